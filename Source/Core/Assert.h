@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cassert>
+
+/// Internal invariants: checked in debug and validation builds, never on user input (that throws).
+#if defined(PALPATE_VALIDATE) || !defined(NDEBUG)
+#include <cstdio>
+#include <cstdlib>
+#define PALPATE_ASSERT(condition)                                                        \
+  do {                                                                                   \
+    if (!(condition)) {                                                                  \
+      std::fprintf(stderr, "%s:%d: %s does not hold\n", __FILE__, __LINE__, #condition); \
+      std::abort();                                                                      \
+    }                                                                                    \
+  } while (false)
+#else
+#define PALPATE_ASSERT(condition) static_cast<void>(0)
+#endif

@@ -1,0 +1,126 @@
+#include "Core/Threads.h"
+
+#include <thread>
+
+#ifdef PALPATE_THREADS_TBB
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+#else
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <exception>
+#include <mutex>
+#include <vector>
+#endif
+
+namespace palpate {
+
+namespace {
+
+int resolved(int count) {
+  if (count > 0) return count;
+  const unsigned cores = std::thread::hardware_concurrency();
+  return cores == 0 ? 1 : static_cast<int>(cores);
+}
+
+}  // namespace
+
+#ifdef PALPATE_THREADS_TBB
+
+struct Threads::Pool {
+  explicit Pool(int count) : arena(count) {}
+  tbb::task_arena arena;
+};
+
+void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* function) const {
+  m_pool->arena.execute([&] {
+    tbb::parallel_for(std::size_t{0}, size, [&](std::size_t i) { call(function, i); }, tbb::simple_partitioner());
+  });
+}
+
+#else
+
+/// A plain pool: the caller and count - 1 workers take indices from one counter.
+struct Threads::Pool {
+  explicit Pool(int count) {
+    for (int i = 1; i < count; ++i) workers.emplace_back([this] { work(); });
+  }
+  ~Pool() {
+    {
+      const std::lock_guard lock(mutex);
+      stopping = true;
+    }
+    wake.notify_all();
+    for (std::thread& worker : workers) worker.join();
+  }
+
+  void run(std::size_t newSize, void (*newCall)(void*, std::size_t), void* newFunction) {
+    {
+      const std::lock_guard lock(mutex);
+      size = newSize;
+      call = newCall;
+      function = newFunction;
+      next = 0;
+      busy = workers.size();
+      failure = nullptr;
+      ++generation;
+    }
+    wake.notify_all();
+    takeAll();
+    std::unique_lock lock(mutex);
+    done.wait(lock, [this] { return busy == 0; });
+    if (failure) std::rethrow_exception(failure);
+  }
+
+  void takeAll() {
+    for (std::size_t i = next++; i < size; i = next++) {
+      try {
+        call(function, i);
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        if (!failure) failure = std::current_exception();
+      }
+    }
+  }
+
+  void work() {
+    std::uint64_t seen = 0;
+    for (;;) {
+      {
+        std::unique_lock lock(mutex);
+        wake.wait(lock, [&] { return stopping || generation != seen; });
+        if (stopping) return;
+        seen = generation;
+      }
+      takeAll();
+      const std::lock_guard lock(mutex);
+      if (--busy == 0) done.notify_one();
+    }
+  }
+
+  std::vector<std::thread> workers;
+  std::mutex mutex;
+  std::condition_variable wake, done;
+  std::atomic<std::size_t> next{0};
+  std::size_t size = 0, busy = 0;
+  std::uint64_t generation = 0;
+  void (*call)(void*, std::size_t) = nullptr;
+  void* function = nullptr;
+  std::exception_ptr failure;
+  bool stopping = false;
+};
+
+void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* function) const {
+  m_pool->run(size, call, function);
+}
+
+#endif
+
+Threads::Threads(int count)
+    : m_count(resolved(count)), m_pool(m_count > 1 ? std::make_unique<Pool>(m_count) : nullptr) {}
+Threads::~Threads() = default;
+Threads::Threads(Threads&&) noexcept = default;
+Threads& Threads::operator=(Threads&&) noexcept = default;
+
+}  // namespace palpate

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <palpate/CollisionData.h>
+#include <palpate/Settings.h>
+
+#include "Core/Buffer.h"
+#include "Geometry/TriangleMesh.h"
+
+#include <cstddef>
+#include <span>
+
+namespace palpate {
+
+/// One pair of meshes in one frame.
+struct MeshPair {
+  const TriangleMesh& a;
+  const TriangleMesh& b;   ///< the same object for self-collision
+  PairSettings settings;   ///< method resolved: not Auto
+  bool self() const { return &a == &b; }
+};
+
+/// What one worker found. Unsorted; cleared and filled again each frame.
+struct ContactBuffers {
+  Buffer<VertexTriangleContact> vertexTriangle, triangleVertex;
+  Buffer<EdgeEdgeContact> edgeEdge;
+  Buffer<TrianglePair> intersectingTriangles;
+  std::size_t featurePairs = 0;    ///< tested
+  std::size_t exactDecisions = 0;  ///< left to exact arithmetic
+  void clear();
+};
+
+/// Appends the contacts of the candidate triangle pairs. Each contact that the pair's method includes comes out
+/// once over all batches of a frame, except Intersection's, which may repeat and are made unique by whoever
+/// orders them. Self-collision: every unordered triangle pair once, adjacent ones and (t, t) excluded or not as
+/// the caller likes: pairs in which nothing is owned cost little.
+/// Threads  safe for different output buffers.
+void findContacts(const MeshPair&, std::span<const TrianglePair> candidates, ContactBuffers& out);
+
+/// The oracle: every vertex against every triangle and every edge against every edge, with no candidates and no
+/// ownership. Same contacts as findContacts over complete candidates.
+void findContactsByBruteForce(const MeshPair&, ContactBuffers& out);
+
+}  // namespace palpate

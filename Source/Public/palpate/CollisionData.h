@@ -1,0 +1,89 @@
+#pragma once
+
+#include <palpate/Export.h>
+#include <palpate/Types.h>
+
+#include <Eigen/Core>
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace palpate {
+
+/// A vertex against a triangle.
+struct VertexTriangleContact {
+  std::uint32_t vertex, triangle;
+  std::array<std::uint32_t, 3> corners;  ///< the triangle's vertices
+  Eigen::Vector3d barycentric;           ///< of the closest point, in the triangle's corner order
+  Eigen::Vector3d normal;                ///< unit, from the triangle towards the vertex
+  double distance;                       ///< L, never negative; at the time of impact for Continuous
+  double timeOfImpact;                   ///< [0, 1] of the step; 0 for the static methods
+};
+
+/// An edge against an edge.
+struct EdgeEdgeContact {
+  std::array<std::uint32_t, 2> edgeA, edgeB;  ///< vertex indices, lower first
+  double weightA, weightB;                    ///< closest point = p0 + weight (p1 - p0)
+  Eigen::Vector3d normal;                     ///< unit, from b towards a
+  double distance, timeOfImpact;              ///< L; [0, 1] of the step
+};
+
+/// Four vertices with signed weights: their weighted sum of positions is the vector between the two
+/// closest points, and weight i times a force along the normal is the force on vertex i.
+struct Stencil {
+  std::array<std::uint32_t, 4> vertices;
+  std::array<double, 4> weights;
+};
+
+/// vertices: the vertex (weight 1), then the triangle's corners (weights -barycentric).
+inline Stencil stencil(const VertexTriangleContact& contact) {
+  return {{contact.vertex, contact.corners[0], contact.corners[1], contact.corners[2]},
+          {1.0, -contact.barycentric[0], -contact.barycentric[1], -contact.barycentric[2]}};
+}
+
+/// vertices: edge a's two ends (positive weights), then edge b's (negative weights).
+inline Stencil stencil(const EdgeEdgeContact& contact) {
+  return {{contact.edgeA[0], contact.edgeA[1], contact.edgeB[0], contact.edgeB[1]},
+          {1.0 - contact.weightA, contact.weightA, contact.weightB - 1.0, -contact.weightB}};
+}
+
+/// The contacts of one pair of geometries in the last frame, sorted by element ids.
+///
+/// Order    vertexTriangle by (vertex, triangle), triangleVertex by (triangle, vertex), edgeEdge by
+///          (edgeA, edgeB), intersectingTriangles by (a, b).
+/// Shapes   spans live until the next call that is not const on their OctreeBasedCD.
+class PALPATE_EXPORT CollisionData {
+ public:
+  struct Contents {
+    std::vector<VertexTriangleContact> vertexTriangle, triangleVertex;
+    std::vector<EdgeEdgeContact> edgeEdge;
+    std::vector<TrianglePair> intersectingTriangles;
+  };
+
+  CollisionData() = default;
+  explicit CollisionData(Contents contents) : m_contents(std::move(contents)) {}
+
+  /// Vertices of the first geometry, triangles of the second.
+  std::span<const VertexTriangleContact> vertexTriangle() const { return m_contents.vertexTriangle; }
+  /// Triangles of the first geometry, vertices of the second; empty for self-collision.
+  std::span<const VertexTriangleContact> triangleVertex() const { return m_contents.triangleVertex; }
+  std::span<const EdgeEdgeContact> edgeEdge() const { return m_contents.edgeEdge; }
+  /// Filled by Method::Intersection.
+  std::span<const TrianglePair> intersectingTriangles() const { return m_contents.intersectingTriangles; }
+  /// Infinity if there is no contact; 0 for the static methods' contacts.
+  double earliestTimeOfImpact() const;
+
+  /// Same contacts, same bits, same hash: over ids, weights, normals, distances and times, in order.
+  std::uint64_t hash() const;
+
+  /// For the engine that fills it.
+  Contents& contents() { return m_contents; }
+
+ private:
+  Contents m_contents;
+};
+
+}  // namespace palpate

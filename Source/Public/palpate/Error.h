@@ -1,0 +1,43 @@
+#pragma once
+
+#include <palpate/Export.h>
+#include <palpate/Types.h>
+
+#include <cstddef>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+namespace palpate {
+
+enum class ErrorCode {
+  NonFinitePosition,   ///< a position is NaN or infinite
+  WrongPositionCount,  ///< as many positions as the geometry has vertices are needed
+  IndexOutOfRange,     ///< a triangle names a vertex that is not there
+  UnknownGeometry,     ///< never added, or removed
+  UnknownPair,         ///< never added, removed, or asked for in the other order
+  DuplicatePair,       ///< added before, in either order
+  InvalidSettings,     ///< a setting outside its range
+  UnsupportedMethod,   ///< this method does not exist yet, or not for these geometries
+  TooLarge,            ///< more elements than 32-bit ids can name
+  NotAvailable,        ///< the answer was not kept, or no frame has been computed
+  File,                ///< a file that cannot be read or written, or is not what it should be
+};
+
+/// What was wrong with a call, and where. The call that throws it has changed nothing.
+class PALPATE_EXPORT Error : public std::runtime_error {
+ public:
+  Error(ErrorCode code, const std::string& sentence, std::optional<GeometryId> geometry = {},
+        std::optional<std::size_t> element = {});
+
+  ErrorCode code() const noexcept { return m_code; }
+  std::optional<GeometryId> geometry() const noexcept { return m_geometry; }  ///< the geometry at fault
+  std::optional<std::size_t> element() const noexcept { return m_element; }   ///< its vertex or triangle
+
+ private:
+  ErrorCode m_code;
+  std::optional<GeometryId> m_geometry;
+  std::optional<std::size_t> m_element;
+};
+
+}  // namespace palpate

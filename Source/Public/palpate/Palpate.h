@@ -1,0 +1,8 @@
+#pragma once
+
+/// Everything that an ordinary user needs.
+#include <palpate/CollisionData.h>
+#include <palpate/Error.h>
+#include <palpate/OctreeBasedCD.h>
+#include <palpate/Settings.h>
+#include <palpate/Types.h>

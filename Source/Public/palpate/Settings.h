@@ -1,0 +1,42 @@
+#pragma once
+
+namespace palpate {
+
+/// How `update()` brings an octree to the positions now.
+enum class OctreeUpdate {
+  Auto,    ///< keep the tree and refit its boxes while that stays tight, else rebuild
+  Rebuild  ///< always rebuild from sorted keys
+};
+
+struct OctreeSettings {
+  int maxDepth = 20;              ///< deepest level, root = 0. [1, 60]. Cells too full at this level stay so.
+  int maxPrimitivesPerLeaf = 16;  ///< a cell with more is split. [1, 1024]. Fewer: more nodes, tighter boxes.
+  OctreeUpdate update = OctreeUpdate::Auto;  ///< contacts do not depend on it
+};
+
+enum class Engine {
+  Octree,     ///< pooled loose octrees
+  BruteForce  ///< every triangle against every other: the oracle, behind the same calls
+};
+
+struct Settings {
+  OctreeSettings octree;
+  Engine engine = Engine::Octree;
+  int threads = 0;              ///< threads of a frame. [0, 1024]; 0: all cores. Results do not depend on it.
+  bool keepCandidates = false;  ///< detectCollision() also fills candidatePairs(); costs their memory and a sort
+};
+
+enum class Method { Auto, Proxy, DistanceField, Intersection, Proximity, Continuous };
+
+enum class Contacts {
+  Distinct,  ///< one per pair of closest features
+  All        ///< every pair that the method's definition includes
+};
+
+struct PairSettings {
+  Method method = Method::Auto;            ///< Auto: Proximity where the thickness is positive, else Intersection
+  double thickness = 0.0;                  ///< L, finite, not negative; Proximity needs it positive
+  Contacts contacts = Contacts::Distinct;  ///< Proximity only; other methods report all
+};
+
+}  // namespace palpate

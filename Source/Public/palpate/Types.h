@@ -1,0 +1,31 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+namespace palpate {
+
+/// A geometry of one OctreeBasedCD. Given out once, never reused.
+enum class GeometryId : std::uint32_t {};
+
+using Triangle = std::array<std::uint32_t, 3>;  ///< vertex indices; winding gives the normal
+using Segment = std::array<std::uint32_t, 2>;   ///< vertex indices, lower first where it is an edge of a mesh
+
+/// Two triangles, by index in their meshes; `a` from the pair's first geometry.
+struct TrianglePair {
+  std::uint32_t a;
+  std::uint32_t b;
+  friend bool operator==(const TrianglePair&, const TrianglePair&) = default;
+  friend auto operator<=>(const TrianglePair&, const TrianglePair&) = default;
+};
+
+/// A mesh that stays with its owner, for calls that need it only once.
+struct TriangleMeshView {
+  std::span<const Eigen::Vector3d> positions;
+  std::span<const Triangle> triangles;
+};
+
+}  // namespace palpate
