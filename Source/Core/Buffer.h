@@ -23,7 +23,8 @@ struct UninitializedAllocator : std::allocator<T> {
   }
 };
 
-/// A vector that is about to be overwritten. Keeps its peak capacity, so a steady frame allocates nothing.
+/// A vector that is about to be overwritten. Keeps its peak capacity, so a steady frame allocates
+/// nothing.
 template <class T>
 using Buffer = std::vector<T, UninitializedAllocator<T>>;
 

@@ -35,7 +35,8 @@ struct Threads::Pool {
 
 void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* function) const {
   m_pool->arena.execute([&] {
-    tbb::parallel_for(std::size_t{0}, size, [&](std::size_t i) { call(function, i); }, tbb::simple_partitioner());
+    tbb::parallel_for(
+        std::size_t{0}, size, [&](std::size_t i) { call(function, i); }, tbb::simple_partitioner());
   });
 }
 

@@ -8,8 +8,8 @@ namespace palpate {
 
 /// The one place for threads: oneTBB, or std::thread where PALPATE_THREADS=STD.
 ///
-/// Work is cut into chunks whose bounds depend on its size only, never on the number of threads, so results
-/// written per chunk are the same for any number.
+/// Work is cut into chunks whose bounds depend on its size only, never on the number of threads, so
+/// results written per chunk are the same for any number.
 class Threads {
  public:
   explicit Threads(int count);  ///< 0: all cores
@@ -19,8 +19,8 @@ class Threads {
 
   int count() const { return m_count; }
 
-  /// f(chunk, begin, end) for each chunk of at most `grain` of [0, size); returns when all are done. An
-  /// exception from f is rethrown here.
+  /// f(chunk, begin, end) for each chunk of at most `grain` of [0, size); returns when all are
+  /// done. An exception from f is rethrown here.
   template <class F>
   void forChunks(std::size_t size, std::size_t grain, F&& f) const {
     if (size == 0) return;

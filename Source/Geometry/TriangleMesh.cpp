@@ -7,7 +7,8 @@ namespace palpate {
 
 namespace {
 
-/// Lists per key from (key, item) incidences that come in ascending order of items; repeats dropped.
+/// Lists per key from (key, item) incidences that come in ascending order of items; repeats
+/// dropped.
 template <class ForEach>
 IndexLists listsByKey(std::size_t keyCount, ForEach&& forEachIncidence) {
   IndexLists lists;
@@ -77,7 +78,8 @@ MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle>
       continue;
     }
     const Triangle& owner = triangles[incident.front()];
-    const auto corner = static_cast<unsigned>(std::find(owner.begin(), owner.end(), v) - owner.begin());
+    const auto corner =
+        static_cast<unsigned>(std::find(owner.begin(), owner.end(), v) - owner.begin());
     owned[incident.front()] |= static_cast<std::uint8_t>(1u << corner);
   }
 }

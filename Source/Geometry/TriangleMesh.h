@@ -23,9 +23,9 @@ struct IndexLists {
 
 /// What follows from the triangles alone, computed once.
 ///
-/// Each vertex and each edge is owned by the lowest triangle that holds it, so that of all the triangle pairs
-/// that a feature pair lies in exactly one tests it. (Curtis et al., Fast collision detection for deformable
-/// models using representative-triangles, I3D 2008.)
+/// Each vertex and each edge is owned by the lowest triangle that holds it, so that of all the
+/// triangle pairs that a feature pair lies in exactly one tests it. (Curtis et al., Fast collision
+/// detection for deformable models using representative-triangles, I3D 2008.)
 struct MeshTopology {
   MeshTopology() = default;
   /// Indices must be below vertexCount.
@@ -36,13 +36,17 @@ struct MeshTopology {
   std::vector<Segment> edges;  ///< unique, lower vertex first, sorted
   /// Edge i joins corners i and i + 1 mod 3; kNoEdge where these are the same vertex.
   std::vector<std::array<std::uint32_t, 3>> triangleEdges;
-  std::vector<std::uint8_t> owned;  ///< per triangle: bit i: owns corner i; bit 3 + i: owns edge i
-  IndexLists vertexTriangles;       ///< ascending triangle ids, each once
-  IndexLists edgeTriangles;         ///< ascending triangle ids, each once
-  std::size_t untestedVertices = 0; ///< in no triangle
+  std::vector<std::uint8_t> owned;   ///< per triangle: bit i: owns corner i; bit 3 + i: owns edge i
+  IndexLists vertexTriangles;        ///< ascending triangle ids, each once
+  IndexLists edgeTriangles;          ///< ascending triangle ids, each once
+  std::size_t untestedVertices = 0;  ///< in no triangle
 
-  bool ownsCorner(std::uint32_t triangle, int corner) const { return owned[triangle] >> corner & 1; }
-  bool ownsEdge(std::uint32_t triangle, int edge) const { return owned[triangle] >> (3 + edge) & 1; }
+  bool ownsCorner(std::uint32_t triangle, int corner) const {
+    return owned[triangle] >> corner & 1;
+  }
+  bool ownsEdge(std::uint32_t triangle, int edge) const {
+    return owned[triangle] >> (3 + edge) & 1;
+  }
 };
 
 /// A triangle mesh as handed in: topology once, positions per frame.

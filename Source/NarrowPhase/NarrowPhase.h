@@ -14,8 +14,8 @@ namespace palpate {
 /// One pair of meshes in one frame.
 struct MeshPair {
   const TriangleMesh& a;
-  const TriangleMesh& b;   ///< the same object for self-collision
-  PairSettings settings;   ///< method resolved: not Auto
+  const TriangleMesh& b;  ///< the same object for self-collision
+  PairSettings settings;  ///< method resolved: not Auto
   bool self() const { return &a == &b; }
 };
 
@@ -29,15 +29,16 @@ struct ContactBuffers {
   void clear();
 };
 
-/// Appends the contacts of the candidate triangle pairs. Each contact that the pair's method includes comes out
-/// once over all batches of a frame, except Intersection's, which may repeat and are made unique by whoever
-/// orders them. Self-collision: every unordered triangle pair once, adjacent ones and (t, t) excluded or not as
-/// the caller likes: pairs in which nothing is owned cost little.
+/// Appends the contacts of the candidate triangle pairs. Each contact that the pair's method
+/// includes comes out once over all batches of a frame, except Intersection's, which may repeat and
+/// are made unique by whoever orders them. Self-collision: every unordered triangle pair once,
+/// adjacent ones and (t, t) excluded or not as the caller likes: pairs in which nothing is owned
+/// cost little.
 /// Threads  safe for different output buffers.
 void findContacts(const MeshPair&, std::span<const TrianglePair> candidates, ContactBuffers& out);
 
-/// The oracle: every vertex against every triangle and every edge against every edge, with no candidates and no
-/// ownership. Same contacts as findContacts over complete candidates.
+/// The oracle: every vertex against every triangle and every edge against every edge, with no
+/// candidates and no ownership. Same contacts as findContacts over complete candidates.
 void findContactsByBruteForce(const MeshPair&, ContactBuffers& out);
 
 }  // namespace palpate

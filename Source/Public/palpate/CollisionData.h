@@ -19,8 +19,8 @@ struct VertexTriangleContact {
   std::array<std::uint32_t, 3> corners;  ///< the triangle's vertices
   Eigen::Vector3d barycentric;           ///< of the closest point, in the triangle's corner order
   Eigen::Vector3d normal;                ///< unit, from the triangle towards the vertex
-  double distance;                       ///< L, never negative; at the time of impact for Continuous
-  double timeOfImpact;                   ///< [0, 1] of the step; 0 for the static methods
+  double distance;      ///< L, never negative; at the time of impact for Continuous
+  double timeOfImpact;  ///< [0, 1] of the step; 0 for the static methods
 };
 
 /// An edge against an edge.
@@ -67,16 +67,23 @@ class PALPATE_EXPORT CollisionData {
   explicit CollisionData(Contents contents) : m_contents(std::move(contents)) {}
 
   /// Vertices of the first geometry, triangles of the second.
-  std::span<const VertexTriangleContact> vertexTriangle() const { return m_contents.vertexTriangle; }
+  std::span<const VertexTriangleContact> vertexTriangle() const {
+    return m_contents.vertexTriangle;
+  }
   /// Triangles of the first geometry, vertices of the second; empty for self-collision.
-  std::span<const VertexTriangleContact> triangleVertex() const { return m_contents.triangleVertex; }
+  std::span<const VertexTriangleContact> triangleVertex() const {
+    return m_contents.triangleVertex;
+  }
   std::span<const EdgeEdgeContact> edgeEdge() const { return m_contents.edgeEdge; }
   /// Filled by Method::Intersection.
-  std::span<const TrianglePair> intersectingTriangles() const { return m_contents.intersectingTriangles; }
+  std::span<const TrianglePair> intersectingTriangles() const {
+    return m_contents.intersectingTriangles;
+  }
   /// Infinity if there is no contact; 0 for the static methods' contacts.
   double earliestTimeOfImpact() const;
 
-  /// Same contacts, same bits, same hash: over ids, weights, normals, distances and times, in order.
+  /// Same contacts, same bits, same hash: over ids, weights, normals, distances and times, in
+  /// order.
   std::uint64_t hash() const;
 
   /// For the engine that fills it.

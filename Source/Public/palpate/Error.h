@@ -31,8 +31,10 @@ class PALPATE_EXPORT Error : public std::runtime_error {
         std::optional<std::size_t> element = {});
 
   ErrorCode code() const noexcept { return m_code; }
-  std::optional<GeometryId> geometry() const noexcept { return m_geometry; }  ///< the geometry at fault
-  std::optional<std::size_t> element() const noexcept { return m_element; }   ///< its vertex or triangle
+  /// the geometry at fault
+  std::optional<GeometryId> geometry() const noexcept { return m_geometry; }
+  /// its vertex or triangle
+  std::optional<std::size_t> element() const noexcept { return m_element; }
 
  private:
   ErrorCode m_code;

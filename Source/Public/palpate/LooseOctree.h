@@ -16,14 +16,14 @@
 namespace palpate {
 
 struct OctreeStatistics {
-  std::size_t nodesInUse = 0;     ///< that hold something in their subtree
-  std::size_t nodesAllocated = 0; ///< eight per block of the pool, used or free
+  std::size_t nodesInUse = 0;      ///< that hold something in their subtree
+  std::size_t nodesAllocated = 0;  ///< eight per block of the pool, used or free
   std::size_t blocksInUse = 0, blocksFree = 0, blocksAllocated = 0;
   int deepestLevel = 0;
   std::size_t primitives = 0;
   std::size_t mostPrimitivesInNode = 0;
   std::vector<std::size_t> nodesByDepth, primitivesByDepth;
-  std::size_t bytes = 0;          ///< boxes, keys, nodes and scratch together
+  std::size_t bytes = 0;  ///< boxes, keys, nodes and scratch together
 };
 
 /// The last frame's octrees: one for each geometry, all in one pool of blocks of eight siblings.
@@ -37,14 +37,17 @@ class PALPATE_EXPORT LooseOctree {
 
   struct Node {
     GeometryId geometry;
-    int depth;                       ///< root: 0
-    Eigen::AlignedBox3d bounds;      ///< the cell's cube
-    Eigen::AlignedBox3d looseBounds; ///< the cube doubled about its centre
-    Eigen::AlignedBox3d fittedBox;   ///< of all that the subtree holds, at most outward-rounded float wider
-    std::uint64_t geometries;        ///< group set: bit (geometry id mod 64) of each geometry in the subtree
+    int depth;                        ///< root: 0
+    Eigen::AlignedBox3d bounds;       ///< the cell's cube
+    Eigen::AlignedBox3d looseBounds;  ///< the cube doubled about its centre
+    /// of all that the subtree holds, at most outward-rounded float wider
+    Eigen::AlignedBox3d fittedBox;
+    /// group set: bit (geometry id mod 64) of each geometry in the subtree
+    std::uint64_t geometries;
     std::optional<NodeId> parent;
-    std::array<std::optional<NodeId>, 8> children;  ///< by octant (bit 0: x, 1: y, 2: z); empty ones absent
-    std::span<const std::uint32_t> primitives;      ///< triangles held by this node itself
+    /// by octant (bit 0: x, 1: y, 2: z); empty ones absent
+    std::array<std::optional<NodeId>, 8> children;
+    std::span<const std::uint32_t> primitives;  ///< triangles held by this node itself
     bool leaf;
   };
 
@@ -56,9 +59,9 @@ class PALPATE_EXPORT LooseOctree {
   Update lastUpdate(GeometryId) const;  ///< what the last update() did to its tree
   OctreeStatistics statistics() const;
 
-  /// Every invariant: each primitive in exactly one node and within the fitted boxes above it, fitted
-  /// boxes tight, links both ways, free + used = allocated; after a rebuild also: each primitive in the
-  /// cell of its centre and inside that cell's loose bounds. Cost O(primitives).
+  /// Every invariant: each primitive in exactly one node and within the fitted boxes above it,
+  /// fitted boxes tight, links both ways, free + used = allocated; after a rebuild also: each
+  /// primitive in the cell of its centre and inside that cell's loose bounds. Cost O(primitives).
   /// Returns what does not hold, one sentence each; empty when all does.
   std::vector<std::string> validate() const;
 

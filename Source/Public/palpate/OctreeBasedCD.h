@@ -19,8 +19,8 @@ struct CollisionPair {
   PairSettings settings;
 };
 
-/// Collision detection over deforming triangle meshes: add geometries and pairs once, then each frame
-/// setPositions(), detectCollision(), and read collisionData().
+/// Collision detection over deforming triangle meshes: add geometries and pairs once, then each
+/// frame setPositions(), detectCollision(), and read collisionData().
 ///
 /// Errors   every function that takes data throws palpate::Error and changes nothing.
 /// Threads  const functions are safe from many threads while no other function runs.
@@ -32,16 +32,19 @@ class PALPATE_EXPORT OctreeBasedCD {
   ~OctreeBasedCD();
 
   /// Any soup: several components, borders, non-manifold edges, no triangles at all. Copied in.
-  GeometryId addTriangleMesh(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles);
+  GeometryId addTriangleMesh(std::span<const Eigen::Vector3d> positions,
+                             std::span<const Triangle> triangles);
   void removeGeometry(GeometryId);  ///< and its pairs
 
-  /// A frame ends at detectCollision() or collectCandidates(). With one array, "before" is the "now" of
-  /// the last frame; with two, both are given. Without new positions both stay; of several calls before a
-  /// frame the last counts; at first, and after setTriangles(), before = now.
+  /// A frame ends at detectCollision() or collectCandidates(). With one array, "before" is the
+  /// "now" of the last frame; with two, both are given. Without new positions both stay; of several
+  /// calls before a frame the last counts; at first, and after setTriangles(), before = now.
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> now);
-  void setPositions(GeometryId, std::span<const Eigen::Vector3d> before, std::span<const Eigen::Vector3d> now);
+  void setPositions(GeometryId, std::span<const Eigen::Vector3d> before,
+                    std::span<const Eigen::Vector3d> now);
   /// Topology changed, as by a cut.
-  void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions, std::span<const Triangle>);
+  void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
+                    std::span<const Triangle>);
 
   /// a == b: self-collision, adjacent features excluded.
   void addCollisionPair(GeometryId a, GeometryId b, const PairSettings& = {});
@@ -49,28 +52,32 @@ class PALPATE_EXPORT OctreeBasedCD {
   void removeCollisionPair(GeometryId a, GeometryId b);
   std::span<const CollisionPair> pairs() const;  ///< in the order added
 
-  void update();             ///< boxes and octrees for the positions now
-  void collectCandidates();  ///< broad phase only, for a narrow phase of your own; fills candidatePairs()
-  void detectCollision();    ///< broad and narrow phase of every pair; updates if needed
+  void update();  ///< boxes and octrees for the positions now
+  /// broad phase only, for a narrow phase of your own; fills candidatePairs()
+  void collectCandidates();
+  void detectCollision();  ///< broad and narrow phase of every pair; updates if needed
 
-  /// Hands candidate pairs to f(std::span<const TrianglePair>) in batches, unsorted, from the calling
-  /// thread; memory does not grow with their number. Updates if needed.
+  /// Hands candidate pairs to f(std::span<const TrianglePair>) in batches, unsorted, from the
+  /// calling thread; memory does not grow with their number. Updates if needed.
   template <class F>
   void forEachCandidate(GeometryId a, GeometryId b, F&& f) {
     using Function = std::remove_reference_t<F>;
     forEachCandidateBatch(
-        a, b, [](void* function, std::span<const TrianglePair> batch) { (*static_cast<Function*>(function))(batch); },
+        a, b,
+        [](void* function, std::span<const TrianglePair> batch) {
+          (*static_cast<Function*>(function))(batch);
+        },
         const_cast<void*>(static_cast<const void*>(std::addressof(f))));
   }
 
   /// (a, b) in the order in which the pair was added.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;
   /// Sorted by (a, b): every triangle pair whose boxes, inflated by half the pair's thickness each,
-  /// overlap; more only by outward rounding. (a, a): each unordered pair once, a < b, sharing no vertex.
-  /// After detectCollision() only with Settings::keepCandidates.
+  /// overlap; more only by outward rounding. (a, a): each unordered pair once, a < b, sharing no
+  /// vertex. After detectCollision() only with Settings::keepCandidates.
   std::span<const TrianglePair> candidatePairs(GeometryId a, GeometryId b) const;
-  const LooseOctree& octree() const;           ///< as of the last update()
-  const FrameStatistics& statistics() const;   ///< of the last frame
+  const LooseOctree& octree() const;          ///< as of the last update()
+  const FrameStatistics& statistics() const;  ///< of the last frame
   const Settings& settings() const;
 
  private:

@@ -9,8 +9,9 @@ enum class OctreeUpdate {
 };
 
 struct OctreeSettings {
-  int maxDepth = 20;              ///< deepest level, root = 0. [1, 60]. Cells too full at this level stay so.
-  int maxPrimitivesPerLeaf = 16;  ///< a cell with more is split. [1, 1024]. Fewer: more nodes, tighter boxes.
+  int maxDepth = 20;  ///< deepest level, root = 0. [1, 60]. Cells too full at this level stay so.
+  /// a cell with more is split. [1, 1024]. Fewer: more nodes, tighter boxes.
+  int maxPrimitivesPerLeaf = 16;
   OctreeUpdate update = OctreeUpdate::Auto;  ///< contacts do not depend on it
 };
 
@@ -22,8 +23,9 @@ enum class Engine {
 struct Settings {
   OctreeSettings octree;
   Engine engine = Engine::Octree;
-  int threads = 0;              ///< threads of a frame. [0, 1024]; 0: all cores. Results do not depend on it.
-  bool keepCandidates = false;  ///< detectCollision() also fills candidatePairs(); costs their memory and a sort
+  int threads = 0;  ///< threads of a frame. [0, 1024]; 0: all cores. Results do not depend on it.
+  /// detectCollision() also fills candidatePairs(); costs their memory and a sort
+  bool keepCandidates = false;
 };
 
 enum class Method { Auto, Proxy, DistanceField, Intersection, Proximity, Continuous };
@@ -34,7 +36,8 @@ enum class Contacts {
 };
 
 struct PairSettings {
-  Method method = Method::Auto;            ///< Auto: Proximity where the thickness is positive, else Intersection
+  /// Auto: Proximity where the thickness is positive, else Intersection
+  Method method = Method::Auto;
   double thickness = 0.0;                  ///< L, finite, not negative; Proximity needs it positive
   Contacts contacts = Contacts::Distinct;  ///< Proximity only; other methods report all
 };

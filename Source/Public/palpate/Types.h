@@ -12,7 +12,8 @@ namespace palpate {
 enum class GeometryId : std::uint32_t {};
 
 using Triangle = std::array<std::uint32_t, 3>;  ///< vertex indices; winding gives the normal
-using Segment = std::array<std::uint32_t, 2>;   ///< vertex indices, lower first where it is an edge of a mesh
+/// vertex indices, lower first where it is an edge of a mesh
+using Segment = std::array<std::uint32_t, 2>;
 
 /// Two triangles, by index in their meshes; `a` from the pair's first geometry.
 struct TrianglePair {
