@@ -1,0 +1,21 @@
+# The installed tree: public headers, libraries, and the package file that find_package(Palpate) reads.
+include(CMakePackageConfigHelpers)
+
+set(packageFolder ${CMAKE_INSTALL_LIBDIR}/cmake/Palpate)
+set(components Palpate)
+if(TARGET PalpateVtk)
+  list(APPEND components PalpateVtk)
+endif()
+if(TARGET PalpateFcl)
+  list(APPEND components PalpateFcl)
+endif()
+install(TARGETS ${components} EXPORT PalpateTargets FILE_SET HEADERS)
+install(EXPORT PalpateTargets NAMESPACE Palpate:: DESTINATION ${packageFolder})
+
+configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/PalpateConfig.cmake.in
+  ${PROJECT_BINARY_DIR}/PalpateConfig.cmake INSTALL_DESTINATION ${packageFolder})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/PalpateConfigVersion.cmake
+  COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/PalpateConfig.cmake ${PROJECT_BINARY_DIR}/PalpateConfigVersion.cmake
+  DESTINATION ${packageFolder})
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})

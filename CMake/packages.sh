@@ -1,0 +1,33 @@
+#!/bin/bash
+# CMake/packages.sh SET...: installs the Debian packages of the named sets (build, test, benchmark),
+# as root or through sudo. Returns at once when all are there.
+set -euo pipefail
+
+build="cmake ninja-build g++ pkg-config libeigen3-dev libtbb-dev libhwy-dev libgmp-dev
+  libvtk9-dev libfcl-dev libccd-dev libcli11-dev xvfb xauth libgl1-mesa-dri"
+test="libgtest-dev libcgal-dev libmpfr-dev clang-format-14 qemu-user"
+benchmark="libbenchmark-dev libembree-dev libbullet-dev libcgal-dev"
+
+missing=()
+for set in "$@"; do
+  for package in ${!set}; do
+    state=$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)
+    [[ $state == installed ]] || missing+=("$package")
+  done
+done
+[[ ${#missing[@]} -eq 0 ]] && exit 0
+
+echo "packages: installing ${missing[*]}"
+if [[ $(id -u) -eq 0 ]]; then
+  asRoot=()
+elif command -v sudo >/dev/null; then
+  asRoot=(sudo)
+else
+  echo "packages: neither root nor sudo; as root, run: apt-get install ${missing[*]}" >&2
+  exit 1
+fi
+aptGet() {
+  "${asRoot[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::Use-Pty=0 "$@" </dev/null
+}
+aptGet update
+aptGet install -y --no-install-recommends "${missing[@]}" >/dev/null
