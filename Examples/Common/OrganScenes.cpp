@@ -1,0 +1,111 @@
+#include "Scenes.h"
+
+#include <Eigen/Geometry>
+
+#include <cmath>
+#include <numbers>
+
+namespace palpate::scenes {
+
+using Eigen::Vector3d;
+using std::numbers::pi;
+
+namespace {
+
+/// A sphere made bumpy (star-shaped while the bumps stay below 1), stretched, tapered and bent
+/// along x.
+struct OrganShape {
+  const char* name;
+  int frequency;
+  Vector3d radii;
+  double bumps;  ///< of the radius
+  Vector3d bumpWaves;
+  double taper;  ///< at x = 1 the section is 1 + taper as large
+  double bend;   ///< at x = 1 the section is bend higher
+};
+
+const std::array<OrganShape, 5> kOrganShapes{{
+    {"Liver", 11, {1.25, 0.85, 0.75}, 0.10, {3.1, 4.3, 2.2}, -0.35, -0.15},
+    {"Stomach", 11, {1.15, 0.80, 0.80}, 0.08, {4.0, 2.5, 3.7}, 0.25, 0.30},
+    {"Kidney", 10, {1.05, 0.80, 0.75}, 0.05, {2.0, 5.0, 3.0}, 0.05, 0.35},
+    {"Spleen", 10, {1.10, 0.85, 0.70}, 0.07, {5.2, 3.3, 4.1}, 0.15, -0.25},
+    {"Gallbladder", 10, {1.15, 0.75, 0.75}, 0.06, {2.7, 2.9, 5.1}, 0.40, 0.10},
+}};
+
+SceneMesh shaped(const OrganShape& shape) {
+  SceneMesh mesh = sphere(shape.frequency);
+  for (Vector3d& p : mesh.positions) {
+    const Vector3d waves = (shape.bumpWaves.cwiseProduct(p)).array().sin();
+    p = (shape.radii.cwiseProduct(p) * (1.0 + shape.bumps * waves.sum())).eval();
+    p.tail<2>() *= 1.0 + shape.taper * p.x();
+    p.z() += shape.bend * p.x() * p.x();
+    p = (p * 1e6).array().round() / 1e6;
+  }
+  return mesh;
+}
+
+/// Towards body `index` of `count`, evenly around the z axis and alternately above and below.
+Vector3d direction(std::size_t index, std::size_t count) {
+  const double angle = 2 * pi * static_cast<double>(index) / static_cast<double>(count);
+  return Vector3d(std::cos(angle), std::sin(angle), count > 2 ? (index % 2 == 0 ? 0.4 : -0.4) : 0.0)
+      .normalized();
+}
+
+/// Glides from one side through the centre to the other and back, breathes, ripples and turns on
+/// the way.
+Motion glide(std::size_t index, std::size_t count, double reach, double size) {
+  const Vector3d towards = direction(index, count);
+  const double phase = 1.3 * static_cast<double>(index);
+  const Vector3d axis = Vector3d(towards.z(), towards.x(), 1.0).normalized();
+  return [=](const Vector3d& rest, double time) -> Vector3d {
+    const double beat = 2 * pi * 6 * time + phase;
+    const Vector3d wave = rest * (3.0 / size);
+    const Vector3d ripple(std::sin(wave.y() + beat), std::sin(wave.z() + beat),
+                          std::sin(wave.x() + beat));
+    const Vector3d deformed = rest * (1.0 + 0.04 * std::sin(beat)) + 0.03 * size * ripple;
+    const Eigen::AngleAxisd turn(0.5 * std::sin(2 * pi * time), axis);
+    return turn * deformed + reach * std::cos(2 * pi * time) * towards;
+  };
+}
+
+Scene glidingScene(std::string name, std::vector<SceneMesh> meshes, double reach, double size) {
+  Scene scene{std::move(name), std::move(meshes), {}, {}};
+  for (std::size_t b = 0; b < scene.meshes.size(); ++b) {
+    scene.motions.push_back(glide(b, scene.meshes.size(), reach, size));
+    for (std::size_t a = 0; a < b; ++a) scene.pairs.emplace_back(a, b);
+  }
+  scene.thickness = meanEdge(scene.meshes) / 20;
+  return scene;
+}
+
+}  // namespace
+
+std::vector<Organ> organMeshes() {
+  std::vector<Organ> organs;
+  for (const OrganShape& shape : kOrganShapes) organs.push_back({shape.name, shaped(shape)});
+  return organs;
+}
+
+std::string organObj(const Organ& organ) {
+  return toObj(organ.mesh, organ.name + ": made by Examples/Common, see Data/README.md");
+}
+
+Scene organs() {
+  std::vector<SceneMesh> meshes;
+  for (Organ& organ : organMeshes()) meshes.push_back(std::move(organ.mesh));
+  return glidingScene("organs", std::move(meshes), 1.45, 1.0);
+}
+
+Scene glidingMeshes(std::vector<SceneMesh> meshes) {
+  if (meshes.size() == 1) meshes.push_back(meshes.front());
+  double size = 0;
+  for (SceneMesh& mesh : meshes) {
+    Eigen::AlignedBox3d box;
+    for (const Vector3d& p : mesh.positions) box.extend(p);
+    for (Vector3d& p : mesh.positions) p -= box.center();
+    if (!box.isEmpty()) size = std::max(size, box.sizes().norm() / 2);
+  }
+  return glidingScene("meshes", std::move(meshes), 1.2 * size, size);
+}
+
+}  // namespace palpate::scenes

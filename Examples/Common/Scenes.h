@@ -1,0 +1,59 @@
+#pragma once
+
+#include "Meshes.h"
+
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace palpate::scenes {
+
+/// Where a vertex at `rest` is at `time` in [0, 1] of the scene's period.
+using Motion = std::function<Eigen::Vector3d(const Eigen::Vector3d& rest, double time)>;
+
+/// Meshes that move, the same in every run: shared by tests, benchmarks and examples.
+struct Scene {
+  std::string name;
+  std::vector<SceneMesh> meshes;                           ///< at rest
+  std::vector<Motion> motions;                             ///< one per mesh
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;  ///< of meshes; (m, m): self-collision
+  double thickness = 0;                                    ///< L: a twentieth of the mean edge
+  int frames = 120;                                        ///< after which the motion repeats
+
+  /// Of a mesh in any frame (0, 1, ...); overwrites `out`.
+  void positions(int frame, std::size_t mesh, std::vector<Eigen::Vector3d>& out) const;
+  std::size_t triangleCount() const;
+};
+
+/// Five closed deforming organs, 10,840 triangles, that glide through their common centre and back.
+Scene organs();
+
+/// The organs at rest, as in Data/Organs: closed, outward winding, coordinates multiples of 1e-6.
+struct Organ {
+  std::string name;
+  SceneMesh mesh;
+};
+std::vector<Organ> organMeshes();
+std::string organObj(const Organ& organ);  ///< the text of its file in Data/Organs
+
+/// Any meshes, centred, that glide through each other as the organs do; at least one, one meets its
+/// copy.
+Scene glidingMeshes(std::vector<SceneMesh> meshes);
+
+/// A sheet of 112,338 triangles that settles on a ball and hangs down around it in folds.
+Scene clothOnBall();
+
+/// Two bodies of 103,292 triangles in all, whose sizes span four orders of magnitude.
+Scene unevenBodies();
+
+/// Two wavy sheets that cross each other everywhere, of about `triangles` triangles in all.
+Scene interleavedSheets(std::size_t triangles);
+
+/// Self-collision: a sheet of 18,050 triangles pushed together into overlapping pleats.
+Scene foldedCloth();
+
+/// Self-collision: one mesh of seven rods, 80,640 triangles, twisted about their common axis.
+Scene twistedRods();
+
+}  // namespace palpate::scenes
