@@ -1,0 +1,132 @@
+#!/bin/bash
+# check.sh CHECK ROOT [ARGUMENT...]: what the design promises of the house itself, one check a call.
+# Prints each line at fault and fails if there is one; 77: skipped. CheckBreaks.sh shows that each fails.
+set -uo pipefail
+cd "$2"
+check=$1
+shift 2
+faults=0
+fault() { echo "$*"; faults=1; }
+sourceFiles() { find Source -name '*.h' -o -name '*.cpp' | sort; }
+
+# include lines of a file, one a line: <name> or "name
+includesOf() { sed -nE 's/^[[:space:]]*#[[:space:]]*include[[:space:]]+([<"][^>"]+).*/\1/p' "$1"; }
+
+# What a room may include, by the table in DESIGN: folders, or files of them.
+allowedIn() {
+  case $1 in
+    Core) echo "Core/" ;;
+    Math) echo "Math/ Core/" ;;
+    Geometry) echo "Geometry/ Math/ Core/" ;;
+    Octree) echo "Octree/ Math/Box Core/" ;;
+    NarrowPhase) echo "NarrowPhase/ Geometry/ Math/ Core/" ;;
+    DistanceField) echo "DistanceField/ Octree/ Geometry/ Math/ Core/" ;;
+    CollisionDetection) echo "CollisionDetection/ DistanceField/ NarrowPhase/ Octree/ Geometry/ Math/ Core/" ;;
+    Vtk | Fcl) echo "$1/" ;;
+  esac
+}
+
+# Includes go down the table only; Core sees no more of Public than its plain types.
+checkIncludes() {
+  local file room include allowed prefix
+  while read -r file; do
+    room=${file#Source/} room=${room%%/*} allowed=$(allowedIn "$room")
+    while read -r include; do
+      case $include in
+        \"*)
+          for prefix in $allowed; do [[ ${include#\"} == "$prefix"* ]] && continue 2; done
+          fault "$file: $room may not include ${include#\"}"
+          ;;
+        "<palpate/"*)
+          [[ $room != Core || $include =~ ^.palpate/(Types|Error|Export|Settings)\.h$ ]] ||
+            fault "$file: Core may include Public's plain types only, not ${include#<}"
+          ;;
+      esac
+    done < <(includesOf "$file")
+  done < <(sourceFiles)
+}
+
+# Each library in its one place; besides them the standard library and Eigen's Core and Geometry only.
+checkPlaces() {
+  local file include place
+  while read -r file; do
+    while read -r include; do
+      case $include in
+        "<palpate/"* | "<Eigen/Core" | "<Eigen/Geometry") continue ;;
+        "<tbb/"* | "<oneapi/"* | "<thread" | "<mutex" | "<shared_mutex" | "<condition_variable" | "<future" | "<execution")
+          place=Source/Core/Threads.cpp ;;
+        "<hwy/"*) place=Source/Core/Simd.h ;;
+        "<gmp"*) place=Source/Math/Exact ;;
+        "<vtk"*) place=Source/Vtk/ ;;
+        "<fcl/"* | "<ccd/"*) place=Source/Fcl/ ;;
+        *[./]*) place=nowhere ;;
+        *) continue ;;
+      esac
+      [[ $file == "$place"* ]] || fault "$file: ${include#<} may be included in $place only"
+    done < <(includesOf "$file" | grep '^<')
+  done < <(sourceFiles)
+}
+
+# Each public header compiles alone, includes nothing of Eigen but Core and Geometry, and reaches no file
+# that these and the standard library do not.
+# Arguments: the compiler, Eigen's folder.
+checkPublicHeaders() {
+  local compile=("$1" -std=c++20 -Wall -Wextra -Werror -x c++ -ISource/Public -isystem "$2") header include
+  reached() { "${compile[@]}" -M "$@" | tr ' \\' '\n\n' | grep / | sort -u; }
+  local allowed
+  allowed=$(printf '#include <bits/stdc++.h>\n#include <Eigen/Core>\n#include <Eigen/Geometry>\n' |
+    reached -D_GLIBCXX_USE_TBB_PAR_BACKEND=0 -)
+  for header in Source/Public/palpate/*.h; do
+    "${compile[@]}" -fsyntax-only -include "$header" /dev/null || fault "$header does not compile alone"
+    while read -r include; do
+      [[ $include =~ ^.palpate/[A-Za-z]+\.h$|^\<Eigen/(Core|Geometry)$|^\<[a-z_]+$ ]] ||
+        fault "$header includes ${include:1}"
+    done < <(includesOf "$header")
+    while read -r include; do fault "$header reaches $include"; done < <(
+      comm -13 <(echo "$allowed") <(reached -include "$header" /dev/null) | grep -vE '^(Source/Public/palpate/|/dev/null)')
+  done
+}
+
+# A shared library exports nothing outside namespace palpate. Arguments: the libraries.
+checkSymbols() {
+  local library symbol
+  for library in "$@"; do
+    nm -D --defined-only "$library" | grep -q 7palpate || fault "$library exports nothing of palpate"
+    while read -r symbol; do fault "$library exports $symbol"; done < <(
+      nm -D --defined-only "$library" | awk '{print $3}' |
+        grep -vE '^_Z(T[ISVT]|G[VR]|Z)?N?[VKRO]*7palpate' | c++filt)
+  done
+}
+
+# No file is compiled with -m flags of its own. Arguments: the compile commands, flags given for all.
+checkFlags() {
+  local commands=$1 line
+  [[ -s $commands ]] || fault "$commands is missing"
+  while read -r line; do fault "$line"; done < <(
+    grep '"command"' "$commands" | sed "s|${2:- }| |g" |
+      grep -oE ' -(m[a-z][^ ]*|ffast-math|Ofast) .* -c [^ ]*' | sed -E 's| .* -c | for |')
+}
+
+checkFormat() {
+  local tool
+  tool=$(command -v clang-format-14) || {
+    echo "skipped: clang-format-14 is not installed"
+    exit 77
+  }
+  find Source Examples Testing -name '*.h' -o -name '*.cpp' | xargs "$tool" --dry-run -Werror --style=file || faults=1
+}
+
+# Names that say nothing, and the size of it all.
+checkWords() {
+  local line lines
+  while read -r line; do fault "banned name: $line"; done < <(
+    grep -rnE --include='*.h' --include='*.cpp' '[A-Za-z](Manager|Helper|Utils)\b|\b(Manager|Helper|Utils)|\bdata2\b' \
+      Source Examples Testing
+    find Source Examples Testing -name '*Manager*' -o -name '*Helper*' -o -name '*Utils*')
+  lines=$(sourceFiles | xargs cat | wc -l)
+  echo "Source has $lines lines"
+  ((lines < 10000)) || fault "Source has 10,000 lines or more"
+}
+
+"check$check" "$@"
+exit $faults
