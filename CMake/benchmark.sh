@@ -1,0 +1,12 @@
+#!/bin/bash
+# From nothing to the whole table of Docs/Performance.md: packages, the benchmark preset, the race, its CSV.
+# Arguments go to palpate_race (--help lists them), for example: --scenes organs,cloth --threads 1
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+CMake/packages.sh build benchmark
+cmake --preset benchmark
+cmake --build --preset benchmark --parallel "$(nproc)"
+build/benchmark/Testing/Benchmark/palpate_race --csv build/benchmark/race.csv \
+  --commit "$(git describe --always --dirty 2>/dev/null || echo unknown)" "$@"
+echo "figures: build/benchmark/race.csv"

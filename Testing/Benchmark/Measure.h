@@ -1,0 +1,55 @@
+#pragma once
+
+#include "Workload.h"
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace palpate::benchmark {
+
+double median(std::vector<double> values);
+double quantile(std::vector<double> values, double fraction);  ///< fraction in [0, 1]
+/// Milliseconds on a steady clock, from an arbitrary start.
+double now();
+
+/// An engine's pairs against the truth: all pairs that any engine of the race found and whose exact
+/// boxes overlap.
+struct SetCheck {
+  std::size_t missed = 0;
+  std::size_t extra = 0;   ///< boxes apart, reported by outward rounding
+  double widestExtra = 0;  ///< the widest gap among those, in units of the largest coordinate
+  bool equal() const { return missed == 0 && extra == 0; }
+};
+
+struct Entry {
+  std::string engine;
+  bool rebuilds = false;
+  double total = 0, update = 0;     ///< ms: median over every frame of every repetition
+  double fastest = 0, worst = 0;    ///< ms: of those frames
+  std::vector<double> repetitions;  ///< ms: median over the frames of each
+  SetCheck check;
+};
+
+struct Outcome {
+  std::vector<Entry> entries;
+  std::size_t checkedFrames = 0;
+  double medianPairs = 0, mostPairs = 0;  ///< over the checked frames
+  std::uint64_t hash = 0;  ///< of the first engine's sorted pairs in the checked frames
+};
+
+struct MeasureOptions {
+  int repetitions = 5;
+  double secondsPerEngine = 2;  ///< no further repetition of an engine that took longer
+};
+
+/// Repetitions of all engines take turns, so that what disturbs the machine meets them alike. In
+/// each, the first frame is not timed (a jump back in the motion).
+Outcome measure(const Workload&, std::span<const std::unique_ptr<Peer>> engines,
+                const MeasureOptions&);
+
+/// How many times as long as the first engine: the median over the repetitions that both have.
+double ratio(const Entry& entry, const Entry& first);
+
+}  // namespace palpate::benchmark
