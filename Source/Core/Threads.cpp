@@ -1,8 +1,10 @@
 #include "Core/Threads.h"
 
+#include <algorithm>
 #include <thread>
 
 #ifdef PALPATE_THREADS_TBB
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 #else
@@ -28,8 +30,14 @@ int resolved(int count) {
 
 #ifdef PALPATE_THREADS_TBB
 
+/// At most as many workers as the process may have: oneTBB has no more, and prints a warning when
+/// asked.
 struct Threads::Pool {
-  explicit Pool(int count) : arena(count) {}
+  explicit Pool(int count) : arena(std::min(count, allowed())) {}
+  static int allowed() {
+    return static_cast<int>(
+        tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  }
   tbb::task_arena arena;
 };
 
@@ -41,6 +49,9 @@ void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* func
 }
 
 #else
+
+/// Whether this thread is in a run: one within a run has no pool of its own and runs where it is.
+static thread_local bool isRunning = false;
 
 /// A plain pool: the caller and count - 1 workers take indices from one counter.
 struct Threads::Pool {
@@ -75,6 +86,7 @@ struct Threads::Pool {
   }
 
   void takeAll() {
+    isRunning = true;
     for (std::size_t i = next++; i < size; i = next++) {
       try {
         call(function, i);
@@ -83,6 +95,7 @@ struct Threads::Pool {
         if (!failure) failure = std::current_exception();
       }
     }
+    isRunning = false;
   }
 
   void work() {
@@ -113,7 +126,11 @@ struct Threads::Pool {
 };
 
 void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* function) const {
-  m_pool->run(size, call, function);
+  if (isRunning) {
+    for (std::size_t i = 0; i < size; ++i) call(function, i);
+  } else {
+    m_pool->run(size, call, function);
+  }
 }
 
 #endif

@@ -1,0 +1,129 @@
+#include "Core/Threads.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <numeric>
+#include <stdexcept>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+namespace palpate {
+namespace {
+
+const std::vector<int> kCounts{1, 2, 3, 8};
+
+TEST(Threads, CountIsAsAskedAndNeverZero) {
+  for (int count : kCounts) EXPECT_EQ(Threads(count).count(), count);
+  EXPECT_GE(Threads(0).count(), 1);
+}
+
+TEST(Threads, ChunksDependOnSizeAndGrainOnly) {
+  using Chunk = std::tuple<std::size_t, std::size_t, std::size_t>;
+  for (std::size_t size : {0u, 1u, 9u, 10u, 11u, 99u, 1000u}) {
+    for (std::size_t grain : {1u, 10u, 2000u}) {
+      std::vector<Chunk> expected;
+      for (std::size_t begin = 0; begin < size; begin += grain)
+        expected.emplace_back(begin / grain, begin, std::min(begin + grain, size));
+      for (int count : kCounts) {
+        std::vector<Chunk> chunks((size + grain - 1) / grain);
+        Threads(count).forChunks(size, grain,
+                                 [&](std::size_t i, std::size_t begin, std::size_t end) {
+                                   chunks[i] = {i, begin, end};
+                                 });
+        EXPECT_EQ(chunks, expected) << size << " by " << grain << " on " << count;
+      }
+    }
+  }
+}
+
+TEST(Threads, EachIndexRunsOnceAndItsWritesAreSeen) {
+  for (int count : kCounts) {
+    const Threads threads(count);
+    std::vector<int> runs(10'000, 0);
+    threads.forEach(runs.size(), [&](std::size_t i) { ++runs[i]; });
+    EXPECT_TRUE(std::all_of(runs.begin(), runs.end(), [](int n) { return n == 1; })) << count;
+  }
+}
+
+TEST(Threads, ManySmallRunsOnOnePool) {
+  for (int count : kCounts) {
+    const Threads threads(count);
+    std::uint64_t sum = 0;
+    for (std::size_t run = 0; run < 3000; ++run) {
+      std::vector<std::uint64_t> parts(run % 7);
+      threads.forEach(parts.size(), [&](std::size_t i) { parts[i] = run + i; });
+      sum += std::accumulate(parts.begin(), parts.end(), std::uint64_t{0});
+    }
+    std::uint64_t expected = 0;
+    for (std::uint64_t run = 0; run < 3000; ++run)
+      for (std::uint64_t i = 0; i < run % 7; ++i) expected += run + i;
+    EXPECT_EQ(sum, expected) << count;
+  }
+}
+
+TEST(Threads, AnExceptionIsRethrownAndThePoolStaysUsable) {
+  for (int count : kCounts) {
+    const Threads threads(count);
+    for (int run = 0; run < 50; ++run) {
+      EXPECT_THROW(threads.forEach(100,
+                                   [](std::size_t i) {
+                                     if (i % 50 == 37) throw std::runtime_error("37");
+                                   }),
+                   std::runtime_error);
+      std::atomic<int> runs{0};
+      threads.forEach(100, [&](std::size_t) { ++runs; });
+      EXPECT_EQ(runs, 100);
+    }
+  }
+}
+
+TEST(Threads, NestedRunsAreComplete) {
+  for (int count : kCounts) {
+    const Threads threads(count);
+    for (int run = 0; run < 20; ++run) {
+      std::vector<std::vector<int>> runs(20, std::vector<int>(30, 0));
+      threads.forEach(runs.size(), [&](std::size_t i) {
+        threads.forEach(runs[i].size(), [&](std::size_t j) { ++runs[i][j]; });
+      });
+      for (const auto& row : runs) EXPECT_EQ(row, std::vector<int>(30, 1));
+    }
+  }
+}
+
+TEST(Threads, ANestedExceptionIsRethrown) {
+  for (int count : kCounts) {
+    const Threads threads(count);
+    EXPECT_THROW(threads.forEach(4,
+                                 [&](std::size_t) {
+                                   threads.forEach(4, [](std::size_t j) {
+                                     if (j == 3) throw std::runtime_error("3");
+                                   });
+                                 }),
+                 std::runtime_error);
+  }
+}
+
+// oneTBB warns on stderr when it is asked for more workers than there are cores.
+TEST(Threads, MoreThreadsThanCoresPrintNothing) {
+  testing::internal::CaptureStderr();
+  Threads(500).forEach(1000, [](std::size_t) {});
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+TEST(Threads, MovedPoolsWork) {
+  Threads first(3);
+  Threads second(std::move(first));
+  first = Threads(2);
+  for (const Threads* threads : {&first, &second}) {
+    std::atomic<int> runs{0};
+    threads->forEach(100, [&](std::size_t) { ++runs; });
+    EXPECT_EQ(runs, 100);
+  }
+}
+
+}  // namespace
+}  // namespace palpate
