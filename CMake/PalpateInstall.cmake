@@ -9,6 +9,12 @@ endif()
 if(TARGET PalpateFcl)
   list(APPEND components PalpateFcl)
 endif()
+# A static Palpate::Vtk hands VTK on to its user's linker.
+if(TARGET PalpateVtk)
+  get_target_property(vtkComponents PalpateVtk LINK_LIBRARIES)
+  list(FILTER vtkComponents INCLUDE REGEX "^VTK::")
+  list(TRANSFORM vtkComponents REPLACE "^VTK::" "")
+endif()
 install(TARGETS ${components} EXPORT PalpateTargets FILE_SET HEADERS)
 install(EXPORT PalpateTargets NAMESPACE Palpate:: DESTINATION ${packageFolder})
 

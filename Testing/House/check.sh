@@ -56,7 +56,7 @@ checkPlaces() {
         "<tbb/"* | "<oneapi/"* | "<thread" | "<mutex" | "<shared_mutex" | "<condition_variable" | "<future" | "<execution")
           place=Source/Core/Threads.cpp ;;
         "<hwy/"*) place=Source/Core/Simd.h ;;
-        "<gmp"*) place=Source/Math/Exact ;;
+        "<gmp"*) place=Source/Math/Exact.h ;;
         "<vtk"*) place=Source/Vtk/ ;;
         "<fcl/"* | "<ccd/"*) place=Source/Fcl/ ;;
         *[./]*) place=nowhere ;;
@@ -98,13 +98,13 @@ checkSymbols() {
   done
 }
 
-# No file is compiled with -m flags of its own. Arguments: the compile commands, flags given for all.
+# No file of Source is compiled with -m flags of its own. Arguments: the compile commands, flags given for all.
 checkFlags() {
   local commands=$1 line
   [[ -s $commands ]] || fault "$commands is missing"
   while read -r line; do fault "$line"; done < <(
     grep '"command"' "$commands" | sed "s|${2:- }| |g" |
-      grep -oE ' -(m[a-z][^ ]*|ffast-math|Ofast) .* -c [^ ]*' | sed -E 's| .* -c | for |')
+      grep -oE ' -(m[a-z][^ ]*|ffast-math|Ofast) .* -c [^ ]*/Source/[^ ]*' | sed -E 's| .* -c | for |')
 }
 
 checkFormat() {

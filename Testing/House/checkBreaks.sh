@@ -67,9 +67,9 @@ expect fails Symbols "$tree/lib.so"
 
 planted="flags of one file"
 commands=$tree/compile_commands.json
-printf '"command": "c++ -O2 -o a.o -c a.cpp",\n' >"$commands"
+printf '"command": "c++ -O2 -o a.o -c /p/Source/Math/a.cpp",\n' >"$commands"
 expect holds Flags "$commands"
-printf '"command": "c++ -O2 -march=native -o a.o -c a.cpp",\n' >"$commands"
+printf '"command": "c++ -O2 -march=native -o a.o -c /p/Source/Math/a.cpp",\n' >"$commands"
 expect fails Flags "$commands"
 expect holds Flags "$commands" -march=native
 exit $missed

@@ -21,7 +21,7 @@ enum class Engine {
 };
 
 struct Settings {
-  OctreeSettings octree;
+  OctreeSettings octree{};
   Engine engine = Engine::Octree;
   int threads = 0;  ///< threads of a frame. [0, 1024]; 0: all cores. Results do not depend on it.
   /// detectCollision() also fills candidatePairs(); costs their memory and a sort
