@@ -57,7 +57,7 @@ checkPlaces() {
           place=Source/Core/Threads.cpp ;;
         "<hwy/"*) place=Source/Core/Simd.h ;;
         "<gmp"*) place=Source/Math/Exact.h ;;
-        "<vtk"*) place=Source/Vtk/ ;;
+        "<vtk"* | "<X11/"*) place=Source/Vtk/ ;;
         "<fcl/"* | "<ccd/"*) place=Source/Fcl/ ;;
         *[./]*) place=nowhere ;;
         *) continue ;;
@@ -71,19 +71,20 @@ checkPlaces() {
 # that these and the standard library do not.
 # Arguments: the compiler, Eigen's folder.
 checkPublicHeaders() {
-  local compile=("$1" -std=c++20 -Wall -Wextra -Werror -x c++ -ISource/Public -isystem "$2") header include
+  local compile=("$1" -std=c++20 -Wall -Wextra -Werror -x c++ -ISource/Public -ISource/Vtk/Public
+    -ISource/Fcl/Public -isystem "$2") header include
   reached() { "${compile[@]}" -M "$@" | tr ' \\' '\n\n' | grep / | sort -u; }
   local allowed
   allowed=$(printf '#include <bits/stdc++.h>\n#include <Eigen/Core>\n#include <Eigen/Geometry>\n' |
     reached -D_GLIBCXX_USE_TBB_PAR_BACKEND=0 -)
-  for header in Source/Public/palpate/*.h; do
+  for header in $(find Source -path '*Public/palpate/*.h' | sort); do
     "${compile[@]}" -fsyntax-only -include "$header" /dev/null || fault "$header does not compile alone"
     while read -r include; do
-      [[ $include =~ ^.palpate/[A-Za-z]+\.h$|^\<Eigen/(Core|Geometry)$|^\<[a-z_]+$ ]] ||
+      [[ $include =~ ^.palpate/(vtk/|fcl/)?[A-Za-z]+\.h$|^\<Eigen/(Core|Geometry)$|^\<[a-z_]+$ ]] ||
         fault "$header includes ${include:1}"
     done < <(includesOf "$header")
     while read -r include; do fault "$header reaches $include"; done < <(
-      comm -13 <(echo "$allowed") <(reached -include "$header" /dev/null) | grep -vE '^(Source/Public/palpate/|/dev/null)')
+      comm -13 <(echo "$allowed") <(reached -include "$header" /dev/null) | grep -vE '^(Source/((Vtk|Fcl)/)?Public/palpate/|/dev/null)')
   done
 }
 

@@ -9,7 +9,8 @@ trap 'rm -rf "$tree"' EXIT
 missed=0
 
 # A house with every room, in order.
-for room in Core Math Geometry Octree NarrowPhase DistanceField CollisionDetection Vtk Fcl Public/palpate; do
+for room in Core Math Geometry Octree NarrowPhase DistanceField CollisionDetection Vtk Fcl \
+  Public/palpate Vtk/Public/palpate/vtk; do
   mkdir -p "$tree/Source/$room"
 done
 mkdir -p "$tree/Examples" "$tree/Testing"
@@ -53,6 +54,7 @@ plant Places Source/Math/A.cpp '#include <Eigen/Dense>\n'
 plant PublicHeaders Source/Public/palpate/A.h '#pragma once\nstd::size_t a();\n' "$compiler" "$eigen"
 plant PublicHeaders Source/Public/palpate/A.h '#pragma once\n#include <Eigen/LU>\n' "$compiler" "$eigen"
 plant PublicHeaders Source/Public/palpate/A.h '#define LIBRARY <sys/mman.h>\n#include LIBRARY\n' "$compiler" "$eigen"
+plant PublicHeaders Source/Vtk/Public/palpate/vtk/A.h '#pragma once\n#include <vtkPolyData.h>\n' "$compiler" "$eigen"
 plant Format Source/Core/A.h '#pragma once\nint  a;\n'
 plant Words Source/Core/A.h 'class PoolManager;\n'
 plant Words Source/Core/A.h 'int data2;\n'
