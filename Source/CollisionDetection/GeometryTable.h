@@ -1,0 +1,64 @@
+#pragma once
+
+#include <palpate/Error.h>
+#include <palpate/LooseOctree.h>
+#include <palpate/Settings.h>
+
+#include "Core/Threads.h"
+#include "Geometry/FloatPositions.h"
+#include "Geometry/TriangleMesh.h"
+#include "Octree/Octree.h"
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace palpate {
+
+/// One mesh, its floats and its octree.
+struct Geometry {
+  GeometryId id;
+  TriangleMesh mesh;
+  std::vector<Eigen::Vector3d> staging;   ///< positions are checked while copied in here, then swapped
+  std::vector<Eigen::Vector3d> staging2;  ///< "before", where both are given
+  std::uint64_t revision = 1;             ///< counts changes of positions and topology
+  bool setThisFrame = true;               ///< "before" is already that of the coming frame
+
+  FloatFrame frame;
+  double spread = 0;  ///< of a sample of the positions
+  Buffer<FloatPoint> floats;
+  std::vector<Triangle> orderedTriangles, orderedTrianglesBefore;  ///< in the octree's order
+  Octree octree;
+  std::uint64_t treeRevision = 0;  ///< revision that the octree is of
+  bool treeKnown = false;          ///< built for this topology
+  LooseOctree::Update lastUpdate = LooseOctree::Update::Unchanged;
+  double boxMilliseconds = 0, octreeMilliseconds = 0;  ///< of the last update
+};
+
+/// Geometries by id, with the checks of what users hand in.
+class GeometryTable {
+ public:
+  GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Triangle>);
+  void remove(GeometryId);
+  void setPositions(GeometryId, std::span<const Eigen::Vector3d> now);
+  void setPositions(GeometryId, std::span<const Eigen::Vector3d> before, std::span<const Eigen::Vector3d> now);
+  void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions, std::span<const Triangle>);
+
+  Geometry& at(GeometryId);  ///< throws UnknownGeometry
+  std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }
+
+  /// Octrees for the positions now. Returns whether any changed.
+  bool updateOctrees(const OctreeSettings&, const Threads&);
+  void endFrame();
+
+ private:
+  std::vector<std::unique_ptr<Geometry>> m_geometries;  ///< ascending ids
+  std::uint32_t m_nextId = 0;
+  std::vector<Geometry*> m_small, m_large;
+};
+
+std::string nameOf(GeometryId);  ///< "geometry 3"
+
+}  // namespace palpate

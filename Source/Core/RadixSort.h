@@ -1,0 +1,53 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+
+namespace palpate {
+
+/// Stable sort of `from` by bits [low, high) of each item into `to`, which is as long. `from` is overwritten.
+/// Cost     one pass over the items for each 8 bits (11 where there are many), less one for each digit that is
+///          the same in all.
+inline void radixSort(std::span<std::uint64_t> from, std::span<std::uint64_t> to, int low, int high) {
+  const std::size_t size = from.size();
+  std::uint64_t* const destination = to.data();
+  if (size <= 32) {
+    const auto digit = [=](std::uint64_t item) { return (item & ((std::uint64_t{2} << (high - 1)) - 1)) >> low; };
+    for (std::size_t i = 0; i < size; ++i) {
+      const std::uint64_t item = from[i];
+      std::size_t place = i;
+      for (; place > 0 && digit(to[place - 1]) > digit(item); --place) to[place] = to[place - 1];
+      to[place] = item;
+    }
+    return;
+  }
+  const int digitBits = size < 1024 ? 8 : 11;
+  constexpr int kMostDigits = 4;
+  std::array<std::array<std::uint32_t, 2048>, kMostDigits> counts;
+  const int digits = (high - low + digitBits - 1) / digitBits;
+  const auto bins = std::size_t{1} << digitBits;
+  const std::uint64_t mask = bins - 1;
+  const auto lastMask = (std::uint64_t{1} << (high - low - (digits - 1) * digitBits)) - 1;
+  for (int digit = 0; digit < digits; ++digit) std::fill_n(counts[digit].begin(), bins, 0u);
+  for (const std::uint64_t item : from) {
+    std::uint64_t rest = item >> low;
+    for (int digit = 0; digit + 1 < digits; ++digit, rest >>= digitBits) ++counts[digit][rest & mask];
+    ++counts[digits - 1][rest & lastMask];
+  }
+  for (int digit = 0; digit < digits; ++digit) {
+    const int shift = low + digit * digitBits;
+    const std::uint64_t digitMask = digit + 1 == digits ? lastMask : mask;
+    auto& count = counts[digit];
+    if (count[from[0] >> shift & digitMask] == size) continue;
+    std::uint32_t sum = 0;
+    for (std::size_t bin = 0; bin <= digitMask; ++bin) sum += std::exchange(count[bin], sum);
+    for (const std::uint64_t item : from) to[count[item >> shift & digitMask]++] = item;
+    std::swap(from, to);
+  }
+  if (from.data() != destination) std::copy(from.begin(), from.end(), destination);
+}
+
+}  // namespace palpate

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "Core/Buffer.h"
+
+#include <span>
+
+namespace palpate {
+
+struct alignas(16) FloatPoint {
+  float x, y, z, unused;
+};
+
+/// Where a geometry's floats live: f = (position - origin) * scale.
+///
+/// The origin is the median of a sample of the geometry's own positions, so that the floats resolve the bulk of it
+/// wherever the scene is and however far single vertices are flung; the scale, a power of two shared by a scene, only
+/// keeps floats within their range.
+struct FloatFrame {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  double scale = 1.0;
+};
+
+/// Floats are clamped to this, so that boxes of scenes beyond float's range stay finite and conservative.
+constexpr float kLargestFloat = 0x1p120f;
+
+/// Median of up to 63 evenly spaced positions, axis by axis, and the largest coordinate difference to it among them.
+struct SampledExtent {
+  Eigen::Vector3d median = Eigen::Vector3d::Zero();
+  double spread = 0.0;
+};
+SampledExtent sampleExtent(std::span<const Eigen::Vector3d> positions);
+
+/// A power of two that brings `spread` to [2^-16, 2^16], in steps of 2^32 so that it hardly ever changes.
+double frameScale(double spread);
+
+/// Rounds to nearest. `out` is as long as `positions`.
+void toFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame&, FloatPoint* out);
+
+/// Copies; returns the index of the first vertex that is not finite, or the size if all are.
+std::size_t copyFinite(std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out);
+
+}  // namespace palpate

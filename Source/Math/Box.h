@@ -1,0 +1,61 @@
+#pragma once
+
+#include "Core/Buffer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+namespace palpate {
+
+/// An axis-aligned box in a geometry's float frame, rounded outward. Fourth lanes are padding.
+struct alignas(16) Box {
+  /// Overlaps nothing, neutral for add().
+  static constexpr float kEmptyLower = std::numeric_limits<float>::infinity();
+
+  std::array<float, 4> lower{kEmptyLower, kEmptyLower, kEmptyLower, 0};
+  std::array<float, 4> upper{-kEmptyLower, -kEmptyLower, -kEmptyLower, 0};
+
+  bool empty() const { return !(lower[0] <= upper[0]); }
+  void add(const Box& other) {
+    for (int k = 0; k < 3; ++k) {
+      lower[k] = std::min(lower[k], other.lower[k]);
+      upper[k] = std::max(upper[k], other.upper[k]);
+    }
+  }
+};
+
+/// Boxes side by side, one array per bound, each readable kPadding elements past its size.
+struct BoxArrays {
+  static constexpr std::size_t kPadding = 16;  ///< the widest SIMD vector of floats
+
+  std::array<Buffer<float>, 3> lower, upper;
+
+  void resize(std::size_t size) {
+    for (int k = 0; k < 3; ++k) {
+      lower[k].resize(size + kPadding);
+      upper[k].resize(size + kPadding);
+    }
+  }
+  Box operator[](std::size_t i) const {
+    return {{lower[0][i], lower[1][i], lower[2][i], 0}, {upper[0][i], upper[1][i], upper[2][i], 0}};
+  }
+};
+
+/// Outward rounding of bounds that were rounded to nearest float.
+///
+/// Let v be a coordinate in the frame, fl64(x - origin) * scale with |error| <= 2^-53 |v|, and f the float nearest
+/// to it: |f - v| <= 2^-24 |v| where f is normal, <= 2^-150 where it is denormal. kRelative |f| = 2^-22 |f| covers
+/// that, the 2^-53, and the rounding of the subtraction itself (<= 2^-24 of its result) with a factor of about
+/// two to spare; kAbsolute covers denormals. Both bounds are monotone in f, so the bound of a set is the bound of its
+/// least element.
+struct OutwardRounding {
+  static constexpr float kRelative = 0x1p-22f;
+  static constexpr float kAbsolute = 0x1p-126f;
+  static float down(float f) { return f - (std::fabs(f) * kRelative + kAbsolute); }
+  static float up(float f) { return f + (std::fabs(f) * kRelative + kAbsolute); }
+};
+
+}  // namespace palpate

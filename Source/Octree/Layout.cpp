@@ -1,0 +1,124 @@
+#include "Octree/Layout.h"
+
+#include "Core/Assert.h"
+
+#include <algorithm>
+#include <bit>
+#include <numeric>
+
+namespace palpate {
+
+int keyLevels(std::size_t size, const OctreeSettings& settings, int depth) {
+  const std::size_t leaves = size / static_cast<std::size_t>(settings.maxPrimitivesPerLeaf) + 1;
+  const int levels = (std::bit_width(leaves) + 1) / 2 + 2;  // a surface fills a quarter of the cells of the next level
+  return std::clamp(levels, 1, std::min(KeyLayout::kMostLevels, std::max(1, settings.maxDepth - depth)));
+}
+
+void Octree::Layout::clear() {
+  links.clear();
+  parents.clear();
+  groups.clear();
+  groupNodes.clear();
+  tasks.clear();
+}
+
+void Octree::Layout::layOutTop(Octree& octree, const Job& root, const OctreeSettings& settings,
+                               std::uint32_t taskSize, const Threads& threads) {
+  clear();
+  m_mostPerLeaf = static_cast<std::uint32_t>(settings.maxPrimitivesPerLeaf);
+  m_maxDepth = settings.maxDepth;
+  m_taskSize = taskSize;
+  m_threads = &threads;
+  links.emplace_back();
+  parents.push_back(0);
+  for (unsigned slot = 0; slot < 8; ++slot) {
+    links[0].begin[slot] = root.end;
+    links[0].child[slot] = OctreeBlock::kLeaf;
+  }
+  links[0].begin[0] = root.begin;
+  const std::uint32_t child = layOut(octree, root);
+  links[0].child[0] = child;
+}
+
+void Octree::Layout::layOutTask(Octree& octree, const Job& job, const OctreeSettings& settings) {
+  clear();
+  m_mostPerLeaf = static_cast<std::uint32_t>(settings.maxPrimitivesPerLeaf);
+  m_maxDepth = settings.maxDepth;
+  m_taskSize = 0;
+  m_threads = nullptr;
+  Job own = job;
+  own.node = kTaskRoot;
+  layOut(octree, own);
+}
+
+std::uint32_t Octree::Layout::leaf(std::uint32_t begin, std::uint32_t end, OctreeNode node) {
+  groups.push_back(begin);
+  groupNodes.push_back(node);
+  return OctreeBlock::kLeaf | (end - begin);
+}
+
+std::uint32_t Octree::Layout::layOut(Octree& octree, Job job) {
+  const std::uint32_t size = job.end - job.begin;
+  if (size <= m_mostPerLeaf || job.depth >= m_maxDepth) return leaf(job.begin, job.end, job.node);
+  if (job.level == job.keys.levels) {
+    // Too full at the keys' last level: split further by second keys inside the cell.
+    job.keys.levels = keyLevels(size, {.maxDepth = m_maxDepth, .maxPrimitivesPerLeaf = int(m_mostPerLeaf)}, job.depth);
+    job.level = 0;
+    octree.sortKeys(job.begin, job.end, true, job.cube, job.keys, m_threads);
+  }
+  std::uint32_t own = 0;
+  while (own < size && job.keys.level(octree.key(job.begin + own)) == job.level) ++own;
+  if (own == size) return leaf(job.begin, job.end, job.node);
+  if (size <= m_taskSize) {
+    tasks.push_back(job);
+    groups.push_back(job.begin);
+    groupNodes.push_back(kTask | static_cast<std::uint32_t>(tasks.size() - 1));
+    return 0;  // known when the tasks are done
+  }
+  return split(octree, job, own);
+}
+
+std::uint32_t Octree::Layout::split(Octree& octree, const Job& job, std::uint32_t own) {
+  if (own > 0) leaf(job.begin, job.begin + own, job.node);
+  const auto block = static_cast<std::uint32_t>(links.size());
+  links.emplace_back();
+  parents.push_back(job.node);
+
+  std::array<std::uint32_t, 9> begins;
+  const std::uint32_t first = job.begin + own;
+  const auto octant = [&](std::uint32_t i) { return job.keys.octant(octree.key(i), job.level); };
+  if (job.end - first <= 256) {
+    begins.fill(0);
+    for (std::uint32_t i = first; i < job.end; ++i) ++begins[octant(i) + 1];
+    begins[0] = first;
+    std::partial_sum(begins.begin(), begins.end(), begins.begin());
+  } else {
+    begins[0] = first;
+    for (unsigned slot = 1; slot < 8; ++slot) {
+      std::uint32_t low = begins[slot - 1], high = job.end;
+      while (low < high) {
+        const std::uint32_t middle = low + (high - low) / 2;
+        (octant(middle) < slot ? low : high) = octant(middle) < slot ? middle + 1 : middle;
+      }
+      begins[slot] = low;
+    }
+    begins[8] = job.end;
+  }
+
+  for (unsigned slot = 0; slot < 8; ++slot) {
+    const std::uint32_t size = begins[slot + 1] - begins[slot];
+    const OctreeNode node = block * 8 + slot;
+    std::uint32_t child = OctreeBlock::kLeaf;
+    if (size > m_mostPerLeaf) {
+      child = layOut(octree, {begins[slot], begins[slot + 1], job.level + 1, job.depth + 1, job.keys,
+                              job.cube.child(slot), node});
+    } else if (size > 0) {
+      child = leaf(begins[slot], begins[slot + 1], node);
+    }
+    links[block].begin[slot] = begins[slot];
+    links[block].child[slot] = child;
+  }
+  return block;
+}
+
+}  // namespace palpate

@@ -1,0 +1,217 @@
+#include "Octree/Octree.h"
+
+#include "Core/Assert.h"
+#include "Core/RadixSort.h"
+#include "Octree/Fit.h"
+#include "Octree/Layout.h"
+
+#include <cmath>
+#include <numeric>
+
+namespace palpate {
+
+namespace {
+
+/// Below this, one thread is faster than handing out work.
+constexpr std::size_t kSerialSize = 16384;
+constexpr std::size_t kGrain = 8192;
+constexpr std::size_t kRadixOnly = 8192;
+
+/// The power-of-two cube that holds the box, its corner on a grid so coarse that cells' corners are exact.
+Cube rootCube(const Box& bounds) {
+  Cube cube;
+  float longest = std::numeric_limits<float>::min();
+  for (int k = 0; k < 3; ++k) longest = std::max(longest, bounds.upper[k] - bounds.lower[k]);
+  // 1/1000 for the slack of a primitive's size, and a 2^20th of the edge for the grid.
+  cube.edge = std::exp2(std::ceil(std::log2(static_cast<double>(longest) * (1.0 + 0x1p-9))));
+  const double grid = cube.edge * 0x1p-20;
+  for (int k = 0; k < 3; ++k) {
+    const double middle = 0.5 * (static_cast<double>(bounds.lower[k]) + static_cast<double>(bounds.upper[k]));
+    cube.lower[k] = std::floor((middle - 0.5 * cube.edge) / grid) * grid;
+  }
+  return cube;
+}
+
+}  // namespace
+
+Octree::Octree() = default;
+Octree::Octree(Octree&&) noexcept = default;
+Octree& Octree::operator=(Octree&&) noexcept = default;
+Octree::~Octree() = default;
+
+void Octree::reset(std::size_t size) {
+  m_order.resize(size);
+  std::iota(m_order.begin(), m_order.end(), 0u);
+  m_boxes.resize(size);
+  m_groups.assign({0u, static_cast<std::uint32_t>(size)});
+  m_groupNodes.clear();
+  m_groupBoxes.resize(1);
+  m_pool.use(0);
+}
+
+void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const Cube& cube, KeyLayout layout,
+                      const Threads* threads) {
+  const std::size_t size = end - begin;
+  const std::uint64_t* slots = rekey ? m_keys.data() + begin : nullptr;
+  const int low = 32, high = 32 + layout.bits();
+  const std::span keys(m_keys.data() + begin, size), scratch(m_keysScratch.data() + begin, size);
+  if (size < kRadixOnly || !threads) {
+    octreeKeys(m_boxes, slots, begin, size, cube, layout, scratch.data());
+    radixSort(scratch, keys, low, high);
+    return;
+  }
+  // Keys in parallel; then by their first digit into bins that fit the cache; then each bin.
+  const int topBits = std::min(9, 3 * layout.levels), topShift = high - topBits;
+  const std::size_t bins = std::size_t{1} << topBits, chunks = (size + kGrain - 1) / kGrain;
+  m_binCounts.resize(bins * chunks);
+  threads->forChunks(size, kGrain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
+    octreeKeys(m_boxes, slots ? slots + from : nullptr, static_cast<std::uint32_t>(begin + from), to - from, cube, layout,
+               keys.data() + from);
+    std::uint32_t* counts = m_binCounts.data() + chunk * bins;
+    std::fill_n(counts, bins, 0u);
+    for (std::size_t i = from; i < to; ++i) ++counts[keys[i] >> topShift];
+  });
+  m_binBegins.resize(bins + 1);
+  std::uint32_t sum = 0;
+  for (std::size_t bin = 0; bin < bins; ++bin) {
+    m_binBegins[bin] = sum;
+    for (std::size_t chunk = 0; chunk < chunks; ++chunk) sum += std::exchange(m_binCounts[chunk * bins + bin], sum);
+  }
+  m_binBegins[bins] = sum;
+  threads->forChunks(size, kGrain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
+    std::uint32_t* next = m_binCounts.data() + chunk * bins;
+    for (std::size_t i = from; i < to; ++i) scratch[next[keys[i] >> topShift]++] = keys[i];
+  });
+  threads->forChunks(bins, 8, [&](std::size_t, std::size_t from, std::size_t to) {
+    for (std::size_t bin = from; bin < to; ++bin) {
+      const std::size_t place = m_binBegins[bin], count = m_binBegins[bin + 1] - place;
+      if (count > 0) radixSort(scratch.subspan(place, count), keys.subspan(place, count), low, topShift);
+    }
+  });
+}
+
+void Octree::build(const Box& bounds, const OctreeSettings& settings, const Threads& threads) {
+  const auto size = static_cast<std::uint32_t>(m_order.size());
+  PALPATE_ASSERT(size > 0);
+  m_rootCube = palpate::rootCube(bounds);
+  m_keys.resize(size);
+  m_keysScratch.resize(size);
+  const KeyLayout keys{keyLevels(size, settings, 0)};
+  sortKeys(0, size, false, m_rootCube, keys, &threads);
+
+  if (m_layouts.empty()) m_layouts.resize(1);
+  const std::uint32_t taskSize = size < kSerialSize ? 0 : std::max<std::uint32_t>(size / 64, 1024);
+  m_layouts[0].layOutTop(*this, {0, size, 0, 0, keys, m_rootCube, 0}, settings, taskSize, threads);
+  const std::size_t tasks = m_layouts[0].tasks.size();
+  if (m_layouts.size() < tasks + 1) m_layouts.resize(tasks + 1);
+  Layout* layouts = m_layouts.data();
+  threads.forEach(tasks, [&](std::size_t task) { layouts[task + 1].layOutTask(*this, layouts[0].tasks[task], settings); });
+  assemble(tasks, threads);
+
+  m_orderBefore.swap(m_order);
+  m_order.resize(size);
+  threads.forChunks(size, kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) m_order[i] = m_orderBefore[previousSlot(i)];
+  });
+  m_builtNow = true;
+}
+
+void Octree::assemble(std::size_t tasks, const Threads& threads) {
+  const Layout& top = m_layouts[0];
+  m_taskBlocks.resize(tasks + 2);
+  m_taskBlocks[0] = 0;
+  for (std::size_t i = 0; i <= tasks; ++i)
+    m_taskBlocks[i + 1] = m_taskBlocks[i] + static_cast<std::uint32_t>(m_layouts[i].links.size());
+  m_pool.use(m_taskBlocks.back());
+  m_parents.resize(m_taskBlocks.back());
+
+  // Where each entry of the top's groups goes: a task's take as many places as it made.
+  m_entryPlaces.resize(top.groups.size());
+  std::uint32_t groupCount = 0;
+  for (std::size_t i = 0; i < top.groups.size(); ++i) {
+    m_entryPlaces[i] = groupCount;
+    const OctreeNode node = top.groupNodes[i];
+    groupCount += node & Layout::kTask ? static_cast<std::uint32_t>(m_layouts[1 + (node & ~Layout::kTask)].groups.size()) : 1;
+  }
+  m_groups.resize(groupCount + 1);
+  m_groupNodes.resize(groupCount);
+  m_groupBoxes.resize(groupCount);
+  m_groups[groupCount] = static_cast<std::uint32_t>(m_order.size());
+  threads.forEach(top.groups.size(), [&](std::size_t i) {
+    const OctreeNode node = top.groupNodes[i];
+    const std::uint32_t place = m_entryPlaces[i];
+    if (!(node & Layout::kTask)) {
+      m_groups[place] = top.groups[i];
+      m_groupNodes[place] = node;
+      return;
+    }
+    const std::size_t task = node & ~Layout::kTask;
+    const Layout& layout = m_layouts[task + 1];
+    const OctreeNode root = top.tasks[task].node;
+    const std::uint32_t base = m_taskBlocks[task + 1] * 8;
+    std::copy(layout.groups.begin(), layout.groups.end(), m_groups.begin() + place);
+    for (std::size_t g = 0; g < layout.groups.size(); ++g)
+      m_groupNodes[place + g] = layout.groupNodes[g] == Layout::kTaskRoot ? root : layout.groupNodes[g] + base;
+  });
+  threads.forEach(tasks + 1, [&](std::size_t i) {
+    const Layout& layout = m_layouts[i];
+    const std::uint32_t base = m_taskBlocks[i];
+    for (std::size_t b = 0; b < layout.links.size(); ++b) {
+      OctreeBlock& block = m_pool[base + b];
+      m_parents[base + b] = layout.parents[b] == Layout::kTaskRoot ? top.tasks[i - 1].node : layout.parents[b] + base * 8;
+      for (unsigned slot = 0; slot < 8; ++slot) {
+        const std::uint32_t child = layout.links[b].child[slot];
+        block.begin[slot] = layout.links[b].begin[slot];
+        block.child[slot] = child & OctreeBlock::kLeaf ? child : child + base;
+        block.setBox(slot, Box{});
+      }
+    }
+  });
+  for (std::size_t i = 0; i < tasks; ++i) {
+    const OctreeNode node = top.tasks[i].node;
+    m_pool[node >> 3].child[node & 7] = m_taskBlocks[i + 1];
+  }
+}
+
+void Octree::fit(const Threads& threads) {
+  threads.forChunks(m_groupNodes.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+    for (std::size_t g = from; g < to; ++g) m_pool[m_groupNodes[g] >> 3].setBox(m_groupNodes[g] & 7, m_groupBoxes[g]);
+  });
+  // Children come after their parents in a task, and tasks after the top.
+  const std::size_t tasks = m_taskBlocks.size() - 2;
+  threads.forEach(tasks, [&](std::size_t task) {
+    fitBlocks(m_pool.data(), m_parents.data(), m_taskBlocks[task + 1], m_taskBlocks[task + 2]);
+  });
+  fitBlocks(m_pool.data(), m_parents.data(), 1, m_taskBlocks[1]);
+  measureLooseness();
+}
+
+void Octree::measureLooseness() {
+  constexpr std::size_t kStride = 8;
+  const auto halfArea = [](const Box& box) {
+    const double x = double{box.upper[0]} - box.lower[0], y = double{box.upper[1]} - box.lower[1],
+                 z = double{box.upper[2]} - box.lower[2];
+    return x * y + y * z + z * x;
+  };
+  double groups = 0, primitives = 0;
+  for (std::size_t g = 0; g < m_groupNodes.size(); g += kStride) {
+    groups += halfArea(m_groupBoxes[g]);
+    for (std::size_t i = m_groups[g]; i < m_groups[g + 1]; ++i) primitives += halfArea(m_boxes[i]);
+  }
+  m_looseness = primitives > 0 ? groups / primitives : 1.0;
+  if (m_builtNow) m_loosenessWhenBuilt = m_looseness;
+  m_builtNow = false;
+}
+
+std::size_t Octree::bytes() const {
+  const auto of = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
+  std::size_t bytes = of(m_order) + of(m_orderBefore) + of(m_keys) + of(m_keysScratch) + of(m_groups) + of(m_groupNodes) +
+                      of(m_groupBoxes) + of(m_parents) + m_pool.allocated() * sizeof(OctreeBlock) + of(m_binCounts) +
+                      of(m_binBegins);
+  for (int k = 0; k < 3; ++k) bytes += of(m_boxes.lower[k]) + of(m_boxes.upper[k]);
+  for (const Layout& layout : m_layouts)
+    bytes += of(layout.links) + of(layout.parents) + of(layout.groups) + of(layout.groupNodes) + of(layout.tasks);
+  return bytes;
+}
+
+}  // namespace palpate

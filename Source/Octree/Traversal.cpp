@@ -1,0 +1,337 @@
+#include "Octree/Traversal.h"
+
+#include <bit>
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "Octree/Traversal.cpp"
+#include "Core/Simd.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using NodeTag = hn::CappedTag<float, 8>;    ///< eight siblings
+using LeafTag = hn::CappedTag<float, 16>;   ///< primitives of a leaf
+
+template <class D, class M>
+HWY_INLINE std::uint32_t bitsOf(D d, M mask) {
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(d, mask, bytes);
+  return static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8;
+}
+
+template <class V>
+HWY_INLINE V roundedDown(V v, V shift) {
+  const hn::DFromV<V> d;
+  const V moved = hn::Add(v, shift);
+  return hn::Sub(moved, hn::Add(hn::Mul(hn::Abs(moved), hn::Set(d, OutwardRounding::kRelative)),
+                                hn::Set(d, OutwardRounding::kAbsolute)));
+}
+
+template <class V>
+HWY_INLINE V roundedUp(V v, V shift) {
+  const hn::DFromV<V> d;
+  const V moved = hn::Add(v, shift);
+  return hn::Add(moved, hn::Add(hn::Mul(hn::Abs(moved), hn::Set(d, OutwardRounding::kRelative)),
+                                hn::Set(d, OutwardRounding::kAbsolute)));
+}
+
+/// A box that many are compared with.
+struct Query {
+  float lower[3], upper[3];
+};
+
+/// Primitives of one node, in the tree's order.
+struct LeafRange {
+  std::uint32_t begin, end;
+};
+
+class Walk {
+ public:
+  Walk(const TreePair& trees, TraversalStack& stack, PairSink& sink)
+      : m_trees(trees),
+        m_a(trees.a->blocks()),
+        m_b(trees.b->blocks()),
+        m_boxesA(trees.a->boxes()),
+        m_boxesB(trees.b->boxes()),
+        m_idsA(trees.a->order().data()),
+        m_idsB(trees.b->order().data()),
+        m_stack(stack.pairs),
+        m_sink(sink) {}
+
+  HWY_ATTR bool rootsOverlap() const {
+    const Query a = shifted(m_a[0], 0);
+    return overlaps(m_b[0], a) & 1;
+  }
+
+  HWY_ATTR void all(std::size_t bottom) {
+    while (m_stack.size() > bottom) {
+      const NodePair pair = m_stack.back();
+      m_stack.pop_back();
+      step(pair);
+    }
+  }
+
+  /// Replaces a node pair by the pairs below it; two leaves by their primitives' pairs.
+  HWY_ATTR void step(NodePair pair) {
+    const bool leafA = isLeaf(m_a, pair.a), leafB = isLeaf(m_b, pair.b);
+    if (m_trees.self() && pair.a == pair.b)
+      leafA ? withinLeaf(range(*m_trees.a, pair.a)) : withinNode(pair.a);
+    else if (leafA && leafB)
+      leaves(pair);
+    else if (leafA)
+      descendB(pair);
+    else if (leafB)
+      descendA(pair);
+    else
+      descendBoth(pair);
+  }
+
+ private:
+  static bool isLeaf(const OctreeBlock* blocks, OctreeNode node) {
+    return node & NodePair::kOwn || blocks[node >> 3].isLeaf(node & 7);
+  }
+  static LeafRange range(const Octree& tree, OctreeNode node) {
+    const auto [begin, end] = tree.ownRange(node & ~NodePair::kOwn);
+    return {begin, end};
+  }
+
+  HWY_ATTR Query shifted(const OctreeBlock& block, unsigned slot) const {
+    Query query;
+    const hn::CappedTag<float, 1> d;
+    for (int k = 0; k < 3; ++k) {
+      query.lower[k] = hn::GetLane(roundedDown(hn::Set(d, block.lower[k][slot]), hn::Set(d, m_trees.shiftLower[k])));
+      query.upper[k] = hn::GetLane(roundedUp(hn::Set(d, block.upper[k][slot]), hn::Set(d, m_trees.shiftUpper[k])));
+    }
+    return query;
+  }
+
+  /// Bit i: child i of b's block overlaps the query, which is in b's frame.
+  HWY_ATTR static HWY_INLINE std::uint32_t overlaps(const OctreeBlock& block, const Query& query) {
+    const NodeTag d;
+    std::uint32_t bits = 0;
+    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+      auto mask = hn::Le(hn::Load(d, block.lower[0] + i), hn::Set(d, query.upper[0]));
+      mask = hn::And(mask, hn::Ge(hn::Load(d, block.upper[0] + i), hn::Set(d, query.lower[0])));
+      for (int k = 1; k < 3; ++k) {
+        mask = hn::And(mask, hn::Le(hn::Load(d, block.lower[k] + i), hn::Set(d, query.upper[k])));
+        mask = hn::And(mask, hn::Ge(hn::Load(d, block.upper[k] + i), hn::Set(d, query.lower[k])));
+      }
+      bits |= bitsOf(d, mask) << i;
+    }
+    return bits;
+  }
+
+  struct ShiftedBlock {
+    alignas(32) float lower[3][8];
+    alignas(32) float upper[3][8];
+    Query query(unsigned slot) const {
+      return {{lower[0][slot], lower[1][slot], lower[2][slot]}, {upper[0][slot], upper[1][slot], upper[2][slot]}};
+    }
+  };
+
+  /// a's eight children in b's frame; returns which overlap b's node.
+  HWY_ATTR std::uint32_t shiftBlock(const OctreeBlock& a, const OctreeBlock& b, unsigned slotB, ShiftedBlock& out) const {
+    const NodeTag d;
+    std::uint32_t bits = 0;
+    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+      auto mask = hn::Eq(hn::Zero(d), hn::Zero(d));
+      for (int k = 0; k < 3; ++k) {
+        const auto lower = roundedDown(hn::Load(d, a.lower[k] + i), hn::Set(d, m_trees.shiftLower[k]));
+        const auto upper = roundedUp(hn::Load(d, a.upper[k] + i), hn::Set(d, m_trees.shiftUpper[k]));
+        hn::Store(lower, d, out.lower[k] + i);
+        hn::Store(upper, d, out.upper[k] + i);
+        mask = hn::And(mask, hn::And(hn::Le(lower, hn::Set(d, b.upper[k][slotB])), hn::Ge(upper, hn::Set(d, b.lower[k][slotB]))));
+      }
+      bits |= bitsOf(d, mask) << i;
+    }
+    return bits;
+  }
+
+  static bool hasOwn(const OctreeBlock* blocks, OctreeNode node) {
+    const OctreeBlock& block = blocks[node >> 3];
+    return block.begin[node & 7] != blocks[block.child[node & 7]].begin[0];
+  }
+
+  void push(OctreeNode a, OctreeNode b) { m_stack.push_back({a, b}); }
+
+  void pushChildrenOfB(OctreeNode a, OctreeNode blockB, std::uint32_t bits) {
+    for (; bits; bits &= bits - 1) push(a, blockB * 8 + static_cast<unsigned>(std::countr_zero(bits)));
+  }
+
+  HWY_ATTR void descendB(NodePair pair) {
+    const OctreeNode nodeA = pair.a & ~NodePair::kOwn;
+    const OctreeNode child = m_b[pair.b >> 3].child[pair.b & 7];
+    if (hasOwn(m_b, pair.b)) push(pair.a, pair.b | NodePair::kOwn);
+    pushChildrenOfB(pair.a, child, overlaps(m_b[child], shifted(m_a[nodeA >> 3], nodeA & 7)));
+  }
+
+  HWY_ATTR void descendA(NodePair pair) {
+    const OctreeNode nodeB = pair.b & ~NodePair::kOwn;
+    const OctreeNode child = m_a[pair.a >> 3].child[pair.a & 7];
+    if (hasOwn(m_a, pair.a)) push(pair.a | NodePair::kOwn, pair.b);
+    ShiftedBlock block;
+    std::uint32_t bits = shiftBlock(m_a[child], m_b[nodeB >> 3], nodeB & 7, block);
+    for (; bits; bits &= bits - 1) push(child * 8 + static_cast<unsigned>(std::countr_zero(bits)), pair.b);
+  }
+
+  HWY_ATTR void descendBoth(NodePair pair) {
+    const OctreeNode childA = m_a[pair.a >> 3].child[pair.a & 7], childB = m_b[pair.b >> 3].child[pair.b & 7];
+    const bool ownB = hasOwn(m_b, pair.b);
+    if (hasOwn(m_a, pair.a)) push(pair.a | NodePair::kOwn, pair.b);
+    ShiftedBlock block;
+    std::uint32_t bits = shiftBlock(m_a[childA], m_b[pair.b >> 3], pair.b & 7, block);
+    for (; bits; bits &= bits - 1) {
+      const auto slot = static_cast<unsigned>(std::countr_zero(bits));
+      const OctreeNode a = childA * 8 + slot;
+      if (ownB) push(a, pair.b | NodePair::kOwn);
+      pushChildrenOfB(a, childB, overlaps(m_b[childB], block.query(slot)));
+    }
+  }
+
+  HWY_ATTR void withinNode(OctreeNode node) {
+    const OctreeNode child = m_a[node >> 3].child[node & 7];
+    const OctreeBlock& siblings = m_a[child];
+    const bool own = hasOwn(m_a, node);
+    if (own) push(node | NodePair::kOwn, node | NodePair::kOwn);
+    ShiftedBlock block;
+    std::uint32_t bits = shiftBlock(siblings, m_b[node >> 3], node & 7, block);
+    for (; bits; bits &= bits - 1) {
+      const auto slot = static_cast<unsigned>(std::countr_zero(bits));
+      const OctreeNode a = child * 8 + slot;
+      if (own) push(node | NodePair::kOwn, a);
+      push(a, a);
+      pushChildrenOfB(a, child, overlaps(siblings, block.query(slot)) & ~((2u << slot) - 1));
+    }
+  }
+
+  HWY_ATTR void leaves(NodePair pair) {
+    const LeafRange a = range(*m_trees.a, pair.a), b = range(*m_trees.b, pair.b);
+    const OctreeNode nodeB = pair.b & ~NodePair::kOwn;
+    const OctreeBlock& block = m_b[nodeB >> 3];
+    const unsigned slot = nodeB & 7;
+    const LeafTag d;
+    constexpr std::size_t kMost = 16;
+    alignas(64) float lower[3][kMost], upper[3][kMost];
+    for (std::size_t i = a.begin; i < a.end; i += hn::Lanes(d)) {
+      // Those of a that meet the node of b at all.
+      auto mask = hn::FirstN(d, a.end - i);
+      for (int k = 0; k < 3; ++k) {
+        const auto low = roundedDown(hn::LoadU(d, m_boxesA.lower[k].data() + i), hn::Set(d, m_trees.shiftLower[k]));
+        const auto high = roundedUp(hn::LoadU(d, m_boxesA.upper[k].data() + i), hn::Set(d, m_trees.shiftUpper[k]));
+        hn::Store(low, d, lower[k]);
+        hn::Store(high, d, upper[k]);
+        mask = hn::And(mask, hn::And(hn::Le(low, hn::Set(d, block.upper[k][slot])), hn::Ge(high, hn::Set(d, block.lower[k][slot]))));
+      }
+      for (std::uint32_t bits = bitsOf(d, mask); bits; bits &= bits - 1) {
+        const auto lane = static_cast<unsigned>(std::countr_zero(bits));
+        row(i + lane, {{lower[0][lane], lower[1][lane], lower[2][lane]}, {upper[0][lane], upper[1][lane], upper[2][lane]}}, b);
+      }
+    }
+  }
+
+  HWY_ATTR void withinLeaf(LeafRange leaf) {
+    const hn::CappedTag<float, 1> d;
+    for (std::uint32_t i = leaf.begin; i + 1 < leaf.end; ++i) {
+      Query query;
+      for (int k = 0; k < 3; ++k) {
+        query.lower[k] = hn::GetLane(roundedDown(hn::Set(d, m_boxesA.lower[k][i]), hn::Set(d, m_trees.shiftLower[k])));
+        query.upper[k] = hn::GetLane(roundedUp(hn::Set(d, m_boxesA.upper[k][i]), hn::Set(d, m_trees.shiftUpper[k])));
+      }
+      row(i, query, {i + 1, leaf.end});
+    }
+  }
+
+  /// One primitive of a against a range of b.
+  HWY_ATTR HWY_INLINE void row(std::size_t i, const Query& query, LeafRange b) {
+    const LeafTag d;
+    for (std::size_t j = b.begin; j < b.end; j += hn::Lanes(d)) {
+      auto mask = hn::FirstN(d, b.end - j);
+      for (int k = 0; k < 3; ++k) {
+        mask = hn::And(mask, hn::Le(hn::LoadU(d, m_boxesB.lower[k].data() + j), hn::Set(d, query.upper[k])));
+        mask = hn::And(mask, hn::Ge(hn::LoadU(d, m_boxesB.upper[k].data() + j), hn::Set(d, query.lower[k])));
+      }
+      std::uint32_t bits = bitsOf(d, mask);
+      if (bits == 0) continue;
+      TrianglePair* out = m_sink.room();
+      std::size_t count = 0;
+      if (!m_trees.self()) {
+        for (; bits; bits &= bits - 1) out[count++] = {m_idsA[i], m_idsB[j + static_cast<unsigned>(std::countr_zero(bits))]};
+      } else {
+        for (; bits; bits &= bits - 1) {
+          const std::size_t other = j + static_cast<unsigned>(std::countr_zero(bits));
+          if (m_trees.adjacency && adjacent(m_trees.adjacency[i], m_trees.adjacency[other])) continue;
+          const std::uint32_t p = m_idsA[i], q = m_idsB[other];
+          out[count++] = {p < q ? p : q, p < q ? q : p};
+        }
+      }
+      m_sink.advance(count);
+    }
+  }
+
+  static bool adjacent(const Triangle& s, const Triangle& t) {
+    bool equal = false;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) equal |= s[i] == t[j];
+    return equal;
+  }
+
+  const TreePair& m_trees;
+  const OctreeBlock* m_a;
+  const OctreeBlock* m_b;
+  const BoxArrays& m_boxesA;
+  const BoxArrays& m_boxesB;
+  const std::uint32_t* m_idsA;
+  const std::uint32_t* m_idsB;
+  Buffer<NodePair>& m_stack;
+  PairSink& m_sink;
+};
+
+HWY_ATTR void startPairsKernel(const TreePair& trees, std::size_t wanted, TraversalStack& stack, PairSink& sink) {
+  stack.pairs.clear();
+  Walk walk(trees, stack, sink);
+  if (!walk.rootsOverlap()) return;
+  stack.pairs.push_back({0, 0});
+  // Level by level: each round replaces every pair by those below it.
+  while (!stack.pairs.empty() && stack.pairs.size() < wanted) {
+    stack.next.swap(stack.pairs);
+    stack.pairs.clear();
+    for (const NodePair pair : stack.next) walk.step(pair);
+  }
+}
+
+HWY_ATTR void traverseKernel(const TreePair& trees, std::span<const NodePair> pairs, TraversalStack& stack, PairSink& sink) {
+  stack.pairs.assign(pairs.rbegin(), pairs.rend());
+  Walk(trees, stack, sink).all(0);
+}
+
+}  // namespace palpate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace palpate {
+
+HWY_EXPORT(startPairsKernel);
+HWY_EXPORT(traverseKernel);
+
+void setShift(TreePair& trees, const std::array<double, 3>& offset, double thickness) {
+  const auto clamped = [](double v) { return std::min(std::max(v, -double{0x1p125f}), double{0x1p125f}); };
+  for (int k = 0; k < 3; ++k) {
+    const double error = (std::abs(offset[k]) + thickness) * 0x1p-22;
+    trees.shiftLower[k] = static_cast<float>(clamped(offset[k] - thickness - error));
+    trees.shiftUpper[k] = static_cast<float>(clamped(offset[k] + thickness + error));
+  }
+}
+
+void startPairs(const TreePair& trees, std::size_t wanted, TraversalStack& stack, PairSink& sink) {
+  HWY_DYNAMIC_DISPATCH(startPairsKernel)(trees, wanted, stack, sink);
+}
+
+void traverse(const TreePair& trees, std::span<const NodePair> pairs, TraversalStack& stack, PairSink& sink) {
+  HWY_DYNAMIC_DISPATCH(traverseKernel)(trees, pairs, stack, sink);
+}
+
+}  // namespace palpate
+#endif
