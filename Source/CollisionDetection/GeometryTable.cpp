@@ -15,68 +15,84 @@ constexpr std::size_t kSmall = 16384;
 constexpr std::size_t kVertexGrain = 16384;
 constexpr std::size_t kTrianglesPerGroup = 1024;  ///< for bounds, before there are nodes
 constexpr std::size_t kGroupGrain = 1024;
-/// A refitted tree is rebuilt when its leaves have become this much larger in relation to their triangles.
+/// A refitted tree is rebuilt when its leaves have become this much larger in relation to their
+/// triangles.
 constexpr double kMostLoosening = 1.5;
 
-void checkPositions(GeometryId id, std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out, const char* which) {
+void checkPositions(GeometryId id, std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out,
+                    const char* which) {
   const std::size_t bad = copyFinite(positions, out);
   if (bad == positions.size()) return;
   const Eigen::Vector3d& p = positions[bad];
   char value[128];
   std::snprintf(value, sizeof value, "(%g, %g, %g)", p[0], p[1], p[2]);
   throw Error(ErrorCode::NonFinitePosition,
-              nameOf(id) + ", vertex " + std::to_string(bad) + ": position" + which + " is " + value + "; positions must be finite",
+              nameOf(id) + ", vertex " + std::to_string(bad) + ": position" + which + " is " +
+                  value + "; positions must be finite",
               id, bad);
 }
 
-void checkCounts(GeometryId id, std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles) {
+void checkCounts(GeometryId id, std::span<const Eigen::Vector3d> positions,
+                 std::span<const Triangle> triangles) {
   // Ids are 32 bits, and the highest bit of octree node numbers is taken.
   constexpr std::size_t kMost = std::size_t{1} << 28;
   if (positions.size() > kMost || triangles.size() > kMost)
-    throw Error(ErrorCode::TooLarge, nameOf(id) + ": " + std::to_string(positions.size()) + " vertices and " +
-                                         std::to_string(triangles.size()) + " triangles; at most 2^28 of each can be named", id);
+    throw Error(ErrorCode::TooLarge,
+                nameOf(id) + ": " + std::to_string(positions.size()) + " vertices and " +
+                    std::to_string(triangles.size()) +
+                    " triangles; at most 2^28 of each can be named",
+                id);
   for (std::size_t t = 0; t < triangles.size(); ++t)
     for (const std::uint32_t vertex : triangles[t])
       if (vertex >= positions.size())
         throw Error(ErrorCode::IndexOutOfRange,
-                    nameOf(id) + ", triangle " + std::to_string(t) + ": vertex index " + std::to_string(vertex) +
-                        " is out of range; the mesh has " + std::to_string(positions.size()) + " vertices",
+                    nameOf(id) + ", triangle " + std::to_string(t) + ": vertex index " +
+                        std::to_string(vertex) + " is out of range; the mesh has " +
+                        std::to_string(positions.size()) + " vertices",
                     id, t);
 }
 
 void checkPositionCount(const Geometry& geometry, std::size_t count) {
   if (count != geometry.mesh.topology.vertexCount)
     throw Error(ErrorCode::WrongPositionCount,
-                nameOf(geometry.id) + ": " + std::to_string(count) + " positions given, but it has " +
-                    std::to_string(geometry.mesh.topology.vertexCount) + " vertices; setTriangles() changes their number",
+                nameOf(geometry.id) + ": " + std::to_string(count) +
+                    " positions given, but it has " +
+                    std::to_string(geometry.mesh.topology.vertexCount) +
+                    " vertices; setTriangles() changes their number",
                 geometry.id);
 }
 
 void computeFloats(Geometry& geometry, const Threads& threads) {
   const std::span<const Eigen::Vector3d> positions = geometry.mesh.now;
   geometry.floats.resize(positions.size());
-  threads.forChunks(positions.size(), kVertexGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-    toFloats(positions.subspan(from, to - from), geometry.frame, geometry.floats.data() + from);
-  });
+  threads.forChunks(
+      positions.size(), kVertexGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+        toFloats(positions.subspan(from, to - from), geometry.frame, geometry.floats.data() + from);
+      });
 }
 
 /// Boxes in the order of orderedTriangles, and those of the groups.
-void computeBoxes(Geometry& geometry, std::span<const std::uint32_t> groups, Box* groupBoxes, const Threads& threads) {
-  threads.forChunks(groups.size() - 1, kGroupGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-    triangleBoxes(geometry.floats.data(), nullptr, geometry.orderedTriangles.data(), groups.subspan(from, to - from + 1),
-                  geometry.octree.boxes(), groupBoxes + from);
-  });
+void computeBoxes(Geometry& geometry, std::span<const std::uint32_t> groups, Box* groupBoxes,
+                  const Threads& threads) {
+  threads.forChunks(
+      groups.size() - 1, kGroupGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+        triangleBoxes(geometry.floats.data(), nullptr, geometry.orderedTriangles.data(),
+                      groups.subspan(from, to - from + 1), geometry.octree.boxes(),
+                      groupBoxes + from);
+      });
 }
 
 Box boundsOf(Geometry& geometry, const Threads& threads) {
   const std::size_t size = geometry.orderedTriangles.size();
   std::vector<std::uint32_t> groups;
-  for (std::size_t begin = 0; begin < size; begin += kTrianglesPerGroup) groups.push_back(static_cast<std::uint32_t>(begin));
+  for (std::size_t begin = 0; begin < size; begin += kTrianglesPerGroup)
+    groups.push_back(static_cast<std::uint32_t>(begin));
   groups.push_back(static_cast<std::uint32_t>(size));
   std::vector<Box> groupBoxes(groups.size() - 1);
   threads.forChunks(groupBoxes.size(), 8, [&](std::size_t, std::size_t from, std::size_t to) {
     triangleBoxes(geometry.floats.data(), nullptr, geometry.orderedTriangles.data(),
-                  std::span(groups).subspan(from, to - from + 1), geometry.octree.boxes(), groupBoxes.data() + from);
+                  std::span(groups).subspan(from, to - from + 1), geometry.octree.boxes(),
+                  groupBoxes.data() + from);
   });
   Box bounds;
   for (const Box& box : groupBoxes) bounds.add(box);
@@ -97,9 +113,11 @@ void rebuild(Geometry& geometry, const OctreeSettings& settings, const Threads& 
   octree.build(bounds, settings, threads);
   geometry.orderedTriangles.swap(geometry.orderedTrianglesBefore);
   geometry.orderedTriangles.resize(triangles.size());
-  threads.forChunks(triangles.size(), kVertexGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-    for (std::size_t i = from; i < to; ++i) geometry.orderedTriangles[i] = geometry.orderedTrianglesBefore[octree.previousSlot(i)];
-  });
+  threads.forChunks(
+      triangles.size(), kVertexGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+        for (std::size_t i = from; i < to; ++i)
+          geometry.orderedTriangles[i] = geometry.orderedTrianglesBefore[octree.previousSlot(i)];
+      });
   geometry.octreeMilliseconds += watch.lap();
 }
 
@@ -126,7 +144,8 @@ void updateOctree(Geometry& geometry, const OctreeSettings& settings, const Thre
   if (geometry.treeKnown && settings.update == OctreeUpdate::Auto) {
     fitBoxes(geometry, threads);
     geometry.lastUpdate = Update::Refitted;
-    if (geometry.octree.looseness() <= kMostLoosening * geometry.octree.loosenessWhenBuilt()) return;
+    if (geometry.octree.looseness() <= kMostLoosening * geometry.octree.loosenessWhenBuilt())
+      return;
   }
   rebuild(geometry, settings, threads);
   fitBoxes(geometry, threads);
@@ -135,11 +154,15 @@ void updateOctree(Geometry& geometry, const OctreeSettings& settings, const Thre
 
 }  // namespace
 
-std::string nameOf(GeometryId id) { return "geometry " + std::to_string(static_cast<std::uint32_t>(id)); }
+std::string nameOf(GeometryId id) {
+  return "geometry " + std::to_string(static_cast<std::uint32_t>(id));
+}
 
-GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles) {
+GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
+                              std::span<const Triangle> triangles) {
   const GeometryId id{m_nextId};
-  if (m_nextId == 0xffffffffu) throw Error(ErrorCode::TooLarge, "no geometry ids are left: 2^32 - 1 were given out");
+  if (m_nextId == 0xffffffffu)
+    throw Error(ErrorCode::TooLarge, "no geometry ids are left: 2^32 - 1 were given out");
   checkCounts(id, positions, triangles);
   auto geometry = std::make_unique<Geometry>();
   geometry->id = id;
@@ -153,10 +176,12 @@ GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions, std::s
 }
 
 Geometry& GeometryTable::at(GeometryId id) {
-  const auto found = std::lower_bound(m_geometries.begin(), m_geometries.end(), id, [](const auto& g, GeometryId i) { return g->id < i; });
+  const auto found = std::lower_bound(m_geometries.begin(), m_geometries.end(), id,
+                                      [](const auto& g, GeometryId i) { return g->id < i; });
   if (found == m_geometries.end() || (*found)->id != id) {
     const bool removed = static_cast<std::uint32_t>(id) < m_nextId;
-    throw Error(ErrorCode::UnknownGeometry, nameOf(id) + (removed ? " was removed" : " was never added"), id);
+    throw Error(ErrorCode::UnknownGeometry,
+                nameOf(id) + (removed ? " was removed" : " was never added"), id);
   }
   return **found;
 }
@@ -177,7 +202,8 @@ void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d>
   ++geometry.revision;
 }
 
-void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d> before, std::span<const Eigen::Vector3d> now) {
+void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d> before,
+                                 std::span<const Eigen::Vector3d> now) {
   Geometry& geometry = at(id);
   checkPositionCount(geometry, before.size());
   checkPositionCount(geometry, now.size());
@@ -191,7 +217,8 @@ void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d>
   ++geometry.revision;
 }
 
-void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles) {
+void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions,
+                                 std::span<const Triangle> triangles) {
   Geometry& geometry = at(id);
   checkCounts(id, positions, triangles);
   std::vector<Eigen::Vector3d> now(positions.size());
@@ -225,7 +252,8 @@ bool GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
     if (geometry->treeRevision == geometry->revision && geometry->frame.scale == scale) continue;
     changed = true;
     geometry->frame.scale = scale;
-    (geometry->mesh.topology.triangles.size() < kSmall ? m_small : m_large).push_back(geometry.get());
+    (geometry->mesh.topology.triangles.size() < kSmall ? m_small : m_large)
+        .push_back(geometry.get());
   }
   const Threads one(1);
   threads.forEach(m_small.size(), [&](std::size_t i) { updateOctree(*m_small[i], settings, one); });

@@ -21,7 +21,8 @@ namespace palpate {
 struct Geometry {
   GeometryId id;
   TriangleMesh mesh;
-  std::vector<Eigen::Vector3d> staging;   ///< positions are checked while copied in here, then swapped
+  std::vector<Eigen::Vector3d>
+      staging;  ///< positions are checked while copied in here, then swapped
   std::vector<Eigen::Vector3d> staging2;  ///< "before", where both are given
   std::uint64_t revision = 1;             ///< counts changes of positions and topology
   bool setThisFrame = true;               ///< "before" is already that of the coming frame
@@ -43,8 +44,10 @@ class GeometryTable {
   GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Triangle>);
   void remove(GeometryId);
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> now);
-  void setPositions(GeometryId, std::span<const Eigen::Vector3d> before, std::span<const Eigen::Vector3d> now);
-  void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions, std::span<const Triangle>);
+  void setPositions(GeometryId, std::span<const Eigen::Vector3d> before,
+                    std::span<const Eigen::Vector3d> now);
+  void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
+                    std::span<const Triangle>);
 
   Geometry& at(GeometryId);  ///< throws UnknownGeometry
   std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }

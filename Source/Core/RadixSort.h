@@ -8,14 +8,18 @@
 
 namespace palpate {
 
-/// Stable sort of `from` by bits [low, high) of each item into `to`, which is as long. `from` is overwritten.
+/// Stable sort of `from` by bits [low, high) of each item into `to`, which is as long. `from` is
+/// overwritten.
 /// Cost     one pass over the items for each 8 bits (11 where there are many), less one for each digit that is
 ///          the same in all.
-inline void radixSort(std::span<std::uint64_t> from, std::span<std::uint64_t> to, int low, int high) {
+inline void radixSort(std::span<std::uint64_t> from, std::span<std::uint64_t> to, int low,
+                      int high) {
   const std::size_t size = from.size();
   std::uint64_t* const destination = to.data();
   if (size <= 32) {
-    const auto digit = [=](std::uint64_t item) { return (item & ((std::uint64_t{2} << (high - 1)) - 1)) >> low; };
+    const auto digit = [=](std::uint64_t item) {
+      return (item & ((std::uint64_t{2} << (high - 1)) - 1)) >> low;
+    };
     for (std::size_t i = 0; i < size; ++i) {
       const std::uint64_t item = from[i];
       std::size_t place = i;
@@ -34,7 +38,8 @@ inline void radixSort(std::span<std::uint64_t> from, std::span<std::uint64_t> to
   for (int digit = 0; digit < digits; ++digit) std::fill_n(counts[digit].begin(), bins, 0u);
   for (const std::uint64_t item : from) {
     std::uint64_t rest = item >> low;
-    for (int digit = 0; digit + 1 < digits; ++digit, rest >>= digitBits) ++counts[digit][rest & mask];
+    for (int digit = 0; digit + 1 < digits; ++digit, rest >>= digitBits)
+      ++counts[digit][rest & mask];
     ++counts[digits - 1][rest & lastMask];
   }
   for (int digit = 0; digit < digits; ++digit) {

@@ -1,13 +1,13 @@
-// The one place that names the SIMD library (Highway). No include guard: a file with SIMD code is compiled
-// once for each instruction set by including itself. Such a file starts with
+// The one place that names the SIMD library (Highway). No include guard: a file with SIMD code is
+// compiled once for each instruction set by including itself. Such a file starts with
 //
 //   #undef HWY_TARGET_INCLUDE
 //   #define HWY_TARGET_INCLUDE "Room/File.cpp"
 //   #include "Core/Simd.h"
 //
-// puts its kernels in namespace palpate::HWY_NAMESPACE between HWY_BEFORE_NAMESPACE() and HWY_AFTER_NAMESPACE(),
-// and its exports and dispatch under #if HWY_ONCE. Every path gives the same bits: no fused multiply-add, no
-// approximate reciprocal, no sum whose order depends on the width.
+// puts its kernels in namespace palpate::HWY_NAMESPACE between HWY_BEFORE_NAMESPACE() and
+// HWY_AFTER_NAMESPACE(), and its exports and dispatch under #if HWY_ONCE. Every path gives the same
+// bits: no fused multiply-add, no approximate reciprocal, no sum whose order depends on the width.
 #if defined(PALPATE_SCALAR) && !defined(HWY_COMPILE_ONLY_SCALAR)
 #define HWY_COMPILE_ONLY_SCALAR
 #elif !defined(HWY_DISABLED_TARGETS)

@@ -13,7 +13,8 @@ SampledExtent sampleExtent(std::span<const Eigen::Vector3d> positions) {
   const std::size_t count = std::min(kMost, positions.size());
   std::array<double, kMost> sample;
   for (int axis = 0; axis < 3; ++axis) {
-    for (std::size_t i = 0; i < count; ++i) sample[i] = positions[i * positions.size() / count][axis];
+    for (std::size_t i = 0; i < count; ++i)
+      sample[i] = positions[i * positions.size() / count][axis];
     const auto middle = sample.begin() + count / 2;
     std::nth_element(sample.begin(), middle, sample.begin() + count);
     extent.median[axis] = *middle;
@@ -30,14 +31,16 @@ double frameScale(double spread) {
   return std::ldexp(1.0, -32 * steps);
 }
 
-void toFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame, FloatPoint* out) {
+void toFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
+              FloatPoint* out) {
   const double x = frame.origin[0], y = frame.origin[1], z = frame.origin[2], scale = frame.scale;
   const auto clamped = [](double v) {
     return static_cast<float>(std::min(std::max(v, -double{kLargestFloat}), double{kLargestFloat}));
   };
   for (std::size_t i = 0; i < positions.size(); ++i) {
     const Eigen::Vector3d& p = positions[i];
-    out[i] = {clamped((p[0] - x) * scale), clamped((p[1] - y) * scale), clamped((p[2] - z) * scale), 0.0f};
+    out[i] = {clamped((p[0] - x) * scale), clamped((p[1] - y) * scale), clamped((p[2] - z) * scale),
+              0.0f};
   }
 }
 

@@ -14,25 +14,28 @@ struct alignas(16) FloatPoint {
 
 /// Where a geometry's floats live: f = (position - origin) * scale.
 ///
-/// The origin is the median of a sample of the geometry's own positions, so that the floats resolve the bulk of it
-/// wherever the scene is and however far single vertices are flung; the scale, a power of two shared by a scene, only
-/// keeps floats within their range.
+/// The origin is the median of a sample of the geometry's own positions, so that the floats resolve
+/// the bulk of it wherever the scene is and however far single vertices are flung; the scale, a
+/// power of two shared by a scene, only keeps floats within their range.
 struct FloatFrame {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   double scale = 1.0;
 };
 
-/// Floats are clamped to this, so that boxes of scenes beyond float's range stay finite and conservative.
+/// Floats are clamped to this, so that boxes of scenes beyond float's range stay finite and
+/// conservative.
 constexpr float kLargestFloat = 0x1p120f;
 
-/// Median of up to 63 evenly spaced positions, axis by axis, and the largest coordinate difference to it among them.
+/// Median of up to 63 evenly spaced positions, axis by axis, and the largest coordinate difference
+/// to it among them.
 struct SampledExtent {
   Eigen::Vector3d median = Eigen::Vector3d::Zero();
   double spread = 0.0;
 };
 SampledExtent sampleExtent(std::span<const Eigen::Vector3d> positions);
 
-/// A power of two that brings `spread` to [2^-16, 2^16], in steps of 2^32 so that it hardly ever changes.
+/// A power of two that brings `spread` to [2^-16, 2^16], in steps of 2^32 so that it hardly ever
+/// changes.
 double frameScale(double spread);
 
 /// Rounds to nearest. `out` is as long as `positions`.

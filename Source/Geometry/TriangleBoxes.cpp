@@ -36,9 +36,11 @@ HWY_ATTR void storeRounded(const Chunk& chunk, std::size_t begin, BoxArrays& box
 }
 
 template <bool kSwept>
-HWY_ATTR void triangleBoxesOf(const FloatPoint* HWY_RESTRICT vertices, const FloatPoint* HWY_RESTRICT before,
-                              const Triangle* HWY_RESTRICT triangles, std::span<const std::uint32_t> groups,
-                              BoxArrays& boxes, Box* HWY_RESTRICT groupBoxes) {
+HWY_ATTR void triangleBoxesOf(const FloatPoint* HWY_RESTRICT vertices,
+                              const FloatPoint* HWY_RESTRICT before,
+                              const Triangle* HWY_RESTRICT triangles,
+                              std::span<const std::uint32_t> groups, BoxArrays& boxes,
+                              Box* HWY_RESTRICT groupBoxes) {
   const hn::FixedTag<float, HWY_TARGET == HWY_SCALAR ? 1 : 4> d4;
   constexpr std::size_t kLanes = HWY_TARGET == HWY_SCALAR ? 1 : 4, kVectors = 4 / kLanes;
   using V = hn::Vec<decltype(d4)>;
@@ -76,15 +78,19 @@ HWY_ATTR void triangleBoxesOf(const FloatPoint* HWY_RESTRICT vertices, const Flo
         fill = 0;
       }
     }
-    const V relative = hn::Set(d4, OutwardRounding::kRelative), absolute = hn::Set(d4, OutwardRounding::kAbsolute);
+    const V relative = hn::Set(d4, OutwardRounding::kRelative),
+            absolute = hn::Set(d4, OutwardRounding::kAbsolute);
     for (std::size_t k = 0; k < kVectors; ++k) {
-      hn::Store(hn::Sub(groupLower[k], hn::Add(hn::Mul(hn::Abs(groupLower[k]), relative), absolute)), d4,
-                groupBoxes[g].lower.data() + k * kLanes);
-      hn::Store(hn::Add(groupUpper[k], hn::Add(hn::Mul(hn::Abs(groupUpper[k]), relative), absolute)), d4,
-                groupBoxes[g].upper.data() + k * kLanes);
+      hn::Store(
+          hn::Sub(groupLower[k], hn::Add(hn::Mul(hn::Abs(groupLower[k]), relative), absolute)), d4,
+          groupBoxes[g].lower.data() + k * kLanes);
+      hn::Store(
+          hn::Add(groupUpper[k], hn::Add(hn::Mul(hn::Abs(groupUpper[k]), relative), absolute)), d4,
+          groupBoxes[g].upper.data() + k * kLanes);
     }
   }
-  // The rest one by one: a whole vector would overwrite what another thread may have written behind it.
+  // The rest one by one: a whole vector would overwrite what another thread may have written behind
+  // it.
   for (std::size_t i = 0; i < fill; ++i)
     for (int k = 0; k < 3; ++k) {
       boxes.lower[k][chunkBegin + i] = OutwardRounding::down(chunk.lower[4 * i + k]);
@@ -92,8 +98,9 @@ HWY_ATTR void triangleBoxesOf(const FloatPoint* HWY_RESTRICT vertices, const Flo
     }
 }
 
-HWY_ATTR void triangleBoxesKernel(const FloatPoint* vertices, const FloatPoint* before, const Triangle* triangles,
-                                  std::span<const std::uint32_t> groups, BoxArrays& boxes, Box* groupBoxes) {
+HWY_ATTR void triangleBoxesKernel(const FloatPoint* vertices, const FloatPoint* before,
+                                  const Triangle* triangles, std::span<const std::uint32_t> groups,
+                                  BoxArrays& boxes, Box* groupBoxes) {
   if (before)
     triangleBoxesOf<true>(vertices, before, triangles, groups, boxes, groupBoxes);
   else

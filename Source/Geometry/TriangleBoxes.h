@@ -10,11 +10,12 @@
 
 namespace palpate {
 
-/// Outward-rounded boxes of triangles [begin, end), and the box of each group of consecutive triangles.
+/// Outward-rounded boxes of triangles [begin, end), and the box of each group of consecutive
+/// triangles.
 ///
 /// Shapes   vertices: of the mesh now; before: the same at the step's start, so that boxes sweep the step, or null.
-///          groups: group g is triangles [groups[g], groups[g + 1]); the first starts at `begin`, the last ends at
-///          `end`. groupBoxes: one per group.
+///          groups: group g is triangles [groups[g], groups[g + 1]); the first starts at `begin`,
+///          the last ends at `end`. groupBoxes: one per group.
 /// Cost     about 20 instructions a triangle.
 void triangleBoxes(const FloatPoint* vertices, const FloatPoint* before, const Triangle* triangles,
                    std::span<const std::uint32_t> groups, BoxArrays& boxes, Box* groupBoxes);

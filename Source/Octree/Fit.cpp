@@ -9,7 +9,8 @@ namespace palpate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-HWY_ATTR void fitBlocksKernel(OctreeBlock* blocks, const OctreeNode* parents, std::size_t begin, std::size_t end) {
+HWY_ATTR void fitBlocksKernel(OctreeBlock* blocks, const OctreeNode* parents, std::size_t begin,
+                              std::size_t end) {
   const hn::CappedTag<float, 8> d;
   for (std::size_t b = end; b-- > begin;) {
     const OctreeBlock& block = blocks[b];

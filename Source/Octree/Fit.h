@@ -7,7 +7,8 @@
 namespace palpate {
 
 /// Carries the fitted boxes of blocks [begin, end) to their parents' slots, last block first.
-/// A parent's slot with primitives of its own already holds their box and is widened, any other is overwritten.
+/// A parent's slot with primitives of its own already holds their box and is widened, any other is
+/// overwritten.
 void fitBlocks(OctreeBlock* blocks, const OctreeNode* parents, std::size_t begin, std::size_t end);
 
 }  // namespace palpate

@@ -18,13 +18,14 @@ struct LooseOctree::State {
     Eigen::Vector3d origin;  ///< position = origin + float / scale
     double scale;
     Update lastUpdate;
-    std::size_t otherBytes;     ///< the geometry's floats
+    std::size_t otherBytes;       ///< the geometry's floats
     std::uint32_t firstNode = 0;  ///< node ids of this tree start here
   };
   std::vector<Tree> trees;  ///< by ascending geometry id; those without primitives left out
 };
 
-/// Sentences about each invariant that does not hold. `cells`: also that primitives are where a rebuild puts them.
+/// Sentences about each invariant that does not hold. `cells`: also that primitives are where a
+/// rebuild puts them.
 std::vector<std::string> validate(const Octree&, bool cells);
 
 /// The cell of a node and its depth.

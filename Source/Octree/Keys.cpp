@@ -21,8 +21,9 @@ HWY_INLINE V spreadBits(V v) {
   return hn::And(hn::Or(v, hn::ShiftLeft<2>(v)), hn::Set(d, 0x09249249));
 }
 
-HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slots, std::uint32_t first,
-                               std::size_t size, const Cube& cube, KeyLayout layout, std::uint64_t* keys) {
+HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slots,
+                               std::uint32_t first, std::size_t size, const Cube& cube,
+                               KeyLayout layout, std::uint64_t* keys) {
   const hn::CappedTag<float, 8> d;
   const hn::RebindToSigned<decltype(d)> di;
   const std::size_t lanes = hn::Lanes(d);
@@ -31,8 +32,9 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
   const auto slack = hn::Set(d, 1.0f + 0x1p-10f);
   const auto half = hn::Set(d, 0.5f);
   // The biased exponent of the cube's edge, a power of two.
-  const auto edgeExponent =
-      hn::Set(di, static_cast<std::int32_t>(std::bit_cast<std::uint32_t>(static_cast<float>(cube.edge)) >> 23));
+  const auto edgeExponent = hn::Set(
+      di,
+      static_cast<std::int32_t>(std::bit_cast<std::uint32_t>(static_cast<float>(cube.edge)) >> 23));
   const auto deepest = hn::Set(di, layout.levels);
   const auto zero = hn::Zero(di), lastCell = hn::Set(di, (1 << layout.levels) - 1);
   alignas(64) float gathered[6][8];
@@ -52,15 +54,19 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
     hn::Vec<decltype(di)> cell[3];
     auto longest = hn::Zero(d);
     for (int k = 0; k < 3; ++k) {
-      const auto lower = slots ? hn::LoadU(d, gathered[k]) : hn::LoadU(d, boxes.lower[k].data() + first + i);
-      const auto upper = slots ? hn::LoadU(d, gathered[3 + k]) : hn::LoadU(d, boxes.upper[k].data() + first + i);
+      const auto lower =
+          slots ? hn::LoadU(d, gathered[k]) : hn::LoadU(d, boxes.lower[k].data() + first + i);
+      const auto upper =
+          slots ? hn::LoadU(d, gathered[3 + k]) : hn::LoadU(d, boxes.upper[k].data() + first + i);
       longest = hn::Max(longest, hn::Sub(upper, lower));
       // The cube's corner in two floats: the differences are as good as exact near it.
       const float corner = static_cast<float>(cube.lower[k]);
-      const auto high = hn::Set(d, corner), low = hn::Set(d, static_cast<float>(cube.lower[k] - corner));
+      const auto high = hn::Set(d, corner),
+                 low = hn::Set(d, static_cast<float>(cube.lower[k] - corner));
       const auto fromCorner = hn::Add(hn::Mul(hn::Sub(hn::Sub(lower, high), low), half),
                                       hn::Mul(hn::Sub(hn::Sub(upper, high), low), half));
-      const auto scaled = hn::Min(hn::Max(hn::Mul(fromCorner, cellsPerUnit), hn::Zero(d)), hn::Set(d, cells));
+      const auto scaled =
+          hn::Min(hn::Max(hn::Mul(fromCorner, cellsPerUnit), hn::Zero(d)), hn::Set(d, cells));
       cell[k] = hn::Min(hn::ConvertTo(di, scaled), lastCell);
     }
     // ceil(log2(size)): the exponent of size, one more if any bit of its fraction is set.
@@ -69,7 +75,8 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
     const auto level = hn::Min(hn::Max(hn::Sub(edgeExponent, sizeExponent), zero), deepest);
     const auto coarse = hn::Sub(deepest, level);
     for (int k = 0; k < 3; ++k) cell[k] = spreadBits(hn::Shl(hn::Shr(cell[k], coarse), coarse));
-    const auto morton = hn::Or(cell[0], hn::Or(hn::ShiftLeft<1>(cell[1]), hn::ShiftLeft<2>(cell[2])));
+    const auto morton =
+        hn::Or(cell[0], hn::Or(hn::ShiftLeft<1>(cell[1]), hn::ShiftLeft<2>(cell[2])));
     hn::StoreU(hn::Or(hn::ShiftLeft<KeyLayout::kLevelBits>(morton), level), di, made);
     for (std::size_t lane = 0; lane < count; ++lane) {
       const std::uint64_t slot = slots ? slots[i + lane] & 0xffffffffu : first + i + lane;
@@ -86,8 +93,8 @@ namespace palpate {
 
 HWY_EXPORT(octreeKeysKernel);
 
-void octreeKeys(const BoxArrays& boxes, const std::uint64_t* slots, std::uint32_t first, std::size_t size,
-                const Cube& cube, KeyLayout layout, std::uint64_t* keys) {
+void octreeKeys(const BoxArrays& boxes, const std::uint64_t* slots, std::uint32_t first,
+                std::size_t size, const Cube& cube, KeyLayout layout, std::uint64_t* keys) {
   HWY_DYNAMIC_DISPATCH(octreeKeysKernel)(boxes, slots, first, size, cube, layout, keys);
 }
 

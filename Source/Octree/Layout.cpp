@@ -10,8 +10,10 @@ namespace palpate {
 
 int keyLevels(std::size_t size, const OctreeSettings& settings, int depth) {
   const std::size_t leaves = size / static_cast<std::size_t>(settings.maxPrimitivesPerLeaf) + 1;
-  const int levels = (std::bit_width(leaves) + 1) / 2 + 2;  // a surface fills a quarter of the cells of the next level
-  return std::clamp(levels, 1, std::min(KeyLayout::kMostLevels, std::max(1, settings.maxDepth - depth)));
+  const int levels = (std::bit_width(leaves) + 1) / 2 +
+                     2;  // a surface fills a quarter of the cells of the next level
+  return std::clamp(levels, 1,
+                    std::min(KeyLayout::kMostLevels, std::max(1, settings.maxDepth - depth)));
 }
 
 void Octree::Layout::clear() {
@@ -62,7 +64,8 @@ std::uint32_t Octree::Layout::layOut(Octree& octree, Job job) {
   if (size <= m_mostPerLeaf || job.depth >= m_maxDepth) return leaf(job.begin, job.end, job.node);
   if (job.level == job.keys.levels) {
     // Too full at the keys' last level: split further by second keys inside the cell.
-    job.keys.levels = keyLevels(size, {.maxDepth = m_maxDepth, .maxPrimitivesPerLeaf = int(m_mostPerLeaf)}, job.depth);
+    job.keys.levels = keyLevels(
+        size, {.maxDepth = m_maxDepth, .maxPrimitivesPerLeaf = int(m_mostPerLeaf)}, job.depth);
     job.level = 0;
     octree.sortKeys(job.begin, job.end, true, job.cube, job.keys, m_threads);
   }
@@ -110,8 +113,8 @@ std::uint32_t Octree::Layout::split(Octree& octree, const Job& job, std::uint32_
     const OctreeNode node = block * 8 + slot;
     std::uint32_t child = OctreeBlock::kLeaf;
     if (size > m_mostPerLeaf) {
-      child = layOut(octree, {begins[slot], begins[slot + 1], job.level + 1, job.depth + 1, job.keys,
-                              job.cube.child(slot), node});
+      child = layOut(octree, {begins[slot], begins[slot + 1], job.level + 1, job.depth + 1,
+                              job.keys, job.cube.child(slot), node});
     } else if (size > 0) {
       child = leaf(begins[slot], begins[slot + 1], node);
     }

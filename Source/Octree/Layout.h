@@ -6,10 +6,11 @@
 
 namespace palpate {
 
-/// Lays out the nodes over a range of sorted keys: the whole tree's top, or one subtree of it in a task of its own.
+/// Lays out the nodes over a range of sorted keys: the whole tree's top, or one subtree of it in a
+/// task of its own.
 ///
-/// The top leaves every subtree of at most taskSize primitives to a task; so the same primitives give the same blocks
-/// in the same order for any number of threads.
+/// The top leaves every subtree of at most taskSize primitives to a task; so the same primitives
+/// give the same blocks in the same order for any number of threads.
 class Octree::Layout {
  public:
   struct Links {
@@ -24,7 +25,8 @@ class Octree::Layout {
     Cube cube;
     OctreeNode node;
   };
-  /// In `groupNodes`: the group is task (entry & ~kTask)'s, or the own primitives of the task's root.
+  /// In `groupNodes`: the group is task (entry & ~kTask)'s, or the own primitives of the task's
+  /// root.
   static constexpr OctreeNode kTask = 0x80000000u, kTaskRoot = 0xffffffffu;
 
   Buffer<Links> links;
@@ -34,7 +36,8 @@ class Octree::Layout {
   Buffer<Job> tasks;
 
   /// Of the whole tree: block 0 holds the root alone.
-  void layOutTop(Octree&, const Job& root, const OctreeSettings&, std::uint32_t taskSize, const Threads&);
+  void layOutTop(Octree&, const Job& root, const OctreeSettings&, std::uint32_t taskSize,
+                 const Threads&);
   /// Of one task: block 0 holds the children of its root.
   void layOutTask(Octree&, const Job&, const OctreeSettings&);
 

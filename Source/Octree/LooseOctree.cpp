@@ -15,7 +15,8 @@ namespace {
 using Tree = LooseOctree::State::Tree;
 
 const Tree* treeOf(const LooseOctree::State& state, GeometryId geometry) {
-  const auto found = std::find_if(state.trees.begin(), state.trees.end(), [=](const Tree& t) { return t.geometry == geometry; });
+  const auto found = std::find_if(state.trees.begin(), state.trees.end(),
+                                  [=](const Tree& t) { return t.geometry == geometry; });
   return found == state.trees.end() ? nullptr : &*found;
 }
 
@@ -35,7 +36,8 @@ double nextUp(double v) { return std::nextafter(v, std::numeric_limits<double>::
 
 Eigen::AlignedBox3d cubeInScene(const Tree& tree, const std::array<double, 3>& lower, double edge) {
   const Eigen::Vector3d corner(lower[0], lower[1], lower[2]);
-  return {tree.origin + corner / tree.scale, tree.origin + (corner.array() + edge).matrix() / tree.scale};
+  return {tree.origin + corner / tree.scale,
+          tree.origin + (corner.array() + edge).matrix() / tree.scale};
 }
 
 }  // namespace
@@ -54,14 +56,16 @@ CellOfNode cellOf(const Octree& octree, OctreeNode node) {
 std::vector<LooseOctree::NodeId> LooseOctree::nodes(GeometryId geometry) const {
   std::vector<NodeId> ids;
   if (const Tree* tree = treeOf(*m_state, geometry))
-    forEachNode(*tree->octree, 0, 0, [&](OctreeNode node, int) { ids.push_back(NodeId{tree->firstNode + node}); });
+    forEachNode(*tree->octree, 0, 0,
+                [&](OctreeNode node, int) { ids.push_back(NodeId{tree->firstNode + node}); });
   return ids;
 }
 
 std::vector<LooseOctree::NodeId> LooseOctree::nodes() const {
   std::vector<NodeId> ids;
   for (const Tree& tree : m_state->trees)
-    forEachNode(*tree.octree, 0, 0, [&](OctreeNode node, int) { ids.push_back(NodeId{tree.firstNode + node}); });
+    forEachNode(*tree.octree, 0, 0,
+                [&](OctreeNode node, int) { ids.push_back(NodeId{tree.firstNode + node}); });
   return ids;
 }
 
@@ -72,14 +76,18 @@ std::optional<LooseOctree::NodeId> LooseOctree::root(GeometryId geometry) const 
 
 LooseOctree::Node LooseOctree::node(NodeId id) const {
   const auto index = static_cast<std::uint32_t>(id);
-  const auto next = std::upper_bound(m_state->trees.begin(), m_state->trees.end(), index,
-                                     [](std::uint32_t i, const Tree& t) { return i < t.firstNode; });
-  if (next == m_state->trees.begin()) throw Error(ErrorCode::IndexOutOfRange, "octree node " + std::to_string(index) + " does not exist");
+  const auto next =
+      std::upper_bound(m_state->trees.begin(), m_state->trees.end(), index,
+                       [](std::uint32_t i, const Tree& t) { return i < t.firstNode; });
+  if (next == m_state->trees.begin())
+    throw Error(ErrorCode::IndexOutOfRange,
+                "octree node " + std::to_string(index) + " does not exist");
   const Tree& tree = *std::prev(next);
   const Octree& octree = *tree.octree;
   const OctreeNode node = index - tree.firstNode;
   if (node >= octree.pool().used() * 8 || octree.blocks()[node >> 3].isEmpty(node & 7))
-    throw Error(ErrorCode::IndexOutOfRange, "octree node " + std::to_string(index) + " does not exist or is empty");
+    throw Error(ErrorCode::IndexOutOfRange,
+                "octree node " + std::to_string(index) + " does not exist or is empty");
   const OctreeBlock& block = octree.blocks()[node >> 3];
   const auto [cube, depth] = cellOf(octree, node);
 
@@ -87,8 +95,11 @@ LooseOctree::Node LooseOctree::node(NodeId id) const {
   result.geometry = tree.geometry;
   result.depth = depth;
   result.bounds = cubeInScene(tree, cube.lower, cube.edge);
-  result.looseBounds = cubeInScene(
-      tree, {cube.lower[0] - cube.edge * 0.5, cube.lower[1] - cube.edge * 0.5, cube.lower[2] - cube.edge * 0.5}, 2 * cube.edge);
+  result.looseBounds =
+      cubeInScene(tree,
+                  {cube.lower[0] - cube.edge * 0.5, cube.lower[1] - cube.edge * 0.5,
+                   cube.lower[2] - cube.edge * 0.5},
+                  2 * cube.edge);
   const Box box = block.box(node & 7);
   for (int k = 0; k < 3; ++k) {
     result.fittedBox.min()[k] = nextDown(tree.origin[k] + box.lower[k] / tree.scale);
@@ -100,7 +111,8 @@ LooseOctree::Node LooseOctree::node(NodeId id) const {
   if (!result.leaf) {
     const std::uint32_t child = block.child[node & 7];
     for (unsigned slot = 0; slot < 8; ++slot)
-      if (!octree.blocks()[child].isEmpty(slot)) result.children[slot] = NodeId{tree.firstNode + child * 8 + slot};
+      if (!octree.blocks()[child].isEmpty(slot))
+        result.children[slot] = NodeId{tree.firstNode + child * 8 + slot};
   }
   const auto [begin, end] = octree.ownRange(node);
   result.primitives = octree.order().subspan(begin, end - begin);
@@ -132,7 +144,8 @@ OctreeStatistics LooseOctree::statistics() const {
       ++statistics.nodesByDepth[level];
       statistics.primitivesByDepth[level] += end - begin;
       statistics.deepestLevel = std::max(statistics.deepestLevel, depth);
-      statistics.mostPrimitivesInNode = std::max<std::size_t>(statistics.mostPrimitivesInNode, end - begin);
+      statistics.mostPrimitivesInNode =
+          std::max<std::size_t>(statistics.mostPrimitivesInNode, end - begin);
     });
   }
   statistics.nodesAllocated = 8 * statistics.blocksAllocated;
@@ -142,8 +155,10 @@ OctreeStatistics LooseOctree::statistics() const {
 std::vector<std::string> LooseOctree::validate() const {
   std::vector<std::string> failures;
   for (const Tree& tree : m_state->trees)
-    for (const std::string& failure : palpate::validate(*tree.octree, tree.lastUpdate == Update::Rebuilt))
-      failures.push_back("geometry " + std::to_string(static_cast<std::uint32_t>(tree.geometry)) + ": " + failure);
+    for (const std::string& failure :
+         palpate::validate(*tree.octree, tree.lastUpdate == Update::Rebuilt))
+      failures.push_back("geometry " + std::to_string(static_cast<std::uint32_t>(tree.geometry)) +
+                         ": " + failure);
   return failures;
 }
 

@@ -17,7 +17,8 @@ constexpr std::size_t kSerialSize = 16384;
 constexpr std::size_t kGrain = 8192;
 constexpr std::size_t kRadixOnly = 8192;
 
-/// The power-of-two cube that holds the box, its corner on a grid so coarse that cells' corners are exact.
+/// The power-of-two cube that holds the box, its corner on a grid so coarse that cells' corners are
+/// exact.
 Cube rootCube(const Box& bounds) {
   Cube cube;
   float longest = std::numeric_limits<float>::min();
@@ -26,7 +27,8 @@ Cube rootCube(const Box& bounds) {
   cube.edge = std::exp2(std::ceil(std::log2(static_cast<double>(longest) * (1.0 + 0x1p-9))));
   const double grid = cube.edge * 0x1p-20;
   for (int k = 0; k < 3; ++k) {
-    const double middle = 0.5 * (static_cast<double>(bounds.lower[k]) + static_cast<double>(bounds.upper[k]));
+    const double middle =
+        0.5 * (static_cast<double>(bounds.lower[k]) + static_cast<double>(bounds.upper[k]));
     cube.lower[k] = std::floor((middle - 0.5 * cube.edge) / grid) * grid;
   }
   return cube;
@@ -49,8 +51,8 @@ void Octree::reset(std::size_t size) {
   m_pool.use(0);
 }
 
-void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const Cube& cube, KeyLayout layout,
-                      const Threads* threads) {
+void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const Cube& cube,
+                      KeyLayout layout, const Threads* threads) {
   const std::size_t size = end - begin;
   const std::uint64_t* slots = rekey ? m_keys.data() + begin : nullptr;
   const int low = 32, high = 32 + layout.bits();
@@ -65,8 +67,8 @@ void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const 
   const std::size_t bins = std::size_t{1} << topBits, chunks = (size + kGrain - 1) / kGrain;
   m_binCounts.resize(bins * chunks);
   threads->forChunks(size, kGrain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
-    octreeKeys(m_boxes, slots ? slots + from : nullptr, static_cast<std::uint32_t>(begin + from), to - from, cube, layout,
-               keys.data() + from);
+    octreeKeys(m_boxes, slots ? slots + from : nullptr, static_cast<std::uint32_t>(begin + from),
+               to - from, cube, layout, keys.data() + from);
     std::uint32_t* counts = m_binCounts.data() + chunk * bins;
     std::fill_n(counts, bins, 0u);
     for (std::size_t i = from; i < to; ++i) ++counts[keys[i] >> topShift];
@@ -75,7 +77,8 @@ void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const 
   std::uint32_t sum = 0;
   for (std::size_t bin = 0; bin < bins; ++bin) {
     m_binBegins[bin] = sum;
-    for (std::size_t chunk = 0; chunk < chunks; ++chunk) sum += std::exchange(m_binCounts[chunk * bins + bin], sum);
+    for (std::size_t chunk = 0; chunk < chunks; ++chunk)
+      sum += std::exchange(m_binCounts[chunk * bins + bin], sum);
   }
   m_binBegins[bins] = sum;
   threads->forChunks(size, kGrain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
@@ -85,7 +88,8 @@ void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const 
   threads->forChunks(bins, 8, [&](std::size_t, std::size_t from, std::size_t to) {
     for (std::size_t bin = from; bin < to; ++bin) {
       const std::size_t place = m_binBegins[bin], count = m_binBegins[bin + 1] - place;
-      if (count > 0) radixSort(scratch.subspan(place, count), keys.subspan(place, count), low, topShift);
+      if (count > 0)
+        radixSort(scratch.subspan(place, count), keys.subspan(place, count), low, topShift);
     }
   });
 }
@@ -105,7 +109,9 @@ void Octree::build(const Box& bounds, const OctreeSettings& settings, const Thre
   const std::size_t tasks = m_layouts[0].tasks.size();
   if (m_layouts.size() < tasks + 1) m_layouts.resize(tasks + 1);
   Layout* layouts = m_layouts.data();
-  threads.forEach(tasks, [&](std::size_t task) { layouts[task + 1].layOutTask(*this, layouts[0].tasks[task], settings); });
+  threads.forEach(tasks, [&](std::size_t task) {
+    layouts[task + 1].layOutTask(*this, layouts[0].tasks[task], settings);
+  });
   assemble(tasks, threads);
 
   m_orderBefore.swap(m_order);
@@ -131,7 +137,10 @@ void Octree::assemble(std::size_t tasks, const Threads& threads) {
   for (std::size_t i = 0; i < top.groups.size(); ++i) {
     m_entryPlaces[i] = groupCount;
     const OctreeNode node = top.groupNodes[i];
-    groupCount += node & Layout::kTask ? static_cast<std::uint32_t>(m_layouts[1 + (node & ~Layout::kTask)].groups.size()) : 1;
+    groupCount +=
+        node & Layout::kTask
+            ? static_cast<std::uint32_t>(m_layouts[1 + (node & ~Layout::kTask)].groups.size())
+            : 1;
   }
   m_groups.resize(groupCount + 1);
   m_groupNodes.resize(groupCount);
@@ -151,14 +160,16 @@ void Octree::assemble(std::size_t tasks, const Threads& threads) {
     const std::uint32_t base = m_taskBlocks[task + 1] * 8;
     std::copy(layout.groups.begin(), layout.groups.end(), m_groups.begin() + place);
     for (std::size_t g = 0; g < layout.groups.size(); ++g)
-      m_groupNodes[place + g] = layout.groupNodes[g] == Layout::kTaskRoot ? root : layout.groupNodes[g] + base;
+      m_groupNodes[place + g] =
+          layout.groupNodes[g] == Layout::kTaskRoot ? root : layout.groupNodes[g] + base;
   });
   threads.forEach(tasks + 1, [&](std::size_t i) {
     const Layout& layout = m_layouts[i];
     const std::uint32_t base = m_taskBlocks[i];
     for (std::size_t b = 0; b < layout.links.size(); ++b) {
       OctreeBlock& block = m_pool[base + b];
-      m_parents[base + b] = layout.parents[b] == Layout::kTaskRoot ? top.tasks[i - 1].node : layout.parents[b] + base * 8;
+      m_parents[base + b] = layout.parents[b] == Layout::kTaskRoot ? top.tasks[i - 1].node
+                                                                   : layout.parents[b] + base * 8;
       for (unsigned slot = 0; slot < 8; ++slot) {
         const std::uint32_t child = layout.links[b].child[slot];
         block.begin[slot] = layout.links[b].begin[slot];
@@ -174,9 +185,11 @@ void Octree::assemble(std::size_t tasks, const Threads& threads) {
 }
 
 void Octree::fit(const Threads& threads) {
-  threads.forChunks(m_groupNodes.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-    for (std::size_t g = from; g < to; ++g) m_pool[m_groupNodes[g] >> 3].setBox(m_groupNodes[g] & 7, m_groupBoxes[g]);
-  });
+  threads.forChunks(m_groupNodes.size(), kGrain,
+                    [&](std::size_t, std::size_t from, std::size_t to) {
+                      for (std::size_t g = from; g < to; ++g)
+                        m_pool[m_groupNodes[g] >> 3].setBox(m_groupNodes[g] & 7, m_groupBoxes[g]);
+                    });
   // Children come after their parents in a task, and tasks after the top.
   const std::size_t tasks = m_taskBlocks.size() - 2;
   threads.forEach(tasks, [&](std::size_t task) {
@@ -205,12 +218,13 @@ void Octree::measureLooseness() {
 
 std::size_t Octree::bytes() const {
   const auto of = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
-  std::size_t bytes = of(m_order) + of(m_orderBefore) + of(m_keys) + of(m_keysScratch) + of(m_groups) + of(m_groupNodes) +
-                      of(m_groupBoxes) + of(m_parents) + m_pool.allocated() * sizeof(OctreeBlock) + of(m_binCounts) +
-                      of(m_binBegins);
+  std::size_t bytes = of(m_order) + of(m_orderBefore) + of(m_keys) + of(m_keysScratch) +
+                      of(m_groups) + of(m_groupNodes) + of(m_groupBoxes) + of(m_parents) +
+                      m_pool.allocated() * sizeof(OctreeBlock) + of(m_binCounts) + of(m_binBegins);
   for (int k = 0; k < 3; ++k) bytes += of(m_boxes.lower[k]) + of(m_boxes.upper[k]);
   for (const Layout& layout : m_layouts)
-    bytes += of(layout.links) + of(layout.parents) + of(layout.groups) + of(layout.groupNodes) + of(layout.tasks);
+    bytes += of(layout.links) + of(layout.parents) + of(layout.groups) + of(layout.groupNodes) +
+             of(layout.tasks);
   return bytes;
 }
 

@@ -17,9 +17,9 @@ namespace palpate {
 
 /// Eight siblings: their fitted boxes side by side, so that one SIMD comparison prunes all eight.
 ///
-/// Slot i is the child in octant i (bit 0: x, 1: y, 2: z). A slot in use holds primitives [begin, ...) of the tree's
-/// order: as a leaf `count(i)` of them; otherwise its own primitives come first and end where child block's first
-/// begins. An empty slot's box overlaps nothing.
+/// Slot i is the child in octant i (bit 0: x, 1: y, 2: z). A slot in use holds primitives [begin,
+/// ...) of the tree's order: as a leaf `count(i)` of them; otherwise its own primitives come first
+/// and end where child block's first begins. An empty slot's box overlaps nothing.
 struct alignas(64) OctreeBlock {
   static constexpr std::uint32_t kLeaf = 0x80000000u;
 
@@ -32,7 +32,8 @@ struct alignas(64) OctreeBlock {
   std::uint32_t count(unsigned slot) const { return child[slot] & ~kLeaf; }
   bool isEmpty(unsigned slot) const { return child[slot] == kLeaf; }
   Box box(unsigned slot) const {
-    return {{lower[0][slot], lower[1][slot], lower[2][slot], 0}, {upper[0][slot], upper[1][slot], upper[2][slot], 0}};
+    return {{lower[0][slot], lower[1][slot], lower[2][slot], 0},
+            {upper[0][slot], upper[1][slot], upper[2][slot], 0}};
   }
   void setBox(unsigned slot, const Box& box) {
     for (int k = 0; k < 3; ++k) {
@@ -41,16 +42,18 @@ struct alignas(64) OctreeBlock {
     }
   }
 };
-static_assert(sizeof(OctreeBlock) == 256, "four cache lines: two of bounds on each side, one of links");
+static_assert(sizeof(OctreeBlock) == 256,
+              "four cache lines: two of bounds on each side, one of links");
 
-/// Blocks, numbered from 0. Grows by at least kGrowth blocks and by half of what it has; blocks that a smaller tree no
-/// longer needs stay in it, free.
+/// Blocks, numbered from 0. Grows by at least kGrowth blocks and by half of what it has; blocks
+/// that a smaller tree no longer needs stay in it, free.
 class BlockPool {
  public:
   static constexpr std::size_t kGrowth = 64;
 
   void use(std::size_t blocks) {
-    if (blocks > m_blocks.size()) m_blocks.resize(std::max(blocks, m_blocks.size() + std::max(kGrowth, m_blocks.size() / 2)));
+    if (blocks > m_blocks.size())
+      m_blocks.resize(std::max(blocks, m_blocks.size() + std::max(kGrowth, m_blocks.size() / 2)));
     m_used = blocks;
   }
   std::size_t used() const { return m_used; }
@@ -71,9 +74,10 @@ using OctreeNode = std::uint32_t;
 
 /// The loose octree of one geometry: sees boxes and positions in an order, no meshes.
 ///
-/// Life of a frame, rebuilt:  boxes() of the primitives in the order() of the last frame are written by the caller;
-/// build() makes keys, sorts, and lays out nodes; the caller then writes boxes in the new order() with groups(), and
-/// fit() carries the groups' boxes to the root. Refitted: only the last two.
+/// Life of a frame, rebuilt:  boxes() of the primitives in the order() of the last frame are
+/// written by the caller; build() makes keys, sorts, and lays out nodes; the caller then writes
+/// boxes in the new order() with groups(), and fit() carries the groups' boxes to the root.
+/// Refitted: only the last two.
 class Octree {
  public:
   Octree();
@@ -85,20 +89,24 @@ class Octree {
   void reset(std::size_t size);
 
   std::size_t size() const { return m_order.size(); }
-  std::span<const std::uint32_t> order() const { return m_order; }  ///< primitive ids as the nodes hold them
+  std::span<const std::uint32_t> order() const {
+    return m_order;
+  }  ///< primitive ids as the nodes hold them
   BoxArrays& boxes() { return m_boxes; }
   const BoxArrays& boxes() const { return m_boxes; }
-  /// Leaves and the own primitives of other nodes: group g is primitives [groups[g], groups[g + 1]) of the order.
+  /// Leaves and the own primitives of other nodes: group g is primitives [groups[g], groups[g + 1])
+  /// of the order.
   std::span<const std::uint32_t> groups() const { return m_groups; }
   Box* groupBoxes() { return m_groupBoxes.data(); }
 
-  /// `bounds`: of all boxes. Afterwards previousSlots()[i] says where in the old order primitive i of the new one was.
+  /// `bounds`: of all boxes. Afterwards previousSlots()[i] says where in the old order primitive i
+  /// of the new one was.
   void build(const Box& bounds, const OctreeSettings&, const Threads&);
   std::uint32_t previousSlot(std::size_t i) const { return static_cast<std::uint32_t>(m_keys[i]); }
   void fit(const Threads&);
 
-  /// Sum of the leaves' half areas over that of their primitives: how loose the fitted boxes are. Grows as a refitted
-  /// tree degrades; unchanged by motion and scaling of the whole.
+  /// Sum of the leaves' half areas over that of their primitives: how loose the fitted boxes are.
+  /// Grows as a refitted tree degrades; unchanged by motion and scaling of the whole.
   double looseness() const { return m_looseness; }
   double loosenessWhenBuilt() const { return m_loosenessWhenBuilt; }
 
@@ -114,13 +122,15 @@ class Octree {
     const OctreeBlock& block = m_pool[node >> 3];
     const unsigned slot = node & 7;
     const std::uint32_t begin = block.begin[slot];
-    return {begin, block.isLeaf(slot) ? begin + block.count(slot) : m_pool[block.child[slot]].begin[0]};
+    return {begin,
+            block.isLeaf(slot) ? begin + block.count(slot) : m_pool[block.child[slot]].begin[0]};
   }
 
  private:
   class Layout;
   std::uint32_t key(std::size_t i) const { return static_cast<std::uint32_t>(m_keys[i] >> 32); }
-  void sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const Cube&, KeyLayout, const Threads*);
+  void sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const Cube&, KeyLayout,
+                const Threads*);
   void assemble(std::size_t tasks, const Threads&);
   void measureLooseness();
 
@@ -132,9 +142,10 @@ class Octree {
   Buffer<OctreeNode> m_groupNodes;  ///< the node of each group
   Buffer<Box> m_groupBoxes;
   BlockPool m_pool;
-  Buffer<OctreeNode> m_parents;  ///< of each block
-  std::vector<Layout> m_layouts; ///< the top's, then one for each task of the last build
-  Buffer<std::uint32_t> m_taskBlocks;  ///< layout i made blocks [m_taskBlocks[i], m_taskBlocks[i + 1])
+  Buffer<OctreeNode> m_parents;   ///< of each block
+  std::vector<Layout> m_layouts;  ///< the top's, then one for each task of the last build
+  Buffer<std::uint32_t>
+      m_taskBlocks;  ///< layout i made blocks [m_taskBlocks[i], m_taskBlocks[i + 1])
   Buffer<std::uint32_t> m_entryPlaces;
   Cube m_rootCube;
   double m_looseness = 0, m_loosenessWhenBuilt = 0;

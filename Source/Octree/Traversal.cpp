@@ -12,8 +12,8 @@ namespace palpate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-using NodeTag = hn::CappedTag<float, 8>;    ///< eight siblings
-using LeafTag = hn::CappedTag<float, 16>;   ///< primitives of a leaf
+using NodeTag = hn::CappedTag<float, 8>;   ///< eight siblings
+using LeafTag = hn::CappedTag<float, 16>;  ///< primitives of a leaf
 
 template <class D, class M>
 HWY_INLINE std::uint32_t bitsOf(D d, M mask) {
@@ -102,8 +102,10 @@ class Walk {
     Query query;
     const hn::CappedTag<float, 1> d;
     for (int k = 0; k < 3; ++k) {
-      query.lower[k] = hn::GetLane(roundedDown(hn::Set(d, block.lower[k][slot]), hn::Set(d, m_trees.shiftLower[k])));
-      query.upper[k] = hn::GetLane(roundedUp(hn::Set(d, block.upper[k][slot]), hn::Set(d, m_trees.shiftUpper[k])));
+      query.lower[k] = hn::GetLane(
+          roundedDown(hn::Set(d, block.lower[k][slot]), hn::Set(d, m_trees.shiftLower[k])));
+      query.upper[k] = hn::GetLane(
+          roundedUp(hn::Set(d, block.upper[k][slot]), hn::Set(d, m_trees.shiftUpper[k])));
     }
     return query;
   }
@@ -128,22 +130,27 @@ class Walk {
     alignas(32) float lower[3][8];
     alignas(32) float upper[3][8];
     Query query(unsigned slot) const {
-      return {{lower[0][slot], lower[1][slot], lower[2][slot]}, {upper[0][slot], upper[1][slot], upper[2][slot]}};
+      return {{lower[0][slot], lower[1][slot], lower[2][slot]},
+              {upper[0][slot], upper[1][slot], upper[2][slot]}};
     }
   };
 
   /// a's eight children in b's frame; returns which overlap b's node.
-  HWY_ATTR std::uint32_t shiftBlock(const OctreeBlock& a, const OctreeBlock& b, unsigned slotB, ShiftedBlock& out) const {
+  HWY_ATTR std::uint32_t shiftBlock(const OctreeBlock& a, const OctreeBlock& b, unsigned slotB,
+                                    ShiftedBlock& out) const {
     const NodeTag d;
     std::uint32_t bits = 0;
     for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
       auto mask = hn::Eq(hn::Zero(d), hn::Zero(d));
       for (int k = 0; k < 3; ++k) {
-        const auto lower = roundedDown(hn::Load(d, a.lower[k] + i), hn::Set(d, m_trees.shiftLower[k]));
-        const auto upper = roundedUp(hn::Load(d, a.upper[k] + i), hn::Set(d, m_trees.shiftUpper[k]));
+        const auto lower =
+            roundedDown(hn::Load(d, a.lower[k] + i), hn::Set(d, m_trees.shiftLower[k]));
+        const auto upper =
+            roundedUp(hn::Load(d, a.upper[k] + i), hn::Set(d, m_trees.shiftUpper[k]));
         hn::Store(lower, d, out.lower[k] + i);
         hn::Store(upper, d, out.upper[k] + i);
-        mask = hn::And(mask, hn::And(hn::Le(lower, hn::Set(d, b.upper[k][slotB])), hn::Ge(upper, hn::Set(d, b.lower[k][slotB]))));
+        mask = hn::And(mask, hn::And(hn::Le(lower, hn::Set(d, b.upper[k][slotB])),
+                                     hn::Ge(upper, hn::Set(d, b.lower[k][slotB]))));
       }
       bits |= bitsOf(d, mask) << i;
     }
@@ -158,7 +165,8 @@ class Walk {
   void push(OctreeNode a, OctreeNode b) { m_stack.push_back({a, b}); }
 
   void pushChildrenOfB(OctreeNode a, OctreeNode blockB, std::uint32_t bits) {
-    for (; bits; bits &= bits - 1) push(a, blockB * 8 + static_cast<unsigned>(std::countr_zero(bits)));
+    for (; bits; bits &= bits - 1)
+      push(a, blockB * 8 + static_cast<unsigned>(std::countr_zero(bits)));
   }
 
   HWY_ATTR void descendB(NodePair pair) {
@@ -174,11 +182,13 @@ class Walk {
     if (hasOwn(m_a, pair.a)) push(pair.a | NodePair::kOwn, pair.b);
     ShiftedBlock block;
     std::uint32_t bits = shiftBlock(m_a[child], m_b[nodeB >> 3], nodeB & 7, block);
-    for (; bits; bits &= bits - 1) push(child * 8 + static_cast<unsigned>(std::countr_zero(bits)), pair.b);
+    for (; bits; bits &= bits - 1)
+      push(child * 8 + static_cast<unsigned>(std::countr_zero(bits)), pair.b);
   }
 
   HWY_ATTR void descendBoth(NodePair pair) {
-    const OctreeNode childA = m_a[pair.a >> 3].child[pair.a & 7], childB = m_b[pair.b >> 3].child[pair.b & 7];
+    const OctreeNode childA = m_a[pair.a >> 3].child[pair.a & 7],
+                     childB = m_b[pair.b >> 3].child[pair.b & 7];
     const bool ownB = hasOwn(m_b, pair.b);
     if (hasOwn(m_a, pair.a)) push(pair.a | NodePair::kOwn, pair.b);
     ShiftedBlock block;
@@ -219,15 +229,21 @@ class Walk {
       // Those of a that meet the node of b at all.
       auto mask = hn::FirstN(d, a.end - i);
       for (int k = 0; k < 3; ++k) {
-        const auto low = roundedDown(hn::LoadU(d, m_boxesA.lower[k].data() + i), hn::Set(d, m_trees.shiftLower[k]));
-        const auto high = roundedUp(hn::LoadU(d, m_boxesA.upper[k].data() + i), hn::Set(d, m_trees.shiftUpper[k]));
+        const auto low = roundedDown(hn::LoadU(d, m_boxesA.lower[k].data() + i),
+                                     hn::Set(d, m_trees.shiftLower[k]));
+        const auto high = roundedUp(hn::LoadU(d, m_boxesA.upper[k].data() + i),
+                                    hn::Set(d, m_trees.shiftUpper[k]));
         hn::Store(low, d, lower[k]);
         hn::Store(high, d, upper[k]);
-        mask = hn::And(mask, hn::And(hn::Le(low, hn::Set(d, block.upper[k][slot])), hn::Ge(high, hn::Set(d, block.lower[k][slot]))));
+        mask = hn::And(mask, hn::And(hn::Le(low, hn::Set(d, block.upper[k][slot])),
+                                     hn::Ge(high, hn::Set(d, block.lower[k][slot]))));
       }
       for (std::uint32_t bits = bitsOf(d, mask); bits; bits &= bits - 1) {
         const auto lane = static_cast<unsigned>(std::countr_zero(bits));
-        row(i + lane, {{lower[0][lane], lower[1][lane], lower[2][lane]}, {upper[0][lane], upper[1][lane], upper[2][lane]}}, b);
+        row(i + lane,
+            {{lower[0][lane], lower[1][lane], lower[2][lane]},
+             {upper[0][lane], upper[1][lane], upper[2][lane]}},
+            b);
       }
     }
   }
@@ -237,8 +253,10 @@ class Walk {
     for (std::uint32_t i = leaf.begin; i + 1 < leaf.end; ++i) {
       Query query;
       for (int k = 0; k < 3; ++k) {
-        query.lower[k] = hn::GetLane(roundedDown(hn::Set(d, m_boxesA.lower[k][i]), hn::Set(d, m_trees.shiftLower[k])));
-        query.upper[k] = hn::GetLane(roundedUp(hn::Set(d, m_boxesA.upper[k][i]), hn::Set(d, m_trees.shiftUpper[k])));
+        query.lower[k] = hn::GetLane(
+            roundedDown(hn::Set(d, m_boxesA.lower[k][i]), hn::Set(d, m_trees.shiftLower[k])));
+        query.upper[k] = hn::GetLane(
+            roundedUp(hn::Set(d, m_boxesA.upper[k][i]), hn::Set(d, m_trees.shiftUpper[k])));
       }
       row(i, query, {i + 1, leaf.end});
     }
@@ -250,19 +268,23 @@ class Walk {
     for (std::size_t j = b.begin; j < b.end; j += hn::Lanes(d)) {
       auto mask = hn::FirstN(d, b.end - j);
       for (int k = 0; k < 3; ++k) {
-        mask = hn::And(mask, hn::Le(hn::LoadU(d, m_boxesB.lower[k].data() + j), hn::Set(d, query.upper[k])));
-        mask = hn::And(mask, hn::Ge(hn::LoadU(d, m_boxesB.upper[k].data() + j), hn::Set(d, query.lower[k])));
+        mask = hn::And(
+            mask, hn::Le(hn::LoadU(d, m_boxesB.lower[k].data() + j), hn::Set(d, query.upper[k])));
+        mask = hn::And(
+            mask, hn::Ge(hn::LoadU(d, m_boxesB.upper[k].data() + j), hn::Set(d, query.lower[k])));
       }
       std::uint32_t bits = bitsOf(d, mask);
       if (bits == 0) continue;
       TrianglePair* out = m_sink.room();
       std::size_t count = 0;
       if (!m_trees.self()) {
-        for (; bits; bits &= bits - 1) out[count++] = {m_idsA[i], m_idsB[j + static_cast<unsigned>(std::countr_zero(bits))]};
+        for (; bits; bits &= bits - 1)
+          out[count++] = {m_idsA[i], m_idsB[j + static_cast<unsigned>(std::countr_zero(bits))]};
       } else {
         for (; bits; bits &= bits - 1) {
           const std::size_t other = j + static_cast<unsigned>(std::countr_zero(bits));
-          if (m_trees.adjacency && adjacent(m_trees.adjacency[i], m_trees.adjacency[other])) continue;
+          if (m_trees.adjacency && adjacent(m_trees.adjacency[i], m_trees.adjacency[other]))
+            continue;
           const std::uint32_t p = m_idsA[i], q = m_idsB[other];
           out[count++] = {p < q ? p : q, p < q ? q : p};
         }
@@ -289,7 +311,8 @@ class Walk {
   PairSink& m_sink;
 };
 
-HWY_ATTR void startPairsKernel(const TreePair& trees, std::size_t wanted, TraversalStack& stack, PairSink& sink) {
+HWY_ATTR void startPairsKernel(const TreePair& trees, std::size_t wanted, TraversalStack& stack,
+                               PairSink& sink) {
   stack.pairs.clear();
   Walk walk(trees, stack, sink);
   if (!walk.rootsOverlap()) return;
@@ -302,7 +325,8 @@ HWY_ATTR void startPairsKernel(const TreePair& trees, std::size_t wanted, Traver
   }
 }
 
-HWY_ATTR void traverseKernel(const TreePair& trees, std::span<const NodePair> pairs, TraversalStack& stack, PairSink& sink) {
+HWY_ATTR void traverseKernel(const TreePair& trees, std::span<const NodePair> pairs,
+                             TraversalStack& stack, PairSink& sink) {
   stack.pairs.assign(pairs.rbegin(), pairs.rend());
   Walk(trees, stack, sink).all(0);
 }
@@ -317,7 +341,9 @@ HWY_EXPORT(startPairsKernel);
 HWY_EXPORT(traverseKernel);
 
 void setShift(TreePair& trees, const std::array<double, 3>& offset, double thickness) {
-  const auto clamped = [](double v) { return std::min(std::max(v, -double{0x1p125f}), double{0x1p125f}); };
+  const auto clamped = [](double v) {
+    return std::min(std::max(v, -double{0x1p125f}), double{0x1p125f});
+  };
   for (int k = 0; k < 3; ++k) {
     const double error = (std::abs(offset[k]) + thickness) * 0x1p-22;
     trees.shiftLower[k] = static_cast<float>(clamped(offset[k] - thickness - error));
@@ -329,7 +355,8 @@ void startPairs(const TreePair& trees, std::size_t wanted, TraversalStack& stack
   HWY_DYNAMIC_DISPATCH(startPairsKernel)(trees, wanted, stack, sink);
 }
 
-void traverse(const TreePair& trees, std::span<const NodePair> pairs, TraversalStack& stack, PairSink& sink) {
+void traverse(const TreePair& trees, std::span<const NodePair> pairs, TraversalStack& stack,
+              PairSink& sink) {
   HWY_DYNAMIC_DISPATCH(traverseKernel)(trees, pairs, stack, sink);
 }
 

@@ -18,7 +18,8 @@ struct NodePair {
   OctreeNode a, b;
 };
 
-/// Found pairs: handed on in batches, or kept until taken where there is no function to hand them to.
+/// Found pairs: handed on in batches, or kept until taken where there is no function to hand them
+/// to.
 class PairSink {
  public:
   using Function = void (*)(void* context, std::span<const TrianglePair>);
@@ -67,17 +68,19 @@ struct TreePair {
   const Octree* b;  ///< the same one: each unordered pair once, a < b
   /// Triangles in the order of each tree: pairs that share a vertex are left out. Null: nothing is.
   const Triangle* adjacency = nullptr;
-  /// Added to a's bounds: the distance between the frames, and half the thickness on each side twice.
+  /// Added to a's bounds: the distance between the frames, and half the thickness on each side
+  /// twice.
   std::array<float, 4> shiftLower{}, shiftUpper{};
 
   bool self() const { return a == b; }
 };
 
-/// Shifts for frames whose origins are `offset` apart (a's minus b's, in units of the frame), and a thickness.
+/// Shifts for frames whose origins are `offset` apart (a's minus b's, in units of the frame), and a
+/// thickness.
 ///
-/// Rounding: a bound of a is moved by fl(lower + shift) and then outward by OutwardRounding. The shift's own error is at
-/// most 2^-24 of |offset| + thickness, which is added to it here; the sum's is at most 2^-24 of the sum, which the
-/// outward step covers.
+/// Rounding: a bound of a is moved by fl(lower + shift) and then outward by OutwardRounding. The
+/// shift's own error is at most 2^-24 of |offset| + thickness, which is added to it here; the sum's
+/// is at most 2^-24 of the sum, which the outward step covers.
 void setShift(TreePair&, const std::array<double, 3>& offset, double thickness);
 
 /// Scratch of one traversal, which remembers its peak.
@@ -85,11 +88,12 @@ struct TraversalStack {
   Buffer<NodePair> pairs, next;
 };
 
-/// The node pairs to start from: none if the roots do not overlap; else at least `wanted` if the trees are large
-/// enough, found breadth first. Pairs of primitives met on the way go to the sink.
+/// The node pairs to start from: none if the roots do not overlap; else at least `wanted` if the
+/// trees are large enough, found breadth first. Pairs of primitives met on the way go to the sink.
 void startPairs(const TreePair&, std::size_t wanted, TraversalStack&, PairSink&);
 
-/// All primitive pairs below the node pairs whose boxes overlap. Empties the span's pairs depth first.
+/// All primitive pairs below the node pairs whose boxes overlap. Empties the span's pairs depth
+/// first.
 /// Cost     about a nanosecond for each eight boxes compared.
 void traverse(const TreePair&, std::span<const NodePair>, TraversalStack&, PairSink&);
 

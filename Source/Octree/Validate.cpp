@@ -13,14 +13,17 @@ class Validation {
   std::vector<std::string> run() {
     if (m_octree.size() == 0) return m_failures;
     const BlockPool& pool = m_octree.pool();
-    if (pool.used() + pool.free() != pool.allocated()) fail(0, "used and free blocks do not add up to the allocated");
+    if (pool.used() + pool.free() != pool.allocated())
+      fail(0, "used and free blocks do not add up to the allocated");
     m_holders.assign(m_octree.size(), 0);
     m_blockSeen.assign(pool.used(), false);
     m_blockSeen[0] = true;
     const Box all = visit(0, m_octree.rootCube());
     if (all.empty()) fail(0, "the root is empty");
     for (std::size_t i = 0; i < m_holders.size(); ++i)
-      if (m_holders[i] != 1) fail(0, "primitive " + std::to_string(m_octree.order()[i]) + " is in " + std::to_string(m_holders[i]) + " nodes");
+      if (m_holders[i] != 1)
+        fail(0, "primitive " + std::to_string(m_octree.order()[i]) + " is in " +
+                    std::to_string(m_holders[i]) + " nodes");
     std::vector<bool> ids(m_octree.size(), false);
     for (const std::uint32_t id : m_octree.order()) {
       if (id >= ids.size() || ids[id]) {
@@ -30,7 +33,8 @@ class Validation {
       ids[id] = true;
     }
     for (std::size_t block = 0; block < m_blockSeen.size(); ++block)
-      if (!m_blockSeen[block]) fail(static_cast<OctreeNode>(block * 8), "a block in use has no parent");
+      if (!m_blockSeen[block])
+        fail(static_cast<OctreeNode>(block * 8), "a block in use has no parent");
     return std::move(m_failures);
   }
 
@@ -64,14 +68,16 @@ class Validation {
       if (m_octree.parent(child) != node) fail(node, "its children name another parent");
       for (unsigned octant = 0; octant < 8; ++octant) {
         if (m_octree.blocks()[child].isEmpty(octant)) {
-          if (!m_octree.blocks()[child].box(octant).empty()) fail(child * 8 + octant, "an empty slot has a box");
+          if (!m_octree.blocks()[child].box(octant).empty())
+            fail(child * 8 + octant, "an empty slot has a box");
         } else {
           box.add(visit(child * 8 + octant, cube.child(octant)));
         }
       }
     }
     const Box fitted = block.box(slot);
-    if (fitted.lower != box.lower || fitted.upper != box.upper) fail(node, "its fitted box is not the tight one");
+    if (fitted.lower != box.lower || fitted.upper != box.upper)
+      fail(node, "its fitted box is not the tight one");
     return box;
   }
 
@@ -79,16 +85,25 @@ class Validation {
     const Box box = m_octree.boxes()[i];
     double longest = 0;
     for (int k = 0; k < 3; ++k) {
-      const double lower = double{box.lower[k]} - cube.lower[k], upper = double{box.upper[k]} - cube.lower[k];
+      const double lower = double{box.lower[k]} - cube.lower[k],
+                   upper = double{box.upper[k]} - cube.lower[k];
       longest = std::max(longest, upper - lower);
-      // The centre's cell is found in float arithmetic relative to the cell: good to 2^-20 of its edge.
+      // The centre's cell is found in float arithmetic relative to the cell: good to 2^-20 of its
+      // edge.
       const double centre = 0.5 * (lower + upper), slack = cube.edge * 0x1p-20;
-      if (centre < -slack || centre > cube.edge + slack) fail(node, "the centre of primitive " + std::to_string(m_octree.order()[i]) + " is outside its cell");
-      if (lower < -0.5 * cube.edge || upper > 1.5 * cube.edge) fail(node, "primitive " + std::to_string(m_octree.order()[i]) + " is outside its loose bounds");
+      if (centre < -slack || centre > cube.edge + slack)
+        fail(node, "the centre of primitive " + std::to_string(m_octree.order()[i]) +
+                       " is outside its cell");
+      if (lower < -0.5 * cube.edge || upper > 1.5 * cube.edge)
+        fail(node,
+             "primitive " + std::to_string(m_octree.order()[i]) + " is outside its loose bounds");
     }
-    if (longest > cube.edge) fail(node, "primitive " + std::to_string(m_octree.order()[i]) + " is longer than its cell");
-    // An own primitive of a split cell is too large for the cell's children; in a leaf it may be any size.
-    if (!leaf && longest * (1.0 + 0x1p-9) < 0.5 * cube.edge) fail(node, "primitive " + std::to_string(m_octree.order()[i]) + " belongs deeper");
+    if (longest > cube.edge)
+      fail(node, "primitive " + std::to_string(m_octree.order()[i]) + " is longer than its cell");
+    // An own primitive of a split cell is too large for the cell's children; in a leaf it may be
+    // any size.
+    if (!leaf && longest * (1.0 + 0x1p-9) < 0.5 * cube.edge)
+      fail(node, "primitive " + std::to_string(m_octree.order()[i]) + " belongs deeper");
   }
 
   const Octree& m_octree;
@@ -100,6 +115,8 @@ class Validation {
 
 }  // namespace
 
-std::vector<std::string> validate(const Octree& octree, bool cells) { return Validation(octree, cells).run(); }
+std::vector<std::string> validate(const Octree& octree, bool cells) {
+  return Validation(octree, cells).run();
+}
 
 }  // namespace palpate
