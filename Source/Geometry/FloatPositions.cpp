@@ -15,11 +15,14 @@ SampledExtent sampleExtent(std::span<const Eigen::Vector3d> positions) {
   for (int axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < count; ++i)
       sample[i] = positions[i * positions.size() / count][axis];
-    const auto middle = sample.begin() + count / 2;
-    std::nth_element(sample.begin(), middle, sample.begin() + count);
-    extent.median[axis] = *middle;
-    for (std::size_t i = 0; i < count; ++i)
-      extent.spread = std::max(extent.spread, std::abs(sample[i] * 0.5 - *middle * 0.5) * 2.0);
+    const auto at = [&](std::size_t eighths) {
+      const auto place = sample.begin() + static_cast<std::ptrdiff_t>(count * eighths / 8);
+      std::nth_element(sample.begin(), place, sample.begin() + count);
+      return *place;
+    };
+    extent.median[axis] = at(4);
+    // Halved: the difference of two doubles may be beyond their range.
+    extent.spread = std::max(extent.spread, 2.0 * (0.5 * at(7) - 0.5 * at(1)));
   }
   return extent;
 }

@@ -26,8 +26,8 @@ struct FloatFrame {
 /// conservative.
 constexpr float kLargestFloat = 0x1p120f;
 
-/// Median of up to 63 evenly spaced positions, axis by axis, and the largest coordinate difference
-/// to it among them.
+/// Of up to 63 evenly spaced positions: the median of each axis, and the largest distance along an
+/// axis between the first and the last eighth; a few vertices far away change neither.
 struct SampledExtent {
   Eigen::Vector3d median = Eigen::Vector3d::Zero();
   double spread = 0.0;

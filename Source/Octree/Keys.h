@@ -22,6 +22,9 @@ struct Cube {
   }
 };
 
+/// Cells are not split below this: floats could not tell their children's sizes any more.
+constexpr float kSmallestCell = 0x1p-100f;
+
 /// A key within a cube: Morton code of the cell at kKeyLevels or less, then its level; so that keys
 /// sorted put a cell's own primitives first and every subtree in one range.
 struct KeyLayout {

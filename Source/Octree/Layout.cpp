@@ -61,7 +61,8 @@ std::uint32_t Octree::Layout::leaf(std::uint32_t begin, std::uint32_t end, Octre
 
 std::uint32_t Octree::Layout::layOut(Octree& octree, Job job) {
   const std::uint32_t size = job.end - job.begin;
-  if (size <= m_mostPerLeaf || job.depth >= m_maxDepth) return leaf(job.begin, job.end, job.node);
+  if (size <= m_mostPerLeaf || job.depth >= m_maxDepth || job.cube.edge <= kSmallestCell)
+    return leaf(job.begin, job.end, job.node);
   if (job.level == job.keys.levels) {
     // Too full at the keys' last level: split further by second keys inside the cell.
     job.keys.levels = keyLevels(

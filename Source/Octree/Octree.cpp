@@ -21,7 +21,7 @@ constexpr std::size_t kRadixOnly = 8192;
 /// exact.
 Cube rootCube(const Box& bounds) {
   Cube cube;
-  float longest = std::numeric_limits<float>::min();
+  float longest = kSmallestCell;
   for (int k = 0; k < 3; ++k) longest = std::max(longest, bounds.upper[k] - bounds.lower[k]);
   // 1/1000 for the slack of a primitive's size, and a 2^20th of the edge for the grid.
   cube.edge = std::exp2(std::ceil(std::log2(static_cast<double>(longest) * (1.0 + 0x1p-9))));

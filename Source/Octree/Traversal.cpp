@@ -74,6 +74,9 @@ class Walk {
     }
   }
 
+  /// Nothing below but primitives.
+  bool isLast(NodePair pair) const { return isLeaf(m_a, pair.a) && isLeaf(m_b, pair.b); }
+
   /// Replaces a node pair by the pairs below it; two leaves by their primitives' pairs.
   HWY_ATTR void step(NodePair pair) {
     const bool leafA = isLeaf(m_a, pair.a), leafB = isLeaf(m_b, pair.b);
@@ -311,17 +314,25 @@ class Walk {
   PairSink& m_sink;
 };
 
-HWY_ATTR void startPairsKernel(const TreePair& trees, std::size_t wanted, TraversalStack& stack,
-                               PairSink& sink) {
+HWY_ATTR void startPairsKernel(const TreePair& trees, std::size_t wanted, TraversalStack& stack) {
   stack.pairs.clear();
-  Walk walk(trees, stack, sink);
+  PairSink none;
+  Walk walk(trees, stack, none);
   if (!walk.rootsOverlap()) return;
   stack.pairs.push_back({0, 0});
-  // Level by level: each round replaces every pair by those below it.
-  while (!stack.pairs.empty() && stack.pairs.size() < wanted) {
-    stack.next.swap(stack.pairs);
+  // Level by level: each round replaces every pair that is not of two leaves by those below it.
+  for (bool progress = true; progress && stack.pairs.size() < wanted;) {
+    progress = false;
+    stack.level.swap(stack.pairs);
     stack.pairs.clear();
-    for (const NodePair pair : stack.next) walk.step(pair);
+    for (const NodePair pair : stack.level) {
+      if (walk.isLast(pair)) {
+        stack.pairs.push_back(pair);
+      } else {
+        walk.step(pair);
+        progress = true;
+      }
+    }
   }
 }
 
@@ -351,8 +362,8 @@ void setShift(TreePair& trees, const std::array<double, 3>& offset, double thick
   }
 }
 
-void startPairs(const TreePair& trees, std::size_t wanted, TraversalStack& stack, PairSink& sink) {
-  HWY_DYNAMIC_DISPATCH(startPairsKernel)(trees, wanted, stack, sink);
+void startPairs(const TreePair& trees, std::size_t wanted, TraversalStack& stack) {
+  HWY_DYNAMIC_DISPATCH(startPairsKernel)(trees, wanted, stack);
 }
 
 void traverse(const TreePair& trees, std::span<const NodePair> pairs, TraversalStack& stack,

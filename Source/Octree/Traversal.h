@@ -6,6 +6,7 @@
 #include "Math/Box.h"
 #include "Octree/Octree.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -31,7 +32,7 @@ class PairSink {
     m_context = context;
     m_size = 0;
     m_total = 0;
-    if (m_pairs.empty()) m_pairs.resize(kBatch);
+    m_pairs.resize(std::max(m_pairs.capacity(), kBatch));
   }
   /// Room for kMostAtOnce pairs; advance() says how many were written.
   TrianglePair* room() {
@@ -52,6 +53,12 @@ class PairSink {
     }
   }
   std::span<const TrianglePair> kept() const { return std::span(m_pairs).first(m_size); }
+  /// Takes what was kept, in exchange for a buffer to fill next time.
+  void takeKept(Buffer<TrianglePair>& pairs) {
+    m_pairs.resize(m_size);
+    m_pairs.swap(pairs);
+    m_size = 0;
+  }
   std::size_t total() const { return m_total + m_size; }
   std::size_t bytes() const { return m_pairs.capacity() * sizeof(TrianglePair); }
 
@@ -85,12 +92,12 @@ void setShift(TreePair&, const std::array<double, 3>& offset, double thickness);
 
 /// Scratch of one traversal, which remembers its peak.
 struct TraversalStack {
-  Buffer<NodePair> pairs, next;
+  Buffer<NodePair> pairs, level;
 };
 
-/// The node pairs to start from: none if the roots do not overlap; else at least `wanted` if the
-/// trees are large enough, found breadth first. Pairs of primitives met on the way go to the sink.
-void startPairs(const TreePair&, std::size_t wanted, TraversalStack&, PairSink&);
+/// The node pairs to start from, into stack.pairs: none if the roots do not overlap; else at least
+/// `wanted` if the trees are large enough, found breadth first.
+void startPairs(const TreePair&, std::size_t wanted, TraversalStack&);
 
 /// All primitive pairs below the node pairs whose boxes overlap. Empties the span's pairs depth
 /// first.

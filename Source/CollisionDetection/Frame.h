@@ -1,0 +1,49 @@
+#pragma once
+
+#include <palpate/FrameStatistics.h>
+#include <palpate/Settings.h>
+
+#include "CollisionDetection/Order.h"
+#include "CollisionDetection/PairTable.h"
+#include "Core/Threads.h"
+#include "NarrowPhase/NarrowPhase.h"
+#include "Octree/Traversal.h"
+
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace palpate {
+
+/// The pairs' way through a frame: octrees to candidates to contacts. Its scratch remembers its
+/// peak.
+class Frame {
+ public:
+  Frame();
+  ~Frame();
+
+  /// Candidates of each pair, unsorted, into its record.
+  void collect(std::span<PairRecord* const>, const Threads&, FrameStatistics&);
+  /// Candidates of one pair to a function, batch by batch, never two at once.
+  void forEach(PairRecord&, const Threads&, PairSink::Function, void* context);
+  /// Contacts of each pair, sorted, into its record; its candidates too if they are to be kept.
+  void detect(std::span<PairRecord* const>, const Settings&, const Threads&, FrameStatistics&);
+  /// The same answers from every feature against every other.
+  void detectByBruteForce(std::span<PairRecord* const>, const Settings&, FrameStatistics&);
+
+ private:
+  struct Job;
+  void start(std::span<PairRecord* const>, const Threads&, bool adjacentPairs);
+  void run(Job&) const;
+  Job& newJob(PairRecord&);
+
+  std::vector<std::unique_ptr<Job>>
+      m_jobs;  ///< the first m_jobCount are in use, those of a pair together
+  std::size_t m_jobCount = 0;
+  Buffer<NodePair> m_nodePairs;
+  TraversalStack m_stack;
+  std::vector<ContactBuffers*> m_buffers;
+  OrderScratch m_orderScratch;
+};
+
+}  // namespace palpate

@@ -1,0 +1,268 @@
+#include <palpate/OctreeBasedCD.h>
+
+#include "CollisionDetection/BruteForce.h"
+#include "CollisionDetection/Frame.h"
+#include "CollisionDetection/GeometryTable.h"
+#include "CollisionDetection/PairTable.h"
+#include "CollisionDetection/Stopwatch.h"
+#include "Core/Assert.h"
+#include "Octree/Forest.h"
+
+#include <algorithm>
+#include <mutex>
+#include <optional>
+
+namespace palpate {
+
+namespace {
+
+const Settings& checked(const Settings& settings) {
+  const auto check = [](bool good, const char* name, int value, const char* range) {
+    if (!good)
+      throw Error(ErrorCode::InvalidSettings, std::string("settings: ") + name + " is " +
+                                                  std::to_string(value) + "; it must be " + range);
+  };
+  check(settings.octree.maxDepth >= 1 && settings.octree.maxDepth <= 60, "octree.maxDepth",
+        settings.octree.maxDepth, "in [1, 60]");
+  check(settings.octree.maxPrimitivesPerLeaf >= 1 && settings.octree.maxPrimitivesPerLeaf <= 1024,
+        "octree.maxPrimitivesPerLeaf", settings.octree.maxPrimitivesPerLeaf, "in [1, 1024]");
+  check(settings.octree.update == OctreeUpdate::Auto ||
+            settings.octree.update == OctreeUpdate::Rebuild,
+        "octree.update", static_cast<int>(settings.octree.update), "Auto or Rebuild");
+  check(settings.engine == Engine::Octree || settings.engine == Engine::BruteForce, "engine",
+        static_cast<int>(settings.engine), "Octree or BruteForce");
+  check(settings.threads >= 0 && settings.threads <= 1024, "threads", settings.threads,
+        "in [0, 1024]");
+  return settings;
+}
+
+}  // namespace
+
+struct OctreeBasedCD::Implementation {
+  explicit Implementation(const Settings& newSettings)
+      : settings(checked(newSettings)), threads(newSettings.threads) {
+    showOctree();
+  }
+
+  Settings settings;
+  Threads threads;
+  GeometryTable geometries;
+  PairTable pairs;
+  Frame frame;
+  FrameStatistics statistics;
+  std::optional<LooseOctree> octree;
+  std::vector<PairRecord*> work;
+  std::mutex sorting;  ///< of candidates, when a const query first asks for them
+
+  void startFrame() {
+    statistics = {};
+    for (const auto& geometry : geometries.all()) {
+      ++statistics.geometries;
+      statistics.triangles += geometry->mesh.topology.triangles.size();
+      statistics.untestedVertices += geometry->mesh.topology.untestedVertices;
+    }
+  }
+
+  /// Boxes and octrees for the positions now.
+  void update() {
+    Stopwatch watch;
+    const bool changed = geometries.updateOctrees(settings.octree, threads);
+    double boxes = 0, octrees = 0;
+    for (const auto& geometry : geometries.all()) {
+      using Update = LooseOctree::Update;
+      const Update last = geometry->lastUpdate;
+      ++(last == Update::Rebuilt    ? statistics.rebuiltOctrees
+         : last == Update::Refitted ? statistics.refittedOctrees
+                                    : statistics.unchangedOctrees);
+      if (last == Update::Unchanged) continue;
+      boxes += geometry->boxMilliseconds;
+      octrees += geometry->octreeMilliseconds;
+    }
+    // Geometries are updated side by side: the wall clock is shared out as their work was.
+    const double wall = watch.lap(), share = boxes + octrees > 0 ? boxes / (boxes + octrees) : 0;
+    statistics.milliseconds.boxes += wall * share;
+    statistics.milliseconds.octree += wall * (1 - share);
+    if (changed) showOctree();
+#ifdef PALPATE_VALIDATE
+    PALPATE_ASSERT(octree->validate().empty());
+#endif
+  }
+
+  void showOctree() {
+    if (!state) {
+      state = std::make_shared<LooseOctree::State>();
+      octree.emplace(state);
+    }
+    state->trees.clear();
+    std::uint32_t firstNode = 0;
+    for (const auto& geometry : geometries.all()) {
+      if (geometry->octree.size() == 0) continue;
+      const std::size_t bytes =
+          geometry->floats.capacity() * sizeof(FloatPoint) +
+          (geometry->orderedTriangles.capacity() + geometry->orderedTrianglesBefore.capacity()) *
+              sizeof(Triangle);
+      state->trees.push_back({geometry->id, &geometry->octree, geometry->frame.origin,
+                              geometry->frame.scale, geometry->lastUpdate, bytes, firstNode});
+      firstNode += static_cast<std::uint32_t>(geometry->octree.pool().used() * 8);
+    }
+  }
+
+  /// Pairs whose answer is not of the revisions now.
+  template <class AnsweredFor>
+  std::span<PairRecord* const> pairsToDo(AnsweredFor PairRecord::*answered) {
+    work.clear();
+    for (const auto& record : pairs.records())
+      if ((*record).*answered != record->revisions()) work.push_back(record.get());
+    return work;
+  }
+
+  void collect() {
+    startFrame();
+    update();
+    const auto records = pairsToDo(&PairRecord::candidatesFor);
+    if (settings.engine == Engine::Octree) {
+      frame.collect(records, threads, statistics);
+    } else {
+      for (PairRecord* record : records) {
+        findCandidatesByBruteForce(record->meshes(), record->candidates);
+        record->candidatesFor = record->revisions();
+        record->candidatesSorted = true;
+      }
+    }
+    statistics.candidatePairs = 0;
+    for (const auto& record : pairs.records())
+      statistics.candidatePairs += record->candidates.size();
+    geometries.endFrame();
+  }
+
+  void detect() {
+    startFrame();
+    update();
+    const auto records = pairsToDo(&PairRecord::dataFor);
+    if (settings.engine == Engine::Octree)
+      frame.detect(records, settings, threads, statistics);
+    else
+      frame.detectByBruteForce(records, settings, statistics);
+    for (const auto& record : pairs.records()) {
+      const CollisionData& data = record->data;
+      statistics.contacts +=
+          data.vertexTriangle().size() + data.triangleVertex().size() + data.edgeEdge().size();
+      statistics.intersectingTriangles += data.intersectingTriangles().size();
+    }
+    geometries.endFrame();
+  }
+
+  std::shared_ptr<LooseOctree::State> state;
+};
+
+OctreeBasedCD::OctreeBasedCD(const Settings& settings)
+    : m_implementation(std::make_unique<Implementation>(settings)) {}
+OctreeBasedCD::OctreeBasedCD(OctreeBasedCD&&) noexcept = default;
+OctreeBasedCD& OctreeBasedCD::operator=(OctreeBasedCD&&) noexcept = default;
+OctreeBasedCD::~OctreeBasedCD() = default;
+
+GeometryId OctreeBasedCD::addTriangleMesh(std::span<const Eigen::Vector3d> positions,
+                                          std::span<const Triangle> triangles) {
+  return m_implementation->geometries.add(positions, triangles);
+}
+
+void OctreeBasedCD::removeGeometry(GeometryId geometry) {
+  m_implementation->geometries.at(geometry);
+  m_implementation->pairs.removeAllOf(geometry);
+  m_implementation->geometries.remove(geometry);
+  m_implementation->showOctree();
+}
+
+void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vector3d> now) {
+  m_implementation->geometries.setPositions(geometry, now);
+}
+
+void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vector3d> before,
+                                 std::span<const Eigen::Vector3d> now) {
+  m_implementation->geometries.setPositions(geometry, before, now);
+}
+
+void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
+                                 std::span<const Triangle> triangles) {
+  m_implementation->geometries.setTriangles(geometry, positions, triangles);
+}
+
+void OctreeBasedCD::addCollisionPair(GeometryId a, GeometryId b, const PairSettings& settings) {
+  m_implementation->pairs.add(m_implementation->geometries, a, b, settings);
+}
+
+void OctreeBasedCD::setPairSettings(GeometryId a, GeometryId b, const PairSettings& settings) {
+  m_implementation->pairs.set(m_implementation->geometries, a, b, settings);
+}
+
+void OctreeBasedCD::removeCollisionPair(GeometryId a, GeometryId b) {
+  m_implementation->pairs.remove(m_implementation->geometries, a, b);
+}
+
+std::span<const CollisionPair> OctreeBasedCD::pairs() const {
+  return m_implementation->pairs.pairs();
+}
+
+void OctreeBasedCD::update() {
+  m_implementation->startFrame();
+  m_implementation->update();
+}
+
+void OctreeBasedCD::collectCandidates() { m_implementation->collect(); }
+
+void OctreeBasedCD::detectCollision() { m_implementation->detect(); }
+
+void OctreeBasedCD::forEachCandidateBatch(GeometryId a, GeometryId b, BatchFunction function,
+                                          void* context) {
+  Implementation& all = *m_implementation;
+  PairRecord& record = all.pairs.at(all.geometries, a, b);
+  all.startFrame();
+  all.update();
+  if (all.settings.engine == Engine::BruteForce) {
+    Buffer<TrianglePair> candidates;
+    findCandidatesByBruteForce(record.meshes(), candidates);
+    if (!candidates.empty()) function(context, candidates);
+    return;
+  }
+  all.frame.forEach(record, all.threads, function, context);
+}
+
+const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) const {
+  return m_implementation->pairs.inOrder(m_implementation->geometries, a, b).data;
+}
+
+std::span<const TrianglePair> OctreeBasedCD::candidatePairs(GeometryId a, GeometryId b) const {
+  PairRecord& record = m_implementation->pairs.at(m_implementation->geometries, a, b);
+  if (record.candidatesFor == PairRecord::AnsweredFor{})
+    throw Error(ErrorCode::NotAvailable,
+                "candidates were not kept: call collectCandidates(), or set "
+                "Settings::keepCandidates before detectCollision()",
+                a);
+  const std::lock_guard lock(m_implementation->sorting);
+  if (!record.candidatesSorted) std::sort(record.candidates.begin(), record.candidates.end());
+  record.candidatesSorted = true;
+  return record.candidates;
+}
+
+const LooseOctree& OctreeBasedCD::octree() const { return *m_implementation->octree; }
+
+const FrameStatistics& OctreeBasedCD::statistics() const { return m_implementation->statistics; }
+
+const Settings& OctreeBasedCD::settings() const { return m_implementation->settings; }
+
+CollisionData detectCollision(const TriangleMeshView& a, const TriangleMeshView& b,
+                              const PairSettings& settings) {
+  if (settings.method == Method::Continuous)
+    throw Error(ErrorCode::UnsupportedMethod,
+                "Method::Continuous needs a step: use OctreeBasedCD and two sets of positions");
+  Settings oneThread;
+  oneThread.threads = 1;
+  OctreeBasedCD detection(oneThread);
+  const GeometryId first = detection.addTriangleMesh(a.positions, a.triangles);
+  const GeometryId second = detection.addTriangleMesh(b.positions, b.triangles);
+  detection.addCollisionPair(first, second, settings);
+  detection.detectCollision();
+  return detection.collisionData(first, second);
+}
+
+}  // namespace palpate

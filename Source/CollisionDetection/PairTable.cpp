@@ -1,0 +1,119 @@
+#include "CollisionDetection/PairTable.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate {
+
+namespace {
+
+std::uint64_t keyOf(GeometryId a, GeometryId b) {
+  const auto first = static_cast<std::uint64_t>(a), second = static_cast<std::uint64_t>(b);
+  return std::min(first, second) << 32 | std::max(first, second);
+}
+
+std::string nameOf(GeometryId a, GeometryId b) {
+  return "pair (" + std::to_string(static_cast<std::uint32_t>(a)) + ", " +
+         std::to_string(static_cast<std::uint32_t>(b)) + ")";
+}
+
+/// The method that Auto stands for; throws what is wrong with the settings.
+Method checked(GeometryId a, GeometryId b, const PairSettings& settings) {
+  const std::string name = nameOf(a, b);
+  if (!(settings.thickness >= 0.0) || std::isinf(settings.thickness))
+    throw Error(ErrorCode::InvalidSettings,
+                name + ": thickness is " + std::to_string(settings.thickness) +
+                    "; it must be finite and not negative",
+                a);
+  if (settings.contacts != Contacts::Distinct && settings.contacts != Contacts::All)
+    throw Error(ErrorCode::InvalidSettings, name + ": contacts must be Distinct or All", a);
+  switch (settings.method) {
+    case Method::Auto:
+      return settings.thickness > 0.0 ? Method::Proximity : Method::Intersection;
+    case Method::Intersection:
+      return settings.method;
+    case Method::Proximity:
+      if (settings.thickness == 0.0)
+        throw Error(ErrorCode::InvalidSettings,
+                    name + ": Method::Proximity needs a positive thickness; it is 0", a);
+      return settings.method;
+    case Method::Proxy:
+      throw Error(ErrorCode::UnsupportedMethod, name + ": Method::Proxy does not exist yet", a);
+    case Method::DistanceField:
+      throw Error(ErrorCode::UnsupportedMethod, name + ": Method::DistanceField does not exist yet",
+                  a);
+    case Method::Continuous:
+      throw Error(ErrorCode::UnsupportedMethod, name + ": Method::Continuous does not exist yet",
+                  a);
+  }
+  throw Error(ErrorCode::InvalidSettings,
+              name + ": no such method: " + std::to_string(static_cast<int>(settings.method)), a);
+}
+
+}  // namespace
+
+void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
+                    const PairSettings& settings) {
+  Geometry& first = geometries.at(a);
+  Geometry& second = geometries.at(b);
+  const Method method = checked(a, b, settings);
+  if (m_byIds.contains(keyOf(a, b)))
+    throw Error(ErrorCode::DuplicatePair,
+                nameOf(a, b) + " was added before; setPairSettings() changes its settings", a);
+  auto record = std::make_unique<PairRecord>();
+  record->pair = {a, b, settings};
+  record->method = method;
+  record->a = &first;
+  record->b = &second;
+  m_records.push_back(std::move(record));
+  index();
+}
+
+PairRecord& PairTable::at(const GeometryTable& geometries, GeometryId a, GeometryId b) const {
+  const auto found = m_byIds.find(keyOf(a, b));
+  if (found != m_byIds.end()) return *found->second;
+  const_cast<GeometryTable&>(geometries).at(a);
+  const_cast<GeometryTable&>(geometries).at(b);
+  throw Error(ErrorCode::UnknownPair, nameOf(a, b) + " was never added, or was removed", a);
+}
+
+PairRecord& PairTable::inOrder(const GeometryTable& geometries, GeometryId a, GeometryId b) const {
+  PairRecord& record = at(geometries, a, b);
+  if (record.pair.a != a)
+    throw Error(ErrorCode::UnknownPair,
+                nameOf(a, b) + " was added as " + nameOf(b, a) + "; its results are in that order",
+                a);
+  return record;
+}
+
+void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
+                    const PairSettings& settings) {
+  PairRecord& record = at(geometries, a, b);
+  record.method = checked(a, b, settings);
+  record.pair.settings = settings;
+  record.dataFor = record.candidatesFor = {};
+  index();
+}
+
+void PairTable::remove(GeometryTable& geometries, GeometryId a, GeometryId b) {
+  const PairRecord* record = &at(geometries, a, b);
+  std::erase_if(m_records, [=](const auto& r) { return r.get() == record; });
+  index();
+}
+
+void PairTable::removeAllOf(GeometryId geometry) {
+  std::erase_if(m_records,
+                [=](const auto& r) { return r->pair.a == geometry || r->pair.b == geometry; });
+  index();
+}
+
+void PairTable::index() {
+  m_pairs.clear();
+  m_byIds.clear();
+  for (const auto& record : m_records) {
+    m_pairs.push_back(record->pair);
+    m_byIds.emplace(keyOf(record->pair.a, record->pair.b), record.get());
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <palpate/CollisionData.h>
+#include <palpate/OctreeBasedCD.h>
+
+#include "CollisionDetection/GeometryTable.h"
+#include "Core/Buffer.h"
+#include "NarrowPhase/NarrowPhase.h"
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+namespace palpate {
+
+/// One collision pair, with its answers and what they are answers to.
+struct PairRecord {
+  CollisionPair pair;
+  Method method;  ///< not Auto
+  Geometry* a;
+  Geometry* b;
+
+  /// Revisions of the geometries that an answer is of; 0: of none.
+  struct AnsweredFor {
+    std::uint64_t a = 0, b = 0;
+    friend bool operator==(const AnsweredFor&, const AnsweredFor&) = default;
+  };
+  AnsweredFor revisions() const { return {a->revision, b->revision}; }
+  MeshPair meshes() const {
+    return {a->mesh, b->mesh, {method, pair.settings.thickness, pair.settings.contacts}};
+  }
+
+  CollisionData data;
+  AnsweredFor dataFor;
+  Buffer<TrianglePair> candidates;  ///< in the order found until somebody asks for them
+  AnsweredFor candidatesFor;
+  bool candidatesSorted = false;
+};
+
+/// Collision pairs, found by their geometries in either order.
+class PairTable {
+ public:
+  void add(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&);
+  void set(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&);
+  void remove(GeometryTable&, GeometryId a, GeometryId b);
+  void removeAllOf(GeometryId);
+
+  PairRecord& at(const GeometryTable&, GeometryId a, GeometryId b) const;  ///< either order
+  PairRecord& inOrder(const GeometryTable&, GeometryId a,
+                      GeometryId b) const;  ///< throws in the other order
+  std::span<const CollisionPair> pairs() const { return m_pairs; }
+  std::span<const std::unique_ptr<PairRecord>> records() const { return m_records; }
+
+ private:
+  void index();
+
+  std::vector<std::unique_ptr<PairRecord>> m_records;  ///< in the order added
+  std::vector<CollisionPair> m_pairs;
+  std::unordered_map<std::uint64_t, PairRecord*> m_byIds;
+};
+
+}  // namespace palpate

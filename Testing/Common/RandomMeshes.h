@@ -1,0 +1,88 @@
+#pragma once
+
+#include <palpate/Types.h>
+
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+namespace palpate::testing {
+
+struct Mesh {
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<Triangle> triangles;
+};
+
+using Random = std::mt19937_64;
+
+/// Uniform in [low, high), the same on every machine.
+inline double uniform(Random& random, double low, double high) {
+  return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);
+}
+
+inline Eigen::Vector3d randomPoint(Random& random, double low, double high) {
+  const double x = uniform(random, low, high), y = uniform(random, low, high),
+               z = uniform(random, low, high);
+  return {x, y, z};
+}
+
+/// Triangles of about `size`, in a unit cube, no two sharing a vertex.
+inline Mesh soup(Random& random, std::size_t triangles, double size) {
+  Mesh mesh;
+  for (std::uint32_t t = 0; t < triangles; ++t) {
+    const Eigen::Vector3d centre = randomPoint(random, 0, 1);
+    for (int corner = 0; corner < 3; ++corner)
+      mesh.positions.push_back(centre + randomPoint(random, -size, size));
+    mesh.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+  }
+  return mesh;
+}
+
+/// An n by n sheet of quads over the unit square, waving in z about `height`.
+inline Mesh sheet(std::uint32_t n, double height, double phase) {
+  Mesh mesh;
+  for (std::uint32_t j = 0; j <= n; ++j)
+    for (std::uint32_t i = 0; i <= n; ++i) {
+      const double x = double(i) / n, y = double(j) / n;
+      mesh.positions.push_back({x, y, height + 0.05 * std::sin(9 * x + phase) * std::cos(7 * y)});
+    }
+  for (std::uint32_t j = 0; j < n; ++j)
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const std::uint32_t v = j * (n + 1) + i;
+      mesh.triangles.push_back({v, v + 1, v + n + 2});
+      mesh.triangles.push_back({v, v + n + 2, v + n + 1});
+    }
+  return mesh;
+}
+
+/// A closed sphere: latitudes by longitudes.
+inline Mesh sphere(std::uint32_t rings, std::uint32_t segments, const Eigen::Vector3d& centre,
+                   double radius) {
+  Mesh mesh;
+  constexpr double kPi = 3.14159265358979323846;
+  mesh.positions.push_back(centre + Eigen::Vector3d(0, 0, radius));
+  for (std::uint32_t r = 1; r < rings; ++r)
+    for (std::uint32_t s = 0; s < segments; ++s) {
+      const double theta = kPi * r / rings, phi = 2 * kPi * s / segments;
+      mesh.positions.push_back(centre + radius * Eigen::Vector3d(std::sin(theta) * std::cos(phi),
+                                                                 std::sin(theta) * std::sin(phi),
+                                                                 std::cos(theta)));
+    }
+  mesh.positions.push_back(centre - Eigen::Vector3d(0, 0, radius));
+  const auto bottom = static_cast<std::uint32_t>(mesh.positions.size() - 1);
+  const auto at = [&](std::uint32_t r, std::uint32_t s) {
+    return 1 + (r - 1) * segments + s % segments;
+  };
+  for (std::uint32_t s = 0; s < segments; ++s) {
+    mesh.triangles.push_back({0, at(1, s), at(1, s + 1)});
+    for (std::uint32_t r = 1; r + 1 < rings; ++r) {
+      mesh.triangles.push_back({at(r, s), at(r + 1, s), at(r + 1, s + 1)});
+      mesh.triangles.push_back({at(r, s), at(r + 1, s + 1), at(r, s + 1)});
+    }
+    mesh.triangles.push_back({at(rings - 1, s), bottom, at(rings - 1, s + 1)});
+  }
+  return mesh;
+}
+
+}  // namespace palpate::testing

@@ -1,0 +1,114 @@
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/RandomMeshes.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace palpate {
+namespace {
+
+using testing::Mesh;
+using testing::Random;
+
+Settings settingsOf(Engine engine, int threads, OctreeUpdate update) {
+  Settings settings;
+  settings.engine = engine;
+  settings.threads = threads;
+  settings.octree.update = update;
+  return settings;
+}
+
+PairSettings proximity(double thickness) {
+  PairSettings settings;
+  settings.thickness = thickness;
+  return settings;
+}
+
+/// True boxes in exact comparison of doubles: nothing missed; more only by outward rounding.
+void expectComplete(std::span<const TrianglePair> found, std::span<const TrianglePair> truth) {
+  EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
+  EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
+  EXPECT_TRUE(std::includes(found.begin(), found.end(), truth.begin(), truth.end()));
+  EXPECT_LE(found.size(), truth.size() + truth.size() / 100 + 2);
+}
+
+/// The octree's candidates of a and b, and of a with itself, over frames in which both move,
+/// against brute force.
+void compare(const Mesh& a, const Mesh& b, double thickness, const Eigen::Vector3d& offset,
+             double scale, int threads, OctreeUpdate update) {
+  OctreeBasedCD octree(settingsOf(Engine::Octree, threads, update)),
+      oracle(settingsOf(Engine::BruteForce, 1, update));
+  Mesh first = a, second = b;
+  const auto place = [&](Eigen::Vector3d& p) { p = p * scale + offset * scale; };
+  std::for_each(first.positions.begin(), first.positions.end(), place);
+  std::for_each(second.positions.begin(), second.positions.end(), place);
+  GeometryId ids[2][2];
+  OctreeBasedCD* engines[] = {&octree, &oracle};
+  for (int e = 0; e < 2; ++e) {
+    ids[e][0] = engines[e]->addTriangleMesh(first.positions, first.triangles);
+    ids[e][1] = engines[e]->addTriangleMesh(second.positions, second.triangles);
+    engines[e]->addCollisionPair(ids[e][0], ids[e][1], proximity(thickness * scale));
+    engines[e]->addCollisionPair(ids[e][0], ids[e][0], proximity(thickness * scale));
+  }
+  Random random(7);
+  for (int frame = 0; frame < 4; ++frame) {
+    for (OctreeBasedCD* engine : engines) engine->collectCandidates();
+    EXPECT_EQ(octree.octree().validate(), std::vector<std::string>{});
+    expectComplete(octree.candidatePairs(ids[0][0], ids[0][1]),
+                   oracle.candidatePairs(ids[1][0], ids[1][1]));
+    expectComplete(octree.candidatePairs(ids[0][0], ids[0][0]),
+                   oracle.candidatePairs(ids[1][0], ids[1][0]));
+    for (Eigen::Vector3d& p : first.positions)
+      p += testing::randomPoint(random, -0.01 * scale, 0.02 * scale);
+    for (int e = 0; e < 2; ++e) engines[e]->setPositions(ids[e][0], first.positions);
+  }
+}
+
+TEST(Candidates, AreThoseOfBruteForceOnSoups) {
+  Random random(1);
+  for (const double size : {0.003, 0.05, 0.5}) {
+    const Mesh a = testing::soup(random, 400, size), b = testing::soup(random, 300, size * 2);
+    for (const int threads : {1, 2, 8})
+      for (const OctreeUpdate update : {OctreeUpdate::Auto, OctreeUpdate::Rebuild})
+        compare(a, b, 0.01, {0, 0, 0}, 1, threads, update);
+  }
+}
+
+TEST(Candidates, AreThoseOfBruteForceOnSheetsAndBodies) {
+  const Mesh a = testing::sheet(20, 0.0, 0.0), b = testing::sheet(17, 0.02, 1.0);
+  const Mesh ball = testing::sphere(12, 16, {0.5, 0.5, 0.1}, 0.2);
+  for (const OctreeUpdate update : {OctreeUpdate::Auto, OctreeUpdate::Rebuild}) {
+    compare(a, b, 0.002, {0, 0, 0}, 1, 2, update);
+    compare(a, ball, 0.01, {0, 0, 0}, 1, 1, update);
+  }
+}
+
+TEST(Candidates, DoNotDependOnWhereAndHowLargeTheSceneIs) {
+  Random random(3);
+  const Mesh a = testing::soup(random, 300, 0.05), b = testing::soup(random, 300, 0.05);
+  for (const double offset : {0.0, 1e3, 1e6})
+    for (const double scale : {1e-300, 1e-3, 1.0, 1e3, 1e300})
+      compare(a, b, 0.01, {offset, -offset, offset}, scale, 1, OctreeUpdate::Auto);
+}
+
+TEST(Candidates, SurviveOneTriangleFlungFarAway) {
+  Random random(4);
+  Mesh a = testing::soup(random, 500, 0.03);
+  const Mesh b = testing::soup(random, 500, 0.03);
+  for (const double far : {1e3, 1e6, 1e12, 1e100}) {
+    a.positions[0] = {far, -far, far};
+    compare(a, b, 0.01, {0, 0, 0}, 1, 1, OctreeUpdate::Rebuild);
+  }
+}
+
+TEST(Candidates, OfPointsThatAreAllTheSame) {
+  Mesh a;
+  a.positions.assign(60, Eigen::Vector3d(1, 2, 3));
+  for (std::uint32_t t = 0; t < 20; ++t) a.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+  compare(a, a, 0.0, {0, 0, 0}, 1, 1, OctreeUpdate::Rebuild);
+}
+
+}  // namespace
+}  // namespace palpate
