@@ -1,0 +1,107 @@
+#pragma once
+
+#include <cmath>
+
+namespace palpate {
+
+/// A real number as an unevaluated sum of doubles: nonzero, strongly nonoverlapping, of increasing
+/// magnitude, so that the last one has the sign of all. No terms: zero. N bounds their number.
+///
+/// Sums and products are exact as long as no operation overflows and every partial product is a
+/// multiple of the smallest denormal; the caller sees to that. Needs round-to-even, as the whole
+/// tree does.
+/// Source   Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric predicates,
+///          Discrete & Computational Geometry 18 (1997), sections 2.3 to 2.5, with zeros left out.
+template <int N>
+struct Expansion {
+  double terms[N];
+  int size = 0;
+
+  void append(double term) {
+    if (term != 0) terms[size++] = term;
+  }
+  int sign() const { return size == 0 ? 0 : terms[size - 1] > 0 ? 1 : -1; }
+};
+
+/// value + error is the exact result of an operation whose rounded result is value.
+struct RoundedWithError {
+  double value, error;
+};
+
+inline RoundedWithError exactSum(double a, double b) {
+  const double sum = a + b, bRounded = sum - a;
+  return {sum, (a - (sum - bRounded)) + (b - bRounded)};
+}
+
+/// Veltkamp: halves of at most 26 bits that sum to a.
+inline RoundedWithError halves(double a) {
+  const double scaled = 134217729.0 * a;  // 2^27 + 1
+  const double high = scaled - (scaled - a);
+  return {high, a - high};
+}
+
+/// Dekker, without fused multiply-add: the baseline instruction set has none.
+inline RoundedWithError exactProduct(double a, double b, const RoundedWithError& bHalves) {
+  const double product = a * b;
+  const auto [high, low] = halves(a);
+  return {product, ((high * bHalves.value - product) + high * bHalves.error + low * bHalves.value) +
+                       low * bHalves.error};
+}
+
+inline Expansion<2> exactDifference(double a, double b) {
+  const auto [value, error] = exactSum(a, -b);
+  Expansion<2> difference;
+  difference.append(error);
+  difference.append(value);
+  return difference;
+}
+
+template <int N, int M>
+Expansion<N + M> operator+(const Expansion<N>& e, const Expansion<M>& f) {
+  Expansion<N + M> sum;
+  double rest = 0;
+  for (int i = 0, j = 0; i + j < e.size + f.size;) {
+    const bool takeE = j == f.size || (i < e.size && std::abs(e.terms[i]) < std::abs(f.terms[j]));
+    const auto [value, error] = exactSum(rest, takeE ? e.terms[i++] : f.terms[j++]);
+    sum.append(error);
+    rest = value;
+  }
+  sum.append(rest);
+  return sum;
+}
+
+template <int N>
+Expansion<N> operator-(Expansion<N> e) {
+  for (int i = 0; i < e.size; ++i) e.terms[i] = -e.terms[i];
+  return e;
+}
+
+template <int N, int M>
+Expansion<N + M> operator-(const Expansion<N>& e, const Expansion<M>& f) {
+  return e + -f;
+}
+
+template <int N>
+Expansion<2 * N> operator*(const Expansion<N>& e, double factor) {
+  Expansion<2 * N> scaled;
+  if (factor == 0) return scaled;
+  const RoundedWithError factorHalves = halves(factor);
+  double rest = 0;
+  for (int i = 0; i < e.size; ++i) {
+    const auto product = exactProduct(e.terms[i], factor, factorHalves);
+    const auto low = exactSum(rest, product.error);
+    scaled.append(low.error);
+    const auto high = exactSum(product.value, low.value);
+    scaled.append(high.error);
+    rest = high.value;
+  }
+  scaled.append(rest);
+  return scaled;
+}
+
+template <int N>
+Expansion<4 * N> operator*(const Expansion<N>& e, const Expansion<2>& f) {
+  return e * (f.size > 0 ? f.terms[0] : 0.0) + e * (f.size > 1 ? f.terms[1] : 0.0);
+}
+
+}  // namespace palpate

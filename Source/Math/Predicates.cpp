@@ -1,0 +1,82 @@
+#include "Math/Predicates.h"
+
+#include "Math/Exact.h"
+#include "Math/Expansion.h"
+
+#include <initializer_list>
+
+namespace palpate {
+
+namespace {
+
+int signOf(const Integer& value) { return sgn(value); }
+template <int N>
+int signOf(const Expansion<N>& value) {
+  return value.sign();
+}
+
+/// Expansions are exact up to products of three differences: nonzero coordinates of at least 2^-300
+/// are multiples of 2^-352, products of three then of 2^-1056; and six products of three
+/// differences of at most 2^301 stay under 2^906.
+bool fitExpansions(std::initializer_list<const Eigen::Vector3d*> positions) {
+  for (const Eigen::Vector3d* position : positions) {
+    for (const double value : *position) {
+      const double magnitude = std::abs(value);
+      if (magnitude > 0x1p300 || (magnitude < 0x1p-300 && value != 0)) return false;
+    }
+  }
+  return true;
+}
+
+/// The number types: each has difference(a, b) exactly, a - b times a positive constant.
+struct WithExpansions {
+  static Expansion<2> difference(double a, double b) { return exactDifference(a, b); }
+};
+struct WithIntegers {
+  static Integer difference(double a, double b) { return scaledInteger(a) - scaledInteger(b); }
+};
+
+template <class Numbers>
+int volumeSign(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+               const Eigen::Vector3d& d) {
+  const auto difference = [&](const Eigen::Vector3d& p, int i) {
+    return Numbers::difference(p[i], a[i]);
+  };
+  const auto u0 = difference(b, 0), u1 = difference(b, 1), u2 = difference(b, 2);
+  const auto v0 = difference(c, 0), v1 = difference(c, 1), v2 = difference(c, 2);
+  const auto w0 = difference(d, 0), w1 = difference(d, 1), w2 = difference(d, 2);
+  return signOf((u1 * v2 - u2 * v1) * w0 + (u2 * v0 - u0 * v2) * w1 + (u0 * v1 - u1 * v0) * w2);
+}
+
+template <class Numbers>
+int areaSign(int x, int y, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+             const Eigen::Vector3d& c) {
+  const auto ux = Numbers::difference(b[x], a[x]), uy = Numbers::difference(b[y], a[y]);
+  const auto vx = Numbers::difference(c[x], a[x]), vy = Numbers::difference(c[y], a[y]);
+  return signOf(ux * vy - uy * vx);
+}
+
+}  // namespace
+
+int orient3dExactly(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                    const Eigen::Vector3d& d, SignCounts& counts) {
+  if (fitExpansions({&a, &b, &c, &d})) {
+    ++counts.expansions;
+    return volumeSign<WithExpansions>(a, b, c, d);
+  }
+  ++counts.bigIntegers;
+  return volumeSign<WithIntegers>(a, b, c, d);
+}
+
+int orient2dExactly(int axis, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                    const Eigen::Vector3d& c, SignCounts& counts) {
+  const int x = (axis + 1) % 3, y = (axis + 2) % 3;
+  if (fitExpansions({&a, &b, &c})) {
+    ++counts.expansions;
+    return areaSign<WithExpansions>(x, y, a, b, c);
+  }
+  ++counts.bigIntegers;
+  return areaSign<WithIntegers>(x, y, a, b, c);
+}
+
+}  // namespace palpate

@@ -1,0 +1,37 @@
+#pragma once
+
+#include "Math/Predicates.h"
+
+#include <array>
+#include <cstdint>
+
+namespace palpate {
+
+/// Positions of a triangle's corners; edge i joins corners i and i + 1 mod 3.
+using Corners = std::array<Eigen::Vector3d, 3>;
+
+/// How two triangles, as closed sets of points, meet: which features have a point in common.
+///
+/// Where nothing touches, triangles that meet do so in a segment, and each of its ends is where an
+/// edge of one crosses the other: either two edges of one, or one of each.
+struct TriangleIntersection {
+  std::uint8_t cornersOfAOnB = 0, cornersOfBOnA = 0;  ///< bit i: corner i
+  std::uint16_t touchingEdges = 0;  ///< bit 3 i + j: edge i of a meets edge j of b
+  /// Bit i: edge i crosses the other's interior, its ends strictly on either side.
+  std::uint8_t edgesOfAThroughB = 0, edgesOfBThroughA = 0;
+  bool touch() const { return (cornersOfAOnB | cornersOfBOnA | touchingEdges) != 0; }
+  bool intersect() const { return touch() || (edgesOfAThroughB | edgesOfBThroughA) != 0; }
+};
+
+/// Every touching and crossing of two triangles, with area or without. Exact for any finite
+/// doubles.
+///
+/// Laws     (1) corners in another order, or the two triangles swapped, move the bits and change nothing else.
+///          (2) so do mirroring and scaling by powers of two.
+/// Source   intervals on the planes' common line as Guigue and Devillers, Fast and robust triangle-triangle
+///          overlap test using orientation predicates, Journal of Graphics Tools 8 (2003).
+///          Difference: four volumes and no canonical order of the corners; and three axis
+///          projections in place of a chosen one.
+TriangleIntersection intersectTriangles(const Corners& a, const Corners& b, SignCounts&);
+
+}  // namespace palpate

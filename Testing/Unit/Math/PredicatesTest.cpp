@@ -1,0 +1,99 @@
+#include "Math/Exact.h"
+#include "Math/Predicates.h"
+#include "Unit/Math/TrianglePairs.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace palpate::test {
+namespace {
+
+/// The determinant expanded without differences, in integers: nothing shared with what it checks.
+int volumeSign(const std::array<Eigen::Vector3d, 4>& p) {
+  std::array<std::array<Integer, 3>, 4> q;
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 3; ++k) q[i][k] = scaledInteger(p[i][k]);
+  const auto triple = [&](int i, int j, int k) -> Integer {
+    return q[i][0] * q[j][1] * q[k][2] + q[i][1] * q[j][2] * q[k][0] + q[i][2] * q[j][0] * q[k][1] -
+           q[i][2] * q[j][1] * q[k][0] - q[i][0] * q[j][2] * q[k][1] - q[i][1] * q[j][0] * q[k][2];
+  };
+  return sgn(Integer(triple(1, 2, 3) - triple(0, 2, 3) + triple(0, 1, 3) - triple(0, 1, 2)));
+}
+
+int areaSign(int axis, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+             const Eigen::Vector3d& c) {
+  const int x = (axis + 1) % 3, y = (axis + 2) % 3;
+  const auto cross = [&](const Eigen::Vector3d& p, const Eigen::Vector3d& q) -> Integer {
+    return scaledInteger(p[x]) * scaledInteger(q[y]) - scaledInteger(p[y]) * scaledInteger(q[x]);
+  };
+  return sgn(Integer(cross(a, b) + cross(b, c) + cross(c, a)));
+}
+
+TEST(Predicates, EverySignIsThatOfTheIntegerDeterminant) {
+  Random random(1);
+  SignCounts counts;
+  for (int k = 0; k < static_cast<int>(Kind::Count); ++k) {
+    for (int repeat = 0; repeat < 1500; ++repeat) {
+      const auto [a, b] = makePair(static_cast<Kind>(k), random);
+      ASSERT_EQ(orient3d(a[0], a[1], a[2], b[0], counts), volumeSign({a[0], a[1], a[2], b[0]}))
+          << k;
+      ASSERT_EQ(orient3d(a[0], b[1], a[2], b[0], counts), volumeSign({a[0], b[1], a[2], b[0]}))
+          << k;
+      for (int axis = 0; axis < 3; ++axis)
+        ASSERT_EQ(orient2d(axis, a[0], a[1], b[0], counts), areaSign(axis, a[0], a[1], b[0])) << k;
+    }
+  }
+  EXPECT_GT(counts.expansions, 1000u);
+  EXPECT_GT(counts.bigIntegers, 1000u);
+}
+
+TEST(Predicates, OneUlpOffThePlaneIsSeen) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  Random random(2);
+  SignCounts counts;
+  for (int repeat = 0; repeat < 1000; ++repeat) {
+    const Eigen::Vector3d a = random.inCube(), b = random.inCube(), c = random.inCube();
+    Eigen::Vector3d d = pointOn({a, b, c}, random);
+    const int axis = random.below(3);
+    d[axis] = std::nextafter(d[axis], random.below(2) ? infinity : -infinity);
+    ASSERT_EQ(orient3d(a, b, c, d, counts), volumeSign({a, b, c, d}));
+  }
+}
+
+TEST(Predicates, SwappingTwoPositionsTurnsTheSign) {
+  Random random(3);
+  SignCounts counts;
+  for (int repeat = 0; repeat < 20000; ++repeat) {
+    const auto [a, b] = makePair(static_cast<Kind>(repeat % static_cast<int>(Kind::Count)), random);
+    const int sign = orient3d(a[0], a[1], a[2], b[0], counts);
+    ASSERT_EQ(orient3d(a[1], a[0], a[2], b[0], counts), -sign);
+    ASSERT_EQ(orient3d(a[0], a[2], a[1], b[0], counts), -sign);
+    ASSERT_EQ(orient3d(a[0], a[1], b[0], a[2], counts), -sign);
+  }
+}
+
+TEST(Predicates, FloatingPointDecidesWhatIsNotDegenerate) {
+  Random random(4);
+  SignCounts counts;
+  for (int repeat = 0; repeat < 100000; ++repeat) {
+    const auto [a, b] = makePair(Kind::Random, random);
+    orient3d(a[0], a[1], a[2], b[0], counts);
+    orient2d(repeat % 3, a[0], a[1], a[2], counts);
+  }
+  EXPECT_EQ(counts.total(), 0u);
+}
+
+TEST(Exact, ScaledIntegersKeepTheirOrder) {
+  const double denormal = std::numeric_limits<double>::denorm_min();
+  EXPECT_TRUE(scaledInteger(denormal) == 1);
+  EXPECT_TRUE(scaledInteger(-3 * denormal) == -3);
+  EXPECT_TRUE(scaledInteger(-0.0) == 0);
+  EXPECT_TRUE(scaledInteger(0x1p-1022) == Integer(1) << 52);
+  EXPECT_TRUE(scaledInteger(1.5) == Integer(3) << 1073);
+  EXPECT_TRUE(scaledInteger(std::numeric_limits<double>::max()) == ((Integer(1) << 53) - 1)
+                                                                       << 2045);
+}
+
+}  // namespace
+}  // namespace palpate::test

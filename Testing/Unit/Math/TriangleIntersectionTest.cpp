@@ -1,0 +1,164 @@
+#include <palpate/Intersection.h>
+
+#include "Math/TriangleIntersection.h"
+#include "Unit/Math/TrianglePairs.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace palpate::test {
+namespace {
+
+constexpr int kKinds = static_cast<int>(Kind::Count);
+
+/// Bits moved to where they would be if corner i had been named corner order[i]: what
+/// intersectTriangles must answer for a and b with their corners so ordered.
+struct Order {
+  std::array<int, 3> corner;
+  Corners operator()(const Corners& t) const { return {t[corner[0]], t[corner[1]], t[corner[2]]}; }
+  /// The edge i of the reordered triangle, as an edge of the original.
+  int edge(int i) const {
+    const int p = corner[i], q = corner[(i + 1) % 3];
+    return (p + 1) % 3 == q ? p : q;
+  }
+};
+
+TriangleIntersection reordered(const TriangleIntersection& r, const Order& a, const Order& b) {
+  TriangleIntersection s;
+  for (int i = 0; i < 3; ++i) {
+    s.cornersOfAOnB |= (r.cornersOfAOnB >> a.corner[i] & 1) << i;
+    s.cornersOfBOnA |= (r.cornersOfBOnA >> b.corner[i] & 1) << i;
+    s.edgesOfAThroughB |= (r.edgesOfAThroughB >> a.edge(i) & 1) << i;
+    s.edgesOfBThroughA |= (r.edgesOfBThroughA >> b.edge(i) & 1) << i;
+    for (int j = 0; j < 3; ++j)
+      s.touchingEdges |= (r.touchingEdges >> (3 * a.edge(i) + b.edge(j)) & 1) << (3 * i + j);
+  }
+  return s;
+}
+
+TriangleIntersection swapped(const TriangleIntersection& r) {
+  TriangleIntersection s{r.cornersOfBOnA, r.cornersOfAOnB, 0, r.edgesOfBThroughA,
+                         r.edgesOfAThroughB};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      s.touchingEdges |= (r.touchingEdges >> (3 * j + i) & 1) << (3 * i + j);
+  return s;
+}
+
+void expectSame(const TriangleIntersection& r, const TriangleIntersection& s, int kind) {
+  ASSERT_EQ(r.cornersOfAOnB, s.cornersOfAOnB) << kind;
+  ASSERT_EQ(r.cornersOfBOnA, s.cornersOfBOnA) << kind;
+  ASSERT_EQ(r.touchingEdges, s.touchingEdges) << kind;
+  ASSERT_EQ(r.edgesOfAThroughB, s.edgesOfAThroughB) << kind;
+  ASSERT_EQ(r.edgesOfBThroughA, s.edgesOfBThroughA) << kind;
+}
+
+const std::array<Order, 6> kOrders{
+    {{{0, 1, 2}}, {{1, 2, 0}}, {{2, 0, 1}}, {{0, 2, 1}}, {{2, 1, 0}}, {{1, 0, 2}}}};
+
+TEST(TriangleIntersection, ReorderedCornersAndSwappedTrianglesMoveTheBits) {
+  Random random(11);
+  SignCounts counts;
+  for (int repeat = 0; repeat < 300 * kKinds; ++repeat) {
+    const auto [a, b] = makePair(static_cast<Kind>(repeat % kKinds), random);
+    const TriangleIntersection result = intersectTriangles(a, b, counts);
+    expectSame(intersectTriangles(b, a, counts), swapped(result), repeat % kKinds);
+    for (const Order& orderA : kOrders)
+      for (const Order& orderB : kOrders)
+        expectSame(intersectTriangles(orderA(a), orderB(b), counts),
+                   reordered(result, orderA, orderB), repeat % kKinds);
+    if (HasFatalFailure()) return;
+  }
+}
+
+TEST(TriangleIntersection, MirroringExchangingAxesAndPowersOfTwoChangeNothing) {
+  Random random(12);
+  SignCounts counts;
+  for (int repeat = 0; repeat < 2000 * kKinds; ++repeat) {
+    const auto kind = static_cast<Kind>(repeat % kKinds);
+    const CornersPair pair = makePair(kind, random);
+    const TriangleIntersection result = intersectTriangles(pair.first, pair.second, counts);
+    CornersPair mirrored = pair, turned = pair;
+    for (auto& [from, to] : {std::pair(&mirrored, &turned)})
+      for (int i = 0; i < 3; ++i) {
+        from->first[i][repeat % 3] *= -1;
+        from->second[i][repeat % 3] *= -1;
+        std::swap(to->first[i][0], to->first[i][1]);
+        std::swap(to->second[i][0], to->second[i][1]);
+      }
+    expectSame(intersectTriangles(mirrored.first, mirrored.second, counts), result,
+               repeat % kKinds);
+    expectSame(intersectTriangles(turned.first, turned.second, counts), result, repeat % kKinds);
+    // Only where no bit is lost: grids may go to the denormals, others stay well above.
+    if (kind == Kind::SmallGrid || kind == Kind::Random || kind == Kind::CoplanarTilted) {
+      for (const int exponent : {-900, -400, 400, 900}) {
+        const CornersPair other = scaled(pair, exponent);
+        expectSame(intersectTriangles(other.first, other.second, counts), result, repeat % kKinds);
+      }
+    }
+    if (HasFatalFailure()) return;
+  }
+}
+
+/// What the features say must fit together, whatever the triangles.
+TEST(TriangleIntersection, WhatMeetsWithoutTouchingHasTwoCrossings) {
+  Random random(13);
+  SignCounts counts;
+  std::array<int, 3> seen{};
+  for (int repeat = 0; repeat < 3000 * kKinds; ++repeat) {
+    const auto [a, b] = makePair(static_cast<Kind>(repeat % kKinds), random);
+    const TriangleIntersection result = intersectTriangles(a, b, counts);
+    if (result.touch() || !result.intersect()) continue;
+    const int ofA = std::popcount(result.edgesOfAThroughB),
+              ofB = std::popcount(result.edgesOfBThroughA);
+    ASSERT_EQ(ofA + ofB, 2) << repeat % kKinds;
+    ++seen[ofA];
+  }
+  for (const int count : seen) EXPECT_GT(count, 100);
+}
+
+TEST(TriangleIntersection, EachSimpleConfigurationHasItsFeatures) {
+  SignCounts counts;
+  const Corners ground{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}};
+  const auto above = [&](Eigen::Vector3d p, Eigen::Vector3d q, Eigen::Vector3d r) {
+    return intersectTriangles({p, q, r}, ground, counts);
+  };
+  const auto pierced = above({1, 1, -1}, {1, 1.5, 2}, {1.5, 1, 2});
+  EXPECT_EQ(pierced.edgesOfAThroughB, 0b101);
+  EXPECT_FALSE(pierced.touch() || pierced.edgesOfBThroughA);
+  const auto interlocked = above({1, 1, -1}, {1, 1, 1}, {1, -5, 0.5});
+  EXPECT_EQ(interlocked.edgesOfAThroughB, 0b001);
+  EXPECT_EQ(interlocked.edgesOfBThroughA, 0b001);
+  EXPECT_FALSE(interlocked.touch());
+  EXPECT_EQ(above({1, 1, 0}, {1, 2, 3}, {2, 1, 3}).cornersOfAOnB, 0b001);
+  const auto standing = above({1, 1, 0}, {2, 1, 0}, {1, 1, 3});
+  EXPECT_EQ(standing.cornersOfAOnB, 0b011);
+  EXPECT_EQ(standing.touchingEdges, 0);
+  const auto crossedEdges = above({1, -1, -1}, {1, 1, 1}, {1, -1, 3});
+  EXPECT_EQ(crossedEdges.touchingEdges, 0b000000001);
+  const auto over = above({1, 1, 1e-300}, {2, 1, 1}, {1, 2, 1});
+  EXPECT_FALSE(over.intersect());
+  const auto same = intersectTriangles(ground, ground, counts);
+  EXPECT_EQ(same.cornersOfAOnB, 0b111);
+  EXPECT_EQ(same.cornersOfBOnA, 0b111);
+  EXPECT_EQ(same.touchingEdges, 0b111111111);
+}
+
+TEST(TriangleIntersection, SegmentsAndPointsAreWhatTheyCover) {
+  const Eigen::Vector3d p(1, 1, 0), q(1, 1, 5), r(9, 9, 9), none(0, 0, 1);
+  const Eigen::Vector3d a(0, 0, 0), b(4, 0, 0), c(0, 4, 0);
+  EXPECT_TRUE(trianglesIntersect(a, b, c, p, p, p));
+  EXPECT_FALSE(trianglesIntersect(a, b, c, q, q, q));
+  EXPECT_TRUE(trianglesIntersect(a, b, c, q, p, q));
+  EXPECT_TRUE(trianglesIntersect(a, b, c, {1, 1, -1}, q, {1, 1, 2}));
+  EXPECT_TRUE(trianglesIntersect(p, q, p, {0, 1, 3}, {2, 1, 3}, {1, 1, 3}));
+  EXPECT_FALSE(trianglesIntersect(p, q, p, {2, 1, 3}, {3, 1, 3}, {4, 1, 3}));
+  EXPECT_TRUE(trianglesIntersect(r, r, r, r, r, r));
+  EXPECT_FALSE(trianglesIntersect(r, r, r, none, none, none));
+  EXPECT_TRUE(trianglesIntersect(none, {0, 0, 2}, {0, 0, 3}, {0, 0, 3}, {0, 0, 4}, {0, 0, 5}));
+  EXPECT_FALSE(trianglesIntersect(none, {0, 0, 2}, {0, 0, 3}, {0, 0, 3.5}, {0, 0, 4}, {0, 0, 5}));
+}
+
+}  // namespace
+}  // namespace palpate::test
