@@ -8,3 +8,11 @@ if(PALPATE_SANITIZE)
                                                   -fno-sanitize-recover=all)
   target_link_options(PalpateOptions INTERFACE -fsanitize=${PALPATE_SANITIZE})
 endif()
+
+# A shared library of ours exports what is ours.
+function(palpate_export_own_symbols target)
+  if(BUILD_SHARED_LIBS)
+    target_link_options(${target} PRIVATE LINKER:--version-script=${PROJECT_SOURCE_DIR}/CMake/exports.map)
+    set_property(TARGET ${target} APPEND PROPERTY LINK_DEPENDS ${PROJECT_SOURCE_DIR}/CMake/exports.map)
+  endif()
+endfunction()

@@ -53,7 +53,7 @@ checkPlaces() {
     while read -r include; do
       case $include in
         "<palpate/"* | "<Eigen/Core" | "<Eigen/Geometry") continue ;;
-        "<tbb/"* | "<oneapi/"* | "<thread" | "<mutex" | "<shared_mutex" | "<condition_variable" | "<future" | "<execution")
+        "<tbb/"* | "<oneapi/"* | "<thread" | "<condition_variable" | "<future" | "<execution")
           place=Source/Core/Threads.cpp ;;
         "<hwy/"*) place=Source/Core/Simd.h ;;
         "<gmp"*) place=Source/Math/Exact.h ;;
