@@ -1,0 +1,33 @@
+#pragma once
+
+#include <palpate/Distance.h>
+
+#include <optional>
+
+namespace palpate {
+
+// The public functions of <palpate/Distance.h> without their check for NaN and infinity, and the
+// decisions they are made of. Every decision is true of the given doubles.
+
+VertexTriangleDistance finiteVertexTriangleDistance(const Eigen::Vector3d& p,
+                                                    const Eigen::Vector3d& a,
+                                                    const Eigen::Vector3d& b,
+                                                    const Eigen::Vector3d& c);
+EdgeEdgeDistance finiteEdgeEdgeDistance(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
+                                        const Eigen::Vector3d& q0, const Eigen::Vector3d& q1);
+
+/// As edgeEdgeDistance(), if the edges are not parallel and both closest points lie strictly
+/// inside.
+std::optional<EdgeEdgeDistance> crossingEdgesDistance(const Eigen::Vector3d& p0,
+                                                      const Eigen::Vector3d& p1,
+                                                      const Eigen::Vector3d& q0,
+                                                      const Eigen::Vector3d& q1);
+
+/// Whether moving from a towards b comes nearer to p: (p - a) . (b - a) > 0.
+bool comesNearer(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b);
+
+/// Whether p's projection onto the plane of (a, b, c) lies on c's side of edge ab, and not on it.
+bool liesInwards(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                 const Eigen::Vector3d& c);
+
+}  // namespace palpate

@@ -1,0 +1,89 @@
+#pragma once
+
+#include "Math/Expansion.h"
+
+#include <Eigen/Core>
+
+namespace palpate {
+
+/// high + low exactly, each component of high the double nearest to it.
+struct Difference {
+  Eigen::Vector3d high, low;
+};
+
+/// a - b exactly.
+inline Difference difference(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  Difference result;
+  for (int i = 0; i < 3; ++i) {
+    const auto [high, low] = exactSum(a[i], -b[i]);
+    result.high[i] = high;
+    result.low[i] = low;
+  }
+  return result;
+}
+
+/// a + b within 2^-104 of its terms; the same bits in either order.
+inline Difference sum(const Difference& a, const Difference& b) {
+  Difference result;
+  for (int i = 0; i < 3; ++i) {
+    const RoundedWithError high = exactSum(a.high[i], b.high[i]);
+    const RoundedWithError all = exactSum(high.value, high.error + (a.low[i] + b.low[i]));
+    result.high[i] = all.value;
+    result.low[i] = all.error;
+  }
+  return result;
+}
+
+/// m + s u + t v within 2^-53 of the result and 2^-78 of the terms; the same bits when (s, u) and
+/// (t, v) change places. s, t: at most 27 significant bits.
+inline Eigen::Vector3d combination(const Difference& m, double s, const Difference& u, double t,
+                                   const Difference& v) {
+  Eigen::Vector3d result;
+  for (int i = 0; i < 3; ++i) {
+    const auto [uHigh, uLow] = halves(u.high[i]);
+    const auto [vHigh, vLow] = halves(v.high[i]);
+    const RoundedWithError plane = exactSum(s * uHigh, t * vHigh);
+    const RoundedWithError all = exactSum(m.high[i], plane.value);
+    const double rest = (s * uLow + t * vLow) + (s * u.low[i] + t * v.low[i]);
+    result[i] = all.value + ((all.error + plane.error) + (m.low[i] + rest));
+  }
+  return result;
+}
+
+/// The same with one vector.
+inline Eigen::Vector3d combination(const Difference& m, double s, const Difference& u) {
+  Eigen::Vector3d result;
+  for (int i = 0; i < 3; ++i) {
+    const auto [uHigh, uLow] = halves(u.high[i]);
+    const RoundedWithError all = exactSum(m.high[i], s * uHigh);
+    result[i] = all.value + (all.error + (m.low[i] + (s * uLow + s * u.low[i])));
+  }
+  return result;
+}
+
+/// Component i of u x v before its two products are subtracted.
+struct Minor {
+  RoundedWithError plus, minus;
+};
+
+inline Minor minorOf(const Eigen::Vector3d& u, const Eigen::Vector3d& v, int i) {
+  const int j = (i + 1) % 3, k = (i + 2) % 3;
+  return {exactProduct(u[j], v[k], halves(v[k])), exactProduct(u[k], v[j], halves(v[j]))};
+}
+
+/// u x v within 2^-52 of each component and 2^-103 of |u| |v|; turns exactly when u and v change
+/// places.
+inline Eigen::Vector3d accurateCross(const Difference& u, const Difference& v) {
+  Eigen::Vector3d result;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    const auto [plus, minus] = minorOf(u.high, v.high, i);
+    const RoundedWithError high = exactSum(plus.value, -minus.value);
+    const double mixed = (u.high[j] * v.low[k] + u.low[j] * v.high[k]) -
+                         (u.high[k] * v.low[j] + u.low[k] * v.high[j]);
+    result[i] = high.value + (high.error + ((plus.error - minus.error) + mixed));
+  }
+  return result;
+}
+
+}  // namespace palpate

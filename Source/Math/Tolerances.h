@@ -1,0 +1,51 @@
+#pragma once
+
+// Every tolerance of the library, with its unit and where it comes from. u = 2^-53 is the rounding
+// unit.
+namespace palpate {
+
+// ---- Signs of polynomials in coordinate differences (ClosestPoint.cpp) ----
+// The differences are rounded once each, so each factor carries (1 + u).
+
+/// Of x . y, relative to the sum of |x_i y_i|: 2 u from the factors, u from each product, 2 u from
+/// the sums, and second-order terms.
+constexpr double kDotError = 6 * 0x1p-53;
+/// Of (x x y) . (z x w), relative to |x| |y| |z| |w| in sums of magnitudes: each cross product 4 u
+/// (two factors, product, difference), the dot product 3 u, second-order terms and the bound's own
+/// rounding.
+constexpr double kTripleError = 12 * 0x1p-53;
+/// Sums below this did not overflow in a term.
+constexpr double kOverflowGuard = 0x1p1000;
+/// Two factors below this multiply without overflow.
+constexpr double kSquareOverflowGuard = 0x1p400;
+/// More than a few products lose to underflow (2^-1074 each).
+constexpr double kUnderflowGuard = 0x1p-1000;
+/// The same where they are multiplied by products of moderate coordinates, 2^200 at most.
+constexpr double kUnderflowGuardOfProducts = 0x1p-800;
+
+// ---- Closest points (ClosestPoint.cpp) ----
+
+/// L. Coordinate differences between these have products of degree eight within the range of
+/// double; others are left to integers.
+constexpr double kSmallestModerate = 0x1p-100;
+constexpr double kLargestModerate = 0x1p100;
+/// Added and taken away again it rounds a weight to a multiple of 2^-26, so that its product with
+/// half of a split double is exact.
+constexpr double kCoarseWeight = 0x1.8p26;
+/// The Newton step after the coarse weight must be this short at most: its own rounding is then
+/// 2^-70 of the largest coordinate difference at the narrowest angle below. A longer one means that
+/// the first estimate was bad, as of a feature tiny beside its distance.
+constexpr double kFineWeight = 0x1p-20;
+/// Relative to the largest coordinate difference. A residual is off by 2^-76 at most, so that
+/// longer ones have a true direction and shorter ones may be zero.
+constexpr double kTouching = 0x1p-66;
+/// Of two lengths, each within 4 u: closer ones are told apart in integers, because the closest
+/// points of nearly parallel edges may lie far apart at almost the same distance.
+constexpr double kTie = 1 + 0x1p-49;
+/// Squared sine of the angle between two edges below which their cross product is taken with
+/// compensation: its plain error of 5 u over the sine would spoil the Newton step.
+constexpr double kNarrowAngleSquare = 0x1p-16;
+/// Squared sine below which the compensated Newton step is left to integers.
+constexpr double kSliverAngleSquare = 0x1p-40;
+
+}  // namespace palpate

@@ -1,0 +1,406 @@
+#include "Math/ClosestPoint.h"
+
+#include "RationalOracle.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <bit>
+#include <limits>
+#include <random>
+#include <vector>
+
+namespace palpate {
+namespace {
+
+using Eigen::Vector3d;
+using Four = std::array<Vector3d, 4>;  // p a b c, or p0 p1 q0 q1
+
+constexpr double kAllowedUlp = 8.0;
+
+class Random {
+ public:
+  double real() { return std::uniform_real_distribution<double>(-1, 1)(m_engine); }
+  int below(int n) { return static_cast<int>(m_engine() % static_cast<unsigned>(n)); }
+  double smallPower() { return std::pow(10.0, -below(18)); }
+  Vector3d vector() { return {real(), real(), real()}; }
+  Four four() { return {vector(), vector(), vector(), vector()}; }
+
+ private:
+  std::mt19937_64 m_engine{7};
+};
+
+/// One kind of configuration each: random; slivers; far from the origin; on a small grid; nearly
+/// touching; nearly parallel; nearly coincident; from the smallest to the largest doubles.
+constexpr int kKinds = 8;
+
+Four configuration(int kind, Random& random) {
+  Four x = random.four();
+  switch (kind) {
+    case 1:
+      x[3] = x[1] + random.real() * (x[2] - x[1]) + random.smallPower() * random.vector();
+      break;
+    case 2:
+      for (Vector3d& v : x) v += Vector3d(1e6, -2e6, 3e5);
+      break;
+    case 3:
+      for (Vector3d& v : x) v = Vector3d(random.below(4), random.below(4), random.below(4));
+      break;
+    case 4:
+      x[0] = x[1] + 0.5 * (1 + random.real()) * (x[2] - x[1]) +
+             0.3 * random.below(2) * (x[3] - x[1]) + random.smallPower() * random.vector();
+      break;
+    case 5:
+      x[3] = x[2] + random.real() * (x[1] - x[0]) + random.smallPower() * random.vector();
+      break;
+    case 6:
+      x[1 + random.below(3)] = x[random.below(4)] + random.smallPower() * random.vector();
+      break;
+    case 7:
+      for (Vector3d& v : x) v = v * std::ldexp(1.0, random.below(2092) - 1070);
+      if (random.below(4) == 0) x[random.below(4)] *= 1e-20;
+      break;
+  }
+  return x;
+}
+
+bool isDegenerate(const Four& x) {
+  using namespace oracle;
+  const Vector a = toRational(x[1]);
+  const Vector normal = cross(toRational(x[2]) - a, toRational(x[3]) - a);
+  return dot(normal, normal) == 0;
+}
+
+void expectWithin(const oracle::Errors& errors) {
+  EXPECT_LE(errors.distance, kAllowedUlp);
+  EXPECT_LE(errors.difference, kAllowedUlp);
+  EXPECT_LE(errors.witness, kAllowedUlp);
+  EXPECT_LE(errors.normal, kAllowedUlp);
+}
+
+bool hasUlp(double ulp) { return std::isfinite(ulp) && ulp > 0.0; }
+
+oracle::Errors checkVertexTriangle(const Four& x) {
+  using namespace oracle;
+  const VertexTriangleDistance answer = vertexTriangleDistance(x[0], x[1], x[2], x[3]);
+  const Closest truth = oracle::vertexTriangle(x[0], x[1], x[2], x[3]);
+  Vector difference = toRational(x[0]);
+  Rational sum = 0;
+  for (int i = 0; i < 3; ++i) {
+    const Rational weight(answer.barycentric[i]);
+    EXPECT_TRUE(weight >= 0);
+    sum += weight;
+    difference = difference - weight * toRational(x[i + 1]);
+  }
+  EXPECT_TRUE(sum == 1);
+  EXPECT_NEAR(answer.normal.norm(), 1.0, 1e-15);
+  const int feature = static_cast<int>(answer.feature);
+  EXPECT_EQ(feature == 6, truth.interior);
+  if (!truth.interior && !isDegenerate(x)) {
+    for (int i = 0; i < 3; ++i) {
+      const bool holds = feature < 3 ? feature == i : feature - 3 == i || (feature - 2) % 3 == i;
+      EXPECT_EQ(truth.weights[i] != 0, holds) << "corner " << i << " of feature " << feature;
+    }
+  }
+  const double ulp = ulpOfLargestDifference(x);
+  if (!hasUlp(ulp)) return {};
+  const Errors errors =
+      errorsOf(truth, difference, answer.difference, answer.normal, answer.distance, ulp);
+  expectWithin(errors);
+  return errors;
+}
+
+oracle::Errors checkEdgeEdge(const Four& x) {
+  using namespace oracle;
+  const EdgeEdgeDistance answer = edgeEdgeDistance(x[0], x[1], x[2], x[3]);
+  const Closest truth = oracle::edgeEdge(x[0], x[1], x[2], x[3]);
+  const Vector p0 = toRational(x[0]), q0 = toRational(x[2]);
+  const Vector difference = p0 + Rational(answer.weightA) * (toRational(x[1]) - p0) - q0 -
+                            Rational(answer.weightB) * (toRational(x[3]) - q0);
+  EXPECT_GE(std::min(answer.weightA, answer.weightB), 0.0);
+  EXPECT_LE(std::max(answer.weightA, answer.weightB), 1.0);
+  EXPECT_NEAR(answer.normal.norm(), 1.0, 1e-15);
+  const bool interior = !answer.parallel && answer.featureA == EdgeFeature::Interior &&
+                        answer.featureB == EdgeFeature::Interior;
+  EXPECT_EQ(interior, truth.interior);
+  EXPECT_EQ(crossingEdgesDistance(x[0], x[1], x[2], x[3]).has_value(), truth.interior);
+  const double ulp = ulpOfLargestDifference(x);
+  if (!hasUlp(ulp)) return {};
+  const Errors errors =
+      errorsOf(truth, difference, answer.difference, answer.normal, answer.distance, ulp);
+  expectWithin(errors);
+  return errors;
+}
+
+TEST(ClosestPoint, AgreesWithRationalArithmetic) {
+  Random random;
+  oracle::Errors vertexTriangle, edgeEdge;
+  for (int kind = 0; kind < kKinds; ++kind) {
+    for (int i = 0; i < 1500 && !HasFailure(); ++i) {
+      SCOPED_TRACE("kind " + std::to_string(kind) + ", number " + std::to_string(i));
+      const Four x = configuration(kind, random);
+      vertexTriangle.keepLarger(checkVertexTriangle(x));
+      edgeEdge.keepLarger(checkEdgeEdge(x));
+    }
+  }
+  RecordProperty("vertexTriangleDistanceUlp", std::to_string(vertexTriangle.distance));
+  RecordProperty("edgeEdgeDistanceUlp", std::to_string(edgeEdge.distance));
+}
+
+/// Each border between two regions lies where a weight or an offset is zero.
+TEST(ClosestPoint, EveryRegionOfATriangleIsCrossed) {
+  const std::vector<std::array<Vector3d, 3>> triangles{
+      {Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(0, 1, 0)},
+      {Vector3d(0.1, 0.2, 0.3), Vector3d(1.3, -0.4, 0.7), Vector3d(0.6, 1.1, -0.2)},
+      {Vector3d(1e6, 1e6, 1e6), Vector3d(1e6 + 1, 1e6, 1e6 + 0.25), Vector3d(1e6, 1e6 + 3, 1e6)},
+      {Vector3d(0, 0, 0), Vector3d(1, 1e-13, 0), Vector3d(2, 0, 1e-13)}};
+  for (const auto& [a, b, c] : triangles) {
+    const Vector3d ab = b - a, normal = ab.cross(c - a).normalized(),
+                   inward = normal.cross(ab).normalized();
+    for (const double along :
+         {-0.5, -1e-15, 0.0, 1e-15, 0.25, 0.5, 1.0 - 1e-15, 1.0, 1.0 + 1e-15, 1.5})
+      for (const double side : {-0.5, -1e-15, 0.0, 1e-15, 0.1})
+        for (const double height : {-1.0, -1e-9, 0.0, 1e-15, 0.05}) {
+          if (HasFailure()) return;
+          const Vector3d p = a + along * ab + side * inward + height * normal;
+          checkVertexTriangle({p, a, b, c});
+          checkVertexTriangle({p, b, c, a});
+          checkVertexTriangle({p, c, b, a});
+        }
+  }
+}
+
+TEST(ClosestPoint, EveryRegionOfTwoEdgesIsCrossed) {
+  for (const double tilt : {0.0, 1e-300, 1e-16, 1e-8, 0.3, 2.0})
+    for (const double s : {-0.25, -1e-15, 0.0, 1e-15, 0.5, 1.0, 1.0 + 1e-15, 1.5})
+      for (const double t : {-0.25, 0.0, 1e-15, 0.5, 1.0 - 1e-15, 1.0, 1.5})
+        for (const double height : {0.0, 1e-12, 0.5}) {
+          if (HasFailure()) return;
+          // The lines meet, height apart, at s of the first and t of the second.
+          const Vector3d p0(0.1, 0.2, 0.3), p(1.0, 0.5, 0.25);
+          const Vector3d q = p + tilt * Vector3d(-0.5, 1, 0),
+                         q0 = p0 + s * p - t * q + height * Vector3d(0, 0, 1);
+          checkEdgeEdge({p0, p0 + p, q0, q0 + q});
+        }
+}
+
+// ---- Laws ----
+
+using Bits = std::vector<std::uint64_t>;
+
+void append(Bits& bits, double value) { bits.push_back(std::bit_cast<std::uint64_t>(value + 0.0)); }
+void append(Bits& bits, const Vector3d& value) {
+  for (const double x : value) append(bits, x);
+}
+
+/// With weights in the order of corners a, b, c.
+Bits bitsOf(const VertexTriangleDistance& d, const std::array<int, 3>& order = {0, 1, 2}) {
+  Bits bits;
+  for (const int i : order) append(bits, d.barycentric[i]);
+  append(bits, d.difference);
+  if (d.distance > 0.0) append(bits, d.normal);
+  append(bits, d.distance);
+  return bits;
+}
+
+Bits bitsOf(const EdgeEdgeDistance& d) {
+  Bits bits;
+  append(bits, d.weightA);
+  append(bits, d.weightB);
+  append(bits, d.difference);
+  if (d.distance > 0.0) append(bits, d.normal);
+  append(bits, d.distance);
+  return bits;
+}
+
+TEST(ClosestPoint, PermutingCornersPermutesWeights) {
+  Random random;
+  for (int kind = 0; kind < kKinds; ++kind) {
+    for (int i = 0; i < 300; ++i) {
+      const Four x = configuration(kind, random);
+      if (isDegenerate(x)) continue;
+      const Bits bits = bitsOf(vertexTriangleDistance(x[0], x[1], x[2], x[3]));
+      std::array<int, 3> order{0, 1, 2};
+      do {
+        const VertexTriangleDistance other =
+            vertexTriangleDistance(x[0], x[1 + order[0]], x[1 + order[1]], x[1 + order[2]]);
+        std::array<int, 3> back;
+        for (int j = 0; j < 3; ++j) back[order[j]] = j;
+        ASSERT_EQ(bitsOf(other, back), bits) << "kind " << kind << ", number " << i;
+      } while (std::next_permutation(order.begin(), order.end()));
+    }
+  }
+}
+
+TEST(ClosestPoint, SwappingEdgesOrEndsSwapsTheAnswer) {
+  Random random;
+  for (int kind = 0; kind < kKinds; ++kind) {
+    for (int i = 0; i < 500; ++i) {
+      const auto [p0, p1, q0, q1] = configuration(kind, random);
+      const EdgeEdgeDistance answer = edgeEdgeDistance(p0, p1, q0, q1);
+      if (answer.parallel) continue;
+      EdgeEdgeDistance edges = edgeEdgeDistance(q0, q1, p0, p1);
+      std::swap(edges.weightA, edges.weightB);
+      edges.difference = -edges.difference;
+      edges.normal = -edges.normal;
+      ASSERT_EQ(bitsOf(edges), bitsOf(answer)) << "kind " << kind << ", number " << i;
+      EdgeEdgeDistance ends = edgeEdgeDistance(p1, p0, q0, q1);
+      ends.weightA = 1.0 - ends.weightA;
+      ASSERT_EQ(bitsOf(ends), bitsOf(answer)) << "kind " << kind << ", number " << i;
+    }
+  }
+}
+
+/// Mirrored in x, and scaled by a power of two.
+TEST(ClosestPoint, ExactTransformationsKeepTheBits) {
+  Random random;
+  const double scale = 0x1p-7;
+  for (int kind = 0; kind < 7; ++kind) {
+    for (int i = 0; i < 500; ++i) {
+      const Four x = configuration(kind, random);
+      Four mirrored = x, small = x;
+      for (Vector3d& v : mirrored) v[0] = -v[0];
+      for (Vector3d& v : small) v *= scale;
+      const auto mapped = [&](auto answer, bool isMirrored) {
+        if (isMirrored) {
+          answer.difference[0] = -answer.difference[0];
+          answer.normal[0] = -answer.normal[0];
+        } else {
+          answer.difference /= scale;
+          answer.distance /= scale;
+        }
+        return bitsOf(answer);
+      };
+      const EdgeEdgeDistance edges = edgeEdgeDistance(x[0], x[1], x[2], x[3]);
+      const Bits edgeBits = bitsOf(edges);
+      ASSERT_EQ(mapped(edgeEdgeDistance(mirrored[0], mirrored[1], mirrored[2], mirrored[3]), true),
+                edgeBits);
+      ASSERT_EQ(mapped(edgeEdgeDistance(small[0], small[1], small[2], small[3]), false), edgeBits);
+      const VertexTriangleDistance face = vertexTriangleDistance(x[0], x[1], x[2], x[3]);
+      const Bits bits = bitsOf(face);
+      ASSERT_EQ(mapped(vertexTriangleDistance(small[0], small[1], small[2], small[3]), false),
+                bits);
+      if (kind == 3) continue;  // corners that are mirror images of each other
+      ASSERT_EQ(
+          mapped(vertexTriangleDistance(mirrored[0], mirrored[1], mirrored[2], mirrored[3]), true),
+          bits)
+          << "kind " << kind << ", number " << i;
+    }
+  }
+}
+
+TEST(ClosestPoint, MovingOnAGridKeepsTheBits) {
+  Random random;
+  for (int i = 0; i < 2000; ++i) {
+    Four x, moved;
+    const Vector3d offset(1e6, -3e6, 5e5);
+    for (int j = 0; j < 4; ++j) {
+      x[j] =
+          Vector3d(random.below(1 << 20), random.below(1 << 20), random.below(1 << 20)) * 0x1p-20;
+      moved[j] = x[j] + offset;
+    }
+    ASSERT_EQ(bitsOf(vertexTriangleDistance(x[0], x[1], x[2], x[3])),
+              bitsOf(vertexTriangleDistance(moved[0], moved[1], moved[2], moved[3])));
+    ASSERT_EQ(bitsOf(edgeEdgeDistance(x[0], x[1], x[2], x[3])),
+              bitsOf(edgeEdgeDistance(moved[0], moved[1], moved[2], moved[3])));
+  }
+}
+
+TEST(ClosestPoint, TrianglesThatShareAnEdgeAnswerAlikeForIt) {
+  Random random;
+  int shared = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const auto [p, a, b, c] = configuration(i % 7, random);
+    const Vector3d d = random.vector();
+    const VertexTriangleDistance left = vertexTriangleDistance(p, a, b, c);
+    const VertexTriangleDistance right = vertexTriangleDistance(p, b, a, d);
+    if (left.feature != TriangleFeature::EdgeAB || right.feature != TriangleFeature::EdgeAB)
+      continue;
+    ++shared;
+    Bits leftBits, rightBits;
+    append(leftBits, left.difference);
+    append(leftBits, left.barycentric[0]);
+    append(rightBits, right.difference);
+    append(rightBits, right.barycentric[1]);
+    ASSERT_EQ(leftBits, rightBits);
+  }
+  EXPECT_GT(shared, 100);
+}
+
+// ---- By value ----
+
+TEST(ClosestPoint, TouchingFeaturesHaveTheirRulesNormal) {
+  const Vector3d a(0, 0, 0), b(2, 0, 0), c(0, 2, 0);
+  for (const Vector3d& p : {a, Vector3d(1, 0, 0), Vector3d(0.5, 0.5, 0)}) {
+    EXPECT_EQ(vertexTriangleDistance(p, a, b, c).distance, 0.0);
+    EXPECT_EQ(vertexTriangleDistance(p, a, b, c).normal, Vector3d(0, 0, 1));
+    EXPECT_EQ(vertexTriangleDistance(p, a, c, b).normal, Vector3d(0, 0, -1));
+  }
+  const Vector3d third = vertexTriangleDistance({1, 0, 0}, {0, 0, 0}, {3, 0, 0}, {0, 0, 3}).normal;
+  EXPECT_EQ(third, Vector3d(0, -1, 0));
+  const EdgeEdgeDistance crossed = edgeEdgeDistance({-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0});
+  EXPECT_EQ(crossed.distance, 0.0);
+  EXPECT_EQ(crossed.normal, Vector3d(0, 0, 1));
+}
+
+TEST(ClosestPoint, DegenerateFeaturesAreAnsweredForWhatIsLeft) {
+  const Vector3d point(1, 2, 3);
+  const VertexTriangleDistance onPoint =
+      vertexTriangleDistance(point + Vector3d(0, 3, 4), point, point, point);
+  EXPECT_EQ(onPoint.distance, 5.0);
+  EXPECT_EQ(onPoint.normal, Vector3d(0, 0.6, 0.8));
+  EXPECT_EQ(onPoint.feature, TriangleFeature::CornerA);
+  EXPECT_EQ(vertexTriangleDistance(point, point, point, point).normal, Vector3d(1, 0, 0));
+
+  const VertexTriangleDistance onSegment =
+      vertexTriangleDistance({1, 1, 0}, {0, 0, 0}, {1, 0, 0}, {3, 0, 0});
+  EXPECT_EQ(onSegment.feature, TriangleFeature::EdgeCA);
+  EXPECT_EQ(onSegment.distance, 1.0);
+  EXPECT_EQ(vertexTriangleDistance({1, 0, 0}, {0, 0, 0}, {1, 0, 0}, {3, 0, 0}).normal,
+            Vector3d(0, 1, 0));
+
+  const EdgeEdgeDistance points = edgeEdgeDistance(point, point, point, point);
+  EXPECT_TRUE(points.parallel);
+  EXPECT_EQ(points.distance, 0.0);
+  EXPECT_EQ(points.normal, Vector3d(1, 0, 0));
+}
+
+TEST(ClosestPoint, ParallelEdgesMeetInTheMiddleOfTheirStretch) {
+  const EdgeEdgeDistance beside = edgeEdgeDistance({0, 0, 0}, {4, 0, 0}, {5, 1, 0}, {1, 1, 0});
+  EXPECT_TRUE(beside.parallel);
+  EXPECT_EQ(beside.weightA, 0.625);
+  EXPECT_EQ(beside.weightB, 0.625);
+  EXPECT_EQ(beside.distance, 1.0);
+  EXPECT_EQ(beside.normal, Vector3d(0, -1, 0));
+  const EdgeEdgeDistance beyond = edgeEdgeDistance({0, 0, 0}, {1, 0, 0}, {4, 4, 0}, {7, 4, 0});
+  EXPECT_EQ(beyond.weightA, 1.0);
+  EXPECT_EQ(beyond.weightB, 0.0);
+  EXPECT_EQ(beyond.distance, 5.0);
+}
+
+TEST(ClosestPoint, TheLargestDoublesAreAnswered) {
+  const double most = std::numeric_limits<double>::max();
+  const VertexTriangleDistance far = vertexTriangleDistance(
+      {most, most, most}, {-most, -most, -most}, {-most, most, -most}, {-most, -most, most});
+  EXPECT_EQ(far.distance, std::numeric_limits<double>::infinity());
+  EXPECT_NEAR(far.normal.norm(), 1.0, 1e-15);
+  const VertexTriangleDistance flat =
+      vertexTriangleDistance({0, 0, 1}, {-most, -most, 0}, {most, -most, 0}, {0, most, 0});
+  EXPECT_EQ(flat.distance, 1.0);
+  EXPECT_EQ(flat.normal, Vector3d(0, 0, 1));
+}
+
+TEST(ClosestPoint, NaNGivesNaN) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(),
+               infinity = std::numeric_limits<double>::infinity();
+  for (const double bad : {nan, infinity, -infinity}) {
+    EXPECT_TRUE(
+        std::isnan(vertexTriangleDistance({0, 0, 0}, {bad, 0, 0}, {1, 0, 0}, {0, 1, 0}).distance));
+    EXPECT_TRUE(
+        std::isnan(edgeEdgeDistance({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, bad, 1}).distance));
+  }
+}
+
+}  // namespace
+}  // namespace palpate
