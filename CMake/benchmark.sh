@@ -7,6 +7,11 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 CMake/packages.sh build benchmark
 cmake --preset benchmark
 cmake --build --preset benchmark --parallel "$(nproc)"
-build/benchmark/Testing/Benchmark/palpate_race --csv build/benchmark/race.csv \
+csv=build/benchmark/race.csv
+build/benchmark/Testing/Benchmark/palpate_race --csv $csv \
   --commit "$(git describe --always --dirty 2>/dev/null || echo unknown)" "$@"
-echo "figures: build/benchmark/race.csv"
+if [[ $# -eq 0 ]]; then  # the whole table
+  cp $csv Docs/Performance.csv
+  python3 Testing/Benchmark/tables.py Docs/Performance.csv Docs/Performance.md
+fi
+echo "figures: $csv"

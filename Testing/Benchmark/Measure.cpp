@@ -72,7 +72,6 @@ void checkSets(const Workload& workload, std::span<const std::unique_ptr<Peer>> 
   const std::size_t count = workload.frames.size();
   std::vector<std::size_t> frames = {0, count / 3, 2 * count / 3, count - 1};
   frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
-  std::vector<double> pairCounts;
   outcome.hash = 0xcbf29ce484222325u;
   for (const std::size_t frame : frames) {
     const SetChecker checker(workload.task, workload.frames[frame]);
@@ -80,26 +79,34 @@ void checkSets(const Workload& workload, std::span<const std::unique_ptr<Peer>> 
       engine->update(workload.frames[frame]);
       engine->collide();
     }
-    double pairs = 0;
     for (std::size_t pair = 0; pair < workload.task.pairs.size(); ++pair) {
       std::vector<Pairs> sets(engines.size());
       for (std::size_t i = 0; i < engines.size(); ++i) sets[i] = engines[i]->candidates(pair);
-      pairs += static_cast<double>(sets[0].size());
       addToHash(outcome.hash, sets[0]);
       checker.check(pair, sets, outcome.entries);
     }
-    pairCounts.push_back(pairs);
   }
-  outcome.checkedFrames = frames.size();
-  outcome.medianPairs = median(pairCounts);
-  outcome.mostPairs = *std::max_element(pairCounts.begin(), pairCounts.end());
+}
+
+void countPairs(const Workload& workload, Peer& engine, Outcome& outcome) {
+  std::vector<double> counts;
+  for (const Positions& frame : workload.frames) {
+    engine.update(frame);
+    engine.collide();
+    std::size_t pairs = 0;
+    for (std::size_t pair = 0; pair < workload.task.pairs.size(); ++pair)
+      pairs += engine.candidates(pair).size();
+    counts.push_back(static_cast<double>(pairs));
+  }
+  outcome.medianPairs = median(counts);
+  outcome.mostPairs = quantile(counts, 1);
 }
 
 struct Samples {
   std::vector<double> total, update;
 };
 
-void repeat(Peer& engine, const std::vector<Positions>& frames, Entry& entry, Samples& samples) {
+void repeat(Peer& engine, const std::vector<Positions>& frames, Timing& timing, Samples& samples) {
   std::vector<double> totals;
   for (std::size_t frame = 0; frame < frames.size(); ++frame) {
     const double start = now();
@@ -111,7 +118,7 @@ void repeat(Peer& engine, const std::vector<Positions>& frames, Entry& entry, Sa
     totals.push_back(end - start);
     samples.update.push_back(updated - start);
   }
-  entry.repetitions.push_back(median(totals));
+  timing.repetitions.push_back(median(totals));
   samples.total.insert(samples.total.end(), totals.begin(), totals.end());
 }
 
@@ -143,30 +150,40 @@ Outcome measure(const Workload& workload, std::span<const std::unique_ptr<Peer>>
     engine->prepare(workload.task, workload.frames[0]);
   }
   checkSets(workload, engines, outcome);
-  std::vector<Samples> samples(engines.size());
-  std::vector<double> spent(engines.size());
-  for (int repetition = 0; repetition < options.repetitions; ++repetition) {
-    for (std::size_t i = 0; i < engines.size(); ++i) {
-      if (spent[i] > 1000 * options.secondsPerEngine) continue;
-      const double start = now();
-      repeat(*engines[i], workload.frames, outcome.entries[i], samples[i]);
-      spent[i] += now() - start;
-    }
-  }
-  for (std::size_t i = 0; i < engines.size(); ++i) {
-    Entry& entry = outcome.entries[i];
-    entry.total = median(samples[i].total);
-    entry.update = median(samples[i].update);
-    entry.fastest = quantile(samples[i].total, 0);
-    entry.worst = quantile(samples[i].total, 1);
-  }
+  countPairs(workload, *engines[0], outcome);
+  std::vector<Contestant> contestants;
+  for (const auto& engine : engines) contestants.push_back({engine.get(), &workload.frames});
+  const std::vector<Timing> timings = takeTurns(contestants, options);
+  for (std::size_t i = 0; i < engines.size(); ++i) outcome.entries[i].timing = timings[i];
   return outcome;
 }
 
-double ratio(const Entry& entry, const Entry& first) {
+std::vector<Timing> takeTurns(std::span<const Contestant> contestants,
+                              const MeasureOptions& options) {
+  std::vector<Timing> timings(contestants.size());
+  std::vector<Samples> samples(contestants.size());
+  std::vector<double> spent(contestants.size());
+  for (int repetition = 0; repetition < options.repetitions; ++repetition) {
+    for (std::size_t i = 0; i < contestants.size(); ++i) {
+      if (spent[i] > 1000 * options.secondsPerEngine) continue;
+      const double start = now();
+      repeat(*contestants[i].engine, *contestants[i].frames, timings[i], samples[i]);
+      spent[i] += now() - start;
+    }
+  }
+  for (std::size_t i = 0; i < contestants.size(); ++i) {
+    timings[i].total = median(samples[i].total);
+    timings[i].update = median(samples[i].update);
+    timings[i].fastest = quantile(samples[i].total, 0);
+    timings[i].worst = quantile(samples[i].total, 1);
+  }
+  return timings;
+}
+
+double ratio(const Timing& timing, const Timing& other) {
   std::vector<double> ratios;
-  for (std::size_t i = 0; i < std::min(entry.repetitions.size(), first.repetitions.size()); ++i)
-    ratios.push_back(entry.repetitions[i] / first.repetitions[i]);
+  for (std::size_t i = 0; i < std::min(timing.repetitions.size(), other.repetitions.size()); ++i)
+    ratios.push_back(timing.repetitions[i] / other.repetitions[i]);
   return median(ratios);
 }
 

@@ -23,20 +23,19 @@ struct SetCheck {
   bool equal() const { return missed == 0 && extra == 0; }
 };
 
-struct Entry {
-  std::string engine;
-  bool rebuilds = false;
-  double total = 0, update = 0;     ///< ms: median over every frame of every repetition
-  double fastest = 0, worst = 0;    ///< ms: of those frames
-  std::vector<double> repetitions;  ///< ms: median over the frames of each
-  SetCheck check;
+/// Milliseconds of whole frames; `update` is the part of `total` before the pairs.
+struct Timing {
+  double total = 0, update = 0;     ///< medians over every frame of every repetition
+  double fastest = 0, worst = 0;    ///< of those frames
+  std::vector<double> repetitions;  ///< median over the frames of each
 };
 
-struct Outcome {
-  std::vector<Entry> entries;
-  std::size_t checkedFrames = 0;
-  double medianPairs = 0, mostPairs = 0;  ///< over the checked frames
-  std::uint64_t hash = 0;  ///< of the first engine's sorted pairs in the checked frames
+/// How many times as long as the other: the median over the repetitions that both have.
+double ratio(const Timing&, const Timing& other);
+
+struct Contestant {
+  Peer* engine;
+  const std::vector<Positions>* frames;
 };
 
 struct MeasureOptions {
@@ -44,12 +43,25 @@ struct MeasureOptions {
   double secondsPerEngine = 2;  ///< no further repetition of an engine that took longer
 };
 
-/// Repetitions of all engines take turns, so that what disturbs the machine meets them alike. In
-/// each, the first frame is not timed (a jump back in the motion).
+/// Repetitions of all contestants take turns, so that what disturbs the machine meets them alike.
+/// In each, the first frame is not timed (a jump back in the motion).
+std::vector<Timing> takeTurns(std::span<const Contestant>, const MeasureOptions&);
+
+struct Entry {
+  std::string engine;
+  bool rebuilds = false;
+  Timing timing;
+  SetCheck check;
+};
+
+struct Outcome {
+  std::vector<Entry> entries;
+  double medianPairs = 0, mostPairs = 0;  ///< over all frames, by the first engine
+  std::uint64_t hash = 0;                 ///< of the first engine's sorted pairs in four frames
+};
+
+/// Prepares all engines, compares their pairs, and times them.
 Outcome measure(const Workload&, std::span<const std::unique_ptr<Peer>> engines,
                 const MeasureOptions&);
-
-/// How many times as long as the first engine: the median over the repetitions that both have.
-double ratio(const Entry& entry, const Entry& first);
 
 }  // namespace palpate::benchmark

@@ -1,0 +1,92 @@
+#include "PalpateEngine.h"
+
+#include <optional>
+
+namespace palpate::benchmark {
+namespace {
+
+Settings settingsFor(OctreeUpdate update, int threads) {
+  Settings settings;
+  settings.octree.update = update;
+  settings.threads = threads;
+  return settings;
+}
+
+class PalpateEngine : public Peer {
+ public:
+  PalpateEngine(OctreeUpdate update, PairOrder order) : m_update(update), m_order(order) {}
+
+  std::string name() const override {
+    return std::string("Palpate") + (rebuilds() ? ", full rebuild" : "") +
+           (m_order == PairOrder::Sorted ? ", sorted pairs" : "");
+  }
+  bool rebuilds() const override { return m_update == OctreeUpdate::Rebuild; }
+
+  void prepare(const Task& task, const Positions& positions) override {
+    m_task = task;
+    m_scene.emplace(task, positions, m_update);
+    m_lists.prepare(task.pairs.size(), 1);
+  }
+
+  void update(const Positions& positions) override {
+    m_scene->setPositions(positions);
+    m_scene->detection.update();
+  }
+
+  void collide() override {
+    if (m_order == PairOrder::Sorted) {
+      m_scene->detection.collectCandidates();
+      // Sorted when first asked for.
+      for (std::size_t pair = 0; pair < m_task.pairs.size(); ++pair)
+        m_scene->detection.candidatePairs(first(pair), second(pair));
+      return;
+    }
+    m_lists.clear();
+    for (std::size_t pair = 0; pair < m_task.pairs.size(); ++pair) {
+      std::vector<TrianglePair>& list = m_lists.of(pair, 0);
+      m_scene->detection.forEachCandidate(first(pair), second(pair),
+                                          [&list](std::span<const TrianglePair> batch) {
+                                            list.insert(list.end(), batch.begin(), batch.end());
+                                          });
+    }
+  }
+
+  std::vector<TrianglePair> candidates(std::size_t pair) const override {
+    if (m_order == PairOrder::Found) return m_lists.sorted(pair);
+    const auto pairs = m_scene->detection.candidatePairs(first(pair), second(pair));
+    return {pairs.begin(), pairs.end()};
+  }
+
+ private:
+  GeometryId first(std::size_t pair) const { return m_scene->ids[m_task.pairs[pair][0]]; }
+  GeometryId second(std::size_t pair) const { return m_scene->ids[m_task.pairs[pair][1]]; }
+
+  OctreeUpdate m_update;
+  PairOrder m_order;
+  Task m_task;
+  std::optional<PalpateScene> m_scene;
+  PairLists m_lists;
+};
+
+}  // namespace
+
+PalpateScene::PalpateScene(const Task& task, const Positions& positions, OctreeUpdate update,
+                           double thickness)
+    : detection(settingsFor(update, task.threads)) {
+  PairSettings pairSettings;
+  pairSettings.thickness = thickness > 0 ? thickness : task.thickness;
+  for (std::size_t mesh = 0; mesh < task.meshes.size(); ++mesh)
+    ids.push_back(detection.addTriangleMesh(positions[mesh], task.meshes[mesh]));
+  for (const auto& [a, b] : task.pairs) detection.addCollisionPair(ids[a], ids[b], pairSettings);
+}
+
+void PalpateScene::setPositions(const Positions& positions) {
+  for (std::size_t mesh = 0; mesh < ids.size(); ++mesh)
+    detection.setPositions(ids[mesh], positions[mesh]);
+}
+
+std::unique_ptr<Peer> makePalpate(OctreeUpdate update, PairOrder order) {
+  return std::make_unique<PalpateEngine>(update, order);
+}
+
+}  // namespace palpate::benchmark

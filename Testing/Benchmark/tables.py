@@ -1,0 +1,138 @@
+#!/usr/bin/env python3
+"""Writes the tables of a page from the race's CSV.
+
+usage: tables.py FIGURES.csv PAGE.md
+
+Each table stands in the page between the lines "<!-- table NAME -->" and "<!-- end -->"; what is
+between them is replaced, all else stays.
+"""
+import csv
+import re
+import sys
+
+
+def figure(value):
+    """Three significant digits."""
+    value = float(value)
+    if value == 0 or abs(value) >= 100:
+        return f"{value:.0f}"
+    return f"{value:.{3 if abs(value) < 1 else 2 if abs(value) < 10 else 1}f}"
+
+
+class Figures:
+    def __init__(self, path):
+        with open(path, newline="") as file:
+            self.rows = list(csv.DictReader(file))
+
+    def of(self, table):
+        return [row for row in self.rows if row["table"] == table]
+
+    def value(self, table, scene, threads, engine, metric):
+        for row in self.of(table):
+            key = (row["scene"], int(row["threads"]), row["engine"], row["metric"])
+            if key == (scene, threads, engine, metric):
+                return float(row["value"])
+        return None
+
+    def distinct(self, table, column):
+        return list(dict.fromkeys(row[column] for row in self.of(table)))
+
+
+def markdown(header, rows):
+    lines = ["| " + " | ".join(header) + " |", "|---" * len(header) + "|"]
+    return lines + ["| " + " | ".join(row) + " |" for row in rows]
+
+
+def joined(figures, table, scene, engine, metric, suffix=""):
+    """The figures of 1 and more threads, in one cell."""
+    found = [figures.value(table, scene, threads, engine, metric) for threads in (1, 2)]
+    return " / ".join(figure(value) + suffix for value in found if value is not None) or "-"
+
+
+def race(figures):
+    scenes = figures.distinct("race", "scene")
+    engines = [engine for engine in figures.distinct("race", "engine") if engine != "scene"]
+    header = ["ms, 1 / 2 threads"] + scenes
+    rows = [["triangles"] + [figure(figures.value("race", s, 1, "scene", "triangles")) for s in scenes]]
+    rows.append(["pairs, median"] + [figure(figures.value("race", s, 1, "scene", "pairs")) for s in scenes])
+    rows += [[e] + [joined(figures, "race", s, e, "median ms") for s in scenes] for e in engines]
+    return markdown(header, rows)
+
+
+def sets(figures):
+    header = ["pairs missed, and more by outward rounding, in four frames"] + figures.distinct("race", "scene")
+    rows = []
+    for engine in figures.distinct("race", "engine"):
+        if engine == "scene":
+            continue
+        cells = []
+        for scene in header[1:]:
+            missed, extra = (figures.value("race", scene, 1, engine, m) for m in ("missed", "extra"))
+            cells.append("-" if missed is None else f"{missed:.0f}, {extra:.0f}")
+        rows.append([engine] + cells)
+    return markdown(header, rows)
+
+
+def verdict(figures):
+    scenes = figures.distinct("verdict", "scene")
+    rows = []
+    for what in figures.distinct("verdict", "engine"):
+        cells = []
+        for scene in scenes:
+            limit = figures.value("verdict", scene, 1, what, "limit")
+            ratios = joined(figures, "verdict", scene, what, "ratio")
+            cells.append("-" if limit is None else f"{ratios} of {limit:g}")
+        rows.append([what] + cells)
+    return markdown(["times as fast, 1 / 2 threads, of those asked for"] + scenes, rows)
+
+
+def metrics(table, first):
+    """One row for each scene and engine, one column for each metric."""
+    def write(figures):
+        columns = figures.distinct(table, "metric")
+        rows = []
+        for scene in figures.distinct(table, "scene"):
+            for engine in dict.fromkeys(r["engine"] for r in figures.of(table) if r["scene"] == scene):
+                rows.append([f"{scene}, {engine}"] + [joined(figures, table, scene, engine, m) for m in columns])
+        return markdown([first] + columns, rows)
+    return write
+
+
+def provenance(figures):
+    row = figures.rows[0]
+    return [f"{row['machine']}, {row['compiler']}, SIMD path {row['simd']}, commit {row['commit']}."]
+
+
+TABLES = {
+    "provenance": provenance,
+    "race": race,
+    "sets": sets,
+    "verdict": verdict,
+    "stages": metrics("stages", "1 / 2 threads"),
+    "whole-frame": metrics("whole frame", "1 / 2 threads"),
+    "far-flung": metrics("far-flung", "1 thread"),
+    "still": metrics("still", "1 thread"),
+    "scale": metrics("scale", "1 / 2 threads"),
+    "steady": metrics("steady", "1 / 2 threads"),
+    "simd": metrics("simd", "1 thread"),
+}
+
+
+def main(figures_path, page_path):
+    figures = Figures(figures_path)
+    with open(page_path) as file:
+        page = file.read()
+
+    def table(match):
+        lines = TABLES[match[1]](figures)
+        return f"<!-- table {match[1]} -->\n" + "\n".join(lines) + "\n<!-- end -->"
+
+    page = re.sub(r"<!-- table (\S+) -->\n.*?<!-- end -->", table, page, flags=re.DOTALL)
+    with open(page_path, "w") as file:
+        file.write(page)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        sys.exit(__doc__)
+    main(sys.argv[1], sys.argv[2])
