@@ -111,13 +111,11 @@ void rebuild(Geometry& geometry, const OctreeSettings& settings, const Threads& 
   const Box bounds = boundsOf(geometry, threads);
   geometry.boxMilliseconds += watch.lap();
   octree.build(bounds, settings, threads);
-  geometry.orderedTriangles.swap(geometry.orderedTrianglesBefore);
-  geometry.orderedTriangles.resize(triangles.size());
-  threads.forChunks(
-      triangles.size(), kVertexGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-        for (std::size_t i = from; i < to; ++i)
-          geometry.orderedTriangles[i] = geometry.orderedTrianglesBefore[octree.previousSlot(i)];
-      });
+  threads.forChunks(triangles.size(), kVertexGrain,
+                    [&](std::size_t, std::size_t from, std::size_t to) {
+                      for (std::size_t i = from; i < to; ++i)
+                        geometry.orderedTriangles[i] = triangles[octree.order()[i]];
+                    });
   geometry.octreeMilliseconds += watch.lap();
 }
 

@@ -30,7 +30,7 @@ struct Geometry {
   FloatFrame frame;
   double spread = 0;  ///< of a sample of the positions
   Buffer<FloatPoint> floats;
-  std::vector<Triangle> orderedTriangles, orderedTrianglesBefore;  ///< in the octree's order
+  std::vector<Triangle> orderedTriangles;  ///< in the octree's order
   Octree octree;
   std::uint64_t treeRevision = 0;  ///< revision that the octree is of
   bool treeKnown = false;          ///< built for this topology

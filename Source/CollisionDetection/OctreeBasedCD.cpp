@@ -97,10 +97,8 @@ struct OctreeBasedCD::Implementation {
     std::uint32_t firstNode = 0;
     for (const auto& geometry : geometries.all()) {
       if (geometry->octree.size() == 0) continue;
-      const std::size_t bytes =
-          geometry->floats.capacity() * sizeof(FloatPoint) +
-          (geometry->orderedTriangles.capacity() + geometry->orderedTrianglesBefore.capacity()) *
-              sizeof(Triangle);
+      const std::size_t bytes = geometry->floats.capacity() * sizeof(FloatPoint) +
+                                geometry->orderedTriangles.capacity() * sizeof(Triangle);
       state->trees.push_back({geometry->id, &geometry->octree, geometry->frame.origin,
                               geometry->frame.scale, geometry->lastUpdate, bytes, firstNode});
       firstNode += static_cast<std::uint32_t>(geometry->octree.pool().used() * 8);

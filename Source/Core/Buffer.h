@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <type_traits>
 #include <utility>
@@ -27,5 +28,15 @@ struct UninitializedAllocator : std::allocator<T> {
 /// nothing.
 template <class T>
 using Buffer = std::vector<T, UninitializedAllocator<T>>;
+
+/// resize() of what is about to be overwritten, growing by an eighth to spare where std::vector would double.
+template <class T>
+void resizeSparingly(Buffer<T>& buffer, std::size_t size) {
+  if (size > buffer.capacity()) {
+    buffer.clear();
+    buffer.reserve(size + size / 8);
+  }
+  buffer.resize(size);
+}
 
 }  // namespace palpate

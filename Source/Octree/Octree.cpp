@@ -114,10 +114,12 @@ void Octree::build(const Box& bounds, const OctreeSettings& settings, const Thre
   });
   assemble(tasks, threads);
 
-  m_orderBefore.swap(m_order);
-  m_order.resize(size);
+  // The keys' scratch is free now and holds the old order.
+  auto* before = reinterpret_cast<std::uint32_t*>(m_keysScratch.data());
+  std::copy(m_order.begin(), m_order.end(), before);
   threads.forChunks(size, kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-    for (std::size_t i = from; i < to; ++i) m_order[i] = m_orderBefore[previousSlot(i)];
+    for (std::size_t i = from; i < to; ++i)
+      m_order[i] = before[static_cast<std::uint32_t>(m_keys[i])];
   });
   m_builtNow = true;
 }
@@ -142,9 +144,9 @@ void Octree::assemble(std::size_t tasks, const Threads& threads) {
             ? static_cast<std::uint32_t>(m_layouts[1 + (node & ~Layout::kTask)].groups.size())
             : 1;
   }
-  m_groups.resize(groupCount + 1);
-  m_groupNodes.resize(groupCount);
-  m_groupBoxes.resize(groupCount);
+  resizeSparingly(m_groups, groupCount + 1);
+  resizeSparingly(m_groupNodes, groupCount);
+  resizeSparingly(m_groupBoxes, groupCount);
   m_groups[groupCount] = static_cast<std::uint32_t>(m_order.size());
   threads.forEach(top.groups.size(), [&](std::size_t i) {
     const OctreeNode node = top.groupNodes[i];
@@ -218,8 +220,8 @@ void Octree::measureLooseness() {
 
 std::size_t Octree::bytes() const {
   const auto of = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
-  std::size_t bytes = of(m_order) + of(m_orderBefore) + of(m_keys) + of(m_keysScratch) +
-                      of(m_groups) + of(m_groupNodes) + of(m_groupBoxes) + of(m_parents) +
+  std::size_t bytes = of(m_order) + of(m_keys) + of(m_keysScratch) + of(m_groups) +
+                      of(m_groupNodes) + of(m_groupBoxes) + of(m_parents) +
                       m_pool.allocated() * sizeof(OctreeBlock) + of(m_binCounts) + of(m_binBegins);
   for (int k = 0; k < 3; ++k) bytes += of(m_boxes.lower[k]) + of(m_boxes.upper[k]);
   for (const Layout& layout : m_layouts)

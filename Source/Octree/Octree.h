@@ -99,10 +99,8 @@ class Octree {
   std::span<const std::uint32_t> groups() const { return m_groups; }
   Box* groupBoxes() { return m_groupBoxes.data(); }
 
-  /// `bounds`: of all boxes. Afterwards previousSlots()[i] says where in the old order primitive i
-  /// of the new one was.
+  /// `bounds`: of all boxes. Afterwards order() is new, and boxes() are still in the old one.
   void build(const Box& bounds, const OctreeSettings&, const Threads&);
-  std::uint32_t previousSlot(std::size_t i) const { return static_cast<std::uint32_t>(m_keys[i]); }
   void fit(const Threads&);
 
   /// Sum of the leaves' half areas over that of their primitives: how loose the fitted boxes are.
@@ -134,7 +132,7 @@ class Octree {
   void assemble(std::size_t tasks, const Threads&);
   void measureLooseness();
 
-  Buffer<std::uint32_t> m_order, m_orderBefore;
+  Buffer<std::uint32_t> m_order;
   BoxArrays m_boxes;
   Buffer<std::uint64_t> m_keys, m_keysScratch;  ///< key << 32 | slot in the old order
   Buffer<std::uint32_t> m_binCounts, m_binBegins;
