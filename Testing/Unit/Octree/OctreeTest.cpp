@@ -1,0 +1,209 @@
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/RandomMeshes.h"
+#include "Core/RadixSort.h"
+#include "Octree/Forest.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+namespace palpate {
+namespace {
+
+using testing::Mesh;
+using testing::Random;
+
+constexpr auto kRebuilt = LooseOctree::Update::Rebuilt;
+
+Settings rebuilding(int threads = 1) {
+  Settings settings;
+  settings.threads = threads;
+  settings.octree.update = OctreeUpdate::Rebuild;
+  return settings;
+}
+
+/// Cells by their bounds, each with the primitives it holds: what a tree is, whatever its nodes are
+/// called.
+using Tree = std::set<std::pair<std::vector<double>, std::vector<std::uint32_t>>>;
+
+Tree treeOf(const OctreeBasedCD& detection, GeometryId geometry) {
+  Tree tree;
+  for (const LooseOctree::NodeId id : detection.octree().nodes(geometry)) {
+    const LooseOctree::Node node = detection.octree().node(id);
+    std::vector<std::uint32_t> primitives(node.primitives.begin(), node.primitives.end());
+    std::sort(primitives.begin(), primitives.end());
+    const Eigen::Vector3d low = node.bounds.min(), high = node.bounds.max();
+    tree.insert({{low[0], low[1], low[2], high[0], high[1], high[2]}, primitives});
+  }
+  return tree;
+}
+
+TEST(Octree, HoldsEachPrimitiveOnceWithinItsLooseBounds) {
+  Random random(1);
+  for (const std::size_t size : {1u, 2u, 17u, 500u, 20000u})
+    for (const double extent : {1e-4, 0.02, 0.7}) {
+      const Mesh mesh = testing::soup(random, size, extent);
+      OctreeBasedCD detection(rebuilding());
+      const GeometryId id = detection.addTriangleMesh(mesh.positions, mesh.triangles);
+      detection.update();
+      ASSERT_EQ(detection.octree().lastUpdate(id), kRebuilt);
+      EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
+      std::vector<int> holders(size, 0);
+      for (const auto node : detection.octree().nodes()) {
+        const LooseOctree::Node n = detection.octree().node(node);
+        for (const std::uint32_t t : n.primitives) {
+          ++holders[t];
+          for (const std::uint32_t corner : mesh.triangles[t]) {
+            EXPECT_TRUE(n.looseBounds.contains(mesh.positions[corner]));
+            EXPECT_TRUE(n.fittedBox.contains(mesh.positions[corner]));
+          }
+        }
+        if (n.parent) {
+          const LooseOctree::Node parent = detection.octree().node(*n.parent);
+          EXPECT_EQ(parent.depth + 1, n.depth);
+          EXPECT_TRUE(parent.fittedBox.contains(n.fittedBox));
+          EXPECT_NE(std::find(parent.children.begin(), parent.children.end(), node),
+                    parent.children.end());
+        } else {
+          EXPECT_EQ(detection.octree().root(id), node);
+        }
+      }
+      EXPECT_TRUE(std::all_of(holders.begin(), holders.end(), [](int n) { return n == 1; }));
+    }
+}
+
+TEST(Octree, IsTheSameForAnyNumberOfThreadsAndAnyHistory) {
+  Random random(2);
+  const Mesh mesh = testing::soup(random, 40000, 0.01);
+  std::vector<Eigen::Vector3d> elsewhere = mesh.positions;
+  for (Eigen::Vector3d& p : elsewhere) p += testing::randomPoint(random, -0.3, 0.3);
+  Tree expected;
+  for (const int threads : {1, 2, 8}) {
+    OctreeBasedCD detection(rebuilding(threads));
+    const GeometryId id = detection.addTriangleMesh(mesh.positions, mesh.triangles);
+    if (threads == 8) {  // another past
+      detection.setPositions(id, elsewhere);
+      detection.update();
+      detection.setPositions(id, mesh.positions);
+    }
+    detection.update();
+    EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
+    if (threads == 1) expected = treeOf(detection, id);
+    EXPECT_EQ(treeOf(detection, id), expected);
+  }
+}
+
+TEST(Octree, KeepsItsLimits) {
+  Random random(3);
+  const Mesh mesh = testing::soup(random, 5000, 0.001);
+  for (const int depth : {1, 2, 5, 9, 10, 20})
+    for (const int leaf : {1, 8, 100}) {
+      Settings settings = rebuilding();
+      settings.octree.maxDepth = depth;
+      settings.octree.maxPrimitivesPerLeaf = leaf;
+      OctreeBasedCD detection(settings);
+      const GeometryId id = detection.addTriangleMesh(mesh.positions, mesh.triangles);
+      detection.update();
+      EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
+      EXPECT_LE(detection.octree().statistics().deepestLevel, depth);
+      // A leaf may be fuller only at the maximum depth, or where all are as large as its cell.
+      for (const auto node : detection.octree().nodes(id)) {
+        const LooseOctree::Node n = detection.octree().node(node);
+        if (n.leaf && n.depth < depth && n.primitives.size() > static_cast<std::size_t>(leaf)) {
+          for (const std::uint32_t t : n.primitives) {
+            Eigen::AlignedBox3d box;
+            for (const std::uint32_t corner : mesh.triangles[t]) box.extend(mesh.positions[corner]);
+            EXPECT_GT(box.sizes().maxCoeff(), 0.49 * n.bounds.sizes()[0]);
+          }
+        }
+      }
+    }
+}
+
+TEST(Octree, OneFarTriangleDoesNotFlattenIt) {
+  Random random(4);
+  Mesh mesh = testing::soup(random, 3000, 0.01);
+  mesh.positions[300] = {1e6, -1e6, 1e6};
+  OctreeBasedCD detection(rebuilding());
+  detection.addTriangleMesh(mesh.positions, mesh.triangles);
+  detection.update();
+  EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
+  EXPECT_LE(detection.octree().statistics().mostPrimitivesInNode, 16u);
+}
+
+TEST(Octree, FollowsItsGeometryAndSaysWhatRan) {
+  using Update = LooseOctree::Update;
+  Random random(5);
+  const Mesh mesh = testing::sphere(20, 30, {0, 0, 0}, 1.0);
+  OctreeBasedCD detection;
+  const GeometryId moving = detection.addTriangleMesh(mesh.positions, mesh.triangles);
+  const GeometryId still = detection.addTriangleMesh(mesh.positions, mesh.triangles);
+  detection.update();
+  EXPECT_EQ(detection.octree().lastUpdate(moving), Update::Rebuilt);
+  std::vector<Eigen::Vector3d> positions = mesh.positions;
+  for (Eigen::Vector3d& p : positions) p += Eigen::Vector3d(100, 0, 0);
+  detection.setPositions(moving, positions);
+  detection.update();
+  EXPECT_EQ(detection.octree().lastUpdate(moving), Update::Refitted);
+  EXPECT_EQ(detection.octree().lastUpdate(still), Update::Unchanged);
+  EXPECT_EQ(detection.statistics().refittedOctrees, 1u);
+  EXPECT_EQ(detection.statistics().unchangedOctrees, 1u);
+  EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
+  const auto root = detection.octree().node(*detection.octree().root(moving));
+  for (const Eigen::Vector3d& p : positions) EXPECT_TRUE(root.fittedBox.contains(p));
+}
+
+TEST(Octree, IsRebuiltWhenRefittingLoosensIt) {
+  Random random(7);
+  const Mesh mesh = testing::soup(random, 2000, 0.01);
+  std::vector<Eigen::Vector3d> positions = mesh.positions;
+  OctreeBasedCD detection;
+  const GeometryId id = detection.addTriangleMesh(positions, mesh.triangles);
+  detection.update();
+  for (const Triangle& t : mesh.triangles) {  // neighbours part
+    const Eigen::Vector3d away = testing::randomPoint(random, -1, 1);
+    for (const std::uint32_t corner : t) positions[corner] += away;
+  }
+  detection.setPositions(id, positions);
+  detection.update();
+  EXPECT_EQ(detection.octree().lastUpdate(id), kRebuilt);
+  EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
+}
+
+TEST(Octree, PoolTakesBlocksBack) {
+  Random random(6);
+  const Mesh large = testing::soup(random, 20000, 0.005), small = testing::soup(random, 50, 0.1);
+  OctreeBasedCD detection(rebuilding());
+  const GeometryId id = detection.addTriangleMesh(large.positions, large.triangles);
+  detection.update();
+  const OctreeStatistics before = detection.octree().statistics();
+  detection.setTriangles(id, small.positions, small.triangles);
+  detection.update();
+  const OctreeStatistics after = detection.octree().statistics();
+  EXPECT_EQ(after.blocksAllocated, before.blocksAllocated);
+  EXPECT_LT(after.blocksInUse, before.blocksInUse / 10);
+  EXPECT_EQ(after.blocksInUse + after.blocksFree, after.blocksAllocated);
+  EXPECT_GE(after.blocksAllocated, 64u);
+  EXPECT_EQ(after.primitives, 50u);
+  EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
+}
+
+TEST(RadixSort, IsTheStableSort) {
+  Random random(8);
+  for (const std::size_t size : {0u, 1u, 31u, 33u, 1000u, 5000u})
+    for (const int high : {36, 41, 44, 52, 63}) {
+      std::vector<std::uint64_t> items(size), result(size);
+      for (std::size_t i = 0; i < size; ++i)
+        items[i] = (random() >> 1 & ((std::uint64_t{1} << high) - 1) & ~0xffffffffull) | i;
+      std::vector<std::uint64_t> expected = items;
+      std::stable_sort(expected.begin(), expected.end(),
+                       [](std::uint64_t l, std::uint64_t r) { return l >> 32 < r >> 32; });
+      radixSort(items, result, 32, high);
+      EXPECT_EQ(result, expected);
+    }
+}
+
+}  // namespace
+}  // namespace palpate
