@@ -110,7 +110,7 @@ void rebuild(Geometry& geometry, const OctreeSettings& settings, const Threads& 
   }
   const Box bounds = boundsOf(geometry, threads);
   geometry.boxMilliseconds += watch.lap();
-  octree.build(bounds, settings, threads);
+  octree.build(bounds, geometry.spread * geometry.frame.scale, settings, threads);
   threads.forChunks(triangles.size(), kVertexGrain,
                     [&](std::size_t, std::size_t from, std::size_t to) {
                       for (std::size_t i = from; i < to; ++i)

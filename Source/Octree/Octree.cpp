@@ -19,16 +19,29 @@ constexpr std::size_t kRadixOnly = 8192;
 
 /// The power-of-two cube that holds the box, its corner on a grid so coarse that cells' corners are
 /// exact.
-Cube rootCube(const Box& bounds) {
+///
+/// Where the box is much larger than the bulk, which lies about 0, the cube is placed so that 0 is
+/// a third of the way along each of its edges: then 0 is a third or two thirds along those of its
+/// cell at any level, and no cell border cuts the bulk, nor runs close to it, before cells are of
+/// its size.
+Cube rootCube(const Box& bounds, double bulk) {
+  constexpr double kMuchLarger = 256;
   Cube cube;
-  float longest = kSmallestCell;
-  for (int k = 0; k < 3; ++k) longest = std::max(longest, bounds.upper[k] - bounds.lower[k]);
-  // 1/1000 for the slack of a primitive's size, and a 2^20th of the edge for the grid.
-  cube.edge = std::exp2(std::ceil(std::log2(static_cast<double>(longest) * (1.0 + 0x1p-9))));
+  double longest = kSmallestCell, farthest = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double lower = bounds.lower[k], upper = bounds.upper[k];
+    longest = std::max(longest, upper - lower);
+    farthest = std::max({farthest, -lower, upper});
+  }
+  if (longest > kMuchLarger * bulk) {
+    cube.edge = std::exp2(std::ceil(std::log2(3.01 * std::max(farthest, longest))));
+    cube.lower.fill(-cube.edge / 3.0);
+    return cube;
+  }
+  cube.edge = std::exp2(std::ceil(std::log2(longest * (1.0 + 0x1p-9))));
   const double grid = cube.edge * 0x1p-20;
   for (int k = 0; k < 3; ++k) {
-    const double middle =
-        0.5 * (static_cast<double>(bounds.lower[k]) + static_cast<double>(bounds.upper[k]));
+    const double middle = 0.5 * (double{bounds.lower[k]} + double{bounds.upper[k]});
     cube.lower[k] = std::floor((middle - 0.5 * cube.edge) / grid) * grid;
   }
   return cube;
@@ -94,10 +107,11 @@ void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const 
   });
 }
 
-void Octree::build(const Box& bounds, const OctreeSettings& settings, const Threads& threads) {
+void Octree::build(const Box& bounds, double bulk, const OctreeSettings& settings,
+                   const Threads& threads) {
   const auto size = static_cast<std::uint32_t>(m_order.size());
   PALPATE_ASSERT(size > 0);
-  m_rootCube = palpate::rootCube(bounds);
+  m_rootCube = palpate::rootCube(bounds, bulk);
   m_keys.resize(size);
   m_keysScratch.resize(size);
   const KeyLayout keys{keyLevels(size, settings, 0)};

@@ -99,8 +99,9 @@ class Octree {
   std::span<const std::uint32_t> groups() const { return m_groups; }
   Box* groupBoxes() { return m_groupBoxes.data(); }
 
-  /// `bounds`: of all boxes. Afterwards order() is new, and boxes() are still in the old one.
-  void build(const Box& bounds, const OctreeSettings&, const Threads&);
+  /// `bounds`: of all boxes; `bulk`: the extent of most of them, about 0. Afterwards order() is
+  /// new, and boxes() are still in the old one.
+  void build(const Box& bounds, double bulk, const OctreeSettings&, const Threads&);
   void fit(const Threads&);
 
   /// Sum of the leaves' half areas over that of their primitives: how loose the fitted boxes are.
