@@ -1,0 +1,226 @@
+#include "Math/CubicRoot.h"
+#include "Math/ImpactQuery.h"
+#include "Math/RelativeMotion.h"
+
+#include <algorithm>
+#include <optional>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+using Kind = ImpactQuery::Kind;
+
+/// det(A, B, C), each coefficient within `error`. One bound serves all four: with m the largest
+/// magnitudes over the step, no term exceeds one of the permanent of m's six; each takes 11
+/// roundings.
+struct Coplanarity {
+  CubicBernstein coefficients;
+  double error;
+};
+
+template <Kind kind>
+Coplanarity coplanarity(const RelativeMotion<kind>& motion) {
+  const auto& [a, b, c] = std::tie(motion.a, motion.b, motion.c);
+  const Vector3d normal[3] = {a[0].cross(b[0]), a[0].cross(b[1]) + a[1].cross(b[0]),
+                              a[1].cross(b[1])};
+  Coplanarity result;
+  result.coefficients = {normal[0].dot(c[0]), (normal[1].dot(c[0]) + normal[0].dot(c[1])) / 3.0,
+                         (normal[2].dot(c[0]) + normal[1].dot(c[1])) / 3.0, normal[2].dot(c[1])};
+  const Vector3d p = a[0].cwiseAbs().cwiseMax(a[1].cwiseAbs()),
+                 q = b[0].cwiseAbs().cwiseMax(b[1].cwiseAbs()),
+                 r = c[0].cwiseAbs().cwiseMax(c[1].cwiseAbs());
+  const double permanent = r[0] * (p[1] * q[2] + p[2] * q[1]) + r[1] * (p[2] * q[0] + p[0] * q[2]) +
+                           r[2] * (p[0] * q[1] + p[1] * q[0]);
+  result.error = 16.0 * kRoundoff * permanent + kUnderflow;
+  return result;
+}
+
+/// 1 or -1 where all coefficients certainly have that sign.
+template <std::size_t N>
+int certainSign(const std::array<double, N>& coefficients, double error) {
+  const auto [least, most] = std::minmax_element(coefficients.begin(), coefficients.end());
+  return *least > error ? 1 : *most < -error ? -1 : 0;
+}
+
+template <std::size_t N>
+double largestMagnitude(const std::array<double, N>& coefficients) {
+  double largest = 0.0;
+  for (const double c : coefficients) largest = std::max(largest, std::abs(c));
+  return largest;
+}
+
+CubicBernstein restrict(const CubicBernstein& b, const Interval& t) {
+  return {blossom(b, t.low, t.low, t.low), blossom(b, t.low, t.low, t.high),
+          blossom(b, t.low, t.high, t.high), blossom(b, t.high, t.high, t.high)};
+}
+
+/// Whether the coefficients certainly change sign exactly once, so that there is exactly one root,
+/// and it is simple (Descartes' rule): the sign after, or 0. One doubtful coefficient between two
+/// signs does no harm.
+int signAfterOnlyRoot(const CubicBernstein& b, double error) {
+  int signs[4];
+  for (int i = 0; i < 4; ++i) signs[i] = b[i] > error ? 1 : b[i] < -error ? -1 : 0;
+  if (signs[0] * signs[3] >= 0) return 0;
+  const bool first = signs[1] == signs[0] || (signs[1] == 0 && signs[2] == signs[3]) ||
+                     (signs[1] == signs[3] && signs[2] == signs[3]);
+  const bool second = signs[2] == signs[3] || (signs[2] == 0 && signs[1] == signs[0]) ||
+                      (signs[2] == signs[0] && signs[1] == signs[0]);
+  return first && second ? signs[3] : 0;
+}
+
+template <Kind kind>
+class ImpactSearch {
+ public:
+  ImpactSearch(const RelativeMotion<kind>& motion, double tolerance)
+      : m_motion(motion), m_tolerance(tolerance), m_largest(motion.largestDifference()) {}
+
+  /// None: undecided.
+  std::optional<ImpactAnswer> run();
+
+ private:
+  enum class Verdict { Inside, Outside, Unknown };
+
+  std::optional<Interval> bracketRoot(const Interval& piece, int signAfter) const;
+  Verdict judge(const Interval& bracket) const;
+  Interval separatedAround(double t) const {
+    return palpate::separatedAround(t, m_motion, m_largest, bestSeparation(m_motion, t), 0.0);
+  }
+
+  const RelativeMotion<kind>& m_motion;
+  double m_tolerance;
+  Vector3d m_largest;
+  CubicBernstein m_cubic{};
+  double m_error = 0.0;  ///< of m_cubic restricted to any part of the step
+};
+
+/// A narrow interval at whose ends the cubic certainly has different signs, around its only root in
+/// the piece.
+template <Kind kind>
+std::optional<Interval> ImpactSearch<kind>::bracketRoot(const Interval& piece,
+                                                        int signAfter) const {
+  const double t = approximateRoot(m_cubic, piece.low, piece.high, signAfter);
+  for (double width = 0x1p-50; width <= m_tolerance; width *= 64.0) {
+    const Interval bracket{std::max(t - width, piece.low), std::min(t + width, piece.high)};
+    if (signAfter * blossom(m_cubic, bracket.low, bracket.low, bracket.low) < -m_error &&
+        signAfter * blossom(m_cubic, bracket.high, bracket.high, bracket.high) > m_error)
+      return bracket;
+  }
+  return {};
+}
+
+/// The sign of l x r, component k, over an interval: a quadratic within 8 roundings of each
+/// coefficient.
+struct CrossComponent {
+  QuadraticBernstein coefficients;
+  double error;
+  using Ends = std::array<Vector3d, 2>;
+
+  CrossComponent(const Ends& l, const Ends& r, int k, const Interval& t) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    const auto cross = [&](int m, int n) { return l[m][i] * r[n][j] - l[m][j] * r[n][i]; };
+    const auto largest = [](const Ends& ends, int n) {
+      return std::max(std::abs(ends[0][n]), std::abs(ends[1][n]));
+    };
+    const QuadraticBernstein whole{cross(0, 0), 0.5 * (cross(0, 1) + cross(1, 0)), cross(1, 1)};
+    coefficients = {blossom(whole, t.low, t.low), blossom(whole, t.low, t.high),
+                    blossom(whole, t.high, t.high)};
+    error = 32.0 * kRoundoff * (largest(l, i) * largest(r, j) + largest(l, j) * largest(r, i)) +
+            kUnderflow;
+  }
+  CrossComponent operator-(const CrossComponent& other) const {
+    CrossComponent difference = *this;
+    for (int i = 0; i < 3; ++i) difference.coefficients[i] -= other.coefficients[i];
+    difference.error += other.error;
+    return difference;
+  }
+  int sign() const { return certainSign(coefficients, error); }
+};
+
+/// Whether, at a time within the bracket at which A, B and C are in one plane, C = x A + y B is in
+/// the domain: Cramer's rule in the coordinates that tell A and B apart best.
+template <Kind kind>
+typename ImpactSearch<kind>::Verdict ImpactSearch<kind>::judge(const Interval& bracket) const {
+  const double t = 0.5 * (bracket.low + bracket.high);
+  int k;
+  at(t, m_motion.a).cross(at(t, m_motion.b)).cwiseAbs().maxCoeff(&k);
+  const CrossComponent normal(m_motion.a, m_motion.b, k, bracket);
+  const int side = normal.sign();
+  if (side == 0) return Verdict::Unknown;
+  const CrossComponent x(m_motion.c, m_motion.b, k, bracket), y(m_motion.a, m_motion.c, k, bracket);
+  const int signX = side * x.sign(), signY = side * y.sign();
+  if (signX < 0 || signY < 0) return Verdict::Outside;
+  if constexpr (RelativeMotion<kind>::square) {
+    const int restX = side * (normal - x).sign(), restY = side * (normal - y).sign();
+    if (restX < 0 || restY < 0) return Verdict::Outside;
+    return signX > 0 && signY > 0 && restX > 0 && restY > 0 ? Verdict::Inside : Verdict::Unknown;
+  } else {
+    const int rest = side * (normal - x - y).sign();
+    if (rest < 0) return Verdict::Outside;
+    return signX > 0 && signY > 0 && rest > 0 ? Verdict::Inside : Verdict::Unknown;
+  }
+}
+
+template <Kind kind>
+std::optional<ImpactAnswer> ImpactSearch<kind>::run() {
+  if (!(m_largest.maxCoeff() <= kLargestDifference)) return {};
+  const Coplanarity cubic = coplanarity(m_motion);
+  if (certainSign(cubic.coefficients, cubic.error) != 0) return ImpactAnswer{};
+  m_cubic = cubic.coefficients;
+  const double largest = largestMagnitude(m_cubic);
+  m_error = cubic.error + 16.0 * kRoundoff * largest;
+  const bool alwaysCoplanar = largest <= cubic.error;
+
+  // What is left of the step, later pieces first.
+  constexpr int kMostPieces = 16, kMostSteps = 32;
+  std::array<Interval, kMostPieces> pieces;
+  int count = 0;
+  pieces[count++] = {0.0, 1.0};
+  for (int step = 0; count > 0; ++step) {
+    if (step == kMostSteps || count + 2 > kMostPieces) return {};
+    const Interval piece = pieces[--count];
+    const CubicBernstein part = restrict(m_cubic, piece);
+    if (certainSign(part, m_error) != 0) continue;
+    double t = 0.5 * (piece.low + piece.high);
+    const int signAfter = signAfterOnlyRoot(part, m_error);
+    if (signAfter != 0) {
+      const std::optional<Interval> bracket = bracketRoot(piece, signAfter);
+      if (!bracket) return {};
+      const Verdict verdict = judge(*bracket);
+      if (verdict == Verdict::Inside) return ImpactAnswer{true, false, bracket->low};
+      if (verdict == Verdict::Outside) continue;
+      t = 0.5 * (bracket->low + bracket->high);
+      const Interval clear = separatedAround(t);
+      if (clear.low <= bracket->low && clear.high >= bracket->high) continue;
+      return {};
+    }
+    const Interval clear = separatedAround(t);
+    if (!clear.empty()) {
+      if (clear.high < piece.high) pieces[count++] = {clear.high, piece.high};
+      if (clear.low > piece.low) pieces[count++] = {piece.low, clear.low};
+    } else {
+      if (alwaysCoplanar) return {};
+      pieces[count++] = {t, piece.high};
+      pieces[count++] = {piece.low, t};
+    }
+  }
+  return ImpactAnswer{};
+}
+
+template <Kind kind>
+ImpactAnswer find(const ImpactQuery& query, double tolerance) {
+  const RelativeMotion<kind> motion(query);
+  if (motion.boxesSeparate()) return {};
+  if (const auto answer = ImpactSearch<kind>(motion, tolerance).run()) return *answer;
+  return findTouchExactly(query, tolerance);
+}
+
+}  // namespace
+
+ImpactAnswer findTouch(const ImpactQuery& query, double tolerance) {
+  return query.kind == Kind::VertexTriangle ? find<Kind::VertexTriangle>(query, tolerance)
+                                            : find<Kind::EdgeEdge>(query, tolerance);
+}
+
+}  // namespace palpate

@@ -1,0 +1,95 @@
+#pragma once
+
+#include "Math/ImpactQuery.h"
+
+#include <Eigen/Geometry>
+
+#include <array>
+#include <cmath>
+
+namespace palpate {
+
+/// What rounding can do to one operation, relative.
+constexpr double kRoundoff = 0x1p-53;
+
+/// The bounds in this room's impact tests hold for coordinate differences up to 2^200, where no
+/// product overflows and all that underflow can lose, under 2^-800, is within kUnderflow.
+/// (Differences of doubles underflow exactly.)
+constexpr double kLargestDifference = 0x1p200;
+constexpr double kUnderflow = 0x1p-700;
+
+struct Interval {
+  double low, high;
+  bool empty() const { return !(low <= high); }
+};
+
+/// An ImpactQuery's A, B, C, and the corners of C - x A - y B, at both ends of the step, in
+/// doubles. Each component is within kRoundoff of the real one, relative, with its exact sign.
+template <ImpactQuery::Kind kind>
+struct RelativeMotion {
+  static constexpr bool square = kind == ImpactQuery::Kind::EdgeEdge;
+  static constexpr int corners = square ? 4 : 3;
+  using Ends = std::array<Eigen::Vector3d, 2>;
+
+  Ends a, b, c;
+  std::array<Ends, corners> corner;
+
+  explicit RelativeMotion(const ImpactQuery& query) {
+    constexpr auto axes = ImpactQuery::axes(kind);
+    constexpr auto cornerDifferences = ImpactQuery::corners(kind);
+    for (int end = 0; end < 2; ++end) {
+      const auto difference = [&](const ImpactQuery::Difference& d) -> Eigen::Vector3d {
+        return query.vertices[d[0]].at(end) - query.vertices[d[1]].at(end);
+      };
+      a[end] = difference(axes[0]);
+      b[end] = difference(axes[1]);
+      c[end] = difference(axes[2]);
+      for (int i = 0; i < corners; ++i) corner[i][end] = difference(cornerDifferences[i]);
+    }
+  }
+
+  /// A coordinate has one strict sign at every corner at both ends, and so throughout. Exact.
+  bool boxesSeparate() const {
+    for (int k = 0; k < 3; ++k) {
+      double least = corner[0][0][k], most = least;
+      for (const Ends& ends : corner)
+        for (const Eigen::Vector3d& position : ends) {
+          least = position[k] < least ? position[k] : least;
+          most = position[k] > most ? position[k] : most;
+        }
+      if (least > 0.0 || most < 0.0) return true;
+    }
+    return false;
+  }
+
+  /// Per coordinate, over the corners and the step.
+  Eigen::Vector3d largestDifference() const {
+    Eigen::Vector3d largest = Eigen::Vector3d::Zero();
+    for (const Ends& ends : corner)
+      for (const Eigen::Vector3d& position : ends) largest = largest.cwiseMax(position.cwiseAbs());
+    return largest;
+  }
+};
+
+inline Eigen::Vector3d at(double t, const std::array<Eigen::Vector3d, 2>& ends) {
+  return (1.0 - t) * ends[0] + t * ends[1];
+}
+
+/// A fixed direction in which all corners may lie on one side of zero at time t, and how far: the
+/// features' distance where the direction is right. Approximate; length is that of the direction.
+struct Separation {
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  double distance = 0.0, length = 0.0;
+  bool found() const { return distance > 0.0; }
+};
+template <ImpactQuery::Kind kind>
+Separation bestSeparation(const RelativeMotion<kind>&, double t);
+
+/// The times around t at which all corners are certainly further than `distance` along the
+/// direction: the corners move linearly along it, so this is an interval. Empty where they are not
+/// at t itself. largest is motion.largestDifference().
+template <ImpactQuery::Kind kind>
+Interval separatedAround(double t, const RelativeMotion<kind>&, const Eigen::Vector3d& largest,
+                         const Separation&, double distance);
+
+}  // namespace palpate

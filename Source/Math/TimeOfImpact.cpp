@@ -1,0 +1,46 @@
+#include <palpate/TimeOfImpact.h>
+
+#include "Math/ImpactQuery.h"
+
+namespace palpate {
+
+ImpactAnswer findImpact(const ImpactQuery& query, const TimeOfImpactSettings& settings) {
+  // A tolerance that is no number counts as the smallest.
+  const double tolerance = settings.tolerance > 0x1p-50
+                               ? (settings.tolerance < 1.0 ? settings.tolerance : 1.0)
+                               : 0x1p-50;
+  return settings.minimumDistance > 0.0 ? findApproach(query, settings.minimumDistance, tolerance)
+                                        : findTouch(query, tolerance);
+}
+
+namespace {
+
+std::optional<double> timeOf(const ImpactAnswer& answer) {
+  return answer.impact ? std::optional(answer.time) : std::nullopt;
+}
+
+}  // namespace
+
+std::optional<double> vertexTriangleTimeOfImpact(
+    const Eigen::Vector3d& vBefore, const Eigen::Vector3d& aBefore, const Eigen::Vector3d& bBefore,
+    const Eigen::Vector3d& cBefore, const Eigen::Vector3d& vNow, const Eigen::Vector3d& aNow,
+    const Eigen::Vector3d& bNow, const Eigen::Vector3d& cNow,
+    const TimeOfImpactSettings& settings) {
+  return timeOf(
+      findImpact({ImpactQuery::Kind::VertexTriangle,
+                  {{{&vBefore, &vNow}, {&aBefore, &aNow}, {&bBefore, &bNow}, {&cBefore, &cNow}}}},
+                 settings));
+}
+
+std::optional<double> edgeEdgeTimeOfImpact(
+    const Eigen::Vector3d& p0Before, const Eigen::Vector3d& p1Before,
+    const Eigen::Vector3d& q0Before, const Eigen::Vector3d& q1Before, const Eigen::Vector3d& p0Now,
+    const Eigen::Vector3d& p1Now, const Eigen::Vector3d& q0Now, const Eigen::Vector3d& q1Now,
+    const TimeOfImpactSettings& settings) {
+  return timeOf(findImpact(
+      {ImpactQuery::Kind::EdgeEdge,
+       {{{&p0Before, &p0Now}, {&p1Before, &p1Now}, {&q0Before, &q0Now}, {&q1Before, &q1Now}}}},
+      settings));
+}
+
+}  // namespace palpate

@@ -1,0 +1,288 @@
+#include <palpate/TimeOfImpact.h>
+
+#include "ImpactCases.h"
+#include "Math/ImpactQuery.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace palpate {
+
+namespace {
+
+std::string text(const ImpactCase& query) {
+  std::string result = query.edges ? "edges" : "vertex and triangle";
+  for (const Eigen::Vector3d& p : query.positions) {
+    char line[100];
+    std::snprintf(line, sizeof line, "\n  %a %a %a", p[0], p[1], p[2]);
+    result += line;
+  }
+  return result;
+}
+
+ImpactAnswer exactly(const ImpactCase& query, double tolerance) {
+  ImpactQuery q{query.edges ? ImpactQuery::Kind::EdgeEdge : ImpactQuery::Kind::VertexTriangle, {}};
+  for (int i = 0; i < 4; ++i) q.vertices[i] = {&query.positions[i], &query.positions[4 + i]};
+  return findTouchExactly(q, tolerance);
+}
+
+/// Hit or none as the oracle has it; not late; early by at most the tolerance. For both paths.
+void expectTrue(const ImpactCase& query, double tolerance, int& impacts) {
+  std::optional<oracle::Real> truth = oracle::Query(query.edges, query.positions).firstTouch();
+  const auto check = [&](bool impact, double time, const char* path) {
+    ASSERT_EQ(impact, truth.has_value()) << path << ", " << text(query);
+    if (!impact) return;
+    EXPECT_GE(truth->compare(time), 0) << path << " late at " << time << ", " << text(query);
+    EXPECT_LE(truth->compare(oracle::Rational(time) + oracle::Rational(tolerance)), 0)
+        << path << " early at " << time << ", " << text(query);
+  };
+  const std::optional<double> time = query.time({0.0, tolerance});
+  check(time.has_value(), time.value_or(0.0), "findTouch");
+  const ImpactAnswer exact = exactly(query, tolerance);
+  check(exact.impact, exact.time, "findTouchExactly");
+  impacts += truth.has_value();
+}
+
+TEST(TimeOfImpact, AgreesWithOracleOnSmallGrids) {
+  test::Random random(1);
+  int impacts = 0;
+  for (int i = 0; i < 6000; ++i) {
+    const double tolerance = i % 3 == 0 ? 1e-6 : i % 3 == 1 ? 1e-2 : 0x1p-50;
+    expectTrue(randomGridCase(random, i % 2 == 0,
+                              i % 5 == 0  ? 1
+                              : i % 5 < 4 ? 2
+                                          : 9),
+               tolerance, impacts);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(impacts, 600);
+}
+
+TEST(TimeOfImpact, AgreesWithOracleOnFullDoubles) {
+  test::Random random(2);
+  int impacts = 0;
+  for (int i = 0; i < 400; ++i) {
+    expectTrue(randomCase(random, i % 2 == 0), 1e-6, impacts);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(impacts, 40);
+}
+
+/// Same decision, and times that are within a tolerance of each other, as both are within one of
+/// the truth.
+void expectSame(const ImpactCase& l, const ImpactCase& r) {
+  const std::optional<double> left = l.time(), right = r.time();
+  ASSERT_EQ(left.has_value(), right.has_value()) << text(l) << "\nand " << text(r);
+  EXPECT_NEAR(left.value_or(0.0), right.value_or(0.0), 1e-6) << text(l);
+}
+
+/// Vertex 0 stays in a vertex-triangle query; edges keep their ends together.
+std::vector<std::array<int, 4>> orders(bool edges) {
+  if (edges)
+    return {{1, 0, 2, 3}, {0, 1, 3, 2}, {1, 0, 3, 2}, {2, 3, 0, 1},
+            {3, 2, 0, 1}, {2, 3, 1, 0}, {3, 2, 1, 0}};
+  return {{0, 1, 3, 2}, {0, 2, 1, 3}, {0, 2, 3, 1}, {0, 3, 1, 2}, {0, 3, 2, 1}};
+}
+
+TEST(TimeOfImpact, DoesNotDependOnTheOrderOfCorners) {
+  test::Random random(3);
+  for (int i = 0; i < 3000 && !testing::Test::HasFatalFailure(); ++i) {
+    const ImpactCase query =
+        i % 4 < 3 ? randomGridCase(random, i % 2 == 0, 2) : randomCase(random, i % 2 == 0);
+    for (const auto& order : orders(query.edges)) expectSame(query, query.permuted(order));
+  }
+}
+
+TEST(TimeOfImpact, IsTheSameDecisionBackwards) {
+  test::Random random(4);
+  for (int i = 0; i < 6000; ++i) {
+    const ImpactCase query =
+        i % 4 < 3 ? randomGridCase(random, i % 2 == 0, 2) : randomCase(random, i % 2 == 0);
+    ASSERT_EQ(query.time().has_value(), query.reversed().time().has_value()) << text(query);
+  }
+}
+
+TEST(TimeOfImpact, ScalesByPowersOfTwo) {
+  test::Random random(5);
+  for (int i = 0; i < 2000 && !testing::Test::HasFatalFailure(); ++i) {
+    const ImpactCase query = randomGridCase(random, i % 2 == 0, 2);
+    for (const int exponent : {-1074, -1073, -900, -300, -150, 100, 180, 400, 1000, 1020})
+      expectSame(query,
+                 query.mapped([&](const Eigen::Vector3d& p) { return test::scaled(p, exponent); }));
+  }
+}
+
+TEST(TimeOfImpact, MovesWithTheOrigin) {
+  test::Random random(6);
+  for (int i = 0; i < 2000 && !testing::Test::HasFatalFailure(); ++i) {
+    const ImpactCase query = randomGridCase(random, i % 2 == 0, 2);
+    for (const double offset : {1e3, 1e6, 0x1p51})
+      expectSame(query, query.mapped([&](const Eigen::Vector3d& p) -> Eigen::Vector3d {
+        return p + Eigen::Vector3d(offset, -offset, 3 * offset);
+      }));
+  }
+}
+
+/// Sizes from the smallest to the largest double in one query: only exact arithmetic can order
+/// these.
+TEST(TimeOfImpact, DecidesMixedSizesTheSameInAnyOrder) {
+  test::Random random(7);
+  int impacts = 0;
+  for (int i = 0; i < 1000 && !testing::Test::HasFatalFailure(); ++i) {
+    ImpactCase query = randomGridCase(random, i % 2 == 0, 2);
+    for (Eigen::Vector3d& p : query.positions)
+      for (int k = 0; k < 3; ++k)
+        if (random.below(3) == 0) p[k] = std::ldexp(p[k], random.between(-1074, 1021));
+    impacts += query.time().has_value();
+    ASSERT_EQ(query.time().has_value(), query.reversed().time().has_value()) << text(query);
+    for (const auto& order : orders(query.edges)) expectSame(query, query.permuted(order));
+  }
+  EXPECT_GT(impacts, 50);
+}
+
+TEST(TimeOfImpact, TakesAnyToleranceAndDistanceThatIsNotPositive) {
+  const ImpactCase query{false,
+                         {{{0, 0, 1},
+                           {-1, -1, 0},
+                           {2, -1, 0},
+                           {-1, 2, 0},  //
+                           {0, 0, -2},
+                           {-1, -1, 0},
+                           {2, -1, 0},
+                           {-1, 2, 0}}}};
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double tolerance : {0.0, -1.0, nan, 1e-300, 1e-6, 1.0, 5.0}) {
+    for (const double distance : {0.0, -0.0, -1.0, nan}) {
+      const std::optional<double> time = query.time({distance, tolerance});
+      ASSERT_TRUE(time);
+      EXPECT_LE(*time, 1.0 / 3.0);
+      EXPECT_GE(*time, 1.0 / 3.0 - (tolerance > 0x1p-50 ? tolerance : 0x1p-50));
+    }
+  }
+}
+
+TEST(TimeOfImpact, AnswersStepsWithoutMotion) {
+  const Eigen::Vector3d a(0, 0, 0), b(1, 0, 0), c(0, 1, 0);
+  const auto still = [](const Eigen::Vector3d& v, const Eigen::Vector3d& p,
+                        const Eigen::Vector3d& q, const Eigen::Vector3d& r) {
+    return vertexTriangleTimeOfImpact(v, p, q, r, v, p, q, r);
+  };
+  EXPECT_EQ(still({0.25, 0.25, 0}, a, b, c), 0.0);
+  EXPECT_EQ(still(a, a, b, c), 0.0);
+  EXPECT_EQ(still(a, a, a, a), 0.0);  // all in one place
+  EXPECT_EQ(still({0.5, 0.5, 0}, a, b, c), 0.0);
+  EXPECT_FALSE(still({0.5, 0.5, 5e-324}, a, b, c));
+  EXPECT_FALSE(still({0.5, std::nextafter(0.5, 1.0), 0}, a, b, c));
+  EXPECT_FALSE(still(b, a, a, a));
+  EXPECT_EQ(edgeEdgeTimeOfImpact(a, b, a, b, a, b, a, b), 0.0);
+  EXPECT_EQ(edgeEdgeTimeOfImpact(a, b, b, c, a, b, b, c), 0.0);
+  EXPECT_FALSE(edgeEdgeTimeOfImpact(a, b, c, c, a, b, c, c));
+}
+
+TEST(TimeOfImpact, TouchesAtTheEndsOfTheStep) {
+  const Eigen::Vector3d a(0, 0, 0), b(1, 0, 0), c(0, 1, 0), above(0.25, 0.25, 1), on(0.25, 0.25, 0);
+  EXPECT_EQ(vertexTriangleTimeOfImpact(on, a, b, c, above, a, b, c), 0.0);
+  const std::optional<double> last = vertexTriangleTimeOfImpact(above, a, b, c, on, a, b, c);
+  ASSERT_TRUE(last);
+  EXPECT_LE(*last, 1.0);
+  EXPECT_GE(*last, 1.0 - 1e-6);
+  EXPECT_FALSE(vertexTriangleTimeOfImpact(above, a, b, c, {0.25, 0.25, 5e-324}, a, b, c));
+  EXPECT_TRUE(vertexTriangleTimeOfImpact(above, a, b, c, {0.25, 0.25, -5e-324}, a, b, c));
+}
+
+/// Distance at a time, from the closest of all feature pairs; an independent, plain way to get it.
+double distanceAt(const ImpactCase& query, double t) {
+  std::array<Eigen::Vector3d, 4> x;
+  for (int i = 0; i < 4; ++i) x[i] = (1 - t) * query.positions[i] + t * query.positions[4 + i];
+  const auto toSegment = [](const Eigen::Vector3d& p, const Eigen::Vector3d& q,
+                            const Eigen::Vector3d& r) {
+    const double lengthSquared = (r - q).squaredNorm();
+    const double z =
+        lengthSquared > 0 ? std::clamp((p - q).dot(r - q) / lengthSquared, 0.0, 1.0) : 0.0;
+    return (p - q - z * (r - q)).norm();
+  };
+  const Eigen::Vector3d u =
+      query.edges ? Eigen::Vector3d(x[1] - x[0]) : Eigen::Vector3d(x[2] - x[1]);
+  const Eigen::Vector3d w =
+      query.edges ? Eigen::Vector3d(x[3] - x[2]) : Eigen::Vector3d(x[3] - x[1]);
+  const Eigen::Vector3d from =
+      query.edges ? Eigen::Vector3d(x[2] - x[0]) : Eigen::Vector3d(x[0] - x[1]);
+  Eigen::Matrix2d gram;
+  gram << u.dot(u), u.dot(w), u.dot(w), w.dot(w);
+  double best = query.edges ? std::min({toSegment(x[0], x[2], x[3]), toSegment(x[1], x[2], x[3]),
+                                        toSegment(x[2], x[0], x[1]), toSegment(x[3], x[0], x[1])})
+                            : std::min({toSegment(x[0], x[1], x[2]), toSegment(x[0], x[2], x[3]),
+                                        toSegment(x[0], x[3], x[1])});
+  if (gram.determinant() > 1e-12 * gram(0, 0) * gram(1, 1)) {
+    Eigen::Vector2d weights = gram.inverse() * Eigen::Vector2d(u.dot(from), w.dot(from));
+    const double x0 = weights[0], x1 = query.edges ? -weights[1] : weights[1];
+    const bool inside = x0 >= 0 && x1 >= 0 && (query.edges ? x0 <= 1 && x1 <= 1 : x0 + x1 <= 1);
+    if (inside) best = std::min(best, (from - weights[0] * u - weights[1] * w).norm());
+  }
+  return best;
+}
+
+TEST(TimeOfImpact, KeepsTheMinimumDistance) {
+  test::Random random(8);
+  const double tolerance = 1e-4, rounding = 1e-9;
+  int impacts = 0, misses = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const ImpactCase query =
+        i % 2 ? randomCase(random, i % 4 < 2) : randomGridCase(random, i % 4 < 2, 2);
+    const double distance = std::ldexp(random.unit(), -random.below(8)) + 1e-3;
+    double displacement = 0;
+    for (int j = 0; j < 4; ++j)
+      displacement = std::max(displacement, (query.positions[4 + j] - query.positions[j]).norm());
+    const std::optional<double> time = query.time({distance, tolerance});
+    // Never late, never missed: at no sampled time before is the distance below the minimum.
+    for (int sample = 0; sample <= 200; ++sample) {
+      const double t = time.value_or(1.0) * sample / 200;
+      if (time && t >= *time) break;
+      ASSERT_GT(distanceAt(query, t), distance - rounding) << text(query) << "\nat " << t;
+    }
+    // Nothing invented: soon after, it is within the stated error of the minimum.
+    if (time) {
+      double least = std::numeric_limits<double>::infinity();
+      for (int sample = 0; sample <= 10; ++sample)
+        least = std::min(least, distanceAt(query, std::min(*time + tolerance * sample / 10, 1.0)));
+      ASSERT_LE(least, distance + 3 * tolerance * displacement + rounding)
+          << text(query) << "\nat " << *time;
+    }
+    ++(time ? impacts : misses);
+  }
+  EXPECT_GT(impacts, 500);
+  EXPECT_GT(misses, 500);
+}
+
+TEST(TimeOfImpact, KeepsTheMinimumDistanceAtAnyScale) {
+  const ImpactCase query{true,
+                         {{{-1, 0, 1},
+                           {1, 0, 1},
+                           {0, -1, 0},
+                           {0, 1, 0},  //
+                           {-1, 0, 0},
+                           {1, 0, 0},
+                           {0, -1, 0},
+                           {0, 1, 0}}}};
+  for (const int exponent : {-1060, -600, -240, 0, 150, 220, 500, 1022}) {
+    const ImpactCase scaled =
+        query.mapped([&](const Eigen::Vector3d& p) { return test::scaled(p, exponent); });
+    const std::optional<double> time = scaled.time({std::ldexp(0.25, exponent), 1e-6});
+    ASSERT_TRUE(time) << exponent;
+    EXPECT_LE(*time, 0.75);
+    EXPECT_GE(*time, 0.75 - 3e-6);
+    const ImpactCase away = scaled.mapped([&](const Eigen::Vector3d& p) -> Eigen::Vector3d {
+      return {p[0], p[1], p[2] > 0 || p[0] != 0 ? p[2] + std::ldexp(0.5, exponent) : p[2]};
+    });
+    EXPECT_FALSE(away.time({std::ldexp(0.25, exponent), 1e-6})) << exponent;
+  }
+}
+
+}  // namespace
+
+}  // namespace palpate
