@@ -73,29 +73,24 @@ void computeFloats(Geometry& geometry, const Threads& threads) {
 
 /// Boxes in the order of orderedTriangles, and those of the groups.
 void computeBoxes(Geometry& geometry, std::span<const std::uint32_t> groups, Box* groupBoxes,
-                  const Threads& threads) {
-  threads.forChunks(
-      groups.size() - 1, kGroupGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-        triangleBoxes(geometry.floats.data(), nullptr, geometry.orderedTriangles.data(),
-                      groups.subspan(from, to - from + 1), geometry.octree.boxes(),
-                      groupBoxes + from);
-      });
+                  std::size_t grain, const Threads& threads) {
+  threads.forChunks(groups.size() - 1, grain, [&](std::size_t, std::size_t from, std::size_t to) {
+    triangleBoxes(geometry.floats.data(), nullptr, geometry.orderedTriangles.data(),
+                  groups.subspan(from, to - from + 1), geometry.octree.boxes(), groupBoxes + from);
+  });
 }
 
+/// Boxes in the order of orderedTriangles, and the bounds of all.
 Box boundsOf(Geometry& geometry, const Threads& threads) {
-  const std::size_t size = geometry.orderedTriangles.size();
-  std::vector<std::uint32_t> groups;
-  for (std::size_t begin = 0; begin < size; begin += kTrianglesPerGroup)
-    groups.push_back(static_cast<std::uint32_t>(begin));
-  groups.push_back(static_cast<std::uint32_t>(size));
-  std::vector<Box> groupBoxes(groups.size() - 1);
-  threads.forChunks(groupBoxes.size(), 8, [&](std::size_t, std::size_t from, std::size_t to) {
-    triangleBoxes(geometry.floats.data(), nullptr, geometry.orderedTriangles.data(),
-                  std::span(groups).subspan(from, to - from + 1), geometry.octree.boxes(),
-                  groupBoxes.data() + from);
-  });
+  const std::size_t size = geometry.orderedTriangles.size(),
+                    count = (size + kTrianglesPerGroup - 1) / kTrianglesPerGroup;
+  geometry.boundsGroups.resize(count + 1);
+  for (std::size_t i = 0; i <= count; ++i)
+    geometry.boundsGroups[i] = static_cast<std::uint32_t>(std::min(i * kTrianglesPerGroup, size));
+  geometry.boundsBoxes.resize(count);
+  computeBoxes(geometry, geometry.boundsGroups, geometry.boundsBoxes.data(), 8, threads);
   Box bounds;
-  for (const Box& box : groupBoxes) bounds.add(box);
+  for (const Box& box : geometry.boundsBoxes) bounds.add(box);
   return bounds;
 }
 
@@ -121,7 +116,8 @@ void rebuild(Geometry& geometry, const OctreeSettings& settings, const Threads& 
 
 void fitBoxes(Geometry& geometry, const Threads& threads) {
   Stopwatch watch;
-  computeBoxes(geometry, geometry.octree.groups(), geometry.octree.groupBoxes(), threads);
+  computeBoxes(geometry, geometry.octree.groups(), geometry.octree.groupBoxes(), kGroupGrain,
+               threads);
   geometry.boxMilliseconds += watch.lap();
   geometry.octree.fit(threads);
   geometry.octreeMilliseconds += watch.lap();

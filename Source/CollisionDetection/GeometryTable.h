@@ -32,6 +32,8 @@ struct Geometry {
   Buffer<FloatPoint> floats;
   std::vector<Triangle> orderedTriangles;  ///< in the octree's order
   Octree octree;
+  Buffer<std::uint32_t> boundsGroups;  ///< scratch of a rebuild
+  Buffer<Box> boundsBoxes;
   std::uint64_t treeRevision = 0;  ///< revision that the octree is of
   bool treeKnown = false;          ///< built for this topology
   LooseOctree::Update lastUpdate = LooseOctree::Update::Unchanged;

@@ -1,0 +1,42 @@
+#include "Core/SimdPath.h"
+
+#include <palpate/OctreeBasedCD.h>
+#include <palpate/Platform.h>
+
+#include "Common/RandomMeshes.h"
+
+#include <gtest/gtest.h>
+
+namespace palpate {
+namespace {
+
+TEST(SimdPath, EachGivesTheSameCandidates) {
+  testing::Random random(1);
+  const testing::Mesh a = testing::soup(random, 3000, 0.02), b = testing::sheet(40, 0.5, 0.3);
+  std::vector<TrianglePair> first, self;
+  for (const std::string& path : simdPaths()) {
+    useSimdPath(path);
+    EXPECT_EQ(simdPath(), path);
+    OctreeBasedCD detection;
+    const GeometryId idA = detection.addTriangleMesh(a.positions, a.triangles),
+                     idB = detection.addTriangleMesh(b.positions, b.triangles);
+    PairSettings settings;
+    settings.thickness = 0.01;
+    detection.addCollisionPair(idA, idB, settings);
+    detection.addCollisionPair(idA, idA, settings);
+    detection.collectCandidates();
+    const auto pairs = detection.candidatePairs(idA, idB), own = detection.candidatePairs(idA, idA);
+    EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
+    if (first.empty()) {
+      first.assign(pairs.begin(), pairs.end());
+      self.assign(own.begin(), own.end());
+      EXPECT_GT(first.size(), 100u);
+    }
+    EXPECT_TRUE(std::equal(pairs.begin(), pairs.end(), first.begin(), first.end()));
+    EXPECT_TRUE(std::equal(own.begin(), own.end(), self.begin(), self.end()));
+  }
+  useSimdPath("");
+}
+
+}  // namespace
+}  // namespace palpate
