@@ -1,0 +1,108 @@
+#include "Vtk/MeshFile.h"
+
+#include <palpate/Error.h>
+
+#include <algorithm>
+#include <fstream>
+#include <limits>
+#include <new>
+#include <stdexcept>
+
+namespace palpate::vtk {
+
+void Polygons::addPolygon(const std::vector<std::int64_t>& polygon) {
+  corners.insert(corners.end(), polygon.begin(), polygon.end());
+  ends.push_back(corners.size());
+}
+
+void Polygons::addStrip(const std::vector<std::int64_t>& strip) {
+  if (strip.size() < 3) throw FileFault{"a triangle strip has fewer than three corners"};
+  for (std::size_t i = 0; i + 2 < strip.size(); ++i) {
+    const std::size_t odd = i % 2;  // every second triangle of a strip is wound the other way
+    addPolygon({strip[i + odd], strip[i + 1 - odd], strip[i + 2]});
+  }
+}
+
+namespace {
+
+std::string contentOf(const std::filesystem::path& path) {
+  std::error_code fault;
+  if (!std::filesystem::exists(path, fault)) throw FileFault{"there is no such file"};
+  if (std::filesystem::is_directory(path, fault)) throw FileFault{"it is a folder"};
+  std::ifstream file(path, std::ios::binary);
+  std::string content{std::istreambuf_iterator<char>(file), {}};
+  if (file.fail() || file.bad()) throw FileFault{"it cannot be read"};
+  if (content.empty()) throw FileFault{"it is empty"};
+  return content;
+}
+
+Polygons polygonsOf(const std::filesystem::path& path) {
+  std::string kind = path.extension().string();
+  std::transform(kind.begin(), kind.end(), kind.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  const std::string content = contentOf(path);
+  if (kind == ".obj") return readObj(content);
+  if (kind == ".ply") return readPly(content);
+  if (kind == ".vtk") return readLegacyVtk(content);
+  if (kind == ".stl") return readStl(content, path.string());
+  if (kind == ".vtp") return readVtp(content);
+  throw FileFault{"its name does not end in .obj, .stl, .ply, .vtk or .vtp"};
+}
+
+void checkPositions(const std::vector<Eigen::Vector3d>& positions) {
+  if (positions.size() > std::numeric_limits<std::uint32_t>::max())
+    throw FileFault{"it has too many vertices"};
+  for (std::size_t v = 0; v < positions.size(); ++v) {
+    if (!positions[v].allFinite()) {
+      throw FileFault{"vertex " + std::to_string(v) +
+                      " (from 0) has a coordinate that is not finite"};
+    }
+  }
+}
+
+std::vector<Triangle> fans(const Polygons& polygons) {
+  const std::size_t count = polygons.positions.size();
+  std::vector<Triangle> triangles;
+  std::size_t begin = 0;
+  for (std::size_t p = 0; p < polygons.ends.size(); ++p) {
+    const std::size_t end = polygons.ends[p];
+    if (end - begin < 3)
+      throw FileFault{"polygon " + std::to_string(p) + " (from 0) has fewer than three corners"};
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::int64_t corner = polygons.corners[i];
+      if (corner < 0 || static_cast<std::uint64_t>(corner) >= count) {
+        throw FileFault{"polygon " + std::to_string(p) +
+                        " (from 0) names a vertex that is not among its " + std::to_string(count)};
+      }
+    }
+    const auto corner = [&](std::size_t i) {
+      return static_cast<std::uint32_t>(polygons.corners[i]);
+    };
+    for (std::size_t i = begin + 2; i < end; ++i)
+      triangles.push_back({corner(begin), corner(i - 1), corner(i)});
+    begin = end;
+  }
+  if (triangles.empty()) throw FileFault{"it holds no triangles, so it is not a triangle mesh"};
+  return triangles;
+}
+
+}  // namespace
+
+MeshFile readTriangleMesh(const std::filesystem::path& path) {
+  const auto refuse = [&](const std::string& reason) {
+    return Error(ErrorCode::File,
+                 "The mesh file \"" + path.string() + "\" cannot be used: " + reason + ".");
+  };
+  try {
+    Polygons polygons = polygonsOf(path);
+    checkPositions(polygons.positions);
+    std::vector<Triangle> triangles = fans(polygons);
+    return {std::move(polygons.positions), std::move(triangles)};
+  } catch (const FileFault& fault) {
+    throw refuse(fault.reason);
+  } catch (const std::bad_alloc&) {
+    throw refuse("it needs more memory than there is");
+  }
+}
+
+}  // namespace palpate::vtk
