@@ -276,6 +276,15 @@ Vector3d crossingNormal(const Vector3d& p0, const Vector3d& p1, const Vector3d& 
 
 }  // namespace
 
+TriangleFeature closestTriangleFeature(const Vector3d& p, const Vector3d& a, const Vector3d& b,
+                                       const Vector3d& c) {
+  return closestFeature(p, {&a, &b, &c}).feature;
+}
+
+bool hasArea(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+  return unitCross(a, b, a, c) != Vector3d::Zero();
+}
+
 bool comesNearer(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
   const Sign sign = signAlong(p - a, b - a);
   return sign == Sign::Unknown ? exact::along(p, a, b) > 0 : sign == Sign::Positive;

@@ -23,6 +23,13 @@ std::optional<EdgeEdgeDistance> crossingEdgesDistance(const Eigen::Vector3d& p0,
                                                       const Eigen::Vector3d& q0,
                                                       const Eigen::Vector3d& q1);
 
+/// What of triangle (a, b, c) holds the point closest to p.
+TriangleFeature closestTriangleFeature(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
+                                       const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+
+/// Whether the triangle's area is not zero.
+bool hasArea(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+
 /// Whether moving from a towards b comes nearer to p: (p - a) . (b - a) > 0.
 bool comesNearer(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b);
 

@@ -1,5 +1,7 @@
 #include "NarrowPhase/NarrowPhase.h"
 
+#include "NarrowPhase/Proximity.h"
+
 #include <palpate/Error.h>
 
 namespace palpate {
@@ -12,12 +14,17 @@ void ContactBuffers::clear() {
   featurePairs = exactDecisions = 0;
 }
 
-void findContacts(const MeshPair&, std::span<const TrianglePair>, ContactBuffers&) {
-  throw Error(ErrorCode::UnsupportedMethod, "no narrow phase exists yet");
+void findContacts(const MeshPair& pair, std::span<const TrianglePair> candidates,
+                  ContactBuffers& out) {
+  if (pair.settings.method != Method::Proximity)
+    throw Error(ErrorCode::UnsupportedMethod, "this method does not exist yet");
+  findProximity(pair, candidates, out);
 }
 
-void findContactsByBruteForce(const MeshPair&, ContactBuffers&) {
-  throw Error(ErrorCode::UnsupportedMethod, "no narrow phase exists yet");
+void findContactsByBruteForce(const MeshPair& pair, ContactBuffers& out) {
+  if (pair.settings.method != Method::Proximity)
+    throw Error(ErrorCode::UnsupportedMethod, "this method does not exist yet");
+  findProximityByBruteForce(pair, out);
 }
 
 }  // namespace palpate

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <palpate/Distance.h>
+
+#include "NarrowPhase/NarrowPhase.h"
+
+#include <cstdint>
+#include <span>
+
+namespace palpate {
+
+/// Method::Proximity of findContacts().
+///
+/// Distinct, self-collision: of two vertices nearest to each other's triangles in a corner the
+/// lower one is the contact's vertex. A vertex's own triangles count for nothing: they neither hold
+/// nor drop a contact.
+void findProximity(const MeshPair&, std::span<const TrianglePair> candidates, ContactBuffers& out);
+
+/// Method::Proximity of findContactsByBruteForce().
+void findProximityByBruteForce(const MeshPair&, ContactBuffers& out);
+
+/// A feature of a mesh that holds a closest point, by the mesh's own ids.
+struct MeshFeature {
+  enum class Kind : std::uint8_t { Vertex, Edge, Face } kind;
+  std::uint32_t id;
+  friend bool operator==(const MeshFeature&, const MeshFeature&) = default;
+};
+
+inline MeshFeature featureOf(const MeshTopology& topology, std::uint32_t triangle,
+                             TriangleFeature feature) {
+  const int i = static_cast<int>(feature);
+  if (i < 3) return {MeshFeature::Kind::Vertex, topology.triangles[triangle][i]};
+  if (i < 6) return {MeshFeature::Kind::Edge, topology.triangleEdges[triangle][i - 3]};
+  return {MeshFeature::Kind::Face, triangle};
+}
+
+inline bool holdsVertex(const Triangle& triangle, std::uint32_t vertex) {
+  return triangle[0] == vertex || triangle[1] == vertex || triangle[2] == vertex;
+}
+
+inline bool shareVertex(const Segment& a, const Segment& b) {
+  return a[0] == b[0] || a[0] == b[1] || a[1] == b[0] || a[1] == b[1];
+}
+
+inline VertexTriangleContact contactOf(std::uint32_t vertex, std::uint32_t triangle,
+                                       const Triangle& corners,
+                                       const VertexTriangleDistance& answer) {
+  return {vertex, triangle, corners, answer.barycentric, answer.normal, answer.distance, 0.0};
+}
+
+inline EdgeEdgeContact contactOf(const Segment& a, const Segment& b,
+                                 const EdgeEdgeDistance& answer) {
+  return {a, b, answer.weightA, answer.weightB, answer.normal, answer.distance, 0.0};
+}
+
+}  // namespace palpate
