@@ -1,9 +1,12 @@
 #include "NarrowPhase/Proximity.h"
 
+#include "NarrowPhase/ProximityFilter.h"
 #include "Math/ClosestPoint.h"
 
 #include <algorithm>
+#include <bit>
 #include <optional>
+#include <utility>
 
 namespace palpate {
 
@@ -97,10 +100,10 @@ class VertexTriangleFinder {
   std::size_t& m_exactDecisions;
 };
 
-void testEdges(const MeshPair& pair, const Segment& p, const Segment& q, bool distinct,
-               ContactBuffers& out) {
+void testEdges(const MeshPair& pair, const Segment& p, const Segment& q, ContactBuffers& out) {
   const Vector3d &p0 = pair.a.now[p[0]], &p1 = pair.a.now[p[1]];
   const Vector3d &q0 = pair.b.now[q[0]], &q1 = pair.b.now[q[1]];
+  const bool distinct = pair.settings.contacts == Contacts::Distinct;
   const std::optional<EdgeEdgeDistance> answer =
       distinct ? crossingEdgesDistance(p0, p1, q0, q1) : finiteEdgeEdgeDistance(p0, p1, q0, q1);
   if (!answer) return;
@@ -108,45 +111,104 @@ void testEdges(const MeshPair& pair, const Segment& p, const Segment& q, bool di
   if (answer->distance <= pair.settings.thickness) out.edgeEdge.push_back(contactOf(p, q, *answer));
 }
 
+/// Feature pairs that a triangle pair owns, in the bits of findPossibleProximity().
+std::uint32_t ownedPairs(const MeshTopology& a, std::uint32_t s, const MeshTopology& b,
+                         std::uint32_t t) {
+  const std::uint32_t ownedByA = a.owned[s], ownedByB = b.owned[t];
+  std::uint32_t edges = 0;
+  for (int i = 0; i < 3; ++i)
+    if (ownedByA >> (3 + i) & 1) edges |= (ownedByB >> 3) << 3 * i;
+  return (ownedByA & 7) | (ownedByB & 7) << 3 | edges << 6;
+}
+
+/// The same without features that share a vertex, which self-collision leaves out.
+std::uint32_t withoutAdjacent(const Triangle& s, const Triangle& t, std::uint32_t pairs) {
+  for (int i = 0; i < 3; ++i) {
+    if (holdsVertex(t, s[i])) pairs &= ~(1u << i);
+    if (holdsVertex(s, t[i])) pairs &= ~(8u << i);
+    for (int j = 0; j < 3; ++j)
+      if (shareVertex({s[i], s[(i + 1) % 3]}, {t[j], t[(j + 1) % 3]}))
+        pairs &= ~(64u << (3 * i + j));
+  }
+  return pairs;
+}
+
+/// Fills batches with the triangle pairs that own something, and measures what the filter leaves.
+class ProximityFinder {
+ public:
+  ProximityFinder(const MeshPair& pair, ContactBuffers& out)
+      : m_pair(pair),
+        m_out(out),
+        m_ofA(pair.a, pair.b, pair.settings, pair.self() ? Corners::LowerVertexOnly : Corners::All,
+              out.vertexTriangle, out.exactDecisions),
+        m_ofB(pair.b, pair.a, pair.settings, pair.self() ? Corners::LowerVertexOnly : Corners::None,
+              pair.self() ? out.vertexTriangle : out.triangleVertex, out.exactDecisions) {}
+
+  void find(std::span<const TrianglePair> candidates) {
+    for (const TrianglePair& candidate : candidates) add(candidate);
+    flush();
+  }
+
+ private:
+  using Corners = VertexTriangleFinder::Corners;
+
+  void add(const TrianglePair& candidate) {
+    const MeshTopology &a = m_pair.a.topology, &b = m_pair.b.topology;
+    std::uint32_t pairs = ownedPairs(a, candidate.a, b, candidate.b);
+    const Triangle &s = a.triangles[candidate.a], &t = b.triangles[candidate.b];
+    if (m_pair.self()) pairs = withoutAdjacent(s, t, pairs);
+    if (pairs == 0) return;
+    m_pairs[m_size] = pairs;
+    m_candidates[m_size] = candidate;
+    for (int i = 0; i < 3; ++i) {
+      const Vector3d &p = m_pair.a.now[s[i]], &q = m_pair.b.now[t[i]];
+      for (int k = 0; k < 3; ++k) {
+        m_batch.coordinates[3 * i + k][m_size] = p[k];
+        m_batch.coordinates[9 + 3 * i + k][m_size] = q[k];
+      }
+    }
+    if (++m_size == TrianglePairBatch::kSize) flush();
+  }
+
+  void flush() {
+    if (m_size == 0) return;
+    std::uint32_t possible[TrianglePairBatch::kSize];
+    const PairSettings& settings = m_pair.settings;
+    findPossibleProximity(m_batch, settings.thickness, settings.contacts == Contacts::Distinct,
+                          possible);
+    for (int i = 0; i < m_size; ++i) {
+      m_out.featurePairs += static_cast<std::size_t>(std::popcount(m_pairs[i]));
+      for (std::uint32_t left = m_pairs[i] & possible[i]; left != 0; left &= left - 1)
+        measure(m_candidates[i], std::countr_zero(left));
+    }
+    m_size = 0;
+  }
+
+  /// One feature pair, by its bit.
+  void measure(const TrianglePair& candidate, int bit) {
+    const MeshTopology &a = m_pair.a.topology, &b = m_pair.b.topology;
+    if (bit < 3) return m_ofA.test(a.triangles[candidate.a][bit], candidate.b);
+    if (bit < 6) return m_ofB.test(b.triangles[candidate.b][bit - 3], candidate.a);
+    std::uint32_t edgeA = a.triangleEdges[candidate.a][(bit - 6) / 3];
+    std::uint32_t edgeB = b.triangleEdges[candidate.b][(bit - 6) % 3];
+    if (m_pair.self() && edgeB < edgeA) std::swap(edgeA, edgeB);
+    testEdges(m_pair, a.edges[edgeA], b.edges[edgeB], m_out);
+  }
+
+  const MeshPair& m_pair;
+  ContactBuffers& m_out;
+  VertexTriangleFinder m_ofA, m_ofB;
+  int m_size = 0;
+  std::uint32_t m_pairs[TrianglePairBatch::kSize];
+  TrianglePair m_candidates[TrianglePairBatch::kSize];
+  TrianglePairBatch m_batch{};
+};
+
 }  // namespace
 
 void findProximity(const MeshPair& pair, std::span<const TrianglePair> candidates,
                    ContactBuffers& out) {
-  using Corners = VertexTriangleFinder::Corners;
-  const MeshTopology &a = pair.a.topology, &b = pair.b.topology;
-  const bool distinct = pair.settings.contacts == Contacts::Distinct;
-  VertexTriangleFinder ofA(pair.a, pair.b, pair.settings,
-                           pair.self() ? Corners::LowerVertexOnly : Corners::All,
-                           out.vertexTriangle, out.exactDecisions);
-  VertexTriangleFinder ofB(
-      pair.b, pair.a, pair.settings, pair.self() ? Corners::LowerVertexOnly : Corners::None,
-      pair.self() ? out.vertexTriangle : out.triangleVertex, out.exactDecisions);
-  for (const TrianglePair& candidate : candidates) {
-    const Triangle &s = a.triangles[candidate.a], &t = b.triangles[candidate.b];
-    for (int i = 0; i < 3; ++i) {
-      if (a.ownsCorner(candidate.a, i) && !(pair.self() && holdsVertex(t, s[i]))) {
-        ++out.featurePairs;
-        ofA.test(s[i], candidate.b);
-      }
-      if (b.ownsCorner(candidate.b, i) && !(pair.self() && holdsVertex(s, t[i]))) {
-        ++out.featurePairs;
-        ofB.test(t[i], candidate.a);
-      }
-    }
-    for (int i = 0; i < 3; ++i) {
-      if (!a.ownsEdge(candidate.a, i)) continue;
-      for (int j = 0; j < 3; ++j) {
-        if (!b.ownsEdge(candidate.b, j)) continue;
-        std::uint32_t edgeA = a.triangleEdges[candidate.a][i],
-                      edgeB = b.triangleEdges[candidate.b][j];
-        if (pair.self() && edgeB < edgeA) std::swap(edgeA, edgeB);
-        const Segment &p = a.edges[edgeA], &q = b.edges[edgeB];
-        if (pair.self() && shareVertex(p, q)) continue;
-        ++out.featurePairs;
-        testEdges(pair, p, q, distinct, out);
-      }
-    }
-  }
+  ProximityFinder(pair, out).find(candidates);
 }
 
 }  // namespace palpate

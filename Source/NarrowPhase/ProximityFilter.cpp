@@ -1,0 +1,215 @@
+#include "NarrowPhase/ProximityFilter.h"
+
+// Every pair is taken in floats relative to its corner a0 and scaled by a power of two, so that all
+// its coordinates are below 2. What floats then get wrong, in units of e = 2^-22:
+//
+//   coordinate differences    e per component: two coordinates off by e / 4 each, one rounding of a
+//   number
+//                             below 4
+//   n = u x v                 8.8 e L, |u|, |v| <= L: two factors off by sqrt(3) e, three roundings
+//   of L²,
+//                             and L < 7
+//   n . r                     111 e L, |r| < 7
+//   (n x u) . r               160 e L²
+//   (v . u)(v . r) - (v . v)(u . r)   320 e |v| L; and n . n 280 e |v| L beside it
+//
+// The thresholds below are those, rounded up, times 1 + thickness, which covers what the same
+// errors do to |n| and |u| in products with the thickness. A comparison with NaN is false and
+// leaves nothing out.
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "NarrowPhase/ProximityFilter.cpp"
+#include "Core/Simd.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr int kSize = TrianglePairBatch::kSize;
+
+/// A batch in floats: coordinates relative to a0, scaled to below 2.
+struct ScaledBatch {
+  alignas(64) float coordinates[18][kSize];
+  alignas(64) float thickness[kSize];
+};
+
+HWY_ATTR void scaleBatch(const TrianglePairBatch& batch, double thickness, ScaledBatch& scaled) {
+  const hn::CappedTag<double, kSize> d;
+  const hn::RebindToUnsigned<decltype(d)> du;
+  const hn::Rebind<float, decltype(d)> df;
+  for (int i = 0; i < kSize; i += static_cast<int>(hn::Lanes(d))) {
+    hn::Vec<decltype(d)> relative[18], most = hn::Zero(d);
+    for (int k = 0; k < 18; ++k) {
+      relative[k] =
+          hn::Sub(hn::Load(d, batch.coordinates[k] + i), hn::Load(d, batch.coordinates[k % 3] + i));
+      most = hn::Max(most, hn::Abs(relative[k]));
+    }
+    // 2^-e for 2^e <= most < 2^(e + 1), by its exponent bits.
+    const auto exponent = hn::And(hn::BitCast(du, most), hn::Set(du, 0x7ff0000000000000u));
+    const auto scale = hn::BitCast(d, hn::Sub(hn::Set(du, 0x7fe0000000000000u), exponent));
+    const auto isFinite = hn::Lt(most, hn::Set(d, 0x1p1023));
+    const auto scaledThickness = hn::IfThenElse(isFinite, hn::Mul(hn::Set(d, thickness), scale),
+                                                hn::BitCast(d, hn::Set(du, 0x7ff8000000000000u)));
+    hn::Store(hn::Mul(hn::DemoteTo(df, scaledThickness), hn::Set(df, 1.0f + 0x1p-20f)), df,
+              scaled.thickness + i);
+    for (int k = 0; k < 18; ++k)
+      hn::Store(hn::DemoteTo(df, hn::Mul(relative[k], scale)), df, scaled.coordinates[k] + i);
+  }
+}
+
+template <class V>
+struct Vector3 {
+  V x, y, z;
+};
+
+template <class V>
+HWY_INLINE Vector3<V> minus(const Vector3<V>& a, const Vector3<V>& b) {
+  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+template <class V>
+HWY_INLINE V dot(const Vector3<V>& a, const Vector3<V>& b) {
+  return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
+}
+template <class V>
+HWY_INLINE Vector3<V> cross(const Vector3<V>& a, const Vector3<V>& b) {
+  return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)),
+          hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
+          hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
+}
+
+/// A triangle with what several tests of it share.
+template <class V>
+struct TriangleFrame {
+  Vector3<V> corner[3], edge[3];
+  V square[3];                   // of the edges
+  V length;                      // of the longest edge
+  Vector3<V> normal, inward[3];  // inward: from each edge, in the plane
+  V height, beyond[3];           // farther from the plane, or beyond an edge, is out of reach
+
+  template <class D>
+  HWY_INLINE void set(D d, V thickness) {
+    for (int i = 0; i < 3; ++i) {
+      edge[i] = minus(corner[(i + 1) % 3], corner[i]);
+      square[i] = dot(edge[i], edge[i]);
+    }
+    length = hn::Sqrt(hn::Max(hn::Max(square[0], square[1]), square[2]));
+    normal = cross(edge[0], edge[1]);
+    const V normalSquare = dot(normal, normal);
+    const V slack = hn::Mul(hn::Add(hn::Set(d, 1.0f), thickness), hn::Set(d, 0x1p-22f));
+    const V tiny = hn::Set(d, 1e-37f);
+    height = hn::Add(hn::Add(hn::Mul(thickness, hn::Sqrt(normalSquare)),
+                             hn::Mul(hn::Mul(hn::Set(d, 128.0f), slack), length)),
+                     tiny);
+    const V side =
+        hn::Add(hn::Mul(hn::Mul(hn::Set(d, 192.0f), slack), hn::Mul(length, length)), tiny);
+    for (int i = 0; i < 3; ++i) {
+      inward[i] = cross(normal, edge[i]);
+      beyond[i] =
+          hn::Neg(hn::Add(hn::Mul(thickness, hn::Sqrt(hn::Mul(normalSquare, square[i]))), side));
+    }
+  }
+};
+
+/// bits with the given one where a pair is not ruled out.
+template <class V, class M>
+HWY_INLINE V withBit(V bits, int bit, M isOut) {
+  const hn::DFromV<V> du;
+  return hn::Or(bits, hn::IfThenZeroElse(hn::RebindMask(du, isOut), hn::Set(du, 1u << bit)));
+}
+
+template <bool kTurned, class V>
+HWY_INLINE V along(const Vector3<V>& a, const Vector3<V>& b) {
+  return kTurned ? hn::Neg(dot(a, b)) : dot(a, b);
+}
+
+/// from: from each of the triangle's corners to the vertex; turned: the other way round.
+template <bool kTurned, class V>
+HWY_INLINE auto isOutOfReach(const TriangleFrame<V>& triangle, const Vector3<V>& from0,
+                             const Vector3<V>& from1, const Vector3<V>& from2) {
+  auto isOut = hn::Gt(hn::Abs(dot(triangle.normal, from0)), triangle.height);
+  isOut = hn::Or(isOut, hn::Lt(along<kTurned>(triangle.inward[0], from0), triangle.beyond[0]));
+  isOut = hn::Or(isOut, hn::Lt(along<kTurned>(triangle.inward[1], from1), triangle.beyond[1]));
+  return hn::Or(isOut, hn::Lt(along<kTurned>(triangle.inward[2], from2), triangle.beyond[2]));
+}
+
+template <bool kDistinct>
+HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[kSize]) {
+  const hn::CappedTag<float, kSize> d;
+  using D = decltype(d);
+  using V = hn::Vec<D>;
+  for (int lane = 0; lane < kSize; lane += static_cast<int>(hn::Lanes(d))) {
+    const V thickness = hn::Load(d, scaled.thickness + lane);
+    TriangleFrame<V> a, b;
+    for (int i = 0; i < 3; ++i) {
+      const auto load = [&](int row) { return hn::Load(d, scaled.coordinates[row] + lane); };
+      a.corner[i] = {load(3 * i), load(3 * i + 1), load(3 * i + 2)};
+      b.corner[i] = {load(3 * i + 9), load(3 * i + 10), load(3 * i + 11)};
+    }
+    a.set(d, thickness);
+    b.set(d, thickness);
+    Vector3<V> from[3][3];  // a's corner i seen from b's corner j
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) from[i][j] = minus(a.corner[i], b.corner[j]);
+
+    auto bits = hn::Zero(hn::RebindToUnsigned<D>());
+    for (int i = 0; i < 3; ++i) {
+      bits = withBit(bits, i, isOutOfReach<false>(b, from[i][0], from[i][1], from[i][2]));
+      bits = withBit(bits, 3 + i, isOutOfReach<true>(a, from[0][i], from[1][i], from[2][i]));
+    }
+
+    const V slack = hn::Mul(hn::Add(hn::Set(d, 1.0f), thickness), hn::Set(d, 0x1p-22f));
+    const V longest = hn::Mul(hn::Max(a.length, b.length), slack), tiny = hn::Set(d, 1e-37f);
+    const V heightError = hn::Add(hn::Mul(hn::Set(d, 128.0f), longest), tiny);
+    const V sError = hn::Add(hn::Mul(hn::Mul(hn::Set(d, 640.0f), longest), b.length), tiny);
+    const V tError = hn::Add(hn::Mul(hn::Mul(hn::Set(d, 640.0f), longest), a.length), tiny);
+    const V thicknessSquare = hn::Mul(thickness, thickness);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        const Vector3<V>&u = a.edge[i], &v = b.edge[j], &r = from[i][j];
+        const Vector3<V> n = cross(u, v);
+        const V normalSquare = dot(n, n);
+        const V height = hn::Max(hn::Sub(hn::Abs(dot(n, r)), heightError), hn::Zero(d));
+        auto isOut =
+            hn::Gt(hn::Mul(height, height), hn::Add(hn::Mul(thicknessSquare, normalSquare), tiny));
+        if constexpr (kDistinct) {
+          const V uv = dot(u, v), ur = dot(u, r), vr = dot(v, r);
+          const V s = hn::Sub(hn::Mul(uv, vr), hn::Mul(b.square[j], ur));
+          const V t = hn::Sub(hn::Mul(a.square[i], vr), hn::Mul(uv, ur));
+          isOut = hn::Or(isOut, hn::Lt(s, hn::Neg(sError)));
+          isOut = hn::Or(isOut, hn::Lt(t, hn::Neg(tError)));
+          isOut = hn::Or(isOut, hn::Gt(hn::Sub(s, normalSquare), sError));
+          isOut = hn::Or(isOut, hn::Gt(hn::Sub(t, normalSquare), tError));
+        }
+        bits = withBit(bits, 6 + 3 * i + j, isOut);
+      }
+    }
+    hn::StoreU(bits, hn::RebindToUnsigned<D>(), possible + lane);
+  }
+}
+
+HWY_ATTR void filterKernel(const TrianglePairBatch& batch, double thickness, bool distinct,
+                           std::uint32_t (&possible)[kSize]) {
+  ScaledBatch scaled;
+  scaleBatch(batch, thickness, scaled);
+  if (distinct)
+    filterScaled<true>(scaled, possible);
+  else
+    filterScaled<false>(scaled, possible);
+}
+
+}  // namespace palpate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace palpate {
+
+HWY_EXPORT(filterKernel);
+
+void findPossibleProximity(const TrianglePairBatch& batch, double thickness, bool distinct,
+                           std::uint32_t (&possible)[TrianglePairBatch::kSize]) {
+  HWY_DYNAMIC_DISPATCH(filterKernel)(batch, thickness, distinct, possible);
+}
+
+}  // namespace palpate
+#endif
