@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -57,9 +58,10 @@ Motion glide(std::size_t index, std::size_t count, double reach, double size) {
   const Vector3d towards = direction(index, count);
   const double phase = 1.3 * static_cast<double>(index);
   const Vector3d axis = Vector3d(towards.z(), towards.x(), 1.0).normalized();
+  const double waves = size > 0 ? 3.0 / size : 0.0;
   return [=](const Vector3d& rest, double time) -> Vector3d {
     const double beat = 2 * pi * 6 * time + phase;
-    const Vector3d wave = rest * (3.0 / size);
+    const Vector3d wave = rest * waves;
     const Vector3d ripple(std::sin(wave.y() + beat), std::sin(wave.z() + beat),
                           std::sin(wave.x() + beat));
     const Vector3d deformed = rest * (1.0 + 0.04 * std::sin(beat)) + 0.03 * size * ripple;
@@ -68,10 +70,12 @@ Motion glide(std::size_t index, std::size_t count, double reach, double size) {
   };
 }
 
-Scene glidingScene(std::string name, std::vector<SceneMesh> meshes, double reach, double size) {
+/// sizes: of each mesh, half its extent: how far it ripples.
+Scene glidingScene(std::string name, std::vector<SceneMesh> meshes, double reach,
+                   const std::vector<double>& sizes) {
   Scene scene{std::move(name), std::move(meshes), {}, {}};
   for (std::size_t b = 0; b < scene.meshes.size(); ++b) {
-    scene.motions.push_back(glide(b, scene.meshes.size(), reach, size));
+    scene.motions.push_back(glide(b, scene.meshes.size(), reach, sizes[b]));
     for (std::size_t a = 0; a < b; ++a) scene.pairs.emplace_back(a, b);
   }
   scene.thickness = meanEdge(scene.meshes) / 20;
@@ -93,19 +97,21 @@ std::string organObj(const Organ& organ) {
 Scene organs() {
   std::vector<SceneMesh> meshes;
   for (Organ& organ : organMeshes()) meshes.push_back(std::move(organ.mesh));
-  return glidingScene("organs", std::move(meshes), 1.45, 1.0);
+  return glidingScene("organs", std::move(meshes), 1.45,
+                      std::vector<double>(kOrganShapes.size(), 1.0));
 }
 
 Scene glidingMeshes(std::vector<SceneMesh> meshes) {
   if (meshes.size() == 1) meshes.push_back(meshes.front());
-  double size = 0;
+  std::vector<double> sizes;
   for (SceneMesh& mesh : meshes) {
-    Eigen::AlignedBox3d box;
+    Eigen::AlignedBox3d box(mesh.positions.front());
     for (const Vector3d& p : mesh.positions) box.extend(p);
     for (Vector3d& p : mesh.positions) p -= box.center();
-    if (!box.isEmpty()) size = std::max(size, box.sizes().norm() / 2);
+    sizes.push_back(box.sizes().norm() / 2);
   }
-  return glidingScene("meshes", std::move(meshes), 1.2 * size, size);
+  const double reach = 1.2 * *std::max_element(sizes.begin(), sizes.end());
+  return glidingScene("meshes", std::move(meshes), reach, sizes);
 }
 
 }  // namespace palpate::scenes

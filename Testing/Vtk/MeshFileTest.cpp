@@ -27,6 +27,7 @@ class MeshFiles : public testing::Test {
   ~MeshFiles() override { fs::remove_all(folder); }
 
   fs::path write(const std::string& name, const std::string& content) const {
+    fs::remove(folder / name);  // a file truncated and written again goes to the disk at once
     std::ofstream(folder / name, std::ios::binary) << content;
     return folder / name;
   }
