@@ -47,7 +47,10 @@ struct Frame::Job {
   static void findContactsOf(void* context, std::span<const TrianglePair> candidates) {
     Job& job = *static_cast<Job*>(context);
     Stopwatch watch;
-    const MeshPair meshes = job.record->meshes();
+    const FloatPair floats{
+        job.record->a->floats.data(), job.record->b->floats.data(), nullptr, nullptr,
+        job.trees.shiftLower,         job.trees.shiftUpper};
+    const MeshPair meshes = job.record->meshes(&floats);
     findContacts(meshes, candidates, job.contacts);
     job.narrowMilliseconds += watch.lap();
     if (!job.keepCandidates) return;

@@ -28,8 +28,8 @@ struct PairRecord {
     friend bool operator==(const AnsweredFor&, const AnsweredFor&) = default;
   };
   AnsweredFor revisions() const { return {a->revision, b->revision}; }
-  MeshPair meshes() const {
-    return {a->mesh, b->mesh, {method, pair.settings.thickness, pair.settings.contacts}};
+  MeshPair meshes(const FloatPair* floats = nullptr) const {
+    return {a->mesh, b->mesh, {method, pair.settings.thickness, pair.settings.contacts}, floats};
   }
 
   CollisionData data;

@@ -1,7 +1,5 @@
 #include "Core/SimdPath.h"
 
-#include <palpate/Platform.h>
-
 #include <cstdint>
 
 #undef HWY_TARGET_INCLUDE
@@ -21,7 +19,7 @@ namespace palpate {
 
 HWY_EXPORT(targetKernel);
 
-std::string simdPath() { return hwy::TargetName(HWY_DYNAMIC_DISPATCH(targetKernel)()); }
+std::string currentSimdPath() { return hwy::TargetName(HWY_DYNAMIC_DISPATCH(targetKernel)()); }
 
 std::vector<std::string> simdPaths() {
   useSimdPath("");

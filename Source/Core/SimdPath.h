@@ -5,6 +5,9 @@
 
 namespace palpate {
 
+/// The path that runs now.
+std::string currentSimdPath();
+
 /// The paths that this machine can run, best first.
 std::vector<std::string> simdPaths();
 

@@ -194,6 +194,7 @@ void findFeaturePairs(const MeshTopology& a, const MeshTopology& b, const FloatP
   out.vertexTriangle.clear();
   out.triangleVertex.clear();
   out.edgeEdge.clear();
+  out.owned = 0;
   HWY_DYNAMIC_DISPATCH(findFeaturePairsKernel)(a, b, floats, pairs, out);
 }
 

@@ -5,6 +5,7 @@
 
 #include "Core/Buffer.h"
 #include "Geometry/TriangleMesh.h"
+#include "NarrowPhase/FeaturePairs.h"
 
 #include <cstddef>
 #include <span>
@@ -16,6 +17,8 @@ struct MeshPair {
   const TriangleMesh& a;
   const TriangleMesh& b;  ///< the same object for self-collision
   PairSettings settings;  ///< method resolved: not Auto
+  /// For throwing out feature pairs by their boxes; without, the same answer takes longer.
+  const FloatPair* floats = nullptr;
   bool self() const { return &a == &b; }
 };
 
@@ -24,6 +27,7 @@ struct ContactBuffers {
   Buffer<VertexTriangleContact> vertexTriangle, triangleVertex;
   Buffer<EdgeEdgeContact> edgeEdge;
   Buffer<TrianglePair> intersectingTriangles;
+  FeaturePairs features;           ///< scratch: of the batch at hand
   std::size_t featurePairs = 0;    ///< tested
   std::size_t exactDecisions = 0;  ///< left to exact arithmetic
   void clear();

@@ -1,0 +1,9 @@
+#include <palpate/Platform.h>
+
+#include "Core/SimdPath.h"
+
+namespace palpate {
+
+std::string simdPath() { return currentSimdPath(); }
+
+}  // namespace palpate
