@@ -38,7 +38,7 @@ checkIncludes() {
           fault "$file: $room may not include ${include#\"}"
           ;;
         "<palpate/"*)
-          [[ $room != Core || $include =~ ^.palpate/(Types|Error|Export|Settings)\.h$ ]] ||
+          [[ $room != Core || $include =~ ^.palpate/(Types|Error|Export|Settings|Platform)\.h$ ]] ||
             fault "$file: Core may include Public's plain types only, not ${include#<}"
           ;;
       esac
@@ -127,6 +127,15 @@ checkWords() {
   lines=$(sourceFiles | xargs cat | wc -l)
   echo "Source has $lines lines"
   ((lines < 10000)) || fault "Source has 10,000 lines or more"
+}
+
+# README's statements are those that the consumer compiles and runs, and at most eight.
+checkReadme() {
+  local shown compiled
+  shown=$(sed -n '/^```cpp$/,/^```$/p' README.md | grep -v '^```')
+  compiled=$(sed -n '/README begins/,/README ends/p' Testing/Consumer/Project/Contacts.cpp | grep -v README | sed 's/^  //')
+  [[ -n $shown && $shown == "$compiled" ]] || fault "README.md shows other statements than Contacts.cpp compiles"
+  (($(grep -c ';$' <<<"$shown") <= 8)) || fault "README.md: more than eight statements"
 }
 
 "check$check" "$@"

@@ -61,6 +61,15 @@ plant Words Source/Core/A.h 'int data2;\n'
 plant Words Source/Core/IndexUtils.h '\n'
 plant Words Source/Core/A.h "$(yes x | head -10000)"
 
+mkdir -p "$tree/Testing/Consumer/Project"
+printf '```cpp\na();\n  b();\n```\n' >"$tree/README.md"
+planted="other statements than README's"
+printf '  // README begins\n  a();\n    b();\n  // README ends\n' >"$tree/Testing/Consumer/Project/Contacts.cpp"
+expect holds Readme
+printf '  // README begins\n  a();\n    c();\n  // README ends\n' >"$tree/Testing/Consumer/Project/Contacts.cpp"
+expect fails Readme
+rm -r "$tree/README.md" "$tree/Testing/Consumer"
+
 planted="a stray symbol"
 printf 'namespace palpate { int a; }\n' | "$compiler" -shared -fPIC -x c++ -o "$tree/lib.so" -
 expect holds Symbols "$tree/lib.so"

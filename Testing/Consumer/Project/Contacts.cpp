@@ -1,12 +1,33 @@
 #include <palpate/Palpate.h>
 
 #include <cstdio>
+#include <vector>
 
+// The statements between the marks are README's, and Testing/House checks that they are the same.
 int main() {
-  try {
-    throw palpate::Error(palpate::ErrorCode::File, "no such file");
-  } catch (const palpate::Error& error) {
-    std::puts(error.what());
-    return error.code() == palpate::ErrorCode::File ? 0 : 1;
-  }
+  const std::vector<Eigen::Vector3d> organPositions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  const std::vector<palpate::Triangle> organTriangles{{0, 1, 2}};
+  const std::vector<Eigen::Vector3d> toolPositions{{0.2, 0.2, 0.05}, {0.2, 0.2, 2}, {0.3, 0.2, 2}};
+  const std::vector<palpate::Triangle> toolTriangles{{0, 1, 2}};
+  int contacts = 0;
+  const auto respond = [&](const palpate::Stencil& stencil,
+                           const palpate::VertexTriangleContact& contact) {
+    std::printf("vertex %u is %g from triangle %u, normal (%g, %g, %g)\n", stencil.vertices[0],
+                contact.distance, contact.triangle, contact.normal.x(), contact.normal.y(),
+                contact.normal.z());
+    ++contacts;
+  };
+
+  // README begins
+  palpate::OctreeBasedCD collisions;
+  const auto organ = collisions.addTriangleMesh(organPositions, organTriangles);
+  const auto tool = collisions.addTriangleMesh(toolPositions, toolTriangles);
+  collisions.addCollisionPair(organ, tool, {.thickness = 0.1});
+  // each frame, when positions have changed
+  collisions.setPositions(tool, toolPositions);
+  collisions.detectCollision();
+  for (const auto& contact : collisions.collisionData(organ, tool).triangleVertex())
+    respond(palpate::stencil(contact), contact);
+  // README ends
+  return contacts == 1 ? 0 : 1;
 }
