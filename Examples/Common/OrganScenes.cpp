@@ -110,7 +110,7 @@ Scene glidingMeshes(std::vector<SceneMesh> meshes) {
     for (Vector3d& p : mesh.positions) p -= box.center();
     sizes.push_back(box.sizes().norm() / 2);
   }
-  const double reach = 1.2 * *std::max_element(sizes.begin(), sizes.end());
+  const double reach = 0.8 * *std::max_element(sizes.begin(), sizes.end());
   return glidingScene("meshes", std::move(meshes), reach, sizes);
 }
 

@@ -30,6 +30,7 @@
 #include <cstdlib>
 #include <ctime>
 #include <memory>
+#include <numbers>
 
 // X11's header defines these as macros.
 #undef None
@@ -112,7 +113,7 @@ void addCells(vtkRenderer* renderer, const LooseOctree& octree) {
     if (node.primitives.empty()) continue;
     addCube(node.bounds, points, lines);
     const double depth = node.depth / deepest;
-    const auto shade = static_cast<unsigned char>(90 + 150 * depth);
+    const auto shade = static_cast<unsigned char>(60 + 190 * depth);
     const auto opacity = static_cast<unsigned char>(150 - 90 * depth);  // the deepest are the most
     const std::array<unsigned char, 4> colour{0, shade, 0, opacity};
     for (int edge = 0; edge < 12; ++edge) colours->InsertNextTypedTuple(colour.data());
@@ -172,19 +173,28 @@ Eigen::AlignedBox3d boundsOf(const std::vector<TriangleMeshView>& bodies) {
   return box.isEmpty() ? Eigen::AlignedBox3d(Vector3d::Zero(), Vector3d::Ones()) : box;
 }
 
-/// From the front, somewhat to the right and above, on the middle of the bodies, all of them in
-/// view.
-void aim(vtkRenderer* renderer, const Eigen::AlignedBox3d& box) {
-  const Vector3d centre = box.center(),
-                 from = centre + Vector3d(0.5, -1.0, 0.6) * box.diagonal().norm();
+/// From the front, somewhat to the right and above, towards the middle of the bodies, as near as
+/// has all in view.
+void aim(vtkRenderer* renderer, const Picture& picture, const Eigen::AlignedBox3d& box) {
+  const Vector3d back = Vector3d(0.5, -1.0, 0.6).normalized();
+  const Vector3d right = Vector3d::UnitZ().cross(back).normalized(), up = back.cross(right);
   vtkCamera* camera = renderer->GetActiveCamera();
+  const double slope =
+      std::tan(camera->GetViewAngle() / 2 * std::numbers::pi / 180);  // up from the middle
+  const double slopeRight = slope * picture.width / picture.height;
+  double distance = 0.1 * box.diagonal().norm();
+  for (const TriangleMeshView& body : picture.bodies) {
+    for (const Vector3d& p : body.positions) {
+      const Vector3d q = p - box.center();
+      const double needed =
+          std::max(std::abs(q.dot(up)) / slope, std::abs(q.dot(right)) / slopeRight);
+      distance = std::max(distance, needed + q.dot(back));
+    }
+  }
+  const Vector3d centre = box.center(), position = centre + 1.08 * distance * back;
   camera->SetFocalPoint(centre.data());
-  camera->SetPosition(from.data());
+  camera->SetPosition(position.data());
   camera->SetViewUp(0, 0, 1);
-  const std::array<double, 6> bounds{box.min().x(), box.max().x(), box.min().y(),
-                                     box.max().y(), box.min().z(), box.max().z()};
-  renderer->ResetCamera(bounds.data());
-  camera->Zoom(1.5);
   renderer->ResetCameraClippingRange();
 }
 
@@ -240,7 +250,7 @@ Image draw(const Picture& picture) {
   window->SetMultiSamples(0);
   window->SetSize(picture.width, picture.height);
   window->AddRenderer(renderer);
-  aim(renderer, box);
+  aim(renderer, picture, box);
   window->Render();
 
   vtkNew<vtkUnsignedCharArray> pixels;

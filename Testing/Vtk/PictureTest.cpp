@@ -71,8 +71,11 @@ TEST_F(Picture, ShowsOrgansCellsAndContacts) {
   EXPECT_GT(count(bodies, &Pixel::isWhite), all / 8);
   EXPECT_EQ(count(bodies, &Pixel::isGreen), 0u);
   EXPECT_EQ(count(bodies, &Pixel::isOrange), 0u);
-  for (const int x : {0, 639}) {
+  for (int x = 0; x < 640; ++x) {  // nothing cut off
     for (const int y : {0, 479}) EXPECT_TRUE(pixel(bodies, x, y).isWhite());
+  }
+  for (int y = 0; y < 480; ++y) {
+    for (const int x : {0, 639}) EXPECT_TRUE(pixel(bodies, x, y).isWhite());
   }
 
   addContacts();
