@@ -11,8 +11,12 @@ namespace palpate::benchmark {
 
 double median(std::vector<double> values);
 double quantile(std::vector<double> values, double fraction);  ///< fraction in [0, 1]
-/// Milliseconds on a steady clock, from an arbitrary start.
+
+/// Milliseconds from an arbitrary start: on the wall's clock, or after useCpuClock() of this
+/// process's time on processors, which a busy machine disturbs less and which is of use with one
+/// thread only.
 double now();
+void useCpuClock();
 
 /// An engine's pairs against the truth: all pairs that any engine of the race found and whose exact
 /// boxes overlap.

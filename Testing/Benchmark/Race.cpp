@@ -55,14 +55,16 @@ const Entry* find(const Outcome& outcome, const std::string& engine) {
   return nullptr;
 }
 
-/// The complete peer with the shortest frame; of those that rebuild, if asked for.
-const Entry* fastestPeer(const Outcome& outcome, bool rebuilding) {
-  const Entry* best = nullptr;
-  for (const Entry& entry : outcome.entries)
-    if (!isPalpate(entry) && entry.check.missed == 0 && (entry.rebuilds || !rebuilding) &&
-        (!best || entry.timing.total < best->timing.total))
-      best = &entry;
-  return best;
+/// Against the complete peer that comes nearest; of those that rebuild, if asked for. 0: there is
+/// none.
+double againstPeers(const Outcome& outcome, const Timing& palpate, bool rebuilding) {
+  double least = 0;
+  for (const Entry& entry : outcome.entries) {
+    if (isPalpate(entry) || entry.check.missed > 0 || (rebuilding && !entry.rebuilds)) continue;
+    const double factor = ratio(entry.timing, palpate);
+    if (least == 0 || factor < least) least = factor;
+  }
+  return least;
 }
 
 /// One line of the verdict: how many times as long the peer takes, and how many are asked for.
@@ -77,21 +79,19 @@ void verdict(Report& report, const Workload& workload, const std::string& what, 
 void verdicts(Report& report, const Workload& workload, const Outcome& outcome) {
   const Entry *shipped = find(outcome, "Palpate"),
               *rebuilt = find(outcome, "Palpate, full rebuild");
-  const Entry *any = fastestPeer(outcome, false), *rebuilding = fastestPeer(outcome, true);
   const Entry* embree = find(outcome, "Embree 3.13, Morton rebuild + rtcCollide");
+  if (!shipped || !rebuilt || againstPeers(outcome, shipped->timing, false) == 0) return;
   const auto [a, b] = workload.task.pairs[0];
-  if (shipped && any)
-    verdict(report, workload, "as shipped, against the fastest peer",
-            ratio(any->timing, shipped->timing), a == b ? 2.5 : 1.3);
-  if (rebuilt && embree)
+  verdict(report, workload, "as shipped, against the fastest peer",
+          againstPeers(outcome, shipped->timing, false), a == b ? 2.5 : 1.3);
+  if (embree)
     verdict(report, workload, "full rebuild: update against Embree's rebuild",
             embree->timing.update / rebuilt->timing.update, 4);
-  if (rebuilt && rebuilding)
-    verdict(report, workload, "full rebuild, against rebuilding peers",
-            ratio(rebuilding->timing, rebuilt->timing), 2);
-  if (rebuilt && any && !workload.name.starts_with("sheets"))
+  if (const double factor = againstPeers(outcome, rebuilt->timing, true); factor > 0)
+    verdict(report, workload, "full rebuild, against rebuilding peers", factor, 2);
+  if (!workload.name.starts_with("sheets"))
     verdict(report, workload, "full rebuild, against the fastest peer",
-            ratio(any->timing, rebuilt->timing), 1);
+            againstPeers(outcome, rebuilt->timing, false), 1);
 }
 
 void race(Report& report, const Options& options, Workload& workload, int threads) {
@@ -157,6 +157,8 @@ int main(int count, char** arguments) {
   app.add_option("--repetitions", measure.repetitions, "of every engine, in turns");
   app.add_option("--seconds", measure.secondsPerEngine, "after so long, no more repetitions");
   app.add_flag("--quick", options.rows.quick, "no four million triangles, fewer steady frames");
+  app.add_flag_callback("--cpu-clock", useCpuClock,
+                        "time on processors; for 1 thread on a busy machine");
   app.add_option("--csv", options.csv, "file to write");
   app.add_option("--commit", options.commit, "to be named in the report");
   app.add_option("--shared-data", options.rows.sharedData, "folder of the published frames");
