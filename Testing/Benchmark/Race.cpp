@@ -2,7 +2,8 @@
 // measured of Palpate alone. Prints tables and writes every figure as CSV.
 #include "PalpateEngine.h"
 #include "Rows.h"
-#include "SimdPath.h"
+
+#include <palpate/Platform.h>
 
 #include <CLI/CLI.hpp>
 

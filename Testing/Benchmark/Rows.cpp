@@ -2,7 +2,10 @@
 
 #include "AllocationCount.h"
 #include "PalpateEngine.h"
-#include "SimdPath.h"
+
+#include "Core/SimdPath.h"
+
+#include <palpate/Platform.h>
 
 #include <cstdio>
 
@@ -280,7 +283,7 @@ void simdRows(Report& report, const RowOptions& options) {
   for (const char* name : {"organs", "sheets-64K"}) {
     const Workload workload = makeWorkload(name, options.frames, options.sharedData);
     for (const std::string& path : simdPaths()) {
-      chooseSimdPath(path);
+      useSimdPath(path);
       std::vector<std::unique_ptr<Peer>> engines;
       engines.push_back(shipped());
       engines.push_back(rebuilding());
@@ -294,7 +297,7 @@ void simdRows(Report& report, const RowOptions& options) {
       report.row("simd", name, 1, simdPath(), "shipped ms", auto_.total, outcome.hash);
       report.row("simd", name, 1, simdPath(), "rebuild ms", rebuilt.total, outcome.hash);
     }
-    chooseSimdPath("");
+    useSimdPath("");
   }
 }
 
