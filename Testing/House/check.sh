@@ -129,6 +129,14 @@ checkWords() {
   ((lines < 10000)) || fault "Source has 10,000 lines or more"
 }
 
+# Nothing prints and nothing exits, but an assertion that fails.
+checkQuiet() {
+  local line
+  while read -r line; do fault "$line"; done < <(
+    sourceFiles | grep -v '^Source/Core/Assert.h$' |
+      xargs grep -nE '\b(cout|cerr|clog|printf|fprintf|puts|fputs|exit|abort|terminate)\b *(\(|<<|;)')
+}
+
 # README's statements are those that the consumer compiles and runs, and at most eight.
 checkReadme() {
   local shown compiled

@@ -56,6 +56,9 @@ plant PublicHeaders Source/Public/palpate/A.h '#pragma once\n#include <Eigen/LU>
 plant PublicHeaders Source/Public/palpate/A.h '#define LIBRARY <sys/mman.h>\n#include LIBRARY\n' "$compiler" "$eigen"
 plant PublicHeaders Source/Vtk/Public/palpate/vtk/A.h '#pragma once\n#include <vtkPolyData.h>\n' "$compiler" "$eigen"
 plant Format Source/Core/A.h '#pragma once\nint  a;\n'
+plant Quiet Source/Math/A.cpp 'void f() { std::cerr << 1; }\n'
+plant Quiet Source/Math/A.cpp 'void f() { std::printf("1"); }\n'
+plant Quiet Source/Math/A.cpp 'void f() { std::exit(1); }\n'
 plant Words Source/Core/A.h 'class PoolManager;\n'
 plant Words Source/Core/A.h 'int data2;\n'
 plant Words Source/Core/IndexUtils.h '\n'
