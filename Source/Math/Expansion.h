@@ -18,7 +18,8 @@ struct Expansion {
   int size = 0;
 
   void append(double term) {
-    if (term != 0) terms[size++] = term;
+    terms[size] = term;
+    size += term != 0;  // no branch: which terms are zero cannot be foreseen
   }
   int sign() const { return size == 0 ? 0 : terms[size - 1] > 0 ? 1 : -1; }
 };
@@ -48,6 +49,8 @@ inline RoundedWithError exactProduct(double a, double b, const RoundedWithError&
                        low * bHalves.error};
 }
 
+inline RoundedWithError exactProduct(double a, double b) { return exactProduct(a, b, halves(b)); }
+
 inline Expansion<2> exactDifference(double a, double b) {
   const auto [value, error] = exactSum(a, -b);
   Expansion<2> difference;
@@ -61,7 +64,8 @@ Expansion<N + M> operator+(const Expansion<N>& e, const Expansion<M>& f) {
   Expansion<N + M> sum;
   double rest = 0;
   for (int i = 0, j = 0; i + j < e.size + f.size;) {
-    const bool takeE = j == f.size || (i < e.size && std::abs(e.terms[i]) < std::abs(f.terms[j]));
+    const bool takeE =
+        i < e.size && (j == f.size || std::abs(e.terms[i]) < std::abs(f.terms[j]));
     const auto [value, error] = exactSum(rest, takeE ? e.terms[i++] : f.terms[j++]);
     sum.append(error);
     rest = value;
@@ -71,9 +75,10 @@ Expansion<N + M> operator+(const Expansion<N>& e, const Expansion<M>& f) {
 }
 
 template <int N>
-Expansion<N> operator-(Expansion<N> e) {
-  for (int i = 0; i < e.size; ++i) e.terms[i] = -e.terms[i];
-  return e;
+Expansion<N> operator-(const Expansion<N>& e) {
+  Expansion<N> negated;
+  for (int i = 0; i < e.size; ++i) negated.append(-e.terms[i]);
+  return negated;
 }
 
 template <int N, int M>

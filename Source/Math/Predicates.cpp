@@ -3,6 +3,7 @@
 #include "Math/Exact.h"
 #include "Math/Expansion.h"
 
+#include <algorithm>
 #include <initializer_list>
 
 namespace palpate {
@@ -26,6 +27,13 @@ bool fitExpansions(std::initializer_list<const Eigen::Vector3d*> positions) {
     }
   }
   return true;
+}
+
+/// What degenerate input mostly is, and no arithmetic is needed for: flat along an axis.
+bool flat(int axis, std::initializer_list<const Eigen::Vector3d*> positions) {
+  const double first = (**positions.begin())[axis];
+  return std::all_of(positions.begin(), positions.end(),
+                     [&](const Eigen::Vector3d* position) { return (*position)[axis] == first; });
 }
 
 /// The number types: each has difference(a, b) exactly, a - b times a positive constant.
@@ -56,10 +64,29 @@ int areaSign(int x, int y, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
   return signOf(ux * vy - uy * vx);
 }
 
+int compare(double a, double b) { return (a > b) - (a < b); }
+
+/// (b - a)[x] (c - a)[y] against (b - a)[y] (c - a)[x]: where the differences are doubles, the
+/// rounded products compare as the exact ones do or are equal, and then their errors compare.
+int areaSignWithExpansions(int x, int y, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                           const Eigen::Vector3d& c) {
+  const auto ux = exactSum(b[x], -a[x]), uy = exactSum(b[y], -a[y]);
+  const auto vx = exactSum(c[x], -a[x]), vy = exactSum(c[y], -a[y]);
+  if (ux.error != 0 || uy.error != 0 || vx.error != 0 || vy.error != 0)
+    return areaSign<WithExpansions>(x, y, a, b, c);
+  const auto forward = exactProduct(ux.value, vy.value),
+             backward = exactProduct(uy.value, vx.value);
+  return forward.value != backward.value ? compare(forward.value, backward.value)
+                                         : compare(forward.error, backward.error);
+}
+
 }  // namespace
 
 int orient3dExactly(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                     const Eigen::Vector3d& d, SignCounts& counts) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (flat(axis, {&a, &b, &c, &d})) return 0;
+  if (a == b || a == c || a == d || b == c || b == d || c == d) return 0;
   if (fitExpansions({&a, &b, &c, &d})) {
     ++counts.expansions;
     return volumeSign<WithExpansions>(a, b, c, d);
@@ -71,9 +98,10 @@ int orient3dExactly(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Ei
 int orient2dExactly(int axis, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                     const Eigen::Vector3d& c, SignCounts& counts) {
   const int x = (axis + 1) % 3, y = (axis + 2) % 3;
+  if (flat(x, {&a, &b, &c}) || flat(y, {&a, &b, &c})) return 0;
   if (fitExpansions({&a, &b, &c})) {
     ++counts.expansions;
-    return areaSign<WithExpansions>(x, y, a, b, c);
+    return areaSignWithExpansions(x, y, a, b, c);
   }
   ++counts.bigIntegers;
   return areaSign<WithIntegers>(x, y, a, b, c);

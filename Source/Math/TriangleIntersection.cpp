@@ -10,6 +10,8 @@ using Signs = std::array<int, 3>;
 
 constexpr int next(int i) { return i == 2 ? 0 : i + 1; }
 
+bool has(unsigned bits, int i) { return bits >> i & 1; }
+
 bool strictlyOneSide(const Signs& s) { return s[0] != 0 && s[0] == s[1] && s[0] == s[2]; }
 bool anyZero(const Signs& s) { return s[0] == 0 || s[1] == 0 || s[2] == 0; }
 bool allZero(const Signs& s) { return s[0] == 0 && s[1] == 0 && s[2] == 0; }
@@ -33,11 +35,32 @@ struct Box {
   }
 };
 
-Signs sides(const Corners& triangle, const Corners& points, SignCounts& counts) {
-  const OrientedPlane plane(triangle[0], triangle[1], triangle[2]);
-  return {plane.side(points[0], counts), plane.side(points[1], counts),
-          plane.side(points[2], counts)};
-}
+/// A triangle and, for each of its corners, the side of the other's plane that it is on.
+struct Placed {
+  const Corners& corners;
+  const Box& box;
+  unsigned excluded;  ///< bit i: corner i is the other's too
+  Signs sides{};
+
+  void place(const Corners& other, SignCounts& counts) {
+    const OrientedPlane plane(other[0], other[1], other[2]);
+    for (int i = 0; i < 3; ++i)
+      if (!has(excluded, i)) sides[i] = plane.side(corners[i], counts);
+  }
+  /// All corners that are not the other's are strictly on one side: the other has area, and no more
+  /// than the corners in common lie on its plane.
+  bool aside() const {
+    int sum = 0, count = 0;
+    for (int i = 0; i < 3; ++i) {
+      if (has(excluded, i)) continue;
+      sum += sides[i];
+      ++count;
+    }
+    return sum != 0 && std::abs(sum) == count;
+  }
+  bool edgeAside(int i) const { return sides[i] * sides[next(i)] > 0; }
+  bool edgeCrosses(int i) const { return sides[i] * sides[next(i)] < 0; }
+};
 
 /// The corner that is alone on its side of a plane which the triangle crosses, no corner being on
 /// the plane.
@@ -47,15 +70,15 @@ int lonelyCorner(const Signs& s) { return s[0] == s[1] ? 2 : s[0] == s[2] ? 1 : 
 /// on which each triangle covers an interval that ends at the two edges of its lonely corner. The
 /// sign of the volume of an edge of a and one of b, both taken from the lonely corners, says which
 /// end comes first, in a sense common to all four.
-TriangleIntersection intersectCrossing(const Corners& a, const Corners& b, const Signs& sidesOfA,
-                                       const Signs& sidesOfB, SignCounts& counts) {
-  const int p = lonelyCorner(sidesOfA), q = lonelyCorner(sidesOfB);
+TriangleIntersection intersectCrossing(const Placed& a, const Placed& b, SignCounts& counts) {
+  const int p = lonelyCorner(a.sides), q = lonelyCorner(b.sides);
   const std::array<int, 2> edgesA{p, next(next(p))}, edgesB{q, next(next(q))};
   const std::array<int, 2> endsA{next(p), edgesA[1]}, endsB{next(q), edgesB[1]};
   std::array<std::array<int, 2>, 2> order;
   for (int i = 0; i < 2; ++i) {
     for (int j = 0; j < 2; ++j)
-      order[i][j] = orient3d(a[p], a[endsA[i]], b[q], b[endsB[j]], counts);
+      order[i][j] =
+          orient3d(a.corners[p], a.corners[endsA[i]], b.corners[q], b.corners[endsB[j]], counts);
   }
   TriangleIntersection result;
   for (int i = 0; i < 2; ++i) {
@@ -117,27 +140,27 @@ class InPlane {
   SignCounts& m_counts;
 };
 
-std::uint8_t cornersOn(const Corners& corners, const Signs& sidesOfCorners, const Corners& triangle,
-                       const Box& boxOfTriangle, SignCounts& counts) {
-  if (!anyZero(sidesOfCorners)) return 0;
+std::uint8_t cornersOn(const Placed& a, const Placed& triangle, SignCounts& counts) {
+  if (!anyZero(a.sides)) return 0;
   InPlane inPlane(counts);
-  inPlane.useAxisOf(triangle);
+  inPlane.useAxisOf(triangle.corners);
   std::uint8_t found = 0;
   for (int i = 0; i < 3; ++i) {
-    if (sidesOfCorners[i] == 0 && inPlane.pointInTriangle(corners[i], triangle, boxOfTriangle))
+    if (a.sides[i] == 0 && !has(a.excluded, i) &&
+        inPlane.pointInTriangle(a.corners[i], triangle.corners, triangle.box))
       found |= 1 << i;
   }
   return found;
 }
 
-std::uint8_t edgesThrough(const Corners& corners, const Signs& sidesOfCorners,
-                          const Corners& triangle, SignCounts& counts) {
+std::uint8_t edgesThrough(const Placed& a, const Corners& triangle, SignCounts& counts) {
   std::uint8_t found = 0;
   for (int i = 0; i < 3; ++i) {
-    if (sidesOfCorners[i] * sidesOfCorners[next(i)] >= 0) continue;
+    if (!a.edgeCrosses(i)) continue;
     Signs around;
     for (int j = 0; j < 3; ++j)
-      around[j] = orient3d(corners[i], corners[next(i)], triangle[j], triangle[next(j)], counts);
+      around[j] =
+          orient3d(a.corners[i], a.corners[next(i)], triangle[j], triangle[next(j)], counts);
     if (strictlyOneSide(around)) found |= 1 << i;
   }
   return found;
@@ -145,46 +168,46 @@ std::uint8_t edgesThrough(const Corners& corners, const Signs& sidesOfCorners,
 
 /// Corners on the other's plane, a triangle without area, or both: every feature is tested by
 /// itself.
-TriangleIntersection intersectTouching(const Corners& a, const Corners& b, const Box& boxA,
-                                       const Box& boxB, const Signs& sidesOfA,
-                                       const Signs& sidesOfB, SignCounts& counts) {
+TriangleIntersection intersectTouching(const Placed& a, const Placed& b, unsigned excludedEdges,
+                                       SignCounts& counts) {
   InPlane inPlane(counts);
-  const bool coplanar =
-      (allZero(sidesOfA) && inPlane.useAxisOf(b)) || (allZero(sidesOfB) && inPlane.useAxisOf(a));
+  const bool coplanar = (allZero(a.sides) && inPlane.useAxisOf(b.corners)) ||
+                        (allZero(b.sides) && inPlane.useAxisOf(a.corners));
   TriangleIntersection result;
-  result.cornersOfAOnB = cornersOn(a, sidesOfA, b, boxB, counts);
-  result.cornersOfBOnA = cornersOn(b, sidesOfB, a, boxA, counts);
+  result.cornersOfAOnB = cornersOn(a, b, counts);
+  result.cornersOfBOnA = cornersOn(b, a, counts);
   for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector3d &p0 = a[i], &p1 = a[next(i)];
+    const Eigen::Vector3d &p0 = a.corners[i], &p1 = a.corners[next(i)];
     const Box boxP(p0, p1);
-    if (sidesOfA[i] * sidesOfA[next(i)] > 0 || !boxP.meets(boxB)) continue;
+    if (a.edgeAside(i) || !boxP.meets(b.box)) continue;
     for (int j = 0; j < 3; ++j) {
-      const Eigen::Vector3d &q0 = b[j], &q1 = b[next(j)];
-      if (sidesOfB[j] * sidesOfB[next(j)] > 0 || !boxP.meets(Box(q0, q1))) continue;
+      const Eigen::Vector3d &q0 = b.corners[j], &q1 = b.corners[next(j)];
+      if (has(excludedEdges, 3 * i + j) || b.edgeAside(j) || !boxP.meets(Box(q0, q1))) continue;
       if ((coplanar || orient3d(p0, p1, q0, q1, counts) == 0) &&
           inPlane.segmentsMeet(p0, p1, q0, q1))
         result.touchingEdges |= 1 << (3 * i + j);
     }
   }
   if (!coplanar) {
-    result.edgesOfAThroughB = edgesThrough(a, sidesOfA, b, counts);
-    result.edgesOfBThroughA = edgesThrough(b, sidesOfB, a, counts);
+    result.edgesOfAThroughB = edgesThrough(a, b.corners, counts);
+    result.edgesOfBThroughA = edgesThrough(b, a.corners, counts);
   }
   return result;
 }
 
 }  // namespace
 
-TriangleIntersection intersectTriangles(const Corners& a, const Corners& b, SignCounts& counts) {
-  const Box boxA(a), boxB(b);
+TriangleIntersection intersectTriangles(const Corners& cornersOfA, const Corners& cornersOfB,
+                                        SignCounts& counts, const ExcludedFeatures& excluded) {
+  const Box boxA(cornersOfA), boxB(cornersOfB);
   if (!boxA.meets(boxB)) return {};
-  const Signs sidesOfA = sides(b, a, counts);
-  if (strictlyOneSide(sidesOfA)) return {};
-  const Signs sidesOfB = sides(a, b, counts);
-  if (strictlyOneSide(sidesOfB)) return {};
-  if (anyZero(sidesOfA) || anyZero(sidesOfB))
-    return intersectTouching(a, b, boxA, boxB, sidesOfA, sidesOfB, counts);
-  return intersectCrossing(a, b, sidesOfA, sidesOfB, counts);
+  Placed a{cornersOfA, boxA, excluded.cornersOfA}, b{cornersOfB, boxB, excluded.cornersOfB};
+  a.place(cornersOfB, counts);
+  if (a.aside()) return {};
+  b.place(cornersOfA, counts);
+  if (b.aside()) return {};
+  if (anyZero(a.sides) || anyZero(b.sides)) return intersectTouching(a, b, excluded.edges, counts);
+  return intersectCrossing(a, b, counts);
 }
 
 bool trianglesIntersect(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1,

@@ -23,8 +23,14 @@ struct TriangleIntersection {
   bool intersect() const { return touch() || (edgesOfAThroughB | edgesOfBThroughA) != 0; }
 };
 
-/// Every touching and crossing of two triangles, with area or without. Exact for any finite
-/// doubles.
+/// Feature pairs that two triangles of one mesh are not asked for, as they have a vertex in common.
+struct ExcludedFeatures {
+  std::uint8_t cornersOfA = 0, cornersOfB = 0;  ///< bit i: corner i is the other triangle's too
+  std::uint16_t edges = 0;                      ///< bit 3 i + j: edge i of a and edge j of b
+};
+
+/// Every touching and crossing of two triangles, with area or without, outside of excluded
+/// features. Exact for any finite doubles.
 ///
 /// Laws     (1) corners in another order, or the two triangles swapped, move the bits and change nothing else.
 ///          (2) so do mirroring and scaling by powers of two.
@@ -32,6 +38,7 @@ struct TriangleIntersection {
 ///          overlap test using orientation predicates, Journal of Graphics Tools 8 (2003).
 ///          Difference: four volumes and no canonical order of the corners; and three axis
 ///          projections in place of a chosen one.
-TriangleIntersection intersectTriangles(const Corners& a, const Corners& b, SignCounts&);
+TriangleIntersection intersectTriangles(const Corners& a, const Corners& b, SignCounts&,
+                                        const ExcludedFeatures& = {});
 
 }  // namespace palpate
