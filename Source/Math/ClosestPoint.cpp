@@ -452,11 +452,15 @@ EdgeEdgeDistance endDistance(bool parallel, bool decidedExactly, const Vector3d&
   // The stretch that two parallel edges share runs from end to end; its middle is the answer.
   const std::array<bool, 4> beside{isBeside(p0, q0, q1), isBeside(p1, q0, q1), isBeside(q0, p0, p1),
                                    isBeside(q1, p0, p1)};
+  // Both weights: on an edge without length the other's are equal.
+  const auto before = [&](int i, int j) {
+    return std::pair(weightA(i), weightB(i)) < std::pair(weightA(j), weightB(j));
+  };
   int low = -1, high = -1;
   for (int i = 0; i < 4; ++i) {
     if (!beside[i]) continue;
-    if (low < 0 || weightA(i) < weightA(low)) low = i;
-    if (high < 0 || weightA(i) > weightA(high)) high = i;
+    if (low < 0 || before(i, low)) low = i;
+    if (high < 0 || before(high, i)) high = i;
   }
   if (low < 0 || low == high) return result;
   result.weightA = 0.5 * weightA(low) + 0.5 * weightA(high);

@@ -63,13 +63,16 @@ template <int N, int M>
 Expansion<N + M> operator+(const Expansion<N>& e, const Expansion<M>& f) {
   Expansion<N + M> sum;
   double rest = 0;
-  for (int i = 0, j = 0; i + j < e.size + f.size;) {
-    const bool takeE =
-        i < e.size && (j == f.size || std::abs(e.terms[i]) < std::abs(f.terms[j]));
-    const auto [value, error] = exactSum(rest, takeE ? e.terms[i++] : f.terms[j++]);
+  const auto add = [&](double term) {
+    const auto [value, error] = exactSum(rest, term);
     sum.append(error);
     rest = value;
-  }
+  };
+  int i = 0, j = 0;
+  while (i < e.size && j < f.size)
+    add(std::abs(e.terms[i]) < std::abs(f.terms[j]) ? e.terms[i++] : f.terms[j++]);
+  while (i < e.size) add(e.terms[i++]);
+  while (j < f.size) add(f.terms[j++]);
   sum.append(rest);
   return sum;
 }
@@ -89,7 +92,6 @@ Expansion<N + M> operator-(const Expansion<N>& e, const Expansion<M>& f) {
 template <int N>
 Expansion<2 * N> operator*(const Expansion<N>& e, double factor) {
   Expansion<2 * N> scaled;
-  if (factor == 0) return scaled;
   const RoundedWithError factorHalves = halves(factor);
   double rest = 0;
   for (int i = 0; i < e.size; ++i) {
@@ -106,7 +108,12 @@ Expansion<2 * N> operator*(const Expansion<N>& e, double factor) {
 
 template <int N>
 Expansion<4 * N> operator*(const Expansion<N>& e, const Expansion<2>& f) {
-  return e * (f.size > 0 ? f.terms[0] : 0.0) + e * (f.size > 1 ? f.terms[1] : 0.0);
+  if (f.size == 2) return e * f.terms[0] + e * f.terms[1];
+  Expansion<4 * N> product;
+  if (f.size == 0) return product;
+  const Expansion<2 * N> only = e * f.terms[0];
+  for (int i = 0; i < only.size; ++i) product.append(only.terms[i]);
+  return product;
 }
 
 }  // namespace palpate

@@ -1,5 +1,6 @@
 #include "NarrowPhase/NarrowPhase.h"
 
+#include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Proximity.h"
 
 #include <palpate/Error.h>
@@ -16,15 +17,25 @@ void ContactBuffers::clear() {
 
 void findContacts(const MeshPair& pair, std::span<const TrianglePair> candidates,
                   ContactBuffers& out) {
-  if (pair.settings.method != Method::Proximity)
-    throw Error(ErrorCode::UnsupportedMethod, "this method does not exist yet");
-  findProximity(pair, candidates, out);
+  switch (pair.settings.method) {
+    case Method::Proximity:
+      return findProximity(pair, candidates, out);
+    case Method::Intersection:
+      return findIntersections(pair, candidates, out);
+    default:
+      throw Error(ErrorCode::UnsupportedMethod, "this method does not exist yet");
+  }
 }
 
 void findContactsByBruteForce(const MeshPair& pair, ContactBuffers& out) {
-  if (pair.settings.method != Method::Proximity)
-    throw Error(ErrorCode::UnsupportedMethod, "this method does not exist yet");
-  findProximityByBruteForce(pair, out);
+  switch (pair.settings.method) {
+    case Method::Proximity:
+      return findProximityByBruteForce(pair, out);
+    case Method::Intersection:
+      return findIntersectionsByBruteForce(pair, out);
+    default:
+      throw Error(ErrorCode::UnsupportedMethod, "this method does not exist yet");
+  }
 }
 
 }  // namespace palpate

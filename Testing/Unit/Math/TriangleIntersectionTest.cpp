@@ -1,3 +1,4 @@
+#include <palpate/Distance.h>
 #include <palpate/Intersection.h>
 
 #include "Math/TriangleIntersection.h"
@@ -116,6 +117,35 @@ TEST(TriangleIntersection, WhatMeetsWithoutTouchingHasTwoCrossings) {
     ++seen[ofA];
   }
   for (const int count : seen) EXPECT_GT(count, 100);
+}
+
+/// Two independent decisions of the same thing. Distances under the smallest denormal round to
+/// zero.
+TEST(TriangleIntersection, FeaturesTouchWhereTheirDistanceIsZero) {
+  Random random(14);
+  SignCounts counts;
+  std::array<int, 2> touching{};
+  for (int repeat = 0; repeat < 300 * kKinds; ++repeat) {
+    const auto kind = static_cast<Kind>(repeat % kKinds);
+    const bool mayRoundToZero =
+        kind == Kind::MixedExponents || kind == Kind::Tiny || kind == Kind::Denormal;
+    const auto [a, b] = makePair(kind, random);
+    const TriangleIntersection result = intersectTriangles(a, b, counts);
+    for (int i = 0; i < 3; ++i) {
+      const bool corner = result.cornersOfAOnB >> i & 1;
+      const double distance = vertexTriangleDistance(a[i], b[0], b[1], b[2]).distance;
+      ASSERT_TRUE(corner ? distance == 0 : distance > 0 || mayRoundToZero) << repeat % kKinds;
+      touching[0] += corner;
+      for (int j = 0; j < 3; ++j) {
+        const bool edges = result.touchingEdges >> (3 * i + j) & 1;
+        const double between =
+            edgeEdgeDistance(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]).distance;
+        ASSERT_TRUE(edges ? between == 0 : between > 0 || mayRoundToZero) << repeat % kKinds;
+        touching[1] += edges;
+      }
+    }
+  }
+  for (const int count : touching) EXPECT_GT(count, 1000);
 }
 
 TEST(TriangleIntersection, EachSimpleConfigurationHasItsFeatures) {

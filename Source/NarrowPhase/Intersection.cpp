@@ -1,0 +1,137 @@
+#include "NarrowPhase/Intersection.h"
+
+#include "NarrowPhase/Proximity.h"
+#include "Math/ClosestPoint.h"
+#include "Math/TriangleIntersection.h"
+
+#include <bit>
+
+namespace palpate {
+
+namespace {
+
+struct MeshTriangle {
+  const TriangleMesh& mesh;
+  std::uint32_t id;
+  const Triangle& vertices;
+  Corners positions;
+
+  MeshTriangle(const TriangleMesh& ofMesh, std::uint32_t triangle)
+      : mesh(ofMesh),
+        id(triangle),
+        vertices(mesh.topology.triangles[id]),
+        positions{mesh.now[vertices[0]], mesh.now[vertices[1]], mesh.now[vertices[2]]} {}
+
+  /// kNoEdge between two corners that are one vertex.
+  std::uint32_t edge(int i) const { return mesh.topology.triangleEdges[id][i]; }
+};
+
+ExcludedFeatures featuresInCommon(const MeshTriangle& a, const MeshTriangle& b) {
+  ExcludedFeatures excluded;
+  for (int i = 0; i < 3; ++i) {
+    excluded.cornersOfA |= holdsVertex(b.vertices, a.vertices[i]) << i;
+    excluded.cornersOfB |= holdsVertex(a.vertices, b.vertices[i]) << i;
+  }
+  if (excluded.cornersOfA == 0) return excluded;
+  const std::vector<Segment>& edges = a.mesh.topology.edges;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      const bool pointless = a.edge(i) == kNoEdge || b.edge(j) == kNoEdge;
+      excluded.edges |= (pointless || shareVertex(edges[a.edge(i)], edges[b.edge(j)]))
+                        << (3 * i + j);
+    }
+  }
+  return excluded;
+}
+
+/// The corner between two edges, given as bits.
+int sharedCorner(unsigned twoEdges) { return twoEdges == 0b011 ? 1 : twoEdges == 0b110 ? 2 : 0; }
+
+/// The contacts of two triangles that intersect.
+class IntersectionContacts {
+ public:
+  IntersectionContacts(const MeshTriangle& a, const MeshTriangle& b, ContactBuffers& out)
+      : m_a(a), m_b(b), m_out(out), m_self(&a.mesh == &b.mesh) {}
+
+  void add(const TriangleIntersection& meeting) {
+    const unsigned ofA = meeting.edgesOfAThroughB, ofB = meeting.edgesOfBThroughA;
+    if (meeting.touch()) {
+      for (int i = 0; i < 3; ++i) {
+        if (meeting.cornersOfAOnB >> i & 1) addCornerOfA(i);
+        if (meeting.cornersOfBOnA >> i & 1) addCornerOfB(i);
+        for (int j = 0; j < 3; ++j)
+          if (meeting.touchingEdges >> (3 * i + j) & 1) addEdges(i, j);
+      }
+    } else if (std::popcount(ofA) == 2) {
+      addCornerOfA(sharedCorner(ofA));
+    } else if (std::popcount(ofB) == 2) {
+      addCornerOfB(sharedCorner(ofB));
+    } else if (ofA != 0 && ofB != 0) {
+      addEdges(std::countr_zero(ofA), std::countr_zero(ofB));
+    }
+  }
+
+ private:
+  void addCornerOfA(int i) { addCorner(m_a, i, m_b, m_out.vertexTriangle); }
+  void addCornerOfB(int i) {
+    addCorner(m_b, i, m_a, m_self ? m_out.vertexTriangle : m_out.triangleVertex);
+  }
+
+  void addCorner(const MeshTriangle& of, int corner, const MeshTriangle& triangle,
+                 Buffer<VertexTriangleContact>& contacts) {
+    const auto& [a, b, c] = triangle.positions;
+    VertexTriangleDistance answer = finiteVertexTriangleDistance(of.positions[corner], a, b, c);
+    m_out.exactDecisions += answer.exact;
+    // The winding normal is what a vertex at distance zero, such as a corner, is answered.
+    answer.normal = finiteVertexTriangleDistance(a, a, b, c).normal;
+    contacts.push_back(contactOf(of.vertices[corner], triangle.id, triangle.vertices, answer));
+  }
+
+  void addEdges(int i, int j) {
+    std::uint32_t edgeA = m_a.edge(i), edgeB = m_b.edge(j);
+    if (edgeA == kNoEdge || edgeB == kNoEdge) return;
+    if (m_self && edgeB < edgeA) std::swap(edgeA, edgeB);
+    const Segment &p = m_a.mesh.topology.edges[edgeA], &q = m_b.mesh.topology.edges[edgeB];
+    const auto &positionsA = m_a.mesh.now, &positionsB = m_b.mesh.now;
+    const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(positionsA[p[0]], positionsA[p[1]],
+                                                           positionsB[q[0]], positionsB[q[1]]);
+    m_out.exactDecisions += answer.exact;
+    m_out.edgeEdge.push_back(contactOf(p, q, answer));
+  }
+
+  const MeshTriangle &m_a, &m_b;
+  ContactBuffers& m_out;
+  bool m_self;
+};
+
+}  // namespace
+
+void findIntersections(const MeshPair& pair, std::span<const TrianglePair> candidates,
+                       ContactBuffers& out) {
+  SignCounts counts;
+  for (TrianglePair candidate : candidates) {
+    if (pair.self() && candidate.b < candidate.a) std::swap(candidate.a, candidate.b);
+    const MeshTriangle a(pair.a, candidate.a), b(pair.b, candidate.b);
+    if (pair.self() && a.id == b.id) continue;
+    const TriangleIntersection meeting =
+        intersectTriangles(a.positions, b.positions, counts,
+                           pair.self() ? featuresInCommon(a, b) : ExcludedFeatures());
+    if (!meeting.intersect()) continue;
+    out.intersectingTriangles.push_back(candidate);
+    IntersectionContacts(a, b, out).add(meeting);
+  }
+  out.exactDecisions += counts.total();
+}
+
+void findIntersectionsByBruteForce(const MeshPair& pair, ContactBuffers& out) {
+  const auto countA = static_cast<std::uint32_t>(pair.a.topology.triangles.size());
+  const auto countB = static_cast<std::uint32_t>(pair.b.topology.triangles.size());
+  for (std::uint32_t a = 0; a < countA; ++a) {
+    for (std::uint32_t b = pair.self() ? a + 1 : 0; b < countB; ++b) {
+      const TrianglePair candidate{a, b};
+      findIntersections(pair, {&candidate, 1}, out);
+    }
+  }
+}
+
+}  // namespace palpate
