@@ -1,6 +1,7 @@
 #include "Octree/Traversal.h"
 
 #include <bit>
+#include <algorithm>
 #include <cmath>
 
 #undef HWY_TARGET_INCLUDE
@@ -89,7 +90,7 @@ class Walk {
     else if (leafB)
       descendA(pair);
     else
-      descendBoth(pair);
+      descendLarger(pair);
   }
 
  private:
@@ -170,6 +171,27 @@ class Walk {
   void pushChildrenOfB(OctreeNode a, OctreeNode blockB, std::uint32_t bits) {
     for (; bits; bits &= bits - 1)
       push(a, blockB * 8 + static_cast<unsigned>(std::countr_zero(bits)));
+  }
+
+  static float extent(const OctreeBlock* blocks, OctreeNode node) {
+    const OctreeBlock& block = blocks[node >> 3];
+    const unsigned slot = node & 7;
+    float longest = 0;
+    for (int k = 0; k < 3; ++k)
+      longest = std::max(longest, block.upper[k][slot] - block.lower[k][slot]);
+    return longest;
+  }
+
+  /// A node much larger than the other comes down alone, else the small one would be at its leaves
+  /// before the large one has come to its size.
+  HWY_ATTR void descendLarger(NodePair pair) {
+    const float a = extent(m_a, pair.a), b = extent(m_b, pair.b);
+    if (a > 4 * b)
+      descendA(pair);
+    else if (b > 4 * a)
+      descendB(pair);
+    else
+      descendBoth(pair);
   }
 
   HWY_ATTR void descendB(NodePair pair) {
