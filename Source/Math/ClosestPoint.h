@@ -37,4 +37,10 @@ bool comesNearer(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen
 bool liesInwards(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                  const Eigen::Vector3d& c);
 
+inline bool areFinite(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                      const Eigen::Vector3d& d) {
+  const Eigen::Vector3d zeros = 0.0 * a + 0.0 * b + 0.0 * c + 0.0 * d;  // NaN where not finite
+  return zeros == Eigen::Vector3d::Zero();
+}
+
 }  // namespace palpate

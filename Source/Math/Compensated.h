@@ -4,7 +4,21 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
+#include <cmath>
+
 namespace palpate {
+
+// Sums in one order, whatever Eigen would choose.
+inline double dot(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
+}
+inline double sumOfMagnitudes(const Eigen::Vector3d& a) {
+  return (std::abs(a[0]) + std::abs(a[1])) + std::abs(a[2]);
+}
+inline double largest(const Eigen::Vector3d& a) {
+  return std::max({std::abs(a[0]), std::abs(a[1]), std::abs(a[2])});
+}
 
 /// high + low exactly, each component of high the double nearest to it.
 struct Difference {
@@ -34,6 +48,8 @@ inline Difference sum(const Difference& a, const Difference& b) {
   return result;
 }
 
+inline Difference half(const Difference& a) { return {0.5 * a.high, 0.5 * a.low}; }
+
 /// m + s u + t v within 2^-53 of the result and 2^-78 of the terms; the same bits when (s, u) and
 /// (t, v) change places. s, t: at most 27 significant bits.
 inline Eigen::Vector3d combination(const Difference& m, double s, const Difference& u, double t,
@@ -61,23 +77,14 @@ inline Eigen::Vector3d combination(const Difference& m, double s, const Differen
   return result;
 }
 
-/// Component i of u x v before its two products are subtracted.
-struct Minor {
-  RoundedWithError plus, minus;
-};
-
-inline Minor minorOf(const Eigen::Vector3d& u, const Eigen::Vector3d& v, int i) {
-  const int j = (i + 1) % 3, k = (i + 2) % 3;
-  return {exactProduct(u[j], v[k], halves(v[k])), exactProduct(u[k], v[j], halves(v[j]))};
-}
-
 /// u x v within 2^-52 of each component and 2^-103 of |u| |v|; turns exactly when u and v change
 /// places.
 inline Eigen::Vector3d accurateCross(const Difference& u, const Difference& v) {
   Eigen::Vector3d result;
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3, k = (i + 2) % 3;
-    const auto [plus, minus] = minorOf(u.high, v.high, i);
+    const RoundedWithError plus = exactProduct(u.high[j], v.high[k], halves(v.high[k]));
+    const RoundedWithError minus = exactProduct(u.high[k], v.high[j], halves(v.high[j]));
     const RoundedWithError high = exactSum(plus.value, -minus.value);
     const double mixed = (u.high[j] * v.low[k] + u.low[j] * v.high[k]) -
                          (u.high[k] * v.low[j] + u.low[k] * v.high[j]);

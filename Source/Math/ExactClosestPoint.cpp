@@ -1,6 +1,7 @@
 #include "Math/ExactClosestPoint.h"
 
 #include "Math/Exact.h"
+#include "Math/WideInteger.h"
 
 #include <algorithm>
 #include <array>
@@ -108,68 +109,143 @@ Foot footFrom(const IntegerVector& a, const Integer& denominator, int exponent) 
   return foot;
 }
 
-int side(const IntegerVector& p, const IntegerVector& a, const IntegerVector& b,
-         const IntegerVector& normal) {
-  return sgn(dot(cross(b - a, p - a), normal));
+// ---- Signs, in integers of fixed width where the positions fit, else of any size ----
+
+using FixedVector = std::array<std::int64_t, 3>;
+
+FixedVector operator-(const FixedVector& a, const FixedVector& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+Int128 dot(const FixedVector& a, const FixedVector& b) {
+  return Int128{a[0]} * b[0] + Int128{a[1]} * b[1] + Int128{a[2]} * b[2];
+}
+std::array<Int128, 3> cross(const FixedVector& a, const FixedVector& b) {
+  return {Int128{a[1]} * b[2] - Int128{a[2]} * b[1], Int128{a[2]} * b[0] - Int128{a[0]} * b[2],
+          Int128{a[0]} * b[1] - Int128{a[1]} * b[0]};
+}
+Integer product(const Integer& a, const Integer& b) { return a * b; }
+using palpate::product;
+
+int signOf(const Integer& a) { return sgn(a); }
+int signOf(Int128 a) { return (a > 0) - (a < 0); }
+int signOf(const Int256& a) { return a.sign(); }
+
+/// decision(positions), as vectors of one kind of integer or the other.
+template <class Decision, class... Positions>
+auto decide(Decision&& decision, const Positions&... positions) {
+  if (const FixedGrid grid(positions...); grid.fits) return decision(grid.at);
+  return decision(Grid(positions...).at);
 }
 
-bool isAlong(const IntegerVector& p, const IntegerVector& a, const IntegerVector& b) {
-  return dot(p - a, b - a) > 0 && dot(p - b, a - b) > 0;
+template <class Vector>
+int signAlong(const Vector& p, const Vector& a, const Vector& b) {
+  return signOf(dot(p - a, b - a));
+}
+
+/// (ab x ap) . (ab x ac)
+template <class Vector>
+int signAside(const Vector& p, const Vector& a, const Vector& b, const Vector& c) {
+  const Vector ab = b - a, ac = c - a, ap = p - a;
+  const auto abab = dot(ab, ab), apac = dot(ap, ac), abac = dot(ab, ac), abap = dot(ab, ap);
+  const decltype(product(abab, apac)) sign = product(abab, apac) - product(abac, abap);
+  return signOf(sign);
+}
+
+template <class Vector>
+bool isAlong(const Vector& p, const Vector& a, const Vector& b) {
+  return signAlong(p, a, b) > 0 && signAlong(p, b, a) > 0;
+}
+
+template <class Vector>
+bool isZero(const Vector& a) {
+  return a[0] == 0 && a[1] == 0 && a[2] == 0;
 }
 
 /// Of a triangle without area: its longest edge, the first of equals.
-int longestEdge(const std::array<IntegerVector, 4>& at) {
+template <class Vector>
+int longestEdge(const std::array<Vector, 4>& at) {
   int longest = 0;
-  Integer most = -1;
-  for (int i = 0; i < 3; ++i) {
-    const IntegerVector edge = at[(i + 1) % 3] - at[i];
-    const Integer square = dot(edge, edge);
-    if (square > most) {
-      most = square;
-      longest = i;
-    }
+  for (int i = 1; i < 3; ++i) {
+    const Vector edge = at[(i + 1) % 3] - at[i], best = at[(longest + 1) % 3] - at[longest];
+    if (dot(edge, edge) > dot(best, best)) longest = i;
   }
   return longest;
+}
+
+/// at: the corners, then p.
+template <class Vector>
+TriangleFeature closestFeatureOf(const std::array<Vector, 4>& at) {
+  const Vector& p = at[3];
+  if (isZero(cross(at[1] - at[0], at[2] - at[0]))) {
+    const int edge = longestEdge(at), next = (edge + 1) % 3;
+    if (isAlong(p, at[edge], at[next])) return static_cast<TriangleFeature>(3 + edge);
+    return static_cast<TriangleFeature>(signAlong(p, at[edge], at[next]) <= 0 ? edge : next);
+  }
+  bool inside = true;
+  for (int i = 0; i < 3; ++i) {
+    const Vector &a = at[i], &b = at[(i + 1) % 3], &c = at[(i + 2) % 3];
+    if (signAside(p, a, b, c) > 0) continue;
+    if (isAlong(p, a, b)) return static_cast<TriangleFeature>(3 + i);
+    inside = false;
+  }
+  if (inside) return TriangleFeature::Face;
+  for (int i = 0; i < 2; ++i) {
+    if (signAlong(p, at[i], at[(i + 1) % 3]) <= 0 && signAlong(p, at[i], at[(i + 2) % 3]) <= 0)
+      return static_cast<TriangleFeature>(i);
+  }
+  return TriangleFeature::CornerC;
+}
+
+/// at: p0, p1, q0, q1.
+template <class Vector>
+Crossing crossingOf(const std::array<Vector, 4>& at) {
+  const Vector u = at[1] - at[0], v = at[3] - at[2], from = at[0] - at[2];
+  if (isZero(cross(u, v))) return Crossing::Parallel;
+  const auto uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), uf = dot(u, from), vf = dot(v, from);
+  using Product = decltype(product(uu, vv));  // not auto: sums of Integers are expressions
+  const Product determinant = product(uu, vv) - product(uv, uv);
+  const auto isInside = [&](const Product& numerator) {
+    const Product rest = determinant - numerator;
+    return signOf(numerator) > 0 && signOf(rest) > 0;
+  };
+  const Product s = product(uv, vf) - product(vv, uf), t = product(uu, vf) - product(uv, uf);
+  return isInside(s) && isInside(t) ? Crossing::Interior : Crossing::Outside;
 }
 
 }  // namespace
 
 int along(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
-  const Grid grid(p, a, b);
-  return sgn(dot(grid.at[0] - grid.at[1], grid.at[2] - grid.at[1]));
+  return decide([](const auto& at) { return signAlong(at[0], at[1], at[2]); }, p, a, b);
 }
 
 int side(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-  const Grid grid(p, a, b, c);
-  const auto& [ip, ia, ib, ic] = grid.at;
-  return side(ip, ia, ib, cross(ib - ia, ic - ia));
+  return decide([](const auto& at) { return signAside(at[0], at[1], at[2], at[3]); }, p, a, b, c);
 }
 
 TriangleFeature closestFeature(const Vector3d& p, const Vector3d& a, const Vector3d& b,
                                const Vector3d& c) {
-  const Grid grid(a, b, c, p);
-  const auto& at = grid.at;
-  const IntegerVector normal = cross(at[1] - at[0], at[2] - at[0]);
-  if (dot(normal, normal) == 0) {
-    const int edge = longestEdge(at);
-    const int next = (edge + 1) % 3;
-    if (isAlong(at[3], at[edge], at[next])) return static_cast<TriangleFeature>(3 + edge);
-    const bool beyondStart = dot(at[3] - at[edge], at[next] - at[edge]) <= 0;
-    return static_cast<TriangleFeature>(beyondStart ? edge : next);
-  }
-  bool inside = true;
-  for (int i = 0; i < 3; ++i) {
-    if (side(at[3], at[i], at[(i + 1) % 3], normal) > 0) continue;
-    if (isAlong(at[3], at[i], at[(i + 1) % 3])) return static_cast<TriangleFeature>(3 + i);
-    inside = false;
-  }
-  if (inside) return TriangleFeature::Face;
-  for (int i = 0; i < 2; ++i) {
-    const IntegerVector from = at[3] - at[i];
-    if (dot(from, at[(i + 1) % 3] - at[i]) <= 0 && dot(from, at[(i + 2) % 3] - at[i]) <= 0)
-      return static_cast<TriangleFeature>(i);
-  }
-  return TriangleFeature::CornerC;
+  return decide([](const auto& at) { return closestFeatureOf(at); }, a, b, c, p);
+}
+
+Crossing crossing(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0, const Vector3d& q1) {
+  return decide([](const auto& at) { return crossingOf(at); }, p0, p1, q0, q1);
+}
+
+bool areCollinear(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+  return decide([](const auto& at) { return isZero(cross(at[1] - at[0], at[2] - at[0])); }, a, b,
+                c);
+}
+
+bool areCoplanar(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
+  return decide(
+      [](const auto& at) {
+        const auto normal = cross(at[1] - at[0], at[2] - at[0]);
+        const auto from = at[3] - at[0];
+        const decltype(product(normal[0], from[0])) volume =
+            product(normal[0], from[0]) + product(normal[1], from[1]) + product(normal[2], from[2]);
+        return signOf(volume) == 0;
+      },
+      a, b, c, d);
 }
 
 Foot footOnPoint(const Vector3d& p, const Vector3d& a) {
@@ -216,14 +292,6 @@ struct Lines {
 };
 
 }  // namespace
-
-Crossing crossing(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0, const Vector3d& q1) {
-  const Lines lines(Grid(p0, p1, q0, q1).at);
-  if (lines.denominator == 0) return Crossing::Parallel;
-  const bool inside =
-      lines.s > 0 && lines.s < lines.denominator && lines.t > 0 && lines.t < lines.denominator;
-  return inside ? Crossing::Interior : Crossing::Outside;
-}
 
 Foot footBetweenLines(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0,
                       const Vector3d& q1) {

@@ -2,20 +2,12 @@
 
 #include <palpate/Distance.h>
 
-#include <optional>
+#include "Math/Foot.h"
 
 /// Closest points in integer arithmetic: every sign is true of the given doubles, every value
 /// within an ulp of its own. Any finite doubles. About fifty times as slow as floating point, and
 /// allocates.
 namespace palpate {
-
-/// From the foot of a perpendicular to what it was dropped from.
-struct Foot {
-  Eigen::Vector3d difference, direction;  ///< direction: unit; zero where the distance is
-  double distance;
-  double s, t;  ///< weights of the foot, multiples of 2^-53
-  bool exact;   ///< found in integers
-};
 
 /// How two edges lie to each other. Interior: their lines' closest points lie strictly inside both.
 /// Parallel: exactly, or one has no length.
@@ -35,6 +27,11 @@ int side(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector
 
 TriangleFeature closestFeature(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                                const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+
+/// Whether they lie on one line; in one plane.
+bool areCollinear(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+bool areCoplanar(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                 const Eigen::Vector3d& d);
 
 /// p seen from point a.
 Foot footOnPoint(const Eigen::Vector3d& p, const Eigen::Vector3d& a);

@@ -1,0 +1,183 @@
+#include "Math/Foot.h"
+
+#include "Math/ExactClosestPoint.h"
+#include "Math/Tolerances.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+
+/// A weight as a coarse part, a multiple of 2^-26, and the little that is missing.
+struct Weight {
+  double coarse, fine;
+};
+
+double toCoarse(double value) { return (value + kCoarseWeight) - kCoarseWeight; }
+/// To the nearest multiple of 2^-53, |value| below 1/4; turns with the value's sign.
+double toGrid(double value) { return (value + 0.75) - 0.75; }
+
+/// In [0, 1], multiples of 2^-53.
+double unitWeight(const Weight& weight) {
+  return std::clamp(weight.coarse + toGrid(weight.fine), 0.0, 1.0);
+}
+/// From [-1, 1] to the same; -w gives 1 minus what w gives.
+double halvedWeight(const Weight& weight) {
+  return std::clamp(0.5 * (1.0 + weight.coarse) + toGrid(0.5 * weight.fine), 0.0, 1.0);
+}
+
+bool isModerate(double extent) { return extent > kSmallestModerate && extent < kLargestModerate; }
+
+/// The vector from the middle of b to the middle of a; the same bits whichever end comes first.
+Difference betweenMiddles(const Vector3d& a0, const Vector3d& a1, const Vector3d& b0,
+                          const Vector3d& b1) {
+  return half(sum(difference(a0, -a1), difference(-b0, b1)));
+}
+
+/// What a weight of a foot runs over.
+enum class Range { ZeroToOne, MinusOneToOne };
+
+double weightOf(const Weight& weight, Range range) {
+  return range == Range::ZeroToOne ? unitWeight(weight) : halvedWeight(weight);
+}
+
+/// The foot of the perpendicular from the origin to the plane m + s u + t v by one Newton step from
+/// coarse weights, whose residual is compensated. None if floating point cannot tell it. The
+/// distance is left at zero where it may be that.
+///
+/// The same bits, mapped, when (u, s) and (v, t) change places.
+std::optional<Foot> footOnPlane(const Difference& m, const Difference& u, const Difference& v,
+                                Range range) {
+  const double edges = std::max(largest(u.high), largest(v.high));
+  const double extent = std::max(largest(m.high), range == Range::ZeroToOne ? edges : 2.0 * edges);
+  if (!isModerate(extent)) return {};
+  const double square = dot(u.high, u.high) * dot(v.high, v.high);
+  Vector3d normal = u.high.cross(v.high);
+  double normalSquare = dot(normal, normal);
+  bool accurate = false;
+  const auto makeAccurate = [&] {
+    normal = accurateCross(u, v);
+    normalSquare = dot(normal, normal);
+    accurate = true;
+  };
+  if (!(normalSquare > kNarrowAngleSquare * square)) makeAccurate();
+  if (!(normalSquare > kSliverAngleSquare * square)) return {};
+
+  const auto sOf = [&](const Vector3d& from) {
+    return -dot(from.cross(v.high), normal) / normalSquare;
+  };
+  const auto tOf = [&](const Vector3d& from) {
+    return -dot(u.high.cross(from), normal) / normalSquare;
+  };
+  Weight s, t;
+  s.coarse = toCoarse(std::clamp(sOf(m.high), -1.0, 1.0));
+  t.coarse = toCoarse(std::clamp(tOf(m.high), -1.0, 1.0));
+  const Vector3d residual = combination(m, s.coarse, u, t.coarse, v);
+
+  double length = std::sqrt(normalSquare), height = dot(normal, residual) / length;
+  // The plain normal is off by 5 u |u| |v| / |n| and 4 u more, u the rounding unit; it may be by 7
+  // u times the extent over the height.
+  const double factors = std::sqrt(square);
+  if (!accurate && !(std::abs(height) * (5.0 * factors + 4.0 * length) < 7.0 * extent * length)) {
+    makeAccurate();
+    length = std::sqrt(normalSquare);
+    height = dot(normal, residual) / length;
+  }
+  const Vector3d tangential = residual - normal * (dot(normal, residual) / normalSquare);
+  s.fine = sOf(tangential);
+  t.fine = tOf(tangential);
+  if (!(std::abs(s.fine) < kFineWeight && std::abs(t.fine) < kFineWeight)) return {};
+  Foot foot{Vector3d::Zero(), Vector3d::Zero(), 0.0, weightOf(s, range), weightOf(t, range), false};
+  if (!(std::abs(height) > kTouching * extent)) return foot;
+  foot.direction = normal / (height < 0.0 ? -length : length);
+  foot.distance = std::abs(height);
+  foot.difference = foot.distance * foot.direction;
+  return foot;
+}
+
+/// foot: of four points' plane or lines, whose distance is zero if they lie in one plane.
+bool isTrue(std::optional<Foot>& foot, const Vector3d& a, const Vector3d& b, const Vector3d& c,
+            const Vector3d& d) {
+  if (!foot || foot->distance > 0.0) return foot.has_value();
+  foot->exact = true;
+  return exact::areCoplanar(a, b, c, d);
+}
+
+}  // namespace
+
+Foot footOnPoint(const Vector3d& p, const Vector3d& a) {
+  const Vector3d difference = p - a;
+  const double extent = largest(difference);
+  if (extent == 0.0) return {difference, Vector3d::Zero(), 0.0, 0.0, 0.0, false};
+  if (!isModerate(extent)) return exact::footOnPoint(p, a);
+  const double distance = std::sqrt(dot(difference, difference));
+  return {difference, difference / distance, distance, 0.0, 0.0, false};
+}
+
+Foot footOnLine(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
+  const Difference m = betweenMiddles(p, p, a, b), edge = half(difference(b, a));
+  const double extent = std::max(largest(m.high), largest(edge.high));
+  if (!isModerate(extent)) return exact::footOnLine(p, a, b);
+  const double square = dot(edge.high, edge.high);
+  Weight weight;
+  weight.coarse = toCoarse(std::clamp(dot(m.high, edge.high) / square, -1.0, 1.0));
+  const Vector3d residual = combination(m, -weight.coarse, edge);
+  weight.fine = dot(residual, edge.high) / square;
+  // NaN, of an edge too short to square, is not below either.
+  if (!(std::abs(weight.fine) < kFineWeight)) return exact::footOnLine(p, a, b);
+  const Vector3d difference = residual - weight.fine * edge.high;
+  if (!(largest(difference) > kTouching * extent)) {
+    if (!exact::areCollinear(p, a, b)) return exact::footOnLine(p, a, b);
+    return {Vector3d::Zero(), Vector3d::Zero(), 0.0, halvedWeight(weight), 0.0, true};
+  }
+  const double length = std::sqrt(dot(difference, difference));
+  return {difference, difference / length, length, halvedWeight(weight), 0.0, false};
+}
+
+Foot footOnFace(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+  std::optional<Foot> foot =
+      footOnPlane(difference(p, a), difference(a, b), difference(a, c), Range::ZeroToOne);
+  return isTrue(foot, p, a, b, c) ? *foot : exact::footOnPlane(p, a, b, c);
+}
+
+EdgePair::EdgePair(const Vector3d& newP0, const Vector3d& newP1, const Vector3d& newQ0,
+                   const Vector3d& newQ1)
+    : p0(newP0),
+      p1(newP1),
+      q0(newQ0),
+      q1(newQ1),
+      m(betweenMiddles(p0, p1, q0, q1)),
+      u(half(difference(p1, p0))),
+      v(half(difference(q0, q1))) {}
+
+Foot footBetweenEdges(const EdgePair& edges) {
+  std::optional<Foot> foot = footOnPlane(edges.m, edges.u, edges.v, Range::MinusOneToOne);
+  const auto& [p0, p1, q0, q1, m, u, v] = edges;
+  return isTrue(foot, p0, p1, q0, q1) ? *foot : exact::footBetweenLines(p0, p1, q0, q1);
+}
+
+Vector3d unitCross(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
+  const Difference u = difference(b, a), v = difference(d, c);
+  if (isModerate(largest(u.high)) && isModerate(largest(v.high))) {
+    const Vector3d normal = accurateCross(u, v);
+    const double square = dot(normal, normal);
+    if (square > kSliverAngleSquare * dot(u.high, u.high) * dot(v.high, v.high))
+      return normal / std::sqrt(square);
+  }
+  return exact::unitCross(a, b, c, d);
+}
+
+Vector3d axisOfLeast(const Vector3d& extents) {
+  int axis;
+  extents.minCoeff(&axis);
+  return Vector3d::Unit(axis);
+}
+
+}  // namespace palpate

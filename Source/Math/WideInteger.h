@@ -1,0 +1,100 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+namespace palpate {
+
+__extension__ using Int128 = __int128;
+__extension__ using UnsignedInt128 = unsigned __int128;
+
+/// Two's complement.
+struct Int256 {
+  UnsignedInt128 high = 0, low = 0;
+
+  int sign() const { return static_cast<Int128>(high) < 0 ? -1 : (high | low) != 0; }
+  friend Int256 operator+(const Int256& a, const Int256& b) {
+    const UnsignedInt128 low = a.low + b.low;
+    return {a.high + b.high + (low < a.low), low};
+  }
+  friend Int256 operator-(const Int256& a, const Int256& b) {
+    return {a.high - b.high - (a.low < b.low), a.low - b.low};
+  }
+};
+
+inline Int256 product(Int128 a, Int128 b) {
+  const auto magnitude = [](Int128 x) { return static_cast<UnsignedInt128>(x < 0 ? -x : x); };
+  const auto low = [](UnsignedInt128 x) { return static_cast<std::uint64_t>(x); };
+  const UnsignedInt128 x = magnitude(a), y = magnitude(b);
+  const UnsignedInt128 ll = UnsignedInt128{low(x)} * low(y),
+                       lh = UnsignedInt128{low(x)} * low(y >> 64);
+  const UnsignedInt128 hl = UnsignedInt128{low(x >> 64)} * low(y),
+                       hh = UnsignedInt128{low(x >> 64)} * low(y >> 64);
+  const UnsignedInt128 middle = (ll >> 64) + low(lh) + low(hl);
+  const Int256 result{hh + (lh >> 64) + (hl >> 64) + (middle >> 64), middle << 64 | low(ll)};
+  return (a < 0) == (b < 0) ? result : Int256{} - result;
+}
+
+/// Positions as integers in units of a power of two, exactly, where differences fit 61 bits: of
+/// meshes near each other whose coordinates have not many more bits than a double.
+template <std::size_t Count>
+struct FixedGrid {
+  std::array<std::array<std::int64_t, 3>, Count> at;  ///< relative to the first
+  bool fits = true;
+
+  template <class... Positions>
+  explicit FixedGrid(const Positions&... positions) {
+    const std::array<const Eigen::Vector3d*, Count> all{&positions...};
+    int lowest = kHighestBit, highest = -kHighestBit;
+    for (const Eigen::Vector3d* position : all) {
+      for (const double x : *position) {
+        const auto [mantissa, exponent] = split(x);
+        if (mantissa == 0) continue;
+        lowest = std::min(lowest, exponent + std::countr_zero(mantissa));
+        highest = std::max(highest, exponent + 53);
+      }
+    }
+    fits = highest - lowest <= 120;
+    for (int i = 0; i < 3 && fits; ++i) {
+      const Int128 origin = integer((*all[0])[i], lowest);
+      for (std::size_t n = 0; n < Count; ++n) {
+        const Int128 relative = integer((*all[n])[i], lowest) - origin;
+        fits = fits && relative < kLimit && relative > -kLimit;
+        at[n][i] = static_cast<std::int64_t>(relative);
+      }
+    }
+  }
+
+ private:
+  static constexpr int kHighestBit = 2000;
+  static constexpr Int128 kLimit = Int128{1} << 60;  // differences of two stay below 2^61
+
+  struct Parts {
+    std::uint64_t mantissa;
+    int exponent;
+  };
+  /// |x| = mantissa 2^exponent.
+  static Parts split(double x) {
+    const auto bits = std::bit_cast<std::uint64_t>(x);
+    const int exponent = static_cast<int>(bits >> 52 & 0x7ff);
+    const std::uint64_t fraction = bits & ((std::uint64_t{1} << 52) - 1);
+    if (exponent == 0) return {fraction, -1074};
+    return {fraction | std::uint64_t{1} << 52, exponent - 1075};
+  }
+  static Int128 integer(double x, int lowest) {
+    const auto [mantissa, exponent] = split(x);
+    if (mantissa == 0) return 0;
+    const int shift = exponent - lowest;
+    const Int128 magnitude = shift >= 0 ? Int128{mantissa} << shift : Int128{mantissa >> -shift};
+    return x < 0 ? -magnitude : magnitude;
+  }
+};
+template <class... Positions>
+FixedGrid(const Positions&...) -> FixedGrid<sizeof...(Positions)>;
+
+}  // namespace palpate
