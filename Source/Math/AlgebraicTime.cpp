@@ -1,6 +1,7 @@
 #include "Math/AlgebraicTime.h"
 
 #include "Math/CubicRoot.h"
+#include "Math/Tolerances.h"
 
 #include <algorithm>
 #include <cmath>
@@ -145,7 +146,7 @@ void CubicTime::bracket(double lower, double upper) {
   b[1] /= 3.0;
   b[2] /= 3.0;
   const double t = approximateRoot(b, lower, std::max(lower, upper), m_rising);
-  for (const double width : {0x1p-50, 0x1p-42, 0x1p-32}) {
+  for (const double width : {kNarrowestBracket, 0x1p-42, 0x1p-32}) {
     const double low = std::max(t - width, 0.0), high = std::min(t + width, 1.0);
     if (compare(low) >= 0 && compare(high) <= 0) {
       m_low = low;
@@ -172,7 +173,7 @@ int CubicTime::sign(const Form<2>& form) const {
 
   QuadraticBernstein b = toDoubles(form);
   b[1] *= 0.5;
-  const double error = 0x1p-46;  // of coefficients up to 1: conversion 2^-51, blossom 2^-49
+  const double error = kFormError;
   const double low = blossom(b, m_low, m_low), middle = blossom(b, m_low, m_high),
                high = blossom(b, m_high, m_high);
   if (low > error && middle > error && high > error) return 1;

@@ -1,5 +1,6 @@
 #include "Math/ImpactQuery.h"
 #include "Math/RelativeMotion.h"
+#include "Math/Tolerances.h"
 
 #include <algorithm>
 #include <array>
@@ -23,7 +24,7 @@ ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance) {
   for (const auto& ends : motion.corner)
     displacement = std::max(displacement, (ends[1] - ends[0]).norm());
   const double near =
-      distance + tolerance * displacement + 0x1p-41 * (largest.maxCoeff() + distance);
+      distance + tolerance * displacement + kApproachSlack * (largest.maxCoeff() + distance);
 
   // What is left, later pieces first. With slack, each cover is at least `tolerance` wide and
   // usually far wider; the limits bound the time whatever the motion, and report an impact where

@@ -1,6 +1,7 @@
 #include "Math/CubicRoot.h"
 #include "Math/ImpactQuery.h"
 #include "Math/RelativeMotion.h"
+#include "Math/Tolerances.h"
 
 #include <algorithm>
 #include <optional>
@@ -33,7 +34,7 @@ Coplanarity coplanarity(const RelativeMotion<kind>& motion) {
                  r = c[0].cwiseAbs().cwiseMax(c[1].cwiseAbs());
   const double permanent = r[0] * (p[1] * q[2] + p[2] * q[1]) + r[1] * (p[2] * q[0] + p[0] * q[2]) +
                            r[2] * (p[0] * q[1] + p[1] * q[0]);
-  result.error = 16.0 * kRoundoff * permanent + kUnderflow;
+  result.error = kCoplanarityError * permanent + kImpactUnderflow;
   return result;
 }
 
@@ -101,7 +102,7 @@ template <Kind kind>
 std::optional<Interval> ImpactSearch<kind>::bracketRoot(const Interval& piece,
                                                         int signAfter) const {
   const double t = approximateRoot(m_cubic, piece.low, piece.high, signAfter);
-  for (double width = 0x1p-50; width <= m_tolerance; width *= 64.0) {
+  for (double width = kNarrowestBracket; width <= m_tolerance; width *= 64.0) {
     const Interval bracket{std::max(t - width, piece.low), std::min(t + width, piece.high)};
     if (signAfter * blossom(m_cubic, bracket.low, bracket.low, bracket.low) < -m_error &&
         signAfter * blossom(m_cubic, bracket.high, bracket.high, bracket.high) > m_error)
@@ -126,8 +127,8 @@ struct CrossComponent {
     const QuadraticBernstein whole{cross(0, 0), 0.5 * (cross(0, 1) + cross(1, 0)), cross(1, 1)};
     coefficients = {blossom(whole, t.low, t.low), blossom(whole, t.low, t.high),
                     blossom(whole, t.high, t.high)};
-    error = 32.0 * kRoundoff * (largest(l, i) * largest(r, j) + largest(l, j) * largest(r, i)) +
-            kUnderflow;
+    error = kCrossError * (largest(l, i) * largest(r, j) + largest(l, j) * largest(r, i)) +
+            kImpactUnderflow;
   }
   CrossComponent operator-(const CrossComponent& other) const {
     CrossComponent difference = *this;
@@ -164,12 +165,12 @@ typename ImpactSearch<kind>::Verdict ImpactSearch<kind>::judge(const Interval& b
 
 template <Kind kind>
 std::optional<ImpactAnswer> ImpactSearch<kind>::run() {
-  if (!(m_largest.maxCoeff() <= kLargestDifference)) return {};
+  if (!(m_largest.maxCoeff() <= kLargestImpactDifference)) return {};
   const Coplanarity cubic = coplanarity(m_motion);
   if (certainSign(cubic.coefficients, cubic.error) != 0) return ImpactAnswer{};
   m_cubic = cubic.coefficients;
   const double largest = largestMagnitude(m_cubic);
-  m_error = cubic.error + 16.0 * kRoundoff * largest;
+  m_error = cubic.error + kBlossomError * largest;
   const bool alwaysCoplanar = largest <= cubic.error;
 
   // What is left of the step, later pieces first.

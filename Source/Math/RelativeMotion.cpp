@@ -1,6 +1,7 @@
 #include "Math/RelativeMotion.h"
 
 #include "Math/CubicRoot.h"
+#include "Math/Tolerances.h"
 
 #include <algorithm>
 
@@ -17,9 +18,6 @@ Vector3d awayFromSegment(const Vector3d& point, const Vector3d& segment) {
   if (along >= lengthSquared) return point - segment;
   return point - (along / lengthSquared) * segment;
 }
-
-/// Below this a length loses precision to underflow.
-constexpr double kShortestDirection = 0x1p-500;
 
 }  // namespace
 
@@ -55,12 +53,9 @@ Separation bestSeparation(const RelativeMotion<kind>& motion, double t) {
 template <ImpactQuery::Kind kind>
 Interval separatedAround(double t, const RelativeMotion<kind>& motion, const Vector3d& largest,
                          const Separation& separation, double distance) {
-  // A corner along the direction: its components are off by u, the dot product by 3 u of the sum of
-  // magnitudes; between() adds 3 u of the larger end, the limit below 4 u more.
   const double error =
-      16.0 * kRoundoff *
-          (separation.direction.cwiseAbs().dot(largest) + distance * separation.length) +
-      kUnderflow;
+      kAlongError * (separation.direction.cwiseAbs().dot(largest) + distance * separation.length) +
+      kImpactUnderflow;
   const double needed = distance * separation.length + error;
   Interval interval{0.0, 1.0};
   for (const auto& ends : motion.corner) {

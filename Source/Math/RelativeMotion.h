@@ -9,22 +9,13 @@
 
 namespace palpate {
 
-/// What rounding can do to one operation, relative.
-constexpr double kRoundoff = 0x1p-53;
-
-/// The bounds in this room's impact tests hold for coordinate differences up to 2^200, where no
-/// product overflows and all that underflow can lose, under 2^-800, is within kUnderflow.
-/// (Differences of doubles underflow exactly.)
-constexpr double kLargestDifference = 0x1p200;
-constexpr double kUnderflow = 0x1p-700;
-
 struct Interval {
   double low, high;
   bool empty() const { return !(low <= high); }
 };
 
 /// An ImpactQuery's A, B, C, and the corners of C - x A - y B, at both ends of the step, in
-/// doubles. Each component is within kRoundoff of the real one, relative, with its exact sign.
+/// doubles. Each component is the real one rounded once, with its exact sign.
 template <ImpactQuery::Kind kind>
 struct RelativeMotion {
   static constexpr bool square = kind == ImpactQuery::Kind::EdgeEdge;

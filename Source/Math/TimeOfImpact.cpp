@@ -1,14 +1,17 @@
 #include <palpate/TimeOfImpact.h>
 
 #include "Math/ImpactQuery.h"
+#include "Math/Tolerances.h"
+
+#include <algorithm>
 
 namespace palpate {
 
 ImpactAnswer findImpact(const ImpactQuery& query, const TimeOfImpactSettings& settings) {
   // A tolerance that is no number counts as the smallest.
-  const double tolerance = settings.tolerance > 0x1p-50
-                               ? (settings.tolerance < 1.0 ? settings.tolerance : 1.0)
-                               : 0x1p-50;
+  const double tolerance = settings.tolerance > kSmallestTimeTolerance
+                               ? std::min(settings.tolerance, 1.0)
+                               : kSmallestTimeTolerance;
   return settings.minimumDistance > 0.0 ? findApproach(query, settings.minimumDistance, tolerance)
                                         : findTouch(query, tolerance);
 }

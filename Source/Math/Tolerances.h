@@ -48,4 +48,37 @@ constexpr double kNarrowAngleSquare = 0x1p-16;
 /// Squared sine below which the compensated Newton step is left to integers.
 constexpr double kSliverAngleSquare = 0x1p-40;
 
+// ---- Impacts (RelativeMotion.cpp, FindTouch.cpp, FindApproach.cpp, ImpactFilter.cpp) ----
+
+/// L. Bounds hold for coordinate differences up to this: no product overflows, and all that
+/// underflow can lose, under 2^-800, is within kImpactUnderflow.
+constexpr double kLargestImpactDifference = 0x1p200;
+constexpr double kImpactUnderflow = 0x1p-700;
+/// Of a Bernstein coefficient of det(A, B, C), relative to the permanent of the largest magnitudes
+/// over the step, of whose terms none is exceeded: 11 u (three differences, two products, at most
+/// six sums and a division) and the permanent's own rounding.
+constexpr double kCoplanarityError = 16 * 0x1p-53;
+/// Of restricting a polynomial to part of the step, relative to its largest coefficient: nine
+/// roundings and those of the weights.
+constexpr double kBlossomError = 16 * 0x1p-53;
+/// Of a Bernstein coefficient of a component of a cross product restricted to part of the step,
+/// relative to the sum of the two products' largest magnitudes: 8 u, and 6 u from restricting.
+constexpr double kCrossError = 32 * 0x1p-53;
+/// Of a corner's position along a direction, relative to the sum of the products' magnitudes: 1 u
+/// from the difference, 3 u from the dot product, 4 u from interpolating in time, and the same
+/// again for what it is compared with.
+constexpr double kAlongError = 16 * 0x1p-53;
+/// Below this a direction's length loses precision to underflow.
+constexpr double kShortestDirection = 0x1p-500;
+/// Of the step: brackets of roots start this wide to either side.
+constexpr double kNarrowestBracket = 0x1p-50;
+/// Of the step: the smallest tolerance that is kept.
+constexpr double kSmallestTimeTolerance = 0x1p-50;
+/// Relative to the largest coordinate difference and the minimum distance, in findApproach(): well
+/// above what rounding does to the distance it computes.
+constexpr double kApproachSlack = 0x1p-41;
+/// Of a form's Bernstein coefficient converted to double and restricted, relative to the largest
+/// coefficient (CubicTime::sign()): 2^-51 and kBlossomError.
+constexpr double kFormError = 0x1p-46;
+
 }  // namespace palpate

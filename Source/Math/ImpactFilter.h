@@ -1,0 +1,28 @@
+#pragma once
+
+#include "Math/ImpactQuery.h"
+
+#include <cstdint>
+
+namespace palpate {
+
+/// Eight queries of one kind, side by side. Lanes that hold no query may hold any finite numbers.
+struct ImpactBlock {
+  static constexpr int kLanes = 8;
+  alignas(64) double positions[4][2][3][kLanes] = {};  ///< vertex, end of the step, coordinate
+
+  void set(int lane, int vertex, const Eigen::Vector3d& before, const Eigen::Vector3d& now) {
+    for (int k = 0; k < 3; ++k) {
+      positions[vertex][0][k][lane] = before[k];
+      positions[vertex][1][k][lane] = now[k];
+    }
+  }
+};
+
+/// Throws out most queries without an impact: bit i is set where query i may have one, and
+/// clear only where certainly not.
+/// Shapes   distance: 0 or the minimum distance, L.
+/// Cost     a few tens of nanoseconds a query.
+std::uint8_t mayImpact(ImpactQuery::Kind, const ImpactBlock&, double distance);
+
+}  // namespace palpate
