@@ -17,7 +17,7 @@ using Kind = ImpactQuery::Kind;
 /// after. Where they are within distance + slack an impact is reported, and from then on only
 /// earlier times matter.
 template <Kind kind>
-ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance) {
+ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, double upTo) {
   const RelativeMotion<kind> motion(query);
   const Eigen::Vector3d largest = motion.largestDifference();
   double displacement = 0.0;
@@ -32,7 +32,7 @@ ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance) {
   constexpr int kMostPieces = 64, kMostSteps = 4096;
   std::array<Interval, kMostPieces> pieces;
   int count = 0;
-  pieces[count++] = {0.0, 1.0};
+  pieces[count++] = {0.0, upTo};
   ImpactAnswer answer;
   for (int step = 0; count > 0; ++step) {
     const Interval piece = pieces[--count];
@@ -66,7 +66,8 @@ double scaleFor(const ImpactQuery& query) {
 
 }  // namespace
 
-ImpactAnswer findApproach(const ImpactQuery& query, double distance, double tolerance) {
+ImpactAnswer findApproach(const ImpactQuery& query, double distance, double tolerance,
+                          double upTo) {
   const double scale = scaleFor(query);
   std::array<Eigen::Vector3d, 8> positions;
   ImpactQuery scaled{query.kind, {}};
@@ -74,9 +75,13 @@ ImpactAnswer findApproach(const ImpactQuery& query, double distance, double tole
     for (int end = 0; end < 2; ++end) positions[2 * i + end] = scale * query.vertices[i].at(end);
     scaled.vertices[i] = {&positions[2 * i], &positions[2 * i + 1]};
   }
-  return query.kind == Kind::VertexTriangle
-             ? find<Kind::VertexTriangle>(scaled, distance * scale, tolerance)
-             : find<Kind::EdgeEdge>(scaled, distance * scale, tolerance);
+  const auto search = [&](double end) {
+    return query.kind == Kind::VertexTriangle
+               ? find<Kind::VertexTriangle>(scaled, distance * scale, tolerance, end)
+               : find<Kind::EdgeEdge>(scaled, distance * scale, tolerance, end);
+  };
+  const ImpactAnswer answer = search(upTo);
+  return answer.impact && upTo < 1.0 ? search(1.0) : answer;
 }
 
 }  // namespace palpate

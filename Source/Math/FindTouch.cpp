@@ -78,7 +78,7 @@ class ImpactSearch {
       : m_motion(motion), m_tolerance(tolerance), m_largest(motion.largestDifference()) {}
 
   /// None: undecided.
-  std::optional<ImpactAnswer> run();
+  std::optional<ImpactAnswer> run(double upTo);
 
  private:
   enum class Verdict { Inside, Outside, Unknown };
@@ -164,7 +164,7 @@ typename ImpactSearch<kind>::Verdict ImpactSearch<kind>::judge(const Interval& b
 }
 
 template <Kind kind>
-std::optional<ImpactAnswer> ImpactSearch<kind>::run() {
+std::optional<ImpactAnswer> ImpactSearch<kind>::run(double upTo) {
   if (!(m_largest.maxCoeff() <= kLargestImpactDifference)) return {};
   const Coplanarity cubic = coplanarity(m_motion);
   if (certainSign(cubic.coefficients, cubic.error) != 0) return ImpactAnswer{};
@@ -177,7 +177,7 @@ std::optional<ImpactAnswer> ImpactSearch<kind>::run() {
   constexpr int kMostPieces = 16, kMostSteps = 32;
   std::array<Interval, kMostPieces> pieces;
   int count = 0;
-  pieces[count++] = {0.0, 1.0};
+  pieces[count++] = {0.0, upTo};
   for (int step = 0; count > 0; ++step) {
     if (step == kMostSteps || count + 2 > kMostPieces) return {};
     const Interval piece = pieces[--count];
@@ -210,18 +210,20 @@ std::optional<ImpactAnswer> ImpactSearch<kind>::run() {
 }
 
 template <Kind kind>
-ImpactAnswer find(const ImpactQuery& query, double tolerance) {
+ImpactAnswer find(const ImpactQuery& query, double tolerance, double upTo) {
   const RelativeMotion<kind> motion(query);
   if (motion.boxesSeparate()) return {};
-  if (const auto answer = ImpactSearch<kind>(motion, tolerance).run()) return *answer;
-  return findTouchExactly(query, tolerance);
+  ImpactSearch<kind> search(motion, tolerance);
+  std::optional<ImpactAnswer> answer = search.run(upTo);
+  if (answer && answer->impact && upTo < 1.0) answer = search.run(1.0);
+  return answer ? *answer : findTouchExactly(query, tolerance);
 }
 
 }  // namespace
 
-ImpactAnswer findTouch(const ImpactQuery& query, double tolerance) {
-  return query.kind == Kind::VertexTriangle ? find<Kind::VertexTriangle>(query, tolerance)
-                                            : find<Kind::EdgeEdge>(query, tolerance);
+ImpactAnswer findTouch(const ImpactQuery& query, double tolerance, double upTo) {
+  return query.kind == Kind::VertexTriangle ? find<Kind::VertexTriangle>(query, tolerance, upTo)
+                                            : find<Kind::EdgeEdge>(query, tolerance, upTo);
 }
 
 }  // namespace palpate

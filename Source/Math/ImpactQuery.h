@@ -47,14 +47,20 @@ struct ImpactAnswer {
   double time = 0.0;   ///< [0, 1] of the step; of an impact only
 };
 
-/// As vertexTriangleTimeOfImpact and edgeEdgeTimeOfImpact.
-ImpactAnswer findImpact(const ImpactQuery&, const TimeOfImpactSettings&);
+/// As vertexTriangleTimeOfImpact and edgeEdgeTimeOfImpact. An impact after upTo, in [0, 1], may be
+/// left out; the time of one that is found does not depend on upTo.
+ImpactAnswer findImpact(const ImpactQuery&, const TimeOfImpactSettings&, double upTo = 1.0);
 
 /// Its parts; tolerance in [2^-50, 1]. Touching: floating point first, then exact arithmetic.
-ImpactAnswer findTouch(const ImpactQuery&, double tolerance);
+ImpactAnswer findTouch(const ImpactQuery&, double tolerance, double upTo = 1.0);
 /// The same answer by exact arithmetic alone.
 ImpactAnswer findTouchExactly(const ImpactQuery&, double tolerance);
 /// Coming within a distance > 0.
-ImpactAnswer findApproach(const ImpactQuery&, double distance, double tolerance);
+ImpactAnswer findApproach(const ImpactQuery&, double distance, double tolerance, double upTo = 1.0);
+
+/// The side of the contact plane on which the first feature was last before the time: 1 if that of
+/// A x B, the triangle's winding normal or (p1 - p0) x (q0 - q1), towards which C points; else -1;
+/// 0 if it was always in the plane.
+int sideBefore(const ImpactQuery&, double time);
 
 }  // namespace palpate

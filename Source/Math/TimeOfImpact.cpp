@@ -7,13 +7,15 @@
 
 namespace palpate {
 
-ImpactAnswer findImpact(const ImpactQuery& query, const TimeOfImpactSettings& settings) {
+ImpactAnswer findImpact(const ImpactQuery& query, const TimeOfImpactSettings& settings,
+                        double upTo) {
   // A tolerance that is no number counts as the smallest.
   const double tolerance = settings.tolerance > kSmallestTimeTolerance
                                ? std::min(settings.tolerance, 1.0)
                                : kSmallestTimeTolerance;
-  return settings.minimumDistance > 0.0 ? findApproach(query, settings.minimumDistance, tolerance)
-                                        : findTouch(query, tolerance);
+  return settings.minimumDistance > 0.0
+             ? findApproach(query, settings.minimumDistance, tolerance, upTo)
+             : findTouch(query, tolerance, upTo);
 }
 
 namespace {

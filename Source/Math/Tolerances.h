@@ -80,5 +80,7 @@ constexpr double kApproachSlack = 0x1p-41;
 /// Of a form's Bernstein coefficient converted to double and restricted, relative to the largest
 /// coefficient (CubicTime::sign()): 2^-51 and kBlossomError.
 constexpr double kFormError = 0x1p-46;
+/// Of det(A, B, C) with components up to 1 (sideBefore()): six terms of 12 u, twice.
+constexpr double kSideError = 0x1p-46;
 
 }  // namespace palpate

@@ -1,0 +1,190 @@
+#include "NarrowPhase/Continuous.h"
+
+#include "NarrowPhase/Proximity.h"
+#include "Math/ClosestPoint.h"
+#include "Math/ImpactFilter.h"
+#include "Math/ImpactQuery.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+using Kind = ImpactQuery::Kind;
+
+/// The two meshes that feature pairs of one kind come from: vertices of the first with triangles of
+/// the second, or edges of each.
+template <Kind kind>
+struct Features {
+  const TriangleMesh& first;
+  const TriangleMesh& second;
+
+  std::array<std::uint32_t, 4> vertices(std::uint32_t inFirst, std::uint32_t inSecond) const {
+    if constexpr (kind == Kind::VertexTriangle) {
+      const auto& [a, b, c] = second.topology.triangles[inSecond];
+      return {inFirst, a, b, c};
+    } else {
+      const Segment &p = first.topology.edges[inFirst], &q = second.topology.edges[inSecond];
+      return {p[0], p[1], q[0], q[1]};
+    }
+  }
+  const TriangleMesh& meshOf(int vertex) const {
+    return vertex < (kind == Kind::VertexTriangle ? 1 : 2) ? first : second;
+  }
+  ImpactQuery query(std::uint32_t inFirst, std::uint32_t inSecond) const {
+    const auto ids = vertices(inFirst, inSecond);
+    ImpactQuery result{kind, {}};
+    for (int i = 0; i < 4; ++i)
+      result.vertices[i] = {&meshOf(i).before[ids[i]], &meshOf(i).now[ids[i]]};
+    return result;
+  }
+};
+
+/// f(features, inFirst, inSecond, ofSecond) for those pairs that may meet, eight at a time.
+/// ofSecond: pairs name a feature of `second` first.
+template <bool ofSecond, Kind kind, class F>
+void filterPairs(const Features<kind>& features, std::span<const FeaturePair> pairs,
+                 double thickness, F&& f) {
+  ImpactBlock block;
+  const auto test = [&](const FeaturePair& pair, auto&& with) {
+    return ofSecond ? with(pair.b, pair.a) : with(pair.a, pair.b);
+  };
+  for (std::size_t begin = 0; begin < pairs.size(); begin += ImpactBlock::kLanes) {
+    const auto eight =
+        pairs.subspan(begin, std::min<std::size_t>(ImpactBlock::kLanes, pairs.size() - begin));
+    for (int lane = 0; lane < static_cast<int>(eight.size()); ++lane)
+      test(eight[lane], [&](std::uint32_t inFirst, std::uint32_t inSecond) {
+        const auto ids = features.vertices(inFirst, inSecond);
+        for (int i = 0; i < 4; ++i) {
+          const TriangleMesh& mesh = features.meshOf(i);
+          block.set(lane, i, mesh.before[ids[i]], mesh.now[ids[i]]);
+        }
+      });
+    unsigned lanes = mayImpact(kind, block, thickness) & ((1u << eight.size()) - 1);
+    for (; lanes != 0; lanes &= lanes - 1)
+      test(eight[std::countr_zero(lanes)], [&](std::uint32_t inFirst, std::uint32_t inSecond) {
+        f(features, inFirst, inSecond, ofSecond);
+      });
+  }
+}
+
+/// The same for every feature pair that the candidates own. ofSecond: the first feature is of the
+/// pair's second mesh.
+template <class F>
+void forEachLikelyPair(const MeshPair& pair, std::span<const TrianglePair> candidates,
+                       ContactBuffers& out, F&& f) {
+  FeaturePairs& pairs = out.features;
+  findFeaturePairs(pair.a.topology, pair.b.topology, pair.floats, candidates, pairs);
+  out.featurePairs += pairs.owned;
+  const double thickness = pair.settings.thickness;
+  filterPairs<false>(Features<Kind::VertexTriangle>{pair.a, pair.b}, pairs.vertexTriangle,
+                     thickness, f);
+  filterPairs<true>(Features<Kind::VertexTriangle>{pair.b, pair.a}, pairs.triangleVertex, thickness,
+                    f);
+  filterPairs<false>(Features<Kind::EdgeEdge>{pair.a, pair.b}, pairs.edgeEdge, thickness, f);
+}
+
+/// Tests pairs and describes the contacts found.
+class ContactFinder {
+ public:
+  ContactFinder(const MeshPair& pair, ContactBuffers& out) : m_pair(pair), m_out(out) {
+    m_settings.minimumDistance = pair.settings.thickness;
+  }
+
+  template <Kind kind>
+  void operator()(const Features<kind>& features, std::uint32_t inFirst, std::uint32_t inSecond,
+                  bool ofSecond) {
+    const ImpactQuery query = features.query(inFirst, inSecond);
+    const ImpactAnswer answer = findImpact(query, m_settings);
+    m_out.exactDecisions += answer.exact;
+    if (!answer.impact) return;
+    std::array<Vector3d, 4> p;
+    for (int i = 0; i < 4; ++i)
+      p[i] = (1.0 - answer.time) * query.vertices[i].at(0) + answer.time * query.vertices[i].at(1);
+    if constexpr (kind == Kind::VertexTriangle) {
+      auto& list = ofSecond && !m_pair.self() ? m_out.triangleVertex : m_out.vertexTriangle;
+      list.push_back(contactOf(inFirst, inSecond, features.second.topology.triangles[inSecond],
+                               finiteVertexTriangleDistance(p[0], p[1], p[2], p[3])));
+      // A corner touches its triangle, and then the normal is the plane's.
+      complete(list.back(), query, answer.time,
+               [&] { return finiteVertexTriangleDistance(p[1], p[1], p[2], p[3]).normal; });
+    } else {
+      m_out.edgeEdge.push_back(contactOf(features.first.topology.edges[inFirst],
+                                         features.second.topology.edges[inSecond],
+                                         finiteEdgeEdgeDistance(p[0], p[1], p[2], p[3])));
+      complete(m_out.edgeEdge.back(), query, answer.time, [&] {
+        return finiteEdgeEdgeDistance(p[0], p[1], p[0], p[0] + (p[3] - p[2])).normal;
+      });
+    }
+  }
+
+ private:
+  template <class Contact, class PlaneNormal>
+  void complete(Contact& contact, const ImpactQuery& query, double time, PlaneNormal&& normal) {
+    contact.timeOfImpact = time;
+    if (m_settings.minimumDistance > 0.0) return;
+    contact.normal = normal();
+    if (sideBefore(query, time) < 0) contact.normal = -contact.normal;
+  }
+
+  const MeshPair& m_pair;
+  ContactBuffers& m_out;
+  TimeOfImpactSettings m_settings;
+};
+
+}  // namespace
+
+void findContinuous(const MeshPair& pair, std::span<const TrianglePair> candidates,
+                    ContactBuffers& out) {
+  forEachLikelyPair(pair, candidates, out, ContactFinder(pair, out));
+}
+
+void findContinuousByBruteForce(const MeshPair& pair, ContactBuffers& out) {
+  ContactFinder test(pair, out);
+  for (const bool ofSecond : {false, true}) {
+    if (ofSecond && pair.self()) continue;
+    const Features<Kind::VertexTriangle> features{ofSecond ? pair.b : pair.a,
+                                                  ofSecond ? pair.a : pair.b};
+    const MeshTopology &vertices = features.first.topology, &triangles = features.second.topology;
+    for (std::uint32_t v = 0; v < vertices.vertexCount; ++v) {
+      if (vertices.vertexTriangles[v].empty()) continue;
+      for (std::uint32_t t = 0; t < triangles.triangles.size(); ++t) {
+        if (pair.self() && holdsVertex(triangles.triangles[t], v)) continue;
+        ++out.featurePairs;
+        test(features, v, t, ofSecond);
+      }
+    }
+  }
+  const auto &a = pair.a.topology.edges, &b = pair.b.topology.edges;
+  for (std::uint32_t i = 0; i < a.size(); ++i)
+    for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
+      if (pair.self() && shareVertex(a[i], b[j])) continue;
+      ++out.featurePairs;
+      test(Features<Kind::EdgeEdge>{pair.a, pair.b}, i, j, false);
+    }
+}
+
+double findEarliestImpact(const MeshPair& pair, std::span<const TrianglePair> candidates,
+                          double upTo, ContactBuffers& counts) {
+  TimeOfImpactSettings settings;
+  settings.minimumDistance = pair.settings.thickness;
+  double earliest = upTo;
+  forEachLikelyPair(pair, candidates, counts,
+                    [&](const auto& features, std::uint32_t inFirst, std::uint32_t inSecond, bool) {
+                      // A reported time may be a tolerance early, so a pair that is left out for an
+                      // impact after this could not have reported one before `earliest`.
+                      const ImpactAnswer answer =
+                          findImpact(features.query(inFirst, inSecond), settings,
+                                     std::min(earliest + settings.tolerance, 1.0));
+                      counts.exactDecisions += answer.exact;
+                      if (answer.impact) earliest = std::min(earliest, answer.time);
+                    });
+  return earliest;
+}
+
+}  // namespace palpate

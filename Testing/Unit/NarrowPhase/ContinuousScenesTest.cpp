@@ -1,0 +1,115 @@
+// Two steps of published simulations, with symbolic truth for feature pairs that come close. (Wang
+// et al., Time of impact dataset for continuous collision detection and a scalable conservative
+// algorithm, 2021.)
+#include "NarrowPhase/Continuous.h"
+
+#include "PublishedFrames.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <limits>
+#include <set>
+#include <string>
+
+namespace palpate {
+
+namespace {
+
+struct Step {
+  const char *scene, *before, *now;
+  std::size_t vertexTriangle, edgeEdge;  ///< true pairs
+};
+
+class ContinuousScenes : public ::testing::TestWithParam<Step> {};
+
+using Pairs = std::set<std::array<std::uint32_t, 2>>;
+
+/// Lists name vertices by index, edges from the number of vertices on, then triangles. Edges are in
+/// order of (larger vertex, smaller vertex).
+struct PublishedIds {
+  explicit PublishedIds(const MeshTopology& mesh)
+      : edges(mesh.edges), triangles(static_cast<std::uint32_t>(mesh.vertexCount + edges.size())) {
+    std::sort(edges.begin(), edges.end(), [](const Segment& l, const Segment& r) {
+      return std::pair(l[1], l[0]) < std::pair(r[1], r[0]);
+    });
+    firstEdge = static_cast<std::uint32_t>(mesh.vertexCount);
+  }
+  std::uint32_t of(const Segment& edge) const {
+    const auto found =
+        std::lower_bound(edges.begin(), edges.end(), edge, [](const Segment& l, const Segment& r) {
+          return std::pair(l[1], l[0]) < std::pair(r[1], r[0]);
+        });
+    return firstEdge + static_cast<std::uint32_t>(found - edges.begin());
+  }
+  std::vector<Segment> edges;
+  std::uint32_t firstEdge, triangles;
+};
+
+TEST_P(ContinuousScenes, FindsEveryTruePairAndInventsNone) {
+  const auto& [scene, before, now, vertexTriangle, edgeEdge] = GetParam();
+  const std::filesystem::path folder = std::string(PALPATE_SHARED_DATA) + "/ccd-scenes/" + scene;
+  if (!std::filesystem::is_directory(folder))
+    GTEST_SKIP() << "no ccd-scenes in PALPATE_SHARED_DATA";
+  const TriangleMesh mesh = testing::readStep(folder / "frames" / (std::string(before) + ".ply"),
+                                              folder / "frames" / (std::string(now) + ".ply"));
+  const std::vector<TrianglePair> candidates = testing::sweptCandidates(mesh);
+  const MeshPair pair{mesh, mesh, {Method::Continuous, 0.0, Contacts::All}};
+  ContactBuffers found{};
+  findContinuous(pair, candidates, found);
+
+  const PublishedIds ids(mesh.topology);
+  Pairs vertices, edges;
+  for (const VertexTriangleContact& contact : found.vertexTriangle)
+    vertices.insert({contact.vertex, ids.triangles + contact.triangle});
+  for (const EdgeEdgeContact& contact : found.edgeEdge) {
+    const std::uint32_t a = ids.of(contact.edgeA), b = ids.of(contact.edgeB);
+    edges.insert({std::min(a, b), std::max(a, b)});
+  }
+  EXPECT_EQ(vertices.size(), vertexTriangle);
+  EXPECT_EQ(edges.size(), edgeEdge);
+  EXPECT_EQ(found.vertexTriangle.size(), vertexTriangle);
+  EXPECT_EQ(found.edgeEdge.size(), edgeEdge);
+
+  const auto expectLabels = [&](const char* kind, const Pairs& contacts) {
+    const std::string name = std::string(before) + kind;
+    const auto pairs = testing::readPairs(folder / "boxes" / (name + ".json"));
+    const auto truth = testing::readTruth(folder / "mma_bool" / (name + "_mma_bool.json"));
+    ASSERT_EQ(pairs.size(), truth.size());
+    ASSERT_GT(pairs.size(), 0u);
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const auto [first, second] = std::minmax(pairs[i][0], pairs[i][1]);
+      EXPECT_EQ(contacts.contains({first, second}), truth[i])
+          << kind << ' ' << first << ' ' << second;
+    }
+  };
+  expectLabels("vf", vertices);
+  expectLabels("ee", edges);
+
+  // The earliest time is that of the contacts, in one batch or in many, backwards too.
+  double earliest = std::numeric_limits<double>::infinity();
+  for (const auto& contact : found.vertexTriangle)
+    earliest = std::min(earliest, contact.timeOfImpact);
+  for (const auto& contact : found.edgeEdge) earliest = std::min(earliest, contact.timeOfImpact);
+  ContactBuffers counts{};
+  const double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(findEarliestImpact(pair, candidates, infinity, counts), earliest);
+  const auto half = std::span(candidates).first(candidates.size() / 2);
+  const double second =
+      findEarliestImpact(pair, std::span(candidates).subspan(half.size()), infinity, counts);
+  EXPECT_EQ(findEarliestImpact(pair, half, second, counts), earliest);
+}
+
+INSTANTIATE_TEST_SUITE_P(Published, ContinuousScenes,
+                         ::testing::Values(Step{"cloth-funnel", "227", "228", 27, 107},
+                                           Step{"rod-twist", "3036", "3037", 765, 4179}),
+                         [](const auto& test) {
+                           std::string name = test.param.scene;
+                           std::replace(name.begin(), name.end(), '-', '_');
+                           return name;
+                         });
+
+}  // namespace
+
+}  // namespace palpate

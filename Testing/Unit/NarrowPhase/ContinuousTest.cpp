@@ -1,0 +1,211 @@
+#include "NarrowPhase/Continuous.h"
+
+#include "Common/RandomMeshes.h"
+#include "PublishedFrames.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <tuple>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+TriangleMesh meshOf(const std::vector<Vector3d>& before, const std::vector<Vector3d>& now,
+                    const std::vector<Triangle>& triangles) {
+  return {MeshTopology(now.size(), triangles), now, before};
+}
+
+/// A soup in which each vertex moves its own way, in grid steps where `grid` is positive.
+TriangleMesh movingSoup(testing::Random& random, std::size_t triangles, double size, double grid) {
+  testing::Mesh mesh = testing::soup(random, triangles, size);
+  // Some share vertices, so that triangles are neighbours too.
+  for (std::size_t t = 1; t < mesh.triangles.size(); t += 2)
+    mesh.triangles[t][0] = mesh.triangles[t - 1][random() % 3];
+  std::vector<Vector3d> now = mesh.positions;
+  for (Vector3d& p : now) p += testing::randomPoint(random, -0.3, 0.3);
+  if (grid > 0)
+    for (auto* positions : {&mesh.positions, &now})
+      for (Vector3d& p : *positions) p = (p / grid).array().round() * grid;
+  return meshOf(mesh.positions, now, mesh.triangles);
+}
+
+std::vector<TrianglePair> everyPair(const TriangleMesh& a, const TriangleMesh& b) {
+  std::vector<TrianglePair> pairs;
+  for (std::uint32_t i = 0; i < a.topology.triangles.size(); ++i)
+    for (std::uint32_t j = &a == &b ? i + 1 : 0; j < b.topology.triangles.size(); ++j)
+      pairs.push_back({i, j});
+  return pairs;
+}
+
+/// Everything of a contact but its weights' exact bits is in its ids, time, distance and normal.
+std::vector<std::tuple<std::uint32_t, std::uint32_t, double, double>> sorted(
+    const Buffer<VertexTriangleContact>& contacts) {
+  std::vector<std::tuple<std::uint32_t, std::uint32_t, double, double>> keys;
+  for (const auto& c : contacts)
+    keys.push_back({c.vertex, c.triangle, c.timeOfImpact, c.normal.sum()});
+  std::sort(keys.begin(), keys.end());
+  return keys;
+}
+std::vector<std::tuple<Segment, Segment, double, double>> sorted(
+    const Buffer<EdgeEdgeContact>& contacts) {
+  std::vector<std::tuple<Segment, Segment, double, double>> keys;
+  for (const auto& c : contacts) keys.push_back({c.edgeA, c.edgeB, c.timeOfImpact, c.normal.sum()});
+  std::sort(keys.begin(), keys.end());
+  return keys;
+}
+
+double earliestOf(const ContactBuffers& contacts) {
+  double earliest = kInfinity;
+  for (const auto* list : {&contacts.vertexTriangle, &contacts.triangleVertex})
+    for (const auto& contact : *list) earliest = std::min(earliest, contact.timeOfImpact);
+  for (const auto& contact : contacts.edgeEdge) earliest = std::min(earliest, contact.timeOfImpact);
+  return earliest;
+}
+
+void expectSameAsBruteForce(const MeshPair& pair) {
+  ContactBuffers found{}, expected{}, counts{};
+  const std::vector<TrianglePair> candidates = everyPair(pair.a, pair.b);
+  findContinuous(pair, candidates, found);
+  findContinuousByBruteForce(pair, expected);
+  EXPECT_EQ(found.featurePairs, expected.featurePairs);
+  EXPECT_EQ(sorted(found.vertexTriangle), sorted(expected.vertexTriangle));
+  EXPECT_EQ(sorted(found.triangleVertex), sorted(expected.triangleVertex));
+  EXPECT_EQ(sorted(found.edgeEdge), sorted(expected.edgeEdge));
+  EXPECT_GT(found.vertexTriangle.size(), 0u);
+  EXPECT_GT(found.edgeEdge.size(), 0u);
+  EXPECT_EQ(findEarliestImpact(pair, candidates, kInfinity, counts), earliestOf(expected));
+  EXPECT_EQ(findEarliestImpact(pair, candidates, 0.0, counts), 0.0);
+}
+
+TEST(Continuous, EqualsBruteForce) {
+  testing::Random random(1);
+  for (int i = 0; i < 12; ++i) {
+    const double grid = i % 3 == 0 ? 0.25 : 0.0, thickness = i % 4 == 3 ? 0.02 : 0.0;
+    const TriangleMesh a = movingSoup(random, 24, 0.3, grid), b = movingSoup(random, 17, 0.4, grid);
+    SCOPED_TRACE(i);
+    expectSameAsBruteForce({a, b, {Method::Continuous, thickness, Contacts::All}});
+    expectSameAsBruteForce({a, a, {Method::Continuous, thickness, Contacts::All}});
+  }
+}
+
+TEST(Continuous, EarliestDoesNotDependOnOrderOrBatches) {
+  testing::Random random(2);
+  for (int i = 0; i < 20; ++i) {
+    const TriangleMesh a = movingSoup(random, 20, 0.3, i % 2 ? 0.25 : 0.0);
+    const MeshPair pair{a, a, {Method::Continuous, i % 4 == 3 ? 0.01 : 0.0, Contacts::All}};
+    std::vector<TrianglePair> candidates = everyPair(a, a);
+    ContactBuffers counts{}, all{};
+    findContinuous(pair, candidates, all);
+    for (int repeat = 0; repeat < 4; ++repeat) {
+      double earliest = kInfinity;
+      for (std::size_t begin = 0; begin < candidates.size(); begin += 1 + 37 * repeat)
+        earliest = findEarliestImpact(
+            pair,
+            std::span(candidates)
+                .subspan(begin, std::min<std::size_t>(1 + 37 * repeat, candidates.size() - begin)),
+            earliest, counts);
+      EXPECT_EQ(earliest, earliestOf(all));
+      std::shuffle(candidates.begin(), candidates.end(), random);
+    }
+  }
+}
+
+/// A triangle in z = 0 whose winding normal is +z, and another well above or below it that comes
+/// through it.
+struct Crossing {
+  std::vector<Vector3d> before{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}, now = before;
+  std::vector<Triangle> triangle{{0, 1, 2}};
+};
+
+TEST(Continuous, VertexContactsSayWhereAndFromWhichSide) {
+  const Crossing target;
+  for (const double side : {1.0, -1.0}) {
+    // Only the first corner comes through, at (1, 0.5) and t = 0.75.
+    const std::vector<Vector3d> before{
+        {1, 0.5, 3 * side}, {1, 0.5, 9 * side}, {1.5, 0.5, 9 * side}},
+        now{{1, 0.5, -side}, {1, 0.5, 9 * side}, {1.5, 0.5, 9 * side}};
+    const TriangleMesh a = meshOf(before, now, {{0, 1, 2}}),
+                       b = meshOf(target.before, target.now, target.triangle);
+    ContactBuffers found{};
+    const std::vector<TrianglePair> candidates{{0, 0}};
+    findContinuous({a, b, {Method::Continuous, 0.0, Contacts::All}}, candidates, found);
+    ASSERT_EQ(found.vertexTriangle.size(), 1u);
+    EXPECT_TRUE(found.triangleVertex.empty());
+    EXPECT_TRUE(found.edgeEdge.empty());
+    const VertexTriangleContact& contact = found.vertexTriangle[0];
+    EXPECT_EQ(contact.vertex, 0u);
+    EXPECT_LE(contact.timeOfImpact, 0.75);
+    EXPECT_GE(contact.timeOfImpact, 0.75 - 1e-6);
+    EXPECT_LE((contact.normal - Vector3d(0, 0, side)).norm(), 1e-15);
+    EXPECT_LE((contact.barycentric - Vector3d(0.625, 0.25, 0.125)).norm(), 1e-12);
+    EXPECT_LE(contact.distance, 4e-6);
+
+    ContactBuffers swapped{}, thick{};
+    findContinuous({b, a, {Method::Continuous, 0.0, Contacts::All}}, candidates, swapped);
+    ASSERT_EQ(swapped.triangleVertex.size(), 1u);
+    EXPECT_EQ(swapped.triangleVertex[0].normal, contact.normal);
+    EXPECT_EQ(swapped.triangleVertex[0].timeOfImpact, contact.timeOfImpact);
+
+    findContinuous({a, b, {Method::Continuous, 1.0, Contacts::All}}, candidates, thick);
+    ASSERT_EQ(thick.vertexTriangle.size(), 1u);
+    EXPECT_LE(thick.vertexTriangle[0].timeOfImpact, 0.5);
+    EXPECT_GE(thick.vertexTriangle[0].timeOfImpact, 0.5 - 3e-6);
+    EXPECT_NEAR(thick.vertexTriangle[0].distance, 1.0, 1e-5);
+    EXPECT_LE((thick.vertexTriangle[0].normal - Vector3d(0, 0, side)).norm(), 1e-15);
+  }
+}
+
+TEST(Continuous, EdgeContactsSayWhereAndFromWhichSide) {
+  // Edge (0, 1) of a, along x, comes down on edge (0, 1) of b, along y; the third corners are far
+  // off.
+  for (const double side : {1.0, -1.0}) {
+    const TriangleMesh a = meshOf({{-1, 0, side}, {3, 0, side}, {1, 0, 9 * side}},
+                                  {{-1, 0, -side}, {3, 0, -side}, {1, 0, 9 * side}}, {{0, 1, 2}});
+    const TriangleMesh b = meshOf({{0, -1, 0}, {0, 1, 0}, {0, 0, -9 * side}},
+                                  {{0, -1, 0}, {0, 1, 0}, {0, 0, -9 * side}}, {{0, 1, 2}});
+    const std::vector<TrianglePair> candidates{{0, 0}};
+    ContactBuffers found{}, swapped{};
+    findContinuous({a, b, {Method::Continuous, 0.0, Contacts::All}}, candidates, found);
+    const auto contact =
+        std::find_if(found.edgeEdge.begin(), found.edgeEdge.end(), [](const auto& c) {
+          return c.edgeA == Segment{0, 1} && c.edgeB == Segment{0, 1};
+        });
+    ASSERT_NE(contact, found.edgeEdge.end());
+    EXPECT_LE(contact->timeOfImpact, 0.5);
+    EXPECT_GE(contact->timeOfImpact, 0.5 - 1e-6);
+    EXPECT_NEAR(contact->weightA, 0.25, 1e-12);
+    EXPECT_NEAR(contact->weightB, 0.5, 1e-12);
+    EXPECT_LE((contact->normal - Vector3d(0, 0, side)).norm(), 1e-15);
+    findContinuous({b, a, {Method::Continuous, 0.0, Contacts::All}}, candidates, swapped);
+    const auto other =
+        std::find_if(swapped.edgeEdge.begin(), swapped.edgeEdge.end(), [](const auto& c) {
+          return c.edgeA == Segment{0, 1} && c.edgeB == Segment{0, 1};
+        });
+    ASSERT_NE(other, swapped.edgeEdge.end());
+    EXPECT_LE((other->normal + contact->normal).norm(), 1e-15);
+  }
+}
+
+/// Two triangles that share an edge and fold flat onto each other: the features they do not share
+/// meet.
+TEST(Continuous, NeighboursMeetInWhatTheyDoNotShare) {
+  const std::vector<Vector3d> before{{0, 0, 0}, {1, 0, 0}, {0.5, 1, 0}, {0.5, -0.5, 1}},
+      now{{0, 0, 0}, {1, 0, 0}, {0.5, 1, 0}, {0.5, 0.5, -1}};
+  const TriangleMesh mesh = meshOf(before, now, {{0, 1, 2}, {1, 0, 3}});
+  ContactBuffers found{};
+  const std::vector<TrianglePair> candidates{{0, 1}};
+  findContinuous({mesh, mesh, {Method::Continuous, 0.0, Contacts::All}}, candidates, found);
+  ASSERT_EQ(found.vertexTriangle.size(), 1u);
+  EXPECT_EQ(found.vertexTriangle[0].vertex, 3u);
+  EXPECT_EQ(found.vertexTriangle[0].triangle, 0u);
+}
+
+}  // namespace
+
+}  // namespace palpate
