@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <type_traits>
 
 namespace palpate::exact {
 
@@ -13,62 +15,42 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A vector of integers in units of 2^exponent of its Grid.
-struct IntegerVector {
-  std::array<Integer, 3> component;
-  const Integer& operator[](int i) const { return component[i]; }
-  Integer& operator[](int i) { return component[i]; }
-};
+/// Integers of 64 bits multiply into 128, others into their kind.
+template <class T>
+using Wide = std::conditional_t<std::is_same_v<T, std::int64_t>, Int128, T>;
 
-IntegerVector operator-(const IntegerVector& a, const IntegerVector& b) {
-  return {{a[0] - b[0], a[1] - b[1], a[2] - b[2]}};
+template <class T>
+using Vector = std::array<T, 3>;
+
+template <class T>
+Vector<T> operator-(const Vector<T>& a, const Vector<T>& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+template <class T>
+Wide<T> dot(const Vector<T>& a, const Vector<T>& b) {
+  return Wide<T>(a[0]) * b[0] + Wide<T>(a[1]) * b[1] + Wide<T>(a[2]) * b[2];
+}
+template <class T>
+Vector<Wide<T>> cross(const Vector<T>& a, const Vector<T>& b) {
+  using W = Wide<T>;
+  return {W(a[1]) * b[2] - W(a[2]) * b[1], W(a[2]) * b[0] - W(a[0]) * b[2],
+          W(a[0]) * b[1] - W(a[1]) * b[0]};
 }
 
-IntegerVector scaled(const Integer& factor, const IntegerVector& a) {
-  return {{factor * a[0], factor * a[1], factor * a[2]}};
+/// In units of 2^-1074.
+Vector<Integer> integers(const Vector3d& a) {
+  return {scaledInteger(a[0]), scaledInteger(a[1]), scaledInteger(a[2])};
 }
+constexpr int kUnit = -1074;
 
-Integer dot(const IntegerVector& a, const IntegerVector& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+Vector<Integer> scaled(const Integer& factor, const Vector<Integer>& a) {
+  return {factor * a[0], factor * a[1], factor * a[2]};
 }
-
-IntegerVector cross(const IntegerVector& a, const IntegerVector& b) {
-  return {{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}};
-}
-
-/// Positions as integers in units of 2^exponent, exactly.
-template <std::size_t Count>
-struct Grid {
-  std::array<IntegerVector, Count> at;
-  int exponent = 1024;
-
-  template <class... Positions>
-  explicit Grid(const Positions&... positions) {
-    const std::array<const Vector3d*, Count> all{&positions...};
-    for (const Vector3d* position : all) {
-      for (int i = 0; i < 3; ++i) {
-        int own;
-        if (std::frexp((*position)[i], &own) != 0.0) exponent = std::min(exponent, own - 53);
-      }
-    }
-    for (std::size_t n = 0; n < Count; ++n) {
-      for (int i = 0; i < 3; ++i) {
-        int own;
-        const double mantissa = std::ldexp(std::frexp((*all[n])[i], &own), 53);
-        if (mantissa == 0.0) continue;
-        at[n][i] = mantissa;
-        at[n][i] <<= own - 53 - exponent;
-      }
-    }
-  }
-};
-template <class... Positions>
-Grid(const Positions&...) -> Grid<sizeof...(Positions)>;
 
 int bits(const Integer& a) { return static_cast<int>(mpz_sizeinbase(a.get_mpz_t(), 2)); }
 
 /// numerator 2^exponent / denominator, within an ulp; denominator positive.
-double quotient(const Integer& numerator, const Integer& denominator, int exponent = 0) {
+double quotient(const Integer& numerator, const Integer& denominator, int exponent) {
   if (numerator == 0) return 0.0;
   // 64 or 65 bits of quotient, cut to 63, so that one rounding to double is left.
   const int shift = 64 - bits(numerator) + bits(denominator);
@@ -88,41 +70,38 @@ double weight(const Integer& numerator, const Integer& denominator) {
   return std::ldexp(nearest.get_d(), -53);
 }
 
-Vector3d unit(const IntegerVector& a) {
+Vector3d unit(const Vector<Integer>& a) {
   const Integer square = dot(a, a);
   if (square == 0) return Vector3d::Zero();
   const int shift = std::max(0, (140 - bits(square)) / 2 + 1);  // of a root with 70 bits
   const Integer root = sqrt(Integer(square << 2 * shift));
   Vector3d result;
-  for (int i = 0; i < 3; ++i) result[i] = quotient(a[i] << shift, root);
+  for (int i = 0; i < 3; ++i) result[i] = quotient(a[i] << shift, root, 0);
   return result;
 }
 
-/// The foot whose difference is a 2^exponent / denominator.
-Foot footFrom(const IntegerVector& a, const Integer& denominator, int exponent) {
-  const Integer square = dot(a, a);
-  const int shift = square == 0 ? 0 : std::max(0, (140 - bits(square)) / 2 + 1);
-  const Integer root = sqrt(Integer(square << 2 * shift));
-  Foot foot{
-      Vector3d::Zero(), unit(a), quotient(root, denominator << shift, exponent), 0.0, 0.0, true};
-  for (int i = 0; i < 3; ++i) foot.difference[i] = quotient(a[i], denominator, exponent);
+/// The foot whose difference is a / denominator.
+Foot footFrom(const Vector<Integer>& a, const Integer& denominator) {
+  Foot foot{Vector3d::Zero(), unit(a), 0.0, 0.0, 0.0, true};
+  for (int i = 0; i < 3; ++i) foot.difference[i] = quotient(a[i], denominator, kUnit);
+  int longest;
+  if (foot.direction.cwiseAbs().maxCoeff(&longest) > 0.0)
+    foot.distance = foot.difference[longest] / foot.direction[longest];
+  return foot;
+}
+
+/// Of the perpendicular from the origin to the plane from + s u + t v.
+Foot footOnPlane(const Vector<Integer>& from, const Vector<Integer>& u, const Vector<Integer>& v) {
+  const Vector<Integer> normal = cross(u, v);
+  const Integer denominator = dot(normal, normal);
+  Foot foot = footFrom(scaled(dot(normal, from), normal), denominator);
+  foot.s = weight(dot(cross(v, from), normal), denominator);
+  foot.t = weight(dot(cross(from, u), normal), denominator);
   return foot;
 }
 
 // ---- Signs, in integers of fixed width where the positions fit, else of any size ----
 
-using FixedVector = std::array<std::int64_t, 3>;
-
-FixedVector operator-(const FixedVector& a, const FixedVector& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-Int128 dot(const FixedVector& a, const FixedVector& b) {
-  return Int128{a[0]} * b[0] + Int128{a[1]} * b[1] + Int128{a[2]} * b[2];
-}
-std::array<Int128, 3> cross(const FixedVector& a, const FixedVector& b) {
-  return {Int128{a[1]} * b[2] - Int128{a[2]} * b[1], Int128{a[2]} * b[0] - Int128{a[0]} * b[2],
-          Int128{a[0]} * b[1] - Int128{a[1]} * b[0]};
-}
 Integer product(const Integer& a, const Integer& b) { return a * b; }
 using palpate::product;
 
@@ -134,48 +113,48 @@ int signOf(const Int256& a) { return a.sign(); }
 template <class Decision, class... Positions>
 auto decide(Decision&& decision, const Positions&... positions) {
   if (const FixedGrid grid(positions...); grid.fits) return decision(grid.at);
-  return decision(Grid(positions...).at);
+  return decision(std::array{integers(positions)...});
 }
 
-template <class Vector>
-int signAlong(const Vector& p, const Vector& a, const Vector& b) {
+template <class T>
+int signAlong(const Vector<T>& p, const Vector<T>& a, const Vector<T>& b) {
   return signOf(dot(p - a, b - a));
 }
 
 /// (ab x ap) . (ab x ac)
-template <class Vector>
-int signAside(const Vector& p, const Vector& a, const Vector& b, const Vector& c) {
-  const Vector ab = b - a, ac = c - a, ap = p - a;
+template <class T>
+int signAside(const Vector<T>& p, const Vector<T>& a, const Vector<T>& b, const Vector<T>& c) {
+  const Vector<T> ab = b - a, ac = c - a, ap = p - a;
   const auto abab = dot(ab, ab), apac = dot(ap, ac), abac = dot(ab, ac), abap = dot(ab, ap);
   const decltype(product(abab, apac)) sign = product(abab, apac) - product(abac, abap);
   return signOf(sign);
 }
 
-template <class Vector>
-bool isAlong(const Vector& p, const Vector& a, const Vector& b) {
+template <class T>
+bool isAlong(const Vector<T>& p, const Vector<T>& a, const Vector<T>& b) {
   return signAlong(p, a, b) > 0 && signAlong(p, b, a) > 0;
 }
 
-template <class Vector>
-bool isZero(const Vector& a) {
+template <class T>
+bool isZero(const Vector<T>& a) {
   return a[0] == 0 && a[1] == 0 && a[2] == 0;
 }
 
 /// Of a triangle without area: its longest edge, the first of equals.
-template <class Vector>
-int longestEdge(const std::array<Vector, 4>& at) {
+template <class T>
+int longestEdge(const std::array<Vector<T>, 4>& at) {
   int longest = 0;
   for (int i = 1; i < 3; ++i) {
-    const Vector edge = at[(i + 1) % 3] - at[i], best = at[(longest + 1) % 3] - at[longest];
+    const Vector<T> edge = at[(i + 1) % 3] - at[i], best = at[(longest + 1) % 3] - at[longest];
     if (dot(edge, edge) > dot(best, best)) longest = i;
   }
   return longest;
 }
 
 /// at: the corners, then p.
-template <class Vector>
-TriangleFeature closestFeatureOf(const std::array<Vector, 4>& at) {
-  const Vector& p = at[3];
+template <class T>
+TriangleFeature closestFeatureOf(const std::array<Vector<T>, 4>& at) {
+  const Vector<T>& p = at[3];
   if (isZero(cross(at[1] - at[0], at[2] - at[0]))) {
     const int edge = longestEdge(at), next = (edge + 1) % 3;
     if (isAlong(p, at[edge], at[next])) return static_cast<TriangleFeature>(3 + edge);
@@ -183,7 +162,7 @@ TriangleFeature closestFeatureOf(const std::array<Vector, 4>& at) {
   }
   bool inside = true;
   for (int i = 0; i < 3; ++i) {
-    const Vector &a = at[i], &b = at[(i + 1) % 3], &c = at[(i + 2) % 3];
+    const Vector<T>&a = at[i], &b = at[(i + 1) % 3], &c = at[(i + 2) % 3];
     if (signAside(p, a, b, c) > 0) continue;
     if (isAlong(p, a, b)) return static_cast<TriangleFeature>(3 + i);
     inside = false;
@@ -197,9 +176,9 @@ TriangleFeature closestFeatureOf(const std::array<Vector, 4>& at) {
 }
 
 /// at: p0, p1, q0, q1.
-template <class Vector>
-Crossing crossingOf(const std::array<Vector, 4>& at) {
-  const Vector u = at[1] - at[0], v = at[3] - at[2], from = at[0] - at[2];
+template <class T>
+Crossing crossingOf(const std::array<Vector<T>, 4>& at) {
+  const Vector<T> u = at[1] - at[0], v = at[3] - at[2], from = at[0] - at[2];
   if (isZero(cross(u, v))) return Crossing::Parallel;
   const auto uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), uf = dot(u, from), vf = dot(v, from);
   using Product = decltype(product(uu, vv));  // not auto: sums of Integers are expressions
@@ -249,59 +228,26 @@ bool areCoplanar(const Vector3d& a, const Vector3d& b, const Vector3d& c, const 
 }
 
 Foot footOnPoint(const Vector3d& p, const Vector3d& a) {
-  const Grid grid(p, a);
-  return footFrom(grid.at[0] - grid.at[1], 1, grid.exponent);
+  return footFrom(integers(p) - integers(a), 1);
 }
 
 Foot footOnLine(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
-  const Grid grid(p, a, b);
-  const IntegerVector from = grid.at[0] - grid.at[1], edge = grid.at[2] - grid.at[1];
+  const Vector<Integer> from = integers(p) - integers(a), edge = integers(b) - integers(a);
   const Integer numerator = dot(from, edge), denominator = dot(edge, edge);
-  Foot foot =
-      footFrom(scaled(denominator, from) - scaled(numerator, edge), denominator, grid.exponent);
+  Foot foot = footFrom(scaled(denominator, from) - scaled(numerator, edge), denominator);
   foot.s = weight(numerator, denominator);
   return foot;
 }
 
 Foot footOnPlane(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-  const Grid grid(p, a, b, c);
-  const IntegerVector from = grid.at[0] - grid.at[1];
-  const IntegerVector ab = grid.at[2] - grid.at[1], ac = grid.at[3] - grid.at[1];
-  const IntegerVector normal = cross(ab, ac);
-  const Integer denominator = dot(normal, normal);
-  Foot foot = footFrom(scaled(dot(normal, from), normal), denominator, grid.exponent);
-  foot.s = weight(dot(cross(from, ac), normal), denominator);
-  foot.t = weight(dot(cross(ab, from), normal), denominator);
-  return foot;
+  const Vector<Integer> origin = integers(a);
+  return footOnPlane(integers(p) - origin, origin - integers(b), origin - integers(c));
 }
-
-namespace {
-
-/// Numerators of the two lines' weights over the squared length of their common normal.
-struct Lines {
-  IntegerVector normal;
-  Integer s, t, denominator;
-
-  explicit Lines(const std::array<IntegerVector, 4>& at) {
-    const IntegerVector p = at[1] - at[0], q = at[3] - at[2], from = at[0] - at[2];
-    normal = cross(p, q);
-    denominator = dot(normal, normal);
-    s = -dot(cross(from, q), normal);
-    t = -dot(cross(from, p), normal);
-  }
-};
-
-}  // namespace
 
 Foot footBetweenLines(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0,
                       const Vector3d& q1) {
-  const Grid grid(p0, p1, q0, q1);
-  const Lines lines(grid.at);
-  const Integer height = dot(lines.normal, grid.at[0] - grid.at[2]);
-  Foot foot = footFrom(scaled(height, lines.normal), lines.denominator, grid.exponent);
-  foot.s = weight(lines.s, lines.denominator);
-  foot.t = weight(lines.t, lines.denominator);
-  return foot;
+  const Vector<Integer> p = integers(p0), q = integers(q0);
+  return footOnPlane(p - q, integers(p1) - p, q - integers(q1));
 }
 
 namespace {
@@ -311,9 +257,9 @@ struct Quotient {
   Integer numerator, denominator;
 };
 
-Quotient squaredDistanceToEdge(const IntegerVector& p, const IntegerVector& a,
-                               const IntegerVector& b) {
-  const IntegerVector from = p - a, edge = b - a;
+Quotient squaredDistanceToEdge(const Vector<Integer>& p, const Vector<Integer>& a,
+                               const Vector<Integer>& b) {
+  const Vector<Integer> from = p - a, edge = b - a;
   const Integer along = dot(from, edge), square = dot(edge, edge);
   if (along <= 0) return {dot(from, from), 1};
   if (along >= square) return {dot(p - b, p - b), 1};
@@ -323,8 +269,7 @@ Quotient squaredDistanceToEdge(const IntegerVector& p, const IntegerVector& a,
 }  // namespace
 
 int nearestEnd(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0, const Vector3d& q1) {
-  const Grid grid(p0, p1, q0, q1);
-  const auto& at = grid.at;
+  const std::array at{integers(p0), integers(p1), integers(q0), integers(q1)};
   int nearest = 0;
   Quotient least = squaredDistanceToEdge(at[0], at[2], at[3]);
   for (int i = 1; i < 4; ++i) {
@@ -339,8 +284,7 @@ int nearestEnd(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0, const
 }
 
 Vector3d unitCross(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
-  const Grid grid(a, b, c, d);
-  return unit(cross(grid.at[1] - grid.at[0], grid.at[3] - grid.at[2]));
+  return unit(cross(integers(b) - integers(a), integers(d) - integers(c)));
 }
 
 }  // namespace palpate::exact
