@@ -3,6 +3,7 @@
 #include "CollisionDetection/BruteForce.h"
 #include "CollisionDetection/Frame.h"
 #include "CollisionDetection/GeometryTable.h"
+#include "CollisionDetection/Order.h"
 #include "CollisionDetection/PairTable.h"
 #include "CollisionDetection/Stopwatch.h"
 #include "Core/Assert.h"
@@ -53,6 +54,7 @@ struct OctreeBasedCD::Implementation {
   std::optional<LooseOctree> octree;
   std::vector<PairRecord*> work;
   std::mutex sorting;  ///< of candidates, when a const query first asks for them
+  PairOrderScratch sortingScratch;
 
   void startFrame() {
     statistics = {};
@@ -237,7 +239,9 @@ std::span<const TrianglePair> OctreeBasedCD::candidatePairs(GeometryId a, Geomet
                 "Settings::keepCandidates before detectCollision()",
                 a);
   const std::lock_guard lock(m_implementation->sorting);
-  if (!record.candidatesSorted) std::sort(record.candidates.begin(), record.candidates.end());
+  if (!record.candidatesSorted)
+    orderPairs(record.candidates, record.a->mesh.topology.triangles.size(),
+               m_implementation->sortingScratch);
   record.candidatesSorted = true;
   return record.candidates;
 }

@@ -19,6 +19,15 @@ struct OrderScratch {
   Buffer<Entry<EdgeEdgeContact>> edgeEdge;
 };
 
+struct PairOrderScratch {
+  Buffer<std::uint32_t> places;
+  Buffer<TrianglePair> pairs;
+};
+
+/// Sorts by (a, b), where every a is below `firsts`.
+/// Cost     two passes over the pairs and one over `firsts` counters.
+void orderPairs(Buffer<TrianglePair>& pairs, std::size_t firsts, PairOrderScratch&);
+
 /// The buffers' contacts, sorted by element ids, each once.
 void orderContacts(std::span<ContactBuffers* const>, OrderScratch&, CollisionData::Contents&);
 
