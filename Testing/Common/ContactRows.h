@@ -1,0 +1,163 @@
+#pragma once
+
+#include <palpate/CollisionData.h>
+#include <palpate/Settings.h>
+
+#include "Common/RandomMeshes.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <string>
+#include <vector>
+
+namespace palpate::testing {
+
+/// A contact as words: its ids, then the bits of every number.
+using Row = std::vector<std::uint64_t>;
+
+inline void append(Row& row, double value) { row.push_back(std::bit_cast<std::uint64_t>(value)); }
+inline void append(Row& row, const Eigen::Vector3d& value) {
+  for (const double x : value) append(row, x);
+}
+
+/// kTriangleFirst: of triangleVertex(), which is sorted by the triangle.
+template <bool kTriangleFirst>
+Row rowOf(const VertexTriangleContact& c) {
+  Row row{kTriangleFirst ? c.triangle : c.vertex, kTriangleFirst ? c.vertex : c.triangle,
+          c.corners[0], c.corners[1], c.corners[2]};
+  append(row, c.barycentric);
+  append(row, c.normal);
+  append(row, c.distance);
+  append(row, c.timeOfImpact);
+  return row;
+}
+
+inline Row rowOf(const EdgeEdgeContact& c) {
+  Row row{c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]};
+  append(row, c.weightA);
+  append(row, c.weightB);
+  append(row, c.normal);
+  append(row, c.distance);
+  append(row, c.timeOfImpact);
+  return row;
+}
+
+/// What one pair answers, list by list, in the order given out.
+struct Rows {
+  std::vector<Row> vertexTriangle, triangleVertex, edgeEdge;
+  std::vector<TrianglePair> intersectingTriangles;
+
+  Rows() = default;
+  explicit Rows(const CollisionData& data) {
+    for (const auto& c : data.vertexTriangle()) vertexTriangle.push_back(rowOf<false>(c));
+    for (const auto& c : data.triangleVertex()) triangleVertex.push_back(rowOf<true>(c));
+    for (const auto& c : data.edgeEdge()) edgeEdge.push_back(rowOf(c));
+    const auto pairs = data.intersectingTriangles();
+    intersectingTriangles.assign(pairs.begin(), pairs.end());
+  }
+  std::size_t contacts() const {
+    return vertexTriangle.size() + triangleVertex.size() + edgeEdge.size();
+  }
+  friend bool operator==(const Rows&, const Rows&) = default;
+};
+
+inline std::string firstDifference(const std::vector<Row>& found, const std::vector<Row>& truth) {
+  const std::size_t size = std::min(found.size(), truth.size());
+  std::size_t i = 0;
+  while (i < size && found[i] == truth[i]) ++i;
+  if (i == found.size() && i == truth.size()) return {};
+  const auto text = [](const std::vector<Row>& rows, std::size_t row) -> std::string {
+    if (row >= rows.size()) return " none";
+    std::string line;
+    for (const std::uint64_t word : rows[row]) {
+      char value[40];
+      if (word < 1u << 30)
+        std::snprintf(value, sizeof value, " %u", static_cast<unsigned>(word));
+      else
+        std::snprintf(value, sizeof value, " %.17g", std::bit_cast<double>(word));
+      line += value;
+    }
+    return line;
+  };
+  return "row " + std::to_string(i) + " of " + std::to_string(found.size()) + ":" + text(found, i) +
+         "\n  truth, of " + std::to_string(truth.size()) + ":" + text(truth, i);
+}
+
+/// Whole sets, bit by bit.
+inline void expectSameRows(const Rows& found, const Rows& truth) {
+  EXPECT_EQ(firstDifference(found.vertexTriangle, truth.vertexTriangle), "") << "vertexTriangle";
+  EXPECT_EQ(firstDifference(found.triangleVertex, truth.triangleVertex), "") << "triangleVertex";
+  EXPECT_EQ(firstDifference(found.edgeEdge, truth.edgeEdge), "") << "edgeEdge";
+  EXPECT_EQ(found.intersectingTriangles, truth.intersectingTriangles);
+}
+
+/// Rows ascend by their two ids, each pair of ids once.
+inline bool ascend(const std::vector<Row>& rows, std::size_t idWords) {
+  return std::adjacent_find(rows.begin(), rows.end(), [&](const Row& p, const Row& q) {
+           return !std::lexicographical_compare(p.begin(), p.begin() + idWords, q.begin(),
+                                                q.begin() + idWords);
+         }) == rows.end();
+}
+
+inline void expectWellFormed(const VertexTriangleContact& c, const Mesh& triangles) {
+  EXPECT_EQ(c.corners, triangles.triangles[c.triangle]);
+  EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);  // NaN is near nothing
+  EXPECT_GE(c.barycentric.minCoeff(), 0.0);
+  EXPECT_EQ(c.barycentric.sum(), 1.0);
+}
+
+inline void expectWellFormed(const EdgeEdgeContact& c) {
+  EXPECT_LT(c.edgeA[0], c.edgeA[1]);
+  EXPECT_LT(c.edgeB[0], c.edgeB[1]);
+  EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);
+  for (const double weight : {c.weightA, c.weightB}) EXPECT_TRUE(weight >= 0 && weight <= 1);
+}
+
+/// Sorted, nothing twice, unit normals, weights that are weights, times within the step.
+inline void expectWellFormed(const CollisionData& data, const Mesh& a, const Mesh& b,
+                             const PairSettings& settings) {
+  const Rows rows(data);
+  EXPECT_TRUE(ascend(rows.vertexTriangle, 2));
+  EXPECT_TRUE(ascend(rows.triangleVertex, 2));
+  EXPECT_TRUE(ascend(rows.edgeEdge, 4));
+  EXPECT_EQ(std::adjacent_find(rows.intersectingTriangles.begin(), rows.intersectingTriangles.end(),
+                               [](const auto& p, const auto& q) { return !(p < q); }),
+            rows.intersectingTriangles.end());
+  const bool proximity = settings.method == Method::Proximity,
+             continuous = settings.method == Method::Continuous;
+  const auto expectNumbers = [&](const auto& c) {
+    EXPECT_GE(c.distance, 0.0);
+    EXPECT_LE(c.distance, proximity ? settings.thickness : std::numeric_limits<double>::infinity());
+    EXPECT_GE(c.timeOfImpact, 0.0);
+    EXPECT_LE(c.timeOfImpact, continuous ? 1.0 : 0.0);
+  };
+  for (const auto& c : data.vertexTriangle()) {
+    expectNumbers(c);
+    expectWellFormed(c, b);
+  }
+  for (const auto& c : data.triangleVertex()) {
+    expectNumbers(c);
+    expectWellFormed(c, a);
+  }
+  for (const auto& c : data.edgeEdge()) {
+    expectNumbers(c);
+    expectWellFormed(c);
+  }
+}
+
+/// One way to ask about a pair.
+struct MethodCase {
+  std::string name;
+  PairSettings settings;
+};
+
+/// Every method and every choice of contacts; `thickness` where the method has one.
+inline std::vector<MethodCase> methodCases(double thickness) {
+  return {{"ProximityDistinct", {Method::Proximity, thickness, Contacts::Distinct}},
+          {"ProximityAll", {Method::Proximity, thickness, Contacts::All}},
+          {"Intersection", {Method::Intersection, 0, Contacts::All}}};
+}
+
+}  // namespace palpate::testing
