@@ -9,11 +9,17 @@ namespace palpate {
 
 namespace {
 
-std::vector<Eigen::AlignedBox3d> boxesOf(const TriangleMesh& mesh) {
+std::vector<Eigen::AlignedBox3d> boxesOf(const TriangleMesh& mesh, bool swept) {
   std::vector<Eigen::AlignedBox3d> boxes;
   boxes.reserve(mesh.topology.triangles.size());
-  for (const auto& [a, b, c] : mesh.topology.triangles)
-    boxes.push_back(Eigen::AlignedBox3d(mesh.now[a]).extend(mesh.now[b]).extend(mesh.now[c]));
+  for (const Triangle& triangle : mesh.topology.triangles) {
+    Eigen::AlignedBox3d box;
+    for (const std::uint32_t corner : triangle) {
+      box.extend(mesh.now[corner]);
+      if (swept) box.extend(mesh.before[corner]);
+    }
+    boxes.push_back(box);
+  }
   return boxes;
 }
 
@@ -22,7 +28,8 @@ std::vector<Eigen::AlignedBox3d> boxesOf(const TriangleMesh& mesh) {
 void findCandidatesByBruteForce(const MeshPair& meshes, Buffer<TrianglePair>& out) {
   const double thickness =
       meshes.settings.method == Method::Intersection ? 0.0 : meshes.settings.thickness;
-  const std::vector<Eigen::AlignedBox3d> boxesA = boxesOf(meshes.a), boxesB = boxesOf(meshes.b);
+  const bool swept = meshes.settings.method == Method::Continuous;
+  const std::vector<Eigen::AlignedBox3d> boxesA = boxesOf(meshes.a, swept), boxesB = boxesOf(meshes.b, swept);
   const std::vector<Triangle>& triangles = meshes.a.topology.triangles;
   const auto overlap = [&](const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b) {
     return ((a.min() - b.max()).array() <= thickness).all() &&

@@ -38,7 +38,7 @@ void addAll(Hash& hash, std::span<const VertexTriangleContact> contacts) {
 }  // namespace
 
 double CollisionData::earliestTimeOfImpact() const {
-  double earliest = std::numeric_limits<double>::infinity();
+  double earliest = m_contents.earliestTimeOfImpact;
   for (const auto& c : m_contents.vertexTriangle) earliest = std::min(earliest, c.timeOfImpact);
   for (const auto& c : m_contents.triangleVertex) earliest = std::min(earliest, c.timeOfImpact);
   for (const auto& c : m_contents.edgeEdge) earliest = std::min(earliest, c.timeOfImpact);

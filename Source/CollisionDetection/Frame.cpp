@@ -2,11 +2,22 @@
 
 #include "CollisionDetection/BruteForce.h"
 #include "CollisionDetection/Stopwatch.h"
+#include "NarrowPhase/Continuous.h"
+#include "NarrowPhase/FeaturePairs.h"
 
 #include <algorithm>
+#include <atomic>
+#include <limits>
 #include <mutex>
 
 namespace palpate {
+
+/// A user's function, called by one thread at a time.
+struct Guarded {
+  std::mutex mutex;
+  PairSink::Function function;
+  void* context;
+};
 
 namespace {
 
@@ -25,6 +36,16 @@ TreePair treesOf(const PairRecord& record, bool adjacentPairs) {
   return trees;
 }
 
+FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
+  FloatPair floats{record.a->floats.data(), record.b->floats.data(), nullptr, nullptr,
+                   trees.shiftLower,        trees.shiftUpper};
+  if (record.method == Method::Continuous) {
+    floats.beforeA = record.a->floatsBefore.data();
+    floats.beforeB = record.b->floatsBefore.data();
+  }
+  return floats;
+}
+
 bool sharesVertex(const Triangle& s, const Triangle& t) {
   return std::any_of(s.begin(), s.end(),
                      [&](std::uint32_t v) { return v == t[0] || v == t[1] || v == t[2]; });
@@ -34,30 +55,66 @@ bool sharesVertex(const Triangle& s, const Triangle& t) {
 
 /// Part of one pair's traversal, with what it found.
 struct Frame::Job {
+  using Use = void (*)(Job&, std::span<const TrianglePair>);
+
   PairRecord* record;
   TreePair trees;
   std::size_t begin, end;  ///< of m_nodePairs
-  bool keepCandidates;
+  FloatPair floats;
   TraversalStack stack;
   PairSink sink;
+  Use use;
+  Guarded* guarded;               ///< of forEach()
+  std::atomic<double>* earliest;  ///< of all jobs of the pair, where only that is asked for
+  bool keepCandidates;
   ContactBuffers contacts;
-  Buffer<TrianglePair> candidates;
+  Buffer<TrianglePair> candidates, own;
   double milliseconds = 0, narrowMilliseconds = 0;
 
-  static void findContactsOf(void* context, std::span<const TrianglePair> candidates) {
+  /// Batches go to `use`; without, they stay in the sink.
+  void start(Use newUse) {
+    use = newUse;
+    sink.start(use ? &receive : nullptr, this);
+  }
+
+  static void receive(void* context, std::span<const TrianglePair> pairs) {
     Job& job = *static_cast<Job*>(context);
+    if (!job.record->widerBoxes()) return job.use(job, pairs);
+    job.own.assign(pairs.begin(), pairs.end());
+    keepOverlapping(job.record->a->mesh.topology, job.record->b->mesh.topology, job.floats,
+                    job.own);
+    if (!job.own.empty()) job.use(job, job.own);
+  }
+
+  static void keep(Job& job, std::span<const TrianglePair> pairs) {
+    job.candidates.insert(job.candidates.end(), pairs.begin(), pairs.end());
+  }
+
+  static void handOver(Job& job, std::span<const TrianglePair> pairs) {
+    const std::lock_guard lock(job.guarded->mutex);
+    job.guarded->function(job.guarded->context, pairs);
+  }
+
+  static void detect(Job& job, std::span<const TrianglePair> pairs) {
     Stopwatch watch;
-    const FloatPair floats{
-        job.record->a->floats.data(), job.record->b->floats.data(), nullptr, nullptr,
-        job.trees.shiftLower,         job.trees.shiftUpper};
-    const MeshPair meshes = job.record->meshes(&floats);
-    findContacts(meshes, candidates, job.contacts);
+    const MeshPair meshes = job.record->meshes(&job.floats);
+    if (meshes.settings.contacts == Contacts::Earliest)
+      job.findEarliest(meshes, pairs);
+    else
+      findContacts(meshes, pairs, job.contacts);
     job.narrowMilliseconds += watch.lap();
     if (!job.keepCandidates) return;
     const std::vector<Triangle>& triangles = meshes.a.topology.triangles;
-    for (const TrianglePair pair : candidates)
+    for (const TrianglePair pair : pairs)
       if (!meshes.self() || !sharesVertex(triangles[pair.a], triangles[pair.b]))
         job.candidates.push_back(pair);
+  }
+
+  void findEarliest(const MeshPair& meshes, std::span<const TrianglePair> pairs) {
+    const double found = findEarliestImpact(meshes, pairs, earliest->load(), contacts);
+    double known = earliest->load();
+    while (found < known && !earliest->compare_exchange_weak(known, found)) {
+    }
   }
 };
 
@@ -79,6 +136,7 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
   m_jobCount = 0;
   m_nodePairs.clear();
   for (PairRecord* record : records) {
+    record->earliest = std::numeric_limits<double>::infinity();
     if (record->a->octree.size() == 0 || record->b->octree.size() == 0) continue;
     const TreePair trees = treesOf(*record, adjacentPairs);
     startPairs(trees, threads.count() == 1 ? 1 : kNodePairsWanted, m_stack);
@@ -88,6 +146,8 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
     for (std::size_t begin = 0; begin < count; begin += grain) {
       Job& job = newJob(*record);
       job.trees = trees;
+      job.floats = floatsOf(*record, trees);
+      job.earliest = &record->earliest;
       job.begin = first + begin;
       job.end = first + std::min(count, begin + grain);
     }
@@ -105,26 +165,28 @@ void Frame::collect(std::span<PairRecord* const> records, const Threads& threads
   Stopwatch watch;
   start(records, threads, false);
   threads.forEach(m_jobCount, [&](std::size_t i) {
-    m_jobs[i]->sink.start(nullptr, nullptr);
+    m_jobs[i]->start(m_jobs[i]->record->widerBoxes() ? &Job::keep : nullptr);
     run(*m_jobs[i]);
   });
+  const auto found = [&](std::size_t i) {
+    return m_jobs[i]->use ? std::span<const TrianglePair>(m_jobs[i]->candidates)
+                          : m_jobs[i]->sink.kept();
+  };
   std::size_t i = 0;
   for (PairRecord* record : records) {
     const std::size_t first = i;
     std::size_t size = 0;
-    for (; i < m_jobCount && m_jobs[i]->record == record; ++i)
-      size += m_jobs[i]->sink.kept().size();
-    if (i == first + 1) {
+    for (; i < m_jobCount && m_jobs[i]->record == record; ++i) size += found(i).size();
+    if (i == first + 1 && !m_jobs[first]->use) {
       m_jobs[first]->sink.takeKept(record->candidates);
     } else {
       record->candidates.resize(size);
       auto place = record->candidates.begin();
       for (std::size_t k = first; k < i; ++k)
-        place = std::copy(m_jobs[k]->sink.kept().begin(), m_jobs[k]->sink.kept().end(), place);
+        place = std::copy(found(k).begin(), found(k).end(), place);
     }
     record->candidatesFor = record->revisions();
     record->candidatesSorted = false;
-    statistics.candidatePairs += size;
   }
   statistics.milliseconds.pairs = watch.lap();
 }
@@ -133,18 +195,10 @@ void Frame::forEach(PairRecord& record, const Threads& threads, PairSink::Functi
                     void* context) {
   PairRecord* records[] = {&record};
   start(records, threads, false);
-  struct Guarded {
-    std::mutex mutex;
-    PairSink::Function function;
-    void* context;
-  } guarded{{}, function, context};
-  const PairSink::Function call = [](void* guard, std::span<const TrianglePair> pairs) {
-    Guarded& g = *static_cast<Guarded*>(guard);
-    const std::lock_guard lock(g.mutex);
-    g.function(g.context, pairs);
-  };
+  Guarded guarded{{}, function, context};
   threads.forEach(m_jobCount, [&](std::size_t i) {
-    m_jobs[i]->sink.start(m_jobCount == 1 ? function : call, m_jobCount == 1 ? context : &guarded);
+    m_jobs[i]->guarded = &guarded;
+    m_jobs[i]->start(&Job::handOver);
     run(*m_jobs[i]);
   });
 }
@@ -157,7 +211,7 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
     Stopwatch jobWatch;
     Job& job = *m_jobs[i];
     job.keepCandidates = settings.keepCandidates;
-    job.sink.start(&Job::findContactsOf, &job);
+    job.start(&Job::detect);
     run(job);
     job.milliseconds = jobWatch.lap();
   });
@@ -186,6 +240,7 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
                                   m_jobs[i]->candidates.end());
     }
     orderContacts(m_buffers, m_orderScratch, record->data.contents());
+    record->data.contents().earliestTimeOfImpact = record->earliest.load();
     record->dataFor = record->revisions();
     record->candidatesFor =
         settings.keepCandidates ? record->revisions() : PairRecord::AnsweredFor{};
@@ -200,6 +255,16 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Setti
     Stopwatch watch;
     ContactBuffers contacts;
     findContactsByBruteForce(record->meshes(), contacts);
+    record->earliest = std::numeric_limits<double>::infinity();
+    if (record->pair.settings.contacts == Contacts::Earliest) {
+      for (const auto& c : contacts.vertexTriangle)
+        record->earliest = std::min(record->earliest.load(), c.timeOfImpact);
+      for (const auto& c : contacts.triangleVertex)
+        record->earliest = std::min(record->earliest.load(), c.timeOfImpact);
+      for (const auto& c : contacts.edgeEdge)
+        record->earliest = std::min(record->earliest.load(), c.timeOfImpact);
+      contacts.clear();
+    }
     if (settings.keepCandidates) findCandidatesByBruteForce(record->meshes(), record->candidates);
     statistics.featurePairs += contacts.featurePairs;
     statistics.exactDecisions += contacts.exactDecisions;

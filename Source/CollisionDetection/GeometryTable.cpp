@@ -62,21 +62,22 @@ void checkPositionCount(const Geometry& geometry, std::size_t count) {
                 geometry.id);
 }
 
-void computeFloats(Geometry& geometry, const Threads& threads) {
-  const std::span<const Eigen::Vector3d> positions = geometry.mesh.now;
-  geometry.floats.resize(positions.size());
-  threads.forChunks(
-      positions.size(), kVertexGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-        toFloats(positions.subspan(from, to - from), geometry.frame, geometry.floats.data() + from);
-      });
+void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
+                   Buffer<FloatPoint>& floats, const Threads& threads) {
+  floats.resize(positions.size());
+  threads.forChunks(positions.size(), kVertexGrain,
+                    [&](std::size_t, std::size_t from, std::size_t to) {
+                      toFloats(positions.subspan(from, to - from), frame, floats.data() + from);
+                    });
 }
 
 /// Boxes in the order of orderedTriangles, and those of the groups.
 void computeBoxes(Geometry& geometry, std::span<const std::uint32_t> groups, Box* groupBoxes,
                   std::size_t grain, const Threads& threads) {
   threads.forChunks(groups.size() - 1, grain, [&](std::size_t, std::size_t from, std::size_t to) {
-    triangleBoxes(geometry.floats.data(), nullptr, geometry.orderedTriangles.data(),
-                  groups.subspan(from, to - from + 1), geometry.octree.boxes(), groupBoxes + from);
+    triangleBoxes(geometry.floats.data(), geometry.swept ? geometry.floatsBefore.data() : nullptr,
+                  geometry.orderedTriangles.data(), groups.subspan(from, to - from + 1),
+                  geometry.octree.boxes(), groupBoxes + from);
   });
 }
 
@@ -133,7 +134,10 @@ void updateOctree(Geometry& geometry, const OctreeSettings& settings, const Thre
     return;
   }
   Stopwatch watch;
-  computeFloats(geometry, threads);
+  geometry.treeSwept = geometry.swept;
+  computeFloats(geometry.mesh.now, geometry.frame, geometry.floats, threads);
+  if (geometry.swept)
+    computeFloats(geometry.mesh.before, geometry.frame, geometry.floatsBefore, threads);
   geometry.boxMilliseconds += watch.lap();
   if (geometry.treeKnown && settings.update == OctreeUpdate::Auto) {
     fitBoxes(geometry, threads);
@@ -243,7 +247,9 @@ bool GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   m_small.clear();
   m_large.clear();
   for (const auto& geometry : m_geometries) {
-    if (geometry->treeRevision == geometry->revision && geometry->frame.scale == scale) continue;
+    const bool known =
+        geometry->treeRevision == geometry->revision && geometry->treeSwept == geometry->swept;
+    if (known && geometry->frame.scale == scale) continue;
     changed = true;
     geometry->frame.scale = scale;
     (geometry->mesh.topology.triangles.size() < kSmall ? m_small : m_large)

@@ -30,6 +30,9 @@ struct Geometry {
   FloatFrame frame;
   double spread = 0;  ///< of a sample of the positions
   Buffer<FloatPoint> floats;
+  Buffer<FloatPoint> floatsBefore;  ///< of a swept geometry
+  bool swept = false;               ///< boxes hold the whole step, because a pair's method needs it
+  bool treeSwept = false;
   std::vector<Triangle> orderedTriangles;  ///< in the octree's order
   Octree octree;
   Buffer<std::uint32_t> boundsGroups;  ///< scratch of a rebuild
@@ -54,7 +57,7 @@ class GeometryTable {
   Geometry& at(GeometryId);  ///< throws UnknownGeometry
   std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }
 
-  /// Octrees for the positions now. Returns whether any changed.
+  /// Octrees for the positions now, or the whole step. Returns whether any changed.
   bool updateOctrees(const OctreeSettings&, const Threads&);
   void endFrame();
 

@@ -67,6 +67,9 @@ struct OctreeBasedCD::Implementation {
 
   /// Boxes and octrees for the positions now.
   void update() {
+    for (const auto& geometry : geometries.all()) geometry->swept = false;
+    for (const auto& record : pairs.records())
+      if (record->method == Method::Continuous) record->a->swept = record->b->swept = true;
     Stopwatch watch;
     const bool changed = geometries.updateOctrees(settings.octree, threads);
     double boxes = 0, octrees = 0;
@@ -99,8 +102,9 @@ struct OctreeBasedCD::Implementation {
     std::uint32_t firstNode = 0;
     for (const auto& geometry : geometries.all()) {
       if (geometry->octree.size() == 0) continue;
-      const std::size_t bytes = geometry->floats.capacity() * sizeof(FloatPoint) +
-                                geometry->orderedTriangles.capacity() * sizeof(Triangle);
+      const std::size_t bytes =
+          (geometry->floats.capacity() + geometry->floatsBefore.capacity()) * sizeof(FloatPoint) +
+          geometry->orderedTriangles.capacity() * sizeof(Triangle);
       state->trees.push_back({geometry->id, &geometry->octree, geometry->frame.origin,
                               geometry->frame.scale, geometry->lastUpdate, bytes, firstNode});
       firstNode += static_cast<std::uint32_t>(geometry->octree.pool().used() * 8);

@@ -25,8 +25,13 @@ Method checked(GeometryId a, GeometryId b, const PairSettings& settings) {
                 name + ": thickness is " + std::to_string(settings.thickness) +
                     "; it must be finite and not negative",
                 a);
-  if (settings.contacts != Contacts::Distinct && settings.contacts != Contacts::All)
-    throw Error(ErrorCode::InvalidSettings, name + ": contacts must be Distinct or All", a);
+  if (settings.contacts != Contacts::Distinct && settings.contacts != Contacts::All &&
+      settings.contacts != Contacts::Earliest)
+    throw Error(ErrorCode::InvalidSettings, name + ": contacts must be Distinct, All or Earliest",
+                a);
+  if (settings.contacts == Contacts::Earliest && settings.method != Method::Continuous)
+    throw Error(ErrorCode::InvalidSettings,
+                name + ": Contacts::Earliest is for Method::Continuous only", a);
   switch (settings.method) {
     case Method::Auto:
       return settings.thickness > 0.0 ? Method::Proximity : Method::Intersection;
@@ -43,8 +48,7 @@ Method checked(GeometryId a, GeometryId b, const PairSettings& settings) {
       throw Error(ErrorCode::UnsupportedMethod, name + ": Method::DistanceField does not exist yet",
                   a);
     case Method::Continuous:
-      throw Error(ErrorCode::UnsupportedMethod, name + ": Method::Continuous does not exist yet",
-                  a);
+      return settings.method;
   }
   throw Error(ErrorCode::InvalidSettings,
               name + ": no such method: " + std::to_string(static_cast<int>(settings.method)), a);

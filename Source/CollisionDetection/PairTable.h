@@ -7,6 +7,7 @@
 #include "Core/Buffer.h"
 #include "NarrowPhase/NarrowPhase.h"
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -32,8 +33,12 @@ struct PairRecord {
     return {a->mesh, b->mesh, {method, pair.settings.thickness, pair.settings.contacts}, floats};
   }
 
+  /// Stored boxes may hold more than this pair's method asks for.
+  bool widerBoxes() const { return method != Method::Continuous && (a->swept || b->swept); }
+
   CollisionData data;
   AnsweredFor dataFor;
+  std::atomic<double> earliest;     ///< Contacts::Earliest: found so far in this frame
   Buffer<TrianglePair> candidates;  ///< in the order found until somebody asks for them
   AnsweredFor candidatesFor;
   bool candidatesSorted = false;

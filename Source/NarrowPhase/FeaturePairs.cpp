@@ -181,6 +181,18 @@ HWY_ATTR void findFeaturePairsKernel(const MeshTopology& a, const MeshTopology& 
     findFeaturePairsOf<true, true>(a, b, floats, pairs, out);
 }
 
+HWY_ATTR void keepOverlappingKernel(const MeshTopology& a, const MeshTopology& b,
+                                    const FloatPair& floats, Buffer<TrianglePair>& pairs) {
+  std::size_t kept = 0;
+  for (const TrianglePair& pair : pairs) {
+    const Features s = featuresOf<false>(floats.a, nullptr, a.triangles[pair.a]);
+    const Features t = featuresOf<false>(floats.b, nullptr, b.triangles[pair.b]);
+    pairs[kept] = pair;
+    kept += overlap(shifted(s.all, floats), t.all);
+  }
+  pairs.resize(kept);
+}
+
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -188,6 +200,7 @@ HWY_AFTER_NAMESPACE();
 namespace palpate {
 
 HWY_EXPORT(findFeaturePairsKernel);
+HWY_EXPORT(keepOverlappingKernel);
 
 void findFeaturePairs(const MeshTopology& a, const MeshTopology& b, const FloatPair* floats,
                       std::span<const TrianglePair> pairs, FeaturePairs& out) {
@@ -196,6 +209,11 @@ void findFeaturePairs(const MeshTopology& a, const MeshTopology& b, const FloatP
   out.edgeEdge.clear();
   out.owned = 0;
   HWY_DYNAMIC_DISPATCH(findFeaturePairsKernel)(a, b, floats, pairs, out);
+}
+
+void keepOverlapping(const MeshTopology& a, const MeshTopology& b, const FloatPair& floats,
+                     Buffer<TrianglePair>& pairs) {
+  HWY_DYNAMIC_DISPATCH(keepOverlappingKernel)(a, b, floats, pairs);
 }
 
 }  // namespace palpate

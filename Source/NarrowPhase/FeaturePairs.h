@@ -44,4 +44,8 @@ struct FeaturePairs {
 void findFeaturePairs(const MeshTopology& a, const MeshTopology& b, const FloatPair* floats,
                       std::span<const TrianglePair> pairs, FeaturePairs& out);
 
+/// Those of the triangle pairs whose own boxes overlap.
+void keepOverlapping(const MeshTopology& a, const MeshTopology& b, const FloatPair&,
+                     Buffer<TrianglePair>& pairs);
+
 }  // namespace palpate

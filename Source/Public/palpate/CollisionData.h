@@ -61,6 +61,8 @@ class PALPATE_EXPORT CollisionData {
     std::vector<VertexTriangleContact> vertexTriangle, triangleVertex;
     std::vector<EdgeEdgeContact> edgeEdge;
     std::vector<TrianglePair> intersectingTriangles;
+    double earliestTimeOfImpact =
+        std::numeric_limits<double>::infinity();  ///< with Contacts::Earliest
   };
 
   CollisionData() = default;

@@ -32,7 +32,8 @@ enum class Method { Auto, Proxy, DistanceField, Intersection, Proximity, Continu
 
 enum class Contacts {
   Distinct,  ///< one per pair of closest features
-  All        ///< every pair that the method's definition includes
+  All,       ///< every pair that the method's definition includes
+  Earliest   ///< Continuous only: no contacts, only earliestTimeOfImpact(); much cheaper
 };
 
 struct PairSettings {
