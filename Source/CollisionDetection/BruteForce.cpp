@@ -29,7 +29,8 @@ void findCandidatesByBruteForce(const MeshPair& meshes, Buffer<TrianglePair>& ou
   const double thickness =
       meshes.settings.method == Method::Intersection ? 0.0 : meshes.settings.thickness;
   const bool swept = meshes.settings.method == Method::Continuous;
-  const std::vector<Eigen::AlignedBox3d> boxesA = boxesOf(meshes.a, swept), boxesB = boxesOf(meshes.b, swept);
+  const std::vector<Eigen::AlignedBox3d> boxesA = boxesOf(meshes.a, swept),
+                                         boxesB = boxesOf(meshes.b, swept);
   const std::vector<Triangle>& triangles = meshes.a.topology.triangles;
   const auto overlap = [&](const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b) {
     return ((a.min() - b.max()).array() <= thickness).all() &&

@@ -1,0 +1,68 @@
+#include <palpate/OctreeBasedCD.h>
+
+#include "Scenes.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+
+extern "C" void* __libc_malloc(std::size_t);
+extern "C" void* __libc_realloc(void*, std::size_t);
+
+namespace {
+std::atomic<std::size_t> allocations{0};
+}
+
+/// Counts every allocation of the process, whoever makes it.
+extern "C" void* malloc(std::size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+extern "C" void* realloc(void* memory, std::size_t size) {
+  ++allocations;
+  return __libc_realloc(memory, size);
+}
+
+namespace palpate {
+namespace {
+
+std::size_t allocationsOfSecondPass(const Settings& settings, const PairSettings& pairSettings) {
+  const scenes::Scene scene = scenes::organs();
+  OctreeBasedCD detection(settings);
+  std::vector<GeometryId> ids;
+  for (const auto& mesh : scene.meshes)
+    ids.push_back(detection.addTriangleMesh(mesh.positions, mesh.triangles));
+  for (const auto& [a, b] : scene.pairs) detection.addCollisionPair(ids[a], ids[b], pairSettings);
+  std::vector<Eigen::Vector3d> positions;
+  std::size_t before = 0;
+  for (int frame = 0; frame < 2 * scene.frames; ++frame) {
+    if (frame == scene.frames) before = allocations;
+    for (std::size_t m = 0; m < ids.size(); ++m) {
+      scene.positions(frame, m, positions);
+      detection.setPositions(ids[m], positions);
+    }
+    detection.detectCollision();
+  }
+  return allocations - before;
+}
+
+TEST(SteadyFrame, AllocatesNothing) {
+  Settings settings;
+  settings.threads = 1;
+  PairSettings proximity;
+  proximity.thickness = scenes::organs().thickness;
+  for (const OctreeUpdate update : {OctreeUpdate::Auto, OctreeUpdate::Rebuild}) {
+    settings.octree.update = update;
+    EXPECT_EQ(allocationsOfSecondPass(settings, proximity), 0u);
+  }
+}
+
+TEST(SteadyFrame, CountsAllocations) {
+  const std::size_t before = allocations;
+  std::vector<int> some(allocations % 7 + 1);
+  EXPECT_GE(allocations - before, some.empty() ? 0u : 1u);
+}
+
+}  // namespace
+}  // namespace palpate
