@@ -126,7 +126,6 @@ void fitBoxes(Geometry& geometry, const Threads& threads) {
 
 void updateOctree(Geometry& geometry, const OctreeSettings& settings, const Threads& threads) {
   using Update = LooseOctree::Update;
-  geometry.boxMilliseconds = geometry.octreeMilliseconds = 0;
   geometry.treeRevision = geometry.revision;
   if (geometry.mesh.topology.triangles.empty()) {
     geometry.octree.reset(0);
@@ -230,17 +229,14 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
   ++geometry.revision;
 }
 
-bool GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads& threads) {
-  bool changed = false;
+void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads& threads) {
   double spread = 0;
   for (const auto& geometry : m_geometries) {
     if (geometry->treeRevision != geometry->revision) {
       const SampledExtent extent = sampleExtent(geometry->mesh.now);
       geometry->frame.origin = extent.median;
       geometry->spread = extent.spread;
-      changed = true;
     }
-    geometry->lastUpdate = LooseOctree::Update::Unchanged;
     spread = std::max(spread, geometry->spread);
   }
   const double scale = frameScale(spread);
@@ -250,7 +246,6 @@ bool GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
     const bool known =
         geometry->treeRevision == geometry->revision && geometry->treeSwept == geometry->swept;
     if (known && geometry->frame.scale == scale) continue;
-    changed = true;
     geometry->frame.scale = scale;
     (geometry->mesh.topology.triangles.size() < kSmall ? m_small : m_large)
         .push_back(geometry.get());
@@ -258,7 +253,6 @@ bool GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   const Threads one(1);
   threads.forEach(m_small.size(), [&](std::size_t i) { updateOctree(*m_small[i], settings, one); });
   for (Geometry* geometry : m_large) updateOctree(*geometry, settings, threads);
-  return changed;
 }
 
 void GeometryTable::endFrame() {

@@ -57,8 +57,8 @@ class GeometryTable {
   Geometry& at(GeometryId);  ///< throws UnknownGeometry
   std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }
 
-  /// Octrees for the positions now, or the whole step. Returns whether any changed.
-  bool updateOctrees(const OctreeSettings&, const Threads&);
+  /// Octrees for the positions now, or the whole step.
+  void updateOctrees(const OctreeSettings&, const Threads&);
   void endFrame();
 
  private:

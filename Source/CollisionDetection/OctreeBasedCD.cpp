@@ -53,41 +53,55 @@ struct OctreeBasedCD::Implementation {
   FrameStatistics statistics;
   std::optional<LooseOctree> octree;
   std::vector<PairRecord*> work;
+  bool inFrame = false;
   std::mutex sorting;  ///< of candidates, when a const query first asks for them
   PairOrderScratch sortingScratch;
 
+  /// An update() before detectCollision() belongs to its frame.
   void startFrame() {
+    if (inFrame) return;
+    inFrame = true;
     statistics = {};
     for (const auto& geometry : geometries.all()) {
+      geometry->lastUpdate = LooseOctree::Update::Unchanged;
       ++statistics.geometries;
       statistics.triangles += geometry->mesh.topology.triangles.size();
       statistics.untestedVertices += geometry->mesh.topology.untestedVertices;
     }
   }
 
+  void endFrame() {
+    geometries.endFrame();
+    inFrame = false;
+  }
+
   /// Boxes and octrees for the positions now.
   void update() {
-    for (const auto& geometry : geometries.all()) geometry->swept = false;
+    using Update = LooseOctree::Update;
+    startFrame();
+    for (const auto& geometry : geometries.all()) {
+      geometry->swept = false;
+      geometry->boxMilliseconds = geometry->octreeMilliseconds = 0;
+    }
     for (const auto& record : pairs.records())
       if (record->method == Method::Continuous) record->a->swept = record->b->swept = true;
     Stopwatch watch;
-    const bool changed = geometries.updateOctrees(settings.octree, threads);
+    geometries.updateOctrees(settings.octree, threads);
+    const double wall = watch.lap();
     double boxes = 0, octrees = 0;
+    statistics.rebuiltOctrees = statistics.refittedOctrees = statistics.unchangedOctrees = 0;
     for (const auto& geometry : geometries.all()) {
-      using Update = LooseOctree::Update;
-      const Update last = geometry->lastUpdate;
-      ++(last == Update::Rebuilt    ? statistics.rebuiltOctrees
-         : last == Update::Refitted ? statistics.refittedOctrees
-                                    : statistics.unchangedOctrees);
-      if (last == Update::Unchanged) continue;
+      ++(geometry->lastUpdate == Update::Rebuilt    ? statistics.rebuiltOctrees
+         : geometry->lastUpdate == Update::Refitted ? statistics.refittedOctrees
+                                                    : statistics.unchangedOctrees);
       boxes += geometry->boxMilliseconds;
       octrees += geometry->octreeMilliseconds;
     }
     // Geometries are updated side by side: the wall clock is shared out as their work was.
-    const double wall = watch.lap(), share = boxes + octrees > 0 ? boxes / (boxes + octrees) : 0;
+    const double share = boxes + octrees > 0 ? boxes / (boxes + octrees) : 0;
     statistics.milliseconds.boxes += wall * share;
     statistics.milliseconds.octree += wall * (1 - share);
-    if (changed) showOctree();
+    showOctree();
 #ifdef PALPATE_VALIDATE
     PALPATE_ASSERT(octree->validate().empty());
 #endif
@@ -121,7 +135,6 @@ struct OctreeBasedCD::Implementation {
   }
 
   void collect() {
-    startFrame();
     update();
     const auto records = pairsToDo(&PairRecord::candidatesFor);
     if (settings.engine == Engine::Octree) {
@@ -136,11 +149,10 @@ struct OctreeBasedCD::Implementation {
     statistics.candidatePairs = 0;
     for (const auto& record : pairs.records())
       statistics.candidatePairs += record->candidates.size();
-    geometries.endFrame();
+    endFrame();
   }
 
   void detect() {
-    startFrame();
     update();
     const auto records = pairsToDo(&PairRecord::dataFor);
     if (settings.engine == Engine::Octree)
@@ -153,7 +165,7 @@ struct OctreeBasedCD::Implementation {
           data.vertexTriangle().size() + data.triangleVertex().size() + data.edgeEdge().size();
       statistics.intersectingTriangles += data.intersectingTriangles().size();
     }
-    geometries.endFrame();
+    endFrame();
   }
 
   std::shared_ptr<LooseOctree::State> state;
@@ -207,10 +219,7 @@ std::span<const CollisionPair> OctreeBasedCD::pairs() const {
   return m_implementation->pairs.pairs();
 }
 
-void OctreeBasedCD::update() {
-  m_implementation->startFrame();
-  m_implementation->update();
-}
+void OctreeBasedCD::update() { m_implementation->update(); }
 
 void OctreeBasedCD::collectCandidates() { m_implementation->collect(); }
 
@@ -220,7 +229,6 @@ void OctreeBasedCD::forEachCandidateBatch(GeometryId a, GeometryId b, BatchFunct
                                           void* context) {
   Implementation& all = *m_implementation;
   PairRecord& record = all.pairs.at(all.geometries, a, b);
-  all.startFrame();
   all.update();
   if (all.settings.engine == Engine::BruteForce) {
     Buffer<TrianglePair> candidates;

@@ -57,8 +57,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   void collectCandidates();
   void detectCollision();  ///< broad and narrow phase of every pair; updates if needed
 
-  /// Hands candidate pairs to f(std::span<const TrianglePair>) in batches, unsorted, from the
-  /// calling thread; memory does not grow with their number. Updates if needed.
+  /// Hands candidate pairs to f(std::span<const TrianglePair>) in batches, unsorted, one at a time,
+  /// not all from the calling thread; memory does not grow with their number. Updates if needed.
   template <class F>
   void forEachCandidate(GeometryId a, GeometryId b, F&& f) {
     using Function = std::remove_reference_t<F>;
