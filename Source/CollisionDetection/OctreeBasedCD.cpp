@@ -63,7 +63,6 @@ struct OctreeBasedCD::Implementation {
     inFrame = true;
     statistics = {};
     for (const auto& geometry : geometries.all()) {
-      geometry->lastUpdate = LooseOctree::Update::Unchanged;
       ++statistics.geometries;
       statistics.triangles += geometry->mesh.topology.triangles.size();
       statistics.untestedVertices += geometry->mesh.topology.untestedVertices;
@@ -75,11 +74,14 @@ struct OctreeBasedCD::Implementation {
     inFrame = false;
   }
 
-  /// Boxes and octrees for the positions now.
-  void update() {
+  /// Boxes and octrees for the positions now. What a frame's detection finds done by an explicit
+  /// update() stays said.
+  void update(bool explicitly = false) {
     using Update = LooseOctree::Update;
+    const bool asked = !inFrame || explicitly;
     startFrame();
     for (const auto& geometry : geometries.all()) {
+      if (asked) geometry->lastUpdate = Update::Unchanged;
       geometry->swept = false;
       geometry->boxMilliseconds = geometry->octreeMilliseconds = 0;
     }
@@ -219,7 +221,7 @@ std::span<const CollisionPair> OctreeBasedCD::pairs() const {
   return m_implementation->pairs.pairs();
 }
 
-void OctreeBasedCD::update() { m_implementation->update(); }
+void OctreeBasedCD::update() { m_implementation->update(true); }
 
 void OctreeBasedCD::collectCandidates() { m_implementation->collect(); }
 
