@@ -1,5 +1,6 @@
 #include "NarrowPhase/NarrowPhase.h"
 
+#include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Proximity.h"
 
@@ -22,6 +23,8 @@ void findContacts(const MeshPair& pair, std::span<const TrianglePair> candidates
       return findProximity(pair, candidates, out);
     case Method::Intersection:
       return findIntersections(pair, candidates, out);
+    case Method::Continuous:
+      return findContinuous(pair, candidates, out);
     default:
       throw Error(ErrorCode::UnsupportedMethod, "this method does not exist yet");
   }
@@ -33,6 +36,8 @@ void findContactsByBruteForce(const MeshPair& pair, ContactBuffers& out) {
       return findProximityByBruteForce(pair, out);
     case Method::Intersection:
       return findIntersectionsByBruteForce(pair, out);
+    case Method::Continuous:
+      return findContinuousByBruteForce(pair, out);
     default:
       throw Error(ErrorCode::UnsupportedMethod, "this method does not exist yet");
   }
