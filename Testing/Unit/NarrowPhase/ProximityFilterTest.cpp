@@ -1,0 +1,171 @@
+#include "NarrowPhase/ProximityFilter.h"
+
+#include "Core/SimdPath.h"
+#include "Math/ClosestPoint.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace palpate {
+namespace {
+
+using Eigen::Vector3d;
+using Pair = std::array<Vector3d, 6>;  // corners of a, of b
+using Possible = std::array<std::uint32_t, TrianglePairBatch::kSize>;
+
+constexpr int kFeaturePairs = 15;
+
+/// Distance of feature pair `bit`; with distinct, none where edges do not cross inside.
+std::optional<double> distanceOf(const Pair& x, int bit, bool distinct) {
+  const auto corner = [&](int triangle, int i) { return x[3 * triangle + i % 3]; };
+  if (bit < 6) {
+    const int own = bit < 3 ? 0 : 1, other = 1 - own;
+    return vertexTriangleDistance(corner(own, bit % 3), corner(other, 0), corner(other, 1),
+                                  corner(other, 2))
+        .distance;
+  }
+  const int i = (bit - 6) / 3, j = (bit - 6) % 3;
+  if (!distinct)
+    return edgeEdgeDistance(corner(0, i), corner(0, i + 1), corner(1, j), corner(1, j + 1))
+        .distance;
+  const auto answer =
+      crossingEdgesDistance(corner(0, i), corner(0, i + 1), corner(1, j), corner(1, j + 1));
+  return answer ? std::optional(answer->distance) : std::nullopt;
+}
+
+Possible filter(const std::vector<Pair>& pairs, double thickness, bool distinct) {
+  TrianglePairBatch batch{};
+  for (std::size_t n = 0; n < pairs.size(); ++n)
+    for (int row = 0; row < 18; ++row) batch.coordinates[row][n] = pairs[n][row / 3][row % 3];
+  std::uint32_t possible[TrianglePairBatch::kSize];
+  findPossibleProximity(batch, thickness, distinct, possible);
+  return std::to_array(possible);
+}
+
+class Random {
+ public:
+  double real() { return std::uniform_real_distribution<double>(-1, 1)(m_engine); }
+  int below(int n) { return static_cast<int>(m_engine() % static_cast<unsigned>(n)); }
+  Vector3d vector() { return {real(), real(), real()}; }
+  double smallPower() { return std::pow(10.0, -below(12)); }
+
+ private:
+  std::mt19937_64 m_engine{3};
+};
+
+constexpr int kKinds = 7;
+
+Pair pairOf(int kind, Random& random) {
+  Pair x;
+  for (Vector3d& v : x) v = random.vector();
+  switch (kind) {
+    case 1:  // far from the origin
+      for (Vector3d& v : x) v += Vector3d(1e6, 1e6, -1e6);
+      break;
+    case 2:  // slivers
+      x[2] = x[0] + random.real() * (x[1] - x[0]) + random.smallPower() * random.vector();
+      x[5] = x[3] + random.real() * (x[4] - x[3]) + random.smallPower() * random.vector();
+      break;
+    case 3: {  // one much smaller than the other
+      const double size = random.smallPower();
+      for (int i = 3; i < 6; ++i) x[i] = x[0] + size * x[i];
+      break;
+    }
+    case 4:  // on a small grid: parallel, coplanar, coincident
+      for (Vector3d& v : x) v = Vector3d(random.below(3), random.below(3), random.below(3));
+      break;
+    case 5:  // nearly parallel edges and planes
+      for (int i = 3; i < 6; ++i)
+        x[i] = x[i - 3] + 0.1 * Vector3d::Ones() + random.smallPower() * x[i];
+      break;
+    case 6: {  // any scale
+      const double scale = std::ldexp(1.0, random.below(2000) - 1000);
+      for (Vector3d& v : x) v *= scale;
+      break;
+    }
+  }
+  return x;
+}
+
+/// The thickness is exactly the distance of one of the feature pairs, which must not be left out.
+TEST(ProximityFilter, LeavesOutNothingWithinTheThickness) {
+  Random random;
+  std::size_t within = 0;
+  for (int round = 0; round < 1400; ++round) {
+    const int kind = round % kKinds;
+    std::vector<Pair> pairs;
+    for (int i = 0; i < TrianglePairBatch::kSize; ++i) pairs.push_back(pairOf(kind, random));
+    const bool distinct = random.below(2) == 0;
+    const Pair& chosen = pairs[random.below(TrianglePairBatch::kSize)];
+    const double thickness = distanceOf(chosen, random.below(6), distinct).value();
+    const Possible possible = filter(pairs, thickness, distinct);
+    for (std::size_t n = 0; n < pairs.size(); ++n) {
+      for (int bit = 0; bit < kFeaturePairs; ++bit) {
+        const std::optional<double> distance = distanceOf(pairs[n], bit, distinct);
+        if (!distance || !(*distance <= thickness)) continue;
+        ++within;
+        ASSERT_TRUE(possible[n] >> bit & 1)
+            << "kind " << kind << ", round " << round << ", bit " << bit;
+      }
+    }
+  }
+  EXPECT_GT(within, 5000u);
+}
+
+TEST(ProximityFilter, EveryPathLeavesOutTheSame) {
+  Random random;
+  for (int round = 0; round < 300; ++round) {
+    std::vector<Pair> pairs;
+    for (int i = 0; i < TrianglePairBatch::kSize; ++i)
+      pairs.push_back(pairOf(round % kKinds, random));
+    const double thickness = random.smallPower();
+    useSimdPath("");
+    const Possible best = filter(pairs, thickness, round % 2 == 0);
+    for (const std::string& path : simdPaths()) {
+      useSimdPath(path);
+      ASSERT_EQ(filter(pairs, thickness, round % 2 == 0), best) << path;
+    }
+  }
+  useSimdPath("");
+}
+
+/// Of well-shaped triangles little is kept that is not within reach.
+TEST(ProximityFilter, LeavesOutNearlyAllThatIsBeyondTheThickness) {
+  Random random;
+  const double thickness = 0.03;
+  int kept = 0, contacts = 0, all = 0;
+  for (int round = 0; round < 300; ++round) {
+    std::vector<Pair> pairs;
+    for (int i = 0; i < TrianglePairBatch::kSize; ++i) pairs.push_back(pairOf(round % 2, random));
+    const Possible possible = filter(pairs, thickness, true);
+    for (std::size_t n = 0; n < pairs.size(); ++n) {
+      all += kFeaturePairs;
+      kept += std::popcount(possible[n] & 0x7fffu);
+      for (int bit = 0; bit < kFeaturePairs; ++bit) {
+        const std::optional<double> distance = distanceOf(pairs[n], bit, true);
+        contacts += distance && *distance <= thickness;
+      }
+    }
+  }
+  EXPECT_GT(contacts, all / 200);
+  EXPECT_LT(kept, contacts + contacts / 10);
+}
+
+TEST(ProximityFilter, LeavesOutNothingWhereCoordinatesOverflow) {
+  const double most = std::numeric_limits<double>::max();
+  const Pair x{Vector3d(-most, -most, 0), Vector3d(most, -most, 0), Vector3d(0, most, 0),
+               Vector3d(0, 0, 1),         Vector3d(1, 0, 1),        Vector3d(0, 1, 2)};
+  const std::vector<Pair> pairs(TrianglePairBatch::kSize, x);
+  for (const std::uint32_t bits : filter(pairs, 1.0, true)) EXPECT_EQ(bits & 0x7fffu, 0x7fffu);
+}
+
+}  // namespace
+}  // namespace palpate
