@@ -49,7 +49,7 @@ struct Scene {
 
   Scene() {
     collisions.addCollisionPair(organ, tool, {.thickness = kThickness});
-    collisions.addCollisionPair(organ, organ, {.thickness = kThickness});
+    collisions.addCollisionPair(organ, organ);
     collisions.removeGeometry(removed);
   }
 };
