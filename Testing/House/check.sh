@@ -124,9 +124,10 @@ checkWords() {
     grep -rnE --include='*.h' --include='*.cpp' '[A-Za-z](Manager|Helper|Utils)\b|\b(Manager|Helper|Utils)|\bdata2\b' \
       Source Examples Testing
     find Source Examples Testing -name '*Manager*' -o -name '*Helper*' -o -name '*Utils*')
-  lines=$(sourceFiles | xargs cat | wc -l)
-  echo "Source has $lines lines"
-  ((lines < 10000)) || fault "Source has 10,000 lines or more"
+  # What comments say is no reason to leave it out: lines of code count, without comments and blanks.
+  lines=$(sourceFiles | xargs cat | grep -cvE '^[[:space:]]*(//.*)?$')
+  echo "Source has $lines lines of code, $(sourceFiles | xargs cat | wc -l) with comments and blanks"
+  ((lines < 10000)) || fault "Source has 10,000 lines of code or more"
 }
 
 # Nothing prints and nothing exits, but an assertion that fails.
