@@ -71,7 +71,13 @@ printf '  // README begins\n  a();\n    b();\n  // README ends\n' >"$tree/Testin
 expect holds Readme
 printf '  // README begins\n  a();\n    c();\n  // README ends\n' >"$tree/Testing/Consumer/Project/Contacts.cpp"
 expect fails Readme
-rm -r "$tree/README.md" "$tree/Testing/Consumer"
+planted="a link that leads nowhere"
+printf '  // README begins\n  a();\n    b();\n  // README ends\n' >"$tree/Testing/Consumer/Project/Contacts.cpp"
+printf '[b](b.md)\n' >"$tree/Examples/A.md"
+expect fails Readme
+touch "$tree/Examples/b.md"
+expect holds Readme
+rm -r "$tree/README.md" "$tree/Examples/A.md" "$tree/Testing/Consumer"
 
 planted="a stray symbol"
 printf 'namespace palpate { int a; }\n' | "$compiler" -shared -fPIC -x c++ -o "$tree/lib.so" -
