@@ -192,7 +192,8 @@ void expectPossible(Call call) {
   const auto refuse = [&](const PairSettings& settings, const Refusal& refusal) {
     expectRefused([&](Scene& scene) { call(scene, settings); }, refusal);
   };
-  for (Method method : {Method::Auto, Method::Proximity, Method::Intersection}) {
+  for (Method method :
+       {Method::Auto, Method::Proximity, Method::Intersection, Method::Continuous}) {
     refuse({.method = method, .thickness = -0.125}, {ErrorCode::InvalidSettings, {"-0.125"}});
     refuse({.method = method, .thickness = kNan}, {ErrorCode::InvalidSettings, {"nan"}});
     refuse({.method = method, .thickness = kInfinity}, {ErrorCode::InvalidSettings, {"inf"}});
@@ -205,6 +206,9 @@ void expectPossible(Call call) {
   refuse({.method = Method::Proxy, .thickness = 1}, {ErrorCode::UnsupportedMethod, {"Proxy"}});
   refuse({.method = Method::DistanceField, .thickness = 1},
          {ErrorCode::UnsupportedMethod, {"DistanceField"}});
+  for (Method method : {Method::Auto, Method::Proximity, Method::Intersection})
+    refuse({.method = method, .thickness = 1, .contacts = Contacts::Earliest},
+           {ErrorCode::InvalidSettings, {"Earliest", "Continuous"}});
   refuse({.method = static_cast<Method>(99), .thickness = 1}, {ErrorCode::InvalidSettings, {}});
   refuse({.thickness = 1, .contacts = static_cast<Contacts>(99)}, {ErrorCode::InvalidSettings, {}});
 }
@@ -409,6 +413,8 @@ TEST(BadInput, OneCallPath) {
   refuse(organ, tool, {.thickness = -1}, {ErrorCode::InvalidSettings, {"-1"}});
   refuse(organ, tool, {.method = Method::Proximity}, {ErrorCode::InvalidSettings, {"Proximity"}});
   refuse(organ, tool, {.method = Method::Proxy}, {ErrorCode::UnsupportedMethod, {"Proxy"}});
+  refuse(organ, tool, {.method = Method::Continuous},
+         {ErrorCode::UnsupportedMethod, {"Continuous", "step"}});
   EXPECT_GT(detectCollision(organ, tool, {.thickness = kThickness}).hash(), 0u);
 }
 
