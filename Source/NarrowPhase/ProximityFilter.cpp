@@ -30,7 +30,7 @@ constexpr int kSize = TrianglePairBatch::kSize;
 
 /// A batch in floats: coordinates relative to a0, scaled to below 2.
 struct ScaledBatch {
-  alignas(64) float coordinates[18][kSize];
+  alignas(64) float coordinates[18][kSize];  // the first three stay unused: a0 is the origin
   alignas(64) float thickness[kSize];
 };
 
@@ -40,7 +40,7 @@ HWY_ATTR void scaleBatch(const TrianglePairBatch& batch, double thickness, Scale
   const hn::Rebind<float, decltype(d)> df;
   for (int i = 0; i < kSize; i += static_cast<int>(hn::Lanes(d))) {
     hn::Vec<decltype(d)> relative[18], most = hn::Zero(d);
-    for (int k = 0; k < 18; ++k) {
+    for (int k = 3; k < 18; ++k) {
       relative[k] =
           hn::Sub(hn::Load(d, batch.coordinates[k] + i), hn::Load(d, batch.coordinates[k % 3] + i));
       most = hn::Max(most, hn::Abs(relative[k]));
@@ -53,7 +53,7 @@ HWY_ATTR void scaleBatch(const TrianglePairBatch& batch, double thickness, Scale
                                                 hn::BitCast(d, hn::Set(du, 0x7ff8000000000000u)));
     hn::Store(hn::Mul(hn::DemoteTo(df, scaledThickness), hn::Set(df, 1.0f + 0x1p-20f)), df,
               scaled.thickness + i);
-    for (int k = 0; k < 18; ++k)
+    for (int k = 3; k < 18; ++k)
       hn::Store(hn::DemoteTo(df, hn::Mul(relative[k], scale)), df, scaled.coordinates[k] + i);
   }
 }
@@ -146,6 +146,7 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
       a.corner[i] = {load(3 * i), load(3 * i + 1), load(3 * i + 2)};
       b.corner[i] = {load(3 * i + 9), load(3 * i + 10), load(3 * i + 11)};
     }
+    a.corner[0] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     a.set(d, thickness);
     b.set(d, thickness);
     Vector3<V> from[3][3];  // a's corner i seen from b's corner j
