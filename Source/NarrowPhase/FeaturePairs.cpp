@@ -103,12 +103,28 @@ class Appender {
   std::size_t m_size;
 };
 
-inline bool holds(const Triangle& triangle, std::uint32_t vertex) {
-  return triangle[0] == vertex || triangle[1] == vertex || triangle[2] == vertex;
-}
+/// Feature pairs of two triangles, as bits. corners: i with the other triangle; edges: 3 i + j.
+struct Choice {
+  unsigned cornersOfA, cornersOfB, edges;
+};
+constexpr unsigned kColumn = 0111;  ///< bit 3 i of each row i; times three bits: those in every row
+constexpr unsigned kRows[8] = {0, 07, 070, 077, 0700, 0707, 0770, 0777};
 
-inline bool shareVertex(const Segment& p, const Segment& q) {
-  return p[0] == q[0] || p[0] == q[1] || p[1] == q[0] || p[1] == q[1];
+/// Those that have a vertex in common.
+inline Choice sharing(const Triangle& a, const Triangle& b) {
+  unsigned same = 0;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) same |= static_cast<unsigned>(a[i] == b[j]) << (3 * i + j);
+  if (same == 0) return {};
+  Choice choice{};
+  for (int i = 0; i < 3; ++i) {
+    choice.cornersOfA |= static_cast<unsigned>((same & 07u << 3 * i) != 0) << i;
+    choice.cornersOfB |= static_cast<unsigned>((same & kColumn << i) != 0) << i;
+  }
+  // Edge i has corners i and i + 1 mod 3.
+  const unsigned ofEdgesA = same | same >> 3 | (same << 6 & 0700);
+  choice.edges = ofEdgesA | (ofEdgesA >> 1 & 0333) | (ofEdgesA << 2 & 0444);
+  return choice;
 }
 
 template <bool kFloats, bool kSwept>
@@ -138,34 +154,33 @@ HWY_ATTR void findFeaturePairsOf(const MeshTopology& a, const MeshTopology& b,
       }
       t = featuresOf<kSwept>(floats->b, floats->beforeB, cornersB);
     }
-    for (unsigned corners = ownedA & 7; corners; corners &= corners - 1) {
-      const int i = std::countr_zero(corners);
-      if (self && holds(cornersB, cornersA[i])) continue;
-      ++out.owned;
+    Choice choice{ownedA & 7, ownedB & 7, kRows[ownedA >> 3] & (ownedB >> 3) * kColumn};
+    if (self) {
+      const Choice shared = sharing(cornersA, cornersB);
+      choice.cornersOfA &= ~shared.cornersOfA;
+      choice.cornersOfB &= ~shared.cornersOfB;
+      choice.edges &= ~shared.edges;
+    }
+    out.owned += static_cast<std::size_t>(
+        std::popcount(choice.cornersOfA | choice.cornersOfB << 3 | choice.edges << 6));
+    for (; choice.cornersOfA; choice.cornersOfA &= choice.cornersOfA - 1) {
+      const int i = std::countr_zero(choice.cornersOfA);
       vertexTriangle.append(cornersA[i], pair.b, !kFloats || overlap(s.corners[i], t.all));
     }
-    for (unsigned corners = ownedB & 7; corners; corners &= corners - 1) {
-      const int i = std::countr_zero(corners);
-      if (self && holds(cornersA, cornersB[i])) continue;
-      ++out.owned;
+    for (; choice.cornersOfB; choice.cornersOfB &= choice.cornersOfB - 1) {
+      const int i = std::countr_zero(choice.cornersOfB);
       const bool keep = !kFloats || overlap(s.all, t.corners[i]);
       if (self)
         vertexTriangle.append(cornersB[i], pair.a, keep);
       else
         triangleVertex.append(pair.a, cornersB[i], keep);
     }
-    for (unsigned edgesA = ownedA >> 3; edgesA; edgesA &= edgesA - 1) {
-      const int i = std::countr_zero(edgesA);
-      const std::uint32_t edgeA = a.triangleEdges[pair.a][i];
-      for (unsigned edgesB = ownedB >> 3; edgesB; edgesB &= edgesB - 1) {
-        const int j = std::countr_zero(edgesB);
-        const std::uint32_t edgeB = b.triangleEdges[pair.b][j];
-        if (self && shareVertex(a.edges[edgeA], b.edges[edgeB])) continue;
-        ++out.owned;
-        const bool turned = self && edgeB < edgeA;
-        edgeEdge.append(turned ? edgeB : edgeA, turned ? edgeA : edgeB,
-                        !kFloats || overlap(s.edges[i], t.edges[j]));
-      }
+    for (; choice.edges; choice.edges &= choice.edges - 1) {
+      const int bit = std::countr_zero(choice.edges), i = bit / 3, j = bit % 3;
+      const std::uint32_t edgeA = a.triangleEdges[pair.a][i], edgeB = b.triangleEdges[pair.b][j];
+      const bool turned = self && edgeB < edgeA;
+      edgeEdge.append(turned ? edgeB : edgeA, turned ? edgeA : edgeB,
+                      !kFloats || overlap(s.edges[i], t.edges[j]));
     }
   }
 }

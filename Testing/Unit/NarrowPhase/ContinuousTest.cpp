@@ -1,11 +1,13 @@
 #include "NarrowPhase/Continuous.h"
 
 #include "Common/RandomMeshes.h"
+#include "Geometry/FloatPositions.h"
 #include "PublishedFrames.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <tuple>
 
@@ -68,19 +70,46 @@ double earliestOf(const ContactBuffers& contacts) {
   return earliest;
 }
 
-void expectSameAsBruteForce(const MeshPair& pair) {
-  ContactBuffers found{}, expected{}, counts{};
-  const std::vector<TrianglePair> candidates = everyPair(pair.a, pair.b);
-  findContinuous(pair, candidates, found);
-  findContinuousByBruteForce(pair, expected);
+void expectSame(const ContactBuffers& found, const ContactBuffers& expected) {
   EXPECT_EQ(found.featurePairs, expected.featurePairs);
   EXPECT_EQ(sorted(found.vertexTriangle), sorted(expected.vertexTriangle));
   EXPECT_EQ(sorted(found.triangleVertex), sorted(expected.triangleVertex));
   EXPECT_EQ(sorted(found.edgeEdge), sorted(expected.edgeEdge));
-  EXPECT_GT(found.vertexTriangle.size(), 0u);
-  EXPECT_GT(found.edgeEdge.size(), 0u);
+}
+
+std::vector<FloatPoint> floatsOf(const std::vector<Vector3d>& positions) {
+  std::vector<FloatPoint> floats(positions.size());
+  toFloats(positions, {}, floats.data());
+  return floats;
+}
+
+void expectSameAsBruteForce(MeshPair pair) {
+  ContactBuffers found{}, boxed{}, expected{}, counts{};
+  const std::vector<TrianglePair> candidates = everyPair(pair.a, pair.b);
+  findContinuousByBruteForce(pair, expected);
+  EXPECT_GT(expected.vertexTriangle.size(), 0u);
+  EXPECT_GT(expected.edgeEdge.size(), 0u);
+  findContinuous(pair, candidates, found);
+  expectSame(found, expected);
   EXPECT_EQ(findEarliestImpact(pair, candidates, kInfinity, counts), earliestOf(expected));
   EXPECT_EQ(findEarliestImpact(pair, candidates, 0.0, counts), 0.0);
+
+  // With boxes over the step, inflated outward.
+  const auto nowA = floatsOf(pair.a.now), beforeA = floatsOf(pair.a.before),
+             nowB = floatsOf(pair.b.now), beforeB = floatsOf(pair.b.before);
+  const float shift = std::nextafter(static_cast<float>(pair.settings.thickness), 1.0f);
+  const FloatPair floats{nowA.data(),
+                         nowB.data(),
+                         beforeA.data(),
+                         beforeB.data(),
+                         {-shift, -shift, -shift, 0},
+                         {shift, shift, shift, 0}};
+  pair.floats = &floats;
+  findContinuous(pair, candidates, boxed);
+  expectSame(boxed, expected);
+  EXPECT_LT(boxed.features.vertexTriangle.size() + boxed.features.edgeEdge.size(),
+            found.features.vertexTriangle.size() + found.features.edgeEdge.size());
+  EXPECT_EQ(findEarliestImpact(pair, candidates, kInfinity, counts), earliestOf(expected));
 }
 
 TEST(Continuous, EqualsBruteForce) {
