@@ -48,16 +48,52 @@ TEST(Predicates, EverySignIsThatOfTheIntegerDeterminant) {
   EXPECT_GT(counts.bigIntegers, 1000u);
 }
 
-TEST(Predicates, OneUlpOffThePlaneIsSeen) {
+Eigen::Vector3d nudged(Eigen::Vector3d p, int axis, Random& random) {
   const double infinity = std::numeric_limits<double>::infinity();
+  p[axis] = std::nextafter(p[axis], random.below(2) ? infinity : -infinity);
+  return p;
+}
+
+TEST(Predicates, OneUlpOffThePlaneOrTheLineIsSeen) {
   Random random(2);
   SignCounts counts;
-  for (int repeat = 0; repeat < 1000; ++repeat) {
+  for (int repeat = 0; repeat < 5000; ++repeat) {
     const Eigen::Vector3d a = random.inCube(), b = random.inCube(), c = random.inCube();
-    Eigen::Vector3d d = pointOn({a, b, c}, random);
     const int axis = random.below(3);
-    d[axis] = std::nextafter(d[axis], random.below(2) ? infinity : -infinity);
+    const Eigen::Vector3d d = nudged(pointOn({a, b, c}, random), axis, random);
     ASSERT_EQ(orient3d(a, b, c, d, counts), volumeSign({a, b, c, d}));
+    const Eigen::Vector3d e = nudged(a + random.unit() * (b - a), axis, random);
+    for (int along = 0; along < 3; ++along)
+      ASSERT_EQ(orient2d(along, a, b, e, counts), areaSign(along, a, b, e));
+  }
+}
+
+/// Where products end among the denormals, and all around.
+TEST(Predicates, NoUnderflowTurnsAVolume) {
+  Random random(5);
+  SignCounts counts;
+  for (int exponent = -1020; exponent <= 1000;
+       exponent += std::abs(exponent + 450) < 120 ? 1 : 30) {
+    for (int repeat = 0; repeat < 60; ++repeat) {
+      CornersPair pair{cornersOf([&] { return random.inCube(); }), {}};
+      pair.second = cornersOf([&] { return pointOn(pair.first, random); });
+      const auto [a, b] = scaled(pair, exponent);
+      ASSERT_EQ(orient3d(a[0], a[1], a[2], b[0], counts), volumeSign({a[0], a[1], a[2], b[0]}))
+          << exponent;
+    }
+  }
+}
+
+TEST(Predicates, NoUnderflowTurnsAnArea) {
+  Random random(6);
+  SignCounts counts;
+  for (int exponent = -545; exponent <= -490; ++exponent) {
+    for (int repeat = 0; repeat < 1500; ++repeat) {
+      const Eigen::Vector3d a = scaled(random.inCube(), exponent),
+                            b = scaled(random.inCube(), exponent);
+      const Eigen::Vector3d c = a + random.unit() * (b - a);
+      ASSERT_EQ(orient2d(repeat % 3, a, b, c, counts), areaSign(repeat % 3, a, b, c)) << exponent;
+    }
   }
 }
 
