@@ -36,24 +36,55 @@ bool flat(int axis, std::initializer_list<const Eigen::Vector3d*> positions) {
                      [&](const Eigen::Vector3d* position) { return (*position)[axis] == first; });
 }
 
-/// The number types: each has difference(a, b) exactly, a - b times a positive constant.
+/// Sums of two doubles, errors of errors dropped.
+RoundedWithError operator+(const RoundedWithError& a, const RoundedWithError& b) {
+  const auto [value, error] = exactSum(a.value, b.value);
+  return {value, error + (a.error + b.error)};
+}
+RoundedWithError operator-(const RoundedWithError& a, const RoundedWithError& b) {
+  return a + RoundedWithError{-b.value, -b.error};
+}
+RoundedWithError operator*(const RoundedWithError& a, const RoundedWithError& b) {
+  const auto [value, error] = exactProduct(a.value, b.value);
+  return {value, error + (a.value * b.error + a.error * b.value)};
+}
+
+/// The number types: each has difference(a, b), a - b exactly, times a positive constant.
+struct WithTwoDoubles {
+  using Volume = RoundedWithError;
+  static RoundedWithError difference(double a, double b) { return exactSum(a, -b); }
+};
 struct WithExpansions {
+  using Volume = Expansion<192>;
   static Expansion<2> difference(double a, double b) { return exactDifference(a, b); }
 };
 struct WithIntegers {
+  using Volume = Integer;
   static Integer difference(double a, double b) { return scaledInteger(a) - scaledInteger(b); }
 };
 
 template <class Numbers>
-int volumeSign(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
-               const Eigen::Vector3d& d) {
+typename Numbers::Volume volume(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                const Eigen::Vector3d& c, const Eigen::Vector3d& d) {
   const auto difference = [&](const Eigen::Vector3d& p, int i) {
     return Numbers::difference(p[i], a[i]);
   };
   const auto u0 = difference(b, 0), u1 = difference(b, 1), u2 = difference(b, 2);
   const auto v0 = difference(c, 0), v1 = difference(c, 1), v2 = difference(c, 2);
   const auto w0 = difference(d, 0), w1 = difference(d, 1), w2 = difference(d, 2);
-  return signOf((u1 * v2 - u2 * v1) * w0 + (u2 * v0 - u0 * v2) * w1 + (u0 * v1 - u1 * v0) * w2);
+  return (u1 * v2 - u2 * v1) * w0 + (u2 * v0 - u0 * v2) * w1 + (u0 * v1 - u1 * v0) * w2;
+}
+
+/// Positions that fit expansions. With e = 2^-53 and P the sum of the six products' magnitudes,
+/// sums of two doubles err by 8 e² a product, 15 e² a minor, 35 e² a term and 75 e² P in all, of
+/// which P is at most the product of the differences' 1-norms: 2^-98 covers these and the bound's
+/// own rounding.
+int volumeSignWithExpansions(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                             const Eigen::Vector3d& c, const Eigen::Vector3d& d) {
+  const auto [value, error] = volume<WithTwoDoubles>(a, b, c, d);
+  const double bound = 0x1p-98 * (b - a).lpNorm<1>() * (c - a).lpNorm<1>() * (d - a).lpNorm<1>();
+  if (std::abs(value + error) > bound) return value + error > 0 ? 1 : -1;
+  return volume<WithExpansions>(a, b, c, d).sign();
 }
 
 template <class Numbers>
@@ -89,10 +120,10 @@ int orient3dExactly(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Ei
   if (a == b || a == c || a == d || b == c || b == d || c == d) return 0;
   if (fitExpansions({&a, &b, &c, &d})) {
     ++counts.expansions;
-    return volumeSign<WithExpansions>(a, b, c, d);
+    return volumeSignWithExpansions(a, b, c, d);
   }
   ++counts.bigIntegers;
-  return volumeSign<WithIntegers>(a, b, c, d);
+  return sgn(volume<WithIntegers>(a, b, c, d));
 }
 
 int orient2dExactly(int axis, const Eigen::Vector3d& a, const Eigen::Vector3d& b,

@@ -91,64 +91,59 @@ TriangleIntersection intersectCrossing(const Placed& a, const Placed& b, SignCou
   return result;
 }
 
-/// Decides which points that lie in one plane coincide, by their projections along the axes. What
-/// meets in space meets in all three; and along at least one axis the plane is seen at full
-/// dimension, so what meets in all three meets in space. Where such an axis is known, it alone is
-/// enough.
-class InPlane {
+// Which points of one plane coincide is decided by projections along the axes. What meets in space
+// meets in all three; and along at least one axis the plane is seen at full dimension, so what
+// meets in all three meets in space. Where such an axis is known, it alone is enough.
+
+struct Axes {
+  int first = 0, last = 2;
+  bool known() const { return first == last; }
+};
+
+/// One along which a triangle is seen with area; all if it has none.
+Axes axesOf(const Corners& t, SignCounts& counts) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (orient2d(axis, t[0], t[1], t[2], counts) != 0) return {axis, axis};
+  return {};
+}
+
+/// The sides of a triangle's edges that another's corners are on, seen along an axis.
+class SidesOfEdges {
  public:
-  explicit InPlane(SignCounts& counts) : m_counts(counts) {}
-
-  /// From here on only what lies in this triangle's plane is asked for. False, and no change, if it
-  /// has no area.
-  bool useAxisOf(const Corners& triangle) {
-    for (int axis = 0; axis < 3; ++axis) {
-      if (orient2d(axis, triangle[0], triangle[1], triangle[2], m_counts) == 0) continue;
-      m_first = axis;
-      m_last = axis;
-      return true;
-    }
-    return false;
+  SidesOfEdges(const Corners& triangle, const Corners& points, SignCounts& counts)
+      : m_triangle(triangle), m_points(points), m_counts(counts) {
+    m_known.fill(kUnknown);
   }
-
-  /// A point within the box and seen by no two edges from different sides is in the triangle: with
-  /// area, no point outside is; without area, a point on the triangle's line is left to the box.
-  bool pointInTriangle(const Eigen::Vector3d& p, const Corners& t, const Box& boxOfT) const {
-    if (!boxOfT.contains(p)) return false;
-    for (int axis = m_first; axis <= m_last; ++axis) {
-      if (mixed({orient2d(axis, t[0], t[1], p, m_counts), orient2d(axis, t[1], t[2], p, m_counts),
-                 orient2d(axis, t[2], t[0], p, m_counts)}))
-        return false;
+  int operator()(int axis, int edge, int point) {
+    std::int8_t& side = m_known[9 * axis + 3 * edge + point];
+    if (side == kUnknown) {
+      side = static_cast<std::int8_t>(
+          orient2d(axis, m_triangle[edge], m_triangle[next(edge)], m_points[point], m_counts));
     }
-    return true;
+    return side;
   }
-
-  /// Segments whose boxes overlap meet if neither is strictly to one side of the other; those of no
-  /// length included.
-  bool segmentsMeet(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1, const Eigen::Vector3d& q0,
-                    const Eigen::Vector3d& q1) const {
-    for (int axis = m_first; axis <= m_last; ++axis) {
-      if (orient2d(axis, p0, p1, q0, m_counts) * orient2d(axis, p0, p1, q1, m_counts) > 0 ||
-          orient2d(axis, q0, q1, p0, m_counts) * orient2d(axis, q0, q1, p1, m_counts) > 0)
-        return false;
-    }
-    return true;
+  bool separate(int axis, int edge, int p, int q) {
+    return (*this)(axis, edge, p) * (*this)(axis, edge, q) > 0;
   }
 
  private:
-  int m_first = 0, m_last = 2;
+  static constexpr std::int8_t kUnknown = 2;
+  const Corners &m_triangle, &m_points;
+  std::array<std::int8_t, 27> m_known;
   SignCounts& m_counts;
 };
 
-std::uint8_t cornersOn(const Placed& a, const Placed& triangle, SignCounts& counts) {
-  if (!anyZero(a.sides)) return 0;
-  InPlane inPlane(counts);
-  inPlane.useAxisOf(triangle.corners);
+/// Bit i: corner i of a is on the triangle. A point on its plane and in its box, which its edges do
+/// not see from different sides, is: with area, no point outside is seen so; without, only points
+/// on the triangle's line are, and the box does the rest.
+std::uint8_t cornersOn(const Placed& a, const Placed& triangle, const Axes& axes,
+                       SidesOfEdges& sidesOf) {
   std::uint8_t found = 0;
   for (int i = 0; i < 3; ++i) {
-    if (a.sides[i] == 0 && !has(a.excluded, i) &&
-        inPlane.pointInTriangle(a.corners[i], triangle.corners, triangle.box))
-      found |= 1 << i;
+    bool on = a.sides[i] == 0 && !has(a.excluded, i) && triangle.box.contains(a.corners[i]);
+    for (int axis = axes.first; on && axis <= axes.last; ++axis)
+      on = !mixed({sidesOf(axis, 0, i), sidesOf(axis, 1, i), sidesOf(axis, 2, i)});
+    found |= on << i;
   }
   return found;
 }
@@ -167,15 +162,18 @@ std::uint8_t edgesThrough(const Placed& a, const Corners& triangle, SignCounts& 
 }
 
 /// Corners on the other's plane, a triangle without area, or both: every feature is tested by
-/// itself.
+/// itself. Segments in one plane whose boxes overlap meet if neither is strictly to one side of the
+/// other, those without length included.
 TriangleIntersection intersectTouching(const Placed& a, const Placed& b, unsigned excludedEdges,
                                        SignCounts& counts) {
-  InPlane inPlane(counts);
-  const bool coplanar = (allZero(a.sides) && inPlane.useAxisOf(b.corners)) ||
-                        (allZero(b.sides) && inPlane.useAxisOf(a.corners));
+  const Axes ofA = axesOf(a.corners, counts), ofB = axesOf(b.corners, counts);
+  const bool inPlaneOfA = allZero(b.sides) && ofA.known();
+  const bool coplanar = inPlaneOfA || (allZero(a.sides) && ofB.known());
+  const Axes axes = inPlaneOfA ? ofA : coplanar ? ofB : Axes();
+  SidesOfEdges sidesOfA(a.corners, b.corners, counts), sidesOfB(b.corners, a.corners, counts);
   TriangleIntersection result;
-  result.cornersOfAOnB = cornersOn(a, b, counts);
-  result.cornersOfBOnA = cornersOn(b, a, counts);
+  result.cornersOfAOnB = cornersOn(a, b, ofB, sidesOfB);
+  result.cornersOfBOnA = cornersOn(b, a, ofA, sidesOfA);
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d &p0 = a.corners[i], &p1 = a.corners[next(i)];
     const Box boxP(p0, p1);
@@ -183,9 +181,10 @@ TriangleIntersection intersectTouching(const Placed& a, const Placed& b, unsigne
     for (int j = 0; j < 3; ++j) {
       const Eigen::Vector3d &q0 = b.corners[j], &q1 = b.corners[next(j)];
       if (has(excludedEdges, 3 * i + j) || b.edgeAside(j) || !boxP.meets(Box(q0, q1))) continue;
-      if ((coplanar || orient3d(p0, p1, q0, q1, counts) == 0) &&
-          inPlane.segmentsMeet(p0, p1, q0, q1))
-        result.touchingEdges |= 1 << (3 * i + j);
+      bool meet = coplanar || orient3d(p0, p1, q0, q1, counts) == 0;
+      for (int axis = axes.first; meet && axis <= axes.last; ++axis)
+        meet = !sidesOfA.separate(axis, i, j, next(j)) && !sidesOfB.separate(axis, j, i, next(i));
+      result.touchingEdges |= meet << (3 * i + j);
     }
   }
   if (!coplanar) {

@@ -56,12 +56,7 @@ class IntersectionContacts {
   void add(const TriangleIntersection& meeting) {
     const unsigned ofA = meeting.edgesOfAThroughB, ofB = meeting.edgesOfBThroughA;
     if (meeting.touch()) {
-      for (int i = 0; i < 3; ++i) {
-        if (meeting.cornersOfAOnB >> i & 1) addCornerOfA(i);
-        if (meeting.cornersOfBOnA >> i & 1) addCornerOfB(i);
-        for (int j = 0; j < 3; ++j)
-          if (meeting.touchingEdges >> (3 * i + j) & 1) addEdges(i, j);
-      }
+      addTouching(meeting);
     } else if (std::popcount(ofA) == 2) {
       addCornerOfA(sharedCorner(ofA));
     } else if (std::popcount(ofB) == 2) {
@@ -72,6 +67,19 @@ class IntersectionContacts {
   }
 
  private:
+  /// Features that touch do so in their owners too, whose pair adds them.
+  void addTouching(const TriangleIntersection& meeting) {
+    const MeshTopology &ofA = m_a.mesh.topology, &ofB = m_b.mesh.topology;
+    for (int i = 0; i < 3; ++i) {
+      if (meeting.cornersOfAOnB >> i & 1 && ofA.ownsCorner(m_a.id, i)) addCornerOfA(i);
+      if (meeting.cornersOfBOnA >> i & 1 && ofB.ownsCorner(m_b.id, i)) addCornerOfB(i);
+      for (int j = 0; j < 3; ++j) {
+        if (meeting.touchingEdges >> (3 * i + j) & 1 && ofA.ownsEdge(m_a.id, i) &&
+            ofB.ownsEdge(m_b.id, j))
+          addEdges(i, j);
+      }
+    }
+  }
   void addCornerOfA(int i) { addCorner(m_a, i, m_b, m_out.vertexTriangle); }
   void addCornerOfB(int i) {
     addCorner(m_b, i, m_a, m_self ? m_out.vertexTriangle : m_out.triangleVertex);
@@ -89,7 +97,6 @@ class IntersectionContacts {
 
   void addEdges(int i, int j) {
     std::uint32_t edgeA = m_a.edge(i), edgeB = m_b.edge(j);
-    if (edgeA == kNoEdge || edgeB == kNoEdge) return;
     if (m_self && edgeB < edgeA) std::swap(edgeA, edgeB);
     const Segment &p = m_a.mesh.topology.edges[edgeA], &q = m_b.mesh.topology.edges[edgeB];
     const auto &positionsA = m_a.mesh.now, &positionsB = m_b.mesh.now;

@@ -10,14 +10,16 @@ namespace palpate {
 ///
 /// Of two triangles that intersect: if features touch, every vertex-triangle and edge-edge pair at
 /// distance zero; else, if two edges of one cross the other, the vertex that these share; else the
-/// two edges that cross the other triangle. The same contact from several triangle pairs has the
-/// same bits. Vertex-triangle normals are the triangle's winding normal; of a triangle without
-/// area, and of touching parallel edges, the axis that <palpate/Distance.h> names.
+/// two edges that cross the other triangle. What touches comes out once, from the pair of its
+/// owners; other contacts come from several pairs, each time with the same bits. Vertex-triangle
+/// normals are the triangle's winding normal; of a triangle without area, and of touching parallel
+/// edges, the axis that <palpate/Distance.h> names.
 ///
 /// Self-collision: two triangles with common vertices intersect if a vertex touches the other
 /// triangle and is not a corner of it, if an edge of each touch that have no common vertex, or if
 /// an edge crosses the other triangle's interior. This last alone gives no contact: it is the end
-/// of a fold at the common vertex, and the triangle across that edge reports it.
+/// of a fold at the common vertex, and the triangle across that edge reports it. Pairs with common
+/// vertices must be among the candidates.
 void findIntersections(const MeshPair&, std::span<const TrianglePair> candidates,
                        ContactBuffers& out);
 
