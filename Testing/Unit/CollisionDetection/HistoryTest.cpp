@@ -1,0 +1,279 @@
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/PairRun.h"
+#include "Common/RandomMeshes.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <set>
+#include <span>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+// Many frames: whatever came before, a frame's answer is that of its positions and pairs alone.
+
+namespace palpate::testing {
+namespace {
+
+using Positions = std::vector<Eigen::Vector3d>;
+
+Positions moved(Positions positions, const Eigen::Vector3d& by) {
+  for (Eigen::Vector3d& p : positions) p += by;
+  return positions;
+}
+
+/// The same calls to several engines: octrees of different settings, and brute force.
+class Engines {
+ public:
+  Engines() {
+    for (const Settings& settings : octreeSettings()) m_all.emplace_back(settings);
+    m_all.emplace_back(settingsOf(Engine::BruteForce));
+  }
+  /// call(engine) on each; all must return the same.
+  template <class Call>
+  auto onAll(Call call) {
+    const auto first = call(m_all.front());
+    for (std::size_t i = 1; i < m_all.size(); ++i) EXPECT_EQ(call(m_all[i]), first) << i;
+    return first;
+  }
+  template <class Call>
+  void forAll(Call call) {
+    for (OctreeBasedCD& engine : m_all) call(engine);
+  }
+  /// A frame, and that all agree on every pair. Returns the number of contacts.
+  std::size_t expectEqualFrames() {
+    forAll([](OctreeBasedCD& engine) { engine.detectCollision(); });
+    for (const CollisionPair& pair : m_all.front().pairs()) {
+      const CollisionData& oracle = m_all.back().collisionData(pair.a, pair.b);
+      for (const OctreeBasedCD& engine : m_all)
+        EXPECT_EQ(engine.collisionData(pair.a, pair.b).hash(), oracle.hash());
+    }
+    for (const OctreeBasedCD& engine : m_all)
+      EXPECT_EQ(engine.octree().validate(), std::vector<std::string>{});
+    return m_all.front().statistics().contacts;
+  }
+  std::span<const CollisionPair> pairs() const { return m_all.front().pairs(); }
+
+ private:
+  std::vector<OctreeBasedCD> m_all;
+};
+
+/// A random life: geometries and pairs come and go, move, change their triangles and their
+/// settings.
+class RandomLife {
+ public:
+  explicit RandomLife(std::uint64_t seed) : m_random(seed) {}
+
+  void act() {
+    const auto action = m_random() % 10;
+    if (m_geometries.size() < 2 || action == 0) return add();
+    const std::size_t i = m_random() % m_geometries.size(), j = m_random() % m_geometries.size();
+    if (action == 1 && m_geometries.size() > 3) return remove(i);
+    if (action == 2) return changeTriangles(i);
+    if (action < 5) return changePair(m_geometries[i].first, m_geometries[j].first);
+    move(i);
+  }
+  std::size_t frame() { return m_engines.expectEqualFrames(); }
+
+ private:
+  PairSettings randomSettings() {
+    constexpr std::array<Method, 3> kMethods{Method::Intersection, Method::Proximity,
+                                             Method::Continuous};
+    PairSettings settings;
+    settings.method = kMethods[m_random() % 3];
+    settings.thickness = settings.method == Method::Proximity ? uniform(m_random, 0.001, 0.1) : 0.0;
+    settings.contacts = m_random() % 2 ? Contacts::Distinct : Contacts::All;
+    return settings;
+  }
+  void add() {
+    const Mesh mesh = soup(m_random, m_random() % 40, uniform(m_random, 0.01, 0.3));
+    const GeometryId id = m_engines.onAll([&](OctreeBasedCD& engine) {
+      return engine.addTriangleMesh(mesh.positions, mesh.triangles);
+    });
+    EXPECT_TRUE(m_given.insert(id).second) << "an id was given out again";
+    m_geometries.emplace_back(id, mesh);
+  }
+  void remove(std::size_t i) {
+    const GeometryId id = m_geometries[i].first;
+    m_engines.forAll([&](OctreeBasedCD& engine) {
+      engine.removeGeometry(id);
+      EXPECT_THROW(engine.removeGeometry(id), Error);
+    });
+    for (const CollisionPair& pair : m_engines.pairs()) EXPECT_TRUE(pair.a != id && pair.b != id);
+    m_geometries.erase(m_geometries.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  void changeTriangles(std::size_t i) {
+    Mesh& mesh = m_geometries[i].second;
+    mesh = soup(m_random, m_random() % 40, uniform(m_random, 0.01, 0.3));
+    m_engines.forAll([&](OctreeBasedCD& engine) {
+      engine.setTriangles(m_geometries[i].first, mesh.positions, mesh.triangles);
+    });
+  }
+  void changePair(GeometryId a, GeometryId b) {
+    const PairSettings settings = randomSettings();
+    bool there = false;
+    for (const CollisionPair& pair : m_engines.pairs())
+      there |= (pair.a == a && pair.b == b) || (pair.a == b && pair.b == a);
+    const bool goes = there && m_random() % 2;
+    m_engines.forAll([&](OctreeBasedCD& engine) {
+      if (!there)
+        engine.addCollisionPair(a, b, settings);
+      else if (goes)
+        engine.removeCollisionPair(a, b);
+      else
+        engine.setPairSettings(a, b, settings);
+    });
+  }
+  void move(std::size_t i) {
+    Mesh& mesh = m_geometries[i].second;
+    for (Eigen::Vector3d& p : mesh.positions) p += randomPoint(m_random, -0.05, 0.05);
+    m_engines.forAll(
+        [&](OctreeBasedCD& engine) { engine.setPositions(m_geometries[i].first, mesh.positions); });
+  }
+
+  Random m_random;
+  Engines m_engines;
+  std::vector<std::pair<GeometryId, Mesh>> m_geometries;
+  std::set<GeometryId> m_given;
+};
+
+TEST(History, AnyLifeIsAsByBruteForceInEveryFrame) {
+  std::size_t contacts = 0;
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    RandomLife life(seed);
+    for (int frame = 0; frame < 30; ++frame) {
+      for (int action = 0; action < 4; ++action) life.act();
+      contacts += life.frame();
+      if (HasFailure()) FAIL() << "seed " << seed << ", frame " << frame;
+    }
+  }
+  EXPECT_GT(contacts, 1000u);
+}
+
+/// Two soups that meet, in several engines, with what their first frame gave.
+struct Meeting {
+  Engines engines;
+  Mesh a, b;
+  GeometryId idA, idB;
+  std::size_t contacts;
+
+  Meeting() {
+    Random random(7);
+    a = soup(random, 60, 0.2);
+    b = soup(random, 60, 0.2);
+    idA = engines.onAll(
+        [&](OctreeBasedCD& e) { return e.addTriangleMesh(a.positions, a.triangles); });
+    idB = engines.onAll(
+        [&](OctreeBasedCD& e) { return e.addTriangleMesh(b.positions, b.triangles); });
+    engines.forAll([&](OctreeBasedCD& e) { e.addCollisionPair(idA, idB, {.thickness = 0.02}); });
+    contacts = engines.expectEqualFrames();
+  }
+  std::size_t frameWith(const Positions& now) {
+    engines.forAll([&](OctreeBasedCD& e) { e.setPositions(idB, now); });
+    return engines.expectEqualFrames();
+  }
+};
+
+TEST(History, BodiesThatLeaveAndComeBackMeetAsBefore) {
+  Meeting meeting;
+  ASSERT_GT(meeting.contacts, 50u);
+  for (const double far : {3.0, 1e3, 1e9}) {
+    for (int step = 1; step <= 3; ++step)
+      EXPECT_EQ(meeting.frameWith(moved(meeting.b.positions, {far * step, -far, far})), 0u);
+    EXPECT_EQ(meeting.frameWith(meeting.b.positions), meeting.contacts) << far;
+  }
+}
+
+TEST(History, ATriangleThatGrowsPastTheSceneAndShrinksAgain) {
+  Meeting meeting;
+  for (const double size : {1.0, 4.0, 1e3, 1e9, 10.0}) {
+    Positions grown = meeting.b.positions;
+    const Eigen::Vector3d centre = (grown[0] + grown[1] + grown[2]) / 3;
+    for (int i = 0; i < 3; ++i) grown[i] = centre + size * (grown[i] - centre).normalized();
+    EXPECT_GT(meeting.frameWith(grown), 0u);
+    EXPECT_EQ(meeting.frameWith(meeting.b.positions), meeting.contacts) << size;
+  }
+}
+
+TEST(History, AFrameWithoutNewPositionsAnswersTheSame) {
+  Meeting meeting;
+  for (int frame = 0; frame < 3; ++frame)
+    EXPECT_EQ(meeting.engines.expectEqualFrames(), meeting.contacts);
+}
+
+/// A vertex above a triangle, in one engine with Method::Continuous.
+struct Step {
+  OctreeBasedCD engine{settingsOf(Engine::Octree)};
+  GeometryId floor = engine.addTriangleMesh(Positions{{-9, -9, 0}, {9, -9, 0}, {0, 9, 0}},
+                                            std::vector<Triangle>{{0, 1, 2}});
+  GeometryId needle = engine.addTriangleMesh(at(4), std::vector<Triangle>{{0, 1, 2}});
+
+  Step() { engine.addCollisionPair(floor, needle, {.method = Method::Continuous}); }
+  static Positions at(double z) { return {{0, 0, z}, {0.1, 0, z + 50}, {0, 0.1, z + 50}}; }
+  double earliest() {
+    engine.detectCollision();
+    return engine.collisionData(floor, needle).earliestTimeOfImpact();
+  }
+};
+
+TEST(History, BeforeIsTheNowOfTheLastFrame) {
+  Step step;
+  EXPECT_EQ(step.earliest(), INFINITY);  // at first, before = now
+  step.engine.setPositions(step.needle, Step::at(-4));
+  EXPECT_NEAR(step.earliest(), 0.5, 1e-6);
+  EXPECT_NEAR(step.earliest(), 0.5, 1e-6);  // nothing new: both stay
+  step.engine.setPositions(step.needle, Step::at(-6));
+  EXPECT_EQ(step.earliest(), INFINITY);  // begins below: the tip met the floor in the last frame
+}
+
+TEST(History, OfSeveralCallsBeforeAFrameTheLastCounts) {
+  Step step;
+  step.earliest();
+  step.engine.setPositions(step.needle, Step::at(-100));
+  step.engine.setPositions(step.needle, Step::at(-1));
+  EXPECT_NEAR(step.earliest(), 0.8, 1e-6);
+  step.engine.setPositions(step.needle, Step::at(-50));
+  step.engine.setPositions(step.needle, Step::at(1), Step::at(-3));  // both given
+  EXPECT_NEAR(step.earliest(), 0.25, 1e-6);
+}
+
+TEST(History, NewTrianglesHaveNoBefore) {
+  Step step;
+  step.earliest();
+  step.engine.setTriangles(step.needle, Step::at(-60), std::vector<Triangle>{{0, 1, 2}});
+  EXPECT_EQ(step.earliest(), INFINITY);  // below the floor, and never came through it
+}
+
+TEST(History, ConstQueriesFromManyThreads) {
+  Random random(3);
+  const Mesh a = soup(random, 300, 0.2), b = soup(random, 300, 0.2);
+  Settings settings = settingsOf(Engine::Octree, 2);
+  settings.keepCandidates = true;
+  OctreeBasedCD engine(settings);
+  const GeometryId idA = engine.addTriangleMesh(a.positions, a.triangles);
+  const GeometryId idB = engine.addTriangleMesh(b.positions, b.triangles);
+  engine.addCollisionPair(idA, idB, {.thickness = 0.01});
+  for (int frame = 0; frame < 10; ++frame) {
+    engine.setPositions(idB, moved(b.positions, {0.01 * frame, 0, 0}));
+    engine.detectCollision();
+    std::array<std::size_t, 4> answers{};
+    std::vector<std::thread> threads;
+    for (std::size_t& answer : answers) {
+      threads.emplace_back([&] {
+        const auto candidates = engine.candidatePairs(idA, idB);  // sorted when first asked for
+        EXPECT_TRUE(std::is_sorted(candidates.begin(), candidates.end()));
+        answer = candidates.size() + engine.collisionData(idA, idB).hash() +
+                 engine.octree().nodes().size() + engine.octree().validate().size() +
+                 engine.statistics().contacts + engine.pairs().size();
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+    for (std::size_t answer : answers) EXPECT_EQ(answer, answers[0]);
+  }
+}
+
+}  // namespace
+}  // namespace palpate::testing
