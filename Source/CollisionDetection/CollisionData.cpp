@@ -59,6 +59,7 @@ std::uint64_t CollisionData::hash() const {
   hash.add(std::uint64_t{m_contents.intersectingTriangles.size()});
   for (const TrianglePair& p : m_contents.intersectingTriangles)
     hash.add(std::uint64_t{p.a} << 32 | p.b);
+  if (const double earliest = m_contents.earliestTimeOfImpact; earliest <= 1.0) hash.add(earliest);
   return hash.value();
 }
 

@@ -271,6 +271,7 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Setti
     statistics.milliseconds.narrowPhase += watch.lap();
     ContactBuffers* const buffers[] = {&contacts};
     orderContacts(buffers, m_orderScratch, record->data.contents());
+    record->data.contents().earliestTimeOfImpact = record->earliest.load();
     record->dataFor = record->revisions();
     record->candidatesFor =
         settings.keepCandidates ? record->revisions() : PairRecord::AnsweredFor{};

@@ -89,10 +89,13 @@ void forEachLikelyPair(const MeshPair& pair, std::span<const TrianglePair> candi
   filterPairs<false>(Features<Kind::EdgeEdge>{pair.a, pair.b}, pairs.edgeEdge, thickness, f);
 }
 
-/// Tests pairs and describes the contacts found.
+/// Tests pairs and describes the contacts found. Pairs that do not come within the thickness may
+/// be found if they nearly do, unless the filter rules them out: filtered says whether it was
+/// asked.
 class ContactFinder {
  public:
-  ContactFinder(const MeshPair& pair, ContactBuffers& out) : m_pair(pair), m_out(out) {
+  ContactFinder(const MeshPair& pair, bool filtered, ContactBuffers& out)
+      : m_pair(pair), m_filtered(filtered), m_out(out) {
     m_settings.minimumDistance = pair.settings.thickness;
   }
 
@@ -108,15 +111,18 @@ class ContactFinder {
       p[i] = (1.0 - answer.time) * query.vertices[i].at(0) + answer.time * query.vertices[i].at(1);
     if constexpr (kind == Kind::VertexTriangle) {
       auto& list = ofSecond && !m_pair.self() ? m_out.triangleVertex : m_out.vertexTriangle;
-      list.push_back(contactOf(inFirst, inSecond, features.second.topology.triangles[inSecond],
-                               finiteVertexTriangleDistance(p[0], p[1], p[2], p[3])));
+      const auto closest = finiteVertexTriangleDistance(p[0], p[1], p[2], p[3]);
+      if (isRuledOut(query, closest.distance)) return;
+      list.push_back(
+          contactOf(inFirst, inSecond, features.second.topology.triangles[inSecond], closest));
       // A corner touches its triangle, and then the normal is the plane's.
       complete(list.back(), query, answer.time,
                [&] { return finiteVertexTriangleDistance(p[1], p[1], p[2], p[3]).normal; });
     } else {
+      const auto closest = finiteEdgeEdgeDistance(p[0], p[1], p[2], p[3]);
+      if (isRuledOut(query, closest.distance)) return;
       m_out.edgeEdge.push_back(contactOf(features.first.topology.edges[inFirst],
-                                         features.second.topology.edges[inSecond],
-                                         finiteEdgeEdgeDistance(p[0], p[1], p[2], p[3])));
+                                         features.second.topology.edges[inSecond], closest));
       complete(m_out.edgeEdge.back(), query, answer.time, [&] {
         return finiteEdgeEdgeDistance(p[0], p[1], p[0], p[0] + (p[3] - p[2])).normal;
       });
@@ -132,7 +138,16 @@ class ContactFinder {
     if (sideBefore(query, time) < 0) contact.normal = -contact.normal;
   }
 
+  bool isRuledOut(const ImpactQuery& query, double distance) const {
+    const double thickness = m_settings.minimumDistance;
+    if (m_filtered || thickness <= 0.0 || distance <= thickness) return false;
+    ImpactBlock block;
+    for (int i = 0; i < 4; ++i) block.set(0, i, query.vertices[i].at(0), query.vertices[i].at(1));
+    return (mayImpact(query.kind, block, thickness) & 1u) == 0;
+  }
+
   const MeshPair& m_pair;
+  const bool m_filtered;
   ContactBuffers& m_out;
   TimeOfImpactSettings m_settings;
 };
@@ -141,11 +156,11 @@ class ContactFinder {
 
 void findContinuous(const MeshPair& pair, std::span<const TrianglePair> candidates,
                     ContactBuffers& out) {
-  forEachLikelyPair(pair, candidates, out, ContactFinder(pair, out));
+  forEachLikelyPair(pair, candidates, out, ContactFinder(pair, true, out));
 }
 
 void findContinuousByBruteForce(const MeshPair& pair, ContactBuffers& out) {
-  ContactFinder test(pair, out);
+  ContactFinder test(pair, false, out);
   for (const bool ofSecond : {false, true}) {
     if (ofSecond && pair.self()) continue;
     const Features<Kind::VertexTriangle> features{ofSecond ? pair.b : pair.a,

@@ -84,8 +84,7 @@ class PALPATE_EXPORT CollisionData {
   /// Infinity if there is no contact; 0 for the static methods' contacts.
   double earliestTimeOfImpact() const;
 
-  /// Same contacts, same bits, same hash: over ids, weights, normals, distances and times, in
-  /// order.
+  /// Same answer, same bits, same hash: over ids, weights, normals, distances and times, in order.
   std::uint64_t hash() const;
 
   /// For the engine that fills it.
