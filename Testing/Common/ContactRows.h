@@ -9,6 +9,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -48,6 +50,7 @@ inline Row rowOf(const EdgeEdgeContact& c) {
 struct Rows {
   std::vector<Row> vertexTriangle, triangleVertex, edgeEdge;
   std::vector<TrianglePair> intersectingTriangles;
+  double earliestTimeOfImpact = std::numeric_limits<double>::infinity();
 
   Rows() = default;
   explicit Rows(const CollisionData& data) {
@@ -56,10 +59,12 @@ struct Rows {
     for (const auto& c : data.edgeEdge()) edgeEdge.push_back(rowOf(c));
     const auto pairs = data.intersectingTriangles();
     intersectingTriangles.assign(pairs.begin(), pairs.end());
+    earliestTimeOfImpact = data.earliestTimeOfImpact();
   }
   std::size_t contacts() const {
     return vertexTriangle.size() + triangleVertex.size() + edgeEdge.size();
   }
+  bool anything() const { return earliestTimeOfImpact <= 1; }
   friend bool operator==(const Rows&, const Rows&) = default;
 };
 
@@ -91,6 +96,7 @@ inline void expectSameRows(const Rows& found, const Rows& truth) {
   EXPECT_EQ(firstDifference(found.triangleVertex, truth.triangleVertex), "") << "triangleVertex";
   EXPECT_EQ(firstDifference(found.edgeEdge, truth.edgeEdge), "") << "edgeEdge";
   EXPECT_EQ(found.intersectingTriangles, truth.intersectingTriangles);
+  EXPECT_EQ(found.earliestTimeOfImpact, truth.earliestTimeOfImpact);
 }
 
 /// Rows ascend by their two ids, each pair of ids once.
@@ -151,13 +157,17 @@ inline void expectWellFormed(const CollisionData& data, const Mesh& a, const Mes
 struct MethodCase {
   std::string name;
   PairSettings settings;
+  friend void PrintTo(const MethodCase& method, std::ostream* out) { *out << method.name; }
 };
 
 /// Every method and every choice of contacts; `thickness` where the method has one.
 inline std::vector<MethodCase> methodCases(double thickness) {
   return {{"ProximityDistinct", {Method::Proximity, thickness, Contacts::Distinct}},
           {"ProximityAll", {Method::Proximity, thickness, Contacts::All}},
-          {"Intersection", {Method::Intersection, 0, Contacts::All}}};
+          {"Intersection", {Method::Intersection, 0, Contacts::All}},
+          {"Continuous", {Method::Continuous, 0, Contacts::All}},
+          {"ContinuousWithThickness", {Method::Continuous, thickness, Contacts::All}},
+          {"ContinuousEarliest", {Method::Continuous, 0, Contacts::Earliest}}};
 }
 
 }  // namespace palpate::testing

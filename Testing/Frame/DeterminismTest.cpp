@@ -1,0 +1,104 @@
+#include "Core/SimdPath.h"
+
+#include "Common/PairRun.h"
+#include "Common/Zoo.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <map>
+
+// The same input gives the same bits: for any number of threads, any SIMD path, any build.
+
+namespace palpate {
+namespace {
+
+using namespace testing;
+using Eigen::Vector3d;
+
+/// Positions from exact arithmetic only, so that no compiler or mathematics library changes them.
+struct Scene {
+  Mesh a, b;
+  std::vector<Vector3d> aBefore, bBefore;
+};
+
+Scene scene() {
+  Random random(99);
+  Scene scene;
+  scene.a = flat(24, 0);
+  for (Vector3d& p : scene.a.positions)
+    p.z() = 0.3 * p.x() * (1 - p.x()) + uniform(random, -0.01, 0.01);
+  append(scene.a, soup(random, 60, 0.08));
+  scene.b = soup(random, 400, 0.05);
+  append(scene.b, flat(9, 0.06));
+  scene.aBefore = scene.a.positions;
+  scene.bBefore = scene.b.positions;
+  for (Vector3d& p : scene.aBefore) p.z() += 0.03;
+  for (Vector3d& p : scene.bBefore) p += randomPoint(random, -0.02, 0.02);
+  return scene;
+}
+
+/// Of the step, by octrees that were refitted to it.
+std::vector<std::uint64_t> hashes(const Settings& settings, const PairSettings& pair) {
+  const Scene s = scene();
+  PairRun run(settings, s.a, s.b, pair);
+  run.step(s.aBefore, s.aBefore, s.bBefore, s.bBefore);
+  run.step(s.aBefore, s.a.positions, s.bBefore, s.b.positions);
+  const auto of = [&](GeometryId a, GeometryId b) {
+    return run.detection().collisionData(a, b).hash();
+  };
+  return {of(run.a(), run.b()), of(run.a(), run.a()), of(run.b(), run.b())};
+}
+
+class Determinism : public ::testing::TestWithParam<MethodCase> {
+ protected:
+  static PairSettings settings() {
+    PairSettings settings = GetParam().settings;
+    settings.thickness *= 0.01;
+    return settings;
+  }
+};
+
+TEST_P(Determinism, ThreadsAndUpdatesDoNotChangeABit) {
+  const std::vector<std::uint64_t> first = hashes(settingsOf(Engine::Octree), settings());
+  for (const Settings& each : octreeSettings()) {
+    SCOPED_TRACE(nameOf(each));
+    for (int repeat = 0; repeat < 3; ++repeat) EXPECT_EQ(hashes(each, settings()), first);
+  }
+}
+
+TEST_P(Determinism, SimdPathsDoNotChangeABit) {
+  const std::vector<std::uint64_t> first = hashes(settingsOf(Engine::Octree), settings());
+  for (const std::string& path : simdPaths()) {
+    SCOPED_TRACE(path);
+    useSimdPath(path);
+    EXPECT_EQ(hashes(settingsOf(Engine::Octree), settings()), first);
+  }
+  useSimdPath("");
+}
+
+/// Of (a, b), a and b by themselves. They change with the definition of an answer only: a build
+/// that gives others has lost the promise, whatever its optimization and instruction set.
+const std::map<std::string, std::vector<std::uint64_t>> kExpected{
+    {"ProximityDistinct", {0xfbc747ece53b54e5u, 0x1517572283f05896u, 0xb257011c14575fb3u}},
+    {"ProximityAll", {0xe33a337fe97e589fu, 0x0ad64f013ab5272du, 0x2bcdc7928f03162du}},
+    {"Intersection", {0x6cb88a6c5e41aa5du, 0x255a4d79b56020edu, 0x25e447d21f38e066u}},
+    {"Continuous", {0xa56a8b0f9487c9dau, 0x0c8210784d8af5a5u, 0x84eac19fff079b2bu}},
+    {"ContinuousWithThickness", {0x88e0630b2ccf819au, 0xa6a47b763def51c4u, 0x7a1440b8e4452165u}},
+    {"ContinuousEarliest", {0xb05355e5d6a61913u, 0x0c8210784d8af5a5u, 0xfc3177c3d8cabcd6u}},
+};
+
+TEST_P(Determinism, EveryBuildGivesTheseHashes) {
+  const std::vector<std::uint64_t> found = hashes(settingsOf(Engine::Octree, 2), settings());
+  std::printf("%s: hashes", GetParam().name.c_str());
+  for (const std::uint64_t hash : found)
+    std::printf(" 0x%016llxu", static_cast<unsigned long long>(hash));
+  std::printf("\n");
+  EXPECT_EQ(found, kExpected.at(GetParam().name));
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryMethod, Determinism, ::testing::ValuesIn(methodCases(1.0)),
+                         [](const auto& method) { return method.param.name; });
+
+}  // namespace
+}  // namespace palpate
