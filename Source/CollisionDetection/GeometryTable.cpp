@@ -101,6 +101,7 @@ void rebuild(Geometry& geometry, const OctreeSettings& settings, const Threads& 
   const std::vector<Triangle>& triangles = geometry.mesh.topology.triangles;
   if (!geometry.treeKnown) {
     octree.reset(triangles.size());
+    geometry.orderedTriangles.reserve(triangles.size() + BoxArrays::kPadding);
     geometry.orderedTriangles.assign(triangles.begin(), triangles.end());
     geometry.treeKnown = true;
   }

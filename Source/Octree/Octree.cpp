@@ -55,6 +55,7 @@ Octree& Octree::operator=(Octree&&) noexcept = default;
 Octree::~Octree() = default;
 
 void Octree::reset(std::size_t size) {
+  m_order.reserve(size + BoxArrays::kPadding);  // read in whole vectors
   m_order.resize(size);
   std::iota(m_order.begin(), m_order.end(), 0u);
   m_boxes.resize(size);

@@ -3,6 +3,7 @@
 #include <bit>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Octree/Traversal.cpp"
@@ -242,87 +243,124 @@ class Walk {
     }
   }
 
-  HWY_ATTR void leaves(NodePair pair) {
+  /// Up to kMost primitives of a, their boxes in b's frame.
+  struct Rows {
+    static constexpr std::size_t kMost = 16;
+    alignas(64) float lower[3][kMost], upper[3][kMost];
+    std::size_t first;   ///< in a's order
+    std::uint32_t bits;  ///< which of them are of interest
+  };
+
+  HWY_ATTR HWY_INLINE void leaves(NodePair pair) {
     const LeafRange a = range(*m_trees.a, pair.a), b = range(*m_trees.b, pair.b);
     const OctreeNode nodeB = pair.b & ~NodePair::kOwn;
     const OctreeBlock& block = m_b[nodeB >> 3];
     const unsigned slot = nodeB & 7;
-    const LeafTag d;
-    constexpr std::size_t kMost = 16;
-    alignas(64) float lower[3][kMost], upper[3][kMost];
-    for (std::size_t i = a.begin; i < a.end; i += hn::Lanes(d)) {
-      // Those of a that meet the node of b at all.
-      auto mask = hn::FirstN(d, a.end - i);
-      for (int k = 0; k < 3; ++k) {
-        const auto low = roundedDown(hn::LoadU(d, m_boxesA.lower[k].data() + i),
-                                     hn::Set(d, m_trees.shiftLower[k]));
-        const auto high = roundedUp(hn::LoadU(d, m_boxesA.upper[k].data() + i),
-                                    hn::Set(d, m_trees.shiftUpper[k]));
-        hn::Store(low, d, lower[k]);
-        hn::Store(high, d, upper[k]);
-        mask = hn::And(mask, hn::And(hn::Le(low, hn::Set(d, block.upper[k][slot])),
-                                     hn::Ge(high, hn::Set(d, block.lower[k][slot]))));
-      }
-      for (std::uint32_t bits = bitsOf(d, mask); bits; bits &= bits - 1) {
-        const auto lane = static_cast<unsigned>(std::countr_zero(bits));
-        row(i + lane,
-            {{lower[0][lane], lower[1][lane], lower[2][lane]},
-             {upper[0][lane], upper[1][lane], upper[2][lane]}},
-            b);
-      }
+    const Query box{{block.lower[0][slot], block.lower[1][slot], block.lower[2][slot]},
+                    {block.upper[0][slot], block.upper[1][slot], block.upper[2][slot]}};
+    Rows rows;
+    for (std::size_t i = a.begin; i < a.end; i += Rows::kMost) {
+      load(rows, i, a.end, box);
+      if (rows.bits) compare<false>(rows, b);
     }
   }
 
   HWY_ATTR void withinLeaf(LeafRange leaf) {
-    const hn::CappedTag<float, 1> d;
-    for (std::uint32_t i = leaf.begin; i + 1 < leaf.end; ++i) {
-      Query query;
-      for (int k = 0; k < 3; ++k) {
-        query.lower[k] = hn::GetLane(
-            roundedDown(hn::Set(d, m_boxesA.lower[k][i]), hn::Set(d, m_trees.shiftLower[k])));
-        query.upper[k] = hn::GetLane(
-            roundedUp(hn::Set(d, m_boxesA.upper[k][i]), hn::Set(d, m_trees.shiftUpper[k])));
-      }
-      row(i, query, {i + 1, leaf.end});
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    const Query all{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+    Rows rows;
+    for (std::size_t i = leaf.begin; i < leaf.end; i += Rows::kMost) {
+      load(rows, i, leaf.end, all);
+      compare<true>(rows, {static_cast<std::uint32_t>(i), leaf.end});
     }
   }
 
-  /// One primitive of a against a range of b.
-  HWY_ATTR HWY_INLINE void row(std::size_t i, const Query& query, LeafRange b) {
+  /// Those from `first` on, of which the ones are of interest that overlap the box.
+  HWY_ATTR HWY_INLINE void load(Rows& rows, std::size_t first, std::size_t end,
+                                const Query& box) const {
     const LeafTag d;
-    for (std::size_t j = b.begin; j < b.end; j += hn::Lanes(d)) {
-      auto mask = hn::FirstN(d, b.end - j);
+    rows.first = first;
+    rows.bits = 0;
+    for (std::size_t lane = 0; lane < Rows::kMost && first + lane < end; lane += hn::Lanes(d)) {
+      const std::size_t i = first + lane;
+      auto mask = hn::FirstN(d, end - i);
       for (int k = 0; k < 3; ++k) {
-        mask = hn::And(
-            mask, hn::Le(hn::LoadU(d, m_boxesB.lower[k].data() + j), hn::Set(d, query.upper[k])));
-        mask = hn::And(
-            mask, hn::Ge(hn::LoadU(d, m_boxesB.upper[k].data() + j), hn::Set(d, query.lower[k])));
+        const auto lower = roundedDown(hn::LoadU(d, m_boxesA.lower[k].data() + i),
+                                       hn::Set(d, m_trees.shiftLower[k]));
+        const auto upper = roundedUp(hn::LoadU(d, m_boxesA.upper[k].data() + i),
+                                     hn::Set(d, m_trees.shiftUpper[k]));
+        hn::Store(lower, d, rows.lower[k] + lane);
+        hn::Store(upper, d, rows.upper[k] + lane);
+        mask = hn::And(mask, hn::And(hn::Le(lower, hn::Set(d, box.upper[k])),
+                                     hn::Ge(upper, hn::Set(d, box.lower[k]))));
       }
-      std::uint32_t bits = bitsOf(d, mask);
-      if (bits == 0) continue;
-      TrianglePair* out = m_sink.room();
-      std::size_t count = 0;
-      if (!m_trees.self()) {
-        for (; bits; bits &= bits - 1)
-          out[count++] = {m_idsA[i], m_idsB[j + static_cast<unsigned>(std::countr_zero(bits))]};
-      } else {
-        for (; bits; bits &= bits - 1) {
-          const std::size_t other = j + static_cast<unsigned>(std::countr_zero(bits));
-          if (m_trees.adjacency && adjacent(m_trees.adjacency[i], m_trees.adjacency[other]))
-            continue;
-          const std::uint32_t p = m_idsA[i], q = m_idsB[other];
-          out[count++] = {p < q ? p : q, p < q ? q : p};
+      rows.bits |= bitsOf(d, mask) << lane;
+    }
+  }
+
+  /// Rows against a range of b, a vector of which stays in registers for all rows. kWithin: of one
+  /// leaf, against what comes after each row.
+  template <bool kWithin>
+  HWY_ATTR HWY_INLINE void compare(const Rows& rows, LeafRange b) {
+    const LeafTag d;
+    const hn::RebindToUnsigned<LeafTag> du;
+    for (std::size_t j = b.begin; j < b.end; j += hn::Lanes(d)) {
+      hn::Vec<LeafTag> lower[3], upper[3];
+      for (int k = 0; k < 3; ++k) {
+        lower[k] = hn::LoadU(d, m_boxesB.lower[k].data() + j);
+        upper[k] = hn::LoadU(d, m_boxesB.upper[k].data() + j);
+      }
+      const auto ids = hn::LoadU(du, m_idsB + j);
+      hn::Vec<decltype(du)> corners[3];
+      if (m_trees.adjacency)
+        hn::LoadInterleaved3(du, m_trees.adjacency[j].data(), corners[0], corners[1], corners[2]);
+      else
+        corners[0] = corners[1] = corners[2] = hn::Zero(du);
+      const auto inside = hn::FirstN(d, b.end - j);
+      for (std::uint32_t bits = rows.bits; bits; bits &= bits - 1) {
+        const auto lane = static_cast<unsigned>(std::countr_zero(bits));
+        const std::size_t i = rows.first + lane;
+        auto mask = inside;
+        if (kWithin && i >= j) mask = hn::AndNot(hn::FirstN(d, i - j + 1), mask);
+        for (int k = 0; k < 3; ++k) {
+          mask = hn::And(mask, hn::Le(lower[k], hn::Set(d, rows.upper[k][lane])));
+          mask = hn::And(mask, hn::Ge(upper[k], hn::Set(d, rows.lower[k][lane])));
         }
+        if (hn::AllFalse(d, mask)) continue;
+        auto found = hn::RebindMask(du, mask);
+        if (m_trees.adjacency)
+          for (const std::uint32_t corner : m_trees.adjacency[i])
+            for (const auto& others : corners)
+              found = hn::AndNot(hn::Eq(others, hn::Set(du, corner)), found);
+        emit(hn::Set(du, m_idsA[i]), ids, found);
+      }
+    }
+  }
+
+  template <class V, class M>
+  HWY_ATTR HWY_INLINE void emit(V a, V b, M found) {
+    const hn::DFromV<V> du;
+    TrianglePair* const out = m_sink.room();
+    if (m_trees.self()) {
+      const V lower = hn::Min(a, b);
+      b = hn::Max(a, b);
+      a = lower;
+    }
+    if constexpr (HWY_TARGET == HWY_AVX2) {  // no compression but by a table, slower than a loop
+      alignas(32) std::uint32_t ids[2][8];
+      hn::Store(a, du, ids[0]);
+      hn::Store(b, du, ids[1]);
+      std::size_t count = 0;
+      for (std::uint32_t bits = bitsOf(du, found); bits; bits &= bits - 1) {
+        const auto lane = static_cast<unsigned>(std::countr_zero(bits));
+        out[count++] = {ids[0][lane], ids[1][lane]};
       }
       m_sink.advance(count);
+    } else {
+      if (m_trees.self()) a = hn::Compress(a, found);  // else the same in all lanes
+      hn::StoreInterleaved2(a, hn::Compress(b, found), du, reinterpret_cast<std::uint32_t*>(out));
+      m_sink.advance(hn::CountTrue(du, found));
     }
-  }
-
-  static bool adjacent(const Triangle& s, const Triangle& t) {
-    bool equal = false;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) equal |= s[i] == t[j];
-    return equal;
   }
 
   const TreePair& m_trees;

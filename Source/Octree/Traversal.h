@@ -73,7 +73,8 @@ class PairSink {
 struct TreePair {
   const Octree* a;
   const Octree* b;  ///< the same one: each unordered pair once, a < b
-  /// Triangles in the order of each tree: pairs that share a vertex are left out. Null: nothing is.
+  /// Triangles in the order of each tree, readable BoxArrays::kPadding past their end: pairs that
+  /// share a vertex are left out. Null: nothing is.
   const Triangle* adjacency = nullptr;
   /// Added to a's bounds: the distance between the frames, and half the thickness on each side
   /// twice.
