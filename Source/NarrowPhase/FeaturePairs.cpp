@@ -2,6 +2,7 @@
 
 #include "Math/Box.h"
 
+#include <algorithm>
 #include <bit>
 
 #undef HWY_TARGET_INCLUDE
@@ -39,12 +40,9 @@ HWY_ATTR HWY_INLINE Bounds joined(const Bounds& s, const Bounds& t) {
   return bounds;
 }
 
-/// A vertex, or its way through the step.
-template <bool kSwept>
-HWY_ATTR HWY_INLINE Bounds vertexBounds(const FloatPoint* now, const FloatPoint* before,
-                                        std::uint32_t vertex) {
-  if constexpr (kSwept) return joined(boundsOf(now[vertex]), boundsOf(before[vertex]));
-  return boundsOf(now[vertex]);
+HWY_ATTR HWY_INLINE Bounds triangleBounds(const FloatPoint* now, const Triangle& triangle) {
+  return joined(joined(boundsOf(now[triangle[0]]), boundsOf(now[triangle[1]])),
+                boundsOf(now[triangle[2]]));
 }
 
 /// Into b's frame, inflated, outward.
@@ -70,20 +68,100 @@ HWY_ATTR HWY_INLINE bool overlap(const Bounds& s, const Bounds& t) {
   return all;
 }
 
-/// A triangle's features as boxes: corners, edges (i joins corners i and i + 1), and the whole.
-struct Features {
-  Bounds corners[3], edges[3], all;
+/// Triangle pairs side by side: their corners' floats, those of a first, and what is to be
+/// compared.
+struct Batch {
+  static constexpr std::size_t kSize = 16;
+  alignas(64) FloatPoint now[6][kSize];
+  alignas(64) FloatPoint before[6][kSize];
+  alignas(
+      64) std::uint32_t choices[kSize];  ///< bits 0-2: corners of a, 3-5: of b, 6 + 3 i + j: edges
+  TrianglePair pairs[kSize];
+  std::size_t size = 0;
+};
+constexpr int kTests = 15;
+
+using WideTag = hn::CappedTag<float, Batch::kSize>;
+using Wide = hn::Vec<WideTag>;
+
+/// One bound of one feature, lane by lane, in three axes; and both bounds.
+struct WideBounds {
+  Wide lower[3], upper[3];
 };
 
+HWY_ATTR HWY_INLINE WideBounds joined(const WideBounds& s, const WideBounds& t) {
+  WideBounds bounds;
+  for (int k = 0; k < 3; ++k) {
+    bounds.lower[k] = hn::Min(s.lower[k], t.lower[k]);
+    bounds.upper[k] = hn::Max(s.upper[k], t.upper[k]);
+  }
+  return bounds;
+}
+
 template <bool kSwept>
-HWY_ATTR HWY_INLINE Features featuresOf(const FloatPoint* now, const FloatPoint* before,
-                                        const Triangle& triangle) {
-  Features features;
-  for (int i = 0; i < 3; ++i) features.corners[i] = vertexBounds<kSwept>(now, before, triangle[i]);
-  for (int i = 0; i < 3; ++i)
-    features.edges[i] = joined(features.corners[i], features.corners[(i + 1) % 3]);
-  features.all = joined(features.edges[0], features.corners[2]);
-  return features;
+HWY_ATTR HWY_INLINE WideBounds cornerBounds(const Batch& batch, int corner, std::size_t lane) {
+  const WideTag d;
+  Wide p[3], q[3], unused;
+  hn::LoadInterleaved4(d, &batch.now[corner][lane].x, p[0], p[1], p[2], unused);
+  if constexpr (kSwept)
+    hn::LoadInterleaved4(d, &batch.before[corner][lane].x, q[0], q[1], q[2], unused);
+  WideBounds bounds;
+  for (int k = 0; k < 3; ++k) {
+    bounds.lower[k] = kSwept ? hn::Min(p[k], q[k]) : p[k];
+    bounds.upper[k] = kSwept ? hn::Max(p[k], q[k]) : p[k];
+  }
+  return bounds;
+}
+
+/// Into b's frame, inflated, outward; monotone, so that boxes of shifted corners are shifted boxes.
+HWY_ATTR HWY_INLINE WideBounds shifted(const WideBounds& bounds, const FloatPair& floats) {
+  const WideTag d;
+  const Wide relative = hn::Set(d, OutwardRounding::kRelative),
+             absolute = hn::Set(d, OutwardRounding::kAbsolute);
+  WideBounds moved;
+  for (int k = 0; k < 3; ++k) {
+    const Wide lower = hn::Add(bounds.lower[k], hn::Set(d, floats.shiftLower[k]));
+    const Wide upper = hn::Add(bounds.upper[k], hn::Set(d, floats.shiftUpper[k]));
+    moved.lower[k] = hn::Sub(lower, hn::Add(hn::Mul(hn::Abs(lower), relative), absolute));
+    moved.upper[k] = hn::Add(upper, hn::Add(hn::Mul(hn::Abs(upper), relative), absolute));
+  }
+  return moved;
+}
+
+/// Adds to `bits` of a test the lanes that chose it and whose two boxes overlap.
+HWY_ATTR HWY_INLINE void compare(const WideBounds& s, const WideBounds& t,
+                                 const std::uint32_t* choices, int test, std::size_t lane,
+                                 std::uint32_t* bits) {
+  const WideTag d;
+  const hn::RebindToUnsigned<WideTag> du;
+  auto mask = hn::RebindMask(d, hn::TestBit(hn::Load(du, choices + lane), hn::Set(du, 1u << test)));
+  for (int k = 0; k < 3; ++k)
+    mask = hn::And(mask, hn::And(hn::Le(s.lower[k], t.upper[k]), hn::Le(t.lower[k], s.upper[k])));
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(d, mask, bytes);
+  bits[test] |= (bytes[0] | static_cast<std::uint32_t>(bytes[1]) << 8) << lane;
+}
+
+/// bits[test]: the pairs of the batch that chose the test and whose boxes overlap.
+template <bool kSwept>
+HWY_ATTR void compareBatch(const Batch& batch, const FloatPair& floats, std::uint32_t* bits) {
+  for (std::size_t lane = 0; lane < Batch::kSize; lane += hn::Lanes(WideTag())) {
+    WideBounds cornersA[3], cornersB[3];
+    for (int i = 0; i < 3; ++i) cornersA[i] = shifted(cornerBounds<kSwept>(batch, i, lane), floats);
+    for (int j = 0; j < 3; ++j) cornersB[j] = cornerBounds<kSwept>(batch, 3 + j, lane);
+    const WideBounds edgesA[3] = {joined(cornersA[0], cornersA[1]),
+                                  joined(cornersA[1], cornersA[2]),
+                                  joined(cornersA[2], cornersA[0])};
+    const WideBounds allA = joined(edgesA[0], cornersA[2]);
+    for (int j = 0; j < 3; ++j) {
+      const WideBounds edgeB = joined(cornersB[j], cornersB[(j + 1) % 3]);
+      for (int i = 0; i < 3; ++i)
+        compare(edgesA[i], edgeB, batch.choices, 6 + 3 * i + j, lane, bits);
+      compare(allA, cornersB[j], batch.choices, 3 + j, lane, bits);
+    }
+    const WideBounds allB = joined(joined(cornersB[0], cornersB[1]), cornersB[2]);
+    for (int i = 0; i < 3; ++i) compare(cornersA[i], allB, batch.choices, i, lane, bits);
+  }
 }
 
 /// Grows a list by what is written behind its end: no test for room at each element.
@@ -93,10 +171,7 @@ class Appender {
     list.resize(m_size + most);
   }
   ~Appender() { m_list.resize(m_size); }
-  void append(std::uint32_t a, std::uint32_t b, bool keep) {
-    m_list[m_size] = {a, b};
-    m_size += keep;
-  }
+  void append(std::uint32_t a, std::uint32_t b) { m_list[m_size++] = {a, b}; }
 
  private:
   Buffer<FeaturePair>& m_list;
@@ -135,54 +210,61 @@ HWY_ATTR void findFeaturePairsOf(const MeshTopology& a, const MeshTopology& b,
   Appender vertexTriangle(out.vertexTriangle, pairs.size() * (self ? 6 : 3));
   Appender triangleVertex(out.triangleVertex, self ? 0 : pairs.size() * 3);
   Appender edgeEdge(out.edgeEdge, pairs.size() * 9);
-  // Most pairs come in runs with the same a.
-  std::uint32_t last = 0xffffffffu;
-  Features s, t;
+  const auto append = [&](const TrianglePair& pair, int test) {
+    if (test < 3) return vertexTriangle.append(a.triangles[pair.a][test], pair.b);
+    if (test < 6) {
+      const std::uint32_t vertex = b.triangles[pair.b][test - 3];
+      return self ? vertexTriangle.append(vertex, pair.a) : triangleVertex.append(pair.a, vertex);
+    }
+    const std::uint32_t edgeA = a.triangleEdges[pair.a][(test - 6) / 3],
+                        edgeB = b.triangleEdges[pair.b][(test - 6) % 3];
+    const bool turned = self && edgeB < edgeA;
+    edgeEdge.append(turned ? edgeB : edgeA, turned ? edgeA : edgeB);
+  };
+  Batch batch;
+  const auto flush = [&]() HWY_ATTR {
+    std::uint32_t bits[kTests] = {};
+    compareBatch<kSwept>(batch, *floats, bits);
+    for (int test = 0; test < kTests; ++test)
+      for (; bits[test]; bits[test] &= bits[test] - 1)
+        append(batch.pairs[std::countr_zero(bits[test])], test);
+    std::fill_n(batch.choices, Batch::kSize, 0u);
+    batch.size = 0;
+  };
+  if constexpr (kFloats) {
+    std::fill_n(batch.choices, Batch::kSize, 0u);
+    std::fill_n(&batch.now[0][0], 6 * Batch::kSize, FloatPoint{});
+    std::fill_n(&batch.before[0][0], 6 * Batch::kSize, FloatPoint{});
+  }
   for (const TrianglePair& pair : pairs) {
     const unsigned ownedA = a.owned[pair.a], ownedB = b.owned[pair.b];
-    if ((ownedA | ownedB) == 0) continue;
     const Triangle &cornersA = a.triangles[pair.a], &cornersB = b.triangles[pair.b];
-    if constexpr (kFloats) {
-      if (pair.a != last) {
-        s = featuresOf<kSwept>(floats->a, floats->beforeA, cornersA);
-        for (int i = 0; i < 3; ++i) {
-          s.corners[i] = shifted(s.corners[i], *floats);
-          s.edges[i] = shifted(s.edges[i], *floats);
-        }
-        s.all = shifted(s.all, *floats);
-        last = pair.a;
-      }
-      t = featuresOf<kSwept>(floats->b, floats->beforeB, cornersB);
-    }
-    Choice choice{ownedA & 7, ownedB & 7, kRows[ownedA >> 3] & (ownedB >> 3) * kColumn};
-    if (self) {
+    unsigned choice =
+        (ownedA & 7) | (ownedB & 7) << 3 | (kRows[ownedA >> 3] & (ownedB >> 3) * kColumn) << 6;
+    if (self && choice) {
       const Choice shared = sharing(cornersA, cornersB);
-      choice.cornersOfA &= ~shared.cornersOfA;
-      choice.cornersOfB &= ~shared.cornersOfB;
-      choice.edges &= ~shared.edges;
+      choice &= ~(shared.cornersOfA | shared.cornersOfB << 3 | shared.edges << 6);
     }
-    out.owned += static_cast<std::size_t>(
-        std::popcount(choice.cornersOfA | choice.cornersOfB << 3 | choice.edges << 6));
-    for (; choice.cornersOfA; choice.cornersOfA &= choice.cornersOfA - 1) {
-      const int i = std::countr_zero(choice.cornersOfA);
-      vertexTriangle.append(cornersA[i], pair.b, !kFloats || overlap(s.corners[i], t.all));
+    if (choice == 0) continue;
+    out.owned += static_cast<std::size_t>(std::popcount(choice));
+    if constexpr (!kFloats) {
+      for (; choice; choice &= choice - 1) append(pair, std::countr_zero(choice));
+      continue;
     }
-    for (; choice.cornersOfB; choice.cornersOfB &= choice.cornersOfB - 1) {
-      const int i = std::countr_zero(choice.cornersOfB);
-      const bool keep = !kFloats || overlap(s.all, t.corners[i]);
-      if (self)
-        vertexTriangle.append(cornersB[i], pair.a, keep);
-      else
-        triangleVertex.append(pair.a, cornersB[i], keep);
+    const std::size_t lane = batch.size;
+    for (int i = 0; i < 3; ++i) {
+      batch.now[i][lane] = floats->a[cornersA[i]];
+      batch.now[3 + i][lane] = floats->b[cornersB[i]];
+      if constexpr (kSwept) {
+        batch.before[i][lane] = floats->beforeA[cornersA[i]];
+        batch.before[3 + i][lane] = floats->beforeB[cornersB[i]];
+      }
     }
-    for (; choice.edges; choice.edges &= choice.edges - 1) {
-      const int bit = std::countr_zero(choice.edges), i = bit / 3, j = bit % 3;
-      const std::uint32_t edgeA = a.triangleEdges[pair.a][i], edgeB = b.triangleEdges[pair.b][j];
-      const bool turned = self && edgeB < edgeA;
-      edgeEdge.append(turned ? edgeB : edgeA, turned ? edgeA : edgeB,
-                      !kFloats || overlap(s.edges[i], t.edges[j]));
-    }
+    batch.choices[lane] = choice;
+    batch.pairs[lane] = pair;
+    if (++batch.size == Batch::kSize) flush();
   }
+  if (batch.size > 0) flush();
 }
 
 HWY_ATTR void findFeaturePairsKernel(const MeshTopology& a, const MeshTopology& b,
@@ -200,10 +282,9 @@ HWY_ATTR void keepOverlappingKernel(const MeshTopology& a, const MeshTopology& b
                                     const FloatPair& floats, Buffer<TrianglePair>& pairs) {
   std::size_t kept = 0;
   for (const TrianglePair& pair : pairs) {
-    const Features s = featuresOf<false>(floats.a, nullptr, a.triangles[pair.a]);
-    const Features t = featuresOf<false>(floats.b, nullptr, b.triangles[pair.b]);
     pairs[kept] = pair;
-    kept += overlap(shifted(s.all, floats), t.all);
+    kept += overlap(shifted(triangleBounds(floats.a, a.triangles[pair.a]), floats),
+                    triangleBounds(floats.b, b.triangles[pair.b]));
   }
   pairs.resize(kept);
 }
