@@ -2,6 +2,7 @@
 
 #include "Math/Exact.h"
 #include "Math/Expansion.h"
+#include "Math/WideInteger.h"
 
 #include <algorithm>
 #include <initializer_list>
@@ -35,6 +36,8 @@ bool flat(int axis, std::initializer_list<const Eigen::Vector3d*> positions) {
   return std::all_of(positions.begin(), positions.end(),
                      [&](const Eigen::Vector3d* position) { return (*position)[axis] == first; });
 }
+
+int compare(double a, double b) { return (a > b) - (a < b); }
 
 /// Sums of two doubles, errors of errors dropped.
 RoundedWithError operator+(const RoundedWithError& a, const RoundedWithError& b) {
@@ -75,16 +78,22 @@ typename Numbers::Volume volume(const Eigen::Vector3d& a, const Eigen::Vector3d&
   return (u1 * v2 - u2 * v1) * w0 + (u2 * v0 - u0 * v2) * w1 + (u0 * v1 - u1 * v0) * w2;
 }
 
-/// Positions that fit expansions. With e = 2^-53 and P the sum of the six products' magnitudes,
-/// sums of two doubles err by 8 e² a product, 15 e² a minor, 35 e² a term and 75 e² P in all, of
-/// which P is at most the product of the differences' 1-norms: 2^-98 covers these and the bound's
-/// own rounding.
-int volumeSignWithExpansions(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+int volumeSign(const FixedGrid<4>& grid) {
+  const auto& [origin, u, v, w] = grid.at;
+  const auto minor = [&](int i, int j) { return Int128{u[i]} * v[j] - Int128{u[j]} * v[i]; };
+  return (product(minor(1, 2), w[0]) + product(minor(2, 0), w[1]) + product(minor(0, 1), w[2]))
+      .sign();
+}
+
+/// 0: left undecided. Of positions that fit expansions. With e = 2^-53 and P the sum of the six
+/// products' magnitudes, sums of two doubles err by 8 e² a product, 15 e² a minor, 35 e² a term and
+/// 75 e² P in all, and P is at most the product of the differences' 1-norms: 2^-98 covers these and
+/// the bound's own rounding.
+int volumeSignWithTwoDoubles(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                              const Eigen::Vector3d& c, const Eigen::Vector3d& d) {
   const auto [value, error] = volume<WithTwoDoubles>(a, b, c, d);
   const double bound = 0x1p-98 * (b - a).lpNorm<1>() * (c - a).lpNorm<1>() * (d - a).lpNorm<1>();
-  if (std::abs(value + error) > bound) return value + error > 0 ? 1 : -1;
-  return volume<WithExpansions>(a, b, c, d).sign();
+  return std::abs(value + error) > bound ? compare(value + error, 0) : 0;
 }
 
 template <class Numbers>
@@ -94,8 +103,6 @@ int areaSign(int x, int y, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
   const auto vx = Numbers::difference(c[x], a[x]), vy = Numbers::difference(c[y], a[y]);
   return signOf(ux * vy - uy * vx);
 }
-
-int compare(double a, double b) { return (a > b) - (a < b); }
 
 /// (b - a)[x] (c - a)[y] against (b - a)[y] (c - a)[x]: where the differences are doubles, the
 /// rounded products compare as the exact ones do or are equal, and then their errors compare.
@@ -118,10 +125,11 @@ int orient3dExactly(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Ei
   for (int axis = 0; axis < 3; ++axis)
     if (flat(axis, {&a, &b, &c, &d})) return 0;
   if (a == b || a == c || a == d || b == c || b == d || c == d) return 0;
-  if (fitExpansions({&a, &b, &c, &d})) {
-    ++counts.expansions;
-    return volumeSignWithExpansions(a, b, c, d);
-  }
+  ++counts.undecided;
+  const bool fit = fitExpansions({&a, &b, &c, &d});
+  if (const int sign = fit ? volumeSignWithTwoDoubles(a, b, c, d) : 0) return sign;
+  if (const FixedGrid grid(a, b, c, d); grid.fits) return volumeSign(grid);
+  if (fit) return volume<WithExpansions>(a, b, c, d).sign();
   ++counts.bigIntegers;
   return sgn(volume<WithIntegers>(a, b, c, d));
 }
@@ -130,10 +138,8 @@ int orient2dExactly(int axis, const Eigen::Vector3d& a, const Eigen::Vector3d& b
                     const Eigen::Vector3d& c, SignCounts& counts) {
   const int x = (axis + 1) % 3, y = (axis + 2) % 3;
   if (flat(x, {&a, &b, &c}) || flat(y, {&a, &b, &c})) return 0;
-  if (fitExpansions({&a, &b, &c})) {
-    ++counts.expansions;
-    return areaSignWithExpansions(x, y, a, b, c);
-  }
+  ++counts.undecided;
+  if (fitExpansions({&a, &b, &c})) return areaSignWithExpansions(x, y, a, b, c);
   ++counts.bigIntegers;
   return areaSign<WithIntegers>(x, y, a, b, c);
 }

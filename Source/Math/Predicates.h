@@ -9,11 +9,10 @@
 
 namespace palpate {
 
-/// How often the fast path did not decide.
+/// How often the floating filter did not decide.
 struct SignCounts {
-  std::size_t expansions = 0;   ///< decided by sums of doubles
-  std::size_t bigIntegers = 0;  ///< by integers, which allocate: products over- or underflow
-  std::size_t total() const { return expansions + bigIntegers; }
+  std::size_t undecided = 0;    ///< by the filter, but for trivial zeros
+  std::size_t bigIntegers = 0;  ///< of these, left to integers of any size, which allocate
 };
 
 /// Signs of the same determinants, with no rounding at all. Slow.

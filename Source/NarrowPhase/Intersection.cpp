@@ -127,7 +127,7 @@ void findIntersections(const MeshPair& pair, std::span<const TrianglePair> candi
     out.intersectingTriangles.push_back(candidate);
     IntersectionContacts(a, b, out).add(meeting);
   }
-  out.exactDecisions += counts.total();
+  out.exactDecisions += counts.undecided;
 }
 
 void findIntersectionsByBruteForce(const MeshPair& pair, ContactBuffers& out) {

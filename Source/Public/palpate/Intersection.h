@@ -11,7 +11,7 @@ namespace palpate {
 ///
 /// Shapes   three corners each, any winding. Without area a triangle is the segment or the point that it covers.
 /// Errors   none; a NaN or an infinity in gives an answer without meaning.
-/// Cost     some 20 to 60 ns where floating point decides, up to 10 µs where it cannot.
+/// Cost     about 0.1 µs where floating point decides, 1 µs where features touch, 100 µs at worst.
 PALPATE_EXPORT bool trianglesIntersect(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1,
                                        const Eigen::Vector3d& a2, const Eigen::Vector3d& b0,
                                        const Eigen::Vector3d& b1, const Eigen::Vector3d& b2);
