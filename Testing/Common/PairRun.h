@@ -68,6 +68,7 @@ class PairRun {
   }
 
   OctreeBasedCD& detection() { return m_detection; }
+  const OctreeBasedCD& detection() const { return m_detection; }
   const CollisionData& data() const { return m_detection.collisionData(m_a, m_b); }
   GeometryId a() const { return m_a; }
   GeometryId b() const { return m_b; }

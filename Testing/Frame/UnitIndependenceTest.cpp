@@ -1,0 +1,164 @@
+#include <palpate/TimeOfImpact.h>
+
+#include "Common/PairRun.h"
+#include "Common/Zoo.h"
+#include "Frame/Placement.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+// Contacts do not depend on the unit of length, on where the scene is, or on how its elements are
+// numbered.
+
+namespace palpate {
+namespace {
+
+using namespace testing;
+using Eigen::Vector3d;
+
+/// To multiples of 2^-20, so that sums with larger multiples are exact.
+void toGrid(std::vector<Vector3d>& positions) {
+  for (Vector3d& p : positions)
+    for (double& x : p) x = std::round(x * 0x1p20) * 0x1p-20;
+}
+
+StepScene stepScene(const std::string& name, const Mesh& a, const Mesh& b, double thickness) {
+  StepScene scene{name, a, b, a.positions, b.positions, thickness};
+  Random random(3);
+  for (Vector3d& p : scene.aBefore) p += Vector3d(0.02, 0.01, 0.15) + randomPoint(random, 0, 0.01);
+  for (Vector3d& p : scene.bBefore) p -= randomPoint(random, 0, 0.02);
+  for (auto* positions : {&scene.a.positions, &scene.b.positions, &scene.aBefore, &scene.bBefore})
+    toGrid(*positions);
+  return scene;
+}
+
+/// Triangles with area between few places of a coarse lattice: all kinds of touching.
+Mesh onLattice(Random& random) {
+  Mesh mesh;
+  const auto coordinate = [&] { return static_cast<double>(random() % 4) * 0.25; };
+  while (mesh.positions.size() < 14)
+    mesh.positions.push_back({coordinate(), coordinate(), coordinate()});
+  while (mesh.triangles.size() < 14) {
+    const Triangle t{static_cast<std::uint32_t>(random() % 14),
+                     static_cast<std::uint32_t>(random() % 14),
+                     static_cast<std::uint32_t>(random() % 14)};
+    const Vector3d u = mesh.positions[t[1]] - mesh.positions[t[0]],
+                   v = mesh.positions[t[2]] - mesh.positions[t[0]];
+    if (u.cross(v) != Vector3d::Zero()) mesh.triangles.push_back(t);
+  }
+  return mesh;
+}
+
+std::vector<StepScene> scenes() {
+  Random random(12);
+  const Mesh first = soup(random, 40, 0.3), second = soup(random, 40, 0.3);
+  const Mesh lattice = onLattice(random), other = onLattice(random);
+  StepScene touching{"lattice", lattice, other, lattice.positions, other.positions, 0.25};
+  for (Vector3d& p : touching.aBefore) p.z() += 0.5;
+  return {stepScene("soups", first, second, 0x1p-5),
+          stepScene("sheets", sheet(8, 0, 0), sheet(7, 0.02, 1), 0x1p-6),
+          stepScene("bodies", sphere(6, 9, {0.5, 0.5, 0.5}, 0.4),
+                    sphere(5, 8, {0.6, 0.55, 1.1}, 0.3), 0x1p-5),
+          touching};
+}
+
+/// Exact in double for positions of toGrid().
+std::vector<Transformation> exactTransformations() {
+  const Vector3d far(0x1p28, -0x1.8p27, 0x1p20);
+  return {{.name = "larger", .scale = 0x1p10},
+          {.name = "smaller", .scale = 0x1p-10},
+          {.name = "much larger", .scale = 0x1p90},
+          {.name = "much smaller", .scale = 0x1p-90},
+          {.name = "moved", .translation = far},
+          {.name = "corners", .corners = true},
+          {.name = "triangles", .triangles = true},
+          {.name = "vertices", .vertices = true},
+          {.name = "geometries", .swapped = true},
+          {.name = "mirrored in x", .mirror = {-1, 1, 1}},
+          {.name = "mirrored in y", .mirror = {1, -1, 1}},
+          {.name = "turned by a half", .mirror = {-1, -1, 1}},
+          {.name = "all at once",
+           .scale = 0x1p7,
+           .mirror = {1, 1, -1},
+           .translation = far,
+           .corners = true,
+           .triangles = true,
+           .vertices = true,
+           .swapped = true}};
+}
+
+class UnitIndependence : public ::testing::TestWithParam<MethodCase> {
+ protected:
+  static const PairSettings& settings() { return GetParam().settings; }
+  static bool continuous() { return settings().method == Method::Continuous; }
+  static bool distinct() {
+    return settings().method == Method::Proximity && settings().contacts == Contacts::Distinct;
+  }
+
+  /// Whether the sign of a contact's normal follows from its winding or numbering.
+  static bool hasNoSide(const PlainContact& c) {
+    if (c.distance == 0) return true;
+    return settings().method == Method::Intersection && c.ids[0] != PlainContact::EdgeEdge;
+  }
+
+  static void expectSame(const PlainContact& found, const PlainContact& truth) {
+    SCOPED_TRACE("contact " + std::to_string(truth.ids[0]) + ": " + std::to_string(truth.ids[1]) +
+                 " " + std::to_string(truth.ids[2]) + " " + std::to_string(truth.ids[3]) + " " +
+                 std::to_string(truth.ids[4]));
+    if (continuous()) {
+      // Of a time that may be up to the tolerance early, by as much as the search happened to be.
+      EXPECT_NEAR(found.time, truth.time, TimeOfImpactSettings{}.tolerance);
+      return;
+    }
+    EXPECT_EQ(found.time, truth.time);
+    EXPECT_EQ(found.distance, truth.distance);
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(found.weights[i], truth.weights[i], 0x1p-52);
+    // Distinct at distance zero: the winding normal of whichever triangle is named.
+    if (distinct() && truth.distance == 0) return;
+    if (hasNoSide(truth) && found.normal.dot(truth.normal) < 0)
+      EXPECT_EQ(found.normal, -truth.normal);
+    else
+      EXPECT_EQ(found.normal, truth.normal);
+  }
+};
+
+TEST_P(UnitIndependence, ByTransformationsThatAreExact) {
+  for (const StepScene& scene : scenes()) {
+    SCOPED_TRACE(scene.name);
+    const Placement own(scene, {});
+    const PairRun truth = own.run(settings());
+    EXPECT_TRUE(truth.answers().front().anything());
+    for (const Transformation& how : exactTransformations()) {
+      SCOPED_TRACE(how.name);
+      const Placement placement(scene, how);
+      const PairRun run = placement.run(settings());
+      EXPECT_NEAR(run.data().earliestTimeOfImpact(), truth.data().earliestTimeOfImpact(),
+                  continuous() ? TimeOfImpactSettings{}.tolerance : 0);
+      EXPECT_EQ(placement.intersectingTriangles(run), own.intersectingTriangles(truth));
+      for (const bool self : {false, true}) {
+        auto found = placement.contacts(run, self, settings().contacts);
+        auto expected = own.contacts(truth, self, settings().contacts);
+        if (distinct() && (how.swapped || how.vertices)) {
+          // By definition these are asked of one side only: the first mesh's, or the lower vertex.
+          for (auto* contacts : {&found, &expected})
+            std::erase_if(*contacts, [](const PlainContact& c) {
+              return c.ids[0] == PlainContact::VertexVertex;
+            });
+        }
+        ASSERT_EQ(found.size(), expected.size()) << "self: " << self;
+        for (std::size_t i = 0; i < found.size(); ++i) {
+          ASSERT_EQ(found[i].ids, expected[i].ids) << "self: " << self;
+          expectSame(found[i], expected[i]);
+          if (HasFailure()) break;
+        }
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryMethod, UnitIndependence, ::testing::ValuesIn(methodCases(1.0)),
+                         [](const auto& method) { return method.param.name; });
+
+}  // namespace
+}  // namespace palpate
