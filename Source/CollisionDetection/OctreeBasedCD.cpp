@@ -1,5 +1,6 @@
 #include <palpate/OctreeBasedCD.h>
 
+#include "CollisionDetection/Audit.h"
 #include "CollisionDetection/BruteForce.h"
 #include "CollisionDetection/Frame.h"
 #include "CollisionDetection/GeometryTable.h"
@@ -12,6 +13,7 @@
 #include <algorithm>
 #include <mutex>
 #include <optional>
+#include <unordered_map>
 
 namespace palpate {
 
@@ -34,6 +36,7 @@ const Settings& checked(const Settings& settings) {
         static_cast<int>(settings.engine), "Octree or BruteForce");
   check(settings.threads >= 0 && settings.threads <= 1024, "threads", settings.threads,
         "in [0, 1024]");
+  check(settings.audit.features >= 0, "audit.features", settings.audit.features, "at least 0");
   return settings;
 }
 
@@ -54,6 +57,8 @@ struct OctreeBasedCD::Implementation {
   std::optional<LooseOctree> octree;
   std::vector<PairRecord*> work;
   bool inFrame = false;
+  std::vector<AuditFailure> auditFailures;
+  std::uint64_t detections = 0;
   std::mutex sorting;  ///< of candidates, when a const query first asks for them
   PairOrderScratch sortingScratch;
 
@@ -168,6 +173,16 @@ struct OctreeBasedCD::Implementation {
       statistics.intersectingTriangles += data.intersectingTriangles().size();
     }
     endFrame();
+    auditFrame();
+  }
+
+  void auditFrame() {
+    auditFailures.clear();
+    ++detections;
+    if (settings.audit.features == 0) return;
+    for (const auto& record : pairs.records())
+      audit(record->meshes(), record->pair, record->data, settings.audit, detections,
+            auditFailures);
   }
 
   std::shared_ptr<LooseOctree::State> state;
@@ -265,6 +280,24 @@ const LooseOctree& OctreeBasedCD::octree() const { return *m_implementation->oct
 const FrameStatistics& OctreeBasedCD::statistics() const { return m_implementation->statistics; }
 
 const Settings& OctreeBasedCD::settings() const { return m_implementation->settings; }
+
+std::span<const AuditFailure> OctreeBasedCD::auditFailures() const {
+  return m_implementation->auditFailures;
+}
+
+CollisionProblem OctreeBasedCD::problem() const {
+  CollisionProblem problem{m_implementation->settings, {}, {}};
+  std::unordered_map<const Geometry*, std::uint32_t> indices;
+  for (const auto& geometry : m_implementation->geometries.all()) {
+    indices.emplace(geometry.get(), static_cast<std::uint32_t>(indices.size()));
+    const TriangleMesh& mesh = geometry->mesh;
+    problem.geometries.push_back({geometry->id, mesh.before, mesh.now, mesh.topology.triangles});
+  }
+  for (const auto& record : m_implementation->pairs.records())
+    problem.pairs.push_back(
+        {indices.at(record->a), indices.at(record->b), record->pair.settings, record->method});
+  return problem;
+}
 
 CollisionData detectCollision(const TriangleMeshView& a, const TriangleMeshView& b,
                               const PairSettings& settings) {

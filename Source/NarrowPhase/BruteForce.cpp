@@ -93,12 +93,12 @@ class VertexAgainstMesh {
 
 /// kSecond: the vertices are the second mesh's.
 template <bool kSecond>
-void findVertexTriangle(const MeshPair& pair, ContactBuffers& out) {
+void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sample,
+                        ContactBuffers& out) {
   const TriangleMesh &vertices = kSecond ? pair.b : pair.a, &triangles = kSecond ? pair.a : pair.b;
   const bool distinct = pair.settings.contacts == Contacts::Distinct;
   VertexAgainstMesh against(triangles, pair.settings);
-  for (std::uint32_t v = 0; v < vertices.topology.vertexCount; ++v) {
-    if (vertices.topology.vertexTriangles[v].empty()) continue;
+  for (const std::uint32_t v : sample) {
     against.measure(vertices.now[v], pair.self() ? std::optional(v) : std::nullopt, out);
     for (std::uint32_t t = 0; t < against.size(); ++t) {
       const VertexTriangleDistance* answer = against.near(t);
@@ -115,9 +115,10 @@ void findVertexTriangle(const MeshPair& pair, ContactBuffers& out) {
   }
 }
 
-void findEdgeEdge(const MeshPair& pair, ContactBuffers& out) {
+void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
+                  ContactBuffers& out) {
   const std::vector<Segment>&a = pair.a.topology.edges, &b = pair.b.topology.edges;
-  for (std::size_t i = 0; i < a.size(); ++i) {
+  for (const std::uint32_t i : sample) {
     for (std::size_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
       if (pair.self() && shareVertex(a[i], b[j])) continue;
       const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(
@@ -135,10 +136,11 @@ void findEdgeEdge(const MeshPair& pair, ContactBuffers& out) {
 
 }  // namespace
 
-void findProximityByBruteForce(const MeshPair& pair, ContactBuffers& out) {
-  findVertexTriangle<false>(pair, out);
-  if (!pair.self()) findVertexTriangle<true>(pair, out);
-  findEdgeEdge(pair, out);
+void findProximityByBruteForce(const MeshPair& pair, const FeatureLists& features,
+                               ContactBuffers& out) {
+  findVertexTriangle<false>(pair, features.verticesOfA, out);
+  findVertexTriangle<true>(pair, features.verticesOfB, out);
+  findEdgeEdge(pair, features.edgesOfA, out);
 }
 
 }  // namespace palpate

@@ -159,24 +159,23 @@ void findContinuous(const MeshPair& pair, std::span<const TrianglePair> candidat
   forEachLikelyPair(pair, candidates, out, ContactFinder(pair, true, out));
 }
 
-void findContinuousByBruteForce(const MeshPair& pair, ContactBuffers& out) {
+void findContinuousByBruteForce(const MeshPair& pair, const FeatureLists& lists,
+                                ContactBuffers& out) {
   ContactFinder test(pair, false, out);
   for (const bool ofSecond : {false, true}) {
-    if (ofSecond && pair.self()) continue;
     const Features<Kind::VertexTriangle> features{ofSecond ? pair.b : pair.a,
                                                   ofSecond ? pair.a : pair.b};
-    const MeshTopology &vertices = features.first.topology, &triangles = features.second.topology;
-    for (std::uint32_t v = 0; v < vertices.vertexCount; ++v) {
-      if (vertices.vertexTriangles[v].empty()) continue;
-      for (std::uint32_t t = 0; t < triangles.triangles.size(); ++t) {
-        if (pair.self() && holdsVertex(triangles.triangles[t], v)) continue;
+    const std::vector<Triangle>& triangles = features.second.topology.triangles;
+    for (const std::uint32_t v : ofSecond ? lists.verticesOfB : lists.verticesOfA) {
+      for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+        if (pair.self() && holdsVertex(triangles[t], v)) continue;
         ++out.featurePairs;
         test(features, v, t, ofSecond);
       }
     }
   }
   const auto &a = pair.a.topology.edges, &b = pair.b.topology.edges;
-  for (std::uint32_t i = 0; i < a.size(); ++i)
+  for (const std::uint32_t i : lists.edgesOfA)
     for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
       if (pair.self() && shareVertex(a[i], b[j])) continue;
       ++out.featurePairs;

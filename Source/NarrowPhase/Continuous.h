@@ -17,7 +17,7 @@ namespace palpate {
 void findContinuous(const MeshPair&, std::span<const TrianglePair> candidates, ContactBuffers& out);
 
 /// Method::Continuous of findContactsByBruteForce().
-void findContinuousByBruteForce(const MeshPair&, ContactBuffers& out);
+void findContinuousByBruteForce(const MeshPair&, const FeatureLists&, ContactBuffers& out);
 
 /// The earliest timeOfImpact that findContinuous() would report, or upTo if that is earlier;
 /// infinity is a good first upTo. Impacts after it cost little, so passing the smallest time of

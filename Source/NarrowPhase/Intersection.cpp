@@ -130,10 +130,10 @@ void findIntersections(const MeshPair& pair, std::span<const TrianglePair> candi
   out.exactDecisions += counts.undecided;
 }
 
-void findIntersectionsByBruteForce(const MeshPair& pair, ContactBuffers& out) {
-  const auto countA = static_cast<std::uint32_t>(pair.a.topology.triangles.size());
+void findIntersectionsByBruteForce(const MeshPair& pair, const FeatureLists& features,
+                                   ContactBuffers& out) {
   const auto countB = static_cast<std::uint32_t>(pair.b.topology.triangles.size());
-  for (std::uint32_t a = 0; a < countA; ++a) {
+  for (const std::uint32_t a : features.trianglesOfA) {
     for (std::uint32_t b = pair.self() ? a + 1 : 0; b < countB; ++b) {
       const TrianglePair candidate{a, b};
       findIntersections(pair, {&candidate, 1}, out);

@@ -23,7 +23,7 @@ namespace palpate {
 void findIntersections(const MeshPair&, std::span<const TrianglePair> candidates,
                        ContactBuffers& out);
 
-/// Method::Intersection of findContactsByBruteForce(): every pair of triangles.
-void findIntersectionsByBruteForce(const MeshPair&, ContactBuffers& out);
+/// Method::Intersection of findContactsByBruteForce(): pairs of triangles.
+void findIntersectionsByBruteForce(const MeshPair&, const FeatureLists&, ContactBuffers& out);
 
 }  // namespace palpate

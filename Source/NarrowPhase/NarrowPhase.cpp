@@ -6,6 +6,8 @@
 
 #include <palpate/Error.h>
 
+#include <numeric>
+
 namespace palpate {
 
 void ContactBuffers::clear() {
@@ -30,14 +32,35 @@ void findContacts(const MeshPair& pair, std::span<const TrianglePair> candidates
   }
 }
 
-void findContactsByBruteForce(const MeshPair& pair, ContactBuffers& out) {
+FeatureLists everyFeature(const MeshPair& pair) {
+  FeatureLists every;
+  const auto fill = [](std::vector<std::uint32_t>& list, std::size_t size) {
+    list.resize(size);
+    std::iota(list.begin(), list.end(), 0u);
+  };
+  const auto fillTested = [&](std::vector<std::uint32_t>& list, const MeshTopology& topology) {
+    fill(list, topology.vertexCount);
+    std::erase_if(list, [&](std::uint32_t v) { return topology.vertexTriangles[v].empty(); });
+  };
+  if (pair.settings.method == Method::Intersection) {
+    fill(every.trianglesOfA, pair.a.topology.triangles.size());
+    return every;
+  }
+  fillTested(every.verticesOfA, pair.a.topology);
+  if (!pair.self()) fillTested(every.verticesOfB, pair.b.topology);
+  fill(every.edgesOfA, pair.a.topology.edges.size());
+  return every;
+}
+
+void findContactsByBruteForce(const MeshPair& pair, const FeatureLists& features,
+                              ContactBuffers& out) {
   switch (pair.settings.method) {
     case Method::Proximity:
-      return findProximityByBruteForce(pair, out);
+      return findProximityByBruteForce(pair, features, out);
     case Method::Intersection:
-      return findIntersectionsByBruteForce(pair, out);
+      return findIntersectionsByBruteForce(pair, features, out);
     case Method::Continuous:
-      return findContinuousByBruteForce(pair, out);
+      return findContinuousByBruteForce(pair, features, out);
     default:
       throw Error(ErrorCode::UnsupportedMethod, "this method does not exist yet");
   }

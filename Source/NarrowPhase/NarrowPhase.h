@@ -8,7 +8,9 @@
 #include "NarrowPhase/FeaturePairs.h"
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
+#include <vector>
 
 namespace palpate {
 
@@ -41,8 +43,22 @@ struct ContactBuffers {
 /// Threads  safe for different output buffers.
 void findContacts(const MeshPair&, std::span<const TrianglePair> candidates, ContactBuffers& out);
 
-/// The oracle: every vertex against every triangle and every edge against every edge, with no
-/// candidates and no ownership. Same contacts as findContacts over complete candidates.
-void findContactsByBruteForce(const MeshPair&, ContactBuffers& out);
+/// Features for brute force to test against all of the other mesh: for Intersection triangles, else
+/// vertices and edges.
+struct FeatureLists {
+  std::vector<std::uint32_t> verticesOfA, verticesOfB;
+  std::vector<std::uint32_t> edgesOfA,
+      trianglesOfA;  ///< self-collision: against those of higher id
+};
+
+/// All that the pair's method tests; vertices in no triangle are left out.
+FeatureLists everyFeature(const MeshPair&);
+
+/// The oracle: vertices against every triangle and edges against every edge, with no candidates and
+/// no ownership. With every feature the same contacts as findContacts over complete candidates.
+void findContactsByBruteForce(const MeshPair&, const FeatureLists&, ContactBuffers& out);
+inline void findContactsByBruteForce(const MeshPair& pair, ContactBuffers& out) {
+  findContactsByBruteForce(pair, everyFeature(pair), out);
+}
 
 }  // namespace palpate

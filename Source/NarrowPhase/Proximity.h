@@ -17,7 +17,7 @@ namespace palpate {
 void findProximity(const MeshPair&, std::span<const TrianglePair> candidates, ContactBuffers& out);
 
 /// Method::Proximity of findContactsByBruteForce().
-void findProximityByBruteForce(const MeshPair&, ContactBuffers& out);
+void findProximityByBruteForce(const MeshPair&, const FeatureLists&, ContactBuffers& out);
 
 /// A feature of a mesh that holds a closest point, by the mesh's own ids.
 struct MeshFeature {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <palpate/Audit.h>
 #include <palpate/CollisionData.h>
+#include <palpate/CollisionProblem.h>
 #include <palpate/Error.h>
 #include <palpate/Export.h>
 #include <palpate/FrameStatistics.h>
@@ -79,6 +81,11 @@ class PALPATE_EXPORT OctreeBasedCD {
   const LooseOctree& octree() const;          ///< as of the last update()
   const FrameStatistics& statistics() const;  ///< of the last frame
   const Settings& settings() const;
+  /// With Settings::audit, the contacts that the last detectCollision() missed, as far as its
+  /// sample of features shows: empty unless this library is at fault.
+  std::span<const AuditFailure> auditFailures() const;
+  /// What detectCollision() would be given now, copied out; straight after a frame, that frame's.
+  CollisionProblem problem() const;
 
  private:
   using BatchFunction = void (*)(void*, std::span<const TrianglePair>);

@@ -1,6 +1,7 @@
 #pragma once
 
 /// Everything that an ordinary user needs.
+#include <palpate/Capture.h>
 #include <palpate/CollisionData.h>
 #include <palpate/Error.h>
 #include <palpate/OctreeBasedCD.h>

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 namespace palpate {
 
 /// How `update()` brings an octree to the positions now.
@@ -20,12 +22,22 @@ enum class Engine {
   BruteForce  ///< every triangle against every other: the oracle, behind the same calls
 };
 
+/// A check of the library by itself, in any build: after each detectCollision() a sample of
+/// features is tested against all of the other mesh, with no octree.
+struct AuditSettings {
+  /// Features tested per pair and frame: vertices and edges, or triangles for Intersection. At
+  /// least 0; 0: no audit, at no cost. Each costs a test against every triangle or edge.
+  int features = 0;
+  std::uint64_t seed = 0;  ///< same seed, frame number and pair: same sample
+};
+
 struct Settings {
   OctreeSettings octree{};
   Engine engine = Engine::Octree;
   int threads = 0;  ///< threads of a frame. [0, 1024]; 0: all cores. Results do not depend on it.
   /// detectCollision() also fills candidatePairs(); costs their memory and a sort
   bool keepCandidates = false;
+  AuditSettings audit{};
 };
 
 enum class Method { Auto, Proxy, DistanceField, Intersection, Proximity, Continuous };

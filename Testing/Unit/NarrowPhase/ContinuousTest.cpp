@@ -86,7 +86,7 @@ std::vector<FloatPoint> floatsOf(const std::vector<Vector3d>& positions) {
 void expectSameAsBruteForce(MeshPair pair) {
   ContactBuffers found{}, boxed{}, expected{}, counts{};
   const std::vector<TrianglePair> candidates = everyPair(pair.a, pair.b);
-  findContinuousByBruteForce(pair, expected);
+  findContinuousByBruteForce(pair, everyFeature(pair), expected);
   EXPECT_GT(expected.vertexTriangle.size(), 0u);
   EXPECT_GT(expected.edgeEdge.size(), 0u);
   findContinuous(pair, candidates, found);

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <palpate/Settings.h>
+#include <palpate/Types.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace palpate {
+
+/// All that one frame's answers depend on.
+struct CollisionProblem {
+  struct Mesh {
+    GeometryId id;  ///< where it comes from; nothing depends on it
+    std::vector<Eigen::Vector3d> before, now;
+    std::vector<Triangle> triangles;
+  };
+  struct Pair {
+    std::uint32_t a, b;  ///< indices of geometries
+    PairSettings settings;
+    Method method;  ///< that was chosen for it; not Auto
+  };
+  Settings settings;
+  std::vector<Mesh> geometries;
+  std::vector<Pair> pairs;  ///< in the order added
+};
+
+}  // namespace palpate
