@@ -7,6 +7,9 @@
 
 #include <palpate/Platform.h>
 
+#include <Meshes.h>
+
+#include <cmath>
 #include <cstdio>
 
 namespace palpate::benchmark {
@@ -202,6 +205,43 @@ void stillRows(Report& report, const RowOptions& options) {
     report.row("still", name, 1, "Palpate", "moving ms", moving);
     report.row("still", name, 1, "Palpate", "same positions ms", same);
     report.row("still", name, 1, "Palpate", "no positions ms", none);
+  }
+}
+
+void payRows(Report& report, const RowOptions& options) {
+  report.heading("A tool of 1,280 triangles over a still sheet, and far from it; 1 thread, ms");
+  report.line({"", "frame", "pairs", "far: frame"});
+  for (const int cells : {90, 180, 360, 720}) {
+    const scenes::SceneMesh sheet = scenes::sheet(cells), sphere = scenes::sphere(8);
+    const double edge = 2.0 / cells;
+    Task task;
+    task.meshes = {sheet.triangles, sphere.triangles};
+    task.pairs = {{0, 1}};
+    task.thickness = edge / 10;
+    PalpateScene scene(task, {sheet.positions, sphere.positions});
+    // As large as ten of the sheet's cells, so that as many triangles meet for every sheet.
+    std::vector<Eigen::Vector3d> tool(sphere.positions.size());
+    const auto timeAt = [&](double height, double& pairs) {
+      std::vector<double> samples;
+      for (int frame = 0; frame < 10 * (1 + options.measure.repetitions); ++frame) {
+        const Eigen::Vector3d centre(0.5 * edge * std::sin(0.1 * frame), 0, height);
+        for (std::size_t i = 0; i < tool.size(); ++i)
+          tool[i] = 5 * edge * sphere.positions[i] + centre;
+        const double start = now();
+        scene.detection.setPositions(scene.ids[1], tool);
+        scene.detection.collectCandidates();
+        samples.push_back(now() - start);
+        pairs = static_cast<double>(scene.detection.statistics().candidatePairs);
+      }
+      return median(samples);
+    };
+    double pairs = 0, none = 0;
+    const double near = timeAt(0, pairs), far = timeAt(10, none);
+    const std::string name = "sheet of " + std::to_string(sheet.triangles.size());
+    report.line({name, milliseconds(near), whole(pairs), milliseconds(far)});
+    report.row("pay", name, 1, "Palpate", "frame ms", near);
+    report.row("pay", name, 1, "Palpate", "pairs", pairs);
+    report.row("pay", name, 1, "Palpate", "far ms", far);
   }
 }
 

@@ -20,8 +20,10 @@ void stageRows(Report&,
 void wholeFrameRows(Report&, const RowOptions&);  ///< organs, all contacts delivered and sorted
 void farFlungRows(Report&, const RowOptions&);    ///< one triangle a million scene sizes away
 void stillRows(Report&, const RowOptions&);       ///< nothing moved
+void payRows(Report&, const RowOptions&);         ///< a small tool against large still sheets
 void scaleRows(Report&, const RowOptions&);       ///< to four million triangles, bytes a triangle
 void steadyRows(Report&, const RowOptions&);      ///< allocations of a thousand frames, p99
+void featureRows(Report&, const RowOptions&);     ///< vertex-triangle and edge-edge candidates
 void simdRows(Report&, const RowOptions&);        ///< every path that this processor runs
 
 }  // namespace palpate::benchmark

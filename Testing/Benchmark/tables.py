@@ -112,8 +112,10 @@ TABLES = {
     "whole-frame": metrics("whole frame", "1 / 2 threads"),
     "far-flung": metrics("far-flung", "1 thread"),
     "still": metrics("still", "1 thread"),
+    "pay": metrics("pay", "1 thread"),
     "scale": metrics("scale", "1 / 2 threads"),
     "steady": metrics("steady", "1 / 2 threads"),
+    "features": metrics("features", "1 thread"),
     "simd": metrics("simd", "1 thread"),
 }
 
