@@ -11,7 +11,7 @@
 #include <cmath>
 #include <random>
 #include <string>
-#include <tuple>
+#include <utility>
 #include <vector>
 
 namespace palpate {
@@ -295,6 +295,86 @@ TEST(Proximity, TwoUnitCubesFaceToFaceMeetInFourContactsOrFive) {
       EXPECT_EQ(contact.normal, Vector3d(0, 0, -1));
     }
     expectSame(below, above, 0.125);
+  }
+}
+
+// ---- Unit independence ----
+
+/// Touching features have a normal by rule, which winding and mirroring turn.
+Vector3d mappedNormal(const Vector3d& normal, double distance, bool mirrored) {
+  if (distance == 0.0) return Vector3d::Zero();
+  return mirrored ? Vector3d(-normal.x(), normal.y(), normal.z()) : normal;
+}
+
+/// Each corner's vertex with its weight, so that the order of corners does not matter.
+Row unorderedRowOf(const VertexTriangleContact& c, bool mirrored, double scale) {
+  Row row{c.vertex, c.triangle};
+  std::array<std::pair<std::uint32_t, double>, 3> corners;
+  for (int i = 0; i < 3; ++i) corners[i] = {c.corners[i], c.barycentric[i]};
+  std::sort(corners.begin(), corners.end());
+  for (const auto& [corner, weight] : corners) {
+    row.push_back(corner);
+    append(row, weight);
+  }
+  append(row, mappedNormal(c.normal, c.distance, mirrored));
+  append(row, c.distance / scale);
+  return row;
+}
+
+std::vector<Row> unorderedRows(const ContactBuffers& found, bool mirrored, double scale) {
+  std::vector<Row> rows;
+  for (const auto* list : {&found.vertexTriangle, &found.triangleVertex})
+    for (const VertexTriangleContact& contact : *list)
+      rows.push_back(unorderedRowOf(contact, mirrored, scale));
+  for (EdgeEdgeContact contact : found.edgeEdge) {
+    contact.normal = mappedNormal(contact.normal, contact.distance, mirrored);
+    contact.distance /= scale;
+    rows.push_back(rowOf(contact));
+  }
+  std::sort(rows.begin(), rows.end());
+  return rows;
+}
+
+/// On a grid, so that moving it is exact.
+SceneMesh gridSheet(int cells, double phase) {
+  SceneMesh mesh = wavySheet(cells, phase);
+  for (Vector3d& p : mesh.positions)
+    for (double& x : p) x = std::round(x * 0x1p20) * 0x1p-20;
+  return mesh;
+}
+
+TEST(Proximity, ExactTransformationsGiveTheSameContacts) {
+  const double thickness = 0x1p-5;
+  const std::array<SceneMesh, 2> meshes{gridSheet(10, 0.0), gridSheet(9, 1.0)};
+  for (const Contacts contacts : {Contacts::Distinct, Contacts::All}) {
+    const auto contactsOf = [&](auto&& transform, bool mirrored, double scale) {
+      std::array<SceneMesh, 2> changed = meshes;
+      for (SceneMesh& mesh : changed) transform(mesh);
+      const Found found = find(meshOf(changed[0]), meshOf(changed[1]), thickness * scale, contacts);
+      return unorderedRows(found.fast, mirrored, scale);
+    };
+    const std::vector<Row> rows = contactsOf([](SceneMesh&) {}, false, 1.0);
+    EXPECT_GT(rows.size(), 50u);
+    const auto scaled = [](SceneMesh& mesh) {
+      for (Vector3d& p : mesh.positions) p *= 0x1p-10;
+    };
+    const auto far = [](SceneMesh& mesh) {
+      for (Vector3d& p : mesh.positions) p += Vector3d(1e6, -1e4, 3e6);
+    };
+    const auto mirrored = [](SceneMesh& mesh) {
+      for (Vector3d& p : mesh.positions) p.x() = -p.x();
+    };
+    const auto turned = [](SceneMesh& mesh) {
+      for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        auto& corners = mesh.triangles[t];
+        std::rotate(corners.begin(), corners.begin() + t % 3, corners.end());
+        if (t % 2) std::swap(corners[0], corners[1]);
+      }
+    };
+    EXPECT_TRUE(contactsOf(scaled, false, 0x1p-10) == rows);
+    EXPECT_TRUE(contactsOf(far, false, 1.0) == rows);
+    EXPECT_TRUE(contactsOf(mirrored, true, 1.0) == rows);
+    EXPECT_TRUE(contactsOf(turned, false, 1.0) == rows);
   }
 }
 
