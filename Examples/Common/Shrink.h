@@ -1,0 +1,21 @@
+#pragma once
+
+#include <palpate/CollisionProblem.h>
+
+#include <functional>
+
+namespace palpate::scenes {
+
+/// A smaller problem that still fails: triangles are dropped by halves, then by smaller parts down
+/// to single ones, then pairs, then what no triangle or pair uses, each time only if what is left
+/// fails.
+///
+/// Needs    fails(problem) to hold, and to answer the same each time.
+/// Returns  a problem that fails; without any one of its triangles or pairs it does not.
+/// Cost     about as many calls of `fails` as (triangles left) · log2(triangles) where few are left.
+/// Source   Zeller and Hildebrandt, Simplifying and Isolating Failure-Inducing Input (IEEE TSE 2002).
+///          Difference: parts are dropped only, never kept alone.
+CollisionProblem shrink(CollisionProblem problem,
+                        const std::function<bool(const CollisionProblem&)>& fails);
+
+}  // namespace palpate::scenes
