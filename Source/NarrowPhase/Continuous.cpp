@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <utility>
 
 namespace palpate {
@@ -188,16 +189,30 @@ double findEarliestImpact(const MeshPair& pair, std::span<const TrianglePair> ca
   TimeOfImpactSettings settings;
   settings.minimumDistance = pair.settings.thickness;
   double earliest = upTo;
-  forEachLikelyPair(pair, candidates, counts,
-                    [&](const auto& features, std::uint32_t inFirst, std::uint32_t inSecond, bool) {
-                      // A reported time may be a tolerance early, so a pair that is left out for an
-                      // impact after this could not have reported one before `earliest`.
-                      const ImpactAnswer answer =
-                          findImpact(features.query(inFirst, inSecond), settings,
-                                     std::min(earliest + settings.tolerance, 1.0));
-                      counts.exactDecisions += answer.exact;
-                      if (answer.impact) earliest = std::min(earliest, answer.time);
-                    });
+  // A reported time may be a tolerance early, so a pair that is left out for an impact after this
+  // could not have reported one before `earliest`.
+  const auto end = [&] { return std::min(earliest + settings.tolerance, 1.0); };
+  const auto test = [&](const auto& features, std::uint32_t inFirst, std::uint32_t inSecond, bool) {
+    const ImpactAnswer answer = findImpact(features.query(inFirst, inSecond), settings, end());
+    counts.exactDecisions += answer.exact;
+    if (answer.impact) earliest = std::min(earliest, answer.time);
+  };
+  // In parts, so that the boxes of later ones need not reach further than is known by then.
+  constexpr std::size_t kPart = 512;
+  // Boxes over part of the step cost more; a part that is not short throws out too little for that.
+  constexpr double kShortPart = 1.0 / 32;
+  while (!candidates.empty()) {
+    const auto part = candidates.first(std::min(kPart, candidates.size()));
+    candidates = candidates.subspan(part.size());
+    MeshPair boxed = pair;
+    FloatPair floats;
+    if (pair.floats) {
+      floats = *pair.floats;
+      if (end() < kShortPart) floats.upTo = std::nextafter(static_cast<float>(end()), 1.0f);
+      boxed.floats = &floats;
+    }
+    forEachLikelyPair(boxed, part, counts, test);
+  }
   return earliest;
 }
 

@@ -98,17 +98,33 @@ HWY_ATTR HWY_INLINE WideBounds joined(const WideBounds& s, const WideBounds& t) 
   return bounds;
 }
 
-template <bool kSwept>
-HWY_ATTR HWY_INLINE WideBounds cornerBounds(const Batch& batch, int corner, std::size_t lane) {
+enum class Sweep { None, Step, PartOfStep };
+
+/// A vertex, or its way through the step or the first part of it. The float nearest to where it is
+/// at upTo is within the margin: the ends and that float are off by 2^-24 of themselves each, the
+/// three operations by as much again. (Clamped ends say nothing of what is between.)
+template <Sweep sweep>
+HWY_ATTR HWY_INLINE WideBounds cornerBounds(const Batch& batch, int corner, std::size_t lane,
+                                            float upTo) {
   const WideTag d;
   Wide p[3], q[3], unused;
   hn::LoadInterleaved4(d, &batch.now[corner][lane].x, p[0], p[1], p[2], unused);
-  if constexpr (kSwept)
-    hn::LoadInterleaved4(d, &batch.before[corner][lane].x, q[0], q[1], q[2], unused);
   WideBounds bounds;
+  for (int k = 0; k < 3; ++k) bounds.lower[k] = bounds.upper[k] = p[k];
+  if constexpr (sweep == Sweep::None) return bounds;
+  hn::LoadInterleaved4(d, &batch.before[corner][lane].x, q[0], q[1], q[2], unused);
   for (int k = 0; k < 3; ++k) {
-    bounds.lower[k] = kSwept ? hn::Min(p[k], q[k]) : p[k];
-    bounds.upper[k] = kSwept ? hn::Max(p[k], q[k]) : p[k];
+    if constexpr (sweep == Sweep::PartOfStep) {
+      const Wide reach = hn::Add(hn::Abs(p[k]), hn::Abs(q[k]));
+      const Wide margin =
+          hn::Add(hn::Mul(reach, hn::Set(d, 0x1p-21f)), hn::Set(d, OutwardRounding::kAbsolute));
+      const Wide moved = hn::Add(q[k], hn::Mul(hn::Set(d, upTo), hn::Sub(p[k], q[k])));
+      const auto inRange = hn::Lt(reach, hn::Set(d, kLargestFloat));
+      bounds.lower[k] = hn::IfThenElse(inRange, hn::Sub(moved, margin), p[k]);
+      bounds.upper[k] = hn::IfThenElse(inRange, hn::Add(moved, margin), p[k]);
+    }
+    bounds.lower[k] = hn::Min(bounds.lower[k], q[k]);
+    bounds.upper[k] = hn::Max(bounds.upper[k], q[k]);
   }
   return bounds;
 }
@@ -143,12 +159,13 @@ HWY_ATTR HWY_INLINE void compare(const WideBounds& s, const WideBounds& t,
 }
 
 /// bits[test]: the pairs of the batch that chose the test and whose boxes overlap.
-template <bool kSwept>
+template <Sweep sweep>
 HWY_ATTR void compareBatch(const Batch& batch, const FloatPair& floats, std::uint32_t* bits) {
   for (std::size_t lane = 0; lane < Batch::kSize; lane += hn::Lanes(WideTag())) {
     WideBounds cornersA[3], cornersB[3];
-    for (int i = 0; i < 3; ++i) cornersA[i] = shifted(cornerBounds<kSwept>(batch, i, lane), floats);
-    for (int j = 0; j < 3; ++j) cornersB[j] = cornerBounds<kSwept>(batch, 3 + j, lane);
+    for (int i = 0; i < 3; ++i)
+      cornersA[i] = shifted(cornerBounds<sweep>(batch, i, lane, floats.upTo), floats);
+    for (int j = 0; j < 3; ++j) cornersB[j] = cornerBounds<sweep>(batch, 3 + j, lane, floats.upTo);
     const WideBounds edgesA[3] = {joined(cornersA[0], cornersA[1]),
                                   joined(cornersA[1], cornersA[2]),
                                   joined(cornersA[2], cornersA[0])};
@@ -202,7 +219,7 @@ inline Choice sharing(const Triangle& a, const Triangle& b) {
   return choice;
 }
 
-template <bool kFloats, bool kSwept>
+template <bool kFloats, Sweep sweep>
 HWY_ATTR void findFeaturePairsOf(const MeshTopology& a, const MeshTopology& b,
                                  const FloatPair* floats, std::span<const TrianglePair> pairs,
                                  FeaturePairs& out) {
@@ -224,7 +241,7 @@ HWY_ATTR void findFeaturePairsOf(const MeshTopology& a, const MeshTopology& b,
   Batch batch;
   const auto flush = [&]() HWY_ATTR {
     std::uint32_t bits[kTests] = {};
-    compareBatch<kSwept>(batch, *floats, bits);
+    compareBatch<sweep>(batch, *floats, bits);
     for (int test = 0; test < kTests; ++test)
       for (; bits[test]; bits[test] &= bits[test] - 1)
         append(batch.pairs[std::countr_zero(bits[test])], test);
@@ -255,7 +272,7 @@ HWY_ATTR void findFeaturePairsOf(const MeshTopology& a, const MeshTopology& b,
     for (int i = 0; i < 3; ++i) {
       batch.now[i][lane] = floats->a[cornersA[i]];
       batch.now[3 + i][lane] = floats->b[cornersB[i]];
-      if constexpr (kSwept) {
+      if constexpr (sweep != Sweep::None) {
         batch.before[i][lane] = floats->beforeA[cornersA[i]];
         batch.before[3 + i][lane] = floats->beforeB[cornersB[i]];
       }
@@ -271,11 +288,13 @@ HWY_ATTR void findFeaturePairsKernel(const MeshTopology& a, const MeshTopology& 
                                      const FloatPair* floats, std::span<const TrianglePair> pairs,
                                      FeaturePairs& out) {
   if (!floats)
-    findFeaturePairsOf<false, false>(a, b, floats, pairs, out);
+    findFeaturePairsOf<false, Sweep::None>(a, b, floats, pairs, out);
   else if (!floats->beforeA && !floats->beforeB)
-    findFeaturePairsOf<true, false>(a, b, floats, pairs, out);
+    findFeaturePairsOf<true, Sweep::None>(a, b, floats, pairs, out);
+  else if (floats->upTo >= 1.0f)
+    findFeaturePairsOf<true, Sweep::Step>(a, b, floats, pairs, out);
   else
-    findFeaturePairsOf<true, true>(a, b, floats, pairs, out);
+    findFeaturePairsOf<true, Sweep::PartOfStep>(a, b, floats, pairs, out);
 }
 
 HWY_ATTR void keepOverlappingKernel(const MeshTopology& a, const MeshTopology& b,

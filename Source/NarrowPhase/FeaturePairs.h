@@ -21,6 +21,7 @@ struct FloatPair {
   const FloatPoint* beforeA = nullptr;  ///< the step's start, where boxes are to sweep the step
   const FloatPoint* beforeB = nullptr;
   std::array<float, 4> shiftLower{}, shiftUpper{};
+  float upTo = 1.0f;  ///< of the step: boxes sweep [0, upTo]
 };
 
 /// Two features by their indices: a vertex and a triangle, or two edges of MeshTopology::edges.
