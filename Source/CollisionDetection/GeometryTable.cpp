@@ -194,9 +194,14 @@ void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d>
   checkPositionCount(geometry, now.size());
   geometry.staging.resize(now.size());
   checkPositions(id, now, geometry.staging.data(), "");
-  if (!geometry.setThisFrame) geometry.mesh.before.swap(geometry.mesh.now);
+  if (!geometry.setThisFrame)
+    geometry.mesh.before.swap(geometry.mesh.now);
+  else if (geometry.beforeGiven)
+    geometry.mesh.before.swap(geometry.lastFrame);
   geometry.mesh.now.swap(geometry.staging);
+  if (!geometry.hasLastFrame) geometry.mesh.before = geometry.mesh.now;
   geometry.setThisFrame = true;
+  geometry.beforeGiven = false;
   ++geometry.revision;
 }
 
@@ -209,9 +214,13 @@ void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d>
   geometry.staging2.resize(before.size());
   checkPositions(id, before, geometry.staging2.data(), " before");
   checkPositions(id, now, geometry.staging.data(), " now");
+  if (!geometry.setThisFrame)
+    geometry.lastFrame.swap(geometry.mesh.now);
+  else if (!geometry.beforeGiven)
+    geometry.lastFrame.swap(geometry.mesh.before);
   geometry.mesh.before.swap(geometry.staging2);
   geometry.mesh.now.swap(geometry.staging);
-  geometry.setThisFrame = true;
+  geometry.setThisFrame = geometry.beforeGiven = true;
   ++geometry.revision;
 }
 
@@ -226,6 +235,7 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
   geometry.mesh.now = std::move(now);
   geometry.mesh.topology = std::move(topology);
   geometry.setThisFrame = true;
+  geometry.hasLastFrame = geometry.beforeGiven = false;
   geometry.treeKnown = false;
   ++geometry.revision;
 }
@@ -257,7 +267,10 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
 }
 
 void GeometryTable::endFrame() {
-  for (const auto& geometry : m_geometries) geometry->setThisFrame = false;
+  for (const auto& geometry : m_geometries) {
+    geometry->setThisFrame = false;
+    geometry->hasLastFrame = true;
+  }
 }
 
 }  // namespace palpate

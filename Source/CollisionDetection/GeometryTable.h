@@ -25,7 +25,11 @@ struct Geometry {
       staging;  ///< positions are checked while copied in here, then swapped
   std::vector<Eigen::Vector3d> staging2;  ///< "before", where both are given
   std::uint64_t revision = 1;             ///< counts changes of positions and topology
-  bool setThisFrame = true;               ///< "before" is already that of the coming frame
+  bool setThisFrame = true;               ///< positions or topology, since the last frame ended
+  bool hasLastFrame = false;              ///< one ended with this topology
+  bool beforeGiven =
+      false;  ///< by the last call, in this frame; then `lastFrame` holds what it would else be
+  std::vector<Eigen::Vector3d> lastFrame;
 
   FloatFrame frame;
   double spread = 0;  ///< of a sample of the positions
