@@ -37,27 +37,30 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
       static_cast<std::int32_t>(std::bit_cast<std::uint32_t>(static_cast<float>(cube.edge)) >> 23));
   const auto deepest = hn::Set(di, layout.levels);
   const auto zero = hn::Zero(di), lastCell = hn::Set(di, (1 << layout.levels) - 1);
-  alignas(64) float gathered[6][8];
+  // Gathered well before it is read as vectors: a load that spans fresh narrower stores waits for
+  // them.
+  constexpr std::size_t kGathered = 64;
+  alignas(64) float gathered[6][kGathered];
   alignas(64) std::int32_t made[8];
 
   for (std::size_t i = 0; i < size; i += lanes) {
-    const std::size_t count = size - i < lanes ? size - i : lanes;
-    if (slots) {
-      for (std::size_t lane = 0; lane < count; ++lane) {
-        const auto slot = static_cast<std::uint32_t>(slots[i + lane]);
+    const std::size_t count = size - i < lanes ? size - i : lanes, place = i % kGathered;
+    if (slots && place == 0) {
+      for (std::size_t next = 0; next < kGathered && i + next < size; ++next) {
+        const auto slot = static_cast<std::uint32_t>(slots[i + next]);
         for (int k = 0; k < 3; ++k) {
-          gathered[k][lane] = boxes.lower[k][slot];
-          gathered[3 + k][lane] = boxes.upper[k][slot];
+          gathered[k][next] = boxes.lower[k][slot];
+          gathered[3 + k][next] = boxes.upper[k][slot];
         }
       }
     }
     hn::Vec<decltype(di)> cell[3];
     auto longest = hn::Zero(d);
     for (int k = 0; k < 3; ++k) {
-      const auto lower =
-          slots ? hn::LoadU(d, gathered[k]) : hn::LoadU(d, boxes.lower[k].data() + first + i);
-      const auto upper =
-          slots ? hn::LoadU(d, gathered[3 + k]) : hn::LoadU(d, boxes.upper[k].data() + first + i);
+      const auto lower = slots ? hn::LoadU(d, gathered[k] + place)
+                               : hn::LoadU(d, boxes.lower[k].data() + first + i);
+      const auto upper = slots ? hn::LoadU(d, gathered[3 + k] + place)
+                               : hn::LoadU(d, boxes.upper[k].data() + first + i);
       longest = hn::Max(longest, hn::Sub(upper, lower));
       // The cube's corner in two floats: the differences are as good as exact near it.
       const float corner = static_cast<float>(cube.lower[k]);
