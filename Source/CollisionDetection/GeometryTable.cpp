@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstring>
 
 namespace palpate {
 
@@ -127,14 +128,14 @@ void fitBoxes(Geometry& geometry, const Threads& threads) {
 
 void updateOctree(Geometry& geometry, const OctreeSettings& settings, const Threads& threads) {
   using Update = LooseOctree::Update;
-  geometry.treeRevision = geometry.revision;
+  geometry.treeRevision = geometry.revisionFor(geometry.swept);
+  geometry.treeSwept = geometry.swept;
   if (geometry.mesh.topology.triangles.empty()) {
     geometry.octree.reset(0);
     geometry.treeKnown = false;
     return;
   }
   Stopwatch watch;
-  geometry.treeSwept = geometry.swept;
   computeFloats(geometry.mesh.now, geometry.frame, geometry.floats, threads);
   if (geometry.swept)
     computeFloats(geometry.mesh.before, geometry.frame, geometry.floatsBefore, threads);
@@ -194,6 +195,8 @@ void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d>
   checkPositionCount(geometry, now.size());
   geometry.staging.resize(now.size());
   checkPositions(id, now, geometry.staging.data(), "");
+  const bool moved =
+      !now.empty() && std::memcmp(now.data(), geometry.mesh.now.data(), now.size_bytes()) != 0;
   if (!geometry.setThisFrame)
     geometry.mesh.before.swap(geometry.mesh.now);
   else if (geometry.beforeGiven)
@@ -202,7 +205,8 @@ void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d>
   if (!geometry.hasLastFrame) geometry.mesh.before = geometry.mesh.now;
   geometry.setThisFrame = true;
   geometry.beforeGiven = false;
-  ++geometry.revision;
+  geometry.revision += moved;
+  ++geometry.stepRevision;
 }
 
 void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d> before,
@@ -222,6 +226,7 @@ void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d>
   geometry.mesh.now.swap(geometry.staging);
   geometry.setThisFrame = geometry.beforeGiven = true;
   ++geometry.revision;
+  ++geometry.stepRevision;
 }
 
 void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions,
@@ -238,12 +243,13 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
   geometry.hasLastFrame = geometry.beforeGiven = false;
   geometry.treeKnown = false;
   ++geometry.revision;
+  ++geometry.stepRevision;
 }
 
 void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads& threads) {
   double spread = 0;
   for (const auto& geometry : m_geometries) {
-    if (geometry->treeRevision != geometry->revision) {
+    if (!geometry->treeIsNow()) {
       const SampledExtent extent = sampleExtent(geometry->mesh.now);
       geometry->frame.origin = extent.median;
       geometry->spread = extent.spread;
@@ -254,9 +260,7 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   m_small.clear();
   m_large.clear();
   for (const auto& geometry : m_geometries) {
-    const bool known =
-        geometry->treeRevision == geometry->revision && geometry->treeSwept == geometry->swept;
-    if (known && geometry->frame.scale == scale) continue;
+    if (geometry->treeIsNow() && geometry->frame.scale == scale) continue;
     geometry->frame.scale = scale;
     (geometry->mesh.topology.triangles.size() < kSmall ? m_small : m_large)
         .push_back(geometry.get());

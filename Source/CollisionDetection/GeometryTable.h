@@ -24,9 +24,11 @@ struct Geometry {
   std::vector<Eigen::Vector3d>
       staging;  ///< positions are checked while copied in here, then swapped
   std::vector<Eigen::Vector3d> staging2;  ///< "before", where both are given
-  std::uint64_t revision = 1;             ///< counts changes of positions and topology
-  bool setThisFrame = true;               ///< positions or topology, since the last frame ended
-  bool hasLastFrame = false;              ///< one ended with this topology
+  std::uint64_t revision = 1;             ///< counts changes of positions now and of topology
+  std::uint64_t stepRevision = 1;         ///< and of the positions before
+  std::uint64_t revisionFor(bool wholeStep) const { return wholeStep ? stepRevision : revision; }
+  bool setThisFrame = true;   ///< positions or topology, since the last frame ended
+  bool hasLastFrame = false;  ///< one ended with this topology
   bool beforeGiven =
       false;  ///< by the last call, in this frame; then `lastFrame` holds what it would else be
   std::vector<Eigen::Vector3d> lastFrame;
@@ -37,6 +39,7 @@ struct Geometry {
   Buffer<FloatPoint> floatsBefore;  ///< of a swept geometry
   bool swept = false;               ///< boxes hold the whole step, because a pair's method needs it
   bool treeSwept = false;
+  bool treeIsNow() const { return treeSwept == swept && treeRevision == revisionFor(swept); }
   std::vector<Triangle> orderedTriangles;  ///< in the octree's order
   Octree octree;
   Buffer<std::uint32_t> boundsGroups;  ///< scratch of a rebuild

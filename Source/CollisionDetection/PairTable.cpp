@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace palpate {
 
@@ -17,12 +18,18 @@ std::string nameOf(GeometryId a, GeometryId b) {
          std::to_string(static_cast<std::uint32_t>(b)) + ")";
 }
 
+std::string shortest(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
+
 /// The method that Auto stands for; throws what is wrong with the settings.
 Method checked(GeometryId a, GeometryId b, const PairSettings& settings) {
   const std::string name = nameOf(a, b);
   if (!(settings.thickness >= 0.0) || std::isinf(settings.thickness))
     throw Error(ErrorCode::InvalidSettings,
-                name + ": thickness is " + std::to_string(settings.thickness) +
+                name + ": thickness is " + shortest(settings.thickness) +
                     "; it must be finite and not negative",
                 a);
   if (settings.contacts != Contacts::Distinct && settings.contacts != Contacts::All &&

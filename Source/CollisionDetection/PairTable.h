@@ -28,7 +28,10 @@ struct PairRecord {
     std::uint64_t a = 0, b = 0;
     friend bool operator==(const AnsweredFor&, const AnsweredFor&) = default;
   };
-  AnsweredFor revisions() const { return {a->revision, b->revision}; }
+  AnsweredFor revisions() const {
+    const bool wholeStep = method == Method::Continuous;
+    return {a->revisionFor(wholeStep), b->revisionFor(wholeStep)};
+  }
   MeshPair meshes(const FloatPair* floats = nullptr) const {
     return {a->mesh, b->mesh, {method, pair.settings.thickness, pair.settings.contacts}, floats};
   }

@@ -65,5 +65,37 @@ TEST_F(Step, AfterNewTopologyBeforeIsNow) {
   expect(4, 4);
 }
 
+TEST_F(Step, WithTheSamePositionsLeavesOctreeAndStaticAnswersAlone) {
+  const GeometryId other = m_detection.addTriangleMesh(at(0.1), triangle());
+  PairSettings settings;
+  settings.thickness = 0.5;
+  m_detection.addCollisionPair(m_id, other, settings);
+  expect(0, 0);
+  const std::uint64_t hash = m_detection.collisionData(m_id, other).hash();
+  m_detection.setPositions(m_id, at(1));
+  expect(0, 1);
+  EXPECT_NE(m_detection.collisionData(m_id, other).hash(), hash);
+  m_detection.setPositions(m_id, at(1));
+  expect(1, 1);
+  EXPECT_EQ(m_detection.statistics().unchangedOctrees, 2u);
+  m_detection.setPositions(m_id, at(0));
+  expect(1, 0);
+  EXPECT_EQ(m_detection.collisionData(m_id, other).hash(), hash);
+}
+
+TEST_F(Step, WithTheSamePositionsIsANewOneForContinuous) {
+  const GeometryId other = m_detection.addTriangleMesh(at(0.5), triangle());
+  PairSettings settings;
+  settings.method = Method::Continuous;
+  m_detection.addCollisionPair(m_id, other, settings);
+  expect(0, 0);
+  m_detection.setPositions(m_id, at(1));
+  expect(0, 1);
+  EXPECT_FALSE(m_detection.collisionData(m_id, other).vertexTriangle().empty());
+  m_detection.setPositions(m_id, at(1));
+  expect(1, 1);
+  EXPECT_TRUE(m_detection.collisionData(m_id, other).vertexTriangle().empty());
+}
+
 }  // namespace
 }  // namespace palpate
