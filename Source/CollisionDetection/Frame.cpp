@@ -24,6 +24,8 @@ namespace {
 /// Node pairs and jobs for each collision pair, where there is more than one thread.
 constexpr std::size_t kNodePairsWanted = 256;
 constexpr std::size_t kJobsPerPair = 16;
+/// Below this many triangles handing out parts of a pair costs more than it saves.
+constexpr std::size_t kSharedSize = 8192;
 
 TreePair treesOf(const PairRecord& record, bool adjacentPairs) {
   TreePair trees{&record.a->octree, &record.b->octree};
@@ -139,7 +141,9 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
     record->earliest = std::numeric_limits<double>::infinity();
     if (record->a->octree.size() == 0 || record->b->octree.size() == 0) continue;
     const TreePair trees = treesOf(*record, adjacentPairs);
-    startPairs(trees, threads.count() == 1 ? 1 : kNodePairsWanted, m_stack);
+    const bool shared =
+        threads.count() > 1 && record->a->octree.size() + record->b->octree.size() >= kSharedSize;
+    startPairs(trees, shared ? kNodePairsWanted : 1, m_stack);
     const std::size_t first = m_nodePairs.size(), count = m_stack.pairs.size();
     m_nodePairs.insert(m_nodePairs.end(), m_stack.pairs.begin(), m_stack.pairs.end());
     const std::size_t grain = std::max<std::size_t>(1, (count + kJobsPerPair - 1) / kJobsPerPair);
