@@ -92,7 +92,7 @@ checkPublicHeaders() {
 checkSymbols() {
   local library symbol
   for library in "$@"; do
-    nm -D --defined-only "$library" | grep -q 7palpate || fault "$library exports nothing of palpate"
+    nm -D --defined-only "$library" | grep 7palpate >/dev/null || fault "$library exports nothing of palpate"
     while read -r symbol; do fault "$library exports $symbol"; done < <(
       nm -D --defined-only "$library" | awk '{print $3}' |
         grep -vE '^_Z(T[ISVT]|G[VR]|Z)?N?[VKRO]*7palpate' | c++filt)
