@@ -215,7 +215,8 @@ ImpactAnswer find(const ImpactQuery& query, double tolerance, double upTo) {
   if (motion.boxesSeparate()) return {};
   ImpactSearch<kind> search(motion, tolerance);
   std::optional<ImpactAnswer> answer = search.run(upTo);
-  if (answer && answer->impact && upTo < 1.0) answer = search.run(1.0);
+  // What part of the step cannot decide the whole may: the time must not depend on upTo.
+  if (upTo < 1.0 && (!answer || answer->impact)) answer = search.run(1.0);
   return answer ? *answer : findTouchExactly(query, tolerance);
 }
 

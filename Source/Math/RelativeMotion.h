@@ -12,6 +12,7 @@ namespace palpate {
 struct Interval {
   double low, high;
   bool empty() const { return !(low <= high); }
+  bool holds(const Interval& other) const { return low <= other.low && other.high <= high; }
 };
 
 /// An ImpactQuery's A, B, C, and the corners of C - x A - y B, at both ends of the step, in

@@ -77,6 +77,9 @@ constexpr double kSmallestTimeTolerance = 0x1p-50;
 /// Relative to the largest coordinate difference and the minimum distance, in findApproach(): well
 /// above what rounding does to the distance it computes.
 constexpr double kApproachSlack = 0x1p-41;
+/// Of a coordinate of a moving corner less the distance, relative to both: the difference of two
+/// positions, that less the distance, and this bound's own rounding.
+constexpr double kApproachBoxError = 0x1p-51;
 /// Of a form's Bernstein coefficient converted to double and restricted, relative to the largest
 /// coefficient (CubicTime::sign()): 2^-51 and kBlossomError.
 constexpr double kFormError = 0x1p-46;
