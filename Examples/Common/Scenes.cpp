@@ -60,8 +60,8 @@ Scene clothOnBall() {
   return withThickness({"cloth", {sheet(237), std::move(ball)}, {drape, still}, {{0, 1}}}, 0);
 }
 
-Scene unevenBodies() {
-  const SceneMesh body = gradedSphere(119, 1e-4);
+Scene gradedBodies(int around) {
+  const SceneMesh body = gradedSphere(around, 1e-4);
   const auto bumpy = [](const Vector3d& rest, double phase) -> Vector3d {
     return rest * (1 + 0.05 * std::sin(5 * rest.x()) * std::sin(4 * rest.y()) * std::cos(phase));
   };
@@ -75,6 +75,8 @@ Scene unevenBodies() {
   };
   return withThickness({"uneven", {body, body}, {below, above}, {{0, 1}}}, 0);
 }
+
+Scene unevenBodies() { return gradedBodies(119); }
 
 Scene interleavedSheets(std::size_t triangles) {
   const int cells =

@@ -44,8 +44,9 @@ Scene glidingMeshes(std::vector<SceneMesh> meshes);
 /// A sheet of 112,338 triangles that settles on a ball and hangs down around it in folds.
 Scene clothOnBall();
 
-/// Two bodies of 103,292 triangles in all, whose sizes span four orders of magnitude.
-Scene unevenBodies();
+/// Two bodies of `around` triangles around, whose sizes span four orders of magnitude.
+Scene gradedBodies(int around);
+Scene unevenBodies();  ///< with 119 around: 103,292 triangles in all
 
 /// Two wavy sheets that cross each other everywhere, of about `triangles` triangles in all.
 Scene interleavedSheets(std::size_t triangles);
@@ -55,5 +56,11 @@ Scene foldedCloth();
 
 /// Self-collision: one mesh of seven rods, 80,640 triangles, twisted about their common axis.
 Scene twistedRods();
+
+/// Eight small scenes, each of which some method gets wrong: soft bodies pressed slowly; a needle
+/// through a membrane; a suture that slides while its end whips; bodies deep in each other; stacked
+/// sheets; ridges across ridges; triangles over four orders of size; the first of them a million
+/// times its size from the origin.
+std::vector<Scene> hardScenes();
 
 }  // namespace palpate::scenes

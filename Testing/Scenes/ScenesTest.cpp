@@ -145,6 +145,24 @@ TEST(Scenes, HaveTheirTriangles) {
   }
 }
 
+TEST(Scenes, HardOnesAreSmallRepeatAndTouch) {
+  const std::vector<Scene> scenes = hardScenes();
+  ASSERT_EQ(scenes.size(), 8u);
+  for (const Scene& scene : scenes) {
+    EXPECT_LT(scene.triangleCount(), 3'000u) << scene.name;
+    std::size_t most = 0;
+    std::vector<Vector3d> one, later;
+    for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+      scene.positions(5, m, one);
+      scene.positions(5 + scene.frames, m, later);
+      EXPECT_EQ(one, later) << scene.name;
+    }
+    for (int frame = 0; frame < scene.frames; ++frame)
+      for (const auto& [a, b] : scene.pairs) most = std::max(most, candidates(scene, frame, a, b));
+    EXPECT_GT(most, 20u) << scene.name;
+  }
+}
+
 TEST(Scenes, OneMeshGlidesThroughItsCopy) {
   const Scene scene = glidingMeshes({sphere(6)});
   ASSERT_EQ(scene.meshes.size(), 2u);

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace palpate::report {
+
+/// A column of numbers.
+struct Quantity {
+  std::string key;    ///< in CSV
+  std::string label;  ///< with its unit, at an axis
+};
+
+/// What a program measured: each row some texts that name it, then its numbers, NaN where there is
+/// none.
+class Figures {
+ public:
+  struct Row {
+    std::vector<std::string> texts;
+    std::vector<double> values;
+  };
+
+  Figures(std::vector<std::string> textKeys, std::vector<Quantity> quantities)
+      : m_textKeys(std::move(textKeys)), m_quantities(std::move(quantities)) {}
+
+  void add(Row);
+  const std::vector<std::string>& textKeys() const { return m_textKeys; }
+  const std::vector<Quantity>& quantities() const { return m_quantities; }
+  const std::vector<Row>& rows() const { return m_rows; }
+  std::size_t indexOf(const std::string& quantity) const;  ///< throws std::out_of_range
+  /// The row of these first texts, or none.
+  const Row* find(std::span<const std::string> texts) const;
+
+  std::string csv() const;
+  /// Adds the rows of a file that csv() wrote; none if there is no such file or its columns are
+  /// others.
+  void addFrom(const std::filesystem::path& csv);
+
+ private:
+  std::string header() const;
+
+  std::vector<std::string> m_textKeys;
+  std::vector<Quantity> m_quantities;
+  std::vector<Row> m_rows;
+};
+
+/// Three significant digits.
+std::string shortNumber(double);
+
+}  // namespace palpate::report

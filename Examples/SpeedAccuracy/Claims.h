@@ -1,0 +1,56 @@
+#pragma once
+
+#include <palpate/CollisionData.h>
+
+#include <Eigen/Core>
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace palpate::accuracy {
+
+/// Two features: a vertex of the first mesh and a triangle of the second, a triangle and a vertex,
+/// two edges by their ends (lower first), or two triangles.
+struct FeaturePair {
+  enum class Kind : std::uint8_t { VertexTriangle, TriangleVertex, EdgeEdge, Triangles } kind;
+  std::array<std::uint32_t, 4> ids{};
+  friend auto operator<=>(const FeaturePair&, const FeaturePair&) = default;
+};
+
+/// What a method says of two features.
+struct Claim {
+  FeaturePair features;
+  Eigen::Vector3d normal;  ///< unit, from the second mesh towards the first
+  double distance;         ///< L; negative: depth
+  double time;             ///< of the step, that this is said of
+};
+
+/// What a method says of a step, in any order.
+struct Claims {
+  std::vector<Claim> claims;
+  /// Triangles that touch, by a method that speaks of them; by others those that hold the claims'
+  /// features touch.
+  std::vector<TrianglePair> triangles;
+};
+
+/// Which triangles hold a vertex, or an edge.
+class Incidence {
+ public:
+  explicit Incidence(const std::vector<Triangle>& triangles);
+  std::vector<std::uint32_t> holding(std::uint32_t vertex) const { return m_byVertex[vertex]; }
+  std::vector<std::uint32_t> holding(std::uint32_t p, std::uint32_t q) const;
+  /// Every pair of triangles that touch where these features touch.
+  static void addTriangles(const FeaturePair&, const Incidence& a, const Incidence& b,
+                           std::vector<TrianglePair>& out);
+
+ private:
+  std::vector<std::vector<std::uint32_t>> m_byVertex;
+};
+
+void sortUnique(std::vector<TrianglePair>&);
+
+/// Contacts as claims. time: that static methods looked at; 0 for Continuous, which knows its own.
+void addClaims(const CollisionData&, double time, Claims& out);
+
+}  // namespace palpate::accuracy

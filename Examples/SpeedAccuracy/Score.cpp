@@ -1,0 +1,80 @@
+#include "Score.h"
+
+#include <algorithm>
+#include <map>
+#include <numbers>
+
+namespace palpate::accuracy {
+
+namespace {
+
+double degreesBetween(const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
+  return 2 * std::atan2((u - v).norm(), (u + v).norm()) * 180 / std::numbers::pi;
+}
+
+std::size_t countOutside(const std::vector<TrianglePair>& pairs,
+                         const std::vector<TrianglePair>& set) {
+  return static_cast<std::size_t>(std::count_if(pairs.begin(), pairs.end(), [&](const auto& pair) {
+    return !std::binary_search(set.begin(), set.end(), pair);
+  }));
+}
+
+/// The features that touch, by the triangles that touch with them.
+std::multimap<TrianglePair, const Impact*> byTriangles(const Truth& truth, const Incidence& a,
+                                                       const Incidence& b) {
+  std::multimap<TrianglePair, const Impact*> all;
+  for (const auto& [features, impact] : truth.impacts) {
+    if (!impact) continue;
+    std::vector<TrianglePair> triangles;
+    Incidence::addTriangles(features, a, b, triangles);
+    for (const TrianglePair& pair : triangles) all.emplace(pair, &*impact);
+  }
+  return all;
+}
+
+}  // namespace
+
+void Score::addErrors(const Claim& claim, const Impact& impact) {
+  distance.add(100 * std::abs(claim.distance - impact.gapAt(claim.time)) / meanEdge);
+  normal.add(degreesBetween(claim.normal, impact.normal));
+  time.add(100 * std::abs(claim.time - impact.time));
+}
+
+void Score::add(const Truth& truth, const Claims& said, const Incidence& a, const Incidence& b) {
+  // Of several claims about the same features the first in time counts.
+  std::map<FeaturePair, Claim> first;
+  for (const Claim& claim : said.claims) {
+    const auto [entry, isNew] = first.try_emplace(claim.features, claim);
+    if (!isNew && claim.time < entry->second.time) entry->second = claim;
+  }
+  claims += first.size();
+  std::vector<TrianglePair> touching = said.triangles;
+  if (touching.empty())
+    for (const auto& [features, claim] : first) Incidence::addTriangles(features, a, b, touching);
+  sortUnique(touching);
+  m_touching += truth.touching.size();
+  m_claimed += touching.size();
+  m_missed += countOutside(truth.touching, touching);
+  m_old += truth.touchingAtStart.size();
+  m_oldMissed += countOutside(truth.touchingAtStart, touching);
+  m_invented += countOutside(touching, truth.touching);
+
+  std::multimap<TrianglePair, const Impact*> impacts;  // for claims about triangles
+  if (!first.empty() && first.begin()->first.kind == FeaturePair::Kind::Triangles)
+    impacts = byTriangles(truth, a, b);
+  for (const auto& [features, claim] : first) {
+    if (features.kind == FeaturePair::Kind::Triangles) {
+      // It does not say which features: the kindest of the pair's counts.
+      const auto [begin, end] = impacts.equal_range({features.ids[0], features.ids[1]});
+      const auto kindest = std::min_element(begin, end, [&](const auto& l, const auto& r) {
+        return l.second->normal.dot(claim.normal) > r.second->normal.dot(claim.normal);
+      });
+      if (kindest != end) addErrors(claim, *kindest->second);
+    } else {
+      const auto impact = truth.impacts.find(features);
+      if (impact != truth.impacts.end() && impact->second) addErrors(claim, *impact->second);
+    }
+  }
+}
+
+}  // namespace palpate::accuracy
