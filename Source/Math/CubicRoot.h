@@ -1,5 +1,7 @@
 #pragma once
 
+#include "Math/Tolerances.h"
+
 #include <algorithm>
 #include <array>
 
@@ -35,7 +37,7 @@ inline double approximateRoot(const CubicBernstein& b, double low, double high, 
     if (!(next > low && next < high)) next = 0.5 * (low + high);
     const double step = next - t;
     t = next;
-    if (step < 1e-16 && step > -1e-16) break;
+    if (step < kRootStep && step > -kRootStep) break;
   }
   return t;
 }

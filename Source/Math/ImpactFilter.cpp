@@ -3,7 +3,6 @@
 #include "Math/Tolerances.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #undef HWY_TARGET_INCLUDE
@@ -28,9 +27,12 @@ struct Ends {
 };
 
 HWY_INLINE V largest(V a, V b) { return hn::Max(hn::Abs(a), hn::Abs(b)); }
-HWY_INLINE Point largest(const Ends& ends) {
-  return {largest(ends.at[0].x, ends.at[1].x), largest(ends.at[0].y, ends.at[1].y),
-          largest(ends.at[0].z, ends.at[1].z)};
+HWY_INLINE Point largest(const Point& a, const Point& b) {
+  return {largest(a.x, b.x), largest(a.y, b.y), largest(a.z, b.z)};
+}
+HWY_INLINE Point largest(const Ends& ends) { return largest(ends.at[0], ends.at[1]); }
+HWY_INLINE Point minus(const Point& l, const Point& r) {
+  return {hn::Sub(l.x, r.x), hn::Sub(l.y, r.y), hn::Sub(l.z, r.z)};
 }
 HWY_INLINE Point cross(const Point& l, const Point& r) {
   return {hn::Sub(hn::Mul(l.y, r.z), hn::Mul(l.z, r.y)),
@@ -44,28 +46,50 @@ HWY_INLINE V dot(const Point& l, const Point& r) {
   return hn::Add(hn::Add(hn::Mul(l.x, r.x), hn::Mul(l.y, r.y)), hn::Mul(l.z, r.z));
 }
 
+HWY_INLINE Point scaled(V factor, const Point& p) {
+  return {hn::Mul(factor, p.x), hn::Mul(factor, p.y), hn::Mul(factor, p.z)};
+}
+/// Into [0, 1]; anything there where the divisor is not positive.
+HWY_INLINE V clampedQuotient(V l, V r) {
+  const D d;
+  const V quotient = hn::Div(l, hn::Max(r, hn::Set(d, kShortestDirection)));
+  return hn::Min(hn::Max(quotient, hn::Zero(d)), hn::Set(d, 1.0));
+}
+HWY_INLINE Point awayFromSegment(const Point& point, const Point& segment) {
+  return minus(point, scaled(clampedQuotient(dot(point, segment), dot(segment, segment)), segment));
+}
+HWY_INLINE Point nearer(const Point& l, const Point& r) {
+  const M first = hn::Lt(dot(l, l), dot(r, r));
+  return {hn::IfThenElse(first, l.x, r.x), hn::IfThenElse(first, l.y, r.y),
+          hn::IfThenElse(first, l.z, r.z)};
+}
+
 /// One vector's worth of queries.
 template <ImpactQuery::Kind kind>
 class FilterLanes {
  public:
   HWY_INLINE FilterLanes(const ImpactBlock& block, int lane) : m_block(block), m_lane(lane) {}
 
-  /// Along some coordinate all corners are always further than `distance` to one side.
+  /// Along some coordinate all corners are always further than the distance to one side, as
+  /// findTouch() and findApproach() have it.
   HWY_INLINE M separatedByBoxes(double distance) const {
     const D d;
     constexpr auto corners = ImpactQuery::corners(kind);
-    V gap = hn::Set(d, 0.0);
+    const V limit = hn::Set(d, distance),
+            error = hn::Set(d, distance > 0.0 ? kApproachBoxError : 0.0);
+    M separated = hn::MaskFalse(d);
     for (int k = 0; k < 3; ++k) {
-      V least = hn::Set(d, std::numeric_limits<double>::infinity()), most = hn::Neg(least);
-      for (int i = 0; i < cornerCount(); ++i)
-        for (int end = 0; end < 2; ++end) {
-          const V value = coordinate(corners[i], end, k);
-          least = hn::Min(least, value);
-          most = hn::Max(most, value);
-        }
-      gap = hn::Max(gap, hn::Max(least, hn::Neg(most)));
+      M above = hn::Not(hn::MaskFalse(d)), below = above;
+      for (int i = 0; i < cornerCount(); ++i) {
+        const V first = coordinate(corners[i], 0, k), last = coordinate(corners[i], 1, k);
+        const V needed =
+            hn::Add(limit, hn::Mul(error, hn::Add(largest(first, last), limit)));
+        above = hn::And(above, hn::Gt(hn::Min(first, last), needed));
+        below = hn::And(below, hn::Lt(hn::Max(first, last), hn::Neg(needed)));
+      }
+      separated = hn::Or(separated, hn::Or(above, below));
     }
-    return hn::Gt(gap, hn::Set(d, distance));
+    return separated;
   }
 
   /// det(A, B, C) has one sign throughout.
@@ -94,34 +118,57 @@ class FilterLanes {
                    hn::Le(magnitude, hn::Set(d, kLargestImpactDifference)));
   }
 
-  /// All corners are always further than `distance` along A x B as it is halfway.
-  HWY_INLINE M separatedAlongNormal(double distance) const {
+  /// All corners are always further than the distance, and than findApproach() may report, along a
+  /// direction that does not move. Any direction will do.
+  HWY_INLINE M separatedAlong(const Point& direction, double distance, double tolerance) const {
     const D d;
-    constexpr auto axes = ImpactQuery::axes(kind);
     constexpr auto corners = ImpactQuery::corners(kind);
-    const Ends a = difference(axes[0]), b = difference(axes[1]);
-    const Point normal = cross(sum(a.at[0], a.at[1]), sum(b.at[0], b.at[1]));
     V least = hn::Set(d, std::numeric_limits<double>::infinity()), most = hn::Neg(least);
-    Point reach{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    Point reach{hn::Zero(d), hn::Zero(d), hn::Zero(d)}, displacement = reach;
     for (int i = 0; i < cornerCount(); ++i) {
       const Ends corner = difference(corners[i]);
-      const V first = dot(normal, corner.at[0]), last = dot(normal, corner.at[1]);
+      const V first = dot(direction, corner.at[0]), last = dot(direction, corner.at[1]);
       least = hn::Min(least, hn::Min(first, last));
       most = hn::Max(most, hn::Max(first, last));
-      const Point size = largest(corner);
-      reach = {hn::Max(reach.x, size.x), hn::Max(reach.y, size.y), hn::Max(reach.z, size.z)};
+      reach = largest(reach, largest(corner));
+      displacement = largest(displacement, minus(corner.at[1], corner.at[0]));
     }
-    const V lengthSquared = dot(normal, normal);
-    const V needed = hn::Mul(hn::Set(d, distance), hn::Sqrt(lengthSquared));
-    const Point size{hn::Abs(normal.x), hn::Abs(normal.y), hn::Abs(normal.z)};
+    const V lengthSquared = dot(direction, direction);
+    const V farthest = hn::Max(reach.x, hn::Max(reach.y, reach.z));
+    const V approach =
+        hn::Add(hn::Mul(hn::Sqrt(dot(displacement, displacement)), hn::Set(d, tolerance)),
+                hn::Mul(hn::Add(farthest, hn::Set(d, distance)), hn::Set(d, kApproachError)));
+    const V needed = hn::Mul(hn::Add(hn::Set(d, distance), approach), hn::Sqrt(lengthSquared));
+    const Point size{hn::Abs(direction.x), hn::Abs(direction.y), hn::Abs(direction.z)};
     const V limit = hn::Add(hn::Mul(hn::Add(dot(size, reach), needed), hn::Set(d, kAlongError)),
                             hn::Add(needed, hn::Set(d, kImpactUnderflow)));
-    const V magnitude = hn::Max(hn::Max(reach.x, hn::Max(reach.y, reach.z)),
-                                hn::Max(size.x, hn::Max(size.y, size.z)));
+    const V magnitude = hn::Max(farthest, hn::Max(size.x, hn::Max(size.y, size.z)));
     const M inRange =
         hn::And(hn::Le(magnitude, hn::Set(d, kLargestImpactDifference)),
                 hn::Gt(lengthSquared, hn::Set(d, kShortestDirection * kShortestDirection)));
     return hn::And(hn::Or(hn::Gt(least, limit), hn::Lt(most, hn::Neg(limit))), inRange);
+  }
+
+  /// A x B as it is halfway.
+  HWY_INLINE Point normalHalfway() const {
+    constexpr auto axes = ImpactQuery::axes(kind);
+    return cross(halfway(axes[0]), halfway(axes[1]));
+  }
+
+  /// About from one feature's closest point to the other's, halfway, where these are on borders.
+  HWY_INLINE Point gapHalfway() const {
+    constexpr auto axes = ImpactQuery::axes(kind);
+    const Point a = halfway(axes[0]), b = halfway(axes[1]), c = halfway(axes[2]);
+    if constexpr (kind == ImpactQuery::Kind::EdgeEdge) {
+      const V aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), ac = dot(a, c), bc = dot(b, c);
+      const V x = clampedQuotient(hn::Sub(hn::Mul(ac, bb), hn::Mul(bc, ab)),
+                                  hn::Sub(hn::Mul(aa, bb), hn::Mul(ab, ab)));
+      const V y = clampedQuotient(hn::Sub(bc, hn::Mul(x, ab)), bb);
+      return awayFromSegment(minus(c, scaled(y, b)), a);
+    } else {
+      const Point p = nearer(awayFromSegment(c, a), awayFromSegment(c, b));
+      return nearer(p, awayFromSegment(minus(c, a), minus(b, a)));
+    }
   }
 
  private:
@@ -130,6 +177,10 @@ class FilterLanes {
     const D d;
     return hn::Sub(hn::Load(d, &m_block.positions[vertices[0]][end][k][m_lane]),
                    hn::Load(d, &m_block.positions[vertices[1]][end][k][m_lane]));
+  }
+  HWY_INLINE Point halfway(const ImpactQuery::Difference& v) const {
+    const Ends ends = difference(v);
+    return scaled(hn::Set(D(), 0.5), sum(ends.at[0], ends.at[1]));
   }
   HWY_INLINE Ends difference(const ImpactQuery::Difference& v) const {
     return {{{coordinate(v, 0, 0), coordinate(v, 0, 1), coordinate(v, 0, 2)},
@@ -140,17 +191,20 @@ class FilterLanes {
   int m_lane;
 };
 
-/// Box tests are exact; with a distance they are if `limit` is at least the distance and an ulp.
 template <ImpactQuery::Kind kind>
-HWY_INLINE unsigned mayImpactOf(const ImpactBlock& block, double distance, double limit) {
+HWY_INLINE unsigned mayImpactOf(const ImpactBlock& block, double distance, double tolerance) {
   const D d;
   unsigned bits = 0;
   for (int lane = 0; lane < ImpactBlock::kLanes; lane += static_cast<int>(hn::Lanes(d))) {
     const FilterLanes<kind> lanes(block, lane);
-    M impossible = lanes.separatedByBoxes(limit);
+    M impossible = lanes.separatedByBoxes(distance);
     if (!hn::AllTrue(d, impossible))
-      impossible = hn::Or(impossible, distance > 0.0 ? lanes.separatedAlongNormal(distance)
+      impossible = hn::Or(impossible, distance > 0.0 ? lanes.separatedAlong(lanes.normalHalfway(),
+                                                                            distance, tolerance)
                                                      : lanes.neverCoplanar());
+    if (!hn::AllTrue(d, impossible))
+      impossible =
+          hn::Or(impossible, lanes.separatedAlong(lanes.gapHalfway(), distance, tolerance));
     std::uint8_t mask[8] = {};
     hn::StoreMaskBits(d, hn::Not(impossible), mask);
     bits |= static_cast<unsigned>(mask[0]) << lane;
@@ -159,10 +213,10 @@ HWY_INLINE unsigned mayImpactOf(const ImpactBlock& block, double distance, doubl
 }
 
 HWY_ATTR unsigned mayImpactKernel(ImpactQuery::Kind kind, const ImpactBlock& block, double distance,
-                                  double limit) {
+                                  double tolerance) {
   return kind == ImpactQuery::Kind::VertexTriangle
-             ? mayImpactOf<ImpactQuery::Kind::VertexTriangle>(block, distance, limit)
-             : mayImpactOf<ImpactQuery::Kind::EdgeEdge>(block, distance, limit);
+             ? mayImpactOf<ImpactQuery::Kind::VertexTriangle>(block, distance, tolerance)
+             : mayImpactOf<ImpactQuery::Kind::EdgeEdge>(block, distance, tolerance);
 }
 
 }  // namespace palpate::HWY_NAMESPACE
@@ -173,13 +227,10 @@ namespace palpate {
 
 HWY_EXPORT(mayImpactKernel);
 
-std::uint8_t mayImpact(ImpactQuery::Kind kind, const ImpactBlock& block, double distance) {
-  // A rounded difference above this comes from one above the distance.
-  const double limit = distance > 0.0 ? std::nextafter(distance * (1.0 + 0x1p-51),
-                                                       std::numeric_limits<double>::infinity())
-                                      : 0.0;
-  return static_cast<std::uint8_t>(
-      HWY_DYNAMIC_DISPATCH(mayImpactKernel)(kind, block, std::max(distance, 0.0), limit));
+std::uint8_t mayImpact(ImpactQuery::Kind kind, const ImpactBlock& block,
+                       const TimeOfImpactSettings& settings) {
+  return static_cast<std::uint8_t>(HWY_DYNAMIC_DISPATCH(mayImpactKernel)(
+      kind, block, std::max(settings.minimumDistance, 0.0), settings.tolerance));
 }
 
 }  // namespace palpate

@@ -19,10 +19,10 @@ struct ImpactBlock {
   }
 };
 
-/// Throws out most queries without an impact: bit i is set where query i may have one, and
-/// clear only where certainly not.
-/// Shapes   distance: 0 or the minimum distance, L.
+/// Throws out most queries without an impact: bit i is clear only where findImpact() with these
+/// settings certainly finds none, and set where it may find one.
+/// Needs    a tolerance in [2^-50, 1].
 /// Cost     a few tens of nanoseconds a query.
-std::uint8_t mayImpact(ImpactQuery::Kind, const ImpactBlock&, double distance);
+std::uint8_t mayImpact(ImpactQuery::Kind, const ImpactBlock&, const TimeOfImpactSettings&);
 
 }  // namespace palpate

@@ -27,26 +27,37 @@ Separation bestSeparation(const RelativeMotion<kind>& motion, double t) {
   std::array<Vector3d, corners> corner;
   for (int i = 0; i < corners; ++i) corner[i] = at(t, motion.corner[i]);
 
+  // Compared squared: no root for each.
   Separation best;
-  const auto consider = [&](const Vector3d& direction) {
+  double bestLeast = 0.0, bestSquare = 1.0, nearestSquare = INFINITY;
+  const auto consider = [&](const Vector3d& direction, double square) {
     double least = direction.dot(corner[0]);
     for (int i = 1; i < corners; ++i) least = std::min(least, direction.dot(corner[i]));
-    if (!(least > 0.0)) return;
-    const double length = direction.norm();
-    if (!(length > kShortestDirection)) return;
-    if (least > best.distance * length) best = {direction, least / length, length};
+    if (!(least > 0.0) || !(square > kShortestDirection * kShortestDirection)) return;
+    if (least * least * bestSquare > bestLeast * bestLeast * square) {
+      best.direction = direction;
+      bestLeast = least;
+      bestSquare = square;
+    }
+  };
+  const auto considerAway = [&](const Vector3d& direction) {
+    const double square = direction.squaredNorm();
+    nearestSquare = std::min(nearestSquare, square);
+    consider(direction, square);
   };
   const Vector3d a = at(t, motion.a), b = at(t, motion.b), &c = corner[0];
   const Vector3d normal = a.cross(b);
-  consider(normal.dot(c) < 0.0 ? Vector3d(-normal) : normal);
-  consider(awayFromSegment(c, a));
-  consider(awayFromSegment(c, b));
+  consider(normal.dot(c) < 0.0 ? Vector3d(-normal) : normal, normal.squaredNorm());
+  considerAway(awayFromSegment(c, a));
+  considerAway(awayFromSegment(c, b));
   if constexpr (RelativeMotion<kind>::square) {
-    consider(awayFromSegment(c - b, a));
-    consider(awayFromSegment(c - a, b));
+    considerAway(awayFromSegment(c - b, a));
+    considerAway(awayFromSegment(c - a, b));
   } else {
-    consider(awayFromSegment(c - a, b - a));
+    considerAway(awayFromSegment(c - a, b - a));
   }
+  best.length = bestLeast > 0.0 ? std::sqrt(bestSquare) : 0.0;
+  best.nearest = std::sqrt(nearestSquare);
   return best;
 }
 
@@ -65,10 +76,29 @@ Interval separatedAround(double t, const RelativeMotion<kind>& motion, const Vec
     // Where the end itself is not positive the limit is the zero between, moved towards t by more
     // than the quotient's three roundings.
     const double zero = first / (first - last);
-    if (!(first > 0.0)) interval.low = std::max(interval.low, zero * (1.0 + 0x1p-50));
-    if (!(last > 0.0)) interval.high = std::min(interval.high, zero * (1.0 - 0x1p-50));
+    if (!(first > 0.0)) interval.low = std::max(interval.low, zero * (1.0 + kQuotientError));
+    if (!(last > 0.0)) interval.high = std::min(interval.high, zero * (1.0 - kQuotientError));
   }
   return interval;
+}
+
+/// Along n(t) a corner moves as a quadratic, above its Bernstein coefficients; |n(t)| is at most
+/// the larger length at the ends.
+template <ImpactQuery::Kind kind>
+bool separatedBetween(double t0, const Separation& first, double t1, const Separation& last,
+                      const RelativeMotion<kind>& motion, const Vector3d& largest,
+                      double distance) {
+  if (!(first.length > 0.0 && last.length > 0.0)) return false;
+  const Vector3d m = first.direction / first.length, n = last.direction / last.length;
+  const double needed = distance * (1.0 + kAlongError) +
+                        kAlongError * m.cwiseAbs().cwiseMax(n.cwiseAbs()).dot(largest) +
+                        kImpactUnderflow;
+  for (const auto& ends : motion.corner) {
+    const Vector3d x = at(t0, ends), y = at(t1, ends);
+    if (!(m.dot(x) > needed && n.dot(y) > needed && 0.5 * (m.dot(y) + n.dot(x)) > needed))
+      return false;
+  }
+  return true;
 }
 
 template Separation bestSeparation(const RelativeMotion<ImpactQuery::Kind::VertexTriangle>&,
@@ -78,5 +108,11 @@ template Interval separatedAround(double, const RelativeMotion<ImpactQuery::Kind
                                   const Vector3d&, const Separation&, double);
 template Interval separatedAround(double, const RelativeMotion<ImpactQuery::Kind::EdgeEdge>&,
                                   const Vector3d&, const Separation&, double);
+template bool separatedBetween(double, const Separation&, double, const Separation&,
+                               const RelativeMotion<ImpactQuery::Kind::VertexTriangle>&,
+                               const Vector3d&, double);
+template bool separatedBetween(double, const Separation&, double, const Separation&,
+                               const RelativeMotion<ImpactQuery::Kind::EdgeEdge>&, const Vector3d&,
+                               double);
 
 }  // namespace palpate

@@ -12,7 +12,6 @@ namespace palpate {
 struct Interval {
   double low, high;
   bool empty() const { return !(low <= high); }
-  bool holds(const Interval& other) const { return low <= other.low && other.high <= high; }
 };
 
 /// An ImpactQuery's A, B, C, and the corners of C - x A - y B, at both ends of the step, in
@@ -67,12 +66,12 @@ inline Eigen::Vector3d at(double t, const std::array<Eigen::Vector3d, 2>& ends) 
   return (1.0 - t) * ends[0] + t * ends[1];
 }
 
-/// A fixed direction in which all corners may lie on one side of zero at time t, and how far: the
-/// features' distance where the direction is right. Approximate; length is that of the direction.
+/// A fixed direction in which all corners may lie on one side of zero at time t: the least of them
+/// over the length is the features' distance where the direction is right. Zero: none was found.
 struct Separation {
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();
-  double distance = 0.0, length = 0.0;
-  bool found() const { return distance > 0.0; }
+  double length = 0.0;
+  double nearest = INFINITY;  ///< the distance of two points on the features' borders
 };
 template <ImpactQuery::Kind kind>
 Separation bestSeparation(const RelativeMotion<kind>&, double t);
@@ -83,5 +82,11 @@ Separation bestSeparation(const RelativeMotion<kind>&, double t);
 template <ImpactQuery::Kind kind>
 Interval separatedAround(double t, const RelativeMotion<kind>&, const Eigen::Vector3d& largest,
                          const Separation&, double distance);
+
+/// All corners are certainly further than `distance` from t0 to t1 along a direction that goes
+/// linearly from one to the other.
+template <ImpactQuery::Kind kind>
+bool separatedBetween(double t0, const Separation&, double t1, const Separation&,
+                      const RelativeMotion<kind>&, const Eigen::Vector3d& largest, double distance);
 
 }  // namespace palpate

@@ -74,12 +74,22 @@ constexpr double kShortestDirection = 0x1p-500;
 constexpr double kNarrowestBracket = 0x1p-50;
 /// Of the step: the smallest tolerance that is kept.
 constexpr double kSmallestTimeTolerance = 0x1p-50;
-/// Relative to the largest coordinate difference and the minimum distance, in findApproach(): well
-/// above what rounding does to the distance it computes.
-constexpr double kApproachSlack = 0x1p-41;
 /// Of a coordinate of a moving corner less the distance, relative to both: the difference of two
 /// positions, that less the distance, and this bound's own rounding.
 constexpr double kApproachBoxError = 0x1p-51;
+/// Of the quotient of two differences, each its operands' nearest, relative: 3 u, and above that.
+constexpr double kQuotientError = 0x1p-50;
+/// Relative to the largest coordinate difference and the minimum distance: the distance at which
+/// findApproach() may report, beyond tolerance * displacement. At 2^-36 the direction in which its
+/// features are apart is right to 2^-39 (2^-50, and 2^-76 of twice the largest difference over the
+/// distance), which takes at most 2^-38 of the largest difference, √3 of it away, from what corners
+/// are apart.
+constexpr double kApproachSlack = 0x1p-36;
+/// The same as promised: with what the distance computed there is off by, under 2^-45.
+constexpr double kApproachError = 0x1p-35;
+/// Of the step: Newton's iteration of a root ends with steps this short; two units in the last
+/// place of a time.
+constexpr double kRootStep = 0x1p-53;
 /// Of a form's Bernstein coefficient converted to double and restricted, relative to the largest
 /// coefficient (CubicTime::sign()): 2^-51 and kBlossomError.
 constexpr double kFormError = 0x1p-46;

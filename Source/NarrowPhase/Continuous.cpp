@@ -46,11 +46,17 @@ struct Features {
   }
 };
 
+TimeOfImpactSettings settingsOf(const MeshPair& pair) {
+  TimeOfImpactSettings settings;
+  settings.minimumDistance = pair.settings.thickness;
+  return settings;
+}
+
 /// f(features, inFirst, inSecond, ofSecond) for those pairs that may meet, eight at a time.
 /// ofSecond: pairs name a feature of `second` first.
 template <bool ofSecond, Kind kind, class F>
 void filterPairs(const Features<kind>& features, std::span<const FeaturePair> pairs,
-                 double thickness, F&& f) {
+                 const TimeOfImpactSettings& settings, F&& f) {
   ImpactBlock block;
   const auto test = [&](const FeaturePair& pair, auto&& with) {
     return ofSecond ? with(pair.b, pair.a) : with(pair.a, pair.b);
@@ -66,7 +72,7 @@ void filterPairs(const Features<kind>& features, std::span<const FeaturePair> pa
           block.set(lane, i, mesh.before[ids[i]], mesh.now[ids[i]]);
         }
       });
-    unsigned lanes = mayImpact(kind, block, thickness) & ((1u << eight.size()) - 1);
+    unsigned lanes = mayImpact(kind, block, settings) & ((1u << eight.size()) - 1);
     for (; lanes != 0; lanes &= lanes - 1)
       test(eight[std::countr_zero(lanes)], [&](std::uint32_t inFirst, std::uint32_t inSecond) {
         f(features, inFirst, inSecond, ofSecond);
@@ -82,23 +88,19 @@ void forEachLikelyPair(const MeshPair& pair, std::span<const TrianglePair> candi
   FeaturePairs& pairs = out.features;
   findFeaturePairs(pair.a.topology, pair.b.topology, pair.floats, candidates, pairs);
   out.featurePairs += pairs.owned;
-  const double thickness = pair.settings.thickness;
-  filterPairs<false>(Features<Kind::VertexTriangle>{pair.a, pair.b}, pairs.vertexTriangle,
-                     thickness, f);
-  filterPairs<true>(Features<Kind::VertexTriangle>{pair.b, pair.a}, pairs.triangleVertex, thickness,
+  const TimeOfImpactSettings settings = settingsOf(pair);
+  filterPairs<false>(Features<Kind::VertexTriangle>{pair.a, pair.b}, pairs.vertexTriangle, settings,
+                     f);
+  filterPairs<true>(Features<Kind::VertexTriangle>{pair.b, pair.a}, pairs.triangleVertex, settings,
                     f);
-  filterPairs<false>(Features<Kind::EdgeEdge>{pair.a, pair.b}, pairs.edgeEdge, thickness, f);
+  filterPairs<false>(Features<Kind::EdgeEdge>{pair.a, pair.b}, pairs.edgeEdge, settings, f);
 }
 
-/// Tests pairs and describes the contacts found. Pairs that do not come within the thickness may
-/// be found if they nearly do, unless the filter rules them out: filtered says whether it was
-/// asked.
+/// Tests pairs and describes the contacts found.
 class ContactFinder {
  public:
-  ContactFinder(const MeshPair& pair, bool filtered, ContactBuffers& out)
-      : m_pair(pair), m_filtered(filtered), m_out(out) {
-    m_settings.minimumDistance = pair.settings.thickness;
-  }
+  ContactFinder(const MeshPair& pair, ContactBuffers& out)
+      : m_pair(pair), m_out(out), m_settings(settingsOf(pair)) {}
 
   template <Kind kind>
   void operator()(const Features<kind>& features, std::uint32_t inFirst, std::uint32_t inSecond,
@@ -113,7 +115,6 @@ class ContactFinder {
     if constexpr (kind == Kind::VertexTriangle) {
       auto& list = ofSecond && !m_pair.self() ? m_out.triangleVertex : m_out.vertexTriangle;
       const auto closest = finiteVertexTriangleDistance(p[0], p[1], p[2], p[3]);
-      if (isRuledOut(query, closest.distance)) return;
       list.push_back(
           contactOf(inFirst, inSecond, features.second.topology.triangles[inSecond], closest));
       // A corner touches its triangle, and then the normal is the plane's.
@@ -121,7 +122,6 @@ class ContactFinder {
                [&] { return finiteVertexTriangleDistance(p[1], p[1], p[2], p[3]).normal; });
     } else {
       const auto closest = finiteEdgeEdgeDistance(p[0], p[1], p[2], p[3]);
-      if (isRuledOut(query, closest.distance)) return;
       m_out.edgeEdge.push_back(contactOf(features.first.topology.edges[inFirst],
                                          features.second.topology.edges[inSecond], closest));
       complete(m_out.edgeEdge.back(), query, answer.time, [&] {
@@ -139,30 +139,21 @@ class ContactFinder {
     if (sideBefore(query, time) < 0) contact.normal = -contact.normal;
   }
 
-  bool isRuledOut(const ImpactQuery& query, double distance) const {
-    const double thickness = m_settings.minimumDistance;
-    if (m_filtered || thickness <= 0.0 || distance <= thickness) return false;
-    ImpactBlock block;
-    for (int i = 0; i < 4; ++i) block.set(0, i, query.vertices[i].at(0), query.vertices[i].at(1));
-    return (mayImpact(query.kind, block, thickness) & 1u) == 0;
-  }
-
   const MeshPair& m_pair;
-  const bool m_filtered;
   ContactBuffers& m_out;
-  TimeOfImpactSettings m_settings;
+  const TimeOfImpactSettings m_settings;
 };
 
 }  // namespace
 
 void findContinuous(const MeshPair& pair, std::span<const TrianglePair> candidates,
                     ContactBuffers& out) {
-  forEachLikelyPair(pair, candidates, out, ContactFinder(pair, true, out));
+  forEachLikelyPair(pair, candidates, out, ContactFinder(pair, out));
 }
 
 void findContinuousByBruteForce(const MeshPair& pair, const FeatureLists& lists,
                                 ContactBuffers& out) {
-  ContactFinder test(pair, false, out);
+  ContactFinder test(pair, out);
   for (const bool ofSecond : {false, true}) {
     const Features<Kind::VertexTriangle> features{ofSecond ? pair.b : pair.a,
                                                   ofSecond ? pair.a : pair.b};
@@ -186,8 +177,7 @@ void findContinuousByBruteForce(const MeshPair& pair, const FeatureLists& lists,
 
 double findEarliestImpact(const MeshPair& pair, std::span<const TrianglePair> candidates,
                           double upTo, ContactBuffers& counts) {
-  TimeOfImpactSettings settings;
-  settings.minimumDistance = pair.settings.thickness;
+  const TimeOfImpactSettings settings = settingsOf(pair);
   double earliest = upTo;
   // A reported time may be a tolerance early, so a pair that is left out for an impact after this
   // could not have reported one before `earliest`.
@@ -201,7 +191,7 @@ double findEarliestImpact(const MeshPair& pair, std::span<const TrianglePair> ca
   constexpr std::size_t kPart = 512;
   // Boxes over part of the step cost more; a part that is not short throws out too little for that.
   constexpr double kShortPart = 1.0 / 32;
-  while (!candidates.empty()) {
+  while (!candidates.empty() && earliest > 0.0) {
     const auto part = candidates.first(std::min(kPart, candidates.size()));
     candidates = candidates.subspan(part.size());
     MeshPair boxed = pair;

@@ -1,0 +1,175 @@
+// Continuous detection of the two published steps, from positions to times of impact, beside
+// Embree on the same frame: the earliest time against IPC toolkit's faster engine, all times
+// against every candidate's time by Tight-Inclusion. Their figures were measured elsewhere on this
+// class of machine and are scaled by what Embree took there and takes here.
+#include "Rows.h"
+
+#include <palpate/OctreeBasedCD.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+
+namespace palpate::benchmark {
+namespace {
+
+/// Milliseconds by one thread and by two; 0: no figure.
+struct Reference {
+  const char* scene;
+  double embree[2];     ///< rebuild + collide, as it is
+  double earliest[2];   ///< IPC toolkit, whole step, Additive CCD, the faster of its two
+  double everyTime[2];  ///< each candidate by Tight-Inclusion
+};
+constexpr Reference kReferences[] = {{"cloth-funnel", {15.8, 6.7}, {27, 20}, {0, 0}},
+                                     {"rod-twist", {121, 60}, {679, 365}, {0, 11400}}};
+constexpr double kTimesEarliest = 5, kTimesEveryTime = 20;
+
+/// One published step, again and again.
+class Step {
+ public:
+  Step(const Workload& workload, Contacts contacts, double thickness)
+      : m_workload(workload), m_earliest(contacts == Contacts::Earliest), m_detection([&] {
+          Settings settings;
+          settings.threads = workload.task.threads;
+          settings.octree.update = OctreeUpdate::Rebuild;
+          return settings;
+        }()) {
+    PairSettings settings;
+    settings.method = Method::Continuous;
+    settings.contacts = contacts;
+    settings.thickness = thickness;
+    m_id = m_detection.addTriangleMesh(workload.frames[0][0], workload.task.meshes[0]);
+    m_detection.addCollisionPair(m_id, m_id, settings);
+  }
+
+  /// Milliseconds from positions to the answer. Other positions first, so that these are new.
+  double frame() {
+    const auto &first = m_workload.frames[0][0], &second = m_workload.frames[1][0];
+    m_detection.setPositions(m_id, second, first);
+    m_detection.update();
+    const double start = now();
+    m_detection.setPositions(m_id, first, second);
+    m_detection.detectCollision();
+    return now() - start;
+  }
+
+  double found() const {
+    const CollisionData& data = m_detection.collisionData(m_id, m_id);
+    return m_earliest ? data.earliestTimeOfImpact()
+                      : static_cast<double>(data.vertexTriangle().size() + data.edgeEdge().size());
+  }
+  const FrameStatistics& statistics() const { return m_detection.statistics(); }
+
+ private:
+  const Workload& m_workload;
+  bool m_earliest;
+  OctreeBasedCD m_detection;
+  GeometryId m_id;
+};
+
+struct Kind {
+  const char* name;
+  Contacts contacts;
+  double thickness;  ///< of the mean edge
+};
+constexpr Kind kKinds[] = {{"earliest time", Contacts::Earliest, 0},
+                           {"all times", Contacts::All, 0},
+                           {"earliest time, thickness", Contacts::Earliest, 0.05},
+                           {"all times, thickness", Contacts::All, 0.05}};
+
+/// Median milliseconds of each kind, and of Embree; in turns.
+struct Medians {
+  double kinds[std::size(kKinds)] = {}, narrow[std::size(kKinds)] = {},
+         found[std::size(kKinds)] = {}, embree = 0;
+};
+
+Medians takeTurns(const Workload& workload, const MeasureOptions& options) {
+  std::vector<std::unique_ptr<Step>> steps;
+  // A workload's thickness is a tenth of the mean edge.
+  for (const Kind& kind : kKinds)
+    steps.push_back(std::make_unique<Step>(workload, kind.contacts,
+                                           kind.thickness * 10 * workload.task.thickness));
+  std::vector<double> times[std::size(kKinds)], narrow[std::size(kKinds)], embree;
+#ifdef PALPATE_BENCHMARK_PEERS
+  const auto peer = makeEmbreeMorton();
+  peer->prepare(workload.task, workload.frames[0]);
+#endif
+  for (int repetition = 0; repetition < 1 + options.repetitions; ++repetition) {
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+      const double took = steps[i]->frame();
+      if (repetition == 0) continue;
+      times[i].push_back(took);
+      narrow[i].push_back(steps[i]->statistics().milliseconds.narrowPhase);
+    }
+#ifdef PALPATE_BENCHMARK_PEERS
+    for (const Positions& frame : workload.frames) {
+      const double start = now();
+      peer->update(frame);
+      peer->collide();
+      if (repetition > 0) embree.push_back(now() - start);
+    }
+#endif
+  }
+  Medians medians;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    medians.kinds[i] = median(times[i]);
+    medians.narrow[i] = median(narrow[i]);
+    medians.found[i] = steps[i]->found();
+  }
+  medians.embree = median(embree);
+  return medians;
+}
+
+void rowsOf(Report& report, const Reference& reference, const Workload& workload,
+            const MeasureOptions& options) {
+  const int threads = workload.task.threads;
+  const Medians medians = takeTurns(workload, options);
+  const std::string name = std::string(reference.scene) + ", " + std::to_string(threads) +
+                           (threads == 1 ? " thread" : " threads");
+  report.line({name + ", Embree", milliseconds(medians.embree)});
+  report.row("continuous", reference.scene, threads, "Embree rebuild + collide", "ms",
+             medians.embree);
+  for (std::size_t i = 0; i < std::size(kKinds); ++i) {
+    const Kind& kind = kKinds[i];
+    const auto row = [&](const char* metric, double value) {
+      report.row("continuous", reference.scene, threads, kind.name, metric, value);
+    };
+    row("ms", medians.kinds[i]);
+    row("narrow phase ms", medians.narrow[i]);
+    const bool earliest = kind.contacts == Contacts::Earliest;
+    char found[32];
+    std::snprintf(found, sizeof found, earliest ? "%.6f" : "%.0f", medians.found[i]);
+    std::vector<std::string> cells = {name + ", " + kind.name, milliseconds(medians.kinds[i]),
+                                      milliseconds(medians.narrow[i]), found};
+    const int column = threads - 1;
+    const double limit = kind.thickness > 0 || column > 1 ? 0
+                         : earliest ? reference.earliest[column] / kTimesEarliest
+                                    : reference.everyTime[column] / kTimesEveryTime;
+    if (limit > 0 && medians.embree > 0) {
+      const double scaled = limit * medians.embree / reference.embree[column];
+      row("limit ms", scaled);
+      row("times as fast as the limit", scaled / medians.kinds[i]);
+      cells.insert(cells.end(), {milliseconds(scaled), times(scaled / medians.kinds[i]),
+                                 scaled >= medians.kinds[i] ? "holds" : "SHORT"});
+    }
+    report.line(cells);
+  }
+}
+
+}  // namespace
+
+void continuousRows(Report& report, const RowOptions& options) {
+  report.heading("Continuous, whole step of the published frames, octree rebuilt; ms");
+  report.line({"", "median", "narrow", "found", "limit", "ratio"});
+  const std::vector<std::string> names = workloadNames(options.sharedData);
+  for (const Reference& reference : kReferences) {
+    if (std::find(names.begin(), names.end(), reference.scene) == names.end()) continue;
+    Workload workload = makeWorkload(reference.scene, 2, options.sharedData);
+    for (const int threads : options.threads) {
+      workload.task.threads = threads;
+      rowsOf(report, reference, workload, options.measure);
+    }
+  }
+}
+
+}  // namespace palpate::benchmark
