@@ -83,8 +83,8 @@ Separation accurateSeparation(const RelativeMotion<kind>& motion, double t) {
 /// by more than tolerance * displacement, and it takes more than the tolerance to lose that. So
 /// each stretch is longer than the tolerance. (Few are needed: they are Newton's steps towards the
 /// impact. Features that pass each other at little more than the distance, while they turn, need
-/// most; there directions that turn along reach further.) Where the march ends early changes no step
-/// before.
+/// most; there directions that turn along reach further.) Where the march ends early changes no
+/// step before.
 template <Kind kind>
 ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, double upTo) {
   const RelativeMotion<kind> motion(query);
@@ -102,7 +102,7 @@ ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, d
   Separation here = bestSeparation(motion, t);
   for (int step = 0;; ++step) {
     double clear = separatedAround(t, motion, largest, here, distance).high;
-    if (!(clear - t > tolerance)) {
+    if (!(clear == 1.0 || clear - t > tolerance)) {
       if (here.nearest <= near || distanceInside(motion, t) <= near) return {true, false, t};
       here = accurateSeparation(motion, t);
       clear = separatedAround(t, motion, largest, here, distance).high;

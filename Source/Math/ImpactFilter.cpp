@@ -77,13 +77,12 @@ class FilterLanes {
     constexpr auto corners = ImpactQuery::corners(kind);
     const V limit = hn::Set(d, distance),
             error = hn::Set(d, distance > 0.0 ? kApproachBoxError : 0.0);
-    M separated = hn::MaskFalse(d);
+    M separated = hn::Lt(limit, limit);  // none
     for (int k = 0; k < 3; ++k) {
-      M above = hn::Not(hn::MaskFalse(d)), below = above;
+      M above = hn::Eq(limit, limit), below = above;
       for (int i = 0; i < cornerCount(); ++i) {
         const V first = coordinate(corners[i], 0, k), last = coordinate(corners[i], 1, k);
-        const V needed =
-            hn::Add(limit, hn::Mul(error, hn::Add(largest(first, last), limit)));
+        const V needed = hn::Add(limit, hn::Mul(error, hn::Add(largest(first, last), limit)));
         above = hn::And(above, hn::Gt(hn::Min(first, last), needed));
         below = hn::And(below, hn::Lt(hn::Max(first, last), hn::Neg(needed)));
       }

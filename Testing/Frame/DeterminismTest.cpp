@@ -84,7 +84,7 @@ const std::map<std::string, std::vector<std::uint64_t>> kExpected{
     {"ProximityAll", {0xe33a337fe97e589fu, 0x0ad64f013ab5272du, 0x2bcdc7928f03162du}},
     {"Intersection", {0x6cb88a6c5e41aa5du, 0x255a4d79b56020edu, 0x25e447d21f38e066u}},
     {"Continuous", {0xa56a8b0f9487c9dau, 0x0c8210784d8af5a5u, 0x84eac19fff079b2bu}},
-    {"ContinuousWithThickness", {0x6d273af281b63efcu, 0xa6a47b763def51c4u, 0x8d9a26990f46516au}},
+    {"ContinuousWithThickness", {0xef4307fb84ed8dd6u, 0xa6a47b763def51c4u, 0xe02e296a1f4edca2u}},
     {"ContinuousEarliest", {0xb05355e5d6a61913u, 0x0c8210784d8af5a5u, 0xfc3177c3d8cabcd6u}},
 };
 
