@@ -37,6 +37,7 @@ void expectAsBruteForce(const CollisionProblem& problem) {
   const OctreeBasedCD oracle = solve(problem, Engine::BruteForce);
   for (const int threads : {1, 2}) {
     const OctreeBasedCD octree = solve(problem, Engine::Octree, threads);
+    EXPECT_EQ(octree.octree().validate(), std::vector<std::string>{});
     for (const CollisionProblem::Pair& pair : problem.pairs) {
       EXPECT_EQ(countsOf(dataOf(octree, pair)), countsOf(dataOf(oracle, pair)));
       EXPECT_EQ(dataOf(octree, pair).hash(), dataOf(oracle, pair).hash());
