@@ -1,11 +1,13 @@
 #pragma once
 
 #include "Math/Expansion.h"
+#include "Math/Tolerances.h"
 
 #include <Eigen/Core>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace palpate {
 
@@ -18,6 +20,20 @@ inline double sumOfMagnitudes(const Eigen::Vector3d& a) {
 }
 inline double largest(const Eigen::Vector3d& a) {
   return std::max({std::abs(a[0]), std::abs(a[1]), std::abs(a[2])});
+}
+
+/// Whether products of degree eight of coordinates so large stay within the range of double.
+inline bool isModerate(double extent) {
+  return extent > kSmallestModerate && extent < kLargestModerate;
+}
+/// The exponent of a power of two that brings an extent near 1; of zero, infinity and NaN the last
+/// there is.
+inline int exponentTowardsOne(double extent) {
+  return extent <= std::numeric_limits<double>::max() ? -std::clamp(std::ilogb(extent), -1074, 1023)
+                                                      : -1023;
+}
+inline Eigen::Vector3d scaled(const Eigen::Vector3d& a, int exponent) {
+  return {std::ldexp(a[0], exponent), std::ldexp(a[1], exponent), std::ldexp(a[2], exponent)};
 }
 
 /// high + low exactly, each component of high the double nearest to it.

@@ -33,7 +33,20 @@ double halvedWeight(const Weight& weight) {
   return std::clamp(0.5 * (1.0 + weight.coarse) + toGrid(0.5 * weight.fine), 0.0, 1.0);
 }
 
-bool isModerate(double extent) { return extent > kSmallestModerate && extent < kLargestModerate; }
+/// find(positions...) of positions near 1, scaled back; exactly(positions...) where a bit would be
+/// lost on the way.
+template <class Find, class Exactly, class... Positions>
+Foot atModerateScale(double extent, Find&& find, Exactly&& exactly, const Positions&... positions) {
+  const int exponent = exponentTowardsOne(extent);
+  const auto keepsBits = [&](const Vector3d& p) {
+    return scaled(scaled(p, exponent), -exponent) == p;
+  };
+  if (!(keepsBits(positions) && ...)) return exactly(positions...);
+  Foot foot = find(scaled(positions, exponent)...);
+  foot.difference = scaled(foot.difference, -exponent);
+  foot.distance = std::ldexp(foot.distance, -exponent);
+  return foot;
+}
 
 /// The vector from the middle of b to the middle of a; the same bits whichever end comes first.
 Difference betweenMiddles(const Vector3d& a0, const Vector3d& a1, const Vector3d& b0,
@@ -48,16 +61,19 @@ double weightOf(const Weight& weight, Range range) {
   return range == Range::ZeroToOne ? unitWeight(weight) : halvedWeight(weight);
 }
 
+double extentOf(const Difference& m, const Difference& u, const Difference& v, Range range) {
+  const double edges = std::max(largest(u.high), largest(v.high));
+  return std::max(largest(m.high), range == Range::ZeroToOne ? edges : 2.0 * edges);
+}
+
 /// The foot of the perpendicular from the origin to the plane m + s u + t v by one Newton step from
 /// coarse weights, whose residual is compensated. None if floating point cannot tell it. The
 /// distance is left at zero where it may be that.
 ///
+/// Needs    a moderate extent: extentOf() them.
 /// The same bits, mapped, when (u, s) and (v, t) change places.
 std::optional<Foot> footOnPlane(const Difference& m, const Difference& u, const Difference& v,
-                                Range range) {
-  const double edges = std::max(largest(u.high), largest(v.high));
-  const double extent = std::max(largest(m.high), range == Range::ZeroToOne ? edges : 2.0 * edges);
-  if (!isModerate(extent)) return {};
+                                Range range, double extent) {
   const double square = dot(u.high, u.high) * dot(v.high, v.high);
   Vector3d normal = u.high.cross(v.high);
   double normalSquare = dot(normal, normal);
@@ -116,7 +132,7 @@ Foot footOnPoint(const Vector3d& p, const Vector3d& a) {
   const Vector3d difference = p - a;
   const double extent = largest(difference);
   if (extent == 0.0) return {difference, Vector3d::Zero(), 0.0, 0.0, 0.0, false};
-  if (!isModerate(extent)) return exact::footOnPoint(p, a);
+  if (!isModerate(extent)) return atModerateScale(extent, footOnPoint, exact::footOnPoint, p, a);
   const double distance = std::sqrt(dot(difference, difference));
   return {difference, difference / distance, distance, 0.0, 0.0, false};
 }
@@ -124,7 +140,7 @@ Foot footOnPoint(const Vector3d& p, const Vector3d& a) {
 Foot footOnLine(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
   const Difference m = betweenMiddles(p, p, a, b), edge = half(difference(b, a));
   const double extent = std::max(largest(m.high), largest(edge.high));
-  if (!isModerate(extent)) return exact::footOnLine(p, a, b);
+  if (!isModerate(extent)) return atModerateScale(extent, footOnLine, exact::footOnLine, p, a, b);
   const double square = dot(edge.high, edge.high);
   Weight weight;
   weight.coarse = toCoarse(std::clamp(dot(m.high, edge.high) / square, -1.0, 1.0));
@@ -142,8 +158,11 @@ Foot footOnLine(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
 }
 
 Foot footOnFace(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-  std::optional<Foot> foot =
-      footOnPlane(difference(p, a), difference(a, b), difference(a, c), Range::ZeroToOne);
+  const Difference m = difference(p, a), u = difference(a, b), v = difference(a, c);
+  const double extent = extentOf(m, u, v, Range::ZeroToOne);
+  if (!isModerate(extent))
+    return atModerateScale(extent, footOnFace, exact::footOnPlane, p, a, b, c);
+  std::optional<Foot> foot = footOnPlane(m, u, v, Range::ZeroToOne, extent);
   return isTrue(foot, p, a, b, c) ? *foot : exact::footOnPlane(p, a, b, c);
 }
 
@@ -158,13 +177,26 @@ EdgePair::EdgePair(const Vector3d& newP0, const Vector3d& newP1, const Vector3d&
       v(half(difference(q0, q1))) {}
 
 Foot footBetweenEdges(const EdgePair& edges) {
-  std::optional<Foot> foot = footOnPlane(edges.m, edges.u, edges.v, Range::MinusOneToOne);
   const auto& [p0, p1, q0, q1, m, u, v] = edges;
+  const double extent = extentOf(m, u, v, Range::MinusOneToOne);
+  if (!isModerate(extent)) {
+    const auto find = [](const auto&... positions) {
+      return footBetweenEdges(EdgePair(positions...));
+    };
+    return atModerateScale(extent, find, exact::footBetweenLines, p0, p1, q0, q1);
+  }
+  std::optional<Foot> foot = footOnPlane(m, u, v, Range::MinusOneToOne, extent);
   return isTrue(foot, p0, p1, q0, q1) ? *foot : exact::footBetweenLines(p0, p1, q0, q1);
 }
 
 Vector3d unitCross(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
-  const Difference u = difference(b, a), v = difference(d, c);
+  const auto moderate = [](const Difference& edge) -> Difference {
+    const double extent = largest(edge.high);
+    if (isModerate(extent)) return edge;
+    const int exponent = exponentTowardsOne(extent);
+    return {scaled(edge.high, exponent), scaled(edge.low, exponent)};
+  };
+  const Difference u = moderate(difference(b, a)), v = moderate(difference(d, c));
   if (isModerate(largest(u.high)) && isModerate(largest(v.high))) {
     const Vector3d normal = accurateCross(u, v);
     const double square = dot(normal, normal);

@@ -52,13 +52,27 @@ FeatureDecision closestFeature(const Vector3d& p, const CornerPointers& corners)
   return exactly();
 }
 
+/// In a unit of their own, so that none overflows or vanishes.
+std::array<double, 3> squares(const std::array<Vector3d, 3>& a) {
+  const double extent = std::max({largest(a[0]), largest(a[1]), largest(a[2])});
+  if (isModerate(extent)) return {dot(a[0], a[0]), dot(a[1], a[1]), dot(a[2], a[2])};
+  std::array<double, 3> result;
+  for (int i = 0; i < 3; ++i) {
+    const Vector3d near = scaled(a[i], exponentTowardsOne(extent));
+    result[i] = dot(near, near);
+  }
+  return result;
+}
+
 /// The corner opposite the longest edge: the two shortest edges meet there. Equals are told apart
 /// by distance from p, then by coordinates, never by their order.
 int widestCorner(const Vector3d& p, const CornerPointers& corners) {
+  const auto& [a, b, c] = corners;
+  const std::array<double, 3> opposite = squares({*b - *c, *c - *a, *a - *b}),
+                              from = squares({p - *a, p - *b, p - *c});
   const auto rank = [&](int i) {
     const Vector3d& at = *corners[i];
-    const Vector3d opposite = *corners[(i + 1) % 3] - *corners[(i + 2) % 3], from = p - at;
-    return std::tuple(dot(opposite, opposite), dot(from, from), at[0], at[1], at[2]);
+    return std::tuple(opposite[i], from[i], at[0], at[1], at[2]);
   };
   const auto first = rank(0), second = rank(1), third = rank(2);
   if (first >= second && first >= third) return 0;

@@ -41,7 +41,9 @@ struct VertexTriangleDistance {
 ///          a triangle without area the coordinate axis along which it extends least, x before y
 ///          before z.
 /// Laws     (1) permuting the corners, mirroring an axis and scaling by powers of two give the same bits,
-///          mapped (where corners are mirror images of each other, weights may differ by 2^-53).
+///          mapped (where corners are mirror images of each other, weights may differ by 2^-53); a
+///          scale may neither take bits of positions and answers nor bring their differences beyond
+///          double.
 ///          (2) a point held by an edge or corner has the same bits from every triangle that shares
 ///          it.
 /// Errors   none. A triangle without area is answered for its longest edge, one without length for its

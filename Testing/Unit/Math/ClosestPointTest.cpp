@@ -252,40 +252,57 @@ TEST(ClosestPoint, SwappingEdgesOrEndsSwapsTheAnswer) {
   }
 }
 
-/// Mirrored in x, and scaled by a power of two.
-TEST(ClosestPoint, ExactTransformationsKeepTheBits) {
+template <class Answer>
+Bits mirroredBits(Answer answer) {
+  answer.difference[0] = -answer.difference[0];
+  answer.normal[0] = -answer.normal[0];
+  return bitsOf(answer);
+}
+
+template <class Answer>
+Bits scaledBits(Answer answer, int exponent) {
+  for (double& x : answer.difference) x = std::ldexp(x, exponent);
+  answer.distance = std::ldexp(answer.distance, exponent);
+  return bitsOf(answer);
+}
+
+TEST(ClosestPoint, MirroringKeepsTheBits) {
   Random random;
-  const double scale = 0x1p-7;
   for (int kind = 0; kind < 7; ++kind) {
     for (int i = 0; i < 500; ++i) {
       const Four x = configuration(kind, random);
-      Four mirrored = x, small = x;
+      Four mirrored = x;
       for (Vector3d& v : mirrored) v[0] = -v[0];
-      for (Vector3d& v : small) v *= scale;
-      const auto mapped = [&](auto answer, bool isMirrored) {
-        if (isMirrored) {
-          answer.difference[0] = -answer.difference[0];
-          answer.normal[0] = -answer.normal[0];
-        } else {
-          answer.difference /= scale;
-          answer.distance /= scale;
-        }
-        return bitsOf(answer);
-      };
-      const EdgeEdgeDistance edges = edgeEdgeDistance(x[0], x[1], x[2], x[3]);
-      const Bits edgeBits = bitsOf(edges);
-      ASSERT_EQ(mapped(edgeEdgeDistance(mirrored[0], mirrored[1], mirrored[2], mirrored[3]), true),
-                edgeBits);
-      ASSERT_EQ(mapped(edgeEdgeDistance(small[0], small[1], small[2], small[3]), false), edgeBits);
-      const VertexTriangleDistance face = vertexTriangleDistance(x[0], x[1], x[2], x[3]);
-      const Bits bits = bitsOf(face);
-      ASSERT_EQ(mapped(vertexTriangleDistance(small[0], small[1], small[2], small[3]), false),
-                bits);
+      ASSERT_EQ(mirroredBits(edgeEdgeDistance(mirrored[0], mirrored[1], mirrored[2], mirrored[3])),
+                bitsOf(edgeEdgeDistance(x[0], x[1], x[2], x[3])));
       if (kind == 3) continue;  // corners that are mirror images of each other
       ASSERT_EQ(
-          mapped(vertexTriangleDistance(mirrored[0], mirrored[1], mirrored[2], mirrored[3]), true),
-          bits)
+          mirroredBits(vertexTriangleDistance(mirrored[0], mirrored[1], mirrored[2], mirrored[3])),
+          bitsOf(vertexTriangleDistance(x[0], x[1], x[2], x[3])))
           << "kind " << kind << ", number " << i;
+    }
+  }
+}
+
+/// From where distances of 1e-17 of the positions still have all their bits to where squared
+/// lengths have long overflowed.
+TEST(ClosestPoint, PowersOfTwoKeepTheBits) {
+  Random random;
+  for (int kind = 0; kind < 7; ++kind) {
+    for (int i = 0; i < 200; ++i) {
+      const Four x = configuration(kind, random);
+      const EdgeEdgeDistance edges = edgeEdgeDistance(x[0], x[1], x[2], x[3]);
+      const VertexTriangleDistance face = vertexTriangleDistance(x[0], x[1], x[2], x[3]);
+      for (const int exponent : {-900, -521, -260, -99, -7, 79, 101, 255, 512, 900, 1001}) {
+        Four y = x;
+        for (Vector3d& v : y)
+          for (double& coordinate : v) coordinate = std::ldexp(coordinate, exponent);
+        ASSERT_EQ(bitsOf(edgeEdgeDistance(y[0], y[1], y[2], y[3])), scaledBits(edges, exponent))
+            << "kind " << kind << ", number " << i << ", 2^" << exponent;
+        ASSERT_EQ(bitsOf(vertexTriangleDistance(y[0], y[1], y[2], y[3])),
+                  scaledBits(face, exponent))
+            << "kind " << kind << ", number " << i << ", 2^" << exponent;
+      }
     }
   }
 }
