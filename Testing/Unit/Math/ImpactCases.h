@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include <cmath>
+#include <cstdint>
 #include <optional>
 
 namespace palpate {
@@ -15,7 +16,7 @@ namespace palpate {
 /// A query as the tests hold it.
 struct ImpactCase {
   bool edges;
-  oracle::Positions positions;
+  impact::Positions positions;
 
   std::optional<double> time(const TimeOfImpactSettings& settings = {}) const {
     const auto& p = positions;
@@ -79,5 +80,174 @@ inline ImpactCase randomCase(test::Random& random, bool edges) {
   for (Eigen::Vector3d& position : result.positions) position = random.inCube();
   return result;
 }
+
+/// Kinds of queries that are hard to decide.
+enum class ImpactKind {
+  Grid,
+  FullDoubles,
+  TouchAtStart,
+  TouchAtEnd,
+  TouchHalfway,
+  NearlyTouching,
+  InOnePlane,
+  Parallel,
+  Collinear,
+  Still,
+  MovingTogether,
+  Degenerate,
+  Identical,
+  FarAway,
+  MixedSizes,
+  Denormal,
+  Count
+};
+
+/// On grids small enough that all that is said of a case is true of its doubles.
+class HardCases {
+ public:
+  explicit HardCases(std::uint64_t seed) : m_random(seed) {}
+
+  ImpactCase next(ImpactKind kind) {
+    ImpactCase query = onGrid(m_random.below(2));
+    make(kind, query);
+    if (kind != ImpactKind::FullDoubles && m_random.below(2)) shear(query);
+    refine(kind, query);
+    return query;
+  }
+
+ private:
+  using Vector = Eigen::Vector3d;
+
+  static Vector& at(ImpactCase& query, int vertex, int end) {
+    return query.positions[static_cast<std::size_t>(4 * end + vertex)];
+  }
+  Vector point() { return m_random.onGrid(17) - Vector::Constant(8); }
+  ImpactCase onGrid(bool edges) {
+    ImpactCase query{edges, {}};
+    for (Vector& p : query.positions) p = 4 * point();
+    return query;
+  }
+
+  /// The features touch at that end, in quarters of theirs.
+  void touch(ImpactCase& query, int end) {
+    if (query.edges) {
+      const Vector p =
+          at(query, 0, end) + 0.25 * m_random.below(5) * (at(query, 1, end) - at(query, 0, end));
+      at(query, 3, end) = at(query, 2, end) + (1 << m_random.below(3)) * (p - at(query, 2, end));
+    } else {
+      const int i = m_random.below(5), j = m_random.below(5 - i);
+      at(query, 0, end) = at(query, 1, end) + 0.25 * i * (at(query, 2, end) - at(query, 1, end)) +
+                          0.25 * j * (at(query, 3, end) - at(query, 1, end));
+    }
+  }
+
+  /// Edges, or the triangle's corners and sometimes the vertex, along one direction.
+  void align(ImpactCase& query, int end, bool onOneLine) {
+    const Vector along = point();
+    const auto place = [&](int vertex, int from) {
+      at(query, vertex, end) = at(query, from, end) + (m_random.below(9) - 4) * along;
+    };
+    if (query.edges) {
+      place(1, 0);
+      if (onOneLine) place(2, 0);
+      place(3, 2);
+    } else {
+      place(2, 1);
+      place(3, 1);
+      if (onOneLine) place(0, 1);
+    }
+  }
+
+  void make(ImpactKind kind, ImpactCase& query) {
+    const auto ends = 1 + m_random.below(3);  // bits
+    switch (kind) {
+      case ImpactKind::Grid:
+        query = randomGridCase(m_random, query.edges, 1 + m_random.below(4));
+        break;
+      case ImpactKind::FullDoubles:
+        query = randomCase(m_random, query.edges);
+        break;
+      case ImpactKind::TouchAtStart:
+        touch(query, 0);
+        break;
+      case ImpactKind::TouchAtEnd:
+      case ImpactKind::NearlyTouching:
+        touch(query, 1);
+        break;
+      case ImpactKind::TouchHalfway:
+        touch(query, 1);
+        for (int i = 0; i < 4; ++i) at(query, i, 1) = 2 * at(query, i, 1) - at(query, i, 0);
+        break;
+      case ImpactKind::InOnePlane: {
+        const Vector u = point(), v = point(), origin = point();
+        for (Vector& p : query.positions)
+          p = origin + (m_random.below(9) - 4) * u + (m_random.below(9) - 4) * v;
+        break;
+      }
+      case ImpactKind::Parallel:
+      case ImpactKind::Collinear:
+        for (int end = 0; end < 2; ++end)
+          if (ends & 1 << end) align(query, end, kind == ImpactKind::Collinear);
+        break;
+      case ImpactKind::Still:
+        if (m_random.below(2)) touch(query, 0);
+        for (int i = 0; i < 4; ++i) at(query, i, 1) = at(query, i, 0);
+        break;
+      case ImpactKind::MovingTogether: {
+        if (m_random.below(2)) touch(query, 0);
+        const Vector move = 4 * point(), other = m_random.below(2) ? move : 4 * point();
+        for (int i = 0; i < 4; ++i)
+          at(query, i, 1) = at(query, i, 0) + (i < (query.edges ? 2 : 1) ? move : other);
+        break;
+      }
+      case ImpactKind::Degenerate:
+        for (int end = 0; end < 2; ++end) {
+          at(query, 3, end) = at(query, 2, end);
+          if (m_random.below(2)) at(query, 1, end) = at(query, query.edges ? 0 : 2, end);
+        }
+        if (m_random.below(2)) touch(query, 1);
+        break;
+      case ImpactKind::Identical:
+        for (int end = 0; end < 2; ++end)
+          if (ends & 1 << end)
+            for (int i = 0; i < (query.edges ? 2 : 1); ++i)
+              at(query, i, end) = at(query, query.edges ? 3 - i : 1, end);
+        break;
+      default:
+        if (m_random.below(2)) touch(query, 1);
+    }
+  }
+
+  /// Out of the axes, on the grid.
+  void shear(ImpactCase& query) {
+    Eigen::Matrix3d matrix;
+    for (int k = 0; k < 9; ++k) matrix(k / 3, k % 3) = m_random.below(7) - 3;
+    for (Vector& p : query.positions) p = Vector(matrix * p);
+  }
+
+  void refine(ImpactKind kind, ImpactCase& query) {
+    const auto nudged = [&](double x) {
+      return m_random.below(3) ? std::nextafter(x, m_random.below(2) ? 1e9 : -1e9)
+                               : x + std::ldexp(m_random.unit() - 0.5, -m_random.below(45));
+    };
+    if (kind == ImpactKind::NearlyTouching)
+      for (Vector& p : query.positions)
+        if (m_random.below(3) == 0) p[m_random.below(3)] = nudged(p[m_random.below(3)]);
+    if (kind == ImpactKind::FarAway) {
+      const Vector offset = m_random.below(2)
+                                ? Vector(std::ldexp(1.0, m_random.below(42)) * point())
+                                : Vector(1e6 * m_random.inCube());
+      for (Vector& p : query.positions) p += offset;
+    }
+    if (kind == ImpactKind::MixedSizes)
+      for (Vector& p : query.positions)
+        for (double& x : p)
+          if (m_random.below(3) == 0) x = std::ldexp(x, m_random.between(-90, 90));
+    if (kind == ImpactKind::Denormal)
+      for (Vector& p : query.positions) p = test::scaled(p, -1074 + m_random.below(4));
+  }
+
+  test::Random m_random;
+};
 
 }  // namespace palpate

@@ -12,7 +12,7 @@
 /// Continuous detection decided slowly and by other means than the library's: rational polynomials
 /// in the power basis, Sturm sequences, signs at roots by greatest common divisors and bisection,
 /// and formulas of degree four. Nothing here is shared with Source/.
-namespace palpate::oracle {
+namespace palpate::impact {
 
 using Rational = mpq_class;
 /// Coefficients of 1, t, t², …; no trailing zeros; zero is empty.
@@ -62,8 +62,17 @@ inline Division divide(Polynomial p, const Polynomial& by) {
   }
   return {quotient, p};
 }
+/// Times a positive number: whole coefficients without a common divisor, which are quicker.
+inline Polynomial primitive(Polynomial p) {
+  mpz_class denominator = 1, divisor = 0;
+  for (const Rational& c : p) denominator = lcm(denominator, c.get_den());
+  for (const Rational& c : p)
+    divisor = gcd(divisor, mpz_class(c.get_num() * denominator / c.get_den()));
+  for (Rational& c : p) c *= Rational(denominator) / divisor;
+  return p;
+}
 inline Polynomial commonDivisor(Polynomial l, Polynomial r) {
-  while (!r.empty()) l = std::exchange(r, divide(l, r).remainder);
+  while (!r.empty()) l = std::exchange(r, primitive(divide(l, r).remainder));
   return l;
 }
 
@@ -71,8 +80,8 @@ inline Polynomial commonDivisor(Polynomial l, Polynomial r) {
 inline int rootCount(const Polynomial& p, const Rational& low, const Rational& high) {
   std::vector<Polynomial> sequence{p, derivative(p)};
   while (!sequence.back().empty())
-    sequence.push_back(Polynomial{Rational(-1)} *
-                       divide(sequence[sequence.size() - 2], sequence.back()).remainder);
+    sequence.push_back(primitive(Polynomial{Rational(-1)} *
+                                 divide(sequence[sequence.size() - 2], sequence.back()).remainder));
   const auto changes = [&](const Rational& t) {
     int count = 0, last = 0;
     for (const Polynomial& q : sequence) {
@@ -111,7 +120,7 @@ struct Real {
 inline std::vector<Real> rootsInStep(const Polynomial& q) {
   std::vector<Real> roots;
   if (valueAt(q, 0) == 0) roots.push_back({{}, 0, 0});
-  const Polynomial p = divide(q, commonDivisor(q, derivative(q))).quotient;
+  const Polynomial p = primitive(divide(q, commonDivisor(q, derivative(q))).quotient);
   std::vector<std::array<Rational, 2>> pieces{{0, 1}};
   while (!pieces.empty()) {
     const auto [low, high] = pieces.back();
@@ -143,9 +152,14 @@ using Positions = std::array<Eigen::Vector3d, 8>;
 class Query {
  public:
   Query(bool edges, const Positions& positions) : m_edges(edges) {
+    // Whole numbers, times one power of two.
+    mpz_class scale = 1;
+    for (const Eigen::Vector3d& p : positions)
+      for (const double x : p) scale = lcm(scale, Rational(x).get_den());
     for (int i = 0; i < 4; ++i)
       for (int k = 0; k < 3; ++k) {
-        const Rational before(positions[i][k]), now(positions[4 + i][k]);
+        const Rational before = scale * Rational(positions[i][k]),
+                       now = scale * Rational(positions[4 + i][k]);
         m_vertices[i][k] = trimmed({before, now - before});
       }
     const auto& [v, a, b, c] = m_vertices;
@@ -227,4 +241,4 @@ class Query {
   std::vector<std::array<Vector, 3>> m_segments;  ///< a point and a segment's ends
 };
 
-}  // namespace palpate::oracle
+}  // namespace palpate::impact

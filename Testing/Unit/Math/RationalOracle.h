@@ -58,10 +58,8 @@ inline Rational parameter(const Vector& p, const Vector& a, const Vector& b) {
   return square == 0 ? Rational(0) : clamped(dot(p - a, edge) / square);
 }
 
-inline Closest vertexTriangle(const Eigen::Vector3d& dp, const Eigen::Vector3d& da,
-                              const Eigen::Vector3d& db, const Eigen::Vector3d& dc) {
-  const Vector p = toRational(dp);
-  const std::array<Vector, 3> corner{toRational(da), toRational(db), toRational(dc)};
+inline Closest vertexTriangle(const Vector& p, const Vector& a, const Vector& b, const Vector& c) {
+  const std::array<Vector, 3> corner{a, b, c};
   Closest best;
   best.square = -1;
   for (int i = 0; i < 3; ++i) {
@@ -92,10 +90,7 @@ inline Closest vertexTriangle(const Eigen::Vector3d& dp, const Eigen::Vector3d& 
   return best;
 }
 
-inline Closest edgeEdge(const Eigen::Vector3d& dp0, const Eigen::Vector3d& dp1,
-                        const Eigen::Vector3d& dq0, const Eigen::Vector3d& dq1) {
-  const Vector p0 = toRational(dp0), p1 = toRational(dp1), q0 = toRational(dq0),
-               q1 = toRational(dq1);
+inline Closest edgeEdge(const Vector& p0, const Vector& p1, const Vector& q0, const Vector& q1) {
   Closest best;
   best.square = -1;
   const auto attempt = [&](const Rational& s, const Rational& t) {
@@ -122,6 +117,15 @@ inline Closest edgeEdge(const Eigen::Vector3d& dp0, const Eigen::Vector3d& dp1,
     best.weights = {s, t, 0};
   }
   return best;
+}
+
+inline Closest vertexTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
+                              const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+  return vertexTriangle(toRational(p), toRational(a), toRational(b), toRational(c));
+}
+inline Closest edgeEdge(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
+                        const Eigen::Vector3d& q0, const Eigen::Vector3d& q1) {
+  return edgeEdge(toRational(p0), toRational(p1), toRational(q0), toRational(q1));
 }
 
 /// One unit in the last place of the largest coordinate difference among four positions.

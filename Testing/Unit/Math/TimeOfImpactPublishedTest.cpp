@@ -42,13 +42,13 @@ TEST(TimeOfImpactPublished, TimesAreThoseOfTheOracle) {
     for (std::size_t i = 0; i < set.queries.size(); ++i) {
       const auto& [positions, impact] = set.queries[i];
       if (!impact && i % 10 != 0) continue;
-      std::optional<oracle::Real> truth = oracle::Query(set.edges, positions).firstTouch();
+      std::optional<impact::Real> truth = impact::Query(set.edges, positions).firstTouch();
       ASSERT_EQ(truth.has_value(), impact) << set.name << ", query " << i;
       const std::optional<double> time = ImpactCase{set.edges, positions}.time();
       ASSERT_EQ(time.has_value(), impact) << set.name << ", query " << i;
       if (!impact) continue;
       EXPECT_GE(truth->compare(*time), 0) << set.name << ", query " << i;
-      EXPECT_LE(truth->compare(oracle::Rational(*time) + oracle::Rational(1e-6)), 0)
+      EXPECT_LE(truth->compare(impact::Rational(*time) + impact::Rational(1e-6)), 0)
           << set.name << ", query " << i;
     }
   }

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <string>
 #include <vector>
@@ -33,12 +34,12 @@ ImpactAnswer exactly(const ImpactCase& query, double tolerance) {
 
 /// Hit or none as the oracle has it; not late; early by at most the tolerance. For both paths.
 void expectTrue(const ImpactCase& query, double tolerance, int& impacts) {
-  std::optional<oracle::Real> truth = oracle::Query(query.edges, query.positions).firstTouch();
+  std::optional<impact::Real> truth = impact::Query(query.edges, query.positions).firstTouch();
   const auto check = [&](bool impact, double time, const char* path) {
     ASSERT_EQ(impact, truth.has_value()) << path << ", " << text(query);
     if (!impact) return;
     EXPECT_GE(truth->compare(time), 0) << path << " late at " << time << ", " << text(query);
-    EXPECT_LE(truth->compare(oracle::Rational(time) + oracle::Rational(tolerance)), 0)
+    EXPECT_LE(truth->compare(impact::Rational(time) + impact::Rational(tolerance)), 0)
         << path << " early at " << time << ", " << text(query);
   };
   const std::optional<double> time = query.time({0.0, tolerance});
@@ -46,6 +47,30 @@ void expectTrue(const ImpactCase& query, double tolerance, int& impacts) {
   const ImpactAnswer exact = exactly(query, tolerance);
   check(exact.impact, exact.time, "findTouchExactly");
   impacts += truth.has_value();
+}
+
+/// Cases and seed from the environment: the long run of `ctest -L long` has millions.
+long fromEnvironment(const char* name, long otherwise) {
+  const char* value = std::getenv(name);
+  return value ? std::atol(value) : otherwise;
+}
+
+TEST(TimeOfImpact, AgreesWithOracleOnHardCases) {
+  const long cases = fromEnvironment("PALPATE_IMPACT_CASES", 2000);
+  HardCases hard(static_cast<std::uint64_t>(fromEnvironment("PALPATE_IMPACT_SEED", 1)));
+  constexpr int kKinds = static_cast<int>(ImpactKind::Count);
+  constexpr double kTolerances[] = {1e-6, 1e-2, 0x1p-50};
+  int impacts[kKinds] = {};
+  for (long i = 0; i < cases; ++i) {
+    const auto kind = static_cast<int>(i % kKinds);
+    expectTrue(hard.next(static_cast<ImpactKind>(kind)), kTolerances[i / kKinds % 3],
+               impacts[kind]);
+    if (HasFailure()) FAIL() << "case " << i << " of kind " << kind;
+  }
+  for (int kind = 0; kind < kKinds; ++kind) {
+    RecordProperty("impactsOfKind" + std::to_string(kind), impacts[kind]);
+    EXPECT_GT(impacts[kind], cases / kKinds / 100) << kind;
+  }
 }
 
 TEST(TimeOfImpact, AgreesWithOracleOnSmallGrids) {
