@@ -3,6 +3,7 @@
 #include <palpate/TimeOfImpact.h>
 
 #include "ImpactOracle.h"
+#include "Math/ImpactQuery.h"
 #include "TrianglePairs.h"
 
 #include <Eigen/Core>
@@ -22,6 +23,11 @@ struct ImpactCase {
     const auto& p = positions;
     return (edges ? edgeEdgeTimeOfImpact : vertexTriangleTimeOfImpact)(p[0], p[1], p[2], p[3], p[4],
                                                                        p[5], p[6], p[7], settings);
+  }
+  ImpactQuery query() const {
+    ImpactQuery result{edges ? ImpactQuery::Kind::EdgeEdge : ImpactQuery::Kind::VertexTriangle, {}};
+    for (std::size_t i = 0; i < 4; ++i) result.vertices[i] = {&positions[i], &positions[4 + i]};
+    return result;
   }
   /// Vertex i is the old order[i].
   ImpactCase permuted(const std::array<int, 4>& order) const {
@@ -107,8 +113,9 @@ class HardCases {
  public:
   explicit HardCases(std::uint64_t seed) : m_random(seed) {}
 
-  ImpactCase next(ImpactKind kind) {
-    ImpactCase query = onGrid(m_random.below(2));
+  ImpactCase next(ImpactKind kind) { return next(kind, m_random.below(2)); }
+  ImpactCase next(ImpactKind kind, bool edges) {
+    ImpactCase query = onGrid(edges);
     make(kind, query);
     if (kind != ImpactKind::FullDoubles && m_random.below(2)) shear(query);
     refine(kind, query);
