@@ -36,9 +36,8 @@ struct KeyLayout {
   int bits() const { return 3 * levels + kLevelBits; }
   int level(std::uint32_t key) const { return static_cast<int>(key & ((1u << kLevelBits) - 1)); }
   /// The child of its cell at `level` that the key lies in.
-  unsigned octant(std::uint32_t key, int level) const {
-    return key >> (kLevelBits + 3 * (levels - 1 - level)) & 7;
-  }
+  unsigned octant(std::uint32_t key, int level) const { return key >> octantShift(level) & 7; }
+  int octantShift(int level) const { return kLevelBits + 3 * (levels - 1 - level); }
 };
 
 /// keys[i] = key << 32 | slot, for the box of each slot: level from its size, the deepest whose

@@ -82,32 +82,40 @@ std::uint32_t Octree::Layout::layOut(Octree& octree, Job job) {
   return split(octree, job, own);
 }
 
+/// Where the octants of a range of sorted keys begin: seven binary searches side by side, without
+/// branches, so that none waits for another's loads.
+std::array<std::uint32_t, 9> Octree::octantBegins(std::uint32_t begin, std::uint32_t end,
+                                                  int shift) const {
+  std::array<std::uint32_t, 9> begins;
+  begins.fill(begin);
+  begins[8] = end;
+  if (begin == end) return begins;
+  const std::uint64_t cell = m_keys[begin] >> 32 >> shift & ~std::uint64_t{7};
+  const std::uint64_t* places[8];
+  std::uint64_t bounds[8];
+  for (unsigned slot = 1; slot < 8; ++slot) {
+    places[slot] = m_keys.data() + begin;
+    bounds[slot] = (cell | slot) << shift << 32;
+  }
+  for (std::size_t length = end - begin; length > 0;) {
+    const std::size_t half = (length + 1) / 2;
+    for (unsigned slot = 1; slot < 8; ++slot)
+      places[slot] += half & -std::size_t{places[slot][half - 1] < bounds[slot]};
+    length -= half;
+  }
+  for (unsigned slot = 1; slot < 8; ++slot)
+    begins[slot] = static_cast<std::uint32_t>(places[slot] - m_keys.data());
+  return begins;
+}
+
 std::uint32_t Octree::Layout::split(Octree& octree, const Job& job, std::uint32_t own) {
   if (own > 0) leaf(job.begin, job.begin + own, job.node);
   const auto block = static_cast<std::uint32_t>(links.size());
   links.emplace_back();
   parents.push_back(job.node);
 
-  std::array<std::uint32_t, 9> begins;
-  const std::uint32_t first = job.begin + own;
-  const auto octant = [&](std::uint32_t i) { return job.keys.octant(octree.key(i), job.level); };
-  if (job.end - first <= 256) {
-    begins.fill(0);
-    for (std::uint32_t i = first; i < job.end; ++i) ++begins[octant(i) + 1];
-    begins[0] = first;
-    std::partial_sum(begins.begin(), begins.end(), begins.begin());
-  } else {
-    begins[0] = first;
-    for (unsigned slot = 1; slot < 8; ++slot) {
-      std::uint32_t low = begins[slot - 1], high = job.end;
-      while (low < high) {
-        const std::uint32_t middle = low + (high - low) / 2;
-        (octant(middle) < slot ? low : high) = octant(middle) < slot ? middle + 1 : middle;
-      }
-      begins[slot] = low;
-    }
-    begins[8] = job.end;
-  }
+  const std::array<std::uint32_t, 9> begins = octree.octantBegins(
+      job.begin + own, job.end, job.keys.octantShift(job.level));
 
   for (unsigned slot = 0; slot < 8; ++slot) {
     const std::uint32_t size = begins[slot + 1] - begins[slot];

@@ -128,6 +128,8 @@ class Octree {
  private:
   class Layout;
   std::uint32_t key(std::size_t i) const { return static_cast<std::uint32_t>(m_keys[i] >> 32); }
+  std::array<std::uint32_t, 9> octantBegins(std::uint32_t begin, std::uint32_t end,
+                                            int shift) const;
   void sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const Cube&, KeyLayout,
                 const Threads*);
   void assemble(std::size_t tasks, const Threads&);
