@@ -1,6 +1,7 @@
 #include "Octree/Keys.h"
 
 #include <bit>
+#include <cstring>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Octree/Keys.cpp"
@@ -41,13 +42,15 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
   // them.
   constexpr std::size_t kGathered = 64;
   alignas(64) float gathered[6][kGathered];
-  alignas(64) std::int32_t made[8];
+  alignas(64) std::int32_t gatheredSlots[kGathered];
+  alignas(64) std::int32_t made[16];
 
   for (std::size_t i = 0; i < size; i += lanes) {
     const std::size_t count = size - i < lanes ? size - i : lanes, place = i % kGathered;
     if (slots && place == 0) {
       for (std::size_t next = 0; next < kGathered && i + next < size; ++next) {
         const auto slot = static_cast<std::uint32_t>(slots[i + next]);
+        gatheredSlots[next] = static_cast<std::int32_t>(slot);
         for (int k = 0; k < 3; ++k) {
           gathered[k][next] = boxes.lower[k][slot];
           gathered[3 + k][next] = boxes.upper[k][slot];
@@ -80,10 +83,16 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
     for (int k = 0; k < 3; ++k) cell[k] = spreadBits(hn::Shl(hn::Shr(cell[k], coarse), coarse));
     const auto morton =
         hn::Or(cell[0], hn::Or(hn::ShiftLeft<1>(cell[1]), hn::ShiftLeft<2>(cell[2])));
-    hn::StoreU(hn::Or(hn::ShiftLeft<KeyLayout::kLevelBits>(morton), level), di, made);
-    for (std::size_t lane = 0; lane < count; ++lane) {
-      const std::uint64_t slot = slots ? slots[i + lane] & 0xffffffffu : first + i + lane;
-      keys[i + lane] = std::uint64_t{static_cast<std::uint32_t>(made[lane])} << 32 | slot;
+    // Slot and key side by side are a little-endian key << 32 | slot.
+    const auto key = hn::Or(hn::ShiftLeft<KeyLayout::kLevelBits>(morton), level);
+    const auto slot = slots ? hn::LoadU(di, gatheredSlots + place)
+                            : hn::Iota(di, static_cast<std::int32_t>(first + i));
+    auto* out = reinterpret_cast<std::int32_t*>(keys + i);
+    if (count == lanes) {
+      hn::StoreInterleaved2(slot, key, di, out);
+    } else {
+      hn::StoreInterleaved2(slot, key, di, made);
+      std::memcpy(out, made, count * sizeof(std::uint64_t));
     }
   }
 }

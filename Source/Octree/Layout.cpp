@@ -8,6 +8,10 @@
 
 namespace palpate {
 
+/// A cell that needs second keys is one task's up to this size: sorted in the top it would keep
+/// other threads waiting.
+constexpr std::uint32_t kMostInOneTask = 8192;
+
 int keyLevels(std::size_t size, const OctreeSettings& settings, int depth) {
   const std::size_t leaves = size / static_cast<std::size_t>(settings.maxPrimitivesPerLeaf) + 1;
   const int levels = (std::bit_width(leaves) + 1) / 2 +
@@ -50,7 +54,7 @@ void Octree::Layout::layOutTask(Octree& octree, const Job& job, const OctreeSett
   m_threads = nullptr;
   Job own = job;
   own.node = kTaskRoot;
-  layOut(octree, own);
+  rootChild = layOut(octree, own);
 }
 
 std::uint32_t Octree::Layout::leaf(std::uint32_t begin, std::uint32_t end, OctreeNode node) {
@@ -63,8 +67,15 @@ std::uint32_t Octree::Layout::layOut(Octree& octree, Job job) {
   const std::uint32_t size = job.end - job.begin;
   if (size <= m_mostPerLeaf || job.depth >= m_maxDepth || job.cube.edge <= kSmallestCell)
     return leaf(job.begin, job.end, job.node);
-  if (job.level == job.keys.levels) {
-    // Too full at the keys' last level: split further by second keys inside the cell.
+  // Too full at the keys' last level: split further by second keys inside the cell.
+  const bool rekey = job.level == job.keys.levels;
+  if (m_taskSize > 0 && size <= (rekey ? std::max(m_taskSize, kMostInOneTask) : m_taskSize)) {
+    tasks.push_back(job);
+    groups.push_back(job.begin);
+    groupNodes.push_back(kTask | static_cast<std::uint32_t>(tasks.size() - 1));
+    return 0;  // known when the tasks are done
+  }
+  if (rekey) {
     job.keys.levels = keyLevels(
         size, {.maxDepth = m_maxDepth, .maxPrimitivesPerLeaf = int(m_mostPerLeaf)}, job.depth);
     job.level = 0;
@@ -73,12 +84,6 @@ std::uint32_t Octree::Layout::layOut(Octree& octree, Job job) {
   std::uint32_t own = 0;
   while (own < size && job.keys.level(octree.key(job.begin + own)) == job.level) ++own;
   if (own == size) return leaf(job.begin, job.end, job.node);
-  if (size <= m_taskSize) {
-    tasks.push_back(job);
-    groups.push_back(job.begin);
-    groupNodes.push_back(kTask | static_cast<std::uint32_t>(tasks.size() - 1));
-    return 0;  // known when the tasks are done
-  }
   return split(octree, job, own);
 }
 

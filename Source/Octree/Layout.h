@@ -34,11 +34,12 @@ class Octree::Layout {
   Buffer<std::uint32_t> groups;
   Buffer<OctreeNode> groupNodes;
   Buffer<Job> tasks;
+  std::uint32_t rootChild = 0;  ///< of a task: its block 0, or a leaf
 
   /// Of the whole tree: block 0 holds the root alone.
   void layOutTop(Octree&, const Job& root, const OctreeSettings&, std::uint32_t taskSize,
                  const Threads&);
-  /// Of one task: block 0 holds the children of its root.
+  /// Of one task: block 0 holds the children of its root, unless that is a leaf.
   void layOutTask(Octree&, const Job&, const OctreeSettings&);
 
  private:

@@ -197,7 +197,9 @@ void Octree::assemble(std::size_t tasks, const Threads& threads) {
   });
   for (std::size_t i = 0; i < tasks; ++i) {
     const OctreeNode node = top.tasks[i].node;
-    m_pool[node >> 3].child[node & 7] = m_taskBlocks[i + 1];
+    const std::uint32_t child = m_layouts[i + 1].rootChild;
+    m_pool[node >> 3].child[node & 7] =
+        child & OctreeBlock::kLeaf ? child : child + m_taskBlocks[i + 1];
   }
 }
 
