@@ -9,20 +9,23 @@ namespace palpate {
 SampledExtent sampleExtent(std::span<const Eigen::Vector3d> positions) {
   SampledExtent extent;
   if (positions.empty()) return extent;
-  constexpr std::size_t kMost = 63;
+  constexpr std::size_t kMost = 31;
   const std::size_t count = std::min(kMost, positions.size());
   std::array<double, kMost> sample;
   for (int axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < count; ++i)
       sample[i] = positions[i * positions.size() / count][axis];
-    const auto at = [&](std::size_t eighths) {
-      const auto place = sample.begin() + static_cast<std::ptrdiff_t>(count * eighths / 8);
-      std::nth_element(sample.begin(), place, sample.begin() + count);
-      return *place;
+    const auto begin = sample.begin(), end = begin + static_cast<std::ptrdiff_t>(count);
+    const auto at = [&](auto from, std::size_t eighths, auto to) {
+      const auto place = begin + static_cast<std::ptrdiff_t>(count * eighths / 8);
+      std::nth_element(from, place, to);
+      return place;
     };
-    extent.median[axis] = at(4);
+    const auto middle = at(begin, 4, end);
+    extent.median[axis] = *middle;
     // Halved: the difference of two doubles may be beyond their range.
-    extent.spread = std::max(extent.spread, 2.0 * (0.5 * at(7) - 0.5 * at(1)));
+    const double first = *at(begin, 1, middle), seventh = *at(middle, 7, end);
+    extent.spread = std::max(extent.spread, 2.0 * (0.5 * seventh - 0.5 * first));
   }
   return extent;
 }
