@@ -37,26 +37,46 @@ inline void radixSort(std::span<std::uint64_t> from, std::span<std::uint64_t> to
   }
   const int digitBits = size < 192 ? 6 : size < 1024 ? 8 : 11;
   constexpr int kMostDigits = 6;
-  std::array<std::array<std::uint32_t, 2048>, kMostDigits> counts;
+  std::array<std::array<std::array<std::uint32_t, 2048>, kMostDigits>, 2> counts;
   const int digits = (high - low + digitBits - 1) / digitBits;
   const auto bins = std::size_t{1} << digitBits;
   const std::uint64_t mask = bins - 1;
   const auto lastMask = (std::uint64_t{1} << (high - low - (digits - 1) * digitBits)) - 1;
-  for (int digit = 0; digit < digits; ++digit) std::fill_n(counts[digit].begin(), bins, 0u);
-  for (const std::uint64_t item : from) {
+  for (int digit = 0; digit < digits; ++digit)
+    for (auto& half : counts) std::fill_n(half[digit].begin(), bins, 0u);
+  // From both ends at once: nearly sorted items meet the same count again and again, each time
+  // waiting for its last store.
+  const auto count = [&](auto& half, std::uint64_t item) {
     std::uint64_t rest = item >> low;
-    for (int digit = 0; digit + 1 < digits; ++digit, rest >>= digitBits)
-      ++counts[digit][rest & mask];
-    ++counts[digits - 1][rest & lastMask];
+    for (int digit = 0; digit + 1 < digits; ++digit, rest >>= digitBits) ++half[digit][rest & mask];
+    ++half[digits - 1][rest & lastMask];
+  };
+  const std::size_t middle = size / 2;
+  for (std::size_t i = 0; i < middle; ++i) {
+    count(counts[0], from[i]);
+    count(counts[1], from[middle + i]);
   }
+  if (size & 1) count(counts[1], from[size - 1]);
   for (int digit = 0; digit < digits; ++digit) {
     const int shift = low + digit * digitBits;
     const std::uint64_t digitMask = digit + 1 == digits ? lastMask : mask;
-    auto& count = counts[digit];
-    if (count[from[0] >> shift & digitMask] == size) continue;
+    auto &begins = counts[0][digit], &ends = counts[1][digit];
+    const std::uint64_t first = from[0] >> shift & digitMask;
+    if (begins[first] + ends[first] == size) continue;
     std::uint32_t sum = 0;
-    for (std::size_t bin = 0; bin <= digitMask; ++bin) sum += std::exchange(count[bin], sum);
-    for (const std::uint64_t item : from) to[count[item >> shift & digitMask]++] = item;
+    for (std::size_t bin = 0; bin <= digitMask; ++bin) {
+      const std::uint32_t own = begins[bin] + ends[bin];
+      begins[bin] = sum;
+      ends[bin] = sum += own;
+    }
+    const std::uint64_t* items = from.data();
+    std::uint64_t* out = to.data();
+    for (std::size_t i = 0, j = size; i < middle; ++i) {
+      const std::uint64_t front = items[i], back = items[--j];
+      out[begins[front >> shift & digitMask]++] = front;
+      out[--ends[back >> shift & digitMask]] = back;
+    }
+    if (size & 1) out[begins[items[middle] >> shift & digitMask]] = items[middle];
     std::swap(from, to);
   }
   if (from.data() != destination) std::copy(from.begin(), from.end(), destination);

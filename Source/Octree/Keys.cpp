@@ -25,7 +25,7 @@ HWY_INLINE V spreadBits(V v) {
 HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slots,
                                std::uint32_t first, std::size_t size, const Cube& cube,
                                KeyLayout layout, std::uint64_t* keys) {
-  const hn::CappedTag<float, 8> d;
+  const hn::CappedTag<float, 16> d;
   const hn::RebindToSigned<decltype(d)> di;
   const std::size_t lanes = hn::Lanes(d);
   const float cells = static_cast<float>(1 << layout.levels);
@@ -43,7 +43,7 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
   constexpr std::size_t kGathered = 64;
   alignas(64) float gathered[6][kGathered];
   alignas(64) std::int32_t gatheredSlots[kGathered];
-  alignas(64) std::int32_t made[16];
+  alignas(64) std::int32_t made[32];
 
   for (std::size_t i = 0; i < size; i += lanes) {
     const std::size_t count = size - i < lanes ? size - i : lanes, place = i % kGathered;

@@ -78,26 +78,36 @@ void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const 
   }
   // Keys in parallel; then by their first digit into bins that fit the cache; then each bin.
   const int topBits = std::min(9, 3 * layout.levels), topShift = high - topBits;
-  const std::size_t bins = std::size_t{1} << topBits, chunks = (size + kGrain - 1) / kGrain;
-  m_binCounts.resize(bins * chunks);
+  const std::size_t bins = std::size_t{1} << topBits, halves = 2 * ((size + kGrain - 1) / kGrain);
+  m_binCounts.resize(bins * halves);
+  // Each chunk in two halves at once: nearly sorted keys meet the same count again and again, each
+  // time waiting for its last store.
+  const auto forHalves = [&](std::size_t chunk, std::size_t from, std::size_t to, auto&& f) {
+    std::uint32_t *first = m_binCounts.data() + 2 * chunk * bins, *second = first + bins;
+    const std::size_t half = (to - from) / 2;
+    for (std::size_t i = from; i < from + half; ++i) {
+      f(first[keys[i] >> topShift], i);
+      f(second[keys[i + half] >> topShift], i + half);
+    }
+    if ((to - from) & 1) f(second[keys[to - 1] >> topShift], to - 1);
+  };
   threads->forChunks(size, kGrain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
     octreeKeys(m_boxes, slots ? slots + from : nullptr, static_cast<std::uint32_t>(begin + from),
                to - from, cube, layout, keys.data() + from);
-    std::uint32_t* counts = m_binCounts.data() + chunk * bins;
-    std::fill_n(counts, bins, 0u);
-    for (std::size_t i = from; i < to; ++i) ++counts[keys[i] >> topShift];
+    std::fill_n(m_binCounts.data() + 2 * chunk * bins, 2 * bins, 0u);
+    forHalves(chunk, from, to, [](std::uint32_t& count, std::size_t) { ++count; });
   });
   m_binBegins.resize(bins + 1);
   std::uint32_t sum = 0;
   for (std::size_t bin = 0; bin < bins; ++bin) {
     m_binBegins[bin] = sum;
-    for (std::size_t chunk = 0; chunk < chunks; ++chunk)
-      sum += std::exchange(m_binCounts[chunk * bins + bin], sum);
+    for (std::size_t half = 0; half < halves; ++half)
+      sum += std::exchange(m_binCounts[half * bins + bin], sum);
   }
   m_binBegins[bins] = sum;
   threads->forChunks(size, kGrain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
-    std::uint32_t* next = m_binCounts.data() + chunk * bins;
-    for (std::size_t i = from; i < to; ++i) scratch[next[keys[i] >> topShift]++] = keys[i];
+    forHalves(chunk, from, to,
+              [&](std::uint32_t& next, std::size_t i) { scratch[next++] = keys[i]; });
   });
   threads->forChunks(bins, 8, [&](std::size_t, std::size_t from, std::size_t to) {
     for (std::size_t bin = from; bin < to; ++bin) {
