@@ -23,8 +23,10 @@ int keyLevels(std::size_t size, const OctreeSettings& settings, int depth) {
 void Octree::Layout::clear() {
   links.clear();
   parents.clear();
-  groups.clear();
-  groupNodes.clear();
+  m_groupCount = 0;
+  groups.resize(groups.capacity());
+  groupNodes.resize(groups.size());
+  reserveGroups();
   tasks.clear();
 }
 
@@ -44,6 +46,7 @@ void Octree::Layout::layOutTop(Octree& octree, const Job& root, const OctreeSett
   links[0].begin[0] = root.begin;
   const std::uint32_t child = layOut(octree, root);
   links[0].child[0] = child;
+  trimGroups();
 }
 
 void Octree::Layout::layOutTask(Octree& octree, const Job& job, const OctreeSettings& settings) {
@@ -55,11 +58,20 @@ void Octree::Layout::layOutTask(Octree& octree, const Job& job, const OctreeSett
   Job own = job;
   own.node = kTaskRoot;
   rootChild = layOut(octree, own);
+  trimGroups();
+}
+
+/// Room for those of a block's eight slots and one more.
+void Octree::Layout::reserveGroups() {
+  if (m_groupCount + 9 <= groups.size()) return;
+  groups.resize(2 * groups.size() + 64);
+  groupNodes.resize(groups.size());
 }
 
 std::uint32_t Octree::Layout::leaf(std::uint32_t begin, std::uint32_t end, OctreeNode node) {
-  groups.push_back(begin);
-  groupNodes.push_back(node);
+  groups[m_groupCount] = begin;
+  groupNodes[m_groupCount++] = node;
+  reserveGroups();
   return OctreeBlock::kLeaf | (end - begin);
 }
 
@@ -71,8 +83,7 @@ std::uint32_t Octree::Layout::layOut(Octree& octree, Job job) {
   const bool rekey = job.level == job.keys.levels;
   if (m_taskSize > 0 && size <= (rekey ? std::max(m_taskSize, kMostInOneTask) : m_taskSize)) {
     tasks.push_back(job);
-    groups.push_back(job.begin);
-    groupNodes.push_back(kTask | static_cast<std::uint32_t>(tasks.size() - 1));
+    leaf(job.begin, job.end, kTask | static_cast<std::uint32_t>(tasks.size() - 1));
     return 0;  // known when the tasks are done
   }
   if (rekey) {
@@ -118,22 +129,27 @@ std::uint32_t Octree::Layout::split(Octree& octree, const Job& job, std::uint32_
   const auto block = static_cast<std::uint32_t>(links.size());
   links.emplace_back();
   parents.push_back(job.node);
-
-  const std::array<std::uint32_t, 9> begins = octree.octantBegins(
-      job.begin + own, job.end, job.keys.octantShift(job.level));
-
+  const std::array<std::uint32_t, 9> begins =
+      octree.octantBegins(job.begin + own, job.end, job.keys.octantShift(job.level));
+  for (unsigned slot = 0; slot < 8; ++slot) {
+    links[block].begin[slot] = begins[slot];
+    links[block].child[slot] = OctreeBlock::kLeaf | (begins[slot + 1] - begins[slot]);
+  }
   for (unsigned slot = 0; slot < 8; ++slot) {
     const std::uint32_t size = begins[slot + 1] - begins[slot];
     const OctreeNode node = block * 8 + slot;
-    std::uint32_t child = OctreeBlock::kLeaf;
     if (size > m_mostPerLeaf) {
-      child = layOut(octree, {begins[slot], begins[slot + 1], job.level + 1, job.depth + 1,
-                              job.keys, job.cube.child(slot), node});
-    } else if (size > 0) {
-      child = leaf(begins[slot], begins[slot + 1], node);
+      const std::uint32_t child =
+          layOut(octree, {begins[slot], begins[slot + 1], job.level + 1, job.depth + 1, job.keys,
+                          job.cube.child(slot), node});
+      links[block].child[slot] = child;
+      reserveGroups();
+    } else {
+      // An empty slot's is overwritten by the next: no branch to be mispredicted.
+      groups[m_groupCount] = begins[slot];
+      groupNodes[m_groupCount] = node;
+      m_groupCount += size > 0;
     }
-    links[block].begin[slot] = begins[slot];
-    links[block].child[slot] = child;
   }
   return block;
 }

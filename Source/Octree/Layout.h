@@ -47,7 +47,13 @@ class Octree::Layout {
   std::uint32_t split(Octree&, const Job&, std::uint32_t own);
   std::uint32_t leaf(std::uint32_t begin, std::uint32_t end, OctreeNode);
   void clear();
+  void reserveGroups();
+  void trimGroups() {
+    groups.resize(m_groupCount);
+    groupNodes.resize(m_groupCount);
+  }
 
+  std::size_t m_groupCount = 0;
   std::uint32_t m_mostPerLeaf = 0, m_taskSize = 0;
   int m_maxDepth = 0;
   const Threads* m_threads = nullptr;  ///< none within a task
