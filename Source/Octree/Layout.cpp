@@ -126,6 +126,7 @@ std::array<std::uint32_t, 9> Octree::octantBegins(std::uint32_t begin, std::uint
 
 std::uint32_t Octree::Layout::split(Octree& octree, const Job& job, std::uint32_t own) {
   if (own > 0) leaf(job.begin, job.begin + own, job.node);
+  reserveGroups();
   const auto block = static_cast<std::uint32_t>(links.size());
   links.emplace_back();
   parents.push_back(job.node);
