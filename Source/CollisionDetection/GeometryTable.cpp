@@ -13,9 +13,9 @@ namespace {
 
 /// Below this many triangles a geometry is updated by one thread, beside others.
 constexpr std::size_t kSmall = 16384;
-constexpr std::size_t kVertexGrain = 16384;
+constexpr std::size_t kVertexGrain = 4096;
 constexpr std::size_t kTrianglesPerGroup = 1024;  ///< for bounds, before there are nodes
-constexpr std::size_t kGroupGrain = 1024;
+constexpr std::size_t kGroupGrain = 256;
 /// A refitted tree is rebuilt when its leaves have become this much larger in relation to their
 /// triangles.
 constexpr double kMostLoosening = 1.5;

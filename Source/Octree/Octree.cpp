@@ -214,7 +214,7 @@ void Octree::assemble(std::size_t tasks, const Threads& threads) {
 }
 
 void Octree::fit(const Threads& threads) {
-  threads.forChunks(m_groupNodes.size(), kGrain,
+  threads.forChunks(m_groupNodes.size(), kGrain / 8,
                     [&](std::size_t, std::size_t from, std::size_t to) {
                       for (std::size_t g = from; g < to; ++g)
                         m_pool[m_groupNodes[g] >> 3].setBox(m_groupNodes[g] & 7, m_groupBoxes[g]);
@@ -229,14 +229,14 @@ void Octree::fit(const Threads& threads) {
 }
 
 void Octree::measureLooseness() {
-  constexpr std::size_t kStride = 8;
+  const std::size_t stride = std::max<std::size_t>(8, m_groupNodes.size() / 256);
   const auto halfArea = [](const Box& box) {
     const double x = double{box.upper[0]} - box.lower[0], y = double{box.upper[1]} - box.lower[1],
                  z = double{box.upper[2]} - box.lower[2];
     return x * y + y * z + z * x;
   };
   double groups = 0, primitives = 0;
-  for (std::size_t g = 0; g < m_groupNodes.size(); g += kStride) {
+  for (std::size_t g = 0; g < m_groupNodes.size(); g += stride) {
     groups += halfArea(m_groupBoxes[g]);
     for (std::size_t i = m_groups[g]; i < m_groups[g + 1]; ++i) primitives += halfArea(m_boxes[i]);
   }
