@@ -87,8 +87,12 @@ std::uint32_t Octree::Layout::layOut(Octree& octree, Job job) {
     return 0;  // known when the tasks are done
   }
   if (rekey) {
-    job.keys.levels = keyLevels(
-        size, {.maxDepth = m_maxDepth, .maxPrimitivesPerLeaf = int(m_mostPerLeaf)}, job.depth);
+    // Where most of the tree is still in one cell it is tiny in the root, and the more levels at
+    // once the better.
+    const bool tiny = 2 * std::size_t{size} > octree.size();
+    job.keys.levels =
+        keyLevels(tiny ? SIZE_MAX : size,
+                  {.maxDepth = m_maxDepth, .maxPrimitivesPerLeaf = int(m_mostPerLeaf)}, job.depth);
     job.level = 0;
     octree.sortKeys(job.begin, job.end, true, job.cube, job.keys, m_threads);
   }

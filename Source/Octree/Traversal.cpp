@@ -183,13 +183,13 @@ class Walk {
     return longest;
   }
 
-  /// A node much larger than the other comes down alone, else the small one would be at its leaves
+  /// A node larger than the other comes down alone, else the small one would be at its leaves
   /// before the large one has come to its size.
   HWY_ATTR void descendLarger(NodePair pair) {
     const float a = extent(m_a, pair.a), b = extent(m_b, pair.b);
-    if (a > 4 * b)
+    if (a > 2 * b)
       descendA(pair);
-    else if (b > 4 * a)
+    else if (b > 2 * a)
       descendB(pair);
     else
       descendBoth(pair);
