@@ -257,17 +257,24 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
     spread = std::max(spread, geometry->spread);
   }
   const double scale = frameScale(spread);
-  m_small.clear();
-  m_large.clear();
+  m_changed.clear();
   for (const auto& geometry : m_geometries) {
     if (geometry->treeIsNow() && geometry->frame.scale == scale) continue;
     geometry->frame.scale = scale;
-    (geometry->mesh.topology.triangles.size() < kSmall ? m_small : m_large)
-        .push_back(geometry.get());
+    m_changed.push_back(geometry.get());
   }
+  // Side by side, the largest first, and a large one's work is shared too: what one does alone is
+  // hidden by another.
+  const auto size = [](const Geometry* geometry) {
+    return geometry->mesh.topology.triangles.size();
+  };
+  std::sort(m_changed.begin(), m_changed.end(), [&](const Geometry* l, const Geometry* r) {
+    return size(l) != size(r) ? size(l) > size(r) : l->id < r->id;
+  });
   const Threads one(1);
-  threads.forEach(m_small.size(), [&](std::size_t i) { updateOctree(*m_small[i], settings, one); });
-  for (Geometry* geometry : m_large) updateOctree(*geometry, settings, threads);
+  threads.forEach(m_changed.size(), [&](std::size_t i) {
+    updateOctree(*m_changed[i], settings, size(m_changed[i]) < kSmall ? one : threads);
+  });
 }
 
 void GeometryTable::endFrame() {

@@ -71,7 +71,7 @@ class GeometryTable {
  private:
   std::vector<std::unique_ptr<Geometry>> m_geometries;  ///< ascending ids
   std::uint32_t m_nextId = 0;
-  std::vector<Geometry*> m_small, m_large;
+  std::vector<Geometry*> m_changed;
 };
 
 std::string nameOf(GeometryId);  ///< "geometry 3"
