@@ -1,7 +1,8 @@
 #!/bin/bash
-# test.sh PROGRAM CAPTURES: Replay's answers and refusals.
+# test.sh PROGRAM CAPTURES [FAULT]: Replay's answers and refusals; with a library that, loaded first, makes octrees lose
+# contacts, also what it shrinks.
 set -uo pipefail
-program=$1 captures=$2
+program=$1 captures=$2 fault=${3-}
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 fail() { echo "FAILED: $*"; exit 1; }
@@ -15,6 +16,30 @@ for file in "$captures"/*.capture; do
   count=$((count + 1))
 done
 ((count > 0)) || fail "no captures"
+
+# Two strips of 60 triangles, one above the other.
+strips() {
+  awk 'BEGIN {
+    print "palpate-capture 1\nOctree 1 32 16 Auto\n2 1"
+    for (g = 0; g < 2; ++g) {
+      print "geometry", g, 62, 60
+      for (i = 0; i < 62; ++i) printf "%x %x %x %x %x %x\n", i, i % 2, g, i, i % 2, g
+      for (t = 0; t < 60; ++t) print t, t + 1, t + 2
+    }
+    print "pair 0 1 Proximity Proximity 1.8p+0 All\nend"
+  }'
+}
+if [[ -n $fault ]]; then
+  strips >"$folder/strips.capture"
+  "$program" "$folder/strips.capture" >"$folder/text" || fail "differs without a fault: $(cat "$folder/text")"
+  LD_PRELOAD=$fault "$program" "$folder/strips.capture" --shrink "$folder/small.capture" >"$folder/text"
+  [[ $? -eq 1 ]] || fail "the fault was not seen: $(cat "$folder/text")"
+  grep -q "missing in edgeEdge: edge" "$folder/text" || fail "not said what is missing: $(cat "$folder/text")"
+  grep -q "^2 of 120 triangles still differ" "$folder/text" || fail "not shrunk: $(tail -1 "$folder/text")"
+  LD_PRELOAD=$fault "$program" "$folder/small.capture" >"$folder/text"
+  [[ $? -eq 1 ]] || fail "the smaller problem does not differ: $(cat "$folder/text")"
+  "$program" "$folder/small.capture" >"$folder/text" || fail "it differs without the fault"
+fi
 
 # Refused in one line, with a code of its own.
 refused() {

@@ -1,12 +1,17 @@
 #include "CollisionDetection/Audit.h"
 
+#include <palpate/Capture.h>
+
 #include "CollisionDetection/Order.h"
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <initializer_list>
+#include <iterator>
 #include <random>
-#include <span>
+#include <string>
+#include <system_error>
 
 namespace palpate {
 
@@ -41,15 +46,78 @@ std::array<std::uint32_t, 4> idsOf(const EdgeEdgeContact& c) {
 }
 std::array<std::uint32_t, 2> idsOf(const TrianglePair& pair) { return {pair.a, pair.b}; }
 
-/// Calls f with those expected that are not among those found.
-template <class Contact, class F>
-void forEachMissing(std::span<const Contact> expected, std::span<const Contact> found, F&& f) {
-  const auto before = [](const Contact* l, const Contact* r) { return idsOf(*l) < idsOf(*r); };
-  std::vector<const Contact*> sorted;
-  for (const Contact& contact : found) sorted.push_back(&contact);
-  std::sort(sorted.begin(), sorted.end(), before);
-  for (const Contact& contact : expected)
-    if (!std::binary_search(sorted.begin(), sorted.end(), &contact, before)) f(contact);
+/// Which contacts a sample of features tells everything about.
+class Coverage {
+ public:
+  Coverage(const MeshPair& meshes, const FeatureLists& sample)
+      : m_meshes(meshes),
+        m_sample(sample),
+        m_byTriangles(meshes.settings.method == Method::Intersection) {}
+
+  bool ofVertexTriangle(const VertexTriangleContact& c) const {
+    if (c.vertex >= m_meshes.a.topology.vertexCount) return true;  // there is no such vertex
+    if (!m_byTriangles) return holds(m_sample.verticesOfA, c.vertex);
+    return all(m_meshes.a.topology.vertexTriangles[c.vertex],
+               [&](std::uint32_t s) { return ofTriangles(s, c.triangle); });
+  }
+  bool ofTriangleVertex(const VertexTriangleContact& c) const {
+    return m_byTriangles ? holds(m_sample.trianglesOfA, c.triangle)
+                         : holds(m_sample.verticesOfB, c.vertex);
+  }
+  bool ofEdges(const EdgeEdgeContact& c) const {
+    const MeshTopology &a = m_meshes.a.topology, &b = m_meshes.b.topology;
+    const std::uint32_t edgeA = idOf(a, c.edgeA), edgeB = idOf(b, c.edgeB);
+    if (edgeA == kNoEdge || edgeB == kNoEdge) return true;  // nor such edges
+    if (!m_byTriangles) return holds(m_sample.edgesOfA, edgeA);
+    return all(a.edgeTriangles[edgeA], [&](std::uint32_t s) {
+      return all(b.edgeTriangles[edgeB], [&](std::uint32_t t) { return ofTriangles(s, t); });
+    });
+  }
+  bool ofTriangles(std::uint32_t s, std::uint32_t t) const {
+    return holds(m_sample.trianglesOfA, m_meshes.self() ? std::min(s, t) : s);
+  }
+
+ private:
+  static bool holds(const std::vector<std::uint32_t>& list, std::uint32_t id) {
+    return std::binary_search(list.begin(), list.end(), id);
+  }
+  template <class F>
+  static bool all(std::span<const std::uint32_t> ids, F&& f) {
+    return std::all_of(ids.begin(), ids.end(), f);
+  }
+  static std::uint32_t idOf(const MeshTopology& topology, const Segment& edge) {
+    const auto& edges = topology.edges;
+    const auto place = std::lower_bound(edges.begin(), edges.end(), edge);
+    if (place == edges.end() || *place != edge) return kNoEdge;
+    return static_cast<std::uint32_t>(place - edges.begin());
+  }
+
+  const MeshPair& m_meshes;
+  const FeatureLists& m_sample;
+  bool m_byTriangles;
+};
+
+/// Calls report(fault, expected, found) where two lists differ: of those found, in those covered.
+template <class Contact, class Covered, class Report>
+void compare(std::vector<Contact> expected, std::span<const Contact> allFound, Covered&& covered,
+             Report&& report) {
+  const auto before = [](const Contact& l, const Contact& r) { return idsOf(l) < idsOf(r); };
+  std::vector<Contact> found;
+  std::copy_if(allFound.begin(), allFound.end(), std::back_inserter(found), covered);
+  std::stable_sort(expected.begin(), expected.end(), before);
+  std::stable_sort(found.begin(), found.end(), before);
+  using Fault = AuditFailure::Fault;
+  auto f = found.begin();
+  for (const Contact& e : expected) {
+    for (; f != found.end() && before(*f, e); ++f) report(Fault::Invented, {}, *f);
+    if (f == found.end() || before(e, *f)) {
+      report(Fault::Missing, e, {});
+    } else {
+      if (!(*f == e)) report(Fault::Different, e, *f);
+      ++f;
+    }
+  }
+  for (; f != found.end(); ++f) report(Fault::Invented, {}, *f);
 }
 
 }  // namespace
@@ -84,35 +152,83 @@ FeatureLists drawFeatures(const MeshPair& meshes, const CollisionPair& pair,
 void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionData& data,
            const AuditSettings& settings, std::uint64_t frame, std::vector<AuditFailure>& out) {
   ContactBuffers contacts;
-  findContactsByBruteForce(meshes, drawFeatures(meshes, pair, settings, frame), contacts);
+  const FeatureLists sample = drawFeatures(meshes, pair, settings, frame);
+  findContactsByBruteForce(meshes, sample, contacts);
   ContactBuffers* const buffers[] = {&contacts};
   OrderScratch scratch;
   CollisionData::Contents expected;
   orderContacts(buffers, scratch, expected);
 
   using List = AuditFailure::List;
-  const auto report = [&](List list) {
-    return [=, &pair, &out](const auto& contact) {
-      out.push_back({pair.a, pair.b, frame, list, contact});
+  using Fault = AuditFailure::Fault;
+  using Any = AuditFailure::Contact;
+  const auto into = [&](List list) {
+    return [=, &pair, &out](Fault fault, const Any& e, const Any& f) {
+      out.push_back({pair.a, pair.b, frame, fault, list, e, f, {}, {}});
     };
   };
   if (meshes.settings.contacts == Contacts::Earliest) {
     const auto reportEarlier = [&](const auto& all) {
       for (const auto& contact : all)
-        if (contact.timeOfImpact < data.earliestTimeOfImpact()) report(List::Earliest)(contact);
+        if (contact.timeOfImpact < data.earliestTimeOfImpact())
+          into(List::Earliest)(Fault::Missing, contact, {});
     };
     reportEarlier(expected.vertexTriangle);
     reportEarlier(expected.triangleVertex);
     reportEarlier(expected.edgeEdge);
     return;
   }
-  forEachMissing<VertexTriangleContact>(expected.vertexTriangle, data.vertexTriangle(),
-                                        report(List::VertexTriangle));
-  forEachMissing<VertexTriangleContact>(expected.triangleVertex, data.triangleVertex(),
-                                        report(List::TriangleVertex));
-  forEachMissing<EdgeEdgeContact>(expected.edgeEdge, data.edgeEdge(), report(List::EdgeEdge));
-  forEachMissing<TrianglePair>(expected.intersectingTriangles, data.intersectingTriangles(),
-                               report(List::IntersectingTriangles));
+  const Coverage coverage(meshes, sample);
+  compare(
+      expected.vertexTriangle, data.vertexTriangle(),
+      [&](const auto& c) { return coverage.ofVertexTriangle(c); }, into(List::VertexTriangle));
+  compare(
+      expected.triangleVertex, data.triangleVertex(),
+      [&](const auto& c) { return coverage.ofTriangleVertex(c); }, into(List::TriangleVertex));
+  compare(
+      expected.edgeEdge, data.edgeEdge(), [&](const auto& c) { return coverage.ofEdges(c); },
+      into(List::EdgeEdge));
+  compare(
+      expected.intersectingTriangles, data.intersectingTriangles(),
+      [&](const auto& c) { return coverage.ofTriangles(c.a, c.b); },
+      into(List::IntersectingTriangles));
+}
+
+CollisionProblem pairAlone(const CollisionProblem& whole, GeometryId idA, GeometryId idB) {
+  CollisionProblem problem{whole.settings, {}, {}};
+  for (CollisionProblem::Pair pair : whole.pairs) {
+    const CollisionProblem::Mesh &a = whole.geometries[pair.a], &b = whole.geometries[pair.b];
+    if (a.id != idA || b.id != idB) continue;
+    problem.geometries.push_back(a);
+    if (pair.a != pair.b) problem.geometries.push_back(b);
+    pair.b = pair.a == pair.b ? 0 : 1;
+    pair.a = 0;
+    problem.pairs.push_back(pair);
+  }
+  return problem;
+}
+
+void keepProblem(const CollisionProblem& problem, const AuditSettings& settings,
+                 std::span<AuditFailure> failures) {
+  const AuditFailure& first = failures.front();
+  const std::string name = "frame" + std::to_string(first.frame) + "-pair" +
+                           std::to_string(static_cast<std::uint32_t>(first.a)) + "-" +
+                           std::to_string(static_cast<std::uint32_t>(first.b));
+  std::filesystem::path file = settings.folder / (name + ".capture");
+  std::error_code fault;
+  for (int copy = 2; std::filesystem::exists(file, fault); ++copy)
+    file = settings.folder / (name + "-" + std::to_string(copy) + ".capture");
+  std::string error;
+  try {
+    writeCapture(pairAlone(problem, first.a, first.b), file);
+  } catch (const Error& e) {
+    error = e.what();
+    file.clear();
+  }
+  for (AuditFailure& failure : failures) {
+    failure.file = file;
+    failure.fileError = error;
+  }
 }
 
 }  // namespace palpate

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <palpate/Audit.h>
+#include <palpate/CollisionProblem.h>
 #include <palpate/Settings.h>
 
 #include "CollisionDetection/PairTable.h"
 #include "NarrowPhase/NarrowPhase.h"
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace palpate {
@@ -16,8 +18,16 @@ namespace palpate {
 FeatureLists drawFeatures(const MeshPair&, const CollisionPair&, const AuditSettings&,
                           std::uint64_t frame);
 
-/// Appends every contact that brute force finds from a drawn sample of features and `data` lacks.
+/// Appends every contact that a drawn sample of features should have by brute force and has not in
+/// `data`, or the other way round. Of Contacts::Earliest only impacts before the one known.
 void audit(const MeshPair&, const CollisionPair&, const CollisionData& data, const AuditSettings&,
            std::uint64_t frame, std::vector<AuditFailure>& out);
+
+/// One pair of the problem alone.
+CollisionProblem pairAlone(const CollisionProblem&, GeometryId a, GeometryId b);
+
+/// Writes the problem of one pair's failures into a new file of the settings' folder, and its name
+/// into each of them.
+void keepProblem(const CollisionProblem&, const AuditSettings&, std::span<AuditFailure>);
 
 }  // namespace palpate

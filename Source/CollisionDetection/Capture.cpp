@@ -1,5 +1,7 @@
 #include <palpate/Capture.h>
 
+#include "CollisionDetection/Audit.h"
+
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -225,18 +227,7 @@ void capture(const OctreeBasedCD& detection, const std::filesystem::path& path) 
 
 void capture(const OctreeBasedCD& detection, const AuditFailure& failure,
              const std::filesystem::path& path) {
-  const CollisionProblem whole = detection.problem();
-  CollisionProblem problem{whole.settings, {}, {}};
-  for (CollisionProblem::Pair pair : whole.pairs) {
-    const CollisionProblem::Mesh &a = whole.geometries[pair.a], &b = whole.geometries[pair.b];
-    if (a.id != failure.a || b.id != failure.b) continue;
-    problem.geometries.push_back(a);
-    if (pair.a != pair.b) problem.geometries.push_back(b);
-    pair.b = pair.a == pair.b ? 0 : 1;
-    pair.a = 0;
-    problem.pairs.push_back(pair);
-  }
-  writeCapture(problem, path);
+  writeCapture(pairAlone(detection.problem(), failure.a, failure.b), path);
 }
 
 CollisionProblem readCapture(const std::filesystem::path& path) {

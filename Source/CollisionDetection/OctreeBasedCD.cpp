@@ -11,8 +11,11 @@
 #include "Octree/Forest.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <mutex>
 #include <optional>
+#include <span>
+#include <system_error>
 #include <unordered_map>
 
 namespace palpate {
@@ -37,6 +40,12 @@ const Settings& checked(const Settings& settings) {
   check(settings.threads >= 0 && settings.threads <= 1024, "threads", settings.threads,
         "in [0, 1024]");
   check(settings.audit.features >= 0, "audit.features", settings.audit.features, "at least 0");
+  check(settings.audit.mostFiles >= 0, "audit.mostFiles", settings.audit.mostFiles, "at least 0");
+  std::error_code fault;
+  if (const auto& folder = settings.audit.folder;
+      !folder.empty() && !std::filesystem::is_directory(folder, fault))
+    throw Error(ErrorCode::InvalidSettings,
+                "settings: audit.folder \"" + folder.string() + "\" is not a folder");
   return settings;
 }
 
@@ -59,6 +68,7 @@ struct OctreeBasedCD::Implementation {
   bool inFrame = false;
   std::vector<AuditFailure> auditFailures;
   std::uint64_t detections = 0;
+  int auditFiles = 0;
   std::mutex sorting;  ///< of candidates, when a const query first asks for them
   PairOrderScratch sortingScratch;
 
@@ -180,9 +190,35 @@ struct OctreeBasedCD::Implementation {
     auditFailures.clear();
     ++detections;
     if (settings.audit.features == 0) return;
-    for (const auto& record : pairs.records())
+    for (const auto& record : pairs.records()) {
+      const std::size_t first = auditFailures.size();
       audit(record->meshes(), record->pair, record->data, settings.audit, detections,
             auditFailures);
+      const auto own = std::span(auditFailures).subspan(first);
+      if (own.empty() || settings.audit.folder.empty()) continue;
+      if (auditFiles < settings.audit.mostFiles) {
+        keepProblem(problem(), settings.audit, own);
+        auditFiles += !own.front().file.empty();
+      } else {
+        for (AuditFailure& failure : own)
+          failure.fileError =
+              "audit.mostFiles were written into \"" + settings.audit.folder.string() + "\" before";
+      }
+    }
+  }
+
+  CollisionProblem problem() const {
+    CollisionProblem problem{settings, {}, {}};
+    std::unordered_map<const Geometry*, std::uint32_t> indices;
+    for (const auto& geometry : geometries.all()) {
+      indices.emplace(geometry.get(), static_cast<std::uint32_t>(indices.size()));
+      const TriangleMesh& mesh = geometry->mesh;
+      problem.geometries.push_back({geometry->id, mesh.before, mesh.now, mesh.topology.triangles});
+    }
+    for (const auto& record : pairs.records())
+      problem.pairs.push_back(
+          {indices.at(record->a), indices.at(record->b), record->pair.settings, record->method});
+    return problem;
   }
 
   std::shared_ptr<LooseOctree::State> state;
@@ -285,19 +321,7 @@ std::span<const AuditFailure> OctreeBasedCD::auditFailures() const {
   return m_implementation->auditFailures;
 }
 
-CollisionProblem OctreeBasedCD::problem() const {
-  CollisionProblem problem{m_implementation->settings, {}, {}};
-  std::unordered_map<const Geometry*, std::uint32_t> indices;
-  for (const auto& geometry : m_implementation->geometries.all()) {
-    indices.emplace(geometry.get(), static_cast<std::uint32_t>(indices.size()));
-    const TriangleMesh& mesh = geometry->mesh;
-    problem.geometries.push_back({geometry->id, mesh.before, mesh.now, mesh.topology.triangles});
-  }
-  for (const auto& record : m_implementation->pairs.records())
-    problem.pairs.push_back(
-        {indices.at(record->a), indices.at(record->b), record->pair.settings, record->method});
-  return problem;
-}
+CollisionProblem OctreeBasedCD::problem() const { return m_implementation->problem(); }
 
 CollisionData detectCollision(const TriangleMeshView& a, const TriangleMeshView& b,
                               const PairSettings& settings) {

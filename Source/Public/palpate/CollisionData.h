@@ -21,6 +21,7 @@ struct VertexTriangleContact {
   Eigen::Vector3d normal;                ///< unit, from the triangle towards the vertex
   double distance;      ///< L, never negative; at the time of impact for Continuous
   double timeOfImpact;  ///< [0, 1] of the step; 0 for the static methods
+  friend bool operator==(const VertexTriangleContact&, const VertexTriangleContact&) = default;
 };
 
 /// An edge against an edge.
@@ -29,6 +30,7 @@ struct EdgeEdgeContact {
   double weightA, weightB;                    ///< closest point = p0 + weight (p1 - p0)
   Eigen::Vector3d normal;                     ///< unit, from b towards a
   double distance, timeOfImpact;              ///< L; [0, 1] of the step
+  friend bool operator==(const EdgeEdgeContact&, const EdgeEdgeContact&) = default;
 };
 
 /// Four vertices with signed weights: their weighted sum of positions is the vector between the two

@@ -81,8 +81,9 @@ class PALPATE_EXPORT OctreeBasedCD {
   const LooseOctree& octree() const;          ///< as of the last update()
   const FrameStatistics& statistics() const;  ///< of the last frame
   const Settings& settings() const;
-  /// With Settings::audit, the contacts that the last detectCollision() missed, as far as its
-  /// sample of features shows: empty unless this library is at fault.
+  /// With Settings::audit, where the last detectCollision() and brute force differ, as far as its
+  /// sample of features shows: empty unless this library is at fault. Never an exception: a file
+  /// that could not be written is said in its failures.
   std::span<const AuditFailure> auditFailures() const;
   /// What detectCollision() would be given now, copied out; straight after a frame, that frame's.
   CollisionProblem problem() const;

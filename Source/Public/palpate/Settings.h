@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 
 namespace palpate {
 
@@ -29,6 +30,10 @@ struct AuditSettings {
   /// least 0; 0: no audit, at no cost. Each costs a test against every triangle or edge.
   int features = 0;
   std::uint64_t seed = 0;  ///< same seed, frame number and pair: same sample
+  /// Where to keep a file (see <palpate/Capture.h>) for each pair and frame with failures: a folder
+  /// that is there. Empty: none are kept. Files that are there stay as they are.
+  std::filesystem::path folder{};
+  int mostFiles = 100;  ///< over the life of an OctreeBasedCD, at least 0
 };
 
 struct Settings {

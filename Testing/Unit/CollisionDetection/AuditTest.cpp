@@ -16,8 +16,9 @@ namespace {
 using testing::Mesh;
 using testing::Random;
 using List = AuditFailure::List;
+using Fault = AuditFailure::Fault;
 
-constexpr AuditSettings kEverything{.features = 1 << 20};
+const AuditSettings kEverything{.features = 1 << 20};
 constexpr PairSettings kPairSettings[]{
     {.method = Method::Intersection},
     {.method = Method::Proximity, .thickness = 0.05},
@@ -77,43 +78,67 @@ void forEachScene(F&& f) {
     }
 }
 
-bool same(const TrianglePair& l, const TrianglePair& r) { return l == r; }
-bool same(const VertexTriangleContact& l, const VertexTriangleContact& r) {
-  return l.vertex == r.vertex && l.triangle == r.triangle && l.corners == r.corners &&
-         l.distance == r.distance && l.normal == r.normal;
-}
-bool same(const EdgeEdgeContact& l, const EdgeEdgeContact& r) {
-  return l.edgeA == r.edgeA && l.edgeB == r.edgeB && l.distance == r.distance &&
-         l.normal == r.normal;
+void expectOne(const std::vector<AuditFailure>& failures, const Scene& scene, Fault fault,
+               List list, const AuditFailure::Contact& expected,
+               const AuditFailure::Contact& found) {
+  ASSERT_EQ(failures.size(), 1u);
+  EXPECT_EQ(failures[0].fault, fault);
+  EXPECT_EQ(failures[0].list, list);
+  EXPECT_EQ(failures[0].a, scene.pair.a);
+  EXPECT_EQ(failures[0].b, scene.pair.b);
+  EXPECT_EQ(failures[0].frame, 1u);
+  EXPECT_TRUE(failures[0].expected == expected);
+  EXPECT_TRUE(failures[0].found == found);
 }
 
-/// Takes each contact of a list out in turn: it must be the one failure.
+/// Values that no frame would give.
+void falsify(VertexTriangleContact& c) { c.distance = std::nextafter(c.distance, 2.0); }
+void falsify(EdgeEdgeContact& c) { c.normal = -c.normal; }
+/// Ids that no frame would give: the last of those there are.
+void rename(VertexTriangleContact& c) { c.vertex = c.triangle = 29; }
+void rename(EdgeEdgeContact& c) { c.edgeA = {0, 1}, c.edgeB = {88, 89}; }
+void rename(TrianglePair& pair) { pair = {28, 29}; }
+
+/// Takes each contact of a list out in turn, or changes it, or puts another one beside it: it must
+/// be the one failure.
 template <class Contact>
-void expectEachMissed(const Scene& scene, List list,
-                      std::vector<Contact> CollisionData::Contents::*member) {
-  const CollisionData::Contents found = scene.found();
-  for (std::size_t i = 0; i < (found.*member).size(); ++i) {
-    CollisionData::Contents faulty = found;
+void expectEachFault(const Scene& scene, List list,
+                     std::vector<Contact> CollisionData::Contents::*member) {
+  const CollisionData::Contents good = scene.found();
+  for (std::size_t i = 0; i < (good.*member).size(); ++i) {
+    const Contact& contact = (good.*member)[i];
+    CollisionData::Contents faulty = good;
     (faulty.*member).erase((faulty.*member).begin() + static_cast<std::ptrdiff_t>(i));
-    const std::vector<AuditFailure> failures = scene.failures(faulty);
-    ASSERT_EQ(failures.size(), 1u);
-    EXPECT_EQ(failures[0].list, list);
-    EXPECT_EQ(failures[0].a, scene.pair.a);
-    EXPECT_EQ(failures[0].b, scene.pair.b);
-    EXPECT_EQ(failures[0].frame, 1u);
-    EXPECT_TRUE(same(std::get<Contact>(failures[0].expected), (found.*member)[i]));
+    expectOne(scene.failures(faulty), scene, Fault::Missing, list, contact, {});
+    if (i % 5 != 0) continue;
+    faulty = good;
+    (faulty.*member).push_back(contact);
+    expectOne(scene.failures(faulty), scene, Fault::Invented, list, {}, contact);
+    Contact other = contact;
+    rename(other);
+    if (std::find((good.*member).begin(), (good.*member).end(), other) == (good.*member).end()) {
+      (faulty.*member).back() = other;
+      expectOne(scene.failures(faulty), scene, Fault::Invented, list, {}, other);
+    }
+    if constexpr (requires { falsify(other); }) {
+      faulty = good;
+      other = contact;
+      falsify(other);
+      (faulty.*member)[i] = other;
+      expectOne(scene.failures(faulty), scene, Fault::Different, list, contact, other);
+    }
   }
 }
 
-TEST(Audit, FiresForEachContactTakenOut) {
+TEST(Audit, FiresForEachContactTakenOutAddedOrChanged) {
   std::size_t contacts = 0;
   forEachScene([&](const Scene& scene) {
     EXPECT_TRUE(scene.failures(scene.found()).empty());
-    expectEachMissed(scene, List::VertexTriangle, &CollisionData::Contents::vertexTriangle);
-    expectEachMissed(scene, List::TriangleVertex, &CollisionData::Contents::triangleVertex);
-    expectEachMissed(scene, List::EdgeEdge, &CollisionData::Contents::edgeEdge);
-    expectEachMissed(scene, List::IntersectingTriangles,
-                     &CollisionData::Contents::intersectingTriangles);
+    expectEachFault(scene, List::VertexTriangle, &CollisionData::Contents::vertexTriangle);
+    expectEachFault(scene, List::TriangleVertex, &CollisionData::Contents::triangleVertex);
+    expectEachFault(scene, List::EdgeEdge, &CollisionData::Contents::edgeEdge);
+    expectEachFault(scene, List::IntersectingTriangles,
+                    &CollisionData::Contents::intersectingTriangles);
     EXPECT_GT(scene.found().vertexTriangle.size(), 0u);
     EXPECT_GT(scene.found().edgeEdge.size(), 0u);
     contacts += scene.found().edgeEdge.size();

@@ -136,8 +136,7 @@ TEST_F(Capture, KeepsThePairOfAnAuditsFailure) {
   const OctreeBasedCD detection = movedScene();
   const GeometryId a{1}, b{2};
   const CollisionData& whole = detection.collisionData(b, a);
-  const AuditFailure failure{b, a, 2, AuditFailure::List::VertexTriangle,
-                             whole.vertexTriangle().front()};
+  const AuditFailure failure{.a = b, .b = a};
   capture(detection, failure, file());
   CollisionProblem problem = readCapture(file());
   ASSERT_EQ(problem.pairs.size(), 1u);
@@ -148,8 +147,7 @@ TEST_F(Capture, KeepsThePairOfAnAuditsFailure) {
   replay.detectCollision();
   EXPECT_EQ(replay.collisionData(GeometryId{0}, GeometryId{1}).hash(), whole.hash());
 
-  const AuditFailure ofItself{a, a, 2, AuditFailure::List::IntersectingTriangles,
-                              TrianglePair{0, 1}};
+  const AuditFailure ofItself{.a = a, .b = a};
   capture(detection, ofItself, file());
   problem = readCapture(file());
   ASSERT_EQ(problem.geometries.size(), 1u);
