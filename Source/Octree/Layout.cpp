@@ -64,7 +64,9 @@ void Octree::Layout::layOutTask(Octree& octree, const Job& job, const OctreeSett
 /// Room for those of a block's eight slots and one more.
 void Octree::Layout::reserveGroups() {
   if (m_groupCount + 9 <= groups.size()) return;
-  groups.resize(2 * groups.size() + 64);
+  groups.reserve(groups.size() + groups.size() / 8 + 16);
+  groups.resize(groups.capacity());
+  groupNodes.reserve(groups.size());
   groupNodes.resize(groups.size());
 }
 
@@ -132,6 +134,10 @@ std::uint32_t Octree::Layout::split(Octree& octree, const Job& job, std::uint32_
   if (own > 0) leaf(job.begin, job.begin + own, job.node);
   reserveGroups();
   const auto block = static_cast<std::uint32_t>(links.size());
+  if (block == links.capacity()) {  // by less than std::vector would: there are many layouts
+    links.reserve(block + block / 8 + 2);
+    parents.reserve(links.capacity());
+  }
   links.emplace_back();
   parents.push_back(job.node);
   const std::array<std::uint32_t, 9> begins =
