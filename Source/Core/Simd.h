@@ -16,3 +16,22 @@
 #endif
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+
+#include <cstdint>
+#include <cstring>
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate::HWY_NAMESPACE {
+
+/// A mask of at most 16 lanes as bits, the first lane's lowest.
+template <class D, class M>
+HWY_ATTR HWY_INLINE std::uint32_t bitsOf(D d, M mask) {
+  std::uint8_t bytes[8] = {};
+  hwy::HWY_NAMESPACE::StoreMaskBits(d, mask, bytes);
+  std::uint32_t bits;
+  std::memcpy(&bits, bytes, sizeof bits);
+  return bits;
+}
+
+}  // namespace palpate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();

@@ -1,9 +1,12 @@
 #include "NarrowPhase/FeaturePairs.h"
 
+#include "NarrowPhase/FeatureTests.h"
 #include "Math/Box.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cstring>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "NarrowPhase/FeaturePairs.cpp"
@@ -40,20 +43,25 @@ HWY_ATTR HWY_INLINE Bounds joined(const Bounds& s, const Bounds& t) {
   return bounds;
 }
 
+/// What brings boxes into the frame they are compared in.
+struct Shift {
+  std::array<float, 4> lower{}, upper{};
+};
+
 HWY_ATTR HWY_INLINE Bounds triangleBounds(const FloatPoint* now, const Triangle& triangle) {
   return joined(joined(boundsOf(now[triangle[0]]), boundsOf(now[triangle[1]])),
                 boundsOf(now[triangle[2]]));
 }
 
-/// Into b's frame, inflated, outward.
-HWY_ATTR HWY_INLINE Bounds shifted(const Bounds& bounds, const FloatPair& floats) {
+/// Inflated, outward.
+HWY_ATTR HWY_INLINE Bounds shifted(const Bounds& bounds, const Shift& shift) {
   const D d;
   const V relative = hn::Set(d, OutwardRounding::kRelative),
           absolute = hn::Set(d, OutwardRounding::kAbsolute);
   Bounds moved;
   for (std::size_t k = 0; k < kVectors; ++k) {
-    const V lower = hn::Add(bounds.lower[k], hn::LoadU(d, floats.shiftLower.data() + k * kLanes));
-    const V upper = hn::Add(bounds.upper[k], hn::LoadU(d, floats.shiftUpper.data() + k * kLanes));
+    const V lower = hn::Add(bounds.lower[k], hn::LoadU(d, shift.lower.data() + k * kLanes));
+    const V upper = hn::Add(bounds.upper[k], hn::LoadU(d, shift.upper.data() + k * kLanes));
     moved.lower[k] = hn::Sub(lower, hn::Add(hn::Mul(hn::Abs(lower), relative), absolute));
     moved.upper[k] = hn::Add(upper, hn::Add(hn::Mul(hn::Abs(upper), relative), absolute));
   }
@@ -68,241 +76,314 @@ HWY_ATTR HWY_INLINE bool overlap(const Bounds& s, const Bounds& t) {
   return all;
 }
 
-/// Triangle pairs side by side: their corners' floats, those of a first, and what is to be
-/// compared.
-struct Batch {
-  static constexpr std::size_t kSize = 16;
-  alignas(64) FloatPoint now[6][kSize];
-  alignas(64) FloatPoint before[6][kSize];
-  alignas(
-      64) std::uint32_t choices[kSize];  ///< bits 0-2: corners of a, 3-5: of b, 6 + 3 i + j: edges
-  TrianglePair pairs[kSize];
-  std::size_t size = 0;
+/// The features of a triangle side by side.
+struct alignas(64) FeatureRow {
+  float bounds[3][2 * kFeatures];    ///< of each axis: lower, then upper
+  std::uint32_t ids[kFeatures];      ///< vertices, edges, the triangle
+  std::uint16_t ownedByA, ownedByB;  ///< tests, if this is triangle a, or b
 };
-constexpr int kTests = 15;
-
-using WideTag = hn::CappedTag<float, Batch::kSize>;
-using Wide = hn::Vec<WideTag>;
-
-/// One bound of one feature, lane by lane, in three axes; and both bounds.
-struct WideBounds {
-  Wide lower[3], upper[3];
-};
-
-HWY_ATTR HWY_INLINE WideBounds joined(const WideBounds& s, const WideBounds& t) {
-  WideBounds bounds;
-  for (int k = 0; k < 3; ++k) {
-    bounds.lower[k] = hn::Min(s.lower[k], t.lower[k]);
-    bounds.upper[k] = hn::Max(s.upper[k], t.upper[k]);
-  }
-  return bounds;
-}
+static_assert(sizeof(FeatureRow) == 256, "three lines of bounds, one of the rest");
 
 enum class Sweep { None, Step, PartOfStep };
+
+/// One of two meshes.
+struct Side {
+  const MeshTopology& topology;
+  const FloatPoint *now, *before;
+  Shift shift;
+  float upTo;
+};
 
 /// A vertex, or its way through the step or the first part of it. The float nearest to where it is
 /// at upTo is within the margin: the ends and that float are off by 2^-24 of themselves each, the
 /// three operations by as much again. (Clamped ends say nothing of what is between.)
 template <Sweep sweep>
-HWY_ATTR HWY_INLINE WideBounds cornerBounds(const Batch& batch, int corner, std::size_t lane,
-                                            float upTo) {
-  const WideTag d;
-  Wide p[3], q[3], unused;
-  hn::LoadInterleaved4(d, &batch.now[corner][lane].x, p[0], p[1], p[2], unused);
-  WideBounds bounds;
-  for (int k = 0; k < 3; ++k) bounds.lower[k] = bounds.upper[k] = p[k];
+HWY_ATTR HWY_INLINE Bounds cornerBounds(const Side& side, std::uint32_t vertex) {
+  const D d;
+  Bounds bounds = boundsOf(side.now[vertex]);
   if constexpr (sweep == Sweep::None) return bounds;
-  hn::LoadInterleaved4(d, &batch.before[corner][lane].x, q[0], q[1], q[2], unused);
-  for (int k = 0; k < 3; ++k) {
+  for (std::size_t k = 0; k < kVectors; ++k) {
+    const V p = bounds.lower[k], q = hn::Load(d, &side.before[vertex].x + k * kLanes);
     if constexpr (sweep == Sweep::PartOfStep) {
-      const Wide reach = hn::Add(hn::Abs(p[k]), hn::Abs(q[k]));
-      const Wide margin =
+      const V reach = hn::Add(hn::Abs(p), hn::Abs(q));
+      const V margin =
           hn::Add(hn::Mul(reach, hn::Set(d, 0x1p-21f)), hn::Set(d, OutwardRounding::kAbsolute));
-      const Wide moved = hn::Add(q[k], hn::Mul(hn::Set(d, upTo), hn::Sub(p[k], q[k])));
+      const V moved = hn::Add(q, hn::Mul(hn::Set(d, side.upTo), hn::Sub(p, q)));
       const auto inRange = hn::Lt(reach, hn::Set(d, kLargestFloat));
-      bounds.lower[k] = hn::IfThenElse(inRange, hn::Sub(moved, margin), p[k]);
-      bounds.upper[k] = hn::IfThenElse(inRange, hn::Add(moved, margin), p[k]);
+      bounds.lower[k] = hn::IfThenElse(inRange, hn::Sub(moved, margin), p);
+      bounds.upper[k] = hn::IfThenElse(inRange, hn::Add(moved, margin), p);
     }
-    bounds.lower[k] = hn::Min(bounds.lower[k], q[k]);
-    bounds.upper[k] = hn::Max(bounds.upper[k], q[k]);
+    bounds.lower[k] = hn::Min(bounds.lower[k], q);
+    bounds.upper[k] = hn::Max(bounds.upper[k], q);
   }
   return bounds;
 }
 
-/// Into b's frame, inflated, outward; monotone, so that boxes of shifted corners are shifted boxes.
-HWY_ATTR HWY_INLINE WideBounds shifted(const WideBounds& bounds, const FloatPair& floats) {
-  const WideTag d;
-  const Wide relative = hn::Set(d, OutwardRounding::kRelative),
-             absolute = hn::Set(d, OutwardRounding::kAbsolute);
-  WideBounds moved;
-  for (int k = 0; k < 3; ++k) {
-    const Wide lower = hn::Add(bounds.lower[k], hn::Set(d, floats.shiftLower[k]));
-    const Wide upper = hn::Add(bounds.upper[k], hn::Set(d, floats.shiftUpper[k]));
-    moved.lower[k] = hn::Sub(lower, hn::Add(hn::Mul(hn::Abs(lower), relative), absolute));
-    moved.upper[k] = hn::Add(upper, hn::Add(hn::Mul(hn::Abs(upper), relative), absolute));
-  }
-  return moved;
-}
-
-/// Adds to `bits` of a test the lanes that chose it and whose two boxes overlap.
-HWY_ATTR HWY_INLINE void compare(const WideBounds& s, const WideBounds& t,
-                                 const std::uint32_t* choices, int test, std::size_t lane,
-                                 std::uint32_t* bits) {
-  const WideTag d;
-  const hn::RebindToUnsigned<WideTag> du;
-  auto mask = hn::RebindMask(d, hn::TestBit(hn::Load(du, choices + lane), hn::Set(du, 1u << test)));
-  for (int k = 0; k < 3; ++k)
-    mask = hn::And(mask, hn::And(hn::Le(s.lower[k], t.upper[k]), hn::Le(t.lower[k], s.upper[k])));
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(d, mask, bytes);
-  bits[test] |= (bytes[0] | static_cast<std::uint32_t>(bytes[1]) << 8) << lane;
-}
-
-/// bits[test]: the pairs of the batch that chose the test and whose boxes overlap.
+/// Outward rounding is monotone: boxes of shifted corners are shifted boxes.
 template <Sweep sweep>
-HWY_ATTR void compareBatch(const Batch& batch, const FloatPair& floats, std::uint32_t* bits) {
-  for (std::size_t lane = 0; lane < Batch::kSize; lane += hn::Lanes(WideTag())) {
-    WideBounds cornersA[3], cornersB[3];
-    for (int i = 0; i < 3; ++i)
-      cornersA[i] = shifted(cornerBounds<sweep>(batch, i, lane, floats.upTo), floats);
-    for (int j = 0; j < 3; ++j) cornersB[j] = cornerBounds<sweep>(batch, 3 + j, lane, floats.upTo);
-    const WideBounds edgesA[3] = {joined(cornersA[0], cornersA[1]),
-                                  joined(cornersA[1], cornersA[2]),
-                                  joined(cornersA[2], cornersA[0])};
-    const WideBounds allA = joined(edgesA[0], cornersA[2]);
-    for (int j = 0; j < 3; ++j) {
-      const WideBounds edgeB = joined(cornersB[j], cornersB[(j + 1) % 3]);
-      for (int i = 0; i < 3; ++i)
-        compare(edgesA[i], edgeB, batch.choices, 6 + 3 * i + j, lane, bits);
-      compare(allA, cornersB[j], batch.choices, 3 + j, lane, bits);
+HWY_ATTR HWY_INLINE void setBounds(const Side& side, const Triangle& corners, FeatureRow& row) {
+  Bounds boxes[kFeatures];
+  for (int i = 0; i < 3; ++i) boxes[i] = shifted(cornerBounds<sweep>(side, corners[i]), side.shift);
+  boxes[kEdge0] = joined(boxes[0], boxes[1]);
+  boxes[kEdge1] = joined(boxes[1], boxes[2]);
+  boxes[kEdge2] = boxes[kEdge2Too] = joined(boxes[2], boxes[0]);
+  boxes[kTriangle] = joined(boxes[kEdge0], boxes[2]);
+  const D d;
+  alignas(64) float points[2 * kFeatures][4];
+  for (int i = 0; i < kFeatures; ++i)
+    for (std::size_t k = 0; k < kVectors; ++k) {
+      hn::Store(boxes[i].lower[k], d, points[i] + k * kLanes);
+      hn::Store(boxes[i].upper[k], d, points[kFeatures + i] + k * kLanes);
     }
-    const WideBounds allB = joined(joined(cornersB[0], cornersB[1]), cornersB[2]);
-    for (int i = 0; i < 3; ++i) compare(cornersA[i], allB, batch.choices, i, lane, bits);
+  for (std::size_t i = 0; i < 2 * kFeatures; i += kLanes) {
+    V x, y, z, unused;
+    hn::LoadInterleaved4(d, points[i], x, y, z, unused);
+    hn::Store(x, d, row.bounds[0] + i);
+    hn::Store(y, d, row.bounds[1] + i);
+    hn::Store(z, d, row.bounds[2] + i);
   }
 }
 
-/// Grows a list by what is written behind its end: no test for room at each element.
-class Appender {
- public:
-  Appender(Buffer<FeaturePair>& list, std::size_t most) : m_list(list), m_size(list.size()) {
-    list.resize(m_size + most);
+template <Sweep sweep>
+HWY_ATTR HWY_NOINLINE void makeRow(const Side& side, std::uint32_t triangle, FeatureRow& row) {
+  const Triangle& corners = side.topology.triangles[triangle];
+  const auto& edges = side.topology.triangleEdges[triangle];
+  const std::uint8_t owned = side.topology.owned[triangle];
+  const std::uint32_t ids[kFeatures] = {corners[0], corners[1], corners[2], edges[2],
+                                        edges[0],   edges[1],   triangle,   edges[2]};
+  std::copy_n(ids, kFeatures, row.ids);
+  row.ownedByA = kOwnedByA[owned];
+  row.ownedByB = kOwnedByB[owned];
+  if (side.now) return setBounds<sweep>(side, corners, row);
+  for (auto& bounds : row.bounds) {
+    std::fill_n(bounds, kFeatures, -kLargestFloat);
+    std::fill_n(bounds + kFeatures, kFeatures, kLargestFloat);
   }
-  ~Appender() { m_list.resize(m_size); }
-  void append(std::uint32_t a, std::uint32_t b) { m_list[m_size++] = {a, b}; }
+}
+
+using TestTag = hn::CappedTag<float, kTests>;
+constexpr std::size_t kTestLanes = hn::MaxLanes(TestTag());
+
+/// How a vector of tests takes its features' lower or upper bounds: a window of the row, and places
+/// in it.
+template <const Features& features>
+struct Places {
+  std::array<std::size_t, kTests> window{};
+  alignas(64) std::array<std::int32_t, kTests> lower{}, upper{};
+  constexpr Places() {
+    constexpr std::size_t kWindow = std::min<std::size_t>(kTestLanes, kFeatures);
+    for (std::size_t test = 0; test < kTests; ++test) {
+      window[test] = features[test / kTestLanes * kTestLanes] / kWindow * kWindow;
+      lower[test] = static_cast<std::int32_t>(features[test] - window[test]);
+      upper[test] = lower[test] + (kTestLanes > kFeatures ? kFeatures : 0);
+    }
+  }
+};
+
+/// Values of the tests from `test` on, out of a row's.
+template <const Features& features, class DT>
+HWY_ATTR HWY_INLINE hn::Vec<DT> valuesOf(DT d, const hn::TFromD<DT>* row, std::size_t test,
+                                         bool upper = false) {
+  static constexpr Places<features> kPlaces;
+  const auto window =
+      hn::Load(d, row + kPlaces.window[test] + (upper && kTestLanes <= kFeatures ? kFeatures : 0));
+  return hn::TableLookupLanes(
+      window, hn::SetTableIndices(d, (upper ? kPlaces.upper : kPlaces.lower).data() + test));
+}
+
+/// Tests whose two boxes overlap.
+HWY_ATTR HWY_INLINE unsigned overlappingTests(const FeatureRow& a, const FeatureRow& b) {
+  const TestTag d;
+  unsigned tests = 0;
+  for (std::size_t i = 0; i < kTests; i += kTestLanes) {
+    auto mask = hn::FirstN(d, kTestLanes);
+    for (int k = 0; k < 3; ++k) {
+      mask = hn::And(
+          mask, hn::Le(valuesOf<kOfA>(d, a.bounds[k], i), valuesOf<kOfB>(d, b.bounds[k], i, true)));
+      mask = hn::And(
+          mask, hn::Le(valuesOf<kOfB>(d, b.bounds[k], i), valuesOf<kOfA>(d, a.bounds[k], i, true)));
+    }
+    tests |= bitsOf(d, mask) << i;
+  }
+  return tests;
+}
+
+/// Tests of features with a vertex in common.
+HWY_ATTR HWY_INLINE unsigned sharingTests(const FeatureRow& a, const FeatureRow& b) {
+  const hn::RebindToUnsigned<TestTag> d;
+  unsigned same = 0;
+  for (std::size_t i = 0; i < 9; i += kTestLanes)
+    same |= bitsOf(d, hn::Eq(valuesOf<kCornerOfA>(d, a.ids, i), valuesOf<kCornerOfB>(d, b.ids, i)))
+            << i;
+  return kSharingTests[same & 511];
+}
+
+/// Rows of the triangles met last. Neighbours in the octree meet again soon: of twenty rows asked
+/// for nineteen are there.
+template <Sweep sweep>
+class RowCache {
+ public:
+  RowCache(const Side& a, const Side& b)
+      : m_sides{a, b}, m_other(&a.topology == &b.topology ? 0 : 0x80000000u) {
+    std::fill(std::begin(m_keys), std::end(m_keys), kNoKey);
+  }
+  struct RowPair {
+    const FeatureRow &a, &b;
+  };
+  HWY_ATTR HWY_INLINE RowPair rows(const TrianglePair& pair) {
+    const std::uint32_t keyA = pair.a, keyB = pair.b ^ m_other;
+    const std::size_t placeA = place(keyA), placeB = place(keyB);
+    const FeatureRow& a = row(m_sides[0], pair.a, keyA, placeA);
+    return {a, row(m_sides[1], pair.b, keyB, placeB == placeA ? kSpare : placeB)};
+  }
 
  private:
-  Buffer<FeaturePair>& m_list;
-  std::size_t m_size;
-};
+  static constexpr int kBits = 9;
+  static constexpr std::size_t kSpare = 1u << kBits;
+  static constexpr std::uint32_t kNoKey = 0xffffffffu;
 
-/// Feature pairs of two triangles, as bits. corners: i with the other triangle; edges: 3 i + j.
-struct Choice {
-  unsigned cornersOfA, cornersOfB, edges;
-};
-constexpr unsigned kColumn = 0111;  ///< bit 3 i of each row i; times three bits: those in every row
-constexpr unsigned kRows[8] = {0, 07, 070, 077, 0700, 0707, 0770, 0777};
-
-/// Those that have a vertex in common.
-inline Choice sharing(const Triangle& a, const Triangle& b) {
-  unsigned same = 0;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) same |= static_cast<unsigned>(a[i] == b[j]) << (3 * i + j);
-  if (same == 0) return {};
-  Choice choice{};
-  for (int i = 0; i < 3; ++i) {
-    choice.cornersOfA |= static_cast<unsigned>((same & 07u << 3 * i) != 0) << i;
-    choice.cornersOfB |= static_cast<unsigned>((same & kColumn << i) != 0) << i;
+  static std::size_t place(std::uint32_t key) { return key * 0x9e3779b1u >> (32 - kBits); }
+  HWY_ATTR HWY_INLINE const FeatureRow& row(const Side& side, std::uint32_t triangle,
+                                            std::uint32_t key, std::size_t place) {
+    if (m_keys[place] != key) {
+      m_keys[place] = key;
+      makeRow<sweep>(side, triangle, m_rows[place]);
+    }
+    return m_rows[place];
   }
-  // Edge i has corners i and i + 1 mod 3.
-  const unsigned ofEdgesA = same | same >> 3 | (same << 6 & 0700);
-  choice.edges = ofEdgesA | (ofEdgesA >> 1 & 0333) | (ofEdgesA << 2 & 0444);
-  return choice;
+
+  const Side m_sides[2];
+  const std::uint32_t m_other;
+  std::uint32_t m_keys[kSpare + 1];
+  FeatureRow m_rows[kSpare + 1];
+};
+
+/// Triangle pairs whose tests are chosen, to be listed together: corners' tests and edges' apart.
+struct ChosenTests {
+  static constexpr std::size_t kMost = 128;
+  alignas(64) std::uint32_t ids[kMost][2 * kFeatures];  ///< of both rows
+  alignas(8) std::uint8_t corners[kMost];
+  alignas(8) std::uint16_t edges[kMost];
+
+  void set(std::size_t i, const FeatureRow& a, const FeatureRow& b, unsigned tests) {
+    std::copy_n(a.ids, kFeatures, ids[i]);
+    std::copy_n(b.ids, kFeatures, ids[i] + kFeatures);
+    corners[i] = tests & (kCornersOfA | kCornersOfB);
+    edges[i] = static_cast<std::uint16_t>(tests & kEdges);
+  }
+};
+
+/// Where in ChosenTests::ids the feature of a test is, for as many pairs as have their tests in 64
+/// bits.
+using IdPlaces = std::array<std::uint8_t, 64>;
+template <class Tests>
+constexpr IdPlaces idPlaces(const Features& features, int offset) {
+  constexpr int kBits = 8 * sizeof(Tests);
+  IdPlaces places{};
+  for (int i = 0; i < 64; ++i)
+    places[i] = static_cast<std::uint8_t>(i / kBits * 2 * kFeatures + features[i % kBits] + offset);
+  return places;
 }
 
-template <bool kFloats, Sweep sweep>
-HWY_ATTR void findFeaturePairsOf(const MeshTopology& a, const MeshTopology& b,
-                                 const FloatPair* floats, std::span<const TrianglePair> pairs,
+/// Writes the chosen tests of `size` pairs, those in `mask`; ordered: the lower id first. Returns
+/// how many.
+template <class Tests>
+inline std::size_t list(const ChosenTests& chosen, const Tests* tests, std::size_t size,
+                        unsigned mask, const IdPlaces& firstIn, const IdPlaces& secondIn,
+                        bool ordered, FeaturePair* out) {
+  constexpr std::size_t kPairs = 8 / sizeof(Tests);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < size; i += kPairs) {
+    std::uint64_t bits;
+    std::memcpy(&bits, tests + i, sizeof bits);
+    for (bits &= mask * (~std::uint64_t{0} / static_cast<Tests>(-1)); bits; bits &= bits - 1) {
+      const auto bit = static_cast<unsigned>(std::countr_zero(bits));
+      const std::uint64_t first = chosen.ids[i][firstIn[bit]],
+                          second = chosen.ids[i][secondIn[bit]];
+      // Which is lower is as good as random: no branch.
+      const std::uint64_t pair = std::rotl(first | second << 32, 32 * (ordered & (second < first)));
+      std::memcpy(out + count++, &pair, sizeof pair);
+    }
+  }
+  return count;
+}
+
+constexpr IdPlaces kEdgeInA = idPlaces<std::uint16_t>(kOfA, 0),
+                   kEdgeInB = idPlaces<std::uint16_t>(kOfB, kFeatures);
+constexpr IdPlaces kCornerInA = idPlaces<std::uint8_t>(kOfA, 0),
+                   kCornerInB = idPlaces<std::uint8_t>(kOfB, kFeatures);
+/// Of a corner's test the vertex and the triangle, whichever of the two they are of.
+constexpr IdPlaces kVertexIn = idPlaces<std::uint8_t>({0, 1, 2, 0, 8, 9, 10}, 0),
+                   kTriangleIn = idPlaces<std::uint8_t>({14, 14, 14, 0, 6, 6, 6}, 0);
+
+template <Sweep sweep>
+HWY_ATTR void findFeaturePairsOf(const Side& a, const Side& b, std::span<const TrianglePair> pairs,
                                  FeaturePairs& out) {
-  const bool self = &a == &b;
-  Appender vertexTriangle(out.vertexTriangle, pairs.size() * (self ? 6 : 3));
-  Appender triangleVertex(out.triangleVertex, self ? 0 : pairs.size() * 3);
-  Appender edgeEdge(out.edgeEdge, pairs.size() * 9);
-  const auto append = [&](const TrianglePair& pair, int test) {
-    if (test < 3) return vertexTriangle.append(a.triangles[pair.a][test], pair.b);
-    if (test < 6) {
-      const std::uint32_t vertex = b.triangles[pair.b][test - 3];
-      return self ? vertexTriangle.append(vertex, pair.a) : triangleVertex.append(pair.a, vertex);
+  const bool self = &a.topology == &b.topology;
+  const unsigned excluded = self ? ~0u : 0u;
+  out.vertexTriangle.resize(pairs.size() * (self ? 6 : 3));
+  out.triangleVertex.resize(self ? 0 : pairs.size() * 3);
+  out.edgeEdge.resize(pairs.size() * 9);
+  std::size_t owned = 0, vertexTriangle = 0, triangleVertex = 0, edgeEdge = 0;
+  RowCache<sweep> cache(a, b);
+  ChosenTests chosen;
+  for (std::size_t begin = 0; begin < pairs.size(); begin += ChosenTests::kMost) {
+    std::size_t size = 0;
+    for (const TrianglePair& pair :
+         pairs.subspan(begin, std::min(ChosenTests::kMost, pairs.size() - begin))) {
+      const auto [rowA, rowB] = cache.rows(pair);
+      unsigned tests = rowA.ownedByA & rowB.ownedByB;
+      tests &= ~(sharingTests(rowA, rowB) & excluded);
+      owned += static_cast<std::size_t>(std::popcount(tests));
+      tests &= overlappingTests(rowA, rowB);
+      chosen.set(size++, rowA, rowB, tests);
     }
-    const std::uint32_t edgeA = a.triangleEdges[pair.a][(test - 6) / 3],
-                        edgeB = b.triangleEdges[pair.b][(test - 6) % 3];
-    const bool turned = self && edgeB < edgeA;
-    edgeEdge.append(turned ? edgeB : edgeA, turned ? edgeA : edgeB);
-  };
-  Batch batch;
-  const auto flush = [&]() HWY_ATTR {
-    std::uint32_t bits[kTests] = {};
-    compareBatch<sweep>(batch, *floats, bits);
-    for (int test = 0; test < kTests; ++test)
-      for (; bits[test]; bits[test] &= bits[test] - 1)
-        append(batch.pairs[std::countr_zero(bits[test])], test);
-    std::fill_n(batch.choices, Batch::kSize, 0u);
-    batch.size = 0;
-  };
-  if constexpr (kFloats) {
-    std::fill_n(batch.choices, Batch::kSize, 0u);
-    std::fill_n(&batch.now[0][0], 6 * Batch::kSize, FloatPoint{});
-    std::fill_n(&batch.before[0][0], 6 * Batch::kSize, FloatPoint{});
+    std::fill(chosen.corners + size, std::end(chosen.corners), std::uint8_t{0});
+    std::fill(chosen.edges + size, std::end(chosen.edges), std::uint16_t{0});
+    edgeEdge += list(chosen, chosen.edges, size, kEdges, kEdgeInA, kEdgeInB, self,
+                     out.edgeEdge.data() + edgeEdge);
+    FeaturePair* const corners = out.vertexTriangle.data() + vertexTriangle;
+    if (self) {
+      vertexTriangle +=
+          list(chosen, chosen.corners, size, 255, kVertexIn, kTriangleIn, false, corners);
+    } else {
+      vertexTriangle +=
+          list(chosen, chosen.corners, size, kCornersOfA, kCornerInA, kCornerInB, false, corners);
+      triangleVertex += list(chosen, chosen.corners, size, kCornersOfB, kCornerInA, kCornerInB,
+                             false, out.triangleVertex.data() + triangleVertex);
+    }
   }
-  for (const TrianglePair& pair : pairs) {
-    const unsigned ownedA = a.owned[pair.a], ownedB = b.owned[pair.b];
-    const Triangle &cornersA = a.triangles[pair.a], &cornersB = b.triangles[pair.b];
-    unsigned choice =
-        (ownedA & 7) | (ownedB & 7) << 3 | (kRows[ownedA >> 3] & (ownedB >> 3) * kColumn) << 6;
-    if (self && choice) {
-      const Choice shared = sharing(cornersA, cornersB);
-      choice &= ~(shared.cornersOfA | shared.cornersOfB << 3 | shared.edges << 6);
-    }
-    if (choice == 0) continue;
-    out.owned += static_cast<std::size_t>(std::popcount(choice));
-    if constexpr (!kFloats) {
-      for (; choice; choice &= choice - 1) append(pair, std::countr_zero(choice));
-      continue;
-    }
-    const std::size_t lane = batch.size;
-    for (int i = 0; i < 3; ++i) {
-      batch.now[i][lane] = floats->a[cornersA[i]];
-      batch.now[3 + i][lane] = floats->b[cornersB[i]];
-      if constexpr (sweep != Sweep::None) {
-        batch.before[i][lane] = floats->beforeA[cornersA[i]];
-        batch.before[3 + i][lane] = floats->beforeB[cornersB[i]];
-      }
-    }
-    batch.choices[lane] = choice;
-    batch.pairs[lane] = pair;
-    if (++batch.size == Batch::kSize) flush();
-  }
-  if (batch.size > 0) flush();
+  out.owned = owned;
+  out.vertexTriangle.resize(vertexTriangle);
+  out.triangleVertex.resize(triangleVertex);
+  out.edgeEdge.resize(edgeEdge);
 }
 
 HWY_ATTR void findFeaturePairsKernel(const MeshTopology& a, const MeshTopology& b,
-                                     const FloatPair* floats, std::span<const TrianglePair> pairs,
+                                     const FloatPair& floats, std::span<const TrianglePair> pairs,
                                      FeaturePairs& out) {
-  if (!floats)
-    findFeaturePairsOf<false, Sweep::None>(a, b, floats, pairs, out);
-  else if (!floats->beforeA && !floats->beforeB)
-    findFeaturePairsOf<true, Sweep::None>(a, b, floats, pairs, out);
-  else if (floats->upTo >= 1.0f)
-    findFeaturePairsOf<true, Sweep::Step>(a, b, floats, pairs, out);
+  Side sideA{a, floats.a, floats.beforeA, {floats.shiftLower, floats.shiftUpper}, floats.upTo};
+  Side sideB{b, floats.b, floats.beforeB, {}, floats.upTo};
+  if (&a == &b) {  // half to each, so that a row is the same on both sides
+    for (float& shift : sideA.shift.lower) shift /= 2;
+    for (float& shift : sideA.shift.upper) shift /= 2;
+    sideB.shift = sideA.shift;
+  }
+  if (!floats.beforeA && !floats.beforeB)
+    findFeaturePairsOf<Sweep::None>(sideA, sideB, pairs, out);
+  else if (floats.upTo >= 1.0f)
+    findFeaturePairsOf<Sweep::Step>(sideA, sideB, pairs, out);
   else
-    findFeaturePairsOf<true, Sweep::PartOfStep>(a, b, floats, pairs, out);
+    findFeaturePairsOf<Sweep::PartOfStep>(sideA, sideB, pairs, out);
 }
 
 HWY_ATTR void keepOverlappingKernel(const MeshTopology& a, const MeshTopology& b,
                                     const FloatPair& floats, Buffer<TrianglePair>& pairs) {
+  const Shift shift{floats.shiftLower, floats.shiftUpper};
   std::size_t kept = 0;
   for (const TrianglePair& pair : pairs) {
     pairs[kept] = pair;
-    kept += overlap(shifted(triangleBounds(floats.a, a.triangles[pair.a]), floats),
+    kept += overlap(shifted(triangleBounds(floats.a, a.triangles[pair.a]), shift),
                     triangleBounds(floats.b, b.triangles[pair.b]));
   }
   pairs.resize(kept);
@@ -319,11 +400,7 @@ HWY_EXPORT(keepOverlappingKernel);
 
 void findFeaturePairs(const MeshTopology& a, const MeshTopology& b, const FloatPair* floats,
                       std::span<const TrianglePair> pairs, FeaturePairs& out) {
-  out.vertexTriangle.clear();
-  out.triangleVertex.clear();
-  out.edgeEdge.clear();
-  out.owned = 0;
-  HWY_DYNAMIC_DISPATCH(findFeaturePairsKernel)(a, b, floats, pairs, out);
+  HWY_DYNAMIC_DISPATCH(findFeaturePairsKernel)(a, b, floats ? *floats : FloatPair{}, pairs, out);
 }
 
 void keepOverlapping(const MeshTopology& a, const MeshTopology& b, const FloatPair& floats,

@@ -16,8 +16,8 @@ namespace palpate {
 /// the distance between the frames and the thickness, rounded outward (Octree/Traversal.h has the
 /// rounding's proof).
 struct FloatPair {
-  const FloatPoint* a;
-  const FloatPoint* b;
+  const FloatPoint* a = nullptr;
+  const FloatPoint* b = nullptr;
   const FloatPoint* beforeA = nullptr;  ///< the step's start, where boxes are to sweep the step
   const FloatPoint* beforeB = nullptr;
   std::array<float, 4> shiftLower{}, shiftUpper{};
@@ -41,7 +41,8 @@ struct FeaturePairs {
 /// The feature pairs that the triangle pairs own, each once, whose boxes overlap. Excluded in
 /// self-collision (a and b the same object): a vertex with a triangle it is a corner of, and two
 /// edges with a common vertex. Without floats all of them, whatever their boxes.
-/// Cost     about 10 ns a triangle pair. Memory: 40 bytes a triangle pair, for one batch.
+/// Cost     about 12 ns a triangle pair with AVX-512, 15 with AVX2. Memory: 120 bytes a triangle
+///          pair, for one batch; 140 KB of stack.
 void findFeaturePairs(const MeshTopology& a, const MeshTopology& b, const FloatPair* floats,
                       std::span<const TrianglePair> pairs, FeaturePairs& out);
 

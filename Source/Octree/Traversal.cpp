@@ -17,13 +17,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 using NodeTag = hn::CappedTag<float, 8>;   ///< eight siblings
 using LeafTag = hn::CappedTag<float, 16>;  ///< primitives of a leaf
 
-template <class D, class M>
-HWY_INLINE std::uint32_t bitsOf(D d, M mask) {
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(d, mask, bytes);
-  return static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8;
-}
-
 template <class V>
 HWY_INLINE V roundedDown(V v, V shift) {
   const hn::DFromV<V> d;

@@ -1,12 +1,18 @@
 #include "NarrowPhase/FeaturePairs.h"
 
+#include "Core/SimdPath.h"
+#include "Octree/Traversal.h"
+
 #include "Common/RandomMeshes.h"
+#include "PublishedFrames.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <set>
+#include <string>
 
 namespace palpate {
 
@@ -75,6 +81,196 @@ TEST(FeaturePairs, KeepWhatOverlapsUpToAnyTime) {
       EXPECT_GT(overlapping, 0u);
       EXPECT_LE(corners.size() + edges.size(), overlapping + 2 + overlapping / 100) << upTo;
     }
+  }
+}
+
+using Ids = std::array<std::uint32_t, 2>;
+
+std::vector<Ids> sorted(std::span<const FeaturePair> pairs) {
+  std::vector<Ids> ids;
+  for (const FeaturePair& pair : pairs) ids.push_back({pair.a, pair.b});
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+bool holds(const Triangle& triangle, std::uint32_t vertex) {
+  return std::find(triangle.begin(), triangle.end(), vertex) != triangle.end();
+}
+bool meet(const Segment& p, const Segment& q) {
+  return p[0] == q[0] || p[0] == q[1] || p[1] == q[0] || p[1] == q[1];
+}
+
+/// Triangles over few vertices, so that many share some, degenerate ones among them.
+MeshTopology crowded(testing::Random& random, std::uint32_t vertices, std::size_t triangles) {
+  const auto any = [&] { return static_cast<std::uint32_t>(random() % vertices); };
+  std::vector<Triangle> list(triangles);
+  for (Triangle& triangle : list) triangle = {any(), any(), any()};
+  return {vertices, list};
+}
+
+/// Without boxes: all that the definition allows, each once, in the same order on every SIMD path.
+TEST(FeaturePairs, AreEachTestedOnce) {
+  testing::Random random(2);
+  for (const std::size_t size : {1, 2, 7, 60, 300}) {
+    const MeshTopology a = crowded(random, 40, size), b = crowded(random, 900, 50);
+    for (const MeshTopology* second : {&a, &b}) {
+      const bool self = second == &a;
+      std::vector<TrianglePair> candidates;
+      for (std::uint32_t i = 0; i < a.triangles.size(); ++i)
+        for (std::uint32_t j = self ? i + 1 : 0; j < second->triangles.size(); ++j)
+          candidates.push_back({i, j});
+      std::shuffle(candidates.begin(), candidates.end(), random);
+
+      std::vector<Ids> vertexTriangle, triangleVertex, edgeEdge;
+      for (std::uint32_t v = 0; v < a.vertexCount; ++v)
+        for (std::uint32_t t = 0; t < second->triangles.size(); ++t)
+          if (a.vertexTriangles[v].size() > 0 && !(self && holds(a.triangles[t], v)))
+            vertexTriangle.push_back({v, t});
+      for (std::uint32_t t = 0; t < a.triangles.size() && !self; ++t)
+        for (std::uint32_t v = 0; v < b.vertexCount; ++v)
+          if (b.vertexTriangles[v].size() > 0) triangleVertex.push_back({t, v});
+      for (std::uint32_t p = 0; p < a.edges.size(); ++p)
+        for (std::uint32_t q = self ? p + 1 : 0; q < second->edges.size(); ++q)
+          if (!(self && meet(a.edges[p], a.edges[q]))) edgeEdge.push_back({p, q});
+
+      std::vector<FeaturePair> first;
+      for (const std::string& path : simdPaths()) {
+        useSimdPath(path);
+        FeaturePairs pairs;
+        findFeaturePairs(a, *second, nullptr, candidates, pairs);
+        EXPECT_EQ(sorted(pairs.vertexTriangle), vertexTriangle) << path;
+        EXPECT_EQ(sorted(pairs.triangleVertex), triangleVertex) << path;
+        EXPECT_EQ(sorted(pairs.edgeEdge), edgeEdge) << path;
+        EXPECT_EQ(pairs.owned, vertexTriangle.size() + triangleVertex.size() + edgeEdge.size());
+        std::vector<FeaturePair> all(pairs.edgeEdge.begin(), pairs.edgeEdge.end());
+        all.insert(all.end(), pairs.vertexTriangle.begin(), pairs.vertexTriangle.end());
+        all.insert(all.end(), pairs.triangleVertex.begin(), pairs.triangleVertex.end());
+        if (first.empty()) first = all;
+        EXPECT_TRUE(
+            std::equal(all.begin(), all.end(), first.begin(), first.end(),
+                       [](const auto& l, const auto& r) { return l.a == r.a && l.b == r.b; }))
+            << path;
+      }
+      useSimdPath("");
+    }
+  }
+}
+
+/// All that overlap by boxes in double, each once, and hardly more.
+void expectOverlapping(std::span<const FeaturePair> found, std::vector<Ids> exact) {
+  const std::vector<Ids> ids = sorted(found);
+  std::sort(exact.begin(), exact.end());
+  EXPECT_TRUE(std::adjacent_find(ids.begin(), ids.end()) == ids.end());
+  EXPECT_TRUE(std::includes(ids.begin(), ids.end(), exact.begin(), exact.end()));
+  EXPECT_LE(ids.size(), exact.size() + exact.size() / 10'000);
+}
+
+struct PublishedStep {
+  const char *before, *now;
+  std::size_t vertexTriangle, edgeEdge;
+};
+
+TEST(FeaturePairs, OfPublishedStepsAreThoseOfBoxesInDouble) {
+  const std::string folder = std::string(PALPATE_SHARED_DATA) + "/ccd-scenes/";
+  if (!std::filesystem::is_directory(folder))
+    GTEST_SKIP() << "no ccd-scenes in PALPATE_SHARED_DATA";
+  for (const auto& [before, now, vertexTriangles, edgeEdges] :
+       {PublishedStep{"cloth-funnel/frames/227", "cloth-funnel/frames/228", 7'319, 33'770},
+        PublishedStep{"rod-twist/frames/3036", "rod-twist/frames/3037", 448'270, 2'041'334}}) {
+    const TriangleMesh mesh = testing::readStep(folder + before + ".ply", folder + now + ".ply");
+    const MeshTopology& topology = mesh.topology;
+    const auto vertexCount = static_cast<std::uint32_t>(topology.vertexCount);
+    std::vector<Eigen::AlignedBox3d> edges, corners;
+    for (const Segment& edge : topology.edges) edges.push_back(testing::sweptBox(mesh, edge));
+    for (std::uint32_t v = 0; v < vertexCount; ++v)
+      corners.push_back(testing::sweptBox(mesh, std::array{v}));
+    for (const Triangle& triangle : topology.triangles)
+      corners.push_back(testing::sweptBox(mesh, triangle));
+    std::vector<Ids> vertexTriangle, edgeEdge;
+    testing::forEachOverlap(edges, [&](std::uint32_t p, std::uint32_t q) {
+      if (!meet(topology.edges[p], topology.edges[q])) edgeEdge.push_back({p, q});
+    });
+    testing::forEachOverlap(corners, [&](std::uint32_t v, std::uint32_t t) {
+      if (v < vertexCount && t >= vertexCount && !holds(topology.triangles[t - vertexCount], v))
+        vertexTriangle.push_back({v, t - vertexCount});
+    });
+    EXPECT_EQ(vertexTriangle.size(), vertexTriangles);
+    EXPECT_EQ(edgeEdge.size(), edgeEdges);
+
+    std::vector<FloatPoint> floatsBefore(mesh.before.size()), floatsNow(mesh.now.size());
+    toFloats(mesh.before, {mesh.now[0], 1.0}, floatsBefore.data());
+    toFloats(mesh.now, {mesh.now[0], 1.0}, floatsNow.data());
+    const FloatPair floats{floatsNow.data(), floatsNow.data(), floatsBefore.data(),
+                           floatsBefore.data()};
+    FeaturePairs pairs;
+    findFeaturePairs(topology, topology, &floats, testing::sweptCandidates(mesh), pairs);
+    expectOverlapping(pairs.vertexTriangle, vertexTriangle);
+    expectOverlapping(pairs.edgeEdge, edgeEdge);
+  }
+}
+
+/// Of a mesh with itself, and of two in frames of their own, whose boxes are the thickness apart at
+/// the most.
+TEST(FeaturePairs, ReachAsFarAsTheThickness) {
+  testing::Random random(3);
+  constexpr double kThickness = 0.02;
+  testing::Mesh sheet = testing::sheet(20, 0, 0), soup = testing::soup(random, 300, 0.1);
+  const MeshTopology first(sheet.positions.size(), sheet.triangles),
+      second(soup.positions.size(), soup.triangles);
+  const Vector3d originA(10, 20, 30), originB(10.25, 20.25, 30);
+  for (Vector3d& p : sheet.positions) p += originA;
+  for (Vector3d& p : soup.positions) p += originA;
+  const auto floatsOf = [](const std::vector<Vector3d>& positions, const Vector3d& origin) {
+    std::vector<FloatPoint> floats(positions.size());
+    toFloats(positions, {origin, 1.0}, floats.data());
+    return floats;
+  };
+  const auto floatsA = floatsOf(sheet.positions, originA),
+             floatsB = floatsOf(soup.positions, originB);
+  for (const bool self : {true, false}) {
+    const MeshTopology& b = self ? first : second;
+    const std::vector<Vector3d>& positionsB = self ? sheet.positions : soup.positions;
+    TreePair shift{};
+    const Vector3d offset = self ? Vector3d(0, 0, 0) : Vector3d(originA - originB);
+    setShift(shift, {offset[0], offset[1], offset[2]}, kThickness);
+    const FloatPair floats{floatsA.data(),   self ? floatsA.data() : floatsB.data(),
+                           nullptr,          nullptr,
+                           shift.shiftLower, shift.shiftUpper};
+    std::vector<TrianglePair> candidates;
+    for (std::uint32_t i = 0; i < first.triangles.size(); ++i)
+      for (std::uint32_t j = self ? i + 1 : 0; j < b.triangles.size(); ++j)
+        candidates.push_back({i, j});
+    FeaturePairs pairs;
+    findFeaturePairs(first, b, &floats, candidates, pairs);
+    const auto boxOf = [](const std::vector<Vector3d>& positions, const auto& vertices) {
+      AlignedBox3d box;
+      for (const std::uint32_t v : vertices) box.extend(positions[v]);
+      return box;
+    };
+    const auto near = [&](const AlignedBox3d& s, AlignedBox3d t) {
+      t.min().array() -= kThickness;
+      t.max().array() += kThickness;
+      return s.intersects(t);
+    };
+    std::vector<Ids> vertexTriangle, triangleVertex, edgeEdge;
+    for (std::uint32_t v = 0; v < first.vertexCount; ++v)
+      for (std::uint32_t t = 0; t < b.triangles.size(); ++t)
+        if (!(self && holds(b.triangles[t], v)) &&
+            near(boxOf(sheet.positions, std::array{v}), boxOf(positionsB, b.triangles[t])))
+          vertexTriangle.push_back({v, t});
+    for (std::uint32_t t = 0; t < first.triangles.size() && !self; ++t)
+      for (std::uint32_t v = 0; v < b.vertexCount; ++v)
+        if (near(boxOf(sheet.positions, first.triangles[t]), boxOf(positionsB, std::array{v})))
+          triangleVertex.push_back({t, v});
+    for (std::uint32_t p = 0; p < first.edges.size(); ++p)
+      for (std::uint32_t q = self ? p + 1 : 0; q < b.edges.size(); ++q)
+        if (!(self && meet(first.edges[p], b.edges[q])) &&
+            near(boxOf(sheet.positions, first.edges[p]), boxOf(positionsB, b.edges[q])))
+          edgeEdge.push_back({p, q});
+    EXPECT_GT(edgeEdge.size(), 500u);
+    expectOverlapping(pairs.vertexTriangle, vertexTriangle);
+    expectOverlapping(pairs.triangleVertex, triangleVertex);
+    expectOverlapping(pairs.edgeEdge, edgeEdge);
   }
 }
 

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+namespace palpate {
+
+/// The features of a triangle side by side. Edge 2 stands twice, so that each four tests take
+/// theirs from one half.
+inline constexpr int kFeatures = 8;
+enum Feature : std::uint8_t { kCorner, kEdge2 = 3, kEdge0, kEdge1, kTriangle, kEdge2Too };
+
+/// The tests of two triangles side by side, and which feature of each they take: corners of a with
+/// b, corners of b with a, edges with edges. The last is none.
+inline constexpr int kTests = 16;
+using Features = std::array<std::uint8_t, kTests>;
+inline constexpr Features kOfA = {0, 1, 2, 3, 6, 6, 6, 4, 4, 4, 5, 5, 5, 7, 7, 7},
+                          kOfB = {6, 6, 6, 7, 0, 1, 2, 3, 4, 5, 4, 5, 7, 4, 5, 7};
+inline constexpr unsigned kCornersOfA = 0x0007, kCornersOfB = 0x0070, kEdges = 0x7f88;
+/// Each corner of a with each of b.
+inline constexpr Features kCornerOfA = {0, 0, 0, 1, 1, 1, 2, 2, 2},
+                          kCornerOfB = {0, 1, 2, 0, 1, 2, 0, 1, 2};
+
+/// As in MeshTopology::owned.
+constexpr unsigned ownedBit(std::uint8_t feature) {
+  if (feature < kEdge2) return 1u << feature;
+  return feature == kEdge0 ? 8 : feature == kEdge1 ? 16 : 32;
+}
+constexpr unsigned cornersOf(std::uint8_t feature) {
+  if (feature < kEdge2) return 1u << feature;
+  return feature == kTriangle ? 7 : feature == kEdge0 ? 3 : feature == kEdge1 ? 6 : 5;
+}
+
+/// Tests whose feature of one triangle it owns, by its bits; a triangle owns itself.
+constexpr auto ownedTests(const Features& features) {
+  std::array<std::uint16_t, 64> tests{};
+  for (unsigned owned = 0; owned < 64; ++owned)
+    for (int test = 0; test < kTests - 1; ++test)
+      if (features[test] == kTriangle || owned & ownedBit(features[test]))
+        tests[owned] |= static_cast<std::uint16_t>(1u << test);
+  return tests;
+}
+inline constexpr auto kOwnedByA = ownedTests(kOfA), kOwnedByB = ownedTests(kOfB);
+
+/// Tests of features with a vertex in common, by the corners that are the same: bit 3 i + j for a's
+/// i and b's j.
+constexpr auto sharingTests() {
+  std::array<std::uint16_t, 512> tests{};
+  for (unsigned same = 0; same < 512; ++same)
+    for (int test = 0; test < kTests - 1; ++test)
+      for (int bit = 0; bit < 9; ++bit)
+        if (same >> bit & 1 && cornersOf(kOfA[test]) >> bit / 3 & 1 &&
+            cornersOf(kOfB[test]) >> bit % 3 & 1)
+          tests[same] |= static_cast<std::uint16_t>(1u << test);
+  return tests;
+}
+inline constexpr auto kSharingTests = sharingTests();
+
+}  // namespace palpate
