@@ -162,8 +162,11 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
   using List = AuditFailure::List;
   using Fault = AuditFailure::Fault;
   using Any = AuditFailure::Contact;
+  // Intersection's contacts, which Auto adds where a step starts intersecting, are not of features.
+  const bool withOthers = pair.settings.method == Method::Auto && !data.validity().startedApart;
   const auto into = [&](List list) {
     return [=, &pair, &out](Fault fault, const Any& e, const Any& f) {
+      if (withOthers && fault != Fault::Missing) return;
       out.push_back({pair.a, pair.b, frame, fault, list, e, f, {}, {}});
     };
   };

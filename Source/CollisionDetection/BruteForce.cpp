@@ -27,8 +27,9 @@ std::vector<Eigen::AlignedBox3d> boxesOf(const TriangleMesh& mesh, bool swept) {
 
 void findCandidatesByBruteForce(const MeshPair& meshes, Buffer<TrianglePair>& out) {
   const double thickness =
-      meshes.settings.method == Method::Intersection ? 0.0 : meshes.settings.thickness;
-  const bool swept = meshes.settings.method == Method::Continuous;
+      meshes.settings.method == Method::Intersection ? 0.0 : meshes.thicknessAtEnd();
+  const bool swept =
+      meshes.settings.method == Method::Continuous || meshes.settings.method == Method::Auto;
   const std::vector<Eigen::AlignedBox3d> boxesA = boxesOf(meshes.a, swept),
                                          boxesB = boxesOf(meshes.b, swept);
   const std::vector<Triangle>& triangles = meshes.a.topology.triangles;

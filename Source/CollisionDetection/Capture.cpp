@@ -16,7 +16,7 @@ namespace palpate {
 namespace {
 
 constexpr std::string_view kTitle = "palpate-capture";
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
 
 // Values of enumerations are written by name: in the order of their declarations.
 constexpr std::array<std::string_view, 6> kMethods{"Auto",         "Proxy",     "DistanceField",
@@ -135,13 +135,14 @@ void settingsLine(File& file, SettingsType& settings) {
 }
 
 template <class File, class PairType>
-void pairLine(File& file, PairType& pair) {
+void pairLine(File& file, PairType& pair, int version) {
   file.integer(pair.a);
   file.integer(pair.b);
   file.word(pair.settings.method, kMethods);
   file.word(pair.method, kMethods);
   file.real(pair.settings.thickness);
   file.word(pair.settings.contacts, kContacts);
+  if (version >= 2) file.real(pair.settings.tolerance);
 }
 
 std::string textOf(const CollisionProblem& problem) {
@@ -172,7 +173,7 @@ std::string textOf(const CollisionProblem& problem) {
   }
   for (const CollisionProblem::Pair& pair : problem.pairs) {
     file.word("pair");
-    pairLine(file, pair);
+    pairLine(file, pair, kVersion);
     file.endLine();
   }
   file.word("end");
@@ -236,8 +237,8 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
   file.expect(kTitle);
   int version = 0;
   file.integer(version);
-  if (version != kVersion)
-    file.refuseWhole("it is of version " + std::to_string(version) + "; version " +
+  if (version < 1 || version > kVersion)
+    file.refuseWhole("it is of version " + std::to_string(version) + "; versions up to " +
                      std::to_string(kVersion) + " can be read");
   CollisionProblem problem;
   settingsLine(file, problem.settings);
@@ -246,7 +247,8 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
   for (CollisionProblem::Mesh& mesh : problem.geometries) mesh = readMesh(file);
   for (CollisionProblem::Pair& pair : problem.pairs) {
     file.expect("pair");
-    pairLine(file, pair);
+    pairLine(file, pair, version);
+    if (version == 1) pair.settings.method = pair.method;  // Auto stood for one method then
   }
   file.expect("end");
   file.expectEnd();
@@ -263,11 +265,8 @@ OctreeBasedCD setUp(const CollisionProblem& problem) {
   for (const CollisionProblem::Mesh& mesh : problem.geometries)
     detection.setPositions(detection.addTriangleMesh(mesh.now, mesh.triangles), mesh.before,
                            mesh.now);
-  for (const CollisionProblem::Pair& pair : problem.pairs) {
-    PairSettings settings = pair.settings;
-    settings.method = pair.method;
-    detection.addCollisionPair(GeometryId{pair.a}, GeometryId{pair.b}, settings);
-  }
+  for (const CollisionProblem::Pair& pair : problem.pairs)
+    detection.addCollisionPair(GeometryId{pair.a}, GeometryId{pair.b}, pair.settings);
   return detection;
 }
 

@@ -4,6 +4,8 @@
 #include "CollisionDetection/Stopwatch.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/FeaturePairs.h"
+#include "NarrowPhase/Intersection.h"
+#include "NarrowPhase/StepCheck.h"
 
 #include <algorithm>
 #include <atomic>
@@ -27,25 +29,50 @@ constexpr std::size_t kJobsPerPair = 16;
 /// Below this many triangles handing out parts of a pair costs more than it saves.
 constexpr std::size_t kSharedSize = 8192;
 
-TreePair treesOf(const PairRecord& record, bool adjacentPairs) {
+/// thickness: L, of the boxes.
+TreePair treesOf(const PairRecord& record, bool adjacentPairs, double thickness) {
   TreePair trees{&record.a->octree, &record.b->octree};
   if (trees.self() && !adjacentPairs) trees.adjacency = record.a->orderedTriangles.data();
   const Eigen::Vector3d offset =
       (record.a->frame.origin - record.b->frame.origin) * record.a->frame.scale;
-  const double thickness =
-      record.method == Method::Intersection ? 0.0 : record.pair.settings.thickness;
   setShift(trees, {offset[0], offset[1], offset[2]}, thickness * record.a->frame.scale);
   return trees;
+}
+
+double boxThickness(const PairRecord& record) {
+  return record.plan.method == Method::Intersection ? 0.0 : record.meshes().thicknessAtEnd();
 }
 
 FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
   FloatPair floats{record.a->floats.data(), record.b->floats.data(), nullptr, nullptr,
                    trees.shiftLower,        trees.shiftUpper};
-  if (record.method == Method::Continuous) {
+  if (record.plan.swept()) {
     floats.beforeA = record.a->floatsBefore.data();
     floats.beforeB = record.b->floatsBefore.data();
   }
   return floats;
+}
+
+std::size_t sizeOf(const CollisionData::Contents& contents) {
+  return contents.vertexTriangle.size() + contents.triangleVertex.size() + contents.edgeEdge.size();
+}
+
+/// ofIntersection: how many are Intersection's, of the step's end with a time of 0.
+void countContacts(const PairPlan& plan, std::size_t ofIntersection,
+                   CollisionData::Contents& contents) {
+  std::size_t before = 0;
+  const auto count = [&](const auto& contacts) {
+    for (const auto& contact : contacts) before += contact.timeOfImpact < 1.0;
+  };
+  if (plan.step.impacts) {
+    count(contents.vertexTriangle);
+    count(contents.triangleVertex);
+    count(contents.edgeEdge);
+  } else if (plan.method == Method::Continuous) {
+    before = sizeOf(contents);
+  }
+  contents.validity.atImpact = before - std::min(before, ofIntersection);
+  contents.validity.atEnd = sizeOf(contents) - contents.validity.atImpact;
 }
 
 bool sharesVertex(const Triangle& s, const Triangle& t) {
@@ -69,7 +96,9 @@ struct Frame::Job {
   Guarded* guarded;               ///< of forEach()
   std::atomic<double>* earliest;  ///< of all jobs of the pair, where only that is asked for
   bool keepCandidates;
+  bool nearby;  ///< boxes overlap at the thickness of the traversal, if not at their own
   ContactBuffers contacts;
+  ContactBuffers overlaps;  ///< Auto: Intersection's, where the step may start intersecting
   Buffer<TrianglePair> candidates, own;
   double milliseconds = 0, narrowMilliseconds = 0;
 
@@ -81,7 +110,8 @@ struct Frame::Job {
 
   static void receive(void* context, std::span<const TrianglePair> pairs) {
     Job& job = *static_cast<Job*>(context);
-    if (!job.record->widerBoxes()) return job.use(job, pairs);
+    job.nearby = true;
+    if (!job.record->widerBoxes() && job.record->plan.nearby == 0.0) return job.use(job, pairs);
     job.own.assign(pairs.begin(), pairs.end());
     keepOverlapping(job.record->a->mesh.topology, job.record->b->mesh.topology, job.floats,
                     job.own);
@@ -100,6 +130,7 @@ struct Frame::Job {
   static void detect(Job& job, std::span<const TrianglePair> pairs) {
     Stopwatch watch;
     const MeshPair meshes = job.record->meshes(&job.floats);
+    if (meshes.step.start) job.findStart(meshes, pairs);
     if (meshes.settings.contacts == Contacts::Earliest)
       job.findEarliest(meshes, pairs);
     else
@@ -110,6 +141,12 @@ struct Frame::Job {
     for (const TrianglePair pair : pairs)
       if (!meshes.self() || !sharesVertex(triangles[pair.a], triangles[pair.b]))
         job.candidates.push_back(pair);
+  }
+
+  void findStart(const MeshPair& meshes, std::span<const TrianglePair> pairs) {
+    bool& intersecting = contacts.facts.startsIntersecting;
+    intersecting = intersecting || anyIntersectAtStart(meshes, pairs);
+    if (record->pair.settings.method == Method::Auto) findIntersections(meshes, pairs, overlaps);
   }
 
   void findEarliest(const MeshPair& meshes, std::span<const TrianglePair> pairs) {
@@ -128,6 +165,8 @@ Frame::Job& Frame::newJob(PairRecord& record) {
   Job& job = *m_jobs[m_jobCount++];
   job.record = &record;
   job.contacts.clear();
+  job.overlaps.clear();
+  job.nearby = false;
   job.candidates.clear();
   job.milliseconds = job.narrowMilliseconds = 0;
   return job;
@@ -140,7 +179,11 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
   for (PairRecord* record : records) {
     record->earliest = std::numeric_limits<double>::infinity();
     if (record->a->octree.size() == 0 || record->b->octree.size() == 0) continue;
-    const TreePair trees = treesOf(*record, adjacentPairs);
+    const double thickness = boxThickness(*record);
+    const TreePair own = treesOf(*record, adjacentPairs, thickness);
+    const TreePair trees =
+        treesOf(*record, adjacentPairs,
+                adjacentPairs ? std::max(thickness, record->plan.nearby) : thickness);
     const bool shared =
         threads.count() > 1 && record->a->octree.size() + record->b->octree.size() >= kSharedSize;
     startPairs(trees, shared ? kNodePairsWanted : 1, m_stack);
@@ -150,7 +193,7 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
     for (std::size_t begin = 0; begin < count; begin += grain) {
       Job& job = newJob(*record);
       job.trees = trees;
-      job.floats = floatsOf(*record, trees);
+      job.floats = floatsOf(*record, own);
       job.earliest = &record->earliest;
       job.begin = first + begin;
       job.end = first + std::min(count, begin + grain);
@@ -236,29 +279,72 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
   std::size_t i = 0;
   for (PairRecord* record : records) {
     m_buffers.clear();
+    m_overlaps.clear();
+    bool nearby = false;
     if (settings.keepCandidates) record->candidates.clear();
     for (; i < m_jobCount && m_jobs[i]->record == record; ++i) {
-      m_buffers.push_back(&m_jobs[i]->contacts);
+      Job& job = *m_jobs[i];
+      m_buffers.push_back(&job.contacts);
+      m_overlaps.push_back(&job.overlaps);
+      nearby |= job.nearby;
       if (settings.keepCandidates)
-        record->candidates.insert(record->candidates.end(), m_jobs[i]->candidates.begin(),
-                                  m_jobs[i]->candidates.end());
+        record->candidates.insert(record->candidates.end(), job.candidates.begin(),
+                                  job.candidates.end());
     }
-    orderContacts(m_buffers, m_orderScratch, record->data.contents());
-    record->data.contents().earliestTimeOfImpact = record->earliest.load();
-    record->dataFor = record->revisions();
-    record->candidatesFor =
-        settings.keepCandidates ? record->revisions() : PairRecord::AnsweredFor{};
+    finish(*record, nearby, settings);
     record->candidatesSorted = false;
   }
   statistics.milliseconds.order = watch.lap();
+}
+
+void Frame::finish(PairRecord& record, bool nearby, const Settings& settings) {
+  m_facts.clear();
+  for (const auto* buffers : {&m_buffers, &m_overlaps})
+    for (const ContactBuffers* found : *buffers) m_facts.add(found->facts);
+  const bool overlapping =
+      m_facts.startsIntersecting && record.pair.settings.method == Method::Auto;
+  if (overlapping) preferOverlaps();
+  CollisionData::Contents& contents = record.data.contents();
+  orderContacts(m_buffers, m_orderScratch, contents);
+  contents.earliestTimeOfImpact = record.earliest.load();
+  if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
+  record.trust.finish(record.pair.settings, *record.a, *record.b, record.plan, m_facts, nearby,
+                      contents);
+  countContacts(record.plan, overlapping ? sizeOf(m_overlapContacts) : 0, contents);
+  record.dataFor = record.revisions();
+  record.candidatesFor = settings.keepCandidates ? record.revisions() : PairRecord::AnsweredFor{};
+}
+
+/// Where the step starts intersecting, a feature pair that Intersection reports is not reported by
+/// distance or impact as well: only Intersection knows the side.
+void Frame::preferOverlaps() {
+  orderContacts(m_overlaps, m_orderScratch, m_overlapContacts);
+  for (ContactBuffers* found : m_buffers) dropAnswered(*found, m_overlapContacts);
+  m_buffers.insert(m_buffers.end(), m_overlaps.begin(), m_overlaps.end());
+}
+
+void Frame::findStartByBruteForce(const PairRecord& record, ContactBuffers& contacts,
+                                  ContactBuffers& overlaps) {
+  MeshPair meshes = record.meshes();
+  const auto countA = static_cast<std::uint32_t>(meshes.a.topology.triangles.size()),
+             countB = static_cast<std::uint32_t>(meshes.b.topology.triangles.size());
+  for (std::uint32_t a = 0; a < countA; ++a)
+    for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b) {
+      const TrianglePair candidate{a, b};
+      if (anyIntersectAtStart(meshes, {&candidate, 1})) contacts.facts.startsIntersecting = true;
+    }
+  if (record.pair.settings.method != Method::Auto) return;
+  meshes.settings.method = Method::Intersection;
+  findContactsByBruteForce(meshes, overlaps);
 }
 
 void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Settings& settings,
                                FrameStatistics& statistics) {
   for (PairRecord* record : records) {
     Stopwatch watch;
-    ContactBuffers contacts;
+    ContactBuffers contacts, overlaps;
     findContactsByBruteForce(record->meshes(), contacts);
+    if (record->plan.step.start) findStartByBruteForce(*record, contacts, overlaps);
     record->earliest = std::numeric_limits<double>::infinity();
     if (record->pair.settings.contacts == Contacts::Earliest) {
       for (const auto& c : contacts.vertexTriangle)
@@ -267,18 +353,16 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Setti
         record->earliest = std::min(record->earliest.load(), c.timeOfImpact);
       for (const auto& c : contacts.edgeEdge)
         record->earliest = std::min(record->earliest.load(), c.timeOfImpact);
-      contacts.clear();
+      for (auto* list : {&contacts.vertexTriangle, &contacts.triangleVertex}) list->clear();
+      contacts.edgeEdge.clear();
     }
     if (settings.keepCandidates) findCandidatesByBruteForce(record->meshes(), record->candidates);
     statistics.featurePairs += contacts.featurePairs;
     statistics.exactDecisions += contacts.exactDecisions;
     statistics.milliseconds.narrowPhase += watch.lap();
-    ContactBuffers* const buffers[] = {&contacts};
-    orderContacts(buffers, m_orderScratch, record->data.contents());
-    record->data.contents().earliestTimeOfImpact = record->earliest.load();
-    record->dataFor = record->revisions();
-    record->candidatesFor =
-        settings.keepCandidates ? record->revisions() : PairRecord::AnsweredFor{};
+    m_buffers = {&contacts};
+    m_overlaps = {&overlaps};
+    finish(*record, true, settings);
     record->candidatesSorted = true;
     statistics.milliseconds.order += watch.lap();
   }

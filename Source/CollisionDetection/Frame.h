@@ -35,6 +35,10 @@ class Frame {
   struct Job;
   void start(std::span<PairRecord* const>, const Threads&, bool adjacentPairs);
   void run(Job&) const;
+  void finish(PairRecord&, bool nearby, const Settings&);
+  void preferOverlaps();
+  static void findStartByBruteForce(const PairRecord&, ContactBuffers& contacts,
+                                    ContactBuffers& overlaps);
   Job& newJob(PairRecord&);
 
   std::vector<std::unique_ptr<Job>>
@@ -42,7 +46,9 @@ class Frame {
   std::size_t m_jobCount = 0;
   Buffer<NodePair> m_nodePairs;
   TraversalStack m_stack;
-  std::vector<ContactBuffers*> m_buffers;
+  std::vector<ContactBuffers*> m_buffers, m_overlaps;  ///< of the pair at hand
+  CollisionData::Contents m_overlapContacts;
+  StepFacts m_facts;
   OrderScratch m_orderScratch;
 };
 

@@ -3,9 +3,12 @@
 #include "CollisionDetection/Stopwatch.h"
 #include "Geometry/TriangleBoxes.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
+#include <limits>
 
 namespace palpate {
 
@@ -151,6 +154,34 @@ void updateOctree(Geometry& geometry, const OctreeSettings& settings, const Thre
   geometry.lastUpdate = Update::Rebuilt;
 }
 
+double smallestHeight(const TriangleMesh& mesh) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const auto& [i, j, k] : mesh.topology.triangles) {
+    const Eigen::Vector3d &a = mesh.now[i], &b = mesh.now[j], &c = mesh.now[k];
+    const double area = (b - a).cross(c - a).norm();
+    const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+    if (area > 0.0) smallest = std::min(smallest, area / longest);
+  }
+  return smallest;
+}
+
+/// A large mesh by parts, whose union does not depend on threads.
+MotionRange motionOf(std::span<const Eigen::Vector3d> before, std::span<const Eigen::Vector3d> now,
+                     Buffer<MotionRange>& parts, const Threads& threads) {
+  parts.resize((now.size() + kVertexGrain - 1) / kVertexGrain);
+  threads.forChunks(
+      now.size(), kVertexGrain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
+        parts[chunk] = motionRange(before.subspan(from, to - from), now.subspan(from, to - from));
+      });
+  if (parts.empty()) return {};
+  MotionRange all = parts.front();
+  for (const MotionRange& part : parts) {
+    all.lower = all.lower.cwiseMin(part.lower);
+    all.upper = all.upper.cwiseMax(part.upper);
+  }
+  return all;
+}
+
 }  // namespace
 
 std::string nameOf(GeometryId id) {
@@ -169,6 +200,7 @@ GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
   checkPositions(id, positions, geometry->mesh.now.data(), "");
   geometry->mesh.before = geometry->mesh.now;
   geometry->mesh.topology = MeshTopology(positions.size(), triangles);
+  geometry->smallestHeight = smallestHeight(geometry->mesh);
   m_geometries.push_back(std::move(geometry));
   ++m_nextId;
   return id;
@@ -242,8 +274,23 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
   geometry.setThisFrame = true;
   geometry.hasLastFrame = geometry.beforeGiven = false;
   geometry.treeKnown = false;
+  geometry.smallestHeight = smallestHeight(geometry.mesh);
   ++geometry.revision;
   ++geometry.stepRevision;
+  ++geometry.topologyRevision;
+}
+
+void GeometryTable::updateMotion(const Threads& threads) {
+  for (const auto& geometry : m_geometries) {
+    if (geometry->motionRevision == geometry->stepRevision) continue;
+    geometry->motionRevision = geometry->stepRevision;
+    const TriangleMesh& mesh = geometry->mesh;
+    geometry->motion = motionOf(mesh.before, mesh.now, geometry->motionParts, threads);
+    geometry->correction =
+        geometry->hasLastFrame && geometry->beforeGiven
+            ? motionOf(geometry->lastFrame, mesh.before, geometry->motionParts, threads)
+            : MotionRange{};
+  }
 }
 
 void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads& threads) {
@@ -278,6 +325,7 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
 }
 
 void GeometryTable::endFrame() {
+  ++m_framesEnded;
   for (const auto& geometry : m_geometries) {
     geometry->setThisFrame = false;
     geometry->hasLastFrame = true;

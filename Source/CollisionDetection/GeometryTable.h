@@ -6,6 +6,7 @@
 
 #include "Core/Threads.h"
 #include "Geometry/FloatPositions.h"
+#include "Geometry/Motion.h"
 #include "Geometry/TriangleMesh.h"
 #include "Octree/Octree.h"
 
@@ -32,6 +33,13 @@ struct Geometry {
   bool beforeGiven =
       false;  ///< by the last call, in this frame; then `lastFrame` holds what it would else be
   std::vector<Eigen::Vector3d> lastFrame;
+
+  MotionRange motion;                  ///< of the step
+  MotionRange correction;              ///< from the last frame's positions to `before`
+  Buffer<MotionRange> motionParts;     ///< scratch
+  std::uint64_t motionRevision = 0;    ///< stepRevision that both are of
+  std::uint64_t topologyRevision = 1;  ///< counts changes of topology
+  double smallestHeight = 0;           ///< L: of a triangle with area, when the topology was set
 
   FloatFrame frame;
   double spread = 0;  ///< of a sample of the positions
@@ -64,14 +72,18 @@ class GeometryTable {
   Geometry& at(GeometryId);  ///< throws UnknownGeometry
   std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }
 
+  /// How geometries move in the step.
+  void updateMotion(const Threads&);
   /// Octrees for the positions now, or the whole step.
   void updateOctrees(const OctreeSettings&, const Threads&);
   void endFrame();
+  std::uint64_t framesEnded() const { return m_framesEnded; }
 
  private:
   std::vector<std::unique_ptr<Geometry>> m_geometries;  ///< ascending ids
   std::uint32_t m_nextId = 0;
   std::vector<Geometry*> m_changed;
+  std::uint64_t m_framesEnded = 0;
 };
 
 std::string nameOf(GeometryId);  ///< "geometry 3"

@@ -100,9 +100,13 @@ struct OctreeBasedCD::Implementation {
       geometry->swept = false;
       geometry->boxMilliseconds = geometry->octreeMilliseconds = 0;
     }
-    for (const auto& record : pairs.records())
-      if (record->method == Method::Continuous) record->a->swept = record->b->swept = true;
     Stopwatch watch;
+    geometries.updateMotion(threads);
+    statistics.milliseconds.boxes += watch.lap();
+    for (const auto& record : pairs.records()) {
+      record->plan = planOf(record->pair.settings, *record->a, *record->b);
+      if (record->plan.swept()) record->a->swept = record->b->swept = true;
+    }
     geometries.updateOctrees(settings.octree, threads);
     const double wall = watch.lap();
     double boxes = 0, octrees = 0;
@@ -172,11 +176,15 @@ struct OctreeBasedCD::Implementation {
   void detect() {
     update();
     const auto records = pairsToDo(&PairRecord::dataFor);
+    const std::uint64_t thisFrame = geometries.framesEnded() + 1;
+    for (PairRecord* record : records)
+      record->trust.start(record->pair.settings, *record->a, *record->b, thisFrame, record->plan);
     if (settings.engine == Engine::Octree)
       frame.detect(records, settings, threads, statistics);
     else
       frame.detectByBruteForce(records, settings, statistics);
     for (const auto& record : pairs.records()) {
+      record->trust.keep(thisFrame);
       const CollisionData& data = record->data;
       statistics.contacts +=
           data.vertexTriangle().size() + data.triangleVertex().size() + data.edgeEdge().size();
@@ -216,8 +224,8 @@ struct OctreeBasedCD::Implementation {
       problem.geometries.push_back({geometry->id, mesh.before, mesh.now, mesh.topology.triangles});
     }
     for (const auto& record : pairs.records())
-      problem.pairs.push_back(
-          {indices.at(record->a), indices.at(record->b), record->pair.settings, record->method});
+      problem.pairs.push_back({indices.at(record->a), indices.at(record->b), record->pair.settings,
+                               record->plan.method});
     return problem;
   }
 

@@ -11,6 +11,13 @@ std::uint64_t packed(std::uint32_t first, std::uint32_t second) {
   return std::uint64_t{first} << 32 | second;
 }
 
+using Key = std::array<std::uint64_t, 2>;
+Key byVertex(const VertexTriangleContact& c) { return {packed(c.vertex, c.triangle), 0}; }
+Key byTriangle(const VertexTriangleContact& c) { return {packed(c.triangle, c.vertex), 0}; }
+Key byEdges(const EdgeEdgeContact& c) {
+  return {packed(c.edgeA[0], c.edgeA[1]), packed(c.edgeB[0], c.edgeB[1])};
+}
+
 template <class Contact, class Entries, class KeyOf>
 void order(std::span<ContactBuffers* const> buffers, Buffer<Contact> ContactBuffers::*member,
            Entries& entries, std::vector<Contact>& out, KeyOf&& keyOf) {
@@ -52,17 +59,10 @@ void orderPairs(Buffer<TrianglePair>& pairs, std::size_t firsts, PairOrderScratc
 void orderContacts(std::span<ContactBuffers* const> buffers, OrderScratch& scratch,
                    CollisionData::Contents& out) {
   order(buffers, &ContactBuffers::vertexTriangle, scratch.vertexTriangle, out.vertexTriangle,
-        [](const VertexTriangleContact& c) {
-          return std::array{packed(c.vertex, c.triangle), std::uint64_t{0}};
-        });
+        byVertex);
   order(buffers, &ContactBuffers::triangleVertex, scratch.vertexTriangle, out.triangleVertex,
-        [](const VertexTriangleContact& c) {
-          return std::array{packed(c.triangle, c.vertex), std::uint64_t{0}};
-        });
-  order(buffers, &ContactBuffers::edgeEdge, scratch.edgeEdge, out.edgeEdge,
-        [](const EdgeEdgeContact& c) {
-          return std::array{packed(c.edgeA[0], c.edgeA[1]), packed(c.edgeB[0], c.edgeB[1])};
-        });
+        byTriangle);
+  order(buffers, &ContactBuffers::edgeEdge, scratch.edgeEdge, out.edgeEdge, byEdges);
   out.intersectingTriangles.clear();
   for (const ContactBuffers* buffer : buffers)
     out.intersectingTriangles.insert(out.intersectingTriangles.end(),
@@ -72,6 +72,18 @@ void orderContacts(std::span<ContactBuffers* const> buffers, OrderScratch& scrat
   out.intersectingTriangles.erase(
       std::unique(out.intersectingTriangles.begin(), out.intersectingTriangles.end()),
       out.intersectingTriangles.end());
+}
+
+void dropAnswered(ContactBuffers& found, const CollisionData::Contents& answered) {
+  const auto drop = [](auto& contacts, const auto& sorted, auto&& keyOf) {
+    std::erase_if(contacts, [&](const auto& contact) {
+      return std::binary_search(sorted.begin(), sorted.end(), contact,
+                                [&](const auto& l, const auto& r) { return keyOf(l) < keyOf(r); });
+    });
+  };
+  drop(found.vertexTriangle, answered.vertexTriangle, byVertex);
+  drop(found.triangleVertex, answered.triangleVertex, byTriangle);
+  drop(found.edgeEdge, answered.edgeEdge, byEdges);
 }
 
 }  // namespace palpate

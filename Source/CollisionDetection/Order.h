@@ -31,4 +31,7 @@ void orderPairs(Buffer<TrianglePair>& pairs, std::size_t firsts, PairOrderScratc
 /// The buffers' contacts, sorted by element ids, each once.
 void orderContacts(std::span<ContactBuffers* const>, OrderScratch&, CollisionData::Contents&);
 
+/// Takes out contacts of features that the answer, in order, has contacts of.
+void dropAnswered(ContactBuffers&, const CollisionData::Contents& answered);
+
 }  // namespace palpate

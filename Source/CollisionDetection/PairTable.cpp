@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 namespace palpate {
 
@@ -24,13 +25,18 @@ std::string shortest(double value) {
   return text;
 }
 
-/// The method that Auto stands for; throws what is wrong with the settings.
-Method checked(GeometryId a, GeometryId b, const PairSettings& settings) {
+/// Throws what is wrong with the settings.
+void check(GeometryId a, GeometryId b, const PairSettings& settings) {
   const std::string name = nameOf(a, b);
   if (!(settings.thickness >= 0.0) || std::isinf(settings.thickness))
     throw Error(ErrorCode::InvalidSettings,
                 name + ": thickness is " + shortest(settings.thickness) +
                     "; it must be finite and not negative",
+                a);
+  if (!(settings.tolerance <= std::numeric_limits<double>::max()))
+    throw Error(ErrorCode::InvalidSettings,
+                name + ": tolerance is " + shortest(settings.tolerance) +
+                    "; it must be finite, or negative for half the thickness",
                 a);
   if (settings.contacts != Contacts::Distinct && settings.contacts != Contacts::All &&
       settings.contacts != Contacts::Earliest)
@@ -41,21 +47,19 @@ Method checked(GeometryId a, GeometryId b, const PairSettings& settings) {
                 name + ": Contacts::Earliest is for Method::Continuous only", a);
   switch (settings.method) {
     case Method::Auto:
-      return settings.thickness > 0.0 ? Method::Proximity : Method::Intersection;
     case Method::Intersection:
-      return settings.method;
+    case Method::Continuous:
+      return;
     case Method::Proximity:
       if (settings.thickness == 0.0)
         throw Error(ErrorCode::InvalidSettings,
                     name + ": Method::Proximity needs a positive thickness; it is 0", a);
-      return settings.method;
+      return;
     case Method::Proxy:
       throw Error(ErrorCode::UnsupportedMethod, name + ": Method::Proxy does not exist yet", a);
     case Method::DistanceField:
       throw Error(ErrorCode::UnsupportedMethod, name + ": Method::DistanceField does not exist yet",
                   a);
-    case Method::Continuous:
-      return settings.method;
   }
   throw Error(ErrorCode::InvalidSettings,
               name + ": no such method: " + std::to_string(static_cast<int>(settings.method)), a);
@@ -67,15 +71,15 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
                     const PairSettings& settings) {
   Geometry& first = geometries.at(a);
   Geometry& second = geometries.at(b);
-  const Method method = checked(a, b, settings);
+  check(a, b, settings);
   if (m_byIds.contains(keyOf(a, b)))
     throw Error(ErrorCode::DuplicatePair,
                 nameOf(a, b) + " was added before; setPairSettings() changes its settings", a);
   auto record = std::make_unique<PairRecord>();
   record->pair = {a, b, settings};
-  record->method = method;
   record->a = &first;
   record->b = &second;
+  record->plan = planOf(settings, first, second);
   m_records.push_back(std::move(record));
   index();
 }
@@ -100,8 +104,9 @@ PairRecord& PairTable::inOrder(const GeometryTable& geometries, GeometryId a, Ge
 void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
                     const PairSettings& settings) {
   PairRecord& record = at(geometries, a, b);
-  record.method = checked(a, b, settings);
+  check(a, b, settings);
   record.pair.settings = settings;
+  record.plan = planOf(settings, *record.a, *record.b);
   record.dataFor = record.candidatesFor = {};
   index();
 }

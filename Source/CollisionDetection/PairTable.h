@@ -4,6 +4,7 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "CollisionDetection/GeometryTable.h"
+#include "CollisionDetection/Trust.h"
 #include "Core/Buffer.h"
 #include "NarrowPhase/NarrowPhase.h"
 
@@ -19,25 +20,29 @@ namespace palpate {
 /// One collision pair, with its answers and what they are answers to.
 struct PairRecord {
   CollisionPair pair;
-  Method method;  ///< not Auto
   Geometry* a;
   Geometry* b;
+  PairPlan plan;  ///< of this frame
+  Trust trust;
 
   /// Revisions of the geometries that an answer is of; 0: of none.
   struct AnsweredFor {
     std::uint64_t a = 0, b = 0;
+    bool wholeStep = false;
     friend bool operator==(const AnsweredFor&, const AnsweredFor&) = default;
   };
   AnsweredFor revisions() const {
-    const bool wholeStep = method == Method::Continuous;
-    return {a->revisionFor(wholeStep), b->revisionFor(wholeStep)};
+    const bool wholeStep = plan.method == Method::Continuous || plan.motion > 0.0;
+    return {a->revisionFor(wholeStep), b->revisionFor(wholeStep), wholeStep};
   }
   MeshPair meshes(const FloatPair* floats = nullptr) const {
-    return {a->mesh, b->mesh, {method, pair.settings.thickness, pair.settings.contacts}, floats};
+    PairSettings settings = pair.settings;
+    settings.method = plan.method;
+    return {a->mesh, b->mesh, settings, floats, plan.step};
   }
 
   /// Stored boxes may hold more than this pair's method asks for.
-  bool widerBoxes() const { return method != Method::Continuous && (a->swept || b->swept); }
+  bool widerBoxes() const { return !plan.swept() && (a->swept || b->swept); }
 
   CollisionData data;
   AnsweredFor dataFor;

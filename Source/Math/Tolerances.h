@@ -96,4 +96,14 @@ constexpr double kFormError = 0x1p-46;
 /// Of det(A, B, C) with components up to 1 (sideBefore()): six terms of 12 u, twice.
 constexpr double kSideError = 0x1p-46;
 
+// ---- Motion bounds (Motion.cpp, MotionBound.cpp) ----
+
+/// Relative, and of a distance relative to the largest coordinate difference beside it: a
+/// displacement carries 2 u, a difference of two 5 u, its length 4 u more; a distance is within 16
+/// u of the largest coordinate difference (<palpate/Distance.h>).
+constexpr double kMotionError = 0x1p-46;
+/// Added to a motion that extends a thickness, relative: covers twice what Continuous may report
+/// early, 1e-6 of the motion.
+constexpr double kMotionSlack = 0x1p-18;
+
 }  // namespace palpate

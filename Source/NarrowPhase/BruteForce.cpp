@@ -1,5 +1,6 @@
 #include "NarrowPhase/Proximity.h"
 
+#include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
 
 #include <algorithm>
@@ -15,8 +16,8 @@ using Eigen::Vector3d;
 /// One vertex against every triangle of a mesh, as the definition of Contacts::Distinct reads.
 class VertexAgainstMesh {
  public:
-  VertexAgainstMesh(const TriangleMesh& triangles, const PairSettings& settings)
-      : m_mesh(triangles), m_settings(settings) {}
+  VertexAgainstMesh(const TriangleMesh& triangles, double thickness)
+      : m_mesh(triangles), m_thickness(thickness) {}
 
   /// vertex: its id if the mesh is its own, whose triangles at the vertex are left out.
   void measure(const Vector3d& p, std::optional<std::uint32_t> vertex, ContactBuffers& out) {
@@ -37,7 +38,7 @@ class VertexAgainstMesh {
   /// The triangle's answer if it is within the thickness.
   const VertexTriangleDistance* near(std::uint32_t triangle) const {
     const auto& answer = m_answers[triangle];
-    return answer && answer->distance <= m_settings.thickness ? &*answer : nullptr;
+    return answer && answer->distance <= m_thickness ? &*answer : nullptr;
   }
 
   MeshFeature feature(std::uint32_t triangle) const {
@@ -86,7 +87,7 @@ class VertexAgainstMesh {
   }
 
   const TriangleMesh& m_mesh;
-  const PairSettings& m_settings;
+  double m_thickness;
   Vector3d m_position;
   std::vector<std::optional<VertexTriangleDistance>> m_answers;
 };
@@ -97,20 +98,26 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
                         ContactBuffers& out) {
   const TriangleMesh &vertices = kSecond ? pair.b : pair.a, &triangles = kSecond ? pair.a : pair.b;
   const bool distinct = pair.settings.contacts == Contacts::Distinct;
-  VertexAgainstMesh against(triangles, pair.settings);
+  const Features<ImpactQuery::Kind::VertexTriangle> features{vertices, triangles};
+  StepCheck check(pair, out);
+  VertexAgainstMesh against(triangles, pair.thicknessAtEnd());
   for (const std::uint32_t v : sample) {
     against.measure(vertices.now[v], pair.self() ? std::optional(v) : std::nullopt, out);
     for (std::uint32_t t = 0; t < against.size(); ++t) {
       const VertexTriangleDistance* answer = against.near(t);
       if (!answer) continue;
+      if (check.isAnsweredByImpact(features, v, t, kSecond, answer->distance)) continue;
       if (distinct) {
         const MeshFeature feature = against.feature(t);
         const bool isVertex = feature.kind == MeshFeature::Kind::Vertex;
         if (isVertex && (kSecond || (pair.self() && feature.id < v))) continue;
         if (!against.isDistinct(t)) continue;
       }
+      const Triangle& corners = triangles.topology.triangles[t];
+      check.noteTriangle(t, !kSecond, triangles.now[corners[0]], triangles.now[corners[1]],
+                         triangles.now[corners[2]]);
       (kSecond ? out.triangleVertex : out.vertexTriangle)
-          .push_back(contactOf(v, t, triangles.topology.triangles[t], *answer));
+          .push_back(contactOf(v, t, corners, *answer, pair.step.impacts ? 1.0 : 0.0));
     }
   }
 }
@@ -118,18 +125,23 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
 void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
                   ContactBuffers& out) {
   const std::vector<Segment>&a = pair.a.topology.edges, &b = pair.b.topology.edges;
+  const Features<ImpactQuery::Kind::EdgeEdge> features{pair.a, pair.b};
+  StepCheck check(pair, out);
   for (const std::uint32_t i : sample) {
-    for (std::size_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
+    for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
       if (pair.self() && shareVertex(a[i], b[j])) continue;
       const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(
           pair.a.now[a[i][0]], pair.a.now[a[i][1]], pair.b.now[b[j][0]], pair.b.now[b[j][1]]);
       ++out.featurePairs;
       out.exactDecisions += answer.exact;
+      if (!(answer.distance <= pair.thicknessAtEnd()) ||
+          check.isAnsweredByImpact(features, i, j, false, answer.distance))
+        continue;
       const bool inside = !answer.parallel && answer.featureA == EdgeFeature::Interior &&
                           answer.featureB == EdgeFeature::Interior;
       if (pair.settings.contacts == Contacts::Distinct && !inside) continue;
-      if (answer.distance <= pair.settings.thickness)
-        out.edgeEdge.push_back(contactOf(a[i], b[j], answer));
+      check.noteEdges(a[i], b[j]);
+      out.edgeEdge.push_back(contactOf(a[i], b[j], answer, pair.step.impacts ? 1.0 : 0.0));
     }
   }
 }

@@ -1,9 +1,10 @@
 #include "NarrowPhase/Continuous.h"
 
 #include "NarrowPhase/Proximity.h"
+#include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
 #include "Math/ImpactFilter.h"
-#include "Math/ImpactQuery.h"
+#include "Math/MotionBound.h"
 
 #include <algorithm>
 #include <array>
@@ -17,34 +18,6 @@ namespace {
 
 using Eigen::Vector3d;
 using Kind = ImpactQuery::Kind;
-
-/// The two meshes that feature pairs of one kind come from: vertices of the first with triangles of
-/// the second, or edges of each.
-template <Kind kind>
-struct Features {
-  const TriangleMesh& first;
-  const TriangleMesh& second;
-
-  std::array<std::uint32_t, 4> vertices(std::uint32_t inFirst, std::uint32_t inSecond) const {
-    if constexpr (kind == Kind::VertexTriangle) {
-      const auto& [a, b, c] = second.topology.triangles[inSecond];
-      return {inFirst, a, b, c};
-    } else {
-      const Segment &p = first.topology.edges[inFirst], &q = second.topology.edges[inSecond];
-      return {p[0], p[1], q[0], q[1]};
-    }
-  }
-  const TriangleMesh& meshOf(int vertex) const {
-    return vertex < (kind == Kind::VertexTriangle ? 1 : 2) ? first : second;
-  }
-  ImpactQuery query(std::uint32_t inFirst, std::uint32_t inSecond) const {
-    const auto ids = vertices(inFirst, inSecond);
-    ImpactQuery result{kind, {}};
-    for (int i = 0; i < 4; ++i)
-      result.vertices[i] = {&meshOf(i).before[ids[i]], &meshOf(i).now[ids[i]]};
-    return result;
-  }
-};
 
 TimeOfImpactSettings settingsOf(const MeshPair& pair) {
   TimeOfImpactSettings settings;
@@ -100,15 +73,16 @@ void forEachLikelyPair(const MeshPair& pair, std::span<const TrianglePair> candi
 class ContactFinder {
  public:
   ContactFinder(const MeshPair& pair, ContactBuffers& out)
-      : m_pair(pair), m_out(out), m_settings(settingsOf(pair)) {}
+      : m_pair(pair), m_check(pair, out), m_out(out), m_settings(settingsOf(pair)) {}
 
+  /// Whether it is a contact.
   template <Kind kind>
-  void operator()(const Features<kind>& features, std::uint32_t inFirst, std::uint32_t inSecond,
+  bool operator()(const Features<kind>& features, std::uint32_t inFirst, std::uint32_t inSecond,
                   bool ofSecond) {
     const ImpactQuery query = features.query(inFirst, inSecond);
     const ImpactAnswer answer = findImpact(query, m_settings);
     m_out.exactDecisions += answer.exact;
-    if (!answer.impact) return;
+    if (!answer.impact) return false;
     std::array<Vector3d, 4> p;
     for (int i = 0; i < 4; ++i)
       p[i] = (1.0 - answer.time) * query.vertices[i].at(0) + answer.time * query.vertices[i].at(1);
@@ -117,43 +91,69 @@ class ContactFinder {
       const auto closest = finiteVertexTriangleDistance(p[0], p[1], p[2], p[3]);
       list.push_back(
           contactOf(inFirst, inSecond, features.second.topology.triangles[inSecond], closest));
+      m_check.noteTriangle(inSecond, !ofSecond, p[1], p[2], p[3]);
       // A corner touches its triangle, and then the normal is the plane's.
-      complete(list.back(), query, answer.time,
-               [&] { return finiteVertexTriangleDistance(p[1], p[1], p[2], p[3]).normal; });
+      complete<kind>(list.back(), query, answer.time,
+                     [&] { return finiteVertexTriangleDistance(p[1], p[1], p[2], p[3]).normal; });
     } else {
       const auto closest = finiteEdgeEdgeDistance(p[0], p[1], p[2], p[3]);
       m_out.edgeEdge.push_back(contactOf(features.first.topology.edges[inFirst],
                                          features.second.topology.edges[inSecond], closest));
-      complete(m_out.edgeEdge.back(), query, answer.time, [&] {
+      m_check.noteEdges(m_out.edgeEdge.back().edgeA, m_out.edgeEdge.back().edgeB);
+      complete<kind>(m_out.edgeEdge.back(), query, answer.time, [&] {
         return finiteEdgeEdgeDistance(p[0], p[1], p[0], p[0] + (p[3] - p[2])).normal;
       });
     }
+    return true;
   }
 
  private:
-  template <class Contact, class PlaneNormal>
+  template <Kind kind, class Contact, class PlaneNormal>
   void complete(Contact& contact, const ImpactQuery& query, double time, PlaneNormal&& normal) {
     contact.timeOfImpact = time;
+    if (m_pair.step.motion > 0.0) noteClearance<kind>(query, contact);
     if (m_settings.minimumDistance > 0.0) return;
     contact.normal = normal();
     if (sideBefore(query, time) < 0) contact.normal = -contact.normal;
   }
 
+  /// What the rest of the step leaves of the distance.
+  template <Kind kind, class Contact>
+  void noteClearance(const ImpactQuery& query, const Contact& contact) {
+    double& clearance = m_out.facts.clearance;
+    if (clearance <= 0.0) return;
+    const double left = (1.0 - contact.timeOfImpact) * motionBound<kind>(query);
+    clearance = std::min(clearance, std::max(0.0, contact.distance - left));
+  }
+
   const MeshPair& m_pair;
+  StepCheck m_check;
   ContactBuffers& m_out;
   const TimeOfImpactSettings m_settings;
 };
 
-}  // namespace
+/// The same for those that proximity at the step's end does not answer.
+class FastImpactFinder {
+ public:
+  FastImpactFinder(const MeshPair& pair, ContactBuffers& out)
+      : m_check(pair, out), m_find(pair, out) {}
 
-void findContinuous(const MeshPair& pair, std::span<const TrianglePair> candidates,
-                    ContactBuffers& out) {
-  forEachLikelyPair(pair, candidates, out, ContactFinder(pair, out));
-}
+  template <Kind kind>
+  void operator()(const Features<kind>& features, std::uint32_t inFirst, std::uint32_t inSecond,
+                  bool ofSecond) {
+    if (!m_check.isAnsweredAtEnd(features, inFirst, inSecond))
+      m_find(features, inFirst, inSecond, ofSecond);
+  }
 
-void findContinuousByBruteForce(const MeshPair& pair, const FeatureLists& lists,
-                                ContactBuffers& out) {
-  ContactFinder test(pair, out);
+ private:
+  StepCheck m_check;
+  ContactFinder m_find;
+};
+
+/// Those of the lists with every feature of the other mesh, as above.
+template <class F>
+void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, ContactBuffers& out,
+                        F&& f) {
   for (const bool ofSecond : {false, true}) {
     const Features<Kind::VertexTriangle> features{ofSecond ? pair.b : pair.a,
                                                   ofSecond ? pair.a : pair.b};
@@ -162,7 +162,7 @@ void findContinuousByBruteForce(const MeshPair& pair, const FeatureLists& lists,
       for (std::uint32_t t = 0; t < triangles.size(); ++t) {
         if (pair.self() && holdsVertex(triangles[t], v)) continue;
         ++out.featurePairs;
-        test(features, v, t, ofSecond);
+        f(features, v, t, ofSecond);
       }
     }
   }
@@ -171,8 +171,40 @@ void findContinuousByBruteForce(const MeshPair& pair, const FeatureLists& lists,
     for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
       if (pair.self() && shareVertex(a[i], b[j])) continue;
       ++out.featurePairs;
-      test(Features<Kind::EdgeEdge>{pair.a, pair.b}, i, j, false);
+      f(Features<Kind::EdgeEdge>{pair.a, pair.b}, i, j, false);
     }
+}
+
+}  // namespace
+
+void findContinuous(const MeshPair& pair, std::span<const TrianglePair> candidates,
+                    ContactBuffers& out) {
+  forEachLikelyPair(pair, candidates, out, ContactFinder(pair, out));
+}
+
+template <Kind kind>
+bool addImpact(const MeshPair& pair, const Features<kind>& features, std::uint32_t inFirst,
+               std::uint32_t inSecond, bool ofSecond, ContactBuffers& out) {
+  return ContactFinder(pair, out)(features, inFirst, inSecond, ofSecond);
+}
+template bool addImpact(const MeshPair&, const Features<Kind::VertexTriangle>&, std::uint32_t,
+                        std::uint32_t, bool, ContactBuffers&);
+template bool addImpact(const MeshPair&, const Features<Kind::EdgeEdge>&, std::uint32_t,
+                        std::uint32_t, bool, ContactBuffers&);
+
+void findFastImpacts(const MeshPair& pair, std::span<const TrianglePair> candidates,
+                     ContactBuffers& out) {
+  forEachLikelyPair(pair, candidates, out, FastImpactFinder(pair, out));
+}
+
+void findContinuousByBruteForce(const MeshPair& pair, const FeatureLists& lists,
+                                ContactBuffers& out) {
+  forEachFeaturePair(pair, lists, out, ContactFinder(pair, out));
+}
+
+void findFastImpactsByBruteForce(const MeshPair& pair, const FeatureLists& lists,
+                                 ContactBuffers& out) {
+  forEachFeaturePair(pair, lists, out, FastImpactFinder(pair, out));
 }
 
 double findEarliestImpact(const MeshPair& pair, std::span<const TrianglePair> candidates,

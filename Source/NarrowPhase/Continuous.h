@@ -1,7 +1,9 @@
 #pragma once
 
+#include "Math/ImpactQuery.h"
 #include "NarrowPhase/NarrowPhase.h"
 
+#include <array>
 #include <span>
 
 namespace palpate {
@@ -15,6 +17,45 @@ namespace palpate {
 /// the edges; of degenerate elements the axis that distances use. With a thickness: that of the
 /// distance.
 void findContinuous(const MeshPair&, std::span<const TrianglePair> candidates, ContactBuffers& out);
+
+/// The two meshes that feature pairs of one kind come from: vertices of the first with triangles of
+/// the second, or edges of each.
+template <ImpactQuery::Kind kind>
+struct Features {
+  const TriangleMesh& first;
+  const TriangleMesh& second;
+
+  std::array<std::uint32_t, 4> vertices(std::uint32_t inFirst, std::uint32_t inSecond) const {
+    if constexpr (kind == ImpactQuery::Kind::VertexTriangle) {
+      const auto& [a, b, c] = second.topology.triangles[inSecond];
+      return {inFirst, a, b, c};
+    } else {
+      const Segment &p = first.topology.edges[inFirst], &q = second.topology.edges[inSecond];
+      return {p[0], p[1], q[0], q[1]};
+    }
+  }
+  const TriangleMesh& meshOf(int vertex) const {
+    return vertex < (kind == ImpactQuery::Kind::VertexTriangle ? 1 : 2) ? first : second;
+  }
+  ImpactQuery query(std::uint32_t inFirst, std::uint32_t inSecond) const {
+    const auto ids = vertices(inFirst, inSecond);
+    ImpactQuery result{kind, {}};
+    for (int i = 0; i < 4; ++i)
+      result.vertices[i] = {&meshOf(i).before[ids[i]], &meshOf(i).now[ids[i]]};
+    return result;
+  }
+};
+
+/// One feature pair of Method::Continuous; returns whether it is a contact. ofSecond: the first
+/// feature is of the pair's second mesh.
+template <ImpactQuery::Kind kind>
+bool addImpact(const MeshPair&, const Features<kind>&, std::uint32_t inFirst,
+               std::uint32_t inSecond, bool ofSecond, ContactBuffers& out);
+
+/// Method::Auto: impacts of those feature pairs that proximity at the step's end does not answer.
+void findFastImpacts(const MeshPair&, std::span<const TrianglePair> candidates,
+                     ContactBuffers& out);
+void findFastImpactsByBruteForce(const MeshPair&, const FeatureLists&, ContactBuffers& out);
 
 /// Method::Continuous of findContactsByBruteForce().
 void findContinuousByBruteForce(const MeshPair&, const FeatureLists&, ContactBuffers& out);

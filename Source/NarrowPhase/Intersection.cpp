@@ -1,9 +1,11 @@
 #include "NarrowPhase/Intersection.h"
 
 #include "NarrowPhase/Proximity.h"
+#include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
 #include "Math/TriangleIntersection.h"
 
+#include <algorithm>
 #include <bit>
 
 namespace palpate {
@@ -17,10 +19,13 @@ struct MeshTriangle {
   Corners positions;
 
   MeshTriangle(const TriangleMesh& ofMesh, std::uint32_t triangle)
+      : MeshTriangle(ofMesh, triangle, ofMesh.now) {}
+  MeshTriangle(const TriangleMesh& ofMesh, std::uint32_t triangle,
+               const std::vector<Eigen::Vector3d>& at)
       : mesh(ofMesh),
         id(triangle),
         vertices(mesh.topology.triangles[id]),
-        positions{mesh.now[vertices[0]], mesh.now[vertices[1]], mesh.now[vertices[2]]} {}
+        positions{at[vertices[0]], at[vertices[1]], at[vertices[2]]} {}
 
   /// kNoEdge between two corners that are one vertex.
   std::uint32_t edge(int i) const { return mesh.topology.triangleEdges[id][i]; }
@@ -50,8 +55,9 @@ int sharedCorner(unsigned twoEdges) { return twoEdges == 0b011 ? 1 : twoEdges ==
 /// The contacts of two triangles that intersect.
 class IntersectionContacts {
  public:
-  IntersectionContacts(const MeshTriangle& a, const MeshTriangle& b, ContactBuffers& out)
-      : m_a(a), m_b(b), m_out(out), m_self(&a.mesh == &b.mesh) {}
+  IntersectionContacts(const MeshPair& pair, const MeshTriangle& a, const MeshTriangle& b,
+                       ContactBuffers& out)
+      : m_a(a), m_b(b), m_out(out), m_check(pair, out), m_self(pair.self()) {}
 
   void add(const TriangleIntersection& meeting) {
     const unsigned ofA = meeting.edgesOfAThroughB, ofB = meeting.edgesOfBThroughA;
@@ -92,6 +98,7 @@ class IntersectionContacts {
     m_out.exactDecisions += answer.exact;
     // The winding normal is what a vertex at distance zero, such as a corner, is answered.
     answer.normal = finiteVertexTriangleDistance(a, a, b, c).normal;
+    m_check.noteTriangle(triangle.id, &triangle == &m_b, a, b, c);
     contacts.push_back(contactOf(of.vertices[corner], triangle.id, triangle.vertices, answer));
   }
 
@@ -103,11 +110,13 @@ class IntersectionContacts {
     const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(positionsA[p[0]], positionsA[p[1]],
                                                            positionsB[q[0]], positionsB[q[1]]);
     m_out.exactDecisions += answer.exact;
+    m_check.noteEdges(p, q);
     m_out.edgeEdge.push_back(contactOf(p, q, answer));
   }
 
   const MeshTriangle &m_a, &m_b;
   ContactBuffers& m_out;
+  StepCheck m_check;
   bool m_self;
 };
 
@@ -125,9 +134,27 @@ void findIntersections(const MeshPair& pair, std::span<const TrianglePair> candi
                            pair.self() ? featuresInCommon(a, b) : ExcludedFeatures());
     if (!meeting.intersect()) continue;
     out.intersectingTriangles.push_back(candidate);
-    IntersectionContacts(a, b, out).add(meeting);
+    IntersectionContacts(pair, a, b, out).add(meeting);
   }
   out.exactDecisions += counts.undecided;
+}
+
+bool anyIntersectAtStart(const MeshPair& pair, std::span<const TrianglePair> candidates) {
+  SignCounts counts;
+  return std::any_of(candidates.begin(), candidates.end(), [&](const TrianglePair& candidate) {
+    if (pair.self() && candidate.a == candidate.b) return false;
+    const MeshTriangle a(pair.a, candidate.a, pair.a.before), b(pair.b, candidate.b, pair.b.before);
+    for (int k = 0; k < 3; ++k) {
+      const auto [leastA, mostA] =
+          std::minmax({a.positions[0][k], a.positions[1][k], a.positions[2][k]});
+      const auto [leastB, mostB] =
+          std::minmax({b.positions[0][k], b.positions[1][k], b.positions[2][k]});
+      if (mostA < leastB || mostB < leastA) return false;
+    }
+    return intersectTriangles(a.positions, b.positions, counts,
+                              pair.self() ? featuresInCommon(a, b) : ExcludedFeatures())
+        .intersect();
+  });
 }
 
 void findIntersectionsByBruteForce(const MeshPair& pair, const FeatureLists& features,

@@ -1,14 +1,30 @@
 #include "NarrowPhase/NarrowPhase.h"
 
+#include "NarrowPhase/Auto.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Proximity.h"
 
 #include <palpate/Error.h>
 
+#include <algorithm>
 #include <numeric>
 
 namespace palpate {
+
+void StepFacts::clear() {
+  clearance = std::numeric_limits<double>::infinity();
+  startsIntersecting = false;
+  for (auto* list : {&verticesA, &verticesB, &degenerateA, &degenerateB}) list->clear();
+}
+
+void StepFacts::add(const StepFacts& other) {
+  clearance = std::min(clearance, other.clearance);
+  startsIntersecting |= other.startsIntersecting;
+  for (auto list : {&StepFacts::verticesA, &StepFacts::verticesB, &StepFacts::degenerateA,
+                    &StepFacts::degenerateB})
+    (this->*list).insert((this->*list).end(), (other.*list).begin(), (other.*list).end());
+}
 
 void ContactBuffers::clear() {
   vertexTriangle.clear();
@@ -16,6 +32,7 @@ void ContactBuffers::clear() {
   edgeEdge.clear();
   intersectingTriangles.clear();
   featurePairs = exactDecisions = 0;
+  facts.clear();
 }
 
 void findContacts(const MeshPair& pair, std::span<const TrianglePair> candidates,
@@ -27,6 +44,8 @@ void findContacts(const MeshPair& pair, std::span<const TrianglePair> candidates
       return findIntersections(pair, candidates, out);
     case Method::Continuous:
       return findContinuous(pair, candidates, out);
+    case Method::Auto:
+      return findAuto(pair, candidates, out);
     default:
       throw Error(ErrorCode::UnsupportedMethod, "this method does not exist yet");
   }
@@ -61,6 +80,8 @@ void findContactsByBruteForce(const MeshPair& pair, const FeatureLists& features
       return findIntersectionsByBruteForce(pair, features, out);
     case Method::Continuous:
       return findContinuousByBruteForce(pair, features, out);
+    case Method::Auto:
+      return findAutoByBruteForce(pair, features, out);
     default:
       throw Error(ErrorCode::UnsupportedMethod, "this method does not exist yet");
   }

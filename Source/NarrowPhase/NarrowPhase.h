@@ -9,19 +9,44 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
 namespace palpate {
 
+/// What a pair's step asks of the narrow phase; Docs/Algorithms/Validity.md has the reasons.
+struct StepPlan {
+  /// L: no two features move further, relative to each other. 0: nothing is asked of the step.
+  double motion = 0.0;
+  double slow = 0.0;   ///< L: Auto's Proximity misses no feature pair that moves at most this far
+  double extra = 0.0;  ///< L: added to the thickness for proximity at the step's end
+  /// Auto: feature pairs that the step may have brought together are answered by their impact.
+  bool impacts = false;
+  bool start = false;  ///< whether triangles intersect at the step's start is asked
+};
+
 /// One pair of meshes in one frame.
 struct MeshPair {
   const TriangleMesh& a;
   const TriangleMesh& b;  ///< the same object for self-collision
-  PairSettings settings;  ///< method resolved: not Auto
+  PairSettings settings;  ///< method resolved; Auto: Proximity and Continuous
   /// For throwing out feature pairs by their boxes; without, the same answer takes longer.
   const FloatPair* floats = nullptr;
+  StepPlan step{};
+  double thicknessAtEnd() const { return settings.thickness + step.extra; }
   bool self() const { return &a == &b; }
+};
+
+/// What was seen of a method's conditions. Ids may repeat.
+struct StepFacts {
+  /// L: no pair of features that is a contact is nearer at the step's end; 0: it may have touched.
+  double clearance = std::numeric_limits<double>::infinity();
+  bool startsIntersecting = false;
+  Buffer<std::uint32_t> verticesA, verticesB;  ///< of features that may have touched, unanswered
+  Buffer<std::uint32_t> degenerateA, degenerateB;  ///< triangles without area in contacts
+  void clear();
+  void add(const StepFacts&);
 };
 
 /// What one worker found. Unsorted; cleared and filled again each frame.
@@ -29,7 +54,9 @@ struct ContactBuffers {
   Buffer<VertexTriangleContact> vertexTriangle, triangleVertex;
   Buffer<EdgeEdgeContact> edgeEdge;
   Buffer<TrianglePair> intersectingTriangles;
-  FeaturePairs features;           ///< scratch: of the batch at hand
+  FeaturePairs features;      ///< scratch: of the batch at hand
+  Buffer<TrianglePair> part;  ///< scratch: some of the batch at hand
+  StepFacts facts;
   std::size_t featurePairs = 0;    ///< tested
   std::size_t exactDecisions = 0;  ///< left to exact arithmetic
   void clear();

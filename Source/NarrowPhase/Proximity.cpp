@@ -1,6 +1,7 @@
 #include "NarrowPhase/Proximity.h"
 
 #include "NarrowPhase/ProximityFilter.h"
+#include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
 
 #include <algorithm>
@@ -20,18 +21,20 @@ class VertexTriangleFinder {
   /// keepCorner: whether a vertex may meet a corner's vertex here, by their ids.
   enum class Corners { All, LowerVertexOnly, None };
 
-  VertexTriangleFinder(const TriangleMesh& vertices, const TriangleMesh& triangles,
-                       const PairSettings& settings, Corners corners,
-                       Buffer<VertexTriangleContact>& out, std::size_t& exactDecisions)
-      : m_vertices(vertices.now),
-        m_positions(triangles.now),
-        m_topology(triangles.topology),
-        m_self(&vertices == &triangles),
-        m_thickness(settings.thickness),
-        m_distinct(settings.contacts == Contacts::Distinct),
+  VertexTriangleFinder(const MeshPair& pair, bool ofSecond, Corners corners, ContactBuffers& out)
+      : m_features{ofSecond ? pair.b : pair.a, ofSecond ? pair.a : pair.b},
+        m_ofSecond(ofSecond),
+        m_vertices(m_features.first.now),
+        m_positions(m_features.second.now),
+        m_topology(m_features.second.topology),
+        m_self(pair.self()),
+        m_thickness(pair.thicknessAtEnd()),
+        m_distinct(pair.settings.contacts == Contacts::Distinct),
         m_corners(corners),
-        m_out(out),
-        m_exactDecisions(exactDecisions) {}
+        m_time(pair.step.impacts ? 1.0 : 0.0),
+        m_check(pair, out),
+        m_out(ofSecond && !pair.self() ? out.triangleVertex : out.vertexTriangle),
+        m_exactDecisions(out.exactDecisions) {}
 
   void test(std::uint32_t vertex, std::uint32_t triangle) {
     const Triangle& corners = m_topology.triangles[triangle];
@@ -40,10 +43,14 @@ class VertexTriangleFinder {
         p, m_positions[corners[0]], m_positions[corners[1]], m_positions[corners[2]]);
     m_exactDecisions += answer.exact;
     if (!(answer.distance <= m_thickness)) return;
+    if (m_check.isAnsweredByImpact(m_features, vertex, triangle, m_ofSecond, answer.distance))
+      return;
     if (m_distinct &&
         !isDistinct(vertex, triangle, featureOf(m_topology, triangle, answer.feature)))
       return;
-    m_out.push_back(contactOf(vertex, triangle, corners, answer));
+    m_check.noteTriangle(triangle, !m_ofSecond, m_positions[corners[0]], m_positions[corners[1]],
+                         m_positions[corners[2]]);
+    m_out.push_back(contactOf(vertex, triangle, corners, answer, m_time));
   }
 
  private:
@@ -90,25 +97,39 @@ class VertexTriangleFinder {
                        m_positions[corners[(side + 2) % 3]]);
   }
 
+  const Features<ImpactQuery::Kind::VertexTriangle> m_features;
+  const bool m_ofSecond;
   std::span<const Vector3d> m_vertices, m_positions;
   const MeshTopology& m_topology;
   bool m_self;
   double m_thickness;
   bool m_distinct;
   Corners m_corners;
+  double m_time;
+  StepCheck m_check;
   Buffer<VertexTriangleContact>& m_out;
   std::size_t& m_exactDecisions;
 };
 
-void testEdges(const MeshPair& pair, const Segment& p, const Segment& q, ContactBuffers& out) {
-  const Vector3d &p0 = pair.a.now[p[0]], &p1 = pair.a.now[p[1]];
-  const Vector3d &q0 = pair.b.now[q[0]], &q1 = pair.b.now[q[1]];
+void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, StepCheck& check,
+               ContactBuffers& out) {
+  const Features<ImpactQuery::Kind::EdgeEdge> features{pair.a, pair.b};
+  const auto at = [&](int i) -> const Vector3d& {
+    return features.meshOf(i).now[features.vertices(edgeA, edgeB)[i]];
+  };
   const bool distinct = pair.settings.contacts == Contacts::Distinct;
-  const std::optional<EdgeEdgeDistance> answer =
-      distinct ? crossingEdgesDistance(p0, p1, q0, q1) : finiteEdgeEdgeDistance(p0, p1, q0, q1);
-  if (!answer) return;
+  std::optional<EdgeEdgeDistance> answer;
+  if (distinct) answer = crossingEdgesDistance(at(0), at(1), at(2), at(3));
+  const bool isContact = answer || !distinct;
+  if (!isContact && check.edgeReach() == 0.0) return;
+  if (!answer) answer = finiteEdgeEdgeDistance(at(0), at(1), at(2), at(3));
   out.exactDecisions += answer->exact;
-  if (answer->distance <= pair.settings.thickness) out.edgeEdge.push_back(contactOf(p, q, *answer));
+  if (!(answer->distance <= pair.thicknessAtEnd())) return;
+  if (check.isAnsweredByImpact(features, edgeA, edgeB, false, answer->distance)) return;
+  if (!isContact) return;
+  const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
+  check.noteEdges(p, q);
+  out.edgeEdge.push_back(contactOf(p, q, *answer, pair.step.impacts ? 1.0 : 0.0));
 }
 
 /// Of bits below 2^16. The baseline has no instruction for it.
@@ -147,10 +168,9 @@ class ProximityFinder {
   ProximityFinder(const MeshPair& pair, ContactBuffers& out)
       : m_pair(pair),
         m_out(out),
-        m_ofA(pair.a, pair.b, pair.settings, pair.self() ? Corners::LowerVertexOnly : Corners::All,
-              out.vertexTriangle, out.exactDecisions),
-        m_ofB(pair.b, pair.a, pair.settings, pair.self() ? Corners::LowerVertexOnly : Corners::None,
-              pair.self() ? out.vertexTriangle : out.triangleVertex, out.exactDecisions) {}
+        m_check(pair, out),
+        m_ofA(pair, false, pair.self() ? Corners::LowerVertexOnly : Corners::All, out),
+        m_ofB(pair, true, pair.self() ? Corners::LowerVertexOnly : Corners::None, out) {}
 
   void find(std::span<const TrianglePair> candidates) {
     for (const TrianglePair& candidate : candidates) add(candidate);
@@ -181,8 +201,8 @@ class ProximityFinder {
   void flush() {
     if (m_size == 0) return;
     std::uint32_t possible[TrianglePairBatch::kSize];
-    const PairSettings& settings = m_pair.settings;
-    findPossibleProximity(m_batch, settings.thickness, settings.contacts == Contacts::Distinct,
+    findPossibleProximity(m_batch, m_pair.thicknessAtEnd(),
+                          m_pair.settings.contacts == Contacts::Distinct, m_check.edgeReach(),
                           possible);
     for (int i = 0; i < m_size; ++i) {
       m_out.featurePairs += countOf(m_pairs[i]);
@@ -200,11 +220,12 @@ class ProximityFinder {
     std::uint32_t edgeA = a.triangleEdges[candidate.a][(bit - 6) / 3];
     std::uint32_t edgeB = b.triangleEdges[candidate.b][(bit - 6) % 3];
     if (m_pair.self() && edgeB < edgeA) std::swap(edgeA, edgeB);
-    testEdges(m_pair, a.edges[edgeA], b.edges[edgeB], m_out);
+    testEdges(m_pair, edgeA, edgeB, m_check, m_out);
   }
 
   const MeshPair& m_pair;
   ContactBuffers& m_out;
+  StepCheck m_check;
   VertexTriangleFinder m_ofA, m_ofB;
   int m_size = 0;
   std::uint32_t m_pairs[TrianglePairBatch::kSize];

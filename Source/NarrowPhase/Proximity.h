@@ -44,13 +44,13 @@ inline bool shareVertex(const Segment& a, const Segment& b) {
 
 inline VertexTriangleContact contactOf(std::uint32_t vertex, std::uint32_t triangle,
                                        const Triangle& corners,
-                                       const VertexTriangleDistance& answer) {
-  return {vertex, triangle, corners, answer.barycentric, answer.normal, answer.distance, 0.0};
+                                       const VertexTriangleDistance& answer, double time = 0.0) {
+  return {vertex, triangle, corners, answer.barycentric, answer.normal, answer.distance, time};
 }
 
-inline EdgeEdgeContact contactOf(const Segment& a, const Segment& b,
-                                 const EdgeEdgeDistance& answer) {
-  return {a, b, answer.weightA, answer.weightB, answer.normal, answer.distance, 0.0};
+inline EdgeEdgeContact contactOf(const Segment& a, const Segment& b, const EdgeEdgeDistance& answer,
+                                 double time = 0.0) {
+  return {a, b, answer.weightA, answer.weightB, answer.normal, answer.distance, time};
 }
 
 }  // namespace palpate

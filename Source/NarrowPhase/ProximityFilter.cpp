@@ -31,10 +31,11 @@ constexpr int kSize = TrianglePairBatch::kSize;
 /// A batch in floats: coordinates relative to a0, scaled to below 2.
 struct ScaledBatch {
   alignas(64) float coordinates[18][kSize];  // the first three stay unused: a0 is the origin
-  alignas(64) float thickness[kSize];
+  alignas(64) float thickness[kSize], edgeReach[kSize];
 };
 
-HWY_ATTR void scaleBatch(const TrianglePairBatch& batch, double thickness, ScaledBatch& scaled) {
+HWY_ATTR void scaleBatch(const TrianglePairBatch& batch, double thickness, double edgeReach,
+                         ScaledBatch& scaled) {
   const hn::CappedTag<double, kSize> d;
   const hn::RebindToUnsigned<decltype(d)> du;
   const hn::Rebind<float, decltype(d)> df;
@@ -49,10 +50,13 @@ HWY_ATTR void scaleBatch(const TrianglePairBatch& batch, double thickness, Scale
     const auto exponent = hn::And(hn::BitCast(du, most), hn::Set(du, 0x7ff0000000000000u));
     const auto scale = hn::BitCast(d, hn::Sub(hn::Set(du, 0x7fe0000000000000u), exponent));
     const auto isFinite = hn::Lt(most, hn::Set(d, 0x1p1023));
-    const auto scaledThickness = hn::IfThenElse(isFinite, hn::Mul(hn::Set(d, thickness), scale),
-                                                hn::BitCast(d, hn::Set(du, 0x7ff8000000000000u)));
-    hn::Store(hn::Mul(hn::DemoteTo(df, scaledThickness), hn::Set(df, 1.0f + 0x1p-20f)), df,
-              scaled.thickness + i);
+    const auto store = [&](double length, float* out) HWY_ATTR {
+      const auto scaledLength = hn::IfThenElse(isFinite, hn::Mul(hn::Set(d, length), scale),
+                                               hn::BitCast(d, hn::Set(du, 0x7ff8000000000000u)));
+      hn::Store(hn::Mul(hn::DemoteTo(df, scaledLength), hn::Set(df, 1.0f + 0x1p-20f)), df, out + i);
+    };
+    store(thickness, scaled.thickness);
+    store(edgeReach, scaled.edgeReach);
     for (int k = 3; k < 18; ++k)
       hn::Store(hn::DemoteTo(df, hn::Mul(relative[k], scale)), df, scaled.coordinates[k] + i);
   }
@@ -133,7 +137,8 @@ HWY_INLINE auto isOutOfReach(const TriangleFrame<V>& triangle, const Vector3<V>&
   return hn::Or(isOut, hn::Lt(along<kTurned>(triangle.inward[2], from2), triangle.beyond[2]));
 }
 
-template <bool kDistinct>
+/// kReach: edges may matter by their distance though their closest points are not inside both.
+template <bool kDistinct, bool kReach>
 HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[kSize]) {
   const hn::CappedTag<float, kSize> d;
   using D = decltype(d);
@@ -177,10 +182,18 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
           const V uv = dot(u, v), ur = dot(u, r), vr = dot(v, r);
           const V s = hn::Sub(hn::Mul(uv, vr), hn::Mul(b.square[j], ur));
           const V t = hn::Sub(hn::Mul(a.square[i], vr), hn::Mul(uv, ur));
-          isOut = hn::Or(isOut, hn::Lt(s, hn::Neg(sError)));
-          isOut = hn::Or(isOut, hn::Lt(t, hn::Neg(tError)));
-          isOut = hn::Or(isOut, hn::Gt(hn::Sub(s, normalSquare), sError));
-          isOut = hn::Or(isOut, hn::Gt(hn::Sub(t, normalSquare), tError));
+          V sBeyond = sError, tBeyond = tError;
+          if constexpr (kReach) {
+            // A line's closest point that is x beyond the edge's end leaves that end, and with it
+            // the edge, further than x |n| / (|u| |v|) from the other's line.
+            const V far = hn::Mul(hn::Load(d, scaled.edgeReach + lane), hn::Sqrt(normalSquare));
+            sBeyond = hn::Add(sError, hn::Mul(far, hn::Sqrt(b.square[j])));
+            tBeyond = hn::Add(tError, hn::Mul(far, hn::Sqrt(a.square[i])));
+          }
+          isOut = hn::Or(isOut, hn::Lt(s, hn::Neg(sBeyond)));
+          isOut = hn::Or(isOut, hn::Lt(t, hn::Neg(tBeyond)));
+          isOut = hn::Or(isOut, hn::Gt(hn::Sub(s, normalSquare), sBeyond));
+          isOut = hn::Or(isOut, hn::Gt(hn::Sub(t, normalSquare), tBeyond));
         }
         bits = withBit(bits, 6 + 3 * i + j, isOut);
       }
@@ -190,13 +203,15 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
 }
 
 HWY_ATTR void filterKernel(const TrianglePairBatch& batch, double thickness, bool distinct,
-                           std::uint32_t (&possible)[kSize]) {
+                           double edgeReach, std::uint32_t (&possible)[kSize]) {
   ScaledBatch scaled;
-  scaleBatch(batch, thickness, scaled);
-  if (distinct)
-    filterScaled<true>(scaled, possible);
+  scaleBatch(batch, thickness, edgeReach, scaled);
+  if (!distinct)
+    filterScaled<false, false>(scaled, possible);
+  else if (edgeReach > 0.0)
+    filterScaled<true, true>(scaled, possible);
   else
-    filterScaled<false>(scaled, possible);
+    filterScaled<true, false>(scaled, possible);
 }
 
 }  // namespace palpate::HWY_NAMESPACE
@@ -208,8 +223,8 @@ namespace palpate {
 HWY_EXPORT(filterKernel);
 
 void findPossibleProximity(const TrianglePairBatch& batch, double thickness, bool distinct,
-                           std::uint32_t (&possible)[TrianglePairBatch::kSize]) {
-  HWY_DYNAMIC_DISPATCH(filterKernel)(batch, thickness, distinct, possible);
+                           double edgeReach, std::uint32_t (&possible)[TrianglePairBatch::kSize]) {
+  HWY_DYNAMIC_DISPATCH(filterKernel)(batch, thickness, distinct, edgeReach, possible);
 }
 
 }  // namespace palpate

@@ -16,9 +16,10 @@ struct TrianglePairBatch {
 ///
 /// Shapes   possible: per pair, bit i: corner i of a against b; bit 3 + j: corner j of b against a; bit
 ///          6 + 3 i + j: edge i of a against edge j of b.
-/// distinct leaves out edges, too, whose closest points are proven not to lie inside both.
+/// distinct leaves out edges, too, whose closest points are proven not to lie inside both; but
+/// keeps those that may be at most edgeReach apart.
 /// Errors   none; where coordinates over- or underflow nothing is left out.
 void findPossibleProximity(const TrianglePairBatch&, double thickness, bool distinct,
-                           std::uint32_t (&possible)[TrianglePairBatch::kSize]);
+                           double edgeReach, std::uint32_t (&possible)[TrianglePairBatch::kSize]);
 
 }  // namespace palpate

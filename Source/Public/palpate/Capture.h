@@ -25,8 +25,8 @@ PALPATE_EXPORT void writeCapture(const CollisionProblem&, const std::filesystem:
 ///          of another version, cut off, or with what an OctreeBasedCD would refuse.
 PALPATE_EXPORT CollisionProblem readCapture(const std::filesystem::path&);
 
-/// Ready for detectCollision(): geometry i is GeometryId{i}, each pair has the method chosen for
-/// it. What an octree owes to earlier frames is not part of a problem: it is built anew.
+/// Ready for detectCollision(): geometry i is GeometryId{i}. What an octree owes to earlier frames
+/// is not part of a problem: it is built anew.
 PALPATE_EXPORT OctreeBasedCD setUp(const CollisionProblem&);
 
 }  // namespace palpate

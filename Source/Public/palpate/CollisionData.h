@@ -2,6 +2,7 @@
 
 #include <palpate/Export.h>
 #include <palpate/Types.h>
+#include <palpate/Validity.h>
 
 #include <Eigen/Core>
 
@@ -65,6 +66,7 @@ class PALPATE_EXPORT CollisionData {
     std::vector<TrianglePair> intersectingTriangles;
     double earliestTimeOfImpact =
         std::numeric_limits<double>::infinity();  ///< with Contacts::Earliest
+    Validity validity;
   };
 
   CollisionData() = default;
@@ -85,6 +87,9 @@ class PALPATE_EXPORT CollisionData {
   }
   /// Infinity if there is no contact; 0 for the static methods' contacts.
   double earliestTimeOfImpact() const;
+
+  /// Whether to believe it.
+  const Validity& validity() const { return m_contents.validity; }
 
   /// Same answer, same bits, same hash: over ids, weights, normals, distances and times, in order.
   std::uint64_t hash() const;

@@ -18,7 +18,7 @@ struct CollisionProblem {
   struct Pair {
     std::uint32_t a, b;  ///< indices of geometries
     PairSettings settings;
-    Method method;  ///< that was chosen for it; not Auto
+    Method method;  ///< that answered, of Validity; nothing depends on it
   };
   Settings settings;
   std::vector<Mesh> geometries;

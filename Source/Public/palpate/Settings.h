@@ -54,10 +54,16 @@ enum class Contacts {
 };
 
 struct PairSettings {
-  /// Auto: Proximity where the thickness is positive, else Intersection
+  /// Auto: per frame Proximity, Continuous, or each for the features it suits; no impact within the
+  /// step is missed. See <palpate/Validity.h>.
   Method method = Method::Auto;
-  double thickness = 0.0;                  ///< L, finite, not negative; Proximity needs it positive
-  Contacts contacts = Contacts::Distinct;  ///< Proximity only; other methods report all
+  double thickness = 0.0;  ///< L, finite, not negative; Proximity needs it positive
+  /// Proximity, and Auto's contacts at the step's end; others report all
+  Contacts contacts = Contacts::Distinct;
+  /// L. Auto: features that move at most this far, relative to each other, are tested at the step's
+  /// end, with up to this much added to the thickness; others for impacts. Larger: faster, more
+  /// contacts that are further apart. Negative: half the thickness.
+  double tolerance = -1.0;
 };
 
 }  // namespace palpate

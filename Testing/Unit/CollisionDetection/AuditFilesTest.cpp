@@ -43,7 +43,8 @@ class AuditFiles : public ::testing::Test {
   OctreeBasedCD detection(AuditSettings audit) const {
     OctreeBasedCD detection({.threads = 1, .audit = std::move(audit)});
     for (const Mesh& mesh : m_meshes) detection.addTriangleMesh(mesh.positions, mesh.triangles);
-    detection.addCollisionPair(m_a, m_b, {.thickness = 0.02, .contacts = Contacts::All});
+    detection.addCollisionPair(
+        m_a, m_b, {.method = Method::Proximity, .thickness = 0.02, .contacts = Contacts::All});
     detection.addCollisionPair(m_a, m_a, {.method = Method::Intersection});
     return detection;
   }

@@ -83,6 +83,7 @@ void expectSame(const CollisionProblem& l, const CollisionProblem& r) {
     EXPECT_EQ(l.pairs[i].method, r.pairs[i].method);
     EXPECT_EQ(l.pairs[i].settings.method, r.pairs[i].settings.method);
     EXPECT_EQ(l.pairs[i].settings.thickness, r.pairs[i].settings.thickness);
+    EXPECT_EQ(l.pairs[i].settings.tolerance, r.pairs[i].settings.tolerance);
     EXPECT_EQ(l.pairs[i].settings.contacts, r.pairs[i].settings.contacts);
   }
 }
@@ -120,8 +121,8 @@ TEST_F(Capture, ReplaysTheLastFrame) {
   EXPECT_FALSE(sameBits(problem.geometries[0].before, problem.geometries[0].now));
   ASSERT_EQ(problem.pairs.size(), 2u);
   EXPECT_EQ(problem.pairs[0].settings.method, Method::Auto);
-  EXPECT_EQ(problem.pairs[0].method, Method::Proximity);
-  EXPECT_EQ(problem.pairs[1].method, Method::Intersection);
+  EXPECT_EQ(problem.pairs[0].method, detection.collisionData(b, a).validity().method);
+  EXPECT_EQ(problem.pairs[1].method, detection.collisionData(a, a).validity().method);
 
   OctreeBasedCD replay = setUp(problem);
   replay.detectCollision();
@@ -216,9 +217,10 @@ TEST_F(Capture, RefusesWhatIsWrongByName) {
     write(text.replace(place, from.size(), to));
     expectRefused(reason);
   };
-  expectRefusedWith("palpate-capture 1", "solid 1", "it is not a capture");
-  expectRefusedWith("palpate-capture 1", "palpate-capture 2", "it is of version 2; version 1");
-  expectRefusedWith("palpate-capture 1", "palpate-capture x", "line 1: \"x\" is not an integer");
+  expectRefusedWith("palpate-capture 2", "solid 2", "it is not a capture");
+  expectRefusedWith("palpate-capture 2", "palpate-capture 3",
+                    "it is of version 3; versions up to 2");
+  expectRefusedWith("palpate-capture 2", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 99999999999\n", "is not an integer in range");
@@ -234,6 +236,17 @@ TEST_F(Capture, RefusesWhatIsWrongByName) {
   expectRefusedWith("end\n", "end\nend\n", "more follows after its end");
   write(whole);
   EXPECT_NO_THROW(readCapture(file()));
+}
+
+TEST_F(Capture, ReadsTheFirstVersion) {
+  writeCapture(smallProblem(), file());
+  std::string text = textOf(file());
+  text.replace(text.find("palpate-capture 2"), 17, "palpate-capture 1");
+  for (std::size_t at; (at = text.find(" -1p+0\n")) != text.npos;) text.erase(at, 6);
+  write(text);
+  const CollisionProblem read = readCapture(file());
+  EXPECT_EQ(read.pairs[0].settings.method, Method::Proximity);  // for which Auto stood
+  EXPECT_EQ(read.pairs[0].settings.tolerance, PairSettings().tolerance);
 }
 
 TEST_F(Capture, RefusesNanAndInfinity) {

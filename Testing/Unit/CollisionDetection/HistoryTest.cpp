@@ -168,7 +168,9 @@ struct Meeting {
         [&](OctreeBasedCD& e) { return e.addTriangleMesh(a.positions, a.triangles); });
     idB = engines.onAll(
         [&](OctreeBasedCD& e) { return e.addTriangleMesh(b.positions, b.triangles); });
-    engines.forAll([&](OctreeBasedCD& e) { e.addCollisionPair(idA, idB, {.thickness = 0.02}); });
+    engines.forAll([&](OctreeBasedCD& e) {
+      e.addCollisionPair(idA, idB, {.method = Method::Proximity, .thickness = 0.02});
+    });
     contacts = engines.expectEqualFrames();
   }
   std::size_t frameWith(const Positions& now) {

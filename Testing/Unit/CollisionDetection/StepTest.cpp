@@ -68,6 +68,7 @@ TEST_F(Step, AfterNewTopologyBeforeIsNow) {
 TEST_F(Step, WithTheSamePositionsLeavesOctreeAndStaticAnswersAlone) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.1), triangle());
   PairSettings settings;
+  settings.method = Method::Proximity;
   settings.thickness = 0.5;
   m_detection.addCollisionPair(m_id, other, settings);
   expect(0, 0);

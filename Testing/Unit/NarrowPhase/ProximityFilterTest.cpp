@@ -46,7 +46,7 @@ Possible filter(const std::vector<Pair>& pairs, double thickness, bool distinct)
   for (std::size_t n = 0; n < pairs.size(); ++n)
     for (int row = 0; row < 18; ++row) batch.coordinates[row][n] = pairs[n][row / 3][row % 3];
   std::uint32_t possible[TrianglePairBatch::kSize];
-  findPossibleProximity(batch, thickness, distinct, possible);
+  findPossibleProximity(batch, thickness, distinct, 0.0, possible);
   return std::to_array(possible);
 }
 

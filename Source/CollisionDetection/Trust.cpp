@@ -1,0 +1,133 @@
+#include "CollisionDetection/Trust.h"
+
+#include "Math/Tolerances.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace palpate {
+
+namespace {
+
+/// Frames between two searches for intersections at the step's start: doubled after each that does
+/// not restore trust, up to this.
+constexpr int kMostPatience = 64;
+
+/// From the last frame's positions to this step's start.
+MotionRange correctionOf(const Geometry& geometry) {
+  if (geometry.setThisFrame) return geometry.correction;
+  return {-geometry.motion.upper, -geometry.motion.lower};
+}
+
+void sortUnique(std::vector<std::uint32_t>& out, const Buffer<std::uint32_t>& ids) {
+  out.assign(ids.begin(), ids.end());
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+}
+
+/// Vertices that may have moved further than `reach` relative to the other mesh.
+void addFarMovers(std::vector<std::uint32_t>& out, const Geometry& mesh, const Geometry& other,
+                  double reach) {
+  const Eigen::Vector3d centre = 0.5 * (other.motion.lower + other.motion.upper),
+                        extent = other.motion.upper - centre;
+  for (std::uint32_t v = 0; v < mesh.mesh.now.size(); ++v) {
+    const Eigen::Vector3d moved =
+        (mesh.mesh.now[v] - mesh.mesh.before[v] - centre).cwiseAbs() + extent;
+    if (!(moved.squaredNorm() <= reach * reach)) out.push_back(v);
+  }
+}
+
+}  // namespace
+
+PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry& b) {
+  PairPlan plan;
+  plan.method = settings.method;
+  StepPlan& step = plan.step;
+  const double thickness = settings.thickness;
+  plan.motion = step.motion = largestMotion(a.motion, b.motion);
+  if (settings.method == Method::Auto) {
+    plan.tolerance = step.slow = settings.tolerance < 0 ? thickness / 2 : settings.tolerance;
+    if (plan.motion == 0.0) {
+      plan.method = thickness > 0.0 ? Method::Proximity : Method::Intersection;
+      plan.reason = MethodReason::Still;
+    } else if (plan.motion <= plan.tolerance) {
+      plan.method = Method::Proximity;
+      plan.reason = MethodReason::Slow;
+    } else if (smallestMotion(a.motion, b.motion) > plan.tolerance ||
+               thickness + plan.tolerance == 0.0) {
+      plan.method = Method::Continuous;
+      plan.reason = MethodReason::Fast;
+    } else {
+      plan.reason = MethodReason::Mixed;
+    }
+    step.impacts = plan.method == Method::Proximity || plan.method == Method::Auto;
+    if (step.impacts) step.extra = std::min(plan.motion, plan.tolerance) * (1.0 + kMotionSlack);
+  } else if (settings.method == Method::Intersection) {
+    plan.nearby = plan.motion <= std::min(a.smallestHeight, b.smallestHeight) ? plan.motion : 0.0;
+  } else if (settings.method == Method::Proximity && plan.motion > thickness) {
+    step.motion = 0.0;  // not to be trusted, whatever is found
+  }
+  return plan;
+}
+
+void Trust::start(const PairSettings& settings, const Geometry& a, const Geometry& b,
+                  std::uint64_t frame, PairPlan& plan) {
+  const double correction = largestMotion(correctionOf(a), correctionOf(b));
+  m_startsApart = m_apart && frame == m_frame + 1 && m_topologyA == a.topologyRevision &&
+                  m_topologyB == b.topologyRevision &&
+                  (correction == 0.0 || correction < m_clearance);
+  if (m_topologyA != a.topologyRevision || m_topologyB != b.topologyRevision) m_wait = 0;
+  m_frame = frame;
+  m_topologyA = a.topologyRevision;
+  m_topologyB = b.topologyRevision;
+  if (m_startsApart || plan.method == Method::Intersection ||
+      (plan.method == Method::Proximity && plan.motion > 0.0 && plan.step.motion == 0.0))
+    return;
+  plan.step.start = settings.method == Method::Auto || plan.motion == 0.0 || --m_wait <= 0;
+}
+
+void Trust::finish(const PairSettings& settings, const Geometry& a, const Geometry& b,
+                   const PairPlan& plan, const StepFacts& facts, bool nearby,
+                   CollisionData::Contents& contents) {
+  Validity& validity = contents.validity;
+  validity.method = plan.method;
+  validity.reason = plan.reason;
+  validity.displacement = plan.motion;
+  validity.thickness =
+      plan.method == Method::Intersection ? 0.0 : settings.thickness + plan.step.extra;
+  sortUnique(validity.verticesBeyondA, facts.verticesA);
+  sortUnique(validity.verticesBeyondB, facts.verticesB);
+  sortUnique(validity.degenerateTrianglesA, facts.degenerateA);
+  sortUnique(validity.degenerateTrianglesB, facts.degenerateB);
+  validity.startedApart = m_startsApart || (plan.step.start && !facts.startsIntersecting);
+  if (settings.method == Method::Auto) {
+    validity.reach = plan.tolerance;
+    validity.trusted = plan.method == Method::Intersection || validity.startedApart;
+  } else if (plan.method == Method::Continuous) {
+    validity.reach = std::numeric_limits<double>::infinity();
+    validity.trusted = validity.startedApart;
+  } else {
+    const bool proximity = plan.method == Method::Proximity;
+    validity.reach = proximity ? settings.thickness : std::min(a.smallestHeight, b.smallestHeight);
+    const bool within = plan.motion <= validity.reach;
+    if (!within) {
+      addFarMovers(validity.verticesBeyondA, a, b, validity.reach);
+      if (&a != &b) addFarMovers(validity.verticesBeyondB, b, a, validity.reach);
+    }
+    validity.trusted =
+        proximity
+            ? within && validity.startedApart && facts.verticesA.empty() && facts.verticesB.empty()
+            : plan.motion == 0.0 || (within && !(nearby && contents.intersectingTriangles.empty()));
+  }
+  validity.sideMayBeWrong = plan.method != Method::Intersection && !validity.trusted;
+  m_apart = plan.method == Method::Intersection
+                ? plan.motion == 0.0 && contents.intersectingTriangles.empty()
+                : validity.trusted && facts.clearance > 0.0;
+  m_clearance = std::min(facts.clearance, settings.thickness);
+  if (plan.step.start) {
+    m_patience = m_apart ? 1 : std::min(2 * m_patience, kMostPatience);
+    m_wait = m_patience;
+  }
+}
+
+}  // namespace palpate

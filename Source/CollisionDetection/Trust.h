@@ -1,0 +1,47 @@
+#pragma once
+
+#include <palpate/CollisionData.h>
+
+#include "CollisionDetection/GeometryTable.h"
+#include "NarrowPhase/NarrowPhase.h"
+
+namespace palpate {
+
+/// How a pair is answered in this frame.
+struct PairPlan {
+  Method method = Method::Intersection;  ///< Auto: Proximity and Continuous
+  MethodReason reason = MethodReason::Asked;
+  double motion = 0;     ///< L: largest of two features, relative to each other
+  double tolerance = 0;  ///< L: Auto's
+  double nearby = 0;     ///< L: Intersection asks for boxes within this, to know of what was near
+  StepPlan step;
+  /// Boxes hold the whole step.
+  bool swept() const { return method == Method::Continuous || method == Method::Auto; }
+};
+
+/// From the settings, which are good, and how the geometries moved.
+PairPlan planOf(const PairSettings&, const Geometry& a, const Geometry& b);
+
+/// Whether a pair's meshes are known to be apart where its next step starts, from frame to frame.
+class Trust {
+ public:
+  /// Before a frame's detection; `frame` counts all frames. Sets whether the step's start is asked.
+  void start(const PairSettings&, const Geometry& a, const Geometry& b, std::uint64_t frame,
+             PairPlan&);
+  /// After it, with what the narrow phase has seen.
+  void finish(const PairSettings&, const Geometry& a, const Geometry& b, const PairPlan&,
+              const StepFacts&, bool nearby, CollisionData::Contents&);
+  /// After a frame whose answer was kept.
+  void keep(std::uint64_t frame) { m_frame = frame; }
+  void forget() { m_apart = false; }
+
+ private:
+  bool m_apart = false;    ///< at the end of the last frame's step
+  double m_clearance = 0;  ///< L: and by how much, at least
+  std::uint64_t m_frame = 0;
+  std::uint64_t m_topologyA = 0, m_topologyB = 0;
+  bool m_startsApart = false;  ///< this frame's step
+  int m_wait = 0, m_patience = 1;
+};
+
+}  // namespace palpate

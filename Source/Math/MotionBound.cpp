@@ -1,0 +1,47 @@
+#include "Math/MotionBound.h"
+
+#include "Math/Tolerances.h"
+
+#include <algorithm>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+
+/// The largest coordinate difference between the two features.
+template <ImpactQuery::Kind kind>
+double sizeAtEnd(const ImpactQuery& query) {
+  double size = 0.0;
+  for (const ImpactQuery::Difference& d : ImpactQuery::corners(kind))
+    size = std::max(size, (query.vertices[d[0]].at(1) - query.vertices[d[1]].at(1))
+                              .template lpNorm<Eigen::Infinity>());
+  return size;
+}
+
+}  // namespace
+
+template <ImpactQuery::Kind kind>
+double motionBound(const ImpactQuery& query) {
+  double motion = 0.0;
+  for (const ImpactQuery::Difference& d : ImpactQuery::corners(kind)) {
+    const Vector3d now = query.vertices[d[0]].at(1) - query.vertices[d[1]].at(1),
+                   before = query.vertices[d[0]].at(0) - query.vertices[d[1]].at(0);
+    motion = std::max(motion, (now - before).stableNorm());
+  }
+  return motion + kMotionError * (motion + sizeAtEnd<kind>(query));
+}
+
+template <ImpactQuery::Kind kind>
+bool mayHaveTouched(const ImpactQuery& query, double distance, double most) {
+  return distance <= most + kMotionError * (most + sizeAtEnd<kind>(query)) &&
+         distance <= motionBound<kind>(query);
+}
+
+template double motionBound<ImpactQuery::Kind::VertexTriangle>(const ImpactQuery&);
+template double motionBound<ImpactQuery::Kind::EdgeEdge>(const ImpactQuery&);
+template bool mayHaveTouched<ImpactQuery::Kind::VertexTriangle>(const ImpactQuery&, double, double);
+template bool mayHaveTouched<ImpactQuery::Kind::EdgeEdge>(const ImpactQuery&, double, double);
+
+}  // namespace palpate

@@ -1,0 +1,45 @@
+#include "NarrowPhase/Auto.h"
+
+#include "NarrowPhase/Continuous.h"
+#include "NarrowPhase/Proximity.h"
+#include "NarrowPhase/StepCheck.h"
+#include "Geometry/Motion.h"
+
+namespace palpate {
+
+namespace {
+
+MotionRange motionOf(const TriangleMesh& mesh, std::uint32_t triangle) {
+  MotionRange range;
+  const Triangle& corners = mesh.topology.triangles[triangle];
+  range.lower = range.upper = mesh.now[corners[0]] - mesh.before[corners[0]];
+  for (const std::uint32_t corner : {corners[1], corners[2]}) {
+    const Eigen::Vector3d moved = mesh.now[corner] - mesh.before[corner];
+    range.lower = range.lower.cwiseMin(moved);
+    range.upper = range.upper.cwiseMax(moved);
+  }
+  return range;
+}
+
+}  // namespace
+
+void findAuto(const MeshPair& pair, std::span<const TrianglePair> candidates, ContactBuffers& out) {
+  FloatPair atEnd = *pair.floats;
+  atEnd.beforeA = atEnd.beforeB = nullptr;
+  out.part.assign(candidates.begin(), candidates.end());
+  keepOverlapping(pair.a.topology, pair.b.topology, atEnd, out.part);
+  findProximity(pair, out.part, out);
+  out.part.clear();
+  for (const TrianglePair& candidate : candidates)
+    if (largestMotion(motionOf(pair.a, candidate.a), motionOf(pair.b, candidate.b)) >
+        pair.step.slow)
+      out.part.push_back(candidate);
+  findFastImpacts(pair, out.part, out);
+}
+
+void findAutoByBruteForce(const MeshPair& pair, const FeatureLists& features, ContactBuffers& out) {
+  findProximityByBruteForce(pair, features, out);
+  findFastImpactsByBruteForce(pair, features, out);
+}
+
+}  // namespace palpate

@@ -1,0 +1,80 @@
+#include "NarrowPhase/StepCheck.h"
+
+#include "Math/ClosestPoint.h"
+#include "Math/MotionBound.h"
+#include "Math/Tolerances.h"
+
+#include <Eigen/Geometry>
+
+namespace palpate {
+
+using Eigen::Vector3d;
+using Kind = ImpactQuery::Kind;
+
+template <Kind kind>
+bool StepCheck::isAnsweredByImpact(const Features<kind>& features, std::uint32_t inFirst,
+                                   std::uint32_t inSecond, bool ofSecond, double distance) {
+  StepFacts& facts = m_out.facts;
+  facts.clearance = std::min(facts.clearance, distance);
+  if (m_pair.step.motion == 0.0 ||
+      !mayHaveTouched<kind>(features.query(inFirst, inSecond), distance, m_pair.step.motion))
+    return false;
+  if (m_pair.step.impacts) return addImpact(m_pair, features, inFirst, inSecond, ofSecond, m_out);
+  facts.clearance = 0.0;
+  const auto vertices = features.vertices(inFirst, inSecond);
+  for (int i = 0; i < 4; ++i) {
+    const bool ofB = !m_pair.self() && &features.meshOf(i) == &m_pair.b;
+    (ofB ? facts.verticesB : facts.verticesA).push_back(vertices[i]);
+  }
+  return false;
+}
+
+template <Kind kind>
+bool StepCheck::isAnsweredAtEnd(const Features<kind>& features, std::uint32_t inFirst,
+                                std::uint32_t inSecond) const {
+  const ImpactQuery query = features.query(inFirst, inSecond);
+  const double motion = motionBound<kind>(query);
+  if (motion <= m_pair.step.slow) return true;
+  const auto at = [&](int i) -> const Vector3d& { return query.vertices[i].at(1); };
+  double distance;
+  if constexpr (kind == Kind::VertexTriangle)
+    distance = finiteVertexTriangleDistance(at(0), at(1), at(2), at(3)).distance;
+  else
+    distance = finiteEdgeEdgeDistance(at(0), at(1), at(2), at(3)).distance;
+  if (distance > m_pair.thicknessAtEnd()) return false;
+  // Distinct: edges that are nearest at their ends were not measured further apart than
+  // edgeReach().
+  return distance > motion || kind == Kind::VertexTriangle ||
+         m_pair.settings.contacts != Contacts::Distinct;
+}
+
+void StepCheck::noteTriangle(std::uint32_t triangle, bool ofSecond, const Vector3d& a,
+                             const Vector3d& b, const Vector3d& c) {
+  const Vector3d u = b - a, v = c - a;
+  if (u.cross(v).squaredNorm() > 0x1p-60 * u.squaredNorm() * v.squaredNorm() || hasArea(a, b, c))
+    return;
+  (ofSecond && !m_pair.self() ? m_out.facts.degenerateB : m_out.facts.degenerateA)
+      .push_back(triangle);
+}
+
+void StepCheck::noteEdges(const Segment& p, const Segment& q) {
+  const auto note = [](const TriangleMesh& mesh, const Segment& edge, auto& list) {
+    if (mesh.now[edge[0]] != mesh.now[edge[1]]) return;
+    const std::vector<Segment>& edges = mesh.topology.edges;
+    const auto place = std::lower_bound(edges.begin(), edges.end(), edge);
+    list.push_back(mesh.topology.edgeTriangles[place - edges.begin()].front());
+  };
+  note(m_pair.a, p, m_out.facts.degenerateA);
+  note(m_pair.b, q, m_pair.self() ? m_out.facts.degenerateA : m_out.facts.degenerateB);
+}
+
+template bool StepCheck::isAnsweredByImpact(const Features<Kind::VertexTriangle>&, std::uint32_t,
+                                            std::uint32_t, bool, double);
+template bool StepCheck::isAnsweredByImpact(const Features<Kind::EdgeEdge>&, std::uint32_t,
+                                            std::uint32_t, bool, double);
+template bool StepCheck::isAnsweredAtEnd(const Features<Kind::VertexTriangle>&, std::uint32_t,
+                                         std::uint32_t) const;
+template bool StepCheck::isAnsweredAtEnd(const Features<Kind::EdgeEdge>&, std::uint32_t,
+                                         std::uint32_t) const;
+
+}  // namespace palpate

@@ -1,0 +1,46 @@
+#pragma once
+
+#include "NarrowPhase/Continuous.h"
+#include "NarrowPhase/NarrowPhase.h"
+
+#include <algorithm>
+#include <span>
+
+namespace palpate {
+
+/// What a pair's step means for features that were measured at its end.
+class StepCheck {
+ public:
+  StepCheck(const MeshPair& pair, ContactBuffers& out) : m_pair(pair), m_out(out) {}
+
+  /// L: edges up to this far apart matter, even where their ends are nearest to each other.
+  double edgeReach() const {
+    const StepPlan& step = m_pair.step;
+    return std::min(step.motion, step.impacts ? step.extra : m_pair.settings.thickness);
+  }
+
+  /// Of a feature pair at most thicknessAtEnd() apart: whether the step may have brought it
+  /// together and its impact was reported in its place. ofSecond: the first feature is of the
+  /// second mesh.
+  template <ImpactQuery::Kind kind>
+  bool isAnsweredByImpact(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond,
+                          bool ofSecond, double distance);
+
+  /// Auto: whether proximity at the step's end says all there is to say of a feature pair.
+  template <ImpactQuery::Kind kind>
+  bool isAnsweredAtEnd(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond) const;
+
+  /// Triangles of contacts: notes those without area.
+  void noteTriangle(std::uint32_t triangle, bool ofSecond, const Eigen::Vector3d& a,
+                    const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+  void noteEdges(const Segment& p, const Segment& q);
+
+ private:
+  const MeshPair& m_pair;
+  ContactBuffers& m_out;
+};
+
+/// Whether triangles of the candidates intersect at the step's start, exactly.
+bool anyIntersectAtStart(const MeshPair&, std::span<const TrianglePair> candidates);
+
+}  // namespace palpate
