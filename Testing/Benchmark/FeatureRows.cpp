@@ -1,13 +1,28 @@
 // Feature candidates as one arrow, through the rooms' own functions: positions to boxes, octree,
-// triangle pairs and the vertex-triangle and edge-edge pairs that they own, batch by batch.
+// triangle pairs and the vertex-triangle and edge-edge pairs that they own, batch by batch. Beside
+// Embree's triangle pairs of the same frame; the best of IPC toolkit's engines was measured
+// elsewhere on this class of machine, swept, and is scaled by what Embree took there and takes
+// here.
 #include "Rows.h"
 
 #include "CollisionDetection/GeometryTable.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "Octree/Traversal.h"
 
+#include <algorithm>
+#include <memory>
+
 namespace palpate::benchmark {
 namespace {
+
+/// Milliseconds by one thread.
+struct Reference {
+  const char* scene;
+  double embree;  ///< rebuild + collide
+  double lbvh;    ///< IPC toolkit's LBVH, boxes swept over the step
+};
+constexpr Reference kReferences[] = {{"cloth-funnel", 15.8, 21}, {"rod-twist", 121, 172}};
+constexpr double kTimesLbvh = 3;
 
 class FeatureCandidates {
  public:
@@ -36,6 +51,12 @@ class FeatureCandidates {
   }
 
   std::size_t vertexTriangle = 0, edgeEdge = 0;
+  /// Of triangle pairs and feature pairs in memory at once.
+  std::size_t batchBytes() const {
+    return m_sink.bytes() + sizeof(FeaturePair) * (m_features.vertexTriangle.capacity() +
+                                                   m_features.triangleVertex.capacity() +
+                                                   m_features.edgeEdge.capacity());
+  }
 
  private:
   static void receive(void* context, std::span<const TrianglePair> pairs) {
@@ -57,34 +78,80 @@ class FeatureCandidates {
   FeaturePairs m_features;
 };
 
+/// Median milliseconds, in turns.
+struct Medians {
+  double kinds[2] = {}, embree = 0;
+};
+
+Medians takeTurns(const Workload& workload, FeatureCandidates (&kinds)[2],
+                  const MeasureOptions& options) {
+  const auto &first = workload.frames[0][0], &second = workload.frames[1][0];
+  std::vector<double> times[2], embree;
+#ifdef PALPATE_BENCHMARK_PEERS
+  const auto peer = makeEmbreeMorton();
+  peer->prepare(workload.task, workload.frames[0]);
+#endif
+  for (int repetition = 0; repetition < 1 + 2 * options.repetitions; ++repetition) {
+    for (int swept = 0; swept < 2; ++swept) {
+      kinds[swept].frame(second, first);  // so that the positions are new
+      const double start = now();
+      kinds[swept].frame(first, second);
+      if (repetition > 0) times[swept].push_back(now() - start);
+    }
+#ifdef PALPATE_BENCHMARK_PEERS
+    for (const Positions& frame : workload.frames) {
+      const double start = now();
+      peer->update(frame);
+      peer->collide();
+      if (repetition > 0) embree.push_back(now() - start);
+    }
+#endif
+  }
+  return {{median(times[0]), median(times[1])}, median(embree)};
+}
+
+void rowsOf(Report& report, const Reference& reference, const Workload& workload,
+            const MeasureOptions& options) {
+  FeatureCandidates kinds[2] = {{workload, false}, {workload, true}};
+  const Medians medians = takeTurns(workload, kinds, options);
+  report.line({workload.name + ", Embree", milliseconds(medians.embree)});
+  report.row("features", workload.name, 1, "Embree rebuild + collide", "ms", medians.embree);
+  for (int swept = 0; swept < 2; ++swept) {
+    const char* kind = swept ? "swept over the step" : "static";
+    const FeatureCandidates& candidates = kinds[swept];
+    const double lbvh = reference.lbvh * medians.embree / reference.embree;
+    const auto row = [&](const char* metric, double value) {
+      report.row("features", workload.name, 1, kind, metric, value);
+    };
+    row("ms", medians.kinds[swept]);
+    row("vertex-triangle", static_cast<double>(candidates.vertexTriangle));
+    row("edge-edge", static_cast<double>(candidates.edgeEdge));
+    row("batch bytes", static_cast<double>(candidates.batchBytes()));
+    std::vector<std::string> cells = {
+        workload.name + ", " + kind, milliseconds(medians.kinds[swept]),
+        std::to_string(candidates.vertexTriangle), std::to_string(candidates.edgeEdge),
+        std::to_string(candidates.batchBytes())};
+    if (lbvh > 0) {
+      row("limit ms", lbvh / kTimesLbvh);
+      row("times as fast as LBVH", lbvh / medians.kinds[swept]);
+      cells.insert(cells.end(),
+                   {milliseconds(lbvh / kTimesLbvh), times(lbvh / medians.kinds[swept]),
+                    lbvh >= kTimesLbvh * medians.kinds[swept] ? "holds" : "SHORT"});
+    }
+    report.line(cells);
+  }
+}
+
 }  // namespace
 
 void featureRows(Report& report, const RowOptions& options) {
   report.heading("Feature candidates of the published steps, consumed in batches; 1 thread");
-  report.line({"", "ms", "vertex-tri", "edge-edge"});
-  for (const std::string& name : workloadNames(options.sharedData)) {
-    if (name != "cloth-funnel" && name != "rod-twist") continue;
-    const Workload workload = makeWorkload(name, 2, options.sharedData);
-    const auto &first = workload.frames[0][0], &second = workload.frames[1][0];
-    for (const bool swept : {false, true}) {
-      FeatureCandidates candidates(workload, swept);
-      std::vector<double> samples;
-      for (int i = 0; i < 1 + 4 * options.measure.repetitions; ++i) {
-        const double start = now();
-        candidates.frame(first, second);
-        samples.push_back(now() - start);
-      }
-      const char* kind = swept ? "swept over the step" : "static";
-      report.line({name + ", " + kind, milliseconds(median(samples)),
-                   std::to_string(candidates.vertexTriangle), std::to_string(candidates.edgeEdge)});
-      const auto row = [&](const char* metric, double value) {
-        report.row("features", name, 1, kind, metric, value);
-      };
-      row("ms", median(samples));
-      row("vertex-triangle", static_cast<double>(candidates.vertexTriangle));
-      row("edge-edge", static_cast<double>(candidates.edgeEdge));
-    }
-  }
+  report.line({"", "ms", "vertex-tri", "edge-edge", "batch bytes", "limit", "LBVH, 3x"});
+  const std::vector<std::string> names = workloadNames(options.sharedData);
+  for (const Reference& reference : kReferences)
+    if (std::find(names.begin(), names.end(), reference.scene) != names.end())
+      rowsOf(report, reference, makeWorkload(reference.scene, 2, options.sharedData),
+             options.measure);
 }
 
 }  // namespace palpate::benchmark
