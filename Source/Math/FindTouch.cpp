@@ -102,7 +102,8 @@ template <Kind kind>
 std::optional<Interval> ImpactSearch<kind>::bracketRoot(const Interval& piece,
                                                         int signAfter) const {
   const double t = approximateRoot(m_cubic, piece.low, piece.high, signAfter);
-  for (double width = kNarrowestBracket; width <= m_tolerance; width *= 64.0) {
+  // To both sides, so half of the tolerance is the widest that is not too early.
+  for (double width = kNarrowestBracket; width <= 0.5 * m_tolerance; width *= 64.0) {
     const Interval bracket{std::max(t - width, piece.low), std::min(t + width, piece.high)};
     if (signAfter * blossom(m_cubic, bracket.low, bracket.low, bracket.low) < -m_error &&
         signAfter * blossom(m_cubic, bracket.high, bracket.high, bracket.high) > m_error)

@@ -1,14 +1,43 @@
 #include "Math/CubicRoot.h"
+#include "Math/Exact.h"
 #include "Math/ImpactQuery.h"
 #include "Math/RelativeMotion.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace palpate {
 
 namespace {
+
+/// Sign of det(A, B, C) at a multiple of 2^-53 of the step.
+int exactSideAt(const ImpactQuery& query, double time) {
+  const auto passed = static_cast<unsigned long>(std::ldexp(time, 53)), left = (1ul << 53) - passed;
+  std::array<std::array<Integer, 3>, 3> rows;
+  const auto axes = ImpactQuery::axes(query.kind);
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k) {
+      const auto coordinate = [&](int vertex) -> Integer {
+        const ImpactQuery::Step& step = query.vertices[vertex];
+        return scaledInteger((*step.before)[k]) * left + scaledInteger((*step.now)[k]) * passed;
+      };
+      rows[i][k] = coordinate(axes[i][0]) - coordinate(axes[i][1]);
+    }
+  const auto& [a, b, c] = rows;
+  return sgn(Integer((a[1] * b[2] - a[2] * b[1]) * c[0] + (a[2] * b[0] - a[0] * b[2]) * c[1] +
+                     (a[0] * b[1] - a[1] * b[0]) * c[2]));
+}
+
+/// The first that is not zero, ever further back.
+int exactSide(const ImpactQuery& query, double time) {
+  for (double back = 0x1p-44;; back *= 0x1p8) {
+    const double t = std::max(time - back, 0.0);
+    const int sign = exactSideAt(query, t);
+    if (sign != 0 || t == 0.0) return sign;
+  }
+}
 
 template <ImpactQuery::Kind kind>
 int side(const ImpactQuery& query, double time) {
@@ -16,7 +45,7 @@ int side(const ImpactQuery& query, double time) {
   for (auto* ends : {&motion.a, &motion.b, &motion.c}) {
     const double largest =
         std::max((*ends)[0].cwiseAbs().maxCoeff(), (*ends)[1].cwiseAbs().maxCoeff());
-    if (!(largest > 0.0 && std::isfinite(largest))) return 0;
+    if (!(largest > 0.0 && std::isfinite(largest))) return exactSide(query, time);
     for (Eigen::Vector3d& end : *ends) end /= largest;
   }
   // Ever further back, until rounding cannot hide the side.
@@ -25,7 +54,7 @@ int side(const ImpactQuery& query, double time) {
     const double volume = at(t, motion.a).cross(at(t, motion.b)).dot(at(t, motion.c));
     if (volume > kSideError) return 1;
     if (volume < -kSideError) return -1;
-    if (t == 0.0) return 0;
+    if (t == 0.0) return exactSide(query, time);
   }
 }
 

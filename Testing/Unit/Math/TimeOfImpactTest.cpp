@@ -114,6 +114,30 @@ std::vector<std::array<int, 4>> orders(bool edges) {
   return {{0, 1, 3, 2}, {0, 2, 1, 3}, {0, 2, 3, 1}, {0, 3, 1, 2}, {0, 3, 2, 1}};
 }
 
+TEST(TimeOfImpact, IsNotEarlierThanTheToleranceWhereRoundingHidesTheRoot) {
+  // Large triangles against a vertex that moves little, as Testing/Stability met them: the brackets
+  // of their roots are as wide as they may be, and reached 1.02e-6 and 1.002e-6 before the impact.
+  const auto still = [](const Eigen::Vector3d& v, const Eigen::Vector3d& vNow,
+                        const std::array<Eigen::Vector3d, 3>& t) {
+    return ImpactCase{false, {v, t[0], t[1], t[2], vNow, t[0], t[1], t[2]}};
+  };
+  int impacts = 0;
+  test::Random random(14);
+  for (int i = 0; i < 400; ++i) {
+    const double size = std::exp2(20 + 10 * random.unit());
+    std::array<Eigen::Vector3d, 3> triangle;
+    for (Eigen::Vector3d& corner : triangle) corner = size * random.inCube();
+    const Eigen::Vector3d inside = 0.3 * triangle[0] + 0.3 * triangle[1] + 0.4 * triangle[2];
+    const Eigen::Vector3d towards =
+        (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalized();
+    const Eigen::Vector3d by = 0.02 * (towards + 0.3 * random.inCube());
+    const ImpactCase query =
+        still(inside + random.unit() * by, inside - random.unit() * by, triangle);
+    for (const double tolerance : {1e-6, 1e-4, 0.3}) expectTrue(query, tolerance, impacts);
+  }
+  EXPECT_GT(impacts, 600);
+}
+
 TEST(TimeOfImpact, DoesNotDependOnTheOrderOfCorners) {
   test::Random random(3);
   for (int i = 0; i < 3000 && !testing::Test::HasFatalFailure(); ++i) {

@@ -1,0 +1,37 @@
+#include "ImpactCases.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace palpate {
+
+namespace {
+
+/// Edge p along x comes down (side 1) or up on edge q, turned by the angle against it; both are
+/// `length` long. Their cross product points down.
+ImpactCase crossing(double angle, double side, double length) {
+  const double height = 0.01 * side;
+  const Eigen::Vector3d p0(-0.3, 0, 0), p1(length, 0, 0), q0(-0.3, -0.3 * std::sin(angle), 0),
+      q1(length, length * std::sin(angle), 0), up(0, 0, height);
+  return {true, {p0 + up, p1 + up, q1, q0, p0 - up, p1 - up, q1, q0}};
+}
+
+TEST(ImpactSide, IsToldOfEdgesHoweverNearlyParallel) {
+  for (const double side : {1.0, -1.0})
+    for (int exponent = 0; exponent <= 300; ++exponent) {
+      const ImpactCase query = crossing(std::pow(10.0, -exponent), side, 0.7);
+      ASSERT_EQ(sideBefore(query.query(), 0.5), -side) << "angle 1e-" << exponent;
+    }
+  EXPECT_EQ(sideBefore(crossing(0, 1, 0.7).query(), 0.5), 0);
+}
+
+TEST(ImpactSide, IsToldOfEdgesHoweverLong) {
+  for (const double side : {1.0, -1.0})
+    for (double length = 1; length < 1e30; length *= 7)
+      ASSERT_EQ(sideBefore(crossing(0.5, side, length).query(), 0.5), -side) << length;
+}
+
+}  // namespace
+
+}  // namespace palpate
