@@ -203,6 +203,9 @@ class Query {
     return first;
   }
 
+  /// Of (v, a, b, c): det(a - v, b - v, c - v).
+  const Polynomial& coplanarity() const { return m_coplanarity; }
+
   bool touchAt(Real time) const {
     if (time.sign(m_coplanarity) != 0) return false;
     if (time.sign(m_normalSquared) != 0)
