@@ -2,6 +2,8 @@
 
 #include "Common/PairRun.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <array>
 #include <compare>
@@ -30,6 +32,10 @@ struct Transformation {
   Eigen::Vector3d translation{0, 0, 0};                       ///< after scaling
   bool corners = false, triangles = false, vertices = false;  ///< permuted at random
   bool swapped = false;                                       ///< b is the first geometry
+
+  Eigen::Vector3d place(const Eigen::Vector3d& p) const {
+    return (p * scale).cwiseProduct(mirror) + translation;
+  }
 };
 
 /// A contact in the scene's own ids, lengths and axes.
@@ -41,6 +47,31 @@ struct PlainContact {
   double distance, time;
   friend bool operator<(const PlainContact& p, const PlainContact& q) { return p.ids < q.ids; }
 };
+
+/// The scene at its new place, its numbering as it was.
+inline StepScene placed(StepScene scene, const Transformation& how) {
+  for (auto* positions : {&scene.a.positions, &scene.b.positions, &scene.aBefore, &scene.bBefore})
+    for (Eigen::Vector3d& p : *positions) p = how.place(p);
+  scene.thickness *= how.scale;
+  return scene;
+}
+
+/// Triangles with area between few places of a coarse lattice: all kinds of touching.
+inline Mesh onLattice(Random& random) {
+  Mesh mesh;
+  const auto coordinate = [&] { return static_cast<double>(random() % 4) * 0.25; };
+  while (mesh.positions.size() < 14)
+    mesh.positions.push_back({coordinate(), coordinate(), coordinate()});
+  while (mesh.triangles.size() < 14) {
+    const Triangle t{static_cast<std::uint32_t>(random() % 14),
+                     static_cast<std::uint32_t>(random() % 14),
+                     static_cast<std::uint32_t>(random() % 14)};
+    const Eigen::Vector3d u = mesh.positions[t[1]] - mesh.positions[t[0]],
+                          v = mesh.positions[t[2]] - mesh.positions[t[0]];
+    if (u.cross(v) != Eigen::Vector3d::Zero()) mesh.triangles.push_back(t);
+  }
+  return mesh;
+}
 
 class Placement {
  public:
@@ -101,10 +132,6 @@ class Placement {
     return ids;
   }
 
-  Eigen::Vector3d place(const Eigen::Vector3d& p) const {
-    return (p * m_how.scale).cwiseProduct(m_how.mirror) + m_how.translation;
-  }
-
   Mesh placed(const Mesh& mesh, const std::vector<Eigen::Vector3d>& before,
               std::vector<Eigen::Vector3d>& newBefore, Names& names) {
     names.vertices = order(mesh.positions.size(), m_how.vertices);
@@ -113,8 +140,8 @@ class Placement {
     Mesh out;
     for (std::uint32_t v = 0; v < names.vertices.size(); ++v) {
       newId[names.vertices[v]] = v;
-      out.positions.push_back(place(mesh.positions[names.vertices[v]]));
-      newBefore.push_back(place(before[names.vertices[v]]));
+      out.positions.push_back(m_how.place(mesh.positions[names.vertices[v]]));
+      newBefore.push_back(m_how.place(before[names.vertices[v]]));
     }
     for (const std::uint32_t t : names.triangles) {
       const std::vector<std::uint32_t> corner = order(3, m_how.corners);

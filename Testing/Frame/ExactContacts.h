@@ -1,0 +1,262 @@
+#pragma once
+
+#include <palpate/TimeOfImpact.h>
+
+#include "Frame/Placement.h"
+#include "Unit/Math/ImpactOracle.h"
+#include "Unit/Math/RationalOracle.h"
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace palpate::testing {
+
+/// Whether a scene, as its doubles are, has a contact by the method's definition: in rational
+/// arithmetic, by triangle and feature, from nothing of the library but its definitions.
+class ExactContacts {
+ public:
+  /// Either: within the method's stated error of the thickness.
+  enum class Answer { No, Yes, Either };
+  using Ids = std::array<std::uint32_t, 5>;  ///< as in PlainContact
+
+  ExactContacts(const StepScene& scene, const PairSettings& settings, bool self)
+      : m_settings(settings),
+        m_a{scene.a, scene.aBefore},
+        m_b{self ? scene.a : scene.b, self ? scene.aBefore : scene.bBefore},
+        m_self(self) {}
+
+  Answer has(const Ids& ids) const {
+    switch (ids[0]) {
+      case PlainContact::VertexTriangle:
+        return vertexTriangle(m_a, m_b, ids);
+      case PlainContact::TriangleVertex:
+        return vertexTriangle(m_b, m_a, ids);
+      case PlainContact::VertexVertex:
+        return distinct(m_a, m_b, {ids[0], ids[1], ids[2], kNone, kNone});
+      default:
+        return edges(Segment{ids[1], ids[2]}, Segment{ids[3], ids[4]});
+    }
+  }
+
+  bool intersect(const TrianglePair& pair) const { return Meeting(*this, pair.a, pair.b).any; }
+
+ private:
+  static constexpr std::uint32_t kNone = ~0u;
+  using Vector3d = Eigen::Vector3d;
+  using Rational = oracle::Rational;
+  struct Moving {
+    const Mesh& mesh;
+    const std::vector<Vector3d>& before;
+    const Vector3d& operator[](std::uint32_t v) const { return mesh.positions[v]; }
+    const std::vector<Triangle>& triangles() const { return mesh.triangles; }
+  };
+  static bool holds(const Triangle& t, std::uint32_t v) {
+    return t[0] == v || t[1] == v || t[2] == v;
+  }
+  static bool holds(const Triangle& t, const Segment& e) {
+    return holds(t, e[0]) && holds(t, e[1]);
+  }
+  /// Triangles that hold a vertex or an edge.
+  template <class Feature>
+  static std::vector<std::uint32_t> at(const Moving& m, const Feature& feature) {
+    std::vector<std::uint32_t> ids;
+    for (std::uint32_t t = 0; t < m.triangles().size(); ++t)
+      if (holds(m.triangles()[t], feature)) ids.push_back(t);
+    return ids;
+  }
+
+  // ---- Proximity ----
+
+  Answer within(const Rational& square, const std::array<Vector3d, 4>& positions) const {
+    const double beyond = mpf_class(oracle::root(square) - m_settings.thickness).get_d();
+    if (std::abs(beyond) <= 8 * oracle::ulpOfLargestDifference(positions)) return Answer::Either;
+    return beyond < 0 ? Answer::Yes : Answer::No;
+  }
+
+  static std::array<Vector3d, 4> positionsOf(const Moving& vertices, std::uint32_t v,
+                                             const Moving& triangles, std::uint32_t t) {
+    const auto& [a, b, c] = triangles.triangles()[t];
+    return {vertices[v], triangles[a], triangles[b], triangles[c]};
+  }
+  static oracle::Closest closest(const std::array<Vector3d, 4>& p) {
+    return oracle::vertexTriangle(p[0], p[1], p[2], p[3]);
+  }
+
+  /// ids: vertex, then the corners of the triangles' mesh between which the closest point lies.
+  Answer distinct(const Moving& vertices, const Moving& triangles, const Ids& ids) const {
+    std::vector<std::uint32_t> corners;
+    for (int i = 2; i < 5; ++i)
+      if (ids[i] != kNone) corners.push_back(ids[i]);
+    Rational nearest = -1;
+    Answer answer = Answer::No;
+    std::vector<Rational> squares;
+    for (std::uint32_t t = 0; t < triangles.triangles().size(); ++t) {
+      const Triangle& triangle = triangles.triangles()[t];
+      if (m_self && holds(triangle, ids[1])) continue;
+      if (!std::all_of(corners.begin(), corners.end(),
+                       [&](std::uint32_t c) { return holds(triangle, c); }))
+        continue;
+      const auto positions = positionsOf(vertices, ids[1], triangles, t);
+      const oracle::Closest point = closest(positions);
+      if (nearest < 0 || point.square < nearest) nearest = point.square;
+      std::size_t between = 0;
+      bool onFeature = true;
+      for (int i = 0; i < 3; ++i) {
+        if (point.weights[i] == 0) continue;
+        ++between;
+        onFeature &= std::find(corners.begin(), corners.end(), triangle[i]) != corners.end();
+      }
+      if (!onFeature || between != corners.size()) continue;
+      squares.push_back(point.square);
+      answer = within(point.square, positions);
+    }
+    return squares.empty() || nearest < squares.front() ? Answer::No : answer;
+  }
+
+  // ---- Intersection ----
+
+  /// How two triangles meet, in rationals: touching features, and edges that cross the other.
+  struct Meeting {
+    bool cornersOfA[3] = {}, cornersOfB[3] = {}, edges[3][3] = {};  ///< touch
+    bool throughB[3] = {}, throughA[3] = {};
+    bool touch = false, any = false;
+
+    Meeting(const ExactContacts& scene, std::uint32_t s, std::uint32_t t) {
+      const Triangle &a = scene.m_a.triangles()[s], &b = scene.m_b.triangles()[t];
+      const auto p = [&](int i) { return scene.m_a[a[i % 3]]; };
+      const auto q = [&](int i) { return scene.m_b[b[i % 3]]; };
+      for (int i = 0; i < 3; ++i) {
+        cornersOfA[i] = oracle::vertexTriangle(p(i), q(0), q(1), q(2)).square == 0;
+        cornersOfB[i] = oracle::vertexTriangle(q(i), p(0), p(1), p(2)).square == 0;
+        for (int j = 0; j < 3; ++j)
+          edges[i][j] = oracle::edgeEdge(p(i), p(i + 1), q(j), q(j + 1)).square == 0;
+        throughB[i] = crosses(p(i), p(i + 1), q(0), q(1), q(2));
+        throughA[i] = crosses(q(i), q(i + 1), p(0), p(1), p(2));
+        touch |= cornersOfA[i] || cornersOfB[i] || edges[i][0] || edges[i][1] || edges[i][2];
+        any |= throughB[i] || throughA[i];
+      }
+      any |= touch;
+    }
+    static int side(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
+      using namespace oracle;
+      const auto from = toRational(a);
+      return sgn(dot(cross(toRational(b) - from, toRational(c) - from), toRational(d) - from));
+    }
+    static bool crosses(const Vector3d& p, const Vector3d& q, const Vector3d& a, const Vector3d& b,
+                        const Vector3d& c) {
+      if (side(a, b, c, p) * side(a, b, c, q) >= 0) return false;
+      const int x = side(p, q, a, b), y = side(p, q, b, c), z = side(p, q, c, a);
+      return x != 0 && x == y && y == z;
+    }
+    static int count(const bool (&edges)[3]) { return edges[0] + edges[1] + edges[2]; }
+    /// Corner i lies between the two edges that cross.
+    static bool between(const bool (&edges)[3], int i) {
+      return count(edges) == 2 && edges[i] && edges[(i + 2) % 3];
+    }
+    bool cornerOfA(int i) const { return touch ? cornersOfA[i] : between(throughB, i); }
+    bool cornerOfB(int i) const { return touch ? cornersOfB[i] : between(throughA, i); }
+    bool edgePair(int i, int j) const {
+      return touch ? edges[i][j] : count(throughB) == 1 && throughB[i] && throughA[j];
+    }
+  };
+
+  static int cornerOf(const Triangle& t, std::uint32_t v) {
+    return t[0] == v ? 0 : t[1] == v ? 1 : 2;
+  }
+  static int edgeOf(const Triangle& t, const Segment& e) {
+    for (int i = 0; i < 2; ++i)
+      if (holds({t[i], t[i + 1], t[i]}, e)) return i;
+    return 2;
+  }
+
+  Answer vertexTriangle(const Moving& vertices, const Moving& triangles, const Ids& ids) const {
+    const std::uint32_t v = ids[1], t = ids[2];
+    switch (m_settings.method) {
+      case Method::Intersection:
+        for (const std::uint32_t s : at(vertices, v)) {
+          const int corner = cornerOf(vertices.triangles()[s], v);
+          if (ids[0] == PlainContact::VertexTriangle ? Meeting(*this, s, t).cornerOfA(corner)
+                                                     : Meeting(*this, t, s).cornerOfB(corner))
+            return Answer::Yes;
+        }
+        return Answer::No;
+      case Method::Proximity: {
+        if (m_settings.contacts == Contacts::Distinct) return distinct(vertices, triangles, ids);
+        const auto positions = positionsOf(vertices, v, triangles, t);
+        return within(closest(positions).square, positions);
+      }
+      default: {
+        const auto& [a, b, c] = triangles.triangles()[t];
+        return impactOf(
+            false, {vertices.before[v], triangles.before[a], triangles.before[b],
+                    triangles.before[c], vertices[v], triangles[a], triangles[b], triangles[c]});
+      }
+    }
+  }
+
+  Answer edges(const Segment& p, const Segment& q) const {
+    switch (m_settings.method) {
+      case Method::Intersection:
+        for (const std::uint32_t s : at(m_a, p))
+          for (const std::uint32_t t : at(m_b, q))
+            if (Meeting(*this, s, t)
+                    .edgePair(edgeOf(m_a.triangles()[s], p), edgeOf(m_b.triangles()[t], q)))
+              return Answer::Yes;
+        return Answer::No;
+      case Method::Proximity: {
+        const std::array positions{m_a[p[0]], m_a[p[1]], m_b[q[0]], m_b[q[1]]};
+        const oracle::Closest points =
+            oracle::edgeEdge(positions[0], positions[1], positions[2], positions[3]);
+        if (m_settings.contacts == Contacts::Distinct && !points.interior) return Answer::No;
+        return within(points.square, positions);
+      }
+      default:
+        return impactOf(true, {m_a.before[p[0]], m_a.before[p[1]], m_b.before[q[0]],
+                               m_b.before[q[1]], m_a[p[0]], m_a[p[1]], m_b[q[0]], m_b[q[1]]});
+    }
+  }
+
+  // ---- Continuous ----
+
+  Answer impactOf(bool edges, const palpate::impact::Positions& p) const {
+    if (m_settings.thickness == 0)
+      return palpate::impact::Query(edges, p).firstTouch() ? Answer::Yes : Answer::No;
+    // The least distance over the step, from samples and then between them.
+    const auto distanceAt = [&](double t) {
+      std::array<Vector3d, 4> x;
+      for (int i = 0; i < 4; ++i) x[i] = (1 - t) * p[i] + t * p[4 + i];
+      const oracle::Closest points = edges ? oracle::edgeEdge(x[0], x[1], x[2], x[3])
+                                           : oracle::vertexTriangle(x[0], x[1], x[2], x[3]);
+      return oracle::root(points.square).get_d();
+    };
+    double step = 1.0 / 64, best = 0, least = distanceAt(0);
+    const auto consider = [&](double t) {
+      const double distance = distanceAt(std::clamp(t, 0.0, 1.0));
+      if (distance < least) best = std::clamp(t, 0.0, 1.0), least = distance;
+    };
+    for (int i = 1; i <= 64; ++i) consider(i * step);
+    for (; step > 1e-10; step *= 0.5) {
+      const double middle = best;
+      consider(middle - step / 2);
+      consider(middle + step / 2);
+    }
+    double displacement = 0, largest = 0;
+    for (int i = 0; i < 4; ++i) {
+      displacement = std::max(displacement, ((p[4 + i] - p[4]) - (p[i] - p[0])).norm());
+      for (int end = 0; end < 8; end += 4)
+        largest = std::max(largest, (p[end + i] - p[end]).cwiseAbs().maxCoeff());
+    }
+    const double error = TimeOfImpactSettings{}.tolerance * displacement +
+                         0x1p-40 * (largest + m_settings.thickness);
+    if (std::abs(least - m_settings.thickness) <= error) return Answer::Either;
+    return least < m_settings.thickness ? Answer::Yes : Answer::No;
+  }
+
+  PairSettings m_settings;
+  Moving m_a, m_b;
+  bool m_self;
+};
+
+}  // namespace palpate::testing

@@ -1,0 +1,194 @@
+#include "Common/PairRun.h"
+#include "Common/Zoo.h"
+#include "Frame/ExactContacts.h"
+#include "Frame/Placement.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <string>
+
+// Transformations that round positions, as from metres to millimetres: the same contacts, except
+// those whose exact answer for the rounded positions is another one.
+
+namespace palpate {
+namespace {
+
+using namespace testing;
+using Eigen::Vector3d;
+using Answer = ExactContacts::Answer;
+
+StepScene stepScene(const std::string& name, const Mesh& a, const Mesh& b, double thickness) {
+  StepScene scene{name, a, b, a.positions, b.positions, thickness};
+  Random random(3);
+  for (Vector3d& p : scene.aBefore) p += Vector3d(0.02, 0.01, 0.15) + randomPoint(random, 0, 0.01);
+  for (Vector3d& p : scene.bBefore) p -= randomPoint(random, 0, 0.02);
+  return scene;
+}
+
+std::vector<StepScene> scenes() {
+  Random random(13);
+  const Mesh first = soup(random, 30, 0.3), second = soup(random, 30, 0.3);
+  const Mesh lattice = onLattice(random), other = onLattice(random);
+  StepScene touching{"lattice", lattice, other, lattice.positions, other.positions, 0.25};
+  for (Vector3d& p : touching.aBefore) p.z() += 0.5;
+  return {stepScene("soups", first, second, 0.03),
+          stepScene("sheets", sheet(8, 0, 0), sheet(7, 0.02, 1), 0.015),
+          stepScene("bodies", sphere(6, 9, {0.5, 0.5, 0.5}, 0.4),
+                    sphere(5, 8, {0.6, 0.55, 1.1}, 0.3), 0.03),
+          touching};
+}
+
+/// Scenes are about 1 in size.
+std::vector<Transformation> transformations() {
+  const Vector3d direction(0.7, -1, 0.3);
+  return {{.name = "metres to millimetres", .scale = 1e3},
+          {.name = "millimetres to metres", .scale = 1e-3},
+          {.name = "inches", .scale = 25.4, .mirror = {-1, 1, 1}},
+          {.name = "moved by 1e4", .translation = 1e4 * direction},
+          {.name = "moved by 1e6", .translation = 1e6 * direction},
+          {.name = "moved by 1e6, in millimetres, renumbered",
+           .scale = 1e3,
+           .translation = 1e9 * direction,
+           .corners = true,
+           .triangles = true,
+           .vertices = true,
+           .swapped = true}};
+}
+
+class InexactTransformations : public ::testing::TestWithParam<MethodCase> {
+ protected:
+  /// Scenes at which contacts are compared, and what became of them.
+  std::size_t m_same = 0, m_different = 0;
+
+  static bool distinct() {
+    return GetParam().settings.method == Method::Proximity &&
+           GetParam().settings.contacts == Contacts::Distinct;
+  }
+  static ExactContacts exactly(const StepScene& scene, bool self) {
+    PairSettings settings = GetParam().settings;
+    settings.thickness *= scene.thickness;
+    return {scene, settings, self};
+  }
+  static void expectTrue(bool found, Answer answer) {
+    EXPECT_TRUE(answer == Answer::Either || found == (answer == Answer::Yes));
+  }
+
+  static std::vector<PlainContact> contacts(const Placement& placement, const PairRun& run,
+                                            bool self, bool renumbered) {
+    auto all = placement.contacts(run, self, GetParam().settings.contacts);
+    // By definition asked of one side only: the first mesh's, or the lower vertex.
+    if (distinct() && renumbered)
+      std::erase_if(all, [](const auto& c) { return c.ids[0] == PlainContact::VertexVertex; });
+    return all;
+  }
+
+  /// What one has and the other has not must be so in exact arithmetic.
+  template <class Item, class Check>
+  void compare(const std::vector<Item>& own, const std::vector<Item>& other, Check&& check) {
+    std::vector<Item> lost, gained;
+    std::set_difference(own.begin(), own.end(), other.begin(), other.end(),
+                        std::back_inserter(lost));
+    std::set_difference(other.begin(), other.end(), own.begin(), own.end(),
+                        std::back_inserter(gained));
+    m_same += own.size() - lost.size();
+    m_different += lost.size() + gained.size();
+    for (const Item& item : lost) check(item, true);
+    for (const Item& item : gained) check(item, false);
+  }
+
+  void compare(const StepScene& scene, const Transformation& how) {
+    const Placement own(scene, {}), other(scene, how);
+    const PairRun run = own.run(GetParam().settings), otherRun = other.run(GetParam().settings);
+    const StepScene there = placed(scene, how);
+    const bool renumbered = how.swapped || how.vertices;
+    for (const bool self : {false, true}) {
+      const ExactContacts here = exactly(scene, self), thereExactly = exactly(there, self);
+      compare(contacts(own, run, self, renumbered), contacts(other, otherRun, self, renumbered),
+              [&](const PlainContact& c, bool wasFound) {
+                SCOPED_TRACE(std::to_string(c.ids[0]) + ": " + std::to_string(c.ids[1]) + " " +
+                             std::to_string(c.ids[2]) + " " + std::to_string(c.ids[3]) + " " +
+                             std::to_string(c.ids[4]) + ", self: " + std::to_string(self));
+                expectTrue(wasFound, here.has(c.ids));
+                expectTrue(!wasFound, thereExactly.has(c.ids));
+              });
+    }
+    const ExactContacts here = exactly(scene, false), thereExactly = exactly(there, false);
+    compare(own.intersectingTriangles(run), other.intersectingTriangles(otherRun),
+            [&](const TrianglePair& pair, bool wasFound) {
+              EXPECT_EQ(here.intersect(pair), wasFound);
+              EXPECT_EQ(thereExactly.intersect(pair), !wasFound);
+            });
+    // Early by up to the tolerance, and late or early by what rounding moves against the motion.
+    if (GetParam().settings.method == Method::Continuous && scene.name != "lattice") {
+      EXPECT_NEAR(otherRun.data().earliestTimeOfImpact(), run.data().earliestTimeOfImpact(), 2e-6);
+    }
+  }
+};
+
+TEST_P(InexactTransformations, ChangeOnlyWhatRoundingChanges) {
+  for (const StepScene& scene : scenes())
+    for (const Transformation& how : transformations()) {
+      SCOPED_TRACE(scene.name + ", " + how.name);
+      compare(scene, how);
+    }
+  RecordProperty("same", std::to_string(m_same));
+  RecordProperty("different", std::to_string(m_different));
+  std::printf("%zu contacts alike, %zu on one side only\n", m_same, m_different);
+  if (GetParam().settings.contacts == Contacts::Earliest) return;
+  EXPECT_GT(m_same, 1000u);
+  // On the lattice everything touches. A minimum distance is kept with a tolerance above rounding.
+  EXPECT_EQ(m_different > 0u,
+            GetParam().settings.method != Method::Continuous || GetParam().settings.thickness == 0);
+}
+
+/// The judge above, judged: over a sample of all there is, found or not.
+TEST_P(InexactTransformations, ExactAnswersAreThoseFound) {
+  if (distinct() || GetParam().settings.contacts == Contacts::Earliest) return;
+  std::size_t yes = 0, no = 0;
+  for (const StepScene& scene : scenes()) {
+    if (scene.name != "lattice" && scene.name != "soups") continue;
+    SCOPED_TRACE(scene.name);
+    const Placement own(scene, {});
+    const PairRun run = own.run(GetParam().settings);
+    for (const bool self : {false, true}) {
+      const ExactContacts exact = exactly(scene, self);
+      const auto found = contacts(own, run, self, false);
+      const auto check = [&](const PlainContact& c) {
+        const bool isFound = std::binary_search(found.begin(), found.end(), c);
+        expectTrue(isFound, exact.has(c.ids));
+        ++(isFound ? yes : no);
+      };
+      const bool sampled = GetParam().name == "ContinuousWithThickness";  // many samples each
+      for (std::size_t i = 0; i < found.size(); i += sampled ? 40 : 2) check(found[i]);
+      const Mesh &a = scene.a, &b = self ? scene.a : scene.b;
+      Random random(5);
+      const auto below = [&](std::size_t n) { return static_cast<std::uint32_t>(random() % n); };
+      for (int i = 0; i < 60; ++i) {
+        const Triangle &s = a.triangles[below(a.triangles.size())],
+                       &t = b.triangles[below(b.triangles.size())];
+        const std::uint32_t corner = below(3), side = below(3);
+        const Segment p{std::min(s[corner], s[(corner + 1) % 3]),
+                        std::max(s[corner], s[(corner + 1) % 3])},
+            q{std::min(t[side], t[(side + 1) % 3]), std::max(t[side], t[(side + 1) % 3])};
+        const auto triangle = static_cast<std::uint32_t>(&t - b.triangles.data());
+        const auto common = [&](std::uint32_t v, auto&& of) {
+          return self && std::find(of.begin(), of.end(), v) != of.end();
+        };
+        PlainContact c;
+        c.ids = {PlainContact::VertexTriangle, s[corner], triangle};
+        if (!common(s[corner], t)) check(c);
+        c.ids = {PlainContact::EdgeEdge, p[0], p[1], q[0], q[1]};
+        if (!common(p[0], q) && !common(p[1], q) && !(self && q < p)) check(c);
+      }
+    }
+  }
+  EXPECT_GT(yes, 100u);
+  EXPECT_GT(no, 50u);
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryMethod, InexactTransformations, ::testing::ValuesIn(methodCases(1.0)),
+                         [](const auto& method) { return method.param.name; });
+
+}  // namespace
+}  // namespace palpate
