@@ -166,7 +166,7 @@ constexpr std::size_t kTestLanes = hn::MaxLanes(TestTag());
 
 /// How a vector of tests takes its features' lower or upper bounds: a window of the row, and places
 /// in it.
-template <const Features& features>
+template <const TestFeatures& features>
 struct Places {
   std::array<std::size_t, kTests> window{};
   alignas(64) std::array<std::int32_t, kTests> lower{}, upper{};
@@ -181,7 +181,7 @@ struct Places {
 };
 
 /// Values of the tests from `test` on, out of a row's.
-template <const Features& features, class DT>
+template <const TestFeatures& features, class DT>
 HWY_ATTR HWY_INLINE hn::Vec<DT> valuesOf(DT d, const hn::TFromD<DT>* row, std::size_t test,
                                          bool upper = false) {
   static constexpr Places<features> kPlaces;
@@ -277,7 +277,7 @@ struct ChosenTests {
 /// bits.
 using IdPlaces = std::array<std::uint8_t, 64>;
 template <class Tests>
-constexpr IdPlaces idPlaces(const Features& features, int offset) {
+constexpr IdPlaces idPlaces(const TestFeatures& features, int offset) {
   constexpr int kBits = 8 * sizeof(Tests);
   IdPlaces places{};
   for (int i = 0; i < 64; ++i)

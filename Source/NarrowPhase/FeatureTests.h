@@ -1,5 +1,7 @@
 #pragma once
 
+#include <palpate/Types.h>
+
 #include <array>
 #include <cstdint>
 
@@ -13,13 +15,13 @@ enum Feature : std::uint8_t { kCorner, kEdge2 = 3, kEdge0, kEdge1, kTriangle, kE
 /// The tests of two triangles side by side, and which feature of each they take: corners of a with
 /// b, corners of b with a, edges with edges. The last is none.
 inline constexpr int kTests = 16;
-using Features = std::array<std::uint8_t, kTests>;
-inline constexpr Features kOfA = {0, 1, 2, 3, 6, 6, 6, 4, 4, 4, 5, 5, 5, 7, 7, 7},
-                          kOfB = {6, 6, 6, 7, 0, 1, 2, 3, 4, 5, 4, 5, 7, 4, 5, 7};
+using TestFeatures = std::array<std::uint8_t, kTests>;
+inline constexpr TestFeatures kOfA = {0, 1, 2, 3, 6, 6, 6, 4, 4, 4, 5, 5, 5, 7, 7, 7},
+                              kOfB = {6, 6, 6, 7, 0, 1, 2, 3, 4, 5, 4, 5, 7, 4, 5, 7};
 inline constexpr unsigned kCornersOfA = 0x0007, kCornersOfB = 0x0070, kEdges = 0x7f88;
 /// Each corner of a with each of b.
-inline constexpr Features kCornerOfA = {0, 0, 0, 1, 1, 1, 2, 2, 2},
-                          kCornerOfB = {0, 1, 2, 0, 1, 2, 0, 1, 2};
+inline constexpr TestFeatures kCornerOfA = {0, 0, 0, 1, 1, 1, 2, 2, 2},
+                              kCornerOfB = {0, 1, 2, 0, 1, 2, 0, 1, 2};
 
 /// As in MeshTopology::owned.
 constexpr unsigned ownedBit(std::uint8_t feature) {
@@ -32,7 +34,7 @@ constexpr unsigned cornersOf(std::uint8_t feature) {
 }
 
 /// Tests whose feature of one triangle it owns, by its bits; a triangle owns itself.
-constexpr auto ownedTests(const Features& features) {
+constexpr auto ownedTests(const TestFeatures& features) {
   std::array<std::uint16_t, 64> tests{};
   for (unsigned owned = 0; owned < 64; ++owned)
     for (int test = 0; test < kTests - 1; ++test)
@@ -44,16 +46,21 @@ inline constexpr auto kOwnedByA = ownedTests(kOfA), kOwnedByB = ownedTests(kOfB)
 
 /// Tests of features with a vertex in common, by the corners that are the same: bit 3 i + j for a's
 /// i and b's j.
-constexpr auto sharingTests() {
+constexpr auto sharingTests(const TestFeatures& ofA, const TestFeatures& ofB) {
   std::array<std::uint16_t, 512> tests{};
   for (unsigned same = 0; same < 512; ++same)
     for (int test = 0; test < kTests - 1; ++test)
       for (int bit = 0; bit < 9; ++bit)
-        if (same >> bit & 1 && cornersOf(kOfA[test]) >> bit / 3 & 1 &&
-            cornersOf(kOfB[test]) >> bit % 3 & 1)
+        if (same >> bit & 1 && cornersOf(ofA[test]) >> bit / 3 & 1 &&
+            cornersOf(ofB[test]) >> bit % 3 & 1)
           tests[same] |= static_cast<std::uint16_t>(1u << test);
   return tests;
 }
-inline constexpr auto kSharingTests = sharingTests();
+inline unsigned sameCorners(const Triangle& a, const Triangle& b) {
+  unsigned same = 0;
+  for (int bit = 0; bit < 9; ++bit) same |= static_cast<unsigned>(a[bit / 3] == b[bit % 3]) << bit;
+  return same;
+}
+inline constexpr auto kSharingTests = sharingTests(kOfA, kOfB);
 
 }  // namespace palpate

@@ -1,5 +1,6 @@
 #include "NarrowPhase/Proximity.h"
 
+#include "NarrowPhase/FeatureTests.h"
 #include "NarrowPhase/ProximityFilter.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
@@ -140,27 +141,15 @@ std::size_t countOf(std::uint32_t bits) {
   return (bits + (bits >> 8)) & 0x1f;
 }
 
-/// Feature pairs that a triangle pair owns, in the bits of findPossibleProximity().
-std::uint32_t ownedPairs(const MeshTopology& a, std::uint32_t s, const MeshTopology& b,
-                         std::uint32_t t) {
-  const std::uint32_t ownedByA = a.owned[s], ownedByB = b.owned[t];
-  std::uint32_t edges = 0;
-  for (int i = 0; i < 3; ++i)
-    if (ownedByA >> (3 + i) & 1) edges |= (ownedByB >> 3) << 3 * i;
-  return (ownedByA & 7) | (ownedByB & 7) << 3 | edges << 6;
-}
-
-/// The same without features that share a vertex, which self-collision leaves out.
-std::uint32_t withoutAdjacent(const Triangle& s, const Triangle& t, std::uint32_t pairs) {
-  for (int i = 0; i < 3; ++i) {
-    if (holdsVertex(t, s[i])) pairs &= ~(1u << i);
-    if (holdsVertex(s, t[i])) pairs &= ~(8u << i);
-    for (int j = 0; j < 3; ++j)
-      if (shareVertex({s[i], s[(i + 1) % 3]}, {t[j], t[(j + 1) % 3]}))
-        pairs &= ~(64u << (3 * i + j));
-  }
-  return pairs;
-}
+/// Features in the order of findPossibleProximity()'s bits.
+constexpr TestFeatures kInA = {0,         1,      2,      kTriangle, kTriangle,
+                               kTriangle, kEdge0, kEdge0, kEdge0,    kEdge1,
+                               kEdge1,    kEdge1, kEdge2, kEdge2,    kEdge2},
+                       kInB = {kTriangle, kTriangle, kTriangle, 0,      1,
+                               2,         kEdge0,    kEdge1,    kEdge2, kEdge0,
+                               kEdge1,    kEdge2,    kEdge0,    kEdge1, kEdge2};
+constexpr auto kOwnedInA = ownedTests(kInA), kOwnedInB = ownedTests(kInB);
+constexpr auto kSharing = sharingTests(kInA, kInB);
 
 /// Fills batches with the triangle pairs that own something, and measures what the filter leaves.
 class ProximityFinder {
@@ -182,9 +171,9 @@ class ProximityFinder {
 
   void add(const TrianglePair& candidate) {
     const MeshTopology &a = m_pair.a.topology, &b = m_pair.b.topology;
-    std::uint32_t pairs = ownedPairs(a, candidate.a, b, candidate.b);
+    std::uint32_t pairs = kOwnedInA[a.owned[candidate.a]] & kOwnedInB[b.owned[candidate.b]];
     const Triangle &s = a.triangles[candidate.a], &t = b.triangles[candidate.b];
-    if (m_pair.self()) pairs = withoutAdjacent(s, t, pairs);
+    if (m_pair.self()) pairs &= ~kSharing[sameCorners(s, t)];
     if (pairs == 0) return;
     m_pairs[m_size] = pairs;
     m_candidates[m_size] = candidate;
