@@ -66,7 +66,7 @@ class Coverage {
   }
   bool ofEdges(const EdgeEdgeContact& c) const {
     const MeshTopology &a = m_meshes.a.topology, &b = m_meshes.b.topology;
-    const std::uint32_t edgeA = idOf(a, c.edgeA), edgeB = idOf(b, c.edgeB);
+    const std::uint32_t edgeA = a.edgeOf(c.edgeA), edgeB = b.edgeOf(c.edgeB);
     if (edgeA == kNoEdge || edgeB == kNoEdge) return true;  // nor such edges
     if (!m_byTriangles) return holds(m_sample.edgesOfA, edgeA);
     return all(a.edgeTriangles[edgeA], [&](std::uint32_t s) {
@@ -84,12 +84,6 @@ class Coverage {
   template <class F>
   static bool all(std::span<const std::uint32_t> ids, F&& f) {
     return std::all_of(ids.begin(), ids.end(), f);
-  }
-  static std::uint32_t idOf(const MeshTopology& topology, const Segment& edge) {
-    const auto& edges = topology.edges;
-    const auto place = std::lower_bound(edges.begin(), edges.end(), edge);
-    if (place == edges.end() || *place != edge) return kNoEdge;
-    return static_cast<std::uint32_t>(place - edges.begin());
   }
 
   const MeshPair& m_meshes;

@@ -53,6 +53,11 @@ FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
   return floats;
 }
 
+void sortUnique(Buffer<std::uint32_t>& ids) {
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+}
+
 std::size_t sizeOf(const CollisionData::Contents& contents) {
   return contents.vertexTriangle.size() + contents.triangleVertex.size() + contents.edgeEdge.size();
 }
@@ -301,6 +306,15 @@ void Frame::finish(PairRecord& record, bool nearby, const Settings& settings) {
   m_facts.clear();
   for (const auto* buffers : {&m_buffers, &m_overlaps})
     for (const ContactBuffers* found : *buffers) m_facts.add(found->facts);
+  for (auto list : {&StepFacts::verticesA, &StepFacts::verticesB, &StepFacts::degenerateA,
+                    &StepFacts::degenerateB})
+    sortUnique(m_facts.*list);
+  if (record.plan.step.impacts && m_facts.clearance == 0.0) {
+    m_impacts.clear();
+    for (ContactBuffers* found : m_buffers)
+      answerByImpact(record.meshes(), m_facts, *found, m_impacts);
+    m_buffers.push_back(&m_impacts);
+  }
   const bool overlapping =
       m_facts.startsIntersecting && record.pair.settings.method == Method::Auto;
   if (overlapping) preferOverlaps();

@@ -47,6 +47,7 @@ class Frame {
   Buffer<NodePair> m_nodePairs;
   TraversalStack m_stack;
   std::vector<ContactBuffers*> m_buffers, m_overlaps;  ///< of the pair at hand
+  ContactBuffers m_impacts;
   CollisionData::Contents m_overlapContacts;
   StepFacts m_facts;
   OrderScratch m_orderScratch;

@@ -19,12 +19,6 @@ MotionRange correctionOf(const Geometry& geometry) {
   return {-geometry.motion.upper, -geometry.motion.lower};
 }
 
-void sortUnique(std::vector<std::uint32_t>& out, const Buffer<std::uint32_t>& ids) {
-  out.assign(ids.begin(), ids.end());
-  std::sort(out.begin(), out.end());
-  out.erase(std::unique(out.begin(), out.end()), out.end());
-}
-
 /// Vertices that may have moved further than `reach` relative to the other mesh.
 void addFarMovers(std::vector<std::uint32_t>& out, const Geometry& mesh, const Geometry& other,
                   double reach) {
@@ -95,10 +89,17 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
   validity.displacement = plan.motion;
   validity.thickness =
       plan.method == Method::Intersection ? 0.0 : settings.thickness + plan.step.extra;
-  sortUnique(validity.verticesBeyondA, facts.verticesA);
-  sortUnique(validity.verticesBeyondB, facts.verticesB);
-  sortUnique(validity.degenerateTrianglesA, facts.degenerateA);
-  sortUnique(validity.degenerateTrianglesB, facts.degenerateB);
+  const auto take = [](std::vector<std::uint32_t>& out, const Buffer<std::uint32_t>& ids) {
+    out.assign(ids.begin(), ids.end());
+  };
+  take(validity.degenerateTrianglesA, facts.degenerateA);
+  take(validity.degenerateTrianglesB, facts.degenerateB);
+  validity.verticesBeyondA.clear();
+  validity.verticesBeyondB.clear();
+  if (!plan.step.impacts) {
+    take(validity.verticesBeyondA, facts.verticesA);
+    take(validity.verticesBeyondB, facts.verticesB);
+  }
   validity.startedApart = m_startsApart || (plan.step.start && !facts.startsIntersecting);
   if (settings.method == Method::Auto) {
     validity.reach = plan.tolerance;

@@ -84,4 +84,10 @@ MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle>
   }
 }
 
+std::uint32_t MeshTopology::edgeOf(const Segment& edge) const {
+  const auto place = std::lower_bound(edges.begin(), edges.end(), edge);
+  if (place == edges.end() || *place != edge) return kNoEdge;
+  return static_cast<std::uint32_t>(place - edges.begin());
+}
+
 }  // namespace palpate

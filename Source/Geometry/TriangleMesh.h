@@ -41,6 +41,8 @@ struct MeshTopology {
   IndexLists edgeTriangles;          ///< ascending triangle ids, each once
   std::size_t untestedVertices = 0;  ///< in no triangle
 
+  /// Of an edge, lower vertex first; kNoEdge if there is none such.
+  std::uint32_t edgeOf(const Segment& edge) const;
   bool ownsCorner(std::uint32_t triangle, int corner) const {
     return owned[triangle] >> corner & 1;
   }

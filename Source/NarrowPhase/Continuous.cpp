@@ -92,15 +92,17 @@ class ContactFinder {
       list.push_back(
           contactOf(inFirst, inSecond, features.second.topology.triangles[inSecond], closest));
       m_check.noteTriangle(inSecond, !ofSecond, p[1], p[2], p[3]);
+      m_check.noteImpact(features, inFirst, inSecond, answer.time, closest.distance);
       // A corner touches its triangle, and then the normal is the plane's.
-      complete<kind>(list.back(), query, answer.time,
-                     [&] { return finiteVertexTriangleDistance(p[1], p[1], p[2], p[3]).normal; });
+      complete(list.back(), query, answer.time,
+               [&] { return finiteVertexTriangleDistance(p[1], p[1], p[2], p[3]).normal; });
     } else {
       const auto closest = finiteEdgeEdgeDistance(p[0], p[1], p[2], p[3]);
       m_out.edgeEdge.push_back(contactOf(features.first.topology.edges[inFirst],
                                          features.second.topology.edges[inSecond], closest));
       m_check.noteEdges(m_out.edgeEdge.back().edgeA, m_out.edgeEdge.back().edgeB);
-      complete<kind>(m_out.edgeEdge.back(), query, answer.time, [&] {
+      m_check.noteImpact(features, inFirst, inSecond, answer.time, closest.distance);
+      complete(m_out.edgeEdge.back(), query, answer.time, [&] {
         return finiteEdgeEdgeDistance(p[0], p[1], p[0], p[0] + (p[3] - p[2])).normal;
       });
     }
@@ -108,22 +110,12 @@ class ContactFinder {
   }
 
  private:
-  template <Kind kind, class Contact, class PlaneNormal>
+  template <class Contact, class PlaneNormal>
   void complete(Contact& contact, const ImpactQuery& query, double time, PlaneNormal&& normal) {
     contact.timeOfImpact = time;
-    if (m_pair.step.motion > 0.0) noteClearance<kind>(query, contact);
     if (m_settings.minimumDistance > 0.0) return;
     contact.normal = normal();
     if (sideBefore(query, time) < 0) contact.normal = -contact.normal;
-  }
-
-  /// What the rest of the step leaves of the distance.
-  template <Kind kind, class Contact>
-  void noteClearance(const ImpactQuery& query, const Contact& contact) {
-    double& clearance = m_out.facts.clearance;
-    if (clearance <= 0.0) return;
-    const double left = (1.0 - contact.timeOfImpact) * motionBound<kind>(query);
-    clearance = std::min(clearance, std::max(0.0, contact.distance - left));
   }
 
   const MeshPair& m_pair;

@@ -43,7 +43,7 @@ struct StepFacts {
   /// L: no pair of features that is a contact is nearer at the step's end; 0: it may have touched.
   double clearance = std::numeric_limits<double>::infinity();
   bool startsIntersecting = false;
-  Buffer<std::uint32_t> verticesA, verticesB;  ///< of features that may have touched, unanswered
+  Buffer<std::uint32_t> verticesA, verticesB;      ///< of features that may have touched
   Buffer<std::uint32_t> degenerateA, degenerateB;  ///< triangles without area in contacts
   void clear();
   void add(const StepFacts&);

@@ -21,12 +21,57 @@ bool StepCheck::isAnsweredByImpact(const Features<kind>& features, std::uint32_t
     return false;
   if (m_pair.step.impacts) return addImpact(m_pair, features, inFirst, inSecond, ofSecond, m_out);
   facts.clearance = 0.0;
+  noteVertices(features, inFirst, inSecond);
+  return false;
+}
+
+template <Kind kind>
+void StepCheck::noteVertices(const Features<kind>& features, std::uint32_t inFirst,
+                             std::uint32_t inSecond) {
   const auto vertices = features.vertices(inFirst, inSecond);
   for (int i = 0; i < 4; ++i) {
     const bool ofB = !m_pair.self() && &features.meshOf(i) == &m_pair.b;
-    (ofB ? facts.verticesB : facts.verticesA).push_back(vertices[i]);
+    (ofB ? m_out.facts.verticesB : m_out.facts.verticesA).push_back(vertices[i]);
   }
-  return false;
+}
+
+template <Kind kind>
+void StepCheck::noteImpact(const Features<kind>& features, std::uint32_t inFirst,
+                           std::uint32_t inSecond, double time, double distance) {
+  const StepPlan& step = m_pair.step;
+  double& clearance = m_out.facts.clearance;
+  if (step.motion == 0.0 || (clearance == 0.0 && !step.impacts)) return;
+  const double left = (1.0 - time) * motionBound<kind>(features.query(inFirst, inSecond));
+  clearance = std::min(clearance, std::max(0.0, distance - left));
+  if (step.impacts && distance <= left) noteVertices(features, inFirst, inSecond);
+}
+
+void answerByImpact(const MeshPair& pair, const StepFacts& touched, ContactBuffers& found,
+                    ContactBuffers& out) {
+  const auto isTouched = [&](const Buffer<std::uint32_t>& sorted, auto... vertices) {
+    return (std::binary_search(sorted.begin(), sorted.end(), vertices) || ...);
+  };
+  const auto &ofA = touched.verticesA, &ofB = pair.self() ? ofA : touched.verticesB;
+  const auto moveOut = [&](Buffer<VertexTriangleContact>& list, bool ofSecond) {
+    const Features<Kind::VertexTriangle> features{ofSecond ? pair.b : pair.a,
+                                                  ofSecond ? pair.a : pair.b};
+    const auto &vertices = ofSecond ? ofB : ofA, &corners = ofSecond ? ofA : ofB;
+    std::erase_if(list, [&](const VertexTriangleContact& c) {
+      return c.timeOfImpact == 1.0 &&
+             (isTouched(vertices, c.vertex) ||
+              isTouched(corners, c.corners[0], c.corners[1], c.corners[2])) &&
+             addImpact(pair, features, c.vertex, c.triangle, ofSecond, out);
+    });
+  };
+  moveOut(found.vertexTriangle, false);
+  moveOut(found.triangleVertex, true);
+  const Features<Kind::EdgeEdge> edges{pair.a, pair.b};
+  std::erase_if(found.edgeEdge, [&](const EdgeEdgeContact& c) {
+    return c.timeOfImpact == 1.0 &&
+           (isTouched(ofA, c.edgeA[0], c.edgeA[1]) || isTouched(ofB, c.edgeB[0], c.edgeB[1])) &&
+           addImpact(pair, edges, pair.a.topology.edgeOf(c.edgeA), pair.b.topology.edgeOf(c.edgeB),
+                     false, out);
+  });
 }
 
 template <Kind kind>
@@ -59,15 +104,17 @@ void StepCheck::noteTriangle(std::uint32_t triangle, bool ofSecond, const Vector
 
 void StepCheck::noteEdges(const Segment& p, const Segment& q) {
   const auto note = [](const TriangleMesh& mesh, const Segment& edge, auto& list) {
-    if (mesh.now[edge[0]] != mesh.now[edge[1]]) return;
-    const std::vector<Segment>& edges = mesh.topology.edges;
-    const auto place = std::lower_bound(edges.begin(), edges.end(), edge);
-    list.push_back(mesh.topology.edgeTriangles[place - edges.begin()].front());
+    if (mesh.now[edge[0]] == mesh.now[edge[1]])
+      list.push_back(mesh.topology.edgeTriangles[mesh.topology.edgeOf(edge)].front());
   };
   note(m_pair.a, p, m_out.facts.degenerateA);
   note(m_pair.b, q, m_pair.self() ? m_out.facts.degenerateA : m_out.facts.degenerateB);
 }
 
+template void StepCheck::noteImpact(const Features<Kind::VertexTriangle>&, std::uint32_t,
+                                    std::uint32_t, double, double);
+template void StepCheck::noteImpact(const Features<Kind::EdgeEdge>&, std::uint32_t, std::uint32_t,
+                                    double, double);
 template bool StepCheck::isAnsweredByImpact(const Features<Kind::VertexTriangle>&, std::uint32_t,
                                             std::uint32_t, bool, double);
 template bool StepCheck::isAnsweredByImpact(const Features<Kind::EdgeEdge>&, std::uint32_t,

@@ -30,15 +30,29 @@ class StepCheck {
   template <ImpactQuery::Kind kind>
   bool isAnsweredAtEnd(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond) const;
 
+  /// Of an impact that is reported: what the rest of the step leaves of the distance.
+  template <ImpactQuery::Kind kind>
+  void noteImpact(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond, double time,
+                  double distance);
+
   /// Triangles of contacts: notes those without area.
   void noteTriangle(std::uint32_t triangle, bool ofSecond, const Eigen::Vector3d& a,
                     const Eigen::Vector3d& b, const Eigen::Vector3d& c);
   void noteEdges(const Segment& p, const Segment& q);
 
  private:
+  template <ImpactQuery::Kind kind>
+  void noteVertices(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond);
+
   const MeshPair& m_pair;
   ContactBuffers& m_out;
 };
+
+/// Auto: of the contacts at the step's end those that share a vertex with features that may have
+/// touched (`touched`, sorted) are moved to `out` as their impacts, if they have one. A vertex that
+/// came through one triangle is on the wrong side of the next, too.
+void answerByImpact(const MeshPair&, const StepFacts& touched, ContactBuffers& found,
+                    ContactBuffers& out);
 
 /// Whether triangles of the candidates intersect at the step's start, exactly.
 bool anyIntersectAtStart(const MeshPair&, std::span<const TrianglePair> candidates);

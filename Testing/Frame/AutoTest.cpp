@@ -1,0 +1,184 @@
+#include "Common/PairRun.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <tuple>
+
+// Method::Auto: by octrees as by brute force, and nothing missed that Method::Continuous finds.
+
+namespace palpate {
+namespace {
+
+using namespace testing;
+using Eigen::Vector3d;
+
+constexpr double kThickness = 0.02;
+
+/// Two meshes and their positions at both ends of a step.
+struct Case {
+  Mesh a, b;
+  std::vector<Vector3d> aNow, bNow;
+};
+
+std::vector<Vector3d> shaken(Random& random, const std::vector<Vector3d>& positions, double by,
+                             double fastShare, double fast) {
+  std::vector<Vector3d> moved;
+  for (const Vector3d& p : positions) {
+    const bool isFast = uniform(random, 0, 1) < fastShare;
+    moved.push_back(p + randomPoint(random, -1, 1) * (isFast ? fast : by));
+  }
+  return moved;
+}
+
+/// Soups, a ball over a sheet, two sheets; motion by `slow`, and of some vertices by `fast`.
+Case randomCase(Random& random, double slow, double fastShare, double fast) {
+  Case c;
+  switch (random() % 3) {
+    case 0:
+      c.a = soup(random, 25, 0.2);
+      c.b = soup(random, 25, 0.2);
+      break;
+    case 1:
+      c.a = sphere(5, 7, {0.5, 0.5, 0.3 + uniform(random, -0.02, 0.08)}, 0.25);
+      c.b = sheet(5, 0, 1.0);
+      break;
+    default:
+      c.a = sheet(4, uniform(random, 0.0, 0.05), 0.5);
+      c.b = sheet(5, 0, 0.5);
+  }
+  const Vector3d common = randomPoint(random, -0.3, 0.3);  // in which all share
+  c.aNow = shaken(random, c.a.positions, slow, fastShare, fast);
+  c.bNow = shaken(random, c.b.positions, slow, fastShare, fast);
+  for (auto* now : {&c.aNow, &c.bNow})
+    for (Vector3d& p : *now) p += common;
+  return c;
+}
+
+struct Motion {
+  const char* name;
+  double slow, fastShare, fast;
+};
+constexpr Motion kMotions[]{{"still", 0, 0, 0},
+                            {"slow", 0.001, 0, 0},
+                            {"at the tolerance", 0.003, 0, 0},
+                            {"mixed", 0.0005, 0.1, 0.2},
+                            {"fast", 0.1, 0, 0}};
+
+TEST(Auto, AnswersAsBruteForceDoes) {
+  Random random(11);
+  std::set<MethodReason> reasons;
+  for (int i = 0; i < 120; ++i) {
+    const Motion& motion = kMotions[i % std::size(kMotions)];
+    const Case c = randomCase(random, motion.slow, motion.fastShare, motion.fast);
+    for (const PairSettings& settings :
+         {PairSettings{.thickness = kThickness},
+          PairSettings{.thickness = kThickness, .contacts = Contacts::All, .tolerance = 0.005},
+          PairSettings{.thickness = i % 2 ? 0.0 : kThickness, .tolerance = 0.0}}) {
+      SCOPED_TRACE(std::string(motion.name) + ", case " + std::to_string(i));
+      PairRun truth(settingsOf(Engine::BruteForce), c.a, c.b, settings);
+      truth.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
+      for (const Settings& engine : octreeSettings()) {
+        PairRun run(engine, c.a, c.b, settings);
+        run.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
+        expectSame(run.answers(), truth.answers());
+        for (const CollisionPair& pair : run.detection().pairs()) {
+          const Validity &v = run.detection().collisionData(pair.a, pair.b).validity(),
+                         &w = truth.detection().collisionData(pair.a, pair.b).validity();
+          EXPECT_TRUE(v == w);
+          reasons.insert(v.reason);
+        }
+      }
+      if (HasFailure()) return;
+    }
+  }
+  EXPECT_EQ(reasons.size(), 4u);
+}
+
+/// Feature ids of all contacts, by list.
+std::set<std::array<std::uint32_t, 5>> idsOf(const CollisionData& data) {
+  std::set<std::array<std::uint32_t, 5>> ids;
+  for (const auto& c : data.vertexTriangle()) ids.insert({0, c.vertex, c.triangle, 0, 0});
+  for (const auto& c : data.triangleVertex()) ids.insert({1, c.vertex, c.triangle, 0, 0});
+  for (const auto& c : data.edgeEdge())
+    ids.insert({2, c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]});
+  return ids;
+}
+
+TEST(Auto, MissesNothingThatContinuousFinds) {
+  Random random(12);
+  std::size_t found = 0;
+  for (int i = 0; i < 1500; ++i) {
+    const Motion& motion = kMotions[i % std::size(kMotions)];
+    const Case c = randomCase(random, motion.slow * uniform(random, 0, 2), motion.fastShare,
+                              motion.fast * uniform(random, 0, 1));
+    const double thickness = i % 4 == 0 ? 0.0 : kThickness;
+    const PairSettings continuous{Method::Continuous, thickness};
+    const PairSettings automatic{Method::Auto, thickness, Contacts::All,
+                                 uniform(random, -1, 1) * 0.01};
+    PairRun truth(settingsOf(Engine::Octree), c.a, c.b, continuous);
+    PairRun run(settingsOf(Engine::Octree), c.a, c.b, automatic);
+    truth.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
+    run.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
+    const double most =
+        thickness + (automatic.tolerance < 0 ? thickness / 2 : automatic.tolerance) + 1e-6;
+    for (const CollisionPair& pair : run.detection().pairs()) {
+      const CollisionData& data = run.detection().collisionData(pair.a, pair.b);
+      const auto expected = idsOf(truth.detection().collisionData(pair.a, pair.b)),
+                 answer = idsOf(data);
+      found += expected.size();
+      EXPECT_TRUE(std::includes(answer.begin(), answer.end(), expected.begin(), expected.end()))
+          << motion.name << ", case " << i;
+      if (!data.validity().startedApart) continue;  // Intersection's contacts reach further
+      for (const auto& contact : data.vertexTriangle()) EXPECT_LE(contact.distance, most);
+      for (const auto& contact : data.edgeEdge()) EXPECT_LE(contact.distance, most);
+    }
+    if (HasFailure()) return;
+  }
+  EXPECT_GT(found, 20000u);
+}
+
+/// Distinct: what Continuous finds is there, or a contact of the same vertex (of a vertex of each
+/// edge) stands for it.
+TEST(Auto, DistinctContactsStandForAllThatContinuousFinds) {
+  Random random(13);
+  std::size_t found = 0;
+  for (int i = 0; i < 1500; ++i) {
+    const Motion& motion = kMotions[i % std::size(kMotions)];
+    const Case c = randomCase(random, motion.slow * uniform(random, 0, 2), motion.fastShare,
+                              motion.fast * uniform(random, 0, 1));
+    PairRun truth(settingsOf(Engine::Octree), c.a, c.b, {Method::Continuous, kThickness}, false);
+    PairRun run(settingsOf(Engine::Octree), c.a, c.b, {Method::Auto, kThickness}, false);
+    truth.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
+    run.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
+    std::set<std::uint32_t> ofA, ofB;
+    for (const auto& contact : run.data().vertexTriangle()) {
+      ofA.insert(contact.vertex);
+      ofB.insert(contact.corners.begin(), contact.corners.end());
+    }
+    for (const auto& contact : run.data().triangleVertex()) {
+      ofB.insert(contact.vertex);
+      ofA.insert(contact.corners.begin(), contact.corners.end());
+    }
+    for (const auto& contact : run.data().edgeEdge()) {
+      ofA.insert(contact.edgeA.begin(), contact.edgeA.end());
+      ofB.insert(contact.edgeB.begin(), contact.edgeB.end());
+    }
+    const auto any = [](const auto& set, const auto& vertices) {
+      return std::any_of(vertices.begin(), vertices.end(),
+                         [&](std::uint32_t v) { return set.contains(v); });
+    };
+    for (const auto& contact : truth.data().vertexTriangle())
+      EXPECT_TRUE(ofA.contains(contact.vertex) && any(ofB, contact.corners));
+    for (const auto& contact : truth.data().triangleVertex())
+      EXPECT_TRUE(ofB.contains(contact.vertex) && any(ofA, contact.corners));
+    for (const auto& contact : truth.data().edgeEdge())
+      EXPECT_TRUE(any(ofA, contact.edgeA) && any(ofB, contact.edgeB));
+    found += idsOf(truth.data()).size();
+    if (HasFailure()) FAIL() << motion.name << ", case " << i;
+  }
+  EXPECT_GT(found, 10000u);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,159 @@
+#include "Common/PairRun.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <Eigen/Geometry>
+#include <iostream>
+
+// Validity::trusted: never true where an answer is wrong. Truth is exact: impacts of
+// Method::Continuous at thickness 0, and Method::Intersection of the positions at the step's start.
+
+namespace palpate {
+namespace {
+
+using namespace testing;
+using Eigen::Vector3d;
+using Positions = std::vector<Vector3d>;
+
+constexpr double kThickness = 0.02;
+
+/// What really happened in a step.
+struct Truth {
+  bool startedApart, touched;
+};
+
+Truth truthOf(const Mesh& a, const Mesh& b, const Positions& aBefore, const Positions& aNow,
+              const Positions& bBefore, const Positions& bNow) {
+  PairRun start(settingsOf(Engine::Octree), a, b, {Method::Intersection}, false);
+  start.step(aBefore, aBefore, bBefore, bBefore);
+  PairRun step(settingsOf(Engine::Octree), a, b, {Method::Continuous}, false);
+  step.step(aBefore, aNow, bBefore, bNow);
+  return {start.data().intersectingTriangles().empty(), step.data().earliestTimeOfImpact() <= 1.0};
+}
+
+/// A ball over a sheet, whose vertices began above it. A contact that a vertex's projection inside
+/// a face holds shows on which side the method takes it to be.
+struct BallAndSheet {
+  Mesh ball = sphere(5, 7, {0.5, 0.5, 0.35}, 0.2), sheet = testing::sheet(5, 0, 1.0);
+
+  /// timed: contacts are of their timeOfImpact, else of the step's end.
+  static bool anyFromBelow(const CollisionData& data, bool timed, const Positions& before,
+                           const Positions& now) {
+    for (const VertexTriangleContact& c : data.vertexTriangle()) {
+      if (!(c.barycentric.minCoeff() > 0.0)) continue;
+      const double t = timed ? c.timeOfImpact : 1.0;
+      const auto at = [&](std::uint32_t v) { return Vector3d((1 - t) * before[v] + t * now[v]); };
+      const Vector3d a = at(c.corners[0]), b = at(c.corners[1]), d = at(c.corners[2]);
+      if ((b - a).cross(d - a).dot(c.normal) < 0.0) return true;
+    }
+    return false;
+  }
+};
+
+/// Frames in which an answer was wrong, and in which trust was refused though it was right.
+struct Tally {
+  std::size_t frames = 0, wrong = 0, silent = 0, refused = 0, refusedRight = 0;
+  friend std::ostream& operator<<(std::ostream& out, const Tally& t) {
+    return out << t.frames << " frames, wrong " << t.wrong << ", silent " << t.silent
+               << ", not trusted " << t.refused << ", though right " << t.refusedRight;
+  }
+  void add(bool isWrong, bool trusted) {
+    ++frames;
+    wrong += isWrong;
+    silent += isWrong && trusted;
+    refused += !trusted;
+    refusedRight += !isWrong && !trusted;
+  }
+};
+
+/// Lives of a ball that bobs over a sheet by `speed` thicknesses a frame, up to where they cross.
+Tally livesOf(const PairSettings& settings, double speed, std::uint64_t seed, std::size_t lives,
+              bool response) {
+  Random random(seed);
+  Tally tally;
+  for (std::size_t life = 0; life < lives; ++life) {
+    const BallAndSheet scene;
+    PairRun run(settingsOf(Engine::Octree), scene.ball, scene.sheet, settings, false);
+    Positions ball = scene.ball.positions, sheet = scene.sheet.positions;
+    const double drop = uniform(random, 0.0, 0.1);
+    for (Vector3d& p : ball) p.z() -= drop;
+    run.step(ball, ball, sheet, sheet);
+    const Positions start = ball;
+    bool crossed = false;  // so far: then nobody knows sides any more
+    double height = 0;
+    for (int frame = 0; frame < 12 && !crossed; ++frame) {
+      height += uniform(random, -1.2, 1.0) * speed * kThickness;
+      Positions ballNow = start, sheetNow = scene.sheet.positions, ballBefore = ball;
+      for (Vector3d& p : ballNow)
+        p += Vector3d(0, 0, height) + randomPoint(random, -0.1, 0.1) * speed * kThickness;
+      for (Vector3d& p : sheetNow) p += randomPoint(random, -0.1, 0.1) * speed * kThickness;
+      if (response && frame % 3 == 2)  // corrected since, by a solver
+        for (Vector3d& p : ballBefore) p.z() += 0.2 * kThickness;
+      const Truth truth = truthOf(scene.ball, scene.sheet, ballBefore, ballNow, sheet, sheetNow);
+      if (response) {
+        run.step(ballBefore, ballNow, sheet, sheetNow);
+      } else {
+        run.detection().setPositions(run.a(), ballNow);
+        run.detection().setPositions(run.b(), sheetNow);
+        run.detect();
+      }
+      const Validity& validity = run.data().validity();
+      const bool fromBelow = BallAndSheet::anyFromBelow(
+          run.data(), settings.method != Method::Proximity, sheet, sheetNow);
+      bool wrong = false;
+      switch (settings.method) {
+        case Method::Intersection:
+          wrong = truth.touched && run.data().intersectingTriangles().empty();
+          break;
+        case Method::Proximity:  // it cannot see impacts at all
+          wrong = truth.touched || fromBelow;
+          break;
+        default:
+          wrong = !truth.startedApart || fromBelow;
+      }
+      if (validity.startedApart) {
+        EXPECT_TRUE(truth.startedApart);
+      }
+      EXPECT_EQ(validity.sideMayBeWrong,
+                settings.method != Method::Intersection && !validity.trusted);
+      tally.add(wrong, validity.trusted);
+      crossed = truth.touched;
+      ball = ballNow;
+      sheet = sheetNow;
+    }
+  }
+  return tally;
+}
+
+struct MethodTest : ::testing::TestWithParam<MethodCase> {};
+
+TEST_P(MethodTest, FailsNeverSilently) {
+  for (const bool response : {false, true}) {
+    Tally all;
+    for (const double speed : {0.01, 0.1, 0.3, 0.7, 1.0, 1.5, 3.0, 10.0, 50.0}) {
+      const Tally tally = livesOf(GetParam().settings, speed, 5, 40, response);
+      EXPECT_EQ(tally.silent, 0u) << "speed " << speed;
+      std::cout << (response ? "response, " : "") << "speed " << speed << ": " << tally << "\n";
+      all.wrong += tally.wrong;
+    }
+    if (GetParam().settings.method == Method::Proximity) {
+      EXPECT_GT(all.wrong, 100u);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Validity, MethodTest,
+    ::testing::Values(MethodCase{"Intersection", {Method::Intersection}},
+                      MethodCase{"ProximityDistinct", {Method::Proximity, kThickness}},
+                      MethodCase{"ProximityAll", {Method::Proximity, kThickness, Contacts::All}},
+                      MethodCase{"Continuous", {Method::Continuous, 0}},
+                      MethodCase{"ContinuousWithThickness", {Method::Continuous, kThickness}},
+                      MethodCase{"AutoDistinct", {Method::Auto, kThickness}},
+                      MethodCase{"AutoAll", {Method::Auto, kThickness, Contacts::All}},
+                      MethodCase{"AutoWithoutThickness", {Method::Auto, 0}}),
+    [](const auto& test) { return test.param.name; });
+
+}  // namespace
+}  // namespace palpate
