@@ -68,11 +68,11 @@ Separation accurateSeparation(const RelativeMotion<kind>& motion, double t) {
   return separation;
 }
 
-/// Marches through times at which the features are certainly further
-/// apart than the distance, and reports an impact where it cannot go on.
+/// Marches through times at which the features are certainly further apart than the distance, and
+/// reports an impact where it cannot go on.
 ///
 /// Not late, none missed: a stretch is passed only where all corners stay beyond the distance along
-/// a direction that is fixed, or that moves linearly, with errors bounded (RelativeMotion.cpp).
+/// a direction, fixed or turning, or the plane does, with errors bounded (RelativeMotion.cpp).
 ///
 /// None invented: at a reported time two points of the features are within near = distance + e as
 /// computed, e = tolerance * displacement + kApproachSlack * (largest difference + distance). Their
@@ -81,10 +81,10 @@ Separation accurateSeparation(const RelativeMotion<kind>& motion, double t) {
 /// Bounded: where they are not, the features' distance exceeds `near`. Along the direction of
 /// accurateSeparation(), right to 2^-39 at such distances, all corners then are beyond the distance
 /// by more than tolerance * displacement, and it takes more than the tolerance to lose that. So
-/// each stretch is longer than the tolerance. (Few are needed: they are Newton's steps towards the
-/// impact. Features that pass each other at little more than the distance, while they turn, need
-/// most; there directions that turn along reach further.) Where the march ends early changes no
-/// step before.
+/// each stretch is longer than the tolerance, or than kShortStretch where they are near. (Few are
+/// needed: they are Newton's steps towards the impact. Features that turn as they pass each other
+/// at little more than the distance need most; there the turning direction and the plane reach
+/// further.) Where the march ends early changes no step before.
 template <Kind kind>
 ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, double upTo) {
   const RelativeMotion<kind> motion(query);
@@ -98,11 +98,12 @@ ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, d
       distance + tolerance * displacement + kApproachSlack * (largest.maxCoeff() + distance);
 
   constexpr int kPatience = 6;  // stretches before directions are turned
+  const double shortest = std::max(tolerance, kShortStretch);
   double stride = 0.0;
   Separation here = bestSeparation(motion, t);
   for (int step = 0;; ++step) {
     double clear = separatedAround(t, motion, largest, here, distance).high;
-    if (!(clear == 1.0 || clear - t > tolerance)) {
+    if (!(clear == 1.0 || clear - t > shortest)) {
       if (here.nearest <= near || distanceInside(motion, t) <= near) return {true, false, t};
       here = accurateSeparation(motion, t);
       clear = separatedAround(t, motion, largest, here, distance).high;
@@ -113,7 +114,8 @@ ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, d
       stride = std::max(stride, 2.0 * (clear - t));
       const double ahead = std::min(t + stride, 1.0);
       const Separation there = bestSeparation(motion, ahead);
-      if (separatedBetween(t, here, ahead, there, motion, largest, distance)) {
+      if (separatedBetween(t, here, ahead, there, motion, largest, distance) ||
+          separatedByPlane(t, ahead, motion, distance)) {
         if (ahead > upTo || ahead == 1.0) return {};
         t = ahead;
         here = there;

@@ -13,9 +13,8 @@ namespace {
 using Eigen::Vector3d;
 using Kind = ImpactQuery::Kind;
 
-/// det(A, B, C), each coefficient within `error`. One bound serves all four: with m the largest
-/// magnitudes over the step, no term exceeds one of the permanent of m's six; each takes 11
-/// roundings.
+/// det(A, B, C), each coefficient within `error`. One bound serves all four, as the permanent does;
+/// each takes 11 roundings.
 struct Coplanarity {
   CubicBernstein coefficients;
   double error;
@@ -29,12 +28,7 @@ Coplanarity coplanarity(const RelativeMotion<kind>& motion) {
   Coplanarity result;
   result.coefficients = {normal[0].dot(c[0]), (normal[1].dot(c[0]) + normal[0].dot(c[1])) / 3.0,
                          (normal[2].dot(c[0]) + normal[1].dot(c[1])) / 3.0, normal[2].dot(c[1])};
-  const Vector3d p = a[0].cwiseAbs().cwiseMax(a[1].cwiseAbs()),
-                 q = b[0].cwiseAbs().cwiseMax(b[1].cwiseAbs()),
-                 r = c[0].cwiseAbs().cwiseMax(c[1].cwiseAbs());
-  const double permanent = r[0] * (p[1] * q[2] + p[2] * q[1]) + r[1] * (p[2] * q[0] + p[0] * q[2]) +
-                           r[2] * (p[0] * q[1] + p[1] * q[0]);
-  result.error = kCoplanarityError * permanent + kImpactUnderflow;
+  result.error = kCoplanarityError * permanent(motion) + kImpactUnderflow;
   return result;
 }
 

@@ -101,6 +101,21 @@ bool separatedBetween(double t0, const Separation& first, double t1, const Separ
   return true;
 }
 
+/// |det(A, B, C)| is above its Bernstein coefficients of one sign, |A x B| below the longest of
+/// its.
+template <ImpactQuery::Kind kind>
+bool separatedByPlane(double t0, double t1, const RelativeMotion<kind>& motion, double distance) {
+  const Vector3d a = at(t0, motion.a), b = at(t0, motion.b), c = at(t0, motion.c);
+  const Vector3d d = at(t1, motion.a), e = at(t1, motion.b), f = at(t1, motion.c);
+  const Vector3d first = a.cross(b), middle = 0.5 * (a.cross(e) + d.cross(b)), last = d.cross(e);
+  const auto [least, most] = std::minmax({first.dot(c), (2.0 * middle.dot(c) + first.dot(f)) / 3.0,
+                                          (2.0 * middle.dot(f) + last.dot(c)) / 3.0, last.dot(f)});
+  const double gap = std::max(least, -most) - kPlaneError * permanent(motion);
+  const double length = std::max({first.norm(), middle.norm(), last.norm()}) +
+                        kPlaneError * largestOf(motion.a).norm() * largestOf(motion.b).norm();
+  return gap > distance * length * (1.0 + kAlongError) + kImpactUnderflow;
+}
+
 template Separation bestSeparation(const RelativeMotion<ImpactQuery::Kind::VertexTriangle>&,
                                    double);
 template Separation bestSeparation(const RelativeMotion<ImpactQuery::Kind::EdgeEdge>&, double);
@@ -113,6 +128,11 @@ template bool separatedBetween(double, const Separation&, double, const Separati
                                const Vector3d&, double);
 template bool separatedBetween(double, const Separation&, double, const Separation&,
                                const RelativeMotion<ImpactQuery::Kind::EdgeEdge>&, const Vector3d&,
+                               double);
+
+template bool separatedByPlane(double, double,
+                               const RelativeMotion<ImpactQuery::Kind::VertexTriangle>&, double);
+template bool separatedByPlane(double, double, const RelativeMotion<ImpactQuery::Kind::EdgeEdge>&,
                                double);
 
 }  // namespace palpate

@@ -62,6 +62,19 @@ struct RelativeMotion {
   }
 };
 
+/// The largest magnitudes over the step.
+inline Eigen::Vector3d largestOf(const std::array<Eigen::Vector3d, 2>& ends) {
+  return ends[0].cwiseAbs().cwiseMax(ends[1].cwiseAbs());
+}
+
+/// The permanent of the largest magnitudes: no term of det(A, B, C) exceeds one of its six.
+template <ImpactQuery::Kind kind>
+double permanent(const RelativeMotion<kind>& motion) {
+  const Eigen::Vector3d p = largestOf(motion.a), q = largestOf(motion.b), r = largestOf(motion.c);
+  return r[0] * (p[1] * q[2] + p[2] * q[1]) + r[1] * (p[2] * q[0] + p[0] * q[2]) +
+         r[2] * (p[0] * q[1] + p[1] * q[0]);
+}
+
 inline Eigen::Vector3d at(double t, const std::array<Eigen::Vector3d, 2>& ends) {
   return (1.0 - t) * ends[0] + t * ends[1];
 }
@@ -88,5 +101,10 @@ Interval separatedAround(double t, const RelativeMotion<kind>&, const Eigen::Vec
 template <ImpactQuery::Kind kind>
 bool separatedBetween(double t0, const Separation&, double t1, const Separation&,
                       const RelativeMotion<kind>&, const Eigen::Vector3d& largest, double distance);
+
+/// The plane of A and B, through the one feature or along both, certainly stays further than
+/// `distance` from C, which the other goes through.
+template <ImpactQuery::Kind kind>
+bool separatedByPlane(double t0, double t1, const RelativeMotion<kind>&, double distance);
 
 }  // namespace palpate

@@ -68,6 +68,10 @@ constexpr double kCrossError = 32 * 0x1p-53;
 /// from the difference, 3 u from the dot product, 4 u from interpolating in time, and the same
 /// again for what it is compared with.
 constexpr double kAlongError = 16 * 0x1p-53;
+/// Of det(A, B, C) between two times, relative to the permanent, and of A x B, relative to the
+/// product of their largest lengths: 4 u for each factor at a time, and at most 16 u as for
+/// kCoplanarityError.
+constexpr double kPlaneError = 32 * 0x1p-53;
 /// Below this a direction's length loses precision to underflow.
 constexpr double kShortestDirection = 0x1p-500;
 /// Of the step: brackets of roots start this wide to either side.
@@ -87,6 +91,10 @@ constexpr double kQuotientError = 0x1p-50;
 constexpr double kApproachSlack = 0x1p-36;
 /// The same as promised: with what the distance computed there is off by, under 2^-45.
 constexpr double kApproachError = 0x1p-35;
+/// Of the step: findApproach() asks whether the features are near, and reports, where it cannot go
+/// on for longer than this or the tolerance. Any value keeps its promises; smaller ones take more
+/// steps within what it may report.
+constexpr double kShortStretch = 0x1p-20;
 /// Of the step: Newton's iteration of a root ends with steps this short; two units in the last
 /// place of a time.
 constexpr double kRootStep = 0x1p-53;
