@@ -146,7 +146,7 @@ void CubicTime::bracket(double lower, double upper) {
   b[1] /= 3.0;
   b[2] /= 3.0;
   const double t = approximateRoot(b, lower, std::max(lower, upper), m_rising);
-  for (const double width : {kNarrowestBracket, 0x1p-42, 0x1p-32}) {
+  for (double width = kNarrowestBracket; width <= kWidestBracket; width *= 0x1p9) {
     const double low = std::max(t - width, 0.0), high = std::min(t + width, 1.0);
     if (compare(low) >= 0 && compare(high) <= 0) {
       m_low = low;

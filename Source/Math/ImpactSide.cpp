@@ -49,7 +49,7 @@ int side(const ImpactQuery& query, double time) {
     for (Eigen::Vector3d& end : *ends) end /= largest;
   }
   // Ever further back, until rounding cannot hide the side.
-  for (double back = 0x1p-44;; back *= 0x1p8) {
+  for (double back = kFirstStepBack;; back *= 0x1p8) {
     const double t = std::max(time - back, 0.0);
     const double volume = at(t, motion.a).cross(at(t, motion.b)).dot(at(t, motion.c));
     if (volume > kSideError) return 1;

@@ -24,7 +24,8 @@ bool fitExpansions(std::initializer_list<const Eigen::Vector3d*> positions) {
   for (const Eigen::Vector3d* position : positions) {
     for (const double value : *position) {
       const double magnitude = std::abs(value);
-      if (magnitude > 0x1p300 || (magnitude < 0x1p-300 && value != 0)) return false;
+      if (magnitude > kLargestExpanded || (magnitude < kSmallestExpanded && value != 0))
+        return false;
     }
   }
   return true;
@@ -92,7 +93,8 @@ int volumeSign(const FixedGrid<4>& grid) {
 int volumeSignWithTwoDoubles(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                              const Eigen::Vector3d& c, const Eigen::Vector3d& d) {
   const auto [value, error] = volume<WithTwoDoubles>(a, b, c, d);
-  const double bound = 0x1p-98 * (b - a).lpNorm<1>() * (c - a).lpNorm<1>() * (d - a).lpNorm<1>();
+  const double bound =
+      kTwoDoublesError * (b - a).lpNorm<1>() * (c - a).lpNorm<1>() * (d - a).lpNorm<1>();
   return std::abs(value + error) > bound ? compare(value + error, 0) : 0;
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "Math/Tolerances.h"
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
@@ -39,16 +41,16 @@ class OrientedPlane {
   /// The filter: with e = 2^-53 each of the six products of three differences takes at most eight
   /// roundings (three differences, two products, three sums), so the error is at most
   /// ((1 + e)^8 - 1) P, P the sum of their exact magnitudes; the computed P is at least (1 - e)^8
-  /// of that, so 10 e P covers both and its own rounding. An inner product that underflows errs by
-  /// at most 2^-1075 more and is then multiplied by a component of d - a; six of those, three outer
-  /// products and the roundings after them stay under 2^-1000 (1 + |d - a|₁). What overflows makes
-  /// the bound infinite or NaN, and neither comparison is then true.
+  /// of that, so kVolumeError P covers both and its own rounding. An inner product that underflows
+  /// errs by at most 2^-1075 more and is then multiplied by a component of d - a; six of those,
+  /// three outer products and the roundings after them stay under 2^-1000 (1 + |d - a|₁). What
+  /// overflows makes the bound infinite or NaN, and neither comparison is then true.
   int side(const Eigen::Vector3d& d, SignCounts& counts) const {
     const Eigen::Array3d w = d - m_a;
     const Eigen::Array3d wMagnitude = w.abs();
     const double determinant = (m_normal * w).sum();
     const double bound =
-        0x1.4p-50 * (m_magnitude * wMagnitude).sum() + 0x1p-1000 * (1 + wMagnitude.sum());
+        kVolumeError * (m_magnitude * wMagnitude).sum() + kUnderflowGuard * (1 + wMagnitude.sum());
     if (determinant > bound) return 1;
     if (determinant < -bound) return -1;
     return orient3dExactly(m_a, m_b, m_c, d, counts);
@@ -73,7 +75,7 @@ inline int orient2d(int axis, const Eigen::Vector3d& a, const Eigen::Vector3d& b
   const int x = axis == 2 ? 0 : axis + 1, y = axis == 0 ? 2 : axis - 1;
   const double forward = (b[x] - a[x]) * (c[y] - a[y]), backward = (b[y] - a[y]) * (c[x] - a[x]);
   const double determinant = forward - backward;
-  const double bound = 0x1.8p-51 * (std::abs(forward) + std::abs(backward)) + 0x1p-1000;
+  const double bound = kAreaError * (std::abs(forward) + std::abs(backward)) + kUnderflowGuard;
   if (determinant > bound) return 1;
   if (determinant < -bound) return -1;
   return orient2dExactly(axis, a, b, c, counts);

@@ -48,6 +48,22 @@ constexpr double kNarrowAngleSquare = 0x1p-16;
 /// Squared sine below which the compensated Newton step is left to integers.
 constexpr double kSliverAngleSquare = 0x1p-40;
 
+// ---- Volumes and areas (Predicates.h, which has the derivations) ----
+
+/// Of (b - a) x (c - a) . (d - a), relative to the sum of its six products' magnitudes: 8 u and the
+/// sum's own rounding.
+constexpr double kVolumeError = 10 * 0x1p-53;
+/// Of one component of (b - a) x (c - a), relative to the sum of its products' magnitudes: 4 u and
+/// the sum's own rounding.
+constexpr double kAreaError = 6 * 0x1p-53;
+/// Of the volume in sums of two doubles, relative to the product of the three differences' 1-norms:
+/// 75 u^2, and above that the norms' own rounding.
+constexpr double kTwoDoublesError = 0x1p-98;
+/// L. Coordinates between these, and zero, have products of three differences whose expansions are
+/// exact; others are left to integers.
+constexpr double kSmallestExpanded = 0x1p-300;
+constexpr double kLargestExpanded = 0x1p300;
+
 // ---- Impacts (RelativeMotion.cpp, FindTouch.cpp, FindApproach.cpp, ImpactFilter.cpp) ----
 
 /// L. Bounds hold for coordinate differences up to this: no product overflows, and all that
@@ -76,6 +92,8 @@ constexpr double kPlaneError = 32 * 0x1p-53;
 constexpr double kShortestDirection = 0x1p-500;
 /// Of the step: brackets of roots start this wide to either side.
 constexpr double kNarrowestBracket = 0x1p-50;
+/// Of the step: and at most this wide; a root that is not inside is bisected for.
+constexpr double kWidestBracket = 0x1p-32;
 /// Of the step: the smallest tolerance that is kept.
 constexpr double kSmallestTimeTolerance = 0x1p-50;
 /// Of a coordinate of a moving corner less the distance, relative to both: the difference of two
@@ -103,6 +121,9 @@ constexpr double kRootStep = 0x1p-53;
 constexpr double kFormError = 0x1p-46;
 /// Of det(A, B, C) with components up to 1 (sideBefore()): six terms of 12 u, twice.
 constexpr double kSideError = 0x1p-46;
+/// Of the step: how far before an impact sideBefore() looks first; where that is too near to tell,
+/// ever further, so any value will do.
+constexpr double kFirstStepBack = 0x1p-44;
 
 // ---- Motion bounds (Motion.cpp, MotionBound.cpp) ----
 

@@ -97,6 +97,25 @@ TEST(Predicates, NoUnderflowTurnsAnArea) {
   }
 }
 
+/// Where products round to multiples of the least double, of differences that were rounded
+/// themselves: the relative error alone says too little.
+TEST(Predicates, NoUnderflowTurnsAnAreaOfRoundedDifferences) {
+  Random random(7);
+  SignCounts counts;
+  const auto uneven = [&] {
+    Eigen::Vector3d p = random.inCube();
+    for (double& x : p) x = std::ldexp(x, -random.below(8));
+    return p;
+  };
+  for (int exponent = -516; exponent <= -506; ++exponent) {
+    for (int repeat = 0; repeat < 6000; ++repeat) {
+      const Eigen::Vector3d a = scaled(uneven(), exponent), b = scaled(uneven(), exponent);
+      const Eigen::Vector3d c = a + random.unit() * (b - a);
+      ASSERT_EQ(orient2d(repeat % 3, a, b, c, counts), areaSign(repeat % 3, a, b, c)) << exponent;
+    }
+  }
+}
+
 TEST(Predicates, SwappingTwoPositionsTurnsTheSign) {
   Random random(3);
   SignCounts counts;
