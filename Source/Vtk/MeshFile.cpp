@@ -2,7 +2,10 @@
 
 #include <palpate/Error.h>
 
+#include "Vtk/FileText.h"
+
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <limits>
 #include <new>
@@ -10,16 +13,33 @@
 
 namespace palpate::vtk {
 
-void Polygons::addPolygon(const std::vector<std::int64_t>& polygon) {
+void Polygons::addPositions(const std::vector<double>& coordinates) {
+  for (std::size_t i = 0; i + 2 < coordinates.size(); i += 3)
+    positions.emplace_back(coordinates[i], coordinates[i + 1], coordinates[i + 2]);
+}
+
+void Polygons::addPolygon(std::span<const double> polygon) {
   corners.insert(corners.end(), polygon.begin(), polygon.end());
   ends.push_back(corners.size());
 }
 
-void Polygons::addStrip(const std::vector<std::int64_t>& strip) {
+void Polygons::addStrip(std::span<const double> strip) {
   if (strip.size() < 3) throw FileFault{"a triangle strip has fewer than three corners"};
   for (std::size_t i = 0; i + 2 < strip.size(); ++i) {
     const std::size_t odd = i % 2;  // every second triangle of a strip is wound the other way
-    addPolygon({strip[i + odd], strip[i + 1 - odd], strip[i + 2]});
+    addPolygon(std::array{strip[i + odd], strip[i + 1 - odd], strip[i + 2]});
+  }
+}
+
+void Polygons::addCells(const std::vector<double>& offsets, std::span<const double> all,
+                        bool strips) {
+  for (std::size_t i = 0; i + 1 < offsets.size(); ++i) {
+    if (!isCount(offsets[i], all.size()) || !isCount(offsets[i + 1] - offsets[i], all.size()) ||
+        !isCount(offsets[i + 1], all.size()))
+      throw FileFault{"the offsets of its cells are not ascending or run past their corners"};
+    const auto cell = all.subspan(static_cast<std::size_t>(offsets[i]),
+                                  static_cast<std::size_t>(offsets[i + 1] - offsets[i]));
+    strips ? addStrip(cell) : addPolygon(cell);
   }
 }
 
@@ -52,12 +72,10 @@ Polygons polygonsOf(const std::filesystem::path& path) {
 void checkPositions(const std::vector<Eigen::Vector3d>& positions) {
   if (positions.size() > std::numeric_limits<std::uint32_t>::max())
     throw FileFault{"it has too many vertices"};
-  for (std::size_t v = 0; v < positions.size(); ++v) {
-    if (!positions[v].allFinite()) {
+  for (std::size_t v = 0; v < positions.size(); ++v)
+    if (!positions[v].allFinite())
       throw FileFault{"vertex " + std::to_string(v) +
                       " (from 0) has a coordinate that is not finite"};
-    }
-  }
 }
 
 std::vector<Triangle> fans(const Polygons& polygons) {
@@ -69,11 +87,9 @@ std::vector<Triangle> fans(const Polygons& polygons) {
     if (end - begin < 3)
       throw FileFault{"polygon " + std::to_string(p) + " (from 0) has fewer than three corners"};
     for (std::size_t i = begin; i < end; ++i) {
-      const std::int64_t corner = polygons.corners[i];
-      if (corner < 0 || static_cast<std::uint64_t>(corner) >= count) {
+      if (count == 0 || !isCount(polygons.corners[i], count - 1))
         throw FileFault{"polygon " + std::to_string(p) +
                         " (from 0) names a vertex that is not among its " + std::to_string(count)};
-      }
     }
     const auto corner = [&](std::size_t i) {
       return static_cast<std::uint32_t>(polygons.corners[i]);

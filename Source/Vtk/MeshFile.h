@@ -2,7 +2,7 @@
 
 #include <palpate/vtk/MeshFile.h>
 
-#include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -16,10 +16,14 @@ struct FileFault {
 /// What the formats have in common. Corners as the file gives them: not yet checked.
 struct Polygons {
   std::vector<Eigen::Vector3d> positions;
-  std::vector<std::int64_t> corners;
+  std::vector<double> corners;
   std::vector<std::size_t> ends;  ///< polygon i's corners end before corners[ends[i]]
-  void addPolygon(const std::vector<std::int64_t>& polygon);
-  void addStrip(const std::vector<std::int64_t>& strip);
+
+  void addPositions(const std::vector<double>& coordinates);
+  void addPolygon(std::span<const double> polygon);
+  void addStrip(std::span<const double> strip);
+  /// Cell i: corners [offsets[i], offsets[i + 1]) of `all`.
+  void addCells(const std::vector<double>& offsets, std::span<const double> all, bool strips);
 };
 
 // One function for each format, from the file's content; FileFault if it is not what it should be.

@@ -7,25 +7,24 @@ namespace palpate::vtk {
 
 namespace {
 
+const NumberType kAny = typeNamed("double");  ///< of no account in a text
+
 /// "7", "7/1", "7//2" or "7/1/2", from 1, or negative: back from the newest vertex.
-std::int64_t vertexOf(std::string_view corner, std::size_t vertexCount) {
+double vertexOf(std::string_view corner, std::size_t vertexCount) {
   FileText text(corner.substr(0, corner.find('/')));
-  const std::int64_t index = text.integer(NumberType::Int64, Encoding::Ascii);
-  if (index < 0) return static_cast<std::int64_t>(vertexCount) + index;
-  return index - 1;
+  const std::int64_t index = text.integer(kAny);
+  return static_cast<double>(index < 0 ? static_cast<std::int64_t>(vertexCount) + index
+                                       : index - 1);
 }
 
 void readStatement(std::string_view line, Polygons& polygons) {
   FileText text(line.substr(0, line.find('#')));
   const std::string_view keyword = text.word();
   if (keyword == "v") {
-    Eigen::Vector3d& position = polygons.positions.emplace_back();
-    for (double& coordinate : position)
-      coordinate = text.number(NumberType::Float64, Encoding::Ascii);
+    for (double& x : polygons.positions.emplace_back()) x = text.number(kAny);
   } else if (keyword == "f") {
-    for (std::string_view corner = text.word(); !corner.empty(); corner = text.word()) {
+    for (std::string_view corner = text.word(); !corner.empty(); corner = text.word())
       polygons.corners.push_back(vertexOf(corner, polygons.positions.size()));
-    }
     polygons.ends.push_back(polygons.corners.size());
   }
 }
@@ -35,10 +34,10 @@ void readStatement(std::string_view line, Polygons& polygons) {
 Polygons readObj(std::string_view content) {
   Polygons polygons;
   FileText text(content);
-  for (std::size_t number = 1; !text.atEnd(); ++number) {
+  for (std::size_t number = 1; text.left() > 0; ++number) {
     std::string statement(text.line());
     const std::size_t first = number;
-    while (statement.ends_with('\\') && !text.atEnd()) {
+    while (statement.ends_with('\\') && text.left() > 0) {
       statement.back() = ' ';
       statement += text.line();
       ++number;

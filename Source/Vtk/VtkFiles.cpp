@@ -1,12 +1,15 @@
 #include "Vtk/FileText.h"
 #include "Vtk/MeshFile.h"
 
+#include <vtkBase64Utilities.h>
 #include <vtkCallbackCommand.h>
 #include <vtkDataCompressor.h>
 #include <vtkExecutive.h>
 #include <vtkLZ4DataCompressor.h>
 #include <vtkLZMADataCompressor.h>
+#include <vtkMergePoints.h>
 #include <vtkNew.h>
+#include <vtkPoints.h>
 #include <vtkPolyData.h>
 #include <vtkSTLReader.h>
 #include <vtkSmartPointer.h>
@@ -16,8 +19,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <numeric>
+#include <cctype>
 #include <sstream>
 
 namespace palpate::vtk {
@@ -64,42 +66,31 @@ void checkBinaryStlLength(std::string_view content) {
   const bool text =
       content.starts_with("solid") && content.substr(0, 1024).find("facet") != content.npos;
   if (text || content.size() < kHeader + 4) return;
-  FileText facetList(content.substr(kHeader));
-  const auto facets = facetList.integer(NumberType::UInt32, Encoding::LittleEndian);
-  if (facetList.left() / kFacet < static_cast<std::uint64_t>(facets))
-    throw FileFault{"it ends too early"};
+  FileText facetList(content.substr(kHeader), Encoding::LittleEndian);
+  const double facets = facetList.number(typeNamed("UInt32"));
+  if (static_cast<double>(facetList.left() / kFacet) < facets) throw FileFault{"it ends too early"};
 }
 
-/// Vertices at equal positions become the first of them.
-void mergeVertices(Polygons& polygons) {
-  const std::vector<Eigen::Vector3d> all = std::move(polygons.positions);
-  std::vector<std::size_t> order(all.size());
-  std::iota(order.begin(), order.end(), 0);
-  const auto before = [&](std::size_t l, std::size_t r) {
-    return std::lexicographical_compare(all[l].begin(), all[l].end(), all[r].begin(), all[r].end());
-  };
-  std::stable_sort(order.begin(), order.end(), before);
-  std::vector<std::size_t> first(all.size());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const bool same = i > 0 && !before(order[i - 1], order[i]);
-    first[order[i]] = same ? first[order[i - 1]] : order[i];
+/// Up to what is none; padding ends a group, not the text.
+std::string fromBase64(std::string_view text) {
+  std::string bytes, group;
+  for (const char c : text) {
+    if (std::isspace(static_cast<unsigned char>(c))) continue;
+    if ((group += c).size() < 4) continue;
+    std::array<unsigned char, 3> decoded;
+    const int count = vtkBase64Utilities::DecodeTriplet(group[0], group[1], group[2], group[3],
+                                                        &decoded[0], &decoded[1], &decoded[2]);
+    const std::size_t padding = group.find('=');  // VTK takes it anywhere
+    if (count == 0 || padding < 2 || group.find_first_not_of('=', padding) != group.npos) break;
+    bytes.append(decoded.begin(), decoded.begin() + count);
+    group.clear();
   }
-  std::vector<std::int64_t> merged(all.size());
-  polygons.positions.clear();
-  for (std::size_t v = 0; v < all.size(); ++v) {
-    if (first[v] == v) {
-      merged[v] = static_cast<std::int64_t>(polygons.positions.size());
-      polygons.positions.push_back(all[v]);
-    } else {
-      merged[v] = merged[first[v]];
-    }
-  }
-  for (std::int64_t& corner : polygons.corners) corner = merged[static_cast<std::size_t>(corner)];
+  return bytes;
 }
 
-/// The arrays of a VTP file, whose XML VTK parses and whose blocks VTK uncompresses. VTK's own
-/// reader of it prints past its observers, and allocates and copies what a damaged file's sizes
-/// say.
+/// The arrays of a VTP file, whose XML VTK parses and whose blocks VTK uncompresses. VTK 9.1's own
+/// reader of it prints past its observers, divides by a damaged header's zero, and allocates and
+/// copies what its sizes say.
 class VtpReader {
  public:
   explicit VtpReader(std::string_view content) : m_content(content) {
@@ -114,10 +105,8 @@ class VtpReader {
     m_complaints.throwIfAny();
     m_root = m_parser->GetRootElement();
     if (parsed == 0 || m_root == nullptr) throw FileFault{"it is no XML file"};
-    m_encoding = attribute(m_root, "byte_order") == "BigEndian" ? Encoding::BigEndian
-                                                                : Encoding::LittleEndian;
-    m_headerType =
-        attribute(m_root, "header_type") == "UInt64" ? NumberType::UInt64 : NumberType::UInt32;
+    if (attribute(m_root, "byte_order") == "BigEndian") m_encoding = Encoding::BigEndian;
+    if (attribute(m_root, "header_type") == "UInt64") m_headerType = typeNamed("UInt64");
     makeCompressor(attribute(m_root, "compressor"));
     if (appended != content.npos) takeAppendedData(content.substr(appended));
   }
@@ -157,92 +146,62 @@ class VtpReader {
     m_appended = element.substr(start + 1);
   }
 
-  /// At most what a file of this length can hold: compression makes a number a thousandth of a
-  /// byte, hardly less.
+  /// What a file of this length can hold: compression makes a number a thousandth of a byte, hardly
+  /// less.
+  std::size_t mostNumbers() const { return 1000 * m_content.size(); }
+
   std::size_t count(vtkXMLDataElement* piece, const char* name) const {
     const std::string text = attribute(piece, name);
-    const double value = text.empty() ? 0.0 : toNumber(text);
-    if (!(value >= 0) || value > 1e3 * static_cast<double>(m_content.size())) {
-      throw FileFault{"it is shorter than its own counts say"};
-    }
-    return static_cast<std::size_t>(value);
+    return text.empty() ? 0 : FileText(text).count(mostNumbers());
   }
 
   void readPiece(vtkXMLDataElement* piece) {
-    const auto first = static_cast<std::int64_t>(m_polygons.positions.size());
-    const std::size_t points = count(piece, "NumberOfPoints");
-    if (points > 0) {
-      const std::vector<double> numbers = readArray(arrayOf(piece, "Points", ""), 3 * points);
-      for (std::size_t i = 0; i < points; ++i) {
-        m_polygons.positions.emplace_back(numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]);
-      }
-    }
-    readCells(piece, "Polys", "NumberOfPolys", first,
-              [this](const std::vector<std::int64_t>& cell) { m_polygons.addPolygon(cell); });
-    readCells(piece, "Strips", "NumberOfStrips", first,
-              [this](const std::vector<std::int64_t>& cell) { m_polygons.addStrip(cell); });
+    const std::size_t first = m_polygons.positions.size(), points = count(piece, "NumberOfPoints");
+    if (points > 0) m_polygons.addPositions(readArray(piece, "Points", "", 3 * points));
+    readCells(piece, "Polys", count(piece, "NumberOfPolys"), first, false);
+    readCells(piece, "Strips", count(piece, "NumberOfStrips"), first, true);
+  }
+
+  void readCells(vtkXMLDataElement* piece, const char* group, std::size_t cells, std::size_t first,
+                 bool strips) {
+    if (cells == 0) return;
+    std::vector<double> offsets = readArray(piece, group, "offsets", cells);
+    offsets.insert(offsets.begin(), 0.0);
+    if (!isCount(offsets.back(), mostNumbers()))
+      throw FileFault{"the offsets of its cells are not ascending or run past their corners"};
+    std::vector<double> corners =
+        readArray(piece, group, "connectivity", static_cast<std::size_t>(offsets.back()));
+    for (double& corner : corners)  // one below the piece's own stays wrong
+      corner = corner < 0 ? -1 : corner + static_cast<double>(first);
+    m_polygons.addCells(offsets, corners, strips);
   }
 
   /// The array of that name in a group of the piece; the first one if the name is empty.
-  static vtkXMLDataElement* arrayOf(vtkXMLDataElement* piece, const char* group,
-                                    std::string_view name) {
+  std::vector<double> readArray(vtkXMLDataElement* piece, const char* group, std::string_view name,
+                                std::size_t size) {
     if (vtkXMLDataElement* parent = piece->FindNestedElementWithName(group)) {
       for (int i = 0; i < parent->GetNumberOfNestedElements(); ++i) {
         vtkXMLDataElement* array = parent->GetNestedElement(i);
-        if (name.empty() || attribute(array, "Name") == name) return array;
+        if (name.empty() || attribute(array, "Name") == name) return numbersOf(array, size);
       }
     }
     throw FileFault{"it lacks an array of its " + std::string(group)};
   }
 
-  template <class Add>
-  void readCells(vtkXMLDataElement* piece, const char* group, const char* countName,
-                 std::int64_t first, Add&& add) {
-    const std::size_t cells = count(piece, countName);
-    if (cells == 0) return;
-    const std::vector<double> ends = readArray(arrayOf(piece, group, "offsets"), cells);
-    for (std::size_t i = 0; i < cells; ++i) {
-      const bool ascending = ends[i] >= (i == 0 ? 0.0 : ends[i - 1]);  // false for NaN
-      if (!ascending || ends[i] > 1e3 * static_cast<double>(m_content.size())) {
-        throw FileFault{"the offsets of its cells are not ascending or run past their corners"};
-      }
-    }
-    const auto corners =
-        readArray(arrayOf(piece, group, "connectivity"), static_cast<std::size_t>(ends.back()));
-    std::size_t begin = 0;
-    for (const double end : ends) {
-      std::vector<std::int64_t> cell;
-      for (; begin < static_cast<std::size_t>(end); ++begin) {
-        cell.push_back(std::abs(corners[begin]) < 0x1p53
-                           ? first + static_cast<std::int64_t>(corners[begin])
-                           : -1);
-      }
-      add(cell);
-    }
-  }
-
-  std::vector<double> readArray(vtkXMLDataElement* array, std::size_t size) {
+  std::vector<double> numbersOf(vtkXMLDataElement* array, std::size_t size) {
     const NumberType type = typeNamed(attribute(array, "type"));
     const std::string format = attribute(array, "format");
-    std::string data;
-    Encoding encoding = m_encoding;
+    if (format != "appended" && format != "binary")
+      return FileText(textOf(array)).numbers(type, size);
+    std::string block;
     if (format == "appended") {
-      const double offset = toNumber(attribute(array, "offset"));
-      if (!(offset >= 0) || offset > static_cast<double>(m_appended.size()))
-        throw FileFault{"it ends too early"};
-      const std::string_view start = m_appended.substr(static_cast<std::size_t>(offset));
-      data =
-          uncompressed(m_appendedRaw ? std::string(start) : fromBase64(start), size * sizeOf(type));
-    } else if (format == "binary") {
-      data = uncompressed(fromBase64(textOf(array)), size * sizeOf(type));
+      const std::string offset = attribute(array, "offset");
+      const std::string_view start = m_appended.substr(FileText(offset).count(m_appended.size()));
+      block = m_appendedRaw ? std::string(start) : fromBase64(start);
     } else {
-      data = textOf(array);
-      encoding = Encoding::Ascii;
+      block = fromBase64(textOf(array));
     }
-    FileText text(data);
-    std::vector<double> numbers;
-    for (std::size_t i = 0; i < size; ++i) numbers.push_back(text.number(type, encoding));
-    return numbers;
+    return FileText(uncompressed(block, size * type.size), m_encoding).numbers(type, size);
   }
 
   /// What stands between an element's start and the next tag.
@@ -255,56 +214,43 @@ class VtpReader {
     return rest.substr(tag + 1, rest.find('<', tag) - tag - 1);
   }
 
-  static NumberType typeNamed(const std::string& name) {
-    constexpr std::array<std::string_view, 10> kNames{"Int8",    "UInt8",  "Int16", "UInt16",
-                                                      "Int32",   "UInt32", "Int64", "UInt64",
-                                                      "Float32", "Float64"};
-    const auto found = std::find(kNames.begin(), kNames.end(), name);
-    if (found == kNames.end()) throw FileFault{"one of its arrays has an unknown type of number"};
-    return static_cast<NumberType>(found - kNames.begin());
-  }
-
   /// A block's bytes behind its header: its length; or the number of compressed blocks, their
   /// length and the last one's (0: as the others) before compression, and the lengths after it.
-  std::string uncompressed(std::string_view block, std::size_t expected) {
-    FileText text(block);
-    const auto length = [&] {
-      return static_cast<std::size_t>(text.integer(m_headerType, m_encoding));
-    };
-    if (m_compressor == nullptr) {
-      const std::size_t size = length();
-      return std::string(text.take(size));
-    }
-    const std::size_t blocks = length(), whole = length(), last = length();
-    if (blocks > text.left()) throw FileFault{"it ends too early"};
-    std::vector<std::size_t> lengths(blocks);
-    for (std::size_t& one : lengths) one = length();
-    std::string result;
+  std::string_view uncompressed(std::string_view block, std::size_t expected) {
+    FileText text(block, m_encoding);
+    if (m_compressor == nullptr) return text.take(length(text));
+    const std::size_t blocks = length(text), whole = length(text), last = length(text);
+    const std::vector<double> lengths = text.numbers(m_headerType, blocks);
+    m_uncompressed.clear();
     for (std::size_t i = 0; i < blocks; ++i) {
       const std::size_t size = i + 1 == blocks && last > 0 ? last : whole;
-      const std::string_view compressed = text.take(lengths[i]);
-      // All that is expected and nothing more.
-      if (size > expected - result.size())
+      const std::size_t start = m_uncompressed.size();
+      if (size > expected - start || !isCount(lengths[i], text.left()))  // nothing beyond
         throw FileFault{"one of its compressed blocks has a wrong size"};
-      const std::size_t start = result.size();
-      result.resize(start + size);
+      const std::string_view compressed = text.take(static_cast<std::size_t>(lengths[i]));
+      m_uncompressed.resize(start + size);
       const std::size_t got = m_compressor->Uncompress(
           reinterpret_cast<const unsigned char*>(compressed.data()), compressed.size(),
-          reinterpret_cast<unsigned char*>(result.data() + start), size);
+          reinterpret_cast<unsigned char*>(m_uncompressed.data() + start), size);
       m_complaints.throwIfAny();
       if (got != size) throw FileFault{"one of its compressed blocks is damaged"};
     }
-    return result;
+    return m_uncompressed;
+  }
+
+  std::size_t length(FileText& text) const {
+    return static_cast<std::size_t>(text.integer(m_headerType));
   }
 
   std::string_view m_content, m_appended;
   bool m_appendedRaw = false;
+  std::string m_uncompressed;
   Complaints m_complaints;
   vtkNew<vtkXMLDataParser> m_parser;
   vtkXMLDataElement* m_root = nullptr;
   vtkSmartPointer<vtkDataCompressor> m_compressor;
   Encoding m_encoding = Encoding::LittleEndian;
-  NumberType m_headerType = NumberType::UInt32;
+  NumberType m_headerType = typeNamed("UInt32");
   Polygons m_polygons;
 };
 
@@ -321,17 +267,22 @@ Polygons readStl(std::string_view content, const std::string& path) {
   reader->Update();
   complaints.throwIfAny();
 
-  Polygons polygons;
   vtkPolyData* data = reader->GetOutput();
-  polygons.positions.resize(static_cast<std::size_t>(data->GetNumberOfPoints()));
-  for (std::size_t v = 0; v < polygons.positions.size(); ++v) {
-    data->GetPoint(static_cast<vtkIdType>(v), polygons.positions[v].data());
-    if (!polygons.positions[v].allFinite())
-      return polygons;  // refused later; it has no place in an order
+  std::vector<Eigen::Vector3d> corners;
+  for (vtkIdType i = 0; i < data->GetNumberOfPoints(); ++i) {
+    corners.emplace_back(data->GetPoint(i));
+    if (!corners.back().allFinite()) return {corners, {}, {}};  // refused later
   }
-  for (std::int64_t v = 0; v + 2 < data->GetNumberOfPoints(); v += 3)
-    polygons.addPolygon({v, v + 1, v + 2});
-  mergeVertices(polygons);
+  Polygons polygons;
+  vtkNew<vtkPoints> points;
+  vtkNew<vtkMergePoints> merged;
+  merged->InitPointInsertion(points, data->GetBounds(), data->GetNumberOfPoints());
+  for (const Eigen::Vector3d& corner : corners) {
+    vtkIdType vertex;
+    if (merged->InsertUniquePoint(corner.data(), vertex)) polygons.positions.push_back(corner);
+    polygons.corners.push_back(static_cast<double>(vertex));
+    if (polygons.corners.size() % 3 == 0) polygons.ends.push_back(polygons.corners.size());
+  }
   return polygons;
 }
 
