@@ -52,7 +52,9 @@ scenes::Scene sceneOf(const Options& options) {
 }
 
 double thickness(const scenes::Scene& scene, const Options& options) {
-  return options.thickness.value_or(options.method == Method::Intersection ? 0.0 : scene.thickness);
+  const bool touching =
+      options.method == Method::Intersection || options.method == Method::Continuous;
+  return options.thickness.value_or(touching ? 0.0 : scene.thickness);
 }
 
 /// A scene in a collision detection, moved from frame to frame.
@@ -172,12 +174,13 @@ Options parse(CLI::App& app, int count, char** arguments) {
       ->capture_default_str();
   const std::map<std::string, Method> methods{{"auto", Method::Auto},
                                               {"intersection", Method::Intersection},
-                                              {"proximity", Method::Proximity}};
-  app.add_option("--method", options.method, "auto, intersection or proximity")
+                                              {"proximity", Method::Proximity},
+                                              {"continuous", Method::Continuous}};
+  app.add_option("--method", options.method, "auto, intersection, proximity or continuous")
       ->transform(CLI::CheckedTransformer(methods, CLI::ignore_case));
   app.add_option("--thickness", options.thickness,
                  "distance under which two features touch, in the meshes' unit; a twentieth of the "
-                 "mean edge if absent");
+                 "mean edge if absent, and 0 for intersection and continuous");
   app.failure_message(
       [](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });
   app.parse(count, arguments);

@@ -18,6 +18,11 @@ grep -q "no picture" "$folder/text" || fail "nothing said about the picture"
 "$program" --frames 40 --threads 1 --out "$folder/one" >"$folder/one.text" || fail "the run with one thread"
 [[ $(grep "result hash" "$folder/text") == $(grep "result hash" "$folder/one.text") ]] || fail "threads change the result"
 
+for method in intersection proximity continuous; do
+  "$program" --frames 40 --method $method --out "$folder/$method" >"$folder/text" || fail "the run with $method"
+  awk -F, 'NR > 1 && $10 > 0 { found = 1 } END { exit !found }' "$folder/$method/frames.csv" || fail "no contacts with $method"
+done
+
 # Refused in one line, with a code, and nothing written.
 refused() {
   "$program" --out "$folder/refused" "$@" >"$folder/text" 2>"$folder/messages" && fail "not refused: $*"
