@@ -4,9 +4,12 @@
 #include "Math/TriangleIntersection.h"
 #include "Unit/Math/TrianglePairs.h"
 
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
 
 namespace palpate::test {
 namespace {
@@ -173,6 +176,49 @@ TEST(TriangleIntersection, EachSimpleConfigurationHasItsFeatures) {
   EXPECT_EQ(same.cornersOfAOnB, 0b111);
   EXPECT_EQ(same.cornersOfBOnA, 0b111);
   EXPECT_EQ(same.touchingEdges, 0b111111111);
+}
+
+/// What the comparison with CGAL's exact kernel (Testing/Exact) goes through.
+TEST(TriangleIntersection, EveryKindOfPairIsWhatItsNameSays) {
+  Random random(15);
+  std::array<int, 16> cornersOn{};
+  for (int k = 0; k < kKinds; ++k) {
+    const auto kind = static_cast<Kind>(k);
+    SignCounts counts;
+    bool bySegment = false, byPoint = false, beyondProducts = true;
+    for (int repeat = 0; repeat < 5000; ++repeat) {
+      const auto [a, b] = makePair(kind, random);
+      const TriangleIntersection result = intersectTriangles(a, b, counts);
+      int common = 0;
+      double largest = 0;
+      for (const auto& corner : a) {
+        common += std::count(b.begin(), b.end(), corner) > 0;
+        largest = std::max(largest, corner.cwiseAbs().maxCoeff());
+      }
+      ASSERT_GE(common, kind == Kind::SharedEdge ? 2 : kind == Kind::SharedVertex ? 1 : 0);
+      if (kind == Kind::CoplanarAxis || kind == Kind::CoplanarTilted ||
+          kind == Kind::CoplanarShared) {
+        for (const auto& corner : b)
+          ASSERT_EQ(orient3dExactly(a[0], a[1], a[2], corner, counts), 0);
+        ++cornersOn[4 * std::popcount(result.cornersOfAOnB) + std::popcount(result.cornersOfBOnA)];
+      }
+      for (const Corners* t : {&a, &b}) {
+        const auto& [p, q, r] = *t;
+        const bool segment = (q - p).cross(r - p) == Eigen::Vector3d::Zero();
+        bySegment |= segment && p != q;
+        byPoint |= p == q && q == r;
+      }
+      // Squares of coordinates overflow, or vanish.
+      beyondProducts &= largest == 0 || std::isinf(largest * largest) || largest * largest == 0;
+    }
+    EXPECT_TRUE(bySegment || kind != Kind::Segments);
+    EXPECT_TRUE(byPoint || kind != Kind::Points);
+    const bool extreme = kind == Kind::Huge || kind == Kind::Tiny || kind == Kind::Denormal;
+    EXPECT_EQ(beyondProducts, extreme) << k;
+    EXPECT_TRUE(counts.bigIntegers > 100 || !(extreme || kind == Kind::MixedExponents)) << k;
+  }
+  // In one plane: however many corners of one lie on the other, all and none included.
+  for (int i = 0; i < 16; ++i) EXPECT_GT(cornersOn[i], 10) << i;
 }
 
 TEST(TriangleIntersection, SegmentsAndPointsAreWhatTheyCover) {
