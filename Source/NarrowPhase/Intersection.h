@@ -17,9 +17,10 @@ namespace palpate {
 ///
 /// Self-collision: two triangles with common vertices intersect if a vertex touches the other
 /// triangle and is not a corner of it, if an edge of each touch that have no common vertex, or if
-/// an edge crosses the other triangle's interior. This last alone gives no contact: it is the end
-/// of a fold at the common vertex, and the triangle across that edge reports it. Pairs with common
-/// vertices must be among the candidates.
+/// an edge crosses the other triangle's interior. This last alone gives no contact: no two edges of
+/// one cross the other, and what touches at the common vertex is excluded. A triangle across that
+/// edge gives one, if there is one and it has no vertex in common with the other. Pairs with
+/// common vertices must be among the candidates.
 void findIntersections(const MeshPair&, std::span<const TrianglePair> candidates,
                        ContactBuffers& out);
 

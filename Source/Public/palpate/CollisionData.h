@@ -81,7 +81,8 @@ class PALPATE_EXPORT CollisionData {
     return m_contents.triangleVertex;
   }
   std::span<const EdgeEdgeContact> edgeEdge() const { return m_contents.edgeEdge; }
-  /// Filled by Method::Intersection.
+  /// Filled by Method::Intersection. Each pair has a contact, but for two triangles of one mesh
+  /// with a common vertex that meet only where an edge pierces the other.
   std::span<const TrianglePair> intersectingTriangles() const {
     return m_contents.intersectingTriangles;
   }

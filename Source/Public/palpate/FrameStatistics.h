@@ -22,8 +22,10 @@ struct FrameStatistics {
   std::size_t untestedVertices = 0;  ///< vertices in no triangle: counted, not tested
   std::size_t rebuiltOctrees = 0, refittedOctrees = 0, unchangedOctrees = 0;
   std::size_t candidatePairs = 0;  ///< triangle pairs handed to the narrow phase
-  std::size_t featurePairs = 0;    ///< vertex-triangle and edge-edge pairs that those own
-  std::size_t contacts = 0;        ///< vertex-triangle, triangle-vertex and edge-edge
+  /// vertex-triangle and edge-edge pairs that those own; none for Intersection, which decides each
+  /// triangle pair as a whole
+  std::size_t featurePairs = 0;
+  std::size_t contacts = 0;  ///< vertex-triangle, triangle-vertex and edge-edge
   std::size_t intersectingTriangles = 0;
   /// left undecided by floating point, decided by exact arithmetic
   std::size_t exactDecisions = 0;

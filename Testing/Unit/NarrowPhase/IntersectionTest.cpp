@@ -257,6 +257,22 @@ TEST(SelfIntersection, AnEdgeThroughAFaceAtACommonVertexIsListed) {
   EXPECT_EQ(idsOf(rowsOf(fanned({1, 1, 0}, {1, 1, 2}).vertexTriangle)), (std::vector<Row>{{3, 0}}));
 }
 
+/// By definition: two edges of one must cross the other, or one of each.
+TEST(SelfIntersection, AnEdgeThroughAFaceHasAContactFromATriangleAcrossItThatSharesNoVertex) {
+  const std::vector<Vector3d> positions{{0, 0, 0},  {4, 0, 0}, {0, 4, 0},
+                                        {1, 1, -1}, {1, 1, 2}, {8, 8, 1}};
+  const auto contactsWith = [&](const Triangle& across) {
+    return selfContactsOf(meshOf(positions, {{0, 1, 2}, {0, 3, 4}, across}));
+  };
+  const ContactBuffers apart = contactsWith({4, 3, 5});
+  EXPECT_EQ(apart.intersectingTriangles.size(), 2u);
+  EXPECT_EQ(idsOf(rowsOf(apart.edgeEdge)), (std::vector<Row>{{1, 2, 3, 4}}));
+  EXPECT_TRUE(apart.vertexTriangle.empty());
+  const ContactBuffers sharing = contactsWith({4, 3, 1});
+  EXPECT_EQ(sharing.intersectingTriangles.size(), 2u);
+  EXPECT_TRUE(sharing.vertexTriangle.empty() && sharing.edgeEdge.empty());
+}
+
 TEST(SelfIntersection, TheSameTriangleTwiceSharesEverything) {
   const TriangleMesh mesh =
       meshOf({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {2, 0, 1}, {1, 1, 0}});
