@@ -26,7 +26,7 @@ struct FloatFrame {
 /// conservative.
 constexpr float kLargestFloat = 0x1p120f;
 
-/// Of up to 63 evenly spaced positions: the median of each axis, and the largest distance along an
+/// Of up to 31 evenly spaced positions: the median of each axis, and the largest distance along an
 /// axis between the first and the last eighth; a few vertices far away change neither.
 struct SampledExtent {
   Eigen::Vector3d median = Eigen::Vector3d::Zero();
