@@ -2,6 +2,7 @@
 
 #include "CollisionDetection/Audit.h"
 #include "CollisionDetection/BruteForce.h"
+#include "CollisionDetection/Containment.h"
 #include "CollisionDetection/Frame.h"
 #include "CollisionDetection/GeometryTable.h"
 #include "CollisionDetection/Order.h"
@@ -62,6 +63,7 @@ struct OctreeBasedCD::Implementation {
   GeometryTable geometries;
   PairTable pairs;
   Frame frame;
+  Containment containment;
   FrameStatistics statistics;
   std::optional<LooseOctree> octree;
   std::vector<PairRecord*> work;
@@ -298,6 +300,18 @@ void OctreeBasedCD::forEachCandidateBatch(GeometryId a, GeometryId b, BatchFunct
     return;
   }
   all.frame.forEach(record, all.threads, function, context);
+}
+
+std::span<const InsideVertex> OctreeBasedCD::findInsideVertices(GeometryId vertices,
+                                                                GeometryId body) {
+  Implementation& all = *m_implementation;
+  const Geometry& asked = all.geometries.at(vertices);
+  Geometry& around = all.geometries.at(body);
+  if (vertices == body)
+    throw Error(ErrorCode::InvalidSettings, nameOf(body) + ": its own vertices lie on it", body);
+  checkClosed(around);
+  all.update();
+  return all.containment.find(asked, around, all.settings.engine, all.threads);
 }
 
 const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) const {

@@ -5,6 +5,7 @@
 #include "Core/Buffer.h"
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -40,6 +41,7 @@ struct MeshTopology {
   IndexLists vertexTriangles;        ///< ascending triangle ids, each once
   IndexLists edgeTriangles;          ///< ascending triangle ids, each once
   std::size_t untestedVertices = 0;  ///< in no triangle
+  std::optional<bool> closed;        ///< and consistently oriented; once asked
 
   /// Of an edge, lower vertex first; kNoEdge if there is none such.
   std::uint32_t edgeOf(const Segment& edge) const;

@@ -18,6 +18,15 @@ struct alignas(16) Box {
   std::array<float, 4> lower{kEmptyLower, kEmptyLower, kEmptyLower, 0};
   std::array<float, 4> upper{-kEmptyLower, -kEmptyLower, -kEmptyLower, 0};
 
+  /// From a point of the same frame: 0 within.
+  double distanceSquared(const std::array<double, 3>& point) const {
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double outside = std::max({lower[k] - point[k], point[k] - upper[k], 0.0});
+      sum += outside * outside;
+    }
+    return sum;
+  }
   bool empty() const { return !(lower[0] <= upper[0]); }
   void add(const Box& other) {
     for (int k = 0; k < 3; ++k) {

@@ -18,6 +18,7 @@ enum class ErrorCode {
   UnknownPair,         ///< never added, removed, or asked for in the other order
   DuplicatePair,       ///< added before, in either order
   InvalidSettings,     ///< a setting outside its range
+  NotClosed,           ///< a mesh that has no inside: see findMeshDefects()
   UnsupportedMethod,   ///< this method does not exist yet, or not for these geometries
   TooLarge,            ///< more elements than 32-bit ids can name
   NotAvailable,        ///< the answer was not kept, or no frame has been computed

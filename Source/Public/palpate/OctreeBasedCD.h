@@ -1,6 +1,7 @@
 #pragma once
 
 #include <palpate/Audit.h>
+#include <palpate/ClosedMesh.h>
 #include <palpate/CollisionData.h>
 #include <palpate/CollisionProblem.h>
 #include <palpate/Error.h>
@@ -71,6 +72,16 @@ class PALPATE_EXPORT OctreeBasedCD {
         },
         const_cast<void*>(static_cast<const void*>(std::addressof(f))));
   }
+
+  /// The vertices of one geometry that are inside another, a closed body, also where it is concave
+  /// and where no triangles cross; updates if needed. Ascending vertices.
+  ///
+  /// Inside: the body's winding number about the vertex, decided exactly, is not zero, and the
+  /// vertex does not lie on the surface. The exit is the nearest point of the body's surface; of
+  /// several equally near, on the lowest triangle. Depth and exit as exact as
+  /// vertexTriangleDistance().
+  /// Errors   NotClosed names the first edge at fault; InvalidSettings for one geometry twice.
+  std::span<const InsideVertex> findInsideVertices(GeometryId vertices, GeometryId body);
 
   /// (a, b) in the order in which the pair was added.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;

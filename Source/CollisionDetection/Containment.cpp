@@ -1,0 +1,169 @@
+#include "CollisionDetection/Containment.h"
+
+#include "Math/ClosestPoint.h"
+#include "Math/RayCrossing.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace palpate {
+
+namespace {
+
+constexpr std::size_t kVerticesPerPart = 256;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+/// One body, asked about points.
+class Body {
+ public:
+  Body(const Geometry& geometry, Engine engine, PointQueryStack& stack)
+      : m_geometry(geometry), m_bruteForce(engine == Engine::BruteForce), m_stack(stack) {}
+
+  /// How often the surface winds about p; 0 on the surface.
+  int windingNumber(const Eigen::Vector3d& p) {
+    int number = 0;
+    bool on = false;
+    SignCounts counts;
+    const auto count = [&](std::uint32_t begin, std::uint32_t end) {
+      for (std::uint32_t i = begin; i < end; ++i) {
+        const auto& [a, b, c] = m_geometry.orderedTriangles[i];
+        const auto& now = m_geometry.mesh.now;
+        const RayCrossing crossing = crossRay(p, now[a], now[b], now[c], counts);
+        if (crossing == RayCrossing::OnTriangle)
+          on = true;
+        else
+          number += static_cast<int>(crossing);
+      }
+    };
+    if (m_bruteForce) {
+      count(0, size());
+    } else {
+      Box ray = boxOf(p);
+      ray.upper[0] = kInfinity;
+      forEachOverlapping(m_geometry.octree, ray, m_stack, count);
+    }
+    return on ? 0 : number;
+  }
+
+  /// The nearest point of the surface; of several, on the lowest triangle.
+  InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p) {
+    VertexTriangleDistance best{};
+    best.distance = std::numeric_limits<double>::infinity();
+    std::uint32_t at = 0, id = 0xffffffffu;
+    const auto tryOne = [&](std::uint32_t i) {
+      const auto& [a, b, c] = m_geometry.orderedTriangles[i];
+      const auto& now = m_geometry.mesh.now;
+      const VertexTriangleDistance distance =
+          finiteVertexTriangleDistance(p, now[a], now[b], now[c]);
+      const std::uint32_t own = m_geometry.octree.order()[i];
+      if (distance.distance > best.distance || (distance.distance == best.distance && own > id))
+        return;
+      best = distance;
+      at = i;
+      id = own;
+    };
+    if (m_bruteForce) {
+      for (std::uint32_t i = 0; i < size(); ++i) tryOne(i);
+    } else {
+      const std::array<double, 3> point = inFrame(p);
+      // A little more than the best: distances are rounded, and equal ones are looked for.
+      const auto bound = [&] {
+        const double distance = best.distance * m_geometry.frame.scale;
+        return distance * distance * (1 + 0x1p-40);
+      };
+      tryOne(std::min(m_last, size() - 1));
+      forEachNearest(m_geometry.octree, point, bound(), m_stack,
+                     [&](std::uint32_t begin, std::uint32_t end) {
+                       for (std::uint32_t i = begin; i < end; ++i)
+                         if (m_geometry.octree.boxes()[i].distanceSquared(point) <= bound())
+                           tryOne(i);
+                       return bound();
+                     });
+      m_last = at;
+    }
+    return {vertex,           id,           m_geometry.orderedTriangles[at],
+            best.barycentric, -best.normal, best.distance};
+  }
+
+  bool mayContain(const Eigen::Vector3d& p) const {
+    const Box box = boxOf(p), all = m_geometry.octree.blocks()[0].box(0);
+    for (int k = 0; k < 3; ++k)
+      if (box.upper[k] < all.lower[k] || box.lower[k] > all.upper[k]) return m_bruteForce;
+    return true;
+  }
+
+ private:
+  std::uint32_t size() const {
+    return static_cast<std::uint32_t>(m_geometry.orderedTriangles.size());
+  }
+  /// Clamped as the boxes' corners are: that brings no two points further apart.
+  std::array<double, 3> inFrame(const Eigen::Vector3d& p) const {
+    std::array<double, 3> point;
+    for (int k = 0; k < 3; ++k)
+      point[k] = std::clamp((p[k] - m_geometry.frame.origin[k]) * m_geometry.frame.scale,
+                            -double{kLargestFloat}, double{kLargestFloat});
+    return point;
+  }
+  Box boxOf(const Eigen::Vector3d& p) const {
+    Box box;
+    const std::array<double, 3> point = inFrame(p);
+    for (int k = 0; k < 3; ++k) {
+      box.lower[k] = OutwardRounding::down(static_cast<float>(point[k]));
+      box.upper[k] = OutwardRounding::up(static_cast<float>(point[k]));
+    }
+    return box;
+  }
+
+  const Geometry& m_geometry;
+  bool m_bruteForce;
+  PointQueryStack& m_stack;
+  std::uint32_t m_last = 0;  ///< nearest to the point before: not far from the next, often
+};
+
+}  // namespace
+
+std::span<const InsideVertex> Containment::find(const Geometry& vertices, const Geometry& body,
+                                                Engine engine, const Threads& threads) {
+  m_found.clear();
+  const MeshTopology& topology = vertices.mesh.topology;
+  if (body.octree.size() == 0) return m_found;
+  const std::size_t parts = (topology.vertexCount + kVerticesPerPart - 1) / kVerticesPerPart;
+  if (m_parts.size() < parts) m_parts.resize(parts);
+  threads.forChunks(topology.vertexCount, kVerticesPerPart,
+                    [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+                      Part& part = m_parts[chunk];
+                      part.found.clear();
+                      Body asked(body, engine, part.stack);
+                      for (std::size_t v = begin; v < end; ++v) {
+                        const Eigen::Vector3d& p = vertices.mesh.now[v];
+                        if (topology.vertexTriangles[v].empty() || !asked.mayContain(p) ||
+                            asked.windingNumber(p) == 0)
+                          continue;
+                        const InsideVertex inside = asked.nearest(static_cast<std::uint32_t>(v), p);
+                        if (inside.depth > 0) part.found.push_back(inside);
+                      }
+                    });
+  for (std::size_t i = 0; i < parts; ++i)
+    m_found.insert(m_found.end(), m_parts[i].found.begin(), m_parts[i].found.end());
+  return m_found;
+}
+
+void checkClosed(Geometry& body) {
+  MeshTopology& topology = body.mesh.topology;
+  if (!topology.closed) topology.closed = findMeshDefects(topology.triangles).closed();
+  if (*topology.closed) return;
+  const MeshDefects defects = findMeshDefects(topology.triangles);
+  const auto said = [](const std::vector<Segment>& edges, const char* what) {
+    if (edges.empty()) return std::string();
+    return ", " + std::to_string(edges.size()) + " edges " + what + ", the first of vertices " +
+           std::to_string(edges[0][0]) + " and " + std::to_string(edges[0][1]);
+  };
+  throw Error(ErrorCode::NotClosed,
+              nameOf(body.id) + " has no inside: it is not closed and consistently oriented" +
+                  said(defects.open, "have one triangle only") +
+                  said(defects.flipped, "are run through twice in one direction") +
+                  said(defects.shared, "have three triangles or more"),
+              body.id);
+}
+
+}  // namespace palpate

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <palpate/ClosedMesh.h>
+#include <palpate/Settings.h>
+
+#include "CollisionDetection/GeometryTable.h"
+#include "Core/Threads.h"
+#include "Octree/PointQueries.h"
+
+#include <span>
+#include <vector>
+
+namespace palpate {
+
+/// Which vertices of one geometry are inside another: by the winding number of each, counted
+/// exactly along a ray; then the nearest point of the surface. Scratch that remembers its peak.
+class Containment {
+ public:
+  /// Octrees must be of the positions now. Ascending vertices; the span lives until the next call.
+  std::span<const InsideVertex> find(const Geometry& vertices, const Geometry& body, Engine,
+                                     const Threads&);
+
+ private:
+  struct Part {
+    PointQueryStack stack;
+    std::vector<InsideVertex> found;
+  };
+  std::vector<Part> m_parts;
+  std::vector<InsideVertex> m_found;
+};
+
+/// Throws NotClosed, with the first edge at fault.
+void checkClosed(Geometry& body);
+
+}  // namespace palpate

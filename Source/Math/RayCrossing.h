@@ -1,0 +1,41 @@
+#pragma once
+
+#include "Math/Predicates.h"
+
+#include <cstdint>
+
+namespace palpate {
+
+enum class RayCrossing : std::int8_t {
+  Entering = -1,  ///< from the triangle's front (its winding normal's side) to its back
+  None = 0,
+  Leaving = 1,  ///< from the back to the front
+  OnTriangle    ///< the ray starts on it
+};
+
+/// How the ray from p along +x crosses triangle (a, b, c).
+///
+/// Exact for any finite doubles. The ray is moved aside by (0, e, e²) for a vanishing e > 0, so
+/// that it meets no edge and no corner: over a closed mesh, leaving less entering is the winding
+/// number of p, whatever the ray would have hit. A start on the boundary of a triangle may be told
+/// by another one or by none.
+/// Source   Simulation of simplicity (Edelsbrunner, Mücke, 1990), for the two coordinates of p.
+inline RayCrossing crossRay(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
+                            const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                            SignCounts& counts) {
+  const auto turn = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+    if (const int sign = orient2d(0, from, to, p, counts)) return sign;
+    // (to - from) x (p - from) seen from +x falls with p.y by to.z - from.z and grows with p.z by
+    // to.y - from.y.
+    if (to.z() != from.z()) return to.z() < from.z() ? 1 : -1;
+    return (to.y() > from.y()) - (to.y() < from.y());
+  };
+  const int facing = turn(a, b);
+  if (facing == 0 || turn(b, c) != facing || turn(c, a) != facing) return RayCrossing::None;
+  const int side = orient3d(a, b, c, p, counts);
+  if (side == 0) return RayCrossing::OnTriangle;
+  if (side == facing) return RayCrossing::None;  // it is behind the start
+  return facing > 0 ? RayCrossing::Leaving : RayCrossing::Entering;
+}
+
+}  // namespace palpate
