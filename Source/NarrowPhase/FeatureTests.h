@@ -63,4 +63,15 @@ inline unsigned sameCorners(const Triangle& a, const Triangle& b) {
 }
 inline constexpr auto kSharingTests = sharingTests(kOfA, kOfB);
 
+/// The same tests in plain order: corner i of a with b, corner j of b with a (from bit 3), edge i
+/// with edge j (at bit 6 + 3 i + j).
+inline constexpr TestFeatures kInA = {0,         1,      2,      kTriangle, kTriangle,
+                                      kTriangle, kEdge0, kEdge0, kEdge0,    kEdge1,
+                                      kEdge1,    kEdge1, kEdge2, kEdge2,    kEdge2},
+                              kInB = {kTriangle, kTriangle, kTriangle, 0,      1,
+                                      2,         kEdge0,    kEdge1,    kEdge2, kEdge0,
+                                      kEdge1,    kEdge2,    kEdge0,    kEdge1, kEdge2};
+inline constexpr auto kOwnedInA = ownedTests(kInA), kOwnedInB = ownedTests(kInB);
+inline constexpr auto kSharing = sharingTests(kInA, kInB);
+
 }  // namespace palpate

@@ -1,5 +1,6 @@
 #include "NarrowPhase/Intersection.h"
 
+#include "NarrowPhase/FeatureTests.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
@@ -33,20 +34,30 @@ struct MeshTriangle {
 
 ExcludedFeatures featuresInCommon(const MeshTriangle& a, const MeshTriangle& b) {
   ExcludedFeatures excluded;
+  const unsigned same = sameCorners(a.vertices, b.vertices);
+  if (same == 0) return excluded;
+  const unsigned sharing = kSharing[same];
+  excluded.cornersOfA = sharing & 7;
+  excluded.cornersOfB = sharing >> 3 & 7;
+  excluded.edges = static_cast<std::uint16_t>(sharing >> 6);
   for (int i = 0; i < 3; ++i) {
-    excluded.cornersOfA |= holdsVertex(b.vertices, a.vertices[i]) << i;
-    excluded.cornersOfB |= holdsVertex(a.vertices, b.vertices[i]) << i;
-  }
-  if (excluded.cornersOfA == 0) return excluded;
-  const std::vector<Segment>& edges = a.mesh.topology.edges;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      const bool pointless = a.edge(i) == kNoEdge || b.edge(j) == kNoEdge;
-      excluded.edges |= (pointless || shareVertex(edges[a.edge(i)], edges[b.edge(j)]))
-                        << (3 * i + j);
-    }
+    if (a.edge(i) == kNoEdge) excluded.edges |= 0007 << 3 * i;
+    if (b.edge(i) == kNoEdge) excluded.edges |= 0111 << i;
   }
   return excluded;
+}
+
+/// No branch until the end: which axis tells two boxes apart is as good as random.
+bool boxesMeet(const Corners& a, const Corners& b) {
+  bool meet = true;
+  for (int k = 0; k < 3; ++k) {
+    const double lowerA = std::min(std::min(a[0][k], a[1][k]), a[2][k]),
+                 upperA = std::max(std::max(a[0][k], a[1][k]), a[2][k]),
+                 lowerB = std::min(std::min(b[0][k], b[1][k]), b[2][k]),
+                 upperB = std::max(std::max(b[0][k], b[1][k]), b[2][k]);
+    meet &= (lowerA <= upperB) & (lowerB <= upperA);
+  }
+  return meet;
 }
 
 /// The corner between two edges, given as bits.
@@ -144,13 +155,7 @@ bool anyIntersectAtStart(const MeshPair& pair, std::span<const TrianglePair> can
   return std::any_of(candidates.begin(), candidates.end(), [&](const TrianglePair& candidate) {
     if (pair.self() && candidate.a == candidate.b) return false;
     const MeshTriangle a(pair.a, candidate.a, pair.a.before), b(pair.b, candidate.b, pair.b.before);
-    for (int k = 0; k < 3; ++k) {
-      const auto [leastA, mostA] =
-          std::minmax({a.positions[0][k], a.positions[1][k], a.positions[2][k]});
-      const auto [leastB, mostB] =
-          std::minmax({b.positions[0][k], b.positions[1][k], b.positions[2][k]});
-      if (mostA < leastB || mostB < leastA) return false;
-    }
+    if (!boxesMeet(a.positions, b.positions)) return false;
     return intersectTriangles(a.positions, b.positions, counts,
                               pair.self() ? featuresInCommon(a, b) : ExcludedFeatures())
         .intersect();

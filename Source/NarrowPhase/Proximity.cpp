@@ -141,16 +141,6 @@ std::size_t countOf(std::uint32_t bits) {
   return (bits + (bits >> 8)) & 0x1f;
 }
 
-/// Features in the order of findPossibleProximity()'s bits.
-constexpr TestFeatures kInA = {0,         1,      2,      kTriangle, kTriangle,
-                               kTriangle, kEdge0, kEdge0, kEdge0,    kEdge1,
-                               kEdge1,    kEdge1, kEdge2, kEdge2,    kEdge2},
-                       kInB = {kTriangle, kTriangle, kTriangle, 0,      1,
-                               2,         kEdge0,    kEdge1,    kEdge2, kEdge0,
-                               kEdge1,    kEdge2,    kEdge0,    kEdge1, kEdge2};
-constexpr auto kOwnedInA = ownedTests(kInA), kOwnedInB = ownedTests(kInB);
-constexpr auto kSharing = sharingTests(kInA, kInB);
-
 /// Fills batches with the triangle pairs that own something, and measures what the filter leaves.
 class ProximityFinder {
  public:
