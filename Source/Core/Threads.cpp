@@ -9,8 +9,7 @@
 #include <tbb/task_arena.h>
 #else
 #include <atomic>
-#include <condition_variable>
-#include <cstdint>
+#include <barrier>
 #include <exception>
 #include <mutex>
 #include <vector>
@@ -53,35 +52,27 @@ void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* func
 /// Whether this thread is in a run: one within a run has no pool of its own and runs where it is.
 static thread_local bool isRunning = false;
 
-/// A plain pool: the caller and count - 1 workers take indices from one counter.
+/// A plain pool: the caller and count - 1 workers meet, take indices from one counter, and meet
+/// again.
 struct Threads::Pool {
-  explicit Pool(int count) {
+  explicit Pool(int count) : meeting(count) {
     for (int i = 1; i < count; ++i) workers.emplace_back([this] { work(); });
   }
   ~Pool() {
-    {
-      const std::lock_guard lock(mutex);
-      stopping = true;
-    }
-    wake.notify_all();
+    call = nullptr;
+    meeting.arrive_and_wait();
     for (std::thread& worker : workers) worker.join();
   }
 
   void run(std::size_t newSize, void (*newCall)(void*, std::size_t), void* newFunction) {
-    {
-      const std::lock_guard lock(mutex);
-      size = newSize;
-      call = newCall;
-      function = newFunction;
-      next = 0;
-      busy = workers.size();
-      failure = nullptr;
-      ++generation;
-    }
-    wake.notify_all();
+    size = newSize;
+    call = newCall;
+    function = newFunction;
+    next = 0;
+    failure = nullptr;
+    meeting.arrive_and_wait();
     takeAll();
-    std::unique_lock lock(mutex);
-    done.wait(lock, [this] { return busy == 0; });
+    meeting.arrive_and_wait();
     if (failure) std::rethrow_exception(failure);
   }
 
@@ -99,30 +90,20 @@ struct Threads::Pool {
   }
 
   void work() {
-    std::uint64_t seen = 0;
-    for (;;) {
-      {
-        std::unique_lock lock(mutex);
-        wake.wait(lock, [&] { return stopping || generation != seen; });
-        if (stopping) return;
-        seen = generation;
-      }
+    for (meeting.arrive_and_wait(); call != nullptr; meeting.arrive_and_wait()) {
       takeAll();
-      const std::lock_guard lock(mutex);
-      if (--busy == 0) done.notify_one();
+      meeting.arrive_and_wait();
     }
   }
 
   std::vector<std::thread> workers;
-  std::mutex mutex;
-  std::condition_variable wake, done;
+  std::barrier<> meeting;
+  std::mutex mutex;  ///< of the failure
   std::atomic<std::size_t> next{0};
-  std::size_t size = 0, busy = 0;
-  std::uint64_t generation = 0;
-  void (*call)(void*, std::size_t) = nullptr;
+  std::size_t size = 0;
+  void (*call)(void*, std::size_t) = nullptr;  ///< none: no more will come
   void* function = nullptr;
   std::exception_ptr failure;
-  bool stopping = false;
 };
 
 void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* function) const {

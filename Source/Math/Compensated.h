@@ -1,6 +1,5 @@
 #pragma once
 
-#include "Math/Expansion.h"
 #include "Math/Tolerances.h"
 
 #include <Eigen/Core>
@@ -10,6 +9,33 @@
 #include <limits>
 
 namespace palpate {
+
+/// value + error is the exact result of an operation whose rounded result is value.
+struct RoundedWithError {
+  double value, error;
+};
+
+inline RoundedWithError exactSum(double a, double b) {
+  const double sum = a + b, bRounded = sum - a;
+  return {sum, (a - (sum - bRounded)) + (b - bRounded)};
+}
+
+/// Veltkamp: halves of at most 26 bits that sum to a.
+inline RoundedWithError halves(double a) {
+  const double scaled = 134217729.0 * a;  // 2^27 + 1
+  const double high = scaled - (scaled - a);
+  return {high, a - high};
+}
+
+/// Dekker, without fused multiply-add: the baseline instruction set has none.
+inline RoundedWithError exactProduct(double a, double b, const RoundedWithError& bHalves) {
+  const double product = a * b;
+  const auto [high, low] = halves(a);
+  return {product, ((high * bHalves.value - product) + high * bHalves.error + low * bHalves.value) +
+                       low * bHalves.error};
+}
+
+inline RoundedWithError exactProduct(double a, double b) { return exactProduct(a, b, halves(b)); }
 
 // Sums in one order, whatever Eigen would choose.
 inline double dot(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {

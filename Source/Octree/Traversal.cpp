@@ -18,19 +18,18 @@ using NodeTag = hn::CappedTag<float, 8>;   ///< eight siblings
 using LeafTag = hn::CappedTag<float, 16>;  ///< primitives of a leaf
 
 template <class V>
-HWY_INLINE V roundedDown(V v, V shift) {
+HWY_INLINE V margin(V v) {
   const hn::DFromV<V> d;
-  const V moved = hn::Add(v, shift);
-  return hn::Sub(moved, hn::Add(hn::Mul(hn::Abs(moved), hn::Set(d, OutwardRounding::kRelative)),
-                                hn::Set(d, OutwardRounding::kAbsolute)));
+  return hn::Add(hn::Mul(hn::Abs(v), hn::Set(d, OutwardRounding::kRelative)),
+                 hn::Set(d, OutwardRounding::kAbsolute));
 }
-
+template <class V>
+HWY_INLINE V roundedDown(V v, V shift) {
+  return hn::Sub(hn::Add(v, shift), margin(hn::Add(v, shift)));
+}
 template <class V>
 HWY_INLINE V roundedUp(V v, V shift) {
-  const hn::DFromV<V> d;
-  const V moved = hn::Add(v, shift);
-  return hn::Add(moved, hn::Add(hn::Mul(hn::Abs(moved), hn::Set(d, OutwardRounding::kRelative)),
-                                hn::Set(d, OutwardRounding::kAbsolute)));
+  return hn::Add(hn::Add(v, shift), margin(hn::Add(v, shift)));
 }
 
 /// A box that many are compared with.
