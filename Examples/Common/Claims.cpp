@@ -42,21 +42,21 @@ void sortUnique(std::vector<TrianglePair>& pairs) {
 
 void addClaims(const CollisionData& data, double time, Claims& out) {
   using Kind = FeaturePair::Kind;
+  const auto at = [time](double ofImpact) { return ofImpact > 0 ? ofImpact : time; };
   for (const auto& c : data.vertexTriangle())
-    out.claims.push_back({{Kind::VertexTriangle, {c.vertex, c.triangle}},
-                          c.normal,
-                          c.distance,
-                          time + c.timeOfImpact});
+    out.claims.push_back(
+        {{Kind::VertexTriangle, {c.vertex, c.triangle}}, c.normal, c.distance, at(c.timeOfImpact)});
   for (const auto& c : data.triangleVertex())
     out.claims.push_back({{Kind::TriangleVertex, {c.triangle, c.vertex}},
                           -c.normal,
                           c.distance,
-                          time + c.timeOfImpact});
+                          at(c.timeOfImpact)});
   for (const auto& c : data.edgeEdge())
     out.claims.push_back({{Kind::EdgeEdge, {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]}},
                           c.normal,
                           c.distance,
-                          time + c.timeOfImpact});
+                          at(c.timeOfImpact)});
+  out.trusted = out.trusted.value_or(true) && data.validity().trusted;
   const auto triangles = data.intersectingTriangles();
   out.triangles.insert(out.triangles.end(), triangles.begin(), triangles.end());
 }

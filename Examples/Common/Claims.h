@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace palpate::accuracy {
@@ -29,9 +30,9 @@ struct Claim {
 /// What a method says of a step, in any order.
 struct Claims {
   std::vector<Claim> claims;
-  /// Triangles that touch, by a method that speaks of them; by others those that hold the claims'
-  /// features touch.
-  std::vector<TrianglePair> triangles;
+  std::vector<TrianglePair> triangles;  ///< said to touch, besides those that hold the features
+  bool ofTriangles = false;     ///< its features are examples: only `triangles` are said to touch
+  std::optional<bool> trusted;  ///< its own word on this answer, if it has one
 };
 
 /// Which triangles hold a vertex, or an edge.
@@ -50,7 +51,8 @@ class Incidence {
 
 void sortUnique(std::vector<TrianglePair>&);
 
-/// Contacts as claims. time: that static methods looked at; 0 for Continuous, which knows its own.
+/// Contacts as claims, and whether they are trusted, besides those added before. time: that
+/// contacts with a time of impact of 0 speak of; others know their own.
 void addClaims(const CollisionData&, double time, Claims& out);
 
 }  // namespace palpate::accuracy

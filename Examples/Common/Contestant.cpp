@@ -17,7 +17,7 @@ class PalpateRun : public Run {
         m_claims(scene.pairs.size()),
         m_last(start),
         m_substeps(substeps),
-        m_knowsTimes(pairSettings.method == Method::Continuous) {
+        m_method(pairSettings.method) {
     for (std::size_t m = 0; m < start.size(); ++m)
       m_ids.push_back(m_detection.addTriangleMesh(start[m], scene.meshes[m].triangles));
     for (const auto& [a, b] : m_pairs)
@@ -27,7 +27,9 @@ class PalpateRun : public Run {
 
   double step(const Positions& now) override {
     double milliseconds = 0;
-    m_claims.assign(m_pairs.size(), {});
+    Claims none;
+    none.ofTriangles = m_method == Method::Intersection;
+    m_claims.assign(m_pairs.size(), none);
     for (int i = 1; i <= m_substeps; ++i) {
       const double t = static_cast<double>(i) / m_substeps;
       const Positions& positions = i == m_substeps ? now : between(now, t);
@@ -40,7 +42,7 @@ class PalpateRun : public Run {
               .count();
       for (std::size_t p = 0; p < m_pairs.size(); ++p)
         addClaims(m_detection.collisionData(m_ids[m_pairs[p].first], m_ids[m_pairs[p].second]),
-                  m_knowsTimes ? 0 : t, m_claims[p]);
+                  m_method == Method::Continuous ? 0 : t, m_claims[p]);
     }
     m_last = now;
     return milliseconds;
@@ -63,12 +65,13 @@ class PalpateRun : public Run {
   std::vector<Claims> m_claims;
   Positions m_last, m_between;
   int m_substeps;
-  bool m_knowsTimes;
+  Method m_method;
 };
 
 /// What is given to the library besides the pair's method.
 struct Choice {
-  double thickness = 0;  ///< mean edges
+  double thickness = 0;   ///< mean edges
+  double tolerance = -1;  ///< mean edges; negative: the library's own choice
   int substeps = 1;
   OctreeSettings octree{};
   Engine engine = Engine::Octree;
@@ -80,11 +83,13 @@ Contestant contestant(std::string family, std::string setting, Method method,
           [=](const scenes::Scene& scene, const Positions& start) -> std::unique_ptr<Run> {
             const Settings settings{.octree = choice.octree, .engine = choice.engine, .threads = 1};
             const double edge = 20 * scene.thickness;
-            return std::make_unique<PalpateRun>(scene, start, settings,
-                                                PairSettings{.method = method,
-                                                             .thickness = choice.thickness * edge,
-                                                             .contacts = Contacts::All},
-                                                choice.substeps);
+            return std::make_unique<PalpateRun>(
+                scene, start, settings,
+                PairSettings{.method = method,
+                             .thickness = choice.thickness * edge,
+                             .contacts = Contacts::All,
+                             .tolerance = choice.tolerance < 0 ? -1 : choice.tolerance * edge},
+                choice.substeps);
           }};
 }
 
@@ -94,6 +99,7 @@ std::vector<Contestant> contestants() {
   constexpr auto kIntersection = Method::Intersection;
   constexpr auto kProximity = Method::Proximity;
   constexpr auto kContinuous = Method::Continuous;
+  constexpr auto kAuto = Method::Auto;
   std::vector<Contestant> all{
       contestant("Intersection", "once a frame", kIntersection, {}),
       contestant("Proximity", "1/20 edge", kProximity, {.thickness = 0.05}),
@@ -109,6 +115,9 @@ std::vector<Contestant> contestants() {
                  {.thickness = 0.05, .substeps = 16}),
       contestant("Continuous", "exact", kContinuous, {}),
       contestant("Continuous", "1/20 edge kept", kContinuous, {.thickness = 0.05}),
+      contestant("Auto", "1/20 edge", kAuto, {.thickness = 0.05}),
+      contestant("Auto", "touching; tolerance 1/20 edge", kAuto, {.tolerance = 0.05}),
+      contestant("Auto", "touching; tolerance 1/5 edge", kAuto, {.tolerance = 0.2}),
       contestant("Continuous: octree", "1 triangle a leaf", kContinuous,
                  {.octree = {.maxPrimitivesPerLeaf = 1}}),
       contestant("Continuous: octree", "4 triangles a leaf", kContinuous,

@@ -48,6 +48,7 @@ class FclRun : public Run {
     const fcl::CollisionResultd& result = m_results[pair];
 
     Claims all;
+    all.ofTriangles = true;
     for (std::size_t i = 0; i < result.numContacts(); ++i) {
       const fcl::Contactd& contact = result.getContact(i);
       const auto a = static_cast<std::uint32_t>(contact.b1),

@@ -32,6 +32,16 @@ std::multimap<TrianglePair, const Impact*> byTriangles(const Truth& truth, const
   return all;
 }
 
+bool isWrong(const Truth& truth, const Claims& said, const std::map<FeaturePair, Claim>& claims) {
+  if (said.ofTriangles) return said.triangles.empty() && !truth.touching.empty();
+  for (const auto& [features, impact] : truth.impacts) {
+    const auto claim = claims.find(features);
+    if (claim == claims.end()) return true;
+    if (impact && claim->second.normal.dot(impact->normal) < 0) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 void Score::addErrors(const Claim& claim, const Impact& impact) {
@@ -48,8 +58,14 @@ void Score::add(const Truth& truth, const Claims& said, const Incidence& a, cons
     if (!isNew && claim.time < entry->second.time) entry->second = claim;
   }
   claims += first.size();
+  if (said.trusted) {
+    const bool wrong = isWrong(truth, said, first);
+    ++m_judged;
+    silentFailures += wrong && *said.trusted;
+    m_falseAlarms += !wrong && !*said.trusted;
+  }
   std::vector<TrianglePair> touching = said.triangles;
-  if (touching.empty())
+  if (!said.ofTriangles)
     for (const auto& [features, claim] : first) Incidence::addTriangles(features, a, b, touching);
   sortUnique(touching);
   m_touching += truth.touching.size();

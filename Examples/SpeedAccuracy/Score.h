@@ -40,6 +40,13 @@ class Score {
   double meanEdge = 1;                     ///< L, to which distances are relative
   ErrorStatistics distance, normal, time;  ///< % of the mean edge, degrees, % of the step
   std::size_t claims = 0;
+  /// Of answers: trusted ones that are wrong, and others that are right. Wrong: features that touch
+  /// within the step are not among the claims, or a claim's normal points to the other side; of a
+  /// method that speaks of triangles, that nothing touches although something does.
+  std::size_t silentFailures = 0;
+  double falseAlarmsPercent() const {
+    return m_judged == 0 ? NAN : percent(m_falseAlarms, m_judged);
+  }
 
  private:
   static double percent(std::size_t part, std::size_t whole) {
@@ -47,8 +54,8 @@ class Score {
   }
   void addErrors(const Claim&, const Impact&);
 
-  std::size_t m_touching = 0, m_missed = 0, m_old = 0, m_oldMissed = 0, m_claimed = 0,
-              m_invented = 0;
+  std::size_t m_touching = 0, m_missed = 0, m_old = 0, m_oldMissed = 0, m_judged = 0,
+              m_falseAlarms = 0, m_claimed = 0, m_invented = 0;
 };
 
 }  // namespace palpate::accuracy

@@ -50,6 +50,8 @@ Figures emptyFigures() {
            {"normal_rms", "normal: RMS error (degrees)"},
            {"time_worst", "time of impact: worst error (% of the step)"},
            {"time_rms", "time of impact: RMS error (% of the step)"},
+           {"silent", "answers wrong and trusted"},
+           {"alarms", "answers right and not trusted (%)"},
            {"claims", "contacts reported a frame"},
            {"touching", "triangle pairs that touch a frame"}}};
 }
@@ -117,12 +119,13 @@ Figures::Row measure(const scenes::Scene& scene, const SceneTruth& truth, const 
       least = std::min(least, run->step(positionsAt(scene, frame)));
       if (repetition == 0) truth.judge(*run, static_cast<std::size_t>(frame - 1), score);
     }
-  return {{scene.name, method.family, method.setting},
-          {std::accumulate(fastest.begin(), fastest.end(), 0.0) / options.frames,
-           score.missedPercent(), score.newMissedPercent(), score.inventedPercent(),
-           score.distance.worst(), score.distance.rms(), score.normal.worst(), score.normal.rms(),
-           score.time.worst(), score.time.rms(), static_cast<double>(score.claims) / options.frames,
-           truth.touchingPerFrame()}};
+  return {
+      {scene.name, method.family, method.setting},
+      {std::accumulate(fastest.begin(), fastest.end(), 0.0) / options.frames, score.missedPercent(),
+       score.newMissedPercent(), score.inventedPercent(), score.distance.worst(),
+       score.distance.rms(), score.normal.worst(), score.normal.rms(), score.time.worst(),
+       score.time.rms(), static_cast<double>(score.silentFailures), score.falseAlarmsPercent(),
+       static_cast<double>(score.claims) / options.frames, truth.touchingPerFrame()}};
 }
 
 bool isChosen(const std::vector<std::string>& choices, const std::string& name) {

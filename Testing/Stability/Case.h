@@ -7,6 +7,7 @@
 
 #include <array>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,9 @@ struct Sweep {
   std::vector<double> values;  ///< comfortable first
   std::function<Case(double value, testing::Random&)> make;
   bool startsInside = false;  ///< which Continuous does not promise to tell
+  /// Beyond this value the positions are further apart than the thickness from one double to the
+  /// next.
+  double finestAt = std::numeric_limits<double>::infinity();
 };
 
 std::vector<Sweep> sweeps();

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <stdexcept>
 
 namespace {
@@ -37,6 +38,9 @@ report::Figures emptyFigures() {
            {"not_finite", "contacts not finite"},
            {"not_unit", "contacts whose normal is not unit"},
            {"undefined", "features against the method's own definition"},
+           {"silent", "answers wrong and trusted"},
+           {"wrong", "answers wrong (%)"},
+           {"alarms", "answers right and not trusted (%)"},
            {"us", "microseconds a case"}}};
 }
 
@@ -53,6 +57,12 @@ double percent(std::size_t part, const Tally& tally) {
   return 100.0 * static_cast<double>(part) / static_cast<double>(tally.cases);
 }
 
+double percentOfAnswers(std::size_t part, const Tally& tally) {
+  return tally.answers == 0
+             ? std::numeric_limits<double>::quiet_NaN()
+             : 100.0 * static_cast<double>(part) / static_cast<double>(tally.answers);
+}
+
 report::Figures::Row rowOf(const Sweep& sweep, double value, const Subject& subject,
                            const Tally& tally) {
   const auto count = [](std::size_t n) { return static_cast<double>(n); };
@@ -61,7 +71,8 @@ report::Figures::Row rowOf(const Sweep& sweep, double value, const Subject& subj
            percent(tally.invented, tally), percent(tally.turned, tally),
            percent(tally.flipped, tally), count(tally.notFinite), count(tally.notUnit),
            count(tally.undefinedMissed + tally.undefinedInvented + tally.untimely),
-           1000 * tally.milliseconds / count(tally.cases)}};
+           count(tally.silent), percentOfAnswers(tally.wrong, tally),
+           percentOfAnswers(tally.alarms, tally), 1000 * tally.milliseconds / count(tally.cases)}};
 }
 
 /// Prints and counts what must never be.
@@ -74,6 +85,7 @@ int faultsOf(const Sweep& sweep, double value, const Subject& subject, const Tal
                 subject.contestant.family.c_str(), count, what);
   };
   if (subject.contestant.family == "FCL") return 0;
+  if (value <= sweep.finestAt) expectNone(tally.silent, "answers wrong and trusted");
   expectNone(tally.notFinite, "contacts not finite");
   expectNone(tally.notUnit, "normals not unit");
   expectNone(tally.undefinedMissed, "features missed");

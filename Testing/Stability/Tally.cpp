@@ -88,6 +88,21 @@ bool isInwards(const Claim& claim, const Case::Frame& now) {
   return (ofCorner || claim.features.kind == Kind::Triangles) && claim.normal.dot(outwards) < -0.1;
 }
 
+bool isAnyTurned(const Claims& claims, const Judged& judged, std::size_t frame) {
+  return std::any_of(claims.claims.begin(), claims.claims.end(), [&](const Claim& claim) {
+    return judged.posed.startsInside ? isInwards(claim, judged.posed.frames[frame + 1])
+                                     : isTurned(claim, judged.touches[frame]);
+  });
+}
+
+bool isWrong(const Claims& claims, const Judged& judged, std::size_t frame) {
+  const std::vector<Touch>& touches = judged.touches[frame];
+  if (claims.ofTriangles) return claims.triangles.empty() && !touches.empty();
+  return isAnyTurned(claims, judged, frame) ||
+         std::any_of(touches.begin(), touches.end(),
+                     [&](const Touch& touch) { return !says(claims, touch.features); });
+}
+
 void checkContacts(const Claims& claims, Tally& tally) {
   for (const Claim& claim : claims.claims) {
     ++tally.contacts;
@@ -118,6 +133,8 @@ void checkDefinition(Definition definition, const Claims& claims, const std::vec
     tally.undefinedInvented += static_cast<std::size_t>(
         std::count_if(claims.claims.begin(), claims.claims.end(),
                       [&](const Claim& claim) { return !isNear(rest, claim); }));
+  } else if (definition == Definition::Auto) {
+    for (const Touch& touch : touches) tally.undefinedMissed += !says(claims, touch.features);
   } else if (definition == Definition::Continuous) {
     for (const Touch& touch : touches) tally.undefinedMissed += !says(claims, touch.features);
     for (const Claim& claim : claims.claims) {
@@ -146,15 +163,19 @@ void add(const Judged& judged, const Subject& subject, Tally& tally) {
     const Claims& claims = answers[f];
     const bool any = !claims.claims.empty() || !claims.triangles.empty();
     reported |= any;
-    // Proximity says near, the others say touch.
-    touchReported |= any && (subject.definition != Definition::Proximity &&
-                             subject.contestant.family.find("Proximity") == std::string::npos);
-    for (const Claim& claim : claims.claims)
-      turned |= judged.posed.startsInside ? isInwards(claim, judged.posed.frames[f + 1])
-                                          : isTurned(claim, judged.touches[f]);
+    // Proximity and Auto say near, the others say touch.
+    touchReported |= any && (claims.ofTriangles || subject.definition == Definition::Continuous);
+    turned |= isAnyTurned(claims, judged, f);
     flipped |= flips(claims, inNoise[f]);
     checkContacts(claims, tally);
     checkContacts(inNoise[f], tally);
+    if (claims.trusted) {
+      const bool wrong = isWrong(claims, judged, f);
+      ++tally.answers;
+      tally.wrong += wrong;
+      tally.silent += wrong && *claims.trusted;
+      tally.alarms += !wrong && !*claims.trusted;
+    }
     checkDefinition(subject.definition, claims, judged.touches[f], judged.rests[f],
                     judged.posed.thickness, tally);
   }
@@ -176,6 +197,7 @@ std::vector<Subject> subjects() {
       {{"Proximity", "1/20 edge"}, Definition::Proximity},
       {{"Proximity in substeps", "1/20 edge; 8 substeps"}, Definition::None},
       {{"Continuous", "exact"}, Definition::Continuous},
+      {{"Auto", "1/20 edge"}, Definition::Auto},
       {{"FCL", "collide()"}, Definition::None}};
   std::vector<Subject> all;
   for (const accuracy::Contestant& contestant : accuracy::contestants()) {

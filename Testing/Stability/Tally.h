@@ -15,7 +15,8 @@ enum class Definition {
   None,          ///< another's method, or one put together
   Intersection,  ///< triangles that intersect at the end of a frame
   Proximity,     ///< features within the thickness at the end of a frame
-  Continuous     ///< features that touch within a frame, and when
+  Continuous,    ///< features that touch within a frame, and when
+  Auto           ///< no feature that touches within a frame is missing
 };
 
 struct Subject {
@@ -41,6 +42,11 @@ struct Tally {
   std::size_t contacts = 0, notFinite = 0, notUnit = 0;
   std::size_t flipped = 0;  ///< cases with a normal that is turned by noise of 1e-7 of the size
   double milliseconds = 0;
+  // Answers, frame by frame. Wrong: features that touch in the frame are missing or a normal is on
+  // the wrong side; of a method that speaks of triangles, that they do not touch although they do.
+  std::size_t answers = 0, wrong = 0;
+  std::size_t silent = 0;  ///< wrong and trusted
+  std::size_t alarms = 0;  ///< right and not trusted
 };
 
 /// `count` random cases of one step of a sweep, by every subject.

@@ -63,13 +63,18 @@ std::array<impact::Vector, 2> planeSpan(bool edges, const impact::Positions& p) 
   return {at(2) - at(1), at(3) - at(1)};
 }
 
-/// Sign of the first vertex's height over the plane, or edge a's over edge b, just before the
-/// touch.
-int sideJustBefore(bool edges, const impact::Query& query, impact::Real time) {
+/// Of the first vertex over the plane, or edge a over edge b.
+impact::Polynomial heightOf(bool edges, const impact::Query& query) {
+  impact::Polynomial height = query.coplanarity();
+  if (!edges)
+    for (impact::Rational& coefficient : height) coefficient = -coefficient;
+  return height;
+}
+
+int sideJustBefore(const impact::Polynomial& height, impact::Real time) {
   if (time.p.empty()) return 0;  // from the start
-  while (impact::valueAt(query.coplanarity(), time.low) == 0) time.halve();
-  const int sign = sgn(impact::valueAt(query.coplanarity(), time.low));
-  return edges ? sign : -sign;
+  while (impact::valueAt(height, time.low) == 0) time.halve();
+  return sgn(impact::valueAt(height, time.low));
 }
 
 }  // namespace
@@ -82,7 +87,11 @@ bool Touch::isTimely(double answered) const {
 }
 
 bool Touch::isTurned(const Eigen::Vector3d& answered, double at) const {
-  if (side == 0) return false;
+  impact::Real touch = time;
+  const int sideThen = touch.compare(impact::Rational(at)) > 0
+                           ? sgn(impact::valueAt(height, impact::Rational(at)))
+                           : side;
+  if (side == 0 || sideThen == 0) return false;
   using Rational = impact::Rational;
   std::array<std::array<Rational, 3>, 2> sides;
   for (int i = 0; i < 2; ++i)
@@ -100,7 +109,7 @@ bool Touch::isTurned(const Eigen::Vector3d& answered, double at) const {
                                      Rational(answered[2])};
   const Rational along = dot(normal, said);
   // A triangle's normal points to the vertex, whichever mesh that is of.
-  const int sign = features.kind == Kind::TriangleVertex ? -side : side;
+  const int sign = features.kind == Kind::TriangleVertex ? -sideThen : sideThen;
   return along * sign < 0 && along * along > square / 100;
 }
 
@@ -114,9 +123,11 @@ std::vector<Touch> touchesWithin(const Case::Frame& before, const Case::Frame& n
     const bool edges = pair.kind == Kind::EdgeEdge;
     if (stayApart(edges, positions) || neverInOnePlane(positions)) continue;
     const impact::Query query(edges, positions);
-    if (auto time = query.firstTouch())
-      touches.push_back(
-          {pair, *time, sideJustBefore(edges, query, *time), planeSpan(edges, positions)});
+    const auto time = query.firstTouch();
+    if (!time) continue;
+    const impact::Polynomial height = heightOf(edges, query);
+    touches.push_back(
+        {pair, *time, sideJustBefore(height, *time), height, planeSpan(edges, positions)});
   }
   return touches;
 }

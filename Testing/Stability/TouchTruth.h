@@ -15,6 +15,7 @@ struct Touch {
   impact::Real time;
   /// On which side of the common plane they were just before; 0: touching from the start.
   int side = 0;
+  impact::Polynomial height;  ///< over the common plane, times an area
   /// What spans the common plane, over time: two sides of the triangle, or edge a and edge b.
   std::array<impact::Vector, 2> span;
 
