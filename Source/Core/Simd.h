@@ -33,5 +33,27 @@ HWY_ATTR HWY_INLINE std::uint32_t bitsOf(D d, M mask) {
   return bits;
 }
 
+/// Of as many positions as V has lanes.
+template <class V>
+struct Vector3 {
+  V x, y, z;
+
+  friend HWY_INLINE Vector3 operator+(const Vector3& a, const Vector3& b) {
+    return {a.x + b.x, a.y + b.y, a.z + b.z};
+  }
+  friend HWY_INLINE Vector3 operator-(const Vector3& a, const Vector3& b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+  }
+  friend HWY_INLINE Vector3 operator*(const V& factor, const Vector3& a) {
+    return {factor * a.x, factor * a.y, factor * a.z};
+  }
+  friend HWY_INLINE V dot(const Vector3& a, const Vector3& b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+  }
+  friend HWY_INLINE Vector3 cross(const Vector3& a, const Vector3& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+  }
+};
+
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

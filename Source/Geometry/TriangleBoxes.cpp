@@ -26,11 +26,11 @@ HWY_ATTR void storeRounded(const Chunk& chunk, std::size_t begin, BoxArrays& box
     hn::Vec<decltype(d)> v[3], unused;
     hn::LoadInterleaved4(d, chunk.lower + 4 * i, v[0], v[1], v[2], unused);
     for (int k = 0; k < 3; ++k)
-      hn::StoreU(hn::Sub(v[k], hn::Add(hn::Mul(hn::Abs(v[k]), relative), absolute)), d,
+      hn::StoreU(v[k] - (hn::Abs(v[k]) * relative + absolute), d,
                  boxes.lower[k].data() + begin + i);
     hn::LoadInterleaved4(d, chunk.upper + 4 * i, v[0], v[1], v[2], unused);
     for (int k = 0; k < 3; ++k)
-      hn::StoreU(hn::Add(v[k], hn::Add(hn::Mul(hn::Abs(v[k]), relative), absolute)), d,
+      hn::StoreU(v[k] + (hn::Abs(v[k]) * relative + absolute), d,
                  boxes.upper[k].data() + begin + i);
   }
 }
@@ -81,12 +81,10 @@ HWY_ATTR void triangleBoxesOf(const FloatPoint* HWY_RESTRICT vertices,
     const V relative = hn::Set(d4, OutwardRounding::kRelative),
             absolute = hn::Set(d4, OutwardRounding::kAbsolute);
     for (std::size_t k = 0; k < kVectors; ++k) {
-      hn::Store(
-          hn::Sub(groupLower[k], hn::Add(hn::Mul(hn::Abs(groupLower[k]), relative), absolute)), d4,
-          groupBoxes[g].lower.data() + k * kLanes);
-      hn::Store(
-          hn::Add(groupUpper[k], hn::Add(hn::Mul(hn::Abs(groupUpper[k]), relative), absolute)), d4,
-          groupBoxes[g].upper.data() + k * kLanes);
+      hn::Store(groupLower[k] - (hn::Abs(groupLower[k]) * relative + absolute), d4,
+                groupBoxes[g].lower.data() + k * kLanes);
+      hn::Store(groupUpper[k] + (hn::Abs(groupUpper[k]) * relative + absolute), d4,
+                groupBoxes[g].upper.data() + k * kLanes);
     }
   }
   // The rest one by one: a whole vector would overwrite what another thread may have written behind

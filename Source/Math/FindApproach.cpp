@@ -100,22 +100,22 @@ ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, d
   constexpr int kPatience = 6;  // stretches before directions are turned
   const double shortest = std::max(tolerance, kShortStretch);
   double stride = 0.0;
-  Separation here = bestSeparation(motion, t);
+  Separation here = motion.bestSeparation(t);
   for (int step = 0;; ++step) {
-    double clear = separatedAround(t, motion, largest, here, distance).high;
+    double clear = motion.separatedAround(t, largest, here, distance).high;
     if (!(clear == 1.0 || clear - t > shortest)) {
       if (here.nearest <= near || distanceInside(motion, t) <= near) return {true, false, t};
       here = accurateSeparation(motion, t);
-      clear = separatedAround(t, motion, largest, here, distance).high;
+      clear = motion.separatedAround(t, largest, here, distance).high;
       if (!(clear > t)) return {true, false, t};  // does not happen, as said above
     }
     if (clear > upTo || clear == 1.0) return {};
     if (step >= kPatience) {
       stride = std::max(stride, 2.0 * (clear - t));
       const double ahead = std::min(t + stride, 1.0);
-      const Separation there = bestSeparation(motion, ahead);
-      if (separatedBetween(t, here, ahead, there, motion, largest, distance) ||
-          separatedByPlane(t, ahead, motion, distance)) {
+      const Separation there = motion.bestSeparation(ahead);
+      if (motion.separatedBetween(t, here, ahead, there, largest, distance) ||
+          motion.separatedByPlane(t, ahead, distance)) {
         if (ahead > upTo || ahead == 1.0) return {};
         t = ahead;
         here = there;
@@ -125,7 +125,7 @@ ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, d
       stride *= 0.25;
     }
     t = clear;
-    here = bestSeparation(motion, t);
+    here = motion.bestSeparation(t);
   }
 }
 

@@ -28,7 +28,7 @@ Coplanarity coplanarity(const RelativeMotion<kind>& motion) {
   Coplanarity result;
   result.coefficients = {normal[0].dot(c[0]), (normal[1].dot(c[0]) + normal[0].dot(c[1])) / 3.0,
                          (normal[2].dot(c[0]) + normal[1].dot(c[1])) / 3.0, normal[2].dot(c[1])};
-  result.error = kCoplanarityError * permanent(motion) + kImpactUnderflow;
+  result.error = kCoplanarityError * motion.permanent() + kImpactUnderflow;
   return result;
 }
 
@@ -80,7 +80,7 @@ class ImpactSearch {
   std::optional<Interval> bracketRoot(const Interval& piece, int signAfter) const;
   Verdict judge(const Interval& bracket) const;
   Interval separatedAround(double t) const {
-    return palpate::separatedAround(t, m_motion, m_largest, bestSeparation(m_motion, t), 0.0);
+    return m_motion.separatedAround(t, m_largest, m_motion.bestSeparation(t), 0.0);
   }
 
   const RelativeMotion<kind>& m_motion;

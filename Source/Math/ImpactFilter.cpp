@@ -18,9 +18,7 @@ using D = hn::CappedTag<double, ImpactBlock::kLanes>;
 using V = hn::Vec<D>;
 using M = hn::Mask<D>;
 
-struct Point {
-  V x, y, z;
-};
+using Point = Vector3<V>;
 /// At the start of the step and at its end.
 struct Ends {
   Point at[2];
@@ -31,24 +29,6 @@ HWY_INLINE Point largest(const Point& a, const Point& b) {
   return {largest(a.x, b.x), largest(a.y, b.y), largest(a.z, b.z)};
 }
 HWY_INLINE Point largest(const Ends& ends) { return largest(ends.at[0], ends.at[1]); }
-HWY_INLINE Point minus(const Point& l, const Point& r) {
-  return {hn::Sub(l.x, r.x), hn::Sub(l.y, r.y), hn::Sub(l.z, r.z)};
-}
-HWY_INLINE Point cross(const Point& l, const Point& r) {
-  return {hn::Sub(hn::Mul(l.y, r.z), hn::Mul(l.z, r.y)),
-          hn::Sub(hn::Mul(l.z, r.x), hn::Mul(l.x, r.z)),
-          hn::Sub(hn::Mul(l.x, r.y), hn::Mul(l.y, r.x))};
-}
-HWY_INLINE Point sum(const Point& l, const Point& r) {
-  return {hn::Add(l.x, r.x), hn::Add(l.y, r.y), hn::Add(l.z, r.z)};
-}
-HWY_INLINE V dot(const Point& l, const Point& r) {
-  return hn::Add(hn::Add(hn::Mul(l.x, r.x), hn::Mul(l.y, r.y)), hn::Mul(l.z, r.z));
-}
-
-HWY_INLINE Point scaled(V factor, const Point& p) {
-  return {hn::Mul(factor, p.x), hn::Mul(factor, p.y), hn::Mul(factor, p.z)};
-}
 /// Into [0, 1]; anything there where the divisor is not positive.
 HWY_INLINE V clampedQuotient(V l, V r) {
   const D d;
@@ -56,7 +36,7 @@ HWY_INLINE V clampedQuotient(V l, V r) {
   return hn::Min(hn::Max(quotient, hn::Zero(d)), hn::Set(d, 1.0));
 }
 HWY_INLINE Point awayFromSegment(const Point& point, const Point& segment) {
-  return minus(point, scaled(clampedQuotient(dot(point, segment), dot(segment, segment)), segment));
+  return point - clampedQuotient(dot(point, segment), dot(segment, segment)) * segment;
 }
 HWY_INLINE Point nearer(const Point& l, const Point& r) {
   const M first = hn::Lt(dot(l, l), dot(r, r));
@@ -82,7 +62,7 @@ class FilterLanes {
       M above = hn::Eq(limit, limit), below = above;
       for (int i = 0; i < cornerCount(); ++i) {
         const V first = coordinate(corners[i], 0, k), last = coordinate(corners[i], 1, k);
-        const V needed = hn::Add(limit, hn::Mul(error, hn::Add(largest(first, last), limit)));
+        const V needed = limit + error * (largest(first, last) + limit);
         above = hn::And(above, hn::Gt(hn::Min(first, last), needed));
         below = hn::And(below, hn::Lt(hn::Max(first, last), hn::Neg(needed)));
       }
@@ -97,20 +77,17 @@ class FilterLanes {
     constexpr auto axes = ImpactQuery::axes(kind);
     const Ends a = difference(axes[0]), b = difference(axes[1]), c = difference(axes[2]);
     const Point first = cross(a.at[0], b.at[0]), last = cross(a.at[1], b.at[1]),
-                middle = sum(cross(a.at[0], b.at[1]), cross(a.at[1], b.at[0]));
+                middle = cross(a.at[0], b.at[1]) + cross(a.at[1], b.at[0]);
     const V third = hn::Set(d, 1.0 / 3.0);
     const V f0 = dot(first, c.at[0]), f3 = dot(last, c.at[1]),
-            f1 = hn::Mul(third, hn::Add(dot(middle, c.at[0]), dot(first, c.at[1]))),
-            f2 = hn::Mul(third, hn::Add(dot(last, c.at[0]), dot(middle, c.at[1])));
+            f1 = third * (dot(middle, c.at[0]) + dot(first, c.at[1])),
+            f2 = third * (dot(last, c.at[0]) + dot(middle, c.at[1]));
     const V least = hn::Min(hn::Min(f0, f1), hn::Min(f2, f3)),
             most = hn::Max(hn::Max(f0, f1), hn::Max(f2, f3));
     const Point p = largest(a), q = largest(b), r = largest(c);
-    const V permanent =
-        hn::Add(hn::Add(hn::Mul(r.x, hn::Add(hn::Mul(p.y, q.z), hn::Mul(p.z, q.y))),
-                        hn::Mul(r.y, hn::Add(hn::Mul(p.z, q.x), hn::Mul(p.x, q.z)))),
-                hn::Mul(r.z, hn::Add(hn::Mul(p.x, q.y), hn::Mul(p.y, q.x))));
-    const V error =
-        hn::Add(hn::Mul(permanent, hn::Set(d, kCoplanarityError)), hn::Set(d, kImpactUnderflow));
+    const V permanent = r.x * (p.y * q.z + p.z * q.y) + r.y * (p.z * q.x + p.x * q.z) +
+                        r.z * (p.x * q.y + p.y * q.x);
+    const V error = permanent * hn::Set(d, kCoplanarityError) + hn::Set(d, kImpactUnderflow);
     const V magnitude = hn::Max(hn::Max(hn::Max(p.x, p.y), hn::Max(p.z, q.x)),
                                 hn::Max(hn::Max(q.y, q.z), hn::Max(r.x, hn::Max(r.y, r.z))));
     return hn::And(hn::Or(hn::Gt(least, error), hn::Lt(most, hn::Neg(error))),
@@ -130,17 +107,16 @@ class FilterLanes {
       least = hn::Min(least, hn::Min(first, last));
       most = hn::Max(most, hn::Max(first, last));
       reach = largest(reach, largest(corner));
-      displacement = largest(displacement, minus(corner.at[1], corner.at[0]));
+      displacement = largest(displacement, corner.at[1] - corner.at[0]);
     }
     const V lengthSquared = dot(direction, direction);
     const V farthest = hn::Max(reach.x, hn::Max(reach.y, reach.z));
-    const V approach =
-        hn::Add(hn::Mul(hn::Sqrt(dot(displacement, displacement)), hn::Set(d, tolerance)),
-                hn::Mul(hn::Add(farthest, hn::Set(d, distance)), hn::Set(d, kApproachError)));
-    const V needed = hn::Mul(hn::Add(hn::Set(d, distance), approach), hn::Sqrt(lengthSquared));
+    const V approach = hn::Sqrt(dot(displacement, displacement)) * hn::Set(d, tolerance) +
+                       (farthest + hn::Set(d, distance)) * hn::Set(d, kApproachError);
+    const V needed = (hn::Set(d, distance) + approach) * hn::Sqrt(lengthSquared);
     const Point size{hn::Abs(direction.x), hn::Abs(direction.y), hn::Abs(direction.z)};
-    const V limit = hn::Add(hn::Mul(hn::Add(dot(size, reach), needed), hn::Set(d, kAlongError)),
-                            hn::Add(needed, hn::Set(d, kImpactUnderflow)));
+    const V limit = (dot(size, reach) + needed) * hn::Set(d, kAlongError) +
+                    (needed + hn::Set(d, kImpactUnderflow));
     const V magnitude = hn::Max(farthest, hn::Max(size.x, hn::Max(size.y, size.z)));
     const M inRange =
         hn::And(hn::Le(magnitude, hn::Set(d, kLargestImpactDifference)),
@@ -160,13 +136,12 @@ class FilterLanes {
     const Point a = halfway(axes[0]), b = halfway(axes[1]), c = halfway(axes[2]);
     if constexpr (kind == ImpactQuery::Kind::EdgeEdge) {
       const V aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), ac = dot(a, c), bc = dot(b, c);
-      const V x = clampedQuotient(hn::Sub(hn::Mul(ac, bb), hn::Mul(bc, ab)),
-                                  hn::Sub(hn::Mul(aa, bb), hn::Mul(ab, ab)));
-      const V y = clampedQuotient(hn::Sub(bc, hn::Mul(x, ab)), bb);
-      return awayFromSegment(minus(c, scaled(y, b)), a);
+      const V x = clampedQuotient(ac * bb - bc * ab, aa * bb - ab * ab);
+      const V y = clampedQuotient(bc - x * ab, bb);
+      return awayFromSegment(c - y * b, a);
     } else {
       const Point p = nearer(awayFromSegment(c, a), awayFromSegment(c, b));
-      return nearer(p, awayFromSegment(minus(c, a), minus(b, a)));
+      return nearer(p, awayFromSegment(c - a, b - a));
     }
   }
 
@@ -174,12 +149,12 @@ class FilterLanes {
   static constexpr int cornerCount() { return kind == ImpactQuery::Kind::EdgeEdge ? 4 : 3; }
   HWY_INLINE V coordinate(const ImpactQuery::Difference& vertices, int end, int k) const {
     const D d;
-    return hn::Sub(hn::Load(d, &m_block.positions[vertices[0]][end][k][m_lane]),
-                   hn::Load(d, &m_block.positions[vertices[1]][end][k][m_lane]));
+    return hn::Load(d, &m_block.positions[vertices[0]][end][k][m_lane]) -
+           hn::Load(d, &m_block.positions[vertices[1]][end][k][m_lane]);
   }
   HWY_INLINE Point halfway(const ImpactQuery::Difference& v) const {
     const Ends ends = difference(v);
-    return scaled(hn::Set(D(), 0.5), sum(ends.at[0], ends.at[1]));
+    return hn::Set(D(), 0.5) * (ends.at[0] + ends.at[1]);
   }
   HWY_INLINE Ends difference(const ImpactQuery::Difference& v) const {
     return {{{coordinate(v, 0, 0), coordinate(v, 0, 1), coordinate(v, 0, 2)},

@@ -22,39 +22,38 @@ Vector3d awayFromSegment(const Vector3d& point, const Vector3d& segment) {
 }  // namespace
 
 template <ImpactQuery::Kind kind>
-Separation bestSeparation(const RelativeMotion<kind>& motion, double t) {
-  constexpr int corners = RelativeMotion<kind>::corners;
-  std::array<Vector3d, corners> corner;
-  for (int i = 0; i < corners; ++i) corner[i] = at(t, motion.corner[i]);
+Separation RelativeMotion<kind>::bestSeparation(double t) const {
+  std::array<Vector3d, corners> position;
+  for (int i = 0; i < corners; ++i) position[i] = at(t, corner[i]);
 
   // Compared squared: no root for each.
   Separation best;
   double bestLeast = 0.0, bestSquare = 1.0, nearestSquare = INFINITY;
-  const auto consider = [&](const Vector3d& direction, double square) {
-    double least = direction.dot(corner[0]);
-    for (int i = 1; i < corners; ++i) least = std::min(least, direction.dot(corner[i]));
-    if (!(least > 0.0) || !(square > kShortestDirection * kShortestDirection)) return;
-    if (least * least * bestSquare > bestLeast * bestLeast * square) {
+  const auto consider = [&](const Vector3d& direction, double lengthSquared) {
+    double least = direction.dot(position[0]);
+    for (int i = 1; i < corners; ++i) least = std::min(least, direction.dot(position[i]));
+    if (!(least > 0.0) || !(lengthSquared > kShortestDirection * kShortestDirection)) return;
+    if (least * least * bestSquare > bestLeast * bestLeast * lengthSquared) {
       best.direction = direction;
       bestLeast = least;
-      bestSquare = square;
+      bestSquare = lengthSquared;
     }
   };
   const auto considerAway = [&](const Vector3d& direction) {
-    const double square = direction.squaredNorm();
-    nearestSquare = std::min(nearestSquare, square);
-    consider(direction, square);
+    const double lengthSquared = direction.squaredNorm();
+    nearestSquare = std::min(nearestSquare, lengthSquared);
+    consider(direction, lengthSquared);
   };
-  const Vector3d a = at(t, motion.a), b = at(t, motion.b), &c = corner[0];
-  const Vector3d normal = a.cross(b);
-  consider(normal.dot(c) < 0.0 ? Vector3d(-normal) : normal, normal.squaredNorm());
-  considerAway(awayFromSegment(c, a));
-  considerAway(awayFromSegment(c, b));
-  if constexpr (RelativeMotion<kind>::square) {
-    considerAway(awayFromSegment(c - b, a));
-    considerAway(awayFromSegment(c - a, b));
+  const Vector3d u = at(t, a), v = at(t, b), &w = position[0];
+  const Vector3d normal = u.cross(v);
+  consider(normal.dot(w) < 0.0 ? Vector3d(-normal) : normal, normal.squaredNorm());
+  considerAway(awayFromSegment(w, u));
+  considerAway(awayFromSegment(w, v));
+  if constexpr (square) {
+    considerAway(awayFromSegment(w - v, u));
+    considerAway(awayFromSegment(w - u, v));
   } else {
-    considerAway(awayFromSegment(c - a, b - a));
+    considerAway(awayFromSegment(w - u, v - u));
   }
   best.length = bestLeast > 0.0 ? std::sqrt(bestSquare) : 0.0;
   best.nearest = std::sqrt(nearestSquare);
@@ -62,14 +61,15 @@ Separation bestSeparation(const RelativeMotion<kind>& motion, double t) {
 }
 
 template <ImpactQuery::Kind kind>
-Interval separatedAround(double t, const RelativeMotion<kind>& motion, const Vector3d& largest,
-                         const Separation& separation, double distance) {
+Interval RelativeMotion<kind>::separatedAround(double t, const Vector3d& largest,
+                                               const Separation& separation,
+                                               double distance) const {
   const double error =
       kAlongError * (separation.direction.cwiseAbs().dot(largest) + distance * separation.length) +
       kImpactUnderflow;
   const double needed = distance * separation.length + error;
   Interval interval{0.0, 1.0};
-  for (const auto& ends : motion.corner) {
+  for (const auto& ends : corner) {
     const double first = separation.direction.dot(ends[0]) - needed,
                  last = separation.direction.dot(ends[1]) - needed;
     if (!(between(first, last, t) > 0.0)) return {1.0, 0.0};
@@ -85,15 +85,15 @@ Interval separatedAround(double t, const RelativeMotion<kind>& motion, const Vec
 /// Along n(t) a corner moves as a quadratic, above its Bernstein coefficients; |n(t)| is at most
 /// the larger length at the ends.
 template <ImpactQuery::Kind kind>
-bool separatedBetween(double t0, const Separation& first, double t1, const Separation& last,
-                      const RelativeMotion<kind>& motion, const Vector3d& largest,
-                      double distance) {
+bool RelativeMotion<kind>::separatedBetween(double t0, const Separation& first, double t1,
+                                            const Separation& last, const Vector3d& largest,
+                                            double distance) const {
   if (!(first.length > 0.0 && last.length > 0.0)) return false;
   const Vector3d m = first.direction / first.length, n = last.direction / last.length;
   const double needed = distance * (1.0 + kAlongError) +
                         kAlongError * m.cwiseAbs().cwiseMax(n.cwiseAbs()).dot(largest) +
                         kImpactUnderflow;
-  for (const auto& ends : motion.corner) {
+  for (const auto& ends : corner) {
     const Vector3d x = at(t0, ends), y = at(t1, ends);
     if (!(m.dot(x) > needed && n.dot(y) > needed && 0.5 * (m.dot(y) + n.dot(x)) > needed))
       return false;
@@ -104,35 +104,19 @@ bool separatedBetween(double t0, const Separation& first, double t1, const Separ
 /// |det(A, B, C)| is above its Bernstein coefficients of one sign, |A x B| below the longest of
 /// its.
 template <ImpactQuery::Kind kind>
-bool separatedByPlane(double t0, double t1, const RelativeMotion<kind>& motion, double distance) {
-  const Vector3d a = at(t0, motion.a), b = at(t0, motion.b), c = at(t0, motion.c);
-  const Vector3d d = at(t1, motion.a), e = at(t1, motion.b), f = at(t1, motion.c);
-  const Vector3d first = a.cross(b), middle = 0.5 * (a.cross(e) + d.cross(b)), last = d.cross(e);
-  const auto [least, most] = std::minmax({first.dot(c), (2.0 * middle.dot(c) + first.dot(f)) / 3.0,
-                                          (2.0 * middle.dot(f) + last.dot(c)) / 3.0, last.dot(f)});
-  const double gap = std::max(least, -most) - kPlaneError * permanent(motion);
+bool RelativeMotion<kind>::separatedByPlane(double t0, double t1, double distance) const {
+  const Vector3d u = at(t0, a), v = at(t0, b), w = at(t0, c);
+  const Vector3d d = at(t1, a), e = at(t1, b), f = at(t1, c);
+  const Vector3d first = u.cross(v), middle = 0.5 * (u.cross(e) + d.cross(v)), last = d.cross(e);
+  const auto [least, most] = std::minmax({first.dot(w), (2.0 * middle.dot(w) + first.dot(f)) / 3.0,
+                                          (2.0 * middle.dot(f) + last.dot(w)) / 3.0, last.dot(f)});
+  const double gap = std::max(least, -most) - kPlaneError * permanent();
   const double length = std::max({first.norm(), middle.norm(), last.norm()}) +
-                        kPlaneError * largestOf(motion.a).norm() * largestOf(motion.b).norm();
+                        kPlaneError * largestOf(a).norm() * largestOf(b).norm();
   return gap > distance * length * (1.0 + kAlongError) + kImpactUnderflow;
 }
 
-template Separation bestSeparation(const RelativeMotion<ImpactQuery::Kind::VertexTriangle>&,
-                                   double);
-template Separation bestSeparation(const RelativeMotion<ImpactQuery::Kind::EdgeEdge>&, double);
-template Interval separatedAround(double, const RelativeMotion<ImpactQuery::Kind::VertexTriangle>&,
-                                  const Vector3d&, const Separation&, double);
-template Interval separatedAround(double, const RelativeMotion<ImpactQuery::Kind::EdgeEdge>&,
-                                  const Vector3d&, const Separation&, double);
-template bool separatedBetween(double, const Separation&, double, const Separation&,
-                               const RelativeMotion<ImpactQuery::Kind::VertexTriangle>&,
-                               const Vector3d&, double);
-template bool separatedBetween(double, const Separation&, double, const Separation&,
-                               const RelativeMotion<ImpactQuery::Kind::EdgeEdge>&, const Vector3d&,
-                               double);
-
-template bool separatedByPlane(double, double,
-                               const RelativeMotion<ImpactQuery::Kind::VertexTriangle>&, double);
-template bool separatedByPlane(double, double, const RelativeMotion<ImpactQuery::Kind::EdgeEdge>&,
-                               double);
+template struct RelativeMotion<ImpactQuery::Kind::VertexTriangle>;
+template struct RelativeMotion<ImpactQuery::Kind::EdgeEdge>;
 
 }  // namespace palpate

@@ -14,6 +14,22 @@ struct Interval {
   bool empty() const { return !(low <= high); }
 };
 
+/// The largest magnitudes over the step.
+inline Eigen::Vector3d largestOf(const std::array<Eigen::Vector3d, 2>& ends) {
+  return ends[0].cwiseAbs().cwiseMax(ends[1].cwiseAbs());
+}
+
+inline Eigen::Vector3d at(double t, const std::array<Eigen::Vector3d, 2>& ends) {
+  return (1.0 - t) * ends[0] + t * ends[1];
+}
+
+/// A fixed direction in which all corners may lie on one side of zero at time t: the least of them
+/// over the length is the features' distance where the direction is right. Zero: none was found.
+struct Separation {
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  double length = 0.0;
+  double nearest = INFINITY;  ///< the distance of two points on the features' borders
+};
 /// An ImpactQuery's A, B, C, and the corners of C - x A - y B, at both ends of the step, in
 /// doubles. Each component is the real one rounded once, with its exact sign.
 template <ImpactQuery::Kind kind>
@@ -60,51 +76,30 @@ struct RelativeMotion {
       for (const Eigen::Vector3d& position : ends) largest = largest.cwiseMax(position.cwiseAbs());
     return largest;
   }
+
+  /// The permanent of the largest magnitudes: no term of det(A, B, C) exceeds one of its six.
+  double permanent() const {
+    const Eigen::Vector3d p = largestOf(a), q = largestOf(b), r = largestOf(c);
+    return r[0] * (p[1] * q[2] + p[2] * q[1]) + r[1] * (p[2] * q[0] + p[0] * q[2]) +
+           r[2] * (p[0] * q[1] + p[1] * q[0]);
+  }
+
+  Separation bestSeparation(double t) const;
+
+  /// The times around t at which all corners are certainly further than `distance` along the
+  /// direction: the corners move linearly along it, so this is an interval. Empty where they are
+  /// not at t itself. largest is largestDifference().
+  Interval separatedAround(double t, const Eigen::Vector3d& largest, const Separation&,
+                           double distance) const;
+
+  /// All corners are certainly further than `distance` from t0 to t1 along a direction that goes
+  /// linearly from one to the other.
+  bool separatedBetween(double t0, const Separation&, double t1, const Separation&,
+                        const Eigen::Vector3d& largest, double distance) const;
+
+  /// The plane of A and B, through the one feature or along both, certainly stays further than
+  /// `distance` from C, which the other goes through.
+  bool separatedByPlane(double t0, double t1, double distance) const;
 };
-
-/// The largest magnitudes over the step.
-inline Eigen::Vector3d largestOf(const std::array<Eigen::Vector3d, 2>& ends) {
-  return ends[0].cwiseAbs().cwiseMax(ends[1].cwiseAbs());
-}
-
-/// The permanent of the largest magnitudes: no term of det(A, B, C) exceeds one of its six.
-template <ImpactQuery::Kind kind>
-double permanent(const RelativeMotion<kind>& motion) {
-  const Eigen::Vector3d p = largestOf(motion.a), q = largestOf(motion.b), r = largestOf(motion.c);
-  return r[0] * (p[1] * q[2] + p[2] * q[1]) + r[1] * (p[2] * q[0] + p[0] * q[2]) +
-         r[2] * (p[0] * q[1] + p[1] * q[0]);
-}
-
-inline Eigen::Vector3d at(double t, const std::array<Eigen::Vector3d, 2>& ends) {
-  return (1.0 - t) * ends[0] + t * ends[1];
-}
-
-/// A fixed direction in which all corners may lie on one side of zero at time t: the least of them
-/// over the length is the features' distance where the direction is right. Zero: none was found.
-struct Separation {
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
-  double length = 0.0;
-  double nearest = INFINITY;  ///< the distance of two points on the features' borders
-};
-template <ImpactQuery::Kind kind>
-Separation bestSeparation(const RelativeMotion<kind>&, double t);
-
-/// The times around t at which all corners are certainly further than `distance` along the
-/// direction: the corners move linearly along it, so this is an interval. Empty where they are not
-/// at t itself. largest is motion.largestDifference().
-template <ImpactQuery::Kind kind>
-Interval separatedAround(double t, const RelativeMotion<kind>&, const Eigen::Vector3d& largest,
-                         const Separation&, double distance);
-
-/// All corners are certainly further than `distance` from t0 to t1 along a direction that goes
-/// linearly from one to the other.
-template <ImpactQuery::Kind kind>
-bool separatedBetween(double t0, const Separation&, double t1, const Separation&,
-                      const RelativeMotion<kind>&, const Eigen::Vector3d& largest, double distance);
-
-/// The plane of A and B, through the one feature or along both, certainly stays further than
-/// `distance` from C, which the other goes through.
-template <ImpactQuery::Kind kind>
-bool separatedByPlane(double t0, double t1, const RelativeMotion<kind>&, double distance);
 
 }  // namespace palpate

@@ -43,43 +43,23 @@ HWY_ATTR void scaleBatch(const TrianglePairBatch& batch, double thickness, doubl
     hn::Vec<decltype(d)> relative[18], most = hn::Zero(d);
     for (int k = 3; k < 18; ++k) {
       relative[k] =
-          hn::Sub(hn::Load(d, batch.coordinates[k] + i), hn::Load(d, batch.coordinates[k % 3] + i));
+          hn::Load(d, batch.coordinates[k] + i) - hn::Load(d, batch.coordinates[k % 3] + i);
       most = hn::Max(most, hn::Abs(relative[k]));
     }
     // 2^-e for 2^e <= most < 2^(e + 1), by its exponent bits.
     const auto exponent = hn::And(hn::BitCast(du, most), hn::Set(du, 0x7ff0000000000000u));
-    const auto scale = hn::BitCast(d, hn::Sub(hn::Set(du, 0x7fe0000000000000u), exponent));
+    const auto scale = hn::BitCast(d, hn::Set(du, 0x7fe0000000000000u) - exponent);
     const auto isFinite = hn::Lt(most, hn::Set(d, 0x1p1023));
     const auto store = [&](double length, float* out) HWY_ATTR {
-      const auto scaledLength = hn::IfThenElse(isFinite, hn::Mul(hn::Set(d, length), scale),
+      const auto scaledLength = hn::IfThenElse(isFinite, hn::Set(d, length) * scale,
                                                hn::BitCast(d, hn::Set(du, 0x7ff8000000000000u)));
-      hn::Store(hn::Mul(hn::DemoteTo(df, scaledLength), hn::Set(df, 1.0f + 0x1p-20f)), df, out + i);
+      hn::Store(hn::DemoteTo(df, scaledLength) * hn::Set(df, 1.0f + 0x1p-20f), df, out + i);
     };
     store(thickness, scaled.thickness);
     store(edgeReach, scaled.edgeReach);
     for (int k = 3; k < 18; ++k)
-      hn::Store(hn::DemoteTo(df, hn::Mul(relative[k], scale)), df, scaled.coordinates[k] + i);
+      hn::Store(hn::DemoteTo(df, relative[k] * scale), df, scaled.coordinates[k] + i);
   }
-}
-
-template <class V>
-struct Vector3 {
-  V x, y, z;
-};
-
-template <class V>
-HWY_INLINE Vector3<V> minus(const Vector3<V>& a, const Vector3<V>& b) {
-  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-}
-template <class V>
-HWY_INLINE V dot(const Vector3<V>& a, const Vector3<V>& b) {
-  return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
-}
-template <class V>
-HWY_INLINE Vector3<V> cross(const Vector3<V>& a, const Vector3<V>& b) {
-  return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)),
-          hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
-          hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
 }
 
 /// A triangle with what several tests of it share.
@@ -94,23 +74,19 @@ struct TriangleFrame {
   template <class D>
   HWY_INLINE void set(D d, V thickness) {
     for (int i = 0; i < 3; ++i) {
-      edge[i] = minus(corner[(i + 1) % 3], corner[i]);
+      edge[i] = corner[(i + 1) % 3] - corner[i];
       square[i] = dot(edge[i], edge[i]);
     }
     length = hn::Sqrt(hn::Max(hn::Max(square[0], square[1]), square[2]));
     normal = cross(edge[0], edge[1]);
     const V normalSquare = dot(normal, normal);
-    const V slack = hn::Mul(hn::Add(hn::Set(d, 1.0f), thickness), hn::Set(d, 0x1p-22f));
+    const V slack = (hn::Set(d, 1.0f) + thickness) * hn::Set(d, 0x1p-22f);
     const V tiny = hn::Set(d, 1e-37f);
-    height = hn::Add(hn::Add(hn::Mul(thickness, hn::Sqrt(normalSquare)),
-                             hn::Mul(hn::Mul(hn::Set(d, 128.0f), slack), length)),
-                     tiny);
-    const V side =
-        hn::Add(hn::Mul(hn::Mul(hn::Set(d, 192.0f), slack), hn::Mul(length, length)), tiny);
+    height = thickness * hn::Sqrt(normalSquare) + hn::Set(d, 128.0f) * slack * length + tiny;
+    const V side = hn::Set(d, 192.0f) * slack * (length * length) + tiny;
     for (int i = 0; i < 3; ++i) {
       inward[i] = cross(normal, edge[i]);
-      beyond[i] =
-          hn::Neg(hn::Add(hn::Mul(thickness, hn::Sqrt(hn::Mul(normalSquare, square[i]))), side));
+      beyond[i] = hn::Neg(thickness * hn::Sqrt(normalSquare * square[i]) + side);
     }
   }
 };
@@ -156,7 +132,7 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
     b.set(d, thickness);
     Vector3<V> from[3][3];  // a's corner i seen from b's corner j
     for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) from[i][j] = minus(a.corner[i], b.corner[j]);
+      for (int j = 0; j < 3; ++j) from[i][j] = a.corner[i] - b.corner[j];
 
     auto bits = hn::Zero(hn::RebindToUnsigned<D>());
     for (int i = 0; i < 3; ++i) {
@@ -164,36 +140,35 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
       bits = withBit(bits, 3 + i, isOutOfReach<true>(a, from[0][i], from[1][i], from[2][i]));
     }
 
-    const V slack = hn::Mul(hn::Add(hn::Set(d, 1.0f), thickness), hn::Set(d, 0x1p-22f));
-    const V longest = hn::Mul(hn::Max(a.length, b.length), slack), tiny = hn::Set(d, 1e-37f);
-    const V heightError = hn::Add(hn::Mul(hn::Set(d, 128.0f), longest), tiny);
-    const V sError = hn::Add(hn::Mul(hn::Mul(hn::Set(d, 640.0f), longest), b.length), tiny);
-    const V tError = hn::Add(hn::Mul(hn::Mul(hn::Set(d, 640.0f), longest), a.length), tiny);
-    const V thicknessSquare = hn::Mul(thickness, thickness);
+    const V slack = (hn::Set(d, 1.0f) + thickness) * hn::Set(d, 0x1p-22f);
+    const V longest = hn::Max(a.length, b.length) * slack, tiny = hn::Set(d, 1e-37f);
+    const V heightError = hn::Set(d, 128.0f) * longest + tiny;
+    const V sError = hn::Set(d, 640.0f) * longest * b.length + tiny;
+    const V tError = hn::Set(d, 640.0f) * longest * a.length + tiny;
+    const V thicknessSquare = thickness * thickness;
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
         const Vector3<V>&u = a.edge[i], &v = b.edge[j], &r = from[i][j];
         const Vector3<V> n = cross(u, v);
         const V normalSquare = dot(n, n);
-        const V height = hn::Max(hn::Sub(hn::Abs(dot(n, r)), heightError), hn::Zero(d));
-        auto isOut =
-            hn::Gt(hn::Mul(height, height), hn::Add(hn::Mul(thicknessSquare, normalSquare), tiny));
+        const V height = hn::Max(hn::Abs(dot(n, r)) - heightError, hn::Zero(d));
+        auto isOut = hn::Gt(height * height, thicknessSquare * normalSquare + tiny);
         if constexpr (kDistinct) {
           const V uv = dot(u, v), ur = dot(u, r), vr = dot(v, r);
-          const V s = hn::Sub(hn::Mul(uv, vr), hn::Mul(b.square[j], ur));
-          const V t = hn::Sub(hn::Mul(a.square[i], vr), hn::Mul(uv, ur));
+          const V s = uv * vr - b.square[j] * ur;
+          const V t = a.square[i] * vr - uv * ur;
           V sBeyond = sError, tBeyond = tError;
           if constexpr (kReach) {
             // A line's closest point that is x beyond the edge's end leaves that end, and with it
             // the edge, further than x |n| / (|u| |v|) from the other's line.
-            const V far = hn::Mul(hn::Load(d, scaled.edgeReach + lane), hn::Sqrt(normalSquare));
-            sBeyond = hn::Add(sError, hn::Mul(far, hn::Sqrt(b.square[j])));
-            tBeyond = hn::Add(tError, hn::Mul(far, hn::Sqrt(a.square[i])));
+            const V far = hn::Load(d, scaled.edgeReach + lane) * hn::Sqrt(normalSquare);
+            sBeyond = sError + far * hn::Sqrt(b.square[j]);
+            tBeyond = tError + far * hn::Sqrt(a.square[i]);
           }
           isOut = hn::Or(isOut, hn::Lt(s, hn::Neg(sBeyond)));
           isOut = hn::Or(isOut, hn::Lt(t, hn::Neg(tBeyond)));
-          isOut = hn::Or(isOut, hn::Gt(hn::Sub(s, normalSquare), sBeyond));
-          isOut = hn::Or(isOut, hn::Gt(hn::Sub(t, normalSquare), tBeyond));
+          isOut = hn::Or(isOut, hn::Gt(s - normalSquare, sBeyond));
+          isOut = hn::Or(isOut, hn::Gt(t - normalSquare, tBeyond));
         }
         bits = withBit(bits, 6 + 3 * i + j, isOut);
       }

@@ -64,22 +64,21 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
                                : hn::LoadU(d, boxes.lower[k].data() + first + i);
       const auto upper = slots ? hn::LoadU(d, gathered[3 + k] + place)
                                : hn::LoadU(d, boxes.upper[k].data() + first + i);
-      longest = hn::Max(longest, hn::Sub(upper, lower));
+      longest = hn::Max(longest, upper - lower);
       // The cube's corner in two floats: the differences are as good as exact near it.
       const float corner = static_cast<float>(cube.lower[k]);
       const auto high = hn::Set(d, corner),
                  low = hn::Set(d, static_cast<float>(cube.lower[k] - corner));
-      const auto fromCorner = hn::Add(hn::Mul(hn::Sub(hn::Sub(lower, high), low), half),
-                                      hn::Mul(hn::Sub(hn::Sub(upper, high), low), half));
+      const auto fromCorner = (lower - high - low) * half + (upper - high - low) * half;
       const auto scaled =
-          hn::Min(hn::Max(hn::Mul(fromCorner, cellsPerUnit), hn::Zero(d)), hn::Set(d, cells));
+          hn::Min(hn::Max(fromCorner * cellsPerUnit, hn::Zero(d)), hn::Set(d, cells));
       cell[k] = hn::Min(hn::ConvertTo(di, scaled), lastCell);
     }
     // ceil(log2(size)): the exponent of size, one more if any bit of its fraction is set.
-    const auto sizeBits = hn::BitCast(di, hn::Mul(longest, slack));
-    const auto sizeExponent = hn::ShiftRight<23>(hn::Add(sizeBits, hn::Set(di, 0x7fffff)));
-    const auto level = hn::Min(hn::Max(hn::Sub(edgeExponent, sizeExponent), zero), deepest);
-    const auto coarse = hn::Sub(deepest, level);
+    const auto sizeBits = hn::BitCast(di, longest * slack);
+    const auto sizeExponent = hn::ShiftRight<23>(sizeBits + hn::Set(di, 0x7fffff));
+    const auto level = hn::Min(hn::Max(edgeExponent - sizeExponent, zero), deepest);
+    const auto coarse = deepest - level;
     for (int k = 0; k < 3; ++k) cell[k] = spreadBits(hn::Shl(hn::Shr(cell[k], coarse), coarse));
     const auto morton =
         hn::Or(cell[0], hn::Or(hn::ShiftLeft<1>(cell[1]), hn::ShiftLeft<2>(cell[2])));

@@ -20,16 +20,16 @@ using LeafTag = hn::CappedTag<float, 16>;  ///< primitives of a leaf
 template <class V>
 HWY_INLINE V margin(V v) {
   const hn::DFromV<V> d;
-  return hn::Add(hn::Mul(hn::Abs(v), hn::Set(d, OutwardRounding::kRelative)),
-                 hn::Set(d, OutwardRounding::kAbsolute));
+  return hn::Abs(v) * hn::Set(d, OutwardRounding::kRelative) +
+         hn::Set(d, OutwardRounding::kAbsolute);
 }
 template <class V>
 HWY_INLINE V roundedDown(V v, V shift) {
-  return hn::Sub(hn::Add(v, shift), margin(hn::Add(v, shift)));
+  return v + shift - margin(v + shift);
 }
 template <class V>
 HWY_INLINE V roundedUp(V v, V shift) {
-  return hn::Add(hn::Add(v, shift), margin(hn::Add(v, shift)));
+  return v + shift + margin(v + shift);
 }
 
 /// A box that many are compared with.
