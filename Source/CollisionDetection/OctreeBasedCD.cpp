@@ -9,6 +9,7 @@
 #include "CollisionDetection/PairTable.h"
 #include "CollisionDetection/Stopwatch.h"
 #include "Core/Assert.h"
+#include "Core/FloatingPoint.h"
 #include "Octree/Forest.h"
 
 #include <algorithm>
@@ -282,14 +283,24 @@ std::span<const CollisionPair> OctreeBasedCD::pairs() const {
   return m_implementation->pairs.pairs();
 }
 
-void OctreeBasedCD::update() { m_implementation->update(true); }
+void OctreeBasedCD::update() {
+  const StandardFloatingPoint standard;
+  m_implementation->update(true);
+}
 
-void OctreeBasedCD::collectCandidates() { m_implementation->collect(); }
+void OctreeBasedCD::collectCandidates() {
+  const StandardFloatingPoint standard;
+  m_implementation->collect();
+}
 
-void OctreeBasedCD::detectCollision() { m_implementation->detect(); }
+void OctreeBasedCD::detectCollision() {
+  const StandardFloatingPoint standard;
+  m_implementation->detect();
+}
 
 void OctreeBasedCD::forEachCandidateBatch(GeometryId a, GeometryId b, BatchFunction function,
                                           void* context) {
+  const StandardFloatingPoint standard;
   Implementation& all = *m_implementation;
   PairRecord& record = all.pairs.at(all.geometries, a, b);
   all.update();
@@ -304,6 +315,7 @@ void OctreeBasedCD::forEachCandidateBatch(GeometryId a, GeometryId b, BatchFunct
 
 std::span<const InsideVertex> OctreeBasedCD::findInsideVertices(GeometryId vertices,
                                                                 GeometryId body) {
+  const StandardFloatingPoint standard;
   Implementation& all = *m_implementation;
   const Geometry& asked = all.geometries.at(vertices);
   Geometry& around = all.geometries.at(body);

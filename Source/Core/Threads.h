@@ -1,5 +1,7 @@
 #pragma once
 
+#include "Core/FloatingPoint.h"
+
 #include <cstddef>
 #include <memory>
 #include <type_traits>
@@ -40,7 +42,11 @@ class Threads {
     }
     using Function = std::remove_reference_t<F>;
     run(
-        size, [](void* function, std::size_t i) { (*static_cast<Function*>(function))(i); },
+        size,
+        [](void* function, std::size_t i) {
+          const StandardFloatingPoint standard;
+          (*static_cast<Function*>(function))(i);
+        },
         const_cast<void*>(static_cast<const void*>(std::addressof(f))));
   }
 
