@@ -169,10 +169,13 @@ class VtpReader {
     offsets.insert(offsets.begin(), 0.0);
     if (!isCount(offsets.back(), mostNumbers()))
       throw FileFault{"the offsets of its cells are not ascending or run past their corners"};
+    const std::size_t points = m_polygons.positions.size() - first;
     std::vector<double> corners =
         readArray(piece, group, "connectivity", static_cast<std::size_t>(offsets.back()));
-    for (double& corner : corners)  // one below the piece's own stays wrong
-      corner = corner < 0 ? -1 : corner + static_cast<double>(first);
+    for (double& corner : corners) {  // one that is not of the piece becomes wrong in the whole
+      const bool own = corner >= 0 && corner < static_cast<double>(points);
+      corner = own ? corner + static_cast<double>(first) : -1;
+    }
     m_polygons.addCells(offsets, corners, strips);
   }
 

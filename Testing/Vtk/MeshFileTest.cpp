@@ -248,6 +248,22 @@ TEST_F(MeshFiles, IndicesOutOfRangeAreRefused) {
             std::string::npos);
   EXPECT_NE(refusal("high.vtp", replaced(kVtp, "2 3<", "2 5<")).find(reason), std::string::npos);
   EXPECT_NE(refusal("low.vtp", replaced(kVtp, "2 3<", "2 -9<")).find(reason), std::string::npos);
+  EXPECT_NE(refusal("half.vtp", replaced(kVtp, "2 3<", "2 2.5<")).find(reason), std::string::npos);
+}
+
+TEST_F(MeshFiles, PiecesOfAVtpFileAreOneMeshAndKeepToTheirVertices) {
+  const std::size_t begin = kVtp.find("<Piece"), end = kVtp.find("</PolyData>");
+  const std::string piece = kVtp.substr(begin, end - begin);
+  const auto withFirst = [&](const std::string& first) {
+    return std::string(kVtp).insert(begin, first);
+  };
+  const MeshFile mesh = read("two.vtp", withFirst(piece));
+  EXPECT_EQ(mesh.positions.size(), 10u);
+  EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {5, 6, 7}, {5, 7, 8}}));
+  EXPECT_NE(refusal("into.vtp", withFirst(replaced(piece, "2 3<", "2 6<"))).find("polygon 0"),
+            std::string::npos);
+  EXPECT_NE(refusal("back.vtp", replaced(withFirst(piece), "2 3<", "2 -1<")).find("polygon 1"),
+            std::string::npos);
 }
 
 TEST_F(MeshFiles, CoordinatesThatAreNotFiniteAreRefused) {
