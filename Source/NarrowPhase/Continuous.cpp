@@ -199,6 +199,9 @@ void findFastImpactsByBruteForce(const MeshPair& pair, const FeatureLists& lists
   forEachFeaturePair(pair, lists, out, FastImpactFinder(pair, out));
 }
 
+/// Boxes over part of the step cost more; a part that is not short throws out too little for that.
+constexpr double kShortPart = 1.0 / 32;
+
 double findEarliestImpact(const MeshPair& pair, std::span<const TrianglePair> candidates,
                           double upTo, ContactBuffers& counts) {
   const TimeOfImpactSettings settings = settingsOf(pair);
@@ -211,22 +214,15 @@ double findEarliestImpact(const MeshPair& pair, std::span<const TrianglePair> ca
     counts.exactDecisions += answer.exact;
     if (answer.impact) earliest = std::min(earliest, answer.time);
   };
-  // In parts, so that the boxes of later ones need not reach further than is known by then.
-  constexpr std::size_t kPart = 512;
-  // Boxes over part of the step cost more; a part that is not short throws out too little for that.
-  constexpr double kShortPart = 1.0 / 32;
-  while (!candidates.empty() && earliest > 0.0) {
-    const auto part = candidates.first(std::min(kPart, candidates.size()));
-    candidates = candidates.subspan(part.size());
-    MeshPair boxed = pair;
-    FloatPair floats;
-    if (pair.floats) {
-      floats = *pair.floats;
-      if (end() < kShortPart) floats.upTo = std::nextafter(static_cast<float>(end()), 1.0f);
-      boxed.floats = &floats;
-    }
-    forEachLikelyPair(boxed, part, counts, test);
+  if (earliest <= 0.0) return earliest;
+  MeshPair boxed = pair;
+  FloatPair floats;
+  if (pair.floats && end() < kShortPart) {
+    floats = *pair.floats;
+    floats.upTo = std::nextafter(static_cast<float>(end()), 1.0f);
+    boxed.floats = &floats;
   }
+  forEachLikelyPair(boxed, candidates, counts, test);
   return earliest;
 }
 
