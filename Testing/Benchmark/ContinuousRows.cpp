@@ -2,6 +2,7 @@
 // Embree on the same frame: the earliest time against IPC toolkit's faster engine, all times
 // against every candidate's time by Tight-Inclusion. Their figures were measured elsewhere on this
 // class of machine and are scaled by what Embree took there and takes here.
+#include "Queries.h"
 #include "Rows.h"
 
 #include <palpate/OctreeBasedCD.h>
@@ -136,11 +137,17 @@ void rowsOf(Report& report, const Reference& reference, const Workload& workload
     };
     row("ms", medians.kinds[i]);
     row("narrow phase ms", medians.narrow[i]);
+    // All of the narrow phase, so that listing the candidates counts too.
+    const double nanoseconds =
+        1e6 * medians.narrow[i] / static_cast<double>(featureCandidates(workload));
+    if (kind.contacts == Contacts::All && kind.thickness == 0)
+      row("ns a feature candidate", nanoseconds);
     const bool earliest = kind.contacts == Contacts::Earliest;
     char found[32];
     std::snprintf(found, sizeof found, earliest ? "%.6f" : "%.0f", medians.found[i]);
     std::vector<std::string> cells = {name + ", " + kind.name, milliseconds(medians.kinds[i]),
-                                      milliseconds(medians.narrow[i]), found};
+                                      milliseconds(medians.narrow[i]), found,
+                                      milliseconds(nanoseconds)};
     const int column = threads - 1;
     const double limit = kind.thickness > 0 || column > 1 ? 0
                          : earliest ? reference.earliest[column] / kTimesEarliest
@@ -156,11 +163,32 @@ void rowsOf(Report& report, const Reference& reference, const Workload& workload
   }
 }
 
+/// Published queries one by one, microseconds.
+void queryRows(Report& report, const std::string& sharedData) {
+  report.heading("Published continuous queries, microseconds a query; 1 thread");
+  report.line({"", "queries", "mean", "median", "worst", "missed", "invented"});
+  for (const testing::PublishedQueries& set : publishedSets(sharedData)) {
+    const QueryTimes times = timeQueries(set);
+    report.line({set.name, std::to_string(set.queries.size()), milliseconds(times.mean),
+                 milliseconds(times.median), milliseconds(times.worst),
+                 std::to_string(times.missed), std::to_string(times.invented)});
+    const auto row = [&](const char* metric, double value) {
+      report.row("queries", set.name, 1, "Palpate", metric, value);
+    };
+    row("queries", static_cast<double>(set.queries.size()));
+    row("mean us", times.mean);
+    row("median us", times.median);
+    row("worst us", times.worst);
+    row("missed", times.missed);
+    row("invented", times.invented);
+  }
+}
+
 }  // namespace
 
 void continuousRows(Report& report, const RowOptions& options) {
   report.heading("Continuous, whole step of the published frames, octree rebuilt; ms");
-  report.line({"", "median", "narrow", "found", "limit", "ratio"});
+  report.line({"", "median", "narrow", "found", "ns/candidate", "limit", "ratio"});
   const std::vector<std::string> names = workloadNames(options.sharedData);
   for (const Reference& reference : kReferences) {
     if (std::find(names.begin(), names.end(), reference.scene) == names.end()) continue;
@@ -170,6 +198,7 @@ void continuousRows(Report& report, const RowOptions& options) {
       rowsOf(report, reference, workload, options.measure);
     }
   }
+  queryRows(report, options.sharedData);
 }
 
 }  // namespace palpate::benchmark

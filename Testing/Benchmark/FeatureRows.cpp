@@ -154,4 +154,10 @@ void featureRows(Report& report, const RowOptions& options) {
              options.measure);
 }
 
+std::size_t featureCandidates(const Workload& workload) {
+  FeatureCandidates candidates(workload, true);
+  candidates.frame(workload.frames[0][0], workload.frames[1][0]);
+  return candidates.vertexTriangle + candidates.edgeEdge;
+}
+
 }  // namespace palpate::benchmark

@@ -27,4 +27,7 @@ void featureRows(Report&, const RowOptions&);     ///< vertex-triangle and edge-
 void continuousRows(Report&, const RowOptions&);  ///< times of impact of the published steps
 void simdRows(Report&, const RowOptions&);        ///< every path that this processor runs
 
+/// Of the step from a workload's first frame to its second.
+std::size_t featureCandidates(const Workload&);
+
 }  // namespace palpate::benchmark

@@ -116,6 +116,8 @@ TABLES = {
     "scale": metrics("scale", "1 / 2 threads"),
     "steady": metrics("steady", "1 / 2 threads"),
     "features": metrics("features", "1 thread"),
+    "continuous": metrics("continuous", "1 / 2 threads"),
+    "queries": metrics("queries", "1 thread"),
     "simd": metrics("simd", "1 thread"),
 }
 
