@@ -100,6 +100,7 @@ enum class ImpactKind {
   Collinear,
   Still,
   MovingTogether,
+  SmallMotion,
   Degenerate,
   Identical,
   FarAway,
@@ -115,7 +116,7 @@ class HardCases {
 
   ImpactCase next(ImpactKind kind) { return next(kind, m_random.below(2)); }
   ImpactCase next(ImpactKind kind, bool edges) {
-    ImpactCase query = onGrid(edges);
+    ImpactCase query = onGrid(edges, kind != ImpactKind::SmallMotion && m_random.below(3) == 0);
     make(kind, query);
     if (kind != ImpactKind::FullDoubles && m_random.below(2)) shear(query);
     refine(kind, query);
@@ -129,10 +130,9 @@ class HardCases {
     return query.positions[static_cast<std::size_t>(4 * end + vertex)];
   }
   Vector point() { return m_random.onGrid(17) - Vector::Constant(8); }
-  ImpactCase onGrid(bool edges) {
+  /// Wide ones round in every product, and still touch exactly.
+  ImpactCase onGrid(bool edges, bool wide) {
     ImpactCase query{edges, {}};
-    // Wide ones round in every product, and still touch exactly.
-    const bool wide = m_random.below(3) == 0;
     for (Vector& p : query.positions)
       p = 4 * (wide ? Vector((m_random.inCube() * 0x1p42).array().round()) : point());
     return query;
@@ -210,6 +210,16 @@ class HardCases {
           at(query, i, 1) = at(query, i, 0) + (i < (query.edges ? 2 : 1) ? move : other);
         break;
       }
+      case ImpactKind::SmallMotion:
+        query = query.mapped([size = std::ldexp(1.0, m_random.between(8, 38))](
+                                 const Vector& p) -> Vector { return size * p; });
+        touch(query, 1);
+        for (int i = 0; i < 4; ++i) {
+          const Vector move = point();
+          at(query, i, 0) = at(query, i, 1) - move;
+          at(query, i, 1) += m_random.below(3) * move;
+        }
+        break;
       case ImpactKind::Degenerate:
         for (int end = 0; end < 2; ++end) {
           at(query, 3, end) = at(query, 2, end);
