@@ -117,7 +117,7 @@ void setAxis(vtkAxis* axis, const std::string& label, bool logarithmic,
     const double margin = std::pow(*high / *low, 0.04) * 1.02;
     axis->SetUnscaledRange(*low / margin, *high * margin);
   } else {
-    const double size = std::max(*high - std::min(*low, 0.0), 1e-300);
+    const double size = std::max(*high - std::min(*low, 0.0), 1.0);
     axis->SetUnscaledRange(std::min(*low, 0.0) - 0.04 * size, *high + 0.04 * size);
   }
 }
