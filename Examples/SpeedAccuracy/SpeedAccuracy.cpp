@@ -216,6 +216,14 @@ report::Charts charts(const std::string& scene) {
 }
 #endif
 
+/// No answer may be wrong and trusted.
+void checkTrust(const Figures& figures) {
+  for (const Figures::Row& row : figures.rows())
+    if (row.values[figures.indexOf("silent")] > 0)
+      throw Error(ErrorCode::NotAvailable, row.texts[0] + ", " + row.texts[1] + ", " +
+                                               row.texts[2] + ": answers wrong and trusted.");
+}
+
 void run(const Options& options) {
   std::filesystem::create_directories(options.out);
   const std::filesystem::path csv = options.out / "speed-accuracy.csv",
@@ -224,6 +232,7 @@ void run(const Options& options) {
   if (!options.again) figures.addFrom(csv);
   measureAll(options, csv, figures);
   scenes::writeWhole(page, toHtml(figures, view(options)));
+  checkTrust(figures);
   std::printf("figures   %s\npage      %s\n", csv.c_str(), page.c_str());
 #ifdef PALPATE_HAS_CHARTS
   const auto files = draw(figures, charts(options.pictured), options.out / "speed-accuracy");

@@ -7,7 +7,7 @@ trap 'rm -rf "$folder"' EXIT
 fail() { echo "FAILED: $*"; exit 1; }
 unset DISPLAY  # pictures are shown by CMake/speed-accuracy.sh
 
-run() { "$program" --out "$folder/run" --scenes needle --frames 9 --methods Intersection,Continuous --repetitions 1 "$@"; }
+run() { "$program" --out "$folder/run" --scenes needle --frames 9 --methods Intersection,Continuous,Auto --repetitions 1 "$@"; }
 run >"$folder/text" 2>"$folder/messages" || fail "the run: $(cat "$folder/messages")"
 csv=$folder/run/speed-accuracy.csv
 rows=$(($(wc -l <"$csv") - 1))
@@ -16,6 +16,7 @@ cell() { awk -F, -v method="$1" -v setting="$2" -v column="$3" \
   'NR == 1 { for (i = 1; i <= NF; ++i) if ($i == column) c = i } $2 == method && $3 == setting { print $c }' "$csv"; }
 [[ $(cell Continuous exact new_missed) == 0 ]] || fail "Continuous misses new contacts"
 [[ $(cell Continuous exact invented) == 0 ]] || fail "Continuous invents contacts"
+[[ $(cell Auto '1/20 edge' missed) == 0 ]] || fail "Auto misses contacts"
 awk "BEGIN { exit !($(cell Intersection 'once a frame' new_missed) > 30) }" || fail "the needle does not tunnel"
 
 page=$folder/run/report.html
