@@ -66,6 +66,7 @@ bool dropPairs(CollisionProblem& problem, const Fails& fails) {
 }
 
 void removeUnusedVertices(CollisionProblem::Mesh& mesh) {
+  if (mesh.kind == GeometryKind::Points) return;
   std::vector<std::uint32_t> newIndex(mesh.now.size(), kUnused);
   for (const Triangle& triangle : mesh.triangles)
     for (const std::uint32_t corner : triangle) newIndex[corner] = 0;
@@ -74,10 +75,14 @@ void removeUnusedVertices(CollisionProblem::Mesh& mesh) {
     if (newIndex[v] == kUnused) continue;
     mesh.before[count] = mesh.before[v];
     mesh.now[count] = mesh.now[v];
+    if (mesh.radii.size() > 1) mesh.radii[count] = mesh.radii[v];
+    if (!mesh.rest.empty()) mesh.rest[count] = mesh.rest[v];
     newIndex[v] = count++;
   }
   mesh.before.resize(count);
   mesh.now.resize(count);
+  if (mesh.radii.size() > 1) mesh.radii.resize(count);
+  if (!mesh.rest.empty()) mesh.rest.resize(count);
   for (Triangle& triangle : mesh.triangles)
     for (std::uint32_t& corner : triangle) corner = newIndex[corner];
 }

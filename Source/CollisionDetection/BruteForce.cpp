@@ -26,8 +26,7 @@ std::vector<Eigen::AlignedBox3d> boxesOf(const TriangleMesh& mesh, bool swept) {
 }  // namespace
 
 void findCandidatesByBruteForce(const MeshPair& meshes, Buffer<TrianglePair>& out) {
-  const double thickness =
-      meshes.settings.method == Method::Intersection ? 0.0 : meshes.thicknessAtEnd();
+  const double thickness = meshes.settings.method == Method::Intersection ? 0.0 : meshes.reach();
   const bool swept =
       meshes.settings.method == Method::Continuous || meshes.settings.method == Method::Auto;
   const std::vector<Eigen::AlignedBox3d> boxesA = boxesOf(meshes.a, swept),

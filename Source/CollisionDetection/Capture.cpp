@@ -16,11 +16,12 @@ namespace palpate {
 namespace {
 
 constexpr std::string_view kTitle = "palpate-capture";
-constexpr int kVersion = 2;
+constexpr int kVersion = 3;
 
 // Values of enumerations are written by name: in the order of their declarations.
 constexpr std::array<std::string_view, 6> kMethods{"Auto",         "Proxy",     "DistanceField",
                                                    "Intersection", "Proximity", "Continuous"};
+constexpr std::array<std::string_view, 3> kKinds{"Triangles", "Lines", "Points"};
 constexpr std::array<std::string_view, 3> kContacts{"Distinct", "All", "Earliest"};
 constexpr std::array<std::string_view, 2> kEngines{"Octree", "BruteForce"};
 constexpr std::array<std::string_view, 2> kUpdates{"Auto", "Rebuild"};
@@ -143,6 +144,7 @@ void pairLine(File& file, PairType& pair, int version) {
   file.real(pair.settings.thickness);
   file.word(pair.settings.contacts, kContacts);
   if (version >= 2) file.real(pair.settings.tolerance);
+  if (version >= 3) file.real(pair.settings.restDistance);
 }
 
 std::string textOf(const CollisionProblem& problem) {
@@ -160,10 +162,14 @@ std::string textOf(const CollisionProblem& problem) {
     file.integer(static_cast<std::uint32_t>(mesh.id));
     file.integer(mesh.now.size());
     file.integer(mesh.triangles.size());
+    file.word(mesh.kind, kKinds);
+    file.integer(mesh.radii.size());
+    for (const double radius : mesh.radii) file.real(radius);
     file.endLine();
     for (std::size_t v = 0; v < mesh.now.size(); ++v) {
       file.position(mesh.before.at(v));
       file.position(mesh.now[v]);
+      if (mesh.kind == GeometryKind::Lines) file.position(mesh.rest.at(v));
       file.endLine();
     }
     for (const Triangle& triangle : mesh.triangles) {
@@ -181,7 +187,7 @@ std::string textOf(const CollisionProblem& problem) {
   return file.text();
 }
 
-CollisionProblem::Mesh readMesh(Reader& file) {
+CollisionProblem::Mesh readMesh(Reader& file, int version) {
   file.expect("geometry");
   CollisionProblem::Mesh mesh;
   std::uint32_t id = 0;
@@ -190,13 +196,35 @@ CollisionProblem::Mesh readMesh(Reader& file) {
   mesh.now.resize(file.count());
   mesh.before.resize(mesh.now.size());
   mesh.triangles.resize(file.count());
+  if (version >= 3) {
+    file.word(mesh.kind, kKinds);
+    mesh.radii.resize(file.count());
+    for (double& radius : mesh.radii) file.real(radius);
+  }
+  const bool lines = mesh.kind == GeometryKind::Lines;
+  if (lines) mesh.rest.resize(mesh.now.size());
   for (std::size_t v = 0; v < mesh.now.size(); ++v) {
     file.position(mesh.before[v]);
     file.position(mesh.now[v]);
+    if (lines) file.position(mesh.rest[v]);
   }
   for (Triangle& triangle : mesh.triangles)
     for (std::uint32_t& corner : triangle) file.integer(corner);
   return mesh;
+}
+
+GeometryId add(OctreeBasedCD& detection, const CollisionProblem::Mesh& mesh) {
+  if (mesh.kind == GeometryKind::Triangles)
+    return detection.addTriangleMesh(mesh.now, mesh.triangles);
+  const bool one = mesh.radii.size() <= 1;
+  const double radius = one && !mesh.radii.empty() ? mesh.radii.front() : 0.0;
+  if (mesh.kind == GeometryKind::Points)
+    return one ? detection.addPointSet(mesh.now, radius)
+               : detection.addPointSet(mesh.now, mesh.radii);
+  std::vector<Segment> segments;
+  for (const auto& [p, q, _] : mesh.triangles) segments.push_back({p, q});
+  return one ? detection.addLineMesh(mesh.rest, segments, radius)
+             : detection.addLineMesh(mesh.rest, segments, mesh.radii);
 }
 
 std::string contentOf(const std::filesystem::path& path) {
@@ -244,7 +272,7 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
   settingsLine(file, problem.settings);
   problem.geometries.resize(file.count());
   problem.pairs.resize(file.count());
-  for (CollisionProblem::Mesh& mesh : problem.geometries) mesh = readMesh(file);
+  for (CollisionProblem::Mesh& mesh : problem.geometries) mesh = readMesh(file, version);
   for (CollisionProblem::Pair& pair : problem.pairs) {
     file.expect("pair");
     pairLine(file, pair, version);
@@ -263,8 +291,7 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
 OctreeBasedCD setUp(const CollisionProblem& problem) {
   OctreeBasedCD detection(problem.settings);
   for (const CollisionProblem::Mesh& mesh : problem.geometries)
-    detection.setPositions(detection.addTriangleMesh(mesh.now, mesh.triangles), mesh.before,
-                           mesh.now);
+    detection.setPositions(add(detection, mesh), mesh.before, mesh.now);
   for (const CollisionProblem::Pair& pair : problem.pairs)
     detection.addCollisionPair(GeometryId{pair.a}, GeometryId{pair.b}, pair.settings);
   return detection;

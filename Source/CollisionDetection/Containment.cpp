@@ -150,6 +150,10 @@ std::span<const InsideVertex> Containment::find(const Geometry& vertices, const 
 
 void checkClosed(Geometry& body) {
   MeshTopology& topology = body.mesh.topology;
+  if (!topology.hasFaces())
+    throw Error(ErrorCode::NotClosed,
+                nameOf(body.id) + " is " + nameOf(topology.kind) + ", which has no inside",
+                body.id);
   if (!topology.closed) topology.closed = findMeshDefects(topology.triangles).closed();
   if (*topology.closed) return;
   const MeshDefects defects = findMeshDefects(topology.triangles);

@@ -40,7 +40,7 @@ TreePair treesOf(const PairRecord& record, bool adjacentPairs, double thickness)
 }
 
 double boxThickness(const PairRecord& record) {
-  return record.plan.method == Method::Intersection ? 0.0 : record.meshes().thicknessAtEnd();
+  return record.plan.method == Method::Intersection ? 0.0 : record.meshes().reach();
 }
 
 FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <limits>
@@ -37,33 +38,53 @@ void checkPositions(GeometryId id, std::span<const Eigen::Vector3d> positions, E
 }
 
 void checkCounts(GeometryId id, std::span<const Eigen::Vector3d> positions,
-                 std::span<const Triangle> triangles) {
+                 std::span<const Triangle> triangles, GeometryKind kind) {
+  const bool lines = kind == GeometryKind::Lines;
+  const std::string element = lines ? "segment" : "triangle";
   // Ids are 32 bits, and the highest bit of octree node numbers is taken.
   constexpr std::size_t kMost = std::size_t{1} << 28;
   if (positions.size() > kMost || triangles.size() > kMost)
     throw Error(ErrorCode::TooLarge,
                 nameOf(id) + ": " + std::to_string(positions.size()) + " vertices and " +
-                    std::to_string(triangles.size()) +
-                    " triangles; at most 2^28 of each can be named",
+                    std::to_string(triangles.size()) + " " + element +
+                    "s; at most 2^28 of each can be named",
                 id);
-  for (std::size_t t = 0; t < triangles.size(); ++t)
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
     for (const std::uint32_t vertex : triangles[t])
       if (vertex >= positions.size())
         throw Error(ErrorCode::IndexOutOfRange,
-                    nameOf(id) + ", triangle " + std::to_string(t) + ": vertex index " +
+                    nameOf(id) + ", " + element + " " + std::to_string(t) + ": vertex index " +
                         std::to_string(vertex) + " is out of range; the mesh has " +
                         std::to_string(positions.size()) + " vertices",
                     id, t);
+    if (lines && triangles[t][0] == triangles[t][1])
+      throw Error(ErrorCode::IndexOutOfRange,
+                  nameOf(id) + ", segment " + std::to_string(t) + ": joins vertex " +
+                      std::to_string(triangles[t][0]) + " with itself",
+                  id, t);
+  }
+}
+
+void checkRadii(GeometryId id, std::span<const double> radii) {
+  for (std::size_t v = 0; v < radii.size(); ++v)
+    if (!(radii[v] >= 0.0) || std::isinf(radii[v])) {
+      char value[32];
+      std::snprintf(value, sizeof value, "%g", radii[v]);
+      throw Error(ErrorCode::InvalidRadius,
+                  nameOf(id) + ", vertex " + std::to_string(v) + ": radius is " + value +
+                      "; it must be finite and not negative",
+                  id, v);
+    }
 }
 
 void checkPositionCount(const Geometry& geometry, std::size_t count) {
   if (count != geometry.mesh.topology.vertexCount)
-    throw Error(ErrorCode::WrongPositionCount,
-                nameOf(geometry.id) + ": " + std::to_string(count) +
-                    " positions given, but it has " +
-                    std::to_string(geometry.mesh.topology.vertexCount) +
-                    " vertices; setTriangles() changes their number",
-                geometry.id);
+    throw Error(
+        ErrorCode::WrongPositionCount,
+        nameOf(geometry.id) + ": " + std::to_string(count) + " positions given, but it has " +
+            std::to_string(geometry.mesh.topology.vertexCount) + " vertices" +
+            (geometry.mesh.topology.hasFaces() ? "; setTriangles() changes their number" : ""),
+        geometry.id);
 }
 
 void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
@@ -188,18 +209,33 @@ std::string nameOf(GeometryId id) {
   return "geometry " + std::to_string(static_cast<std::uint32_t>(id));
 }
 
+std::string nameOf(GeometryKind kind) {
+  if (kind == GeometryKind::Triangles) return "a triangle mesh";
+  return kind == GeometryKind::Lines ? "a line mesh" : "a point set";
+}
+
 GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
-                              std::span<const Triangle> triangles) {
+                              std::span<const Triangle> triangles, GeometryKind kind,
+                              std::span<const double> radii) {
   const GeometryId id{m_nextId};
   if (m_nextId == 0xffffffffu)
     throw Error(ErrorCode::TooLarge, "no geometry ids are left: 2^32 - 1 were given out");
-  checkCounts(id, positions, triangles);
+  checkCounts(id, positions, triangles, kind);
+  checkRadii(id, radii);
   auto geometry = std::make_unique<Geometry>();
   geometry->id = id;
   geometry->mesh.now.resize(positions.size());
   checkPositions(id, positions, geometry->mesh.now.data(), "");
   geometry->mesh.before = geometry->mesh.now;
-  geometry->mesh.topology = MeshTopology(positions.size(), triangles);
+  TriangleMesh& mesh = geometry->mesh;
+  mesh.topology = MeshTopology(positions.size(), triangles);
+  mesh.topology.kind = kind;
+  if (!radii.empty()) mesh.largestRadius = *std::max_element(radii.begin(), radii.end());
+  if (radii.size() > 1) mesh.radii.assign(radii.begin(), radii.end());
+  if (kind == GeometryKind::Lines) {
+    mesh.rest = mesh.now;
+    mesh.arcs = threadArcs(mesh.topology.edges, mesh.rest);
+  }
   geometry->smallestHeight = smallestHeight(geometry->mesh);
   m_geometries.push_back(std::move(geometry));
   ++m_nextId;
@@ -264,7 +300,12 @@ void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d>
 void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles) {
   Geometry& geometry = at(id);
-  checkCounts(id, positions, triangles);
+  if (!geometry.mesh.topology.hasFaces())
+    throw Error(ErrorCode::UnsupportedMethod,
+                nameOf(id) + " is " + nameOf(geometry.mesh.topology.kind) +
+                    "; setTriangles() is for triangle meshes",
+                id);
+  checkCounts(id, positions, triangles, GeometryKind::Triangles);
   std::vector<Eigen::Vector3d> now(positions.size());
   checkPositions(id, positions, now.data(), "");
   MeshTopology topology(positions.size(), triangles);

@@ -61,7 +61,9 @@ struct Geometry {
 /// Geometries by id, with the checks of what users hand in.
 class GeometryTable {
  public:
-  GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Triangle>);
+  /// radii: none, one for all, or as many as positions.
+  GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Triangle>,
+                 GeometryKind = GeometryKind::Triangles, std::span<const double> radii = {});
   void remove(GeometryId);
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> now);
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> before,
@@ -86,6 +88,7 @@ class GeometryTable {
   std::uint64_t m_framesEnded = 0;
 };
 
-std::string nameOf(GeometryId);  ///< "geometry 3"
+std::string nameOf(GeometryId);    ///< "geometry 3"
+std::string nameOf(GeometryKind);  ///< "a line mesh"
 
 }  // namespace palpate

@@ -51,6 +51,12 @@ const Settings& checked(const Settings& settings) {
   return settings;
 }
 
+void checkOnePerVertex(std::span<const Eigen::Vector3d> positions, std::span<const double> radii) {
+  if (radii.size() != positions.size())
+    throw Error(ErrorCode::InvalidRadius, std::to_string(radii.size()) + " radii given for " +
+                                              std::to_string(positions.size()) + " vertices");
+}
+
 }  // namespace
 
 struct OctreeBasedCD::Implementation {
@@ -75,6 +81,20 @@ struct OctreeBasedCD::Implementation {
   std::mutex sorting;  ///< of candidates, when a const query first asks for them
   PairOrderScratch sortingScratch;
 
+  GeometryId addLines(std::span<const Eigen::Vector3d> positions, std::span<const Segment> segments,
+                      std::span<const double> radii) {
+    std::vector<Triangle> triangles;
+    triangles.reserve(segments.size());
+    for (const auto& [p, q] : segments) triangles.push_back({p, q, q});
+    return geometries.add(positions, triangles, GeometryKind::Lines, radii);
+  }
+
+  GeometryId addPoints(std::span<const Eigen::Vector3d> positions, std::span<const double> radii) {
+    std::vector<Triangle> triangles(positions.size());
+    for (std::uint32_t i = 0; i < triangles.size(); ++i) triangles[i] = {i, i, i};
+    return geometries.add(positions, triangles, GeometryKind::Points, radii);
+  }
+
   /// An update() before detectCollision() belongs to its frame.
   void startFrame() {
     if (inFrame) return;
@@ -82,8 +102,11 @@ struct OctreeBasedCD::Implementation {
     statistics = {};
     for (const auto& geometry : geometries.all()) {
       ++statistics.geometries;
-      statistics.triangles += geometry->mesh.topology.triangles.size();
-      statistics.untestedVertices += geometry->mesh.topology.untestedVertices;
+      const MeshTopology& topology = geometry->mesh.topology;
+      (topology.hasFaces()                    ? statistics.triangles
+       : topology.kind == GeometryKind::Lines ? statistics.segments
+                                              : statistics.points) += topology.triangles.size();
+      statistics.untestedVertices += topology.untestedVertices;
     }
   }
 
@@ -224,7 +247,12 @@ struct OctreeBasedCD::Implementation {
     for (const auto& geometry : geometries.all()) {
       indices.emplace(geometry.get(), static_cast<std::uint32_t>(indices.size()));
       const TriangleMesh& mesh = geometry->mesh;
-      problem.geometries.push_back({geometry->id, mesh.before, mesh.now, mesh.topology.triangles});
+      const GeometryKind kind = mesh.topology.kind;
+      problem.geometries.push_back(
+          {geometry->id, mesh.before, mesh.now, {}, kind, mesh.radii, mesh.rest});
+      CollisionProblem::Mesh& copy = problem.geometries.back();
+      if (kind != GeometryKind::Points) copy.triangles = mesh.topology.triangles;
+      if (copy.radii.empty() && mesh.largestRadius > 0.0) copy.radii = {mesh.largestRadius};
     }
     for (const auto& record : pairs.records())
       problem.pairs.push_back({indices.at(record->a), indices.at(record->b), record->pair.settings,
@@ -244,6 +272,28 @@ OctreeBasedCD::~OctreeBasedCD() = default;
 GeometryId OctreeBasedCD::addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                                           std::span<const Triangle> triangles) {
   return m_implementation->geometries.add(positions, triangles);
+}
+
+GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
+                                      std::span<const Segment> segments, double radius) {
+  return m_implementation->addLines(positions, segments, {&radius, 1});
+}
+
+GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
+                                      std::span<const Segment> segments,
+                                      std::span<const double> radii) {
+  checkOnePerVertex(positions, radii);
+  return m_implementation->addLines(positions, segments, radii);
+}
+
+GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions, double radius) {
+  return m_implementation->addPoints(positions, {&radius, 1});
+}
+
+GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions,
+                                      std::span<const double> radii) {
+  checkOnePerVertex(positions, radii);
+  return m_implementation->addPoints(positions, radii);
 }
 
 void OctreeBasedCD::removeGeometry(GeometryId geometry) {

@@ -25,9 +25,40 @@ std::string shortest(double value) {
   return text;
 }
 
+/// Throws what is wrong with the settings for the pair's kinds.
+void checkKinds(const TriangleMesh& a, const TriangleMesh& b, const PairSettings& settings,
+                GeometryId id, const std::string& name) {
+  const auto refuse = [&](const std::string& reason, ErrorCode code) {
+    throw Error(code, name + ": " + reason, id);
+  };
+  if (!(settings.restDistance >= 0.0) || std::isinf(settings.restDistance))
+    refuse("restDistance is " + shortest(settings.restDistance) +
+               "; it must be finite and not negative",
+           ErrorCode::InvalidSettings);
+  if (settings.restDistance > 0.0 && (&a != &b || a.topology.kind != GeometryKind::Lines))
+    refuse("restDistance is for a line mesh with itself", ErrorCode::InvalidSettings);
+  if (settings.restDistance > 0.0 && a.arcs.size() != a.topology.edges.size())
+    refuse("restDistance needs a thread without branches", ErrorCode::InvalidSettings);
+  if (a.topology.hasFaces() && b.topology.hasFaces()) return;
+  const std::string kinds = nameOf(a.topology.kind) + " and " + nameOf(b.topology.kind);
+  const auto isPoints = [](const TriangleMesh& mesh) {
+    return mesh.topology.kind == GeometryKind::Points;
+  };
+  if ((isPoints(a) && !b.topology.hasFaces()) || (isPoints(b) && !a.topology.hasFaces()))
+    refuse(kinds + " cannot be tested against each other yet", ErrorCode::UnsupportedMethod);
+  if (settings.method == Method::Auto || settings.method == Method::Intersection)
+    refuse("this method is for two triangle meshes, not for " + kinds +
+               "; Proximity and Continuous are",
+           ErrorCode::UnsupportedMethod);
+  if (settings.method == Method::Continuous && !(a.radii.empty() && b.radii.empty()))
+    refuse("Method::Continuous needs one radius for all vertices", ErrorCode::UnsupportedMethod);
+}
+
 /// Throws what is wrong with the settings.
-void check(GeometryId a, GeometryId b, const PairSettings& settings) {
+void check(const Geometry& first, const Geometry& second, const PairSettings& settings) {
+  const GeometryId a = first.id, b = second.id;
   const std::string name = nameOf(a, b);
+  checkKinds(first.mesh, second.mesh, settings, a, name);
   if (!(settings.thickness >= 0.0) || std::isinf(settings.thickness))
     throw Error(ErrorCode::InvalidSettings,
                 name + ": thickness is " + shortest(settings.thickness) +
@@ -51,7 +82,7 @@ void check(GeometryId a, GeometryId b, const PairSettings& settings) {
     case Method::Continuous:
       return;
     case Method::Proximity:
-      if (settings.thickness == 0.0)
+      if (settings.thickness + (first.mesh.largestRadius + second.mesh.largestRadius) == 0.0)
         throw Error(ErrorCode::InvalidSettings,
                     name + ": Method::Proximity needs a positive thickness; it is 0", a);
       return;
@@ -71,7 +102,7 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
                     const PairSettings& settings) {
   Geometry& first = geometries.at(a);
   Geometry& second = geometries.at(b);
-  check(a, b, settings);
+  check(first, second, settings);
   if (m_byIds.contains(keyOf(a, b)))
     throw Error(ErrorCode::DuplicatePair,
                 nameOf(a, b) + " was added before; setPairSettings() changes its settings", a);
@@ -104,7 +135,7 @@ PairRecord& PairTable::inOrder(const GeometryTable& geometries, GeometryId a, Ge
 void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
                     const PairSettings& settings) {
   PairRecord& record = at(geometries, a, b);
-  check(a, b, settings);
+  check(*record.a, *record.b, settings);
   record.pair.settings = settings;
   record.plan = planOf(settings, *record.a, *record.b);
   record.dataFor = record.candidatesFor = {};

@@ -33,12 +33,19 @@ void addFarMovers(std::vector<std::uint32_t>& out, const Geometry& mesh, const G
 
 }  // namespace
 
+/// Bounds on motion are of triangles, which have no radius.
+static bool knowsSides(const Geometry& a, const Geometry& b) {
+  return a.mesh.topology.hasFaces() && b.mesh.topology.hasFaces();
+}
+
 PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry& b) {
   PairPlan plan;
   plan.method = settings.method;
   StepPlan& step = plan.step;
   const double thickness = settings.thickness;
-  plan.motion = step.motion = largestMotion(a.motion, b.motion);
+  plan.motion = largestMotion(a.motion, b.motion);
+  if (!knowsSides(a, b)) return plan;
+  step.motion = plan.motion;
   if (settings.method == Method::Auto) {
     plan.tolerance = step.slow = settings.tolerance < 0 ? thickness / 2 : settings.tolerance;
     if (plan.motion == 0.0) {
@@ -74,7 +81,7 @@ void Trust::start(const PairSettings& settings, const Geometry& a, const Geometr
   m_frame = frame;
   m_topologyA = a.topologyRevision;
   m_topologyB = b.topologyRevision;
-  if (m_startsApart || plan.method == Method::Intersection ||
+  if (!knowsSides(a, b) || m_startsApart || plan.method == Method::Intersection ||
       (plan.method == Method::Proximity && plan.motion > 0.0 && plan.step.motion == 0.0))
     return;
   plan.step.start = settings.method == Method::Auto || plan.motion == 0.0 || --m_wait <= 0;
@@ -120,6 +127,7 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
             ? within && validity.startedApart && facts.verticesA.empty() && facts.verticesB.empty()
             : plan.motion == 0.0 || (within && !(nearby && contents.intersectingTriangles.empty()));
   }
+  validity.trusted = validity.trusted && knowsSides(a, b);
   validity.sideMayBeWrong = plan.method != Method::Intersection && !validity.trusted;
   m_apart = plan.method == Method::Intersection
                 ? plan.motion == 0.0 && contents.intersectingTriangles.empty()

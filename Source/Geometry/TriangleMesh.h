@@ -3,6 +3,7 @@
 #include <palpate/Types.h>
 
 #include "Core/Buffer.h"
+#include "Geometry/Thread.h"
 
 #include <cstdint>
 #include <optional>
@@ -32,6 +33,7 @@ struct MeshTopology {
   /// Indices must be below vertexCount.
   MeshTopology(std::size_t vertexCount, std::span<const Triangle> triangles);
 
+  GeometryKind kind = GeometryKind::Triangles;
   std::size_t vertexCount = 0;
   std::vector<Triangle> triangles;
   std::vector<Segment> edges;  ///< unique, lower vertex first, sorted
@@ -45,6 +47,8 @@ struct MeshTopology {
 
   /// Of an edge, lower vertex first; kNoEdge if there is none such.
   std::uint32_t edgeOf(const Segment& edge) const;
+  /// Others' vertices are tested against triangles with faces only.
+  bool hasFaces() const { return kind == GeometryKind::Triangles; }
   bool ownsCorner(std::uint32_t triangle, int corner) const {
     return owned[triangle] >> corner & 1;
   }
@@ -53,11 +57,29 @@ struct MeshTopology {
   }
 };
 
-/// A triangle mesh as handed in: topology once, positions per frame.
+inline bool shareVertex(const Segment& a, const Segment& b) {
+  return a[0] == b[0] || a[0] == b[1] || a[1] == b[0] || a[1] == b[1];
+}
+
+/// A mesh as handed in: topology once, positions per frame. A segment is the triangle {p, q, q}, a
+/// point {p, p, p}.
 struct TriangleMesh {
   MeshTopology topology;
   std::vector<Eigen::Vector3d> now;
   std::vector<Eigen::Vector3d> before;
+  std::vector<double> radii{};          ///< L, per vertex; empty: all have the largest
+  double largestRadius = 0.0;           ///< L
+  std::vector<Eigen::Vector3d> rest{};  ///< of lines: when they were added
+  std::vector<ThreadArc> arcs{};        ///< of lines without branches: per edge
+
+  double radius(std::uint32_t vertex) const {
+    return radii.empty() ? largestRadius : radii[vertex];
+  }
+  /// At p0 + weight (p1 - p0).
+  double radius(const Segment& edge, double weight) const {
+    if (radii.empty()) return largestRadius;
+    return (1.0 - weight) * radii[edge[0]] + weight * radii[edge[1]];
+  }
 };
 
 }  // namespace palpate

@@ -1,5 +1,7 @@
 #include "NarrowPhase/Proximity.h"
 
+#include "NarrowPhase/LineEdges.h"
+
 #include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
 
@@ -16,8 +18,7 @@ using Eigen::Vector3d;
 /// One vertex against every triangle of a mesh, as the definition of Contacts::Distinct reads.
 class VertexAgainstMesh {
  public:
-  VertexAgainstMesh(const TriangleMesh& triangles, double thickness)
-      : m_mesh(triangles), m_thickness(thickness) {}
+  explicit VertexAgainstMesh(const TriangleMesh& triangles) : m_mesh(triangles) {}
 
   /// vertex: its id if the mesh is its own, whose triangles at the vertex are left out.
   void measure(const Vector3d& p, std::optional<std::uint32_t> vertex, ContactBuffers& out) {
@@ -35,10 +36,9 @@ class VertexAgainstMesh {
 
   std::size_t size() const { return m_answers.size(); }
 
-  /// The triangle's answer if it is within the thickness.
-  const VertexTriangleDistance* near(std::uint32_t triangle) const {
-    const auto& answer = m_answers[triangle];
-    return answer && answer->distance <= m_thickness ? &*answer : nullptr;
+  /// Null of a triangle at the vertex.
+  const VertexTriangleDistance* answer(std::uint32_t triangle) const {
+    return m_answers[triangle] ? &*m_answers[triangle] : nullptr;
   }
 
   MeshFeature feature(std::uint32_t triangle) const {
@@ -87,7 +87,6 @@ class VertexAgainstMesh {
   }
 
   const TriangleMesh& m_mesh;
-  double m_thickness;
   Vector3d m_position;
   std::vector<std::optional<VertexTriangleDistance>> m_answers;
 };
@@ -100,24 +99,27 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
   const bool distinct = pair.settings.contacts == Contacts::Distinct;
   const Features<ImpactQuery::Kind::VertexTriangle> features{vertices, triangles};
   StepCheck check(pair, out);
-  VertexAgainstMesh against(triangles, pair.thicknessAtEnd());
+  VertexAgainstMesh against(triangles);
   for (const std::uint32_t v : sample) {
     against.measure(vertices.now[v], pair.self() ? std::optional(v) : std::nullopt, out);
     for (std::uint32_t t = 0; t < against.size(); ++t) {
-      const VertexTriangleDistance* answer = against.near(t);
-      if (!answer) continue;
+      const VertexTriangleDistance* answer = against.answer(t);
+      if (!answer || !(answer->distance - vertices.radius(v) <= pair.thicknessAtEnd())) continue;
       if (check.isAnsweredByImpact(features, v, t, kSecond, answer->distance)) continue;
       if (distinct) {
         const MeshFeature feature = against.feature(t);
         const bool isVertex = feature.kind == MeshFeature::Kind::Vertex;
-        if (isVertex && (kSecond || (pair.self() && feature.id < v))) continue;
+        const bool reportedByOther =
+            pair.self() ? feature.id < v : kSecond && pair.b.topology.hasFaces();
+        if (isVertex && reportedByOther) continue;
         if (!against.isDistinct(t)) continue;
       }
       const Triangle& corners = triangles.topology.triangles[t];
       check.noteTriangle(t, !kSecond, triangles.now[corners[0]], triangles.now[corners[1]],
                          triangles.now[corners[2]]);
-      (kSecond ? out.triangleVertex : out.vertexTriangle)
-          .push_back(contactOf(v, t, corners, *answer, pair.step.impacts ? 1.0 : 0.0));
+      auto& list = kSecond ? out.triangleVertex : out.vertexTriangle;
+      list.push_back(contactOf(v, t, corners, *answer, pair.step.impacts ? 1.0 : 0.0));
+      list.back().distance -= vertices.radius(v);
     }
   }
 }
@@ -129,7 +131,7 @@ void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
   StepCheck check(pair, out);
   for (const std::uint32_t i : sample) {
     for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
-      if (pair.self() && shareVertex(a[i], b[j])) continue;
+      if (pair.leavesOut(i, j)) continue;
       const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(
           pair.a.now[a[i][0]], pair.a.now[a[i][1]], pair.b.now[b[j][0]], pair.b.now[b[j][1]]);
       ++out.featurePairs;
@@ -146,13 +148,63 @@ void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
   }
 }
 
+/// Edges that hold a feature, of all.
+std::vector<std::uint32_t> edgesOf(const MeshTopology& topology, const MeshFeature& feature) {
+  if (feature.kind == MeshFeature::Kind::Edge) return {feature.id};
+  std::vector<std::uint32_t> holders;
+  for (std::uint32_t e = 0; e < topology.edges.size(); ++e)
+    if (topology.edges[e][0] == feature.id || topology.edges[e][1] == feature.id)
+      holders.push_back(e);
+  return holders;
+}
+
+/// As testLineEdges() defines Distinct: every pair of holders asked, the lowest taken at the end.
+bool isDistinctOfLines(const MeshPair& pair, const std::array<std::uint32_t, 2>& edges,
+                       const std::array<MeshFeature, 2>& features) {
+  if (!isForEdges(pair, features)) return false;
+  std::array<std::uint32_t, 2> lowest = edges;
+  for (const std::uint32_t a : edgesOf(pair.a.topology, features[0]))
+    for (const std::uint32_t b : edgesOf(pair.b.topology, features[1])) {
+      std::array<std::uint32_t, 2> ids{a, b};
+      std::array<MeshFeature, 2> shared = features;
+      if (pair.self() && b < a) {
+        std::swap(ids[0], ids[1]);
+        std::swap(shared[0], shared[1]);
+      }
+      const std::optional<EdgesNearby> other = measureEdges(pair, ids[0], ids[1]);
+      if (!other) continue;
+      if (other->features != shared) return false;
+      lowest = std::min(lowest, ids);
+    }
+  return lowest == edges;
+}
+
+void findLineEdges(const MeshPair& pair, std::span<const std::uint32_t> sample,
+                   ContactBuffers& out) {
+  const std::vector<Segment>&a = pair.a.topology.edges, &b = pair.b.topology.edges;
+  for (const std::uint32_t i : sample)
+    for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
+      ++out.featurePairs;
+      const std::optional<EdgesNearby> nearby = measureEdges(pair, i, j);
+      if (!nearby || (pair.settings.contacts == Contacts::Distinct &&
+                      !isDistinctOfLines(pair, {i, j}, nearby->features)))
+        continue;
+      out.exactDecisions += nearby->centres.exact;
+      out.edgeEdge.push_back(contactOf(a[i], b[j], nearby->centres));
+      out.edgeEdge.back().distance = nearby->distance;
+    }
+}
+
 }  // namespace
 
 void findProximityByBruteForce(const MeshPair& pair, const FeatureLists& features,
                                ContactBuffers& out) {
   findVertexTriangle<false>(pair, features.verticesOfA, out);
   findVertexTriangle<true>(pair, features.verticesOfB, out);
-  findEdgeEdge(pair, features.edgesOfA, out);
+  if (pair.hasLines())
+    findLineEdges(pair, features.edgesOfA, out);
+  else
+    findEdgeEdge(pair, features.edgesOfA, out);
 }
 
 }  // namespace palpate

@@ -21,7 +21,8 @@ using Kind = ImpactQuery::Kind;
 
 TimeOfImpactSettings settingsOf(const MeshPair& pair) {
   TimeOfImpactSettings settings;
-  settings.minimumDistance = pair.settings.thickness;
+  settings.minimumDistance =
+      pair.settings.thickness + (pair.a.largestRadius + pair.b.largestRadius);
   return settings;
 }
 
@@ -60,6 +61,9 @@ void forEachLikelyPair(const MeshPair& pair, std::span<const TrianglePair> candi
                        ContactBuffers& out, F&& f) {
   FeaturePairs& pairs = out.features;
   findFeaturePairs(pair.a.topology, pair.b.topology, pair.floats, candidates, pairs);
+  if (pair.settings.restDistance > 0.0)
+    std::erase_if(pairs.edgeEdge,
+                  [&](const FeaturePair& edges) { return pair.leavesOut(edges.a, edges.b); });
   out.featurePairs += pairs.owned;
   const TimeOfImpactSettings settings = settingsOf(pair);
   filterPairs<false>(Features<Kind::VertexTriangle>{pair.a, pair.b}, pairs.vertexTriangle, settings,
@@ -113,6 +117,7 @@ class ContactFinder {
   template <class Contact, class PlaneNormal>
   void complete(Contact& contact, const ImpactQuery& query, double time, PlaneNormal&& normal) {
     contact.timeOfImpact = time;
+    contact.distance -= m_pair.a.largestRadius + m_pair.b.largestRadius;
     if (m_settings.minimumDistance > 0.0) return;
     contact.normal = normal();
     if (sideBefore(query, time) < 0) contact.normal = -contact.normal;
@@ -158,10 +163,10 @@ void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, Contact
       }
     }
   }
-  const auto &a = pair.a.topology.edges, &b = pair.b.topology.edges;
+  const auto edgeCount = static_cast<std::uint32_t>(pair.b.topology.edges.size());
   for (const std::uint32_t i : lists.edgesOfA)
-    for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
-      if (pair.self() && shareVertex(a[i], b[j])) continue;
+    for (std::uint32_t j = pair.self() ? i + 1 : 0; j < edgeCount; ++j) {
+      if (pair.leavesOut(i, j)) continue;
       ++out.featurePairs;
       f(Features<Kind::EdgeEdge>{pair.a, pair.b}, i, j, false);
     }

@@ -321,6 +321,8 @@ HWY_ATTR void findFeaturePairsOf(const Side& a, const Side& b, std::span<const T
                                  FeaturePairs& out) {
   const bool self = &a.topology == &b.topology;
   const unsigned excluded = self ? ~0u : 0u;
+  const unsigned tested = kEdges | (b.topology.hasFaces() ? kCornersOfA : 0) |
+                          (a.topology.hasFaces() ? kCornersOfB : 0);
   out.vertexTriangle.resize(pairs.size() * (self ? 6 : 3));
   out.triangleVertex.resize(self ? 0 : pairs.size() * 3);
   out.edgeEdge.resize(pairs.size() * 9);
@@ -332,7 +334,7 @@ HWY_ATTR void findFeaturePairsOf(const Side& a, const Side& b, std::span<const T
     for (const TrianglePair& pair :
          pairs.subspan(begin, std::min(ChosenTests::kMost, pairs.size() - begin))) {
       const auto [rowA, rowB] = cache.rows(pair);
-      unsigned tests = rowA.ownedByA & rowB.ownedByB;
+      unsigned tests = rowA.ownedByA & rowB.ownedByB & tested;
       tests &= ~(sharingTests(rowA, rowB) & excluded);
       owned += static_cast<std::size_t>(std::popcount(tests));
       tests &= overlappingTests(rowA, rowB);

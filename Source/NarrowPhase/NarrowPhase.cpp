@@ -65,8 +65,8 @@ FeatureLists everyFeature(const MeshPair& pair) {
     fill(every.trianglesOfA, pair.a.topology.triangles.size());
     return every;
   }
-  fillTested(every.verticesOfA, pair.a.topology);
-  if (!pair.self()) fillTested(every.verticesOfB, pair.b.topology);
+  if (pair.b.topology.hasFaces()) fillTested(every.verticesOfA, pair.a.topology);
+  if (pair.a.topology.hasFaces() && !pair.self()) fillTested(every.verticesOfB, pair.b.topology);
   fill(every.edgesOfA, pair.a.topology.edges.size());
   return every;
 }

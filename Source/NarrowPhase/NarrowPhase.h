@@ -35,7 +35,18 @@ struct MeshPair {
   const FloatPair* floats = nullptr;
   StepPlan step{};
   double thicknessAtEnd() const { return settings.thickness + step.extra; }
+  /// L: centres further apart are no contacts.
+  double reach() const { return thicknessAtEnd() + (a.largestRadius + b.largestRadius); }
   bool self() const { return &a == &b; }
+  bool hasLines() const {
+    return a.topology.kind == GeometryKind::Lines || b.topology.kind == GeometryKind::Lines;
+  }
+  /// Self-collision: edges with a common vertex, or too near along the thread.
+  bool leavesOut(std::uint32_t edgeA, std::uint32_t edgeB) const {
+    return self() && (shareVertex(a.topology.edges[edgeA], a.topology.edges[edgeB]) ||
+                      (settings.restDistance > 0.0 &&
+                       arcBetween(a.arcs[edgeA], a.arcs[edgeB]) < settings.restDistance));
+  }
 };
 
 /// What was seen of a method's conditions. Ids may repeat.

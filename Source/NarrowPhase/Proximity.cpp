@@ -1,6 +1,7 @@
 #include "NarrowPhase/Proximity.h"
 
 #include "NarrowPhase/FeatureTests.h"
+#include "NarrowPhase/LineEdges.h"
 #include "NarrowPhase/ProximityFilter.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
@@ -43,7 +44,8 @@ class VertexTriangleFinder {
     const VertexTriangleDistance answer = finiteVertexTriangleDistance(
         p, m_positions[corners[0]], m_positions[corners[1]], m_positions[corners[2]]);
     m_exactDecisions += answer.exact;
-    if (!(answer.distance <= m_thickness)) return;
+    const double radius = m_features.first.radius(vertex);
+    if (!(answer.distance - radius <= m_thickness)) return;
     if (m_check.isAnsweredByImpact(m_features, vertex, triangle, m_ofSecond, answer.distance))
       return;
     if (m_distinct &&
@@ -52,6 +54,7 @@ class VertexTriangleFinder {
     m_check.noteTriangle(triangle, !m_ofSecond, m_positions[corners[0]], m_positions[corners[1]],
                          m_positions[corners[2]]);
     m_out.push_back(contactOf(vertex, triangle, corners, answer, m_time));
+    m_out.back().distance -= radius;
   }
 
  private:
@@ -149,7 +152,14 @@ class ProximityFinder {
         m_out(out),
         m_check(pair, out),
         m_ofA(pair, false, pair.self() ? Corners::LowerVertexOnly : Corners::All, out),
-        m_ofB(pair, true, pair.self() ? Corners::LowerVertexOnly : Corners::None, out) {}
+        m_ofB(pair, true,
+              pair.self()                  ? Corners::LowerVertexOnly
+              : pair.b.topology.hasFaces() ? Corners::None
+                                           : Corners::All,
+              out),
+        m_tested((pair.b.topology.hasFaces() ? 07u : 0) | (pair.a.topology.hasFaces() ? 070u : 0) |
+                 ~077u),
+        m_distinct(pair.settings.contacts == Contacts::Distinct && !pair.hasLines()) {}
 
   void find(std::span<const TrianglePair> candidates) {
     for (const TrianglePair& candidate : candidates) add(candidate);
@@ -164,6 +174,7 @@ class ProximityFinder {
     std::uint32_t pairs = kOwnedInA[a.owned[candidate.a]] & kOwnedInB[b.owned[candidate.b]];
     const Triangle &s = a.triangles[candidate.a], &t = b.triangles[candidate.b];
     if (m_pair.self()) pairs &= ~kSharing[sameCorners(s, t)];
+    pairs &= m_tested;
     if (pairs == 0) return;
     m_pairs[m_size] = pairs;
     m_candidates[m_size] = candidate;
@@ -180,9 +191,7 @@ class ProximityFinder {
   void flush() {
     if (m_size == 0) return;
     std::uint32_t possible[TrianglePairBatch::kSize];
-    findPossibleProximity(m_batch, m_pair.thicknessAtEnd(),
-                          m_pair.settings.contacts == Contacts::Distinct, m_check.edgeReach(),
-                          possible);
+    findPossibleProximity(m_batch, m_pair.reach(), m_distinct, m_check.edgeReach(), possible);
     for (int i = 0; i < m_size; ++i) {
       m_out.featurePairs += countOf(m_pairs[i]);
       for (std::uint32_t left = m_pairs[i] & possible[i]; left != 0; left &= left - 1)
@@ -199,6 +208,7 @@ class ProximityFinder {
     std::uint32_t edgeA = a.triangleEdges[candidate.a][(bit - 6) / 3];
     std::uint32_t edgeB = b.triangleEdges[candidate.b][(bit - 6) % 3];
     if (m_pair.self() && edgeB < edgeA) std::swap(edgeA, edgeB);
+    if (m_pair.hasLines()) return testLineEdges(m_pair, edgeA, edgeB, m_out);
     testEdges(m_pair, edgeA, edgeB, m_check, m_out);
   }
 
@@ -206,6 +216,8 @@ class ProximityFinder {
   ContactBuffers& m_out;
   StepCheck m_check;
   VertexTriangleFinder m_ofA, m_ofB;
+  const std::uint32_t m_tested;  ///< by the meshes' kinds
+  const bool m_distinct;         ///< edges that meet at their ends are no contacts
   int m_size = 0;
   std::uint32_t m_pairs[TrianglePairBatch::kSize];
   TrianglePair m_candidates[TrianglePairBatch::kSize];

@@ -38,10 +38,6 @@ inline bool holdsVertex(const Triangle& triangle, std::uint32_t vertex) {
   return triangle[0] == vertex || triangle[1] == vertex || triangle[2] == vertex;
 }
 
-inline bool shareVertex(const Segment& a, const Segment& b) {
-  return a[0] == b[0] || a[0] == b[1] || a[1] == b[0] || a[1] == b[1];
-}
-
 inline VertexTriangleContact contactOf(std::uint32_t vertex, std::uint32_t triangle,
                                        const Triangle& corners,
                                        const VertexTriangleDistance& answer, double time = 0.0) {

@@ -24,6 +24,7 @@ void payRows(Report&, const RowOptions&);         ///< a small tool against larg
 void scaleRows(Report&, const RowOptions&);       ///< to four million triangles, bytes a triangle
 void steadyRows(Report&, const RowOptions&);      ///< allocations of a thousand frames, p99
 void featureRows(Report&, const RowOptions&);     ///< vertex-triangle and edge-edge candidates
+void lineRows(Report&, const RowOptions&);        ///< a suture with itself and with organs
 void continuousRows(Report&, const RowOptions&);  ///< times of impact of the published steps
 void simdRows(Report&, const RowOptions&);        ///< every path that this processor runs
 

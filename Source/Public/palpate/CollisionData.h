@@ -20,7 +20,9 @@ struct VertexTriangleContact {
   std::array<std::uint32_t, 3> corners;  ///< the triangle's vertices
   Eigen::Vector3d barycentric;           ///< of the closest point, in the triangle's corner order
   Eigen::Vector3d normal;                ///< unit, from the triangle towards the vertex
-  double distance;      ///< L, never negative; at the time of impact for Continuous
+  /// L, less the vertex's radius; negative only by that, as deep as it overlaps; at the time of
+  /// impact for Continuous
+  double distance;
   double timeOfImpact;  ///< [0, 1] of the step; 0 for the static methods
   friend bool operator==(const VertexTriangleContact&, const VertexTriangleContact&) = default;
 };
@@ -30,7 +32,7 @@ struct EdgeEdgeContact {
   std::array<std::uint32_t, 2> edgeA, edgeB;  ///< vertex indices, lower first
   double weightA, weightB;                    ///< closest point = p0 + weight (p1 - p0)
   Eigen::Vector3d normal;                     ///< unit, from b towards a
-  double distance, timeOfImpact;              ///< L; [0, 1] of the step
+  double distance, timeOfImpact;              ///< L, less both radii, as above; [0, 1] of the step
   friend bool operator==(const EdgeEdgeContact&, const EdgeEdgeContact&) = default;
 };
 

@@ -13,7 +13,10 @@ struct CollisionProblem {
   struct Mesh {
     GeometryId id;  ///< where it comes from; nothing depends on it
     std::vector<Eigen::Vector3d> before, now;
-    std::vector<Triangle> triangles;
+    std::vector<Triangle> triangles;  ///< a segment {p, q} is {p, q, q}; none of points
+    GeometryKind kind = GeometryKind::Triangles;
+    std::vector<double> radii{};          ///< L: none, one for all, or one for each vertex
+    std::vector<Eigen::Vector3d> rest{};  ///< of lines: the shape that they were added in
   };
   struct Pair {
     std::uint32_t a, b;  ///< indices of geometries

@@ -13,7 +13,7 @@ namespace palpate {
 enum class ErrorCode {
   NonFinitePosition,   ///< a position is NaN or infinite
   WrongPositionCount,  ///< as many positions as the geometry has vertices are needed
-  IndexOutOfRange,     ///< a triangle names a vertex that is not there
+  IndexOutOfRange,     ///< an element names a vertex that is not there, a segment one twice
   UnknownGeometry,     ///< never added, or removed
   UnknownPair,         ///< never added, removed, or asked for in the other order
   DuplicatePair,       ///< added before, in either order
@@ -23,6 +23,7 @@ enum class ErrorCode {
   TooLarge,            ///< more elements than 32-bit ids can name
   NotAvailable,        ///< the answer was not kept, or no frame has been computed
   File,                ///< a file that cannot be read or written, or is not what it should be
+  InvalidRadius,       ///< negative, NaN or infinite, or not one for each vertex
 };
 
 /// What was wrong with a call, and where. The call that throws it has changed nothing.

@@ -22,8 +22,8 @@ struct CollisionPair {
   PairSettings settings;
 };
 
-/// Collision detection over deforming triangle meshes: add geometries and pairs once, then each
-/// frame setPositions(), detectCollision(), and read collisionData().
+/// Collision detection over deforming triangle meshes, lines and points: add geometries and pairs
+/// once, then each frame setPositions(), detectCollision(), and read collisionData().
 ///
 /// Errors   every function that takes data throws palpate::Error and changes nothing.
 /// Threads  const functions are safe from many threads while no other function runs.
@@ -37,6 +37,19 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Any soup: several components, borders, non-manifold edges, no triangles at all. Copied in.
   GeometryId addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                              std::span<const Triangle> triangles);
+  /// A thread of any shape: open, closed, branching, several. radius: L, of all, or one for each
+  /// vertex and linear between; finite, not negative. No segment may join a vertex with itself.
+  ///
+  /// Edges meet triangles' edges and other lines' edges in edgeEdge(), vertices meet triangles.
+  /// Features touch where centre lines come closest, if their distance there is at most the
+  /// thickness and the radii there. Docs/Pairs.md has what each pair of kinds answers.
+  GeometryId addLineMesh(std::span<const Eigen::Vector3d> positions,
+                         std::span<const Segment> segments, double radius = 0.0);
+  GeometryId addLineMesh(std::span<const Eigen::Vector3d> positions,
+                         std::span<const Segment> segments, std::span<const double> radii);
+  /// Point i is vertex i. Points meet triangles.
+  GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, double radius = 0.0);
+  GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
   void removeGeometry(GeometryId);  ///< and its pairs
 
   /// A frame ends at detectCollision() or collectCandidates(). With one array, "before" is the
@@ -45,11 +58,12 @@ class PALPATE_EXPORT OctreeBasedCD {
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> now);
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> before,
                     std::span<const Eigen::Vector3d> now);
-  /// Topology changed, as by a cut.
+  /// Topology changed, as by a cut. Of triangle meshes only.
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
 
-  /// a == b: self-collision, adjacent features excluded.
+  /// a == b: self-collision, adjacent features excluded. Kinds and methods that cannot be tested
+  /// are refused: UnsupportedMethod.
   void addCollisionPair(GeometryId a, GeometryId b, const PairSettings& = {});
   void setPairSettings(GeometryId a, GeometryId b, const PairSettings&);
   void removeCollisionPair(GeometryId a, GeometryId b);
@@ -85,9 +99,9 @@ class PALPATE_EXPORT OctreeBasedCD {
 
   /// (a, b) in the order in which the pair was added.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;
-  /// Sorted by (a, b): every triangle pair whose boxes, inflated by half the pair's thickness each,
-  /// overlap; more only by outward rounding. (a, a): each unordered pair once, a < b, sharing no
-  /// vertex. After detectCollision() only with Settings::keepCandidates.
+  /// Sorted by (a, b): every primitive pair whose boxes, inflated by half the pair's thickness and
+  /// largest radii each, overlap; more only by outward rounding. (a, a): each unordered pair once,
+  /// a < b, sharing no vertex. After detectCollision() only with Settings::keepCandidates.
   std::span<const TrianglePair> candidatePairs(GeometryId a, GeometryId b) const;
   const LooseOctree& octree() const;          ///< as of the last update()
   const FrameStatistics& statistics() const;  ///< of the last frame

@@ -64,6 +64,10 @@ struct PairSettings {
   /// end, with up to this much added to the thickness; others for impacts. Larger: faster, more
   /// contacts that are further apart. Negative: half the thickness.
   double tolerance = -1.0;
+  /// L, finite, not negative. A line mesh with itself: edges whose nearest ends are less than this
+  /// apart along the thread, in the shape that it was added in, are no contacts. 0: only edges with
+  /// a common vertex. Needs a mesh without branches.
+  double restDistance = 0.0;
 };
 
 }  // namespace palpate

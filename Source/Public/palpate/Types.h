@@ -11,11 +11,15 @@ namespace palpate {
 /// A geometry of one OctreeBasedCD. Given out once, never reused.
 enum class GeometryId : std::uint32_t {};
 
+/// What a geometry's primitives are.
+enum class GeometryKind : std::uint8_t { Triangles, Lines, Points };
+
 using Triangle = std::array<std::uint32_t, 3>;  ///< vertex indices; winding gives the normal
 /// vertex indices, lower first where it is an edge of a mesh
 using Segment = std::array<std::uint32_t, 2>;
 
-/// Two triangles, by index in their meshes; `a` from the pair's first geometry.
+/// Two primitives (triangles, segments or points) by index in their geometries; `a` from the pair's
+/// first.
 struct TrianglePair {
   std::uint32_t a;
   std::uint32_t b;

@@ -29,5 +29,14 @@ int main() {
   for (const auto& contact : collisions.collisionData(organ, tool).triangleVertex())
     respond(palpate::stencil(contact), contact);
   // README ends
-  return contacts == 1 ? 0 : 1;
+
+  const std::vector<palpate::Segment> segments{{0, 1}, {1, 2}};
+  const auto thread = collisions.addLineMesh(toolPositions, segments, 0.01);
+  const auto drops = collisions.addPointSet(toolPositions, 0.01);
+  for (const auto other : {thread, drops})
+    collisions.addCollisionPair(organ, other, {palpate::Method::Proximity, 0.1});
+  collisions.detectCollision();
+  for (const auto other : {thread, drops})
+    contacts += static_cast<int>(collisions.collisionData(organ, other).triangleVertex().size());
+  return contacts == 3 ? 0 : 1;
 }

@@ -217,10 +217,10 @@ TEST_F(Capture, RefusesWhatIsWrongByName) {
     write(text.replace(place, from.size(), to));
     expectRefused(reason);
   };
-  expectRefusedWith("palpate-capture 2", "solid 2", "it is not a capture");
-  expectRefusedWith("palpate-capture 2", "palpate-capture 3",
-                    "it is of version 3; versions up to 2");
-  expectRefusedWith("palpate-capture 2", "palpate-capture x", "line 1: \"x\" is not an integer");
+  expectRefusedWith("palpate-capture 3", "solid 3", "it is not a capture");
+  expectRefusedWith("palpate-capture 3", "palpate-capture 4",
+                    "it is of version 4; versions up to 3");
+  expectRefusedWith("palpate-capture 3", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 99999999999\n", "is not an integer in range");
@@ -238,13 +238,24 @@ TEST_F(Capture, RefusesWhatIsWrongByName) {
   EXPECT_NO_THROW(readCapture(file()));
 }
 
-TEST_F(Capture, ReadsTheFirstVersion) {
+TEST_F(Capture, ReadsEarlierVersions) {
   writeCapture(smallProblem(), file());
   std::string text = textOf(file());
-  text.replace(text.find("palpate-capture 2"), 17, "palpate-capture 1");
-  for (std::size_t at; (at = text.find(" -1p+0\n")) != text.npos;) text.erase(at, 6);
-  write(text);
-  const CollisionProblem read = readCapture(file());
+  const auto replaceAll = [&](const std::string& words, const std::string& with) {
+    ASSERT_NE(text.find(words), text.npos) << words;
+    for (std::size_t at; (at = text.find(words)) != text.npos;)
+      text.replace(at, words.size(), with);
+  };
+  const auto asVersion = [&](int version) {
+    text.replace(text.find("palpate-capture "), 17, "palpate-capture " + std::to_string(version));
+    write(text);
+    return readCapture(file());
+  };
+  replaceAll(" Triangles 0\n", "\n");
+  replaceAll(" -1p+0 0p+0\n", " -1p+0\n");  // restDistance
+  EXPECT_EQ(asVersion(2).pairs[0].settings.method, smallProblem().pairs[0].settings.method);
+  replaceAll(" -1p+0\n", "\n");  // tolerance
+  const CollisionProblem read = asVersion(1);
   EXPECT_EQ(read.pairs[0].settings.method, Method::Proximity);  // for which Auto stood
   EXPECT_EQ(read.pairs[0].settings.tolerance, PairSettings().tolerance);
 }

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
 #include <cstdlib>
 
 extern "C" void* __libc_malloc(std::size_t);
@@ -56,6 +57,42 @@ TEST(SteadyFrame, AllocatesNothing) {
     settings.octree.update = update;
     EXPECT_EQ(allocationsOfSecondPass(settings, proximity), 0u);
   }
+}
+
+TEST(SteadyFrame, AllocatesNothingWithLinesAndPoints) {
+  constexpr std::uint32_t kSegments = 400;
+  const scenes::SceneMesh sheet = scenes::sheet(40);
+  std::vector<Segment> segments;
+  for (std::uint32_t i = 0; i < kSegments; ++i) segments.push_back({i, i + 1});
+  std::vector<Eigen::Vector3d> thread(kSegments + 1);
+  const auto wind = [&](int frame) {
+    for (std::uint32_t i = 0; i <= kSegments; ++i) {
+      const double s = 0.0157 * i, phase = 0.1 * frame;
+      thread[i] = {std::sin(3 * s + phase), std::sin(5 * s), 0.1 * std::sin(7 * s + phase)};
+    }
+  };
+  wind(0);
+  OctreeBasedCD detection(Settings{.threads = 1});
+  const GeometryId tissue = detection.addTriangleMesh(sheet.positions, sheet.triangles),
+                   suture = detection.addLineMesh(thread, segments, 0.01),
+                   smoke = detection.addPointSet(thread, 0.02);
+  const PairSettings near{.method = Method::Proximity, .thickness = 0.02};
+  PairSettings self = near;
+  self.restDistance = 0.1;
+  detection.addCollisionPair(suture, suture, self);
+  detection.addCollisionPair(suture, tissue, near);
+  detection.addCollisionPair(smoke, tissue, near);
+  std::size_t before = 0, contacts = 0;
+  for (int frame = 0; frame < 20; ++frame) {
+    if (frame == 10) before = allocations;
+    wind(frame % 10);
+    detection.setPositions(suture, thread);
+    detection.setPositions(smoke, thread);
+    detection.detectCollision();
+    contacts += detection.statistics().contacts;
+  }
+  EXPECT_EQ(allocations - before, 0u);
+  EXPECT_GT(contacts, 1000u);
 }
 
 TEST(SteadyFrame, CountsAllocations) {

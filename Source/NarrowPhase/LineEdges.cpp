@@ -1,0 +1,79 @@
+#include "NarrowPhase/LineEdges.h"
+
+#include "Math/ClosestPoint.h"
+
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+MeshFeature featureOf(const MeshTopology& topology, std::uint32_t edge, EdgeFeature feature) {
+  if (feature == EdgeFeature::Interior) return {MeshFeature::Kind::Edge, edge};
+  return {MeshFeature::Kind::Vertex, topology.edges[edge][feature == EdgeFeature::End]};
+}
+
+/// f(edge) for each edge that holds the feature, once, while it returns true.
+template <class F>
+bool allEdgesAt(const MeshTopology& topology, const MeshFeature& feature, F&& f) {
+  if (feature.kind == MeshFeature::Kind::Edge) return f(feature.id);
+  for (const std::uint32_t triangle : topology.vertexTriangles[feature.id])
+    for (int i = 0; i < 3; ++i) {
+      if (!topology.ownsEdge(triangle, i)) continue;
+      const std::uint32_t edge = topology.triangleEdges[triangle][i];
+      const auto [p, q] = topology.edges[edge];
+      if ((p == feature.id || q == feature.id) && !f(edge)) return false;
+    }
+  return true;
+}
+
+/// As testLineEdges() says.
+bool isDistinct(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
+                const std::array<MeshFeature, 2>& features, ContactBuffers& out) {
+  if (!isForEdges(pair, features)) return false;
+  return allEdgesAt(pair.a.topology, features[0], [&](std::uint32_t a) {
+    return allEdgesAt(pair.b.topology, features[1], [&](std::uint32_t b) {
+      if (a == edgeA && b == edgeB) return true;
+      const bool turned = pair.self() && b < a;
+      const std::uint32_t first = turned ? b : a, second = turned ? a : b;
+      const std::optional<EdgesNearby> other = measureEdges(pair, first, second);
+      if (!other) return true;
+      out.exactDecisions += other->centres.exact;
+      auto theirs = other->features;
+      if (turned) std::swap(theirs[0], theirs[1]);
+      return theirs == features && std::pair(edgeA, edgeB) < std::pair(first, second);
+    });
+  });
+}
+
+}  // namespace
+
+std::optional<EdgesNearby> measureEdges(const MeshPair& pair, std::uint32_t edgeA,
+                                        std::uint32_t edgeB) {
+  if (pair.leavesOut(edgeA, edgeB)) return {};
+  const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
+  const EdgeEdgeDistance centres = finiteEdgeEdgeDistance(pair.a.now[p[0]], pair.a.now[p[1]],
+                                                          pair.b.now[q[0]], pair.b.now[q[1]]);
+  const double radii = pair.a.radius(p, centres.weightA) + pair.b.radius(q, centres.weightB);
+  const double distance = centres.distance - radii;
+  if (!(distance <= pair.settings.thickness)) return {};
+  return EdgesNearby{centres,
+                     distance,
+                     {featureOf(pair.a.topology, edgeA, centres.featureA),
+                      featureOf(pair.b.topology, edgeB, centres.featureB)}};
+}
+
+void testLineEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
+                   ContactBuffers& out) {
+  const std::optional<EdgesNearby> nearby = measureEdges(pair, edgeA, edgeB);
+  if (!nearby) return;
+  out.exactDecisions += nearby->centres.exact;
+  if (pair.settings.contacts == Contacts::Distinct &&
+      !isDistinct(pair, edgeA, edgeB, nearby->features, out))
+    return;
+  out.edgeEdge.push_back(
+      contactOf(pair.a.topology.edges[edgeA], pair.b.topology.edges[edgeB], nearby->centres));
+  out.edgeEdge.back().distance = nearby->distance;
+}
+
+}  // namespace palpate
