@@ -135,7 +135,9 @@ struct Frame::Job {
   static void detect(Job& job, std::span<const TrianglePair> pairs) {
     Stopwatch watch;
     const MeshPair meshes = job.record->meshes(&job.floats);
-    if (meshes.step.start) job.findStart(meshes, pairs);
+    bool& intersecting = job.contacts.facts.startsIntersecting;
+    if (meshes.step.start && !intersecting) intersecting = anyIntersectAtStart(meshes, pairs);
+    if (job.record->plan.overlaps) findIntersections(meshes, pairs, job.overlaps);
     if (meshes.settings.contacts == Contacts::Earliest)
       job.findEarliest(meshes, pairs);
     else
@@ -146,12 +148,6 @@ struct Frame::Job {
     for (const TrianglePair pair : pairs)
       if (!meshes.self() || !sharesVertex(triangles[pair.a], triangles[pair.b]))
         job.candidates.push_back(pair);
-  }
-
-  void findStart(const MeshPair& meshes, std::span<const TrianglePair> pairs) {
-    bool& intersecting = contacts.facts.startsIntersecting;
-    intersecting = intersecting || anyIntersectAtStart(meshes, pairs);
-    if (record->pair.settings.method == Method::Auto) findIntersections(meshes, pairs, overlaps);
   }
 
   void findEarliest(const MeshPair& meshes, std::span<const TrianglePair> pairs) {
@@ -315,8 +311,8 @@ void Frame::finish(PairRecord& record, bool nearby, const Settings& settings) {
       answerByImpact(record.meshes(), m_facts, *found, m_impacts);
     m_buffers.push_back(&m_impacts);
   }
-  const bool overlapping =
-      m_facts.startsIntersecting && record.pair.settings.method == Method::Auto;
+  m_facts.startsIntersecting |= record.plan.startsIntersecting;
+  const bool overlapping = m_facts.startsIntersecting && record.plan.overlaps;
   if (overlapping) preferOverlaps();
   CollisionData::Contents& contents = record.data.contents();
   orderContacts(m_buffers, m_orderScratch, contents);
@@ -342,12 +338,12 @@ void Frame::findStartByBruteForce(const PairRecord& record, ContactBuffers& cont
   MeshPair meshes = record.meshes();
   const auto countA = static_cast<std::uint32_t>(meshes.a.topology.triangles.size()),
              countB = static_cast<std::uint32_t>(meshes.b.topology.triangles.size());
-  for (std::uint32_t a = 0; a < countA; ++a)
+  for (std::uint32_t a = 0; a < countA && meshes.step.start; ++a)
     for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b) {
       const TrianglePair candidate{a, b};
       if (anyIntersectAtStart(meshes, {&candidate, 1})) contacts.facts.startsIntersecting = true;
     }
-  if (record.pair.settings.method != Method::Auto) return;
+  if (!record.plan.overlaps) return;
   meshes.settings.method = Method::Intersection;
   findContactsByBruteForce(meshes, overlaps);
 }
@@ -358,7 +354,7 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Setti
     Stopwatch watch;
     ContactBuffers contacts, overlaps;
     findContactsByBruteForce(record->meshes(), contacts);
-    if (record->plan.step.start) findStartByBruteForce(*record, contacts, overlaps);
+    findStartByBruteForce(*record, contacts, overlaps);
     record->earliest = std::numeric_limits<double>::infinity();
     if (record->pair.settings.contacts == Contacts::Earliest) {
       for (const auto& c : contacts.vertexTriangle)

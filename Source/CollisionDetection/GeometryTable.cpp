@@ -194,12 +194,8 @@ MotionRange motionOf(std::span<const Eigen::Vector3d> before, std::span<const Ei
       now.size(), kVertexGrain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
         parts[chunk] = motionRange(before.subspan(from, to - from), now.subspan(from, to - from));
       });
-  if (parts.empty()) return {};
-  MotionRange all = parts.front();
-  for (const MotionRange& part : parts) {
-    all.lower = all.lower.cwiseMin(part.lower);
-    all.upper = all.upper.cwiseMax(part.upper);
-  }
+  MotionRange all;
+  for (const MotionRange& part : parts) all.add(part);
   return all;
 }
 

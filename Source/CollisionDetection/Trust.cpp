@@ -16,7 +16,10 @@ constexpr int kMostPatience = 64;
 /// From the last frame's positions to this step's start.
 MotionRange correctionOf(const Geometry& geometry) {
   if (geometry.setThisFrame) return geometry.correction;
-  return {-geometry.motion.upper, -geometry.motion.lower};
+  MotionRange back;
+  back.lower = -geometry.motion.upper;
+  back.upper = -geometry.motion.lower;
+  return back;
 }
 
 /// Vertices that may have moved further than `reach` relative to the other mesh.
@@ -28,7 +31,18 @@ void addFarMovers(std::vector<std::uint32_t>& out, const Geometry& mesh, const G
     const Eigen::Vector3d moved =
         (mesh.mesh.now[v] - mesh.mesh.before[v] - centre).cwiseAbs() + extent;
     if (!(moved.squaredNorm() <= reach * reach)) out.push_back(v);
+    if (out.size() == Validity::kMostFarMovers) return;
   }
+}
+
+/// L: along the longest axis.
+double extentOf(const Geometry& geometry) {
+  if (geometry.octree.size() == 0) return 0.0;
+  const Box box = geometry.octree.blocks()[0].box(0);
+  double longest = 0.0;
+  for (int k = 0; k < 3; ++k)
+    longest = std::max(longest, double{box.upper[k]} - double{box.lower[k]});
+  return longest / geometry.frame.scale;
 }
 
 }  // namespace
@@ -55,6 +69,7 @@ PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry&
       plan.method = Method::Proximity;
       plan.reason = MethodReason::Slow;
     } else if (smallestMotion(a.motion, b.motion) > plan.tolerance ||
+               meanMotion(a.motion, b.motion) > plan.tolerance ||
                thickness + plan.tolerance == 0.0) {
       plan.method = Method::Continuous;
       plan.reason = MethodReason::Fast;
@@ -73,10 +88,17 @@ PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry&
 
 void Trust::start(const PairSettings& settings, const Geometry& a, const Geometry& b,
                   std::uint64_t frame, PairPlan& plan) {
-  const double correction = largestMotion(correctionOf(a), correctionOf(b));
-  m_startsApart = m_apart && frame == m_frame + 1 && m_topologyA == a.topologyRevision &&
-                  m_topologyB == b.topologyRevision &&
-                  (correction == 0.0 || correction < m_clearance);
+  const MotionRange ofA = correctionOf(a), ofB = correctionOf(b);
+  const double correction = largestMotion(ofA, ofB);
+  const bool corrected = !ofA.isZero() || !ofB.isZero();
+  // No two features within the thickness are further apart, in any coordinate, than both meshes.
+  const double size = extentOf(a) + extentOf(b) + settings.thickness + plan.step.extra;
+  plan.step.certain = plan.step.motion + 2.0 * kMotionError * (plan.step.motion + size);
+  const bool known = frame == m_frame + 1 && m_topologyA == a.topologyRevision &&
+                     m_topologyB == b.topologyRevision;
+  m_startsApart = known && m_apart && (!corrected || correction < m_clearance);
+  const bool startsIntersecting = known && m_intersecting && !corrected;
+  if (startsIntersecting) plan.nearby = 0.0;  // it hardly ever ends at once
   if (m_topologyA != a.topologyRevision || m_topologyB != b.topologyRevision) m_wait = 0;
   m_frame = frame;
   m_topologyA = a.topologyRevision;
@@ -84,7 +106,12 @@ void Trust::start(const PairSettings& settings, const Geometry& a, const Geometr
   if (!knowsSides(a, b) || m_startsApart || plan.method == Method::Intersection ||
       (plan.method == Method::Proximity && plan.motion > 0.0 && plan.step.motion == 0.0))
     return;
-  plan.step.start = settings.method == Method::Auto || plan.motion == 0.0 || --m_wait <= 0;
+  if (settings.method == Method::Auto) {
+    plan.overlaps = true;
+    plan.startsIntersecting = startsIntersecting;
+  }
+  plan.step.start = !startsIntersecting &&
+                    (settings.method == Method::Auto || plan.motion == 0.0 || --m_wait <= 0);
 }
 
 void Trust::finish(const PairSettings& settings, const Geometry& a, const Geometry& b,
@@ -133,6 +160,7 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
                 ? plan.motion == 0.0 && contents.intersectingTriangles.empty()
                 : validity.trusted && facts.clearance > 0.0;
   m_clearance = std::min(facts.clearance, settings.thickness);
+  m_intersecting = !contents.intersectingTriangles.empty();
   if (plan.step.start) {
     m_patience = m_apart ? 1 : std::min(2 * m_patience, kMostPatience);
     m_wait = m_patience;

@@ -15,6 +15,8 @@ struct PairPlan {
   double tolerance = 0;  ///< L: Auto's
   double nearby = 0;     ///< L: Intersection asks for boxes within this, to know of what was near
   StepPlan step;
+  bool overlaps = false;  ///< Auto: Intersection is asked, too, unless the step starts apart
+  bool startsIntersecting = false;  ///< known before
   /// Boxes hold the whole step.
   bool swept() const { return method == Method::Continuous || method == Method::Auto; }
 };
@@ -36,8 +38,9 @@ class Trust {
   void forget() { m_apart = false; }
 
  private:
-  bool m_apart = false;    ///< at the end of the last frame's step
-  double m_clearance = 0;  ///< L: and by how much, at least
+  bool m_apart = false;         ///< at the end of the last frame's step
+  bool m_intersecting = false;  ///< known to intersect there
+  double m_clearance = 0;       ///< L: and by how much, at least
   std::uint64_t m_frame = 0;
   std::uint64_t m_topologyA = 0, m_topologyB = 0;
   bool m_startsApart = false;  ///< this frame's step

@@ -2,38 +2,48 @@
 
 #include "Math/Tolerances.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace palpate {
 
 using Eigen::Vector3d;
 
+void MotionRange::add(const MotionRange& other) {
+  if (other.count == 0) return;
+  lower = count == 0 ? other.lower : Vector3d(lower.cwiseMin(other.lower));
+  upper = count == 0 ? other.upper : Vector3d(upper.cwiseMax(other.upper));
+  sum += other.sum;
+  squares += other.squares;
+  count += other.count;
+}
+
 MotionRange motionRange(std::span<const Vector3d> before, std::span<const Vector3d> now) {
   MotionRange range;
-  if (now.empty()) return range;
-  // Four vertices at a time, as twelve numbers, for whatever vectors the compiler has.
-  using Four = Eigen::Array<double, 12, 1>;
-  const auto displacement = [&](std::size_t i) -> Four {
-    return Eigen::Map<const Four>(now[i].data()) - Eigen::Map<const Four>(before[i].data());
-  };
-  range.lower = range.upper = now[0] - before[0];
   std::size_t i = 0;
-  if (now.size() >= 4) {
-    Four lower = displacement(0), upper = lower;
-    for (i = 4; i + 4 <= now.size(); i += 4) {
-      const Four moved = displacement(i);
+  if (now.size() >= 2) {
+    // Two vertices at a time, as six numbers, for whatever vectors the compiler has.
+    using Two = Eigen::Array<double, 6, 1>;
+    const auto displacement = [&](std::size_t first) -> Two {
+      return Eigen::Map<const Two>(now[first].data()) - Eigen::Map<const Two>(before[first].data());
+    };
+    Two lower = displacement(0), upper = lower, sum = Two::Zero(), squares = Two::Zero();
+    for (; i + 2 <= now.size(); i += 2) {
+      const Two moved = displacement(i);
       lower = lower.min(moved);
       upper = upper.max(moved);
+      sum += moved;
+      squares += moved * moved;
     }
-    for (int k = 0; k < 12; k += 3) {
-      range.lower = range.lower.cwiseMin(lower.segment<3>(k).matrix());
-      range.upper = range.upper.cwiseMax(upper.segment<3>(k).matrix());
+    for (int k = 0; k < 6; k += 3) {
+      const auto part = [&](const Two& two) -> Vector3d { return two.segment<3>(k).matrix(); };
+      range.add({part(lower), part(upper), part(sum), part(squares).sum(), double(i / 2)});
     }
   }
   for (; i < now.size(); ++i) {
     const Vector3d moved = now[i] - before[i];
-    range.lower = range.lower.cwiseMin(moved);
-    range.upper = range.upper.cwiseMax(moved);
+    range.add({moved, moved, moved, moved.squaredNorm(), 1.0});
   }
   return range;
 }
@@ -47,6 +57,12 @@ double largestMotion(const MotionRange& a, const MotionRange& b) {
 double smallestMotion(const MotionRange& a, const MotionRange& b) {
   const Vector3d least = (a.lower - b.upper).cwiseMax(b.lower - a.upper).cwiseMax(0.0);
   return least.stableNorm() * (1.0 - kMotionError);
+}
+
+double meanMotion(const MotionRange& a, const MotionRange& b) {
+  if (a.count == 0 || b.count == 0) return 0.0;
+  const double common = (a.sum / a.count).dot(b.sum / b.count);
+  return std::sqrt(std::max(0.0, a.squares / a.count + b.squares / b.count - 2.0 * common));
 }
 
 }  // namespace palpate

@@ -6,9 +6,14 @@
 
 namespace palpate {
 
-/// The box that holds every vertex's displacement in a step.
+/// The displacements of vertices in a step: the box that holds them, and their sums.
 struct MotionRange {
   Eigen::Vector3d lower = Eigen::Vector3d::Zero(), upper = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double squares = 0;  ///< sum of squared lengths
+  double count = 0;
+  void add(const MotionRange&);
+  bool isZero() const { return lower.isZero(0.0) && upper.isZero(0.0); }
 };
 
 /// From `before` to `now`, of the same size; zero of none.
@@ -20,5 +25,7 @@ MotionRange motionRange(std::span<const Eigen::Vector3d> before,
 /// both have in common, such as a translation, does not count.
 double largestMotion(const MotionRange&, const MotionRange&);
 double smallestMotion(const MotionRange&, const MotionRange&);
+/// The root mean square over all pairs of a vertex of each; approximate.
+double meanMotion(const MotionRange&, const MotionRange&);
 
 }  // namespace palpate

@@ -19,6 +19,8 @@ namespace palpate {
 struct StepPlan {
   /// L: no two features move further, relative to each other. 0: nothing is asked of the step.
   double motion = 0.0;
+  /// L: motion, and what rounding adds to it; features further apart at the end did not touch.
+  double certain = std::numeric_limits<double>::infinity();
   double slow = 0.0;   ///< L: Auto's Proximity misses no feature pair that moves at most this far
   double extra = 0.0;  ///< L: added to the thickness for proximity at the step's end
   /// Auto: feature pairs that the step may have brought together are answered by their impact.

@@ -5,6 +5,7 @@
 #include "NarrowPhase/ProximityFilter.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
+#include "Math/Tolerances.h"
 
 #include <algorithm>
 #include <bit>
@@ -115,6 +116,25 @@ class VertexTriangleFinder {
   std::size_t& m_exactDecisions;
 };
 
+/// Whether edges are certainly further apart: along a coordinate axis, or perpendicular to either
+/// edge, which tells parallel ones.
+bool areFurtherApart(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0, const Vector3d& q1,
+                     double distance) {
+  const Vector3d gap =
+      (p0.cwiseMin(p1) - q0.cwiseMax(q1)).cwiseMax(q0.cwiseMin(q1) - p0.cwiseMax(p1));
+  if (gap.maxCoeff() > distance) return true;
+  const Vector3d u = p1 - p0, v = q1 - q0, r = p0 - q0;
+  const auto separates = [&](const Vector3d& axis) {
+    const double first = axis.dot(r), along = axis.dot(u), across = axis.dot(v);
+    const double least = first + std::min(along, 0.0) - std::max(across, 0.0),
+                 most = first + std::max(along, 0.0) - std::min(across, 0.0);
+    const double error = kMotionError * axis.norm() * (r.norm() + u.norm() + v.norm());
+    return std::max(least, -most) > distance * axis.norm() + error;
+  };
+  return separates(r - (r.dot(v) / v.squaredNorm()) * v) ||
+         separates(r - (r.dot(u) / u.squaredNorm()) * u);
+}
+
 void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, StepCheck& check,
                ContactBuffers& out) {
   const Features<ImpactQuery::Kind::EdgeEdge> features{pair.a, pair.b};
@@ -126,6 +146,7 @@ void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, S
   if (distinct) answer = crossingEdgesDistance(at(0), at(1), at(2), at(3));
   const bool isContact = answer || !distinct;
   if (!isContact && check.edgeReach() == 0.0) return;
+  if (!isContact && areFurtherApart(at(0), at(1), at(2), at(3), check.edgeReach())) return;
   if (!answer) answer = finiteEdgeEdgeDistance(at(0), at(1), at(2), at(3));
   out.exactDecisions += answer->exact;
   if (!(answer->distance <= pair.thicknessAtEnd())) return;

@@ -146,6 +146,12 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
     const V sError = hn::Set(d, 640.0f) * longest * b.length + tiny;
     const V tError = hn::Set(d, 640.0f) * longest * a.length + tiny;
     const V thicknessSquare = thickness * thickness;
+    V reachA[3], reachB[3];  // edges' lengths times the reach
+    for (int i = 0; i < 3 && kReach; ++i) {
+      const V reach = hn::Load(d, scaled.edgeReach + lane);
+      reachA[i] = reach * hn::Sqrt(a.square[i]);
+      reachB[i] = reach * hn::Sqrt(b.square[i]);
+    }
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
         const Vector3<V>&u = a.edge[i], &v = b.edge[j], &r = from[i][j];
@@ -161,9 +167,9 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
           if constexpr (kReach) {
             // A line's closest point that is x beyond the edge's end leaves that end, and with it
             // the edge, further than x |n| / (|u| |v|) from the other's line.
-            const V far = hn::Load(d, scaled.edgeReach + lane) * hn::Sqrt(normalSquare);
-            sBeyond = sError + far * hn::Sqrt(b.square[j]);
-            tBeyond = tError + far * hn::Sqrt(a.square[i]);
+            const V normal = hn::Sqrt(normalSquare);
+            sBeyond = sError + normal * reachB[j];
+            tBeyond = tError + normal * reachA[i];
           }
           isOut = hn::Or(isOut, hn::Lt(s, hn::Neg(sBeyond)));
           isOut = hn::Or(isOut, hn::Lt(t, hn::Neg(tBeyond)));

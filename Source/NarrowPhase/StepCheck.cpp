@@ -16,7 +16,7 @@ bool StepCheck::isAnsweredByImpact(const Features<kind>& features, std::uint32_t
                                    std::uint32_t inSecond, bool ofSecond, double distance) {
   StepFacts& facts = m_out.facts;
   facts.clearance = std::min(facts.clearance, distance);
-  if (m_pair.step.motion == 0.0 ||
+  if (m_pair.step.motion == 0.0 || distance > m_pair.step.certain ||
       !mayHaveTouched<kind>(features.query(inFirst, inSecond), distance, m_pair.step.motion))
     return false;
   if (m_pair.step.impacts) return addImpact(m_pair, features, inFirst, inSecond, ofSecond, m_out);
@@ -41,7 +41,8 @@ void StepCheck::noteImpact(const Features<kind>& features, std::uint32_t inFirst
   const StepPlan& step = m_pair.step;
   double& clearance = m_out.facts.clearance;
   if (step.motion == 0.0 || (clearance == 0.0 && !step.impacts)) return;
-  const double left = (1.0 - time) * motionBound<kind>(features.query(inFirst, inSecond));
+  double left = (1.0 - time) * step.certain;
+  if (distance <= left) left = (1.0 - time) * motionBound<kind>(features.query(inFirst, inSecond));
   clearance = std::min(clearance, std::max(0.0, distance - left));
   if (step.impacts && distance <= left) noteVertices(features, inFirst, inSecond);
 }

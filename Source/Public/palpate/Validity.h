@@ -14,7 +14,7 @@ enum class MethodReason {
   // Method::Auto, by how far features move in the step, relative to each other:
   Still,  ///< not at all
   Slow,   ///< all at most PairSettings::tolerance: Proximity
-  Fast,   ///< all further: Continuous
+  Fast,   ///< all, or most, further: Continuous
   Mixed   ///< some further: Continuous for those, Proximity for the rest
 };
 
@@ -56,6 +56,8 @@ struct Validity {
   std::vector<std::uint32_t> verticesBeyondA, verticesBeyondB;
   /// Triangles without area in contacts, ascending: their normals are those documented.
   std::vector<std::uint32_t> degenerateTrianglesA, degenerateTrianglesB;
+
+  static constexpr std::size_t kMostFarMovers = 128;  ///< of a mesh that are listed
 
   /// Above 1 the motion is beyond the method's condition.
   double displacementOverReach() const { return displacement > 0 ? displacement / reach : 0; }
