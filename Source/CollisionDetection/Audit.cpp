@@ -156,8 +156,8 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
   using List = AuditFailure::List;
   using Fault = AuditFailure::Fault;
   using Any = AuditFailure::Contact;
-  // Intersection's contacts, which Auto adds where a step starts intersecting, are not of features.
-  const bool withOthers = pair.settings.method == Method::Auto && !data.validity().startedApart;
+  // What Auto takes from other methods in place of its own is not of features.
+  const bool withOthers = pair.settings.method == Method::Auto;
   const auto into = [&](List list) {
     return [=, &pair, &out](Fault fault, const Any& e, const Any& f) {
       if (withOthers && fault != Fault::Missing) return;

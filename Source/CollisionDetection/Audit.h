@@ -19,7 +19,8 @@ FeatureLists drawFeatures(const MeshPair&, const CollisionPair&, const AuditSett
                           std::uint64_t frame);
 
 /// Appends every contact that a drawn sample of features should have by brute force and has not in
-/// `data`, or the other way round. Of Contacts::Earliest only impacts before the one known.
+/// `data`, or the other way round. Of
+/// Method::Auto only what is missing, of Contacts::Earliest impacts before the one known.
 void audit(const MeshPair&, const CollisionPair&, const CollisionData& data, const AuditSettings&,
            std::uint64_t frame, std::vector<AuditFailure>& out);
 

@@ -6,7 +6,7 @@ namespace palpate {
 
 /// While it lives, this thread rounds to nearest and keeps denormals: error bounds and exact
 /// decisions count on it. What a caller had set otherwise comes back.
-/// Cost     about 0.1 µs.
+/// Cost     4 ns; 0.25 µs where the caller had set otherwise.
 class StandardFloatingPoint {
  public:
   StandardFloatingPoint() : m_changed(!isStandard()) {

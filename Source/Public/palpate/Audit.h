@@ -10,7 +10,8 @@
 
 namespace palpate {
 
-/// A contact on which a frame's CollisionData and brute force differ: a fault of this library.
+/// A contact on which a frame's CollisionData and brute force differ: a fault of this library. Of
+/// Method::Auto, which may mix the answers of several methods, only what is missing is told.
 struct AuditFailure {
   enum class Fault {
     Missing,   ///< expected, not found; List::Earliest: there is one before earliestTimeOfImpact()
