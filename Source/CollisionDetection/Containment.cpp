@@ -47,8 +47,9 @@ class Body {
 
   /// The nearest point of the surface; of several, on the lowest triangle.
   InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p) {
-    VertexTriangleDistance best{};
-    best.distance = std::numeric_limits<double>::infinity();
+    VertexTriangleDistance best{Eigen::Vector3d::Zero(),  Eigen::Vector3d::Zero(),
+                                Eigen::Vector3d::Zero(),  std::numeric_limits<double>::infinity(),
+                                TriangleFeature::CornerA, false};
     std::uint32_t at = 0, id = 0xffffffffu;
     const auto tryOne = [&](std::uint32_t i) {
       const auto& [a, b, c] = m_geometry.orderedTriangles[i];

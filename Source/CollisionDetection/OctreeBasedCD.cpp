@@ -318,10 +318,12 @@ void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vec
 }
 
 void OctreeBasedCD::addCollisionPair(GeometryId a, GeometryId b, const PairSettings& settings) {
+  const StandardFloatingPoint standard;
   m_implementation->pairs.add(m_implementation->geometries, a, b, settings);
 }
 
 void OctreeBasedCD::setPairSettings(GeometryId a, GeometryId b, const PairSettings& settings) {
+  const StandardFloatingPoint standard;
   m_implementation->pairs.set(m_implementation->geometries, a, b, settings);
 }
 

@@ -98,7 +98,6 @@ void Trust::start(const PairSettings& settings, const Geometry& a, const Geometr
                      m_topologyB == b.topologyRevision;
   m_startsApart = known && m_apart && (!corrected || correction < m_clearance);
   const bool startsIntersecting = known && m_intersecting && !corrected;
-  if (startsIntersecting) plan.nearby = 0.0;  // it hardly ever ends at once
   if (m_topologyA != a.topologyRevision || m_topologyB != b.topologyRevision) m_wait = 0;
   m_frame = frame;
   m_topologyA = a.topologyRevision;
