@@ -261,13 +261,14 @@ class RowCache {
 /// Triangle pairs whose tests are chosen, to be listed together: corners' tests and edges' apart.
 struct ChosenTests {
   static constexpr std::size_t kMost = 128;
-  alignas(64) std::uint32_t ids[kMost][2 * kFeatures];  ///< of both rows
+  alignas(64) std::uint32_t ids[kMost * 2 * kFeatures];  ///< of both rows
   alignas(8) std::uint8_t corners[kMost];
   alignas(8) std::uint16_t edges[kMost];
 
   void set(std::size_t i, const FeatureRow& a, const FeatureRow& b, unsigned tests) {
-    std::copy_n(a.ids, kFeatures, ids[i]);
-    std::copy_n(b.ids, kFeatures, ids[i] + kFeatures);
+    std::uint32_t* const both = ids + 2 * kFeatures * i;
+    std::copy_n(a.ids, kFeatures, both);
+    std::copy_n(b.ids, kFeatures, both + kFeatures);
     corners[i] = tests & (kCornersOfA | kCornersOfB);
     edges[i] = static_cast<std::uint16_t>(tests & kEdges);
   }
@@ -298,8 +299,8 @@ inline std::size_t list(const ChosenTests& chosen, const Tests* tests, std::size
     std::memcpy(&bits, tests + i, sizeof bits);
     for (bits &= mask * (~std::uint64_t{0} / static_cast<Tests>(-1)); bits; bits &= bits - 1) {
       const auto bit = static_cast<unsigned>(std::countr_zero(bits));
-      const std::uint64_t first = chosen.ids[i][firstIn[bit]],
-                          second = chosen.ids[i][secondIn[bit]];
+      const std::uint32_t* const ids = chosen.ids + 2 * kFeatures * i;
+      const std::uint64_t first = ids[firstIn[bit]], second = ids[secondIn[bit]];
       // Which is lower is as good as random: no branch.
       const std::uint64_t pair = std::rotl(first | second << 32, 32 * (ordered & (second < first)));
       std::memcpy(out + count++, &pair, sizeof pair);

@@ -37,7 +37,12 @@ class AuditFiles : public ::testing::Test {
   const GeometryId m_a{0}, m_b{1};
   Mesh m_meshes[2] = {testing::sheet(12, 0.0, 0.0), testing::sheet(11, 0.01, 1.0)};
 
-  void SetUp() override { fs::create_directory(m_folder); }
+  void SetUp() override {
+    fs::create_directory(m_folder);
+#ifdef PALPATE_VALIDATE
+    GTEST_SKIP() << "octrees are validated here, which finds the planted fault first";
+#endif
+  }
   void TearDown() override { fs::remove_all(m_folder); }
 
   OctreeBasedCD detection(AuditSettings audit) const {
