@@ -28,7 +28,7 @@ struct Options {
   std::filesystem::path out = "out";
   std::vector<std::string> meshes;
   int threads = 0;
-  Method method = Method::Auto;
+  Method method = Method::Proximity;
   std::optional<double> thickness;
 };
 

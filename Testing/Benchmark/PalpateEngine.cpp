@@ -74,6 +74,7 @@ PalpateScene::PalpateScene(const Task& task, const Positions& positions, OctreeU
                            double thickness)
     : detection(settingsFor(update, task.threads)) {
   PairSettings pairSettings;
+  pairSettings.method = Method::Proximity;
   pairSettings.thickness = thickness > 0 ? thickness : task.thickness;
   for (std::size_t mesh = 0; mesh < task.meshes.size(); ++mesh)
     ids.push_back(detection.addTriangleMesh(positions[mesh], task.meshes[mesh]));
