@@ -8,6 +8,8 @@
 #include <map>
 #include <set>
 
+#include <xmmintrin.h>
+
 namespace palpate {
 namespace {
 
@@ -165,6 +167,24 @@ TEST(InsideVertices, AreAsByBruteForceForAnyThreads) {
       }
     }
   }
+}
+
+/// Cells of 2^-1060: a caller that takes denormals for zero would find nothing.
+TEST(InsideVertices, DoNotDependOnTheCallersFloatingPoint) {
+  constexpr int n = 2;
+  Mesh body = surfaceOf(n, kBodies[0]), points = lattice(n);
+  for (Mesh* mesh : {&body, &points})
+    for (Eigen::Vector3d& p : mesh->positions) p *= 0x1p-1060;
+  const auto expected = insideVertices(points, body);
+  EXPECT_EQ(expected.size(), 27u);
+  OctreeBasedCD detection;
+  const GeometryId first = detection.addTriangleMesh(points.positions, points.triangles),
+                   second = detection.addTriangleMesh(body.positions, body.triangles);
+  const unsigned before = _mm_getcsr();
+  _mm_setcsr(before | 0x8040);  // flush to zero, denormals are zero
+  const auto found = detection.findInsideVertices(first, second);
+  _mm_setcsr(before);
+  EXPECT_EQ(std::vector<InsideVertex>(found.begin(), found.end()), expected);
 }
 
 TEST(InsideVertices, OfTheLastPositions) {
