@@ -1,5 +1,7 @@
 #include "Shrink.h"
 
+#include <palpate/Capture.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -110,6 +112,17 @@ CollisionProblem withoutUnusedMeshes(const CollisionProblem& problem) {
 }
 
 }  // namespace
+
+OctreeBasedCD solve(CollisionProblem problem, Engine engine) {
+  problem.settings.engine = engine;
+  OctreeBasedCD detection = setUp(problem);
+  detection.detectCollision();
+  return detection;
+}
+
+const CollisionData& dataOf(const OctreeBasedCD& detection, const CollisionProblem::Pair& pair) {
+  return detection.collisionData(GeometryId{pair.a}, GeometryId{pair.b});
+}
 
 CollisionProblem shrink(CollisionProblem problem, const Fails& fails) {
   dropPairs(problem, fails);

@@ -1,10 +1,16 @@
 #pragma once
 
 #include <palpate/CollisionProblem.h>
+#include <palpate/OctreeBasedCD.h>
 
 #include <functional>
 
 namespace palpate::scenes {
+
+/// After one frame of the problem, by this engine.
+OctreeBasedCD solve(CollisionProblem problem, Engine engine);
+/// Of one of its pairs, after solve().
+const CollisionData& dataOf(const OctreeBasedCD& detection, const CollisionProblem::Pair& pair);
 
 /// A smaller problem that still fails: triangles are dropped by halves, then by smaller parts down
 /// to single ones, then pairs, then what no triangle or pair uses, each time only if what is left

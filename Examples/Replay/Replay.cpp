@@ -16,17 +16,8 @@ namespace {
 
 using namespace palpate;
 
-/// Answers of one problem by one engine.
-OctreeBasedCD solve(CollisionProblem problem, Engine engine) {
-  problem.settings.engine = engine;
-  OctreeBasedCD detection = setUp(problem);
-  detection.detectCollision();
-  return detection;
-}
-
-const CollisionData& dataOf(const OctreeBasedCD& detection, const CollisionProblem::Pair& pair) {
-  return detection.collisionData(GeometryId{pair.a}, GeometryId{pair.b});
-}
+using scenes::dataOf;
+using scenes::solve;
 
 bool same(const CollisionData& l, const CollisionData& r) {
   return l.hash() == r.hash() && l.earliestTimeOfImpact() == r.earliestTimeOfImpact();

@@ -18,20 +18,10 @@ using namespace testing;
 using Eigen::Vector3d;
 using Answer = ExactContacts::Answer;
 
-StepScene stepScene(const std::string& name, const Mesh& a, const Mesh& b, double thickness) {
-  StepScene scene{name, a, b, a.positions, b.positions, thickness};
-  Random random(3);
-  for (Vector3d& p : scene.aBefore) p += Vector3d(0.02, 0.01, 0.15) + randomPoint(random, 0, 0.01);
-  for (Vector3d& p : scene.bBefore) p -= randomPoint(random, 0, 0.02);
-  return scene;
-}
-
 std::vector<StepScene> scenes() {
   Random random(13);
   const Mesh first = soup(random, 30, 0.3), second = soup(random, 30, 0.3);
-  const Mesh lattice = onLattice(random), other = onLattice(random);
-  StepScene touching{"lattice", lattice, other, lattice.positions, other.positions, 0.25};
-  for (Vector3d& p : touching.aBefore) p.z() += 0.5;
+  const StepScene touching = latticeScene(random);
   return {stepScene("soups", first, second, 0.03),
           stepScene("sheets", sheet(8, 0, 0), sheet(7, 0.02, 1), 0.015),
           stepScene("bodies", sphere(6, 9, {0.5, 0.5, 0.5}, 0.4),

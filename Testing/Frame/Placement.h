@@ -73,6 +73,25 @@ inline Mesh onLattice(Random& random) {
   return mesh;
 }
 
+/// Two meshes that move towards each other, each vertex its own way.
+inline StepScene stepScene(const std::string& name, const Mesh& a, const Mesh& b,
+                           double thickness) {
+  StepScene scene{name, a, b, a.positions, b.positions, thickness};
+  Random random(3);
+  for (Eigen::Vector3d& p : scene.aBefore)
+    p += Eigen::Vector3d(0.02, 0.01, 0.15) + randomPoint(random, 0, 0.01);
+  for (Eigen::Vector3d& p : scene.bBefore) p -= randomPoint(random, 0, 0.02);
+  return scene;
+}
+
+/// Two meshes on one lattice, the first from half a unit above.
+inline StepScene latticeScene(Random& random) {
+  const Mesh lattice = onLattice(random), other = onLattice(random);
+  StepScene touching{"lattice", lattice, other, lattice.positions, other.positions, 0.25};
+  for (Eigen::Vector3d& p : touching.aBefore) p.z() += 0.5;
+  return touching;
+}
+
 class Placement {
  public:
   Placement(const StepScene& scene, const Transformation& how) : m_how(how) {

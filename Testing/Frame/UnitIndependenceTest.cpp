@@ -23,11 +23,8 @@ void toGrid(std::vector<Vector3d>& positions) {
     for (double& x : p) x = std::round(x * 0x1p20) * 0x1p-20;
 }
 
-StepScene stepScene(const std::string& name, const Mesh& a, const Mesh& b, double thickness) {
-  StepScene scene{name, a, b, a.positions, b.positions, thickness};
-  Random random(3);
-  for (Vector3d& p : scene.aBefore) p += Vector3d(0.02, 0.01, 0.15) + randomPoint(random, 0, 0.01);
-  for (Vector3d& p : scene.bBefore) p -= randomPoint(random, 0, 0.02);
+StepScene gridScene(const std::string& name, const Mesh& a, const Mesh& b, double thickness) {
+  StepScene scene = stepScene(name, a, b, thickness);
   for (auto* positions : {&scene.a.positions, &scene.b.positions, &scene.aBefore, &scene.bBefore})
     toGrid(*positions);
   return scene;
@@ -36,12 +33,10 @@ StepScene stepScene(const std::string& name, const Mesh& a, const Mesh& b, doubl
 std::vector<StepScene> scenes() {
   Random random(12);
   const Mesh first = soup(random, 40, 0.3), second = soup(random, 40, 0.3);
-  const Mesh lattice = onLattice(random), other = onLattice(random);
-  StepScene touching{"lattice", lattice, other, lattice.positions, other.positions, 0.25};
-  for (Vector3d& p : touching.aBefore) p.z() += 0.5;
-  return {stepScene("soups", first, second, 0x1p-5),
-          stepScene("sheets", sheet(8, 0, 0), sheet(7, 0.02, 1), 0x1p-6),
-          stepScene("bodies", sphere(6, 9, {0.5, 0.5, 0.5}, 0.4),
+  const StepScene touching = latticeScene(random);
+  return {gridScene("soups", first, second, 0x1p-5),
+          gridScene("sheets", sheet(8, 0, 0), sheet(7, 0.02, 1), 0x1p-6),
+          gridScene("bodies", sphere(6, 9, {0.5, 0.5, 0.5}, 0.4),
                     sphere(5, 8, {0.6, 0.55, 1.1}, 0.3), 0x1p-5),
           touching};
 }

@@ -13,19 +13,13 @@ namespace palpate {
 namespace {
 
 namespace fs = std::filesystem;
+using scenes::dataOf;
 
 fs::path folder() { return fs::path(PALPATE_SOURCE_DIR) / "Data" / "Regression"; }
 
 OctreeBasedCD solve(CollisionProblem problem, Engine engine, int threads = 1) {
-  problem.settings.engine = engine;
   problem.settings.threads = threads;
-  OctreeBasedCD detection = setUp(problem);
-  detection.detectCollision();
-  return detection;
-}
-
-const CollisionData& dataOf(const OctreeBasedCD& detection, const CollisionProblem::Pair& pair) {
-  return detection.collisionData(GeometryId{pair.a}, GeometryId{pair.b});
+  return scenes::solve(std::move(problem), engine);
 }
 
 std::array<std::size_t, 4> countsOf(const CollisionData& data) {
