@@ -38,7 +38,7 @@ class Body {
     if (m_bruteForce) {
       count(0, size());
     } else {
-      Box ray = boxOf(p);
+      FloatBox ray = boxOf(p);
       ray.upper[0] = kInfinity;
       forEachOverlapping(m_geometry.octree, ray, m_stack, count);
     }
@@ -87,7 +87,7 @@ class Body {
   }
 
   bool mayContain(const Eigen::Vector3d& p) const {
-    const Box box = boxOf(p), all = m_geometry.octree.blocks()[0].box(0);
+    const FloatBox box = boxOf(p), all = m_geometry.octree.blocks()[0].box(0);
     for (int k = 0; k < 3; ++k)
       if (box.upper[k] < all.lower[k] || box.lower[k] > all.upper[k]) return m_bruteForce;
     return true;
@@ -105,8 +105,8 @@ class Body {
                             -double{kLargestFloat}, double{kLargestFloat});
     return point;
   }
-  Box boxOf(const Eigen::Vector3d& p) const {
-    Box box;
+  FloatBox boxOf(const Eigen::Vector3d& p) const {
+    FloatBox box;
     const std::array<double, 3> point = inFrame(p);
     for (int k = 0; k < 3; ++k) {
       box.lower[k] = OutwardRounding::down(static_cast<float>(point[k]));

@@ -97,7 +97,7 @@ void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame&
 }
 
 /// Boxes in the order of orderedTriangles, and those of the groups.
-void computeBoxes(Geometry& geometry, std::span<const std::uint32_t> groups, Box* groupBoxes,
+void computeBoxes(Geometry& geometry, std::span<const std::uint32_t> groups, FloatBox* groupBoxes,
                   std::size_t grain, const Threads& threads) {
   threads.forChunks(groups.size() - 1, grain, [&](std::size_t, std::size_t from, std::size_t to) {
     triangleBoxes(geometry.floats.data(), geometry.swept ? geometry.floatsBefore.data() : nullptr,
@@ -107,7 +107,7 @@ void computeBoxes(Geometry& geometry, std::span<const std::uint32_t> groups, Box
 }
 
 /// Boxes in the order of orderedTriangles, and the bounds of all.
-Box boundsOf(Geometry& geometry, const Threads& threads) {
+FloatBox boundsOf(Geometry& geometry, const Threads& threads) {
   const std::size_t size = geometry.orderedTriangles.size(),
                     count = (size + kTrianglesPerGroup - 1) / kTrianglesPerGroup;
   geometry.boundsGroups.resize(count + 1);
@@ -115,8 +115,8 @@ Box boundsOf(Geometry& geometry, const Threads& threads) {
     geometry.boundsGroups[i] = static_cast<std::uint32_t>(std::min(i * kTrianglesPerGroup, size));
   geometry.boundsBoxes.resize(count);
   computeBoxes(geometry, geometry.boundsGroups, geometry.boundsBoxes.data(), 8, threads);
-  Box bounds;
-  for (const Box& box : geometry.boundsBoxes) bounds.add(box);
+  FloatBox bounds;
+  for (const FloatBox& box : geometry.boundsBoxes) bounds.add(box);
   return bounds;
 }
 
@@ -130,7 +130,7 @@ void rebuild(Geometry& geometry, const OctreeSettings& settings, const Threads& 
     geometry.orderedTriangles.assign(triangles.begin(), triangles.end());
     geometry.treeKnown = true;
   }
-  const Box bounds = boundsOf(geometry, threads);
+  const FloatBox bounds = boundsOf(geometry, threads);
   geometry.boxMilliseconds += watch.lap();
   octree.build(bounds, geometry.spread * geometry.frame.scale, settings, threads);
   threads.forChunks(triangles.size(), kVertexGrain,

@@ -51,7 +51,7 @@ struct Geometry {
   std::vector<Triangle> orderedTriangles;  ///< in the octree's order
   Octree octree;
   Buffer<std::uint32_t> boundsGroups;  ///< scratch of a rebuild
-  Buffer<Box> boundsBoxes;
+  Buffer<FloatBox> boundsBoxes;
   std::uint64_t treeRevision = 0;  ///< revision that the octree is of
   bool treeKnown = false;          ///< built for this topology
   LooseOctree::Update lastUpdate = LooseOctree::Update::Unchanged;

@@ -38,7 +38,7 @@ void addFarMovers(std::vector<std::uint32_t>& out, const Geometry& mesh, const G
 /// L: along the longest axis.
 double extentOf(const Geometry& geometry) {
   if (geometry.octree.size() == 0) return 0.0;
-  const Box box = geometry.octree.blocks()[0].box(0);
+  const FloatBox box = geometry.octree.blocks()[0].box(0);
   double longest = 0.0;
   for (int k = 0; k < 3; ++k)
     longest = std::max(longest, double{box.upper[k]} - double{box.lower[k]});

@@ -40,11 +40,11 @@ HWY_ATTR void triangleBoxesOf(const FloatPoint* HWY_RESTRICT vertices,
                               const FloatPoint* HWY_RESTRICT before,
                               const Triangle* HWY_RESTRICT triangles,
                               std::span<const std::uint32_t> groups, BoxArrays& boxes,
-                              Box* HWY_RESTRICT groupBoxes) {
+                              FloatBox* HWY_RESTRICT groupBoxes) {
   const hn::FixedTag<float, HWY_TARGET == HWY_SCALAR ? 1 : 4> d4;
   constexpr std::size_t kLanes = HWY_TARGET == HWY_SCALAR ? 1 : 4, kVectors = 4 / kLanes;
   using V = hn::Vec<decltype(d4)>;
-  const V empty = hn::Set(d4, Box::kEmptyLower);
+  const V empty = hn::Set(d4, FloatBox::kEmptyLower);
   Chunk chunk;
   std::size_t chunkBegin = groups.front(), fill = 0;
   for (std::size_t g = 0; g + 1 < groups.size(); ++g) {
@@ -98,7 +98,7 @@ HWY_ATTR void triangleBoxesOf(const FloatPoint* HWY_RESTRICT vertices,
 
 HWY_ATTR void triangleBoxesKernel(const FloatPoint* vertices, const FloatPoint* before,
                                   const Triangle* triangles, std::span<const std::uint32_t> groups,
-                                  BoxArrays& boxes, Box* groupBoxes) {
+                                  BoxArrays& boxes, FloatBox* groupBoxes) {
   if (before)
     triangleBoxesOf<true>(vertices, before, triangles, groups, boxes, groupBoxes);
   else
@@ -114,7 +114,7 @@ namespace palpate {
 HWY_EXPORT(triangleBoxesKernel);
 
 void triangleBoxes(const FloatPoint* vertices, const FloatPoint* before, const Triangle* triangles,
-                   std::span<const std::uint32_t> groups, BoxArrays& boxes, Box* groupBoxes) {
+                   std::span<const std::uint32_t> groups, BoxArrays& boxes, FloatBox* groupBoxes) {
   if (groups.size() < 2) return;
   HWY_DYNAMIC_DISPATCH(triangleBoxesKernel)(vertices, before, triangles, groups, boxes, groupBoxes);
 }

@@ -18,6 +18,6 @@ namespace palpate {
 ///          the last ends at `end`. groupBoxes: one per group.
 /// Cost     about 20 instructions a triangle.
 void triangleBoxes(const FloatPoint* vertices, const FloatPoint* before, const Triangle* triangles,
-                   std::span<const std::uint32_t> groups, BoxArrays& boxes, Box* groupBoxes);
+                   std::span<const std::uint32_t> groups, BoxArrays& boxes, FloatBox* groupBoxes);
 
 }  // namespace palpate

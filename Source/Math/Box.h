@@ -11,7 +11,7 @@
 namespace palpate {
 
 /// An axis-aligned box in a geometry's float frame, rounded outward. Fourth lanes are padding.
-struct alignas(16) Box {
+struct alignas(16) FloatBox {
   /// Overlaps nothing, neutral for add().
   static constexpr float kEmptyLower = std::numeric_limits<float>::infinity();
 
@@ -28,7 +28,7 @@ struct alignas(16) Box {
     return sum;
   }
   bool empty() const { return !(lower[0] <= upper[0]); }
-  void add(const Box& other) {
+  void add(const FloatBox& other) {
     for (int k = 0; k < 3; ++k) {
       lower[k] = std::min(lower[k], other.lower[k]);
       upper[k] = std::max(upper[k], other.upper[k]);
@@ -48,7 +48,7 @@ struct BoxArrays {
       upper[k].resize(size + kPadding);
     }
   }
-  Box operator[](std::size_t i) const {
+  FloatBox operator[](std::size_t i) const {
     return {{lower[0][i], lower[1][i], lower[2][i], 0}, {upper[0][i], upper[1][i], upper[2][i], 0}};
   }
 };

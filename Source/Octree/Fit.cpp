@@ -16,7 +16,7 @@ HWY_ATTR void fitBlocksKernel(OctreeBlock* blocks, const OctreeNode* parents, st
     const OctreeBlock& block = blocks[b];
     OctreeBlock& parent = blocks[parents[b] >> 3];
     const unsigned slot = parents[b] & 7;
-    Box box;
+    FloatBox box;
     for (int k = 0; k < 3; ++k) {
       auto lower = hn::Load(d, block.lower[k]), upper = hn::Load(d, block.upper[k]);
       for (std::size_t i = hn::Lanes(d); i < 8; i += hn::Lanes(d)) {

@@ -100,7 +100,7 @@ LooseOctree::Node LooseOctree::node(NodeId id) const {
                   {cube.lower[0] - cube.edge * 0.5, cube.lower[1] - cube.edge * 0.5,
                    cube.lower[2] - cube.edge * 0.5},
                   2 * cube.edge);
-  const Box box = block.box(node & 7);
+  const FloatBox box = block.box(node & 7);
   for (int k = 0; k < 3; ++k) {
     result.fittedBox.min()[k] = nextDown(tree.origin[k] + box.lower[k] / tree.scale);
     result.fittedBox.max()[k] = nextUp(tree.origin[k] + box.upper[k] / tree.scale);

@@ -24,7 +24,7 @@ constexpr std::size_t kRadixOnly = 8192;
 /// a third of the way along each of its edges: then 0 is a third or two thirds along those of its
 /// cell at any level, and no cell border cuts the bulk, nor runs close to it, before cells are of
 /// its size.
-Cube rootCube(const Box& bounds, double bulk) {
+Cube rootCube(const FloatBox& bounds, double bulk) {
   constexpr double kMuchLarger = 256;
   Cube cube;
   double longest = kSmallestCell, farthest = 0;
@@ -118,7 +118,7 @@ void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const 
   });
 }
 
-void Octree::build(const Box& bounds, double bulk, const OctreeSettings& settings,
+void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& settings,
                    const Threads& threads) {
   const auto size = static_cast<std::uint32_t>(m_order.size());
   PALPATE_ASSERT(size > 0);
@@ -201,7 +201,7 @@ void Octree::assemble(std::size_t tasks, const Threads& threads) {
         const std::uint32_t child = layout.links[b].child[slot];
         block.begin[slot] = layout.links[b].begin[slot];
         block.child[slot] = child & OctreeBlock::kLeaf ? child : child + base;
-        block.setBox(slot, Box{});
+        block.setBox(slot, FloatBox{});
       }
     }
   });
@@ -230,7 +230,7 @@ void Octree::fit(const Threads& threads) {
 
 void Octree::measureLooseness() {
   const std::size_t stride = std::max<std::size_t>(8, m_groupNodes.size() / 256);
-  const auto halfArea = [](const Box& box) {
+  const auto halfArea = [](const FloatBox& box) {
     const double x = double{box.upper[0]} - box.lower[0], y = double{box.upper[1]} - box.lower[1],
                  z = double{box.upper[2]} - box.lower[2];
     return x * y + y * z + z * x;

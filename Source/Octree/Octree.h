@@ -31,11 +31,11 @@ struct alignas(64) OctreeBlock {
   bool isLeaf(unsigned slot) const { return child[slot] & kLeaf; }
   std::uint32_t count(unsigned slot) const { return child[slot] & ~kLeaf; }
   bool isEmpty(unsigned slot) const { return child[slot] == kLeaf; }
-  Box box(unsigned slot) const {
+  FloatBox box(unsigned slot) const {
     return {{lower[0][slot], lower[1][slot], lower[2][slot], 0},
             {upper[0][slot], upper[1][slot], upper[2][slot], 0}};
   }
-  void setBox(unsigned slot, const Box& box) {
+  void setBox(unsigned slot, const FloatBox& box) {
     for (int k = 0; k < 3; ++k) {
       lower[k][slot] = box.lower[k];
       upper[k][slot] = box.upper[k];
@@ -97,11 +97,11 @@ class Octree {
   /// Leaves and the own primitives of other nodes: group g is primitives [groups[g], groups[g + 1])
   /// of the order.
   std::span<const std::uint32_t> groups() const { return m_groups; }
-  Box* groupBoxes() { return m_groupBoxes.data(); }
+  FloatBox* groupBoxes() { return m_groupBoxes.data(); }
 
   /// `bounds`: of all boxes; `bulk`: the extent of most of them, about 0. Afterwards order() is
   /// new, and boxes() are still in the old one.
-  void build(const Box& bounds, double bulk, const OctreeSettings&, const Threads&);
+  void build(const FloatBox& bounds, double bulk, const OctreeSettings&, const Threads&);
   void fit(const Threads&);
 
   /// Sum of the leaves' half areas over that of their primitives: how loose the fitted boxes are.
@@ -141,7 +141,7 @@ class Octree {
   Buffer<std::uint32_t> m_binCounts, m_binBegins;
   Buffer<std::uint32_t> m_groups;
   Buffer<OctreeNode> m_groupNodes;  ///< the node of each group
-  Buffer<Box> m_groupBoxes;
+  Buffer<FloatBox> m_groupBoxes;
   BlockPool m_pool;
   Buffer<OctreeNode> m_parents;   ///< of each block
   std::vector<Layout> m_layouts;  ///< the top's, then one for each task of the last build

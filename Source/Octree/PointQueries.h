@@ -21,7 +21,7 @@ struct PointQueryStack {
 /// f(begin, end) for ranges of the octree's order that hold every primitive whose box overlaps
 /// `box`.
 template <class F>
-void forEachOverlapping(const Octree& octree, const Box& box, PointQueryStack& stack, F&& f) {
+void forEachOverlapping(const Octree& octree, const FloatBox& box, PointQueryStack& stack, F&& f) {
   const OctreeBlock* blocks = octree.blocks();
   const auto overlaps = [&](const OctreeBlock& block, unsigned slot) {
     bool all = true;

@@ -18,7 +18,7 @@ class Validation {
     m_holders.assign(m_octree.size(), 0);
     m_blockSeen.assign(pool.used(), false);
     m_blockSeen[0] = true;
-    const Box all = visit(0, m_octree.rootCube());
+    const FloatBox all = visit(0, m_octree.rootCube());
     if (all.empty()) fail(0, "the root is empty");
     for (std::size_t i = 0; i < m_holders.size(); ++i)
       if (m_holders[i] != 1)
@@ -44,11 +44,11 @@ class Validation {
   }
 
   /// Returns the box that the node's fitted box must equal.
-  Box visit(OctreeNode node, const Cube& cube) {
+  FloatBox visit(OctreeNode node, const Cube& cube) {
     const OctreeBlock& block = m_octree.blocks()[node >> 3];
     const unsigned slot = node & 7;
     const auto [begin, end] = m_octree.ownRange(node);
-    Box box;
+    FloatBox box;
     if (begin > end || end > m_octree.size()) {
       fail(node, "its range of primitives is out of bounds");
       return box;
@@ -75,14 +75,14 @@ class Validation {
         }
       }
     }
-    const Box fitted = block.box(slot);
+    const FloatBox fitted = block.box(slot);
     if (fitted.lower != box.lower || fitted.upper != box.upper)
       fail(node, "its fitted box is not the tight one");
     return box;
   }
 
   void checkCell(OctreeNode node, const Cube& cube, std::uint32_t i, bool leaf) {
-    const Box box = m_octree.boxes()[i];
+    const FloatBox box = m_octree.boxes()[i];
     double longest = 0;
     for (int k = 0; k < 3; ++k) {
       const double lower = double{box.lower[k]} - cube.lower[k],

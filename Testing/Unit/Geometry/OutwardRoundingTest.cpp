@@ -145,12 +145,12 @@ TEST(OutwardRounding, BoxesOfTrianglesAreThoseOfTheirCorners) {
   }
   for (std::uint32_t t = 0; t < count; ++t) triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
   const std::vector<std::uint32_t> groups{0, 1, 18, 19, 20, 1000, 1000, 2999, 3000};
-  std::vector<Box> groupBoxes(groups.size() - 1);
+  std::vector<FloatBox> groupBoxes(groups.size() - 1);
   BoxArrays boxes;
   boxes.resize(count);
   triangleBoxes(points.data(), nullptr, triangles.data(), groups, boxes, groupBoxes.data());
   for (std::size_t g = 0; g + 1 < groups.size(); ++g) {
-    Box group;
+    FloatBox group;
     for (std::size_t t = groups[g]; t < groups[g + 1]; ++t) {
       for (int k = 0; k < 3; ++k) {
         float values[3];
