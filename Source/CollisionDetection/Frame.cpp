@@ -136,7 +136,8 @@ struct Frame::Job {
     Stopwatch watch;
     const MeshPair meshes = job.record->meshes(&job.floats);
     bool& intersecting = job.contacts.facts.startsIntersecting;
-    if (meshes.step.start && !intersecting) intersecting = anyIntersectAtStart(meshes, pairs);
+    if (meshes.step.start && !intersecting)
+      intersecting = anyIntersectAtStart(meshes, pairs, job.overlaps.part);
     if (job.record->plan.overlaps) findIntersections(meshes, pairs, job.overlaps);
     if (meshes.settings.contacts == Contacts::Earliest)
       job.findEarliest(meshes, pairs);
@@ -339,10 +340,8 @@ void Frame::findStartByBruteForce(const PairRecord& record, ContactBuffers& cont
   const auto countA = static_cast<std::uint32_t>(meshes.a.topology.triangles.size()),
              countB = static_cast<std::uint32_t>(meshes.b.topology.triangles.size());
   for (std::uint32_t a = 0; a < countA && meshes.step.start; ++a)
-    for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b) {
-      const TrianglePair candidate{a, b};
-      if (anyIntersectAtStart(meshes, {&candidate, 1})) contacts.facts.startsIntersecting = true;
-    }
+    for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b)
+      contacts.facts.startsIntersecting |= intersectAtStart(meshes, {a, b});
   if (!record.plan.overlaps) return;
   meshes.settings.method = Method::Intersection;
   findContactsByBruteForce(meshes, overlaps);

@@ -1,6 +1,7 @@
 #include "NarrowPhase/Intersection.h"
 
 #include "NarrowPhase/FeatureTests.h"
+#include "NarrowPhase/IntersectionFilter.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
@@ -19,8 +20,6 @@ struct MeshTriangle {
   const Triangle& vertices;
   Corners positions;
 
-  MeshTriangle(const TriangleMesh& ofMesh, std::uint32_t triangle)
-      : MeshTriangle(ofMesh, triangle, ofMesh.now) {}
   MeshTriangle(const TriangleMesh& ofMesh, std::uint32_t triangle,
                const std::vector<Eigen::Vector3d>& at)
       : mesh(ofMesh),
@@ -45,19 +44,6 @@ ExcludedFeatures featuresInCommon(const MeshTriangle& a, const MeshTriangle& b) 
     if (b.edge(i) == kNoEdge) excluded.edges |= 0111 << i;
   }
   return excluded;
-}
-
-/// No branch until the end: which axis tells two boxes apart is as good as random.
-bool boxesMeet(const Corners& a, const Corners& b) {
-  bool meet = true;
-  for (int k = 0; k < 3; ++k) {
-    const double lowerA = std::min(std::min(a[0][k], a[1][k]), a[2][k]),
-                 upperA = std::max(std::max(a[0][k], a[1][k]), a[2][k]),
-                 lowerB = std::min(std::min(b[0][k], b[1][k]), b[2][k]),
-                 upperB = std::max(std::max(b[0][k], b[1][k]), b[2][k]);
-    meet &= (lowerA <= upperB) & (lowerB <= upperA);
-  }
-  return meet;
 }
 
 /// The corner between two edges, given as bits.
@@ -131,46 +117,71 @@ class IntersectionContacts {
   bool m_self;
 };
 
+/// Unless it is one triangle of one mesh.
+template <class F>
+void intersect(const MeshPair& pair, const TrianglePair& candidate, bool atStart,
+               SignCounts& counts, F&& f) {
+  if (pair.self() && candidate.a == candidate.b) return;
+  const MeshTriangle a(pair.a, candidate.a, atStart ? pair.a.before : pair.a.now),
+      b(pair.b, candidate.b, atStart ? pair.b.before : pair.b.now);
+  const TriangleIntersection meeting = intersectTriangles(
+      a.positions, b.positions, counts, pair.self() ? featuresInCommon(a, b) : ExcludedFeatures());
+  if (meeting.intersect()) f(a, b, meeting);
+}
+
+/// Without the filter.
+void findOne(const MeshPair& pair, TrianglePair candidate, SignCounts& counts,
+             ContactBuffers& out) {
+  if (pair.self() && candidate.b < candidate.a) std::swap(candidate.a, candidate.b);
+  intersect(pair, candidate, false, counts,
+            [&](const MeshTriangle& a, const MeshTriangle& b, const TriangleIntersection& meeting) {
+              out.intersectingTriangles.push_back(candidate);
+              IntersectionContacts(pair, a, b, out).add(meeting);
+            });
+}
+
+void keepPossible(const MeshPair& pair, bool atStart, std::span<const TrianglePair> candidates,
+                  Buffer<TrianglePair>& possible) {
+  const auto placed = [&](const TriangleMesh& mesh) {
+    return PlacedTriangles{mesh.topology.triangles, (atStart ? mesh.before : mesh.now).data()};
+  };
+  possible.clear();
+  keepPossiblyIntersecting(placed(pair.a), placed(pair.b), pair.self(), candidates, possible);
+}
+
 }  // namespace
 
 void findIntersections(const MeshPair& pair, std::span<const TrianglePair> candidates,
                        ContactBuffers& out) {
   SignCounts counts;
-  for (TrianglePair candidate : candidates) {
-    if (pair.self() && candidate.b < candidate.a) std::swap(candidate.a, candidate.b);
-    const MeshTriangle a(pair.a, candidate.a), b(pair.b, candidate.b);
-    if (pair.self() && a.id == b.id) continue;
-    const TriangleIntersection meeting =
-        intersectTriangles(a.positions, b.positions, counts,
-                           pair.self() ? featuresInCommon(a, b) : ExcludedFeatures());
-    if (!meeting.intersect()) continue;
-    out.intersectingTriangles.push_back(candidate);
-    IntersectionContacts(pair, a, b, out).add(meeting);
-  }
+  keepPossible(pair, false, candidates, out.part);
+  for (const TrianglePair& candidate : out.part) findOne(pair, candidate, counts, out);
   out.exactDecisions += counts.undecided;
 }
 
-bool anyIntersectAtStart(const MeshPair& pair, std::span<const TrianglePair> candidates) {
+bool intersectAtStart(const MeshPair& pair, const TrianglePair& candidate) {
   SignCounts counts;
-  return std::any_of(candidates.begin(), candidates.end(), [&](const TrianglePair& candidate) {
-    if (pair.self() && candidate.a == candidate.b) return false;
-    const MeshTriangle a(pair.a, candidate.a, pair.a.before), b(pair.b, candidate.b, pair.b.before);
-    if (!boxesMeet(a.positions, b.positions)) return false;
-    return intersectTriangles(a.positions, b.positions, counts,
-                              pair.self() ? featuresInCommon(a, b) : ExcludedFeatures())
-        .intersect();
+  bool found = false;
+  intersect(pair, candidate, true, counts, [&](const auto&...) { found = true; });
+  return found;
+}
+
+bool anyIntersectAtStart(const MeshPair& pair, std::span<const TrianglePair> candidates,
+                         Buffer<TrianglePair>& scratch) {
+  keepPossible(pair, true, candidates, scratch);
+  return std::any_of(scratch.begin(), scratch.end(), [&](const TrianglePair& candidate) {
+    return intersectAtStart(pair, candidate);
   });
 }
 
 void findIntersectionsByBruteForce(const MeshPair& pair, const FeatureLists& features,
                                    ContactBuffers& out) {
+  SignCounts counts;
   const auto countB = static_cast<std::uint32_t>(pair.b.topology.triangles.size());
-  for (const std::uint32_t a : features.trianglesOfA) {
-    for (std::uint32_t b = pair.self() ? a + 1 : 0; b < countB; ++b) {
-      const TrianglePair candidate{a, b};
-      findIntersections(pair, {&candidate, 1}, out);
-    }
-  }
+  for (const std::uint32_t a : features.trianglesOfA)
+    for (std::uint32_t b = pair.self() ? a + 1 : 0; b < countB; ++b)
+      findOne(pair, {a, b}, counts, out);
+  out.exactDecisions += counts.undecided;
 }
 
 }  // namespace palpate

@@ -55,6 +55,9 @@ void answerByImpact(const MeshPair&, const StepFacts& touched, ContactBuffers& f
                     ContactBuffers& out);
 
 /// Whether triangles of the candidates intersect at the step's start, exactly.
-bool anyIntersectAtStart(const MeshPair&, std::span<const TrianglePair> candidates);
+bool anyIntersectAtStart(const MeshPair&, std::span<const TrianglePair> candidates,
+                         Buffer<TrianglePair>& scratch);
+/// The same of one pair.
+bool intersectAtStart(const MeshPair&, const TrianglePair&);
 
 }  // namespace palpate
