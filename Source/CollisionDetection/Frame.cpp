@@ -2,6 +2,7 @@
 
 #include "CollisionDetection/BruteForce.h"
 #include "CollisionDetection/Stopwatch.h"
+#include "Core/Spin.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/Intersection.h"
@@ -17,7 +18,7 @@ namespace palpate {
 /// A user's function, called by one thread at a time.
 struct Guarded {
   std::mutex mutex;
-  PairSink::Function function;
+  Frame::BatchFunction function;
   void* context;
 };
 
@@ -25,7 +26,7 @@ namespace {
 
 /// Node pairs and jobs for each collision pair, where there is more than one thread.
 constexpr std::size_t kNodePairsWanted = 256;
-constexpr std::size_t kJobsPerPair = 16;
+constexpr std::size_t kJobsPerPair = 32;
 /// Below this many triangles handing out parts of a pair costs more than it saves.
 constexpr std::size_t kSharedSize = 8192;
 
@@ -100,6 +101,7 @@ struct Frame::Job {
   Use use;
   Guarded* guarded;               ///< of forEach()
   std::atomic<double>* earliest;  ///< of all jobs of the pair, where only that is asked for
+  TrianglePair* place;            ///< of collect(): where what was found goes
   bool keepCandidates;
   bool nearby;  ///< boxes overlap at the thickness of the traversal, if not at their own
   ContactBuffers contacts;
@@ -128,8 +130,10 @@ struct Frame::Job {
   }
 
   static void handOver(Job& job, std::span<const TrianglePair> pairs) {
-    const std::lock_guard lock(job.guarded->mutex);
-    job.guarded->function(job.guarded->context, pairs);
+    std::unique_lock lock(job.guarded->mutex, std::try_to_lock);
+    for (Spin spin; !lock && !spin.isOver() && !lock.try_lock();) spin.wait();
+    if (!lock) lock.lock();
+    job.guarded->function(job.guarded->context, job.record->pair, pairs);
   }
 
   static void detect(Job& job, std::span<const TrianglePair> pairs) {
@@ -169,6 +173,7 @@ Frame::Job& Frame::newJob(PairRecord& record) {
   job.contacts.clear();
   job.overlaps.clear();
   job.nearby = false;
+  job.place = nullptr;
   job.candidates.clear();
   job.milliseconds = job.narrowMilliseconds = 0;
   return job;
@@ -230,19 +235,23 @@ void Frame::collect(std::span<PairRecord* const> records, const Threads& threads
       m_jobs[first]->sink.takeKept(record->candidates);
     } else {
       record->candidates.resize(size);
-      auto place = record->candidates.begin();
-      for (std::size_t k = first; k < i; ++k)
-        place = std::copy(found(k).begin(), found(k).end(), place);
+      TrianglePair* place = record->candidates.data();
+      for (std::size_t k = first; k < i; ++k) {
+        m_jobs[k]->place = place;
+        place += found(k).size();
+      }
     }
     record->candidatesFor = record->revisions();
     record->candidatesSorted = false;
   }
+  threads.forEach(m_jobCount, [&](std::size_t k) {
+    if (m_jobs[k]->place) std::copy(found(k).begin(), found(k).end(), m_jobs[k]->place);
+  });
   statistics.milliseconds.pairs = watch.lap();
 }
 
-void Frame::forEach(PairRecord& record, const Threads& threads, PairSink::Function function,
-                    void* context) {
-  PairRecord* records[] = {&record};
+void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads,
+                    BatchFunction function, void* context) {
   start(records, threads, false);
   Guarded guarded{{}, function, context};
   threads.forEach(m_jobCount, [&](std::size_t i) {

@@ -24,8 +24,10 @@ class Frame {
 
   /// Candidates of each pair, unsorted, into its record.
   void collect(std::span<PairRecord* const>, const Threads&, FrameStatistics&);
-  /// Candidates of one pair to a function, batch by batch, never two at once.
-  void forEach(PairRecord&, const Threads&, PairSink::Function, void* context);
+  using BatchFunction = void (*)(void* context, const CollisionPair&,
+                                 std::span<const TrianglePair>);
+  /// Candidates of each pair to a function, batch by batch, never two at once.
+  void forEach(std::span<PairRecord* const>, const Threads&, BatchFunction, void* context);
   /// Contacts of each pair, sorted, into its record; its candidates too if they are to be kept.
   void detect(std::span<PairRecord* const>, const Settings&, const Threads&, FrameStatistics&);
   /// The same answers from every feature against every other.

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -17,7 +18,9 @@ namespace {
 
 /// Below this many triangles a geometry is updated by one thread, beside others.
 constexpr std::size_t kSmall = 16384;
-constexpr std::size_t kVertexGrain = 4096;
+/// Refitting fewer triangles in all, cores take longer to hand over data than to compute it.
+constexpr std::size_t kSmallRefit = 24576;
+constexpr std::size_t kVertexGrain = 4096, kCopyGrain = 16384;
 constexpr std::size_t kTrianglesPerGroup = 1024;  ///< for bounds, before there are nodes
 constexpr std::size_t kGroupGrain = 256;
 /// A refitted tree is rebuilt when its leaves have become this much larger in relation to their
@@ -25,8 +28,17 @@ constexpr std::size_t kGroupGrain = 256;
 constexpr double kMostLoosening = 1.5;
 
 void checkPositions(GeometryId id, std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out,
-                    const char* which) {
-  const std::size_t bad = copyFinite(positions, out);
+                    const char* which, const Threads& threads = Threads(1)) {
+  std::atomic<std::size_t> first = positions.size();
+  threads.forChunks(positions.size(), kCopyGrain,
+                    [&](std::size_t, std::size_t from, std::size_t to) {
+                      const auto part = positions.subspan(from, to - from);
+                      const std::size_t bad = from + copyFinite(part, out + from);
+                      std::size_t known = first;
+                      while (bad < to && bad < known && !first.compare_exchange_weak(known, bad)) {
+                      }
+                    });
+  const std::size_t bad = first;
   if (bad == positions.size()) return;
   const Eigen::Vector3d& p = positions[bad];
   char value[128];
@@ -254,11 +266,12 @@ void GeometryTable::remove(GeometryId id) {
   std::erase_if(m_geometries, [=](const auto& g) { return g.get() == geometry; });
 }
 
-void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d> now) {
+void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d> now,
+                                 const Threads& threads) {
   Geometry& geometry = at(id);
   checkPositionCount(geometry, now.size());
   geometry.staging.resize(now.size());
-  checkPositions(id, now, geometry.staging.data(), "");
+  checkPositions(id, now, geometry.staging.data(), "", threads);
   const bool moved =
       !now.empty() && std::memcmp(now.data(), geometry.mesh.now.data(), now.size_bytes()) != 0;
   if (!geometry.setThisFrame)
@@ -274,14 +287,14 @@ void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d>
 }
 
 void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d> before,
-                                 std::span<const Eigen::Vector3d> now) {
+                                 std::span<const Eigen::Vector3d> now, const Threads& threads) {
   Geometry& geometry = at(id);
   checkPositionCount(geometry, before.size());
   checkPositionCount(geometry, now.size());
   geometry.staging.resize(now.size());
   geometry.staging2.resize(before.size());
-  checkPositions(id, before, geometry.staging2.data(), " before");
-  checkPositions(id, now, geometry.staging.data(), " now");
+  checkPositions(id, before, geometry.staging2.data(), " before", threads);
+  checkPositions(id, now, geometry.staging.data(), " now", threads);
   if (!geometry.setThisFrame)
     geometry.lastFrame.swap(geometry.mesh.now);
   else if (!geometry.beforeGiven)
@@ -317,17 +330,15 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
   ++geometry.topologyRevision;
 }
 
-void GeometryTable::updateMotion(const Threads& threads) {
-  for (const auto& geometry : m_geometries) {
-    if (geometry->motionRevision == geometry->stepRevision) continue;
-    geometry->motionRevision = geometry->stepRevision;
-    const TriangleMesh& mesh = geometry->mesh;
-    geometry->motion = motionOf(mesh.before, mesh.now, geometry->motionParts, threads);
-    geometry->correction =
-        geometry->hasLastFrame && geometry->beforeGiven
-            ? motionOf(geometry->lastFrame, mesh.before, geometry->motionParts, threads)
-            : MotionRange{};
-  }
+void GeometryTable::updateMotion(Geometry& geometry, const Threads& threads) {
+  if (geometry.motionRevision == geometry.stepRevision) return;
+  geometry.motionRevision = geometry.stepRevision;
+  const TriangleMesh& mesh = geometry.mesh;
+  geometry.motion = motionOf(mesh.before, mesh.now, geometry.motionParts, threads);
+  geometry.correction =
+      geometry.hasLastFrame && geometry.beforeGiven
+          ? motionOf(geometry.lastFrame, mesh.before, geometry.motionParts, threads)
+          : MotionRange{};
 }
 
 void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads& threads) {
@@ -355,8 +366,11 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   std::sort(m_changed.begin(), m_changed.end(), [&](const Geometry* l, const Geometry* r) {
     return size(l) != size(r) ? size(l) > size(r) : l->id < r->id;
   });
+  std::size_t total = 0;
+  for (const Geometry* geometry : m_changed) total += size(geometry);
   const Threads one(1);
-  threads.forEach(m_changed.size(), [&](std::size_t i) {
+  const bool alone = settings.update == OctreeUpdate::Auto && total < kSmallRefit;
+  (alone ? one : threads).forEach(m_changed.size(), [&](std::size_t i) {
     updateOctree(*m_changed[i], settings, size(m_changed[i]) < kSmall ? one : threads);
   });
 }

@@ -65,17 +65,17 @@ class GeometryTable {
   GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Triangle>,
                  GeometryKind = GeometryKind::Triangles, std::span<const double> radii = {});
   void remove(GeometryId);
-  void setPositions(GeometryId, std::span<const Eigen::Vector3d> now);
+  void setPositions(GeometryId, std::span<const Eigen::Vector3d> now, const Threads&);
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> before,
-                    std::span<const Eigen::Vector3d> now);
+                    std::span<const Eigen::Vector3d> now, const Threads&);
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
 
   Geometry& at(GeometryId);  ///< throws UnknownGeometry
   std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }
 
-  /// How geometries move in the step.
-  void updateMotion(const Threads&);
+  /// How a geometry moves in the step.
+  static void updateMotion(Geometry&, const Threads&);
   /// Octrees for the positions now, or the whole step.
   void updateOctrees(const OctreeSettings&, const Threads&);
   void endFrame();

@@ -117,7 +117,8 @@ struct OctreeBasedCD::Implementation {
 
   /// Boxes and octrees for the positions now. What a frame's detection finds done by an explicit
   /// update() stays said.
-  void update(bool explicitly = false) {
+  /// `detecting`: plans say how all pairs move; else only what candidates depend on.
+  void update(bool explicitly = false, bool detecting = false) {
     using Update = LooseOctree::Update;
     const bool asked = !inFrame || explicitly;
     startFrame();
@@ -127,12 +128,15 @@ struct OctreeBasedCD::Implementation {
       geometry->boxMilliseconds = geometry->octreeMilliseconds = 0;
     }
     Stopwatch watch;
-    geometries.updateMotion(threads);
-    statistics.milliseconds.boxes += watch.lap();
     for (const auto& record : pairs.records()) {
-      record->plan = planOf(record->pair.settings, *record->a, *record->b);
+      const bool moves = detecting || record->pair.settings.method == Method::Auto;
+      if (moves)
+        for (Geometry* geometry : {record->a, record->b})
+          GeometryTable::updateMotion(*geometry, threads);
+      record->plan = planOf(record->pair.settings, *record->a, *record->b, moves);
       if (record->plan.swept()) record->a->swept = record->b->swept = true;
     }
+    statistics.milliseconds.boxes += watch.lap();
     geometries.updateOctrees(settings.octree, threads);
     const double wall = watch.lap();
     double boxes = 0, octrees = 0;
@@ -200,7 +204,7 @@ struct OctreeBasedCD::Implementation {
   }
 
   void detect() {
-    update();
+    update(false, true);
     const auto records = pairsToDo(&PairRecord::dataFor);
     const std::uint64_t thisFrame = geometries.framesEnded() + 1;
     for (PairRecord* record : records)
@@ -304,12 +308,12 @@ void OctreeBasedCD::removeGeometry(GeometryId geometry) {
 }
 
 void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vector3d> now) {
-  m_implementation->geometries.setPositions(geometry, now);
+  m_implementation->geometries.setPositions(geometry, now, m_implementation->threads);
 }
 
 void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vector3d> before,
                                  std::span<const Eigen::Vector3d> now) {
-  m_implementation->geometries.setPositions(geometry, before, now);
+  m_implementation->geometries.setPositions(geometry, before, now, m_implementation->threads);
 }
 
 void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
@@ -350,19 +354,23 @@ void OctreeBasedCD::detectCollision() {
   m_implementation->detect();
 }
 
-void OctreeBasedCD::forEachCandidateBatch(GeometryId a, GeometryId b, BatchFunction function,
+void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFunction function,
                                           void* context) {
   const StandardFloatingPoint standard;
   Implementation& all = *m_implementation;
-  PairRecord& record = all.pairs.at(all.geometries, a, b);
+  all.work.clear();
+  if (only)
+    all.work.push_back(&all.pairs.at(all.geometries, only->a, only->b));
+  else
+    for (const auto& record : all.pairs.records()) all.work.push_back(record.get());
   all.update();
-  if (all.settings.engine == Engine::BruteForce) {
-    Buffer<TrianglePair> candidates;
-    findCandidatesByBruteForce(record.meshes(), candidates);
-    if (!candidates.empty()) function(context, candidates);
-    return;
+  if (all.settings.engine == Engine::Octree)
+    return all.frame.forEach(all.work, all.threads, function, context);
+  Buffer<TrianglePair> candidates;
+  for (const PairRecord* record : all.work) {
+    findCandidatesByBruteForce(record->meshes(), candidates);
+    if (!candidates.empty()) function(context, record->pair, candidates);
   }
-  all.frame.forEach(record, all.threads, function, context);
 }
 
 std::span<const InsideVertex> OctreeBasedCD::findInsideVertices(GeometryId vertices,

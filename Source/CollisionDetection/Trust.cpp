@@ -52,12 +52,12 @@ static bool knowsSides(const Geometry& a, const Geometry& b) {
   return a.mesh.topology.hasFaces() && b.mesh.topology.hasFaces();
 }
 
-PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry& b) {
+PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry& b, bool moves) {
   PairPlan plan;
   plan.method = settings.method;
   StepPlan& step = plan.step;
   const double thickness = settings.thickness;
-  plan.motion = largestMotion(a.motion, b.motion);
+  plan.motion = moves ? largestMotion(a.motion, b.motion) : 0.0;
   if (!knowsSides(a, b)) return plan;
   step.motion = plan.motion;
   if (settings.method == Method::Auto) {

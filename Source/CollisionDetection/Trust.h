@@ -21,8 +21,8 @@ struct PairPlan {
   bool swept() const { return method == Method::Continuous || method == Method::Auto; }
 };
 
-/// From the settings, which are good, and how the geometries moved.
-PairPlan planOf(const PairSettings&, const Geometry& a, const Geometry& b);
+/// From the settings, which are good, and how the geometries moved, if that matters.
+PairPlan planOf(const PairSettings&, const Geometry& a, const Geometry& b, bool moves = true);
 
 /// Whether a pair's meshes are known to be apart where its next step starts, from frame to frame.
 class Trust {

@@ -1,5 +1,7 @@
 #include "Core/Threads.h"
 
+#include "Core/Spin.h"
+
 #include <algorithm>
 #include <thread>
 
@@ -9,7 +11,7 @@
 #include <tbb/task_arena.h>
 #else
 #include <atomic>
-#include <barrier>
+#include <cstdint>
 #include <exception>
 #include <mutex>
 #include <vector>
@@ -49,69 +51,129 @@ void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* func
 
 #else
 
-/// Whether this thread is in a run: one within a run has no pool of its own and runs where it is.
-static thread_local bool isRunning = false;
+namespace {
 
-/// A plain pool: the caller and count - 1 workers meet, take indices from one counter, and meet
-/// again.
+void waitOrYield(Spin& spin) {
+  if (spin.isOver())
+    std::this_thread::yield();
+  else
+    spin.wait();
+}
+
+/// Held for a few instructions at a time.
+struct BriefLock {
+  void lock() {
+    for (Spin spin; flag.test_and_set(std::memory_order_acquire);) waitOrYield(spin);
+  }
+  void unlock() { flag.clear(std::memory_order_release); }
+  std::atomic_flag flag;
+};
+
+}  // namespace
+
+/// A plain pool. Indices of a loop are taken one by one, from the first on by the thread that runs
+/// it, from the last on by whoever joins, so that from loop to loop a thread meets the same data:
+/// workers join, and threads that wait for the last indices of a loop of their own. So loops within
+/// loops are shared too.
 struct Threads::Pool {
-  explicit Pool(int count) : meeting(count) {
+  explicit Pool(int count) {
+    loops.reserve(4 * static_cast<std::size_t>(count));
     for (int i = 1; i < count; ++i) workers.emplace_back([this] { work(); });
   }
   ~Pool() {
-    call = nullptr;
-    meeting.arrive_and_wait();
+    over = true;
+    ++posted;
+    posted.notify_all();
     for (std::thread& worker : workers) worker.join();
   }
 
-  void run(std::size_t newSize, void (*newCall)(void*, std::size_t), void* newFunction) {
-    size = newSize;
-    call = newCall;
-    function = newFunction;
-    next = 0;
-    failure = nullptr;
-    meeting.arrive_and_wait();
-    takeAll();
-    meeting.arrive_and_wait();
-    if (failure) std::rethrow_exception(failure);
+  struct Loop {
+    std::size_t size;
+    void (*call)(void*, std::size_t);
+    void* function;
+    std::uint64_t number = 0;
+    std::size_t first = 0;                       ///< taken by the thread that runs it
+    std::atomic<std::size_t> last{0}, taken{0};  ///< by those who joined; by all
+    std::atomic<int> joined{0};
+    std::exception_ptr failure{};
+  };
+
+  void run(std::size_t size, void (*call)(void*, std::size_t), void* function) {
+    Loop loop{size, call, function};
+    post(loop);
+    while (takeOne(loop, false)) {
+    }
+    {
+      const std::lock_guard guard(lock);
+      std::erase(loops, &loop);
+    }
+    // Others are at its last indices; what they wait for is in newer loops.
+    for (Spin spin; loop.joined.load(std::memory_order_acquire) > 0; waitOrYield(spin))
+      if (Loop* newer = join(loop.number)) {
+        takeOne(*newer, true);
+        leave(*newer);
+        spin = {};
+      }
+    if (loop.failure) std::rethrow_exception(loop.failure);
   }
 
-  void takeAll() {
-    isRunning = true;
-    for (std::size_t i = next++; i < size; i = next++) {
-      try {
-        call(function, i);
-      } catch (...) {
-        const std::lock_guard lock(mutex);
-        if (!failure) failure = std::current_exception();
-      }
+  void post(Loop& loop) {
+    {
+      const std::lock_guard guard(lock);
+      loop.number = ++lastNumber;
+      loops.push_back(&loop);
     }
-    isRunning = false;
+    ++posted;
+    for (std::size_t i = 1; i < std::min(loop.size, workers.size() + 1); ++i) posted.notify_one();
+  }
+
+  /// The newest loop after the one numbered that has indices left; it stays until left.
+  Loop* join(std::uint64_t after) {
+    const std::lock_guard guard(lock);
+    for (auto loop = loops.rbegin(); loop != loops.rend() && (*loop)->number > after; ++loop)
+      if ((*loop)->taken < (*loop)->size) {
+        ++(*loop)->joined;
+        return *loop;
+      }
+    return nullptr;
+  }
+
+  static void leave(Loop& loop) { loop.joined.fetch_sub(1, std::memory_order_release); }
+
+  bool takeOne(Loop& loop, bool joined) {
+    if (loop.taken++ >= loop.size) return false;
+    const std::size_t i = joined ? loop.size - ++loop.last : loop.first++;
+    try {
+      loop.call(loop.function, i);
+    } catch (...) {
+      const std::lock_guard guard(lock);
+      if (!loop.failure) loop.failure = std::current_exception();
+    }
+    return true;
   }
 
   void work() {
-    for (meeting.arrive_and_wait(); call != nullptr; meeting.arrive_and_wait()) {
-      takeAll();
-      meeting.arrive_and_wait();
+    for (int seen = posted; !over; seen = posted) {
+      while (Loop* loop = join(0)) {
+        while (takeOne(*loop, true)) {
+        }
+        leave(*loop);
+      }
+      for (Spin spin; posted == seen && !spin.isOver();) spin.wait();
+      posted.wait(seen);
     }
   }
 
+  BriefLock lock;
+  std::vector<Loop*> loops;  ///< oldest first; under the lock
+  std::uint64_t lastNumber = 0;
+  std::atomic<int> posted{0};  ///< counts posts: workers sleep until it changes
+  std::atomic<bool> over{false};
   std::vector<std::thread> workers;
-  std::barrier<> meeting;
-  std::mutex mutex;  ///< of the failure
-  std::atomic<std::size_t> next{0};
-  std::size_t size = 0;
-  void (*call)(void*, std::size_t) = nullptr;  ///< none: no more will come
-  void* function = nullptr;
-  std::exception_ptr failure;
 };
 
 void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* function) const {
-  if (isRunning) {
-    for (std::size_t i = 0; i < size; ++i) call(function, i);
-  } else {
-    m_pool->run(size, call, function);
-  }
+  m_pool->run(size, call, function);
 }
 
 #endif

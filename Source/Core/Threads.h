@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// The one place for threads: oneTBB, or std::thread where PALPATE_THREADS=STD.
+/// The one place for threads: a pool of std::thread, or oneTBB where PALPATE_THREADS=TBB.
 ///
 /// Work is cut into chunks whose bounds depend on its size only, never on the number of threads, so
 /// results written per chunk are the same for any number.

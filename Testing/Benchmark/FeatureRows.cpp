@@ -35,7 +35,7 @@ class FeatureCandidates {
 
   void frame(const std::vector<Eigen::Vector3d>& before, const std::vector<Eigen::Vector3d>& now) {
     vertexTriangle = edgeEdge = 0;
-    m_table.setPositions(m_id, before, now);
+    m_table.setPositions(m_id, before, now, m_threads);
     m_table.updateOctrees({}, m_threads);
     TreePair trees{&m_geometry.octree, &m_geometry.octree};
     setShift(trees, {0, 0, 0}, 0);

@@ -42,13 +42,11 @@ class PalpateEngine : public Peer {
       return;
     }
     m_lists.clear();
-    for (std::size_t pair = 0; pair < m_task.pairs.size(); ++pair) {
-      std::vector<TrianglePair>& list = m_lists.of(pair, 0);
-      m_scene->detection.forEachCandidate(first(pair), second(pair),
-                                          [&list](std::span<const TrianglePair> batch) {
-                                            list.insert(list.end(), batch.begin(), batch.end());
-                                          });
-    }
+    m_scene->detection.forEachCandidate(
+        [this](const CollisionPair& pair, std::span<const TrianglePair> batch) {
+          std::vector<TrianglePair>& list = m_lists.of(indexOf(pair), 0);
+          list.insert(list.end(), batch.begin(), batch.end());
+        });
   }
 
   std::vector<TrianglePair> candidates(std::size_t pair) const override {
@@ -58,6 +56,11 @@ class PalpateEngine : public Peer {
   }
 
  private:
+  std::size_t indexOf(const CollisionPair& pair) const {
+    std::size_t i = 0;
+    while (first(i) != pair.a || second(i) != pair.b) ++i;
+    return i;
+  }
   GeometryId first(std::size_t pair) const { return m_scene->ids[m_task.pairs[pair][0]]; }
   GeometryId second(std::size_t pair) const { return m_scene->ids[m_task.pairs[pair][1]]; }
 

@@ -78,11 +78,21 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// not all from the calling thread; memory does not grow with their number. Updates if needed.
   template <class F>
   void forEachCandidate(GeometryId a, GeometryId b, F&& f) {
-    using Function = std::remove_reference_t<F>;
+    const CollisionPair pair{a, b, {}};
     forEachCandidateBatch(
-        a, b,
-        [](void* function, std::span<const TrianglePair> batch) {
-          (*static_cast<Function*>(function))(batch);
+        &pair,
+        [](void* function, const CollisionPair&, std::span<const TrianglePair> batch) {
+          (*static_cast<std::remove_reference_t<F>*>(function))(batch);
+        },
+        const_cast<void*>(static_cast<const void*>(std::addressof(f))));
+  }
+  /// Those of every pair to f(const CollisionPair&, std::span<const TrianglePair>).
+  template <class F>
+  void forEachCandidate(F&& f) {
+    forEachCandidateBatch(
+        nullptr,
+        [](void* function, const CollisionPair& pair, std::span<const TrianglePair> batch) {
+          (*static_cast<std::remove_reference_t<F>*>(function))(pair, batch);
         },
         const_cast<void*>(static_cast<const void*>(std::addressof(f))));
   }
@@ -114,8 +124,9 @@ class PALPATE_EXPORT OctreeBasedCD {
   CollisionProblem problem() const;
 
  private:
-  using BatchFunction = void (*)(void*, std::span<const TrianglePair>);
-  void forEachCandidateBatch(GeometryId a, GeometryId b, BatchFunction, void* function);
+  using BatchFunction = void (*)(void*, const CollisionPair&, std::span<const TrianglePair>);
+  /// `only`: null: of every pair.
+  void forEachCandidateBatch(const CollisionPair* only, BatchFunction, void* function);
 
   struct Implementation;
   std::unique_ptr<Implementation> m_implementation;

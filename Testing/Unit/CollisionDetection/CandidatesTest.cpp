@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <map>
+#include <vector>
 
 namespace palpate {
 namespace {
@@ -34,6 +37,28 @@ void expectComplete(std::span<const TrianglePair> found, std::span<const Triangl
   EXPECT_LE(found.size(), truth.size() + truth.size() / 100 + 2);
 }
 
+/// forEachCandidate(), of one pair and of all, hands on what candidatePairs() has.
+void expectSameInBatches(OctreeBasedCD& octree,
+                         const std::vector<std::array<GeometryId, 2>>& pairs) {
+  std::map<std::pair<GeometryId, GeometryId>, std::vector<TrianglePair>> ofAll;
+  octree.forEachCandidate([&](const CollisionPair& pair, std::span<const TrianglePair> batch) {
+    auto& own = ofAll[{pair.a, pair.b}];
+    own.insert(own.end(), batch.begin(), batch.end());
+  });
+  for (const auto& [a, b] : pairs) {
+    std::vector<TrianglePair> own;
+    octree.forEachCandidate(a, b, [&](std::span<const TrianglePair> batch) {
+      own.insert(own.end(), batch.begin(), batch.end());
+    });
+    const auto expected = octree.candidatePairs(a, b);
+    for (std::vector<TrianglePair>* found : {&own, &ofAll[{a, b}]}) {
+      std::sort(found->begin(), found->end());
+      EXPECT_TRUE(std::equal(found->begin(), found->end(), expected.begin(), expected.end()));
+    }
+  }
+  EXPECT_EQ(ofAll.size(), pairs.size());
+}
+
 /// The octree's candidates of a and b, and of a with itself, over frames in which both move,
 /// against brute force.
 void compare(const Mesh& a, const Mesh& b, double thickness, const Eigen::Vector3d& offset,
@@ -58,6 +83,7 @@ void compare(const Mesh& a, const Mesh& b, double thickness, const Eigen::Vector
     EXPECT_EQ(octree.octree().validate(), std::vector<std::string>{});
     expectComplete(octree.candidatePairs(ids[0][0], ids[0][1]),
                    oracle.candidatePairs(ids[1][0], ids[1][1]));
+    expectSameInBatches(octree, {{ids[0][0], ids[0][1]}, {ids[0][0], ids[0][0]}});
     expectComplete(octree.candidatePairs(ids[0][0], ids[0][0]),
                    oracle.candidatePairs(ids[1][0], ids[1][0]));
     for (Eigen::Vector3d& p : first.positions)

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <numeric>
 #include <stdexcept>
+#include <thread>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -92,6 +93,19 @@ TEST(Threads, NestedRunsAreComplete) {
       for (const auto& row : runs) EXPECT_EQ(row, std::vector<int>(30, 1));
     }
   }
+}
+
+TEST(Threads, RunsOfSeveralCallersAtOnceAreComplete) {
+  const Threads threads(3);
+  std::vector<std::vector<int>> runs(4, std::vector<int>(500, 0));
+  std::vector<std::thread> callers;
+  for (auto& own : runs)
+    callers.emplace_back([&] {
+      for (int run = 0; run < 100; ++run)
+        threads.forEach(own.size(), [&](std::size_t i) { ++own[i]; });
+    });
+  for (std::thread& caller : callers) caller.join();
+  for (const auto& own : runs) EXPECT_EQ(own, std::vector<int>(500, 100));
 }
 
 TEST(Threads, ANestedExceptionIsRethrown) {
