@@ -243,6 +243,7 @@ void Frame::collect(std::span<PairRecord* const> records, const Threads& threads
     }
     record->candidatesFor = record->revisions();
     record->candidatesSorted = false;
+    record->found = size;
   }
   threads.forEach(m_jobCount, [&](std::size_t k) {
     if (m_jobs[k]->place) std::copy(found(k).begin(), found(k).end(), m_jobs[k]->place);
@@ -259,6 +260,8 @@ void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads
     m_jobs[i]->start(&Job::handOver);
     run(*m_jobs[i]);
   });
+  for (PairRecord* record : records) record->found = 0;
+  for (std::size_t i = 0; i < m_jobCount; ++i) m_jobs[i]->record->found += m_jobs[i]->sink.total();
 }
 
 void Frame::detect(std::span<PairRecord* const> records, const Settings& settings,

@@ -144,7 +144,9 @@ void rebuild(Geometry& geometry, const OctreeSettings& settings, const Threads& 
   }
   const FloatBox bounds = boundsOf(geometry, threads);
   geometry.boxMilliseconds += watch.lap();
-  octree.build(bounds, geometry.spread * geometry.frame.scale, settings, threads);
+  // Triangles in the old order are of no use any more: their memory is the keys'.
+  auto* keys = reinterpret_cast<std::uint64_t*>(geometry.orderedTriangles.data());
+  octree.build(bounds, geometry.spread * geometry.frame.scale, settings, keys, threads);
   threads.forChunks(triangles.size(), kVertexGrain,
                     [&](std::size_t, std::size_t from, std::size_t to) {
                       for (std::size_t i = from; i < to; ++i)
@@ -369,8 +371,8 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   std::size_t total = 0;
   for (const Geometry* geometry : m_changed) total += size(geometry);
   const Threads one(1);
-  const bool alone = settings.update == OctreeUpdate::Auto && total < kSmallRefit;
-  (alone ? one : threads).forEach(m_changed.size(), [&](std::size_t i) {
+  m_updatedAlone = settings.update == OctreeUpdate::Auto && total < kSmallRefit;
+  (m_updatedAlone ? one : threads).forEach(m_changed.size(), [&](std::size_t i) {
     updateOctree(*m_changed[i], settings, size(m_changed[i]) < kSmall ? one : threads);
   });
 }

@@ -78,6 +78,7 @@ class GeometryTable {
   static void updateMotion(Geometry&, const Threads&);
   /// Octrees for the positions now, or the whole step.
   void updateOctrees(const OctreeSettings&, const Threads&);
+  bool updatedAlone() const { return m_updatedAlone; }  ///< by one thread, which has the data
   void endFrame();
   std::uint64_t framesEnded() const { return m_framesEnded; }
 
@@ -85,6 +86,7 @@ class GeometryTable {
   std::vector<std::unique_ptr<Geometry>> m_geometries;  ///< ascending ids
   std::uint32_t m_nextId = 0;
   std::vector<Geometry*> m_changed;
+  bool m_updatedAlone = false;
   std::uint64_t m_framesEnded = 0;
 };
 

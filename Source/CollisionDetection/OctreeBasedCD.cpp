@@ -66,7 +66,7 @@ struct OctreeBasedCD::Implementation {
   }
 
   Settings settings;
-  Threads threads;
+  Threads threads, one{1};
   GeometryTable geometries;
   PairTable pairs;
   Frame frame;
@@ -185,11 +185,20 @@ struct OctreeBasedCD::Implementation {
     return work;
   }
 
+  /// Where one thread has refitted the octrees and few pairs are to be expected, another would wait
+  /// for the data longer than it could help.
+  const Threads& threadsFor(std::span<PairRecord* const> records) const {
+    constexpr std::size_t kFew = 16384;
+    std::size_t found = 0;
+    for (const PairRecord* record : records) found += record->found;
+    return geometries.updatedAlone() && found < kFew ? one : threads;
+  }
+
   void collect() {
     update();
     const auto records = pairsToDo(&PairRecord::candidatesFor);
     if (settings.engine == Engine::Octree) {
-      frame.collect(records, threads, statistics);
+      frame.collect(records, threadsFor(records), statistics);
     } else {
       for (PairRecord* record : records) {
         findCandidatesByBruteForce(record->meshes(), record->candidates);
@@ -365,7 +374,7 @@ void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFuncti
     for (const auto& record : all.pairs.records()) all.work.push_back(record.get());
   all.update();
   if (all.settings.engine == Engine::Octree)
-    return all.frame.forEach(all.work, all.threads, function, context);
+    return all.frame.forEach(all.work, all.threadsFor(all.work), function, context);
   Buffer<TrianglePair> candidates;
   for (const PairRecord* record : all.work) {
     findCandidatesByBruteForce(record->meshes(), candidates);

@@ -47,6 +47,7 @@ struct PairRecord {
   CollisionData data;
   AnsweredFor dataFor;
   std::atomic<double> earliest;     ///< Contacts::Earliest: found so far in this frame
+  std::size_t found = 0;            ///< candidates, when last collected or handed on
   Buffer<TrianglePair> candidates;  ///< in the order found until somebody asks for them
   AnsweredFor candidatesFor;
   bool candidatesSorted = false;

@@ -116,7 +116,7 @@ std::array<std::uint32_t, 9> Octree::octantBegins(std::uint32_t begin, std::uint
   const std::uint64_t* places[8];
   std::uint64_t bounds[8];
   for (unsigned slot = 1; slot < 8; ++slot) {
-    places[slot] = m_keys.data() + begin;
+    places[slot] = m_keys + begin;
     bounds[slot] = (cell | slot) << shift << 32;
   }
   for (std::size_t length = end - begin; length > 0;) {
@@ -126,7 +126,7 @@ std::array<std::uint32_t, 9> Octree::octantBegins(std::uint32_t begin, std::uint
     length -= half;
   }
   for (unsigned slot = 1; slot < 8; ++slot)
-    begins[slot] = static_cast<std::uint32_t>(places[slot] - m_keys.data());
+    begins[slot] = static_cast<std::uint32_t>(places[slot] - m_keys);
   return begins;
 }
 

@@ -68,9 +68,9 @@ void Octree::reset(std::size_t size) {
 void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const Cube& cube,
                       KeyLayout layout, const Threads* threads) {
   const std::size_t size = end - begin;
-  const std::uint64_t* slots = rekey ? m_keys.data() + begin : nullptr;
+  const std::uint64_t* slots = rekey ? m_keys + begin : nullptr;
   const int low = 32, high = 32 + layout.bits();
-  const std::span keys(m_keys.data() + begin, size), scratch(m_keysScratch.data() + begin, size);
+  const std::span keys(m_keys + begin, size), scratch(m_keysScratch + begin, size);
   if (size < kRadixOnly || !threads) {
     octreeKeys(m_boxes, slots, begin, size, cube, layout, scratch.data());
     radixSort(scratch, keys, low, high);
@@ -119,12 +119,13 @@ void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const 
 }
 
 void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& settings,
-                   const Threads& threads) {
+                   std::uint64_t* keyScratch, const Threads& threads) {
   const auto size = static_cast<std::uint32_t>(m_order.size());
   PALPATE_ASSERT(size > 0);
   m_rootCube = palpate::rootCube(bounds, bulk);
-  m_keys.resize(size);
-  m_keysScratch.resize(size);
+  m_keys = keyScratch;
+  m_pool.use((size * sizeof(std::uint64_t) + sizeof(OctreeBlock) - 1) / sizeof(OctreeBlock));
+  m_keysScratch = reinterpret_cast<std::uint64_t*>(m_pool.data());
   const KeyLayout keys{keyLevels(size, settings, 0)};
   sortKeys(0, size, false, m_rootCube, keys, &threads);
 
@@ -137,15 +138,14 @@ void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& se
   threads.forEach(tasks, [&](std::size_t task) {
     layouts[task + 1].layOutTask(*this, layouts[0].tasks[task], settings);
   });
-  assemble(tasks, threads);
-
   // The keys' scratch is free now and holds the old order.
-  auto* before = reinterpret_cast<std::uint32_t*>(m_keysScratch.data());
+  auto* before = reinterpret_cast<std::uint32_t*>(m_keysScratch);
   std::copy(m_order.begin(), m_order.end(), before);
   threads.forChunks(size, kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i)
       m_order[i] = before[static_cast<std::uint32_t>(m_keys[i])];
   });
+  assemble(tasks, threads);
   m_builtNow = true;
 }
 
@@ -247,9 +247,9 @@ void Octree::measureLooseness() {
 
 std::size_t Octree::bytes() const {
   const auto of = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
-  std::size_t bytes = of(m_order) + of(m_keys) + of(m_keysScratch) + of(m_groups) +
-                      of(m_groupNodes) + of(m_groupBoxes) + of(m_parents) +
-                      m_pool.allocated() * sizeof(OctreeBlock) + of(m_binCounts) + of(m_binBegins);
+  std::size_t bytes = of(m_order) + of(m_groups) + of(m_groupNodes) + of(m_groupBoxes) +
+                      of(m_parents) + m_pool.allocated() * sizeof(OctreeBlock) + of(m_binCounts) +
+                      of(m_binBegins);
   for (int k = 0; k < 3; ++k) bytes += of(m_boxes.lower[k]) + of(m_boxes.upper[k]);
   for (const Layout& layout : m_layouts)
     bytes += of(layout.links) + of(layout.parents) + of(layout.groups) + of(layout.groupNodes) +

@@ -99,9 +99,10 @@ class Octree {
   std::span<const std::uint32_t> groups() const { return m_groups; }
   FloatBox* groupBoxes() { return m_groupBoxes.data(); }
 
-  /// `bounds`: of all boxes; `bulk`: the extent of most of them, about 0. Afterwards order() is
-  /// new, and boxes() are still in the old one.
-  void build(const FloatBox& bounds, double bulk, const OctreeSettings&, const Threads&);
+  /// `bounds`: of all boxes; `bulk`: the extent of most of them, about 0. `keys`: scratch, eight
+  /// bytes a primitive. Afterwards order() is new, and boxes() are still in the old one.
+  void build(const FloatBox& bounds, double bulk, const OctreeSettings&, std::uint64_t* keys,
+             const Threads&);
   void fit(const Threads&);
 
   /// Sum of the leaves' half areas over that of their primitives: how loose the fitted boxes are.
@@ -137,7 +138,8 @@ class Octree {
 
   Buffer<std::uint32_t> m_order;
   BoxArrays m_boxes;
-  Buffer<std::uint64_t> m_keys, m_keysScratch;  ///< key << 32 | slot in the old order
+  std::uint64_t* m_keys = nullptr;         ///< during a build: key << 32 | slot in the old order
+  std::uint64_t* m_keysScratch = nullptr;  ///< the blocks' memory, as long as they are not made
   Buffer<std::uint32_t> m_binCounts, m_binBegins;
   Buffer<std::uint32_t> m_groups;
   Buffer<OctreeNode> m_groupNodes;  ///< the node of each group

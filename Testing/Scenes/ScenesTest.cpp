@@ -1,5 +1,7 @@
 #include "Scenes.h"
 
+#include <palpate/OctreeBasedCD.h>
+
 #include <Eigen/Geometry>
 
 #include <gtest/gtest.h>
@@ -142,6 +144,29 @@ TEST(Scenes, HaveTheirTriangles) {
     const double cells = std::sqrt(count / 4.0);  // per side, rounded to a whole number
     EXPECT_NEAR(static_cast<double>(interleavedSheets(count).triangleCount()), count,
                 1.1 * count / cells);
+  }
+}
+
+// Boxes, keys, octree and scratch together, also where every frame is rebuilt and each has needed
+// its most.
+TEST(Scenes, TakeLessThanAHundredBytesATriangle) {
+  for (const Scene& scene : {organs(), foldedCloth(), interleavedSheets(64'000)}) {
+    Settings settings;
+    settings.octree.update = OctreeUpdate::Rebuild;
+    OctreeBasedCD detection(settings);
+    std::vector<GeometryId> ids;
+    for (const SceneMesh& mesh : scene.meshes)
+      ids.push_back(detection.addTriangleMesh(mesh.positions, mesh.triangles));
+    std::vector<Vector3d> positions;
+    for (int frame = 0; frame < scene.frames; ++frame) {
+      for (std::size_t mesh = 0; mesh < ids.size(); ++mesh) {
+        scene.positions(frame, mesh, positions);
+        detection.setPositions(ids[mesh], positions);
+      }
+      detection.update();
+    }
+    const OctreeStatistics statistics = detection.octree().statistics();
+    EXPECT_LT(statistics.bytes, 100 * statistics.primitives) << scene.meshes[0].triangles.size();
   }
 }
 
