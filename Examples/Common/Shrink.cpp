@@ -34,6 +34,10 @@ CollisionProblem withoutTriangles(CollisionProblem problem, std::size_t begin, s
       return mesh.triangles.begin() +
              static_cast<std::ptrdiff_t>(std::clamp(i, first, first + size) - first);
     };
+    const auto from = static_cast<std::uint32_t>(place(begin) - mesh.triangles.begin()),
+               to = static_cast<std::uint32_t>(place(end) - mesh.triangles.begin());
+    std::erase_if(mesh.disabled, [&](std::uint32_t id) { return id >= from && id < to; });
+    for (std::uint32_t& id : mesh.disabled) id -= id >= to ? to - from : 0;
     mesh.triangles.erase(place(begin), place(end));
     first += size;
   }

@@ -44,7 +44,8 @@ void findCandidatesByBruteForce(const MeshPair& meshes, Buffer<TrianglePair>& ou
   out.clear();
   for (std::uint32_t s = 0; s < boxesA.size(); ++s)
     for (std::uint32_t t = meshes.self() ? s + 1 : 0; t < boxesB.size(); ++t)
-      if (overlap(boxesA[s], boxesB[t]) && !(meshes.self() && adjacent(s, t)))
+      if (overlap(boxesA[s], boxesB[t]) && !(meshes.self() && adjacent(s, t)) &&
+          meshes.a.topology.isOn(s) && meshes.b.topology.isOn(t))
         out.push_back({s, t});
 }
 

@@ -10,18 +10,20 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <type_traits>
 
 namespace palpate {
 
 namespace {
 
 constexpr std::string_view kTitle = "palpate-capture";
-constexpr int kVersion = 3;
+constexpr int kVersion = 4;
 
 // Values of enumerations are written by name: in the order of their declarations.
 constexpr std::array<std::string_view, 6> kMethods{"Auto",         "Proxy",     "DistanceField",
                                                    "Intersection", "Proximity", "Continuous"};
 constexpr std::array<std::string_view, 3> kKinds{"Triangles", "Lines", "Points"};
+constexpr std::array<std::string_view, 2> kSides{"Both", "Outer"};
 constexpr std::array<std::string_view, 3> kContacts{"Distinct", "All", "Earliest"};
 constexpr std::array<std::string_view, 2> kEngines{"Octree", "BruteForce"};
 constexpr std::array<std::string_view, 2> kUpdates{"Auto", "Rebuild"};
@@ -145,6 +147,18 @@ void pairLine(File& file, PairType& pair, int version) {
   file.word(pair.settings.contacts, kContacts);
   if (version >= 2) file.real(pair.settings.tolerance);
   if (version >= 3) file.real(pair.settings.restDistance);
+  if (version >= 4) {
+    int predicate = pair.predicate;
+    file.integer(predicate);
+    if constexpr (!std::is_const_v<PairType>) pair.predicate = predicate != 0;
+  }
+}
+
+template <class File, class FilterType>
+void filterOf(File& file, FilterType& filter) {
+  file.integer(filter.groups);
+  file.integer(filter.mask);
+  file.word(filter.sidedness, kSides);
 }
 
 std::string textOf(const CollisionProblem& problem) {
@@ -165,11 +179,15 @@ std::string textOf(const CollisionProblem& problem) {
     file.word(mesh.kind, kKinds);
     file.integer(mesh.radii.size());
     for (const double radius : mesh.radii) file.real(radius);
+    filterOf(file, mesh.filter);
+    file.integer(mesh.disabled.size());
+    for (const std::uint32_t element : mesh.disabled) file.integer(element);
+    file.integer(mesh.rest.size());
     file.endLine();
     for (std::size_t v = 0; v < mesh.now.size(); ++v) {
       file.position(mesh.before.at(v));
       file.position(mesh.now[v]);
-      if (mesh.kind == GeometryKind::Lines) file.position(mesh.rest.at(v));
+      if (!mesh.rest.empty()) file.position(mesh.rest.at(v));
       file.endLine();
     }
     for (const Triangle& triangle : mesh.triangles) {
@@ -201,12 +219,18 @@ CollisionProblem::Mesh readMesh(Reader& file, int version) {
     mesh.radii.resize(file.count());
     for (double& radius : mesh.radii) file.real(radius);
   }
-  const bool lines = mesh.kind == GeometryKind::Lines;
-  if (lines) mesh.rest.resize(mesh.now.size());
+  bool rest = mesh.kind == GeometryKind::Lines;
+  if (version >= 4) {
+    filterOf(file, mesh.filter);
+    mesh.disabled.resize(file.count());
+    for (std::uint32_t& element : mesh.disabled) file.integer(element);
+    rest = file.count() > 0;
+  }
+  if (rest) mesh.rest.resize(mesh.now.size());
   for (std::size_t v = 0; v < mesh.now.size(); ++v) {
     file.position(mesh.before[v]);
     file.position(mesh.now[v]);
-    if (lines) file.position(mesh.rest[v]);
+    if (rest) file.position(mesh.rest[v]);
   }
   for (Triangle& triangle : mesh.triangles)
     for (std::uint32_t& corner : triangle) file.integer(corner);
@@ -214,8 +238,8 @@ CollisionProblem::Mesh readMesh(Reader& file, int version) {
 }
 
 GeometryId add(OctreeBasedCD& detection, const CollisionProblem::Mesh& mesh) {
-  if (mesh.kind == GeometryKind::Triangles)
-    return detection.addTriangleMesh(mesh.now, mesh.triangles);
+  const std::vector<Eigen::Vector3d>& rest = mesh.rest.empty() ? mesh.now : mesh.rest;
+  if (mesh.kind == GeometryKind::Triangles) return detection.addTriangleMesh(rest, mesh.triangles);
   const bool one = mesh.radii.size() <= 1;
   const double radius = one && !mesh.radii.empty() ? mesh.radii.front() : 0.0;
   if (mesh.kind == GeometryKind::Points)
@@ -223,8 +247,8 @@ GeometryId add(OctreeBasedCD& detection, const CollisionProblem::Mesh& mesh) {
                : detection.addPointSet(mesh.now, mesh.radii);
   std::vector<Segment> segments;
   for (const auto& [p, q, _] : mesh.triangles) segments.push_back({p, q});
-  return one ? detection.addLineMesh(mesh.rest, segments, radius)
-             : detection.addLineMesh(mesh.rest, segments, mesh.radii);
+  return one ? detection.addLineMesh(rest, segments, radius)
+             : detection.addLineMesh(rest, segments, mesh.radii);
 }
 
 std::string contentOf(const std::filesystem::path& path) {
@@ -290,8 +314,12 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
 
 OctreeBasedCD setUp(const CollisionProblem& problem) {
   OctreeBasedCD detection(problem.settings);
-  for (const CollisionProblem::Mesh& mesh : problem.geometries)
-    detection.setPositions(add(detection, mesh), mesh.before, mesh.now);
+  for (const CollisionProblem::Mesh& mesh : problem.geometries) {
+    const GeometryId id = add(detection, mesh);
+    detection.setPositions(id, mesh.before, mesh.now);
+    detection.setCollisionFilter(id, mesh.filter);
+    detection.setDisabledElements(id, mesh.disabled);
+  }
   for (const CollisionProblem::Pair& pair : problem.pairs)
     detection.addCollisionPair(GeometryId{pair.a}, GeometryId{pair.b}, pair.settings);
   return detection;

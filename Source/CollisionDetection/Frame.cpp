@@ -118,10 +118,13 @@ struct Frame::Job {
   static void receive(void* context, std::span<const TrianglePair> pairs) {
     Job& job = *static_cast<Job*>(context);
     job.nearby = true;
-    if (!job.record->widerBoxes() && job.record->plan.nearby == 0.0) return job.use(job, pairs);
+    const bool wider = job.record->widerBoxes() || job.record->plan.nearby > 0.0;
+    if (!wider && !job.record->anyDisabled()) return job.use(job, pairs);
+    const MeshTopology &a = job.record->a->mesh.topology, &b = job.record->b->mesh.topology;
     job.own.assign(pairs.begin(), pairs.end());
-    keepOverlapping(job.record->a->mesh.topology, job.record->b->mesh.topology, job.floats,
-                    job.own);
+    if (job.record->anyDisabled())
+      std::erase_if(job.own, [&](const TrianglePair& p) { return !a.isOn(p.a) || !b.isOn(p.b); });
+    if (wider) keepOverlapping(a, b, job.floats, job.own);
     if (!job.own.empty()) job.use(job, job.own);
   }
 
@@ -219,7 +222,8 @@ void Frame::collect(std::span<PairRecord* const> records, const Threads& threads
   Stopwatch watch;
   start(records, threads, false);
   threads.forEach(m_jobCount, [&](std::size_t i) {
-    m_jobs[i]->start(m_jobs[i]->record->widerBoxes() ? &Job::keep : nullptr);
+    const PairRecord& record = *m_jobs[i]->record;
+    m_jobs[i]->start(record.widerBoxes() || record.anyDisabled() ? &Job::keep : nullptr);
     run(*m_jobs[i]);
   });
   const auto found = [&](std::size_t i) {
@@ -353,7 +357,8 @@ void Frame::findStartByBruteForce(const PairRecord& record, ContactBuffers& cont
              countB = static_cast<std::uint32_t>(meshes.b.topology.triangles.size());
   for (std::uint32_t a = 0; a < countA && meshes.step.start; ++a)
     for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b)
-      contacts.facts.startsIntersecting |= intersectAtStart(meshes, {a, b});
+      contacts.facts.startsIntersecting |= meshes.a.topology.isOn(a) && meshes.b.topology.isOn(b) &&
+                                           intersectAtStart(meshes, {a, b});
   if (!record.plan.overlaps) return;
   meshes.settings.method = Method::Intersection;
   findContactsByBruteForce(meshes, overlaps);

@@ -242,10 +242,7 @@ GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
   mesh.topology.kind = kind;
   if (!radii.empty()) mesh.largestRadius = *std::max_element(radii.begin(), radii.end());
   if (radii.size() > 1) mesh.radii.assign(radii.begin(), radii.end());
-  if (kind == GeometryKind::Lines) {
-    mesh.rest = mesh.now;
-    mesh.arcs = threadArcs(mesh.topology.edges, mesh.rest);
-  }
+  mesh.rest = mesh.now;
   geometry->smallestHeight = smallestHeight(geometry->mesh);
   m_geometries.push_back(std::move(geometry));
   ++m_nextId;
@@ -320,13 +317,43 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
   std::vector<Eigen::Vector3d> now(positions.size());
   checkPositions(id, positions, now.data(), "");
   MeshTopology topology(positions.size(), triangles);
-  geometry.mesh.before = now;
+  geometry.mesh.before = geometry.mesh.rest = now;
   geometry.mesh.now = std::move(now);
   geometry.mesh.topology = std::move(topology);
   geometry.setThisFrame = true;
   geometry.hasLastFrame = geometry.beforeGiven = false;
   geometry.treeKnown = false;
   geometry.smallestHeight = smallestHeight(geometry.mesh);
+  ++geometry.revision;
+  ++geometry.stepRevision;
+  ++geometry.topologyRevision;
+  ++geometry.restRevision;
+}
+
+void GeometryTable::setFilter(GeometryId id, const CollisionFilter& filter) {
+  Geometry& geometry = at(id);
+  if (filter.sidedness != Sidedness::Both && filter.sidedness != Sidedness::Outer)
+    throw Error(ErrorCode::InvalidSettings, nameOf(id) + ": sidedness must be Both or Outer", id);
+  if (filter.sidedness == Sidedness::Outer && !geometry.mesh.topology.hasFaces())
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(id) + " is " + nameOf(geometry.mesh.topology.kind) + ", which has no sides",
+                id);
+  geometry.filter = filter;
+  geometry.mesh.outer = filter.sidedness == Sidedness::Outer;
+  ++geometry.revision;
+  ++geometry.stepRevision;
+}
+
+void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> elements) {
+  Geometry& geometry = at(id);
+  MeshTopology& topology = geometry.mesh.topology;
+  for (const std::uint32_t element : elements)
+    if (element >= topology.triangles.size())
+      throw Error(ErrorCode::IndexOutOfRange,
+                  nameOf(id) + ": element " + std::to_string(element) +
+                      " is out of range; it has " + std::to_string(topology.triangles.size()),
+                  id, element);
+  topology.disable(elements);
   ++geometry.revision;
   ++geometry.stepRevision;
   ++geometry.topologyRevision;

@@ -39,7 +39,12 @@ struct Geometry {
   Buffer<MotionRange> motionParts;     ///< scratch
   std::uint64_t motionRevision = 0;    ///< stepRevision that both are of
   std::uint64_t topologyRevision = 1;  ///< counts changes of topology
-  double smallestHeight = 0;           ///< L: of a triangle with area, when the topology was set
+  std::uint64_t restRevision = 1;      ///< and of the shape at rest
+  CollisionFilter filter;
+  bool meets(const Geometry& other) const {
+    return (filter.groups & other.filter.mask) && (other.filter.groups & filter.mask);
+  }
+  double smallestHeight = 0;  ///< L: of a triangle with area, when the topology was set
 
   FloatFrame frame;
   double spread = 0;  ///< of a sample of the positions
@@ -70,6 +75,8 @@ class GeometryTable {
                     std::span<const Eigen::Vector3d> now, const Threads&);
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
+  void setFilter(GeometryId, const CollisionFilter&);
+  void setDisabled(GeometryId, std::span<const std::uint32_t> elements);
 
   Geometry& at(GeometryId);  ///< throws UnknownGeometry
   std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }

@@ -134,6 +134,7 @@ struct OctreeBasedCD::Implementation {
         for (Geometry* geometry : {record->a, record->b})
           GeometryTable::updateMotion(*geometry, threads);
       record->plan = planOf(record->pair.settings, *record->a, *record->b, moves);
+      record->updateNear();
       if (record->plan.swept()) record->a->swept = record->b->swept = true;
     }
     statistics.milliseconds.boxes += watch.lap();
@@ -176,12 +177,20 @@ struct OctreeBasedCD::Implementation {
     }
   }
 
-  /// Pairs whose answer is not of the revisions now.
+  /// Pairs whose answer is not of the revisions now. Of those that do not collide it is nothing.
   template <class AnsweredFor>
   std::span<PairRecord* const> pairsToDo(AnsweredFor PairRecord::*answered) {
     work.clear();
-    for (const auto& record : pairs.records())
-      if ((*record).*answered != record->revisions()) work.push_back(record.get());
+    for (const auto& record : pairs.records()) {
+      if ((*record).*answered == record->revisions()) continue;
+      if (record->collides()) {
+        work.push_back(record.get());
+        continue;
+      }
+      record->clear();
+      (*record).*answered = record->revisions();
+      if (settings.keepCandidates) record->candidatesFor = record->revisions();
+    }
     return work;
   }
 
@@ -238,6 +247,7 @@ struct OctreeBasedCD::Implementation {
     ++detections;
     if (settings.audit.features == 0) return;
     for (const auto& record : pairs.records()) {
+      if (!record->collides()) continue;
       const std::size_t first = auditFailures.size();
       audit(record->meshes(), record->pair, record->data, settings.audit, detections,
             auditFailures);
@@ -261,15 +271,25 @@ struct OctreeBasedCD::Implementation {
       indices.emplace(geometry.get(), static_cast<std::uint32_t>(indices.size()));
       const TriangleMesh& mesh = geometry->mesh;
       const GeometryKind kind = mesh.topology.kind;
-      problem.geometries.push_back(
-          {geometry->id, mesh.before, mesh.now, {}, kind, mesh.radii, mesh.rest});
+      problem.geometries.push_back({geometry->id,
+                                    mesh.before,
+                                    mesh.now,
+                                    {},
+                                    kind,
+                                    mesh.radii,
+                                    {},
+                                    geometry->filter,
+                                    mesh.topology.disabled});
       CollisionProblem::Mesh& copy = problem.geometries.back();
       if (kind != GeometryKind::Points) copy.triangles = mesh.topology.triangles;
       if (copy.radii.empty() && mesh.largestRadius > 0.0) copy.radii = {mesh.largestRadius};
     }
-    for (const auto& record : pairs.records())
+    for (const auto& record : pairs.records()) {
       problem.pairs.push_back({indices.at(record->a), indices.at(record->b), record->pair.settings,
-                               record->plan.method});
+                               record->plan.method, static_cast<bool>(record->predicate)});
+      if (record->pair.settings.restDistance > 0.0)
+        problem.geometries[problem.pairs.back().a].rest = record->a->mesh.rest;
+    }
     return problem;
   }
 
@@ -330,6 +350,19 @@ void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vec
   m_implementation->geometries.setTriangles(geometry, positions, triangles);
 }
 
+void OctreeBasedCD::setCollisionFilter(GeometryId geometry, const CollisionFilter& filter) {
+  m_implementation->geometries.setFilter(geometry, filter);
+}
+
+void OctreeBasedCD::setDisabledElements(GeometryId geometry,
+                                        std::span<const std::uint32_t> elements) {
+  m_implementation->geometries.setDisabled(geometry, elements);
+}
+
+void OctreeBasedCD::setContactPredicate(GeometryId a, GeometryId b, ContactPredicate predicate) {
+  m_implementation->pairs.setPredicate(m_implementation->geometries, a, b, std::move(predicate));
+}
+
 void OctreeBasedCD::addCollisionPair(GeometryId a, GeometryId b, const PairSettings& settings) {
   const StandardFloatingPoint standard;
   m_implementation->pairs.add(m_implementation->geometries, a, b, settings);
@@ -373,6 +406,7 @@ void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFuncti
   else
     for (const auto& record : all.pairs.records()) all.work.push_back(record.get());
   all.update();
+  std::erase_if(all.work, [](const PairRecord* record) { return !record->collides(); });
   if (all.settings.engine == Engine::Octree)
     return all.frame.forEach(all.work, all.threadsFor(all.work), function, context);
   Buffer<TrianglePair> candidates;

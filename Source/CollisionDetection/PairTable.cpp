@@ -1,11 +1,27 @@
 #include "CollisionDetection/PairTable.h"
 
+#include "Geometry/RestDistance.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <utility>
 
 namespace palpate {
+
+void PairRecord::updateNear() {
+  const double distance = pair.settings.restDistance;
+  if (distance == 0.0 || nearRevision == a->restRevision) return;
+  near = verticesWithin(a->mesh.topology, a->mesh.rest, distance);
+  nearRevision = a->restRevision;
+}
+
+void PairRecord::clear() {
+  data = {};
+  candidates.clear();
+  trust.forget();
+}
 
 namespace {
 
@@ -35,17 +51,10 @@ void checkKinds(const TriangleMesh& a, const TriangleMesh& b, const PairSettings
     refuse("restDistance is " + shortest(settings.restDistance) +
                "; it must be finite and not negative",
            ErrorCode::InvalidSettings);
-  if (settings.restDistance > 0.0 && (&a != &b || a.topology.kind != GeometryKind::Lines))
-    refuse("restDistance is for a line mesh with itself", ErrorCode::InvalidSettings);
-  if (settings.restDistance > 0.0 && a.arcs.size() != a.topology.edges.size())
-    refuse("restDistance needs a thread without branches", ErrorCode::InvalidSettings);
+  if (settings.restDistance > 0.0 && (&a != &b || a.topology.kind == GeometryKind::Points))
+    refuse("restDistance is for a triangle or line mesh with itself", ErrorCode::InvalidSettings);
   if (a.topology.hasFaces() && b.topology.hasFaces()) return;
   const std::string kinds = nameOf(a.topology.kind) + " and " + nameOf(b.topology.kind);
-  const auto isPoints = [](const TriangleMesh& mesh) {
-    return mesh.topology.kind == GeometryKind::Points;
-  };
-  if ((isPoints(a) && !b.topology.hasFaces()) || (isPoints(b) && !a.topology.hasFaces()))
-    refuse(kinds + " cannot be tested against each other yet", ErrorCode::UnsupportedMethod);
   if (settings.method == Method::Auto || settings.method == Method::Intersection)
     refuse("this method is for two triangle meshes, not for " + kinds +
                "; Proximity and Continuous are",
@@ -111,6 +120,7 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
   record->a = &first;
   record->b = &second;
   record->plan = planOf(settings, first, second);
+  record->updateNear();
   m_records.push_back(std::move(record));
   index();
 }
@@ -136,10 +146,26 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
                     const PairSettings& settings) {
   PairRecord& record = at(geometries, a, b);
   check(*record.a, *record.b, settings);
+  const double restDistance =
+      std::exchange(record.pair.settings.restDistance, settings.restDistance);
+  try {
+    if (restDistance != settings.restDistance) record.nearRevision = 0;
+    record.updateNear();
+  } catch (const Error&) {
+    record.pair.settings.restDistance = restDistance;
+    throw;
+  }
   record.pair.settings = settings;
   record.plan = planOf(settings, *record.a, *record.b);
   record.dataFor = record.candidatesFor = {};
   index();
+}
+
+void PairTable::setPredicate(const GeometryTable& geometries, GeometryId a, GeometryId b,
+                             ContactPredicate predicate) {
+  PairRecord& record = inOrder(geometries, a, b);
+  record.predicate = std::move(predicate);
+  record.dataFor = {};
 }
 
 void PairTable::remove(GeometryTable& geometries, GeometryId a, GeometryId b) {

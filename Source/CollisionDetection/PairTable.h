@@ -38,8 +38,22 @@ struct PairRecord {
   MeshPair meshes(const FloatPair* floats = nullptr) const {
     PairSettings settings = pair.settings;
     settings.method = plan.method;
-    return {a->mesh, b->mesh, settings, floats, plan.step};
+    return {a->mesh,
+            b->mesh,
+            settings,
+            floats,
+            plan.step,
+            settings.restDistance > 0.0 ? &near : nullptr,
+            predicate ? &predicate : nullptr};
   }
+  bool collides() const { return a->meets(*b); }
+  bool anyDisabled() const {
+    return !a->mesh.topology.disabled.empty() || !b->mesh.topology.disabled.empty();
+  }
+  /// Finds what is too near at rest, where it has changed.
+  void updateNear();
+  /// An answer of nothing.
+  void clear();
 
   /// Stored boxes may hold more than this pair's method asks for.
   bool widerBoxes() const { return !plan.swept() && (a->swept || b->swept); }
@@ -51,6 +65,9 @@ struct PairRecord {
   Buffer<TrianglePair> candidates;  ///< in the order found until somebody asks for them
   AnsweredFor candidatesFor;
   bool candidatesSorted = false;
+  ContactPredicate predicate;
+  IndexLists near;  ///< of settings.restDistance
+  std::uint64_t nearRevision = 0;
 };
 
 /// Collision pairs, found by their geometries in either order.
@@ -58,6 +75,7 @@ class PairTable {
  public:
   void add(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&);
   void set(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&);
+  void setPredicate(const GeometryTable&, GeometryId a, GeometryId b, ContactPredicate);
   void remove(GeometryTable&, GeometryId a, GeometryId b);
   void removeAllOf(GeometryId);
 

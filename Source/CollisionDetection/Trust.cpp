@@ -155,9 +155,10 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
   }
   validity.trusted = validity.trusted && knowsSides(a, b);
   validity.sideMayBeWrong = plan.method != Method::Intersection && !validity.trusted;
-  m_apart = plan.method == Method::Intersection
-                ? plan.motion == 0.0 && contents.intersectingTriangles.empty()
-                : validity.trusted && facts.clearance > 0.0;
+  m_apart =
+      plan.method == Method::Intersection
+          ? plan.motion == 0.0 && contents.intersectingTriangles.empty() && facts.clearance > 0.0
+          : validity.trusted && facts.clearance > 0.0;
   m_clearance = std::min(facts.clearance, settings.thickness);
   m_intersecting = !contents.intersectingTriangles.empty();
   if (plan.step.start) {

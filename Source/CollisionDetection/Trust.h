@@ -35,7 +35,7 @@ class Trust {
               const StepFacts&, bool nearby, CollisionData::Contents&);
   /// After a frame whose answer was kept.
   void keep(std::uint64_t frame) { m_frame = frame; }
-  void forget() { m_apart = false; }
+  void forget() { m_topologyA = 0; }
 
  private:
   bool m_apart = false;         ///< at the end of the last frame's step

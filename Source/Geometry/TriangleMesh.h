@@ -3,7 +3,6 @@
 #include <palpate/Types.h>
 
 #include "Core/Buffer.h"
-#include "Geometry/Thread.h"
 
 #include <cstdint>
 #include <optional>
@@ -23,11 +22,24 @@ struct IndexLists {
   }
 };
 
+/// Lists per key from (key, item) incidences, which come in ascending order of items.
+template <class ForEach>
+IndexLists listsByKey(std::size_t keyCount, ForEach&& forEachIncidence) {
+  IndexLists lists;
+  lists.offsets.assign(keyCount + 1, 0);
+  forEachIncidence([&](std::uint32_t key, std::uint32_t) { ++lists.offsets[key + 1]; });
+  for (std::size_t i = 0; i < keyCount; ++i) lists.offsets[i + 1] += lists.offsets[i];
+  lists.items.resize(lists.offsets.back());
+  std::vector<std::uint32_t> next(lists.offsets.begin(), lists.offsets.end() - 1);
+  forEachIncidence([&](std::uint32_t key, std::uint32_t item) { lists.items[next[key]++] = item; });
+  return lists;
+}
+
 /// What follows from the triangles alone, computed once.
 ///
-/// Each vertex and each edge is owned by the lowest triangle that holds it, so that of all the
-/// triangle pairs that a feature pair lies in exactly one tests it. (Curtis et al., Fast collision
-/// detection for deformable models using representative-triangles, I3D 2008.)
+/// Each vertex and each edge is owned by the lowest triangle that is on and holds it, so that of
+/// all the triangle pairs that a feature pair lies in exactly one tests it. (Curtis et al., Fast
+/// collision detection for deformable models using representative-triangles, I3D 2008.)
 struct MeshTopology {
   MeshTopology() = default;
   /// Indices must be below vertexCount.
@@ -40,10 +52,17 @@ struct MeshTopology {
   /// Edge i joins corners i and i + 1 mod 3; kNoEdge where these are the same vertex.
   std::vector<std::array<std::uint32_t, 3>> triangleEdges;
   std::vector<std::uint8_t> owned;   ///< per triangle: bit i: owns corner i; bit 3 + i: owns edge i
-  IndexLists vertexTriangles;        ///< ascending triangle ids, each once
-  IndexLists edgeTriangles;          ///< ascending triangle ids, each once
-  std::size_t untestedVertices = 0;  ///< in no triangle
-  std::optional<bool> closed;        ///< and consistently oriented; once asked
+  IndexLists vertexTriangles;        ///< that are on: ascending triangle ids, each once
+  IndexLists edgeTriangles;          ///< the same; none: the edge is off
+  std::size_t untestedVertices = 0;  ///< in no triangle that is on
+  std::vector<std::uint32_t> disabled{};  ///< triangles that are off, ascending
+  std::vector<bool> isDisabled{};         ///< the same by triangle; empty if none is
+  std::optional<bool> closed;             ///< and consistently oriented; once asked
+
+  /// Switches these triangles off, and all others on.
+  /// Cost     linear: about a tenth of the constructor's.
+  void disable(std::span<const std::uint32_t> triangles);
+  bool isOn(std::uint32_t triangle) const { return isDisabled.empty() || !isDisabled[triangle]; }
 
   /// Of an edge, lower vertex first; kNoEdge if there is none such.
   std::uint32_t edgeOf(const Segment& edge) const;
@@ -55,7 +74,17 @@ struct MeshTopology {
   bool ownsEdge(std::uint32_t triangle, int edge) const {
     return owned[triangle] >> (3 + edge) & 1;
   }
+
+ private:
+  void findOwners();
 };
+
+/// Whether vertices of one mesh of a pair are tested against what the other is made of. Of two
+/// point sets those of the first are.
+inline bool areTested(const MeshTopology& vertices, const MeshTopology& others, bool ofFirst) {
+  return others.hasFaces() ||
+         (vertices.kind == GeometryKind::Points && (others.kind == GeometryKind::Lines || ofFirst));
+}
 
 inline bool shareVertex(const Segment& a, const Segment& b) {
   return a[0] == b[0] || a[0] == b[1] || a[1] == b[0] || a[1] == b[1];
@@ -69,8 +98,8 @@ struct TriangleMesh {
   std::vector<Eigen::Vector3d> before;
   std::vector<double> radii{};          ///< L, per vertex; empty: all have the largest
   double largestRadius = 0.0;           ///< L
-  std::vector<Eigen::Vector3d> rest{};  ///< of lines: when they were added
-  std::vector<ThreadArc> arcs{};        ///< of lines without branches: per edge
+  std::vector<Eigen::Vector3d> rest{};  ///< when the topology was set
+  bool outer = false;                   ///< Sidedness::Outer
 
   double radius(std::uint32_t vertex) const {
     return radii.empty() ? largestRadius : radii[vertex];
@@ -79,6 +108,11 @@ struct TriangleMesh {
   double radius(const Segment& edge, double weight) const {
     if (radii.empty()) return largestRadius;
     return (1.0 - weight) * radii[edge[0]] + weight * radii[edge[1]];
+  }
+  double radius(const Triangle& corners, const Eigen::Vector3d& barycentric) const {
+    if (radii.empty()) return largestRadius;
+    return barycentric[0] * radii[corners[0]] + barycentric[1] * radii[corners[1]] +
+           barycentric[2] * radii[corners[2]];
   }
 };
 

@@ -1,7 +1,7 @@
 #include "NarrowPhase/Proximity.h"
 
+#include "NarrowPhase/Filters.h"
 #include "NarrowPhase/LineEdges.h"
-
 #include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
 
@@ -20,13 +20,12 @@ class VertexAgainstMesh {
  public:
   explicit VertexAgainstMesh(const TriangleMesh& triangles) : m_mesh(triangles) {}
 
-  /// vertex: its id if the mesh is its own, whose triangles at the vertex are left out.
-  void measure(const Vector3d& p, std::optional<std::uint32_t> vertex, ContactBuffers& out) {
+  void measure(const MeshPair& pair, const Vector3d& p, std::uint32_t vertex, ContactBuffers& out) {
     m_position = p;
     const std::vector<Triangle>& triangles = m_mesh.topology.triangles;
     m_answers.assign(triangles.size(), {});
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
-      if (vertex && holdsVertex(triangles[t], *vertex)) continue;
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+      if (!m_mesh.topology.isOn(t) || pair.leavesOutVertex(vertex, t)) continue;
       const auto& [a, b, c] = triangles[t];
       m_answers[t] = finiteVertexTriangleDistance(p, m_mesh.now[a], m_mesh.now[b], m_mesh.now[c]);
       ++out.featurePairs;
@@ -46,12 +45,14 @@ class VertexAgainstMesh {
   }
 
   /// The lowest triangle whose closest point the feature holds, while none that holds the feature
-  /// is nearer.
-  bool isDistinct(std::uint32_t triangle) const {
+  /// is nearer. Triangles that are refused do not count.
+  template <class Refused>
+  bool isDistinct(std::uint32_t triangle, Refused&& isRefused) const {
     const MeshFeature own = feature(triangle);
     for (std::uint32_t other = 0; other < m_answers.size(); ++other) {
       if (!m_answers[other] || other == triangle) continue;
-      if (feature(other) == own ? other < triangle : holds(other, own) && isNearer(other, own))
+      if ((feature(other) == own ? other < triangle : holds(other, own) && isNearer(other, own)) &&
+          !isRefused(other))
         return false;
     }
     return true;
@@ -101,25 +102,39 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
   StepCheck check(pair, out);
   VertexAgainstMesh against(triangles);
   for (const std::uint32_t v : sample) {
-    against.measure(vertices.now[v], pair.self() ? std::optional(v) : std::nullopt, out);
+    against.measure(pair, vertices.now[v], v, out);
+    const auto gap = [&](std::uint32_t t) {
+      const VertexTriangleDistance& measured = *against.answer(t);
+      return measured.distance -
+             pair.radii(v, triangles.topology.triangles[t], measured.barycentric, kSecond);
+    };
     for (std::uint32_t t = 0; t < against.size(); ++t) {
       const VertexTriangleDistance* answer = against.answer(t);
-      if (!answer || !(answer->distance - vertices.radius(v) <= pair.thicknessAtEnd())) continue;
+      if (!answer || !(gap(t) <= pair.thicknessAtEnd())) continue;
       if (check.isAnsweredByImpact(features, v, t, kSecond, answer->distance)) continue;
+      const auto isRefused = [&](std::uint32_t triangle) {
+        return refusesVertex(pair, v, triangle, kSecond) ||
+               (!triangles.radii.empty() && !(gap(triangle) <= pair.thicknessAtEnd()));
+      };
+      if (isRefused(t)) continue;
+      const MeshFeature feature = against.feature(t);
       if (distinct) {
-        const MeshFeature feature = against.feature(t);
         const bool isVertex = feature.kind == MeshFeature::Kind::Vertex;
         const bool reportedByOther =
             pair.self() ? feature.id < v : kSecond && pair.b.topology.hasFaces();
         if (isVertex && reportedByOther) continue;
-        if (!against.isDistinct(t)) continue;
+        if (!against.isDistinct(t, isRefused)) continue;
+      }
+      if (pointsInwardAtEnd(pair, v, feature, *answer, kSecond)) {
+        if (pair.step.impacts) addImpact(pair, features, v, t, kSecond, out);
+        continue;
       }
       const Triangle& corners = triangles.topology.triangles[t];
       check.noteTriangle(t, !kSecond, triangles.now[corners[0]], triangles.now[corners[1]],
                          triangles.now[corners[2]]);
       auto& list = kSecond ? out.triangleVertex : out.vertexTriangle;
       list.push_back(contactOf(v, t, corners, *answer, pair.step.impacts ? 1.0 : 0.0));
-      list.back().distance -= vertices.radius(v);
+      list.back().distance = gap(t);
     }
   }
 }
@@ -131,7 +146,7 @@ void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
   StepCheck check(pair, out);
   for (const std::uint32_t i : sample) {
     for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
-      if (pair.leavesOut(i, j)) continue;
+      if (pair.leavesOut(i, j) || pair.b.topology.edgeTriangles[j].empty()) continue;
       const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(
           pair.a.now[a[i][0]], pair.a.now[a[i][1]], pair.b.now[b[j][0]], pair.b.now[b[j][1]]);
       ++out.featurePairs;
@@ -142,6 +157,11 @@ void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
       const bool inside = !answer.parallel && answer.featureA == EdgeFeature::Interior &&
                           answer.featureB == EdgeFeature::Interior;
       if (pair.settings.contacts == Contacts::Distinct && !inside) continue;
+      if (refusesEdges(pair, i, j)) continue;
+      if (pointInwardAtEnd(pair, i, j, answer)) {
+        if (pair.step.impacts) addImpact(pair, features, i, j, false, out);
+        continue;
+      }
       check.noteEdges(a[i], b[j]);
       out.edgeEdge.push_back(contactOf(a[i], b[j], answer, pair.step.impacts ? 1.0 : 0.0));
     }
@@ -153,7 +173,8 @@ std::vector<std::uint32_t> edgesOf(const MeshTopology& topology, const MeshFeatu
   if (feature.kind == MeshFeature::Kind::Edge) return {feature.id};
   std::vector<std::uint32_t> holders;
   for (std::uint32_t e = 0; e < topology.edges.size(); ++e)
-    if (topology.edges[e][0] == feature.id || topology.edges[e][1] == feature.id)
+    if ((topology.edges[e][0] == feature.id || topology.edges[e][1] == feature.id) &&
+        !topology.edgeTriangles[e].empty())
       holders.push_back(e);
   return holders;
 }
@@ -184,10 +205,13 @@ void findLineEdges(const MeshPair& pair, std::span<const std::uint32_t> sample,
   const std::vector<Segment>&a = pair.a.topology.edges, &b = pair.b.topology.edges;
   for (const std::uint32_t i : sample)
     for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
+      if (pair.b.topology.edgeTriangles[j].empty()) continue;
       ++out.featurePairs;
       const std::optional<EdgesNearby> nearby = measureEdges(pair, i, j);
-      if (!nearby || (pair.settings.contacts == Contacts::Distinct &&
-                      !isDistinctOfLines(pair, {i, j}, nearby->features)))
+      if (!nearby ||
+          (pair.settings.contacts == Contacts::Distinct &&
+           !isDistinctOfLines(pair, {i, j}, nearby->features)) ||
+          pointInwardAtEnd(pair, i, j, nearby->centres))
         continue;
       out.exactDecisions += nearby->centres.exact;
       out.edgeEdge.push_back(contactOf(a[i], b[j], nearby->centres));

@@ -1,5 +1,6 @@
 #include "NarrowPhase/Continuous.h"
 
+#include "NarrowPhase/Filters.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
@@ -61,9 +62,11 @@ void forEachLikelyPair(const MeshPair& pair, std::span<const TrianglePair> candi
                        ContactBuffers& out, F&& f) {
   FeaturePairs& pairs = out.features;
   findFeaturePairs(pair.a.topology, pair.b.topology, pair.floats, candidates, pairs);
-  if (pair.settings.restDistance > 0.0)
-    std::erase_if(pairs.edgeEdge,
-                  [&](const FeaturePair& edges) { return pair.leavesOut(edges.a, edges.b); });
+  // Where nothing is asked of the step: refused below, too.
+  if (pair.near && pair.step.motion == 0.0)
+    std::erase_if(pairs.edgeEdge, [&](const FeaturePair& edges) {
+      return areNearAtRest(pair, pair.a.topology.edges[edges.a], pair.b.topology.edges[edges.b]);
+    });
   out.featurePairs += pairs.owned;
   const TimeOfImpactSettings settings = settingsOf(pair);
   filterPairs<false>(Features<Kind::VertexTriangle>{pair.a, pair.b}, pairs.vertexTriangle, settings,
@@ -79,36 +82,59 @@ class ContactFinder {
   ContactFinder(const MeshPair& pair, ContactBuffers& out)
       : m_pair(pair), m_check(pair, out), m_out(out), m_settings(settingsOf(pair)) {}
 
-  /// Whether it is a contact.
+  /// Whether it is a contact that no filter leaves out.
   template <Kind kind>
   bool operator()(const Features<kind>& features, std::uint32_t inFirst, std::uint32_t inSecond,
                   bool ofSecond) {
     const ImpactQuery query = features.query(inFirst, inSecond);
     const ImpactAnswer answer = findImpact(query, m_settings);
     m_out.exactDecisions += answer.exact;
-    if (!answer.impact) return false;
+    return answer.impact && add(features, inFirst, inSecond, ofSecond, query, answer.time, true);
+  }
+
+  /// The contact of an impact, and whether there is one for all filters. store: it is noted and
+  /// kept.
+  template <Kind kind>
+  bool add(const Features<kind>& features, std::uint32_t inFirst, std::uint32_t inSecond,
+           bool ofSecond, const ImpactQuery& query, double time, bool store) {
     std::array<Vector3d, 4> p;
     for (int i = 0; i < 4; ++i)
-      p[i] = (1.0 - answer.time) * query.vertices[i].at(0) + answer.time * query.vertices[i].at(1);
+      p[i] = (1.0 - time) * query.vertices[i].at(0) + time * query.vertices[i].at(1);
+    std::array<MeshFeature, 2> held;
+    if (m_pair.settings.contacts == Contacts::Earliest) m_out.facts.clearance = 0.0;
+    const auto isLeftOut = [&](const auto& closest, const Vector3d& normal, bool refused) {
+      if (store) m_check.noteImpact(features, inFirst, inSecond, time, closest.distance);
+      return refused || ((m_pair.a.outer || m_pair.b.outer) &&
+                         pointsInward(m_pair, held, ofSecond ? -normal : normal, time));
+    };
     if constexpr (kind == Kind::VertexTriangle) {
-      auto& list = ofSecond && !m_pair.self() ? m_out.triangleVertex : m_out.vertexTriangle;
+      const MeshTopology& topology = features.second.topology;
       const auto closest = finiteVertexTriangleDistance(p[0], p[1], p[2], p[3]);
-      list.push_back(
-          contactOf(inFirst, inSecond, features.second.topology.triangles[inSecond], closest));
-      m_check.noteTriangle(inSecond, !ofSecond, p[1], p[2], p[3]);
-      m_check.noteImpact(features, inFirst, inSecond, answer.time, closest.distance);
+      VertexTriangleContact contact =
+          contactOf(inFirst, inSecond, topology.triangles[inSecond], closest);
       // A corner touches its triangle, and then the normal is the plane's.
-      complete(list.back(), query, answer.time,
+      complete(contact, query, time,
                [&] { return finiteVertexTriangleDistance(p[1], p[1], p[2], p[3]).normal; });
+      held[ofSecond] = {MeshFeature::Kind::Vertex, inFirst};
+      held[!ofSecond] = featureOf(topology, inSecond, closest.feature);
+      if (isLeftOut(closest, contact.normal, refusesVertex(m_pair, inFirst, inSecond, ofSecond)))
+        return false;
+      if (!store) return true;
+      (ofSecond && !m_pair.self() ? m_out.triangleVertex : m_out.vertexTriangle).push_back(contact);
+      m_check.noteTriangle(inSecond, !ofSecond, p[1], p[2], p[3]);
     } else {
+      const MeshTopology &ofA = features.first.topology, &ofB = features.second.topology;
       const auto closest = finiteEdgeEdgeDistance(p[0], p[1], p[2], p[3]);
-      m_out.edgeEdge.push_back(contactOf(features.first.topology.edges[inFirst],
-                                         features.second.topology.edges[inSecond], closest));
-      m_check.noteEdges(m_out.edgeEdge.back().edgeA, m_out.edgeEdge.back().edgeB);
-      m_check.noteImpact(features, inFirst, inSecond, answer.time, closest.distance);
-      complete(m_out.edgeEdge.back(), query, answer.time, [&] {
+      EdgeEdgeContact contact = contactOf(ofA.edges[inFirst], ofB.edges[inSecond], closest);
+      complete(contact, query, time, [&] {
         return finiteEdgeEdgeDistance(p[0], p[1], p[0], p[0] + (p[3] - p[2])).normal;
       });
+      held = {featureOf(ofA, inFirst, closest.featureA),
+              featureOf(ofB, inSecond, closest.featureB)};
+      if (isLeftOut(closest, contact.normal, refusesEdges(m_pair, inFirst, inSecond))) return false;
+      if (!store) return true;
+      m_out.edgeEdge.push_back(contact);
+      m_check.noteEdges(contact.edgeA, contact.edgeB);
     }
     return true;
   }
@@ -157,7 +183,7 @@ void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, Contact
     const std::vector<Triangle>& triangles = features.second.topology.triangles;
     for (const std::uint32_t v : ofSecond ? lists.verticesOfB : lists.verticesOfA) {
       for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-        if (pair.self() && holdsVertex(triangles[t], v)) continue;
+        if (!features.second.topology.isOn(t) || pair.leavesOutVertex(v, t)) continue;
         ++out.featurePairs;
         f(features, v, t, ofSecond);
       }
@@ -166,7 +192,7 @@ void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, Contact
   const auto edgeCount = static_cast<std::uint32_t>(pair.b.topology.edges.size());
   for (const std::uint32_t i : lists.edgesOfA)
     for (std::uint32_t j = pair.self() ? i + 1 : 0; j < edgeCount; ++j) {
-      if (pair.leavesOut(i, j)) continue;
+      if (pair.leavesOut(i, j) || pair.b.topology.edgeTriangles[j].empty()) continue;
       ++out.featurePairs;
       f(Features<Kind::EdgeEdge>{pair.a, pair.b}, i, j, false);
     }
@@ -214,10 +240,16 @@ double findEarliestImpact(const MeshPair& pair, std::span<const TrianglePair> ca
   // A reported time may be a tolerance early, so a pair that is left out for an impact after this
   // could not have reported one before `earliest`.
   const auto end = [&] { return std::min(earliest + settings.tolerance, 1.0); };
-  const auto test = [&](const auto& features, std::uint32_t inFirst, std::uint32_t inSecond, bool) {
-    const ImpactAnswer answer = findImpact(features.query(inFirst, inSecond), settings, end());
+  ContactFinder finder(pair, counts);
+  const auto test = [&](const auto& features, std::uint32_t inFirst, std::uint32_t inSecond,
+                        bool ofSecond) {
+    const ImpactQuery query = features.query(inFirst, inSecond);
+    const ImpactAnswer answer = findImpact(query, settings, end());
     counts.exactDecisions += answer.exact;
-    if (answer.impact) earliest = std::min(earliest, answer.time);
+    if (answer.impact && answer.time < earliest &&
+        (!pair.filters() ||
+         finder.add(features, inFirst, inSecond, ofSecond, query, answer.time, false)))
+      earliest = answer.time;
   };
   if (earliest <= 0.0) return earliest;
   MeshPair boxed = pair;

@@ -322,8 +322,8 @@ HWY_ATTR void findFeaturePairsOf(const Side& a, const Side& b, std::span<const T
                                  FeaturePairs& out) {
   const bool self = &a.topology == &b.topology;
   const unsigned excluded = self ? ~0u : 0u;
-  const unsigned tested = kEdges | (b.topology.hasFaces() ? kCornersOfA : 0) |
-                          (a.topology.hasFaces() ? kCornersOfB : 0);
+  const unsigned tested = kEdges | (areTested(a.topology, b.topology, true) ? kCornersOfA : 0) |
+                          (areTested(b.topology, a.topology, false) ? kCornersOfB : 0);
   out.vertexTriangle.resize(pairs.size() * (self ? 6 : 3));
   out.triangleVertex.resize(self ? 0 : pairs.size() * 3);
   out.edgeEdge.resize(pairs.size() * 9);
@@ -347,8 +347,8 @@ HWY_ATTR void findFeaturePairsOf(const Side& a, const Side& b, std::span<const T
                      out.edgeEdge.data() + edgeEdge);
     FeaturePair* const corners = out.vertexTriangle.data() + vertexTriangle;
     if (self) {
-      vertexTriangle +=
-          list(chosen, chosen.corners, size, 255, kVertexIn, kTriangleIn, false, corners);
+      vertexTriangle += list(chosen, chosen.corners, size, 255, kVertexIn, kTriangleIn,
+                             a.topology.kind == GeometryKind::Points, corners);
     } else {
       vertexTriangle +=
           list(chosen, chosen.corners, size, kCornersOfA, kCornerInA, kCornerInB, false, corners);

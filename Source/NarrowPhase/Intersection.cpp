@@ -1,6 +1,7 @@
 #include "NarrowPhase/Intersection.h"
 
 #include "NarrowPhase/FeatureTests.h"
+#include "NarrowPhase/Filters.h"
 #include "NarrowPhase/IntersectionFilter.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
@@ -54,7 +55,7 @@ class IntersectionContacts {
  public:
   IntersectionContacts(const MeshPair& pair, const MeshTriangle& a, const MeshTriangle& b,
                        ContactBuffers& out)
-      : m_a(a), m_b(b), m_out(out), m_check(pair, out), m_self(pair.self()) {}
+      : m_pair(pair), m_a(a), m_b(b), m_out(out), m_check(pair, out), m_self(pair.self()) {}
 
   void add(const TriangleIntersection& meeting) {
     const unsigned ofA = meeting.edgesOfAThroughB, ofB = meeting.edgesOfBThroughA;
@@ -90,6 +91,7 @@ class IntersectionContacts {
 
   void addCorner(const MeshTriangle& of, int corner, const MeshTriangle& triangle,
                  Buffer<VertexTriangleContact>& contacts) {
+    if (refusesVertex(m_pair, of.vertices[corner], triangle.id, &of == &m_b)) return;
     const auto& [a, b, c] = triangle.positions;
     VertexTriangleDistance answer = finiteVertexTriangleDistance(of.positions[corner], a, b, c);
     m_out.exactDecisions += answer.exact;
@@ -102,6 +104,7 @@ class IntersectionContacts {
   void addEdges(int i, int j) {
     std::uint32_t edgeA = m_a.edge(i), edgeB = m_b.edge(j);
     if (m_self && edgeB < edgeA) std::swap(edgeA, edgeB);
+    if (refusesEdges(m_pair, edgeA, edgeB)) return;
     const Segment &p = m_a.mesh.topology.edges[edgeA], &q = m_b.mesh.topology.edges[edgeB];
     const auto &positionsA = m_a.mesh.now, &positionsB = m_b.mesh.now;
     const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(positionsA[p[0]], positionsA[p[1]],
@@ -111,6 +114,7 @@ class IntersectionContacts {
     m_out.edgeEdge.push_back(contactOf(p, q, answer));
   }
 
+  const MeshPair& m_pair;
   const MeshTriangle &m_a, &m_b;
   ContactBuffers& m_out;
   StepCheck m_check;
@@ -135,6 +139,10 @@ void findOne(const MeshPair& pair, TrianglePair candidate, SignCounts& counts,
   if (pair.self() && candidate.b < candidate.a) std::swap(candidate.a, candidate.b);
   intersect(pair, candidate, false, counts,
             [&](const MeshTriangle& a, const MeshTriangle& b, const TriangleIntersection& meeting) {
+              if (areNearAtRest(pair, a.vertices, b.vertices)) {
+                out.facts.clearance = 0.0;
+                return;
+              }
               out.intersectingTriangles.push_back(candidate);
               IntersectionContacts(pair, a, b, out).add(meeting);
             });
@@ -180,7 +188,7 @@ void findIntersectionsByBruteForce(const MeshPair& pair, const FeatureLists& fea
   const auto countB = static_cast<std::uint32_t>(pair.b.topology.triangles.size());
   for (const std::uint32_t a : features.trianglesOfA)
     for (std::uint32_t b = pair.self() ? a + 1 : 0; b < countB; ++b)
-      findOne(pair, {a, b}, counts, out);
+      if (pair.b.topology.isOn(b)) findOne(pair, {a, b}, counts, out);
   out.exactDecisions += counts.undecided;
 }
 

@@ -1,5 +1,6 @@
 #include "NarrowPhase/LineEdges.h"
 
+#include "NarrowPhase/Filters.h"
 #include "Math/ClosestPoint.h"
 
 #include <utility>
@@ -7,11 +8,6 @@
 namespace palpate {
 
 namespace {
-
-MeshFeature featureOf(const MeshTopology& topology, std::uint32_t edge, EdgeFeature feature) {
-  if (feature == EdgeFeature::Interior) return {MeshFeature::Kind::Edge, edge};
-  return {MeshFeature::Kind::Vertex, topology.edges[edge][feature == EdgeFeature::End]};
-}
 
 /// f(edge) for each edge that holds the feature, once, while it returns true.
 template <class F>
@@ -50,13 +46,13 @@ bool isDistinct(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
 
 std::optional<EdgesNearby> measureEdges(const MeshPair& pair, std::uint32_t edgeA,
                                         std::uint32_t edgeB) {
-  if (pair.leavesOut(edgeA, edgeB)) return {};
   const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
+  if (pair.leavesOut(edgeA, edgeB) || areNearAtRest(pair, p, q)) return {};
   const EdgeEdgeDistance centres = finiteEdgeEdgeDistance(pair.a.now[p[0]], pair.a.now[p[1]],
                                                           pair.b.now[q[0]], pair.b.now[q[1]]);
   const double radii = pair.a.radius(p, centres.weightA) + pair.b.radius(q, centres.weightB);
   const double distance = centres.distance - radii;
-  if (!(distance <= pair.settings.thickness)) return {};
+  if (!(distance <= pair.settings.thickness) || refusesEdges(pair, edgeA, edgeB)) return {};
   return EdgesNearby{centres,
                      distance,
                      {featureOf(pair.a.topology, edgeA, centres.featureA),
@@ -71,6 +67,7 @@ void testLineEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edge
   if (pair.settings.contacts == Contacts::Distinct &&
       !isDistinct(pair, edgeA, edgeB, nearby->features, out))
     return;
+  if (pointInwardAtEnd(pair, edgeA, edgeB, nearby->centres)) return;
   out.edgeEdge.push_back(
       contactOf(pair.a.topology.edges[edgeA], pair.b.topology.edges[edgeB], nearby->centres));
   out.edgeEdge.back().distance = nearby->distance;

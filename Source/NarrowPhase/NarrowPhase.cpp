@@ -63,11 +63,15 @@ FeatureLists everyFeature(const MeshPair& pair) {
   };
   if (pair.settings.method == Method::Intersection) {
     fill(every.trianglesOfA, pair.a.topology.triangles.size());
+    std::erase_if(every.trianglesOfA, [&](std::uint32_t t) { return !pair.a.topology.isOn(t); });
     return every;
   }
-  if (pair.b.topology.hasFaces()) fillTested(every.verticesOfA, pair.a.topology);
-  if (pair.a.topology.hasFaces() && !pair.self()) fillTested(every.verticesOfB, pair.b.topology);
+  const MeshTopology &a = pair.a.topology, &b = pair.b.topology;
+  if (areTested(a, b, true)) fillTested(every.verticesOfA, a);
+  if (areTested(b, a, false) && !pair.self()) fillTested(every.verticesOfB, b);
   fill(every.edgesOfA, pair.a.topology.edges.size());
+  std::erase_if(every.edgesOfA,
+                [&](std::uint32_t e) { return pair.a.topology.edgeTriangles[e].empty(); });
   return every;
 }
 

@@ -7,6 +7,7 @@
 #include "Geometry/TriangleMesh.h"
 #include "NarrowPhase/FeaturePairs.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -36,18 +37,32 @@ struct MeshPair {
   /// For throwing out feature pairs by their boxes; without, the same answer takes longer.
   const FloatPair* floats = nullptr;
   StepPlan step{};
+  const IndexLists* near = nullptr;  ///< restDistance: vertices too near each other at rest
+  const ContactPredicate* predicate = nullptr;
   double thicknessAtEnd() const { return settings.thickness + step.extra; }
   /// L: centres further apart are no contacts.
   double reach() const { return thicknessAtEnd() + (a.largestRadius + b.largestRadius); }
   bool self() const { return &a == &b; }
+  /// L: a vertex's and that of what it is tested against, where it is closest.
+  double radii(std::uint32_t vertex, const Triangle& corners, const Eigen::Vector3d& barycentric,
+               bool ofSecond) const {
+    const TriangleMesh &vertices = ofSecond ? b : a, &others = ofSecond ? a : b;
+    return vertices.radius(vertex) + others.radius(corners, barycentric);
+  }
+  bool filters() const { return near || predicate || a.outer || b.outer; }
   bool hasLines() const {
     return a.topology.kind == GeometryKind::Lines || b.topology.kind == GeometryKind::Lines;
   }
-  /// Self-collision: edges with a common vertex, or too near along the thread.
+  /// Self-collision: a vertex with a triangle at it; of two points the lower is the vertex.
+  bool leavesOutVertex(std::uint32_t vertex, std::uint32_t triangle) const {
+    if (!self()) return false;
+    const auto& [i, j, k] = a.topology.triangles[triangle];
+    return vertex == i || vertex == j || vertex == k ||
+           (a.topology.kind == GeometryKind::Points && triangle < vertex);
+  }
+  /// Self-collision: edges with a common vertex.
   bool leavesOut(std::uint32_t edgeA, std::uint32_t edgeB) const {
-    return self() && (shareVertex(a.topology.edges[edgeA], a.topology.edges[edgeB]) ||
-                      (settings.restDistance > 0.0 &&
-                       arcBetween(a.arcs[edgeA], a.arcs[edgeB]) < settings.restDistance));
+    return self() && shareVertex(a.topology.edges[edgeA], a.topology.edges[edgeB]);
   }
 };
 

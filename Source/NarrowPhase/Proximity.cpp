@@ -1,6 +1,7 @@
 #include "NarrowPhase/Proximity.h"
 
 #include "NarrowPhase/FeatureTests.h"
+#include "NarrowPhase/Filters.h"
 #include "NarrowPhase/LineEdges.h"
 #include "NarrowPhase/ProximityFilter.h"
 #include "NarrowPhase/StepCheck.h"
@@ -25,7 +26,8 @@ class VertexTriangleFinder {
   enum class Corners { All, LowerVertexOnly, None };
 
   VertexTriangleFinder(const MeshPair& pair, bool ofSecond, Corners corners, ContactBuffers& out)
-      : m_features{ofSecond ? pair.b : pair.a, ofSecond ? pair.a : pair.b},
+      : m_pair(pair),
+        m_features{ofSecond ? pair.b : pair.a, ofSecond ? pair.a : pair.b},
         m_ofSecond(ofSecond),
         m_vertices(m_features.first.now),
         m_positions(m_features.second.now),
@@ -36,6 +38,7 @@ class VertexTriangleFinder {
         m_corners(corners),
         m_time(pair.step.impacts ? 1.0 : 0.0),
         m_check(pair, out),
+        m_buffers(out),
         m_out(ofSecond && !pair.self() ? out.triangleVertex : out.vertexTriangle),
         m_exactDecisions(out.exactDecisions) {}
 
@@ -45,17 +48,22 @@ class VertexTriangleFinder {
     const VertexTriangleDistance answer = finiteVertexTriangleDistance(
         p, m_positions[corners[0]], m_positions[corners[1]], m_positions[corners[2]]);
     m_exactDecisions += answer.exact;
-    const double radius = m_features.first.radius(vertex);
-    if (!(answer.distance - radius <= m_thickness)) return;
+    const double radii = m_pair.radii(vertex, corners, answer.barycentric, m_ofSecond);
+    if (!(answer.distance - radii <= m_thickness)) return;
     if (m_check.isAnsweredByImpact(m_features, vertex, triangle, m_ofSecond, answer.distance))
       return;
-    if (m_distinct &&
-        !isDistinct(vertex, triangle, featureOf(m_topology, triangle, answer.feature)))
+    if (refusesVertex(m_pair, vertex, triangle, m_ofSecond)) return;
+    const MeshFeature feature = featureOf(m_topology, triangle, answer.feature);
+    if (m_distinct && !isDistinct(vertex, triangle, feature)) return;
+    if (pointsInwardAtEnd(m_pair, vertex, feature, answer, m_ofSecond)) {
+      if (m_pair.step.impacts)
+        addImpact(m_pair, m_features, vertex, triangle, m_ofSecond, m_buffers);
       return;
+    }
     m_check.noteTriangle(triangle, !m_ofSecond, m_positions[corners[0]], m_positions[corners[1]],
                          m_positions[corners[2]]);
     m_out.push_back(contactOf(vertex, triangle, corners, answer, m_time));
-    m_out.back().distance -= radius;
+    m_out.back().distance -= radii;
   }
 
  private:
@@ -70,13 +78,25 @@ class VertexTriangleFinder {
         isVertex ? m_topology.vertexTriangles[feature.id] : m_topology.edgeTriangles[feature.id];
     const Vector3d& p = m_vertices[vertex];
     return std::none_of(holders.begin(), holders.end(), [&](std::uint32_t other) {
-      if (other == triangle || (m_self && holdsVertex(m_topology.triangles[other], vertex)))
+      if (other == triangle || (m_self && holdsVertex(m_topology.triangles[other], vertex)) ||
+          refusesVertex(m_pair, vertex, other, m_ofSecond))
         return false;
-      if (isVertex ? isNearerThanVertex(p, feature.id, other)
-                   : isNearerThanEdge(p, feature.id, other))
-        return true;
-      return other < triangle && closestFeatureOf(p, other) == feature;
+      const bool isNearer = isVertex ? isNearerThanVertex(p, feature.id, other)
+                                     : isNearerThanEdge(p, feature.id, other);
+      return (isNearer || (other < triangle && closestFeatureOf(p, other) == feature)) &&
+             isNearEnough(vertex, other);
     });
+  }
+
+  /// Of a triangle at least as near as one that is: where radii differ it may not be.
+  bool isNearEnough(std::uint32_t vertex, std::uint32_t triangle) const {
+    if (m_features.second.radii.empty()) return true;
+    const Triangle& corners = m_topology.triangles[triangle];
+    const VertexTriangleDistance measured =
+        finiteVertexTriangleDistance(m_vertices[vertex], m_positions[corners[0]],
+                                     m_positions[corners[1]], m_positions[corners[2]]);
+    return measured.distance - m_pair.radii(vertex, corners, measured.barycentric, m_ofSecond) <=
+           m_thickness;
   }
 
   MeshFeature closestFeatureOf(const Vector3d& p, std::uint32_t triangle) const {
@@ -102,6 +122,7 @@ class VertexTriangleFinder {
                        m_positions[corners[(side + 2) % 3]]);
   }
 
+  const MeshPair& m_pair;
   const Features<ImpactQuery::Kind::VertexTriangle> m_features;
   const bool m_ofSecond;
   std::span<const Vector3d> m_vertices, m_positions;
@@ -112,6 +133,7 @@ class VertexTriangleFinder {
   Corners m_corners;
   double m_time;
   StepCheck m_check;
+  ContactBuffers& m_buffers;
   Buffer<VertexTriangleContact>& m_out;
   std::size_t& m_exactDecisions;
 };
@@ -151,7 +173,11 @@ void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, S
   out.exactDecisions += answer->exact;
   if (!(answer->distance <= pair.thicknessAtEnd())) return;
   if (check.isAnsweredByImpact(features, edgeA, edgeB, false, answer->distance)) return;
-  if (!isContact) return;
+  if (!isContact || refusesEdges(pair, edgeA, edgeB)) return;
+  if (pointInwardAtEnd(pair, edgeA, edgeB, *answer)) {
+    if (pair.step.impacts) addImpact(pair, features, edgeA, edgeB, false, out);
+    return;
+  }
   const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
   check.noteEdges(p, q);
   out.edgeEdge.push_back(contactOf(p, q, *answer, pair.step.impacts ? 1.0 : 0.0));
@@ -178,8 +204,8 @@ class ProximityFinder {
               : pair.b.topology.hasFaces() ? Corners::None
                                            : Corners::All,
               out),
-        m_tested((pair.b.topology.hasFaces() ? 07u : 0) | (pair.a.topology.hasFaces() ? 070u : 0) |
-                 ~077u),
+        m_tested((areTested(pair.a.topology, pair.b.topology, true) ? 07u : 0) |
+                 (areTested(pair.b.topology, pair.a.topology, false) ? 070u : 0) | ~077u),
         m_distinct(pair.settings.contacts == Contacts::Distinct && !pair.hasLines()) {}
 
   void find(std::span<const TrianglePair> candidates) {

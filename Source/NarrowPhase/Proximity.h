@@ -34,6 +34,12 @@ inline MeshFeature featureOf(const MeshTopology& topology, std::uint32_t triangl
   return {MeshFeature::Kind::Face, triangle};
 }
 
+inline MeshFeature featureOf(const MeshTopology& topology, std::uint32_t edge,
+                             EdgeFeature feature) {
+  if (feature == EdgeFeature::Interior) return {MeshFeature::Kind::Edge, edge};
+  return {MeshFeature::Kind::Vertex, topology.edges[edge][feature == EdgeFeature::End]};
+}
+
 inline bool holdsVertex(const Triangle& triangle, std::uint32_t vertex) {
   return triangle[0] == vertex || triangle[1] == vertex || triangle[2] == vertex;
 }

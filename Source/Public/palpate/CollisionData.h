@@ -14,13 +14,14 @@
 
 namespace palpate {
 
-/// A vertex against a triangle.
+/// A vertex against a triangle; a point against a segment {p, q} is one with the corners {p, q, q},
+/// and against another point {p, p, p}.
 struct VertexTriangleContact {
   std::uint32_t vertex, triangle;
   std::array<std::uint32_t, 3> corners;  ///< the triangle's vertices
   Eigen::Vector3d barycentric;           ///< of the closest point, in the triangle's corner order
   Eigen::Vector3d normal;                ///< unit, from the triangle towards the vertex
-  /// L, less the vertex's radius; negative only by that, as deep as it overlaps; at the time of
+  /// L, less the radii; negative only by that, as deep as it overlaps; at the time of
   /// impact for Continuous
   double distance;
   double timeOfImpact;  ///< [0, 1] of the step; 0 for the static methods

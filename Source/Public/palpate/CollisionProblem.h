@@ -16,12 +16,17 @@ struct CollisionProblem {
     std::vector<Triangle> triangles;  ///< a segment {p, q} is {p, q, q}; none of points
     GeometryKind kind = GeometryKind::Triangles;
     std::vector<double> radii{};          ///< L: none, one for all, or one for each vertex
-    std::vector<Eigen::Vector3d> rest{};  ///< of lines: the shape that they were added in
+    std::vector<Eigen::Vector3d> rest{};  ///< the shape that restDistance is of; none: now
+    CollisionFilter filter{};
+    std::vector<std::uint32_t> disabled{};  ///< elements that are off
   };
   struct Pair {
     std::uint32_t a, b;  ///< indices of geometries
     PairSettings settings;
     Method method;  ///< that answered, of Validity; nothing depends on it
+    /// A predicate was asked, which is not part of a problem: without it there may be more
+    /// contacts.
+    bool predicate = false;
   };
   Settings settings;
   std::vector<Mesh> geometries;

@@ -40,14 +40,17 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// A thread of any shape: open, closed, branching, several. radius: L, of all, or one for each
   /// vertex and linear between; finite, not negative. No segment may join a vertex with itself.
   ///
-  /// Edges meet triangles' edges and other lines' edges in edgeEdge(), vertices meet triangles.
-  /// Features touch where centre lines come closest, if their distance there is at most the
-  /// thickness and the radii there. Docs/Pairs.md has what each pair of kinds answers.
+  /// Edges meet triangles' edges and other lines' edges in edgeEdge(), vertices meet triangles;
+  /// points meet its segments in vertexTriangle() or triangleVertex(): segment {p, q} is triangle
+  /// {p, q, q}. Features touch where centre lines come closest, if their distance there is at most
+  /// the thickness and the radii there. Docs/Pairs.md has what each pair of kinds answers.
   GeometryId addLineMesh(std::span<const Eigen::Vector3d> positions,
                          std::span<const Segment> segments, double radius = 0.0);
   GeometryId addLineMesh(std::span<const Eigen::Vector3d> positions,
                          std::span<const Segment> segments, std::span<const double> radii);
-  /// Point i is vertex i. Points meet triangles.
+  /// Point i is vertex i. Points meet triangles, segments and points: point p is triangle {p, p,
+  /// p}. Of two point sets the first has the vertices, of one with itself the lower point is the
+  /// vertex.
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, double radius = 0.0);
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
   void removeGeometry(GeometryId);  ///< and its pairs
@@ -62,10 +65,20 @@ class PALPATE_EXPORT OctreeBasedCD {
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
 
+  /// Two geometries meet where each is in a group that the other's mask has; a pair that does not
+  /// has no contacts, no candidates and no cost, and is not trusted.
+  void setCollisionFilter(GeometryId, const CollisionFilter&);
+  /// Switches triangles, segments or points off, and all others on: they are no candidates. A
+  /// vertex or edge is on while anything that holds it is. findInsideVertices() asks all.
+  void setDisabledElements(GeometryId, std::span<const std::uint32_t> elements);
+
   /// a == b: self-collision, adjacent features excluded. Kinds and methods that cannot be tested
   /// are refused: UnsupportedMethod.
   void addCollisionPair(GeometryId a, GeometryId b, const PairSettings& = {});
   void setPairSettings(GeometryId a, GeometryId b, const PairSettings&);
+  /// Features that it refuses are no contacts and hide none; intersectingTriangles() and validity()
+  /// do not ask it. In the order in which the pair was added; an empty one refuses nothing.
+  void setContactPredicate(GeometryId a, GeometryId b, ContactPredicate);
   void removeCollisionPair(GeometryId a, GeometryId b);
   std::span<const CollisionPair> pairs() const;  ///< in the order added
 

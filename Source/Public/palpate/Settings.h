@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 
 namespace palpate {
 
@@ -64,10 +66,39 @@ struct PairSettings {
   /// end, with up to this much added to the thickness; others for impacts. Larger: faster, more
   /// contacts that are further apart. Negative: half the thickness.
   double tolerance = -1.0;
-  /// L, finite, not negative. A line mesh with itself: edges whose nearest ends are less than this
-  /// apart along the thread, in the shape that it was added in, are no contacts. 0: only edges with
-  /// a common vertex. Needs a mesh without branches.
+  /// L, finite, not negative. A triangle or line mesh with itself: features that are nearer than
+  /// this along its edges, in the shape that it was added in or that setTriangles() gave, are no
+  /// contacts. 0: only features with a common vertex.
   double restDistance = 0.0;
 };
+
+/// From where a triangle mesh is touched.
+enum class Sidedness {
+  Both,
+  /// Only from where its triangles' winding normals point. A contact whose direction, from the
+  /// feature of this mesh that holds the closest point, points inward is none. Intersection's
+  /// contacts are on surfaces that cross: none of them points inward.
+  Outer
+};
+
+/// What of a geometry takes part in its pairs.
+struct CollisionFilter {
+  std::uint32_t groups = 1;  ///< bits: the groups that it is in
+  std::uint32_t mask =
+      0xffffffff;  ///< bits: the groups that it meets. Both must ask for each other
+  Sidedness sidedness = Sidedness::Both;  ///< Outer: of triangle meshes only
+  friend bool operator==(const CollisionFilter&, const CollisionFilter&) = default;
+};
+
+/// Two features that are about to be a contact, of the pair's first and second geometry.
+struct ContactFeatures {
+  enum class Kind { VertexTriangle, TriangleVertex, EdgeEdge } kind;
+  /// a vertex or a triangle (twice the same number), or an edge's vertices, lower first
+  std::array<std::uint32_t, 2> a, b;
+};
+
+/// Whether two features may be a contact. Called by several threads at once, in any order, only for
+/// features near enough; must answer the same each time in a frame, and must not throw.
+using ContactPredicate = std::function<bool(const ContactFeatures&)>;
 
 }  // namespace palpate

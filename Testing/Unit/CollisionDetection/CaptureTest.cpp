@@ -217,10 +217,10 @@ TEST_F(Capture, RefusesWhatIsWrongByName) {
     write(text.replace(place, from.size(), to));
     expectRefused(reason);
   };
-  expectRefusedWith("palpate-capture 3", "solid 3", "it is not a capture");
-  expectRefusedWith("palpate-capture 3", "palpate-capture 4",
-                    "it is of version 4; versions up to 3");
-  expectRefusedWith("palpate-capture 3", "palpate-capture x", "line 1: \"x\" is not an integer");
+  expectRefusedWith("palpate-capture 4", "solid 3", "it is not a capture");
+  expectRefusedWith("palpate-capture 4", "palpate-capture 5",
+                    "it is of version 5; versions up to 4");
+  expectRefusedWith("palpate-capture 4", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 99999999999\n", "is not an integer in range");
@@ -251,6 +251,9 @@ TEST_F(Capture, ReadsEarlierVersions) {
     write(text);
     return readCapture(file());
   };
+  replaceAll(" 0 1 4294967295 Both 0 0\n", " 0\n");  // filters, rest
+  replaceAll(" 0p+0 0\n", " 0p+0\n");                // predicate
+  EXPECT_EQ(asVersion(3).geometries[0].filter, CollisionFilter());
   replaceAll(" Triangles 0\n", "\n");
   replaceAll(" -1p+0 0p+0\n", " -1p+0\n");  // restDistance
   EXPECT_EQ(asVersion(2).pairs[0].settings.method, smallProblem().pairs[0].settings.method);

@@ -5,12 +5,15 @@
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
+#include "Common/Things.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <set>
 #include <string>
@@ -24,128 +27,13 @@
 namespace palpate::testing {
 namespace {
 
-using Eigen::Vector3d;
-using Positions = std::vector<Vector3d>;
-
-/// A geometry of any kind.
-struct Thing {
-  GeometryKind kind = GeometryKind::Triangles;
-  Positions positions;
-  std::vector<Triangle> triangles;
-  std::vector<Segment> segments;
-  std::vector<double> radii{0.0};
-
-  GeometryId addTo(OctreeBasedCD& collisions) const {
-    switch (kind) {
-      case GeometryKind::Triangles:
-        return collisions.addTriangleMesh(positions, triangles);
-      case GeometryKind::Lines:
-        return radii.size() == 1 ? collisions.addLineMesh(positions, segments, radii[0])
-                                 : collisions.addLineMesh(positions, segments, radii);
-      case GeometryKind::Points:
-        return radii.size() == 1 ? collisions.addPointSet(positions, radii[0])
-                                 : collisions.addPointSet(positions, radii);
-    }
-    return {};
-  }
-  double radius(std::uint32_t vertex) const { return radii.size() == 1 ? radii[0] : radii[vertex]; }
-  std::vector<Segment> edges() const {
-    std::set<Segment> all;
-    const auto add = [&](std::uint32_t p, std::uint32_t q) {
-      if (p != q) all.insert({std::min(p, q), std::max(p, q)});
-    };
-    for (const auto& [a, b, c] : triangles) add(a, b), add(b, c), add(c, a);
-    for (const auto& [p, q] : segments) add(p, q);
-    return {all.begin(), all.end()};
-  }
-};
-
-Thing things(const Mesh& mesh) {
-  return {GeometryKind::Triangles, mesh.positions, mesh.triangles, {}};
-}
-
-using Pairs = std::vector<std::pair<const Thing*, const Thing*>>;
-
-/// A random walk in the unit cube, closed or not.
-Thing thread(Random& random, std::uint32_t segments, double step, double radius, bool closed) {
-  Thing line{GeometryKind::Lines, {randomPoint(random, 0.2, 0.8)}, {}, {}, {radius}};
-  for (std::uint32_t i = 1; i <= segments; ++i) {
-    line.positions.push_back((line.positions.back() + randomPoint(random, -step, step))
-                                 .cwiseMax(Vector3d::Zero())
-                                 .cwiseMin(Vector3d::Ones()));
-    line.segments.push_back(i % 3 ? Segment{i - 1, i} : Segment{i, i - 1});
-  }
-  if (closed) line.segments.push_back({segments, 0});
-  return line;
-}
-
-Thing particles(Random& random, std::size_t count, double radius) {
-  Thing points{GeometryKind::Points, {}, {}, {}, {radius}};
-  for (std::size_t i = 0; i < count; ++i) points.positions.push_back(randomPoint(random, 0, 1));
-  return points;
-}
-
-/// Radii of its own for each vertex.
-Thing tapered(Random& random, Thing thing, double most) {
-  thing.radii.clear();
-  for (std::size_t v = 0; v < thing.positions.size(); ++v)
-    thing.radii.push_back(uniform(random, 0, most));
-  return thing;
-}
-
-Positions moved(Random& random, Positions positions, double most) {
-  for (Vector3d& p : positions) p += randomPoint(random, -most, most);
-  return positions;
-}
-
-/// One frame of a pair.
-CollisionData answer(const Settings& settings, const Thing& a, const Thing& b,
-                     const PairSettings& pair, const Positions& nowA, const Positions& nowB) {
-  OctreeBasedCD collisions(settings);
-  const GeometryId first = a.addTo(collisions);
-  const bool self = &a == &b;
-  const GeometryId second = self ? first : b.addTo(collisions);
-  collisions.addCollisionPair(first, second, pair);
-  collisions.setPositions(first, a.positions, nowA);
-  if (!self) collisions.setPositions(second, b.positions, nowB);
-  collisions.detectCollision();
-  EXPECT_EQ(collisions.octree().validate(), std::vector<std::string>{});
-  return collisions.collisionData(first, second);
-}
-
-CollisionData answer(const Thing& a, const Thing& b, const PairSettings& pair) {
-  return answer(settingsOf(Engine::Octree), a, b, pair, a.positions, b.positions);
-}
-
-std::vector<PairSettings> settingsFor(double thickness, bool continuous = true) {
-  std::vector<PairSettings> all{{Method::Proximity, thickness, Contacts::Distinct},
-                                {Method::Proximity, thickness, Contacts::All}};
-  if (continuous) {
-    all.push_back({Method::Continuous, thickness, Contacts::All});
-    all.push_back({Method::Continuous, 0, Contacts::All});
-    all.push_back({Method::Continuous, thickness, Contacts::Earliest});
-  }
-  return all;
-}
-
-/// Octrees with any threads answer as brute force does, bit by bit; returns how many contacts.
-std::size_t expectOracle(Random& random, const Thing& a, const Thing& b, const PairSettings& pair) {
-  const Positions nowA = moved(random, a.positions, 0.03), nowB = moved(random, b.positions, 0.03);
-  const Rows truth(answer(settingsOf(Engine::BruteForce), a, b, pair, nowA, nowB));
-  EXPECT_TRUE(ascend(truth.vertexTriangle, 2) && ascend(truth.triangleVertex, 2) &&
-              ascend(truth.edgeEdge, 4));
-  for (const Settings& settings : octreeSettings())
-    expectSameRows(Rows(answer(settings, a, b, pair, nowA, nowB)), truth);
-  return truth.contacts() + (truth.earliestTimeOfImpact <= 1.0);
-}
-
 TEST(Kinds, AnswerAsBruteForce) {
   Random random(1);
   const Thing organ = things(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
   const Thing line = thread(random, 150, 0.12, 0.01, false),
               loop = thread(random, 80, 0.15, 0, true);
   const Thing needle = tapered(random, thread(random, 60, 0.1, 0, false), 0.03);
-  const Thing smoke = particles(random, 200, 0.02),
+  const Thing smoke = particles(random, 200, 0.02), dust = particles(random, 300, 0),
               drops = tapered(random, particles(random, 200, 0), 0.04);
   std::size_t contacts = 0;
   for (const auto& [a, b] : Pairs{{&organ, &line},
@@ -155,10 +43,16 @@ TEST(Kinds, AnswerAsBruteForce) {
                                   {&line, &loop},
                                   {&loop, &line},
                                   {&line, &line},
-                                  {&loop, &loop}})
+                                  {&loop, &loop},
+                                  {&smoke, &line},
+                                  {&line, &smoke},
+                                  {&loop, &dust},
+                                  {&smoke, &dust},
+                                  {&dust, &smoke},
+                                  {&smoke, &smoke}})
     for (PairSettings pair : settingsFor(0.02)) {
       contacts += expectOracle(random, *a, *b, pair);
-      pair.restDistance = a == b ? 0.3 : 0.0;
+      pair.restDistance = a == b && a != &smoke ? 0.3 : 0.0;
       contacts += expectOracle(random, *a, *b, pair);
     }
   for (const auto& [a, b] : Pairs{{&organ, &needle},
@@ -166,7 +60,11 @@ TEST(Kinds, AnswerAsBruteForce) {
                                   {&needle, &line},
                                   {&needle, &needle},
                                   {&drops, &organ},
-                                  {&organ, &drops}})
+                                  {&organ, &drops},
+                                  {&drops, &needle},
+                                  {&needle, &smoke},
+                                  {&drops, &dust},
+                                  {&drops, &drops}})
     for (const PairSettings& pair : settingsFor(0.005, false))
       contacts += expectOracle(random, *a, *b, pair);
   EXPECT_GT(contacts, 1000u);
@@ -174,19 +72,31 @@ TEST(Kinds, AnswerAsBruteForce) {
 
 using Ids = std::vector<std::uint32_t>;
 
-/// The definition of All over public functions.
-std::set<Ids> expectedVertexTriangle(const Thing& vertices, const Thing& triangles,
-                                     double thickness, bool triangleFirst) {
+/// The definition of All over public functions: vertices of others against triangles, points also
+/// against segments and, of the first of two point sets, against points.
+std::set<Ids> expectedVertexTriangle(const Thing& vertices, const Thing& others, double thickness,
+                                     bool ofSecond) {
   std::set<Ids> ids;
-  if (triangles.kind != GeometryKind::Triangles) return ids;
+  const bool points = vertices.kind == GeometryKind::Points;
+  if (others.kind != GeometryKind::Triangles &&
+      !(points && (others.kind == GeometryKind::Lines || !ofSecond)))
+    return ids;
+  std::vector<Triangle> elements = others.triangles;
+  for (const auto& [p, q] : others.segments) elements.push_back({p, q, q});
+  for (std::uint32_t i = 0; others.kind == GeometryKind::Points && i < others.positions.size(); ++i)
+    elements.push_back({i, i, i});
+  const auto at = [&](std::uint32_t i) { return others.positions[i]; };
   for (std::uint32_t v = 0; v < vertices.positions.size(); ++v)
-    for (std::uint32_t t = 0; t < triangles.triangles.size(); ++t) {
-      const auto& [i, j, k] = triangles.triangles[t];
-      const Positions& p = triangles.positions;
-      const double distance =
-          vertexTriangleDistance(vertices.positions[v], p[i], p[j], p[k]).distance;
-      if (distance - vertices.radius(v) <= thickness)
-        ids.insert(triangleFirst ? Ids{t, v} : Ids{v, t});
+    for (std::uint32_t t = 0; t < elements.size(); ++t) {
+      const auto& [i, j, k] = elements[t];
+      if (&vertices == &others && !(v < t)) continue;
+      const VertexTriangleDistance d =
+          vertexTriangleDistance(vertices.positions[v], at(i), at(j), at(k));
+      const double radius = d.barycentric[0] * others.radius(i) +
+                            d.barycentric[1] * others.radius(j) +
+                            d.barycentric[2] * others.radius(k);
+      if (d.distance - (vertices.radius(v) + radius) <= thickness)
+        ids.insert(ofSecond ? Ids{t, v} : Ids{v, t});
     }
   return ids;
 }
@@ -220,16 +130,23 @@ TEST(Kinds, AllIsWhatTheDefinitionSays) {
   const Thing organ = things(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
   const Thing line = tapered(random, thread(random, 120, 0.12, 0, false), 0.03);
   const Thing loop = thread(random, 80, 0.15, 0, true), drops = particles(random, 300, 0.03);
+  const Thing smoke = tapered(random, particles(random, 250, 0), 0.04);
   constexpr double kThickness = 0.02;
   for (const auto& [a, b] : Pairs{{&organ, &line},
                                   {&line, &organ},
                                   {&drops, &organ},
                                   {&organ, &drops},
                                   {&line, &loop},
-                                  {&line, &line}}) {
+                                  {&line, &line},
+                                  {&line, &smoke},
+                                  {&smoke, &line},
+                                  {&drops, &loop},
+                                  {&smoke, &drops},
+                                  {&smoke, &smoke}}) {
     const Rows rows(answer(*a, *b, {Method::Proximity, kThickness, Contacts::All}));
     EXPECT_EQ(idsOf(rows.vertexTriangle, 2), expectedVertexTriangle(*a, *b, kThickness, false));
-    EXPECT_EQ(idsOf(rows.triangleVertex, 2), expectedVertexTriangle(*b, *a, kThickness, true));
+    EXPECT_EQ(idsOf(rows.triangleVertex, 2),
+              a == b ? std::set<Ids>() : expectedVertexTriangle(*b, *a, kThickness, true));
     EXPECT_EQ(idsOf(rows.edgeEdge, 4), expectedEdgeEdge(*a, *b, kThickness));
     EXPECT_GT(rows.contacts(), 5u);
   }
@@ -290,7 +207,8 @@ TEST(Kinds, SwappingSwapsTheAnswer) {
   const Thing line = thread(random, 120, 0.1, 0.02, false),
               loop = thread(random, 90, 0.1, 0.01, true);
   const Thing drops = particles(random, 300, 0.03);
-  for (const auto& [a, b] : Pairs{{&organ, &line}, {&line, &loop}, {&drops, &organ}})
+  for (const auto& [a, b] :
+       Pairs{{&organ, &line}, {&line, &loop}, {&drops, &organ}, {&drops, &line}, {&loop, &drops}})
     for (const PairSettings& pair : settingsFor(0.02)) {
       const Rows there(swapped(answer(*a, *b, pair))), back(answer(*b, *a, pair));
       expectSameRows(there, back);
@@ -315,7 +233,8 @@ TEST(Kinds, MotionThatIsExactChangesNothing) {
     for (Vector3d& p : thing.positions) p = Vector3d(p[2], p[0], p[1]);
     return thing;
   };
-  const Thing* const pairs[][2] = {{&organ, &line}, {&organ, &drops}, {&line, &line}};
+  const Thing* const pairs[][2] = {{&organ, &line}, {&organ, &drops}, {&line, &line},
+                                   {&line, &drops}, {&drops, &line},  {&drops, &drops}};
   for (const auto& [a, b] : pairs)
     for (const Contacts contacts : {Contacts::Distinct, Contacts::All}) {
       const PairSettings pair{Method::Proximity, 0.03125, contacts};
@@ -326,8 +245,31 @@ TEST(Kinds, MotionThatIsExactChangesNothing) {
       const Rows other(answer(turnedA, a == b ? turnedA : turnedB, pair));
       EXPECT_EQ(idsOf(other.edgeEdge, 4), idsOf(rows.edgeEdge, 4));
       EXPECT_EQ(idsOf(other.triangleVertex, 2), idsOf(rows.triangleVertex, 2));
+      EXPECT_EQ(idsOf(other.vertexTriangle, 2), idsOf(rows.vertexTriangle, 2));
       EXPECT_GT(rows.contacts(), 10u);
     }
+}
+
+/// Of two points neither is a triangle: the other one's place in the list.
+TEST(Kinds, SwappingTwoPointSetsTurnsTheirContacts) {
+  Random random(8);
+  const Thing drops = tapered(random, particles(random, 300, 0), 0.05),
+              smoke = particles(random, 200, 0.02);
+  const CollisionData there = answer(drops, smoke, {Method::Proximity, 0.02}),
+                      back = answer(smoke, drops, {Method::Proximity, 0.02});
+  ASSERT_EQ(there.vertexTriangle().size(), back.vertexTriangle().size());
+  EXPECT_GT(back.vertexTriangle().size(), 20u);
+  EXPECT_TRUE(there.triangleVertex().empty() && there.edgeEdge().empty());
+  for (const auto& c : there.vertexTriangle()) {
+    const auto twin = std::find_if(
+        back.vertexTriangle().begin(), back.vertexTriangle().end(),
+        [&](const auto& o) { return o.vertex == c.triangle && o.triangle == c.vertex; });
+    ASSERT_NE(twin, back.vertexTriangle().end());
+    EXPECT_EQ(twin->distance, c.distance);
+    EXPECT_EQ(twin->normal, -c.normal);
+    EXPECT_EQ(c.barycentric, Vector3d(1, 0, 0));
+    EXPECT_EQ(c.corners, (Triangle{c.triangle, c.triangle, c.triangle}));
+  }
 }
 
 // ---- Meaning, by hand ----
@@ -397,6 +339,45 @@ TEST(Kinds, ParticleOnAPlaneReportsItsDepth) {
   EXPECT_EQ(data.vertexTriangle()[0].normal, Vector3d(0, 0, 1));
 }
 
+TEST(Kinds, ParticlesMeetThreadsAndEachOther) {
+  const Thing thread = lineOf({{0, 0, 0}, {4, 0, 0}, {4, 4, 0}}, 0.125);
+  const Thing drops{GeometryKind::Points,
+                    {{1, 0, 0.5}, {4.25, -0.25, 0}, {9, 9, 9}, {1, 0.25, 0.5}},
+                    {},
+                    {},
+                    {0.25}};
+  const PairSettings near{Method::Proximity, 0.25, Contacts::Distinct};
+  const CollisionData data = answer(drops, thread, near);
+  ASSERT_EQ(data.vertexTriangle().size(), 3u);
+  const VertexTriangleContact &over = data.vertexTriangle()[0], &corner = data.vertexTriangle()[1];
+  EXPECT_EQ(over.corners, (Triangle{0, 1, 1}));
+  EXPECT_EQ(over.barycentric, Vector3d(0.75, 0.25, 0));
+  EXPECT_EQ(over.distance, 0.125);  // 0.5 less both radii
+  EXPECT_EQ(over.normal, Vector3d(0, 0, 1));
+  EXPECT_EQ(corner.triangle, 0u);  // of the two segments at the corner the lower
+  EXPECT_EQ(corner.barycentric[0], 0.0);
+  EXPECT_EQ(answer(drops, thread, {Method::Proximity, 0.25, Contacts::All}).vertexTriangle().size(),
+            4u);
+  const CollisionData self = answer(drops, drops, near);
+  ASSERT_EQ(self.vertexTriangle().size(), 1u);
+  EXPECT_EQ(self.vertexTriangle()[0].vertex, 0u);
+  EXPECT_EQ(self.vertexTriangle()[0].triangle, 3u);
+  EXPECT_EQ(self.vertexTriangle()[0].distance, -0.25);
+  EXPECT_EQ(self.vertexTriangle()[0].normal, Vector3d(0, -1, 0));
+}
+
+TEST(Kinds, ThickEndOfATaperIsNotHiddenByItsThinOne) {
+  // Both segments at the thick vertex come nearer to the particle, where they are thin.
+  Thing spindle = lineOf({{-2, 0, 0.5}, {0, 0, 0}, {2, 0, 0.5}});
+  spindle.radii = {0, 1, 0};
+  const Thing drop{GeometryKind::Points, {{0, 0, 1.125}}, {}, {}, {0}};
+  const CollisionData data = answer(drop, spindle, {Method::Proximity, 0.5, Contacts::Distinct});
+  EXPECT_EQ(data.vertexTriangle().size(), 2u);
+  const Thing far = lineOf({{-2, 0, 0.5}, {0, 0, 0}, {2, 0, 0.5}}, 0.625);
+  EXPECT_EQ(answer(drop, far, {Method::Proximity, 0.5, Contacts::Distinct}).vertexTriangle().size(),
+            2u);
+}
+
 TEST(Kinds, ContinuousStopsAtTheRadius) {
   const Thing ground{
       GeometryKind::Triangles, {{-4, -4, 0}, {4, -4, 0}, {0, 4, 0}}, {{0, 1, 2}}, {}};
@@ -408,12 +389,16 @@ TEST(Kinds, ContinuousStopsAtTheRadius) {
   EXPECT_NEAR(data.vertexTriangle()[0].distance, 0.0, 1e-5);
 }
 
+std::set<Ids> pairsFoundIn(const Thing& line, const PairSettings& pair) {
+  return idsOf(Rows(answer(line, line, pair)).edgeEdge, 4);
+}
+
 TEST(Kinds, RestDistanceLeavesOutNeighboursAlongTheThread) {
   // A hairpin with corners half a unit apart, ten units long: 0-1-2-3 and back at height 0.125.
   const Thing hairpin =
       lineOf({{0, 0, 0}, {4, 0, 0}, {5, 0, 0.0625}, {4, 0, 0.125}, {0, 0, 0.125}});
   PairSettings pair{Method::Proximity, 0.25, Contacts::All};
-  const auto pairsFound = [&] { return idsOf(Rows(answer(hairpin, hairpin, pair)).edgeEdge, 4); };
+  const auto pairsFound = [&] { return pairsFoundIn(hairpin, pair); };
   EXPECT_EQ(pairsFound(), (std::set<Ids>{{0, 1, 2, 3}, {0, 1, 3, 4}, {1, 2, 3, 4}}));
   pair.restDistance = 1.5;  // edges next but one are 1.002 apart
   EXPECT_EQ(pairsFound(), (std::set<Ids>{{0, 1, 3, 4}}));
@@ -432,9 +417,56 @@ TEST(Kinds, RestDistanceLeavesOutNeighboursAlongTheThread) {
   EXPECT_EQ(answer(ring, ring, pair).edgeEdge().size(), 2u);
   pair.restDistance = 1.25;  // opposite edges are one apart, either way
   EXPECT_EQ(answer(ring, ring, pair).edgeEdge().size(), 0u);
+  // So does the shortest way between branches.
+  Thing branching = lineOf({{0, 0, 0}, {0, 0, 1}, {0, 0, 2}});
+  branching.positions.insert(branching.positions.end(), {{1, 0, 1}, {1, 0, 2}});
+  branching.segments.insert(branching.segments.end(), {{1, 3}, {3, 4}});
+  pair = {Method::Proximity, 1.0, Contacts::All};
+  EXPECT_EQ(pairsFoundIn(branching, pair), (std::set<Ids>{{0, 1, 3, 4}, {1, 2, 3, 4}}));
+  pair.restDistance = 1.0;
+  EXPECT_EQ(pairsFoundIn(branching, pair), (std::set<Ids>{{0, 1, 3, 4}, {1, 2, 3, 4}}));
+  pair.restDistance = 1.25;
+  EXPECT_TRUE(pairsFoundIn(branching, pair).empty());
 }
 
 // ---- Degenerate ----
+
+TEST(Kinds, DegeneratePointsAnswerAsBruteForce) {
+  Random random(9);
+  for (int run = 0; run < 20; ++run) {
+    const auto onGrid = [&](GeometryKind kind, std::size_t count, double radius) {
+      Thing thing{kind, {}, {}, {}, {radius}};
+      for (std::size_t v = 0; v < count; ++v) {
+        const auto at = [&] { return static_cast<double>(random() % 3); };
+        const double x = at(), y = at(), z = at();
+        thing.positions.push_back({x, y, z});
+      }
+      return thing;
+    };
+    const Thing drops = onGrid(GeometryKind::Points, 20, run % 2 ? 0.25 : 0.0),
+                others = onGrid(GeometryKind::Points, 20, 0.0);
+    Thing line = onGrid(GeometryKind::Lines, 12, 0.25);  // some segments without length
+    for (std::uint32_t e = 0; e < 16; ++e) {
+      const auto p = static_cast<std::uint32_t>(random() % 12);
+      line.segments.push_back({p, static_cast<std::uint32_t>((p + 1 + random() % 11) % 12)});
+    }
+    for (const auto& [a, b] :
+         Pairs{{&drops, &line}, {&line, &drops}, {&drops, &others}, {&drops, &drops}})
+      for (PairSettings pair : settingsFor(0.5)) {
+        const Positions nowA = run % 4 < 2 ? a->positions : others.positions;
+        const Positions& now = nowA.size() == a->positions.size() ? nowA : a->positions;
+        const Rows truth(answer(settingsOf(Engine::BruteForce), *a, *b, pair, now, b->positions));
+        expectSameRows(Rows(answer(settingsOf(Engine::Octree), *a, *b, pair, now, b->positions)),
+                       truth);
+        const CollisionData data = answer(*a, *b, pair);
+        for (const auto& c : data.vertexTriangle()) {
+          EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);
+          EXPECT_EQ(c.barycentric.sum(), 1.0);
+          EXPECT_GE(c.barycentric.minCoeff(), 0.0);
+        }
+      }
+  }
+}
 
 TEST(Kinds, DegenerateLinesAnswerAsBruteForce) {
   Random random(6);
@@ -465,6 +497,48 @@ TEST(Kinds, DegenerateLinesAnswerAsBruteForce) {
 }
 
 // ---- Refused ----
+
+/// Docs/Pairs.md's matrix is what the code accepts.
+TEST(Kinds, DocumentSaysWhatIsAnswered) {
+  const Positions some{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  const std::pair<Method, std::string> methods[] = {{Method::Intersection, "Intersection"},
+                                                    {Method::Auto, "Auto"},
+                                                    {Method::Proximity, "Proximity"},
+                                                    {Method::Continuous, "Continuous"}};
+  const std::string names[] = {"triangles", "lines", "points"};
+  const Thing kinds[] = {{GeometryKind::Triangles, some, {{0, 1, 2}}, {}},
+                         {GeometryKind::Lines, some, {}, {{0, 1}}},
+                         {GeometryKind::Points, some, {}, {}}};
+  std::ifstream file(PALPATE_SOURCE_DIR "/Docs/Pairs.md");
+  const std::string document{std::istreambuf_iterator<char>(file), {}};
+  for (int a = 0; a < 3; ++a) {
+    std::string row = "| **" + names[a] + "** |";
+    for (int b = 0; b < 3; ++b) {
+      std::string cell;
+      int accepted = 0;
+      for (const auto& [method, name] : methods) {
+        int ways = 0;
+        for (const bool self : {false, true}) {
+          if (self && a != b) continue;
+          OctreeBasedCD detection;
+          const GeometryId first = kinds[a].addTo(detection), second = kinds[b].addTo(detection);
+          try {
+            detection.addCollisionPair(first, self ? first : second, {method, 1.0});
+            ++ways;
+          } catch (const Error& error) {
+            EXPECT_EQ(error.code(), ErrorCode::UnsupportedMethod);
+          }
+        }
+        EXPECT_TRUE(ways == 0 || ways == 1 + (a == b));
+        if (ways == 0) continue;
+        ++accepted;
+        cell += (cell.empty() ? "`" : ", `") + name + "`";
+      }
+      row += " " + (accepted == 4 ? "every method" : cell) + " |";
+    }
+    EXPECT_NE(document.find(row + "\n"), document.npos) << row;
+  }
+}
 
 template <class F>
 void expectRefused(ErrorCode code, const std::string& words, F&& call) {
@@ -511,12 +585,8 @@ TEST(Kinds, BadInputIsRefusedByName) {
                    mesh = collisions.addTriangleMesh(two, std::vector<Triangle>{{0, 1, 0}});
   EXPECT_EQ(line, GeometryId{0});  // nothing refused took an id
   const PairSettings near{Method::Proximity, 1.0};
-  for (const auto& [a, b] : std::vector<std::pair<GeometryId, GeometryId>>{
-           {points, points}, {points, line}, {line, points}})
-    expectRefused(Code::UnsupportedMethod, "cannot be tested against each other",
-                  [&] { collisions.addCollisionPair(a, b, near); });
   for (const Method method : {Method::Auto, Method::Intersection})
-    for (const GeometryId other : {mesh, line})
+    for (const GeometryId other : {mesh, line, points})
       expectRefused(Code::UnsupportedMethod, "a line mesh", [&] {
         collisions.addCollisionPair(line, other, {method, 1.0});
       });
@@ -537,13 +607,8 @@ TEST(Kinds, BadInputIsRefusedByName) {
                   [&] { collisions.addCollisionPair(line, line, rest); });
   }
   rest.restDistance = 1.0;
-  expectRefused(Code::InvalidSettings, "for a line mesh with itself",
+  expectRefused(Code::InvalidSettings, "for a triangle or line mesh with itself",
                 [&] { collisions.addCollisionPair(line, thick, rest); });
-  const GeometryId branching =
-      collisions.addLineMesh(Positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
-                             std::vector<Segment>{{0, 1}, {0, 2}, {0, 3}});
-  expectRefused(Code::InvalidSettings, "without branches",
-                [&] { collisions.addCollisionPair(branching, branching, rest); });
   EXPECT_TRUE(collisions.pairs().empty());
   collisions.addCollisionPair(thick, mesh, {Method::Proximity, 0.0});  // the radii are not 0
 }

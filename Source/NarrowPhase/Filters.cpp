@@ -1,0 +1,116 @@
+#include "NarrowPhase/Filters.h"
+
+#include "Math/ClosestPoint.h"
+
+#include <Eigen/Geometry>
+
+#include <cmath>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+
+/// Between unit vectors, in [0, pi]. The standard library's functions differ between processors.
+double angleBetween(const Vector3d& u, const Vector3d& v) {
+  const double y = (u - v).norm(), x = (u + v).norm();
+  double t = y / (x + std::sqrt(x * x + y * y));  // the tangent of a quarter
+  for (int i = 0; i < 3; ++i) t /= 1.0 + std::sqrt(1.0 + t * t);
+  double series = 0.0;
+  for (int k = 13; k > 0; k -= 2) series = 1.0 / k - t * t * series;
+  return 32.0 * t * series;
+}
+
+/// The surface around a feature at a time of the step.
+class Surface {
+ public:
+  Surface(const TriangleMesh& mesh, double time) : m_mesh(mesh), m_time(time) {}
+
+  /// Below a vertex where it is below the mean of the normals, weighted by the triangles' angles;
+  /// below an edge that bulges if it is below all its triangles, else if it is below any.
+  ///
+  /// Source   Bærentzen and Aanæs, Signed distance computation using the angle weighted pseudonormal,
+  ///          IEEE TVCG 11 (2005). Difference: an edge by its two planes, which is exact too where
+  ///          the direction is not that of a closest point.
+  bool isBelow(const MeshFeature& feature, const Vector3d& direction) const {
+    switch (feature.kind) {
+      case MeshFeature::Kind::Vertex: {
+        Vector3d sum = Vector3d::Zero();
+        for (const std::uint32_t t : m_mesh.topology.vertexTriangles[feature.id])
+          sum += angleAt(t, feature.id) * normalOf(t);
+        return direction.dot(sum) < 0.0;
+      }
+      case MeshFeature::Kind::Edge:
+        return isBelowEdge(feature.id, direction);
+      case MeshFeature::Kind::Face:
+        return direction.dot(normalOf(feature.id)) < 0.0;
+    }
+    return false;
+  }
+
+ private:
+  Vector3d at(std::uint32_t vertex) const {
+    return (1.0 - m_time) * m_mesh.before[vertex] + m_time * m_mesh.now[vertex];
+  }
+  /// Unit; zero of a triangle without area, which has no sides.
+  Vector3d normalOf(std::uint32_t triangle) const {
+    const auto& [i, j, k] = m_mesh.topology.triangles[triangle];
+    const Vector3d a = at(i);
+    return (at(j) - a).stableNormalized().cross((at(k) - a).stableNormalized()).stableNormalized();
+  }
+  double angleAt(std::uint32_t triangle, std::uint32_t vertex) const {
+    Triangle corners = m_mesh.topology.triangles[triangle];
+    while (corners[0] != vertex) corners = {corners[1], corners[2], corners[0]};
+    const Vector3d p = at(vertex);
+    return angleBetween((at(corners[1]) - p).stableNormalized(),
+                        (at(corners[2]) - p).stableNormalized());
+  }
+  bool isBelowEdge(std::uint32_t edge, const Vector3d& direction) const {
+    const auto triangles = m_mesh.topology.edgeTriangles[edge];
+    const auto isBelowFace = [&](std::uint32_t t) { return direction.dot(normalOf(t)) < 0.0; };
+    return bulges(edge) ? std::all_of(triangles.begin(), triangles.end(), isBelowFace)
+                        : std::any_of(triangles.begin(), triangles.end(), isBelowFace);
+  }
+  /// Whether of two triangles at an edge the second is below the first; also where there are not
+  /// two.
+  bool bulges(std::uint32_t edge) const {
+    const auto triangles = m_mesh.topology.edgeTriangles[edge];
+    if (triangles.size() != 2) return true;
+    const auto [p, q] = m_mesh.topology.edges[edge];
+    for (const std::uint32_t corner : m_mesh.topology.triangles[triangles[1]])
+      if (corner != p && corner != q) return (at(corner) - at(p)).dot(normalOf(triangles[0])) < 0.0;
+    return true;
+  }
+
+  const TriangleMesh& m_mesh;
+  double m_time;
+};
+
+}  // namespace
+
+bool refusesVertex(const MeshPair& pair, std::uint32_t vertex, std::uint32_t triangle,
+                   bool ofSecond) {
+  const TriangleMesh& mesh = ofSecond ? pair.a : pair.b;
+  if (areNearAtRest(pair, std::array{vertex}, mesh.topology.triangles[triangle])) return true;
+  if (!pair.predicate) return false;
+  using Kind = ContactFeatures::Kind;
+  const std::array<std::uint32_t, 2> v{vertex, vertex}, t{triangle, triangle};
+  const bool triangleFirst = ofSecond && !pair.self();
+  return !(*pair.predicate)(triangleFirst ? ContactFeatures{Kind::TriangleVertex, t, v}
+                                          : ContactFeatures{Kind::VertexTriangle, v, t});
+}
+
+bool refusesEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB) {
+  const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
+  return areNearAtRest(pair, p, q) ||
+         (pair.predicate && !(*pair.predicate)({ContactFeatures::Kind::EdgeEdge, p, q}));
+}
+
+bool pointsInward(const MeshPair& pair, const std::array<MeshFeature, 2>& features,
+                  const Vector3d& direction, double time) {
+  return (pair.a.outer && Surface(pair.a, time).isBelow(features[0], -direction)) ||
+         (pair.b.outer && Surface(pair.b, time).isBelow(features[1], direction));
+}
+
+}  // namespace palpate

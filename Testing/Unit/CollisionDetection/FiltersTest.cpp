@@ -1,0 +1,508 @@
+#include <palpate/Capture.h>
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/ContactRows.h"
+#include "Common/PairRun.h"
+#include "Common/RandomMeshes.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <string>
+#include <tuple>
+#include <vector>
+
+// Filters: groups, elements that are off, rest distance, predicates; each against brute force and
+// against a definition of its own here. SidednessTest.cpp has sides.
+
+namespace palpate::testing {
+namespace {
+
+using Eigen::Vector3d;
+using Positions = std::vector<Vector3d>;
+
+/// A pair of meshes, or one with itself, and what is filtered.
+struct Case {
+  Mesh a, b;
+  bool self = false;
+  Positions nowA, nowB;
+  PairSettings pair;
+  std::vector<std::uint32_t> disabledA{}, disabledB{};
+  ContactPredicate predicate{};
+};
+
+struct Answer {
+  Rows rows;
+  Validity validity;
+  std::vector<TrianglePair> candidates;
+};
+
+Answer answer(Settings settings, const Case& c) {
+  settings.keepCandidates = true;
+  OctreeBasedCD detection(settings);
+  const GeometryId a = detection.addTriangleMesh(c.a.positions, c.a.triangles),
+                   b = c.self ? a : detection.addTriangleMesh(c.b.positions, c.b.triangles);
+  detection.addCollisionPair(a, b, c.pair);
+  detection.setPositions(a, c.a.positions, c.nowA);
+  detection.setDisabledElements(a, c.disabledA);
+  if (!c.self) {
+    detection.setPositions(b, c.b.positions, c.nowB);
+    detection.setDisabledElements(b, c.disabledB);
+  }
+  detection.setContactPredicate(a, b, c.predicate);
+  detection.detectCollision();
+  const auto candidates = detection.candidatePairs(a, b);
+  return {Rows(detection.collisionData(a, b)),
+          detection.collisionData(a, b).validity(),
+          {candidates.begin(), candidates.end()}};
+}
+
+/// By brute force; octrees say the same.
+Answer truth(const Case& c) {
+  const Answer expected = answer(settingsOf(Engine::BruteForce), c);
+  for (const Settings& settings : octreeSettings()) {
+    const Answer found = answer(settings, c);
+    expectSameRows(found.rows, expected.rows);
+    EXPECT_EQ(found.validity.trusted, expected.validity.trusted);
+    EXPECT_EQ(found.validity.atImpact, expected.validity.atImpact);
+    for (const TrianglePair& pair : expected.candidates)
+      EXPECT_TRUE(std::binary_search(found.candidates.begin(), found.candidates.end(), pair));
+  }
+  return expected;
+}
+
+std::vector<PairSettings> everyMethod(double thickness) {
+  std::vector<PairSettings> all;
+  for (const MethodCase& method : methodCases(thickness)) all.push_back(method.settings);
+  for (const double tolerance : {0.0, 0.02, 1.0}) {
+    PairSettings automatic{Method::Auto, thickness, Contacts::Distinct};
+    automatic.tolerance = tolerance;
+    all.push_back(automatic);
+  }
+  return all;
+}
+
+Positions moved(Random& random, Positions positions, double most) {
+  for (Vector3d& p : positions) p += randomPoint(random, -most, most);
+  return positions;
+}
+
+Case sheetsInContact(Random& random, bool self) {
+  Case c;
+  c.a = sheet(7, 0.5, 0.0);
+  c.b = sheet(6, 0.53, 1.5);
+  if (self) {
+    for (const auto& [i, j, k] : c.b.triangles) {
+      const auto first = static_cast<std::uint32_t>(c.a.positions.size());
+      c.a.triangles.push_back({first + i, first + j, first + k});
+    }
+    c.a.positions.insert(c.a.positions.end(), c.b.positions.begin(), c.b.positions.end());
+  }
+  c.self = self;
+  c.nowA = moved(random, c.a.positions, 0.03);
+  c.nowB = moved(random, c.b.positions, 0.03);
+  return c;
+}
+
+// ---- Elements that are off ----
+
+std::vector<std::uint32_t> some(Random& random, std::size_t size) {
+  std::vector<std::uint32_t> ids;
+  for (std::uint32_t i = 0; i < size; ++i)
+    if (random() % 4 == 0) ids.push_back(i);
+  return ids;
+}
+
+/// Takes the triangles out; returns the old ids of those left.
+std::vector<std::uint32_t> takeOut(Mesh& mesh, const std::vector<std::uint32_t>& disabled) {
+  std::vector<std::uint32_t> kept;
+  std::vector<Triangle> triangles;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
+    if (!std::binary_search(disabled.begin(), disabled.end(), t)) {
+      kept.push_back(t);
+      triangles.push_back(mesh.triangles[t]);
+    }
+  mesh.triangles = triangles;
+  return kept;
+}
+
+TEST(Filters, WhatIsOffIsAsIfItWereNotThere) {
+  Random random(1);
+  std::size_t contacts = 0;
+  for (const bool self : {false, true})
+    for (const PairSettings& pair : everyMethod(0.04)) {
+      Case c = sheetsInContact(random, self);
+      c.pair = pair;
+      c.disabledA = some(random, c.a.triangles.size());
+      c.disabledB = some(random, c.b.triangles.size());
+      const Answer found = truth(c);
+      Case without = c;
+      without.disabledA = without.disabledB = {};
+      const auto keptA = takeOut(without.a, c.disabledA);
+      const auto keptB = self ? keptA : takeOut(without.b, c.disabledB);
+      Answer expected = answer(settingsOf(Engine::BruteForce), without);
+      for (Row& row : expected.rows.vertexTriangle) row[1] = keptB[row[1]];
+      for (Row& row : expected.rows.triangleVertex) row[0] = keptA[row[0]];
+      for (auto* pairs : {&expected.rows.intersectingTriangles, &expected.candidates})
+        for (TrianglePair& p : *pairs) p = {keptA[p.a], keptB[p.b]};
+      expectSameRows(found.rows, expected.rows);
+      EXPECT_EQ(found.candidates, expected.candidates);
+      EXPECT_EQ(found.validity.trusted, expected.validity.trusted);
+      contacts += found.rows.contacts();
+    }
+  EXPECT_GT(contacts, 500u);
+}
+
+TEST(Filters, SwitchingOffPassesVerticesAndEdgesOn) {
+  // Two triangles at an edge, and a point over a corner of both.
+  const Mesh roof{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {4, 4, 0}}, {{0, 1, 2}, {1, 3, 2}}};
+  OctreeBasedCD detection(settingsOf(Engine::Octree));
+  const GeometryId mesh = detection.addTriangleMesh(roof.positions, roof.triangles),
+                   probe = detection.addPointSet(Positions{{2, 2, 0.25}});
+  detection.addCollisionPair(probe, mesh, {Method::Proximity, 0.5});
+  const auto triangles = [&] {
+    detection.detectCollision();
+    std::vector<std::uint32_t> ids;
+    for (const auto& c : detection.collisionData(probe, mesh).vertexTriangle())
+      ids.push_back(c.triangle);
+    return ids;
+  };
+  using Ids = std::vector<std::uint32_t>;
+  EXPECT_EQ(triangles(), Ids{0});
+  detection.setDisabledElements(mesh, Ids{0});
+  EXPECT_EQ(triangles(), Ids{1});
+  EXPECT_EQ(detection.statistics().untestedVertices, 1u);
+  detection.setDisabledElements(mesh, Ids{0, 1});
+  EXPECT_EQ(triangles(), Ids{});
+  detection.setDisabledElements(mesh, {});
+  EXPECT_EQ(triangles(), Ids{0});
+  detection.setDisabledElements(probe, Ids{0});
+  EXPECT_EQ(triangles(), Ids{});
+}
+
+// ---- Predicates ----
+
+/// About two thirds.
+bool hashed(const ContactFeatures& f) {
+  return (f.a[0] * 7 + f.a[1] * 3 + f.b[0] * 5 + f.b[1] * 11 + static_cast<unsigned>(f.kind)) % 3;
+}
+
+TEST(Filters, PredicateLeavesOutWhatItRefuses) {
+  Random random(2);
+  std::size_t left = 0, out = 0;
+  for (const bool self : {false, true})
+    for (const PairSettings& pair : everyMethod(0.04)) {
+      Case c = sheetsInContact(random, self);
+      c.pair = pair;
+      const Answer all = answer(settingsOf(Engine::Octree), c);
+      c.predicate = hashed;
+      const Answer found = truth(c);
+      EXPECT_TRUE(all.validity.trusted || !found.validity.trusted);
+      EXPECT_EQ(found.rows.intersectingTriangles, all.rows.intersectingTriangles);
+      EXPECT_GE(found.rows.earliestTimeOfImpact, all.rows.earliestTimeOfImpact);
+      using Kind = ContactFeatures::Kind;
+      const auto id = [](const Row& row, int i) { return static_cast<std::uint32_t>(row[i]); };
+      const auto kept = [&](Kind kind) {
+        return [=](const Row& r) {
+          return kind == Kind::EdgeEdge
+                     ? hashed({kind, {id(r, 0), id(r, 1)}, {id(r, 2), id(r, 3)}})
+                     : hashed({kind, {id(r, 0), id(r, 0)}, {id(r, 1), id(r, 1)}});
+        };
+      };
+      for (const auto& [list, kind] : {std::tuple(&Rows::vertexTriangle, Kind::VertexTriangle),
+                                       std::tuple(&Rows::triangleVertex, Kind::TriangleVertex),
+                                       std::tuple(&Rows::edgeEdge, Kind::EdgeEdge)}) {
+        const auto& rows = found.rows.*list;
+        EXPECT_TRUE(std::all_of(rows.begin(), rows.end(), kept(kind)));
+        if (pair.contacts != Contacts::All || pair.method == Method::Auto) continue;
+        std::vector<Row> expected;  // nothing hides anything
+        std::copy_if((all.rows.*list).begin(), (all.rows.*list).end(), std::back_inserter(expected),
+                     kept(kind));
+        EXPECT_EQ(firstDifference(rows, expected), "");
+        left += rows.size();
+        out += (all.rows.*list).size() - rows.size();
+      }
+    }
+  EXPECT_GT(left, 200u);
+  EXPECT_GT(out, 100u);
+}
+
+TEST(Filters, WhatIsRefusedHidesNothing) {
+  const Mesh roof{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {4, 4, 0}}, {{0, 1, 2}, {1, 3, 2}}};
+  OctreeBasedCD detection(settingsOf(Engine::Octree));
+  const GeometryId mesh = detection.addTriangleMesh(roof.positions, roof.triangles),
+                   probe = detection.addPointSet(Positions{{2, 2, 0.25}});
+  detection.addCollisionPair(mesh, probe, {Method::Proximity, 0.5});
+  std::atomic<int> asked = 0;
+  detection.setContactPredicate(mesh, probe, [&](const ContactFeatures& f) {
+    ++asked;
+    EXPECT_EQ(f.kind, ContactFeatures::Kind::TriangleVertex);
+    return f.a[0] != 0;
+  });
+  detection.detectCollision();
+  ASSERT_EQ(detection.collisionData(mesh, probe).triangleVertex().size(), 1u);
+  EXPECT_EQ(detection.collisionData(mesh, probe).triangleVertex()[0].triangle, 1u);
+  EXPECT_GT(asked, 0);
+  asked = 0;
+  detection.setPositions(probe, Positions{{2, 2, 0.75}});
+  detection.detectCollision();
+  EXPECT_EQ(asked, 0);  // only what is near enough
+  detection.setPositions(probe, Positions{{2, 2, 0.25}});
+  detection.setContactPredicate(mesh, probe, {});
+  detection.detectCollision();
+  EXPECT_EQ(detection.collisionData(mesh, probe).triangleVertex()[0].triangle, 0u);
+}
+
+// ---- Rest distance ----
+
+/// Along the edges, between all vertices.
+std::vector<std::vector<double>> restDistances(const Mesh& mesh) {
+  const std::size_t n = mesh.positions.size();
+  std::vector<std::vector<double>> d(n, std::vector<double>(n, 1e300));
+  for (std::size_t v = 0; v < n; ++v) d[v][v] = 0;
+  for (const auto& [i, j, k] : mesh.triangles)
+    for (const auto& [p, q] : {Segment{i, j}, Segment{j, k}, Segment{k, i}})
+      d[p][q] = d[q][p] = (mesh.positions[p] - mesh.positions[q]).norm();
+  for (std::size_t m = 0; m < n; ++m)
+    for (std::size_t p = 0; p < n; ++p)
+      for (std::size_t q = 0; q < n; ++q) d[p][q] = std::min(d[p][q], d[p][m] + d[m][q]);
+  return d;
+}
+
+TEST(Filters, RestDistanceLeavesOutWhatIsNearAlongTheSurface) {
+  Random random(3);
+  std::size_t left = 0, out = 0;
+  for (const PairSettings& pair : everyMethod(0.15)) {
+    Case c = sheetsInContact(random, true);
+    for (Vector3d& p : c.nowA) p[0] = 0.5 * p[0] + 0.2 * p[1] * p[1];  // crumpled
+    c.pair = pair;
+    const Answer all = answer(settingsOf(Engine::Octree), c);
+    const double restDistance = c.pair.restDistance = 0.31;
+    const Answer found = truth(c);
+    EXPECT_TRUE(all.validity.trusted || !found.validity.trusted);
+    const auto d = restDistances(c.a);
+    const auto isFar = [&](const std::vector<std::uint64_t>& p,
+                           const std::vector<std::uint64_t>& q) {
+      for (const std::uint64_t v : p)
+        for (const std::uint64_t w : q)
+          if (d[v][w] < restDistance) return false;
+      return true;
+    };
+    const auto vertexIsFar = [&](const Row& r) { return isFar({r[0]}, {r[2], r[3], r[4]}); };
+    const auto edgesAreFar = [&](const Row& r) { return isFar({r[0], r[1]}, {r[2], r[3]}); };
+    const auto compare = [&](const auto& rows, const auto& unfiltered, const auto& keep) {
+      EXPECT_TRUE(std::all_of(rows.begin(), rows.end(), keep));
+      if (pair.contacts != Contacts::All || pair.method == Method::Auto) return;
+      std::vector<Row> expected;
+      std::copy_if(unfiltered.begin(), unfiltered.end(), std::back_inserter(expected), keep);
+      // Intersection's contacts are of whole triangle pairs: fewer.
+      if (pair.method == Method::Intersection)
+        EXPECT_TRUE(std::includes(expected.begin(), expected.end(), rows.begin(), rows.end()));
+      else
+        EXPECT_EQ(firstDifference(rows, expected), "");
+      left += rows.size();
+      out += unfiltered.size() - rows.size();
+    };
+    compare(found.rows.vertexTriangle, all.rows.vertexTriangle, vertexIsFar);
+    compare(found.rows.edgeEdge, all.rows.edgeEdge, edgesAreFar);
+    std::vector<TrianglePair> expected;
+    for (const TrianglePair& p : all.rows.intersectingTriangles) {
+      const auto &s = c.a.triangles[p.a], &t = c.a.triangles[p.b];
+      if (isFar({s[0], s[1], s[2]}, {t[0], t[1], t[2]})) expected.push_back(p);
+    }
+    EXPECT_EQ(found.rows.intersectingTriangles, expected);
+  }
+  EXPECT_GT(left, 200u);
+  EXPECT_GT(out, 200u);
+}
+
+TEST(Filters, RestIsTheShapeOfTheTopology) {
+  const Positions flat{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 2, 0}, {1, 2, 0}};
+  const std::vector<Triangle> strip{{0, 1, 2}, {1, 3, 2}, {2, 3, 4}, {3, 5, 4}};
+  Positions folded = flat;  // the far end over the near one
+  folded[4] = {0, 0.25, 0.25};
+  folded[5] = {1, 0.25, 0.25};
+  OctreeBasedCD detection(settingsOf(Engine::Octree));
+  const GeometryId mesh = detection.addTriangleMesh(flat, strip);
+  PairSettings pair{Method::Proximity, 0.5, Contacts::All};
+  const auto contacts = [&] {
+    detection.detectCollision();
+    return detection.statistics().contacts;
+  };
+  detection.addCollisionPair(mesh, mesh, pair);
+  detection.setPositions(mesh, folded);
+  const std::size_t all = contacts();
+  EXPECT_GT(all, 0u);
+  pair.restDistance = 1.5;
+  detection.setPairSettings(mesh, mesh, pair);
+  EXPECT_LT(contacts(), all);
+  EXPECT_GT(contacts(), 0u);  // 0-1 against 4-5 are two apart
+  pair.restDistance = 2.5;
+  detection.setPairSettings(mesh, mesh, pair);
+  EXPECT_EQ(contacts(), 0u);
+  detection.setTriangles(mesh, folded, strip);  // two sides are 1.06 apart, along the surface 2
+  EXPECT_EQ(contacts(), 0u);
+  pair.restDistance = 0.5;
+  detection.setPairSettings(mesh, mesh, pair);
+  EXPECT_EQ(contacts(), all);
+}
+
+// ---- Groups ----
+
+TEST(Filters, GroupsAndMasksChooseThePairs) {
+  Random random(4);
+  const Case c = sheetsInContact(random, false);
+  for (const Settings& settings :
+       {settingsOf(Engine::Octree), settingsOf(Engine::Octree, 2), settingsOf(Engine::BruteForce)})
+    for (const PairSettings& pair : everyMethod(0.04)) {
+      PairRun run(settings, c.a, c.b, pair, false);
+      OctreeBasedCD& detection = run.detection();
+      const auto detect = [&] {
+        run.step(c.a.positions, c.nowA, c.b.positions, c.nowB);
+        return Rows(run.data());
+      };
+      const Rows all = detect();
+      EXPECT_TRUE(all.anything());
+      // An asked for by b's mask, not the other way round; then neither; then both.
+      detection.setCollisionFilter(run.a(), {2, 1});
+      detection.setCollisionFilter(run.b(), {4, 6});
+      EXPECT_EQ(detect(), Rows());
+      EXPECT_FALSE(run.data().validity().trusted);
+      detection.setCollisionFilter(run.b(), {4, 0});
+      EXPECT_EQ(detect(), Rows());
+      detection.collectCandidates();
+      EXPECT_TRUE(detection.candidatePairs(run.a(), run.b()).empty());
+      std::size_t candidates = 0;
+      detection.forEachCandidate(run.a(), run.b(),
+                                 [&](std::span<const TrianglePair> p) { candidates += p.size(); });
+      EXPECT_EQ(candidates, 0u);
+      detection.setCollisionFilter(run.a(), {2, 4});
+      detection.setCollisionFilter(run.b(), {4, 2});
+      expectSameRows(detect(), all);
+    }
+}
+
+// ---- From frame to frame, files, errors ----
+
+/// Whatever was filtered before, a frame says what a new engine would say.
+TEST(Filters, OnlyTheLastFiltersCount) {
+  Random random(5);
+  for (const bool self : {false, true})
+    for (const PairSettings& pair : everyMethod(0.04)) {
+      Case c = sheetsInContact(random, self);
+      OctreeBasedCD detection(settingsOf(Engine::Octree, 2));
+      const GeometryId a = detection.addTriangleMesh(c.a.positions, c.a.triangles),
+                       b = self ? a : detection.addTriangleMesh(c.b.positions, c.b.triangles);
+      detection.addCollisionPair(a, b, pair);
+      for (int frame = 0; frame < 8; ++frame) {
+        c.pair = pair;
+        c.pair.restDistance = self && random() % 2 ? 0.2 : 0.0;
+        c.disabledA =
+            random() % 2 ? some(random, c.a.triangles.size()) : std::vector<std::uint32_t>{};
+        c.predicate = random() % 2 ? ContactPredicate(hashed) : ContactPredicate();
+        detection.setPairSettings(a, b, c.pair);
+        detection.setDisabledElements(a, c.disabledA);
+        detection.setContactPredicate(a, b, c.predicate);
+        if (frame == 0 || random() % 2) {
+          detection.setPositions(a, c.a.positions, c.nowA);
+          if (!self) detection.setPositions(b, c.b.positions, c.nowB);
+        }
+        detection.detectCollision();
+        SCOPED_TRACE("frame " + std::to_string(frame));
+        expectSameRows(Rows(detection.collisionData(a, b)),
+                       answer(settingsOf(Engine::BruteForce), c).rows);
+      }
+    }
+}
+
+TEST(Filters, CapturesAndTheAuditHoldThem) {
+  Random random(6);
+  const auto path = std::filesystem::temp_directory_path() / "palpate-filters.capture";
+  Settings audited = settingsOf(Engine::Octree);
+  audited.audit.features = 1000000;
+  for (const PairSettings& pair : everyMethod(0.04)) {
+    Case c = sheetsInContact(random, true);
+    OctreeBasedCD detection(audited);
+    const GeometryId a = detection.addTriangleMesh(c.a.positions, c.a.triangles),
+                     b = detection.addTriangleMesh(c.b.positions, c.b.triangles),
+                     ball = detection.addTriangleMesh(sphere(6, 8, {0.5, 0.5, 0.5}, 0.2).positions,
+                                                      sphere(6, 8, {0.5, 0.5, 0.5}, 0.2).triangles);
+    PairSettings self = pair;
+    self.restDistance = 0.3;
+    detection.addCollisionPair(a, a, self);
+    detection.addCollisionPair(b, a, pair);
+    detection.addCollisionPair(ball, b, pair);
+    detection.setCollisionFilter(ball, {3, 5, Sidedness::Outer});
+    detection.setPositions(a, c.a.positions, c.nowA);
+    detection.setPositions(b, c.b.positions, c.nowB);
+    detection.setDisabledElements(b, some(random, c.b.triangles.size()));
+    detection.detectCollision();
+    EXPECT_TRUE(detection.auditFailures().empty());
+    capture(detection, path);
+    OctreeBasedCD again = setUp(readCapture(path));
+    again.detectCollision();
+    for (const CollisionPair& p : detection.pairs())
+      expectSameRows(Rows(again.collisionData(p.a, p.b)), Rows(detection.collisionData(p.a, p.b)));
+    EXPECT_GT(detection.statistics().contacts + detection.statistics().intersectingTriangles +
+                  (pair.contacts == Contacts::Earliest),
+              0u);
+    // A predicate is not in the file, but said; the audit asks it.
+    detection.setContactPredicate(b, a, hashed);
+    detection.detectCollision();
+    EXPECT_TRUE(detection.auditFailures().empty());
+    capture(detection, path);
+    const CollisionProblem problem = readCapture(path);
+    EXPECT_TRUE(problem.pairs[1].predicate && !problem.pairs[0].predicate);
+    EXPECT_EQ(problem.geometries[2].filter, (CollisionFilter{3, 5, Sidedness::Outer}));
+    EXPECT_FALSE(problem.geometries[1].disabled.empty());
+  }
+  std::filesystem::remove(path);
+}
+
+TEST(Filters, BadInputIsRefusedByName) {
+  const Mesh one{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+  OctreeBasedCD detection(settingsOf(Engine::Octree));
+  const GeometryId mesh = detection.addTriangleMesh(one.positions, one.triangles),
+                   line = detection.addLineMesh(one.positions, std::vector<Segment>{{0, 1}});
+  const auto expectRefused = [](ErrorCode code, const std::string& words, auto&& call) {
+    try {
+      call();
+      ADD_FAILURE() << "accepted; expected: " << words;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), code);
+      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+    }
+  };
+  const std::vector<std::uint32_t> beyond{0, 1};
+  expectRefused(ErrorCode::IndexOutOfRange, "geometry 0: element 1 is out of range; it has 1",
+                [&] { detection.setDisabledElements(mesh, beyond); });
+  expectRefused(ErrorCode::InvalidSettings, "geometry 1 is a line mesh, which has no sides", [&] {
+    detection.setCollisionFilter(line, {1, 1, Sidedness::Outer});
+  });
+  expectRefused(ErrorCode::InvalidSettings, "sidedness must be Both or Outer", [&] {
+    detection.setCollisionFilter(mesh, {1, 1, static_cast<Sidedness>(7)});
+  });
+  expectRefused(ErrorCode::UnknownGeometry, "geometry 9 was never added",
+                [&] { detection.setCollisionFilter(GeometryId{9}, {}); });
+  expectRefused(ErrorCode::UnknownPair, "was never added",
+                [&] { detection.setContactPredicate(mesh, line, {}); });
+  detection.addCollisionPair(mesh, line, {Method::Proximity, 0.1});
+  detection.detectCollision();
+  const std::uint64_t before = detection.collisionData(mesh, line).hash();
+  EXPECT_GT(detection.statistics().contacts, 0u);
+  expectRefused(ErrorCode::UnknownPair, "results are in that order",
+                [&] { detection.setContactPredicate(line, mesh, {}); });
+  PairSettings rest{Method::Proximity, 0.1};
+  rest.restDistance = 1.0;
+  expectRefused(ErrorCode::InvalidSettings, "for a triangle or line mesh with itself",
+                [&] { detection.setPairSettings(mesh, line, rest); });
+  detection.detectCollision();
+  EXPECT_EQ(detection.collisionData(mesh, line).hash(), before);  // nothing changed
+}
+
+}  // namespace
+}  // namespace palpate::testing

@@ -1,0 +1,264 @@
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/ContactRows.h"
+#include "Common/PairRun.h"
+#include "Common/RandomMeshes.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <set>
+#include <span>
+#include <vector>
+
+// Sidedness::Outer against the exact winding number of findInsideVertices(): a contact points
+// inward where a little way along its direction is inside the body.
+
+namespace palpate::testing {
+namespace {
+
+using Eigen::Vector3d;
+using Positions = std::vector<Vector3d>;
+
+/// Closed, with spikes and pits: sharp edges and corners of either sense.
+Mesh burr(Random& random) {
+  Mesh body = sphere(7, 10, {0, 0, 0}, 1);
+  for (Vector3d& p : body.positions) p *= uniform(random, 0.35, 1.0);
+  return body;
+}
+
+/// Which of the places are inside the body.
+std::vector<bool> areInside(const Mesh& body, const Positions& places) {
+  OctreeBasedCD detection(settingsOf(Engine::Octree));
+  const GeometryId probes = detection.addPointSet(places),
+                   id = detection.addTriangleMesh(body.positions, body.triangles);
+  std::vector<bool> inside(places.size());
+  for (const InsideVertex& v : detection.findInsideVertices(probes, id)) inside[v.vertex] = true;
+  return inside;
+}
+
+Vector3d normalOf(const Mesh& mesh, std::uint32_t t) {
+  const auto& [a, b, c] = mesh.triangles[t];
+  return (mesh.positions[b] - mesh.positions[a])
+      .cross(mesh.positions[c] - mesh.positions[a])
+      .normalized();
+}
+
+/// Whether a direction lies so near to the plane of a triangle there that a probe cannot tell.
+bool isAlongSurface(const Mesh& body, const std::set<std::uint32_t>& vertices, const Vector3d& d) {
+  for (std::uint32_t t = 0; t < body.triangles.size(); ++t) {
+    const auto& corners = body.triangles[t];
+    std::size_t held = 0;
+    for (const std::uint32_t v : corners) held += vertices.contains(v);
+    if (held == vertices.size() && std::abs(normalOf(body, t).dot(d)) < 1e-3) return true;
+  }
+  return false;
+}
+
+/// What a contact says of the body: where, in which direction, and by which of its vertices.
+struct Touch {
+  Row row;
+  Vector3d place, direction;
+  std::set<std::uint32_t> vertices;
+};
+
+Touch touchOf(const VertexTriangleContact& c, const Mesh& body) {
+  Touch touch{rowOf<true>(c), Vector3d::Zero(), c.normal, {}};
+  for (int i = 0; i < 3; ++i) {
+    touch.place += c.barycentric[i] * body.positions[c.corners[i]];
+    if (c.barycentric[i] > 0) touch.vertices.insert(c.corners[i]);
+  }
+  return touch;
+}
+
+Touch touchOf(const EdgeEdgeContact& c, const Mesh& body) {
+  const auto& [p, q] = c.edgeA;
+  Touch touch{
+      rowOf(c), (1 - c.weightA) * body.positions[p] + c.weightA * body.positions[q], -c.normal, {}};
+  if (c.weightA < 1) touch.vertices.insert(p);
+  if (c.weightA > 0) touch.vertices.insert(q);
+  return touch;
+}
+
+/// Rows that point outward, as far as a probe tells; those that it cannot tell are as `found` says.
+std::vector<Row> outward(const Mesh& body, const std::vector<Touch>& touches, bool corners,
+                         const std::vector<Row>& found, std::size_t& told) {
+  Positions probes;
+  for (const Touch& t : touches) probes.push_back(t.place + 1e-7 * t.direction);
+  const std::vector<bool> inside = areInside(body, probes);
+  std::vector<Row> rows;
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    const Touch& t = touches[i];
+    const bool known =
+        (corners || t.vertices.size() > 1) && !isAlongSurface(body, t.vertices, t.direction);
+    told += known;
+    if (known ? !inside[i] : std::find(found.begin(), found.end(), t.row) != found.end())
+      rows.push_back(t.row);
+  }
+  return rows;
+}
+
+struct Tool {
+  Positions before, now;
+  std::vector<Segment> segments;  ///< none: points
+};
+
+CollisionData answer(const Settings& settings, const Mesh& body, const Tool& tool,
+                     const PairSettings& pair, Sidedness sidedness) {
+  OctreeBasedCD detection(settings);
+  const GeometryId id = detection.addTriangleMesh(body.positions, body.triangles),
+                   other = tool.segments.empty()
+                               ? detection.addPointSet(tool.before)
+                               : detection.addLineMesh(tool.before, tool.segments);
+  detection.addCollisionPair(id, other, pair);
+  detection.setCollisionFilter(id, {1, 1, sidedness});
+  detection.setPositions(other, tool.before, tool.now);
+  detection.detectCollision();
+  return detection.collisionData(id, other);
+}
+
+/// corners: whether what a corner holds is near enough for its cone to be known by the definition.
+void expectOutward(const Mesh& body, const Tool& tool, const PairSettings& pair, bool corners,
+                   std::size_t& told) {
+  const CollisionData all =
+      answer(settingsOf(Engine::BruteForce), body, tool, pair, Sidedness::Both);
+  const Rows truth(answer(settingsOf(Engine::BruteForce), body, tool, pair, Sidedness::Outer));
+  std::vector<Touch> faces, edges;
+  for (const auto& c : all.triangleVertex()) faces.push_back(touchOf(c, body));
+  for (const auto& c : all.edgeEdge()) edges.push_back(touchOf(c, body));
+  EXPECT_EQ(firstDifference(truth.triangleVertex,
+                            outward(body, faces, corners, truth.triangleVertex, told)),
+            "");
+  EXPECT_EQ(firstDifference(truth.edgeEdge, outward(body, edges, false, truth.edgeEdge, told)), "");
+  for (const Settings& settings : octreeSettings())
+    expectSameRows(Rows(answer(settings, body, tool, pair, Sidedness::Outer)), truth);
+}
+
+Tool toolOf(Random& random, std::uint32_t size, double step, bool lines) {
+  Tool tool;
+  for (std::uint32_t i = 0; i < size; ++i) {
+    tool.before.push_back(randomPoint(random, -1, 1));
+    tool.now.push_back(tool.before.back() + randomPoint(random, -step, step));
+    if (lines && i % 2) tool.segments.push_back({i - 1, i});
+  }
+  return tool;
+}
+
+TEST(Sidedness, OuterIsWhatIsOutside) {
+  Random random(1);
+  std::size_t told = 0;
+  for (int run = 0; run < 12; ++run) {
+    const Mesh body = burr(random);
+    for (const bool lines : {false, true}) {
+      const Tool still = toolOf(random, 150, 0.0, lines), moving = toolOf(random, 60, 0.4, lines);
+      expectOutward(body, still, {Method::Proximity, 0.1, Contacts::Distinct}, true, told);
+      expectOutward(body, still, {Method::Proximity, 0.1, Contacts::All}, false, told);
+      expectOutward(body, moving, {Method::Continuous, 0.0, Contacts::All}, false, told);
+      expectOutward(body, moving, {Method::Continuous, 0.02, Contacts::All}, false, told);
+    }
+  }
+  EXPECT_GT(told, 3000u);
+}
+
+/// Ids of every contact.
+std::set<Row> idsOf(const Rows& rows) {
+  std::set<Row> ids;
+  for (const Row& r : rows.vertexTriangle) ids.insert({0, r[0], r[1]});
+  for (const Row& r : rows.triangleVertex) ids.insert({1, r[0], r[1]});
+  for (const Row& r : rows.edgeEdge) ids.insert({2, r[0], r[1], r[2], r[3]});
+  return ids;
+}
+
+TEST(Sidedness, EveryMethodAnswersAsBruteForce) {
+  Random random(2);
+  for (int run = 0; run < 6; ++run) {
+    const Mesh a = burr(random);
+    Mesh b = burr(random);
+    for (Vector3d& p : b.positions) p += Vector3d(0.9, 0.2, 0.1);
+    Positions nowA = a.positions, nowB = b.positions;
+    for (Vector3d& p : nowA) p += randomPoint(random, -0.05, 0.15);
+    for (Vector3d& p : nowB) p += randomPoint(random, -0.15, 0.05);
+    const auto detect = [&](const Settings& settings, const PairSettings& pair, bool outer) {
+      PairRun run(settings, a, b, pair);
+      if (outer) run.detection().setCollisionFilter(run.a(), {1, 1, Sidedness::Outer});
+      if (outer) run.detection().setCollisionFilter(run.b(), {1, 1, Sidedness::Outer});
+      run.step(a.positions, nowA, b.positions, nowB);
+      return std::pair(run.answers(), run.data().validity().trusted);
+    };
+    std::vector<PairSettings> methods;
+    for (const MethodCase& method : methodCases(0.05)) methods.push_back(method.settings);
+    for (const double tolerance : {0.0, 0.05, 1.0}) {
+      methods.push_back({Method::Auto, 0.05, Contacts::All});
+      methods.back().tolerance = tolerance;
+    }
+    std::set<Row> impacts;
+    for (const PairSettings& pair : methods) {
+      const auto [truth, trusted] = detect(settingsOf(Engine::BruteForce), pair, true);
+      for (const Settings& settings : octreeSettings())
+        expectSame(detect(settings, pair, true).first, truth);
+      const auto [all, allTrusted] = detect(settingsOf(Engine::Octree), pair, false);
+      EXPECT_TRUE(allTrusted || !trusted);
+      if (pair.method == Method::Intersection) expectSame(truth, all);
+      const std::set<Row> ids = idsOf(truth[0]);
+      if (pair.method == Method::Continuous && pair.thickness > 0) impacts = ids;
+      if (pair.method != Method::Auto && pair.contacts == Contacts::All) {
+        const std::set<Row> ofAll = idsOf(all[0]);
+        EXPECT_TRUE(std::includes(ofAll.begin(), ofAll.end(), ids.begin(), ids.end()));
+      }
+      // Automatic: nothing that comes from outside is missing.
+      if (pair.method == Method::Auto)
+        EXPECT_TRUE(std::includes(ids.begin(), ids.end(), impacts.begin(), impacts.end()));
+    }
+    EXPECT_GT(impacts.size(), 5u);
+  }
+}
+
+TEST(Sidedness, ThinOrganIsTouchedFromOneSide) {
+  // A slab 0.1 thick, closed; a probe 0.05 over it, and one under it. Thickness 1.
+  const Mesh slab{{{-4, -4, 0},
+                   {4, -4, 0},
+                   {4, 4, 0},
+                   {-4, 4, 0},
+                   {-4, -4, 0.1},
+                   {4, -4, 0.1},
+                   {4, 4, 0.1},
+                   {-4, 4, 0.1}},
+                  {{0, 2, 1},
+                   {0, 3, 2},
+                   {4, 5, 6},
+                   {4, 6, 7},
+                   {0, 1, 5},
+                   {0, 5, 4},
+                   {1, 2, 6},
+                   {1, 6, 5},
+                   {2, 3, 7},
+                   {2, 7, 6},
+                   {3, 0, 4},
+                   {3, 4, 7}}};
+  ASSERT_TRUE(findMeshDefects(slab.triangles).closed());
+  const auto triangles = [&](const Vector3d& probe, Sidedness sidedness, Contacts contacts) {
+    std::set<std::uint32_t> ids;
+    const CollisionData data = answer(settingsOf(Engine::Octree), slab, {{probe}, {probe}, {}},
+                                      {Method::Proximity, 1.0, contacts}, sidedness);
+    for (const auto& c : data.triangleVertex()) ids.insert(c.triangle);
+    return ids;
+  };
+  using Ids = std::set<std::uint32_t>;
+  for (const Contacts contacts : {Contacts::Distinct, Contacts::All}) {
+    const Ids above = triangles({1, 0.5, 0.15}, Sidedness::Outer, contacts),
+              below = triangles({1, 0.5, -0.05}, Sidedness::Outer, contacts);
+    EXPECT_TRUE(!above.empty() && *above.begin() >= 2 && *above.rbegin() <= 3);
+    EXPECT_TRUE(!below.empty() && *below.rbegin() <= 1);
+    // Off the sharp corner, where no face looks straight at it.
+    EXPECT_FALSE(triangles({4.3, 4.3, 0.3}, Sidedness::Outer, contacts).empty());
+    // Touching points nowhere.
+    EXPECT_FALSE(triangles({1, 0.5, 0.1}, Sidedness::Outer, contacts).empty());
+  }
+  EXPECT_GT(triangles({1, 0.5, 0.15}, Sidedness::Both, Contacts::All).size(), 2u);
+}
+
+}  // namespace
+}  // namespace palpate::testing
