@@ -20,9 +20,9 @@ namespace {
 constexpr std::size_t kSmall = 16384;
 /// Refitting fewer triangles in all, cores take longer to hand over data than to compute it.
 constexpr std::size_t kSmallRefit = 24576;
-constexpr std::size_t kVertexGrain = 4096, kCopyGrain = 16384;
+constexpr std::size_t kGrain = 1024, kMotionGrain = 4096, kCopyGrain = 16384;
 constexpr std::size_t kTrianglesPerGroup = 1024;  ///< for bounds, before there are nodes
-constexpr std::size_t kGroupGrain = 256;
+constexpr std::size_t kGroupGrain = 128;
 /// A refitted tree is rebuilt when its leaves have become this much larger in relation to their
 /// triangles.
 constexpr double kMostLoosening = 1.5;
@@ -102,10 +102,9 @@ void checkPositionCount(const Geometry& geometry, std::size_t count) {
 void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
                    Buffer<FloatPoint>& floats, const Threads& threads) {
   floats.resize(positions.size());
-  threads.forChunks(positions.size(), kVertexGrain,
-                    [&](std::size_t, std::size_t from, std::size_t to) {
-                      toFloats(positions.subspan(from, to - from), frame, floats.data() + from);
-                    });
+  threads.forChunks(positions.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+    toFloats(positions.subspan(from, to - from), frame, floats.data() + from);
+  });
 }
 
 /// Boxes in the order of orderedTriangles, and those of the groups.
@@ -126,7 +125,7 @@ FloatBox boundsOf(Geometry& geometry, const Threads& threads) {
   for (std::size_t i = 0; i <= count; ++i)
     geometry.boundsGroups[i] = static_cast<std::uint32_t>(std::min(i * kTrianglesPerGroup, size));
   geometry.boundsBoxes.resize(count);
-  computeBoxes(geometry, geometry.boundsGroups, geometry.boundsBoxes.data(), 8, threads);
+  computeBoxes(geometry, geometry.boundsGroups, geometry.boundsBoxes.data(), 2, threads);
   FloatBox bounds;
   for (const FloatBox& box : geometry.boundsBoxes) bounds.add(box);
   return bounds;
@@ -147,20 +146,20 @@ void rebuild(Geometry& geometry, const OctreeSettings& settings, const Threads& 
   // Triangles in the old order are of no use any more: their memory is the keys'.
   auto* keys = reinterpret_cast<std::uint64_t*>(geometry.orderedTriangles.data());
   octree.build(bounds, geometry.spread * geometry.frame.scale, settings, keys, threads);
-  threads.forChunks(triangles.size(), kVertexGrain,
-                    [&](std::size_t, std::size_t from, std::size_t to) {
-                      for (std::size_t i = from; i < to; ++i)
-                        geometry.orderedTriangles[i] = triangles[octree.order()[i]];
-                    });
+  threads.forChunks(triangles.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i)
+      geometry.orderedTriangles[i] = triangles[octree.order()[i]];
+  });
   geometry.octreeMilliseconds += watch.lap();
 }
 
-void fitBoxes(Geometry& geometry, const Threads& threads) {
+void fitBoxes(Geometry& geometry, const OctreeSettings& settings, const Threads& threads) {
   Stopwatch watch;
   computeBoxes(geometry, geometry.octree.groups(), geometry.octree.groupBoxes(), kGroupGrain,
                threads);
   geometry.boxMilliseconds += watch.lap();
   geometry.octree.fit(threads);
+  if (settings.update == OctreeUpdate::Auto) geometry.octree.measureLooseness();
   geometry.octreeMilliseconds += watch.lap();
 }
 
@@ -179,13 +178,13 @@ void updateOctree(Geometry& geometry, const OctreeSettings& settings, const Thre
     computeFloats(geometry.mesh.before, geometry.frame, geometry.floatsBefore, threads);
   geometry.boxMilliseconds += watch.lap();
   if (geometry.treeKnown && settings.update == OctreeUpdate::Auto) {
-    fitBoxes(geometry, threads);
+    fitBoxes(geometry, settings, threads);
     geometry.lastUpdate = Update::Refitted;
     if (geometry.octree.looseness() <= kMostLoosening * geometry.octree.loosenessWhenBuilt())
       return;
   }
   rebuild(geometry, settings, threads);
-  fitBoxes(geometry, threads);
+  fitBoxes(geometry, settings, threads);
   geometry.lastUpdate = Update::Rebuilt;
 }
 
@@ -203,9 +202,9 @@ double smallestHeight(const TriangleMesh& mesh) {
 /// A large mesh by parts, whose union does not depend on threads.
 MotionRange motionOf(std::span<const Eigen::Vector3d> before, std::span<const Eigen::Vector3d> now,
                      Buffer<MotionRange>& parts, const Threads& threads) {
-  parts.resize((now.size() + kVertexGrain - 1) / kVertexGrain);
+  parts.resize((now.size() + kMotionGrain - 1) / kMotionGrain);
   threads.forChunks(
-      now.size(), kVertexGrain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
+      now.size(), kMotionGrain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
         parts[chunk] = motionRange(before.subspan(from, to - from), now.subspan(from, to - from));
       });
   MotionRange all;

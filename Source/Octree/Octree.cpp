@@ -15,6 +15,9 @@ namespace {
 /// Below this, one thread is faster than handing out work.
 constexpr std::size_t kSerialSize = 16384;
 constexpr std::size_t kGrain = 8192;
+/// Of a sort's passes: at least eight parts, so that a thread keeps about its half from pass to
+/// pass.
+std::size_t grainOf(std::size_t size) { return std::clamp<std::size_t>(size / 8, 1024, kGrain); }
 constexpr std::size_t kRadixOnly = 8192;
 
 /// The power-of-two cube that holds the box, its corner on a grid so coarse that cells' corners are
@@ -77,8 +80,9 @@ void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const 
     return;
   }
   // Keys in parallel; then by their first digit into bins that fit the cache; then each bin.
-  const int topBits = std::min(9, 3 * layout.levels), topShift = high - topBits;
-  const std::size_t bins = std::size_t{1} << topBits, halves = 2 * ((size + kGrain - 1) / kGrain);
+  const int topBits = std::min(size < 32768 ? 8 : 9, 3 * layout.levels), topShift = high - topBits;
+  const std::size_t bins = std::size_t{1} << topBits, grain = grainOf(size),
+                    halves = 2 * ((size + grain - 1) / grain);
   m_binCounts.resize(bins * halves);
   // Each chunk in two halves at once: nearly sorted keys meet the same count again and again, each
   // time waiting for its last store.
@@ -91,7 +95,7 @@ void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const 
     }
     if ((to - from) & 1) f(second[keys[to - 1] >> topShift], to - 1);
   };
-  threads->forChunks(size, kGrain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
+  threads->forChunks(size, grain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
     octreeKeys(m_boxes, slots ? slots + from : nullptr, static_cast<std::uint32_t>(begin + from),
                to - from, cube, layout, keys.data() + from);
     std::fill_n(m_binCounts.data() + 2 * chunk * bins, 2 * bins, 0u);
@@ -105,7 +109,7 @@ void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const 
       sum += std::exchange(m_binCounts[half * bins + bin], sum);
   }
   m_binBegins[bins] = sum;
-  threads->forChunks(size, kGrain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
+  threads->forChunks(size, grain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
     forHalves(chunk, from, to,
               [&](std::uint32_t& next, std::size_t i) { scratch[next++] = keys[i]; });
   });
@@ -141,7 +145,7 @@ void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& se
   // The keys' scratch is free now and holds the old order.
   auto* before = reinterpret_cast<std::uint32_t*>(m_keysScratch);
   std::copy(m_order.begin(), m_order.end(), before);
-  threads.forChunks(size, kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+  threads.forChunks(size, grainOf(size), [&](std::size_t, std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i)
       m_order[i] = before[static_cast<std::uint32_t>(m_keys[i])];
   });
@@ -225,7 +229,6 @@ void Octree::fit(const Threads& threads) {
     fitBlocks(m_pool.data(), m_parents.data(), m_taskBlocks[task + 1], m_taskBlocks[task + 2]);
   });
   fitBlocks(m_pool.data(), m_parents.data(), 1, m_taskBlocks[1]);
-  measureLooseness();
 }
 
 void Octree::measureLooseness() {

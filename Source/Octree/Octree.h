@@ -104,6 +104,7 @@ class Octree {
   void build(const FloatBox& bounds, double bulk, const OctreeSettings&, std::uint64_t* keys,
              const Threads&);
   void fit(const Threads&);
+  void measureLooseness();  ///< of what was fitted
 
   /// Sum of the leaves' half areas over that of their primitives: how loose the fitted boxes are.
   /// Grows as a refitted tree degrades; unchanged by motion and scaling of the whole.
@@ -134,7 +135,6 @@ class Octree {
   void sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const Cube&, KeyLayout,
                 const Threads*);
   void assemble(std::size_t tasks, const Threads&);
-  void measureLooseness();
 
   Buffer<std::uint32_t> m_order;
   BoxArrays m_boxes;
