@@ -394,6 +394,7 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   std::sort(m_changed.begin(), m_changed.end(), [&](const Geometry* l, const Geometry* r) {
     return size(l) != size(r) ? size(l) > size(r) : l->id < r->id;
   });
+  if (m_changed.empty()) return;
   std::size_t total = 0;
   for (const Geometry* geometry : m_changed) total += size(geometry);
   const Threads one(1);
