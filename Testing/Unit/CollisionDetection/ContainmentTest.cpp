@@ -1,9 +1,11 @@
+#include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
 
 #include <palpate/OctreeBasedCD.h>
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <map>
 #include <set>
@@ -14,6 +16,11 @@ namespace palpate {
 namespace {
 
 using testing::Mesh;
+using testing::Random;
+using testing::randomPoint;
+using testing::settingsOf;
+using testing::sphere;
+using testing::uniform;
 using Cell = std::array<int, 3>;
 
 /// The closed surface of the unit cells for which `filled` holds, within [0, n]³: every face
@@ -170,6 +177,33 @@ TEST(InsideVertices, AreAsByBruteForceForAnyThreads) {
 }
 
 /// Cells of 2^-1060: a caller that takes denormals for zero would find nothing.
+/// The search starts from what was nearest to the vertex before.
+TEST(InsideVertices, DoNotDependOnTheVertexBefore) {
+  Random random(11);
+  for (int run = 0; run < 30; ++run) {
+    const double scale = run % 3 == 0 ? 1e-6 : run % 3 == 1 ? 1.0 : 1e7;
+    const Eigen::Vector3d centre = (run % 2) * scale * Eigen::Vector3d(3e5, -1e5, 7e4);
+    Mesh body = sphere(7, 10, {0, 0, 0}, 1);
+    for (Eigen::Vector3d& p : body.positions) p = uniform(random, 0.3, 1.0) * scale * p + centre;
+    Mesh walk;
+    Eigen::Vector3d at = Eigen::Vector3d::Zero();
+    for (std::uint32_t i = 0; i < 300; ++i) {
+      // Steps of the depth's size, and out at times; some of them onto the surface's vertices.
+      at = (0.8 * at + std::pow(10.0, uniform(random, -4, 0)) * randomPoint(random, -1, 1))
+               .cwiseMax(-0.8)
+               .cwiseMin(0.8);
+      walk.positions.push_back(i % 7 ? Eigen::Vector3d(scale * at + centre)
+                                     : body.positions[random() % body.positions.size()]);
+      if (i >= 2) walk.triangles.push_back({i - 2, i - 1, i});
+    }
+    const auto found = insideVertices(walk, body),
+               truth = insideVertices(walk, body, settingsOf(Engine::BruteForce));
+    EXPECT_EQ(found, truth);
+    EXPECT_GT(truth.size(), 10u);
+    EXPECT_LT(truth.size(), 290u);
+  }
+}
+
 TEST(InsideVertices, DoNotDependOnTheCallersFloatingPoint) {
   constexpr int n = 2;
   Mesh body = surfaceOf(n, kBodies[0]), points = lattice(n);
