@@ -45,6 +45,9 @@ std::array<std::uint32_t, 4> idsOf(const EdgeEdgeContact& c) {
   return {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]};
 }
 std::array<std::uint32_t, 2> idsOf(const TrianglePair& pair) { return {pair.a, pair.b}; }
+std::array<std::uint32_t, 3> idsOf(const ShapeContact& c) {
+  return {static_cast<std::uint32_t>(c.element), c.id, c.vertices[1]};
+}
 
 /// Which contacts a sample of features tells everything about.
 class Coverage {
@@ -72,6 +75,16 @@ class Coverage {
     return all(a.edgeTriangles[edgeA], [&](std::uint32_t s) {
       return all(b.edgeTriangles[edgeB], [&](std::uint32_t t) { return ofTriangles(s, t); });
     });
+  }
+  /// By the primitive that owns the element.
+  bool ofShape(const ShapeContact& c) const {
+    const MeshTopology& mesh = m_meshes.mesh().topology;
+    if (c.element == ShapeElement::Face) return holds(m_sample.trianglesOfA, c.id);
+    const bool isVertex = c.element == ShapeElement::Vertex;
+    const std::uint32_t edge = isVertex ? 0 : mesh.edgeOf({c.vertices[0], c.vertices[1]});
+    if (isVertex ? c.id >= mesh.vertexCount : edge == kNoEdge) return true;  // there is none such
+    const auto owners = isVertex ? mesh.vertexTriangles[c.id] : mesh.edgeTriangles[edge];
+    return owners.empty() || holds(m_sample.trianglesOfA, owners.front());
   }
   bool ofTriangles(std::uint32_t s, std::uint32_t t) const {
     return holds(m_sample.trianglesOfA, m_meshes.self() ? std::min(s, t) : s);
@@ -189,6 +202,9 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
       expected.intersectingTriangles, data.intersectingTriangles(),
       [&](const auto& c) { return coverage.ofTriangles(c.a, c.b); },
       into(List::IntersectingTriangles));
+  compare(
+      expected.shape, data.shape(), [&](const auto& c) { return coverage.ofShape(c); },
+      into(List::Shape));
 }
 
 CollisionProblem pairAlone(const CollisionProblem& whole, GeometryId idA, GeometryId idB) {

@@ -1,6 +1,7 @@
 #include <palpate/Capture.h>
 
 #include "CollisionDetection/Audit.h"
+#include "Geometry/Shape.h"
 
 #include <algorithm>
 #include <array>
@@ -11,19 +12,21 @@
 #include <string_view>
 #include <system_error>
 #include <type_traits>
+#include <utility>
 
 namespace palpate {
 
 namespace {
 
 constexpr std::string_view kTitle = "palpate-capture";
-constexpr int kVersion = 4;
+constexpr int kVersion = 5;
 
 // Values of enumerations are written by name: in the order of their declarations.
 constexpr std::array<std::string_view, 6> kMethods{"Auto",         "Proxy",     "DistanceField",
                                                    "Intersection", "Proximity", "Continuous"};
-constexpr std::array<std::string_view, 3> kKinds{"Triangles", "Lines", "Points"};
+constexpr std::array<std::string_view, 4> kKinds{"Triangles", "Lines", "Points", "Shape"};
 constexpr std::array<std::string_view, 2> kSides{"Both", "Outer"};
+constexpr std::array<std::string_view, 5> kShapes{"Sphere", "Capsule", "Plane", "Box", "Cylinder"};
 constexpr std::array<std::string_view, 3> kContacts{"Distinct", "All", "Earliest"};
 constexpr std::array<std::string_view, 2> kEngines{"Octree", "BruteForce"};
 constexpr std::array<std::string_view, 2> kUpdates{"Auto", "Rebuild"};
@@ -161,6 +164,35 @@ void filterOf(File& file, FilterType& filter) {
   file.word(filter.sidedness, kSides);
 }
 
+void fieldOf(Writer& file, const Eigen::Vector3d& value) { file.position(value); }
+void fieldOf(Writer& file, double value) { file.real(value); }
+void fieldOf(Writer& file, bool value) { file.integer(int{value}); }
+void fieldOf(Reader& file, Eigen::Vector3d& value) { file.position(value); }
+void fieldOf(Reader& file, double& value) { file.real(value); }
+void fieldOf(Reader& file, bool& value) {
+  int number = 0;
+  file.integer(number);
+  value = number != 0;
+}
+
+/// A shape's measures and where it is.
+template <class File, class MeshType>
+void shapeOf(File& file, MeshType& mesh) {
+  forEachField(*mesh.analytical, [&](std::string_view, auto& field) { fieldOf(file, field); });
+  for (int k = 0; k < 3; ++k) {
+    for (int i = 0; i < 3; ++i) fieldOf(file, mesh.rotation(k, i));
+    fieldOf(file, mesh.translation[k]);
+  }
+}
+
+/// The kind of shape by its number.
+template <std::size_t... kinds>
+AnalyticalGeometry shapeOfKind(std::size_t kind, std::index_sequence<kinds...>) {
+  AnalyticalGeometry shape;
+  (void)((kind == kinds && (shape.emplace<kinds>(), true)) || ...);
+  return shape;
+}
+
 std::string textOf(const CollisionProblem& problem) {
   Writer file;
   file.word(kTitle);
@@ -179,6 +211,10 @@ std::string textOf(const CollisionProblem& problem) {
     file.word(mesh.kind, kKinds);
     file.integer(mesh.radii.size());
     for (const double radius : mesh.radii) file.real(radius);
+    if (mesh.analytical) {
+      file.word(mesh.analytical->index(), kShapes);
+      shapeOf(file, mesh);
+    }
     filterOf(file, mesh.filter);
     file.integer(mesh.disabled.size());
     for (const std::uint32_t element : mesh.disabled) file.integer(element);
@@ -218,6 +254,12 @@ CollisionProblem::Mesh readMesh(Reader& file, int version) {
     file.word(mesh.kind, kKinds);
     mesh.radii.resize(file.count());
     for (double& radius : mesh.radii) file.real(radius);
+    if (mesh.kind == GeometryKind::Shape) {
+      std::size_t kind = 0;
+      file.word(kind, kShapes);
+      mesh.analytical = shapeOfKind(kind, std::make_index_sequence<kShapes.size()>());
+      shapeOf(file, mesh);
+    }
   }
   bool rest = mesh.kind == GeometryKind::Lines;
   if (version >= 4) {
@@ -238,6 +280,7 @@ CollisionProblem::Mesh readMesh(Reader& file, int version) {
 }
 
 GeometryId add(OctreeBasedCD& detection, const CollisionProblem::Mesh& mesh) {
+  if (mesh.analytical) return detection.addAnalyticalGeometry(*mesh.analytical);
   const std::vector<Eigen::Vector3d>& rest = mesh.rest.empty() ? mesh.now : mesh.rest;
   if (mesh.kind == GeometryKind::Triangles) return detection.addTriangleMesh(rest, mesh.triangles);
   const bool one = mesh.radii.size() <= 1;
@@ -316,7 +359,10 @@ OctreeBasedCD setUp(const CollisionProblem& problem) {
   OctreeBasedCD detection(problem.settings);
   for (const CollisionProblem::Mesh& mesh : problem.geometries) {
     const GeometryId id = add(detection, mesh);
-    detection.setPositions(id, mesh.before, mesh.now);
+    if (mesh.analytical)
+      detection.setTransform(id, mesh.rotation, mesh.translation);
+    else
+      detection.setPositions(id, mesh.before, mesh.now);
     detection.setCollisionFilter(id, mesh.filter);
     detection.setDisabledElements(id, mesh.disabled);
   }

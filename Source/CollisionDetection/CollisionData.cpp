@@ -59,6 +59,12 @@ std::uint64_t CollisionData::hash() const {
   hash.add(std::uint64_t{m_contents.intersectingTriangles.size()});
   for (const TrianglePair& p : m_contents.intersectingTriangles)
     hash.add(std::uint64_t{p.a} << 32 | p.b);
+  for (const ShapeContact& c : m_contents.shape) {
+    hash.add(static_cast<std::uint64_t>(c.element) << 32 | c.id);
+    for (const std::uint32_t id : c.vertices) hash.add(std::uint64_t{id});
+    for (const auto& vector : {c.weights, c.point, c.pointOnShape, c.normal}) hash.add(vector);
+    hash.add(c.distance);
+  }
   if (const double earliest = m_contents.earliestTimeOfImpact; earliest <= 1.0) hash.add(earliest);
   return hash.value();
 }

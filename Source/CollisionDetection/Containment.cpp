@@ -54,7 +54,8 @@ class Body {
     } else {
       FloatBox ray = boxOf(p);
       ray.upper[0] = kInfinity;
-      forEachOverlapping(m_geometry.octree, ray, m_stack, count);
+      const auto overlaps = [&](const FloatBox& box) { return box.overlaps(ray); };
+      forEachOverlapping(m_geometry.octree, overlaps, m_stack, count);
     }
     return on ? 0 : number;
   }
@@ -102,10 +103,7 @@ class Body {
   }
 
   bool mayContain(const Eigen::Vector3d& p) const {
-    const FloatBox box = boxOf(p), all = m_geometry.octree.blocks()[0].box(0);
-    for (int k = 0; k < 3; ++k)
-      if (box.upper[k] < all.lower[k] || box.lower[k] > all.upper[k]) return m_bruteForce;
-    return true;
+    return m_bruteForce || boxOf(p).overlaps(m_geometry.octree.blocks()[0].box(0));
   }
 
  private:

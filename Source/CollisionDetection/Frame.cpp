@@ -1,11 +1,13 @@
 #include "CollisionDetection/Frame.h"
 
 #include "CollisionDetection/BruteForce.h"
+#include "CollisionDetection/ShapeQuery.h"
 #include "CollisionDetection/Stopwatch.h"
 #include "Core/Spin.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/Intersection.h"
+#include "NarrowPhase/ShapeContacts.h"
 #include "NarrowPhase/StepCheck.h"
 
 #include <algorithm>
@@ -60,7 +62,8 @@ void sortUnique(Buffer<std::uint32_t>& ids) {
 }
 
 std::size_t sizeOf(const CollisionData::Contents& contents) {
-  return contents.vertexTriangle.size() + contents.triangleVertex.size() + contents.edgeEdge.size();
+  return contents.vertexTriangle.size() + contents.triangleVertex.size() +
+         contents.edgeEdge.size() + contents.shape.size();
 }
 
 /// ofIntersection: how many are Intersection's, of the step's end with a time of 0.
@@ -97,6 +100,8 @@ struct Frame::Job {
   std::size_t begin, end;  ///< of m_nodePairs
   FloatPair floats;
   TraversalStack stack;
+  PointQueryStack queries;
+  Buffer<std::uint32_t> primitives;
   PairSink sink;
   Use use;
   Guarded* guarded;               ///< of forEach()
@@ -158,6 +163,15 @@ struct Frame::Job {
         job.candidates.push_back(pair);
   }
 
+  /// The whole of a pair with a shape.
+  void detectShape() {
+    const MeshPair meshes = record->meshes();
+    findPrimitivesNear(record->mesh(), meshes.shape(), meshes.reach(), queries, primitives);
+    Stopwatch watch;
+    findShapeContacts(meshes, primitives, contacts);
+    narrowMilliseconds += watch.lap();
+  }
+
   void findEarliest(const MeshPair& meshes, std::span<const TrianglePair> pairs) {
     const double found = findEarliestImpact(meshes, pairs, earliest->load(), contacts);
     double known = earliest->load();
@@ -188,6 +202,10 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
   m_nodePairs.clear();
   for (PairRecord* record : records) {
     record->earliest = std::numeric_limits<double>::infinity();
+    if (record->meshes().hasShape()) {
+      if (adjacentPairs && record->mesh().octree.size() > 0) newJob(*record);
+      continue;
+    }
     if (record->a->octree.size() == 0 || record->b->octree.size() == 0) continue;
     const double thickness = boxThickness(*record);
     const TreePair own = treesOf(*record, adjacentPairs, thickness);
@@ -277,7 +295,7 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
     Job& job = *m_jobs[i];
     job.keepCandidates = settings.keepCandidates;
     job.start(&Job::detect);
-    run(job);
+    job.record->meshes().hasShape() ? job.detectShape() : run(job);
     job.milliseconds = jobWatch.lap();
   });
   double all = 0, narrow = 0;

@@ -90,6 +90,11 @@ void checkRadii(GeometryId id, std::span<const double> radii) {
 }
 
 void checkPositionCount(const Geometry& geometry, std::size_t count) {
+  if (geometry.mesh.shape)
+    throw Error(
+        ErrorCode::WrongPositionCount,
+        nameOf(geometry.id) + " is a shape, which has no positions; setTransform() moves it",
+        geometry.id);
   if (count != geometry.mesh.topology.vertexCount)
     throw Error(
         ErrorCode::WrongPositionCount,
@@ -219,8 +224,8 @@ std::string nameOf(GeometryId id) {
 }
 
 std::string nameOf(GeometryKind kind) {
-  if (kind == GeometryKind::Triangles) return "a triangle mesh";
-  return kind == GeometryKind::Lines ? "a line mesh" : "a point set";
+  constexpr const char* kNames[] = {"a triangle mesh", "a line mesh", "a point set", "a shape"};
+  return kNames[static_cast<std::size_t>(kind)];
 }
 
 GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
@@ -246,6 +251,32 @@ GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
   m_geometries.push_back(std::move(geometry));
   ++m_nextId;
   return id;
+}
+
+GeometryId GeometryTable::add(const AnalyticalGeometry& analytical) {
+  if (const std::string fault = faultOf(analytical); !fault.empty())
+    throw Error(ErrorCode::InvalidShape, nameOf(GeometryId{m_nextId}) + ": " + fault,
+                GeometryId{m_nextId});
+  const GeometryId id = add({}, {}, GeometryKind::Shape);
+  TriangleMesh& mesh = m_geometries.back()->mesh;
+  mesh.analytical = analytical;
+  mesh.shape.emplace(analytical, mesh.transform);
+  return id;
+}
+
+void GeometryTable::setTransform(GeometryId id, const RigidTransform& transform) {
+  Geometry& geometry = at(id);
+  TriangleMesh& mesh = geometry.mesh;
+  if (!mesh.shape)
+    throw Error(ErrorCode::UnsupportedMethod,
+                nameOf(id) + " is " + nameOf(mesh.topology.kind) + "; setTransform() is for shapes",
+                id);
+  if (const std::string fault = faultOf(transform); !fault.empty())
+    throw Error(ErrorCode::InvalidTransform, nameOf(id) + ": " + fault, id);
+  mesh.transform = transform;
+  mesh.shape.emplace(*mesh.analytical, transform);
+  ++geometry.revision;
+  ++geometry.stepRevision;
 }
 
 Geometry& GeometryTable::at(GeometryId id) {

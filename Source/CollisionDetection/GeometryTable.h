@@ -69,6 +69,7 @@ class GeometryTable {
   /// radii: none, one for all, or as many as positions.
   GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Triangle>,
                  GeometryKind = GeometryKind::Triangles, std::span<const double> radii = {});
+  GeometryId add(const AnalyticalGeometry&);
   void remove(GeometryId);
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> now, const Threads&);
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> before,
@@ -77,6 +78,8 @@ class GeometryTable {
                     std::span<const Triangle>);
   void setFilter(GeometryId, const CollisionFilter&);
   void setDisabled(GeometryId, std::span<const std::uint32_t> elements);
+
+  void setTransform(GeometryId, const RigidTransform&);
 
   Geometry& at(GeometryId);  ///< throws UnknownGeometry
   std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }

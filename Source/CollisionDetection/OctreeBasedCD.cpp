@@ -59,6 +59,12 @@ void checkOnePerVertex(std::span<const Eigen::Vector3d> positions, std::span<con
 
 }  // namespace
 
+void checkCandidates(const PairRecord& record) {
+  if (record.meshes().hasShape())
+    throw Error(ErrorCode::NotAvailable, "a pair with a shape has no candidate pairs",
+                record.pair.a);
+}
+
 struct OctreeBasedCD::Implementation {
   explicit Implementation(const Settings& newSettings)
       : settings(checked(newSettings)), threads(newSettings.threads) {
@@ -129,7 +135,8 @@ struct OctreeBasedCD::Implementation {
     }
     Stopwatch watch;
     for (const auto& record : pairs.records()) {
-      const bool moves = detecting || record->pair.settings.method == Method::Auto;
+      const bool moves = (detecting || record->pair.settings.method == Method::Auto) &&
+                         !record->meshes().hasShape();
       if (moves)
         for (Geometry* geometry : {record->a, record->b})
           GeometryTable::updateMotion(*geometry, threads);
@@ -234,8 +241,8 @@ struct OctreeBasedCD::Implementation {
     for (const auto& record : pairs.records()) {
       record->trust.keep(thisFrame);
       const CollisionData& data = record->data;
-      statistics.contacts +=
-          data.vertexTriangle().size() + data.triangleVertex().size() + data.edgeEdge().size();
+      statistics.contacts += data.vertexTriangle().size() + data.triangleVertex().size() +
+                             data.edgeEdge().size() + data.shape().size();
       statistics.intersectingTriangles += data.intersectingTriangles().size();
     }
     endFrame();
@@ -279,7 +286,10 @@ struct OctreeBasedCD::Implementation {
                                     mesh.radii,
                                     {},
                                     geometry->filter,
-                                    mesh.topology.disabled});
+                                    mesh.topology.disabled,
+                                    mesh.analytical,
+                                    mesh.transform.rotation,
+                                    mesh.transform.translation});
       CollisionProblem::Mesh& copy = problem.geometries.back();
       if (kind != GeometryKind::Points) copy.triangles = mesh.topology.triangles;
       if (copy.radii.empty() && mesh.largestRadius > 0.0) copy.radii = {mesh.largestRadius};
@@ -327,6 +337,17 @@ GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions
                                       std::span<const double> radii) {
   checkOnePerVertex(positions, radii);
   return m_implementation->addPoints(positions, radii);
+}
+
+GeometryId OctreeBasedCD::addAnalyticalGeometry(const AnalyticalGeometry& geometry) {
+  const StandardFloatingPoint standard;
+  return m_implementation->geometries.add(geometry);
+}
+
+void OctreeBasedCD::setTransform(GeometryId geometry, const Eigen::Matrix3d& rotation,
+                                 const Eigen::Vector3d& translation) {
+  const StandardFloatingPoint standard;
+  m_implementation->geometries.setTransform(geometry, {rotation, translation});
 }
 
 void OctreeBasedCD::removeGeometry(GeometryId geometry) {
@@ -401,10 +422,12 @@ void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFuncti
   const StandardFloatingPoint standard;
   Implementation& all = *m_implementation;
   all.work.clear();
-  if (only)
+  if (only) {
     all.work.push_back(&all.pairs.at(all.geometries, only->a, only->b));
-  else
+    checkCandidates(*all.work.front());
+  } else {
     for (const auto& record : all.pairs.records()) all.work.push_back(record.get());
+  }
   all.update();
   std::erase_if(all.work, [](const PairRecord* record) { return !record->collides(); });
   if (all.settings.engine == Engine::Octree)
@@ -435,6 +458,7 @@ const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) co
 
 std::span<const TrianglePair> OctreeBasedCD::candidatePairs(GeometryId a, GeometryId b) const {
   PairRecord& record = m_implementation->pairs.at(m_implementation->geometries, a, b);
+  checkCandidates(record);
   if (record.candidatesFor == PairRecord::AnsweredFor{})
     throw Error(ErrorCode::NotAvailable,
                 "candidates were not kept: call collectCandidates(), or set "

@@ -17,6 +17,9 @@ Key byTriangle(const VertexTriangleContact& c) { return {packed(c.triangle, c.ve
 Key byEdges(const EdgeEdgeContact& c) {
   return {packed(c.edgeA[0], c.edgeA[1]), packed(c.edgeB[0], c.edgeB[1])};
 }
+Key byElement(const ShapeContact& c) {
+  return {packed(static_cast<std::uint32_t>(c.element), c.id), c.vertices[1]};
+}
 
 template <class Contact, class Entries, class KeyOf>
 void order(std::span<ContactBuffers* const> buffers, Buffer<Contact> ContactBuffers::*member,
@@ -63,6 +66,7 @@ void orderContacts(std::span<ContactBuffers* const> buffers, OrderScratch& scrat
   order(buffers, &ContactBuffers::triangleVertex, scratch.vertexTriangle, out.triangleVertex,
         byTriangle);
   order(buffers, &ContactBuffers::edgeEdge, scratch.edgeEdge, out.edgeEdge, byEdges);
+  order(buffers, &ContactBuffers::shape, scratch.shape, out.shape, byElement);
   out.intersectingTriangles.clear();
   for (const ContactBuffers* buffer : buffers)
     out.intersectingTriangles.insert(out.intersectingTriangles.end(),

@@ -17,6 +17,7 @@ struct OrderScratch {
   };
   Buffer<Entry<VertexTriangleContact>> vertexTriangle;
   Buffer<Entry<EdgeEdgeContact>> edgeEdge;
+  Buffer<Entry<ShapeContact>> shape;
 };
 
 struct PairOrderScratch {

@@ -54,6 +54,13 @@ void checkKinds(const TriangleMesh& a, const TriangleMesh& b, const PairSettings
   if (settings.restDistance > 0.0 && (&a != &b || a.topology.kind == GeometryKind::Points))
     refuse("restDistance is for a triangle or line mesh with itself", ErrorCode::InvalidSettings);
   if (a.topology.hasFaces() && b.topology.hasFaces()) return;
+  if (a.shape || b.shape) {
+    if (a.shape && b.shape)
+      refuse("two shapes cannot be tested against each other yet", ErrorCode::UnsupportedMethod);
+    if (settings.method != Method::Proximity)
+      refuse("a shape is tested by Method::Proximity only", ErrorCode::UnsupportedMethod);
+    return;
+  }
   const std::string kinds = nameOf(a.topology.kind) + " and " + nameOf(b.topology.kind);
   if (settings.method == Method::Auto || settings.method == Method::Intersection)
     refuse("this method is for two triangle meshes, not for " + kinds +
@@ -91,7 +98,8 @@ void check(const Geometry& first, const Geometry& second, const PairSettings& se
     case Method::Continuous:
       return;
     case Method::Proximity:
-      if (settings.thickness + (first.mesh.largestRadius + second.mesh.largestRadius) == 0.0)
+      if (!first.mesh.shape && !second.mesh.shape &&
+          settings.thickness + (first.mesh.largestRadius + second.mesh.largestRadius) == 0.0)
         throw Error(ErrorCode::InvalidSettings,
                     name + ": Method::Proximity needs a positive thickness; it is 0", a);
       return;
@@ -164,6 +172,9 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
 void PairTable::setPredicate(const GeometryTable& geometries, GeometryId a, GeometryId b,
                              ContactPredicate predicate) {
   PairRecord& record = inOrder(geometries, a, b);
+  if (predicate && record.meshes().hasShape())
+    throw Error(ErrorCode::UnsupportedMethod,
+                nameOf(a, b) + ": a shape has no features to ask about", a);
   record.predicate = std::move(predicate);
   record.dataFor = {};
 }

@@ -55,6 +55,8 @@ struct PairRecord {
   /// An answer of nothing.
   void clear();
 
+  const Geometry& mesh() const { return a->mesh.shape ? *b : *a; }  ///< of a pair with a shape
+
   /// Stored boxes may hold more than this pair's method asks for.
   bool widerBoxes() const { return !plan.swept() && (a->swept || b->swept); }
 

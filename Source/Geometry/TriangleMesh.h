@@ -3,6 +3,7 @@
 #include <palpate/Types.h>
 
 #include "Core/Buffer.h"
+#include "Geometry/Shape.h"
 
 #include <cstdint>
 #include <optional>
@@ -100,6 +101,9 @@ struct TriangleMesh {
   double largestRadius = 0.0;           ///< L
   std::vector<Eigen::Vector3d> rest{};  ///< when the topology was set
   bool outer = false;                   ///< Sidedness::Outer
+  RigidTransform transform{};
+  std::optional<AnalyticalGeometry> analytical{};  ///< of a shape, in the body's frame
+  std::optional<Shape> shape{};                    ///< the same in the world
 
   double radius(std::uint32_t vertex) const {
     return radii.empty() ? largestRadius : radii[vertex];

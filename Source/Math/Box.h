@@ -27,6 +27,11 @@ struct alignas(16) FloatBox {
     }
     return sum;
   }
+  bool overlaps(const FloatBox& other) const {
+    bool all = true;
+    for (int k = 0; k < 3; ++k) all &= lower[k] <= other.upper[k] && upper[k] >= other.lower[k];
+    return all;
+  }
   bool empty() const { return !(lower[0] <= upper[0]); }
   void add(const FloatBox& other) {
     for (int k = 0; k < 3; ++k) {

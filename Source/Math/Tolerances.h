@@ -125,6 +125,23 @@ constexpr double kSideError = 0x1p-46;
 /// ever further, so any value will do.
 constexpr double kFirstStepBack = 0x1p-44;
 
+// ---- Shapes (Geometry/Shape.cpp, CollisionDetection/ShapeQuery.cpp) ----
+
+/// Of an edge: how closely its point nearest to a shape is bracketed, and how near to an end it is
+/// that end. The least distance varies by the square of that.
+constexpr double kEdgeWeight = 0x1p-50;
+/// Relative to a shape's magnitude: nearer to a capsule's axis, or out of a face, the direction to
+/// it is rounding; and of two faces, this much nearer, which is nearer.
+constexpr double kOnSurface = 0x1p-48;
+/// Squared sine from a capsule's axis below which another direction across it is taken: any value.
+constexpr double kAcrossSquare = 0x1p-10;
+/// Of R^T R from 1: rotations as exact as users have them; boxes and cylinders take the nearest one
+/// that is exact to double.
+constexpr double kOrthonormal = 1e-9;
+/// Relative to the magnitudes of a box and a shape: a distance bounded from a box's centre carries
+/// some twenty roundings.
+constexpr double kShapeBoundError = 0x1p-46;
+
 // ---- Motion bounds (Motion.cpp, MotionBound.cpp) ----
 
 /// Relative, and of a distance relative to the largest coordinate difference beside it: a

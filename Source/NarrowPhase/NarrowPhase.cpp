@@ -4,6 +4,7 @@
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Proximity.h"
+#include "NarrowPhase/ShapeContacts.h"
 
 #include <palpate/Error.h>
 
@@ -31,6 +32,7 @@ void ContactBuffers::clear() {
   triangleVertex.clear();
   edgeEdge.clear();
   intersectingTriangles.clear();
+  shape.clear();
   featurePairs = exactDecisions = 0;
   facts.clear();
 }
@@ -61,9 +63,10 @@ FeatureLists everyFeature(const MeshPair& pair) {
     fill(list, topology.vertexCount);
     std::erase_if(list, [&](std::uint32_t v) { return topology.vertexTriangles[v].empty(); });
   };
-  if (pair.settings.method == Method::Intersection) {
-    fill(every.trianglesOfA, pair.a.topology.triangles.size());
-    std::erase_if(every.trianglesOfA, [&](std::uint32_t t) { return !pair.a.topology.isOn(t); });
+  if (pair.settings.method == Method::Intersection || pair.hasShape()) {
+    const MeshTopology& mesh = pair.hasShape() ? pair.mesh().topology : pair.a.topology;
+    fill(every.trianglesOfA, mesh.triangles.size());
+    std::erase_if(every.trianglesOfA, [&](std::uint32_t t) { return !mesh.isOn(t); });
     return every;
   }
   const MeshTopology &a = pair.a.topology, &b = pair.b.topology;
@@ -77,6 +80,7 @@ FeatureLists everyFeature(const MeshPair& pair) {
 
 void findContactsByBruteForce(const MeshPair& pair, const FeatureLists& features,
                               ContactBuffers& out) {
+  if (pair.hasShape()) return findShapeContacts(pair, features.trianglesOfA, out);
   switch (pair.settings.method) {
     case Method::Proximity:
       return findProximityByBruteForce(pair, features, out);

@@ -50,6 +50,10 @@ struct MeshPair {
     return vertices.radius(vertex) + others.radius(corners, barycentric);
   }
   bool filters() const { return near || predicate || a.outer || b.outer; }
+  bool hasShape() const { return a.shape || b.shape; }
+  /// Of a pair with a shape: the other one, and the shape.
+  const TriangleMesh& mesh() const { return a.shape ? b : a; }
+  const Shape& shape() const { return *(a.shape ? a : b).shape; }
   bool hasLines() const {
     return a.topology.kind == GeometryKind::Lines || b.topology.kind == GeometryKind::Lines;
   }
@@ -82,6 +86,7 @@ struct ContactBuffers {
   Buffer<VertexTriangleContact> vertexTriangle, triangleVertex;
   Buffer<EdgeEdgeContact> edgeEdge;
   Buffer<TrianglePair> intersectingTriangles;
+  Buffer<ShapeContact> shape;
   FeaturePairs features;      ///< scratch: of the batch at hand
   Buffer<TrianglePair> part;  ///< scratch: some of the batch at hand
   StepFacts facts;
@@ -99,7 +104,7 @@ struct ContactBuffers {
 void findContacts(const MeshPair&, std::span<const TrianglePair> candidates, ContactBuffers& out);
 
 /// Features for brute force to test against all of the other mesh: for Intersection triangles, else
-/// vertices and edges.
+/// vertices and edges; with a shape, primitives of the mesh, as trianglesOfA.
 struct FeatureLists {
   std::vector<std::uint32_t> verticesOfA, verticesOfB;
   std::vector<std::uint32_t> edgesOfA,

@@ -18,19 +18,13 @@ struct PointQueryStack {
   Buffer<Entry> entries;
 };
 
-/// f(begin, end) for ranges of the octree's order that hold every primitive whose box overlaps
-/// `box`.
-template <class F>
-void forEachOverlapping(const Octree& octree, const FloatBox& box, PointQueryStack& stack, F&& f) {
+/// f(begin, end) for ranges of the octree's order that hold every primitive whose box `overlaps`,
+/// as do all boxes around it.
+template <class Overlaps, class F>
+void forEachOverlapping(const Octree& octree, Overlaps&& overlaps, PointQueryStack& stack, F&& f) {
   const OctreeBlock* blocks = octree.blocks();
-  const auto overlaps = [&](const OctreeBlock& block, unsigned slot) {
-    bool all = true;
-    for (int k = 0; k < 3; ++k)
-      all &= block.lower[k][slot] <= box.upper[k] && block.upper[k][slot] >= box.lower[k];
-    return all;
-  };
   stack.entries.clear();
-  if (overlaps(blocks[0], 0)) stack.entries.push_back({0, 0});
+  if (overlaps(blocks[0].box(0))) stack.entries.push_back({0, 0});
   while (!stack.entries.empty()) {
     const OctreeNode node = stack.entries.back().node;
     stack.entries.pop_back();
@@ -40,7 +34,7 @@ void forEachOverlapping(const Octree& octree, const FloatBox& box, PointQuerySta
     if (block.isLeaf(node & 7)) continue;
     const std::uint32_t child = block.child[node & 7];
     for (unsigned slot = 0; slot < 8; ++slot)
-      if (overlaps(blocks[child], slot)) stack.entries.push_back({0, child * 8 + slot});
+      if (overlaps(blocks[child].box(slot))) stack.entries.push_back({0, child * 8 + slot});
   }
 }
 

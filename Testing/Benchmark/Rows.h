@@ -25,6 +25,7 @@ void scaleRows(Report&, const RowOptions&);       ///< to four million triangles
 void steadyRows(Report&, const RowOptions&);      ///< allocations of a thousand frames, p99
 void featureRows(Report&, const RowOptions&);     ///< vertex-triangle and edge-edge candidates
 void lineRows(Report&, const RowOptions&);        ///< a suture with itself and with organs
+void shapeRows(Report&, const RowOptions&);       ///< a capsule in a sheet, and in points
 void continuousRows(Report&, const RowOptions&);  ///< times of impact of the published steps
 void simdRows(Report&, const RowOptions&);        ///< every path that this processor runs
 

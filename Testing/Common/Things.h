@@ -38,6 +38,8 @@ struct Thing {
       case GeometryKind::Points:
         return radii.size() == 1 ? collisions.addPointSet(positions, radii[0])
                                  : collisions.addPointSet(positions, radii);
+      case GeometryKind::Shape:
+        break;
     }
     return {};
   }

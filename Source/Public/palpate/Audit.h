@@ -18,9 +18,16 @@ struct AuditFailure {
     Invented,  ///< found, not expected, or found twice
     Different  ///< found with other values than expected
   };
-  enum class List { VertexTriangle, TriangleVertex, EdgeEdge, IntersectingTriangles, Earliest };
-  using Contact =
-      std::variant<std::monostate, VertexTriangleContact, EdgeEdgeContact, TrianglePair>;
+  enum class List {
+    VertexTriangle,
+    TriangleVertex,
+    EdgeEdge,
+    IntersectingTriangles,
+    Earliest,
+    Shape
+  };
+  using Contact = std::variant<std::monostate, VertexTriangleContact, EdgeEdgeContact, TrianglePair,
+                               ShapeContact>;
 
   GeometryId a, b;          ///< the pair, as it was added
   std::uint64_t frame = 0;  ///< counts detectCollision() from 1

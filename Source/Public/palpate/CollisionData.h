@@ -37,6 +37,22 @@ struct EdgeEdgeContact {
   friend bool operator==(const EdgeEdgeContact&, const EdgeEdgeContact&) = default;
 };
 
+enum class ShapeElement : std::uint32_t { Vertex, Edge, Face };
+
+/// An element of a mesh against an analytical shape.
+struct ShapeContact {
+  ShapeElement element;
+  std::uint32_t id;  ///< vertex or triangle; of an edge its lower vertex
+  /// The element's: {v, v, v}, {p, q, q} with the lower first, or the triangle's corners.
+  std::array<std::uint32_t, 3> vertices;
+  Eigen::Vector3d weights;       ///< of the vertices; sum 1
+  Eigen::Vector3d point;         ///< L, of the element: of lines and points on their centre line
+  Eigen::Vector3d pointOnShape;  ///< L
+  Eigen::Vector3d normal;        ///< unit, out of the shape, towards the element
+  double distance;               ///< L, less the element's radius; negative: as deep inside
+  friend bool operator==(const ShapeContact&, const ShapeContact&) = default;
+};
+
 /// Four vertices with signed weights: their weighted sum of positions is the vector between the two
 /// closest points, and weight i times a force along the normal is the force on vertex i.
 struct Stencil {
@@ -67,6 +83,7 @@ class PALPATE_EXPORT CollisionData {
     std::vector<VertexTriangleContact> vertexTriangle, triangleVertex;
     std::vector<EdgeEdgeContact> edgeEdge;
     std::vector<TrianglePair> intersectingTriangles;
+    std::vector<ShapeContact> shape;
     double earliestTimeOfImpact =
         std::numeric_limits<double>::infinity();  ///< with Contacts::Earliest
     Validity validity;
@@ -89,6 +106,8 @@ class PALPATE_EXPORT CollisionData {
   std::span<const TrianglePair> intersectingTriangles() const {
     return m_contents.intersectingTriangles;
   }
+  /// With an analytical shape, which has no other contacts; by (element, id, vertices).
+  std::span<const ShapeContact> shape() const { return m_contents.shape; }
   /// Infinity if there is no contact; 0 for the static methods' contacts.
   double earliestTimeOfImpact() const;
 

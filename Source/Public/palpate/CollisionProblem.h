@@ -1,9 +1,11 @@
 #pragma once
 
+#include <palpate/AnalyticalGeometry.h>
 #include <palpate/Settings.h>
 #include <palpate/Types.h>
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace palpate {
@@ -18,7 +20,10 @@ struct CollisionProblem {
     std::vector<double> radii{};          ///< L: none, one for all, or one for each vertex
     std::vector<Eigen::Vector3d> rest{};  ///< the shape that restDistance is of; none: now
     CollisionFilter filter{};
-    std::vector<std::uint32_t> disabled{};  ///< elements that are off
+    std::vector<std::uint32_t> disabled{};           ///< elements that are off
+    std::optional<AnalyticalGeometry> analytical{};  ///< of a shape, placed by what follows
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   };
   struct Pair {
     std::uint32_t a, b;  ///< indices of geometries

@@ -24,6 +24,8 @@ enum class ErrorCode {
   NotAvailable,        ///< the answer was not kept, or no frame has been computed
   File,                ///< a file that cannot be read or written, or is not what it should be
   InvalidRadius,       ///< negative, NaN or infinite, or not one for each vertex
+  InvalidShape,        ///< a measure of a shape that is NaN, infinite, negative, or no direction
+  InvalidTransform,    ///< not a rotation, or a translation that is not finite
 };
 
 /// What was wrong with a call, and where. The call that throws it has changed nothing.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <palpate/AnalyticalGeometry.h>
 #include <palpate/Audit.h>
 #include <palpate/ClosedMesh.h>
 #include <palpate/CollisionData.h>
@@ -53,6 +54,16 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// vertex.
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, double radius = 0.0);
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
+  /// A tool, a needle's tip, a table: placed by setTransform(). Meets triangles, lines and points
+  /// by Method::Proximity, in CollisionData::shape(); the thickness may be 0.
+  ///
+  ///   const GeometryId tool = detection.addAnalyticalGeometry(Capsule{{0, 0, 0}, {0, 0,
+  ///   80}, 2.5}); detection.addCollisionPair(organ, tool, {Method::Proximity, 0.5});
+  ///   detection.setTransform(tool, rotation, tip);
+  ///   detection.detectCollision();
+  ///   for (const ShapeContact& c : detection.collisionData(organ, tool).shape())
+  ///     push(c.vertices, c.weights, c.normal, 0.5 - c.distance);
+  GeometryId addAnalyticalGeometry(const AnalyticalGeometry&);
   void removeGeometry(GeometryId);  ///< and its pairs
 
   /// A frame ends at detectCollision() or collectCandidates(). With one array, "before" is the
@@ -65,6 +76,10 @@ class PALPATE_EXPORT OctreeBasedCD {
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
 
+  /// Of a shape: a point x of its body's frame is at rotation x + translation.
+  /// Errors   InvalidTransform unless the rotation is one within 1e-9 and all is finite.
+  void setTransform(GeometryId, const Eigen::Matrix3d& rotation,
+                    const Eigen::Vector3d& translation);
   /// Two geometries meet where each is in a group that the other's mask has; a pair that does not
   /// has no contacts, no candidates and no cost, and is not trusted.
   void setCollisionFilter(GeometryId, const CollisionFilter&);

@@ -12,7 +12,7 @@ namespace palpate {
 enum class GeometryId : std::uint32_t {};
 
 /// What a geometry's primitives are.
-enum class GeometryKind : std::uint8_t { Triangles, Lines, Points };
+enum class GeometryKind : std::uint8_t { Triangles, Lines, Points, Shape };
 
 using Triangle = std::array<std::uint32_t, 3>;  ///< vertex indices; winding gives the normal
 /// vertex indices, lower first where it is an edge of a mesh

@@ -217,10 +217,10 @@ TEST_F(Capture, RefusesWhatIsWrongByName) {
     write(text.replace(place, from.size(), to));
     expectRefused(reason);
   };
-  expectRefusedWith("palpate-capture 4", "solid 3", "it is not a capture");
-  expectRefusedWith("palpate-capture 4", "palpate-capture 5",
-                    "it is of version 5; versions up to 4");
-  expectRefusedWith("palpate-capture 4", "palpate-capture x", "line 1: \"x\" is not an integer");
+  expectRefusedWith("palpate-capture 5", "solid 3", "it is not a capture");
+  expectRefusedWith("palpate-capture 5", "palpate-capture 6",
+                    "it is of version 6; versions up to 5");
+  expectRefusedWith("palpate-capture 5", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 99999999999\n", "is not an integer in range");

@@ -95,6 +95,30 @@ TEST(SteadyFrame, AllocatesNothingWithLinesAndPoints) {
   EXPECT_GT(contacts, 1000u);
 }
 
+TEST(SteadyFrame, AllocatesNothingWithShapes) {
+  const scenes::SceneMesh sheet = scenes::sheet(40);
+  OctreeBasedCD detection(Settings{.threads = 1});
+  const GeometryId tissue = detection.addTriangleMesh(sheet.positions, sheet.triangles);
+  std::vector<GeometryId> tools;
+  for (const AnalyticalGeometry& tool : std::vector<AnalyticalGeometry>{
+           Capsule{{-0.513, 0.0137, 0.3}, {0.487, 0.1093, 0.3317}, 0.4},
+           Box{{0, 0, 0}, {0.2, 0.3, 0.1}}, Cylinder{{0, 0, -0.1}, {0, 0.3, 0}, 0.2}, Plane{}}) {
+    tools.push_back(detection.addAnalyticalGeometry(tool));
+    detection.addCollisionPair(tissue, tools.back(), {Method::Proximity, 0.01});
+  }
+  std::size_t before = 0, contacts = 0;
+  for (int frame = 0; frame < 20; ++frame) {
+    if (frame == 10) before = allocations;
+    for (const GeometryId tool : tools)
+      detection.setTransform(tool, Eigen::Matrix3d::Identity(), {0.02 * (frame % 10), 0, 0.05});
+    detection.detectCollision();
+    contacts += detection.statistics().contacts;
+    EXPECT_EQ(detection.statistics().exactDecisions, 0u);
+  }
+  EXPECT_EQ(allocations - before, 0u);
+  EXPECT_GT(contacts, 1000u);
+}
+
 TEST(SteadyFrame, CountsAllocations) {
   const std::size_t before = allocations;
   std::vector<int> some(allocations % 7 + 1);

@@ -1,0 +1,315 @@
+#include "Geometry/Shape.h"
+
+#include "Math/ClosestPoint.h"
+#include "Math/Foot.h"
+#include "Math/Predicates.h"
+#include "Math/Tolerances.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <string_view>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+
+/// Its columns again, at right angles and of length 1 as exactly as double can say.
+Eigen::Matrix3d orthonormal(const Eigen::Matrix3d& rotation) {
+  Eigen::Matrix3d axes;
+  const Vector3d x = rotation.col(0).normalized();
+  axes << x, (rotation.col(1) - x.dot(rotation.col(1)) * x).normalized(), Vector3d::Zero();
+  axes.col(2) = x.cross(axes.col(1));
+  return axes;
+}
+
+/// Also where squares leave the range of double, but slower there.
+double lengthOf(const Vector3d& v) {
+  const double squared = v.squaredNorm();
+  return squared > kUnderflowGuardOfProducts && squared < kOverflowGuard ? std::sqrt(squared)
+                                                                         : v.stableNorm();
+}
+
+/// A rotation that turns z into the direction.
+Eigen::Matrix3d axesAlong(const Vector3d& direction) {
+  const Vector3d z = direction.stableNormalized(), x = z.unitOrthogonal();
+  Eigen::Matrix3d axes;
+  axes << x, z.cross(x), z;
+  return axes;
+}
+
+}  // namespace
+
+Vector3d RigidTransform::operator()(const Vector3d& p) const {
+  Vector3d result;
+  for (int k = 0; k < 3; ++k)
+    result[k] =
+        rotation(k, 0) * p[0] + rotation(k, 1) * p[1] + rotation(k, 2) * p[2] + translation[k];
+  return result;
+}
+
+Shape::Shape(const AnalyticalGeometry& geometry, const RigidTransform& transform) {
+  const auto capsule = [&](const Vector3d& p0, const Vector3d& p1, double radius) {
+    m_kind = Kind::Capsule;
+    m_p0 = transform(p0);
+    m_p1 = transform(p1);
+    m_radius = radius;
+  };
+  const auto body = [&](Kind kind, const Vector3d& origin, const Eigen::Matrix3d& axes,
+                        const std::array<double, 3>& sizes) {
+    m_kind = kind;
+    m_p0 = m_p1 = transform(origin);
+    m_axes = orthonormal(transform.rotation) * axes;
+    m_sizes = sizes;
+  };
+  if (const auto* sphere = std::get_if<Sphere>(&geometry)) {
+    capsule(sphere->centre, sphere->centre, sphere->radius);
+  } else if (const auto* rod = std::get_if<Capsule>(&geometry)) {
+    capsule(rod->p0, rod->p1, rod->radius);
+  } else if (const auto* plane = std::get_if<Plane>(&geometry)) {
+    body(plane->twoSided ? Kind::TwoSidedPlane : Kind::Plane, plane->point,
+         axesAlong(plane->normal), {0, 0, 0});
+  } else if (const auto* box = std::get_if<Box>(&geometry)) {
+    const Vector3d& half = box->halfExtents;
+    body(Kind::Box, box->centre, Eigen::Matrix3d::Identity(), {half[0], half[1], half[2]});
+  } else if (const auto* cylinder = std::get_if<Cylinder>(&geometry)) {
+    const Vector3d along = 0.5 * cylinder->p1 - 0.5 * cylinder->p0;
+    body(Kind::Cylinder, cylinder->p0 + along, axesAlong(along),
+         {cylinder->radius, lengthOf(along), 0});
+  }
+  m_magnitude = m_p0.cwiseAbs().maxCoeff() + m_p1.cwiseAbs().maxCoeff() + m_radius +
+                *std::max_element(m_sizes.begin(), m_sizes.end());
+}
+
+Vector3d Shape::inBody(const Vector3d& x) const { return m_axes.transpose() * (x - m_p0); }
+
+Shape::Parts Shape::partsOf(const Vector3d& v, double tie) const {
+  const Vector3d up(0, 0, v[2] < -tie ? -1 : 1);
+  switch (m_kind) {
+    case Kind::Plane:
+      return {1, {v[2]}, {Vector3d::UnitZ()}};
+    case Kind::TwoSidedPlane:
+      return {1, {std::abs(v[2])}, {up}};
+    case Kind::Cylinder: {
+      const double radius = lengthOf({v[0], v[1], 0});
+      const Vector3d outward =
+          radius > 0 ? Vector3d(v[0] / radius, v[1] / radius, 0) : Vector3d(1, 0, 0);
+      return {2, {radius, std::abs(v[2])}, {outward, up}};
+    }
+    default:
+      return {3,
+              {std::abs(v[0]), std::abs(v[1]), std::abs(v[2])},
+              {Vector3d(v[0] < -tie ? -1 : 1, 0, 0), Vector3d(0, v[1] < -tie ? -1 : 1, 0), up}};
+  }
+}
+
+SignedDistance Shape::atBody(const Vector3d& u, double tie) const {
+  const Parts parts = partsOf(u, tie);
+  int nearest = 0, outside = 0;
+  std::array<double, 3> beyond{};
+  Vector3d difference = Vector3d::Zero();
+  for (int i = 0; i < parts.count; ++i) {
+    beyond[i] = parts.lengths[i] - m_sizes[i];
+    if (beyond[i] > beyond[nearest] + tie) nearest = i;
+    if (!(beyond[i] > kOnSurface * m_magnitude)) continue;
+    ++outside;
+    difference += beyond[i] * parts.directions[i];
+  }
+  if (outside <= 1) return {beyond[nearest], parts.directions[nearest]};
+  const double distance = lengthOf(difference);
+  return {distance, difference / distance};
+}
+
+SignedDistance Shape::at(const Vector3d& x) const {
+  if (m_kind != Kind::Capsule) {
+    const SignedDistance inBodys = atBody(inBody(x), kOnSurface * m_magnitude);
+    return {inBodys.distance, m_axes * inBodys.normal};
+  }
+  const Vector3d along = m_p1 - m_p0, from = x - m_p0;
+  const double length = along.squaredNorm();
+  const double weight = length > 0 ? std::clamp(from.dot(along) / length, 0.0, 1.0) : 0.0;
+  const Vector3d difference = from - weight * along;
+  const double distance = lengthOf(difference);
+  const bool onAxis = distance <= kOnSurface * m_magnitude;
+  return {distance - m_radius,
+          onAxis ? fromAxis(axisOfLeast(along.cwiseAbs())) : Vector3d(difference / distance)};
+}
+
+Vector3d Shape::fromAxis(const Vector3d& normal) const {
+  const Vector3d along = (m_p1 - m_p0).stableNormalized();
+  const Vector3d across = normal - along.dot(normal) * along;
+  return across.squaredNorm() > kAcrossSquare ? across.normalized() : along.unitOrthogonal();
+}
+
+NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const {
+  if (m_kind == Kind::Capsule) {
+    const EdgeEdgeDistance axis = finiteEdgeEdgeDistance(p, q, m_p0, m_p1);
+    return {{1.0 - axis.weightA, axis.weightA, 0.0},
+            axis.distance > kOnSurface * m_magnitude ? axis.normal : fromAxis(axis.normal),
+            axis.distance - m_radius,
+            axis.featureA == EdgeFeature::Interior,
+            axis.exact};
+  }
+  if (m_kind == Kind::TwoSidedPlane) {
+    const double start = inBody(p)[2], end = inBody(q)[2];
+    if ((start < 0 && end > 0) || (start > 0 && end < 0)) {
+      const double t = start / (start - end);
+      return {{1.0 - t, t, 0.0}, m_axes.col(2), 0.0, true};
+    }
+  }
+  // The distance is convex along the edge: where its slope changes sign.
+  const Vector3d from = inBody(p), along = inBody(q) - from;
+  const auto slope = [&](double t) { return atBody(from + t * along, 0).normal.dot(along); };
+  const auto at = [&](double t, bool inInterior) {
+    const SignedDistance least = atBody(from + t * along, kOnSurface * m_magnitude);
+    return NearestToShape{{1.0 - t, t, 0.0}, m_axes * least.normal, least.distance, inInterior};
+  };
+  if (slope(0) >= 0) return at(0, false);
+  if (slope(1) <= 0) return at(1, false);
+  // From a falling to a rising slope; a stretch without slope is bracketed from both sides.
+  double falls = 0, rises = 1, flat = 0;
+  while (rises - falls > kEdgeWeight) {
+    const double middle = 0.5 * (falls + rises), sloping = slope(middle);
+    (sloping < 0 ? falls : rises) = middle;
+    if (sloping == 0) flat = std::max(flat, middle);
+  }
+  double first = 0.5 * (falls + rises), last = first;
+  if (flat > 0) {
+    for (falls = flat, rises = 1; rises - falls > kEdgeWeight;)
+      (slope(0.5 * (falls + rises)) > 0 ? rises : falls) = 0.5 * (falls + rises);
+    last = 0.5 * (falls + rises);
+  }
+  const double t = 0.5 * (first + last);
+  if (first <= kEdgeWeight) return at(0, false);
+  if (last >= 1 - kEdgeWeight) return at(1, false);
+  return at(t, true);
+}
+
+/// Of the plane normal . u = height, height not negative: the deepest point in the shape, or the
+/// shape's nearest to it. The shape cut down by m on all sides, { at(u) <= -m }, has the parts'
+/// sizes less m; m is the largest for which it still reaches the plane.
+Vector3d Shape::nearestOfPlane(const Vector3d& normal, double height) const {
+  const Parts parts = partsOf(normal, 0);
+  double reach = 0, lengths = 0, deepest = -std::numeric_limits<double>::infinity();
+  for (int i = 0; i < parts.count; ++i) {
+    reach += parts.lengths[i] * m_sizes[i];
+    lengths += parts.lengths[i];
+    deepest = std::max(deepest, -m_sizes[i]);
+  }
+  const double level = std::min(0.0, std::max(deepest, (height - reach) / lengths));
+  Vector3d point = Vector3d::Zero();
+  for (int i = 0; i < parts.count; ++i)
+    if (parts.lengths[i] > 0) point += (m_sizes[i] + level) * parts.directions[i];
+  const double reached = reach + level * lengths;
+  return reached > height ? Vector3d(height / reached * point) : point;
+}
+
+/// Of a capsule.
+std::optional<NearestToShape> Shape::nearestToAxis(const Vector3d& a, const Vector3d& b,
+                                                   const Vector3d& c) const {
+  const VertexTriangleDistance ends[] = {finiteVertexTriangleDistance(m_p0, a, b, c),
+                                         finiteVertexTriangleDistance(m_p1, a, b, c)};
+  const Vector3d along = m_p1 - m_p0;
+  const auto answer = [&](const VertexTriangleDistance& end, double distance) {
+    const bool onAxis = distance <= kOnSurface * m_magnitude;
+    return NearestToShape{end.barycentric, onAxis ? fromAxis(-end.normal) : Vector3d(-end.normal),
+                          distance - m_radius, true, end.exact};
+  };
+  const auto isOver = [&](int i) { return ends[i].feature == TriangleFeature::Face; };
+  if (isOver(0) && isOver(1) && ends[0].difference.dot(ends[1].difference) > 0) {
+    if (ends[0].distance != ends[1].distance)
+      return answer(ends[ends[1].distance < ends[0].distance],
+                    std::min(ends[0].distance, ends[1].distance));
+    return answer(finiteVertexTriangleDistance(m_p0 + 0.5 * along, a, b, c), ends[0].distance);
+  }
+  for (const int i : {0, 1})  // nearest of all if from there the axis does not come nearer
+    if (isOver(i) && (i == 0 ? 1 : -1) * along.dot(ends[i].difference) >= 0)
+      return answer(ends[i], ends[i].distance);
+  SignCounts counts;
+  const OrientedPlane plane(a, b, c);
+  const int side = plane.side(m_p0, counts), turn = orient3d(m_p0, m_p1, a, b, counts);
+  if (side == 0 || turn == 0 || side != -plane.side(m_p1, counts) ||
+      turn != orient3d(m_p0, m_p1, b, c, counts) || turn != orient3d(m_p0, m_p1, c, a, counts))
+    return {};
+  const Vector3d normal = unitCross(a, b, a, c);
+  const double before = std::abs(normal.dot(m_p0 - a)), after = std::abs(normal.dot(m_p1 - a));
+  const double t = before > 0 ? before / (before + after) : 0.0;
+  VertexTriangleDistance through = finiteVertexTriangleDistance(m_p0 + t * along, a, b, c);
+  through.normal = normal;
+  return answer(through, 0.0);
+}
+
+std::optional<NearestToShape> Shape::nearestInTriangle(const Vector3d& a, const Vector3d& b,
+                                                       const Vector3d& c) const {
+  if (m_kind == Kind::Capsule) return nearestToAxis(a, b, c);
+  Vector3d normal = unitCross(a, b, a, c);
+  // In a plane's half-space no interior is deeper than the boundary.
+  if (m_kind < Kind::Capsule || normal == Vector3d::Zero()) return {};
+  double height = normal.dot(a - m_p0);
+  if (height < 0) normal = -normal, height = -height;
+  const Vector3d point = m_p0 + m_axes * nearestOfPlane(m_axes.transpose() * normal, height);
+  const VertexTriangleDistance on = finiteVertexTriangleDistance(point, a, b, c);
+  if (on.feature != TriangleFeature::Face) return {};
+  const Vector3d& weights = on.barycentric;
+  if (on.distance > kOnSurface * m_magnitude)  // the point was the shape's nearest to the plane
+    return NearestToShape{weights, normal, on.distance, true};
+  const SignedDistance least = at(weights[0] * a + weights[1] * b + weights[2] * c);
+  return NearestToShape{weights, least.normal, least.distance, true};
+}
+
+std::string faultOf(const AnalyticalGeometry& geometry) {
+  std::string fault;
+  const auto say = [&](std::string_view name, const Vector3d& v, bool isVector, const char* rule) {
+    char value[128];
+    if (isVector)
+      std::snprintf(value, sizeof value, " is (%g, %g, %g)", v[0], v[1], v[2]);
+    else
+      std::snprintf(value, sizeof value, " is %g", v[0]);
+    fault = std::string(name) + value + "; it must be " + rule;
+  };
+  forEachField(geometry, [&](std::string_view name, const auto& field) {
+    using Field = std::decay_t<decltype(field)>;
+    if constexpr (!std::is_same_v<Field, bool>) {
+      constexpr bool isVector = std::is_same_v<Field, Vector3d>;
+      const Vector3d values = [&]() -> Vector3d {
+        if constexpr (isVector)
+          return field;
+        else
+          return Vector3d::Constant(field);
+      }();
+      const bool isSize = name == "radius" || name == "halfExtents";
+      if (!values.allFinite() || (isSize && !(values.minCoeff() >= 0)))
+        say(name, values, isVector, isSize ? "finite and not negative" : "finite");
+      else if (name == "normal" && values == Vector3d::Zero())
+        say(name, values, isVector, "of some length");
+    }
+  });
+  const auto* cylinder = std::get_if<Cylinder>(&geometry);
+  if (fault.empty() && cylinder && cylinder->p0 == cylinder->p1)
+    say("p1", cylinder->p1, true, "another point than p0");
+  return fault;
+}
+
+std::string faultOf(const RigidTransform& transform) {
+  const Eigen::Matrix3d& r = transform.rotation;
+  const double off = (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  char text[128];
+  const Vector3d& t = transform.translation;
+  if (!r.allFinite() || !(off <= kOrthonormal) || !(r.determinant() > 0)) {
+    std::snprintf(text, sizeof text,
+                  "is not a rotation: its columns' products are off by %g, its determinant is %g",
+                  off, r.determinant());
+    return "rotation " + std::string(text);
+  }
+  if (t.allFinite()) return {};
+  std::snprintf(text, sizeof text, "translation is (%g, %g, %g); it must be finite", t[0], t[1],
+                t[2]);
+  return text;
+}
+
+}  // namespace palpate

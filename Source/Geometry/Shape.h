@@ -1,0 +1,107 @@
+#pragma once
+
+#include <palpate/AnalyticalGeometry.h>
+
+#include <array>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <variant>
+
+namespace palpate {
+
+/// A rotation and then a translation.
+struct RigidTransform {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+  /// Rounded as it is written: ((r0 x + r1 y) + r2 z) + t.
+  Eigen::Vector3d operator()(const Eigen::Vector3d& p) const;
+};
+
+/// From a shape's surface: negative inside.
+struct SignedDistance {
+  double distance;         ///< L
+  Eigen::Vector3d normal;  ///< unit: the distance grows fastest along it
+};
+
+/// Where a vertex, an edge or a triangle comes nearest to a shape, or is deepest inside.
+struct NearestToShape {
+  Eigen::Vector3d weights;  ///< of its vertices; never negative
+  Eigen::Vector3d normal;   ///< unit, from the shape towards it
+  double distance;          ///< L, negative inside
+  bool inInterior;          ///< strictly: not on an end, not on an edge
+  bool exact = false;       ///< floating point left it to exact arithmetic
+};
+
+/// An analytical shape in the world.
+///
+/// The signed distance to a convex shape is convex, so that an element has one least distance.
+/// Where several of its points share it, one on its boundary is taken if there is one, else the
+/// middle.
+class Shape {
+ public:
+  Shape(const AnalyticalGeometry&, const RigidTransform&);
+
+  SignedDistance at(const Eigen::Vector3d& x) const;
+  NearestToShape nearestOfEdge(const Eigen::Vector3d& p, const Eigen::Vector3d& q) const;
+  /// None where a point of the triangle's boundary is as near.
+  std::optional<NearestToShape> nearestInTriangle(const Eigen::Vector3d& a,
+                                                  const Eigen::Vector3d& b,
+                                                  const Eigen::Vector3d& c) const;
+  /// L: about the largest magnitude of its coordinates and measures.
+  double magnitude() const { return m_magnitude; }
+
+ private:
+  enum class Kind { Plane, TwoSidedPlane, Capsule, Cylinder, Box };
+  /// A vector by what the distance is made of: height, or radius and height, or three heights.
+  struct Parts {
+    int count;
+    std::array<double, 3> lengths;  ///< but of a plane never negative
+    std::array<Eigen::Vector3d, 3> directions;
+  };
+  /// tie: lengths on either side of the middle that count as above it.
+  Parts partsOf(const Eigen::Vector3d& v, double tie) const;
+  Eigen::Vector3d inBody(const Eigen::Vector3d& x) const;
+  /// At a capsule's axis, where every direction across it leads out: one near to the given one.
+  Eigen::Vector3d fromAxis(const Eigen::Vector3d& normal) const;
+  /// tie: L, of two faces that are equally near the first counts.
+  SignedDistance atBody(const Eigen::Vector3d& u, double tie) const;
+  Eigen::Vector3d nearestOfPlane(const Eigen::Vector3d& normal, double height) const;
+  std::optional<NearestToShape> nearestToAxis(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                              const Eigen::Vector3d& c) const;
+
+  Kind m_kind = Kind::Plane;
+  Eigen::Vector3d m_p0, m_p1;  ///< a capsule's axis; others: both the body's origin
+  double m_radius = 0;         ///< of a capsule
+  Eigen::Matrix3d m_axes = Eigen::Matrix3d::Identity();  ///< of the body
+  std::array<double, 3> m_sizes{};                       ///< of the parts
+  double m_magnitude;
+};
+
+/// Calls f(name, field) for each field of a shape: vectors, doubles and flags.
+template <class Geometry, class F>
+void forEachField(Geometry& geometry, F&& f) {
+  std::visit(
+      [&](auto& shape) {
+        using Type = std::decay_t<decltype(shape)>;
+        if constexpr (std::is_same_v<Type, Plane>) {
+          f("point", shape.point), f("normal", shape.normal), f("twoSided", shape.twoSided);
+        } else if constexpr (std::is_same_v<Type, Box>) {
+          f("centre", shape.centre), f("halfExtents", shape.halfExtents);
+        } else {
+          if constexpr (std::is_same_v<Type, Sphere>)
+            f("centre", shape.centre);
+          else
+            f("p0", shape.p0), f("p1", shape.p1);
+          f("radius", shape.radius);
+        }
+      },
+      geometry);
+}
+
+/// What is wrong with a shape's measures; empty if nothing is.
+std::string faultOf(const AnalyticalGeometry&);
+/// Of a transform: its matrix must be a rotation within 1e-9.
+std::string faultOf(const RigidTransform&);
+
+}  // namespace palpate

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "NarrowPhase/NarrowPhase.h"
+
+#include <span>
+
+namespace palpate {
+
+/// Contacts of the features that the primitives of a pair's mesh own with the other's shape.
+///
+/// All: every vertex, edge and triangle at most the thickness and its radius from the shape, at its
+/// point nearest to it. Distinct: those of them of which that point is strictly inside.
+void findShapeContacts(const MeshPair&, std::span<const std::uint32_t> primitives,
+                       ContactBuffers& out);
+
+}  // namespace palpate

@@ -1,0 +1,619 @@
+#include <palpate/Capture.h>
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/ContactRows.h"
+#include "Common/PairRun.h"
+#include "Common/RandomMeshes.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <string>
+#include <vector>
+
+// Analytical shapes against triangles, lines and points: brute force bit by bit, and the definition
+// by a signed distance and a search written here.
+
+namespace palpate::testing {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Positions = std::vector<Vector3d>;
+
+struct Placed {
+  AnalyticalGeometry geometry;
+  Matrix3d rotation = Matrix3d::Identity();
+  Vector3d translation = Vector3d::Zero();
+};
+
+/// A geometry with elements: triangles, segments {p, q, q} or points {p, p, p}.
+struct Body {
+  GeometryKind kind;
+  Positions positions;
+  std::vector<Triangle> primitives;
+  double radius = 0.0;
+
+  GeometryId addTo(OctreeBasedCD& collisions) const {
+    if (kind == GeometryKind::Triangles) return collisions.addTriangleMesh(positions, primitives);
+    if (kind == GeometryKind::Points) return collisions.addPointSet(positions, radius);
+    std::vector<Segment> segments;
+    for (const auto& [p, q, _] : primitives) segments.push_back({p, q});
+    return collisions.addLineMesh(positions, segments, radius);
+  }
+};
+
+Body organ(const Mesh& mesh) { return {GeometryKind::Triangles, mesh.positions, mesh.triangles}; }
+
+Body thread(Random& random, std::uint32_t segments, double radius) {
+  Body line{GeometryKind::Lines, {randomPoint(random, 0.2, 0.8)}, {}, radius};
+  for (std::uint32_t i = 1; i <= segments; ++i) {
+    line.positions.push_back(line.positions.back() + randomPoint(random, -0.1, 0.1));
+    line.primitives.push_back({i - 1, i, i});
+  }
+  return line;
+}
+
+Body particles(Random& random, std::uint32_t count, double radius) {
+  Body points{GeometryKind::Points, {}, {}, radius};
+  for (std::uint32_t i = 0; i < count; ++i) {
+    points.positions.push_back(randomPoint(random, 0, 1));
+    points.primitives.push_back({i, i, i});
+  }
+  return points;
+}
+
+Matrix3d randomRotation(Random& random) {
+  return Eigen::Quaterniond(Eigen::Vector4d(uniform(random, -1, 1), uniform(random, -1, 1),
+                                            uniform(random, -1, 1), uniform(random, 0.1, 1))
+                                .normalized())
+      .toRotationMatrix();
+}
+
+/// One of each, about the unit cube's middle.
+std::vector<Placed> shapes(Random& random) {
+  std::vector<Placed> all;
+  const auto place = [&](const AnalyticalGeometry& geometry) {
+    all.push_back({geometry, randomRotation(random), randomPoint(random, 0.3, 0.7)});
+  };
+  place(Sphere{{0.01, 0, 0}, 0.25});
+  place(Capsule{{-0.3, 0, 0}, {0.2, 0.1, 0}, 0.1});
+  place(Plane{{0, 0.05, 0}, {1, 2, 3}, false});
+  place(Plane{{0, 0.05, 0}, {1, -2, 3}, true});
+  place(Box{{0.05, 0, 0}, {0.3, 0.2, 0.1}});
+  place(Cylinder{{-0.2, 0, 0}, {0.3, 0.1, 0}, 0.15});
+  place(Sphere{{0, 0, 0}, 0});
+  place(Capsule{{-0.3, 0, 0}, {0.2, 0.1, 0}, 0});
+  place(Box{{0, 0, 0}, {0.3, 0.2, 0}});
+  place(Cylinder{{-0.2, 0, 0}, {0.3, 0.1, 0}, 0});
+  return all;
+}
+
+CollisionData answer(const Settings& settings, const Body& body, const Placed& shape,
+                     const PairSettings& pair, bool shapeFirst = false) {
+  OctreeBasedCD collisions(settings);
+  const GeometryId tool = collisions.addAnalyticalGeometry(shape.geometry),
+                   mesh = body.addTo(collisions);
+  collisions.setTransform(tool, shape.rotation, shape.translation);
+  collisions.addCollisionPair(shapeFirst ? tool : mesh, shapeFirst ? mesh : tool, pair);
+  collisions.detectCollision();
+  EXPECT_EQ(collisions.octree().validate(), std::vector<std::string>{});
+  return collisions.collisionData(shapeFirst ? tool : mesh, shapeFirst ? mesh : tool);
+}
+
+CollisionData answer(const Body& body, const Placed& shape, const PairSettings& pair) {
+  return answer(settingsOf(Engine::Octree), body, shape, pair);
+}
+
+/// Identifies an element.
+using Element = std::array<std::uint32_t, 3>;
+Element elementOf(const ShapeContact& c) {
+  return {static_cast<std::uint32_t>(c.element), c.id, c.vertices[1]};
+}
+std::map<Element, ShapeContact> byElement(const CollisionData& data) {
+  std::map<Element, ShapeContact> contacts;
+  for (const ShapeContact& c : data.shape()) contacts.emplace(elementOf(c), c);
+  EXPECT_EQ(contacts.size(), data.shape().size());
+  return contacts;
+}
+
+TEST(Shapes, AnswerAsBruteForce) {
+  Random random(1);
+  const std::vector<Body> bodies{organ(sphere(10, 14, {0.5, 0.5, 0.5}, 0.4)),
+                                 organ(sheet(14, 0.5, 0)), organ(soup(random, 150, 0.2)),
+                                 thread(random, 120, 0.02), particles(random, 300, 0.01)};
+  std::size_t contacts = 0;
+  for (const Body& body : bodies)
+    for (const Placed& shape : shapes(random))
+      for (const Contacts which : {Contacts::Distinct, Contacts::All})
+        for (const double thickness : {0.0, 0.03}) {
+          const PairSettings pair{Method::Proximity, thickness, which};
+          const CollisionData truth = answer(settingsOf(Engine::BruteForce), body, shape, pair);
+          EXPECT_EQ(truth.vertexTriangle().size() + truth.edgeEdge().size(), 0u);
+          EXPECT_TRUE(std::is_sorted(
+              truth.shape().begin(), truth.shape().end(),
+              [](const auto& l, const auto& r) { return elementOf(l) < elementOf(r); }));
+          for (const bool swapped : {false, true})
+            for (const int threads : {1, 2}) {
+              const CollisionData found =
+                  answer(settingsOf(Engine::Octree, threads), body, shape, pair, swapped);
+              EXPECT_TRUE(std::equal(found.shape().begin(), found.shape().end(),
+                                     truth.shape().begin(), truth.shape().end()))
+                  << "shape " << shape.geometry.index();
+              EXPECT_EQ(found.hash(), truth.hash());
+            }
+          contacts += truth.shape().size();
+        }
+  EXPECT_GT(contacts, 8000u);
+}
+
+// ---- The definition ----
+
+/// Written once more, from what each shape is.
+double signedDistance(const Placed& placed, const Vector3d& world) {
+  const Vector3d x = placed.rotation.transpose() * (world - placed.translation);
+  const auto ofBox = [](std::initializer_list<double> beyond) {
+    double outside = 0;
+    for (const double b : beyond) outside += b > 0 ? b * b : 0;
+    return outside > 0 ? std::sqrt(outside) : std::max(beyond);
+  };
+  if (const auto* s = std::get_if<Sphere>(&placed.geometry))
+    return (x - s->centre).norm() - s->radius;
+  if (const auto* c = std::get_if<Capsule>(&placed.geometry)) {
+    const Vector3d u = c->p1 - c->p0;
+    const double t = u.dot(x - c->p0) / u.squaredNorm();
+    return (x - c->p0 - std::clamp(t, 0.0, 1.0) * u).norm() - c->radius;
+  }
+  if (const auto* p = std::get_if<Plane>(&placed.geometry)) {
+    const double height = p->normal.normalized().dot(x - p->point);
+    return p->twoSided ? std::abs(height) : height;
+  }
+  if (const auto* b = std::get_if<Box>(&placed.geometry)) {
+    const Vector3d beyond = (x - b->centre).cwiseAbs() - b->halfExtents;
+    return ofBox({beyond[0], beyond[1], beyond[2]});
+  }
+  const auto& c = std::get<Cylinder>(placed.geometry);
+  const Vector3d u = (c.p1 - c.p0).normalized(), from = x - 0.5 * (c.p0 + c.p1);
+  return ofBox(
+      {u.cross(from).norm() - c.radius, std::abs(u.dot(from)) - 0.5 * (c.p1 - c.p0).norm()});
+}
+
+/// Least of a convex function over [0, 1].
+double least(const std::function<double(double)>& f) {
+  double low = 0, high = 1;
+  for (int i = 0; i < 70; ++i) {
+    const double third = (high - low) / 3;
+    if (f(low + third) <= f(high - third))
+      high -= third;
+    else
+      low += third;
+  }
+  return std::min({f(0), f(1), f(0.5 * (low + high))});
+}
+double leastOn(const Placed& shape, const Vector3d& p, const Vector3d& q) {
+  return least([&](double t) { return signedDistance(shape, p + t * (q - p)); });
+}
+double leastOn(const Placed& shape, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+  return least([&](double t) { return leastOn(shape, a + t * (b - a), a + t * (c - a)); });
+}
+
+constexpr double kSearch = 1e-7;  ///< of the search above where distances are even
+
+/// Every element with its least distance, and the least on its boundary.
+struct Truth {
+  double own, boundary;
+};
+std::map<Element, Truth> truthOf(const Body& body, const Placed& shape) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  std::map<Element, Truth> truth;
+  const auto& at = body.positions;
+  for (std::uint32_t t = 0; t < body.primitives.size(); ++t) {
+    const Triangle& corners = body.primitives[t];
+    double edges = kNone;
+    for (int i = 0; i < 3; ++i) {
+      const std::uint32_t p = std::min(corners[i], corners[(i + 1) % 3]),
+                          q = std::max(corners[i], corners[(i + 1) % 3]);
+      const double start = signedDistance(shape, at[p]), end = signedDistance(shape, at[q]);
+      truth[{0, p, p}] = {start, kNone};
+      if (p == q) continue;
+      const double edge = leastOn(shape, at[p], at[q]);
+      truth[{1, p, q}] = {edge, std::min(start, end)};
+      edges = std::min(edges, edge);
+    }
+    if (body.kind != GeometryKind::Triangles) continue;
+    const auto& [a, b, c] = corners;
+    truth[{2, t, b}] = {leastOn(shape, at[a], at[b], at[c]), edges};
+  }
+  return truth;
+}
+
+void expectWellFormed(const ShapeContact& c, const Body& body, const Placed& shape) {
+  EXPECT_NEAR(c.normal.norm(), 1, 1e-14);
+  EXPECT_GE(c.weights.minCoeff(), 0);
+  EXPECT_NEAR(c.weights.sum(), 1, 1e-15);
+  Vector3d point = Vector3d::Zero();
+  for (int i = 0; i < 3; ++i) point += c.weights[i] * body.positions[c.vertices[i]];
+  const double centre = c.distance + body.radius;
+  EXPECT_LE((point - c.point).norm(), 1e-14);
+  EXPECT_LE((c.point - centre * c.normal - c.pointOnShape).norm(), 1e-14);
+  EXPECT_NEAR(signedDistance(shape, c.point), centre, 1e-13);
+  EXPECT_NEAR(signedDistance(shape, c.pointOnShape), 0, 1e-8);
+  EXPECT_GE(signedDistance(shape, c.point + 1e-3 * c.normal), centre + 1e-3 - 1e-10);
+}
+
+TEST(Shapes, AnswerTheDefinition) {
+  Random random(2);
+  const std::vector<Body> bodies{organ(soup(random, 60, 0.3)), organ(soup(random, 60, 0.8)),
+                                 organ(sphere(8, 12, {.5, .5, .5}, .4)), thread(random, 60, 0.02),
+                                 particles(random, 100, 0.01)};
+  std::array<std::size_t, 3> distinct{}, inside{};
+  for (const Body& body : bodies)
+    for (const Placed& shape : shapes(random)) {
+      SCOPED_TRACE("shape " + std::to_string(shape.geometry.index()));
+      const double thickness = 0.05;
+      const auto all =
+                     byElement(answer(body, shape, {Method::Proximity, thickness, Contacts::All})),
+                 own = byElement(
+                     answer(body, shape, {Method::Proximity, thickness, Contacts::Distinct}));
+      for (const auto& [element, truth] : truthOf(body, shape)) {
+        const auto found = all.find(element);
+        if (found == all.end()) {
+          EXPECT_GT(truth.own - body.radius, thickness - kSearch) << element[0];
+          continue;
+        }
+        const ShapeContact& c = found->second;
+        EXPECT_NEAR(c.distance + body.radius, truth.own, kSearch) << element[0];
+        EXPECT_LE(c.distance + body.radius, truth.own + 1e-13) << "the search found a nearer point";
+        expectWellFormed(c, body, shape);
+        const auto held = own.find(element);
+        EXPECT_TRUE(held != own.end() || truth.boundary <= truth.own + kSearch) << element[0];
+        if (held == own.end()) continue;
+        ++distinct[element[0]];
+        inside[element[0]] += c.distance < 0;
+        EXPECT_EQ(held->second, c);
+        EXPECT_GT(c.weights.head(element[0] + 1).minCoeff(), 0);
+      }
+      for (const auto& [element, c] : own) EXPECT_TRUE(all.contains(element));
+    }
+  for (int kind = 0; kind < 3; ++kind) {
+    EXPECT_GT(distinct[kind], 50u) << kind;
+    EXPECT_GT(inside[kind], 30u) << kind;
+  }
+}
+
+TEST(Shapes, MoveWithTheirBodies) {
+  Random random(3);
+  const Body body = organ(sphere(8, 10, {0.5, 0.5, 0.5}, 0.4));
+  for (const Placed& shape : shapes(random)) {
+    const PairSettings pair{Method::Proximity, 0.05};
+    const auto here = byElement(answer(body, shape, pair));
+    for (int run = 0; run < 5; ++run) {
+      const Matrix3d turn = randomRotation(random);
+      const Vector3d shift = randomPoint(random, -4, 4);
+      Body moved = body;
+      for (Vector3d& p : moved.positions) p = turn * p + shift;
+      const auto there = byElement(answer(
+          moved, {shape.geometry, turn * shape.rotation, turn * shape.translation + shift}, pair));
+      for (const auto& [element, c] : here) {
+        const auto found = there.find(element);
+        if (found == there.end()) {  // on the border of being one
+          const double edge = std::min(c.weights.minCoeff(), 0.05 - c.distance);
+          EXPECT_TRUE(element[0] > 0 || edge < 1e-12) << element[0] << ' ' << c.weights.transpose();
+          continue;
+        }
+        EXPECT_NEAR(found->second.distance, c.distance, 1e-13);
+        EXPECT_NEAR((found->second.normal - turn * c.normal).norm(), 0, 1e-7)
+            << shape.geometry.index() << ' ' << element[0] << " at " << c.distance << ": "
+            << (shape.rotation.transpose() * c.normal).transpose() << " and "
+            << (shape.rotation.transpose() * turn.transpose() * found->second.normal).transpose();
+      }
+      EXPECT_NEAR(static_cast<double>(there.size()), static_cast<double>(here.size()), 1);
+    }
+  }
+}
+
+TEST(Shapes, AgreeWithTheirTessellations) {
+  Random random(4);
+  const Body body = organ(soup(random, 60, 0.15));
+  const auto nearest = [](const CollisionData& data) {
+    double distance = std::numeric_limits<double>::infinity();
+    for (const auto& c : data.vertexTriangle()) distance = std::min(distance, c.distance);
+    for (const auto& c : data.triangleVertex()) distance = std::min(distance, c.distance);
+    for (const auto& c : data.edgeEdge()) distance = std::min(distance, c.distance);
+    for (const auto& c : data.shape()) distance = std::min(distance, c.distance);
+    return distance;
+  };
+  const Mesh ball = sphere(60, 120, Vector3d::Zero(), 0.3);
+  Mesh cube{{},
+            {{0, 2, 1},
+             {1, 2, 3},
+             {4, 5, 6},
+             {5, 7, 6},
+             {0, 1, 4},
+             {1, 5, 4},
+             {2, 6, 3},
+             {3, 6, 7},
+             {0, 4, 2},
+             {2, 4, 6},
+             {1, 3, 5},
+             {3, 7, 5}}};
+  for (int v = 0; v < 8; ++v)
+    cube.positions.push_back({v & 1 ? 0.3 : -0.3, v & 2 ? 0.2 : -0.2, v & 4 ? 0.1 : -0.1});
+  int apart = 0;
+  for (int run = 0; run < 20; ++run) {
+    const Matrix3d turn = randomRotation(random);
+    const Vector3d at = Vector3d::Constant(0.5) + 1.1 * randomPoint(random, -1, 1).normalized();
+    for (const bool isBall : {true, false}) {
+      Mesh mesh = isBall ? ball : cube;
+      for (Vector3d& p : mesh.positions) p = turn * p + at;
+      const Placed shape{isBall ? AnalyticalGeometry(Sphere{{0, 0, 0}, 0.3})
+                                : AnalyticalGeometry(Box{{0, 0, 0}, {0.3, 0.2, 0.1}}),
+                         turn, at};
+      const Mesh own{body.positions, body.primitives};
+      PairRun meshes(settingsOf(Engine::Octree), own, mesh, {Method::Proximity, 1.0}, false);
+      meshes.detect();
+      const double truth = nearest(meshes.data()),
+                   found = nearest(answer(body, shape, {Method::Proximity, 1.0}));
+      if (!(truth > 0.01)) continue;
+      ++apart;
+      // Chords of 3 degrees are this far inside at most.
+      EXPECT_NEAR(found, truth, isBall ? 0.3 * 2 * (1 - std::cos(3.1415927 / 120)) : 1e-14);
+    }
+  }
+  EXPECT_GT(apart, 20);
+}
+
+// ---- By hand ----
+
+TEST(Shapes, CubeOnTableTouchesWithItsCorners) {
+  Body cube = organ({{},
+                     {{0, 2, 1},
+                      {1, 2, 3},
+                      {4, 5, 6},
+                      {5, 7, 6},
+                      {0, 1, 4},
+                      {1, 5, 4},
+                      {2, 6, 3},
+                      {3, 6, 7},
+                      {0, 4, 2},
+                      {2, 4, 6},
+                      {1, 3, 5},
+                      {3, 7, 5}}});
+  for (int v = 0; v < 8; ++v)
+    cube.positions.push_back({double(v & 1), double(v >> 1 & 1), double(v >> 2)});
+  const auto table = [](double height, bool twoSided) {
+    return Placed{Plane{{0, 0, height}, {0, 0, 7}, twoSided}};
+  };
+  for (const double height : {0.0, 0.25}) {
+    const CollisionData data = answer(cube, table(height, false), {Method::Proximity, 0.0});
+    ASSERT_EQ(data.shape().size(), 4u);
+    for (std::uint32_t v = 0; v < 4; ++v) {
+      EXPECT_EQ(data.shape()[v].element, ShapeElement::Vertex);
+      EXPECT_EQ(data.shape()[v].id, v);
+      EXPECT_EQ(data.shape()[v].distance, -height);
+      EXPECT_EQ(data.shape()[v].normal, Vector3d::UnitZ());
+    }
+  }
+  // Through the middle of a sheet: four edges and one diagonal on each side cross it.
+  const CollisionData data = answer(cube, table(0.5, true), {Method::Proximity, 0.0});
+  EXPECT_EQ(data.shape().size(), 8u);
+  for (const ShapeContact& c : data.shape()) {
+    EXPECT_EQ(c.element, ShapeElement::Edge);
+    EXPECT_EQ(c.distance, 0);
+    EXPECT_EQ(c.point[2], 0.5);
+  }
+}
+
+TEST(Shapes, TriangleIsMetWhereItIsNearest) {
+  const Body triangle = organ({{{-8, -8, 0}, {8, -8, 0}, {0, 8, 0}}, {{0, 1, 2}}});
+  const auto only = [&](const AnalyticalGeometry& shape) {
+    const CollisionData data = answer(triangle, {shape}, {Method::Proximity, 1.0});
+    EXPECT_EQ(data.shape().size(), 1u);
+    EXPECT_EQ(data.shape()[0].element, ShapeElement::Face);
+    return data.shape()[0];
+  };
+  ShapeContact c = only(Sphere{{0, 0, 2}, 1.5});
+  EXPECT_EQ(c.distance, 0.5);
+  EXPECT_EQ(c.normal, -Vector3d::UnitZ());
+  EXPECT_EQ(c.point, Vector3d::Zero());
+  c = only(Sphere{{0, 0, -0.5}, 1.5});
+  EXPECT_EQ(c.distance, -1);
+  EXPECT_EQ(c.normal, Vector3d::UnitZ());
+  c = only(Capsule{{-1, 0, 2}, {1, 0, 2}, 1.5});  // parallel: in the middle
+  EXPECT_EQ(c.point, Vector3d::Zero());
+  c = only(Capsule{{0, 0, 4}, {1, 0, 2}, 1.5});
+  EXPECT_EQ(c.point, Vector3d(1, 0, 0));
+  c = only(Capsule{{0, 0, 4}, {0, 0, -2}, 1.5});  // its axis goes through
+  EXPECT_EQ(c.distance, -1.5);
+  EXPECT_EQ(c.point, Vector3d::Zero());
+  EXPECT_EQ(c.normal[2], 0);              // out, across the axis
+  c = only(Box{{0, 0, 2}, {1, 1, 1.5}});  // flat: in the middle
+  EXPECT_EQ(c.point, Vector3d::Zero());
+  EXPECT_EQ(c.distance, 0.5);
+  c = only(Box{{0, 0, 1}, {1, 1, 1.5}});  // the nearest way out is below
+  EXPECT_EQ(c.distance, -0.5);
+  EXPECT_EQ(c.normal, -Vector3d::UnitZ());
+  c = only(Cylinder{{0, 0, 0.5}, {0, 0, 4}, 1});
+  EXPECT_EQ(c.distance, 0.5);
+  c = only(Cylinder{{0, -1, 2}, {0, 1, 2}, 1.5});
+  EXPECT_EQ(c.point, Vector3d::Zero());
+  EXPECT_EQ(c.distance, 0.5);
+}
+
+TEST(Shapes, DegenerateElementsAnswerTheDefinition) {
+  Random random(5);
+  std::vector<Placed> all{{Sphere{{1, 1, 1}, 0.5}},
+                          {Sphere{{1, 1, 1}, 0}},
+                          {Capsule{{0, 0, 0}, {2, 0, 0}, 0}},
+                          {Capsule{{0, 1, 1}, {2, 1, 1}, 0.5}},
+                          {Capsule{{1, 1, 1}, {1, 1, 1}, 1}},
+                          {Plane{{1, 1, 1}, {0, 0, 1}, false}},
+                          {Plane{{1, 1, 1}, {0, 1, 1}, true}},
+                          {Box{{1, 1, 1}, {0, 0, 0}}},
+                          {Box{{1, 1, 1}, {1, 1, 0}}},
+                          {Box{{1, 1, 1}, {1, 0.5, 0.5}}},
+                          {Cylinder{{1, 1, 0}, {1, 1, 2}, 0.5}},
+                          {Cylinder{{1, 1, 0}, {1, 1, 2}, 0}}};
+  for (int run = 0; run < 12; ++run) {
+    Body zoo{GeometryKind::Triangles, {}, {}};  // on a coarse grid
+    for (int v = 0; v < 12; ++v) {
+      const auto at = [&] { return static_cast<double>(random() % 3); };
+      const double x = at(), y = at(), z = at();
+      zoo.positions.push_back({x, y, z});
+    }
+    const auto any = [&] { return static_cast<std::uint32_t>(random() % 12); };
+    for (int t = 0; t < 14; ++t) {
+      const std::uint32_t a = any(), b = any(), c = any();
+      zoo.primitives.push_back({a, b, c});
+    }
+    for (const Placed& shape : all) {
+      if (shape.geometry.index() == 1 &&
+          std::get<Capsule>(shape.geometry).p0 == std::get<Capsule>(shape.geometry).p1)
+        continue;  // the test's own formula needs a length
+      SCOPED_TRACE("shape " + std::to_string(shape.geometry.index()));
+      const auto found = byElement(answer(zoo, shape, {Method::Proximity, 0.75, Contacts::All}));
+      for (const auto& [element, truth] : truthOf(zoo, shape)) {
+        const auto c = found.find(element);
+        if (c == found.end())
+          EXPECT_GT(truth.own, 0.75 - kSearch);
+        else
+          EXPECT_NEAR(c->second.distance, truth.own, kSearch);
+      }
+      for (const auto& [element, c] : found) expectWellFormed(c, zoo, shape);
+    }
+    // A capsule without length is a sphere.
+    const PairSettings pair{Method::Proximity, 0.5};
+    EXPECT_EQ(answer(zoo, {Capsule{{1, 1, 1}, {1, 1, 1}, 0.5}}, pair).hash(),
+              answer(zoo, {Sphere{{1, 1, 1}, 0.5}}, pair).hash());
+  }
+}
+
+// ---- Refused ----
+
+template <class F>
+void expectRefused(ErrorCode code, const std::string& words, F&& call) {
+  try {
+    call();
+    ADD_FAILURE() << "accepted; expected: " << words;
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), code);
+    EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+  }
+}
+
+TEST(Shapes, BadInputIsRefusedByName) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN(),
+                   kInfinity = std::numeric_limits<double>::infinity();
+  OctreeBasedCD collisions(settingsOf(Engine::Octree));
+  using Code = ErrorCode;
+  const auto refuse = [&](const AnalyticalGeometry& shape, const std::string& words) {
+    expectRefused(Code::InvalidShape, "geometry 0: " + words,
+                  [&] { collisions.addAnalyticalGeometry(shape); });
+  };
+  refuse(Sphere{{0, 0, 0}, -1}, "radius is -1; it must be finite and not negative");
+  refuse(Sphere{{0, kNan, 0}, 1}, "centre is (0, nan, 0); it must be finite");
+  refuse(Capsule{{0, 0, 0}, {0, 0, kInfinity}, 1}, "p1 is (0, 0, inf); it must be finite");
+  refuse(Capsule{{0, 0, 0}, {0, 0, 1}, kNan}, "radius is nan");
+  refuse(Plane{{0, 0, 0}, {0, 0, 0}}, "normal is (0, 0, 0); it must be of some length");
+  refuse(Box{{0, 0, 0}, {1, -2, 1}}, "halfExtents is (1, -2, 1); it must be finite and not neg");
+  refuse(Cylinder{{1, 2, 3}, {1, 2, 3}, 1}, "p1 is (1, 2, 3); it must be another point than p0");
+
+  const GeometryId tool = collisions.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1}),
+                   other = collisions.addAnalyticalGeometry(Box{{0, 0, 0}, {1, 1, 1}}),
+                   points = collisions.addPointSet(Positions{{0, 0, 0.5}});
+  EXPECT_EQ(tool, GeometryId{0});  // nothing refused took an id
+  for (const Method method : {Method::Auto, Method::Intersection, Method::Continuous})
+    expectRefused(Code::UnsupportedMethod, "Method::Proximity only", [&] {
+      collisions.addCollisionPair(tool, points, {method, 1.0});
+    });
+  expectRefused(Code::UnsupportedMethod, "two shapes", [&] {
+    collisions.addCollisionPair(tool, other, {Method::Proximity, 1.0});
+  });
+  expectRefused(Code::UnsupportedMethod, "two shapes", [&] {
+    collisions.addCollisionPair(tool, tool, {Method::Proximity, 1.0});
+  });
+  collisions.addCollisionPair(tool, points, {Method::Proximity, 0.0});
+  collisions.detectCollision();
+  ASSERT_EQ(collisions.collisionData(tool, points).shape().size(), 1u);
+  EXPECT_EQ(collisions.statistics().contacts, 1u);
+  EXPECT_FALSE(collisions.collisionData(tool, points).validity().trusted);
+  const Matrix3d one = Matrix3d::Identity();
+  Matrix3d turned = one;
+  turned(0, 1) = 2e-9;
+  expectRefused(Code::InvalidTransform, "geometry 0: rotation is not a rotation", [&] {
+    collisions.setTransform(tool, turned, {0, 0, 0});
+  });
+  expectRefused(Code::InvalidTransform, "its determinant is -1", [&] {
+    collisions.setTransform(tool, -one, {0, 0, 0});
+  });
+  expectRefused(Code::InvalidTransform, "rotation", [&] {
+    collisions.setTransform(tool, kNan * one, {0, 0, 0});
+  });
+  expectRefused(Code::InvalidTransform, "translation is (0, 0, nan)", [&] {
+    collisions.setTransform(tool, one, {0, 0, kNan});
+  });
+  expectRefused(Code::UnsupportedMethod, "setTransform() is for shapes", [&] {
+    collisions.setTransform(points, one, {0, 0, 0});
+  });
+  expectRefused(Code::WrongPositionCount, "is a shape, which has no positions",
+                [&] { collisions.setPositions(tool, Positions{}); });
+  expectRefused(Code::UnsupportedMethod, "is a shape; setTriangles()",
+                [&] { collisions.setTriangles(tool, Positions{}, {}); });
+  expectRefused(Code::NotClosed, "is a shape",
+                [&] { collisions.findInsideVertices(points, tool); });
+  expectRefused(Code::NotAvailable, "no candidate pairs",
+                [&] { collisions.candidatePairs(tool, points); });
+  expectRefused(Code::NotAvailable, "no candidate pairs", [&] {
+    collisions.forEachCandidate(tool, points, [](std::span<const TrianglePair>) {});
+  });
+  expectRefused(Code::UnsupportedMethod, "no features to ask about", [&] {
+    collisions.setContactPredicate(tool, points, [](const ContactFeatures&) { return true; });
+  });
+  turned(0, 1) = 1e-10;
+  collisions.setTransform(tool, turned, {0, 0, 4});
+  collisions.collectCandidates();
+  collisions.detectCollision();
+  EXPECT_TRUE(collisions.collisionData(tool, points).shape().empty());
+  collisions.removeGeometry(tool);
+  EXPECT_TRUE(collisions.pairs().empty());
+}
+
+// ---- Round the library ----
+
+TEST(Shapes, CapturesAndAuditsHoldThem) {
+  Random random(6);
+  const Body body = organ(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
+  for (const int features : {20, 100000}) {
+    Settings audited = settingsOf(Engine::Octree);
+    audited.audit.features = features;
+    OctreeBasedCD collisions(audited);
+    const GeometryId mesh = body.addTo(collisions);
+    for (const Placed& shape : shapes(random)) {
+      const GeometryId tool = collisions.addAnalyticalGeometry(shape.geometry);
+      collisions.setTransform(tool, shape.rotation, shape.translation);
+      collisions.addCollisionPair(tool, mesh, {Method::Proximity, 0.02});
+    }
+    collisions.detectCollision();
+    EXPECT_TRUE(collisions.auditFailures().empty());
+    const auto path = std::filesystem::temp_directory_path() / "palpate-shapes.capture";
+    capture(collisions, path);
+    OctreeBasedCD again = setUp(readCapture(path));
+    std::filesystem::remove(path);
+    again.detectCollision();
+    EXPECT_GT(collisions.statistics().contacts, 100u);
+    for (const CollisionPair& pair : collisions.pairs())
+      EXPECT_EQ(again.collisionData(pair.a, pair.b).hash(),
+                collisions.collisionData(pair.a, pair.b).hash());
+  }
+}
+
+}  // namespace
+}  // namespace palpate::testing
