@@ -505,15 +505,19 @@ TEST(Kinds, DocumentSaysWhatIsAnswered) {
                                                     {Method::Auto, "Auto"},
                                                     {Method::Proximity, "Proximity"},
                                                     {Method::Continuous, "Continuous"}};
-  const std::string names[] = {"triangles", "lines", "points"};
+  const std::string names[] = {"triangles", "lines", "points", "shapes"};
   const Thing kinds[] = {{GeometryKind::Triangles, some, {{0, 1, 2}}, {}},
                          {GeometryKind::Lines, some, {}, {{0, 1}}},
                          {GeometryKind::Points, some, {}, {}}};
+  const auto add = [&](OctreeBasedCD& detection, int kind) {
+    return kind == 3 ? detection.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1.0})
+                     : kinds[kind].addTo(detection);
+  };
   std::ifstream file(PALPATE_SOURCE_DIR "/Docs/Pairs.md");
   const std::string document{std::istreambuf_iterator<char>(file), {}};
-  for (int a = 0; a < 3; ++a) {
+  for (int a = 0; a < 4; ++a) {
     std::string row = "| **" + names[a] + "** |";
-    for (int b = 0; b < 3; ++b) {
+    for (int b = 0; b < 4; ++b) {
       std::string cell;
       int accepted = 0;
       for (const auto& [method, name] : methods) {
@@ -521,7 +525,7 @@ TEST(Kinds, DocumentSaysWhatIsAnswered) {
         for (const bool self : {false, true}) {
           if (self && a != b) continue;
           OctreeBasedCD detection;
-          const GeometryId first = kinds[a].addTo(detection), second = kinds[b].addTo(detection);
+          const GeometryId first = add(detection, a), second = add(detection, b);
           try {
             detection.addCollisionPair(first, self ? first : second, {method, 1.0});
             ++ways;
@@ -534,7 +538,7 @@ TEST(Kinds, DocumentSaysWhatIsAnswered) {
         ++accepted;
         cell += (cell.empty() ? "`" : ", `") + name + "`";
       }
-      row += " " + (accepted == 4 ? "every method" : cell) + " |";
+      row += " " + (accepted == 4 ? "every method" : accepted == 0 ? "refused" : cell) + " |";
     }
     EXPECT_NE(document.find(row + "\n"), document.npos) << row;
   }
