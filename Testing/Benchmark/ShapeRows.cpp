@@ -1,5 +1,6 @@
 // A capsule pressed into a sheet of 100,352 triangles, all moving, and the same sheet's vertices as
-// particles: what the pair takes beyond the update, beside brute force over the same frame.
+// particles: what the pair takes beyond the update, beside brute force over the same frames and
+// FCL.
 #include "Rows.h"
 
 #ifdef PALPATE_BENCHMARK_PEERS
@@ -22,8 +23,8 @@ constexpr double kMilliseconds = 0.1;  ///< aimed at for the triangles
 /// Beside the sheet what an instrument of 5 mm is beside 200 mm.
 const Capsule kTool{{0, 0, 0}, {0.25, 0, 0}, 0.0125};
 
-Positions waves(int frame) {
-  Positions positions;
+std::vector<Eigen::Vector3d> waves(int frame) {
+  std::vector<Eigen::Vector3d> positions;
   for (std::uint32_t j = 0; j <= kSide; ++j)
     for (std::uint32_t i = 0; i <= kSide; ++i) {
       const double x = double(i) / kSide, y = double(j) / kSide;
