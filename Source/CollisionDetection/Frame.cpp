@@ -149,7 +149,7 @@ struct Frame::Job {
     const MeshPair meshes = job.record->meshes(&job.floats);
     bool& intersecting = job.contacts.facts.startsIntersecting;
     if (meshes.step.start && !intersecting)
-      intersecting = anyIntersectAtStart(meshes, pairs, job.overlaps.part);
+      intersecting = anyIntersectAtStart(meshes, pairs, job.overlaps);
     if (job.record->plan.overlaps) findIntersections(meshes, pairs, job.overlaps);
     if (meshes.settings.contacts == Contacts::Earliest)
       job.findEarliest(meshes, pairs);
@@ -305,7 +305,7 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
     narrow += job.narrowMilliseconds;
     statistics.candidatePairs += job.sink.total();
     statistics.featurePairs += job.contacts.featurePairs;
-    statistics.exactDecisions += job.contacts.exactDecisions;
+    statistics.exactDecisions += job.contacts.exactDecisions + job.overlaps.exactDecisions;
   }
   // Threads work on both stages at once: the wall clock is shared out as their work was.
   const double wall = watch.lap();
@@ -376,7 +376,7 @@ void Frame::findStartByBruteForce(const PairRecord& record, ContactBuffers& cont
   for (std::uint32_t a = 0; a < countA && meshes.step.start; ++a)
     for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b)
       contacts.facts.startsIntersecting |= meshes.a.topology.isOn(a) && meshes.b.topology.isOn(b) &&
-                                           intersectAtStart(meshes, {a, b});
+                                           intersectAtStart(meshes, {a, b}, overlaps);
   if (!record.plan.overlaps) return;
   meshes.settings.method = Method::Intersection;
   findContactsByBruteForce(meshes, overlaps);
@@ -402,7 +402,7 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Setti
     }
     if (settings.keepCandidates) findCandidatesByBruteForce(record->meshes(), record->candidates);
     statistics.featurePairs += contacts.featurePairs;
-    statistics.exactDecisions += contacts.exactDecisions;
+    statistics.exactDecisions += contacts.exactDecisions + overlaps.exactDecisions;
     statistics.milliseconds.narrowPhase += watch.lap();
     m_buffers = {&contacts};
     m_overlaps = {&overlaps};

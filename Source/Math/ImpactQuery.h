@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 
 #include <array>
+#include <cstddef>
 
 namespace palpate {
 
@@ -60,7 +61,7 @@ ImpactAnswer findApproach(const ImpactQuery&, double distance, double tolerance,
 
 /// The side of the contact plane on which the first feature was last before the time: 1 if that of
 /// A x B, the triangle's winding normal or (p1 - p0) x (q0 - q1), towards which C points; else -1;
-/// 0 if it was always in the plane.
-int sideBefore(const ImpactQuery&, double time);
+/// 0 if it was always in the plane. exactDecisions: counts up where floating point could not tell.
+int sideBefore(const ImpactQuery&, double time, std::size_t* exactDecisions = nullptr);
 
 }  // namespace palpate

@@ -31,7 +31,8 @@ int exactSideAt(const ImpactQuery& query, double time) {
 }
 
 /// The first that is not zero, ever further back.
-int exactSide(const ImpactQuery& query, double time) {
+int exactSide(const ImpactQuery& query, double time, std::size_t* exactDecisions) {
+  if (exactDecisions) ++*exactDecisions;
   for (double back = 0x1p-44;; back *= 0x1p8) {
     const double t = std::max(time - back, 0.0);
     const int sign = exactSideAt(query, t);
@@ -40,12 +41,12 @@ int exactSide(const ImpactQuery& query, double time) {
 }
 
 template <ImpactQuery::Kind kind>
-int side(const ImpactQuery& query, double time) {
+int side(const ImpactQuery& query, double time, std::size_t* exactDecisions) {
   RelativeMotion<kind> motion(query);
   for (auto* ends : {&motion.a, &motion.b, &motion.c}) {
     const double largest =
         std::max((*ends)[0].cwiseAbs().maxCoeff(), (*ends)[1].cwiseAbs().maxCoeff());
-    if (!(largest > 0.0 && std::isfinite(largest))) return exactSide(query, time);
+    if (!(largest > 0.0 && std::isfinite(largest))) return exactSide(query, time, exactDecisions);
     for (Eigen::Vector3d& end : *ends) end /= largest;
   }
   // Ever further back, until rounding cannot hide the side.
@@ -54,16 +55,16 @@ int side(const ImpactQuery& query, double time) {
     const double volume = at(t, motion.a).cross(at(t, motion.b)).dot(at(t, motion.c));
     if (volume > kSideError) return 1;
     if (volume < -kSideError) return -1;
-    if (t == 0.0) return exactSide(query, time);
+    if (t == 0.0) return exactSide(query, time, exactDecisions);
   }
 }
 
 }  // namespace
 
-int sideBefore(const ImpactQuery& query, double time) {
+int sideBefore(const ImpactQuery& query, double time, std::size_t* exactDecisions) {
   return query.kind == ImpactQuery::Kind::VertexTriangle
-             ? side<ImpactQuery::Kind::VertexTriangle>(query, time)
-             : side<ImpactQuery::Kind::EdgeEdge>(query, time);
+             ? side<ImpactQuery::Kind::VertexTriangle>(query, time, exactDecisions)
+             : side<ImpactQuery::Kind::EdgeEdge>(query, time, exactDecisions);
 }
 
 }  // namespace palpate

@@ -13,8 +13,7 @@ namespace palpate {
 
 /// How often the floating filter did not decide.
 struct SignCounts {
-  std::size_t undecided = 0;    ///< by the filter, but for trivial zeros
-  std::size_t bigIntegers = 0;  ///< of these, left to integers of any size, which allocate
+  std::size_t undecided = 0;  ///< but for trivial zeros
 };
 
 /// Signs of the same determinants, with no rounding at all. Slow.

@@ -2,6 +2,7 @@
 
 #include "Math/ImpactQuery.h"
 #include "Math/Tolerances.h"
+#include "Core/FloatingPoint.h"
 
 #include <algorithm>
 
@@ -20,7 +21,9 @@ ImpactAnswer findImpact(const ImpactQuery& query, const TimeOfImpactSettings& se
 
 namespace {
 
-std::optional<double> timeOf(const ImpactAnswer& answer) {
+std::optional<double> timeOf(const ImpactQuery& query, const TimeOfImpactSettings& settings) {
+  const StandardFloatingPoint standard;
+  const ImpactAnswer answer = findImpact(query, settings);
   return answer.impact ? std::optional(answer.time) : std::nullopt;
 }
 
@@ -31,10 +34,9 @@ std::optional<double> vertexTriangleTimeOfImpact(
     const Eigen::Vector3d& cBefore, const Eigen::Vector3d& vNow, const Eigen::Vector3d& aNow,
     const Eigen::Vector3d& bNow, const Eigen::Vector3d& cNow,
     const TimeOfImpactSettings& settings) {
-  return timeOf(
-      findImpact({ImpactQuery::Kind::VertexTriangle,
-                  {{{&vBefore, &vNow}, {&aBefore, &aNow}, {&bBefore, &bNow}, {&cBefore, &cNow}}}},
-                 settings));
+  return timeOf({ImpactQuery::Kind::VertexTriangle,
+                 {{{&vBefore, &vNow}, {&aBefore, &aNow}, {&bBefore, &bNow}, {&cBefore, &cNow}}}},
+                settings);
 }
 
 std::optional<double> edgeEdgeTimeOfImpact(
@@ -42,10 +44,10 @@ std::optional<double> edgeEdgeTimeOfImpact(
     const Eigen::Vector3d& q0Before, const Eigen::Vector3d& q1Before, const Eigen::Vector3d& p0Now,
     const Eigen::Vector3d& p1Now, const Eigen::Vector3d& q0Now, const Eigen::Vector3d& q1Now,
     const TimeOfImpactSettings& settings) {
-  return timeOf(findImpact(
+  return timeOf(
       {ImpactQuery::Kind::EdgeEdge,
        {{{&p0Before, &p0Now}, {&p1Before, &p1Now}, {&q0Before, &q0Now}, {&q1Before, &q1Now}}}},
-      settings));
+      settings);
 }
 
 }  // namespace palpate

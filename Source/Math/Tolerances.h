@@ -56,13 +56,6 @@ constexpr double kVolumeError = 10 * 0x1p-53;
 /// Of one component of (b - a) x (c - a), relative to the sum of its products' magnitudes: 4 u and
 /// the sum's own rounding.
 constexpr double kAreaError = 6 * 0x1p-53;
-/// Of the volume in sums of two doubles, relative to the product of the three differences' 1-norms:
-/// 75 u^2, and above that the norms' own rounding.
-constexpr double kTwoDoublesError = 0x1p-98;
-/// L. Coordinates between these, and zero, have products of three differences whose errors are
-/// doubles; others are left to integers.
-constexpr double kSmallestCompensated = 0x1p-300;
-constexpr double kLargestCompensated = 0x1p300;
 
 // ---- Impacts (RelativeMotion.cpp, FindTouch.cpp, FindApproach.cpp, ImpactFilter.cpp) ----
 

@@ -2,6 +2,8 @@
 
 #include <palpate/Intersection.h>
 
+#include "Core/FloatingPoint.h"
+
 namespace palpate {
 
 namespace {
@@ -212,6 +214,7 @@ TriangleIntersection intersectTriangles(const Corners& cornersOfA, const Corners
 bool trianglesIntersect(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1,
                         const Eigen::Vector3d& a2, const Eigen::Vector3d& b0,
                         const Eigen::Vector3d& b1, const Eigen::Vector3d& b2) {
+  const StandardFloatingPoint standard;
   SignCounts counts;
   return intersectTriangles({a0, a1, a2}, {b0, b1, b2}, counts).intersect();
 }

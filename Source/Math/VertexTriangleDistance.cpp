@@ -2,6 +2,7 @@
 #include "Math/ExactClosestPoint.h"
 #include "Math/FilteredSigns.h"
 #include "Math/Foot.h"
+#include "Core/FloatingPoint.h"
 
 #include <algorithm>
 #include <array>
@@ -141,6 +142,7 @@ VertexTriangleDistance finiteVertexTriangleDistance(const Vector3d& p, const Vec
 
 VertexTriangleDistance vertexTriangleDistance(const Vector3d& p, const Vector3d& a,
                                               const Vector3d& b, const Vector3d& c) {
+  const StandardFloatingPoint standard;
   if (areFinite(p, a, b, c)) return finiteVertexTriangleDistance(p, a, b, c);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const Vector3d none = Vector3d::Constant(nan);

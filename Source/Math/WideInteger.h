@@ -40,6 +40,19 @@ inline Int256 product(Int128 a, Int128 b) {
   return (a < 0) == (b < 0) ? result : Int256{} - result;
 }
 
+/// |x| = mantissa 2^exponent.
+struct DoubleParts {
+  std::uint64_t mantissa;
+  int exponent;
+};
+inline DoubleParts splitDouble(double x) {
+  const auto bits = std::bit_cast<std::uint64_t>(x);
+  const int exponent = static_cast<int>(bits >> 52 & 0x7ff);
+  const std::uint64_t fraction = bits & ((std::uint64_t{1} << 52) - 1);
+  if (exponent == 0) return {fraction, -1074};
+  return {fraction | std::uint64_t{1} << 52, exponent - 1075};
+}
+
 /// Positions as integers in units of a power of two, exactly, where differences fit 61 bits: of
 /// meshes near each other whose coordinates have not many more bits than a double.
 template <std::size_t Count>
@@ -53,7 +66,7 @@ struct FixedGrid {
     int lowest = kHighestBit, highest = -kHighestBit;
     for (const Eigen::Vector3d* position : all) {
       for (const double x : *position) {
-        const auto [mantissa, exponent] = split(x);
+        const auto [mantissa, exponent] = splitDouble(x);
         if (mantissa == 0) continue;
         lowest = std::min(lowest, exponent + std::countr_zero(mantissa));
         highest = std::max(highest, exponent + 53);
@@ -74,20 +87,8 @@ struct FixedGrid {
   static constexpr int kHighestBit = 2000;
   static constexpr Int128 kLimit = Int128{1} << 60;  // differences of two stay below 2^61
 
-  struct Parts {
-    std::uint64_t mantissa;
-    int exponent;
-  };
-  /// |x| = mantissa 2^exponent.
-  static Parts split(double x) {
-    const auto bits = std::bit_cast<std::uint64_t>(x);
-    const int exponent = static_cast<int>(bits >> 52 & 0x7ff);
-    const std::uint64_t fraction = bits & ((std::uint64_t{1} << 52) - 1);
-    if (exponent == 0) return {fraction, -1074};
-    return {fraction | std::uint64_t{1} << 52, exponent - 1075};
-  }
   static Int128 integer(double x, int lowest) {
-    const auto [mantissa, exponent] = split(x);
+    const auto [mantissa, exponent] = splitDouble(x);
     if (mantissa == 0) return 0;
     const int shift = exponent - lowest;
     const Int128 magnitude = shift >= 0 ? Int128{mantissa} << shift : Int128{mantissa >> -shift};

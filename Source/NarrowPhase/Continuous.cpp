@@ -110,6 +110,7 @@ class ContactFinder {
     if constexpr (kind == Kind::VertexTriangle) {
       const MeshTopology& topology = features.second.topology;
       const auto closest = finiteVertexTriangleDistance(p[0], p[1], p[2], p[3]);
+      m_out.exactDecisions += closest.exact;
       VertexTriangleContact contact =
           contactOf(inFirst, inSecond, topology.triangles[inSecond], closest);
       // A corner touches its triangle, and then the normal is the plane's.
@@ -125,6 +126,7 @@ class ContactFinder {
     } else {
       const MeshTopology &ofA = features.first.topology, &ofB = features.second.topology;
       const auto closest = finiteEdgeEdgeDistance(p[0], p[1], p[2], p[3]);
+      m_out.exactDecisions += closest.exact;
       EdgeEdgeContact contact = contactOf(ofA.edges[inFirst], ofB.edges[inSecond], closest);
       complete(contact, query, time, [&] {
         return finiteEdgeEdgeDistance(p[0], p[1], p[0], p[0] + (p[3] - p[2])).normal;
@@ -146,7 +148,7 @@ class ContactFinder {
     contact.distance -= m_pair.a.largestRadius + m_pair.b.largestRadius;
     if (m_settings.minimumDistance > 0.0) return;
     contact.normal = normal();
-    if (sideBefore(query, time) < 0) contact.normal = -contact.normal;
+    if (sideBefore(query, time, &m_out.exactDecisions) < 0) contact.normal = -contact.normal;
   }
 
   const MeshPair& m_pair;

@@ -167,18 +167,19 @@ void findIntersections(const MeshPair& pair, std::span<const TrianglePair> candi
   out.exactDecisions += counts.undecided;
 }
 
-bool intersectAtStart(const MeshPair& pair, const TrianglePair& candidate) {
-  SignCounts counts;
+bool intersectAtStart(const MeshPair& pair, const TrianglePair& candidate, ContactBuffers& counts) {
+  SignCounts signs;
   bool found = false;
-  intersect(pair, candidate, true, counts, [&](const auto&...) { found = true; });
+  intersect(pair, candidate, true, signs, [&](const auto&...) { found = true; });
+  counts.exactDecisions += signs.undecided;
   return found;
 }
 
 bool anyIntersectAtStart(const MeshPair& pair, std::span<const TrianglePair> candidates,
-                         Buffer<TrianglePair>& scratch) {
-  keepPossible(pair, true, candidates, scratch);
-  return std::any_of(scratch.begin(), scratch.end(), [&](const TrianglePair& candidate) {
-    return intersectAtStart(pair, candidate);
+                         ContactBuffers& counts) {
+  keepPossible(pair, true, candidates, counts.part);
+  return std::any_of(counts.part.begin(), counts.part.end(), [&](const TrianglePair& candidate) {
+    return intersectAtStart(pair, candidate, counts);
   });
 }
 

@@ -54,10 +54,11 @@ class StepCheck {
 void answerByImpact(const MeshPair&, const StepFacts& touched, ContactBuffers& found,
                     ContactBuffers& out);
 
-/// Whether triangles of the candidates intersect at the step's start, exactly.
+/// Whether triangles of the candidates intersect at the step's start, exactly. counts:
+/// exactDecisions only, and a scratch.
 bool anyIntersectAtStart(const MeshPair&, std::span<const TrianglePair> candidates,
-                         Buffer<TrianglePair>& scratch);
+                         ContactBuffers& counts);
 /// The same of one pair.
-bool intersectAtStart(const MeshPair&, const TrianglePair&);
+bool intersectAtStart(const MeshPair&, const TrianglePair&, ContactBuffers& counts);
 
 }  // namespace palpate
