@@ -4,9 +4,17 @@
 
 #include <CGAL/Box_intersection_d/Box_with_info_d.h>
 #include <CGAL/box_intersection_d.h>
+#include <CGAL/AABB_face_graph_triangle_primitive.h>
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Side_of_triangle_mesh.h>
+#include <CGAL/Surface_mesh.h>
 
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+
+#include <chrono>
 
 namespace palpate::benchmark {
 namespace {
@@ -99,6 +107,36 @@ class Cgal : public Peer {
 };
 
 }  // namespace
+
+InsideAnswer insideByCgal(const std::vector<Eigen::Vector3d>& positions,
+                          const std::vector<Triangle>& triangles,
+                          const std::vector<Eigen::Vector3d>& points) {
+  using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+  using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
+  using Tree =
+      CGAL::AABB_tree<CGAL::AABB_traits<Kernel, CGAL::AABB_face_graph_triangle_primitive<Mesh>>>;
+  Mesh mesh;
+  std::vector<Mesh::Vertex_index> vertices;
+  for (const Eigen::Vector3d& p : positions)
+    vertices.push_back(mesh.add_vertex({p[0], p[1], p[2]}));
+  for (const auto& [a, b, c] : triangles) mesh.add_face(vertices[a], vertices[b], vertices[c]);
+  Tree tree(faces(mesh).begin(), faces(mesh).end(), mesh);
+  tree.build();
+  tree.accelerate_distance_queries();
+  const CGAL::Side_of_triangle_mesh<Mesh, Kernel> side(tree);
+  side(Kernel::Point_3(0, 0, 0));
+  InsideAnswer answer;
+  const auto start = std::chrono::steady_clock::now();
+  for (const Eigen::Vector3d& point : points) {
+    const Kernel::Point_3 p(point[0], point[1], point[2]);
+    if (side(p) != CGAL::ON_BOUNDED_SIDE) continue;
+    ++answer.inside;
+    answer.depth += std::sqrt(CGAL::squared_distance(p, tree.closest_point_and_primitive(p).first));
+  }
+  answer.milliseconds =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return answer;
+}
 
 std::unique_ptr<Peer> makeCgal() { return std::make_unique<Cgal>(); }
 

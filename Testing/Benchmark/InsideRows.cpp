@@ -1,0 +1,124 @@
+// Vertices inside a closed body, beside CGAL; and a million particles around it, beside brute
+// force.
+#include "Rows.h"
+
+#include "Common/RandomMeshes.h"
+
+#ifdef PALPATE_BENCHMARK_PEERS
+#include "Peers/Peer.h"
+#endif
+
+#include <palpate/OctreeBasedCD.h>
+
+#include <cmath>
+
+namespace palpate::benchmark {
+namespace {
+
+using Points = std::vector<Eigen::Vector3d>;
+
+/// A closed body of 100,352 triangles, with bumps.
+testing::Mesh bone() {
+  testing::Mesh body = testing::sphere(225, 224, Eigen::Vector3d::Zero(), 1);
+  for (Eigen::Vector3d& p : body.positions)
+    p *= 0.9 + 0.05 * std::sin(9 * p[0]) * std::cos(11 * p[1] + 5 * p[2]);
+  return body;
+}
+
+Points pointsIn(testing::Random& random, std::size_t count, double half) {
+  Points points(count);
+  for (Eigen::Vector3d& p : points) p = testing::randomPoint(random, -half, half);
+  return points;
+}
+
+void insideRow(Report& report, const std::string& name, const testing::Mesh& body,
+               const Points& points, int threads) {
+  Settings settings;
+  settings.threads = threads;
+  OctreeBasedCD detection(settings);
+  const GeometryId asked = detection.addPointSet(points),
+                   id = detection.addTriangleMesh(body.positions, body.triangles);
+  std::vector<double> samples;
+  std::size_t inside = 0;
+  double depth = 0;
+  for (int i = 0; i < 7; ++i) {
+    const double start = now();
+    const auto found = detection.findInsideVertices(asked, id);
+    samples.push_back(now() - start);
+    inside = found.size();
+    depth = 0;
+    for (const InsideVertex& v : found) depth += v.depth;
+  }
+  samples.erase(samples.begin());  // which builds octrees
+  const double each = 1000 * median(samples) / static_cast<double>(inside);
+  report.line({name + ", " + std::to_string(threads) + " threads", milliseconds(each)});
+  report.row("inside", name, threads, "Palpate", "us a vertex inside", each);
+#ifdef PALPATE_BENCHMARK_PEERS
+  if (threads != 1) return;
+  const InsideAnswer answer = insideByCgal(body.positions, body.triangles, points);
+  if (answer.inside != inside || std::abs(answer.depth - depth) > 1e-9 * depth)
+    report.line({"CGAL answers otherwise", std::to_string(answer.inside), std::to_string(inside)});
+  const double theirs = 1000 * answer.milliseconds / static_cast<double>(answer.inside);
+  report.line({name + ", CGAL 5.5", milliseconds(theirs)});
+  report.row("inside", name, 1, "CGAL 5.5 Side_of_triangle_mesh, AABB_tree", "us a vertex inside",
+             theirs);
+#endif
+}
+
+/// Half a box of particles that sinks into the body, all moving.
+double particleFrame(const Settings& settings, const testing::Mesh& body, const Points& start,
+                     int frames, std::uint64_t& hash) {
+  constexpr double kRadius = 0.002;
+  OctreeBasedCD detection(settings);
+  const GeometryId id = detection.addTriangleMesh(body.positions, body.triangles),
+                   smoke = detection.addPointSet(start, kRadius);
+  detection.addCollisionPair(smoke, id, {Method::Proximity, kRadius});
+  std::vector<double> samples;
+  Points points = start;
+  for (int frame = 0; frame < frames; ++frame) {
+    for (Eigen::Vector3d& p : points) p *= 0.999;
+    const double begin = now();
+    detection.setPositions(smoke, points);
+    detection.detectCollision();
+    samples.push_back(now() - begin);
+  }
+  hash = detection.collisionData(smoke, id).hash();
+  return median(samples);
+}
+
+}  // namespace
+
+void insideRows(Report& report, const RowOptions& options) {
+  report.heading("Vertices inside a body of 100,352 triangles: us each, with depth and exit");
+  testing::Random random(1);
+  const testing::Mesh body = bone();
+  const Points deep = pointsIn(random, 20000, 0.5), around = pointsIn(random, 60000, 1.0);
+  Points below = body.positions;
+  for (Eigen::Vector3d& p : below) p *= 0.998;
+  for (const int threads : options.threads) {
+    insideRow(report, "deep", body, deep, threads);
+    insideRow(report, "around", body, around, threads);
+    insideRow(report, "just below", body, below, threads);
+  }
+  report.heading("A million particles against it: ms a frame, millions of particles a second");
+  const Points smoke = pointsIn(random, 1000000, 1.2);
+  std::uint64_t hash = 0;
+  for (const int threads : options.threads) {
+    Settings settings;
+    settings.threads = threads;
+    const double frame = particleFrame(settings, body, smoke, 8, hash);
+    report.line(
+        {std::to_string(threads) + " threads", milliseconds(frame), milliseconds(1000 / frame)});
+    report.row("points", "particles-bone", threads, "Palpate", "frame ms", frame, hash);
+    report.row("points", "particles-bone", threads, "Palpate", "of 20 million a second",
+               frame / 50);
+  }
+  Settings bruteForce;
+  bruteForce.engine = Engine::BruteForce;
+  const Points few(smoke.begin(), smoke.begin() + 50);
+  const double taken = particleFrame(bruteForce, body, few, 1, hash) * 20000;
+  report.line({"brute force, from 50 particles", milliseconds(taken)});
+  report.row("points", "particles-bone", 1, "Palpate, brute force", "frame ms", taken);
+}
+
+}  // namespace palpate::benchmark
