@@ -70,8 +70,8 @@ class PalpateRun : public Run {
 
 /// What is given to the library besides the pair's method.
 struct Choice {
-  double thickness = 0;   ///< mean edges
-  double tolerance = -1;  ///< mean edges; negative: the library's own choice
+  double thickness = 0;  ///< mean edges
+  Contacts contacts = Contacts::All;
   int substeps = 1;
   OctreeSettings octree{};
   Engine engine = Engine::Octree;
@@ -83,13 +83,11 @@ Contestant contestant(std::string family, std::string setting, Method method,
           [=](const scenes::Scene& scene, const Positions& start) -> std::unique_ptr<Run> {
             const Settings settings{.octree = choice.octree, .engine = choice.engine, .threads = 1};
             const double edge = 20 * scene.thickness;
-            return std::make_unique<PalpateRun>(
-                scene, start, settings,
-                PairSettings{.method = method,
-                             .thickness = choice.thickness * edge,
-                             .contacts = Contacts::All,
-                             .tolerance = choice.tolerance < 0 ? -1 : choice.tolerance * edge},
-                choice.substeps);
+            return std::make_unique<PalpateRun>(scene, start, settings,
+                                                PairSettings{.method = method,
+                                                             .thickness = choice.thickness * edge,
+                                                             .contacts = choice.contacts},
+                                                choice.substeps);
           }};
 }
 
@@ -103,6 +101,8 @@ std::vector<Contestant> contestants() {
   std::vector<Contestant> all{
       contestant("Intersection", "once a frame", kIntersection, {}),
       contestant("Proximity", "1/20 edge", kProximity, {.thickness = 0.05}),
+      contestant("Proximity: distinct", "1/20 edge", kProximity,
+                 {.thickness = 0.05, .contacts = Contacts::Distinct}),
       contestant("Proximity", "1/5 edge", kProximity, {.thickness = 0.2}),
       contestant("Proximity", "4/5 edge", kProximity, {.thickness = 0.8}),
       contestant("Proximity in substeps", "1/20 edge; 2 substeps", kProximity,
@@ -116,8 +116,9 @@ std::vector<Contestant> contestants() {
       contestant("Continuous", "exact", kContinuous, {}),
       contestant("Continuous", "1/20 edge kept", kContinuous, {.thickness = 0.05}),
       contestant("Auto", "1/20 edge", kAuto, {.thickness = 0.05}),
-      contestant("Auto", "touching; tolerance 1/20 edge", kAuto, {.tolerance = 0.05}),
-      contestant("Auto", "touching; tolerance 1/5 edge", kAuto, {.tolerance = 0.2}),
+      contestant("Auto: distinct", "1/20 edge", kAuto,
+                 {.thickness = 0.05, .contacts = Contacts::Distinct}),
+      contestant("Auto", "touching", kAuto, {}),
       contestant("Continuous: octree", "1 triangle a leaf", kContinuous,
                  {.octree = {.maxPrimitivesPerLeaf = 1}}),
       contestant("Continuous: octree", "4 triangles a leaf", kContinuous,

@@ -164,7 +164,7 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
   ContactBuffers* const buffers[] = {&contacts};
   OrderScratch scratch;
   CollisionData::Contents expected;
-  orderContacts(buffers, scratch, expected);
+  orderContacts(buffers, 0, scratch, expected);
 
   using List = AuditFailure::List;
   using Fault = AuditFailure::Fault;

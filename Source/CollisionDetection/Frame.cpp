@@ -110,7 +110,8 @@ struct Frame::Job {
   bool keepCandidates;
   bool nearby;  ///< boxes overlap at the thickness of the traversal, if not at their own
   ContactBuffers contacts;
-  ContactBuffers overlaps;  ///< Auto: Intersection's, where the step may start intersecting
+  ContactBuffers overlaps;  ///< Auto: Intersection's, where the step starts intersecting
+  bool overlapsMissed;      ///< of batches before any was seen to start so
   Buffer<TrianglePair> candidates, own;
   double milliseconds = 0, narrowMilliseconds = 0;
 
@@ -150,7 +151,10 @@ struct Frame::Job {
     bool& intersecting = job.contacts.facts.startsIntersecting;
     if (meshes.step.start && !intersecting)
       intersecting = anyIntersectAtStart(meshes, pairs, job.overlaps);
-    if (job.record->plan.overlaps) findIntersections(meshes, pairs, job.overlaps);
+    if (job.record->plan.overlaps && (intersecting || job.record->plan.startsIntersecting))
+      findOverlaps(job, pairs);
+    else
+      job.overlapsMissed = true;
     if (meshes.settings.contacts == Contacts::Earliest)
       job.findEarliest(meshes, pairs);
     else
@@ -172,6 +176,11 @@ struct Frame::Job {
     narrowMilliseconds += watch.lap();
   }
 
+  /// Auto: what intersects at the step's end.
+  static void findOverlaps(Job& job, std::span<const TrianglePair> pairs) {
+    findIntersections(job.record->meshes(), pairs, job.overlaps);
+  }
+
   void findEarliest(const MeshPair& meshes, std::span<const TrianglePair> pairs) {
     const double found = findEarliestImpact(meshes, pairs, earliest->load(), contacts);
     double known = earliest->load();
@@ -189,7 +198,7 @@ Frame::Job& Frame::newJob(PairRecord& record) {
   job.record = &record;
   job.contacts.clear();
   job.overlaps.clear();
-  job.nearby = false;
+  job.nearby = job.overlapsMissed = false;
   job.place = nullptr;
   job.candidates.clear();
   job.milliseconds = job.narrowMilliseconds = 0;
@@ -298,6 +307,7 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
     job.record->meshes().hasShape() ? job.detectShape() : run(job);
     job.milliseconds = jobWatch.lap();
   });
+  findMissedOverlaps(threads);
   double all = 0, narrow = 0;
   for (std::size_t i = 0; i < m_jobCount; ++i) {
     const Job& job = *m_jobs[i];
@@ -333,6 +343,31 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
   statistics.milliseconds.order = watch.lap();
 }
 
+/// Most steps that start intersecting are known to before, or by their first batch.
+void Frame::findMissedOverlaps(const Threads& threads) {
+  const auto missed = [](const Job& job) {
+    return job.overlapsMissed && job.record->plan.overlaps && job.record->plan.startsIntersecting;
+  };
+  bool any = false;
+  for (std::size_t i = 0; i < m_jobCount; ++i)
+    m_jobs[i]->record->plan.startsIntersecting |= m_jobs[i]->contacts.facts.startsIntersecting;
+  for (std::size_t i = 0; i < m_jobCount; ++i) any |= missed(*m_jobs[i]);
+  if (!any) return;
+  threads.forEach(m_jobCount, [&](std::size_t i) {
+    Job& job = *m_jobs[i];
+    if (!missed(job)) return;
+    Stopwatch watch;
+    const std::size_t decided = job.overlaps.exactDecisions;  // of the search at the start
+    job.overlaps.clear();
+    job.overlaps.exactDecisions = decided;
+    job.start(&Job::findOverlaps);
+    run(job);
+    const double spent = watch.lap();
+    job.milliseconds += spent;
+    job.narrowMilliseconds += spent;
+  });
+}
+
 void Frame::finish(PairRecord& record, bool nearby, const Settings& settings) {
   m_facts.clear();
   for (const auto* buffers : {&m_buffers, &m_overlaps})
@@ -347,25 +382,22 @@ void Frame::finish(PairRecord& record, bool nearby, const Settings& settings) {
     m_buffers.push_back(&m_impacts);
   }
   m_facts.startsIntersecting |= record.plan.startsIntersecting;
-  const bool overlapping = m_facts.startsIntersecting && record.plan.overlaps;
-  if (overlapping) preferOverlaps();
+  std::size_t ofIntersection = 0;
+  if (m_facts.startsIntersecting && record.plan.overlaps) {
+    ofIntersection = m_overlaps.size();
+    m_buffers.insert(m_buffers.begin(), m_overlaps.begin(), m_overlaps.end());
+  }
+  // A feature pair that Intersection reports is not reported by distance or impact as well: where
+  // the step starts intersecting only Intersection knows the side.
   CollisionData::Contents& contents = record.data.contents();
-  orderContacts(m_buffers, m_orderScratch, contents);
+  ofIntersection = orderContacts(m_buffers, ofIntersection, m_orderScratch, contents);
   contents.earliestTimeOfImpact = record.earliest.load();
   if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
   record.trust.finish(record.pair.settings, *record.a, *record.b, record.plan, m_facts, nearby,
                       contents);
-  countContacts(record.plan, overlapping ? sizeOf(m_overlapContacts) : 0, contents);
+  countContacts(record.plan, ofIntersection, contents);
   record.dataFor = record.revisions();
   record.candidatesFor = settings.keepCandidates ? record.revisions() : PairRecord::AnsweredFor{};
-}
-
-/// Where the step starts intersecting, a feature pair that Intersection reports is not reported by
-/// distance or impact as well: only Intersection knows the side.
-void Frame::preferOverlaps() {
-  orderContacts(m_overlaps, m_orderScratch, m_overlapContacts);
-  for (ContactBuffers* found : m_buffers) dropAnswered(*found, m_overlapContacts);
-  m_buffers.insert(m_buffers.end(), m_overlaps.begin(), m_overlaps.end());
 }
 
 void Frame::findStartByBruteForce(const PairRecord& record, ContactBuffers& contacts,
@@ -377,7 +409,9 @@ void Frame::findStartByBruteForce(const PairRecord& record, ContactBuffers& cont
     for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b)
       contacts.facts.startsIntersecting |= meshes.a.topology.isOn(a) && meshes.b.topology.isOn(b) &&
                                            intersectAtStart(meshes, {a, b}, overlaps);
-  if (!record.plan.overlaps) return;
+  if (!record.plan.overlaps ||
+      !(contacts.facts.startsIntersecting || record.plan.startsIntersecting))
+    return;
   meshes.settings.method = Method::Intersection;
   findContactsByBruteForce(meshes, overlaps);
 }

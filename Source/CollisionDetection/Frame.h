@@ -38,7 +38,7 @@ class Frame {
   void start(std::span<PairRecord* const>, const Threads&, bool adjacentPairs);
   void run(Job&) const;
   void finish(PairRecord&, bool nearby, const Settings&);
-  void preferOverlaps();
+  void findMissedOverlaps(const Threads&);
   static void findStartByBruteForce(const PairRecord&, ContactBuffers& contacts,
                                     ContactBuffers& overlaps);
   Job& newJob(PairRecord&);
@@ -50,7 +50,6 @@ class Frame {
   TraversalStack m_stack;
   std::vector<ContactBuffers*> m_buffers, m_overlaps;  ///< of the pair at hand
   ContactBuffers m_impacts;
-  CollisionData::Contents m_overlapContacts;
   StepFacts m_facts;
   OrderScratch m_orderScratch;
 };

@@ -11,30 +11,43 @@ std::uint64_t packed(std::uint32_t first, std::uint32_t second) {
   return std::uint64_t{first} << 32 | second;
 }
 
+/// The lowest bit is left free: ids are below 2^28.
 using Key = std::array<std::uint64_t, 2>;
 Key byVertex(const VertexTriangleContact& c) { return {packed(c.vertex, c.triangle), 0}; }
 Key byTriangle(const VertexTriangleContact& c) { return {packed(c.triangle, c.vertex), 0}; }
 Key byEdges(const EdgeEdgeContact& c) {
-  return {packed(c.edgeA[0], c.edgeA[1]), packed(c.edgeB[0], c.edgeB[1])};
+  return {packed(c.edgeA[0], c.edgeA[1]), packed(c.edgeB[0], c.edgeB[1] << 1)};
 }
 Key byElement(const ShapeContact& c) {
-  return {packed(static_cast<std::uint32_t>(c.element), c.id), c.vertices[1]};
+  return {packed(static_cast<std::uint32_t>(c.element), c.id), std::uint64_t{c.vertices[1]} << 1};
 }
 
+/// Returns how many are of the first `preferred` buffers.
 template <class Contact, class Entries, class KeyOf>
-void order(std::span<ContactBuffers* const> buffers, Buffer<Contact> ContactBuffers::*member,
-           Entries& entries, std::vector<Contact>& out, KeyOf&& keyOf) {
+std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferred,
+                  Buffer<Contact> ContactBuffers::*member, Entries& entries,
+                  std::vector<Contact>& out, KeyOf&& keyOf) {
   entries.clear();
-  for (const ContactBuffers* buffer : buffers)
-    for (const Contact& contact : buffer->*member) entries.push_back({keyOf(contact), &contact});
+  for (std::size_t i = 0; i < buffers.size(); ++i)
+    for (const Contact& contact : buffers[i]->*member) {
+      entries.push_back({keyOf(contact), &contact});
+      entries.back().key[1] |= i >= preferred;
+    }
   std::sort(entries.begin(), entries.end(),
             [](const auto& l, const auto& r) { return l.key < r.key; });
   entries.erase(std::unique(entries.begin(), entries.end(),
-                            [](const auto& l, const auto& r) { return l.key == r.key; }),
+                            [](const auto& l, const auto& r) {
+                              return l.key[0] == r.key[0] && (l.key[1] | 1) == (r.key[1] | 1);
+                            }),
                 entries.end());
   out.clear();
   out.reserve(entries.size());
-  for (const auto& entry : entries) out.push_back(*entry.contact);
+  std::size_t count = 0;
+  for (const auto& entry : entries) {
+    out.push_back(*entry.contact);
+    count += ~entry.key[1] & 1;
+  }
+  return count;
 }
 
 }  // namespace
@@ -59,35 +72,23 @@ void orderPairs(Buffer<TrianglePair>& pairs, std::size_t firsts, PairOrderScratc
   std::copy(scratch.pairs.begin(), scratch.pairs.end(), pairs.begin());
 }
 
-void orderContacts(std::span<ContactBuffers* const> buffers, OrderScratch& scratch,
-                   CollisionData::Contents& out) {
-  order(buffers, &ContactBuffers::vertexTriangle, scratch.vertexTriangle, out.vertexTriangle,
-        byVertex);
-  order(buffers, &ContactBuffers::triangleVertex, scratch.vertexTriangle, out.triangleVertex,
-        byTriangle);
-  order(buffers, &ContactBuffers::edgeEdge, scratch.edgeEdge, out.edgeEdge, byEdges);
-  order(buffers, &ContactBuffers::shape, scratch.shape, out.shape, byElement);
-  out.intersectingTriangles.clear();
+std::size_t orderContacts(std::span<ContactBuffers* const> buffers, std::size_t preferred,
+                          OrderScratch& scratch, CollisionData::Contents& out) {
+  const std::size_t count =
+      order(buffers, preferred, &ContactBuffers::vertexTriangle, scratch.vertexTriangle,
+            out.vertexTriangle, byVertex) +
+      order(buffers, preferred, &ContactBuffers::triangleVertex, scratch.vertexTriangle,
+            out.triangleVertex, byTriangle) +
+      order(buffers, preferred, &ContactBuffers::edgeEdge, scratch.edgeEdge, out.edgeEdge, byEdges);
+  order(buffers, preferred, &ContactBuffers::shape, scratch.shape, out.shape, byElement);
+  auto& triangles = out.intersectingTriangles;
+  triangles.clear();
   for (const ContactBuffers* buffer : buffers)
-    out.intersectingTriangles.insert(out.intersectingTriangles.end(),
-                                     buffer->intersectingTriangles.begin(),
-                                     buffer->intersectingTriangles.end());
-  std::sort(out.intersectingTriangles.begin(), out.intersectingTriangles.end());
-  out.intersectingTriangles.erase(
-      std::unique(out.intersectingTriangles.begin(), out.intersectingTriangles.end()),
-      out.intersectingTriangles.end());
-}
-
-void dropAnswered(ContactBuffers& found, const CollisionData::Contents& answered) {
-  const auto drop = [](auto& contacts, const auto& sorted, auto&& keyOf) {
-    std::erase_if(contacts, [&](const auto& contact) {
-      return std::binary_search(sorted.begin(), sorted.end(), contact,
-                                [&](const auto& l, const auto& r) { return keyOf(l) < keyOf(r); });
-    });
-  };
-  drop(found.vertexTriangle, answered.vertexTriangle, byVertex);
-  drop(found.triangleVertex, answered.triangleVertex, byTriangle);
-  drop(found.edgeEdge, answered.edgeEdge, byEdges);
+    triangles.insert(triangles.end(), buffer->intersectingTriangles.begin(),
+                     buffer->intersectingTriangles.end());
+  std::sort(triangles.begin(), triangles.end());
+  triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+  return count;
 }
 
 }  // namespace palpate

@@ -29,10 +29,9 @@ struct PairOrderScratch {
 /// Cost     two passes over the pairs and one over `firsts` counters.
 void orderPairs(Buffer<TrianglePair>& pairs, std::size_t firsts, PairOrderScratch&);
 
-/// The buffers' contacts, sorted by element ids, each once.
-void orderContacts(std::span<ContactBuffers* const>, OrderScratch&, CollisionData::Contents&);
-
-/// Takes out contacts of features that the answer, in order, has contacts of.
-void dropAnswered(ContactBuffers&, const CollisionData::Contents& answered);
+/// The buffers' contacts, sorted by element ids, each once: where the first `preferred` buffers
+/// have one of the same features as the others, theirs. Returns how many are theirs.
+std::size_t orderContacts(std::span<ContactBuffers* const>, std::size_t preferred, OrderScratch&,
+                          CollisionData::Contents&);
 
 }  // namespace palpate

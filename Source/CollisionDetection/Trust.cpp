@@ -65,12 +65,14 @@ PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry&
     if (plan.motion == 0.0) {
       plan.method = thickness > 0.0 ? Method::Proximity : Method::Intersection;
       plan.reason = MethodReason::Still;
+    } else if (thickness == 0.0 || settings.contacts == Contacts::All) {
+      plan.method = Method::Continuous;
+      plan.reason = MethodReason::Cheapest;
     } else if (plan.motion <= plan.tolerance) {
       plan.method = Method::Proximity;
       plan.reason = MethodReason::Slow;
     } else if (smallestMotion(a.motion, b.motion) > plan.tolerance ||
-               meanMotion(a.motion, b.motion) > plan.tolerance ||
-               thickness + plan.tolerance == 0.0) {
+               meanMotion(a.motion, b.motion) > plan.tolerance) {
       plan.method = Method::Continuous;
       plan.reason = MethodReason::Fast;
     } else {
@@ -111,6 +113,9 @@ void Trust::start(const PairSettings& settings, const Geometry& a, const Geometr
   }
   plan.step.start = !startsIntersecting &&
                     (settings.method == Method::Auto || plan.motion == 0.0 || --m_wait <= 0);
+  // It will not be trusted, whatever is seen of the step.
+  if (plan.method == Method::Proximity && settings.method == plan.method && !plan.step.start)
+    plan.step.motion = 0.0;
 }
 
 void Trust::finish(const PairSettings& settings, const Geometry& a, const Geometry& b,

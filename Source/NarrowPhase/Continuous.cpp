@@ -76,6 +76,22 @@ void forEachLikelyPair(const MeshPair& pair, std::span<const TrianglePair> candi
   filterPairs<false>(Features<Kind::EdgeEdge>{pair.a, pair.b}, pairs.edgeEdge, settings, f);
 }
 
+/// The vertices at a time of the step, relative to the first one's way: differences stay sharp far
+/// from the origin, where positions would be rounded. As they are where differences overflow.
+std::array<Vector3d, 4> positionsAt(const ImpactQuery& query, double time) {
+  std::array<Vector3d, 4> p;
+  const auto place = [&](const Vector3d& start, const Vector3d& end) {
+    for (int i = 0; i < 4; ++i)
+      p[i] =
+          (1.0 - time) * (query.vertices[i].at(0) - start) + time * (query.vertices[i].at(1) - end);
+  };
+  place(query.vertices[0].at(0), query.vertices[0].at(1));
+  const bool finite = std::all_of(p.begin(), p.end(),
+                                  [](const Vector3d& position) { return position.allFinite(); });
+  if (!finite) place(Vector3d::Zero(), Vector3d::Zero());
+  return p;
+}
+
 /// Tests pairs and describes the contacts found.
 class ContactFinder {
  public:
@@ -97,9 +113,7 @@ class ContactFinder {
   template <Kind kind>
   bool add(const Features<kind>& features, std::uint32_t inFirst, std::uint32_t inSecond,
            bool ofSecond, const ImpactQuery& query, double time, bool store) {
-    std::array<Vector3d, 4> p;
-    for (int i = 0; i < 4; ++i)
-      p[i] = (1.0 - time) * query.vertices[i].at(0) + time * query.vertices[i].at(1);
+    const std::array<Vector3d, 4> p = positionsAt(query, time);
     std::array<MeshFeature, 2> held;
     if (m_pair.settings.contacts == Contacts::Earliest) m_out.facts.clearance = 0.0;
     const auto isLeftOut = [&](const auto& closest, const Vector3d& normal, bool refused) {

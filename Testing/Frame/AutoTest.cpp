@@ -92,7 +92,7 @@ TEST(Auto, AnswersAsBruteForceDoes) {
       if (HasFailure()) return;
     }
   }
-  EXPECT_EQ(reasons.size(), 4u);
+  EXPECT_EQ(reasons.size(), 5u);
 }
 
 /// Feature ids of all contacts, by list.

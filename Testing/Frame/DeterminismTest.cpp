@@ -83,8 +83,8 @@ const std::map<std::string, std::vector<std::uint64_t>> kExpected{
     {"ProximityDistinct", {0xfbc747ece53b54e5u, 0x1517572283f05896u, 0xb257011c14575fb3u}},
     {"ProximityAll", {0xe33a337fe97e589fu, 0x0ad64f013ab5272du, 0x2bcdc7928f03162du}},
     {"Intersection", {0x6cb88a6c5e41aa5du, 0x255a4d79b56020edu, 0x25e447d21f38e066u}},
-    {"Continuous", {0xa56a8b0f9487c9dau, 0x0c8210784d8af5a5u, 0x84eac19fff079b2bu}},
-    {"ContinuousWithThickness", {0xef4307fb84ed8dd6u, 0xa6a47b763def51c4u, 0xe02e296a1f4edca2u}},
+    {"Continuous", {0xf2a045b5365b4a0du, 0x0c8210784d8af5a5u, 0xa40fd859ac7a28b6u}},
+    {"ContinuousWithThickness", {0x22d2ed6e801eea82u, 0xa6a47b763def51c4u, 0x8596f41ca2865a0cu}},
     {"ContinuousEarliest", {0xb05355e5d6a61913u, 0x0c8210784d8af5a5u, 0xfc3177c3d8cabcd6u}},
 };
 

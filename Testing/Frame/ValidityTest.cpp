@@ -114,6 +114,9 @@ Tally livesOf(const PairSettings& settings, double speed, std::uint64_t seed, st
       }
       if (validity.startedApart) {
         EXPECT_TRUE(truth.startedApart);
+        if (settings.method == Method::Auto) {  // then nothing is Intersection's
+          EXPECT_TRUE(run.data().intersectingTriangles().empty());
+        }
       }
       EXPECT_EQ(validity.sideMayBeWrong,
                 settings.method != Method::Intersection && !validity.trusted);

@@ -200,8 +200,7 @@ std::vector<Sweep> sweeps() {
          return build(design, random);
        }},
       {"gap", "gap or depth at the end / size", powers(0, -16), gapped},
-      {"offset", "distance from the origin / size", powers(0, 15), farAway, false,
-       kThickness * 0x1p52},
+      {"offset", "distance from the origin / size", powers(0, 15), farAway},
       {"small scale", "scale", powers(0, -150), scaled},
       {"large scale", "scale", powers(0, 150), scaled},
       {"size ratio", "size of one / size of the other", powers(0, 12),

@@ -40,9 +40,6 @@ struct Sweep {
   std::vector<double> values;  ///< comfortable first
   std::function<Case(double value, testing::Random&)> make;
   bool startsInside = false;  ///< which Continuous does not promise to tell
-  /// Beyond this value the positions are further apart than the thickness from one double to the
-  /// next.
-  double finestAt = std::numeric_limits<double>::infinity();
 };
 
 std::vector<Sweep> sweeps();

@@ -198,6 +198,7 @@ std::vector<Subject> subjects() {
       {{"Proximity in substeps", "1/20 edge; 8 substeps"}, Definition::None},
       {{"Continuous", "exact"}, Definition::Continuous},
       {{"Auto", "1/20 edge"}, Definition::Auto},
+      {{"Auto: distinct", "1/20 edge"}, Definition::Auto},
       {{"FCL", "collide()"}, Definition::None}};
   std::vector<Subject> all;
   for (const accuracy::Contestant& contestant : accuracy::contestants()) {

@@ -62,9 +62,9 @@ struct PairSettings {
   double thickness = 0.0;  ///< L, finite, not negative; Proximity needs it positive
   /// Proximity, and Auto's contacts at the step's end; others report all
   Contacts contacts = Contacts::Distinct;
-  /// L. Auto: features that move at most this far, relative to each other, are tested at the step's
-  /// end, with up to this much added to the thickness; others for impacts. Larger: faster, more
-  /// contacts that are further apart. Negative: half the thickness.
+  /// L. Auto, Distinct with a thickness: features that move at most this far, relative to each
+  /// other, are tested at the step's end, with up to this added to the thickness; others for
+  /// impacts. Larger: faster, more contacts that are further apart. Negative: half the thickness.
   double tolerance = -1.0;
   /// L, finite, not negative. A triangle or line mesh with itself: features that are nearer than
   /// this along its edges, in the shape that it was added in or that setTriangles() gave, are no

@@ -15,7 +15,10 @@ enum class MethodReason {
   Still,  ///< not at all
   Slow,   ///< all at most PairSettings::tolerance: Proximity
   Fast,   ///< all, or most, further: Continuous
-  Mixed   ///< some further: Continuous for those, Proximity for the rest
+  Mixed,  ///< some further: Continuous for those, Proximity for the rest
+  /// At most the tolerance or not, Continuous costs least: without a thickness, and with
+  /// Contacts::All, where distances of everything near would be asked for.
+  Cheapest
 };
 
 /// What one pair's method assumes, and whether the last frame kept to it.
