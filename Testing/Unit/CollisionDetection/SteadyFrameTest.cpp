@@ -96,15 +96,17 @@ TEST(SteadyFrame, AllocatesNothingWithAuto) {
   const IntegersApart apart;
   for (const scenes::Scene& scene : scenes::hardScenes()) {
     if (scene.name == "far away") continue;  // slow pressing elsewhere
-    for (const double tolerance : {0.5, 4.0})
-      for (const double thickness : {0.0, 0.2}) {
-        const LastPass pass = lastPass(
-            scene, {.threads = 1},
-            {.thickness = thickness * scene.thickness, .tolerance = tolerance * scene.thickness});
-        EXPECT_EQ(pass.allocations, 0u)
-            << scene.name << ", thickness " << thickness << ", tolerance " << tolerance;
-        reasons.insert(pass.reasons.begin(), pass.reasons.end());
-      }
+    for (const auto& [tolerance, thickness] :
+         {std::pair{4.0, 0.0}, std::pair{0.5, 0.2}, std::pair{4.0, 0.2}}) {
+      // Many times the edges of its small triangles: each frame takes half a second and is exact.
+      if (scene.name == "uneven triangles" && tolerance * thickness > 0.5) continue;
+      const LastPass pass = lastPass(
+          scene, {.threads = 1},
+          {.thickness = thickness * scene.thickness, .tolerance = tolerance * scene.thickness});
+      EXPECT_EQ(pass.allocations, 0u)
+          << scene.name << ", thickness " << thickness << ", tolerance " << tolerance;
+      reasons.insert(pass.reasons.begin(), pass.reasons.end());
+    }
   }
   EXPECT_EQ(reasons, (std::set{MethodReason::Slow, MethodReason::Fast, MethodReason::Mixed,
                                MethodReason::Cheapest}));
