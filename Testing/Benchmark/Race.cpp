@@ -150,7 +150,8 @@ int main(int count, char** arguments) {
   app.add_option("--tables", options.tables,
                  "some of race, stages, frame, far, still, pay, scale, "
                  "steady, features, lines, shapes, inside, continuous, simd")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->check(CLI::IsMember(options.tables));
   app.add_option("--scenes", options.scenes, "of the race; default: all")->delimiter(',');
   app.add_option("--engines", options.engines, "parts of engines' names; default: all")
       ->delimiter(',');
