@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <cstdint>
 #include <string_view>
 
 namespace palpate::report {
@@ -27,20 +28,31 @@ std::string inScript(const Json& json) {
   return text;
 }
 
+std::string base64(std::string_view bytes) {
+  constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t at = 0; at < bytes.size(); at += 3) {
+    std::uint32_t bits = 0;
+    for (std::size_t i = 0; i < 3; ++i)
+      bits = bits << 8 | (at + i < bytes.size() ? static_cast<unsigned char>(bytes[at + i]) : 0u);
+    for (std::size_t i = 0; i < 4; ++i)
+      text += at + i <= bytes.size() ? kDigits[bits >> (18 - 6 * i) & 63] : '=';
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string toHtml(const Figures& figures, const View& view) {
-  Json json{{"title", view.title},
-            {"paragraphs", view.paragraphs},
-            {"group", view.group},
-            {"series", view.series},
-            {"label", view.label},
-            {"first", view.first},
-            {"x", view.x},
-            {"y", view.y},
-            {"front", view.front},
-            {"lines", view.lines},
-            {"texts", figures.textKeys()}};
+  Json json{{"title", view.title}, {"paragraphs", view.paragraphs},
+            {"group", view.group}, {"series", view.series},
+            {"label", view.label}, {"first", view.first},
+            {"x", view.x},         {"y", view.y},
+            {"front", view.front}, {"lines", view.lines},
+            {"logX", view.logX},   {"texts", figures.textKeys()}};
+  json["pictures"] = Json::array();
+  for (const std::string& png : view.pictures) json["pictures"].push_back(base64(png));
   for (const Quantity& quantity : figures.quantities())
     json["quantities"].push_back({{"key", quantity.key}, {"label", quantity.label}});
   for (const Figures::Row& row : figures.rows())

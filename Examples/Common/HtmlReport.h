@@ -18,6 +18,8 @@ struct View {
   std::string x, y;                     ///< quantities; smaller is better
   bool front = false;                   ///< the Pareto front is drawn
   bool lines = false;                   ///< a series' points are joined in the order of x
+  bool logX = true;
+  std::vector<std::string> pictures{};  ///< contents of PNG files
 };
 
 /// One page that needs neither network nor any other file.

@@ -1,5 +1,8 @@
 #include "Meshes.h"
 
+#include <Eigen/Geometry>
+
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <map>
@@ -122,6 +125,30 @@ SceneMesh gradedSphere(int around, double smallest) {
     mesh.triangles.push_back({south, next, i});
     mesh.triangles.push_back({north, last + i, last + next});
   }
+  return mesh;
+}
+
+SceneMesh capsule(const Vector3d& p0, const Vector3d& p1, double radius, int frequency) {
+  SceneMesh mesh = sphere(frequency);
+  for (Vector3d& p : mesh.positions) p = (p.dot(p1 - p0) > 0 ? p1 : p0) + radius * p;
+  return mesh;
+}
+
+SceneMesh tubeAround(std::span<const Vector3d> line, double radius, int around) {
+  SceneMesh mesh;
+  Vector3d side = (line[1] - line[0]).unitOrthogonal();
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const std::size_t last = line.size() - 1;
+    const Vector3d along = (line[std::min(i + 1, last)] - line[i == 0 ? 0 : i - 1]).normalized();
+    const Vector3d across = side - along.dot(side) * along;
+    side = across.norm() > 1e-6 ? Vector3d(across.normalized()) : along.unitOrthogonal();
+    for (int j = 0; j < around; ++j) {
+      const double angle = 2 * pi * j / around;
+      mesh.positions.push_back(
+          line[i] + radius * (std::cos(angle) * side + std::sin(angle) * along.cross(side)));
+    }
+  }
+  stitchRows(mesh.triangles, static_cast<std::uint32_t>(line.size()), around, true);
   return mesh;
 }
 

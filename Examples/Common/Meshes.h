@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,13 @@ SceneMesh tube(int around, int along);
 /// to `smallest` of the largest. 2 around (rings + 1) triangles with rings = around ln(2 /
 /// smallest) / 2π.
 SceneMesh gradedSphere(int around, double smallest);
+
+/// Sphere of this radius about p0, its half towards p1 moved there. Outward winding.
+SceneMesh capsule(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1, double radius,
+                  int frequency);
+
+/// Open tube about a polyline of at least two positions, for pictures.
+SceneMesh tubeAround(std::span<const Eigen::Vector3d> line, double radius, int around);
 
 void append(SceneMesh& mesh, const SceneMesh& other);
 

@@ -90,6 +90,12 @@ std::vector<Organ> organMeshes() {
   return organs;
 }
 
+SceneMesh liver(int frequency) {
+  OrganShape shape = kOrganShapes[0];
+  shape.frequency = frequency;
+  return shaped(shape);
+}
+
 std::string organObj(const Organ& organ) {
   return toObj(organ.mesh, organ.name + ": made by Examples/Common, see Data/README.md");
 }

@@ -5,6 +5,7 @@
 #include <cinttypes>
 #include <cstdio>
 #include <fstream>
+#include <unistd.h>
 
 namespace palpate::scenes {
 
@@ -130,6 +131,15 @@ void writeWhole(const std::filesystem::path& path, const std::string& content) {
   std::error_code ignored;
   std::filesystem::remove(partial, ignored);
   throw Error(ErrorCode::File, "The file \"" + path.string() + "\" cannot be written.");
+}
+
+void makeFolder(const std::filesystem::path& folder) {
+  std::error_code fault;
+  std::filesystem::create_directories(folder, fault);
+  if (fault || access(folder.c_str(), W_OK | X_OK) != 0) {
+    throw Error(ErrorCode::File,
+                "The folder \"" + folder.string() + "\" cannot be made or written to.");
+  }
 }
 
 }  // namespace palpate::scenes

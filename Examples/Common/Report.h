@@ -34,4 +34,7 @@ class Report {
 /// Written beside its place, then moved there. Throws Error (ErrorCode::File).
 void writeWhole(const std::filesystem::path& path, const std::string& content);
 
+/// Throws Error (ErrorCode::File) where it cannot be made or written to.
+void makeFolder(const std::filesystem::path& folder);
+
 }  // namespace palpate::scenes

@@ -35,6 +35,7 @@ struct Organ {
   SceneMesh mesh;
 };
 std::vector<Organ> organMeshes();
+SceneMesh liver(int frequency);  ///< finer or coarser than its file's 11: 20 frequency² triangles
 std::string organObj(const Organ& organ);  ///< the text of its file in Data/Organs
 
 /// Any meshes, centred, that glide through each other as the organs do; at least one, one meets its

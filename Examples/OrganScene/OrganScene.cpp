@@ -16,7 +16,6 @@
 #include <filesystem>
 #include <map>
 #include <optional>
-#include <unistd.h>
 
 namespace {
 
@@ -125,19 +124,10 @@ scenes::Report computeFrames(Simulation& simulation, int frames) {
   return report;
 }
 
-void makeFolder(const std::filesystem::path& folder) {
-  std::error_code fault;
-  std::filesystem::create_directories(folder, fault);
-  if (fault || access(folder.c_str(), W_OK | X_OK) != 0) {
-    throw Error(ErrorCode::File,
-                "The folder \"" + folder.string() + "\" cannot be made or written to.");
-  }
-}
-
 void run(const Options& options) {
   const scenes::Scene scene = sceneOf(options);
   Simulation simulation(scene, options);
-  makeFolder(options.out);
+  scenes::makeFolder(options.out);
   std::printf("%zu meshes, %zu triangles, %zu pairs, thickness %g\n", scene.meshes.size(),
               scene.triangleCount(), scene.pairs.size(), thickness(scene, options));
   const scenes::Report report = computeFrames(simulation, options.frames);

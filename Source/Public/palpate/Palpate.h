@@ -3,6 +3,7 @@
 /// Everything that an ordinary user needs.
 #include <palpate/Capture.h>
 #include <palpate/CollisionData.h>
+#include <palpate/ConstraintRows.h>
 #include <palpate/Error.h>
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/Settings.h>

@@ -1,0 +1,267 @@
+#include "SceneProgram.h"
+
+#include "HtmlReport.h"
+#include "Report.h"
+
+#include <palpate/Error.h>
+#ifdef PALPATE_HAS_VTK
+#include <palpate/vtk/MeshFile.h>
+#include <palpate/vtk/Picture.h>
+#endif
+
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cinttypes>
+#include <cstdio>
+#include <fstream>
+#include <thread>
+#include <unistd.h>
+
+namespace palpate::scenes {
+
+namespace {
+
+struct Options {
+  int frames;
+  std::filesystem::path out = "out";
+  int threads = 0;
+};
+
+struct Column {
+  std::string name;
+  std::vector<double> values;
+  bool isTime;
+};
+
+/// What a run measured, a value per column and frame.
+class RunLog {
+ public:
+  void add(const std::string& name, double value, bool isTime = false) {
+    const auto column = std::find_if(m_columns.begin(), m_columns.end(),
+                                     [&](const Column& c) { return c.name == name; });
+    if (column != m_columns.end())
+      column->values.push_back(value);
+    else
+      m_columns.push_back({name, {value}, isTime});
+  }
+  const std::vector<Column>& columns() const { return m_columns; }
+
+  std::string csv() const {
+    std::vector<report::Quantity> quantities;
+    for (const Column& column : m_columns) quantities.push_back({column.name, column.name});
+    report::Figures figures({"frame"}, quantities);
+    for (std::size_t frame = 0; frame < m_columns.front().values.size(); ++frame) {
+      report::Figures::Row row{{std::to_string(frame)}, {}};
+      for (const Column& column : m_columns) row.values.push_back(column.values[frame]);
+      figures.add(std::move(row));
+    }
+    return figures.csv();
+  }
+
+ private:
+  std::vector<Column> m_columns;
+};
+
+double quantile(std::vector<double> values, double share) {
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
+}
+
+std::string summary(const RunLog& log, const SceneProgram& program) {
+  std::array<char, 256> line;
+  std::string text;
+  const auto add = [&](const char* format, auto... values) {
+    text.append(line.data(), std::snprintf(line.data(), line.size(), format, values...));
+  };
+  add("%-20s %10s %10s %10s %10s\n", "", "median", "p99", "worst", "budget");
+  for (const Column& column : log.columns()) {
+    const double budget = column.name == "frame ms"       ? program.frameMilliseconds
+                          : column.name == "collision ms" ? program.collisionMilliseconds
+                                                          : 0;
+    add("%-20s %10.3f %10.3f %10.3f", column.name.c_str(), quantile(column.values, 0.5),
+        quantile(column.values, 0.99), quantile(column.values, 1));
+    budget > 0 ? add(" %10.3f\n", budget) : add("\n");
+  }
+  return text;
+}
+
+/// Rows of the page: a group for the times, their histogram, and each other column.
+report::Figures pageFigures(const RunLog& log) {
+  report::Figures figures({"shown", "series", "frame"},
+                          {{"x", "frame (histogram: ms)"}, {"y", "value (histogram: frames)"}});
+  for (const Column& column : log.columns()) {
+    for (std::size_t frame = 0; frame < column.values.size(); ++frame)
+      figures.add({{column.isTime ? "times in ms" : column.name, column.name,
+                    "frame " + std::to_string(frame)},
+                   {static_cast<double>(frame), column.values[frame]}});
+    if (column.name != "frame ms") continue;
+    constexpr int kBins = 30;
+    const double width = quantile(column.values, 1) / kBins;
+    std::vector<double> bins(kBins + 1, 0.0);
+    for (const double value : column.values) ++bins[static_cast<std::size_t>(value / width)];
+    for (int bin = 0; bin <= kBins; ++bin)
+      figures.add({{"histogram", "frames", report::shortNumber((bin + 0.5) * width) + " ms"},
+                   {(bin + 0.5) * width, bins[bin]}});
+  }
+  return figures;
+}
+
+std::string machine() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    if (line.starts_with("model name"))
+      return line.substr(line.find(':') + 2) + ", " +
+             std::to_string(std::thread::hardware_concurrency()) + " threads";
+  }
+  return "unknown";
+}
+
+std::string page(const RunLog& log, const SceneProgram& program, const Options& options,
+                 std::uint64_t hash, const std::string& png) {
+  std::array<char, 32> hashText;
+  std::snprintf(hashText.data(), hashText.size(), "%016" PRIx64, hash);
+  report::View view{
+      .title = program.name,
+      .paragraphs = {program.description,
+                     "Settings: " + std::to_string(options.frames) + " frames, threads " +
+                         (options.threads == 0 ? "all" : std::to_string(options.threads)) +
+                         ". Machine: " + machine() + ". Hash of all contacts: " + hashText.data()},
+      .group = "shown",
+      .series = "series",
+      .label = "frame",
+      .first = "times in ms",
+      .x = "x",
+      .y = "y",
+      .lines = true,
+      .logX = false};
+  if (!png.empty()) view.pictures.push_back(png);
+  return report::toHtml(pageFigures(log), view);
+}
+
+#ifdef PALPATE_HAS_VTK
+std::string drawn(World& world) {
+  vtk::Picture picture;
+  std::vector<SceneMesh> tubes;
+  tubes.reserve(world.bodies().size());
+  for (World::BodyId id = 0; id < world.bodies().size(); ++id)
+    picture.bodies.push_back({world.positions(id), world.bodies()[id].triangles});
+  for (World::BodyId id = 0; id < world.bodies().size(); ++id) {
+    const World::Body& body = world.bodies()[id];
+    if (body.kind == GeometryKind::Triangles) continue;
+    SceneMesh mesh = body.drawn;
+    for (Eigen::Vector3d& p : mesh.positions) p = body.rotation * p + body.translation;
+    if (body.kind == GeometryKind::Lines) mesh = tubeAround(world.positions(id), body.radius, 8);
+    tubes.push_back(std::move(mesh));
+    picture.bodies.push_back({tubes.back().positions, tubes.back().triangles});
+  }
+  for (const World::Pair& pair : world.pairs())
+    picture.contacts.push_back({pair.a, pair.b, &world.contacts(pair.a, pair.b)});
+  return vtk::toPng(vtk::draw(picture));
+}
+#endif
+
+/// Says why where there is none.
+std::string picture([[maybe_unused]] World& world) {
+#ifdef PALPATE_HAS_VTK
+  try {
+    return drawn(world);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::NotAvailable) throw;
+    std::printf("no picture           %s\n", error.what());
+  }
+#else
+  std::printf("no picture           built without VTK\n");
+#endif
+  return "";
+}
+
+std::uint64_t nextHash(std::uint64_t hash, World& world) {
+  for (const World::Pair& pair : world.pairs())
+    hash = (hash ^ world.contacts(pair.a, pair.b).hash()) * 0x100000001b3u;
+  return hash;
+}
+
+void logFrame(RunLog& log, LiveScene& scene, double milliseconds) {
+  const World::Times& times = scene.world().times();
+  log.add("frame ms", milliseconds, true);
+  log.add("collision ms", times.collision, true);
+  log.add("boxes ms", times.boxes, true);
+  log.add("octree ms", times.octree, true);
+  log.add("pairs ms", times.pairs, true);
+  log.add("narrow phase ms", times.narrowPhase, true);
+  log.add("order ms", times.order, true);
+  log.add("hold ms", times.hold, true);
+  log.add("solver ms", times.solver, true);
+  log.add("contacts", static_cast<double>(times.contacts));
+  log.add("held particles", static_cast<double>(times.held));
+  for (const auto& [name, value] : scene.values()) log.add(name, value);
+}
+
+void run(const SceneProgram& program, const Options& options) {
+  const std::unique_ptr<LiveScene> scene = program.make(options.threads);
+  makeFolder(options.out);
+  RunLog log;
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (int frame = 0; frame < options.frames; ++frame) {
+    scene->world().resetTimes();
+    const auto start = std::chrono::steady_clock::now();
+    scene->computeFrame(frame);
+    const std::chrono::duration<double, std::milli> passed =
+        std::chrono::steady_clock::now() - start;
+    const std::string fault = scene->fault();
+    if (!fault.empty())
+      throw Error(ErrorCode::NotAvailable, "Frame " + std::to_string(frame) + ": " + fault);
+    logFrame(log, *scene, passed.count());
+    hash = nextHash(hash, scene->world());
+  }
+  std::printf("%s, %d frames\n%s", program.name.c_str(), options.frames,
+              summary(log, program).c_str());
+  std::printf("%-20s %016" PRIx64 "\n", "result hash", hash);
+  const std::string png = picture(scene->world());
+  if (!png.empty()) writeWhole(options.out / "scene.png", png);
+  writeWhole(options.out / "frames.csv", log.csv());
+  writeWhole(options.out / "report.html", page(log, program, options, hash, png));
+  std::printf("%-20s %s\n", "report", (options.out / "report.html").c_str());
+}
+
+}  // namespace
+
+int runScene(const SceneProgram& program, int count, char** arguments) {
+  CLI::App app(program.description, program.name);
+  Options options{.frames = program.frames};
+  app.add_option("--frames", options.frames, "frames to compute")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
+  app.add_option("--out", options.out, "folder for frames.csv, report.html and scene.png")
+      ->capture_default_str();
+  app.add_option("--threads", options.threads, "0: all cores")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  if (program.addOptions) program.addOptions(app);
+  app.failure_message(
+      [](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });
+  try {
+    app.parse(count, arguments);
+    run(program, options);
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}
+
+SceneMesh readMesh([[maybe_unused]] const std::filesystem::path& path) {
+#ifdef PALPATE_HAS_VTK
+  vtk::MeshFile file = vtk::readTriangleMesh(path);
+  return {std::move(file.positions), std::move(file.triangles)};
+#else
+  throw Error(ErrorCode::NotAvailable,
+              "This program was built without VTK and cannot read \"" + path.string() + "\".");
+#endif
+}
+
+}  // namespace palpate::scenes

@@ -1,0 +1,216 @@
+#include "World.h"
+
+#include <palpate/Error.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <map>
+
+namespace palpate::scenes {
+
+using Eigen::Vector3d;
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Adds to `milliseconds` what passes until its end.
+class Timed {
+ public:
+  explicit Timed(double& milliseconds) : m_milliseconds(milliseconds) {}
+  ~Timed() {
+    m_milliseconds += std::chrono::duration<double, std::milli>(Clock::now() - m_start).count();
+  }
+  Timed(const Timed&) = delete;
+  Timed& operator=(const Timed&) = delete;
+
+ private:
+  double& m_milliseconds;
+  Clock::time_point m_start = Clock::now();
+};
+
+}  // namespace
+
+World::BodyId World::add(Body body, std::span<const Vector3d> positions, double inverseMass) {
+  body.first = m_solver.add(positions, inverseMass);
+  body.count = static_cast<std::uint32_t>(positions.size());
+  m_bodies.push_back(std::move(body));
+  m_guardIds.push_back({});
+  m_isGuarded.push_back(false);
+  return m_bodies.size() - 1;
+}
+
+World::BodyId World::addMesh(std::string name, const SceneMesh& mesh, double inverseMass) {
+  const GeometryId id = m_detection.addTriangleMesh(mesh.positions, mesh.triangles);
+  return add({std::move(name), id, GeometryKind::Triangles, 0, 0, mesh.triangles, {}, 0, {}},
+             mesh.positions, inverseMass);
+}
+
+World::BodyId World::addThread(std::string name, std::span<const Vector3d> positions, double radius,
+                               double inverseMass) {
+  std::vector<Segment> segments;
+  for (std::uint32_t i = 0; i + 1 < positions.size(); ++i) segments.push_back({i, i + 1});
+  const GeometryId id = m_detection.addLineMesh(positions, segments, radius);
+  return add({std::move(name), id, GeometryKind::Lines, 0, 0, {}, std::move(segments), radius, {}},
+             positions, inverseMass);
+}
+
+World::BodyId World::addShape(std::string name, const AnalyticalGeometry& shape, SceneMesh drawn) {
+  const GeometryId id = m_detection.addAnalyticalGeometry(shape);
+  return add({std::move(name), id, GeometryKind::Shape, 0, 0, {}, {}, 0, std::move(drawn)}, {}, 0);
+}
+
+void World::addStiffness(BodyId body, double edgeCompliance, double bendingCompliance) {
+  std::map<Segment, std::vector<std::uint32_t>> opposite;  // corners across each edge
+  for (const Triangle& t : m_bodies[body].triangles) {
+    for (int i = 0; i < 3; ++i) {
+      const auto [low, high] = std::minmax(t[i], t[(i + 1) % 3]);
+      opposite[{low, high}].push_back(t[(i + 2) % 3]);
+    }
+  }
+  const std::uint32_t first = m_bodies[body].first;
+  const auto keep = [&](std::uint32_t a, std::uint32_t b, double compliance) {
+    const double rest = (m_solver.now[first + a] - m_solver.now[first + b]).norm();
+    m_solver.distances.push_back({first + a, first + b, rest, compliance});
+  };
+  for (const auto& [edge, corners] : opposite) {
+    keep(edge[0], edge[1], edgeCompliance);
+    if (corners.size() == 2) keep(corners[0], corners[1], bendingCompliance);
+  }
+}
+
+void World::addVolume(BodyId id, double compliance) {
+  const Body& body = m_bodies[id];
+  m_solver.volumes.push_back({body.first, body.count, body.triangles,
+                              volumeOf(positions(id), body.triangles), compliance});
+}
+
+void World::addPair(BodyId a, BodyId b, const PairSettings& settings, double gap) {
+  m_detection.addCollisionPair(m_bodies[a].id, m_bodies[b].id, settings);
+  m_pairs.push_back({a, b, gap});
+}
+
+void World::addGuard(BodyId a, BodyId b) {
+  for (const BodyId id : {a, b}) {
+    if (m_isGuarded[id]) continue;
+    m_isGuarded[id] = true;
+    const Body& body = m_bodies[id];
+    m_guardIds[id] = body.kind == GeometryKind::Lines
+                         ? m_guard.addLineMesh(positions(id), body.segments)
+                         : m_guard.addTriangleMesh(positions(id), body.triangles);
+  }
+  m_guard.addCollisionPair(m_guardIds[a], m_guardIds[b], {.method = Method::Continuous});
+  m_guarded.push_back({a, b, 0});
+}
+
+void World::place(BodyId shape, const Eigen::Matrix3d& rotation, const Vector3d& translation) {
+  m_detection.setTransform(m_bodies[shape].id, rotation, translation);
+  m_bodies[shape].rotation = rotation;
+  m_bodies[shape].translation = translation;
+}
+
+std::span<Vector3d> World::positions(BodyId body) {
+  return {m_solver.now.data() + m_bodies[body].first, m_bodies[body].count};
+}
+
+std::span<const Vector3d> World::before(BodyId body) const {
+  return {m_solver.before.data() + m_bodies[body].first, m_bodies[body].count};
+}
+
+SolverVertices World::vertices(BodyId body) const {
+  const auto& [first, count] = std::pair(m_bodies[body].first, m_bodies[body].count);
+  return {first, {m_solver.before.data() + first, count}, {m_solver.now.data() + first, count}};
+}
+
+void World::predict(double seconds, const Vector3d& acceleration, double damping) {
+  const Timed timed(m_times.solver);
+  m_seconds = seconds;
+  m_forces.assign(m_bodies.size(), Vector3d::Zero());
+  m_solver.predict(seconds, acceleration, damping);
+}
+
+void World::detect() {
+  const Timed timed(m_times.collision);
+  for (const Body& body : m_bodies) {
+    const BodyId id = &body - m_bodies.data();
+    if (body.count > 0) m_detection.setPositions(body.id, before(id), vertices(id).now);
+  }
+  m_detection.detectCollision();
+  m_rows.clear();
+  m_rowPairs.clear();
+  for (std::size_t p = 0; p < m_pairs.size(); ++p) {
+    const auto& [a, b, gap] = m_pairs[p];
+    appendRows(contacts(a, b), vertices(a), vertices(b), m_rows);
+    for (std::size_t row = m_rowPairs.size(); row < m_rows.size(); ++row) m_rows[row].offset += gap;
+    m_rowPairs.resize(m_rows.size(), p);
+  }
+  const FrameStatistics::Stages& stages = m_detection.statistics().milliseconds;
+  m_times.boxes += stages.boxes;
+  m_times.octree += stages.octree;
+  m_times.pairs += stages.pairs;
+  m_times.narrowPhase += stages.narrowPhase;
+  m_times.order += stages.order;
+  m_times.contacts = m_rows.size();
+}
+
+void World::solve(int iterations) {
+  const Timed timed(m_times.solver);
+  const std::span<const double> multipliers = m_solver.solve(m_seconds, m_rows, iterations);
+  for (std::size_t r = 0; r < m_rows.size(); ++r) {
+    const Vector3d force = multipliers[r] / (m_seconds * m_seconds) * m_rows[r].normal;
+    const auto& [a, b, gap] = m_pairs[m_rowPairs[r]];
+    const Body& first = m_bodies[a];  // weights above 0 are of the side that the normal points to
+    const std::uint32_t pushed = m_rows[r].vertices[0];
+    const bool towardsA = pushed >= first.first && pushed < first.first + first.count;
+    m_forces[a] += towardsA ? force : Vector3d(-force);
+    m_forces[b] -= towardsA ? force : Vector3d(-force);
+  }
+}
+
+void World::holdParticle(std::uint32_t particle) {
+  Range range{particle, 1};
+  for (const Range& rigid : m_rigid)
+    if (particle - rigid.first < rigid.count) range = rigid;
+  for (std::uint32_t i = range.first; i < range.first + range.count; ++i) {
+    if (wasHeld(i)) continue;
+    m_solver.now[i] = m_solver.before[i];
+    ++m_times.held;
+  }
+}
+
+bool World::holdContacts(const Pair& pair) {
+  const auto& [a, b, gap] = pair;
+  const CollisionData& contacts = m_guard.collisionData(m_guardIds[a], m_guardIds[b]);
+  const auto hold = [&](const Stencil& stencil, const std::array<BodyId, 4>& bodies) {
+    for (std::size_t i = 0; i < 4; ++i)
+      holdParticle(m_bodies[bodies[i]].first + stencil.vertices[i]);
+  };
+  for (const auto& contact : contacts.vertexTriangle()) hold(stencil(contact), {a, b, b, b});
+  for (const auto& contact : contacts.triangleVertex()) hold(stencil(contact), {b, a, a, a});
+  for (const auto& contact : contacts.edgeEdge()) hold(stencil(contact), {a, a, b, b});
+  return contacts.earliestTimeOfImpact() <= 1;
+}
+
+void World::hold() {
+  const Timed timed(m_times.hold);
+  for (bool touches = !m_guarded.empty(); touches;) {
+    for (BodyId id = 0; id < m_bodies.size(); ++id)
+      if (m_isGuarded[id]) m_guard.setPositions(m_guardIds[id], before(id), vertices(id).now);
+    m_guard.detectCollision();
+    const std::size_t held = m_times.held;
+    touches = false;
+    for (const Pair& pair : m_guarded) touches |= holdContacts(pair);
+    if (touches && m_times.held == held)
+      throw Error(ErrorCode::NotAvailable, "Bodies touched before the step.");
+  }
+}
+
+void World::commit() {
+  const Timed timed(m_times.solver);
+  m_solver.commit(m_seconds);
+}
+
+Vector3d World::force(BodyId body) const { return m_forces[body]; }
+
+}  // namespace palpate::scenes

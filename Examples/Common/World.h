@@ -1,0 +1,125 @@
+#pragma once
+
+#include "Meshes.h"
+#include "Xpbd.h"
+
+#include <palpate/OctreeBasedCD.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace palpate::scenes {
+
+/// Bodies whose particles one solver moves and one OctreeBasedCD sees. A step of a scene's loop:
+///
+///   world.predict(seconds, {});      // where velocities lead
+///   ...                              // tools go where hands lead: positions(tool), place(tool)
+///   for (int round = 0; round < rounds; ++round) {
+///     world.detect();                // before and now, contacts as rows
+///     world.solve(iterations);       // corrects now
+///   }
+///   world.hold();                    // what would still pass through stays where it was
+///   world.commit();
+class World {
+ public:
+  using BodyId = std::size_t;
+
+  struct Body {
+    std::string name;
+    GeometryId id;
+    GeometryKind kind;
+    std::uint32_t first, count;  ///< its particles; a shape has none
+    std::vector<Triangle> triangles;
+    std::vector<Segment> segments;
+    double radius;    ///< of lines
+    SceneMesh drawn;  ///< of a shape, in its own frame
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+  };
+
+  /// Milliseconds since resetTimes().
+  struct Times {
+    double boxes = 0, octree = 0, pairs = 0, narrowPhase = 0, order = 0;
+    double collision = 0;  ///< wall clock from setPositions() to rows
+    double hold = 0, solver = 0;
+    std::size_t contacts = 0;  ///< of the last detect()
+    std::size_t held = 0;      ///< particles
+  };
+
+  explicit World(int threads)
+      : m_detection(Settings{.threads = threads}), m_guard(Settings{.threads = threads}) {}
+
+  BodyId addMesh(std::string name, const SceneMesh& mesh, double inverseMass);
+  /// A polyline.
+  BodyId addThread(std::string name, std::span<const Eigen::Vector3d> positions, double radius,
+                   double inverseMass);
+  BodyId addShape(std::string name, const AnalyticalGeometry&, SceneMesh drawn);
+  /// Distances along each edge of a mesh and across it between the opposite corners.
+  void addStiffness(BodyId, double edgeCompliance, double bendingCompliance);
+  void addVolume(BodyId, double compliance);
+  /// These particles move together: hold() holds all or none.
+  void addRigid(std::uint32_t first, std::uint32_t count) { m_rigid.push_back({first, count}); }
+
+  /// gap: L, what the solver keeps them apart.
+  void addPair(BodyId a, BodyId b, const PairSettings&, double gap);
+  /// These never pass through each other: hold() sees to it.
+  void addGuard(BodyId a, BodyId b);
+  void place(BodyId shape, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation);
+
+  void predict(double seconds, const Eigen::Vector3d& acceleration, double damping);
+  void detect();
+  void solve(int iterations);
+  /// Particles of features that touch within the step from before to now go back to before, until
+  /// nothing touches: exact, by Method::Continuous without thickness.
+  /// Errors   Error where something touched before the step.
+  void hold();
+  void commit();
+
+  std::span<Eigen::Vector3d> positions(BodyId);  ///< now
+  std::span<const Eigen::Vector3d> before(BodyId) const;
+  bool wasHeld(std::uint32_t particle) const {
+    return m_solver.now[particle] == m_solver.before[particle];
+  }
+  /// Forces on a body in the last step, along the normals of its contacts.
+  Eigen::Vector3d force(BodyId) const;
+
+  const std::vector<Body>& bodies() const { return m_bodies; }
+  const CollisionData& contacts(BodyId a, BodyId b) const {
+    return m_detection.collisionData(m_bodies[a].id, m_bodies[b].id);
+  }
+  Xpbd& solver() { return m_solver; }
+  OctreeBasedCD& detection() { return m_detection; }
+  const Times& times() const { return m_times; }
+  void resetTimes() { m_times = {}; }
+
+  struct Pair {
+    BodyId a, b;
+    double gap;
+  };
+  const std::vector<Pair>& pairs() const { return m_pairs; }
+
+ private:
+  BodyId add(Body, std::span<const Eigen::Vector3d> positions, double inverseMass);
+  SolverVertices vertices(BodyId) const;
+  void holdParticle(std::uint32_t particle);
+  bool holdContacts(const Pair&);  ///< whether anything touches
+
+  Xpbd m_solver;
+  OctreeBasedCD m_detection, m_guard;
+  std::vector<Body> m_bodies;
+  std::vector<GeometryId> m_guardIds;  ///< by body
+  std::vector<bool> m_isGuarded;       ///< by body
+  std::vector<Pair> m_pairs, m_guarded;
+  struct Range {
+    std::uint32_t first, count;
+  };
+  std::vector<Range> m_rigid;
+  std::vector<ConstraintRow> m_rows;
+  std::vector<std::size_t> m_rowPairs;
+  std::vector<Eigen::Vector3d> m_forces;  ///< by body
+  double m_seconds = 0;
+  Times m_times;
+};
+
+}  // namespace palpate::scenes

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <palpate/ConstraintRows.h>
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace palpate::scenes {
+
+/// Keeps two particles at a distance.
+struct DistanceConstraint {
+  std::uint32_t a, b;
+  double rest;        ///< L
+  double compliance;  ///< L / force; 0: stiff
+};
+
+/// Keeps what a closed surface holds.
+struct VolumeConstraint {
+  std::uint32_t first, count;       ///< the surface's particles
+  std::vector<Triangle> triangles;  ///< of the surface's own vertices 0, 1, ...; outward winding
+  double rest;                      ///< L³
+  double compliance;                ///< L⁵ / force; 0: stiff
+};
+
+/// Particles that keep distances, volumes and gaps: extended position-based dynamics.
+///
+/// Errors   none: constraints must name particles that are there.
+/// Order    constraints are met one after another as they were added, so a run repeats bit by bit.
+/// Source   Macklin, Müller and Chentanez, XPBD (2016).
+class Xpbd {
+ public:
+  std::vector<Eigen::Vector3d> before, now, velocities;
+  std::vector<double> inverseMasses;  ///< 0: stays, or is moved by hand
+  std::vector<DistanceConstraint> distances;
+  std::vector<VolumeConstraint> volumes;
+
+  /// Returns the number of the first.
+  std::uint32_t add(std::span<const Eigen::Vector3d> positions, double inverseMass);
+
+  /// now = before + what velocities and the acceleration bring. damping: share of velocity lost.
+  void predict(double seconds, const Eigen::Vector3d& acceleration, double damping);
+  /// Corrects `now`. Rows push only. Returns the rows' multipliers: each is a force times seconds².
+  std::span<const double> solve(double seconds, std::span<const ConstraintRow> rows,
+                                int iterations);
+  /// Velocities from what became of the step; before = now.
+  void commit(double seconds);
+
+ private:
+  void solveDistance(std::size_t index, double seconds);
+  void solveVolume(std::size_t index, double seconds);
+  void solveRow(const ConstraintRow& row, double& multiplier);
+
+  std::vector<double> m_distanceMultipliers, m_volumeMultipliers, m_rowMultipliers;
+  std::vector<Eigen::Vector3d> m_gradients;
+};
+
+double volumeOf(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles);
+
+}  // namespace palpate::scenes

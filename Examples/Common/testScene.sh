@@ -1,0 +1,40 @@
+#!/bin/bash
+# testScene.sh PROGRAM TEST HAS_VTK: what every scene's program does, and what its own test.sh adds. That
+# says how many frames are enough (frames=N), and may use program, folder, hasVtk, fail, refused and column.
+set -uo pipefail
+program=$1 test=$2 hasVtk=$3
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+fail() { echo "FAILED: $*"; exit 1; }
+unset DISPLAY
+
+# Refused in one line, with a code, and nothing written.
+refused() {
+  "$program" --frames 1 --out "$folder/refused" "$@" >"$folder/text" 2>"$folder/messages" && fail "not refused: $*"
+  [[ $(wc -l <"$folder/messages") -eq 1 ]] || fail "not one line for $*: $(cat "$folder/messages")"
+  [[ ! -e $folder/refused ]] || fail "something written for $*"
+}
+# column NAME: its values in the run's frames.csv, a line each.
+column() {
+  awk -F, -v name="$1" 'NR == 1 { for (i = 1; i <= NF; ++i) if ($i == name) at = i; if (!at) exit 1; next } { print $at }' \
+    "$folder/run/frames.csv" || fail "no column $1"
+}
+run() { "$program" --frames "$frames" --out "$folder/run" "$@" >"$folder/text" 2>"$folder/messages" || fail "$(cat "$folder/messages")"; }
+
+frames=$(sed -n 's/^frames=//p' "$test")
+run --threads 1
+hash=$(grep "result hash" "$folder/text")
+run
+[[ $(grep "result hash" "$folder/text") == "$hash" ]] || fail "threads change the result"
+[[ $(wc -l <"$folder/run/frames.csv") -eq $((frames + 1)) ]] || fail "frames.csv has not a line per frame"
+grep -q "${hash##* }" "$folder/run/report.html" || fail "report.html has not the hash"
+grep -qE '(src|href)="?http' "$folder/run/report.html" && fail "report.html needs a network"
+grep -q "no picture" "$folder/text" || fail "nothing said about the picture"
+refused --frames 0
+refused --unknown
+refused --threads -1
+touch "$folder/file"
+"$program" --frames 1 --out "$folder/file/run" 2>"$folder/messages" && fail "a folder inside a file"
+grep -q "cannot be made" "$folder/messages" || fail "the folder is not named: $(cat "$folder/messages")"
+. "$test"
+echo passed

@@ -1,0 +1,176 @@
+#include <palpate/ConstraintRows.h>
+
+#include "Common/Things.h"
+
+#include <Eigen/SparseCore>
+
+#include <map>
+
+namespace palpate::testing {
+namespace {
+
+/// A pair at some positions: its contacts and their rows, the second geometry's vertices after the
+/// first's.
+struct Rowed {
+  CollisionData contacts;
+  std::vector<ConstraintRow> rows;
+  std::vector<double> distances;  ///< of the rows' contacts
+  std::vector<std::vector<std::uint32_t>> keys;
+};
+
+Positions joined(const Positions& a, const Positions& b) {
+  Positions all = a;
+  all.insert(all.end(), b.begin(), b.end());
+  return all;
+}
+
+void collect(Rowed& result, const SolverVertices& a, const SolverVertices& b) {
+  appendRows(result.contacts, a, b, result.rows);
+  const auto add = [&](const auto& contacts, auto&& key) {
+    for (const auto& contact : contacts) {
+      result.distances.push_back(contact.distance);
+      result.keys.push_back(key(contact));
+    }
+  };
+  using Key = std::vector<std::uint32_t>;
+  const auto vertexTriangle = [](std::uint32_t kind) {
+    return [kind](const VertexTriangleContact& c) { return Key{kind, c.vertex, c.triangle}; };
+  };
+  add(result.contacts.vertexTriangle(), vertexTriangle(0));
+  add(result.contacts.triangleVertex(), vertexTriangle(1));
+  add(result.contacts.edgeEdge(), [](const EdgeEdgeContact& c) {
+    return Key{2, c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]};
+  });
+  add(result.contacts.shape(), [](const ShapeContact& c) {
+    return Key{3 + static_cast<std::uint32_t>(c.element), c.id, c.vertices[1], c.vertices[2]};
+  });
+}
+
+/// all: the first thing's positions, then the second's, of which self-collision has none.
+Rowed rowed(const Thing& a, const Thing& b, const PairSettings& pair, const Positions& all) {
+  const auto split = all.begin() + static_cast<std::ptrdiff_t>(a.positions.size());
+  const Positions nowA(all.begin(), split), nowB(split, all.end());
+  Rowed result{answer(settingsOf(Engine::Octree), a, b, pair, nowA, nowB), {}, {}, {}};
+  const SolverVertices first{0, a.positions, nowA},
+      second{static_cast<std::uint32_t>(nowA.size()), b.positions, nowB};
+  collect(result, first, &a == &b ? first : second);
+  return result;
+}
+
+Rowed rowed(const Thing& a, const AnalyticalGeometry& shape, double thickness,
+            const Positions& now) {
+  OctreeBasedCD collisions;
+  const GeometryId first = a.addTo(collisions), second = collisions.addAnalyticalGeometry(shape);
+  collisions.addCollisionPair(first, second, {Method::Proximity, thickness, Contacts::All});
+  collisions.setPositions(first, now);
+  collisions.detectCollision();
+  Rowed result{collisions.collisionData(first, second), {}, {}, {}};
+  collect(result, {0, a.positions, now}, {});
+  return result;
+}
+
+Eigen::SparseMatrix<double> jacobian(const Rowed& found, std::size_t vertices) {
+  std::vector<Eigen::Triplet<double>> triplets;
+  appendTriplets<Eigen::Triplet<double>>(found.rows, triplets);
+  Eigen::SparseMatrix<double> matrix(static_cast<Eigen::Index>(found.rows.size()),
+                                     static_cast<Eigen::Index>(3 * vertices));
+  matrix.setFromTriplets(triplets.begin(), triplets.end());
+  return matrix;
+}
+
+/// Gaps are distances, and the Jacobian is what distances do when all positions move a little in
+/// random directions. Returns how many contacts were compared.
+template <class Find>  // Rowed of positions
+std::size_t expectDerivatives(Random& random, const Positions& at, Find&& find) {
+  constexpr double kStep = 0x1p-18;
+  const Rowed found = find(at);
+  EXPECT_EQ(found.rows.size(), found.distances.size());
+  for (std::size_t r = 0; r < found.rows.size(); ++r)
+    EXPECT_NEAR(found.rows[r].gap(at), found.distances[r], 1e-13) << r;
+  Eigen::VectorXd direction(3 * static_cast<Eigen::Index>(at.size()));
+  for (double& component : direction) component = uniform(random, -1, 1);
+  const auto distancesAt = [&](double step) {
+    Positions there = at;
+    for (std::size_t i = 0; i < at.size(); ++i)
+      there[i] += step * direction.segment<3>(3 * static_cast<Eigen::Index>(i));
+    const Rowed near = find(there);
+    std::map<std::vector<std::uint32_t>, double> distances;
+    for (std::size_t r = 0; r < near.rows.size(); ++r) distances[near.keys[r]] = near.distances[r];
+    return distances;
+  };
+  const auto ahead = distancesAt(kStep), behind = distancesAt(-kStep);
+  const Eigen::VectorXd predicted = jacobian(found, at.size()) * direction;
+  std::size_t compared = 0;
+  for (std::size_t r = 0; r < found.rows.size(); ++r) {
+    const auto one = ahead.find(found.keys[r]), other = behind.find(found.keys[r]);
+    if (one == ahead.end() || other == behind.end()) continue;  // at the thickness
+    const double quotient = (one->second - other->second) / (2 * kStep);
+    // A central difference errs by the square of the step over the distance.
+    const double ratio = kStep / std::max(std::abs(found.distances[r]), 1e-4);
+    EXPECT_NEAR(predicted[static_cast<Eigen::Index>(r)], quotient, 1e-6 + 30 * ratio * ratio) << r;
+    ++compared;
+  }
+  EXPECT_GE(2 * compared, found.rows.size());
+  return compared;
+}
+
+TEST(ConstraintRows, AreTheDerivativesOfDistancesOfEveryKind) {
+  Random random(71);
+  const Thing sheets = things(sheet(6, 0.5, 0.3)), triangles = things(soup(random, 60, 0.1)),
+              line = thread(random, 60, 0.1, 0.01, false), points = particles(random, 60, 0.02);
+  const Pairs pairs{{&sheets, &triangles}, {&triangles, &sheets}, {&triangles, &triangles},
+                    {&sheets, &line},      {&line, &sheets},      {&line, &line},
+                    {&line, &points},      {&points, &line},      {&points, &points},
+                    {&points, &sheets}};
+  for (const auto& [a, b] : pairs) {
+    const PairSettings settings{Method::Proximity, 0.1, Contacts::All};
+    const Positions at = a == b ? a->positions : joined(a->positions, b->positions);
+    EXPECT_GT(expectDerivatives(random, at,
+                                [&](const Positions& now) { return rowed(*a, *b, settings, now); }),
+              10u);
+  }
+}
+
+TEST(ConstraintRows, AreTheDerivativesOfDistancesToShapes) {
+  Random random(72);
+  const Thing triangles = things(soup(random, 60, 0.1)),
+              line = thread(random, 60, 0.1, 0.01, false), points = particles(random, 60, 0.02);
+  const std::vector<AnalyticalGeometry> shapes{Sphere{{0.5, 0.5, 0.5}, 0.25},
+                                               Capsule{{0.3, 0.4, 0.5}, {0.7, 0.5, 0.6}, 0.2},
+                                               Plane{{0.5, 0.5, 0.5}, {0.3, 0.1, 1}}};
+  for (const Thing* thing : {&triangles, &line, &points}) {
+    for (const AnalyticalGeometry& shape : shapes)
+      EXPECT_GT(
+          expectDerivatives(random, thing->positions,
+                            [&](const Positions& now) { return rowed(*thing, shape, 0.1, now); }),
+          10u);
+  }
+}
+
+TEST(ConstraintRows, OfImpactsHoldTheirGapWhereFeaturesTouch) {
+  Random random(73);
+  const Thing triangles = things(soup(random, 80, 0.1)), sheets = things(sheet(6, 0.5, 0.3));
+  for (const Method method : {Method::Continuous, Method::Auto}) {
+    for (const double thickness : {0.0, 0.02}) {
+      const Positions before = joined(triangles.positions, sheets.positions),
+                      now = moved(random, before, 0.1);
+      const Rowed found = rowed(triangles, sheets, {method, thickness, Contacts::All}, now);
+      EXPECT_GT(found.rows.size(), 20u);
+      std::vector<double> times;
+      const auto add = [&](const auto& contacts) {
+        for (const auto& contact : contacts) times.push_back(contact.timeOfImpact);
+      };
+      add(found.contacts.vertexTriangle()), add(found.contacts.triangleVertex());
+      add(found.contacts.edgeEdge());
+      for (std::size_t r = 0; r < found.rows.size(); ++r) {
+        Positions there = before;
+        for (std::size_t i = 0; i < there.size(); ++i)
+          there[i] = (1 - times[r]) * before[i] + times[r] * now[i];
+        EXPECT_NEAR(found.rows[r].gap(there), found.distances[r], 1e-13) << r;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate::testing
