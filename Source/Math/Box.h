@@ -63,11 +63,14 @@ struct BoxArrays {
 /// Let v be a coordinate in the frame, fl64(x - origin) * scale with |error| <= 2^-53 |v|, and f
 /// the float nearest to it: |f - v| <= 2^-24 |v| where f is normal, <= 2^-150 where it is denormal.
 /// kRelative |f| = 2^-22 |f| covers that, the 2^-53, and the rounding of the subtraction itself (<=
-/// 2^-24 of its result) with a factor of about two to spare; kAbsolute covers denormals. Both
-/// bounds are monotone in f, so the bound of a set is the bound of its least element.
+/// 2^-24 of its result) with a factor of about two to spare; kAbsolute covers denormals, and is so
+/// large that its own outward rounding is not one: a product that is costs many processors a
+/// hundred cycles, and coordinates of zero are common. Both bounds are monotone in f, so the bound
+/// of a set is the bound of its least element.
 struct OutwardRounding {
   static constexpr float kRelative = 0x1p-22f;
-  static constexpr float kAbsolute = 0x1p-126f;
+  static constexpr float kAbsolute = 0x1p-103f;
+  static_assert(kAbsolute * kRelative >= std::numeric_limits<float>::min());
   static float down(float f) { return f - (std::fabs(f) * kRelative + kAbsolute); }
   static float up(float f) { return f + (std::fabs(f) * kRelative + kAbsolute); }
 };

@@ -37,7 +37,7 @@ void expectHeld(double x, double origin, double scale) {
   const long double exact = inFrame(x, origin, scale);
   ASSERT_LE(lower, exact) << x << " " << origin << " " << scale;
   ASSERT_GE(upper, exact) << x << " " << origin << " " << scale;
-  ASSERT_LE(upper - lower, kFloatMargin * std::fabs(exact) + 0x1p-124L)
+  ASSERT_LE(upper - lower, kFloatMargin * std::fabs(exact) + 4.0L * OutwardRounding::kAbsolute)
       << x << " " << origin << " " << scale;
 }
 
