@@ -74,6 +74,10 @@ void World::addStiffness(BodyId body, double edgeCompliance, double bendingCompl
     const double rest = (m_solver.now[first + a] - m_solver.now[first + b]).norm();
     m_solver.distances.push_back({first + a, first + b, rest, compliance});
   };
+  for (std::uint32_t i = 0; i < m_bodies[body].segments.size(); ++i) {
+    keep(i, i + 1, edgeCompliance);
+    if (i + 2 < m_bodies[body].count) keep(i, i + 2, bendingCompliance);
+  }
   for (const auto& [edge, corners] : opposite) {
     keep(edge[0], edge[1], edgeCompliance);
     if (corners.size() == 2) keep(corners[0], corners[1], bendingCompliance);
@@ -84,6 +88,11 @@ void World::addVolume(BodyId id, double compliance) {
   const Body& body = m_bodies[id];
   m_solver.volumes.push_back({body.first, body.count, body.triangles,
                               volumeOf(positions(id), body.triangles), compliance});
+}
+
+void World::pin(BodyId body, const std::function<bool(const Vector3d&)>& holds) {
+  for (std::uint32_t i = 0; i < m_bodies[body].count; ++i)
+    if (holds(positions(body)[i])) m_solver.inverseMasses[m_bodies[body].first + i] = 0;
 }
 
 void World::addPair(BodyId a, BodyId b, const PairSettings& settings, double gap) {
@@ -102,6 +111,11 @@ void World::addGuard(BodyId a, BodyId b) {
   }
   m_guard.addCollisionPair(m_guardIds[a], m_guardIds[b], {.method = Method::Continuous});
   m_guarded.push_back({a, b, 0});
+}
+
+void World::disable(BodyId body, std::span<const std::uint32_t> triangles) {
+  m_detection.setDisabledElements(m_bodies[body].id, triangles);
+  if (m_isGuarded[body]) m_guard.setDisabledElements(m_guardIds[body], triangles);
 }
 
 void World::place(BodyId shape, const Eigen::Matrix3d& rotation, const Vector3d& translation) {

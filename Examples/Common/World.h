@@ -55,9 +55,12 @@ class World {
   BodyId addThread(std::string name, std::span<const Eigen::Vector3d> positions, double radius,
                    double inverseMass);
   BodyId addShape(std::string name, const AnalyticalGeometry&, SceneMesh drawn);
-  /// Distances along each edge of a mesh and across it between the opposite corners.
+  /// Distances along each edge of a mesh and across it between the opposite corners; of a thread
+  /// along each segment and each two.
   void addStiffness(BodyId, double edgeCompliance, double bendingCompliance);
   void addVolume(BodyId, double compliance);
+  /// Vertices of which this holds stay where they are, or are moved by hand.
+  void pin(BodyId, const std::function<bool(const Eigen::Vector3d&)>&);
   /// These particles move together: hold() holds all or none.
   void addRigid(std::uint32_t first, std::uint32_t count) { m_rigid.push_back({first, count}); }
 
@@ -65,6 +68,8 @@ class World {
   void addPair(BodyId a, BodyId b, const PairSettings&, double gap);
   /// These never pass through each other: hold() sees to it.
   void addGuard(BodyId a, BodyId b);
+  /// These triangles are no longer there, as where something pierced them; all others are.
+  void disable(BodyId, std::span<const std::uint32_t> triangles);
   void place(BodyId shape, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation);
 
   void predict(double seconds, const Eigen::Vector3d& acceleration, double damping);

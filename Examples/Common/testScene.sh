@@ -1,8 +1,9 @@
 #!/bin/bash
-# testScene.sh PROGRAM TEST HAS_VTK: what every scene's program does, and what its own test.sh adds. That
-# says how many frames are enough (frames=N), and may use program, folder, hasVtk, fail, refused and column.
+# testScene.sh PROGRAM TEST HAS_VTK LENGTH: what every scene's program does, and what its own test.sh adds.
+# That says how many frames are enough (frames=N) and how many the whole story has (long=N), of which
+# LENGTH is one; it may use program, folder, hasVtk, length, fail, refused, run and column.
 set -uo pipefail
-program=$1 test=$2 hasVtk=$3
+program=$1 test=$2 hasVtk=$3 length=$4
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 fail() { echo "FAILED: $*"; exit 1; }
@@ -21,7 +22,7 @@ column() {
 }
 run() { "$program" --frames "$frames" --out "$folder/run" "$@" >"$folder/text" 2>"$folder/messages" || fail "$(cat "$folder/messages")"; }
 
-frames=$(sed -n 's/^frames=//p' "$test")
+frames=$(sed -n "s/^$length=//p" "$test")
 run --threads 1
 hash=$(grep "result hash" "$folder/text")
 run

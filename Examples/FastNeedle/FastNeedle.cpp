@@ -83,12 +83,9 @@ class FastNeedle : public LiveScene {
     for (Vector3d& p : membrane.positions) p = centre + kHalfWidth * p;
     Lane lane{method, m_world.addMesh(name, needle, 0.0),
               m_world.addMesh(name + " membrane", membrane, 1.0)};
-    const World::Body& body = m_world.bodies()[lane.membrane];
-    for (std::uint32_t i = 0; i < body.count; ++i) {
-      const Vector3d p = membrane.positions[i] - centre;
-      if (std::max(std::abs(p.x()), std::abs(p.y())) > 0.999 * kHalfWidth)
-        m_world.solver().inverseMasses[body.first + i] = 0;
-    }
+    m_world.pin(lane.membrane, [&](const Vector3d& p) {
+      return (p - centre).head<2>().lpNorm<Eigen::Infinity>() > 0.999 * kHalfWidth;
+    });
     m_world.addStiffness(lane.membrane, 1e-5, 1e-3);
     m_world.addRigid(m_world.bodies()[lane.needle].first, m_world.bodies()[lane.needle].count);
     m_world.addPair(lane.needle, lane.membrane, {.method = method, .thickness = kThickness},

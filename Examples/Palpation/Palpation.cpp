@@ -58,11 +58,10 @@ class Palpation : public LiveScene {
   Palpation(const Files& files, int threads) : m_world(threads) {
     SceneMesh organ = organMesh(files.organ);
     m_box = boxOf(organ.positions);
-    m_size = m_box.sizes().maxCoeff();
-    m_gap = 0.003 * m_size;
+    m_size = m_box.sizes().maxCoeff(), m_gap = 0.003 * m_size;
     m_organ = m_world.addMesh("organ", organ, static_cast<double>(organ.positions.size()) / kMass);
-    for (std::uint32_t i = 0; i < organ.positions.size(); ++i)  // it grows on what is below
-      if (organ.positions[i].z() < 0.25 * m_box.max().z()) m_world.solver().inverseMasses[i] = 0;
+    const double foot = 0.25 * m_box.max().z();  // it grows on what is below
+    m_world.pin(m_organ, [foot](const Vector3d& p) { return p.z() < foot; });
     m_world.addStiffness(m_organ, kCompliance, 3 * kCompliance);
     m_world.addVolume(m_organ, 0);
     addTool(files.tool);

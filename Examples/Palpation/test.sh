@@ -1,5 +1,6 @@
 # That no vertex is inside the probe the program itself checks in each frame.
 frames=30
+long=300
 column "force mN" | awk '$1 > 1 { found = 1 } END { exit !found }' || fail "nothing is pressed"
 column "volume share" | awk '$1 < 0.97 || $1 > 1.03 { exit 1 }' || fail "the organ lost volume"
 refused --mesh "$folder/missing.obj"

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include <cstddef>
+#include <span>
+
+namespace palpate::scenes {
+
+/// Pairs of a polyline's segments without a common vertex that touch within a step: exactly, every
+/// segment against every other, with no octree.
+std::size_t countSelfImpacts(std::span<const Eigen::Vector3d> before,
+                             std::span<const Eigen::Vector3d> now);
+
+}  // namespace palpate::scenes
