@@ -26,7 +26,8 @@ constexpr std::array<std::string_view, 6> kMethods{"Auto",         "Proxy",     
                                                    "Intersection", "Proximity", "Continuous"};
 constexpr std::array<std::string_view, 4> kKinds{"Triangles", "Lines", "Points", "Shape"};
 constexpr std::array<std::string_view, 2> kSides{"Both", "Outer"};
-constexpr std::array<std::string_view, 5> kShapes{"Sphere", "Capsule", "Plane", "Box", "Cylinder"};
+constexpr std::array<std::string_view, 6> kShapes{"Sphere", "Capsule",  "Plane",
+                                                  "Box",    "Cylinder", "ConvexHull"};
 constexpr std::array<std::string_view, 3> kContacts{"Distinct", "All", "Earliest"};
 constexpr std::array<std::string_view, 2> kEngines{"Octree", "BruteForce"};
 constexpr std::array<std::string_view, 2> kUpdates{"Auto", "Rebuild"};
@@ -167,6 +168,14 @@ void filterOf(File& file, FilterType& filter) {
 void fieldOf(Writer& file, const Eigen::Vector3d& value) { file.position(value); }
 void fieldOf(Writer& file, double value) { file.real(value); }
 void fieldOf(Writer& file, bool value) { file.integer(int{value}); }
+void fieldOf(Writer& file, const std::vector<Eigen::Vector3d>& value) {
+  file.integer(value.size());
+  for (const Eigen::Vector3d& p : value) file.position(p);
+}
+void fieldOf(Reader& file, std::vector<Eigen::Vector3d>& value) {
+  value.resize(file.count());
+  for (Eigen::Vector3d& p : value) file.position(p);
+}
 void fieldOf(Reader& file, Eigen::Vector3d& value) { file.position(value); }
 void fieldOf(Reader& file, double& value) { file.real(value); }
 void fieldOf(Reader& file, bool& value) {

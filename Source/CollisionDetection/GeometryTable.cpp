@@ -254,9 +254,10 @@ GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
 }
 
 GeometryId GeometryTable::add(const AnalyticalGeometry& analytical) {
-  if (const std::string fault = faultOf(analytical); !fault.empty())
+  std::optional<std::size_t> element;
+  if (const std::string fault = faultOf(analytical, element); !fault.empty())
     throw Error(ErrorCode::InvalidShape, nameOf(GeometryId{m_nextId}) + ": " + fault,
-                GeometryId{m_nextId});
+                GeometryId{m_nextId}, element);
   const GeometryId id = add({}, {}, GeometryKind::Shape);
   TriangleMesh& mesh = m_geometries.back()->mesh;
   mesh.analytical = analytical;
@@ -274,7 +275,7 @@ void GeometryTable::setTransform(GeometryId id, const RigidTransform& transform)
   if (const std::string fault = faultOf(transform); !fault.empty())
     throw Error(ErrorCode::InvalidTransform, nameOf(id) + ": " + fault, id);
   mesh.transform = transform;
-  mesh.shape.emplace(*mesh.analytical, transform);
+  mesh.shape->place(*mesh.analytical, transform);
   ++geometry.revision;
   ++geometry.stepRevision;
 }

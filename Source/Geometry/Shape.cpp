@@ -54,6 +54,14 @@ Vector3d RigidTransform::operator()(const Vector3d& p) const {
 }
 
 Shape::Shape(const AnalyticalGeometry& geometry, const RigidTransform& transform) {
+  if (const auto* hull = std::get_if<ConvexHull>(&geometry)) {
+    m_span = spanOf(hull->points);
+    if (m_span.size() > 2) m_hull = std::make_shared<Polytope>(hull->points);
+  }
+  place(geometry, transform);
+}
+
+void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& transform) {
   const auto capsule = [&](const Vector3d& p0, const Vector3d& p1, double radius) {
     m_kind = Kind::Capsule;
     m_p0 = transform(p0);
@@ -81,6 +89,12 @@ Shape::Shape(const AnalyticalGeometry& geometry, const RigidTransform& transform
     const Vector3d along = 0.5 * cylinder->p1 - 0.5 * cylinder->p0;
     body(Kind::Cylinder, cylinder->p0 + along, axesAlong(along),
          {cylinder->radius, lengthOf(along), 0});
+  } else if (m_hull) {
+    double size = 0;
+    for (const Vector3d& p : m_hull->points()) size = std::max(size, p.cwiseAbs().maxCoeff());
+    body(Kind::Hull, Vector3d::Zero(), Eigen::Matrix3d::Identity(), {size, 0, 0});
+  } else {
+    capsule(m_span.front(), m_span.back(), 0);
   }
   m_magnitude = m_p0.cwiseAbs().maxCoeff() + m_p1.cwiseAbs().maxCoeff() + m_radius +
                 *std::max_element(m_sizes.begin(), m_sizes.end());
@@ -109,6 +123,7 @@ Shape::Parts Shape::partsOf(const Vector3d& v, double tie) const {
 }
 
 SignedDistance Shape::atBody(const Vector3d& u, double tie) const {
+  if (m_hull) return m_hull->at(u, tie);
   const Parts parts = partsOf(u, tie);
   int nearest = 0, outside = 0;
   std::array<double, 3> beyond{};
@@ -162,13 +177,17 @@ NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const 
       return {{1.0 - t, t, 0.0}, m_axes.col(2), 0.0, true};
     }
   }
-  // The distance is convex along the edge: where its slope changes sign.
   const Vector3d from = inBody(p), along = inBody(q) - from;
   const auto slope = [&](double t) { return atBody(from + t * along, 0).normal.dot(along); };
   const auto at = [&](double t, bool inInterior) {
     const SignedDistance least = atBody(from + t * along, kOnSurface * m_magnitude);
     return NearestToShape{{1.0 - t, t, 0.0}, m_axes * least.normal, least.distance, inInterior};
   };
+  if (m_hull) {
+    const double t = m_hull->leastOnEdge(from, from + along, kOnSurface * m_magnitude);
+    return at(t, t > 0 && t < 1);
+  }
+  // The distance is convex along the edge: where its slope changes sign.
   if (slope(0) >= 0) return at(0, false);
   if (slope(1) <= 0) return at(1, false);
   // From a falling to a rising slope; a stretch without slope is bracketed from both sides.
@@ -247,6 +266,7 @@ std::optional<NearestToShape> Shape::nearestToAxis(const Vector3d& a, const Vect
 std::optional<NearestToShape> Shape::nearestInTriangle(const Vector3d& a, const Vector3d& b,
                                                        const Vector3d& c) const {
   if (m_kind == Kind::Capsule) return nearestToAxis(a, b, c);
+  if (m_hull) return nearestToHull(inBody(a), inBody(b), inBody(c));
   Vector3d normal = unitCross(a, b, a, c);
   // In a plane's half-space no interior is deeper than the boundary.
   if (m_kind < Kind::Capsule || normal == Vector3d::Zero()) return {};
@@ -262,7 +282,27 @@ std::optional<NearestToShape> Shape::nearestInTriangle(const Vector3d& a, const 
   return NearestToShape{weights, least.normal, least.distance, true};
 }
 
-std::string faultOf(const AnalyticalGeometry& geometry) {
+/// Of a triangle in the body's frame.
+std::optional<NearestToShape> Shape::nearestToHull(const Vector3d& a, const Vector3d& b,
+                                                   const Vector3d& c) const {
+  const double tie = kOnSurface * m_magnitude;
+  const Vector3d up = unitCross(a, b, a, c);
+  if (up == Vector3d::Zero()) return {};
+  for (const Vector3d& normal : {up, Vector3d(-up)}) {
+    const Vector3d point = m_hull->support(normal, tie);
+    if (normal.dot(a - point) < -tie) continue;  // the plane goes through
+    const VertexTriangleDistance on = finiteVertexTriangleDistance(point, a, b, c);
+    if (on.feature != TriangleFeature::Face) return {};
+    return NearestToShape{on.barycentric, m_axes * normal, on.distance, true, on.exact};
+  }
+  const std::optional<Vector3d> weights = m_hull->leastInTriangle(a, b, c, tie);
+  if (!weights) return {};
+  const SignedDistance least =
+      m_hull->at((*weights)[0] * a + (*weights)[1] * b + (*weights)[2] * c, tie);
+  return NearestToShape{*weights, m_axes * least.normal, least.distance, true};
+}
+
+std::string faultOf(const AnalyticalGeometry& geometry, std::optional<std::size_t>& element) {
   std::string fault;
   const auto say = [&](std::string_view name, const Vector3d& v, bool isVector, const char* rule) {
     char value[128];
@@ -274,7 +314,12 @@ std::string faultOf(const AnalyticalGeometry& geometry) {
   };
   forEachField(geometry, [&](std::string_view name, const auto& field) {
     using Field = std::decay_t<decltype(field)>;
-    if constexpr (!std::is_same_v<Field, bool>) {
+    if constexpr (std::is_same_v<Field, std::vector<Vector3d>>) {
+      if (field.empty()) fault = "a hull needs at least one point";
+      for (std::size_t i = field.size(); i-- > 0;)
+        if (!field[i].allFinite())
+          say("point " + std::to_string(i), field[i], true, "finite"), element = i;
+    } else if constexpr (!std::is_same_v<Field, bool>) {
       constexpr bool isVector = std::is_same_v<Field, Vector3d>;
       const Vector3d values = [&]() -> Vector3d {
         if constexpr (isVector)

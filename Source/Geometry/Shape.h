@@ -2,7 +2,11 @@
 
 #include <palpate/AnalyticalGeometry.h>
 
+#include "Geometry/Polytope.h"
+
 #include <array>
+#include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -16,12 +20,6 @@ struct RigidTransform {
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   /// Rounded as it is written: ((r0 x + r1 y) + r2 z) + t.
   Eigen::Vector3d operator()(const Eigen::Vector3d& p) const;
-};
-
-/// From a shape's surface: negative inside.
-struct SignedDistance {
-  double distance;         ///< L
-  Eigen::Vector3d normal;  ///< unit: the distance grows fastest along it
 };
 
 /// Where a vertex, an edge or a triangle comes nearest to a shape, or is deepest inside.
@@ -41,6 +39,8 @@ struct NearestToShape {
 class Shape {
  public:
   Shape(const AnalyticalGeometry&, const RigidTransform&);
+  /// The same shape elsewhere.
+  void place(const AnalyticalGeometry&, const RigidTransform&);
 
   SignedDistance at(const Eigen::Vector3d& x) const;
   NearestToShape nearestOfEdge(const Eigen::Vector3d& p, const Eigen::Vector3d& q) const;
@@ -52,7 +52,7 @@ class Shape {
   double magnitude() const { return m_magnitude; }
 
  private:
-  enum class Kind { Plane, TwoSidedPlane, Capsule, Cylinder, Box };
+  enum class Kind { Plane, TwoSidedPlane, Capsule, Cylinder, Box, Hull };
   /// A vector by what the distance is made of: height, or radius and height, or three heights.
   struct Parts {
     int count;
@@ -67,6 +67,8 @@ class Shape {
   /// tie: L, of two faces that are equally near the first counts.
   SignedDistance atBody(const Eigen::Vector3d& u, double tie) const;
   Eigen::Vector3d nearestOfPlane(const Eigen::Vector3d& normal, double height) const;
+  std::optional<NearestToShape> nearestToHull(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                              const Eigen::Vector3d& c) const;
   std::optional<NearestToShape> nearestToAxis(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                               const Eigen::Vector3d& c) const;
 
@@ -75,10 +77,12 @@ class Shape {
   double m_radius = 0;         ///< of a capsule
   Eigen::Matrix3d m_axes = Eigen::Matrix3d::Identity();  ///< of the body
   std::array<double, 3> m_sizes{};                       ///< of the parts
+  std::vector<Eigen::Vector3d> m_span;                   ///< of a hull's points
+  std::shared_ptr<const Polytope> m_hull;                ///< in its body's frame
   double m_magnitude;
 };
 
-/// Calls f(name, field) for each field of a shape: vectors, doubles and flags.
+/// Calls f(name, field) for each field of a shape: vectors, doubles, flags and lists of vectors.
 template <class Geometry, class F>
 void forEachField(Geometry& geometry, F&& f) {
   std::visit(
@@ -88,6 +92,8 @@ void forEachField(Geometry& geometry, F&& f) {
           f("point", shape.point), f("normal", shape.normal), f("twoSided", shape.twoSided);
         } else if constexpr (std::is_same_v<Type, Box>) {
           f("centre", shape.centre), f("halfExtents", shape.halfExtents);
+        } else if constexpr (std::is_same_v<Type, ConvexHull>) {
+          f("points", shape.points);
         } else {
           if constexpr (std::is_same_v<Type, Sphere>)
             f("centre", shape.centre);
@@ -99,8 +105,8 @@ void forEachField(Geometry& geometry, F&& f) {
       geometry);
 }
 
-/// What is wrong with a shape's measures; empty if nothing is.
-std::string faultOf(const AnalyticalGeometry&);
+/// What is wrong with a shape's measures; empty if nothing is. element: the point of a hull.
+std::string faultOf(const AnalyticalGeometry&, std::optional<std::size_t>& element);
 /// Of a transform: its matrix must be a rotation within 1e-9.
 std::string faultOf(const RigidTransform&);
 

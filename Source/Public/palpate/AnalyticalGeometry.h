@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include <variant>
+#include <vector>
 
 namespace palpate {
 
@@ -40,6 +41,15 @@ struct Cylinder {
   double radius = 0.0;  ///< finite, not negative
 };
 
-using AnalyticalGeometry = std::variant<Sphere, Capsule, Plane, Box, Cylinder>;
+/// The convex hull of points: a tool's tip. At least one point; any may be doubled or inside. Of
+/// points in one plane a plate, on one line a segment, at one place a point: exactly so, points
+/// near a plane span a thin body.
+/// Cost     when added, each point is tested against each triangle of the hull of those before it:
+///          made for a few thousand. Each distance asks each triangle of the hull.
+struct ConvexHull {
+  std::vector<Eigen::Vector3d> points;  ///< finite
+};
+
+using AnalyticalGeometry = std::variant<Sphere, Capsule, Plane, Box, Cylinder, ConvexHull>;
 
 }  // namespace palpate

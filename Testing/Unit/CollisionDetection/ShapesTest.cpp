@@ -16,6 +16,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,10 +30,75 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Positions = std::vector<Vector3d>;
 
+/// Triangles that cover a hull's surface, each with its plane: every three points with all others
+/// on one side. Of points in one plane: every three.
+struct Facets {
+  struct Facet {
+    std::array<Vector3d, 3> corners;
+    Vector3d normal;  ///< out
+    double turn;      ///< 1: by the corners' winding, too
+  };
+  std::vector<Facet> all;
+  bool isBody = false;
+
+  explicit Facets(const Positions& points) {
+    const std::size_t n = points.size();
+    for (const bool body : {true, false}) {
+      for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t j = i; j < n; ++j)
+          for (std::size_t k = j; k < n; ++k) {
+            Vector3d normal = (points[j] - points[i]).cross(points[k] - points[i]);
+            double above = 0, below = 0;
+            for (const Vector3d& p : points) {
+              const double height = normal.normalized().dot(p - points[i]);
+              above = std::max(above, height);
+              below = std::min(below, height);
+            }
+            if (body && (normal.norm() < 1e-12 || std::min(above, -below) > 1e-12)) continue;
+            isBody |= body && std::max(above, -below) > 1e-12;
+            const double turn = above > -below ? -1 : 1;
+            normal = turn * normal.normalized();
+            all.push_back({{points[i], points[j], points[k]}, normal, turn});
+            if (body || normal == Vector3d::Zero()) continue;
+            all.push_back({{points[i], points[j], points[k]}, -normal, -turn});
+          }
+      if (isBody) return;
+      if (body) all.clear();
+    }
+  }
+
+  double signedDistance(const Vector3d& x) const {
+    double highest = -std::numeric_limits<double>::infinity(), nearest = -highest;
+    for (const Facet& f : all) {
+      const double height = f.normal.dot(x - f.corners[0]);
+      highest = std::max(highest, height);
+      if (height < -1e-14) continue;
+      bool over = true;
+      for (int i = 0; i < 3; ++i) {
+        const Vector3d &p = f.corners[i], edge = f.corners[(i + 1) % 3] - p, from = x - p;
+        over &= f.normal.dot(edge.cross(from)) * f.turn > 0;
+        const double square = edge.squaredNorm(),
+                     t = square > 0 ? std::clamp(from.dot(edge) / square, 0.0, 1.0) : 0.0;
+        nearest = std::min(nearest, (from - t * edge).norm());
+      }
+      if (over) nearest = std::min(nearest, std::abs(height));
+    }
+    return isBody && highest < 0 ? highest : nearest;
+  }
+};
+
 struct Placed {
   AnalyticalGeometry geometry;
   Matrix3d rotation = Matrix3d::Identity();
   Vector3d translation = Vector3d::Zero();
+  std::optional<Facets> facets{};  ///< of a hull of few points
+
+  Placed(const AnalyticalGeometry& shape, const Matrix3d& turn = Matrix3d::Identity(),
+         const Vector3d& shift = Vector3d::Zero())
+      : geometry(shape), rotation(turn), translation(shift) {
+    const auto* hull = std::get_if<ConvexHull>(&geometry);
+    if (hull && hull->points.size() < 10) facets.emplace(hull->points);
+  }
 };
 
 /// A geometry with elements: triangles, segments {p, q, q} or points {p, p, p}.
@@ -94,6 +160,20 @@ std::vector<Placed> shapes(Random& random) {
   place(Capsule{{-0.3, 0, 0}, {0.2, 0.1, 0}, 0});
   place(Box{{0, 0, 0}, {0.3, 0.2, 0}});
   place(Cylinder{{-0.2, 0, 0}, {0.3, 0.1, 0}, 0});
+  Positions cloud, plate;
+  for (int i = 0; i < 6; ++i) cloud.push_back(randomPoint(random, -0.3, 0.3));
+  cloud.push_back(cloud[2]);
+  for (int i = 0; i < 4; ++i)
+    plate.push_back({uniform(random, -.3, .3), 0.1, uniform(random, -.3, .3)});
+  place(ConvexHull{cloud});
+  place(ConvexHull{plate});
+  place(ConvexHull{{{-0.3, 0, 0}, {0.1, 0, 0}, {0.3, 0, 0}}});
+  place(ConvexHull{{{0.1, 0, 0}, {0.1, 0, 0}}});
+  Positions prism{{0.01, 0, 0}};  // with parallel faces
+  for (int i = 0; i < 3; ++i)
+    for (const double z : {-0.2, 0.2})
+      prism.push_back({0.25 * std::cos(2 * i), 0.25 * std::sin(2 * i), z});
+  place(ConvexHull{prism});
   return all;
 }
 
@@ -180,6 +260,7 @@ double signedDistance(const Placed& placed, const Vector3d& world) {
     const Vector3d beyond = (x - b->centre).cwiseAbs() - b->halfExtents;
     return ofBox({beyond[0], beyond[1], beyond[2]});
   }
+  if (placed.facets) return placed.facets->signedDistance(x);
   const auto& c = std::get<Cylinder>(placed.geometry);
   const Vector3d u = (c.p1 - c.p0).normalized(), from = x - 0.5 * (c.p0 + c.p1);
   return ofBox(
@@ -189,7 +270,7 @@ double signedDistance(const Placed& placed, const Vector3d& world) {
 /// Least of a convex function over [0, 1].
 double least(const std::function<double(double)>& f) {
   double low = 0, high = 1;
-  for (int i = 0; i < 70; ++i) {
+  for (int i = 0; i < 45; ++i) {
     const double third = (high - low) / 3;
     if (f(low + third) <= f(high - third))
       high -= third;
@@ -211,7 +292,8 @@ constexpr double kSearch = 1e-7;  ///< of the search above where distances are e
 struct Truth {
   double own, boundary;
 };
-std::map<Element, Truth> truthOf(const Body& body, const Placed& shape) {
+/// Of faces further than `reach` some distance beyond that.
+std::map<Element, Truth> truthOf(const Body& body, const Placed& shape, double reach) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   std::map<Element, Truth> truth;
   const auto& at = body.positions;
@@ -230,7 +312,11 @@ std::map<Element, Truth> truthOf(const Body& body, const Placed& shape) {
     }
     if (body.kind != GeometryKind::Triangles) continue;
     const auto& [a, b, c] = corners;
-    truth[{2, t, b}] = {leastOn(shape, at[a], at[b], at[c]), edges};
+    const Vector3d middle = (at[a] + at[b] + at[c]) / 3;
+    const double size =
+        std::max({(at[a] - middle).norm(), (at[b] - middle).norm(), (at[c] - middle).norm()});
+    const double bound = signedDistance(shape, middle) - size;  // distances grow no faster
+    truth[{2, t, b}] = {bound > reach ? bound : leastOn(shape, at[a], at[b], at[c]), edges};
   }
   return truth;
 }
@@ -263,7 +349,7 @@ TEST(Shapes, AnswerTheDefinition) {
                      byElement(answer(body, shape, {Method::Proximity, thickness, Contacts::All})),
                  own = byElement(
                      answer(body, shape, {Method::Proximity, thickness, Contacts::Distinct}));
-      for (const auto& [element, truth] : truthOf(body, shape)) {
+      for (const auto& [element, truth] : truthOf(body, shape, thickness + body.radius)) {
         const auto found = all.find(element);
         if (found == all.end()) {
           EXPECT_GT(truth.own - body.radius, thickness - kSearch) << element[0];
@@ -371,6 +457,42 @@ TEST(Shapes, AgreeWithTheirTessellations) {
   EXPECT_GT(apart, 20);
 }
 
+TEST(Shapes, HullsAgreeWithWhatTheyAreHullsOf) {
+  Random random(7);
+  const Body body = organ(soup(random, 100, 0.3));
+  Positions corners, round;
+  for (int v = 0; v < 8; ++v)
+    corners.push_back({v & 1 ? 0.3 : -0.3, v & 2 ? 0.2 : -0.2, v & 4 ? 0.1 : -0.1});
+  for (int i = 0; i < 30; ++i)  // on its faces and inside
+    corners.push_back(
+        {uniform(random, -.3, .3), uniform(random, -.2, .2), i % 2 ? 0.1 : uniform(random, 0, .1)});
+  const Mesh ball = sphere(16, 32, Vector3d::Zero(), 0.3);
+  round = ball.positions;
+  for (int run = 0; run < 6; ++run) {
+    const Matrix3d turn = randomRotation(random);
+    const Vector3d at = randomPoint(random, 0.3, 0.7);
+    const PairSettings pair{Method::Proximity, 0.05, Contacts::All};
+    const auto hull = byElement(answer(body, {ConvexHull{corners}, turn, at}, pair)),
+               box = byElement(answer(body, {Box{{0, 0, 0}, {0.3, 0.2, 0.1}}, turn, at}, pair));
+    EXPECT_GT(box.size(), 50u);
+    EXPECT_EQ(box.size(), hull.size());
+    for (const auto& [element, c] : box) {
+      ASSERT_TRUE(hull.contains(element));
+      EXPECT_NEAR(hull.at(element).distance, c.distance, 1e-14) << element[0];
+    }
+    const auto facets = byElement(answer(body, {ConvexHull{round}, turn, at}, pair)),
+               exact = byElement(answer(body, {Sphere{{0, 0, 0}, 0.3}, turn, at}, pair));
+    EXPECT_GT(facets.size(), 50u);
+    for (const auto& [element, c] : facets) {
+      ASSERT_TRUE(exact.contains(element));
+      // Chords of 11.25 degrees across and along.
+      const double sagitta = 0.3 * 2 * (1 - std::cos(0.0982));
+      EXPECT_GE(c.distance, exact.at(element).distance - 1e-14);
+      EXPECT_LE(c.distance, exact.at(element).distance + sagitta);
+    }
+  }
+}
+
 // ---- By hand ----
 
 TEST(Shapes, CubeOnTableTouchesWithItsCorners) {
@@ -450,6 +572,9 @@ TEST(Shapes, TriangleIsMetWhereItIsNearest) {
 
 TEST(Shapes, DegenerateElementsAnswerTheDefinition) {
   Random random(5);
+  Positions unitCube{{1, 1, 1}};
+  for (int v = 0; v < 8; ++v)
+    unitCube.push_back({(v & 1) + 0.5, (v >> 1 & 1) + 0.5, (v >> 2) + 0.5});
   std::vector<Placed> all{{Sphere{{1, 1, 1}, 0.5}},
                           {Sphere{{1, 1, 1}, 0}},
                           {Capsule{{0, 0, 0}, {2, 0, 0}, 0}},
@@ -461,9 +586,14 @@ TEST(Shapes, DegenerateElementsAnswerTheDefinition) {
                           {Box{{1, 1, 1}, {1, 1, 0}}},
                           {Box{{1, 1, 1}, {1, 0.5, 0.5}}},
                           {Cylinder{{1, 1, 0}, {1, 1, 2}, 0.5}},
-                          {Cylinder{{1, 1, 0}, {1, 1, 2}, 0}}};
-  for (int run = 0; run < 12; ++run) {
-    Body zoo{GeometryKind::Triangles, {}, {}};  // on a coarse grid
+                          {Cylinder{{1, 1, 0}, {1, 1, 2}, 0}},
+                          {ConvexHull{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 2}}}},
+                          {ConvexHull{{{0, 0, 1}, {2, 0, 1}, {0, 2, 1}}}},
+                          {ConvexHull{{{0, 0, 0}, {2, 2, 2}, {1, 1, 1}}}},
+                          {ConvexHull{{{1, 1, 1}}}},
+                          {ConvexHull{unitCube}}};
+  for (int run = 0; run < 6; ++run) {
+    Body zoo{GeometryKind::Triangles, {}, {}, 0};  // on a coarse grid
     for (int v = 0; v < 12; ++v) {
       const auto at = [&] { return static_cast<double>(random() % 3); };
       const double x = at(), y = at(), z = at();
@@ -480,7 +610,7 @@ TEST(Shapes, DegenerateElementsAnswerTheDefinition) {
         continue;  // the test's own formula needs a length
       SCOPED_TRACE("shape " + std::to_string(shape.geometry.index()));
       const auto found = byElement(answer(zoo, shape, {Method::Proximity, 0.75, Contacts::All}));
-      for (const auto& [element, truth] : truthOf(zoo, shape)) {
+      for (const auto& [element, truth] : truthOf(zoo, shape, 0.75)) {
         const auto c = found.find(element);
         if (c == found.end())
           EXPECT_GT(truth.own, 0.75 - kSearch);
@@ -524,6 +654,15 @@ TEST(Shapes, BadInputIsRefusedByName) {
   refuse(Capsule{{0, 0, 0}, {0, 0, 1}, kNan}, "radius is nan");
   refuse(Plane{{0, 0, 0}, {0, 0, 0}}, "normal is (0, 0, 0); it must be of some length");
   refuse(Box{{0, 0, 0}, {1, -2, 1}}, "halfExtents is (1, -2, 1); it must be finite and not neg");
+  refuse(ConvexHull{}, "a hull needs at least one point");
+  refuse(ConvexHull{{{0, 0, 0}, {0, kNan, 1}, {kNan, 0, 0}}},
+         "point 1 is (0, nan, 1); it must be finite");
+  try {
+    collisions.addAnalyticalGeometry(ConvexHull{{{0, 0, 0}, {0, kInfinity, 1}}});
+    ADD_FAILURE();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.element(), std::size_t{1});
+  }
   refuse(Cylinder{{1, 2, 3}, {1, 2, 3}, 1}, "p1 is (1, 2, 3); it must be another point than p0");
 
   const GeometryId tool = collisions.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1}),

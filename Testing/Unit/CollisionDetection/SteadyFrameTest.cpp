@@ -155,7 +155,8 @@ TEST(SteadyFrame, AllocatesNothingWithShapes) {
   std::vector<GeometryId> tools;
   for (const AnalyticalGeometry& tool : std::vector<AnalyticalGeometry>{
            Capsule{{-0.513, 0.0137, 0.3}, {0.487, 0.1093, 0.3317}, 0.4},
-           Box{{0, 0, 0}, {0.2, 0.3, 0.1}}, Cylinder{{0, 0, -0.1}, {0, 0.3, 0}, 0.2}, Plane{}}) {
+           Box{{0, 0, 0}, {0.2, 0.3, 0.1}}, Cylinder{{0, 0, -0.1}, {0, 0.3, 0}, 0.2}, Plane{},
+           ConvexHull{{{-0.2, 0, -0.1}, {0.3, 0, -0.1}, {0, 0.3, 0}, {0, 0.1, 0.3}}}}) {
     tools.push_back(detection.addAnalyticalGeometry(tool));
     detection.addCollisionPair(tissue, tools.back(), {Method::Proximity, 0.01});
   }
