@@ -73,6 +73,7 @@ struct Choice {
   double thickness = 0;  ///< mean edges
   Contacts contacts = Contacts::All;
   int substeps = 1;
+  double timeTolerance = PairSettings().timeTolerance;
   OctreeSettings octree{};
   Engine engine = Engine::Octree;
 };
@@ -86,7 +87,8 @@ Contestant contestant(std::string family, std::string setting, Method method,
             return std::make_unique<PalpateRun>(scene, start, settings,
                                                 PairSettings{.method = method,
                                                              .thickness = choice.thickness * edge,
-                                                             .contacts = choice.contacts},
+                                                             .contacts = choice.contacts,
+                                                             .timeTolerance = choice.timeTolerance},
                                                 choice.substeps);
           }};
 }
@@ -114,6 +116,12 @@ std::vector<Contestant> contestants() {
       contestant("Proximity in substeps", "1/20 edge; 16 substeps", kProximity,
                  {.thickness = 0.05, .substeps = 16}),
       contestant("Continuous", "exact", kContinuous, {}),
+      contestant("Continuous: time tolerance", "1/20 edge kept; 1e-2", kContinuous,
+                 {.thickness = 0.05, .timeTolerance = 1e-2}),
+      contestant("Continuous: time tolerance", "1/20 edge kept; 1e-4", kContinuous,
+                 {.thickness = 0.05, .timeTolerance = 1e-4}),
+      contestant("Continuous: time tolerance", "1/20 edge kept; 1e-10", kContinuous,
+                 {.thickness = 0.05, .timeTolerance = 1e-10}),
       contestant("Continuous", "1/20 edge kept", kContinuous, {.thickness = 0.05}),
       contestant("Auto", "1/20 edge", kAuto, {.thickness = 0.05}),
       contestant("Auto: distinct", "1/20 edge", kAuto,

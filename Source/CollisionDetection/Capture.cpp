@@ -19,7 +19,7 @@ namespace palpate {
 namespace {
 
 constexpr std::string_view kTitle = "palpate-capture";
-constexpr int kVersion = 5;
+constexpr int kVersion = 6;
 
 // Values of enumerations are written by name: in the order of their declarations.
 constexpr std::array<std::string_view, 6> kMethods{"Auto",         "Proxy",     "DistanceField",
@@ -156,6 +156,7 @@ void pairLine(File& file, PairType& pair, int version) {
     file.integer(predicate);
     if constexpr (!std::is_const_v<PairType>) pair.predicate = predicate != 0;
   }
+  if (version >= 6) file.real(pair.settings.timeTolerance);
 }
 
 template <class File, class FilterType>

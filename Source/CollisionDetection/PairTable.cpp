@@ -1,6 +1,7 @@
 #include "CollisionDetection/PairTable.h"
 
 #include "Geometry/RestDistance.h"
+#include "Math/Tolerances.h"
 
 #include <algorithm>
 #include <cmath>
@@ -84,6 +85,11 @@ void check(const Geometry& first, const Geometry& second, const PairSettings& se
     throw Error(ErrorCode::InvalidSettings,
                 name + ": tolerance is " + shortest(settings.tolerance) +
                     "; it must be finite, or negative for half the thickness",
+                a);
+  if (!(settings.timeTolerance >= kSmallestTimeTolerance && settings.timeTolerance <= 1.0))
+    throw Error(ErrorCode::InvalidSettings,
+                name + ": timeTolerance is " + shortest(settings.timeTolerance) +
+                    "; it must be from 2^-50 to 1",
                 a);
   if (settings.contacts != Contacts::Distinct && settings.contacts != Contacts::All &&
       settings.contacts != Contacts::Earliest)

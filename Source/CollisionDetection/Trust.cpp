@@ -79,7 +79,9 @@ PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry&
       plan.reason = MethodReason::Mixed;
     }
     step.impacts = plan.method == Method::Proximity || plan.method == Method::Auto;
-    if (step.impacts) step.extra = std::min(plan.motion, plan.tolerance) * (1.0 + kMotionSlack);
+    if (step.impacts)
+      step.extra =
+          std::min(plan.motion, plan.tolerance) * (1.0 + kMotionSlack * settings.timeTolerance);
   } else if (settings.method == Method::Intersection) {
     plan.nearby = plan.motion <= std::min(a.smallestHeight, b.smallestHeight) ? plan.motion : 0.0;
   } else if (settings.method == Method::Proximity && plan.motion > thickness) {

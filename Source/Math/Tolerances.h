@@ -141,8 +141,8 @@ constexpr double kShapeBoundError = 0x1p-46;
 /// displacement carries 2 u, a difference of two 5 u, its length 4 u more; a distance is within 16
 /// u of the largest coordinate difference (<palpate/Distance.h>).
 constexpr double kMotionError = 0x1p-46;
-/// Added to a motion that extends a thickness, relative: covers twice what Continuous may report
-/// early, 1e-6 of the motion.
-constexpr double kMotionSlack = 0x1p-18;
+/// Of the time tolerance, added to a motion that extends a thickness, relative: covers twice what
+/// Continuous may report early.
+constexpr double kMotionSlack = 4;
 
 }  // namespace palpate

@@ -24,6 +24,7 @@ TimeOfImpactSettings settingsOf(const MeshPair& pair) {
   TimeOfImpactSettings settings;
   settings.minimumDistance =
       pair.settings.thickness + (pair.a.largestRadius + pair.b.largestRadius);
+  settings.tolerance = pair.settings.timeTolerance;
   return settings;
 }
 

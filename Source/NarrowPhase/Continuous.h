@@ -11,7 +11,8 @@ namespace palpate {
 /// Method::Continuous of findContacts(): every vertex-triangle and edge-edge pair with an impact in
 /// the step from `before` to `now`, with the thickness as its minimum distance.
 ///
-/// timeOfImpact is not after the first impact and at most 1e-6 before it; all else is of that time.
+/// timeOfImpact is not after the first impact and at most the settings' timeTolerance before it;
+/// all else is of that time.
 /// The normal, at thickness 0: the contact plane's, on the side where the vertex, or edge a, was
 /// before; where it was always in that plane, the triangle's winding normal or the cross product of
 /// the edges; of degenerate elements the axis that distances use. With a thickness: that of the

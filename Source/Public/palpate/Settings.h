@@ -70,6 +70,10 @@ struct PairSettings {
   /// this along its edges, in the shape that it was added in or that setTriangles() gave, are no
   /// contacts. 0: only features with a common vertex.
   double restDistance = 0.0;
+  /// Of the step, in [2^-50, 1]: reported times of impact are at most this early, never late. With
+  /// a thickness features are reported, too, that come within it and this part of their motion;
+  /// without, the same ones whatever this is.
+  double timeTolerance = 1e-6;
 };
 
 /// From where a triangle mesh is touched.

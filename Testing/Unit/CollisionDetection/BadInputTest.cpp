@@ -209,6 +209,8 @@ void expectPossible(Call call) {
   for (Method method : {Method::Auto, Method::Proximity, Method::Intersection})
     refuse({.method = method, .thickness = 1, .contacts = Contacts::Earliest},
            {ErrorCode::InvalidSettings, {"Earliest", "Continuous"}});
+  for (const double bad : {0.0, 0x1p-51, 1.5, -1.0, kNan})
+    refuse({.timeTolerance = bad}, {ErrorCode::InvalidSettings, {"timeTolerance", "2^-50"}});
   refuse({.method = static_cast<Method>(99), .thickness = 1}, {ErrorCode::InvalidSettings, {}});
   refuse({.thickness = 1, .contacts = static_cast<Contacts>(99)}, {ErrorCode::InvalidSettings, {}});
 }

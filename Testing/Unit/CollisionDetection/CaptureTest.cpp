@@ -84,6 +84,7 @@ void expectSame(const CollisionProblem& l, const CollisionProblem& r) {
     EXPECT_EQ(l.pairs[i].settings.method, r.pairs[i].settings.method);
     EXPECT_EQ(l.pairs[i].settings.thickness, r.pairs[i].settings.thickness);
     EXPECT_EQ(l.pairs[i].settings.tolerance, r.pairs[i].settings.tolerance);
+    EXPECT_EQ(l.pairs[i].settings.timeTolerance, r.pairs[i].settings.timeTolerance);
     EXPECT_EQ(l.pairs[i].settings.contacts, r.pairs[i].settings.contacts);
   }
 }
@@ -99,7 +100,8 @@ OctreeBasedCD movedScene() {
   const GeometryId a = detection.addTriangleMesh(first.positions, first.triangles);
   const GeometryId b = detection.addTriangleMesh(second.positions, second.triangles);
   detection.removeGeometry(removed);
-  detection.addCollisionPair(b, a, {.thickness = 0.1, .contacts = Contacts::All});
+  detection.addCollisionPair(
+      b, a, {.thickness = 0.1, .contacts = Contacts::All, .timeTolerance = 0x1p-9});
   detection.addCollisionPair(a, a);
   detection.detectCollision();
   std::vector<Eigen::Vector3d> now = first.positions;
@@ -217,10 +219,10 @@ TEST_F(Capture, RefusesWhatIsWrongByName) {
     write(text.replace(place, from.size(), to));
     expectRefused(reason);
   };
-  expectRefusedWith("palpate-capture 5", "solid 3", "it is not a capture");
-  expectRefusedWith("palpate-capture 5", "palpate-capture 6",
-                    "it is of version 6; versions up to 5");
-  expectRefusedWith("palpate-capture 5", "palpate-capture x", "line 1: \"x\" is not an integer");
+  expectRefusedWith("palpate-capture 6", "solid 3", "it is not a capture");
+  expectRefusedWith("palpate-capture 6", "palpate-capture 7",
+                    "it is of version 7; versions up to 6");
+  expectRefusedWith("palpate-capture 6", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 99999999999\n", "is not an integer in range");
@@ -251,6 +253,8 @@ TEST_F(Capture, ReadsEarlierVersions) {
     write(text);
     return readCapture(file());
   };
+  replaceAll(" 1.0c6f7a0b5ed8dp-20\n", "\n");  // timeTolerance
+  EXPECT_EQ(asVersion(5).pairs[0].settings.timeTolerance, PairSettings().timeTolerance);
   replaceAll(" 0 1 4294967295 Both 0 0\n", " 0\n");  // filters, rest
   replaceAll(" 0p+0 0\n", " 0p+0\n");                // predicate
   EXPECT_EQ(asVersion(3).geometries[0].filter, CollisionFilter());

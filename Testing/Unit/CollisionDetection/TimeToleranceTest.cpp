@@ -1,0 +1,124 @@
+#include "Common/PairRun.h"
+
+#include <palpate/TimeOfImpact.h>
+
+#include <gtest/gtest.h>
+
+namespace palpate {
+namespace {
+
+using testing::PairRun;
+using testing::Random;
+using Positions = std::vector<Eigen::Vector3d>;
+
+struct Moving {
+  testing::Mesh mesh;
+  Positions now;
+};
+
+Moving movingSoup(Random& random) {
+  Moving moving{testing::soup(random, 40, 0.3), {}};
+  for (const Eigen::Vector3d& p : moving.mesh.positions)
+    moving.now.push_back(p + testing::randomPoint(random, -0.4, 0.4));
+  return moving;
+}
+
+PairRun runOf(const Settings& settings, const PairSettings& pair, const Moving& a,
+              const Moving& b) {
+  PairRun run(settings, a.mesh, b.mesh, pair);
+  run.step(a.mesh.positions, a.now, b.mesh.positions, b.now);
+  return run;
+}
+
+double exactTime(const VertexTriangleContact& c, const Moving& vertex, const Moving& triangle) {
+  const auto [i, j, k] = c.corners;
+  const Positions &v = vertex.mesh.positions, &t = triangle.mesh.positions;
+  return *vertexTriangleTimeOfImpact(v[c.vertex], t[i], t[j], t[k], vertex.now[c.vertex],
+                                     triangle.now[i], triangle.now[j], triangle.now[k],
+                                     {.tolerance = 0x1p-50});
+}
+double exactTime(const EdgeEdgeContact& c, const Moving& a, const Moving& b) {
+  const auto [i, j] = c.edgeA;
+  const auto [k, l] = c.edgeB;
+  const Positions &p = a.mesh.positions, &q = b.mesh.positions;
+  return *edgeEdgeTimeOfImpact(p[i], p[j], q[k], q[l], a.now[i], a.now[j], b.now[k], b.now[l],
+                               {.tolerance = 0x1p-50});
+}
+
+std::vector<std::array<std::uint32_t, 4>> idsOf(const CollisionData& data) {
+  std::vector<std::array<std::uint32_t, 4>> ids;
+  for (const auto& c : data.vertexTriangle()) ids.push_back({0, c.vertex, c.triangle});
+  for (const auto& c : data.triangleVertex()) ids.push_back({1, c.vertex, c.triangle});
+  for (const auto& c : data.edgeEdge())
+    ids.push_back({c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]});
+  return ids;
+}
+
+/// Whatever the tolerance, the same features touch; times are early by at most as much, not late.
+TEST(TimeTolerance, BoundsHowEarlyAndNothingElse) {
+  Random random(5);
+  const Moving a = movingSoup(random), b = movingSoup(random);
+  const auto truth = idsOf(
+      runOf(testing::settingsOf(Engine::BruteForce), {.method = Method::Continuous}, a, b).data());
+  ASSERT_GT(truth.size(), 50u);
+  for (const double tolerance : {0x1p-50, 1e-10, 1e-3, 0.25, 1.0}) {
+    SCOPED_TRACE(tolerance);
+    const PairSettings settings{.method = Method::Continuous, .timeTolerance = tolerance};
+    const PairRun run = runOf({}, settings, a, b);
+    testing::expectSame(run.answers(),
+                        runOf(testing::settingsOf(Engine::BruteForce), settings, a, b).answers());
+    run.expectWellFormed(a.mesh, b.mesh);
+    const CollisionData& data = run.data();
+    EXPECT_EQ(idsOf(data), truth);
+    double earliest = 1.0;
+    const auto expectTime = [&](double time, double exact) {
+      EXPECT_LE(time, exact + 0x1p-50);
+      EXPECT_GE(time, exact - tolerance);
+      earliest = std::min(earliest, time);
+    };
+    for (const auto& c : data.vertexTriangle()) expectTime(c.timeOfImpact, exactTime(c, a, b));
+    for (const auto& c : data.triangleVertex()) expectTime(c.timeOfImpact, exactTime(c, b, a));
+    for (const auto& c : data.edgeEdge()) expectTime(c.timeOfImpact, exactTime(c, a, b));
+    PairSettings only = settings;
+    only.contacts = Contacts::Earliest;
+    EXPECT_EQ(runOf({}, only, a, b).data().earliestTimeOfImpact(), earliest);
+  }
+}
+
+/// With a thickness: what comes within it is reported, and nothing that stays further away than it
+/// and the tolerance's part of the motion.
+TEST(TimeTolerance, WithThicknessBoundsTimeAndDistance) {
+  Random random(7);
+  const Moving a = movingSoup(random), b = movingSoup(random);
+  const auto idsAt = [&](double tolerance, double thickness) {
+    const PairSettings settings{
+        .method = Method::Continuous, .thickness = thickness, .timeTolerance = tolerance};
+    const PairRun run = runOf({}, settings, a, b);
+    testing::expectSame(run.answers(),
+                        runOf(testing::settingsOf(Engine::BruteForce), settings, a, b).answers());
+    auto ids = idsOf(run.data());
+    std::sort(ids.begin(), ids.end());
+    return ids;
+  };
+  // No coordinate moves further than 0.4 in either mesh.
+  const double tolerance = 0.02, thickness = 0.03, motion = 0.8 * std::sqrt(3.0);
+  const auto fine = idsAt(0x1p-40, thickness), coarse = idsAt(tolerance, thickness),
+             wider = idsAt(0x1p-40, thickness + tolerance * motion);
+  EXPECT_GT(coarse.size(), fine.size());
+  EXPECT_TRUE(std::includes(coarse.begin(), coarse.end(), fine.begin(), fine.end()));
+  EXPECT_TRUE(std::includes(wider.begin(), wider.end(), coarse.begin(), coarse.end()));
+}
+
+/// Auto misses nothing that Continuous finds, whatever it may report early.
+TEST(TimeTolerance, AutoFindsWhatContinuousFinds) {
+  Random random(6);
+  const Moving a = movingSoup(random), b = movingSoup(random);
+  for (const double tolerance : {1e-10, 1e-3, 0.25}) {
+    const PairSettings settings{.thickness = 0.1, .tolerance = 0.3, .timeTolerance = tolerance};
+    testing::expectSame(runOf({}, settings, a, b).answers(),
+                        runOf(testing::settingsOf(Engine::BruteForce), settings, a, b).answers());
+  }
+}
+
+}  // namespace
+}  // namespace palpate
