@@ -1,0 +1,106 @@
+#include <palpate/ArrayAdapter.h>
+
+#include "Common/Things.h"
+
+namespace palpate::testing {
+namespace {
+
+/// As simulators keep them: contiguous vectors of N, behind a pointer.
+template <class T, int N>
+class VecArray {
+ public:
+  using Vec = Eigen::Matrix<T, N, 1>;
+  void push_back(const Vec& value) { m_values.push_back(value); }
+  const Vec* getPointer() const { return m_values.data(); }
+  int size() const { return static_cast<int>(m_values.size()); }
+  const Vec& operator[](int i) const { return m_values[static_cast<std::size_t>(i)]; }
+
+ private:
+  std::vector<Vec> m_values;
+};
+
+enum class CellKind { Vertex, Edge, Triangle };
+struct CellElement {
+  int ids[4] = {7, 7, 7, 7};
+  int idCount = 0;
+  CellKind cellType = CellKind::Vertex;
+};
+
+struct Arrays {
+  VecArray<double, 3> positions;
+  VecArray<int, 3> triangles;
+};
+
+Arrays arraysOf(const Thing& thing) {
+  Arrays arrays;
+  for (const Vector3d& p : thing.positions) arrays.positions.push_back(p);
+  for (const auto& [a, b, c] : thing.triangles)
+    arrays.triangles.push_back(
+        Eigen::Vector3i(static_cast<int>(a), static_cast<int>(b), static_cast<int>(c)));
+  return arrays;
+}
+
+TEST(ArrayAdapter, GivesTheSameContactsAsSpansDo) {
+  Random random(81);
+  const Thing first = things(sheet(6, 0.5, 0.3)), second = things(soup(random, 60, 0.1));
+  const PairSettings settings{Method::Proximity, 0.1, Contacts::All};
+  const CollisionData truth = answer(first, second, settings);
+
+  const Arrays a = arraysOf(first), b = arraysOf(second);
+  OctreeBasedCD collisions;
+  const GeometryId idA = collisions.addTriangleMesh(positionsOf(a.positions),
+                                                    elementsOf<3>(a.triangles)),
+                   idB = collisions.addTriangleMesh(positionsOf(b.positions),
+                                                    elementsOf<3>(b.triangles));
+  EXPECT_EQ(static_cast<const void*>(positionsOf(a.positions).data()), a.positions.getPointer());
+  collisions.addCollisionPair(idA, idB, settings);
+  collisions.detectCollision();
+  const CollisionData& contacts = collisions.collisionData(idA, idB);
+  EXPECT_EQ(contacts.hash(), truth.hash());
+
+  std::vector<CellElement> cellsA, cellsB;
+  appendCells(contacts, CellTypes<CellKind>{CellKind::Vertex, CellKind::Edge, CellKind::Triangle},
+              cellsA, cellsB);
+  ASSERT_EQ(cellsA.size(), truth.vertexTriangle().size() + truth.triangleVertex().size() +
+                               truth.edgeEdge().size());
+  ASSERT_EQ(cellsB.size(), cellsA.size());
+  EXPECT_GT(truth.vertexTriangle().size() * truth.triangleVertex().size() * truth.edgeEdge().size(),
+            0u);
+  const auto expectCell = [](const CellElement& cell, CellKind kind,
+                             std::vector<std::uint32_t> ids) {
+    EXPECT_EQ(cell.cellType, kind);
+    ASSERT_EQ(cell.idCount, static_cast<int>(ids.size()));
+    for (std::size_t i = 0; i < 4; ++i)
+      EXPECT_EQ(cell.ids[i], i < ids.size() ? static_cast<int>(ids[i]) : -1);
+  };
+  std::size_t at = 0;
+  for (const auto& c : truth.vertexTriangle()) {
+    expectCell(cellsA[at], CellKind::Vertex, {c.vertex});
+    expectCell(cellsB[at++], CellKind::Triangle, {c.triangle});
+  }
+  for (const auto& c : truth.triangleVertex()) {
+    expectCell(cellsA[at], CellKind::Triangle, {c.triangle});
+    expectCell(cellsB[at++], CellKind::Vertex, {c.vertex});
+  }
+  for (const auto& c : truth.edgeEdge()) {
+    expectCell(cellsA[at], CellKind::Edge, {c.edgeA[0], c.edgeA[1]});
+    expectCell(cellsB[at++], CellKind::Edge, {c.edgeB[0], c.edgeB[1]});
+  }
+}
+
+TEST(ArrayAdapter, RefusesNegativeIndices) {
+  VecArray<int, 2> segments;
+  segments.push_back({0, 1});
+  segments.push_back({1, -1});
+  try {
+    elementsOf<2>(segments);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::IndexOutOfRange);
+    EXPECT_EQ(error.element(), 1u);
+    EXPECT_STREQ(error.what(), "Element 1 has the index -1.");
+  }
+}
+
+}  // namespace
+}  // namespace palpate::testing
