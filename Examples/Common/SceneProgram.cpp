@@ -1,6 +1,7 @@
 #include "SceneProgram.h"
 
 #include "HtmlReport.h"
+#include "ParaView.h"
 #include "Report.h"
 
 #include <palpate/Error.h>
@@ -16,6 +17,7 @@
 #include <cinttypes>
 #include <cstdio>
 #include <fstream>
+#include <optional>
 #include <thread>
 #include <unistd.h>
 
@@ -27,6 +29,7 @@ struct Options {
   int frames;
   std::filesystem::path out = "out";
   int threads = 0;
+  bool paraView = false;
 };
 
 struct Column {
@@ -202,6 +205,8 @@ void logFrame(RunLog& log, LiveScene& scene, double milliseconds) {
 void run(const SceneProgram& program, const Options& options) {
   const std::unique_ptr<LiveScene> scene = program.make(options.threads);
   makeFolder(options.out);
+  std::optional<ParaViewSeries> series;
+  if (options.paraView) series.emplace(options.out / "paraview");
   RunLog log;
   std::uint64_t hash = 0xcbf29ce484222325u;
   for (int frame = 0; frame < options.frames; ++frame) {
@@ -215,10 +220,12 @@ void run(const SceneProgram& program, const Options& options) {
       throw Error(ErrorCode::NotAvailable, "Frame " + std::to_string(frame) + ": " + fault);
     logFrame(log, *scene, passed.count());
     hash = nextHash(hash, scene->world());
+    if (series) series->add(scene->world());
   }
   std::printf("%s, %d frames\n%s", program.name.c_str(), options.frames,
               summary(log, program).c_str());
   std::printf("%-20s %016" PRIx64 "\n", "result hash", hash);
+  if (series) series->finish(program.name);
   const std::string png = picture(scene->world());
   if (!png.empty()) writeWhole(options.out / "scene.png", png);
   writeWhole(options.out / "frames.csv", log.csv());
@@ -239,6 +246,8 @@ int runScene(const SceneProgram& program, int count, char** arguments) {
   app.add_option("--threads", options.threads, "0: all cores")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
+  app.add_flag("--paraview", options.paraView,
+               "also write OUT/paraview: .vtp files of bodies, contacts and octree, and a .pvd");
   if (program.addOptions) program.addOptions(app);
   app.failure_message(
       [](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });

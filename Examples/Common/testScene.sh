@@ -31,6 +31,9 @@ run
 grep -q "${hash##* }" "$folder/run/report.html" || fail "report.html has not the hash"
 grep -qE '(src|href)="?http' "$folder/run/report.html" && fail "report.html needs a network"
 grep -q "no picture" "$folder/text" || fail "nothing said about the picture"
+"$program" --frames 2 --paraview --out "$folder/series" >"$folder/text" || fail "the series"
+[[ $(grep -c '<DataSet' "$folder"/series/paraview/*.pvd) -eq 6 ]] || fail "the .pvd has not three parts of two frames"
+[[ $(ls "$folder"/series/paraview/*.vtp | wc -l) -eq 6 && ! -e $folder/series/paraview.part ]] || fail "not six .vtp files"
 refused --frames 0
 refused --unknown
 refused --threads -1
