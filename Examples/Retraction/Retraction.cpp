@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector3d, std::numbers::pi;
 
 // Lengths in mm, times in s, masses in kg.
-constexpr int kPeriod = 150, kSubsteps = 2, kRounds = 2, kIterations = 6;
+constexpr int kPeriod = 150, kSubsteps = 2, kRounds = 1, kIterations = 8;
 constexpr double kStep = 1.0 / 60 / kSubsteps, kScale = 50, kGap = 0.8, kHalfMembrane = 70;
 constexpr double kMostDrift = 1;  // of a body's centre from one period to the next
 const Vector3d kGravity(0, 0, -2000);
