@@ -30,6 +30,12 @@ run
 [[ $(wc -l <"$folder/run/frames.csv") -eq $((frames + 1)) ]] || fail "frames.csv has not a line per frame"
 grep -q "${hash##* }" "$folder/run/report.html" || fail "report.html has not the hash"
 grep -qE '(src|href)="?http' "$folder/run/report.html" && fail "report.html needs a network"
+for browser in chromium chromium-browser google-chrome; do  # where one is installed, it draws the page
+  command -v $browser >/dev/null || continue
+  $browser --headless --no-sandbox --disable-gpu --dump-dom "file://$folder/run/report.html" 2>/dev/null | grep -q "<circle" ||
+    fail "$browser draws no report.html"
+  break
+done
 grep -q "no picture" "$folder/text" || fail "nothing said about the picture"
 "$program" --frames 2 --paraview --out "$folder/series" >"$folder/text" || fail "the series"
 [[ $(grep -c '<DataSet' "$folder"/series/paraview/*.pvd) -eq 6 ]] || fail "the .pvd has not three parts of two frames"
