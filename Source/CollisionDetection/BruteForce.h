@@ -11,4 +11,7 @@ namespace palpate {
 /// The oracle of the octree's candidates. Self-collision: a < b, sharing no vertex.
 void findCandidatesByBruteForce(const MeshPair&, Buffer<TrianglePair>& out);
 
+/// Keeps those whose boxes over the step, or now, overlap at this thickness.
+void keepOverlapping(const MeshPair&, bool swept, double thickness, Buffer<TrianglePair>& pairs);
+
 }  // namespace palpate

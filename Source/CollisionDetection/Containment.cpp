@@ -31,7 +31,11 @@ bool isBeyond(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::V
 class Body {
  public:
   Body(const Geometry& geometry, Engine engine, PointQueryStack& stack)
-      : m_geometry(geometry), m_bruteForce(engine == Engine::BruteForce), m_stack(stack) {}
+      : m_geometry(geometry),
+        m_bruteForce(engine == Engine::BruteForce),
+        m_stack(stack),
+        m_origin(worldOrigin(geometry)),
+        m_map(worldMap(geometry, m_origin, 0.0, false)) {}
 
   /// How often the surface winds about p; 0 on the surface.
   int windingNumber(const Eigen::Vector3d& p) {
@@ -54,7 +58,7 @@ class Body {
     } else {
       FloatBox ray = boxOf(p);
       ray.upper[0] = kInfinity;
-      const auto overlaps = [&](const FloatBox& box) { return box.overlaps(ray); };
+      const auto overlaps = [&](const FloatBox& box) { return m_map(box).overlaps(ray); };
       forEachOverlapping(m_geometry.octree, overlaps, m_stack, count);
     }
     return on ? 0 : number;
@@ -89,11 +93,11 @@ class Body {
         return distance * distance * (1 + 0x1p-40);
       };
       tryOne(std::min(m_last, size() - 1));
-      forEachNearest(m_geometry.octree, point, bound(), m_stack,
+      const auto squareTo = [&](const FloatBox& box) { return m_map(box).distanceSquared(point); };
+      forEachNearest(m_geometry.octree, squareTo, bound(), m_stack,
                      [&](std::uint32_t begin, std::uint32_t end) {
                        for (std::uint32_t i = begin; i < end; ++i)
-                         if (m_geometry.octree.boxes()[i].distanceSquared(point) <= bound())
-                           tryOne(i);
+                         if (squareTo(m_geometry.octree.boxes()[i]) <= bound()) tryOne(i);
                        return bound();
                      });
       m_last = at;
@@ -103,7 +107,7 @@ class Body {
   }
 
   bool mayContain(const Eigen::Vector3d& p) const {
-    return m_bruteForce || boxOf(p).overlaps(m_geometry.octree.blocks()[0].box(0));
+    return m_bruteForce || boxOf(p).overlaps(m_map(m_geometry.octree.blocks()[0].box(0)));
   }
 
  private:
@@ -114,8 +118,8 @@ class Body {
   std::array<double, 3> inFrame(const Eigen::Vector3d& p) const {
     std::array<double, 3> point;
     for (int k = 0; k < 3; ++k)
-      point[k] = std::clamp((p[k] - m_geometry.frame.origin[k]) * m_geometry.frame.scale,
-                            -double{kLargestFloat}, double{kLargestFloat});
+      point[k] = std::clamp((p[k] - m_origin[k]) * m_geometry.frame.scale, -double{kLargestFloat},
+                            double{kLargestFloat});
     return point;
   }
   FloatBox boxOf(const Eigen::Vector3d& p) const {
@@ -131,6 +135,8 @@ class Body {
   const Geometry& m_geometry;
   bool m_bruteForce;
   PointQueryStack& m_stack;
+  Eigen::Vector3d m_origin;  ///< of boxes in the world
+  BoxMap m_map;              ///< that brings them there
   std::uint32_t m_last = 0;  ///< nearest to the point before: not far from the next, often
 };
 

@@ -36,9 +36,12 @@ constexpr std::size_t kSharedSize = 8192;
 TreePair treesOf(const PairRecord& record, bool adjacentPairs, double thickness) {
   TreePair trees{&record.a->octree, &record.b->octree};
   if (trees.self() && !adjacentPairs) trees.adjacency = record.a->orderedTriangles.data();
-  const Eigen::Vector3d offset =
-      (record.a->frame.origin - record.b->frame.origin) * record.a->frame.scale;
-  setShift(trees, {offset[0], offset[1], offset[2]}, thickness * record.a->frame.scale);
+  const double scale = record.a->frame.scale;
+  const Eigen::Vector3d origin = worldOrigin(*record.b),
+                        offset = (worldOrigin(*record.a) - origin) * scale;
+  setShift(trees, {offset[0], offset[1], offset[2]}, thickness * scale);
+  trees.mapA = worldMap(*record.a, origin, thickness * scale, record.plan.swept());
+  trees.mapB = worldMap(*record.b, origin, 0.0, record.plan.swept());
   return trees;
 }
 
@@ -50,8 +53,8 @@ FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
   FloatPair floats{record.a->floats.data(), record.b->floats.data(), nullptr, nullptr,
                    trees.shiftLower,        trees.shiftUpper};
   if (record.plan.swept()) {
-    floats.beforeA = record.a->floatsBefore.data();
-    floats.beforeB = record.b->floatsBefore.data();
+    floats.beforeA = record.a->floatsAtStart();
+    floats.beforeB = record.b->floatsAtStart();
   }
   return floats;
 }
@@ -99,6 +102,7 @@ struct Frame::Job {
   TreePair trees;
   std::size_t begin, end;  ///< of m_nodePairs
   FloatPair floats;
+  double thickness;  ///< L: of boxes
   TraversalStack stack;
   PointQueryStack queries;
   Buffer<std::uint32_t> primitives;
@@ -121,16 +125,29 @@ struct Frame::Job {
     sink.start(use ? &receive : nullptr, this);
   }
 
+  /// Not all that the traversal finds is a candidate.
+  bool isFiltered() const { return record->anyDisabled() || trees.turned(); }
+  void keepInWorld(double distance) {
+    keepOverlapping(record->meshes(), record->plan.swept(), distance, own);
+  }
+
   static void receive(void* context, std::span<const TrianglePair> pairs) {
     Job& job = *static_cast<Job*>(context);
-    job.nearby = true;
     const bool wider = job.record->widerBoxes() || job.record->plan.nearby > 0.0;
-    if (!wider && !job.record->anyDisabled()) return job.use(job, pairs);
+    if (!wider && !job.isFiltered()) {
+      job.nearby = true;
+      return job.use(job, pairs);
+    }
     const MeshTopology &a = job.record->a->mesh.topology, &b = job.record->b->mesh.topology;
     job.own.assign(pairs.begin(), pairs.end());
+    if (job.trees.turned()) job.keepInWorld(std::max(job.record->plan.nearby, job.thickness));
+    job.nearby |= !job.own.empty();
     if (job.record->anyDisabled())
       std::erase_if(job.own, [&](const TrianglePair& p) { return !a.isOn(p.a) || !b.isOn(p.b); });
-    if (wider) keepOverlapping(a, b, job.floats, job.own);
+    if (job.trees.turned() && job.record->plan.nearby > job.thickness)
+      job.keepInWorld(job.thickness);
+    else if (wider && !job.trees.turned())
+      keepOverlapping(a, b, job.floats, job.own);
     if (!job.own.empty()) job.use(job, job.own);
   }
 
@@ -147,7 +164,7 @@ struct Frame::Job {
 
   static void detect(Job& job, std::span<const TrianglePair> pairs) {
     Stopwatch watch;
-    const MeshPair meshes = job.record->meshes(&job.floats);
+    const MeshPair meshes = job.record->meshes(job.trees.turned() ? nullptr : &job.floats);
     bool& intersecting = job.contacts.facts.startsIntersecting;
     if (meshes.step.start && !intersecting)
       intersecting = anyIntersectAtStart(meshes, pairs, job.overlaps);
@@ -231,6 +248,7 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
       Job& job = newJob(*record);
       job.trees = trees;
       job.floats = floatsOf(*record, own);
+      job.thickness = thickness;
       job.earliest = &record->earliest;
       job.begin = first + begin;
       job.end = first + std::min(count, begin + grain);
@@ -250,7 +268,7 @@ void Frame::collect(std::span<PairRecord* const> records, const Threads& threads
   start(records, threads, false);
   threads.forEach(m_jobCount, [&](std::size_t i) {
     const PairRecord& record = *m_jobs[i]->record;
-    m_jobs[i]->start(record.widerBoxes() || record.anyDisabled() ? &Job::keep : nullptr);
+    m_jobs[i]->start(record.widerBoxes() || m_jobs[i]->isFiltered() ? &Job::keep : nullptr);
     run(*m_jobs[i]);
   });
   const auto found = [&](std::size_t i) {

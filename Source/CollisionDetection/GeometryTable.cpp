@@ -1,7 +1,9 @@
 #include "CollisionDetection/GeometryTable.h"
 
 #include "CollisionDetection/Stopwatch.h"
+#include "Core/Assert.h"
 #include "Geometry/TriangleBoxes.h"
+#include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>
 
@@ -104,6 +106,54 @@ void checkPositionCount(const Geometry& geometry, std::size_t count) {
         geometry.id);
 }
 
+/// Of positions in a body's frame.
+void checkPlaceable(GeometryId id, std::span<const Eigen::Vector3d> body, ErrorCode code) {
+  for (std::size_t v = 0; v < body.size(); ++v)
+    if (!(body[v].cwiseAbs().maxCoeff() <= kLargestPlaced))
+      throw Error(code,
+                  nameOf(id) + ", vertex " + std::to_string(v) +
+                      ": its position in the body's frame is beyond 2^1000",
+                  id, v);
+}
+
+/// Copied into memory that neither the step nor the last frame has.
+Positions::Body checkedBody(Geometry& geometry, std::span<const Eigen::Vector3d> positions,
+                            const char* which, const Threads& threads) {
+  const auto free = std::find_if(geometry.bodies.begin(), geometry.bodies.end(),
+                                 [](const auto& body) { return body.use_count() <= 1; });
+  PALPATE_ASSERT(free != geometry.bodies.end());
+  if (!*free) *free = std::make_shared<std::vector<Eigen::Vector3d>>();
+  (*free)->resize(positions.size());
+  checkPositions(geometry.id, positions, (*free)->data(), which, threads);
+  if (geometry.isPlaced()) checkPlaceable(geometry.id, positions, ErrorCode::NonFinitePosition);
+  return *free;
+}
+
+/// The step begins where the last frame ended, unless positions before were given since.
+void startStep(Geometry& geometry) {
+  if (!geometry.setThisFrame)
+    geometry.mesh.before = geometry.mesh.now;
+  else if (geometry.beforeGiven)
+    geometry.mesh.before = geometry.lastFrame;
+  geometry.setThisFrame = true;
+  geometry.beforeGiven = false;
+}
+
+/// The body stays as it is: only where it is read from changes.
+void placeBody(Geometry& geometry, const RigidTransform& transform) {
+  TriangleMesh& mesh = geometry.mesh;
+  if (!(transform.translation.cwiseAbs().maxCoeff() <= kLargestPlaced))
+    throw Error(ErrorCode::InvalidTransform,
+                nameOf(geometry.id) + ": the translation is beyond 2^1000", geometry.id);
+  if (!mesh.now.isPlaced())
+    checkPlaceable(geometry.id, mesh.now.body(), ErrorCode::InvalidTransform);
+  if (!geometry.setThisFrame) startStep(geometry);
+  geometry.revision += !mesh.now.isPlaced() || !(mesh.now.transform() == transform);
+  ++geometry.stepRevision;
+  mesh.now.place(transform);
+  if (!geometry.hasLastFrame && !geometry.beforeGiven) mesh.before = mesh.now;
+}
+
 void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
                    Buffer<FloatPoint>& floats, const Threads& threads) {
   floats.resize(positions.size());
@@ -116,7 +166,8 @@ void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame&
 void computeBoxes(Geometry& geometry, std::span<const std::uint32_t> groups, FloatBox* groupBoxes,
                   std::size_t grain, const Threads& threads) {
   threads.forChunks(groups.size() - 1, grain, [&](std::size_t, std::size_t from, std::size_t to) {
-    triangleBoxes(geometry.floats.data(), geometry.swept ? geometry.floatsBefore.data() : nullptr,
+    triangleBoxes(geometry.floats.data(),
+                  geometry.treeSwept ? geometry.floatsBefore.data() : nullptr,
                   geometry.orderedTriangles.data(), groups.subspan(from, to - from + 1),
                   geometry.octree.boxes(), groupBoxes + from);
   });
@@ -170,17 +221,17 @@ void fitBoxes(Geometry& geometry, const OctreeSettings& settings, const Threads&
 
 void updateOctree(Geometry& geometry, const OctreeSettings& settings, const Threads& threads) {
   using Update = LooseOctree::Update;
-  geometry.treeRevision = geometry.revisionFor(geometry.swept);
-  geometry.treeSwept = geometry.swept;
+  geometry.treeRevision = geometry.revisionForTree();
+  geometry.treeSwept = geometry.treeSweeps();
   if (geometry.mesh.topology.triangles.empty()) {
     geometry.octree.reset(0);
     geometry.treeKnown = false;
     return;
   }
   Stopwatch watch;
-  computeFloats(geometry.mesh.now, geometry.frame, geometry.floats, threads);
-  if (geometry.swept)
-    computeFloats(geometry.mesh.before, geometry.frame, geometry.floatsBefore, threads);
+  computeFloats(geometry.mesh.now.body(), geometry.frame, geometry.floats, threads);
+  if (geometry.treeSwept)
+    computeFloats(geometry.mesh.before.body(), geometry.frame, geometry.floatsBefore, threads);
   geometry.boxMilliseconds += watch.lap();
   if (geometry.treeKnown && settings.update == OctreeUpdate::Auto) {
     fitBoxes(geometry, settings, threads);
@@ -205,13 +256,13 @@ double smallestHeight(const TriangleMesh& mesh) {
 }
 
 /// A large mesh by parts, whose union does not depend on threads.
-MotionRange motionOf(std::span<const Eigen::Vector3d> before, std::span<const Eigen::Vector3d> now,
-                     Buffer<MotionRange>& parts, const Threads& threads) {
+MotionRange motionOf(const Positions& before, const Positions& now, Buffer<MotionRange>& parts,
+                     const Threads& threads) {
   parts.resize((now.size() + kMotionGrain - 1) / kMotionGrain);
-  threads.forChunks(
-      now.size(), kMotionGrain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
-        parts[chunk] = motionRange(before.subspan(from, to - from), now.subspan(from, to - from));
-      });
+  threads.forChunks(now.size(), kMotionGrain,
+                    [&](std::size_t chunk, std::size_t from, std::size_t to) {
+                      parts[chunk] = motionRange(before, now, from, to);
+                    });
   MotionRange all;
   for (const MotionRange& part : parts) all.add(part);
   return all;
@@ -238,15 +289,14 @@ GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
   checkRadii(id, radii);
   auto geometry = std::make_unique<Geometry>();
   geometry->id = id;
-  geometry->mesh.now.resize(positions.size());
-  checkPositions(id, positions, geometry->mesh.now.data(), "");
-  geometry->mesh.before = geometry->mesh.now;
   TriangleMesh& mesh = geometry->mesh;
+  mesh.rest.resize(positions.size());
+  checkPositions(id, positions, mesh.rest.data(), "");
+  mesh.before = mesh.now = mesh.rest;
   mesh.topology = MeshTopology(positions.size(), triangles);
   mesh.topology.kind = kind;
   if (!radii.empty()) mesh.largestRadius = *std::max_element(radii.begin(), radii.end());
   if (radii.size() > 1) mesh.radii.assign(radii.begin(), radii.end());
-  mesh.rest = mesh.now;
   geometry->smallestHeight = smallestHeight(geometry->mesh);
   m_geometries.push_back(std::move(geometry));
   ++m_nextId;
@@ -268,12 +318,9 @@ GeometryId GeometryTable::add(const AnalyticalGeometry& analytical) {
 void GeometryTable::setTransform(GeometryId id, const RigidTransform& transform) {
   Geometry& geometry = at(id);
   TriangleMesh& mesh = geometry.mesh;
-  if (!mesh.shape)
-    throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(id) + " is " + nameOf(mesh.topology.kind) + "; setTransform() is for shapes",
-                id);
   if (const std::string fault = faultOf(transform); !fault.empty())
     throw Error(ErrorCode::InvalidTransform, nameOf(id) + ": " + fault, id);
+  if (!mesh.shape) return placeBody(geometry, transform);
   mesh.transform = transform;
   mesh.shape->place(*mesh.analytical, transform);
   ++geometry.revision;
@@ -299,41 +346,36 @@ void GeometryTable::remove(GeometryId id) {
 void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d> now,
                                  const Threads& threads) {
   Geometry& geometry = at(id);
+  TriangleMesh& mesh = geometry.mesh;
   checkPositionCount(geometry, now.size());
-  geometry.staging.resize(now.size());
-  checkPositions(id, now, geometry.staging.data(), "", threads);
+  const Positions::Body body = checkedBody(geometry, now, "", threads);
   const bool moved =
-      !now.empty() && std::memcmp(now.data(), geometry.mesh.now.data(), now.size_bytes()) != 0;
-  if (!geometry.setThisFrame)
-    geometry.mesh.before.swap(geometry.mesh.now);
-  else if (geometry.beforeGiven)
-    geometry.mesh.before.swap(geometry.lastFrame);
-  geometry.mesh.now.swap(geometry.staging);
-  if (!geometry.hasLastFrame) geometry.mesh.before = geometry.mesh.now;
-  geometry.setThisFrame = true;
-  geometry.beforeGiven = false;
+      !now.empty() && std::memcmp(now.data(), mesh.now.body().data(), now.size_bytes()) != 0;
+  startStep(geometry);
+  mesh.now.setBody(body);
+  if (!geometry.hasLastFrame) mesh.before = mesh.now;
   geometry.revision += moved;
+  geometry.bodyRevision += moved;
   ++geometry.stepRevision;
+  ++geometry.bodyStepRevision;
 }
 
 void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d> before,
                                  std::span<const Eigen::Vector3d> now, const Threads& threads) {
   Geometry& geometry = at(id);
+  TriangleMesh& mesh = geometry.mesh;
   checkPositionCount(geometry, before.size());
   checkPositionCount(geometry, now.size());
-  geometry.staging.resize(now.size());
-  geometry.staging2.resize(before.size());
-  checkPositions(id, before, geometry.staging2.data(), " before", threads);
-  checkPositions(id, now, geometry.staging.data(), " now", threads);
-  if (!geometry.setThisFrame)
-    geometry.lastFrame.swap(geometry.mesh.now);
-  else if (!geometry.beforeGiven)
-    geometry.lastFrame.swap(geometry.mesh.before);
-  geometry.mesh.before.swap(geometry.staging2);
-  geometry.mesh.now.swap(geometry.staging);
-  geometry.setThisFrame = geometry.beforeGiven = true;
-  ++geometry.revision;
-  ++geometry.stepRevision;
+  const Positions::Body start = checkedBody(geometry, before, " before", threads),
+                        end = checkedBody(geometry, now, " now", threads);
+  startStep(geometry);
+  geometry.lastFrame = mesh.before;
+  geometry.beforeGiven = true;
+  mesh.before.setBody(start);
+  mesh.now.setBody(end);
+  for (auto* revision : {&geometry.revision, &geometry.stepRevision, &geometry.bodyRevision,
+                         &geometry.bodyStepRevision})
+    ++*revision;
 }
 
 void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions,
@@ -345,11 +387,13 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
                     "; setTriangles() is for triangle meshes",
                 id);
   checkCounts(id, positions, triangles, GeometryKind::Triangles);
-  std::vector<Eigen::Vector3d> now(positions.size());
-  checkPositions(id, positions, now.data(), "");
+  std::vector<Eigen::Vector3d> rest(positions.size());
+  checkPositions(id, positions, rest.data(), "");
+  if (geometry.isPlaced()) checkPlaceable(id, positions, ErrorCode::NonFinitePosition);
   MeshTopology topology(positions.size(), triangles);
-  geometry.mesh.before = geometry.mesh.rest = now;
-  geometry.mesh.now = std::move(now);
+  geometry.mesh.now.setBody(std::make_shared<const std::vector<Eigen::Vector3d>>(rest));
+  geometry.mesh.before = geometry.mesh.now;
+  geometry.mesh.rest = std::move(rest);
   geometry.mesh.topology = std::move(topology);
   geometry.setThisFrame = true;
   geometry.hasLastFrame = geometry.beforeGiven = false;
@@ -357,6 +401,7 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
   geometry.smallestHeight = smallestHeight(geometry.mesh);
   ++geometry.revision;
   ++geometry.stepRevision;
+  ++geometry.bodyRevision;
   ++geometry.topologyRevision;
   ++geometry.restRevision;
 }
@@ -394,7 +439,10 @@ void GeometryTable::updateMotion(Geometry& geometry, const Threads& threads) {
   if (geometry.motionRevision == geometry.stepRevision) return;
   geometry.motionRevision = geometry.stepRevision;
   const TriangleMesh& mesh = geometry.mesh;
-  geometry.motion = motionOf(mesh.before, mesh.now, geometry.motionParts, threads);
+  geometry.motion = geometry.isPlaced() && mesh.now.hasSameBody(mesh.before)
+                        ? rigidMotion(geometry)
+                        : motionOf(mesh.before, mesh.now, geometry.motionParts, threads);
+  geometry.arcDeviation = arcDeviation(geometry);
   geometry.correction =
       geometry.hasLastFrame && geometry.beforeGiven
           ? motionOf(geometry.lastFrame, mesh.before, geometry.motionParts, threads)
@@ -405,7 +453,7 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   double spread = 0;
   for (const auto& geometry : m_geometries) {
     if (!geometry->treeIsNow()) {
-      const SampledExtent extent = sampleExtent(geometry->mesh.now);
+      const SampledExtent extent = sampleExtent(geometry->mesh.now.body());
       geometry->frame.origin = extent.median;
       geometry->spread = extent.spread;
     }

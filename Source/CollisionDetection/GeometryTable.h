@@ -4,12 +4,15 @@
 #include <palpate/LooseOctree.h>
 #include <palpate/Settings.h>
 
+#include "CollisionDetection/RigidBody.h"
 #include "Core/Threads.h"
 #include "Geometry/FloatPositions.h"
 #include "Geometry/Motion.h"
 #include "Geometry/TriangleMesh.h"
 #include "Octree/Octree.h"
+#include "Octree/PointQueries.h"
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -22,24 +25,32 @@ namespace palpate {
 struct Geometry {
   GeometryId id;
   TriangleMesh mesh;
-  std::vector<Eigen::Vector3d>
-      staging;  ///< positions are checked while copied in here, then swapped
-  std::vector<Eigen::Vector3d> staging2;  ///< "before", where both are given
-  std::uint64_t revision = 1;             ///< counts changes of positions now and of topology
-  std::uint64_t stepRevision = 1;         ///< and of the positions before
+  /// Positions are checked while copied into one of these that no end of a step has.
+  std::array<std::shared_ptr<std::vector<Eigen::Vector3d>>, 5> bodies;
+  std::uint64_t revision = 1;      ///< counts changes of positions now and of topology
+  std::uint64_t stepRevision = 1;  ///< and of the positions before
   std::uint64_t revisionFor(bool wholeStep) const { return wholeStep ? stepRevision : revision; }
+  /// The same of positions in the body's frame.
+  std::uint64_t bodyRevision = 1, bodyStepRevision = 1;
+  /// By setTransform(): the octree is of the body's frame.
+  bool isPlaced() const { return mesh.now.isPlaced(); }
   bool setThisFrame = true;   ///< positions or topology, since the last frame ended
   bool hasLastFrame = false;  ///< one ended with this topology
   bool beforeGiven =
       false;  ///< by the last call, in this frame; then `lastFrame` holds what it would else be
-  std::vector<Eigen::Vector3d> lastFrame;
+  Positions lastFrame;
 
-  MotionRange motion;                  ///< of the step
-  MotionRange correction;              ///< from the last frame's positions to `before`
-  Buffer<MotionRange> motionParts;     ///< scratch
-  std::uint64_t motionRevision = 0;    ///< stepRevision that both are of
-  std::uint64_t topologyRevision = 1;  ///< counts changes of topology
-  std::uint64_t restRevision = 1;      ///< and of the shape at rest
+  MotionRange motion;                       ///< of the step
+  MotionRange correction;                   ///< from the last frame's positions to `before`
+  double arcDeviation = 0;                  ///< L: of the step
+  BodyMoments moments;                      ///< of a body that is placed
+  std::uint64_t momentsRevision = 0;        ///< bodyRevision that these are of
+  std::array<std::uint32_t, 7> furthest{};  ///< vertices of the last step, to be tried first
+  PointQueryStack queries;                  ///< scratch
+  Buffer<MotionRange> motionParts;          ///< scratch
+  std::uint64_t motionRevision = 0;         ///< stepRevision that both are of
+  std::uint64_t topologyRevision = 1;       ///< counts changes of topology
+  std::uint64_t restRevision = 1;           ///< and of the shape at rest
   CollisionFilter filter;
   bool meets(const Geometry& other) const {
     return (filter.groups & other.filter.mask) && (other.filter.groups & filter.mask);
@@ -52,7 +63,13 @@ struct Geometry {
   Buffer<FloatPoint> floatsBefore;  ///< of a swept geometry
   bool swept = false;               ///< boxes hold the whole step, because a pair's method needs it
   bool treeSwept = false;
-  bool treeIsNow() const { return treeSwept == swept && treeRevision == revisionFor(swept); }
+  bool treeSweeps() const { return swept && !mesh.now.hasSameBody(mesh.before); }
+  std::uint64_t revisionForTree() const { return treeSweeps() ? bodyStepRevision : bodyRevision; }
+  bool treeIsNow() const { return treeSwept == treeSweeps() && treeRevision == revisionForTree(); }
+  bool treeHasBody() const {
+    return treeKnown && treeRevision == (treeSwept ? bodyStepRevision : bodyRevision);
+  }
+  const FloatPoint* floatsAtStart() const { return (treeSwept ? floatsBefore : floats).data(); }
   std::vector<Triangle> orderedTriangles;  ///< in the octree's order
   Octree octree;
   Buffer<std::uint32_t> boundsGroups;  ///< scratch of a rebuild

@@ -279,8 +279,8 @@ struct OctreeBasedCD::Implementation {
       const TriangleMesh& mesh = geometry->mesh;
       const GeometryKind kind = mesh.topology.kind;
       problem.geometries.push_back({geometry->id,
-                                    mesh.before,
-                                    mesh.now,
+                                    mesh.before.all(),
+                                    mesh.now.all(),
                                     {},
                                     kind,
                                     mesh.radii,
@@ -347,6 +347,8 @@ GeometryId OctreeBasedCD::addAnalyticalGeometry(const AnalyticalGeometry& geomet
 void OctreeBasedCD::setTransform(GeometryId geometry, const Eigen::Matrix3d& rotation,
                                  const Eigen::Vector3d& translation) {
   const StandardFloatingPoint standard;
+  m_implementation->geometries.at(geometry);
+  m_implementation->pairs.checkRigid(geometry);
   m_implementation->geometries.setTransform(geometry, {rotation, translation});
 }
 

@@ -42,6 +42,9 @@ std::string shortest(double value) {
   return text;
 }
 
+constexpr const char* kRigidWithItself =
+    "a geometry that setTransform() moves cannot be tested against itself";
+
 /// Throws what is wrong with the settings for the pair's kinds.
 void checkKinds(const TriangleMesh& a, const TriangleMesh& b, const PairSettings& settings,
                 GeometryId id, const std::string& name) {
@@ -54,6 +57,7 @@ void checkKinds(const TriangleMesh& a, const TriangleMesh& b, const PairSettings
            ErrorCode::InvalidSettings);
   if (settings.restDistance > 0.0 && (&a != &b || a.topology.kind == GeometryKind::Points))
     refuse("restDistance is for a triangle or line mesh with itself", ErrorCode::InvalidSettings);
+  if (&a == &b && a.now.isPlaced()) refuse(kRigidWithItself, ErrorCode::UnsupportedMethod);
   if (a.topology.hasFaces() && b.topology.hasFaces()) return;
   if (a.shape || b.shape) {
     if (a.shape && b.shape)
@@ -173,6 +177,12 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
   record.plan = planOf(settings, *record.a, *record.b);
   record.dataFor = record.candidatesFor = {};
   index();
+}
+
+void PairTable::checkRigid(GeometryId geometry) const {
+  if (m_byIds.contains(keyOf(geometry, geometry)))
+    throw Error(ErrorCode::UnsupportedMethod, nameOf(geometry, geometry) + ": " + kRigidWithItself,
+                geometry);
 }
 
 void PairTable::setPredicate(const GeometryTable& geometries, GeometryId a, GeometryId b,

@@ -78,6 +78,8 @@ class PairTable {
   void add(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&);
   void set(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&);
   void setPredicate(const GeometryTable&, GeometryId a, GeometryId b, ContactPredicate);
+  /// Throws if there is a pair of the geometry with itself.
+  void checkRigid(GeometryId) const;
   void remove(GeometryTable&, GeometryId a, GeometryId b);
   void removeAllOf(GeometryId);
 

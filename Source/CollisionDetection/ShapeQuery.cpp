@@ -8,18 +8,25 @@ void findPrimitivesNear(const Geometry& geometry, const Shape& shape, double rea
                         PointQueryStack& stack, Buffer<std::uint32_t>& out) {
   const Octree& octree = geometry.octree;
   const double unit = 1.0 / geometry.frame.scale;
+  const RigidTransform& placed = geometry.mesh.now.transform();
   const auto mayReach = [&](const FloatBox& box) {
     if (box.empty()) return false;
     Eigen::Vector3d lower, upper;
     for (int k = 0; k < 3; ++k) lower[k] = box.lower[k], upper[k] = box.upper[k];
     if (lower.minCoeff() <= -kLargestFloat || upper.maxCoeff() >= kLargestFloat) return true;
-    const Eigen::Vector3d centre = 0.5 * unit * (lower + upper) + geometry.frame.origin,
-                          half = 0.5 * unit * (upper - lower);
+    Eigen::Vector3d centre = 0.5 * unit * (lower + upper) + geometry.frame.origin;
+    const Eigen::Vector3d half = 0.5 * unit * (upper - lower);
+    double size = centre.cwiseAbs().maxCoeff() + geometry.frame.origin.cwiseAbs().maxCoeff() +
+                  half.sum() + shape.magnitude();
+    if (geometry.isPlaced()) {
+      centre = placed(centre);
+      size += placed.translation.cwiseAbs().maxCoeff();
+    }
     const SignedDistance at = shape.at(centre);
-    const double slack = kShapeBoundError * (centre.cwiseAbs().maxCoeff() +
-                                             geometry.frame.origin.cwiseAbs().maxCoeff() +
-                                             half.sum() + shape.magnitude());
-    return !(at.distance - at.normal.cwiseAbs().dot(half) > reach + slack);  // NaN: it may
+    const Eigen::Vector3d slope =
+        geometry.isPlaced() ? placed.rotation.transpose() * at.normal : at.normal;
+    return !(at.distance - slope.cwiseAbs().dot(half) >
+             reach + kShapeBoundError * size);  // NaN: it may
   };
   out.clear();
   forEachOverlapping(octree, mayReach, stack, [&](std::uint32_t begin, std::uint32_t end) {

@@ -35,14 +35,14 @@ void addFarMovers(std::vector<std::uint32_t>& out, const Geometry& mesh, const G
   }
 }
 
-/// L: along the longest axis.
+/// L: along the longest axis; of a body that may be turned, along any.
 double extentOf(const Geometry& geometry) {
   if (geometry.octree.size() == 0) return 0.0;
   const FloatBox box = geometry.octree.blocks()[0].box(0);
   double longest = 0.0;
   for (int k = 0; k < 3; ++k)
     longest = std::max(longest, double{box.upper[k]} - double{box.lower[k]});
-  return longest / geometry.frame.scale;
+  return (geometry.isPlaced() ? 2.0 : 1.0) * longest / geometry.frame.scale;
 }
 
 }  // namespace
@@ -160,12 +160,14 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
             ? within && validity.startedApart && facts.verticesA.empty() && facts.verticesB.empty()
             : plan.motion == 0.0 || (within && !(nearby && contents.intersectingTriangles.empty()));
   }
-  validity.trusted = validity.trusted && knowsSides(a, b);
+  const bool trusted = validity.trusted && knowsSides(a, b);  // as vertices move, in straight lines
+  validity.arcDeviation = a.arcDeviation + b.arcDeviation;
+  validity.trusted = trusted && validity.arcDeviation <= settings.thickness;
   validity.sideMayBeWrong = plan.method != Method::Intersection && !validity.trusted;
   m_apart =
       plan.method == Method::Intersection
           ? plan.motion == 0.0 && contents.intersectingTriangles.empty() && facts.clearance > 0.0
-          : validity.trusted && facts.clearance > 0.0;
+          : trusted && facts.clearance > 0.0;
   m_clearance = std::min(facts.clearance, settings.thickness);
   m_intersecting = !contents.intersectingTriangles.empty();
   if (plan.step.start) {

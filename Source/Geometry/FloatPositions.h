@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "Core/Buffer.h"
+#include "Math/Box.h"
 
 #include <span>
 
@@ -21,10 +22,6 @@ struct FloatFrame {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   double scale = 1.0;
 };
-
-/// Floats are clamped to this, so that boxes of scenes beyond float's range stay finite and
-/// conservative.
-constexpr float kLargestFloat = 0x1p120f;
 
 /// Of up to 31 evenly spaced positions: the median of each axis, and the largest distance along an
 /// axis between the first and the last eighth; a few vertices far away change neither.

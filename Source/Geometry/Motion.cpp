@@ -19,17 +19,19 @@ void MotionRange::add(const MotionRange& other) {
   count += other.count;
 }
 
-MotionRange motionRange(std::span<const Vector3d> before, std::span<const Vector3d> now) {
+MotionRange motionRange(const Positions& before, const Positions& now, std::size_t begin,
+                        std::size_t end) {
   MotionRange range;
-  std::size_t i = 0;
-  if (now.size() >= 2) {
+  std::size_t i = begin;
+  if (end - begin >= 2 && !before.isPlaced() && !now.isPlaced()) {
     // Two vertices at a time, as six numbers, for whatever vectors the compiler has.
     using Two = Eigen::Array<double, 6, 1>;
     const auto displacement = [&](std::size_t first) -> Two {
-      return Eigen::Map<const Two>(now[first].data()) - Eigen::Map<const Two>(before[first].data());
+      return Eigen::Map<const Two>(now.body()[first].data()) -
+             Eigen::Map<const Two>(before.body()[first].data());
     };
-    Two lower = displacement(0), upper = lower, sum = Two::Zero(), squares = Two::Zero();
-    for (; i + 2 <= now.size(); i += 2) {
+    Two lower = displacement(i), upper = lower, sum = Two::Zero(), squares = Two::Zero();
+    for (; i + 2 <= end; i += 2) {
       const Two moved = displacement(i);
       lower = lower.min(moved);
       upper = upper.max(moved);
@@ -38,10 +40,11 @@ MotionRange motionRange(std::span<const Vector3d> before, std::span<const Vector
     }
     for (int k = 0; k < 6; k += 3) {
       const auto part = [&](const Two& two) -> Vector3d { return two.segment<3>(k).matrix(); };
-      range.add({part(lower), part(upper), part(sum), part(squares).sum(), double(i / 2)});
+      range.add(
+          {part(lower), part(upper), part(sum), part(squares).sum(), double((i - begin) / 2)});
     }
   }
-  for (; i < now.size(); ++i) {
+  for (; i < end; ++i) {
     const Vector3d moved = now[i] - before[i];
     range.add({moved, moved, moved, moved.squaredNorm(), 1.0});
   }

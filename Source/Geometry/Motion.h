@@ -1,8 +1,10 @@
 #pragma once
 
+#include "Geometry/Positions.h"
+
 #include <Eigen/Core>
 
-#include <span>
+#include <cstddef>
 
 namespace palpate {
 
@@ -16,10 +18,10 @@ struct MotionRange {
   bool isZero() const { return lower.isZero(0.0) && upper.isZero(0.0); }
 };
 
-/// From `before` to `now`, of the same size; zero of none.
-/// Cost     about half a nanosecond a vertex, or what reading both takes.
-MotionRange motionRange(std::span<const Eigen::Vector3d> before,
-                        std::span<const Eigen::Vector3d> now);
+/// Of vertices [begin, end) from `before` to `now`; zero of none.
+/// Cost     about half a nanosecond a vertex, or what reading both takes; ten where they are placed.
+MotionRange motionRange(const Positions& before, const Positions& now, std::size_t begin,
+                        std::size_t end);
 
 /// L. No point of the one moves further relative to a point of the other, and none less far. What
 /// both have in common, such as a translation, does not count.

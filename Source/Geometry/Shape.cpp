@@ -45,14 +45,6 @@ Eigen::Matrix3d axesAlong(const Vector3d& direction) {
 
 }  // namespace
 
-Vector3d RigidTransform::operator()(const Vector3d& p) const {
-  Vector3d result;
-  for (int k = 0; k < 3; ++k)
-    result[k] =
-        rotation(k, 0) * p[0] + rotation(k, 1) * p[1] + rotation(k, 2) * p[2] + translation[k];
-  return result;
-}
-
 Shape::Shape(const AnalyticalGeometry& geometry, const RigidTransform& transform) {
   if (const auto* hull = std::get_if<ConvexHull>(&geometry)) {
     m_span = spanOf(hull->points);

@@ -3,6 +3,7 @@
 #include <palpate/AnalyticalGeometry.h>
 
 #include "Geometry/Polytope.h"
+#include "Geometry/Positions.h"
 
 #include <array>
 #include <cstddef>
@@ -13,14 +14,6 @@
 #include <variant>
 
 namespace palpate {
-
-/// A rotation and then a translation.
-struct RigidTransform {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-  /// Rounded as it is written: ((r0 x + r1 y) + r2 z) + t.
-  Eigen::Vector3d operator()(const Eigen::Vector3d& p) const;
-};
 
 /// Where a vertex, an edge or a triangle comes nearest to a shape, or is deepest inside.
 struct NearestToShape {

@@ -3,6 +3,7 @@
 #include <palpate/Types.h>
 
 #include "Core/Buffer.h"
+#include "Geometry/Positions.h"
 #include "Geometry/Shape.h"
 
 #include <cstdint>
@@ -95,8 +96,8 @@ inline bool shareVertex(const Segment& a, const Segment& b) {
 /// point {p, p, p}.
 struct TriangleMesh {
   MeshTopology topology;
-  std::vector<Eigen::Vector3d> now;
-  std::vector<Eigen::Vector3d> before;
+  Positions now;
+  Positions before;
   std::vector<double> radii{};          ///< L, per vertex; empty: all have the largest
   double largestRadius = 0.0;           ///< L
   std::vector<Eigen::Vector3d> rest{};  ///< when the topology was set

@@ -10,6 +10,10 @@
 
 namespace palpate {
 
+/// Floats are clamped to this, so that boxes of scenes beyond float's range stay finite and
+/// conservative.
+constexpr float kLargestFloat = 0x1p120f;
+
 /// An axis-aligned box in a geometry's float frame, rounded outward. Fourth lanes are padding.
 struct alignas(16) FloatBox {
   /// Overlaps nothing, neutral for add().

@@ -145,13 +145,10 @@ double scaleFor(const ImpactQuery& query) {
 ImpactAnswer findApproach(const ImpactQuery& query, double distance, double tolerance,
                           double upTo) {
   const double scale = scaleFor(query);
-  std::array<Vector3d, 8> positions;
   ImpactQuery scaled = query;
   if (scale != 1.0)
-    for (int i = 0; i < 4; ++i) {
-      for (int end = 0; end < 2; ++end) positions[2 * i + end] = scale * query.vertices[i].at(end);
-      scaled.vertices[i] = {&positions[2 * i], &positions[2 * i + 1]};
-    }
+    for (ImpactQuery::Step& vertex : scaled.vertices)
+      vertex = {scale * vertex.before, scale * vertex.now};
   return query.kind == Kind::VertexTriangle
              ? find<Kind::VertexTriangle>(scaled, distance * scale, tolerance, upTo)
              : find<Kind::EdgeEdge>(scaled, distance * scale, tolerance, upTo);

@@ -19,9 +19,8 @@ namespace palpate {
 struct ImpactQuery {
   enum class Kind { VertexTriangle, EdgeEdge };
   struct Step {
-    const Eigen::Vector3d* before;
-    const Eigen::Vector3d* now;
-    const Eigen::Vector3d& at(int end) const { return end == 0 ? *before : *now; }
+    Eigen::Vector3d before, now;
+    const Eigen::Vector3d& at(int end) const { return end == 0 ? before : now; }
   };
   /// A difference of two vertices, by index into `vertices`: minuend, subtrahend.
   using Difference = std::array<int, 2>;

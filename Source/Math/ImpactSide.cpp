@@ -21,7 +21,7 @@ int exactSideAt(const ImpactQuery& query, double time) {
     for (int k = 0; k < 3; ++k) {
       const auto coordinate = [&](int vertex) -> Integer {
         const ImpactQuery::Step& step = query.vertices[vertex];
-        return scaledInteger((*step.before)[k]) * left + scaledInteger((*step.now)[k]) * passed;
+        return scaledInteger(step.before[k]) * left + scaledInteger(step.now[k]) * passed;
       };
       rows[i][k] = coordinate(axes[i][0]) - coordinate(axes[i][1]);
     }

@@ -35,7 +35,7 @@ std::optional<double> vertexTriangleTimeOfImpact(
     const Eigen::Vector3d& bNow, const Eigen::Vector3d& cNow,
     const TimeOfImpactSettings& settings) {
   return timeOf({ImpactQuery::Kind::VertexTriangle,
-                 {{{&vBefore, &vNow}, {&aBefore, &aNow}, {&bBefore, &bNow}, {&cBefore, &cNow}}}},
+                 {{{vBefore, vNow}, {aBefore, aNow}, {bBefore, bNow}, {cBefore, cNow}}}},
                 settings);
 }
 
@@ -44,10 +44,9 @@ std::optional<double> edgeEdgeTimeOfImpact(
     const Eigen::Vector3d& q0Before, const Eigen::Vector3d& q1Before, const Eigen::Vector3d& p0Now,
     const Eigen::Vector3d& p1Now, const Eigen::Vector3d& q0Now, const Eigen::Vector3d& q1Now,
     const TimeOfImpactSettings& settings) {
-  return timeOf(
-      {ImpactQuery::Kind::EdgeEdge,
-       {{{&p0Before, &p0Now}, {&p1Before, &p1Now}, {&q0Before, &q0Now}, {&q1Before, &q1Now}}}},
-      settings);
+  return timeOf({ImpactQuery::Kind::EdgeEdge,
+                 {{{p0Before, p0Now}, {p1Before, p1Now}, {q0Before, q0Now}, {q1Before, q1Now}}}},
+                settings);
 }
 
 }  // namespace palpate

@@ -135,6 +135,14 @@ constexpr double kOrthonormal = 1e-9;
 /// some twenty roundings.
 constexpr double kShapeBoundError = 0x1p-46;
 
+// ---- Bodies placed in the world (CollisionDetection/RigidBody.cpp) ----
+
+/// Of fl(R x + t), relative to the sum of its terms' magnitudes: 4 u; of a difference of two 9 u;
+/// and of what is compared with them, computed from a box's centre, some ten roundings.
+constexpr double kPlacedError = 0x1p-48;
+/// L: coordinates of bodies and translations up to this are placed without overflow.
+constexpr double kLargestPlaced = 0x1p1000;
+
 // ---- Motion bounds (Motion.cpp, MotionBound.cpp) ----
 
 /// Relative, and of a distance relative to the largest coordinate difference beside it: a

@@ -24,10 +24,12 @@ MotionRange motionOf(const TriangleMesh& mesh, std::uint32_t triangle) {
 }  // namespace
 
 void findAuto(const MeshPair& pair, std::span<const TrianglePair> candidates, ContactBuffers& out) {
-  FloatPair atEnd = *pair.floats;
-  atEnd.beforeA = atEnd.beforeB = nullptr;
   out.part.assign(candidates.begin(), candidates.end());
-  keepOverlapping(pair.a.topology, pair.b.topology, atEnd, out.part);
+  if (pair.floats) {
+    FloatPair atEnd = *pair.floats;
+    atEnd.beforeA = atEnd.beforeB = nullptr;
+    keepOverlapping(pair.a.topology, pair.b.topology, atEnd, out.part);
+  }
   findProximity(pair, out.part, out);
   out.part.clear();
   for (const TrianglePair& candidate : candidates)

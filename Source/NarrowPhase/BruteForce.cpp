@@ -78,11 +78,11 @@ class VertexAgainstMesh {
   /// features may hold that point.
   bool isNearer(std::uint32_t triangle, const MeshFeature& feature) const {
     const Triangle& corners = m_mesh.topology.triangles[triangle];
-    const Vector3d &a = m_mesh.now[corners[0]], &b = m_mesh.now[corners[1]],
-                   &c = m_mesh.now[corners[2]];
+    const Vector3d a = m_mesh.now[corners[0]], b = m_mesh.now[corners[1]],
+                   c = m_mesh.now[corners[2]];
     if (hasArea(a, b, c)) return true;
     if (feature.kind != MeshFeature::Kind::Vertex) return false;
-    const Vector3d& at = m_mesh.now[feature.id];
+    const Vector3d at = m_mesh.now[feature.id];
     return comesNearer(m_position, at, a) || comesNearer(m_position, at, b) ||
            comesNearer(m_position, at, c);
   }

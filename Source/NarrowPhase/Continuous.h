@@ -42,7 +42,7 @@ struct Features {
     const auto ids = vertices(inFirst, inSecond);
     ImpactQuery result{kind, {}};
     for (int i = 0; i < 4; ++i)
-      result.vertices[i] = {&meshOf(i).before[ids[i]], &meshOf(i).now[ids[i]]};
+      result.vertices[i] = {meshOf(i).before[ids[i]], meshOf(i).now[ids[i]]};
     return result;
   }
 };

@@ -21,8 +21,7 @@ struct MeshTriangle {
   const Triangle& vertices;
   Corners positions;
 
-  MeshTriangle(const TriangleMesh& ofMesh, std::uint32_t triangle,
-               const std::vector<Eigen::Vector3d>& at)
+  MeshTriangle(const TriangleMesh& ofMesh, std::uint32_t triangle, const Positions& at)
       : mesh(ofMesh),
         id(triangle),
         vertices(mesh.topology.triangles[id]),
@@ -151,7 +150,7 @@ void findOne(const MeshPair& pair, TrianglePair candidate, SignCounts& counts,
 void keepPossible(const MeshPair& pair, bool atStart, std::span<const TrianglePair> candidates,
                   Buffer<TrianglePair>& possible) {
   const auto placed = [&](const TriangleMesh& mesh) {
-    return PlacedTriangles{mesh.topology.triangles, (atStart ? mesh.before : mesh.now).data()};
+    return PlacedTriangles{mesh.topology.triangles, atStart ? mesh.before : mesh.now};
   };
   possible.clear();
   keepPossiblyIntersecting(placed(pair.a), placed(pair.b), pair.self(), candidates, possible);

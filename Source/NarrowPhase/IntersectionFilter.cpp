@@ -28,7 +28,7 @@ struct Batch {
                                std::uint32_t triangle, bool withIds) {
     const Triangle& vertices = from.triangles[triangle];
     for (int i = 0; i < 3; ++i) {
-      const double* const position = from.positions[vertices[i]].data();
+      const Eigen::Vector3d position = from.positions[vertices[i]];
       for (int k = 0; k < 3; ++k) coordinates[9 * side + 3 * i + k][lane] = position[k];
       if (withIds) ids[3 * side + i][lane] = vertices[i];
     }

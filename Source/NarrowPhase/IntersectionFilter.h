@@ -3,8 +3,7 @@
 #include <palpate/Types.h>
 
 #include "Core/Buffer.h"
-
-#include <Eigen/Core>
+#include "Geometry/Positions.h"
 
 #include <span>
 
@@ -13,7 +12,7 @@ namespace palpate {
 /// Triangles where they are at some time.
 struct PlacedTriangles {
   std::span<const Triangle> triangles;
-  const Eigen::Vector3d* positions;
+  Positions positions;
 };
 
 /// Appends those pairs that may intersect, in their order: those left out are proven not to, as

@@ -44,7 +44,7 @@ class VertexTriangleFinder {
 
   void test(std::uint32_t vertex, std::uint32_t triangle) {
     const Triangle& corners = m_topology.triangles[triangle];
-    const Vector3d& p = m_vertices[vertex];
+    const Vector3d p = m_vertices[vertex];
     const VertexTriangleDistance answer = finiteVertexTriangleDistance(
         p, m_positions[corners[0]], m_positions[corners[1]], m_positions[corners[2]]);
     m_exactDecisions += answer.exact;
@@ -76,7 +76,7 @@ class VertexTriangleFinder {
     if (isVertex && m_corners == Corners::LowerVertexOnly && feature.id < vertex) return false;
     const auto holders =
         isVertex ? m_topology.vertexTriangles[feature.id] : m_topology.edgeTriangles[feature.id];
-    const Vector3d& p = m_vertices[vertex];
+    const Vector3d p = m_vertices[vertex];
     return std::none_of(holders.begin(), holders.end(), [&](std::uint32_t other) {
       if (other == triangle || (m_self && holdsVertex(m_topology.triangles[other], vertex)) ||
           refusesVertex(m_pair, vertex, other, m_ofSecond))
@@ -125,7 +125,7 @@ class VertexTriangleFinder {
   const MeshPair& m_pair;
   const Features<ImpactQuery::Kind::VertexTriangle> m_features;
   const bool m_ofSecond;
-  std::span<const Vector3d> m_vertices, m_positions;
+  const Positions &m_vertices, &m_positions;
   const MeshTopology& m_topology;
   bool m_self;
   double m_thickness;
@@ -160,7 +160,7 @@ bool areFurtherApart(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0,
 void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, StepCheck& check,
                ContactBuffers& out) {
   const Features<ImpactQuery::Kind::EdgeEdge> features{pair.a, pair.b};
-  const auto at = [&](int i) -> const Vector3d& {
+  const auto at = [&](int i) -> Vector3d {
     return features.meshOf(i).now[features.vertices(edgeA, edgeB)[i]];
   };
   const bool distinct = pair.settings.contacts == Contacts::Distinct;
@@ -226,7 +226,7 @@ class ProximityFinder {
     m_pairs[m_size] = pairs;
     m_candidates[m_size] = candidate;
     for (int i = 0; i < 3; ++i) {
-      const Vector3d &p = m_pair.a.now[s[i]], &q = m_pair.b.now[t[i]];
+      const Vector3d p = m_pair.a.now[s[i]], q = m_pair.b.now[t[i]];
       for (int k = 0; k < 3; ++k) {
         m_batch.coordinates[3 * i + k][m_size] = p[k];
         m_batch.coordinates[9 + 3 * i + k][m_size] = q[k];

@@ -60,7 +60,7 @@ class ShapeContactFinder {
   }
 
   NearestToShape nearestOfTriangle(const Triangle& corners) const {
-    const auto at = [&](int i) -> const Vector3d& { return m_mesh.now[corners[i % 3]]; };
+    const auto at = [&](int i) -> Vector3d { return m_mesh.now[corners[i % 3]]; };
     if (const auto inside = m_shape.nearestInTriangle(at(0), at(1), at(2))) return *inside;
     NearestToShape best{};
     for (int i = 0; i < 3 && !m_distinct; ++i) {

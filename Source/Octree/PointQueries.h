@@ -3,7 +3,6 @@
 #include "Core/Buffer.h"
 #include "Octree/Octree.h"
 
-#include <array>
 #include <cstdint>
 #include <span>
 
@@ -41,14 +40,14 @@ void forEachOverlapping(const Octree& octree, Overlaps&& overlaps, PointQuerySta
 /// Nearest first: f(begin, end) for ranges of the octree's order until no other node's box comes as
 /// near to the point as f's last answer, a squared distance in the octree's floats.
 ///
-/// `point`: in the octree's frame, in double. Boxes hold their primitives with more to spare than
-/// the roundings here.
-template <class F>
-void forEachNearest(const Octree& octree, const std::array<double, 3>& point,
-                    double distanceSquared, PointQueryStack& stack, F&& f) {
+/// squareTo(box): of the point's distance. Boxes hold their primitives with more to spare than its
+/// roundings.
+template <class SquareTo, class F>
+void forEachNearest(const Octree& octree, SquareTo&& squareTo, double distanceSquared,
+                    PointQueryStack& stack, F&& f) {
   const OctreeBlock* blocks = octree.blocks();
   using Entry = PointQueryStack::Entry;
-  stack.entries.assign(1, {blocks[0].box(0).distanceSquared(point), 0});
+  stack.entries.assign(1, {squareTo(blocks[0].box(0)), 0});
   while (!stack.entries.empty()) {
     const Entry entry = stack.entries.back();
     stack.entries.pop_back();
@@ -61,7 +60,7 @@ void forEachNearest(const Octree& octree, const std::array<double, 3>& point,
     const std::size_t first = stack.entries.size();
     for (unsigned slot = 0; slot < 8; ++slot) {
       if (blocks[child].isEmpty(slot)) continue;
-      const Entry next{blocks[child].box(slot).distanceSquared(point), child * 8 + slot};
+      const Entry next{squareTo(blocks[child].box(slot)), child * 8 + slot};
       if (next.distanceSquared > distanceSquared) continue;
       // Nearest last, to be taken first.
       std::size_t place = stack.entries.size();

@@ -42,6 +42,78 @@ struct LeafRange {
   std::uint32_t begin, end;
 };
 
+/// Boxes side by side.
+template <class D>
+struct Bounds {
+  hn::Vec<D> lower[3], upper[3];
+
+  HWY_ATTR HWY_INLINE static Bounds load(D d, const OctreeBlock& block, std::size_t i) {
+    Bounds bounds;
+    for (int k = 0; k < 3; ++k) {
+      bounds.lower[k] = hn::Load(d, block.lower[k] + i);
+      bounds.upper[k] = hn::Load(d, block.upper[k] + i);
+    }
+    return bounds;
+  }
+  HWY_ATTR HWY_INLINE static Bounds load(D d, const BoxArrays& boxes, std::size_t i) {
+    Bounds bounds;
+    for (int k = 0; k < 3; ++k) {
+      bounds.lower[k] = hn::LoadU(d, boxes.lower[k].data() + i);
+      bounds.upper[k] = hn::LoadU(d, boxes.upper[k].data() + i);
+    }
+    return bounds;
+  }
+  HWY_ATTR HWY_INLINE Bounds shifted(const std::array<float, 4>& down,
+                                     const std::array<float, 4>& up) const {
+    const D d;
+    Bounds bounds;
+    for (int k = 0; k < 3; ++k) {
+      bounds.lower[k] = roundedDown(lower[k], hn::Set(d, down[k]));
+      bounds.upper[k] = roundedUp(upper[k], hn::Set(d, up[k]));
+    }
+    return bounds;
+  }
+  /// As BoxMap::at(), bit by bit.
+  HWY_ATTR HWY_INLINE Bounds turned(const BoxMap::End& end) const {
+    const D d;
+    const auto middle = hn::Set(d, 0.5f), zero = hn::Zero(d);
+    hn::Vec<D> c[3], h[3], farthest = zero;
+    for (int j = 0; j < 3; ++j) {
+      c[j] = (lower[j] + upper[j]) * middle;
+      h[j] = (upper[j] - lower[j]) * middle;
+      farthest = hn::Max(farthest, hn::Max(hn::Neg(lower[j]), upper[j]));
+    }
+    Bounds bounds;
+    for (int k = 0; k < 3; ++k) {
+      hn::Vec<D> centre = zero, half = zero, size = zero;
+      for (int j = 0; j < 3; ++j) {
+        const auto m = hn::Set(d, end.matrix[k][j]);
+        centre = centre + m * c[j];
+        half = half + hn::Abs(m) * h[j];
+        size = size + hn::Abs(m) * (hn::Abs(c[j]) + h[j]);
+      }
+      half = half + (size * hn::Set(d, BoxMap::kRelative) + hn::Set(d, OutwardRounding::kAbsolute));
+      half = hn::IfThenElse(hn::Ge(farthest, hn::Set(d, kLargestFloat)),
+                            hn::Set(d, std::numeric_limits<float>::infinity()), half);
+      bounds.lower[k] = roundedDown(centre - half, hn::Set(d, end.shiftLower[k]));
+      bounds.upper[k] = roundedUp(centre + half, hn::Set(d, end.shiftUpper[k]));
+    }
+    return bounds;
+  }
+  HWY_ATTR HWY_INLINE Bounds turned(const BoxMap& map) const {
+    Bounds bounds = turned(map.ends[0]);
+    if (map.count == 1) return bounds;
+    const Bounds other = turned(map.ends[1]);
+    for (int k = 0; k < 3; ++k) {
+      bounds.lower[k] = hn::Min(bounds.lower[k], other.lower[k]);
+      bounds.upper[k] = hn::Max(bounds.upper[k], other.upper[k]);
+    }
+    return bounds;
+  }
+};
+
+/// kTurned: boxes of at least one tree are turned on the way.
+template <bool kTurned>
 class Walk {
  public:
   Walk(const TreePair& trees, TraversalStack& stack, PairSink& sink)
@@ -55,10 +127,7 @@ class Walk {
         m_stack(stack.pairs),
         m_sink(sink) {}
 
-  HWY_ATTR bool rootsOverlap() const {
-    const Query a = shifted(m_a[0], 0);
-    return overlaps(m_b[0], a) & 1;
-  }
+  HWY_ATTR bool rootsOverlap() const { return overlaps(m_b[0], queryOfA(m_a[0], 0)) & 1; }
 
   HWY_ATTR void all(std::size_t bottom) {
     while (m_stack.size() > bottom) {
@@ -95,28 +164,50 @@ class Walk {
     return {begin, end};
   }
 
-  HWY_ATTR Query shifted(const OctreeBlock& block, unsigned slot) const {
+  template <class D>
+  HWY_ATTR HWY_INLINE Bounds<D> placedA(const Bounds<D>& bounds) const {
+    if (kTurned && m_trees.mapA.count > 0) return bounds.turned(m_trees.mapA);
+    return bounds.shifted(m_trees.shiftLower, m_trees.shiftUpper);
+  }
+  template <class D>
+  HWY_ATTR HWY_INLINE Bounds<D> placedB(const Bounds<D>& bounds) const {
+    if (kTurned && m_trees.mapB.count > 0) return bounds.turned(m_trees.mapB);
+    return bounds;
+  }
+
+  /// One node of a, in the frame that boxes are compared in.
+  HWY_ATTR Query queryOfA(const OctreeBlock& block, unsigned slot) const {
     Query query;
     const hn::CappedTag<float, 1> d;
+    Bounds<hn::CappedTag<float, 1>> bounds;
     for (int k = 0; k < 3; ++k) {
-      query.lower[k] = hn::GetLane(
-          roundedDown(hn::Set(d, block.lower[k][slot]), hn::Set(d, m_trees.shiftLower[k])));
-      query.upper[k] = hn::GetLane(
-          roundedUp(hn::Set(d, block.upper[k][slot]), hn::Set(d, m_trees.shiftUpper[k])));
+      bounds.lower[k] = hn::Set(d, block.lower[k][slot]);
+      bounds.upper[k] = hn::Set(d, block.upper[k][slot]);
+    }
+    bounds = placedA(bounds);
+    for (int k = 0; k < 3; ++k) {
+      query.lower[k] = hn::GetLane(bounds.lower[k]);
+      query.upper[k] = hn::GetLane(bounds.upper[k]);
     }
     return query;
   }
+  HWY_ATTR HWY_INLINE Query queryOfB(const OctreeBlock& block, unsigned slot) const {
+    FloatBox box = block.box(slot);
+    if (kTurned) box = m_trees.mapB(box);
+    return {{box.lower[0], box.lower[1], box.lower[2]}, {box.upper[0], box.upper[1], box.upper[2]}};
+  }
 
-  /// Bit i: child i of b's block overlaps the query, which is in b's frame.
-  HWY_ATTR static HWY_INLINE std::uint32_t overlaps(const OctreeBlock& block, const Query& query) {
+  /// Bit i: child i of b's block overlaps the query.
+  HWY_ATTR HWY_INLINE std::uint32_t overlaps(const OctreeBlock& block, const Query& query) const {
     const NodeTag d;
     std::uint32_t bits = 0;
     for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-      auto mask = hn::Le(hn::Load(d, block.lower[0] + i), hn::Set(d, query.upper[0]));
-      mask = hn::And(mask, hn::Ge(hn::Load(d, block.upper[0] + i), hn::Set(d, query.lower[0])));
+      const auto bounds = placedB(Bounds<NodeTag>::load(d, block, i));
+      auto mask = hn::Le(bounds.lower[0], hn::Set(d, query.upper[0]));
+      mask = hn::And(mask, hn::Ge(bounds.upper[0], hn::Set(d, query.lower[0])));
       for (int k = 1; k < 3; ++k) {
-        mask = hn::And(mask, hn::Le(hn::Load(d, block.lower[k] + i), hn::Set(d, query.upper[k])));
-        mask = hn::And(mask, hn::Ge(hn::Load(d, block.upper[k] + i), hn::Set(d, query.lower[k])));
+        mask = hn::And(mask, hn::Le(bounds.lower[k], hn::Set(d, query.upper[k])));
+        mask = hn::And(mask, hn::Ge(bounds.upper[k], hn::Set(d, query.lower[k])));
       }
       bits |= bitsOf(d, mask) << i;
     }
@@ -132,22 +223,20 @@ class Walk {
     }
   };
 
-  /// a's eight children in b's frame; returns which overlap b's node.
+  /// a's eight children, placed; returns which overlap b's node.
   HWY_ATTR std::uint32_t shiftBlock(const OctreeBlock& a, const OctreeBlock& b, unsigned slotB,
                                     ShiftedBlock& out) const {
     const NodeTag d;
+    const Query box = queryOfB(b, slotB);
     std::uint32_t bits = 0;
     for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+      const auto bounds = placedA(Bounds<NodeTag>::load(d, a, i));
       auto mask = hn::Eq(hn::Zero(d), hn::Zero(d));
       for (int k = 0; k < 3; ++k) {
-        const auto lower =
-            roundedDown(hn::Load(d, a.lower[k] + i), hn::Set(d, m_trees.shiftLower[k]));
-        const auto upper =
-            roundedUp(hn::Load(d, a.upper[k] + i), hn::Set(d, m_trees.shiftUpper[k]));
-        hn::Store(lower, d, out.lower[k] + i);
-        hn::Store(upper, d, out.upper[k] + i);
-        mask = hn::And(mask, hn::And(hn::Le(lower, hn::Set(d, b.upper[k][slotB])),
-                                     hn::Ge(upper, hn::Set(d, b.lower[k][slotB]))));
+        hn::Store(bounds.lower[k], d, out.lower[k] + i);
+        hn::Store(bounds.upper[k], d, out.upper[k] + i);
+        mask = hn::And(mask, hn::And(hn::Le(bounds.lower[k], hn::Set(d, box.upper[k])),
+                                     hn::Ge(bounds.upper[k], hn::Set(d, box.lower[k]))));
       }
       bits |= bitsOf(d, mask) << i;
     }
@@ -191,7 +280,7 @@ class Walk {
     const OctreeNode nodeA = pair.a & ~NodePair::kOwn;
     const OctreeNode child = m_b[pair.b >> 3].child[pair.b & 7];
     if (hasOwn(m_b, pair.b)) push(pair.a, pair.b | NodePair::kOwn);
-    pushChildrenOfB(pair.a, child, overlaps(m_b[child], shifted(m_a[nodeA >> 3], nodeA & 7)));
+    pushChildrenOfB(pair.a, child, overlaps(m_b[child], queryOfA(m_a[nodeA >> 3], nodeA & 7)));
   }
 
   HWY_ATTR void descendA(NodePair pair) {
@@ -246,10 +335,7 @@ class Walk {
   HWY_ATTR HWY_INLINE void leaves(NodePair pair) {
     const LeafRange a = range(*m_trees.a, pair.a), b = range(*m_trees.b, pair.b);
     const OctreeNode nodeB = pair.b & ~NodePair::kOwn;
-    const OctreeBlock& block = m_b[nodeB >> 3];
-    const unsigned slot = nodeB & 7;
-    const Query box{{block.lower[0][slot], block.lower[1][slot], block.lower[2][slot]},
-                    {block.upper[0][slot], block.upper[1][slot], block.upper[2][slot]}};
+    const Query box = queryOfB(m_b[nodeB >> 3], nodeB & 7);
     Rows rows;
     for (std::size_t i = a.begin; i < a.end; i += Rows::kMost) {
       load(rows, i, a.end, box);
@@ -275,16 +361,13 @@ class Walk {
     rows.bits = 0;
     for (std::size_t lane = 0; lane < Rows::kMost && first + lane < end; lane += hn::Lanes(d)) {
       const std::size_t i = first + lane;
+      const auto bounds = placedA(Bounds<LeafTag>::load(d, m_boxesA, i));
       auto mask = hn::FirstN(d, end - i);
       for (int k = 0; k < 3; ++k) {
-        const auto lower = roundedDown(hn::LoadU(d, m_boxesA.lower[k].data() + i),
-                                       hn::Set(d, m_trees.shiftLower[k]));
-        const auto upper = roundedUp(hn::LoadU(d, m_boxesA.upper[k].data() + i),
-                                     hn::Set(d, m_trees.shiftUpper[k]));
-        hn::Store(lower, d, rows.lower[k] + lane);
-        hn::Store(upper, d, rows.upper[k] + lane);
-        mask = hn::And(mask, hn::And(hn::Le(lower, hn::Set(d, box.upper[k])),
-                                     hn::Ge(upper, hn::Set(d, box.lower[k]))));
+        hn::Store(bounds.lower[k], d, rows.lower[k] + lane);
+        hn::Store(bounds.upper[k], d, rows.upper[k] + lane);
+        mask = hn::And(mask, hn::And(hn::Le(bounds.lower[k], hn::Set(d, box.upper[k])),
+                                     hn::Ge(bounds.upper[k], hn::Set(d, box.lower[k]))));
       }
       rows.bits |= bitsOf(d, mask) << lane;
     }
@@ -297,11 +380,7 @@ class Walk {
     const LeafTag d;
     const hn::RebindToUnsigned<LeafTag> du;
     for (std::size_t j = b.begin; j < b.end; j += hn::Lanes(d)) {
-      hn::Vec<LeafTag> lower[3], upper[3];
-      for (int k = 0; k < 3; ++k) {
-        lower[k] = hn::LoadU(d, m_boxesB.lower[k].data() + j);
-        upper[k] = hn::LoadU(d, m_boxesB.upper[k].data() + j);
-      }
+      const auto bounds = placedB(Bounds<LeafTag>::load(d, m_boxesB, j));
       const auto ids = hn::LoadU(du, m_idsB + j);
       hn::Vec<decltype(du)> corners[3];
       if (m_trees.adjacency)
@@ -315,8 +394,8 @@ class Walk {
         auto mask = inside;
         if (kWithin && i >= j) mask = hn::AndNot(hn::FirstN(d, i - j + 1), mask);
         for (int k = 0; k < 3; ++k) {
-          mask = hn::And(mask, hn::Le(lower[k], hn::Set(d, rows.upper[k][lane])));
-          mask = hn::And(mask, hn::Ge(upper[k], hn::Set(d, rows.lower[k][lane])));
+          mask = hn::And(mask, hn::Le(bounds.lower[k], hn::Set(d, rows.upper[k][lane])));
+          mask = hn::And(mask, hn::Ge(bounds.upper[k], hn::Set(d, rows.lower[k][lane])));
         }
         if (hn::AllFalse(d, mask)) continue;
         auto found = hn::RebindMask(du, mask);
@@ -366,10 +445,11 @@ class Walk {
   PairSink& m_sink;
 };
 
-HWY_ATTR void startPairsKernel(const TreePair& trees, std::size_t wanted, TraversalStack& stack) {
+template <bool kTurned>
+HWY_ATTR void startWalk(const TreePair& trees, std::size_t wanted, TraversalStack& stack) {
   stack.pairs.clear();
   PairSink none;
-  Walk walk(trees, stack, none);
+  Walk<kTurned> walk(trees, stack, none);
   if (!walk.rootsOverlap()) return;
   stack.pairs.push_back({0, 0});
   // Level by level: each round replaces every pair that is not of two leaves by those below it.
@@ -388,10 +468,14 @@ HWY_ATTR void startPairsKernel(const TreePair& trees, std::size_t wanted, Traver
   }
 }
 
+HWY_ATTR void startPairsKernel(const TreePair& trees, std::size_t wanted, TraversalStack& stack) {
+  trees.turned() ? startWalk<true>(trees, wanted, stack) : startWalk<false>(trees, wanted, stack);
+}
+
 HWY_ATTR void traverseKernel(const TreePair& trees, std::span<const NodePair> pairs,
                              TraversalStack& stack, PairSink& sink) {
   stack.pairs.assign(pairs.rbegin(), pairs.rend());
-  Walk(trees, stack, sink).all(0);
+  trees.turned() ? Walk<true>(trees, stack, sink).all(0) : Walk<false>(trees, stack, sink).all(0);
 }
 
 }  // namespace palpate::HWY_NAMESPACE
@@ -403,15 +487,27 @@ namespace palpate {
 HWY_EXPORT(startPairsKernel);
 HWY_EXPORT(traverseKernel);
 
-void setShift(TreePair& trees, const std::array<double, 3>& offset, double thickness) {
+static void setShift(std::array<float, 4>& lower, std::array<float, 4>& upper,
+                     const std::array<double, 3>& offset, double thickness) {
   const auto clamped = [](double v) {
     return std::min(std::max(v, -double{0x1p125f}), double{0x1p125f});
   };
   for (int k = 0; k < 3; ++k) {
     const double error = (std::abs(offset[k]) + thickness) * 0x1p-22;
-    trees.shiftLower[k] = static_cast<float>(clamped(offset[k] - thickness - error));
-    trees.shiftUpper[k] = static_cast<float>(clamped(offset[k] + thickness + error));
+    lower[k] = static_cast<float>(clamped(offset[k] - thickness - error));
+    upper[k] = static_cast<float>(clamped(offset[k] + thickness + error));
   }
+}
+
+void setShift(TreePair& trees, const std::array<double, 3>& offset, double thickness) {
+  setShift(trees.shiftLower, trees.shiftUpper, offset, thickness);
+}
+
+void setEnd(BoxMap::End& end, const std::array<std::array<double, 3>, 3>& matrix,
+            const std::array<double, 3>& offset, double thickness, double error) {
+  for (int k = 0; k < 3; ++k)
+    for (int j = 0; j < 3; ++j) end.matrix[k][j] = static_cast<float>(matrix[k][j]);
+  setShift(end.shiftLower, end.shiftUpper, offset, thickness + error);
 }
 
 void startPairs(const TreePair& trees, std::size_t wanted, TraversalStack& stack) {

@@ -4,6 +4,7 @@
 
 #include "Core/Buffer.h"
 #include "Math/Box.h"
+#include "Octree/BoxMap.h"
 #include "Octree/Octree.h"
 
 #include <algorithm>
@@ -79,8 +80,12 @@ struct TreePair {
   /// Added to a's bounds: the distance between the frames, and half the thickness on each side
   /// twice.
   std::array<float, 4> shiftLower{}, shiftUpper{};
+  /// Where a tree is of a rigid body that was moved, what brings its boxes into the world; a's then
+  /// in place of the shift. Not of one tree with itself.
+  BoxMap mapA{}, mapB{};
 
   bool self() const { return a == b; }
+  bool turned() const { return mapA.count > 0 || mapB.count > 0; }
 };
 
 /// Shifts for frames whose origins are `offset` apart (a's minus b's, in units of the frame), and a
@@ -90,6 +95,9 @@ struct TreePair {
 /// shift's own error is at most 2^-24 of |offset| + thickness, which is added to it here; the sum's
 /// is at most 2^-24 of the sum, which the outward step covers.
 void setShift(TreePair&, const std::array<double, 3>& offset, double thickness);
+/// The same after a turn; error: of the offset and of all positions that are in the boxes.
+void setEnd(BoxMap::End&, const std::array<std::array<double, 3>, 3>& matrix,
+            const std::array<double, 3>& offset, double thickness, double error);
 
 /// Scratch of one traversal, which remembers its peak.
 struct TraversalStack {

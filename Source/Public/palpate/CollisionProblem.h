@@ -13,9 +13,9 @@ namespace palpate {
 /// All that one frame's answers depend on.
 struct CollisionProblem {
   struct Mesh {
-    GeometryId id;  ///< where it comes from; nothing depends on it
-    std::vector<Eigen::Vector3d> before, now;
-    std::vector<Triangle> triangles;  ///< a segment {p, q} is {p, q, q}; none of points
+    GeometryId id;                             ///< where it comes from; nothing depends on it
+    std::vector<Eigen::Vector3d> before, now;  ///< in the world, also of a body that was moved
+    std::vector<Triangle> triangles;           ///< a segment {p, q} is {p, q, q}; none of points
     GeometryKind kind = GeometryKind::Triangles;
     std::vector<double> radii{};          ///< L: none, one for all, or one for each vertex
     std::vector<Eigen::Vector3d> rest{};  ///< the shape that restDistance is of; none: now

@@ -28,7 +28,8 @@ struct OctreeStatistics {
 
 /// The last frame's octrees: one for each geometry, all in one pool of blocks of eight siblings.
 ///
-/// A tree's root follows its geometry, so a body that moves as a whole keeps its cells. See
+/// A tree's root follows its geometry, so a body that moves as a whole keeps its cells. The tree of
+/// a geometry that setTransform() moves is in its body's frame, and so are all its boxes. See
 /// Docs/Algorithms/LooseOctree.md.
 class PALPATE_EXPORT LooseOctree {
  public:

@@ -76,8 +76,16 @@ class PALPATE_EXPORT OctreeBasedCD {
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
 
-  /// Of a shape: a point x of its body's frame is at rotation x + translation.
-  /// Errors   InvalidTransform unless the rotation is one within 1e-9 and all is finite.
+  /// Moves a geometry as a whole, from now on: a point x of its body's frame is at rotation x +
+  /// translation, which of vertices is the double ((r0 x + r1 y) + r2 z) + t. The positions given
+  /// before, and by later setPositions() and setTriangles(), are in the body's frame, and so is its
+  /// octree, which stays as it is. A frame's step is as with setPositions(): "before" is by the
+  /// last frame's transform, vertices move in straight lines (Validity::arcDeviation), and of
+  /// positions and transforms of one frame the last of each count.
+  ///
+  /// Errors   InvalidTransform unless the rotation is one within 1e-9 and all is finite, below
+  ///          2^1000; UnsupportedMethod where the geometry has a pair with itself.
+  /// Cost     does not grow with the geometry.
   void setTransform(GeometryId, const Eigen::Matrix3d& rotation,
                     const Eigen::Vector3d& translation);
   /// Two geometries meet where each is in a group that the other's mask has; a pair that does not

@@ -49,6 +49,10 @@ struct Validity {
   /// only chooses the method. Intersection: the smallest height of a triangle when its topology was
   /// set. Continuous: infinity.
   double reach = 0;
+  /// L: vertices move in straight lines within a step. Where setTransform() turns a body no vertex
+  /// is further than this from the way it would take if the body turned evenly about one axis and
+  /// slid along it; of two bodies the sum. Beyond the thickness nothing is trusted.
+  double arcDeviation = 0;
   /// L: pairs further apart at the step's end are no contacts, unless by an impact: the thickness,
   /// or with Auto up to the tolerance more.
   double thickness = 0;

@@ -49,8 +49,8 @@ struct Scene {
         self(withItself) {
     detection.addTriangleMesh(first.positions, first.triangles);
     detection.addTriangleMesh(second.positions, second.triangles);
-    detection.setPositions(GeometryId{0}, a.before, a.now);
-    detection.setPositions(GeometryId{1}, b.before, b.now);
+    detection.setPositions(GeometryId{0}, a.before.all(), a.now.all());
+    detection.setPositions(GeometryId{1}, b.before.all(), b.now.all());
     detection.addCollisionPair(pair.a, pair.b, settings);
     detection.detectCollision();
   }

@@ -699,9 +699,6 @@ TEST(Shapes, BadInputIsRefusedByName) {
   expectRefused(Code::InvalidTransform, "translation is (0, 0, nan)", [&] {
     collisions.setTransform(tool, one, {0, 0, kNan});
   });
-  expectRefused(Code::UnsupportedMethod, "setTransform() is for shapes", [&] {
-    collisions.setTransform(points, one, {0, 0, 0});
-  });
   expectRefused(Code::WrongPositionCount, "is a shape, which has no positions",
                 [&] { collisions.setPositions(tool, Positions{}); });
   expectRefused(Code::UnsupportedMethod, "is a shape; setTriangles()",

@@ -173,6 +173,31 @@ TEST(SteadyFrame, AllocatesNothingWithShapes) {
   EXPECT_GT(contacts, 1000u);
 }
 
+TEST(SteadyFrame, AllocatesNothingWithRigidBodies) {
+  const scenes::SceneMesh sheet = scenes::sheet(40);
+  for (const Method method : {Method::Proximity, Method::Auto}) {
+    const IntegersApart apart;
+    OctreeBasedCD detection(Settings{.threads = 1});
+    const GeometryId tissue = detection.addTriangleMesh(sheet.positions, sheet.triangles),
+                     plate = detection.addTriangleMesh(sheet.positions, sheet.triangles);
+    detection.addCollisionPair(tissue, plate, {method, 0.02});
+    std::size_t before = 0, contacts = 0;
+    for (int frame = 0; frame < 30; ++frame) {
+      if (frame == 20) before = allocations;
+      const double angle = 0.01 * (frame % 10);
+      Eigen::Matrix3d turned = Eigen::Matrix3d::Identity();
+      turned(0, 0) = turned(1, 1) = std::cos(angle);
+      turned(0, 1) = -(turned(1, 0) = std::sin(angle));
+      detection.setTransform(plate, turned, {0, 0, 0.015});
+      if (frame % 10 == 5) detection.setPositions(plate, sheet.positions);
+      detection.detectCollision();
+      contacts += detection.statistics().contacts;
+    }
+    EXPECT_EQ(allocations - before, 0u);
+    EXPECT_GT(contacts, 1000u);
+  }
+}
+
 TEST(SteadyFrame, CountsAllocations) {
   const std::size_t before = allocations;
   std::vector<int> some(allocations % 7 + 1);

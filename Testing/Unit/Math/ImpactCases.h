@@ -26,7 +26,7 @@ struct ImpactCase {
   }
   ImpactQuery query() const {
     ImpactQuery result{edges ? ImpactQuery::Kind::EdgeEdge : ImpactQuery::Kind::VertexTriangle, {}};
-    for (std::size_t i = 0; i < 4; ++i) result.vertices[i] = {&positions[i], &positions[4 + i]};
+    for (std::size_t i = 0; i < 4; ++i) result.vertices[i] = {positions[i], positions[4 + i]};
     return result;
   }
   /// Vertex i is the old order[i].

@@ -11,7 +11,7 @@ namespace {
 
 ImpactAnswer find(const ImpactCase& query, double distance, double upTo) {
   ImpactQuery q{query.edges ? ImpactQuery::Kind::EdgeEdge : ImpactQuery::Kind::VertexTriangle, {}};
-  for (int i = 0; i < 4; ++i) q.vertices[i] = {&query.positions[i], &query.positions[4 + i]};
+  for (int i = 0; i < 4; ++i) q.vertices[i] = {query.positions[i], query.positions[4 + i]};
   return findImpact(q, {.minimumDistance = distance}, upTo);
 }
 

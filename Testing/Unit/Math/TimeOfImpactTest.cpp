@@ -28,7 +28,7 @@ std::string text(const ImpactCase& query) {
 
 ImpactAnswer exactly(const ImpactCase& query, double tolerance) {
   ImpactQuery q{query.edges ? ImpactQuery::Kind::EdgeEdge : ImpactQuery::Kind::VertexTriangle, {}};
-  for (int i = 0; i < 4; ++i) q.vertices[i] = {&query.positions[i], &query.positions[4 + i]};
+  for (int i = 0; i < 4; ++i) q.vertices[i] = {query.positions[i], query.positions[4 + i]};
   return findTouchExactly(q, tolerance);
 }
 

@@ -77,9 +77,9 @@ void expectSame(const ContactBuffers& found, const ContactBuffers& expected) {
   EXPECT_EQ(sorted(found.edgeEdge), sorted(expected.edgeEdge));
 }
 
-std::vector<FloatPoint> floatsOf(const std::vector<Vector3d>& positions) {
+std::vector<FloatPoint> floatsOf(const Positions& positions) {
   std::vector<FloatPoint> floats(positions.size());
-  toFloats(positions, {}, floats.data());
+  toFloats(positions.body(), {}, floats.data());
   return floats;
 }
 

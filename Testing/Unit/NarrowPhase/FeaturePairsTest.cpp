@@ -198,8 +198,8 @@ TEST(FeaturePairs, OfPublishedStepsAreThoseOfBoxesInDouble) {
     EXPECT_EQ(edgeEdge.size(), edgeEdges);
 
     std::vector<FloatPoint> floatsBefore(mesh.before.size()), floatsNow(mesh.now.size());
-    toFloats(mesh.before, {mesh.now[0], 1.0}, floatsBefore.data());
-    toFloats(mesh.now, {mesh.now[0], 1.0}, floatsNow.data());
+    toFloats(mesh.before.body(), {mesh.now[0], 1.0}, floatsBefore.data());
+    toFloats(mesh.now.body(), {mesh.now[0], 1.0}, floatsNow.data());
     const FloatPair floats{floatsNow.data(), floatsNow.data(), floatsBefore.data(),
                            floatsBefore.data()};
     FeaturePairs pairs;

@@ -25,7 +25,7 @@ struct Side {
     triangles.push_back({first, first + 1, first + 2});
     positions.insert(positions.end(), corners.begin(), corners.end());
   }
-  PlacedTriangles placed() const { return {triangles, positions.data()}; }
+  PlacedTriangles placed() const { return {triangles, positions}; }
 };
 
 /// The same on every SIMD path.
@@ -122,7 +122,7 @@ TEST(IntersectionFilter, OfOneMeshLeavesOutCornersInCommonAsTheDefinitionDoes) {
     std::vector<TrianglePair> pairs;
     for (std::uint32_t i = 0; i < triangles.size(); ++i)
       for (std::uint32_t j = i; j < triangles.size(); ++j) pairs.push_back({i, j});
-    const PlacedTriangles placed{triangles, positions.data()};
+    const PlacedTriangles placed{triangles, positions};
     const std::vector<bool> isKept = kept(placed, placed, true, pairs);
     ContactBuffers out;
     findContactsByBruteForce({mesh, mesh, {.method = Method::Intersection}}, out);

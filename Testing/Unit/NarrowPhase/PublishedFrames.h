@@ -40,8 +40,11 @@ inline std::vector<Triangle> readFrame(const std::filesystem::path& path,
 inline TriangleMesh readStep(const std::filesystem::path& before,
                              const std::filesystem::path& now) {
   TriangleMesh mesh;
-  const std::vector<Triangle> triangles = readFrame(before, mesh.before);
-  readFrame(now, mesh.now);
+  std::vector<Eigen::Vector3d> start, end;
+  const std::vector<Triangle> triangles = readFrame(before, start);
+  readFrame(now, end);
+  mesh.before = start;
+  mesh.now = end;
   mesh.topology = MeshTopology(mesh.now.size(), triangles);
   return mesh;
 }

@@ -1,0 +1,170 @@
+#include "CollisionDetection/RigidBody.h"
+
+#include "CollisionDetection/GeometryTable.h"
+#include "Math/Tolerances.h"
+#include "Octree/PointQueries.h"
+#include "Octree/Traversal.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// The step of one body, and searches for the vertices that go furthest in it.
+class RigidStep {
+ public:
+  explicit RigidStep(Geometry& geometry)
+      : m_geometry(geometry),
+        m_before(geometry.mesh.before.transform()),
+        m_now(geometry.mesh.now.transform()),
+        m_matrix(m_now.rotation - m_before.rotation),
+        m_vector(m_now.translation - m_before.translation) {
+    if (geometry.momentsRevision != geometry.bodyRevision) {
+      geometry.moments = momentsOf(geometry.mesh.now.body());
+      geometry.momentsRevision = geometry.bodyRevision;
+    }
+    m_slack = kPlacedError *
+              (4.0 * geometry.moments.largest + m_before.translation.cwiseAbs().maxCoeff() +
+               m_now.translation.cwiseAbs().maxCoeff());
+  }
+
+  const RigidTransform& before() const { return m_before; }
+  const RigidTransform& now() const { return m_now; }
+  const Matrix3d& matrix() const { return m_matrix; }
+  Vector3d mean() const { return m_matrix * m_geometry.moments.mean + m_vector; }
+
+  /// The largest size(displacement) of a vertex, and up to the slack more. Of a box of positions:
+  /// no more than that at its centre and, for each axis, growth(axis) times half its edge.
+  template <class Size>
+  double largest(std::uint32_t& vertex, const Vector3d& growth, Size&& size) {
+    const std::span<const Vector3d> body = m_geometry.mesh.now.body();
+    const auto sizeOf = [&](std::uint32_t v) { return size(m_now(body[v]) - m_before(body[v])); };
+    if (body.empty()) return 0.0;
+    if (vertex >= body.size()) vertex = 0;
+    double best = sizeOf(vertex);
+    const auto tryOne = [&](std::uint32_t v) {
+      const double other = sizeOf(v);
+      if (other > best) best = other, vertex = v;
+    };
+    const double unit = 1.0 / m_geometry.frame.scale;
+    const auto mayHaveMore = [&](const FloatBox& box) {
+      if (box.empty()) return false;
+      Vector3d lower, upper;
+      for (int k = 0; k < 3; ++k) lower[k] = box.lower[k], upper[k] = box.upper[k];
+      if (lower.minCoeff() <= -kLargestFloat || upper.maxCoeff() >= kLargestFloat) return true;
+      const Vector3d centre = 0.5 * unit * (lower + upper) + m_geometry.frame.origin;
+      const double most =
+          size(m_matrix * centre + m_vector) + growth.dot(0.5 * unit * (upper - lower));
+      return !(most <= best + m_slack);
+    };
+    if (m_geometry.treeHasBody()) {
+      forEachOverlapping(m_geometry.octree, mayHaveMore, m_geometry.queries,
+                         [&](std::uint32_t begin, std::uint32_t end) {
+                           for (std::uint32_t i = begin; i < end; ++i)
+                             if (mayHaveMore(m_geometry.octree.boxes()[i]))
+                               for (const std::uint32_t v : m_geometry.orderedTriangles[i])
+                                 tryOne(v);
+                         });
+    } else {
+      for (std::uint32_t v = 0; v < body.size(); ++v) tryOne(v);
+    }
+    return best + 2.0 * m_slack;
+  }
+
+ private:
+  Geometry& m_geometry;
+  const RigidTransform &m_before, &m_now;
+  Matrix3d m_matrix;  ///< a displacement is matrix x + vector
+  Vector3d m_vector;
+  double m_slack;
+};
+
+}  // namespace
+
+BodyMoments momentsOf(std::span<const Vector3d> body) {
+  BodyMoments moments;
+  if (body.empty()) return moments;
+  moments.count = static_cast<double>(body.size());
+  for (const Vector3d& p : body) {
+    moments.mean += p / moments.count;
+    moments.largest = std::max(moments.largest, p.cwiseAbs().maxCoeff());
+  }
+  for (const Vector3d& p : body)
+    moments.spread += (p - moments.mean) * ((p - moments.mean) / moments.count).transpose();
+  return moments;
+}
+
+Vector3d worldOrigin(const Geometry& geometry) {
+  const Vector3d& origin = geometry.frame.origin;
+  return geometry.isPlaced() ? geometry.mesh.now.transform()(origin) : origin;
+}
+
+BoxMap worldMap(const Geometry& geometry, const Vector3d& origin, double thickness,
+                bool wholeStep) {
+  BoxMap map;
+  if (!geometry.isPlaced()) return map;
+  const FloatFrame& frame = geometry.frame;
+  const auto addEnd = [&](const RigidTransform& transform) {
+    std::array<std::array<double, 3>, 3> matrix;
+    for (int k = 0; k < 3; ++k)
+      for (int j = 0; j < 3; ++j) matrix[k][j] = transform.rotation(k, j);
+    const Vector3d offset = (transform(frame.origin) - origin) * frame.scale;
+    const double error =
+        kPlacedError * frame.scale *
+        (2.0 * frame.origin.cwiseAbs().maxCoeff() + transform.translation.cwiseAbs().maxCoeff() +
+         origin.cwiseAbs().maxCoeff());
+    setEnd(map.ends[map.count++], matrix, {offset[0], offset[1], offset[2]}, thickness, error);
+  };
+  const RigidTransform &now = geometry.mesh.now.transform(),
+                       &before = geometry.mesh.before.transform();
+  addEnd(now);
+  if (wholeStep && !(now == before)) addEnd(before);
+  return map;
+}
+
+MotionRange rigidMotion(Geometry& geometry) {
+  RigidStep step(geometry);
+  const BodyMoments& moments = geometry.moments;
+  MotionRange range;
+  range.count = moments.count;
+  if (step.before() == step.now()) return range;
+  for (int k = 0; k < 3; ++k) {
+    const Vector3d growth = step.matrix().row(k).cwiseAbs();
+    range.upper[k] =
+        step.largest(geometry.furthest[k], growth, [&](const Vector3d& moved) { return moved[k]; });
+    range.lower[k] = -step.largest(geometry.furthest[3 + k], growth,
+                                   [&](const Vector3d& moved) { return -moved[k]; });
+  }
+  range.sum = moments.count * step.mean();
+  range.squares =
+      moments.count * (step.mean().squaredNorm() +
+                       (step.matrix() * moments.spread * step.matrix().transpose()).trace());
+  return range;
+}
+
+double arcDeviation(Geometry& geometry) {
+  if (!geometry.isPlaced()) return 0.0;
+  RigidStep step(geometry);
+  if (step.before().rotation == step.now().rotation) return 0.0;
+  const Matrix3d turn = step.now().rotation * step.before().rotation.transpose();
+  const Eigen::Quaterniond half = Eigen::Quaterniond(turn).normalized();
+  const double sine = half.vec().norm();
+  if (sine == 0.0) return 0.0;
+  const Vector3d axis = half.vec() / sine;
+  const auto across = [&](const Vector3d& v) -> Vector3d { return v - axis.dot(v) * axis; };
+  Vector3d growth;
+  for (int j = 0; j < 3; ++j) growth[j] = across(step.matrix().col(j)).norm();
+  return 0.5 * sine / (1.0 + std::abs(half.w())) *
+         step.largest(geometry.furthest[6], growth,
+                      [&](const Vector3d& moved) { return across(moved).norm(); });
+}
+
+}  // namespace palpate

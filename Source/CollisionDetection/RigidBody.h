@@ -1,0 +1,50 @@
+#pragma once
+
+#include "Geometry/Motion.h"
+#include "Octree/BoxMap.h"
+
+#include <Eigen/Core>
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+namespace palpate {
+
+struct Geometry;
+
+// A geometry that setTransform() moved: its boxes are of its body's frame, and nothing here reads
+// all its vertices more than once.
+
+/// The sums that the mean motion of a body follows from.
+struct BodyMoments {
+  double count = 0;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();  ///< the mean of (x - mean) (x - mean)^T
+  double largest = 0;                                ///< L: of the coordinates' magnitudes
+};
+BodyMoments momentsOf(std::span<const Eigen::Vector3d> body);
+
+/// Where a geometry's float frame has its origin in the world.
+Eigen::Vector3d worldOrigin(const Geometry&);
+
+/// Brings the boxes of a geometry's octree into the world, in floats about `origin`, grown by
+/// `thickness` (in those floats): as it is now, or over the whole step. Nothing of one that is not
+/// placed.
+BoxMap worldMap(const Geometry&, const Eigen::Vector3d& origin, double thickness, bool wholeStep);
+
+/// How a body moved of which both ends of the step have the same positions in its frame: bounds at
+/// most a few roundings beyond the furthest vertices, which are searched for in its octree, and
+/// sums from its moments.
+MotionRange rigidMotion(Geometry&);
+
+/// L: how far a vertex is at most, at any time of the step, from where it would be if the body
+/// turned evenly about one axis while it slid along it, which takes it from any place to any other
+/// (Chasles). At most a few roundings too much.
+///
+/// Source   a vertex r from the axis, turned by the angle t, is furthest from its chord at half time: r (1 -
+///          cos(t / 2)); its chord across the axis is 2 r sin(t / 2), so that is half the chord
+///          times tan(t / 4).
+double arcDeviation(Geometry&);
+
+}  // namespace palpate

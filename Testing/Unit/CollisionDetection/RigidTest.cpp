@@ -1,0 +1,579 @@
+#include <palpate/Capture.h>
+
+#include "Common/Things.h"
+
+#include <Eigen/Geometry>
+
+#include <filesystem>
+#include <functional>
+
+// Geometries that setTransform() moves: the truth is the same scene whose positions are given as
+// fl(R x + t), and brute force.
+
+namespace palpate::testing {
+namespace {
+
+using Eigen::Matrix3d;
+
+struct Place {
+  Matrix3d rotation = Matrix3d::Identity();
+  Vector3d translation = Vector3d::Zero();
+
+  Vector3d operator()(const Vector3d& p) const {
+    Vector3d q;
+    for (int k = 0; k < 3; ++k)
+      q[k] = rotation(k, 0) * p[0] + rotation(k, 1) * p[1] + rotation(k, 2) * p[2] + translation[k];
+    return q;
+  }
+  Positions operator()(Positions positions) const {
+    for (Vector3d& p : positions) p = (*this)(p);
+    return positions;
+  }
+  /// Then turned by the angle about an axis through a point, and moved.
+  Place then(const Vector3d& axis, double angle, const Vector3d& through,
+             const Vector3d& by) const {
+    const Matrix3d turn = Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
+    return {turn * rotation, turn * (translation - through) + through + by};
+  }
+};
+
+Place somewhere(Random& random) {
+  return Place().then(randomPoint(random, -1, 1), uniform(random, 0, 3), {0.5, 0.5, 0.5},
+                      randomPoint(random, -0.1, 0.1));
+}
+
+/// What the transforms of the frames are.
+enum class Way { Still, Exact, Small, Large, Far };
+
+std::vector<Place> placesOf(Random& random, Way way) {
+  const Vector3d middle(0.5, 0.5, 0.5), up = Vector3d::UnitZ();
+  std::vector<Place> places;
+  Place place;
+  if (way == Way::Far) place.translation = {4e6, -3e7, 2e6};
+  if (way == Way::Small || way == Way::Large) place = somewhere(random);
+  for (int frame = 0; frame < 4; ++frame) {
+    places.push_back(place);
+    if (way == Way::Exact)
+      place = {(Matrix3d() << 0, -1, 0, 1, 0, 0, 0, 0, 1).finished(), {1, 0, 0}};
+    if (way == Way::Small || way == Way::Far)
+      place = place.then(randomPoint(random, -1, 1), 0.02,
+                         middle + (way == Way::Far ? place.translation : 0 * up),
+                         randomPoint(random, -0.01, 0.01));
+    if (way == Way::Large)
+      place = place.then(randomPoint(random, -1, 1), 0.8, middle, randomPoint(random, -0.3, 0.3));
+  }
+  return places;
+}
+
+/// A pair over some frames: the body is moved by transforms, or by the same positions.
+class Life {
+ public:
+  Life(Settings settings, const Thing& body, const Thing& other, const PairSettings& pair,
+       bool bodyFirst, bool byTransform)
+      : m_collisions((settings.keepCandidates = true, settings)),
+        m_positions(body.positions),
+        m_byTransform(byTransform),
+        m_body(body.addTo(m_collisions)),
+        m_other(other.addTo(m_collisions)),
+        m_a(bodyFirst ? m_body : m_other),
+        m_b(bodyFirst ? m_other : m_body) {
+    m_collisions.addCollisionPair(m_a, m_b, pair);
+  }
+  void frame(const Place& place, const Place* ofOther, const Positions& other) {
+    move(m_body, place, m_positions);
+    if (ofOther)
+      move(m_other, *ofOther, other);
+    else
+      m_collisions.setPositions(m_other, other);
+    m_collisions.detectCollision();
+    EXPECT_EQ(m_collisions.octree().validate(), std::vector<std::string>{});
+  }
+  OctreeBasedCD& collisions() { return m_collisions; }
+  const CollisionData& data() const { return m_collisions.collisionData(m_a, m_b); }
+  std::span<const TrianglePair> candidates() const { return m_collisions.candidatePairs(m_a, m_b); }
+  GeometryId body() const { return m_body; }
+
+ private:
+  void move(GeometryId id, const Place& place, const Positions& positions) {
+    if (m_byTransform)
+      m_collisions.setTransform(id, place.rotation, place.translation);
+    else
+      m_collisions.setPositions(id, place(positions));
+  }
+  OctreeBasedCD m_collisions;
+  Positions m_positions;
+  bool m_byTransform;
+  GeometryId m_body, m_other, m_a, m_b;
+};
+
+struct LifeCase {
+  Way way = Way::Small;
+  bool bodyFirst = true, bothRigid = false;
+  std::function<void(OctreeBasedCD&, GeometryId body)> setUp = [](auto&, GeometryId) {};
+};
+
+/// size: L, of coordinates, of which motion is bounded with rounding to spare.
+void expectSameValidity(const Validity& found, const Validity& truth, double size) {
+  EXPECT_NEAR(found.displacement, truth.displacement, 1e-13 * size);
+  EXPECT_GE(found.displacement, truth.displacement);
+  EXPECT_LE(found.trusted, truth.trusted);
+  EXPECT_EQ(found.startedApart, truth.startedApart);
+  EXPECT_EQ(found.method, truth.method);
+  EXPECT_EQ(found.reason, truth.reason);
+  EXPECT_EQ(found.atEnd, truth.atEnd);
+  EXPECT_EQ(found.atImpact, truth.atImpact);
+  EXPECT_EQ(found.verticesBeyondA, truth.verticesBeyondA);
+  EXPECT_EQ(found.verticesBeyondB, truth.verticesBeyondB);
+}
+
+/// Every engine with transforms answers as the positions do; returns the contacts of all frames.
+std::size_t expectAsPositions(Random& random, const Thing& body, const Thing& other,
+                              const PairSettings& pair, const LifeCase& life) {
+  const std::vector<Place> places = placesOf(random, life.way);
+  std::vector<Life> rigid;
+  for (const int threads : {1, 2})
+    rigid.emplace_back(settingsOf(Engine::Octree, threads), body, other, pair, life.bodyFirst,
+                       true);
+  rigid.emplace_back(settingsOf(Engine::BruteForce), body, other, pair, life.bodyFirst, true);
+  Life truth(settingsOf(Engine::Octree), body, other, pair, life.bodyFirst, false);
+  for (Life& one : rigid) life.setUp(one.collisions(), one.body());
+  life.setUp(truth.collisions(), truth.body());
+  std::size_t contacts = 0;
+  double largest = 0;
+  for (const Vector3d& p : body.positions) largest = std::max(largest, p.norm());
+  Place ofOther = places[0];
+  for (const Place& place : places) {
+    ofOther = ofOther.then({1, 2, 3}, 0.01, ofOther({0.5, 0.5, 0.5}), {0, 0, 0});
+    Positions now =
+        life.bothRigid ? other.positions : places[0](moved(random, other.positions, 0.02));
+    for (Life& one : rigid) one.frame(place, life.bothRigid ? &ofOther : nullptr, now);
+    truth.frame(place, life.bothRigid ? &ofOther : nullptr, now);
+    const Rows expected(truth.data());
+    contacts += expected.contacts() + expected.intersectingTriangles.size() +
+                (expected.earliestTimeOfImpact <= 1.0);
+    const auto candidates = rigid.back().candidates();
+    for (const Life& one : rigid) {
+      expectSameRows(Rows(one.data()), expected);
+      expectSameValidity(one.data().validity(), truth.data().validity(),
+                         10 + place.translation.norm() + largest);
+      EXPECT_TRUE(std::equal(candidates.begin(), candidates.end(), one.candidates().begin(),
+                             one.candidates().end()));
+    }
+    EXPECT_TRUE(std::includes(truth.candidates().begin(), truth.candidates().end(),
+                              candidates.begin(), candidates.end()));
+  }
+  return contacts;
+}
+
+constexpr Way kWays[] = {Way::Still, Way::Exact, Way::Small, Way::Large, Way::Far};
+
+TEST(Rigid, TrianglesAnswerAsTheirPositionsDo) {
+  Random random(1);
+  const Thing body = things(sphere(4, 5, {0.5, 0.5, 0.5}, 0.4)),
+              tissue = things(sheet(4, 0.5, 1.0));
+  std::vector<PairSettings> all = settingsFor(0.03);
+  all.push_back({Method::Intersection, 0.0});
+  all.push_back({Method::Auto, 0.0});
+  all.push_back({Method::Auto, 0.03});
+  all.push_back({Method::Auto, 0.2, Contacts::Distinct, 0.4});
+  for (const PairSettings& pair : all)
+    for (const Way way : kWays) {
+      SCOPED_TRACE(::testing::Message() << "method " << int(pair.method) << " way " << int(way)
+                                        << " thickness " << pair.thickness);
+      std::size_t contacts = 0;
+      for (const bool first : {true, false})
+        contacts += expectAsPositions(random, body, tissue, pair, {way, first});
+      contacts += expectAsPositions(random, tissue, body, pair, {way, true, true});
+      EXPECT_GT(contacts, 5u);
+      if (HasFailure()) return;
+    }
+}
+
+TEST(Rigid, SoupsAnswerAsTheirPositionsDo) {
+  Random random(2);
+  const Thing body = things(soup(random, 40, 0.2)), other = things(soup(random, 40, 0.2));
+  for (const PairSettings& pair :
+       {PairSettings{Method::Intersection, 0.0}, {Method::Proximity, 0.05}, {Method::Auto, 0.05}})
+    for (const Way way : kWays)
+      EXPECT_GT(expectAsPositions(random, body, other, pair, {way, way == Way::Far}), 20u);
+}
+
+TEST(Rigid, LinesAndPointsAnswerAsTheirPositionsDo) {
+  Random random(3);
+  const Thing tissue = things(sheet(4, 0.5, 1.0)), needle = thread(random, 20, 0.2, 0.02, false),
+              tapering = tapered(random, thread(random, 20, 0.2, 0, true), 0.05),
+              smoke = particles(random, 60, 0.02);
+  for (const auto& [body, other] : Pairs{{&tissue, &needle},
+                                         {&tissue, &smoke},
+                                         {&needle, &tissue},
+                                         {&smoke, &tissue},
+                                         {&needle, &smoke},
+                                         {&smoke, &needle},
+                                         {&needle, &tapering},
+                                         {&tapering, &tissue}})
+    for (const PairSettings& pair :
+         settingsFor(0.02, body->radii.size() == 1 && other->radii.size() == 1))
+      for (const Way way : {Way::Small, Way::Large, Way::Far}) {
+        SCOPED_TRACE(::testing::Message() << "kinds " << int(body->kind) << int(other->kind)
+                                          << " method " << int(pair.method) << " way " << int(way));
+        expectAsPositions(random, *body, *other, pair, {way, way != Way::Large, way == Way::Large});
+        if (HasFailure()) return;
+      }
+}
+
+TEST(Rigid, FiltersHoldForThem) {
+  Random random(4);
+  const Thing body = things(sphere(7, 9, {0.5, 0.5, 0.5}, 0.4)),
+              tissue = things(sheet(7, 0.5, 1.0));
+  for (const Method method : {Method::Proximity, Method::Continuous, Method::Intersection}) {
+    const auto filter = [](OctreeBasedCD& collisions, GeometryId id) {
+      collisions.setCollisionFilter(id, {.sidedness = Sidedness::Outer});
+      collisions.setDisabledElements(id, std::vector<std::uint32_t>{1, 5, 9, 20, 21, 22, 23});
+    };
+    EXPECT_GT(
+        expectAsPositions(random, body, tissue, {method, method == Method::Proximity ? 0.05 : 0.0},
+                          {Way::Large, true, false, filter}),
+        0u);
+  }
+}
+
+/// A vertex so far that floats are clamped, another that flattens the tree.
+TEST(Rigid, VerticesFarFlung) {
+  Random random(5);
+  for (const double far : {1e4, 1e30, 1e60}) {
+    Thing body = things(soup(random, 40, 0.2));
+    body.positions[3] = {far, 0.5 * far, -far};
+    const Thing other = things(soup(random, 40, 0.2));
+    expectAsPositions(random, body, other, {Method::Proximity, 0.05, Contacts::All}, {Way::Small});
+    expectAsPositions(random, body, other, {Method::Continuous, 0.0}, {Way::Small});
+  }
+}
+
+TEST(Rigid, TheTreeIsNotTouched) {
+  Random random(6);
+  const Thing bone = things(sphere(40, 50, {0.5, 0.5, 0.5}, 0.4)), organ = things(sheet(6, 0.5, 1));
+  OctreeBasedCD collisions(settingsOf(Engine::Octree, 1, OctreeUpdate::Rebuild));
+  const GeometryId body = bone.addTo(collisions), other = organ.addTo(collisions);
+  collisions.addCollisionPair(body, other, {Method::Continuous, 0.0});
+  collisions.setTransform(body, Matrix3d::Identity(), {0, 0, 0});
+  collisions.detectCollision();
+  const auto boxes = [&] {
+    std::vector<Vector3d> all;
+    for (const LooseOctree::NodeId node : collisions.octree().nodes(body))
+      all.push_back(collisions.octree().node(node).fittedBox.min());
+    return all;
+  };
+  const std::vector<Vector3d> built = boxes();
+  for (int frame = 0; frame < 5; ++frame) {
+    const Place place = somewhere(random);
+    collisions.setTransform(body, place.rotation, place.translation);
+    collisions.detectCollision();
+    EXPECT_EQ(collisions.statistics().rebuiltOctrees + collisions.statistics().refittedOctrees, 0u);
+    EXPECT_EQ(collisions.statistics().unchangedOctrees, 2u);
+    EXPECT_EQ(boxes(), built);  // in the body's frame
+    EXPECT_GT(collisions.statistics().contacts, 0u);
+  }
+  collisions.setPositions(body, moved(random, bone.positions, 0.01));
+  collisions.detectCollision();
+  EXPECT_EQ(collisions.statistics().rebuiltOctrees, 1u);
+}
+
+/// What a step's ends are, as Step does it in StepTest.cpp.
+class RigidStep : public ::testing::Test {
+ protected:
+  static Positions at(double z) { return {{0, 0, z}, {1, 0, z}, {0, 1, z}}; }
+  void moveTo(double z) { m_collisions.setTransform(m_id, Matrix3d::Identity(), {0, 0, z}); }
+  void expect(double before, double now) {
+    m_collisions.detectCollision();
+    const CollisionProblem problem = m_collisions.problem();
+    EXPECT_EQ(problem.geometries[0].before, at(before));
+    EXPECT_EQ(problem.geometries[0].now, at(now));
+  }
+  OctreeBasedCD m_collisions;
+  GeometryId m_id = m_collisions.addTriangleMesh(at(0), std::vector<Triangle>{{0, 1, 2}});
+};
+
+TEST_F(RigidStep, BeginsWhereTheLastFrameEnded) {
+  moveTo(1);
+  expect(1, 1);  // at first before is now
+  moveTo(2);
+  expect(1, 2);
+  expect(1, 2);  // nothing new: both stay
+  moveTo(2);
+  expect(2, 2);
+  moveTo(7);
+  m_collisions.update();
+  moveTo(5);
+  expect(2, 5);  // of several calls the last counts
+}
+
+TEST_F(RigidStep, OfAMeshThatWasMovedByPositions) {
+  expect(0, 0);
+  m_collisions.setPositions(m_id, at(3));
+  expect(0, 3);
+  moveTo(1);
+  expect(3, 4);
+}
+
+TEST_F(RigidStep, PositionsAreOfTheBodysFrame) {
+  moveTo(10);
+  expect(10, 10);
+  m_collisions.setPositions(m_id, at(1));
+  expect(10, 11);
+  m_collisions.setPositions(m_id, at(2));
+  moveTo(20);
+  expect(11, 22);
+  moveTo(30);
+  m_collisions.setPositions(m_id, at(3));
+  expect(22, 33);
+  m_collisions.setPositions(m_id, at(7), at(8));  // both ends
+  expect(37, 38);
+  moveTo(40);
+  m_collisions.setPositions(m_id, at(4), at(5));  // each placed as its end of the step is
+  expect(34, 45);
+  m_collisions.setPositions(m_id, at(0), at(1));
+  moveTo(50);
+  expect(40, 51);
+  m_collisions.setPositions(m_id, at(0), at(0));
+  m_collisions.setPositions(m_id, at(2));
+  expect(51, 52);
+}
+
+TEST_F(RigidStep, NewTrianglesHaveNoBefore) {
+  moveTo(1);
+  expect(1, 1);
+  moveTo(2);
+  m_collisions.setTriangles(m_id, at(5), std::vector<Triangle>{{0, 1, 2}});
+  expect(7, 7);
+  moveTo(3);
+  expect(7, 8);
+}
+
+TEST(Rigid, PositionsThatChangeOnTheWay) {
+  Random random(7);
+  const Thing body = things(soup(random, 40, 0.2)), other = things(soup(random, 40, 0.2));
+  for (const Method method : {Method::Continuous, Method::Proximity, Method::Auto}) {
+    std::vector<OctreeBasedCD> rigid, world;
+    for (auto* all : {&rigid, &world}) {
+      all->emplace_back(settingsOf(Engine::Octree));
+      all->emplace_back(settingsOf(Engine::BruteForce));
+      for (OctreeBasedCD& one : *all) {
+        body.addTo(one), other.addTo(one);
+        one.addCollisionPair(GeometryId{1}, GeometryId{0}, {method, 0.02});
+      }
+    }
+    Positions own = body.positions, start = own;
+    Place place;
+    for (int frame = 0; frame < 12; ++frame) {
+      const int what = frame < 2 ? frame : static_cast<int>(random() % 4);
+      start = own;
+      if (what != 1) place = place.then({1, 1, 0}, 0.1, {0.5, 0.5, 0.5}, {0.01, 0, 0});
+      if (what != 0) own = moved(random, own, 0.02);
+      for (OctreeBasedCD& one : rigid) {
+        if (what != 1) one.setTransform(GeometryId{0}, place.rotation, place.translation);
+        if (what == 3) one.setPositions(GeometryId{0}, start = own, own);
+        if (what != 0) one.setPositions(GeometryId{0}, own);
+        one.detectCollision();
+      }
+      for (OctreeBasedCD& one : world) {
+        one.setPositions(GeometryId{0}, place(own));
+        one.detectCollision();
+      }
+      const Rows expected(world[0].collisionData(GeometryId{1}, GeometryId{0}));
+      for (const auto* all : {&rigid, &world})
+        for (const OctreeBasedCD& one : *all)
+          expectSameRows(Rows(one.collisionData(GeometryId{1}, GeometryId{0})), expected);
+      EXPECT_GT(expected.contacts(), 0u);
+    }
+  }
+}
+
+TEST(Rigid, InsideIsAsOfPositions) {
+  Random random(8);
+  const Thing body = things(sphere(12, 14, {0.5, 0.5, 0.5}, 0.4)),
+              smoke = particles(random, 400, 0.0);
+  for (const double far : {0.0, 1e7}) {
+    Place place = somewhere(random);
+    place.translation += Vector3d(far, -far, far);
+    Place ofSmoke = place.then({1, 0, 0}, 0.3, place({0.5, 0.5, 0.5}), {0, 0, 0});
+    std::vector<std::vector<InsideVertex>> found;
+    for (const bool byTransform : {true, false})
+      for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
+        OctreeBasedCD collisions(settingsOf(engine));
+        const GeometryId id = body.addTo(collisions), points = smoke.addTo(collisions);
+        if (byTransform) {
+          collisions.setTransform(id, place.rotation, place.translation);
+          collisions.setTransform(points, ofSmoke.rotation, ofSmoke.translation);
+        } else {
+          collisions.setPositions(id, place(body.positions));
+          collisions.setPositions(points, ofSmoke(smoke.positions));
+        }
+        const auto inside = collisions.findInsideVertices(points, id);
+        found.emplace_back(inside.begin(), inside.end());
+      }
+    EXPECT_GT(found[0].size(), 50u);
+    for (const auto& other : found) {
+      ASSERT_EQ(other.size(), found[0].size());
+      for (std::size_t i = 0; i < other.size(); ++i) {
+        EXPECT_EQ(other[i].vertex, found[0][i].vertex);
+        EXPECT_EQ(other[i].triangle, found[0][i].triangle);
+        EXPECT_EQ(other[i].depth, found[0][i].depth);
+        EXPECT_EQ(other[i].barycentric, found[0][i].barycentric);
+      }
+    }
+  }
+}
+
+TEST(Rigid, ShapesMeetThemAsTheirPositions) {
+  Random random(9);
+  const Thing body = things(sphere(8, 9, {0.5, 0.5, 0.5}, 0.4));
+  std::size_t contacts = 0;
+  for (const AnalyticalGeometry& shape : std::vector<AnalyticalGeometry>{
+           Capsule{{0, 0, 0.5}, {1, 1, 0.5}, 0.1}, Box{{0.1, 0.5, 0.5}, {0.2, 0.3, 0.1}},
+           Plane{{0.5, 0.5, 0.2}}})
+    for (int i = 0; i < 6; ++i) {
+      const Place place = somewhere(random);
+      std::vector<std::uint64_t> hashes;
+      for (const bool byTransform : {true, false})
+        for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
+          OctreeBasedCD collisions(settingsOf(engine));
+          const GeometryId id = body.addTo(collisions),
+                           tool = collisions.addAnalyticalGeometry(shape);
+          collisions.addCollisionPair(id, tool, {Method::Proximity, 0.02});
+          if (byTransform)
+            collisions.setTransform(id, place.rotation, place.translation);
+          else
+            collisions.setPositions(id, place(body.positions));
+          collisions.detectCollision();
+          contacts += collisions.statistics().contacts;
+          hashes.push_back(collisions.collisionData(id, tool).hash());
+        }
+      for (const std::uint64_t hash : hashes) EXPECT_EQ(hash, hashes[0]);
+    }
+  EXPECT_GT(contacts, 100u);
+}
+
+TEST(Rigid, CapturesReplayThem) {
+  Random random(10);
+  const Thing body = things(soup(random, 60, 0.2)), other = things(soup(random, 60, 0.2));
+  const auto path = std::filesystem::temp_directory_path() / "palpate-rigid.capture";
+  for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto}) {
+    Settings settings = settingsOf(Engine::Octree);
+    settings.audit.features = 100000;
+    Life life(settings, body, other, {method, 0.02}, true, true);
+    Place place = somewhere(random);
+    for (int frame = 0; frame < 2; ++frame) {
+      place = place.then({1, 2, 3}, 0.1, {0.5, 0.5, 0.5}, {0, 0, 0.01});
+      life.frame(place, nullptr, other.positions);
+    }
+    EXPECT_TRUE(life.collisions().auditFailures().empty());
+    capture(life.collisions(), path);
+    OctreeBasedCD again = setUp(readCapture(path));
+    again.detectCollision();
+    EXPECT_EQ(again.collisionData(GeometryId{0}, GeometryId{1}).hash(), life.data().hash());
+    EXPECT_GT(life.collisions().statistics().contacts, 10u);
+  }
+  std::filesystem::remove(path);
+}
+
+/// The way of a body that turns evenly about an axis and slides along it, in a thousand parts.
+double deviationInParts(const Positions& body, const Place& before, const Vector3d& axis,
+                        double angle, const Vector3d& through, double slide) {
+  constexpr int kParts = 1000;
+  double most = 0;
+  const auto at = [&](double s) {
+    return before.then(axis, s * angle, through, s * slide * axis.normalized());
+  };
+  for (int part = 0; part <= kParts; ++part) {
+    const double s = double(part) / kParts;
+    for (const Vector3d& p : body)
+      most = std::max(most, (at(s)(p) - ((1 - s) * at(0)(p) + s * at(1)(p))).norm());
+  }
+  return most;
+}
+
+TEST(Rigid, ArcsAreMeasured) {
+  Random random(11);
+  const Thing body = things(sphere(5, 6, {0.5, 0.5, 0.5}, 0.4)), far = things(sheet(2, 50, 0));
+  for (const double angle : {1e-3, 0.05, 0.7, 2.0, 3.1})
+    for (const double slide : {0.0, 0.6}) {
+      const Vector3d axis = randomPoint(random, -1, 1), through = randomPoint(random, -2, 2);
+      const Place before = somewhere(random),
+                  now = before.then(axis, angle, through, slide * axis.normalized());
+      const double truth = deviationInParts(body.positions, before, axis, angle, through, slide);
+      for (const double thickness : {truth * 1.001, truth * 0.999}) {
+        Life life(settingsOf(Engine::Octree), body, far, {Method::Continuous, thickness}, true,
+                  true);
+        life.frame(before, nullptr, far.positions);
+        EXPECT_EQ(life.data().validity().arcDeviation, 0.0);
+        EXPECT_TRUE(life.data().validity().trusted);
+        life.frame(now, nullptr, far.positions);
+        EXPECT_NEAR(life.data().validity().arcDeviation, truth, 1e-9 * truth + 1e-13);
+        EXPECT_EQ(life.data().validity().trusted, thickness > truth);
+      }
+    }
+  // Without a turn there is no arc.
+  Life life(settingsOf(Engine::Octree), body, far, {Method::Continuous, 0.0}, true, true);
+  Place place = somewhere(random);
+  for (int frame = 0; frame < 2; ++frame, place.translation += Vector3d(1, 2, 3)) {
+    life.frame(place, nullptr, far.positions);
+    EXPECT_EQ(life.data().validity().arcDeviation, 0.0);
+    EXPECT_TRUE(life.data().validity().trusted);
+  }
+}
+
+TEST(Rigid, BadTransformsAreRefused) {
+  using Code = ErrorCode;
+  Random random(12);
+  const Thing body = things(soup(random, 5, 0.2));
+  OctreeBasedCD collisions(settingsOf(Engine::Octree));
+  const GeometryId id = body.addTo(collisions), huge = body.addTo(collisions);
+  const auto expectRefused = [&](Code code, const std::string& reason, const auto& call) {
+    try {
+      call();
+      ADD_FAILURE() << "not refused: " << reason;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), code) << error.what();
+      EXPECT_NE(std::string(error.what()).find(reason), std::string::npos) << error.what();
+    }
+  };
+  const Matrix3d one = Matrix3d::Identity();
+  Matrix3d skewed = one;
+  skewed(0, 1) = 2e-9;
+  const Positions given = collisions.problem().geometries[0].now;
+  for (const Matrix3d& bad : {skewed, Matrix3d(-one), Matrix3d(NAN * one), Matrix3d(2 * one)})
+    expectRefused(Code::InvalidTransform, "geometry 0: ", [&] {
+      collisions.setTransform(id, bad, {0, 0, 0});
+    });
+  for (const double bad : {double(NAN), double(INFINITY), 1e308})
+    expectRefused(Code::InvalidTransform, "geometry 0: ", [&] {
+      collisions.setTransform(id, one, {0, bad, 0});
+    });
+  Positions wide = body.positions;
+  wide[4] = {0, 1e308, 0};
+  collisions.setPositions(huge, wide);
+  expectRefused(Code::InvalidTransform, "geometry 1, vertex 4: ", [&] {
+    collisions.setTransform(huge, one, {0, 0, 0});
+  });
+  expectRefused(Code::UnknownGeometry, "geometry 9", [&] {
+    collisions.setTransform(GeometryId{9}, one, {0, 0, 0});
+  });
+  EXPECT_EQ(collisions.problem().geometries[0].now, given);
+  collisions.setTransform(id, one, {0, 0, 0});
+  expectRefused(Code::NonFinitePosition,
+                "geometry 0, vertex 4: ", [&] { collisions.setPositions(id, wide); });
+  expectRefused(Code::UnsupportedMethod, "cannot be tested against itself", [&] {
+    collisions.addCollisionPair(id, id, {Method::Intersection, 0.0});
+  });
+  collisions.addCollisionPair(huge, huge, {Method::Intersection, 0.0});
+  collisions.setPositions(huge, body.positions);
+  expectRefused(Code::UnsupportedMethod, "cannot be tested against itself", [&] {
+    collisions.setTransform(huge, one, {0, 0, 0});
+  });
+  collisions.removeCollisionPair(huge, huge);
+  collisions.setTransform(huge, one, {1, 0, 0});
+  collisions.detectCollision();
+}
+
+}  // namespace
+}  // namespace palpate::testing
