@@ -27,6 +27,7 @@ void featureRows(Report&, const RowOptions&);     ///< vertex-triangle and edge-
 void lineRows(Report&, const RowOptions&);        ///< a suture with itself and with organs
 void shapeRows(Report&, const RowOptions&);       ///< a capsule in a sheet, and in points
 void insideRows(Report&, const RowOptions&);      ///< vertices inside a body, particles around it
+void rigidRows(Report&, const RowOptions&);       ///< a large bone moved by its transform
 void continuousRows(Report&, const RowOptions&);  ///< times of impact of the published steps
 void simdRows(Report&, const RowOptions&);        ///< every path that this processor runs
 
