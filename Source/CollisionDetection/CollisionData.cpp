@@ -65,6 +65,10 @@ std::uint64_t CollisionData::hash() const {
     for (const auto& vector : {c.weights, c.point, c.pointOnShape, c.normal}) hash.add(vector);
     hash.add(c.distance);
   }
+  for (const ShapeShapeContact& c : m_contents.shapeShape) {
+    for (const auto& vector : {c.pointA, c.pointB, c.normal}) hash.add(vector);
+    hash.add(c.distance);
+  }
   if (const double earliest = m_contents.earliestTimeOfImpact; earliest <= 1.0) hash.add(earliest);
   return hash.value();
 }

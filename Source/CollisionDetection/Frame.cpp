@@ -66,7 +66,7 @@ void sortUnique(Buffer<std::uint32_t>& ids) {
 
 std::size_t sizeOf(const CollisionData::Contents& contents) {
   return contents.vertexTriangle.size() + contents.triangleVertex.size() +
-         contents.edgeEdge.size() + contents.shape.size();
+         contents.edgeEdge.size() + contents.shape.size() + contents.shapeShape.size();
 }
 
 /// ofIntersection: how many are Intersection's, of the step's end with a time of 0.
@@ -187,6 +187,7 @@ struct Frame::Job {
   /// The whole of a pair with a shape.
   void detectShape() {
     const MeshPair meshes = record->meshes();
+    if (meshes.isOfShapes()) return findShapePair(meshes, contacts);
     findPrimitivesNear(record->mesh(), meshes.shape(), meshes.reach(), queries, primitives);
     Stopwatch watch;
     findShapeContacts(meshes, primitives, contacts);
@@ -229,7 +230,8 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
   for (PairRecord* record : records) {
     record->earliest = std::numeric_limits<double>::infinity();
     if (record->meshes().hasShape()) {
-      if (adjacentPairs && record->mesh().octree.size() > 0) newJob(*record);
+      if (adjacentPairs && (record->mesh().mesh.shape || record->mesh().octree.size() > 0))
+        newJob(*record);
       continue;
     }
     if (record->a->octree.size() == 0 || record->b->octree.size() == 0) continue;

@@ -242,7 +242,8 @@ struct OctreeBasedCD::Implementation {
       record->trust.keep(thisFrame);
       const CollisionData& data = record->data;
       statistics.contacts += data.vertexTriangle().size() + data.triangleVertex().size() +
-                             data.edgeEdge().size() + data.shape().size();
+                             data.edgeEdge().size() + data.shape().size() +
+                             data.shapeShape().size();
       statistics.intersectingTriangles += data.intersectingTriangles().size();
     }
     endFrame();

@@ -81,6 +81,10 @@ std::size_t orderContacts(std::span<ContactBuffers* const> buffers, std::size_t 
             out.triangleVertex, byTriangle) +
       order(buffers, preferred, &ContactBuffers::edgeEdge, scratch.edgeEdge, out.edgeEdge, byEdges);
   order(buffers, preferred, &ContactBuffers::shape, scratch.shape, out.shape, byElement);
+  out.shapeShape.clear();
+  for (const ContactBuffers* buffer : buffers)
+    out.shapeShape.insert(out.shapeShape.end(), buffer->shapeShape.begin(),
+                          buffer->shapeShape.end());
   auto& triangles = out.intersectingTriangles;
   triangles.clear();
   for (const ContactBuffers* buffer : buffers)

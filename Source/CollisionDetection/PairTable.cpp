@@ -60,8 +60,9 @@ void checkKinds(const TriangleMesh& a, const TriangleMesh& b, const PairSettings
   if (&a == &b && a.now.isPlaced()) refuse(kRigidWithItself, ErrorCode::UnsupportedMethod);
   if (a.topology.hasFaces() && b.topology.hasFaces()) return;
   if (a.shape || b.shape) {
-    if (a.shape && b.shape)
-      refuse("two shapes cannot be tested against each other yet", ErrorCode::UnsupportedMethod);
+    if (&a == &b) refuse("a shape does not meet itself", ErrorCode::UnsupportedMethod);
+    if (a.shape && b.shape && a.shape->isPlane() && b.shape->isPlane())
+      refuse("two planes have no distance", ErrorCode::UnsupportedMethod);
     if (settings.method != Method::Proximity)
       refuse("a shape is tested by Method::Proximity only", ErrorCode::UnsupportedMethod);
     return;

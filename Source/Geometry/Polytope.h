@@ -53,7 +53,7 @@ class Polytope {
   const Triangle& corners(std::uint32_t face) const { return m_faces[face].corners; }
 
   SignedDistance at(const Eigen::Vector3d& x, double tie) const;
-  /// The face that is nearest to x.
+  /// The face that is nearest to x; inside, of those in the plane of at().
   OnFace nearest(const Eigen::Vector3d& x, double tie) const;
   /// The middle of its points that are furthest along a direction.
   Eigen::Vector3d support(const Eigen::Vector3d& direction, double tie) const;

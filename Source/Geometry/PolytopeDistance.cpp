@@ -124,6 +124,10 @@ Polytope::OnFace Polytope::nearest(const Vector3d& x, double tie) const {
   OnFace best = onFace(x, top.face);
   for (const Plane& plane : m_planes) {
     if (!(plane.height(x) >= top.height(x) - tie)) continue;
+    const Triangle& corners = m_faces[plane.face].corners;
+    if (std::any_of(corners.begin(), corners.end(),
+                    [&](std::uint32_t v) { return std::abs(top.height(m_points[v])) > tie; }))
+      continue;
     const OnFace on = onFace(x, plane.face);
     if (on.from.distance < best.from.distance) best = on;
   }

@@ -24,6 +24,19 @@ struct NearestToShape {
   bool exact = false;       ///< floating point left it to exact arithmetic
 };
 
+/// How far two shapes are apart; negative: as far as the shortest way to part them.
+struct ShapePairDistance {
+  Eigen::Vector3d pointA, pointB;  ///< L, on the surfaces
+  Eigen::Vector3d normal;          ///< unit, from b towards a
+  double distance;                 ///< L: pointA - pointB = distance * normal
+};
+
+/// Scratch, which remembers its peak: a body inside that of all a - b, and the points of a.
+struct ShapePairScratch {
+  Polytope grown;
+  Buffer<Eigen::Vector3d> ofA;
+};
+
 /// An analytical shape in the world.
 ///
 /// The signed distance to a convex shape is convex, so that an element has one least distance.
@@ -41,10 +54,34 @@ class Shape {
   std::optional<NearestToShape> nearestInTriangle(const Eigen::Vector3d& a,
                                                   const Eigen::Vector3d& b,
                                                   const Eigen::Vector3d& c) const;
+  /// From another shape, b; not both planes. Exchanged shapes give the same bits, exchanged.
+  ///
+  /// Planes by the other's furthest point, spheres by the distance of a point, two capsules by that
+  /// of edges; all others by how far the origin is from the body of all differences a - b, less the
+  /// radii. Within that a polytope grows from its furthest points along the direction in which the
+  /// origin is nearest to leave it. The origin's distance to the polytope and its height over the
+  /// last furthest point are bounds on either side; they meet within kShapePairGap.
+  ///
+  /// Source   Gilbert, Johnson, Keerthi (1988) and van den Bergen (2001) where shapes are apart and
+  ///          where they overlap. Difference: one polytope for both, of all points so far, whose
+  ///          triangles are kept by exact predicates.
+  ShapePairDistance distanceFrom(const Shape& b, ShapePairScratch&) const;
+  /// The middle of what of a body but for a capsule's radius is furthest along a direction, from
+  /// its origin. tie: L, a difference of heights that is none.
+  Eigen::Vector3d support(const Eigen::Vector3d& direction, double tie) const;
+  const Eigen::Vector3d& origin() const { return m_p0; }
+  bool isPlane() const { return m_kind < Kind::Capsule; }
   /// L: about the largest magnitude of its coordinates and measures.
   double magnitude() const { return m_magnitude; }
 
  private:
+  /// In some order of all shapes.
+  bool precedes(const Shape&) const;
+  ShapePairDistance planeFrom(const Shape& body) const;
+  ShapePairDistance axisFrom(const Shape& body) const;
+  ShapePairDistance flatFrom(const Shape&, const Eigen::Vector3d& flat) const;
+  ShapePairDistance grownFrom(const Shape&, ShapePairScratch&) const;
+
   enum class Kind { Plane, TwoSidedPlane, Capsule, Cylinder, Box, Hull };
   /// A vector by what the distance is made of: height, or radius and height, or three heights.
   struct Parts {

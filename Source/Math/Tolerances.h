@@ -126,6 +126,9 @@ constexpr double kEdgeWeight = 0x1p-50;
 /// Relative to a shape's magnitude: nearer to a capsule's axis, or out of a face, the direction to
 /// it is rounding; and of two faces, this much nearer, which is nearer.
 constexpr double kOnSurface = 0x1p-48;
+/// Relative to the largest difference of two shapes' points: how closely their distance is
+/// bracketed. Each difference carries two roundings, its height five more.
+constexpr double kShapePairGap = 0x1p-46;
 /// Squared sine from a capsule's axis below which another direction across it is taken: any value.
 constexpr double kAcrossSquare = 0x1p-10;
 /// Of R^T R from 1: rotations as exact as users have them; boxes and cylinders take the nearest one

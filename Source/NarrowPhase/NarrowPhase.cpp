@@ -33,6 +33,7 @@ void ContactBuffers::clear() {
   edgeEdge.clear();
   intersectingTriangles.clear();
   shape.clear();
+  shapeShape.clear();
   featurePairs = exactDecisions = 0;
   facts.clear();
 }
@@ -80,6 +81,7 @@ FeatureLists everyFeature(const MeshPair& pair) {
 
 void findContactsByBruteForce(const MeshPair& pair, const FeatureLists& features,
                               ContactBuffers& out) {
+  if (pair.isOfShapes()) return findShapePair(pair, out);
   if (pair.hasShape()) return findShapeContacts(pair, features.trianglesOfA, out);
   switch (pair.settings.method) {
     case Method::Proximity:

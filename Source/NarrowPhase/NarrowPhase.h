@@ -51,6 +51,7 @@ struct MeshPair {
   }
   bool filters() const { return near || predicate || a.outer || b.outer; }
   bool hasShape() const { return a.shape || b.shape; }
+  bool isOfShapes() const { return a.shape && b.shape; }
   /// Of a pair with a shape: the other one, and the shape.
   const TriangleMesh& mesh() const { return a.shape ? b : a; }
   const Shape& shape() const { return *(a.shape ? a : b).shape; }
@@ -87,6 +88,8 @@ struct ContactBuffers {
   Buffer<EdgeEdgeContact> edgeEdge;
   Buffer<TrianglePair> intersectingTriangles;
   Buffer<ShapeContact> shape;
+  Buffer<ShapeShapeContact> shapeShape;
+  ShapePairScratch shapePair;
   FeaturePairs features;      ///< scratch: of the batch at hand
   Buffer<TrianglePair> part;  ///< scratch: some of the batch at hand
   StepFacts facts;

@@ -106,4 +106,12 @@ void findShapeContacts(const MeshPair& pair, std::span<const std::uint32_t> prim
   for (const std::uint32_t primitive : primitives) finder.test(primitive);
 }
 
+void findShapePair(const MeshPair& pair, ContactBuffers& out) {
+  const auto [pointA, pointB, normal, distance] =
+      pair.a.shape->distanceFrom(*pair.b.shape, out.shapePair);
+  ++out.featurePairs;
+  if (distance <= pair.settings.thickness)
+    out.shapeShape.push_back({pointA, pointB, normal, distance});
+}
+
 }  // namespace palpate

@@ -13,4 +13,7 @@ namespace palpate {
 void findShapeContacts(const MeshPair&, std::span<const std::uint32_t> primitives,
                        ContactBuffers& out);
 
+/// The contact of a pair of two shapes, if they are near enough.
+void findShapePair(const MeshPair&, ContactBuffers& out);
+
 }  // namespace palpate

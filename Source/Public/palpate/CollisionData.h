@@ -53,6 +53,16 @@ struct ShapeContact {
   friend bool operator==(const ShapeContact&, const ShapeContact&) = default;
 };
 
+/// Two analytical shapes where they are nearest, or, if they overlap, where they leave each other
+/// by the shortest way.
+struct ShapeShapeContact {
+  Eigen::Vector3d pointA, pointB;  ///< L, on the surfaces of the first and of the second
+  Eigen::Vector3d normal;          ///< unit, from b towards a
+  /// L: pointA - pointB is the normal times this; negative: moved so far along it a just touches b
+  double distance;
+  friend bool operator==(const ShapeShapeContact&, const ShapeShapeContact&) = default;
+};
+
 /// Four vertices with signed weights: their weighted sum of positions is the vector between the two
 /// closest points, and weight i times a force along the normal is the force on vertex i.
 struct Stencil {
@@ -84,6 +94,7 @@ class PALPATE_EXPORT CollisionData {
     std::vector<EdgeEdgeContact> edgeEdge;
     std::vector<TrianglePair> intersectingTriangles;
     std::vector<ShapeContact> shape;
+    std::vector<ShapeShapeContact> shapeShape;
     double earliestTimeOfImpact =
         std::numeric_limits<double>::infinity();  ///< with Contacts::Earliest
     Validity validity;
@@ -106,8 +117,10 @@ class PALPATE_EXPORT CollisionData {
   std::span<const TrianglePair> intersectingTriangles() const {
     return m_contents.intersectingTriangles;
   }
-  /// With an analytical shape, which has no other contacts; by (element, id, vertices).
+  /// Elements with an analytical shape, which have no other contacts; by (element, id, vertices).
   std::span<const ShapeContact> shape() const { return m_contents.shape; }
+  /// Of two analytical shapes: one, if they are at most the thickness apart.
+  std::span<const ShapeShapeContact> shapeShape() const { return m_contents.shapeShape; }
   /// Infinity if there is no contact; 0 for the static methods' contacts.
   double earliestTimeOfImpact() const;
 

@@ -533,7 +533,7 @@ TEST(Kinds, DocumentSaysWhatIsAnswered) {
             EXPECT_EQ(error.code(), ErrorCode::UnsupportedMethod);
           }
         }
-        EXPECT_TRUE(ways == 0 || ways == 1 + (a == b));
+        EXPECT_TRUE(ways == 0 || ways == 1 + (a == b && a != 3));  // no shape meets itself
         if (ways == 0) continue;
         ++accepted;
         cell += (cell.empty() ? "`" : ", `") + name + "`";

@@ -666,19 +666,12 @@ TEST(Shapes, BadInputIsRefusedByName) {
   refuse(Cylinder{{1, 2, 3}, {1, 2, 3}, 1}, "p1 is (1, 2, 3); it must be another point than p0");
 
   const GeometryId tool = collisions.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1}),
-                   other = collisions.addAnalyticalGeometry(Box{{0, 0, 0}, {1, 1, 1}}),
                    points = collisions.addPointSet(Positions{{0, 0, 0.5}});
   EXPECT_EQ(tool, GeometryId{0});  // nothing refused took an id
   for (const Method method : {Method::Auto, Method::Intersection, Method::Continuous})
     expectRefused(Code::UnsupportedMethod, "Method::Proximity only", [&] {
       collisions.addCollisionPair(tool, points, {method, 1.0});
     });
-  expectRefused(Code::UnsupportedMethod, "two shapes", [&] {
-    collisions.addCollisionPair(tool, other, {Method::Proximity, 1.0});
-  });
-  expectRefused(Code::UnsupportedMethod, "two shapes", [&] {
-    collisions.addCollisionPair(tool, tool, {Method::Proximity, 1.0});
-  });
   collisions.addCollisionPair(tool, points, {Method::Proximity, 0.0});
   collisions.detectCollision();
   ASSERT_EQ(collisions.collisionData(tool, points).shape().size(), 1u);

@@ -3,6 +3,7 @@
 #include "Scenes.h"
 
 #include <gmp.h>
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -159,12 +160,18 @@ TEST(SteadyFrame, AllocatesNothingWithShapes) {
            ConvexHull{{{-0.2, 0, -0.1}, {0.3, 0, -0.1}, {0, 0.3, 0}, {0, 0.1, 0.3}}}}) {
     tools.push_back(detection.addAnalyticalGeometry(tool));
     detection.addCollisionPair(tissue, tools.back(), {Method::Proximity, 0.01});
+    for (std::size_t i = 0; i + 1 < tools.size(); ++i)
+      detection.addCollisionPair(tools[i], tools.back(), {Method::Proximity, 0.5});
   }
+  const Eigen::Matrix3d turns[] = {
+      Eigen::Matrix3d::Identity(),
+      Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix()};
   std::size_t before = 0, contacts = 0;
   for (int frame = 0; frame < 20; ++frame) {
     if (frame == 10) before = allocations;
     for (const GeometryId tool : tools)
-      detection.setTransform(tool, Eigen::Matrix3d::Identity(), {0.02 * (frame % 10), 0, 0.05});
+      detection.setTransform(tool, turns[static_cast<std::size_t>(tool) % 2],
+                             {0.02 * (frame % 10), 0, 0.05});
     detection.detectCollision();
     contacts += detection.statistics().contacts;
     EXPECT_EQ(detection.statistics().exactDecisions, 0u);

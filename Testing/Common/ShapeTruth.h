@@ -1,0 +1,97 @@
+#pragma once
+
+#include <palpate/AnalyticalGeometry.h>
+
+#include "Common/RandomMeshes.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+/// Analytical shapes by what they are: how far they reach along a direction.
+namespace palpate::testing {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+struct PlacedShape {
+  AnalyticalGeometry geometry;
+  Matrix3d rotation = Matrix3d::Identity();
+  Vector3d translation = Vector3d::Zero();
+};
+
+inline Matrix3d randomTurn(Random& random) {
+  return Eigen::Quaterniond(Eigen::Vector4d(uniform(random, -1, 1), uniform(random, -1, 1),
+                                            uniform(random, -1, 1), uniform(random, 0.1, 1))
+                                .normalized())
+      .toRotationMatrix();
+}
+
+/// The corners of a body that is their hull and a ball of `radius` around it; none of others.
+inline std::vector<Vector3d> cornersOf(const PlacedShape& shape, double& radius) {
+  std::vector<Vector3d> corners;
+  radius = 0;
+  if (const auto* s = std::get_if<Sphere>(&shape.geometry)) {
+    corners = {s->centre};
+    radius = s->radius;
+  } else if (const auto* c = std::get_if<Capsule>(&shape.geometry)) {
+    corners = {c->p0, c->p1};
+    radius = c->radius;
+  } else if (const auto* b = std::get_if<Box>(&shape.geometry)) {
+    for (int v = 0; v < 8; ++v)
+      corners.push_back(
+          b->centre +
+          Vector3d(v & 1 ? 1 : -1, v & 2 ? 1 : -1, v & 4 ? 1 : -1).cwiseProduct(b->halfExtents));
+  } else if (const auto* h = std::get_if<ConvexHull>(&shape.geometry)) {
+    corners = h->points;
+  }
+  for (Vector3d& p : corners) p = shape.rotation * p + shape.translation;
+  return corners;
+}
+
+/// The largest m . x in the shape; infinity where there is none. m: unit.
+inline double reachOf(const PlacedShape& shape, const Vector3d& m) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  double radius = 0, most = -kInfinity;
+  for (const Vector3d& p : cornersOf(shape, radius)) most = std::max(most, m.dot(p) + radius);
+  if (most > -kInfinity) return most;
+  const Vector3d u = shape.rotation.transpose() * m;
+  if (const auto* c = std::get_if<Cylinder>(&shape.geometry)) {
+    const Vector3d axis = (c->p1 - c->p0).normalized();
+    return std::max(u.dot(c->p0), u.dot(c->p1)) + c->radius * u.cross(axis).norm() +
+           m.dot(shape.translation);
+  }
+  const auto& plane = std::get<Plane>(shape.geometry);
+  const Vector3d normal = plane.normal.normalized();
+  const bool along = u.cross(normal).norm() < 1e-12 && (plane.twoSided || u.dot(normal) > 0);
+  return along ? u.dot(plane.point) + m.dot(shape.translation) : kInfinity;
+}
+
+/// How far the shapes are apart along m, from b towards a.
+inline double apartAlong(const PlacedShape& a, const PlacedShape& b, const Vector3d& m) {
+  return -reachOf(a, -m) - reachOf(b, m);
+}
+
+/// Directions among which are all in which two hulls of corners can first come apart.
+inline std::vector<Vector3d> facetDirections(const PlacedShape& a, const PlacedShape& b) {
+  std::vector<Vector3d> edges, directions;
+  double radius = 0;
+  for (const auto* shape : {&a, &b}) {
+    const std::vector<Vector3d> corners = cornersOf(*shape, radius);
+    for (std::size_t i = 0; i < corners.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j) edges.push_back(corners[i] - corners[j]);
+  }
+  for (std::size_t i = 0; i < edges.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const Vector3d across = edges[i].cross(edges[j]);
+      if (!(across.norm() > 1e-9 * edges[i].norm() * edges[j].norm())) continue;
+      directions.push_back(across.normalized());
+      directions.push_back(-directions.back());
+    }
+  return directions;
+}
+
+}  // namespace palpate::testing

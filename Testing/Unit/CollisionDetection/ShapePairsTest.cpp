@@ -1,0 +1,289 @@
+#include <palpate/Capture.h>
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/PairRun.h"
+#include "Common/ShapeTruth.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+// Analytical shapes with each other. What parts them along a direction bounds their distance from
+// below; points of both bound it from above where they are apart, and every other direction where
+// they overlap.
+
+namespace palpate::testing {
+namespace {
+
+constexpr double kFar = 100;
+
+std::optional<ShapeShapeContact> answer(const PlacedShape& a, const PlacedShape& b,
+                                        Engine engine = Engine::Octree, double thickness = kFar) {
+  OctreeBasedCD collisions(settingsOf(engine));
+  const GeometryId first = collisions.addAnalyticalGeometry(a.geometry),
+                   second = collisions.addAnalyticalGeometry(b.geometry);
+  collisions.setTransform(first, a.rotation, a.translation);
+  collisions.setTransform(second, b.rotation, b.translation);
+  collisions.addCollisionPair(first, second, {Method::Proximity, thickness});
+  collisions.detectCollision();
+  const CollisionData& data = collisions.collisionData(first, second);
+  EXPECT_EQ(data.shape().size() + data.vertexTriangle().size() + data.edgeEdge().size(), 0u);
+  EXPECT_EQ(collisions.statistics().contacts, data.shapeShape().size());
+  if (data.shapeShape().empty()) return {};
+  EXPECT_EQ(data.shapeShape().size(), 1u);
+  return data.shapeShape()[0];
+}
+
+bool isPlane(const PlacedShape& shape) { return std::holds_alternative<Plane>(shape.geometry); }
+
+std::vector<AnalyticalGeometry> kinds(Random& random) {
+  std::vector<Vector3d> cloud, plate;
+  for (int i = 0; i < 8; ++i) cloud.push_back(randomPoint(random, -0.3, 0.3));
+  for (int i = 0; i < 5; ++i)
+    plate.push_back({uniform(random, -.3, .3), 0.1, uniform(random, -.3, .3)});
+  return {Sphere{{0.01, 0, 0}, 0.25},
+          Capsule{{-0.3, 0, 0}, {0.2, 0.1, 0}, 0.1},
+          Plane{{0, 0.05, 0}, {1, 2, 3}, false},
+          Plane{{0, 0.05, 0}, {1, -2, 3}, true},
+          Box{{0.05, 0, 0}, {0.3, 0.2, 0.1}},
+          Cylinder{{-0.2, 0, 0}, {0.3, 0.1, 0}, 0.15},
+          ConvexHull{cloud},
+          Sphere{{0, 0, 0}, 0},
+          Capsule{{-0.3, 0, 0}, {0.2, 0.1, 0}, 0},
+          Box{{0, 0, 0}, {0.3, 0.2, 0}},
+          Box{{0, 0, 0}, {0.3, 0, 0}},
+          Cylinder{{-0.2, 0, 0}, {0.3, 0.1, 0}, 0},
+          ConvexHull{plate},
+          ConvexHull{{{-0.3, 0, 0}, {0.3, 0, 0}}}};
+}
+
+bool holds(const PlacedShape& shape, const Vector3d& x, const std::vector<Vector3d>& directions,
+           double slack) {
+  for (const Vector3d& m : directions)
+    if (!(m.dot(x) <= reachOf(shape, m) + slack)) return false;
+  return true;
+}
+
+std::vector<Vector3d> someDirections(Random& random, int count) {
+  std::vector<Vector3d> all;
+  for (int i = 0; i < count; ++i) all.push_back(randomPoint(random, -1, 1).normalized());
+  return all;
+}
+
+/// scale: L, of the shapes and what is between them. rounding: relative to that, where cylinders
+/// overlap, how much longer than the shortest the way may be.
+void expectDistance(Random& random, const PlacedShape& a, const PlacedShape& b,
+                    const ShapeShapeContact& c, double scale, double rounding = 1e-6) {
+  const double slack = 2e-13 * scale;
+  // With cylinders: as Docs/Pairs.md says.
+  const bool isRound = !isPlane(a) && !isPlane(b) &&
+                       (std::holds_alternative<Cylinder>(a.geometry) ||
+                        std::holds_alternative<Cylinder>(b.geometry));
+  const double most = isRound && c.distance < 0 ? rounding * scale : slack;
+  EXPECT_NEAR(c.normal.norm(), 1, 1e-13);
+  EXPECT_LE((c.pointA - c.pointB - c.distance * c.normal).norm(), most);
+  EXPECT_NEAR(apartAlong(a, b, c.normal), c.distance,
+              isRound && c.distance > 0 ? 1e-7 * scale : slack)
+      << "the normal does not part them so";
+  const std::vector<Vector3d> facets = facetDirections(a, b);
+  std::vector<Vector3d> some = someDirections(random, 60);
+  for (const double size : {1e-1, 1e-2, 1e-4, 1e-6})  // near the normal, for curved ones
+    for (int i = 0; i < 10; ++i)
+      some.push_back((c.normal + size * randomPoint(random, -1, 1)).normalized());
+  for (const std::vector<Vector3d>& directions : {facets, some}) {
+    EXPECT_TRUE(holds(a, c.pointA, directions, slack));
+    EXPECT_TRUE(holds(b, c.pointB, directions, slack));
+    if (c.distance > 0 && !isPlane(a) && !isPlane(b)) continue;  // the points bound it
+    for (const Vector3d& m : directions)
+      EXPECT_LE(apartAlong(a, b, m), c.distance + most) << "another direction parts them sooner";
+  }
+}
+
+void expectPair(Random& random, const PlacedShape& a, const PlacedShape& b, double scale,
+                double rounding = 1e-6) {
+  const auto found = answer(a, b);
+  ASSERT_TRUE(found);
+  expectDistance(random, a, b, *found, scale, rounding);
+  EXPECT_TRUE(answer(a, b, Engine::BruteForce) == found);
+  const auto back = answer(b, a);
+  EXPECT_EQ(back->distance, found->distance);
+  EXPECT_EQ(back->normal, -found->normal);
+  EXPECT_EQ(back->pointA, found->pointB);
+  EXPECT_EQ(back->pointB, found->pointA);
+}
+
+TEST(ShapePairs, AnswerTheDefinition) {
+  Random random(1);
+  int apart = 0, overlapping = 0;
+  for (int run = 0; run < 12; ++run) {
+    const std::vector<AnalyticalGeometry> all = kinds(random);
+    for (std::size_t i = 0; i < all.size(); ++i)
+      for (std::size_t j = 0; j <= i; ++j) {
+        const PlacedShape a{all[i], randomTurn(random), randomPoint(random, -.3, .3)},
+            b{all[j], randomTurn(random), randomPoint(random, -.3, .3)};
+        if (isPlane(a) && isPlane(b)) continue;
+        SCOPED_TRACE("kinds " + std::to_string(i) + " and " + std::to_string(j));
+        expectPair(random, a, b, 1);
+        const double distance = answer(a, b)->distance;
+        ++(distance > 0 ? apart : overlapping);
+        // Moved by its depth and a little more, it is that little apart.
+        const ShapeShapeContact c = *answer(a, b);
+        PlacedShape moved = a;
+        moved.translation += (0.01 - c.distance) * c.normal;
+        EXPECT_NEAR(answer(moved, b)->distance, 0.01, 1e-13);
+        const Matrix3d turn = randomTurn(random);
+        const Vector3d shift = randomPoint(random, -3, 3);
+        const auto there = answer({a.geometry, turn * a.rotation, turn * a.translation + shift},
+                                  {b.geometry, turn * b.rotation, turn * b.translation + shift});
+        EXPECT_NEAR(there->distance, c.distance, 1e-13);
+      }
+  }
+  EXPECT_GT(apart, 300);
+  EXPECT_GT(overlapping, 300);
+}
+
+/// Everything parallel, touching or in one plane.
+TEST(ShapePairs, DegenerateOnesAnswerTheDefinition) {
+  Random random(2);
+  const std::vector<AnalyticalGeometry> all{
+      Sphere{{0, 0, 0}, 1},
+      Sphere{{1, 0, 0}, 0},
+      Capsule{{0, 0, 0}, {2, 0, 0}, 0},
+      Capsule{{0, 0, 0}, {0, 2, 0}, 1},
+      Capsule{{1, 1, 1}, {1, 1, 1}, 1},
+      Plane{{0, 0, 0}, {0, 0, 1}, false},
+      Plane{{0, 0, 0}, {0, 1, 1}, true},
+      Box{{0, 0, 0}, {0, 0, 0}},
+      Box{{0, 0, 0}, {1, 1, 0}},
+      Box{{0, 0, 0}, {0, 1, 0}},
+      Box{{0, 0, 0}, {1, 1, 1}},
+      Box{{0, 0, 0}, {1, 2, 0.5}},
+      Cylinder{{0, 0, -1}, {0, 0, 1}, 1},
+      Cylinder{{0, -1, 0}, {0, 1, 0}, 0.5},
+      Cylinder{{0, 0, -1}, {0, 0, 1}, 0},
+      ConvexHull{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}}},
+      ConvexHull{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 2}}},
+      ConvexHull{{{0, 0, 0}, {2, 2, 2}, {1, 1, 1}}},
+      ConvexHull{{{1, 1, 1}}}};
+  for (std::size_t i = 0; i < all.size(); ++i)
+    for (std::size_t j = 0; j <= i; ++j)
+      for (int run = 0; run < 6; ++run) {
+        const auto grid = [&] { return static_cast<double>(random() % 5) - 2; };
+        const double x = grid(), y = grid(), z = run < 3 ? 0 : grid();
+        const PlacedShape a{all[i]},
+            b{all[j], Matrix3d::Identity(), run == 0 ? Vector3d(0, 0, 0) : Vector3d(x, y, z)};
+        if (isPlane(a) && isPlane(b)) continue;
+        if (i == j && b.translation.isZero()) continue;  // exchanged they are as they were
+        SCOPED_TRACE("kinds " + std::to_string(i) + " and " + std::to_string(j) + " at " +
+                     std::to_string(x) + " " + std::to_string(y) + " " + std::to_string(z));
+        expectPair(random, a, b, 4, 1e-3);
+      }
+}
+
+TEST(ShapePairs, DoNotDependOnScale) {
+  Random random(3);
+  const auto scaled = [](AnalyticalGeometry geometry, double by) {
+    if (auto* box = std::get_if<Box>(&geometry)) box->centre *= by, box->halfExtents *= by;
+    if (auto* hull = std::get_if<ConvexHull>(&geometry))
+      for (Vector3d& p : hull->points) p *= by;
+    if (auto* cylinder = std::get_if<Cylinder>(&geometry)) {
+      cylinder->p0 *= by;
+      cylinder->p1 *= by;
+      cylinder->radius *= by;
+    }
+    return geometry;
+  };
+  const std::vector<AnalyticalGeometry> all = kinds(random);
+  for (const std::size_t i : {4, 5, 6, 9, 12})
+    for (const std::size_t j : {4, 5, 6})
+      for (const double by : {1e-9, 1e-3, 1e7}) {
+        PlacedShape a{scaled(all[i], by), randomTurn(random), by * randomPoint(random, -.3, .3)},
+            b{scaled(all[j], by), randomTurn(random), by * randomPoint(random, -.3, .3)};
+        if (by > 1)  // flat against each other
+          b.rotation = a.rotation = Matrix3d::Identity(), a.translation = {0, 0, 0.25 * by};
+        OctreeBasedCD collisions;
+        const auto found = answer(a, b, Engine::Octree, kFar * by);
+        ASSERT_TRUE(found);
+        expectDistance(random, a, b, *found, by);
+      }
+}
+
+TEST(ShapePairs, ByHand) {
+  const auto only = [](const AnalyticalGeometry& a, const AnalyticalGeometry& b) {
+    return *answer({a}, {b});
+  };
+  ShapeShapeContact c = only(Sphere{{0, 0, 3}, 1}, Sphere{{0, 0, 0}, 1});
+  EXPECT_EQ(c.distance, 1);
+  EXPECT_EQ(c.normal, Vector3d::UnitZ());
+  EXPECT_EQ(c.pointA, Vector3d(0, 0, 2));
+  EXPECT_EQ(c.pointB, Vector3d(0, 0, 1));
+  c = only(Capsule{{-1, 0, 1}, {1, 0, 1}, 1}, Plane{});  // lies on it: in the middle
+  EXPECT_EQ(c.distance, 0);
+  EXPECT_EQ(c.pointB, Vector3d::Zero());
+  c = only(Box{{0, 0, 0.5}, {1, 1, 1}}, Plane{});
+  EXPECT_EQ(c.distance, -0.5);
+  EXPECT_EQ(c.pointA, Vector3d(0, 0, -0.5));
+  EXPECT_EQ(c.normal, Vector3d::UnitZ());
+  c = only(Box{{0, 0, 1.75}, {1, 1, 1}}, Box{{0, 0, 0}, {2, 2, 1}});
+  EXPECT_EQ(c.distance, -0.25);
+  EXPECT_EQ(c.normal, Vector3d::UnitZ());
+  c = only(Cylinder{{0, 0, 2}, {0, 0, 4}, 1}, Box{{0, 0, 0}, {2, 2, 1}});
+  EXPECT_NEAR(c.distance, 1, 1e-15);
+  EXPECT_EQ(c.normal, Vector3d::UnitZ());
+  c = only(Capsule{{0, 0, -2}, {0, 0, 1}, 0.25}, Box{{0, 0, 0}, {2, 2, 1}});  // out sideways or up
+  EXPECT_NEAR(c.distance, -2.25, 1e-14);
+}
+
+TEST(ShapePairs, BadInputIsRefusedByName) {
+  OctreeBasedCD collisions(settingsOf(Engine::Octree));
+  const GeometryId box = collisions.addAnalyticalGeometry(Box{{0, 0, 0}, {1, 1, 1}}),
+                   plane = collisions.addAnalyticalGeometry(Plane{}),
+                   other = collisions.addAnalyticalGeometry(Plane{{0, 0, 1}, {1, 0, 0}, true});
+  const auto refuse = [&](GeometryId a, GeometryId b, Method method, const std::string& words) {
+    try {
+      collisions.addCollisionPair(a, b, {method, 1.0});
+      ADD_FAILURE() << "accepted; expected: " << words;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::UnsupportedMethod);
+      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+    }
+  };
+  refuse(box, box, Method::Proximity, "pair (0, 0): a shape does not meet itself");
+  refuse(plane, other, Method::Proximity, "pair (1, 2): two planes have no distance");
+  for (const Method method : {Method::Auto, Method::Intersection, Method::Continuous})
+    refuse(box, plane, method, "Method::Proximity only");
+}
+
+TEST(ShapePairs, CapturesHoldThem) {
+  Random random(4);
+  Settings audited = settingsOf(Engine::Octree, 2);
+  audited.audit.features = 10;
+  OctreeBasedCD collisions(audited);
+  std::vector<GeometryId> ids;
+  for (const AnalyticalGeometry& shape : kinds(random)) {
+    if (std::holds_alternative<Plane>(shape)) continue;
+    ids.push_back(collisions.addAnalyticalGeometry(shape));
+    collisions.setTransform(ids.back(), randomTurn(random), randomPoint(random, -0.3, 0.3));
+    for (const GeometryId id : ids)
+      if (id != ids.back()) collisions.addCollisionPair(id, ids.back(), {Method::Proximity, 0.5});
+  }
+  collisions.detectCollision();
+  EXPECT_TRUE(collisions.auditFailures().empty());
+  EXPECT_GT(collisions.statistics().contacts, 50u);
+  const auto path = std::filesystem::temp_directory_path() / "palpate-shape-pairs.capture";
+  capture(collisions, path);
+  OctreeBasedCD again = setUp(readCapture(path));
+  std::filesystem::remove(path);
+  again.detectCollision();
+  for (const CollisionPair& pair : collisions.pairs())
+    EXPECT_EQ(again.collisionData(pair.a, pair.b).hash(),
+              collisions.collisionData(pair.a, pair.b).hash());
+}
+
+}  // namespace
+}  // namespace palpate::testing
