@@ -1,5 +1,6 @@
 #include "SceneProgram.h"
 
+#include "CommandLine.h"
 #include "HtmlReport.h"
 #include "ParaView.h"
 #include "Report.h"
@@ -251,16 +252,10 @@ int runScene(const SceneProgram& program, int count, char** arguments) {
   if (program.addOptions) program.addOptions(app);
   app.failure_message(
       [](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });
-  try {
+  return exitCodeOf(app, [&] {
     app.parse(count, arguments);
     run(program, options);
-    return 0;
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
+  });
 }
 
 SceneMesh readMesh([[maybe_unused]] const std::filesystem::path& path) {

@@ -1,5 +1,6 @@
 // Five deforming organs, or the user's own meshes, glide through each other: contacts of each
 // frame, what each stage of it cost, and a picture.
+#include "CommandLine.h"
 #include "Report.h"
 #include "Scenes.h"
 
@@ -181,13 +182,5 @@ Options parse(CLI::App& app, int count, char** arguments) {
 
 int main(int count, char** arguments) {
   CLI::App app("Deforming organs glide through each other.", "OrganScene");
-  try {
-    run(parse(app, count, arguments));
-    return 0;
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
+  return scenes::exitCodeOf(app, [&] { run(parse(app, count, arguments)); });
 }

@@ -3,6 +3,7 @@
 #ifdef PALPATE_HAS_CHARTS
 #include "Chart.h"
 #endif
+#include "CommandLine.h"
 #include "HtmlReport.h"
 #include "Contestant.h"
 #include "Report.h"
@@ -267,13 +268,5 @@ Options parse(CLI::App& app, int count, char** arguments) {
 
 int main(int count, char** arguments) {
   CLI::App app("What methods cost and what they get wrong.", "SpeedAccuracy");
-  try {
-    run(parse(app, count, arguments));
-    return 0;
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
+  return scenes::exitCodeOf(app, [&] { run(parse(app, count, arguments)); });
 }

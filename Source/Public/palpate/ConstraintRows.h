@@ -1,6 +1,7 @@
 #pragma once
 
 #include <palpate/CollisionData.h>
+#include <palpate/Error.h>
 
 #include <Eigen/Core>
 
@@ -8,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace palpate {
@@ -36,15 +38,18 @@ struct ConstraintRow {
 /// The vertices of one geometry among those of a solver; a shape has none.
 struct SolverVertices {
   std::uint32_t first = 0;                       ///< number of the geometry's vertex 0
-  std::span<const Eigen::Vector3d> before, now;  /// as handed to setPositions()
+  std::span<const Eigen::Vector3d> before, now;  ///< as handed to setPositions()
 };
 
 /// Adds a row for each contact of a pair (a, b), in the order vertexTriangle(), triangleVertex(),
 /// edgeEdge(), shape(). Contacts of Continuous and Auto are at their time of impact, others now.
+/// Errors   WrongPositionCount names the first vertex that a contact has and `before` or `now` has
+///          not; no row is added.
 inline void appendRows(const CollisionData& contacts, const SolverVertices& a,
                        const SolverVertices& b, std::vector<ConstraintRow>& rows) {
   const Method method = contacts.validity().method;
   const bool swept = method == Method::Continuous || method == Method::Auto;
+  const std::size_t given = rows.size();
   const auto add = [&](const auto& contact, const std::array<const SolverVertices*, 4>& sides) {
     const auto [vertices, weights] = stencil(contact);
     const double time = swept ? contact.timeOfImpact : 1.0;
@@ -52,6 +57,15 @@ inline void appendRows(const CollisionData& contacts, const SolverVertices& a,
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < 4; ++i) {
       const SolverVertices& side = *sides[i];
+      if (vertices[i] >= side.before.size() || vertices[i] >= side.now.size()) {
+        rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(given), rows.end());
+        throw Error(ErrorCode::WrongPositionCount,
+                    "appendRows(): a contact has vertex " + std::to_string(vertices[i]) + " of " +
+                        (sides[i] == &a ? "a" : "b") + ", which has " +
+                        std::to_string(side.before.size()) + " positions before and " +
+                        std::to_string(side.now.size()) + " now",
+                    {}, vertices[i]);
+      }
       row.vertices[i] = side.first + vertices[i];
       sum += weights[i] * ((1 - time) * side.before[vertices[i]] + time * side.now[vertices[i]]);
     }

@@ -147,6 +147,31 @@ TEST(ConstraintRows, AreTheDerivativesOfDistancesToShapes) {
   }
 }
 
+TEST(ConstraintRows, TooFewPositionsAreRefusedByVertex) {
+  const Positions low{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, high{{0, 0, 0.1}, {1, 0, 0.1}, {0, 1, 0.1}};
+  const std::vector<Triangle> triangle{{0, 1, 2}};
+  const CollisionData contacts =
+      detectCollision({low, triangle}, {high, triangle}, {Method::Proximity, 0.2, Contacts::All});
+  std::vector<ConstraintRow> rows(1);
+  const std::span<const Eigen::Vector3d> two(high.data(), 2);
+  for (const auto& [before, now] :
+       {std::pair<std::span<const Eigen::Vector3d>, std::span<const Eigen::Vector3d>>{two, high},
+        {high, two},
+        {{}, {}}}) {
+    try {
+      appendRows(contacts, {0, low, low}, {3, before, now}, rows);
+      ADD_FAILURE() << "accepted";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::WrongPositionCount);
+      EXPECT_EQ(error.element(), std::optional<std::size_t>(before.empty() ? 0 : 2));
+      EXPECT_NE(std::string(error.what()).find(" of b, which has "), std::string::npos);
+    }
+    EXPECT_EQ(rows.size(), 1u);
+  }
+  appendRows(contacts, {0, low, low}, {3, high, high}, rows);
+  EXPECT_GT(rows.size(), 1u);
+}
+
 TEST(ConstraintRows, OfImpactsHoldTheirGapWhereFeaturesTouch) {
   Random random(73);
   const Thing triangles = things(soup(random, 80, 0.1)), sheets = things(sheet(6, 0.5, 0.3));
