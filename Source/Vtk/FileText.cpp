@@ -1,5 +1,3 @@
-#include "Vtk/FileText.h"
-
 #include "Vtk/MeshFile.h"
 
 #include <algorithm>
@@ -8,7 +6,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <utility>
 
 namespace palpate::vtk {
 
@@ -26,17 +23,17 @@ double decode(const char* bytes) {
 template <class T>
 constexpr NumberType kType{sizeof(T), decode<T>};
 
-constexpr std::array<std::pair<std::string_view, NumberType>, 10> kTypes{
-    {{" Int8 int8 char signed_char ", kType<std::int8_t>},
-     {" UInt8 uint8 uchar unsigned_char ", kType<std::uint8_t>},
-     {" Int16 int16 short ", kType<std::int16_t>},
-     {" UInt16 uint16 ushort unsigned_short ", kType<std::uint16_t>},
-     {" Int32 int32 int vtkIdType vtkidtype ", kType<std::int32_t>},
-     {" UInt32 uint32 uint unsigned_int ", kType<std::uint32_t>},
-     {" Int64 vtktypeint64 long ", kType<std::int64_t>},
-     {" UInt64 vtktypeuint64 unsigned_long ", kType<std::uint64_t>},
-     {" Float32 float32 float ", kType<float>},
-     {" Float64 float64 double ", kType<double>}}};
+constexpr std::pair<std::string_view, NumberType> kTypes[]{
+    {" Int8 int8 char signed_char ", kType<std::int8_t>},
+    {" UInt8 uint8 uchar unsigned_char ", kType<std::uint8_t>},
+    {" Int16 int16 short ", kType<std::int16_t>},
+    {" UInt16 uint16 ushort unsigned_short ", kType<std::uint16_t>},
+    {" Int32 int32 int vtkIdType vtkidtype ", kType<std::int32_t>},
+    {" UInt32 uint32 uint unsigned_int ", kType<std::uint32_t>},
+    {" Int64 vtktypeint64 long ", kType<std::int64_t>},
+    {" UInt64 vtktypeuint64 unsigned_long ", kType<std::uint64_t>},
+    {" Float32 float32 float ", kType<float>},
+    {" Float64 float64 double ", kType<double>}};
 
 }  // namespace
 
@@ -48,19 +45,22 @@ NumberType typeNamed(std::string_view name) {
 }
 
 double toNumber(std::string_view word) {
-  if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
+  if (word.empty()) throw FileFault{"a number is missing at the end"};
+  const std::string_view digits = word.substr(word[0] == '+');
   double value = 0;
-  const auto [end, fault] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (fault == std::errc::invalid_argument || end != word.data() + word.size())
+  const auto [end, fault] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (fault == std::errc::invalid_argument || end != digits.data() + digits.size())
     throw FileFault{"\"" + std::string(word.substr(0, 40)) + "\" stands where a number should"};
   // Out of double's range: from_chars leaves the value alone. Tiny ones are zero for any mesh.
-  if (fault == std::errc::result_out_of_range)
-    return word.find('-', 1) != word.npos ? 0.0 : HUGE_VAL;
+  if (fault == std::errc::result_out_of_range) return digits.rfind('-') + 1 > 1 ? 0.0 : HUGE_VAL;
   return value;
 }
 
-bool isCount(double value, std::size_t most) {  // NaN is none
-  return value == std::floor(value) && value >= 0 && value <= static_cast<double>(most);
+std::size_t toCount(double number, std::size_t most) {  // NaN is none
+  if (number > static_cast<double>(most)) throw FileFault{"it is shorter than its own counts say"};
+  if (!(number >= 0 && number == std::floor(number)))
+    throw FileFault{"one of its counts is no whole number from 0 on"};
+  return static_cast<std::size_t>(number);
 }
 
 std::string_view FileText::line() {
@@ -86,41 +86,18 @@ std::string_view FileText::take(std::size_t bytes) {
 }
 
 double FileText::number(NumberType type) {
-  if (m_encoding == Encoding::Ascii) {
-    const std::string_view text = word();
-    if (text.empty()) throw FileFault{"a number is missing at the end"};
-    return toNumber(text);
-  }
-  const std::string_view source = take(type.size);
-  std::array<char, 8> bytes;
-  const bool swapped =
-      (m_encoding == Encoding::BigEndian) != (std::endian::native == std::endian::big);
-  swapped ? std::copy(source.rbegin(), source.rend(), bytes.begin())
-          : std::copy(source.begin(), source.end(), bytes.begin());
-  return type.decode(bytes.data());
+  if (m_encoding == Encoding::Ascii) return toNumber(word());
+  char bytes[8];
+  take(type.size).copy(bytes, type.size);
+  if ((m_encoding == Encoding::BigEndian) != (std::endian::native == std::endian::big))
+    std::reverse(bytes, bytes + type.size);
+  return type.decode(bytes);
 }
 
 std::vector<double> FileText::numbers(NumberType type, std::size_t count) {
-  // Each takes at least a byte.
-  if (count > left()) throw FileFault{"it is shorter than its own counts say"};
-  std::vector<double> result(count);
+  std::vector<double> result(toCount(static_cast<double>(count), left()));
   for (double& value : result) value = number(type);
   return result;
-}
-
-std::int64_t FileText::integer(NumberType type) {
-  const double value = number(type);
-  // NaN fails the comparison too; every whole number below 2^53 is a double.
-  if (value != std::floor(value) || !(std::abs(value) < 0x1p53))
-    throw FileFault{"a count or an index is no whole number"};
-  return static_cast<std::int64_t>(value);
-}
-
-std::size_t FileText::count(std::size_t most) {
-  const double value = toNumber(word());
-  if (value > static_cast<double>(most)) throw FileFault{"it is shorter than its own counts say"};
-  if (!isCount(value, most)) throw FileFault{"one of its counts is no whole number from 0 on"};
-  return static_cast<std::size_t>(value);
 }
 
 }  // namespace palpate::vtk

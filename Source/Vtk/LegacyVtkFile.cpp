@@ -1,8 +1,7 @@
-#include "Vtk/FileText.h"
 #include "Vtk/MeshFile.h"
 
-#include <algorithm>
 #include <cctype>
+#include <cmath>
 
 namespace palpate::vtk {
 
@@ -12,13 +11,6 @@ namespace palpate::vtk {
 
 namespace {
 
-std::string upperCase(std::string_view word) {
-  std::string text(word);
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return std::toupper(c); });
-  return text;
-}
-
 class Reader {
  public:
   explicit Reader(std::string_view content) : m_text(content) {}
@@ -27,97 +19,88 @@ class Reader {
     const std::string_view first = m_text.line();
     constexpr std::string_view kStart = "# vtk DataFile Version ";
     if (!first.starts_with(kStart)) throw FileFault{"it does not begin as a VTK file"};
-    m_offsets = toNumber(FileText(first.substr(kStart.size())).word()) >= 5;
+    m_offsets = FileText(first.substr(kStart.size())).number() >= 5;
     m_text.line();  // the title
-    const std::string encoding = upperCase(m_text.word());
+    const std::string encoding = keyword();
+    if (encoding == "BINARY") m_text.setEncoding(Encoding::BigEndian);
     if (encoding != "ASCII" && encoding != "BINARY")
       throw FileFault{"it says neither ASCII nor BINARY"};
-    if (encoding == "BINARY") m_text.setEncoding(Encoding::BigEndian);
-    while (readSection()) {
-    }
+    // Data of points and of cells end what makes the mesh.
+    for (std::string section = keyword(); !section.empty() && !section.ends_with("_DATA");
+         section = keyword())
+      readSection(section);
     return std::move(m_polygons);
   }
 
  private:
-  /// False at the end of what makes the mesh.
-  bool readSection() {
-    const std::string keyword = upperCase(m_text.word());
-    if (keyword.empty() || keyword == "POINT_DATA" || keyword == "CELL_DATA") return false;
-    if (keyword == "DATASET") {
-      const std::string kind = upperCase(m_text.word());
-      if (kind != "POLYDATA") throw FileFault{"its data set is " + kind + ", not POLYDATA"};
-    } else if (keyword == "POINTS") {
-      const std::size_t count = m_text.count(m_text.left());
-      m_polygons.positions.clear();
-      m_polygons.addPositions(readArray(m_text.word(), 3 * count));
-    } else if (keyword == "POLYGONS" || keyword == "TRIANGLE_STRIPS") {
-      readCells(m_polygons, keyword == "TRIANGLE_STRIPS");
-    } else if (keyword == "VERTICES" || keyword == "LINES") {
-      Polygons ignored;
-      readCells(ignored, false);
-    } else if (keyword == "FIELD") {
-      skipField();
-    } else if (keyword == "METADATA") {
-      m_text.line();
-      while (!m_text.line().empty()) {
-      }
-    } else {
-      throw FileFault{"it has an unknown section \"" + keyword.substr(0, 40) + "\""};
-    }
-    return true;
+  std::string keyword() {
+    std::string text(m_text.word());
+    for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    return text;
   }
 
-  /// Binary numbers begin after the end of the line.
-  std::vector<double> readArray(std::string_view type, std::size_t count) {
+  void readSection(const std::string& section) {
+    if (section == "DATASET") {
+      const std::string kind = keyword();
+      if (kind != "POLYDATA") throw FileFault{"its data set is " + kind + ", not POLYDATA"};
+    } else if (section == "POINTS") {
+      const std::size_t count = m_text.count();
+      m_polygons.positions.clear();
+      m_polygons.addPositions(readArray(3 * count));
+    } else if (section == "POLYGONS" || section == "TRIANGLE_STRIPS") {
+      readCells(m_polygons, section == "TRIANGLE_STRIPS");
+    } else if (section == "VERTICES" || section == "LINES") {
+      Polygons ignored;
+      readCells(ignored, false);
+    } else if (section == "FIELD") {  // arrays of data about the whole mesh
+      m_text.word();
+      for (std::size_t arrays = m_text.count(); arrays > 0; --arrays) {
+        m_text.word();
+        const std::size_t components = m_text.count();
+        readArray(components * m_text.count());
+      }
+    } else if (section == "METADATA") {
+      for (m_text.line(); !m_text.line().empty();) {
+      }
+    } else {
+      throw FileFault{"it has an unknown section \"" + section.substr(0, 40) + "\""};
+    }
+  }
+
+  /// Behind the name of its type; binary numbers begin after the end of the line.
+  std::vector<double> readArray(std::size_t count) {
+    const NumberType type = typeNamed(m_text.word());
     m_text.line();
-    return m_text.numbers(typeNamed(type), count);
+    return m_text.numbers(type, count);
   }
 
   void readCells(Polygons& polygons, bool strips) {
-    const std::size_t first = m_text.count(m_text.left()), second = m_text.count(m_text.left());
-    m_offsets ? readOffsetCells(first, second, polygons, strips)
-              : readSizedCells(first, second, polygons, strips);
-  }
-
-  /// Up to version 4: each cell its number of corners, then these.
-  void readSizedCells(std::size_t cells, std::size_t count, Polygons& polygons, bool strips) {
-    const std::vector<double> numbers = readArray("int", count);
-    std::size_t at = 0;
-    for (std::size_t i = 0; i < cells; ++i) {
-      if (at == count || !isCount(numbers[at], count - at - 1))
-        throw FileFault{"cell " + std::to_string(i) + " (from 0) has a wrong number of corners"};
-      const double begin = static_cast<double>(at + 1), end = begin + numbers[at];
-      polygons.addCells({begin, end}, numbers, strips);
-      at = static_cast<std::size_t>(end);
+    const std::size_t first = m_text.count(), second = m_text.count();
+    if (m_offsets) {  // where each cell begins, and one more; then all corners
+      const std::vector<double> offsets = readNamed("OFFSETS", first);
+      return polygons.addCells(offsets, readNamed("CONNECTIVITY", second), strips);
     }
-    if (at != count) throw FileFault{"its cells have fewer corners than it says"};
-  }
-
-  /// From version 5: where each cell begins, and one more; then all corners.
-  void readOffsetCells(std::size_t offsetCount, std::size_t cornerCount, Polygons& polygons,
-                       bool strips) {
-    const std::vector<double> offsets = readNamed("OFFSETS", offsetCount);
-    polygons.addCells(offsets, readNamed("CONNECTIVITY", cornerCount), strips);
+    m_text.line();
+    const NumberType type = typeNamed("int");
+    std::size_t left = second;
+    for (std::size_t i = 0; i < first; ++i) {  // its number of corners, then these
+      const double length = left > 0 ? m_text.number(type) : -1;
+      if (length < 0 || length >= static_cast<double>(left) || length != std::floor(length))
+        throw FileFault{"cell " + std::to_string(i) + " (from 0) has a wrong number of corners"};
+      std::vector<double> cell = m_text.numbers(type, static_cast<std::size_t>(length));
+      left -= 1 + cell.size();
+      strips ? polygons.addStrip(cell) : polygons.corners.push_back(std::move(cell));
+    }
+    if (left > 0) throw FileFault{"its cells have fewer corners than it says"};
   }
 
   std::vector<double> readNamed(const std::string& name, std::size_t count) {
-    if (upperCase(m_text.word()) != name) throw FileFault{"it lacks the " + name + " of its cells"};
-    return readArray(m_text.word(), count);
-  }
-
-  /// Arrays of data about the whole mesh.
-  void skipField() {
-    m_text.word();
-    for (std::size_t arrays = m_text.count(m_text.left()); arrays > 0; --arrays) {
-      m_text.word();
-      const std::size_t components = m_text.count(m_text.left());
-      const std::size_t tuples = m_text.count(m_text.left());
-      readArray(m_text.word(), components * tuples);
-    }
+    if (keyword() != name) throw FileFault{"it lacks the " + name + " of its cells"};
+    return readArray(count);
   }
 
   FileText m_text;
-  bool m_offsets = false;
+  bool m_offsets = false;  ///< cells as from version 5 on
   Polygons m_polygons;
 };
 

@@ -2,14 +2,12 @@
 
 #include <palpate/Error.h>
 
-#include "Vtk/FileText.h"
-
 #include <algorithm>
-#include <array>
+#include <cctype>
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <new>
-#include <stdexcept>
 
 namespace palpate::vtk {
 
@@ -18,28 +16,19 @@ void Polygons::addPositions(const std::vector<double>& coordinates) {
     positions.emplace_back(coordinates[i], coordinates[i + 1], coordinates[i + 2]);
 }
 
-void Polygons::addPolygon(std::span<const double> polygon) {
-  corners.insert(corners.end(), polygon.begin(), polygon.end());
-  ends.push_back(corners.size());
-}
-
 void Polygons::addStrip(std::span<const double> strip) {
   if (strip.size() < 3) throw FileFault{"a triangle strip has fewer than three corners"};
   for (std::size_t i = 0; i + 2 < strip.size(); ++i) {
     const std::size_t odd = i % 2;  // every second triangle of a strip is wound the other way
-    addPolygon(std::array{strip[i + odd], strip[i + 1 - odd], strip[i + 2]});
+    corners.push_back({strip[i + odd], strip[i + 1 - odd], strip[i + 2]});
   }
 }
 
-void Polygons::addCells(const std::vector<double>& offsets, std::span<const double> all,
-                        bool strips) {
+void Polygons::addCells(std::span<const double> offsets, std::span<const double> all, bool strips) {
   for (std::size_t i = 0; i + 1 < offsets.size(); ++i) {
-    if (!isCount(offsets[i], all.size()) || !isCount(offsets[i + 1] - offsets[i], all.size()) ||
-        !isCount(offsets[i + 1], all.size()))
-      throw FileFault{"the offsets of its cells are not ascending or run past their corners"};
-    const auto cell = all.subspan(static_cast<std::size_t>(offsets[i]),
-                                  static_cast<std::size_t>(offsets[i + 1] - offsets[i]));
-    strips ? addStrip(cell) : addPolygon(cell);
+    const std::size_t end = toCount(offsets[i + 1], all.size()), begin = toCount(offsets[i], end);
+    const auto cell = all.subspan(begin, end - begin);
+    strips ? addStrip(cell) : corners.push_back({cell.begin(), cell.end()});
   }
 }
 
@@ -64,7 +53,7 @@ Polygons polygonsOf(const std::filesystem::path& path) {
   if (kind == ".obj") return readObj(content);
   if (kind == ".ply") return readPly(content);
   if (kind == ".vtk") return readLegacyVtk(content);
-  if (kind == ".stl") return readStl(content, path.string());
+  if (kind == ".stl") return readStl(content);
   if (kind == ".vtp") return readVtp(content);
   throw FileFault{"its name does not end in .obj, .stl, .ply, .vtk or .vtp"};
 }
@@ -81,22 +70,19 @@ void checkPositions(const std::vector<Eigen::Vector3d>& positions) {
 std::vector<Triangle> fans(const Polygons& polygons) {
   const std::size_t count = polygons.positions.size();
   std::vector<Triangle> triangles;
-  std::size_t begin = 0;
-  for (std::size_t p = 0; p < polygons.ends.size(); ++p) {
-    const std::size_t end = polygons.ends[p];
-    if (end - begin < 3)
-      throw FileFault{"polygon " + std::to_string(p) + " (from 0) has fewer than three corners"};
-    for (std::size_t i = begin; i < end; ++i) {
-      if (count == 0 || !isCount(polygons.corners[i], count - 1))
-        throw FileFault{"polygon " + std::to_string(p) +
-                        " (from 0) names a vertex that is not among its " + std::to_string(count)};
-    }
-    const auto corner = [&](std::size_t i) {
-      return static_cast<std::uint32_t>(polygons.corners[i]);
+  for (std::size_t p = 0; p < polygons.corners.size(); ++p) {
+    const auto fault = [&](const std::string& reason) {
+      return FileFault{"polygon " + std::to_string(p) + " (from 0) " + reason};
     };
-    for (std::size_t i = begin + 2; i < end; ++i)
-      triangles.push_back({corner(begin), corner(i - 1), corner(i)});
-    begin = end;
+    std::vector<std::uint32_t> corners;
+    for (const double corner : polygons.corners[p]) {
+      if (!(corner >= 0 && corner < static_cast<double>(count) && corner == std::floor(corner)))
+        throw fault("names a vertex that is not among its " + std::to_string(count));
+      corners.push_back(static_cast<std::uint32_t>(corner));
+    }
+    if (corners.size() < 3) throw fault("has fewer than three corners");
+    for (std::size_t i = 2; i < corners.size(); ++i)
+      triangles.push_back({corners[0], corners[i - 1], corners[i]});
   }
   if (triangles.empty()) throw FileFault{"it holds no triangles, so it is not a triangle mesh"};
   return triangles;

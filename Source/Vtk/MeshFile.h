@@ -13,24 +13,53 @@ struct FileFault {
   std::string reason;
 };
 
+struct NumberType {
+  std::size_t size;  ///< bytes
+  double (*decode)(const char* bytes);
+};
+
+/// By the name that any of the formats has for it; FileFault if none has.
+NumberType typeNamed(std::string_view name);
+double toNumber(std::string_view word);                ///< FileFault if it is none
+std::size_t toCount(double number, std::size_t most);  ///< FileFault unless whole, in [0, most]
+enum class Encoding { Ascii, LittleEndian, BigEndian };
+
+/// Reads a file's content from front to back; FileFault where it ends too early or holds no number.
+class FileText {
+ public:
+  explicit FileText(std::string_view content, Encoding encoding = Encoding::Ascii)
+      : m_rest(content), m_encoding(encoding) {}
+  void setEncoding(Encoding encoding) { m_encoding = encoding; }
+
+  std::size_t left() const { return m_rest.size(); }  ///< bytes
+  std::string_view line();                            ///< without its end; empty at the end
+  std::string_view word();  ///< between white space, across lines; empty at the end
+  std::string_view take(std::size_t bytes);
+  double number(NumberType type = typeNamed("double"));
+  std::vector<double> numbers(NumberType type, std::size_t count);
+  std::size_t count() { return toCount(toNumber(word()), left()); }  ///< each takes a byte
+
+ private:
+  std::string_view m_rest;
+  Encoding m_encoding;
+};
+
 /// What the formats have in common. Corners as the file gives them: not yet checked.
 struct Polygons {
   std::vector<Eigen::Vector3d> positions;
-  std::vector<double> corners;
-  std::vector<std::size_t> ends;  ///< polygon i's corners end before corners[ends[i]]
+  std::vector<std::vector<double>> corners;
 
   void addPositions(const std::vector<double>& coordinates);
-  void addPolygon(std::span<const double> polygon);
   void addStrip(std::span<const double> strip);
   /// Cell i: corners [offsets[i], offsets[i + 1]) of `all`.
-  void addCells(const std::vector<double>& offsets, std::span<const double> all, bool strips);
+  void addCells(std::span<const double> offsets, std::span<const double> all, bool strips);
 };
 
 // One function for each format, from the file's content; FileFault if it is not what it should be.
 Polygons readObj(std::string_view content);
 Polygons readPly(std::string_view content);
 Polygons readLegacyVtk(std::string_view content);
-Polygons readStl(std::string_view content, const std::string& path);
+Polygons readStl(std::string_view content);
 Polygons readVtp(std::string_view content);
 
 }  // namespace palpate::vtk

@@ -1,4 +1,3 @@
-#include "Vtk/FileText.h"
 #include "Vtk/MeshFile.h"
 
 #include <algorithm>
@@ -24,13 +23,10 @@ struct Element {
 };
 
 Property readProperty(FileText& line) {
-  std::optional<NumberType> countType;
-  std::string_view type = line.word();
-  if (type == "list") {
-    countType = typeNamed(line.word());
-    type = line.word();
-  }
-  return {std::string(line.word()), typeNamed(type), countType};
+  const std::string_view type = line.word();
+  if (type != "list") return {std::string(line.word()), typeNamed(type), {}};
+  const NumberType countType = typeNamed(line.word()), itemType = typeNamed(line.word());
+  return {std::string(line.word()), itemType, countType};
 }
 
 Encoding encodingNamed(std::string_view name) {
@@ -50,7 +46,7 @@ std::vector<Element> readHeader(FileText& text) {
     if (keyword == "format") text.setEncoding(encodingNamed(line.word()));
     if (keyword == "element") {
       std::string name(line.word());
-      elements.push_back({std::move(name), line.count(text.left()), {}});  // a byte each at least
+      elements.push_back({std::move(name), toCount(line.number(), text.left()), {}});
     } else if (keyword == "property") {
       if (elements.empty()) throw FileFault{"its PLY header has a property of no element"};
       elements.back().properties.push_back(readProperty(line));
@@ -59,23 +55,14 @@ std::vector<Element> readHeader(FileText& text) {
   throw FileFault{"its PLY header ends too early"};
 }
 
-/// Strips one after the other, parted by -1.
-void addStrips(const std::vector<double>& list, Polygons& polygons) {
-  for (auto begin = list.begin(); begin != list.end();) {
+/// A face's corners; strips one after the other, parted by -1.
+void addList(const std::string& element, const std::vector<double>& list, Polygons& polygons) {
+  if (element == "face") polygons.corners.push_back(list);
+  for (auto begin = list.begin(); element == "tristrips" && begin != list.end();) {
     const auto end = std::find(begin, list.end(), -1.0);
     polygons.addStrip({begin, end});
-    begin = end == list.end() ? end : end + 1;
+    begin = end + (end != list.end());
   }
-}
-
-void readList(FileText& text, const std::string& element, const Property& property,
-              Polygons& polygons) {
-  const double count = text.number(*property.countType);
-  if (!isCount(count, text.left())) throw FileFault{"one of its lists has a wrong length"};
-  const auto list = text.numbers(property.type, static_cast<std::size_t>(count));
-  if (property.name != "vertex_indices" && property.name != "vertex_index") return;
-  if (element == "tristrips") addStrips(list, polygons);
-  if (element == "face") polygons.addPolygon(list);
 }
 
 }  // namespace
@@ -86,15 +73,15 @@ Polygons readPly(std::string_view content) {
   for (const Element& element : readHeader(text)) {
     for (std::size_t i = 0; i < element.count; ++i) {
       Eigen::Vector3d position = Eigen::Vector3d::Zero();
-      for (const Property& property : element.properties) {
-        if (property.countType) {
-          readList(text, element.name, property, polygons);
+      for (const auto& [name, type, countType] : element.properties) {
+        if (countType) {
+          const std::size_t length = toCount(text.number(*countType), text.left());
+          const std::vector<double> list = text.numbers(type, length);
+          if (name.starts_with("vertex_ind")) addList(element.name, list, polygons);
           continue;
         }
-        const double value = text.number(property.type);
-        if (property.name == "x") position.x() = value;
-        if (property.name == "y") position.y() = value;
-        if (property.name == "z") position.z() = value;
+        const double value = text.number(type);
+        if (name.size() == 1 && name >= "x" && name <= "z") position[name[0] - 'x'] = value;
       }
       if (element.name == "vertex") polygons.positions.push_back(position);
     }
