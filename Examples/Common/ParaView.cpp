@@ -123,6 +123,7 @@ VtpText contactsVtp(World& world) {
       add(middle(c, {b, a, a, a}), c, c.timeOfImpact, 1, pair);
     for (const auto& c : data.edgeEdge()) add(middle(c, {a, a, b, b}), c, c.timeOfImpact, 2, pair);
     for (const auto& c : data.shape()) add((c.point + c.pointOnShape) / 2, c, 1, 3, pair);
+    for (const auto& c : data.shapeShape()) add((c.pointA + c.pointB) / 2, c, 1, 4, pair);
   }
   file.addPointField("distance", distances);
   file.addPointField("time of impact", times);

@@ -29,7 +29,8 @@ class VtpText {
 /// All bodies; field "body".
 VtpText bodiesVtp(World&);
 /// A point midway of each contact; fields "distance", "time of impact", "normal", "pair", "kind"
-/// (0: vertex-triangle, 1: triangle-vertex, 2: edge-edge, 3: shape).
+/// (0: vertex-triangle, 1: triangle-vertex, 2: edge-edge, 3: shape, 4:
+/// two shapes).
 VtpText contactsVtp(World&);
 /// Edges of the cells that hold primitives; fields "depth", "primitives", "geometry".
 VtpText octreeVtp(const LooseOctree&);

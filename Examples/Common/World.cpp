@@ -47,6 +47,12 @@ World::BodyId World::addMesh(std::string name, const SceneMesh& mesh, double inv
              mesh.positions, inverseMass);
 }
 
+World::BodyId World::addRigidMesh(std::string name, const SceneMesh& mesh) {
+  const BodyId id = addMesh(std::move(name), mesh, 0.0);
+  m_bodies[id].rest = mesh.positions;
+  return id;
+}
+
 World::BodyId World::addThread(std::string name, std::span<const Vector3d> positions, double radius,
                                double inverseMass) {
   std::vector<Segment> segments;
@@ -118,10 +124,13 @@ void World::disable(BodyId body, std::span<const std::uint32_t> triangles) {
   if (m_isGuarded[body]) m_guard.setDisabledElements(m_guardIds[body], triangles);
 }
 
-void World::place(BodyId shape, const Eigen::Matrix3d& rotation, const Vector3d& translation) {
-  m_detection.setTransform(m_bodies[shape].id, rotation, translation);
-  m_bodies[shape].rotation = rotation;
-  m_bodies[shape].translation = translation;
+void World::place(BodyId id, const Eigen::Matrix3d& rotation, const Vector3d& translation) {
+  Body& body = m_bodies[id];
+  m_detection.setTransform(body.id, rotation, translation);
+  body.rotation = rotation;
+  body.translation = translation;
+  for (std::size_t i = 0; i < body.rest.size(); ++i)
+    m_solver.now[body.first + i] = rotation * body.rest[i] + translation;
 }
 
 std::span<Vector3d> World::positions(BodyId body) {
@@ -148,16 +157,19 @@ void World::detect() {
   const Timed timed(m_times.collision);
   for (const Body& body : m_bodies) {
     const BodyId id = &body - m_bodies.data();
-    if (body.count > 0) m_detection.setPositions(body.id, before(id), vertices(id).now);
+    if (body.count > 0 && body.rest.empty())
+      m_detection.setPositions(body.id, before(id), vertices(id).now);
   }
   m_detection.detectCollision();
   m_rows.clear();
   m_rowPairs.clear();
+  m_times.contacts = 0;
   for (std::size_t p = 0; p < m_pairs.size(); ++p) {
     const auto& [a, b, gap] = m_pairs[p];
     appendRows(contacts(a, b), vertices(a), vertices(b), m_rows);
     for (std::size_t row = m_rowPairs.size(); row < m_rows.size(); ++row) m_rows[row].offset += gap;
     m_rowPairs.resize(m_rows.size(), p);
+    m_times.contacts += contacts(a, b).shapeShape().size();
   }
   const FrameStatistics::Stages& stages = m_detection.statistics().milliseconds;
   m_times.boxes += stages.boxes;
@@ -165,7 +177,7 @@ void World::detect() {
   m_times.pairs += stages.pairs;
   m_times.narrowPhase += stages.narrowPhase;
   m_times.order += stages.order;
-  m_times.contacts = m_rows.size();
+  m_times.contacts += m_rows.size();
 }
 
 void World::solve(int iterations) {

@@ -36,6 +36,7 @@ class World {
     SceneMesh drawn;  ///< of a shape, in its own frame
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
     Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+    std::vector<Eigen::Vector3d> rest{};  ///< of a mesh that place() moves, in its own frame
   };
 
   /// Milliseconds since resetTimes().
@@ -51,6 +52,8 @@ class World {
       : m_detection(Settings{.threads = threads}), m_guard(Settings{.threads = threads}) {}
 
   BodyId addMesh(std::string name, const SceneMesh& mesh, double inverseMass);
+  /// Rigid: place() moves it, its octree stays as it is.
+  BodyId addRigidMesh(std::string name, const SceneMesh& mesh);
   /// A polyline.
   BodyId addThread(std::string name, std::span<const Eigen::Vector3d> positions, double radius,
                    double inverseMass);
@@ -70,7 +73,8 @@ class World {
   void addGuard(BodyId a, BodyId b);
   /// These triangles are no longer there, as where something pierced them; all others are.
   void disable(BodyId, std::span<const std::uint32_t> triangles);
-  void place(BodyId shape, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation);
+  /// A shape or a rigid mesh.
+  void place(BodyId, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation);
 
   void predict(double seconds, const Eigen::Vector3d& acceleration, double damping);
   void detect();

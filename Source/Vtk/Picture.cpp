@@ -149,6 +149,7 @@ void addContacts(vtkRenderer* renderer, const Picture& picture, double radius) {
     for (const auto& contact : data->triangleVertex()) add(middle(stencil(contact), {b, a, a, a}));
     for (const auto& contact : data->edgeEdge()) add(middle(stencil(contact), {a, a, b, b}));
     for (const auto& contact : data->shape()) add((contact.point + contact.pointOnShape) / 2);
+    for (const auto& contact : data->shapeShape()) add((contact.pointA + contact.pointB) / 2);
   }
   vtkNew<vtkPolyData> data;
   data->SetPoints(points);

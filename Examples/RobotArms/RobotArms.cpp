@@ -1,0 +1,199 @@
+// Two instrument arms of five rigid links each in one cavity, among three organs that breathe:
+// transforms only, and contacts become corrections of the arms' joints.
+#include "InstrumentArm.h"
+#include "SceneProgram.h"
+#include "Scenes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace palpate::scenes {
+namespace {
+
+using Eigen::Vector3d, std::numbers::pi;
+using Joints = InstrumentArm::Joints;
+using BothJoints = Eigen::Matrix<double, 12, 1>;
+
+// Lengths in mm. kStep: what an arm's points move in a frame of 1/60 s, of its own accord.
+constexpr double kGap = 1, kSight = 2 * kGap, kStep = 1;
+constexpr int kRounds = 6, kIterations = 12, kPeriod = 240, kLinks = InstrumentArm::kLinks;
+constexpr World::BodyId kCavity = 0, kLiver = 1, kFirstArm = 4, kSecondArm = kFirstArm + kLinks;
+
+struct Row {
+  double gap;        // mm
+  BothJoints slope;  // mm for each joint's unit
+};
+
+/// Where the hand leads an arm; side: -1, 1.
+Joints targetOf(double side, double phase) {
+  const double s = std::sin(phase), c = std::cos(phase), twice = std::sin(2 * phase + side);
+  return (Joints() << 0.35 * s, 0.35 * side * c, 42 + 20 * twice, 0.8 * c - 0.3, 0.7 * s * side,
+          0.25 - 0.35 * twice)
+      .finished();
+}
+
+class RobotArms : public LiveScene {
+ public:
+  explicit RobotArms(int threads) : m_world(threads), m_check(Settings{.threads = threads}) {
+    addMesh("cavity", sphere(16), {110, 88, 78}, Vector3d::Zero());
+    const std::vector<Vector3d> places{{-44, 16, -14}, {38, 16, -22}, {0, -30, -30}};
+    for (int i = 0; i < 3; ++i)  // liver, stomach, kidney
+      addMesh(organMeshes()[i].name, organMeshes()[i].mesh, Vector3d::Constant(34 - 4 * i),
+              places[i]);
+    for (const double side : {-1.0, 1.0}) {
+      Eigen::Isometry3d port = Eigen::Isometry3d::Identity();
+      port.translation() = Vector3d(58 * side, -25, 60);
+      const Vector3d in = (Vector3d(-14 * side, 6, -16) - port.translation()).normalized();
+      port.linear() = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), in).matrix();
+      m_arms.emplace_back(port, targetOf(side, 0));
+      for (const auto& [name, shape, drawn] : InstrumentArm::makeLinks()) {
+        addToCheck(drawn);
+        m_world.addShape((side < 0 ? "left " : "right ") + name, shape, drawn);
+      }
+    }
+    addPairs();
+    move();
+  }
+
+  World& world() override { return m_world; }
+  void computeFrame(int frame) override {
+    const std::vector<InstrumentArm> arms = m_arms;
+    const double breath = m_breath;
+    m_breath += 2 * pi / kPeriod;
+    for (int i = 0; i < 2; ++i) {
+      const Joints target = targetOf(2 * i - 1, 2 * pi * (frame + 1) / kPeriod),
+                   now = arms[i].joints();
+      const double length = (target - now).cwiseAbs().dot(InstrumentArm::reach());
+      m_arms[i].bend(now + std::min(1.0, kStep / length) * (target - now));
+    }
+    for (int round = 0; round < kRounds && move() < kGap / 2; ++round) correct();
+    if (m_held = move() <= 0; m_held == 0) return;
+    m_arms = arms, m_breath = breath;  // all waits, as it was
+    move();
+  }
+
+  std::vector<std::pair<std::string, double>> values() override {
+    return {{"least distance mm", m_nearest},
+            {"held", m_held},
+            {"arms touch", m_armsTouch},
+            {"organs touch", m_organsTouch}};
+  }
+
+  /// By other means than those that hold links apart: their tessellations do not intersect, by
+  /// exact arithmetic, and a vertex of each, which stands for all then, is not inside another.
+  std::string fault() override {
+    const auto& bodies = m_world.bodies();
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+      for (const GeometryId id : {m_meshes[i], m_firsts[i]})
+        m_check.setTransform(id, bodies[i].rotation, bodies[i].translation);
+    m_check.detectCollision();
+    for (const auto& [a, b, gap] : m_world.pairs()) {
+      const CollisionData& data = m_check.collisionData(m_meshes[a], m_meshes[b]);
+      const bool inA = !m_check.findInsideVertices(m_firsts[b], m_meshes[a]).empty(),
+                 inB = !m_check.findInsideVertices(m_firsts[a], m_meshes[b]).empty();
+      if (!data.intersectingTriangles().empty() || inA || inB != (b == kCavity))
+        return bodies[a].name + " and " + bodies[b].name + " overlap.";
+    }
+    return "";
+  }
+
+ private:
+  void addToCheck(const SceneMesh& mesh) {
+    m_meshes.push_back(m_check.addTriangleMesh(mesh.positions, mesh.triangles));
+    m_firsts.push_back(m_check.addPointSet({mesh.positions.data(), 1}));
+  }
+  void addMesh(const std::string& name, SceneMesh mesh, const Vector3d& scale, const Vector3d& at) {
+    for (Vector3d& p : mesh.positions) p = scale.cwiseProduct(p) + at;
+    addToCheck(mesh);
+    m_world.addRigidMesh(name, mesh);
+  }
+
+  /// Each link with all that it is not joined to; the shaft came in through the cavity's wall.
+  void addPairs() {
+    for (World::BodyId a = kFirstArm; a < m_world.bodies().size(); ++a) {
+      const int link = (a - kFirstArm) % kLinks;
+      for (World::BodyId b = link == 0 ? kLiver : kCavity; b < a; ++b) {
+        const bool sameArm = b >= kFirstArm && (b < kSecondArm) == (a < kSecondArm);
+        if (sameArm && InstrumentArm::areJoined(link, (b - kFirstArm) % kLinks)) continue;
+        m_world.addPair(a, b, {.method = Method::Proximity, .thickness = kSight}, kGap);
+        m_check.addCollisionPair(m_meshes[a], m_meshes[b], {.method = Method::Intersection});
+      }
+    }
+  }
+
+  /// Places everything and finds what is near. Returns the least distance, at most kSight.
+  double move() {
+    for (World::BodyId organ = kLiver; organ < kFirstArm; ++organ)
+      m_world.place(
+          organ, Eigen::AngleAxisd(0.06 * std::sin(m_breath + organ), Vector3d::UnitY()).matrix(),
+          {0, 0, 3 * std::sin(m_breath)});
+    for (int i = 0; i < 2 * kLinks; ++i) {
+      const Eigen::Isometry3d& at = m_arms[i / kLinks].link(i % kLinks);
+      m_world.place(kFirstArm + i, at.linear(), at.translation());
+    }
+    m_world.detect();
+    m_rows.clear();
+    m_nearest = kSight, m_armsTouch = m_organsTouch = 0;
+    for (const auto& [a, b, gap] : m_world.pairs()) {
+      for (const ShapeContact& c : m_world.contacts(a, b).shape())
+        addRow(a, b, c.distance, -c.normal, c.pointOnShape, c.point);
+      for (const ShapeShapeContact& c : m_world.contacts(a, b).shapeShape())
+        addRow(a, b, c.distance, c.normal, c.pointA, c.pointB);
+    }
+    return m_nearest;
+  }
+
+  /// normal: towards a, which is a link.
+  void addRow(World::BodyId a, World::BodyId b, double distance, const Vector3d& normal,
+              const Vector3d& onA, const Vector3d& onB) {
+    Row row{distance, BothJoints::Zero()};
+    const auto add = [&](World::BodyId body, const Vector3d& point, const Vector3d& direction) {
+      const int link = body - kFirstArm, arm = link / kLinks;
+      row.slope.segment<6>(6 * arm) += m_arms[arm].slope(link % kLinks, point, direction);
+    };
+    add(a, onA, normal);
+    if (b >= kFirstArm) add(b, onB, -normal);
+    m_nearest = std::min(m_nearest, distance);
+    m_organsTouch += distance < kGap && b >= kLiver && b < kFirstArm;
+    m_armsTouch += distance < kGap && b >= kFirstArm && b < kSecondArm && a >= kSecondArm;
+    m_rows.push_back(row);
+  }
+
+  /// Joints give way, those first that move least for it, until gaps are wide enough as far as
+  /// slopes tell.
+  void correct() {
+    BothJoints change = BothJoints::Zero(), ease;
+    ease << InstrumentArm::reach(), InstrumentArm::reach();
+    ease = ease.cwiseAbs2().cwiseInverse().eval();
+    for (int iteration = 0; iteration < kIterations; ++iteration) {
+      for (const Row& row : m_rows) {
+        const BothJoints push = ease.cwiseProduct(row.slope);
+        const double missing = kGap - row.gap - row.slope.dot(change), give = push.dot(row.slope);
+        if (missing > 0 && give > 0) change += missing / give * push;
+      }
+    }
+    for (int i = 0; i < 2; ++i) m_arms[i].bend(m_arms[i].joints() + change.segment<6>(6 * i));
+  }
+
+  World m_world;
+  OctreeBasedCD m_check;
+  std::vector<GeometryId> m_meshes, m_firsts;  // of m_check, by body: tessellation, its vertex 0
+  std::vector<InstrumentArm> m_arms;
+  std::vector<Row> m_rows;
+  double m_breath = 0, m_nearest = kSight;
+  int m_armsTouch = 0, m_organsTouch = 0, m_held = 0;
+};
+
+}  // namespace
+}  // namespace palpate::scenes
+
+int main(int count, char** arguments) {
+  using namespace palpate::scenes;
+  return runScene({.name = "RobotArms",
+                   .description = "Two arms of rigid links in a cavity, among organs that breathe.",
+                   .frames = 480,
+                   .frameMilliseconds = 1000.0 / 60,
+                   .make = [](int threads) { return std::make_unique<RobotArms>(threads); }},
+                  count, arguments);
+}
