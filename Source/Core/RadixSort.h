@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <utility>
 
@@ -12,24 +13,16 @@ namespace palpate {
 /// overwritten.
 /// Cost     one pass over the items for each 8 bits (6 where there are few, 11 where many), less one for each digit that is
 ///          the same in all.
-inline void radixSort(std::span<std::uint64_t> from, std::span<std::uint64_t> to, int low,
-                      int high) {
+inline void radixSortItems(std::span<std::uint64_t> from, std::span<std::uint64_t> to, int low,
+                           int high) {
   const std::size_t size = from.size();
   std::uint64_t* const destination = to.data();
-  const auto digitsOf = [=](std::uint64_t item) {
-    return (item & ((std::uint64_t{2} << (high - 1)) - 1)) >> low;
-  };
-  // From frame to frame many ranges stay in order.
-  if (std::is_sorted(from.begin(), from.end(),
-                     [&](auto l, auto r) { return digitsOf(l) < digitsOf(r); })) {
-    std::copy(from.begin(), from.end(), destination);
-    return;
-  }
   if (size <= 32) {
+    const std::uint64_t digits = ((std::uint64_t{2} << (high - low - 1)) - 1) << low;
     for (std::size_t i = 0; i < size; ++i) {
       const std::uint64_t item = from[i];
       std::size_t place = i;
-      for (; place > 0 && digitsOf(to[place - 1]) > digitsOf(item); --place)
+      for (; place > 0 && (to[place - 1] & digits) > (item & digits); --place)
         to[place] = to[place - 1];
       to[place] = item;
     }
@@ -80,6 +73,55 @@ inline void radixSort(std::span<std::uint64_t> from, std::span<std::uint64_t> to
     std::swap(from, to);
   }
   if (from.data() != destination) std::copy(from.begin(), from.end(), destination);
+}
+
+/// Stable sort of `from` by bits [low, high), at most 32, of each item into `to`, which is as long.
+/// `from` is overwritten.
+///
+/// From frame to frame, items that are equal in these bits stay side by side: such runs are sorted
+/// in place of items, where they are few.
+inline void radixSort(std::span<std::uint64_t> from, std::span<std::uint64_t> to, int low,
+                      int high) {
+  constexpr std::size_t kMostItems = 8192, kCopied = 4;
+  const std::size_t size = from.size();
+  if (size <= 32 || size > kMostItems) return radixSortItems(from, to, low, high);
+  const std::uint64_t mask = (std::uint64_t{2} << (high - low - 1)) - 1;
+  std::array<std::uint64_t, kMostItems> runs;
+  std::array<std::uint64_t, kMostItems / 2> sorted;
+  // Of each run, its digits and its end.
+  std::size_t count = 0;
+  std::uint64_t digits = from[0] >> low & mask;
+  for (std::size_t i = 1; i < size; ++i) {
+    const std::uint64_t next = from[i] >> low & mask;
+    runs[count] = digits << 32 | i;
+    count += next != digits;
+    digits = next;
+  }
+  runs[count++] = digits << 32 | size;
+  if (std::is_sorted(runs.begin(), runs.begin() + count)) {
+    std::copy(from.begin(), from.end(), to.begin());
+    return;
+  }
+  if (count > sorted.size() || 2 * count > size) return radixSortItems(from, to, low, high);
+  // Its digits, its place and its length.
+  std::uint64_t place = 0;
+  for (std::size_t r = 0; r < count; ++r) {
+    const std::uint64_t end = runs[r] & 0xffff;
+    runs[r] = (runs[r] >> 32) << 32 | place << 16 | (end - place);
+    place = end;
+  }
+  radixSortItems({runs.data(), count}, {sorted.data(), count}, 32, 32 + high - low);
+  std::size_t written = 0;
+  for (std::size_t r = 0; r < count; ++r) {
+    const std::size_t begin = sorted[r] >> 16 & 0xffff, length = sorted[r] & 0xffff;
+    const std::size_t whole = (length + kCopied - 1) / kCopied * kCopied;
+    if (std::max(begin, written) + whole <= size)  // what is too much is overwritten by the next
+      for (std::size_t k = 0; k < whole; k += kCopied)
+        std::memcpy(&to[written + k], &from[begin + k], kCopied * sizeof(from[0]));
+    else
+      std::copy_n(&from[begin], length, &to[written]);
+    written += length;
+  }
 }
 
 }  // namespace palpate

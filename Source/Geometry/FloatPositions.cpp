@@ -4,6 +4,45 @@
 #include <array>
 #include <cmath>
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "Geometry/FloatPositions.cpp"
+#include "Core/Simd.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+HWY_ATTR void toFloatsKernel(const Eigen::Vector3d* positions, std::size_t size,
+                             const FloatFrame& frame, FloatPoint* out) {
+  constexpr double kMost = kLargestFloat;
+  std::size_t i = 0;
+#if HWY_MAX_BYTES >= 32
+  // A point and the next one's x, which comes to nothing.
+  const hn::FixedTag<double, 4> d;
+  const hn::FixedTag<float, 4> df;
+  alignas(32) const double corner[4] = {frame.origin[0], frame.origin[1], frame.origin[2], 0.0},
+                           scales[4] = {frame.scale, frame.scale, frame.scale, 0.0};
+  const auto origin = hn::Load(d, corner), scale = hn::Load(d, scales);
+  const auto least = hn::Set(d, -kMost), most = hn::Set(d, kMost);
+  for (; i + 1 < size; ++i) {
+    const auto point = (hn::LoadU(d, positions[i].data()) - origin) * scale;
+    hn::Store(hn::DemoteTo(df, hn::Min(hn::Max(point, least), most)), df, &out[i].x);
+  }
+#endif
+  for (; i < size; ++i) {
+    const auto of = [&](int k) {
+      const double v = (positions[i][k] - frame.origin[k]) * frame.scale;
+      return static_cast<float>(std::min(std::max(v, -kMost), kMost));
+    };
+    out[i] = {of(0), of(1), of(2), 0.0f};
+  }
+}
+
+}  // namespace palpate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 namespace palpate {
 
 SampledExtent sampleExtent(std::span<const Eigen::Vector3d> positions) {
@@ -37,17 +76,11 @@ double frameScale(double spread) {
   return std::ldexp(1.0, -32 * steps);
 }
 
+HWY_EXPORT(toFloatsKernel);
+
 void toFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
               FloatPoint* out) {
-  const double x = frame.origin[0], y = frame.origin[1], z = frame.origin[2], scale = frame.scale;
-  const auto clamped = [](double v) {
-    return static_cast<float>(std::min(std::max(v, -double{kLargestFloat}), double{kLargestFloat}));
-  };
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    const Eigen::Vector3d& p = positions[i];
-    out[i] = {clamped((p[0] - x) * scale), clamped((p[1] - y) * scale), clamped((p[2] - z) * scale),
-              0.0f};
-  }
+  HWY_DYNAMIC_DISPATCH(toFloatsKernel)(positions.data(), positions.size(), frame, out);
 }
 
 std::size_t copyFinite(std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out) {
@@ -64,3 +97,4 @@ std::size_t copyFinite(std::span<const Eigen::Vector3d> positions, Eigen::Vector
 }
 
 }  // namespace palpate
+#endif

@@ -31,8 +31,13 @@ void expectHeld(double x, double origin, double scale) {
   FloatFrame frame;
   frame.origin = {origin, origin, origin};
   frame.scale = scale;
-  FloatPoint point;
-  toFloats({&position, 1}, frame, &point);
+  // Several at once, and the last alone.
+  const Vector3d positions[3] = {position, position, position};
+  FloatPoint points[3];
+  toFloats(positions, frame, points);
+  const FloatPoint& point = points[0];
+  for (const FloatPoint& other : points)
+    ASSERT_TRUE(other.x == point.x && other.y == point.y && other.z == point.z);
   const float lower = OutwardRounding::down(point.x), upper = OutwardRounding::up(point.x);
   const long double exact = inFrame(x, origin, scale);
   ASSERT_LE(lower, exact) << x << " " << origin << " " << scale;

@@ -192,17 +192,22 @@ TEST(Octree, PoolTakesBlocksBack) {
 
 TEST(RadixSort, IsTheStableSort) {
   Random random(8);
-  for (const std::size_t size : {0u, 1u, 31u, 33u, 1000u, 5000u})
-    for (const int high : {36, 41, 44, 52, 63}) {
-      std::vector<std::uint64_t> items(size), result(size);
-      for (std::size_t i = 0; i < size; ++i)
-        items[i] = (random() >> 1 & ((std::uint64_t{1} << high) - 1) & ~0xffffffffull) | i;
-      std::vector<std::uint64_t> expected = items;
-      std::stable_sort(expected.begin(), expected.end(),
-                       [](std::uint64_t l, std::uint64_t r) { return l >> 32 < r >> 32; });
-      radixSort(items, result, 32, high);
-      EXPECT_EQ(result, expected);
-    }
+  for (const std::size_t size : {0u, 1u, 31u, 33u, 34u, 1000u, 5000u, 8192u, 8193u})
+    for (const int longest : {1, 2, 40, 9000})  // of runs of equal keys
+      for (const int high : {33, 36, 41, 44, 52, 64}) {
+        std::vector<std::uint64_t> items(size), result(size);
+        std::uint64_t key = 0;
+        for (std::size_t i = 0; i < size; ++i) {
+          if (random() % static_cast<unsigned>(longest) == 0)
+            key = random() & ~std::uint64_t{0} >> (64 - high) & ~0xffffffffull;
+          items[i] = key | i;
+        }
+        std::vector<std::uint64_t> expected = items;
+        std::stable_sort(expected.begin(), expected.end(),
+                         [](std::uint64_t l, std::uint64_t r) { return l >> 32 < r >> 32; });
+        radixSort(items, result, 32, high);
+        EXPECT_EQ(result, expected) << size << " " << longest << " " << high;
+      }
 }
 
 }  // namespace
