@@ -89,6 +89,19 @@ SceneMesh sheet(int cells) {
   return mesh;
 }
 
+SceneMesh cubeSphere(int cells) {
+  SceneMesh mesh;
+  for (int face = 0; face < 6; ++face) {
+    const Eigen::AngleAxisd turn(
+        face < 4 ? face * pi / 2 : (face - 4.5) * pi,
+        face < 4 ? Vector3d(Vector3d::UnitX()) : Vector3d(Vector3d::UnitY()));
+    SceneMesh side = sheet(cells);
+    for (Vector3d& p : side.positions) p = turn * (p + Vector3d::UnitZ()).normalized();
+    append(mesh, side);
+  }
+  return mesh;
+}
+
 SceneMesh tube(int around, int along) {
   SceneMesh mesh;
   for (int row = 0; row <= along; ++row) {
@@ -149,6 +162,21 @@ SceneMesh tubeAround(std::span<const Vector3d> line, double radius, int around) 
     }
   }
   stitchRows(mesh.triangles, static_cast<std::uint32_t>(line.size()), around, true);
+  return mesh;
+}
+
+SceneMesh specks(std::span<const Vector3d> positions, double radius) {
+  const Vector3d far = Vector3d::Constant(radius / std::sqrt(3.0));
+  const SceneMesh speck{
+      {far, far.cwiseProduct(Vector3d(-1, -1, 1)), far.cwiseProduct(Vector3d(-1, 1, -1)),
+       far.cwiseProduct(Vector3d(1, -1, -1))},
+      {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
+  SceneMesh mesh;
+  for (const Vector3d& p : positions) {
+    const std::size_t first = mesh.positions.size();
+    append(mesh, speck);
+    for (std::size_t i = first; i < mesh.positions.size(); ++i) mesh.positions[i] += p;
+  }
   return mesh;
 }
 

@@ -19,6 +19,10 @@ struct SceneMesh {
 /// Outward winding.
 SceneMesh sphere(int frequency);
 
+/// Unit sphere: six square sheets around a cube, blown up, 12 cells² triangles of about one size;
+/// where sheets meet each has its own vertices. Outward winding.
+SceneMesh cubeSphere(int cells);
+
 /// The square [-1, 1]² at z = 0, 2 cells² triangles, normals up.
 SceneMesh sheet(int cells);
 
@@ -37,6 +41,9 @@ SceneMesh capsule(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1, double r
 
 /// Open tube about a polyline of at least two positions, for pictures.
 SceneMesh tubeAround(std::span<const Eigen::Vector3d> line, double radius, int around);
+
+/// A tetrahedron about each position, as far out as the radius, for pictures.
+SceneMesh specks(std::span<const Eigen::Vector3d> positions, double radius);
 
 void append(SceneMesh& mesh, const SceneMesh& other);
 

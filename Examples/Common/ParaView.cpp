@@ -74,7 +74,7 @@ std::string VtpText::text() const {
 
 VtpText bodiesVtp(World& world) {
   VtpText file;
-  std::vector<double> ofLines, ofTriangles;
+  std::vector<double> ofVertices, ofLines, ofTriangles;
   for (World::BodyId id = 0; id < world.bodies().size(); ++id) {
     const World::Body& body = world.bodies()[id];
     const auto first = static_cast<std::uint32_t>(file.points.size());
@@ -82,15 +82,19 @@ VtpText bodiesVtp(World& world) {
     file.points.insert(file.points.end(), positions.begin(), positions.end());
     for (const Vector3d& p : body.drawn.positions)
       file.points.push_back(body.rotation * p + body.translation);
+    for (std::uint32_t i = 0; body.kind == GeometryKind::Points && i < body.count; ++i)
+      file.vertices.push_back(first + i);
     for (const auto& [p, q] : body.segments) file.lines.push_back({first + p, first + q});
     for (const auto* triangles : {&body.triangles, &body.drawn.triangles})
       for (const auto& [a, b, c] : *triangles)
         file.triangles.push_back({first + a, first + b, first + c});
+    ofVertices.resize(file.vertices.size(), static_cast<double>(id));
     ofLines.resize(file.lines.size(), static_cast<double>(id));
     ofTriangles.resize(file.triangles.size(), static_cast<double>(id));
   }
-  ofLines.insert(ofLines.end(), ofTriangles.begin(), ofTriangles.end());
-  file.addCellField("body", ofLines);
+  for (const auto* part : {&ofLines, &ofTriangles})
+    ofVertices.insert(ofVertices.end(), part->begin(), part->end());
+  file.addCellField("body", ofVertices);
   return file;
 }
 

@@ -157,11 +157,13 @@ std::string drawn(World& world) {
     SceneMesh mesh = body.drawn;
     for (Eigen::Vector3d& p : mesh.positions) p = body.rotation * p + body.translation;
     if (body.kind == GeometryKind::Lines) mesh = tubeAround(world.positions(id), body.radius, 8);
+    if (body.kind == GeometryKind::Points) mesh = specks(world.positions(id), 6 * body.radius);
     tubes.push_back(std::move(mesh));
     picture.bodies.push_back({tubes.back().positions, tubes.back().triangles});
   }
   for (const World::Pair& pair : world.pairs())
-    picture.contacts.push_back({pair.a, pair.b, &world.contacts(pair.a, pair.b)});
+    if (world.times().contacts < 5000)  // more would hide all else
+      picture.contacts.push_back({pair.a, pair.b, &world.contacts(pair.a, pair.b)});
   return vtk::toPng(vtk::draw(picture));
 }
 #endif

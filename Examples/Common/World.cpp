@@ -62,6 +62,13 @@ World::BodyId World::addThread(std::string name, std::span<const Vector3d> posit
              positions, inverseMass);
 }
 
+World::BodyId World::addPoints(std::string name, std::span<const Vector3d> positions, double radius,
+                               double inverseMass) {
+  const GeometryId id = m_detection.addPointSet(positions, radius);
+  return add({std::move(name), id, GeometryKind::Points, 0, 0, {}, {}, radius, {}}, positions,
+             inverseMass);
+}
+
 World::BodyId World::addShape(std::string name, const AnalyticalGeometry& shape, SceneMesh drawn) {
   const GeometryId id = m_detection.addAnalyticalGeometry(shape);
   return add({std::move(name), id, GeometryKind::Shape, 0, 0, {}, {}, 0, std::move(drawn)}, {}, 0);

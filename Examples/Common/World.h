@@ -32,7 +32,7 @@ class World {
     std::uint32_t first, count;  ///< its particles; a shape has none
     std::vector<Triangle> triangles;
     std::vector<Segment> segments;
-    double radius;    ///< of lines
+    double radius;    ///< of lines and points
     SceneMesh drawn;  ///< of a shape, in its own frame
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
     Eigen::Vector3d translation = Eigen::Vector3d::Zero();
@@ -48,14 +48,18 @@ class World {
     std::size_t held = 0;      ///< particles
   };
 
-  explicit World(int threads)
-      : m_detection(Settings{.threads = threads}), m_guard(Settings{.threads = threads}) {}
+  explicit World(int threads, OctreeUpdate update = OctreeUpdate::Auto)
+      : m_detection(Settings{.octree = {.update = update}, .threads = threads}),
+        m_guard(Settings{.threads = threads}) {}
 
   BodyId addMesh(std::string name, const SceneMesh& mesh, double inverseMass);
   /// Rigid: place() moves it, its octree stays as it is.
   BodyId addRigidMesh(std::string name, const SceneMesh& mesh);
   /// A polyline.
   BodyId addThread(std::string name, std::span<const Eigen::Vector3d> positions, double radius,
+                   double inverseMass);
+  /// Particles: blood, debris.
+  BodyId addPoints(std::string name, std::span<const Eigen::Vector3d> positions, double radius,
                    double inverseMass);
   BodyId addShape(std::string name, const AnalyticalGeometry&, SceneMesh drawn);
   /// Distances along each edge of a mesh and across it between the opposite corners; of a thread

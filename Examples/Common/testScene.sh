@@ -1,7 +1,7 @@
 #!/bin/bash
 # testScene.sh PROGRAM TEST HAS_VTK LENGTH: what every scene's program does, and what its own test.sh adds.
-# That says how many frames are enough (frames=N) and how many the whole story has (long=N), of which
-# LENGTH is one; it may use program, folder, hasVtk, length, fail, refused, run and column.
+# That says how many frames are enough (frames=N), with which options (options=...), and how many the whole story
+# has (long=N, without them), frames or long being LENGTH; it may use program, folder, hasVtk, length, fail, refused, run and column.
 set -uo pipefail
 program=$1 test=$2 hasVtk=$3 length=$4
 folder=$(mktemp -d)
@@ -20,9 +20,11 @@ column() {
   awk -F, -v name="$1" 'NR == 1 { for (i = 1; i <= NF; ++i) if ($i == name) at = i; if (!at) exit 1; next } { print $at }' \
     "$folder/run/frames.csv" || fail "no column $1"
 }
-run() { "$program" --frames "$frames" --out "$folder/run" "$@" >"$folder/text" 2>"$folder/messages" || fail "$(cat "$folder/messages")"; }
+run() { "$program" $options --frames "$frames" --out "$folder/run" "$@" >"$folder/text" 2>"$folder/messages" || fail "$(cat "$folder/messages")"; }
 
 frames=$(sed -n "s/^$length=//p" "$test")
+options=
+[[ $length == long ]] || options=$(sed -n 's/^options=//p' "$test" | tr -d '"')
 run --threads 1
 hash=$(grep "result hash" "$folder/text")
 run
@@ -37,7 +39,7 @@ for browser in chromium chromium-browser google-chrome; do  # where one is insta
   break
 done
 grep -q "no picture" "$folder/text" || fail "nothing said about the picture"
-"$program" --frames 2 --paraview --out "$folder/series" >"$folder/text" || fail "the series"
+"$program" $options --frames 2 --paraview --out "$folder/series" >"$folder/text" || fail "the series"
 [[ $(grep -c '<DataSet' "$folder"/series/paraview/*.pvd) -eq 6 ]] || fail "the .pvd has not three parts of two frames"
 [[ $(ls "$folder"/series/paraview/*.vtp | wc -l) -eq 6 && ! -e $folder/series/paraview.part ]] || fail "not six .vtp files"
 refused --frames 0

@@ -1,0 +1,199 @@
+// A spherical burr on a large bone under flowing water: debris and blood sink over bone and organs.
+// Bone and organs stay where setTransform() put them, so only the particles' octree changes.
+#include "SceneProgram.h"
+#include "Scenes.h"
+
+#include <CLI/CLI.hpp>
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace palpate::scenes {
+namespace {
+
+using Eigen::Vector3d, std::numbers::pi;
+// Lengths in mm, times in s. Nothing moves further than kReach in a substep, which is what
+// contacts are found within: so each knows its side, and Proximity is enough.
+constexpr double kFrame = 1.0 / 60, kReach = 0.4, kSpeed = 48, kParticle = 0.1, kBurr = 4,
+                 kGap = 0.02;
+constexpr double kBone = 120, kFloor = -180;
+const Vector3d kMiddle(0, 0, 0), kGravity(0, 0, -600);  // less what water carries
+
+struct Size {
+  int particles = 100'000, triangles = 500'000;
+};
+/// Of the bone, which is seen whole from its middle, along a unit vector.
+double boneRadius(const Vector3d& d) {
+  return kBone * (1 + 0.06 * std::sin(5 * d.x() + 1) * std::cos(4 * d.y()) - 0.1 * d.y() * d.y() +
+                  0.01 * std::sin(23 * d.x()) * std::sin(19 * d.y() + 7 * d.z()));
+}
+
+class BoneDrilling : public LiveScene {
+ public:
+  BoneDrilling(const Size& size, int threads)
+      : m_sag(12'000.0 / size.triangles), m_world(threads, OctreeUpdate::Rebuild) {  // some leap
+    SceneMesh bone = cubeSphere(static_cast<int>(std::ceil(std::sqrt(size.triangles / 12.0))));
+    for (Vector3d& p : bone.positions) p = (boneRadius(p) * p).eval();
+    addRigid("bone", std::move(bone), 1, kMiddle);
+    addRigid("liver", organMeshes()[0].mesh, 50, {-70, -120, -60});
+    addRigid("stomach", organMeshes()[1].mesh, 50, {65, -125, -60});
+    m_burrAt = burrTarget(0) + 5 * Vector3d::UnitZ();
+    m_burr = m_world.addShape("burr", Sphere{kMiddle, kBurr}, capsule(kMiddle, kMiddle, kBurr, 8));
+    m_world.place(m_burr, Eigen::Matrix3d::Identity(), m_burrAt);
+    std::vector<Vector3d> positions(size.particles);
+    for (Vector3d& p : positions) {  // sinking already, beside and above all else
+      do p = {between(-130, 130), between(-150, 120), between(kFloor, kBone + 180)};
+      while (p.norm() < 1.2 * kBone || (p.z() < 0 && p.y() < 0));
+    }
+    m_particles = m_world.addPoints("particles", positions, kParticle, 1.0);
+    PairSettings nearby{.method = Method::Proximity, .thickness = kReach};
+    for (const World::BodyId id : m_rigid) m_world.addPair(m_particles, id, nearby, kGap);
+    nearby.contacts = Contacts::All;
+    m_world.addPair(m_rigid[0], m_burr, nearby, 0);
+  }
+
+  World& world() override { return m_world; }
+  void computeFrame(int frame) override {
+    double fastest = 0;
+    for (const Vector3d& v : m_world.solver().velocities) fastest = std::max(fastest, v.norm());
+    const double speed = std::min(kSpeed, fastest - kFrame * kGravity.z());
+    const int substeps = static_cast<int>(std::ceil(speed * kFrame / kReach));
+    m_fallen = m_rebuilt = 0;
+    for (int substep = 1; substep <= substeps; ++substep) {
+      m_world.detect();  // where all is: planes that hold for as far as anything moves
+      m_rebuilt += m_world.detection().statistics().rebuiltOctrees;
+      moveBurr(burrTarget(frame + static_cast<double>(substep) / substeps));
+      m_world.predict(kFrame / substeps, kGravity, 0.02);
+      m_world.solve(2);
+      keepOut();
+      m_world.commit();
+      raiseFallen();
+    }
+  }
+
+  std::vector<std::pair<std::string, double>> values() override {
+    return {{"burr distance mm", m_burrDistance},
+            {"touching", m_touching},
+            {"fallen", m_fallen},
+            {"rebuilt", m_rebuilt}};
+  }
+
+  /// The bone by the surface that its mesh was made of, organs by winding numbers.
+  std::string fault() override {
+    const std::span<const Vector3d> particles = m_world.positions(m_particles);
+    for (std::size_t i = 0; i < particles.size(); ++i)
+      if (particles[i].norm() < boneRadius(particles[i].normalized()) - m_sag)
+        return "particle " + std::to_string(i) + " is inside the bone.";
+    OctreeBasedCD& detection = m_world.detection();
+    const auto id = [&](World::BodyId body) { return m_world.bodies()[body].id; };
+    detection.setPositions(id(m_particles), particles);
+    for (const World::BodyId organ : {m_rigid[1], m_rigid[2]})
+      if (!detection.findInsideVertices(id(m_particles), id(organ)).empty())
+        return "particles are inside an organ.";
+    for (const Vector3d& p : m_world.bodies()[m_rigid[0]].rest)
+      if ((p - m_burrAt).norm() < (1 - 1e-9) * kBurr) return "the burr is in the bone.";
+    return "";
+  }
+
+ private:
+  double between(double low, double high) {
+    return low + (high - low) * m_random() / m_random.max();
+  }
+
+  void addRigid(const char* name, SceneMesh mesh, double scale, const Vector3d& at) {
+    for (Vector3d& p : mesh.positions) p *= scale;
+    m_rigid.push_back(m_world.addRigidMesh(name, mesh));
+    m_world.place(m_rigid.back(), Eigen::Matrix3d::Identity(), at);
+  }
+
+  /// The hand presses 1 mm deep, along an eight.
+  static Vector3d burrTarget(double frame) {
+    const double phase = 2 * pi * frame / 300, y = 0.15 * std::sin(2 * phase) - 0.3;
+    const Vector3d d = Vector3d(0.3 * std::sin(phase), y, 1).normalized();
+    return (boneRadius(d) + kBurr - 1) * d;
+  }
+
+  /// What lies within reach is behind the plane through its nearest point: so the burr, on its side
+  /// of all planes, is in nothing.
+  void moveBurr(const Vector3d& target) {
+    const auto contacts = m_world.contacts(m_rigid[0], m_burr).shape();
+    Vector3d way = target - m_burrAt;
+    way *= std::min(1.0, kReach / way.norm());
+    m_burrDistance = kReach;
+    for (const ShapeContact& c : contacts) m_burrDistance = std::min(m_burrDistance, c.distance);
+    for (int iteration = 0; iteration < 20; ++iteration)
+      for (const ShapeContact& c : contacts)
+        way -= std::max(0.0, way.dot(c.normal) + kGap - c.distance) * c.normal;
+    double share = std::min(1.0, kReach / way.norm());
+    for (const ShapeContact& c : contacts)
+      if (const double towards = way.dot(c.normal); towards > c.distance)
+        share = std::min(share, std::max(0.0, c.distance / towards));
+    m_burrAt += share * way;
+    m_world.place(m_burr, Eigen::Matrix3d::Identity(), m_burrAt);
+  }
+
+  /// None goes further than contacts were looked for. Rows are met one after another: who would
+  /// end behind a plane goes only as far as the plane.
+  void keepOut() {
+    const std::span<const Vector3d> before = m_world.before(m_particles);
+    const std::span<Vector3d> now = m_world.positions(m_particles);
+    for (std::size_t i = 0; i < now.size(); ++i)
+      now[i] =
+          before[i] + std::min(1.0, kReach / (now[i] - before[i]).norm()) * (now[i] - before[i]);
+    m_touching = 0;
+    for (const World::BodyId body : m_rigid) {
+      for (const VertexTriangleContact& c : m_world.contacts(m_particles, body).vertexTriangle()) {
+        const Vector3d way = now[c.vertex] - before[c.vertex];
+        const double room = std::max(0.0, c.distance), towards = -way.dot(c.normal);
+        if (towards > room) now[c.vertex] = before[c.vertex] + room / towards * way;
+        m_touching += c.distance < 2 * kGap;
+      }
+    }
+  }
+
+  /// What is below all else comes again: debris from the burr, blood from a vessel beside it.
+  void raiseFallen() {
+    Xpbd& solver = m_world.solver();  // which has the particles last
+    for (std::size_t i = m_world.bodies()[m_particles].first; i < solver.now.size(); ++i) {
+      if (solver.now[i].z() > kFloor) continue;
+      const Vector3d vessel(-20, -30, boneRadius(Vector3d(-20, -30, 90).normalized()) + 6);
+      const Vector3d away(between(-2, 2), between(-2, 2), between(-2, 2));
+      solver.now[i] = solver.before[i] = (i % 2 == 0 ? m_burrAt : vessel) + away;
+      solver.velocities[i] = 40 * away;
+      ++m_fallen;
+    }
+  }
+
+  double m_burrDistance = 0, m_sag;  // m_sag: of the bone's mesh: edge² x curvature / 8
+  World m_world;
+  std::minstd_rand m_random;
+  std::vector<World::BodyId> m_rigid;  // the bone, then organs
+  World::BodyId m_burr = 0, m_particles = 0;
+  Vector3d m_burrAt;
+  int m_touching = 0, m_fallen = 0, m_rebuilt = 0;
+};
+
+}  // namespace
+}  // namespace palpate::scenes
+
+int main(int count, char** arguments) {
+  using namespace palpate::scenes;
+  palpate::scenes::Size size;
+  return runScene(
+      {.name = "BoneDrilling",
+       .description =
+           "A burr on a bone of half a million triangles, debris and blood sinking over it.",
+       .frames = 300,
+       .frameMilliseconds = 1000.0 / 60,
+       .addOptions =
+           [&](CLI::App& app) {
+             app.add_option("--particles", size.particles)->check(CLI::Range(1, 10'000'000));
+             app.add_option("--triangles", size.triangles, "of the bone, at least")
+                 ->check(CLI::Range(1000, 10'000'000));
+           },
+       .make = [&](int threads) { return std::make_unique<BoneDrilling>(size, threads); }},
+      count, arguments);
+}
