@@ -4,9 +4,9 @@
 set -euo pipefail
 
 build="cmake ninja-build g++ pkg-config libeigen3-dev libtbb-dev libhwy-dev libgmp-dev
-  libvtk9-dev libcli11-dev nlohmann-json3-dev xvfb xauth libgl1-mesa-dri"
+  libvtk9-dev libfcl-dev libccd-dev libcli11-dev nlohmann-json3-dev xvfb xauth libgl1-mesa-dri"
 test="libgtest-dev libcgal-dev libmpfr-dev clang-format-14 qemu-user"
-benchmark="python3 libbenchmark-dev libembree-dev libbullet-dev libfcl-dev libcgal-dev"
+benchmark="python3 libbenchmark-dev libembree-dev libbullet-dev libcgal-dev"
 
 missing=()
 for set in "$@"; do

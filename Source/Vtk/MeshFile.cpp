@@ -54,8 +54,7 @@ Polygons polygonsOf(const std::filesystem::path& path) {
   if (kind == ".ply") return readPly(content);
   if (kind == ".vtk") return readLegacyVtk(content);
   if (kind == ".stl") return readStl(content);
-  if (kind == ".vtp") return readVtp(content);
-  throw FileFault{"its name does not end in .obj, .stl, .ply, .vtk or .vtp"};
+  throw FileFault{"its name does not end in .obj, .stl, .ply or .vtk"};
 }
 
 void checkPositions(const std::vector<Eigen::Vector3d>& positions) {

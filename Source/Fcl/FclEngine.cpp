@@ -1,0 +1,235 @@
+#include <palpate/FclEngine.h>
+
+#include <fcl/geometry/bvh/BVH_model.h>
+#include <fcl/geometry/shape/box.h>
+#include <fcl/geometry/shape/capsule.h>
+#include <fcl/geometry/shape/convex.h>
+#include <fcl/geometry/shape/cylinder.h>
+#include <fcl/geometry/shape/halfspace.h>
+#include <fcl/geometry/shape/plane.h>
+#include <fcl/geometry/shape/sphere.h>
+#include <fcl/narrowphase/collision.h>
+#include <fcl/narrowphase/distance.h>
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <string>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+using Model = fcl::BVHModel<fcl::OBBRSS<double>>;
+using Geometry = std::shared_ptr<fcl::CollisionGeometry<double>>;
+
+/// A geometry as FCL has it: shapes amid its own frame, capsules and cylinders along z.
+struct Body {
+  Geometry geometry;
+  fcl::Transform3d inFrame = fcl::Transform3d::Identity(), frame = fcl::Transform3d::Identity();
+
+  fcl::NODE_TYPE kind() const { return geometry->getNodeType(); }
+  bool isMesh() const { return kind() == fcl::BV_OBBRSS; }
+  fcl::Transform3d place() const { return frame * inFrame; }
+};
+
+Geometry modelOf(std::span<const Vector3d> positions, std::span<const Triangle> triangles) {
+  auto model = std::make_shared<Model>();
+  if (triangles.empty()) return model;  // FCL would say so on the terminal
+  std::vector<fcl::Triangle> indices;
+  for (const auto& [a, b, c] : triangles) indices.emplace_back(a, b, c);
+  model->beginModel(static_cast<int>(triangles.size()), static_cast<int>(positions.size()));
+  model->addSubModel({positions.begin(), positions.end()}, indices);
+  model->endModel();
+  return model;
+}
+
+Body along(const Vector3d& p0, const Vector3d& p1, fcl::CollisionGeometry<double>* geometry) {
+  Body body{Geometry(geometry)};
+  body.inFrame.translation() = 0.5 * (p0 + p1);
+  if (p0 != p1) body.inFrame.rotate(Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), p1 - p0));
+  return body;
+}
+Body bodyOf(const Sphere& s) { return along(s.centre, s.centre, new fcl::Sphered(s.radius)); }
+Body bodyOf(const Box& b) { return along(b.centre, b.centre, new fcl::Boxd(2 * b.halfExtents)); }
+Body bodyOf(const Capsule& c) {
+  return along(c.p0, c.p1, new fcl::Capsuled(c.radius, (c.p1 - c.p0).norm()));
+}
+Body bodyOf(const Cylinder& c) {
+  return along(c.p0, c.p1, new fcl::Cylinderd(c.radius, (c.p1 - c.p0).norm()));
+}
+Body bodyOf(const Plane& p) {
+  const Vector3d normal = p.normal.stableNormalized();
+  const double offset = normal.dot(p.point);
+  if (p.twoSided) return {Geometry(new fcl::Planed(normal, offset))};
+  return {Geometry(new fcl::Halfspaced(normal, offset))};
+}
+/// Without faces, which FCL needs to walk along only: it asks every point.
+Body bodyOf(const ConvexHull& h) {
+  return {std::make_shared<fcl::Convexd>(std::make_shared<const std::vector<Vector3d>>(h.points), 0,
+                                         std::make_shared<const std::vector<int>>())};
+}
+
+/// Whether FCL has the distance in closed form. Others it searches for, and ends the process by an
+/// assertion where bodies lie along each other.
+bool hasDistance(fcl::NODE_TYPE a, fcl::NODE_TYPE b) {
+  if (a == fcl::GEOM_SPHERE || b == fcl::GEOM_SPHERE) return std::max(a, b) < fcl::GEOM_CONVEX;
+  return a == fcl::GEOM_CAPSULE && b == fcl::GEOM_CAPSULE;
+}
+
+/// Why FCL cannot answer a pair; empty if it can.
+std::string refusal(const Body& a, const Body& b, const PairSettings& settings) {
+  if (&a == &b) return "does not find what a mesh does to itself";
+  if (a.isMesh() != b.isMesh()) return "is asked for two triangle meshes or two shapes only";
+  if (a.isMesh() && settings.method != Method::Intersection)
+    return "answers triangle meshes by Method::Intersection only";
+  const auto [lower, higher] = std::minmax({a.kind(), b.kind()});
+  if (lower == fcl::GEOM_CONVEX && higher == fcl::GEOM_PLANE)
+    return "does not know a hull with a plane of two sides";
+  if (!a.isMesh() && settings.thickness > 0 && !hasDistance(a.kind(), b.kind()))
+    return "has no distance of these that can be relied on: the thickness must be 0";
+  return "";
+}
+
+void addTriangles(const Body& a, const Body& b, std::vector<TrianglePair>& pairs) {
+  for (const Body* body : {&a, &b})
+    if (static_cast<const Model&>(*body->geometry).num_tris == 0) return;
+  // Without contacts, of which FCL has several for a pair of triangles, there is one of each.
+  fcl::CollisionResultd result;
+  fcl::collide(a.geometry.get(), a.place(), b.geometry.get(), b.place(),
+               fcl::CollisionRequestd(std::numeric_limits<int>::max(), false), result);
+  for (std::size_t i = 0; i < result.numContacts(); ++i) {
+    const fcl::Contactd& contact = result.getContact(i);
+    pairs.push_back(
+        {static_cast<std::uint32_t>(contact.b1), static_cast<std::uint32_t>(contact.b2)});
+  }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+}
+
+/// By the deepest contact of collide() where they overlap, by distance() where they are apart.
+void addContact(const Body& a, const Body& b, double thickness,
+                std::vector<ShapeShapeContact>& contacts) {
+  fcl::CollisionResultd overlap;
+  fcl::collide(a.geometry.get(), a.place(), b.geometry.get(), b.place(),
+               fcl::CollisionRequestd(100, true), overlap);
+  const fcl::Contactd* deepest = nullptr;
+  for (std::size_t i = 0; i < overlap.numContacts(); ++i)
+    if (!deepest || overlap.getContact(i).penetration_depth > deepest->penetration_depth)
+      deepest = &overlap.getContact(i);
+  if (deepest) {
+    const double depth = deepest->penetration_depth;
+    const Vector3d half = 0.5 * depth * deepest->normal;
+    contacts.push_back({deepest->pos + half, deepest->pos - half, -deepest->normal, -depth});
+  } else if (thickness > 0) {
+    fcl::DistanceResultd nearest;
+    fcl::distance(a.geometry.get(), a.place(), b.geometry.get(), b.place(),
+                  fcl::DistanceRequestd(true), nearest);
+    const auto& [p, q] = nearest.nearest_points;
+    if (nearest.min_distance <= thickness)
+      contacts.push_back({p, q, (p - q).stableNormalized(), nearest.min_distance});
+  }
+}
+
+}  // namespace
+
+struct FclEngine::Implementation {
+  OctreeBasedCD input;  ///< keeps and checks what is handed in; computes no frame
+  std::map<GeometryId, Body> bodies;
+  std::map<std::pair<GeometryId, GeometryId>, CollisionData> answers;
+};
+
+FclEngine::FclEngine() : m_implementation(std::make_unique<Implementation>()) {}
+FclEngine::FclEngine(FclEngine&&) noexcept = default;
+FclEngine& FclEngine::operator=(FclEngine&&) noexcept = default;
+FclEngine::~FclEngine() = default;
+
+GeometryId FclEngine::addTriangleMesh(std::span<const Vector3d> positions,
+                                      std::span<const Triangle> triangles) {
+  const GeometryId id = m_implementation->input.addTriangleMesh(positions, triangles);
+  m_implementation->bodies[id].geometry = modelOf(positions, triangles);
+  return id;
+}
+
+GeometryId FclEngine::addAnalyticalGeometry(const AnalyticalGeometry& shape) {
+  const GeometryId id = m_implementation->input.addAnalyticalGeometry(shape);
+  m_implementation->bodies[id] = std::visit([](const auto& s) { return bodyOf(s); }, shape);
+  return id;
+}
+
+void FclEngine::removeGeometry(GeometryId id) {
+  m_implementation->input.removeGeometry(id);
+  m_implementation->bodies.erase(id);
+}
+
+void FclEngine::setPositions(GeometryId id, std::span<const Vector3d> now) {
+  m_implementation->input.setPositions(id, now);
+  auto& model = static_cast<Model&>(*m_implementation->bodies[id].geometry);
+  if (model.num_tris == 0) return;
+  model.beginReplaceModel();  // endUpdateModel() would fit boxes over two frames
+  model.replaceSubModel({now.begin(), now.end()});
+  model.endReplaceModel(true, true);
+}
+
+void FclEngine::setTriangles(GeometryId id, std::span<const Vector3d> positions,
+                             std::span<const Triangle> triangles) {
+  m_implementation->input.setTriangles(id, positions, triangles);
+  m_implementation->bodies[id].geometry = modelOf(positions, triangles);
+}
+
+void FclEngine::setTransform(GeometryId id, const Eigen::Matrix3d& rotation,
+                             const Vector3d& translation) {
+  m_implementation->input.setTransform(id, rotation, translation);
+  fcl::Transform3d& frame = m_implementation->bodies[id].frame;
+  frame.linear() = rotation;
+  frame.translation() = translation;
+}
+
+void FclEngine::addCollisionPair(GeometryId a, GeometryId b, const PairSettings& settings) {
+  const auto& bodies = m_implementation->bodies;
+  const auto first = bodies.find(a), second = bodies.find(b);
+  if (first != bodies.end() && second != bodies.end())  // others are refused below
+    if (const std::string reason = refusal(first->second, second->second, settings); reason != "")
+      throw Error(ErrorCode::UnsupportedMethod,
+                  "pair (" + std::to_string(static_cast<std::uint32_t>(a)) + ", " +
+                      std::to_string(static_cast<std::uint32_t>(b)) + "): FCL " + reason,
+                  a);
+  m_implementation->input.addCollisionPair(a, b, settings);
+}
+
+void FclEngine::removeCollisionPair(GeometryId a, GeometryId b) {
+  m_implementation->input.removeCollisionPair(a, b);
+  m_implementation->answers.erase({a, b});
+  m_implementation->answers.erase({b, a});
+}
+
+std::span<const CollisionPair> FclEngine::pairs() const { return m_implementation->input.pairs(); }
+
+void FclEngine::detectCollision() {
+  std::map<std::pair<GeometryId, GeometryId>, CollisionData> answers;
+  for (const auto& [a, b, settings] : pairs()) {
+    const Body &x = m_implementation->bodies[a], &y = m_implementation->bodies[b];
+    CollisionData::Contents contents;
+    contents.validity.method = settings.method;
+    try {
+      if (x.isMesh())
+        addTriangles(x, y, contents.intersectingTriangles);
+      else
+        addContact(x, y, settings.thickness, contents.shapeShape);
+    } catch (const std::exception& fault) {
+      throw Error(ErrorCode::NotAvailable, std::string("FCL gives up: ") + fault.what(), a);
+    }
+    answers[{a, b}] = CollisionData(std::move(contents));
+  }
+  m_implementation->answers = std::move(answers);
+}
+
+const CollisionData& FclEngine::collisionData(GeometryId a, GeometryId b) const {
+  const CollisionData& none = m_implementation->input.collisionData(a, b);  // that is a pair
+  const auto answer = m_implementation->answers.find({a, b});
+  return answer == m_implementation->answers.end() ? none : answer->second;
+}
+
+}  // namespace palpate
