@@ -11,8 +11,8 @@ namespace palpate {
 
 /// Stable sort of `from` by bits [low, high) of each item into `to`, which is as long. `from` is
 /// overwritten.
-/// Cost     one pass over the items for each 8 bits (6 where there are few, 11 where many), less one for each digit that is
-///          the same in all.
+/// Cost     one pass over the items for each 6 bits, where there are few, to 11, where many, less one for each digit that
+///          is the same in all.
 inline void radixSortItems(std::span<std::uint64_t> from, std::span<std::uint64_t> to, int low,
                            int high) {
   const std::size_t size = from.size();
@@ -28,21 +28,31 @@ inline void radixSortItems(std::span<std::uint64_t> from, std::span<std::uint64_
     }
     return;
   }
-  const int digitBits = size < 192 ? 6 : size < 1024 ? 8 : 11;
-  constexpr int kMostDigits = 6;
-  std::array<std::array<std::array<std::uint32_t, 2048>, kMostDigits>, 2> counts;
-  const int digits = (high - low + digitBits - 1) / digitBits;
+  // The digit with the fewest steps in all: one an item and about two a bin.
+  constexpr int kMostDigitBits = 11;
+  constexpr std::size_t kMostCounts = std::size_t{4} << kMostDigitBits;
+  int digitBits = 0, digits = 0;
+  for (std::size_t bits = 6, fewest = SIZE_MAX; bits <= kMostDigitBits; ++bits) {
+    const std::size_t passes = (static_cast<std::size_t>(high - low) + bits - 1) / bits,
+                      steps = passes * (size + (std::size_t{2} << bits));
+    if (steps >= fewest) continue;
+    fewest = steps;
+    digitBits = static_cast<int>(bits);
+    digits = static_cast<int>(passes);
+  }
+  std::array<std::array<std::uint32_t, kMostCounts>, 2> counts;
   const auto bins = std::size_t{1} << digitBits;
   const std::uint64_t mask = bins - 1;
   const auto lastMask = (std::uint64_t{1} << (high - low - (digits - 1) * digitBits)) - 1;
-  for (int digit = 0; digit < digits; ++digit)
-    for (auto& half : counts) std::fill_n(half[digit].begin(), bins, 0u);
+  for (auto& half : counts) std::fill_n(half.begin(), bins * static_cast<std::size_t>(digits), 0u);
   // From both ends at once: nearly sorted items meet the same count again and again, each time
   // waiting for its last store.
   const auto count = [&](auto& half, std::uint64_t item) {
     std::uint64_t rest = item >> low;
-    for (int digit = 0; digit + 1 < digits; ++digit, rest >>= digitBits) ++half[digit][rest & mask];
-    ++half[digits - 1][rest & lastMask];
+    std::uint32_t* of = half.data();
+    for (int digit = 0; digit + 1 < digits; ++digit, rest >>= digitBits, of += bins)
+      ++of[rest & mask];
+    ++of[rest & lastMask];
   };
   const std::size_t middle = size / 2;
   for (std::size_t i = 0; i < middle; ++i) {
@@ -53,7 +63,8 @@ inline void radixSortItems(std::span<std::uint64_t> from, std::span<std::uint64_
   for (int digit = 0; digit < digits; ++digit) {
     const int shift = low + digit * digitBits;
     const std::uint64_t digitMask = digit + 1 == digits ? lastMask : mask;
-    auto &begins = counts[0][digit], &ends = counts[1][digit];
+    std::uint32_t *begins = counts[0].data() + bins * static_cast<std::size_t>(digit),
+                  *ends = counts[1].data() + bins * static_cast<std::size_t>(digit);
     const std::uint64_t first = from[0] >> shift & digitMask;
     if (begins[first] + ends[first] == size) continue;
     std::uint32_t sum = 0;

@@ -201,11 +201,14 @@ void Octree::assemble(std::size_t tasks, const Threads& threads) {
       OctreeBlock& block = m_pool[base + b];
       m_parents[base + b] = layout.parents[b] == Layout::kTaskRoot ? top.tasks[i - 1].node
                                                                    : layout.parents[b] + base * 8;
+      for (int k = 0; k < 3; ++k) {
+        std::fill_n(block.lower[k], 8, FloatBox::kEmptyLower);
+        std::fill_n(block.upper[k], 8, -FloatBox::kEmptyLower);
+      }
+      const Layout::Links& links = layout.links[b];
       for (unsigned slot = 0; slot < 8; ++slot) {
-        const std::uint32_t child = layout.links[b].child[slot];
-        block.begin[slot] = layout.links[b].begin[slot];
-        block.child[slot] = child & OctreeBlock::kLeaf ? child : child + base;
-        block.setBox(slot, FloatBox{});
+        block.begin[slot] = links.begin[slot];
+        block.child[slot] = links.child[slot] + (links.child[slot] & OctreeBlock::kLeaf ? 0 : base);
       }
     }
   });
