@@ -1,5 +1,8 @@
 #include "Octree/Keys.h"
 
+#include "Core/Assert.h"
+
+#include <algorithm>
 #include <bit>
 #include <cstring>
 
@@ -38,17 +41,22 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
       static_cast<std::int32_t>(std::bit_cast<std::uint32_t>(static_cast<float>(cube.edge)) >> 23));
   const auto deepest = hn::Set(di, layout.levels);
   const auto zero = hn::Zero(di), lastCell = hn::Set(di, (1 << layout.levels) - 1);
-  // Gathered well before it is read as vectors: a load that spans fresh narrower stores waits for
-  // them.
+  // Gathered, unless the slots are consecutive, well before it is read as vectors: a load that
+  // spans fresh narrower stores waits for them.
   constexpr std::size_t kGathered = 64;
   alignas(64) float gathered[6][kGathered];
   alignas(64) std::int32_t gatheredSlots[kGathered];
   alignas(64) std::int32_t made[32];
+  bool gathers = false;
 
   for (std::size_t i = 0; i < size; i += lanes) {
     const std::size_t count = size - i < lanes ? size - i : lanes, place = i % kGathered;
     if (slots && place == 0) {
-      for (std::size_t next = 0; next < kGathered && i + next < size; ++next) {
+      const std::size_t last = (size - i < kGathered ? size - i : kGathered) - 1;
+      // They ascend: equal keys stay in order.
+      first = static_cast<std::uint32_t>(slots[i]) - static_cast<std::uint32_t>(i);
+      gathers = static_cast<std::uint32_t>(slots[i + last]) - first != i + last;
+      for (std::size_t next = 0; gathers && next <= last; ++next) {
         const auto slot = static_cast<std::uint32_t>(slots[i + next]);
         gatheredSlots[next] = static_cast<std::int32_t>(slot);
         for (int k = 0; k < 3; ++k) {
@@ -60,10 +68,10 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
     hn::Vec<decltype(di)> cell[3];
     auto longest = hn::Zero(d);
     for (int k = 0; k < 3; ++k) {
-      const auto lower = slots ? hn::LoadU(d, gathered[k] + place)
-                               : hn::LoadU(d, boxes.lower[k].data() + first + i);
-      const auto upper = slots ? hn::LoadU(d, gathered[3 + k] + place)
-                               : hn::LoadU(d, boxes.upper[k].data() + first + i);
+      const auto lower =
+          hn::LoadU(d, gathers ? gathered[k] + place : boxes.lower[k].data() + first + i);
+      const auto upper =
+          hn::LoadU(d, gathers ? gathered[3 + k] + place : boxes.upper[k].data() + first + i);
       longest = hn::Max(longest, upper - lower);
       // The cube's corner in two floats: the differences are as good as exact near it.
       const float corner = static_cast<float>(cube.lower[k]);
@@ -84,8 +92,8 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
         hn::Or(cell[0], hn::Or(hn::ShiftLeft<1>(cell[1]), hn::ShiftLeft<2>(cell[2])));
     // Slot and key side by side are a little-endian key << 32 | slot.
     const auto key = hn::Or(hn::ShiftLeft<KeyLayout::kLevelBits>(morton), level);
-    const auto slot = slots ? hn::LoadU(di, gatheredSlots + place)
-                            : hn::Iota(di, static_cast<std::int32_t>(first + i));
+    const auto slot = gathers ? hn::LoadU(di, gatheredSlots + place)
+                              : hn::Iota(di, static_cast<std::int32_t>(first + i));
     auto* out = reinterpret_cast<std::int32_t*>(keys + i);
     if (count == lanes) {
       hn::StoreInterleaved2(slot, key, di, out);
@@ -106,6 +114,9 @@ HWY_EXPORT(octreeKeysKernel);
 
 void octreeKeys(const BoxArrays& boxes, const std::uint64_t* slots, std::uint32_t first,
                 std::size_t size, const Cube& cube, KeyLayout layout, std::uint64_t* keys) {
+  PALPATE_ASSERT(!slots || std::is_sorted(slots, slots + size, [](auto l, auto r) {
+    return static_cast<std::uint32_t>(l) < static_cast<std::uint32_t>(r);
+  }));
   HWY_DYNAMIC_DISPATCH(octreeKeysKernel)(boxes, slots, first, size, cube, layout, keys);
 }
 

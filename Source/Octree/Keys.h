@@ -43,7 +43,7 @@ struct KeyLayout {
 /// keys[i] = key << 32 | slot, for the box of each slot: level from its size, the deepest whose
 /// cell edge is not shorter than its longest side (a part in a thousand is kept for rounding), and
 /// cell from its centre.
-/// Shapes   slots: of `boxes`; null: first, first + 1, ...
+/// Shapes   slots: of `boxes`, ascending; null: first, first + 1, ...
 void octreeKeys(const BoxArrays& boxes, const std::uint64_t* slots, std::uint32_t first,
                 std::size_t size, const Cube&, KeyLayout, std::uint64_t* keys);
 

@@ -5,6 +5,7 @@
 #include "Octree/Fit.h"
 #include "Octree/Layout.h"
 
+#include <atomic>
 #include <cmath>
 #include <numeric>
 
@@ -95,12 +96,17 @@ void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const 
     }
     if ((to - from) & 1) f(second[keys[to - 1] >> topShift], to - 1);
   };
+  std::atomic<bool> ordered = true;
   threads->forChunks(size, grain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
     octreeKeys(m_boxes, slots ? slots + from : nullptr, static_cast<std::uint32_t>(begin + from),
                to - from, cube, layout, keys.data() + from);
+    if (!std::is_sorted(keys.data() + from, keys.data() + to))
+      ordered.store(false, std::memory_order_relaxed);
     std::fill_n(m_binCounts.data() + 2 * chunk * bins, 2 * bins, 0u);
     forHalves(chunk, from, to, [](std::uint32_t& count, std::size_t) { ++count; });
   });
+  for (std::size_t i = grain; i < size; i += grain) ordered = ordered && keys[i - 1] < keys[i];
+  if (ordered) return;  // as where nearly all are in one cell
   m_binBegins.resize(bins + 1);
   std::uint32_t sum = 0;
   for (std::size_t bin = 0; bin < bins; ++bin) {
