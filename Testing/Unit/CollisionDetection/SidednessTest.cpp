@@ -182,11 +182,11 @@ TEST(Sidedness, EveryMethodAnswersAsBruteForce) {
     for (Vector3d& p : nowA) p += randomPoint(random, -0.05, 0.15);
     for (Vector3d& p : nowB) p += randomPoint(random, -0.15, 0.05);
     const auto detect = [&](const Settings& settings, const PairSettings& pair, bool outer) {
-      PairRun run(settings, a, b, pair);
-      if (outer) run.detection().setCollisionFilter(run.a(), {1, 1, Sidedness::Outer});
-      if (outer) run.detection().setCollisionFilter(run.b(), {1, 1, Sidedness::Outer});
-      run.step(a.positions, nowA, b.positions, nowB);
-      return std::pair(run.answers(), run.data().validity().trusted);
+      PairRun once(settings, a, b, pair);
+      if (outer) once.detection().setCollisionFilter(once.a(), {1, 1, Sidedness::Outer});
+      if (outer) once.detection().setCollisionFilter(once.b(), {1, 1, Sidedness::Outer});
+      once.step(a.positions, nowA, b.positions, nowB);
+      return std::pair(once.answers(), once.data().validity().trusted);
     };
     std::vector<PairSettings> methods;
     for (const MethodCase& method : methodCases(0.05)) methods.push_back(method.settings);
@@ -209,8 +209,9 @@ TEST(Sidedness, EveryMethodAnswersAsBruteForce) {
         EXPECT_TRUE(std::includes(ofAll.begin(), ofAll.end(), ids.begin(), ids.end()));
       }
       // Automatic: nothing that comes from outside is missing.
-      if (pair.method == Method::Auto)
+      if (pair.method == Method::Auto) {
         EXPECT_TRUE(std::includes(ids.begin(), ids.end(), impacts.begin(), impacts.end()));
+      }
     }
     EXPECT_GT(impacts.size(), 5u);
   }
