@@ -1,8 +1,7 @@
 #include "Chart.h"
 
 #include "Report.h"
-
-#include <palpate/vtk/Picture.h>
+#include "Window.h"
 
 #include <vtkAxis.h>
 #include <vtkChartLegend.h>

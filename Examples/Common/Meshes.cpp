@@ -165,21 +165,6 @@ SceneMesh tubeAround(std::span<const Vector3d> line, double radius, int around) 
   return mesh;
 }
 
-SceneMesh specks(std::span<const Vector3d> positions, double radius) {
-  const Vector3d far = Vector3d::Constant(radius / std::sqrt(3.0));
-  const SceneMesh speck{
-      {far, far.cwiseProduct(Vector3d(-1, -1, 1)), far.cwiseProduct(Vector3d(-1, 1, -1)),
-       far.cwiseProduct(Vector3d(1, -1, -1))},
-      {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
-  SceneMesh mesh;
-  for (const Vector3d& p : positions) {
-    const std::size_t first = mesh.positions.size();
-    append(mesh, speck);
-    for (std::size_t i = first; i < mesh.positions.size(); ++i) mesh.positions[i] += p;
-  }
-  return mesh;
-}
-
 void append(SceneMesh& mesh, const SceneMesh& other) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());

@@ -42,9 +42,6 @@ SceneMesh capsule(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1, double r
 /// Open tube about a polyline of at least two positions, for pictures.
 SceneMesh tubeAround(std::span<const Eigen::Vector3d> line, double radius, int around);
 
-/// A tetrahedron about each position, as far out as the radius, for pictures.
-SceneMesh specks(std::span<const Eigen::Vector3d> positions, double radius);
-
 void append(SceneMesh& mesh, const SceneMesh& other);
 
 /// L: mean over every side of every triangle of all meshes.

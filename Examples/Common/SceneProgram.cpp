@@ -4,11 +4,13 @@
 #include "HtmlReport.h"
 #include "ParaView.h"
 #include "Report.h"
+#ifdef PALPATE_HAS_VTK
+#include "Window.h"
+#endif
 
 #include <palpate/Error.h>
 #ifdef PALPATE_HAS_VTK
 #include <palpate/vtk/MeshFile.h>
-#include <palpate/vtk/Picture.h>
 #endif
 
 #include <CLI/CLI.hpp>
@@ -31,6 +33,7 @@ struct Options {
   std::filesystem::path out = "out";
   int threads = 0;
   bool paraView = false;
+  bool view = false;
 };
 
 struct Column {
@@ -145,26 +148,11 @@ std::string page(const RunLog& log, const SceneProgram& program, const Options& 
 }
 
 #ifdef PALPATE_HAS_VTK
-std::string drawn(World& world) {
-  vtk::Picture picture;
-  std::vector<SceneMesh> tubes;
-  tubes.reserve(world.bodies().size());
+/// As it is at the frame's end.
+void place(World& world) {
   for (World::BodyId id = 0; id < world.bodies().size(); ++id)
-    picture.bodies.push_back({world.positions(id), world.bodies()[id].triangles});
-  for (World::BodyId id = 0; id < world.bodies().size(); ++id) {
-    const World::Body& body = world.bodies()[id];
-    if (body.kind == GeometryKind::Triangles) continue;
-    SceneMesh mesh = body.drawn;
-    for (Eigen::Vector3d& p : mesh.positions) p = body.rotation * p + body.translation;
-    if (body.kind == GeometryKind::Lines) mesh = tubeAround(world.positions(id), body.radius, 8);
-    if (body.kind == GeometryKind::Points) mesh = specks(world.positions(id), 6 * body.radius);
-    tubes.push_back(std::move(mesh));
-    picture.bodies.push_back({tubes.back().positions, tubes.back().triangles});
-  }
-  for (const World::Pair& pair : world.pairs())
-    if (world.times().contacts < 5000)  // more would hide all else
-      picture.contacts.push_back({pair.a, pair.b, &world.contacts(pair.a, pair.b)});
-  return vtk::toPng(vtk::draw(picture));
+    if (const World::Body& body = world.bodies()[id]; body.count > 0 && body.rest.empty())
+      world.detection().setPositions(body.id, world.positions(id));
 }
 #endif
 
@@ -172,7 +160,13 @@ std::string drawn(World& world) {
 std::string picture([[maybe_unused]] World& world) {
 #ifdef PALPATE_HAS_VTK
   try {
-    return drawn(world);
+    place(world);
+    vtk::Window window(world.detection(), false);
+    constexpr std::size_t kMostContacts = 5000;  // more would hide all else
+    if (world.times().contacts > kMostContacts)
+      for (const char key : {'c', 'n'}) window.press(key);
+    window.show();
+    return vtk::toPng(window.image());
   } catch (const Error& error) {
     if (error.code() != ErrorCode::NotAvailable) throw;
     std::printf("no picture           %s\n", error.what());
@@ -205,8 +199,12 @@ void logFrame(RunLog& log, LiveScene& scene, double milliseconds) {
   for (const auto& [name, value] : scene.values()) log.add(name, value);
 }
 
-void run(const SceneProgram& program, const Options& options) {
+void run(const SceneProgram& program, Options options) {
   const std::unique_ptr<LiveScene> scene = program.make(options.threads);
+#ifdef PALPATE_HAS_VTK
+  std::optional<vtk::Window> window;
+  if (options.view) window.emplace(scene->world().detection());
+#endif
   makeFolder(options.out);
   std::optional<ParaViewSeries> series;
   if (options.paraView) series.emplace(options.out / "paraview");
@@ -224,6 +222,10 @@ void run(const SceneProgram& program, const Options& options) {
     logFrame(log, *scene, passed.count());
     hash = nextHash(hash, scene->world());
     if (series) series->add(scene->world());
+#ifdef PALPATE_HAS_VTK
+    if (window) place(scene->world());
+    if (window && !window->show()) options.frames = frame + 1;
+#endif
   }
   std::printf("%s, %d frames\n%s", program.name.c_str(), options.frames,
               summary(log, program).c_str());
@@ -251,6 +253,11 @@ int runScene(const SceneProgram& program, int count, char** arguments) {
       ->capture_default_str();
   app.add_flag("--paraview", options.paraView,
                "also write OUT/paraview: .vtp files of bodies, contacts and octree, and a .pvd");
+#ifdef PALPATE_HAS_VTK
+  app.add_flag("--view", options.view,
+               "shows each frame in a window; keys: o cells, c contacts, n normals, u untrusted, t "
+               "times, r all in view, space waits, q closes; a click names the element");
+#endif
   if (program.addOptions) program.addOptions(app);
   app.failure_message(
       [](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });

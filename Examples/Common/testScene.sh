@@ -42,6 +42,10 @@ grep -q "no picture" "$folder/text" || fail "nothing said about the picture"
 "$program" $options --frames 2 --paraview --out "$folder/series" >"$folder/text" || fail "the series"
 [[ $(grep -c '<DataSet' "$folder"/series/paraview/*.pvd) -eq 6 ]] || fail "the .pvd has not three parts of two frames"
 [[ $(ls "$folder"/series/paraview/*.vtp | wc -l) -eq 6 && ! -e $folder/series/paraview.part ]] || fail "not six .vtp files"
+if [[ $hasVtk == 1 ]]; then
+  refused --view
+  grep -q display "$folder/messages" || fail "the display that is not there is not named"
+fi
 refused --frames 0
 refused --unknown
 refused --threads -1

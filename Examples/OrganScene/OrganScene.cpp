@@ -6,8 +6,9 @@
 
 #include <palpate/Palpate.h>
 #ifdef PALPATE_HAS_VTK
+#include "Window.h"
+
 #include <palpate/vtk/MeshFile.h>
-#include <palpate/vtk/Picture.h>
 #endif
 
 #include <CLI/CLI.hpp>
@@ -87,15 +88,10 @@ class Simulation {
 
 #ifdef PALPATE_HAS_VTK
   std::string png() const {
-    vtk::Picture picture;
-    for (std::size_t m = 0; m < m_ids.size(); ++m) {
-      picture.bodies.push_back({m_positions[m], m_scene.meshes[m].triangles});
-    }
-    for (const auto& [a, b] : m_scene.pairs) {
-      picture.contacts.push_back({a, b, &m_detection.collisionData(m_ids[a], m_ids[b])});
-    }
-    picture.octree = &m_detection.octree();
-    return vtk::toPng(vtk::draw(picture));
+    vtk::Window window(m_detection, false);
+    window.press('o');
+    window.show();
+    return vtk::toPng(window.image());
   }
 #endif
 

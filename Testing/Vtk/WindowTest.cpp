@@ -1,0 +1,252 @@
+#include "Window.h"
+#include "Scenes.h"
+
+#include <palpate/Palpate.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace palpate::vtk {
+namespace {
+
+using Eigen::Vector3d;
+
+struct Pixel {
+  int red, green, blue;
+  bool isWhite() const { return red == 255 && green == 255 && blue == 255; }
+  bool isGreen() const { return green > red + 60 && green > blue + 60; }
+  bool isMagenta() const { return red > green + 120 && blue > green + 120; }
+  /// Of a contact, which is near or far; bodies are paler.
+  bool isVivid() const {
+    return std::max({red, green, blue}) > 180 && std::min({red, green, blue}) < 40;
+  }
+};
+
+Pixel pixel(const Image& image, int x, int y) {
+  const std::size_t at = 3 * (static_cast<std::size_t>(y) * image.width + x);
+  return {image.rgb[at], image.rgb[at + 1], image.rgb[at + 2]};
+}
+
+std::size_t count(const Image& image, bool (Pixel::*question)() const) {
+  std::size_t found = 0;
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) found += (pixel(image, x, y).*question)();
+  }
+  return found;
+}
+
+/// The organs at a frame in which they touch.
+class WindowOnOrgans : public testing::Test {
+ protected:
+  WindowOnOrgans() : scene(scenes::organs()) {
+    for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+      scene.positions(24, m, scene.meshes[m].positions);
+      ids.push_back(
+          detection.addTriangleMesh(scene.meshes[m].positions, scene.meshes[m].triangles));
+    }
+    for (const auto& [a, b] : scene.pairs)
+      detection.addCollisionPair(ids[a], ids[b], {.thickness = scene.thickness});
+    detection.detectCollision();
+  }
+
+  scenes::Scene scene;
+  OctreeBasedCD detection;
+  std::vector<GeometryId> ids;
+};
+
+TEST_F(WindowOnOrgans, KeysSwitchWhatIsShown) {
+  Window window(detection, false, 320, 240);
+  EXPECT_TRUE(window.show());
+  const Image all = window.image();
+  ASSERT_EQ(all.rgb.size(), 320u * 240 * 3);
+  EXPECT_GT(count(all, &Pixel::isWhite), 320u * 240 / 8);
+  EXPECT_LT(count(all, &Pixel::isWhite), 320u * 240 * 7 / 8);
+  window.press('n');
+  const std::size_t spheres = count(window.image(), &Pixel::isVivid);
+  EXPECT_GT(count(all, &Pixel::isVivid), spheres);
+  window.press('c');
+  const Image bodies = window.image();
+  EXPECT_GT(spheres, count(bodies, &Pixel::isVivid) + 20);
+  EXPECT_EQ(count(bodies, &Pixel::isGreen), 0u);
+  for (int x = 0; x < 320; ++x)  // nothing cut off
+    for (const int y : {0, 239}) EXPECT_TRUE(pixel(bodies, x, y).isWhite());
+  window.press('o');
+  const Image byDepth = window.image();
+  EXPECT_GT(count(byDepth, &Pixel::isGreen), 320u * 240 / 50);
+  window.press('o');
+  const Image byOccupancy = window.image();
+  EXPECT_GT(count(byOccupancy, &Pixel::isGreen), 320u * 240 / 100);
+  EXPECT_NE(byDepth.rgb, byOccupancy.rgb);
+  window.press('o');
+  EXPECT_EQ(window.image().rgb, bodies.rgb);
+}
+
+TEST_F(WindowOnOrgans, FiveLinesWithTimesOfEachFrame) {
+  Window window(detection, true, 320, 240);
+  int frames = 0;
+  while (window.show()) {
+    for (std::size_t m = 0; m < ids.size(); ++m) {
+      std::vector<Vector3d> moved = scene.meshes[m].positions;
+      for (Vector3d& p : moved) p.x() += 0.001 * frames * static_cast<double>(m);
+      detection.setPositions(ids[m], moved);
+    }
+    detection.detectCollision();
+    if (++frames == 4) window.press('q');
+  }
+  EXPECT_EQ(frames, 4);
+  const Image graph = window.image();
+  window.press('t');
+  const Image without = window.image();
+  std::size_t inside = 0, outside = 0;
+  for (int y = 0; y < 240; ++y) {
+    for (int x = 0; x < 320; ++x) {
+      const Pixel a = pixel(graph, x, y), b = pixel(without, x, y);
+      const bool differs = a.red != b.red || a.green != b.green || a.blue != b.blue;
+      (x >= 190 && y < 86 ? inside : outside) += differs;
+    }
+  }
+  EXPECT_GT(inside, 500u);
+  EXPECT_EQ(outside, 0u);
+}
+
+/// Where the middle of the picture looks: from the front, somewhat to the right and above.
+const Vector3d kBack = Vector3d(0.5, -1.0, 0.6).normalized();
+
+TEST(Window, PickNamesTheElementUnderTheCursor) {
+  const scenes::SceneMesh ball = scenes::sphere(6);
+  const std::vector<Vector3d> line{-0.3 * kBack.unitOrthogonal() + 1.5 * kBack,
+                                   0.7 * kBack.unitOrthogonal() + 1.5 * kBack,
+                                   2 * kBack.unitOrthogonal()};
+  OctreeBasedCD detection;
+  detection.addTriangleMesh(ball.positions, ball.triangles);
+  {
+    Window window(detection, true, 300, 300);
+    window.show();
+    const std::string picked = window.pick(150, 150), start = "geometry 0, triangle ";
+    ASSERT_TRUE(picked.starts_with(start)) << picked;
+    const auto& [a, b, c] = ball.triangles.at(std::stoul(picked.substr(start.size())));
+    Eigen::Matrix3d corners;  // the ray from the middle leaves through the triangle
+    corners << ball.positions[a], ball.positions[b], ball.positions[c];
+    EXPECT_GT(corners.inverse().operator*(kBack).minCoeff(), -0.02) << picked;
+    EXPECT_EQ(window.pick(2, 2), "");
+  }
+  const GeometryId tool = detection.addAnalyticalGeometry(Sphere{Vector3d::Zero(), 1.2});
+  detection.setTransform(tool, Eigen::Matrix3d::Identity(), Vector3d::Zero());
+  Window window(detection, false, 300, 300);
+  window.show();
+  EXPECT_EQ(window.pick(150, 150), "geometry 1, a shape");
+}
+
+TEST(Window, DrawsEveryKindWhereItIs) {
+  // A thread, points and each shape, one at a time, about the middle of an open frame of specks.
+  const std::vector<Vector3d> frame{{-1, -1, -1}, {1, 1, 1}};
+  const std::vector<AnalyticalGeometry> shapes{
+      Sphere{{5, 0, 0}, 0.5},
+      Capsule{{4.7, 0, 0}, {5.3, 0, 0}, 0.3},
+      Plane{{5, 0, 0}, {1, 0, 0}},
+      Box{{5, 0, 0}, {0.5, 0.4, 0.3}},
+      Cylinder{{5, 0, -0.5}, {5, 0, 0.5}, 0.4},
+      ConvexHull{{{4.5, 0, 0}, {5.5, 0, 0}, {5, 0.5, 0}, {5, 0, 0.5}, {5, -0.5, -0.5}}}};
+  for (const AnalyticalGeometry& shape : shapes) {
+    OctreeBasedCD detection;
+    detection.addPointSet(frame, 0.01);
+    const GeometryId id = detection.addAnalyticalGeometry(shape);
+    detection.setTransform(id, Eigen::Matrix3d::Identity(), {-5, 0, 0});
+    Window window(detection, false, 200, 200);
+    window.show();
+    EXPECT_EQ(window.pick(100, 100), "geometry 1, a shape") << shape.index();
+    EXPECT_FALSE(pixel(window.image(), 100, 100).isWhite()) << shape.index();
+  }
+  OctreeBasedCD detection;
+  detection.addPointSet(frame, 0.01);
+  detection.addLineMesh(std::vector<Vector3d>{{-1, -1, 1}, {-0.5, -0.5, 0.5}, {1, 1, -1}},
+                        std::vector<Segment>{{0, 1}, {1, 2}}, 0.1);
+  detection.addPointSet(std::vector<Vector3d>{{9, 9, 9}, 0.5 * kBack});
+  Window window(detection, false, 200, 200);
+  window.show();
+  EXPECT_FALSE(count(window.image(), &Pixel::isWhite) == 200u * 200);
+}
+
+TEST(Window, ContactLiesBetweenItsFeatures) {
+  // Two tips that all but meet in the middle of the picture.
+  const std::vector<Vector3d> up{{-1, -1, -1}, {1, -1, -1}, {0, 1, -1}, {0, 0, -0.01}};
+  const std::vector<Vector3d> down{{-1, -1, 1}, {0, 1, 1}, {1, -1, 1}, {0, 0, 0.01}};
+  const std::vector<Triangle> sides{{0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+  OctreeBasedCD detection;
+  const GeometryId a = detection.addTriangleMesh(up, sides),
+                   b = detection.addTriangleMesh(down, sides);
+  detection.addCollisionPair(a, b, {.thickness = 0.05});
+  detection.detectCollision();
+  Window window(detection, false, 200, 200);
+  window.show();
+  window.press('n');
+  EXPECT_TRUE(pixel(window.image(), 100, 100).isVivid());
+  EXPECT_LT(count(window.image(), &Pixel::isVivid), 200u);
+  window.press('c');
+  EXPECT_FALSE(pixel(window.image(), 100, 100).isVivid());
+}
+
+TEST(Window, MarksWhatIsNotTrusted) {
+  scenes::SceneMesh upper = scenes::sheet(4), lower = scenes::sheet(4);
+  for (Vector3d& p : upper.positions) p.z() += 0.1;
+  OctreeBasedCD detection;
+  const GeometryId a = detection.addTriangleMesh(upper.positions, upper.triangles),
+                   b = detection.addTriangleMesh(lower.positions, lower.triangles);
+  detection.addCollisionPair(a, b, {.method = Method::Proximity, .thickness = 0.05});
+  detection.detectCollision();
+  for (Vector3d& p : upper.positions)
+    p.z() = -0.04;  // through the other, further than the thickness
+  detection.setPositions(a, upper.positions);
+  detection.detectCollision();
+  ASSERT_FALSE(detection.collisionData(a, b).validity().verticesBeyondA.empty());
+  Window window(detection, false, 300, 300);
+  window.show();
+  window.press('c');
+  window.press('n');
+  EXPECT_GT(count(window.image(), &Pixel::isMagenta), 50u);
+  window.press('u');
+  EXPECT_EQ(count(window.image(), &Pixel::isMagenta), 0u);
+}
+
+TEST(Window, OfNothingIsWhiteAndSizesAreRefused) {
+  const OctreeBasedCD nothing;
+  Window window(nothing, false, 200, 100);
+  window.show();
+  EXPECT_EQ(count(window.image(), &Pixel::isWhite), 200u * 100);
+  for (const auto& [width, height] : {std::pair(0, 10), {10, 20'000}}) {
+    try {
+      Window(nothing, false, width, height);
+      ADD_FAILURE() << "not refused";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::InvalidSettings);
+    }
+  }
+}
+
+TEST_F(WindowOnOrgans, BecomesPng) {
+  Window window(detection, false, 320, 240);
+  window.show();
+  const std::string png = toPng(window.image());
+  EXPECT_TRUE(png.starts_with("\x89PNG\r\n\x1a\n"));
+  EXPECT_TRUE(png.ends_with("IEND\xae\x42\x60\x82"));
+  EXPECT_GT(png.size(), 5'000u);
+}
+
+TEST(NoDisplay, IsSaidAndNotTheEnd) {
+  ASSERT_EQ(std::getenv("DISPLAY"), nullptr);
+  const OctreeBasedCD nothing;
+  for (const bool onScreen : {false, true}) {
+    try {
+      Window(nothing, onScreen);
+      ADD_FAILURE() << "drawn without a display";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::NotAvailable);
+      EXPECT_NE(std::string(error.what()).find("xvfb-run"), std::string::npos);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate::vtk
