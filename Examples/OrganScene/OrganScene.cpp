@@ -155,7 +155,7 @@ Options parse(CLI::App& app, int count, char** arguments) {
   app.add_option("--out", options.out, "folder for frames.csv and scene.png")
       ->capture_default_str();
   app.add_option("--mesh", options.meshes,
-                 "OBJ, STL, PLY, VTK or VTP files to use instead of the organs");
+                 "OBJ, STL, PLY or VTK files to use instead of the organs");
   app.add_option("--threads", options.threads, "0: all cores")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();

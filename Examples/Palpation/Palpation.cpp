@@ -190,7 +190,7 @@ int main(int count, char** arguments) {
        .addOptions =
            [&](CLI::App& app) {
              app.add_option("--mesh", files.organ,
-                            "the organ, closed: OBJ, STL, PLY, VTK or VTP, in mm");
+                            "the organ, closed: OBJ, STL, PLY or VTK, in mm");
              app.add_option("--tool", files.tool,
                             "the tool, closed, lowest at its tip, in the organ's unit");
            },
