@@ -105,6 +105,8 @@ class GeometryTable {
   static void updateMotion(Geometry&, const Threads&);
   /// Octrees for the positions now, or the whole step.
   void updateOctrees(const OctreeSettings&, const Threads&);
+  /// Boxes of a swept octree over the step's first part, or over all of it again.
+  static void sweepUpTo(Geometry&, double part, const Threads&);
   bool updatedAlone() const { return m_updatedAlone; }  ///< by one thread, which has the data
   void endFrame();
   std::uint64_t framesEnded() const { return m_framesEnded; }

@@ -120,5 +120,51 @@ TEST(TimeTolerance, AutoFindsWhatContinuousFinds) {
   }
 }
 
+/// Of many triangles boxes sweep no further than to an impact that is known; whatever was known
+/// when, the time is that of all contacts, and the octrees sweep the whole step again.
+TEST(Earliest, OfManyTrianglesIsThatOfAllContacts) {
+  Random random(9);
+  testing::Mesh a = testing::soup(random, 4500, 0.02), b = testing::soup(random, 4500, 0.02);
+  for (const double speed : {1e-3, 1e-2, 0.1}) {
+    Positions nowA = a.positions, nowB = b.positions;
+    // Half of them hardly move.
+    for (auto* now : {&nowA, &nowB})
+      for (Eigen::Vector3d& p : *now)
+        p += testing::randomPoint(random, -speed, speed) * (p.x() > 0.5 ? 1.0 : 0.01);
+    for (const double thickness : {0.0, 1e-4})
+      for (const bool self : {false, true}) {
+        SCOPED_TRACE(::testing::Message() << speed << " " << thickness << " " << self);
+        const auto run = [&](Contacts contacts, int threads,
+                             std::vector<TrianglePair>& candidates) {
+          OctreeBasedCD detection({.threads = threads});
+          const GeometryId first = detection.addTriangleMesh(a.positions, a.triangles),
+                           second =
+                               self ? first : detection.addTriangleMesh(b.positions, b.triangles);
+          detection.addCollisionPair(
+              first, second,
+              {.method = Method::Continuous, .thickness = thickness, .contacts = contacts});
+          detection.setPositions(first, a.positions, nowA);
+          if (!self) detection.setPositions(second, b.positions, nowB);
+          detection.detectCollision();
+          EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
+          const double earliest = detection.collisionData(first, second).earliestTimeOfImpact();
+          detection.setPositions(first, a.positions, nowA);
+          detection.collectCandidates();
+          const auto found = detection.candidatePairs(first, second);
+          candidates.assign(found.begin(), found.end());
+          return earliest;
+        };
+        std::vector<TrianglePair> expected;
+        const double time = run(Contacts::All, 1, expected);
+        ASSERT_LE(time, 1.0);
+        for (const int threads : {1, 2}) {
+          std::vector<TrianglePair> candidates;
+          EXPECT_EQ(run(Contacts::Earliest, threads, candidates), time);
+          EXPECT_EQ(candidates, expected);
+        }
+      }
+  }
+}
+
 }  // namespace
 }  // namespace palpate
