@@ -48,6 +48,7 @@ std::array<std::uint32_t, 2> idsOf(const TrianglePair& pair) { return {pair.a, p
 std::array<std::uint32_t, 3> idsOf(const ShapeContact& c) {
   return {static_cast<std::uint32_t>(c.element), c.id, c.vertices[1]};
 }
+int idsOf(const ShapeShapeContact&) { return 0; }  // there is one
 
 /// Which contacts a sample of features tells everything about.
 class Coverage {
@@ -205,6 +206,9 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
   compare(
       expected.shape, data.shape(), [&](const auto& c) { return coverage.ofShape(c); },
       into(List::Shape));
+  compare(
+      expected.shapeShape, data.shapeShape(), [](const auto&) { return true; },
+      into(List::ShapeShape));
 }
 
 CollisionProblem pairAlone(const CollisionProblem& whole, GeometryId idA, GeometryId idB) {

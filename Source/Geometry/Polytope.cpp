@@ -116,7 +116,7 @@ std::uint32_t Polytope::newFace(const Triangle& corners) {
     m_free.pop_back();
   }
   const Vector3d &a = m_points[corners[0]], &b = m_points[corners[1]], &c = m_points[corners[2]];
-  const Vector3d normal = unitCross(a, b, a, c);
+  const Vector3d normal = unitCross(a, b, a, c, &m_decisions.undecided);
   m_faces[face] = {corners, {kNone, kNone, kNone}};
   m_planes[face] = {normal, dot(normal, a), face};
   m_sees[face] = 0;
@@ -126,8 +126,8 @@ std::uint32_t Polytope::newFace(const Triangle& corners) {
 bool Polytope::add(const Vector3d& p) {
   m_visible.clear();
   for (std::uint32_t f = 0; f < m_faces.size(); ++f) {
-    m_sees[f] =
-        m_planes[f].face != kNone && volumeSign(corner(f, 0), corner(f, 1), corner(f, 2), p) > 0;
+    m_sees[f] = m_planes[f].face != kNone &&
+                orient3d(corner(f, 0), corner(f, 1), corner(f, 2), p, m_decisions) > 0;
     if (m_sees[f]) m_visible.push_back(f);
   }
   if (m_visible.empty()) return false;

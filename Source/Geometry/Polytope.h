@@ -4,6 +4,7 @@
 
 #include "Core/Buffer.h"
 #include "Math/ClosestPoint.h"
+#include "Math/Predicates.h"
 
 #include <array>
 #include <cstdint>
@@ -49,6 +50,8 @@ class Polytope {
 
   /// Of a hull that is not to grow: all of them are its own.
   const std::vector<Eigen::Vector3d>& points() const { return m_points; }
+  /// Left to exact arithmetic by start() and add(), ever.
+  std::size_t exactDecisions() const { return m_decisions.undecided; }
   std::size_t faceCount() const { return m_faces.size(); }
   const Triangle& corners(std::uint32_t face) const { return m_faces[face].corners; }
 
@@ -102,7 +105,8 @@ class Polytope {
   Buffer<Face> m_faces;
   Buffer<Plane> m_planes;                           ///< of the faces, and of a plate's border
   Buffer<std::uint32_t> m_free, m_visible, m_next;  ///< scratch of add()
-  Buffer<std::uint8_t> m_sees;                      ///< per face: the point that is being added
+  SignCounts m_decisions;
+  Buffer<std::uint8_t> m_sees;  ///< per face: the point that is being added
 };
 
 }  // namespace palpate

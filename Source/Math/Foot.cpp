@@ -189,7 +189,8 @@ Foot footBetweenEdges(const EdgePair& edges) {
   return isTrue(foot, p0, p1, q0, q1) ? *foot : exact::footBetweenLines(p0, p1, q0, q1);
 }
 
-Vector3d unitCross(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
+Vector3d unitCross(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d,
+                   std::size_t* exactDecisions) {
   const auto moderate = [](const Difference& edge) -> Difference {
     const double extent = largest(edge.high);
     if (isModerate(extent)) return edge;
@@ -203,6 +204,7 @@ Vector3d unitCross(const Vector3d& a, const Vector3d& b, const Vector3d& c, cons
     if (square > kSliverAngleSquare * dot(u.high, u.high) * dot(v.high, v.high))
       return normal / std::sqrt(square);
   }
+  if (exactDecisions) ++*exactDecisions;
   return exact::unitCross(a, b, c, d);
 }
 

@@ -35,9 +35,11 @@ struct EdgePair {
 /// p0 + s (p1 - p0) seen from q0 + t (q1 - q0), both inside edges that are not parallel.
 Foot footBetweenEdges(const EdgePair&);
 
-/// Unit vector along (b - a) x (d - c), zero where that is.
+/// Unit vector along (b - a) x (d - c), zero where that is. exactDecisions: counts up where
+/// floating point could not tell.
 Eigen::Vector3d unitCross(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                          const Eigen::Vector3d& c, const Eigen::Vector3d& d);
+                          const Eigen::Vector3d& c, const Eigen::Vector3d& d,
+                          std::size_t* exactDecisions = nullptr);
 
 /// The coordinate axis of the least component, the first of equals.
 Eigen::Vector3d axisOfLeast(const Eigen::Vector3d& extents);

@@ -107,8 +107,10 @@ void findShapeContacts(const MeshPair& pair, std::span<const std::uint32_t> prim
 }
 
 void findShapePair(const MeshPair& pair, ContactBuffers& out) {
+  const std::size_t before = out.shapePair.grown.exactDecisions();
   const auto [pointA, pointB, normal, distance] =
       pair.a.shape->distanceFrom(*pair.b.shape, out.shapePair);
+  out.exactDecisions += out.shapePair.grown.exactDecisions() - before;
   ++out.featurePairs;
   if (distance <= pair.settings.thickness)
     out.shapeShape.push_back({pointA, pointB, normal, distance});

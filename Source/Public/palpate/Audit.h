@@ -24,10 +24,11 @@ struct AuditFailure {
     EdgeEdge,
     IntersectingTriangles,
     Earliest,
-    Shape
+    Shape,
+    ShapeShape
   };
   using Contact = std::variant<std::monostate, VertexTriangleContact, EdgeEdgeContact, TrianglePair,
-                               ShapeContact>;
+                               ShapeContact, ShapeShapeContact>;
 
   GeometryId a, b;          ///< the pair, as it was added
   std::uint64_t frame = 0;  ///< counts detectCollision() from 1

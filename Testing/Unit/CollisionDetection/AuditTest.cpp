@@ -130,6 +130,43 @@ void expectEachFault(const Scene& scene, List list,
   }
 }
 
+TEST(Audit, FiresForTwoShapes) {
+  const auto boxAt = [](const Eigen::Vector3d& centre) {
+    TriangleMesh mesh;
+    mesh.shape.emplace(Box{centre, {1, 1, 1}}, RigidTransform{});
+    return mesh;
+  };
+  const TriangleMesh a = boxAt({0, 0, 0}), b = boxAt({0, 0, 2.5});
+  const PairSettings settings{.method = Method::Proximity, .thickness = 1};
+  const CollisionPair pair{GeometryId{0}, GeometryId{1}, settings};
+  const auto audited = [&](const CollisionData::Contents& contents) {
+    std::vector<AuditFailure> out;
+    audit({a, b, settings}, pair, CollisionData(contents), kEverything, 1, out);
+    return out;
+  };
+  OctreeBasedCD detection;
+  detection.addAnalyticalGeometry(Box{{0, 0, 0}, {1, 1, 1}});
+  detection.addAnalyticalGeometry(Box{{0, 0, 2.5}, {1, 1, 1}});
+  detection.addCollisionPair(pair.a, pair.b, settings);
+  detection.detectCollision();
+  const auto good = CollisionData(detection.collisionData(pair.a, pair.b)).contents();
+  ASSERT_EQ(good.shapeShape.size(), 1u);
+  EXPECT_TRUE(audited(good).empty());
+  const auto expectFault = [&](const CollisionData::Contents& faulty, Fault fault) {
+    const std::vector<AuditFailure> failures = audited(faulty);
+    ASSERT_EQ(failures.size(), 1u);
+    EXPECT_EQ(failures[0].fault, fault);
+    EXPECT_EQ(failures[0].list, List::ShapeShape);
+  };
+  expectFault({}, Fault::Missing);
+  CollisionData::Contents faulty = good;
+  faulty.shapeShape[0].distance = 0.25;
+  expectFault(faulty, Fault::Different);
+  faulty = good;
+  faulty.shapeShape.push_back(good.shapeShape[0]);
+  expectFault(faulty, Fault::Invented);
+}
+
 TEST(Audit, FiresForEachContactTakenOutAddedOrChanged) {
   std::size_t contacts = 0;
   forEachScene([&](const Scene& scene) {

@@ -174,10 +174,40 @@ TEST(SteadyFrame, AllocatesNothingWithShapes) {
                              {0.02 * (frame % 10), 0, 0.05});
     detection.detectCollision();
     contacts += detection.statistics().contacts;
-    EXPECT_EQ(detection.statistics().exactDecisions, 0u);
   }
   EXPECT_EQ(allocations - before, 0u);
   EXPECT_GT(contacts, 1000u);
+}
+
+/// Axes parallel to each other: exact arithmetic has its integers, and tells how often it was
+/// asked.
+TEST(SteadyFrame, CountsWhatExactArithmeticDecidesOfShapes) {
+  OctreeBasedCD detection(Settings{.threads = 1});
+  std::vector<GeometryId> tools;
+  for (const AnalyticalGeometry& tool : std::vector<AnalyticalGeometry>{
+           Box{{0, 0, 0}, {0.3, 0.2, 0.1}}, Box{{0, 0, 0}, {0.25, 0.25, 0.25}},
+           Cylinder{{0, 0, -0.3}, {0, 0, 0.3}, 0.2}, Capsule{{0, 0, -0.2}, {0, 0, 0.2}, 0.1}}) {
+    tools.push_back(detection.addAnalyticalGeometry(tool));
+    for (const GeometryId other : tools)
+      if (other != tools.back())
+        detection.addCollisionPair(other, tools.back(), {Method::Proximity, 10});
+  }
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  std::size_t exact = 0;
+  for (const bool parallel : {false, true})
+    for (int frame = 0; frame < 20; ++frame) {
+      for (std::size_t i = 0; i < tools.size(); ++i)
+        detection.setTransform(
+            tools[i], parallel || i % 2 ? Eigen::Matrix3d::Identity() : turn,
+            0.1 * static_cast<double>(i + 1) * Eigen::Vector3d(1, 0.5, 0.01 * (frame % 10)));
+      const IntegersApart apart;
+      const std::size_t before = allocations;
+      detection.detectCollision();
+      if (frame >= 10) EXPECT_EQ(allocations - before, 0u);
+      exact += parallel ? detection.statistics().exactDecisions : 0;
+    }
+  EXPECT_GT(exact, 20u);
 }
 
 TEST(SteadyFrame, AllocatesNothingWithRigidBodies) {
