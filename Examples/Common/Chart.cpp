@@ -1,7 +1,7 @@
 #include "Chart.h"
 
 #include "Report.h"
-#include "Window.h"
+#include <palpate/vtk/Window.h>
 
 #include <vtkAxis.h>
 #include <vtkChartLegend.h>

@@ -4,13 +4,11 @@
 #include "HtmlReport.h"
 #include "ParaView.h"
 #include "Report.h"
-#ifdef PALPATE_HAS_VTK
-#include "Window.h"
-#endif
 
 #include <palpate/Error.h>
 #ifdef PALPATE_HAS_VTK
 #include <palpate/vtk/MeshFile.h>
+#include <palpate/vtk/Window.h>
 #endif
 
 #include <CLI/CLI.hpp>

@@ -6,9 +6,8 @@
 
 #include <palpate/Palpate.h>
 #ifdef PALPATE_HAS_VTK
-#include "Window.h"
-
 #include <palpate/vtk/MeshFile.h>
+#include <palpate/vtk/Window.h>
 #endif
 
 #include <CLI/CLI.hpp>

@@ -24,16 +24,16 @@ template <class T>
 constexpr NumberType kType{sizeof(T), decode<T>};
 
 constexpr std::pair<std::string_view, NumberType> kTypes[]{
-    {" int8 char signed_char ", kType<std::int8_t>},
-    {" uint8 uchar unsigned_char ", kType<std::uint8_t>},
-    {" int16 short ", kType<std::int16_t>},
-    {" uint16 ushort unsigned_short ", kType<std::uint16_t>},
-    {" int32 int vtkIdType vtkidtype ", kType<std::int32_t>},
-    {" uint32 uint unsigned_int ", kType<std::uint32_t>},
-    {" vtktypeint64 long ", kType<std::int64_t>},
-    {" vtktypeuint64 unsigned_long ", kType<std::uint64_t>},
-    {" float32 float ", kType<float>},
-    {" float64 double ", kType<double>}};
+    {" Int8 int8 char signed_char ", kType<std::int8_t>},
+    {" UInt8 uint8 uchar unsigned_char ", kType<std::uint8_t>},
+    {" Int16 int16 short ", kType<std::int16_t>},
+    {" UInt16 uint16 ushort unsigned_short ", kType<std::uint16_t>},
+    {" Int32 int32 int vtkIdType vtkidtype ", kType<std::int32_t>},
+    {" UInt32 uint32 uint unsigned_int ", kType<std::uint32_t>},
+    {" Int64 vtktypeint64 long ", kType<std::int64_t>},
+    {" UInt64 vtktypeuint64 unsigned_long ", kType<std::uint64_t>},
+    {" Float32 float32 float ", kType<float>},
+    {" Float64 float64 double ", kType<double>}};
 
 }  // namespace
 

@@ -54,7 +54,8 @@ Polygons polygonsOf(const std::filesystem::path& path) {
   if (kind == ".ply") return readPly(content);
   if (kind == ".vtk") return readLegacyVtk(content);
   if (kind == ".stl") return readStl(content);
-  throw FileFault{"its name does not end in .obj, .stl, .ply or .vtk"};
+  if (kind == ".vtp") return readVtp(content);
+  throw FileFault{"its name does not end in .obj, .stl, .ply, .vtk or .vtp"};
 }
 
 void checkPositions(const std::vector<Eigen::Vector3d>& positions) {

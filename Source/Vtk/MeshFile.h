@@ -60,5 +60,6 @@ Polygons readObj(std::string_view content);
 Polygons readPly(std::string_view content);
 Polygons readLegacyVtk(std::string_view content);
 Polygons readStl(std::string_view content);
+Polygons readVtp(std::string_view content);
 
 }  // namespace palpate::vtk

@@ -1,5 +1,6 @@
 #include "Vtk/MeshFile.h"
 
+#include <algorithm>
 #include <optional>
 
 namespace palpate::vtk {
@@ -54,6 +55,16 @@ std::vector<Element> readHeader(FileText& text) {
   throw FileFault{"its PLY header ends too early"};
 }
 
+/// A face's corners; strips one after the other, parted by -1.
+void addList(const std::string& element, const std::vector<double>& list, Polygons& polygons) {
+  if (element == "face") polygons.corners.push_back(list);
+  for (auto begin = list.begin(); element == "tristrips" && begin != list.end();) {
+    const auto end = std::find(begin, list.end(), -1.0);
+    polygons.addStrip({begin, end});
+    begin = end + (end != list.end());
+  }
+}
+
 }  // namespace
 
 Polygons readPly(std::string_view content) {
@@ -66,9 +77,7 @@ Polygons readPly(std::string_view content) {
         if (countType) {
           const std::size_t length = toCount(text.number(*countType), text.left());
           const std::vector<double> list = text.numbers(type, length);
-          if (element.name == "face" && name.starts_with("vertex_ind"))
-            polygons.corners.push_back(list);
-          if (element.name == "tristrips") throw FileFault{"it has triangle strips, not faces"};
+          if (name.starts_with("vertex_ind")) addList(element.name, list, polygons);
           continue;
         }
         const double value = text.number(type);

@@ -76,6 +76,35 @@ const std::string kVtk5 =
     "0.5 0 1 0 7 7 7\n"
     "METADATA\nINFORMATION 0\n\nPOLYGONS 2 4\nOFFSETS vtktypeint64\n0 4\nCONNECTIVITY "
     "vtktypeint64\n0 1 2 3\n";
+const std::string kVtp =
+    "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" "
+    "byte_order=\"LittleEndian\"><PolyData>"
+    "<Piece NumberOfPoints=\"5\" NumberOfPolys=\"1\"><Points>"
+    "<DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">0 0 0 1 0 0 1 1 0.5 0 1 "
+    "0 7 7 7</DataArray>"
+    "</Points><Polys><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">0 1 2 "
+    "3</DataArray>"
+    "<DataArray type=\"Int64\" Name=\"offsets\" "
+    "format=\"ascii\">4</DataArray></Polys></Piece></PolyData></VTKFile>\n";
+// The same as VTK's own writer leaves it: compressed, appended.
+const std::string kAppendedVtp =
+    "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" "
+    "byte_order=\"LittleEndian\" "
+    "header_type=\"UInt32\" compressor=\"vtkZLibDataCompressor\">\n<PolyData>\n"
+    "<Piece NumberOfPoints=\"5\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" "
+    "NumberOfPolys=\"1\">\n"
+    "<Points><DataArray type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\" "
+    "format=\"appended\" offset=\"0\"/>"
+    "</Points>\n<Polys><DataArray type=\"Int64\" Name=\"connectivity\" format=\"appended\" "
+    "offset=\"156\"/>\n"
+    "<DataArray type=\"Int64\" Name=\"offsets\" format=\"appended\" "
+    "offset=\"208\"/></Polys>\n</Piece>\n</PolyData>\n"
+    "<AppendedData encoding=\"base64\">\n"
+    "_AQAAAACAAAB4AAAAGwAAAA==eJxjYMAHPtjjF4fRD+"
+    "yxy8OAjAM6DQBm6gbwAAAAAACAAAAAAAAAAAAAAACAAAAAAAAAAAAAAACAAAAAAAAA"
+    "AAAAAACAAAAAAAAAAAAAAACAAAAAAAAAAAAAAACAAAAAAAAAAQAAAACAAAAgAAAAEwAAAA=="
+    "eJxjYIAARijNBKWZoTQAAHAABw=="
+    "AQAAAACAAAAIAAAACwAAAA==eJxjYYAAAAAoAAU=\n</AppendedData>\n</VTKFile>\n";
 const std::string kStl =
     "solid square\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 "
     "0.5\nendloop\nendfacet\n"
@@ -131,6 +160,8 @@ const std::vector<std::pair<std::string, std::string>> kGood{{"a.obj", kObj},
                                                              {"a.vtk", kVtk},
                                                              {"a5.vtk", kVtk5},
                                                              {"binary.vtk", binaryVtk()},
+                                                             {"a.vtp", kVtp},
+                                                             {"appended.vtp", kAppendedVtp},
                                                              {"a.stl", kStl},
                                                              {"binary.stl", binaryStl()}};
 
@@ -194,7 +225,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
 }
 
 TEST_F(MeshFiles, MissingEmptyFoldersAndUnknownKindsAreRefused) {
-  for (const char* kind : {".obj", ".ply", ".vtk", ".stl"}) {
+  for (const char* kind : {".obj", ".ply", ".vtk", ".vtp", ".stl"}) {
     EXPECT_NE(refusal(folder / ("missing" + std::string(kind))).find("no such file"),
               std::string::npos);
     EXPECT_NE(refusal("empty" + std::string(kind), "").find("empty"), std::string::npos);
@@ -214,6 +245,24 @@ TEST_F(MeshFiles, IndicesOutOfRangeAreRefused) {
   EXPECT_NE(refusal("low.ply", replaced(kPly, "2 3\n", "2 -1\n")).find(reason), std::string::npos);
   EXPECT_NE(refusal("high.vtk", replaced(kVtk, "2 3\n", "2 5\n")).find(reason), std::string::npos);
   EXPECT_NE(refusal("high5.vtk", replaced(kVtk5, "2 3\n", "2 5\n")).find(reason),
+            std::string::npos);
+  EXPECT_NE(refusal("high.vtp", replaced(kVtp, "2 3<", "2 5<")).find(reason), std::string::npos);
+  EXPECT_NE(refusal("low.vtp", replaced(kVtp, "2 3<", "2 -9<")).find(reason), std::string::npos);
+  EXPECT_NE(refusal("half.vtp", replaced(kVtp, "2 3<", "2 2.5<")).find(reason), std::string::npos);
+}
+
+TEST_F(MeshFiles, PiecesOfAVtpFileAreOneMeshAndKeepToTheirVertices) {
+  const std::size_t begin = kVtp.find("<Piece"), end = kVtp.find("</PolyData>");
+  const std::string piece = kVtp.substr(begin, end - begin);
+  const auto withFirst = [&](const std::string& first) {
+    return std::string(kVtp).insert(begin, first);
+  };
+  const MeshFile mesh = read("two.vtp", withFirst(piece));
+  EXPECT_EQ(mesh.positions.size(), 10u);
+  EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {5, 6, 7}, {5, 7, 8}}));
+  EXPECT_NE(refusal("into.vtp", withFirst(replaced(piece, "2 3<", "2 6<"))).find("polygon 0"),
+            std::string::npos);
+  EXPECT_NE(refusal("back.vtp", replaced(withFirst(piece), "2 3<", "2 -1<")).find("polygon 1"),
             std::string::npos);
 }
 
@@ -238,9 +287,12 @@ TEST_F(MeshFiles, CountsLargerThanTheFileAreRefused) {
             std::string::npos);
   EXPECT_NE(refusal("a.vtk", replaced(kVtk, "POINTS 5", "POINTS 400000000000")).find(reason),
             std::string::npos);
+  EXPECT_NE(refusal("a.vtp", replaced(kVtp, "Points=\"5\"", "Points=\"40000000000\"")).find(reason),
+            std::string::npos);
   EXPECT_NE(refusal("list.ply", replaced(kPly, "4 0 1 2 3", "2000000000 0 1 2 3")), "");
   EXPECT_NE(refusal("cell.vtk", replaced(kVtk, "4 0 1 2 3", "9 0 1 2 3")).find("wrong number"),
             std::string::npos);
+  EXPECT_NE(refusal("offset.vtp", replaced(kVtp, ">4<", ">9<")), "");
 }
 
 TEST_F(MeshFiles, OtherDataSetsAreRefused) {

@@ -1,4 +1,4 @@
-#include "Window.h"
+#include <palpate/vtk/Window.h>
 #include "Scenes.h"
 
 #include <palpate/Palpate.h>

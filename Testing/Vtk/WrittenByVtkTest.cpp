@@ -9,6 +9,7 @@
 #include <vtkPolyData.h>
 #include <vtkPolyDataWriter.h>
 #include <vtkSTLWriter.h>
+#include <vtkXMLPolyDataWriter.h>
 
 #include <filesystem>
 #include <random>
@@ -57,12 +58,30 @@ class WrittenByVtk : public testing::Test {
     EXPECT_TRUE(read.triangles == triangles);
   }
 
-  static constexpr std::uint32_t kVertices = 1500;
+  static constexpr std::uint32_t kVertices = 1500;  // more than one compressed block
   std::filesystem::path path;
   std::vector<Eigen::Vector3d> positions;
   std::vector<Triangle> triangles;
   vtkNew<vtkPolyData> mesh;
 };
+
+TEST_F(WrittenByVtk, Xml) {
+  using Writer = vtkXMLPolyDataWriter;
+  for (const int mode : {Writer::Ascii, Writer::Binary, Writer::Appended})
+    for (const int encoded : {0, 1})
+      for (const int compressor : {Writer::NONE, Writer::ZLIB, Writer::LZ4, Writer::LZMA})
+        for (const int header : {Writer::UInt32, Writer::UInt64})
+          for (const int order : {Writer::LittleEndian, Writer::BigEndian}) {
+            SCOPED_TRACE(testing::Message() << mode << encoded << compressor << header << order);
+            vtkNew<Writer> writer;
+            writer->SetDataMode(mode);
+            writer->SetEncodeAppendedData(encoded);
+            writer->SetCompressorType(compressor);
+            writer->SetHeaderType(header);
+            writer->SetByteOrder(order);
+            expectReadBack(*writer, ".vtp");
+          }
+}
 
 TEST_F(WrittenByVtk, Legacy) {
   for (const int version :

@@ -17,7 +17,7 @@ struct MeshFile {
   operator TriangleMeshView() const { return {positions, triangles}; }
 };
 
-/// Triangle mesh from an OBJ, STL, PLY or VTK (legacy) file; the kind follows from the file's
+/// Triangle mesh from an OBJ, STL, PLY, VTK (legacy) or VTP file; the kind follows from the file's
 /// name.
 ///
 /// Shapes   the file's own vertices in its order, also those in no triangle; normals, texture coordinates and

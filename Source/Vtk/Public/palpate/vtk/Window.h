@@ -1,5 +1,6 @@
 #pragma once
 
+#include <palpate/Export.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include <cstdint>
@@ -15,7 +16,7 @@ struct Image {
 };
 
 /// The content of a PNG file.
-std::string toPng(const Image&);
+PALPATE_EXPORT std::string toPng(const Image&);
 
 /// What an OctreeBasedCD was given and answers: bodies and tools, translucent; cells in green;
 /// contacts midway of their two points, and their normals, coloured by distance (red: near);
@@ -34,7 +35,7 @@ std::string toPng(const Image&);
 /// Needs    the OctreeBasedCD stays where it is, and as it is but for positions and transforms from show()
 ///          to press() and pick().
 /// Threads  all calls from the thread that made it.
-class Window {
+class PALPATE_EXPORT Window {
  public:
   explicit Window(const OctreeBasedCD&, bool onScreen = true, int width = 1280, int height = 960);
   ~Window();

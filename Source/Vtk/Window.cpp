@@ -1,4 +1,4 @@
-#include "Window.h"
+#include <palpate/vtk/Window.h>
 
 #include <palpate/Error.h>
 

@@ -1,0 +1,168 @@
+#include "Vtk/MeshFile.h"
+
+#include <vtkBase64Utilities.h>
+#include <vtkCallbackCommand.h>
+#include <vtkLZ4DataCompressor.h>
+#include <vtkLZMADataCompressor.h>
+#include <vtkNew.h>
+#include <vtkSmartPointer.h>
+#include <vtkZLibDataCompressor.h>
+
+#include <algorithm>
+#include <cctype>
+
+namespace palpate::vtk {
+
+// VTK 9.1 uncompresses its blocks, and no more: its reader of these files prints past its
+// observers, divides by a damaged header's zero, and allocates and copies what its sizes say.
+
+namespace {
+
+/// Up to what is none; padding ends a group, not the text.
+std::string fromBase64(std::string_view text) {
+  std::string bytes, group;
+  for (const char c : text) {
+    if (std::isspace(static_cast<unsigned char>(c))) continue;
+    if ((group += c).size() < 4) continue;
+    unsigned char decoded[3];
+    const int count = vtkBase64Utilities::DecodeTriplet(group[0], group[1], group[2], group[3],
+                                                        decoded, decoded + 1, decoded + 2);
+    const std::size_t padding = group.find('=');  // VTK takes it anywhere
+    if (count == 0 || padding < 2 || group.find_first_not_of('=', padding) != group.npos) break;
+    bytes.append(decoded, decoded + count);
+    group.clear();
+  }
+  return bytes;
+}
+
+/// From an element's first tag to its last.
+std::string_view elementIn(std::string_view text, const std::string& name) {
+  const std::size_t begin = text.find("<" + name), end = text.find("</" + name);
+  if (begin == text.npos) throw FileFault{"it holds no " + name};
+  if (end == text.npos || end < begin) throw FileFault{"it ends too early"};
+  return text.substr(begin, end - begin);
+}
+
+/// Of an element's tag; empty if it has none.
+std::string_view attributeOf(std::string_view element, const std::string& name) {
+  const std::string_view tag = element.substr(0, element.find('>'));
+  const std::size_t begin = tag.find(" " + name + "=\"");
+  if (begin == tag.npos) return "";
+  const std::string_view value = tag.substr(begin + name.size() + 3);
+  return value.substr(0, value.find('"'));
+}
+
+vtkSmartPointer<vtkDataCompressor> compressorNamed(std::string_view name) {
+  if (name.empty()) return nullptr;
+  vtkSmartPointer<vtkDataCompressor> compressor;
+  if (name == "vtkZLibDataCompressor") compressor = vtkSmartPointer<vtkZLibDataCompressor>::New();
+  if (name == "vtkLZ4DataCompressor") compressor = vtkSmartPointer<vtkLZ4DataCompressor>::New();
+  if (name == "vtkLZMADataCompressor") compressor = vtkSmartPointer<vtkLZMADataCompressor>::New();
+  if (compressor == nullptr) throw FileFault{"it is compressed in an unknown way"};
+  compressor->AddObserver(vtkCommand::ErrorEvent, vtkNew<vtkCallbackCommand>());  // prints nothing
+  return compressor;
+}
+
+class Reader {
+ public:
+  explicit Reader(std::string_view content)
+      : m_xml(content.substr(0, content.find("<AppendedData"))), m_most(1000 * content.size()) {
+    // Appended data need not be XML: they are what follows "_" behind their tag.
+    const std::string_view appended = content.substr(m_xml.size());
+    const std::size_t start = appended.find('_', appended.find('>'));
+    if (start != appended.npos) m_appended = appended.substr(start + 1);
+    m_raw = attributeOf(appended, "encoding") == "raw";
+    const std::string_view file = m_xml.substr(std::min(m_xml.find("<VTKFile"), m_xml.size()));
+    if (attributeOf(file, "byte_order") == "BigEndian") m_encoding = Encoding::BigEndian;
+    if (attributeOf(file, "header_type") == "UInt64") m_headerType = typeNamed("UInt64");
+    m_compressor = compressorNamed(attributeOf(file, "compressor"));
+  }
+
+  Polygons read() {
+    const std::string_view data = elementIn(m_xml, "PolyData");
+    for (std::size_t at = data.find("<Piece"); at != data.npos; at = data.find("<Piece", at + 1)) {
+      const std::string_view piece = elementIn(data.substr(at), "Piece");
+      const std::size_t first = m_polygons.positions.size(), points = count(piece, "Points");
+      if (points > 0) m_polygons.addPositions(readArray(piece, "Points", "", 3 * points));
+      for (const std::string group : {"Polys", "Strips"})
+        if (const std::size_t cells = count(piece, group)) readCells(piece, group, cells, first);
+    }
+    return std::move(m_polygons);
+  }
+
+ private:
+  std::size_t count(std::string_view piece, const std::string& group) const {
+    const std::string_view text = attributeOf(piece, "NumberOf" + group);
+    return text.empty() ? 0 : toCount(toNumber(text), m_most);
+  }
+
+  void readCells(std::string_view piece, const std::string& group, std::size_t cells,
+                 std::size_t first) {
+    std::vector<double> offsets = readArray(piece, group, "offsets", cells);
+    offsets.insert(offsets.begin(), 0.0);
+    std::vector<double> corners =
+        readArray(piece, group, "connectivity", toCount(offsets.back(), m_most));
+    const double points = static_cast<double>(m_polygons.positions.size() - first);
+    for (double& corner : corners)  // one that is not of the piece becomes wrong in the whole
+      corner = corner >= 0 && corner < points ? corner + static_cast<double>(first) : -1;
+    m_polygons.addCells(offsets, corners, group == "Strips");
+  }
+
+  /// The array of that name in a group of the piece; the first one if the name is empty.
+  std::vector<double> readArray(std::string_view piece, const std::string& group,
+                                std::string_view name, std::size_t size) const {
+    std::string_view array = elementIn(piece, group);
+    do {
+      array = array.substr(std::min(array.find("<DataArray", 1), array.size()));
+      if (array.empty()) throw FileFault{"it lacks an array of its " + group};
+    } while (!name.empty() && attributeOf(array, "Name") != name);
+
+    const NumberType type = typeNamed(attributeOf(array, "type"));
+    const std::string_view format = attributeOf(array, "format");
+    std::string_view text = array.substr(std::min(array.find('>') + 1, array.size()));
+    text = text.substr(0, text.find('<'));
+    if (format == "appended")
+      text = m_appended.substr(toCount(toNumber(attributeOf(array, "offset")), m_appended.size()));
+    else if (format != "binary")
+      return FileText(text).numbers(type, size);
+    const bool raw = m_raw && format == "appended";
+    const std::string bytes = uncompressed(raw ? text : fromBase64(text), size * type.size);
+    return FileText(bytes, m_encoding).numbers(type, size);
+  }
+
+  /// A block's bytes behind its header: its length; or the number of compressed blocks, their
+  /// length and the last one's (0: as the others) before compression, and the lengths after it.
+  std::string uncompressed(std::string_view block, std::size_t expected) const {
+    FileText text(block, m_encoding);
+    const auto length = [&] { return toCount(text.number(m_headerType), std::size_t{1} << 53); };
+    if (m_compressor == nullptr) return std::string(text.take(length()));
+    const std::size_t blocks = length(), whole = length(), last = length();
+    const std::vector<double> lengths = text.numbers(m_headerType, blocks);
+    std::string bytes;
+    for (std::size_t i = 0; i < blocks; ++i) {
+      const std::size_t size = i + 1 == blocks && last > 0 ? last : whole, start = bytes.size();
+      if (size > expected - start) throw FileFault{"one of its compressed blocks has a wrong size"};
+      const std::string_view compressed = text.take(toCount(lengths[i], text.left()));
+      bytes.resize(start + size);
+      const std::size_t got = m_compressor->Uncompress(
+          reinterpret_cast<const unsigned char*>(compressed.data()), compressed.size(),
+          reinterpret_cast<unsigned char*>(bytes.data() + start), size);
+      if (got != size) throw FileFault{"one of its compressed blocks is damaged"};
+    }
+    return bytes;
+  }
+
+  std::string_view m_xml, m_appended;
+  std::size_t m_most;  ///< numbers in such a file: a thousandth of a byte each, hardly less
+  bool m_raw = false;
+  vtkSmartPointer<vtkDataCompressor> m_compressor;
+  Encoding m_encoding = Encoding::LittleEndian;
+  NumberType m_headerType = typeNamed("UInt32");
+  Polygons m_polygons;
+};
+
+}  // namespace
+
+Polygons readVtp(std::string_view content) { return Reader(content).read(); }
+
+}  // namespace palpate::vtk
