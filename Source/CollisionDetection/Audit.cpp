@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <initializer_list>
 #include <iterator>
+#include <numeric>
 #include <random>
 #include <string>
 #include <system_error>
@@ -19,23 +21,6 @@ namespace {
 
 std::uint32_t low(std::uint64_t value) { return static_cast<std::uint32_t>(value); }
 std::uint32_t high(std::uint64_t value) { return static_cast<std::uint32_t>(value >> 32); }
-
-/// `count` of the numbers below `size`, ascending. (Bentley and Floyd, A sample of brilliance,
-/// Communications of the ACM 30, 1987.)
-std::vector<std::uint64_t> drawNumbers(std::uint64_t count, std::uint64_t size,
-                                       std::mt19937_64& random) {
-  std::vector<std::uint64_t> drawn;
-  for (std::uint64_t last = size - count; last < size; ++last) {
-    std::uint64_t number = random() % (last + 1);
-    auto place = std::lower_bound(drawn.begin(), drawn.end(), number);
-    if (place != drawn.end() && *place == number) {
-      number = last;
-      place = drawn.end();
-    }
-    drawn.insert(place, number);
-  }
-  return drawn;
-}
 
 /// The ids by which contacts are ordered and told apart.
 std::array<std::uint32_t, 2> idsOf(const VertexTriangleContact& c) {
@@ -61,8 +46,9 @@ class Coverage {
   bool ofVertexTriangle(const VertexTriangleContact& c) const {
     if (c.vertex >= m_meshes.a.topology.vertexCount) return true;  // there is no such vertex
     if (!m_byTriangles) return holds(m_sample.verticesOfA, c.vertex);
-    return all(m_meshes.a.topology.vertexTriangles[c.vertex],
-               [&](std::uint32_t s) { return ofTriangles(s, c.triangle); });
+    return all(m_meshes.a.topology.vertexTriangles[c.vertex], [&](std::uint32_t s) {
+      return ofTriangles({s, c.triangle});
+    });
   }
   bool ofTriangleVertex(const VertexTriangleContact& c) const {
     return m_byTriangles ? holds(m_sample.trianglesOfA, c.triangle)
@@ -74,7 +60,7 @@ class Coverage {
     if (edgeA == kNoEdge || edgeB == kNoEdge) return true;  // nor such edges
     if (!m_byTriangles) return holds(m_sample.edgesOfA, edgeA);
     return all(a.edgeTriangles[edgeA], [&](std::uint32_t s) {
-      return all(b.edgeTriangles[edgeB], [&](std::uint32_t t) { return ofTriangles(s, t); });
+      return all(b.edgeTriangles[edgeB], [&](std::uint32_t t) { return ofTriangles({s, t}); });
     });
   }
   /// By the primitive that owns the element.
@@ -87,8 +73,8 @@ class Coverage {
     const auto owners = isVertex ? mesh.vertexTriangles[c.id] : mesh.edgeTriangles[edge];
     return owners.empty() || holds(m_sample.trianglesOfA, owners.front());
   }
-  bool ofTriangles(std::uint32_t s, std::uint32_t t) const {
-    return holds(m_sample.trianglesOfA, m_meshes.self() ? std::min(s, t) : s);
+  bool ofTriangles(const TrianglePair& pair) const {
+    return holds(m_sample.trianglesOfA, m_meshes.self() ? std::min(pair.a, pair.b) : pair.a);
   }
 
  private:
@@ -143,7 +129,9 @@ FeatureLists drawFeatures(const MeshPair& meshes, const CollisionPair& pair,
   const auto a = static_cast<std::uint32_t>(pair.a), b = static_cast<std::uint32_t>(pair.b);
   std::seed_seq seed{low(settings.seed), high(settings.seed), low(frame), high(frame), a, b};
   std::mt19937_64 random(seed);
-  const std::vector<std::uint64_t> drawn = drawNumbers(count, size, random);
+  std::vector<std::uint64_t> all(size), drawn;
+  std::iota(all.begin(), all.end(), 0);
+  std::sample(all.begin(), all.end(), std::back_inserter(drawn), count, random);
   auto next = drawn.begin();
   std::uint64_t first = 0;
   for (auto* list : lists) {
@@ -179,33 +167,24 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
     };
   };
   if (meshes.settings.contacts == Contacts::Earliest) {
-    const auto reportEarlier = [&](const auto& all) {
+    return forEachTimed(expected, [&](const auto& all) {
       for (const auto& contact : all)
         if (contact.timeOfImpact < data.earliestTimeOfImpact())
           into(List::Earliest)(Fault::Missing, contact, {});
-    };
-    reportEarlier(expected.vertexTriangle);
-    reportEarlier(expected.triangleVertex);
-    reportEarlier(expected.edgeEdge);
-    return;
+    });
   }
   const Coverage coverage(meshes, sample);
-  compare(
-      expected.vertexTriangle, data.vertexTriangle(),
-      [&](const auto& c) { return coverage.ofVertexTriangle(c); }, into(List::VertexTriangle));
-  compare(
-      expected.triangleVertex, data.triangleVertex(),
-      [&](const auto& c) { return coverage.ofTriangleVertex(c); }, into(List::TriangleVertex));
-  compare(
-      expected.edgeEdge, data.edgeEdge(), [&](const auto& c) { return coverage.ofEdges(c); },
-      into(List::EdgeEdge));
-  compare(
-      expected.intersectingTriangles, data.intersectingTriangles(),
-      [&](const auto& c) { return coverage.ofTriangles(c.a, c.b); },
-      into(List::IntersectingTriangles));
-  compare(
-      expected.shape, data.shape(), [&](const auto& c) { return coverage.ofShape(c); },
-      into(List::Shape));
+  const auto differ = [&](const auto& truth, const auto& found, auto covers, List list) {
+    compare(truth, found, std::bind_front(covers, &coverage), into(list));
+  };
+  differ(expected.vertexTriangle, data.vertexTriangle(), &Coverage::ofVertexTriangle,
+         List::VertexTriangle);
+  differ(expected.triangleVertex, data.triangleVertex(), &Coverage::ofTriangleVertex,
+         List::TriangleVertex);
+  differ(expected.edgeEdge, data.edgeEdge(), &Coverage::ofEdges, List::EdgeEdge);
+  differ(expected.intersectingTriangles, data.intersectingTriangles(), &Coverage::ofTriangles,
+         List::IntersectingTriangles);
+  differ(expected.shape, data.shape(), &Coverage::ofShape, List::Shape);
   compare(
       expected.shapeShape, data.shapeShape(), [](const auto&) { return true; },
       into(List::ShapeShape));

@@ -19,7 +19,7 @@ namespace palpate {
 namespace {
 
 constexpr std::string_view kTitle = "palpate-capture";
-constexpr int kVersion = 6;
+constexpr int kVersion = 7;
 
 // Values of enumerations are written by name: in the order of their declarations.
 constexpr std::array<std::string_view, 6> kMethods{"Auto",         "Proxy",     "DistanceField",
@@ -52,9 +52,8 @@ class Writer {
     const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::hex).ptr;
     word({text, static_cast<std::size_t>(end - text)});
   }
-  void position(const Eigen::Vector3d& p) {
-    for (int k = 0; k < 3; ++k) real(p[k]);
-  }
+  void expect(std::string_view text) { word(text); }
+  void count(std::size_t value) { integer(value); }
   void endLine() { m_text.back() = '\n'; }
   const std::string& text() const { return m_text; }
 
@@ -104,16 +103,12 @@ class Reader {
         end != found.end() || fault != std::errc())
       refuse(quoted(found) + " is not a number");
   }
-  void position(Eigen::Vector3d& p) {
-    for (int k = 0; k < 3; ++k) real(p[k]);
-  }
   /// How many of something follow: never more than the file has characters.
-  std::size_t count() {
-    std::size_t value = 0;
+  void count(std::size_t& value) {
     integer(value);
     if (value > m_rest.size()) refuse("it is cut off: too few lines for " + std::to_string(value));
-    return value;
   }
+  void endLine() {}
   void expectEnd() {
     if (m_rest.find_first_not_of(" \t\r\n") != m_rest.npos) refuse("more follows after its end");
   }
@@ -131,7 +126,11 @@ class Reader {
   std::ptrdiff_t m_line = 1;
 };
 
-/// The lines of a file, either way: `file` is a Writer or a Reader.
+// The lines of a file, either way: `file` is a Writer or a Reader.
+
+template <class File>
+constexpr bool kReads = std::is_same_v<File, Reader>;
+
 template <class File, class SettingsType>
 void settingsLine(File& file, SettingsType& settings) {
   file.word(settings.engine, kEngines);
@@ -139,6 +138,36 @@ void settingsLine(File& file, SettingsType& settings) {
   file.integer(settings.octree.maxDepth);
   file.integer(settings.octree.maxPrimitivesPerLeaf);
   file.word(settings.octree.update, kUpdates);
+}
+
+template <class File>
+void fieldOf(File& file, auto& value) {
+  using Value = std::decay_t<decltype(value)>;
+  if constexpr (std::is_same_v<Value, double>) {
+    file.real(value);
+  } else if constexpr (std::is_same_v<Value, bool>) {
+    int number = value;
+    file.integer(number);
+    if constexpr (kReads<File>) value = number != 0;
+  } else if constexpr (std::is_integral_v<Value>) {
+    file.integer(value);
+  } else {
+    for (auto& part : value) fieldOf(file, part);
+  }
+}
+
+/// How many a list has.
+template <class File>
+void sizeOf(File& file, auto& list) {
+  std::size_t size = list.size();
+  file.count(size);
+  if constexpr (kReads<File>) list.resize(size);
+}
+
+template <class File>
+void listOf(File& file, auto& list) {
+  sizeOf(file, list);
+  fieldOf(file, list);
 }
 
 template <class File, class PairType>
@@ -151,11 +180,7 @@ void pairLine(File& file, PairType& pair, int version) {
   file.word(pair.settings.contacts, kContacts);
   if (version >= 2) file.real(pair.settings.tolerance);
   if (version >= 3) file.real(pair.settings.restDistance);
-  if (version >= 4) {
-    int predicate = pair.predicate;
-    file.integer(predicate);
-    if constexpr (!std::is_const_v<PairType>) pair.predicate = predicate != 0;
-  }
+  if (version >= 4) fieldOf(file, pair.predicate);
   if (version >= 6) file.real(pair.settings.timeTolerance);
 }
 
@@ -166,32 +191,24 @@ void filterOf(File& file, FilterType& filter) {
   file.word(filter.sidedness, kSides);
 }
 
-void fieldOf(Writer& file, const Eigen::Vector3d& value) { file.position(value); }
-void fieldOf(Writer& file, double value) { file.real(value); }
-void fieldOf(Writer& file, bool value) { file.integer(int{value}); }
-void fieldOf(Writer& file, const std::vector<Eigen::Vector3d>& value) {
-  file.integer(value.size());
-  for (const Eigen::Vector3d& p : value) file.position(p);
-}
-void fieldOf(Reader& file, std::vector<Eigen::Vector3d>& value) {
-  value.resize(file.count());
-  for (Eigen::Vector3d& p : value) file.position(p);
-}
-void fieldOf(Reader& file, Eigen::Vector3d& value) { file.position(value); }
-void fieldOf(Reader& file, double& value) { file.real(value); }
-void fieldOf(Reader& file, bool& value) {
-  int number = 0;
-  file.integer(number);
-  value = number != 0;
-}
-
 /// A shape's measures and where it is.
 template <class File, class MeshType>
-void shapeOf(File& file, MeshType& mesh) {
-  forEachField(*mesh.analytical, [&](std::string_view, auto& field) { fieldOf(file, field); });
-  for (int k = 0; k < 3; ++k) {
-    for (int i = 0; i < 3; ++i) fieldOf(file, mesh.rotation(k, i));
-    fieldOf(file, mesh.translation[k]);
+void shapeOf(File& file, MeshType& mesh, int version) {
+  forEachField(*mesh.analytical, [&](std::string_view, auto& field) {
+    if constexpr (requires { field.capacity(); }) sizeOf(file, field);
+    fieldOf(file, field);
+  });
+  const auto transform = [&](auto& rotation, auto& translation) {
+    for (int k = 0; k < 3; ++k) {
+      for (int i = 0; i < 3; ++i) fieldOf(file, rotation(k, i));
+      fieldOf(file, translation[k]);
+    }
+  };
+  transform(mesh.rotation, mesh.translation);
+  if (version >= 7) return transform(mesh.rotationBefore, mesh.translationBefore);
+  if constexpr (kReads<File>) {
+    mesh.rotationBefore = mesh.rotation;
+    mesh.translationBefore = mesh.translation;
   }
 }
 
@@ -203,90 +220,73 @@ AnalyticalGeometry shapeOfKind(std::size_t kind, std::index_sequence<kinds...>) 
   return shape;
 }
 
+template <class File, class MeshType>
+void meshLines(File& file, MeshType& mesh, int version) {
+  file.expect("geometry");
+  auto id = static_cast<std::uint32_t>(mesh.id);
+  file.integer(id);
+  sizeOf(file, mesh.now);
+  sizeOf(file, mesh.triangles);
+  if (version >= 3) {
+    file.word(mesh.kind, kKinds);
+    listOf(file, mesh.radii);
+    if (mesh.kind == GeometryKind::Shape) {
+      std::size_t kind = mesh.analytical ? mesh.analytical->index() : 0;
+      file.word(kind, kShapes);
+      if constexpr (kReads<File>)
+        mesh.analytical = shapeOfKind(kind, std::make_index_sequence<kShapes.size()>());
+      shapeOf(file, mesh, version);
+    }
+  }
+  std::size_t rest = kReads<File> ? mesh.kind == GeometryKind::Lines : mesh.rest.size();
+  if (version >= 4) {
+    filterOf(file, mesh.filter);
+    listOf(file, mesh.disabled);
+    file.count(rest);
+  }
+  file.endLine();
+  if constexpr (kReads<File>) {
+    mesh.id = GeometryId{id};
+    mesh.before.resize(mesh.now.size());
+    mesh.rest.resize(rest ? mesh.now.size() : 0);
+  }
+  for (std::size_t v = 0; v < mesh.now.size(); ++v) {
+    fieldOf(file, mesh.before.at(v));
+    fieldOf(file, mesh.now[v]);
+    if (rest) fieldOf(file, mesh.rest.at(v));
+    file.endLine();
+  }
+  for (auto& triangle : mesh.triangles) {
+    fieldOf(file, triangle);
+    file.endLine();
+  }
+}
+
+/// All but the title.
+template <class File, class ProblemType>
+void problemLines(File& file, ProblemType& problem, int version) {
+  settingsLine(file, problem.settings);
+  file.endLine();
+  sizeOf(file, problem.geometries);
+  sizeOf(file, problem.pairs);
+  file.endLine();
+  for (auto& mesh : problem.geometries) meshLines(file, mesh, version);
+  for (auto& pair : problem.pairs) {
+    file.expect("pair");
+    pairLine(file, pair, version);
+    file.endLine();
+  }
+  file.expect("end");
+  file.endLine();
+}
+
 std::string textOf(const CollisionProblem& problem) {
   Writer file;
   file.word(kTitle);
   file.integer(kVersion);
   file.endLine();
-  settingsLine(file, problem.settings);
-  file.endLine();
-  file.integer(problem.geometries.size());
-  file.integer(problem.pairs.size());
-  file.endLine();
-  for (const CollisionProblem::Mesh& mesh : problem.geometries) {
-    file.word("geometry");
-    file.integer(static_cast<std::uint32_t>(mesh.id));
-    file.integer(mesh.now.size());
-    file.integer(mesh.triangles.size());
-    file.word(mesh.kind, kKinds);
-    file.integer(mesh.radii.size());
-    for (const double radius : mesh.radii) file.real(radius);
-    if (mesh.analytical) {
-      file.word(mesh.analytical->index(), kShapes);
-      shapeOf(file, mesh);
-    }
-    filterOf(file, mesh.filter);
-    file.integer(mesh.disabled.size());
-    for (const std::uint32_t element : mesh.disabled) file.integer(element);
-    file.integer(mesh.rest.size());
-    file.endLine();
-    for (std::size_t v = 0; v < mesh.now.size(); ++v) {
-      file.position(mesh.before.at(v));
-      file.position(mesh.now[v]);
-      if (!mesh.rest.empty()) file.position(mesh.rest.at(v));
-      file.endLine();
-    }
-    for (const Triangle& triangle : mesh.triangles) {
-      for (const std::uint32_t corner : triangle) file.integer(corner);
-      file.endLine();
-    }
-  }
-  for (const CollisionProblem::Pair& pair : problem.pairs) {
-    file.word("pair");
-    pairLine(file, pair, kVersion);
-    file.endLine();
-  }
-  file.word("end");
-  file.endLine();
+  problemLines(file, problem, kVersion);
   return file.text();
-}
-
-CollisionProblem::Mesh readMesh(Reader& file, int version) {
-  file.expect("geometry");
-  CollisionProblem::Mesh mesh;
-  std::uint32_t id = 0;
-  file.integer(id);
-  mesh.id = GeometryId{id};
-  mesh.now.resize(file.count());
-  mesh.before.resize(mesh.now.size());
-  mesh.triangles.resize(file.count());
-  if (version >= 3) {
-    file.word(mesh.kind, kKinds);
-    mesh.radii.resize(file.count());
-    for (double& radius : mesh.radii) file.real(radius);
-    if (mesh.kind == GeometryKind::Shape) {
-      std::size_t kind = 0;
-      file.word(kind, kShapes);
-      mesh.analytical = shapeOfKind(kind, std::make_index_sequence<kShapes.size()>());
-      shapeOf(file, mesh);
-    }
-  }
-  bool rest = mesh.kind == GeometryKind::Lines;
-  if (version >= 4) {
-    filterOf(file, mesh.filter);
-    mesh.disabled.resize(file.count());
-    for (std::uint32_t& element : mesh.disabled) file.integer(element);
-    rest = file.count() > 0;
-  }
-  if (rest) mesh.rest.resize(mesh.now.size());
-  for (std::size_t v = 0; v < mesh.now.size(); ++v) {
-    file.position(mesh.before[v]);
-    file.position(mesh.now[v]);
-    if (rest) file.position(mesh.rest[v]);
-  }
-  for (Triangle& triangle : mesh.triangles)
-    for (std::uint32_t& corner : triangle) file.integer(corner);
-  return mesh;
 }
 
 GeometryId add(OctreeBasedCD& detection, const CollisionProblem::Mesh& mesh) {
@@ -346,16 +346,9 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
     file.refuseWhole("it is of version " + std::to_string(version) + "; versions up to " +
                      std::to_string(kVersion) + " can be read");
   CollisionProblem problem;
-  settingsLine(file, problem.settings);
-  problem.geometries.resize(file.count());
-  problem.pairs.resize(file.count());
-  for (CollisionProblem::Mesh& mesh : problem.geometries) mesh = readMesh(file, version);
-  for (CollisionProblem::Pair& pair : problem.pairs) {
-    file.expect("pair");
-    pairLine(file, pair, version);
-    if (version == 1) pair.settings.method = pair.method;  // Auto stood for one method then
-  }
-  file.expect("end");
+  problemLines(file, problem, version);
+  if (version == 1)  // Auto stood for one method then
+    for (CollisionProblem::Pair& pair : problem.pairs) pair.settings.method = pair.method;
   file.expectEnd();
   try {
     setUp(problem);
@@ -367,8 +360,15 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
 
 OctreeBasedCD setUp(const CollisionProblem& problem) {
   OctreeBasedCD detection(problem.settings);
+  std::vector<GeometryId> ids;
   for (const CollisionProblem::Mesh& mesh : problem.geometries) {
-    const GeometryId id = add(detection, mesh);
+    ids.push_back(add(detection, mesh));
+    if (mesh.analytical)
+      detection.setTransform(ids.back(), mesh.rotationBefore, mesh.translationBefore);
+  }
+  detection.collectCandidates();  // ends a frame: what is set now is the step's other end
+  for (const CollisionProblem::Mesh& mesh : problem.geometries) {
+    const GeometryId id = ids[static_cast<std::size_t>(&mesh - problem.geometries.data())];
     if (mesh.analytical)
       detection.setTransform(id, mesh.rotation, mesh.translation);
     else

@@ -73,26 +73,33 @@ void sortUnique(Buffer<std::uint32_t>& ids) {
 }
 
 std::size_t sizeOf(const CollisionData::Contents& contents) {
-  return contents.vertexTriangle.size() + contents.triangleVertex.size() +
-         contents.edgeEdge.size() + contents.shape.size() + contents.shapeShape.size();
+  std::size_t size = contents.shapeShape.size();
+  forEachTimed(contents, [&](const auto& list) { size += list.size(); });
+  return size;
 }
 
 /// ofIntersection: how many are Intersection's, of the step's end with a time of 0.
 void countContacts(const PairPlan& plan, std::size_t ofIntersection,
                    CollisionData::Contents& contents) {
   std::size_t before = 0;
-  const auto count = [&](const auto& contacts) {
-    for (const auto& contact : contacts) before += contact.timeOfImpact < 1.0;
-  };
   if (plan.step.impacts) {
-    count(contents.vertexTriangle);
-    count(contents.triangleVertex);
-    count(contents.edgeEdge);
+    forEachTimed(contents, [&](const auto& contacts) {
+      for (const auto& contact : contacts) before += contact.timeOfImpact < 1.0;
+    });
   } else if (plan.method == Method::Continuous) {
     before = sizeOf(contents);
   }
   contents.validity.atImpact = before - std::min(before, ofIntersection);
   contents.validity.atEnd = sizeOf(contents) - contents.validity.atImpact;
+}
+
+/// Contacts::Earliest: of all of a pair's contacts the time.
+void takeEarliest(PairRecord& record, ContactBuffers& contacts) {
+  forEachTimed(contacts, [&](auto& list) {
+    for (const auto& contact : list)
+      record.earliest = std::min(record.earliest.load(), contact.timeOfImpact);
+    list.clear();
+  });
 }
 
 bool sharesVertex(const Triangle& s, const Triangle& t) {
@@ -196,9 +203,11 @@ struct Frame::Job {
   void detectShape() {
     const MeshPair meshes = record->meshes();
     if (meshes.isOfShapes()) return findShapePair(meshes, contacts);
-    findPrimitivesNear(record->mesh(), meshes.shape(), meshes.reach(), queries, primitives);
+    findPrimitivesNear(record->mesh(), record->plan.swept() ? meshes.shapeBefore() : meshes.shape(),
+                       meshes.shape(), meshes.reach(), queries, primitives);
     Stopwatch watch;
     findShapeContacts(meshes, primitives, contacts);
+    if (meshes.settings.contacts == Contacts::Earliest) takeEarliest(*record, contacts);
     narrowMilliseconds += watch.lap();
   }
 
@@ -505,16 +514,7 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Setti
     findContactsByBruteForce(record->meshes(), contacts);
     findStartByBruteForce(*record, contacts, overlaps);
     record->earliest = std::numeric_limits<double>::infinity();
-    if (record->pair.settings.contacts == Contacts::Earliest) {
-      for (const auto& c : contacts.vertexTriangle)
-        record->earliest = std::min(record->earliest.load(), c.timeOfImpact);
-      for (const auto& c : contacts.triangleVertex)
-        record->earliest = std::min(record->earliest.load(), c.timeOfImpact);
-      for (const auto& c : contacts.edgeEdge)
-        record->earliest = std::min(record->earliest.load(), c.timeOfImpact);
-      for (auto* list : {&contacts.vertexTriangle, &contacts.triangleVertex}) list->clear();
-      contacts.edgeEdge.clear();
-    }
+    if (record->pair.settings.contacts == Contacts::Earliest) takeEarliest(*record, contacts);
     if (settings.keepCandidates) findCandidatesByBruteForce(record->meshes(), record->candidates);
     statistics.featurePairs += contacts.featurePairs;
     statistics.exactDecisions += contacts.exactDecisions + overlaps.exactDecisions;

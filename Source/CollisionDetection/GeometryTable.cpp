@@ -2,6 +2,7 @@
 
 #include "CollisionDetection/Stopwatch.h"
 #include "Core/Assert.h"
+#include "Core/Text.h"
 #include "Geometry/TriangleBoxes.h"
 #include "Math/Tolerances.h"
 
@@ -10,7 +11,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <limits>
 
@@ -42,12 +42,9 @@ void checkPositions(GeometryId id, std::span<const Eigen::Vector3d> positions, E
                     });
   const std::size_t bad = first;
   if (bad == positions.size()) return;
-  const Eigen::Vector3d& p = positions[bad];
-  char value[128];
-  std::snprintf(value, sizeof value, "(%g, %g, %g)", p[0], p[1], p[2]);
   throw Error(ErrorCode::NonFinitePosition,
               nameOf(id) + ", vertex " + std::to_string(bad) + ": position" + which + " is " +
-                  value + "; positions must be finite",
+                  textOf(positions[bad]) + "; positions must be finite",
               id, bad);
 }
 
@@ -81,14 +78,11 @@ void checkCounts(GeometryId id, std::span<const Eigen::Vector3d> positions,
 
 void checkRadii(GeometryId id, std::span<const double> radii) {
   for (std::size_t v = 0; v < radii.size(); ++v)
-    if (!(radii[v] >= 0.0) || std::isinf(radii[v])) {
-      char value[32];
-      std::snprintf(value, sizeof value, "%g", radii[v]);
+    if (!(radii[v] >= 0.0) || std::isinf(radii[v]))
       throw Error(ErrorCode::InvalidRadius,
-                  nameOf(id) + ", vertex " + std::to_string(v) + ": radius is " + value +
+                  nameOf(id) + ", vertex " + std::to_string(v) + ": radius is " + textOf(radii[v]) +
                       "; it must be finite and not negative",
                   id, v);
-    }
 }
 
 void checkPositionCount(const Geometry& geometry, std::size_t count) {
@@ -137,21 +131,6 @@ void startStep(Geometry& geometry) {
     geometry.mesh.before = geometry.lastFrame;
   geometry.setThisFrame = true;
   geometry.beforeGiven = false;
-}
-
-/// The body stays as it is: only where it is read from changes.
-void placeBody(Geometry& geometry, const RigidTransform& transform) {
-  TriangleMesh& mesh = geometry.mesh;
-  if (!(transform.translation.cwiseAbs().maxCoeff() <= kLargestPlaced))
-    throw Error(ErrorCode::InvalidTransform,
-                nameOf(geometry.id) + ": the translation is beyond 2^1000", geometry.id);
-  if (!mesh.now.isPlaced())
-    checkPlaceable(geometry.id, mesh.now.body(), ErrorCode::InvalidTransform);
-  if (!geometry.setThisFrame) startStep(geometry);
-  geometry.revision += !mesh.now.isPlaced() || !(mesh.now.transform() == transform);
-  ++geometry.stepRevision;
-  mesh.now.place(transform);
-  if (!geometry.hasLastFrame && !geometry.beforeGiven) mesh.before = mesh.now;
 }
 
 void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
@@ -311,7 +290,10 @@ GeometryId GeometryTable::add(const AnalyticalGeometry& analytical) {
   const GeometryId id = add({}, {}, GeometryKind::Shape);
   TriangleMesh& mesh = m_geometries.back()->mesh;
   mesh.analytical = analytical;
-  mesh.shape.emplace(analytical, mesh.transform);
+  mesh.shape.emplace(analytical, mesh.now.transform());
+  mesh.shapeBefore = mesh.shape;
+  const auto corners = mesh.shape->corners();
+  mesh.before = mesh.now = std::vector<Eigen::Vector3d>(corners.begin(), corners.end());
   return id;
 }
 
@@ -320,11 +302,18 @@ void GeometryTable::setTransform(GeometryId id, const RigidTransform& transform)
   TriangleMesh& mesh = geometry.mesh;
   if (const std::string fault = faultOf(transform); !fault.empty())
     throw Error(ErrorCode::InvalidTransform, nameOf(id) + ": " + fault, id);
-  if (!mesh.shape) return placeBody(geometry, transform);
-  mesh.transform = transform;
-  mesh.shape->place(*mesh.analytical, transform);
-  ++geometry.revision;
+  if (!(transform.translation.cwiseAbs().maxCoeff() <= kLargestPlaced))
+    throw Error(ErrorCode::InvalidTransform, nameOf(id) + ": the translation is beyond 2^1000", id);
+  if (!geometry.isPlaced()) checkPlaceable(id, mesh.now.body(), ErrorCode::InvalidTransform);
+  // The body stays as it is: only where it is read from changes.
+  if (!geometry.setThisFrame) startStep(geometry);
+  geometry.revision += !geometry.isPlaced() || !(mesh.now.transform() == transform);
   ++geometry.stepRevision;
+  mesh.now.place(transform);
+  if (!geometry.hasLastFrame && !geometry.beforeGiven) mesh.before = mesh.now;
+  if (!mesh.shape) return;
+  mesh.shape->place(*mesh.analytical, transform);
+  mesh.shapeBefore->place(*mesh.analytical, mesh.before.transform());
 }
 
 Geometry& GeometryTable::at(GeometryId id) {
@@ -343,39 +332,29 @@ void GeometryTable::remove(GeometryId id) {
   std::erase_if(m_geometries, [=](const auto& g) { return g.get() == geometry; });
 }
 
-void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d> now,
-                                 const Threads& threads) {
+void GeometryTable::setPositions(GeometryId id,
+                                 std::optional<std::span<const Eigen::Vector3d>> before,
+                                 std::span<const Eigen::Vector3d> now, const Threads& threads) {
   Geometry& geometry = at(id);
   TriangleMesh& mesh = geometry.mesh;
+  if (before) checkPositionCount(geometry, before->size());
   checkPositionCount(geometry, now.size());
-  const Positions::Body body = checkedBody(geometry, now, "", threads);
-  const bool moved =
-      !now.empty() && std::memcmp(now.data(), mesh.now.body().data(), now.size_bytes()) != 0;
+  const auto start = before ? checkedBody(geometry, *before, " before", threads) : nullptr,
+             end = checkedBody(geometry, now, before ? " now" : "", threads);
+  const bool moved = before || (!now.empty() && std::memcmp(now.data(), mesh.now.body().data(),
+                                                            now.size_bytes()) != 0);
   startStep(geometry);
-  mesh.now.setBody(body);
-  if (!geometry.hasLastFrame) mesh.before = mesh.now;
+  if (before) {
+    geometry.lastFrame = mesh.before;
+    geometry.beforeGiven = true;
+    mesh.before.setBody(start);
+  }
+  mesh.now.setBody(end);
+  if (!before && !geometry.hasLastFrame) mesh.before = mesh.now;
   geometry.revision += moved;
   geometry.bodyRevision += moved;
   ++geometry.stepRevision;
   ++geometry.bodyStepRevision;
-}
-
-void GeometryTable::setPositions(GeometryId id, std::span<const Eigen::Vector3d> before,
-                                 std::span<const Eigen::Vector3d> now, const Threads& threads) {
-  Geometry& geometry = at(id);
-  TriangleMesh& mesh = geometry.mesh;
-  checkPositionCount(geometry, before.size());
-  checkPositionCount(geometry, now.size());
-  const Positions::Body start = checkedBody(geometry, before, " before", threads),
-                        end = checkedBody(geometry, now, " now", threads);
-  startStep(geometry);
-  geometry.lastFrame = mesh.before;
-  geometry.beforeGiven = true;
-  mesh.before.setBody(start);
-  mesh.now.setBody(end);
-  for (auto* revision : {&geometry.revision, &geometry.stepRevision, &geometry.bodyRevision,
-                         &geometry.bodyStepRevision})
-    ++*revision;
 }
 
 void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions,
@@ -399,11 +378,9 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
   geometry.hasLastFrame = geometry.beforeGiven = false;
   geometry.treeKnown = false;
   geometry.smallestHeight = smallestHeight(geometry.mesh);
-  ++geometry.revision;
-  ++geometry.stepRevision;
-  ++geometry.bodyRevision;
-  ++geometry.topologyRevision;
-  ++geometry.restRevision;
+  for (auto* revision : {&geometry.revision, &geometry.stepRevision, &geometry.bodyRevision,
+                         &geometry.topologyRevision, &geometry.restRevision})
+    ++*revision;
 }
 
 void GeometryTable::setFilter(GeometryId id, const CollisionFilter& filter) {

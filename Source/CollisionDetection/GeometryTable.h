@@ -15,6 +15,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -88,8 +89,7 @@ class GeometryTable {
                  GeometryKind = GeometryKind::Triangles, std::span<const double> radii = {});
   GeometryId add(const AnalyticalGeometry&);
   void remove(GeometryId);
-  void setPositions(GeometryId, std::span<const Eigen::Vector3d> now, const Threads&);
-  void setPositions(GeometryId, std::span<const Eigen::Vector3d> before,
+  void setPositions(GeometryId, std::optional<std::span<const Eigen::Vector3d>> before,
                     std::span<const Eigen::Vector3d> now, const Threads&);
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);

@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -25,24 +26,21 @@ namespace palpate {
 namespace {
 
 const Settings& checked(const Settings& settings) {
-  const auto check = [](bool good, const char* name, int value, const char* range) {
-    if (!good)
+  const auto check = [](const char* name, auto setting, int low, int high, const char* range) {
+    const int value = static_cast<int>(setting);
+    if (value < low || value > high)
       throw Error(ErrorCode::InvalidSettings, std::string("settings: ") + name + " is " +
                                                   std::to_string(value) + "; it must be " + range);
   };
-  check(settings.octree.maxDepth >= 1 && settings.octree.maxDepth <= 60, "octree.maxDepth",
-        settings.octree.maxDepth, "in [1, 60]");
-  check(settings.octree.maxPrimitivesPerLeaf >= 1 && settings.octree.maxPrimitivesPerLeaf <= 1024,
-        "octree.maxPrimitivesPerLeaf", settings.octree.maxPrimitivesPerLeaf, "in [1, 1024]");
-  check(settings.octree.update == OctreeUpdate::Auto ||
-            settings.octree.update == OctreeUpdate::Rebuild,
-        "octree.update", static_cast<int>(settings.octree.update), "Auto or Rebuild");
-  check(settings.engine == Engine::Octree || settings.engine == Engine::BruteForce, "engine",
-        static_cast<int>(settings.engine), "Octree or BruteForce");
-  check(settings.threads >= 0 && settings.threads <= 1024, "threads", settings.threads,
-        "in [0, 1024]");
-  check(settings.audit.features >= 0, "audit.features", settings.audit.features, "at least 0");
-  check(settings.audit.mostFiles >= 0, "audit.mostFiles", settings.audit.mostFiles, "at least 0");
+  constexpr int kAny = std::numeric_limits<int>::max();
+  const OctreeSettings& octree = settings.octree;
+  check("octree.maxDepth", octree.maxDepth, 1, 60, "in [1, 60]");
+  check("octree.maxPrimitivesPerLeaf", octree.maxPrimitivesPerLeaf, 1, 1024, "in [1, 1024]");
+  check("octree.update", octree.update, 0, 1, "Auto or Rebuild");
+  check("engine", settings.engine, 0, 1, "Octree or BruteForce");
+  check("threads", settings.threads, 0, 1024, "in [0, 1024]");
+  check("audit.features", settings.audit.features, 0, kAny, "at least 0");
+  check("audit.mostFiles", settings.audit.mostFiles, 0, kAny, "at least 0");
   std::error_code fault;
   if (const auto& folder = settings.audit.folder;
       !folder.empty() && !std::filesystem::is_directory(folder, fault))
@@ -135,13 +133,14 @@ struct OctreeBasedCD::Implementation {
     }
     Stopwatch watch;
     for (const auto& record : pairs.records()) {
-      const bool moves = (detecting || record->pair.settings.method == Method::Auto) &&
-                         !record->meshes().hasShape();
+      const Method method = record->pair.settings.method;
+      const bool moves = (detecting || method == Method::Auto) &&
+                         (method == Method::Continuous || !record->meshes().hasShape());
       if (moves)
         for (Geometry* geometry : {record->a, record->b})
           GeometryTable::updateMotion(*geometry, threads);
       record->plan = planOf(record->pair.settings, *record->a, *record->b, moves);
-      record->updateNear();
+      record->updateNear(record->pair.settings.restDistance);
       if (record->plan.swept()) record->a->swept = record->b->swept = true;
     }
     statistics.milliseconds.boxes += watch.lap();
@@ -241,9 +240,7 @@ struct OctreeBasedCD::Implementation {
     for (const auto& record : pairs.records()) {
       record->trust.keep(thisFrame);
       const CollisionData& data = record->data;
-      statistics.contacts += data.vertexTriangle().size() + data.triangleVertex().size() +
-                             data.edgeEdge().size() + data.shape().size() +
-                             data.shapeShape().size();
+      statistics.contacts += data.validity().atImpact + data.validity().atEnd;
       statistics.intersectingTriangles += data.intersectingTriangles().size();
     }
     endFrame();
@@ -279,19 +276,17 @@ struct OctreeBasedCD::Implementation {
       indices.emplace(geometry.get(), static_cast<std::uint32_t>(indices.size()));
       const TriangleMesh& mesh = geometry->mesh;
       const GeometryKind kind = mesh.topology.kind;
-      problem.geometries.push_back({geometry->id,
-                                    mesh.before.all(),
-                                    mesh.now.all(),
-                                    {},
-                                    kind,
-                                    mesh.radii,
-                                    {},
-                                    geometry->filter,
-                                    mesh.topology.disabled,
-                                    mesh.analytical,
-                                    mesh.transform.rotation,
-                                    mesh.transform.translation});
-      CollisionProblem::Mesh& copy = problem.geometries.back();
+      CollisionProblem::Mesh& copy = problem.geometries.emplace_back();
+      copy.id = geometry->id;
+      copy.kind = kind;
+      copy.radii = mesh.radii;
+      copy.filter = geometry->filter;
+      copy.disabled = mesh.topology.disabled;
+      copy.analytical = mesh.analytical;
+      if (!mesh.shape) copy.before = mesh.before.all(), copy.now = mesh.now.all();
+      const RigidTransform &before = mesh.before.transform(), &now = mesh.now.transform();
+      copy.rotation = now.rotation, copy.translation = now.translation;
+      copy.rotationBefore = before.rotation, copy.translationBefore = before.translation;
       if (kind != GeometryKind::Points) copy.triangles = mesh.topology.triangles;
       if (copy.radii.empty() && mesh.largestRadius > 0.0) copy.radii = {mesh.largestRadius};
     }
@@ -361,7 +356,7 @@ void OctreeBasedCD::removeGeometry(GeometryId geometry) {
 }
 
 void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vector3d> now) {
-  m_implementation->geometries.setPositions(geometry, now, m_implementation->threads);
+  m_implementation->geometries.setPositions(geometry, {}, now, m_implementation->threads);
 }
 
 void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vector3d> before,
@@ -492,9 +487,7 @@ CollisionData detectCollision(const TriangleMeshView& a, const TriangleMeshView&
   if (settings.method == Method::Continuous)
     throw Error(ErrorCode::UnsupportedMethod,
                 "Method::Continuous needs a step: use OctreeBasedCD and two sets of positions");
-  Settings oneThread;
-  oneThread.threads = 1;
-  OctreeBasedCD detection(oneThread);
+  OctreeBasedCD detection({.threads = 1});
   const GeometryId first = detection.addTriangleMesh(a.positions, a.triangles);
   const GeometryId second = detection.addTriangleMesh(b.positions, b.triangles);
   detection.addCollisionPair(first, second, settings);

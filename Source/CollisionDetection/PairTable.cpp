@@ -1,18 +1,16 @@
 #include "CollisionDetection/PairTable.h"
 
+#include "Core/Text.h"
 #include "Geometry/RestDistance.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
-#include <utility>
 
 namespace palpate {
 
-void PairRecord::updateNear() {
-  const double distance = pair.settings.restDistance;
+void PairRecord::updateNear(double distance) {
   if (distance == 0.0 || nearRevision == a->restRevision) return;
   near = verticesWithin(a->mesh.topology, a->mesh.rest, distance);
   nearRevision = a->restRevision;
@@ -36,93 +34,76 @@ std::string nameOf(GeometryId a, GeometryId b) {
          std::to_string(static_cast<std::uint32_t>(b)) + ")";
 }
 
-std::string shortest(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%g", value);
-  return text;
-}
-
 constexpr const char* kRigidWithItself =
     "a geometry that setTransform() moves cannot be tested against itself";
 
-/// Throws what is wrong with the settings for the pair's kinds.
-void checkKinds(const TriangleMesh& a, const TriangleMesh& b, const PairSettings& settings,
-                GeometryId id, const std::string& name) {
-  const auto refuse = [&](const std::string& reason, ErrorCode code) {
-    throw Error(code, name + ": " + reason, id);
-  };
-  if (!(settings.restDistance >= 0.0) || std::isinf(settings.restDistance))
-    refuse("restDistance is " + shortest(settings.restDistance) +
-               "; it must be finite and not negative",
-           ErrorCode::InvalidSettings);
-  if (settings.restDistance > 0.0 && (&a != &b || a.topology.kind == GeometryKind::Points))
-    refuse("restDistance is for a triangle or line mesh with itself", ErrorCode::InvalidSettings);
-  if (&a == &b && a.now.isPlaced()) refuse(kRigidWithItself, ErrorCode::UnsupportedMethod);
-  if (a.topology.hasFaces() && b.topology.hasFaces()) return;
-  if (a.shape || b.shape) {
-    if (&a == &b) refuse("a shape does not meet itself", ErrorCode::UnsupportedMethod);
-    if (a.shape && b.shape && a.shape->isPlane() && b.shape->isPlane())
-      refuse("two planes have no distance", ErrorCode::UnsupportedMethod);
-    if (settings.method != Method::Proximity)
-      refuse("a shape is tested by Method::Proximity only", ErrorCode::UnsupportedMethod);
-    return;
-  }
-  const std::string kinds = nameOf(a.topology.kind) + " and " + nameOf(b.topology.kind);
-  if (settings.method == Method::Auto || settings.method == Method::Intersection)
-    refuse("this method is for two triangle meshes, not for " + kinds +
-               "; Proximity and Continuous are",
-           ErrorCode::UnsupportedMethod);
-  if (settings.method == Method::Continuous && !(a.radii.empty() && b.radii.empty()))
-    refuse("Method::Continuous needs one radius for all vertices", ErrorCode::UnsupportedMethod);
-}
-
 /// Throws what is wrong with the settings.
-void check(const Geometry& first, const Geometry& second, const PairSettings& settings) {
-  const GeometryId a = first.id, b = second.id;
-  const std::string name = nameOf(a, b);
-  checkKinds(first.mesh, second.mesh, settings, a, name);
-  if (!(settings.thickness >= 0.0) || std::isinf(settings.thickness))
-    throw Error(ErrorCode::InvalidSettings,
-                name + ": thickness is " + shortest(settings.thickness) +
-                    "; it must be finite and not negative",
-                a);
-  if (!(settings.tolerance <= std::numeric_limits<double>::max()))
-    throw Error(ErrorCode::InvalidSettings,
-                name + ": tolerance is " + shortest(settings.tolerance) +
-                    "; it must be finite, or negative for half the thickness",
-                a);
-  if (!(settings.timeTolerance >= kSmallestTimeTolerance && settings.timeTolerance <= 1.0))
-    throw Error(ErrorCode::InvalidSettings,
-                name + ": timeTolerance is " + shortest(settings.timeTolerance) +
-                    "; it must be from 2^-50 to 1",
-                a);
-  if (settings.contacts != Contacts::Distinct && settings.contacts != Contacts::All &&
-      settings.contacts != Contacts::Earliest)
-    throw Error(ErrorCode::InvalidSettings, name + ": contacts must be Distinct, All or Earliest",
-                a);
-  if (settings.contacts == Contacts::Earliest && settings.method != Method::Continuous)
-    throw Error(ErrorCode::InvalidSettings,
-                name + ": Contacts::Earliest is for Method::Continuous only", a);
-  switch (settings.method) {
-    case Method::Auto:
-    case Method::Intersection:
-    case Method::Continuous:
-      return;
-    case Method::Proximity:
-      if (!first.mesh.shape && !second.mesh.shape &&
-          settings.thickness + (first.mesh.largestRadius + second.mesh.largestRadius) == 0.0)
-        throw Error(ErrorCode::InvalidSettings,
-                    name + ": Method::Proximity needs a positive thickness; it is 0", a);
-      return;
-    case Method::Proxy:
-      throw Error(ErrorCode::UnsupportedMethod, name + ": Method::Proxy does not exist yet", a);
-    case Method::DistanceField:
-      throw Error(ErrorCode::UnsupportedMethod, name + ": Method::DistanceField does not exist yet",
-                  a);
+class Check {
+ public:
+  Check(const Geometry& a, const Geometry& b, const PairSettings& settings)
+      : m_id(a.id), m_name(nameOf(a.id, b.id)), m_method(settings.method) {
+    range(a.mesh, b.mesh, settings);
+    kinds(a.mesh, b.mesh);
+    need(m_method != Method::Proximity || a.mesh.shape || b.mesh.shape ||
+             settings.thickness + (a.mesh.largestRadius + b.mesh.largestRadius) > 0.0,
+         "Method::Proximity needs a positive thickness; it is 0");
   }
-  throw Error(ErrorCode::InvalidSettings,
-              name + ": no such method: " + std::to_string(static_cast<int>(settings.method)), a);
-}
+
+ private:
+  void need(bool good, const std::string& reason, ErrorCode code = ErrorCode::InvalidSettings) {
+    if (!good) throw Error(code, m_name + ": " + reason, m_id);
+  }
+  void support(bool supported, const std::string& reason) {
+    need(supported, reason, ErrorCode::UnsupportedMethod);
+  }
+  void finite(const char* which, double value, bool good, const char* rule) {
+    need(good && value <= std::numeric_limits<double>::max(),
+         std::string(which) + " is " + textOf(value) + "; it must be " + rule);
+  }
+
+  void range(const TriangleMesh& a, const TriangleMesh& b, const PairSettings& settings) {
+    const auto [method, thickness, contacts, tolerance, rest, timeTolerance] = settings;
+    constexpr const char* kNotNegative = "finite and not negative";
+    finite("restDistance", rest, rest >= 0.0, kNotNegative);
+    need(rest == 0.0 || (&a == &b && a.topology.kind != GeometryKind::Points),
+         "restDistance is for a triangle or line mesh with itself");
+    finite("thickness", thickness, thickness >= 0.0, kNotNegative);
+    finite("tolerance", tolerance, true, "finite, or negative for half the thickness");
+    finite("timeTolerance", timeTolerance,
+           timeTolerance >= kSmallestTimeTolerance && timeTolerance <= 1.0, "from 2^-50 to 1");
+    need(contacts >= Contacts::Distinct && contacts <= Contacts::Earliest,
+         "contacts must be Distinct, All or Earliest");
+    need(contacts != Contacts::Earliest || method == Method::Continuous,
+         "Contacts::Earliest is for Method::Continuous only");
+    need(method >= Method::Auto && method <= Method::Continuous,
+         "no such method: " + std::to_string(static_cast<int>(method)));
+    support(method != Method::Proxy, "Method::Proxy does not exist yet");
+    support(method != Method::DistanceField, "Method::DistanceField does not exist yet");
+  }
+
+  void kinds(const TriangleMesh& a, const TriangleMesh& b) {
+    const Shape* tool = a.shape ? &*a.shape : b.shape ? &*b.shape : nullptr;
+    const bool continuous = m_method == Method::Continuous, both = a.shape && b.shape,
+               meshes = a.topology.hasFaces() && b.topology.hasFaces() && !tool;
+    support(&a != &b || tool || !a.now.isPlaced(), kRigidWithItself);
+    support(&a != &b || !tool, "a shape does not meet itself");
+    support(!both || !a.shape->isPlane() || !b.shape->isPlane(), "two planes have no distance");
+    support(!both || m_method == Method::Proximity,
+            "two shapes are tested by Method::Proximity only");
+    support(meshes || continuous || m_method == Method::Proximity,
+            "this method is for two triangle meshes, not for " + nameOf(a.topology.kind) + " and " +
+                nameOf(b.topology.kind) + "; Proximity and Continuous are");
+    support(!tool || !continuous || tool->movesInStep(),
+            std::string(tool && tool->isPlane() ? "a plane" : "a cylinder") + " and " +
+                nameOf((a.shape ? b : a).topology.kind) + " are tested by Method::Proximity only");
+    support(!continuous || (a.radii.empty() && b.radii.empty()),
+            "Method::Continuous needs one radius for all vertices");
+  }
+
+  GeometryId m_id;
+  std::string m_name;
+  Method m_method;
+};
 
 }  // namespace
 
@@ -130,7 +111,7 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
                     const PairSettings& settings) {
   Geometry& first = geometries.at(a);
   Geometry& second = geometries.at(b);
-  check(first, second, settings);
+  Check(first, second, settings);
   if (m_byIds.contains(keyOf(a, b)))
     throw Error(ErrorCode::DuplicatePair,
                 nameOf(a, b) + " was added before; setPairSettings() changes its settings", a);
@@ -139,7 +120,7 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
   record->a = &first;
   record->b = &second;
   record->plan = planOf(settings, first, second);
-  record->updateNear();
+  record->updateNear(settings.restDistance);
   m_records.push_back(std::move(record));
   index();
 }
@@ -164,16 +145,9 @@ PairRecord& PairTable::inOrder(const GeometryTable& geometries, GeometryId a, Ge
 void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
                     const PairSettings& settings) {
   PairRecord& record = at(geometries, a, b);
-  check(*record.a, *record.b, settings);
-  const double restDistance =
-      std::exchange(record.pair.settings.restDistance, settings.restDistance);
-  try {
-    if (restDistance != settings.restDistance) record.nearRevision = 0;
-    record.updateNear();
-  } catch (const Error&) {
-    record.pair.settings.restDistance = restDistance;
-    throw;
-  }
+  Check(*record.a, *record.b, settings);
+  if (record.pair.settings.restDistance != settings.restDistance) record.nearRevision = 0;
+  record.updateNear(settings.restDistance);
   record.pair.settings = settings;
   record.plan = planOf(settings, *record.a, *record.b);
   record.dataFor = record.candidatesFor = {};

@@ -51,7 +51,7 @@ struct PairRecord {
     return !a->mesh.topology.disabled.empty() || !b->mesh.topology.disabled.empty();
   }
   /// Finds what is too near at rest, where it has changed.
-  void updateNear();
+  void updateNear(double restDistance);
   /// An answer of nothing.
   void clear();
 

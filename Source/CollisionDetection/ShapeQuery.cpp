@@ -2,36 +2,43 @@
 
 #include "Math/Tolerances.h"
 
+#include <Eigen/Geometry>
+
 namespace palpate {
 
-void findPrimitivesNear(const Geometry& geometry, const Shape& shape, double reach,
-                        PointQueryStack& stack, Buffer<std::uint32_t>& out) {
-  const Octree& octree = geometry.octree;
+void findPrimitivesNear(const Geometry& geometry, const Shape& before, const Shape& now,
+                        double reach, PointQueryStack& stack, Buffer<std::uint32_t>& out) {
+  using Eigen::Vector3d;
+  const bool wholeStep = &before != &now;
+  const Vector3d origin = worldOrigin(geometry);
+  const BoxMap map = worldMap(geometry, origin, 0.0, wholeStep);
   const double unit = 1.0 / geometry.frame.scale;
-  const RigidTransform& placed = geometry.mesh.now.transform();
-  const auto mayReach = [&](const FloatBox& box) {
-    if (box.empty()) return false;
-    Eigen::Vector3d lower, upper;
-    for (int k = 0; k < 3; ++k) lower[k] = box.lower[k], upper[k] = box.upper[k];
-    if (lower.minCoeff() <= -kLargestFloat || upper.maxCoeff() >= kLargestFloat) return true;
-    Eigen::Vector3d centre = 0.5 * unit * (lower + upper) + geometry.frame.origin;
-    const Eigen::Vector3d half = 0.5 * unit * (upper - lower);
-    double size = centre.cwiseAbs().maxCoeff() + geometry.frame.origin.cwiseAbs().maxCoeff() +
-                  half.sum() + shape.magnitude();
-    if (geometry.isPlaced()) {
-      centre = placed(centre);
-      size += placed.translation.cwiseAbs().maxCoeff();
-    }
-    const SignedDistance at = shape.at(centre);
-    const Eigen::Vector3d slope =
-        geometry.isPlaced() ? placed.rotation.transpose() * at.normal : at.normal;
-    return !(at.distance - slope.cwiseAbs().dot(half) >
-             reach + kShapeBoundError * size);  // NaN: it may
+  const double error = kShapeBoundError * (before.magnitude() + now.magnitude() + reach +
+                                           2.0 * origin.cwiseAbs().maxCoeff());
+  Eigen::AlignedBox3d swept;
+  for (const Shape* shape : {&before, &now})
+    for (const Vector3d& corner : shape->corners()) swept.extend(corner - origin);
+  const Vector3d grown = Vector3d::Constant(reach + now.radius() + error);
+  swept = {swept.min() - grown, swept.max() + grown};
+  const auto mayReach = [&](const FloatBox& stored) {
+    if (stored.empty()) return false;
+    const FloatBox floats = map(stored);
+    Eigen::AlignedBox3d box;
+    for (int k = 0; k < 3; ++k) box.min()[k] = floats.lower[k], box.max()[k] = floats.upper[k];
+    if (!(box.min().minCoeff() > -kLargestFloat && box.max().maxCoeff() < kLargestFloat))
+      return true;
+    box = {unit * box.min(), unit * box.max()};
+    if (wholeStep) return swept.intersects(box);
+    const Vector3d centre = box.center() + origin;
+    const SignedDistance at = now.at(centre);
+    const double size = centre.cwiseAbs().maxCoeff() + box.sizes().sum();
+    return !(at.distance - 0.5 * at.normal.cwiseAbs().dot(box.sizes()) >
+             reach + error + kShapeBoundError * size);  // NaN: it may
   };
   out.clear();
-  forEachOverlapping(octree, mayReach, stack, [&](std::uint32_t begin, std::uint32_t end) {
+  forEachOverlapping(geometry.octree, mayReach, stack, [&](std::uint32_t begin, std::uint32_t end) {
     for (std::uint32_t i = begin; i < end; ++i)
-      if (mayReach(octree.boxes()[i])) out.push_back(octree.order()[i]);
+      if (mayReach(geometry.octree.boxes()[i])) out.push_back(geometry.octree.order()[i]);
   });
 }
 

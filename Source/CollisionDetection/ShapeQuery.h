@@ -10,7 +10,9 @@ namespace palpate {
 ///
 /// Source   the distance to a convex shape is convex: over a box it is nowhere less than at the centre, less
 ///          what the slope there takes away on the way to a corner.
-void findPrimitivesNear(const Geometry&, const Shape&, double reach, PointQueryStack&,
-                        Buffer<std::uint32_t>& out);
+///
+/// At any time of the step; the same shape twice: as it is now.
+void findPrimitivesNear(const Geometry&, const Shape& before, const Shape& now, double reach,
+                        PointQueryStack&, Buffer<std::uint32_t>& out);
 
 }  // namespace palpate

@@ -95,17 +95,13 @@ void Polytope::start(std::span<const Vector3d> four) {
   m_next.assign(4, 0);
   const bool turned = volumeSign(four[0], four[1], four[2], four[3]) > 0;
   const std::uint32_t b = turned ? 2 : 1, c = turned ? 1 : 2;
-  newFace({0, b, c});
-  newFace({0, 3, b});
-  newFace({b, 3, c});
-  newFace({c, 3, 0});
-  m_faces[0].neighbours = {1, 2, 3};
-  m_faces[1].neighbours = {3, 2, 0};
-  m_faces[2].neighbours = {1, 3, 0};
-  m_faces[3].neighbours = {2, 1, 0};
+  newFace({0, b, c}, {1, 2, 3});
+  newFace({0, 3, b}, {3, 2, 0});
+  newFace({b, 3, c}, {1, 3, 0});
+  newFace({c, 3, 0}, {2, 1, 0});
 }
 
-std::uint32_t Polytope::newFace(const Triangle& corners) {
+std::uint32_t Polytope::newFace(const Triangle& corners, const Triangle& neighbours) {
   auto face = static_cast<std::uint32_t>(m_faces.size());
   if (m_free.empty()) {
     m_faces.emplace_back();
@@ -117,7 +113,7 @@ std::uint32_t Polytope::newFace(const Triangle& corners) {
   }
   const Vector3d &a = m_points[corners[0]], &b = m_points[corners[1]], &c = m_points[corners[2]];
   const Vector3d normal = unitCross(a, b, a, c, &m_decisions.undecided);
-  m_faces[face] = {corners, {kNone, kNone, kNone}};
+  m_faces[face] = {corners, neighbours};
   m_planes[face] = {normal, dot(normal, a), face};
   m_sees[face] = 0;
   return face;
@@ -158,9 +154,8 @@ std::uint32_t Polytope::cut(std::uint32_t face, std::uint32_t last) {
     const std::uint32_t u = seen.corners[i], v = seen.corners[(i + 1) % 3],
                         behind = seen.neighbours[i];
     if (m_sees[behind]) continue;
-    const std::uint32_t fresh = newFace({u, v, p});
+    const std::uint32_t fresh = newFace({u, v, p}, {behind, kNone, kNone});
     m_next[u] = fresh;
-    m_faces[fresh].neighbours[0] = behind;
     for (std::size_t k = 0; k < 3; ++k)
       if (m_faces[behind].corners[k] == v && m_faces[behind].corners[(k + 1) % 3] == u)
         m_faces[behind].neighbours[k] = fresh;
@@ -169,8 +164,8 @@ std::uint32_t Polytope::cut(std::uint32_t face, std::uint32_t last) {
   return last;
 }
 
-/// Without what is left of faces and points on the way.
-void Polytope::keepHull() {
+/// Without what is left of faces and points on the way. Returns the faces' new numbers.
+std::vector<std::uint32_t> Polytope::keepHull() {
   Buffer<Face> faces;
   Buffer<Plane> planes;
   std::vector<std::uint32_t> ofFace(m_faces.size(), kNone), ofPoint(m_points.size(), kNone);
@@ -195,6 +190,7 @@ void Polytope::keepHull() {
   m_faces.swap(faces);
   m_planes.swap(planes);
   m_points.swap(points);
+  return ofFace;
 }
 
 /// Of the hull with an apex beside the plane: its base, from both sides.
@@ -209,7 +205,7 @@ void Polytope::keepPlate(std::uint32_t apex) {
   for (std::uint32_t f = 0; f < count; ++f) {
     if (!isBase(f)) continue;
     const auto [a, b, c] = m_faces[f].corners;
-    back[f] = newFace({a, c, b});
+    back[f] = newFace({a, c, b}, {});
   }
   Buffer<Plane> border;
   for (std::uint32_t f = 0; f < count; ++f) {
@@ -231,12 +227,7 @@ void Polytope::keepPlate(std::uint32_t apex) {
   }
   for (std::uint32_t f = 0; f < count; ++f)
     if (!isBase(f)) m_planes[f].face = kNone;
-  // keepHull() numbers the faces anew, of which the back ones are in the order of the others.
-  std::uint32_t kept = 0;
-  std::vector<std::uint32_t> ofFace(count, 0);
-  for (std::uint32_t f = 0; f < count; ++f)
-    if (back[f] != kNone) ofFace[f] = kept++;
-  keepHull();
+  const std::vector<std::uint32_t> ofFace = keepHull();
   for (Plane& plane : border) plane.face = ofFace[plane.face];
   m_planes.insert(m_planes.end(), border.begin(), border.end());
 }

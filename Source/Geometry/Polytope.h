@@ -84,9 +84,9 @@ class Polytope {
   const Eigen::Vector3d& corner(std::uint32_t face, int i) const {
     return m_points[m_faces[face].corners[static_cast<std::size_t>(i)]];
   }
-  std::uint32_t newFace(const Triangle& corners);
+  std::uint32_t newFace(const Triangle& corners, const Triangle& neighbours);
   std::uint32_t cut(std::uint32_t face, std::uint32_t last);
-  void keepHull();
+  std::vector<std::uint32_t> keepHull();
   void keepPlate(std::uint32_t apex);
   std::uint32_t highest(const Eigen::Vector3d& x, double tie) const;
   OnFace onFace(const Eigen::Vector3d& x, std::uint32_t face) const;

@@ -1,6 +1,8 @@
 #include "Geometry/Shape.h"
 
+#include "Core/Text.h"
 #include "Math/ClosestPoint.h"
+#include "Math/Compensated.h"
 #include "Math/Foot.h"
 #include "Math/Predicates.h"
 #include "Math/Tolerances.h"
@@ -9,9 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
-#include <string_view>
 
 namespace palpate {
 
@@ -43,12 +43,34 @@ Eigen::Matrix3d axesAlong(const Vector3d& direction) {
   return axes;
 }
 
+/// Of a body that is the hull of points, from its origin; none of others.
+std::vector<Vector3d> cornersOf(const AnalyticalGeometry& geometry) {
+  if (const auto* hull = std::get_if<ConvexHull>(&geometry)) return hull->points;
+  std::vector<Vector3d> corners;
+  if (const auto* box = std::get_if<Box>(&geometry))
+    for (int v = 0; v < 8; ++v)
+      corners.push_back(
+          Vector3d(v & 1 ? 1 : -1, v & 2 ? 1 : -1, v & 4 ? 1 : -1).cwiseProduct(box->halfExtents));
+  return corners;
+}
+
 }  // namespace
 
 Shape::Shape(const AnalyticalGeometry& geometry, const RigidTransform& transform) {
-  if (const auto* hull = std::get_if<ConvexHull>(&geometry)) {
-    m_span = spanOf(hull->points);
-    if (m_span.size() > 2) m_hull = std::make_shared<Polytope>(hull->points);
+  if (const std::vector<Vector3d> corners = cornersOf(geometry); !corners.empty()) {
+    m_span = spanOf(corners);
+    if (m_span.size() > 2) m_hull = std::make_shared<Polytope>(corners);
+  }
+  if (m_hull) {
+    for (std::uint32_t f = 0; f < m_hull->faceCount(); ++f) {
+      m_faces.push_back(m_hull->corners(f));
+      const auto& [a, b, c] = m_faces.back();
+      for (const auto& edge : {Segment{a, b}, Segment{b, c}, Segment{c, a}})
+        if (edge[0] < edge[1]) m_edges.push_back(edge);  // two faces have it, one each way
+    }
+  } else {
+    m_faces = {{0, 1, 1}};
+    m_edges = {{0, 1}};
   }
   place(geometry, transform);
 }
@@ -61,7 +83,7 @@ void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& tran
     m_radius = radius;
   };
   const auto body = [&](Kind kind, const Vector3d& origin, const Eigen::Matrix3d& axes,
-                        const std::array<double, 3>& sizes) {
+                        const std::array<double, 2>& sizes) {
     m_kind = kind;
     m_p0 = m_p1 = transform(origin);
     m_axes = orthonormal(transform.rotation) * axes;
@@ -73,63 +95,59 @@ void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& tran
     capsule(rod->p0, rod->p1, rod->radius);
   } else if (const auto* plane = std::get_if<Plane>(&geometry)) {
     body(plane->twoSided ? Kind::TwoSidedPlane : Kind::Plane, plane->point,
-         axesAlong(plane->normal), {0, 0, 0});
-  } else if (const auto* box = std::get_if<Box>(&geometry)) {
-    const Vector3d& half = box->halfExtents;
-    body(Kind::Box, box->centre, Eigen::Matrix3d::Identity(), {half[0], half[1], half[2]});
+         axesAlong(plane->normal), {});
   } else if (const auto* cylinder = std::get_if<Cylinder>(&geometry)) {
-    const Vector3d along = 0.5 * cylinder->p1 - 0.5 * cylinder->p0;
-    body(Kind::Cylinder, cylinder->p0 + along, axesAlong(along),
-         {cylinder->radius, lengthOf(along), 0});
-  } else if (m_hull) {
-    double size = 0;
-    for (const Vector3d& p : m_hull->points()) size = std::max(size, p.cwiseAbs().maxCoeff());
-    body(Kind::Hull, Vector3d::Zero(), Eigen::Matrix3d::Identity(), {size, 0, 0});
+    if (cylinder->radius > 0) {
+      const Vector3d along = 0.5 * cylinder->p1 - 0.5 * cylinder->p0;
+      body(Kind::Cylinder, cylinder->p0 + along, axesAlong(along),
+           {cylinder->radius, lengthOf(along)});
+    } else {
+      capsule(cylinder->p0, cylinder->p1, 0);
+    }
   } else {
-    capsule(m_span.front(), m_span.back(), 0);
+    const auto* box = std::get_if<Box>(&geometry);
+    const Vector3d origin = box ? box->centre : Vector3d(Vector3d::Zero());
+    if (m_hull)
+      body(Kind::Hull, origin, Eigen::Matrix3d::Identity(), {});
+    else
+      capsule(origin + m_span.front(), origin + m_span.back(), 0);
   }
-  m_magnitude = m_p0.cwiseAbs().maxCoeff() + m_p1.cwiseAbs().maxCoeff() + m_radius +
-                *std::max_element(m_sizes.begin(), m_sizes.end());
+  m_corners = {m_p0, m_p1};
+  if (isCylinder()) {
+    m_corners = {m_p0 - m_sizes[1] * m_axes.col(2), m_p0 + m_sizes[1] * m_axes.col(2)};
+  } else if (m_hull) {
+    m_corners = m_hull->points();
+    for (Vector3d& p : m_corners) p = m_p0 + m_axes * p;
+  }
+  m_magnitude = largest(m_p0);
+  for (const Vector3d& p : m_corners) m_magnitude = std::max(m_magnitude, largest(p));
+  m_magnitude += largest(m_p0) + radius();
 }
 
 Vector3d Shape::inBody(const Vector3d& x) const { return m_axes.transpose() * (x - m_p0); }
 
 Shape::Parts Shape::partsOf(const Vector3d& v, double tie) const {
-  const Vector3d up(0, 0, v[2] < -tie ? -1 : 1);
-  switch (m_kind) {
-    case Kind::Plane:
-      return {1, {v[2]}, {Vector3d::UnitZ()}};
-    case Kind::TwoSidedPlane:
-      return {1, {std::abs(v[2])}, {up}};
-    case Kind::Cylinder: {
-      const double radius = lengthOf({v[0], v[1], 0});
-      const Vector3d outward =
-          radius > 0 ? Vector3d(v[0] / radius, v[1] / radius, 0) : Vector3d(1, 0, 0);
-      return {2, {radius, std::abs(v[2])}, {outward, up}};
-    }
-    default:
-      return {3,
-              {std::abs(v[0]), std::abs(v[1]), std::abs(v[2])},
-              {Vector3d(v[0] < -tie ? -1 : 1, 0, 0), Vector3d(0, v[1] < -tie ? -1 : 1, 0), up}};
-  }
+  const double radius = lengthOf({v[0], v[1], 0});
+  const Vector3d outward =
+      radius > 0 ? Vector3d(v[0] / radius, v[1] / radius, 0) : Vector3d(1, 0, 0);
+  return {{radius, std::abs(v[2])}, {outward, Vector3d(0, 0, v[2] < -tie ? -1 : 1)}};
 }
 
 SignedDistance Shape::atBody(const Vector3d& u, double tie) const {
   if (m_hull) return m_hull->at(u, tie);
-  const Parts parts = partsOf(u, tie);
-  int nearest = 0, outside = 0;
-  std::array<double, 3> beyond{};
-  Vector3d difference = Vector3d::Zero();
-  for (int i = 0; i < parts.count; ++i) {
-    beyond[i] = parts.lengths[i] - m_sizes[i];
-    if (beyond[i] > beyond[nearest] + tie) nearest = i;
-    if (!(beyond[i] > kOnSurface * m_magnitude)) continue;
-    ++outside;
-    difference += beyond[i] * parts.directions[i];
+  if (isPlane()) {
+    const bool below = m_kind == Kind::TwoSidedPlane && u[2] < 0;
+    return {below ? -u[2] : u[2], {0, 0, m_kind == Kind::TwoSidedPlane && u[2] < -tie ? -1. : 1.}};
   }
-  if (outside <= 1) return {beyond[nearest], parts.directions[nearest]};
-  const double distance = lengthOf(difference);
-  return {distance, difference / distance};
+  const Parts parts = partsOf(u, tie);
+  const std::array<double, 2> beyond{parts.lengths[0] - m_sizes[0], parts.lengths[1] - m_sizes[1]};
+  if (std::min(beyond[0], beyond[1]) > kOnSurface * m_magnitude) {
+    const Vector3d difference = beyond[0] * parts.directions[0] + beyond[1] * parts.directions[1];
+    const double distance = lengthOf(difference);
+    return {distance, difference / distance};
+  }
+  const std::size_t nearest = beyond[1] > beyond[0] + tie;
+  return {beyond[nearest], parts.directions[nearest]};
 }
 
 SignedDistance Shape::at(const Vector3d& x) const {
@@ -183,40 +201,36 @@ NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const 
   if (slope(0) >= 0) return at(0, false);
   if (slope(1) <= 0) return at(1, false);
   // From a falling to a rising slope; a stretch without slope is bracketed from both sides.
-  double falls = 0, rises = 1, flat = 0;
-  while (rises - falls > kEdgeWeight) {
-    const double middle = 0.5 * (falls + rises), sloping = slope(middle);
-    (sloping < 0 ? falls : rises) = middle;
-    if (sloping == 0) flat = std::max(flat, middle);
-  }
-  double first = 0.5 * (falls + rises), last = first;
-  if (flat > 0) {
-    for (falls = flat, rises = 1; rises - falls > kEdgeWeight;)
-      (slope(0.5 * (falls + rises)) > 0 ? rises : falls) = 0.5 * (falls + rises);
-    last = 0.5 * (falls + rises);
-  }
+  const auto bracket = [&](auto&& isBefore) {
+    double low = 0, high = 1;
+    while (high - low > kEdgeWeight) {
+      const double middle = 0.5 * (low + high);
+      (isBefore(slope(middle)) ? low : high) = middle;
+    }
+    return 0.5 * (low + high);
+  };
+  const double first = bracket([](double s) { return s < 0; });
+  const double last =
+      slope(first + 2 * kEdgeWeight) > 0 ? first : bracket([](double s) { return !(s > 0); });
   const double t = 0.5 * (first + last);
   if (first <= kEdgeWeight) return at(0, false);
   if (last >= 1 - kEdgeWeight) return at(1, false);
   return at(t, true);
 }
 
-/// Of the plane normal . u = height, height not negative: the deepest point in the shape, or the
-/// shape's nearest to it. The shape cut down by m on all sides, { at(u) <= -m }, has the parts'
-/// sizes less m; m is the largest for which it still reaches the plane.
+/// Of a cylinder and the plane normal . u = height, height not negative: the deepest point in the
+/// shape, or the shape's nearest to it. The shape cut down by m on all sides, { at(u) <= -m }, has
+/// the parts' sizes less m; m is the largest for which it still reaches the plane.
 Vector3d Shape::nearestOfPlane(const Vector3d& normal, double height) const {
   const Parts parts = partsOf(normal, 0);
-  double reach = 0, lengths = 0, deepest = -std::numeric_limits<double>::infinity();
-  for (int i = 0; i < parts.count; ++i) {
-    reach += parts.lengths[i] * m_sizes[i];
-    lengths += parts.lengths[i];
-    deepest = std::max(deepest, -m_sizes[i]);
-  }
-  const double level = std::min(0.0, std::max(deepest, (height - reach) / lengths));
+  const auto& [lengths, directions] = parts;
+  const double reach = lengths[0] * m_sizes[0] + lengths[1] * m_sizes[1],
+               all = lengths[0] + lengths[1], deepest = -std::min(m_sizes[0], m_sizes[1]);
+  const double level = std::min(0.0, std::max(deepest, (height - reach) / all));
   Vector3d point = Vector3d::Zero();
-  for (int i = 0; i < parts.count; ++i)
-    if (parts.lengths[i] > 0) point += (m_sizes[i] + level) * parts.directions[i];
-  const double reached = reach + level * lengths;
+  for (int i = 0; i < 2; ++i)
+    if (lengths[i] > 0) point += (m_sizes[i] + level) * directions[i];
+  const double reached = reach + level * all;
   return reached > height ? Vector3d(height / reached * point) : point;
 }
 
@@ -296,57 +310,40 @@ std::optional<NearestToShape> Shape::nearestToHull(const Vector3d& a, const Vect
 
 std::string faultOf(const AnalyticalGeometry& geometry, std::optional<std::size_t>& element) {
   std::string fault;
-  const auto say = [&](std::string_view name, const Vector3d& v, bool isVector, const char* rule) {
-    char value[128];
-    if (isVector)
-      std::snprintf(value, sizeof value, " is (%g, %g, %g)", v[0], v[1], v[2]);
-    else
-      std::snprintf(value, sizeof value, " is %g", v[0]);
-    fault = std::string(name) + value + "; it must be " + rule;
+  const auto say = [&](const std::string& name, const auto& value, const char* rule) {
+    fault = name + " is " + textOf(value) + "; it must be " + rule;
   };
-  forEachField(geometry, [&](std::string_view name, const auto& field) {
+  forEachField(geometry, [&](const std::string& name, const auto& field) {
     using Field = std::decay_t<decltype(field)>;
     if constexpr (std::is_same_v<Field, std::vector<Vector3d>>) {
       if (field.empty()) fault = "a hull needs at least one point";
       for (std::size_t i = field.size(); i-- > 0;)
         if (!field[i].allFinite())
-          say("point " + std::to_string(i), field[i], true, "finite"), element = i;
+          say("point " + std::to_string(i), field[i], "finite"), element = i;
     } else if constexpr (!std::is_same_v<Field, bool>) {
-      constexpr bool isVector = std::is_same_v<Field, Vector3d>;
-      const Vector3d values = [&]() -> Vector3d {
-        if constexpr (isVector)
-          return field;
-        else
-          return Vector3d::Constant(field);
-      }();
+      Vector3d values;
+      values << field, Eigen::VectorXd::Zero(std::is_same_v<Field, double> ? 2 : 0);
       const bool isSize = name == "radius" || name == "halfExtents";
       if (!values.allFinite() || (isSize && !(values.minCoeff() >= 0)))
-        say(name, values, isVector, isSize ? "finite and not negative" : "finite");
+        say(name, field, isSize ? "finite and not negative" : "finite");
       else if (name == "normal" && values == Vector3d::Zero())
-        say(name, values, isVector, "of some length");
+        say(name, field, "of some length");
     }
   });
   const auto* cylinder = std::get_if<Cylinder>(&geometry);
   if (fault.empty() && cylinder && cylinder->p0 == cylinder->p1)
-    say("p1", cylinder->p1, true, "another point than p0");
+    say("p1", cylinder->p1, "another point than p0");
   return fault;
 }
 
 std::string faultOf(const RigidTransform& transform) {
   const Eigen::Matrix3d& r = transform.rotation;
   const double off = (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  char text[128];
-  const Vector3d& t = transform.translation;
-  if (!r.allFinite() || !(off <= kOrthonormal) || !(r.determinant() > 0)) {
-    std::snprintf(text, sizeof text,
-                  "is not a rotation: its columns' products are off by %g, its determinant is %g",
-                  off, r.determinant());
-    return "rotation " + std::string(text);
-  }
-  if (t.allFinite()) return {};
-  std::snprintf(text, sizeof text, "translation is (%g, %g, %g); it must be finite", t[0], t[1],
-                t[2]);
-  return text;
+  if (!r.allFinite() || !(off <= kOrthonormal) || !(r.determinant() > 0))
+    return "rotation is not a rotation: its columns' products are off by " + textOf(off) +
+           ", its determinant is " + textOf(r.determinant());
+  if (transform.translation.allFinite()) return {};
+  return "translation is " + textOf(transform.translation) + "; it must be finite";
 }
 
 }  // namespace palpate

@@ -9,9 +9,11 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <variant>
+#include <vector>
 
 namespace palpate {
 
@@ -22,6 +24,12 @@ struct NearestToShape {
   double distance;          ///< L, negative inside
   bool inInterior;          ///< strictly: not on an end, not on an edge
   bool exact = false;       ///< floating point left it to exact arithmetic
+};
+
+/// The same at a time of the step.
+struct ShapeImpact {
+  double time;
+  NearestToShape nearest;
 };
 
 /// How far two shapes are apart; negative: as far as the shortest way to part them.
@@ -71,6 +79,17 @@ class Shape {
   Eigen::Vector3d support(const Eigen::Vector3d& direction, double tie) const;
   const Eigen::Vector3d& origin() const { return m_p0; }
   bool isPlane() const { return m_kind < Kind::Capsule; }
+  bool isCylinder() const { return m_kind == Kind::Cylinder; }
+  bool movesInStep() const { return m_kind == Kind::Capsule || m_kind == Kind::Hull; }
+
+  // Within a step what a shape is made of moves linearly: a capsule's two ends, which of a sphere
+  // are one, or a hull's corners. Planes and cylinders do not move so.
+
+  std::span<const Eigen::Vector3d> corners() const { return m_corners; }
+  /// Of a hull, or a capsule's axis, by corners: {p, q, q}.
+  std::span<const Triangle> faces() const { return m_faces; }
+  std::span<const Segment> edges() const { return m_edges; }
+  double radius() const { return isCylinder() ? m_sizes[0] : m_radius; }  ///< L
   /// L: about the largest magnitude of its coordinates and measures.
   double magnitude() const { return m_magnitude; }
 
@@ -82,12 +101,11 @@ class Shape {
   ShapePairDistance flatFrom(const Shape&, const Eigen::Vector3d& flat) const;
   ShapePairDistance grownFrom(const Shape&, ShapePairScratch&) const;
 
-  enum class Kind { Plane, TwoSidedPlane, Capsule, Cylinder, Box, Hull };
-  /// A vector by what the distance is made of: height, or radius and height, or three heights.
+  enum class Kind { Plane, TwoSidedPlane, Capsule, Cylinder, Hull };
+  /// A vector by what the distance to a cylinder is made of: radius and height.
   struct Parts {
-    int count;
-    std::array<double, 3> lengths;  ///< but of a plane never negative
-    std::array<Eigen::Vector3d, 3> directions;
+    std::array<double, 2> lengths;  ///< never negative
+    std::array<Eigen::Vector3d, 2> directions;
   };
   /// tie: lengths on either side of the middle that count as above it.
   Parts partsOf(const Eigen::Vector3d& v, double tie) const;
@@ -106,9 +124,12 @@ class Shape {
   Eigen::Vector3d m_p0, m_p1;  ///< a capsule's axis; others: both the body's origin
   double m_radius = 0;         ///< of a capsule
   Eigen::Matrix3d m_axes = Eigen::Matrix3d::Identity();  ///< of the body
-  std::array<double, 3> m_sizes{};                       ///< of the parts
+  std::array<double, 2> m_sizes{};                       ///< of a cylinder's parts
   std::vector<Eigen::Vector3d> m_span;                   ///< of a hull's points
-  std::shared_ptr<const Polytope> m_hull;                ///< in its body's frame
+  std::vector<Eigen::Vector3d> m_corners;
+  std::vector<Triangle> m_faces;
+  std::vector<Segment> m_edges;
+  std::shared_ptr<const Polytope> m_hull;  ///< in its body's frame
   double m_magnitude;
 };
 

@@ -92,27 +92,20 @@ Vector3d Shape::support(const Vector3d& direction, double tie) const {
   if (m_hull) return m_axes * m_hull->support(inBodys, tie);
   const Parts parts = partsOf(inBodys, 0);
   Vector3d point = Vector3d::Zero();
-  for (int i = 0; i < parts.count; ++i)
+  for (int i = 0; i < 2; ++i)
     if (parts.lengths[i] * m_sizes[i] > 0.5 * tie) point += m_sizes[i] * parts.directions[i];
   return m_axes * point;
 }
 
 bool Shape::precedes(const Shape& other) const {
   if (m_kind != other.m_kind) return m_kind < other.m_kind;
-  const auto compare = [](const auto& x, const auto& y) {
-    const auto order =
-        std::lexicographical_compare_three_way(x.begin(), x.end(), y.begin(), y.end());
-    return order < 0 ? -1 : order > 0 ? 1 : 0;
-  };
-  int order = compare(m_p0, other.m_p0);
-  if (order == 0) order = compare(m_p1, other.m_p1);
-  if (order == 0) order = compare(m_sizes, other.m_sizes);
-  if (order == 0) order = compare(m_axes.reshaped(), other.m_axes.reshaped());
-  for (std::size_t i = 0; order == 0 && m_hull && i < m_hull->points().size(); ++i)
-    order = i < other.m_hull->points().size()
-                ? compare(m_hull->points()[i], other.m_hull->points()[i])
-                : 1;
-  return order == 0 ? m_radius < other.m_radius : order < 0;
+  if (radius() != other.radius()) return radius() < other.radius();
+  const auto &ours = m_corners, &theirs = other.m_corners;
+  for (std::size_t i = 0; i < std::min(ours.size(), theirs.size()); ++i)
+    if (ours[i] != theirs[i])
+      return std::lexicographical_compare(ours[i].begin(), ours[i].end(), theirs[i].begin(),
+                                          theirs[i].end());
+  return ours.size() < theirs.size();
 }
 
 /// Of a plane against a body.
@@ -151,23 +144,9 @@ ShapePairDistance Shape::flatFrom(const Shape& other, const Vector3d& flat) cons
     take(other.nearestOfEdge(c, a), c, a, b);
   };
   if (m_hull) {
-    const auto at = [&](std::uint32_t v) -> Vector3d {
-      return m_p0 + m_axes * m_hull->points()[v];
-    };
-    for (std::uint32_t f = 0; f < m_hull->faceCount(); ++f) {
-      const auto& [a, b, c] = m_hull->corners(f);
-      test(at(a), at(b), at(c));
-    }
-  } else if (m_kind == Kind::Capsule) {
+    for (const auto& [a, b, c] : m_faces) test(m_corners[a], m_corners[b], m_corners[c]);
+  } else {
     take(other.nearestOfEdge(m_p0, m_p1), m_p0, m_p1, m_p1);
-  } else {  // a box or a cylinder of no more than two extents
-    std::array<Vector3d, 2> arms{Vector3d::Zero(), Vector3d::Zero()};
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < 3; ++i)
-      if (m_sizes[i] > 0) arms[count++] = m_sizes[i] * m_axes.col(m_kind == Kind::Box ? i : 2);
-    const Vector3d &u = arms[0], &v = arms[1];
-    test(m_p0 - u - v, m_p0 + u - v, m_p0 - u + v);
-    test(m_p0 + u + v, m_p0 + u - v, m_p0 - u + v);
   }
   const double distance = nearest.distance + other.m_radius;  // 0 but of a capsule
   const double tie = kOnSurface * (m_magnitude + other.m_magnitude);

@@ -98,13 +98,13 @@ struct TriangleMesh {
   MeshTopology topology;
   Positions now;
   Positions before;
-  std::vector<double> radii{};          ///< L, per vertex; empty: all have the largest
-  double largestRadius = 0.0;           ///< L
-  std::vector<Eigen::Vector3d> rest{};  ///< when the topology was set
-  bool outer = false;                   ///< Sidedness::Outer
-  RigidTransform transform{};
+  std::vector<double> radii{};                     ///< L, per vertex; empty: all have the largest
+  double largestRadius = 0.0;                      ///< L
+  std::vector<Eigen::Vector3d> rest{};             ///< when the topology was set
+  bool outer = false;                              ///< Sidedness::Outer
   std::optional<AnalyticalGeometry> analytical{};  ///< of a shape, in the body's frame
-  std::optional<Shape> shape{};                    ///< the same in the world
+  /// The same in the world, placed as `now` and `before` are.
+  std::optional<Shape> shape{}, shapeBefore{};
 
   double radius(std::uint32_t vertex) const {
     return radii.empty() ? largestRadius : radii[vertex];

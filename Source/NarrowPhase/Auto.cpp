@@ -11,12 +11,9 @@ namespace {
 
 MotionRange motionOf(const TriangleMesh& mesh, std::uint32_t triangle) {
   MotionRange range;
-  const Triangle& corners = mesh.topology.triangles[triangle];
-  range.lower = range.upper = mesh.now[corners[0]] - mesh.before[corners[0]];
-  for (const std::uint32_t corner : {corners[1], corners[2]}) {
+  for (const std::uint32_t corner : mesh.topology.triangles[triangle]) {
     const Eigen::Vector3d moved = mesh.now[corner] - mesh.before[corner];
-    range.lower = range.lower.cwiseMin(moved);
-    range.upper = range.upper.cwiseMax(moved);
+    range.add({moved, moved, moved, 0.0, 1.0});
   }
   return range;
 }

@@ -77,22 +77,6 @@ void forEachLikelyPair(const MeshPair& pair, std::span<const TrianglePair> candi
   filterPairs<false>(Features<Kind::EdgeEdge>{pair.a, pair.b}, pairs.edgeEdge, settings, f);
 }
 
-/// The vertices at a time of the step, relative to the first one's way: differences stay sharp far
-/// from the origin, where positions would be rounded. As they are where differences overflow.
-std::array<Vector3d, 4> positionsAt(const ImpactQuery& query, double time) {
-  std::array<Vector3d, 4> p;
-  const auto place = [&](const Vector3d& start, const Vector3d& end) {
-    for (int i = 0; i < 4; ++i)
-      p[i] =
-          (1.0 - time) * (query.vertices[i].at(0) - start) + time * (query.vertices[i].at(1) - end);
-  };
-  place(query.vertices[0].at(0), query.vertices[0].at(1));
-  const bool finite = std::all_of(p.begin(), p.end(),
-                                  [](const Vector3d& position) { return position.allFinite(); });
-  if (!finite) place(Vector3d::Zero(), Vector3d::Zero());
-  return p;
-}
-
 /// Tests pairs and describes the contacts found.
 class ContactFinder {
  public:
@@ -128,9 +112,7 @@ class ContactFinder {
       m_out.exactDecisions += closest.exact;
       VertexTriangleContact contact =
           contactOf(inFirst, inSecond, topology.triangles[inSecond], closest);
-      // A corner touches its triangle, and then the normal is the plane's.
-      complete(contact, query, time,
-               [&] { return finiteVertexTriangleDistance(p[1], p[1], p[2], p[3]).normal; });
+      complete(contact, query, time, p);
       held[ofSecond] = {MeshFeature::Kind::Vertex, inFirst};
       held[!ofSecond] = featureOf(topology, inSecond, closest.feature);
       if (isLeftOut(closest, contact.normal, refusesVertex(m_pair, inFirst, inSecond, ofSecond)))
@@ -143,9 +125,7 @@ class ContactFinder {
       const auto closest = finiteEdgeEdgeDistance(p[0], p[1], p[2], p[3]);
       m_out.exactDecisions += closest.exact;
       EdgeEdgeContact contact = contactOf(ofA.edges[inFirst], ofB.edges[inSecond], closest);
-      complete(contact, query, time, [&] {
-        return finiteEdgeEdgeDistance(p[0], p[1], p[0], p[0] + (p[3] - p[2])).normal;
-      });
+      complete(contact, query, time, p);
       held = {featureOf(ofA, inFirst, closest.featureA),
               featureOf(ofB, inSecond, closest.featureB)};
       if (isLeftOut(closest, contact.normal, refusesEdges(m_pair, inFirst, inSecond))) return false;
@@ -157,13 +137,13 @@ class ContactFinder {
   }
 
  private:
-  template <class Contact, class PlaneNormal>
-  void complete(Contact& contact, const ImpactQuery& query, double time, PlaneNormal&& normal) {
+  template <class Contact>
+  void complete(Contact& contact, const ImpactQuery& query, double time,
+                const std::array<Vector3d, 4>& p) {
     contact.timeOfImpact = time;
     contact.distance -= m_pair.a.largestRadius + m_pair.b.largestRadius;
     if (m_settings.minimumDistance > 0.0) return;
-    contact.normal = normal();
-    if (sideBefore(query, time, &m_out.exactDecisions) < 0) contact.normal = -contact.normal;
+    contact.normal = normalOfTouch(query, time, p, m_out.exactDecisions);
   }
 
   const MeshPair& m_pair;
@@ -216,6 +196,30 @@ void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, Contact
 }
 
 }  // namespace
+
+std::array<Vector3d, 4> positionsAt(const ImpactQuery& query, double time) {
+  std::array<Vector3d, 4> p;
+  const auto place = [&](const Vector3d& start, const Vector3d& end) {
+    for (int i = 0; i < 4; ++i)
+      p[i] =
+          (1.0 - time) * (query.vertices[i].at(0) - start) + time * (query.vertices[i].at(1) - end);
+  };
+  place(query.vertices[0].at(0), query.vertices[0].at(1));
+  const bool finite = std::all_of(p.begin(), p.end(),
+                                  [](const Vector3d& position) { return position.allFinite(); });
+  if (!finite) place(Vector3d::Zero(), Vector3d::Zero());
+  return p;
+}
+
+Vector3d normalOfTouch(const ImpactQuery& query, double time, const std::array<Vector3d, 4>& p,
+                       std::size_t& exactDecisions) {
+  // A corner touches its triangle, and then the normal is the plane's.
+  const Vector3d normal =
+      query.kind == Kind::VertexTriangle
+          ? finiteVertexTriangleDistance(p[1], p[1], p[2], p[3]).normal
+          : finiteEdgeEdgeDistance(p[0], p[1], p[0], p[0] + (p[3] - p[2])).normal;
+  return sideBefore(query, time, &exactDecisions) < 0 ? Vector3d(-normal) : normal;
+}
 
 void findContinuous(const MeshPair& pair, std::span<const TrianglePair> candidates,
                     ContactBuffers& out) {

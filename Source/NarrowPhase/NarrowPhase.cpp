@@ -6,8 +6,6 @@
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/ShapeContacts.h"
 
-#include <palpate/Error.h>
-
 #include <algorithm>
 #include <numeric>
 
@@ -40,18 +38,11 @@ void ContactBuffers::clear() {
 
 void findContacts(const MeshPair& pair, std::span<const TrianglePair> candidates,
                   ContactBuffers& out) {
-  switch (pair.settings.method) {
-    case Method::Proximity:
-      return findProximity(pair, candidates, out);
-    case Method::Intersection:
-      return findIntersections(pair, candidates, out);
-    case Method::Continuous:
-      return findContinuous(pair, candidates, out);
-    case Method::Auto:
-      return findAuto(pair, candidates, out);
-    default:
-      throw Error(ErrorCode::UnsupportedMethod, "this method does not exist yet");
-  }
+  const Method method = pair.settings.method;
+  if (method == Method::Proximity) return findProximity(pair, candidates, out);
+  if (method == Method::Intersection) return findIntersections(pair, candidates, out);
+  if (method == Method::Continuous) return findContinuous(pair, candidates, out);
+  findAuto(pair, candidates, out);
 }
 
 FeatureLists everyFeature(const MeshPair& pair) {
@@ -83,18 +74,11 @@ void findContactsByBruteForce(const MeshPair& pair, const FeatureLists& features
                               ContactBuffers& out) {
   if (pair.isOfShapes()) return findShapePair(pair, out);
   if (pair.hasShape()) return findShapeContacts(pair, features.trianglesOfA, out);
-  switch (pair.settings.method) {
-    case Method::Proximity:
-      return findProximityByBruteForce(pair, features, out);
-    case Method::Intersection:
-      return findIntersectionsByBruteForce(pair, features, out);
-    case Method::Continuous:
-      return findContinuousByBruteForce(pair, features, out);
-    case Method::Auto:
-      return findAutoByBruteForce(pair, features, out);
-    default:
-      throw Error(ErrorCode::UnsupportedMethod, "this method does not exist yet");
-  }
+  const Method method = pair.settings.method;
+  if (method == Method::Proximity) return findProximityByBruteForce(pair, features, out);
+  if (method == Method::Intersection) return findIntersectionsByBruteForce(pair, features, out);
+  if (method == Method::Continuous) return findContinuousByBruteForce(pair, features, out);
+  findAutoByBruteForce(pair, features, out);
 }
 
 }  // namespace palpate

@@ -55,6 +55,7 @@ struct MeshPair {
   /// Of a pair with a shape: the other one, and the shape.
   const TriangleMesh& mesh() const { return a.shape ? b : a; }
   const Shape& shape() const { return *(a.shape ? a : b).shape; }
+  const Shape& shapeBefore() const { return *(a.shape ? a : b).shapeBefore; }
   bool hasLines() const {
     return a.topology.kind == GeometryKind::Lines || b.topology.kind == GeometryKind::Lines;
   }
@@ -97,6 +98,12 @@ struct ContactBuffers {
   std::size_t exactDecisions = 0;  ///< left to exact arithmetic
   void clear();
 };
+
+/// f(list) of contacts that have a time of impact.
+template <class Lists, class F>
+void forEachTimed(Lists& lists, F&& f) {
+  f(lists.vertexTriangle), f(lists.triangleVertex), f(lists.edgeEdge), f(lists.shape);
+}
 
 /// Appends the contacts of the candidate triangle pairs. Each contact that the pair's method
 /// includes comes out once over all batches of a frame, except Intersection's, which may repeat and

@@ -1,5 +1,9 @@
 #include "NarrowPhase/ShapeContacts.h"
 
+#include "NarrowPhase/Continuous.h"
+#include "Math/ClosestPoint.h"
+#include "Math/Tolerances.h"
+
 #include <algorithm>
 
 namespace palpate {
@@ -8,33 +12,137 @@ namespace {
 
 using Eigen::Vector3d;
 
+using Kind = ImpactQuery::Kind;
+
+/// When elements of a mesh come near to a shape within the step.
+class ShapeImpacts {
+ public:
+  ShapeImpacts(const MeshPair& pair, ContactBuffers& out)
+      : m_mesh(pair.mesh()),
+        m_before(pair.shapeBefore()),
+        m_now(pair.shape()),
+        m_distance(pair.settings.thickness + m_mesh.largestRadius),
+        m_out(out) {
+    m_settings.minimumDistance = m_distance + m_before.radius();
+    m_settings.tolerance = pair.settings.timeTolerance;
+    for (std::uint32_t i = 0; i < m_before.corners().size(); ++i)
+      m_motion = std::max(m_motion, motionOf(corner(i)));
+  }
+
+  /// L: what distances before the step may be off by, and what the step may take from them.
+  std::array<double, 2> slack(const Triangle& vertices) const {
+    double size = m_before.magnitude() + m_distance, motion = 0;
+    for (const std::uint32_t v : vertices) {
+      size += m_mesh.before[v].cwiseAbs().maxCoeff();
+      motion = std::max(motion, motionOf(vertex(v)));
+    }
+    return {kShapeBoundError * size, motion + m_motion};
+  }
+
+  /// Of an element that is further away before the step: the first time at which its inside is near
+  /// one of the shape's features.
+  std::optional<ShapeImpact> find(ShapeElement element, const Triangle& vertices) {
+    const auto& [a, b, c] = vertices;
+    m_first.reset();
+    m_time = 1.0;
+    if (element == ShapeElement::Vertex) {
+      for (const auto& [i, j, k] : m_before.faces())
+        ask({Kind::VertexTriangle, {{vertex(a), corner(i), corner(j), corner(k)}}});
+    } else if (element == ShapeElement::Edge) {
+      for (const auto& [i, j] : m_before.edges())
+        ask({Kind::EdgeEdge, {{vertex(a), vertex(b), corner(i), corner(j)}}});
+    } else {
+      for (std::uint32_t i = 0; i < m_before.corners().size(); ++i)
+        ask({Kind::VertexTriangle, {{corner(i), vertex(a), vertex(b), vertex(c)}}});
+    }
+    if (!m_first) return {};
+    return ShapeImpact{m_time, nearest(element, *m_first)};
+  }
+
+ private:
+  ImpactQuery::Step vertex(std::uint32_t v) const { return {m_mesh.before[v], m_mesh.now[v]}; }
+  ImpactQuery::Step corner(std::uint32_t i) const {
+    return {m_before.corners()[i], m_now.corners()[i]};
+  }
+  static double motionOf(const ImpactQuery::Step& step) { return (step.now - step.before).norm(); }
+
+  void ask(const ImpactQuery& query) {
+    const ImpactAnswer answer = findImpact(query, m_settings, m_time);
+    ++m_out.featurePairs;
+    m_out.exactDecisions += answer.exact;
+    if (!answer.impact || (m_first && !(answer.time < m_time))) return;
+    m_time = answer.time;
+    m_first = query;
+  }
+
+  NearestToShape nearest(ShapeElement element, const ImpactQuery& query) {
+    const std::array<Vector3d, 4> p = positionsAt(query, m_time);
+    NearestToShape nearest{Vector3d::UnitX(), {}, 0, true};
+    const auto take = [&](const auto& closest) {
+      nearest.normal = m_settings.minimumDistance > 0
+                           ? closest.normal
+                           : normalOfTouch(query, m_time, p, m_out.exactDecisions);
+      nearest.distance = closest.distance - m_before.radius();
+      m_out.exactDecisions += closest.exact;
+    };
+    if (query.kind == Kind::EdgeEdge) {
+      const EdgeEdgeDistance closest = finiteEdgeEdgeDistance(p[0], p[1], p[2], p[3]);
+      take(closest);
+      nearest.weights = {1.0 - closest.weightA, closest.weightA, 0.0};
+      nearest.inInterior = closest.featureA == EdgeFeature::Interior;
+      return nearest;
+    }
+    const VertexTriangleDistance closest = finiteVertexTriangleDistance(p[0], p[1], p[2], p[3]);
+    take(closest);
+    if (element == ShapeElement::Vertex) return nearest;
+    nearest.normal = -nearest.normal;
+    nearest.weights = closest.barycentric;
+    nearest.inInterior = closest.feature == TriangleFeature::Face;
+    return nearest;
+  }
+
+  const TriangleMesh& m_mesh;
+  const Shape &m_before, &m_now;
+  const double m_distance;  ///< L: with the mesh's radius
+  ContactBuffers& m_out;
+  TimeOfImpactSettings m_settings;
+  double m_motion = 0;  ///< L: of the shape's points at most
+  double m_time = 1.0;
+  std::optional<ImpactQuery> m_first;
+};
+
 class ShapeContactFinder {
  public:
   ShapeContactFinder(const MeshPair& pair, ContactBuffers& out)
-      : m_shape(pair.shape()),
+      : m_continuous(pair.settings.method == Method::Continuous),
+        m_shape(m_continuous ? pair.shapeBefore() : pair.shape()),
         m_mesh(pair.mesh()),
+        m_positions(m_continuous ? m_mesh.before : m_mesh.now),
         m_thickness(pair.settings.thickness),
-        m_distinct(pair.settings.contacts == Contacts::Distinct),
+        m_distinct(m_continuous || pair.settings.contacts == Contacts::Distinct),
+        m_impacts(pair, out),
         m_out(out) {}
 
   void test(std::uint32_t primitive) {
     const MeshTopology& topology = m_mesh.topology;
     const Triangle& corners = topology.triangles[primitive];
     if (!topology.isOn(primitive)) return;
-    for (int i = 0; i < 3; ++i) m_ends[i] = {corners[i], m_shape.at(m_mesh.now[corners[i]])};
+    for (int i = 0; i < 3; ++i) m_ends[i] = {corners[i], m_shape.at(m_positions[corners[i]])};
     for (int i = 0; i < 3; ++i) {
       const auto& [vertex, from] = m_ends[i];
       if (topology.ownsCorner(primitive, i))
-        add(ShapeElement::Vertex, vertex, {vertex, vertex, vertex},
-            {Vector3d::UnitX(), from.normal, from.distance, true});
+        find(ShapeElement::Vertex, vertex, {vertex, vertex, vertex}, std::array{m_ends[i]}, [&] {
+          return NearestToShape{Vector3d::UnitX(), from.normal, from.distance, true};
+        });
       if (!topology.ownsEdge(primitive, i)) continue;
       const Segment& edge = topology.edges[topology.triangleEdges[primitive][i]];
-      if (mayTouch(std::array{m_ends[i], m_ends[(i + 1) % 3]}))
-        add(ShapeElement::Edge, edge[0], {edge[0], edge[1], edge[1]},
-            m_shape.nearestOfEdge(m_mesh.now[edge[0]], m_mesh.now[edge[1]]));
+      find(ShapeElement::Edge, edge[0], {edge[0], edge[1], edge[1]},
+           std::array{m_ends[i], m_ends[(i + 1) % 3]},
+           [&] { return m_shape.nearestOfEdge(m_positions[edge[0]], m_positions[edge[1]]); });
     }
-    if (topology.hasFaces() && mayTouch(m_ends))
-      add(ShapeElement::Face, primitive, corners, nearestOfTriangle(corners));
+    if (topology.hasFaces())
+      find(ShapeElement::Face, primitive, corners, m_ends,
+           [&] { return nearestOfTriangle(corners); });
   }
 
  private:
@@ -46,24 +154,43 @@ class ShapeContactFinder {
   /// By the slope at each end the distance, which is convex, is nowhere less than a bound; and
   /// where it falls in no direction the end itself is nearest.
   template <std::size_t size>
-  bool mayTouch(const std::array<End, size>& ends) {
-    ++m_out.featurePairs;
-    const double reach = m_thickness + m_mesh.largestRadius;
+  bool mayTouch(const std::array<End, size>& ends, double reach) {
+    if (size > 1) ++m_out.featurePairs;
     for (const End& end : ends) {
       double slope = 0;
       for (const End& other : ends)
-        slope =
-            std::min(slope, end.from.normal.dot(m_mesh.now[other.vertex] - m_mesh.now[end.vertex]));
-      if (end.from.distance + slope > reach || (m_distinct && slope == 0)) return false;
+        slope = std::min(slope,
+                         end.from.normal.dot(m_positions[other.vertex] - m_positions[end.vertex]));
+      if (end.from.distance + slope > reach) return false;
+      if (m_distinct && !m_continuous && size > 1 && slope == 0) return false;
     }
     return true;
   }
 
+  /// The contact of an element: as it is, or first within the step.
+  template <std::size_t size, class Nearest>
+  void find(ShapeElement element, std::uint32_t id, const Triangle& vertices,
+            const std::array<End, size>& ends, Nearest&& nearest) {
+    const double distance = m_thickness + m_mesh.largestRadius;
+    std::array<double, 2> slack{0.0, 0.0};
+    if (m_continuous) slack = m_impacts.slack(vertices);
+    const auto& [error, motion] = slack;
+    const double reach = distance + error + motion;
+    if (!mayTouch(ends, reach)) return;
+    NearestToShape first = nearest();
+    m_out.exactDecisions += first.exact;
+    if (!m_continuous || first.distance <= distance + error)
+      return add(element, id, vertices, first, 0.0);
+    if (first.distance > reach) return;
+    if (const auto impact = m_impacts.find(element, vertices))
+      add(element, id, vertices, impact->nearest, impact->time);
+  }
+
   NearestToShape nearestOfTriangle(const Triangle& corners) const {
-    const auto at = [&](int i) -> Vector3d { return m_mesh.now[corners[i % 3]]; };
+    const auto at = [&](int i) -> Vector3d { return m_positions[corners[i % 3]]; };
     if (const auto inside = m_shape.nearestInTriangle(at(0), at(1), at(2))) return *inside;
     NearestToShape best{};
-    for (int i = 0; i < 3 && !m_distinct; ++i) {
+    for (int i = 0; i < 3 && (!m_distinct || m_continuous); ++i) {
       const NearestToShape edge = m_shape.nearestOfEdge(at(i), at(i + 1));
       if (i > 0 && !(edge.distance < best.distance)) continue;
       best = edge;
@@ -76,24 +203,29 @@ class ShapeContactFinder {
   }
 
   void add(ShapeElement element, std::uint32_t id, const Triangle& vertices,
-           const NearestToShape& nearest) {
+           const NearestToShape& nearest, double time) {
     const Vector3d& weights = nearest.weights;
-    m_out.exactDecisions += nearest.exact;
     const double radius = m_mesh.radius(vertices, weights);
-    if (!(nearest.distance - radius <= m_thickness) || (m_distinct && !nearest.inInterior)) return;
-    const auto& now = m_mesh.now;
-    Vector3d point = weights[0] * now[vertices[0]];
-    if (element != ShapeElement::Vertex)
-      point += weights[1] * now[vertices[1]] + weights[2] * now[vertices[2]];
+    if (!m_continuous && !(nearest.distance - radius <= m_thickness)) return;
+    if (m_distinct && !nearest.inInterior) return;
+    const auto at = [&](int i) -> Vector3d {
+      if (time == 0.0) return m_positions[vertices[i]];
+      return (1.0 - time) * m_mesh.before[vertices[i]] + time * m_mesh.now[vertices[i]];
+    };
+    Vector3d point = weights[0] * at(0);
+    if (element != ShapeElement::Vertex) point += weights[1] * at(1) + weights[2] * at(2);
     m_out.shape.push_back({element, id, vertices, weights, point,
                            point - nearest.distance * nearest.normal, nearest.normal,
-                           nearest.distance - radius});
+                           nearest.distance - radius, time});
   }
 
+  const bool m_continuous;
   const Shape& m_shape;
   const TriangleMesh& m_mesh;
+  const Positions& m_positions;
   const double m_thickness;
   const bool m_distinct;
+  ShapeImpacts m_impacts;
   ContactBuffers& m_out;
   std::array<End, 3> m_ends;
 };

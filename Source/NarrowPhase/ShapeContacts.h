@@ -10,6 +10,10 @@ namespace palpate {
 ///
 /// All: every vertex, edge and triangle at most the thickness and its radius from the shape, at its
 /// point nearest to it. Distinct: those of them of which that point is strictly inside.
+///
+/// Continuous: those within the distance before the step, as Distinct, at time 0; else vertices
+/// that come so near to the shape, edges that do to its edges, and triangles to its corners, where
+/// the nearest point is then strictly inside: whatever first comes so near is one of them.
 void findShapeContacts(const MeshPair&, std::span<const std::uint32_t> primitives,
                        ContactBuffers& out);
 

@@ -64,8 +64,7 @@ std::vector<LooseOctree::NodeId> LooseOctree::nodes(GeometryId geometry) const {
 std::vector<LooseOctree::NodeId> LooseOctree::nodes() const {
   std::vector<NodeId> ids;
   for (const Tree& tree : m_state->trees)
-    forEachNode(*tree.octree, 0, 0,
-                [&](OctreeNode node, int) { ids.push_back(NodeId{tree.firstNode + node}); });
+    for (const NodeId id : nodes(tree.geometry)) ids.push_back(id);
   return ids;
 }
 
@@ -95,11 +94,9 @@ LooseOctree::Node LooseOctree::node(NodeId id) const {
   result.geometry = tree.geometry;
   result.depth = depth;
   result.bounds = cubeInScene(tree, cube.lower, cube.edge);
-  result.looseBounds =
-      cubeInScene(tree,
-                  {cube.lower[0] - cube.edge * 0.5, cube.lower[1] - cube.edge * 0.5,
-                   cube.lower[2] - cube.edge * 0.5},
-                  2 * cube.edge);
+  std::array<double, 3> lower = cube.lower;
+  for (double& l : lower) l -= cube.edge * 0.5;
+  result.looseBounds = cubeInScene(tree, lower, 2 * cube.edge);
   const FloatBox box = block.box(node & 7);
   for (int k = 0; k < 3; ++k) {
     result.fittedBox.min()[k] = nextDown(tree.origin[k] + box.lower[k] / tree.scale);

@@ -83,6 +83,7 @@ class Validation {
 
   void checkCell(OctreeNode node, const Cube& cube, std::uint32_t i, bool leaf) {
     const FloatBox box = m_octree.boxes()[i];
+    const auto primitive = [&] { return "primitive " + std::to_string(m_octree.order()[i]); };
     double longest = 0;
     for (int k = 0; k < 3; ++k) {
       const double lower = double{box.lower[k]} - cube.lower[k],
@@ -93,18 +94,15 @@ class Validation {
       static_assert(KeyLayout::kMostLevels == 9);
       const double centre = 0.5 * (lower + upper), slack = cube.edge * 0x1p-13;
       if (centre < -slack || centre > cube.edge + slack)
-        fail(node, "the centre of primitive " + std::to_string(m_octree.order()[i]) +
-                       " is outside its cell");
+        fail(node, "the centre of " + primitive() + " is outside its cell");
       if (lower < -0.5 * cube.edge || upper > 1.5 * cube.edge)
-        fail(node,
-             "primitive " + std::to_string(m_octree.order()[i]) + " is outside its loose bounds");
+        fail(node, primitive() + " is outside its loose bounds");
     }
-    if (longest > cube.edge)
-      fail(node, "primitive " + std::to_string(m_octree.order()[i]) + " is longer than its cell");
+    if (longest > cube.edge) fail(node, primitive() + " is longer than its cell");
     // An own primitive of a split cell is too large for the cell's children; in a leaf it may be
     // any size.
     if (!leaf && longest * (1.0 + 0x1p-9) < 0.5 * cube.edge)
-      fail(node, "primitive " + std::to_string(m_octree.order()[i]) + " belongs deeper");
+      fail(node, primitive() + " belongs deeper");
   }
 
   const Octree& m_octree;

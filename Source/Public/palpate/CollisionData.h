@@ -50,6 +50,7 @@ struct ShapeContact {
   Eigen::Vector3d pointOnShape;  ///< L
   Eigen::Vector3d normal;        ///< unit, out of the shape, towards the element
   double distance;               ///< L, less the element's radius; negative: as deep inside
+  double timeOfImpact = 0.0;     ///< [0, 1] of the step, and all else then; 0 for Proximity
   friend bool operator==(const ShapeContact&, const ShapeContact&) = default;
 };
 

@@ -24,6 +24,8 @@ struct CollisionProblem {
     std::optional<AnalyticalGeometry> analytical{};  ///< of a shape, placed by what follows
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
     Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d rotationBefore = Eigen::Matrix3d::Identity();  ///< of a shape
+    Eigen::Vector3d translationBefore = Eigen::Vector3d::Zero();
   };
   struct Pair {
     std::uint32_t a, b;  ///< indices of geometries

@@ -219,10 +219,10 @@ TEST_F(Capture, RefusesWhatIsWrongByName) {
     write(text.replace(place, from.size(), to));
     expectRefused(reason);
   };
-  expectRefusedWith("palpate-capture 6", "solid 3", "it is not a capture");
-  expectRefusedWith("palpate-capture 6", "palpate-capture 7",
-                    "it is of version 7; versions up to 6");
-  expectRefusedWith("palpate-capture 6", "palpate-capture x", "line 1: \"x\" is not an integer");
+  expectRefusedWith("palpate-capture 7", "solid 3", "it is not a capture");
+  expectRefusedWith("palpate-capture 7", "palpate-capture 8",
+                    "it is of version 8; versions up to 7");
+  expectRefusedWith("palpate-capture 7", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 99999999999\n", "is not an integer in range");

@@ -542,6 +542,31 @@ TEST(Kinds, DocumentSaysWhatIsAnswered) {
     }
     EXPECT_NE(document.find(row + "\n"), document.npos) << row;
   }
+  const std::pair<AnalyticalGeometry, std::string> shapes[] = {
+      {Sphere{}, "sphere"},
+      {Capsule{}, "capsule"},
+      {Plane{}, "plane"},
+      {Box{{0, 0, 0}, {1, 1, 1}}, "box"},
+      {Cylinder{{0, 0, 0}, {0, 0, 1}, 1}, "cylinder"},
+      {ConvexHull{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, "hull"}};
+  for (const auto& [shape, name] : shapes) {
+    std::string row = "| **" + name + "** |";
+    for (const Thing& kind : kinds) {
+      OctreeBasedCD detection;
+      const GeometryId mesh = kind.addTo(detection), tool = detection.addAnalyticalGeometry(shape);
+      detection.addCollisionPair(mesh, tool, {Method::Proximity, 1.0});
+      row += " `Proximity`";
+      try {
+        detection.setPairSettings(tool, mesh, {Method::Continuous, 1.0});
+        row += ", `Continuous`";
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::UnsupportedMethod);
+        EXPECT_NE(std::string(error.what()).find("a " + name + " and a "), std::string::npos);
+      }
+      row += " |";
+    }
+    EXPECT_NE(document.find(row + "\n"), document.npos) << row;
+  }
 }
 
 template <class F>

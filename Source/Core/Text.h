@@ -1,0 +1,20 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include <cstdio>
+#include <string>
+
+namespace palpate {
+
+/// In six digits: 0.25 or (0, 0.25, nan).
+inline std::string textOf(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
+inline std::string textOf(const Eigen::Vector3d& v) {
+  return "(" + textOf(v[0]) + ", " + textOf(v[1]) + ", " + textOf(v[2]) + ")";
+}
+
+}  // namespace palpate

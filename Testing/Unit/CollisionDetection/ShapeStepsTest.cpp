@@ -1,0 +1,366 @@
+#include <palpate/Capture.h>
+#include <palpate/Distance.h>
+#include <palpate/Intersection.h>
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/PairRun.h"
+#include "Common/RandomMeshes.h"
+#include "Common/ShapeTruth.h"
+#include "Common/Things.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <vector>
+
+// Method::Continuous with shapes, against distances along the step that are written here.
+
+namespace palpate::testing {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct Transform {
+  Matrix3d rotation = Matrix3d::Identity();
+  Vector3d translation = Vector3d::Zero();
+  Vector3d operator()(const Vector3d& p) const { return rotation * p + translation; }
+};
+
+/// A shape at both ends of a step.
+struct Tool {
+  AnalyticalGeometry geometry;
+  std::array<Transform, 2> ends;
+
+  /// A point of its frame at a time: it moves linearly.
+  Vector3d at(const Vector3d& p, double t) const { return (1 - t) * ends[0](p) + t * ends[1](p); }
+};
+
+Positions cornersOf(const AnalyticalGeometry& geometry) {
+  double radius = 0;
+  return testing::cornersOf({geometry}, radius);
+}
+
+/// Of a hull of points in general position, or of a box: three corners with all others on one side.
+std::vector<Triangle> facesOf(const Positions& p) {
+  std::vector<Triangle> faces;
+  const auto n = static_cast<std::uint32_t>(p.size());
+  for (std::uint32_t i = 0; i < n; ++i)
+    for (std::uint32_t j = 0; j < n; ++j)
+      for (std::uint32_t k = 0; k < n; ++k) {
+        if (j < i || k < i || j == k || i == j || i == k) continue;
+        const Vector3d normal = (p[j] - p[i]).cross(p[k] - p[i]);
+        if (normal.norm() > 1e-9 && std::all_of(p.begin(), p.end(), [&](const Vector3d& q) {
+              return normal.dot(q - p[i]) <= 1e-9;
+            }))
+          faces.push_back({i, j, k});
+      }
+  return faces;
+}
+
+/// How far an element, {p, p, p}, {p, q, q} or a triangle, is from the tool, at a time; 0 inside.
+double distanceAt(const Tool& tool, const std::vector<Triangle>& faces,
+                  const std::array<Vector3d, 3>& x, double t) {
+  double radius = 0;
+  Positions corners = testing::cornersOf({tool.geometry}, radius);
+  for (Vector3d& p : corners) p = tool.at(p, t);
+  std::vector<Triangle> parts = faces;
+  if (corners.size() <= 2) parts = {{0, static_cast<std::uint32_t>(corners.size() - 1), 0}};
+  double least = kInfinity;
+  bool inside = !faces.empty();
+  for (const auto& [i, j, k] : parts) {
+    const std::array<Vector3d, 3> face{corners[i], corners[j], corners[k]};
+    inside &= (face[1] - face[0]).cross(face[2] - face[0]).dot(x[0] - face[0]) < 0;
+    if (trianglesIntersect(x[0], x[1], x[2], face[0], face[1], face[2])) return 0;
+    for (int a = 0; a < 3; ++a) {
+      least = std::min({least, vertexTriangleDistance(x[a], face[0], face[1], face[2]).distance,
+                        vertexTriangleDistance(face[a], x[0], x[1], x[2]).distance});
+      for (int b = 0; b < 3; ++b)
+        least = std::min(
+            least, edgeEdgeDistance(x[a], x[(a + 1) % 3], face[b], face[(b + 1) % 3]).distance);
+    }
+  }
+  return inside ? 0 : std::max(0.0, least - radius);
+}
+
+struct Moving {
+  Thing thing;
+  Positions now;
+
+  std::array<Vector3d, 3> at(const Triangle& corners, double t) const {
+    std::array<Vector3d, 3> x;
+    for (int i = 0; i < 3; ++i) x[i] = (1 - t) * thing.positions[corners[i]] + t * now[corners[i]];
+    return x;
+  }
+  /// Vertices, edges and triangles, by what their contacts say: element, and vertices.
+  std::vector<std::pair<ShapeElement, Triangle>> elements() const {
+    std::vector<std::pair<ShapeElement, Triangle>> all;
+    for (std::uint32_t v = 0; v < now.size(); ++v) all.push_back({ShapeElement::Vertex, {v, v, v}});
+    for (const auto& [p, q] : thing.edges()) all.push_back({ShapeElement::Edge, {p, q, q}});
+    for (const Triangle& t : thing.triangles) all.push_back({ShapeElement::Face, t});
+    return all;
+  }
+};
+
+CollisionData answer(const Settings& settings, const Moving& body, const Tool& tool,
+                     const PairSettings& pair, bool toolFirst = false) {
+  OctreeBasedCD collisions(settings);
+  const GeometryId mesh = body.thing.addTo(collisions),
+                   shape = collisions.addAnalyticalGeometry(tool.geometry);
+  collisions.addCollisionPair(toolFirst ? shape : mesh, toolFirst ? mesh : shape, pair);
+  collisions.setTransform(shape, tool.ends[0].rotation, tool.ends[0].translation);
+  collisions.detectCollision();
+  collisions.setTransform(shape, tool.ends[1].rotation, tool.ends[1].translation);
+  collisions.setPositions(mesh, body.thing.positions, body.now);
+  collisions.detectCollision();
+  return collisions.collisionData(toolFirst ? shape : mesh, toolFirst ? mesh : shape);
+}
+
+PairSettings continuous(double thickness, double timeTolerance = 1e-6) {
+  PairSettings pair{Method::Continuous, thickness};
+  pair.timeTolerance = timeTolerance;
+  return pair;
+}
+
+bool holds(const Triangle& all, const Triangle& part) {
+  return std::all_of(part.begin(), part.end(), [&](std::uint32_t v) {
+    return std::find(all.begin(), all.end(), v) != all.end();
+  });
+}
+
+struct Tally {
+  std::size_t contacts = 0, within = 0;
+};
+
+/// Every contact is near then; of everything that comes near, it or something on its boundary is a
+/// contact, not later.
+Tally expectTrue(const CollisionData& data, const Moving& body, const Tool& tool,
+                 const PairSettings& pair) {
+  Tally tally;
+  const std::vector<Triangle> faces = cornersOf(tool.geometry).size() > 2
+                                          ? facesOf(cornersOf(tool.geometry))
+                                          : std::vector<Triangle>{};
+  const double distance = pair.thickness + body.thing.radii[0];
+  double motion = 0;
+  for (std::size_t v = 0; v < body.now.size(); ++v)
+    motion = std::max(motion, (body.now[v] - body.thing.positions[v]).norm());
+  for (const Vector3d& p : {Vector3d(-2, -2, -2), Vector3d(2, 2, 2), Vector3d(2, -2, 2)})
+    motion += (tool.ends[1](p) - tool.ends[0](p)).norm();
+  const double early = pair.timeTolerance * motion + 1e-9;
+  for (const ShapeContact& c : data.shape()) {
+    ++tally.contacts;
+    tally.within += c.timeOfImpact > 0;
+    const auto x = body.at(c.vertices, c.timeOfImpact);
+    Vector3d point = Vector3d::Zero();
+    for (int i = 0; i < 3; ++i) point += c.weights[i] * x[i];
+    EXPECT_LE((point - c.point).norm(), 1e-12);
+    EXPECT_NEAR(c.normal.norm(), 1, 1e-12);
+    EXPECT_GT(c.weights.head(static_cast<int>(c.element) + 1).minCoeff(), 0);
+    const double centres = c.distance + body.thing.radii[0];
+    EXPECT_LE((c.point - centres * c.normal - c.pointOnShape).norm(), 1e-12);
+    EXPECT_LE(distanceAt(tool, faces, x, c.timeOfImpact), distance + early) << c.timeOfImpact;
+    if (c.timeOfImpact == 0) continue;
+    EXPECT_LE(std::abs(centres - distance), early);
+    EXPECT_LE(distanceAt(tool, faces, {c.point, c.point, c.point}, c.timeOfImpact),
+              centres + early);
+  }
+  for (const auto& [element, corners] : body.elements()) {
+    // Distances grow no faster than things move: up to there, or a small step further.
+    const auto gap = [&](double t) {
+      return distanceAt(tool, faces, body.at(corners, t), t) - distance;
+    };
+    double low = 0, high = 0, left = gap(0);
+    while (left > 0 && high < 1) {
+      low = high;
+      high = std::min(1.0, high + std::max(left / (2 * motion), 1.0 / 64));
+      left = gap(high);
+    }
+    if (left > 0) continue;
+    for (int i = 0; i < 50 && high > low; ++i) {
+      const double middle = 0.5 * (low + high);
+      (gap(middle) <= 0 ? high : low) = middle;
+    }
+    double first = kInfinity;
+    for (const ShapeContact& c : data.shape())
+      if (holds(corners, c.vertices)) first = std::min(first, c.timeOfImpact);
+    EXPECT_LE(first, high + 1e-13) << static_cast<int>(element) << " of " << tool.geometry.index();
+  }
+  return tally;
+}
+
+std::vector<AnalyticalGeometry> geometries(Random& random) {
+  ConvexHull cloud;
+  for (int i = 0; i < 5; ++i) cloud.points.push_back(randomPoint(random, -0.4, 0.4));
+  std::vector<AnalyticalGeometry> all{Sphere{{0.1, 0, 0}, 0.3},
+                                      Sphere{{0, 0, 0}, 0},
+                                      Capsule{{-0.4, 0, 0}, {0.3, 0.1, 0}, 0.1},
+                                      Capsule{{-0.4, 0, 0}, {0.3, 0.1, 0}, 0},
+                                      Box{{0.1, 0, 0}, {0.3, 0.2, 0.1}},
+                                      Box{{0, 0, 0}, {0.3, 0.2, 0}},
+                                      cloud};
+  return all;
+}
+
+Moving movingBody(Random& random, int kind, double radius) {
+  Moving body;
+  body.thing.kind = static_cast<GeometryKind>(kind);
+  body.thing.radii = {radius};
+  Vector3d push;  // past the middle
+  const auto add = [&](const Vector3d& p) {
+    body.thing.positions.push_back(p);
+    body.now.push_back(p + push + randomPoint(random, -0.3, 0.3));
+    return static_cast<std::uint32_t>(body.now.size() - 1);
+  };
+  for (int i = 0; i < 3; ++i) {
+    const Vector3d p = randomPoint(random, -1, 1);
+    push = -1.6 * p;
+    const std::uint32_t a = add(p);
+    if (kind == 2) continue;
+    const std::uint32_t b = add(p + randomPoint(random, -0.6, 0.6));
+    if (kind == 1) body.thing.segments.push_back({a, b});
+    if (kind == 0) body.thing.triangles.push_back({a, b, add(p + randomPoint(random, -.6, .6))});
+  }
+  return body;
+}
+
+TEST(ShapeSteps, AreNeverLateAndNoEarlierThanTheTolerance) {
+  Random random(1);
+  std::size_t contacts = 0, within = 0;
+  for (int run = 0; run < 4; ++run)
+    for (const int kind : {0, 1, 2}) {
+      const Moving body = movingBody(random, kind, kind == 0 || run % 2 ? 0.0 : 0.02);
+      for (const AnalyticalGeometry& geometry : geometries(random)) {
+        Tool tool{geometry, {}};
+        tool.ends[0] = {randomTurn(random), randomPoint(random, -0.3, 0.3)};
+        tool.ends[1] = tool.ends[0];
+        if (run % 3 > 0) tool.ends[1].translation += randomPoint(random, -0.5, 0.5);
+        if (run % 3 > 1)
+          tool.ends[1].rotation =
+              Eigen::AngleAxisd(uniform(random, 0, 3), randomPoint(random, -1, 1).normalized()) *
+              tool.ends[1].rotation;
+        const PairSettings pair = continuous(run % 4 < 2 ? 0.0 : 0.03, run % 5 ? 1e-6 : 1e-3);
+        SCOPED_TRACE("run " + std::to_string(run) + ", shape " + std::to_string(geometry.index()));
+        const CollisionData data = answer(settingsOf(Engine::Octree), body, tool, pair);
+        const Tally tally = expectTrue(data, body, tool, pair);
+        contacts += tally.contacts;
+        within += tally.within;
+        for (const bool swapped : {false, true})
+          EXPECT_EQ(answer(settingsOf(swapped ? Engine::Octree : Engine::BruteForce), body, tool,
+                           pair, swapped)
+                        .hash(),
+                    data.hash());
+        PairSettings earliest = pair;
+        earliest.contacts = Contacts::Earliest;
+        const CollisionData only = answer(settingsOf(Engine::Octree, 2), body, tool, earliest);
+        EXPECT_TRUE(only.shape().empty());
+        EXPECT_EQ(only.earliestTimeOfImpact(), data.earliestTimeOfImpact());
+      }
+    }
+  EXPECT_GT(contacts, 50u);
+  EXPECT_GT(within, 25u);
+}
+
+// ---- By hand ----
+
+Moving still(const Thing& thing) { return {thing, thing.positions}; }
+
+Thing triangleAtZero() {
+  return {GeometryKind::Triangles, {{-8, -8, 0}, {8, -8, 0}, {0, 8, 0}}, {{0, 1, 2}}, {}};
+}
+
+Tool moving(const AnalyticalGeometry& geometry, const Vector3d& from, const Vector3d& to) {
+  const Matrix3d one = Matrix3d::Identity();
+  return {geometry, {{{one, from}, {one, to}}}};
+}
+
+/// The one contact.
+ShapeContact only(const Moving& body, const Tool& tool, double thickness) {
+  const CollisionData data = answer(settingsOf(Engine::Octree), body, tool, continuous(thickness));
+  EXPECT_EQ(data.shape().size(), 1u);
+  return data.shape().empty() ? ShapeContact{} : data.shape()[0];
+}
+
+TEST(ShapeSteps, NothingIsTooFast) {
+  const Moving sheet = still(triangleAtZero());
+  const Vector3d above(0, -2, 10), below(0, -2, -10), up = Vector3d::UnitZ();
+  for (const auto& [geometry, reach] : std::vector<std::pair<AnalyticalGeometry, double>>{
+           {Sphere{{0, 0, 0}, 0.5}, 0.5},
+           {Sphere{{0, 0, 0}, 0}, 0},
+           {Capsule{{0, 0, 0}, {0.5, 0, 1}, 0.25}, 0.25},
+           {Capsule{{0, 0, 0}, {0.5, 0, 1}, 0}, 0},
+           {ConvexHull{{{0, 0, 0}, {1, 0, 2}, {-1, 0, 2}, {0, 1, 2}}}, 0}})
+    for (const double thickness : {0.0, 0.25}) {
+      const ShapeContact c = only(sheet, moving(geometry, above, below), thickness);
+      EXPECT_EQ(c.element, ShapeElement::Face);
+      EXPECT_NEAR(c.timeOfImpact, (10 - reach - thickness) / 20, 1.1e-6);
+      EXPECT_LE(c.timeOfImpact, (10 - reach - thickness) / 20);
+      EXPECT_NEAR(c.distance, thickness, 3e-5);
+      EXPECT_NEAR((c.normal + up).norm(), 0, 1e-12);
+      EXPECT_NEAR((c.point - Vector3d(0, -2, 0)).norm(), 0, 1e-12);
+    }
+  // A box is flat on it: its corners meet the triangle, and which of them is not said.
+  const ShapeContact flat = only(sheet, moving(Box{{0, 0, 0}, {1, 1, 0.5}}, above, below), 0);
+  EXPECT_EQ(flat.element, ShapeElement::Face);
+  EXPECT_NEAR(flat.timeOfImpact, 0.475, 1e-6);
+}
+
+TEST(ShapeSteps, StartsAndEndsCount) {
+  const Moving sheet = still(triangleAtZero());
+  const Sphere ball{{0, 0, 0}, 0.5};
+  EXPECT_EQ(only(sheet, moving(ball, {0, -2, 0.25}, {0, -2, 9}), 0).timeOfImpact, 0);
+  EXPECT_EQ(only(sheet, moving(ball, {0, -2, 0.5}, {0, -2, 9}), 0).timeOfImpact, 0);
+  EXPECT_EQ(only(sheet, moving(ball, {0, -2, 0.5}, {0, -2, 0.5}), 0).timeOfImpact, 0);
+  EXPECT_NEAR(only(sheet, moving(ball, {0, -2, 8.5}, {0, -2, 0.5}), 0).timeOfImpact, 1, 1e-6);
+  EXPECT_NEAR(only(sheet, moving(ball, {0, -2, 8.5}, {0, -2, 0.75}), 0.25).timeOfImpact, 1, 1e-6);
+  const CollisionData none = answer(settingsOf(Engine::Octree), sheet,
+                                    moving(ball, {0, -2, 8.5}, {0, -2, 0.501}), continuous(0));
+  EXPECT_TRUE(none.shape().empty());
+  EXPECT_EQ(none.earliestTimeOfImpact(), kInfinity);
+  EXPECT_FALSE(none.validity().trusted);
+}
+
+TEST(ShapeSteps, TurnsAreCountedAsArcs) {
+  Tool rod = moving(Capsule{{1, 0, 0}, {2, 0, 0}, 0.1}, {0, 0, 0}, {0, 0, 0});
+  rod.ends[1].rotation = Eigen::AngleAxisd(EIGEN_PI / 2, Vector3d::UnitZ()).toRotationMatrix();
+  const CollisionData data =
+      answer(settingsOf(Engine::Octree), still(triangleAtZero()), rod, continuous(0));
+  EXPECT_NEAR(data.validity().arcDeviation, 2 * (1 - std::cos(EIGEN_PI / 4)), 1e-9);
+}
+
+TEST(ShapeSteps, CapturesAndAuditsHoldThem) {
+  Random random(3);
+  const Moving body = movingBody(random, 0, 0);
+  Settings audited = settingsOf(Engine::Octree);
+  audited.audit.features = 1000;
+  OctreeBasedCD collisions(audited);
+  const GeometryId mesh = body.thing.addTo(collisions);
+  std::vector<GeometryId> tools;
+  for (const AnalyticalGeometry& geometry : geometries(random)) {
+    tools.push_back(collisions.addAnalyticalGeometry(geometry));
+    collisions.setTransform(tools.back(), randomTurn(random), randomPoint(random, -1, 1));
+    collisions.addCollisionPair(tools.back(), mesh, continuous(0.02));
+  }
+  collisions.detectCollision();
+  for (const GeometryId tool : tools)
+    collisions.setTransform(tool, randomTurn(random), randomPoint(random, -1, 1));
+  collisions.setPositions(mesh, body.thing.positions, body.now);
+  collisions.detectCollision();
+  EXPECT_TRUE(collisions.auditFailures().empty());
+  EXPECT_GT(collisions.statistics().contacts, 3u);
+  const auto path = std::filesystem::temp_directory_path() / "palpate-shape-steps.capture";
+  capture(collisions, path);
+  OctreeBasedCD again = setUp(readCapture(path));
+  std::filesystem::remove(path);
+  again.detectCollision();
+  for (const CollisionPair& pair : collisions.pairs())
+    EXPECT_EQ(again.collisionData(pair.a, pair.b).hash(),
+              collisions.collisionData(pair.a, pair.b).hash());
+}
+
+}  // namespace
+}  // namespace palpate::testing
