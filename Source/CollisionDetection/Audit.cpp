@@ -10,7 +10,6 @@
 #include <functional>
 #include <initializer_list>
 #include <iterator>
-#include <numeric>
 #include <random>
 #include <string>
 #include <system_error>
@@ -21,6 +20,23 @@ namespace {
 
 std::uint32_t low(std::uint64_t value) { return static_cast<std::uint32_t>(value); }
 std::uint32_t high(std::uint64_t value) { return static_cast<std::uint32_t>(value >> 32); }
+
+/// `count` of the numbers below `size`, ascending. (Bentley and Floyd, A sample of brilliance,
+/// Communications of the ACM 30, 1987.)
+std::vector<std::uint64_t> drawNumbers(std::uint64_t count, std::uint64_t size,
+                                       std::mt19937_64& random) {
+  std::vector<std::uint64_t> drawn;
+  for (std::uint64_t last = size - count; last < size; ++last) {
+    std::uint64_t number = random() % (last + 1);
+    auto place = std::lower_bound(drawn.begin(), drawn.end(), number);
+    if (place != drawn.end() && *place == number) {
+      number = last;
+      place = drawn.end();
+    }
+    drawn.insert(place, number);
+  }
+  return drawn;
+}
 
 /// The ids by which contacts are ordered and told apart.
 std::array<std::uint32_t, 2> idsOf(const VertexTriangleContact& c) {
@@ -129,9 +145,7 @@ FeatureLists drawFeatures(const MeshPair& meshes, const CollisionPair& pair,
   const auto a = static_cast<std::uint32_t>(pair.a), b = static_cast<std::uint32_t>(pair.b);
   std::seed_seq seed{low(settings.seed), high(settings.seed), low(frame), high(frame), a, b};
   std::mt19937_64 random(seed);
-  std::vector<std::uint64_t> all(size), drawn;
-  std::iota(all.begin(), all.end(), 0);
-  std::sample(all.begin(), all.end(), std::back_inserter(drawn), count, random);
+  const std::vector<std::uint64_t> drawn = drawNumbers(count, size, random);
   auto next = drawn.begin();
   std::uint64_t first = 0;
   for (auto* list : lists) {

@@ -339,7 +339,7 @@ void Frame::findParts(std::span<PairRecord* const> records, const Settings& sett
   m_parts.clear();
   for (PairRecord* record : records) {
     if (record->pair.settings.contacts != Contacts::Earliest || settings.keepCandidates ||
-        !record->plan.swept() || trianglesOf(*record) < kSharedSize)
+        record->meshes().hasShape() || !record->plan.swept() || trianglesOf(*record) < kSharedSize)
       continue;
     const auto needs = [&](const PairRecord* other, const Geometry* geometry) {
       return other != record && (other->a == geometry || other->b == geometry);
@@ -373,19 +373,25 @@ void Frame::sweepParts(bool whole, const Threads& threads) {
 /// Where only the earliest impact is asked for, the jobs after one that finds an early impact meet
 /// boxes that sweep the step no further.
 void Frame::runJobs(const Settings& settings, const Threads& threads) {
-  for (std::size_t begin = 0, end; begin < m_jobCount; begin = end) {
-    const bool all =
-        std::all_of(m_parts.begin(), m_parts.end(), [](const Part& p) { return p.swept; });
-    end = all ? m_jobCount : std::min(begin + kJobsAtOnce, m_jobCount);
-    threads.forEach(end - begin, [&](std::size_t i) {
-      Stopwatch watch;
-      Job& job = *m_jobs[begin + i];
-      job.keepCandidates = settings.keepCandidates;
-      job.start(&Job::detect);
-      job.record->meshes().hasShape() ? job.detectShape() : run(job);
-      job.milliseconds = watch.lap();
-    });
-    if (end < m_jobCount) sweepParts(false, threads);
+  const auto run = [&](std::size_t i) {
+    Stopwatch watch;
+    Job& job = *m_jobs[i];
+    job.keepCandidates = settings.keepCandidates;
+    job.start(&Job::detect);
+    job.record->meshes().hasShape() ? job.detectShape() : this->run(job);
+    job.milliseconds = watch.lap();
+  };
+  try {
+    for (std::size_t begin = 0, end; begin < m_jobCount; begin = end) {
+      const bool all =
+          std::all_of(m_parts.begin(), m_parts.end(), [](const Part& p) { return p.swept; });
+      end = all ? m_jobCount : std::min(begin + kJobsAtOnce, m_jobCount);
+      threads.forEach(end - begin, [&](std::size_t i) { run(begin + i); });
+      if (end < m_jobCount) sweepParts(false, threads);
+    }
+  } catch (...) {  // of a user's predicate, say: the octrees must hold the whole step again
+    sweepParts(true, threads);
+    throw;
   }
   sweepParts(true, threads);
 }

@@ -4,6 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+#include <stdexcept>
+
 namespace palpate {
 namespace {
 
@@ -164,6 +167,74 @@ TEST(Earliest, OfManyTrianglesIsThatOfAllContacts) {
         }
       }
   }
+}
+
+/// A shape's octree is empty, and its pair is left as it is.
+TEST(Earliest, OfAShapeBesideOtherPairs) {
+  Random random(12);
+  const testing::Mesh a = testing::soup(random, 9000, 0.02), b = testing::soup(random, 9000, 0.02);
+  Positions now = a.positions;
+  for (Eigen::Vector3d& p : now) p += Eigen::Vector3d(0.01, 0, 0);
+  OctreeBasedCD detection({.threads = 1});
+  const GeometryId tissue = detection.addTriangleMesh(a.positions, a.triangles),
+                   first = detection.addTriangleMesh(b.positions, b.triangles),
+                   tool = detection.addAnalyticalGeometry(Box{{0.5, 0.5, 0.5}, {0.3, 0.3, 0.3}});
+  const PairSettings earliest{.method = Method::Continuous, .contacts = Contacts::Earliest};
+  detection.addCollisionPair(tool, tissue, earliest);
+  detection.addCollisionPair(first, first, earliest);
+  detection.setTransform(tool, Eigen::Matrix3d::Identity(), {0, 0, 0});
+  detection.detectCollision();
+  detection.setTransform(tool, Eigen::Matrix3d::Identity(), {0.2, 0, 0});
+  detection.setPositions(tissue, a.positions, now);
+  Positions moved = b.positions;
+  for (Eigen::Vector3d& p : moved) p += testing::randomPoint(random, -0.02, 0.02);
+  detection.setPositions(first, b.positions, moved);
+  detection.detectCollision();
+  EXPECT_EQ(detection.collisionData(tool, tissue).earliestTimeOfImpact(), 0.0);
+  EXPECT_LE(detection.collisionData(first, first).earliestTimeOfImpact(), 1.0);
+  EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
+}
+
+/// A predicate that throws after boxes sweep less: the next frame sees the whole step.
+TEST(Earliest, AThrowLeavesTheOctreesWhole) {
+  Random random(13);
+  const testing::Mesh a = testing::soup(random, 9000, 0.02);
+  Positions now = a.positions;
+  for (Eigen::Vector3d& p : now) p += testing::randomPoint(random, -0.02, 0.02);
+  OctreeBasedCD detection({.threads = 1});
+  const GeometryId id = detection.addTriangleMesh(a.positions, a.triangles);
+  detection.addCollisionPair(id, id,
+                             {.method = Method::Continuous, .contacts = Contacts::Earliest});
+  int calls = 0, allowed = std::numeric_limits<int>::max();
+  detection.setContactPredicate(id, id, [&](const ContactFeatures&) {
+    if (++calls > allowed) throw std::runtime_error("enough");
+    return true;
+  });
+  const auto frame = [&] {
+    detection.setPositions(id, a.positions, now);
+    calls = 0;
+    detection.detectCollision();
+    return detection.collisionData(id, id).earliestTimeOfImpact();
+  };
+  const auto boxes = [&] {
+    std::vector<Eigen::AlignedBox3d> all;
+    for (const auto node : detection.octree().nodes())
+      all.push_back(detection.octree().node(node).fittedBox);
+    return all;
+  };
+  const double time = frame();
+  const int asked = calls;
+  ASSERT_GT(asked, 2);
+  const auto whole = boxes();
+  for (allowed = 1; allowed < asked; ++allowed) {
+    EXPECT_THROW(frame(), std::runtime_error);
+    const auto after = boxes();
+    ASSERT_EQ(after.size(), whole.size());
+    for (std::size_t i = 0; i < whole.size(); ++i)
+      ASSERT_TRUE(after[i].min() == whole[i].min() && after[i].max() == whole[i].max());
+  }
+  allowed = std::numeric_limits<int>::max();
+  EXPECT_EQ(frame(), time);
 }
 
 }  // namespace
