@@ -93,9 +93,10 @@ class Check {
     support(meshes || continuous || m_method == Method::Proximity,
             "this method is for two triangle meshes, not for " + nameOf(a.topology.kind) + " and " +
                 nameOf(b.topology.kind) + "; Proximity and Continuous are");
-    support(!tool || !continuous || tool->movesInStep(),
-            std::string(tool && tool->isPlane() ? "a plane" : "a cylinder") + " and " +
-                nameOf((a.shape ? b : a).topology.kind) + " are tested by Method::Proximity only");
+    const GeometryKind other = (a.shape ? b : a).topology.kind;
+    support(
+        !tool || !continuous || !tool->isCylinder() || other == GeometryKind::Points,
+        std::string("a cylinder and ") + nameOf(other) + " are tested by Method::Proximity only");
     support(!continuous || (a.radii.empty() && b.radii.empty()),
             "Method::Continuous needs one radius for all vertices");
   }

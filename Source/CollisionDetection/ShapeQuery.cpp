@@ -1,5 +1,6 @@
 #include "CollisionDetection/ShapeQuery.h"
 
+#include "Geometry/ShapeStep.h"
 #include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>
@@ -18,6 +19,7 @@ void findPrimitivesNear(const Geometry& geometry, const Shape& before, const Sha
   Eigen::AlignedBox3d swept;
   for (const Shape* shape : {&before, &now})
     for (const Vector3d& corner : shape->corners()) swept.extend(corner - origin);
+  const ShapeStep step(before, now);
   const Vector3d grown = Vector3d::Constant(reach + now.radius() + error);
   swept = {swept.min() - grown, swept.max() + grown};
   const auto mayReach = [&](const FloatBox& stored) {
@@ -28,6 +30,8 @@ void findPrimitivesNear(const Geometry& geometry, const Shape& before, const Sha
     if (!(box.min().minCoeff() > -kLargestFloat && box.max().maxCoeff() < kLargestFloat))
       return true;
     box = {unit * box.min(), unit * box.max()};
+    if (wholeStep && now.isPlane())
+      return step.mayComeNear({box.min() + origin, box.max() + origin}, reach);
     if (wholeStep) return swept.intersects(box);
     const Vector3d centre = box.center() + origin;
     const SignedDistance at = now.at(centre);

@@ -139,8 +139,13 @@ SignedDistance Shape::atBody(const Vector3d& u, double tie) const {
     const bool below = m_kind == Kind::TwoSidedPlane && u[2] < 0;
     return {below ? -u[2] : u[2], {0, 0, m_kind == Kind::TwoSidedPlane && u[2] < -tie ? -1. : 1.}};
   }
+  return atBody(u, tie, m_sizes);
+}
+
+SignedDistance Shape::atBody(const Vector3d& u, double tie,
+                             const std::array<double, 2>& sizes) const {
   const Parts parts = partsOf(u, tie);
-  const std::array<double, 2> beyond{parts.lengths[0] - m_sizes[0], parts.lengths[1] - m_sizes[1]};
+  const std::array<double, 2> beyond{parts.lengths[0] - sizes[0], parts.lengths[1] - sizes[1]};
   if (std::min(beyond[0], beyond[1]) > kOnSurface * m_magnitude) {
     const Vector3d difference = beyond[0] * parts.directions[0] + beyond[1] * parts.directions[1];
     const double distance = lengthOf(difference);
@@ -148,6 +153,13 @@ SignedDistance Shape::atBody(const Vector3d& u, double tie) const {
   }
   const std::size_t nearest = beyond[1] > beyond[0] + tie;
   return {beyond[nearest], parts.directions[nearest]};
+}
+
+SignedDistance Shape::ofCylinder(const Vector3d& fromCentre, const Vector3d& axis) const {
+  const Eigen::Matrix3d axes = axis == Vector3d::Zero() ? m_axes : axesAlong(axis);
+  const SignedDistance inBodys = atBody(axes.transpose() * fromCentre, kOnSurface * m_magnitude,
+                                        {m_sizes[0], 0.5 * lengthOf(axis)});
+  return {inBodys.distance, axes * inBodys.normal};
 }
 
 SignedDistance Shape::at(const Vector3d& x) const {

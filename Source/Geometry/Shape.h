@@ -80,12 +80,16 @@ class Shape {
   const Eigen::Vector3d& origin() const { return m_p0; }
   bool isPlane() const { return m_kind < Kind::Capsule; }
   bool isCylinder() const { return m_kind == Kind::Cylinder; }
-  bool movesInStep() const { return m_kind == Kind::Capsule || m_kind == Kind::Hull; }
+  bool isTwoSided() const { return m_kind == Kind::TwoSidedPlane; }
 
   // Within a step what a shape is made of moves linearly: a capsule's two ends, which of a sphere
-  // are one, or a hull's corners. Planes and cylinders do not move so.
+  // are one, or a hull's corners. Of planes and cylinders: ShapeStep.
 
-  std::span<const Eigen::Vector3d> corners() const { return m_corners; }
+  bool hasCorners() const { return m_kind == Kind::Capsule || m_kind == Kind::Hull; }
+  std::span<const Eigen::Vector3d> corners() const { return m_corners; }  ///< or a cylinder's ends
+  const Eigen::Matrix3d& axes() const { return m_axes; }  ///< of a plane, the normal last
+  /// With this one's radius and another axis, from its centre.
+  SignedDistance ofCylinder(const Eigen::Vector3d& fromCentre, const Eigen::Vector3d& axis) const;
   /// Of a hull, or a capsule's axis, by corners: {p, q, q}.
   std::span<const Triangle> faces() const { return m_faces; }
   std::span<const Segment> edges() const { return m_edges; }
@@ -114,6 +118,9 @@ class Shape {
   Eigen::Vector3d fromAxis(const Eigen::Vector3d& normal) const;
   /// tie: L, of two faces that are equally near the first counts.
   SignedDistance atBody(const Eigen::Vector3d& u, double tie) const;
+  /// The same of a cylinder with other sizes.
+  SignedDistance atBody(const Eigen::Vector3d& u, double tie,
+                        const std::array<double, 2>& sizes) const;
   Eigen::Vector3d nearestOfPlane(const Eigen::Vector3d& normal, double height) const;
   std::optional<NearestToShape> nearestToHull(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                               const Eigen::Vector3d& c) const;

@@ -1,10 +1,12 @@
 #include "NarrowPhase/ShapeContacts.h"
 
 #include "NarrowPhase/Continuous.h"
+#include "Geometry/ShapeStep.h"
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace palpate {
 
@@ -27,22 +29,26 @@ class ShapeImpacts {
     m_settings.tolerance = pair.settings.timeTolerance;
     for (std::uint32_t i = 0; i < m_before.corners().size(); ++i)
       m_motion = std::max(m_motion, motionOf(corner(i)));
+    // A plane turns without end, and with a cylinder's ends its mantle.
+    if (!m_before.hasCorners()) m_motion = std::numeric_limits<double>::infinity();
   }
 
   /// L: what distances before the step may be off by, and what the step may take from them.
-  std::array<double, 2> slack(const Triangle& vertices) const {
+  std::array<double, 2> slack(ShapeElement element, const Triangle& vertices) const {
     double size = m_before.magnitude() + m_distance, motion = 0;
     for (const std::uint32_t v : vertices) {
       size += m_mesh.before[v].cwiseAbs().maxCoeff();
       motion = std::max(motion, motionOf(vertex(v)));
     }
-    return {kShapeBoundError * size, motion + m_motion};
+    const bool still = element != ShapeElement::Vertex && !m_before.hasCorners();
+    return {kShapeBoundError * size, still ? 0.0 : motion + m_motion};
   }
 
   /// Of an element that is further away before the step: the first time at which its inside is near
-  /// one of the shape's features.
+  /// one of the shape's features; what moves without those is met by vertices first.
   std::optional<ShapeImpact> find(ShapeElement element, const Triangle& vertices) {
     const auto& [a, b, c] = vertices;
+    if (!m_before.hasCorners()) return findOfVertex(a);
     m_first.reset();
     m_time = 1.0;
     if (element == ShapeElement::Vertex) {
@@ -63,6 +69,15 @@ class ShapeImpacts {
   ImpactQuery::Step vertex(std::uint32_t v) const { return {m_mesh.before[v], m_mesh.now[v]}; }
   ImpactQuery::Step corner(std::uint32_t i) const {
     return {m_before.corners()[i], m_now.corners()[i]};
+  }
+  std::optional<ShapeImpact> findOfVertex(std::uint32_t v) {
+    ++m_out.featurePairs;
+    const ShapeStep step(m_before, m_now);
+    const ShapeStep::Point point{m_mesh.before[v], m_mesh.now[v]};
+    const auto time = step.timeNear(point, m_distance, m_settings.tolerance);
+    if (!time) return {};
+    const SignedDistance then = step.at(point, *time);
+    return ShapeImpact{*time, {Vector3d::UnitX(), then.normal, then.distance, true}};
   }
   static double motionOf(const ImpactQuery::Step& step) { return (step.now - step.before).norm(); }
 
@@ -173,7 +188,7 @@ class ShapeContactFinder {
             const std::array<End, size>& ends, Nearest&& nearest) {
     const double distance = m_thickness + m_mesh.largestRadius;
     std::array<double, 2> slack{0.0, 0.0};
-    if (m_continuous) slack = m_impacts.slack(vertices);
+    if (m_continuous) slack = m_impacts.slack(element, vertices);
     const auto& [error, motion] = slack;
     const double reach = distance + error + motion;
     if (!mayTouch(ends, reach)) return;

@@ -13,7 +13,8 @@ namespace palpate {
 ///
 /// Continuous: those within the distance before the step, as Distinct, at time 0; else vertices
 /// that come so near to the shape, edges that do to its edges, and triangles to its corners, where
-/// the nearest point is then strictly inside: whatever first comes so near is one of them.
+/// the nearest point is then strictly inside: whatever first comes so near is one of them. A plane
+/// has no edges and no corners; a cylinder meets points only.
 void findShapeContacts(const MeshPair&, std::span<const std::uint32_t> primitives,
                        ContactBuffers& out);
 

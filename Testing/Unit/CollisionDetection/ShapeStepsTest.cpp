@@ -63,9 +63,36 @@ std::vector<Triangle> facesOf(const Positions& p) {
   return faces;
 }
 
+/// Of a plane by three of its points; of a cylinder a point, by the centres of its ends.
+double distanceAt(const Plane& plane, const Tool& tool, const std::array<Vector3d, 3>& x,
+                  double t) {
+  const Vector3d along = plane.normal.unitOrthogonal(), across = plane.normal.cross(along);
+  const Vector3d origin = tool.at(plane.point, t);
+  const Vector3d normal = (tool.at(plane.point + along, t) - origin)
+                              .cross(tool.at(plane.point + across, t) - origin)
+                              .normalized();
+  double least = kInfinity, most = -kInfinity;
+  for (const Vector3d& p : x) {
+    least = std::min(least, normal.dot(p - origin));
+    most = std::max(most, normal.dot(p - origin));
+  }
+  return std::max({0.0, least, plane.twoSided ? -most : 0.0});
+}
+
+double distanceAt(const Cylinder& cylinder, const Tool& tool, const Vector3d& x, double t) {
+  const Vector3d p = tool.at(cylinder.p0, t), q = tool.at(cylinder.p1, t),
+                 axis = (q - p).normalized();
+  const double height = axis.dot(x - p), beyond = std::max(-height, height - (q - p).norm());
+  const double across = (x - p - height * axis).norm() - cylinder.radius;
+  return std::hypot(std::max(0.0, across), std::max(0.0, beyond));
+}
+
 /// How far an element, {p, p, p}, {p, q, q} or a triangle, is from the tool, at a time; 0 inside.
 double distanceAt(const Tool& tool, const std::vector<Triangle>& faces,
                   const std::array<Vector3d, 3>& x, double t) {
+  if (const auto* plane = std::get_if<Plane>(&tool.geometry)) return distanceAt(*plane, tool, x, t);
+  const auto* cylinder = std::get_if<Cylinder>(&tool.geometry);
+  if (cylinder && cylinder->radius > 0) return distanceAt(*cylinder, tool, x[0], t);
   double radius = 0;
   Positions corners = testing::cornersOf({tool.geometry}, radius);
   for (Vector3d& p : corners) p = tool.at(p, t);
@@ -193,7 +220,7 @@ Tally expectTrue(const CollisionData& data, const Moving& body, const Tool& tool
   return tally;
 }
 
-std::vector<AnalyticalGeometry> geometries(Random& random) {
+std::vector<AnalyticalGeometry> geometries(Random& random, int kind) {
   ConvexHull cloud;
   for (int i = 0; i < 5; ++i) cloud.points.push_back(randomPoint(random, -0.4, 0.4));
   std::vector<AnalyticalGeometry> all{Sphere{{0.1, 0, 0}, 0.3},
@@ -202,7 +229,13 @@ std::vector<AnalyticalGeometry> geometries(Random& random) {
                                       Capsule{{-0.4, 0, 0}, {0.3, 0.1, 0}, 0},
                                       Box{{0.1, 0, 0}, {0.3, 0.2, 0.1}},
                                       Box{{0, 0, 0}, {0.3, 0.2, 0}},
-                                      cloud};
+                                      cloud,
+                                      Plane{{0.1, 0, 0}, {1, 2, 3}},
+                                      Plane{{0.1, 0, 0}, {1, 2, 3}, true}};
+  if (kind == 2) {
+    all.push_back(Cylinder{{-0.4, 0, 0}, {0.3, 0.1, 0}, 0.2});
+    all.push_back(Cylinder{{0, 0, -0.01}, {0, 0, 0.01}, 0.5});
+  }
   return all;
 }
 
@@ -234,7 +267,7 @@ TEST(ShapeSteps, AreNeverLateAndNoEarlierThanTheTolerance) {
   for (int run = 0; run < 4; ++run)
     for (const int kind : {0, 1, 2}) {
       const Moving body = movingBody(random, kind, kind == 0 || run % 2 ? 0.0 : 0.02);
-      for (const AnalyticalGeometry& geometry : geometries(random)) {
+      for (const AnalyticalGeometry& geometry : geometries(random, kind)) {
         Tool tool{geometry, {}};
         tool.ends[0] = {randomTurn(random), randomPoint(random, -0.3, 0.3)};
         tool.ends[1] = tool.ends[0];
@@ -324,6 +357,128 @@ TEST(ShapeSteps, StartsAndEndsCount) {
   EXPECT_FALSE(none.validity().trusted);
 }
 
+/// One moving point.
+Moving particle(const Vector3d& from, const Vector3d& to) {
+  return {{GeometryKind::Points, {from}, {}, {}}, {to}};
+}
+
+TEST(ShapeSteps, PlanesMeetWhatFallsThroughThem) {
+  const Tool floor = moving(Plane{}, {0, 0, -1}, {0, 0, 1}),
+             sheet = moving(Plane{{0, 0, 0}, {0, 0, 1}, true}, {0, 0, -1}, {0, 0, 1});
+  for (const double thickness : {0.0, 0.5})
+    for (const Tool& tool : {floor, sheet}) {
+      const ShapeContact c = only(particle({3, 4, 9}, {5, 4, -9}), tool, thickness);
+      const double time = (10 - thickness) / 20;
+      EXPECT_LE(c.timeOfImpact, time);
+      EXPECT_NEAR(c.timeOfImpact, time, 1e-6);
+      EXPECT_NEAR(c.distance, thickness, 3e-5);
+      EXPECT_EQ(c.normal, Vector3d::UnitZ());
+      EXPECT_NEAR((c.point - Vector3d(3 + 2 * time, 4, 9 - 18 * time)).norm(), 0, 3e-5);
+    }
+  const ShapeContact below = only(particle({3, 4, -9}, {5, 4, 9}), sheet, 0);
+  EXPECT_LE(below.timeOfImpact, 0.5);
+  EXPECT_NEAR(below.timeOfImpact, 0.5, 1e-6);
+  EXPECT_EQ(below.normal, -Vector3d::UnitZ());
+  EXPECT_EQ(only(particle({3, 4, -9}, {5, 4, 9}), floor, 0).timeOfImpact, 0);  // it was inside
+  // What a plane of two sides goes through before the step: two of a triangle's edges.
+  const Thing up{GeometryKind::Triangles, {{0, 0, -2}, {1, 0, 2}, {0, 1, 2}}, {{0, 1, 2}}, {}};
+  const CollisionData data = answer(settingsOf(Engine::Octree), still(up), sheet, continuous(0));
+  ASSERT_EQ(data.shape().size(), 2u);
+  for (const ShapeContact& c : data.shape()) {
+    EXPECT_EQ(c.element, ShapeElement::Edge);
+    EXPECT_EQ(c.timeOfImpact, 0);
+  }
+}
+
+TEST(ShapeSteps, PlanesAndCylindersTouchAtTheEnds) {
+  const auto touches = [](const AnalyticalGeometry& geometry, double thickness, const Vector3d& at,
+                          const Vector3d& from) {
+    const Tool still = moving(geometry, {0, 0, 0}, {0, 0, 0});
+    EXPECT_EQ(only(particle(at, at), still, thickness).timeOfImpact, 0);
+    EXPECT_EQ(only(particle(at, from), still, thickness).timeOfImpact, 0);
+    const double last = only(particle(from, at), still, thickness).timeOfImpact;
+    EXPECT_LE(last, 1);
+    EXPECT_NEAR(last, 1, 1e-6);
+    const Vector3d past = from + (1 + 1e-3) * (at - from), before = from + 0.999 * (at - from);
+    EXPECT_NEAR(only(particle(from, past), still, thickness).timeOfImpact, 1 / 1.001, 1e-6);
+    for (const Vector3d& end : {from, before})
+      EXPECT_TRUE(
+          answer(settingsOf(Engine::Octree), particle(from, end), still, continuous(thickness))
+              .shape()
+              .empty());
+  };
+  for (const double thickness : {0.0, 0.25}) {
+    const Vector3d z(0, 0, thickness);
+    touches(Plane{}, thickness, z, {5, 5, 3});
+    touches(Plane{{0, 0, 0}, {0, 0, 2}, true}, thickness, -z, {5, 5, -3});
+    const Cylinder can{{0, 0, -2}, {0, 0, 2}, 1};
+    touches(can, thickness, Vector3d(0, 1 + thickness, 0), {5, 5, 3});
+    touches(can, thickness, Vector3d(0.5, 0, 2) + z, {5, 5, 3});
+    touches(can, thickness, Vector3d(0, 1 + 0.6 * thickness, 2 + 0.8 * thickness), {0, 5, 8});
+  }
+}
+
+/// Past the rim at little more than the distance, and along a plane and a mantle.
+TEST(ShapeSteps, NothingNearIsNoContact) {
+  const Tool can = moving(Cylinder{{0, 0, -2}, {0, 0, 2}, 1}, {0, 0, 0}, {0, 0, 0});
+  const auto count = [](const Vector3d& from, const Vector3d& to, const Tool& tool,
+                        double thickness) {
+    return answer(settingsOf(Engine::Octree), particle(from, to), tool, continuous(thickness))
+        .shape()
+        .size();
+  };
+  for (const double gap : {1e-2, 1e-4, -1e-4}) {
+    const double c = std::sqrt(0.5), reach = 0.5 + gap;
+    const Vector3d rim(0, 1 + reach * c, 2 + reach * c), along(0, 4, -4);
+    EXPECT_EQ(count(rim - along, rim + along, can, 0.5), gap < 0) << gap;
+    const Vector3d side(0, 1 + gap, -1), up(0, 0, 2);
+    EXPECT_EQ(count(side, side + up, can, 0), gap < 0) << gap;
+    EXPECT_EQ(count({-9, 0, gap}, {9, 0, gap}, moving(Plane{}, {0, 0, 0}, {3, 0, 0}), 0), gap < 0);
+  }
+}
+
+/// A plane is what a face of a large box is, also where both turn.
+TEST(ShapeSteps, PlanesMoveAsFacesOfBoxes) {
+  Random random(5);
+  const double size = 64;
+  for (int run = 0; run < 8; ++run) {
+    const Moving body = movingBody(random, 2, run % 2 ? 0.03 : 0.0);
+    Tool plane{Plane{}, {}}, box{Box{{0, 0, -size}, {size, size, size}}, {}};
+    plane.ends[0] = {randomTurn(random), randomPoint(random, -1, 1)};
+    plane.ends[1] = {
+        Eigen::AngleAxisd(uniform(random, 0, 2), randomPoint(random, -1, 1).normalized()) *
+            plane.ends[0].rotation,
+        randomPoint(random, -1, 1)};
+    box.ends = plane.ends;
+    const PairSettings pair = continuous(0.02);
+    const CollisionData ofPlane = answer(settingsOf(Engine::Octree), body, plane, pair),
+                        ofBox = answer(settingsOf(Engine::Octree), body, box, pair);
+    ASSERT_EQ(ofPlane.shape().size(), ofBox.shape().size());
+    for (std::size_t i = 0; i < ofBox.shape().size(); ++i) {
+      EXPECT_EQ(ofPlane.shape()[i].id, ofBox.shape()[i].id);
+      EXPECT_NEAR(ofPlane.shape()[i].timeOfImpact, ofBox.shape()[i].timeOfImpact, 2e-4);
+      EXPECT_NEAR((ofPlane.shape()[i].normal - ofBox.shape()[i].normal).norm(), 0, 1e-3);
+    }
+    EXPECT_EQ(ofPlane.validity().arcDeviation, kInfinity);
+  }
+}
+
+/// Turned over in one step what moves so has no extent at half time; nothing is late for that.
+TEST(ShapeSteps, TurnedOverNothingIsMissed) {
+  Tool over = moving(Plane{}, {0, 0, 0}, {0, 0, 0});
+  over.ends[1].rotation = Eigen::DiagonalMatrix<double, 3>(1, -1, -1);
+  const ShapeContact c = only(particle({0, 3, 1}, {0, 3, 1}), over, 0);
+  EXPECT_LE(c.timeOfImpact, 0.5);
+  EXPECT_TRUE(c.point.allFinite() && c.normal.allFinite() && c.pointOnShape.allFinite());
+  Tool can = moving(Cylinder{{0, 0, -2}, {0, 0, 2}, 0.5}, {0, 0, 0}, {0, 0, 0});
+  can.ends[1].rotation = over.ends[1].rotation;
+  EXPECT_TRUE(
+      answer(settingsOf(Engine::Octree), particle({0, 3, 1}, {0, 3, 1}), can, continuous(0.5))
+          .shape()
+          .empty());
+  EXPECT_NEAR(only(particle({0, 0.75, 0}, {0, 0.25, 0}), can, 0).timeOfImpact, 0.5, 1e-6);
+}
+
 TEST(ShapeSteps, TurnsAreCountedAsArcs) {
   Tool rod = moving(Capsule{{1, 0, 0}, {2, 0, 0}, 0.1}, {0, 0, 0}, {0, 0, 0});
   rod.ends[1].rotation = Eigen::AngleAxisd(EIGEN_PI / 2, Vector3d::UnitZ()).toRotationMatrix();
@@ -340,7 +495,7 @@ TEST(ShapeSteps, CapturesAndAuditsHoldThem) {
   OctreeBasedCD collisions(audited);
   const GeometryId mesh = body.thing.addTo(collisions);
   std::vector<GeometryId> tools;
-  for (const AnalyticalGeometry& geometry : geometries(random)) {
+  for (const AnalyticalGeometry& geometry : geometries(random, 0)) {
     tools.push_back(collisions.addAnalyticalGeometry(geometry));
     collisions.setTransform(tools.back(), randomTurn(random), randomPoint(random, -1, 1));
     collisions.addCollisionPair(tools.back(), mesh, continuous(0.02));
