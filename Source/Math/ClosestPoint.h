@@ -23,6 +23,13 @@ std::optional<EdgeEdgeDistance> crossingEdgesDistance(const Eigen::Vector3d& p0,
                                                       const Eigen::Vector3d& q0,
                                                       const Eigen::Vector3d& q1);
 
+/// The normals that these answer at a distance of zero: of edges that touch, and of a triangle with
+/// its corner a.
+Eigen::Vector3d normalOfCrossing(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
+                                 const Eigen::Vector3d& q0, const Eigen::Vector3d& q1);
+Eigen::Vector3d windingNormal(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                              const Eigen::Vector3d& c);
+
 /// What of triangle (a, b, c) holds the point closest to p.
 TriangleFeature closestTriangleFeature(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                                        const Eigen::Vector3d& b, const Eigen::Vector3d& c);

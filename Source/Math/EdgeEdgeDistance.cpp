@@ -16,11 +16,7 @@ namespace {
 using Eigen::Vector3d;
 
 Vector3d crossingNormal(const EdgePair& edges) {
-  const auto& [p0, p1, q0, q1, m, u, v] = edges;
-  const Vector3d normal = unitCross(p0, p1, q0, q1);
-  if (normal != Vector3d::Zero()) return normal;
-  // Quartered, so that the extents of the largest doubles stay finite.
-  return axisOfLeast((0.25 * p1 - 0.25 * p0).cwiseAbs() + (0.25 * q1 - 0.25 * q0).cwiseAbs());
+  return normalOfCrossing(edges.p0, edges.p1, edges.q0, edges.q1);
 }
 
 struct CrossingDecision {
@@ -168,6 +164,14 @@ EdgeEdgeDistance endDistance(const EdgePair& edges, bool parallel, bool decidedE
 }
 
 }  // namespace
+
+Vector3d normalOfCrossing(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0,
+                          const Vector3d& q1) {
+  const Vector3d normal = unitCross(p0, p1, q0, q1);
+  if (normal != Vector3d::Zero()) return normal;
+  // Quartered, so that the extents of the largest doubles stay finite.
+  return axisOfLeast((0.25 * p1 - 0.25 * p0).cwiseAbs() + (0.25 * q1 - 0.25 * q0).cwiseAbs());
+}
 
 std::optional<EdgeEdgeDistance> crossingEdgesDistance(const Vector3d& p0, const Vector3d& p1,
                                                       const Vector3d& q0, const Vector3d& q1) {

@@ -91,6 +91,10 @@ Vector3d windingNormal(const Vector3d& p, const CornerPointers& corners) {
 
 }  // namespace
 
+Vector3d windingNormal(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+  return windingNormal(a, {&a, &b, &c});
+}
+
 TriangleFeature closestTriangleFeature(const Vector3d& p, const Vector3d& a, const Vector3d& b,
                                        const Vector3d& c) {
   return closestFeature(p, {&a, &b, &c}).feature;

@@ -213,11 +213,9 @@ std::array<Vector3d, 4> positionsAt(const ImpactQuery& query, double time) {
 
 Vector3d normalOfTouch(const ImpactQuery& query, double time, const std::array<Vector3d, 4>& p,
                        std::size_t& exactDecisions) {
-  // A corner touches its triangle, and then the normal is the plane's.
-  const Vector3d normal =
-      query.kind == Kind::VertexTriangle
-          ? finiteVertexTriangleDistance(p[1], p[1], p[2], p[3]).normal
-          : finiteEdgeEdgeDistance(p[0], p[1], p[0], p[0] + (p[3] - p[2])).normal;
+  const Vector3d normal = query.kind == Kind::VertexTriangle
+                              ? windingNormal(p[1], p[2], p[3])
+                              : normalOfCrossing(p[0], p[1], p[0], p[0] + (p[3] - p[2]));
   return sideBefore(query, time, &exactDecisions) < 0 ? Vector3d(-normal) : normal;
 }
 

@@ -95,7 +95,7 @@ class IntersectionContacts {
     VertexTriangleDistance answer = finiteVertexTriangleDistance(of.positions[corner], a, b, c);
     m_out.exactDecisions += answer.exact;
     // The winding normal is what a vertex at distance zero, such as a corner, is answered.
-    answer.normal = finiteVertexTriangleDistance(a, a, b, c).normal;
+    answer.normal = windingNormal(a, b, c);
     m_check.noteTriangle(triangle.id, &triangle == &m_b, a, b, c);
     contacts.push_back(contactOf(of.vertices[corner], triangle.id, triangle.vertices, answer));
   }
