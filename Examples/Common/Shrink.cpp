@@ -129,6 +129,7 @@ const CollisionData& dataOf(const OctreeBasedCD& detection, const CollisionProbl
 }
 
 CollisionProblem shrink(CollisionProblem problem, const Fails& fails) {
+  for (CollisionProblem::Mesh& mesh : problem.geometries) mesh.tetrahedra.clear();  // but surfaces
   dropPairs(problem, fails);
   while (dropTriangles(problem, fails) && dropPairs(problem, fails)) continue;
   accept(problem, withoutUnusedVertices(problem), fails);

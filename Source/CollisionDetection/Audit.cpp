@@ -107,14 +107,17 @@ class Coverage {
   bool m_byTriangles;
 };
 
-/// Calls report(fault, expected, found) where two lists differ: of those found, in those covered.
+/// Calls report(fault, expected, found) where two lists differ: of those found that are not
+/// expected, in those covered.
 template <class Contact, class Covered, class Report>
 void compare(std::vector<Contact> expected, std::span<const Contact> allFound, Covered&& covered,
              Report&& report) {
   const auto before = [](const Contact& l, const Contact& r) { return idsOf(l) < idsOf(r); };
   std::vector<Contact> found;
-  std::copy_if(allFound.begin(), allFound.end(), std::back_inserter(found), covered);
   std::stable_sort(expected.begin(), expected.end(), before);
+  std::copy_if(allFound.begin(), allFound.end(), std::back_inserter(found), [&](const Contact& c) {
+    return covered(c) || std::binary_search(expected.begin(), expected.end(), c, before);
+  });
   std::stable_sort(found.begin(), found.end(), before);
   using Fault = AuditFailure::Fault;
   auto f = found.begin();

@@ -19,7 +19,7 @@ namespace palpate {
 namespace {
 
 constexpr std::string_view kTitle = "palpate-capture";
-constexpr int kVersion = 7;
+constexpr int kVersion = 8;
 
 // Values of enumerations are written by name: in the order of their declarations.
 constexpr std::array<std::string_view, 6> kMethods{"Auto",         "Proxy",     "DistanceField",
@@ -244,6 +244,7 @@ void meshLines(File& file, MeshType& mesh, int version) {
     listOf(file, mesh.disabled);
     file.count(rest);
   }
+  if (version >= 8) sizeOf(file, mesh.tetrahedra);
   file.endLine();
   if constexpr (kReads<File>) {
     mesh.id = GeometryId{id};
@@ -256,10 +257,14 @@ void meshLines(File& file, MeshType& mesh, int version) {
     if (rest) fieldOf(file, mesh.rest.at(v));
     file.endLine();
   }
-  for (auto& triangle : mesh.triangles) {
-    fieldOf(file, triangle);
-    file.endLine();
-  }
+  const auto elements = [&](auto& list) {
+    for (auto& element : list) {
+      fieldOf(file, element);
+      file.endLine();
+    }
+  };
+  elements(mesh.triangles);
+  elements(mesh.tetrahedra);
 }
 
 /// All but the title.
@@ -292,6 +297,7 @@ std::string textOf(const CollisionProblem& problem) {
 GeometryId add(OctreeBasedCD& detection, const CollisionProblem::Mesh& mesh) {
   if (mesh.analytical) return detection.addAnalyticalGeometry(*mesh.analytical);
   const std::vector<Eigen::Vector3d>& rest = mesh.rest.empty() ? mesh.now : mesh.rest;
+  if (!mesh.tetrahedra.empty()) return detection.addTetrahedralMesh(rest, mesh.tetrahedra);
   if (mesh.kind == GeometryKind::Triangles) return detection.addTriangleMesh(rest, mesh.triangles);
   const bool one = mesh.radii.size() <= 1;
   const double radius = one && !mesh.radii.empty() ? mesh.radii.front() : 0.0;

@@ -1,15 +1,14 @@
 #include "CollisionDetection/GeometryTable.h"
 
+#include "CollisionDetection/GeometryChecks.h"
 #include "CollisionDetection/Stopwatch.h"
 #include "Core/Assert.h"
-#include "Core/Text.h"
 #include "Geometry/TriangleBoxes.h"
 #include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -22,93 +21,12 @@ namespace {
 constexpr std::size_t kSmall = 16384;
 /// Refitting fewer triangles in all, cores take longer to hand over data than to compute it.
 constexpr std::size_t kSmallRefit = 24576;
-constexpr std::size_t kGrain = 1024, kMotionGrain = 4096, kCopyGrain = 16384;
+constexpr std::size_t kGrain = 1024, kMotionGrain = 4096;
 constexpr std::size_t kTrianglesPerGroup = 1024;  ///< for bounds, before there are nodes
 constexpr std::size_t kGroupGrain = 128;
 /// A refitted tree is rebuilt when its leaves have become this much larger in relation to their
 /// triangles.
 constexpr double kMostLoosening = 1.5;
-
-void checkPositions(GeometryId id, std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out,
-                    const char* which, const Threads& threads = Threads(1)) {
-  std::atomic<std::size_t> first = positions.size();
-  threads.forChunks(positions.size(), kCopyGrain,
-                    [&](std::size_t, std::size_t from, std::size_t to) {
-                      const auto part = positions.subspan(from, to - from);
-                      const std::size_t bad = from + copyFinite(part, out + from);
-                      std::size_t known = first;
-                      while (bad < to && bad < known && !first.compare_exchange_weak(known, bad)) {
-                      }
-                    });
-  const std::size_t bad = first;
-  if (bad == positions.size()) return;
-  throw Error(ErrorCode::NonFinitePosition,
-              nameOf(id) + ", vertex " + std::to_string(bad) + ": position" + which + " is " +
-                  textOf(positions[bad]) + "; positions must be finite",
-              id, bad);
-}
-
-void checkCounts(GeometryId id, std::span<const Eigen::Vector3d> positions,
-                 std::span<const Triangle> triangles, GeometryKind kind) {
-  const bool lines = kind == GeometryKind::Lines;
-  const std::string element = lines ? "segment" : "triangle";
-  // Ids are 32 bits, and the highest bit of octree node numbers is taken.
-  constexpr std::size_t kMost = std::size_t{1} << 28;
-  if (positions.size() > kMost || triangles.size() > kMost)
-    throw Error(ErrorCode::TooLarge,
-                nameOf(id) + ": " + std::to_string(positions.size()) + " vertices and " +
-                    std::to_string(triangles.size()) + " " + element +
-                    "s; at most 2^28 of each can be named",
-                id);
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
-    for (const std::uint32_t vertex : triangles[t])
-      if (vertex >= positions.size())
-        throw Error(ErrorCode::IndexOutOfRange,
-                    nameOf(id) + ", " + element + " " + std::to_string(t) + ": vertex index " +
-                        std::to_string(vertex) + " is out of range; the mesh has " +
-                        std::to_string(positions.size()) + " vertices",
-                    id, t);
-    if (lines && triangles[t][0] == triangles[t][1])
-      throw Error(ErrorCode::IndexOutOfRange,
-                  nameOf(id) + ", segment " + std::to_string(t) + ": joins vertex " +
-                      std::to_string(triangles[t][0]) + " with itself",
-                  id, t);
-  }
-}
-
-void checkRadii(GeometryId id, std::span<const double> radii) {
-  for (std::size_t v = 0; v < radii.size(); ++v)
-    if (!(radii[v] >= 0.0) || std::isinf(radii[v]))
-      throw Error(ErrorCode::InvalidRadius,
-                  nameOf(id) + ", vertex " + std::to_string(v) + ": radius is " + textOf(radii[v]) +
-                      "; it must be finite and not negative",
-                  id, v);
-}
-
-void checkPositionCount(const Geometry& geometry, std::size_t count) {
-  if (geometry.mesh.shape)
-    throw Error(
-        ErrorCode::WrongPositionCount,
-        nameOf(geometry.id) + " is a shape, which has no positions; setTransform() moves it",
-        geometry.id);
-  if (count != geometry.mesh.topology.vertexCount)
-    throw Error(
-        ErrorCode::WrongPositionCount,
-        nameOf(geometry.id) + ": " + std::to_string(count) + " positions given, but it has " +
-            std::to_string(geometry.mesh.topology.vertexCount) + " vertices" +
-            (geometry.mesh.topology.hasFaces() ? "; setTriangles() changes their number" : ""),
-        geometry.id);
-}
-
-/// Of positions in a body's frame.
-void checkPlaceable(GeometryId id, std::span<const Eigen::Vector3d> body, ErrorCode code) {
-  for (std::size_t v = 0; v < body.size(); ++v)
-    if (!(body[v].cwiseAbs().maxCoeff() <= kLargestPlaced))
-      throw Error(code,
-                  nameOf(id) + ", vertex " + std::to_string(v) +
-                      ": its position in the body's frame is beyond 2^1000",
-                  id, v);
-}
 
 /// Copied into memory that neither the step nor the last frame has.
 Positions::Body checkedBody(Geometry& geometry, std::span<const Eigen::Vector3d> positions,
@@ -258,27 +176,46 @@ std::string nameOf(GeometryKind kind) {
   return kNames[static_cast<std::size_t>(kind)];
 }
 
+GeometryId GeometryTable::nextId() const {
+  if (m_nextId == 0xffffffffu)
+    throw Error(ErrorCode::TooLarge, "no geometry ids are left: 2^32 - 1 were given out");
+  return GeometryId{m_nextId};
+}
+
+Geometry& GeometryTable::add(std::vector<Eigen::Vector3d> rest, MeshTopology topology) {
+  auto geometry = std::make_unique<Geometry>();
+  geometry->id = nextId();
+  TriangleMesh& mesh = geometry->mesh;
+  mesh.rest = std::move(rest);
+  mesh.before = mesh.now = mesh.rest;
+  mesh.topology = std::move(topology);
+  geometry->smallestHeight = smallestHeight(mesh);
+  m_geometries.push_back(std::move(geometry));
+  ++m_nextId;
+  return *m_geometries.back();
+}
+
 GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
                               std::span<const Triangle> triangles, GeometryKind kind,
                               std::span<const double> radii) {
-  const GeometryId id{m_nextId};
-  if (m_nextId == 0xffffffffu)
-    throw Error(ErrorCode::TooLarge, "no geometry ids are left: 2^32 - 1 were given out");
+  const GeometryId id = nextId();
   checkCounts(id, positions, triangles, kind);
   checkRadii(id, radii);
-  auto geometry = std::make_unique<Geometry>();
-  geometry->id = id;
-  TriangleMesh& mesh = geometry->mesh;
-  mesh.rest.resize(positions.size());
-  checkPositions(id, positions, mesh.rest.data(), "");
-  mesh.before = mesh.now = mesh.rest;
-  mesh.topology = MeshTopology(positions.size(), triangles);
-  mesh.topology.kind = kind;
+  MeshTopology topology(positions.size(), triangles);
+  topology.kind = kind;
+  TriangleMesh& mesh = add(checkedRest(id, positions), std::move(topology)).mesh;
   if (!radii.empty()) mesh.largestRadius = *std::max_element(radii.begin(), radii.end());
   if (radii.size() > 1) mesh.radii.assign(radii.begin(), radii.end());
-  geometry->smallestHeight = smallestHeight(geometry->mesh);
-  m_geometries.push_back(std::move(geometry));
-  ++m_nextId;
+  return id;
+}
+
+GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
+                              std::span<const Tetrahedron> tetrahedra) {
+  const GeometryId id = nextId();
+  std::vector<Eigen::Vector3d> rest = checkedRest(id, positions);
+  TetrahedralTopology solid = checkedTopology(id, rest, tetrahedra);
+  MeshTopology topology(positions.size(), solid.surface);
+  add(std::move(rest), std::move(topology)).solid = std::move(solid);
   return id;
 }
 
@@ -360,16 +297,24 @@ void GeometryTable::setPositions(GeometryId id,
 void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles) {
   Geometry& geometry = at(id);
-  if (!geometry.mesh.topology.hasFaces())
-    throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(id) + " is " + nameOf(geometry.mesh.topology.kind) +
-                    "; setTriangles() is for triangle meshes",
-                id);
+  checkTopologyKind(geometry, false, "setTriangles() is for triangle meshes");
   checkCounts(id, positions, triangles, GeometryKind::Triangles);
-  std::vector<Eigen::Vector3d> rest(positions.size());
-  checkPositions(id, positions, rest.data(), "");
-  if (geometry.isPlaced()) checkPlaceable(id, positions, ErrorCode::NonFinitePosition);
-  MeshTopology topology(positions.size(), triangles);
+  setTopology(geometry, checkedRest(id, positions), {positions.size(), triangles});
+}
+
+void GeometryTable::setTetrahedra(GeometryId id, std::span<const Eigen::Vector3d> positions,
+                                  std::span<const Tetrahedron> tetrahedra) {
+  Geometry& geometry = at(id);
+  checkTopologyKind(geometry, true, "setTetrahedra() is for tetrahedral meshes");
+  std::vector<Eigen::Vector3d> rest = checkedRest(id, positions);
+  TetrahedralTopology solid = checkedTopology(id, rest, tetrahedra);
+  setTopology(geometry, std::move(rest), {positions.size(), solid.surface});
+  geometry.solid = std::move(solid);
+}
+
+void GeometryTable::setTopology(Geometry& geometry, std::vector<Eigen::Vector3d> rest,
+                                MeshTopology topology) {
+  if (geometry.isPlaced()) checkPlaceable(geometry.id, rest, ErrorCode::NonFinitePosition);
   geometry.mesh.now.setBody(std::make_shared<const std::vector<Eigen::Vector3d>>(rest));
   geometry.mesh.before = geometry.mesh.now;
   geometry.mesh.rest = std::move(rest);

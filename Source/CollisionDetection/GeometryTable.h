@@ -8,6 +8,7 @@
 #include "Core/Threads.h"
 #include "Geometry/FloatPositions.h"
 #include "Geometry/Motion.h"
+#include "Geometry/TetrahedralTopology.h"
 #include "Geometry/TriangleMesh.h"
 #include "Octree/Octree.h"
 #include "Octree/PointQueries.h"
@@ -26,6 +27,7 @@ namespace palpate {
 struct Geometry {
   GeometryId id;
   TriangleMesh mesh;
+  std::optional<TetrahedralTopology> solid;  ///< of a tetrahedral mesh, whose surface `mesh` is
   /// Positions are checked while copied into one of these that no end of a step has.
   std::array<std::shared_ptr<std::vector<Eigen::Vector3d>>, 5> bodies;
   std::uint64_t revision = 1;      ///< counts changes of positions now and of topology
@@ -87,12 +89,15 @@ class GeometryTable {
   /// radii: none, one for all, or as many as positions.
   GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Triangle>,
                  GeometryKind = GeometryKind::Triangles, std::span<const double> radii = {});
+  GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Tetrahedron>);
   GeometryId add(const AnalyticalGeometry&);
   void remove(GeometryId);
   void setPositions(GeometryId, std::optional<std::span<const Eigen::Vector3d>> before,
                     std::span<const Eigen::Vector3d> now, const Threads&);
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
+  void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
+                     std::span<const Tetrahedron>);
   void setFilter(GeometryId, const CollisionFilter&);
   void setDisabled(GeometryId, std::span<const std::uint32_t> elements);
 
@@ -112,6 +117,10 @@ class GeometryTable {
   std::uint64_t framesEnded() const { return m_framesEnded; }
 
  private:
+  GeometryId nextId() const;  ///< of what is added; throws if there are no more
+  Geometry& add(std::vector<Eigen::Vector3d> rest, MeshTopology);
+  static void setTopology(Geometry&, std::vector<Eigen::Vector3d> rest, MeshTopology);
+
   std::vector<std::unique_ptr<Geometry>> m_geometries;  ///< ascending ids
   std::uint32_t m_nextId = 0;
   std::vector<Geometry*> m_changed;

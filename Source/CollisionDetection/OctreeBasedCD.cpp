@@ -4,9 +4,11 @@
 #include "CollisionDetection/BruteForce.h"
 #include "CollisionDetection/Containment.h"
 #include "CollisionDetection/Frame.h"
+#include "CollisionDetection/GeometryChecks.h"
 #include "CollisionDetection/GeometryTable.h"
 #include "CollisionDetection/Order.h"
 #include "CollisionDetection/PairTable.h"
+#include "CollisionDetection/Problem.h"
 #include "CollisionDetection/Stopwatch.h"
 #include "Core/Assert.h"
 #include "Core/FloatingPoint.h"
@@ -19,7 +21,6 @@
 #include <optional>
 #include <span>
 #include <system_error>
-#include <unordered_map>
 
 namespace palpate {
 
@@ -259,7 +260,7 @@ struct OctreeBasedCD::Implementation {
       const auto own = std::span(auditFailures).subspan(first);
       if (own.empty() || settings.audit.folder.empty()) continue;
       if (auditFiles < settings.audit.mostFiles) {
-        keepProblem(problem(), settings.audit, own);
+        keepProblem(problemOf(settings, geometries, pairs), settings.audit, own);
         auditFiles += !own.front().file.empty();
       } else {
         for (AuditFailure& failure : own)
@@ -267,36 +268,6 @@ struct OctreeBasedCD::Implementation {
               "audit.mostFiles were written into \"" + settings.audit.folder.string() + "\" before";
       }
     }
-  }
-
-  CollisionProblem problem() const {
-    CollisionProblem problem{settings, {}, {}};
-    std::unordered_map<const Geometry*, std::uint32_t> indices;
-    for (const auto& geometry : geometries.all()) {
-      indices.emplace(geometry.get(), static_cast<std::uint32_t>(indices.size()));
-      const TriangleMesh& mesh = geometry->mesh;
-      const GeometryKind kind = mesh.topology.kind;
-      CollisionProblem::Mesh& copy = problem.geometries.emplace_back();
-      copy.id = geometry->id;
-      copy.kind = kind;
-      copy.radii = mesh.radii;
-      copy.filter = geometry->filter;
-      copy.disabled = mesh.topology.disabled;
-      copy.analytical = mesh.analytical;
-      if (!mesh.shape) copy.before = mesh.before.all(), copy.now = mesh.now.all();
-      const RigidTransform &before = mesh.before.transform(), &now = mesh.now.transform();
-      copy.rotation = now.rotation, copy.translation = now.translation;
-      copy.rotationBefore = before.rotation, copy.translationBefore = before.translation;
-      if (kind != GeometryKind::Points) copy.triangles = mesh.topology.triangles;
-      if (copy.radii.empty() && mesh.largestRadius > 0.0) copy.radii = {mesh.largestRadius};
-    }
-    for (const auto& record : pairs.records()) {
-      problem.pairs.push_back({indices.at(record->a), indices.at(record->b), record->pair.settings,
-                               record->plan.method, static_cast<bool>(record->predicate)});
-      if (record->pair.settings.restDistance > 0.0)
-        problem.geometries[problem.pairs.back().a].rest = record->a->mesh.rest;
-    }
-    return problem;
   }
 
   std::shared_ptr<LooseOctree::State> state;
@@ -311,6 +282,12 @@ OctreeBasedCD::~OctreeBasedCD() = default;
 GeometryId OctreeBasedCD::addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                                           std::span<const Triangle> triangles) {
   return m_implementation->geometries.add(positions, triangles);
+}
+
+GeometryId OctreeBasedCD::addTetrahedralMesh(std::span<const Eigen::Vector3d> positions,
+                                             std::span<const Tetrahedron> tetrahedra) {
+  const StandardFloatingPoint standard;
+  return m_implementation->geometries.add(positions, tetrahedra);
 }
 
 GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
@@ -367,6 +344,18 @@ void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vec
 void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles) {
   m_implementation->geometries.setTriangles(geometry, positions, triangles);
+}
+
+void OctreeBasedCD::setTetrahedra(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
+                                  std::span<const Tetrahedron> tetrahedra) {
+  const StandardFloatingPoint standard;
+  m_implementation->geometries.setTetrahedra(geometry, positions, tetrahedra);
+}
+
+TetrahedralSurface OctreeBasedCD::surface(GeometryId geometry) const {
+  const Geometry& solid = m_implementation->geometries.at(geometry);
+  checkTopologyKind(solid, true, "surface() is of tetrahedral meshes");
+  return {solid.solid->surface, solid.solid->surfaceOwner};
 }
 
 void OctreeBasedCD::setCollisionFilter(GeometryId geometry, const CollisionFilter& filter) {
@@ -480,7 +469,10 @@ std::span<const AuditFailure> OctreeBasedCD::auditFailures() const {
   return m_implementation->auditFailures;
 }
 
-CollisionProblem OctreeBasedCD::problem() const { return m_implementation->problem(); }
+CollisionProblem OctreeBasedCD::problem() const {
+  const Implementation& all = *m_implementation;
+  return problemOf(all.settings, all.geometries, all.pairs);
+}
 
 CollisionData detectCollision(const TriangleMeshView& a, const TriangleMeshView& b,
                               const PairSettings& settings) {

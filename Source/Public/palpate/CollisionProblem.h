@@ -17,8 +17,9 @@ struct CollisionProblem {
     std::vector<Eigen::Vector3d> before, now;  ///< in the world, also of a body that was moved
     std::vector<Triangle> triangles;           ///< a segment {p, q} is {p, q, q}; none of points
     GeometryKind kind = GeometryKind::Triangles;
-    std::vector<double> radii{};          ///< L: none, one for all, or one for each vertex
-    std::vector<Eigen::Vector3d> rest{};  ///< the shape that restDistance is of; none: now
+    std::vector<double> radii{};  ///< L: none, one for all, or one for each vertex
+    /// The shape that restDistance, and tetrahedra's surface, are of; none: now.
+    std::vector<Eigen::Vector3d> rest{};
     CollisionFilter filter{};
     std::vector<std::uint32_t> disabled{};           ///< elements that are off
     std::optional<AnalyticalGeometry> analytical{};  ///< of a shape, placed by what follows
@@ -26,6 +27,7 @@ struct CollisionProblem {
     Eigen::Vector3d translation = Eigen::Vector3d::Zero();
     Eigen::Matrix3d rotationBefore = Eigen::Matrix3d::Identity();  ///< of a shape
     Eigen::Vector3d translationBefore = Eigen::Vector3d::Zero();
+    std::vector<Tetrahedron> tetrahedra{};  ///< whose surface the triangles are; none: just these
   };
   struct Pair {
     std::uint32_t a, b;  ///< indices of geometries

@@ -13,19 +13,20 @@ namespace palpate {
 enum class ErrorCode {
   NonFinitePosition,   ///< a position is NaN or infinite
   WrongPositionCount,  ///< as many positions as the geometry has vertices are needed
-  IndexOutOfRange,     ///< an element names a vertex that is not there, a segment one twice
-  UnknownGeometry,     ///< never added, or removed
-  UnknownPair,         ///< never added, removed, or asked for in the other order
-  DuplicatePair,       ///< added before, in either order
-  InvalidSettings,     ///< a setting outside its range
-  NotClosed,           ///< a mesh that has no inside: see findMeshDefects()
-  UnsupportedMethod,   ///< this method does not exist yet, or not for these geometries
-  TooLarge,            ///< more elements than 32-bit ids can name
-  NotAvailable,        ///< the answer was not kept, or no frame has been computed
-  File,                ///< a file that cannot be read or written, or is not what it should be
-  InvalidRadius,       ///< negative, NaN or infinite, or not one for each vertex
-  InvalidShape,        ///< a measure of a shape that is NaN, infinite, negative, or no direction
-  InvalidTransform,    ///< not a rotation, or a translation that is not finite
+  IndexOutOfRange,  ///< an element names a vertex that is not there, or one twice where it may not
+  UnknownGeometry,  ///< never added, or removed
+  UnknownPair,      ///< never added, removed, or asked for in the other order
+  DuplicatePair,    ///< added before, in either order
+  InvalidSettings,  ///< a setting outside its range
+  NotClosed,        ///< a mesh that has no inside: see findMeshDefects()
+  UnsupportedMethod,  ///< this method does not exist yet, or not for these geometries
+  TooLarge,           ///< more elements than 32-bit ids can name
+  NotAvailable,       ///< the answer was not kept, or no frame has been computed
+  File,               ///< a file that cannot be read or written, or is not what it should be
+  InvalidRadius,      ///< negative, NaN or infinite, or not one for each vertex
+  InvalidShape,       ///< a measure of a shape that is NaN, infinite, negative, or no direction
+  InvalidTransform,   ///< not a rotation, or a translation that is not finite
+  SharedFace,         ///< a face of more than two tetrahedra
 };
 
 /// What was wrong with a call, and where. The call that throws it has changed nothing.

@@ -10,6 +10,7 @@
 #include <palpate/FrameStatistics.h>
 #include <palpate/LooseOctree.h>
 #include <palpate/Settings.h>
+#include <palpate/TetrahedralMesh.h>
 #include <palpate/Types.h>
 
 #include <memory>
@@ -38,6 +39,10 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Any soup: several components, borders, non-manifold edges, no triangles at all. Copied in.
   GeometryId addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                              std::span<const Triangle> triangles);
+  /// A solid, deforming or not: its surface() is a triangle mesh to every pair and method, with
+  /// the solid's vertex ids. No face may be of more than two tetrahedra, no vertex twice in one.
+  GeometryId addTetrahedralMesh(std::span<const Eigen::Vector3d> positions,
+                                std::span<const Tetrahedron> tetrahedra);
   /// A thread of any shape: open, closed, branching, several. radius: L, of all, or one for each
   /// vertex and linear between; finite, not negative. No segment may join a vertex with itself.
   ///
@@ -76,6 +81,11 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Topology changed, as by a cut. Of triangle meshes only.
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
+  /// The same of tetrahedral meshes only.
+  void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
+                     std::span<const Tetrahedron>);
+  /// Of a tetrahedral mesh; the spans live until it is changed or removed.
+  TetrahedralSurface surface(GeometryId) const;
 
   /// Moves a geometry as a whole, from now on: a point x of its body's frame is at rotation x +
   /// translation, which of vertices is the double ((r0 x + r1 y) + r2 z) + t. The positions given

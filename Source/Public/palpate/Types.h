@@ -17,6 +17,8 @@ enum class GeometryKind : std::uint8_t { Triangles, Lines, Points, Shape };
 using Triangle = std::array<std::uint32_t, 3>;  ///< vertex indices; winding gives the normal
 /// vertex indices, lower first where it is an edge of a mesh
 using Segment = std::array<std::uint32_t, 2>;
+/// vertex indices, in any order
+using Tetrahedron = std::array<std::uint32_t, 4>;
 
 /// Two primitives (triangles, segments or points) by index in their geometries; `a` from the pair's
 /// first.

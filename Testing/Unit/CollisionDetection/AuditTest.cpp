@@ -303,5 +303,27 @@ TEST(Audit, RefusesANegativeSample) {
   }
 }
 
+/// Of Intersection what several pairs of triangles find may be of one that is in the sample, and
+/// others that are not.
+TEST(Audit, SamplesConnectedMeshes) {
+  for (const PairSettings& settings : kPairSettings) {
+    Settings audited{.threads = 1};
+    audited.audit.features = 30;
+    OctreeBasedCD detection(audited);
+    const Mesh a = testing::sphere(12, 16, {0, 0, 0}, 1), b = testing::sphere(9, 14, {1, 0, 0}, 1);
+    const GeometryId first = detection.addTriangleMesh(a.positions, a.triangles),
+                     second = detection.addTriangleMesh(b.positions, b.triangles);
+    detection.addCollisionPair(first, second, settings);
+    std::vector<Eigen::Vector3d> now = b.positions;
+    for (int frame = 0; frame < 20; ++frame) {
+      for (Eigen::Vector3d& p : now) p.y() += 0.01;
+      detection.setPositions(second, now);
+      detection.detectCollision();
+      EXPECT_TRUE(detection.auditFailures().empty());
+      EXPECT_GT(detection.statistics().contacts, 0u);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace palpate

@@ -505,19 +505,20 @@ TEST(Kinds, DocumentSaysWhatIsAnswered) {
                                                     {Method::Auto, "Auto"},
                                                     {Method::Proximity, "Proximity"},
                                                     {Method::Continuous, "Continuous"}};
-  const std::string names[] = {"triangles", "lines", "points", "shapes"};
+  const std::string names[] = {"triangles", "lines", "points", "tetrahedra", "shapes"};
   const Thing kinds[] = {{GeometryKind::Triangles, some, {{0, 1, 2}}, {}},
                          {GeometryKind::Lines, some, {}, {{0, 1}}},
                          {GeometryKind::Points, some, {}, {}}};
   const auto add = [&](OctreeBasedCD& detection, int kind) {
-    return kind == 3 ? detection.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1.0})
+    if (kind == 3) return detection.addTetrahedralMesh(some, std::vector<Tetrahedron>{});
+    return kind == 4 ? detection.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1.0})
                      : kinds[kind].addTo(detection);
   };
   std::ifstream file(PALPATE_SOURCE_DIR "/Docs/Pairs.md");
   const std::string document{std::istreambuf_iterator<char>(file), {}};
-  for (int a = 0; a < 4; ++a) {
+  for (int a = 0; a < 5; ++a) {
     std::string row = "| **" + names[a] + "** |";
-    for (int b = 0; b < 4; ++b) {
+    for (int b = 0; b < 5; ++b) {
       std::string cell;
       int accepted = 0;
       for (const auto& [method, name] : methods) {
@@ -533,7 +534,7 @@ TEST(Kinds, DocumentSaysWhatIsAnswered) {
             EXPECT_EQ(error.code(), ErrorCode::UnsupportedMethod);
           }
         }
-        EXPECT_TRUE(ways == 0 || ways == 1 + (a == b && a != 3));  // no shape meets itself
+        EXPECT_TRUE(ways == 0 || ways == 1 + (a == b && a != 4));  // no shape meets itself
         if (ways == 0) continue;
         ++accepted;
         cell += (cell.empty() ? "`" : ", `") + name + "`";

@@ -1,0 +1,155 @@
+#include "CollisionDetection/GeometryChecks.h"
+
+#include "Core/Text.h"
+#include "Math/Tolerances.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <optional>
+#include <string>
+
+namespace palpate {
+
+namespace {
+
+constexpr std::size_t kCopyGrain = 16384;
+// Ids are 32 bits, and the highest bit of octree node numbers is taken.
+constexpr std::size_t kMostElements = std::size_t{1} << 28;
+constexpr std::size_t kMostTetrahedra = kMostElements / 4;  // of four faces each
+
+void checkIndices(GeometryId id, const std::string& element, std::size_t index,
+                  std::span<const std::uint32_t> vertices, std::size_t count) {
+  for (const std::uint32_t vertex : vertices)
+    if (vertex >= count)
+      throw Error(ErrorCode::IndexOutOfRange,
+                  nameOf(id) + ", " + element + " " + std::to_string(index) + ": vertex index " +
+                      std::to_string(vertex) + " is out of range; the mesh has " +
+                      std::to_string(count) + " vertices",
+                  id, index);
+}
+
+}  // namespace
+
+void checkPositions(GeometryId id, std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out,
+                    const char* which, const Threads& threads) {
+  std::atomic<std::size_t> first = positions.size();
+  threads.forChunks(positions.size(), kCopyGrain,
+                    [&](std::size_t, std::size_t from, std::size_t to) {
+                      const auto part = positions.subspan(from, to - from);
+                      const std::size_t bad = from + copyFinite(part, out + from);
+                      std::size_t known = first;
+                      while (bad < to && bad < known && !first.compare_exchange_weak(known, bad)) {
+                      }
+                    });
+  const std::size_t bad = first;
+  if (bad == positions.size()) return;
+  throw Error(ErrorCode::NonFinitePosition,
+              nameOf(id) + ", vertex " + std::to_string(bad) + ": position" + which + " is " +
+                  textOf(positions[bad]) + "; positions must be finite",
+              id, bad);
+}
+
+std::vector<Eigen::Vector3d> checkedRest(GeometryId id,
+                                         std::span<const Eigen::Vector3d> positions) {
+  std::vector<Eigen::Vector3d> rest(positions.size());
+  checkPositions(id, positions, rest.data(), "", Threads(1));
+  return rest;
+}
+
+void checkCounts(GeometryId id, std::span<const Eigen::Vector3d> positions,
+                 std::span<const Triangle> triangles, GeometryKind kind) {
+  const bool lines = kind == GeometryKind::Lines;
+  const std::string element = lines ? "segment" : "triangle";
+  if (positions.size() > kMostElements || triangles.size() > kMostElements)
+    throw Error(ErrorCode::TooLarge,
+                nameOf(id) + ": " + std::to_string(positions.size()) + " vertices and " +
+                    std::to_string(triangles.size()) + " " + element +
+                    "s; at most 2^28 of each can be named",
+                id);
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    checkIndices(id, element, t, triangles[t], positions.size());
+    if (lines && triangles[t][0] == triangles[t][1])
+      throw Error(ErrorCode::IndexOutOfRange,
+                  nameOf(id) + ", segment " + std::to_string(t) + ": joins vertex " +
+                      std::to_string(triangles[t][0]) + " with itself",
+                  id, t);
+  }
+}
+
+TetrahedralTopology checkedTopology(GeometryId id, std::span<const Eigen::Vector3d> rest,
+                                    std::span<const Tetrahedron> tetrahedra) {
+  if (rest.size() > kMostElements || tetrahedra.size() > kMostTetrahedra)
+    throw Error(ErrorCode::TooLarge,
+                nameOf(id) + ": " + std::to_string(rest.size()) + " vertices and " +
+                    std::to_string(tetrahedra.size()) +
+                    " tetrahedra; at most 2^28 and 2^26 can be named",
+                id);
+  for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
+    checkIndices(id, "tetrahedron", t, tetrahedra[t], rest.size());
+    Tetrahedron sorted = tetrahedra[t];
+    std::sort(sorted.begin(), sorted.end());
+    if (const auto twice = std::adjacent_find(sorted.begin(), sorted.end()); twice != sorted.end())
+      throw Error(ErrorCode::IndexOutOfRange,
+                  nameOf(id) + ", tetrahedron " + std::to_string(t) + ": has vertex " +
+                      std::to_string(*twice) + " twice",
+                  id, t);
+  }
+  std::optional<OverusedFace> fault;
+  TetrahedralTopology topology = topologyOf(rest, tetrahedra, fault);
+  if (!fault) return topology;
+  const auto& [a, b, c] = fault->face;
+  const auto& [s, t, u] = fault->tetrahedra;
+  throw Error(ErrorCode::SharedFace,
+              nameOf(id) + ", tetrahedron " + std::to_string(u) + ": its face of vertices " +
+                  std::to_string(a) + ", " + std::to_string(b) + " and " + std::to_string(c) +
+                  " is one of tetrahedra " + std::to_string(s) + " and " + std::to_string(t) +
+                  " already",
+              id, u);
+}
+
+void checkRadii(GeometryId id, std::span<const double> radii) {
+  for (std::size_t v = 0; v < radii.size(); ++v)
+    if (!(radii[v] >= 0.0) || std::isinf(radii[v]))
+      throw Error(ErrorCode::InvalidRadius,
+                  nameOf(id) + ", vertex " + std::to_string(v) + ": radius is " + textOf(radii[v]) +
+                      "; it must be finite and not negative",
+                  id, v);
+}
+
+void checkPositionCount(const Geometry& geometry, std::size_t count) {
+  if (geometry.mesh.shape)
+    throw Error(
+        ErrorCode::WrongPositionCount,
+        nameOf(geometry.id) + " is a shape, which has no positions; setTransform() moves it",
+        geometry.id);
+  if (count != geometry.mesh.topology.vertexCount)
+    throw Error(ErrorCode::WrongPositionCount,
+                nameOf(geometry.id) + ": " + std::to_string(count) +
+                    " positions given, but it has " +
+                    std::to_string(geometry.mesh.topology.vertexCount) + " vertices" +
+                    (geometry.solid                      ? "; setTetrahedra() changes their number"
+                     : geometry.mesh.topology.hasFaces() ? "; setTriangles() changes their number"
+                                                         : ""),
+                geometry.id);
+}
+
+void checkPlaceable(GeometryId id, std::span<const Eigen::Vector3d> body, ErrorCode code) {
+  for (std::size_t v = 0; v < body.size(); ++v)
+    if (!(body[v].cwiseAbs().maxCoeff() <= kLargestPlaced))
+      throw Error(code,
+                  nameOf(id) + ", vertex " + std::to_string(v) +
+                      ": its position in the body's frame is beyond 2^1000",
+                  id, v);
+}
+
+void checkTopologyKind(const Geometry& geometry, bool tetrahedra, const char* call) {
+  if (geometry.mesh.topology.hasFaces() && geometry.solid.has_value() == tetrahedra) return;
+  throw Error(ErrorCode::UnsupportedMethod,
+              nameOf(geometry.id) + " is " +
+                  (geometry.solid ? "a tetrahedral mesh" : nameOf(geometry.mesh.topology.kind)) +
+                  "; " + call,
+              geometry.id);
+}
+
+}  // namespace palpate

@@ -1,0 +1,30 @@
+#pragma once
+
+#include "CollisionDetection/GeometryTable.h"
+#include "Core/Threads.h"
+#include "Geometry/TetrahedralTopology.h"
+
+#include <span>
+#include <vector>
+
+namespace palpate {
+
+// What users hand in: each throws what is wrong with it.
+
+/// Copied to `out` while checked. which: " before", " now" or nothing, for the message.
+void checkPositions(GeometryId, std::span<const Eigen::Vector3d>, Eigen::Vector3d* out,
+                    const char* which, const Threads&);
+/// Positions of a new topology, copied.
+std::vector<Eigen::Vector3d> checkedRest(GeometryId, std::span<const Eigen::Vector3d>);
+void checkCounts(GeometryId, std::span<const Eigen::Vector3d>, std::span<const Triangle>,
+                 GeometryKind);
+TetrahedralTopology checkedTopology(GeometryId, std::span<const Eigen::Vector3d> rest,
+                                    std::span<const Tetrahedron>);
+void checkRadii(GeometryId, std::span<const double>);
+void checkPositionCount(const Geometry&, std::size_t count);
+/// Of positions in a body's frame.
+void checkPlaceable(GeometryId, std::span<const Eigen::Vector3d> body, ErrorCode);
+/// Throws unless the geometry is of triangles (of tetrahedra), which `call` changes.
+void checkTopologyKind(const Geometry&, bool tetrahedra, const char* call);
+
+}  // namespace palpate
