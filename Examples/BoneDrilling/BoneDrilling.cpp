@@ -33,8 +33,7 @@ double boneRadius(const Vector3d& d) {
 
 class BoneDrilling : public LiveScene {
  public:
-  BoneDrilling(const Size& size, int threads)
-      : m_sag(12'000.0 / size.triangles), m_world(threads, OctreeUpdate::Rebuild) {  // some leap
+  BoneDrilling(const Size& size, int threads) : m_sag(12'000.0 / size.triangles), m_world(threads) {
     SceneMesh bone = cubeSphere(static_cast<int>(std::ceil(std::sqrt(size.triangles / 12.0))));
     for (Vector3d& p : bone.positions) p = (boneRadius(p) * p).eval();
     addRigid("bone", std::move(bone), 1, kMiddle);

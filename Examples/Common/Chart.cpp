@@ -1,6 +1,6 @@
 #include "Chart.h"
 
-#include "Report.h"
+#include "WriteFile.h"
 #include <palpate/vtk/Window.h>
 
 #include <vtkAxis.h>

@@ -1,6 +1,6 @@
 #include "ParaView.h"
 
-#include "Report.h"
+#include "WriteFile.h"
 
 #include <palpate/Error.h>
 

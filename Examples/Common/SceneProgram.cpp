@@ -3,7 +3,7 @@
 #include "CommandLine.h"
 #include "HtmlReport.h"
 #include "ParaView.h"
-#include "Report.h"
+#include "WriteFile.h"
 
 #include <palpate/Error.h>
 #ifdef PALPATE_HAS_VTK
@@ -124,7 +124,7 @@ std::string machine() {
 }
 
 std::string page(const RunLog& log, const SceneProgram& program, const Options& options,
-                 std::uint64_t hash, const std::string& png) {
+                 const std::string& settings, std::uint64_t hash, const std::string& png) {
   std::array<char, 32> hashText;
   std::snprintf(hashText.data(), hashText.size(), "%016" PRIx64, hash);
   report::View view{
@@ -132,7 +132,8 @@ std::string page(const RunLog& log, const SceneProgram& program, const Options& 
       .paragraphs = {program.description,
                      "Settings: " + std::to_string(options.frames) + " frames, threads " +
                          (options.threads == 0 ? "all" : std::to_string(options.threads)) +
-                         ". Machine: " + machine() + ". Hash of all contacts: " + hashText.data()},
+                         (settings.empty() ? "" : ", " + settings) + ". Machine: " + machine() +
+                         ". Hash of all contacts: " + hashText.data()},
       .group = "shown",
       .series = "series",
       .label = "frame",
@@ -155,11 +156,12 @@ void place(World& world) {
 #endif
 
 /// Says why where there is none.
-std::string picture([[maybe_unused]] World& world) {
+std::string picture([[maybe_unused]] World& world, [[maybe_unused]] const std::string& keys) {
 #ifdef PALPATE_HAS_VTK
   try {
     place(world);
     vtk::Window window(world.detection(), false);
+    for (const char key : keys) window.press(key);
     constexpr std::size_t kMostContacts = 5000;  // more would hide all else
     if (world.times().contacts > kMostContacts)
       for (const char key : {'c', 'n'}) window.press(key);
@@ -202,6 +204,7 @@ void run(const SceneProgram& program, Options options) {
 #ifdef PALPATE_HAS_VTK
   std::optional<vtk::Window> window;
   if (options.view) window.emplace(scene->world().detection());
+  for (std::size_t i = 0; window && i < program.keys.size(); ++i) window->press(program.keys[i]);
 #endif
   makeFolder(options.out);
   std::optional<ParaViewSeries> series;
@@ -225,14 +228,23 @@ void run(const SceneProgram& program, Options options) {
     if (window && !window->show()) options.frames = frame + 1;
 #endif
   }
-  std::printf("%s, %d frames\n%s", program.name.c_str(), options.frames,
-              summary(log, program).c_str());
+  const std::string settings = scene->settings();
+  std::printf("%s, %d frames%s%s\n%s", program.name.c_str(), options.frames,
+              settings.empty() ? "" : ", ", settings.c_str(), summary(log, program).c_str());
   std::printf("%-20s %016" PRIx64 "\n", "result hash", hash);
   if (series) series->finish(program.name);
-  const std::string png = picture(scene->world());
-  if (!png.empty()) writeWhole(options.out / "scene.png", png);
+  std::unique_ptr<LiveScene> still;  // whose octrees are built for its very frame
+  if (const std::optional<int> frame = scene->frameToShow()) {
+    still = program.make(options.threads);
+    still->computeFrame(*frame);
+  }
+  const std::string png = picture((still ? still : scene)->world(), program.keys);
+  if (!png.empty()) {
+    writeWhole(options.out / "scene.png", png);
+    std::printf("%-20s %s\n", "picture", (options.out / "scene.png").c_str());
+  }
   writeWhole(options.out / "frames.csv", log.csv());
-  writeWhole(options.out / "report.html", page(log, program, options, hash, png));
+  writeWhole(options.out / "report.html", page(log, program, options, settings, hash, png));
   std::printf("%-20s %s\n", "report", (options.out / "report.html").c_str());
 }
 

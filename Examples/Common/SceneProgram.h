@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,10 +22,15 @@ class LiveScene {
   virtual ~LiveScene() = default;
   virtual void computeFrame(int frame) = 0;
   virtual World& world() = 0;
+  /// What was chosen for this run, for whoever reads its figures.
+  virtual std::string settings() { return ""; }
   /// Of the frame just computed: columns and their values, the same columns in every frame.
   virtual std::vector<std::pair<std::string, double>> values() { return {}; }
   /// What the scene promises and the frame just computed does not hold, as a sentence; else empty.
   virtual std::string fault() { return ""; }
+  /// Of those computed, the one whose picture says most, where a frame needs none before it; else
+  /// the picture is of the last.
+  virtual std::optional<int> frameToShow() { return {}; }
 };
 
 struct SceneProgram {
@@ -32,6 +38,7 @@ struct SceneProgram {
   int frames;                        ///< of the whole story
   double frameMilliseconds;          ///< budget of a frame with the solver
   double collisionMilliseconds = 0;  ///< budget of its collision detection; 0: none
+  std::string keys{};                ///< of vtk::Window, pressed before it shows anything
   std::function<void(CLI::App&)> addOptions{};
   std::function<std::unique_ptr<LiveScene>(int threads)> make{};
 };

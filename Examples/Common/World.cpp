@@ -160,7 +160,7 @@ void World::predict(double seconds, const Vector3d& acceleration, double damping
   m_solver.predict(seconds, acceleration, damping);
 }
 
-void World::detect() {
+void World::detectOnly() {
   const Timed timed(m_times.collision);
   for (const Body& body : m_bodies) {
     const BodyId id = &body - m_bodies.data();
@@ -168,23 +168,26 @@ void World::detect() {
       m_detection.setPositions(body.id, before(id), vertices(id).now);
   }
   m_detection.detectCollision();
+  const FrameStatistics& statistics = m_detection.statistics();
+  m_times.boxes += statistics.milliseconds.boxes;
+  m_times.octree += statistics.milliseconds.octree;
+  m_times.pairs += statistics.milliseconds.pairs;
+  m_times.narrowPhase += statistics.milliseconds.narrowPhase;
+  m_times.order += statistics.milliseconds.order;
+  m_times.contacts = statistics.contacts;
+}
+
+void World::detect() {
+  detectOnly();
+  const Timed timed(m_times.collision);
   m_rows.clear();
   m_rowPairs.clear();
-  m_times.contacts = 0;
   for (std::size_t p = 0; p < m_pairs.size(); ++p) {
     const auto& [a, b, gap] = m_pairs[p];
     appendRows(contacts(a, b), vertices(a), vertices(b), m_rows);
     for (std::size_t row = m_rowPairs.size(); row < m_rows.size(); ++row) m_rows[row].offset += gap;
     m_rowPairs.resize(m_rows.size(), p);
-    m_times.contacts += contacts(a, b).shapeShape().size();
   }
-  const FrameStatistics::Stages& stages = m_detection.statistics().milliseconds;
-  m_times.boxes += stages.boxes;
-  m_times.octree += stages.octree;
-  m_times.pairs += stages.pairs;
-  m_times.narrowPhase += stages.narrowPhase;
-  m_times.order += stages.order;
-  m_times.contacts += m_rows.size();
 }
 
 void World::solve(int iterations) {

@@ -42,15 +42,14 @@ class World {
   /// Milliseconds since resetTimes().
   struct Times {
     double boxes = 0, octree = 0, pairs = 0, narrowPhase = 0, order = 0;
-    double collision = 0;  ///< wall clock from setPositions() to rows
+    double collision = 0;  ///< wall clock from setPositions() to contacts, and to rows of detect()
     double hold = 0, solver = 0;
-    std::size_t contacts = 0;  ///< of the last detect()
+    std::size_t contacts = 0;  ///< of the last detection
     std::size_t held = 0;      ///< particles
   };
 
-  explicit World(int threads, OctreeUpdate update = OctreeUpdate::Auto)
-      : m_detection(Settings{.octree = {.update = update}, .threads = threads}),
-        m_guard(Settings{.threads = threads}) {}
+  explicit World(int threads)
+      : m_detection(Settings{.threads = threads}), m_guard(Settings{.threads = threads}) {}
 
   BodyId addMesh(std::string name, const SceneMesh& mesh, double inverseMass);
   /// Rigid: place() moves it, its octree stays as it is.
@@ -82,6 +81,7 @@ class World {
 
   void predict(double seconds, const Eigen::Vector3d& acceleration, double damping);
   void detect();
+  void detectOnly();  ///< contacts without rows, where nothing responds
   void solve(int iterations);
   /// Particles of features that touch within the step from before to now go back to before, until
   /// nothing touches: exact, by Method::Continuous without thickness.

@@ -6,7 +6,7 @@
 #include "CommandLine.h"
 #include "HtmlReport.h"
 #include "Contestant.h"
-#include "Report.h"
+#include "WriteFile.h"
 #include "Score.h"
 #include "Truth.h"
 

@@ -133,8 +133,7 @@ void updateOctree(Geometry& geometry, const OctreeSettings& settings, const Thre
   if (geometry.treeKnown && settings.update == OctreeUpdate::Auto) {
     fitBoxes(geometry, settings, threads);
     geometry.lastUpdate = Update::Refitted;
-    if (geometry.octree.looseness() <= kMostLoosening * geometry.octree.loosenessWhenBuilt())
-      return;
+    if (geometry.octree.looseness() <= kMostLoosening * geometry.octree.leastLooseness()) return;
   }
   rebuild(geometry, settings, threads);
   fitBoxes(geometry, settings, threads);

@@ -21,6 +21,12 @@ constexpr std::size_t kGrain = 8192;
 std::size_t grainOf(std::size_t size) { return std::clamp<std::size_t>(size / 8, 1024, kGrain); }
 constexpr std::size_t kRadixOnly = 8192;
 
+double halfArea(const FloatBox& box) {
+  const double x = double{box.upper[0]} - box.lower[0], y = double{box.upper[1]} - box.lower[1],
+               z = double{box.upper[2]} - box.lower[2];
+  return x * y + y * z + z * x;
+}
+
 /// The power-of-two cube that holds the box, its corner on a grid so coarse that cells' corners are
 /// exact.
 ///
@@ -227,10 +233,16 @@ void Octree::assemble(std::size_t tasks, const Threads& threads) {
 }
 
 void Octree::fit(const Threads& threads) {
-  threads.forChunks(m_groupNodes.size(), kGrain / 8,
-                    [&](std::size_t, std::size_t from, std::size_t to) {
-                      for (std::size_t g = from; g < to; ++g)
+  constexpr std::size_t kChunk = kGrain / 8;
+  m_groupAreas.resize((m_groupNodes.size() + kChunk - 1) / kChunk);
+  threads.forChunks(m_groupNodes.size(), kChunk,
+                    [&](std::size_t chunk, std::size_t from, std::size_t to) {
+                      double areas = 0;
+                      for (std::size_t g = from; g < to; ++g) {
                         m_pool[m_groupNodes[g] >> 3].setBox(m_groupNodes[g] & 7, m_groupBoxes[g]);
+                        areas += halfArea(m_groupBoxes[g]);
+                      }
+                      m_groupAreas[chunk] = areas;
                     });
   // Children come after their parents in a task, and tasks after the top.
   const std::size_t tasks = m_taskBlocks.size() - 2;
@@ -241,27 +253,23 @@ void Octree::fit(const Threads& threads) {
 }
 
 void Octree::measureLooseness() {
+  // All groups, as few that have become large cost most; of the primitives a sample's growth.
   const std::size_t stride = std::max<std::size_t>(8, m_groupNodes.size() / 256);
-  const auto halfArea = [](const FloatBox& box) {
-    const double x = double{box.upper[0]} - box.lower[0], y = double{box.upper[1]} - box.lower[1],
-                 z = double{box.upper[2]} - box.lower[2];
-    return x * y + y * z + z * x;
-  };
-  double groups = 0, primitives = 0;
-  for (std::size_t g = 0; g < m_groupNodes.size(); g += stride) {
-    groups += halfArea(m_groupBoxes[g]);
+  double groups = 0, primitives = 0x1p-30 * halfArea(m_pool[0].box(0));  // points have no area
+  for (const double areas : m_groupAreas) groups += areas;
+  for (std::size_t g = 0; g < m_groupNodes.size(); g += stride)
     for (std::size_t i = m_groups[g]; i < m_groups[g + 1]; ++i) primitives += halfArea(m_boxes[i]);
-  }
   m_looseness = primitives > 0 ? groups / primitives : 1.0;
-  if (m_builtNow) m_loosenessWhenBuilt = m_looseness;
+  // Refitting does not tighten: what has fallen was due to primitives that the sample lacks.
+  m_leastLooseness = m_builtNow ? m_looseness : std::min(m_leastLooseness, m_looseness);
   m_builtNow = false;
 }
 
 std::size_t Octree::bytes() const {
   const auto of = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
   std::size_t bytes = of(m_order) + of(m_groups) + of(m_groupNodes) + of(m_groupBoxes) +
-                      of(m_parents) + m_pool.allocated() * sizeof(OctreeBlock) + of(m_binCounts) +
-                      of(m_binBegins);
+                      of(m_groupAreas) + of(m_parents) + m_pool.allocated() * sizeof(OctreeBlock) +
+                      of(m_binCounts) + of(m_binBegins);
   for (int k = 0; k < 3; ++k) bytes += of(m_boxes.lower[k]) + of(m_boxes.upper[k]);
   for (const Layout& layout : m_layouts)
     bytes += of(layout.links) + of(layout.parents) + of(layout.groups) + of(layout.groupNodes) +

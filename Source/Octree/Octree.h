@@ -106,10 +106,10 @@ class Octree {
   void fit(const Threads&);
   void measureLooseness();  ///< of what was fitted
 
-  /// Sum of the leaves' half areas over that of their primitives: how loose the fitted boxes are.
-  /// Grows as a refitted tree degrades; unchanged by motion and scaling of the whole.
+  /// Sum of the leaves' half areas over that of some of their primitives: how loose the fitted
+  /// boxes are. Grows as a refitted tree degrades; unchanged by motion and scaling of the whole.
   double looseness() const { return m_looseness; }
-  double loosenessWhenBuilt() const { return m_loosenessWhenBuilt; }
+  double leastLooseness() const { return m_leastLooseness; }  ///< since it was built
 
   const OctreeBlock* blocks() const { return m_pool.data(); }
   const BlockPool& pool() const { return m_pool; }
@@ -144,6 +144,7 @@ class Octree {
   Buffer<std::uint32_t> m_groups;
   Buffer<OctreeNode> m_groupNodes;  ///< the node of each group
   Buffer<FloatBox> m_groupBoxes;
+  Buffer<double> m_groupAreas;  ///< sums of a chunk of groups each
   BlockPool m_pool;
   Buffer<OctreeNode> m_parents;   ///< of each block
   std::vector<Layout> m_layouts;  ///< the top's, then one for each task of the last build
@@ -151,7 +152,7 @@ class Octree {
       m_taskBlocks;  ///< layout i made blocks [m_taskBlocks[i], m_taskBlocks[i + 1])
   Buffer<std::uint32_t> m_entryPlaces;
   Cube m_rootCube;
-  double m_looseness = 0, m_loosenessWhenBuilt = 0;
+  double m_looseness = 0, m_leastLooseness = 0;
   bool m_builtNow = false;
 };
 

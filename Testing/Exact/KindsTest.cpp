@@ -63,9 +63,10 @@ std::size_t compare(const std::map<Ids, Exact>& all, const std::map<Ids, double>
     const double error = 16 * exact.scale + 0x1p-51 * exact.radii.get_d(),
                  gap = exact.distance() - thickness;
     const auto place = found.find(ids);
-    if (gap < -error) EXPECT_NE(place, found.end());
-    if (gap > error) EXPECT_EQ(place, found.end());
-    if (place != found.end()) EXPECT_NEAR(place->second, exact.distance(), error);
+    EXPECT_TRUE(gap >= -error || place != found.end());
+    EXPECT_TRUE(gap <= error || place == found.end());
+    if (place == found.end()) continue;
+    EXPECT_NEAR(place->second, exact.distance(), error);
   }
   for (const auto& [ids, distance] : found) EXPECT_TRUE(all.contains(ids));
   return found.size();
@@ -205,7 +206,7 @@ TEST(ExactKinds, ImpactsAreTheFirst) {
         const auto place = found.find({v, t});
         if (close && reach > 0) continue;
         if (reach == 0) {  // one that is aimed may pass by an ulp: what is found is near
-          if (place != found.end()) EXPECT_TRUE(close);
+          EXPECT_TRUE(close || place == found.end());
           continue;
         }
         ASSERT_EQ(place != found.end(), time <= 1) << double(time);

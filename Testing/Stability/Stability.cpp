@@ -4,7 +4,7 @@
 #include "Chart.h"
 #endif
 #include "HtmlReport.h"
-#include "Report.h"
+#include "WriteFile.h"
 #include "Tally.h"
 
 #include <CLI/CLI.hpp>

@@ -172,6 +172,26 @@ TEST(Octree, IsRebuiltWhenRefittingLoosensIt) {
   EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
 }
 
+TEST(Octree, IsRebuiltWhereFewLeap) {
+  Random random(9);
+  std::vector<Eigen::Vector3d> positions(20'000);
+  for (Eigen::Vector3d& p : positions) p = testing::randomPoint(random, -1, 1);
+  OctreeBasedCD detection;
+  const GeometryId id = detection.addPointSet(positions, 1e-3);
+  detection.update();
+  for (int frame = 0; frame < 3; ++frame) {
+    for (std::size_t i = 0; i < 200; ++i)
+      positions[100 * i + frame] = testing::randomPoint(random, -1, 1);
+    detection.setPositions(id, positions);
+    detection.update();
+    EXPECT_EQ(detection.octree().lastUpdate(id), kRebuilt);
+    for (Eigen::Vector3d& p : positions) p += Eigen::Vector3d(0.01, 0, 0);
+    detection.setPositions(id, positions);
+    detection.update();
+    EXPECT_EQ(detection.octree().lastUpdate(id), LooseOctree::Update::Refitted);
+  }
+}
+
 TEST(Octree, PoolTakesBlocksBack) {
   Random random(6);
   const Mesh large = testing::soup(random, 20000, 0.005), small = testing::soup(random, 50, 0.1);
