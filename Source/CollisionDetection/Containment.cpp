@@ -1,5 +1,6 @@
 #include "CollisionDetection/Containment.h"
 
+#include "CollisionDetection/Embedding.h"
 #include "Math/ClosestPoint.h"
 #include "Math/RayCrossing.h"
 
@@ -154,11 +155,14 @@ std::span<const InsideVertex> Containment::find(const Geometry& vertices, const 
                       Part& part = m_parts[chunk];
                       part.found.clear();
                       Body asked(body, engine, part.stack);
+                      SolidQuery solid(body, engine, part.stack);
+                      const auto isIn = [&](const Eigen::Vector3d& p) {
+                        if (body.solid) return solid.lowest(p).has_value();
+                        return asked.mayContain(p) && asked.windingNumber(p) != 0;
+                      };
                       for (std::size_t v = begin; v < end; ++v) {
                         const Eigen::Vector3d& p = vertices.mesh.now[v];
-                        if (topology.vertexTriangles[v].empty() || !asked.mayContain(p) ||
-                            asked.windingNumber(p) == 0)
-                          continue;
+                        if (topology.vertexTriangles[v].empty() || !isIn(p)) continue;
                         const InsideVertex inside = asked.nearest(static_cast<std::uint32_t>(v), p);
                         if (inside.depth > 0) part.found.push_back(inside);
                       }
@@ -174,6 +178,7 @@ void checkClosed(Geometry& body) {
     throw Error(ErrorCode::NotClosed,
                 nameOf(body.id) + " is " + nameOf(topology.kind) + ", which has no inside",
                 body.id);
+  if (body.solid) return;  // it has its tetrahedra
   if (!topology.closed) topology.closed = findMeshDefects(topology.triangles).closed();
   if (*topology.closed) return;
   const MeshDefects defects = findMeshDefects(topology.triangles);

@@ -120,13 +120,13 @@ void updateOctree(Geometry& geometry, const OctreeSettings& settings, const Thre
   using Update = LooseOctree::Update;
   geometry.treeRevision = geometry.revisionForTree();
   geometry.treeSwept = geometry.treeSweeps();
+  Stopwatch watch;
+  computeFloats(geometry.mesh.now.body(), geometry.frame, geometry.floats, threads);
   if (geometry.mesh.topology.triangles.empty()) {
     geometry.octree.reset(0);
     geometry.treeKnown = false;
     return;
   }
-  Stopwatch watch;
-  computeFloats(geometry.mesh.now.body(), geometry.frame, geometry.floats, threads);
   if (geometry.treeSwept)
     computeFloats(geometry.mesh.before.body(), geometry.frame, geometry.floatsBefore, threads);
   geometry.boxMilliseconds += watch.lap();
@@ -206,6 +206,22 @@ GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
   if (!radii.empty()) mesh.largestRadius = *std::max_element(radii.begin(), radii.end());
   if (radii.size() > 1) mesh.radii.assign(radii.begin(), radii.end());
   return id;
+}
+
+GeometryId GeometryTable::addLines(std::span<const Eigen::Vector3d> positions,
+                                   std::span<const Segment> segments,
+                                   std::span<const double> radii) {
+  std::vector<Triangle> triangles;
+  triangles.reserve(segments.size());
+  for (const auto& [p, q] : segments) triangles.push_back({p, q, q});
+  return add(positions, triangles, GeometryKind::Lines, radii);
+}
+
+GeometryId GeometryTable::addPoints(std::span<const Eigen::Vector3d> positions,
+                                    std::span<const double> radii) {
+  std::vector<Triangle> triangles(positions.size());
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) triangles[i] = {i, i, i};
+  return add(positions, triangles, GeometryKind::Points, radii);
 }
 
 GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
@@ -309,6 +325,7 @@ void GeometryTable::setTetrahedra(GeometryId id, std::span<const Eigen::Vector3d
   TetrahedralTopology solid = checkedTopology(id, rest, tetrahedra);
   setTopology(geometry, std::move(rest), {positions.size(), solid.surface});
   geometry.solid = std::move(solid);
+  geometry.tetrahedronTree.forget();
 }
 
 void GeometryTable::setTopology(Geometry& geometry, std::vector<Eigen::Vector3d> rest,

@@ -5,6 +5,7 @@
 #include <palpate/Settings.h>
 
 #include "CollisionDetection/RigidBody.h"
+#include "CollisionDetection/TetrahedronTree.h"
 #include "Core/Threads.h"
 #include "Geometry/FloatPositions.h"
 #include "Geometry/Motion.h"
@@ -28,6 +29,9 @@ struct Geometry {
   GeometryId id;
   TriangleMesh mesh;
   std::optional<TetrahedralTopology> solid;  ///< of a tetrahedral mesh, whose surface `mesh` is
+  TetrahedronTree tetrahedronTree;           ///< made when first asked for
+  std::uint64_t tetrahedraFor = 0;           ///< bodyRevision that it is of
+  FloatFrame tetrahedraFrame;
   /// Positions are checked while copied into one of these that no end of a step has.
   std::array<std::shared_ptr<std::vector<Eigen::Vector3d>>, 5> bodies;
   std::uint64_t revision = 1;      ///< counts changes of positions now and of topology
@@ -89,6 +93,9 @@ class GeometryTable {
   /// radii: none, one for all, or as many as positions.
   GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Triangle>,
                  GeometryKind = GeometryKind::Triangles, std::span<const double> radii = {});
+  GeometryId addLines(std::span<const Eigen::Vector3d> positions, std::span<const Segment>,
+                      std::span<const double> radii);
+  GeometryId addPoints(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
   GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Tetrahedron>);
   GeometryId add(const AnalyticalGeometry&);
   void remove(GeometryId);

@@ -3,57 +3,33 @@
 #include "CollisionDetection/Audit.h"
 #include "CollisionDetection/BruteForce.h"
 #include "CollisionDetection/Containment.h"
+#include "CollisionDetection/Embedding.h"
+#include "CollisionDetection/FollowedExits.h"
 #include "CollisionDetection/Frame.h"
 #include "CollisionDetection/GeometryChecks.h"
 #include "CollisionDetection/GeometryTable.h"
 #include "CollisionDetection/Order.h"
 #include "CollisionDetection/PairTable.h"
 #include "CollisionDetection/Problem.h"
+#include "CollisionDetection/SettingsCheck.h"
 #include "CollisionDetection/Stopwatch.h"
 #include "Core/Assert.h"
 #include "Core/FloatingPoint.h"
+#include "Core/Text.h"
 #include "Octree/Forest.h"
 
 #include <algorithm>
-#include <filesystem>
-#include <limits>
 #include <mutex>
 #include <optional>
 #include <span>
-#include <system_error>
 
 namespace palpate {
 
 namespace {
 
-const Settings& checked(const Settings& settings) {
-  const auto check = [](const char* name, auto setting, int low, int high, const char* range) {
-    const int value = static_cast<int>(setting);
-    if (value < low || value > high)
-      throw Error(ErrorCode::InvalidSettings, std::string("settings: ") + name + " is " +
-                                                  std::to_string(value) + "; it must be " + range);
-  };
-  constexpr int kAny = std::numeric_limits<int>::max();
-  const OctreeSettings& octree = settings.octree;
-  check("octree.maxDepth", octree.maxDepth, 1, 60, "in [1, 60]");
-  check("octree.maxPrimitivesPerLeaf", octree.maxPrimitivesPerLeaf, 1, 1024, "in [1, 1024]");
-  check("octree.update", octree.update, 0, 1, "Auto or Rebuild");
-  check("engine", settings.engine, 0, 1, "Octree or BruteForce");
-  check("threads", settings.threads, 0, 1024, "in [0, 1024]");
-  check("audit.features", settings.audit.features, 0, kAny, "at least 0");
-  check("audit.mostFiles", settings.audit.mostFiles, 0, kAny, "at least 0");
-  std::error_code fault;
-  if (const auto& folder = settings.audit.folder;
-      !folder.empty() && !std::filesystem::is_directory(folder, fault))
-    throw Error(ErrorCode::InvalidSettings,
-                "settings: audit.folder \"" + folder.string() + "\" is not a folder");
-  return settings;
-}
-
-void checkOnePerVertex(std::span<const Eigen::Vector3d> positions, std::span<const double> radii) {
-  if (radii.size() != positions.size())
-    throw Error(ErrorCode::InvalidRadius, std::to_string(radii.size()) + " radii given for " +
-                                              std::to_string(positions.size()) + " vertices");
+void checkDifferent(GeometryId vertices, GeometryId body) {
+  if (vertices == body)
+    throw Error(ErrorCode::InvalidSettings, nameOf(body) + ": its own vertices lie on it", body);
 }
 
 }  // namespace
@@ -76,6 +52,8 @@ struct OctreeBasedCD::Implementation {
   PairTable pairs;
   Frame frame;
   Containment containment;
+  FollowedExits exits;
+  Embedding embedding;
   FrameStatistics statistics;
   std::optional<LooseOctree> octree;
   std::vector<PairRecord*> work;
@@ -85,20 +63,6 @@ struct OctreeBasedCD::Implementation {
   int auditFiles = 0;
   std::mutex sorting;  ///< of candidates, when a const query first asks for them
   PairOrderScratch sortingScratch;
-
-  GeometryId addLines(std::span<const Eigen::Vector3d> positions, std::span<const Segment> segments,
-                      std::span<const double> radii) {
-    std::vector<Triangle> triangles;
-    triangles.reserve(segments.size());
-    for (const auto& [p, q] : segments) triangles.push_back({p, q, q});
-    return geometries.add(positions, triangles, GeometryKind::Lines, radii);
-  }
-
-  GeometryId addPoints(std::span<const Eigen::Vector3d> positions, std::span<const double> radii) {
-    std::vector<Triangle> triangles(positions.size());
-    for (std::uint32_t i = 0; i < triangles.size(); ++i) triangles[i] = {i, i, i};
-    return geometries.add(positions, triangles, GeometryKind::Points, radii);
-  }
 
   /// An update() before detectCollision() belongs to its frame.
   void startFrame() {
@@ -164,6 +128,12 @@ struct OctreeBasedCD::Implementation {
 #ifdef PALPATE_VALIDATE
     PALPATE_ASSERT(octree->validate().empty());
 #endif
+  }
+
+  /// Before points are asked about.
+  void updateFor(Geometry& body) {
+    update();
+    if (body.solid) updateTetrahedra(body, settings.octree, threads);
   }
 
   void showOctree() {
@@ -292,24 +262,24 @@ GeometryId OctreeBasedCD::addTetrahedralMesh(std::span<const Eigen::Vector3d> po
 
 GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
                                       std::span<const Segment> segments, double radius) {
-  return m_implementation->addLines(positions, segments, {&radius, 1});
+  return m_implementation->geometries.addLines(positions, segments, {&radius, 1});
 }
 
 GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
                                       std::span<const Segment> segments,
                                       std::span<const double> radii) {
   checkOnePerVertex(positions, radii);
-  return m_implementation->addLines(positions, segments, radii);
+  return m_implementation->geometries.addLines(positions, segments, radii);
 }
 
 GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions, double radius) {
-  return m_implementation->addPoints(positions, {&radius, 1});
+  return m_implementation->geometries.addPoints(positions, {&radius, 1});
 }
 
 GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions,
                                       std::span<const double> radii) {
   checkOnePerVertex(positions, radii);
-  return m_implementation->addPoints(positions, radii);
+  return m_implementation->geometries.addPoints(positions, radii);
 }
 
 GeometryId OctreeBasedCD::addAnalyticalGeometry(const AnalyticalGeometry& geometry) {
@@ -329,6 +299,7 @@ void OctreeBasedCD::removeGeometry(GeometryId geometry) {
   m_implementation->geometries.at(geometry);
   m_implementation->pairs.removeAllOf(geometry);
   m_implementation->geometries.remove(geometry);
+  m_implementation->exits.forget(geometry);
   m_implementation->showOctree();
 }
 
@@ -432,11 +403,44 @@ std::span<const InsideVertex> OctreeBasedCD::findInsideVertices(GeometryId verti
   Implementation& all = *m_implementation;
   const Geometry& asked = all.geometries.at(vertices);
   Geometry& around = all.geometries.at(body);
-  if (vertices == body)
-    throw Error(ErrorCode::InvalidSettings, nameOf(body) + ": its own vertices lie on it", body);
+  checkDifferent(vertices, body);
   checkClosed(around);
-  all.update();
+  all.updateFor(around);
   return all.containment.find(asked, around, all.settings.engine, all.threads);
+}
+
+std::span<const FollowedVertex> OctreeBasedCD::followInsideVertices(GeometryId vertices,
+                                                                    GeometryId body) {
+  const StandardFloatingPoint standard;
+  Implementation& all = *m_implementation;
+  const auto inside = findInsideVertices(vertices, body);
+  return all.exits.follow(all.geometries.at(vertices), all.geometries.at(body), inside,
+                          all.settings.engine, all.threads);
+}
+
+std::span<const EmbeddedVertex> OctreeBasedCD::findEmbeddedVertices(GeometryId vertices,
+                                                                    GeometryId body) {
+  const StandardFloatingPoint standard;
+  Implementation& all = *m_implementation;
+  const Geometry& asked = all.geometries.at(vertices);
+  Geometry& solid = all.geometries.at(body);
+  checkDifferent(vertices, body);
+  checkTopologyKind(solid, true, "findEmbeddedVertices() is for tetrahedral meshes");
+  all.updateFor(solid);
+  return all.embedding.find(asked, solid, all.settings.engine, all.threads);
+}
+
+std::optional<TetrahedronPoint> OctreeBasedCD::findTetrahedron(GeometryId body,
+                                                               const Eigen::Vector3d& point) {
+  const StandardFloatingPoint standard;
+  Implementation& all = *m_implementation;
+  Geometry& solid = all.geometries.at(body);
+  checkTopologyKind(solid, true, "findTetrahedron() is for tetrahedral meshes");
+  if (!point.allFinite())
+    throw Error(ErrorCode::NonFinitePosition,
+                nameOf(body) + ": a point to be found is " + textOf(point), body);
+  all.updateFor(solid);
+  return all.embedding.find(point, solid, all.settings.engine);
 }
 
 const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) const {

@@ -21,6 +21,9 @@ struct alignas(16) FloatPoint {
 struct FloatFrame {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   double scale = 1.0;
+  friend bool operator==(const FloatFrame& l, const FloatFrame& r) {
+    return l.origin == r.origin && l.scale == r.scale;
+  }
 };
 
 /// Of up to 31 evenly spaced positions: the median of each axis, and the largest distance along an

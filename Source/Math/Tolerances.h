@@ -146,6 +146,12 @@ constexpr double kPlacedError = 0x1p-48;
 /// L: coordinates of bodies and translations up to this are placed without overflow.
 constexpr double kLargestPlaced = 0x1p1000;
 
+// ---- Ways out of bodies (CollisionDetection/FollowedExits.cpp) ----
+
+/// Of a triangle's edge, normal and what is across both from being orthonormal: beyond it the
+/// normal is no more than rounding. Any value.
+constexpr double kAxesError = 0x1p-20;
+
 // ---- Motion bounds (Motion.cpp, MotionBound.cpp) ----
 
 /// Relative, and of a distance relative to the largest coordinate difference beside it: a

@@ -3,6 +3,7 @@
 #include "Rows.h"
 
 #include "Common/RandomMeshes.h"
+#include "Common/Solids.h"
 
 #ifdef PALPATE_BENCHMARK_PEERS
 #include "Peers/Peer.h"
@@ -65,6 +66,43 @@ void insideRow(Report& report, const std::string& name, const testing::Mesh& bod
 #endif
 }
 
+/// Probes in a solid of 162,000 tetrahedra, which deforms in each frame: us a probe, with the
+/// update; which tetrahedron and weights, or ways out that are followed.
+void embeddedRow(Report& report, const Points& probes, Engine engine, int threads) {
+  testing::Random random(2);
+  const testing::Solid solid = testing::cells(30, random);
+  Settings settings;
+  settings.threads = threads;
+  settings.engine = engine;
+  const bool bruteForce = engine == Engine::BruteForce;
+  OctreeBasedCD detection(settings);
+  const GeometryId asked = detection.addPointSet(probes),
+                   id = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra);
+  std::vector<double> embedded, followed;
+  Points deformed = solid.positions;
+  for (int frame = 0; frame < (bruteForce ? 2 : 9); ++frame) {
+    for (std::size_t v = 0; v < deformed.size(); ++v)
+      deformed[v].x() = solid.positions[v].x() + 0.4 * std::sin(deformed[v].y() + 0.2 * frame);
+    const double start = now();
+    detection.setPositions(id, deformed);
+    detection.findEmbeddedVertices(asked, id);
+    embedded.push_back(now() - start);
+    if (!bruteForce) detection.followInsideVertices(asked, id);
+    followed.push_back(now() - start - embedded.back());
+  }
+  for (auto* samples : {&embedded, &followed}) {
+    samples->erase(samples->begin());
+    if (bruteForce && samples == &followed) continue;
+    const std::string name = samples == &embedded ? "embedded" : "followed";
+    const double each = 1000 * median(*samples) / static_cast<double>(probes.size());
+    report.line(
+        {name + (bruteForce ? ", brute force" : ", " + std::to_string(threads) + " threads"),
+         milliseconds(each)});
+    report.row("inside", name, threads, bruteForce ? "Palpate, brute force" : "Palpate",
+               "us a probe", each);
+  }
+}
+
 /// Half a box of particles that sinks into the body, all moving.
 double particleFrame(const Settings& settings, const testing::Mesh& body, const Points& start,
                      int frames, std::uint64_t& hash) {
@@ -100,6 +138,11 @@ void insideRows(Report& report, const RowOptions& options) {
     insideRow(report, "around", body, around, threads);
     insideRow(report, "just below", body, below, threads);
   }
+  report.heading("Probes in 162,000 tetrahedra that deform: us each");
+  Points probes = pointsIn(random, 100000, 15);
+  for (Eigen::Vector3d& p : probes) p += Eigen::Vector3d(15, 15, 15);
+  for (const int threads : options.threads) embeddedRow(report, probes, Engine::Octree, threads);
+  embeddedRow(report, Points(probes.begin(), probes.begin() + 50), Engine::BruteForce, 1);
   report.heading("A million particles against it: ms a frame, millions of particles a second");
   const Points smoke = pointsIn(random, 1000000, 1.2);
   std::uint64_t hash = 0;

@@ -35,4 +35,27 @@ struct InsideVertex {
   friend bool operator==(const InsideVertex&, const InsideVertex&) = default;
 };
 
+/// What became of a vertex's way out since the last call of followInsideVertices().
+enum class ExitChange {
+  Entered,  ///< the vertex was not inside then, or topology was set since: the nearest
+  None,     ///< the nearest
+  Kept,     ///< the nearest would have turned further than motion explains: the last direction
+  Jumped    ///< the same, and the last direction is no way out any more: the nearest
+};
+
+/// A vertex inside a body, and a way out that turns no further from call to call than motion
+/// explains, unless it says so.
+struct FollowedVertex {
+  /// Between the last direction and this, as lengths of differences of unit vectors, beyond what
+  /// motion explains.
+  static constexpr double kMostTurn = 0.5;
+  /// A direction is kept while it leaves the body no further away than this times the nearest way.
+  static constexpr double kMostDepth = 2.0;
+
+  InsideVertex wayOut;   ///< Kept: where the direction kept leaves the body
+  InsideVertex nearest;  ///< as findInsideVertices() has it
+  ExitChange change;
+  friend bool operator==(const FollowedVertex&, const FollowedVertex&) = default;
+};
+
 }  // namespace palpate

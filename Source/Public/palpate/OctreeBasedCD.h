@@ -14,6 +14,7 @@
 #include <palpate/Types.h>
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <type_traits>
 
@@ -147,12 +148,31 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// The vertices of one geometry that are inside another, a closed body, also where it is concave
   /// and where no triangles cross; updates if needed. Ascending vertices.
   ///
-  /// Inside: the body's winding number about the vertex, decided exactly, is not zero, and the
-  /// vertex does not lie on the surface. The exit is the nearest point of the body's surface; of
-  /// several equally near, on the lowest triangle. Depth and exit as exact as
-  /// vertexTriangleDistance().
+  /// Inside: the body's winding number about the vertex, decided exactly, is not zero, or, of a
+  /// tetrahedral mesh, it is in a tetrahedron; and the vertex does not lie on the surface. The exit
+  /// is the nearest point of the body's surface; of several equally near, on the lowest triangle.
+  /// Depth and exit as exact as vertexTriangleDistance().
   /// Errors   NotClosed names the first edge at fault; InvalidSettings for one geometry twice.
   std::span<const InsideVertex> findInsideVertices(GeometryId vertices, GeometryId body);
+  /// The same, with ways out that do not flip from call to call: call it once a frame, after
+  /// setPositions().
+  ///
+  /// Seen from the triangle that the last exit was on, which turns with the body: where the nearest
+  /// way out is within kMostTurn + m of the last direction, it is taken; m is how far the vertex
+  /// moved from that exit's place, over the root of the last depth times the nearest. Else the last
+  /// direction is kept, if it meets the surface at most kMostDepth times as far away as the nearest
+  /// point is; else the nearest is taken, and the change is Jumped. So depth is at most twice the
+  /// least, and no direction jumps that is not named.
+  std::span<const FollowedVertex> followInsideVertices(GeometryId vertices, GeometryId body);
+  /// The vertices of one geometry in the tetrahedra of another, or on their boundary, decided
+  /// exactly: ascending, each once, in the lowest of its tetrahedra. Updates if needed. One that
+  /// deformation inverted holds points as others do; one without volume has none.
+  ///
+  /// Errors   UnsupportedMethod for a body that is no tetrahedral mesh, InvalidSettings for one
+  ///          geometry twice.
+  std::span<const EmbeddedVertex> findEmbeddedVertices(GeometryId vertices, GeometryId body);
+  /// The same of one point.
+  std::optional<TetrahedronPoint> findTetrahedron(GeometryId body, const Eigen::Vector3d& point);
 
   /// (a, b) in the order in which the pair was added.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;

@@ -2,6 +2,7 @@
 
 #include <palpate/Types.h>
 
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -19,6 +20,24 @@ namespace palpate {
 struct TetrahedralSurface {
   std::span<const Triangle> triangles;
   std::span<const std::uint32_t> tetrahedra;
+};
+
+/// Where a point is in a tetrahedral mesh: the weighted sum of the corners' positions.
+///
+/// Weights  sum 1 within 2^-50; each at least 0, and exactly 0 where the point is on the face
+///          without that corner; within 2^-49 of its value.
+struct TetrahedronPoint {
+  std::uint32_t tetrahedron;
+  Tetrahedron corners;
+  std::array<double, 4> weights;
+  friend bool operator==(const TetrahedronPoint&, const TetrahedronPoint&) = default;
+};
+
+/// A vertex of another geometry in a tetrahedral mesh.
+struct EmbeddedVertex {
+  std::uint32_t vertex;
+  TetrahedronPoint at;
+  friend bool operator==(const EmbeddedVertex&, const EmbeddedVertex&) = default;
 };
 
 }  // namespace palpate

@@ -1,5 +1,6 @@
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/Solids.h"
 #include "Scenes.h"
 
 #include <gmp.h>
@@ -232,6 +233,39 @@ TEST(SteadyFrame, AllocatesNothingWithRigidBodies) {
     }
     EXPECT_EQ(allocations - before, 0u);
     EXPECT_GT(contacts, 1000u);
+  }
+}
+
+TEST(SteadyFrame, AllocatesNothingWithTetrahedra) {
+  testing::Random random(1);
+  const testing::Solid solid = testing::cells(5, random);
+  std::vector<Eigen::Vector3d> probes;
+  for (int i = 0; i < 1000; ++i) probes.push_back(testing::randomPoint(random, -1, 6));
+  for (const OctreeUpdate update : {OctreeUpdate::Auto, OctreeUpdate::Rebuild}) {
+    Settings settings{.threads = 1};
+    settings.octree.update = update;
+    OctreeBasedCD detection(settings);
+    const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
+                     points = detection.addPointSet(probes);
+    detection.addCollisionPair(points, body, {Method::Proximity, 0.1});
+    std::size_t before = 0, found = 0;
+    std::set<ExitChange> changes;
+    const IntegersApart apart;
+    std::vector<Eigen::Vector3d> now = solid.positions;
+    for (int frame = 0; frame < 40; ++frame) {
+      if (frame == 20) before = allocations;
+      for (std::size_t v = 0; v < now.size(); ++v)
+        now[v].x() = solid.positions[v].x() + 0.5 * std::sin(solid.positions[v].y() + frame % 10);
+      detection.setPositions(body, now);
+      detection.detectCollision();
+      found += detection.findEmbeddedVertices(points, body).size();
+      found += detection.findTetrahedron(body, probes[0]).has_value();
+      for (const FollowedVertex& f : detection.followInsideVertices(points, body))
+        if (frame < 20) changes.insert(f.change);
+    }
+    EXPECT_EQ(allocations - before, 0u);
+    EXPECT_GT(found, 10000u);
+    EXPECT_GE(changes.size(), 3u);
   }
 }
 

@@ -1,0 +1,58 @@
+#include "CollisionDetection/Embedding.h"
+
+#include "Math/TetrahedronWeights.h"
+
+namespace palpate {
+
+void updateTetrahedra(Geometry& solid, const OctreeSettings& settings, const Threads& threads) {
+  if (solid.tetrahedraFor == solid.bodyRevision && solid.tetrahedraFrame == solid.frame) return;
+  solid.tetrahedraFor = solid.bodyRevision;
+  solid.tetrahedraFrame = solid.frame;
+  solid.tetrahedronTree.update(solid.solid->tetrahedra, solid.floats.data(),
+                               solid.spread * solid.frame.scale, settings, threads);
+}
+
+std::optional<TetrahedronPoint> SolidQuery::lowest(const Eigen::Vector3d& p) {
+  const std::vector<Tetrahedron>& tetrahedra = m_solid.solid->tetrahedra;
+  const Positions& now = m_solid.mesh.now;
+  std::optional<TetrahedronPoint> best;
+  SignCounts counts;
+  const auto tryOne = [&](std::uint32_t id, const Tetrahedron& t) {
+    if (best && best->tetrahedron < id) return;
+    if (const auto weights =
+            tetrahedronWeights(p, now[t[0]], now[t[1]], now[t[2]], now[t[3]], counts))
+      best = {id, t, *weights};
+  };
+  if (m_bruteForce) {
+    for (std::uint32_t i = 0; i < tetrahedra.size(); ++i) tryOne(i, tetrahedra[i]);
+    return best;
+  }
+  const TetrahedronTree& tree = m_solid.tetrahedronTree;
+  if (tree.octree().size() == 0) return best;
+  const FloatBox point = m_frame.boxOf(p);
+  const auto overlaps = [&](const FloatBox& box) { return m_frame(box).overlaps(point); };
+  forEachOverlapping(tree.octree(), overlaps, m_stack, [&](std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t i = begin; i < end; ++i)
+      if (overlaps(tree.octree().boxes()[i])) tryOne(tree.octree().order()[i], tree.ordered()[i]);
+  });
+  return best;
+}
+
+std::optional<TetrahedronPoint> Embedding::find(const Eigen::Vector3d& point, const Geometry& solid,
+                                                Engine engine) {
+  return SolidQuery(solid, engine, m_stack).lowest(point);
+}
+
+std::span<const EmbeddedVertex> Embedding::find(const Geometry& vertices, const Geometry& solid,
+                                                Engine engine, const Threads& threads) {
+  return m_search.find(vertices.mesh.topology, threads, [&](PointQueryStack& stack) {
+    return [&, query = SolidQuery(solid, engine, stack)](
+               std::uint32_t v) mutable -> std::optional<EmbeddedVertex> {
+      const auto at = query.lowest(vertices.mesh.now[v]);
+      if (!at) return {};
+      return EmbeddedVertex{v, *at};
+    };
+  });
+}
+
+}  // namespace palpate

@@ -1,0 +1,175 @@
+#include "CollisionDetection/FollowedExits.h"
+
+#include "Math/Predicates.h"
+#include "Math/Tolerances.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace palpate {
+
+namespace {
+
+using Corners = std::array<Eigen::Vector3d, 3>;
+
+Corners cornersOf(const Geometry& body, const Triangle& t) {
+  const Positions& now = body.mesh.now;
+  return {now[t[0]], now[t[1]], now[t[2]]};
+}
+
+Eigen::Vector3d pointAt(const Corners& corners, const Eigen::Vector3d& weights) {
+  return weights[0] * corners[0] + weights[1] * corners[1] + weights[2] * corners[2];
+}
+
+/// An edge's direction, the normal, and what is across both; none of a triangle without area.
+std::optional<Eigen::Matrix3d> axesOf(const Corners& t) {
+  Eigen::Matrix3d axes;
+  const Eigen::Vector3d edge = t[1] - t[0], normal = edge.cross(t[2] - t[0]);
+  axes.col(0) = edge.stableNormalized();
+  axes.col(1) = normal.stableNormalized();
+  axes.col(2) = axes.col(0).cross(axes.col(1));
+  if (!(std::abs(axes.determinant() - 1.0) < kAxesError)) return {};
+  return axes;
+}
+
+/// How a triangle turned; not at all where that cannot be said.
+Eigen::Matrix3d turnOf(const Corners& before, const Corners& now) {
+  if (before == now) return Eigen::Matrix3d::Identity();
+  const auto from = axesOf(before), to = axesOf(now);
+  if (!from || !to) return Eigen::Matrix3d::Identity();
+  return *to * from->transpose();
+}
+
+/// Where the segment from p to q crosses a triangle that it is not in the plane of: weights of the
+/// corners. Whether it does is exact.
+std::optional<Eigen::Vector3d> crossing(const Eigen::Vector3d& p, const Eigen::Vector3d& q,
+                                        const Corners& t, SignCounts& counts) {
+  if (orient3d(t[0], t[1], t[2], p, counts) == orient3d(t[0], t[1], t[2], q, counts)) return {};
+  Eigen::Vector3d weights = Eigen::Vector3d::Zero();
+  int side = 0;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d &from = t[(i + 1) % 3], &to = t[(i + 2) % 3];
+    const int sign = orient3d(p, q, from, to, counts);
+    if (sign == 0) continue;
+    if (sign == -side) return {};
+    side = sign;
+    weights[i] = std::abs((q - p).dot((from - p).cross(to - p)));
+  }
+  const double sum = weights.sum();
+  if (!(sum > 0)) return {};
+  return weights / sum;
+}
+
+}  // namespace
+
+/// The body, asked where a direction leaves it.
+class FollowedExits::Following {
+ public:
+  Following(const Geometry& body, Engine engine, PointQueryStack& stack)
+      : m_body(body), m_bruteForce(engine == Engine::BruteForce), m_stack(stack), m_frame(body) {}
+
+  /// The first point of the surface from p along a unit direction, at most so far away; of several
+  /// triangles the lowest.
+  std::optional<InsideVertex> along(std::uint32_t vertex, const Eigen::Vector3d& p,
+                                    const Eigen::Vector3d& direction, double most) {
+    const Eigen::Vector3d q = p + most * direction;
+    std::optional<InsideVertex> first;
+    if (!q.allFinite()) return first;
+    SignCounts counts;
+    const auto tryOnes = [&](std::uint32_t begin, std::uint32_t end) {
+      for (std::uint32_t i = begin; i < end; ++i) {
+        const std::uint32_t id = m_body.octree.order()[i];
+        const Triangle& triangle = m_body.orderedTriangles[i];
+        const Corners corners = cornersOf(m_body, triangle);
+        const auto weights = crossing(p, q, corners, counts);
+        if (!weights) continue;
+        const double depth = (pointAt(corners, *weights) - p).dot(direction);
+        if (!(depth > 0) ||
+            (first && (depth > first->depth || (depth == first->depth && id > first->triangle))))
+          continue;
+        first = {vertex, id, triangle, *weights, direction, depth};
+      }
+    };
+    if (m_bruteForce) {
+      tryOnes(0, static_cast<std::uint32_t>(m_body.orderedTriangles.size()));
+      return first;
+    }
+    FloatBox way = m_frame.boxOf(p);
+    way.add(m_frame.boxOf(q));
+    const auto overlaps = [&](const FloatBox& box) { return m_frame(box).overlaps(way); };
+    forEachOverlapping(m_body.octree, overlaps, m_stack, tryOnes);
+    return first;
+  }
+
+  FollowedVertex operator()(const InsideVertex& nearest, const Eigen::Vector3d& p,
+                            const Place* last) {
+    if (!last) return {nearest, nearest, ExitChange::Entered};
+    const Corners corners = cornersOf(m_body, m_body.mesh.topology.triangles[last->triangle]);
+    const Eigen::Matrix3d turn = turnOf(last->triangleAt, corners);
+    const Eigen::Vector3d direction = (turn * last->direction).normalized();
+    const Eigen::Vector3d moved =
+        (p - pointAt(corners, last->barycentric)) -
+        turn * (last->position - pointAt(last->triangleAt, last->barycentric));
+    const double explained = moved.norm() / std::sqrt(last->depth) / std::sqrt(nearest.depth);
+    if ((nearest.exitDirection - direction).norm() <= FollowedVertex::kMostTurn + explained)
+      return {nearest, nearest, ExitChange::None};
+    if (const auto kept =
+            along(nearest.vertex, p, direction, FollowedVertex::kMostDepth * nearest.depth))
+      return {*kept, nearest, ExitChange::Kept};
+    return {nearest, nearest, ExitChange::Jumped};
+  }
+
+ private:
+  const Geometry& m_body;
+  bool m_bruteForce;
+  PointQueryStack& m_stack;
+  PointFrame m_frame;
+};
+
+std::span<const FollowedVertex> FollowedExits::follow(const Geometry& vertices,
+                                                      const Geometry& body,
+                                                      std::span<const InsideVertex> inside,
+                                                      Engine engine, const Threads& threads) {
+  constexpr std::size_t kGrain = 256;
+  Pair& pair = m_pairs[{vertices.id, body.id}];
+  if (pair.verticesRevision != vertices.restRevision || pair.bodyRevision != body.restRevision)
+    pair.last.clear();
+  pair.verticesRevision = vertices.restRevision;
+  pair.bodyRevision = body.restRevision;
+  pair.found.resize(inside.size());
+  pair.now.resize(inside.size());
+  const std::size_t parts = (inside.size() + kGrain - 1) / kGrain;
+  if (pair.stacks.size() < parts) pair.stacks.resize(parts);
+  threads.forChunks(inside.size(), kGrain,
+                    [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+                      Following following(body, engine, pair.stacks[chunk]);
+                      for (std::size_t i = begin; i < end; ++i) {
+                        const std::uint32_t vertex = inside[i].vertex;
+                        const auto last = std::lower_bound(
+                            pair.last.begin(), pair.last.end(), vertex,
+                            [](const Place& place, std::uint32_t v) { return place.vertex < v; });
+                        const bool known = last != pair.last.end() && last->vertex == vertex;
+                        const Eigen::Vector3d p = vertices.mesh.now[vertex];
+                        pair.found[i] = following(inside[i], p, known ? &*last : nullptr);
+                        const InsideVertex& wayOut = pair.found[i].wayOut;
+                        pair.now[i] = {vertex,
+                                       wayOut.triangle,
+                                       wayOut.barycentric,
+                                       wayOut.exitDirection,
+                                       wayOut.depth,
+                                       p,
+                                       cornersOf(body, wayOut.corners)};
+                      }
+                    });
+  std::swap(pair.last, pair.now);
+  return pair.found;
+}
+
+void FollowedExits::forget(GeometryId id) {
+  std::erase_if(m_pairs, [=](const auto& entry) {
+    return entry.first.first == id || entry.first.second == id;
+  });
+}
+
+}  // namespace palpate

@@ -1,0 +1,78 @@
+#include "CollisionDetection/TetrahedronTree.h"
+
+#include <algorithm>
+
+namespace palpate {
+
+namespace {
+
+constexpr std::size_t kGroupGrain = 128;
+constexpr double kMostLoosening = 1.5;
+
+FloatBox boxOf(const Tetrahedron& tetrahedron, const FloatPoint* floats) {
+  FloatBox box;
+  for (const std::uint32_t vertex : tetrahedron) {
+    const FloatPoint& f = floats[vertex];
+    box.add({{f.x, f.y, f.z, 0}, {f.x, f.y, f.z, 0}});
+  }
+  for (int k = 0; k < 3; ++k) {
+    box.lower[k] = OutwardRounding::down(box.lower[k]);
+    box.upper[k] = OutwardRounding::up(box.upper[k]);
+  }
+  return box;
+}
+
+void set(BoxArrays& boxes, std::size_t i, const FloatBox& box) {
+  for (int k = 0; k < 3; ++k) {
+    boxes.lower[k][i] = box.lower[k];
+    boxes.upper[k][i] = box.upper[k];
+  }
+}
+
+}  // namespace
+
+void TetrahedronTree::update(std::span<const Tetrahedron> tetrahedra, const FloatPoint* floats,
+                             double bulk, const OctreeSettings& settings, const Threads& threads) {
+  const std::size_t size = tetrahedra.size();
+  if (!m_known) {
+    m_octree.reset(size);
+    m_ordered.assign(tetrahedra.begin(), tetrahedra.end());
+  }
+  if (size == 0) return;
+  if (m_known && settings.update == OctreeUpdate::Auto) {
+    fit(floats, threads);
+    m_octree.measureLooseness();
+    if (m_octree.looseness() <= kMostLoosening * m_octree.loosenessWhenBuilt()) return;
+  }
+  m_known = true;
+  FloatBox bounds;
+  for (std::size_t i = 0; i < size; ++i) {
+    const FloatBox box = boxOf(m_ordered[i], floats);
+    set(m_octree.boxes(), i, box);
+    bounds.add(box);
+  }
+  m_keys.resize(size);
+  m_octree.build(bounds, bulk, settings, m_keys.data(), threads);
+  for (std::size_t i = 0; i < size; ++i) m_ordered[i] = tetrahedra[m_octree.order()[i]];
+  fit(floats, threads);
+  m_octree.measureLooseness();
+}
+
+void TetrahedronTree::fit(const FloatPoint* floats, const Threads& threads) {
+  const std::span<const std::uint32_t> groups = m_octree.groups();
+  threads.forChunks(groups.size() - 1, kGroupGrain,
+                    [&](std::size_t, std::size_t from, std::size_t to) {
+                      for (std::size_t g = from; g < to; ++g) {
+                        FloatBox all;
+                        for (std::uint32_t i = groups[g]; i < groups[g + 1]; ++i) {
+                          const FloatBox box = boxOf(m_ordered[i], floats);
+                          set(m_octree.boxes(), i, box);
+                          all.add(box);
+                        }
+                        m_octree.groupBoxes()[g] = all;
+                      }
+                    });
+  m_octree.fit(threads);
+}
+
+}  // namespace palpate

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <palpate/Settings.h>
+#include <palpate/Types.h>
+
+#include "Core/Buffer.h"
+#include "Core/Threads.h"
+#include "Geometry/FloatPositions.h"
+#include "Octree/Octree.h"
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace palpate {
+
+/// An octree over the boxes of tetrahedra, for points in them. Refitted where only positions
+/// changed, until it has become loose.
+class TetrahedronTree {
+ public:
+  /// floats: of the vertices, in a frame of which `bulk` is the extent of most of them.
+  void update(std::span<const Tetrahedron>, const FloatPoint* floats, double bulk,
+              const OctreeSettings&, const Threads&);
+  void forget() { m_known = false; }  ///< the topology changed
+
+  const Octree& octree() const { return m_octree; }
+  /// In the octree's order.
+  std::span<const Tetrahedron> ordered() const { return m_ordered; }
+
+ private:
+  void fit(const FloatPoint* floats, const Threads&);
+
+  Octree m_octree;
+  std::vector<Tetrahedron> m_ordered;
+  Buffer<std::uint64_t> m_keys;  ///< scratch
+  bool m_known = false;
+};
+
+}  // namespace palpate

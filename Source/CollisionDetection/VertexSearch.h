@@ -1,0 +1,86 @@
+#pragma once
+
+#include "CollisionDetection/GeometryTable.h"
+#include "Core/Threads.h"
+#include "Octree/PointQueries.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace palpate {
+
+/// Where points of the world are among the boxes of a geometry's octree, of a placed body too.
+class PointFrame {
+ public:
+  explicit PointFrame(const Geometry& geometry)
+      : m_scale(geometry.frame.scale),
+        m_origin(worldOrigin(geometry)),
+        m_map(worldMap(geometry, m_origin, 0.0, false)) {}
+
+  FloatBox operator()(const FloatBox& box) const { return m_map(box); }
+  /// Clamped as the boxes' corners are: that brings no two points further apart.
+  std::array<double, 3> inFrame(const Eigen::Vector3d& p) const {
+    std::array<double, 3> point;
+    for (int k = 0; k < 3; ++k)
+      point[k] =
+          std::clamp((p[k] - m_origin[k]) * m_scale, -double{kLargestFloat}, double{kLargestFloat});
+    return point;
+  }
+  FloatBox boxOf(const Eigen::Vector3d& p) const {
+    FloatBox box;
+    const std::array<double, 3> point = inFrame(p);
+    for (int k = 0; k < 3; ++k) {
+      box.lower[k] = OutwardRounding::down(static_cast<float>(point[k]));
+      box.upper[k] = OutwardRounding::up(static_cast<float>(point[k]));
+    }
+    return box;
+  }
+
+ private:
+  double m_scale;
+  Eigen::Vector3d m_origin;  ///< of boxes in the world
+  BoxMap m_map;              ///< that brings them there
+};
+
+/// Asks something about each vertex of a geometry that is in an element, and keeps the answers in
+/// the order of the vertices. Scratch that remembers its peak.
+template <class Answer>
+class VertexSearch {
+ public:
+  /// start(stack): for some vertices; returns what is called with each, and gives a
+  /// std::optional<Answer>.
+  template <class Start>
+  std::span<const Answer> find(const MeshTopology& topology, const Threads& threads,
+                               Start&& start) {
+    constexpr std::size_t kGrain = 256;
+    const std::size_t parts = (topology.vertexCount + kGrain - 1) / kGrain;
+    if (m_parts.size() < parts) m_parts.resize(parts);
+    threads.forChunks(topology.vertexCount, kGrain,
+                      [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+                        Part& part = m_parts[chunk];
+                        part.found.clear();
+                        auto ask = start(part.stack);
+                        for (std::size_t v = begin; v < end; ++v)
+                          if (!topology.vertexTriangles[v].empty())
+                            if (const auto answer = ask(static_cast<std::uint32_t>(v)))
+                              part.found.push_back(*answer);
+                      });
+    m_found.clear();
+    for (std::size_t i = 0; i < parts; ++i)
+      m_found.insert(m_found.end(), m_parts[i].found.begin(), m_parts[i].found.end());
+    return m_found;
+  }
+
+ private:
+  struct Part {
+    PointQueryStack stack;
+    std::vector<Answer> found;
+  };
+  std::vector<Part> m_parts;
+  std::vector<Answer> m_found;
+};
+
+}  // namespace palpate

@@ -1,0 +1,21 @@
+#pragma once
+
+#include "Math/Predicates.h"
+
+#include <array>
+#include <optional>
+
+namespace palpate {
+
+/// Weights of a tetrahedron's corners at a point in it or on its boundary; none outside, and none
+/// of a tetrahedron without volume. Either orientation.
+///
+/// Exact    whether there are any, and which are 0: that of corner i where the point is on the face
+///          opposite. The others are positive, each within 2^-50 of its value.
+std::optional<std::array<double, 4>> tetrahedronWeights(const Eigen::Vector3d& p,
+                                                        const Eigen::Vector3d& a,
+                                                        const Eigen::Vector3d& b,
+                                                        const Eigen::Vector3d& c,
+                                                        const Eigen::Vector3d& d, SignCounts&);
+
+}  // namespace palpate
