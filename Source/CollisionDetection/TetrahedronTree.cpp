@@ -42,7 +42,7 @@ void TetrahedronTree::update(std::span<const Tetrahedron> tetrahedra, const Floa
   if (m_known && settings.update == OctreeUpdate::Auto) {
     fit(floats, threads);
     m_octree.measureLooseness();
-    if (m_octree.looseness() <= kMostLoosening * m_octree.loosenessWhenBuilt()) return;
+    if (m_octree.looseness() <= kMostLoosening * m_octree.leastLooseness()) return;
   }
   m_known = true;
   FloatBox bounds;
