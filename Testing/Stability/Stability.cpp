@@ -46,12 +46,12 @@ report::Figures emptyFigures() {
            {"us", "microseconds a case"}}};
 }
 
-/// `count` of the values, evenly from first to last.
-std::vector<double> chosen(const std::vector<double>& values, int count) {
+/// `most` of the values, evenly from first to last, or all.
+std::vector<double> chosen(const std::vector<double>& values, int most) {
+  const std::size_t count = std::min(values.size(), static_cast<std::size_t>(most));
   std::vector<double> some;
-  for (int i = 0; i < count; ++i)
-    some.push_back(values[(values.size() - 1) * static_cast<std::size_t>(i) /
-                          static_cast<std::size_t>(std::max(1, count - 1))]);
+  for (std::size_t i = 0; i < count; ++i)
+    some.push_back(values[(values.size() - 1) * i / (count - 1)]);
   return some;
 }
 

@@ -76,22 +76,33 @@ inline Polynomial commonDivisor(Polynomial l, Polynomial r) {
   return l;
 }
 
-/// Roots of a polynomial in (low, high], by Sturm's theorem.
-inline int rootCount(const Polynomial& p, const Rational& low, const Rational& high) {
-  std::vector<Polynomial> sequence{p, derivative(p)};
-  while (!sequence.back().empty())
-    sequence.push_back(primitive(Polynomial{Rational(-1)} *
-                                 divide(sequence[sequence.size() - 2], sequence.back()).remainder));
-  const auto changes = [&](const Rational& t) {
+/// Counts the roots of a polynomial in (low, high], by Sturm's theorem.
+class RootCounter {
+ public:
+  explicit RootCounter(const Polynomial& p) : m_sequence{p, derivative(p)} {
+    while (!m_sequence.back().empty())
+      m_sequence.push_back(
+          primitive(Polynomial{Rational(-1)} *
+                    divide(m_sequence[m_sequence.size() - 2], m_sequence.back()).remainder));
+  }
+  int operator()(const Rational& low, const Rational& high) const {
+    return changes(low) - changes(high);
+  }
+
+ private:
+  int changes(const Rational& t) const {
     int count = 0, last = 0;
-    for (const Polynomial& q : sequence) {
+    for (const Polynomial& q : m_sequence) {
       const int sign = sgn(valueAt(q, t));
       if (sign != 0 && last != 0 && sign != last) ++count;
       if (sign != 0) last = sign;
     }
     return count;
-  };
-  return changes(low) - changes(high);
+  }
+  std::vector<Polynomial> m_sequence;
+};
+inline int rootCount(const Polynomial& p, const Rational& low, const Rational& high) {
+  return RootCounter(p)(low, high);
 }
 
 /// A real number: the only root of `p`, which has no multiple ones, in (low, high]; or low where p
@@ -100,20 +111,37 @@ struct Real {
   Polynomial p;
   Rational low, high;
 
+  /// Whether it is at most t, in (low, high]: p changes sign at its root, unless it has one at low,
+  /// too.
+  bool isAtMost(const Rational& t) const {
+    const int start = sgn(valueAt(p, low)), there = sgn(valueAt(p, t));
+    return start == 0 ? rootCount(p, low, t) == 1 : there != start;
+  }
   void halve() {
     const Rational middle = (low + high) / 2;
-    (rootCount(p, low, middle) == 1 ? high : low) = middle;
+    (isAtMost(middle) ? high : low) = middle;
   }
   int sign(const Polynomial& q) {
     if (p.empty()) return sgn(valueAt(q, low));
     if (q.empty()) return 0;
     const Polynomial common = commonDivisor(p, q);
     if (common.size() > 1 && rootCount(common, low, high) == 1) return 0;
-    while (rootCount(q, low, high) > 0 || valueAt(q, low) == 0) halve();
+    const RootCounter count(q);
+    while (count(low, high) > 0 || valueAt(q, low) == 0) halve();
     return sgn(valueAt(q, high));
   }
   /// Sign of this - t.
-  int compare(const Rational& t) { return sign(Polynomial{-t, Rational(1)}); }
+  int compare(const Rational& t) {
+    if (p.empty()) return cmp(low, t);
+    if (t <= low) return 1;
+    if (t > high) return -1;
+    if (!isAtMost(t)) {
+      low = t;
+      return 1;
+    }
+    high = t;
+    return valueAt(p, t) == 0 ? 0 : -1;
+  }
 };
 
 /// Of a polynomial that is not zero, in [0, 1], ascending.
