@@ -14,6 +14,8 @@ import sys
 def onset(rows, quantity):
     """The first difficulty at which the quantity is not zero, comfortable first, and its worst."""
     values = [(float(row["difficulty"]), float(row[quantity])) for row in rows]
+    if not values:
+        return ""  # not in that run
     failing = [difficulty for difficulty, value in values if value > 0]
     if not failing:
         return "-"
