@@ -1,6 +1,7 @@
 #include "CollisionDetection/Containment.h"
 
 #include "CollisionDetection/Embedding.h"
+#include "Core/Text.h"
 #include "Math/ClosestPoint.h"
 #include "Math/RayCrossing.h"
 
@@ -103,8 +104,8 @@ class Body {
                      });
       m_last = at;
     }
-    return {vertex,           id,           m_geometry.orderedTriangles[at],
-            best.barycentric, -best.normal, best.distance};
+    return {vertex,        id,  m_geometry.orderedTriangles[at], best.barycentric, -best.normal,
+            best.distance, true};
   }
 
   bool mayContain(const Eigen::Vector3d& p) const {
@@ -144,26 +145,37 @@ class Body {
 }  // namespace
 
 std::span<const InsideVertex> Containment::find(const Geometry& vertices, const Geometry& body,
-                                                Engine engine, const Threads& threads) {
+                                                const InsideSettings& settings, Engine engine,
+                                                const Threads& threads) {
   m_found.clear();
   const MeshTopology& topology = vertices.mesh.topology;
   if (body.octree.size() == 0) return m_found;
   const std::size_t parts = (topology.vertexCount + kVerticesPerPart - 1) / kVerticesPerPart;
   if (m_parts.size() < parts) m_parts.resize(parts);
+  const bool closed = settings.rule == InsideRule::Closed,
+             bruteForce = engine == Engine::BruteForce;
+  if (!closed) m_numbers.prepare(body, threads);
   threads.forChunks(topology.vertexCount, kVerticesPerPart,
                     [&](std::size_t chunk, std::size_t begin, std::size_t end) {
                       Part& part = m_parts[chunk];
                       part.found.clear();
                       Body asked(body, engine, part.stack);
                       SolidQuery solid(body, engine, part.stack);
-                      const auto isIn = [&](const Eigen::Vector3d& p) {
-                        if (body.solid) return solid.lowest(p).has_value();
-                        return asked.mayContain(p) && asked.windingNumber(p) != 0;
+                      const auto answerFor = [&](const Eigen::Vector3d& p) {
+                        if (!closed)
+                          return m_numbers.ask(p, settings.margin, bruteForce, part.stack);
+                        const bool isIn = body.solid
+                                              ? solid.lowest(p).has_value()
+                                              : asked.mayContain(p) && asked.windingNumber(p) != 0;
+                        return WindingNumbers::Answer{isIn, true};
                       };
                       for (std::size_t v = begin; v < end; ++v) {
                         const Eigen::Vector3d& p = vertices.mesh.now[v];
-                        if (topology.vertexTriangles[v].empty() || !isIn(p)) continue;
-                        const InsideVertex inside = asked.nearest(static_cast<std::uint32_t>(v), p);
+                        if (topology.vertexTriangles[v].empty()) continue;
+                        const WindingNumbers::Answer answer = answerFor(p);
+                        if (!answer.inside) continue;
+                        InsideVertex inside = asked.nearest(static_cast<std::uint32_t>(v), p);
+                        inside.decided = answer.decided;
                         if (inside.depth > 0) part.found.push_back(inside);
                       }
                     });
@@ -172,12 +184,19 @@ std::span<const InsideVertex> Containment::find(const Geometry& vertices, const 
   return m_found;
 }
 
-void checkClosed(Geometry& body) {
+void checkInside(Geometry& body, const InsideSettings& settings) {
+  if (settings.rule != InsideRule::Closed && settings.rule != InsideRule::WindingNumber)
+    throw Error(ErrorCode::InvalidSettings, "rule must be Closed or WindingNumber", body.id);
+  if (!(settings.margin >= 0.0 && settings.margin < 0.5))
+    throw Error(ErrorCode::InvalidSettings,
+                "margin is " + textOf(settings.margin) + "; it must be from 0 to below 1/2",
+                body.id);
   MeshTopology& topology = body.mesh.topology;
   if (!topology.hasFaces())
     throw Error(ErrorCode::NotClosed,
                 nameOf(body.id) + " is " + nameOf(topology.kind) + ", which has no inside",
                 body.id);
+  if (settings.rule == InsideRule::WindingNumber) return;
   if (body.solid) return;  // it has its tetrahedra
   if (!topology.closed) topology.closed = findMeshDefects(topology.triangles).closed();
   if (*topology.closed) return;

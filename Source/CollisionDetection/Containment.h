@@ -4,6 +4,7 @@
 #include <palpate/Settings.h>
 
 #include "CollisionDetection/GeometryTable.h"
+#include "CollisionDetection/WindingNumber.h"
 #include "Core/Threads.h"
 #include "Octree/PointQueries.h"
 
@@ -13,12 +14,13 @@
 namespace palpate {
 
 /// Which vertices of one geometry are inside another: by the winding number of each, counted
-/// exactly along a ray; then the nearest point of the surface. Scratch that remembers its peak.
+/// exactly along a ray, or by solid angles; then the nearest point of the surface. Scratch that
+/// remembers its peak.
 class Containment {
  public:
   /// Octrees must be of the positions now. Ascending vertices; the span lives until the next call.
-  std::span<const InsideVertex> find(const Geometry& vertices, const Geometry& body, Engine,
-                                     const Threads&);
+  std::span<const InsideVertex> find(const Geometry& vertices, const Geometry& body,
+                                     const InsideSettings&, Engine, const Threads&);
 
  private:
   struct Part {
@@ -27,9 +29,10 @@ class Containment {
   };
   std::vector<Part> m_parts;
   std::vector<InsideVertex> m_found;
+  WindingNumbers m_numbers;
 };
 
-/// Throws NotClosed, with the first edge at fault.
-void checkClosed(Geometry& body);
+/// Throws NotClosed, with the first edge at fault, where the settings ask for a closed body.
+void checkInside(Geometry& body, const InsideSettings&);
 
 }  // namespace palpate

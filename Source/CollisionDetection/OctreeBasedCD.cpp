@@ -398,15 +398,16 @@ void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFuncti
 }
 
 std::span<const InsideVertex> OctreeBasedCD::findInsideVertices(GeometryId vertices,
-                                                                GeometryId body) {
+                                                                GeometryId body,
+                                                                const InsideSettings& settings) {
   const StandardFloatingPoint standard;
   Implementation& all = *m_implementation;
   const Geometry& asked = all.geometries.at(vertices);
   Geometry& around = all.geometries.at(body);
   checkDifferent(vertices, body);
-  checkClosed(around);
+  checkInside(around, settings);
   all.updateFor(around);
-  return all.containment.find(asked, around, all.settings.engine, all.threads);
+  return all.containment.find(asked, around, settings, all.settings.engine, all.threads);
 }
 
 std::span<const FollowedVertex> OctreeBasedCD::followInsideVertices(GeometryId vertices,

@@ -138,6 +138,17 @@ constexpr double kOrthonormal = 1e-9;
 /// some twenty roundings.
 constexpr double kShapeBoundError = 0x1p-46;
 
+// ---- Winding numbers (SolidAngle.h, CollisionDetection/WindingNumber.cpp) ----
+
+/// Of both parts of a triangle's half solid angle, from unit vectors within 3 u each: 9 u and the
+/// products' 6 u, and 3 (6 u + 4 u) and the sums' 8 u; with the angle's own rounding.
+constexpr double kSolidAngleError = 80 * 0x1p-53;
+/// Relative to what clusters add: some thirty roundings on the way up the tree, and of their
+/// centres relative to the coordinates.
+constexpr double kClusterError = 0x1p-46;
+/// For each triangle: twice what one that is not near adds to the error of a sum of all.
+constexpr double kWindingSlack = 0x1p-44;
+
 // ---- Bodies placed in the world (CollisionDetection/RigidBody.cpp) ----
 
 /// Of fl(R x + t), relative to the sum of its terms' magnitudes: 4 u; of a difference of two 9 u;

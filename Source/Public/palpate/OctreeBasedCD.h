@@ -61,7 +61,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, double radius = 0.0);
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
   /// A tool, a needle's tip, a table: placed by setTransform(). Meets triangles, lines and points
-  /// by Method::Proximity and, but for planes and cylinders, Method::Continuous, in
+  /// by Method::Proximity and Method::Continuous, cylinders by the latter points only, in
   /// CollisionData::shape(); and other shapes, in shapeShape(). The thickness may be 0.
   ///
   ///   const GeometryId tool = detection.addAnalyticalGeometry(Capsule{{0, 0, 0}, {0, 0,
@@ -152,8 +152,11 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// tetrahedral mesh, it is in a tetrahedron; and the vertex does not lie on the surface. The exit
   /// is the nearest point of the body's surface; of several equally near, on the lowest triangle.
   /// Depth and exit as exact as vertexTriangleDistance().
-  /// Errors   NotClosed names the first edge at fault; InvalidSettings for one geometry twice.
-  std::span<const InsideVertex> findInsideVertices(GeometryId vertices, GeometryId body);
+  /// InsideRule::WindingNumber: of bodies with holes, and of soups.
+  /// Errors   NotClosed names the first edge at fault; InvalidSettings for one geometry twice, and
+  ///          for a margin that is none.
+  std::span<const InsideVertex> findInsideVertices(GeometryId vertices, GeometryId body,
+                                                   const InsideSettings& = {});
   /// The same, with ways out that do not flip from call to call: call it once a frame, after
   /// setPositions().
   ///

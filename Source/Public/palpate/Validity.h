@@ -51,7 +51,8 @@ struct Validity {
   double reach = 0;
   /// L: vertices move in straight lines within a step. Where setTransform() turns a body no vertex
   /// is further than this from the way it would take if the body turned evenly about one axis and
-  /// slid along it; of two bodies the sum. Beyond the thickness nothing is trusted.
+  /// slid along it; of two bodies the sum, of a plane that turns infinity. Beyond the thickness
+  /// nothing is trusted.
   double arcDeviation = 0;
   /// L: pairs further apart at the step's end are no contacts, unless by an impact: the thickness,
   /// or with Auto up to the tolerance more.

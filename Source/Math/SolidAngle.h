@@ -1,0 +1,41 @@
+#pragma once
+
+#include "Math/Tolerances.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace palpate {
+
+/// A sum of what is seen, as shares of the whole sphere, and how far it may be off.
+struct SeenShare {
+  double value = 0, error = 0;
+  void add(const SeenShare& other) { value += other.value, error += other.error; }
+};
+
+inline Eigen::Vector3d directionOf(const Eigen::Vector3d& v) {
+  const double square = v.squaredNorm();
+  return square > kUnderflowGuardOfProducts && square < kOverflowGuard
+             ? Eigen::Vector3d(v / std::sqrt(square))
+             : v.stableNormalized();
+}
+
+/// How much of all directions from p a triangle takes; positive from behind, where its winding
+/// normal leads away from p.
+///
+/// Source   Van Oosterom and Strackee, The solid angle of a plane triangle (1983). Difference: of unit
+///          vectors, with a bound on the error, which grows where p is near to the triangle's
+///          border.
+inline SeenShare seenShare(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
+                           const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+  const Eigen::Vector3d u = directionOf(a - p), v = directionOf(b - p), w = directionOf(c - p);
+  const double sine = u.dot(v.cross(w)), cosine = 1 + u.dot(v) + v.dot(w) + w.dot(u);
+  const double length = std::sqrt(sine * sine + cosine * cosine);
+  const double share = std::atan2(sine, cosine) / (2 * std::numbers::pi);
+  return {share, length > kSolidAngleError ? std::min(1.0, kSolidAngleError / length) : 1.0};
+}
+
+}  // namespace palpate
