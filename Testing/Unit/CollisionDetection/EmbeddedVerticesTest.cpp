@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string>
 
 namespace palpate::testing {
@@ -157,6 +158,32 @@ TEST(EmbeddedVertices, AreAsByBruteForceForAnyThreads) {
       EXPECT_TRUE(truth[frame].size() > 40 || (far > 1 && frame >= 6)) << frame;
     for (const Settings& settings : octreeSettings()) EXPECT_EQ(life(settings, scale, far), truth);
   }
+}
+
+/// One vertex moves at a time, so that nothing else tells that positions are new.
+TEST(EmbeddedVertices, AreOfTheLastPositions) {
+  Random random(8);
+  const Solid solid = cells(4, random);
+  const Thing probes = particles(random, 150, 0);
+  Positions places = probes.positions;
+  for (Vector3d& p : places) p *= 4;
+  std::set<std::size_t> sizes;
+  std::vector<std::vector<EmbeddedVertex>> answers[2];
+  for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
+    OctreeBasedCD detection(settingsOf(engine));
+    const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
+                     points = detection.addPointSet(places);
+    for (std::size_t v = 0; v < solid.positions.size(); ++v) {
+      Positions now = solid.positions;
+      now[v] = Vector3d(2, 2, 2) + 0.6 * (now[v] - Vector3d(2, 2, 2));
+      detection.setPositions(body, now);
+      const auto found = detection.findEmbeddedVertices(points, body);
+      answers[engine == Engine::Octree].emplace_back(found.begin(), found.end());
+      sizes.insert(found.size());
+    }
+  }
+  EXPECT_EQ(answers[0], answers[1]);
+  EXPECT_GT(sizes.size(), 4u);
 }
 
 TEST(EmbeddedVertices, WeightsGiveThePointBack) {

@@ -149,9 +149,11 @@ Mesh blocks(int n, Random& random, const std::function<bool(const std::array<int
   return {solid.positions, {surface.triangles.begin(), surface.triangles.end()}};
 }
 
-/// Bodies with sharp edges, notches and a hollow, and round ones.
+/// Bodies with sharp edges, notches and a hollow, round ones, and two slabs with a crack between.
 std::vector<Mesh> bodies(Random& random) {
-  return {blocks(2, random, [](const auto&) { return true; }),
+  Mesh slabs = blocks(3, random, [](const auto& c) { return c[2] != 1; });
+  for (Vector3d& p : slabs.positions) p.z() -= p.z() > 1.5 ? 0.9 : 0.0;
+  return {slabs, blocks(2, random, [](const auto&) { return true; }),
           blocks(3, random, [](const auto& c) { return c[2] == 0 || c[0] == 0; }),
           blocks(3, random,
                  [](const auto& c) {
