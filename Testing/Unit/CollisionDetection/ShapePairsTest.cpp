@@ -2,12 +2,12 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/PairRun.h"
+#include "Common/Replayed.h"
 #include "Common/ShapeTruth.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <optional>
 #include <string>
@@ -275,14 +275,7 @@ TEST(ShapePairs, CapturesHoldThem) {
   collisions.detectCollision();
   EXPECT_TRUE(collisions.auditFailures().empty());
   EXPECT_GT(collisions.statistics().contacts, 50u);
-  const auto path = std::filesystem::temp_directory_path() / "palpate-shape-pairs.capture";
-  capture(collisions, path);
-  OctreeBasedCD again = setUp(readCapture(path));
-  std::filesystem::remove(path);
-  again.detectCollision();
-  for (const CollisionPair& pair : collisions.pairs())
-    EXPECT_EQ(again.collisionData(pair.a, pair.b).hash(),
-              collisions.collisionData(pair.a, pair.b).hash());
+  replayed(collisions);
 }
 
 }  // namespace

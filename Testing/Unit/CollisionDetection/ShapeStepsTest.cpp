@@ -5,6 +5,7 @@
 
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
+#include "Common/Replayed.h"
 #include "Common/ShapeTruth.h"
 #include "Common/Things.h"
 
@@ -14,7 +15,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <string>
 #include <vector>
@@ -507,14 +507,7 @@ TEST(ShapeSteps, CapturesAndAuditsHoldThem) {
   collisions.detectCollision();
   EXPECT_TRUE(collisions.auditFailures().empty());
   EXPECT_GT(collisions.statistics().contacts, 3u);
-  const auto path = std::filesystem::temp_directory_path() / "palpate-shape-steps.capture";
-  capture(collisions, path);
-  OctreeBasedCD again = setUp(readCapture(path));
-  std::filesystem::remove(path);
-  again.detectCollision();
-  for (const CollisionPair& pair : collisions.pairs())
-    EXPECT_EQ(again.collisionData(pair.a, pair.b).hash(),
-              collisions.collisionData(pair.a, pair.b).hash());
+  replayed(collisions);
 }
 
 }  // namespace

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <palpate/Capture.h>
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <unistd.h>
+
+namespace palpate::testing {
+
+/// The last frame's problem written to a file, read back, and computed again: by what is in the
+/// file, every pair's answer is the same.
+inline OctreeBasedCD replayed(const OctreeBasedCD& detection) {
+  const auto path = std::filesystem::temp_directory_path() /
+                    ("palpate-replayed-" + std::to_string(::getpid()) + ".capture");
+  capture(detection, path);
+  OctreeBasedCD again = setUp(readCapture(path));
+  std::filesystem::remove(path);
+  again.detectCollision();
+  for (const CollisionPair& pair : detection.pairs())
+    EXPECT_EQ(again.collisionData(pair.a, pair.b).hash(),
+              detection.collisionData(pair.a, pair.b).hash());
+  return again;
+}
+
+}  // namespace palpate::testing
