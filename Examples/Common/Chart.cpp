@@ -1,6 +1,7 @@
 #include "Chart.h"
 
 #include "WriteFile.h"
+#include <palpate/Error.h>
 #include <palpate/vtk/Window.h>
 
 #include <vtkAxis.h>
@@ -186,7 +187,8 @@ std::vector<std::filesystem::path> draw(const Figures& figures, const Charts& ch
   std::filesystem::path svg = path, png = path;
   svg += ".svg";
   png += ".png";
-  if (std::getenv("DISPLAY") != nullptr) {
+  try {
+    const auto display = vtk::openDisplay();
     scenes::writeWhole(png, pngOf(view->GetRenderWindow()));
     files.push_back(png);
     vtkNew<vtkSVGExporter> exporter;
@@ -194,6 +196,8 @@ std::vector<std::filesystem::path> draw(const Figures& figures, const Charts& ch
     exporter->SetFileName(svg.c_str());
     exporter->Write();
     files.push_back(svg);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::NotAvailable) throw;
   }
   return files;
 }

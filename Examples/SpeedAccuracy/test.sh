@@ -5,7 +5,7 @@ program=$1
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 fail() { echo "FAILED: $*"; exit 1; }
-unset DISPLAY  # pictures are shown by CMake/speed-accuracy.sh
+export DISPLAY=  # none; pictures are shown by CMake/speed-accuracy.sh
 
 run() { "$program" --out "$folder/run" --scenes needle --frames 9 --methods Intersection,Continuous,Auto --repetitions 1 "$@"; }
 run >"$folder/text" 2>"$folder/messages" || fail "the run: $(cat "$folder/messages")"

@@ -187,12 +187,9 @@ vtkProp* addBody(vtkRenderer* renderer, const Mesh& mesh, std::size_t index) {
   return actor;
 }
 
-using Connection = std::unique_ptr<Display, int (*)(Display*)>;
+}  // namespace
 
-/// VTK ends the program where it cannot open the display. One connection stays open while VTK has
-/// its own: an X server such as Xvfb starts anew when its last client leaves, and for a moment
-/// takes nobody.
-Connection connect() {
+std::shared_ptr<void> openDisplay() {
   constexpr int kAttempts = 25;
   for (int attempt = 0; std::getenv("DISPLAY") != nullptr && attempt < kAttempts; ++attempt) {
     if (Display* display = XOpenDisplay(nullptr)) return {display, XCloseDisplay};
@@ -203,11 +200,9 @@ Connection connect() {
       "There is no display to draw with: set DISPLAY, or run the program under xvfb-run -a.");
 }
 
-}  // namespace
-
 struct Window::Implementation {
   const OctreeBasedCD& detection;
-  Connection connection = connect();
+  std::shared_ptr<void> connection = openDisplay();
   vtkNew<vtkRenderer> renderer{}, graph{};
   vtkNew<vtkRenderWindow> window{};
   vtkNew<vtkRenderWindowInteractor> interactor{};

@@ -18,6 +18,13 @@ struct Image {
 /// The content of a PNG file.
 PALPATE_EXPORT std::string toPng(const Image&);
 
+/// A connection to the display. VTK ends the program where it cannot open one, so this is asked for
+/// first, and kept as long as VTK draws: an X server such as Xvfb starts anew when its last client
+/// leaves, and for a moment takes nobody.
+///
+/// Errors   ErrorCode::NotAvailable: there is none.
+PALPATE_EXPORT std::shared_ptr<void> openDisplay();
+
 /// What an OctreeBasedCD was given and answers: bodies and tools, translucent; cells in green;
 /// contacts midway of their two points, and their normals, coloured by distance (red: near);
 /// vertices that validity() names, in magenta; the stages' times as a graph. The mouse turns the
