@@ -88,8 +88,7 @@ class FastNeedle : public LiveScene {
     });
     m_world.addStiffness(lane.membrane, 1e-5, 1e-3);
     m_world.addRigid(m_world.bodies()[lane.needle].first, m_world.bodies()[lane.needle].count);
-    m_world.addPair(lane.needle, lane.membrane,
-                    {.method = method, .thickness = kThickness, .timeTolerance = 0x1p-10},
+    m_world.addPair(lane.needle, lane.membrane, {.method = method, .thickness = kThickness},
                     kThickness);
     if (method != Method::Proximity) m_world.addGuard(lane.needle, lane.membrane);
     m_lanes.push_back(lane);
