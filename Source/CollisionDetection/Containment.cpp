@@ -8,12 +8,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace palpate {
 
 namespace {
 
-constexpr std::size_t kVerticesPerPart = 256;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// Whether a triangle is certainly further from p than `distance`, and is measured so: no point of
@@ -36,8 +36,7 @@ class Body {
       : m_geometry(geometry),
         m_bruteForce(engine == Engine::BruteForce),
         m_stack(stack),
-        m_origin(worldOrigin(geometry)),
-        m_map(worldMap(geometry, m_origin, 0.0, false)) {}
+        m_frame(geometry) {}
 
   /// How often the surface winds about p; 0 on the surface.
   int windingNumber(const Eigen::Vector3d& p) {
@@ -58,9 +57,9 @@ class Body {
     if (m_bruteForce) {
       count(0, size());
     } else {
-      FloatBox ray = boxOf(p);
+      FloatBox ray = m_frame.boxOf(p);
       ray.upper[0] = kInfinity;
-      const auto overlaps = [&](const FloatBox& box) { return m_map(box).overlaps(ray); };
+      const auto overlaps = [&](const FloatBox& box) { return m_frame(box).overlaps(ray); };
       forEachOverlapping(m_geometry.octree, overlaps, m_stack, count);
     }
     return on ? 0 : number;
@@ -88,14 +87,16 @@ class Body {
     if (m_bruteForce) {
       for (std::uint32_t i = 0; i < size(); ++i) tryOne(i);
     } else {
-      const std::array<double, 3> point = inFrame(p);
+      const std::array<double, 3> point = m_frame.inFrame(p);
       // A little more than the best: distances are rounded, and equal ones are looked for.
       const auto bound = [&] {
         const double distance = best.distance * m_geometry.frame.scale;
         return distance * distance * (1 + 0x1p-40);
       };
       tryOne(std::min(m_last, size() - 1));
-      const auto squareTo = [&](const FloatBox& box) { return m_map(box).distanceSquared(point); };
+      const auto squareTo = [&](const FloatBox& box) {
+        return m_frame(box).distanceSquared(point);
+      };
       forEachNearest(m_geometry.octree, squareTo, bound(), m_stack,
                      [&](std::uint32_t begin, std::uint32_t end) {
                        for (std::uint32_t i = begin; i < end; ++i)
@@ -109,36 +110,18 @@ class Body {
   }
 
   bool mayContain(const Eigen::Vector3d& p) const {
-    return m_bruteForce || boxOf(p).overlaps(m_map(m_geometry.octree.blocks()[0].box(0)));
+    return m_bruteForce || m_frame.boxOf(p).overlaps(m_frame(m_geometry.octree.blocks()[0].box(0)));
   }
 
  private:
   std::uint32_t size() const {
     return static_cast<std::uint32_t>(m_geometry.orderedTriangles.size());
   }
-  /// Clamped as the boxes' corners are: that brings no two points further apart.
-  std::array<double, 3> inFrame(const Eigen::Vector3d& p) const {
-    std::array<double, 3> point;
-    for (int k = 0; k < 3; ++k)
-      point[k] = std::clamp((p[k] - m_origin[k]) * m_geometry.frame.scale, -double{kLargestFloat},
-                            double{kLargestFloat});
-    return point;
-  }
-  FloatBox boxOf(const Eigen::Vector3d& p) const {
-    FloatBox box;
-    const std::array<double, 3> point = inFrame(p);
-    for (int k = 0; k < 3; ++k) {
-      box.lower[k] = OutwardRounding::down(static_cast<float>(point[k]));
-      box.upper[k] = OutwardRounding::up(static_cast<float>(point[k]));
-    }
-    return box;
-  }
 
   const Geometry& m_geometry;
   bool m_bruteForce;
   PointQueryStack& m_stack;
-  Eigen::Vector3d m_origin;  ///< of boxes in the world
-  BoxMap m_map;              ///< that brings them there
+  PointFrame m_frame;
   std::uint32_t m_last = 0;  ///< nearest to the point before: not far from the next, often
 };
 
@@ -147,49 +130,40 @@ class Body {
 std::span<const InsideVertex> Containment::find(const Geometry& vertices, const Geometry& body,
                                                 const InsideSettings& settings, Engine engine,
                                                 const Threads& threads) {
-  m_found.clear();
-  const MeshTopology& topology = vertices.mesh.topology;
-  if (body.octree.size() == 0) return m_found;
-  const std::size_t parts = (topology.vertexCount + kVerticesPerPart - 1) / kVerticesPerPart;
-  if (m_parts.size() < parts) m_parts.resize(parts);
+  if (body.octree.size() == 0) return {};
   const bool closed = settings.rule == InsideRule::Closed,
              bruteForce = engine == Engine::BruteForce;
   if (!closed) m_numbers.prepare(body, threads);
-  threads.forChunks(topology.vertexCount, kVerticesPerPart,
-                    [&](std::size_t chunk, std::size_t begin, std::size_t end) {
-                      Part& part = m_parts[chunk];
-                      part.found.clear();
-                      Body asked(body, engine, part.stack);
-                      SolidQuery solid(body, engine, part.stack);
-                      const auto answerFor = [&](const Eigen::Vector3d& p) {
-                        if (!closed)
-                          return m_numbers.ask(p, settings.margin, bruteForce, part.stack);
-                        const bool isIn = body.solid
-                                              ? solid.lowest(p).has_value()
-                                              : asked.mayContain(p) && asked.windingNumber(p) != 0;
-                        return WindingNumbers::Answer{isIn, true};
-                      };
-                      for (std::size_t v = begin; v < end; ++v) {
-                        const Eigen::Vector3d& p = vertices.mesh.now[v];
-                        if (topology.vertexTriangles[v].empty()) continue;
-                        const WindingNumbers::Answer answer = answerFor(p);
-                        if (!answer.inside) continue;
-                        InsideVertex inside = asked.nearest(static_cast<std::uint32_t>(v), p);
-                        inside.decided = answer.decided;
-                        if (inside.depth > 0) part.found.push_back(inside);
-                      }
-                    });
-  for (std::size_t i = 0; i < parts; ++i)
-    m_found.insert(m_found.end(), m_parts[i].found.begin(), m_parts[i].found.end());
-  return m_found;
+  return m_search.find(vertices.mesh.topology, threads, [&](PointQueryStack& stack) {
+    return [&, asked = Body(body, engine, stack), solid = SolidQuery(body, engine, stack)](
+               std::uint32_t v) mutable -> std::optional<InsideVertex> {
+      const Eigen::Vector3d& p = vertices.mesh.now[v];
+      const auto isIn = [&] {
+        return body.solid ? solid.lowest(p).has_value()
+                          : asked.mayContain(p) && asked.windingNumber(p) != 0;
+      };
+      const WindingNumbers::Answer answer =
+          closed ? WindingNumbers::Answer{isIn(), true}
+                 : m_numbers.ask(p, settings.margin, bruteForce, stack);
+      if (!answer.inside) return {};
+      InsideVertex inside = asked.nearest(v, p);
+      inside.decided = answer.decided;
+      if (!(inside.depth > 0)) return {};
+      return inside;
+    };
+  });
 }
 
 void checkInside(Geometry& body, const InsideSettings& settings) {
   if (settings.rule != InsideRule::Closed && settings.rule != InsideRule::WindingNumber)
-    throw Error(ErrorCode::InvalidSettings, "rule must be Closed or WindingNumber", body.id);
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(body.id) + ": rule is " + std::to_string(static_cast<int>(settings.rule)) +
+                    "; it must be Closed or WindingNumber",
+                body.id);
   if (!(settings.margin >= 0.0 && settings.margin < 0.5))
     throw Error(ErrorCode::InvalidSettings,
-                "margin is " + textOf(settings.margin) + "; it must be from 0 to below 1/2",
+                nameOf(body.id) + ": margin is " + textOf(settings.margin) +
+                    "; it must be from 0 to below 1/2",
                 body.id);
   MeshTopology& topology = body.mesh.topology;
   if (!topology.hasFaces())

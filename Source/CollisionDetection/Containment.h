@@ -4,12 +4,11 @@
 #include <palpate/Settings.h>
 
 #include "CollisionDetection/GeometryTable.h"
+#include "CollisionDetection/VertexSearch.h"
 #include "CollisionDetection/WindingNumber.h"
 #include "Core/Threads.h"
-#include "Octree/PointQueries.h"
 
 #include <span>
-#include <vector>
 
 namespace palpate {
 
@@ -23,12 +22,7 @@ class Containment {
                                      const InsideSettings&, Engine, const Threads&);
 
  private:
-  struct Part {
-    PointQueryStack stack;
-    std::vector<InsideVertex> found;
-  };
-  std::vector<Part> m_parts;
-  std::vector<InsideVertex> m_found;
+  VertexSearch<InsideVertex> m_search;
   WindingNumbers m_numbers;
 };
 
