@@ -29,17 +29,21 @@ namespace {
 /// Node pairs and jobs for each collision pair, where there is more than one thread.
 constexpr std::size_t kNodePairsWanted = 256;
 constexpr std::size_t kJobsPerPair = 32;
-/// Where only the earliest impact is asked for: so many jobs, from all over, before boxes are made
-/// anew, and only for a part of the step so much shorter that it pays.
-constexpr std::size_t kJobsAtOnce = 4, kStride = kJobsPerPair / kJobsAtOnce;
-constexpr double kLongestPart = 0.5;
 /// Below this many triangles handing out parts of a pair costs more than it saves.
 constexpr std::size_t kSharedSize = 8192;
+
+/// Whether neighbours in a mesh may be told apart before they are found: nothing but their touching
+/// is asked for, at any time of the step.
+bool asksForTouching(const PairRecord& record) {
+  return record.a == record.b && record.plan.method == Method::Continuous &&
+         record.a->mesh.topology.hasFaces() && record.meshes().reach() == 0.0;
+}
 
 /// thickness: L, of the boxes.
 TreePair treesOf(const PairRecord& record, bool adjacentPairs, double thickness) {
   TreePair trees{&record.a->octree, &record.b->octree};
   if (trees.self() && !adjacentPairs) trees.adjacency = record.a->orderedTriangles.data();
+  if (adjacentPairs && asksForTouching(record)) trees.adjacency = record.a->stars.triangles();
   const double scale = record.a->frame.scale;
   const Eigen::Vector3d origin = worldOrigin(*record.b),
                         offset = (worldOrigin(*record.a) - origin) * scale;
@@ -252,18 +256,20 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
       continue;
     }
     if (record->a->octree.size() == 0 || record->b->octree.size() == 0) continue;
+    if (adjacentPairs && asksForTouching(*record)) {
+      Geometry& mesh = *record->a;
+      mesh.stars.find(mesh.mesh.topology, mesh.orderedTriangles, mesh.floatsAtStart(),
+                      mesh.floats.data(), threads);
+    }
     const double thickness = boxThickness(*record);
     const TreePair own = treesOf(*record, adjacentPairs, thickness);
     const TreePair trees =
         treesOf(*record, adjacentPairs,
                 adjacentPairs ? std::max(thickness, record->plan.nearby) : thickness);
-    const bool shared =
-        isInParts(*record) || (threads.count() > 1 && trianglesOf(*record) >= kSharedSize);
+    const bool shared = threads.count() > 1 && trianglesOf(*record) >= kSharedSize;
     startPairs(trees, shared ? kNodePairsWanted : 1, m_stack);
     const std::size_t first = m_nodePairs.size(), count = m_stack.pairs.size();
-    const std::size_t stride = isInParts(*record) ? kStride : 1;
-    for (std::size_t offset = 0; offset < stride; ++offset)
-      for (std::size_t i = offset; i < count; i += stride) m_nodePairs.push_back(m_stack.pairs[i]);
+    m_nodePairs.insert(m_nodePairs.end(), m_stack.pairs.begin(), m_stack.pairs.end());
     const std::size_t grain = std::max<std::size_t>(1, (count + kJobsPerPair - 1) / kJobsPerPair);
     for (std::size_t begin = 0; begin < count; begin += grain) {
       Job& job = newJob(*record);
@@ -334,75 +340,17 @@ void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads
   for (std::size_t i = 0; i < m_jobCount; ++i) m_jobs[i]->record->found += m_jobs[i]->sink.total();
 }
 
-/// Pairs of which only the earliest impact is asked for, of octrees that no other pair needs.
-void Frame::findParts(std::span<PairRecord* const> records, const Settings& settings) {
-  m_parts.clear();
-  for (PairRecord* record : records) {
-    if (record->pair.settings.contacts != Contacts::Earliest || settings.keepCandidates ||
-        record->meshes().hasShape() || !record->plan.swept() || trianglesOf(*record) < kSharedSize)
-      continue;
-    const auto needs = [&](const PairRecord* other, const Geometry* geometry) {
-      return other != record && (other->a == geometry || other->b == geometry);
-    };
-    const bool alone = std::none_of(records.begin(), records.end(), [&](const PairRecord* other) {
-      return needs(other, record->a) || needs(other, record->b);
-    });
-    if (alone && !record->a->isPlaced() && !record->b->isPlaced()) m_parts.push_back({record});
-  }
-}
-
-bool Frame::isInParts(const PairRecord& record) const {
-  return std::any_of(m_parts.begin(), m_parts.end(),
-                     [&](const Part& part) { return part.record == &record; });
-}
-
-/// Those of which an early enough impact is known now, or, after all, those again.
-void Frame::sweepParts(bool whole, const Threads& threads) {
-  for (Part& part : m_parts) {
-    const PairRecord& record = *part.record;
-    const double end =
-        std::nextafter(record.earliest.load() + record.pair.settings.timeTolerance, 2.0);
-    if (part.swept != whole || end > kLongestPart) continue;
-    part.swept = !whole;
-    for (Geometry* geometry : {record.a, record.b == record.a ? nullptr : record.b})
-      if (geometry && geometry->treeSwept)
-        GeometryTable::sweepUpTo(*geometry, whole ? 1.0 : end, threads);
-  }
-}
-
-/// Where only the earliest impact is asked for, the jobs after one that finds an early impact meet
-/// boxes that sweep the step no further.
-void Frame::runJobs(const Settings& settings, const Threads& threads) {
-  const auto run = [&](std::size_t i) {
-    Stopwatch watch;
-    Job& job = *m_jobs[i];
-    job.keepCandidates = settings.keepCandidates;
-    job.start(&Job::detect);
-    job.record->meshes().hasShape() ? job.detectShape() : this->run(job);
-    job.milliseconds = watch.lap();
-  };
-  try {
-    for (std::size_t begin = 0, end; begin < m_jobCount; begin = end) {
-      const bool all =
-          std::all_of(m_parts.begin(), m_parts.end(), [](const Part& p) { return p.swept; });
-      end = all ? m_jobCount : std::min(begin + kJobsAtOnce, m_jobCount);
-      threads.forEach(end - begin, [&](std::size_t i) { run(begin + i); });
-      if (end < m_jobCount) sweepParts(false, threads);
-    }
-  } catch (...) {  // of a user's predicate, say: the octrees must hold the whole step again
-    sweepParts(true, threads);
-    throw;
-  }
-  sweepParts(true, threads);
-}
-
 void Frame::detect(std::span<PairRecord* const> records, const Settings& settings,
                    const Threads& threads, FrameStatistics& statistics) {
   Stopwatch watch;
-  findParts(records, settings);
   start(records, threads, true);
-  runJobs(settings, threads);
-  m_parts.clear();
+  threads.forEach(m_jobCount, [&](std::size_t i) {
+    Stopwatch job;
+    m_jobs[i]->keepCandidates = settings.keepCandidates;
+    m_jobs[i]->start(&Job::detect);
+    m_jobs[i]->record->meshes().hasShape() ? m_jobs[i]->detectShape() : run(*m_jobs[i]);
+    m_jobs[i]->milliseconds = job.lap();
+  });
   findMissedOverlaps(threads);
   double all = 0, narrow = 0;
   for (std::size_t i = 0; i < m_jobCount; ++i) {

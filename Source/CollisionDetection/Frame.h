@@ -36,10 +36,6 @@ class Frame {
  private:
   struct Job;
   void start(std::span<PairRecord* const>, const Threads&, bool adjacentPairs);
-  void runJobs(const Settings&, const Threads&);
-  void findParts(std::span<PairRecord* const>, const Settings&);
-  bool isInParts(const PairRecord&) const;
-  void sweepParts(bool whole, const Threads&);
   void run(Job&) const;
   void finish(PairRecord&, bool nearby, const Settings&);
   void findMissedOverlaps(const Threads&);
@@ -50,11 +46,6 @@ class Frame {
   std::vector<std::unique_ptr<Job>>
       m_jobs;  ///< the first m_jobCount are in use, those of a pair together
   std::size_t m_jobCount = 0;
-  struct Part {  ///< a pair whose octrees may sweep the step's first part only
-    PairRecord* record;
-    bool swept = false;  ///< they do
-  };
-  std::vector<Part> m_parts;
   Buffer<NodePair> m_nodePairs;
   TraversalStack m_stack;
   std::vector<ContactBuffers*> m_buffers, m_overlaps;  ///< of the pair at hand

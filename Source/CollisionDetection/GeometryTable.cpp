@@ -422,21 +422,6 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   });
 }
 
-void GeometryTable::sweepUpTo(Geometry& geometry, double part, const Threads& threads) {
-  const auto before = geometry.mesh.before.body(), now = geometry.mesh.now.body();
-  threads.forChunks(now.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-    const auto ends = now.subspan(from, to - from);
-    FloatPoint* out = geometry.floats.data() + from;
-    if (part < 1.0)
-      toFloatsAt(part, before.subspan(from, to - from), ends, geometry.frame, out);
-    else
-      toFloats(ends, geometry.frame, out);
-  });
-  computeBoxes(geometry, geometry.octree.groups(), geometry.octree.groupBoxes(), kGroupGrain,
-               threads);
-  geometry.octree.fit(threads);
-}
-
 void GeometryTable::endFrame() {
   ++m_framesEnded;
   for (const auto& geometry : m_geometries) {

@@ -11,6 +11,7 @@
 #include "Geometry/Motion.h"
 #include "Geometry/TetrahedralTopology.h"
 #include "Geometry/TriangleMesh.h"
+#include "Geometry/UnfoldedStars.h"
 #include "Octree/Octree.h"
 #include "Octree/PointQueries.h"
 
@@ -78,6 +79,7 @@ struct Geometry {
   }
   const FloatPoint* floatsAtStart() const { return (treeSwept ? floatsBefore : floats).data(); }
   std::vector<Triangle> orderedTriangles;  ///< in the octree's order
+  UnfoldedStars stars;                     ///< of self-collision
   Octree octree;
   Buffer<std::uint32_t> boundsGroups;  ///< scratch of a rebuild
   Buffer<FloatBox> boundsBoxes;
@@ -117,8 +119,6 @@ class GeometryTable {
   static void updateMotion(Geometry&, const Threads&);
   /// Octrees for the positions now, or the whole step.
   void updateOctrees(const OctreeSettings&, const Threads&);
-  /// Boxes of a swept octree over the step's first part, or over all of it again.
-  static void sweepUpTo(Geometry&, double part, const Threads&);
   bool updatedAlone() const { return m_updatedAlone; }  ///< by one thread, which has the data
   void endFrame();
   std::uint64_t framesEnded() const { return m_framesEnded; }

@@ -83,22 +83,6 @@ void toFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& fram
   HWY_DYNAMIC_DISPATCH(toFloatsKernel)(positions.data(), positions.size(), frame, out);
 }
 
-void toFloatsAt(double upTo, std::span<const Eigen::Vector3d> before,
-                std::span<const Eigen::Vector3d> now, const FloatFrame& frame, FloatPoint* out) {
-  // The ends are off by 2^-53 of themselves and the sum by as much of it: less than 2^-50 of both
-  // ends. Where that is at most 2^-26 of the sum, the margin of OutwardRounding has room for it.
-  const auto of = [&](const Eigen::Vector3d& start, const Eigen::Vector3d& end, int k) {
-    const double first = (start[k] - frame.origin[k]) * frame.scale,
-                 last = (end[k] - frame.origin[k]) * frame.scale,
-                 part = first + (last - first) * upTo;
-    const bool sharp = std::abs(part) >= (std::abs(first) + std::abs(last)) * 0x1p-24;
-    constexpr double kMost = kLargestFloat;
-    return static_cast<float>(std::min(std::max(sharp ? part : last, -kMost), kMost));
-  };
-  for (std::size_t i = 0; i < now.size(); ++i)
-    out[i] = {of(before[i], now[i], 0), of(before[i], now[i], 1), of(before[i], now[i], 2), 0.0f};
-}
-
 std::size_t copyFinite(std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out) {
   // x * 0 is 0 for finite x and NaN else; NaN survives any sum.
   Eigen::Vector3d poison = Eigen::Vector3d::Zero();

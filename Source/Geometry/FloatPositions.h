@@ -41,12 +41,6 @@ double frameScale(double spread);
 /// Rounds to nearest. `out` is as long as `positions`.
 void toFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame&, FloatPoint* out);
 
-/// The same of where linear motion is at a part `upTo` of the step; where the floats of that could
-/// not be told to be as sharp, of where it ends. Boxes of `before` and these hold the motion up to
-/// there.
-void toFloatsAt(double upTo, std::span<const Eigen::Vector3d> before,
-                std::span<const Eigen::Vector3d> now, const FloatFrame&, FloatPoint* out);
-
 /// Copies; returns the index of the first vertex that is not finite, or the size if all are.
 std::size_t copyFinite(std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out);
 

@@ -71,9 +71,17 @@ void MeshTopology::findOwners() {
     else
       own(v, incident.front(), triangles[incident.front()], 1);
   }
-  for (std::uint32_t e = 0; e < edges.size(); ++e)
-    if (const auto incident = edgeTriangles[e]; !incident.empty())
-      own(e, incident.front(), triangleEdges[incident.front()], 8);
+  hasClosedStar.assign(vertexCount, 1);
+  const auto goesUp = [&](std::uint32_t e, std::uint32_t triangle) {
+    const auto side = std::find(triangleEdges[triangle].begin(), triangleEdges[triangle].end(), e);
+    return triangles[triangle][side - triangleEdges[triangle].begin()] == edges[e][0];
+  };
+  for (std::uint32_t e = 0; e < edges.size(); ++e) {
+    const auto incident = edgeTriangles[e];
+    if (!incident.empty()) own(e, incident.front(), triangleEdges[incident.front()], 8);
+    if (incident.size() != 2 || goesUp(e, incident[0]) == goesUp(e, incident[1]))
+      hasClosedStar[edges[e][0]] = hasClosedStar[edges[e][1]] = 0;
+  }
 }
 
 std::uint32_t MeshTopology::edgeOf(const Segment& edge) const {

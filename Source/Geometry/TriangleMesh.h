@@ -57,6 +57,8 @@ struct MeshTopology {
   IndexLists vertexTriangles;        ///< that are on: ascending triangle ids, each once
   IndexLists edgeTriangles;          ///< the same; none: the edge is off
   std::size_t untestedVertices = 0;  ///< in no triangle that is on
+  /// Per vertex: each of its edges is in two triangles that are on, in opposite directions.
+  std::vector<std::uint8_t> hasClosedStar;
   std::vector<std::uint32_t> disabled{};  ///< triangles that are off, ascending
   std::vector<bool> isDisabled{};         ///< the same by triangle; empty if none is
   std::optional<bool> closed;             ///< and consistently oriented; once asked

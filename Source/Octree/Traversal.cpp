@@ -112,8 +112,11 @@ struct Bounds {
   }
 };
 
-/// kTurned: boxes of at least one tree are turned on the way.
-template <bool kTurned>
+/// What is done with boxes on the way: nothing, a's are shifted, or those of at least one tree are
+/// turned.
+enum class Placing { None, Shifted, Turned };
+
+template <Placing placing>
 class Walk {
  public:
   Walk(const TreePair& trees, TraversalStack& stack, PairSink& sink)
@@ -166,12 +169,13 @@ class Walk {
 
   template <class D>
   HWY_ATTR HWY_INLINE Bounds<D> placedA(const Bounds<D>& bounds) const {
-    if (kTurned && m_trees.mapA.count > 0) return bounds.turned(m_trees.mapA);
+    if (placing == Placing::None) return bounds;
+    if (placing == Placing::Turned && m_trees.mapA.count > 0) return bounds.turned(m_trees.mapA);
     return bounds.shifted(m_trees.shiftLower, m_trees.shiftUpper);
   }
   template <class D>
   HWY_ATTR HWY_INLINE Bounds<D> placedB(const Bounds<D>& bounds) const {
-    if (kTurned && m_trees.mapB.count > 0) return bounds.turned(m_trees.mapB);
+    if (placing == Placing::Turned && m_trees.mapB.count > 0) return bounds.turned(m_trees.mapB);
     return bounds;
   }
 
@@ -193,7 +197,7 @@ class Walk {
   }
   HWY_ATTR HWY_INLINE Query queryOfB(const OctreeBlock& block, unsigned slot) const {
     FloatBox box = block.box(slot);
-    if (kTurned) box = m_trees.mapB(box);
+    if (placing == Placing::Turned) box = m_trees.mapB(box);
     return {{box.lower[0], box.lower[1], box.lower[2]}, {box.upper[0], box.upper[1], box.upper[2]}};
   }
 
@@ -327,9 +331,10 @@ class Walk {
   /// Up to kMost primitives of a, their boxes in b's frame.
   struct Rows {
     static constexpr std::size_t kMost = 16;
-    alignas(64) float lower[3][kMost], upper[3][kMost];
-    std::size_t first;   ///< in a's order
-    std::uint32_t bits;  ///< which of them are of interest
+    alignas(64) float placed[2][3][kMost];
+    const float *lower[3], *upper[3];  ///< there, or where they were
+    std::size_t first;                 ///< in a's order
+    std::uint32_t bits;                ///< which of them are of interest
   };
 
   HWY_ATTR HWY_INLINE void leaves(NodePair pair) {
@@ -359,13 +364,20 @@ class Walk {
     const LeafTag d;
     rows.first = first;
     rows.bits = 0;
+    for (int k = 0; k < 3; ++k) {
+      const bool asTheyAre = placing == Placing::None;
+      rows.lower[k] = asTheyAre ? m_boxesA.lower[k].data() + first : rows.placed[0][k];
+      rows.upper[k] = asTheyAre ? m_boxesA.upper[k].data() + first : rows.placed[1][k];
+    }
     for (std::size_t lane = 0; lane < Rows::kMost && first + lane < end; lane += hn::Lanes(d)) {
       const std::size_t i = first + lane;
       const auto bounds = placedA(Bounds<LeafTag>::load(d, m_boxesA, i));
       auto mask = hn::FirstN(d, end - i);
       for (int k = 0; k < 3; ++k) {
-        hn::Store(bounds.lower[k], d, rows.lower[k] + lane);
-        hn::Store(bounds.upper[k], d, rows.upper[k] + lane);
+        if (placing != Placing::None) {
+          hn::Store(bounds.lower[k], d, rows.placed[0][k] + lane);
+          hn::Store(bounds.upper[k], d, rows.placed[1][k] + lane);
+        }
         mask = hn::And(mask, hn::And(hn::Le(bounds.lower[k], hn::Set(d, box.upper[k])),
                                      hn::Ge(bounds.upper[k], hn::Set(d, box.lower[k]))));
       }
@@ -445,11 +457,19 @@ class Walk {
   PairSink& m_sink;
 };
 
-template <bool kTurned>
-HWY_ATTR void startWalk(const TreePair& trees, std::size_t wanted, TraversalStack& stack) {
+template <class F>
+HWY_ATTR void withWalk(const TreePair& trees, TraversalStack& stack, PairSink& sink, F&& f) {
+  if (trees.turned())
+    f(Walk<Placing::Turned>(trees, stack, sink));
+  else if (trees.shifted())
+    f(Walk<Placing::Shifted>(trees, stack, sink));
+  else
+    f(Walk<Placing::None>(trees, stack, sink));
+}
+
+template <class W>
+HWY_ATTR void start(W& walk, std::size_t wanted, TraversalStack& stack) {
   stack.pairs.clear();
-  PairSink none;
-  Walk<kTurned> walk(trees, stack, none);
   if (!walk.rootsOverlap()) return;
   stack.pairs.push_back({0, 0});
   // Level by level: each round replaces every pair that is not of two leaves by those below it.
@@ -469,13 +489,14 @@ HWY_ATTR void startWalk(const TreePair& trees, std::size_t wanted, TraversalStac
 }
 
 HWY_ATTR void startPairsKernel(const TreePair& trees, std::size_t wanted, TraversalStack& stack) {
-  trees.turned() ? startWalk<true>(trees, wanted, stack) : startWalk<false>(trees, wanted, stack);
+  PairSink none;
+  withWalk(trees, stack, none, [&](auto&& walk) HWY_ATTR { start(walk, wanted, stack); });
 }
 
 HWY_ATTR void traverseKernel(const TreePair& trees, std::span<const NodePair> pairs,
                              TraversalStack& stack, PairSink& sink) {
   stack.pairs.assign(pairs.rbegin(), pairs.rend());
-  trees.turned() ? Walk<true>(trees, stack, sink).all(0) : Walk<false>(trees, stack, sink).all(0);
+  withWalk(trees, stack, sink, [](auto&& walk) HWY_ATTR { walk.all(0); });
 }
 
 }  // namespace palpate::HWY_NAMESPACE

@@ -86,6 +86,10 @@ struct TreePair {
 
   bool self() const { return a == b; }
   bool turned() const { return mapA.count > 0 || mapB.count > 0; }
+  bool shifted() const {
+    const std::array<float, 4> none{};
+    return shiftLower != none || shiftUpper != none;
+  }
 };
 
 /// Shifts for frames whose origins are `offset` apart (a's minus b's, in units of the frame), and a

@@ -16,7 +16,7 @@ enum class OctreeUpdate {
 struct OctreeSettings {
   int maxDepth = 32;  ///< deepest level, root = 0. [1, 60]. Cells too full at this level stay so.
   /// a cell with more is split. [1, 1024]. Fewer: more nodes, tighter boxes.
-  int maxPrimitivesPerLeaf = 16;
+  int maxPrimitivesPerLeaf = 32;
   OctreeUpdate update = OctreeUpdate::Auto;  ///< contacts do not depend on it
 };
 

@@ -122,33 +122,6 @@ TEST(OutwardRounding, IsMonotone) {
     }
 }
 
-/// The interval of a coordinate at the step's start and at a part of it holds its way between.
-TEST(OutwardRounding, HoldsTheStepsFirstPart) {
-  Random random(6);
-  const auto value = [&] {
-    return std::ldexp(testing::uniform(random, -1, 1), static_cast<int>(random() % 80) - 40);
-  };
-  for (int i = 0; i < 200000; ++i) {
-    const double before = value(), part = testing::uniform(random, 0, 1);
-    // Often it comes close to 0, where floats are sharper than the sum.
-    const double now = i % 3 == 0 ? value() : -before * (1 - part) / part * (1 + value() * 0x1p-40);
-    const Vector3d start(before, before, before), end(now, now, now);
-    const FloatFrame frame;
-    FloatPoint first, last;
-    toFloats({&start, 1}, frame, &first);
-    toFloatsAt(part, {&start, 1}, {&end, 1}, frame, &last);
-    const float lower = OutwardRounding::down(std::min(first.x, last.x)),
-                upper = OutwardRounding::up(std::max(first.x, last.x));
-    for (const long double t : {0.0L, 0.3L * part, static_cast<long double>(part)}) {
-      const long double x = before + (static_cast<long double>(now) - before) * t;
-      // The long double is off by 2^-62 of the ends.
-      const long double error = 0x1p-62L * (std::fabs(before) + std::fabs(now));
-      ASSERT_LE(lower, x + error) << before << " " << now << " " << part;
-      ASSERT_GE(upper, x - error) << before << " " << now << " " << part;
-    }
-  }
-}
-
 /// What clamping does beyond the floats' range: bounds stay finite and in order, and two that
 /// overlap still do.
 TEST(OutwardRounding, BeyondTheRangeIsClampedAndFinite) {

@@ -130,7 +130,8 @@ TEST(Octree, OneFarTriangleDoesNotFlattenIt) {
   detection.addTriangleMesh(mesh.positions, mesh.triangles);
   detection.update();
   EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
-  EXPECT_LE(detection.octree().statistics().mostPrimitivesInNode, 16u);
+  EXPECT_LE(detection.octree().statistics().mostPrimitivesInNode,
+            static_cast<std::size_t>(OctreeSettings{}.maxPrimitivesPerLeaf));
 }
 
 TEST(Octree, FollowsItsGeometryAndSaysWhatRan) {
