@@ -135,6 +135,32 @@ TEST(UnfoldedStars, AnswerMostNeighboursOfASmoothMesh) {
   }
 }
 
+/// Stars so small in their frame that floats are off by about their size.
+TEST(UnfoldedStars, KnowWhatFloatsDoNot) {
+  testing::Random random(47);
+  for (int round = 0; round < 40; ++round) {
+    testing::Mesh mesh = testing::sheet(5, 0.0, 0.3);
+    const double size = std::ldexp(1.0, -15 - round % 8);
+    for (Vector3d& p : mesh.positions)
+      p = size * (p + testing::randomPoint(random, -0.1, 0.1)) + Vector3d(0.7, 0.6, 0.5);
+    for (int i = 0; i < 200; ++i) mesh.positions.push_back(testing::randomPoint(random, -1, 1));
+    expectRight({mesh, moved(mesh.positions, random, 0.1 * size)});
+  }
+}
+
+/// Floats are clamped: a vertex nearly on the x axis looks as if it were halfway to the y axis.
+TEST(UnfoldedStars, AreWithinTheRangeOfFloats) {
+  testing::Mesh mesh{{Vector3d::Zero()}, {}};
+  for (const Vector3d& p : {Vector3d(1, -1, 0), Vector3d(2, 1, 0), Vector3d(0x1p140, 0x1p125, 0),
+                            Vector3d(-1, 1, 0), Vector3d(-1, -1, 0)})
+    mesh.positions.push_back(p);
+  for (std::uint32_t i = 0; i < 5; ++i) mesh.triangles.push_back({0, 1 + i, 1 + (i + 1) % 5});
+  testing::Random random(48);
+  for (int i = 0; i < 200; ++i) mesh.positions.push_back(testing::randomPoint(random, -1, 1));
+  expectRight({mesh, mesh.positions});
+  EXPECT_TRUE(answered({mesh, mesh.positions}).empty());
+}
+
 /// n triangles around vertex 0, which their rim goes round `turns` times.
 testing::Mesh fan(std::uint32_t n, int turns, double height) {
   testing::Mesh mesh{{Vector3d::Zero()}, {}};
