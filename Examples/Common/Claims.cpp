@@ -42,20 +42,20 @@ void sortUnique(std::vector<TrianglePair>& pairs) {
 
 void addClaims(const CollisionData& data, double time, Claims& out) {
   using Kind = FeaturePair::Kind;
-  const auto at = [time](double ofImpact) { return ofImpact > 0 ? ofImpact : time; };
+  // Intersection's contacts have no time of impact. With a thickness features that are within it
+  // from the start have none either.
+  const bool intersects = data.validity().thickness == 0.0 && !data.intersectingTriangles().empty();
+  const auto add = [&](const FeaturePair& features, const auto& contact, double side) {
+    const bool timed = contact.timeOfImpact > 0;
+    out.claims.push_back({features, side * contact.normal, contact.distance,
+                          timed ? contact.timeOfImpact : time, intersects && !timed});
+  };
   for (const auto& c : data.vertexTriangle())
-    out.claims.push_back(
-        {{Kind::VertexTriangle, {c.vertex, c.triangle}}, c.normal, c.distance, at(c.timeOfImpact)});
+    add({Kind::VertexTriangle, {c.vertex, c.triangle}}, c, 1);
   for (const auto& c : data.triangleVertex())
-    out.claims.push_back({{Kind::TriangleVertex, {c.triangle, c.vertex}},
-                          -c.normal,
-                          c.distance,
-                          at(c.timeOfImpact)});
+    add({Kind::TriangleVertex, {c.triangle, c.vertex}}, c, -1);
   for (const auto& c : data.edgeEdge())
-    out.claims.push_back({{Kind::EdgeEdge, {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]}},
-                          c.normal,
-                          c.distance,
-                          at(c.timeOfImpact)});
+    add({Kind::EdgeEdge, {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]}}, c, 1);
   out.trusted = out.trusted.value_or(true) && data.validity().trusted;
   const auto triangles = data.intersectingTriangles();
   out.triangles.insert(out.triangles.end(), triangles.begin(), triangles.end());

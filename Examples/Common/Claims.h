@@ -25,14 +25,15 @@ struct Claim {
   Eigen::Vector3d normal;  ///< unit, from the second mesh towards the first
   double distance;         ///< L; negative: depth
   double time;             ///< of the step, that this is said of
+  bool example = false;    ///< of triangles that intersect and are named themselves
 };
 
 /// What a method says of a step, in any order.
 struct Claims {
   std::vector<Claim> claims;
   std::vector<TrianglePair> triangles;  ///< said to touch, besides those that hold the features
-  bool ofTriangles = false;     ///< its features are examples: only `triangles` are said to touch
-  std::optional<bool> trusted;  ///< its own word on this answer, if it has one
+  bool ofTriangles = false;             ///< all of its features are examples
+  std::optional<bool> trusted;          ///< its own word on this answer, if it has one
 };
 
 /// Which triangles hold a vertex, or an edge.

@@ -65,8 +65,8 @@ void Score::add(const Truth& truth, const Claims& said, const Incidence& a, cons
     m_falseAlarms += !wrong && !*said.trusted;
   }
   std::vector<TrianglePair> touching = said.triangles;
-  if (!said.ofTriangles)
-    for (const auto& [features, claim] : first) Incidence::addTriangles(features, a, b, touching);
+  for (const auto& [features, claim] : first)
+    if (!claim.example) Incidence::addTriangles(features, a, b, touching);
   sortUnique(touching);
   m_touching += truth.touching.size();
   m_claimed += touching.size();

@@ -6,7 +6,62 @@
 #include <cmath>
 #include <limits>
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "Geometry/Motion.cpp"
+#include "Core/Simd.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// Of eight vertices after each other, coordinate by coordinate.
+constexpr std::size_t kBlock = 24;
+using D = hn::CappedTag<double, 8>;
+using V = hn::Vec<D>;
+
+/// `blocks` of them, into as many sums. Three vectors' worth of each at a time, which is what
+/// registers hold.
+HWY_ATTR void addBlocks(const double* before, const double* now, std::size_t blocks,
+                        double (&out)[4][kBlock]) {
+  const D d;
+  for (std::size_t first = 0; first < kBlock; first += 3 * hn::Lanes(d)) {
+    const auto moved = [&](std::size_t block, std::size_t i) HWY_ATTR {
+      const std::size_t at = kBlock * block + first + i * hn::Lanes(d);
+      return hn::LoadU(d, now + at) - hn::LoadU(d, before + at);
+    };
+    V lower[3], upper[3], sum[3], squares[3];
+    for (std::size_t i = 0; i < 3; ++i) {
+      lower[i] = upper[i] = moved(0, i);
+      sum[i] = squares[i] = hn::Zero(d);
+    }
+    for (std::size_t block = 0; block < blocks; ++block)
+      for (std::size_t i = 0; i < 3; ++i) {
+        const V v = moved(block, i);
+        lower[i] = hn::Min(lower[i], v);
+        upper[i] = hn::Max(upper[i], v);
+        sum[i] = sum[i] + v;
+        squares[i] = squares[i] + v * v;
+      }
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t at = first + i * hn::Lanes(d);
+      hn::StoreU(lower[i], d, out[0] + at);
+      hn::StoreU(upper[i], d, out[1] + at);
+      hn::StoreU(sum[i], d, out[2] + at);
+      hn::StoreU(squares[i], d, out[3] + at);
+    }
+  }
+}
+
+}  // namespace palpate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 namespace palpate {
+
+HWY_EXPORT(addBlocks);
+
+constexpr std::size_t kVertices = 8;  ///< of a block
 
 using Eigen::Vector3d;
 
@@ -23,26 +78,18 @@ MotionRange motionRange(const Positions& before, const Positions& now, std::size
                         std::size_t end) {
   MotionRange range;
   std::size_t i = begin;
-  if (end - begin >= 2 && !before.isPlaced() && !now.isPlaced()) {
-    // Two vertices at a time, as six numbers, for whatever vectors the compiler has.
-    using Two = Eigen::Array<double, 6, 1>;
-    const auto displacement = [&](std::size_t first) -> Two {
-      return Eigen::Map<const Two>(now.body()[first].data()) -
-             Eigen::Map<const Two>(before.body()[first].data());
-    };
-    Two lower = displacement(i), upper = lower, sum = Two::Zero(), squares = Two::Zero();
-    for (; i + 2 <= end; i += 2) {
-      const Two moved = displacement(i);
-      lower = lower.min(moved);
-      upper = upper.max(moved);
-      sum += moved;
-      squares += moved * moved;
+  const std::size_t blocks = (end - begin) / kVertices;
+  if (blocks > 0 && !before.isPlaced() && !now.isPlaced()) {
+    double found[4][3 * kVertices];
+    HWY_DYNAMIC_DISPATCH(addBlocks)
+    (before.body()[begin].data(), now.body()[begin].data(), blocks, found);
+    for (std::size_t k = 0; k < 3 * kVertices; k += 3) {
+      const auto part = [&](int which) -> Vector3d {
+        return Eigen::Map<const Vector3d>(found[which] + k);
+      };
+      range.add({part(0), part(1), part(2), part(3).sum(), static_cast<double>(blocks)});
     }
-    for (int k = 0; k < 6; k += 3) {
-      const auto part = [&](const Two& two) -> Vector3d { return two.segment<3>(k).matrix(); };
-      range.add(
-          {part(lower), part(upper), part(sum), part(squares).sum(), double((i - begin) / 2)});
-    }
+    i += blocks * kVertices;
   }
   for (; i < end; ++i) {
     const Vector3d moved = now[i] - before[i];
@@ -69,3 +116,4 @@ double meanMotion(const MotionRange& a, const MotionRange& b) {
 }
 
 }  // namespace palpate
+#endif

@@ -120,39 +120,32 @@ class IntersectionContacts {
   bool m_self;
 };
 
-/// Unless it is one triangle of one mesh.
-template <class F>
-void intersect(const MeshPair& pair, const TrianglePair& candidate, bool atStart,
-               SignCounts& counts, F&& f) {
-  if (pair.self() && candidate.a == candidate.b) return;
-  const MeshTriangle a(pair.a, candidate.a, atStart ? pair.a.before : pair.a.now),
-      b(pair.b, candidate.b, atStart ? pair.b.before : pair.b.now);
-  const TriangleIntersection meeting = intersectTriangles(
-      a.positions, b.positions, counts, pair.self() ? featuresInCommon(a, b) : ExcludedFeatures());
-  if (meeting.intersect()) f(a, b, meeting);
+TriangleIntersection meetingOf(const MeshPair& pair, const MeshTriangle& a, const MeshTriangle& b,
+                               SignCounts& counts) {
+  if (pair.self() && a.id == b.id) return {};
+  return intersectTriangles(a.positions, b.positions, counts,
+                            pair.self() ? featuresInCommon(a, b) : ExcludedFeatures());
 }
 
-/// Without the filter.
-void findOne(const MeshPair& pair, TrianglePair candidate, SignCounts& counts,
-             ContactBuffers& out) {
-  if (pair.self() && candidate.b < candidate.a) std::swap(candidate.a, candidate.b);
-  intersect(pair, candidate, false, counts,
-            [&](const MeshTriangle& a, const MeshTriangle& b, const TriangleIntersection& meeting) {
-              if (areNearAtRest(pair, a.vertices, b.vertices)) {
-                out.facts.clearance = 0.0;
-                return;
-              }
-              out.intersectingTriangles.push_back(candidate);
-              IntersectionContacts(pair, a, b, out).add(meeting);
-            });
+/// known: how they meet, or nothing.
+void findOne(const MeshPair& pair, const TrianglePair& candidate, TriangleIntersection known,
+             SignCounts& counts, ContactBuffers& out) {
+  const MeshTriangle a(pair.a, candidate.a, pair.a.now), b(pair.b, candidate.b, pair.b.now);
+  if (!known.intersect()) known = meetingOf(pair, a, b, counts);
+  if (!known.intersect()) return;
+  if (areNearAtRest(pair, a.vertices, b.vertices)) {
+    out.facts.clearance = 0.0;
+    return;
+  }
+  out.intersectingTriangles.push_back(candidate);
+  IntersectionContacts(pair, a, b, out).add(known);
 }
 
 void keepPossible(const MeshPair& pair, bool atStart, std::span<const TrianglePair> candidates,
-                  Buffer<TrianglePair>& possible) {
+                  Buffer<PossibleIntersection>& possible) {
   const auto placed = [&](const TriangleMesh& mesh) {
     return PlacedTriangles{mesh.topology.triangles, atStart ? mesh.before : mesh.now};
   };
-  possible.clear();
   keepPossiblyIntersecting(placed(pair.a), placed(pair.b), pair.self(), candidates, possible);
 }
 
@@ -161,25 +154,27 @@ void keepPossible(const MeshPair& pair, bool atStart, std::span<const TrianglePa
 void findIntersections(const MeshPair& pair, std::span<const TrianglePair> candidates,
                        ContactBuffers& out) {
   SignCounts counts;
-  keepPossible(pair, false, candidates, out.part);
-  for (const TrianglePair& candidate : out.part) findOne(pair, candidate, counts, out);
+  keepPossible(pair, false, candidates, out.possible);
+  for (const PossibleIntersection& possible : out.possible)
+    findOne(pair, possible.triangles, possible.meeting, counts, out);
   out.exactDecisions += counts.undecided;
 }
 
 bool intersectAtStart(const MeshPair& pair, const TrianglePair& candidate, ContactBuffers& counts) {
   SignCounts signs;
-  bool found = false;
-  intersect(pair, candidate, true, signs, [&](const auto&...) { found = true; });
+  const MeshTriangle a(pair.a, candidate.a, pair.a.before), b(pair.b, candidate.b, pair.b.before);
+  const bool found = meetingOf(pair, a, b, signs).intersect();
   counts.exactDecisions += signs.undecided;
   return found;
 }
 
 bool anyIntersectAtStart(const MeshPair& pair, std::span<const TrianglePair> candidates,
                          ContactBuffers& counts) {
-  keepPossible(pair, true, candidates, counts.part);
-  return std::any_of(counts.part.begin(), counts.part.end(), [&](const TrianglePair& candidate) {
-    return intersectAtStart(pair, candidate, counts);
-  });
+  keepPossible(pair, true, candidates, counts.possible);
+  return std::any_of(
+      counts.possible.begin(), counts.possible.end(), [&](const PossibleIntersection& possible) {
+        return possible.isKnown() || intersectAtStart(pair, possible.triangles, counts);
+      });
 }
 
 void findIntersectionsByBruteForce(const MeshPair& pair, const FeatureLists& features,
@@ -188,7 +183,7 @@ void findIntersectionsByBruteForce(const MeshPair& pair, const FeatureLists& fea
   const auto countB = static_cast<std::uint32_t>(pair.b.topology.triangles.size());
   for (const std::uint32_t a : features.trianglesOfA)
     for (std::uint32_t b = pair.self() ? a + 1 : 0; b < countB; ++b)
-      if (pair.b.topology.isOn(b)) findOne(pair, {a, b}, counts, out);
+      if (pair.b.topology.isOn(b)) findOne(pair, {a, b}, {}, counts, out);
   out.exactDecisions += counts.undecided;
 }
 

@@ -3,6 +3,7 @@
 #include "Math/Tolerances.h"
 
 #include <algorithm>
+#include <utility>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "NarrowPhase/IntersectionFilter.cpp"
@@ -73,62 +74,179 @@ HWY_INLINE Vector3<V> magnitudes(const Vector3<V>& a) {
   return {hn::Abs(a.x), hn::Abs(a.y), hn::Abs(a.z)};
 }
 
-/// All corners that are not the plane's too are certainly strictly to one side: by the volumes of
-/// OrientedPlane::side() and its bound, which grows with each magnitude of d - a, so that one with
-/// the largest of three corners is a bound for all. If all corners are the plane's: false.
-HWY_INLINE M aside(const Lanes& triangle, const Lanes& plane) {
+/// What is certain of a volume's sign.
+struct Sides {
+  M above, below;
+  HWY_INLINE M certain() const { return hn::Or(above, below); }
+};
+
+/// (q - p) x (r - p) of three points, and the magnitudes of its terms.
+struct Normal {
+  Vector3<V> normal, magnitude;
+
+  HWY_INLINE Normal(const Vector3<V>& p, const Vector3<V>& q, const Vector3<V>& r) {
+    const Vector3<V> u = q - p, v = r - p;
+    const Vector3<V> forward{u.y * v.z, u.z * v.x, u.x * v.y},
+        backward{u.z * v.y, u.x * v.z, u.y * v.x};
+    normal = forward - backward;
+    magnitude = magnitudes(forward) + magnitudes(backward);
+  }
+  /// With the bound of OrientedPlane::side(). w: from p; most: its magnitudes, or larger.
+  HWY_INLINE Sides sidesOf(const Vector3<V>& w, const Vector3<V>& most) const {
+    const D d;
+    const V volume = dot(normal, w);
+    const V bound = hn::Set(d, kVolumeError) * dot(magnitude, most) +
+                    hn::Set(d, kUnderflowGuard) * (hn::Set(d, 1.0) + most.x + most.y + most.z);
+    return {hn::Gt(volume, bound), hn::Lt(volume, hn::Neg(bound))};
+  }
+  HWY_INLINE Sides sidesOf(const Vector3<V>& w) const { return sidesOf(w, magnitudes(w)); }
+};
+
+/// The sides of a plane that a triangle's corners are on.
+struct CornerSides {
+  Sides corner[3];
+
+  /// The bound grows with each magnitude, so that one with the largest of three corners does for
+  /// all.
+  HWY_INLINE CornerSides(const Lanes& triangle, const Lanes& plane) {
+    const auto& [p, q, r] = plane.corner;
+    const Normal normal(p, q, r);
+    const Vector3<V> w[3] = {triangle.corner[0] - p, triangle.corner[1] - p,
+                             triangle.corner[2] - p};
+    Vector3<V> most = magnitudes(w[0]);
+    for (int i = 1; i < 3; ++i) {
+      const Vector3<V> other = magnitudes(w[i]);
+      most = {hn::Max(most.x, other.x), hn::Max(most.y, other.y), hn::Max(most.z, other.z)};
+    }
+    for (int i = 0; i < 3; ++i) corner[i] = normal.sidesOf(w[i], most);
+  }
+  /// All corners that are not the plane's too are strictly to one side. If all are the plane's:
+  /// false.
+  HWY_INLINE M aside(const M (&excluded)[3]) const {
+    M above = hn::FirstN(D(), kSize), below = above;
+    for (int i = 0; i < 3; ++i) {
+      above = hn::And(above, hn::Or(excluded[i], corner[i].above));
+      below = hn::And(below, hn::Or(excluded[i], corner[i].below));
+    }
+    return hn::Xor(above, below);
+  }
+  HWY_INLINE M certain() const {
+    return hn::And(hn::And(corner[0].certain(), corner[1].certain()), corner[2].certain());
+  }
+};
+
+/// A triangle that crosses a plane, from the corner that is alone on its side.
+struct FromLonely {
+  M isLast, isMiddle;
+  Vector3<V> lonely, ends[2];  ///< the corners after it, in their order
+
+  HWY_INLINE FromLonely(const Lanes& triangle, const CornerSides& sides) {
+    const auto& [c0, c1, c2] = triangle.corner;
+    const auto* const s = sides.corner;
+    isLast = hn::Not(hn::Xor(s[0].above, s[1].above));
+    isMiddle = hn::AndNot(isLast, hn::Not(hn::Xor(s[0].above, s[2].above)));
+    lonely = choose(c2, c1, c0);
+    ends[0] = choose(c0, c2, c1);
+    ends[1] = choose(c1, c0, c2);
+  }
+  HWY_INLINE Vector3<V> choose(const Vector3<V>& last, const Vector3<V>& middle,
+                               const Vector3<V>& first) const {
+    const auto among = [this](V l, V m, V f) HWY_ATTR {
+      return hn::IfThenElse(isLast, l, hn::IfThenElse(isMiddle, m, f));
+    };
+    return {among(last.x, middle.x, first.x), among(last.y, middle.y, first.y),
+            among(last.z, middle.z, first.z)};
+  }
+};
+
+/// Lanes as bits: intersectCrossing() of Math/TriangleIntersection, side by side.
+struct Crossings {
+  struct OfOne {
+    std::uint32_t isLast, isMiddle, through[2];
+
+    std::uint8_t edges(std::size_t lane) const {
+      const int lonely = isLast >> lane & 1 ? 2 : static_cast<int>(isMiddle >> lane & 1);
+      const unsigned found = (through[0] >> lane & 1) << lonely |
+                             (through[1] >> lane & 1) << (lonely == 0 ? 2 : lonely - 1);
+      return static_cast<std::uint8_t>(found);
+    }
+  } a, b;
+  std::uint32_t known;  ///< nothing touches, and which edges cross is certain
+
+  HWY_INLINE Crossings(const Lanes& ofA, const CornerSides& sidesOfA, const Lanes& ofB,
+                       const CornerSides& sidesOfB) {
+    const D d;
+    const FromLonely fromA(ofA, sidesOfA), fromB(ofB, sidesOfB);
+    const Vector3<V> towards[2] = {fromB.ends[0] - fromA.lonely, fromB.ends[1] - fromA.lonely};
+    M certain = hn::And(sidesOfA.certain(), sidesOfB.certain()), above[2][2];
+    for (int i = 0; i < 2; ++i) {
+      const Normal normal(fromA.lonely, fromA.ends[i], fromB.lonely);
+      for (int j = 0; j < 2; ++j) {
+        const Sides sides = normal.sidesOf(towards[j]);
+        certain = hn::And(certain, sides.certain());
+        above[i][j] = sides.above;
+      }
+    }
+    known = bitsOf(d, certain);
+    a = {bitsOf(d, fromA.isLast), bitsOf(d, fromA.isMiddle), {}};
+    b = {bitsOf(d, fromB.isLast), bitsOf(d, fromB.isMiddle), {}};
+    for (int i = 0; i < 2; ++i) {
+      a.through[i] = bitsOf(d, hn::Xor(above[i][0], above[i][1]));
+      b.through[i] = bitsOf(d, hn::Xor(above[0][i], above[1][i]));
+    }
+  }
+  bool isKnown(std::size_t lane) const { return known >> lane & 1; }
+  TriangleIntersection meeting(std::size_t lane) const {
+    TriangleIntersection found;
+    found.edgesOfAThroughB = a.edges(lane);
+    found.edgesOfBThroughA = b.edges(lane);
+    return found;
+  }
+};
+
+/// Appends the first `size` lanes that may intersect.
+HWY_INLINE void keepLanes(const Lanes& ofA, const Lanes& ofB, const TrianglePair* pairs,
+                          std::size_t size, PossibleIntersection*& out) {
   const D d;
-  const auto& [p, q, r] = plane.corner;
-  const Vector3<V> u = q - p, v = r - p;
-  const Vector3<V> forward{u.y * v.z, u.z * v.x, u.x * v.y},
-      backward{u.z * v.y, u.x * v.z, u.y * v.x};
-  const Vector3<V> normal = forward - backward;
-  V volume[3];
-  Vector3<V> largest{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-  for (int i = 0; i < 3; ++i) {
-    const Vector3<V> w = triangle.corner[i] - p;
-    volume[i] = dot(normal, w);
-    largest = {hn::Max(largest.x, hn::Abs(w.x)), hn::Max(largest.y, hn::Abs(w.y)),
-               hn::Max(largest.z, hn::Abs(w.z))};
+  M apart = boxesApart(ofA, ofB);
+  if (hn::AllTrue(d, apart)) return;
+  const CornerSides sidesOfA(ofA, ofB), sidesOfB(ofB, ofA);
+  apart = hn::Or(apart, hn::Or(sidesOfA.aside(ofA.excluded), sidesOfB.aside(ofB.excluded)));
+  if (hn::AllTrue(d, apart)) return;
+  const std::uint32_t isApart = bitsOf(d, apart);
+  const Crossings crossings(ofA, sidesOfA, ofB, sidesOfB);
+  for (std::size_t lane = 0; lane < size; ++lane) {
+    if (isApart >> lane & 1) continue;
+    *out = {pairs[lane],
+            crossings.isKnown(lane) ? crossings.meeting(lane) : TriangleIntersection()};
+    out += out->isKnown() || !crossings.isKnown(lane);
   }
-  const V bound =
-      hn::Set(d, kVolumeError) * dot(magnitudes(forward) + magnitudes(backward), largest) +
-      hn::Set(d, kUnderflowGuard) * (hn::Set(d, 1.0) + largest.x + largest.y + largest.z);
-  M above = hn::FirstN(d, kSize), below = above;
-  for (int i = 0; i < 3; ++i) {
-    above = hn::And(above, hn::Or(triangle.excluded[i], hn::Gt(volume[i], bound)));
-    below = hn::And(below, hn::Or(triangle.excluded[i], hn::Lt(volume[i], hn::Neg(bound))));
-  }
-  return hn::Xor(above, below);
 }
 
 HWY_ATTR void keepPossiblyIntersectingKernel(const PlacedTriangles& a, const PlacedTriangles& b,
                                              bool self, std::span<const TrianglePair> pairs,
-                                             Buffer<TrianglePair>& out) {
+                                             Buffer<PossibleIntersection>& out) {
   const D d;
-  std::size_t kept = out.size();
-  out.resize(kept + pairs.size());
+  out.resize(pairs.size());
+  PossibleIntersection* end = out.data();
   Batch batch;
+  TrianglePair some[kSize];
   for (std::size_t begin = 0; begin < pairs.size(); begin += kSize) {
-    const auto some = pairs.subspan(begin, std::min(kSize, pairs.size() - begin));
-    for (std::size_t lane = 0; lane < some.size(); ++lane) {
-      batch.set(lane, 0, a, some[lane].a, self);
-      batch.set(lane, 1, b, some[lane].b, self);
+    const std::size_t size = std::min(kSize, pairs.size() - begin);
+    for (std::size_t lane = 0; lane < size; ++lane) {
+      TrianglePair& pair = some[lane] = pairs[begin + lane];
+      if (self && pair.b < pair.a) std::swap(pair.a, pair.b);
+      batch.set(lane, 0, a, pair.a, self);
+      batch.set(lane, 1, b, pair.b, self);
     }
-    for (std::size_t first = 0; first < some.size(); first += hn::Lanes(d)) {
+    for (std::size_t first = 0; first < size; first += hn::Lanes(d)) {
       Lanes ofA, ofB;
       ofA.set(batch, first, 0, self);
       ofB.set(batch, first, 1, self);
-      M apart = boxesApart(ofA, ofB);
-      if (!hn::AllTrue(d, apart)) apart = hn::Or(apart, hn::Or(aside(ofA, ofB), aside(ofB, ofA)));
-      const std::uint32_t isApart = bitsOf(d, apart);
-      for (std::size_t i = first; i < std::min(first + hn::Lanes(d), some.size()); ++i) {
-        out[kept] = some[i];
-        kept += ~isApart >> (i - first) & 1;
-      }
+      keepLanes(ofA, ofB, some + first, std::min(hn::Lanes(d), size - first), end);
     }
   }
-  out.resize(kept);
+  out.resize(static_cast<std::size_t>(end - out.data()));
 }
 
 }  // namespace palpate::HWY_NAMESPACE
@@ -140,7 +258,8 @@ namespace palpate {
 HWY_EXPORT(keepPossiblyIntersectingKernel);
 
 void keepPossiblyIntersecting(const PlacedTriangles& a, const PlacedTriangles& b, bool self,
-                              std::span<const TrianglePair> pairs, Buffer<TrianglePair>& out) {
+                              std::span<const TrianglePair> pairs,
+                              Buffer<PossibleIntersection>& out) {
   HWY_DYNAMIC_DISPATCH(keepPossiblyIntersectingKernel)(a, b, self, pairs, out);
 }
 

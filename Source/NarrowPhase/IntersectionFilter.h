@@ -4,6 +4,7 @@
 
 #include "Core/Buffer.h"
 #include "Geometry/Positions.h"
+#include "Math/TriangleIntersection.h"
 
 #include <span>
 
@@ -15,11 +16,19 @@ struct PlacedTriangles {
   Positions positions;
 };
 
-/// Appends those pairs that may intersect, in their order: those left out are proven not to, as
-/// intersectTriangles() decides it. self: the two are one mesh, and what triangles with a common
-/// vertex are not asked for is excluded.
+struct PossibleIntersection {
+  TrianglePair triangles;
+  TriangleIntersection meeting;  ///< if known: where edges cross and nothing touches
+  bool isKnown() const { return meeting.intersect(); }
+};
+
+/// The pairs that may intersect, in their order, with what intersectTriangles() finds wherever
+/// floating point is certain; those left out are proven not to. self: the two are one mesh, pairs
+/// come with the lower triangle first, and what triangles with a common vertex are not asked for is
+/// excluded.
 /// Errors   none; where coordinates over- or underflow all pairs whose boxes overlap are kept.
 void keepPossiblyIntersecting(const PlacedTriangles& a, const PlacedTriangles& b, bool self,
-                              std::span<const TrianglePair> pairs, Buffer<TrianglePair>& out);
+                              std::span<const TrianglePair> pairs,
+                              Buffer<PossibleIntersection>& out);
 
 }  // namespace palpate

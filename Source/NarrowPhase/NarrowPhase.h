@@ -6,6 +6,7 @@
 #include "Core/Buffer.h"
 #include "Geometry/TriangleMesh.h"
 #include "NarrowPhase/FeaturePairs.h"
+#include "NarrowPhase/IntersectionFilter.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -91,8 +92,9 @@ struct ContactBuffers {
   Buffer<ShapeContact> shape;
   Buffer<ShapeShapeContact> shapeShape;
   ShapePairScratch shapePair;
-  FeaturePairs features;      ///< scratch: of the batch at hand
-  Buffer<TrianglePair> part;  ///< scratch: some of the batch at hand
+  FeaturePairs features;                  ///< scratch: of the batch at hand
+  Buffer<TrianglePair> part;              ///< scratch: some of the batch at hand
+  Buffer<PossibleIntersection> possible;  ///< scratch: of the batch at hand
   StepFacts facts;
   std::size_t featurePairs = 0;    ///< tested
   std::size_t exactDecisions = 0;  ///< left to exact arithmetic

@@ -143,14 +143,14 @@ void raceRows(Report& report, const Options& options) {
 int main(int count, char** arguments) {
   Options options;
   options.rows.sharedData = PALPATE_SHARED_DATA;
-  options.tables = {"race",   "stages", "frame",  "far",        "still",
-                    "pay",    "scale",  "steady", "features",   "lines",
-                    "shapes", "inside", "rigid",  "continuous", "simd"};
+  options.tables = {"race",  "stages",     "frame",    "far",   "still",  "pay",
+                    "scale", "steady",     "features", "lines", "shapes", "inside",
+                    "rigid", "continuous", "validity", "simd"};
   MeasureOptions& measure = options.rows.measure;
   CLI::App app{"Palpate and its peers, side by side in one run"};
   app.add_option("--tables", options.tables,
                  "some of race, stages, frame, far, still, pay, scale, "
-                 "steady, features, lines, shapes, inside, rigid, continuous, simd")
+                 "steady, features, lines, shapes, inside, rigid, continuous, validity, simd")
       ->delimiter(',')
       ->check(CLI::IsMember(options.tables));
   app.add_option("--scenes", options.scenes, "of the race; default: all")->delimiter(',');
@@ -171,11 +171,11 @@ int main(int count, char** arguments) {
 
   Report report(options.csv, options.commit, simdPath());
   const std::map<std::string, void (*)(Report&, const RowOptions&)> tables = {
-      {"stages", stageRows},          {"frame", wholeFrameRows}, {"far", farFlungRows},
-      {"still", stillRows},           {"pay", payRows},          {"scale", scaleRows},
-      {"steady", steadyRows},         {"features", featureRows}, {"lines", lineRows},
-      {"shapes", shapeRows},          {"inside", insideRows},    {"rigid", rigidRows},
-      {"continuous", continuousRows}, {"simd", simdRows}};
+      {"stages", stageRows},          {"frame", wholeFrameRows},  {"far", farFlungRows},
+      {"still", stillRows},           {"pay", payRows},           {"scale", scaleRows},
+      {"steady", steadyRows},         {"features", featureRows},  {"lines", lineRows},
+      {"shapes", shapeRows},          {"inside", insideRows},     {"rigid", rigidRows},
+      {"continuous", continuousRows}, {"validity", validityRows}, {"simd", simdRows}};
   for (const std::string& table : options.tables) {
     if (table == "race")
       raceRows(report, options);

@@ -29,6 +29,7 @@ void shapeRows(Report&, const RowOptions&);       ///< a capsule in a sheet, and
 void insideRows(Report&, const RowOptions&);      ///< vertices inside a body, particles around it
 void rigidRows(Report&, const RowOptions&);       ///< a large bone moved by its transform
 void continuousRows(Report&, const RowOptions&);  ///< times of impact of the published steps
+void validityRows(Report&, const RowOptions&);    ///< what validity() takes of a frame
 void simdRows(Report&, const RowOptions&);        ///< every path that this processor runs
 
 /// Of the step from a workload's first frame to its second.

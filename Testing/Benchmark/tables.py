@@ -117,6 +117,7 @@ TABLES = {
     "steady": metrics("steady", "1 / 2 threads"),
     "features": metrics("features", "1 thread"),
     "continuous": metrics("continuous", "1 / 2 threads"),
+    "validity": metrics("validity", "1 thread"),
     "queries": metrics("queries", "1 thread"),
     "simd": metrics("simd", "1 thread"),
 }
