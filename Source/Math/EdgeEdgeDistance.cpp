@@ -24,23 +24,86 @@ struct CrossingDecision {
   bool exact;
 };
 
-CrossingDecision crossingOf(const EdgePair& edges) {
-  const Vector3d &m = edges.m.high, &u = edges.u.high, &v = edges.v.high;
-  const double uSum = sumOfMagnitudes(u), vSum = sumOfMagnitudes(v), magnitude = uSum * vSum;
-  // m was rounded in terms as large as the edges at least.
-  const double mSum = sumOfMagnitudes(m) + uSum + vSum;
-  if (mSum < kLargestModerate) {
-    const Vector3d normal = u.cross(v);
-    const double square = dot(normal, normal), squareError = kTripleError * magnitude * magnitude;
-    const double s = std::abs(dot(m.cross(v), normal)), t = std::abs(dot(u.cross(m), normal));
-    const double sError =
-        kTripleError * mSum * vSum * magnitude + squareError + kUnderflowGuardOfProducts;
-    const double tError =
-        kTripleError * mSum * uSum * magnitude + squareError + kUnderflowGuardOfProducts;
-    if (s - square > sError || t - square > tError) return {Crossing::Outside, false};
-    if (square - s > sError && square - t > tError) return {Crossing::Interior, false};
+/// Whether u x v is zero, where products tell: each component's two are equal, rounding and all, or
+/// have a factor zero. Of edges below kLargestModerate.
+bool areCertainlyParallel(const Difference& u, const Difference& v) {
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    const bool isZero = u.high[j] == 0.0 || v.high[k] == 0.0;
+    if (isZero != (u.high[k] == 0.0 || v.high[j] == 0.0)) return false;
+    if (isZero) continue;
+    if (u.low[j] != 0.0 || v.low[k] != 0.0 || u.low[k] != 0.0 || v.low[j] != 0.0) return false;
+    const RoundedWithError plus = exactProduct(u.high[j], v.high[k]),
+                           minus = exactProduct(u.high[k], v.high[j]);
+    if (plus.value != minus.value || plus.error != minus.error ||
+        !(std::abs(plus.value) > kUnderflowGuardOfProducts))
+      return false;
   }
-  return {exact::crossing(edges.p0, edges.p1, edges.q0, edges.q1), true};
+  return true;
+}
+
+/// What is compared to tell whether lines are closest inside both edges: it is so if the square is
+/// more than either. Each is off by its error at most.
+struct CrossingTerms {
+  double square, squareError, s, sError, t, tError;
+
+  std::optional<Crossing> decision() const {
+    if (s - square > sError + squareError || t - square > tError + squareError)
+      return Crossing::Outside;
+    if (square - s > sError + squareError && square - t > tError + squareError)
+      return Crossing::Interior;
+    return {};
+  }
+};
+
+/// m was rounded in terms as large as the edges at least: mSum has them.
+CrossingTerms roundedTerms(const EdgePair& edges, double mSum, double uSum, double vSum) {
+  const Vector3d &m = edges.m.high, &u = edges.u.high, &v = edges.v.high;
+  const double magnitude = uSum * vSum;
+  const Vector3d normal = u.cross(v);
+  return {dot(normal, normal),
+          kTripleError * magnitude * magnitude + kUnderflowGuardOfProducts,
+          std::abs(dot(m.cross(v), normal)),
+          kTripleError * mSum * vSum * magnitude,
+          std::abs(dot(u.cross(m), normal)),
+          kTripleError * mSum * uSum * magnitude};
+}
+
+/// The same of edges that are nearly parallel, whose plain normal is rounding. A product's sum of
+/// magnitudes is off by kAccurateCrossError of itself and kAccurateCrossLoss of its factors'; so
+/// are a scalar product's terms, by what either makes of the other, and by its own rounding.
+CrossingTerms compensatedTerms(const EdgePair& edges, double mSum, double uSum, double vSum) {
+  const Vector3d normal = accurateCross(edges.u, edges.v);
+  const Vector3d ofS = accurateCross(edges.m, edges.v), ofT = accurateCross(edges.u, edges.m);
+  const double normalSum = sumOfMagnitudes(normal), factors = uSum * vSum;
+  const auto errorWith = [&](const Vector3d& other, double itsFactors) {
+    const double otherSum = sumOfMagnitudes(other);
+    return 4 * kAccurateCrossError * normalSum * otherSum +
+           kAccurateCrossLoss * (factors * otherSum + itsFactors * normalSum) +
+           kAccurateCrossLoss * kAccurateCrossLoss * factors * itsFactors;
+  };
+  return {dot(normal, normal),        errorWith(normal, factors) + kUnderflowGuardOfProducts,
+          std::abs(dot(ofS, normal)), errorWith(ofS, mSum * vSum),
+          std::abs(dot(ofT, normal)), errorWith(ofT, mSum * uSum)};
+}
+
+CrossingDecision crossingOf(const EdgePair& edges) {
+  const auto& [p0, p1, q0, q1, m, u, v] = edges;
+  const double uSum = sumOfMagnitudes(u.high), vSum = sumOfMagnitudes(v.high);
+  const double mSum = sumOfMagnitudes(m.high) + uSum + vSum;
+  if (mSum < kLargestModerate) {
+    if (const auto decision = roundedTerms(edges, mSum, uSum, vSum).decision())
+      return {*decision, false};
+    if (areCertainlyParallel(difference(p1, p0), difference(q1, q0)))
+      return {Crossing::Parallel, false};
+    // What m lost is of positions, which may be far from the origin.
+    const double far = mSum + sumOfMagnitudes(p0) + sumOfMagnitudes(p1) + sumOfMagnitudes(q0) +
+                       sumOfMagnitudes(q1);
+    if (std::min(uSum, vSum) > kSmallestModerate && far < kLargestModerate)
+      if (const auto decision = compensatedTerms(edges, far, uSum, vSum).decision())
+        return {*decision, false};
+  }
+  return {exact::crossing(p0, p1, q0, q1), true};
 }
 
 EdgeEdgeDistance interiorDistance(const EdgePair& edges, bool decidedExactly) {
@@ -73,7 +136,12 @@ EndFoot footOfEnd(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
 
 /// Whether p lies beside edge ab, not beyond one of its ends.
 bool isBeside(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
-  return a != b && exact::along(p, a, b) >= 0 && exact::along(p, b, a) >= 0;
+  const auto isBefore = [&p](const Vector3d& from, const Vector3d& to) {
+    const Vector3d edge = to - from, beyond = from - p;
+    if (signAlong(edge, -beyond) == Sign::Positive) return false;
+    return signAlong(edge, beyond) == Sign::Positive || exact::along(p, from, to) < 0;
+  };
+  return a != b && !isBefore(a, b) && !isBefore(b, a);
 }
 
 EdgeFeature featureAt(double weight) {
@@ -155,7 +223,8 @@ EdgeEdgeDistance endDistance(const EdgePair& edges, bool parallel, bool decidedE
   const EndFeet ends(edges);
   bool tied = false;
   int nearest = ends.nearest(tied);
-  if (tied && !parallel) nearest = exact::nearestEnd(edges.p0, edges.p1, edges.q0, edges.q1);
+  tied = tied && !parallel;  // there any pair of the stretch that they share will do
+  if (tied) nearest = exact::nearestEnd(edges.p0, edges.p1, edges.q0, edges.q1);
   EdgeEdgeDistance answer = ends.answer(nearest);
   answer.exact = answer.exact || decidedExactly || tied;
   answer.parallel = parallel;

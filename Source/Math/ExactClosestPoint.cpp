@@ -37,11 +37,23 @@ Vector<Wide<T>> cross(const Vector<T>& a, const Vector<T>& b) {
           W(a[0]) * b[1] - W(a[1]) * b[0]};
 }
 
-/// In units of 2^-1074.
-Vector<Integer> integers(const Vector3d& a) {
-  return {scaledInteger(a[0]), scaledInteger(a[1]), scaledInteger(a[2])};
-}
-constexpr int kUnit = -1074;
+/// Positions in units of the largest power of two that leaves nothing over: the shortest integers.
+template <std::size_t Count>
+struct Integers {
+  std::array<Vector<Integer>, Count> at;
+  int exponent;
+
+  template <class... Positions>
+  explicit Integers(const Positions&... positions) : exponent(ExponentRange(positions...).lowest) {
+    const auto integers = [&](const Vector3d& a) -> Vector<Integer> {
+      return {scaledInteger(a[0], exponent), scaledInteger(a[1], exponent),
+              scaledInteger(a[2], exponent)};
+    };
+    at = {integers(positions)...};
+  }
+};
+template <class... Positions>
+Integers(const Positions&...) -> Integers<sizeof...(Positions)>;
 
 Vector<Integer> scaled(const Integer& factor, const Vector<Integer>& a) {
   return {factor * a[0], factor * a[1], factor * a[2]};
@@ -80,10 +92,10 @@ Vector3d unit(const Vector<Integer>& a) {
   return result;
 }
 
-/// The foot whose difference is a / denominator.
-Foot footFrom(const Vector<Integer>& a, const Integer& denominator) {
+/// The foot whose difference is a 2^exponent / denominator.
+Foot footFrom(const Vector<Integer>& a, const Integer& denominator, int exponent) {
   Foot foot{Vector3d::Zero(), unit(a), 0.0, 0.0, 0.0, true};
-  for (int i = 0; i < 3; ++i) foot.difference[i] = quotient(a[i], denominator, kUnit);
+  for (int i = 0; i < 3; ++i) foot.difference[i] = quotient(a[i], denominator, exponent);
   int longest;
   if (foot.direction.cwiseAbs().maxCoeff(&longest) > 0.0)
     foot.distance = foot.difference[longest] / foot.direction[longest];
@@ -91,10 +103,11 @@ Foot footFrom(const Vector<Integer>& a, const Integer& denominator) {
 }
 
 /// Of the perpendicular from the origin to the plane from + s u + t v.
-Foot footOnPlane(const Vector<Integer>& from, const Vector<Integer>& u, const Vector<Integer>& v) {
+Foot footOnPlane(const Vector<Integer>& from, const Vector<Integer>& u, const Vector<Integer>& v,
+                 int exponent) {
   const Vector<Integer> normal = cross(u, v);
   const Integer denominator = dot(normal, normal);
-  Foot foot = footFrom(scaled(dot(normal, from), normal), denominator);
+  Foot foot = footFrom(scaled(dot(normal, from), normal), denominator, exponent);
   foot.s = weight(dot(cross(v, from), normal), denominator);
   foot.t = weight(dot(cross(from, u), normal), denominator);
   return foot;
@@ -113,7 +126,7 @@ int signOf(const Int256& a) { return a.sign(); }
 template <class Decision, class... Positions>
 auto decide(Decision&& decision, const Positions&... positions) {
   if (const FixedGrid grid(positions...); grid.fits) return decision(grid.at);
-  return decision(std::array{integers(positions)...});
+  return decision(Integers(positions...).at);
 }
 
 template <class T>
@@ -228,26 +241,28 @@ bool areCoplanar(const Vector3d& a, const Vector3d& b, const Vector3d& c, const 
 }
 
 Foot footOnPoint(const Vector3d& p, const Vector3d& a) {
-  return footFrom(integers(p) - integers(a), 1);
+  const auto [at, exponent] = Integers(p, a);
+  return footFrom(at[0] - at[1], 1, exponent);
 }
 
 Foot footOnLine(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
-  const Vector<Integer> from = integers(p) - integers(a), edge = integers(b) - integers(a);
+  const auto [at, exponent] = Integers(p, a, b);
+  const Vector<Integer> from = at[0] - at[1], edge = at[2] - at[1];
   const Integer numerator = dot(from, edge), denominator = dot(edge, edge);
-  Foot foot = footFrom(scaled(denominator, from) - scaled(numerator, edge), denominator);
+  Foot foot = footFrom(scaled(denominator, from) - scaled(numerator, edge), denominator, exponent);
   foot.s = weight(numerator, denominator);
   return foot;
 }
 
 Foot footOnPlane(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-  const Vector<Integer> origin = integers(a);
-  return footOnPlane(integers(p) - origin, origin - integers(b), origin - integers(c));
+  const auto [at, exponent] = Integers(p, a, b, c);
+  return footOnPlane(at[0] - at[1], at[1] - at[2], at[1] - at[3], exponent);
 }
 
 Foot footBetweenLines(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0,
                       const Vector3d& q1) {
-  const Vector<Integer> p = integers(p0), q = integers(q0);
-  return footOnPlane(p - q, integers(p1) - p, q - integers(q1));
+  const auto [at, exponent] = Integers(p0, p1, q0, q1);
+  return footOnPlane(at[0] - at[2], at[1] - at[0], at[2] - at[3], exponent);
 }
 
 namespace {
@@ -269,7 +284,7 @@ Quotient squaredDistanceToEdge(const Vector<Integer>& p, const Vector<Integer>& 
 }  // namespace
 
 int nearestEnd(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0, const Vector3d& q1) {
-  const std::array at{integers(p0), integers(p1), integers(q0), integers(q1)};
+  const auto at = Integers(p0, p1, q0, q1).at;
   int nearest = 0;
   Quotient least = squaredDistanceToEdge(at[0], at[2], at[3]);
   for (int i = 1; i < 4; ++i) {
@@ -284,7 +299,8 @@ int nearestEnd(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0, const
 }
 
 Vector3d unitCross(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
-  return unit(cross(integers(b) - integers(a), integers(d) - integers(c)));
+  const auto at = Integers(a, b, c, d).at;
+  return unit(cross(at[1] - at[0], at[3] - at[2]));
 }
 
 }  // namespace palpate::exact

@@ -47,6 +47,10 @@ constexpr double kTie = 1 + 0x1p-49;
 constexpr double kNarrowAngleSquare = 0x1p-16;
 /// Squared sine below which the compensated Newton step is left to integers.
 constexpr double kSliverAngleSquare = 0x1p-40;
+/// Of accurateCross(), in the sum of magnitudes: relative to the result, and to the product of the
+/// factors' sums (3 2^-103, and m's own 2^-104 of the positions).
+constexpr double kAccurateCrossError = 0x1p-52;
+constexpr double kAccurateCrossLoss = 0x1p-101;
 
 // ---- Volumes and areas (Predicates.h, which has the derivations) ----
 

@@ -53,6 +53,25 @@ inline DoubleParts splitDouble(double x) {
   return {fraction | std::uint64_t{1} << 52, exponent - 1075};
 }
 
+/// The exponent of the largest power of two of which all coordinates are multiples, and of one
+/// above them all; none is of zeros.
+struct ExponentRange {
+  static constexpr int kNone = 2000;
+  int lowest = kNone, highest = -kNone;
+
+  template <class... Positions>
+  explicit ExponentRange(const Positions&... positions) {
+    for (const Eigen::Vector3d* position : {&positions...}) {
+      for (const double x : *position) {
+        const auto [mantissa, exponent] = splitDouble(x);
+        if (mantissa == 0) continue;
+        lowest = std::min(lowest, exponent + std::countr_zero(mantissa));
+        highest = std::max(highest, exponent + 53);
+      }
+    }
+  }
+};
+
 /// Positions as integers in units of a power of two, exactly, where differences fit 61 bits: of
 /// meshes near each other whose coordinates have not many more bits than a double.
 template <std::size_t Count>
@@ -63,15 +82,7 @@ struct FixedGrid {
   template <class... Positions>
   explicit FixedGrid(const Positions&... positions) {
     const std::array<const Eigen::Vector3d*, Count> all{&positions...};
-    int lowest = kHighestBit, highest = -kHighestBit;
-    for (const Eigen::Vector3d* position : all) {
-      for (const double x : *position) {
-        const auto [mantissa, exponent] = splitDouble(x);
-        if (mantissa == 0) continue;
-        lowest = std::min(lowest, exponent + std::countr_zero(mantissa));
-        highest = std::max(highest, exponent + 53);
-      }
-    }
+    const auto [lowest, highest] = ExponentRange(positions...);
     fits = highest - lowest <= 120;
     for (int i = 0; i < 3 && fits; ++i) {
       const Int128 origin = integer((*all[0])[i], lowest);
@@ -84,7 +95,6 @@ struct FixedGrid {
   }
 
  private:
-  static constexpr int kHighestBit = 2000;
   static constexpr Int128 kLimit = Int128{1} << 60;  // differences of two stay below 2^61
 
   static Int128 integer(double x, int lowest) {

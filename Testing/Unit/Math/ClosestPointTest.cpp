@@ -1,5 +1,6 @@
 #include "Math/ClosestPoint.h"
 
+#include "Math/ExactClosestPoint.h"
 #include "RationalOracle.h"
 
 #include <Eigen/Geometry>
@@ -444,6 +445,45 @@ TEST(ClosestPoint, NaNGivesNaN) {
     EXPECT_TRUE(
         std::isnan(edgeEdgeDistance({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, bad, 1}).distance));
   }
+}
+
+/// Edges of grids that lie on each other, as computed coordinates make them: exactly parallel, or
+/// by a rounding not; far from the origin, and with what is left over of zero.
+TEST(ClosestPoint, TellsHowEdgesOfGridsCross) {
+  std::mt19937 random(11);
+  const auto below = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
+  int parallel = 0, interior = 0, outside = 0, inIntegers = 0;
+  for (int repeat = 0; repeat < 40000; ++repeat) {
+    const double edge = 2.0 / 30;
+    const Vector3d far = below(4) ? Vector3d(0, 0, 0) : Vector3d(1e4, -3e5, 7e3);
+    const int sideways = below(3), x = below(30), y = below(30);
+    const auto onGrid = [&](int i, int j, const Vector3d& moved) -> Vector3d {
+      return far + (Vector3d(i * edge - 1, j * edge - 1, 0) + moved);
+    };
+    const int alongX = sideways != 1, alongY = sideways != 0;
+    const Vector3d moved(below(2) ? 0.3 * edge : 0.0, below(2) ? 0.1 * edge : 0.0,
+                         below(2) ? 0.03 * edge : std::ldexp(1.0, -1074));
+    Vector3d p0 = onGrid(x, y, Vector3d::Zero()),
+             p1 = onGrid(x + alongX, y + alongY, Vector3d::Zero());
+    const int i = x + below(3) - 1, j = y + below(3) - 1;
+    Vector3d q0 = onGrid(i, j, moved), q1 = onGrid(i + alongX, j + alongY, moved);
+    if (below(3) == 0) q1[below(3)] += (below(2) ? 1 : -1) * std::ldexp(1.0, -54);
+    if (below(8) == 0)
+      for (Vector3d* position : {&p0, &p1, &q0, &q1}) *position *= below(2) ? 0x1p-980 : 0x1p300;
+    const Crossing truth = exact::crossing(p0, p1, q0, q1);
+    const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(p0, p1, q0, q1);
+    ASSERT_EQ(answer.parallel, truth == Crossing::Parallel) << repeat;
+    ASSERT_EQ(crossingEdgesDistance(p0, p1, q0, q1).has_value(), truth == Crossing::Interior)
+        << repeat;
+    parallel += truth == Crossing::Parallel;
+    interior += truth == Crossing::Interior;
+    outside += truth == Crossing::Outside;
+    inIntegers += truth == Crossing::Parallel && answer.exact;
+  }
+  EXPECT_GT(parallel, 10000);
+  EXPECT_GT(outside, 5000);
+  EXPECT_GT(interior, 1);
+  EXPECT_LT(inIntegers, parallel / 3);
 }
 
 }  // namespace
