@@ -59,10 +59,14 @@ void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame&
   });
 }
 
-/// Boxes in the order of orderedTriangles, and those of the groups.
+/// Boxes in the order of orderedTriangles, and those of the groups; in a new order these come
+/// first.
 void computeBoxes(Geometry& geometry, std::span<const std::uint32_t> groups, FloatBox* groupBoxes,
-                  std::size_t grain, const Threads& threads) {
+                  std::size_t grain, const Threads& threads, bool reordered = false) {
+  const std::vector<Triangle>& triangles = geometry.mesh.topology.triangles;
   threads.forChunks(groups.size() - 1, grain, [&](std::size_t, std::size_t from, std::size_t to) {
+    for (std::size_t i = groups[from]; reordered && i < groups[to]; ++i)
+      geometry.orderedTriangles[i] = triangles[geometry.octree.order()[i]];
     triangleBoxes(geometry.floats.data(),
                   geometry.treeSwept ? geometry.floatsBefore.data() : nullptr,
                   geometry.orderedTriangles.data(), groups.subspan(from, to - from + 1),
@@ -99,17 +103,14 @@ void rebuild(Geometry& geometry, const OctreeSettings& settings, const Threads& 
   // Triangles in the old order are of no use any more: their memory is the keys'.
   auto* keys = reinterpret_cast<std::uint64_t*>(geometry.orderedTriangles.data());
   octree.build(bounds, geometry.spread * geometry.frame.scale, settings, keys, threads);
-  threads.forChunks(triangles.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-    for (std::size_t i = from; i < to; ++i)
-      geometry.orderedTriangles[i] = triangles[octree.order()[i]];
-  });
   geometry.octreeMilliseconds += watch.lap();
 }
 
-void fitBoxes(Geometry& geometry, const OctreeSettings& settings, const Threads& threads) {
+void fitBoxes(Geometry& geometry, const OctreeSettings& settings, const Threads& threads,
+              bool rebuilt) {
   Stopwatch watch;
   computeBoxes(geometry, geometry.octree.groups(), geometry.octree.groupBoxes(), kGroupGrain,
-               threads);
+               threads, rebuilt);
   geometry.boxMilliseconds += watch.lap();
   geometry.octree.fit(threads);
   if (settings.update == OctreeUpdate::Auto) geometry.octree.measureLooseness();
@@ -131,12 +132,12 @@ void updateOctree(Geometry& geometry, const OctreeSettings& settings, const Thre
     computeFloats(geometry.mesh.before.body(), geometry.frame, geometry.floatsBefore, threads);
   geometry.boxMilliseconds += watch.lap();
   if (geometry.treeKnown && settings.update == OctreeUpdate::Auto) {
-    fitBoxes(geometry, settings, threads);
+    fitBoxes(geometry, settings, threads, false);
     geometry.lastUpdate = Update::Refitted;
     if (geometry.octree.looseness() <= kMostLoosening * geometry.octree.leastLooseness()) return;
   }
   rebuild(geometry, settings, threads);
-  fitBoxes(geometry, settings, threads);
+  fitBoxes(geometry, settings, threads, true);
   geometry.lastUpdate = Update::Rebuilt;
 }
 

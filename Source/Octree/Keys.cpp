@@ -15,23 +15,24 @@ namespace palpate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Puts two zero bits between each two of the low ten bits.
+/// Puts three zero bits between each two of the low eight bits.
 template <class V>
 HWY_INLINE V spreadBits(V v) {
   const hn::DFromV<V> d;
-  v = hn::And(hn::Or(v, hn::ShiftLeft<16>(v)), hn::Set(d, 0x030000ff));
-  v = hn::And(hn::Or(v, hn::ShiftLeft<8>(v)), hn::Set(d, 0x0300f00f));
-  v = hn::And(hn::Or(v, hn::ShiftLeft<4>(v)), hn::Set(d, 0x030c30c3));
-  return hn::And(hn::Or(v, hn::ShiftLeft<2>(v)), hn::Set(d, 0x09249249));
+  v = hn::And(hn::Or(v, hn::ShiftLeft<12>(v)), hn::Set(d, 0x000f000f));
+  v = hn::And(hn::Or(v, hn::ShiftLeft<6>(v)), hn::Set(d, 0x03030303));
+  return hn::And(hn::Or(v, hn::ShiftLeft<3>(v)), hn::Set(d, 0x11111111));
 }
 
 HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slots,
-                               std::uint32_t first, std::size_t size, const Cube& cube,
-                               KeyLayout layout, std::uint64_t* keys) {
+                               std::uint32_t first, std::size_t size, const Cube& cube, int levels,
+                               std::uint64_t* keys) {
   const hn::CappedTag<float, 16> d;
   const hn::RebindToSigned<decltype(d)> di;
+  const hn::RebindToUnsigned<decltype(d)> du;
   const std::size_t lanes = hn::Lanes(d);
-  const float cells = static_cast<float>(1 << layout.levels);
+  constexpr int kCells = 1 << Key::kMostLevels;
+  const float cells = kCells;
   const auto cellsPerUnit = hn::Set(d, static_cast<float>(cells / cube.edge));
   const auto slack = hn::Set(d, 1.0f + 0x1p-10f);
   const auto half = hn::Set(d, 0.5f);
@@ -39,8 +40,8 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
   const auto edgeExponent = hn::Set(
       di,
       static_cast<std::int32_t>(std::bit_cast<std::uint32_t>(static_cast<float>(cube.edge)) >> 23));
-  const auto deepest = hn::Set(di, layout.levels);
-  const auto zero = hn::Zero(di), lastCell = hn::Set(di, (1 << layout.levels) - 1);
+  const auto deepest = hn::Set(di, levels);
+  const auto zero = hn::Zero(di), lastCell = hn::Set(di, kCells - 1);
   // Gathered, unless the slots are consecutive, well before it is read as vectors: a load that
   // spans fresh narrower stores waits for them.
   constexpr std::size_t kGathered = 64;
@@ -54,10 +55,10 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
     if (slots && place == 0) {
       const std::size_t last = (size - i < kGathered ? size - i : kGathered) - 1;
       // They ascend: equal keys stay in order.
-      first = static_cast<std::uint32_t>(slots[i]) - static_cast<std::uint32_t>(i);
-      gathers = static_cast<std::uint32_t>(slots[i + last]) - first != i + last;
+      first = Key::slot(slots[i]) - static_cast<std::uint32_t>(i);
+      gathers = Key::slot(slots[i + last]) - first != i + last;
       for (std::size_t next = 0; gathers && next <= last; ++next) {
-        const auto slot = static_cast<std::uint32_t>(slots[i + next]);
+        const std::uint32_t slot = Key::slot(slots[i + next]);
         gatheredSlots[next] = static_cast<std::int32_t>(slot);
         for (int k = 0; k < 3; ++k) {
           gathered[k][next] = boxes.lower[k][slot];
@@ -86,19 +87,32 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
     const auto sizeBits = hn::BitCast(di, longest * slack);
     const auto sizeExponent = hn::ShiftRight<23>(sizeBits + hn::Set(di, 0x7fffff));
     const auto level = hn::Min(hn::Max(edgeExponent - sizeExponent, zero), deepest);
-    const auto coarse = deepest - level;
-    for (int k = 0; k < 3; ++k) cell[k] = spreadBits(hn::Shl(hn::Shr(cell[k], coarse), coarse));
-    const auto morton =
-        hn::Or(cell[0], hn::Or(hn::ShiftLeft<1>(cell[1]), hn::ShiftLeft<2>(cell[2])));
-    // Slot and key side by side are a little-endian key << 32 | slot.
-    const auto key = hn::Or(hn::ShiftLeft<KeyLayout::kLevelBits>(morton), level);
+    // Eight levels in the upper half; the ninth in the lower one, above the slot.
+    static_assert(Key::kMostLevels == 9 && Key::kDigitBits == 4 && Key::kSlotBits == 28);
+    const auto octants = [&](auto x, auto y, auto z) {
+      return hn::Or(hn::Or(x, hn::ShiftLeft<1>(y)), hn::ShiftLeft<2>(z));
+    };
+    const auto digits = hn::Or(hn::Set(du, 0x88888888u),
+                               hn::BitCast(du, octants(spreadBits(hn::ShiftRight<1>(cell[0])),
+                                                       spreadBits(hn::ShiftRight<1>(cell[1])),
+                                                       spreadBits(hn::ShiftRight<1>(cell[2])))));
+    // By half of its digits' bits twice: a shift by all 32 is none.
+    const auto halfBits = hn::BitCast(du, level + level);
+    const auto tooSmall = hn::Shr(hn::Shr(hn::Set(du, ~0u), halfBits), halfBits);
+    const auto key = hn::BitCast(di, hn::AndNot(tooSmall, digits));
+    const auto one = hn::Set(di, 1);
+    const auto last = hn::Or(hn::Set(di, 8), octants(hn::And(cell[0], one), hn::And(cell[1], one),
+                                                     hn::And(cell[2], one)));
+    const auto ninth = hn::IfThenElseZero(hn::Eq(level, hn::Set(di, Key::kMostLevels)),
+                                          hn::ShiftLeft<Key::kSlotBits>(last));
     const auto slot = gathers ? hn::LoadU(di, gatheredSlots + place)
                               : hn::Iota(di, static_cast<std::int32_t>(first + i));
+    const auto low = hn::Or(ninth, slot);
     auto* out = reinterpret_cast<std::int32_t*>(keys + i);
     if (count == lanes) {
-      hn::StoreInterleaved2(slot, key, di, out);
+      hn::StoreInterleaved2(low, key, di, out);
     } else {
-      hn::StoreInterleaved2(slot, key, di, made);
+      hn::StoreInterleaved2(low, key, di, made);
       std::memcpy(out, made, count * sizeof(std::uint64_t));
     }
   }
@@ -113,11 +127,11 @@ namespace palpate {
 HWY_EXPORT(octreeKeysKernel);
 
 void octreeKeys(const BoxArrays& boxes, const std::uint64_t* slots, std::uint32_t first,
-                std::size_t size, const Cube& cube, KeyLayout layout, std::uint64_t* keys) {
+                std::size_t size, const Cube& cube, int levels, std::uint64_t* keys) {
   PALPATE_ASSERT(!slots || std::is_sorted(slots, slots + size, [](auto l, auto r) {
-    return static_cast<std::uint32_t>(l) < static_cast<std::uint32_t>(r);
+    return Key::slot(l) < Key::slot(r);
   }));
-  HWY_DYNAMIC_DISPATCH(octreeKeysKernel)(boxes, slots, first, size, cube, layout, keys);
+  HWY_DYNAMIC_DISPATCH(octreeKeysKernel)(boxes, slots, first, size, cube, levels, keys);
 }
 
 }  // namespace palpate

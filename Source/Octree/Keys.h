@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <span>
 
 namespace palpate {
 
@@ -25,26 +24,29 @@ struct Cube {
 /// Cells are not split below this: floats could not tell their children's sizes any more.
 constexpr float kSmallestCell = 0x1p-100f;
 
-/// A key within a cube: Morton code of the cell at kKeyLevels or less, then its level; so that keys
-/// sorted put a cell's own primitives first and every subtree in one range.
-struct KeyLayout {
-  static constexpr int kMostLevels = 9;
-  static constexpr int kLevelBits = 4;
+/// A key within a cube, and behind it a slot. Four bits for each level from the cube's children
+/// down: 8 + the octant that the centre lies in, or 0 where cells are too small. So keys sorted put
+/// a cell's own primitives first and every subtree in one range, and keys sorted by their first
+/// digits do so for the first levels.
+struct Key {
+  static constexpr int kMostLevels = 9, kDigitBits = 4, kSlotBits = 28;
+  static constexpr std::uint64_t kOctant = 8;
 
-  int levels;  ///< the finest, [1, kMostLevels]
-
-  int bits() const { return 3 * levels + kLevelBits; }
-  int level(std::uint32_t key) const { return static_cast<int>(key & ((1u << kLevelBits) - 1)); }
-  /// The child of its cell at `level` that the key lies in.
-  unsigned octant(std::uint32_t key, int level) const { return key >> octantShift(level) & 7; }
-  int octantShift(int level) const { return kLevelBits + 3 * (levels - 1 - level); }
+  /// The digits after the first `level`, as many as asked for.
+  static std::uint64_t digits(std::uint64_t key, int level, int count) {
+    return key >> (64 - kDigitBits * (level + count)) &
+           ((std::uint64_t{1} << kDigitBits * count) - 1);
+  }
+  static std::uint32_t slot(std::uint64_t key) {
+    return static_cast<std::uint32_t>(key) & ((1u << kSlotBits) - 1);
+  }
 };
 
-/// keys[i] = key << 32 | slot, for the box of each slot: level from its size, the deepest whose
+/// keys[i], for the box of each slot: level from its size, the deepest of at most `levels` whose
 /// cell edge is not shorter than its longest side (a part in a thousand is kept for rounding), and
 /// cell from its centre.
-/// Shapes   slots: of `boxes`, ascending; null: first, first + 1, ...
+/// Shapes   slots: keys whose slots are those of `boxes`, ascending; null: first, first + 1, ...
 void octreeKeys(const BoxArrays& boxes, const std::uint64_t* slots, std::uint32_t first,
-                std::size_t size, const Cube&, KeyLayout, std::uint64_t* keys);
+                std::size_t size, const Cube&, int levels, std::uint64_t* keys);
 
 }  // namespace palpate

@@ -3,23 +3,12 @@
 #include "Core/Assert.h"
 
 #include <algorithm>
-#include <bit>
-#include <numeric>
 
 namespace palpate {
 
-/// A cell that needs second keys is one task's up to this size: sorted in the top it would keep
+/// A cell whose keys are not sorted is one task's up to this size: sorted in the top it would keep
 /// other threads waiting.
 constexpr std::uint32_t kMostInOneTask = 8192;
-
-int keyLevels(std::size_t size, const OctreeSettings& settings, int depth) {
-  const std::size_t leaves = size / static_cast<std::size_t>(settings.maxPrimitivesPerLeaf) + 1;
-  const int levels = (std::bit_width(leaves) + 1) / 2 +
-                     2;  // a surface fills a quarter of the cells of the next level
-  return std::clamp(levels, 1,
-                    std::min(KeyLayout::kMostLevels, std::max(1, settings.maxDepth - depth)));
-}
-
 void Octree::Layout::clear() {
   links.clear();
   parents.clear();
@@ -30,7 +19,7 @@ void Octree::Layout::clear() {
   tasks.clear();
 }
 
-void Octree::Layout::layOutTop(Octree& octree, const Job& root, const OctreeSettings& settings,
+void Octree::Layout::layOutTop(Octree& octree, Job root, const OctreeSettings& settings,
                                std::uint32_t taskSize, const Threads& threads) {
   clear();
   m_mostPerLeaf = static_cast<std::uint32_t>(settings.maxPrimitivesPerLeaf);
@@ -77,61 +66,59 @@ std::uint32_t Octree::Layout::leaf(std::uint32_t begin, std::uint32_t end, Octre
   return OctreeBlock::kLeaf | (end - begin);
 }
 
-std::uint32_t Octree::Layout::layOut(Octree& octree, Job job) {
+std::uint32_t Octree::Layout::layOut(Octree& octree, Job& job) {
   const std::uint32_t size = job.end - job.begin;
   if (size <= m_mostPerLeaf || job.depth >= m_maxDepth || job.cube.edge <= kSmallestCell)
     return leaf(job.begin, job.end, job.node);
-  // Too full at the keys' last level: split further by second keys inside the cell.
-  const bool rekey = job.level == job.keys.levels;
-  if (m_taskSize > 0 && size <= (rekey ? std::max(m_taskSize, kMostInOneTask) : m_taskSize)) {
+  const bool sorted = job.level < job.sorted;
+  if (m_taskSize > 0 && size <= (sorted ? m_taskSize : std::max(m_taskSize, kMostInOneTask))) {
+    job.sorted = job.level;  // `ends` are gone by then
     tasks.push_back(job);
     leaf(job.begin, job.end, kTask | static_cast<std::uint32_t>(tasks.size() - 1));
     return 0;  // known when the tasks are done
   }
-  if (rekey) {
-    // Where most of the tree is still in one cell it is tiny in the root, and the more levels at
-    // once the better.
-    const bool tiny = 2 * std::size_t{size} > octree.size();
-    job.keys.levels =
-        keyLevels(tiny ? SIZE_MAX : size,
-                  {.maxDepth = m_maxDepth, .maxPrimitivesPerLeaf = int(m_mostPerLeaf)}, job.depth);
-    job.level = 0;
-    octree.sortKeys(job.begin, job.end, true, job.cube, job.keys, m_threads);
+  if (sorted) return split(octree, job, partsOf(octree, job));
+  Sorting sorting{job.begin, job.end, job.level};
+  if (job.level == job.levels) {  // the first keys, or second ones inside a cell too full
+    sorting.first = job.levels == 0;
+    sorting.level = job.level = 0;
+    sorting.levels = job.levels = std::min(Key::kMostLevels, m_maxDepth - job.depth);
+    sorting.cube = &job.cube;
   }
-  std::uint32_t own = 0;
-  while (own < size && job.keys.level(octree.key(job.begin + own)) == job.level) ++own;
-  if (own == size) return leaf(job.begin, job.end, job.node);
-  return split(octree, job, own);
+  if (size > Sorting::kFew) return sortMany(octree, job, sorting);
+  job.sorted = job.level + 1;
+  return split(octree, job, octree.sortFewKeys(sorting));
 }
 
-/// Where the octants of a range of sorted keys begin: seven binary searches side by side, without
-/// branches, so that none waits for another's loads.
-std::array<std::uint32_t, 9> Octree::octantBegins(std::uint32_t begin, std::uint32_t end,
-                                                  int shift) const {
+/// In a stack frame of its own, as large as its bins.
+[[gnu::noinline]] std::uint32_t Octree::Layout::sortMany(Octree& octree, Job& job,
+                                                         Sorting& sorting) {
+  const bool many = job.end - job.begin >= Sorting::kMany;
+  sorting.digits = job.digits =
+      std::min(many ? Sorting::kMostDigits : 2, Key::kMostLevels - job.level);
+  std::array<std::uint32_t, 1 << Key::kDigitBits * Sorting::kMostDigits> ends;
+  octree.sortKeys(sorting, ends.data(), m_threads);
+  job.ends = ends.data();
+  job.sorted = job.level + job.digits;
+  return split(octree, job, partsOf(octree, job));
+}
+
+/// Where the octants of a sorted range begin, and where it ends.
+std::array<std::uint32_t, 9> Octree::Layout::partsOf(const Octree& octree, const Job& job) {
+  const int below = Key::kDigitBits * (job.sorted - job.level - 1);
+  std::uint64_t bin = Key::digits(octree.m_keys[job.begin], job.sorted - job.digits, job.digits);
+  bin = bin >> (below + Key::kDigitBits) << (below + Key::kDigitBits);
   std::array<std::uint32_t, 9> begins;
-  begins.fill(begin);
-  begins[8] = end;
-  if (begin == end) return begins;
-  const std::uint64_t cell = m_keys[begin] >> 32 >> shift & ~std::uint64_t{7};
-  const std::uint64_t* places[8];
-  std::uint64_t bounds[8];
-  for (unsigned slot = 1; slot < 8; ++slot) {
-    places[slot] = m_keys + begin;
-    bounds[slot] = (cell | slot) << shift << 32;
-  }
-  for (std::size_t length = end - begin; length > 0;) {
-    const std::size_t half = (length + 1) / 2;
-    for (unsigned slot = 1; slot < 8; ++slot)
-      places[slot] += half & -std::size_t{places[slot][half - 1] < bounds[slot]};
-    length -= half;
-  }
-  for (unsigned slot = 1; slot < 8; ++slot)
-    begins[slot] = static_cast<std::uint32_t>(places[slot] - m_keys);
+  begins[0] = job.ends[bin];
+  for (std::uint64_t octant = 0; octant < 8; ++octant)
+    begins[octant + 1] = job.ends[bin + ((Key::kOctant + octant + 1) << below) - 1];
   return begins;
 }
 
-std::uint32_t Octree::Layout::split(Octree& octree, const Job& job, std::uint32_t own) {
-  if (own > 0) leaf(job.begin, job.begin + own, job.node);
+std::uint32_t Octree::Layout::split(Octree& octree, const Job& job,
+                                    const std::array<std::uint32_t, 9>& begins) {
+  if (begins[0] == job.end) return leaf(job.begin, job.end, job.node);
+  if (begins[0] > job.begin) leaf(job.begin, begins[0], job.node);
   reserveGroups();
   const auto block = static_cast<std::uint32_t>(links.size());
   if (block == links.capacity()) {  // by less than std::vector would: there are many layouts
@@ -140,8 +127,6 @@ std::uint32_t Octree::Layout::split(Octree& octree, const Job& job, std::uint32_
   }
   links.emplace_back();
   parents.push_back(job.node);
-  const std::array<std::uint32_t, 9> begins =
-      octree.octantBegins(job.begin + own, job.end, job.keys.octantShift(job.level));
   for (unsigned slot = 0; slot < 8; ++slot) {
     links[block].begin[slot] = begins[slot];
     links[block].child[slot] = OctreeBlock::kLeaf | (begins[slot + 1] - begins[slot]);
@@ -150,9 +135,14 @@ std::uint32_t Octree::Layout::split(Octree& octree, const Job& job, std::uint32_
     const std::uint32_t size = begins[slot + 1] - begins[slot];
     const OctreeNode node = block * 8 + slot;
     if (size > m_mostPerLeaf) {
-      const std::uint32_t child =
-          layOut(octree, {begins[slot], begins[slot + 1], job.level + 1, job.depth + 1, job.keys,
-                          job.cube.child(slot), node});
+      Job part = job;
+      part.begin = begins[slot];
+      part.end = begins[slot + 1];
+      part.cube = job.cube.child(slot);
+      part.node = node;
+      ++part.depth;
+      ++part.level;
+      const std::uint32_t child = layOut(octree, part);
       links[block].child[slot] = child;
       reserveGroups();
     } else {

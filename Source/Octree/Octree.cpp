@@ -1,11 +1,9 @@
 #include "Octree/Octree.h"
 
 #include "Core/Assert.h"
-#include "Core/RadixSort.h"
 #include "Octree/Fit.h"
 #include "Octree/Layout.h"
 
-#include <atomic>
 #include <cmath>
 #include <numeric>
 
@@ -16,10 +14,9 @@ namespace {
 /// Below this, one thread is faster than handing out work.
 constexpr std::size_t kSerialSize = 16384;
 constexpr std::size_t kGrain = 8192;
-/// Of a sort's passes: at least eight parts, so that a thread keeps about its half from pass to
+/// Of passes over keys: at least eight parts, so that a thread keeps about its half from pass to
 /// pass.
 std::size_t grainOf(std::size_t size) { return std::clamp<std::size_t>(size / 8, 1024, kGrain); }
-constexpr std::size_t kRadixOnly = 8192;
 
 double halfArea(const FloatBox& box) {
   const double x = double{box.upper[0]} - box.lower[0], y = double{box.upper[1]} - box.lower[1],
@@ -75,65 +72,6 @@ void Octree::reset(std::size_t size) {
   m_pool.use(0);
 }
 
-void Octree::sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const Cube& cube,
-                      KeyLayout layout, const Threads* threads) {
-  const std::size_t size = end - begin;
-  const std::uint64_t* slots = rekey ? m_keys + begin : nullptr;
-  const int low = 32, high = 32 + layout.bits();
-  const std::span keys(m_keys + begin, size), scratch(m_keysScratch + begin, size);
-  if (size < kRadixOnly || !threads) {
-    octreeKeys(m_boxes, slots, begin, size, cube, layout, scratch.data());
-    radixSort(scratch, keys, low, high);
-    return;
-  }
-  // Keys in parallel; then by their first digit into bins that fit the cache; then each bin.
-  const int topBits = std::min(size < 32768 ? 8 : 9, 3 * layout.levels), topShift = high - topBits;
-  const std::size_t bins = std::size_t{1} << topBits, grain = grainOf(size),
-                    halves = 2 * ((size + grain - 1) / grain);
-  m_binCounts.resize(bins * halves);
-  // Each chunk in two halves at once: nearly sorted keys meet the same count again and again, each
-  // time waiting for its last store.
-  const auto forHalves = [&](std::size_t chunk, std::size_t from, std::size_t to, auto&& f) {
-    std::uint32_t *first = m_binCounts.data() + 2 * chunk * bins, *second = first + bins;
-    const std::size_t half = (to - from) / 2;
-    for (std::size_t i = from; i < from + half; ++i) {
-      f(first[keys[i] >> topShift], i);
-      f(second[keys[i + half] >> topShift], i + half);
-    }
-    if ((to - from) & 1) f(second[keys[to - 1] >> topShift], to - 1);
-  };
-  std::atomic<bool> ordered = true;
-  threads->forChunks(size, grain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
-    octreeKeys(m_boxes, slots ? slots + from : nullptr, static_cast<std::uint32_t>(begin + from),
-               to - from, cube, layout, keys.data() + from);
-    if (!std::is_sorted(keys.data() + from, keys.data() + to))
-      ordered.store(false, std::memory_order_relaxed);
-    std::fill_n(m_binCounts.data() + 2 * chunk * bins, 2 * bins, 0u);
-    forHalves(chunk, from, to, [](std::uint32_t& count, std::size_t) { ++count; });
-  });
-  for (std::size_t i = grain; i < size; i += grain) ordered = ordered && keys[i - 1] < keys[i];
-  if (ordered) return;  // as where nearly all are in one cell
-  m_binBegins.resize(bins + 1);
-  std::uint32_t sum = 0;
-  for (std::size_t bin = 0; bin < bins; ++bin) {
-    m_binBegins[bin] = sum;
-    for (std::size_t half = 0; half < halves; ++half)
-      sum += std::exchange(m_binCounts[half * bins + bin], sum);
-  }
-  m_binBegins[bins] = sum;
-  threads->forChunks(size, grain, [&](std::size_t chunk, std::size_t from, std::size_t to) {
-    forHalves(chunk, from, to,
-              [&](std::uint32_t& next, std::size_t i) { scratch[next++] = keys[i]; });
-  });
-  threads->forChunks(bins, 8, [&](std::size_t, std::size_t from, std::size_t to) {
-    for (std::size_t bin = from; bin < to; ++bin) {
-      const std::size_t place = m_binBegins[bin], count = m_binBegins[bin + 1] - place;
-      if (count > 0)
-        radixSort(scratch.subspan(place, count), keys.subspan(place, count), low, topShift);
-    }
-  });
-}
-
 void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& settings,
                    std::uint64_t* keyScratch, const Threads& threads) {
   const auto size = static_cast<std::uint32_t>(m_order.size());
@@ -142,25 +80,28 @@ void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& se
   m_keys = keyScratch;
   m_pool.use((size * sizeof(std::uint64_t) + sizeof(OctreeBlock) - 1) / sizeof(OctreeBlock));
   m_keysScratch = reinterpret_cast<std::uint64_t*>(m_pool.data());
-  const KeyLayout keys{keyLevels(size, settings, 0)};
-  sortKeys(0, size, false, m_rootCube, keys, &threads);
 
   if (m_layouts.empty()) m_layouts.resize(1);
   const std::uint32_t taskSize = size < kSerialSize ? 0 : std::max<std::uint32_t>(size / 64, 1024);
-  m_layouts[0].layOutTop(*this, {0, size, 0, 0, keys, m_rootCube, 0}, settings, taskSize, threads);
+  m_layouts[0].layOutTop(*this, {0, size, m_rootCube, 0}, settings, taskSize, threads);
   const std::size_t tasks = m_layouts[0].tasks.size();
   if (m_layouts.size() < tasks + 1) m_layouts.resize(tasks + 1);
   Layout* layouts = m_layouts.data();
   threads.forEach(tasks, [&](std::size_t task) {
     layouts[task + 1].layOutTask(*this, layouts[0].tasks[task], settings);
   });
-  // The keys' scratch is free now and holds the old order.
+  // A root that is a leaf may have no keys; else their scratch is free now and holds the old order.
   auto* before = reinterpret_cast<std::uint32_t*>(m_keysScratch);
-  std::copy(m_order.begin(), m_order.end(), before);
-  threads.forChunks(size, grainOf(size), [&](std::size_t, std::size_t from, std::size_t to) {
-    for (std::size_t i = from; i < to; ++i)
-      m_order[i] = before[static_cast<std::uint32_t>(m_keys[i])];
-  });
+  const bool sorted = !(layouts[0].links[0].child[0] & OctreeBlock::kLeaf);
+  threads.forChunks(sorted ? size : 0, grainOf(size),
+                    [&](std::size_t, std::size_t from, std::size_t to) {
+                      std::copy_n(m_order.data() + from, to - from, before + from);
+                    });
+  threads.forChunks(sorted ? size : 0, grainOf(size),
+                    [&](std::size_t, std::size_t from, std::size_t to) {
+                      for (std::size_t i = from; i < to; ++i)
+                        m_order[i] = before[Key::slot(m_keys[i])];
+                    });
   assemble(tasks, threads);
   m_builtNow = true;
 }
@@ -269,7 +210,7 @@ std::size_t Octree::bytes() const {
   const auto of = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
   std::size_t bytes = of(m_order) + of(m_groups) + of(m_groupNodes) + of(m_groupBoxes) +
                       of(m_groupAreas) + of(m_parents) + m_pool.allocated() * sizeof(OctreeBlock) +
-                      of(m_binCounts) + of(m_binBegins);
+                      of(m_binCounts);
   for (int k = 0; k < 3; ++k) bytes += of(m_boxes.lower[k]) + of(m_boxes.upper[k]);
   for (const Layout& layout : m_layouts)
     bytes += of(layout.links) + of(layout.parents) + of(layout.groups) + of(layout.groupNodes) +

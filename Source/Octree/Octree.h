@@ -129,18 +129,20 @@ class Octree {
 
  private:
   class Layout;
-  std::uint32_t key(std::size_t i) const { return static_cast<std::uint32_t>(m_keys[i] >> 32); }
-  std::array<std::uint32_t, 9> octantBegins(std::uint32_t begin, std::uint32_t end,
-                                            int shift) const;
-  void sortKeys(std::uint32_t begin, std::uint32_t end, bool rekey, const Cube&, KeyLayout,
-                const Threads*);
+  struct Sorting;
+  /// Keys to be sorted, where these read and do not write.
+  void takeKeys(const Sorting&, std::size_t from, std::size_t to, std::uint64_t* out) const;
+  /// `ends`: where each bin of the digits does.
+  void sortKeys(const Sorting&, std::uint32_t* ends, const Threads*);
+  /// At most kFew, by one digit. Returns where the octants begin and the range ends.
+  std::array<std::uint32_t, 9> sortFewKeys(const Sorting&);
   void assemble(std::size_t tasks, const Threads&);
 
   Buffer<std::uint32_t> m_order;
   BoxArrays m_boxes;
-  std::uint64_t* m_keys = nullptr;         ///< during a build: key << 32 | slot in the old order
+  std::uint64_t* m_keys = nullptr;         ///< during a build: slots are in the old order
   std::uint64_t* m_keysScratch = nullptr;  ///< the blocks' memory, as long as they are not made
-  Buffer<std::uint32_t> m_binCounts, m_binBegins;
+  Buffer<std::uint32_t> m_binCounts;
   Buffer<std::uint32_t> m_groups;
   Buffer<OctreeNode> m_groupNodes;  ///< the node of each group
   Buffer<FloatBox> m_groupBoxes;

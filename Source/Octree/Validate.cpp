@@ -91,7 +91,7 @@ class Validation {
       longest = std::max(longest, upper - lower);
       // The centre's cell is found in float arithmetic relative to a cube up to 2^9 times as long:
       // four roundings of 2^-24 of that. What levels keep for rounding, 2^-10 of the size, is more.
-      static_assert(KeyLayout::kMostLevels == 9);
+      static_assert(Key::kMostLevels == 9);
       const double centre = 0.5 * (lower + upper), slack = cube.edge * 0x1p-13;
       if (centre < -slack || centre > cube.edge + slack)
         fail(node, "the centre of " + primitive() + " is outside its cell");

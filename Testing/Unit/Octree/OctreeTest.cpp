@@ -1,12 +1,12 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/RandomMeshes.h"
-#include "Core/RadixSort.h"
 #include "Octree/Forest.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 namespace palpate {
@@ -92,6 +92,28 @@ TEST(Octree, IsTheSameForAnyNumberOfThreadsAndAnyHistory) {
     EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
     if (threads == 1) expected = treeOf(detection, id);
     EXPECT_EQ(treeOf(detection, id), expected);
+  }
+}
+
+/// Ever more and smaller triangles towards a point: cells of many more levels than a key has.
+TEST(Octree, HoldsSizesOfManyLevelsTheSameForAnyNumberOfThreads) {
+  Random random(12);
+  for (const std::size_t size : {255u, 256u, 1100u, 3000u, 30000u}) {
+    Mesh mesh = testing::soup(random, size, 0.2);
+    for (std::size_t t = 0; t < size; ++t) {
+      const double scale = std::exp2(-testing::randomPoint(random, 0, 24).x());
+      for (const std::uint32_t corner : mesh.triangles[t]) mesh.positions[corner] *= scale;
+    }
+    Tree expected;
+    for (const int threads : {1, 2, 3}) {
+      OctreeBasedCD detection(rebuilding(threads));
+      const GeometryId id = detection.addTriangleMesh(mesh.positions, mesh.triangles);
+      detection.update();
+      EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
+      EXPECT_GT(detection.octree().statistics().deepestLevel, size > 1000 ? 18 : 9);
+      if (threads == 1) expected = treeOf(detection, id);
+      EXPECT_EQ(treeOf(detection, id), expected);
+    }
   }
 }
 
@@ -209,26 +231,6 @@ TEST(Octree, PoolTakesBlocksBack) {
   EXPECT_GE(after.blocksAllocated, 64u);
   EXPECT_EQ(after.primitives, 50u);
   EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
-}
-
-TEST(RadixSort, IsTheStableSort) {
-  Random random(8);
-  for (const std::size_t size : {0u, 1u, 31u, 33u, 34u, 1000u, 5000u, 8192u, 8193u})
-    for (const int longest : {1, 2, 40, 9000})  // of runs of equal keys
-      for (const int high : {33, 36, 41, 44, 52, 64}) {
-        std::vector<std::uint64_t> items(size), result(size);
-        std::uint64_t key = 0;
-        for (std::size_t i = 0; i < size; ++i) {
-          if (random() % static_cast<unsigned>(longest) == 0)
-            key = random() & ~std::uint64_t{0} >> (64 - high) & ~0xffffffffull;
-          items[i] = key | i;
-        }
-        std::vector<std::uint64_t> expected = items;
-        std::stable_sort(expected.begin(), expected.end(),
-                         [](std::uint64_t l, std::uint64_t r) { return l >> 32 < r >> 32; });
-        radixSort(items, result, 32, high);
-        EXPECT_EQ(result, expected) << size << " " << longest << " " << high;
-      }
 }
 
 }  // namespace

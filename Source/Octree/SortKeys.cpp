@@ -1,0 +1,171 @@
+#include "Octree/Layout.h"
+
+#include <algorithm>
+#include <cstring>
+#include <type_traits>
+#include <utility>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "Octree/SortKeys.cpp"
+#include "Core/Simd.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate::HWY_NAMESPACE {
+
+// No vectors: newer processors' shifts by a variable take a third of the time.
+
+/// Calls f(bin, begin, end) for keys side by side in one bin. From frame to frame most stay so: by
+/// so many at once no count waits for its last store.
+template <class F>
+HWY_INLINE HWY_ATTR void forRuns(const std::uint64_t* keys, std::size_t size, int shift,
+                                 std::size_t bins, F&& f) {
+  constexpr std::size_t kRun = 8;
+  const std::size_t mask = bins - 1;
+  std::size_t i = 0;
+  for (; i + kRun <= size; i += kRun) {
+    std::uint64_t differ = 0;
+    for (std::size_t k = 1; k < kRun; ++k) differ |= keys[i] ^ keys[i + k];
+    if ((differ >> shift & mask) == 0) {
+      f(keys[i] >> shift & mask, i, std::integral_constant<std::size_t, kRun>());
+    } else {
+      for (std::size_t k = i; k < i + kRun; ++k)
+        f(keys[k] >> shift & mask, k, std::integral_constant<std::size_t, 1>());
+    }
+  }
+  for (; i < size; ++i) f(keys[i] >> shift & mask, i, std::integral_constant<std::size_t, 1>());
+}
+
+/// Counts the keys of each bin.
+HWY_ATTR void countKeysKernel(const std::uint64_t* keys, std::size_t size, int shift,
+                              std::size_t bins, std::uint32_t* counts) {
+  forRuns(keys, size, shift, bins, [=](std::size_t bin, std::size_t, auto length) {
+    counts[bin] += static_cast<std::uint32_t>(length());
+  });
+}
+
+/// Writes keys to the places of their bins.
+HWY_ATTR void scatterKeysKernel(const std::uint64_t* keys, std::size_t size, int shift,
+                                std::size_t bins, std::uint32_t* places, std::uint64_t* out) {
+  forRuns(keys, size, shift, bins, [=](std::size_t bin, std::size_t i, auto length) {
+    std::memcpy(out + places[bin], keys + i, length() * sizeof(*out));
+    places[bin] += static_cast<std::uint32_t>(length());
+  });
+}
+
+/// At most 255 keys by one digit. Returns where the octants begin, a byte each.
+HWY_ATTR std::uint64_t sortFewKeysKernel(const std::uint64_t* keys, std::size_t size, int shift,
+                                         std::uint64_t* out) {
+  // Eight counts in the bytes of one integer: none waits for its store.
+  constexpr std::uint64_t kOnes = 0x0101010101010101;
+  const auto one = [](std::uint64_t digit) {
+    return digit / Key::kOctant << digit % Key::kOctant * 8;
+  };
+  std::uint64_t counts = 0;
+  for (std::size_t i = 0; i < size; ++i) counts += one(keys[i] >> shift & 15);
+  const std::uint64_t own = size - (counts * kOnes >> 56);
+  const std::uint64_t begins = own * kOnes + (counts * kOnes << 8);
+  std::uint64_t places = begins, ownPlace = 0;
+  for (std::size_t i = 0; i < size; ++i) {
+    const std::uint64_t digit = keys[i] >> shift & 15;
+    if (HWY_UNLIKELY(digit < Key::kOctant)) {
+      out[ownPlace++] = keys[i];
+    } else {
+      out[places >> digit % Key::kOctant * 8 & 0xff] = keys[i];
+      places += one(digit);
+    }
+  }
+  return begins;
+}
+
+}  // namespace palpate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace palpate {
+
+HWY_EXPORT(countKeysKernel);
+HWY_EXPORT(scatterKeysKernel);
+HWY_EXPORT(sortFewKeysKernel);
+
+namespace {
+
+/// Calls f(bin) for each that keys can have in so many digits, ascending.
+template <int digits, class F>
+void forBins(unsigned before, F&& f) {
+  f(before << Key::kDigitBits * digits);
+  if constexpr (digits > 0)
+    for (unsigned octant = 0; octant < 8; ++octant)
+      forBins<digits - 1>(before << Key::kDigitBits | Key::kOctant | octant, f);
+}
+
+template <class F>
+void forBins(int digits, F&& f) {
+  if (digits == 1) return forBins<1>(0, f);
+  if (digits == 2) return forBins<2>(0, f);
+  forBins<3>(0, f);
+}
+
+int shiftOf(int level, int digits) { return 64 - Key::kDigitBits * (level + digits); }
+
+}  // namespace
+
+void Octree::takeKeys(const Sorting& sorting, std::size_t from, std::size_t to,
+                      std::uint64_t* out) const {
+  const std::uint64_t* keys = m_keys + sorting.begin + from;
+  if (sorting.cube)
+    octreeKeys(m_boxes, sorting.first ? nullptr : keys, static_cast<std::uint32_t>(from), to - from,
+               *sorting.cube, sorting.levels, out);
+  else
+    std::copy_n(keys, to - from, out);
+}
+
+void Octree::sortKeys(const Sorting& sorting, std::uint32_t* ends, const Threads* threads) {
+  const std::size_t size = sorting.end - sorting.begin,
+                    bins = std::size_t{1} << Key::kDigitBits * sorting.digits;
+  // A part for each thread: keys come in the same order by any.
+  const bool shared = threads && threads->count() > 1 && size >= Sorting::kShared;
+  const std::size_t wanted = shared ? static_cast<std::size_t>(threads->count()) : 1,
+                    grain = (size + wanted - 1) / wanted, parts = (size + grain - 1) / grain;
+  static_assert(Sorting::kMostDigits == 3);
+  std::array<std::uint32_t, 1 << Key::kDigitBits * Sorting::kMostDigits> ownCounts;
+  if (shared) m_binCounts.resize(bins * parts);
+  std::uint32_t* counts = shared ? m_binCounts.data() : ownCounts.data();
+  std::uint64_t* scratch = m_keysScratch + sorting.begin;
+  const int shift = shiftOf(sorting.level, sorting.digits);
+  const auto forChunks = [&](auto&& f) {
+    if (shared) return threads->forChunks(size, grain, f);
+    f(std::size_t{0}, std::size_t{0}, size);
+  };
+  forChunks([&](std::size_t chunk, std::size_t from, std::size_t to) {
+    takeKeys(sorting, from, to, scratch + from);
+    std::uint32_t* own = counts + chunk * bins;
+    std::fill_n(own, bins, 0u);
+    HWY_DYNAMIC_DISPATCH(countKeysKernel)(scratch + from, to - from, shift, bins, own);
+  });
+  std::uint32_t sum = sorting.begin;
+  forBins(sorting.digits, [&](std::size_t bin) {
+    for (std::size_t part = 0; part < parts; ++part)
+      sum += std::exchange(counts[part * bins + bin], sum);
+  });
+  forChunks([&](std::size_t chunk, std::size_t from, std::size_t to) {
+    HWY_DYNAMIC_DISPATCH(scatterKeysKernel)
+    (scratch + from, to - from, shift, bins, counts + chunk * bins, m_keys);
+  });
+  std::copy_n(counts + (parts - 1) * bins, bins, ends);
+}
+
+std::array<std::uint32_t, 9> Octree::sortFewKeys(const Sorting& sorting) {
+  const std::size_t size = sorting.end - sorting.begin;
+  std::array<std::uint64_t, Sorting::kFew> keys;
+  takeKeys(sorting, 0, size, keys.data());
+  const std::uint64_t places = HWY_DYNAMIC_DISPATCH(sortFewKeysKernel)(
+      keys.data(), size, shiftOf(sorting.level, 1), m_keys + sorting.begin);
+  std::array<std::uint32_t, 9> begins;
+  for (unsigned octant = 0; octant < 8; ++octant)
+    begins[octant] = sorting.begin + (places >> 8 * octant & 0xff);
+  begins[8] = sorting.end;
+  return begins;
+}
+
+}  // namespace palpate
+#endif
