@@ -97,18 +97,24 @@ std::uint32_t Octree::Layout::layOut(Octree& octree, Job& job) {
   sorting.digits = job.digits =
       std::min(many ? Sorting::kMostDigits : 2, Key::kMostLevels - job.level);
   std::array<std::uint32_t, 1 << Key::kDigitBits * Sorting::kMostDigits> ends;
-  octree.sortKeys(sorting, ends.data(), m_threads);
-  job.ends = ends.data();
-  job.sorted = job.level + job.digits;
+  const int alike = octree.sortKeys(sorting, ends.data(), m_threads);
+  job.ends = alike ? nullptr : ends.data();
+  job.sorted = alike ? alike : job.level + job.digits;
   return split(octree, job, partsOf(octree, job));
 }
 
 /// Where the octants of a sorted range begin, and where it ends.
 std::array<std::uint32_t, 9> Octree::Layout::partsOf(const Octree& octree, const Job& job) {
+  std::array<std::uint32_t, 9> begins;
+  if (!job.ends) {
+    const std::uint64_t digit = Key::digits(octree.m_keys[job.begin], job.level, 1);
+    for (unsigned part = 0; part < 9; ++part)
+      begins[part] = digit >= Key::kOctant + part ? job.begin : job.end;
+    return begins;
+  }
   const int below = Key::kDigitBits * (job.sorted - job.level - 1);
   std::uint64_t bin = Key::digits(octree.m_keys[job.begin], job.sorted - job.digits, job.digits);
   bin = bin >> (below + Key::kDigitBits) << (below + Key::kDigitBits);
-  std::array<std::uint32_t, 9> begins;
   begins[0] = job.ends[bin];
   for (std::uint64_t octant = 0; octant < 8; ++octant)
     begins[octant + 1] = job.ends[bin + ((Key::kOctant + octant + 1) << below) - 1];

@@ -41,7 +41,8 @@ class Octree::Layout {
     int levels = 0;  ///< of its keys; 0: there are none
     int level = 0;   ///< of the node among them
     int sorted = 0;  ///< levels of keys that the range is sorted by, at least `level`
-    const std::uint32_t* ends = nullptr;  ///< of the parts by the last `digits` of these
+    const std::uint32_t* ends = nullptr;  ///< of the parts by the last `digits` of these; null: all
+                                          ///< keys are alike in them
     int digits = 0;
   };
   /// In `groupNodes`: the group is task (entry & ~kTask)'s, or the own primitives of the task's

@@ -132,8 +132,9 @@ class Octree {
   struct Sorting;
   /// Keys to be sorted, where these read and do not write.
   void takeKeys(const Sorting&, std::size_t from, std::size_t to, std::uint64_t* out) const;
-  /// `ends`: where each bin of the digits does.
-  void sortKeys(const Sorting&, std::uint32_t* ends, const Threads*);
+  /// `ends`: where each bin of the digits does. Returns how many first digits all keys have alike
+  /// if these are among them: then they stay as they are, without ends; else 0.
+  int sortKeys(const Sorting&, std::uint32_t* ends, const Threads*);
   /// At most kFew, by one digit. Returns where the octants begin and the range ends.
   std::array<std::uint32_t, 9> sortFewKeys(const Sorting&);
   void assemble(std::size_t tasks, const Threads&);

@@ -1,6 +1,8 @@
 #include "Octree/Layout.h"
 
 #include <algorithm>
+#include <atomic>
+#include <bit>
 #include <cstring>
 #include <type_traits>
 #include <utility>
@@ -14,7 +16,7 @@ namespace palpate::HWY_NAMESPACE {
 
 // No vectors: newer processors' shifts by a variable take a third of the time.
 
-/// Calls f(bin, begin, end) for keys side by side in one bin. From frame to frame most stay so: by
+/// Calls f(bin, i, length) for keys side by side in one bin. From frame to frame most stay so: by
 /// so many at once no count waits for its last store.
 template <class F>
 HWY_INLINE HWY_ATTR void forRuns(const std::uint64_t* keys, std::size_t size, int shift,
@@ -35,12 +37,15 @@ HWY_INLINE HWY_ATTR void forRuns(const std::uint64_t* keys, std::size_t size, in
   for (; i < size; ++i) f(keys[i] >> shift & mask, i, std::integral_constant<std::size_t, 1>());
 }
 
-/// Counts the keys of each bin.
-HWY_ATTR void countKeysKernel(const std::uint64_t* keys, std::size_t size, int shift,
-                              std::size_t bins, std::uint32_t* counts) {
+/// Counts the keys of each bin. Returns the bits in which any differ.
+HWY_ATTR std::uint64_t countKeysKernel(const std::uint64_t* keys, std::size_t size, int shift,
+                                       std::size_t bins, std::uint32_t* counts) {
   forRuns(keys, size, shift, bins, [=](std::size_t bin, std::size_t, auto length) {
     counts[bin] += static_cast<std::uint32_t>(length());
   });
+  std::uint64_t differ = 0;
+  for (std::size_t i = 1; i < size; ++i) differ |= keys[0] ^ keys[i];
+  return differ;
 }
 
 /// Writes keys to the places of their bins.
@@ -119,7 +124,7 @@ void Octree::takeKeys(const Sorting& sorting, std::size_t from, std::size_t to,
     std::copy_n(keys, to - from, out);
 }
 
-void Octree::sortKeys(const Sorting& sorting, std::uint32_t* ends, const Threads* threads) {
+int Octree::sortKeys(const Sorting& sorting, std::uint32_t* ends, const Threads* threads) {
   const std::size_t size = sorting.end - sorting.begin,
                     bins = std::size_t{1} << Key::kDigitBits * sorting.digits;
   // A part for each thread: keys come in the same order by any.
@@ -136,12 +141,19 @@ void Octree::sortKeys(const Sorting& sorting, std::uint32_t* ends, const Threads
     if (shared) return threads->forChunks(size, grain, f);
     f(std::size_t{0}, std::size_t{0}, size);
   };
+  std::atomic<std::uint64_t> differ = 0;
   forChunks([&](std::size_t chunk, std::size_t from, std::size_t to) {
     takeKeys(sorting, from, to, scratch + from);
     std::uint32_t* own = counts + chunk * bins;
     std::fill_n(own, bins, 0u);
-    HWY_DYNAMIC_DISPATCH(countKeysKernel)(scratch + from, to - from, shift, bins, own);
+    differ |= HWY_DYNAMIC_DISPATCH(countKeysKernel)(scratch + from, to - from, shift, bins, own);
   });
+  for (std::size_t i = 0; i < size; i += grain) differ |= scratch[0] ^ scratch[i];
+  const int alike = std::min(std::countl_zero(differ.load()) / Key::kDigitBits, Key::kMostLevels);
+  if (alike >= sorting.level + sorting.digits) {
+    std::copy_n(scratch, sorting.cube ? size : 0, m_keys + sorting.begin);
+    return alike;
+  }
   std::uint32_t sum = sorting.begin;
   forBins(sorting.digits, [&](std::size_t bin) {
     for (std::size_t part = 0; part < parts; ++part)
@@ -152,6 +164,7 @@ void Octree::sortKeys(const Sorting& sorting, std::uint32_t* ends, const Threads
     (scratch + from, to - from, shift, bins, counts + chunk * bins, m_keys);
   });
   std::copy_n(counts + (parts - 1) * bins, bins, ends);
+  return 0;
 }
 
 std::array<std::uint32_t, 9> Octree::sortFewKeys(const Sorting& sorting) {

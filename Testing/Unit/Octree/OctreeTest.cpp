@@ -146,14 +146,17 @@ TEST(Octree, KeepsItsLimits) {
 
 TEST(Octree, OneFarTriangleDoesNotFlattenIt) {
   Random random(4);
-  Mesh mesh = testing::soup(random, 3000, 0.01);
-  mesh.positions[300] = {1e6, -1e6, 1e6};
-  OctreeBasedCD detection(rebuilding());
-  detection.addTriangleMesh(mesh.positions, mesh.triangles);
-  detection.update();
-  EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
-  EXPECT_LE(detection.octree().statistics().mostPrimitivesInNode,
-            static_cast<std::size_t>(OctreeSettings{}.maxPrimitivesPerLeaf));
+  for (const std::size_t size : {200u, 3000u, 20000u})
+    for (const int threads : {1, 2}) {
+      Mesh mesh = testing::soup(random, size, 0.01);
+      mesh.positions[300] = {1e6, -1e6, 1e6};
+      OctreeBasedCD detection(rebuilding(threads));
+      detection.addTriangleMesh(mesh.positions, mesh.triangles);
+      detection.update();
+      EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
+      EXPECT_LE(detection.octree().statistics().mostPrimitivesInNode,
+                static_cast<std::size_t>(OctreeSettings{}.maxPrimitivesPerLeaf));
+    }
 }
 
 TEST(Octree, FollowsItsGeometryAndSaysWhatRan) {
