@@ -56,8 +56,9 @@ class ValidityCost {
 
   /// Milliseconds of the next frame.
   struct Frame {
-    double whole = std::numeric_limits<double>::infinity();  ///< as it is shipped
-    double validity = 0;                                     ///< of which
+    double whole =
+        std::numeric_limits<double>::infinity();  ///< as it is shipped, and candidates kept
+    double validity = 0;                          ///< of which
   };
   Frame next(int frame) {
     m_before = std::exchange(m_now, at(frame));
