@@ -43,24 +43,22 @@ class Body {
     int number = 0;
     bool on = false;
     SignCounts counts;
-    const auto count = [&](std::uint32_t begin, std::uint32_t end) {
-      for (std::uint32_t i = begin; i < end; ++i) {
-        const auto& [a, b, c] = m_geometry.orderedTriangles[i];
-        const auto& now = m_geometry.mesh.now;
-        const RayCrossing crossing = crossRay(p, now[a], now[b], now[c], counts);
-        if (crossing == RayCrossing::OnTriangle)
-          on = true;
-        else
-          number += static_cast<int>(crossing);
-      }
+    const auto count = [&](std::uint32_t i) {
+      const auto& [a, b, c] = m_geometry.orderedTriangles[i];
+      const auto& now = m_geometry.mesh.now;
+      const RayCrossing crossing = crossRay(p, now[a], now[b], now[c], counts);
+      if (crossing == RayCrossing::OnTriangle)
+        on = true;
+      else
+        number += static_cast<int>(crossing);
     };
     if (m_bruteForce) {
-      count(0, size());
+      for (std::uint32_t i = 0; i < size(); ++i) count(i);
     } else {
       FloatBox ray = m_frame.boxOf(p);
       ray.upper[0] = kInfinity;
-      const auto overlaps = [&](const FloatBox& box) { return m_frame(box).overlaps(ray); };
-      forEachOverlapping(m_geometry.octree, overlaps, m_stack, count);
+      findOverlapping(m_geometry.octree, m_frame.map(), ray, m_stack);
+      for (const std::uint32_t i : m_stack.found) count(i);
     }
     return on ? 0 : number;
   }
@@ -87,20 +85,15 @@ class Body {
     if (m_bruteForce) {
       for (std::uint32_t i = 0; i < size(); ++i) tryOne(i);
     } else {
-      const std::array<double, 3> point = m_frame.inFrame(p);
       // A little more than the best: distances are rounded, and equal ones are looked for.
       const auto bound = [&] {
         const double distance = best.distance * m_geometry.frame.scale;
         return distance * distance * (1 + 0x1p-40);
       };
       tryOne(std::min(m_last, size() - 1));
-      const auto squareTo = [&](const FloatBox& box) {
-        return m_frame(box).distanceSquared(point);
-      };
-      forEachNearest(m_geometry.octree, squareTo, bound(), m_stack,
-                     [&](std::uint32_t begin, std::uint32_t end) {
-                       for (std::uint32_t i = begin; i < end; ++i)
-                         if (squareTo(m_geometry.octree.boxes()[i]) <= bound()) tryOne(i);
+      forEachNearest(m_geometry.octree, m_frame.map(), m_frame.boxOf(p), bound(), m_stack,
+                     [&](std::uint32_t i) {
+                       tryOne(i);
                        return bound();
                      });
       m_last = at;
@@ -110,7 +103,8 @@ class Body {
   }
 
   bool mayContain(const Eigen::Vector3d& p) const {
-    return m_bruteForce || m_frame.boxOf(p).overlaps(m_frame(m_geometry.octree.blocks()[0].box(0)));
+    return m_bruteForce ||
+           m_frame.boxOf(p).overlaps(m_frame.map()(m_geometry.octree.blocks()[0].box(0)));
   }
 
  private:

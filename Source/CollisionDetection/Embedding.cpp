@@ -29,12 +29,8 @@ std::optional<TetrahedronPoint> SolidQuery::lowest(const Eigen::Vector3d& p) {
   }
   const TetrahedronTree& tree = m_solid.tetrahedronTree;
   if (tree.octree().size() == 0) return best;
-  const FloatBox point = m_frame.boxOf(p);
-  const auto overlaps = [&](const FloatBox& box) { return m_frame(box).overlaps(point); };
-  forEachOverlapping(tree.octree(), overlaps, m_stack, [&](std::uint32_t begin, std::uint32_t end) {
-    for (std::uint32_t i = begin; i < end; ++i)
-      if (overlaps(tree.octree().boxes()[i])) tryOne(tree.octree().order()[i], tree.ordered()[i]);
-  });
+  findOverlapping(tree.octree(), m_frame.map(), m_frame.boxOf(p), m_stack);
+  for (const std::uint32_t i : m_stack.found) tryOne(tree.octree().order()[i], tree.ordered()[i]);
   return best;
 }
 

@@ -77,28 +77,26 @@ class FollowedExits::Following {
     std::optional<InsideVertex> first;
     if (!q.allFinite()) return first;
     SignCounts counts;
-    const auto tryOnes = [&](std::uint32_t begin, std::uint32_t end) {
-      for (std::uint32_t i = begin; i < end; ++i) {
-        const std::uint32_t id = m_body.octree.order()[i];
-        const Triangle& triangle = m_body.orderedTriangles[i];
-        const Corners corners = cornersOf(m_body, triangle);
-        const auto weights = crossing(p, q, corners, counts);
-        if (!weights) continue;
-        const double depth = (pointAt(corners, *weights) - p).dot(direction);
-        if (!(depth > 0) ||
-            (first && (depth > first->depth || (depth == first->depth && id > first->triangle))))
-          continue;
-        first = {vertex, id, triangle, *weights, direction, depth};
-      }
+    const auto tryOne = [&](std::uint32_t i) {
+      const std::uint32_t id = m_body.octree.order()[i];
+      const Triangle& triangle = m_body.orderedTriangles[i];
+      const Corners corners = cornersOf(m_body, triangle);
+      const auto weights = crossing(p, q, corners, counts);
+      if (!weights) return;
+      const double depth = (pointAt(corners, *weights) - p).dot(direction);
+      if (!(depth > 0) ||
+          (first && (depth > first->depth || (depth == first->depth && id > first->triangle))))
+        return;
+      first = {vertex, id, triangle, *weights, direction, depth};
     };
     if (m_bruteForce) {
-      tryOnes(0, static_cast<std::uint32_t>(m_body.orderedTriangles.size()));
+      for (std::uint32_t i = 0; i < m_body.orderedTriangles.size(); ++i) tryOne(i);
       return first;
     }
     FloatBox way = m_frame.boxOf(p);
     way.add(m_frame.boxOf(q));
-    const auto overlaps = [&](const FloatBox& box) { return m_frame(box).overlaps(way); };
-    forEachOverlapping(m_body.octree, overlaps, m_stack, tryOnes);
+    findOverlapping(m_body.octree, m_frame.map(), way, m_stack);
+    for (const std::uint32_t i : m_stack.found) tryOne(i);
     return first;
   }
 

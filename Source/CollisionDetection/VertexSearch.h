@@ -5,7 +5,6 @@
 #include "Octree/PointQueries.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -20,21 +19,15 @@ class PointFrame {
         m_origin(worldOrigin(geometry)),
         m_map(worldMap(geometry, m_origin, 0.0, false)) {}
 
-  FloatBox operator()(const FloatBox& box) const { return m_map(box); }
+  const BoxMap& map() const { return m_map; }
   /// Clamped as the boxes' corners are: that brings no two points further apart.
-  std::array<double, 3> inFrame(const Eigen::Vector3d& p) const {
-    std::array<double, 3> point;
-    for (int k = 0; k < 3; ++k)
-      point[k] =
-          std::clamp((p[k] - m_origin[k]) * m_scale, -double{kLargestFloat}, double{kLargestFloat});
-    return point;
-  }
   FloatBox boxOf(const Eigen::Vector3d& p) const {
     FloatBox box;
-    const std::array<double, 3> point = inFrame(p);
     for (int k = 0; k < 3; ++k) {
-      box.lower[k] = OutwardRounding::down(static_cast<float>(point[k]));
-      box.upper[k] = OutwardRounding::up(static_cast<float>(point[k]));
+      const auto at = static_cast<float>(std::clamp((p[k] - m_origin[k]) * m_scale,
+                                                    -double{kLargestFloat}, double{kLargestFloat}));
+      box.lower[k] = OutwardRounding::down(at);
+      box.upper[k] = OutwardRounding::up(at);
     }
     return box;
   }

@@ -22,15 +22,6 @@ struct alignas(16) FloatBox {
   std::array<float, 4> lower{kEmptyLower, kEmptyLower, kEmptyLower, 0};
   std::array<float, 4> upper{-kEmptyLower, -kEmptyLower, -kEmptyLower, 0};
 
-  /// From a point of the same frame: 0 within.
-  double distanceSquared(const std::array<double, 3>& point) const {
-    double sum = 0;
-    for (int k = 0; k < 3; ++k) {
-      const double outside = std::max({lower[k] - point[k], point[k] - upper[k], 0.0});
-      sum += outside * outside;
-    }
-    return sum;
-  }
   bool overlaps(const FloatBox& other) const {
     bool all = true;
     for (int k = 0; k < 3; ++k) all &= lower[k] <= other.upper[k] && upper[k] >= other.lower[k];

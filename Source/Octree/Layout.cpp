@@ -9,6 +9,7 @@ namespace palpate {
 /// A cell whose keys are not sorted is one task's up to this size: sorted in the top it would keep
 /// other threads waiting.
 constexpr std::uint32_t kMostInOneTask = 8192;
+
 void Octree::Layout::clear() {
   links.clear();
   parents.clear();

@@ -1,20 +1,22 @@
 #pragma once
 
 #include "Core/Buffer.h"
+#include "Octree/BoxMap.h"
 #include "Octree/Octree.h"
 
 #include <cstdint>
-#include <span>
+#include <type_traits>
 
 namespace palpate {
 
 /// Scratch of point queries, which remembers its peak.
 struct PointQueryStack {
   struct Entry {
-    double distanceSquared;
+    float distanceSquared;
     OctreeNode node;
   };
   Buffer<Entry> entries;
+  Buffer<std::uint32_t> found;  ///< of findOverlapping()
 };
 
 /// f(begin, end) for ranges of the octree's order that hold every primitive whose box `overlaps`,
@@ -37,40 +39,27 @@ void forEachOverlapping(const Octree& octree, Overlaps&& overlaps, PointQuerySta
   }
 }
 
-/// Nearest first: f(begin, end) for ranges of the octree's order until no other node's box comes as
-/// near to the point as f's last answer, a squared distance in the octree's floats.
-///
-/// squareTo(box): of the point's distance. Boxes hold their primitives with more to spare than its
-/// roundings.
-template <class SquareTo, class F>
-void forEachNearest(const Octree& octree, SquareTo&& squareTo, double distanceSquared,
-                    PointQueryStack& stack, F&& f) {
-  const OctreeBlock* blocks = octree.blocks();
-  using Entry = PointQueryStack::Entry;
-  stack.entries.assign(1, {squareTo(blocks[0].box(0)), 0});
-  while (!stack.entries.empty()) {
-    const Entry entry = stack.entries.back();
-    stack.entries.pop_back();
-    if (entry.distanceSquared > distanceSquared) continue;
-    const auto [begin, end] = octree.ownRange(entry.node);
-    if (begin < end) distanceSquared = f(begin, end);
-    const OctreeBlock& block = blocks[entry.node >> 3];
-    if (block.isLeaf(entry.node & 7)) continue;
-    const std::uint32_t child = block.child[entry.node & 7];
-    const std::size_t first = stack.entries.size();
-    for (unsigned slot = 0; slot < 8; ++slot) {
-      if (blocks[child].isEmpty(slot)) continue;
-      const Entry next{squareTo(blocks[child].box(slot)), child * 8 + slot};
-      if (next.distanceSquared > distanceSquared) continue;
-      // Nearest last, to be taken first.
-      std::size_t place = stack.entries.size();
-      stack.entries.push_back(next);
-      for (; place > first && stack.entries[place - 1].distanceSquared < next.distanceSquared;
-           --place)
-        stack.entries[place] = stack.entries[place - 1];
-      stack.entries[place] = next;
-    }
-  }
+/// The primitives whose boxes, as the map places them, overlap `box`, by their places in the
+/// octree's order: in stack.found.
+void findOverlapping(const Octree&, const BoxMap&, const FloatBox& box, PointQueryStack& stack);
+
+/// Of a primitive's place in the octree's order: the least squared distance seen so far.
+using TryPrimitive = double (*)(void* context, std::uint32_t place);
+
+/// Nearest nodes first: tries primitives until no other one's box, as the map places it, comes as
+/// near to the point as the least squared distance seen, all in the octree's floats. point: a box
+/// around it; distanceSquared: no primitive further away is of interest.
+void tryNearest(const Octree&, const BoxMap&, const FloatBox& point, double distanceSquared,
+                PointQueryStack& stack, void* context, TryPrimitive tryPrimitive);
+
+/// tryNearest() by f(place).
+template <class F>
+void forEachNearest(const Octree& octree, const BoxMap& map, const FloatBox& point,
+                    double distanceSquared, PointQueryStack& stack, F&& f) {
+  const auto call = [](void* context, std::uint32_t place) {
+    return (*static_cast<std::remove_reference_t<F>*>(context))(place);
+  };
+  tryNearest(octree, map, point, distanceSquared, stack, &f, call);
 }
 
 }  // namespace palpate
