@@ -14,7 +14,9 @@ inline std::string textOf(double value) {
   return text;
 }
 inline std::string textOf(const Eigen::Vector3d& v) {
-  return "(" + textOf(v[0]) + ", " + textOf(v[1]) + ", " + textOf(v[2]) + ")";
+  char text[96];
+  std::snprintf(text, sizeof text, "(%g, %g, %g)", v[0], v[1], v[2]);
+  return text;
 }
 
 }  // namespace palpate
