@@ -11,6 +11,7 @@
 
 #include <palpate/OctreeBasedCD.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -81,14 +82,16 @@ void windingRow(Report& report, const testing::Mesh& body, const Points& points,
     const GeometryId asked = detection.addPointSet(points),
                      id = detection.addTriangleMesh(mesh.positions, mesh.triangles);
     std::vector<double> samples;
-    std::size_t inside = 0;
+    std::vector<InsideVertex> inside;
     for (int i = 0; i < 4; ++i) {
       const double start = now();
-      inside = detection.findInsideVertices(asked, id, {.rule = InsideRule::WindingNumber}).size();
+      const auto found =
+          detection.findInsideVertices(asked, id, {.rule = InsideRule::WindingNumber});
       samples.push_back(now() - start);
+      inside.assign(found.begin(), found.end());
     }
     samples.erase(samples.begin());
-    if (&mesh == &body && detection.findInsideVertices(asked, id).size() != inside)
+    if (&mesh == &body && !std::ranges::equal(detection.findInsideVertices(asked, id), inside))
       report.line({"rules answer otherwise"});
     const double each = 1000 * median(samples) / static_cast<double>(points.size());
     report.line({std::string("winding number, ") + name + ", " + std::to_string(threads) +
