@@ -186,7 +186,7 @@ struct Frame::Job {
     const MeshPair meshes = job.record->meshes(job.trees.turned() ? nullptr : &job.floats);
     bool& intersecting = job.contacts.facts.startsIntersecting;
     if (meshes.step.start && !intersecting)
-      intersecting = anyIntersectAtStart(meshes, pairs, job.overlaps);
+      intersecting = anyIntersecting(meshes, true, pairs, job.overlaps).has_value();
     if (job.record->plan.overlaps && (intersecting || job.record->plan.startsIntersecting))
       findOverlaps(job, pairs);
     else
@@ -360,6 +360,7 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
     statistics.candidatePairs += job.sink.total();
     statistics.featurePairs += job.contacts.featurePairs;
     statistics.exactDecisions += job.contacts.exactDecisions + job.overlaps.exactDecisions;
+    statistics.validityPairs += job.overlaps.validityPairs;
   }
   // Threads work on both stages at once: the wall clock is shared out as their work was.
   const double wall = watch.lap();
@@ -381,7 +382,7 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
         record->candidates.insert(record->candidates.end(), job.candidates.begin(),
                                   job.candidates.end());
     }
-    finish(*record, nearby, settings);
+    finish(*record, nearby, settings, statistics);
     record->candidatesSorted = false;
   }
   statistics.milliseconds.order = watch.lap();
@@ -401,9 +402,11 @@ void Frame::findMissedOverlaps(const Threads& threads) {
     Job& job = *m_jobs[i];
     if (!missed(job)) return;
     Stopwatch watch;
-    const std::size_t decided = job.overlaps.exactDecisions;  // of the search at the start
+    const std::size_t decided = job.overlaps.exactDecisions,
+                      looked = job.overlaps.validityPairs;  // of the search at the start
     job.overlaps.clear();
     job.overlaps.exactDecisions = decided;
+    job.overlaps.validityPairs = looked;
     job.start(&Job::findOverlaps);
     run(job);
     const double spent = watch.lap();
@@ -412,15 +415,16 @@ void Frame::findMissedOverlaps(const Threads& threads) {
   });
 }
 
-void Frame::finish(PairRecord& record, bool nearby, const Settings& settings) {
+void Frame::finish(PairRecord& record, bool nearby, const Settings& settings,
+                   FrameStatistics& statistics) {
   m_facts.clear();
+  m_impacts.clear();
   for (const auto* buffers : {&m_buffers, &m_overlaps})
     for (const ContactBuffers* found : *buffers) m_facts.add(found->facts);
   for (auto list : {&StepFacts::verticesA, &StepFacts::verticesB, &StepFacts::degenerateA,
                     &StepFacts::degenerateB})
     sortUnique(m_facts.*list);
   if (record.plan.step.impacts && m_facts.clearance == 0.0) {
-    m_impacts.clear();
     for (ContactBuffers* found : m_buffers)
       answerByImpact(record.meshes(), m_facts, *found, m_impacts);
     m_buffers.push_back(&m_impacts);
@@ -438,7 +442,9 @@ void Frame::finish(PairRecord& record, bool nearby, const Settings& settings) {
   contents.earliestTimeOfImpact = record.earliest.load();
   if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
   record.trust.finish(record.pair.settings, *record.a, *record.b, record.plan, m_facts, nearby,
-                      contents);
+                      record.meshes(), contents, m_impacts);
+  statistics.exactDecisions += m_impacts.exactDecisions;
+  statistics.validityPairs += m_impacts.validityPairs;
   countContacts(record.plan, ofIntersection, contents);
   record.dataFor = record.revisions();
   record.candidatesFor = settings.keepCandidates ? record.revisions() : PairRecord::AnsweredFor{};
@@ -452,7 +458,7 @@ void Frame::findStartByBruteForce(const PairRecord& record, ContactBuffers& cont
   for (std::uint32_t a = 0; a < countA && meshes.step.start; ++a)
     for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b)
       contacts.facts.startsIntersecting |= meshes.a.topology.isOn(a) && meshes.b.topology.isOn(b) &&
-                                           intersectAtStart(meshes, {a, b}, overlaps);
+                                           intersect(meshes, true, {a, b}, overlaps);
   if (!record.plan.overlaps ||
       !(contacts.facts.startsIntersecting || record.plan.startsIntersecting))
     return;
@@ -472,10 +478,11 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Setti
     if (settings.keepCandidates) findCandidatesByBruteForce(record->meshes(), record->candidates);
     statistics.featurePairs += contacts.featurePairs;
     statistics.exactDecisions += contacts.exactDecisions + overlaps.exactDecisions;
+    statistics.validityPairs += overlaps.validityPairs;
     statistics.milliseconds.narrowPhase += watch.lap();
     m_buffers = {&contacts};
     m_overlaps = {&overlaps};
-    finish(*record, true, settings);
+    finish(*record, true, settings, statistics);
     record->candidatesSorted = true;
     statistics.milliseconds.order += watch.lap();
   }

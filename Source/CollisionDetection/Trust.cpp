@@ -1,5 +1,6 @@
 #include "CollisionDetection/Trust.h"
 
+#include "NarrowPhase/StepCheck.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
@@ -9,9 +10,9 @@ namespace palpate {
 
 namespace {
 
-/// Frames between two searches for intersections at the step's start: doubled after each that does
-/// not restore trust, up to this.
-constexpr int kMostPatience = 64;
+/// A look at all candidates at the step's start may take two thirds of a frame. So many frames
+/// earn one, and up to four are saved.
+constexpr int kLook = 16, kMostSaved = 4 * kLook;
 
 /// From the last frame's positions to this step's start.
 MotionRange correctionOf(const Geometry& geometry) {
@@ -100,21 +101,20 @@ void Trust::start(const PairSettings& settings, const Geometry& a, const Geometr
   plan.step.certain = plan.step.motion + 2.0 * kMotionError * (plan.step.motion + size);
   const bool known = frame == m_frame + 1 && m_topologyA == a.topologyRevision &&
                      m_topologyB == b.topologyRevision;
-  m_startsApart = known && m_apart && (!corrected || correction < m_clearance);
-  const bool startsIntersecting = known && m_intersecting && !corrected;
-  if (m_topologyA != a.topologyRevision || m_topologyB != b.topologyRevision) m_wait = 0;
+  m_startsApart = known && m_end == End::Apart && (!corrected || correction < m_clearance);
+  m_startsIntersecting = known && m_end == End::Intersecting && !corrected;
+  plan.startsIntersecting = m_startsIntersecting;
+  const bool changed = m_topologyA != a.topologyRevision || m_topologyB != b.topologyRevision;
+  m_saved = changed ? kMostSaved : std::min(m_saved + 1, kMostSaved);
   m_frame = frame;
   m_topologyA = a.topologyRevision;
   m_topologyB = b.topologyRevision;
   if (!knowsSides(a, b) || m_startsApart || plan.method == Method::Intersection ||
       (plan.method == Method::Proximity && plan.motion > 0.0 && plan.step.motion == 0.0))
     return;
-  if (settings.method == Method::Auto) {
-    plan.overlaps = true;
-    plan.startsIntersecting = startsIntersecting;
-  }
-  plan.step.start = !startsIntersecting &&
-                    (settings.method == Method::Auto || plan.motion == 0.0 || --m_wait <= 0);
+  plan.overlaps = settings.method == Method::Auto;
+  plan.step.start = !plan.startsIntersecting && (plan.overlaps || m_saved >= kLook);
+  if (plan.step.start) m_saved -= kLook;
   // It will not be trusted, whatever is seen of the step.
   if (plan.method == Method::Proximity && settings.method == plan.method && !plan.step.start)
     plan.step.motion = 0.0;
@@ -122,7 +122,8 @@ void Trust::start(const PairSettings& settings, const Geometry& a, const Geometr
 
 void Trust::finish(const PairSettings& settings, const Geometry& a, const Geometry& b,
                    const PairPlan& plan, const StepFacts& facts, bool nearby,
-                   CollisionData::Contents& contents) {
+                   const MeshPair& meshes, CollisionData::Contents& contents,
+                   ContactBuffers& counts) {
   Validity& validity = contents.validity;
   validity.method = plan.method;
   validity.reason = plan.reason;
@@ -164,15 +165,39 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
   validity.arcDeviation = a.arcDeviation + b.arcDeviation;
   validity.trusted = trusted && validity.arcDeviation <= settings.thickness;
   validity.sideMayBeWrong = plan.method != Method::Intersection && !validity.trusted;
-  m_apart =
-      plan.method == Method::Intersection
-          ? plan.motion == 0.0 && contents.intersectingTriangles.empty() && facts.clearance > 0.0
-          : trusted && facts.clearance > 0.0;
+  m_end = End::Unknown;
   m_clearance = std::min(facts.clearance, settings.thickness);
-  m_intersecting = !contents.intersectingTriangles.empty();
-  if (plan.step.start) {
-    m_patience = m_apart ? 1 : std::min(2 * m_patience, kMostPatience);
-    m_wait = m_patience;
+  if (!contents.intersectingTriangles.empty()) {
+    m_end = End::Intersecting;
+    m_witness = contents.intersectingTriangles.front();
+  } else if (plan.method == Method::Intersection) {
+    if (plan.motion == 0.0 && facts.clearance > 0.0) m_end = End::Apart;
+  } else if (trusted && facts.clearance > 0.0) {
+    m_end = End::Apart;
+  } else if (plan.step.motion > 0.0 && settings.method != Method::Proximity) {
+    findEnd(plan, facts, meshes, contents, counts);
+  }
+}
+
+void Trust::findEnd(const PairPlan& plan, const StepFacts& facts, const MeshPair& meshes,
+                    const CollisionData::Contents& contents, ContactBuffers& counts) {
+  m_clearance = 0.0;
+  if (plan.overlaps && facts.startsIntersecting) {  // Intersection has looked, and found none
+    if (!meshes.near) m_end = End::Apart;
+    return;
+  }
+  // Of an earliest time there are no contacts, and of what filters leave out neither.
+  if (meshes.settings.contacts == Contacts::Earliest || meshes.filters()) return;
+  EndOfStep end;
+  if (m_startsIntersecting && intersect(meshes, false, m_witness, counts))
+    end.intersecting = m_witness;
+  else
+    end = lookAtEnd(meshes, contents, counts);
+  if (end.intersecting) {
+    m_end = End::Intersecting;
+    m_witness = *end.intersecting;
+  } else if (contents.validity.startedApart && end.isKnown) {
+    m_end = End::Apart;
   }
 }
 

@@ -30,21 +30,28 @@ class Trust {
   /// Before a frame's detection; `frame` counts all frames. Sets whether the step's start is asked.
   void start(const PairSettings&, const Geometry& a, const Geometry& b, std::uint64_t frame,
              PairPlan&);
-  /// After it, with what the narrow phase has seen.
+  /// After it, with what the narrow phase has seen. counts: as of anyIntersecting().
   void finish(const PairSettings&, const Geometry& a, const Geometry& b, const PairPlan&,
-              const StepFacts&, bool nearby, CollisionData::Contents&);
+              const StepFacts&, bool nearby, const MeshPair&, CollisionData::Contents&,
+              ContactBuffers& counts);
   /// After a frame whose answer was kept.
   void keep(std::uint64_t frame) { m_frame = frame; }
   void forget() { m_topologyA = 0; }
 
  private:
-  bool m_apart = false;         ///< at the end of the last frame's step
-  bool m_intersecting = false;  ///< known to intersect there
-  double m_clearance = 0;       ///< L: and by how much, at least
+  enum class End { Unknown, Apart, Intersecting };
+
+  /// Where bounds on motion do not tell.
+  void findEnd(const PairPlan&, const StepFacts&, const MeshPair&, const CollisionData::Contents&,
+               ContactBuffers& counts);
+
+  End m_end = End::Unknown;  ///< of the last frame's step
+  double m_clearance = 0;    ///< L: Apart by at least
+  TrianglePair m_witness;    ///< Intersecting: a pair that does
   std::uint64_t m_frame = 0;
   std::uint64_t m_topologyA = 0, m_topologyB = 0;
-  bool m_startsApart = false;  ///< this frame's step
-  int m_wait = 0, m_patience = 1;
+  bool m_startsApart = false, m_startsIntersecting = false;  ///< known of this frame's step
+  int m_saved = 0;  ///< of looks at the step's start
 };
 
 }  // namespace palpate

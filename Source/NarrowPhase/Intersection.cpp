@@ -160,21 +160,27 @@ void findIntersections(const MeshPair& pair, std::span<const TrianglePair> candi
   out.exactDecisions += counts.undecided;
 }
 
-bool intersectAtStart(const MeshPair& pair, const TrianglePair& candidate, ContactBuffers& counts) {
+bool intersect(const MeshPair& pair, bool atStart, const TrianglePair& candidate,
+               ContactBuffers& counts) {
   SignCounts signs;
-  const MeshTriangle a(pair.a, candidate.a, pair.a.before), b(pair.b, candidate.b, pair.b.before);
-  const bool found = meetingOf(pair, a, b, signs).intersect();
+  const auto of = [&](const TriangleMesh& mesh, std::uint32_t triangle) {
+    return MeshTriangle(mesh, triangle, atStart ? mesh.before : mesh.now);
+  };
+  const bool found =
+      meetingOf(pair, of(pair.a, candidate.a), of(pair.b, candidate.b), signs).intersect();
   counts.exactDecisions += signs.undecided;
   return found;
 }
 
-bool anyIntersectAtStart(const MeshPair& pair, std::span<const TrianglePair> candidates,
-                         ContactBuffers& counts) {
-  keepPossible(pair, true, candidates, counts.possible);
-  return std::any_of(
-      counts.possible.begin(), counts.possible.end(), [&](const PossibleIntersection& possible) {
-        return possible.isKnown() || intersectAtStart(pair, possible.triangles, counts);
-      });
+std::optional<TrianglePair> anyIntersecting(const MeshPair& pair, bool atStart,
+                                            std::span<const TrianglePair> candidates,
+                                            ContactBuffers& counts) {
+  keepPossible(pair, atStart, candidates, counts.possible);
+  counts.validityPairs += candidates.size();
+  for (const PossibleIntersection& possible : counts.possible)
+    if (possible.isKnown() || intersect(pair, atStart, possible.triangles, counts))
+      return possible.triangles;
+  return {};
 }
 
 void findIntersectionsByBruteForce(const MeshPair& pair, const FeatureLists& features,

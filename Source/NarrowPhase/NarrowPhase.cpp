@@ -32,7 +32,7 @@ void ContactBuffers::clear() {
   intersectingTriangles.clear();
   shape.clear();
   shapeShape.clear();
-  featurePairs = exactDecisions = 0;
+  featurePairs = exactDecisions = validityPairs = 0;
   facts.clear();
 }
 

@@ -98,6 +98,7 @@ struct ContactBuffers {
   StepFacts facts;
   std::size_t featurePairs = 0;    ///< tested
   std::size_t exactDecisions = 0;  ///< left to exact arithmetic
+  std::size_t validityPairs = 0;   ///< looked at for startedApart
   void clear();
 };
 

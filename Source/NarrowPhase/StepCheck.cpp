@@ -11,6 +11,9 @@ namespace palpate {
 using Eigen::Vector3d;
 using Kind = ImpactQuery::Kind;
 
+/// At the step's end: triangle pairs of a frame without contacts, and pairs looked at at once.
+constexpr std::size_t kFreeLooks = 32, kLooksTogether = 16;
+
 template <Kind kind>
 bool StepCheck::isAnsweredByImpact(const Features<kind>& features, std::uint32_t inFirst,
                                    std::uint32_t inSecond, bool ofSecond, double distance) {
@@ -41,8 +44,10 @@ void StepCheck::noteImpact(const Features<kind>& features, std::uint32_t inFirst
   const StepPlan& step = m_pair.step;
   double& clearance = m_out.facts.clearance;
   if (step.motion == 0.0 || (clearance == 0.0 && !step.impacts)) return;
-  double left = (1.0 - time) * step.certain;
-  if (distance <= left) left = (1.0 - time) * motionBound<kind>(features.query(inFirst, inSecond));
+  const double rounding = step.certain - step.motion;
+  double left = (1.0 - time) * step.motion + rounding;
+  if (distance <= left)
+    left = (1.0 - time) * motionBound<kind>(features.query(inFirst, inSecond)) + rounding;
   clearance = std::min(clearance, std::max(0.0, distance - left));
   if (step.impacts && distance <= left) noteVertices(features, inFirst, inSecond);
 }
@@ -92,6 +97,42 @@ bool StepCheck::isAnsweredAtEnd(const Features<kind>& features, std::uint32_t in
   // edgeReach().
   return distance > motion || kind == Kind::VertexTriangle ||
          m_pair.settings.contacts != Contacts::Distinct;
+}
+
+EndOfStep lookAtEnd(const MeshPair& pair, const CollisionData::Contents& contacts,
+                    ContactBuffers& counts) {
+  using Ids = std::span<const std::uint32_t>;
+  const MeshTopology &ofA = pair.a.topology, &ofB = pair.b.topology;
+  const double rounding = pair.step.certain - pair.step.motion;
+  std::size_t left = kFreeLooks;
+  forEachTimed(contacts, [&](const auto& list) { left += list.size(); });
+  Buffer<TrianglePair>& some = counts.part;
+  some.clear();
+  EndOfStep end;
+  const auto look = [&] {
+    end.isKnown = some.size() <= left;
+    if (!end.isKnown) return;
+    left -= some.size();
+    end.intersecting = anyIntersecting(pair, false, some, counts);
+    some.clear();
+  };
+  const auto add = [&](const auto& contact, Ids trianglesOfA, Ids trianglesOfB) {
+    if (end.intersecting || !end.isKnown ||
+        contact.distance > (1.0 - contact.timeOfImpact) * pair.step.motion + rounding)
+      return;
+    for (const std::uint32_t a : trianglesOfA)
+      for (const std::uint32_t b : trianglesOfB)
+        if (!pair.self() || a != b) some.push_back({a, b});
+    if (some.size() >= kLooksTogether) look();
+  };
+  for (const VertexTriangleContact& c : contacts.vertexTriangle)
+    add(c, ofA.vertexTriangles[c.vertex], Ids(&c.triangle, 1));
+  for (const VertexTriangleContact& c : contacts.triangleVertex)
+    add(c, Ids(&c.triangle, 1), ofB.vertexTriangles[c.vertex]);
+  for (const EdgeEdgeContact& c : contacts.edgeEdge)
+    add(c, ofA.edgeTriangles[ofA.edgeOf(c.edgeA)], ofB.edgeTriangles[ofB.edgeOf(c.edgeB)]);
+  if (!end.intersecting && end.isKnown) look();
+  return end;
 }
 
 void StepCheck::noteTriangle(std::uint32_t triangle, bool ofSecond, const Vector3d& a,

@@ -1,9 +1,11 @@
-// What validity() costs: reading how far vertices moved, and what the narrow phase does for it
-// beside the same without, of the same candidates, in turns. Beside it the whole frame.
+// What validity() costs: reading how far vertices moved, what the narrow phase does for it beside
+// the same without, of the same candidates, in turns, and the triangle pairs that were looked at for
+// where the step starts, by what one costs. Beside it the whole frame.
 #include "Rows.h"
 
 #include "Geometry/Motion.h"
 #include "Math/MotionBound.h"
+#include "NarrowPhase/IntersectionFilter.h"
 #include "NarrowPhase/NarrowPhase.h"
 
 #include <palpate/OctreeBasedCD.h>
@@ -73,6 +75,7 @@ class ValidityCost {
     }
     cost.validity = fastest([&] { findMotion(); });
     for (const auto& pair : m_scene.pairs) cost.validity += narrowPhase(pair);
+    cost.validity += looks();
     return cost;
   }
 
@@ -97,9 +100,28 @@ class ValidityCost {
     for (const TriangleMesh& mesh : m_meshes)
       m_motion.push_back(motionRange(mesh.before, mesh.now, 0, mesh.now.size()));
   }
+  std::span<const TrianglePair> candidatesOf(const std::pair<std::size_t, std::size_t>& pair) {
+    return m_detection.candidatePairs(m_ids[pair.first], m_ids[pair.second]);
+  }
+  /// As many pairs as this frame looked at, at what all candidates take.
+  double looks() {
+    const std::size_t looked = m_detection.statistics().validityPairs;
+    if (looked == 0) return 0;
+    std::size_t candidates = 0;
+    for (const auto& pair : m_scene.pairs) candidates += candidatesOf(pair).size();
+    const double all = fastest([&] {
+      for (const auto& pair : m_scene.pairs) {
+        const TriangleMesh &a = m_meshes[pair.first], &b = m_meshes[pair.second];
+        keepPossiblyIntersecting({a.topology.triangles, a.before}, {b.topology.triangles, b.before},
+                                 &a == &b, candidatesOf(pair), m_possible);
+      }
+    });
+    return all / static_cast<double>(candidates) * static_cast<double>(looked);
+  }
   /// With what the step asks for, less without.
   double narrowPhase(const std::pair<std::size_t, std::size_t>& pair) {
-    const auto candidates = m_detection.candidatePairs(m_ids[pair.first], m_ids[pair.second]);
+    if (m_settings.contacts == Contacts::Earliest) return 0;
+    const auto candidates = candidatesOf(pair);
     MeshPair plain{m_meshes[pair.first], m_meshes[pair.second], m_settings};
     MeshPair asked = plain;
     const double motion = largestMotion(m_motion[pair.first], m_motion[pair.second]);
@@ -129,6 +151,7 @@ class ValidityCost {
   std::deque<TriangleMesh> m_meshes;
   std::vector<MotionRange> m_motion;
   ContactBuffers m_buffers;
+  Buffer<PossibleIntersection> m_possible;
 };
 
 }  // namespace
@@ -143,7 +166,8 @@ void validityRows(Report& report, const RowOptions& options) {
     const double thickness = scene.thickness;
     const std::pair<const char*, PairSettings> settings[] = {
         {"Proximity", {.method = Method::Proximity, .thickness = thickness}},
-        {"Continuous", {.method = Method::Continuous}}};
+        {"Continuous", {.method = Method::Continuous}},
+        {"earliest", {.method = Method::Continuous, .contacts = Contacts::Earliest}}};
     for (const auto& [name, ofPair] : settings) {
       ValidityCost cost(scene, ofPair);
       double whole = 0, validity = 0;

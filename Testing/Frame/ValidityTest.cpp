@@ -146,6 +146,132 @@ TEST_P(MethodTest, FailsNeverSilently) {
   }
 }
 
+/// A ball and a sheet as one mesh.
+Mesh asOne(const BallAndSheet& scene) {
+  Mesh mesh = scene.ball;
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  mesh.positions.insert(mesh.positions.end(), scene.sheet.positions.begin(),
+                        scene.sheet.positions.end());
+  for (const auto& [a, b, c] : scene.sheet.triangles)
+    mesh.triangles.push_back({first + a, first + b, first + c});
+  return mesh;
+}
+
+/// Frames of lives that go through each other and back, by what was known of their start.
+struct Known {
+  std::size_t frames = 0, apart = 0, foundApart = 0, looks = 0;
+};
+
+/// Uncorrected. place(frame, positions at rest, whether of the second mesh): where they are.
+template <class Place>
+Known livesThrough(const PairSettings& settings, const Mesh& a, const Mesh* b, int threads,
+                   Place&& place) {
+  Known known;
+  OctreeBasedCD detection(settingsOf(Engine::Octree, threads));
+  OctreeBasedCD truth(settingsOf(Engine::BruteForce));
+  const auto add = [&](OctreeBasedCD& to, const PairSettings& pair) {
+    const GeometryId first = to.addTriangleMesh(a.positions, a.triangles);
+    to.addCollisionPair(first, b ? to.addTriangleMesh(b->positions, b->triangles) : first, pair);
+  };
+  add(detection, settings);
+  add(truth, {Method::Intersection});
+  const auto dataOf = [](const OctreeBasedCD& each) -> const CollisionData& {
+    return each.collisionData(each.pairs().front().a, each.pairs().front().b);
+  };
+  for (int frame = 0; frame < 48; ++frame) {
+    const Positions nowA = place(frame, a.positions, false),
+                    nowB = b ? place(frame, b->positions, true) : Positions{};
+    for (OctreeBasedCD* each : {&detection, &truth}) {
+      const CollisionPair pair = each->pairs().front();
+      each->setPositions(pair.a, nowA);
+      if (b) each->setPositions(pair.b, nowB);
+    }
+    // This frame's start is the last one's end.
+    const bool apart = frame > 0 && dataOf(truth).intersectingTriangles().empty();
+    detection.detectCollision();
+    truth.detectCollision();
+    if (frame == 0) continue;
+    const bool found = dataOf(detection).validity().startedApart;
+    EXPECT_TRUE(apart || !found) << "frame " << frame;
+    ++known.frames;
+    known.apart += apart;
+    known.foundApart += found;
+    const FrameStatistics& statistics = detection.statistics();
+    known.looks += statistics.validityPairs > statistics.contacts + 32;
+    EXPECT_LE(statistics.validityPairs, statistics.candidatePairs + statistics.contacts + 32);
+  }
+  // What contacts do not tell is looked at once, and then now and then.
+  if (settings.method != Method::Auto) {
+    EXPECT_LE(known.looks, 4 + known.frames / 16);
+  }
+  return known;
+}
+
+TEST_P(MethodTest, KnowsTheStartFromImpactsOfTheStepBefore) {
+  const PairSettings& settings = GetParam().settings;
+  if (settings.method == Method::Intersection) return;  // it does not ask
+  const BallAndSheet scene;
+  const Mesh one = asOne(scene);
+  Known all;
+  const auto count = [&](const Known& known) {
+    all.frames += known.frames;
+    all.apart += known.apart;
+    all.foundApart += known.foundApart;
+  };
+  for (const bool itself : {false, true})
+    for (const double speed : {0.05, 0.1, 0.3})
+      for (std::uint64_t seed = 0; seed < 12; ++seed) {
+        SCOPED_TRACE((itself ? "itself, speed " : "speed ") + std::to_string(speed) + ", seed " +
+                     std::to_string(seed));
+        Random random(seed);
+        // At the top of each swing apart, and at its lowest in the sheet or through it.
+        count(livesThrough(settings, itself ? one : scene.ball, itself ? nullptr : &scene.sheet,
+                           1 + seed % 2, [&](int frame, Positions now, bool isSheet) {
+                             const double height = speed * (std::cos(0.7 * frame) - 1.0);
+                             for (std::size_t v = 0; v < now.size(); ++v) {
+                               const bool ofBall = !isSheet && v < scene.ball.positions.size();
+                               now[v] += Vector3d(0, 0, ofBall ? height : 0.0) +
+                                         randomPoint(random, -0.01, 0.01);
+                             }
+                             return now;
+                           }));
+      }
+  // Where one feature alone tells.
+  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+    SCOPED_TRACE("few triangles, seed " + std::to_string(seed));
+    Random random(1000 + seed);
+    Mesh few[2];
+    for (Mesh& mesh : few) {
+      for (int v = 0; v < 4; ++v) mesh.positions.push_back(randomPoint(random, 0.0, 1.0));
+      mesh.triangles = {{0, 1, 2}, {2, 1, 3}};
+    }
+    if (seed % 3 == 0) few[0].triangles = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}};
+    const bool itself = seed % 4 == 3;
+    if (itself) {
+      few[0].positions.push_back(few[1].positions[0]);
+      few[0].triangles = {{0, 1, 2}, {2, 1, 3}, {2, 3, 4}};
+    }
+    Positions walk[2];
+    count(livesThrough(settings, few[0], itself ? nullptr : &few[1], 1,
+                       [&](int frame, const Positions& rest, bool second) {
+                         Positions& now = walk[second];
+                         if (frame == 0) now = rest;
+                         for (std::size_t v = 0; v < now.size(); ++v)
+                           now[v] += 0.1 * (rest[v] - now[v]) + randomPoint(random, -0.15, 0.15);
+                         return now;
+                       }));
+  }
+  std::cout << all.frames << " frames, " << all.apart << " started apart, known of "
+            << all.foundApart << "\n";
+  EXPECT_GT(all.apart, 500u);
+  EXPECT_LT(all.apart, all.frames - 500);
+  if (settings.method == Method::Auto) {
+    EXPECT_EQ(all.foundApart, all.apart);
+  } else if (settings.method == Method::Continuous) {
+    EXPECT_GT(all.foundApart, all.apart * 4 / 5);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Validity, MethodTest,
     ::testing::Values(MethodCase{"Intersection", {Method::Intersection}},

@@ -29,6 +29,8 @@ struct FrameStatistics {
   std::size_t intersectingTriangles = 0;
   /// left undecided by floating point, decided by exact arithmetic
   std::size_t exactDecisions = 0;
+  /// candidates, and triangle pairs at contacts, looked at once more for Validity::startedApart
+  std::size_t validityPairs = 0;
 };
 
 }  // namespace palpate
