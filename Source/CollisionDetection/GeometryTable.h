@@ -51,8 +51,8 @@ struct Geometry {
   MotionRange motion;                       ///< of the step
   MotionRange correction;                   ///< from the last frame's positions to `before`
   double arcDeviation = 0;                  ///< L: of the step
-  BodyMoments moments;                      ///< of a body that is placed
-  std::uint64_t momentsRevision = 0;        ///< bodyRevision that these are of
+  double largestOfBody = 0;                 ///< L: of its coordinates' magnitudes, where placed
+  std::uint64_t largestRevision = 0;        ///< bodyRevision that it is of
   std::array<std::uint32_t, 7> furthest{};  ///< vertices of the last step, to be tried first
   PointQueryStack queries;                  ///< scratch
   Buffer<MotionRange> motionParts;          ///< scratch

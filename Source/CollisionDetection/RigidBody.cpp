@@ -27,19 +27,20 @@ class RigidStep {
         m_now(geometry.mesh.now.transform()),
         m_matrix(m_now.rotation - m_before.rotation),
         m_vector(m_now.translation - m_before.translation) {
-    if (geometry.momentsRevision != geometry.bodyRevision) {
-      geometry.moments = momentsOf(geometry.mesh.now.body());
-      geometry.momentsRevision = geometry.bodyRevision;
+    if (geometry.largestRevision != geometry.bodyRevision) {
+      geometry.largestOfBody = 0.0;
+      for (const Vector3d& p : geometry.mesh.now.body())
+        geometry.largestOfBody = std::max(geometry.largestOfBody, p.cwiseAbs().maxCoeff());
+      geometry.largestRevision = geometry.bodyRevision;
     }
-    m_slack = kPlacedError *
-              (4.0 * geometry.moments.largest + m_before.translation.cwiseAbs().maxCoeff() +
-               m_now.translation.cwiseAbs().maxCoeff());
+    m_slack =
+        kPlacedError * (4.0 * geometry.largestOfBody + m_before.translation.cwiseAbs().maxCoeff() +
+                        m_now.translation.cwiseAbs().maxCoeff());
   }
 
   const RigidTransform& before() const { return m_before; }
   const RigidTransform& now() const { return m_now; }
   const Matrix3d& matrix() const { return m_matrix; }
-  Vector3d mean() const { return m_matrix * m_geometry.moments.mean + m_vector; }
 
   /// The largest size(displacement) of a vertex, and up to the slack more. Of a box of positions:
   /// no more than that at its centre and, for each axis, growth(axis) times half its edge.
@@ -89,19 +90,6 @@ class RigidStep {
 
 }  // namespace
 
-BodyMoments momentsOf(std::span<const Vector3d> body) {
-  BodyMoments moments;
-  if (body.empty()) return moments;
-  moments.count = static_cast<double>(body.size());
-  for (const Vector3d& p : body) {
-    moments.mean += p / moments.count;
-    moments.largest = std::max(moments.largest, p.cwiseAbs().maxCoeff());
-  }
-  for (const Vector3d& p : body)
-    moments.spread += (p - moments.mean) * ((p - moments.mean) / moments.count).transpose();
-  return moments;
-}
-
 Vector3d worldOrigin(const Geometry& geometry) {
   const Vector3d& origin = geometry.frame.origin;
   return geometry.isPlaced() ? geometry.mesh.now.transform()(origin) : origin;
@@ -132,9 +120,8 @@ BoxMap worldMap(const Geometry& geometry, const Vector3d& origin, double thickne
 
 MotionRange rigidMotion(Geometry& geometry) {
   RigidStep step(geometry);
-  const BodyMoments& moments = geometry.moments;
   MotionRange range;
-  range.count = moments.count;
+  range.isEmpty = geometry.mesh.now.size() == 0;
   if (step.before() == step.now()) return range;
   for (int k = 0; k < 3; ++k) {
     const Vector3d growth = step.matrix().row(k).cwiseAbs();
@@ -143,10 +130,6 @@ MotionRange rigidMotion(Geometry& geometry) {
     range.lower[k] = -step.largest(geometry.furthest[3 + k], growth,
                                    [&](const Vector3d& moved) { return -moved[k]; });
   }
-  range.sum = moments.count * step.mean();
-  range.squares =
-      moments.count * (step.mean().squaredNorm() +
-                       (step.matrix() * moments.spread * step.matrix().transpose()).trace());
   return range;
 }
 

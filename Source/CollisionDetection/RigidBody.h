@@ -16,15 +16,6 @@ struct Geometry;
 // A geometry that setTransform() moved: its boxes are of its body's frame, and nothing here reads
 // all its vertices more than once.
 
-/// The sums that the mean motion of a body follows from.
-struct BodyMoments {
-  double count = 0;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();  ///< the mean of (x - mean) (x - mean)^T
-  double largest = 0;                                ///< L: of the coordinates' magnitudes
-};
-BodyMoments momentsOf(std::span<const Eigen::Vector3d> body);
-
 /// Where a geometry's float frame has its origin in the world.
 Eigen::Vector3d worldOrigin(const Geometry&);
 
@@ -34,8 +25,7 @@ Eigen::Vector3d worldOrigin(const Geometry&);
 BoxMap worldMap(const Geometry&, const Eigen::Vector3d& origin, double thickness, bool wholeStep);
 
 /// How a body moved of which both ends of the step have the same positions in its frame: bounds at
-/// most a few roundings beyond the furthest vertices, which are searched for in its octree, and
-/// sums from its moments.
+/// most a few roundings beyond the furthest vertices, which are searched for in its octree.
 MotionRange rigidMotion(Geometry&);
 
 /// L: how far a vertex is at most, at any time of the step, from where it would be if the body

@@ -73,7 +73,7 @@ PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry&
       plan.method = Method::Proximity;
       plan.reason = MethodReason::Slow;
     } else if (smallestMotion(a.motion, b.motion) > plan.tolerance ||
-               meanMotion(a.motion, b.motion) > plan.tolerance) {
+               meanMotion(a.mesh, b.mesh) > plan.tolerance) {
       plan.method = Method::Continuous;
       plan.reason = MethodReason::Fast;
     } else {

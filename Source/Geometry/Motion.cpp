@@ -20,35 +20,27 @@ constexpr std::size_t kBlock = 24;
 using D = hn::CappedTag<double, 8>;
 using V = hn::Vec<D>;
 
-/// `blocks` of them, into as many sums. Three vectors' worth of each at a time, which is what
-/// registers hold.
+/// `blocks` of them. Three vectors' worth at a time: that of eight vertices, with AVX-512.
 HWY_ATTR void addBlocks(const double* before, const double* now, std::size_t blocks,
-                        double (&out)[4][kBlock]) {
+                        double (&lowest)[kBlock], double (&highest)[kBlock]) {
   const D d;
   for (std::size_t first = 0; first < kBlock; first += 3 * hn::Lanes(d)) {
     const auto moved = [&](std::size_t block, std::size_t i) HWY_ATTR {
       const std::size_t at = kBlock * block + first + i * hn::Lanes(d);
       return hn::LoadU(d, now + at) - hn::LoadU(d, before + at);
     };
-    V lower[3], upper[3], sum[3], squares[3];
-    for (std::size_t i = 0; i < 3; ++i) {
-      lower[i] = upper[i] = moved(0, i);
-      sum[i] = squares[i] = hn::Zero(d);
-    }
-    for (std::size_t block = 0; block < blocks; ++block)
+    V lower[3], upper[3];
+    for (std::size_t i = 0; i < 3; ++i) lower[i] = upper[i] = moved(0, i);
+    for (std::size_t block = 1; block < blocks; ++block)
       for (std::size_t i = 0; i < 3; ++i) {
         const V v = moved(block, i);
         lower[i] = hn::Min(lower[i], v);
         upper[i] = hn::Max(upper[i], v);
-        sum[i] = sum[i] + v;
-        squares[i] = squares[i] + v * v;
       }
     for (std::size_t i = 0; i < 3; ++i) {
       const std::size_t at = first + i * hn::Lanes(d);
-      hn::StoreU(lower[i], d, out[0] + at);
-      hn::StoreU(upper[i], d, out[1] + at);
-      hn::StoreU(sum[i], d, out[2] + at);
-      hn::StoreU(squares[i], d, out[3] + at);
+      hn::StoreU(lower[i], d, lowest + at);
+      hn::StoreU(upper[i], d, highest + at);
     }
   }
 }
@@ -65,13 +57,13 @@ constexpr std::size_t kVertices = 8;  ///< of a block
 
 using Eigen::Vector3d;
 
+constexpr std::size_t kSampled = 512;  ///< of a mesh's vertices, for their mean
+
 void MotionRange::add(const MotionRange& other) {
-  if (other.count == 0) return;
-  lower = count == 0 ? other.lower : Vector3d(lower.cwiseMin(other.lower));
-  upper = count == 0 ? other.upper : Vector3d(upper.cwiseMax(other.upper));
-  sum += other.sum;
-  squares += other.squares;
-  count += other.count;
+  if (other.isEmpty) return;
+  lower = isEmpty ? other.lower : Vector3d(lower.cwiseMin(other.lower));
+  upper = isEmpty ? other.upper : Vector3d(upper.cwiseMax(other.upper));
+  isEmpty = false;
 }
 
 MotionRange motionRange(const Positions& before, const Positions& now, std::size_t begin,
@@ -80,20 +72,16 @@ MotionRange motionRange(const Positions& before, const Positions& now, std::size
   std::size_t i = begin;
   const std::size_t blocks = (end - begin) / kVertices;
   if (blocks > 0 && !before.isPlaced() && !now.isPlaced()) {
-    double found[4][3 * kVertices];
+    double lower[3 * kVertices], upper[3 * kVertices];
     HWY_DYNAMIC_DISPATCH(addBlocks)
-    (before.body()[begin].data(), now.body()[begin].data(), blocks, found);
-    for (std::size_t k = 0; k < 3 * kVertices; k += 3) {
-      const auto part = [&](int which) -> Vector3d {
-        return Eigen::Map<const Vector3d>(found[which] + k);
-      };
-      range.add({part(0), part(1), part(2), part(3).sum(), static_cast<double>(blocks)});
-    }
+    (before.body()[begin].data(), now.body()[begin].data(), blocks, lower, upper);
+    const Eigen::Map<const Eigen::Matrix<double, 3, kVertices>> lowest(lower), highest(upper);
+    range.add({lowest.rowwise().minCoeff(), highest.rowwise().maxCoeff(), false});
     i += blocks * kVertices;
   }
   for (; i < end; ++i) {
     const Vector3d moved = now[i] - before[i];
-    range.add({moved, moved, moved, moved.squaredNorm(), 1.0});
+    range.add({moved, moved, false});
   }
   return range;
 }
@@ -109,10 +97,22 @@ double smallestMotion(const MotionRange& a, const MotionRange& b) {
   return least.stableNorm() * (1.0 - kMotionError);
 }
 
-double meanMotion(const MotionRange& a, const MotionRange& b) {
-  if (a.count == 0 || b.count == 0) return 0.0;
-  const double common = (a.sum / a.count).dot(b.sum / b.count);
-  return std::sqrt(std::max(0.0, a.squares / a.count + b.squares / b.count - 2.0 * common));
+double meanMotion(const TriangleMesh& a, const TriangleMesh& b) {
+  if (a.now.size() == 0 || b.now.size() == 0) return 0.0;
+  Vector3d means[2] = {Vector3d::Zero(), Vector3d::Zero()};
+  double squares = 0.0;
+  for (const bool second : {false, true}) {
+    const TriangleMesh& mesh = second ? b : a;
+    const std::size_t step = 1 + mesh.now.size() / kSampled,
+                      count = 1 + (mesh.now.size() - 1) / step;
+    const double weight = 1.0 / static_cast<double>(count);
+    for (std::size_t v = 0; v < mesh.now.size(); v += step) {
+      const Vector3d moved = mesh.now[v] - mesh.before[v];
+      means[second] += weight * moved;
+      squares += weight * moved.squaredNorm();
+    }
+  }
+  return std::sqrt(std::max(0.0, squares - 2.0 * means[0].dot(means[1])));
 }
 
 }  // namespace palpate
