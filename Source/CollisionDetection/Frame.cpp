@@ -402,11 +402,6 @@ void Frame::findMissedOverlaps(const Threads& threads) {
     Job& job = *m_jobs[i];
     if (!missed(job)) return;
     Stopwatch watch;
-    const std::size_t decided = job.overlaps.exactDecisions,
-                      looked = job.overlaps.validityPairs;  // of the search at the start
-    job.overlaps.clear();
-    job.overlaps.exactDecisions = decided;
-    job.overlaps.validityPairs = looked;
     job.start(&Job::findOverlaps);
     run(job);
     const double spent = watch.lap();

@@ -51,7 +51,7 @@ class Trust {
   std::uint64_t m_frame = 0;
   std::uint64_t m_topologyA = 0, m_topologyB = 0;
   bool m_startsApart = false, m_startsIntersecting = false;  ///< known of this frame's step
-  int m_saved = 0;  ///< of looks at the step's start
+  int m_saved = 0;                                           ///< of looks at the step's start
 };
 
 }  // namespace palpate

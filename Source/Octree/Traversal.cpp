@@ -8,108 +8,14 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Octree/Traversal.cpp"
 #include "Core/Simd.h"
+#include "Octree/BoxLanes.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
-using NodeTag = hn::CappedTag<float, 8>;   ///< eight siblings
-using LeafTag = hn::CappedTag<float, 16>;  ///< primitives of a leaf
-
-template <class V>
-HWY_INLINE V margin(V v) {
-  const hn::DFromV<V> d;
-  return hn::Abs(v) * hn::Set(d, OutwardRounding::kRelative) +
-         hn::Set(d, OutwardRounding::kAbsolute);
-}
-template <class V>
-HWY_INLINE V roundedDown(V v, V shift) {
-  return v + shift - margin(v + shift);
-}
-template <class V>
-HWY_INLINE V roundedUp(V v, V shift) {
-  return v + shift + margin(v + shift);
-}
-
-/// A box that many are compared with.
-struct Query {
-  float lower[3], upper[3];
-};
-
 /// Primitives of one node, in the tree's order.
 struct LeafRange {
   std::uint32_t begin, end;
-};
-
-/// Boxes side by side.
-template <class D>
-struct Bounds {
-  hn::Vec<D> lower[3], upper[3];
-
-  HWY_ATTR HWY_INLINE static Bounds load(D d, const OctreeBlock& block, std::size_t i) {
-    Bounds bounds;
-    for (int k = 0; k < 3; ++k) {
-      bounds.lower[k] = hn::Load(d, block.lower[k] + i);
-      bounds.upper[k] = hn::Load(d, block.upper[k] + i);
-    }
-    return bounds;
-  }
-  HWY_ATTR HWY_INLINE static Bounds load(D d, const BoxArrays& boxes, std::size_t i) {
-    Bounds bounds;
-    for (int k = 0; k < 3; ++k) {
-      bounds.lower[k] = hn::LoadU(d, boxes.lower[k].data() + i);
-      bounds.upper[k] = hn::LoadU(d, boxes.upper[k].data() + i);
-    }
-    return bounds;
-  }
-  HWY_ATTR HWY_INLINE Bounds shifted(const std::array<float, 4>& down,
-                                     const std::array<float, 4>& up) const {
-    const D d;
-    Bounds bounds;
-    for (int k = 0; k < 3; ++k) {
-      bounds.lower[k] = roundedDown(lower[k], hn::Set(d, down[k]));
-      bounds.upper[k] = roundedUp(upper[k], hn::Set(d, up[k]));
-    }
-    return bounds;
-  }
-  /// As BoxMap::at(), bit by bit.
-  HWY_ATTR HWY_INLINE Bounds turned(const BoxMap::End& end) const {
-    const D d;
-    const auto middle = hn::Set(d, 0.5f), zero = hn::Zero(d);
-    hn::Vec<D> c[3], h[3], farthest = zero;
-    for (int j = 0; j < 3; ++j) {
-      c[j] = (lower[j] + upper[j]) * middle;
-      h[j] = (upper[j] - lower[j]) * middle;
-      farthest = hn::Max(farthest, hn::Max(hn::Neg(lower[j]), upper[j]));
-    }
-    Bounds bounds;
-    for (int k = 0; k < 3; ++k) {
-      hn::Vec<D> centre = zero, half = zero, size = zero;
-      for (int j = 0; j < 3; ++j) {
-        const auto m = hn::Set(d, end.matrix[k][j]);
-        centre = centre + m * c[j];
-        half = half + hn::Abs(m) * h[j];
-        size = size + hn::Abs(m) * (hn::Abs(c[j]) + h[j]);
-      }
-      half = half + (size * hn::Set(d, BoxMap::kRelative) + hn::Set(d, OutwardRounding::kAbsolute));
-      half = hn::IfThenElse(hn::Ge(farthest, hn::Set(d, kLargestFloat)),
-                            hn::Set(d, std::numeric_limits<float>::infinity()), half);
-      bounds.lower[k] = roundedDown(centre - half, hn::Set(d, end.shiftLower[k]));
-      bounds.upper[k] = roundedUp(centre + half, hn::Set(d, end.shiftUpper[k]));
-    }
-    return bounds;
-  }
-  HWY_ATTR HWY_INLINE Bounds turned(const BoxMap& map) const {
-    Bounds bounds = turned(map.ends[0]);
-    if (map.count == 1) return bounds;
-    const Bounds other = turned(map.ends[1]);
-    for (int k = 0; k < 3; ++k) {
-      bounds.lower[k] = hn::Min(bounds.lower[k], other.lower[k]);
-      bounds.upper[k] = hn::Max(bounds.upper[k], other.upper[k]);
-    }
-    return bounds;
-  }
 };
 
 /// What is done with boxes on the way: nothing, a's are shifted, or those of at least one tree are
@@ -130,7 +36,7 @@ class Walk {
         m_stack(stack.pairs),
         m_sink(sink) {}
 
-  HWY_ATTR bool rootsOverlap() const { return overlaps(m_b[0], queryOfA(m_a[0], 0)) & 1; }
+  HWY_ATTR bool rootsOverlap() const { return overlaps(m_b[0], boxOfA(m_a[0], 0)) & 1; }
 
   HWY_ATTR void all(std::size_t bottom) {
     while (m_stack.size() > bottom) {
@@ -168,62 +74,46 @@ class Walk {
   }
 
   template <class D>
-  HWY_ATTR HWY_INLINE Bounds<D> placedA(const Bounds<D>& bounds) const {
-    if (placing == Placing::None) return bounds;
-    if (placing == Placing::Turned && m_trees.mapA.count > 0) return bounds.turned(m_trees.mapA);
-    return bounds.shifted(m_trees.shiftLower, m_trees.shiftUpper);
+  HWY_ATTR HWY_INLINE BoxLanes<D> placedA(const BoxLanes<D>& boxes) const {
+    if (placing == Placing::None) return boxes;
+    if (placing == Placing::Turned && m_trees.mapA.count > 0) return boxes.turned(m_trees.mapA);
+    return boxes.shifted(m_trees.shiftLower, m_trees.shiftUpper);
   }
   template <class D>
-  HWY_ATTR HWY_INLINE Bounds<D> placedB(const Bounds<D>& bounds) const {
-    if (placing == Placing::Turned && m_trees.mapB.count > 0) return bounds.turned(m_trees.mapB);
-    return bounds;
+  HWY_ATTR HWY_INLINE BoxLanes<D> placedB(const BoxLanes<D>& boxes) const {
+    return placing == Placing::Turned ? boxes.turned(m_trees.mapB) : boxes;
   }
 
   /// One node of a, in the frame that boxes are compared in.
-  HWY_ATTR Query queryOfA(const OctreeBlock& block, unsigned slot) const {
-    Query query;
-    const hn::CappedTag<float, 1> d;
-    Bounds<hn::CappedTag<float, 1>> bounds;
-    for (int k = 0; k < 3; ++k) {
-      bounds.lower[k] = hn::Set(d, block.lower[k][slot]);
-      bounds.upper[k] = hn::Set(d, block.upper[k][slot]);
-    }
-    bounds = placedA(bounds);
-    for (int k = 0; k < 3; ++k) {
-      query.lower[k] = hn::GetLane(bounds.lower[k]);
-      query.upper[k] = hn::GetLane(bounds.upper[k]);
-    }
-    return query;
-  }
-  HWY_ATTR HWY_INLINE Query queryOfB(const OctreeBlock& block, unsigned slot) const {
+  FloatBox boxOfA(const OctreeBlock& block, unsigned slot) const {
     FloatBox box = block.box(slot);
-    if (placing == Placing::Turned) box = m_trees.mapB(box);
-    return {{box.lower[0], box.lower[1], box.lower[2]}, {box.upper[0], box.upper[1], box.upper[2]}};
+    if (placing == Placing::None) return box;
+    if (placing == Placing::Turned && m_trees.mapA.count > 0) return m_trees.mapA(box);
+    for (int k = 0; k < 3; ++k) {
+      box.lower[k] = OutwardRounding::down(box.lower[k] + m_trees.shiftLower[k]);
+      box.upper[k] = OutwardRounding::up(box.upper[k] + m_trees.shiftUpper[k]);
+    }
+    return box;
+  }
+  FloatBox boxOfB(const OctreeBlock& block, unsigned slot) const {
+    return placing == Placing::Turned ? m_trees.mapB(block.box(slot)) : block.box(slot);
   }
 
-  /// Bit i: child i of b's block overlaps the query.
-  HWY_ATTR HWY_INLINE std::uint32_t overlaps(const OctreeBlock& block, const Query& query) const {
+  /// Bit i: child i of b's block overlaps the box.
+  HWY_ATTR HWY_INLINE std::uint32_t overlaps(const OctreeBlock& block, const FloatBox& box) const {
     const NodeTag d;
     std::uint32_t bits = 0;
-    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-      const auto bounds = placedB(Bounds<NodeTag>::load(d, block, i));
-      auto mask = hn::Le(bounds.lower[0], hn::Set(d, query.upper[0]));
-      mask = hn::And(mask, hn::Ge(bounds.upper[0], hn::Set(d, query.lower[0])));
-      for (int k = 1; k < 3; ++k) {
-        mask = hn::And(mask, hn::Le(bounds.lower[k], hn::Set(d, query.upper[k])));
-        mask = hn::And(mask, hn::Ge(bounds.upper[k], hn::Set(d, query.lower[k])));
-      }
-      bits |= bitsOf(d, mask) << i;
-    }
+    for (std::size_t i = 0; i < 8; i += hn::Lanes(d))
+      bits |= bitsOf(d, placedB(BoxLanes<NodeTag>::load(block, i)).overlapping(box)) << i;
     return bits;
   }
 
   struct ShiftedBlock {
     alignas(32) float lower[3][8];
     alignas(32) float upper[3][8];
-    Query query(unsigned slot) const {
-      return {{lower[0][slot], lower[1][slot], lower[2][slot]},
-              {upper[0][slot], upper[1][slot], upper[2][slot]}};
+    FloatBox box(unsigned slot) const {
+      return {{lower[0][slot], lower[1][slot], lower[2][slot], 0},
+              {upper[0][slot], upper[1][slot], upper[2][slot], 0}};
     }
   };
 
@@ -231,18 +121,15 @@ class Walk {
   HWY_ATTR std::uint32_t shiftBlock(const OctreeBlock& a, const OctreeBlock& b, unsigned slotB,
                                     ShiftedBlock& out) const {
     const NodeTag d;
-    const Query box = queryOfB(b, slotB);
+    const FloatBox box = boxOfB(b, slotB);
     std::uint32_t bits = 0;
     for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-      const auto bounds = placedA(Bounds<NodeTag>::load(d, a, i));
-      auto mask = hn::Eq(hn::Zero(d), hn::Zero(d));
+      const auto boxes = placedA(BoxLanes<NodeTag>::load(a, i));
       for (int k = 0; k < 3; ++k) {
-        hn::Store(bounds.lower[k], d, out.lower[k] + i);
-        hn::Store(bounds.upper[k], d, out.upper[k] + i);
-        mask = hn::And(mask, hn::And(hn::Le(bounds.lower[k], hn::Set(d, box.upper[k])),
-                                     hn::Ge(bounds.upper[k], hn::Set(d, box.lower[k]))));
+        hn::Store(boxes.lower[k], d, out.lower[k] + i);
+        hn::Store(boxes.upper[k], d, out.upper[k] + i);
       }
-      bits |= bitsOf(d, mask) << i;
+      bits |= bitsOf(d, boxes.overlapping(box)) << i;
     }
     return bits;
   }
@@ -284,7 +171,7 @@ class Walk {
     const OctreeNode nodeA = pair.a & ~NodePair::kOwn;
     const OctreeNode child = m_b[pair.b >> 3].child[pair.b & 7];
     if (hasOwn(m_b, pair.b)) push(pair.a, pair.b | NodePair::kOwn);
-    pushChildrenOfB(pair.a, child, overlaps(m_b[child], queryOfA(m_a[nodeA >> 3], nodeA & 7)));
+    pushChildrenOfB(pair.a, child, overlaps(m_b[child], boxOfA(m_a[nodeA >> 3], nodeA & 7)));
   }
 
   HWY_ATTR void descendA(NodePair pair) {
@@ -308,7 +195,7 @@ class Walk {
       const auto slot = static_cast<unsigned>(std::countr_zero(bits));
       const OctreeNode a = childA * 8 + slot;
       if (ownB) push(a, pair.b | NodePair::kOwn);
-      pushChildrenOfB(a, childB, overlaps(m_b[childB], block.query(slot)));
+      pushChildrenOfB(a, childB, overlaps(m_b[childB], block.box(slot)));
     }
   }
 
@@ -324,7 +211,7 @@ class Walk {
       const OctreeNode a = child * 8 + slot;
       if (own) push(node | NodePair::kOwn, a);
       push(a, a);
-      pushChildrenOfB(a, child, overlaps(siblings, block.query(slot)) & ~((2u << slot) - 1));
+      pushChildrenOfB(a, child, overlaps(siblings, block.box(slot)) & ~((2u << slot) - 1));
     }
   }
 
@@ -340,7 +227,7 @@ class Walk {
   HWY_ATTR HWY_INLINE void leaves(NodePair pair) {
     const LeafRange a = range(*m_trees.a, pair.a), b = range(*m_trees.b, pair.b);
     const OctreeNode nodeB = pair.b & ~NodePair::kOwn;
-    const Query box = queryOfB(m_b[nodeB >> 3], nodeB & 7);
+    const FloatBox box = boxOfB(m_b[nodeB >> 3], nodeB & 7);
     Rows rows;
     for (std::size_t i = a.begin; i < a.end; i += Rows::kMost) {
       load(rows, i, a.end, box);
@@ -350,7 +237,8 @@ class Walk {
 
   HWY_ATTR void withinLeaf(LeafRange leaf) {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
-    const Query all{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+    const FloatBox all{{-kInfinity, -kInfinity, -kInfinity, 0},
+                       {kInfinity, kInfinity, kInfinity, 0}};
     Rows rows;
     for (std::size_t i = leaf.begin; i < leaf.end; i += Rows::kMost) {
       load(rows, i, leaf.end, all);
@@ -360,7 +248,7 @@ class Walk {
 
   /// Those from `first` on, of which the ones are of interest that overlap the box.
   HWY_ATTR HWY_INLINE void load(Rows& rows, std::size_t first, std::size_t end,
-                                const Query& box) const {
+                                const FloatBox& box) const {
     const LeafTag d;
     rows.first = first;
     rows.bits = 0;
@@ -371,17 +259,12 @@ class Walk {
     }
     for (std::size_t lane = 0; lane < Rows::kMost && first + lane < end; lane += hn::Lanes(d)) {
       const std::size_t i = first + lane;
-      const auto bounds = placedA(Bounds<LeafTag>::load(d, m_boxesA, i));
-      auto mask = hn::FirstN(d, end - i);
-      for (int k = 0; k < 3; ++k) {
-        if (placing != Placing::None) {
-          hn::Store(bounds.lower[k], d, rows.placed[0][k] + lane);
-          hn::Store(bounds.upper[k], d, rows.placed[1][k] + lane);
-        }
-        mask = hn::And(mask, hn::And(hn::Le(bounds.lower[k], hn::Set(d, box.upper[k])),
-                                     hn::Ge(bounds.upper[k], hn::Set(d, box.lower[k]))));
+      const auto boxes = placedA(BoxLanes<LeafTag>::load(m_boxesA, i));
+      for (int k = 0; k < 3 && placing != Placing::None; ++k) {
+        hn::Store(boxes.lower[k], d, rows.placed[0][k] + lane);
+        hn::Store(boxes.upper[k], d, rows.placed[1][k] + lane);
       }
-      rows.bits |= bitsOf(d, mask) << lane;
+      rows.bits |= bitsOf(d, hn::And(hn::FirstN(d, end - i), boxes.overlapping(box))) << lane;
     }
   }
 
@@ -392,7 +275,7 @@ class Walk {
     const LeafTag d;
     const hn::RebindToUnsigned<LeafTag> du;
     for (std::size_t j = b.begin; j < b.end; j += hn::Lanes(d)) {
-      const auto bounds = placedB(Bounds<LeafTag>::load(d, m_boxesB, j));
+      const auto boxes = placedB(BoxLanes<LeafTag>::load(m_boxesB, j));
       const auto ids = hn::LoadU(du, m_idsB + j);
       hn::Vec<decltype(du)> corners[3];
       if (m_trees.adjacency)
@@ -406,8 +289,8 @@ class Walk {
         auto mask = inside;
         if (kWithin && i >= j) mask = hn::AndNot(hn::FirstN(d, i - j + 1), mask);
         for (int k = 0; k < 3; ++k) {
-          mask = hn::And(mask, hn::Le(bounds.lower[k], hn::Set(d, rows.upper[k][lane])));
-          mask = hn::And(mask, hn::Ge(bounds.upper[k], hn::Set(d, rows.lower[k][lane])));
+          mask = hn::And(mask, hn::Le(boxes.lower[k], hn::Set(d, rows.upper[k][lane])));
+          mask = hn::And(mask, hn::Ge(boxes.upper[k], hn::Set(d, rows.lower[k][lane])));
         }
         if (hn::AllFalse(d, mask)) continue;
         auto found = hn::RebindMask(du, mask);

@@ -1,6 +1,6 @@
 // What validity() costs: reading how far vertices moved, what the narrow phase does for it beside
-// the same without, of the same candidates, in turns, and the triangle pairs that were looked at for
-// where the step starts, by what one costs. Beside it the whole frame.
+// the same without, of the same candidates, in turns, and the triangle pairs that were looked at
+// for where the step starts, by what one costs. Beside it the whole frame.
 #include "Rows.h"
 
 #include "Geometry/Motion.h"

@@ -28,8 +28,9 @@ enum class MethodReason {
 ///          no features that touched or crossed within the step are missing. Intersection: that the
 ///          meshes touched within the step is not missing.
 ///          False where the library does not know; never true where it is wrong.
-/// Cost     at most 5 % of the frame, but for a search for intersections at the step's start, in the
-///          pair's first frame and where motion may have brought the meshes together since.
+/// Cost     at most 5 % of the frames, but for a look at the step's start in the pair's first one.
+///          Where motion may have brought the meshes together since, and the step's impacts do not
+///          tell, that is taken again, by Auto at once, else once in sixteen frames.
 /// Source   Docs/Algorithms/Validity.md has the conditions and their proofs.
 struct Validity {
   bool trusted = false;

@@ -1,0 +1,121 @@
+// No include guard: for files with SIMD code, after Core/Simd.h.
+#include "Octree/BoxMap.h"
+#include "Octree/Octree.h"
+
+#include <limits>
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using NodeTag = hn::CappedTag<float, 8>;   ///< eight siblings
+using LeafTag = hn::CappedTag<float, 16>;  ///< primitives of a leaf
+
+template <class V>
+HWY_INLINE V margin(V v) {
+  const hn::DFromV<V> d;
+  return hn::Abs(v) * hn::Set(d, OutwardRounding::kRelative) +
+         hn::Set(d, OutwardRounding::kAbsolute);
+}
+template <class V>
+HWY_INLINE V roundedDown(V v, V shift) {
+  return v + shift - margin(v + shift);
+}
+template <class V>
+HWY_INLINE V roundedUp(V v, V shift) {
+  return v + shift + margin(v + shift);
+}
+
+/// Boxes side by side: as many as D has lanes.
+template <class D>
+struct BoxLanes {
+  hn::Vec<D> lower[3], upper[3];
+
+  /// Of OctreeBlock or BoxArrays, from the i-th on.
+  template <class Boxes>
+  HWY_ATTR HWY_INLINE static BoxLanes load(const Boxes& boxes, std::size_t i) {
+    const D d;
+    BoxLanes lanes;
+    for (int k = 0; k < 3; ++k) {
+      lanes.lower[k] = hn::LoadU(d, &boxes.lower[k][i]);
+      lanes.upper[k] = hn::LoadU(d, &boxes.upper[k][i]);
+    }
+    return lanes;
+  }
+  HWY_ATTR HWY_INLINE BoxLanes shifted(const std::array<float, 4>& down,
+                                       const std::array<float, 4>& up) const {
+    const D d;
+    BoxLanes lanes;
+    for (int k = 0; k < 3; ++k) {
+      lanes.lower[k] = roundedDown(lower[k], hn::Set(d, down[k]));
+      lanes.upper[k] = roundedUp(upper[k], hn::Set(d, up[k]));
+    }
+    return lanes;
+  }
+  /// As BoxMap::at(), bit by bit.
+  HWY_ATTR HWY_INLINE BoxLanes turned(const BoxMap::End& end) const {
+    const D d;
+    const auto middle = hn::Set(d, 0.5f), zero = hn::Zero(d);
+    hn::Vec<D> c[3], h[3], farthest = zero;
+    for (int j = 0; j < 3; ++j) {
+      c[j] = (lower[j] + upper[j]) * middle;
+      h[j] = (upper[j] - lower[j]) * middle;
+      farthest = hn::Max(farthest, hn::Max(hn::Neg(lower[j]), upper[j]));
+    }
+    BoxLanes lanes;
+    for (int k = 0; k < 3; ++k) {
+      hn::Vec<D> centre = zero, half = zero, size = zero;
+      for (int j = 0; j < 3; ++j) {
+        const auto m = hn::Set(d, end.matrix[k][j]);
+        centre = centre + m * c[j];
+        half = half + hn::Abs(m) * h[j];
+        size = size + hn::Abs(m) * (hn::Abs(c[j]) + h[j]);
+      }
+      half = half + (size * hn::Set(d, BoxMap::kRelative) + hn::Set(d, OutwardRounding::kAbsolute));
+      half = hn::IfThenElse(hn::Ge(farthest, hn::Set(d, kLargestFloat)),
+                            hn::Set(d, std::numeric_limits<float>::infinity()), half);
+      lanes.lower[k] = roundedDown(centre - half, hn::Set(d, end.shiftLower[k]));
+      lanes.upper[k] = roundedUp(centre + half, hn::Set(d, end.shiftUpper[k]));
+    }
+    return lanes;
+  }
+  HWY_ATTR HWY_INLINE BoxLanes turned(const BoxMap& map) const {
+    if (map.count == 0) return *this;
+    BoxLanes lanes = turned(map.ends[0]);
+    if (map.count == 1) return lanes;
+    const BoxLanes other = turned(map.ends[1]);
+    for (int k = 0; k < 3; ++k) {
+      lanes.lower[k] = hn::Min(lanes.lower[k], other.lower[k]);
+      lanes.upper[k] = hn::Max(lanes.upper[k], other.upper[k]);
+    }
+    return lanes;
+  }
+
+  HWY_ATTR HWY_INLINE hn::Mask<D> overlapping(const FloatBox& box) const {
+    const D d;
+    auto mask = hn::Le(lower[0], hn::Set(d, box.upper[0]));
+    mask = hn::And(mask, hn::Ge(upper[0], hn::Set(d, box.lower[0])));
+    for (int k = 1; k < 3; ++k) {
+      mask = hn::And(mask, hn::Le(lower[k], hn::Set(d, box.upper[k])));
+      mask = hn::And(mask, hn::Ge(upper[k], hn::Set(d, box.lower[k])));
+    }
+    return mask;
+  }
+  /// Squared; of empty boxes infinity.
+  HWY_ATTR HWY_INLINE hn::Vec<D> distanceFrom(const FloatBox& box) const {
+    const D d;
+    auto sum = hn::Zero(d);
+    for (int k = 0; k < 3; ++k) {
+      const auto outside =
+          hn::Max(hn::Max(lower[k] - hn::Set(d, box.upper[k]), hn::Set(d, box.lower[k]) - upper[k]),
+                  hn::Zero(d));
+      sum += outside * outside;
+    }
+    return hn::IfThenElse(hn::Le(lower[0], upper[0]), sum,
+                          hn::Set(d, std::numeric_limits<float>::infinity()));
+  }
+};
+
+}  // namespace palpate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
