@@ -66,7 +66,9 @@ void Score::add(const Truth& truth, const Claims& said, const Incidence& a, cons
   }
   std::vector<TrianglePair> touching = said.triangles;
   for (const auto& [features, claim] : first)
-    if (!claim.example) Incidence::addTriangles(features, a, b, touching);
+    // Of features that do touch in the step every triangle that holds them is found.
+    if (!claim.example || truth.impacts.contains(features))
+      Incidence::addTriangles(features, a, b, touching);
   sortUnique(touching);
   m_touching += truth.touching.size();
   m_claimed += touching.size();

@@ -1,0 +1,141 @@
+#include "Octree/PointQueries.h"
+
+#include "CollisionDetection/GeometryTable.h"
+#include "Common/RandomMeshes.h"
+#include "Core/SimdPath.h"
+#include "Octree/Traversal.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+namespace palpate {
+namespace {
+
+using testing::Mesh;
+using testing::Random;
+using testing::uniform;
+
+/// A geometry's octree, and maps of its boxes: none, and one and two turns.
+struct Case {
+  GeometryTable table;
+  const Octree* octree;
+  std::vector<BoxMap> maps{BoxMap{}};
+
+  Case(Random& random, std::size_t size, double extent) {
+    const Mesh mesh = testing::soup(random, size, extent);
+    const GeometryId id = table.add(mesh.positions, mesh.triangles);
+    table.updateOctrees({}, Threads(1));
+    octree = &table.at(id).octree;
+    for (int ends = 1; ends <= 2; ++ends) {
+      BoxMap& map = maps.emplace_back();
+      for (int i = 0; i < ends; ++i) {
+        const Eigen::Matrix3d turn =
+            Eigen::AngleAxisd(uniform(random, 0.0, 3.0),
+                              testing::randomPoint(random, -1.0, 1.0).normalized())
+                .toRotationMatrix();
+        std::array<std::array<double, 3>, 3> matrix;
+        for (int k = 0; k < 3; ++k)
+          for (int j = 0; j < 3; ++j) matrix[k][j] = turn(k, j);
+        setEnd(map.ends[map.count++], matrix, {0.1, -0.2, 0.3}, 0.0, 1e-6);
+      }
+    }
+  }
+  std::uint32_t size() const { return static_cast<std::uint32_t>(octree->size()); }
+};
+
+FloatBox randomBox(Random& random, double reach, double size) {
+  FloatBox box;
+  for (int k = 0; k < 3; ++k) {
+    box.lower[k] = static_cast<float>(uniform(random, -reach, reach));
+    box.upper[k] = box.lower[k] + static_cast<float>(uniform(random, 0.0, size));
+  }
+  return box;
+}
+
+double squaredDistance(const FloatBox& a, const FloatBox& b) {
+  double sum = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double gap =
+        std::max({double{a.lower[k]} - b.upper[k], double{b.lower[k]} - a.upper[k], 0.0});
+    sum += gap * gap;
+  }
+  return sum;
+}
+
+/// f(case, map, reach): with the largest coordinate of the case's boxes, on every path.
+template <class F>
+void forEachCase(F&& f) {
+  Random random(7);
+  for (const std::size_t size : {1u, 5u, 33u, 2000u})
+    for (const double extent : {0.02, 0.5}) {
+      const Case c(random, size, extent);
+      double reach = 0;
+      const FloatBox root = c.octree->blocks()[0].box(0);
+      for (int k = 0; k < 3; ++k)
+        reach = std::max({reach, -double{root.lower[k]}, double{root.upper[k]}});
+      for (const std::string& path : simdPaths()) {
+        useSimdPath(path);
+        for (const BoxMap& map : c.maps) {
+          SCOPED_TRACE(path + ", " + std::to_string(size) + " of size " + std::to_string(extent) +
+                       ", ends " + std::to_string(map.count));
+          f(c, map, reach);
+        }
+      }
+    }
+  useSimdPath("");
+}
+
+TEST(PointQueries, FindWhatOverlaps) {
+  Random random(8);
+  std::size_t all = 0, none = 0;
+  forEachCase([&](const Case& c, const BoxMap& map, double reach) {
+    PointQueryStack stack;
+    for (int query = 0; query < 40; ++query) {
+      const FloatBox box = query == 0 ? FloatBox() : randomBox(random, 1.5 * reach, 0.5 * reach);
+      std::vector<std::uint32_t> expected;
+      for (std::uint32_t i = 0; i < c.size(); ++i)
+        if (map(c.octree->boxes()[i]).overlaps(box)) expected.push_back(i);
+      findOverlapping(*c.octree, map, box, stack);
+      std::vector<std::uint32_t> found(stack.found.begin(), stack.found.end());
+      std::sort(found.begin(), found.end());
+      ASSERT_EQ(found, expected);
+      (expected.empty() ? none : all) += 1;
+    }
+  });
+  EXPECT_GT(all, 300u);
+  EXPECT_GT(none, 300u);
+}
+
+TEST(PointQueries, TryNoMoreThanTheNearest) {
+  Random random(9);
+  forEachCase([&](const Case& c, const BoxMap& map, double reach) {
+    PointQueryStack stack;
+    for (int query = 0; query < 40; ++query) {
+      const FloatBox point = randomBox(random, 1.5 * reach, query % 3 ? 0.0 : 0.01 * reach);
+      double nearest = std::numeric_limits<double>::infinity();
+      for (std::uint32_t i = 0; i < c.size(); ++i)
+        nearest = std::min(nearest, squaredDistance(map(c.octree->boxes()[i]), point));
+      // None, exactly as far as the nearest, and less.
+      for (const double limit : {std::numeric_limits<double>::infinity(), nearest, 0.5 * nearest}) {
+        double best = limit;
+        std::vector<int> times(c.size(), 0);
+        forEachNearest(*c.octree, map, point, limit, stack, [&](std::uint32_t place) {
+          ++times[place];
+          const double distance = squaredDistance(map(c.octree->boxes()[place]), point);
+          EXPECT_LE(distance, best * (1 + 1e-5) + 1e-30);
+          return best = std::min(best, distance);
+        });
+        EXPECT_EQ(best, std::min(limit, nearest));
+        EXPECT_LE(*std::max_element(times.begin(), times.end()), 1);
+      }
+    }
+  });
+}
+
+}  // namespace
+}  // namespace palpate
