@@ -10,8 +10,8 @@ namespace palpate {
 
 namespace {
 
-/// A look at all candidates at the step's start may take two thirds of a frame. So many frames
-/// earn one, and up to four are saved.
+/// A look at all candidates at the step's start may take half a frame, of Contacts::Earliest two
+/// thirds. So many frames earn one, and up to four are saved, or one.
 constexpr int kLook = 16, kMostSaved = 4 * kLook;
 
 /// From the last frame's positions to this step's start.
@@ -99,13 +99,13 @@ void Trust::start(const PairSettings& settings, const Geometry& a, const Geometr
   // No two features within the thickness are further apart, in any coordinate, than both meshes.
   const double size = extentOf(a) + extentOf(b) + settings.thickness + plan.step.extra;
   plan.step.certain = plan.step.motion + 2.0 * kMotionError * (plan.step.motion + size);
-  const bool known = frame == m_frame + 1 && m_topologyA == a.topologyRevision &&
-                     m_topologyB == b.topologyRevision;
+  const bool changed = m_topologyA != a.topologyRevision || m_topologyB != b.topologyRevision;
+  const bool known = frame == m_frame + 1 && !changed;
   m_startsApart = known && m_end == End::Apart && (!corrected || correction < m_clearance);
   m_startsIntersecting = known && m_end == End::Intersecting && !corrected;
   plan.startsIntersecting = m_startsIntersecting;
-  const bool changed = m_topologyA != a.topologyRevision || m_topologyB != b.topologyRevision;
-  m_saved = changed ? kMostSaved : std::min(m_saved + 1, kMostSaved);
+  const int most = settings.contacts == Contacts::Earliest ? kLook : kMostSaved;
+  m_saved = changed ? most : std::min(m_saved + 1, most);
   m_frame = frame;
   m_topologyA = a.topologyRevision;
   m_topologyB = b.topologyRevision;
@@ -114,7 +114,7 @@ void Trust::start(const PairSettings& settings, const Geometry& a, const Geometr
     return;
   plan.overlaps = settings.method == Method::Auto;
   plan.step.start = !plan.startsIntersecting && (plan.overlaps || m_saved >= kLook);
-  if (plan.step.start) m_saved -= kLook;
+  if (plan.step.start) m_saved = std::max(m_saved - kLook, 0);
   // It will not be trusted, whatever is seen of the step.
   if (plan.method == Method::Proximity && settings.method == plan.method && !plan.step.start)
     plan.step.motion = 0.0;
