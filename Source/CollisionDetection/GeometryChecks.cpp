@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -13,7 +14,7 @@ namespace palpate {
 
 namespace {
 
-constexpr std::size_t kCopyGrain = 16384;
+constexpr std::size_t kCopyGrain = 16384, kPiece = 512;  ///< what the nearest cache holds
 // Ids are 32 bits, and the highest bit of octree node numbers is taken.
 constexpr std::size_t kMostElements = std::size_t{1} << 28;
 constexpr std::size_t kMostTetrahedra = kMostElements / 4;  // of four faces each
@@ -32,15 +33,26 @@ void checkIndices(GeometryId id, const std::string& element, std::size_t index,
 }  // namespace
 
 void checkPositions(GeometryId id, std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out,
-                    const char* which, const Threads& threads) {
+                    const char* which, const Threads& threads, const Eigen::Vector3d* before,
+                    MotionRange* moved) {
   std::atomic<std::size_t> first = positions.size();
+  std::mutex mutex;
   threads.forChunks(positions.size(), kCopyGrain,
                     [&](std::size_t, std::size_t from, std::size_t to) {
-                      const auto part = positions.subspan(from, to - from);
-                      const std::size_t bad = from + copyFinite(part, out + from);
+                      MotionRange range;
+                      std::size_t bad = to;
+                      for (std::size_t i = from; i < to && bad == to; i += kPiece) {
+                        const auto part = positions.subspan(i, std::min(kPiece, to - i));
+                        const std::size_t good = copyFinite(part, out + i);
+                        if (good < part.size()) bad = i + good;
+                        if (before) range.add(motionRange({before + i, good}, {out + i, good}));
+                      }
                       std::size_t known = first;
                       while (bad < to && bad < known && !first.compare_exchange_weak(known, bad)) {
                       }
+                      if (!before) return;
+                      const std::lock_guard lock(mutex);
+                      moved->add(range);
                     });
   const std::size_t bad = first;
   if (bad == positions.size()) return;

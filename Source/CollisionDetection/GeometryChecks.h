@@ -11,9 +11,11 @@ namespace palpate {
 
 // What users hand in: each throws what is wrong with it.
 
-/// Copied to `out` while checked. which: " before", " now" or nothing, for the message.
+/// Copied to `out` while checked. which: " before", " now" or nothing, for the message. moved: from
+/// `before`, if that is given, while they are at hand; half of what reading both again costs.
 void checkPositions(GeometryId, std::span<const Eigen::Vector3d>, Eigen::Vector3d* out,
-                    const char* which, const Threads&);
+                    const char* which, const Threads&, const Eigen::Vector3d* before = nullptr,
+                    MotionRange* moved = nullptr);
 /// Positions of a new topology, copied.
 std::vector<Eigen::Vector3d> checkedRest(GeometryId, std::span<const Eigen::Vector3d>);
 void checkCounts(GeometryId, std::span<const Eigen::Vector3d>, std::span<const Triangle>,

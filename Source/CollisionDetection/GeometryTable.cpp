@@ -21,32 +21,35 @@ namespace {
 constexpr std::size_t kSmall = 16384;
 /// Refitting fewer triangles in all, cores take longer to hand over data than to compute it.
 constexpr std::size_t kSmallRefit = 24576;
-constexpr std::size_t kGrain = 1024, kMotionGrain = 4096;
+constexpr std::size_t kGrain = 1024;
 constexpr std::size_t kTrianglesPerGroup = 1024;  ///< for bounds, before there are nodes
 constexpr std::size_t kGroupGrain = 128;
 /// A refitted tree is rebuilt when its leaves have become this much larger in relation to their
 /// triangles.
 constexpr double kMostLoosening = 1.5;
 
-/// Copied into memory that neither the step nor the last frame has.
+/// Copied into memory that neither the step nor the last frame has. moved: as of checkPositions().
 Positions::Body checkedBody(Geometry& geometry, std::span<const Eigen::Vector3d> positions,
-                            const char* which, const Threads& threads) {
+                            const char* which, const Threads& threads,
+                            const Eigen::Vector3d* before = nullptr, MotionRange* moved = nullptr) {
   const auto free = std::find_if(geometry.bodies.begin(), geometry.bodies.end(),
                                  [](const auto& body) { return body.use_count() <= 1; });
   PALPATE_ASSERT(free != geometry.bodies.end());
   if (!*free) *free = std::make_shared<std::vector<Eigen::Vector3d>>();
   (*free)->resize(positions.size());
-  checkPositions(geometry.id, positions, (*free)->data(), which, threads);
+  checkPositions(geometry.id, positions, (*free)->data(), which, threads, before, moved);
   if (geometry.isPlaced()) checkPlaceable(geometry.id, positions, ErrorCode::NonFinitePosition);
   return *free;
 }
 
-/// The step begins where the last frame ended, unless positions before were given since.
+/// A step begins where the last frame ended, unless positions before were given since.
+const Positions& nextStart(const Geometry& geometry) {
+  if (!geometry.setThisFrame) return geometry.mesh.now;
+  return geometry.beforeGiven ? geometry.lastFrame : geometry.mesh.before;
+}
+
 void startStep(Geometry& geometry) {
-  if (!geometry.setThisFrame)
-    geometry.mesh.before = geometry.mesh.now;
-  else if (geometry.beforeGiven)
-    geometry.mesh.before = geometry.lastFrame;
+  geometry.mesh.before = nextStart(geometry);
   geometry.setThisFrame = true;
   geometry.beforeGiven = false;
 }
@@ -150,19 +153,6 @@ double smallestHeight(const TriangleMesh& mesh) {
     if (area > 0.0) smallest = std::min(smallest, area / longest);
   }
   return smallest;
-}
-
-/// A large mesh by parts, whose union does not depend on threads.
-MotionRange motionOf(const Positions& before, const Positions& now, Buffer<MotionRange>& parts,
-                     const Threads& threads) {
-  parts.resize((now.size() + kMotionGrain - 1) / kMotionGrain);
-  threads.forChunks(now.size(), kMotionGrain,
-                    [&](std::size_t chunk, std::size_t from, std::size_t to) {
-                      parts[chunk] = motionRange(before, now, from, to);
-                    });
-  MotionRange all;
-  for (const MotionRange& part : parts) all.add(part);
-  return all;
 }
 
 }  // namespace
@@ -292,8 +282,14 @@ void GeometryTable::setPositions(GeometryId id,
   TriangleMesh& mesh = geometry.mesh;
   if (before) checkPositionCount(geometry, before->size());
   checkPositionCount(geometry, now.size());
-  const auto start = before ? checkedBody(geometry, *before, " before", threads) : nullptr,
-             end = checkedBody(geometry, now, before ? " now" : "", threads);
+  const auto start = before ? checkedBody(geometry, *before, " before", threads) : nullptr;
+  // Where it was asked for last time, and all vertices have their positions from here.
+  const Positions& last = nextStart(geometry);
+  const bool asked = geometry.motionRevision == geometry.stepRevision && geometry.hasLastFrame &&
+                     !geometry.isPlaced() && !last.isPlaced();
+  const Eigen::Vector3d* const from = !asked ? nullptr : (start ? *start : last.body()).data();
+  MotionRange motion;
+  const auto end = checkedBody(geometry, now, before ? " now" : "", threads, from, &motion);
   const bool moved = before || (!now.empty() && std::memcmp(now.data(), mesh.now.body().data(),
                                                             now.size_bytes()) != 0);
   startStep(geometry);
@@ -308,6 +304,9 @@ void GeometryTable::setPositions(GeometryId id,
   geometry.bodyRevision += moved;
   ++geometry.stepRevision;
   ++geometry.bodyStepRevision;
+  if (!asked) return;
+  geometry.motion = motion;
+  geometry.movedRevision = geometry.stepRevision;
 }
 
 void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions,
@@ -374,18 +373,18 @@ void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> el
   ++geometry.topologyRevision;
 }
 
-void GeometryTable::updateMotion(Geometry& geometry, const Threads& threads) {
+void GeometryTable::updateMotion(Geometry& geometry) {
   if (geometry.motionRevision == geometry.stepRevision) return;
   geometry.motionRevision = geometry.stepRevision;
   const TriangleMesh& mesh = geometry.mesh;
-  geometry.motion = geometry.isPlaced() && mesh.now.hasSameBody(mesh.before)
-                        ? rigidMotion(geometry)
-                        : motionOf(mesh.before, mesh.now, geometry.motionParts, threads);
+  if (geometry.isPlaced() && mesh.now.hasSameBody(mesh.before))
+    geometry.motion = rigidMotion(geometry);
+  else if (geometry.movedRevision != geometry.stepRevision)
+    geometry.motion = motionRange(mesh.before, mesh.now);
   geometry.arcDeviation = arcDeviation(geometry);
-  geometry.correction =
-      geometry.hasLastFrame && geometry.beforeGiven
-          ? motionOf(geometry.lastFrame, mesh.before, geometry.motionParts, threads)
-          : MotionRange{};
+  geometry.correction = geometry.hasLastFrame && geometry.beforeGiven
+                            ? motionRange(geometry.lastFrame, mesh.before)
+                            : MotionRange{};
 }
 
 void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads& threads) {

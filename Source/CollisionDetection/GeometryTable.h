@@ -55,8 +55,8 @@ struct Geometry {
   std::uint64_t largestRevision = 0;        ///< bodyRevision that it is of
   std::array<std::uint32_t, 7> furthest{};  ///< vertices of the last step, to be tried first
   PointQueryStack queries;                  ///< scratch
-  Buffer<MotionRange> motionParts;          ///< scratch
   std::uint64_t motionRevision = 0;         ///< stepRevision that both are of
+  std::uint64_t movedRevision = 0;          ///< or motion alone, seen as positions were set
   std::uint64_t topologyRevision = 1;       ///< counts changes of topology
   std::uint64_t restRevision = 1;           ///< and of the shape at rest
   CollisionFilter filter;
@@ -116,7 +116,7 @@ class GeometryTable {
   std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }
 
   /// How a geometry moves in the step.
-  static void updateMotion(Geometry&, const Threads&);
+  static void updateMotion(Geometry&);
   /// Octrees for the positions now, or the whole step.
   void updateOctrees(const OctreeSettings&, const Threads&);
   bool updatedAlone() const { return m_updatedAlone; }  ///< by one thread, which has the data

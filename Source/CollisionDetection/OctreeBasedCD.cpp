@@ -102,8 +102,7 @@ struct OctreeBasedCD::Implementation {
       const bool moves = (detecting || method == Method::Auto) &&
                          (method == Method::Continuous || !record->meshes().hasShape());
       if (moves)
-        for (Geometry* geometry : {record->a, record->b})
-          GeometryTable::updateMotion(*geometry, threads);
+        for (Geometry* geometry : {record->a, record->b}) GeometryTable::updateMotion(*geometry);
       record->plan = planOf(record->pair.settings, *record->a, *record->b, moves);
       record->updateNear(record->pair.settings.restDistance);
       if (record->plan.swept()) record->a->swept = record->b->swept = true;

@@ -66,23 +66,25 @@ void MotionRange::add(const MotionRange& other) {
   isEmpty = false;
 }
 
-MotionRange motionRange(const Positions& before, const Positions& now, std::size_t begin,
-                        std::size_t end) {
+MotionRange motionRange(std::span<const Vector3d> before, std::span<const Vector3d> now) {
   MotionRange range;
-  std::size_t i = begin;
-  const std::size_t blocks = (end - begin) / kVertices;
-  if (blocks > 0 && !before.isPlaced() && !now.isPlaced()) {
+  const std::size_t blocks = now.size() / kVertices;
+  if (blocks > 0) {
     double lower[3 * kVertices], upper[3 * kVertices];
-    HWY_DYNAMIC_DISPATCH(addBlocks)
-    (before.body()[begin].data(), now.body()[begin].data(), blocks, lower, upper);
+    HWY_DYNAMIC_DISPATCH(addBlocks)(before[0].data(), now[0].data(), blocks, lower, upper);
     const Eigen::Map<const Eigen::Matrix<double, 3, kVertices>> lowest(lower), highest(upper);
     range.add({lowest.rowwise().minCoeff(), highest.rowwise().maxCoeff(), false});
-    i += blocks * kVertices;
   }
-  for (; i < end; ++i) {
-    const Vector3d moved = now[i] - before[i];
-    range.add({moved, moved, false});
-  }
+  for (std::size_t i = blocks * kVertices; i < now.size(); ++i)
+    range.add({now[i] - before[i], now[i] - before[i], false});
+  return range;
+}
+
+MotionRange motionRange(const Positions& before, const Positions& now) {
+  if (!before.isPlaced() && !now.isPlaced()) return motionRange(before.body(), now.body());
+  MotionRange range;
+  for (std::size_t i = 0; i < now.size(); ++i)
+    range.add({now[i] - before[i], now[i] - before[i], false});
   return range;
 }
 

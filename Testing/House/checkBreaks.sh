@@ -62,7 +62,7 @@ plant Quiet Source/Math/A.cpp 'void f() { std::exit(1); }\n'
 plant Words Source/Core/A.h 'class PoolManager;\n'
 plant Words Source/Core/A.h 'int data2;\n'
 plant Words Source/Core/IndexUtils.h '\n'
-plant Words Source/Core/A.h "$(yes x | head -16260)"
+plant Words Source/Core/A.h "$(yes x | head -16280)"
 
 mkdir -p "$tree/Testing/Consumer/Project"
 printf '```cpp\na();\n  b();\n```\n' >"$tree/README.md"

@@ -33,13 +33,13 @@ TEST(Motion, RangeIsThatOfEachVertexOnEveryPath) {
     before.push_back({normal(random), normal(random), normal(random)});
     now.push_back(before.back() + std::exp(normal(random)) * Vector3d(1, normal(random), -2));
   }
-  const Positions start(before), end(now);
   for (const std::size_t first : {0, 3})
     for (std::size_t last = first; last <= before.size(); ++last) {
       const MotionRange expected = oneByOne(before, now, first, last);
       for (const std::string& path : simdPaths()) {
         useSimdPath(path);
-        const MotionRange range = motionRange(start, end, first, last);
+        const MotionRange range = motionRange(std::span(before).subspan(first, last - first),
+                                              std::span(now).subspan(first, last - first));
         EXPECT_EQ(range.lower, expected.lower) << path << ", " << first << " to " << last;
         EXPECT_EQ(range.upper, expected.upper) << path << ", " << first << " to " << last;
         EXPECT_EQ(range.isEmpty, expected.isEmpty);
