@@ -23,6 +23,7 @@ class PalpateRun : public Run {
     for (const auto& [a, b] : m_pairs)
       m_detection.addCollisionPair(m_ids[a], m_ids[b], pairSettings);
     m_detection.detectCollision();
+    m_detection.advance();
   }
 
   double step(const Positions& now) override {
@@ -43,6 +44,7 @@ class PalpateRun : public Run {
       for (std::size_t p = 0; p < m_pairs.size(); ++p)
         addClaims(m_detection.collisionData(m_ids[m_pairs[p].first], m_ids[m_pairs[p].second]),
                   m_method == Method::Continuous ? 0 : t, m_claims[p]);
+      m_detection.advance();
     }
     m_last = now;
     return milliseconds;

@@ -29,6 +29,7 @@ int main() {
           frame, contact.vertex, contact.triangle, contact.distance, contact.normal.x(),
           contact.normal.y(), contact.normal.z());
     }
+    detection.advance();
     for (Vector3d& p : positions) p.z() -= 0.1;
   }
 }

@@ -109,6 +109,7 @@ class Retraction : public LiveScene {
     for (std::size_t i = 0; i < m_ids.size(); ++i)
       m_check.setPositions(m_ids[i], m_world.positions(i));
     m_check.detectCollision();
+    m_check.advance();
     for (const World::Pair& pair : m_world.pairs()) {
       if (!m_check.collisionData(m_ids[pair.a], m_ids[pair.b]).intersectingTriangles().empty())
         return m_world.bodies()[pair.a].name + " and " + m_world.bodies()[pair.b].name +

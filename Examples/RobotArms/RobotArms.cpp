@@ -88,6 +88,7 @@ class RobotArms : public LiveScene {
       for (const GeometryId id : {m_meshes[i], m_firsts[i]})
         m_check.setTransform(id, bodies[i].rotation, bodies[i].translation);
     m_check.detectCollision();
+    m_check.advance();
     for (const auto& [a, b, gap] : m_world.pairs()) {
       const CollisionData& data = m_check.collisionData(m_meshes[a], m_meshes[b]);
       const bool inA = !m_check.findInsideVertices(m_firsts[b], m_meshes[a]).empty(),

@@ -146,8 +146,10 @@ class Detection {
       for (std::size_t i = 0; i < now.size(); ++i) all[i] = between(before[i], now[i], t);
       return all;
     };
-    m_detection.setPositions(m_a, positions(step.aBefore, step.aNow));
-    m_detection.setPositions(m_b, positions(step.bBefore, step.bNow));
+    const std::vector<Vector3d> a = positions(step.aBefore, step.aNow),
+                                b = positions(step.bBefore, step.bNow);
+    m_detection.setPositions(m_a, a, a);
+    m_detection.setPositions(m_b, b, b);
   }
   const CollisionData& detect() {
     m_detection.detectCollision();

@@ -366,17 +366,11 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
 
 OctreeBasedCD setUp(const CollisionProblem& problem) {
   OctreeBasedCD detection(problem.settings);
-  std::vector<GeometryId> ids;
   for (const CollisionProblem::Mesh& mesh : problem.geometries) {
-    ids.push_back(add(detection, mesh));
+    const GeometryId id = add(detection, mesh);
     if (mesh.analytical)
-      detection.setTransform(ids.back(), mesh.rotationBefore, mesh.translationBefore);
-  }
-  detection.collectCandidates();  // ends a frame: what is set now is the step's other end
-  for (const CollisionProblem::Mesh& mesh : problem.geometries) {
-    const GeometryId id = ids[static_cast<std::size_t>(&mesh - problem.geometries.data())];
-    if (mesh.analytical)
-      detection.setTransform(id, mesh.rotation, mesh.translation);
+      detection.setTransform(id, mesh.rotationBefore, mesh.translationBefore, mesh.rotation,
+                             mesh.translation);
     else
       detection.setPositions(id, mesh.before, mesh.now);
     detection.setCollisionFilter(id, mesh.filter);

@@ -44,7 +44,7 @@ class Body {
     bool on = false;
     SignCounts counts;
     const auto count = [&](std::uint32_t i) {
-      const auto& [a, b, c] = m_geometry.orderedTriangles[i];
+      const auto& [a, b, c] = m_geometry.tree.ordered()[i];
       const auto& now = m_geometry.mesh.now;
       const RayCrossing crossing = crossRay(p, now[a], now[b], now[c], counts);
       if (crossing == RayCrossing::OnTriangle)
@@ -57,7 +57,7 @@ class Body {
     } else {
       FloatBox ray = m_frame.boxOf(p);
       ray.upper[0] = kInfinity;
-      findOverlapping(m_geometry.octree, m_frame.map(), ray, m_stack);
+      findOverlapping(m_geometry.tree.octree(), m_frame.map(), ray, m_stack);
       for (const std::uint32_t i : m_stack.found) count(i);
     }
     return on ? 0 : number;
@@ -70,12 +70,12 @@ class Body {
                                 TriangleFeature::CornerA, false};
     std::uint32_t at = 0, id = 0xffffffffu;
     const auto tryOne = [&](std::uint32_t i) {
-      const auto& [a, b, c] = m_geometry.orderedTriangles[i];
+      const auto& [a, b, c] = m_geometry.tree.ordered()[i];
       const auto& now = m_geometry.mesh.now;
       if (!m_bruteForce && isBeyond(p, now[a], now[b], now[c], best.distance)) return;
       const VertexTriangleDistance distance =
           finiteVertexTriangleDistance(p, now[a], now[b], now[c]);
-      const std::uint32_t own = m_geometry.octree.order()[i];
+      const std::uint32_t own = m_geometry.tree.octree().order()[i];
       if (distance.distance > best.distance || (distance.distance == best.distance && own > id))
         return;
       best = distance;
@@ -87,29 +87,29 @@ class Body {
     } else {
       // A little more than the best: distances are rounded, and equal ones are looked for.
       const auto bound = [&] {
-        const double distance = best.distance * m_geometry.frame.scale;
+        const double distance = best.distance * m_geometry.tree.frame().scale;
         return distance * distance * (1 + 0x1p-40);
       };
       tryOne(std::min(m_last, size() - 1));
-      forEachNearest(m_geometry.octree, m_frame.map(), m_frame.boxOf(p), bound(), m_stack,
+      forEachNearest(m_geometry.tree.octree(), m_frame.map(), m_frame.boxOf(p), bound(), m_stack,
                      [&](std::uint32_t i) {
                        tryOne(i);
                        return bound();
                      });
       m_last = at;
     }
-    return {vertex,        id,  m_geometry.orderedTriangles[at], best.barycentric, -best.normal,
+    return {vertex,        id,  m_geometry.tree.ordered()[at], best.barycentric, -best.normal,
             best.distance, true};
   }
 
   bool mayContain(const Eigen::Vector3d& p) const {
     return m_bruteForce ||
-           m_frame.boxOf(p).overlaps(m_frame.map()(m_geometry.octree.blocks()[0].box(0)));
+           m_frame.boxOf(p).overlaps(m_frame.map()(m_geometry.tree.octree().blocks()[0].box(0)));
   }
 
  private:
   std::uint32_t size() const {
-    return static_cast<std::uint32_t>(m_geometry.orderedTriangles.size());
+    return static_cast<std::uint32_t>(m_geometry.tree.ordered().size());
   }
 
   const Geometry& m_geometry;
@@ -124,7 +124,7 @@ class Body {
 std::span<const InsideVertex> Containment::find(const Geometry& vertices, const Geometry& body,
                                                 const InsideSettings& settings, Engine engine,
                                                 const Threads& threads) {
-  if (body.octree.size() == 0) return {};
+  if (body.tree.octree().size() == 0) return {};
   const bool closed = settings.rule == InsideRule::Closed,
              bruteForce = engine == Engine::BruteForce;
   if (!closed) m_numbers.prepare(body, threads);

@@ -5,15 +5,19 @@
 namespace palpate {
 
 void updateTetrahedra(Geometry& solid, const OctreeSettings& settings, const Threads& threads) {
-  if (solid.tetrahedraFor == solid.bodyRevision && solid.tetrahedraFrame == solid.frame) return;
-  solid.tetrahedraFor = solid.bodyRevision;
-  solid.tetrahedraFrame = solid.frame;
-  solid.tetrahedronTree.update(solid.solid->tetrahedra, solid.floats.data(),
-                               solid.spread * solid.frame.scale, settings, threads);
+  const DerivedFrom<2>::Sources now{solid.revisions.topology, solid.mesh.now.bodyRevision()};
+  const FloatFrame& frame = solid.tree.frame();
+  Solid& tetrahedra = *solid.solid;
+  if (tetrahedra.treeOf.isCurrent(now) && tetrahedra.treeFrame == frame) return;
+  tetrahedra.treeOf.invalidate();
+  tetrahedra.tree.update(tetrahedra.topology.tetrahedra, solid.tree.floats(),
+                         solid.tree.spread() * frame.scale, settings, threads);
+  tetrahedra.treeFrame = frame;
+  tetrahedra.treeOf.commit(now);
 }
 
 std::optional<TetrahedronPoint> SolidQuery::lowest(const Eigen::Vector3d& p) {
-  const std::vector<Tetrahedron>& tetrahedra = m_solid.solid->tetrahedra;
+  const std::vector<Tetrahedron>& tetrahedra = m_solid.solid->topology.tetrahedra;
   const Positions& now = m_solid.mesh.now;
   std::optional<TetrahedronPoint> best;
   SignCounts counts;
@@ -27,7 +31,7 @@ std::optional<TetrahedronPoint> SolidQuery::lowest(const Eigen::Vector3d& p) {
     for (std::uint32_t i = 0; i < tetrahedra.size(); ++i) tryOne(i, tetrahedra[i]);
     return best;
   }
-  const TetrahedronTree& tree = m_solid.tetrahedronTree;
+  const TetrahedronTree& tree = m_solid.solid->tree;
   if (tree.octree().size() == 0) return best;
   findOverlapping(tree.octree(), m_frame.map(), m_frame.boxOf(p), m_stack);
   for (const std::uint32_t i : m_stack.found) tryOne(tree.octree().order()[i], tree.ordered()[i]);

@@ -78,8 +78,8 @@ class FollowedExits::Following {
     if (!q.allFinite()) return first;
     SignCounts counts;
     const auto tryOne = [&](std::uint32_t i) {
-      const std::uint32_t id = m_body.octree.order()[i];
-      const Triangle& triangle = m_body.orderedTriangles[i];
+      const std::uint32_t id = m_body.tree.octree().order()[i];
+      const Triangle& triangle = m_body.tree.ordered()[i];
       const Corners corners = cornersOf(m_body, triangle);
       const auto weights = crossing(p, q, corners, counts);
       if (!weights) return;
@@ -90,12 +90,12 @@ class FollowedExits::Following {
       first = {vertex, id, triangle, *weights, direction, depth};
     };
     if (m_bruteForce) {
-      for (std::uint32_t i = 0; i < m_body.orderedTriangles.size(); ++i) tryOne(i);
+      for (std::uint32_t i = 0; i < m_body.tree.ordered().size(); ++i) tryOne(i);
       return first;
     }
     FloatBox way = m_frame.boxOf(p);
     way.add(m_frame.boxOf(q));
-    findOverlapping(m_body.octree, m_frame.map(), way, m_stack);
+    findOverlapping(m_body.tree.octree(), m_frame.map(), way, m_stack);
     for (const std::uint32_t i : m_stack.found) tryOne(i);
     return first;
   }
@@ -128,13 +128,20 @@ class FollowedExits::Following {
 std::span<const FollowedVertex> FollowedExits::follow(const Geometry& vertices,
                                                       const Geometry& body,
                                                       std::span<const InsideVertex> inside,
-                                                      Engine engine, const Threads& threads) {
+                                                      std::uint64_t step, Engine engine,
+                                                      const Threads& threads) {
   constexpr std::size_t kGrain = 256;
   Pair& pair = m_pairs[{vertices.id, body.id}];
-  if (pair.verticesRevision != vertices.restRevision || pair.bodyRevision != body.restRevision)
-    pair.last.clear();
-  pair.verticesRevision = vertices.restRevision;
-  pair.bodyRevision = body.restRevision;
+  if (pair.step != step && pair.nowOf.isValid()) {
+    std::swap(pair.last, pair.now);
+    pair.lastOf = pair.nowOf;
+  }
+  pair.nowOf.invalidate();
+  pair.step = step;
+  const DerivedFrom<2>::Sources topologies{vertices.revisions.topology, body.revisions.topology};
+  const std::span<const Place> places = pair.lastOf.isCurrent(topologies)
+                                            ? std::span<const Place>(pair.last)
+                                            : std::span<const Place>();
   pair.found.resize(inside.size());
   pair.now.resize(inside.size());
   const std::size_t parts = (inside.size() + kGrain - 1) / kGrain;
@@ -145,9 +152,9 @@ std::span<const FollowedVertex> FollowedExits::follow(const Geometry& vertices,
                       for (std::size_t i = begin; i < end; ++i) {
                         const std::uint32_t vertex = inside[i].vertex;
                         const auto last = std::lower_bound(
-                            pair.last.begin(), pair.last.end(), vertex,
+                            places.begin(), places.end(), vertex,
                             [](const Place& place, std::uint32_t v) { return place.vertex < v; });
-                        const bool known = last != pair.last.end() && last->vertex == vertex;
+                        const bool known = last != places.end() && last->vertex == vertex;
                         const Eigen::Vector3d p = vertices.mesh.now[vertex];
                         pair.found[i] = following(inside[i], p, known ? &*last : nullptr);
                         const InsideVertex& wayOut = pair.found[i].wayOut;
@@ -160,7 +167,7 @@ std::span<const FollowedVertex> FollowedExits::follow(const Geometry& vertices,
                                        cornersOf(body, wayOut.corners)};
                       }
                     });
-  std::swap(pair.last, pair.now);
+  pair.nowOf.commit(topologies);
   return pair.found;
 }
 

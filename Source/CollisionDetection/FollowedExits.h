@@ -14,10 +14,12 @@ namespace palpate {
 /// Ways out of bodies from call to call: see followInsideVertices().
 class FollowedExits {
  public:
-  /// inside: those of now, with the nearest exits. Octrees must be of the positions now.
+  /// inside: those of now, with the nearest exits. Octrees must be of the positions now. step:
+  /// number of the step. Directions are followed from the last earlier step in which they were
+  /// asked for, however often they are asked for in this one.
   std::span<const FollowedVertex> follow(const Geometry& vertices, const Geometry& body,
-                                         std::span<const InsideVertex> inside, Engine,
-                                         const Threads&);
+                                         std::span<const InsideVertex> inside, std::uint64_t step,
+                                         Engine, const Threads&);
   void forget(GeometryId);  ///< a geometry was removed
 
  private:
@@ -30,8 +32,9 @@ class FollowedExits {
     std::array<Eigen::Vector3d, 3> triangleAt;
   };
   struct Pair {
-    std::uint64_t verticesRevision = 0, bodyRevision = 0;  ///< of their topology
-    std::vector<Place> last, now;                          ///< ascending vertices
+    DerivedFrom<2> lastOf, nowOf;  ///< topology of the vertices' geometry and of the body
+    std::uint64_t step = 0;        ///< in which `now` was computed
+    std::vector<Place> last, now;  ///< ascending vertices
     std::vector<FollowedVertex> found;
     std::vector<PointQueryStack> stacks;
   };

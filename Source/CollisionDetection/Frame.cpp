@@ -39,12 +39,14 @@ bool asksForTouching(const PairRecord& record) {
          record.a->mesh.topology.hasFaces() && record.meshes().reach() == 0.0;
 }
 
-/// thickness: L, of the boxes.
-TreePair treesOf(const PairRecord& record, bool adjacentPairs, double thickness) {
-  TreePair trees{&record.a->octree, &record.b->octree};
-  if (trees.self() && !adjacentPairs) trees.adjacency = record.a->orderedTriangles.data();
-  if (adjacentPairs && asksForTouching(record)) trees.adjacency = record.a->stars.triangles();
-  const double scale = record.a->frame.scale;
+/// thickness: L, of the boxes. unfolded: triangles of which neighbours need no test, or null.
+TreePair treesOf(const PairRecord& record, bool adjacentPairs, const Triangle* unfolded,
+                 double thickness) {
+  const GeometryOctree &a = record.a->tree, &b = record.b->tree;
+  TreePair trees{&a.octree(), &b.octree()};
+  if (trees.self() && !adjacentPairs) trees.adjacency = a.ordered().data();
+  if (unfolded) trees.adjacency = unfolded;
+  const double scale = a.frame().scale;
   const Eigen::Vector3d origin = worldOrigin(*record.b),
                         offset = (worldOrigin(*record.a) - origin) * scale;
   setShift(trees, {offset[0], offset[1], offset[2]}, thickness * scale);
@@ -54,7 +56,7 @@ TreePair treesOf(const PairRecord& record, bool adjacentPairs, double thickness)
 }
 
 std::size_t trianglesOf(const PairRecord& record) {
-  return record.a->octree.size() + record.b->octree.size();
+  return record.a->tree.octree().size() + record.b->tree.octree().size();
 }
 
 double boxThickness(const PairRecord& record) {
@@ -62,11 +64,11 @@ double boxThickness(const PairRecord& record) {
 }
 
 FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
-  FloatPair floats{record.a->floats.data(), record.b->floats.data(), nullptr, nullptr,
+  FloatPair floats{record.a->tree.floats(), record.b->tree.floats(), nullptr, nullptr,
                    trees.shiftLower,        trees.shiftUpper};
   if (record.plan.swept()) {
-    floats.beforeA = record.a->floatsAtStart();
-    floats.beforeB = record.b->floatsAtStart();
+    floats.beforeA = record.a->tree.floatsAtStart();
+    floats.beforeB = record.b->tree.floatsAtStart();
   }
   return floats;
 }
@@ -251,20 +253,19 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
   for (PairRecord* record : records) {
     record->earliest = std::numeric_limits<double>::infinity();
     if (record->meshes().hasShape()) {
-      if (adjacentPairs && (record->mesh().mesh.shape || record->mesh().octree.size() > 0))
+      if (adjacentPairs && (record->mesh().mesh.shape || record->mesh().tree.octree().size() > 0))
         newJob(*record);
       continue;
     }
-    if (record->a->octree.size() == 0 || record->b->octree.size() == 0) continue;
-    if (adjacentPairs && asksForTouching(*record)) {
-      Geometry& mesh = *record->a;
-      mesh.stars.find(mesh.mesh.topology, mesh.orderedTriangles, mesh.floatsAtStart(),
-                      mesh.floats.data(), threads);
-    }
+    if (record->a->tree.octree().size() == 0 || record->b->tree.octree().size() == 0) continue;
+    const Triangle* const unfolded =
+        adjacentPairs && asksForTouching(*record)
+            ? record->a->tree.findUnfoldedStars(record->a->mesh, threads)
+            : nullptr;
     const double thickness = boxThickness(*record);
-    const TreePair own = treesOf(*record, adjacentPairs, thickness);
+    const TreePair own = treesOf(*record, adjacentPairs, unfolded, thickness);
     const TreePair trees =
-        treesOf(*record, adjacentPairs,
+        treesOf(*record, adjacentPairs, unfolded,
                 adjacentPairs ? std::max(thickness, record->plan.nearby) : thickness);
     const bool shared = threads.count() > 1 && trianglesOf(*record) >= kSharedSize;
     startPairs(trees, shared ? kNodePairsWanted : 1, m_stack);
@@ -317,13 +318,13 @@ void Frame::collect(std::span<PairRecord* const> records, const Threads& threads
         place += found(k).size();
       }
     }
-    record->candidatesFor = record->revisions();
     record->candidatesSorted = false;
     record->found = size;
   }
   threads.forEach(m_jobCount, [&](std::size_t k) {
     if (m_jobs[k]->place) std::copy(found(k).begin(), found(k).end(), m_jobs[k]->place);
   });
+  for (PairRecord* record : records) record->candidatesOf.commit(record->state());
   statistics.milliseconds.pairs = watch.lap();
 }
 
@@ -382,8 +383,7 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
         record->candidates.insert(record->candidates.end(), job.candidates.begin(),
                                   job.candidates.end());
     }
-    finish(*record, nearby, settings, statistics);
-    record->candidatesSorted = false;
+    finish(*record, nearby, false, settings, statistics);
   }
   statistics.milliseconds.order = watch.lap();
 }
@@ -410,7 +410,7 @@ void Frame::findMissedOverlaps(const Threads& threads) {
   });
 }
 
-void Frame::finish(PairRecord& record, bool nearby, const Settings& settings,
+void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const Settings& settings,
                    FrameStatistics& statistics) {
   m_facts.clear();
   m_impacts.clear();
@@ -441,8 +441,10 @@ void Frame::finish(PairRecord& record, bool nearby, const Settings& settings,
   statistics.exactDecisions += m_impacts.exactDecisions;
   statistics.validityPairs += m_impacts.validityPairs;
   countContacts(record.plan, ofIntersection, contents);
-  record.dataFor = record.revisions();
-  record.candidatesFor = settings.keepCandidates ? record.revisions() : PairRecord::AnsweredFor{};
+  record.candidatesSorted = candidatesSorted;
+  record.isAnswered = true;
+  record.dataOf.commit(record.state());
+  if (settings.keepCandidates) record.candidatesOf.commit(record.state());
 }
 
 void Frame::findStartByBruteForce(const PairRecord& record, ContactBuffers& contacts,
@@ -477,8 +479,7 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Setti
     statistics.milliseconds.narrowPhase += watch.lap();
     m_buffers = {&contacts};
     m_overlaps = {&overlaps};
-    finish(*record, true, settings, statistics);
-    record->candidatesSorted = true;
+    finish(*record, true, true, settings, statistics);
     statistics.milliseconds.order += watch.lap();
   }
 }

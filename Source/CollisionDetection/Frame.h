@@ -37,7 +37,7 @@ class Frame {
   struct Job;
   void start(std::span<PairRecord* const>, const Threads&, bool adjacentPairs);
   void run(Job&) const;
-  void finish(PairRecord&, bool nearby, const Settings&, FrameStatistics&);
+  void finish(PairRecord&, bool nearby, bool candidatesSorted, const Settings&, FrameStatistics&);
   void findMissedOverlaps(const Threads&);
   static void findStartByBruteForce(const PairRecord&, ContactBuffers& contacts,
                                     ContactBuffers& overlaps);

@@ -19,9 +19,11 @@
 #include "Octree/Forest.h"
 
 #include <algorithm>
+#include <atomic>
 #include <mutex>
 #include <optional>
 #include <span>
+#include <utility>
 
 namespace palpate {
 
@@ -41,6 +43,8 @@ void checkCandidates(const PairRecord& record) {
 }
 
 struct OctreeBasedCD::Implementation {
+  class Change;
+
   explicit Implementation(const Settings& newSettings)
       : settings(checked(newSettings)), threads(newSettings.threads) {
     showOctree();
@@ -54,47 +58,44 @@ struct OctreeBasedCD::Implementation {
   Containment containment;
   FollowedExits exits;
   Embedding embedding;
-  FrameStatistics statistics;
+  FrameStatistics statistics;  ///< of the last frame or explicit update
+  FrameStatistics updates;     ///< of the updates since the last frame
+  bool hasUpdates = false;
   std::optional<LooseOctree> octree;
   std::vector<PairRecord*> work;
-  bool inFrame = false;
   std::vector<AuditFailure> auditFailures;
   std::uint64_t detections = 0;
   int auditFiles = 0;
   std::mutex sorting;  ///< of candidates, when a const query first asks for them
   PairOrderScratch sortingScratch;
+  std::atomic<bool> isBusy = false;  ///< a call that changes the object has not returned
 
-  /// An update() before detectCollision() belongs to its frame.
-  void startFrame() {
-    if (inFrame) return;
-    inFrame = true;
-    statistics = {};
+  /// The last thing that a frame does.
+  void publish(FrameStatistics next) {
+    next.geometries = next.triangles = next.segments = next.points = next.untestedVertices = 0;
     for (const auto& geometry : geometries.all()) {
-      ++statistics.geometries;
+      ++next.geometries;
       const MeshTopology& topology = geometry->mesh.topology;
-      (topology.hasFaces()                    ? statistics.triangles
-       : topology.kind == GeometryKind::Lines ? statistics.segments
-                                              : statistics.points) += topology.triangles.size();
-      statistics.untestedVertices += topology.untestedVertices;
+      (topology.hasFaces()                    ? next.triangles
+       : topology.kind == GeometryKind::Lines ? next.segments
+                                              : next.points) += topology.triangles.size();
+      next.untestedVertices += topology.untestedVertices;
     }
+    statistics = next;
   }
 
-  void endFrame() {
-    geometries.endFrame();
-    inFrame = false;
-  }
-
-  /// Boxes and octrees for the positions now. What a frame's detection finds done by an explicit
-  /// update() stays said.
+  /// Brings octrees up to date. The next frame's statistics include what it did; an explicit
+  /// update() forgets what earlier updates did to single trees.
   /// `detecting`: plans say how all pairs move; else only what candidates depend on.
   void update(bool explicitly = false, bool detecting = false) {
     using Update = LooseOctree::Update;
-    const bool asked = !inFrame || explicitly;
-    startFrame();
+    state->trees.clear();  // until they are up to date
+    if (!hasUpdates) updates = {};
+    const bool isFirst = explicitly || !std::exchange(hasUpdates, true);
     for (const auto& geometry : geometries.all()) {
-      if (asked) geometry->lastUpdate = Update::Unchanged;
-      geometry->swept = false;
-      geometry->boxMilliseconds = geometry->octreeMilliseconds = 0;
+      if (isFirst) geometry->tree.lastUpdate = Update::Unchanged;
+      geometry->tree.setSwept(false);
+      geometry->tree.boxMilliseconds = geometry->tree.octreeMilliseconds = 0;
     }
     Stopwatch watch;
     for (const auto& record : pairs.records()) {
@@ -102,31 +103,34 @@ struct OctreeBasedCD::Implementation {
       const bool moves = (detecting || method == Method::Auto) &&
                          (method == Method::Continuous || !record->meshes().hasShape());
       if (moves)
-        for (Geometry* geometry : {record->a, record->b}) GeometryTable::updateMotion(*geometry);
+        for (Geometry* geometry : {record->a, record->b}) geometry->motion.update(*geometry);
       record->plan = planOf(record->pair.settings, *record->a, *record->b, moves);
-      record->updateNear(record->pair.settings.restDistance);
-      if (record->plan.swept()) record->a->swept = record->b->swept = true;
+      record->updateNear();
+      if (record->plan.swept())
+        for (Geometry* geometry : {record->a, record->b}) geometry->tree.setSwept(true);
     }
-    statistics.milliseconds.boxes += watch.lap();
+    updates.milliseconds.boxes += watch.lap();
     geometries.updateOctrees(settings.octree, threads);
     const double wall = watch.lap();
     double boxes = 0, octrees = 0;
-    statistics.rebuiltOctrees = statistics.refittedOctrees = statistics.unchangedOctrees = 0;
+    updates.rebuiltOctrees = updates.refittedOctrees = updates.unchangedOctrees = 0;
     for (const auto& geometry : geometries.all()) {
-      ++(geometry->lastUpdate == Update::Rebuilt    ? statistics.rebuiltOctrees
-         : geometry->lastUpdate == Update::Refitted ? statistics.refittedOctrees
-                                                    : statistics.unchangedOctrees);
-      boxes += geometry->boxMilliseconds;
-      octrees += geometry->octreeMilliseconds;
+      const GeometryOctree& tree = geometry->tree;
+      ++(tree.lastUpdate == Update::Rebuilt    ? updates.rebuiltOctrees
+         : tree.lastUpdate == Update::Refitted ? updates.refittedOctrees
+                                               : updates.unchangedOctrees);
+      boxes += tree.boxMilliseconds;
+      octrees += tree.octreeMilliseconds;
     }
     // Geometries are updated side by side: the wall clock is shared out as their work was.
     const double share = boxes + octrees > 0 ? boxes / (boxes + octrees) : 0;
-    statistics.milliseconds.boxes += wall * share;
-    statistics.milliseconds.octree += wall * (1 - share);
+    updates.milliseconds.boxes += wall * share;
+    updates.milliseconds.octree += wall * (1 - share);
     showOctree();
 #ifdef PALPATE_VALIDATE
     PALPATE_ASSERT(octree->validate().empty());
 #endif
+    if (explicitly) publish(updates);
   }
 
   /// Before points are asked about.
@@ -143,29 +147,30 @@ struct OctreeBasedCD::Implementation {
     state->trees.clear();
     std::uint32_t firstNode = 0;
     for (const auto& geometry : geometries.all()) {
-      if (geometry->octree.size() == 0) continue;
-      const std::size_t bytes =
-          (geometry->floats.capacity() + geometry->floatsBefore.capacity()) * sizeof(FloatPoint) +
-          geometry->orderedTriangles.capacity() * sizeof(Triangle);
-      state->trees.push_back({geometry->id, &geometry->octree, geometry->frame.origin,
-                              geometry->frame.scale, geometry->lastUpdate, bytes, firstNode});
-      firstNode += static_cast<std::uint32_t>(geometry->octree.pool().used() * 8);
+      const GeometryOctree& tree = geometry->tree;
+      if (!tree.isValid() || tree.octree().size() == 0) continue;
+      state->trees.push_back({geometry->id, &tree.octree(), tree.frame().origin, tree.frame().scale,
+                              tree.lastUpdate, tree.bytesBesidesOctree(), firstNode});
+      firstNode += static_cast<std::uint32_t>(tree.octree().pool().used() * 8);
     }
   }
 
-  /// Pairs whose answer is not of the revisions now. Of those that do not collide it is nothing.
-  template <class AnsweredFor>
-  std::span<PairRecord* const> pairsToDo(AnsweredFor PairRecord::*answered) {
+  /// Pairs whose answer is outdated, marked as having none. Of those that do not collide it is
+  /// nothing.
+  std::span<PairRecord* const> pairsToDo(PairRecord::Derived PairRecord::*answer) {
     work.clear();
     for (const auto& record : pairs.records()) {
-      if ((*record).*answered == record->revisions()) continue;
-      if (record->collides()) {
+      if (((*record).*answer).isCurrent(record->state())) continue;
+      if (record->collides())
         work.push_back(record.get());
-        continue;
-      }
-      record->clear();
-      (*record).*answered = record->revisions();
-      if (settings.keepCandidates) record->candidatesFor = record->revisions();
+      else
+        record->commitNothing(settings.keepCandidates || answer == &PairRecord::candidatesOf);
+    }
+    for (PairRecord* record : work) {
+      record->candidatesOf.invalidate();
+      if (answer != &PairRecord::dataOf) continue;
+      record->dataOf.invalidate();
+      record->isAnswered = false;
     }
     return work;
   }
@@ -181,39 +186,40 @@ struct OctreeBasedCD::Implementation {
 
   void collect() {
     update();
-    const auto records = pairsToDo(&PairRecord::candidatesFor);
+    FrameStatistics next = updates;
+    const auto records = pairsToDo(&PairRecord::candidatesOf);
     if (settings.engine == Engine::Octree) {
-      frame.collect(records, threadsFor(records), statistics);
+      frame.collect(records, threadsFor(records), next);
     } else {
       for (PairRecord* record : records) {
         findCandidatesByBruteForce(record->meshes(), record->candidates);
-        record->candidatesFor = record->revisions();
         record->candidatesSorted = true;
+        record->candidatesOf.commit(record->state());
       }
     }
-    statistics.candidatePairs = 0;
-    for (const auto& record : pairs.records())
-      statistics.candidatePairs += record->candidates.size();
-    endFrame();
+    for (const auto& record : pairs.records()) next.candidatePairs += record->candidates.size();
+    publish(next);
+    hasUpdates = false;
   }
 
   void detect() {
     update(false, true);
-    const auto records = pairsToDo(&PairRecord::dataFor);
-    const std::uint64_t thisFrame = geometries.framesEnded() + 1;
+    FrameStatistics next = updates;
+    const auto records = pairsToDo(&PairRecord::dataOf);
     for (PairRecord* record : records)
-      record->trust.start(record->pair.settings, *record->a, *record->b, thisFrame, record->plan);
+      record->trust.start(record->pair.settings, *record->a, *record->b, record->plan);
     if (settings.engine == Engine::Octree)
-      frame.detect(records, settings, threads, statistics);
+      frame.detect(records, settings, threads, next);
     else
-      frame.detectByBruteForce(records, settings, statistics);
+      frame.detectByBruteForce(records, settings, next);
     for (const auto& record : pairs.records()) {
-      record->trust.keep(thisFrame);
       const CollisionData& data = record->data;
-      statistics.contacts += data.validity().atImpact + data.validity().atEnd;
-      statistics.intersectingTriangles += data.intersectingTriangles().size();
+      next.contacts += data.validity().atImpact + data.validity().atEnd;
+      next.intersectingTriangles += data.intersectingTriangles().size();
     }
-    endFrame();
+    for (const auto& geometry : geometries.all()) geometry->step.noteDetection(geometry->mesh);
+    publish(next);
+    hasUpdates = false;
     auditFrame();
   }
 
@@ -239,8 +245,49 @@ struct OctreeBasedCD::Implementation {
     }
   }
 
+  std::span<const InsideVertex> findInside(GeometryId vertices, GeometryId body,
+                                           const InsideSettings&);
+
   std::shared_ptr<LooseOctree::State> state;
 };
+
+namespace {
+
+[[noreturn]] void throwMovedFrom() {
+  throw Error(ErrorCode::InvalidCall, "this OctreeBasedCD was moved from: it has no geometries");
+}
+
+[[noreturn]] void throwBusy() {
+  throw Error(ErrorCode::InvalidCall,
+              "a predicate or callback may not call the OctreeBasedCD that calls it");
+}
+
+}  // namespace
+
+/// While it lives, a call that changes the object runs: others are refused, so that callbacks
+/// cannot change what is being computed, and floating point is as the library needs it.
+class OctreeBasedCD::Implementation::Change {
+ public:
+  explicit Change(const std::unique_ptr<Implementation>& all) : m_all(all.get()) {
+    if (!m_all) throwMovedFrom();
+    if (m_all->isBusy.exchange(true, std::memory_order_relaxed)) throwBusy();
+  }
+  ~Change() { m_all->isBusy.store(false, std::memory_order_relaxed); }
+  Change(const Change&) = delete;
+  Change& operator=(const Change&) = delete;
+  Implementation* operator->() const { return m_all; }
+  Implementation& operator*() const { return *m_all; }
+
+ private:
+  StandardFloatingPoint m_standard;
+  Implementation* m_all;
+};
+
+const OctreeBasedCD::Implementation& OctreeBasedCD::read() const {
+  if (!m_implementation) throwMovedFrom();
+  if (m_implementation->isBusy.load(std::memory_order_relaxed)) throwBusy();
+  return *m_implementation;
+}
 
 OctreeBasedCD::OctreeBasedCD(const Settings& settings)
     : m_implementation(std::make_unique<Implementation>(settings)) {}
@@ -250,231 +297,265 @@ OctreeBasedCD::~OctreeBasedCD() = default;
 
 GeometryId OctreeBasedCD::addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                                           std::span<const Triangle> triangles) {
-  return m_implementation->geometries.add(positions, triangles);
+  const Implementation::Change all(m_implementation);
+  return all->geometries.add(positions, triangles);
 }
 
 GeometryId OctreeBasedCD::addTetrahedralMesh(std::span<const Eigen::Vector3d> positions,
                                              std::span<const Tetrahedron> tetrahedra) {
-  const StandardFloatingPoint standard;
-  return m_implementation->geometries.add(positions, tetrahedra);
+  const Implementation::Change all(m_implementation);
+  return all->geometries.add(positions, tetrahedra);
 }
 
 GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
                                       std::span<const Segment> segments, double radius) {
-  return m_implementation->geometries.addLines(positions, segments, {&radius, 1});
+  const Implementation::Change all(m_implementation);
+  return all->geometries.addLines(positions, segments, {&radius, 1});
 }
 
 GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
                                       std::span<const Segment> segments,
                                       std::span<const double> radii) {
+  const Implementation::Change all(m_implementation);
   checkOnePerVertex(positions, radii);
-  return m_implementation->geometries.addLines(positions, segments, radii);
+  return all->geometries.addLines(positions, segments, radii);
 }
 
 GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions, double radius) {
-  return m_implementation->geometries.addPoints(positions, {&radius, 1});
+  const Implementation::Change all(m_implementation);
+  return all->geometries.addPoints(positions, {&radius, 1});
 }
 
 GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions,
                                       std::span<const double> radii) {
+  const Implementation::Change all(m_implementation);
   checkOnePerVertex(positions, radii);
-  return m_implementation->geometries.addPoints(positions, radii);
+  return all->geometries.addPoints(positions, radii);
 }
 
 GeometryId OctreeBasedCD::addAnalyticalGeometry(const AnalyticalGeometry& geometry) {
-  const StandardFloatingPoint standard;
-  return m_implementation->geometries.add(geometry);
-}
-
-void OctreeBasedCD::setTransform(GeometryId geometry, const Eigen::Matrix3d& rotation,
-                                 const Eigen::Vector3d& translation) {
-  const StandardFloatingPoint standard;
-  m_implementation->geometries.at(geometry);
-  m_implementation->pairs.checkRigid(geometry);
-  m_implementation->geometries.setTransform(geometry, {rotation, translation});
+  const Implementation::Change all(m_implementation);
+  return all->geometries.add(geometry);
 }
 
 void OctreeBasedCD::removeGeometry(GeometryId geometry) {
-  m_implementation->geometries.at(geometry);
-  m_implementation->pairs.removeAllOf(geometry);
-  m_implementation->geometries.remove(geometry);
-  m_implementation->exits.forget(geometry);
-  m_implementation->showOctree();
+  const Implementation::Change all(m_implementation);
+  all->geometries.at(geometry);
+  // Nothing below throws.
+  all->pairs.removeAllOf(geometry);
+  all->geometries.remove(geometry);
+  all->exits.forget(geometry);
+  all->showOctree();
+}
+
+void OctreeBasedCD::advance() {
+  const Implementation::Change all(m_implementation);
+  all->geometries.advance();
 }
 
 void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vector3d> now) {
-  m_implementation->geometries.setPositions(geometry, {}, now, m_implementation->threads);
+  const Implementation::Change all(m_implementation);
+  all->geometries.setPositions(geometry, {}, now, all->threads);
 }
 
 void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vector3d> before,
                                  std::span<const Eigen::Vector3d> now) {
-  m_implementation->geometries.setPositions(geometry, before, now, m_implementation->threads);
+  const Implementation::Change all(m_implementation);
+  all->geometries.setPositions(geometry, before, now, all->threads);
+}
+
+void OctreeBasedCD::setTransform(GeometryId geometry, const Eigen::Matrix3d& rotation,
+                                 const Eigen::Vector3d& translation) {
+  const Implementation::Change all(m_implementation);
+  all->geometries.at(geometry);
+  all->pairs.checkRigid(geometry);
+  all->geometries.setTransform(geometry, {}, {rotation, translation});
+}
+
+void OctreeBasedCD::setTransform(GeometryId geometry, const Eigen::Matrix3d& rotationBefore,
+                                 const Eigen::Vector3d& translationBefore,
+                                 const Eigen::Matrix3d& rotation,
+                                 const Eigen::Vector3d& translation) {
+  const Implementation::Change all(m_implementation);
+  all->geometries.at(geometry);
+  all->pairs.checkRigid(geometry);
+  all->geometries.setTransform(geometry, RigidTransform{rotationBefore, translationBefore},
+                               {rotation, translation});
 }
 
 void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles) {
-  m_implementation->geometries.setTriangles(geometry, positions, triangles);
+  const Implementation::Change all(m_implementation);
+  all->geometries.setTriangles(geometry, positions, triangles);
 }
 
 void OctreeBasedCD::setTetrahedra(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
                                   std::span<const Tetrahedron> tetrahedra) {
-  const StandardFloatingPoint standard;
-  m_implementation->geometries.setTetrahedra(geometry, positions, tetrahedra);
+  const Implementation::Change all(m_implementation);
+  all->geometries.setTetrahedra(geometry, positions, tetrahedra);
 }
 
 TetrahedralSurface OctreeBasedCD::surface(GeometryId geometry) const {
-  const Geometry& solid = m_implementation->geometries.at(geometry);
+  const Geometry& solid = read().geometries.at(geometry);
   checkTopologyKind(solid, true, "surface() is of tetrahedral meshes");
-  return {solid.solid->surface, solid.solid->surfaceOwner};
+  return {solid.solid->topology.surface, solid.solid->topology.surfaceOwner};
 }
 
 void OctreeBasedCD::setCollisionFilter(GeometryId geometry, const CollisionFilter& filter) {
-  m_implementation->geometries.setFilter(geometry, filter);
+  const Implementation::Change all(m_implementation);
+  all->geometries.setFilter(geometry, filter);
 }
 
 void OctreeBasedCD::setDisabledElements(GeometryId geometry,
                                         std::span<const std::uint32_t> elements) {
-  m_implementation->geometries.setDisabled(geometry, elements);
+  const Implementation::Change all(m_implementation);
+  all->geometries.setDisabled(geometry, elements);
 }
 
 void OctreeBasedCD::setContactPredicate(GeometryId a, GeometryId b, ContactPredicate predicate) {
-  m_implementation->pairs.setPredicate(m_implementation->geometries, a, b, std::move(predicate));
+  const Implementation::Change all(m_implementation);
+  all->pairs.setPredicate(all->geometries, a, b, std::move(predicate));
 }
 
 void OctreeBasedCD::addCollisionPair(GeometryId a, GeometryId b, const PairSettings& settings) {
-  const StandardFloatingPoint standard;
-  m_implementation->pairs.add(m_implementation->geometries, a, b, settings);
+  const Implementation::Change all(m_implementation);
+  all->pairs.add(all->geometries, a, b, settings);
 }
 
 void OctreeBasedCD::setPairSettings(GeometryId a, GeometryId b, const PairSettings& settings) {
-  const StandardFloatingPoint standard;
-  m_implementation->pairs.set(m_implementation->geometries, a, b, settings);
+  const Implementation::Change all(m_implementation);
+  all->pairs.set(all->geometries, a, b, settings);
 }
 
 void OctreeBasedCD::removeCollisionPair(GeometryId a, GeometryId b) {
-  m_implementation->pairs.remove(m_implementation->geometries, a, b);
+  const Implementation::Change all(m_implementation);
+  all->pairs.remove(all->geometries, a, b);
 }
 
-std::span<const CollisionPair> OctreeBasedCD::pairs() const {
-  return m_implementation->pairs.pairs();
-}
+std::span<const CollisionPair> OctreeBasedCD::pairs() const { return read().pairs.pairs(); }
 
 void OctreeBasedCD::update() {
-  const StandardFloatingPoint standard;
-  m_implementation->update(true);
+  const Implementation::Change all(m_implementation);
+  all->update(true);
 }
 
 void OctreeBasedCD::collectCandidates() {
-  const StandardFloatingPoint standard;
-  m_implementation->collect();
+  const Implementation::Change all(m_implementation);
+  all->collect();
 }
 
 void OctreeBasedCD::detectCollision() {
-  const StandardFloatingPoint standard;
-  m_implementation->detect();
+  const Implementation::Change all(m_implementation);
+  all->detect();
 }
 
 void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFunction function,
                                           void* context) {
-  const StandardFloatingPoint standard;
-  Implementation& all = *m_implementation;
-  all.work.clear();
+  const Implementation::Change all(m_implementation);
+  std::vector<PairRecord*>& work = all->work;
+  work.clear();
   if (only) {
-    all.work.push_back(&all.pairs.at(all.geometries, only->a, only->b));
-    checkCandidates(*all.work.front());
+    work.push_back(&all->pairs.at(all->geometries, only->a, only->b));
+    checkCandidates(*work.front());
   } else {
-    for (const auto& record : all.pairs.records()) all.work.push_back(record.get());
+    for (const auto& record : all->pairs.records()) work.push_back(record.get());
   }
-  all.update();
-  std::erase_if(all.work, [](const PairRecord* record) { return !record->collides(); });
-  if (all.settings.engine == Engine::Octree)
-    return all.frame.forEach(all.work, all.threadsFor(all.work), function, context);
+  all->update();
+  std::erase_if(work, [](const PairRecord* record) { return !record->collides(); });
+  if (all->settings.engine == Engine::Octree)
+    return all->frame.forEach(work, all->threadsFor(work), function, context);
   Buffer<TrianglePair> candidates;
-  for (const PairRecord* record : all.work) {
+  for (const PairRecord* record : work) {
     findCandidatesByBruteForce(record->meshes(), candidates);
     if (!candidates.empty()) function(context, record->pair, candidates);
   }
 }
 
+std::span<const InsideVertex> OctreeBasedCD::Implementation::findInside(
+    GeometryId vertices, GeometryId body, const InsideSettings& insideSettings) {
+  const Geometry& asked = geometries.at(vertices);
+  Geometry& around = geometries.at(body);
+  checkDifferent(vertices, body);
+  checkInside(around, insideSettings);
+  updateFor(around);
+  return containment.find(asked, around, insideSettings, settings.engine, threads);
+}
+
 std::span<const InsideVertex> OctreeBasedCD::findInsideVertices(GeometryId vertices,
                                                                 GeometryId body,
                                                                 const InsideSettings& settings) {
-  const StandardFloatingPoint standard;
-  Implementation& all = *m_implementation;
-  const Geometry& asked = all.geometries.at(vertices);
-  Geometry& around = all.geometries.at(body);
-  checkDifferent(vertices, body);
-  checkInside(around, settings);
-  all.updateFor(around);
-  return all.containment.find(asked, around, settings, all.settings.engine, all.threads);
+  const Implementation::Change all(m_implementation);
+  return all->findInside(vertices, body, settings);
 }
 
 std::span<const FollowedVertex> OctreeBasedCD::followInsideVertices(GeometryId vertices,
                                                                     GeometryId body) {
-  const StandardFloatingPoint standard;
-  Implementation& all = *m_implementation;
-  const auto inside = findInsideVertices(vertices, body);
-  return all.exits.follow(all.geometries.at(vertices), all.geometries.at(body), inside,
-                          all.settings.engine, all.threads);
+  const Implementation::Change all(m_implementation);
+  const auto inside = all->findInside(vertices, body, {});
+  return all->exits.follow(all->geometries.at(vertices), all->geometries.at(body), inside,
+                           all->geometries.stepNumber(), all->settings.engine, all->threads);
 }
 
 std::span<const EmbeddedVertex> OctreeBasedCD::findEmbeddedVertices(GeometryId vertices,
                                                                     GeometryId body) {
-  const StandardFloatingPoint standard;
-  Implementation& all = *m_implementation;
-  const Geometry& asked = all.geometries.at(vertices);
-  Geometry& solid = all.geometries.at(body);
+  const Implementation::Change all(m_implementation);
+  const Geometry& asked = all->geometries.at(vertices);
+  Geometry& solid = all->geometries.at(body);
   checkDifferent(vertices, body);
   checkTopologyKind(solid, true, "findEmbeddedVertices() is for tetrahedral meshes");
-  all.updateFor(solid);
-  return all.embedding.find(asked, solid, all.settings.engine, all.threads);
+  all->updateFor(solid);
+  return all->embedding.find(asked, solid, all->settings.engine, all->threads);
 }
 
 std::optional<TetrahedronPoint> OctreeBasedCD::findTetrahedron(GeometryId body,
                                                                const Eigen::Vector3d& point) {
-  const StandardFloatingPoint standard;
-  Implementation& all = *m_implementation;
-  Geometry& solid = all.geometries.at(body);
+  const Implementation::Change all(m_implementation);
+  Geometry& solid = all->geometries.at(body);
   checkTopologyKind(solid, true, "findTetrahedron() is for tetrahedral meshes");
   if (!point.allFinite())
     throw Error(ErrorCode::NonFinitePosition,
                 nameOf(body) + ": a point to be found is " + textOf(point), body);
-  all.updateFor(solid);
-  return all.embedding.find(point, solid, all.settings.engine);
+  all->updateFor(solid);
+  return all->embedding.find(point, solid, all->settings.engine);
 }
 
 const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) const {
-  return m_implementation->pairs.inOrder(m_implementation->geometries, a, b).data;
+  const Implementation& all = read();
+  const PairRecord& record = all.pairs.inOrder(all.geometries, a, b);
+  if (!record.isAnswered)
+    throw Error(ErrorCode::NotAvailable,
+                nameOf(a, b) + " has no answer yet: call detectCollision()", a);
+  return record.data;
 }
 
 std::span<const TrianglePair> OctreeBasedCD::candidatePairs(GeometryId a, GeometryId b) const {
-  PairRecord& record = m_implementation->pairs.at(m_implementation->geometries, a, b);
+  read();
+  Implementation& all = *m_implementation;
+  PairRecord& record = all.pairs.at(all.geometries, a, b);
   checkCandidates(record);
-  if (record.candidatesFor == PairRecord::AnsweredFor{})
+  if (!record.candidatesOf.isValid())
     throw Error(ErrorCode::NotAvailable,
                 "candidates were not kept: call collectCandidates(), or set "
                 "Settings::keepCandidates before detectCollision()",
                 a);
-  const std::lock_guard lock(m_implementation->sorting);
+  const std::lock_guard lock(all.sorting);
   if (!record.candidatesSorted)
-    orderPairs(record.candidates, record.a->mesh.topology.triangles.size(),
-               m_implementation->sortingScratch);
+    orderPairs(record.candidates, record.a->mesh.topology.triangles.size(), all.sortingScratch);
   record.candidatesSorted = true;
   return record.candidates;
 }
 
-const LooseOctree& OctreeBasedCD::octree() const { return *m_implementation->octree; }
+const LooseOctree& OctreeBasedCD::octree() const { return *read().octree; }
 
-const FrameStatistics& OctreeBasedCD::statistics() const { return m_implementation->statistics; }
+const FrameStatistics& OctreeBasedCD::statistics() const { return read().statistics; }
 
-const Settings& OctreeBasedCD::settings() const { return m_implementation->settings; }
+const Settings& OctreeBasedCD::settings() const { return read().settings; }
 
-std::span<const AuditFailure> OctreeBasedCD::auditFailures() const {
-  return m_implementation->auditFailures;
-}
+std::span<const AuditFailure> OctreeBasedCD::auditFailures() const { return read().auditFailures; }
 
 CollisionProblem OctreeBasedCD::problem() const {
-  const Implementation& all = *m_implementation;
+  const Implementation& all = read();
+  const StandardFloatingPoint standard;
   return problemOf(all.settings, all.geometries, all.pairs);
 }
 

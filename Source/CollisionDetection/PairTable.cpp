@@ -10,16 +10,26 @@
 
 namespace palpate {
 
-void PairRecord::updateNear(double distance) {
-  if (distance == 0.0 || nearRevision == a->restRevision) return;
-  near = verticesWithin(a->mesh.topology, a->mesh.rest, distance);
-  nearRevision = a->restRevision;
+std::string nameOf(GeometryId a, GeometryId b) {
+  return "pair (" + std::to_string(static_cast<std::uint32_t>(a)) + ", " +
+         std::to_string(static_cast<std::uint32_t>(b)) + ")";
 }
 
-void PairRecord::clear() {
+void PairRecord::updateNear() {
+  const double distance = pair.settings.restDistance;
+  if (distance == 0.0 || nearOf.isCurrent({a->revisions.topology})) return;
+  nearOf.invalidate();
+  near = verticesWithin(a->mesh.topology, a->mesh.rest, distance);
+  nearOf.commit({a->revisions.topology});
+}
+
+void PairRecord::commitNothing(bool keepsCandidates) {
   data = {};
   candidates.clear();
   trust.forget();
+  isAnswered = true;
+  dataOf.commit(state());
+  if (keepsCandidates) candidatesOf.commit(state());
 }
 
 namespace {
@@ -27,11 +37,6 @@ namespace {
 std::uint64_t keyOf(GeometryId a, GeometryId b) {
   const auto first = static_cast<std::uint64_t>(a), second = static_cast<std::uint64_t>(b);
   return std::min(first, second) << 32 | std::max(first, second);
-}
-
-std::string nameOf(GeometryId a, GeometryId b) {
-  return "pair (" + std::to_string(static_cast<std::uint32_t>(a)) + ", " +
-         std::to_string(static_cast<std::uint32_t>(b)) + ")";
 }
 
 constexpr const char* kRigidWithItself =
@@ -121,16 +126,25 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
   record->a = &first;
   record->b = &second;
   record->plan = planOf(settings, first, second);
-  record->updateNear(settings.restDistance);
+  record->settingsRevision = m_revisions.next();
+  record->updateNear();
+  record->index = m_records.size();
+  const auto reserve = [](auto& vector) {
+    if (vector.size() == vector.capacity()) vector.reserve(2 * vector.size() + 1);
+  };
+  reserve(m_records);
+  reserve(m_pairs);
+  m_byIds.emplace(keyOf(a, b), record.get());
+  // Nothing below throws.
+  m_pairs.push_back(record->pair);
   m_records.push_back(std::move(record));
-  index();
 }
 
 PairRecord& PairTable::at(const GeometryTable& geometries, GeometryId a, GeometryId b) const {
   const auto found = m_byIds.find(keyOf(a, b));
   if (found != m_byIds.end()) return *found->second;
-  const_cast<GeometryTable&>(geometries).at(a);
-  const_cast<GeometryTable&>(geometries).at(b);
+  geometries.at(a);
+  geometries.at(b);
   throw Error(ErrorCode::UnknownPair, nameOf(a, b) + " was never added, or was removed", a);
 }
 
@@ -147,12 +161,17 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
                     const PairSettings& settings) {
   PairRecord& record = at(geometries, a, b);
   Check(*record.a, *record.b, settings);
-  if (record.pair.settings.restDistance != settings.restDistance) record.nearRevision = 0;
-  record.updateNear(settings.restDistance);
-  record.pair.settings = settings;
+  if (record.pair.settings.restDistance != settings.restDistance && settings.restDistance > 0.0) {
+    IndexLists near =
+        verticesWithin(record.a->mesh.topology, record.a->mesh.rest, settings.restDistance);
+    record.near = std::move(near);
+    record.nearOf.commit({record.a->revisions.topology});
+  }
+  // Nothing below throws.
+  record.pair.settings = m_pairs[record.index].settings = settings;
   record.plan = planOf(settings, *record.a, *record.b);
-  record.dataFor = record.candidatesFor = {};
-  index();
+  record.settingsRevision = m_revisions.next();
+  record.candidatesOf.invalidate();
 }
 
 void PairTable::checkRigid(GeometryId geometry) const {
@@ -168,28 +187,35 @@ void PairTable::setPredicate(const GeometryTable& geometries, GeometryId a, Geom
     throw Error(ErrorCode::UnsupportedMethod,
                 nameOf(a, b) + ": a shape has no features to ask about", a);
   record.predicate = std::move(predicate);
-  record.dataFor = {};
+  record.settingsRevision = m_revisions.next();
+}
+
+template <class Predicate>
+void PairTable::removeIf(Predicate&& isRemoved) noexcept {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < m_records.size(); ++i) {
+    if (isRemoved(*m_records[i])) {
+      m_byIds.erase(keyOf(m_pairs[i].a, m_pairs[i].b));
+      continue;
+    }
+    m_pairs[kept] = m_pairs[i];
+    if (kept != i) m_records[kept] = std::move(m_records[i]);
+    m_records[kept]->index = kept;
+    ++kept;
+  }
+  m_pairs.resize(kept);
+  m_records.resize(kept);
 }
 
 void PairTable::remove(GeometryTable& geometries, GeometryId a, GeometryId b) {
   const PairRecord* record = &at(geometries, a, b);
-  std::erase_if(m_records, [=](const auto& r) { return r.get() == record; });
-  index();
+  removeIf([=](const PairRecord& other) { return &other == record; });
 }
 
-void PairTable::removeAllOf(GeometryId geometry) {
-  std::erase_if(m_records,
-                [=](const auto& r) { return r->pair.a == geometry || r->pair.b == geometry; });
-  index();
-}
-
-void PairTable::index() {
-  m_pairs.clear();
-  m_byIds.clear();
-  for (const auto& record : m_records) {
-    m_pairs.push_back(record->pair);
-    m_byIds.emplace(keyOf(record->pair.a, record->pair.b), record.get());
-  }
+void PairTable::removeAllOf(GeometryId geometry) noexcept {
+  removeIf([=](const PairRecord& other) {
+    return other.pair.a == geometry || other.pair.b == geometry;
+  });
 }
 
 }  // namespace palpate

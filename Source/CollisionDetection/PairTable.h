@@ -8,10 +8,12 @@
 #include "Core/Buffer.h"
 #include "NarrowPhase/NarrowPhase.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -25,15 +27,14 @@ struct PairRecord {
   PairPlan plan;  ///< of this frame
   Trust trust;
 
-  /// Revisions of the geometries that an answer is of; 0: of none.
-  struct AnsweredFor {
-    std::uint64_t a = 0, b = 0;
-    bool wholeStep = false;
-    friend bool operator==(const AnsweredFor&, const AnsweredFor&) = default;
-  };
-  AnsweredFor revisions() const {
-    const bool wholeStep = plan.method == Method::Continuous || plan.motion > 0.0;
-    return {a->revisionFor(wholeStep), b->revisionFor(wholeStep), wholeStep};
+  /// The states of both geometries, and of the pair's settings and predicate.
+  using Derived = DerivedFrom<15>;
+  Derived::Sources state() const {
+    Derived::Sources sources;
+    const auto ofA = a->state(), ofB = b->state();
+    std::copy(ofB.begin(), ofB.end(), std::copy(ofA.begin(), ofA.end(), sources.begin()));
+    sources.back() = settingsRevision;
+    return sources;
   }
   MeshPair meshes(const FloatPair* floats = nullptr) const {
     PairSettings settings = pair.settings;
@@ -50,26 +51,29 @@ struct PairRecord {
   bool anyDisabled() const {
     return !a->mesh.topology.disabled.empty() || !b->mesh.topology.disabled.empty();
   }
-  /// Finds what is too near at rest, where it has changed.
-  void updateNear(double restDistance);
-  /// An answer of nothing.
-  void clear();
+  /// Finds the vertices that are too near at rest, where these may have changed.
+  void updateNear();
+  /// Commits an empty answer, of a pair that does not collide.
+  void commitNothing(bool keepsCandidates);
 
   const Geometry& mesh() const { return a->mesh.shape ? *b : *a; }  ///< of a pair with a shape
 
   /// Stored boxes may hold more than this pair's method asks for.
-  bool widerBoxes() const { return !plan.swept() && (a->swept || b->swept); }
+  bool widerBoxes() const { return !plan.swept() && (a->tree.isSwept() || b->tree.isSwept()); }
 
+  std::size_t index = 0;  ///< in the table
+  Revision settingsRevision;
   CollisionData data;
-  AnsweredFor dataFor;
+  Derived dataOf;
+  bool isAnswered = false;          ///< `data` is that of a detection, of positions now or before
   std::atomic<double> earliest;     ///< Contacts::Earliest: found so far in this frame
   std::size_t found = 0;            ///< candidates, when last collected or handed on
   Buffer<TrianglePair> candidates;  ///< in the order found until somebody asks for them
-  AnsweredFor candidatesFor;
+  Derived candidatesOf;
   bool candidatesSorted = false;
   ContactPredicate predicate;
   IndexLists near;  ///< of settings.restDistance
-  std::uint64_t nearRevision = 0;
+  DerivedFrom<1> nearOf;
 };
 
 /// Collision pairs, found by their geometries in either order.
@@ -81,7 +85,7 @@ class PairTable {
   /// Throws if there is a pair of the geometry with itself.
   void checkRigid(GeometryId) const;
   void remove(GeometryTable&, GeometryId a, GeometryId b);
-  void removeAllOf(GeometryId);
+  void removeAllOf(GeometryId) noexcept;
 
   PairRecord& at(const GeometryTable&, GeometryId a, GeometryId b) const;  ///< either order
   PairRecord& inOrder(const GeometryTable&, GeometryId a,
@@ -90,11 +94,15 @@ class PairTable {
   std::span<const std::unique_ptr<PairRecord>> records() const { return m_records; }
 
  private:
-  void index();
+  template <class Predicate>
+  void removeIf(Predicate&&) noexcept;
 
   std::vector<std::unique_ptr<PairRecord>> m_records;  ///< in the order added
-  std::vector<CollisionPair> m_pairs;
+  std::vector<CollisionPair> m_pairs;                  ///< of m_records, for the user
+  RevisionCounter m_revisions;
   std::unordered_map<std::uint64_t, PairRecord*> m_byIds;
 };
+
+std::string nameOf(GeometryId a, GeometryId b);  ///< "pair (3, 4)"
 
 }  // namespace palpate

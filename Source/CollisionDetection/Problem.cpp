@@ -21,7 +21,7 @@ CollisionProblem::Mesh meshOf(const Geometry& geometry) {
   copy.rotationBefore = before.rotation, copy.translationBefore = before.translation;
   if (copy.kind != GeometryKind::Points) copy.triangles = mesh.topology.triangles;
   if (copy.radii.empty() && mesh.largestRadius > 0.0) copy.radii = {mesh.largestRadius};
-  if (geometry.solid) copy.tetrahedra = geometry.solid->tetrahedra, copy.rest = mesh.rest;
+  if (geometry.solid) copy.tetrahedra = geometry.solid->topology.tetrahedra, copy.rest = mesh.rest;
   return copy;
 }
 

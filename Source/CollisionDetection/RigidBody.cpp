@@ -1,6 +1,6 @@
 #include "CollisionDetection/RigidBody.h"
 
-#include "CollisionDetection/GeometryTable.h"
+#include "CollisionDetection/Geometry.h"
 #include "Math/Tolerances.h"
 #include "Octree/PointQueries.h"
 #include "Octree/Traversal.h"
@@ -18,24 +18,27 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
+}  // namespace
+
 /// The step of one body, and searches for the vertices that go furthest in it.
-class RigidStep {
+class RigidSearch::Step {
  public:
-  explicit RigidStep(Geometry& geometry)
+  Step(const Geometry& geometry, RigidSearch& search)
       : m_geometry(geometry),
+        m_search(search),
         m_before(geometry.mesh.before.transform()),
         m_now(geometry.mesh.now.transform()),
         m_matrix(m_now.rotation - m_before.rotation),
         m_vector(m_now.translation - m_before.translation) {
-    if (geometry.largestRevision != geometry.bodyRevision) {
-      geometry.largestOfBody = 0.0;
+    const DerivedFrom<1>::Sources body{geometry.mesh.now.bodyRevision()};
+    if (!search.m_largestOf.isCurrent(body)) {
+      search.m_largest = 0.0;
       for (const Vector3d& p : geometry.mesh.now.body())
-        geometry.largestOfBody = std::max(geometry.largestOfBody, p.cwiseAbs().maxCoeff());
-      geometry.largestRevision = geometry.bodyRevision;
+        search.m_largest = std::max(search.m_largest, p.cwiseAbs().maxCoeff());
+      search.m_largestOf.commit(body);
     }
-    m_slack =
-        kPlacedError * (4.0 * geometry.largestOfBody + m_before.translation.cwiseAbs().maxCoeff() +
-                        m_now.translation.cwiseAbs().maxCoeff());
+    m_slack = kPlacedError * (4.0 * search.m_largest + m_before.translation.cwiseAbs().maxCoeff() +
+                              m_now.translation.cwiseAbs().maxCoeff());
   }
 
   const RigidTransform& before() const { return m_before; }
@@ -55,24 +58,24 @@ class RigidStep {
       const double other = sizeOf(v);
       if (other > best) best = other, vertex = v;
     };
-    const double unit = 1.0 / m_geometry.frame.scale;
+    const double unit = 1.0 / m_geometry.tree.frame().scale;
     const auto mayHaveMore = [&](const FloatBox& box) {
       if (box.empty()) return false;
       Vector3d lower, upper;
       for (int k = 0; k < 3; ++k) lower[k] = box.lower[k], upper[k] = box.upper[k];
       if (lower.minCoeff() <= -kLargestFloat || upper.maxCoeff() >= kLargestFloat) return true;
-      const Vector3d centre = 0.5 * unit * (lower + upper) + m_geometry.frame.origin;
+      const Vector3d centre = 0.5 * unit * (lower + upper) + m_geometry.tree.frame().origin;
       const double most =
           size(m_matrix * centre + m_vector) + growth.dot(0.5 * unit * (upper - lower));
       return !(most <= best + m_slack);
     };
-    if (m_geometry.treeHasBody()) {
-      forEachOverlapping(m_geometry.octree, mayHaveMore, m_geometry.queries,
+    const GeometryOctree& tree = m_geometry.tree;
+    if (tree.encloses(m_geometry.mesh, m_geometry.revisions.topology)) {
+      forEachOverlapping(tree.octree(), mayHaveMore, m_search.m_queries,
                          [&](std::uint32_t begin, std::uint32_t end) {
                            for (std::uint32_t i = begin; i < end; ++i)
-                             if (mayHaveMore(m_geometry.octree.boxes()[i]))
-                               for (const std::uint32_t v : m_geometry.orderedTriangles[i])
-                                 tryOne(v);
+                             if (mayHaveMore(tree.octree().boxes()[i]))
+                               for (const std::uint32_t v : tree.ordered()[i]) tryOne(v);
                          });
     } else {
       for (std::uint32_t v = 0; v < body.size(); ++v) tryOne(v);
@@ -81,17 +84,16 @@ class RigidStep {
   }
 
  private:
-  Geometry& m_geometry;
+  const Geometry& m_geometry;
+  RigidSearch& m_search;
   const RigidTransform &m_before, &m_now;
   Matrix3d m_matrix;  ///< a displacement is matrix x + vector
   Vector3d m_vector;
   double m_slack;
 };
 
-}  // namespace
-
 Vector3d worldOrigin(const Geometry& geometry) {
-  const Vector3d& origin = geometry.frame.origin;
+  const Vector3d& origin = geometry.tree.frame().origin;
   return geometry.isPlaced() ? geometry.mesh.now.transform()(origin) : origin;
 }
 
@@ -99,7 +101,7 @@ BoxMap worldMap(const Geometry& geometry, const Vector3d& origin, double thickne
                 bool wholeStep) {
   BoxMap map;
   if (!geometry.isPlaced()) return map;
-  const FloatFrame& frame = geometry.frame;
+  const FloatFrame& frame = geometry.tree.frame();
   const auto addEnd = [&](const RigidTransform& transform) {
     std::array<std::array<double, 3>, 3> matrix;
     for (int k = 0; k < 3; ++k)
@@ -118,24 +120,24 @@ BoxMap worldMap(const Geometry& geometry, const Vector3d& origin, double thickne
   return map;
 }
 
-MotionRange rigidMotion(Geometry& geometry) {
-  RigidStep step(geometry);
+MotionRange RigidSearch::motion(const Geometry& geometry) {
+  Step step(geometry, *this);
   MotionRange range;
   range.isEmpty = geometry.mesh.now.size() == 0;
   if (step.before() == step.now()) return range;
   for (int k = 0; k < 3; ++k) {
     const Vector3d growth = step.matrix().row(k).cwiseAbs();
     range.upper[k] =
-        step.largest(geometry.furthest[k], growth, [&](const Vector3d& moved) { return moved[k]; });
-    range.lower[k] = -step.largest(geometry.furthest[3 + k], growth,
-                                   [&](const Vector3d& moved) { return -moved[k]; });
+        step.largest(m_furthest[k], growth, [&](const Vector3d& moved) { return moved[k]; });
+    range.lower[k] =
+        -step.largest(m_furthest[3 + k], growth, [&](const Vector3d& moved) { return -moved[k]; });
   }
   return range;
 }
 
-double arcDeviation(Geometry& geometry) {
+double RigidSearch::arcDeviation(const Geometry& geometry) {
   if (!geometry.isPlaced()) return 0.0;
-  RigidStep step(geometry);
+  Step step(geometry, *this);
   if (step.before().rotation == step.now().rotation) return 0.0;
   const Matrix3d turn = step.now().rotation * step.before().rotation.transpose();
   const Eigen::Quaterniond half = Eigen::Quaterniond(turn).normalized();
@@ -148,7 +150,7 @@ double arcDeviation(Geometry& geometry) {
   Vector3d growth;
   for (int j = 0; j < 3; ++j) growth[j] = across(step.matrix().col(j)).norm();
   return 0.5 * sine / (1.0 + std::abs(half.w())) *
-         step.largest(geometry.furthest[6], growth,
+         step.largest(m_furthest[6], growth,
                       [&](const Vector3d& moved) { return across(moved).norm(); });
 }
 

@@ -13,7 +13,7 @@ void findPrimitivesNear(const Geometry& geometry, const Shape& before, const Sha
   const bool wholeStep = &before != &now;
   const Vector3d origin = worldOrigin(geometry);
   const BoxMap map = worldMap(geometry, origin, 0.0, wholeStep);
-  const double unit = 1.0 / geometry.frame.scale;
+  const double unit = 1.0 / geometry.tree.frame().scale;
   const double error = kShapeBoundError * (before.magnitude() + now.magnitude() + reach +
                                            2.0 * origin.cwiseAbs().maxCoeff());
   Eigen::AlignedBox3d swept;
@@ -40,10 +40,12 @@ void findPrimitivesNear(const Geometry& geometry, const Shape& before, const Sha
              reach + error + kShapeBoundError * size);  // NaN: it may
   };
   out.clear();
-  forEachOverlapping(geometry.octree, mayReach, stack, [&](std::uint32_t begin, std::uint32_t end) {
-    for (std::uint32_t i = begin; i < end; ++i)
-      if (mayReach(geometry.octree.boxes()[i])) out.push_back(geometry.octree.order()[i]);
-  });
+  forEachOverlapping(geometry.tree.octree(), mayReach, stack,
+                     [&](std::uint32_t begin, std::uint32_t end) {
+                       for (std::uint32_t i = begin; i < end; ++i)
+                         if (mayReach(geometry.tree.octree().boxes()[i]))
+                           out.push_back(geometry.tree.octree().order()[i]);
+                     });
 }
 
 }  // namespace palpate

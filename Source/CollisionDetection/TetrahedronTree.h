@@ -21,7 +21,6 @@ class TetrahedronTree {
   /// floats: of the vertices, in a frame of which `bulk` is the extent of most of them.
   void update(std::span<const Tetrahedron>, const FloatPoint* floats, double bulk,
               const OctreeSettings&, const Threads&);
-  void forget() { m_known = false; }  ///< the topology changed
 
   const Octree& octree() const { return m_octree; }
   /// In the octree's order.
@@ -33,7 +32,7 @@ class TetrahedronTree {
   Octree m_octree;
   std::vector<Tetrahedron> m_ordered;
   Buffer<std::uint64_t> m_keys;  ///< scratch
-  bool m_known = false;
+  bool m_known = false;          ///< built, and the last update did not fail
 };
 
 }  // namespace palpate

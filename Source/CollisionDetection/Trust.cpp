@@ -14,20 +14,11 @@ namespace {
 /// thirds. So many frames earn one, and up to four are saved, or one.
 constexpr int kLook = 16, kMostSaved = 4 * kLook;
 
-/// From the last frame's positions to this step's start.
-MotionRange correctionOf(const Geometry& geometry) {
-  if (geometry.setThisFrame) return geometry.correction;
-  MotionRange back;
-  back.lower = -geometry.motion.upper;
-  back.upper = -geometry.motion.lower;
-  return back;
-}
-
 /// Vertices that may have moved further than `reach` relative to the other mesh.
 void addFarMovers(std::vector<std::uint32_t>& out, const Geometry& mesh, const Geometry& other,
                   double reach) {
-  const Eigen::Vector3d centre = 0.5 * (other.motion.lower + other.motion.upper),
-                        extent = other.motion.upper - centre;
+  const MotionRange& range = other.motion.range();
+  const Eigen::Vector3d centre = 0.5 * (range.lower + range.upper), extent = range.upper - centre;
   for (std::uint32_t v = 0; v < mesh.mesh.now.size(); ++v) {
     const Eigen::Vector3d moved =
         (mesh.mesh.now[v] - mesh.mesh.before[v] - centre).cwiseAbs() + extent;
@@ -38,12 +29,12 @@ void addFarMovers(std::vector<std::uint32_t>& out, const Geometry& mesh, const G
 
 /// L: along the longest axis; of a body that may be turned, along any.
 double extentOf(const Geometry& geometry) {
-  if (geometry.octree.size() == 0) return 0.0;
-  const FloatBox box = geometry.octree.blocks()[0].box(0);
+  if (geometry.tree.octree().size() == 0) return 0.0;
+  const FloatBox box = geometry.tree.octree().blocks()[0].box(0);
   double longest = 0.0;
   for (int k = 0; k < 3; ++k)
     longest = std::max(longest, double{box.upper[k]} - double{box.lower[k]});
-  return (geometry.isPlaced() ? 2.0 : 1.0) * longest / geometry.frame.scale;
+  return (geometry.isPlaced() ? 2.0 : 1.0) * longest / geometry.tree.frame().scale;
 }
 
 }  // namespace
@@ -58,7 +49,7 @@ PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry&
   plan.method = settings.method;
   StepPlan& step = plan.step;
   const double thickness = settings.thickness;
-  plan.motion = moves ? largestMotion(a.motion, b.motion) : 0.0;
+  plan.motion = moves ? largestMotion(a.motion.range(), b.motion.range()) : 0.0;
   if (!knowsSides(a, b)) return plan;
   step.motion = plan.motion;
   if (settings.method == Method::Auto) {
@@ -72,7 +63,7 @@ PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry&
     } else if (plan.motion <= plan.tolerance) {
       plan.method = Method::Proximity;
       plan.reason = MethodReason::Slow;
-    } else if (smallestMotion(a.motion, b.motion) > plan.tolerance ||
+    } else if (smallestMotion(a.motion.range(), b.motion.range()) > plan.tolerance ||
                meanMotion(a.mesh, b.mesh) > plan.tolerance) {
       plan.method = Method::Continuous;
       plan.reason = MethodReason::Fast;
@@ -91,25 +82,48 @@ PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry&
   return plan;
 }
 
+namespace {
+
+std::array<Revision, 8> statesOf(const Geometry& a, const Positions& ofA, const Geometry& b,
+                                 const Positions& ofB) {
+  return {a.revisions.topology, a.revisions.enabled, ofA.bodyRevision(), ofA.transformRevision(),
+          b.revisions.topology, b.revisions.enabled, ofB.bodyRevision(), ofB.transformRevision()};
+}
+
+}  // namespace
+
+void Trust::forget() {
+  m_topologies.invalidate();
+  for (Known* known : {&m_atStart, &m_atEnd}) known->of.invalidate();
+}
+
 void Trust::start(const PairSettings& settings, const Geometry& a, const Geometry& b,
-                  std::uint64_t frame, PairPlan& plan) {
-  const MotionRange ofA = correctionOf(a), ofB = correctionOf(b);
-  const double correction = largestMotion(ofA, ofB);
-  const bool corrected = !ofA.isZero() || !ofB.isZero();
+                  PairPlan& plan) {
   // No two features within the thickness are further apart, in any coordinate, than both meshes.
   const double size = extentOf(a) + extentOf(b) + settings.thickness + plan.step.extra;
   plan.step.certain = plan.step.motion + 2.0 * kMotionError * (plan.step.motion + size);
-  const bool changed = m_topologyA != a.topologyRevision || m_topologyB != b.topologyRevision;
-  const bool known = frame == m_frame + 1 && !changed;
-  m_startsApart = known && m_end == End::Apart && (!corrected || correction < m_clearance);
-  m_startsIntersecting = known && m_end == End::Intersecting && !corrected;
-  plan.startsIntersecting = m_startsIntersecting;
+
+  const auto before = statesOf(a, a.mesh.before, b, b.mesh.before);
+  if (!m_atStart.of.isCurrent(before)) {
+    m_atStart = {};
+    if (m_atEnd.of.isCurrent(before)) {
+      m_atStart = m_atEnd;
+    } else if (m_atEnd.of.isCurrent(statesOf(a, a.step.detected(), b, b.step.detected())) &&
+               m_atEnd.position == Position::Apart &&
+               largestMotion(a.motion.correction(), b.motion.correction()) < m_atEnd.clearance) {
+      m_atStart.position = Position::Apart;
+      m_atStart.of.commit(before);
+    }
+  }
+  const bool startsApart = m_atStart.position == Position::Apart;
+  plan.startsIntersecting = m_atStart.position == Position::Intersecting;
+
+  const std::array<Revision, 4> topologies{a.revisions.topology, a.revisions.enabled,
+                                           b.revisions.topology, b.revisions.enabled};
   const int most = settings.contacts == Contacts::Earliest ? kLook : kMostSaved;
-  m_saved = changed ? most : std::min(m_saved + 1, most);
-  m_frame = frame;
-  m_topologyA = a.topologyRevision;
-  m_topologyB = b.topologyRevision;
-  if (!knowsSides(a, b) || m_startsApart || plan.method == Method::Intersection ||
+  m_saved = m_topologies.isCurrent(topologies) ? std::min(m_saved + 1, most) : most;
+  m_topologies.commit(topologies);
+  if (!knowsSides(a, b) || startsApart || plan.method == Method::Intersection ||
       (plan.method == Method::Proximity && plan.motion > 0.0 && plan.step.motion == 0.0))
     return;
   plan.overlaps = settings.method == Method::Auto;
@@ -141,7 +155,12 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
     take(validity.verticesBeyondA, facts.verticesA);
     take(validity.verticesBeyondB, facts.verticesB);
   }
-  validity.startedApart = m_startsApart || (plan.step.start && !facts.startsIntersecting);
+  if (plan.step.start) {
+    m_atStart = {};
+    m_atStart.position = facts.startsIntersecting ? Position::Intersecting : Position::Apart;
+    m_atStart.of.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
+  }
+  validity.startedApart = m_atStart.position == Position::Apart;
   if (settings.method == Method::Auto) {
     validity.reach = plan.tolerance;
     validity.trusted = plan.method == Method::Intersection || validity.startedApart;
@@ -162,42 +181,44 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
             : plan.motion == 0.0 || (within && !(nearby && contents.intersectingTriangles.empty()));
   }
   const bool trusted = validity.trusted && knowsSides(a, b);  // as vertices move, in straight lines
-  validity.arcDeviation = a.arcDeviation + b.arcDeviation;
+  validity.arcDeviation = a.motion.arcDeviation() + b.motion.arcDeviation();
   validity.trusted = trusted && validity.arcDeviation <= settings.thickness;
   validity.sideMayBeWrong = plan.method != Method::Intersection && !validity.trusted;
-  m_end = End::Unknown;
-  m_clearance = std::min(facts.clearance, settings.thickness);
+  m_atEnd = {};
+  m_atEnd.clearance = std::min(facts.clearance, settings.thickness);
   if (!contents.intersectingTriangles.empty()) {
-    m_end = End::Intersecting;
-    m_witness = contents.intersectingTriangles.front();
+    m_atEnd.position = Position::Intersecting;
+    m_atEnd.witness = contents.intersectingTriangles.front();
   } else if (plan.method == Method::Intersection) {
-    if (plan.motion == 0.0 && facts.clearance > 0.0) m_end = End::Apart;
+    if (plan.motion == 0.0 && facts.clearance > 0.0) m_atEnd.position = Position::Apart;
   } else if (trusted && facts.clearance > 0.0) {
-    m_end = End::Apart;
+    m_atEnd.position = Position::Apart;
   } else if (plan.step.motion > 0.0 && settings.method != Method::Proximity) {
     findEnd(plan, facts, meshes, contents, counts);
   }
+  m_atEnd.of.commit(statesOf(a, a.mesh.now, b, b.mesh.now));
 }
 
 void Trust::findEnd(const PairPlan& plan, const StepFacts& facts, const MeshPair& meshes,
                     const CollisionData::Contents& contents, ContactBuffers& counts) {
-  m_clearance = 0.0;
-  if (plan.overlaps && facts.startsIntersecting) {  // Intersection has looked, and found none
-    if (!meshes.near) m_end = End::Apart;
+  m_atEnd.clearance = 0.0;
+  if (plan.overlaps && facts.startsIntersecting) {  // Intersection has tested all, and found none
+    if (!meshes.near) m_atEnd.position = Position::Apart;
     return;
   }
-  // Of an earliest time there are no contacts, and of what filters leave out neither.
+  // Earliest times come without contacts, and filtered features are not among the contacts.
   if (meshes.settings.contacts == Contacts::Earliest || meshes.filters()) return;
   EndOfStep end;
-  if (m_startsIntersecting && intersect(meshes, false, m_witness, counts))
-    end.intersecting = m_witness;
+  if (m_atStart.position == Position::Intersecting && m_atStart.witness &&
+      intersect(meshes, false, *m_atStart.witness, counts))
+    end.intersecting = m_atStart.witness;
   else
     end = lookAtEnd(meshes, contents, counts);
   if (end.intersecting) {
-    m_end = End::Intersecting;
-    m_witness = *end.intersecting;
+    m_atEnd.position = Position::Intersecting;
+    m_atEnd.witness = end.intersecting;
   } else if (contents.validity.startedApart && end.isKnown) {
-    m_end = End::Apart;
+    m_atEnd.position = Position::Apart;
   }
 }
 

@@ -3,7 +3,10 @@
 #include <palpate/CollisionData.h>
 
 #include "CollisionDetection/GeometryTable.h"
+#include "Geometry/Revision.h"
 #include "NarrowPhase/NarrowPhase.h"
+
+#include <optional>
 
 namespace palpate {
 
@@ -24,34 +27,37 @@ struct PairPlan {
 /// From the settings, which are good, and how the geometries moved, if that matters.
 PairPlan planOf(const PairSettings&, const Geometry& a, const Geometry& b, bool moves = true);
 
-/// Whether a pair's meshes are known to be apart where its next step starts, from frame to frame.
+/// Whether a pair's meshes are known to be apart where a step starts.
+///
+/// What was found out is kept with the states of both geometries that it holds for. So it serves
+/// the next step, which starts where this one ends, and further detections of the same step.
 class Trust {
  public:
-  /// Before a frame's detection; `frame` counts all frames. Sets whether the step's start is asked.
-  void start(const PairSettings&, const Geometry& a, const Geometry& b, std::uint64_t frame,
-             PairPlan&);
-  /// After it, with what the narrow phase has seen. counts: as of anyIntersecting().
+  /// Before a detection: decides whether it also tests the step's start.
+  void start(const PairSettings&, const Geometry& a, const Geometry& b, PairPlan&);
+  /// After it, with what the narrow phase has found. counts: as of anyIntersecting().
   void finish(const PairSettings&, const Geometry& a, const Geometry& b, const PairPlan&,
               const StepFacts&, bool nearby, const MeshPair&, CollisionData::Contents&,
               ContactBuffers& counts);
-  /// After a frame whose answer was kept.
-  void keep(std::uint64_t frame) { m_frame = frame; }
-  void forget() { m_topologyA = 0; }
+  void forget();
 
  private:
-  enum class End { Unknown, Apart, Intersecting };
+  enum class Position { Unknown, Apart, Intersecting };
+  /// One state of both geometries.
+  struct Known {
+    DerivedFrom<8> of;
+    Position position = Position::Unknown;
+    double clearance = 0;                 ///< L: Apart by at least
+    std::optional<TrianglePair> witness;  ///< Intersecting: a pair that does, if known
+  };
 
   /// Where bounds on motion do not tell.
   void findEnd(const PairPlan&, const StepFacts&, const MeshPair&, const CollisionData::Contents&,
                ContactBuffers& counts);
 
-  End m_end = End::Unknown;  ///< of the last frame's step
-  double m_clearance = 0;    ///< L: Apart by at least
-  TrianglePair m_witness;    ///< Intersecting: a pair that does
-  std::uint64_t m_frame = 0;
-  std::uint64_t m_topologyA = 0, m_topologyB = 0;
-  bool m_startsApart = false, m_startsIntersecting = false;  ///< known of this frame's step
-  int m_saved = 0;                                           ///< of looks at the step's start
+  Known m_atStart, m_atEnd;  ///< of the step last detected
+  DerivedFrom<4> m_topologies;
+  int m_saved = 0;  ///< tests of the step's start that were earned and not used, times kLook
 };
 
 }  // namespace palpate

@@ -15,7 +15,7 @@ namespace palpate {
 class PointFrame {
  public:
   explicit PointFrame(const Geometry& geometry)
-      : m_scale(geometry.frame.scale),
+      : m_scale(geometry.tree.frame().scale),
         m_origin(worldOrigin(geometry)),
         m_map(worldMap(geometry, m_origin, 0.0, false)) {}
 

@@ -49,11 +49,11 @@ void WindingNumbers::Cluster::reach(const Cluster& part) {
 /// The triangles that a node holds itself.
 void WindingNumbers::addOwn(OctreeNode node) {
   Cluster& all = m_clusters[node] = {};
-  const auto [begin, end] = m_body->octree.ownRange(node);
+  const auto [begin, end] = m_body->tree.octree().ownRange(node);
   const Positions& now = m_body->mesh.now;
   for (const bool reach : {false, true})
     for (std::uint32_t i = begin; i < end; ++i) {
-      const auto& [ia, ib, ic] = m_body->orderedTriangles[i];
+      const auto& [ia, ib, ic] = m_body->tree.ordered()[i];
       const Vector3d a = now[ia], b = now[ib], c = now[ic], u = b - a, v = c - a;
       if (reach) {
         for (const Vector3d& corner : {a, b, c})
@@ -70,7 +70,7 @@ void WindingNumbers::addOwn(OctreeNode node) {
 
 void WindingNumbers::prepare(const Geometry& body, const Threads& threads) {
   m_body = &body;
-  const Octree& octree = body.octree;
+  const Octree& octree = body.tree.octree();
   const std::size_t blocks = octree.pool().used();
   m_clusters.resize(8 * blocks);
   threads.forChunks(blocks, kBlocksPerPart, [&](std::size_t, std::size_t from, std::size_t to) {
@@ -116,7 +116,7 @@ SeenShare WindingNumbers::sumOfAll(const Vector3d& p) const {
 
 WindingNumbers::Answer WindingNumbers::ask(const Vector3d& p, double margin, bool bruteForce,
                                            PointQueryStack& stack) const {
-  const Octree& octree = m_body->octree;
+  const Octree& octree = m_body->tree.octree();
   const Positions& now = m_body->mesh.now;
   for (const double far : kFar) {
     if (bruteForce) break;
@@ -133,7 +133,7 @@ WindingNumbers::Answer WindingNumbers::ask(const Vector3d& p, double margin, boo
       }
       const auto [begin, end] = octree.ownRange(node);
       for (std::uint32_t i = begin; i < end; ++i) {
-        const auto& [a, b, c] = m_body->orderedTriangles[i];
+        const auto& [a, b, c] = m_body->tree.ordered()[i];
         ofNear.add(seenShare(p, now[a], now[b], now[c]));
       }
       const OctreeBlock& block = octree.blocks()[node >> 3];

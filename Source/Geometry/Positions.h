@@ -1,5 +1,7 @@
 #pragma once
 
+#include "Geometry/Revision.h"
+
 #include <Eigen/Core>
 
 #include <cstddef>
@@ -30,6 +32,8 @@ struct RigidTransform {
 
 /// The positions of a geometry's vertices at one end of a step. Those of a rigid body are kept in
 /// its own frame, shared by both ends, and are placed in the world where they are read.
+///
+/// Two ends of one geometry with equal revisions are at the same positions.
 class Positions {
  public:
   using Body = std::shared_ptr<const std::vector<Eigen::Vector3d>>;
@@ -53,15 +57,29 @@ class Positions {
   /// In the body's frame; the world where it is not placed.
   std::span<const Eigen::Vector3d> body() const { return *m_body; }
   bool hasSameBody(const Positions& other) const { return m_body == other.m_body; }
-  void setBody(Body body) {
+  void setBody(Body body, Revision revision = {}) noexcept {
     m_body = std::move(body);
     m_data = m_body->data();
+    m_bodyRevision = revision;
   }
+  void setBodyOf(const Positions& other) noexcept { setBody(other.m_body, other.m_bodyRevision); }
   bool isPlaced() const { return m_placed; }
   const RigidTransform& transform() const { return m_transform; }
-  void place(const RigidTransform& transform) {
+  void place(const RigidTransform& transform, Revision revision) noexcept {
     m_transform = transform;
     m_placed = true;
+    m_transformRevision = revision;
+  }
+  void placeAs(const Positions& other) noexcept {
+    m_transform = other.m_transform;
+    m_placed = other.m_placed;
+    m_transformRevision = other.m_transformRevision;
+  }
+
+  Revision bodyRevision() const { return m_bodyRevision; }
+  Revision transformRevision() const { return m_transformRevision; }
+  bool isSameAs(const Positions& other) const {
+    return hasSameBody(other) && m_transformRevision == other.m_transformRevision;
   }
 
  private:
@@ -69,6 +87,7 @@ class Positions {
   const Eigen::Vector3d* m_data;
   RigidTransform m_transform;
   bool m_placed = false;
+  Revision m_bodyRevision, m_transformRevision;
 };
 
 }  // namespace palpate

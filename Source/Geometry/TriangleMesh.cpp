@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <tuple>
+#include <utility>
 
 namespace palpate {
 
@@ -30,24 +31,28 @@ MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle>
     if (i == 0 || edge != sides[i - 1].edge) edges.push_back(edge);
     triangleEdges[triangle][side] = static_cast<std::uint32_t>(edges.size() - 1);
   }
-  findOwners();
+  findOwners({});
 }
 
 void MeshTopology::disable(std::span<const std::uint32_t> newDisabled) {
-  isDisabled.assign(newDisabled.empty() ? 0 : triangles.size(), false);
-  for (const std::uint32_t triangle : newDisabled) isDisabled[triangle] = true;
-  disabled.clear();
-  for (std::uint32_t t = 0; t < isDisabled.size(); ++t)
-    if (isDisabled[t]) disabled.push_back(t);
-  findOwners();
+  std::vector<bool> newIsDisabled(newDisabled.empty() ? 0 : triangles.size(), false);
+  for (const std::uint32_t triangle : newDisabled) newIsDisabled[triangle] = true;
+  std::vector<std::uint32_t> sorted;
+  for (std::uint32_t t = 0; t < newIsDisabled.size(); ++t)
+    if (newIsDisabled[t]) sorted.push_back(t);
+  findOwners(newIsDisabled);
+  // Nothing below throws.
+  disabled = std::move(sorted);
+  isDisabled = std::move(newIsDisabled);
 }
 
-void MeshTopology::findOwners() {
+/// Changes nothing if it throws.
+void MeshTopology::findOwners(const std::vector<bool>& newIsDisabled) {
   // What a triangle holds twice counts once.
   const auto listsOf = [&](std::size_t count, const auto& heldBy) {
     return listsByKey(count, [&](auto&& incidence) {
       for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-        if (!isOn(t)) continue;
+        if (!newIsDisabled.empty() && newIsDisabled[t]) continue;
         const auto& [a, b, c] = heldBy[t];
         if (a != kNoEdge) incidence(a, t);
         if (b != kNoEdge && b != a) incidence(b, t);
@@ -55,33 +60,39 @@ void MeshTopology::findOwners() {
       }
     });
   };
-  vertexTriangles = listsOf(vertexCount, triangles);
-  edgeTriangles = listsOf(edges.size(), triangleEdges);
+  IndexLists atVertices = listsOf(vertexCount, triangles);
+  IndexLists atEdges = listsOf(edges.size(), triangleEdges);
 
-  owned.assign(triangles.size(), 0);
+  std::vector<std::uint8_t> owners(triangles.size(), 0);
   const auto own = [&](std::uint32_t item, std::uint32_t owner, const auto& held, unsigned first) {
     const auto place = std::find(held.begin(), held.end(), item) - held.begin();
-    owned[owner] |= static_cast<std::uint8_t>(first << place);
+    owners[owner] |= static_cast<std::uint8_t>(first << place);
   };
-  untestedVertices = 0;
+  std::size_t untested = 0;
   for (std::uint32_t v = 0; v < vertexCount; ++v) {
-    const auto incident = vertexTriangles[v];
+    const auto incident = atVertices[v];
     if (incident.empty())
-      ++untestedVertices;
+      ++untested;
     else
       own(v, incident.front(), triangles[incident.front()], 1);
   }
-  hasClosedStar.assign(vertexCount, 1);
+  std::vector<std::uint8_t> closedStars(vertexCount, 1);
   const auto goesUp = [&](std::uint32_t e, std::uint32_t triangle) {
     const auto side = std::find(triangleEdges[triangle].begin(), triangleEdges[triangle].end(), e);
     return triangles[triangle][side - triangleEdges[triangle].begin()] == edges[e][0];
   };
   for (std::uint32_t e = 0; e < edges.size(); ++e) {
-    const auto incident = edgeTriangles[e];
+    const auto incident = atEdges[e];
     if (!incident.empty()) own(e, incident.front(), triangleEdges[incident.front()], 8);
     if (incident.size() != 2 || goesUp(e, incident[0]) == goesUp(e, incident[1]))
-      hasClosedStar[edges[e][0]] = hasClosedStar[edges[e][1]] = 0;
+      closedStars[edges[e][0]] = closedStars[edges[e][1]] = 0;
   }
+  // Nothing below throws.
+  vertexTriangles = std::move(atVertices);
+  edgeTriangles = std::move(atEdges);
+  owned = std::move(owners);
+  untestedVertices = untested;
+  hasClosedStar = std::move(closedStars);
 }
 
 std::uint32_t MeshTopology::edgeOf(const Segment& edge) const {

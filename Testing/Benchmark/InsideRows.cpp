@@ -154,6 +154,7 @@ double particleFrame(const Settings& settings, const testing::Mesh& body, const 
     const double begin = now();
     detection.setPositions(smoke, points);
     detection.detectCollision();
+    detection.advance();
     samples.push_back(now() - begin);
   }
   hash = detection.collisionData(smoke, id).hash();

@@ -66,6 +66,7 @@ class SutureScene {
     m_detection.setPositions(m_suture, m_thread);
     m_detection.setPositions(m_mesh, m_organs);
     m_detection.detectCollision();
+    m_detection.advance();
     return now() - start;
   }
   const CollisionData& withItself() const { return m_detection.collisionData(m_suture, m_suture); }

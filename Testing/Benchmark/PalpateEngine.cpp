@@ -85,6 +85,7 @@ PalpateScene::PalpateScene(const Task& task, const Positions& positions, OctreeU
 }
 
 void PalpateScene::setPositions(const Positions& positions) {
+  detection.advance();  // a new step
   for (std::size_t mesh = 0; mesh < ids.size(); ++mesh)
     detection.setPositions(ids[mesh], positions[mesh]);
 }

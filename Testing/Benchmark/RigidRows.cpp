@@ -74,6 +74,7 @@ Moved move(const testing::Mesh& body, const PairSettings& pair, int threads, boo
     else
       detection.setPositions(id, world);
     detection.detectCollision();
+    detection.advance();
     if (frame > 1) result.samples.push_back(now() - begin);
     result.contacts += detection.statistics().contacts;
     result.hash ^= detection.collisionData(organ, id).hash() * (2 * frame + 1u);

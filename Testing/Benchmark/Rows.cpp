@@ -230,6 +230,7 @@ void payRows(Report& report, const RowOptions& options) {
         const double start = now();
         scene.detection.setPositions(scene.ids[1], tool);
         scene.detection.collectCandidates();
+        scene.detection.advance();
         samples.push_back(now() - start);
         pairs = static_cast<double>(scene.detection.statistics().candidatePairs);
       }

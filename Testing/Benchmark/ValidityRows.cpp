@@ -56,6 +56,7 @@ class ValidityCost {
     for (const auto& [a, b] : scene.pairs)
       m_detection.addCollisionPair(m_ids[a], m_ids[b], settings);
     m_detection.detectCollision();
+    m_detection.advance();
   }
 
   /// Milliseconds of the next frame.
@@ -70,6 +71,7 @@ class ValidityCost {
     const double start = now();
     for (std::size_t m = 0; m < m_ids.size(); ++m) m_detection.setPositions(m_ids[m], m_now[m]);
     m_detection.detectCollision();
+    m_detection.advance();
     cost.whole = now() - start;
     for (std::size_t m = 0; m < m_meshes.size(); ++m) {
       m_meshes[m].before = m_before[m];

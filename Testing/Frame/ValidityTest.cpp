@@ -97,6 +97,7 @@ Tally livesOf(const PairSettings& settings, double speed, std::uint64_t seed, st
         run.detection().setPositions(run.a(), ballNow);
         run.detection().setPositions(run.b(), sheetNow);
         run.detect();
+        run.detection().advance();
       }
       const Validity& validity = run.data().validity();
       const bool fromBelow = BallAndSheet::anyFromBelow(
@@ -190,6 +191,8 @@ Known livesThrough(const PairSettings& settings, const Mesh& a, const Mesh* b, i
     const bool apart = frame > 0 && dataOf(truth).intersectingTriangles().empty();
     detection.detectCollision();
     truth.detectCollision();
+    detection.advance();
+    truth.advance();
     if (frame == 0) continue;
     const bool found = dataOf(detection).validity().startedApart;
     EXPECT_TRUE(apart || !found) << "frame " << frame;
@@ -302,6 +305,7 @@ TEST(Displacement, IsThatOfTheStep) {
       for (std::size_t v = 0; v < now.size() && frame > 0; ++v)
         most = most.cwiseMax((now[v] - before[v]).cwiseAbs());
       EXPECT_NEAR(run.data().validity().displacement, most.norm(), 1e-12) << "frame " << frame;
+      run.detection().advance();
       last = now;
     }
   }

@@ -83,6 +83,7 @@ TEST(Regression, BodiesThatLeftAndCameBack) {
     for (const bool away : {true, false}) {
       std::vector<Eigen::Vector3d> now = home;
       for (Eigen::Vector3d& p : now) p.x() += away ? far : 0.0;
+      detection.advance();
       detection.setPositions(GeometryId{1}, now);
       detection.detectCollision();
       const CollisionData& data = dataOf(detection, problem.pairs[0]);

@@ -109,6 +109,7 @@ class Loop {
     for (std::size_t b = 0; b < m_bodies.size(); ++b)
       m_detection.setPositions(m_ids[b], noisy(m_bodies[b].positions));
     m_detection.detectCollision();
+    m_detection.advance();
     m_contacts = 0;
     m_normals.clear();
     for (std::uint32_t b = 1; b < m_bodies.size(); ++b) {

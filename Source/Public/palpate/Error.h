@@ -27,6 +27,7 @@ enum class ErrorCode {
   InvalidShape,       ///< a measure of a shape that is NaN, infinite, negative, or no direction
   InvalidTransform,   ///< not a rotation, or a translation that is not finite
   SharedFace,         ///< a face of more than two tetrahedra
+  InvalidCall,        ///< of an object that was moved from, or from a callback that it calls
 };
 
 /// What was wrong with a call, and where. The call that throws it has changed nothing.

@@ -25,11 +25,23 @@ struct CollisionPair {
   PairSettings settings;
 };
 
-/// Collision detection over deforming triangle meshes, lines and points: add geometries and pairs
-/// once, then each frame setPositions(), detectCollision(), and read collisionData().
+/// Collision detection over deforming triangle meshes, lines, points and analytical shapes. Add
+/// geometries and pairs once. Then, in each step: setPositions(), detectCollision(), read
+/// collisionData(), advance().
 ///
-/// Errors   every function that takes data throws palpate::Error and changes nothing.
-/// Threads  const functions are safe from many threads while no other function runs.
+/// Step     a step runs from the positions `before` to the positions `now`; each vertex moves in a
+///          straight line. advance() ends the step: `now` becomes `before`, for positions and
+///          transforms of all geometries. A geometry that is not set after advance() is at rest.
+///          Within a step all calls may be made any number of times and in any order; an answer
+///          depends only on the last values.
+/// Errors   every function that takes data throws palpate::Error and changes nothing. An exception
+///          while a frame is computed (memory, a predicate or callback that throws) leaves the
+///          pairs that it was computing without an answer and the object ready for the next frame.
+///          After a move everything but assignment and destruction throws InvalidCall; so does a
+///          call from a predicate or callback to the object that calls it.
+/// Threads  const functions are safe from many threads while no other function runs. Two objects
+///          share nothing.
+/// Floating point  the caller's rounding mode, traps and treatment of denormals change nothing.
 class PALPATE_EXPORT OctreeBasedCD {
  public:
   explicit OctreeBasedCD(const Settings& = {});
@@ -73,13 +85,20 @@ class PALPATE_EXPORT OctreeBasedCD {
   GeometryId addAnalyticalGeometry(const AnalyticalGeometry&);
   void removeGeometry(GeometryId);  ///< and its pairs
 
-  /// A frame ends at detectCollision() or collectCandidates(). With one array, "before" is the
-  /// "now" of the last frame; with two, both are given. Without new positions both stay; of several
-  /// calls before a frame the last counts; at first, and after setTriangles(), before = now.
+  /// Ends the step of all geometries: `now` becomes `before`. Results stay readable. Loops that
+  /// never call it sweep from where they began: see Validity::displacement.
+  ///
+  /// Cost     does not grow with vertices.
+  void advance();
+
+  /// One array sets `now`; two arrays set both ends of the step. Only the second form and advance()
+  /// set `before`. In the step in which a geometry is added, or its topology is set, `before`
+  /// follows `now` unless it is given.
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> now);
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> before,
                     std::span<const Eigen::Vector3d> now);
-  /// Topology changed, as by a cut. Of triangle meshes only.
+  /// Sets a new topology, as after a cut, and the positions at both ends of the step. Triangle
+  /// meshes only.
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
   /// The same of tetrahedral meshes only.
@@ -91,14 +110,17 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Moves a geometry as a whole, from now on: a point x of its body's frame is at rotation x +
   /// translation, which of vertices is the double ((r0 x + r1 y) + r2 z) + t. The positions given
   /// before, and by later setPositions() and setTriangles(), are in the body's frame, and so is its
-  /// octree, which stays as it is. A frame's step is as with setPositions(): "before" is by the
-  /// last frame's transform, vertices move in straight lines (Validity::arcDeviation), and of
-  /// positions and transforms of one frame the last of each count.
+  /// octree, which stays as it is. The step is as with setPositions(): one pose sets `now`, two
+  /// poses set both ends. Positions and transform are set independently of each other. Vertices
+  /// move in straight lines between the two ends (Validity::arcDeviation).
   ///
   /// Errors   InvalidTransform unless the rotation is one within 1e-9 and all is finite, below
   ///          2^1000; UnsupportedMethod where the geometry has a pair with itself.
   /// Cost     does not grow with the geometry.
   void setTransform(GeometryId, const Eigen::Matrix3d& rotation,
+                    const Eigen::Vector3d& translation);
+  void setTransform(GeometryId, const Eigen::Matrix3d& rotationBefore,
+                    const Eigen::Vector3d& translationBefore, const Eigen::Matrix3d& rotation,
                     const Eigen::Vector3d& translation);
   /// Two geometries meet where each is in a group that the other's mask has; a pair that does not
   /// has no contacts, no candidates and no cost, and is not trusted.
@@ -157,8 +179,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   ///          for a margin that is none.
   std::span<const InsideVertex> findInsideVertices(GeometryId vertices, GeometryId body,
                                                    const InsideSettings& = {});
-  /// The same, with ways out that do not flip from call to call: call it once a frame, after
-  /// setPositions().
+  /// The same, with ways out that do not flip from step to step: call it in each step, after
+  /// setPositions(). Directions are followed from the last earlier step in which it was called.
   ///
   /// Seen from the triangle that the last exit was on, which turns with the body: where the nearest
   /// way out is within kMostTurn + m of the last direction, it is taken; m is how far the vertex
@@ -177,14 +199,17 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// The same of one point.
   std::optional<TetrahedronPoint> findTetrahedron(GeometryId body, const Eigen::Vector3d& point);
 
-  /// (a, b) in the order in which the pair was added.
+  /// The answer of the last detectCollision(); (a, b) in the order in which the pair was added.
+  /// Errors   NotAvailable before the first detection of the pair, and after one that failed.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;
   /// Sorted by (a, b): every primitive pair whose boxes, inflated by half the pair's thickness and
   /// largest radii each, overlap; more only by outward rounding. (a, a): each unordered pair once,
   /// a < b, sharing no vertex. After detectCollision() only with Settings::keepCandidates.
   std::span<const TrianglePair> candidatePairs(GeometryId a, GeometryId b) const;
-  const LooseOctree& octree() const;          ///< as of the last update()
-  const FrameStatistics& statistics() const;  ///< of the last frame
+  const LooseOctree& octree() const;  ///< as of the last update()
+  /// Of the last detectCollision() or collectCandidates(), with the updates before it, or of an
+  /// update() since. Queries do not change it.
+  const FrameStatistics& statistics() const;
   const Settings& settings() const;
   /// With Settings::audit, where the last detectCollision() and brute force differ, as far as its
   /// sample of features shows: empty unless this library is at fault. Never an exception: a file
@@ -199,6 +224,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   void forEachCandidateBatch(const CollisionPair* only, BatchFunction, void* function);
 
   struct Implementation;
+  const Implementation& read() const;  ///< throws InvalidCall
   std::unique_ptr<Implementation> m_implementation;
 };
 

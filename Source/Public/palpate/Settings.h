@@ -102,7 +102,8 @@ struct ContactFeatures {
 };
 
 /// Whether two features may be a contact. Called by several threads at once, in any order, only for
-/// features near enough; must answer the same each time in a frame, and must not throw.
+/// features near enough; must answer the same each time in a frame. An exception ends the
+/// frame, which throws it.
 using ContactPredicate = std::function<bool(const ContactFeatures&)>;
 
 }  // namespace palpate

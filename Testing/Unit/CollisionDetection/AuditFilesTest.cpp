@@ -61,6 +61,7 @@ class AuditFiles : public ::testing::Test {
     detection.update();
     corrupt(detection, m_b);
     detection.detectCollision();
+    detection.advance();
   }
   std::size_t fileCount() const {
     return static_cast<std::size_t>(

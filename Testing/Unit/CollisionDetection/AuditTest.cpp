@@ -53,6 +53,7 @@ struct Scene {
     detection.setPositions(GeometryId{1}, b.before.all(), b.now.all());
     detection.addCollisionPair(pair.a, pair.b, settings);
     detection.detectCollision();
+    detection.advance();
   }
 
   MeshPair meshes() const { return {a, self ? a : b, settings}; }
@@ -286,6 +287,7 @@ TEST(Audit, FindsNothingInGoodFrames) {
       for (Eigen::Vector3d& p : meshes[1].positions) p += testing::randomPoint(random, -0.1, 0.1);
       detection.setPositions(GeometryId{1}, meshes[1].positions);
       detection.detectCollision();
+      detection.advance();
       EXPECT_TRUE(detection.auditFailures().empty());
       contacts += detection.statistics().contacts;
     }
@@ -319,6 +321,7 @@ TEST(Audit, SamplesConnectedMeshes) {
       for (Eigen::Vector3d& p : now) p.y() += 0.01;
       detection.setPositions(second, now);
       detection.detectCollision();
+      detection.advance();
       EXPECT_TRUE(detection.auditFailures().empty());
       EXPECT_GT(detection.statistics().contacts, 0u);
     }

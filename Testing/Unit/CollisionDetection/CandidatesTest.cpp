@@ -88,6 +88,7 @@ void compare(const Mesh& a, const Mesh& b, double thickness, const Eigen::Vector
                    oracle.candidatePairs(ids[1][0], ids[1][0]));
     for (Eigen::Vector3d& p : first.positions)
       p += testing::randomPoint(random, -0.01 * scale, 0.02 * scale);
+    for (OctreeBasedCD* engine : engines) engine->advance();
     for (int e = 0; e < 2; ++e) engines[e]->setPositions(ids[e][0], first.positions);
   }
 }

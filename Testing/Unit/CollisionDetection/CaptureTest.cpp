@@ -104,6 +104,7 @@ OctreeBasedCD movedScene() {
       b, a, {.thickness = 0.1, .contacts = Contacts::All, .timeTolerance = 0x1p-9});
   detection.addCollisionPair(a, a);
   detection.detectCollision();
+  detection.advance();
   std::vector<Eigen::Vector3d> now = first.positions;
   for (Eigen::Vector3d& p : now) p += testing::randomPoint(random, -0.1, 0.1);
   detection.setPositions(a, now);

@@ -148,6 +148,7 @@ TEST(EmbeddedVertices, AreAsByBruteForceForAnyThreads) {
       const auto found = detection.findEmbeddedVertices(points, body);
       all.emplace_back(found.begin(), found.end());
       if (frame % 2) detection.detectCollision();
+      detection.advance();
     }
     return all;
   };

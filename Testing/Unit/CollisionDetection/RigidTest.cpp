@@ -78,6 +78,7 @@ class Life {
     m_collisions.addCollisionPair(m_a, m_b, pair);
   }
   void frame(const Place& place, const Place* ofOther, const Positions& other) {
+    if (std::exchange(m_hasFrame, true)) m_collisions.advance();
     move(m_body, place, m_positions);
     if (ofOther)
       move(m_other, *ofOther, other);
@@ -102,6 +103,7 @@ class Life {
   Positions m_positions;
   bool m_byTransform;
   GeometryId m_body, m_other, m_a, m_b;
+  bool m_hasFrame = false;
 };
 
 struct LifeCase {
@@ -264,6 +266,7 @@ TEST(Rigid, TheTreeIsNotTouched) {
   const std::vector<Vector3d> built = boxes();
   for (int frame = 0; frame < 5; ++frame) {
     const Place place = somewhere(random);
+    collisions.advance();
     collisions.setTransform(body, place.rotation, place.translation);
     collisions.detectCollision();
     EXPECT_EQ(collisions.statistics().rebuiltOctrees + collisions.statistics().refittedOctrees, 0u);
@@ -282,69 +285,110 @@ class RigidStep : public ::testing::Test {
   static Positions at(double z) { return {{0, 0, z}, {1, 0, z}, {0, 1, z}}; }
   void moveTo(double z) { m_collisions.setTransform(m_id, Matrix3d::Identity(), {0, 0, z}); }
   void expect(double before, double now) {
-    m_collisions.detectCollision();
     const CollisionProblem problem = m_collisions.problem();
     EXPECT_EQ(problem.geometries[0].before, at(before));
     EXPECT_EQ(problem.geometries[0].now, at(now));
+  }
+  /// The same, and then the step ends.
+  void expectLast(double before, double now) {
+    expect(before, now);
+    m_collisions.advance();
+    expect(now, now);
+  }
+  void moveFrom(double before, double now) {
+    m_collisions.setTransform(m_id, Matrix3d::Identity(), {0, 0, before}, Matrix3d::Identity(),
+                              {0, 0, now});
   }
   OctreeBasedCD m_collisions;
   GeometryId m_id = m_collisions.addTriangleMesh(at(0), std::vector<Triangle>{{0, 1, 2}});
 };
 
-TEST_F(RigidStep, BeginsWhereTheLastFrameEnded) {
+TEST_F(RigidStep, BeginsWhereTheLastStepEnded) {
   moveTo(1);
-  expect(1, 1);  // at first before is now
+  expectLast(1, 1);  // a new geometry is at rest
   moveTo(2);
   expect(1, 2);
-  expect(1, 2);  // nothing new: both stay
+  m_collisions.detectCollision();
+  expectLast(1, 2);
   moveTo(2);
-  expect(2, 2);
+  expectLast(2, 2);
   moveTo(7);
   m_collisions.update();
   moveTo(5);
-  expect(2, 5);  // of several calls the last counts
+  expectLast(2, 5);  // of several calls the last counts
+  expect(5, 5);      // without a call it is at rest
 }
 
-TEST_F(RigidStep, OfAMeshThatWasMovedByPositions) {
-  expect(0, 0);
+TEST_F(RigidStep, FollowsAMeshThatWasMovedByPositions) {
+  expectLast(0, 0);
   m_collisions.setPositions(m_id, at(3));
-  expect(0, 3);
+  expectLast(0, 3);
   moveTo(1);
-  expect(3, 4);
+  expectLast(3, 4);
 }
 
-TEST_F(RigidStep, PositionsAreOfTheBodysFrame) {
+TEST_F(RigidStep, TakesPositionsInTheBodysFrame) {
   moveTo(10);
-  expect(10, 10);
+  expectLast(10, 10);
   m_collisions.setPositions(m_id, at(1));
-  expect(10, 11);
+  expectLast(10, 11);
   m_collisions.setPositions(m_id, at(2));
   moveTo(20);
-  expect(11, 22);
+  expectLast(11, 22);
   moveTo(30);
   m_collisions.setPositions(m_id, at(3));
-  expect(22, 33);
+  expectLast(22, 33);
   m_collisions.setPositions(m_id, at(7), at(8));  // both ends
-  expect(37, 38);
+  expectLast(37, 38);
   moveTo(40);
-  m_collisions.setPositions(m_id, at(4), at(5));  // each placed as its end of the step is
-  expect(34, 45);
+  m_collisions.setPositions(m_id, at(4), at(5));  // each end is placed by its own transform
+  expectLast(34, 45);
   m_collisions.setPositions(m_id, at(0), at(1));
   moveTo(50);
-  expect(40, 51);
+  expectLast(40, 51);
   m_collisions.setPositions(m_id, at(0), at(0));
-  m_collisions.setPositions(m_id, at(2));
-  expect(51, 52);
+  m_collisions.setPositions(m_id, at(2));  // `before` stays as it was given
+  expectLast(50, 52);
 }
 
-TEST_F(RigidStep, NewTrianglesHaveNoBefore) {
+TEST_F(RigidStep, TwoPosesSetBothEnds) {
+  moveFrom(1, 2);  // also of a new geometry
+  expect(1, 2);
+  moveTo(3);
+  expectLast(1, 3);
+  moveFrom(7, 8);
+  expectLast(7, 8);
+  m_collisions.setPositions(m_id, at(10), at(20));
+  moveFrom(1, 2);
+  expectLast(11, 22);
+}
+
+/// Of a new geometry's first step every order of calls gives the same.
+TEST_F(RigidStep, DoesNotDependOnTheOrderOfCalls) {
+  m_collisions.setPositions(m_id, at(5), at(6));
+  moveTo(10);
+  expect(15, 16);
+  const GeometryId other = m_collisions.addTriangleMesh(at(0), std::vector<Triangle>{{0, 1, 2}});
+  m_collisions.setTransform(other, Matrix3d::Identity(), {0, 0, 10});
+  m_collisions.setPositions(other, at(5), at(6));
+  const CollisionProblem problem = m_collisions.problem();
+  EXPECT_EQ(problem.geometries[1].before, problem.geometries[0].before);
+  EXPECT_EQ(problem.geometries[1].now, problem.geometries[0].now);
+}
+
+TEST_F(RigidStep, NewTrianglesAreAtRest) {
   moveTo(1);
-  expect(1, 1);
+  expectLast(1, 1);
   moveTo(2);
   m_collisions.setTriangles(m_id, at(5), std::vector<Triangle>{{0, 1, 2}});
   expect(7, 7);
+  moveTo(4);
+  expectLast(9, 9);
   moveTo(3);
-  expect(7, 8);
+  expectLast(9, 8);
+  m_collisions.setTriangles(m_id, at(5), std::vector<Triangle>{{0, 1, 2}});
+  moveFrom(1, 2);
+  expect(6, 7);  // unless both poses are given
 }
 
 TEST(Rigid, PositionsThatChangeOnTheWay) {
@@ -369,13 +413,15 @@ TEST(Rigid, PositionsThatChangeOnTheWay) {
       if (what != 0) own = moved(random, own, 0.02);
       for (OctreeBasedCD& one : rigid) {
         if (what != 1) one.setTransform(GeometryId{0}, place.rotation, place.translation);
-        if (what == 3) one.setPositions(GeometryId{0}, start = own, own);
+        if (what == 3) one.setPositions(GeometryId{0}, start);  // the last call counts
         if (what != 0) one.setPositions(GeometryId{0}, own);
         one.detectCollision();
+        one.advance();
       }
       for (OctreeBasedCD& one : world) {
         one.setPositions(GeometryId{0}, place(own));
         one.detectCollision();
+        one.advance();
       }
       const Rows expected(world[0].collisionData(GeometryId{1}, GeometryId{0}));
       for (const auto* all : {&rigid, &world})

@@ -140,9 +140,8 @@ CollisionData answer(const Settings& settings, const Moving& body, const Tool& t
   const GeometryId mesh = body.thing.addTo(collisions),
                    shape = collisions.addAnalyticalGeometry(tool.geometry);
   collisions.addCollisionPair(toolFirst ? shape : mesh, toolFirst ? mesh : shape, pair);
-  collisions.setTransform(shape, tool.ends[0].rotation, tool.ends[0].translation);
-  collisions.detectCollision();
-  collisions.setTransform(shape, tool.ends[1].rotation, tool.ends[1].translation);
+  collisions.setTransform(shape, tool.ends[0].rotation, tool.ends[0].translation,
+                          tool.ends[1].rotation, tool.ends[1].translation);
   collisions.setPositions(mesh, body.thing.positions, body.now);
   collisions.detectCollision();
   return collisions.collisionData(toolFirst ? shape : mesh, toolFirst ? mesh : shape);
@@ -501,6 +500,7 @@ TEST(ShapeSteps, CapturesAndAuditsHoldThem) {
     collisions.addCollisionPair(tools.back(), mesh, continuous(0.02));
   }
   collisions.detectCollision();
+  collisions.advance();
   for (const GeometryId tool : tools)
     collisions.setTransform(tool, randomTurn(random), randomPoint(random, -1, 1));
   collisions.setPositions(mesh, body.thing.positions, body.now);

@@ -3,66 +3,185 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <cmath>
+#include <functional>
+#include <utility>
+#include <vector>
+
 namespace palpate {
 namespace {
 
-/// A triangle at height z, and what its step is when a frame has ended.
+/// A triangle at height z, and the two ends of its step.
 class Step : public ::testing::Test {
  protected:
   static std::vector<Eigen::Vector3d> at(double z) { return {{0, 0, z}, {1, 0, z}, {0, 1, z}}; }
   static std::vector<Triangle> triangle() { return {{0, 1, 2}}; }
 
   void expect(double before, double now) {
-    m_detection.detectCollision();
     const CollisionProblem problem = m_detection.problem();
     EXPECT_EQ(problem.geometries[0].before, at(before));
     EXPECT_EQ(problem.geometries[0].now, at(now));
+  }
+  /// The same, and then the step ends.
+  void expectLast(double before, double now) {
+    expect(before, now);
+    m_detection.advance();
+    expect(now, now);
   }
 
   OctreeBasedCD m_detection;
   GeometryId m_id = m_detection.addTriangleMesh(at(0), triangle());
 };
 
-TEST_F(Step, AtFirstBeforeIsNow) {
+TEST_F(Step, OfANewGeometryIsAtRest) {
   m_detection.setPositions(m_id, at(1));
+  expect(1, 1);
+  m_detection.setPositions(m_id, at(2));
+  expectLast(2, 2);
+}
+
+TEST_F(Step, OfANewGeometryMayBeGivenByBothEnds) {
+  m_detection.setPositions(m_id, at(1), at(2));
+  m_detection.setPositions(m_id, at(3));
+  expectLast(1, 3);
+}
+
+TEST_F(Step, BeginsWhereTheLastOneEnded) {
+  expectLast(0, 0);
+  m_detection.setPositions(m_id, at(1));
+  expectLast(0, 1);
+  m_detection.setPositions(m_id, at(2));
+  expectLast(1, 2);
+}
+
+TEST_F(Step, WithoutPositionsIsAtRest) {
+  m_detection.advance();
+  m_detection.setPositions(m_id, at(1));
+  m_detection.advance();
+  m_detection.advance();
   expect(1, 1);
 }
 
-TEST_F(Step, BeginsWhereTheLastFrameEnded) {
-  expect(0, 0);
+/// No detection, update, query or batch of candidates ends a step.
+TEST_F(Step, EndsByAdvanceOnly) {
+  const GeometryId other = m_detection.addTriangleMesh(at(0.5), triangle());
+  m_detection.addCollisionPair(m_id, other, {.method = Method::Continuous});
+  m_detection.advance();
   m_detection.setPositions(m_id, at(1));
-  expect(0, 1);
-  expect(0, 1);  // nothing new: both stay
-  m_detection.setPositions(m_id, at(2));
-  expect(1, 2);
+  const auto candidates = [&] {
+    std::size_t count = 0;
+    m_detection.forEachCandidate(m_id, other, [&](auto batch) { count += batch.size(); });
+    return count;
+  };
+  for (int round = 0; round < 3; ++round) {
+    EXPECT_EQ(candidates(), 1u);
+    m_detection.update();
+    m_detection.collectCandidates();
+    EXPECT_EQ(m_detection.candidatePairs(m_id, other).size(), 1u);
+    m_detection.detectCollision();
+    EXPECT_EQ(m_detection.collisionData(m_id, other).vertexTriangle().size(), 3u);
+    expect(0, 1);
+  }
+  m_detection.advance();
+  EXPECT_EQ(candidates(), 0u);
+  expect(1, 1);
 }
 
-TEST_F(Step, OfSeveralCallsTheLastCounts) {
-  expect(0, 0);
+/// With candidates alone `before` becomes the last `now`, as with every other call.
+TEST_F(Step, AdvancesForCandidatesInBatchesToo) {
+  const GeometryId other = m_detection.addTriangleMesh(at(0.5), triangle());
+  m_detection.addCollisionPair(m_id, other, {.method = Method::Continuous});
+  m_detection.advance();
+  for (const double z : {1.0, 0.0, 1.0}) {
+    m_detection.setPositions(m_id, at(z));
+    std::size_t count = 0;
+    m_detection.forEachCandidate(m_id, other, [&](auto batch) { count += batch.size(); });
+    EXPECT_EQ(count, 1u);
+    m_detection.advance();
+  }
+}
+
+TEST_F(Step, AnswersByTheLastValuesOnly) {
+  m_detection.advance();
   m_detection.setPositions(m_id, at(1));
   m_detection.update();
   m_detection.setPositions(m_id, at(2));
-  expect(0, 2);
+  expectLast(0, 2);
   m_detection.setPositions(m_id, at(7), at(8));
   m_detection.setPositions(m_id, at(3));
-  expect(2, 3);
+  expectLast(7, 3);
   m_detection.setPositions(m_id, at(4));
   m_detection.setPositions(m_id, at(7), at(8));
-  expect(7, 8);
+  expectLast(7, 8);
   m_detection.setPositions(m_id, at(1), at(2));
   m_detection.setPositions(m_id, at(5), at(6));
   m_detection.setPositions(m_id, at(9));
-  expect(8, 9);
+  expectLast(5, 9);
 }
 
-TEST_F(Step, AfterNewTopologyBeforeIsNow) {
-  expect(0, 0);
+TEST_F(Step, OfANewTopologyIsAtRest) {
+  m_detection.advance();
   m_detection.setTriangles(m_id, at(5), triangle());
   expect(5, 5);
+  m_detection.setPositions(m_id, at(6));
+  expectLast(6, 6);
+  m_detection.setPositions(m_id, at(7), at(8));
   m_detection.setTriangles(m_id, at(1), triangle());
+  expect(1, 1);
   m_detection.setPositions(m_id, at(2), at(3));
   m_detection.setPositions(m_id, at(4));
-  expect(4, 4);
+  expectLast(2, 4);
+}
+
+/// A tool passes through z = 0 in one step and is not set again; a sheet is placed at z = 0 in the
+/// next one: nothing touched.
+TEST_F(Step, DoesNotRepeatMotionThatHasEnded) {
+  const GeometryId sheet = m_detection.addTriangleMesh(at(50), triangle());
+  m_detection.addCollisionPair(m_id, sheet, {.method = Method::Continuous});
+  m_detection.setPositions(m_id, at(-1), at(1));
+  m_detection.detectCollision();
+  m_detection.advance();
+  m_detection.setPositions(sheet, at(0), at(0));
+  m_detection.detectCollision();
+  EXPECT_TRUE(m_detection.collisionData(m_id, sheet).vertexTriangle().empty());
+  EXPECT_EQ(m_detection.collisionData(m_id, sheet).earliestTimeOfImpact(), INFINITY);
+  EXPECT_EQ(m_detection.collisionData(m_id, sheet).validity().displacement, 0.0);
+}
+
+/// A loop that never ends its steps sweeps from where it began, and validity() says how far.
+TEST_F(Step, WithoutAdvanceGrowsAndSaysSo) {
+  const GeometryId sheet = m_detection.addTriangleMesh(at(50), triangle());
+  m_detection.addCollisionPair(m_id, sheet, {.method = Method::Proximity, .thickness = 1.5});
+  m_detection.detectCollision();
+  m_detection.advance();
+  for (int frame = 1; frame < 4; ++frame) {
+    m_detection.setPositions(m_id, at(frame));
+    m_detection.detectCollision();
+    const Validity& validity = m_detection.collisionData(m_id, sheet).validity();
+    EXPECT_NEAR(validity.displacement, frame, 1e-9);
+    EXPECT_EQ(validity.displacementOverReach() > 1, frame > 1);
+    EXPECT_EQ(validity.trusted, frame == 1);
+  }
+}
+
+/// A solver with rounds: the step's start stays known, and positions are corrected between rounds.
+TEST_F(Step, KeepsItsStartThroughRounds) {
+  const GeometryId sheet = m_detection.addTriangleMesh(at(1), triangle());
+  m_detection.addCollisionPair(m_id, sheet, {.method = Method::Continuous});
+  m_detection.detectCollision();
+  m_detection.advance();
+  for (int step = 0; step < 20; ++step) {
+    for (const double z : {2.0, 1.5, 0.75, 0.5}) {
+      m_detection.setPositions(m_id, at(z));
+      m_detection.detectCollision();
+      const CollisionData& data = m_detection.collisionData(m_id, sheet);
+      EXPECT_EQ(data.vertexTriangle().empty(), z < 1);
+      EXPECT_EQ(data.validity().startedApart, true) << step << " " << z;
+    }
+    m_detection.setPositions(m_id, at(0));
+    m_detection.advance();
+  }
 }
 
 TEST_F(Step, WithTheSamePositionsLeavesOctreeAndStaticAnswersAlone) {
@@ -71,31 +190,136 @@ TEST_F(Step, WithTheSamePositionsLeavesOctreeAndStaticAnswersAlone) {
   settings.method = Method::Proximity;
   settings.thickness = 0.5;
   m_detection.addCollisionPair(m_id, other, settings);
-  expect(0, 0);
-  const std::uint64_t hash = m_detection.collisionData(m_id, other).hash();
+  const auto hash = [&] {
+    m_detection.detectCollision();
+    const std::uint64_t answer = m_detection.collisionData(m_id, other).hash();
+    m_detection.advance();
+    return answer;
+  };
+  const std::uint64_t first = hash();
   m_detection.setPositions(m_id, at(1));
-  expect(0, 1);
-  EXPECT_NE(m_detection.collisionData(m_id, other).hash(), hash);
+  EXPECT_NE(hash(), first);
   m_detection.setPositions(m_id, at(1));
-  expect(1, 1);
+  hash();
   EXPECT_EQ(m_detection.statistics().unchangedOctrees, 2u);
   m_detection.setPositions(m_id, at(0));
-  expect(1, 0);
-  EXPECT_EQ(m_detection.collisionData(m_id, other).hash(), hash);
+  EXPECT_EQ(hash(), first);
 }
 
 TEST_F(Step, WithTheSamePositionsIsANewOneForContinuous) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.5), triangle());
-  PairSettings settings;
-  settings.method = Method::Continuous;
-  m_detection.addCollisionPair(m_id, other, settings);
-  expect(0, 0);
+  m_detection.addCollisionPair(m_id, other, {.method = Method::Continuous});
+  m_detection.advance();
   m_detection.setPositions(m_id, at(1));
-  expect(0, 1);
+  m_detection.detectCollision();
   EXPECT_FALSE(m_detection.collisionData(m_id, other).vertexTriangle().empty());
+  m_detection.advance();
   m_detection.setPositions(m_id, at(1));
-  expect(1, 1);
+  m_detection.detectCollision();
   EXPECT_TRUE(m_detection.collisionData(m_id, other).vertexTriangle().empty());
+}
+
+/// Statistics are those of the last frame, whatever is asked for since.
+TEST_F(Step, QueriesKeepStatistics) {
+  const GeometryId other = m_detection.addTriangleMesh(at(0.1), triangle());
+  m_detection.addCollisionPair(m_id, other, {.method = Method::Proximity, .thickness = 0.5});
+  m_detection.detectCollision();
+  const FrameStatistics before = m_detection.statistics();
+  EXPECT_GT(before.contacts, 0u);
+  m_detection.setPositions(m_id, at(0.05));
+  m_detection.findInsideVertices(m_id, other, {.rule = InsideRule::WindingNumber});
+  m_detection.forEachCandidate(m_id, other, [](auto) {});
+  EXPECT_EQ(m_detection.statistics().contacts, before.contacts);
+  EXPECT_EQ(m_detection.statistics().candidatePairs, before.candidatePairs);
+  EXPECT_EQ(m_detection.statistics().rebuiltOctrees, before.rebuiltOctrees);
+  m_detection.detectCollision();  // which counts the octree that a query updated
+  EXPECT_EQ(m_detection.statistics().refittedOctrees + m_detection.statistics().rebuiltOctrees, 1u);
+}
+
+ErrorCode codeOf(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.code();
+  }
+  ADD_FAILURE() << "nothing was thrown";
+  return {};
+}
+
+TEST_F(Step, HasNoAnswerBeforeADetection) {
+  const GeometryId other = m_detection.addTriangleMesh(at(0.1), triangle());
+  const auto ask = [&] { m_detection.collisionData(m_id, other); };
+  m_detection.addCollisionPair(m_id, other, {.method = Method::Proximity, .thickness = 0.5});
+  EXPECT_EQ(codeOf(ask), ErrorCode::NotAvailable);
+  m_detection.collectCandidates();
+  EXPECT_EQ(codeOf(ask), ErrorCode::NotAvailable);
+  m_detection.detectCollision();
+  EXPECT_FALSE(m_detection.collisionData(m_id, other).vertexTriangle().empty());
+  m_detection.advance();
+  m_detection.setPositions(m_id, at(9));
+  EXPECT_FALSE(m_detection.collisionData(m_id, other).vertexTriangle().empty());  // the last one
+  m_detection.removeCollisionPair(m_id, other);
+  m_detection.addCollisionPair(m_id, other, {.method = Method::Proximity, .thickness = 0.5});
+  EXPECT_EQ(codeOf(ask), ErrorCode::NotAvailable);
+}
+
+TEST_F(Step, OfAMovedFromObjectDoesNotExist) {
+  OctreeBasedCD other = std::move(m_detection);
+  EXPECT_EQ(codeOf([&] { m_detection.advance(); }), ErrorCode::InvalidCall);
+  EXPECT_EQ(codeOf([&] { m_detection.setPositions(m_id, at(1)); }), ErrorCode::InvalidCall);
+  EXPECT_EQ(codeOf([&] { m_detection.detectCollision(); }), ErrorCode::InvalidCall);
+  EXPECT_EQ(codeOf([&] { m_detection.addTriangleMesh(at(1), triangle()); }),
+            ErrorCode::InvalidCall);
+  EXPECT_EQ(codeOf([&] { m_detection.statistics(); }), ErrorCode::InvalidCall);
+  EXPECT_EQ(codeOf([&] { m_detection.octree(); }), ErrorCode::InvalidCall);
+  EXPECT_EQ(codeOf([&] { m_detection.pairs(); }), ErrorCode::InvalidCall);
+  EXPECT_EQ(codeOf([&] { m_detection.problem(); }), ErrorCode::InvalidCall);
+  m_detection = std::move(other);
+  m_detection.setPositions(m_id, at(1));
+  expectLast(1, 1);
+}
+
+/// A predicate or callback that calls the object gets an error, and the object stays usable.
+TEST_F(Step, CannotBeChangedByCallbacks) {
+  const GeometryId other = m_detection.addTriangleMesh(at(0.1), triangle());
+  m_detection.addCollisionPair(m_id, other, {.method = Method::Proximity, .thickness = 0.5});
+  m_detection.detectCollision();
+  const std::uint64_t hash = m_detection.collisionData(m_id, other).hash();
+  const std::vector<std::function<void()>> calls{
+      [&] { m_detection.removeGeometry(other); },
+      [&] { m_detection.removeCollisionPair(m_id, other); },
+      [&] { m_detection.setContactPredicate(m_id, other, {}); },
+      [&] { m_detection.setPositions(m_id, at(3)); },
+      [&] { m_detection.advance(); },
+      [&] { m_detection.detectCollision(); },
+      [&] { m_detection.forEachCandidate(m_id, other, [](auto) {}); },
+      [&] { m_detection.collisionData(m_id, other); }};
+  for (const auto& call : calls) {
+    std::atomic<int> refused = 0;
+    m_detection.forEachCandidate(m_id, other,
+                                 [&](auto) { refused += codeOf(call) == ErrorCode::InvalidCall; });
+    EXPECT_GT(refused, 0);
+    refused = 0;
+    m_detection.setContactPredicate(m_id, other, [&](const ContactFeatures&) {
+      refused += codeOf(call) == ErrorCode::InvalidCall;
+      return true;
+    });
+    m_detection.detectCollision();
+    EXPECT_GT(refused, 0);
+    EXPECT_EQ(m_detection.collisionData(m_id, other).hash(), hash);
+    // The error may also leave the predicate: then it ends the frame.
+    m_detection.setContactPredicate(m_id, other, [&](const ContactFeatures&) {
+      call();
+      return true;
+    });
+    EXPECT_EQ(codeOf([&] { m_detection.detectCollision(); }), ErrorCode::InvalidCall);
+    EXPECT_EQ(codeOf([&] { m_detection.collisionData(m_id, other); }), ErrorCode::NotAvailable);
+    EXPECT_EQ(codeOf([&] { m_detection.forEachCandidate(m_id, other, [&](auto) { call(); }); }),
+              ErrorCode::InvalidCall);
+    m_detection.setContactPredicate(m_id, other, {});
+    m_detection.detectCollision();
+    EXPECT_EQ(m_detection.collisionData(m_id, other).hash(), hash);
+  }
 }
 
 }  // namespace

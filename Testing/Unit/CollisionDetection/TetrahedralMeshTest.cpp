@@ -155,6 +155,7 @@ std::vector<Rows> life(const Settings& settings, const Solid& solid, const Solid
   std::vector<Rows> rows;
   const auto frame = [&] {
     detection.detectCollision();
+    detection.advance();
     EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
     EXPECT_TRUE(detection.auditFailures().empty());
     rows.emplace_back(detection.collisionData(body, second));
@@ -212,6 +213,7 @@ TEST(TetrahedralMesh, MeetsShapesAndItself) {
     detection.addCollisionPair(body, other, pair);
     detection.setPositions(body, folded);
     detection.detectCollision();
+    detection.advance();
     return detection.collisionData(body, other);
   };
   int touching = 0;

@@ -220,6 +220,7 @@ TEST(Earliest, OfAShapeBesideOtherPairs) {
   detection.addCollisionPair(first, first, earliest);
   detection.setTransform(tool, Eigen::Matrix3d::Identity(), {0, 0, 0});
   detection.detectCollision();
+  detection.advance();
   detection.setTransform(tool, Eigen::Matrix3d::Identity(), {0.2, 0, 0});
   detection.setPositions(tissue, a.positions, now);
   Positions moved = b.positions;
@@ -248,6 +249,7 @@ TEST(Earliest, AThrowLeavesTheOctreesWhole) {
   });
   const auto frame = [&] {
     detection.setPositions(id, a.positions, now);
+    detection.setPairSettings(id, id, detection.pairs().front().settings);  // not answered yet
     calls = 0;
     detection.detectCollision();
     return detection.collisionData(id, id).earliestTimeOfImpact();

@@ -1,0 +1,126 @@
+#include "CollisionDetection/GeometryStep.h"
+
+#include <palpate/Error.h>
+
+#include "CollisionDetection/GeometryChecks.h"
+#include "Core/Assert.h"
+#include "Math/Tolerances.h"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+#include <utility>
+
+namespace palpate {
+
+void GeometryStep::start(TriangleMesh& mesh, Positions::Body body) noexcept {
+  m_isNew = true;
+  m_bodyGiven = false;
+  mesh.now.setBody(std::move(body), m_revisions.next());
+  mesh.before.setBodyOf(mesh.now);
+  if (!m_transformGiven) mesh.before.placeAs(mesh.now);
+  m_detected = mesh.before;
+}
+
+void GeometryStep::startShape(TriangleMesh& mesh, const AnalyticalGeometry& analytical) {
+  mesh.analytical = analytical;
+  mesh.shape.emplace(analytical, mesh.now.transform());
+  mesh.shapeBefore = m_spare = m_spareBefore = mesh.shape;
+}
+
+Positions::Body GeometryStep::checkedBody(std::span<const Eigen::Vector3d> positions, bool isPlaced,
+                                          const char* which, const Threads& threads,
+                                          const Eigen::Vector3d* from, MotionRange* moved) {
+  const auto free = std::find_if(m_bodies.begin(), m_bodies.end(),
+                                 [](const auto& body) { return body.use_count() <= 1; });
+  PALPATE_ASSERT(free != m_bodies.end());
+  if (!*free) *free = std::make_shared<std::vector<Eigen::Vector3d>>();
+  (*free)->resize(positions.size());
+  checkPositions(m_id, positions, (*free)->data(), which, threads, from, moved);
+  if (isPlaced) checkPlaceable(m_id, positions, ErrorCode::NonFinitePosition);
+  return *free;
+}
+
+void GeometryStep::setBody(TriangleMesh& mesh, Positions& end, Positions::Body body) noexcept {
+  // The ends often share one body, which is compared once.
+  const Positions* last = nullptr;
+  for (const Positions* other : {&std::as_const(end), &std::as_const(mesh.now),
+                                 &std::as_const(m_detected), &std::as_const(mesh.before)}) {
+    if (last && other->hasSameBody(*last)) continue;
+    last = other;
+    if (other->size() == body->size() &&
+        (body->empty() || std::memcmp(other->body().data(), body->data(),
+                                      body->size() * sizeof(Eigen::Vector3d)) == 0))
+      return end.setBodyOf(*other);
+  }
+  end.setBody(std::move(body), m_revisions.next());
+}
+
+void GeometryStep::setPositions(TriangleMesh& mesh,
+                                std::optional<std::span<const Eigen::Vector3d>> before,
+                                std::span<const Eigen::Vector3d> now, const Threads& threads,
+                                std::optional<MotionRange>* moved) {
+  const bool isPlaced = mesh.now.isPlaced() || mesh.before.isPlaced();
+  const auto start = before ? checkedBody(*before, isPlaced, " before", threads) : nullptr;
+  const bool followsNow = m_isNew && !m_bodyGiven && !before;
+  const bool measures = moved && !isPlaced && !followsNow && !now.empty();
+  const Eigen::Vector3d* const from =
+      !measures ? nullptr : (start ? *start : mesh.before.body()).data();
+  MotionRange motion;
+  auto end = checkedBody(now, isPlaced, before ? " now" : "", threads, from, &motion);
+  // Nothing below throws.
+  if (start) {
+    m_bodyGiven = true;
+    setBody(mesh, mesh.before, start);
+  }
+  setBody(mesh, mesh.now, std::move(end));
+  if (followsNow) mesh.before.setBodyOf(mesh.now);
+  if (measures) *moved = motion;
+}
+
+void GeometryStep::place(TriangleMesh& mesh, Positions& end,
+                         const RigidTransform& transform) noexcept {
+  for (const Positions* other : {&std::as_const(end), &std::as_const(mesh.now),
+                                 &std::as_const(m_detected), &std::as_const(mesh.before)})
+    if (other->isPlaced() && other->transform() == transform) return end.placeAs(*other);
+  end.place(transform, m_revisions.next());
+}
+
+void GeometryStep::setTransform(TriangleMesh& mesh, const std::optional<RigidTransform>& before,
+                                const RigidTransform& now) {
+  const auto check = [&](const RigidTransform& transform, const char* which) {
+    if (const std::string fault = faultOf(transform); !fault.empty())
+      throw Error(ErrorCode::InvalidTransform, nameOf(m_id) + ": " + which + fault, m_id);
+    if (!(transform.translation.cwiseAbs().maxCoeff() <= kLargestPlaced))
+      throw Error(ErrorCode::InvalidTransform,
+                  nameOf(m_id) + ": " + which + "the translation is beyond 2^1000", m_id);
+  };
+  if (before) check(*before, "before: ");
+  check(now, before ? "now: " : "");
+  if (!mesh.now.isPlaced()) checkPlaceable(m_id, mesh.now.body(), ErrorCode::InvalidTransform);
+  const bool followsNow = m_isNew && !m_transformGiven && !before;
+  if (mesh.shape) {
+    m_spare->place(*mesh.analytical, now);
+    if (before) m_spareBefore->place(*mesh.analytical, *before);
+    if (followsNow) m_spareBefore->place(*mesh.analytical, now);
+  }
+  // Nothing below throws.
+  if (before) {
+    m_transformGiven = true;
+    place(mesh, mesh.before, *before);
+  }
+  place(mesh, mesh.now, now);
+  if (followsNow) mesh.before.placeAs(mesh.now);
+  if (!mesh.shape) return;
+  std::swap(mesh.shape, m_spare);
+  if (before || followsNow) std::swap(mesh.shapeBefore, m_spareBefore);
+}
+
+void GeometryStep::advance(TriangleMesh& mesh) noexcept {
+  // The shapes are of one body: assigning one to another keeps the memory.
+  if (mesh.shape && !mesh.before.isSameAs(mesh.now)) mesh.shapeBefore = mesh.shape;
+  mesh.before = mesh.now;
+  m_isNew = m_bodyGiven = m_transformGiven = false;
+}
+
+}  // namespace palpate

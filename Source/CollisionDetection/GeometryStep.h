@@ -1,0 +1,73 @@
+#pragma once
+
+#include <palpate/Types.h>
+
+#include "Core/Threads.h"
+#include "Geometry/Motion.h"
+#include "Geometry/Positions.h"
+#include "Geometry/Revision.h"
+#include "Geometry/TriangleMesh.h"
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace palpate {
+
+/// The two ends of one geometry's step: the only writer of TriangleMesh::before, now, shapeBefore
+/// and shape.
+///
+/// The end `now` is what was set last. The end `before` is `now` of the last advance(), unless it
+/// was given. While the geometry is new (it was added or its topology was set in this step) the end
+/// `before` follows `now` instead. Body positions and transform follow this rule separately, so the
+/// order of the calls within a step does not matter.
+///
+/// Positions and transforms that equal those of another end take its revision: what was computed
+/// for them stays valid.
+///
+/// Errors   a call that throws changes nothing.
+class GeometryStep {
+ public:
+  explicit GeometryStep(GeometryId id) : m_id(id) {}
+
+  /// Positions of a new geometry or topology, at both ends.
+  void start(TriangleMesh&, Positions::Body) noexcept;
+  /// The shape in the world, of a new analytical geometry.
+  void startShape(TriangleMesh&, const AnalyticalGeometry&);
+  /// moved: if not null, receives the motion of the step where both ends are unplaced.
+  void setPositions(TriangleMesh&, std::optional<std::span<const Eigen::Vector3d>> before,
+                    std::span<const Eigen::Vector3d> now, const Threads&,
+                    std::optional<MotionRange>* moved);
+  void setTransform(TriangleMesh&, const std::optional<RigidTransform>& before,
+                    const RigidTransform& now);
+  /// The end `now` becomes `before`.
+  void advance(TriangleMesh&) noexcept;
+
+  /// A detection has seen the end `now`.
+  void noteDetection(const TriangleMesh& mesh) noexcept { m_detected = mesh.now; }
+  /// The end `now` of the last detection; a solver may have corrected it since.
+  const Positions& detected() const { return m_detected; }
+  bool isNew() const { return m_isNew; }
+
+ private:
+  Positions::Body checkedBody(std::span<const Eigen::Vector3d>, bool isPlaced, const char* which,
+                              const Threads&, const Eigen::Vector3d* from = nullptr,
+                              MotionRange* moved = nullptr);
+  void setBody(TriangleMesh&, Positions& end, Positions::Body) noexcept;
+  void place(TriangleMesh&, Positions& end, const RigidTransform&) noexcept;
+
+  GeometryId m_id;
+  Positions m_detected;
+  bool m_isNew = true;
+  bool m_bodyGiven = false, m_transformGiven = false;  ///< of `before`, in this step
+  RevisionCounter m_revisions;
+  /// Positions are checked while they are copied into one of these that no end uses: three ends
+  /// and two incoming arrays.
+  std::array<std::shared_ptr<std::vector<Eigen::Vector3d>>, 5> m_bodies;
+  std::optional<Shape> m_spare, m_spareBefore;
+};
+
+}  // namespace palpate
