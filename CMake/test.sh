@@ -1,43 +1,76 @@
 #!/bin/bash
-# From nothing to tested: packages, every configuration that CI builds, their tests. The release
-# configuration's tests run last, so that ctest's summary of them is the last thing printed. Fails if
-# any configuration did.
+# From nothing to tested: packages, every configuration that CI builds, their tests. Every configuration runs, also
+# after another one failed. The script fails if any stage failed or did not run. The release tests run last, so that
+# ctest's summary of them is the last thing printed.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-# No further configuration is started after this many seconds, so that a clean run fits 25 minutes
-# on two cores.
-readonly kLatestStart=840
+jobs=$(nproc)
+report=()
 failed=0
 
-# stage NAME COMMAND...: runs it and prints how long it took.
+# CPU time of all finished child processes, in hundredths of a second.
+cpuTime() {
+  local fields
+  read -ra fields </proc/$$/stat
+  echo $(((fields[15] + fields[16]) * 100 / $(getconf CLK_TCK)))
+}
+# record NAME RESULT SECONDS CPU: adds a line to the table of stages.
+record() { report+=("$(printf '%-22s %-7s %7s %9s' "$@")"); }
+# stage NAME COMMAND...: runs the command, prints how long it took and records the result.
 stage() {
-  local name=$1 start=$SECONDS result=done
+  local name=$1 start=$SECONDS cpu result=done
+  cpu=$(cpuTime)
   shift
   echo "--- $name"
   "$@" || { result=FAILED; failed=1; }
-  echo "--- $name: $result after $((SECONDS - start)) s"
+  cpu=$((($(cpuTime) - cpu) / 100))
+  echo "--- $name: $result after $((SECONDS - start)) s, $cpu s of CPU time"
+  record "$name" "$result" $((SECONDS - start)) $cpu
   [[ $result == done ]]
 }
-build() { stage "$1: build" cmake --build --preset "$1" --parallel "$(nproc)"; }
-
-# configuration PRESET [-DOPTION...]: configured, built and tested.
-configuration() {
-  local preset=$1
-  if ((SECONDS > kLatestStart)); then
-    echo "--- $preset: skipped, $SECONDS s have passed"
-    return
-  fi
-  stage "$preset: configure" cmake --preset "$@" && build "$preset" &&
-    stage "$preset: test" ctest --preset "$preset"
+notRun() {
+  echo "--- $1: NOT RUN"
+  record "$1" "NOT RUN" - -
+  failed=1
 }
 
-stage packages CMake/packages.sh build test || exit 1
-stage "release: configure" cmake --preset release && build release || exit 1
-# The core as a static library, without SIMD, VTK and FCL.
+# build PRESET [-DOPTION...]: configures and builds. A build goes on after an error, so that all errors are shown.
+build() {
+  local preset=$1
+  if stage "$preset: configure" cmake --preset "$@"; then
+    stage "$preset: build" cmake --build --preset "$preset" --parallel "$jobs" -- -k 0
+    return 0
+  fi
+  notRun "$preset: build"
+  return 1
+}
+# configuration PRESET [-DOPTION...]: configures, builds and tests. What a failed build left is tested, too.
+configuration() {
+  local preset=$1 start=()
+  [[ $preset == *san* ]] && start=("${fixedAddresses[@]}")
+  if build "$@"; then
+    stage "$preset: test" "${start[@]}" ctest --preset "$preset" --parallel "$jobs"
+  else
+    notRun "$preset: test"
+  fi
+}
+
+# Sanitizers need memory at certain addresses, which some kernels' address space randomization takes away. Some
+# containers do not allow to switch it off; they run without.
+fixedAddresses=()
+setarch --addr-no-randomize true 2>/dev/null && fixedAddresses=(setarch --addr-no-randomize)
+
+stage packages CMake/packages.sh build test
+build release
+# The core as a static library, without SIMD, VTK and FCL, with oneTBB's threads.
 configuration scalar -DBUILD_SHARED_LIBS=OFF
 configuration asan-ubsan
-((failed)) && echo "--- a configuration FAILED, see above"
+configuration tsan
+
+printf '%-22s %-7s %7s %9s\n' stage result seconds "CPU time"
+printf '%s\n' "${report[@]}"
+((failed)) && echo "--- a stage before the release tests FAILED or did not run, see above"
 echo "--- release: test, after $SECONDS s"
-ctest --preset release || failed=1
+ctest --preset release --parallel "$jobs" || failed=1
 exit $failed

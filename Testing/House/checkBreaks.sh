@@ -62,7 +62,17 @@ plant Quiet Source/Math/A.cpp 'void f() { std::exit(1); }\n'
 plant Words Source/Core/A.h 'class PoolManager;\n'
 plant Words Source/Core/A.h 'int data2;\n'
 plant Words Source/Core/IndexUtils.h '\n'
-plant Words Source/Core/A.h "$(yes x | head -16280)"
+plant Threads Source/Math/A.h '#include "Core/Threads.h"\n' NarrowPhase Math
+plant Threads Source/Math/A.cpp '#include <thread>\n' Math
+
+mkdir -p "$tree/Testing/Unit/Math"
+plant Threads Testing/Unit/Math/ATest.cpp '#include <thread>\n' Math
+commands=$tree/compile_commands.json
+printf '"file": "/p/Testing/Unit/Math/ATest.cpp"\n' >"$commands"
+printf '\n' >"$tree/Testing/Unit/Math/ATest.cpp"
+plant Tests Testing/Unit/Math/BTest.cpp '\n' "$commands" Unit
+plant Tests Testing/Unit/BTest.cpp '\n' "$commands" Unit -Unit/Math
+rm -r "$tree/Testing/Unit" "$commands"
 
 mkdir -p "$tree/Testing/Consumer/Project"
 printf '```cpp\na();\n  b();\n```\n' >"$tree/README.md"
