@@ -42,7 +42,7 @@ void checkCandidates(const PairRecord& record) {
 
 struct OctreeBasedCD::Implementation {
   explicit Implementation(const Settings& newSettings)
-      : settings(checked(newSettings)), threads(newSettings.threads) {
+      : settings(checked(newSettings)), threads(newSettings.threads, newSettings.executor) {
     showOctree();
   }
 
@@ -480,6 +480,7 @@ CollisionProblem OctreeBasedCD::problem() const {
 
 CollisionData detectCollision(const TriangleMeshView& a, const TriangleMeshView& b,
                               const PairSettings& settings) {
+  const StandardFloatingPoint standard;
   if (settings.method == Method::Continuous)
     throw Error(ErrorCode::UnsupportedMethod,
                 "Method::Continuous needs a step: use OctreeBasedCD and two sets of positions");
