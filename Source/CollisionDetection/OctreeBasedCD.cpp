@@ -250,6 +250,7 @@ OctreeBasedCD::~OctreeBasedCD() = default;
 
 GeometryId OctreeBasedCD::addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                                           std::span<const Triangle> triangles) {
+  const StandardFloatingPoint standard;
   return m_implementation->geometries.add(positions, triangles);
 }
 
@@ -261,22 +262,26 @@ GeometryId OctreeBasedCD::addTetrahedralMesh(std::span<const Eigen::Vector3d> po
 
 GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
                                       std::span<const Segment> segments, double radius) {
+  const StandardFloatingPoint standard;
   return m_implementation->geometries.addLines(positions, segments, {&radius, 1});
 }
 
 GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
                                       std::span<const Segment> segments,
                                       std::span<const double> radii) {
+  const StandardFloatingPoint standard;
   checkOnePerVertex(positions, radii);
   return m_implementation->geometries.addLines(positions, segments, radii);
 }
 
 GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions, double radius) {
+  const StandardFloatingPoint standard;
   return m_implementation->geometries.addPoints(positions, {&radius, 1});
 }
 
 GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions,
                                       std::span<const double> radii) {
+  const StandardFloatingPoint standard;
   checkOnePerVertex(positions, radii);
   return m_implementation->geometries.addPoints(positions, radii);
 }
@@ -303,16 +308,19 @@ void OctreeBasedCD::removeGeometry(GeometryId geometry) {
 }
 
 void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vector3d> now) {
+  const StandardFloatingPoint standard;
   m_implementation->geometries.setPositions(geometry, {}, now, m_implementation->threads);
 }
 
 void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vector3d> before,
                                  std::span<const Eigen::Vector3d> now) {
+  const StandardFloatingPoint standard;
   m_implementation->geometries.setPositions(geometry, before, now, m_implementation->threads);
 }
 
 void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles) {
+  const StandardFloatingPoint standard;
   m_implementation->geometries.setTriangles(geometry, positions, triangles);
 }
 
