@@ -1,6 +1,7 @@
 #include <palpate/Capture.h>
 
 #include "CollisionDetection/Audit.h"
+#include "Core/FloatingPoint.h"
 #include "Geometry/Shape.h"
 
 #include <algorithm>
@@ -321,6 +322,7 @@ std::string contentOf(const std::filesystem::path& path) {
 }  // namespace
 
 void writeCapture(const CollisionProblem& problem, const std::filesystem::path& path) {
+  const StandardFloatingPoint standard;
   std::filesystem::path partial = path;
   partial += ".part";
   std::ofstream file(partial, std::ios::binary);
@@ -339,10 +341,12 @@ void capture(const OctreeBasedCD& detection, const std::filesystem::path& path) 
 
 void capture(const OctreeBasedCD& detection, const AuditFailure& failure,
              const std::filesystem::path& path) {
+  const StandardFloatingPoint standard;
   writeCapture(pairAlone(detection.problem(), failure.a, failure.b), path);
 }
 
 CollisionProblem readCapture(const std::filesystem::path& path) {
+  const StandardFloatingPoint standard;
   Reader file(path, contentOf(path));
   if (!file.rest().starts_with(kTitle)) file.refuseWhole("it is not a capture");
   file.expect(kTitle);
@@ -365,6 +369,7 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
 }
 
 OctreeBasedCD setUp(const CollisionProblem& problem) {
+  const StandardFloatingPoint standard;
   OctreeBasedCD detection(problem.settings);
   for (const CollisionProblem::Mesh& mesh : problem.geometries) {
     const GeometryId id = add(detection, mesh);

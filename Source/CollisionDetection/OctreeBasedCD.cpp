@@ -46,7 +46,7 @@ struct OctreeBasedCD::Implementation {
   class Change;
 
   explicit Implementation(const Settings& newSettings)
-      : settings(checked(newSettings)), threads(newSettings.threads) {
+      : settings(checked(newSettings)), threads(newSettings.threads, newSettings.executor) {
     showOctree();
   }
 

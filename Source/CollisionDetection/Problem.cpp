@@ -30,6 +30,7 @@ CollisionProblem::Mesh meshOf(const Geometry& geometry) {
 CollisionProblem problemOf(const Settings& settings, const GeometryTable& geometries,
                            const PairTable& pairs) {
   CollisionProblem problem{settings, {}, {}};
+  problem.settings.executor = nullptr;
   std::unordered_map<const Geometry*, std::uint32_t> indices;
   for (const auto& geometry : geometries.all()) {
     indices.emplace(geometry.get(), static_cast<std::uint32_t>(indices.size()));

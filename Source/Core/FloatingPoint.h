@@ -1,38 +1,80 @@
 #pragma once
 
 #include <cfenv>
+#include <cstdint>
 
 namespace palpate {
 
-/// While it lives, this thread rounds to nearest and keeps denormals: error bounds and exact
-/// decisions count on it. What a caller had set otherwise comes back.
-/// Cost     a few nanoseconds; 0.25 µs where the caller had set otherwise.
+/// Puts this thread into the default floating-point environment for as long as the object lives:
+/// rounding to nearest, denormals kept, no traps. Error bounds and exact decisions rely on it.
+///
+/// Afterwards the caller's environment is as it was, including its exception flags. Exceptions that
+/// the library's own arithmetic raises are neither reported nor trapped, because setting flags by
+/// fesetenv() traps nothing.
+///
+/// x86-64   the library computes with SSE only, so that MXCSR alone decides. The x87 control word
+/// is
+///          not looked at: its rounding, precision and traps change no result here. Where MXCSR
+///          differs, feenableexcept() may have enabled x87 traps too, and both are set.
+/// aarch64  FPCR decides; FPSR has the flags.
+/// Others   the environment is always set.
+/// Cost     3 nanoseconds; 0.5 microseconds where the caller's environment is not the default. Nested
+///          objects cost as much as one in the default environment.
 class StandardFloatingPoint {
  public:
-  StandardFloatingPoint() : m_changed(!isStandard()) {
-    if (!m_changed) return;
-    std::fegetenv(&m_callers);
-    std::fesetenv(FE_DFL_ENV);
+  StandardFloatingPoint() : m_control(readControl()), m_changed(!isStandard(m_control)) {
+    if (m_changed) {
+      std::fegetenv(&m_callers);
+      std::fesetenv(FE_DFL_ENV);
+    }
+    keepOrder();
   }
   ~StandardFloatingPoint() {
-    if (m_changed) std::fesetenv(&m_callers);
+    keepOrder();
+    if (m_changed)
+      std::fesetenv(&m_callers);
+    else
+      restoreFlags(m_control);
   }
   StandardFloatingPoint(const StandardFloatingPoint&) = delete;
   StandardFloatingPoint& operator=(const StandardFloatingPoint&) = delete;
 
  private:
-  static bool isStandard() {
-#if defined(__x86_64__)
-    constexpr unsigned kRounding = 0x6000, kFlushToZero = 0x8000, kDenormalsAreZero = 0x0040;
-    return (__builtin_ia32_stmxcsr() & (kRounding | kFlushToZero | kDenormalsAreZero)) == 0;
-#else
-    // Volatile, so that it is computed here and not by the compiler.
-    const volatile double one = 1.0, least = 0x1p-1022, denormal = 0x1p-1074;
-    return one + 0x1p-54 == 1.0 && one + 0x1.8p-53 > 1.0 && least * 0.5 > 0.0 &&
-           denormal * 0x1p100 > 0.0;
-#endif
-  }
+  /// Compilers do not know that arithmetic depends on the environment. What is loaded from or
+  /// stored to memory is not moved across this.
+  static void keepOrder() { asm volatile("" ::: "memory"); }
 
+#if defined(__x86_64__)
+  static constexpr std::uint64_t kFlags = 0x3f, kDefault = 0x1f80;  // all exceptions masked
+  static std::uint64_t readControl() { return __builtin_ia32_stmxcsr(); }
+  static bool isStandard(std::uint64_t control) { return (control & ~kFlags) == kDefault; }
+  static void restoreFlags(std::uint64_t control) {
+    if (readControl() != control) __builtin_ia32_ldmxcsr(static_cast<unsigned>(control));
+  }
+#elif defined(__aarch64__)
+  static std::uint64_t readStatus() {
+    std::uint64_t status;
+    asm volatile("mrs %0, fpsr" : "=r"(status));
+    return status;
+  }
+  /// FPCR above, FPSR below: each has 32 bits.
+  static std::uint64_t readControl() {
+    std::uint64_t control;
+    asm volatile("mrs %0, fpcr" : "=r"(control));
+    return control << 32 | readStatus();
+  }
+  static bool isStandard(std::uint64_t control) { return control >> 32 == 0; }
+  static void restoreFlags(std::uint64_t control) {
+    const std::uint64_t status = control & 0xffffffff;
+    if (readStatus() != status) asm volatile("msr fpsr, %0" : : "r"(status));
+  }
+#else
+  static std::uint64_t readControl() { return 0; }
+  static bool isStandard(std::uint64_t) { return false; }
+  static void restoreFlags(std::uint64_t) {}
+#endif
+
+  std::uint64_t m_control;
   bool m_changed;
   std::fenv_t m_callers;
 };

@@ -1,25 +1,36 @@
 #include "Core/Threads.h"
 
+#include <palpate/Error.h>
+
+#include "Core/FloatingPoint.h"
 #include "Core/Spin.h"
 
 #include <algorithm>
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <exception>
+#include <limits>
+#include <mutex>
+#include <new>
+#include <pthread.h>
+#include <string>
+#include <system_error>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #ifdef PALPATE_THREADS_TBB
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
-#else
-#include <atomic>
-#include <cstdint>
-#include <exception>
-#include <mutex>
-#include <vector>
 #endif
 
 namespace palpate {
 
 namespace {
+
+constexpr int kMostThreads = 1024;
 
 int resolved(int count) {
   if (count > 0) return count;
@@ -27,161 +38,442 @@ int resolved(int count) {
   return cores == 0 ? 1 : static_cast<int>(cores);
 }
 
-}  // namespace
+/// How many forks lie between this process and the first one that made a pool. A pool compares it
+/// with what it was when its threads started: they are not in the child of a fork(). getpid() would
+/// tell as much for 0.2 microseconds in each loop.
+std::atomic<unsigned> forks{0};
+
+unsigned watchForks() {
+  static const bool watching = [] {
+    const auto count = +[] { forks.fetch_add(1, std::memory_order_relaxed); };
+    if (pthread_atfork(nullptr, nullptr, count) != 0) throw std::bad_alloc();
+    return true;
+  }();
+  static_cast<void>(watching);
+  return forks;
+}
 
 #ifdef PALPATE_THREADS_TBB
 
 /// At most as many workers as the process may have: oneTBB has no more, and prints a warning when
 /// asked.
-struct Threads::Pool {
-  explicit Pool(int count) : arena(std::min(count, allowed())) {}
+class Workers {
+ public:
+  explicit Workers(int count) : m_count(count), m_arena(std::min(count, allowed())) {}
+  int count() const { return m_count; }
+
+  void run(std::size_t size, Executor::Task task, void* context, unsigned) {
+    m_arena.execute([&] {
+      tbb::parallel_for(
+          std::size_t{0}, size, [&](std::size_t i) { task(context, i); },
+          tbb::simple_partitioner());
+    });
+  }
+
+ private:
   static int allowed() {
     return static_cast<int>(
         tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   }
-  tbb::task_arena arena;
+  int m_count;
+  tbb::task_arena m_arena;
 };
-
-void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* function) const {
-  m_pool->arena.execute([&] {
-    tbb::parallel_for(
-        std::size_t{0}, size, [&](std::size_t i) { call(function, i); }, tbb::simple_partitioner());
-  });
-}
 
 #else
 
-namespace {
-
-void waitOrYield(Spin& spin) {
-  if (spin.isOver())
-    std::this_thread::yield();
-  else
-    spin.wait();
-}
-
-/// Held for a few instructions at a time.
-struct BriefLock {
+/// Held for a few instructions at a time. Blocks in the end: its holder may need this core.
+class BriefLock {
+ public:
   void lock() {
-    for (Spin spin; flag.test_and_set(std::memory_order_acquire);) waitOrYield(spin);
+    for (Spin spin; !mutex.try_lock(); spin.wait())
+      if (spin.isOver()) {
+        mutex.lock();
+        return;
+      }
   }
-  void unlock() { flag.clear(std::memory_order_release); }
-  std::atomic_flag flag;
-};
+  void unlock() { mutex.unlock(); }
 
-}  // namespace
+  std::mutex mutex;
+};
 
 /// A plain pool. Indices of a loop are taken one by one, from the first on by the thread that runs
 /// it, from the last on by whoever joins, so that from loop to loop a thread meets the same data:
 /// workers join, and threads that wait for the last indices of a loop of their own. So loops within
 /// loops are shared too.
-struct Threads::Pool {
-  explicit Pool(int count) {
-    loops.reserve(4 * static_cast<std::size_t>(count));
-    for (int i = 1; i < count; ++i) workers.emplace_back([this] { work(); });
+class Workers {
+ public:
+  /// Starts as many threads as the system permits.
+  explicit Workers(int count) {
+    m_threads.reserve(static_cast<std::size_t>(count - 1));
+    try {
+      for (int i = 1; i < count; ++i) m_threads.emplace_back([this] { work(); });
+    } catch (const std::system_error&) {
+    } catch (const std::bad_alloc&) {
+    }
   }
-  ~Pool() {
-    over = true;
-    ++posted;
-    posted.notify_all();
-    for (std::thread& worker : workers) worker.join();
+  ~Workers() {
+    m_over = true;
+    ++m_posted;
+    m_posted.notify_all();
+    for (std::thread& thread : m_threads) thread.join();
   }
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
 
-  struct Loop {
-    std::size_t size;
-    void (*call)(void*, std::size_t);
-    void* function;
-    std::uint64_t number = 0;
-    std::size_t first = 0;                       ///< taken by the thread that runs it
-    std::atomic<std::size_t> last{0}, taken{0};  ///< by those who joined; by all
-    std::atomic<int> joined{0};
-    std::exception_ptr failure{};
-  };
+  int count() const { return static_cast<int>(m_threads.size()) + 1; }
 
-  void run(std::size_t size, void (*call)(void*, std::size_t), void* function) {
-    Loop loop{size, call, function};
+  void run(std::size_t size, Executor::Task task, void* context, unsigned forksBefore) {
+    Loop loop{size, task, context};
     post(loop);
     while (takeOne(loop, false)) {
     }
-    {
-      const std::lock_guard guard(lock);
-      std::erase(loops, &loop);
+    if (forks.load(std::memory_order_relaxed) != forksBefore) {
+      // A task called fork(), and this is the child. The lock may be held by a thread that is not
+      // here, and so may indices.
+      if (loop.joined > 0)
+        throw Error(ErrorCode::NotAvailable,
+                    "fork() was called while threads were at work; the child cannot end the work");
+      return;
     }
-    // Others are at its last indices; what they wait for is in newer loops.
-    for (Spin spin; loop.joined.load(std::memory_order_acquire) > 0; waitOrYield(spin))
-      if (Loop* newer = join(loop.number)) {
-        takeOne(*newer, true);
-        leave(*newer);
-        spin = {};
-      }
-    if (loop.failure) std::rethrow_exception(loop.failure);
+    {
+      const std::lock_guard guard(m_lock);
+      (loop.newer ? loop.newer->older : m_newest) = loop.older;
+      if (loop.older) loop.older->newer = loop.newer;
+    }
+    waitForOthers(loop);
   }
+
+ private:
+  /// On the stack of the thread that runs it.
+  struct Loop {
+    std::size_t size;
+    Executor::Task task;
+    void* context;
+    std::uint64_t number = 0;
+    Loop *older = nullptr, *newer = nullptr;     ///< in the list; under the lock
+    std::size_t first = 0;                       ///< taken by the thread that runs it
+    std::atomic<std::size_t> last{0}, taken{0};  ///< by those who joined; by all
+    std::atomic<int> joined{0};
+  };
 
   void post(Loop& loop) {
     {
-      const std::lock_guard guard(lock);
-      loop.number = ++lastNumber;
-      loops.push_back(&loop);
+      const std::lock_guard guard(m_lock);
+      loop.number = ++m_lastNumber;
+      loop.older = m_newest;
+      if (m_newest) m_newest->newer = &loop;
+      m_newest = &loop;
+      if (m_blocked > 0) m_changed.notify_all();
     }
-    ++posted;
-    for (std::size_t i = 1; i < std::min(loop.size, workers.size() + 1); ++i) posted.notify_one();
+    ++m_posted;
+    for (std::size_t i = 1; i < std::min(loop.size, m_threads.size() + 1); ++i)
+      m_posted.notify_one();
   }
 
-  /// The newest loop after the one numbered that has indices left; it stays until left.
-  Loop* join(std::uint64_t after) {
-    const std::lock_guard guard(lock);
-    for (auto loop = loops.rbegin(); loop != loops.rend() && (*loop)->number > after; ++loop)
-      if ((*loop)->taken < (*loop)->size) {
-        ++(*loop)->joined;
-        return *loop;
-      }
+  /// Under the lock: the newest loop after the one numbered that has indices left.
+  Loop* findOpen(std::uint64_t after) const {
+    for (Loop* loop = m_newest; loop && loop->number > after; loop = loop->older)
+      if (loop->taken < loop->size) return loop;
     return nullptr;
   }
 
-  static void leave(Loop& loop) { loop.joined.fetch_sub(1, std::memory_order_release); }
+  /// findOpen(); it stays until left.
+  Loop* join(std::uint64_t after) {
+    const std::lock_guard guard(m_lock);
+    Loop* const loop = findOpen(after);
+    if (loop) ++loop->joined;
+    return loop;
+  }
 
-  bool takeOne(Loop& loop, bool joined) {
-    if (loop.taken++ >= loop.size) return false;
-    const std::size_t i = joined ? loop.size - ++loop.last : loop.first++;
-    try {
-      loop.call(loop.function, i);
-    } catch (...) {
-      const std::lock_guard guard(lock);
-      if (!loop.failure) loop.failure = std::current_exception();
+  /// The loop may end as soon as the last one has left it. Who is blocked has counted itself in
+  /// m_blocked before it looked at `joined`, so one of the two sees the other.
+  void leave(Loop& loop) {
+    if (--loop.joined > 0 || m_blocked == 0) return;
+    const std::lock_guard guard(m_lock);
+    m_changed.notify_all();
+  }
+
+  /// Others are at the loop's last indices. What they wait for is in newer loops: no two threads
+  /// can wait for each other.
+  void waitForOthers(const Loop& loop) {
+    bool first = true;
+    int seen = 0;
+    for (Spin spin; loop.joined.load(std::memory_order_acquire) > 0;) {
+      if (const int now = m_posted; first || now != seen) {
+        seen = now;
+        Loop* const newer = join(loop.number);
+        first = newer != nullptr;
+        if (newer) {
+          takeOne(*newer, true);
+          leave(*newer);
+          spin = {};
+        }
+      } else if (!spin.isOver()) {
+        spin.wait();
+      } else {
+        std::unique_lock guard(m_lock.mutex);
+        ++m_blocked;
+        m_changed.wait(guard, [&] { return loop.joined == 0 || findOpen(loop.number); });
+        --m_blocked;
+        first = true;
+        spin = {};
+      }
     }
+  }
+
+  static bool takeOne(Loop& loop, bool joined) {
+    if (loop.taken++ >= loop.size) return false;
+    loop.task(loop.context, joined ? loop.size - ++loop.last : loop.first++);
     return true;
   }
 
   void work() {
-    for (int seen = posted; !over; seen = posted) {
+    for (int seen = m_posted; !m_over; seen = m_posted) {
       while (Loop* loop = join(0)) {
         while (takeOne(*loop, true)) {
         }
         leave(*loop);
       }
-      for (Spin spin; posted == seen && !spin.isOver();) spin.wait();
-      posted.wait(seen);
+      for (Spin spin; m_posted == seen && !spin.isOver();) spin.wait();
+      m_posted.wait(seen);
     }
   }
 
-  BriefLock lock;
-  std::vector<Loop*> loops;  ///< oldest first; under the lock
-  std::uint64_t lastNumber = 0;
-  std::atomic<int> posted{0};  ///< counts posts: workers sleep until it changes
-  std::atomic<bool> over{false};
-  std::vector<std::thread> workers;
+  BriefLock m_lock;
+  Loop* m_newest = nullptr;  ///< of the list of loops; under the lock
+  std::uint64_t m_lastNumber = 0;
+  std::condition_variable m_changed;  ///< a loop was posted, or the last one left a loop
+  std::atomic<int> m_blocked{0};      ///< threads that wait for it
+  std::atomic<int> m_posted{0};       ///< counts posts: workers sleep until it changes
+  std::atomic<bool> m_over{false};
+  std::vector<std::thread> m_threads;
 };
-
-void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* function) const {
-  m_pool->run(size, call, function);
-}
 
 #endif
 
-Threads::Threads(int count)
-    : m_count(resolved(count)), m_pool(m_count > 1 ? std::make_unique<Pool>(m_count) : nullptr) {}
+class ThreadPool final : public Executor {
+ public:
+  explicit ThreadPool(int threads)
+      : m_forks(watchForks()),
+        m_workers(threads > 1 ? std::make_unique<Workers>(threads) : nullptr),
+        m_concurrency(m_workers ? m_workers->count() : 1) {}
+  ~ThreadPool() override {
+    // Threads of the parent cannot be joined, and the library's or oneTBB's locks may be held.
+    if (isInChild()) static_cast<void>(m_workers.release());
+  }
+
+  int concurrency() const noexcept override { return m_concurrency; }
+
+  void run(std::size_t count, Task task, void* context) override {
+    if (count > 1 && m_concurrency > 1 && !isInChild()) {
+      m_workers->run(count, task, context, m_forks);
+      return;
+    }
+    for (std::size_t i = 0; i < count; ++i) task(context, i);
+  }
+
+ private:
+  bool isInChild() const { return forks.load(std::memory_order_relaxed) != m_forks; }
+
+  const unsigned m_forks;
+  std::unique_ptr<Workers> m_workers;
+  int m_concurrency;
+};
+
+/// A loop's function, and the exception of the lowest index that has thrown one.
+class Body {
+ public:
+  Body(void (*call)(void*, std::size_t), void* function) : m_call(call), m_function(function) {}
+
+  void runOne(std::size_t i) noexcept {
+    if (i > m_failed.load(std::memory_order_relaxed)) return;
+    const StandardFloatingPoint standard;
+    try {
+      m_call(m_function, i);
+    } catch (...) {
+      // current_exception() is never null here: where there is no memory it gives std::bad_alloc.
+      const std::lock_guard guard(m_lock);
+      if (i > m_failed) return;
+      m_failed = i;
+      m_exception = std::current_exception();
+    }
+  }
+  static void task(void* body, std::size_t i) noexcept { static_cast<Body*>(body)->runOne(i); }
+
+  void rethrow() const {
+    if (m_exception) std::rethrow_exception(m_exception);
+  }
+
+ private:
+  void (*m_call)(void*, std::size_t);
+  void* m_function;
+  std::atomic<std::size_t> m_failed{std::numeric_limits<std::size_t>::max()};
+  std::mutex m_lock;
+  std::exception_ptr m_exception;
+};
+
+/// A loop on an executor that may be faulty. The executor is given runs, each of which takes
+/// indices one by one until none is left: it does not matter in which order the runs come, nor how
+/// often each does. A run that comes too late finds the loop closed.
+class LoopOnExecutor {
+ public:
+  /// No run of the last loop can come any more.
+  bool isFree() {
+    const std::lock_guard guard(m_lock);
+    return !m_open && m_begun >= m_runs;
+  }
+
+  void run(Executor& executor, std::size_t runs, std::size_t size, Body& body) {
+    open(runs, size, body);
+    try {
+      executor.run(runs, task, this);
+    } catch (...) {
+      close();
+      throw;
+    }
+    if (!close())
+      throw Error(ErrorCode::InvalidSettings,
+                  "the executor's run() returned before it had run all tasks");
+  }
+
+ private:
+  static void task(void* loop, std::size_t) noexcept {
+    static_cast<LoopOnExecutor*>(loop)->takeAll();
+  }
+
+  void open(std::size_t runs, std::size_t size, Body& body) {
+    const std::lock_guard guard(m_lock);
+    m_body = &body;
+    m_size = size;
+    m_next = 0;
+    m_runs = runs;
+    m_begun = 0;
+    m_open = true;
+  }
+
+  /// Waits for the runs that have begun. False if not all have.
+  bool close() {
+    std::unique_lock guard(m_lock);
+    const bool all = m_begun >= m_runs;
+    m_open = false;
+    if (!all) m_next = m_size;
+    m_ended.wait(guard, [&] { return m_active == 0; });
+    return all;
+  }
+
+  void takeAll() noexcept {
+    {
+      const std::lock_guard guard(m_lock);
+      ++m_begun;
+      if (!m_open) return;
+      ++m_active;
+    }
+    for (std::size_t i; (i = m_next++) < m_size;) m_body->runOne(i);
+    const std::lock_guard guard(m_lock);
+    if (--m_active == 0) m_ended.notify_all();
+  }
+
+  std::mutex m_lock;
+  std::condition_variable m_ended;
+  Body* m_body = nullptr;
+  std::size_t m_size = 0, m_runs = 0, m_begun = 0, m_active = 0;
+  std::atomic<std::size_t> m_next{0};
+  bool m_open = false;
+};
+
+void checkThreads(int threads) {
+  if (threads < 0 || threads > kMostThreads)
+    throw Error(ErrorCode::InvalidSettings,
+                "threads is " + std::to_string(threads) + "; it must be in [0, 1024]");
+}
+
+}  // namespace
+
+/// Loops that are used again and again, as many as have ever run at the same time.
+struct Threads::LoopsOnExecutor {
+  LoopsOnExecutor() = default;
+  /// What an executor has kept a run of is left to it: the run may still come.
+  ~LoopsOnExecutor() {
+    for (auto& loop : all)
+      if (!loop->isFree()) static_cast<void>(loop.release());
+  }
+  LoopsOnExecutor(const LoopsOnExecutor&) = delete;
+  LoopsOnExecutor& operator=(const LoopsOnExecutor&) = delete;
+
+  LoopOnExecutor* take() {
+    const std::lock_guard guard(lock);
+    const auto found =
+        std::find_if(idle.begin(), idle.end(), [](LoopOnExecutor* loop) { return loop->isFree(); });
+    if (found == idle.end()) {
+      idle.reserve(all.size() + 1);  // so that putting it back cannot fail
+      return all.emplace_back(std::make_unique<LoopOnExecutor>()).get();
+    }
+    LoopOnExecutor* const loop = *found;
+    idle.erase(found);
+    return loop;
+  }
+  void putBack(LoopOnExecutor* loop) {
+    const std::lock_guard guard(lock);
+    idle.push_back(loop);
+  }
+
+  std::mutex lock;
+  std::vector<std::unique_ptr<LoopOnExecutor>> all;
+  std::vector<LoopOnExecutor*> idle;
+};
+
+Threads::Threads(int count, std::shared_ptr<Executor> executor)
+    : m_executor(std::move(executor)), m_count(1) {
+  if (!m_executor) {
+    if (resolved(count) > 1) m_executor = std::make_shared<ThreadPool>(resolved(count));
+    if (m_executor) m_count = m_executor->concurrency();
+    return;
+  }
+  const int concurrency = m_executor->concurrency();
+  if (concurrency < 1)
+    throw Error(ErrorCode::InvalidSettings, "the executor's concurrency() is " +
+                                                std::to_string(concurrency) +
+                                                "; it must be at least 1");
+  m_count = count > 0 ? std::min(count, concurrency) : concurrency;
+  if (m_count < concurrency || !dynamic_cast<ThreadPool*>(m_executor.get()))
+    m_loops = std::make_unique<LoopsOnExecutor>();
+}
+
 Threads::~Threads() = default;
-Threads::Threads(Threads&&) noexcept = default;
-Threads& Threads::operator=(Threads&&) noexcept = default;
+
+Threads::Threads(Threads&& other) noexcept
+    : m_executor(std::move(other.m_executor)),
+      m_loops(std::move(other.m_loops)),
+      m_count(std::exchange(other.m_count, 1)) {}
+
+Threads& Threads::operator=(Threads&& other) noexcept {
+  m_loops = std::move(other.m_loops);
+  m_executor = std::move(other.m_executor);
+  m_count = std::exchange(other.m_count, 1);
+  return *this;
+}
+
+void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* function) const {
+  Body body(call, function);
+  if (!m_loops) {
+    m_executor->run(size, Body::task, &body);
+  } else {
+    LoopOnExecutor* const loop = m_loops->take();
+    const struct Return {
+      LoopsOnExecutor& loops;
+      LoopOnExecutor* loop;
+      ~Return() { loops.putBack(loop); }
+    } atEnd{*m_loops, loop};
+    loop->run(*m_executor, std::min(size, static_cast<std::size_t>(m_count)), size, body);
+  }
+  body.rethrow();
+}
+
+Executor::~Executor() = default;
+
+std::shared_ptr<Executor> makeThreadPool(int threads) {
+  checkThreads(threads);
+  return std::make_shared<ThreadPool>(resolved(threads));
+}
 
 }  // namespace palpate

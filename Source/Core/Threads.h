@@ -1,6 +1,6 @@
 #pragma once
 
-#include "Core/FloatingPoint.h"
+#include <palpate/Executor.h>
 
 #include <cstddef>
 #include <memory>
@@ -8,15 +8,30 @@
 
 namespace palpate {
 
-/// The one place for threads: a pool of std::thread, or oneTBB where PALPATE_THREADS=TBB.
+/// The one place for threads: a pool of std::thread, oneTBB where PALPATE_THREADS=TBB, or the
+/// caller's executor.
 ///
 /// Work is cut into chunks whose bounds depend on its size only, never on the number of threads, so
 /// results written per chunk are the same for any number.
+///
+/// Exceptions  The exception of the lowest index that throws is rethrown, as one thread would.
+///             Indices above it may be left out. The object stays usable.
+/// Memory      Loops allocate nothing on the library's pool, and nothing after the first ones on an
+///             executor.
+/// Waiting     Threads spin for 20 to 80 microseconds at most and block then, so that one with
+///             real-time priority cannot keep another from the core that it waits for. Tested for
+///             std::thread: a SCHED_FIFO thread on one core with a SCHED_OTHER worker
+///             (ThreadsTest.cpp). Where oneTBB is the pool, its own rules hold.
+/// fork()      In the child loops run on the calling thread, and destruction gives up the pool's
+///             memory without touching its threads. fork() inside a task is for exec() only: in the
+///             child the loop throws, or waits without end where oneTBB is the pool.
 class Threads {
  public:
-  explicit Threads(int count);  ///< 0: all cores
+  /// At most `count` threads (0: all cores) of a pool of its own, or of the executor (0: all).
+  /// Where the system refuses to start so many, count() says how many there are.
+  explicit Threads(int count, std::shared_ptr<Executor> executor = nullptr);
   ~Threads();
-  Threads(Threads&&) noexcept;
+  Threads(Threads&&) noexcept;  ///< what was moved from has one thread
   Threads& operator=(Threads&&) noexcept;
 
   int count() const { return m_count; }
@@ -33,7 +48,8 @@ class Threads {
     });
   }
 
-  /// f(i) for each i in [0, size), one task each.
+  /// f(i) for each i in [0, size), one task each, in the default floating-point environment; with
+  /// one thread, in the caller's.
   template <class F>
   void forEach(std::size_t size, F&& f) const {
     if (m_count == 1 || size <= 1) {
@@ -42,20 +58,19 @@ class Threads {
     }
     using Function = std::remove_reference_t<F>;
     run(
-        size,
-        [](void* function, std::size_t i) {
-          const StandardFloatingPoint standard;
-          (*static_cast<Function*>(function))(i);
-        },
+        size, [](void* function, std::size_t i) { (*static_cast<Function*>(function))(i); },
         const_cast<void*>(static_cast<const void*>(std::addressof(f))));
   }
 
  private:
+  struct LoopsOnExecutor;
+
   void run(std::size_t size, void (*call)(void*, std::size_t), void* function) const;
 
-  struct Pool;
+  std::shared_ptr<Executor> m_executor;  ///< null: one thread
+  std::unique_ptr<LoopsOnExecutor>
+      m_loops;  ///< where the executor is not the library's, whole pool
   int m_count;
-  std::unique_ptr<Pool> m_pool;
 };
 
 }  // namespace palpate

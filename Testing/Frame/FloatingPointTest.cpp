@@ -2,20 +2,29 @@
 #include "Common/Zoo.h"
 #include "Unit/Math/TrianglePairs.h"
 
+#include <palpate/ConstraintRows.h>
 #include <palpate/Distance.h>
 #include <palpate/Intersection.h>
+#include <palpate/Palpate.h>
 #include <palpate/TimeOfImpact.h>
 
 #include <gtest/gtest.h>
 
 #include <bit>
 #include <cfenv>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <set>
 #include <string>
+#include <type_traits>
+#include <unistd.h>
+#include <utility>
 #include <xmmintrin.h>
 
-// A frame's answers do not depend on how the calling thread rounds, nor on whether it flushes
-// denormals to zero, as audio and graphics code often asks for; and it is left as it was.
+// Answers do not depend on the calling thread's floating-point environment: how it rounds, whether
+// it flushes denormals to zero, as audio and graphics code often asks for, and whether exceptions
+// trap. The environment is left as it was, with its exception flags.
 
 namespace palpate {
 namespace {
@@ -23,33 +32,64 @@ namespace {
 using namespace testing;
 
 constexpr unsigned kFlushToZero = 0x8000, kDenormalsAreZero = 0x0040;
+constexpr unsigned kBoth = kFlushToZero | kDenormalsAreZero;
 
 struct Mode {
   const char* name;
-  int rounding;
-  unsigned flags;
+  int rounding = FE_TONEAREST;
+  unsigned flags = 0;
+  bool traps = false;
 };
+
+const Mode kStandard{"standard"};
+const std::vector<Mode> kModes{{"trapping", FE_TONEAREST, 0, true},
+                               {"flushing", FE_TONEAREST, kBoth},
+                               {"upward", FE_UPWARD},
+                               {"downward", FE_DOWNWARD},
+                               {"toward zero", FE_TOWARDZERO},
+                               {"flushing, downward", FE_DOWNWARD, kBoth},
+                               {"trapping, upward", FE_UPWARD, 0, true},
+                               {"all", FE_TOWARDZERO, kBoth, true}};
+
+/// This thread is in the mode while the object lives.
+class InMode {
+ public:
+  explicit InMode(const Mode& mode) {
+    std::fegetenv(&m_before);
+    std::feclearexcept(FE_ALL_EXCEPT);
+    std::fesetround(mode.rounding);
+    _mm_setcsr(_mm_getcsr() | mode.flags);
+    if (mode.traps) feenableexcept(FE_ALL_EXCEPT);
+  }
+  ~InMode() { std::fesetenv(&m_before); }
+  InMode(const InMode&) = delete;
+  InMode& operator=(const InMode&) = delete;
+
+ private:
+  std::fenv_t m_before;
+};
+
+/// What a call answers; it must leave the environment and the exception flags as they were.
+template <class F>
+auto unchanged(F&& call) {
+  const unsigned before = _mm_getcsr();
+  const auto result = call();
+  EXPECT_EQ(_mm_getcsr(), before);
+  return result;
+}
 
 /// Answers of one frame, in a mode that is set before everything.
 std::vector<Rows> answers(const Specimen& specimen, const PairSettings& settings, int threads,
                           const Mode& mode) {
   const std::vector<Eigen::Vector3d> aBefore = specimen.aBefore(), bBefore = specimen.bBefore();
-  const unsigned before = _mm_getcsr();
-  std::fesetround(mode.rounding);
-  _mm_setcsr(_mm_getcsr() | mode.flags);
-  const unsigned set = _mm_getcsr() & ~0x3fu;  // without the flags of what happened
-  std::vector<Rows> rows;
-  {
-    PairRun run(settingsOf(Engine::Octree, threads), specimen.a, specimen.b, settings);
-    run.detection().setPositions(run.a(), aBefore, specimen.a.positions);
-    run.detection().setPositions(run.b(), bBefore, specimen.b.positions);
-    run.detection().detectCollision();
-    EXPECT_EQ(_mm_getcsr() & ~0x3fu, set);
-    rows = run.answers();
-  }
-  std::fesetround(FE_TONEAREST);
-  _mm_setcsr(before);
-  return rows;
+  const InMode inMode(mode);
+  const unsigned set = _mm_getcsr();
+  PairRun run(settingsOf(Engine::Octree, threads), specimen.a, specimen.b, settings);
+  run.detection().setPositions(run.a(), aBefore, specimen.a.positions);
+  run.detection().setPositions(run.b(), bBefore, specimen.b.positions);
+  run.detection().detectCollision();
+  EXPECT_EQ(_mm_getcsr() & ~0x3fu, set & ~0x3fu);
+  return run.answers();
 }
 
 class FloatingPoint : public ::testing::TestWithParam<MethodCase> {};
@@ -65,12 +105,13 @@ TEST_P(FloatingPoint, OfTheCallerChangesNoBit) {
     ++seen;
     PairSettings settings = GetParam().settings;
     settings.thickness *= specimen.thickness;
-    const std::vector<Rows> truth = answers(specimen, settings, 1, {"standard", FE_TONEAREST, 0});
+    const std::vector<Rows> truth = answers(specimen, settings, 1, kStandard);
     // A thickness that is denormal would be refused as zero where denormals are.
     const bool denormal = settings.thickness < 0x1p-1022;
     const unsigned both = kFlushToZero | (denormal ? 0 : kDenormalsAreZero);
-    for (const Mode& mode : {Mode{"upward", FE_UPWARD, 0}, Mode{"flushing", FE_TONEAREST, both},
-                             Mode{"flushing and downward", FE_DOWNWARD, both}}) {
+    for (const Mode& mode : {Mode{"upward", FE_UPWARD}, Mode{"flushing", FE_TONEAREST, both},
+                             Mode{"flushing and downward", FE_DOWNWARD, both},
+                             Mode{"trapping", FE_TONEAREST, 0, true}}) {
       SCOPED_TRACE(mode.name);
       expectSame(answers(specimen, settings, 2, mode), truth);
     }
@@ -81,45 +122,160 @@ TEST_P(FloatingPoint, OfTheCallerChangesNoBit) {
 INSTANTIATE_TEST_SUITE_P(EveryMethod, FloatingPoint, ::testing::ValuesIn(methodCases(1.0)),
                          [](const auto& method) { return method.param.name; });
 
+using Bits = std::vector<std::uint64_t>;
+
+template <class Value>
+void append(Bits& bits, const Value& value) {
+  if constexpr (std::is_same_v<Value, double>)
+    bits.push_back(std::bit_cast<std::uint64_t>(value));
+  else if constexpr (std::is_same_v<Value, Eigen::Vector3d>)
+    for (const double x : value) append(bits, x);
+  else
+    bits.push_back(static_cast<std::uint64_t>(value));
+}
+
 /// Bits of what the functions of single features answer, in a mode.
-std::vector<std::uint64_t> featureAnswers(const test::CornersPair& pair, const Mode& mode) {
+Bits featureAnswers(const test::CornersPair& pair, const Mode& mode) {
   const auto& [a, b] = pair;
-  const unsigned before = _mm_getcsr();
-  std::fesetround(mode.rounding);
-  _mm_setcsr(_mm_getcsr() | mode.flags);
-  const unsigned set = _mm_getcsr() & ~0x3fu;
-  const auto vertex = vertexTriangleDistance(a[0], b[0], b[1], b[2]);
-  const auto edges = edgeEdgeDistance(a[0], a[1], b[0], b[1]);
-  const bool intersect = trianglesIntersect(a[0], a[1], a[2], b[0], b[1], b[2]);
-  const auto vertexTime =
-      vertexTriangleTimeOfImpact(a[0], b[0], b[1], b[2], a[1], b[1], b[2], b[0]);
-  const auto edgeTime = edgeEdgeTimeOfImpact(a[0], a[1], b[0], b[1], a[1], a[2], b[2], b[1]);
-  EXPECT_EQ(_mm_getcsr() & ~0x3fu, set);
-  std::fesetround(FE_TONEAREST);
-  _mm_setcsr(before);
-  std::vector<std::uint64_t> bits{intersect, static_cast<std::uint64_t>(vertex.feature),
-                                  static_cast<std::uint64_t>(edges.featureA),
-                                  static_cast<std::uint64_t>(edges.featureB)};
+  const auto both = [&, &a = a, &b = b](const TimeOfImpactSettings& settings) {
+    const auto vertex = unchanged([&] {
+      return vertexTriangleTimeOfImpact(a[0], b[0], b[1], b[2], a[1], b[1], b[2], b[0], settings);
+    });
+    const auto edges = unchanged([&] {
+      return edgeEdgeTimeOfImpact(a[0], a[1], b[0], b[1], a[1], a[2], b[2], b[1], settings);
+    });
+    return std::pair{vertex, edges};
+  };
+  const InMode inMode(mode);
+  const auto vertex = unchanged([&] { return vertexTriangleDistance(a[0], b[0], b[1], b[2]); });
+  const auto edges = unchanged([&] { return edgeEdgeDistance(a[0], a[1], b[0], b[1]); });
+  const bool intersect =
+      unchanged([&] { return trianglesIntersect(a[0], a[1], a[2], b[0], b[1], b[2]); });
+  const auto [vertexTime, edgeTime] = both({});
+  const auto [vertexNear, edgeNear] = both({.minimumDistance = 0.125, .tolerance = 0x1p-10});
+  const Stencil stencils[] = {
+      stencil(VertexTriangleContact{0, 1, {2, 3, 4}, vertex.barycentric, vertex.normal, 0, 0}),
+      unchanged([&] {
+        return stencil(
+            EdgeEdgeContact{{0, 1}, {2, 3}, edges.weightA, edges.weightB, edges.normal, 0, 0});
+      })};
+  Bits bits{intersect,
+            static_cast<std::uint64_t>(vertex.feature),
+            static_cast<std::uint64_t>(edges.featureA),
+            static_cast<std::uint64_t>(edges.featureB),
+            vertex.exact,
+            edges.exact,
+            edges.parallel};
   for (const Eigen::Vector3d& v :
        {vertex.barycentric, vertex.difference, vertex.normal, edges.difference, edges.normal})
-    for (const double x : v) bits.push_back(std::bit_cast<std::uint64_t>(x));
-  for (const double x : {vertex.distance, edges.distance, edges.weightA, edges.weightB,
-                         vertexTime.value_or(2.0), edgeTime.value_or(2.0)})
-    bits.push_back(std::bit_cast<std::uint64_t>(x));
+    append(bits, v);
+  for (const double x : {vertex.distance, edges.distance, edges.weightA, edges.weightB})
+    append(bits, x);
+  for (const auto& time : {vertexTime, edgeTime, vertexNear, edgeNear})
+    append(bits, time.value_or(2.0));
+  for (const Stencil& each : stencils)
+    for (const double weight : each.weights) append(bits, weight);
   return bits;
 }
 
 TEST(FloatingPointOfSingleFeatures, ChangesNoBit) {
   test::Random random(1);
-  constexpr unsigned kBoth = kFlushToZero | kDenormalsAreZero;
   for (int repeat = 0; repeat < 3200; ++repeat) {
     const auto kind = static_cast<test::Kind>(repeat % static_cast<int>(test::Kind::Count));
     const test::CornersPair pair = test::makePair(kind, random);
-    const auto truth = featureAnswers(pair, {"standard", FE_TONEAREST, 0});
-    for (const Mode& mode : {Mode{"upward", FE_UPWARD, 0}, Mode{"flushing", FE_TONEAREST, kBoth},
-                             Mode{"flushing and downward", FE_DOWNWARD, kBoth}})
+    const Bits truth = featureAnswers(pair, kStandard);
+    for (const Mode& mode : kModes)
       ASSERT_EQ(featureAnswers(pair, mode), truth) << repeat << ' ' << mode.name;
   }
+}
+
+struct TripletOfBits {
+  int row, column;
+  double value;
+};
+
+/// Of detectCollision() on two meshes, and of what makes a solver's rows of its contacts.
+Bits meshAnswers(const Specimen& specimen, const PairSettings& settings, const Mode& mode) {
+  const Mesh &a = specimen.a, &b = specimen.b;
+  const std::vector<Eigen::Vector3d> aBefore = specimen.aBefore(), bBefore = specimen.bBefore();
+  const auto first = static_cast<std::uint32_t>(a.positions.size());
+  std::vector<Eigen::Vector3d> all = a.positions;
+  all.insert(all.end(), b.positions.begin(), b.positions.end());
+  const InMode inMode(mode);
+  const CollisionData data = unchanged([&] {
+    return detectCollision({a.positions, a.triangles}, {b.positions, b.triangles}, settings);
+  });
+  std::vector<ConstraintRow> rows;
+  std::vector<TripletOfBits> triplets;
+  const unsigned before = _mm_getcsr();
+  appendRows(data, {0, aBefore, a.positions}, {first, bBefore, b.positions}, rows);
+  appendTriplets(std::span<const ConstraintRow>(rows), triplets);
+  EXPECT_EQ(_mm_getcsr(), before);
+  Bits bits{data.hash()};
+  for (const ConstraintRow& row : rows) {
+    append(bits, row.normal);
+    append(bits, row.offset);
+    append(bits, unchanged([&] { return row.gap(all); }));
+  }
+  for (const TripletOfBits& triplet : triplets) {
+    append(bits, triplet.row);
+    append(bits, triplet.column);
+    append(bits, triplet.value);
+  }
+  return bits;
+}
+
+TEST(FloatingPointOfOneCall, ChangesNoBit) {
+  std::size_t rows = 0;
+  for (const Specimen& specimen : zoo()) {
+    PairSettings settings;
+    settings.method = Method::Proximity;
+    settings.thickness = specimen.thickness;
+    // A thickness that is denormal would be refused as zero where denormals are.
+    if (specimen.large || settings.thickness < 0x1p-1022) continue;
+    SCOPED_TRACE(specimen.name);
+    const Bits truth = meshAnswers(specimen, settings, kStandard);
+    rows += truth.size();
+    for (const Mode& mode : kModes)
+      ASSERT_EQ(meshAnswers(specimen, settings, mode), truth) << mode.name;
+  }
+  EXPECT_GT(rows, 1000u);
+}
+
+std::string contentOf(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST(FloatingPointOfCaptures, ChangesNoByte) {
+  const std::filesystem::path folder = std::filesystem::temp_directory_path(),
+                              path = folder / ("FloatingPoint" + std::to_string(getpid()));
+  for (const Specimen& specimen : zoo()) {
+    PairSettings settings;
+    settings.method = Method::Continuous;
+    if (specimen.large) continue;
+    SCOPED_TRACE(specimen.name);
+    PairRun run({.threads = 1}, specimen.a, specimen.b, settings);
+    run.step(specimen.aBefore(), specimen.a.positions, specimen.bBefore(), specimen.b.positions);
+    capture(run.detection(), path);
+    const std::string truth = contentOf(path);
+    const std::uint64_t hash = run.data().hash();
+    for (const Mode& mode : {kModes.front(), kModes.back()}) {
+      SCOPED_TRACE(mode.name);
+      std::filesystem::remove(path);
+      const std::uint64_t found = [&] {
+        const InMode inMode(mode);
+        capture(run.detection(), path);
+        OctreeBasedCD again = setUp(readCapture(path));
+        writeCapture(again.problem(), path);
+        again.detectCollision();
+        return again.collisionData(again.pairs()[0].a, again.pairs()[0].b).hash();
+      }();
+      EXPECT_EQ(found, hash);
+      EXPECT_EQ(contentOf(path), truth);
+    }
+  }
+  std::filesystem::remove(path);
 }
 
 }  // namespace

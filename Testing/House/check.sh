@@ -38,7 +38,7 @@ checkIncludes() {
           fault "$file: $room may not include ${include#\"}"
           ;;
         "<palpate/"*)
-          [[ $room != Core || $include =~ ^.palpate/(Types|Error|Export|Settings|Platform)\.h$ ]] ||
+          [[ $room != Core || $include =~ ^.palpate/(Types|Error|Export|Executor|Settings|Platform)\.h$ ]] ||
             fault "$file: Core may include Public's plain types only, not ${include#<}"
           ;;
       esac
@@ -53,7 +53,7 @@ checkPlaces() {
     while read -r include; do
       case $include in
         "<palpate/"* | "<Eigen/Core" | "<Eigen/Geometry") continue ;;
-        "<tbb/"* | "<oneapi/"* | "<thread" | "<condition_variable" | "<future" | "<execution")
+        "<tbb/"* | "<oneapi/"* | "<thread" | "<condition_variable" | "<future" | "<execution" | "<pthread.h")
           place=Source/Core/Threads.cpp ;;
         "<hwy/"*) place=Source/Core/Simd.h ;;
         "<gmp"*) place=Source/Math/Exact.h ;;

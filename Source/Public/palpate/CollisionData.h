@@ -78,10 +78,7 @@ inline Stencil stencil(const VertexTriangleContact& contact) {
 }
 
 /// vertices: edge a's two ends (positive weights), then edge b's (negative weights).
-inline Stencil stencil(const EdgeEdgeContact& contact) {
-  return {{contact.edgeA[0], contact.edgeA[1], contact.edgeB[0], contact.edgeB[1]},
-          {1.0 - contact.weightA, contact.weightA, contact.weightB - 1.0, -contact.weightB}};
-}
+PALPATE_EXPORT Stencil stencil(const EdgeEdgeContact& contact);
 
 /// The contacts of one pair of geometries in the last frame, sorted by element ids.
 ///

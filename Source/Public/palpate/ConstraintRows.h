@@ -1,7 +1,7 @@
 #pragma once
 
 #include <palpate/CollisionData.h>
-#include <palpate/Error.h>
+#include <palpate/Export.h>
 
 #include <Eigen/Core>
 
@@ -9,7 +9,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
 namespace palpate {
@@ -28,11 +27,7 @@ struct ConstraintRow {
   double offset;                          ///< L
 
   /// L; positions: of all that the solver numbers.
-  double gap(std::span<const Eigen::Vector3d> positions) const {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < 4; ++i) sum += weights[i] * positions[vertices[i]];
-    return normal.dot(sum) - offset;
-  }
+  PALPATE_EXPORT double gap(std::span<const Eigen::Vector3d> positions) const;
 };
 
 /// The vertices of one geometry among those of a solver; a shape has none.
@@ -45,60 +40,26 @@ struct SolverVertices {
 /// edgeEdge(), shape(). Contacts of Continuous and Auto are at their time of impact, others now.
 /// Errors   WrongPositionCount names the first vertex that a contact has and `before` or `now` has
 ///          not; no row is added.
-inline void appendRows(const CollisionData& contacts, const SolverVertices& a,
-                       const SolverVertices& b, std::vector<ConstraintRow>& rows) {
-  const Method method = contacts.validity().method;
-  const bool swept = method == Method::Continuous || method == Method::Auto;
-  const std::size_t given = rows.size();
-  const auto add = [&](const auto& contact, const std::array<const SolverVertices*, 4>& sides) {
-    const auto [vertices, weights] = stencil(contact);
-    const double time = swept ? contact.timeOfImpact : 1.0;
-    ConstraintRow row{{}, weights, contact.normal, 0.0};
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < 4; ++i) {
-      const SolverVertices& side = *sides[i];
-      if (vertices[i] >= side.before.size() || vertices[i] >= side.now.size()) {
-        rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(given), rows.end());
-        throw Error(ErrorCode::WrongPositionCount,
-                    "appendRows(): a contact has vertex " + std::to_string(vertices[i]) + " of " +
-                        (sides[i] == &a ? "a" : "b") + ", which has " +
-                        std::to_string(side.before.size()) + " positions before and " +
-                        std::to_string(side.now.size()) + " now",
-                    {}, vertices[i]);
-      }
-      row.vertices[i] = side.first + vertices[i];
-      sum += weights[i] * ((1 - time) * side.before[vertices[i]] + time * side.now[vertices[i]]);
-    }
-    row.offset = contact.normal.dot(sum) - contact.distance;
-    rows.push_back(row);
-  };
-  for (const auto& contact : contacts.vertexTriangle()) add(contact, {&a, &b, &b, &b});
-  for (const auto& contact : contacts.triangleVertex()) add(contact, {&b, &a, &a, &a});
-  for (const auto& contact : contacts.edgeEdge()) add(contact, {&a, &a, &b, &b});
-  const std::uint32_t first = a.now.empty() ? b.first : a.first;  // the other is the shape
-  for (const ShapeContact& contact : contacts.shape()) {
-    const auto& [i, j, k] = contact.vertices;
-    rows.push_back({{first + i, first + j, first + k, first + i},
-                    {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
-                    contact.normal,
-                    contact.normal.dot(contact.point) - contact.distance});
-  }
-}
+PALPATE_EXPORT void appendRows(const CollisionData& contacts, const SolverVertices& a,
+                               const SolverVertices& b, std::vector<ConstraintRow>& rows);
+
+/// Calls entry(context, row, column, value) for each entry of the rows' Jacobian that is not zero;
+/// column: 3 vertex + axis. appendTriplets() is the convenient form.
+PALPATE_EXPORT void forEachEntry(std::span<const ConstraintRow> rows,
+                                 void (*entry)(void* context, int row, int column, double value),
+                                 void* context);
 
 /// The rows' Jacobian of gaps by positions as triplets (row, 3 vertex + axis, value), for a matrix
 /// that sums equal places, as Eigen::SparseMatrix::setFromTriplets() does.
 /// Needs    Triplet(row, column, value), such as Eigen::Triplet<double>.
 template <class Triplet>
 void appendTriplets(std::span<const ConstraintRow> rows, std::vector<Triplet>& triplets) {
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    for (std::size_t i = 0; i < 4; ++i) {
-      if (rows[r].weights[i] == 0) continue;
-      for (int axis = 0; axis < 3; ++axis) {
-        triplets.emplace_back(static_cast<int>(r), static_cast<int>(3 * rows[r].vertices[i] + axis),
-                              rows[r].weights[i] * rows[r].normal[axis]);
-      }
-    }
-  }
+  forEachEntry(
+      rows,
+      [](void* context, int row, int column, double value) {
+        static_cast<std::vector<Triplet>*>(context)->emplace_back(row, column, value);
+      },
+      &triplets);
 }
 
 }  // namespace palpate

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <palpate/Executor.h>
+
 #include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 
 namespace palpate {
 
@@ -41,10 +44,17 @@ struct AuditSettings {
 struct Settings {
   OctreeSettings octree{};
   Engine engine = Engine::Octree;
-  int threads = 0;  ///< threads of a frame. [0, 1024]; 0: all cores. Results do not depend on it.
+  /// Threads of a frame, in [0, 1024]; 0: one for each core, or the executor's concurrency. Results
+  /// do not depend on it. Where the system refuses to start so many, those that it started do the
+  /// work.
+  int threads = 0;
   /// detectCollision() also fills candidatePairs(); costs their memory and a sort
   bool keepCandidates = false;
   AuditSettings audit{};
+  /// Runs the work of a frame, on at most `threads` of its threads; several objects may share one.
+  /// Null: a pool of the object's own. Results do not depend on it. It is no part of a
+  /// CollisionProblem or a capture.
+  std::shared_ptr<Executor> executor{};
 };
 
 enum class Method { Auto, Proxy, DistanceField, Intersection, Proximity, Continuous };

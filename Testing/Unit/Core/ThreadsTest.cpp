@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
+#include <functional>
 #include <numeric>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <tuple>
 #include <utility>
@@ -118,6 +121,95 @@ TEST(Threads, ANestedExceptionIsRethrown) {
                                    });
                                  }),
                  std::runtime_error);
+  }
+}
+
+TEST(Threads, OfSeveralExceptionsTheLowestIndexIsRethrown) {
+  for (int count : kCounts) {
+    const Threads threads(count);
+    for (int run = 0; run < 100; ++run) {
+      std::string message;
+      try {
+        threads.forEach(200, [](std::size_t i) {
+          if (i >= 60) throw std::runtime_error(std::to_string(i));
+        });
+      } catch (const std::runtime_error& error) {
+        message = error.what();
+      }
+      EXPECT_EQ(message, "60") << count;
+    }
+  }
+}
+
+TEST(Threads, NestedLoopsWithExceptionsLeaveThePoolUsable) {
+  for (int count : kCounts) {
+    const Threads threads(count);
+    for (int run = 0; run < 50; ++run) {
+      std::atomic<int> caught{0};
+      EXPECT_THROW(threads.forEach(8,
+                                   [&](std::size_t i) {
+                                     try {
+                                       threads.forEach(8, [](std::size_t j) {
+                                         if (j % 2 == 1) throw std::runtime_error("odd");
+                                       });
+                                     } catch (const std::runtime_error&) {
+                                       ++caught;
+                                       if (i == 5) throw;
+                                     }
+                                   }),
+                   std::runtime_error);
+      EXPECT_GE(caught, 6);
+      std::atomic<int> runs{0};
+      threads.forEach(100, [&](std::size_t) { ++runs; });
+      EXPECT_EQ(runs, 100);
+    }
+  }
+}
+
+TEST(Threads, APoolIsDestroyedRightAfterAnException) {
+  for (int count : kCounts)
+    for (int run = 0; run < 50; ++run) {
+      const Threads threads(count);
+      EXPECT_THROW(threads.forEach(10, [](std::size_t i) { throw i; }), std::size_t);
+    }
+}
+
+/// Deeper than any list that a pool might have reserved.
+TEST(Threads, DeeplyNestedLoopsAreComplete) {
+  for (int count : kCounts) {
+    const Threads threads(count);
+    std::atomic<int> runs{0};
+    const std::function<void(int)> nest = [&](int depth) {
+      threads.forEach(2, [&](std::size_t i) {
+        ++runs;
+        if (i == 0 && depth > 0) nest(depth - 1);
+      });
+    };
+    nest(200);
+    EXPECT_EQ(runs, 402) << count;
+  }
+}
+
+/// Waiting is in vain first: the caller blocks, and must wake up to help with a newer loop.
+TEST(Threads, WhoWaitsForAnIndexHelpsWithTheLoopThatItRuns) {
+  const Threads threads(2);
+  for (int run = 0; run < 5; ++run) {
+    std::atomic<bool> begun{false};
+    std::atomic<int> met{0};
+    threads.forEach(2, [&](std::size_t i) {
+      if (i == 0) {
+        while (!begun) std::this_thread::yield();
+        return;
+      }
+      begun = true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      // Only returns where two threads are at work.
+      threads.forEach(2, [&](std::size_t) {
+        ++met;
+        while (met < 2) std::this_thread::yield();
+      });
+    });
+    EXPECT_EQ(met, 2);
   }
 }
 

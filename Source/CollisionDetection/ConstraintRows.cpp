@@ -1,0 +1,78 @@
+#include <palpate/ConstraintRows.h>
+#include <palpate/Error.h>
+
+#include "Core/FloatingPoint.h"
+
+#include <string>
+
+namespace palpate {
+
+Stencil stencil(const EdgeEdgeContact& contact) {
+  const StandardFloatingPoint standard;
+  return {{contact.edgeA[0], contact.edgeA[1], contact.edgeB[0], contact.edgeB[1]},
+          {1.0 - contact.weightA, contact.weightA, contact.weightB - 1.0, -contact.weightB}};
+}
+
+double ConstraintRow::gap(std::span<const Eigen::Vector3d> positions) const {
+  const StandardFloatingPoint standard;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < 4; ++i) sum += weights[i] * positions[vertices[i]];
+  return normal.dot(sum) - offset;
+}
+
+void appendRows(const CollisionData& contacts, const SolverVertices& a, const SolverVertices& b,
+                std::vector<ConstraintRow>& rows) {
+  const StandardFloatingPoint standard;
+  const Method method = contacts.validity().method;
+  const bool swept = method == Method::Continuous || method == Method::Auto;
+  const std::size_t given = rows.size();
+  const auto add = [&](const auto& contact, const std::array<const SolverVertices*, 4>& sides) {
+    const auto [vertices, weights] = stencil(contact);
+    const double time = swept ? contact.timeOfImpact : 1.0;
+    ConstraintRow row{{}, weights, contact.normal, 0.0};
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < 4; ++i) {
+      const SolverVertices& side = *sides[i];
+      if (vertices[i] >= side.before.size() || vertices[i] >= side.now.size()) {
+        rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(given), rows.end());
+        throw Error(ErrorCode::WrongPositionCount,
+                    "appendRows(): a contact has vertex " + std::to_string(vertices[i]) + " of " +
+                        (sides[i] == &a ? "a" : "b") + ", which has " +
+                        std::to_string(side.before.size()) + " positions before and " +
+                        std::to_string(side.now.size()) + " now",
+                    {}, vertices[i]);
+      }
+      row.vertices[i] = side.first + vertices[i];
+      sum += weights[i] * ((1 - time) * side.before[vertices[i]] + time * side.now[vertices[i]]);
+    }
+    row.offset = contact.normal.dot(sum) - contact.distance;
+    rows.push_back(row);
+  };
+  for (const auto& contact : contacts.vertexTriangle()) add(contact, {&a, &b, &b, &b});
+  for (const auto& contact : contacts.triangleVertex()) add(contact, {&b, &a, &a, &a});
+  for (const auto& contact : contacts.edgeEdge()) add(contact, {&a, &a, &b, &b});
+  const std::uint32_t first = a.now.empty() ? b.first : a.first;  // the other is the shape
+  for (const ShapeContact& contact : contacts.shape()) {
+    const auto& [i, j, k] = contact.vertices;
+    rows.push_back({{first + i, first + j, first + k, first + i},
+                    {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
+                    contact.normal,
+                    contact.normal.dot(contact.point) - contact.distance});
+  }
+}
+
+void forEachEntry(std::span<const ConstraintRow> rows, void (*entry)(void*, int, int, double),
+                  void* context) {
+  const StandardFloatingPoint standard;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (rows[r].weights[i] == 0) continue;
+      for (int axis = 0; axis < 3; ++axis) {
+        entry(context, static_cast<int>(r), static_cast<int>(3 * rows[r].vertices[i] + axis),
+              rows[r].weights[i] * rows[r].normal[axis]);
+      }
+    }
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <csignal>
+#include <cstdlib>
+#include <functional>
+#include <string>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define PALPATE_SANITIZED
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define PALPATE_SANITIZED
+#endif
+#endif
+
+namespace palpate::testing {
+
+#ifdef PALPATE_SANITIZED
+inline constexpr bool kSanitized = true;
+#else
+inline constexpr bool kSanitized = false;
+#endif
+
+/// What became of a child: "passed", "failed", "exit 3", or "signal 14" (SIGALRM: it hung).
+/// The child runs `body` and leaves without running what is registered for the end of the process.
+inline std::string inChild(const std::function<bool()>& body, unsigned seconds = 20) {
+  const pid_t child = fork();
+  if (child < 0) return "no fork";
+  if (child == 0) {
+    std::signal(SIGALRM, SIG_DFL);
+    alarm(seconds);
+    bool passed = false;
+    try {
+      passed = body();
+    } catch (...) {
+      _exit(3);
+    }
+    _exit(passed ? 0 : 1);
+  }
+  int status = 0;
+  if (waitpid(child, &status, 0) != child) return "not waited for";
+  if (WIFSIGNALED(status)) return "signal " + std::to_string(WTERMSIG(status));
+  const int code = WEXITSTATUS(status);
+  return code == 0 ? "passed" : code == 1 ? "failed" : "exit " + std::to_string(code);
+}
+
+}  // namespace palpate::testing

@@ -1,0 +1,335 @@
+#include <palpate/Executor.h>
+
+#include "Core/Threads.h"
+
+#include <palpate/Capture.h>
+#include <palpate/Error.h>
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/RandomMeshes.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+// Executors of the caller's: what they do with tasks changes no result.
+
+namespace palpate {
+namespace {
+
+/// Runs tasks as the function does.
+class FunctionExecutor : public Executor {
+ public:
+  using Run = std::function<void(std::size_t count, Task task, void* context)>;
+  FunctionExecutor(int concurrency, Run run) : m_concurrency(concurrency), m_run(std::move(run)) {}
+  int concurrency() const noexcept override { return m_concurrency; }
+  void run(std::size_t count, Task task, void* context) override {
+    ++calls;
+    m_run(count, task, context);
+  }
+  std::atomic<int> calls{0};
+
+ private:
+  int m_concurrency;
+  Run m_run;
+};
+
+std::shared_ptr<FunctionExecutor> executorOf(int concurrency, FunctionExecutor::Run run) {
+  return std::make_shared<FunctionExecutor>(concurrency, std::move(run));
+}
+
+void backwards(std::size_t count, Executor::Task task, void* context) {
+  while (count-- > 0) task(context, count);
+}
+
+/// A thread for each task, none of them the caller's.
+void onThreads(std::size_t count, Executor::Task task, void* context) {
+  std::vector<std::thread> threads;
+  for (std::size_t i = 0; i < count; ++i) threads.emplace_back([=] { task(context, i); });
+  for (std::thread& thread : threads) thread.join();
+}
+
+struct Named {
+  std::string name;
+  std::shared_ptr<Executor> executor;
+};
+
+std::vector<Named> executors() {
+  return {{"the library's pool", makeThreadPool(3)},
+          {"backwards", executorOf(4, backwards)},
+          {"a thread for each task", executorOf(3, onThreads)},
+          {"first half on a thread, the rest here",
+           executorOf(5, [](std::size_t count, Executor::Task task, void* context) {
+             std::thread other([=] {
+               for (std::size_t i = 0; i < count / 2; ++i) task(context, i);
+             });
+             for (std::size_t i = count / 2; i < count; ++i) task(context, i);
+             other.join();
+           })}};
+}
+
+/// Two meshes that move: contacts of each method in a few frames.
+std::vector<std::uint64_t> hashesOf(const Settings& settings, std::uint64_t seed, int frames = 4) {
+  std::vector<std::uint64_t> hashes;
+  for (const Method method :
+       {Method::Intersection, Method::Proximity, Method::Continuous, Method::Auto}) {
+    testing::Random random(seed);
+    testing::Mesh a = testing::soup(random, 400, 0.05);
+    const testing::Mesh b = testing::sheet(24, 0.5, 0.3);
+    OctreeBasedCD detection(settings);
+    const GeometryId idA = detection.addTriangleMesh(a.positions, a.triangles),
+                     idB = detection.addTriangleMesh(b.positions, b.triangles);
+    PairSettings pair;
+    pair.method = method;
+    pair.thickness = 0.01;
+    detection.addCollisionPair(idA, idB, pair);
+    detection.addCollisionPair(idA, idA, pair);
+    for (int frame = 0; frame < frames; ++frame) {
+      const std::vector<Eigen::Vector3d> before = a.positions;
+      for (Eigen::Vector3d& p : a.positions) p.z() += 0.01;
+      detection.setPositions(idA, before, a.positions);
+      detection.detectCollision();
+      hashes.push_back(detection.collisionData(idA, idB).hash());
+      hashes.push_back(detection.collisionData(idA, idA).hash());
+    }
+  }
+  return hashes;
+}
+
+Settings sharing(std::shared_ptr<Executor> executor, int threads = 0) {
+  Settings settings;
+  settings.threads = threads;
+  settings.executor = std::move(executor);
+  return settings;
+}
+
+bool allRun(const Threads& threads, std::size_t size = 1000) {
+  std::vector<int> runs(size, 0);
+  threads.forEach(size, [&](std::size_t i) { ++runs[i]; });
+  return std::all_of(runs.begin(), runs.end(), [](int n) { return n == 1; });
+}
+
+TEST(Executor, ChangesNoBitOfAFrame) {
+  const std::vector<std::uint64_t> truth = hashesOf({.threads = 1}, 1);
+  EXPECT_GT(std::count_if(truth.begin(), truth.end(), [&](auto h) { return h != truth[0]; }), 8);
+  for (const auto& [name, executor] : executors())
+    for (const int threads : {0, 1, 2})
+      EXPECT_EQ(hashesOf(sharing(executor, threads), 1), truth) << name << ' ' << threads;
+}
+
+TEST(Executor, RunsTheWorkOfAFrame) {
+  const auto executor = executorOf(2, backwards);
+  hashesOf(sharing(executor), 1);
+  EXPECT_GT(executor->calls, 4);
+  const auto unused = executorOf(2, backwards);
+  hashesOf(sharing(unused, 1), 1);
+  EXPECT_EQ(unused->calls, 0) << "one thread needs none";
+}
+
+TEST(Executor, IsSharedByObjectsInSeveralThreads) {
+  for (const auto& [name, shared] : executors()) {
+    const std::shared_ptr<Executor>& executor = shared;
+    std::vector<std::vector<std::uint64_t>> truth, found(3);
+    for (std::uint64_t i = 0; i < found.size(); ++i) truth.push_back(hashesOf({.threads = 1}, i));
+    std::vector<std::thread> threads;
+    for (std::uint64_t i = 0; i < found.size(); ++i)
+      threads.emplace_back([&, i] { found[i] = hashesOf(sharing(executor), i); });
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(found, truth) << name;
+  }
+}
+
+TEST(Executor, CountIsItsConcurrencyOrLess) {
+  EXPECT_EQ(Threads(0, executorOf(5, backwards)).count(), 5);
+  EXPECT_EQ(Threads(3, executorOf(5, backwards)).count(), 3);
+  EXPECT_EQ(Threads(9, executorOf(5, backwards)).count(), 5);
+  EXPECT_EQ(Threads(0, makeThreadPool(4)).count(), 4);
+  EXPECT_EQ(makeThreadPool(1)->concurrency(), 1);
+  EXPECT_GE(makeThreadPool()->concurrency(), 1);
+}
+
+TEST(Executor, NoMoreThreadsThanAskedFor) {
+  for (const std::shared_ptr<Executor>& executor :
+       {makeThreadPool(8), std::shared_ptr<Executor>(executorOf(8, onThreads))}) {
+    const Threads threads(2, executor);
+    std::atomic<int> now{0}, most{0};
+    threads.forEach(200, [&](std::size_t) {
+      const int inside = ++now;
+      for (int seen = most; seen < inside && !most.compare_exchange_weak(seen, inside);) {
+      }
+      std::this_thread::sleep_for(std::chrono::microseconds(20));
+      --now;
+    });
+    EXPECT_LE(most, 2);
+  }
+}
+
+TEST(Executor, NestedLoopsAreComplete) {
+  for (const auto& [name, executor] : executors()) {
+    const Threads threads(0, executor);
+    std::vector<std::vector<int>> runs(20, std::vector<int>(30, 0));
+    threads.forEach(runs.size(), [&](std::size_t i) {
+      threads.forEach(runs[i].size(), [&](std::size_t j) { ++runs[i][j]; });
+    });
+    for (const auto& row : runs) EXPECT_EQ(row, std::vector<int>(30, 1)) << name;
+  }
+}
+
+TEST(Executor, TheExceptionOfTheLowestIndexIsRethrown) {
+  for (const auto& [name, executor] : executors()) {
+    for (const int count : {0, 2}) {
+      const Threads threads(count, executor);
+      for (int repeat = 0; repeat < 20; ++repeat) {
+        std::string message;
+        try {
+          threads.forEach(100, [](std::size_t i) {
+            if (i % 30 == 17) throw std::runtime_error(std::to_string(i));
+          });
+        } catch (const std::runtime_error& error) {
+          message = error.what();
+        }
+        EXPECT_EQ(message, "17") << name;
+        EXPECT_TRUE(allRun(threads));
+      }
+    }
+  }
+}
+
+TEST(Executor, WithoutConcurrencyIsRefused) {
+  for (const int concurrency : {0, -1}) {
+    try {
+      OctreeBasedCD detection(sharing(executorOf(concurrency, backwards)));
+      ADD_FAILURE() << concurrency;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::InvalidSettings);
+    }
+  }
+  for (const int threads : {-1, 1025}) EXPECT_THROW(makeThreadPool(threads), Error) << threads;
+}
+
+/// Tasks that a faulty executor has put off.
+struct Later {
+  Executor::Task task;
+  void* context;
+};
+
+TEST(Executor, ReturningEarlyIsAnErrorAndTasksThatComeLaterDoNothing) {
+  std::vector<Later> later;
+  bool faulty = true;
+  const auto executor = executorOf(3, [&](std::size_t count, Executor::Task task, void* context) {
+    std::size_t i = 0;
+    if (!faulty)
+      for (; i < count; ++i) task(context, i);
+    for (; i < count; ++i) later.push_back({task, context});
+  });
+  {
+    const Threads threads(0, executor);
+    std::atomic<int> runs{0};
+    for (int repeat = 0; repeat < 3; ++repeat) {
+      try {
+        threads.forEach(10, [&](std::size_t) { ++runs; });
+        ADD_FAILURE() << "no error";
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::InvalidSettings);
+      }
+      faulty = false;
+      EXPECT_TRUE(allRun(threads));
+      faulty = true;
+    }
+    EXPECT_EQ(runs, 0);
+    ASSERT_EQ(later.size(), 9u);
+    for (std::size_t i = 0; i + 2 < later.size(); ++i) later[i].task(later[i].context, 0);
+    faulty = false;
+    EXPECT_TRUE(allRun(threads));
+    EXPECT_EQ(runs, 0);
+    // The last two come in the end, so that the memory of all loops is given back.
+    for (std::size_t i = 7; i < later.size(); ++i) later[i].task(later[i].context, 0);
+  }
+}
+
+TEST(Executor, ReturningWhileTasksRunWaitsForThem) {
+  std::vector<std::thread> running;
+  const auto executor = executorOf(3, [&](std::size_t count, Executor::Task task, void* context) {
+    std::atomic<std::size_t> begun{0};
+    for (std::size_t i = 0; i < count; ++i) running.emplace_back([=] { task(context, i); });
+    while (begun++ < 1000) std::this_thread::yield();
+  });
+  const Threads threads(0, executor);
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    std::vector<int> runs(40, 0);
+    bool complete = true;
+    try {
+      threads.forEach(runs.size(), [&](std::size_t i) {
+        std::this_thread::sleep_for(std::chrono::microseconds(100));
+        ++runs[i];
+      });
+    } catch (const Error&) {
+      complete = false;
+    }
+    // No task is at work any more: reading is no race, and where there was no error all have run.
+    for (const int n : runs) EXPECT_TRUE(n == 1 || (n == 0 && !complete));
+    for (std::thread& thread : running) thread.join();
+    running.clear();
+  }
+}
+
+TEST(Executor, ItsExceptionPassesOnAfterTheTasksThatHadBegun) {
+  std::thread running;
+  bool faulty = true;
+  const auto executor = executorOf(2, [&](std::size_t count, Executor::Task task, void* context) {
+    if (!faulty) return backwards(count, task, context);
+    std::atomic<bool> begun{false};
+    running = std::thread([&, task, context] {
+      begun = true;
+      task(context, 0);
+    });
+    while (!begun) std::this_thread::yield();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    throw std::bad_alloc();
+  });
+  auto threads = std::make_unique<Threads>(0, executor);
+  std::vector<int> runs(1000, 0);
+  EXPECT_THROW(threads->forEach(runs.size(),
+                                [&](std::size_t i) {
+                                  std::this_thread::sleep_for(std::chrono::microseconds(10));
+                                  ++runs[i];
+                                }),
+               std::bad_alloc);
+  EXPECT_LT(std::count(runs.begin(), runs.end(), 1), 1000);
+  running.join();
+  faulty = false;
+  EXPECT_TRUE(allRun(*threads));
+}
+
+TEST(Executor, IsNoPartOfAProblem) {
+  OctreeBasedCD detection(sharing(executorOf(2, backwards)));
+  EXPECT_TRUE(detection.settings().executor);
+  const CollisionProblem problem = detection.problem();
+  EXPECT_FALSE(problem.settings.executor);
+  EXPECT_FALSE(setUp(problem).settings().executor);
+}
+
+TEST(Executor, ThePoolRunsTasksOfTheProgram) {
+  const std::shared_ptr<Executor> pool = makeThreadPool(3);
+  std::vector<int> runs(100, 0);
+  pool->run(
+      runs.size(),
+      [](void* context, std::size_t i) noexcept {
+        ++(*static_cast<std::vector<int>*>(context))[i];
+      },
+      &runs);
+  EXPECT_EQ(runs, std::vector<int>(100, 1));
+}
+
+}  // namespace
+}  // namespace palpate
