@@ -91,21 +91,32 @@ FloatBox boundsOf(Geometry& geometry, const Threads& threads) {
   return bounds;
 }
 
+/// Triangles in the memory that may have been keys. Their values are indeterminate.
+void startTriangles(Geometry& geometry) {
+  const std::size_t size = geometry.mesh.topology.triangles.size();
+  geometry.orderedTriangles = {};
+  geometry.orderedTriangles =
+      geometry.triangleMemory.start<Triangle>(size + BoxArrays::kPadding).first(size);
+}
+
+/// The tree is not known until fitBoxes() has succeeded: an exception leaves it to be built anew.
 void rebuild(Geometry& geometry, const OctreeSettings& settings, const Threads& threads) {
   Stopwatch watch;
   Octree& octree = geometry.octree;
   const std::vector<Triangle>& triangles = geometry.mesh.topology.triangles;
   if (!geometry.treeKnown) {
     octree.reset(triangles.size());
-    geometry.orderedTriangles.reserve(triangles.size() + BoxArrays::kPadding);
-    geometry.orderedTriangles.assign(triangles.begin(), triangles.end());
-    geometry.treeKnown = true;
+    startTriangles(geometry);
+    std::copy(triangles.begin(), triangles.end(), geometry.orderedTriangles.begin());
   }
+  geometry.treeKnown = false;
   const FloatBox bounds = boundsOf(geometry, threads);
   geometry.boxMilliseconds += watch.lap();
   // Triangles in the old order are of no use any more: their memory is the keys'.
-  auto* keys = reinterpret_cast<std::uint64_t*>(geometry.orderedTriangles.data());
+  geometry.orderedTriangles = {};
+  const auto keys = geometry.triangleMemory.start<std::uint64_t>(triangles.size());
   octree.build(bounds, geometry.spread * geometry.frame.scale, settings, keys, threads);
+  startTriangles(geometry);
   geometry.octreeMilliseconds += watch.lap();
 }
 
@@ -120,10 +131,8 @@ void fitBoxes(Geometry& geometry, const OctreeSettings& settings, const Threads&
   geometry.octreeMilliseconds += watch.lap();
 }
 
-void updateOctree(Geometry& geometry, const OctreeSettings& settings, const Threads& threads) {
+void refitOrRebuild(Geometry& geometry, const OctreeSettings& settings, const Threads& threads) {
   using Update = LooseOctree::Update;
-  geometry.treeRevision = geometry.revisionForTree();
-  geometry.treeSwept = geometry.treeSweeps();
   Stopwatch watch;
   computeFloats(geometry.mesh.now.body(), geometry.frame, geometry.floats, threads);
   if (geometry.mesh.topology.triangles.empty()) {
@@ -141,7 +150,16 @@ void updateOctree(Geometry& geometry, const OctreeSettings& settings, const Thre
   }
   rebuild(geometry, settings, threads);
   fitBoxes(geometry, settings, threads, true);
+  geometry.treeKnown = true;
   geometry.lastUpdate = Update::Rebuilt;
+}
+
+/// The tree is of no revision until it is whole: an exception leaves it to be updated again.
+void updateOctree(Geometry& geometry, const OctreeSettings& settings, const Threads& threads) {
+  geometry.treeRevision = 0;
+  geometry.treeSwept = geometry.treeSweeps();
+  refitOrRebuild(geometry, settings, threads);
+  geometry.treeRevision = geometry.revisionForTree();
 }
 
 double smallestHeight(const TriangleMesh& mesh) {
@@ -401,6 +419,7 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   m_changed.clear();
   for (const auto& geometry : m_geometries) {
     if (geometry->treeIsNow() && geometry->frame.scale == scale) continue;
+    geometry->treeRevision = 0;  // also where the update of another geometry fails
     geometry->frame.scale = scale;
     m_changed.push_back(geometry.get());
   }

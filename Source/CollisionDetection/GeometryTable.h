@@ -6,6 +6,7 @@
 
 #include "CollisionDetection/RigidBody.h"
 #include "CollisionDetection/TetrahedronTree.h"
+#include "Core/Arena.h"
 #include "Core/Threads.h"
 #include "Geometry/FloatPositions.h"
 #include "Geometry/Motion.h"
@@ -78,8 +79,9 @@ struct Geometry {
     return treeKnown && treeRevision == (treeSwept ? bodyStepRevision : bodyRevision);
   }
   const FloatPoint* floatsAtStart() const { return (treeSwept ? floatsBefore : floats).data(); }
-  std::vector<Triangle> orderedTriangles;  ///< in the octree's order
-  UnfoldedStars stars;                     ///< of self-collision
+  std::span<Triangle> orderedTriangles;  ///< in the octree's order; none during a build
+  Arena triangleMemory;                  ///< of these, or of the keys of a build
+  UnfoldedStars stars;                   ///< of self-collision
   Octree octree;
   Buffer<std::uint32_t> boundsGroups;  ///< scratch of a rebuild
   Buffer<FloatBox> boundsBoxes;

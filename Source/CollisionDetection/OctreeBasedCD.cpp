@@ -146,7 +146,7 @@ struct OctreeBasedCD::Implementation {
       if (geometry->octree.size() == 0) continue;
       const std::size_t bytes =
           (geometry->floats.capacity() + geometry->floatsBefore.capacity()) * sizeof(FloatPoint) +
-          geometry->orderedTriangles.capacity() * sizeof(Triangle);
+          geometry->triangleMemory.bytes();
       state->trees.push_back({geometry->id, &geometry->octree, geometry->frame.origin,
                               geometry->frame.scale, geometry->lastUpdate, bytes, firstNode});
       firstNode += static_cast<std::uint32_t>(geometry->octree.pool().used() * 8);

@@ -1,6 +1,7 @@
 #include "CollisionDetection/TetrahedronTree.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace palpate {
 
@@ -34,17 +35,20 @@ void set(BoxArrays& boxes, std::size_t i, const FloatBox& box) {
 void TetrahedronTree::update(std::span<const Tetrahedron> tetrahedra, const FloatPoint* floats,
                              double bulk, const OctreeSettings& settings, const Threads& threads) {
   const std::size_t size = tetrahedra.size();
-  if (!m_known) {
+  const bool known = std::exchange(m_known, false);  // until all has succeeded
+  if (!known) {
     m_octree.reset(size);
     m_ordered.assign(tetrahedra.begin(), tetrahedra.end());
   }
   if (size == 0) return;
-  if (m_known && settings.update == OctreeUpdate::Auto) {
+  if (known && settings.update == OctreeUpdate::Auto) {
     fit(floats, threads);
     m_octree.measureLooseness();
-    if (m_octree.looseness() <= kMostLoosening * m_octree.leastLooseness()) return;
+    if (m_octree.looseness() <= kMostLoosening * m_octree.leastLooseness()) {
+      m_known = true;
+      return;
+    }
   }
-  m_known = true;
   FloatBox bounds;
   for (std::size_t i = 0; i < size; ++i) {
     const FloatBox box = boxOf(m_ordered[i], floats);
@@ -52,10 +56,11 @@ void TetrahedronTree::update(std::span<const Tetrahedron> tetrahedra, const Floa
     bounds.add(box);
   }
   m_keys.resize(size);
-  m_octree.build(bounds, bulk, settings, m_keys.data(), threads);
+  m_octree.build(bounds, bulk, settings, m_keys, threads);
   for (std::size_t i = 0; i < size; ++i) m_ordered[i] = tetrahedra[m_octree.order()[i]];
   fit(floats, threads);
   m_octree.measureLooseness();
+  m_known = true;
 }
 
 void TetrahedronTree::fit(const FloatPoint* floats, const Threads& threads) {
