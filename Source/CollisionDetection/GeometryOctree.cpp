@@ -77,8 +77,9 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
     if (!fits) {
       if (!canRefit) {
         m_octree.reset(mesh.topology.triangles.size());
-        m_ordered.reserve(mesh.topology.triangles.size() + BoxArrays::kPadding);
-        m_ordered.assign(mesh.topology.triangles.begin(), mesh.topology.triangles.end());
+        startOrdered(mesh.topology.triangles.size());
+        std::copy(mesh.topology.triangles.begin(), mesh.topology.triangles.end(),
+                  m_ordered.begin());
       }
       rebuild(mesh, settings, threads);
       fitBoxes(mesh, settings, threads, true);
@@ -116,14 +117,23 @@ FloatBox GeometryOctree::bounds(const TriangleMesh& mesh, const Threads& threads
   return all;
 }
 
+/// Triangles in the memory that may have been keys. Their values are indeterminate.
+void GeometryOctree::startOrdered(std::size_t size) {
+  m_ordered = {};
+  m_ordered = m_orderedMemory.start<Triangle>(size + BoxArrays::kPadding).first(size);
+}
+
 void GeometryOctree::rebuild(const TriangleMesh& mesh, const OctreeSettings& settings,
                              const Threads& threads) {
   Stopwatch watch;
   const FloatBox all = bounds(mesh, threads);
   boxMilliseconds += watch.lap();
   // Triangles in the old order are of no use any more: their memory is the keys'.
-  auto* keys = reinterpret_cast<std::uint64_t*>(m_ordered.data());
+  const std::size_t size = m_ordered.size();
+  m_ordered = {};
+  const auto keys = m_orderedMemory.start<std::uint64_t>(size);
   m_octree.build(all, m_spread * m_frame.scale, settings, keys, threads);
+  startOrdered(size);
   octreeMilliseconds += watch.lap();
 }
 
@@ -145,7 +155,7 @@ const Triangle* GeometryOctree::findUnfoldedStars(const TriangleMesh& mesh,
 
 std::size_t GeometryOctree::bytesBesidesOctree() const {
   return (m_floats.capacity() + m_floatsBefore.capacity()) * sizeof(FloatPoint) +
-         m_ordered.capacity() * sizeof(Triangle);
+         m_orderedMemory.bytes();
 }
 
 }  // namespace palpate

@@ -3,6 +3,7 @@
 #include <palpate/LooseOctree.h>
 #include <palpate/Settings.h>
 
+#include "Core/Arena.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
 #include "Geometry/FloatPositions.h"
@@ -12,7 +13,7 @@
 #include "Octree/Octree.h"
 
 #include <cstdint>
-#include <vector>
+#include <span>
 
 namespace palpate {
 
@@ -46,7 +47,7 @@ class GeometryOctree {
     return (m_treeSwept ? m_floatsBefore : m_floats).data();
   }
   /// Elements in the octree's order, readable BoxArrays::kPadding past their end.
-  const std::vector<Triangle>& ordered() const { return m_ordered; }
+  std::span<const Triangle> ordered() const { return m_ordered; }
   std::size_t bytesBesidesOctree() const;
 
   // Of the last update:
@@ -59,6 +60,7 @@ class GeometryOctree {
   void computeBoxes(const TriangleMesh&, std::span<const std::uint32_t> groups,
                     FloatBox* groupBoxes, std::size_t grain, const Threads&, bool reordered);
   FloatBox bounds(const TriangleMesh&, const Threads&);
+  void startOrdered(std::size_t size);
   void rebuild(const TriangleMesh&, const OctreeSettings&, const Threads&);
   void fitBoxes(const TriangleMesh&, const OctreeSettings&, const Threads&, bool rebuilt);
 
@@ -66,7 +68,8 @@ class GeometryOctree {
   double m_spread = 0;
   bool m_swept = false, m_treeSwept = false;
   Buffer<FloatPoint> m_floats, m_floatsBefore;
-  std::vector<Triangle> m_ordered;
+  std::span<Triangle> m_ordered;  ///< none during a build
+  Arena m_orderedMemory;          ///< of these, or of the keys of a build
   UnfoldedStars m_stars;
   Octree m_octree;
   Buffer<std::uint32_t> m_boundsGroups;  ///< scratch of a rebuild

@@ -54,7 +54,7 @@ void TetrahedronTree::update(std::span<const Tetrahedron> tetrahedra, const Floa
     bounds.add(box);
   }
   m_keys.resize(size);
-  m_octree.build(bounds, bulk, settings, m_keys.data(), threads);
+  m_octree.build(bounds, bulk, settings, m_keys, threads);
   for (std::size_t i = 0; i < size; ++i) m_ordered[i] = tetrahedra[m_octree.order()[i]];
   fit(floats, threads);
   m_octree.measureLooseness();

@@ -108,13 +108,13 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
     const auto slot = gathers ? hn::LoadU(di, gatheredSlots + place)
                               : hn::Iota(di, static_cast<std::int32_t>(first + i));
     const auto low = hn::Or(ninth, slot);
-    auto* out = reinterpret_cast<std::int32_t*>(keys + i);
-    if (count == lanes) {
-      hn::StoreInterleaved2(low, key, di, out);
-    } else {
-      hn::StoreInterleaved2(low, key, di, made);
-      std::memcpy(out, made, count * sizeof(std::uint64_t));
-    }
+    // Keys are 64-bit integers: bytes of other types get there by copying only.
+    static_assert(std::endian::native == std::endian::little);
+    hn::StoreInterleaved2(low, key, di, made);
+    if (count == lanes)
+      std::memcpy(keys + i, made, hn::Lanes(d) * sizeof(std::uint64_t));
+    else
+      std::memcpy(keys + i, made, count * sizeof(std::uint64_t));
   }
 }
 

@@ -10,8 +10,8 @@ namespace palpate {
 /// A cube in the float frame, a power of two wide; its lower corner and those of its cells are
 /// exact in double.
 struct Cube {
-  std::array<double, 3> lower{};
-  double edge = 0;
+  std::array<double, 3> lower;
+  double edge;
 
   Cube child(unsigned octant) const {
     const double half = edge * 0.5;

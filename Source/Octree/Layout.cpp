@@ -10,23 +10,32 @@ namespace palpate {
 /// other threads waiting.
 constexpr std::uint32_t kMostInOneTask = 8192;
 
-void Octree::Layout::clear() {
+void Layout::start(const OctreeSettings& settings, std::uint32_t taskSize,
+                   Buffer<std::uint32_t>& ends, const Threads* threads) {
   links.clear();
   parents.clear();
+  tasks.clear();
   m_groupCount = 0;
   groups.resize(groups.capacity());
   groupNodes.resize(groups.size());
   reserveGroups();
-  tasks.clear();
+  m_mostPerLeaf = static_cast<std::uint32_t>(settings.maxPrimitivesPerLeaf);
+  m_maxDepth = std::min(settings.maxDepth, kMostDepth);
+  m_taskSize = taskSize;
+  m_ends = &ends;
+  m_ends->clear();
+  m_threads = threads;
 }
 
-void Octree::Layout::layOutTop(Octree& octree, Job root, const OctreeSettings& settings,
-                               std::uint32_t taskSize, const Threads& threads) {
-  clear();
-  m_mostPerLeaf = static_cast<std::uint32_t>(settings.maxPrimitivesPerLeaf);
-  m_maxDepth = settings.maxDepth;
-  m_taskSize = taskSize;
-  m_threads = &threads;
+void Layout::finish() {
+  groups.resize(m_groupCount);
+  groupNodes.resize(m_groupCount);
+}
+
+void Layout::layOutTop(const KeySort& keys, const Job& root, const OctreeSettings& settings,
+                       std::uint32_t taskSize, Buffer<std::uint32_t>& ends,
+                       const Threads& threads) {
+  start(settings, taskSize, ends, &threads);
   links.emplace_back();
   parents.push_back(0);
   for (unsigned slot = 0; slot < 8; ++slot) {
@@ -34,25 +43,175 @@ void Octree::Layout::layOutTop(Octree& octree, Job root, const OctreeSettings& s
     links[0].child[slot] = OctreeBlock::kLeaf;
   }
   links[0].begin[0] = root.begin;
-  const std::uint32_t child = layOut(octree, root);
+  const std::uint32_t child = layOut(keys, root);
   links[0].child[0] = child;
-  trimGroups();
+  finish();
 }
 
-void Octree::Layout::layOutTask(Octree& octree, const Job& job, const OctreeSettings& settings) {
-  clear();
-  m_mostPerLeaf = static_cast<std::uint32_t>(settings.maxPrimitivesPerLeaf);
-  m_maxDepth = settings.maxDepth;
-  m_taskSize = 0;
-  m_threads = nullptr;
+void Layout::layOutTask(const KeySort& keys, const Job& job, const OctreeSettings& settings,
+                        Buffer<std::uint32_t>& ends) {
+  start(settings, 0, ends, nullptr);
   Job own = job;
   own.node = kTaskRoot;
-  rootChild = layOut(octree, own);
-  trimGroups();
+  rootChild = layOut(keys, own);
+  finish();
+}
+
+/// Returns what the parent's slot says of the job's node. An explicit path in place of recursion:
+/// its size on the stack is known, about 7 KB.
+std::uint32_t Layout::layOut(const KeySort& keys, const Job& job) {
+  std::array<OpenNode, kMostDepth + 1> path;
+  OpenNode* node = path.data();
+  node->job = job;
+  if (!open(keys, *node)) return node->link;
+  for (;;) {
+    OpenNode* const child = node + 1;
+    if (nextChild(*node, child->job)) {
+      PALPATE_ASSERT(child < path.data() + path.size());
+      const bool opened = open(keys, *child);
+      links[node->link].child[node->nextSlot - 1] = child->link;
+      if (opened) node = child;
+    } else {
+      m_ends->resize(node->endsBefore);
+      reserveGroups();
+      if (node == path.data()) return node->link;
+      --node;
+    }
+  }
+}
+
+/// Gives a node its link: to a leaf, a task, or a block. Returns whether it is a block, whose
+/// slots are then to be laid out.
+bool Layout::open(const KeySort& keys, OpenNode& node) {
+  Job& job = node.job;
+  const std::uint32_t size = job.end - job.begin;
+  if (size <= m_mostPerLeaf || job.depth >= m_maxDepth || job.cube.edge <= kSmallestCell) {
+    node.link = addLeaf(job.begin, job.end, job.node);
+    return false;
+  }
+  const bool sorted = job.level < job.sorted;
+  if (m_taskSize > 0 && size <= (sorted ? m_taskSize : std::max(m_taskSize, kMostInOneTask))) {
+    job.sorted = job.level;  // `ends` are gone by then
+    tasks.push_back(job);
+    addLeaf(job.begin, job.end, kTask | static_cast<std::uint32_t>(tasks.size() - 1));
+    node.link = 0;  // known when the tasks are done
+    return false;
+  }
+  node.endsBefore = static_cast<std::uint32_t>(m_ends->size());
+  if (sorted)
+    findParts(keys, node);
+  else
+    sort(keys, node);
+  if (node.begins[0] == job.end) {
+    m_ends->resize(node.endsBefore);
+    node.link = addLeaf(job.begin, job.end, job.node);
+    return false;
+  }
+  if (node.begins[0] > job.begin) addLeaf(job.begin, node.begins[0], job.node);
+  reserveGroups();
+  node.link = addBlock(node);
+  node.nextSlot = 0;
+  return true;
+}
+
+/// Sorts the node's range by the next digits, three if it is long and else two or one, and finds
+/// its parts. Where no digits are left, new keys are computed within the node's cell.
+void Layout::sort(const KeySort& keys, OpenNode& node) {
+  Job& job = node.job;
+  KeyRange range{job.begin, job.end, job.level};
+  if (job.level == job.levels) {
+    range.first = job.levels == 0;
+    range.level = job.level = 0;
+    range.levels = job.levels = std::min(Key::kMostLevels, m_maxDepth - job.depth);
+    range.cube = &job.cube;
+  }
+  const std::uint32_t size = job.end - job.begin;
+  if (size <= KeyRange::kFew) {
+    job.sorted = job.level + 1;
+    node.begins = keys.byOneDigit(range);
+    return;
+  }
+  range.digits =
+      std::min(size >= KeyRange::kMany ? PartEnds::kMostDigits : 2, Key::kMostLevels - job.level);
+  const std::size_t count = PartEnds::kCounts[static_cast<std::size_t>(range.digits)];
+  m_ends->resize(node.endsBefore + count);
+  const int alike = keys.byDigits(range, m_ends->data() + node.endsBefore, m_threads);
+  job.sorted = alike ? alike : job.level + range.digits;
+  job.ends = alike ? kAlike : node.endsBefore;
+  findParts(keys, node);
+}
+
+/// Where the octants of a sorted range begin, and where it ends.
+void Layout::findParts(const KeySort& keys, OpenNode& node) const {
+  const Job& job = node.job;
+  if (job.ends == kAlike) {
+    const std::uint64_t digit = Key::digits(keys[job.begin], job.level, 1);
+    for (unsigned octant = 0; octant < 9; ++octant)
+      node.begins[octant] = digit >= Key::kOctant + octant ? job.begin : job.end;
+    return;
+  }
+  const std::uint32_t* ends = m_ends->data() + job.ends;
+  const std::size_t perOctant =
+      PartEnds::kCounts[static_cast<std::size_t>(job.sorted - job.level - 1)];
+  for (std::size_t octant = 0; octant < 9; ++octant) node.begins[octant] = ends[octant * perOctant];
+}
+
+std::uint32_t Layout::addBlock(const OpenNode& node) {
+  const auto block = static_cast<std::uint32_t>(links.size());
+  if (block == links.capacity()) {  // by less than std::vector would: there are many layouts
+    links.reserve(block + block / 8 + 2);
+    parents.reserve(links.capacity());
+  }
+  links.emplace_back();
+  parents.push_back(node.job.node);
+  for (unsigned slot = 0; slot < 8; ++slot) {
+    links[block].begin[slot] = node.begins[slot];
+    links[block].child[slot] = OctreeBlock::kLeaf | (node.begins[slot + 1] - node.begins[slot]);
+  }
+  return block;
+}
+
+/// Adds the groups of leaves from nextSlot on, up to the next child that is to be laid out itself.
+/// Returns whether there is one.
+bool Layout::nextChild(OpenNode& parent, Job& child) {
+  const Job& job = parent.job;
+  for (unsigned slot = parent.nextSlot; slot < 8; ++slot) {
+    const std::uint32_t begin = parent.begins[slot], size = parent.begins[slot + 1] - begin;
+    const OctreeNode node = parent.link * 8 + slot;
+    if (size <= m_mostPerLeaf) {
+      // An empty slot's is overwritten by the next: no branch to be mispredicted.
+      groups[m_groupCount] = begin;
+      groupNodes[m_groupCount] = node;
+      m_groupCount += size > 0;
+      continue;
+    }
+    parent.nextSlot = slot + 1;
+    child.begin = begin;
+    child.end = begin + size;
+    child.cube = job.cube.child(slot);
+    child.node = node;
+    child.depth = job.depth + 1;
+    child.levels = job.levels;
+    child.level = job.level + 1;
+    child.sorted = job.sorted;
+    child.ends = kAlike;
+    if (job.ends != kAlike && child.level < job.sorted)
+      child.ends = job.ends + 1 +
+                   slot * PartEnds::kCounts[static_cast<std::size_t>(job.sorted - job.level - 1)];
+    return true;
+  }
+  return false;
+}
+
+std::uint32_t Layout::addLeaf(std::uint32_t begin, std::uint32_t end, OctreeNode node) {
+  groups[m_groupCount] = begin;
+  groupNodes[m_groupCount++] = node;
+  reserveGroups();
+  return OctreeBlock::kLeaf | (end - begin);
 }
 
 /// Room for those of a block's eight slots and one more.
-void Octree::Layout::reserveGroups() {
+void Layout::reserveGroups() {
   if (m_groupCount + 9 <= groups.size()) return;
   groups.reserve(groups.size() + groups.size() / 8 + 16);
   groups.resize(groups.capacity());
@@ -60,106 +219,9 @@ void Octree::Layout::reserveGroups() {
   groupNodes.resize(groups.size());
 }
 
-std::uint32_t Octree::Layout::leaf(std::uint32_t begin, std::uint32_t end, OctreeNode node) {
-  groups[m_groupCount] = begin;
-  groupNodes[m_groupCount++] = node;
-  reserveGroups();
-  return OctreeBlock::kLeaf | (end - begin);
-}
-
-std::uint32_t Octree::Layout::layOut(Octree& octree, Job& job) {
-  const std::uint32_t size = job.end - job.begin;
-  if (size <= m_mostPerLeaf || job.depth >= m_maxDepth || job.cube.edge <= kSmallestCell)
-    return leaf(job.begin, job.end, job.node);
-  const bool sorted = job.level < job.sorted;
-  if (m_taskSize > 0 && size <= (sorted ? m_taskSize : std::max(m_taskSize, kMostInOneTask))) {
-    job.sorted = job.level;  // `ends` are gone by then
-    tasks.push_back(job);
-    leaf(job.begin, job.end, kTask | static_cast<std::uint32_t>(tasks.size() - 1));
-    return 0;  // known when the tasks are done
-  }
-  if (sorted) return split(octree, job, partsOf(octree, job));
-  Sorting sorting{job.begin, job.end, job.level};
-  if (job.level == job.levels) {  // the first keys, or second ones inside a cell too full
-    sorting.first = job.levels == 0;
-    sorting.level = job.level = 0;
-    sorting.levels = job.levels = std::min(Key::kMostLevels, m_maxDepth - job.depth);
-    sorting.cube = &job.cube;
-  }
-  if (size > Sorting::kFew) return sortMany(octree, job, sorting);
-  job.sorted = job.level + 1;
-  return split(octree, job, octree.sortFewKeys(sorting));
-}
-
-/// In a stack frame of its own, as large as its bins.
-[[gnu::noinline]] std::uint32_t Octree::Layout::sortMany(Octree& octree, Job& job,
-                                                         Sorting& sorting) {
-  const bool many = job.end - job.begin >= Sorting::kMany;
-  sorting.digits = job.digits =
-      std::min(many ? Sorting::kMostDigits : 2, Key::kMostLevels - job.level);
-  std::array<std::uint32_t, 1 << Key::kDigitBits * Sorting::kMostDigits> ends;
-  const int alike = octree.sortKeys(sorting, ends.data(), m_threads);
-  job.ends = alike ? nullptr : ends.data();
-  job.sorted = alike ? alike : job.level + job.digits;
-  return split(octree, job, partsOf(octree, job));
-}
-
-/// Where the octants of a sorted range begin, and where it ends.
-std::array<std::uint32_t, 9> Octree::Layout::partsOf(const Octree& octree, const Job& job) {
-  std::array<std::uint32_t, 9> begins;
-  if (!job.ends) {
-    const std::uint64_t digit = Key::digits(octree.m_keys[job.begin], job.level, 1);
-    for (unsigned part = 0; part < 9; ++part)
-      begins[part] = digit >= Key::kOctant + part ? job.begin : job.end;
-    return begins;
-  }
-  const int below = Key::kDigitBits * (job.sorted - job.level - 1);
-  std::uint64_t bin = Key::digits(octree.m_keys[job.begin], job.sorted - job.digits, job.digits);
-  bin = bin >> (below + Key::kDigitBits) << (below + Key::kDigitBits);
-  begins[0] = job.ends[bin];
-  for (std::uint64_t octant = 0; octant < 8; ++octant)
-    begins[octant + 1] = job.ends[bin + ((Key::kOctant + octant + 1) << below) - 1];
-  return begins;
-}
-
-std::uint32_t Octree::Layout::split(Octree& octree, const Job& job,
-                                    const std::array<std::uint32_t, 9>& begins) {
-  if (begins[0] == job.end) return leaf(job.begin, job.end, job.node);
-  if (begins[0] > job.begin) leaf(job.begin, begins[0], job.node);
-  reserveGroups();
-  const auto block = static_cast<std::uint32_t>(links.size());
-  if (block == links.capacity()) {  // by less than std::vector would: there are many layouts
-    links.reserve(block + block / 8 + 2);
-    parents.reserve(links.capacity());
-  }
-  links.emplace_back();
-  parents.push_back(job.node);
-  for (unsigned slot = 0; slot < 8; ++slot) {
-    links[block].begin[slot] = begins[slot];
-    links[block].child[slot] = OctreeBlock::kLeaf | (begins[slot + 1] - begins[slot]);
-  }
-  for (unsigned slot = 0; slot < 8; ++slot) {
-    const std::uint32_t size = begins[slot + 1] - begins[slot];
-    const OctreeNode node = block * 8 + slot;
-    if (size > m_mostPerLeaf) {
-      Job part = job;
-      part.begin = begins[slot];
-      part.end = begins[slot + 1];
-      part.cube = job.cube.child(slot);
-      part.node = node;
-      ++part.depth;
-      ++part.level;
-      const std::uint32_t child = layOut(octree, part);
-      links[block].child[slot] = child;
-      reserveGroups();
-    } else {
-      // An empty slot's is overwritten by the next: no branch to be mispredicted.
-      groups[m_groupCount] = begins[slot];
-      groupNodes[m_groupCount] = node;
-      m_groupCount += size > 0;
-    }
-  }
-  return block;
+std::size_t Layout::bytes() const {
+  const auto of = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
+  return of(links) + of(parents) + of(groups) + of(groupNodes) + of(tasks);
 }
 
 }  // namespace palpate

@@ -20,6 +20,13 @@ const Tree* treeOf(const LooseOctree::State& state, GeometryId geometry) {
   return found == state.trees.end() ? nullptr : &*found;
 }
 
+/// Calls f(tree) for those that have nodes. A tree whose last update failed has none.
+template <class F>
+void forEachTree(const LooseOctree::State& state, F&& f) {
+  for (const Tree& tree : state.trees)
+    if (tree.octree->isBuilt()) f(tree);
+}
+
 /// Calls f(node, depth) for each node in use, parents before children.
 template <class F>
 void forEachNode(const Octree& octree, OctreeNode node, int depth, F&& f) {
@@ -55,7 +62,7 @@ CellOfNode cellOf(const Octree& octree, OctreeNode node) {
 
 std::vector<LooseOctree::NodeId> LooseOctree::nodes(GeometryId geometry) const {
   std::vector<NodeId> ids;
-  if (const Tree* tree = treeOf(*m_state, geometry))
+  if (const Tree* tree = treeOf(*m_state, geometry); tree && tree->octree->isBuilt())
     forEachNode(*tree->octree, 0, 0,
                 [&](OctreeNode node, int) { ids.push_back(NodeId{tree->firstNode + node}); });
   return ids;
@@ -70,7 +77,7 @@ std::vector<LooseOctree::NodeId> LooseOctree::nodes() const {
 
 std::optional<LooseOctree::NodeId> LooseOctree::root(GeometryId geometry) const {
   const Tree* tree = treeOf(*m_state, geometry);
-  return tree ? std::optional(NodeId{tree->firstNode}) : std::nullopt;
+  return tree && tree->octree->isBuilt() ? std::optional(NodeId{tree->firstNode}) : std::nullopt;
 }
 
 LooseOctree::Node LooseOctree::node(NodeId id) const {
@@ -84,6 +91,7 @@ LooseOctree::Node LooseOctree::node(NodeId id) const {
   const Tree& tree = *std::prev(next);
   const Octree& octree = *tree.octree;
   const OctreeNode node = index - tree.firstNode;
+  octree.requireBuilt();
   if (node >= octree.pool().used() * 8 || octree.blocks()[node >> 3].isEmpty(node & 7))
     throw Error(ErrorCode::IndexOutOfRange,
                 "octree node " + std::to_string(index) + " does not exist or is empty");
@@ -123,7 +131,7 @@ LooseOctree::Update LooseOctree::lastUpdate(GeometryId geometry) const {
 
 OctreeStatistics LooseOctree::statistics() const {
   OctreeStatistics statistics;
-  for (const Tree& tree : m_state->trees) {
+  forEachTree(*m_state, [&](const Tree& tree) {
     const Octree& octree = *tree.octree;
     statistics.blocksInUse += octree.pool().used();
     statistics.blocksFree += octree.pool().free();
@@ -144,7 +152,7 @@ OctreeStatistics LooseOctree::statistics() const {
       statistics.mostPrimitivesInNode =
           std::max<std::size_t>(statistics.mostPrimitivesInNode, end - begin);
     });
-  }
+  });
   statistics.nodesAllocated = 8 * statistics.blocksAllocated;
   return statistics;
 }

@@ -3,15 +3,17 @@
 #include <palpate/LooseOctree.h>
 #include <palpate/Settings.h>
 
+#include "Core/Arena.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
 #include "Math/Box.h"
 #include "Octree/Keys.h"
 
-#include <bit>
+#include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <span>
-#include <vector>
+#include <utility>
 
 namespace palpate {
 
@@ -47,42 +49,80 @@ static_assert(sizeof(OctreeBlock) == 256,
 
 /// Blocks, numbered from 0. Grows by at least kGrowth blocks and by half of what it has; blocks
 /// that a smaller tree no longer needs stay in it, free.
+///
+/// While a tree is built, before it has blocks, their memory is lent to other elements.
 class BlockPool {
  public:
   static constexpr std::size_t kGrowth = 64;
 
-  void use(std::size_t blocks) {
-    if (blocks > m_blocks.size())
-      m_blocks.resize(std::max(blocks, m_blocks.size() + std::max(kGrowth, m_blocks.size() / 2)));
-    m_used = blocks;
+  /// So many elements in place of all blocks. Their values are indeterminate.
+  template <class T>
+  std::span<T> lend(std::size_t count) {
+    m_blocks = {};
+    reserve((count * sizeof(T) + sizeof(OctreeBlock) - 1) / sizeof(OctreeBlock));
+    return m_memory.start<T>(count);
   }
-  std::size_t used() const { return m_used; }
-  std::size_t free() const { return m_blocks.size() - m_used; }
-  std::size_t allocated() const { return m_blocks.size(); }
+  /// So many blocks in place of what was there. Their values are indeterminate.
+  void start(std::size_t blocks) {
+    m_blocks = {};
+    reserve(blocks);
+    m_blocks = m_memory.start<OctreeBlock>(blocks);
+  }
+  std::size_t used() const { return m_blocks.size(); }
+  std::size_t free() const { return allocated() - used(); }
+  std::size_t allocated() const { return m_memory.bytes() / sizeof(OctreeBlock); }
   OctreeBlock& operator[](std::size_t i) { return m_blocks[i]; }
   const OctreeBlock& operator[](std::size_t i) const { return m_blocks[i]; }
   OctreeBlock* data() { return m_blocks.data(); }
   const OctreeBlock* data() const { return m_blocks.data(); }
 
  private:
-  Buffer<OctreeBlock> m_blocks;
-  std::size_t m_used = 0;
+  void reserve(std::size_t blocks) {
+    if (const std::size_t had = allocated(); blocks > had)
+      m_memory.reserve(std::max(blocks, had + std::max(kGrowth, had / 2)) * sizeof(OctreeBlock));
+  }
+
+  Arena m_memory;
+  std::span<OctreeBlock> m_blocks;
 };
 
 /// A node: block * 8 + slot. The root is node 0, alone in block 0.
 using OctreeNode = std::uint32_t;
 
+/// What a build makes: the nodes over an order of primitives.
+struct OctreeNodes {
+  Cube rootCube{};
+  BlockPool pool;
+  Buffer<OctreeNode> parents;  ///< of each block
+  /// Leaves and the own primitives of other nodes: group g is primitives [groups[g], groups[g + 1])
+  /// of the order.
+  Buffer<std::uint32_t> groups;
+  Buffer<OctreeNode> groupNodes;  ///< the node of each group
+  /// Part i of the build made blocks [partBlocks[i], partBlocks[i + 1]). Part 0 is the top.
+  Buffer<std::uint32_t> partBlocks;
+};
+
+class OctreeBuilder;
+
 /// The loose octree of one geometry: sees boxes and positions in an order, no meshes.
 ///
-/// Life of a frame, rebuilt:  boxes() of the primitives in the order() of the last frame are
-/// written by the caller; build() makes keys, sorts, and lays out nodes; the caller then writes
-/// boxes in the new order() with groups(), and fit() carries the groups' boxes to the root.
-/// Refitted: only the last two.
+/// An octree is in one of three stages:
+///
+///   empty      after reset(), and, with a size of 0, after a reset() or build() that failed.
+///   laid out   after build(), and after a fit() that failed. Nodes hold their primitives, in a
+///              new order(); their boxes are not known yet.
+///   built      after fit(). Searches work in this stage only, and throw in the others.
+///
+/// A frame that rebuilds the tree goes through all: the caller writes boxes() in the order() of the
+/// last frame; build(); the caller writes boxes() in the new order(), and groupBoxes(); fit(). A
+/// frame that refits it begins after build().
+///
+/// An exception from any member leaves an octree that can be reset() and built as a new one.
 class Octree {
  public:
   Octree();
-  Octree(Octree&&) noexcept;
-  Octree& operator=(Octree&&) noexcept;
+  Octree(const Octree&) = delete;
+  Octree& operator=(const Octree&) = delete;
   ~Octree();
 
   /// Forgets the tree; `order()` is then 0, 1, ..., size - 1.
@@ -94,69 +134,58 @@ class Octree {
   }  ///< primitive ids as the nodes hold them
   BoxArrays& boxes() { return m_boxes; }
   const BoxArrays& boxes() const { return m_boxes; }
-  /// Leaves and the own primitives of other nodes: group g is primitives [groups[g], groups[g + 1])
-  /// of the order.
-  std::span<const std::uint32_t> groups() const { return m_groups; }
+  std::span<const std::uint32_t> groups() const { return m_nodes.groups; }  ///< see OctreeNodes
   FloatBox* groupBoxes() { return m_groupBoxes.data(); }
 
-  /// `bounds`: of all boxes; `bulk`: the extent of most of them, about 0. `keys`: scratch, eight
-  /// bytes a primitive. Afterwards order() is new, and boxes() are still in the old one.
-  void build(const FloatBox& bounds, double bulk, const OctreeSettings&, std::uint64_t* keys,
-             const Threads&);
+  /// Lays out the nodes. Afterwards order() is new, and boxes() are still in the old one.
+  /// `bounds`: of all boxes; `bulk`: the extent of most of them, about 0. `keys`: scratch, as many
+  /// elements as there are primitives.
+  void build(const FloatBox& bounds, double bulk, const OctreeSettings&,
+             std::span<std::uint64_t> keys, const Threads&);
+  /// Carries the groups' boxes to the root.
   void fit(const Threads&);
   void measureLooseness();  ///< of what was fitted
+
+  bool isBuilt() const { return m_stage == Stage::Built; }
+  /// Throws unless isBuilt(): where every search starts.
+  void requireBuilt() const {
+    if (!isBuilt()) throwNotBuilt();
+  }
 
   /// Sum of the leaves' half areas over that of some of their primitives: how loose the fitted
   /// boxes are. Grows as a refitted tree degrades; unchanged by motion and scaling of the whole.
   double looseness() const { return m_looseness; }
   double leastLooseness() const { return m_leastLooseness; }  ///< since it was built
 
-  const OctreeBlock* blocks() const { return m_pool.data(); }
-  const BlockPool& pool() const { return m_pool; }
-  const Cube& rootCube() const { return m_rootCube; }
+  const OctreeBlock* blocks() const { return m_nodes.pool.data(); }
+  const BlockPool& pool() const { return m_nodes.pool; }
+  const Cube& rootCube() const { return m_nodes.rootCube; }
   std::size_t bytes() const;
   /// The node whose children block `block` holds; of block 0, itself.
-  OctreeNode parent(std::size_t block) const { return m_parents[block]; }
+  OctreeNode parent(std::size_t block) const { return m_nodes.parents[block]; }
 
   /// Primitives that a node holds itself.
   std::pair<std::uint32_t, std::uint32_t> ownRange(OctreeNode node) const {
-    const OctreeBlock& block = m_pool[node >> 3];
+    const OctreeBlock& block = m_nodes.pool[node >> 3];
     const unsigned slot = node & 7;
     const std::uint32_t begin = block.begin[slot];
-    return {begin,
-            block.isLeaf(slot) ? begin + block.count(slot) : m_pool[block.child[slot]].begin[0]};
+    return {begin, block.isLeaf(slot) ? begin + block.count(slot)
+                                      : m_nodes.pool[block.child[slot]].begin[0]};
   }
 
  private:
-  class Layout;
-  struct Sorting;
-  /// Keys to be sorted, where these read and do not write.
-  void takeKeys(const Sorting&, std::size_t from, std::size_t to, std::uint64_t* out) const;
-  /// `ends`: where each bin of the digits does. Returns how many first digits all keys have alike
-  /// if these are among them: then they stay as they are, without ends; else 0.
-  int sortKeys(const Sorting&, std::uint32_t* ends, const Threads*);
-  /// At most kFew, by one digit. Returns where the octants begin and the range ends.
-  std::array<std::uint32_t, 9> sortFewKeys(const Sorting&);
-  void assemble(std::size_t tasks, const Threads&);
+  enum class Stage { Empty, LaidOut, Built };
+  [[noreturn]] static void throwNotBuilt();
 
+  Stage m_stage = Stage::Empty;
   Buffer<std::uint32_t> m_order;
   BoxArrays m_boxes;
-  std::uint64_t* m_keys = nullptr;         ///< during a build: slots are in the old order
-  std::uint64_t* m_keysScratch = nullptr;  ///< the blocks' memory, as long as they are not made
-  Buffer<std::uint32_t> m_binCounts;
-  Buffer<std::uint32_t> m_groups;
-  Buffer<OctreeNode> m_groupNodes;  ///< the node of each group
+  OctreeNodes m_nodes;
+  std::unique_ptr<OctreeBuilder> m_builder;  ///< with its scratch, from the first build on
   Buffer<FloatBox> m_groupBoxes;
   Buffer<double> m_groupAreas;  ///< sums of a chunk of groups each
-  BlockPool m_pool;
-  Buffer<OctreeNode> m_parents;   ///< of each block
-  std::vector<Layout> m_layouts;  ///< the top's, then one for each task of the last build
-  Buffer<std::uint32_t>
-      m_taskBlocks;  ///< layout i made blocks [m_taskBlocks[i], m_taskBlocks[i + 1])
-  Buffer<std::uint32_t> m_entryPlaces;
-  Cube m_rootCube;
   double m_looseness = 0, m_leastLooseness = 0;
-  bool m_builtNow = false;
+  bool m_builtNow = false;  ///< no looseness was measured since
 };
 
 }  // namespace palpate

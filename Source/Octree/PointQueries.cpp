@@ -116,12 +116,14 @@ HWY_EXPORT(tryNearestKernel);
 
 void findOverlapping(const Octree& octree, const BoxMap& map, const FloatBox& box,
                      PointQueryStack& stack) {
+  octree.requireBuilt();
   HWY_DYNAMIC_DISPATCH(findOverlappingKernel)(octree, map, box, stack);
 }
 
 void tryNearest(const Octree& octree, const BoxMap& map, const FloatBox& point,
                 double distanceSquared, PointQueryStack& stack, void* context,
                 TryPrimitive tryPrimitive) {
+  octree.requireBuilt();
   HWY_DYNAMIC_DISPATCH(tryNearestKernel)
   (octree, map, point, distanceSquared, stack, context, tryPrimitive);
 }

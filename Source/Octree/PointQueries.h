@@ -9,7 +9,8 @@
 
 namespace palpate {
 
-/// Scratch of point queries, which remembers its peak.
+/// Scratch of point queries, which remembers its peak. Each query clears it first, so a query that
+/// an exception ended leaves nothing to the next.
 struct PointQueryStack {
   struct Entry {
     float distanceSquared;
@@ -20,9 +21,10 @@ struct PointQueryStack {
 };
 
 /// f(begin, end) for ranges of the octree's order that hold every primitive whose box `overlaps`,
-/// as do all boxes around it.
+/// as do all boxes around it. This and all queries below throw if the octree is not built.
 template <class Overlaps, class F>
 void forEachOverlapping(const Octree& octree, Overlaps&& overlaps, PointQueryStack& stack, F&& f) {
+  octree.requireBuilt();
   const OctreeBlock* blocks = octree.blocks();
   stack.entries.clear();
   if (overlaps(blocks[0].box(0))) stack.entries.push_back({0, 0});

@@ -415,11 +415,15 @@ void setEnd(BoxMap::End& end, const std::array<std::array<double, 3>, 3>& matrix
 }
 
 void startPairs(const TreePair& trees, std::size_t wanted, TraversalStack& stack) {
+  trees.a->requireBuilt();
+  trees.b->requireBuilt();
   HWY_DYNAMIC_DISPATCH(startPairsKernel)(trees, wanted, stack);
 }
 
 void traverse(const TreePair& trees, std::span<const NodePair> pairs, TraversalStack& stack,
               PairSink& sink) {
+  trees.a->requireBuilt();
+  trees.b->requireBuilt();
   HWY_DYNAMIC_DISPATCH(traverseKernel)(trees, pairs, stack, sink);
 }
 

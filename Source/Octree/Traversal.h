@@ -21,7 +21,7 @@ struct NodePair {
 };
 
 /// Found pairs: handed on in batches, or kept until taken where there is no function to hand them
-/// to.
+/// to. After an exception, start() again: it forgets what was found.
 class PairSink {
  public:
   using Function = void (*)(void* context, std::span<const TrianglePair>);
@@ -38,10 +38,9 @@ class PairSink {
   /// Room for kMostAtOnce pairs; advance() says how many were written.
   TrianglePair* room() {
     if (m_size + kMostAtOnce > m_pairs.size()) {
-      if (m_function)
-        flush();
-      else
-        m_pairs.resize(2 * m_pairs.size());
+      if (m_function) flush();
+      if (m_size + kMostAtOnce > m_pairs.size())
+        m_pairs.resize(std::max({2 * m_pairs.size(), m_size + kMostAtOnce, kBatch}));
     }
     return m_pairs.data() + m_size;
   }
@@ -103,13 +102,15 @@ void setShift(TreePair&, const std::array<double, 3>& offset, double thickness);
 void setEnd(BoxMap::End&, const std::array<std::array<double, 3>, 3>& matrix,
             const std::array<double, 3>& offset, double thickness, double error);
 
-/// Scratch of one traversal, which remembers its peak.
+/// Scratch of one traversal, which remembers its peak. Each traversal overwrites it first, so one
+/// that an exception ended leaves nothing to the next.
 struct TraversalStack {
   Buffer<NodePair> pairs, level;
 };
 
 /// The node pairs to start from, into stack.pairs: none if the roots do not overlap; else at least
-/// `wanted` if the trees are large enough, found breadth first.
+/// `wanted` if the trees are large enough, found breadth first. Throws if a tree is not built, as
+/// traverse() does.
 void startPairs(const TreePair&, std::size_t wanted, TraversalStack&);
 
 /// All primitive pairs below the node pairs whose boxes overlap. Empties the span's pairs depth

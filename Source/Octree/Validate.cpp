@@ -12,6 +12,10 @@ class Validation {
 
   std::vector<std::string> run() {
     if (m_octree.size() == 0) return m_failures;
+    if (!m_octree.isBuilt()) {
+      fail(0, "the tree is not built");
+      return m_failures;
+    }
     const BlockPool& pool = m_octree.pool();
     if (pool.used() + pool.free() != pool.allocated())
       fail(0, "used and free blocks do not add up to the allocated");

@@ -68,6 +68,8 @@ class PALPATE_EXPORT LooseOctree {
 
   struct State;
   explicit LooseOctree(std::shared_ptr<const State> state) : m_state(std::move(state)) {}
+  LooseOctree(const LooseOctree&) = delete;
+  LooseOctree& operator=(const LooseOctree&) = delete;
 
  private:
   std::shared_ptr<const State> m_state;

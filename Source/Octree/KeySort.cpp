@@ -1,4 +1,4 @@
-#include "Octree/Layout.h"
+#include "Octree/KeySort.h"
 
 #include <algorithm>
 #include <atomic>
@@ -8,7 +8,7 @@
 #include <utility>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "Octree/SortKeys.cpp"
+#define HWY_TARGET_INCLUDE "Octree/KeySort.cpp"
 #include "Core/Simd.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -114,69 +114,71 @@ int shiftOf(int level, int digits) { return 64 - Key::kDigitBits * (level + digi
 
 }  // namespace
 
-void Octree::takeKeys(const Sorting& sorting, std::size_t from, std::size_t to,
-                      std::uint64_t* out) const {
-  const std::uint64_t* keys = m_keys + sorting.begin + from;
-  if (sorting.cube)
-    octreeKeys(m_boxes, sorting.first ? nullptr : keys, static_cast<std::uint32_t>(from), to - from,
-               *sorting.cube, sorting.levels, out);
+void KeySort::takeKeys(const KeyRange& range, std::size_t from, std::size_t to,
+                       std::uint64_t* out) const {
+  const std::uint64_t* keys = m_keys.data() + range.begin + from;
+  if (range.cube)
+    octreeKeys(m_boxes, range.first ? nullptr : keys, static_cast<std::uint32_t>(from), to - from,
+               *range.cube, range.levels, out);
   else
     std::copy_n(keys, to - from, out);
 }
 
-int Octree::sortKeys(const Sorting& sorting, std::uint32_t* ends, const Threads* threads) {
-  const std::size_t size = sorting.end - sorting.begin,
-                    bins = std::size_t{1} << Key::kDigitBits * sorting.digits;
+int KeySort::byDigits(const KeyRange& range, std::uint32_t* ends, const Threads* threads) const {
+  const std::size_t size = range.end - range.begin,
+                    bins = std::size_t{1} << Key::kDigitBits * range.digits;
   // A part for each thread: keys come in the same order by any.
-  const bool shared = threads && threads->count() > 1 && size >= Sorting::kShared;
+  const bool shared = threads && threads->count() > 1 && size >= KeyRange::kShared;
   const std::size_t wanted = shared ? static_cast<std::size_t>(threads->count()) : 1,
                     grain = (size + wanted - 1) / wanted, parts = (size + grain - 1) / grain;
-  static_assert(Sorting::kMostDigits == 3);
-  std::array<std::uint32_t, 1 << Key::kDigitBits * Sorting::kMostDigits> ownCounts;
-  if (shared) m_binCounts.resize(bins * parts);
-  std::uint32_t* counts = shared ? m_binCounts.data() : ownCounts.data();
-  std::uint64_t* scratch = m_keysScratch + sorting.begin;
-  const int shift = shiftOf(sorting.level, sorting.digits);
+  // 16 KB of the stack. Nothing that is called from here sorts, so this is there once at a time.
+  std::array<std::uint32_t, 1 << Key::kDigitBits * PartEnds::kMostDigits> ownCounts;
+  if (shared) m_sharedCounts.resize(bins * parts);
+  std::uint32_t* counts = shared ? m_sharedCounts.data() : ownCounts.data();
+  std::uint64_t* scratch = m_scratch.data() + range.begin;
+  const int shift = shiftOf(range.level, range.digits);
   const auto forChunks = [&](auto&& f) {
     if (shared) return threads->forChunks(size, grain, f);
     f(std::size_t{0}, std::size_t{0}, size);
   };
   std::atomic<std::uint64_t> differ = 0;
   forChunks([&](std::size_t chunk, std::size_t from, std::size_t to) {
-    takeKeys(sorting, from, to, scratch + from);
+    takeKeys(range, from, to, scratch + from);
     std::uint32_t* own = counts + chunk * bins;
     std::fill_n(own, bins, 0u);
     differ |= HWY_DYNAMIC_DISPATCH(countKeysKernel)(scratch + from, to - from, shift, bins, own);
   });
   for (std::size_t i = 0; i < size; i += grain) differ |= scratch[0] ^ scratch[i];
   const int alike = std::min(std::countl_zero(differ.load()) / Key::kDigitBits, Key::kMostLevels);
-  if (alike >= sorting.level + sorting.digits) {
-    std::copy_n(scratch, sorting.cube ? size : 0, m_keys + sorting.begin);
+  if (alike >= range.level + range.digits) {
+    std::copy_n(scratch, range.cube ? size : 0, m_keys.data() + range.begin);
     return alike;
   }
-  std::uint32_t sum = sorting.begin;
-  forBins(sorting.digits, [&](std::size_t bin) {
+  std::uint32_t sum = range.begin;
+  forBins(range.digits, [&](std::size_t bin) {
     for (std::size_t part = 0; part < parts; ++part)
       sum += std::exchange(counts[part * bins + bin], sum);
   });
   forChunks([&](std::size_t chunk, std::size_t from, std::size_t to) {
     HWY_DYNAMIC_DISPATCH(scatterKeysKernel)
-    (scratch + from, to - from, shift, bins, counts + chunk * bins, m_keys);
+    (scratch + from, to - from, shift, bins, counts + chunk * bins, m_keys.data());
   });
-  std::copy_n(counts + (parts - 1) * bins, bins, ends);
+  // Where the last thread's part of a bin ends, the bin does.
+  const std::uint32_t* last = counts + (parts - 1) * bins;
+  forBins(range.digits, [&](std::size_t bin) { *ends++ = last[bin]; });
   return 0;
 }
 
-std::array<std::uint32_t, 9> Octree::sortFewKeys(const Sorting& sorting) {
-  const std::size_t size = sorting.end - sorting.begin;
-  std::array<std::uint64_t, Sorting::kFew> keys;
-  takeKeys(sorting, 0, size, keys.data());
+std::array<std::uint32_t, 9> KeySort::byOneDigit(const KeyRange& range) const {
+  const std::size_t size = range.end - range.begin;
+  std::array<std::uint64_t, KeyRange::kFew> keys;
+  takeKeys(range, 0, size, keys.data());
   const std::uint64_t places = HWY_DYNAMIC_DISPATCH(sortFewKeysKernel)(
-      keys.data(), size, shiftOf(sorting.level, 1), m_keys + sorting.begin);
+      keys.data(), size, shiftOf(range.level, 1), m_keys.data() + range.begin);
   std::array<std::uint32_t, 9> begins;
   for (unsigned octant = 0; octant < 8; ++octant)
-    begins[octant] = sorting.begin + (places >> 8 * octant & 0xff);
-  begins[8] = sorting.end;
+    begins[octant] = range.begin + (places >> 8 * octant & 0xff);
+  begins[8] = range.end;
   return begins;
 }
 

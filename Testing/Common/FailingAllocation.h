@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstddef>
+
+namespace palpate::testing {
+
+/// Makes one allocation of the process fail, to test what an exception leaves behind.
+///
+/// A test binary that compiles FailingAllocation.cpp replaces all forms of operator new: plain and
+/// array, aligned and not, throwing and not. While armed, the n-th call of any of them from any
+/// thread throws std::bad_alloc, or returns null where it must not throw. Calls of malloc() are
+/// neither counted nor made to fail.
+class FailingAllocation {
+ public:
+  enum class Failures {
+    One,  ///< only the n-th allocation fails
+    All   ///< it and all after it fail
+  };
+
+  /// The n-th allocation from now on fails, n from 1. n = 0: none does; they are only counted.
+  static void arm(std::size_t n, Failures failures = Failures::One);
+  static void disarm();
+  /// Allocations between the last arm() and the disarm() after it, or now; failed ones count.
+  static std::size_t count();
+  /// Whether an allocation failed since the last arm().
+  static bool failed();
+};
+
+}  // namespace palpate::testing

@@ -1,0 +1,200 @@
+#include <palpate/Error.h>
+
+#include "BoxOctree.h"
+#include "Common/FailingAllocation.h"
+#include "Octree/PointQueries.h"
+#include "Octree/Traversal.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <new>
+#include <optional>
+#include <string>
+
+namespace palpate {
+namespace {
+
+using testing::Boxes;
+using testing::BoxOctree;
+using testing::FailingAllocation;
+using testing::Random;
+
+bool throwsNotAvailable(auto&& f) {
+  try {
+    f();
+  } catch (const Error& error) {
+    return error.code() == ErrorCode::NotAvailable;
+  }
+  return false;
+}
+
+/// Every search throws, and validation names the fault unless the tree has forgotten its size.
+void expectUnusable(const Octree& octree) {
+  EXPECT_FALSE(octree.isBuilt());
+  PointQueryStack stack;
+  TraversalStack pairs;
+  PairSink sink;
+  const FloatBox box = testing::boxAbout({0, 0, 0}, 1);
+  const TreePair trees{&octree, &octree};
+  const NodePair roots[] = {{0, 0}};
+  EXPECT_TRUE(throwsNotAvailable([&] { findOverlapping(octree, {}, box, stack); }));
+  EXPECT_TRUE(throwsNotAvailable(
+      [&] { forEachNearest(octree, {}, box, 1.0, stack, [](std::uint32_t) { return 1.0; }); }));
+  EXPECT_TRUE(throwsNotAvailable([&] {
+    forEachOverlapping(
+        octree, [](const FloatBox&) { return true; }, stack, [](std::uint32_t, std::uint32_t) {});
+  }));
+  EXPECT_TRUE(throwsNotAvailable([&] { startPairs(trees, 1, pairs); }));
+  EXPECT_TRUE(throwsNotAvailable([&] { traverse(trees, roots, pairs, sink); }));
+  EXPECT_EQ(validate(octree, false).empty(), octree.size() == 0);
+}
+
+struct Case {
+  std::string name;
+  Boxes boxes;
+  OctreeSettings settings;
+};
+
+/// Each way to sort a range: not at all, by one digit, by two and three, with second keys, and in
+/// tasks.
+std::vector<Case> cases() {
+  Random random(21);
+  OctreeSettings few, many;
+  few.maxPrimitivesPerLeaf = 4;
+  many.maxPrimitivesPerLeaf = 100;
+  return {{"one leaf", testing::randomBoxes(random, 3, 0.1), few},
+          {"one digit", testing::randomBoxes(random, 200, 0.01), few},
+          {"two digits", testing::randomBoxes(random, 900, 0.01), few},
+          {"second keys", testing::nestedBoxes(random, 30, 40, 300), few},
+          {"tasks", testing::randomBoxes(random, 17'000, 0.001), many}};
+}
+
+/// Fails the n-th allocation of a build for every n. `smaller`: of a tree that was built before
+/// with fewer primitives, and so has part of its memory.
+void failEach(const Case& c, const Threads& threads, bool smaller) {
+  BoxOctree fresh;
+  fresh.build(c.boxes, c.settings, threads);
+  ASSERT_EQ(validate(fresh.octree, true), std::vector<std::string>{});
+  const Boxes part(c.boxes.begin(), c.boxes.begin() + static_cast<long>(c.boxes.size() / 3 + 1));
+  std::size_t failures = 0;
+  for (std::size_t n = 1;; ++n) {
+    BoxOctree tree;
+    if (smaller) tree.build(part, c.settings, threads);
+    tree.prepare(c.boxes);
+    bool threw = false;
+    FailingAllocation::arm(n);
+    try {
+      tree.build(c.boxes, c.settings, threads);
+    } catch (const std::bad_alloc&) {
+      threw = true;
+    }
+    FailingAllocation::disarm();
+    ASSERT_EQ(threw, FailingAllocation::failed());
+    if (!threw) {
+      EXPECT_TRUE(tree.octree.isBuilt());
+      EXPECT_TRUE(testing::same(tree.octree, fresh.octree));
+      break;
+    }
+    ++failures;
+    SCOPED_TRACE(n);
+    expectUnusable(tree.octree);
+    tree.build(c.boxes, c.settings, threads);
+    ASSERT_TRUE(tree.octree.isBuilt());
+    ASSERT_TRUE(testing::same(tree.octree, fresh.octree));
+    ASSERT_EQ(validate(tree.octree, true), std::vector<std::string>{});
+  }
+  EXPECT_GE(failures, 5u);
+}
+
+class OctreeFailure : public ::testing::TestWithParam<int> {};
+
+TEST_P(OctreeFailure, OfAnyAllocationLeavesATreeThatCanBeBuilt) {
+  const Threads threads(GetParam());
+  for (const Case& c : cases())
+    for (const bool smaller : {false, true}) {
+      SCOPED_TRACE(c.name + (smaller ? ", after a smaller tree" : ""));
+      failEach(c, threads, smaller);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Threads, OctreeFailure, ::testing::Values(1, 2));
+
+TEST(OctreeFailure, StagesAreNotMixedUp) {
+  Random random(22);
+  const Boxes boxes = testing::randomBoxes(random, 500, 0.01);
+  const Threads one(1);
+  BoxOctree tree;
+  expectUnusable(tree.octree);
+  tree.octree.reset(boxes.size());
+  EXPECT_EQ(tree.octree.size(), boxes.size());
+  expectUnusable(tree.octree);
+  tree.build(boxes, {}, one);
+  EXPECT_TRUE(tree.octree.isBuilt());
+  tree.octree.reset(boxes.size());
+  expectUnusable(tree.octree);
+}
+
+/// What a query or traversal left behind when it ended early is not part of the next one's answer.
+TEST(OctreeFailure, OfAQueryLeavesNothingToTheNext) {
+  Random random(23);
+  const Boxes boxes = testing::randomBoxes(random, 3000, 0.15);
+  BoxOctree tree;
+  tree.build(boxes, {}, Threads(1));
+  const Octree& octree = tree.octree;
+  const FloatBox box = testing::boxAbout({0.1, 0.2, 0.3}, 0.7);
+  const TreePair trees{&octree, &octree};
+  const NodePair roots[] = {{0, 0}};
+  const auto query = [&](PointQueryStack& stack, double& nearest) {
+    nearest = 1e9;
+    forEachNearest(octree, {}, box, nearest, stack, [&](std::uint32_t place) {
+      return nearest = std::min(nearest, double{octree.boxes()[place].lower[0]});
+    });
+    findOverlapping(octree, {}, box, stack);
+  };
+  const auto pairsOf = [&](TraversalStack& stack, PairSink& sink) {
+    sink.start(nullptr, nullptr);
+    startPairs(trees, 50, stack);
+    const std::vector<NodePair> pairs(stack.pairs.begin(), stack.pairs.end());
+    traverse(trees, pairs, stack, sink);
+    traverse(trees, roots, stack, sink);
+  };
+  PointQueryStack expectedStack;
+  double expectedNearest;
+  query(expectedStack, expectedNearest);
+  TraversalStack expectedPairs;
+  PairSink expectedSink;
+  pairsOf(expectedPairs, expectedSink);
+  ASSERT_GT(expectedSink.kept().size(), PairSink::kBatch);
+  for (const bool ofPairs : {false, true}) {
+    std::size_t failures = 0;
+    for (std::size_t n = 1;; ++n) {
+      PointQueryStack stack;
+      double nearest;
+      TraversalStack pairs;
+      PairSink sink;
+      bool threw = false;
+      FailingAllocation::arm(n);
+      try {
+        ofPairs ? pairsOf(pairs, sink) : query(stack, nearest);
+      } catch (const std::bad_alloc&) {
+        threw = true;
+      }
+      FailingAllocation::disarm();
+      failures += threw;
+      if (ofPairs) {
+        pairsOf(pairs, sink);
+        ASSERT_TRUE(std::ranges::equal(sink.kept(), expectedSink.kept()));
+      } else {
+        query(stack, nearest);
+        ASSERT_TRUE(std::ranges::equal(stack.found, expectedStack.found));
+        ASSERT_EQ(nearest, expectedNearest);
+      }
+      if (!threw) break;
+    }
+    EXPECT_GE(failures, 5u);
+  }
+}
+
+}  // namespace
+}  // namespace palpate

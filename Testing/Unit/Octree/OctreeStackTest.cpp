@@ -1,0 +1,97 @@
+#include "BoxOctree.h"
+#include "Octree/PointQueries.h"
+#include "Octree/Traversal.h"
+
+#include <gtest/gtest.h>
+
+#include <pthread.h>
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <functional>
+
+namespace palpate {
+namespace {
+
+using testing::Boxes;
+using testing::BoxOctree;
+using testing::Random;
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(NDEBUG)
+constexpr std::size_t kStack = 512 << 10;  // frames are several times as large
+#else
+constexpr std::size_t kStack = 64 << 10;
+#endif
+
+/// Runs f in a thread with kStack bytes of stack. Returns how many of them were written to.
+std::size_t stackOf(std::function<void()> f) {
+  constexpr unsigned char kUntouched = 0xa5;
+  void* memory = mmap(nullptr, kStack, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  EXPECT_NE(memory, MAP_FAILED);
+  auto* bytes = static_cast<unsigned char*>(memory);
+  std::fill_n(bytes, kStack, kUntouched);
+  pthread_attr_t attributes;
+  pthread_attr_init(&attributes);
+  EXPECT_EQ(pthread_attr_setstack(&attributes, memory, kStack), 0);
+  pthread_t thread;
+  const auto call = [](void* function) -> void* {
+    (*static_cast<std::function<void()>*>(function))();
+    return nullptr;
+  };
+  EXPECT_EQ(pthread_create(&thread, &attributes, call, &f), 0);
+  EXPECT_EQ(pthread_join(thread, nullptr), 0);
+  pthread_attr_destroy(&attributes);
+  const auto* touched =
+      std::find_if(bytes, bytes + kStack, [](unsigned char byte) { return byte != kUntouched; });
+  const auto used = static_cast<std::size_t>(bytes + kStack - touched);
+  munmap(memory, kStack);
+  return used;
+}
+
+/// Stacks of real-time threads are small. What is on them does not grow with the tree.
+TEST(OctreeStack, IsSmallForTheDeepestTree) {
+  Random random(31);
+  // Each third level is sorted by three digits while those above it are still open.
+  const Boxes boxes = testing::nestedBoxes(random, 40, 58, 3000);
+  OctreeSettings settings;
+  settings.maxDepth = 60;
+  settings.maxPrimitivesPerLeaf = 1;
+  const Threads one(1);
+  BoxOctree tree;
+  TraversalStack pairs;
+  PairSink sink;
+  PointQueryStack queries;
+  std::size_t found = 0;
+  const std::size_t build = stackOf([&] { tree.build(boxes, settings, one); });
+  const std::size_t traversal = stackOf([&] {
+    const TreePair trees{&tree.octree, &tree.octree};
+    sink.start(nullptr, nullptr);
+    startPairs(trees, 64, pairs);
+    const std::vector<NodePair> starts(pairs.pairs.begin(), pairs.pairs.end());
+    traverse(trees, starts, pairs, sink);
+    found = sink.kept().size();
+  });
+  const std::size_t points = stackOf([&] {
+    const FloatBox all = testing::boxAbout({0, 0, 0}, 0x1p22);
+    findOverlapping(tree.octree, {}, all, queries);
+    forEachNearest(tree.octree, {}, testing::boxAbout({0, 0, 0}, 0), 1e30, queries,
+                   [](std::uint32_t) { return 1e30; });
+  });
+  EXPECT_EQ(validate(tree.octree, true), std::vector<std::string>{});
+  int deepest = 0;
+  for (std::uint32_t block = 1; block < tree.octree.pool().used(); ++block)
+    deepest = std::max(deepest, cellOf(tree.octree, tree.octree.parent(block)).depth + 1);
+  EXPECT_GE(deepest, 55);
+  EXPECT_GT(found, boxes.size());
+  EXPECT_EQ(queries.found.size(), boxes.size());
+  // Including what the thread itself needs, about 4 KB.
+  EXPECT_LE(build, kStack * 5 / 8);
+  EXPECT_LE(traversal, kStack / 4);
+  EXPECT_LE(points, kStack / 4);
+  RecordProperty("build", static_cast<int>(build));
+  RecordProperty("traversal", static_cast<int>(traversal));
+  RecordProperty("points", static_cast<int>(points));
+}
+
+}  // namespace
+}  // namespace palpate
