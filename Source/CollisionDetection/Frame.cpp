@@ -432,7 +432,7 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   }
   // A feature pair that Intersection reports is not reported by distance or impact as well: where
   // the step starts intersecting only Intersection knows the side.
-  CollisionData::Contents& contents = record.data.contents();
+  CollisionData::Contents& contents = record.next.contents();
   ofIntersection = orderContacts(m_buffers, ofIntersection, m_orderScratch, contents);
   contents.earliestTimeOfImpact = record.earliest.load();
   if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
@@ -442,8 +442,6 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   statistics.validityPairs += m_impacts.validityPairs;
   countContacts(record.plan, ofIntersection, contents);
   record.candidatesSorted = candidatesSorted;
-  record.isAnswered = true;
-  record.dataOf.commit(record.state());
   if (settings.keepCandidates) record.candidatesOf.commit(record.state());
 }
 

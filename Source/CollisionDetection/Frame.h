@@ -28,7 +28,8 @@ class Frame {
                                  std::span<const TrianglePair>);
   /// Candidates of each pair to a function, batch by batch, never two at once.
   void forEach(std::span<PairRecord* const>, const Threads&, BatchFunction, void* context);
-  /// Contacts of each pair, sorted, into its record; its candidates too if they are to be kept.
+  /// Contacts of each pair, sorted, into PairRecord::next; its candidates too if they are to be
+  /// kept.
   void detect(std::span<PairRecord* const>, const Settings&, const Threads&, FrameStatistics&);
   /// The same answers from every feature against every other.
   void detectByBruteForce(std::span<PairRecord* const>, const Settings&, FrameStatistics&);

@@ -15,7 +15,7 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
+#include <memory>
 #include <utility>
 
 namespace palpate {
@@ -78,7 +78,7 @@ struct Geometry {
   double smallestHeight = 0;  ///< L: of a triangle with area, when the topology was set
   GeometryMotion motion;
   GeometryOctree tree;
-  std::optional<Solid> solid;
+  std::unique_ptr<Solid> solid;  ///< of a tetrahedral mesh
 
   /// Whether setTransform() has placed it: its octree is in the body's frame.
   bool isPlaced() const { return mesh.now.isPlaced(); }

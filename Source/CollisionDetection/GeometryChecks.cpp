@@ -162,7 +162,7 @@ void checkPlaceable(GeometryId id, std::span<const Eigen::Vector3d> body, ErrorC
 }
 
 void checkTopologyKind(const Geometry& geometry, bool tetrahedra, const char* call) {
-  if (geometry.mesh.topology.hasFaces() && geometry.solid.has_value() == tetrahedra) return;
+  if (geometry.mesh.topology.hasFaces() && (geometry.solid != nullptr) == tetrahedra) return;
   throw Error(ErrorCode::UnsupportedMethod,
               nameOf(geometry.id) + " is " +
                   (geometry.solid ? "a tetrahedral mesh" : nameOf(geometry.mesh.topology.kind)) +

@@ -105,7 +105,8 @@ GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
   TetrahedralTopology solid = checkedTopology(id, rest, tetrahedra);
   MeshTopology topology(positions.size(), solid.surface);
   auto geometry = make(std::move(rest), std::move(topology));
-  geometry->solid.emplace().topology = std::move(solid);
+  geometry->solid = std::make_unique<Solid>();
+  geometry->solid->topology = std::move(solid);
   return add(std::move(geometry));
 }
 
@@ -179,14 +180,14 @@ void GeometryTable::setTetrahedra(GeometryId id, std::span<const Eigen::Vector3d
   Geometry& geometry = at(id);
   checkTopologyKind(geometry, true, "setTetrahedra() is for tetrahedral meshes");
   std::vector<Eigen::Vector3d> rest = checkedRest(id, positions);
-  std::optional<Solid> solid(std::in_place);
+  auto solid = std::make_unique<Solid>();
   solid->topology = checkedTopology(id, rest, tetrahedra);
   MeshTopology topology(positions.size(), solid->topology.surface);
   setTopology(geometry, std::move(rest), std::move(topology), std::move(solid));
 }
 
 void GeometryTable::setTopology(Geometry& geometry, std::vector<Eigen::Vector3d> rest,
-                                MeshTopology topology, std::optional<Solid> solid) {
+                                MeshTopology topology, std::unique_ptr<Solid> solid) {
   if (geometry.isPlaced()) checkPlaceable(geometry.id, rest, ErrorCode::NonFinitePosition);
   auto body = std::make_shared<const std::vector<Eigen::Vector3d>>(rest);
   // Nothing below throws.

@@ -54,7 +54,7 @@ class GeometryTable {
   std::unique_ptr<Geometry> make(std::vector<Eigen::Vector3d> rest, MeshTopology) const;
   GeometryId add(std::unique_ptr<Geometry>);
   static void setTopology(Geometry&, std::vector<Eigen::Vector3d> rest, MeshTopology,
-                          std::optional<Solid>);
+                          std::unique_ptr<Solid>);
 
   std::vector<std::unique_ptr<Geometry>> m_geometries;  ///< ascending ids
   std::uint32_t m_nextId = 0;

@@ -155,8 +155,7 @@ struct OctreeBasedCD::Implementation {
     }
   }
 
-  /// Pairs whose answer is outdated, marked as having none. Of those that do not collide it is
-  /// nothing.
+  /// Pairs whose answer is outdated. That of pairs that do not collide is nothing.
   std::span<PairRecord* const> pairsToDo(PairRecord::Derived PairRecord::*answer) {
     work.clear();
     for (const auto& record : pairs.records()) {
@@ -166,12 +165,7 @@ struct OctreeBasedCD::Implementation {
       else
         record->commitNothing(settings.keepCandidates || answer == &PairRecord::candidatesOf);
     }
-    for (PairRecord* record : work) {
-      record->candidatesOf.invalidate();
-      if (answer != &PairRecord::dataOf) continue;
-      record->dataOf.invalidate();
-      record->isAnswered = false;
-    }
+    for (PairRecord* record : work) record->candidatesOf.invalidate();
     return work;
   }
 
@@ -212,6 +206,7 @@ struct OctreeBasedCD::Implementation {
       frame.detect(records, settings, threads, next);
     else
       frame.detectByBruteForce(records, settings, next);
+    for (PairRecord* record : records) record->commit();
     for (const auto& record : pairs.records()) {
       const CollisionData& data = record->data;
       next.contacts += data.validity().atImpact + data.validity().atEnd;

@@ -23,12 +23,17 @@ void PairRecord::updateNear() {
   nearOf.commit({a->revisions.topology});
 }
 
-void PairRecord::commitNothing(bool keepsCandidates) {
-  data = {};
-  candidates.clear();
-  trust.forget();
+void PairRecord::commit() noexcept {
+  std::swap(data, next);
   isAnswered = true;
   dataOf.commit(state());
+}
+
+void PairRecord::commitNothing(bool keepsCandidates) noexcept {
+  next = {};
+  commit();
+  candidates.clear();
+  trust.forget();
   if (keepsCandidates) candidatesOf.commit(state());
 }
 

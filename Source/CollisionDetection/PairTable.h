@@ -53,8 +53,10 @@ struct PairRecord {
   }
   /// Finds the vertices that are too near at rest, where these may have changed.
   void updateNear();
+  /// Makes `next` the answer.
+  void commit() noexcept;
   /// Commits an empty answer, of a pair that does not collide.
-  void commitNothing(bool keepsCandidates);
+  void commitNothing(bool keepsCandidates) noexcept;
 
   const Geometry& mesh() const { return a->mesh.shape ? *b : *a; }  ///< of a pair with a shape
 
@@ -63,9 +65,10 @@ struct PairRecord {
 
   std::size_t index = 0;  ///< in the table
   Revision settingsRevision;
-  CollisionData data;
+  CollisionData data;  ///< of the last detection that was completed
   Derived dataOf;
-  bool isAnswered = false;          ///< `data` is that of a detection, of positions now or before
+  bool isAnswered = false;          ///< there was one
+  CollisionData next;               ///< of the detection that runs
   std::atomic<double> earliest;     ///< Contacts::Earliest: found so far in this frame
   std::size_t found = 0;            ///< candidates, when last collected or handed on
   Buffer<TrianglePair> candidates;  ///< in the order found until somebody asks for them

@@ -35,8 +35,9 @@ struct CollisionPair {
 ///          Within a step all calls may be made any number of times and in any order; an answer
 ///          depends only on the last values.
 /// Errors   every function that takes data throws palpate::Error and changes nothing. An exception
-///          while a frame is computed (memory, a predicate or callback that throws) leaves the
-///          pairs that it was computing without an answer and the object ready for the next frame.
+///          while a frame is computed (memory, a predicate or callback that throws) leaves the last
+///          answers readable and the object ready for the next frame. Exact arithmetic on integers
+///          of any size is GMP's, which ends the process where it gets no memory.
 ///          After a move everything but assignment and destruction throws InvalidCall; so does a
 ///          call from a predicate or callback to the object that calls it.
 /// Threads  const functions are safe from many threads while no other function runs. Two objects
@@ -200,7 +201,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   std::optional<TetrahedronPoint> findTetrahedron(GeometryId body, const Eigen::Vector3d& point);
 
   /// The answer of the last detectCollision(); (a, b) in the order in which the pair was added.
-  /// Errors   NotAvailable before the first detection of the pair, and after one that failed.
+  /// Errors   NotAvailable before the first detection of the pair.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;
   /// Sorted by (a, b): every primitive pair whose boxes, inflated by half the pair's thickness and
   /// largest radii each, overlap; more only by outward rounding. (a, a): each unordered pair once,

@@ -1,0 +1,323 @@
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/FailingAllocation.h"
+#include "Common/PairRun.h"
+#include "Common/Solids.h"
+#include "Common/Things.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <functional>
+#include <new>
+#include <string>
+
+// Every allocation of every public call fails once. A call that changes the object leaves it as it
+// was; a frame leaves it ready for the next one.
+
+namespace palpate::testing {
+namespace {
+
+using Words = std::vector<std::uint64_t>;
+
+void append(Words& words, double value) { words.push_back(std::bit_cast<std::uint64_t>(value)); }
+void append(Words& words, const Positions& positions) {
+  words.push_back(positions.size());
+  for (const Vector3d& p : positions)
+    for (const double x : p) append(words, x);
+}
+
+/// All that a frame's answer depends on.
+Words stateOf(const OctreeBasedCD& detection) {
+  Words words;
+  const CollisionProblem problem = detection.problem();
+  for (const CollisionProblem::Mesh& mesh : problem.geometries) {
+    words.push_back(static_cast<std::uint64_t>(mesh.id));
+    append(words, mesh.before);
+    append(words, mesh.now);
+    append(words, mesh.rest);
+    for (const Triangle& t : mesh.triangles) words.insert(words.end(), t.begin(), t.end());
+    for (const Tetrahedron& t : mesh.tetrahedra) words.insert(words.end(), t.begin(), t.end());
+    for (const double radius : mesh.radii) append(words, radius);
+    words.insert(words.end(), mesh.disabled.begin(), mesh.disabled.end());
+    words.push_back(mesh.filter.mask);
+    words.push_back(static_cast<std::uint64_t>(mesh.filter.sidedness));
+    for (const auto& m : {mesh.rotationBefore, mesh.rotation})
+      for (const double x : m.reshaped()) append(words, x);
+    for (const auto& v : {mesh.translationBefore, mesh.translation})
+      for (const double x : v) append(words, x);
+  }
+  for (const CollisionProblem::Pair& pair : problem.pairs) {
+    words.insert(words.end(), {pair.a, pair.b, pair.predicate});
+    words.push_back(static_cast<std::uint64_t>(pair.settings.method));
+    append(words, pair.settings.thickness);
+    append(words, pair.settings.restDistance);
+  }
+  EXPECT_EQ(detection.pairs().size(), problem.pairs.size());
+  return words;
+}
+
+/// Geometries of every type, and pairs of every method.
+struct Scene {
+  explicit Scene(const Settings& settings) : detection(settings) {
+    Random random(4);
+    const Mesh body = sphere(5, 6, {0.5, 0.5, 0.5}, 0.4), floor = sheet(4, 0.4, 0);
+    organ = detection.addTriangleMesh(body.positions, body.triangles);
+    sheetId = detection.addTriangleMesh(floor.positions, floor.triangles);
+    line = thread(random, 20, 0.1, 0.01, false).addTo(detection);
+    drops = particles(random, 20, 0.02).addTo(detection);
+    Solid cube = cells(1, random);
+    for (Vector3d& p : cube.positions) p = 0.5 * p + Vector3d(0.2, 0.2, 0.2);
+    solid = detection.addTetrahedralMesh(cube.positions, cube.tetrahedra);
+    tool = detection.addAnalyticalGeometry(Capsule{{0, 0, 0}, {0, 0, 1}, 0.1});
+    Positions corners;
+    for (int i = 0; i < 12; ++i) corners.push_back(randomPoint(random, 0.2, 0.8));
+    block = detection.addAnalyticalGeometry(ConvexHull{corners});
+    organRest = body.positions;
+    detection.addCollisionPair(organ, sheetId, {Method::Auto, 0.05});
+    detection.addCollisionPair(organ, organ, {Method::Continuous, 0.0});
+    detection.addCollisionPair(line, organ, {Method::Proximity, 0.05});
+    detection.addCollisionPair(drops, organ, {Method::Continuous, 0.01});
+    detection.addCollisionPair(solid, sheetId, {Method::Intersection});
+    detection.addCollisionPair(organ, tool, {Method::Continuous, 0.0});
+    detection.addCollisionPair(tool, block, {Method::Proximity, 1.0});
+    PairSettings apart{Method::Proximity, 0.05};
+    apart.restDistance = 0.3;
+    detection.addCollisionPair(line, line, apart);
+    detection.addCollisionPair(sheetId, solid == sheetId ? organ : drops,
+                               {.method = Method::Proximity, .thickness = 0.05});
+  }
+  void move() {
+    Random random(5);
+    detection.setPositions(organ, moved(random, organRest, 0.05));
+    detection.setTransform(tool, Eigen::AngleAxisd(0.1, Vector3d::UnitX()).matrix(), {0.4, 0, 0});
+  }
+  /// A frame's contacts, candidates and queries.
+  Words answer() {
+    Words words;
+    const auto add = [&](const auto& found, auto&& depth) {
+      words.push_back(found.size());
+      for (const auto& each : found) append(words, depth(each));
+    };
+    add(detection.findInsideVertices(drops, organ), [](const auto& v) { return v.depth; });
+    add(detection.findInsideVertices(drops, sheetId, {.rule = InsideRule::WindingNumber}),
+        [](const auto& v) { return v.depth; });
+    add(detection.findEmbeddedVertices(drops, solid),
+        [](const auto& v) { return v.at.weights[0]; });
+    words.push_back(detection.findTetrahedron(solid, {0.3, 0.3, 0.3}).has_value());
+    detection.detectCollision();
+    for (const CollisionPair& pair : detection.pairs()) {
+      words.push_back(detection.collisionData(pair.a, pair.b).hash());
+      append(words, detection.collisionData(pair.a, pair.b).validity().displacement);
+    }
+    EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
+    detection.collectCandidates();
+    for (const CollisionPair& pair : detection.pairs())
+      if (pair.b != tool && pair.b != block)
+        words.push_back(detection.candidatePairs(pair.a, pair.b).size());
+    return words;
+  }
+
+  OctreeBasedCD detection;
+  GeometryId organ, sheetId, line, drops, solid, tool, block;
+  Positions organRest;
+};
+
+struct Call {
+  std::string name;
+  std::function<void(Scene&)> call;
+  bool afterAFrame = true;
+};
+
+/// Every public call that changes or computes something.
+std::vector<Call> calls() {
+  const std::vector<Triangle> one{{0, 1, 2}};
+  const Positions three{{0, 0, 0.5}, {1, 0, 0.5}, {0, 1, 0.5}};
+  const Positions four{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  const std::vector<Tetrahedron> first{{0, 1, 2, 3}};
+  const Eigen::Matrix3d unit = Eigen::Matrix3d::Identity();
+  const Positions body = sphere(5, 6, {0.5, 0.5, 0.5}, 0.4).positions;
+  std::vector<Call> all{
+      {"detectCollision, first", [](Scene& s) { s.detection.detectCollision(); }, false},
+      {"collectCandidates, first", [](Scene& s) { s.detection.collectCandidates(); }, false},
+      {"update, first", [](Scene& s) { s.detection.update(); }, false},
+      {"detectCollision", [](Scene& s) { s.detection.detectCollision(); }},
+      {"collectCandidates", [](Scene& s) { s.detection.collectCandidates(); }},
+      {"forEachCandidate", [](Scene& s) { s.detection.forEachCandidate([](auto&&...) {}); }},
+      {"update", [](Scene& s) { s.detection.update(); }},
+      {"advance", [](Scene& s) { s.detection.advance(); }},
+      {"findInsideVertices", [](Scene& s) { s.detection.findInsideVertices(s.drops, s.organ); }},
+      {"followInsideVertices",
+       [](Scene& s) { s.detection.followInsideVertices(s.drops, s.organ); }},
+      {"findInsideVertices by winding number",
+       [](Scene& s) {
+         s.detection.findInsideVertices(s.drops, s.sheetId, {.rule = InsideRule::WindingNumber});
+       }},
+      {"findEmbeddedVertices",
+       [](Scene& s) { s.detection.findEmbeddedVertices(s.drops, s.solid); }},
+      {"findTetrahedron",
+       [](Scene& s) {
+         s.detection.findTetrahedron(s.solid, {0.3, 0.3, 0.3});
+       }},
+      {"setPositions", [=](Scene& s) { s.detection.setPositions(s.organ, body); }},
+      {"setPositions, both", [=](Scene& s) { s.detection.setPositions(s.organ, body, body); }},
+      {"setTransform of a mesh",
+       [=](Scene& s) {
+         s.detection.setTransform(s.drops, unit, {0.1, 0, 0});
+       }},
+      {"setTransform of a shape",
+       [=](Scene& s) {
+         s.detection.setTransform(s.block, unit, {0.1, 0, 0});
+       }},
+      {"setTransform, both",
+       [=](Scene& s) {
+         s.detection.setTransform(s.block, unit, {0, 0, 0}, unit, {0.1, 0, 0});
+       }},
+      {"setTriangles", [=](Scene& s) { s.detection.setTriangles(s.sheetId, three, one); }},
+      {"setTetrahedra", [=](Scene& s) { s.detection.setTetrahedra(s.solid, four, first); }},
+      {"setCollisionFilter",
+       [](Scene& s) {
+         s.detection.setCollisionFilter(s.sheetId, {.sidedness = Sidedness::Outer});
+       }},
+      {"setDisabledElements",
+       [](Scene& s) {
+         s.detection.setDisabledElements(s.organ, std::vector<std::uint32_t>{3, 5});
+       }},
+      {"addCollisionPair",
+       [](Scene& s) {
+         s.detection.addCollisionPair(s.line, s.solid, {Method::Proximity, 0.1});
+       }},
+      {"setPairSettings",
+       [](Scene& s) {
+         PairSettings settings{Method::Proximity, 0.02};
+         settings.restDistance = 0.2;
+         s.detection.setPairSettings(s.line, s.line, settings);
+       }},
+      {"setContactPredicate",
+       [](Scene& s) {
+         s.detection.setContactPredicate(s.organ, s.sheetId,
+                                         [](const ContactFeatures& f) { return f.a[0] % 2 == 0; });
+       }},
+      {"removeCollisionPair", [](Scene& s) { s.detection.removeCollisionPair(s.organ, s.organ); }},
+      {"removeGeometry", [](Scene& s) { s.detection.removeGeometry(s.block); }}};
+  const auto add = [&](std::string name, auto&& addOne) {
+    all.push_back({std::move(name), [=](Scene& s) { addOne(s.detection); }});
+  };
+  add("addTriangleMesh", [=](OctreeBasedCD& d) { return d.addTriangleMesh(three, one); });
+  add("addTetrahedralMesh", [=](OctreeBasedCD& d) { return d.addTetrahedralMesh(four, first); });
+  add("addLineMesh", [=](OctreeBasedCD& d) {
+    return d.addLineMesh(three, std::vector<Segment>{{0, 1}}, std::vector<double>{0.1, 0.2, 0.1});
+  });
+  add("addPointSet", [=](OctreeBasedCD& d) { return d.addPointSet(three, 0.1); });
+  add("addAnalyticalGeometry",
+      [=](OctreeBasedCD& d) { return d.addAnalyticalGeometry(ConvexHull{four}); });
+  return all;
+}
+
+class AllocationFailure : public ::testing::TestWithParam<int> {
+ protected:
+  Settings settings() const { return settingsOf(Engine::Octree, GetParam()); }
+};
+
+TEST_P(AllocationFailure, LeavesTheObjectAsItWas) {
+  std::size_t failures = 0;
+  for (const Call& call : calls()) {
+    SCOPED_TRACE(call.name);
+    const auto prepared = [&] {
+      auto scene = std::make_unique<Scene>(settings());
+      if (call.afterAFrame) {
+        scene->answer();
+        scene->detection.advance();
+      }
+      scene->move();
+      return scene;
+    };
+    const auto without = prepared(), with = prepared();
+    const Words state = stateOf(without->detection), answerWithout = without->answer();
+    call.call(*with);
+    const Words answerWith = with->answer();
+    for (std::size_t n = 1;; ++n) {
+      const auto scene = prepared();
+      bool threw = false;
+      FailingAllocation::arm(
+          n, n % 2 ? FailingAllocation::Failures::One : FailingAllocation::Failures::All);
+      try {
+        call.call(*scene);
+      } catch (const std::bad_alloc&) {
+        threw = true;
+      }
+      FailingAllocation::disarm();
+      if (!FailingAllocation::failed()) break;
+      SCOPED_TRACE("allocation " + std::to_string(n));
+      if (threw) {
+        ++failures;
+        ASSERT_EQ(stateOf(scene->detection), state);
+        ASSERT_EQ(scene->answer(), answerWithout);
+        call.call(*scene);  // again, with memory
+      }
+      ASSERT_EQ(scene->answer(), answerWith);
+    }
+  }
+  EXPECT_GT(failures, 500u);
+}
+
+/// The first and the second frame of two sheets of 800 triangles.
+TEST_P(AllocationFailure, LeavesTheNextFrameRight) {
+  for (const Method method :
+       {Method::Proximity, Method::Continuous, Method::Intersection, Method::Auto})
+    for (const bool first : {true, false}) {
+      SCOPED_TRACE("method " + std::to_string(static_cast<int>(method)) + (first ? ", first" : ""));
+      const Mesh a = sheet(20, 0, 0), b = sheet(20, 0.01, 1);
+      const PairSettings pair{method, method == Method::Intersection ? 0.0 : 0.02};
+      const auto prepared = [&] {
+        auto run = std::make_unique<PairRun>(settings(), a, b, pair, false);
+        if (first) return run;
+        run->detect();
+        run->detection().advance();
+        Random random(2);
+        run->detection().setPositions(run->a(), moved(random, a.positions, 0.01));
+        return run;
+      };
+      const auto fresh = prepared();
+      const std::uint64_t hash = first ? 0 : fresh->data().hash();
+      fresh->detect();
+      ASSERT_GT(fresh->detection().statistics().contacts, 50u);
+      std::size_t failures = 0;
+      for (std::size_t n = 1;; ++n) {
+        const auto run = prepared();
+        FailingAllocation::arm(n);
+        bool threw = false;
+        try {
+          run->detection().detectCollision();
+        } catch (const std::bad_alloc&) {
+          threw = true;
+        }
+        FailingAllocation::disarm();
+        if (!FailingAllocation::failed()) break;
+        failures += threw;
+        SCOPED_TRACE("allocation " + std::to_string(n));
+        if (threw) {
+          if (first) {
+            EXPECT_THROW(run->data(), Error);
+          } else {
+            ASSERT_EQ(run->data().hash(), hash);  // the last answer
+          }
+          EXPECT_TRUE(run->detection().octree().validate().empty());
+          run->detect();
+        }
+        ASSERT_EQ(run->data().hash(), fresh->data().hash());
+        ASSERT_EQ(run->data().validity().trusted, fresh->data().validity().trusted);
+        Random random(3);
+        run->detection().advance();
+        run->detection().setPositions(run->b(), moved(random, b.positions, 0.01));
+        run->detect();
+      }
+      EXPECT_GT(failures, first ? 40u : 0u);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Threads, AllocationFailure, ::testing::Values(1, 2));
+
+}  // namespace
+}  // namespace palpate::testing
