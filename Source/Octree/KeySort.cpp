@@ -169,17 +169,15 @@ int KeySort::byDigits(const KeyRange& range, std::uint32_t* ends, const Threads*
   return 0;
 }
 
-std::array<std::uint32_t, 9> KeySort::byOneDigit(const KeyRange& range) const {
+void KeySort::byOneDigit(const KeyRange& range, std::array<std::uint32_t, 9>& begins) const {
   const std::size_t size = range.end - range.begin;
   std::array<std::uint64_t, KeyRange::kFew> keys;
   takeKeys(range, 0, size, keys.data());
   const std::uint64_t places = HWY_DYNAMIC_DISPATCH(sortFewKeysKernel)(
       keys.data(), size, shiftOf(range.level, 1), m_keys.data() + range.begin);
-  std::array<std::uint32_t, 9> begins;
   for (unsigned octant = 0; octant < 8; ++octant)
     begins[octant] = range.begin + (places >> 8 * octant & 0xff);
   begins[8] = range.end;
-  return begins;
 }
 
 }  // namespace palpate

@@ -50,8 +50,9 @@ class KeySort {
   /// Returns 0; or, where all keys of the range have the same digits, the number of first digits
   /// that they have in common: then nothing is moved or written to `ends`.
   int byDigits(const KeyRange&, std::uint32_t* ends, const Threads* threads) const;
-  /// Sorts at most KeyRange::kFew keys by one digit. Returns where the octants begin, and the end.
-  std::array<std::uint32_t, 9> byOneDigit(const KeyRange&) const;
+  /// Sorts at most KeyRange::kFew keys by one digit. Writes where the octants begin, and the end:
+  /// to their place, as a load that spans fresh narrower stores waits for them.
+  void byOneDigit(const KeyRange&, std::array<std::uint32_t, 9>& begins) const;
 
  private:
   /// Writes the keys of a part of the range, which are computed where it says so.

@@ -128,7 +128,7 @@ void Layout::sort(const KeySort& keys, OpenNode& node) {
   const std::uint32_t size = job.end - job.begin;
   if (size <= KeyRange::kFew) {
     job.sorted = job.level + 1;
-    node.begins = keys.byOneDigit(range);
+    keys.byOneDigit(range, node.begins);
     return;
   }
   range.digits =

@@ -91,8 +91,8 @@ LooseOctree::Node LooseOctree::node(NodeId id) const {
   const Tree& tree = *std::prev(next);
   const Octree& octree = *tree.octree;
   const OctreeNode node = index - tree.firstNode;
-  octree.requireBuilt();
-  if (node >= octree.pool().used() * 8 || octree.blocks()[node >> 3].isEmpty(node & 7))
+  if (!octree.isBuilt() || node >= octree.pool().used() * 8 ||
+      octree.blocks()[node >> 3].isEmpty(node & 7))
     throw Error(ErrorCode::IndexOutOfRange,
                 "octree node " + std::to_string(index) + " does not exist or is empty");
   const OctreeBlock& block = octree.blocks()[node >> 3];

@@ -26,7 +26,11 @@ struct OctreeStatistics {
   std::size_t bytes = 0;  ///< boxes, keys, nodes and scratch together
 };
 
-/// The last frame's octrees: one for each geometry, all in one pool of blocks of eight siblings.
+/// The octrees of the last update: one for each geometry that has primitives.
+///
+/// This is a view. It belongs to its OctreeBasedCD, cannot be copied, and is valid as long as its
+/// owner lives. Each update changes what it shows. A geometry whose update was ended by an
+/// exception has no nodes until the next update.
 ///
 /// A tree's root follows its geometry, so a body that moves as a whole keeps its cells. The tree of
 /// a geometry that setTransform() moves is in its body's frame, and so are all its boxes. See
@@ -55,8 +59,8 @@ class PALPATE_EXPORT LooseOctree {
   /// Nodes in use, root first, parents before children; of one geometry, or of all by geometry id.
   std::vector<NodeId> nodes(GeometryId) const;
   std::vector<NodeId> nodes() const;
-  std::optional<NodeId> root(GeometryId) const;  ///< none: no triangles
-  Node node(NodeId) const;
+  std::optional<NodeId> root(GeometryId) const;  ///< none: the geometry has no nodes
+  Node node(NodeId) const;              ///< throws IndexOutOfRange for a node that does not exist
   Update lastUpdate(GeometryId) const;  ///< what the last update() did to its tree
   OctreeStatistics statistics() const;
 

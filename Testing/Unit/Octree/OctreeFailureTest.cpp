@@ -1,6 +1,7 @@
 #include <palpate/Error.h>
 
 #include "BoxOctree.h"
+#include "CollisionDetection/GeometryTable.h"
 #include "Common/FailingAllocation.h"
 #include "Octree/PointQueries.h"
 #include "Octree/Traversal.h"
@@ -11,6 +12,7 @@
 #include <new>
 #include <optional>
 #include <string>
+#include <type_traits>
 
 namespace palpate {
 namespace {
@@ -134,6 +136,73 @@ TEST(OctreeFailure, StagesAreNotMixedUp) {
   tree.octree.reset(boxes.size());
   expectUnusable(tree.octree);
 }
+
+/// A geometry whose update failed, or that was to be updated after one that failed, is updated by
+/// the next call.
+TEST_P(OctreeFailure, OfAnUpdateIsMadeUpForByTheNext) {
+  Random random(24);
+  const testing::Mesh small = testing::soup(random, 300, 0.1),
+                      other = testing::soup(random, 40, 0.1);
+  testing::Mesh large = testing::soup(random, 500, 0.02);
+  for (Eigen::Vector3d& p : large.positions) p *= 1000;
+  const Threads threads(GetParam());
+  const auto moved = [](std::vector<Eigen::Vector3d> positions) {
+    for (Eigen::Vector3d& p : positions) p += Eigen::Vector3d(0.1 * p.y(), 0, 0.2 * p.x());
+    return positions;
+  };
+  // In the second update the scale of all frames changes, because a large geometry was added.
+  const auto start = [&](GeometryTable& table, const OctreeSettings& settings) {
+    const GeometryId first = table.add(small.positions, small.triangles);
+    table.add(other.positions, other.triangles);
+    table.updateOctrees(settings, threads);
+    table.add(large.positions, large.triangles);
+    table.setPositions(first, {}, moved(small.positions), threads);
+  };
+  for (const OctreeUpdate update : {OctreeUpdate::Auto, OctreeUpdate::Rebuild}) {
+    OctreeSettings settings;
+    settings.update = update;
+    GeometryTable expected;
+    start(expected, settings);
+    expected.updateOctrees(settings, threads);
+    std::size_t failures = 0;
+    for (std::size_t n = 1;; ++n) {
+      SCOPED_TRACE(n);
+      GeometryTable table;
+      start(table, settings);
+      bool threw = false;
+      FailingAllocation::arm(
+          n, n % 2 ? FailingAllocation::Failures::One : FailingAllocation::Failures::All);
+      try {
+        table.updateOctrees(settings, threads);
+      } catch (const std::bad_alloc&) {
+        threw = true;
+      }
+      FailingAllocation::disarm();
+      failures += threw;
+      if (threw) table.updateOctrees(settings, threads);
+      for (std::size_t i = 0; i < table.all().size(); ++i) {
+        const Geometry& geometry = *table.all()[i];
+        const Geometry& wanted = *expected.all()[i];
+        ASSERT_TRUE(geometry.treeIsNow() && geometry.octree.isBuilt());
+        ASSERT_EQ(validate(geometry.octree, false), std::vector<std::string>{});
+        ASSERT_EQ(geometry.frame, wanted.frame);
+        ASSERT_EQ(geometry.orderedTriangles.size(), wanted.orderedTriangles.size());
+        for (std::size_t t = 0; t < geometry.octree.size(); ++t)
+          ASSERT_EQ(geometry.orderedTriangles[t],
+                    geometry.mesh.topology.triangles[geometry.octree.order()[t]]);
+        const FloatBox root = geometry.octree.blocks()[0].box(0),
+                       wantedRoot = wanted.octree.blocks()[0].box(0);
+        ASSERT_EQ(root.lower, wantedRoot.lower);
+        ASSERT_EQ(root.upper, wantedRoot.upper);
+      }
+      if (!threw) break;
+    }
+    EXPECT_GE(failures, 10u);
+  }
+}
+
+static_assert(!std::is_copy_constructible_v<LooseOctree> &&
+              !std::is_copy_assignable_v<LooseOctree>);
 
 /// What a query or traversal left behind when it ended early is not part of the next one's answer.
 TEST(OctreeFailure, OfAQueryLeavesNothingToTheNext) {
