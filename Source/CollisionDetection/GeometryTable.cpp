@@ -16,10 +16,11 @@ namespace {
 constexpr std::size_t kSmall = 16384;
 /// Refitting fewer triangles in all, cores take longer to hand over data than to compute it.
 constexpr std::size_t kSmallRefit = 24576;
+/// In the body's frame, so that it does not depend on where the body is.
 double smallestHeight(const TriangleMesh& mesh) {
   double smallest = std::numeric_limits<double>::infinity();
   for (const auto& [i, j, k] : mesh.topology.triangles) {
-    const Eigen::Vector3d &a = mesh.now[i], &b = mesh.now[j], &c = mesh.now[k];
+    const Eigen::Vector3d &a = mesh.rest[i], &b = mesh.rest[j], &c = mesh.rest[k];
     const double area = (b - a).cross(c - a).norm();
     const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
     if (area > 0.0) smallest = std::min(smallest, area / longest);

@@ -49,7 +49,10 @@ PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry&
   plan.method = settings.method;
   StepPlan& step = plan.step;
   const double thickness = settings.thickness;
-  plan.motion = moves ? largestMotion(a.motion.range(), b.motion.range()) : 0.0;
+  if (moves) {
+    plan.motion = largestMotion(a.motion.range(), b.motion.range());
+    plan.arcDeviation = a.motion.arcDeviation() + b.motion.arcDeviation();
+  }
   if (!knowsSides(a, b)) return plan;
   step.motion = plan.motion;
   if (settings.method == Method::Auto) {
@@ -181,7 +184,7 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
             : plan.motion == 0.0 || (within && !(nearby && contents.intersectingTriangles.empty()));
   }
   const bool trusted = validity.trusted && knowsSides(a, b);  // as vertices move, in straight lines
-  validity.arcDeviation = a.motion.arcDeviation() + b.motion.arcDeviation();
+  validity.arcDeviation = plan.arcDeviation;
   validity.trusted = trusted && validity.arcDeviation <= settings.thickness;
   validity.sideMayBeWrong = plan.method != Method::Intersection && !validity.trusted;
   m_atEnd = {};

@@ -14,9 +14,10 @@ namespace palpate {
 struct PairPlan {
   Method method = Method::Intersection;  ///< Auto: Proximity and Continuous
   MethodReason reason = MethodReason::Asked;
-  double motion = 0;     ///< L: largest of two features, relative to each other
-  double tolerance = 0;  ///< L: Auto's
-  double nearby = 0;     ///< L: Intersection asks for boxes within this, to know of what was near
+  double motion = 0;        ///< L: largest of two features, relative to each other
+  double arcDeviation = 0;  ///< L: of both geometries
+  double tolerance = 0;     ///< L: Auto's
+  double nearby = 0;  ///< L: Intersection asks for boxes within this, to know of what was near
   StepPlan step;
   bool overlaps = false;  ///< Auto: Intersection is asked, too, unless the step starts apart
   bool startsIntersecting = false;  ///< known before

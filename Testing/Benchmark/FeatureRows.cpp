@@ -30,24 +30,24 @@ class FeatureCandidates {
       : m_threads(1),
         m_id(m_table.add(workload.frames[0][0], workload.task.meshes[0])),
         m_geometry(m_table.at(m_id)) {
-    m_geometry.swept = swept;
+    m_geometry.tree.setSwept(swept);
   }
 
   void frame(const std::vector<Eigen::Vector3d>& before, const std::vector<Eigen::Vector3d>& now) {
     vertexTriangle = edgeEdge = 0;
     m_table.setPositions(m_id, before, now, m_threads);
     m_table.updateOctrees({}, m_threads);
-    TreePair trees{&m_geometry.octree, &m_geometry.octree};
+    const GeometryOctree& tree = m_geometry.tree;
+    TreePair trees{&tree.octree(), &tree.octree()};
     setShift(trees, {0, 0, 0}, 0);
-    m_floats = {m_geometry.floats.data(), m_geometry.floats.data(), nullptr, nullptr,
-                trees.shiftLower,         trees.shiftUpper};
-    if (m_geometry.swept) m_floats.beforeA = m_floats.beforeB = m_geometry.floatsBefore.data();
+    m_floats = {tree.floats(), tree.floats(), nullptr, nullptr, trees.shiftLower, trees.shiftUpper};
+    if (tree.isSwept()) m_floats.beforeA = m_floats.beforeB = tree.floatsAtStart();
     startPairs(trees, 1, m_stack);
     m_nodePairs.assign(m_stack.pairs.begin(), m_stack.pairs.end());
     m_sink.start(&receive, this);
     traverse(trees, m_nodePairs, m_stack, m_sink);
     m_sink.flush();
-    m_table.endFrame();
+    m_table.advance();
   }
 
   std::size_t vertexTriangle = 0, edgeEdge = 0;

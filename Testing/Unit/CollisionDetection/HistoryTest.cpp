@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <set>
 #include <span>
 #include <string>
 #include <thread>
@@ -56,103 +55,10 @@ class Engines {
     forAll([](OctreeBasedCD& engine) { engine.advance(); });
     return m_all.front().statistics().contacts;
   }
-  std::span<const CollisionPair> pairs() const { return m_all.front().pairs(); }
 
  private:
   std::vector<OctreeBasedCD> m_all;
 };
-
-/// A random life: geometries and pairs come and go, move, change their triangles and their
-/// settings.
-class RandomLife {
- public:
-  explicit RandomLife(std::uint64_t seed) : m_random(seed) {}
-
-  void act() {
-    const auto action = m_random() % 10;
-    if (m_geometries.size() < 2 || action == 0) return add();
-    const std::size_t i = m_random() % m_geometries.size(), j = m_random() % m_geometries.size();
-    if (action == 1 && m_geometries.size() > 3) return remove(i);
-    if (action == 2) return changeTriangles(i);
-    if (action < 5) return changePair(m_geometries[i].first, m_geometries[j].first);
-    move(i);
-  }
-  std::size_t frame() { return m_engines.expectEqualFrames(); }
-
- private:
-  PairSettings randomSettings() {
-    constexpr std::array<Method, 3> kMethods{Method::Intersection, Method::Proximity,
-                                             Method::Continuous};
-    PairSettings settings;
-    settings.method = kMethods[m_random() % 3];
-    settings.thickness = settings.method == Method::Proximity ? uniform(m_random, 0.001, 0.1) : 0.0;
-    settings.contacts = m_random() % 2 ? Contacts::Distinct : Contacts::All;
-    return settings;
-  }
-  void add() {
-    const Mesh mesh = soup(m_random, m_random() % 40, uniform(m_random, 0.01, 0.3));
-    const GeometryId id = m_engines.onAll([&](OctreeBasedCD& engine) {
-      return engine.addTriangleMesh(mesh.positions, mesh.triangles);
-    });
-    EXPECT_TRUE(m_given.insert(id).second) << "an id was given out again";
-    m_geometries.emplace_back(id, mesh);
-  }
-  void remove(std::size_t i) {
-    const GeometryId id = m_geometries[i].first;
-    m_engines.forAll([&](OctreeBasedCD& engine) {
-      engine.removeGeometry(id);
-      EXPECT_THROW(engine.removeGeometry(id), Error);
-    });
-    for (const CollisionPair& pair : m_engines.pairs()) EXPECT_TRUE(pair.a != id && pair.b != id);
-    m_geometries.erase(m_geometries.begin() + static_cast<std::ptrdiff_t>(i));
-  }
-  void changeTriangles(std::size_t i) {
-    Mesh& mesh = m_geometries[i].second;
-    mesh = soup(m_random, m_random() % 40, uniform(m_random, 0.01, 0.3));
-    m_engines.forAll([&](OctreeBasedCD& engine) {
-      engine.setTriangles(m_geometries[i].first, mesh.positions, mesh.triangles);
-    });
-  }
-  void changePair(GeometryId a, GeometryId b) {
-    const PairSettings settings = randomSettings();
-    bool there = false;
-    for (const CollisionPair& pair : m_engines.pairs())
-      there |= (pair.a == a && pair.b == b) || (pair.a == b && pair.b == a);
-    const bool goes = there && m_random() % 2;
-    m_engines.forAll([&](OctreeBasedCD& engine) {
-      if (!there)
-        engine.addCollisionPair(a, b, settings);
-      else if (goes)
-        engine.removeCollisionPair(a, b);
-      else
-        engine.setPairSettings(a, b, settings);
-    });
-  }
-  void move(std::size_t i) {
-    Mesh& mesh = m_geometries[i].second;
-    for (Eigen::Vector3d& p : mesh.positions) p += randomPoint(m_random, -0.05, 0.05);
-    m_engines.forAll(
-        [&](OctreeBasedCD& engine) { engine.setPositions(m_geometries[i].first, mesh.positions); });
-  }
-
-  Random m_random;
-  Engines m_engines;
-  std::vector<std::pair<GeometryId, Mesh>> m_geometries;
-  std::set<GeometryId> m_given;
-};
-
-TEST(History, AnyLifeIsAsByBruteForceInEveryFrame) {
-  std::size_t contacts = 0;
-  for (std::uint64_t seed = 0; seed < 6; ++seed) {
-    RandomLife life(seed);
-    for (int frame = 0; frame < 30; ++frame) {
-      for (int action = 0; action < 4; ++action) life.act();
-      contacts += life.frame();
-      if (HasFailure()) FAIL() << "seed " << seed << ", frame " << frame;
-    }
-  }
-  EXPECT_GT(contacts, 1000u);
-}
 
 /// Two soups that meet, in several engines, with what their first frame gave.
 struct Meeting {

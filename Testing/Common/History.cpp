@@ -1,0 +1,524 @@
+#include "Common/History.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+
+namespace palpate::testing {
+
+namespace {
+
+constexpr std::size_t kMostBodies = 6, kMostPairs = 6;
+constexpr int kTypes = 8;  ///< see randomThing() and add()
+
+Settings settingsOfLife(Random& random) {
+  Settings settings = settingsOf(Engine::Octree, random() % 4 == 0 ? 2 : 1,
+                                 random() % 3 ? OctreeUpdate::Auto : OctreeUpdate::Rebuild);
+  settings.octree.maxPrimitivesPerLeaf = random() % 2 ? 32 : 2;
+  return settings;
+}
+
+std::uint32_t hashOf(const ContactFeatures& features) {
+  return features.a[0] * 2654435761u ^ features.b[0] * 40503u ^ features.a[1] ^ features.b[1] * 7u ^
+         static_cast<std::uint32_t>(features.kind);
+}
+
+/// Words of what a query found, or why it was refused.
+template <class F>
+std::vector<std::uint64_t> wordsOf(F&& query) {
+  std::vector<std::uint64_t> words;
+  try {
+    query(words);
+  } catch (const Error& error) {
+    words = {~std::uint64_t{0}, static_cast<std::uint64_t>(error.code())};
+  }
+  return words;
+}
+
+void append(std::vector<std::uint64_t>& words, const InsideVertex& v) {
+  Row row{v.vertex, v.triangle, v.decided};
+  testing::append(row, v.barycentric);
+  testing::append(row, v.exitDirection);
+  testing::append(row, v.depth);
+  words.insert(words.end(), row.begin(), row.end());
+}
+
+}  // namespace
+
+std::size_t RandomHistory::Body::elements() const {
+  if (shape) return 0;
+  return thing.kind == GeometryKind::Points  ? thing.positions.size()
+         : thing.kind == GeometryKind::Lines ? thing.segments.size()
+                                             : thing.triangles.size();
+}
+
+RandomHistory::RandomHistory(std::uint64_t seed)
+    : m_random(seed), m_life(settingsOfLife(m_random)), m_committed(settingsOf(Engine::Octree)) {}
+
+template <class F>
+bool RandomHistory::accepts(F&& call) {
+  try {
+    call();
+  } catch (const Error&) {
+    return false;
+  }
+  return true;
+}
+
+GeometryId RandomHistory::anyBody() {
+  auto body = m_bodies.begin();
+  std::advance(body, m_random() % m_bodies.size());
+  return body->first;
+}
+
+Eigen::Matrix3d RandomHistory::randomTurn() {
+  return Eigen::AngleAxisd(uniform(m_random, -0.5, 0.5), randomPoint(m_random, 0.1, 1).normalized())
+      .toRotationMatrix();
+}
+
+Positions RandomHistory::randomMotion(const Positions& from) {
+  constexpr std::array<double, 5> kSizes{0.0, 1e-3, 0.02, 0.1, 0.5};
+  const double size = kSizes[m_random() % 5], drift = kSizes[m_random() % 4];
+  const Vector3d by = randomPoint(m_random, -drift, drift);
+  Positions to = moved(m_random, from, size);
+  for (Vector3d& p : to) p += by;
+  return to;
+}
+
+Thing RandomHistory::randomThing(int type) {
+  switch (type) {
+    case 0:
+    case 1:
+      return things(soup(m_random, m_random() % 12, uniform(m_random, 0.05, 0.4)));
+    case 2:
+      return things(sphere(3, 4, randomPoint(m_random, 0.3, 0.7), uniform(m_random, 0.1, 0.5)));
+    case 3:
+      return things(sheet(2, uniform(m_random, 0.3, 0.7), 0));
+    case 4: {
+      const Thing line = thread(m_random, 2 + m_random() % 8, 0.3, 0.02, m_random() % 2);
+      return m_random() % 3 ? line : tapered(m_random, line, 0.05);
+    }
+    default: {
+      const Thing points = particles(m_random, 1 + m_random() % 12, 0.05);
+      return m_random() % 3 ? points : tapered(m_random, points, 0.1);
+    }
+  }
+}
+
+Solid RandomHistory::randomSolid() {
+  Solid solid = cells(1, m_random);
+  const double size = uniform(m_random, 0.2, 0.8);
+  const Vector3d at = randomPoint(m_random, 0, 0.5);
+  for (Vector3d& p : solid.positions) p = size * p + at;
+  return solid;
+}
+
+GeometryId RandomHistory::addTo(OctreeBasedCD& collisions, const Body& body) {
+  if (body.shape) return collisions.addAnalyticalGeometry(*body.shape);
+  if (!body.tetrahedra.empty())
+    return collisions.addTetrahedralMesh(body.thing.positions, body.tetrahedra);
+  return body.thing.addTo(collisions);
+}
+
+void RandomHistory::add() {
+  if (m_bodies.size() >= kMostBodies) return;
+  Body body;
+  const int type = static_cast<int>(m_random() % kTypes);
+  if (type == 6) {
+    const Solid solid = randomSolid();
+    body.thing.positions = solid.positions;
+    body.tetrahedra = solid.tetrahedra;
+  } else if (type == 7) {
+    const std::array<AnalyticalGeometry, 5> shapes{
+        Sphere{{0.1, 0, 0}, 0.2}, Capsule{{0, 0, 0}, {0.3, 0.3, 0.3}, 0.05},
+        Box{{0, 0, 0}, {0.2, 0.1, 0.3}}, Plane{{0.5, 0.5, 0.5}, {1, 2, 3}},
+        ConvexHull{soup(m_random, 2, 0.3).positions}};
+    body.shape = shapes[m_random() % 5];
+  } else {
+    body.thing = randomThing(type);
+  }
+  const GeometryId id = addTo(m_life, body);
+  ASSERT_EQ(addTo(m_committed, body), id);
+  ASSERT_FALSE(m_bodies.contains(id)) << "an id was given out twice";
+  if (!body.tetrahedra.empty()) {
+    const auto surface = m_life.surface(id).triangles;
+    body.thing.triangles.assign(surface.begin(), surface.end());
+  }
+  body.before = body.now = body.thing.positions;
+  m_bodies.emplace(id, std::move(body));
+}
+
+void RandomHistory::remove(GeometryId id) {
+  for (OctreeBasedCD* each : {&m_life, &m_committed}) each->removeGeometry(id);
+  m_bodies.erase(id);
+  std::erase_if(m_pairs, [=](const Pair& pair) { return pair.a == id || pair.b == id; });
+  if (m_followed && (m_followed->first == id || m_followed->second == id)) m_followed.reset();
+}
+
+void RandomHistory::setPositions(GeometryId id) {
+  Body& body = m_bodies.at(id);
+  const Positions now = randomMotion(m_random() % 4 ? body.now : body.thing.positions);
+  if (m_random() % 4 == 0) {
+    const Positions before = m_random() % 3 ? randomMotion(body.before) : body.before;
+    if (!accepts([&] { m_life.setPositions(id, before, now); })) return;
+    body.before = before;
+    body.bodyGiven = true;
+  } else if (!accepts([&] { m_life.setPositions(id, now); })) {
+    return;
+  }
+  body.now = now;
+  if (body.isNew && !body.bodyGiven) body.before = body.now;
+}
+
+void RandomHistory::setTransform(GeometryId id) {
+  Body& body = m_bodies.at(id);
+  const Eigen::Matrix3d rotation =
+      m_random() % 4 ? Eigen::Matrix3d(randomTurn() * body.rotation) : Eigen::Matrix3d::Identity();
+  const Vector3d translation = body.translation + randomPoint(m_random, -0.1, 0.1);
+  if (m_random() % 4 == 0) {
+    const Eigen::Matrix3d rotationBefore = randomTurn() * body.rotationBefore;
+    const Vector3d translationBefore = body.translationBefore + randomPoint(m_random, -0.1, 0.1);
+    if (!accepts([&] {
+          m_life.setTransform(id, rotationBefore, translationBefore, rotation, translation);
+        }))
+      return;
+    body.rotationBefore = rotationBefore;
+    body.translationBefore = translationBefore;
+    body.transformGiven = true;
+  } else if (!accepts([&] { m_life.setTransform(id, rotation, translation); })) {
+    return;
+  }
+  body.rotation = rotation;
+  body.translation = translation;
+  body.placed = true;
+  if (!body.isNew || body.transformGiven) return;
+  body.rotationBefore = rotation;
+  body.translationBefore = translation;
+}
+
+void RandomHistory::setTopology(GeometryId id) {
+  Body& body = m_bodies.at(id);
+  Body next = body;
+  if (body.tetrahedra.empty()) {
+    next.thing = randomThing(static_cast<int>(m_random() % 4));
+    for (OctreeBasedCD* each : {&m_life, &m_committed})
+      if (!accepts([&] { each->setTriangles(id, next.thing.positions, next.thing.triangles); }))
+        return;
+  } else {
+    const Solid solid = randomSolid();
+    next.thing.positions = solid.positions;
+    next.tetrahedra = solid.tetrahedra;
+    for (OctreeBasedCD* each : {&m_life, &m_committed})
+      each->setTetrahedra(id, solid.positions, solid.tetrahedra);
+    const auto surface = m_life.surface(id).triangles;
+    next.thing.triangles.assign(surface.begin(), surface.end());
+  }
+  next.before = next.now = next.thing.positions;
+  next.isNew = true;
+  next.bodyGiven = false;
+  next.disabled.clear();
+  if (!next.transformGiven) {
+    next.rotationBefore = next.rotation;
+    next.translationBefore = next.translation;
+  }
+  body = std::move(next);
+}
+
+void RandomHistory::setFilter(GeometryId id) {
+  CollisionFilter filter;
+  if (m_random() % 3 == 0) filter.groups = 1 + m_random() % 3;
+  if (m_random() % 3 == 0) filter.mask = 1 + m_random() % 3;
+  if (m_random() % 2) filter.sidedness = Sidedness::Outer;
+  if (accepts([&] { m_life.setCollisionFilter(id, filter); })) m_bodies.at(id).filter = filter;
+}
+
+void RandomHistory::setDisabled(GeometryId id) {
+  Body& body = m_bodies.at(id);
+  std::vector<std::uint32_t> disabled;
+  for (std::uint32_t i = 0; i < body.elements(); ++i)
+    if (m_random() % 4 == 0) disabled.push_back(i);
+  for (OctreeBasedCD* each : {&m_life, &m_committed})
+    if (!accepts([&] { each->setDisabledElements(id, disabled); })) return;
+  body.disabled = disabled;
+}
+
+PairSettings RandomHistory::randomSettings() {
+  constexpr std::array<Method, 5> kMethods{Method::Auto, Method::Auto, Method::Intersection,
+                                           Method::Proximity, Method::Continuous};
+  PairSettings settings;
+  settings.method = kMethods[m_random() % 5];
+  settings.thickness = m_random() % 2 ? uniform(m_random, 0.001, 0.1) : 0.0;
+  settings.contacts = m_random() % 2 ? Contacts::Distinct : Contacts::All;
+  if (settings.method == Method::Continuous && m_random() % 4 == 0)
+    settings.contacts = Contacts::Earliest;
+  if (m_random() % 8 == 0) settings.restDistance = 0.2;
+  if (m_random() % 4 == 0) settings.timeTolerance = 1e-3;
+  return settings;
+}
+
+ContactPredicate RandomHistory::predicateOf(int number) {
+  if (number == 0) return {};
+  return [number](const ContactFeatures& features) {
+    return hashOf(features) % 5 != static_cast<std::uint32_t>(number);
+  };
+}
+
+void RandomHistory::addOrChangePair() {
+  const GeometryId a = anyBody(), b = anyBody();
+  const PairSettings settings = randomSettings();
+  const auto pair = std::find_if(m_pairs.begin(), m_pairs.end(), [&](const Pair& p) {
+    return (p.a == a && p.b == b) || (p.a == b && p.b == a);
+  });
+  if (pair == m_pairs.end()) {
+    if (m_pairs.size() < kMostPairs && accepts([&] { m_life.addCollisionPair(a, b, settings); }))
+      m_pairs.push_back({a, b, settings});
+    return;
+  }
+  const auto action = m_random() % 4;
+  if (action == 0) {
+    m_life.removeCollisionPair(a, b);
+    m_pairs.erase(pair);
+  } else if (action == 1) {
+    const int number = static_cast<int>(m_random() % 5);
+    if (accepts([&] { m_life.setContactPredicate(pair->a, pair->b, predicateOf(number)); }))
+      pair->predicate = number;
+  } else if (accepts([&] { m_life.setPairSettings(a, b, settings); })) {
+    pair->settings = settings;
+  }
+}
+
+/// Calls that change nothing.
+void RandomHistory::query() {
+  const GeometryId a = anyBody(), b = anyBody();
+  switch (m_random() % 8) {
+    case 0:
+      return m_life.update();
+    case 1:
+      return m_life.collectCandidates();
+    case 2:
+      return m_life.detectCollision();
+    case 3: {
+      std::size_t count = 0;
+      m_life.forEachCandidate([&](const CollisionPair&, auto batch) { count += batch.size(); });
+      return;
+    }
+    case 4:
+      accepts([&] { m_life.findInsideVertices(a, b); });
+      return;
+    case 5:
+      accepts([&] { m_life.findInsideVertices(a, b, {.rule = InsideRule::WindingNumber}); });
+      return;
+    case 6:
+      accepts([&] { m_life.findEmbeddedVertices(a, b); });
+      return;
+    default:
+      if (!m_followed) m_followed = {a, b};
+      accepts([&] { m_life.followInsideVertices(m_followed->first, m_followed->second); });
+  }
+}
+
+void RandomHistory::act() {
+  const auto action = m_random() % 16;
+  if (m_bodies.size() < 2 || action == 0) return add();
+  const GeometryId id = anyBody();
+  Body& body = m_bodies.at(id);
+  if (action == 1 && m_bodies.size() > 3 && m_random() % 2) return remove(id);
+  if (action == 2) {
+    if (body.isMesh()) setTopology(id);
+    return;
+  }
+  if (action == 3) return setFilter(id);
+  if (action == 4) return setDisabled(id);
+  if (action < 8) return addOrChangePair();
+  if (action < 10) return query();
+  if (action < 12 || body.shape) return setTransform(id);
+  setPositions(id);
+}
+
+/// Both ends of a geometry that is new in the object.
+void RandomHistory::setEnds(OctreeBasedCD& collisions, GeometryId id, const Body& body) {
+  if (!body.shape) collisions.setPositions(id, body.before, body.now);
+  if (body.placed)
+    collisions.setTransform(id, body.rotationBefore, body.translationBefore, body.rotation,
+                            body.translation);
+}
+
+OctreeBasedCD RandomHistory::fresh(Engine engine, std::map<GeometryId, GeometryId>& ids) const {
+  OctreeBasedCD collisions(settingsOf(engine));
+  for (const auto& [id, body] : m_bodies) {
+    const GeometryId own = addTo(collisions, body);
+    ids.emplace(id, own);
+    setEnds(collisions, own, body);
+    collisions.setCollisionFilter(own, body.filter);
+    collisions.setDisabledElements(own, body.disabled);
+  }
+  for (const Pair& pair : m_pairs) {
+    collisions.addCollisionPair(ids.at(pair.a), ids.at(pair.b), pair.settings);
+    if (pair.predicate)
+      collisions.setContactPredicate(ids.at(pair.a), ids.at(pair.b), predicateOf(pair.predicate));
+  }
+  return collisions;
+}
+
+/// Of two triangle meshes, by exact arithmetic.
+bool RandomHistory::startsApart(const Pair& pair) const {
+  OctreeBasedCD collisions(settingsOf(Engine::BruteForce));
+  const auto add = [&](GeometryId id) {
+    const Body& body = m_bodies.at(id);
+    const GeometryId own = addTo(collisions, body);
+    collisions.setPositions(own, body.before, body.before);
+    if (body.placed && pair.a != pair.b)
+      collisions.setTransform(own, body.rotationBefore, body.translationBefore);
+    collisions.setDisabledElements(own, body.disabled);
+    return own;
+  };
+  const GeometryId a = add(pair.a), b = pair.a == pair.b ? a : add(pair.b);
+  collisions.addCollisionPair(a, b, {.method = Method::Intersection});
+  collisions.detectCollision();
+  return collisions.collisionData(a, b).intersectingTriangles().empty();
+}
+
+void RandomHistory::compareContacts(const OctreeBasedCD& other,
+                                    const std::map<GeometryId, GeometryId>& ids,
+                                    bool isBruteForce) {
+  for (const Pair& pair : m_pairs) {
+    const CollisionData& found = m_life.collisionData(pair.a, pair.b);
+    const CollisionData& truth = other.collisionData(ids.at(pair.a), ids.at(pair.b));
+    SCOPED_TRACE(::testing::Message() << "pair (" << static_cast<unsigned>(pair.a) << ", "
+                                      << static_cast<unsigned>(pair.b) << "), method "
+                                      << static_cast<int>(pair.settings.method) << ", thickness "
+                                      << pair.settings.thickness << ", predicate " << pair.predicate
+                                      << (isBruteForce ? ", brute force" : ""));
+    EXPECT_EQ(found.hash(), truth.hash());
+    EXPECT_EQ(found.earliestTimeOfImpact(), truth.earliestTimeOfImpact());
+    const Validity &v = found.validity(), &t = truth.validity();
+    EXPECT_EQ(v.method, t.method);
+    EXPECT_EQ(v.reason, t.reason);
+    EXPECT_EQ(v.atEnd, t.atEnd);
+    EXPECT_EQ(v.atImpact, t.atImpact);
+    EXPECT_NEAR(v.displacement, t.displacement, 1e-12);
+    EXPECT_EQ(v.reach, t.reach);
+    if (std::isinf(t.arcDeviation))
+      EXPECT_EQ(v.arcDeviation, t.arcDeviation);
+    else
+      EXPECT_NEAR(v.arcDeviation, t.arcDeviation, 1e-12);
+    // A new object always knows; one with a history may not, but is never wrong.
+    if (!isBruteForce) {  // without boxes Intersection does not know what was near
+      EXPECT_LE(v.trusted, t.trusted);
+    }
+    if (v.startedApart && !t.startedApart) {
+      EXPECT_TRUE(startsApart(pair));
+    }
+  }
+}
+
+void RandomHistory::compareCandidates(OctreeBasedCD& bruteForce,
+                                      const std::map<GeometryId, GeometryId>& ids) {
+  m_life.collectCandidates();
+  bruteForce.collectCandidates();
+  for (const Pair& pair : m_pairs) {
+    if (m_bodies.at(pair.a).shape || m_bodies.at(pair.b).shape) continue;
+    const auto found = m_life.candidatePairs(pair.a, pair.b),
+               truth = bruteForce.candidatePairs(ids.at(pair.a), ids.at(pair.b));
+    EXPECT_TRUE(std::includes(found.begin(), found.end(), truth.begin(), truth.end()));
+    EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
+  }
+}
+
+void RandomHistory::compareQueries(OctreeBasedCD& other,
+                                   const std::map<GeometryId, GeometryId>& ids) {
+  const GeometryId a = anyBody(), b = anyBody();
+  const Vector3d point = randomPoint(m_random, 0, 1);
+  const auto ask = [&](OctreeBasedCD& collisions, GeometryId vertices, GeometryId body) {
+    std::vector<std::uint64_t> all;
+    for (const InsideRule rule : {InsideRule::Closed, InsideRule::WindingNumber}) {
+      const auto words = wordsOf([&](auto& out) {
+        for (const InsideVertex& v : collisions.findInsideVertices(vertices, body, {.rule = rule}))
+          append(out, v);
+      });
+      all.insert(all.end(), words.begin(), words.end());
+    }
+    const auto words = wordsOf([&](auto& out) {
+      for (const EmbeddedVertex& v : collisions.findEmbeddedVertices(vertices, body)) {
+        out.push_back(v.vertex);
+        out.push_back(v.at.tetrahedron);
+        for (const double weight : v.at.weights)
+          out.push_back(std::bit_cast<std::uint64_t>(weight));
+      }
+      const auto at = collisions.findTetrahedron(body, point);
+      out.push_back(at ? at->tetrahedron : ~0u);
+    });
+    all.insert(all.end(), words.begin(), words.end());
+    return all;
+  };
+  EXPECT_EQ(ask(m_life, a, b), ask(other, ids.at(a), ids.at(b)));
+}
+
+/// At the end of a step.
+void RandomHistory::compareWhatLasts() {
+  for (const auto& [id, body] : m_bodies) {
+    if (!body.shape && body.bodyGiven)
+      m_committed.setPositions(id, body.before, body.now);
+    else if (!body.shape)
+      m_committed.setPositions(id, body.now);
+    if (body.placed && body.transformGiven)
+      m_committed.setTransform(id, body.rotationBefore, body.translationBefore, body.rotation,
+                               body.translation);
+    else if (body.placed)
+      m_committed.setTransform(id, body.rotation, body.translation);
+  }
+  const CollisionProblem life = m_life.problem(), committed = m_committed.problem();
+  ASSERT_EQ(life.geometries.size(), m_bodies.size());
+  ASSERT_EQ(committed.geometries.size(), m_bodies.size());
+  for (std::size_t i = 0; i < m_bodies.size(); ++i) {
+    EXPECT_EQ(life.geometries[i].before, committed.geometries[i].before);
+    EXPECT_EQ(life.geometries[i].now, committed.geometries[i].now);
+  }
+  if (!m_followed) return;
+  const auto follow = [&](OctreeBasedCD& collisions) {
+    return wordsOf([&](auto& out) {
+      for (const FollowedVertex& v :
+           collisions.followInsideVertices(m_followed->first, m_followed->second)) {
+        append(out, v.wayOut);
+        append(out, v.nearest);
+        out.push_back(static_cast<std::uint64_t>(v.change));
+      }
+    });
+  };
+  EXPECT_EQ(follow(m_life), follow(m_committed));
+}
+
+void RandomHistory::endStep() {
+  for (OctreeBasedCD* each : {&m_life, &m_committed}) each->advance();
+  for (auto& [id, body] : m_bodies) {
+    body.before = body.now;
+    body.rotationBefore = body.rotation;
+    body.translationBefore = body.translation;
+    body.isNew = body.bodyGiven = body.transformGiven = false;
+  }
+  if (m_random() % 4 == 0) m_followed.reset();
+}
+
+void RandomHistory::frame() {
+  for (auto count = m_random() % 8; count > 0; --count) act();
+  m_life.detectCollision();
+  m_contacts += m_life.statistics().contacts;
+  EXPECT_EQ(m_life.octree().validate(), std::vector<std::string>{});
+  if (!m_bodies.empty()) {
+    std::map<GeometryId, GeometryId> ids, bruteIds;
+    OctreeBasedCD octree = fresh(Engine::Octree, ids),
+                  bruteForce = fresh(Engine::BruteForce, bruteIds);
+    octree.detectCollision();
+    bruteForce.detectCollision();
+    compareContacts(octree, ids, false);
+    compareContacts(bruteForce, bruteIds, true);
+    compareCandidates(bruteForce, bruteIds);
+    const bool byBruteForce = m_random() % 2;
+    compareQueries(byBruteForce ? bruteForce : octree, byBruteForce ? bruteIds : ids);
+  }
+  compareWhatLasts();
+  endStep();
+}
+
+}  // namespace palpate::testing

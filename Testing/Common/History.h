@@ -1,0 +1,102 @@
+#pragma once
+
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/PairRun.h"
+#include "Common/Solids.h"
+#include "Common/Things.h"
+
+#include <Eigen/Geometry>
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace palpate::testing {
+
+/// A random life of an OctreeBasedCD: geometries of every type and pairs of every method come and
+/// go, move within steps and from step to step, change topology, filters, disabled elements and
+/// predicates, with queries, updates and detections in between.
+///
+/// Beside it a model keeps only the last values, by the rules of the step as DESIGN states them. At
+/// the end of each frame the life must answer as a new object that is given the model, and as brute
+/// force is. What is meant to last from step to step must be as in an object that was given only
+/// the last values of each step.
+class RandomHistory {
+ public:
+  explicit RandomHistory(std::uint64_t seed);
+
+  /// Some random calls, a detection, and all comparisons. Failures are GoogleTest's.
+  void frame();
+  std::size_t contacts() const { return m_contacts; }  ///< of all frames
+
+ private:
+  struct Body {
+    Thing thing;                          ///< of the last topology; its positions at rest
+    std::vector<Tetrahedron> tetrahedra;  ///< of a tetrahedral mesh
+    std::optional<AnalyticalGeometry> shape;
+    Positions before, now;  ///< in the body's frame
+    bool isNew = true, bodyGiven = false, placed = false, transformGiven = false;
+    Eigen::Matrix3d rotationBefore = Eigen::Matrix3d::Identity(), rotation = rotationBefore;
+    Vector3d translationBefore = Vector3d::Zero(), translation = translationBefore;
+    CollisionFilter filter{};
+    std::vector<std::uint32_t> disabled{};
+
+    bool isMesh() const { return !shape && thing.kind == GeometryKind::Triangles; }
+    std::size_t elements() const;
+  };
+  struct Pair {
+    GeometryId a, b;
+    PairSettings settings;
+    int predicate = 0;  ///< 0: none
+  };
+
+  // Random calls. Each changes the life and the model, or neither where the library refuses it.
+  void act();
+  void add();
+  void remove(GeometryId);
+  void setPositions(GeometryId);
+  void setTransform(GeometryId);
+  void setTopology(GeometryId);
+  void setFilter(GeometryId);
+  void setDisabled(GeometryId);
+  void addOrChangePair();
+  void query();
+
+  GeometryId anyBody();
+  Thing randomThing(int type);
+  Solid randomSolid();
+  PairSettings randomSettings();
+  Positions randomMotion(const Positions&);
+  Eigen::Matrix3d randomTurn();
+  static ContactPredicate predicateOf(int number);
+  /// call() throws where it is refused; returns whether it was accepted.
+  template <class F>
+  static bool accepts(F&& call);
+
+  static GeometryId addTo(OctreeBasedCD&, const Body&);
+  static void setEnds(OctreeBasedCD&, GeometryId, const Body&);
+  /// A new object with the last values. ids: of the life's geometries in it.
+  OctreeBasedCD fresh(Engine, std::map<GeometryId, GeometryId>& ids) const;
+  void compareContacts(const OctreeBasedCD& other, const std::map<GeometryId, GeometryId>&,
+                       bool isBruteForce);
+  bool startsApart(const Pair&) const;
+  void compareCandidates(OctreeBasedCD& bruteForce, const std::map<GeometryId, GeometryId>&);
+  void compareQueries(OctreeBasedCD& other, const std::map<GeometryId, GeometryId>&);
+  void compareWhatLasts();
+  void endStep();
+
+  Random m_random;
+  OctreeBasedCD m_life;
+  /// Given only the last values of each step.
+  OctreeBasedCD m_committed;
+  std::map<GeometryId, Body> m_bodies;
+  std::vector<Pair> m_pairs;
+  std::optional<std::pair<GeometryId, GeometryId>> m_followed;  ///< asked for in this step
+  std::size_t m_contacts = 0;
+};
+
+}  // namespace palpate::testing
