@@ -23,11 +23,12 @@ int main() {
   const auto organ = collisions.addTriangleMesh(organPositions, organTriangles);
   const auto tool = collisions.addTriangleMesh(toolPositions, toolTriangles);
   collisions.addCollisionPair(organ, tool, {.thickness = 0.1});
-  // each frame, when positions have changed
+  // in each step
   collisions.setPositions(tool, toolPositions);
   collisions.detectCollision();
   for (const auto& contact : collisions.collisionData(organ, tool).triangleVertex())
     respond(palpate::stencil(contact), contact);
+  collisions.advance();
   // README ends
 
   const std::vector<palpate::Segment> segments{{0, 1}, {1, 2}};
