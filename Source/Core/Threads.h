@@ -23,8 +23,9 @@ namespace palpate {
 ///             std::thread: a SCHED_FIFO thread on one core with a SCHED_OTHER worker
 ///             (ThreadsTest.cpp). Where oneTBB is the pool, its own rules hold.
 /// fork()      In the child loops run on the calling thread, and destruction gives up the pool's
-///             memory without touching its threads. fork() inside a task is for exec() only: in the
-///             child the loop throws, or waits without end where oneTBB is the pool.
+///             memory without touching its threads. A Threads made in the child has threads of its
+///             own, except with oneTBB, which starts none there. fork() inside a task is for exec()
+///             only: in the child the loop throws, or waits without end with oneTBB.
 class Threads {
  public:
   /// At most `count` threads (0: all cores) of a pool of its own, or of the executor (0: all).
