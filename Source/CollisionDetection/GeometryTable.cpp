@@ -230,13 +230,17 @@ GeometryId GeometryTable::add(const AnalyticalGeometry& analytical) {
   if (const std::string fault = faultOf(analytical, element); !fault.empty())
     throw Error(ErrorCode::InvalidShape, nameOf(GeometryId{m_nextId}) + ": " + fault,
                 GeometryId{m_nextId}, element);
+  // All that may fail comes first: a shape is there whole or not at all.
+  std::optional<Shape> shape(std::in_place, analytical, RigidTransform{}), before = shape;
+  AnalyticalGeometry measures = analytical;
+  const auto corners = shape->corners();
+  const Positions positions(std::vector<Eigen::Vector3d>(corners.begin(), corners.end()));
   const GeometryId id = add({}, {}, GeometryKind::Shape);
   TriangleMesh& mesh = m_geometries.back()->mesh;
-  mesh.analytical = analytical;
-  mesh.shape.emplace(analytical, mesh.now.transform());
-  mesh.shapeBefore = mesh.shape;
-  const auto corners = mesh.shape->corners();
-  mesh.before = mesh.now = std::vector<Eigen::Vector3d>(corners.begin(), corners.end());
+  mesh.analytical = std::move(measures);
+  mesh.shape = std::move(shape);
+  mesh.shapeBefore = std::move(before);
+  mesh.before = mesh.now = positions;
   return id;
 }
 
