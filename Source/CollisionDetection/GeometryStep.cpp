@@ -22,9 +22,10 @@ void GeometryStep::start(TriangleMesh& mesh, Positions::Body body) noexcept {
   m_detected = mesh.before;
 }
 
-void GeometryStep::startShape(TriangleMesh& mesh, const AnalyticalGeometry& analytical) {
+void GeometryStep::startShape(TriangleMesh& mesh, const AnalyticalGeometry& analytical,
+                              Shape shape) {
   mesh.analytical = analytical;
-  mesh.shape.emplace(analytical, mesh.now.transform());
+  mesh.shape = std::move(shape);
   mesh.shapeBefore = m_spare = m_spareBefore = mesh.shape;
 }
 

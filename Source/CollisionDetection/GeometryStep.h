@@ -35,8 +35,8 @@ class GeometryStep {
 
   /// Positions of a new geometry or topology, at both ends.
   void start(TriangleMesh&, Positions::Body) noexcept;
-  /// The shape in the world, of a new analytical geometry.
-  void startShape(TriangleMesh&, const AnalyticalGeometry&);
+  /// The shape of a new analytical geometry, not placed.
+  void startShape(TriangleMesh&, const AnalyticalGeometry&, Shape);
   /// moved: if not null, receives the motion of the step where both ends are unplaced.
   void setPositions(TriangleMesh&, std::optional<std::span<const Eigen::Vector3d>> before,
                     std::span<const Eigen::Vector3d> now, const Threads&,

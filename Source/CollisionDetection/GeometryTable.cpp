@@ -116,12 +116,12 @@ GeometryId GeometryTable::add(const AnalyticalGeometry& analytical) {
   std::optional<std::size_t> element;
   if (const std::string fault = faultOf(analytical, element); !fault.empty())
     throw Error(ErrorCode::InvalidShape, nameOf(id) + ": " + fault, id, element);
-  const Shape shape(analytical, {});
+  Shape shape(analytical, {});
   MeshTopology topology;
   topology.kind = GeometryKind::Shape;
   auto geometry = make({shape.corners().begin(), shape.corners().end()}, std::move(topology));
   geometry->mesh.rest.clear();
-  geometry->step.startShape(geometry->mesh, analytical);
+  geometry->step.startShape(geometry->mesh, analytical, std::move(shape));
   return add(std::move(geometry));
 }
 

@@ -1,5 +1,6 @@
 #include "Geometry/Polytope.h"
 
+#include "Geometry/ShapeLengths.h"
 #include "Math/Compensated.h"
 #include "Math/Foot.h"
 #include "Math/Predicates.h"
@@ -7,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <utility>
 
 namespace palpate {
 
@@ -39,6 +42,25 @@ const Vector3d* furthest(std::span<const Vector3d> points, Independent&& indepen
     most = its;
   }
   return best;
+}
+
+/// Up to so many points are added in their own order.
+constexpr std::size_t kPointsInOrder = 32;
+
+/// 0, 1, ... in an order that looks random and is the same on every machine: Fisher and Yates, with
+/// the numbers of SplitMix64 (Steele, Lea, Flood 2014).
+std::vector<std::uint32_t> shuffled(std::uint32_t count) {
+  std::vector<std::uint32_t> order(count);
+  std::iota(order.begin(), order.end(), 0u);
+  std::uint64_t state = 0;
+  for (std::uint32_t i = count; i > 1; --i) {
+    std::uint64_t z = state += 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    z ^= z >> 31;
+    std::swap(order[i - 1], order[(z >> 32) * i >> 32]);
+  }
+  return order;
 }
 
 }  // namespace
@@ -79,7 +101,7 @@ Polytope::Polytope(std::span<const Vector3d> points) {
         std::max({std::abs(four[0][axis]), largest(four[1] - four[0]), largest(four[2] - four[0])});
   }
   start(four);
-  for (const Vector3d& p : points) add(p);
+  addAll(points);
   if (flat)
     keepPlate(3);
   else
@@ -122,27 +144,95 @@ std::uint32_t Polytope::newFace(const Triangle& corners, const Triangle& neighbo
 bool Polytope::add(const Vector3d& p) {
   m_visible.clear();
   for (std::uint32_t f = 0; f < m_faces.size(); ++f) {
-    m_sees[f] = m_planes[f].face != kNone &&
-                orient3d(corner(f, 0), corner(f, 1), corner(f, 2), p, m_decisions) > 0;
+    m_sees[f] = m_planes[f].face != kNone && sees(p, f);
     if (m_sees[f]) m_visible.push_back(f);
   }
   if (m_visible.empty()) return false;
+  addVisible(p);
+  removeVisible();
+  return true;
+}
+
+/// Faces from p to the border of what it sees.
+void Polytope::addVisible(const Vector3d& p) {
   m_points.push_back(p);
   m_next.resize(m_points.size());
+  m_fresh.clear();
   std::uint32_t last = kNone;
   for (const std::uint32_t f : m_visible) last = cut(f, last);
-  // Around the border of what it sees; m_next: the new face that starts at a corner of that.
+  // Around the border; m_next: the new face that starts at a corner of that.
   for (std::uint32_t f = last, next = kNone; next != last; f = next) {
     next = m_next[m_faces[f].corners[1]];
     m_faces[f].neighbours[1] = next;
     m_faces[next].neighbours[2] = f;
   }
+}
+
+void Polytope::removeVisible() {
   for (const std::uint32_t f : m_visible) {
     m_planes[f] = {Vector3d::Zero(), std::numeric_limits<double>::infinity(), kNone};
     m_sees[f] = 0;
     m_free.push_back(f);
   }
-  return true;
+}
+
+/// Which of the points that are still to be added see which face.
+///
+/// A point that sees a new face, which has an edge with a face on either side of the border, saw
+/// one of these two: in front of a plane between two others through one line, it is in front of one
+/// of them. And a point outside that saw a face which is removed sees a new one: what it sees is
+/// connected, so either that is all removed, or it saw both faces at an edge of the border.
+struct Polytope::Conflicts {
+  std::vector<std::vector<std::uint32_t>> ofFace;
+  std::vector<std::uint32_t> seen;    ///< per point: a face that it sees; kNone: it is inside
+  std::vector<std::uint32_t> tested;  ///< per point: how many faces there were when it was last
+
+  explicit Conflicts(std::size_t points) : seen(points, kNone), tested(points, 0) {}
+  void add(std::uint32_t point, std::uint32_t face) {
+    ofFace[face].push_back(point);
+    seen[point] = face;
+  }
+};
+
+void Polytope::addAll(std::span<const Vector3d> points) {
+  if (points.size() <= kPointsInOrder) {
+    for (const Vector3d& p : points) add(p);
+    return;
+  }
+  const auto count = static_cast<std::uint32_t>(points.size());
+  Conflicts conflicts(count);
+  conflicts.ofFace.resize(m_faces.size());
+  for (std::uint32_t f = 0; f < m_faces.size(); ++f) {
+    const OrientedPlane plane(corner(f, 0), corner(f, 1), corner(f, 2));
+    for (std::uint32_t i = 0; i < count; ++i)
+      if (plane.side(points[i], m_decisions) > 0) conflicts.add(i, f);
+  }
+  std::uint32_t made = 0;  // faces
+  const auto test = [&](std::uint32_t point, const OrientedPlane& plane, std::uint32_t face) {
+    if (conflicts.tested[point] == made) return;
+    conflicts.tested[point] = made;
+    if (plane.side(points[point], m_decisions) > 0) conflicts.add(point, face);
+  };
+  for (const std::uint32_t i : shuffled(count)) {
+    if (conflicts.seen[i] == kNone) continue;
+    m_visible.assign(1, conflicts.seen[i]);
+    m_sees[conflicts.seen[i]] = 1;
+    for (std::size_t k = 0; k < m_visible.size(); ++k)
+      for (const std::uint32_t other : m_faces[m_visible[k]].neighbours)
+        if (!m_sees[other] && sees(points[i], other)) m_sees[other] = 1, m_visible.push_back(other);
+    addVisible(points[i]);
+    for (const std::uint32_t f : m_visible)
+      for (const std::uint32_t point : conflicts.ofFace[f]) conflicts.seen[point] = kNone;
+    conflicts.ofFace.resize(m_faces.size());
+    for (const auto& [face, seen] : m_fresh) {
+      const OrientedPlane plane(corner(face, 0), corner(face, 1), corner(face, 2));
+      ++made;
+      for (const std::uint32_t from : {seen, m_faces[face].neighbours[0]})
+        for (const std::uint32_t point : conflicts.ofFace[from]) test(point, plane, face);
+    }
+    for (const std::uint32_t f : m_visible) conflicts.ofFace[f].clear();
+    removeVisible();
+  }
 }
 
 /// New faces from the last point to a face's edges behind which it sees nothing. Returns the last
@@ -156,6 +246,7 @@ std::uint32_t Polytope::cut(std::uint32_t face, std::uint32_t last) {
     if (m_sees[behind]) continue;
     const std::uint32_t fresh = newFace({u, v, p}, {behind, kNone, kNone});
     m_next[u] = fresh;
+    m_fresh.push_back({fresh, face});
     for (std::size_t k = 0; k < 3; ++k)
       if (m_faces[behind].corners[k] == v && m_faces[behind].corners[(k + 1) % 3] == u)
         m_faces[behind].neighbours[k] = fresh;
@@ -221,7 +312,7 @@ void Polytope::keepPlate(std::uint32_t apex) {
       behind = f;
       const Vector3d &u = corner(f, static_cast<int>(i)),
                      &v = corner(f, static_cast<int>(i + 1) % 3);
-      const Vector3d out = (v - u).stableNormalized().cross(m_planes[f].normal).normalized();
+      const Vector3d out = directionOf(v - u).cross(m_planes[f].normal).normalized();
       border.push_back({out, dot(out, u), f});
     }
   }

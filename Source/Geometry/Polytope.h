@@ -29,7 +29,9 @@ std::vector<Eigen::Vector3d> spanOf(std::span<const Eigen::Vector3d> points);
 ///
 /// Ties     `tie`, L, is a height that counts as none: of two planes that are equally near the
 ///          first counts.
-/// Source   the beneath-beyond method: Preparata, Shamos, Computational Geometry (1985), 3.4.2.
+/// Source   the beneath-beyond method: Preparata, Shamos, Computational Geometry (1985), 3.4.2. Of
+///          many points with conflict lists: Clarkson, Shor, Applications of random sampling in
+///          computational geometry II (1989).
 class Polytope {
  public:
   struct OnFace {
@@ -39,7 +41,9 @@ class Polytope {
 
   /// The hull of points that span a plane or more. Of a plane: a plate, whose triangles are there
   /// in both windings.
-  /// Cost     each point is tested against each triangle of the hull of those before it.
+  /// Cost     n log n expected for n points in any order. They are added in an order that looks
+  ///          random but is always the same, so that the hull is the same in every run; up to
+  ///          32 of them are added in their own order.
   explicit Polytope(std::span<const Eigen::Vector3d> points);
   Polytope() = default;
 
@@ -54,6 +58,8 @@ class Polytope {
   std::size_t exactDecisions() const { return m_decisions.undecided; }
   std::size_t faceCount() const { return m_faces.size(); }
   const Triangle& corners(std::uint32_t face) const { return m_faces[face].corners; }
+  /// Of one that grows: what is left of a face that is no more has corners, too.
+  bool hasFace(std::uint32_t face) const { return m_planes[face].face == face; }
 
   SignedDistance at(const Eigen::Vector3d& x, double tie) const;
   /// The face that is nearest to x; inside, of those in the plane of at().
@@ -84,6 +90,13 @@ class Polytope {
   const Eigen::Vector3d& corner(std::uint32_t face, int i) const {
     return m_points[m_faces[face].corners[static_cast<std::size_t>(i)]];
   }
+  struct Conflicts;
+  bool sees(const Eigen::Vector3d& p, std::uint32_t face) {
+    return orient3d(corner(face, 0), corner(face, 1), corner(face, 2), p, m_decisions) > 0;
+  }
+  void addAll(std::span<const Eigen::Vector3d> points);
+  void addVisible(const Eigen::Vector3d& p);
+  void removeVisible();
   std::uint32_t newFace(const Triangle& corners, const Triangle& neighbours);
   std::uint32_t cut(std::uint32_t face, std::uint32_t last);
   std::vector<std::uint32_t> keepHull();
@@ -105,6 +118,11 @@ class Polytope {
   Buffer<Face> m_faces;
   Buffer<Plane> m_planes;                           ///< of the faces, and of a plate's border
   Buffer<std::uint32_t> m_free, m_visible, m_next;  ///< scratch of add()
+  /// A new face, and the face that was seen across its edge on the border.
+  struct Fresh {
+    std::uint32_t face, seen;
+  };
+  Buffer<Fresh> m_fresh;  ///< scratch of add()
   SignCounts m_decisions;
   Buffer<std::uint8_t> m_sees;  ///< per face: the point that is being added
 };

@@ -1,6 +1,7 @@
 #include "Geometry/Shape.h"
 
 #include "Core/Text.h"
+#include "Geometry/ShapeLengths.h"
 #include "Math/ClosestPoint.h"
 #include "Math/Compensated.h"
 #include "Math/Foot.h"
@@ -28,16 +29,9 @@ Eigen::Matrix3d orthonormal(const Eigen::Matrix3d& rotation) {
   return axes;
 }
 
-/// Also where squares leave the range of double, but slower there.
-double lengthOf(const Vector3d& v) {
-  const double squared = v.squaredNorm();
-  return squared > kUnderflowGuardOfProducts && squared < kOverflowGuard ? std::sqrt(squared)
-                                                                         : v.stableNorm();
-}
-
 /// A rotation that turns z into the direction.
 Eigen::Matrix3d axesAlong(const Vector3d& direction) {
-  const Vector3d z = direction.stableNormalized(), x = z.unitOrthogonal();
+  const Vector3d z = directionOf(direction), x = z.unitOrthogonal();
   Eigen::Matrix3d axes;
   axes << x, z.cross(x), z;
   return axes;
@@ -98,9 +92,9 @@ void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& tran
          axesAlong(plane->normal), {});
   } else if (const auto* cylinder = std::get_if<Cylinder>(&geometry)) {
     if (cylinder->radius > 0) {
-      const Vector3d along = 0.5 * cylinder->p1 - 0.5 * cylinder->p0;
-      body(Kind::Cylinder, cylinder->p0 + along, axesAlong(along),
-           {cylinder->radius, lengthOf(along)});
+      const Vector3d axis = cylinder->p1 - cylinder->p0;
+      body(Kind::Cylinder, cylinder->p0 + 0.5 * axis, axesAlong(axis),
+           {cylinder->radius, 0.5 * lengthOf(axis)});
     } else {
       capsule(cylinder->p0, cylinder->p1, 0);
     }
@@ -127,9 +121,8 @@ void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& tran
 Vector3d Shape::inBody(const Vector3d& x) const { return m_axes.transpose() * (x - m_p0); }
 
 Shape::Parts Shape::partsOf(const Vector3d& v, double tie) const {
-  const double radius = lengthOf({v[0], v[1], 0});
-  const Vector3d outward =
-      radius > 0 ? Vector3d(v[0] / radius, v[1] / radius, 0) : Vector3d(1, 0, 0);
+  const auto& [radius, across] = polar({v[0], v[1], 0});
+  const Vector3d outward = radius > 0 ? across : Vector3d(1, 0, 0);
   return {{radius, std::abs(v[2])}, {outward, Vector3d(0, 0, v[2] < -tie ? -1 : 1)}};
 }
 
@@ -147,9 +140,9 @@ SignedDistance Shape::atBody(const Vector3d& u, double tie,
   const Parts parts = partsOf(u, tie);
   const std::array<double, 2> beyond{parts.lengths[0] - sizes[0], parts.lengths[1] - sizes[1]};
   if (std::min(beyond[0], beyond[1]) > kOnSurface * m_magnitude) {
-    const Vector3d difference = beyond[0] * parts.directions[0] + beyond[1] * parts.directions[1];
-    const double distance = lengthOf(difference);
-    return {distance, difference / distance};
+    const auto [distance, normal] =
+        polar(beyond[0] * parts.directions[0] + beyond[1] * parts.directions[1]);
+    return {distance, normal};
   }
   const std::size_t nearest = beyond[1] > beyond[0] + tie;
   return {beyond[nearest], parts.directions[nearest]};
@@ -168,17 +161,13 @@ SignedDistance Shape::at(const Vector3d& x) const {
     return {inBodys.distance, m_axes * inBodys.normal};
   }
   const Vector3d along = m_p1 - m_p0, from = x - m_p0;
-  const double length = along.squaredNorm();
-  const double weight = length > 0 ? std::clamp(from.dot(along) / length, 0.0, 1.0) : 0.0;
-  const Vector3d difference = from - weight * along;
-  const double distance = lengthOf(difference);
+  const auto& [distance, outward] = polar(from - weightOnAxis(from, along) * along);
   const bool onAxis = distance <= kOnSurface * m_magnitude;
-  return {distance - m_radius,
-          onAxis ? fromAxis(axisOfLeast(along.cwiseAbs())) : Vector3d(difference / distance)};
+  return {distance - m_radius, onAxis ? fromAxis(axisOfLeast(along.cwiseAbs())) : outward};
 }
 
 Vector3d Shape::fromAxis(const Vector3d& normal) const {
-  const Vector3d along = (m_p1 - m_p0).stableNormalized();
+  const Vector3d along = directionOf(m_p1 - m_p0);
   const Vector3d across = normal - along.dot(normal) * along;
   return across.squaredNorm() > kAcrossSquare ? across.normalized() : along.unitOrthogonal();
 }
@@ -258,14 +247,14 @@ std::optional<NearestToShape> Shape::nearestToAxis(const Vector3d& a, const Vect
                           distance - m_radius, true, end.exact};
   };
   const auto isOver = [&](int i) { return ends[i].feature == TriangleFeature::Face; };
-  if (isOver(0) && isOver(1) && ends[0].difference.dot(ends[1].difference) > 0) {
+  if (isOver(0) && isOver(1) && signedDot(ends[0].difference, ends[1].difference) > 0) {
     if (ends[0].distance != ends[1].distance)
       return answer(ends[ends[1].distance < ends[0].distance],
                     std::min(ends[0].distance, ends[1].distance));
     return answer(finiteVertexTriangleDistance(m_p0 + 0.5 * along, a, b, c), ends[0].distance);
   }
   for (const int i : {0, 1})  // nearest of all if from there the axis does not come nearer
-    if (isOver(i) && (i == 0 ? 1 : -1) * along.dot(ends[i].difference) >= 0)
+    if (isOver(i) && (i == 0 ? 1 : -1) * signedDot(along, ends[i].difference) >= 0)
       return answer(ends[i], ends[i].distance);
   SignCounts counts;
   const OrientedPlane plane(a, b, c);
@@ -322,6 +311,8 @@ std::optional<NearestToShape> Shape::nearestToHull(const Vector3d& a, const Vect
 
 std::string faultOf(const AnalyticalGeometry& geometry, std::optional<std::size_t>& element) {
   std::string fault;
+  constexpr const char* kWithin = "at most 1e+300 in magnitude";
+  const auto isBeyond = [](const Vector3d& v) { return largest(v) > kLargestMeasure; };
   const auto say = [&](const std::string& name, const auto& value, const char* rule) {
     fault = name + " is " + textOf(value) + "; it must be " + rule;
   };
@@ -330,16 +321,19 @@ std::string faultOf(const AnalyticalGeometry& geometry, std::optional<std::size_
     if constexpr (std::is_same_v<Field, std::vector<Vector3d>>) {
       if (field.empty()) fault = "a hull needs at least one point";
       for (std::size_t i = field.size(); i-- > 0;)
-        if (!field[i].allFinite())
-          say("point " + std::to_string(i), field[i], "finite"), element = i;
+        if (const bool finite = field[i].allFinite(); !finite || isBeyond(field[i]))
+          say("point " + std::to_string(i), field[i], finite ? kWithin : "finite"), element = i;
+      if (field.size() > kMostHullPoints)
+        fault = "a hull of " + std::to_string(field.size()) + " points; a hull takes at most " +
+                std::to_string(kMostHullPoints);
     } else if constexpr (!std::is_same_v<Field, bool>) {
       Vector3d values;
       values << field, Eigen::VectorXd::Zero(std::is_same_v<Field, double> ? 2 : 0);
       const bool isSize = name == "radius" || name == "halfExtents";
       if (!values.allFinite() || (isSize && !(values.minCoeff() >= 0)))
         say(name, field, isSize ? "finite and not negative" : "finite");
-      else if (name == "normal" && values == Vector3d::Zero())
-        say(name, field, "of some length");
+      else if (name == "normal" ? values == Vector3d::Zero() : isBeyond(values))
+        say(name, field, name == "normal" ? "of some length" : kWithin);
     }
   });
   const auto* cylinder = std::get_if<Cylinder>(&geometry);

@@ -1,4 +1,5 @@
 #include "Geometry/Shape.h"
+#include "Geometry/ShapeLengths.h"
 
 #include "Math/Compensated.h"
 #include "Math/Predicates.h"
@@ -37,15 +38,14 @@ class Differences {
     points[0] = furthest(Vector3d::UnitX());
     flat = Vector3d::UnitX();
     const Vector3d axes[] = {Vector3d::UnitX(), Vector3d::UnitY(), Vector3d::UnitZ()};
-    if (!extend(points[1], axes, [&](const Vector3d& p) { return (p - at(0)).stableNorm(); }))
-      return 1;
-    const Vector3d along = (at(1) - at(0)).stableNormalized();
+    if (!extend(points[1], axes, [&](const Vector3d& p) { return lengthOf(p - at(0)); })) return 1;
+    const Vector3d along = directionOf(at(1) - at(0));
     flat = along.unitOrthogonal();
     const Vector3d across[] = {flat, along.cross(flat)};
     if (!extend(points[2], across,
-                [&](const Vector3d& p) { return along.cross(p - at(0)).stableNorm(); }))
+                [&](const Vector3d& p) { return lengthOf(along.cross(p - at(0))); }))
       return 2;
-    flat = along.cross(at(2) - at(0)).stableNormalized();
+    flat = directionOf(along.cross(at(2) - at(0)));
     SignCounts counts;
     if (!extend(points[3], {&flat, 1},
                 [&](const Vector3d& p) { return std::abs(flat.dot(p - at(0))); }) ||
@@ -172,7 +172,7 @@ ShapePairDistance Shape::grownFrom(const Shape& other, ShapePairScratch& scratch
   }
   grown.start(corners);
   const Vector3d origin = Vector3d::Zero();
-  const double gap = kShapePairGap * size, tie = kOnSurface * size;
+  const double gap = std::max(kShapePairGap * size, kSmallestShapePairGap), tie = kOnSurface * size;
   SignedDistance out;
   for (;;) {
     out = grown.at(origin, tie);

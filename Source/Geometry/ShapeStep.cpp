@@ -1,5 +1,6 @@
 #include "Geometry/ShapeStep.h"
 
+#include "Math/Compensated.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
@@ -14,8 +15,6 @@ using Eigen::Vector3d;
 /// Of the step: parts that are not passed are halved down to this share of the tolerance, so that
 /// what bounds lose on them is within it.
 constexpr double kShareOfTolerance = 0.25;
-
-double largest(const Vector3d& v) { return v.cwiseAbs().maxCoeff(); }
 
 /// u x v, in Bernstein form.
 template <class Moment>
@@ -51,23 +50,29 @@ ShapeStep::Moment ShapeStep::between(const Moment& a, const Moment& b, double ti
   return {left * a.from + time * b.from, left * a.u + time * b.u, left * a.v + time * b.v};
 }
 
-bool ShapeStep::staysAbove(const Moment& a, const Moment& b, double distance, double error) const {
+ShapeStep::Moment ShapeStep::scaledBy(int exponent, const Moment& moment) const {
+  if (exponent == 0) return moment;
+  if (m_before.isPlane()) return {scaled(moment.from, exponent), moment.u, moment.v};
+  return {scaled(moment.from, exponent), scaled(moment.u, exponent), moment.v};
+}
+
+bool ShapeStep::staysAbove(const Moment& a, const Moment& b, const Scaled& is) const {
   const std::array<Vector3d, 3> n = normalsOf(a, b);
   const double length =
       std::sqrt(std::max({n[0].squaredNorm(), n[1].squaredNorm(), n[2].squaredNorm()}));
-  return areBeyond(heightsOf(n, a, b), distance * length + error, m_before.isTwoSided());
+  return areBeyond(heightsOf(n, a, b), is.distance * length + is.error, m_before.isTwoSided());
 }
 
-bool ShapeStep::staysOutside(const Moment& a, const Moment& b, double distance,
-                             double error) const {
-  const double reach = m_before.radius() + distance;
+bool ShapeStep::staysOutside(const Moment& a, const Moment& b, const Scaled& is) const {
+  const auto& [exponent, distance, error, radius] = is;
+  const double reach = radius + distance;
   const std::array<double, 3> squares{a.u.squaredNorm(), a.u.dot(b.u), b.u.squaredNorm()};
   const double longest = std::max(squares[0], squares[2]),
                furthest = std::sqrt(std::max(a.from.squaredNorm(), b.from.squaredNorm()));
   // All of it is in a ball about its centre.
   const double half = 0.5 * (b.from - a.from).norm();
   if ((0.5 * (a.from + b.from)).norm() - half >
-      distance + std::hypot(m_before.radius(), 0.5 * std::sqrt(longest)) + error)
+      distance + std::hypot(radius, 0.5 * std::sqrt(longest)) + error)
     return true;
   // Beyond an end: from . u less half the square of u.
   const std::array<double, 3> along{a.from.dot(a.u), 0.5 * (a.from.dot(b.u) + b.from.dot(a.u)),
@@ -87,21 +92,22 @@ bool ShapeStep::staysOutside(const Moment& a, const Moment& b, double distance,
       k0.dot(k0) - square * q0, k0.dot(k1) - square * (q0 + q1) / 2,
       (k0.dot(k2) + 2 * k1.dot(k1)) / 3 - square * (q0 + 4 * q1 + q2) / 6,
       k1.dot(k2) - square * (q1 + q2) / 2, k2.dot(k2) - square * q2};
-  return areBeyond(across, error * (furthest + reach) * longest, false) ||
-         staysFar(a, b, distance + error);
+  return areBeyond(across, error * (furthest + reach) * longest, false) || staysFar(a, b, is);
 }
 
 /// At half time the point is further from the cylinder than either moves until then: from there a
 /// cylinder comes to any other by turning about its centre, and growing along its axis.
-bool ShapeStep::staysFar(const Moment& a, const Moment& b, double distance) const {
+bool ShapeStep::staysFar(const Moment& a, const Moment& b, const Scaled& is) const {
   const Moment middle = between(a, b, 0.5);
   const Vector3d along = middle.u.normalized();
   const double chord =
       std::max((a.u.normalized() - along).norm(), (b.u.normalized() - along).norm());
   if (!(chord < 1)) return false;  // or one has no direction: only by the ball
   const double moves = 0.5 * (b.from - a.from).norm() + 0.25 * (b.u - a.u).norm() +
-                       chord * std::hypot(m_before.radius(), 0.5 * middle.u.norm());
-  return distanceAt(middle).distance - moves > distance;
+                       chord * std::hypot(is.radius, 0.5 * middle.u.norm());
+  const double middleDistance =
+      std::ldexp(distanceAt(scaledBy(-is.exponent, middle)).distance, is.exponent);
+  return middleDistance - moves > is.distance + is.error;
 }
 
 SignedDistance ShapeStep::distanceAt(const Moment& moment) const {
@@ -114,13 +120,16 @@ SignedDistance ShapeStep::distanceAt(const Moment& moment) const {
 
 std::optional<double> ShapeStep::timeNear(const Point& point, double distance,
                                           double tolerance) const {
-  const Moment start = before(point[0]), end = now(point[1]);
-  const double error = kShapeBoundError * (m_before.magnitude() + m_now.magnitude() +
-                                           largest(point[0]) + largest(point[1]) + distance);
+  const double size =
+      m_before.magnitude() + m_now.magnitude() + largest(point[0]) + largest(point[1]) + distance;
+  const int exponent = isModerate(size) ? 0 : exponentTowardsOne(size);
+  const auto near = [&](double length) { return std::ldexp(length, exponent); };
+  const Scaled is{exponent, near(distance), kShapeBoundError * near(size), near(m_before.radius())};
+  const Moment start = scaledBy(exponent, before(point[0])),
+               end = scaledBy(exponent, now(point[1]));
   const auto passes = [&](double from, double to) {
     const Moment a = between(start, end, from), b = between(start, end, to);
-    return m_before.isPlane() ? staysAbove(a, b, distance, error)
-                              : staysOutside(a, b, distance, error);
+    return m_before.isPlane() ? staysAbove(a, b, is) : staysOutside(a, b, is);
   };
   double time = 0, part = 1;  // time is a multiple of part, and both are exact
   while (time < 1) {

@@ -39,14 +39,20 @@ class ShapeStep {
   struct Moment {
     Eigen::Vector3d from, u, v;
   };
+  /// Lengths times a power of two, so that their fourth powers stay in the range of double.
+  struct Scaled {
+    int exponent;
+    double distance, error, radius;
+  };
   Moment before(const Eigen::Vector3d& point) const { return at(m_before, point); }
   Moment now(const Eigen::Vector3d& point) const { return at(m_now, point); }
+  Moment scaledBy(int exponent, const Moment&) const;
   static Moment at(const Shape&, const Eigen::Vector3d& point);
   static Moment between(const Moment&, const Moment&, double time);
   SignedDistance distanceAt(const Moment&) const;
-  bool staysAbove(const Moment&, const Moment&, double distance, double error) const;
-  bool staysOutside(const Moment&, const Moment&, double distance, double error) const;
-  bool staysFar(const Moment&, const Moment&, double distance) const;
+  bool staysAbove(const Moment&, const Moment&, const Scaled&) const;
+  bool staysOutside(const Moment&, const Moment&, const Scaled&) const;
+  bool staysFar(const Moment&, const Moment&, const Scaled&) const;
 
   const Shape &m_before, &m_now;
 };

@@ -133,6 +133,8 @@ constexpr double kOnSurface = 0x1p-48;
 /// Relative to the largest difference of two shapes' points: how closely their distance is
 /// bracketed. Each difference carries two roundings, its height five more.
 constexpr double kShapePairGap = 0x1p-46;
+/// L: the same where differences are so small that their own roundings are larger.
+constexpr double kSmallestShapePairGap = 0x1p-1068;
 /// Squared sine from a capsule's axis below which another direction across it is taken: any value.
 constexpr double kAcrossSquare = 0x1p-10;
 /// Of R^T R from 1: rotations as exact as users have them; boxes and cylinders take the nearest one

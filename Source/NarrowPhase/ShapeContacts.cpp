@@ -1,6 +1,7 @@
 #include "NarrowPhase/ShapeContacts.h"
 
 #include "NarrowPhase/Continuous.h"
+#include "Geometry/ShapeLengths.h"
 #include "Geometry/ShapeStep.h"
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
@@ -79,7 +80,7 @@ class ShapeImpacts {
     const SignedDistance then = step.at(point, *time);
     return ShapeImpact{*time, {Vector3d::UnitX(), then.normal, then.distance, true}};
   }
-  static double motionOf(const ImpactQuery::Step& step) { return (step.now - step.before).norm(); }
+  static double motionOf(const ImpactQuery::Step& step) { return lengthOf(step.now - step.before); }
 
   void ask(const ImpactQuery& query) {
     const ImpactAnswer answer = findImpact(query, m_settings, m_time);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 
+#include <cstddef>
 #include <variant>
 #include <vector>
 
@@ -10,6 +11,11 @@ namespace palpate {
 // Shapes by their measures, all in L, in a body frame that OctreeBasedCD::setTransform() places in
 // the world. All are solid and convex. Measures may be zero: the shape is then what is left of it,
 // a sphere without radius a point, a capsule without length a sphere, a box without height a plate.
+// Each coordinate and each size is at most kLargestMeasure in magnitude, and may be as small as
+// double goes; others are refused (ErrorCode::InvalidShape).
+
+inline constexpr double kLargestMeasure = 1e300;                      ///< L
+inline constexpr std::size_t kMostHullPoints = std::size_t{1} << 17;  ///< of one ConvexHull
 
 struct Sphere {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
@@ -44,8 +50,11 @@ struct Cylinder {
 /// The convex hull of points: a tool's tip. At least one point; any may be doubled or inside. Of
 /// points in one plane a plate, on one line a segment, at one place a point: exactly so, points
 /// near a plane span a thin body.
-/// Cost     when added, each point is tested against each triangle of the hull of those before it:
-///          made for a few thousand. Each distance asks each triangle of the hull.
+/// Errors   more than kMostHullPoints points are refused.
+/// Cost     when added, n log n for n points, expected, whatever their order: 1,000, 8,000 and 64,000
+///          points of a sphere take 3, 27 and 340 ms of one core of an Intel Xeon. A distance asks
+///          each triangle of the hull, some of them several times: 0.06, 0.5 and 4 ms for a point
+///          beside these hulls. Points inside cost nothing after that.
 struct ConvexHull {
   std::vector<Eigen::Vector3d> points;  ///< finite
 };

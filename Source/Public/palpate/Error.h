@@ -24,7 +24,7 @@ enum class ErrorCode {
   NotAvailable,       ///< the answer was not kept, or no frame has been computed
   File,               ///< a file that cannot be read or written, or is not what it should be
   InvalidRadius,      ///< negative, NaN or infinite, or not one for each vertex
-  InvalidShape,       ///< a measure of a shape that is NaN, infinite, negative, or no direction
+  InvalidShape,       ///< a measure of a shape: not finite, negative, no direction, or too large
   InvalidTransform,   ///< not a rotation, or a translation that is not finite
   SharedFace,         ///< a face of more than two tetrahedra
   InvalidCall,        ///< of an object that was moved from, or from a callback that it calls
