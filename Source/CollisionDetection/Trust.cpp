@@ -188,7 +188,9 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
   validity.trusted = trusted && validity.arcDeviation <= settings.thickness;
   validity.sideMayBeWrong = plan.method != Method::Intersection && !validity.trusted;
   m_atEnd = {};
-  m_atEnd.clearance = std::min(facts.clearance, settings.thickness);
+  // Intersection measures no distances: meshes that do not intersect may be as near as they like.
+  m_atEnd.clearance =
+      plan.method == Method::Intersection ? 0.0 : std::min(facts.clearance, settings.thickness);
   if (!contents.intersectingTriangles.empty()) {
     m_atEnd.position = Position::Intersecting;
     m_atEnd.witness = contents.intersectingTriangles.front();

@@ -165,6 +165,20 @@ TEST_F(Step, WithoutAdvanceGrowsAndSaysSo) {
   }
 }
 
+/// Intersection measures no distances: a thickness does not tell how far apart its meshes were.
+TEST_F(Step, OfIntersectionStartsApartOnlyWhereItEnded) {
+  const std::vector<Eigen::Vector3d> wall{{0.2, 0.2, -1}, {0.2, 0.2, 1}, {0.3, 0.2, 1}};
+  const GeometryId id = m_detection.addTriangleMesh(wall, triangle());
+  m_detection.addCollisionPair(m_id, id, {.method = Method::Intersection, .thickness = 5});
+  m_detection.setPositions(m_id, at(2), at(2));
+  m_detection.detectCollision();
+  m_detection.advance();
+  m_detection.setPositions(m_id, at(0.5), at(0.5));
+  m_detection.detectCollision();
+  EXPECT_EQ(m_detection.collisionData(m_id, id).intersectingTriangles().size(), 1u);
+  EXPECT_FALSE(m_detection.collisionData(m_id, id).validity().startedApart);
+}
+
 /// A solver with rounds: the step's start stays known, and positions are corrected between rounds.
 TEST_F(Step, KeepsItsStartThroughRounds) {
   const GeometryId sheet = m_detection.addTriangleMesh(at(1), triangle());

@@ -183,15 +183,16 @@ TEST_P(OctreeFailure, OfAnUpdateIsMadeUpForByTheNext) {
       for (std::size_t i = 0; i < table.all().size(); ++i) {
         const Geometry& geometry = *table.all()[i];
         const Geometry& wanted = *expected.all()[i];
-        ASSERT_TRUE(geometry.treeIsNow() && geometry.octree.isBuilt());
-        ASSERT_EQ(validate(geometry.octree, false), std::vector<std::string>{});
-        ASSERT_EQ(geometry.frame, wanted.frame);
-        ASSERT_EQ(geometry.orderedTriangles.size(), wanted.orderedTriangles.size());
-        for (std::size_t t = 0; t < geometry.octree.size(); ++t)
-          ASSERT_EQ(geometry.orderedTriangles[t],
-                    geometry.mesh.topology.triangles[geometry.octree.order()[t]]);
-        const FloatBox root = geometry.octree.blocks()[0].box(0),
-                       wantedRoot = wanted.octree.blocks()[0].box(0);
+        const GeometryOctree& tree = geometry.tree;
+        const Octree& octree = tree.octree();
+        ASSERT_TRUE(tree.isValid() && octree.isBuilt());
+        ASSERT_EQ(validate(octree, false), std::vector<std::string>{});
+        ASSERT_EQ(tree.frame(), wanted.tree.frame());
+        ASSERT_EQ(tree.ordered().size(), wanted.tree.ordered().size());
+        for (std::size_t t = 0; t < octree.size(); ++t)
+          ASSERT_EQ(tree.ordered()[t], geometry.mesh.topology.triangles[octree.order()[t]]);
+        const FloatBox root = octree.blocks()[0].box(0),
+                       wantedRoot = wanted.tree.octree().blocks()[0].box(0);
         ASSERT_EQ(root.lower, wantedRoot.lower);
         ASSERT_EQ(root.upper, wantedRoot.upper);
       }
