@@ -36,12 +36,19 @@ class StandardFloatingPoint {
     else
       restoreFlags(m_control);
   }
+  /// The result, computed while the object lives. Compilers do not know that arithmetic depends on
+  /// the environment: what a function returns in registers they may compute after the destructor.
+  template <class Result>
+  static Result kept(Result result) {
+    asm volatile("" : "+m"(result));
+    return result;
+  }
+
   StandardFloatingPoint(const StandardFloatingPoint&) = delete;
   StandardFloatingPoint& operator=(const StandardFloatingPoint&) = delete;
 
  private:
-  /// Compilers do not know that arithmetic depends on the environment. What is loaded from or
-  /// stored to memory is not moved across this.
+  /// What is loaded from or stored to memory is not moved across this.
   static void keepOrder() { asm volatile("" ::: "memory"); }
 
 #if defined(__x86_64__)

@@ -261,7 +261,7 @@ EdgeEdgeDistance finiteEdgeEdgeDistance(const Vector3d& p0, const Vector3d& p1, 
 EdgeEdgeDistance edgeEdgeDistance(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0,
                                   const Vector3d& q1) {
   const StandardFloatingPoint standard;
-  if (areFinite(p0, p1, q0, q1)) return finiteEdgeEdgeDistance(p0, p1, q0, q1);
+  if (areFinite(p0, p1, q0, q1)) return standard.kept(finiteEdgeEdgeDistance(p0, p1, q0, q1));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const Vector3d none = Vector3d::Constant(nan);
   return {nan, nan, none, none, nan, EdgeFeature::Start, EdgeFeature::Start, false, false};

@@ -24,7 +24,7 @@ namespace {
 std::optional<double> timeOf(const ImpactQuery& query, const TimeOfImpactSettings& settings) {
   const StandardFloatingPoint standard;
   const ImpactAnswer answer = findImpact(query, settings);
-  return answer.impact ? std::optional(answer.time) : std::nullopt;
+  return standard.kept(answer.impact ? std::optional(answer.time) : std::nullopt);
 }
 
 }  // namespace

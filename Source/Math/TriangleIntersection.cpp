@@ -216,7 +216,7 @@ bool trianglesIntersect(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1,
                         const Eigen::Vector3d& b1, const Eigen::Vector3d& b2) {
   const StandardFloatingPoint standard;
   SignCounts counts;
-  return intersectTriangles({a0, a1, a2}, {b0, b1, b2}, counts).intersect();
+  return standard.kept(intersectTriangles({a0, a1, a2}, {b0, b1, b2}, counts).intersect());
 }
 
 }  // namespace palpate

@@ -147,7 +147,7 @@ VertexTriangleDistance finiteVertexTriangleDistance(const Vector3d& p, const Vec
 VertexTriangleDistance vertexTriangleDistance(const Vector3d& p, const Vector3d& a,
                                               const Vector3d& b, const Vector3d& c) {
   const StandardFloatingPoint standard;
-  if (areFinite(p, a, b, c)) return finiteVertexTriangleDistance(p, a, b, c);
+  if (areFinite(p, a, b, c)) return standard.kept(finiteVertexTriangleDistance(p, a, b, c));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const Vector3d none = Vector3d::Constant(nan);
   return {none, none, none, nan, TriangleFeature::CornerA, false};
