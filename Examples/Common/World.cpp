@@ -154,26 +154,18 @@ SolverVertices World::vertices(BodyId body) const {
 }
 
 void World::predict(double seconds, const Vector3d& acceleration, double damping) {
-  for (BodyId id = 0; id < m_bodies.size(); ++id) {
-    setPositions(id);
-    if (m_isGuarded[id]) m_guard.setPositions(m_guardIds[id], positions(id));
-  }
-  m_detection.advance();
-  m_guard.advance();
   const Timed timed(m_times.solver);
   m_seconds = seconds;
   m_forces.assign(m_bodies.size(), Vector3d::Zero());
   m_solver.predict(seconds, acceleration, damping);
 }
 
-void World::setPositions(BodyId id) {
-  const Body& body = m_bodies[id];
-  if (body.count > 0 && body.rest.empty()) m_detection.setPositions(body.id, positions(id));
-}
-
 void World::detectOnly() {
   const Timed timed(m_times.collision);
-  for (BodyId id = 0; id < m_bodies.size(); ++id) setPositions(id);
+  // The solver's `before`: the last detection saw positions that were corrected since.
+  for (BodyId id = 0; id < m_bodies.size(); ++id)
+    if (const Body& body = m_bodies[id]; body.count > 0 && body.rest.empty())
+      m_detection.setPositions(body.id, before(id), positions(id));
   m_detection.detectCollision();
   const FrameStatistics& statistics = m_detection.statistics();
   m_times.boxes += statistics.milliseconds.boxes;
@@ -239,7 +231,7 @@ void World::hold() {
   const Timed timed(m_times.hold);
   for (bool touches = !m_guarded.empty(); touches;) {
     for (BodyId id = 0; id < m_bodies.size(); ++id)
-      if (m_isGuarded[id]) m_guard.setPositions(m_guardIds[id], positions(id));
+      if (m_isGuarded[id]) m_guard.setPositions(m_guardIds[id], before(id), positions(id));
     m_guard.detectCollision();
     const std::size_t held = m_times.held;
     touches = false;
@@ -252,6 +244,7 @@ void World::hold() {
 void World::commit() {
   const Timed timed(m_times.solver);
   m_solver.commit(m_seconds);
+  m_detection.advance();
 }
 
 Vector3d World::force(BodyId body) const { return m_forces[body]; }

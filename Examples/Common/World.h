@@ -13,14 +13,14 @@ namespace palpate::scenes {
 
 /// Bodies whose particles one solver moves and one OctreeBasedCD sees. A step of a scene's loop:
 ///
-///   world.predict(seconds, {});      // a new step begins: where velocities lead
+///   world.predict(seconds, {});      // where velocities lead
 ///   ...                              // tools go where hands lead: positions(tool), place(tool)
 ///   for (int round = 0; round < rounds; ++round) {
 ///     world.detect();                // before and now, contacts as rows
 ///     world.solve(iterations);       // corrects now
 ///   }
 ///   world.hold();                    // what would still pass through stays where it was
-///   world.commit();
+///   world.commit();                  // ends the step
 class World {
  public:
   using BodyId = std::size_t;
@@ -113,7 +113,6 @@ class World {
   const std::vector<Pair>& pairs() const { return m_pairs; }
 
  private:
-  void setPositions(BodyId);
   BodyId add(Body, std::span<const Eigen::Vector3d> positions, double inverseMass);
   SolverVertices vertices(BodyId) const;
   void holdParticle(std::uint32_t particle);

@@ -227,9 +227,13 @@ void FclEngine::detectCollision() {
 }
 
 const CollisionData& FclEngine::collisionData(GeometryId a, GeometryId b) const {
-  const CollisionData& none = m_implementation->input.collisionData(a, b);  // that is a pair
   const auto answer = m_implementation->answers.find({a, b});
-  return answer == m_implementation->answers.end() ? none : answer->second;
+  try {
+    m_implementation->input.collisionData(a, b);  // throws if there is no such pair
+  } catch (const Error& error) {                  // the input itself detects nothing
+    if (error.code() != ErrorCode::NotAvailable || answer == m_implementation->answers.end()) throw;
+  }
+  return answer->second;
 }
 
 }  // namespace palpate

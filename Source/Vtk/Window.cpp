@@ -258,6 +258,7 @@ struct Window::Implementation {
   void addTimes();
   void draw();
   void drawCells() const;
+  const CollisionData& answer(GeometryId a, GeometryId b) const;
   void drawContacts() const;
   void aim();
 };
@@ -296,13 +297,24 @@ void Window::Implementation::drawCells() const {
   look->SetOpacity(0.5);
 }
 
+/// Nothing before the first detection.
+const CollisionData& Window::Implementation::answer(GeometryId a, GeometryId b) const {
+  static const CollisionData none;
+  try {
+    return detection.collisionData(a, b);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::NotAvailable) throw;
+  }
+  return none;
+}
+
 void Window::Implementation::drawContacts() const {
   Glyphs spheres, arrows, wrong;
   const double size = box.diagonal().norm();
   for (const auto& [first, second, settings] : detection.pairs()) {
     const Mesh &a = problem.geometries[indices.at(first)],
                &b = problem.geometries[indices.at(second)];
-    const CollisionData& data = detection.collisionData(first, second);
+    const CollisionData& data = answer(first, second);
     const auto add = [&](const auto& c, const Vector3d& at) {
       spheres.add(at, c.distance, 0.008 * size, Quaterniond::Identity());
       arrows.add(at, c.distance, 0.05 * size,

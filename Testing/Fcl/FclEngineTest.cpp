@@ -179,7 +179,7 @@ TEST(FclEngine, BadInputIsRefusedAsByOctreeBasedCD) {
   engine.removeCollisionPair(other, mesh);
   EXPECT_EQ(refusal([&] { engine.collisionData(mesh, other); }), ErrorCode::UnknownPair);
   engine.addCollisionPair(mesh, other, {Method::Intersection});
-  EXPECT_TRUE(engine.collisionData(mesh, other).intersectingTriangles().empty());  // no frame yet
+  EXPECT_EQ(refusal([&] { engine.collisionData(mesh, other); }), ErrorCode::NotAvailable);
   engine.removeGeometry(other);
   EXPECT_EQ(refusal([&] { engine.addCollisionPair(mesh, other, {Method::Intersection}); }),
             ErrorCode::UnknownGeometry);

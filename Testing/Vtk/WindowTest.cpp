@@ -196,6 +196,7 @@ TEST(Window, MarksWhatIsNotTrusted) {
                    b = detection.addTriangleMesh(lower.positions, lower.triangles);
   detection.addCollisionPair(a, b, {.method = Method::Proximity, .thickness = 0.05});
   detection.detectCollision();
+  detection.advance();
   for (Vector3d& p : upper.positions)
     p.z() = -0.04;  // through the other, further than the thickness
   detection.setPositions(a, upper.positions);
