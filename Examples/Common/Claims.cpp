@@ -40,15 +40,14 @@ void sortUnique(std::vector<TrianglePair>& pairs) {
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
 }
 
-void addClaims(const CollisionData& data, double time, Claims& out) {
+void addClaims(const CollisionData& data, double from, double to, Claims& out) {
   using Kind = FeaturePair::Kind;
-  // Intersection's contacts have no time of impact. With a thickness features that are within it
-  // from the start have none either.
+  // Where triangles intersect, contacts of the step's end are Intersection's.
   const bool intersects = data.validity().thickness == 0.0 && !data.intersectingTriangles().empty();
   const auto add = [&](const FeaturePair& features, const auto& contact, double side) {
-    const bool timed = contact.timeOfImpact > 0;
+    const double part = contact.timeOfImpact;
     out.claims.push_back({features, side * contact.normal, contact.distance,
-                          timed ? contact.timeOfImpact : time, intersects && !timed});
+                          (1 - part) * from + part * to, intersects && part == 1});
   };
   for (const auto& c : data.vertexTriangle())
     add({Kind::VertexTriangle, {c.vertex, c.triangle}}, c, 1);

@@ -52,8 +52,8 @@ class Incidence {
 
 void sortUnique(std::vector<TrianglePair>&);
 
-/// Contacts as claims, and whether they are trusted, besides those added before. time: that
-/// contacts with a time of impact of 0 speak of; others know their own.
-void addClaims(const CollisionData&, double time, Claims& out);
+/// Contacts as claims, and whether they are trusted, besides those added before. from, to: the part
+/// of the step that was detected.
+void addClaims(const CollisionData&, double from, double to, Claims& out);
 
 }  // namespace palpate::accuracy

@@ -43,7 +43,7 @@ class PalpateRun : public Run {
               .count();
       for (std::size_t p = 0; p < m_pairs.size(); ++p)
         addClaims(m_detection.collisionData(m_ids[m_pairs[p].first], m_ids[m_pairs[p].second]),
-                  m_method == Method::Continuous ? 0 : t, m_claims[p]);
+                  static_cast<double>(i - 1) / m_substeps, t, m_claims[p]);
       m_detection.advance();
     }
     m_last = now;

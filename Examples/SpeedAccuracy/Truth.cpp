@@ -167,7 +167,7 @@ Truth truthOf(const Step& step, int substeps) {
   Truth truth;
   Claims contacts;
   const auto began = std::chrono::steady_clock::now();
-  addClaims(Detection(step, Engine::BruteForce, Method::Continuous).detect(), 0, contacts);
+  addClaims(Detection(step, Engine::BruteForce, Method::Continuous).detect(), 0, 1, contacts);
   truth.milliseconds =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
   const Incidence a(step.a.triangles), b(step.b.triangles);

@@ -36,6 +36,7 @@ class Hash {
 
 double CollisionData::earliestTimeOfImpact() const {
   double earliest = m_contents.earliestTimeOfImpact;
+  if (!m_contents.shapeShape.empty()) earliest = std::min(earliest, 1.0);
   forEachTimed(m_contents, [&](const auto& list) {
     for (const auto& contact : list) earliest = std::min(earliest, contact.timeOfImpact);
   });

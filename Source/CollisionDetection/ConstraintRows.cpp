@@ -24,25 +24,25 @@ double ConstraintRow::gap(std::span<const Eigen::Vector3d> positions) const {
 void appendRows(const CollisionData& contacts, const SolverVertices& a, const SolverVertices& b,
                 std::vector<ConstraintRow>& rows) {
   const StandardFloatingPoint standard;
-  const Method method = contacts.validity().method;
-  const bool swept = method == Method::Continuous || method == Method::Auto;
   const std::size_t given = rows.size();
+  const auto require = [&](const SolverVertices& side, std::uint32_t vertex) {
+    if (vertex < side.before.size() && vertex < side.now.size()) return;
+    rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(given), rows.end());
+    throw Error(ErrorCode::WrongPositionCount,
+                "appendRows(): a contact has vertex " + std::to_string(vertex) + " of " +
+                    (&side == &a ? "a" : "b") + ", which has " +
+                    std::to_string(side.before.size()) + " positions before and " +
+                    std::to_string(side.now.size()) + " now",
+                {}, vertex);
+  };
   const auto add = [&](const auto& contact, const std::array<const SolverVertices*, 4>& sides) {
     const auto [vertices, weights] = stencil(contact);
-    const double time = swept ? contact.timeOfImpact : 1.0;
+    const double time = contact.timeOfImpact;
     ConstraintRow row{{}, weights, contact.normal, 0.0};
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < 4; ++i) {
       const SolverVertices& side = *sides[i];
-      if (vertices[i] >= side.before.size() || vertices[i] >= side.now.size()) {
-        rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(given), rows.end());
-        throw Error(ErrorCode::WrongPositionCount,
-                    "appendRows(): a contact has vertex " + std::to_string(vertices[i]) + " of " +
-                        (sides[i] == &a ? "a" : "b") + ", which has " +
-                        std::to_string(side.before.size()) + " positions before and " +
-                        std::to_string(side.now.size()) + " now",
-                    {}, vertices[i]);
-      }
+      require(side, vertices[i]);
       row.vertices[i] = side.first + vertices[i];
       sum += weights[i] * ((1 - time) * side.before[vertices[i]] + time * side.now[vertices[i]]);
     }
@@ -52,9 +52,11 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
   for (const auto& contact : contacts.vertexTriangle()) add(contact, {&a, &b, &b, &b});
   for (const auto& contact : contacts.triangleVertex()) add(contact, {&b, &a, &a, &a});
   for (const auto& contact : contacts.edgeEdge()) add(contact, {&a, &a, &b, &b});
-  const std::uint32_t first = a.now.empty() ? b.first : a.first;  // the other is the shape
+  const SolverVertices& mesh = a.before.empty() && a.now.empty() ? b : a;  // the other: the shape
   for (const ShapeContact& contact : contacts.shape()) {
     const auto& [i, j, k] = contact.vertices;
+    for (const std::uint32_t vertex : contact.vertices) require(mesh, vertex);
+    const std::uint32_t first = mesh.first;
     rows.push_back({{first + i, first + j, first + k, first + i},
                     {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
                     contact.normal,

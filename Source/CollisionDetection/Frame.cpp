@@ -84,18 +84,18 @@ std::size_t sizeOf(const CollisionData::Contents& contents) {
   return size;
 }
 
-/// ofIntersection: how many are Intersection's, of the step's end with a time of 0.
+/// ofIntersection: how many are Intersection's, of the step's end.
 void countContacts(const PairPlan& plan, std::size_t ofIntersection,
                    CollisionData::Contents& contents) {
-  std::size_t before = 0;
+  std::size_t atImpact = 0;
   if (plan.step.impacts) {
     forEachTimed(contents, [&](const auto& contacts) {
-      for (const auto& contact : contacts) before += contact.timeOfImpact < 1.0;
+      for (const auto& contact : contacts) atImpact += contact.timeOfImpact < 1.0;
     });
   } else if (plan.method == Method::Continuous) {
-    before = sizeOf(contents);
+    atImpact = sizeOf(contents) - ofIntersection;
   }
-  contents.validity.atImpact = before - std::min(before, ofIntersection);
+  contents.validity.atImpact = atImpact;
   contents.validity.atEnd = sizeOf(contents) - contents.validity.atImpact;
 }
 

@@ -133,7 +133,7 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
       check.noteTriangle(t, !kSecond, triangles.now[corners[0]], triangles.now[corners[1]],
                          triangles.now[corners[2]]);
       auto& list = kSecond ? out.triangleVertex : out.vertexTriangle;
-      list.push_back(contactOf(v, t, corners, *answer, pair.step.impacts ? 1.0 : 0.0));
+      list.push_back(contactOf(v, t, corners, *answer));
       list.back().distance = gap(t);
     }
   }
@@ -163,7 +163,7 @@ void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
         continue;
       }
       check.noteEdges(a[i], b[j]);
-      out.edgeEdge.push_back(contactOf(a[i], b[j], answer, pair.step.impacts ? 1.0 : 0.0));
+      out.edgeEdge.push_back(contactOf(a[i], b[j], answer));
     }
   }
 }

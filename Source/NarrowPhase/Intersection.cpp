@@ -6,6 +6,7 @@
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
+#include "Math/Predicates.h"
 #include "Math/TriangleIntersection.h"
 
 #include <algorithm>
@@ -94,10 +95,25 @@ class IntersectionContacts {
     const auto& [a, b, c] = triangle.positions;
     VertexTriangleDistance answer = finiteVertexTriangleDistance(of.positions[corner], a, b, c);
     m_out.exactDecisions += answer.exact;
-    // The winding normal is what a vertex at distance zero, such as a corner, is answered.
-    answer.normal = windingNormal(a, b, c);
+    if (answer.distance > 0.0) turnToOutside(of.positions[corner], triangle.positions, answer);
     m_check.noteTriangle(triangle.id, &triangle == &m_b, a, b, c);
     contacts.push_back(contactOf(of.vertices[corner], triangle.id, triangle.vertices, answer));
+  }
+
+  /// The normal to the side where the winding normal points, the distance below zero behind it. At
+  /// distance zero the normal is the winding normal already.
+  void turnToOutside(const Eigen::Vector3d& p, const Corners& triangle,
+                     VertexTriangleDistance& answer) {
+    const auto& [a, b, c] = triangle;
+    SignCounts counts;
+    const bool behind = orient3d(a, b, c, p, counts) < 0;
+    m_out.exactDecisions += counts.undecided;
+    // At a face this is the direction of the difference, and the same from wherever it is seen.
+    if (answer.feature == TriangleFeature::Face)
+      answer.normal = windingNormal(a, b, c);
+    else if (behind)
+      answer.normal = -answer.normal;
+    if (behind) answer.distance = -answer.distance;
   }
 
   void addEdges(int i, int j) {

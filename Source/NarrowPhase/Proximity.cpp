@@ -36,7 +36,6 @@ class VertexTriangleFinder {
         m_thickness(pair.thicknessAtEnd()),
         m_distinct(pair.settings.contacts == Contacts::Distinct),
         m_corners(corners),
-        m_time(pair.step.impacts ? 1.0 : 0.0),
         m_check(pair, out),
         m_buffers(out),
         m_out(ofSecond && !pair.self() ? out.triangleVertex : out.vertexTriangle),
@@ -62,7 +61,7 @@ class VertexTriangleFinder {
     }
     m_check.noteTriangle(triangle, !m_ofSecond, m_positions[corners[0]], m_positions[corners[1]],
                          m_positions[corners[2]]);
-    m_out.push_back(contactOf(vertex, triangle, corners, answer, m_time));
+    m_out.push_back(contactOf(vertex, triangle, corners, answer));
     m_out.back().distance -= radii;
   }
 
@@ -131,7 +130,6 @@ class VertexTriangleFinder {
   double m_thickness;
   bool m_distinct;
   Corners m_corners;
-  double m_time;
   StepCheck m_check;
   ContactBuffers& m_buffers;
   Buffer<VertexTriangleContact>& m_out;
@@ -180,7 +178,7 @@ void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, S
   }
   const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
   check.noteEdges(p, q);
-  out.edgeEdge.push_back(contactOf(p, q, *answer, pair.step.impacts ? 1.0 : 0.0));
+  out.edgeEdge.push_back(contactOf(p, q, *answer));
 }
 
 /// Of bits below 2^16. The baseline has no instruction for it.

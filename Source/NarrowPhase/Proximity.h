@@ -44,14 +44,15 @@ inline bool holdsVertex(const Triangle& triangle, std::uint32_t vertex) {
   return triangle[0] == vertex || triangle[1] == vertex || triangle[2] == vertex;
 }
 
+/// The contact of features that are measured at a time of the step: at its end, or at an impact.
 inline VertexTriangleContact contactOf(std::uint32_t vertex, std::uint32_t triangle,
                                        const Triangle& corners,
-                                       const VertexTriangleDistance& answer, double time = 0.0) {
+                                       const VertexTriangleDistance& answer, double time = 1.0) {
   return {vertex, triangle, corners, answer.barycentric, answer.normal, answer.distance, time};
 }
 
 inline EdgeEdgeContact contactOf(const Segment& a, const Segment& b, const EdgeEdgeDistance& answer,
-                                 double time = 0.0) {
+                                 double time = 1.0) {
   return {a, b, answer.weightA, answer.weightB, answer.normal, answer.distance, time};
 }
 

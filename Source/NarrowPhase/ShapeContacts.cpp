@@ -195,8 +195,8 @@ class ShapeContactFinder {
     if (!mayTouch(ends, reach)) return;
     NearestToShape first = nearest();
     m_out.exactDecisions += first.exact;
-    if (!m_continuous || first.distance <= distance + error)
-      return add(element, id, vertices, first, 0.0);
+    if (!m_continuous) return add(element, id, vertices, first, 1.0);
+    if (first.distance <= distance + error) return add(element, id, vertices, first, 0.0);
     if (first.distance > reach) return;
     if (const auto impact = m_impacts.find(element, vertices))
       add(element, id, vertices, impact->nearest, impact->time);
@@ -225,7 +225,7 @@ class ShapeContactFinder {
     if (!m_continuous && !(nearest.distance - radius <= m_thickness)) return;
     if (m_distinct && !nearest.inInterior) return;
     const auto at = [&](int i) -> Vector3d {
-      if (time == 0.0) return m_positions[vertices[i]];
+      if (time == 0.0 || !m_continuous) return m_positions[vertices[i]];
       return (1.0 - time) * m_mesh.before[vertices[i]] + time * m_mesh.now[vertices[i]];
     };
     Vector3d point = weights[0] * at(0);

@@ -37,12 +37,11 @@ Truth truthOf(const Mesh& a, const Mesh& b, const Positions& aBefore, const Posi
 struct BallAndSheet {
   Mesh ball = sphere(5, 7, {0.5, 0.5, 0.35}, 0.2), sheet = testing::sheet(5, 0, 1.0);
 
-  /// timed: contacts are of their timeOfImpact, else of the step's end.
-  static bool anyFromBelow(const CollisionData& data, bool timed, const Positions& before,
+  static bool anyFromBelow(const CollisionData& data, const Positions& before,
                            const Positions& now) {
     for (const VertexTriangleContact& c : data.vertexTriangle()) {
       if (!(c.barycentric.minCoeff() > 0.0)) continue;
-      const double t = timed ? c.timeOfImpact : 1.0;
+      const double t = c.timeOfImpact;
       const auto at = [&](std::uint32_t v) { return Vector3d((1 - t) * before[v] + t * now[v]); };
       const Vector3d a = at(c.corners[0]), b = at(c.corners[1]), d = at(c.corners[2]);
       if ((b - a).cross(d - a).dot(c.normal) < 0.0) return true;
@@ -100,8 +99,7 @@ Tally livesOf(const PairSettings& settings, double speed, std::uint64_t seed, st
         run.detection().advance();
       }
       const Validity& validity = run.data().validity();
-      const bool fromBelow = BallAndSheet::anyFromBelow(
-          run.data(), settings.method != Method::Proximity, sheet, sheetNow);
+      const bool fromBelow = BallAndSheet::anyFromBelow(run.data(), sheet, sheetNow);
       bool wrong = false;
       switch (settings.method) {
         case Method::Intersection:

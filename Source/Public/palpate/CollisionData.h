@@ -14,17 +14,35 @@
 
 namespace palpate {
 
+// Contacts of every method satisfy one law. With the positions at the contact's timeOfImpact, the
+// sum of the positions of its stencil() times their weights is (distance + radii) * normal, with
+// the radii interpolated at the closest points; of a ShapeContact this is point - pointOnShape.
+//
+// Error    32 ulp of the largest coordinate difference among the four vertices, and the rounding of
+//          the positions at that time. Method::Continuous adds timeTolerance times the vertices'
+//          relative motion.
+// Time     methods that look at the step's end (Proximity, Intersection, Auto's contacts from them)
+//          give 1.
+// Sign     distances are negative by radii, of shapes inside them, and for vertex-triangle contacts
+//          of Method::Intersection, also as part of Auto, where the vertex lies behind the triangle
+//          as its winding normal points. The normal of these is the winding normal where the
+//          triangle's interior holds the closest point. Where an edge or a corner holds it, the
+//          normal is along the line through both closest points, on the winding normal's side.
+// Touching centres at distance 0 have the winding normal, or the cross product of the edges, as
+//          <palpate/Distance.h> states. Method::Continuous without a thickness turns it to the side
+//          from which the features came.
+
 /// A vertex against a triangle; a point against a segment {p, q} is one with the corners {p, q, q},
 /// and against another point {p, p, p}.
 struct VertexTriangleContact {
   std::uint32_t vertex, triangle;
   std::array<std::uint32_t, 3> corners;  ///< the triangle's vertices
   Eigen::Vector3d barycentric;           ///< of the closest point, in the triangle's corner order
-  Eigen::Vector3d normal;                ///< unit, from the triangle towards the vertex
-  /// L, less the radii; negative only by that, as deep as it overlaps; at the time of
-  /// impact for Continuous
-  double distance;
-  double timeOfImpact;  ///< [0, 1] of the step; 0 for the static methods
+  /// unit, from the triangle towards the vertex; turned round where Intersection's vertex lies
+  /// behind
+  Eigen::Vector3d normal;
+  double distance;      ///< L, less the radii, at timeOfImpact; sign: see above
+  double timeOfImpact;  ///< [0, 1] of the step; 1 for methods that look at its end
   friend bool operator==(const VertexTriangleContact&, const VertexTriangleContact&) = default;
 };
 
@@ -33,7 +51,7 @@ struct EdgeEdgeContact {
   std::array<std::uint32_t, 2> edgeA, edgeB;  ///< vertex indices, lower first
   double weightA, weightB;                    ///< closest point = p0 + weight (p1 - p0)
   Eigen::Vector3d normal;                     ///< unit, from b towards a
-  double distance, timeOfImpact;              ///< L, less both radii, as above; [0, 1] of the step
+  double distance, timeOfImpact;              ///< L, negative by radii only; as above
   friend bool operator==(const EdgeEdgeContact&, const EdgeEdgeContact&) = default;
 };
 
@@ -50,7 +68,7 @@ struct ShapeContact {
   Eigen::Vector3d pointOnShape;  ///< L
   Eigen::Vector3d normal;        ///< unit, out of the shape, towards the element
   double distance;               ///< L, less the element's radius; negative: as deep inside
-  double timeOfImpact = 0.0;     ///< [0, 1] of the step, and all else then; 0 for Proximity
+  double timeOfImpact = 0.0;     ///< [0, 1] of the step, and all else then; 1 for Proximity
   friend bool operator==(const ShapeContact&, const ShapeContact&) = default;
 };
 
@@ -119,7 +137,8 @@ class PALPATE_EXPORT CollisionData {
   std::span<const ShapeContact> shape() const { return m_contents.shape; }
   /// Of two analytical shapes: one, if they are at most the thickness apart.
   std::span<const ShapeShapeContact> shapeShape() const { return m_contents.shapeShape; }
-  /// Infinity if there is no contact; 0 for the static methods' contacts.
+  /// Infinity if there is no contact; 1 for contacts of methods that look at the step's end, two
+  /// shapes' among them.
   double earliestTimeOfImpact() const;
 
   /// Whether to believe it.

@@ -15,11 +15,21 @@ namespace palpate {
 
 /// A contact as a solver's row: gap(x) = normal . sum of weights[i] x[vertices[i]] - offset.
 ///
-/// Units    the gap is in L: the contact's distance at the positions that it was found for, less
-///          the radii. A solver keeps it at least as large as it wants its bodies apart.
-/// Laws     (1) the gap's gradient at vertex i is weights[i] normal. Where a static method's contact
-///          was found it is the distance's as well, as weights and normal change that in the second
-///          order only; with radii that differ along an edge it is not.
+/// Units    the gap is in L. A solver keeps it at least as large as it wants its bodies apart.
+/// Laws     (1) with the positions at the contact's timeOfImpact the gap is the contact's distance.
+///          (2) the gap's gradient at vertex i is weights[i] normal. There it is the distance's
+///          gradient as well, because weights and normal change the distance in the second order
+///          only. Two exceptions: radii that differ along an element, where the distance also
+///          changes by what the closest point's way along the element changes of the radius; and
+///          centres at distance 0, where the distance itself has no gradient and the row has that
+///          of the distance along the normal.
+///          (3) a step along the row alone, each vertex by a multiple of its inverse mass, its
+///          weight and the normal, to a gap g > 0 makes the signed distance g, up to (g + radii)
+///          (4 s / h)^2: s is the longest displacement of a vertex of a triangle or an edge, h the
+///          triangle's least height, or the shorter edge times the sine between the edges. Where a
+///          vertex lies behind a triangle (distance below 0 from Method::Intersection) and an edge
+///          or a corner holds the closest point, the vertex comes to the outer side, at a signed
+///          distance above 0 and at most g.
 struct ConstraintRow {
   std::array<std::uint32_t, 4> vertices;  ///< in the solver's numbering; may repeat
   std::array<double, 4> weights;          ///< 0: not there
@@ -37,7 +47,8 @@ struct SolverVertices {
 };
 
 /// Adds a row for each contact of a pair (a, b), in the order vertexTriangle(), triangleVertex(),
-/// edgeEdge(), shape(). Contacts of Continuous and Auto are at their time of impact, others now.
+/// edgeEdge(), shape(), each at its timeOfImpact, whatever method found it. Of a pair with a shape
+/// the side without any positions is the shape.
 /// Errors   WrongPositionCount names the first vertex that a contact has and `before` or `now` has
 ///          not; no row is added.
 PALPATE_EXPORT void appendRows(const CollisionData& contacts, const SolverVertices& a,

@@ -1,4 +1,5 @@
 #include <palpate/ConstraintRows.h>
+#include <palpate/Distance.h>
 
 #include "Common/Things.h"
 
@@ -170,6 +171,97 @@ TEST(ConstraintRows, TooFewPositionsAreRefusedByVertex) {
   }
   appendRows(contacts, {0, low, low}, {3, high, high}, rows);
   EXPECT_GT(rows.size(), 1u);
+}
+
+TEST(ConstraintRows, TooFewPositionsBesideAShapeAreRefusedByVertex) {
+  const Thing drops{GeometryKind::Points, {{0, 0, 1}, {0, 0, 0.1}, {1, 0, 0.1}}, {}, {}, {0.0}};
+  OctreeBasedCD collisions;
+  const GeometryId points = drops.addTo(collisions),
+                   plane = collisions.addAnalyticalGeometry(Plane{});
+  collisions.addCollisionPair(points, plane, {Method::Proximity, 0.2, Contacts::All});
+  collisions.detectCollision();
+  const CollisionData& contacts = collisions.collisionData(points, plane);
+  ASSERT_EQ(contacts.shape().size(), 2u);
+  std::vector<ConstraintRow> rows(1);
+  const std::span<const Eigen::Vector3d> all = drops.positions, two = all.first(2);
+  for (const auto& [before, now] : {std::pair{all, two}, {two, all}, {all, all.first(0)}}) {
+    try {
+      appendRows(contacts, {0, before, now}, {}, rows);
+      ADD_FAILURE() << "accepted";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::WrongPositionCount);
+      EXPECT_EQ(error.element(), std::optional<std::size_t>(now.empty() ? 1 : 2));
+      EXPECT_NE(std::string(error.what()).find(" of a, which has "), std::string::npos);
+    }
+    EXPECT_EQ(rows.size(), 1u);
+  }
+  EXPECT_THROW(appendRows(contacts, {}, {}, rows), Error);
+  appendRows(contacts, {0, all, all}, {}, rows);
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_NEAR(rows[1].gap(all), 0.1, 1e-15);
+}
+
+/// The third law of ConstraintRow, of triangles that intersect and of triangles that are near.
+TEST(ConstraintRows, AStepToAGapMakesTheSignedDistanceThat) {
+  Random random(74);
+  const Thing triangles = things(soup(random, 300, 0.2)), sheets = things(sheet(3, 0.5, 0.3));
+  const Positions at = joined(triangles.positions, sheets.positions);
+  std::size_t compared = 0, behind = 0, outOfEdges = 0;
+  for (const Method method : {Method::Intersection, Method::Proximity}) {
+    const Rowed found = rowed(triangles, sheets, {method, 0.05, Contacts::All}, at);
+    const std::size_t vertexRows =
+        found.contacts.vertexTriangle().size() + found.contacts.triangleVertex().size();
+    for (std::size_t r = 0; r < found.rows.size(); ++r) {
+      const ConstraintRow& row = found.rows[r];
+      std::array<Vector3d, 4> x, start;
+      std::array<double, 4> inverseMasses;
+      double sum = 0;
+      for (int i = 0; i < 4; ++i) {
+        start[i] = x[i] = at[row.vertices[i]];
+        inverseMasses[i] = uniform(random, 0.1, 1) * (i > 0 ? 0.2 : 1);
+        sum += inverseMasses[i] * row.weights[i] * row.weights[i];
+      }
+      const bool isVertex = r < vertexRows;
+      const Vector3d u = isVertex ? Vector3d(x[2] - x[1]) : Vector3d(x[1] - x[0]),
+                     v = isVertex ? Vector3d(x[3] - x[1]) : Vector3d(x[3] - x[2]);
+      const double height =
+          isVertex ? u.cross(v).norm() / std::max({u.norm(), v.norm(), (u - v).norm()})
+                   : std::min(u.norm(), v.norm()) * u.normalized().cross(v.normalized()).norm();
+      const bool isBehind = found.distances[r] < 0;
+      const double goal = isBehind ? 0.01 : found.distances[r] + 0.02 * height;
+      double longest = 0;
+      for (int i = 0; i < 4; ++i) {
+        const double share = (goal - found.distances[r]) * inverseMasses[i] * row.weights[i] / sum;
+        x[i] += share * row.normal;
+        if (i > 0 || !isVertex) longest = std::max(longest, std::abs(share));
+      }
+      const double tilt = 4 * longest / height;
+      if (tilt > 0.5) continue;
+      Vector3d difference;
+      bool atFace = true;
+      if (isVertex) {
+        const auto before = vertexTriangleDistance(start[0], start[1], start[2], start[3]);
+        atFace = before.feature == TriangleFeature::Face;
+        difference = vertexTriangleDistance(x[0], x[1], x[2], x[3]).difference;
+      } else {
+        difference = edgeEdgeDistance(x[0], x[1], x[2], x[3]).difference;
+      }
+      const double reached =
+          difference.dot(row.normal) < 0 ? -difference.norm() : difference.norm();
+      if (isBehind && !atFace) {
+        EXPECT_GT(reached, 0) << r;
+        EXPECT_LE(reached, goal * (1 + 1e-9)) << r;
+        ++outOfEdges;
+      } else {
+        EXPECT_NEAR(reached, goal, goal * tilt * tilt + 1e-13) << r;
+        behind += isBehind;
+      }
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 100u);
+  EXPECT_GE(behind, 5u);
+  EXPECT_GE(outOfEdges, 3u);
 }
 
 TEST(ConstraintRows, OfImpactsHoldTheirGapWhereFeaturesTouch) {

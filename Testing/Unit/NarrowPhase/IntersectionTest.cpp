@@ -148,13 +148,26 @@ TEST(Intersection, OneEdgeOfEachIsAnEdgeEdgeContact) {
   EXPECT_EQ(found.edgeEdge[0].weightB, 0.25);
 }
 
-TEST(Intersection, NormalsAreWindingNormalsWhereverTheVertexIs) {
+TEST(Intersection, NormalsOfFacesAreWindingNormalsAndDistancesBehindThemAreNegative) {
   const ContactBuffers found = contactsOf(meshOf(kPiercing), meshOf(kGround));
   EXPECT_EQ(found.vertexTriangle[0].normal, Vector3d::UnitZ());
-  EXPECT_EQ(found.vertexTriangle[0].distance, 1);
+  EXPECT_EQ(found.vertexTriangle[0].distance, -1);
+  EXPECT_EQ(found.vertexTriangle[0].timeOfImpact, 1);
   const Corners turned{{kGround[1], kGround[0], kGround[2]}};
-  EXPECT_EQ(contactsOf(meshOf(kPiercing), meshOf(turned)).vertexTriangle[0].normal,
-            Vector3d(-Vector3d::UnitZ()));
+  const ContactBuffers above = contactsOf(meshOf(kPiercing), meshOf(turned));
+  EXPECT_EQ(above.vertexTriangle[0].normal, Vector3d(-Vector3d::UnitZ()));
+  EXPECT_EQ(above.vertexTriangle[0].distance, 1);
+}
+
+/// The tip is below the ground and beyond its edge y = 0: the nearest point of the ground is (1, 0,
+/// 0), the normal leads from the tip through that.
+TEST(Intersection, NormalsOfEdgesLeadToTheWindingNormalsSide) {
+  const Corners slanted{{{1, -3, -4}, {1, 1.5, 2}, {1.5, 2, 2}}};
+  const ContactBuffers found = contactsOf(meshOf(slanted), meshOf(kGround));
+  ASSERT_EQ(found.vertexTriangle.size(), 1u);
+  EXPECT_EQ(found.vertexTriangle[0].barycentric, Vector3d(0.75, 0.25, 0));
+  EXPECT_EQ(found.vertexTriangle[0].distance, -5);
+  EXPECT_TRUE(found.vertexTriangle[0].normal.isApprox(Vector3d(0, 0.6, 0.8), 1e-15));
 }
 
 TEST(Intersection, EveryKindOfPairHasContactsWithUnitNormals) {

@@ -1,0 +1,423 @@
+#include <palpate/ConstraintRows.h>
+
+#include "Common/PairRun.h"
+#include "Common/Solids.h"
+#include "Common/Things.h"
+#include "Common/Zoo.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+// The law of contacts: with the positions at a contact's timeOfImpact, the weighted sum of the
+// positions of its stencil is (distance + radii) * normal; of a ShapeContact this is point -
+// pointOnShape. Every method keeps it, for every kind of geometry.
+
+namespace palpate::testing {
+namespace {
+
+using Wide = long double;
+using WideVector = Eigen::Matrix<Wide, 3, 1>;
+
+/// A geometry's vertices in the world, in the solver's sense.
+struct Side {
+  Positions before, now;
+  std::vector<double> radii;  ///< one for all, or one per vertex
+
+  WideVector at(std::uint32_t vertex, double time) const {
+    const Wide t = time;
+    if (time == 0) return before[vertex].cast<Wide>();
+    if (time == 1) return now[vertex].cast<Wide>();
+    return (1 - t) * before[vertex].cast<Wide>() + t * now[vertex].cast<Wide>();
+  }
+  double radius(std::uint32_t vertex) const {
+    return radii.empty() ? 0.0 : radii.size() == 1 ? radii[0] : radii[vertex];
+  }
+};
+
+/// How many contacts were looked at, by what they are.
+struct Seen {
+  std::map<std::string, std::size_t> counts;
+  void add(const std::string& name) { ++counts[name]; }
+};
+
+class Law {
+ public:
+  Law(const CollisionData& data, const Side& a, const Side& b, const PairSettings& settings,
+      Seen& seen)
+      : m_data(data),
+        m_a(a),
+        m_b(b),
+        m_asked(settings.method),
+        m_method(data.validity().method),
+        m_timeTolerance(settings.timeTolerance),
+        m_seen(seen) {}
+
+  void expect() {
+    for (const auto& c : m_data.vertexTriangle()) expectVertexTriangle(c, m_a, m_b);
+    for (const auto& c : m_data.triangleVertex()) expectVertexTriangle(c, m_b, m_a);
+    for (const auto& c : m_data.edgeEdge()) expectEdges(c);
+    for (const auto& c : m_data.shape()) expectShape(c, m_a.now.empty() ? m_b : m_a);
+    const bool any = !m_data.vertexTriangle().empty() || !m_data.triangleVertex().empty() ||
+                     !m_data.edgeEdge().empty() || !m_data.shape().empty() ||
+                     !m_data.shapeShape().empty();
+    if (looksAtEnd()) {
+      EXPECT_EQ(m_data.earliestTimeOfImpact(), any ? 1.0 : kInfinity);
+    }
+  }
+
+ private:
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+  bool looksAtEnd() const {
+    return m_asked == Method::Proximity || m_asked == Method::Intersection;
+  }
+
+  /// L: the vector that the weighted sum may be off by. Distances and weights are within a few
+  /// units in the last place of the largest coordinate difference, Continuous speaks of a time up
+  /// to the tolerance before the impact.
+  Wide error(const Stencil& stencil, const std::array<const Side*, 4>& sides, double time) const {
+    const WideVector first = sides[0]->at(stencil.vertices[0], time);
+    Wide largest = 0, motion = 0;
+    const auto moved = [&](int i) -> WideVector {
+      return sides[i]->at(stencil.vertices[i], 1) - sides[i]->at(stencil.vertices[i], 0);
+    };
+    for (int i = 1; i < 4; ++i) {
+      largest = std::max(largest,
+                         (sides[i]->at(stencil.vertices[i], time) - first).cwiseAbs().maxCoeff());
+      motion = std::max(motion, (moved(i) - moved(0)).norm());
+    }
+    return 0x1p-47L * (largest + radiiOf(stencil, sides)) +
+           (time < 1 ? Wide(m_timeTolerance) * motion : Wide(0)) +
+           16 * Wide(std::numeric_limits<double>::denorm_min());
+  }
+
+  static Wide radiiOf(const Stencil& stencil, const std::array<const Side*, 4>& sides) {
+    Wide radii = 0;
+    for (int i = 0; i < 4; ++i)
+      radii += std::abs(stencil.weights[i]) * sides[i]->radius(stencil.vertices[i]);
+    return radii;
+  }
+
+  template <class Contact>
+  void expectSum(const Contact& c, const std::array<const Side*, 4>& sides) {
+    const Stencil s = stencil(c);
+    expectTime(c.timeOfImpact);
+    EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);
+    WideVector sum = WideVector::Zero();
+    const WideVector origin = sides[0]->at(s.vertices[0], c.timeOfImpact);
+    for (int i = 0; i < 4; ++i)
+      sum += Wide(s.weights[i]) * (sides[i]->at(s.vertices[i], c.timeOfImpact) - origin);
+    const Wide length = c.distance + radiiOf(s, sides);
+    EXPECT_LE((sum - length * c.normal.template cast<Wide>()).norm(),
+              error(s, sides, c.timeOfImpact))
+        << "distance " << c.distance << " at " << c.timeOfImpact << ", normal "
+        << c.normal.transpose() << ", sum " << sum.template cast<double>().transpose();
+  }
+
+  void expectTime(double time) {
+    if (looksAtEnd()) {
+      m_seen.add("at the step's end");
+      EXPECT_EQ(time, 1.0);
+    } else {
+      m_seen.add("within the step");
+      EXPECT_GE(time, 0.0);
+      EXPECT_LE(time, 1.0);
+    }
+  }
+
+  static WideVector cross(const WideVector& u, const WideVector& v) {
+    const Wide x = u.norm(), y = v.norm();
+    if (x == 0 || y == 0) return WideVector::Zero();
+    return (u / x).cross(v / y);
+  }
+
+  void expectVertexTriangle(const VertexTriangleContact& c, const Side& vertices,
+                            const Side& triangles) {
+    expectSum(c, {&vertices, &triangles, &triangles, &triangles});
+    const auto at = [&](int i) { return triangles.at(c.corners[i], c.timeOfImpact); };
+    const WideVector u = at(1) - at(0), v = at(2) - at(0), winding = cross(u, v);
+    const Wide sine = winding.norm();
+    const WideVector normal = c.normal.cast<Wide>();
+    const bool slim = !(sine > 1e-6L);  // whose winding normal no plain arithmetic finds
+    if (m_method == Method::Intersection || isOfIntersection(c)) {
+      m_seen.add("vertex of Intersection");
+      if (slim) return;
+      EXPECT_GT(normal.dot(winding), 0);
+      const WideVector from = vertices.at(c.vertex, c.timeOfImpact) - at(0);
+      const Wide height = winding.dot(from) / sine;
+      if (std::abs(height) > 1e-9L * from.norm()) {
+        EXPECT_EQ(c.distance < 0, height < 0);
+      }
+      if (c.barycentric.minCoeff() > 0 || c.distance == 0) {
+        EXPECT_NEAR(normal.dot(winding) / sine, 1, 1e-12L);
+      }
+      m_seen.add(c.distance < 0 ? "behind" : c.distance > 0 ? "in front" : "touching");
+    } else if (c.distance == 0 && !hasRadii() && m_method == Method::Proximity && !slim) {
+      m_seen.add("touching by Proximity");
+      EXPECT_NEAR(normal.dot(winding) / sine, 1, 1e-12L);
+    }
+  }
+
+  /// Auto: with a step that starts in intersection.
+  bool isOfIntersection(const VertexTriangleContact& c) const {
+    return c.distance < 0 && !hasRadii();
+  }
+  bool hasRadii() const { return m_a.radius(0) > 0 || m_b.radius(0) > 0; }
+
+  void expectEdges(const EdgeEdgeContact& c) {
+    expectSum(c, {&m_a, &m_a, &m_b, &m_b});
+    m_seen.add("edges");
+    if (c.distance != 0 || hasRadii()) return;
+    const auto direction = [&](const Side& side, const std::array<std::uint32_t, 2>& edge) {
+      return WideVector(side.at(edge[1], c.timeOfImpact) - side.at(edge[0], c.timeOfImpact));
+    };
+    const WideVector normal = cross(direction(m_a, c.edgeA), direction(m_b, c.edgeB));
+    if (normal.norm() > 1e-6L) {
+      EXPECT_NEAR(std::abs(normal.dot(c.normal.cast<Wide>())) / normal.norm(), 1, 1e-12L);
+    }
+  }
+
+  void expectShape(const ShapeContact& c, const Side& side) {
+    m_seen.add("shape");
+    expectTime(c.timeOfImpact);
+    EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);
+    WideVector point = WideVector::Zero();
+    Wide radius = 0, size = 1;
+    for (int i = 0; i < 3; ++i) {
+      const WideVector x = side.at(c.vertices[i], c.timeOfImpact);
+      point += Wide(c.weights[i]) * x;
+      radius += Wide(c.weights[i]) * side.radius(c.vertices[i]);
+      size += x.norm();
+    }
+    EXPECT_LE((point - c.point.cast<Wide>()).norm(), 0x1p-48L * size);
+    EXPECT_LE((c.point.cast<Wide>() - c.pointOnShape.cast<Wide>() -
+               (c.distance + radius) * c.normal.cast<Wide>())
+                  .norm(),
+              0x1p-48L * size);
+  }
+
+  const CollisionData& m_data;
+  const Side &m_a, &m_b;
+  const Method m_asked, m_method;
+  const double m_timeTolerance;
+  Seen& m_seen;
+};
+
+/// Anything that OctreeBasedCD holds, with the step that it makes.
+struct Body {
+  std::string name;
+  std::function<GeometryId(OctreeBasedCD&)> add;
+  Side side;  ///< empty: of a shape
+  std::function<void(OctreeBasedCD&, GeometryId)> move;
+};
+
+Body bodyOf(std::string name, const Thing& thing, Positions now) {
+  return {std::move(name),
+          [thing](OctreeBasedCD& collisions) { return thing.addTo(collisions); },
+          {thing.positions, now, thing.radii},
+          [=](OctreeBasedCD& collisions, GeometryId id) {
+            collisions.setPositions(id, thing.positions, now);
+          }};
+}
+
+/// The same placed: the body's frame is turned and shifted, and turns further in the step.
+Body placed(std::string name, const Thing& thing, double angle, const Vector3d& shift) {
+  using Turn = Eigen::AngleAxisd;
+  const Vector3d axis = Vector3d(1, 2, 3).normalized(), centre(0.5, 0.5, 0.5);
+  const std::array<Eigen::Matrix3d, 2> turns{Turn(0.3, axis).toRotationMatrix(),
+                                             Turn(0.3 + angle, axis).toRotationMatrix()};
+  const std::array<Vector3d, 2> shifts{centre - turns[0] * centre,
+                                       centre - turns[1] * centre + shift};
+  Side side{{}, {}, thing.radii};
+  for (const Vector3d& x : thing.positions) {
+    side.before.push_back(turns[0] * x + shifts[0]);
+    side.now.push_back(turns[1] * x + shifts[1]);
+  }
+  return {std::move(name), [thing](OctreeBasedCD& collisions) { return thing.addTo(collisions); },
+          side,
+          [=](OctreeBasedCD& collisions, GeometryId id) {
+            collisions.setTransform(id, turns[0], shifts[0], turns[1], shifts[1]);
+          }};
+}
+
+Body shapeOf(std::string name, const AnalyticalGeometry& shape, const Vector3d& motion) {
+  return {std::move(name),
+          [=](OctreeBasedCD& collisions) { return collisions.addAnalyticalGeometry(shape); },
+          {},
+          [=](OctreeBasedCD& collisions, GeometryId id) {
+            const Eigen::Matrix3d none = Eigen::Matrix3d::Identity();
+            collisions.setTransform(id, none, Vector3d::Zero(), none, motion);
+          }};
+}
+
+/// Every kind of geometry in the unit cube, with steps of about `motion`.
+std::vector<Body> bodies(Random& random, double motion) {
+  const Thing triangles = things(soup(random, 60, 0.15)), sheets = things(sheet(6, 0.5, 0.3)),
+              line = thread(random, 40, 0.15, 0.02, false), points = particles(random, 50, 0.03);
+  const Thing taperedLine = tapered(random, line, 0.05),
+              taperedPoints = tapered(random, points, 0.05);
+  Solid block = cells(2, random);
+  for (Vector3d& x : block.positions) x = 0.25 * x + Vector3d(0.3, 0.25, 0.27);
+  const Positions blockNow = moved(random, block.positions, motion);
+  std::vector<Body> all;
+  all.push_back(bodyOf("triangles", triangles, moved(random, triangles.positions, motion)));
+  all.push_back(bodyOf("sheet", sheets, moved(random, sheets.positions, motion)));
+  all.push_back(placed("placed triangles", triangles, motion, Vector3d::Constant(motion)));
+  all.push_back({"tetrahedra",
+                 [=](OctreeBasedCD& collisions) {
+                   return collisions.addTetrahedralMesh(block.positions, block.tetrahedra);
+                 },
+                 {block.positions, blockNow, {}},
+                 [=](OctreeBasedCD& collisions, GeometryId id) {
+                   collisions.setPositions(id, block.positions, blockNow);
+                 }});
+  all.push_back(bodyOf("line", line, moved(random, line.positions, motion)));
+  all.push_back(bodyOf("tapered line", taperedLine, moved(random, line.positions, motion)));
+  all.push_back(bodyOf("points", points, moved(random, points.positions, motion)));
+  all.push_back(placed("placed points", points, motion, Vector3d::Constant(-motion)));
+  all.push_back(bodyOf("tapered points", taperedPoints, moved(random, points.positions, motion)));
+  const Vector3d way(motion, 0, -motion);
+  all.push_back(shapeOf("sphere", Sphere{{0.5, 0.5, 0.5}, 0.2}, way));
+  all.push_back(shapeOf("capsule", Capsule{{0.3, 0.4, 0.5}, {0.7, 0.5, 0.6}, 0.1}, way));
+  all.push_back(shapeOf("plane", Plane{{0.5, 0.5, 0.5}, {0.3, 0.1, 1}}, way));
+  all.push_back(shapeOf("two-sided plane", Plane{{0.5, 0.5, 0.5}, {0.3, 0.1, 1}, true}, way));
+  all.push_back(shapeOf("box", Box{{0.5, 0.5, 0.5}, {0.2, 0.1, 0.15}}, way));
+  all.push_back(shapeOf("cylinder", Cylinder{{0.3, 0.4, 0.5}, {0.7, 0.5, 0.6}, 0.1}, way));
+  all.push_back(shapeOf(
+      "hull", ConvexHull{{{0.3, 0.3, 0.3}, {0.7, 0.4, 0.3}, {0.5, 0.7, 0.4}, {0.5, 0.5, 0.8}}},
+      way));
+  return all;
+}
+
+std::vector<PairSettings> everySetting(double thickness) {
+  std::vector<PairSettings> all{{Method::Intersection, 0.0}, {Method::Auto, 0.0}};
+  for (const Contacts contacts : {Contacts::Distinct, Contacts::All}) {
+    all.push_back({Method::Proximity, thickness, contacts});
+    all.push_back({Method::Continuous, 0.0, contacts});
+    all.push_back({Method::Continuous, thickness, contacts});
+    all.push_back({Method::Auto, thickness, contacts});
+    all.push_back({Method::Auto, thickness, contacts, 4 * thickness});
+    all.push_back({Method::Auto, thickness, contacts, 0.0});
+  }
+  all.push_back({.method = Method::Continuous, .thickness = 0.0, .timeTolerance = 1e-2});
+  all.push_back({.method = Method::Continuous, .thickness = thickness, .timeTolerance = 1e-2});
+  return all;
+}
+
+/// Steps that start in intersection, as random triangles do.
+TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
+  std::map<std::string, Seen> byMethod;
+  for (const double motion : {0.0, 0.01, 0.2}) {
+    Random random(181);
+    const std::vector<Body> all = bodies(random, motion);
+    for (std::size_t i = 0; i < all.size(); ++i)
+      for (std::size_t j = i; j < all.size(); ++j) {
+        const Body &first = all[i], &second = all[j];
+        for (const bool turned : {false, true}) {
+          if (turned && i == j) continue;
+          const Body &a = turned ? second : first, &b = turned ? first : second;
+          for (const PairSettings& settings : everySetting(0.05)) {
+            OctreeBasedCD collisions;
+            const GeometryId idA = a.add(collisions), idB = i == j ? idA : b.add(collisions);
+            try {
+              collisions.addCollisionPair(idA, idB, settings);
+              a.move(collisions, idA);
+              if (i != j) b.move(collisions, idB);
+            } catch (const Error& error) {
+              EXPECT_EQ(error.code(), ErrorCode::UnsupportedMethod);
+              continue;
+            }
+            collisions.detectCollision();
+            const CollisionData& data = collisions.collisionData(idA, idB);
+            const Method method = data.validity().method;
+            SCOPED_TRACE(a.name + " with " + b.name + ", asked " +
+                         std::to_string(static_cast<int>(settings.method)) + ", answered " +
+                         std::to_string(static_cast<int>(method)) + ", thickness " +
+                         std::to_string(settings.thickness) + ", motion " + std::to_string(motion));
+            Seen& seen = byMethod[std::to_string(static_cast<int>(settings.method)) + "/" +
+                                  std::to_string(static_cast<int>(method))];
+            Law(data, a.side, b.side, settings, seen).expect();
+            if (HasFatalFailure() || HasNonfatalFailure()) return;
+          }
+        }
+      }
+  }
+  // Each method has met what it may answer.
+  for (const auto& [method, seen] : byMethod)
+    for (const auto& [what, count] : seen.counts) RecordProperty(method + " " + what, int(count));
+  const auto count = [&](Method asked, Method answered, const std::string& what) {
+    return byMethod[std::to_string(static_cast<int>(asked)) + "/" +
+                    std::to_string(static_cast<int>(answered))]
+        .counts[what];
+  };
+  for (const char* what : {"behind", "in front", "edges"})
+    EXPECT_GT(count(Method::Intersection, Method::Intersection, what), 100u) << what;
+  for (const Method method : {Method::Proximity, Method::Continuous}) {
+    EXPECT_GT(count(method, method, "edges"), 1000u);
+    EXPECT_GT(count(method, method, "shape"), 1000u);
+  }
+  for (const Method method :
+       {Method::Intersection, Method::Proximity, Method::Continuous, Method::Auto})
+    EXPECT_GT(count(Method::Auto, method, "edges"), 100u) << static_cast<int>(method);
+  EXPECT_GT(count(Method::Auto, Method::Intersection, "behind"), 30u);
+  EXPECT_GT(count(Method::Auto, Method::Continuous, "behind"), 10u);
+  EXPECT_GT(count(Method::Auto, Method::Auto, "behind"), 10u);
+}
+
+/// Degenerate meshes, coordinates near the ends of what double holds, and self-collision.
+TEST(ContactLaw, HoldsForDegenerateMeshes) {
+  Seen seen;
+  for (const Specimen& specimen : zoo()) {
+    const auto aBefore = specimen.aBefore(), bBefore = specimen.bBefore();
+    const Side a{aBefore, specimen.a.positions, {}}, b{bBefore, specimen.b.positions, {}};
+    for (const MethodCase& method : methodCases(specimen.thickness)) {
+      SCOPED_TRACE(specimen.name + ", " + method.name);
+      PairRun run(settingsOf(Engine::Octree), specimen.a, specimen.b, method.settings,
+                  !specimen.large);
+      run.step(aBefore, a.now, bBefore, b.now);
+      for (const CollisionPair& pair : run.detection().pairs())
+        Law(run.detection().collisionData(pair.a, pair.b), pair.a == run.a() ? a : b,
+            pair.b == run.a() ? a : b, method.settings, seen)
+            .expect();
+      if (HasFatalFailure() || HasNonfatalFailure()) return;
+    }
+  }
+  EXPECT_GT(seen.counts["touching"], 1000u);
+  EXPECT_GT(seen.counts["edges"], 1000u);
+}
+
+/// The tip of a spike below a face: a solver that wants it 0.05 above brings it there.
+TEST(ContactLaw, ATipBehindAFaceHasANegativeDistance) {
+  const Positions ground{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}};
+  const Mesh tip = spike({1, 1, -0.1}, 0.5);
+  const std::vector<Triangle> one{{0, 1, 2}};
+  for (const PairSettings& settings :
+       {PairSettings{Method::Intersection}, PairSettings{Method::Auto}}) {
+    const CollisionData contacts =
+        detectCollision({tip.positions, tip.triangles}, {ground, one}, settings);
+    ASSERT_EQ(contacts.vertexTriangle().size(), 1u);
+    const VertexTriangleContact& contact = contacts.vertexTriangle()[0];
+    EXPECT_EQ(contact.vertex, 0u);
+    EXPECT_NEAR(contact.distance, -0.1, 1e-15);
+    EXPECT_EQ(contact.normal, Vector3d::UnitZ());
+    EXPECT_EQ(contact.timeOfImpact, 1.0);
+    EXPECT_EQ(contacts.earliestTimeOfImpact(), 1.0);
+    std::vector<ConstraintRow> rows;
+    appendRows(contacts, {0, tip.positions, tip.positions}, {4, ground, ground}, rows);
+    Positions all = tip.positions;
+    all.insert(all.end(), ground.begin(), ground.end());
+    EXPECT_NEAR(rows[0].gap(all), -0.1, 1e-15);
+    all[0] += (0.05 - rows[0].gap(all)) * rows[0].normal;
+    EXPECT_NEAR(all[0].z(), 0.05, 1e-15);
+  }
+}
+
+}  // namespace
+}  // namespace palpate::testing
