@@ -135,7 +135,7 @@ class Detection {
       : m_detection({.engine = engine, .threads = 1}),
         m_a(m_detection.addTriangleMesh(step.aBefore, step.a.triangles)),
         m_b(m_detection.addTriangleMesh(step.bBefore, step.b.triangles)) {
-    m_detection.addCollisionPair(m_a, m_b, {.method = method});
+    m_detection.addCollisionPair(m_a, m_b, {.method = method, .contacts = Contacts::All});
     m_detection.setPositions(m_a, step.aBefore, step.aNow);
     m_detection.setPositions(m_b, step.bBefore, step.bNow);
   }

@@ -77,9 +77,13 @@ class Suturing : public LiveScene {
     mobility.back() = 0;
     m_world.addStiffness(m_thread, 0, 1e-3);
     m_world.addRigid(0, kNeedle + 1);
-    const PairSettings touching{.method = Method::Continuous, .thickness = kGap};
+    const PairSettings touching{
+        .method = Method::Continuous, .thickness = kGap, .contacts = Contacts::All};
     m_world.addPair(m_thread, m_thread,
-                    {.method = Method::Continuous, .thickness = kGap, .restDistance = 4 * kSegment},
+                    {.method = Method::Continuous,
+                     .thickness = kGap,
+                     .contacts = Contacts::All,
+                     .restDistance = 4 * kSegment},
                     kGap);
     m_world.addGuard(m_thread, m_thread);
     for (const double side : {-1.0, 1.0}) addSheet(side, touching);

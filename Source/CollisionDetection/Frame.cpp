@@ -440,6 +440,12 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
                       record.meshes(), contents, m_impacts);
   statistics.exactDecisions += m_impacts.exactDecisions;
   statistics.validityPairs += m_impacts.validityPairs;
+  // Not before trust has looked at every triangle that an impact names.
+  if (record.pair.settings.contacts == Contacts::Distinct &&
+      (record.plan.step.impacts || record.plan.method == Method::Continuous))
+    m_firstImpacts.keep(record.a == record.b,
+                        record.plan.step.impacts ? 1.0 : std::numeric_limits<double>::infinity(),
+                        m_orderScratch, contents);
   countContacts(record.plan, ofIntersection, contents);
   record.candidatesSorted = candidatesSorted;
   if (settings.keepCandidates) record.candidatesOf.commit(record.state());

@@ -3,6 +3,7 @@
 #include <palpate/FrameStatistics.h>
 #include <palpate/Settings.h>
 
+#include "CollisionDetection/FirstImpacts.h"
 #include "CollisionDetection/Order.h"
 #include "CollisionDetection/PairTable.h"
 #include "Core/Threads.h"
@@ -53,6 +54,7 @@ class Frame {
   ContactBuffers m_impacts;
   StepFacts m_facts;
   OrderScratch m_orderScratch;
+  FirstImpacts m_firstImpacts;
 };
 
 }  // namespace palpate

@@ -100,8 +100,9 @@ struct OctreeBasedCD::Implementation {
     Stopwatch watch;
     for (const auto& record : pairs.records()) {
       const Method method = record->pair.settings.method;
-      const bool moves = (detecting || method == Method::Auto) &&
-                         (method == Method::Continuous || !record->meshes().hasShape());
+      const bool moves =
+          (detecting || method == Method::Auto) &&
+          (method == Method::Continuous || method == Method::Auto || !record->meshes().hasShape());
       if (moves)
         for (Geometry* geometry : {record->a, record->b}) geometry->motion.update(*geometry);
       record->plan = planOf(record->pair.settings, *record->a, *record->b, moves);

@@ -22,11 +22,11 @@ Key byElement(const ShapeContact& c) {
   return {packed(static_cast<std::uint32_t>(c.element), c.id), std::uint64_t{c.vertices[1]} << 1};
 }
 
-/// Returns how many are of the first `preferred` buffers.
+/// Returns how many are of the first `preferred` buffers. flags: if not null, which these are.
 template <class Contact, class Entries, class KeyOf>
 std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferred,
                   Buffer<Contact> ContactBuffers::*member, Entries& entries,
-                  std::vector<Contact>& out, KeyOf&& keyOf) {
+                  std::vector<Contact>& out, KeyOf&& keyOf, Buffer<std::uint8_t>* flags) {
   entries.clear();
   for (std::size_t i = 0; i < buffers.size(); ++i)
     for (const Contact& contact : buffers[i]->*member) {
@@ -47,6 +47,10 @@ std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferre
     out.push_back(*entry.contact);
     count += ~entry.key[1] & 1;
   }
+  if (!flags) return count;
+  flags->clear();
+  if (preferred > 0)
+    for (const auto& entry : entries) flags->push_back(~entry.key[1] & 1);
   return count;
 }
 
@@ -76,11 +80,12 @@ std::size_t orderContacts(std::span<ContactBuffers* const> buffers, std::size_t 
                           OrderScratch& scratch, CollisionData::Contents& out) {
   const std::size_t count =
       order(buffers, preferred, &ContactBuffers::vertexTriangle, scratch.vertexTriangle,
-            out.vertexTriangle, byVertex) +
+            out.vertexTriangle, byVertex, &scratch.preferred[0]) +
       order(buffers, preferred, &ContactBuffers::triangleVertex, scratch.vertexTriangle,
-            out.triangleVertex, byTriangle) +
-      order(buffers, preferred, &ContactBuffers::edgeEdge, scratch.edgeEdge, out.edgeEdge, byEdges);
-  order(buffers, preferred, &ContactBuffers::shape, scratch.shape, out.shape, byElement);
+            out.triangleVertex, byTriangle, &scratch.preferred[1]) +
+      order(buffers, preferred, &ContactBuffers::edgeEdge, scratch.edgeEdge, out.edgeEdge, byEdges,
+            &scratch.preferred[2]);
+  order(buffers, preferred, &ContactBuffers::shape, scratch.shape, out.shape, byElement, nullptr);
   out.shapeShape.clear();
   for (const ContactBuffers* buffer : buffers)
     out.shapeShape.insert(out.shapeShape.end(), buffer->shapeShape.begin(),

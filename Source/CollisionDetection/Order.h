@@ -4,6 +4,8 @@
 
 #include "NarrowPhase/NarrowPhase.h"
 
+#include <array>
+#include <cstdint>
 #include <span>
 
 namespace palpate {
@@ -18,6 +20,9 @@ struct OrderScratch {
   Buffer<Entry<VertexTriangleContact>> vertexTriangle;
   Buffer<Entry<EdgeEdgeContact>> edgeEdge;
   Buffer<Entry<ShapeContact>> shape;
+  /// Of vertexTriangle, triangleVertex and edgeEdge as ordered last: which contacts are of the
+  /// preferred buffers. Empty where there are no such buffers.
+  std::array<Buffer<std::uint8_t>, 3> preferred;
 };
 
 struct PairOrderScratch {

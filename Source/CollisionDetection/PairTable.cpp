@@ -47,6 +47,24 @@ std::uint64_t keyOf(GeometryId a, GeometryId b) {
 constexpr const char* kRigidWithItself =
     "a geometry that setTransform() moves cannot be tested against itself";
 
+const char* nameOf(Method method) {
+  switch (method) {
+    case Method::Auto:
+      return "Auto";
+    case Method::Proxy:
+      return "Proxy";
+    case Method::DistanceField:
+      return "DistanceField";
+    case Method::Intersection:
+      return "Intersection";
+    case Method::Proximity:
+      return "Proximity";
+    case Method::Continuous:
+      return "Continuous";
+  }
+  return "?";
+}
+
 /// Throws what is wrong with the settings.
 class Check {
  public:
@@ -54,9 +72,11 @@ class Check {
       : m_id(a.id), m_name(nameOf(a.id, b.id)), m_method(settings.method) {
     range(a.mesh, b.mesh, settings);
     kinds(a.mesh, b.mesh);
-    need(m_method != Method::Proximity || a.mesh.shape || b.mesh.shape ||
-             settings.thickness + (a.mesh.largestRadius + b.mesh.largestRadius) > 0.0,
+    const bool proximity = hasProximity(a.mesh, b.mesh, settings.thickness);
+    need(m_method != Method::Proximity || proximity,
          "Method::Proximity needs a positive thickness; it is 0");
+    need(m_method != Method::Auto || proximity || hasContinuous(a.mesh, b.mesh),
+         "Method::Auto needs a positive thickness for these radii; it is 0");
   }
 
  private:
@@ -89,6 +109,9 @@ class Check {
          "no such method: " + std::to_string(static_cast<int>(method)));
     support(method != Method::Proxy, "Method::Proxy does not exist yet");
     support(method != Method::DistanceField, "Method::DistanceField does not exist yet");
+    need(method == Method::Auto || tolerance < 0.0,
+         "tolerance is " + textOf(tolerance) + "; Method::" + nameOf(method) +
+             " does not use it, only Method::Auto does: leave it negative");
   }
 
   void kinds(const TriangleMesh& a, const TriangleMesh& b) {
@@ -98,17 +121,17 @@ class Check {
     support(&a != &b || tool || !a.now.isPlaced(), kRigidWithItself);
     support(&a != &b || !tool, "a shape does not meet itself");
     support(!both || !a.shape->isPlane() || !b.shape->isPlane(), "two planes have no distance");
-    support(!both || m_method == Method::Proximity,
-            "two shapes are tested by Method::Proximity only");
-    support(meshes || continuous || m_method == Method::Proximity,
-            "this method is for two triangle meshes, not for " + nameOf(a.topology.kind) + " and " +
-                nameOf(b.topology.kind) + "; Proximity and Continuous are");
+    const bool any = m_method == Method::Auto || m_method == Method::Proximity;
+    support(!both || any, "two shapes are tested by Method::Auto and Method::Proximity only");
+    support(meshes || continuous || any,
+            "Method::Intersection is for two triangle meshes, not for " + nameOf(a.topology.kind) +
+                " and " + nameOf(b.topology.kind) + "; Auto, Proximity and Continuous are");
     const GeometryKind other = (a.shape ? b : a).topology.kind;
-    support(
-        !tool || !continuous || !tool->isCylinder() || other == GeometryKind::Points,
-        std::string("a cylinder and ") + nameOf(other) + " are tested by Method::Proximity only");
+    support(!tool || !continuous || !tool->isCylinder() || other == GeometryKind::Points,
+            std::string("a cylinder and ") + nameOf(other) +
+                " are tested by Method::Auto and Method::Proximity only");
     support(!continuous || (a.radii.empty() && b.radii.empty()),
-            "Method::Continuous needs one radius for all vertices");
+            "Method::Continuous needs one radius for all vertices; Proximity and Auto do not");
   }
 
   GeometryId m_id;

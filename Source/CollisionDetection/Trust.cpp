@@ -44,6 +44,28 @@ static bool knowsSides(const Geometry& a, const Geometry& b) {
   return a.mesh.topology.hasFaces() && b.mesh.topology.hasFaces();
 }
 
+bool hasContinuous(const TriangleMesh& a, const TriangleMesh& b) {
+  if (a.shape && b.shape) return false;
+  const Shape* const shape = a.shape ? &*a.shape : b.shape ? &*b.shape : nullptr;
+  if (shape && shape->isCylinder() && (a.shape ? b : a).topology.kind != GeometryKind::Points)
+    return false;
+  return a.radii.empty() && b.radii.empty();
+}
+
+bool hasProximity(const TriangleMesh& a, const TriangleMesh& b, double thickness) {
+  return a.shape || b.shape || thickness + (a.largestRadius + b.largestRadius) > 0.0;
+}
+
+/// Auto with lines, points or shapes: at rest Proximity, which costs least; in a step that moves
+/// features Continuous, which alone misses no impact.
+static void chooseMethod(const PairSettings& settings, const TriangleMesh& a, const TriangleMesh& b,
+                         PairPlan& plan) {
+  const bool proximity = hasProximity(a, b, settings.thickness);
+  const bool still = plan.motion == 0.0 && proximity;
+  plan.method = still || !hasContinuous(a, b) ? Method::Proximity : Method::Continuous;
+  plan.reason = still ? MethodReason::Still : MethodReason::Only;
+}
+
 PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry& b, bool moves) {
   PairPlan plan;
   plan.method = settings.method;
@@ -53,7 +75,10 @@ PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry&
     plan.motion = largestMotion(a.motion.range(), b.motion.range());
     plan.arcDeviation = a.motion.arcDeviation() + b.motion.arcDeviation();
   }
-  if (!knowsSides(a, b)) return plan;
+  if (!knowsSides(a, b)) {
+    if (settings.method == Method::Auto) chooseMethod(settings, a.mesh, b.mesh, plan);
+    return plan;
+  }
   step.motion = plan.motion;
   if (settings.method == Method::Auto) {
     plan.tolerance = step.slow = settings.tolerance < 0 ? thickness / 2 : settings.tolerance;
@@ -164,7 +189,7 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
     m_atStart.of.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
   }
   validity.startedApart = m_atStart.position == Position::Apart;
-  if (settings.method == Method::Auto) {
+  if (settings.method == Method::Auto && knowsSides(a, b)) {
     validity.reach = plan.tolerance;
     validity.trusted = plan.method == Method::Intersection || validity.startedApart;
   } else if (plan.method == Method::Continuous) {
@@ -174,7 +199,7 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
     const bool proximity = plan.method == Method::Proximity;
     validity.reach = proximity ? settings.thickness : std::min(a.smallestHeight, b.smallestHeight);
     const bool within = plan.motion <= validity.reach;
-    if (!within) {
+    if (!within && !meshes.hasShape()) {
       addFarMovers(validity.verticesBeyondA, a, b, validity.reach);
       if (&a != &b) addFarMovers(validity.verticesBeyondB, b, a, validity.reach);
     }

@@ -25,6 +25,11 @@ struct PairPlan {
   bool swept() const { return method == Method::Continuous || method == Method::Auto; }
 };
 
+/// Whether Method::Continuous answers a pair of these geometries.
+bool hasContinuous(const TriangleMesh& a, const TriangleMesh& b);
+/// Whether Method::Proximity does.
+bool hasProximity(const TriangleMesh& a, const TriangleMesh& b, double thickness);
+
 /// From the settings, which are good, and how the geometries moved, if that matters.
 PairPlan planOf(const PairSettings&, const Geometry& a, const Geometry& b, bool moves = true);
 

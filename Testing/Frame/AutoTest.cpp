@@ -113,7 +113,7 @@ TEST(Auto, MissesNothingThatContinuousFinds) {
     const Case c = randomCase(random, motion.slow * uniform(random, 0, 2), motion.fastShare,
                               motion.fast * uniform(random, 0, 1));
     const double thickness = i % 4 == 0 ? 0.0 : kThickness;
-    const PairSettings continuous{Method::Continuous, thickness};
+    const PairSettings continuous{Method::Continuous, thickness, Contacts::All};
     const PairSettings automatic{Method::Auto, thickness, Contacts::All,
                                  uniform(random, -1, 1) * 0.01};
     PairRun truth(settingsOf(Engine::Octree), c.a, c.b, continuous);
@@ -147,7 +147,8 @@ TEST(Auto, DistinctContactsStandForAllThatContinuousFinds) {
     const Motion& motion = kMotions[i % std::size(kMotions)];
     const Case c = randomCase(random, motion.slow * uniform(random, 0, 2), motion.fastShare,
                               motion.fast * uniform(random, 0, 1));
-    PairRun truth(settingsOf(Engine::Octree), c.a, c.b, {Method::Continuous, kThickness}, false);
+    PairRun truth(settingsOf(Engine::Octree), c.a, c.b,
+                  {Method::Continuous, kThickness, Contacts::All}, false);
     PairRun run(settingsOf(Engine::Octree), c.a, c.b, {Method::Auto, kThickness}, false);
     truth.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
     run.step(c.a.positions, c.aNow, c.b.positions, c.bNow);

@@ -60,21 +60,32 @@ struct Settings {
 enum class Method { Auto, Proxy, DistanceField, Intersection, Proximity, Continuous };
 
 enum class Contacts {
-  Distinct,  ///< one per pair of closest features
-  All,       ///< every pair that the method's definition includes
-  Earliest   ///< Continuous only: no contacts, only earliestTimeOfImpact(); much cheaper
+  /// One per pair of closest features. Proximity: where the distance is smallest. Continuous, and
+  /// impacts of Auto: of all impacts between the same two features (vertex, edge or interior of a
+  /// triangle, by the weights other than 0) the earliest; of equally early ones the first in
+  /// vertexTriangle(), triangleVertex(), edgeEdge(). So a dropped contact is never the first impact
+  /// of its features, every vertex with a weight other than 0 keeps its earliest time, and
+  /// earliestTimeOfImpact() is that of All. Docs/Pairs.md has the reasons.
+  Distinct,
+  All,      ///< every pair that the method's definition includes
+  Earliest  ///< Continuous only: no contacts, only earliestTimeOfImpact(); much cheaper
 };
 
 struct PairSettings {
-  /// Auto: per frame Proximity, Continuous, or each for the features it suits; no impact within the
-  /// step is missed. See <palpate/Validity.h>.
+  /// Auto: per frame Proximity, Continuous, or each for the features it suits. It answers every
+  /// pair that any method answers, and misses no impact within the step of any pair that Continuous
+  /// answers. See <palpate/Validity.h>.
   Method method = Method::Auto;
-  double thickness = 0.0;  ///< L, finite, not negative; Proximity needs it positive
-  /// Proximity, and Auto's contacts at the step's end; others report all
+  /// L, finite, not negative. Proximity needs it positive, or radii. Intersection's contacts do not
+  /// depend on it.
+  double thickness = 0.0;
+  /// Intersection reports all.
   Contacts contacts = Contacts::Distinct;
-  /// L. Auto, Distinct with a thickness: features that move at most this far, relative to each
-  /// other, are tested at the step's end, with up to this added to the thickness; others for
-  /// impacts. Larger: faster, more contacts that are further apart. Negative: half the thickness.
+  /// L. For Auto only: any other method refuses it unless it is negative. Two triangle or
+  /// tetrahedral meshes, Distinct with a thickness: features that move at most this far, relative
+  /// to each other, are tested at the step's end, with up to this added to the thickness; others
+  /// for impacts. Larger: faster, more contacts that are further apart. Negative: half the
+  /// thickness.
   double tolerance = -1.0;
   /// L, finite, not negative. A triangle or line mesh with itself: features that are nearer than
   /// this along its edges, in the shape that it was added in or that setTriangles() gave, are no
@@ -82,7 +93,8 @@ struct PairSettings {
   double restDistance = 0.0;
   /// Of the step, in [2^-50, 1]: reported times of impact are at most this early, never late. With
   /// a thickness features are reported, too, that come within it and this part of their motion;
-  /// without, the same ones whatever this is.
+  /// without, the same ones whatever this is. No effect on Proximity and Intersection, which look
+  /// at one time.
   double timeTolerance = 1e-6;
 };
 

@@ -12,20 +12,25 @@ namespace palpate {
 enum class MethodReason {
   Asked,  ///< the pair's settings name it
   // Method::Auto, by how far features move in the step, relative to each other:
-  Still,  ///< not at all
+  Still,  ///< not at all: Proximity, or Intersection for two meshes without a thickness
   Slow,   ///< all at most PairSettings::tolerance: Proximity
   Fast,   ///< all, or most, further: Continuous
   Mixed,  ///< some further: Continuous for those, Proximity for the rest
   /// At most the tolerance or not, Continuous costs least: without a thickness, and with
   /// Contacts::All, where distances of everything near would be asked for.
-  Cheapest
+  Cheapest,
+  /// A pair with lines, points or shapes: no other method answers it as well. Continuous where
+  /// features move, or where Proximity would need a thickness or a radius. Proximity where
+  /// Continuous does not answer the pair: what passes within the step may then be missing.
+  Only
 };
 
 /// What one pair's method assumes, and whether the last frame kept to it.
 ///
 /// trusted  Proximity, Continuous, Auto: every normal is on the side from which its features came,
 /// and
-///          no features that touched or crossed within the step are missing. Intersection: that the
+///          no features that touched or crossed within the step are missing, save those for which
+///          Contacts::Distinct reports another contact. Intersection: that the
 ///          meshes touched within the step is not missing.
 ///          False where the library does not know; never true where it is wrong.
 /// Cost     at most 5 % of the frames, but for a look at the step's start in the pair's first one.

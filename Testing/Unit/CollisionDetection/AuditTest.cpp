@@ -23,7 +23,9 @@ constexpr PairSettings kPairSettings[]{
     {.method = Method::Intersection},
     {.method = Method::Proximity, .thickness = 0.05},
     {.method = Method::Proximity, .thickness = 0.05, .contacts = Contacts::All},
-    {.method = Method::Continuous}};
+    {.method = Method::Continuous},
+    {.method = Method::Continuous, .thickness = 0.05},
+    {.method = Method::Continuous, .thickness = 0.05, .contacts = Contacts::All}};
 
 TriangleMesh movingMesh(Random& random, const Mesh& mesh) {
   std::vector<Eigen::Vector3d> now = mesh.positions;

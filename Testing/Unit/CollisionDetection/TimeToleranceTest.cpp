@@ -61,12 +61,14 @@ std::vector<std::array<std::uint32_t, 4>> idsOf(const CollisionData& data) {
 TEST(TimeTolerance, BoundsHowEarlyAndNothingElse) {
   Random random(5);
   const Moving a = movingSoup(random), b = movingSoup(random);
-  const auto truth = idsOf(
-      runOf(testing::settingsOf(Engine::BruteForce), {.method = Method::Continuous}, a, b).data());
+  const auto truth = idsOf(runOf(testing::settingsOf(Engine::BruteForce),
+                                 {.method = Method::Continuous, .contacts = Contacts::All}, a, b)
+                               .data());
   ASSERT_GT(truth.size(), 50u);
   for (const double tolerance : {0x1p-50, 1e-10, 1e-3, 0.25, 1.0}) {
     SCOPED_TRACE(tolerance);
-    const PairSettings settings{.method = Method::Continuous, .timeTolerance = tolerance};
+    const PairSettings settings{
+        .method = Method::Continuous, .contacts = Contacts::All, .timeTolerance = tolerance};
     const PairRun run = runOf({}, settings, a, b);
     testing::expectSame(run.answers(),
                         runOf(testing::settingsOf(Engine::BruteForce), settings, a, b).answers());
@@ -94,8 +96,10 @@ TEST(TimeTolerance, WithThicknessBoundsTimeAndDistance) {
   Random random(7);
   const Moving a = movingSoup(random), b = movingSoup(random);
   const auto idsAt = [&](double tolerance, double thickness) {
-    const PairSettings settings{
-        .method = Method::Continuous, .thickness = thickness, .timeTolerance = tolerance};
+    const PairSettings settings{.method = Method::Continuous,
+                                .thickness = thickness,
+                                .contacts = Contacts::All,
+                                .timeTolerance = tolerance};
     const PairRun run = runOf({}, settings, a, b);
     testing::expectSame(run.answers(),
                         runOf(testing::settingsOf(Engine::BruteForce), settings, a, b).answers());

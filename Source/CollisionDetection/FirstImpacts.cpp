@@ -1,0 +1,86 @@
+#include "CollisionDetection/FirstImpacts.h"
+
+#include <algorithm>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+std::uint64_t featureOf(std::uint32_t p, std::uint32_t q) {
+  return std::uint64_t{std::min(p, q)} << 32 | std::max(p, q);
+}
+
+std::uint64_t featureOf(const Segment& edge, double weight) {
+  if (weight == 0.0) return featureOf(edge[0], edge[0]);
+  if (weight == 1.0) return featureOf(edge[1], edge[1]);
+  return featureOf(edge[0], edge[1]);
+}
+
+ImpactFeatures inOrder(std::uint64_t first, std::uint64_t second, bool swap) {
+  return swap ? ImpactFeatures{second, first} : ImpactFeatures{first, second};
+}
+
+}  // namespace
+
+std::optional<ImpactFeatures> sharedFeatures(const VertexTriangleContact& c, bool ofSecond,
+                                             bool self) {
+  int first = -1, last = -1, count = 0;
+  for (int i = 0; i < 3; ++i) {
+    if (c.barycentric[i] == 0.0) continue;
+    if (first < 0) first = i;
+    last = i;
+    ++count;
+  }
+  if (count == 3 && c.corners[1] != c.corners[2]) return {};
+  const std::uint64_t vertex = featureOf(c.vertex, c.vertex),
+                      other = featureOf(c.corners[first], c.corners[last]);
+  return inOrder(vertex, other, self ? other < vertex : ofSecond);
+}
+
+std::optional<ImpactFeatures> sharedFeatures(const EdgeEdgeContact& c, bool self) {
+  const std::uint64_t a = featureOf(c.edgeA, c.weightA), b = featureOf(c.edgeB, c.weightB);
+  const auto isEdge = [](std::uint64_t feature) {
+    return feature >> 32 != static_cast<std::uint32_t>(feature);
+  };
+  if (isEdge(a) && isEdge(b)) return {};
+  return inOrder(a, b, self && b < a);
+}
+
+void FirstImpacts::keep(bool self, double end, const OrderScratch& ordered,
+                        CollisionData::Contents& contents) {
+  m_entries.clear();
+  forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
+    const Buffer<std::uint8_t>& preferred = ordered.preferred[list];
+    for (std::uint32_t i = 0; i < contacts.size(); ++i) {
+      const auto& contact = contacts[i];
+      if (!(contact.timeOfImpact < end) || (!preferred.empty() && preferred[i])) continue;
+      std::optional<ImpactFeatures> features;
+      if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
+        features = sharedFeatures(contact, self);
+      else
+        features = sharedFeatures(contact, list == 1, self);
+      if (features) m_entries.push_back({*features, contact.timeOfImpact, list, i});
+    }
+  });
+  std::sort(m_entries.begin(), m_entries.end(), [](const Entry& l, const Entry& r) {
+    return std::tie(l.features, l.time, l.list, l.index) <
+           std::tie(r.features, r.time, r.list, r.index);
+  });
+  forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
+    m_dropped[list].assign(contacts.size(), 0);
+  });
+  for (std::size_t i = 1; i < m_entries.size(); ++i)
+    if (m_entries[i].features == m_entries[i - 1].features)
+      m_dropped[m_entries[i].list][m_entries[i].index] = 1;
+  forEachImpactList(contents, [&](auto& contacts, std::uint32_t list) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < contacts.size(); ++i)
+      if (!m_dropped[list][i]) contacts[kept++] = contacts[i];
+    contacts.resize(kept);
+  });
+}
+
+}  // namespace palpate

@@ -1,0 +1,283 @@
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/ContactRows.h"
+#include "Common/PairRun.h"
+#include "Common/RandomMeshes.h"
+#include "Common/Things.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <set>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+// Contacts::Distinct of Method::Continuous against its definition, written here over sets of
+// vertices and applied to the contacts that Contacts::All reports.
+
+namespace palpate::testing {
+namespace {
+
+using VertexSet = std::set<std::uint32_t>;
+using FeaturePair = std::pair<VertexSet, VertexSet>;
+
+VertexSet verticesOf(const VertexTriangleContact& c) {
+  VertexSet vertices;
+  for (int i = 0; i < 3; ++i)
+    if (c.barycentric[i] != 0.0) vertices.insert(c.corners[i]);
+  return vertices;
+}
+
+VertexSet verticesOf(const std::array<std::uint32_t, 2>& edge, double weight) {
+  VertexSet vertices;
+  if (weight != 1.0) vertices.insert(edge[0]);
+  if (weight != 0.0) vertices.insert(edge[1]);
+  return vertices;
+}
+
+/// What the definition needs to know of a contact.
+struct Impact {
+  FeaturePair features;
+  std::uint32_t triangle;  ///< that holds a closest point in its interior, or none
+  double time;
+  int list;
+  std::size_t index;
+
+  bool isBefore(const Impact& other) const {
+    return std::tie(time, list, index) < std::tie(other.time, other.list, other.index);
+  }
+  bool hasFeaturesOf(const Impact& other, bool self) const {
+    if (triangle != other.triangle) return false;
+    const FeaturePair swapped{features.second, features.first};
+    return features == other.features || (self && swapped == other.features);
+  }
+};
+
+std::vector<Impact> impactsOf(const CollisionData& data) {
+  std::vector<Impact> impacts;
+  const auto addVertex = [&](const VertexTriangleContact& c, int list, std::size_t index) {
+    const VertexSet vertex{c.vertex}, others = verticesOf(c);
+    const std::uint32_t triangle =
+        others.size() == 3 ? c.triangle : std::numeric_limits<std::uint32_t>::max();
+    impacts.push_back({list == 1 ? FeaturePair{others, vertex} : FeaturePair{vertex, others},
+                       triangle, c.timeOfImpact, list, index});
+  };
+  std::size_t index = 0;
+  for (const auto& c : data.vertexTriangle()) addVertex(c, 0, index++);
+  index = 0;
+  for (const auto& c : data.triangleVertex()) addVertex(c, 1, index++);
+  index = 0;
+  for (const EdgeEdgeContact& c : data.edgeEdge())
+    impacts.push_back({{verticesOf(c.edgeA, c.weightA), verticesOf(c.edgeB, c.weightB)},
+                       std::numeric_limits<std::uint32_t>::max(),
+                       c.timeOfImpact,
+                       2,
+                       index++});
+  return impacts;
+}
+
+/// The definition: every contact against every other.
+Rows reduced(const CollisionData& all, bool self) {
+  const std::vector<Impact> impacts = impactsOf(all);
+  const Rows rows(all);
+  Rows kept;
+  kept.earliestTimeOfImpact = rows.earliestTimeOfImpact;
+  for (const Impact& impact : impacts) {
+    if (std::any_of(impacts.begin(), impacts.end(), [&](const Impact& other) {
+          return other.isBefore(impact) && other.hasFeaturesOf(impact, self);
+        }))
+      continue;
+    const auto member = impact.list == 0   ? &Rows::vertexTriangle
+                        : impact.list == 1 ? &Rows::triangleVertex
+                                           : &Rows::edgeEdge;
+    (kept.*member).push_back((rows.*member)[impact.index]);
+  }
+  return kept;
+}
+
+using Side = std::pair<int, std::uint32_t>;  // of the pair's first or second geometry, and a vertex
+
+/// By each vertex with a weight other than 0: its earliest time.
+std::map<Side, double> earliestByVertex(const CollisionData& data, bool self) {
+  std::map<Side, double> earliest;
+  const auto note = [&](int side, const VertexSet& vertices, double time) {
+    for (const std::uint32_t v : vertices) {
+      const auto place = earliest.emplace(Side{self ? 0 : side, v}, time).first;
+      place->second = std::min(place->second, time);
+    }
+  };
+  for (const Impact& impact : impactsOf(data)) {
+    note(0, impact.features.first, impact.time);
+    note(1, impact.features.second, impact.time);
+  }
+  return earliest;
+}
+
+/// One step of a pair: answers of every engine against the definition, and what it promises.
+/// Returns how many contacts Distinct drops.
+std::size_t expectFirstImpacts(const Thing& a, const Thing& b, PairSettings pair,
+                               const Positions& nowA, const Positions& nowB) {
+  const bool self = &a == &b;
+  pair.contacts = Contacts::All;
+  const CollisionData all = answer(settingsOf(Engine::Octree), a, b, pair, nowA, nowB);
+  const Rows expected = reduced(all, self);
+  pair.contacts = Contacts::Distinct;
+  const CollisionData distinct = answer(settingsOf(Engine::BruteForce), a, b, pair, nowA, nowB);
+  expectSameRows(Rows(distinct), expected);
+  for (const Settings& settings : octreeSettings())
+    expectSameRows(Rows(answer(settings, a, b, pair, nowA, nowB)), expected);
+
+  EXPECT_EQ(distinct.earliestTimeOfImpact(), all.earliestTimeOfImpact());
+  EXPECT_EQ(earliestByVertex(distinct, self), earliestByVertex(all, self));
+  EXPECT_EQ(distinct.validity().trusted, all.validity().trusted);
+  EXPECT_EQ(distinct.validity().startedApart, all.validity().startedApart);
+  EXPECT_EQ(distinct.validity().atImpact, expected.contacts());
+  // Each pair of features that meets is reported once, with its first time.
+  const std::vector<Impact> kept = impactsOf(distinct);
+  for (const Impact& impact : impactsOf(all)) {
+    std::size_t count = 0;
+    for (const Impact& other : kept)
+      if (other.hasFeaturesOf(impact, self)) {
+        ++count;
+        EXPECT_LE(other.time, impact.time);
+      }
+    EXPECT_EQ(count, 1u);
+  }
+  return Rows(all).contacts() - expected.contacts();
+}
+
+TEST(FirstImpacts, AreThoseOfTheDefinitionForEveryPairOfGeometries) {
+  Random random(1);
+  const Thing organ = things(sphere(6, 8, {0.5, 0.5, 0.5}, 0.35)),
+              cloth = things(sheet(7, 0.4, 1.0));
+  const Thing line = thread(random, 60, 0.12, 0.01, false),
+              loop = thread(random, 40, 0.15, 0, true);
+  const Thing smoke = particles(random, 60, 0.02), dust = particles(random, 80, 0);
+  std::size_t dropped = 0;
+  for (const auto& [a, b] : Pairs{{&organ, &cloth},
+                                  {&cloth, &organ},
+                                  {&organ, &organ},
+                                  {&cloth, &cloth},
+                                  {&organ, &line},
+                                  {&line, &organ},
+                                  {&line, &loop},
+                                  {&loop, &line},
+                                  {&line, &line},
+                                  {&loop, &loop},
+                                  {&organ, &smoke},
+                                  {&smoke, &organ},
+                                  {&line, &smoke},
+                                  {&dust, &loop},
+                                  {&dust, &smoke},
+                                  {&smoke, &smoke}})
+    for (const double thickness : {0.0, 0.05, 0.15}) {
+      PairSettings pair{Method::Continuous, thickness};
+      const Positions nowA = moved(random, a->positions, 0.06),
+                      nowB = moved(random, b->positions, 0.06);
+      dropped += expectFirstImpacts(*a, *b, pair, nowA, nowB);
+      if (a == b && a != &smoke) {
+        pair.restDistance = 0.2;
+        dropped += expectFirstImpacts(*a, *b, pair, nowA, nowB);
+      }
+      if (HasFailure()) return;
+    }
+  EXPECT_GT(dropped, 1000u);
+}
+
+/// Equal positions and equal times: everything is a tie.
+TEST(FirstImpacts, BreakTiesByOrder) {
+  Thing above = things(sheet(4, 0, 0)), below = above;
+  for (Thing* thing : {&above, &below})
+    for (Vector3d& p : thing->positions) p[2] = 0.0;
+  for (Vector3d& p : above.positions) p[2] = 1.0;
+  Positions landed = above.positions;
+  for (Vector3d& p : landed) p[2] = -0.5;
+  std::size_t dropped = 0;
+  for (const double thickness : {0.0, 0.0625, 0.3}) {
+    dropped +=
+        expectFirstImpacts(above, below, {Method::Continuous, thickness}, landed, below.positions);
+    dropped +=
+        expectFirstImpacts(below, above, {Method::Continuous, thickness}, below.positions, landed);
+  }
+  EXPECT_GT(dropped, 1000u);
+}
+
+TEST(FirstImpacts, OfACornerOnACornerIsOne) {
+  // The apexes of two pyramids of four triangles each meet at half time.
+  const std::vector<Triangle> sides{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}};
+  const Thing up{GeometryKind::Triangles,
+                 {{0, 0, 0}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, -1}, {1, -1, -1}},
+                 sides,
+                 {}};
+  const Thing down{GeometryKind::Triangles,
+                   {{0, 0, 1}, {1, 0, 2}, {0, 1, 2}, {-1, 0, 2}, {0, -1, 2}},
+                   sides,
+                   {}};
+  Positions landed = down.positions;
+  for (Vector3d& p : landed) p[2] -= 1.5;
+  PairSettings pair{Method::Continuous, 0.25, Contacts::All};
+  const Settings settings = settingsOf(Engine::Octree);
+  const CollisionData all = answer(settings, up, down, pair, up.positions, landed);
+  std::size_t ofApexes = 0;
+  for (const Impact& impact : impactsOf(all)) ofApexes += impact.features == FeaturePair{{0}, {0}};
+  EXPECT_EQ(ofApexes, 24u);  // 4 + 4 vertices against triangles, 16 pairs of edges
+  pair.contacts = Contacts::Distinct;
+  const CollisionData distinct = answer(settings, up, down, pair, up.positions, landed);
+  ofApexes = 0;
+  for (const Impact& impact : impactsOf(distinct))
+    ofApexes += impact.features == FeaturePair{{0}, {0}};
+  EXPECT_EQ(ofApexes, 1u);
+  ASSERT_FALSE(distinct.vertexTriangle().empty());
+  EXPECT_EQ(distinct.vertexTriangle()[0].vertex, 0u);
+  EXPECT_EQ(distinct.vertexTriangle()[0].triangle, 0u);
+}
+
+/// What a filter refuses is no contact, so it stands for none.
+TEST(FirstImpacts, AreOfWhatFiltersLeave) {
+  Random random(3);
+  const Mesh organ = sphere(8, 10, {0.5, 0.5, 0.55}, 0.35), cloth = sheet(9, 0, 0);
+  Positions pressed = organ.positions;
+  for (Vector3d& p : pressed) p[2] -= 0.5;
+  const auto answerOf = [&](const Settings& settings, Contacts contacts) {
+    PairRun run(settings, organ, cloth, {Method::Continuous, 0.1, contacts}, false);
+    run.detection().setContactPredicate(run.a(), run.b(), [](const ContactFeatures& features) {
+      return (features.a[0] * 7 + features.b[0] * 3) % 4 != 0;
+    });
+    run.detection().setCollisionFilter(run.b(), {1, 0xffffffff, Sidedness::Outer});
+    run.step(organ.positions, pressed, cloth.positions, cloth.positions);
+    return run.data();
+  };
+  const CollisionData all = answerOf(settingsOf(Engine::Octree), Contacts::All);
+  const Rows expected = reduced(all, false);
+  EXPECT_LT(expected.contacts() + 50, Rows(all).contacts());
+  EXPECT_GT(expected.contacts(), 50u);
+  expectSameRows(Rows(answerOf(settingsOf(Engine::BruteForce), Contacts::Distinct)), expected);
+  for (const Settings& settings : octreeSettings())
+    expectSameRows(Rows(answerOf(settings, Contacts::Distinct)), expected);
+}
+
+/// A smooth body is pressed into another. How many contacts a solver is spared.
+TEST(FirstImpacts, AreFewOnSmoothBodies) {
+  const Mesh cloth = sheet(52, 0, 0);
+  const Mesh body = sphere(52, 50, {0.5, 0.5, 0.36}, 0.28);
+  Positions pressed = body.positions;
+  for (Vector3d& p : pressed) p += Vector3d(0, 0.02, -0.06);
+  const double thickness = 0.5 / 52;  // half an edge
+  const auto countOf = [&](Contacts contacts) {
+    PairRun run(settingsOf(Engine::Octree), body, cloth, {Method::Continuous, thickness, contacts},
+                false);
+    run.step(body.positions, pressed, cloth.positions, cloth.positions);
+    return Rows(run.data()).contacts();
+  };
+  const std::size_t all = countOf(Contacts::All), distinct = countOf(Contacts::Distinct);
+  RecordProperty("all", static_cast<int>(all));
+  RecordProperty("distinct", static_cast<int>(distinct));
+  EXPECT_GT(all, 9000u);
+  EXPECT_LT(3 * distinct, all);
+}
+
+}  // namespace
+}  // namespace palpate::testing
