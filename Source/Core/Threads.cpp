@@ -317,6 +317,8 @@ class Body {
 /// often each does. A run that comes too late finds the loop closed.
 class LoopOnExecutor {
  public:
+  LoopOnExecutor* nextAbandoned = nullptr;
+
   /// No run of the last loop can come any more.
   bool isFree() {
     const std::lock_guard guard(m_lock);
@@ -392,10 +394,17 @@ void checkThreads(int threads) {
 /// Loops that are used again and again, as many as have ever run at the same time.
 struct Threads::LoopsOnExecutor {
   LoopsOnExecutor() = default;
-  /// What an executor has kept a run of is left to it: the run may still come.
+  /// What an executor has kept a run of is never freed: the run may still come. A list of all such
+  /// loops tells leak checkers that this is meant.
   ~LoopsOnExecutor() {
+    static std::atomic<LoopOnExecutor*> abandoned{nullptr};
     for (auto& loop : all)
-      if (!loop->isFree()) static_cast<void>(loop.release());
+      if (!loop->isFree()) {
+        loop->nextAbandoned = abandoned;
+        while (!abandoned.compare_exchange_weak(loop->nextAbandoned, loop.get())) {
+        }
+        static_cast<void>(loop.release());
+      }
   }
   LoopsOnExecutor(const LoopsOnExecutor&) = delete;
   LoopsOnExecutor& operator=(const LoopsOnExecutor&) = delete;
