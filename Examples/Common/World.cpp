@@ -1,9 +1,6 @@
 #include "World.h"
 
-#include <palpate/Error.h>
-
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <map>
 
@@ -37,7 +34,6 @@ World::BodyId World::add(Body body, std::span<const Vector3d> positions, double 
   body.count = static_cast<std::uint32_t>(positions.size());
   m_bodies.push_back(std::move(body));
   m_guardIds.push_back({});
-  m_isGuarded.push_back(false);
   return m_bodies.size() - 1;
 }
 
@@ -113,22 +109,29 @@ void World::addPair(BodyId a, BodyId b, const PairSettings& settings, double gap
   m_pairs.push_back({a, b, gap});
 }
 
-void World::addGuard(BodyId a, BodyId b) {
-  for (const BodyId id : {a, b}) {
-    if (m_isGuarded[id]) continue;
-    m_isGuarded[id] = true;
-    const Body& body = m_bodies[id];
+GeometryId World::guarded(BodyId id) {
+  const Body& body = m_bodies[id];
+  if (!m_guardIds[id])
     m_guardIds[id] = body.kind == GeometryKind::Lines
                          ? m_guard.addLineMesh(positions(id), body.segments)
                          : m_guard.addTriangleMesh(positions(id), body.triangles);
-  }
-  m_guard.addCollisionPair(m_guardIds[a], m_guardIds[b], {.method = Method::Continuous});
-  m_guarded.push_back({a, b, 0});
+  return *m_guardIds[id];
+}
+
+void World::addGuard(BodyId a, BodyId b) {
+  const GeometryId first = guarded(a), second = guarded(b);
+  m_guard.addPair(first, second);
+}
+
+void World::addRigid(BodyId body, std::uint32_t count) {
+  std::vector<GuardedVertex> vertices(count);
+  for (std::uint32_t i = 0; i < count; ++i) vertices[i] = {guarded(body), i};
+  m_guard.addRigidGroup(vertices);
 }
 
 void World::disable(BodyId body, std::span<const std::uint32_t> triangles) {
   m_detection.setDisabledElements(m_bodies[body].id, triangles);
-  if (m_isGuarded[body]) m_guard.setDisabledElements(m_guardIds[body], triangles);
+  if (m_guardIds[body]) m_guard.setDisabledElements(*m_guardIds[body], triangles);
 }
 
 void World::place(BodyId id, const Eigen::Matrix3d& rotation, const Vector3d& translation) {
@@ -203,42 +206,12 @@ void World::solve(int iterations) {
   }
 }
 
-void World::holdParticle(std::uint32_t particle) {
-  Range range{particle, 1};
-  for (const Range& rigid : m_rigid)
-    if (particle - rigid.first < rigid.count) range = rigid;
-  for (std::uint32_t i = range.first; i < range.first + range.count; ++i) {
-    if (wasHeld(i)) continue;
-    m_solver.now[i] = m_solver.before[i];
-    ++m_times.held;
-  }
-}
-
-bool World::holdContacts(const Pair& pair) {
-  const auto& [a, b, gap] = pair;
-  const CollisionData& contacts = m_guard.collisionData(m_guardIds[a], m_guardIds[b]);
-  const auto hold = [&](const Stencil& stencil, const std::array<BodyId, 4>& bodies) {
-    for (std::size_t i = 0; i < 4; ++i)
-      holdParticle(m_bodies[bodies[i]].first + stencil.vertices[i]);
-  };
-  for (const auto& contact : contacts.vertexTriangle()) hold(stencil(contact), {a, b, b, b});
-  for (const auto& contact : contacts.triangleVertex()) hold(stencil(contact), {b, a, a, a});
-  for (const auto& contact : contacts.edgeEdge()) hold(stencil(contact), {a, a, b, b});
-  return contacts.earliestTimeOfImpact() <= 1;
-}
-
 void World::hold() {
   const Timed timed(m_times.hold);
-  for (bool touches = !m_guarded.empty(); touches;) {
-    for (BodyId id = 0; id < m_bodies.size(); ++id)
-      if (m_isGuarded[id]) m_guard.setPositions(m_guardIds[id], before(id), positions(id));
-    m_guard.detectCollision();
-    const std::size_t held = m_times.held;
-    touches = false;
-    for (const Pair& pair : m_guarded) touches |= holdContacts(pair);
-    if (touches && m_times.held == held)
-      throw Error(ErrorCode::NotAvailable, "Bodies touched before the step.");
-  }
+  m_steps.clear();
+  for (BodyId id = 0; id < m_bodies.size(); ++id)
+    if (m_guardIds[id]) m_steps.push_back({*m_guardIds[id], before(id), positions(id)});
+  m_times.held += m_guard.hold(m_steps);
 }
 
 void World::commit() {

@@ -4,8 +4,10 @@
 #include "Xpbd.h"
 
 #include <palpate/OctreeBasedCD.h>
+#include <palpate/StepGuard.h>
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -67,8 +69,8 @@ class World {
   void addVolume(BodyId, double compliance);
   /// Vertices of which this holds stay where they are, or are moved by hand.
   void pin(BodyId, const std::function<bool(const Eigen::Vector3d&)>&);
-  /// These particles move together: hold() holds all or none.
-  void addRigid(std::uint32_t first, std::uint32_t count) { m_rigid.push_back({first, count}); }
+  /// The first vertices of a body move together: hold() holds all or none.
+  void addRigid(BodyId, std::uint32_t count);
 
   /// gap: L, what the solver keeps them apart.
   void addPair(BodyId a, BodyId b, const PairSettings&, double gap);
@@ -83,10 +85,7 @@ class World {
   void detect();
   void detectOnly();  ///< contacts without rows, where nothing responds
   void solve(int iterations);
-  /// Particles of features that touch within the step from before to now go back to before, until
-  /// nothing touches: exact, by Method::Continuous without thickness.
-  /// Errors   Error where something touched before the step.
-  void hold();
+  void hold();  ///< StepGuard::hold() of all guarded bodies
   void commit();
 
   std::span<Eigen::Vector3d> positions(BodyId);  ///< now
@@ -115,19 +114,15 @@ class World {
  private:
   BodyId add(Body, std::span<const Eigen::Vector3d> positions, double inverseMass);
   SolverVertices vertices(BodyId) const;
-  void holdParticle(std::uint32_t particle);
-  bool holdContacts(const Pair&);  ///< whether anything touches
+  GeometryId guarded(BodyId);  ///< its id in the guard, to which it is added once
 
   Xpbd m_solver;
-  OctreeBasedCD m_detection, m_guard;
+  OctreeBasedCD m_detection;
+  StepGuard m_guard;
   std::vector<Body> m_bodies;
-  std::vector<GeometryId> m_guardIds;  ///< by body
-  std::vector<bool> m_isGuarded;       ///< by body
-  std::vector<Pair> m_pairs, m_guarded;
-  struct Range {
-    std::uint32_t first, count;
-  };
-  std::vector<Range> m_rigid;
+  std::vector<std::optional<GeometryId>> m_guardIds;  ///< by body; none: not guarded
+  std::vector<Pair> m_pairs;
+  std::vector<GuardedStep> m_steps;
   std::vector<ConstraintRow> m_rows;
   std::vector<std::size_t> m_rowPairs;
   std::vector<Eigen::Vector3d> m_forces;  ///< by body

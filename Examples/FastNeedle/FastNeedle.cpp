@@ -87,10 +87,12 @@ class FastNeedle : public LiveScene {
       return (p - centre).head<2>().lpNorm<Eigen::Infinity>() > 0.999 * kHalfWidth;
     });
     m_world.addStiffness(lane.membrane, 1e-5, 1e-3);
-    m_world.addRigid(m_world.bodies()[lane.needle].first, m_world.bodies()[lane.needle].count);
     m_world.addPair(lane.needle, lane.membrane, {.method = method, .thickness = kThickness},
                     kThickness);
-    if (method != Method::Proximity) m_world.addGuard(lane.needle, lane.membrane);
+    if (method != Method::Proximity) {
+      m_world.addGuard(lane.needle, lane.membrane);
+      m_world.addRigid(lane.needle, m_world.bodies()[lane.needle].count);
+    }
     m_lanes.push_back(lane);
   }
 

@@ -129,7 +129,7 @@ class Palpation : public LiveScene {
     m_tool = m_world.addMesh("tool", placed, 0.0);
     m_world.addPair(m_organ, m_tool, {.method = Method::Auto, .thickness = m_gap}, m_gap);
     m_world.addGuard(m_organ, m_tool);
-    m_world.addRigid(m_world.bodies()[m_tool].first, m_world.bodies()[m_tool].count);
+    m_world.addRigid(m_tool, m_world.bodies()[m_tool].count);
   }
 
   /// Down into the organ, along it, and up again.

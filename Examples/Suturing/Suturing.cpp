@@ -76,7 +76,7 @@ class Suturing : public LiveScene {
     std::fill_n(mobility.begin(), kNeedle + 1, 0.0);
     mobility.back() = 0;
     m_world.addStiffness(m_thread, 0, 1e-3);
-    m_world.addRigid(0, kNeedle + 1);
+    m_world.addRigid(m_thread, kNeedle + 1);
     const PairSettings touching{
         .method = Method::Continuous, .thickness = kGap, .contacts = Contacts::All};
     m_world.addPair(m_thread, m_thread,

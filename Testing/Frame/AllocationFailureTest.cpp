@@ -1,4 +1,5 @@
 #include <palpate/OctreeBasedCD.h>
+#include <palpate/StepGuard.h>
 
 #include "Common/FailingAllocation.h"
 #include "Common/PairRun.h"
@@ -315,6 +316,44 @@ TEST_P(AllocationFailure, LeavesTheNextFrameRight) {
       }
       EXPECT_GT(failures, first ? 40u : 0u);
     }
+}
+
+TEST_P(AllocationFailure, LeavesTheStepOfAGuardAsItWas) {
+  const Mesh body = sphere(5, 6, {0.51, 0.47, 0.53}, 0.4), floor = sheet(4, 0.5, 0.3);
+  Random random(6);
+  const Positions bodyNow = moved(random, body.positions, 0.3),
+                  floorNow = moved(random, floor.positions, 0.3);
+  std::size_t failures = 0;
+  bool threw = true;
+  for (std::size_t n = 1; threw; ++n) {
+    SCOPED_TRACE("allocation " + std::to_string(n));
+    StepGuard guard(settingsOf(Engine::Octree, GetParam())), unfailed;
+    std::array<GeometryId, 2> ids{};
+    for (StepGuard* each : {&guard, &unfailed}) {
+      ids = {each->addTriangleMesh(body.positions, body.triangles),
+             each->addTriangleMesh(floor.positions, floor.triangles)};
+      each->addPair(ids[0], ids[1]);
+    }
+    Positions a = bodyNow, b = floorNow, sameA = bodyNow;
+    FailingAllocation::arm(n);
+    try {
+      guard.hold(std::array{GuardedStep{ids[0], body.positions, a},
+                            GuardedStep{ids[1], floor.positions, b}});
+    } catch (const std::bad_alloc&) {
+    }
+    FailingAllocation::disarm();
+    threw = a == bodyNow && b == floorNow;
+    if (!threw) break;
+    ++failures;
+    ASSERT_TRUE(guard.held().empty());
+    // The second geometry is not given: it is where it was added, not where the call that failed
+    // moved it.
+    a = bodyNow;
+    guard.hold(std::array{GuardedStep{ids[0], body.positions, a}});
+    unfailed.hold(std::array{GuardedStep{ids[0], body.positions, sameA}});
+    ASSERT_EQ(a, sameA);
+  }
+  EXPECT_GT(failures, 20u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Threads, AllocationFailure, ::testing::Values(1, 2));

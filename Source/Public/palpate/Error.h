@@ -28,6 +28,7 @@ enum class ErrorCode {
   InvalidTransform,   ///< not a rotation, or a translation that is not finite
   SharedFace,         ///< a face of more than two tetrahedra
   InvalidCall,        ///< of an object that was moved from, or from a callback that it calls
+  ImpactRemains,      ///< features touch within a step, and StepGuard may not move their vertices
 };
 
 /// What was wrong with a call, and where. The call that throws it has changed nothing.

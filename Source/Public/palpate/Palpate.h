@@ -7,4 +7,5 @@
 #include <palpate/Error.h>
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/Settings.h>
+#include <palpate/StepGuard.h>
 #include <palpate/Types.h>

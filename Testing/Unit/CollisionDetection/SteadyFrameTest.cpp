@@ -1,4 +1,5 @@
 #include <palpate/OctreeBasedCD.h>
+#include <palpate/StepGuard.h>
 
 #include "Common/Solids.h"
 #include "Scenes.h"
@@ -273,6 +274,33 @@ TEST(SteadyFrame, AllocatesNothingWithTetrahedra) {
     EXPECT_GT(found, 10000u);
     EXPECT_GE(changes.size(), 3u);
   }
+}
+
+TEST(SteadyFrame, AllocatesNothingInAGuard) {
+  testing::Random random(9);
+  const testing::Mesh body = testing::sphere(12, 16, {0.51, 0.47, 0.53}, 0.3),
+                      floor = testing::sheet(12, 0.5, 0.3);
+  StepGuard guard({.threads = 1});
+  const GeometryId a = guard.addTriangleMesh(body.positions, body.triangles),
+                   b = guard.addTriangleMesh(floor.positions, floor.triangles);
+  guard.addPair(a, b);
+  guard.addPair(b, b);
+  const std::vector<std::uint32_t> fixed{0, 5};
+  guard.setFixedVertices(b, fixed);
+  std::vector<Eigen::Vector3d> far = body.positions, now, still;
+  for (Eigen::Vector3d& p : far) p += testing::randomPoint(random, -0.3, 0.3);
+  std::size_t before = 0, held = 0;
+  const IntegersApart apart;
+  for (int step = 0; step < 20; ++step) {
+    if (step == 10) before = allocations;
+    now = far;
+    still = floor.positions;
+    const GuardedStep steps[2]{{a, body.positions, now}, {b, floor.positions, still}};
+    held = guard.hold(steps);
+  }
+  EXPECT_EQ(allocations - before, 0u);
+  EXPECT_GT(held, 10u);
+  EXPECT_GT(guard.rounds(), 1u);
 }
 
 TEST(SteadyFrame, CountsAllocations) {

@@ -1,0 +1,157 @@
+#include <palpate/ConstraintRows.h>
+#include <palpate/Error.h>
+
+#include "Core/FloatingPoint.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// What a vertex of a contact has.
+struct VertexMotion {
+  Vector3d position, displacement;  ///< L; at the contact's time, and over the step
+  double radius;                    ///< L
+};
+
+/// name: "a" or "b", for messages.
+VertexMotion motionOf(const ContactSide& side, const char* name, std::uint32_t vertex,
+                      double time) {
+  const auto& [first, before, now] = side.vertices;
+  if (vertex >= before.size() || vertex >= now.size())
+    throw Error(ErrorCode::WrongPositionCount,
+                "appendMotions(): a contact has vertex " + std::to_string(vertex) + " of " + name +
+                    ", which has " + std::to_string(before.size()) + " positions before and " +
+                    std::to_string(now.size()) + " now",
+                {}, vertex);
+  const std::span<const double> radii = side.radii;
+  return {(1 - time) * before[vertex] + time * now[vertex], now[vertex] - before[vertex],
+          radii.empty() ? 0.0 : radii[radii.size() == 1 ? 0 : vertex]};
+}
+
+void checkRadiusCount(const ContactSide& side, const char* name) {
+  const std::size_t count = side.radii.size();
+  if (count > 1 && count != side.vertices.now.size())
+    throw Error(ErrorCode::InvalidRadius, "appendMotions(): " + std::string(name) + " has " +
+                                              std::to_string(count) + " radii and " +
+                                              std::to_string(side.vertices.now.size()) +
+                                              " positions; one radius, or one for each is needed");
+}
+
+/// Of the shape's point that is at `point` at the time.
+Vector3d displacementAt(const ShapeMotion& motion, const Vector3d& point, double time) {
+  const Matrix3d rotation = (1 - time) * motion.rotationBefore + time * motion.rotation;
+  const Vector3d translation = (1 - time) * motion.translationBefore + time * motion.translation;
+  const Vector3d body = rotation.inverse() * (point - translation);
+  return (motion.rotation - motion.rotationBefore) * body +
+         (motion.translation - motion.translationBefore);
+}
+
+/// A weighted sum of the vertices on one side of a contact.
+struct SideSum {
+  Vector3d position = Vector3d::Zero(), displacement = Vector3d::Zero();
+  double radius = 0;
+
+  void add(double weight, const VertexMotion& vertex) {
+    position += weight * vertex.position;
+    displacement += weight * vertex.displacement;
+    radius += weight * vertex.radius;
+  }
+};
+
+}  // namespace
+
+void appendMotions(const CollisionData& contacts, const ContactSide& a, const ContactSide& b,
+                   std::vector<ContactMotion>& motions) {
+  const StandardFloatingPoint standard;
+  const Method method = contacts.validity().method;
+  const bool swept = method == Method::Continuous || method == Method::Auto;
+  const auto nameOf = [&](const ContactSide& side) { return &side == &a ? "a" : "b"; };
+  const auto timeOf = [&](const auto& contact) { return swept ? contact.timeOfImpact : 1.0; };
+  const std::size_t given = motions.size();
+
+  // inFirst: how many of the stencil's vertices are on the side that the normal points to.
+  const auto add = [&](const auto& contact, const ContactSide& first, const ContactSide& second,
+                       std::size_t inFirst) {
+    const auto [vertices, weights] = stencil(contact);
+    SideSum one, other;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const ContactSide& side = i < inFirst ? first : second;
+      (i < inFirst ? one : other)
+          .add(std::abs(weights[i]), motionOf(side, nameOf(side), vertices[i], timeOf(contact)));
+    }
+    motions.push_back({one.position - one.radius * contact.normal,
+                       other.position + other.radius * contact.normal,
+                       one.displacement - other.displacement});
+  };
+  try {
+    checkRadiusCount(a, "a");
+    checkRadiusCount(b, "b");
+    for (const auto& contact : contacts.vertexTriangle()) add(contact, a, b, 1);
+    for (const auto& contact : contacts.triangleVertex()) add(contact, b, a, 1);
+    for (const auto& contact : contacts.edgeEdge()) add(contact, a, b, 2);
+    const ContactSide& mesh = a.vertices.now.empty() ? b : a;
+    const ContactSide& shape = &mesh == &a ? b : a;
+    for (const ShapeContact& contact : contacts.shape()) {
+      SideSum sum;
+      for (int i = 0; i < 3; ++i)
+        sum.add(contact.weights[i],
+                motionOf(mesh, nameOf(mesh), contact.vertices[i], timeOf(contact)));
+      motions.push_back(
+          {contact.point - sum.radius * contact.normal, contact.pointOnShape,
+           sum.displacement - displacementAt(shape.shape, contact.pointOnShape, timeOf(contact))});
+    }
+    for (const ShapeShapeContact& contact : contacts.shapeShape())
+      motions.push_back({contact.pointA, contact.pointB,
+                         displacementAt(a.shape, contact.pointA, 1.0) -
+                             displacementAt(b.shape, contact.pointB, 1.0)});
+  } catch (...) {
+    motions.erase(motions.begin() + static_cast<std::ptrdiff_t>(given), motions.end());
+    throw;
+  }
+}
+
+Tangents tangentsOf(const Vector3d& normal) {
+  const StandardFloatingPoint standard;
+  const double x = normal.x(), y = normal.y(), z = normal.z();
+  double xx, xy, yy;  // x², x y and y² over 1 + z
+  if (z >= 0) {
+    const double scale = 1 / (1 + z);
+    xx = x * x * scale, xy = x * y * scale, yy = y * y * scale;
+  } else {
+    // 1 + z = (x² + y²) / (1 - z), with x and y over the larger one so that no square vanishes.
+    const double most = std::max(std::abs(x), std::abs(y));
+    const double u = most > 0 ? x / most : 1, v = most > 0 ? y / most : 0;
+    const double scale = (1 - z) / (u * u + v * v);
+    xx = u * u * scale, xy = u * v * scale, yy = v * v * scale;
+  }
+  return {Vector3d(1 - xx, -xy, -x), Vector3d(-xy, 1 - yy, -y)};
+}
+
+Tangents tangentsOf(const Vector3d& normal, const Tangents& previous) {
+  const StandardFloatingPoint standard;
+  const Vector3d previousNormal = previous[0].cross(previous[1]);
+  if (!(previousNormal.squaredNorm() > 0.5)) return tangentsOf(normal);  // NaN as well
+  // To a vector perpendicular to the previous normal the turn does what the reflection does that
+  // swaps the previous normal with the opposite of the normal.
+  const Vector3d middle = previousNormal + normal;
+  const double lengthSquared = middle.squaredNorm();
+  constexpr double kOpposite = 0x1p-80;  // below its root the sum of two normals is rounding
+  Vector3d first = previous[0];
+  if (lengthSquared > kOpposite) first -= 2 * middle.dot(first) / lengthSquared * middle;
+  first -= normal.dot(first) * normal;  // what rounding left
+  first /= first.norm();
+  return {first, normal.cross(first)};
+}
+
+}  // namespace palpate
