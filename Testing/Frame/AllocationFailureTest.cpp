@@ -211,8 +211,11 @@ std::vector<Call> calls() {
     return d.addLineMesh(three, std::vector<Segment>{{0, 1}}, std::vector<double>{0.1, 0.2, 0.1});
   });
   add("addPointSet", [=](OctreeBasedCD& d) { return d.addPointSet(three, 0.1); });
-  add("addAnalyticalGeometry",
-      [=](OctreeBasedCD& d) { return d.addAnalyticalGeometry(ConvexHull{four}); });
+  for (const AnalyticalGeometry& shape : std::vector<AnalyticalGeometry>{
+           ConvexHull{four}, ConvexHull{three}, Box{{0, 0, 0}, {1, 1, 1}}, Sphere{{0, 0, 0}, 1},
+           Plane{}, Cylinder{{0, 0, 0}, {0, 0, 1}, 1}})
+    add("addAnalyticalGeometry " + std::to_string(shape.index()),
+        [=](OctreeBasedCD& d) { return d.addAnalyticalGeometry(shape); });
   return all;
 }
 
