@@ -11,7 +11,7 @@
 namespace palpate::testing {
 namespace {
 
-constexpr int kLives = 20, kFrames = casesOf(500);
+constexpr int kLives = casesOf(20), kFrames = 500;
 
 std::size_t live(std::uint64_t seed, int frames) {
   RandomHistory history(seed);
