@@ -7,12 +7,14 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <exception>
 #include <limits>
 #include <mutex>
 #include <new>
+#include <optional>
 #include <pthread.h>
 #include <string>
 #include <system_error>
@@ -195,9 +197,15 @@ class Workers {
 
   /// Others are at the loop's last indices. What they wait for is in newer loops: no two threads
   /// can wait for each other.
+  ///
+  /// Waking a blocked thread takes as long as much of a small frame, so the thread first gives its
+  /// core away for a while, which is enough for most last indices.
   void waitForOthers(const Loop& loop) {
+    using Clock = std::chrono::steady_clock;
+    constexpr std::chrono::microseconds kMostYielding{500};
     bool first = true;
     int seen = 0;
+    std::optional<Clock::time_point> yielding;
     for (Spin spin; loop.joined.load(std::memory_order_acquire) > 0;) {
       if (const int now = m_posted; first || now != seen) {
         seen = now;
@@ -207,9 +215,13 @@ class Workers {
           takeOne(*newer, true);
           leave(*newer);
           spin = {};
+          yielding.reset();
         }
       } else if (!spin.isOver()) {
         spin.wait();
+      } else if (!yielding || Clock::now() - *yielding < kMostYielding) {
+        if (!yielding) yielding = Clock::now();
+        std::this_thread::yield();
       } else {
         std::unique_lock guard(m_lock.mutex);
         ++m_blocked;
@@ -217,6 +229,7 @@ class Workers {
         --m_blocked;
         first = true;
         spin = {};
+        yielding.reset();
       }
     }
   }

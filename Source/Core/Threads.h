@@ -18,7 +18,8 @@ namespace palpate {
 ///             Indices above it may be left out. The object stays usable.
 /// Memory      Loops allocate nothing on the library's pool, and nothing after the first ones on an
 ///             executor.
-/// Waiting     Threads spin for 20 to 80 microseconds at most and block then, so that one with
+/// Waiting     Threads spin for 20 to 80 microseconds, at the end of a loop then yield for half a
+///             millisecond, and block in the end, so that one with
 ///             real-time priority cannot keep another from the core that it waits for. Tested for
 ///             std::thread: a SCHED_FIFO thread on one core with a SCHED_OTHER worker
 ///             (ThreadsTest.cpp). Where oneTBB is the pool, its own rules hold.

@@ -1,4 +1,5 @@
 #include "Common/History.h"
+#include "Common/Sanitized.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +11,7 @@
 namespace palpate::testing {
 namespace {
 
-constexpr int kLives = 20, kFrames = 500;
+constexpr int kLives = casesOf(20), kFrames = 500;
 
 std::size_t live(std::uint64_t seed, int frames) {
   RandomHistory history(seed);
@@ -27,7 +28,8 @@ std::size_t live(std::uint64_t seed, int frames) {
 class History : public ::testing::TestWithParam<int> {};
 
 TEST_P(History, AnswersByTheLastValuesOnly) {
-  EXPECT_GT(live(static_cast<std::uint64_t>(GetParam()), kFrames), 500u);
+  EXPECT_GT(live(static_cast<std::uint64_t>(GetParam()), kFrames),
+            static_cast<std::size_t>(kFrames));
 }
 
 INSTANTIATE_TEST_SUITE_P(Lives, History, ::testing::Range(0, kLives));

@@ -1,4 +1,5 @@
 #include "Common/PairRun.h"
+#include "Common/Sanitized.h"
 
 #include <gtest/gtest.h>
 
@@ -221,7 +222,7 @@ TEST_P(MethodTest, KnowsTheStartFromImpactsOfTheStepBefore) {
   };
   for (const bool itself : {false, true})
     for (const double speed : {0.05, 0.1, 0.3})
-      for (std::uint64_t seed = 0; seed < 12; ++seed) {
+      for (std::uint64_t seed = 0; seed < casesOf(12); ++seed) {
         SCOPED_TRACE((itself ? "itself, speed " : "speed ") + std::to_string(speed) + ", seed " +
                      std::to_string(seed));
         Random random(seed);
