@@ -59,7 +59,7 @@ std::uint64_t CollisionData::hash() const {
     hash.add(static_cast<std::uint64_t>(c.element) << 32 | c.id, c.vertices, c.weights, c.point,
              c.pointOnShape, c.normal, c.distance, c.timeOfImpact);
   for (const ShapeShapeContact& c : m_contents.shapeShape)
-    hash.add(c.pointA, c.pointB, c.normal, c.distance);
+    hash.add(c.pointA, c.pointB, c.normal, c.distance, c.timeOfImpact);
   if (const double earliest = m_contents.earliestTimeOfImpact; earliest <= 1.0) hash.add(earliest);
   return hash.value();
 }

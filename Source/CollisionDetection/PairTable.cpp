@@ -88,15 +88,9 @@ class Check {
     support(&a != &b || tool || !a.now.isPlaced(), kRigidWithItself);
     support(&a != &b || !tool, "a shape does not meet itself");
     support(!both || !a.shape->isPlane() || !b.shape->isPlane(), "two planes have no distance");
-    support(!both || m_method == Method::Proximity,
-            "two shapes are tested by Method::Proximity only");
     support(meshes || continuous || m_method == Method::Proximity,
             "this method is for two triangle meshes, not for " + nameOf(a.topology.kind) + " and " +
                 nameOf(b.topology.kind) + "; Proximity and Continuous are");
-    const GeometryKind other = (a.shape ? b : a).topology.kind;
-    support(
-        !tool || !continuous || !tool->isCylinder() || other == GeometryKind::Points,
-        std::string("a cylinder and ") + nameOf(other) + " are tested by Method::Proximity only");
     support(!continuous || (a.radii.empty() && b.radii.empty()),
             "Method::Continuous needs one radius for all vertices");
   }

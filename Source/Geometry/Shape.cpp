@@ -106,6 +106,22 @@ void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& tran
     else
       capsule(origin + m_span.front(), origin + m_span.back(), 0);
   }
+  placeCorners();
+}
+
+void Shape::placeBetween(const Shape& before, const Shape& now, double time) {
+  const auto at = [&](std::size_t end) -> Vector3d {
+    return (1.0 - time) * before.m_corners[end] + time * now.m_corners[end];
+  };
+  const Vector3d axis = at(1) - at(0);
+  m_kind = Kind::Cylinder;
+  m_p0 = m_p1 = at(0) + 0.5 * axis;
+  m_axes = axis == Vector3d::Zero() ? before.m_axes : axesAlong(axis);
+  m_sizes = {before.m_sizes[0], 0.5 * lengthOf(axis)};
+  placeCorners();
+}
+
+void Shape::placeCorners() {
   m_corners = {m_p0, m_p1};
   if (isCylinder()) {
     m_corners = {m_p0 - m_sizes[1] * m_axes.col(2), m_p0 + m_sizes[1] * m_axes.col(2)};

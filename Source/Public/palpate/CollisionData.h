@@ -55,12 +55,13 @@ struct ShapeContact {
 };
 
 /// Two analytical shapes where they are nearest, or, if they overlap, where they leave each other
-/// by the shortest way.
+/// by the shortest way; with Method::Continuous at the time at which they first come near enough.
 struct ShapeShapeContact {
   Eigen::Vector3d pointA, pointB;  ///< L, on the surfaces of the first and of the second
   Eigen::Vector3d normal;          ///< unit, from b towards a
   /// L: pointA - pointB is the normal times this; negative: moved so far along it a just touches b
   double distance;
+  double timeOfImpact = 0.0;  ///< [0, 1] of the step, and all else then; 0 for Proximity
   friend bool operator==(const ShapeShapeContact&, const ShapeShapeContact&) = default;
 };
 

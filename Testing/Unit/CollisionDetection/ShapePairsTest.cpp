@@ -255,8 +255,9 @@ TEST(ShapePairs, BadInputIsRefusedByName) {
   };
   refuse(box, box, Method::Proximity, "pair (0, 0): a shape does not meet itself");
   refuse(plane, other, Method::Proximity, "pair (1, 2): two planes have no distance");
-  for (const Method method : {Method::Auto, Method::Intersection, Method::Continuous})
-    refuse(box, plane, method, "Method::Proximity only");
+  refuse(plane, other, Method::Continuous, "pair (1, 2): two planes have no distance");
+  for (const Method method : {Method::Auto, Method::Intersection})
+    refuse(box, plane, method, "a shape and a shape; Proximity and Continuous");
 }
 
 TEST(ShapePairs, CapturesHoldThem) {
