@@ -132,6 +132,7 @@ class Shape {
   Kind m_kind = Kind::Plane;
   Eigen::Vector3d m_p0, m_p1;  ///< a capsule's axis; others: both the body's origin
   double m_radius = 0;         ///< of a capsule
+  double m_axisSquare = 0;     ///< L²: of its length; negative where that leaves double's range
   Eigen::Matrix3d m_axes = Eigen::Matrix3d::Identity();  ///< of the body
   std::array<double, 2> m_sizes{};                       ///< of a cylinder's parts
   std::vector<Eigen::Vector3d> m_span;                   ///< of a hull's points

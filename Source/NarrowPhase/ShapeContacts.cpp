@@ -8,6 +8,7 @@
 #include "Math/Tolerances.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <span>
@@ -21,11 +22,12 @@ using Eigen::Vector3d;
 
 using Kind = ImpactQuery::Kind;
 
-/// Of a triangle's edges.
-NearestToShape nearestOnBoundary(const Shape& shape, const std::array<Vector3d, 3>& x) {
+/// Of a triangle's edges; at(i): its corners.
+template <class At>
+NearestToShape nearestOnBoundary(const Shape& shape, At&& at) {
   NearestToShape best{};
   for (int i = 0; i < 3; ++i) {
-    const NearestToShape edge = shape.nearestOfEdge(x[i], x[(i + 1) % 3]);
+    const NearestToShape edge = shape.nearestOfEdge(at(i), at((i + 1) % 3));
     if (i > 0 && !(edge.distance < best.distance)) continue;
     best = edge;
     best.weights = Vector3d::Zero();
@@ -44,6 +46,7 @@ class ShapeImpacts {
         m_before(pair.shapeBefore()),
         m_now(pair.shape()),
         m_distance(pair.settings.thickness + m_mesh.largestRadius),
+        m_isStill(m_mesh.before.hasSameBody(m_mesh.now) && !m_mesh.now.isPlaced()),
         m_out(out) {
     m_settings.minimumDistance = m_distance + m_before.radius();
     m_settings.tolerance = pair.settings.timeTolerance;
@@ -56,11 +59,16 @@ class ShapeImpacts {
 
   /// L: what distances before the step may be off by, and what the step may take from them.
   std::array<double, 2> slack(ShapeElement element, const Triangle& vertices) const {
-    double size = m_before.magnitude() + m_distance, motion = 0;
+    double size = m_before.magnitude() + m_distance, square = 0;
     for (const std::uint32_t v : vertices) {
       size += m_mesh.before[v].cwiseAbs().maxCoeff();
-      motion = std::max(motion, motionOf(vertex(v)));
+      if (!m_isStill) square = std::max(square, (m_mesh.now[v] - m_mesh.before[v]).squaredNorm());
     }
+    double motion = 0;
+    if (isInRange(square))
+      motion = std::sqrt(square);
+    else if (!m_isStill)
+      for (const std::uint32_t v : vertices) motion = std::max(motion, motionOf(vertex(v)));
     const bool still = element != ShapeElement::Vertex && m_before.isPlane();
     return {kShapeBoundError * size, still ? 0.0 : motion + m_motion};
   }
@@ -140,7 +148,7 @@ class ShapeImpacts {
 
   static NearestToShape nearestOfTriangle(const Shape& shape, const std::array<Vector3d, 3>& x) {
     if (const auto inside = shape.nearestInTriangle(x[0], x[1], x[2])) return *inside;
-    return nearestOnBoundary(shape, x);
+    return nearestOnBoundary(shape, [&](int i) { return x[i]; });
   }
 
   /// Whether what holds the point of these weights is near the shape at this time, or was before.
@@ -210,6 +218,7 @@ class ShapeImpacts {
   const TriangleMesh& m_mesh;
   const Shape &m_before, &m_now;
   const double m_distance;  ///< L: with the mesh's radius
+  const bool m_isStill;     ///< no vertex of the mesh moves
   ContactBuffers& m_out;
   TimeOfImpactSettings m_settings;
   double m_motion = 0;  ///< L: of the shape's points at most
@@ -293,10 +302,9 @@ class ShapeContactFinder {
   }
 
   NearestToShape nearestOfTriangle(const Triangle& corners) const {
-    const std::array<Vector3d, 3> x{m_positions[corners[0]], m_positions[corners[1]],
-                                    m_positions[corners[2]]};
-    if (const auto inside = m_shape.nearestInTriangle(x[0], x[1], x[2])) return *inside;
-    return m_distinct && !m_continuous ? NearestToShape{} : nearestOnBoundary(m_shape, x);
+    const auto at = [&](int i) -> Vector3d { return m_positions[corners[i]]; };
+    if (const auto inside = m_shape.nearestInTriangle(at(0), at(1), at(2))) return *inside;
+    return m_distinct && !m_continuous ? NearestToShape{} : nearestOnBoundary(m_shape, at);
   }
 
   void add(ShapeElement element, std::uint32_t id, const Triangle& vertices,
