@@ -2,7 +2,6 @@
 
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
-#include "Common/ShapeTruth.h"
 
 #include <gtest/gtest.h>
 
@@ -15,12 +14,10 @@
 namespace {
 
 thread_local long allocationsLeft = -1;  ///< before one fails; negative: none does
-thread_local std::size_t allocations = 0;
 
 }  // namespace
 
 void* operator new(std::size_t size) {
-  ++allocations;
   if (allocationsLeft == 0) throw std::bad_alloc();
   if (allocationsLeft > 0) --allocationsLeft;
   if (void* memory = std::malloc(size > 0 ? size : 1)) return memory;
@@ -74,44 +71,6 @@ TEST(ShapeMemory, ShapesAreThereWholeOrNotAtAll) {
     EXPECT_GT(failures, 3u);
     EXPECT_EQ(answerOf(collisions), expected);
   }
-}
-
-/// Frames of every two shapes, and of cylinders with triangles and lines, by Method::Continuous.
-TEST(ShapeMemory, SteadyStepsAllocateNothing) {
-  Random random(2);
-  const Mesh tissue = soup(random, 40, 0.3);
-  OctreeBasedCD collisions(settingsOf(Engine::Octree));
-  const GeometryId mesh = collisions.addTriangleMesh(tissue.positions, tissue.triangles);
-  std::vector<Segment> segments;
-  for (std::uint32_t v = 1; v < 60; ++v) segments.push_back({v - 1, v});
-  const GeometryId line = collisions.addLineMesh(tissue.positions, segments, 0.01);
-  std::vector<GeometryId> tools;
-  ConvexHull hull;
-  for (int i = 0; i < 12; ++i) hull.points.push_back(randomPoint(random, -0.2, 0.2));
-  for (const AnalyticalGeometry& shape : std::vector<AnalyticalGeometry>{
-           Sphere{{0, 0, 0}, 0.2}, Capsule{{-0.2, 0, 0}, {0.2, 0, 0}, 0.1}, Plane{},
-           Box{{0, 0, 0}, {0.1, 0.2, 0.3}}, Cylinder{{0, 0, -0.2}, {0, 0, 0.2}, 0.1}, hull}) {
-    const GeometryId tool = collisions.addAnalyticalGeometry(shape);
-    for (const GeometryId other : tools)
-      collisions.addCollisionPair(other, tool, {Method::Continuous, 0.01});
-    tools.push_back(tool);
-    if (!std::holds_alternative<Cylinder>(shape)) continue;
-    collisions.addCollisionPair(mesh, tool, {Method::Continuous, 0.01});
-    collisions.addCollisionPair(line, tool, {Method::Continuous, 0.01});
-  }
-  std::size_t contacts = 0, before = 0;
-  for (int pass = 0; pass < 3; ++pass) {
-    Random same(3);
-    if (pass == 2) before = allocations;
-    for (int frame = 0; frame < 12; ++frame) {
-      for (const GeometryId tool : tools)
-        collisions.setTransform(tool, randomTurn(same), randomPoint(same, 0, 1));
-      collisions.detectCollision();
-      if (pass == 2) contacts += collisions.statistics().contacts;
-    }
-  }
-  EXPECT_EQ(allocations - before, 0u);
-  EXPECT_GT(contacts, 100u);
 }
 
 }  // namespace
