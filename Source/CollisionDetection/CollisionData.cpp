@@ -36,7 +36,6 @@ class Hash {
 
 double CollisionData::earliestTimeOfImpact() const {
   double earliest = m_contents.earliestTimeOfImpact;
-  if (!m_contents.shapeShape.empty()) earliest = std::min(earliest, 1.0);
   forEachTimed(m_contents, [&](const auto& list) {
     for (const auto& contact : list) earliest = std::min(earliest, contact.timeOfImpact);
   });
@@ -48,11 +47,13 @@ std::uint64_t CollisionData::hash() const {
   for (const auto* list : {&m_contents.vertexTriangle, &m_contents.triangleVertex}) {
     hash.add(list->size());
     for (const VertexTriangleContact& c : *list)
-      hash.add(c.vertex, c.triangle, c.barycentric, c.normal, c.distance, c.timeOfImpact);
+      hash.add(c.vertex, c.triangle, c.barycentric, c.normal, c.distance, c.timeOfImpact,
+               static_cast<std::uint64_t>(c.feature));
   }
   hash.add(m_contents.edgeEdge.size());
   for (const EdgeEdgeContact& c : m_contents.edgeEdge)
-    hash.add(c.edgeA, c.edgeB, c.weightA, c.weightB, c.distance, c.timeOfImpact, c.normal);
+    hash.add(c.edgeA, c.edgeB, c.weightA, c.weightB, c.distance, c.timeOfImpact, c.normal,
+             static_cast<std::uint64_t>(c.featureA) << 8 | static_cast<std::uint64_t>(c.featureB));
   hash.add(m_contents.intersectingTriangles.size());
   for (const TrianglePair& p : m_contents.intersectingTriangles)
     hash.add(std::uint64_t{p.a} << 32 | p.b);
@@ -60,7 +61,7 @@ std::uint64_t CollisionData::hash() const {
     hash.add(static_cast<std::uint64_t>(c.element) << 32 | c.id, c.vertices, c.weights, c.point,
              c.pointOnShape, c.normal, c.distance, c.timeOfImpact);
   for (const ShapeShapeContact& c : m_contents.shapeShape)
-    hash.add(c.pointA, c.pointB, c.normal, c.distance);
+    hash.add(c.pointA, c.pointB, c.normal, c.distance, c.timeOfImpact);
   if (const double earliest = m_contents.earliestTimeOfImpact; earliest <= 1.0) hash.add(earliest);
   return hash.value();
 }

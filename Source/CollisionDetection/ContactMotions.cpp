@@ -74,10 +74,7 @@ struct SideSum {
 void appendMotions(const CollisionData& contacts, const ContactSide& a, const ContactSide& b,
                    std::vector<ContactMotion>& motions) {
   const StandardFloatingPoint standard;
-  const Method method = contacts.validity().method;
-  const bool swept = method == Method::Continuous || method == Method::Auto;
   const auto nameOf = [&](const ContactSide& side) { return &side == &a ? "a" : "b"; };
-  const auto timeOf = [&](const auto& contact) { return swept ? contact.timeOfImpact : 1.0; };
   const std::size_t given = motions.size();
 
   // inFirst: how many of the stencil's vertices are on the side that the normal points to.
@@ -88,7 +85,8 @@ void appendMotions(const CollisionData& contacts, const ContactSide& a, const Co
     for (std::size_t i = 0; i < 4; ++i) {
       const ContactSide& side = i < inFirst ? first : second;
       (i < inFirst ? one : other)
-          .add(std::abs(weights[i]), motionOf(side, nameOf(side), vertices[i], timeOf(contact)));
+          .add(std::abs(weights[i]),
+               motionOf(side, nameOf(side), vertices[i], contact.timeOfImpact));
     }
     motions.push_back({one.position - one.radius * contact.normal,
                        other.position + other.radius * contact.normal,
@@ -106,15 +104,15 @@ void appendMotions(const CollisionData& contacts, const ContactSide& a, const Co
       SideSum sum;
       for (int i = 0; i < 3; ++i)
         sum.add(contact.weights[i],
-                motionOf(mesh, nameOf(mesh), contact.vertices[i], timeOf(contact)));
-      motions.push_back(
-          {contact.point - sum.radius * contact.normal, contact.pointOnShape,
-           sum.displacement - displacementAt(shape.shape, contact.pointOnShape, timeOf(contact))});
+                motionOf(mesh, nameOf(mesh), contact.vertices[i], contact.timeOfImpact));
+      motions.push_back({contact.point - sum.radius * contact.normal, contact.pointOnShape,
+                         sum.displacement - displacementAt(shape.shape, contact.pointOnShape,
+                                                           contact.timeOfImpact)});
     }
     for (const ShapeShapeContact& contact : contacts.shapeShape())
       motions.push_back({contact.pointA, contact.pointB,
-                         displacementAt(a.shape, contact.pointA, 1.0) -
-                             displacementAt(b.shape, contact.pointB, 1.0)});
+                         displacementAt(a.shape, contact.pointA, contact.timeOfImpact) -
+                             displacementAt(b.shape, contact.pointB, contact.timeOfImpact)});
   } catch (...) {
     motions.erase(motions.begin() + static_cast<std::ptrdiff_t>(given), motions.end());
     throw;

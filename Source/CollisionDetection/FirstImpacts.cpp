@@ -13,10 +13,10 @@ std::uint64_t featureOf(std::uint32_t p, std::uint32_t q) {
   return std::uint64_t{std::min(p, q)} << 32 | std::max(p, q);
 }
 
-std::uint64_t featureOf(const Segment& edge, double weight) {
-  if (weight == 0.0) return featureOf(edge[0], edge[0]);
-  if (weight == 1.0) return featureOf(edge[1], edge[1]);
-  return featureOf(edge[0], edge[1]);
+std::uint64_t featureOf(const Segment& edge, EdgeFeature feature) {
+  const std::uint32_t p = edge[feature == EdgeFeature::End],
+                      q = edge[feature != EdgeFeature::Start];
+  return featureOf(p, q);
 }
 
 ImpactFeatures inOrder(std::uint64_t first, std::uint64_t second, bool swap) {
@@ -27,25 +27,17 @@ ImpactFeatures inOrder(std::uint64_t first, std::uint64_t second, bool swap) {
 
 std::optional<ImpactFeatures> sharedFeatures(const VertexTriangleContact& c, bool ofSecond,
                                              bool self) {
-  int first = -1, last = -1, count = 0;
-  for (int i = 0; i < 3; ++i) {
-    if (c.barycentric[i] == 0.0) continue;
-    if (first < 0) first = i;
-    last = i;
-    ++count;
-  }
-  if (count == 3 && c.corners[1] != c.corners[2]) return {};
+  if (c.feature == TriangleFeature::Face) return {};
+  const int i = static_cast<int>(c.feature);
   const std::uint64_t vertex = featureOf(c.vertex, c.vertex),
-                      other = featureOf(c.corners[first], c.corners[last]);
+                      other = i < 3 ? featureOf(c.corners[i], c.corners[i])
+                                    : featureOf(c.corners[i - 3], c.corners[(i - 2) % 3]);
   return inOrder(vertex, other, self ? other < vertex : ofSecond);
 }
 
 std::optional<ImpactFeatures> sharedFeatures(const EdgeEdgeContact& c, bool self) {
-  const std::uint64_t a = featureOf(c.edgeA, c.weightA), b = featureOf(c.edgeB, c.weightB);
-  const auto isEdge = [](std::uint64_t feature) {
-    return feature >> 32 != static_cast<std::uint32_t>(feature);
-  };
-  if (isEdge(a) && isEdge(b)) return {};
+  const std::uint64_t a = featureOf(c.edgeA, c.featureA), b = featureOf(c.edgeB, c.featureB);
+  if (c.featureA == EdgeFeature::Interior && c.featureB == EdgeFeature::Interior) return {};
   return inOrder(a, b, self && b < a);
 }
 

@@ -12,8 +12,8 @@
 namespace palpate {
 
 /// The two features that hold an impact's closest points, as a key: an edge by its vertices, lower
-/// first, a vertex twice. They are what the vertices with weights other than 0 span. `self`: the
-/// contact is of one mesh with itself, and the features come in ascending order.
+/// first, a vertex twice. `self`: the contact is of one mesh with itself, and the features come in
+/// ascending order.
 /// Returns  nothing for the interior of a triangle and for the interiors of two edges: no other
 ///          contact has the same features.
 using ImpactFeatures = std::array<std::uint64_t, 2>;
@@ -31,11 +31,10 @@ void forEachImpactList(Lists&& lists, F&& f) {
 /// of equally early ones the first of the lists vertexTriangle, triangleVertex and edgeEdge, and in
 /// one list the first.
 ///
-/// Laws     (1) a dropped contact has the same vertices with weights other than 0 as the contact
-///          that stands for it, which is not later. (2) So each vertex, edge and triangle interior
-///          keeps the earliest time at which it holds a closest point, each vertex keeps the
-///          earliest time at which it has a weight other than 0, and the earliest time of all
-///          stays. (3) keeping twice is keeping once.
+/// Laws     (1) a dropped contact has the same features as the contact that stands for it, which is
+///          not later. (2) So each vertex, edge and triangle interior keeps the earliest time at
+///          which it holds a closest point, and the earliest time of all stays. (3) keeping twice
+///          is keeping once.
 /// Cost     n log n in the number of contacts with shared features.
 class FirstImpacts {
  public:

@@ -79,7 +79,7 @@ void sortUnique(Buffer<std::uint32_t>& ids) {
 }
 
 std::size_t sizeOf(const CollisionData::Contents& contents) {
-  std::size_t size = contents.shapeShape.size();
+  std::size_t size = 0;
   forEachTimed(contents, [&](const auto& list) { size += list.size(); });
   return size;
 }
@@ -208,7 +208,11 @@ struct Frame::Job {
   /// The whole of a pair with a shape.
   void detectShape() {
     const MeshPair meshes = record->meshes();
-    if (meshes.isOfShapes()) return findShapePair(meshes, contacts);
+    if (meshes.isOfShapes()) {
+      findShapePair(meshes, contacts);
+      if (meshes.settings.contacts == Contacts::Earliest) takeEarliest(*record, contacts);
+      return;
+    }
     findPrimitivesNear(record->mesh(), record->plan.swept() ? meshes.shapeBefore() : meshes.shape(),
                        meshes.shape(), meshes.reach(), queries, primitives);
     Stopwatch watch;

@@ -122,15 +122,10 @@ class Check {
     support(&a != &b || !tool, "a shape does not meet itself");
     support(!both || !a.shape->isPlane() || !b.shape->isPlane(), "two planes have no distance");
     const bool any = m_method == Method::Auto || m_method == Method::Proximity;
-    support(!both || any, "two shapes are tested by Method::Auto and Method::Proximity only");
     support(meshes || continuous || any,
             "Method::Intersection is for two triangle meshes, not for " + nameOf(a.topology.kind) +
                 " and " + nameOf(b.topology.kind) + "; Auto, Proximity and Continuous are");
-    const GeometryKind other = (a.shape ? b : a).topology.kind;
-    support(!tool || !continuous || !tool->isCylinder() || other == GeometryKind::Points,
-            std::string("a cylinder and ") + nameOf(other) +
-                " are tested by Method::Auto and Method::Proximity only");
-    support(!continuous || (a.radii.empty() && b.radii.empty()),
+    support(!continuous || hasContinuous(a, b),
             "Method::Continuous needs one radius for all vertices; Proximity and Auto do not");
   }
 

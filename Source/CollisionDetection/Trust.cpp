@@ -45,10 +45,6 @@ static bool knowsSides(const Geometry& a, const Geometry& b) {
 }
 
 bool hasContinuous(const TriangleMesh& a, const TriangleMesh& b) {
-  if (a.shape && b.shape) return false;
-  const Shape* const shape = a.shape ? &*a.shape : b.shape ? &*b.shape : nullptr;
-  if (shape && shape->isCylinder() && (a.shape ? b : a).topology.kind != GeometryKind::Points)
-    return false;
   return a.radii.empty() && b.radii.empty();
 }
 

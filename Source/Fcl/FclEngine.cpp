@@ -85,6 +85,8 @@ std::string refusal(const Body& a, const Body& b, const PairSettings& settings) 
   if (a.isMesh() != b.isMesh()) return "is asked for two triangle meshes or two shapes only";
   if (a.isMesh() && settings.method != Method::Intersection)
     return "answers triangle meshes by Method::Intersection only";
+  if (!a.isMesh() && settings.method != Method::Proximity)
+    return "answers shapes by Method::Proximity only";
   const auto [lower, higher] = std::minmax({a.kind(), b.kind()});
   if (lower == fcl::GEOM_CONVEX && higher == fcl::GEOM_PLANE)
     return "does not know a hull with a plane of two sides";

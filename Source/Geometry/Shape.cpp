@@ -75,6 +75,9 @@ void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& tran
     m_p0 = transform(p0);
     m_p1 = transform(p1);
     m_radius = radius;
+    const Vector3d along = m_p1 - m_p0;
+    const double square = along.squaredNorm();
+    m_axisSquare = isInRange(square) ? square : along == Vector3d::Zero() ? 0.0 : -1.0;
   };
   const auto body = [&](Kind kind, const Vector3d& origin, const Eigen::Matrix3d& axes,
                         const std::array<double, 2>& sizes) {
@@ -106,6 +109,22 @@ void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& tran
     else
       capsule(origin + m_span.front(), origin + m_span.back(), 0);
   }
+  placeCorners();
+}
+
+void Shape::placeBetween(const Shape& before, const Shape& now, double time) {
+  const auto at = [&](std::size_t end) -> Vector3d {
+    return (1.0 - time) * before.m_corners[end] + time * now.m_corners[end];
+  };
+  const Vector3d axis = at(1) - at(0);
+  m_kind = Kind::Cylinder;
+  m_p0 = m_p1 = at(0) + 0.5 * axis;
+  m_axes = axis == Vector3d::Zero() ? before.m_axes : axesAlong(axis);
+  m_sizes = {before.m_sizes[0], 0.5 * lengthOf(axis)};
+  placeCorners();
+}
+
+void Shape::placeCorners() {
   m_corners = {m_p0, m_p1};
   if (isCylinder()) {
     m_corners = {m_p0 - m_sizes[1] * m_axes.col(2), m_p0 + m_sizes[1] * m_axes.col(2)};
@@ -161,7 +180,14 @@ SignedDistance Shape::at(const Vector3d& x) const {
     return {inBodys.distance, m_axes * inBodys.normal};
   }
   const Vector3d along = m_p1 - m_p0, from = x - m_p0;
-  const auto& [distance, outward] = polar(from - weightOnAxis(from, along) * along);
+  double weight = 0;
+  if (m_axisSquare != 0) {
+    const double product = from.dot(along);
+    weight = m_axisSquare > 0 && std::abs(product) < kOverflowGuard
+                 ? std::clamp(product / m_axisSquare, 0.0, 1.0)
+                 : weightOnAnyAxis(from, along);
+  }
+  const auto& [distance, outward] = polar(from - weight * along);
   const bool onAxis = distance <= kOnSurface * m_magnitude;
   return {distance - m_radius, onAxis ? fromAxis(axisOfLeast(along.cwiseAbs())) : outward};
 }

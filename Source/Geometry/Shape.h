@@ -37,13 +37,11 @@ struct ShapePairDistance {
   Eigen::Vector3d pointA, pointB;  ///< L, on the surfaces
   Eigen::Vector3d normal;          ///< unit, from b towards a
   double distance;                 ///< L: pointA - pointB = distance * normal
+
+  ShapePairDistance exchanged() const { return {pointB, pointA, -normal, distance}; }
 };
 
-/// Scratch, which remembers its peak: a body inside that of all a - b, and the points of a.
-struct ShapePairScratch {
-  Polytope grown;
-  Buffer<Eigen::Vector3d> ofA;
-};
+struct ShapePairScratch;
 
 /// An analytical shape in the world.
 ///
@@ -55,6 +53,8 @@ class Shape {
   Shape(const AnalyticalGeometry&, const RigidTransform&);
   /// The same shape elsewhere.
   void place(const AnalyticalGeometry&, const RigidTransform&);
+  /// A cylinder at a time of a step: a right one between its ends, which move linearly.
+  void placeBetween(const Shape& before, const Shape& now, double time);
 
   SignedDistance at(const Eigen::Vector3d& x) const;
   NearestToShape nearestOfEdge(const Eigen::Vector3d& p, const Eigen::Vector3d& q) const;
@@ -74,6 +74,9 @@ class Shape {
   ///          where they overlap. Difference: one polytope for both, of all points so far, whose
   ///          triangles are kept by exact predicates.
   ShapePairDistance distanceFrom(const Shape& b, ShapePairScratch&) const;
+  /// In some order of all shapes; of two of which neither precedes the other the measures are the
+  /// same.
+  bool precedes(const Shape&) const;
   /// The middle of what of a body but for a capsule's radius is furthest along a direction, from
   /// its origin. tie: L, a difference of heights that is none.
   Eigen::Vector3d support(const Eigen::Vector3d& direction, double tie) const;
@@ -98,8 +101,6 @@ class Shape {
   double magnitude() const { return m_magnitude; }
 
  private:
-  /// In some order of all shapes.
-  bool precedes(const Shape&) const;
   ShapePairDistance planeFrom(const Shape& body) const;
   ShapePairDistance axisFrom(const Shape& body) const;
   ShapePairDistance flatFrom(const Shape&, const Eigen::Vector3d& flat) const;
@@ -113,6 +114,7 @@ class Shape {
   };
   /// tie: lengths on either side of the middle that count as above it.
   Parts partsOf(const Eigen::Vector3d& v, double tie) const;
+  void placeCorners();
   Eigen::Vector3d inBody(const Eigen::Vector3d& x) const;
   /// At a capsule's axis, where every direction across it leads out: one near to the given one.
   Eigen::Vector3d fromAxis(const Eigen::Vector3d& normal) const;
@@ -130,6 +132,7 @@ class Shape {
   Kind m_kind = Kind::Plane;
   Eigen::Vector3d m_p0, m_p1;  ///< a capsule's axis; others: both the body's origin
   double m_radius = 0;         ///< of a capsule
+  double m_axisSquare = 0;     ///< L²: of its length; negative where that leaves double's range
   Eigen::Matrix3d m_axes = Eigen::Matrix3d::Identity();  ///< of the body
   std::array<double, 2> m_sizes{};                       ///< of a cylinder's parts
   std::vector<Eigen::Vector3d> m_span;                   ///< of a hull's points
@@ -138,6 +141,14 @@ class Shape {
   std::vector<Segment> m_edges;
   std::shared_ptr<const Polytope> m_hull;  ///< in its body's frame
   double m_magnitude;
+};
+
+/// Scratch, which remembers its peak: a body inside that of all a - b, and the points of a; and a
+/// shape at a time of the step.
+struct ShapePairScratch {
+  Polytope grown;
+  Buffer<Eigen::Vector3d> ofA;
+  std::optional<Shape> then;
 };
 
 /// Calls f(name, field) for each field of a shape: vectors, doubles, flags and lists of vectors.

@@ -6,7 +6,6 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include <algorithm>
 #include <cmath>
 
 /// Lengths and angles of vectors whose squares may leave the range of double. Where they do not,
@@ -24,22 +23,21 @@ struct LengthAndDirection {
   Eigen::Vector3d direction;  ///< unit; zero if the length is
 };
 
+/// Of a vector of any length; slower.
+LengthAndDirection polarOfAnyLength(const Eigen::Vector3d&);
+
 inline LengthAndDirection polar(const Eigen::Vector3d& v) {
   const double squared = v.squaredNorm();
-  if (isInRange(squared)) {
-    const double length = std::sqrt(squared);
-    return {length, v / length};
-  }
-  const int exponent = exponentTowardsOne(largest(v));
-  const Eigen::Vector3d near = scaled(v, exponent);
-  const double length = near.norm();
-  if (!(length > 0.0)) return {0.0, Eigen::Vector3d::Zero()};
-  return {std::ldexp(length, -exponent), near / length};
+  if (!isInRange(squared)) return polarOfAnyLength(v);
+  const double length = std::sqrt(squared);
+  return {length, v / length};
 }
 
 inline double lengthOf(const Eigen::Vector3d& v) {
   const double squared = v.squaredNorm();
-  return isInRange(squared) ? std::sqrt(squared) : polar(v).length;
+  if (isInRange(squared)) return std::sqrt(squared);
+  // What does not move is common.
+  return v == Eigen::Vector3d::Zero() ? 0.0 : polarOfAnyLength(v).length;
 }
 
 /// Unit; zero of no length.
@@ -48,28 +46,17 @@ inline Eigen::Vector3d directionOf(const Eigen::Vector3d& v) {
   return (isModerate(extent) ? v : scaled(v, exponentTowardsOne(extent))).stableNormalized();
 }
 
+/// Of a . b, which may be anything, a number of the same sign; slower.
+double signedDotOfAny(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
+
 /// a . b, or where that leaves the range of double a number of the same sign.
 inline double signedDot(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   const double product = a.dot(b);
-  if (isInRange(product)) return product;
-  const double ofA = largest(a), ofB = largest(b);
-  if (ofA == 0.0 || ofB == 0.0) return 0.0;
-  return scaled(a, exponentTowardsOne(ofA)).dot(scaled(b, exponentTowardsOne(ofB)));
+  return isInRange(product) ? product : signedDotOfAny(a, b);
 }
 
 /// The weight in [0, 1] of the point on an axis that is nearest to `from`, both seen from the
-/// axis' start; 0 where the axis has no length.
-inline double weightOnAxis(const Eigen::Vector3d& from, const Eigen::Vector3d& along) {
-  double square = along.squaredNorm(), product = from.dot(along);
-  if (!(isInRange(square) && std::abs(product) < kOverflowGuard)) {
-    if (along == Eigen::Vector3d::Zero()) return 0.0;
-    const int exponent = exponentTowardsOne(std::max(largest(from), largest(along)));
-    const Eigen::Vector3d nearAlong = scaled(along, exponent);
-    square = nearAlong.squaredNorm();
-    product = scaled(from, exponent).dot(nearAlong);
-    if (!(square > 0.0)) return 0.0;  // then it is a point beside the distance
-  }
-  return std::clamp(product / square, 0.0, 1.0);
-}
+/// axis' start. Of any vectors; slower than the quotient.
+double weightOnAnyAxis(const Eigen::Vector3d& from, const Eigen::Vector3d& along);
 
 }  // namespace palpate

@@ -76,10 +76,6 @@ class Differences {
 /// Of bodies with a round side that overlap, at most so many points.
 constexpr std::size_t kMostDifferences = 256;
 
-ShapePairDistance exchanged(const ShapePairDistance& d) {
-  return {d.pointB, d.pointA, -d.normal, d.distance};
-}
-
 }  // namespace
 
 Vector3d Shape::support(const Vector3d& direction, double tie) const {
@@ -161,7 +157,8 @@ ShapePairDistance Shape::grownFrom(const Shape& other, ShapePairScratch& scratch
   std::array<Differences::Point, 4> first;
   Vector3d flat;
   if (differences.start(first, flat) < 4) return flatFrom(other, flat);
-  auto& [grown, ofA] = scratch;
+  Polytope& grown = scratch.grown;
+  Buffer<Vector3d>& ofA = scratch.ofA;
   std::array<Vector3d, 4> corners;
   ofA.clear();
   double size = 0;
@@ -212,10 +209,10 @@ ShapePairDistance Shape::axisFrom(const Shape& body) const {
 }
 
 ShapePairDistance Shape::distanceFrom(const Shape& b, ShapePairScratch& scratch) const {
-  if (b.precedes(*this)) return exchanged(b.distanceFrom(*this, scratch));
+  if (b.precedes(*this)) return b.distanceFrom(*this, scratch).exchanged();
   if (isPlane()) return planeFrom(b);
   if (m_kind == Kind::Capsule && b.m_kind == Kind::Capsule && b.m_p0 == b.m_p1)
-    return exchanged(b.axisFrom(*this));
+    return b.axisFrom(*this).exchanged();
   if (m_kind == Kind::Capsule && (b.m_kind == Kind::Capsule || m_p0 == m_p1)) return axisFrom(b);
   return grownFrom(b, scratch);
 }

@@ -1,20 +1,17 @@
 #include "Geometry/ShapeStep.h"
 
+#include "Geometry/ShapeLengths.h"
 #include "Math/Compensated.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
-#include <cmath>
+#include <limits>
 
 namespace palpate {
 
 namespace {
 
 using Eigen::Vector3d;
-
-/// Of the step: parts that are not passed are halved down to this share of the tolerance, so that
-/// what bounds lose on them is within it.
-constexpr double kShareOfTolerance = 0.25;
 
 /// u x v, in Bernstein form.
 template <class Moment>
@@ -38,6 +35,12 @@ bool areBeyond(const std::array<double, size>& heights, double bound, bool eithe
 }
 
 }  // namespace
+
+MovingBody movingBody(const Shape& before, const Shape& now) {
+  MovingBody body{{before.corners(), now.corners()}};
+  (before.isCylinder() ? body.mantle : body.radius) = before.radius();
+  return body;
+}
 
 ShapeStep::Moment ShapeStep::at(const Shape& shape, const Vector3d& point) {
   const Vector3d from = point - shape.origin();
@@ -131,18 +134,80 @@ std::optional<double> ShapeStep::timeNear(const Point& point, double distance,
     const Moment a = between(start, end, from), b = between(start, end, to);
     return m_before.isPlane() ? staysAbove(a, b, is) : staysOutside(a, b, is);
   };
-  double time = 0, part = 1;  // time is a multiple of part, and both are exact
-  while (time < 1) {
-    if (passes(time, time + part)) {
-      time += part;
-      while (part < 1 && std::fmod(time, 2 * part) == 0) part *= 2;
-    } else if (part > kShareOfTolerance * tolerance) {
-      part *= 0.5;
-    } else {
-      return time;
+  return firstNotPassed(tolerance, passes);
+}
+
+/// The side of a plane on which a body is before the step; of a half-space it is always outside.
+double ShapeStep::sideOf(const MovingBody& body) const {
+  return m_before.isTwoSided() && distanceAt(before(body.corners[0][0])).distance < 0 ? -1.0 : 1.0;
+}
+
+std::optional<double> ShapeStep::timeNear(const MovingBody& body, double distance,
+                                          double tolerance) const {
+  double size = 0;
+  for (const auto& corners : body.corners)
+    for (const Vector3d& p : corners) size = std::max(size, largest(p));
+  size += m_before.magnitude() + m_now.magnitude() + (distance + body.radius + body.mantle);
+  const int exponent = isModerate(size) ? 0 : exponentTowardsOne(size);
+  const double side = sideOf(body), mantle = std::ldexp(body.mantle, exponent),
+               needed = std::ldexp(distance + body.radius, exponent),
+               error = kShapeBoundError * std::ldexp(size, exponent);
+  const auto momentOf = [&](std::size_t i, double time) {
+    return between(scaledBy(exponent, before(body.corners[0][i])),
+                   scaledBy(exponent, now(body.corners[1][i])), time);
+  };
+  return firstNotPassed(tolerance, [&](double from, double to) {
+    const Moment first = momentOf(0, from), last = momentOf(0, to);
+    const std::array<Vector3d, 3> n = normalsOf(first, last);
+    const double length =
+        std::sqrt(std::max({n[0].squaredNorm(), n[1].squaredNorm(), n[2].squaredNorm()}));
+    double bound = needed * length + error;
+    if (mantle > 0) {
+      // It reaches as far as the sine between normal and axis, times the normal's length.
+      const Vector3d start = momentOf(1, from).from - first.from,
+                     end = momentOf(1, to).from - last.from;
+      const double shortest = 0.5 * (start + end).norm() - 0.5 * (end - start).norm();
+      const double across =
+          std::sqrt(std::max({n[0].cross(start).squaredNorm(),
+                              ((n[0].cross(end) + 2 * n[1].cross(start)) / 3).squaredNorm(),
+                              ((2 * n[1].cross(end) + n[2].cross(start)) / 3).squaredNorm(),
+                              n[2].cross(end).squaredNorm()}));
+      bound += mantle * (across < length * shortest ? across / shortest : length);
     }
+    for (std::size_t i = 0; i < body.corners[0].size(); ++i)
+      for (const double height : heightsOf(n, momentOf(i, from), momentOf(i, to)))
+        if (!(side * height > bound)) return false;
+    return true;
+  });
+}
+
+ShapePairDistance ShapeStep::at(const MovingBody& body, double time) const {
+  const auto momentOf = [&](std::size_t i) {
+    return between(before(body.corners[0][i]), now(body.corners[1][i]), time);
+  };
+  const Moment any = momentOf(0);
+  Vector3d normal = distanceAt(any).normal;
+  if (normal == Vector3d::Zero()) normal = m_before.axes().col(2);
+  normal *= sideOf(body);
+  const double tie = kOnSurface * (m_before.magnitude() + m_now.magnitude());
+  double lowest = std::numeric_limits<double>::infinity(), count = 0;
+  for (std::size_t i = 0; i < body.corners[0].size(); ++i)
+    lowest = std::min(lowest, dot(normal, momentOf(i).from));
+  Vector3d nearest = Vector3d::Zero();
+  for (std::size_t i = 0; i < body.corners[0].size(); ++i) {
+    const Vector3d from = momentOf(i).from;
+    if (dot(normal, from) <= lowest + tie) nearest += from, ++count;
   }
-  return {};
+  nearest /= count;
+  if (body.mantle > 0) {
+    const Vector3d axis = directionOf(momentOf(1).from - any.from);
+    const LengthAndDirection across = polar(dot(normal, axis) * axis - normal);
+    if (across.length * body.mantle > 0.5 * tie) nearest += body.mantle * across.direction;
+  }
+  const double distance = dot(normal, nearest) - body.radius;
+  const Vector3d point =
+      nearest - body.radius * normal + ((1.0 - time) * m_before.origin() + time * m_now.origin());
+  return {point - distance * normal, point, -normal, distance};
 }
 
 SignedDistance ShapeStep::at(const Point& point, double time) const {

@@ -5,9 +5,43 @@
 #include <Eigen/Geometry>
 
 #include <array>
+#include <cmath>
 #include <optional>
+#include <span>
 
 namespace palpate {
+
+/// A convex body that moves in a step: the hull of corners that move linearly, or a right cylinder
+/// whose ends' centres do; and all that is at most a radius from it.
+struct MovingBody {
+  std::array<std::span<const Eigen::Vector3d>, 2> corners;  ///< L: before and now; or the ends
+  double radius = 0.0;                                      ///< L: of a ball about each point
+  double mantle = 0.0;                                      ///< L: of a cylinder, about its axis
+};
+/// Of any shape but a plane.
+MovingBody movingBody(const Shape& before, const Shape& now);
+
+/// Of the step: parts that are not passed are halved down to this share of the tolerance, so that
+/// what bounds lose on them is within it.
+inline constexpr double kShareOfTolerance = 0.25;
+
+/// Where a step that is passed part by part is held up first; none if it is not.
+/// passes(from, to): whether nothing happens in that part.
+template <class Passes>
+std::optional<double> firstNotPassed(double tolerance, Passes&& passes) {
+  double time = 0, part = 1;  // time is a multiple of part, and both are exact
+  while (time < 1) {
+    if (passes(time, time + part)) {
+      time += part;
+      while (part < 1 && std::fmod(time, 2 * part) == 0) part *= 2;
+    } else if (part > kShareOfTolerance * tolerance) {
+      part *= 0.5;
+    } else {
+      return time;
+    }
+  }
+  return {};
+}
 
 /// A plane or a cylinder that moves in a step, and when points come near to it.
 ///
@@ -30,6 +64,11 @@ class ShapeStep {
   std::optional<double> timeNear(const Point&, double distance, double tolerance) const;
   /// Of it then; of a plane of two sides on the side from where it came.
   SignedDistance at(const Point&, double time) const;
+  /// Of a plane, and a body in place of the point: of a plane of two sides from the side on which
+  /// the body was before the step.
+  std::optional<double> timeNear(const MovingBody&, double distance, double tolerance) const;
+  /// From the body, then. Where several of its points are as near, the middle of them.
+  ShapePairDistance at(const MovingBody&, double time) const;
   /// Of a plane: whether a point that stays in the box may come so near.
   bool mayComeNear(const Eigen::AlignedBox3d&, double distance) const;
 
@@ -50,6 +89,7 @@ class ShapeStep {
   static Moment at(const Shape&, const Eigen::Vector3d& point);
   static Moment between(const Moment&, const Moment&, double time);
   SignedDistance distanceAt(const Moment&) const;
+  double sideOf(const MovingBody&) const;
   bool staysAbove(const Moment&, const Moment&, const Scaled&) const;
   bool staysOutside(const Moment&, const Moment&, const Scaled&) const;
   bool staysFar(const Moment&, const Moment&, const Scaled&) const;

@@ -106,6 +106,7 @@ struct ContactBuffers {
 template <class Lists, class F>
 void forEachTimed(Lists& lists, F&& f) {
   f(lists.vertexTriangle), f(lists.triangleVertex), f(lists.edgeEdge), f(lists.shape);
+  f(lists.shapeShape);
 }
 
 /// Appends the contacts of the candidate triangle pairs. Each contact that the pair's method

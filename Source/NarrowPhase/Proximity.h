@@ -44,16 +44,36 @@ inline bool holdsVertex(const Triangle& triangle, std::uint32_t vertex) {
   return triangle[0] == vertex || triangle[1] == vertex || triangle[2] == vertex;
 }
 
+/// Of a segment {p, q, q} or a point {p, p, p}, some of whose corners and edges are the same, the
+/// first name that the feature has; of a triangle its only name.
+inline TriangleFeature firstNameOf(TriangleFeature feature, const Triangle& corners) {
+  if (corners[1] != corners[2]) return feature;
+  if (corners[0] == corners[1]) return TriangleFeature::CornerA;
+  if (feature == TriangleFeature::EdgeCA) return TriangleFeature::EdgeAB;
+  return feature <= TriangleFeature::CornerB || feature == TriangleFeature::EdgeAB
+             ? feature
+             : TriangleFeature::CornerB;
+}
+
 /// The contact of features that are measured at a time of the step: at its end, or at an impact.
 inline VertexTriangleContact contactOf(std::uint32_t vertex, std::uint32_t triangle,
                                        const Triangle& corners,
                                        const VertexTriangleDistance& answer, double time = 1.0) {
-  return {vertex, triangle, corners, answer.barycentric, answer.normal, answer.distance, time};
+  return {vertex,        triangle,        corners, answer.barycentric,
+          answer.normal, answer.distance, time,    firstNameOf(answer.feature, corners)};
 }
 
 inline EdgeEdgeContact contactOf(const Segment& a, const Segment& b, const EdgeEdgeDistance& answer,
                                  double time = 1.0) {
-  return {a, b, answer.weightA, answer.weightB, answer.normal, answer.distance, time};
+  return {a,
+          b,
+          answer.weightA,
+          answer.weightB,
+          answer.normal,
+          answer.distance,
+          time,
+          answer.featureA,
+          answer.featureB};
 }
 
 }  // namespace palpate

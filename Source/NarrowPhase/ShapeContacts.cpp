@@ -1,13 +1,18 @@
 #include "NarrowPhase/ShapeContacts.h"
 
 #include "NarrowPhase/Continuous.h"
+#include "Geometry/ShapeApproach.h"
 #include "Geometry/ShapeLengths.h"
 #include "Geometry/ShapeStep.h"
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <optional>
+#include <span>
+#include <utility>
 
 namespace palpate {
 
@@ -17,6 +22,22 @@ using Eigen::Vector3d;
 
 using Kind = ImpactQuery::Kind;
 
+/// Of a triangle's edges; at(i): its corners.
+template <class At>
+NearestToShape nearestOnBoundary(const Shape& shape, At&& at) {
+  NearestToShape best{};
+  for (int i = 0; i < 3; ++i) {
+    const NearestToShape edge = shape.nearestOfEdge(at(i), at((i + 1) % 3));
+    if (i > 0 && !(edge.distance < best.distance)) continue;
+    best = edge;
+    best.weights = Vector3d::Zero();
+    best.weights[i] = edge.weights[0];
+    best.weights[(i + 1) % 3] = edge.weights[1];
+    best.inInterior = false;
+  }
+  return best;
+}
+
 /// When elements of a mesh come near to a shape within the step.
 class ShapeImpacts {
  public:
@@ -25,23 +46,30 @@ class ShapeImpacts {
         m_before(pair.shapeBefore()),
         m_now(pair.shape()),
         m_distance(pair.settings.thickness + m_mesh.largestRadius),
+        m_isStill(m_mesh.before.hasSameBody(m_mesh.now) && !m_mesh.now.isPlaced()),
         m_out(out) {
     m_settings.minimumDistance = m_distance + m_before.radius();
     m_settings.tolerance = pair.settings.timeTolerance;
     for (std::uint32_t i = 0; i < m_before.corners().size(); ++i)
       m_motion = std::max(m_motion, motionOf(corner(i)));
-    // A plane turns without end, and with a cylinder's ends its mantle.
-    if (!m_before.hasCorners()) m_motion = std::numeric_limits<double>::infinity();
+    if (m_before.isPlane()) m_motion = std::numeric_limits<double>::infinity();  // it may turn
+    if (m_before.isCylinder())  // its mantle turns with its ends
+      m_motion += (m_now.axes().col(2) - m_before.axes().col(2)).norm() * m_before.radius();
   }
 
   /// L: what distances before the step may be off by, and what the step may take from them.
   std::array<double, 2> slack(ShapeElement element, const Triangle& vertices) const {
-    double size = m_before.magnitude() + m_distance, motion = 0;
+    double size = m_before.magnitude() + m_distance, square = 0;
     for (const std::uint32_t v : vertices) {
       size += m_mesh.before[v].cwiseAbs().maxCoeff();
-      motion = std::max(motion, motionOf(vertex(v)));
+      if (!m_isStill) square = std::max(square, (m_mesh.now[v] - m_mesh.before[v]).squaredNorm());
     }
-    const bool still = element != ShapeElement::Vertex && !m_before.hasCorners();
+    double motion = 0;
+    if (isInRange(square))
+      motion = std::sqrt(square);
+    else if (!m_isStill)
+      for (const std::uint32_t v : vertices) motion = std::max(motion, motionOf(vertex(v)));
+    const bool still = element != ShapeElement::Vertex && m_before.isPlane();
     return {kShapeBoundError * size, still ? 0.0 : motion + m_motion};
   }
 
@@ -49,7 +77,8 @@ class ShapeImpacts {
   /// one of the shape's features; what moves without those is met by vertices first.
   std::optional<ShapeImpact> find(ShapeElement element, const Triangle& vertices) {
     const auto& [a, b, c] = vertices;
-    if (!m_before.hasCorners()) return findOfVertex(a);
+    if (!m_before.hasCorners())
+      return element == ShapeElement::Vertex ? findOfVertex(a) : findOfCylinder(element, vertices);
     m_first.reset();
     m_time = 1.0;
     if (element == ShapeElement::Vertex) {
@@ -72,14 +101,83 @@ class ShapeImpacts {
     return {m_before.corners()[i], m_now.corners()[i]};
   }
   std::optional<ShapeImpact> findOfVertex(std::uint32_t v) {
-    ++m_out.featurePairs;
-    const ShapeStep step(m_before, m_now);
-    const ShapeStep::Point point{m_mesh.before[v], m_mesh.now[v]};
-    const auto time = step.timeNear(point, m_distance, m_settings.tolerance);
+    const auto time = timeOfVertex(v);
     if (!time) return {};
-    const SignedDistance then = step.at(point, *time);
+    const SignedDistance then =
+        ShapeStep(m_before, m_now).at({m_mesh.before[v], m_mesh.now[v]}, *time);
     return ShapeImpact{*time, {Vector3d::UnitX(), then.normal, then.distance, true}};
   }
+  std::optional<double> timeOfVertex(std::uint32_t v) {
+    ++m_out.featurePairs;
+    return ShapeStep(m_before, m_now)
+        .timeNear({m_mesh.before[v], m_mesh.now[v]}, m_distance, m_settings.tolerance);
+  }
+  /// Of an edge or a triangle.
+  std::optional<double> timeOfElement(ShapeElement element, const Triangle& vertices) {
+    const std::size_t size = element == ShapeElement::Edge ? 2 : 3;
+    std::array<std::array<Vector3d, 3>, 2> ends;
+    for (std::size_t i = 0; i < size; ++i)
+      ends[0][i] = m_mesh.before[vertices[i]], ends[1][i] = m_mesh.now[vertices[i]];
+    ShapeApproach approach({{std::span(ends[0]).first(size), std::span(ends[1]).first(size)}},
+                           movingBody(m_before, m_now));
+    ++m_out.featurePairs;
+    const auto time = approach.timeNear(m_distance, m_settings.tolerance);
+    m_out.exactDecisions += approach.exactDecisions();
+    return time;
+  }
+
+  /// An edge or a triangle is a contact where it first comes near, unless what is nearest then is
+  /// on its boundary and a contact itself, no later.
+  std::optional<ShapeImpact> findOfCylinder(ShapeElement element, const Triangle& vertices) {
+    const auto time = timeOfElement(element, vertices);
+    if (!time) return {};
+    std::optional<Shape>& then = m_out.shapePair.then;
+    if (!then) then = m_before;
+    then->placeBetween(m_before, m_now, *time);
+    std::array<Vector3d, 3> x;
+    for (int i = 0; i < 3; ++i)
+      x[i] = (1.0 - *time) * m_mesh.before[vertices[i]] + *time * m_mesh.now[vertices[i]];
+    ShapeImpact impact{*time, element == ShapeElement::Edge ? then->nearestOfEdge(x[0], x[1])
+                                                            : nearestOfTriangle(*then, x)};
+    NearestToShape& nearest = impact.nearest;
+    m_out.exactDecisions += nearest.exact;
+    if (!nearest.inInterior && boundaryIsNear(vertices, nearest.weights, *time)) return {};
+    moveInside(element, nearest);
+    return impact;
+  }
+
+  static NearestToShape nearestOfTriangle(const Shape& shape, const std::array<Vector3d, 3>& x) {
+    if (const auto inside = shape.nearestInTriangle(x[0], x[1], x[2])) return *inside;
+    return nearestOnBoundary(shape, [&](int i) { return x[i]; });
+  }
+
+  /// Whether what holds the point of these weights is near the shape at this time, or was before.
+  bool boundaryIsNear(const Triangle& vertices, const Vector3d& weights, double time) {
+    std::array<std::uint32_t, 3> held{};
+    std::size_t count = 0;
+    for (int i = 0; i < 3; ++i)
+      if (weights[i] > 0 && (count == 0 || held[count - 1] != vertices[i]))
+        held[count++] = vertices[i];
+    if (count > 2) return false;
+    const auto first = count == 1 ? timeOfVertex(held[0])
+                                  : timeOfElement(ShapeElement::Edge, {std::min(held[0], held[1]),
+                                                                       std::max(held[0], held[1]),
+                                                                       std::max(held[0], held[1])});
+    return first && *first <= time;
+  }
+
+  /// So that weights say which element it is.
+  static void moveInside(ShapeElement element, NearestToShape& nearest) {
+    const int size = element == ShapeElement::Edge ? 2 : 3;
+    Vector3d& weights = nearest.weights;
+    if (weights.head(size).minCoeff() > 0) return;
+    int most = 0;
+    weights.head(size).maxCoeff(&most);
+    for (int i = 0; i < size; ++i) weights[i] = std::max(weights[i], kEdgeWeight);
+    weights[most] = 1.0 - weights[(most + 1) % size] - (size > 2 ? weights[(most + 2) % size] : 0);
+    nearest.inInterior = true;
+  }
+
   static double motionOf(const ImpactQuery::Step& step) { return lengthOf(step.now - step.before); }
 
   void ask(const ImpactQuery& query) {
@@ -120,6 +218,7 @@ class ShapeImpacts {
   const TriangleMesh& m_mesh;
   const Shape &m_before, &m_now;
   const double m_distance;  ///< L: with the mesh's radius
+  const bool m_isStill;     ///< no vertex of the mesh moves
   ContactBuffers& m_out;
   TimeOfImpactSettings m_settings;
   double m_motion = 0;  ///< L: of the shape's points at most
@@ -203,19 +302,9 @@ class ShapeContactFinder {
   }
 
   NearestToShape nearestOfTriangle(const Triangle& corners) const {
-    const auto at = [&](int i) -> Vector3d { return m_positions[corners[i % 3]]; };
+    const auto at = [&](int i) -> Vector3d { return m_positions[corners[i]]; };
     if (const auto inside = m_shape.nearestInTriangle(at(0), at(1), at(2))) return *inside;
-    NearestToShape best{};
-    for (int i = 0; i < 3 && (!m_distinct || m_continuous); ++i) {
-      const NearestToShape edge = m_shape.nearestOfEdge(at(i), at(i + 1));
-      if (i > 0 && !(edge.distance < best.distance)) continue;
-      best = edge;
-      best.weights = Vector3d::Zero();
-      best.weights[i] = edge.weights[0];
-      best.weights[(i + 1) % 3] = edge.weights[1];
-      best.inInterior = false;
-    }
-    return best;
+    return m_distinct && !m_continuous ? NearestToShape{} : nearestOnBoundary(m_shape, at);
   }
 
   void add(ShapeElement element, std::uint32_t id, const Triangle& vertices,
@@ -254,14 +343,50 @@ void findShapeContacts(const MeshPair& pair, std::span<const std::uint32_t> prim
   for (const std::uint32_t primitive : primitives) finder.test(primitive);
 }
 
+namespace {
+
+/// When two shapes come near each other within the step, by one order of the two whatever the
+/// pair's.
+void findShapeImpact(const MeshPair& pair, ContactBuffers& out) {
+  const TriangleMesh *a = &pair.a, *b = &pair.b;
+  const bool exchanged =
+      b->shapeBefore->precedes(*a->shapeBefore) ||
+      (!a->shapeBefore->precedes(*b->shapeBefore) && b->shape->precedes(*a->shape));
+  if (exchanged) std::swap(a, b);
+  const auto [method, thickness, contacts, tolerance, rest, timeTolerance] = pair.settings;
+  const MovingBody body = movingBody(*b->shapeBefore, *b->shape);
+  std::optional<double> time;
+  ShapePairDistance then{};
+  if (a->shape->isPlane()) {
+    const ShapeStep step(*a->shapeBefore, *a->shape);
+    time = step.timeNear(body, thickness, timeTolerance);
+    if (time) then = step.at(body, *time);
+  } else {
+    ShapeApproach approach(movingBody(*a->shapeBefore, *a->shape), body);
+    time = approach.timeNear(thickness, timeTolerance);
+    if (time && *time > 0) then = approach.nearestAt(*time);
+    out.exactDecisions += approach.exactDecisions();
+  }
+  if (!time) return;
+  if (*time == 0) then = a->shapeBefore->distanceFrom(*b->shapeBefore, out.shapePair);
+  if (exchanged) then = then.exchanged();
+  out.shapeShape.push_back({then.pointA, then.pointB, then.normal, then.distance, *time});
+}
+
+}  // namespace
+
 void findShapePair(const MeshPair& pair, ContactBuffers& out) {
   const std::size_t before = out.shapePair.grown.exactDecisions();
-  const auto [pointA, pointB, normal, distance] =
-      pair.a.shape->distanceFrom(*pair.b.shape, out.shapePair);
-  out.exactDecisions += out.shapePair.grown.exactDecisions() - before;
   ++out.featurePairs;
-  if (distance <= pair.settings.thickness)
-    out.shapeShape.push_back({pointA, pointB, normal, distance});
+  if (pair.settings.method == Method::Continuous) {
+    findShapeImpact(pair, out);
+  } else {
+    const auto [pointA, pointB, normal, distance] =
+        pair.a.shape->distanceFrom(*pair.b.shape, out.shapePair);
+    if (distance <= pair.settings.thickness)
+      out.shapeShape.push_back({pointA, pointB, normal, distance});
+  }
+  out.exactDecisions += out.shapePair.grown.exactDecisions() - before;
 }
 
 }  // namespace palpate

@@ -33,6 +33,7 @@ Row rowOf(const VertexTriangleContact& c) {
   append(row, c.normal);
   append(row, c.distance);
   append(row, c.timeOfImpact);
+  row.push_back(static_cast<std::uint64_t>(c.feature));
   return row;
 }
 
@@ -43,6 +44,8 @@ inline Row rowOf(const EdgeEdgeContact& c) {
   append(row, c.normal);
   append(row, c.distance);
   append(row, c.timeOfImpact);
+  row.push_back(static_cast<std::uint64_t>(c.featureA));
+  row.push_back(static_cast<std::uint64_t>(c.featureB));
   return row;
 }
 

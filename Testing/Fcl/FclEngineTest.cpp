@@ -139,7 +139,8 @@ TEST(FclEngine, WhatFclCannotIsRefusedByName) {
   refuse(box, plane, {Method::Proximity, 0.1}, "the thickness must be 0");
   refuse(box, hull, {Method::Proximity, 0.1}, "the thickness must be 0");
   refuse(plane, twoSided, {Method::Proximity}, "two planes have no distance");
-  refuse(box, hull, {Method::Intersection}, "Method::Proximity only");
+  for (const Method method : {Method::Auto, Method::Intersection, Method::Continuous})
+    refuse(box, hull, {method}, "pair (2, 3): FCL answers shapes by Method::Proximity only");
   EXPECT_TRUE(engine.pairs().empty());
 }
 

@@ -64,6 +64,7 @@ class Law {
     for (const auto& c : m_data.triangleVertex()) expectVertexTriangle(c, m_b, m_a);
     for (const auto& c : m_data.edgeEdge()) expectEdges(c);
     for (const auto& c : m_data.shape()) expectShape(c, m_a.now.empty() ? m_b : m_a);
+    for (const auto& c : m_data.shapeShape()) expectShapes(c);
     const bool any = !m_data.vertexTriangle().empty() || !m_data.triangleVertex().empty() ||
                      !m_data.edgeEdge().empty() || !m_data.shape().empty() ||
                      !m_data.shapeShape().empty();
@@ -141,6 +142,7 @@ class Law {
   void expectVertexTriangle(const VertexTriangleContact& c, const Side& vertices,
                             const Side& triangles) {
     expectSum(c, {&vertices, &triangles, &triangles, &triangles});
+    expectFeature(c);
     const auto at = [&](int i) { return triangles.at(c.corners[i], c.timeOfImpact); };
     const WideVector u = at(1) - at(0), v = at(2) - at(0), winding = cross(u, v);
     const Wide sine = winding.norm();
@@ -171,8 +173,46 @@ class Law {
   }
   bool hasRadii() const { return m_a.radius(0) > 0 || m_b.radius(0) > 0; }
 
+  /// The closest point is a sum of the vertices of the feature that the contact names, of no fewer.
+  void expectFeature(const VertexTriangleContact& c) {
+    const int feature = static_cast<int>(c.feature);
+    std::map<std::uint32_t, double> weights;
+    for (int i = 0; i < 3; ++i) weights[c.corners[i]] += c.barycentric[i];
+    for (const auto& [vertex, weight] : weights) {
+      bool isOfFeature = c.feature == TriangleFeature::Face;
+      if (feature < 3) isOfFeature = vertex == c.corners[feature];
+      if (feature >= 3 && feature < 6)
+        isOfFeature = vertex == c.corners[feature - 3] || vertex == c.corners[(feature - 2) % 3];
+      expectWeight(weight, isOfFeature);
+    }
+    if (c.corners[1] == c.corners[2]) {
+      EXPECT_TRUE(feature <= 1 || c.feature == TriangleFeature::EdgeAB);
+      m_seen.add("of a segment");
+    }
+    if (c.corners[0] == c.corners[1]) {
+      EXPECT_EQ(c.feature, TriangleFeature::CornerA);
+    }
+    m_seen.add(feature < 3 ? "at a corner" : feature < 6 ? "at an edge" : "at a face");
+  }
+  void expectFeature(EdgeFeature feature, double weight) {
+    expectWeight(1 - weight, feature != EdgeFeature::End);
+    expectWeight(weight, feature != EdgeFeature::Start);
+    m_seen.add(feature == EdgeFeature::Interior ? "within an edge" : "at an edge's end");
+  }
+  /// Features are decided exactly, weights are rounded: one within the last place of 0 or 1 may be
+  /// 0 though the feature has the vertex.
+  void expectWeight(double weight, bool isOfFeature) {
+    if (!isOfFeature) {
+      EXPECT_EQ(weight, 0.0);
+    } else if (weight == 0.0) {
+      m_seen.add("weight rounded to 0");
+    }
+  }
+
   void expectEdges(const EdgeEdgeContact& c) {
     expectSum(c, {&m_a, &m_a, &m_b, &m_b});
+    expectFeature(c.featureA, c.weightA);
+    expectFeature(c.featureB, c.weightB);
     m_seen.add("edges");
     if (c.distance != 0 || hasRadii()) return;
     const auto direction = [&](const Side& side, const std::array<std::uint32_t, 2>& edge) {
@@ -201,6 +241,14 @@ class Law {
                (c.distance + radius) * c.normal.cast<Wide>())
                   .norm(),
               0x1p-48L * size);
+  }
+
+  void expectShapes(const ShapeShapeContact& c) {
+    m_seen.add("two shapes");
+    expectTime(c.timeOfImpact);
+    EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);
+    EXPECT_LE((c.pointA - c.pointB - c.distance * c.normal).norm(),
+              0x1p-48 * (1 + c.pointA.norm() + c.pointB.norm()));
   }
 
   const CollisionData& m_data;
@@ -362,6 +410,12 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
   for (const Method method : {Method::Proximity, Method::Continuous}) {
     EXPECT_GT(count(method, method, "edges"), 1000u);
     EXPECT_GT(count(method, method, "shape"), 1000u);
+    EXPECT_GT(count(method, method, "two shapes"), 50u);
+    for (const char* what : {"at a corner", "at an edge", "at a face", "of a segment"})
+      EXPECT_GT(count(method, method, what), 100u) << what;
+    for (const char* what : {"within an edge", "at an edge's end"})
+      EXPECT_GT(count(method, method, what), 100u) << what;
+    EXPECT_EQ(count(method, method, "weight rounded to 0"), 0u);
   }
   for (const Method method :
        {Method::Intersection, Method::Proximity, Method::Continuous, Method::Auto})

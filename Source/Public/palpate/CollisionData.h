@@ -1,5 +1,6 @@
 #pragma once
 
+#include <palpate/Distance.h>
 #include <palpate/Export.h>
 #include <palpate/Types.h>
 #include <palpate/Validity.h>
@@ -43,6 +44,9 @@ struct VertexTriangleContact {
   Eigen::Vector3d normal;
   double distance;      ///< L, less the radii, at timeOfImpact; sign: see above
   double timeOfImpact;  ///< [0, 1] of the step; 1 for methods that look at its end
+  /// What holds the closest point at that time, decided exactly: Face, an edge or a corner. Of a
+  /// segment EdgeAB, CornerA or CornerB, of a point CornerA.
+  TriangleFeature feature = TriangleFeature::Face;
   friend bool operator==(const VertexTriangleContact&, const VertexTriangleContact&) = default;
 };
 
@@ -52,6 +56,8 @@ struct EdgeEdgeContact {
   double weightA, weightB;                    ///< closest point = p0 + weight (p1 - p0)
   Eigen::Vector3d normal;                     ///< unit, from b towards a
   double distance, timeOfImpact;              ///< L, negative by radii only; as above
+  /// What holds each closest point at that time, decided exactly: the interior or an end.
+  EdgeFeature featureA = EdgeFeature::Interior, featureB = EdgeFeature::Interior;
   friend bool operator==(const EdgeEdgeContact&, const EdgeEdgeContact&) = default;
 };
 
@@ -68,17 +74,18 @@ struct ShapeContact {
   Eigen::Vector3d pointOnShape;  ///< L
   Eigen::Vector3d normal;        ///< unit, out of the shape, towards the element
   double distance;               ///< L, less the element's radius; negative: as deep inside
-  double timeOfImpact = 0.0;     ///< [0, 1] of the step, and all else then; 1 for Proximity
+  double timeOfImpact = 1.0;     ///< [0, 1] of the step, and all else then; 1 for Proximity
   friend bool operator==(const ShapeContact&, const ShapeContact&) = default;
 };
 
 /// Two analytical shapes where they are nearest, or, if they overlap, where they leave each other
-/// by the shortest way.
+/// by the shortest way; with Method::Continuous at the time at which they first come near enough.
 struct ShapeShapeContact {
   Eigen::Vector3d pointA, pointB;  ///< L, on the surfaces of the first and of the second
   Eigen::Vector3d normal;          ///< unit, from b towards a
   /// L: pointA - pointB is the normal times this; negative: moved so far along it a just touches b
   double distance;
+  double timeOfImpact = 1.0;  ///< [0, 1] of the step, and all else then; 1 for Proximity
   friend bool operator==(const ShapeShapeContact&, const ShapeShapeContact&) = default;
 };
 
@@ -137,14 +144,14 @@ class PALPATE_EXPORT CollisionData {
   std::span<const ShapeContact> shape() const { return m_contents.shape; }
   /// Of two analytical shapes: one, if they are at most the thickness apart.
   std::span<const ShapeShapeContact> shapeShape() const { return m_contents.shapeShape; }
-  /// Infinity if there is no contact; 1 for contacts of methods that look at the step's end, two
-  /// shapes' among them.
+  /// Infinity if there is no contact. Contacts of methods that look at the step's end have 1.
   double earliestTimeOfImpact() const;
 
   /// Whether to believe it.
   const Validity& validity() const { return m_contents.validity; }
 
-  /// Same answer, same bits, same hash: over ids, weights, normals, distances and times, in order.
+  /// Same answer, same bits, same hash: over ids, weights, normals, distances, times and features,
+  /// in order.
   std::uint64_t hash() const;
 
   /// For the engine that fills it.

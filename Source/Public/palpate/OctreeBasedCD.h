@@ -74,8 +74,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, double radius = 0.0);
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
   /// A tool, a needle's tip, a table: placed by setTransform(). Meets triangles, lines and points
-  /// by Method::Auto, Proximity and Continuous, cylinders by the last points only, in
-  /// CollisionData::shape(); and other shapes, in shapeShape(). The thickness may be 0.
+  /// in CollisionData::shape(), and other shapes in shapeShape(), each by Method::Auto, Proximity
+  /// and Continuous. The thickness may be 0.
   ///
   ///   const GeometryId tool = detection.addAnalyticalGeometry(Capsule{{0, 0, 0}, {0, 0,
   ///   80}, 2.5}); detection.addCollisionPair(organ, tool, {Method::Proximity, 0.5});

@@ -255,8 +255,8 @@ TEST(ShapePairs, BadInputIsRefusedByName) {
   };
   refuse(box, box, Method::Proximity, "pair (0, 0): a shape does not meet itself");
   refuse(plane, other, Method::Proximity, "pair (1, 2): two planes have no distance");
-  for (const Method method : {Method::Intersection, Method::Continuous})
-    refuse(box, plane, method, "Method::Proximity only");
+  refuse(plane, other, Method::Continuous, "pair (1, 2): two planes have no distance");
+  refuse(box, plane, Method::Intersection, "a shape and a shape; Auto, Proximity and Continuous");
 }
 
 TEST(ShapePairs, CapturesHoldThem) {

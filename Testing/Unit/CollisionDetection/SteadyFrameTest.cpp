@@ -1,6 +1,7 @@
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/StepGuard.h>
 
+#include "Common/ShapeTruth.h"
 #include "Common/Solids.h"
 #include "Scenes.h"
 
@@ -182,6 +183,46 @@ TEST(SteadyFrame, AllocatesNothingWithShapes) {
   }
   EXPECT_EQ(allocations - before, 0u);
   EXPECT_GT(contacts, 1000u);
+}
+
+/// Frames of every two shapes, and of cylinders with triangles and lines, by Method::Continuous.
+TEST(SteadyFrame, AllocatesNothingWithStepsOfShapes) {
+  using namespace testing;
+  const IntegersApart integers;
+  Random random(2);
+  const Mesh tissue = soup(random, 40, 0.3);
+  OctreeBasedCD collisions(Settings{.threads = 1});
+  const GeometryId mesh = collisions.addTriangleMesh(tissue.positions, tissue.triangles);
+  std::vector<Segment> segments;
+  for (std::uint32_t v = 1; v < 60; ++v) segments.push_back({v - 1, v});
+  const GeometryId line = collisions.addLineMesh(tissue.positions, segments, 0.01);
+  std::vector<GeometryId> tools;
+  ConvexHull hull;
+  for (int i = 0; i < 12; ++i) hull.points.push_back(randomPoint(random, -0.2, 0.2));
+  for (const AnalyticalGeometry& shape : std::vector<AnalyticalGeometry>{
+           Sphere{{0, 0, 0}, 0.2}, Capsule{{-0.2, 0, 0}, {0.2, 0, 0}, 0.1}, Plane{},
+           Box{{0, 0, 0}, {0.1, 0.2, 0.3}}, Cylinder{{0, 0, -0.2}, {0, 0, 0.2}, 0.1}, hull}) {
+    const GeometryId tool = collisions.addAnalyticalGeometry(shape);
+    for (const GeometryId other : tools)
+      collisions.addCollisionPair(other, tool, {Method::Continuous, 0.01});
+    tools.push_back(tool);
+    if (!std::holds_alternative<Cylinder>(shape)) continue;
+    collisions.addCollisionPair(mesh, tool, {Method::Continuous, 0.01});
+    collisions.addCollisionPair(line, tool, {Method::Continuous, 0.01});
+  }
+  std::size_t contacts = 0, before = 0;
+  for (int pass = 0; pass < 3; ++pass) {
+    Random same(3);
+    if (pass == 2) before = allocations;
+    for (int frame = 0; frame < 12; ++frame) {
+      for (const GeometryId tool : tools)
+        collisions.setTransform(tool, randomTurn(same), randomPoint(same, 0, 1));
+      collisions.detectCollision();
+      if (pass == 2) contacts += collisions.statistics().contacts;
+    }
+  }
+  EXPECT_EQ(allocations - before, 0u);
+  EXPECT_GT(contacts, 100u);
 }
 
 /// Axes parallel to each other: exact arithmetic has its integers, and tells how often it was
