@@ -1,11 +1,80 @@
 #include "Claims.h"
 
 #include <algorithm>
+#include <initializer_list>
 #include <iterator>
 
 namespace palpate::accuracy {
 
-Incidence::Incidence(const std::vector<Triangle>& triangles) {
+namespace {
+
+Held heldBy(std::initializer_list<std::uint32_t> vertices) {
+  Held held{};
+  std::copy(vertices.begin(), vertices.end(), held.begin());
+  std::sort(held.begin(), held.begin() + static_cast<std::ptrdiff_t>(vertices.size()));
+  std::fill(held.begin() + static_cast<std::ptrdiff_t>(vertices.size()), held.end(),
+            held[vertices.size() - 1]);
+  return held;
+}
+
+Held heldBy(const VertexTriangleContact& contact) {
+  const auto& [p, q, r] = contact.corners;
+  const int feature = static_cast<int>(contact.feature);
+  if (contact.feature == TriangleFeature::Face) return heldBy({p, q, r});
+  if (feature < 3) return heldBy({contact.corners[feature]});
+  return heldBy({contact.corners[feature - 3], contact.corners[(feature - 2) % 3]});
+}
+
+Held heldBy(const std::array<std::uint32_t, 2>& edge, EdgeFeature feature) {
+  if (feature == EdgeFeature::Interior) return heldBy({edge[0], edge[1]});
+  return heldBy({edge[feature == EdgeFeature::End]});
+}
+
+std::vector<Held> featuresOf(std::uint32_t vertex) { return {heldBy({vertex})}; }
+std::vector<Held> featuresOf(std::uint32_t p, std::uint32_t q) {
+  return {heldBy({p}), heldBy({q}), heldBy({p, q})};
+}
+std::vector<Held> featuresOf(const Triangle& t) {
+  return {heldBy({t[0]}),
+          heldBy({t[1]}),
+          heldBy({t[2]}),
+          heldBy({t[0], t[1]}),
+          heldBy({t[1], t[2]}),
+          heldBy({t[2], t[0]}),
+          heldBy({t[0], t[1], t[2]})};
+}
+
+}  // namespace
+
+Substitutes::Substitutes(const Claims& said) {
+  if (!said.distinct) return;
+  for (const Claim& claim : said.claims) {
+    if (!(claim.time < 1)) continue;
+    const auto [entry, isNew] = m_byHeld.try_emplace(claim.held, &claim);
+    if (!isNew && claim.time < entry->second->time) entry->second = &claim;
+  }
+}
+
+const Claim* Substitutes::find(const FeaturePair& pair, const Incidence& a,
+                               const Incidence& b) const {
+  if (m_byHeld.empty()) return nullptr;
+  using Kind = FeaturePair::Kind;
+  const auto& [i, j, k, l] = pair.ids;
+  std::vector<Held> ofA, ofB;
+  if (pair.kind == Kind::VertexTriangle) ofA = featuresOf(i), ofB = featuresOf(b.corners(j));
+  if (pair.kind == Kind::TriangleVertex) ofA = featuresOf(a.corners(i)), ofB = featuresOf(j);
+  if (pair.kind == Kind::EdgeEdge) ofA = featuresOf(i, j), ofB = featuresOf(k, l);
+  const Claim* first = nullptr;
+  for (const Held& p : ofA)
+    for (const Held& q : ofB) {
+      const auto found = m_byHeld.find({p, q});
+      if (found != m_byHeld.end() && (!first || found->second->time < first->time))
+        first = found->second;
+    }
+  return first;
+}
+
+Incidence::Incidence(const std::vector<Triangle>& triangles) : m_triangles(triangles) {
   for (std::uint32_t t = 0; t < triangles.size(); ++t)
     for (const std::uint32_t vertex : triangles[t]) {
       if (m_byVertex.size() <= vertex) m_byVertex.resize(vertex + 1);
@@ -44,17 +113,19 @@ void addClaims(const CollisionData& data, double from, double to, Claims& out) {
   using Kind = FeaturePair::Kind;
   // Where triangles intersect, contacts of the step's end are Intersection's.
   const bool intersects = data.validity().thickness == 0.0 && !data.intersectingTriangles().empty();
-  const auto add = [&](const FeaturePair& features, const auto& contact, double side) {
+  const auto add = [&](const FeaturePair& features, const auto& contact, double side,
+                       const std::array<Held, 2>& held) {
     const double part = contact.timeOfImpact;
     out.claims.push_back({features, side * contact.normal, contact.distance,
-                          (1 - part) * from + part * to, intersects && part == 1});
+                          (1 - part) * from + part * to, intersects && part == 1, held});
   };
   for (const auto& c : data.vertexTriangle())
-    add({Kind::VertexTriangle, {c.vertex, c.triangle}}, c, 1);
+    add({Kind::VertexTriangle, {c.vertex, c.triangle}}, c, 1, {heldBy({c.vertex}), heldBy(c)});
   for (const auto& c : data.triangleVertex())
-    add({Kind::TriangleVertex, {c.triangle, c.vertex}}, c, -1);
+    add({Kind::TriangleVertex, {c.triangle, c.vertex}}, c, -1, {heldBy(c), heldBy({c.vertex})});
   for (const auto& c : data.edgeEdge())
-    add({Kind::EdgeEdge, {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]}}, c, 1);
+    add({Kind::EdgeEdge, {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]}}, c, 1,
+        {heldBy(c.edgeA, c.featureA), heldBy(c.edgeB, c.featureB)});
   out.trusted = out.trusted.value_or(true) && data.validity().trusted;
   const auto triangles = data.intersectingTriangles();
   out.triangles.insert(out.triangles.end(), triangles.begin(), triangles.end());

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -19,6 +20,9 @@ struct FeaturePair {
   friend auto operator<=>(const FeaturePair&, const FeaturePair&) = default;
 };
 
+/// A vertex, an edge or a triangle by its vertices, ascending, the last one repeated.
+using Held = std::array<std::uint32_t, 3>;
+
 /// What a method says of two features.
 struct Claim {
   FeaturePair features;
@@ -26,6 +30,8 @@ struct Claim {
   double distance;         ///< L; negative: depth
   double time;             ///< of the step, that this is said of
   bool example = false;    ///< of triangles that intersect and are named themselves
+  /// What holds the two closest points, in the first mesh and in the second.
+  std::array<Held, 2> held{};
 };
 
 /// What a method says of a step, in any order.
@@ -33,6 +39,7 @@ struct Claims {
   std::vector<Claim> claims;
   std::vector<TrianglePair> triangles;  ///< said to touch, besides those that hold the features
   bool ofTriangles = false;             ///< all of its features are examples
+  bool distinct = false;                ///< impacts of the same closest features are said once
   std::optional<bool> trusted;          ///< its own word on this answer, if it has one
 };
 
@@ -42,12 +49,28 @@ class Incidence {
   explicit Incidence(const std::vector<Triangle>& triangles);
   std::vector<std::uint32_t> holding(std::uint32_t vertex) const { return m_byVertex[vertex]; }
   std::vector<std::uint32_t> holding(std::uint32_t p, std::uint32_t q) const;
+  const Triangle& corners(std::uint32_t triangle) const { return m_triangles[triangle]; }
   /// Every pair of triangles that touch where these features touch.
   static void addTriangles(const FeaturePair&, const Incidence& a, const Incidence& b,
                            std::vector<TrianglePair>& out);
 
  private:
   std::vector<std::vector<std::uint32_t>> m_byVertex;
+  std::vector<Triangle> m_triangles;
+};
+
+/// Which claim stands for an impact that is not claimed itself, where impacts of the same closest
+/// features are said once.
+class Substitutes {
+ public:
+  /// Those of `distinct` claims within the step; the claims must outlive this.
+  explicit Substitutes(const Claims&);
+  /// The first claim in time whose closest features belong to these elements; null if there is
+  /// none. It stands for an impact that is not earlier.
+  const Claim* find(const FeaturePair&, const Incidence& a, const Incidence& b) const;
+
+ private:
+  std::map<std::array<Held, 2>, const Claim*> m_byHeld;
 };
 
 void sortUnique(std::vector<TrianglePair>&);

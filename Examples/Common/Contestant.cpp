@@ -17,7 +17,8 @@ class PalpateRun : public Run {
         m_claims(scene.pairs.size()),
         m_last(start),
         m_substeps(substeps),
-        m_method(pairSettings.method) {
+        m_method(pairSettings.method),
+        m_distinct(pairSettings.contacts == Contacts::Distinct) {
     for (std::size_t m = 0; m < start.size(); ++m)
       m_ids.push_back(m_detection.addTriangleMesh(start[m], scene.meshes[m].triangles));
     for (const auto& [a, b] : m_pairs)
@@ -30,6 +31,7 @@ class PalpateRun : public Run {
     double milliseconds = 0;
     Claims none;
     none.ofTriangles = m_method == Method::Intersection;
+    none.distinct = m_distinct && (m_method == Method::Auto || m_method == Method::Continuous);
     m_claims.assign(m_pairs.size(), none);
     for (int i = 1; i <= m_substeps; ++i) {
       const double t = static_cast<double>(i) / m_substeps;
@@ -68,6 +70,7 @@ class PalpateRun : public Run {
   Positions m_last, m_between;
   int m_substeps;
   Method m_method;
+  bool m_distinct;
 };
 
 /// What is given to the library besides the pair's method.

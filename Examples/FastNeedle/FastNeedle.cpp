@@ -87,7 +87,9 @@ class FastNeedle : public LiveScene {
       return (p - centre).head<2>().lpNorm<Eigen::Infinity>() > 0.999 * kHalfWidth;
     });
     m_world.addStiffness(lane.membrane, 1e-5, 1e-3);
-    m_world.addPair(lane.needle, lane.membrane, {.method = method, .thickness = kThickness},
+    // Contacts are found once in a step: rows for all of them.
+    m_world.addPair(lane.needle, lane.membrane,
+                    {.method = method, .thickness = kThickness, .contacts = Contacts::All},
                     kThickness);
     if (method != Method::Proximity) {
       m_world.addGuard(lane.needle, lane.membrane);

@@ -32,14 +32,16 @@ std::multimap<TrianglePair, const Impact*> byTriangles(const Truth& truth, const
   return all;
 }
 
-bool isWrong(const Truth& truth, const Claims& said, const std::map<FeaturePair, Claim>& claims) {
-  if (said.ofTriangles) return said.triangles.empty() && !truth.touching.empty();
-  for (const auto& [features, impact] : truth.impacts) {
-    const auto claim = claims.find(features);
-    if (claim == claims.end()) return true;
-    if (impact && claim->second.normal.dot(impact->normal) < 0) return true;
-  }
-  return false;
+/// The claim about features that touch, or the one that stands for it; null if there is none.
+const Claim* claimOf(const FeaturePair& features, const std::optional<Impact>& impact,
+                     const std::map<FeaturePair, Claim>& claims, const Substitutes& substitutes,
+                     const Incidence& a, const Incidence& b) {
+  const auto claim = claims.find(features);
+  if (claim != claims.end()) return &claim->second;
+  const Claim* substitute = substitutes.find(features, a, b);
+  constexpr double kTimeError = 1e-12;  // of the truth and of rounding
+  return substitute && impact && substitute->time > impact->time + kTimeError ? nullptr
+                                                                              : substitute;
 }
 
 }  // namespace
@@ -58,17 +60,22 @@ void Score::add(const Truth& truth, const Claims& said, const Incidence& a, cons
     if (!isNew && claim.time < entry->second.time) entry->second = claim;
   }
   claims += first.size();
+  const Substitutes substitutes(said);
+  std::vector<TrianglePair> touching = said.triangles;
+  bool wrong = said.ofTriangles && said.triangles.empty() && !truth.touching.empty();
+  for (const auto& [features, impact] : truth.impacts) {
+    const Claim* claim = claimOf(features, impact, first, substitutes, a, b);
+    // Of features that do touch in the step every triangle that holds them is found.
+    if (claim) Incidence::addTriangles(features, a, b, touching);
+    if (!said.ofTriangles) wrong |= !claim || (impact && claim->normal.dot(impact->normal) < 0);
+  }
   if (said.trusted) {
-    const bool wrong = isWrong(truth, said, first);
     ++m_judged;
     silentFailures += wrong && *said.trusted;
     m_falseAlarms += !wrong && !*said.trusted;
   }
-  std::vector<TrianglePair> touching = said.triangles;
   for (const auto& [features, claim] : first)
-    // Of features that do touch in the step every triangle that holds them is found.
-    if (!claim.example || truth.impacts.contains(features))
-      Incidence::addTriangles(features, a, b, touching);
+    if (!claim.example) Incidence::addTriangles(features, a, b, touching);
   sortUnique(touching);
   m_touching += truth.touching.size();
   m_claimed += touching.size();

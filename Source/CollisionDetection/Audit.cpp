@@ -4,6 +4,7 @@
 
 #include "CollisionDetection/FirstImpacts.h"
 #include "CollisionDetection/Order.h"
+#include "NarrowPhase/Continuous.h"
 
 #include <algorithm>
 #include <array>
@@ -148,12 +149,35 @@ void dropWhatOthersStandFor(const MeshPair& meshes, const CollisionData& answer,
   note(answer.triangleVertex(), 1);
   note(answer.edgeEdge(), 2);
   forEachImpactList(expected, note);
+  const auto isDropped = [&](const auto& contact, int list) {
+    const auto features = featuresOf(contact, list);
+    const auto place = features ? first.find(*features) : first.end();
+    return place != first.end() && contact.timeOfImpact < end &&
+           place->second < rankOf(contact, list);
+  };
+  // Auto may answer by its impact what brute force finds at the step's end, and drop that.
+  const auto isDroppedImpact = [&](const auto& contact, int list) {
+    if (contact.timeOfImpact < end) return false;
+    ContactBuffers impact;
+    if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>) {
+      const Features<ImpactQuery::Kind::EdgeEdge> features{meshes.a, meshes.b};
+      addImpact(meshes, features, meshes.a.topology.edgeOf(contact.edgeA),
+                meshes.b.topology.edgeOf(contact.edgeB), false, impact);
+    } else {
+      const bool ofSecond = list == 1;
+      const Features<ImpactQuery::Kind::VertexTriangle> features{ofSecond ? meshes.b : meshes.a,
+                                                                 ofSecond ? meshes.a : meshes.b};
+      addImpact(meshes, features, contact.vertex, contact.triangle, ofSecond, impact);
+    }
+    bool dropped = false;
+    forEachImpactList(impact, [&](const auto& contacts, int of) {
+      for (const auto& found : contacts) dropped |= isDropped(found, of);
+    });
+    return dropped;
+  };
   forEachImpactList(expected, [&](auto& contacts, int list) {
     std::erase_if(contacts, [&](const auto& contact) {
-      const auto features = featuresOf(contact, list);
-      const auto place = features ? first.find(*features) : first.end();
-      return place != first.end() && contact.timeOfImpact < end &&
-             place->second < rankOf(contact, list);
+      return isDropped(contact, list) || isDroppedImpact(contact, list);
     });
   });
 }

@@ -4,7 +4,6 @@
 #include "Core/FloatingPoint.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
@@ -48,11 +47,17 @@ void checkRadiusCount(const ContactSide& side, const char* name) {
                                               " positions; one radius, or one for each is needed");
 }
 
+/// Solves matrix x = right.
+Vector3d solve(const Matrix3d& matrix, const Vector3d& right) {
+  const Vector3d u = matrix.col(0), v = matrix.col(1), w = matrix.col(2), normal = v.cross(w);
+  return Vector3d(normal.dot(right), w.cross(u).dot(right), u.cross(v).dot(right)) / u.dot(normal);
+}
+
 /// Of the shape's point that is at `point` at the time.
 Vector3d displacementAt(const ShapeMotion& motion, const Vector3d& point, double time) {
   const Matrix3d rotation = (1 - time) * motion.rotationBefore + time * motion.rotation;
   const Vector3d translation = (1 - time) * motion.translationBefore + time * motion.translation;
-  const Vector3d body = rotation.inverse() * (point - translation);
+  const Vector3d body = solve(rotation, point - translation);
   return (motion.rotation - motion.rotationBefore) * body +
          (motion.translation - motion.translationBefore);
 }

@@ -217,7 +217,7 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
     m_atEnd.witness = contents.intersectingTriangles.front();
   } else if (plan.method == Method::Intersection) {
     if (plan.motion == 0.0 && facts.clearance > 0.0) m_atEnd.position = Position::Apart;
-  } else if (trusted && facts.clearance > 0.0) {
+  } else if (trusted && (facts.clearance > 0.0 || plan.motion == 0.0)) {
     m_atEnd.position = Position::Apart;
   } else if (plan.step.motion > 0.0 && settings.method != Method::Proximity) {
     findEnd(plan, facts, meshes, contents, counts);

@@ -43,7 +43,7 @@ void StepCheck::noteImpact(const Features<kind>& features, std::uint32_t inFirst
                            std::uint32_t inSecond, double time, double distance) {
   const StepPlan& step = m_pair.step;
   double& clearance = m_out.facts.clearance;
-  if (step.motion == 0.0 || (clearance == 0.0 && !step.impacts)) return;
+  if (clearance == 0.0 && !step.impacts) return;
   const double rounding = step.certain - step.motion;
   double left = (1.0 - time) * step.motion + rounding;
   if (distance <= left)

@@ -50,14 +50,15 @@ struct Seen {
 class Law {
  public:
   Law(const CollisionData& data, const Side& a, const Side& b, const PairSettings& settings,
-      Seen& seen)
+      Seen& seen, bool hasCylinder = false)
       : m_data(data),
         m_a(a),
         m_b(b),
         m_asked(settings.method),
         m_method(data.validity().method),
         m_timeTolerance(settings.timeTolerance),
-        m_seen(seen) {}
+        m_seen(seen),
+        m_hasCylinder(hasCylinder) {}
 
   void expect() {
     for (const auto& c : m_data.vertexTriangle()) expectVertexTriangle(c, m_a, m_b);
@@ -189,7 +190,7 @@ class Law {
       EXPECT_TRUE(feature <= 1 || c.feature == TriangleFeature::EdgeAB);
       m_seen.add("of a segment");
     }
-    if (c.corners[0] == c.corners[1]) {
+    if (c.corners[0] == c.corners[1] && c.corners[1] == c.corners[2]) {
       EXPECT_EQ(c.feature, TriangleFeature::CornerA);
     }
     m_seen.add(feature < 3 ? "at a corner" : feature < 6 ? "at an edge" : "at a face");
@@ -247,8 +248,10 @@ class Law {
     m_seen.add("two shapes");
     expectTime(c.timeOfImpact);
     EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);
+    // A cylinder that overlaps is answered within 1e-3 of the size (Docs/Pairs.md).
+    const double error = m_hasCylinder && c.distance < 0 ? 1e-3 : 0x1p-48;
     EXPECT_LE((c.pointA - c.pointB - c.distance * c.normal).norm(),
-              0x1p-48 * (1 + c.pointA.norm() + c.pointB.norm()));
+              error * (1 + c.pointA.norm() + c.pointB.norm()));
   }
 
   const CollisionData& m_data;
@@ -256,6 +259,7 @@ class Law {
   const Method m_asked, m_method;
   const double m_timeTolerance;
   Seen& m_seen;
+  const bool m_hasCylinder;
 };
 
 /// Anything that OctreeBasedCD holds, with the step that it makes.
@@ -391,7 +395,8 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
                          std::to_string(settings.thickness) + ", motion " + std::to_string(motion));
             Seen& seen = byMethod[std::to_string(static_cast<int>(settings.method)) + "/" +
                                   std::to_string(static_cast<int>(method))];
-            Law(data, a.side, b.side, settings, seen).expect();
+            Law(data, a.side, b.side, settings, seen, a.name == "cylinder" || b.name == "cylinder")
+                .expect();
             if (HasFatalFailure() || HasNonfatalFailure()) return;
           }
         }

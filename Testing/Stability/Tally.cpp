@@ -68,6 +68,15 @@ bool says(const Claims& claims, const FeaturePair& features) {
                      [&](const Claim& claim) { return claim.features == features; });
 }
 
+/// Of this touch, or where impacts of the same closest features are said once, for this touch.
+bool says(const Claims& claims, const Touch& touch) {
+  if (says(claims, touch.features)) return true;
+  const accuracy::Incidence one({{0, 1, 2}});
+  const Claim* substitute = accuracy::Substitutes(claims).find(touch.features, one, one);
+  return substitute && !touch.isBefore(substitute->time) &&
+         !touch.isTurned(substitute->normal, substitute->time);
+}
+
 /// Where the features came from their touch in this frame decides; of triangles the kindest.
 bool isTurned(const Claim& claim, const std::vector<Touch>& touches) {
   if (claim.features.kind != Kind::Triangles) {
@@ -100,7 +109,7 @@ bool isWrong(const Claims& claims, const Judged& judged, std::size_t frame) {
   if (claims.ofTriangles) return claims.triangles.empty() && !touches.empty();
   return isAnyTurned(claims, judged, frame) ||
          std::any_of(touches.begin(), touches.end(),
-                     [&](const Touch& touch) { return !says(claims, touch.features); });
+                     [&](const Touch& touch) { return !says(claims, touch); });
 }
 
 void checkContacts(const Claims& claims, Tally& tally) {
@@ -134,7 +143,7 @@ void checkDefinition(Definition definition, const Claims& claims, const std::vec
         std::count_if(claims.claims.begin(), claims.claims.end(),
                       [&](const Claim& claim) { return !isNear(rest, claim); }));
   } else if (definition == Definition::Auto) {
-    for (const Touch& touch : touches) tally.undefinedMissed += !says(claims, touch.features);
+    for (const Touch& touch : touches) tally.undefinedMissed += !says(claims, touch);
   } else if (definition == Definition::Continuous) {
     for (const Touch& touch : touches) tally.undefinedMissed += !says(claims, touch.features);
     for (const Claim& claim : claims.claims) {

@@ -79,11 +79,15 @@ int sideJustBefore(const impact::Polynomial& height, impact::Real time) {
 
 }  // namespace
 
+bool Touch::isBefore(double answered) const {
+  impact::Real exact = time;
+  return exact.compare(impact::Rational(answered)) < 0;
+}
+
 bool Touch::isTimely(double answered) const {
   impact::Real exact = time;
   const impact::Rational early(1, 1'000'000);
-  return exact.compare(impact::Rational(answered)) >= 0 &&
-         exact.compare(impact::Rational(answered) + early) <= 0;
+  return !isBefore(answered) && exact.compare(impact::Rational(answered) + early) <= 0;
 }
 
 bool Touch::isTurned(const Eigen::Vector3d& answered, double at) const {

@@ -19,6 +19,7 @@ struct Touch {
   /// What spans the common plane, over time: two sides of the triangle, or edge a and edge b.
   std::array<impact::Vector, 2> span;
 
+  bool isBefore(double answered) const;
   /// At most 1e-6 early, never late.
   bool isTimely(double answered) const;
   /// Whether a normal, from the second feature towards the first, points to the other side at this

@@ -137,17 +137,20 @@ PairSettings continuous(double thickness, double timeTolerance = 1e-6) {
   return pair;
 }
 
+void place(OctreeBasedCD& collisions, GeometryId id, const Tool& tool) {
+  const auto& [before, now] = tool.ends;
+  collisions.setTransform(id, before.rotation, before.translation, now.rotation, now.translation);
+}
+
 CollisionData answer(const Tool& a, const Tool& b, const PairSettings& pair,
                      Engine engine = Engine::Octree) {
   OctreeBasedCD collisions(settingsOf(engine));
   const GeometryId first = collisions.addAnalyticalGeometry(a.geometry),
                    second = collisions.addAnalyticalGeometry(b.geometry);
   collisions.addCollisionPair(first, second, pair);
-  for (const std::size_t end : {0, 1}) {
-    collisions.setTransform(first, a.ends[end].rotation, a.ends[end].translation);
-    collisions.setTransform(second, b.ends[end].rotation, b.ends[end].translation);
-    collisions.detectCollision();
-  }
+  place(collisions, first, a);
+  place(collisions, second, b);
+  collisions.detectCollision();
   const CollisionData data = collisions.collisionData(first, second);
   EXPECT_LE(data.shapeShape().size(), 1u);
   EXPECT_EQ(collisions.statistics().contacts, data.shapeShape().size());
@@ -399,6 +402,7 @@ TEST(ShapePairSteps, CapturesAndAuditsHoldThem) {
         collisions.addCollisionPair(id, ids.back(), continuous(0.05));
   }
   collisions.detectCollision();
+  collisions.advance();
   for (const GeometryId id : ids)
     collisions.setTransform(id, randomTurn(random), 2 * randomPoint(random, -1, 1));
   collisions.detectCollision();

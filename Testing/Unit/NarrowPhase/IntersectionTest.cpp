@@ -162,7 +162,7 @@ TEST(Intersection, NormalsOfFacesAreWindingNormalsAndDistancesBehindThemAreNegat
 /// The tip is below the ground and beyond its edge y = 0: the nearest point of the ground is (1, 0,
 /// 0), the normal leads from the tip through that.
 TEST(Intersection, NormalsOfEdgesLeadToTheWindingNormalsSide) {
-  const Corners slanted{{{1, -3, -4}, {1, 1.5, 2}, {1.5, 2, 2}}};
+  const Corners slanted{{{1, -3, -4}, {1, 3, 2}, {1.5, 3, 2}}};
   const ContactBuffers found = contactsOf(meshOf(slanted), meshOf(kGround));
   ASSERT_EQ(found.vertexTriangle.size(), 1u);
   EXPECT_EQ(found.vertexTriangle[0].barycentric, Vector3d(0.75, 0.25, 0));
