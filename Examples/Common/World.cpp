@@ -163,12 +163,15 @@ void World::predict(double seconds, const Vector3d& acceleration, double damping
   m_solver.predict(seconds, acceleration, damping);
 }
 
-void World::detectOnly() {
-  const Timed timed(m_times.collision);
-  // The solver's `before`: the last detection saw positions that were corrected since.
+void World::passPositions() {
   for (BodyId id = 0; id < m_bodies.size(); ++id)
     if (const Body& body = m_bodies[id]; body.count > 0 && body.rest.empty())
-      m_detection.setPositions(body.id, before(id), positions(id));
+      m_detection.setPositions(body.id, positions(id));
+}
+
+void World::detectOnly() {
+  const Timed timed(m_times.collision);
+  passPositions();
   m_detection.detectCollision();
   const FrameStatistics& statistics = m_detection.statistics();
   m_times.boxes += statistics.milliseconds.boxes;
@@ -217,6 +220,7 @@ void World::hold() {
 void World::commit() {
   const Timed timed(m_times.solver);
   m_solver.commit(m_seconds);
+  passPositions();  // as corrected since the detection
   m_detection.advance();
 }
 

@@ -114,6 +114,7 @@ class World {
  private:
   BodyId add(Body, std::span<const Eigen::Vector3d> positions, double inverseMass);
   SolverVertices vertices(BodyId) const;
+  void passPositions();        ///< of all bodies that deform, to the detection
   GeometryId guarded(BodyId);  ///< its id in the guard, to which it is added once
 
   Xpbd m_solver;

@@ -112,13 +112,12 @@ struct ContactMotion {
 /// Adds a motion for each contact of a pair (a, b), in the order of appendRows(); then, where both
 /// are shapes, that of shapeShape(), which has no row: its first side is a.
 ///
-/// Time     contacts of Continuous and Auto are at their time of impact, others now. A shape's
-///          material there is that of its pose between the two ends, of which each point moves in a
-///          straight line.
+/// Time     each contact is at its timeOfImpact. A shape's material there is that of its pose
+///          between the two ends, of which each point moves in a straight line.
 /// Needs    shapes that turn by less than 90 degrees in the step.
 /// Errors   WrongPositionCount as appendRows(), and for a contact with a shape, too; InvalidRadius
 ///          unless radii are none, one, or one for each vertex. No motion is added.
-/// Cost     below 0.1 µs for each contact; no allocation where the vector has room.
+/// Cost     linear in the contacts; no allocation where the vector has room.
 PALPATE_EXPORT void appendMotions(const CollisionData& contacts, const ContactSide& a,
                                   const ContactSide& b, std::vector<ContactMotion>& motions);
 

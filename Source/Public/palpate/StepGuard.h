@@ -56,12 +56,12 @@ struct GuardedVertex {
 ///           (4) hold() needs at most one round more than it holds vertices: each round but the
 ///           last moves at least one vertex back, and no vertex moves back twice.
 /// Limits    surfaces that already cross at `before` are not parted: only features that touch
-/// count.
-///           Intersection at the start is for Method::Intersection and Validity::startedApart.
+///           count. Intersection at the start is for Method::Intersection and
+///           Validity::startedApart. Analytical geometries and transforms are not guarded: give a
+///           tool as a mesh, with its vertices at both ends of the step.
 /// Cost      each round is one detection by Method::Continuous of the pairs whose positions changed
-///           since the round before, with octrees of the guard's own. Most steps need one round,
-///           and steps with impacts two or three. A geometry that is not given costs nothing.
-///           Steady steps allocate nothing.
+///           since the round before, with octrees of the guard's own. A geometry that is not
+///           given costs nothing. Steady steps allocate nothing.
 /// Order     results do not depend on the number of threads, nor on the order of the steps.
 /// Errors    every function throws palpate::Error where its data are wrong, and then changes nothing:
 ///           neither the guard nor the caller's positions. After a move everything but assignment
