@@ -164,6 +164,9 @@ class BoneDrilling : public LiveScene {
       solver.velocities[i] = 40 * away;
       ++m_fallen;
     }
+    // They do not sweep through what is between: at rest at the new place.
+    const std::span<const Vector3d> particles = m_world.positions(m_particles);
+    m_world.detection().setPositions(m_world.bodies()[m_particles].id, particles, particles);
   }
 
   double m_burrDistance = 0, m_sag;  // m_sag: of the bone's mesh: edge² x curvature / 8
