@@ -87,8 +87,7 @@ void printDifferences(const char* list, std::span<const Contact> found,
 
 /// Returns whether a pair's answers differ.
 bool report(const CollisionProblem& problem) {
-  constexpr const char* kMethods[]{"Auto",         "Proxy",     "DistanceField",
-                                   "Intersection", "Proximity", "Continuous"};
+  constexpr const char* kMethods[]{"Auto", "Intersection", "Proximity", "Continuous"};
   const OctreeBasedCD octree = solve(problem, Engine::Octree),
                       oracle = solve(problem, Engine::BruteForce);
   std::size_t different = 0;

@@ -23,8 +23,8 @@ constexpr std::string_view kTitle = "palpate-capture";
 constexpr int kVersion = 8;
 
 // Values of enumerations are written by name: in the order of their declarations.
-constexpr std::array<std::string_view, 6> kMethods{"Auto",         "Proxy",     "DistanceField",
-                                                   "Intersection", "Proximity", "Continuous"};
+constexpr std::array<std::string_view, 4> kMethods{"Auto", "Intersection", "Proximity",
+                                                   "Continuous"};
 constexpr std::array<std::string_view, 4> kKinds{"Triangles", "Lines", "Points", "Shape"};
 constexpr std::array<std::string_view, 2> kSides{"Both", "Outer"};
 constexpr std::array<std::string_view, 6> kShapes{"Sphere", "Capsule",  "Plane",

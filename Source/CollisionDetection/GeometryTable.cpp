@@ -140,15 +140,17 @@ void GeometryTable::advance() noexcept {
   }
 }
 
-Geometry& GeometryTable::at(GeometryId id) const {
+Geometry* GeometryTable::find(GeometryId id) const {
   const auto found = std::lower_bound(m_geometries.begin(), m_geometries.end(), id,
                                       [](const auto& g, GeometryId i) { return g->id < i; });
-  if (found == m_geometries.end() || (*found)->id != id) {
-    const bool removed = static_cast<std::uint32_t>(id) < m_nextId;
-    throw Error(ErrorCode::UnknownGeometry,
-                nameOf(id) + (removed ? " was removed" : " was never added"), id);
-  }
-  return **found;
+  return found == m_geometries.end() || (*found)->id != id ? nullptr : found->get();
+}
+
+Geometry& GeometryTable::at(GeometryId id) const {
+  if (Geometry* const found = find(id)) return *found;
+  const bool removed = static_cast<std::uint32_t>(id) < m_nextId;
+  throw Error(ErrorCode::UnknownGeometry,
+              nameOf(id) + (removed ? " was removed" : " was never added"), id);
 }
 
 void GeometryTable::remove(GeometryId id) {

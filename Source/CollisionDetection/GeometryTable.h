@@ -41,7 +41,8 @@ class GeometryTable {
   void advance() noexcept;
   std::uint64_t stepNumber() const { return m_stepNumber; }  ///< counts advance()
 
-  Geometry& at(GeometryId) const;  ///< throws UnknownGeometry
+  Geometry* find(GeometryId) const;  ///< null if there is none
+  Geometry& at(GeometryId) const;    ///< throws UnknownGeometry
   std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }
 
   /// Brings octrees up to the positions now, or to the whole step where that is wanted.

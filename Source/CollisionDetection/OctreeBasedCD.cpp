@@ -29,9 +29,23 @@ namespace palpate {
 
 namespace {
 
-void checkDifferent(GeometryId vertices, GeometryId body) {
-  if (vertices == body)
+Eigen::AlignedBox3d boundsOf(const TriangleMesh& mesh) {
+  if (mesh.shape) return mesh.shape->bounds();
+  Eigen::AlignedBox3d box;
+  for (std::uint32_t v = 0; v < mesh.now.size(); ++v) {
+    const Eigen::Vector3d centre = mesh.now[v], reach = Eigen::Vector3d::Constant(mesh.radius(v));
+    box.extend(Eigen::AlignedBox3d(centre - reach, centre + reach));
+  }
+  return box;
+}
+
+/// Of a query for the vertices of one geometry in another.
+void checkVertices(const Geometry& vertices, GeometryId body) {
+  if (vertices.id == body)
     throw Error(ErrorCode::InvalidSettings, nameOf(body) + ": its own vertices lie on it", body);
+  if (vertices.mesh.shape)
+    throw Error(ErrorCode::UnsupportedMethod,
+                nameOf(vertices.id) + " is a shape: it has no vertices", vertices.id);
 }
 
 }  // namespace
@@ -430,6 +444,31 @@ void OctreeBasedCD::removeCollisionPair(GeometryId a, GeometryId b) {
 
 std::span<const CollisionPair> OctreeBasedCD::pairs() const { return read().pairs.pairs(); }
 
+const PairSettings& OctreeBasedCD::pairSettings(GeometryId a, GeometryId b) const {
+  const Implementation& all = read();
+  return all.pairs.inOrder(all.geometries, a, b).pair.settings;
+}
+
+bool OctreeBasedCD::contains(GeometryId geometry) const {
+  return read().geometries.find(geometry) != nullptr;
+}
+
+std::size_t OctreeBasedCD::vertexCount(GeometryId geometry) const {
+  return positions(geometry).size();
+}
+
+std::span<const Eigen::Vector3d> OctreeBasedCD::positions(GeometryId geometry) const {
+  const TriangleMesh& mesh = read().geometries.at(geometry).mesh;
+  if (mesh.shape) return {};
+  return mesh.now.body();
+}
+
+Eigen::AlignedBox3d OctreeBasedCD::bounds(GeometryId geometry) const {
+  const TriangleMesh& mesh = read().geometries.at(geometry).mesh;
+  const StandardFloatingPoint standard;
+  return boundsOf(mesh);
+}
+
 void OctreeBasedCD::update() {
   const Implementation::Change all(m_implementation);
   all->update(true);
@@ -471,7 +510,7 @@ std::span<const InsideVertex> OctreeBasedCD::Implementation::findInside(
     GeometryId vertices, GeometryId body, const InsideSettings& insideSettings) {
   const Geometry& asked = geometries.at(vertices);
   Geometry& around = geometries.at(body);
-  checkDifferent(vertices, body);
+  checkVertices(asked, body);
   checkInside(around, insideSettings);
   updateFor(around);
   return containment.find(asked, around, insideSettings, settings.engine, threads);
@@ -497,7 +536,7 @@ std::span<const EmbeddedVertex> OctreeBasedCD::findEmbeddedVertices(GeometryId v
   const Implementation::Change all(m_implementation);
   const Geometry& asked = all->geometries.at(vertices);
   Geometry& solid = all->geometries.at(body);
-  checkDifferent(vertices, body);
+  checkVertices(asked, body);
   checkTopologyKind(solid, true, "findEmbeddedVertices() is for tetrahedral meshes");
   all->updateFor(solid);
   return all->embedding.find(asked, solid, all->settings.engine, all->threads);

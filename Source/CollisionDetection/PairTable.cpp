@@ -51,10 +51,6 @@ const char* nameOf(Method method) {
   switch (method) {
     case Method::Auto:
       return "Auto";
-    case Method::Proxy:
-      return "Proxy";
-    case Method::DistanceField:
-      return "DistanceField";
     case Method::Intersection:
       return "Intersection";
     case Method::Proximity:
@@ -107,8 +103,6 @@ class Check {
          "Contacts::Earliest is for Method::Continuous only");
     need(method >= Method::Auto && method <= Method::Continuous,
          "no such method: " + std::to_string(static_cast<int>(method)));
-    support(method != Method::Proxy, "Method::Proxy does not exist yet");
-    support(method != Method::DistanceField, "Method::DistanceField does not exist yet");
     need(method == Method::Auto || tolerance < 0.0,
          "tolerance is " + textOf(tolerance) + "; Method::" + nameOf(method) +
              " does not use it, only Method::Auto does: leave it negative");

@@ -38,8 +38,8 @@ class PointFrame {
   BoxMap m_map;              ///< that brings them there
 };
 
-/// Asks something about each vertex of a geometry that is in an element, and keeps the answers in
-/// the order of the vertices. Scratch that remembers its peak.
+/// Asks something about each vertex of a geometry that is in an element, enabled or not, and keeps
+/// the answers in the order of the vertices. Scratch that remembers its peak.
 template <class Answer>
 class VertexSearch {
  public:
@@ -57,7 +57,7 @@ class VertexSearch {
                         part.found.clear();
                         auto ask = start(part.stack);
                         for (std::size_t v = begin; v < end; ++v)
-                          if (!topology.vertexTriangles[v].empty())
+                          if (topology.isUsed[v])
                             if (const auto answer = ask(static_cast<std::uint32_t>(v)))
                               part.found.push_back(*answer);
                       });

@@ -112,6 +112,20 @@ void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& tran
   placeCorners();
 }
 
+Eigen::AlignedBox3d Shape::bounds() const {
+  Vector3d reach =
+      Vector3d::Constant(isPlane() ? std::numeric_limits<double>::infinity() : m_radius);
+  if (isCylinder())
+    for (int k = 0; k < 3; ++k) {
+      // Of a disc: its radius times the sine of the angle between its axis and the coordinate's.
+      const double cosine = m_axes(k, 2);
+      reach[k] = m_sizes[0] * std::sqrt(std::max(0.0, (1.0 - cosine) * (1.0 + cosine)));
+    }
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& corner : m_corners) box.extend(corner);
+  return {box.min() - reach, box.max() + reach};
+}
+
 void Shape::placeBetween(const Shape& before, const Shape& now, double time) {
   const auto at = [&](std::size_t end) -> Vector3d {
     return (1.0 - time) * before.m_corners[end] + time * now.m_corners[end];

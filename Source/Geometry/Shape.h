@@ -5,6 +5,8 @@
 #include "Geometry/Polytope.h"
 #include "Geometry/Positions.h"
 
+#include <Eigen/Geometry>
+
 #include <array>
 #include <cstddef>
 #include <memory>
@@ -97,6 +99,7 @@ class Shape {
   std::span<const Triangle> faces() const { return m_faces; }
   std::span<const Segment> edges() const { return m_edges; }
   double radius() const { return isCylinder() ? m_sizes[0] : m_radius; }  ///< L
+  Eigen::AlignedBox3d bounds() const;  ///< L; infinite for a plane
   /// L: about the largest magnitude of its coordinates and measures.
   double magnitude() const { return m_magnitude; }
 

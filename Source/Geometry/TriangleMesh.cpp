@@ -9,7 +9,8 @@ namespace palpate {
 MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle> newTriangles)
     : vertexCount(newVertexCount),
       triangles(newTriangles.begin(), newTriangles.end()),
-      triangleEdges(newTriangles.size()) {
+      triangleEdges(newTriangles.size()),
+      isUsed(newVertexCount, false) {
   struct Side {
     Segment edge;
     std::uint32_t triangle, side;
@@ -18,6 +19,7 @@ MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle>
   sides.reserve(3 * triangles.size());
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
     for (std::uint32_t i = 0; i < 3; ++i) {
+      isUsed[triangles[t][i]] = true;
       const std::uint32_t p = triangles[t][i], q = triangles[t][(i + 1) % 3];
       triangleEdges[t][i] = kNoEdge;
       if (p != q) sides.push_back({{std::min(p, q), std::max(p, q)}, t, i});

@@ -57,6 +57,7 @@ struct MeshTopology {
   IndexLists vertexTriangles;        ///< that are on: ascending triangle ids, each once
   IndexLists edgeTriangles;          ///< the same; none: the edge is off
   std::size_t untestedVertices = 0;  ///< in no triangle that is on
+  std::vector<bool> isUsed;          ///< per vertex: in a triangle, on or off
   /// Per vertex: each of its edges is in two triangles that are on, in opposite directions.
   std::vector<std::uint8_t> hasClosedStar;
   std::vector<std::uint32_t> disabled{};  ///< triangles that are off, ascending

@@ -13,6 +13,9 @@
 #include <palpate/TetrahedralMesh.h>
 #include <palpate/Types.h>
 
+#include <Eigen/Geometry>
+
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <span>
@@ -86,6 +89,16 @@ class PALPATE_EXPORT OctreeBasedCD {
   GeometryId addAnalyticalGeometry(const AnalyticalGeometry&);
   void removeGeometry(GeometryId);  ///< and its pairs
 
+  bool contains(GeometryId) const;            ///< whether it was added and not removed
+  std::size_t vertexCount(GeometryId) const;  ///< 0 of a shape
+  /// The positions now, as setPositions() gave them: of a geometry that setTransform() has placed,
+  /// in the body's frame. Empty for a shape. The span lives until the next call that is not const.
+  std::span<const Eigen::Vector3d> positions(GeometryId) const;
+  /// L: an axis-aligned box in the world around all vertices now, with their radii, or around a
+  /// shape. Empty where there are no vertices; infinite for a plane. Exact but for rounding.
+  /// Cost     linear in the vertices.
+  Eigen::AlignedBox3d bounds(GeometryId) const;
+
   /// Ends the step of all geometries: `now` becomes `before`. Results stay readable. Loops that
   /// never call it sweep from where they began: see Validity::displacement.
   ///
@@ -139,6 +152,9 @@ class PALPATE_EXPORT OctreeBasedCD {
   void setContactPredicate(GeometryId a, GeometryId b, ContactPredicate);
   void removeCollisionPair(GeometryId a, GeometryId b);
   std::span<const CollisionPair> pairs() const;  ///< in the order added
+  /// As they were given last; (a, b) in the order in which the pair was added. The reference lives
+  /// until the next call that is not const.
+  const PairSettings& pairSettings(GeometryId a, GeometryId b) const;
 
   void update();  ///< boxes and octrees for the positions now
   /// broad phase only, for a narrow phase of your own; fills candidatePairs()

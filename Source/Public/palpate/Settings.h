@@ -57,7 +57,7 @@ struct Settings {
   std::shared_ptr<Executor> executor{};
 };
 
-enum class Method { Auto, Proxy, DistanceField, Intersection, Proximity, Continuous };
+enum class Method { Auto, Intersection, Proximity, Continuous };
 
 enum class Contacts {
   /// One per pair of closest features. Proximity: where the distance is smallest. Continuous, and

@@ -203,9 +203,6 @@ void expectPossible(Call call) {
   refuse({.method = Method::Proximity}, {ErrorCode::InvalidSettings, {"Proximity", "thickness"}});
   refuse({.method = Method::Proximity, .thickness = -0.0},
          {ErrorCode::InvalidSettings, {"Proximity", "thickness"}});
-  refuse({.method = Method::Proxy, .thickness = 1}, {ErrorCode::UnsupportedMethod, {"Proxy"}});
-  refuse({.method = Method::DistanceField, .thickness = 1},
-         {ErrorCode::UnsupportedMethod, {"DistanceField"}});
   for (Method method : {Method::Auto, Method::Proximity, Method::Intersection})
     refuse({.method = method, .thickness = 1, .contacts = Contacts::Earliest},
            {ErrorCode::InvalidSettings, {"Earliest", "Continuous"}});
@@ -414,7 +411,6 @@ TEST(BadInput, OneCallPath) {
   refuse(badTool, organ, {}, refusal);
   refuse(organ, tool, {.thickness = -1}, {ErrorCode::InvalidSettings, {"-1"}});
   refuse(organ, tool, {.method = Method::Proximity}, {ErrorCode::InvalidSettings, {"Proximity"}});
-  refuse(organ, tool, {.method = Method::Proxy}, {ErrorCode::UnsupportedMethod, {"Proxy"}});
   refuse(organ, tool, {.method = Method::Continuous},
          {ErrorCode::UnsupportedMethod, {"Continuous", "step"}});
   EXPECT_GT(detectCollision(organ, tool, {.thickness = kThickness}).hash(), 0u);
