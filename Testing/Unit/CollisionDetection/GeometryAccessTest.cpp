@@ -1,0 +1,183 @@
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/RandomMeshes.h"
+#include "Common/Things.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+#include <vector>
+
+// What a caller can ask of the geometries and pairs that an OctreeBasedCD has.
+
+namespace palpate::testing {
+namespace {
+
+template <class F>
+void expectRefused(ErrorCode code, const std::string& words, F&& call) {
+  try {
+    call();
+    ADD_FAILURE() << "accepted; expected: " << words;
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), code);
+    EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+  }
+}
+
+Positions copyOf(std::span<const Vector3d> positions) {
+  return {positions.begin(), positions.end()};
+}
+
+TEST(GeometryAccess, ContainsWhatWasAddedAndNotRemoved) {
+  OctreeBasedCD collisions;
+  EXPECT_FALSE(collisions.contains(GeometryId{0}));
+  const Mesh mesh = sheet(2, 0.5, 0.0);
+  const GeometryId a = collisions.addTriangleMesh(mesh.positions, mesh.triangles),
+                   b = collisions.addAnalyticalGeometry(Sphere{});
+  EXPECT_TRUE(collisions.contains(a) && collisions.contains(b));
+  collisions.removeGeometry(a);
+  EXPECT_FALSE(collisions.contains(a));
+  EXPECT_TRUE(collisions.contains(b));
+  EXPECT_FALSE(collisions.contains(GeometryId{7}));
+  expectRefused(ErrorCode::UnknownGeometry, "geometry 0 was removed",
+                [&] { (void)collisions.vertexCount(a); });
+}
+
+TEST(GeometryAccess, PositionsAreThoseOfNow) {
+  Random random(1);
+  OctreeBasedCD collisions;
+  const Mesh mesh = sheet(3, 0.5, 0.1);
+  const GeometryId id = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+  EXPECT_EQ(copyOf(collisions.positions(id)), mesh.positions);
+  const Positions next = moved(random, mesh.positions, 0.1);
+  collisions.setPositions(id, next);
+  EXPECT_EQ(copyOf(collisions.positions(id)), next);
+  collisions.setPositions(id, next, mesh.positions);
+  EXPECT_EQ(copyOf(collisions.positions(id)), mesh.positions);
+  // A placed body's are in its own frame.
+  collisions.setTransform(id, Eigen::Matrix3d::Identity(), {1, 2, 3});
+  EXPECT_EQ(copyOf(collisions.positions(id)), mesh.positions);
+  EXPECT_EQ(collisions.vertexCount(id), mesh.positions.size());
+  const Positions two{{0, 0, 0}, {1, 0, 0}};
+  collisions.setTriangles(id, two, {});
+  EXPECT_EQ(collisions.vertexCount(id), 2u);
+  const GeometryId shape = collisions.addAnalyticalGeometry(Box{{0, 0, 0}, {1, 1, 1}});
+  EXPECT_EQ(collisions.vertexCount(shape), 0u);
+  EXPECT_TRUE(collisions.positions(shape).empty());
+}
+
+TEST(GeometryAccess, BoundsHoldVerticesWithTheirRadii) {
+  Random random(2);
+  const Thing line = thread(random, 20, 0.2, 0.0, false);
+  const Thing things[] = {testing::things(soup(random, 30, 0.3)), line, tapered(random, line, 0.1),
+                          particles(random, 20, 0.05)};
+  for (const Thing& thing : things) {
+    OctreeBasedCD collisions;
+    const GeometryId id = thing.addTo(collisions);
+    const Positions now = moved(random, thing.positions, 0.3);
+    collisions.setPositions(id, now);
+    for (const bool placed : {false, true}) {
+      const Eigen::AngleAxisd turn(0.7, Vector3d(1, 2, 3).normalized());
+      const Vector3d shift(0.3, -2, 5);
+      if (placed) collisions.setTransform(id, turn.toRotationMatrix(), shift);
+      Eigen::AlignedBox3d truth;
+      for (std::uint32_t v = 0; v < now.size(); ++v) {
+        const Vector3d at = placed ? Vector3d(turn * now[v] + shift) : now[v];
+        truth.extend(at + Vector3d::Constant(thing.radius(v)));
+        truth.extend(at - Vector3d::Constant(thing.radius(v)));
+      }
+      const Eigen::AlignedBox3d found = collisions.bounds(id);
+      EXPECT_LE((found.min() - truth.min()).norm(), 1e-14);
+      EXPECT_LE((found.max() - truth.max()).norm(), 1e-14);
+    }
+  }
+  OctreeBasedCD collisions;
+  EXPECT_TRUE(collisions.bounds(collisions.addPointSet({})).isEmpty());
+}
+
+/// Of each shape the furthest point along each axis, found from its definition.
+TEST(GeometryAccess, BoundsOfShapesAreTight) {
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  const Vector3d shift(0.3, -2, 5), p(1, 2, 3), q(2, 0, 4);
+  const auto boundsOf = [&](const AnalyticalGeometry& shape) {
+    OctreeBasedCD collisions;
+    const GeometryId id = collisions.addAnalyticalGeometry(shape);
+    collisions.setTransform(id, turn, shift);
+    return collisions.bounds(id);
+  };
+  const auto expectBounds = [](const Eigen::AlignedBox3d& found, const Eigen::AlignedBox3d& truth) {
+    EXPECT_LE((found.min() - truth.min()).norm(), 1e-13);
+    EXPECT_LE((found.max() - truth.max()).norm(), 1e-13);
+  };
+  const auto around = [&](const Positions& points, const Vector3d& reach) {
+    Eigen::AlignedBox3d box;
+    for (const Vector3d& x : points) box.extend(turn * x + shift);
+    return Eigen::AlignedBox3d(box.min() - reach, box.max() + reach);
+  };
+  const Vector3d half = Vector3d::Constant(0.5);
+  expectBounds(boundsOf(Sphere{p, 0.5}), around({p}, half));
+  expectBounds(boundsOf(Capsule{p, q, 0.5}), around({p, q}, half));
+  const Vector3d axis = (turn * (q - p)).normalized();
+  expectBounds(boundsOf(Cylinder{p, q, 0.5}),
+               around({p, q}, 0.5 * (Vector3d::Ones() - axis.cwiseAbs2()).cwiseSqrt()));
+  Positions corners;
+  for (int i = 0; i < 8; ++i)
+    corners.push_back(p + Vector3d(i & 1 ? 1 : -1, i & 2 ? 2 : -2, i & 4 ? 3 : -3));
+  expectBounds(boundsOf(Box{p, {1, 2, 3}}), around(corners, Vector3d::Zero()));
+  expectBounds(boundsOf(ConvexHull{corners}), around(corners, Vector3d::Zero()));
+  const Eigen::AlignedBox3d plane = boundsOf(Plane{});
+  EXPECT_EQ(plane.min()[0], -std::numeric_limits<double>::infinity());
+  EXPECT_EQ(plane.max()[2], std::numeric_limits<double>::infinity());
+}
+
+TEST(GeometryAccess, PairSettingsAreTheLastOnes) {
+  OctreeBasedCD collisions;
+  const Mesh mesh = sheet(2, 0.5, 0.0);
+  const GeometryId a = collisions.addTriangleMesh(mesh.positions, mesh.triangles),
+                   b = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+  expectRefused(ErrorCode::UnknownPair, "(0, 1)", [&] { (void)collisions.pairSettings(a, b); });
+  collisions.addCollisionPair(a, b, {Method::Proximity, 0.5});
+  EXPECT_EQ(collisions.pairSettings(a, b).thickness, 0.5);
+  collisions.setPairSettings(a, b, {.method = Method::Continuous, .thickness = 0.25});
+  EXPECT_EQ(collisions.pairSettings(a, b).method, Method::Continuous);
+  EXPECT_EQ(collisions.pairSettings(a, b).thickness, 0.25);
+  expectRefused(ErrorCode::UnknownPair, "was added as",
+                [&] { (void)collisions.pairSettings(b, a); });
+}
+
+/// Which elements are enabled decides what collides, not where the vertices are.
+TEST(GeometryAccess, VerticesOfDisabledElementsAreFoundInABody) {
+  const Mesh inner = sphere(3, 4, {0.5, 0.5, 0.5}, 0.1), outer = sphere(6, 8, {0.5, 0.5, 0.5}, 0.4);
+  OctreeBasedCD collisions;
+  const GeometryId vertices = collisions.addTriangleMesh(inner.positions, inner.triangles),
+                   body = collisions.addTriangleMesh(outer.positions, outer.triangles);
+  const std::size_t count = collisions.findInsideVertices(vertices, body).size();
+  EXPECT_EQ(count, inner.positions.size());
+  std::vector<std::uint32_t> all(inner.triangles.size());
+  for (std::uint32_t t = 0; t < all.size(); ++t) all[t] = t;
+  collisions.setDisabledElements(vertices, all);
+  EXPECT_EQ(collisions.findInsideVertices(vertices, body).size(), count);
+}
+
+TEST(GeometryAccess, AShapeHasNoVerticesToFind) {
+  OctreeBasedCD collisions;
+  const Mesh ball = sphere(6, 8, {0.5, 0.5, 0.5}, 0.4);
+  const GeometryId shape = collisions.addAnalyticalGeometry(Box{{0.5, 0.5, 0.5}, {0.1, 0.1, 0.1}}),
+                   body = collisions.addTriangleMesh(ball.positions, ball.triangles);
+  const auto refuse = [&](auto&& call) {
+    expectRefused(ErrorCode::UnsupportedMethod, "geometry 0 is a shape: it has no vertices", call);
+  };
+  refuse([&] { (void)collisions.findInsideVertices(shape, body); });
+  refuse([&] { (void)collisions.followInsideVertices(shape, body); });
+  refuse([&] {
+    const Positions corners{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const std::vector<Tetrahedron> one{{0, 1, 2, 3}};
+    (void)collisions.findEmbeddedVertices(shape, collisions.addTetrahedralMesh(corners, one));
+  });
+}
+
+}  // namespace
+}  // namespace palpate::testing
