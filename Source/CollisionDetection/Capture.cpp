@@ -2,7 +2,7 @@
 
 #include "CollisionDetection/Audit.h"
 #include "Core/FloatingPoint.h"
-#include "Geometry/Shape.h"
+#include "Shapes/Shape.h"
 
 #include <algorithm>
 #include <array>

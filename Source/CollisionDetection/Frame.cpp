@@ -7,7 +7,7 @@
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/Intersection.h"
-#include "NarrowPhase/ShapeContacts.h"
+#include "Shapes/ShapeContacts.h"
 #include "NarrowPhase/StepCheck.h"
 
 #include <algorithm>
@@ -209,14 +209,15 @@ struct Frame::Job {
   void detectShape() {
     const MeshPair meshes = record->meshes();
     if (meshes.isOfShapes()) {
-      findShapePair(meshes, contacts);
+      findShapePair(*meshes.shapeOfA, *meshes.shapeOfB, meshes.settings, contacts);
       if (meshes.settings.contacts == Contacts::Earliest) takeEarliest(*record, contacts);
       return;
     }
-    findPrimitivesNear(record->mesh(), record->plan.swept() ? meshes.shapeBefore() : meshes.shape(),
-                       meshes.shape(), meshes.reach(), queries, primitives);
+    const auto& [analytical, now, before] = meshes.shape();
+    findPrimitivesNear(record->mesh(), record->plan.swept() ? before : now, now, meshes.reach(),
+                       queries, primitives);
     Stopwatch watch;
-    findShapeContacts(meshes, primitives, contacts);
+    findShapeContacts(meshes.mesh(), meshes.shape(), meshes.settings, primitives, contacts);
     if (meshes.settings.contacts == Contacts::Earliest) takeEarliest(*record, contacts);
     narrowMilliseconds += watch.lap();
   }
@@ -256,8 +257,8 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
   m_nodePairs.clear();
   for (PairRecord* record : records) {
     record->earliest = std::numeric_limits<double>::infinity();
-    if (record->meshes().hasShape()) {
-      if (adjacentPairs && (record->mesh().mesh.shape || record->mesh().tree.octree().size() > 0))
+    if (record->hasShape()) {
+      if (adjacentPairs && (record->mesh().shape || record->mesh().tree.octree().size() > 0))
         newJob(*record);
       continue;
     }
@@ -353,7 +354,7 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
     Stopwatch job;
     m_jobs[i]->keepCandidates = settings.keepCandidates;
     m_jobs[i]->start(&Job::detect);
-    m_jobs[i]->record->meshes().hasShape() ? m_jobs[i]->detectShape() : run(*m_jobs[i]);
+    m_jobs[i]->record->hasShape() ? m_jobs[i]->detectShape() : run(*m_jobs[i]);
     m_jobs[i]->milliseconds = job.lap();
   });
   findMissedOverlaps(threads);

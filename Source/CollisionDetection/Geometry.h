@@ -7,15 +7,17 @@
 #include "CollisionDetection/GeometryStep.h"
 #include "CollisionDetection/RigidBody.h"
 #include "CollisionDetection/TetrahedronTree.h"
-#include "Geometry/Motion.h"
-#include "Geometry/Revision.h"
-#include "Geometry/TetrahedralTopology.h"
-#include "Geometry/TriangleMesh.h"
+#include "Mesh/Motion.h"
+#include "Mesh/Revision.h"
+#include "Mesh/TetrahedralTopology.h"
+#include "Mesh/TriangleMesh.h"
 #include "Octree/PointQueries.h"
+#include "Shapes/PlacedShape.h"
 
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 
 namespace palpate {
@@ -73,9 +75,10 @@ struct Geometry {
   GeometryId id;
   GeometryRevisions revisions;
   CollisionFilter filter;
-  TriangleMesh mesh;          ///< topology, positions, shape
-  GeometryStep step;          ///< writes the positions of both ends
-  double smallestHeight = 0;  ///< L: of a triangle with area, when the topology was set
+  TriangleMesh mesh;                 ///< topology and positions; of a shape, its corners
+  std::optional<PlacedShape> shape;  ///< of an analytical geometry
+  GeometryStep step;                 ///< writes the positions of both ends
+  double smallestHeight = 0;         ///< L: of a triangle with area, when the topology was set
   GeometryMotion motion;
   GeometryOctree tree;
   std::unique_ptr<Solid> solid;  ///< of a tetrahedral mesh

@@ -136,7 +136,7 @@ void checkOnePerVertex(std::span<const Eigen::Vector3d> positions, std::span<con
 }
 
 void checkPositionCount(const Geometry& geometry, std::size_t count) {
-  if (geometry.mesh.shape)
+  if (geometry.shape)
     throw Error(
         ErrorCode::WrongPositionCount,
         nameOf(geometry.id) + " is a shape, which has no positions; setTransform() moves it",

@@ -2,7 +2,7 @@
 
 #include "CollisionDetection/GeometryTable.h"
 #include "Core/Threads.h"
-#include "Geometry/TetrahedralTopology.h"
+#include "Mesh/TetrahedralTopology.h"
 
 #include <span>
 #include <vector>

@@ -1,7 +1,7 @@
 #include "CollisionDetection/GeometryOctree.h"
 
 #include "CollisionDetection/Stopwatch.h"
-#include "Geometry/TriangleBoxes.h"
+#include "Mesh/TriangleBoxes.h"
 
 #include <algorithm>
 

@@ -6,10 +6,10 @@
 #include "Core/Arena.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
-#include "Geometry/FloatPositions.h"
-#include "Geometry/Revision.h"
-#include "Geometry/TriangleMesh.h"
-#include "Geometry/UnfoldedStars.h"
+#include "Mesh/FloatPositions.h"
+#include "Mesh/Revision.h"
+#include "Mesh/TriangleMesh.h"
+#include "Mesh/UnfoldedStars.h"
 #include "Octree/Octree.h"
 
 #include <cstdint>

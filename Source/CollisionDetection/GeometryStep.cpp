@@ -22,12 +22,7 @@ void GeometryStep::start(TriangleMesh& mesh, Positions::Body body) noexcept {
   m_detected = mesh.before;
 }
 
-void GeometryStep::startShape(TriangleMesh& mesh, const AnalyticalGeometry& analytical,
-                              Shape shape) {
-  mesh.analytical = analytical;
-  mesh.shape = std::move(shape);
-  mesh.shapeBefore = m_spare = m_spareBefore = mesh.shape;
-}
+void GeometryStep::startShape(const Shape& shape) { m_spare = m_spareBefore = shape; }
 
 Positions::Body GeometryStep::checkedBody(std::span<const Eigen::Vector3d> positions, bool isPlaced,
                                           const char* which, const Threads& threads,
@@ -87,7 +82,8 @@ void GeometryStep::place(TriangleMesh& mesh, Positions& end,
   end.place(transform, m_revisions.next());
 }
 
-void GeometryStep::setTransform(TriangleMesh& mesh, const std::optional<RigidTransform>& before,
+void GeometryStep::setTransform(TriangleMesh& mesh, PlacedShape* shape,
+                                const std::optional<RigidTransform>& before,
                                 const RigidTransform& now) {
   const auto check = [&](const RigidTransform& transform, const char* which) {
     if (const std::string fault = faultOf(transform); !fault.empty())
@@ -100,10 +96,10 @@ void GeometryStep::setTransform(TriangleMesh& mesh, const std::optional<RigidTra
   check(now, before ? "now: " : "");
   if (!mesh.now.isPlaced()) checkPlaceable(m_id, mesh.now.body(), ErrorCode::InvalidTransform);
   const bool followsNow = m_isNew && !m_transformGiven && !before;
-  if (mesh.shape) {
-    m_spare->place(*mesh.analytical, now);
-    if (before) m_spareBefore->place(*mesh.analytical, *before);
-    if (followsNow) m_spareBefore->place(*mesh.analytical, now);
+  if (shape) {
+    m_spare->place(shape->analytical, now);
+    if (before) m_spareBefore->place(shape->analytical, *before);
+    if (followsNow) m_spareBefore->place(shape->analytical, now);
   }
   // Nothing below throws.
   if (before) {
@@ -112,14 +108,14 @@ void GeometryStep::setTransform(TriangleMesh& mesh, const std::optional<RigidTra
   }
   place(mesh, mesh.now, now);
   if (followsNow) mesh.before.placeAs(mesh.now);
-  if (!mesh.shape) return;
-  std::swap(mesh.shape, m_spare);
-  if (before || followsNow) std::swap(mesh.shapeBefore, m_spareBefore);
+  if (!shape) return;
+  std::swap(shape->now, *m_spare);
+  if (before || followsNow) std::swap(shape->before, *m_spareBefore);
 }
 
-void GeometryStep::advance(TriangleMesh& mesh) noexcept {
+void GeometryStep::advance(TriangleMesh& mesh, PlacedShape* shape) noexcept {
   // The shapes are of one body: assigning one to another keeps the memory.
-  if (mesh.shape && !mesh.before.isSameAs(mesh.now)) mesh.shapeBefore = mesh.shape;
+  if (shape && !mesh.before.isSameAs(mesh.now)) shape->before = shape->now;
   mesh.before = mesh.now;
   m_isNew = m_bodyGiven = m_transformGiven = false;
 }

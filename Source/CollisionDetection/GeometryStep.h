@@ -3,10 +3,11 @@
 #include <palpate/Types.h>
 
 #include "Core/Threads.h"
-#include "Geometry/Motion.h"
-#include "Geometry/Positions.h"
-#include "Geometry/Revision.h"
-#include "Geometry/TriangleMesh.h"
+#include "Mesh/Motion.h"
+#include "Mesh/Positions.h"
+#include "Mesh/Revision.h"
+#include "Mesh/TriangleMesh.h"
+#include "Shapes/PlacedShape.h"
 
 #include <array>
 #include <cstdint>
@@ -17,8 +18,8 @@
 
 namespace palpate {
 
-/// The two ends of one geometry's step: the only writer of TriangleMesh::before, now, shapeBefore
-/// and shape.
+/// The two ends of one geometry's step: the only writer of TriangleMesh::before and now, and of
+/// a PlacedShape's.
 ///
 /// The end `now` is what was set last. The end `before` is `now` of the last advance(), unless it
 /// was given. While the geometry is new (it was added or its topology was set in this step) the end
@@ -36,15 +37,16 @@ class GeometryStep {
   /// Positions of a new geometry or topology, at both ends.
   void start(TriangleMesh&, Positions::Body) noexcept;
   /// The shape of a new analytical geometry, not placed.
-  void startShape(TriangleMesh&, const AnalyticalGeometry&, Shape);
+  void startShape(const Shape&);
   /// moved: if not null, receives the motion of the step where both ends are unplaced.
   void setPositions(TriangleMesh&, std::optional<std::span<const Eigen::Vector3d>> before,
                     std::span<const Eigen::Vector3d> now, const Threads&,
                     std::optional<MotionRange>* moved);
-  void setTransform(TriangleMesh&, const std::optional<RigidTransform>& before,
+  /// shape: null if there is none.
+  void setTransform(TriangleMesh&, PlacedShape* shape, const std::optional<RigidTransform>& before,
                     const RigidTransform& now);
   /// The end `now` becomes `before`.
-  void advance(TriangleMesh&) noexcept;
+  void advance(TriangleMesh&, PlacedShape* shape) noexcept;
 
   /// A detection has seen the end `now`.
   void noteDetection(const TriangleMesh& mesh) noexcept { m_detected = mesh.now; }
@@ -67,7 +69,7 @@ class GeometryStep {
   /// Positions are checked while they are copied into one of these that no end uses: three ends
   /// and two incoming arrays.
   std::array<std::shared_ptr<std::vector<Eigen::Vector3d>>, 5> m_bodies;
-  std::optional<Shape> m_spare, m_spareBefore;
+  std::optional<Shape> m_spare, m_spareBefore;  ///< placed before anything is committed
 };
 
 }  // namespace palpate

@@ -17,6 +17,8 @@ constexpr std::size_t kSmall = 16384;
 /// Refitting fewer triangles in all, cores take longer to hand over data than to compute it.
 constexpr std::size_t kSmallRefit = 24576;
 /// In the body's frame, so that it does not depend on where the body is.
+PlacedShape* shapeOf(Geometry& geometry) { return geometry.shape ? &*geometry.shape : nullptr; }
+
 double smallestHeight(const TriangleMesh& mesh) {
   double smallest = std::numeric_limits<double>::infinity();
   for (const auto& [i, j, k] : mesh.topology.triangles) {
@@ -116,12 +118,14 @@ GeometryId GeometryTable::add(const AnalyticalGeometry& analytical) {
   std::optional<std::size_t> element;
   if (const std::string fault = faultOf(analytical, element); !fault.empty())
     throw Error(ErrorCode::InvalidShape, nameOf(id) + ": " + fault, id, element);
-  Shape shape(analytical, {});
+  const PlacedShape shape(analytical);
   MeshTopology topology;
   topology.kind = GeometryKind::Shape;
-  auto geometry = make({shape.corners().begin(), shape.corners().end()}, std::move(topology));
+  auto geometry =
+      make({shape.now.corners().begin(), shape.now.corners().end()}, std::move(topology));
   geometry->mesh.rest.clear();
-  geometry->step.startShape(geometry->mesh, analytical, std::move(shape));
+  geometry->shape = shape;
+  geometry->step.startShape(shape.now);
   return add(std::move(geometry));
 }
 
@@ -129,13 +133,13 @@ void GeometryTable::setTransform(GeometryId id, const std::optional<RigidTransfo
                                  const RigidTransform& now) {
   Geometry& geometry = at(id);
   // The positions in the body's frame, and the octree, stay as they are.
-  geometry.step.setTransform(geometry.mesh, before, now);
+  geometry.step.setTransform(geometry.mesh, shapeOf(geometry), before, now);
 }
 
 void GeometryTable::advance() noexcept {
   ++m_stepNumber;
   for (const auto& geometry : m_geometries) {
-    geometry->step.advance(geometry->mesh);
+    geometry->step.advance(geometry->mesh, shapeOf(*geometry));
     geometry->motion.advance();
   }
 }

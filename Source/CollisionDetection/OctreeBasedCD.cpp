@@ -29,8 +29,9 @@ namespace palpate {
 
 namespace {
 
-Eigen::AlignedBox3d boundsOf(const TriangleMesh& mesh) {
-  if (mesh.shape) return mesh.shape->bounds();
+Eigen::AlignedBox3d boundsOf(const Geometry& geometry) {
+  if (geometry.shape) return geometry.shape->now.bounds();
+  const TriangleMesh& mesh = geometry.mesh;
   Eigen::AlignedBox3d box;
   for (std::uint32_t v = 0; v < mesh.now.size(); ++v) {
     const Eigen::Vector3d centre = mesh.now[v], reach = Eigen::Vector3d::Constant(mesh.radius(v));
@@ -43,7 +44,7 @@ Eigen::AlignedBox3d boundsOf(const TriangleMesh& mesh) {
 void checkVertices(const Geometry& vertices, GeometryId body) {
   if (vertices.id == body)
     throw Error(ErrorCode::InvalidSettings, nameOf(body) + ": its own vertices lie on it", body);
-  if (vertices.mesh.shape)
+  if (vertices.shape)
     throw Error(ErrorCode::UnsupportedMethod,
                 nameOf(vertices.id) + " is a shape: it has no vertices", vertices.id);
 }
@@ -51,7 +52,7 @@ void checkVertices(const Geometry& vertices, GeometryId body) {
 }  // namespace
 
 void checkCandidates(const PairRecord& record) {
-  if (record.meshes().hasShape())
+  if (record.hasShape())
     throw Error(ErrorCode::NotAvailable, "a pair with a shape has no candidate pairs",
                 record.pair.a);
 }
@@ -116,7 +117,7 @@ struct OctreeBasedCD::Implementation {
       const Method method = record->pair.settings.method;
       const bool moves =
           (detecting || method == Method::Auto) &&
-          (method == Method::Continuous || method == Method::Auto || !record->meshes().hasShape());
+          (method == Method::Continuous || method == Method::Auto || !record->hasShape());
       if (moves)
         for (Geometry* geometry : {record->a, record->b}) geometry->motion.update(*geometry);
       record->plan = planOf(record->pair.settings, *record->a, *record->b, moves);
@@ -458,15 +459,15 @@ std::size_t OctreeBasedCD::vertexCount(GeometryId geometry) const {
 }
 
 std::span<const Eigen::Vector3d> OctreeBasedCD::positions(GeometryId geometry) const {
-  const TriangleMesh& mesh = read().geometries.at(geometry).mesh;
-  if (mesh.shape) return {};
-  return mesh.now.body();
+  const Geometry& asked = read().geometries.at(geometry);
+  if (asked.shape) return {};
+  return asked.mesh.now.body();
 }
 
 Eigen::AlignedBox3d OctreeBasedCD::bounds(GeometryId geometry) const {
-  const TriangleMesh& mesh = read().geometries.at(geometry).mesh;
+  const Geometry& asked = read().geometries.at(geometry);
   const StandardFloatingPoint standard;
-  return boundsOf(mesh);
+  return boundsOf(asked);
 }
 
 void OctreeBasedCD::update() {

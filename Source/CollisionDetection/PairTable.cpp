@@ -1,7 +1,7 @@
 #include "CollisionDetection/PairTable.h"
 
 #include "Core/Text.h"
-#include "Geometry/RestDistance.h"
+#include "Mesh/RestDistance.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
@@ -67,11 +67,11 @@ class Check {
   Check(const Geometry& a, const Geometry& b, const PairSettings& settings)
       : m_id(a.id), m_name(nameOf(a.id, b.id)), m_method(settings.method) {
     range(a.mesh, b.mesh, settings);
-    kinds(a.mesh, b.mesh);
-    const bool proximity = hasProximity(a.mesh, b.mesh, settings.thickness);
+    kinds(a, b);
+    const bool proximity = hasProximity(a, b, settings.thickness);
     need(m_method != Method::Proximity || proximity,
          "Method::Proximity needs a positive thickness; it is 0");
-    need(m_method != Method::Auto || proximity || hasContinuous(a.mesh, b.mesh),
+    need(m_method != Method::Auto || proximity || hasContinuous(a, b),
          "Method::Auto needs a positive thickness for these radii; it is 0");
   }
 
@@ -108,17 +108,20 @@ class Check {
              " does not use it, only Method::Auto does: leave it negative");
   }
 
-  void kinds(const TriangleMesh& a, const TriangleMesh& b) {
-    const Shape* tool = a.shape ? &*a.shape : b.shape ? &*b.shape : nullptr;
-    const bool continuous = m_method == Method::Continuous, both = a.shape && b.shape,
-               meshes = a.topology.hasFaces() && b.topology.hasFaces() && !tool;
-    support(&a != &b || tool || !a.now.isPlaced(), kRigidWithItself);
-    support(&a != &b || !tool, "a shape does not meet itself");
-    support(!both || !a.shape->isPlane() || !b.shape->isPlane(), "two planes have no distance");
+  void kinds(const Geometry& a, const Geometry& b) {
+    const auto isPlane = [](const Geometry& each) {
+      return each.shape && each.shape->now.isPlane();
+    };
+    const MeshTopology &ofA = a.mesh.topology, &ofB = b.mesh.topology;
+    const bool continuous = m_method == Method::Continuous, self = &a == &b,
+               meshes = ofA.hasFaces() && ofB.hasFaces();
+    support(!self || a.shape || !a.isPlaced(), kRigidWithItself);
+    support(!self || !a.shape, "a shape does not meet itself");
+    support(!isPlane(a) || !isPlane(b), "two planes have no distance");
     const bool any = m_method == Method::Auto || m_method == Method::Proximity;
     support(meshes || continuous || any,
-            "Method::Intersection is for two triangle meshes, not for " + nameOf(a.topology.kind) +
-                " and " + nameOf(b.topology.kind) + "; Auto, Proximity and Continuous are");
+            "Method::Intersection is for two triangle meshes, not for " + nameOf(ofA.kind) +
+                " and " + nameOf(ofB.kind) + "; Auto, Proximity and Continuous are");
     support(!continuous || hasContinuous(a, b),
             "Method::Continuous needs one radius for all vertices; Proximity and Auto do not");
   }
@@ -200,7 +203,7 @@ void PairTable::checkRigid(GeometryId geometry) const {
 void PairTable::setPredicate(const GeometryTable& geometries, GeometryId a, GeometryId b,
                              ContactPredicate predicate) {
   PairRecord& record = inOrder(geometries, a, b);
-  if (predicate && record.meshes().hasShape())
+  if (predicate && record.hasShape())
     throw Error(ErrorCode::UnsupportedMethod,
                 nameOf(a, b) + ": a shape has no features to ask about", a);
   record.predicate = std::move(predicate);

@@ -45,7 +45,9 @@ struct PairRecord {
             floats,
             plan.step,
             settings.restDistance > 0.0 ? &near : nullptr,
-            predicate ? &predicate : nullptr};
+            predicate ? &predicate : nullptr,
+            a->shape ? &*a->shape : nullptr,
+            b->shape ? &*b->shape : nullptr};
   }
   bool collides() const { return a->meets(*b); }
   bool anyDisabled() const {
@@ -58,7 +60,8 @@ struct PairRecord {
   /// Commits an empty answer, of a pair that does not collide.
   void commitNothing(bool keepsCandidates) noexcept;
 
-  const Geometry& mesh() const { return a->mesh.shape ? *b : *a; }  ///< of a pair with a shape
+  bool hasShape() const { return a->shape || b->shape; }
+  const Geometry& mesh() const { return a->shape ? *b : *a; }  ///< of a pair with a shape
 
   /// Stored boxes may hold more than this pair's method asks for.
   bool widerBoxes() const { return !plan.swept() && (a->tree.isSwept() || b->tree.isSwept()); }

@@ -14,8 +14,8 @@ CollisionProblem::Mesh meshOf(const Geometry& geometry) {
   copy.radii = mesh.radii;
   copy.filter = geometry.filter;
   copy.disabled = mesh.topology.disabled;
-  copy.analytical = mesh.analytical;
-  if (!mesh.shape) copy.before = mesh.before.all(), copy.now = mesh.now.all();
+  if (geometry.shape) copy.analytical = geometry.shape->analytical;
+  if (!geometry.shape) copy.before = mesh.before.all(), copy.now = mesh.now.all();
   const RigidTransform &before = mesh.before.transform(), &now = mesh.now.transform();
   copy.rotation = now.rotation, copy.translation = now.translation;
   copy.rotationBefore = before.rotation, copy.translationBefore = before.translation;

@@ -143,7 +143,7 @@ double RigidSearch::arcDeviation(const Geometry& geometry) {
   const Eigen::Quaterniond half = Eigen::Quaterniond(turn).normalized();
   const double sine = half.vec().norm();
   if (sine == 0.0) return 0.0;
-  if (geometry.mesh.shape && geometry.mesh.shape->isPlane())
+  if (geometry.shape && geometry.shape->now.isPlane())
     return std::numeric_limits<double>::infinity();
   const Vector3d axis = half.vec() / sine;
   const auto across = [&](const Vector3d& v) -> Vector3d { return v - axis.dot(v) * axis; };

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "Geometry/Motion.h"
-#include "Geometry/Revision.h"
+#include "Mesh/Motion.h"
+#include "Mesh/Revision.h"
 #include "Octree/BoxMap.h"
 #include "Octree/PointQueries.h"
 

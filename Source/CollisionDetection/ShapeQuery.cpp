@@ -1,6 +1,6 @@
 #include "CollisionDetection/ShapeQuery.h"
 
-#include "Geometry/ShapeStep.h"
+#include "Shapes/ShapeStep.h"
 #include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>

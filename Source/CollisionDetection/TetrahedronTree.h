@@ -5,7 +5,7 @@
 
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
-#include "Geometry/FloatPositions.h"
+#include "Mesh/FloatPositions.h"
 #include "Octree/Octree.h"
 
 #include <cstdint>

@@ -44,17 +44,17 @@ static bool knowsSides(const Geometry& a, const Geometry& b) {
   return a.mesh.topology.hasFaces() && b.mesh.topology.hasFaces();
 }
 
-bool hasContinuous(const TriangleMesh& a, const TriangleMesh& b) {
-  return a.radii.empty() && b.radii.empty();
+bool hasContinuous(const Geometry& a, const Geometry& b) {
+  return a.mesh.radii.empty() && b.mesh.radii.empty();
 }
 
-bool hasProximity(const TriangleMesh& a, const TriangleMesh& b, double thickness) {
-  return a.shape || b.shape || thickness + (a.largestRadius + b.largestRadius) > 0.0;
+bool hasProximity(const Geometry& a, const Geometry& b, double thickness) {
+  return a.shape || b.shape || thickness + (a.mesh.largestRadius + b.mesh.largestRadius) > 0.0;
 }
 
 /// Auto with lines, points or shapes: at rest Proximity, which costs least; in a step that moves
 /// features Continuous, which alone misses no impact.
-static void chooseMethod(const PairSettings& settings, const TriangleMesh& a, const TriangleMesh& b,
+static void chooseMethod(const PairSettings& settings, const Geometry& a, const Geometry& b,
                          PairPlan& plan) {
   const bool proximity = hasProximity(a, b, settings.thickness);
   const bool still = plan.motion == 0.0 && proximity;
@@ -72,7 +72,7 @@ PairPlan planOf(const PairSettings& settings, const Geometry& a, const Geometry&
     plan.arcDeviation = a.motion.arcDeviation() + b.motion.arcDeviation();
   }
   if (!knowsSides(a, b)) {
-    if (settings.method == Method::Auto) chooseMethod(settings, a.mesh, b.mesh, plan);
+    if (settings.method == Method::Auto) chooseMethod(settings, a, b, plan);
     return plan;
   }
   step.motion = plan.motion;

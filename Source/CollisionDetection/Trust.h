@@ -3,7 +3,7 @@
 #include <palpate/CollisionData.h>
 
 #include "CollisionDetection/GeometryTable.h"
-#include "Geometry/Revision.h"
+#include "Mesh/Revision.h"
 #include "NarrowPhase/NarrowPhase.h"
 
 #include <optional>
@@ -26,9 +26,9 @@ struct PairPlan {
 };
 
 /// Whether Method::Continuous answers a pair of these geometries.
-bool hasContinuous(const TriangleMesh& a, const TriangleMesh& b);
+bool hasContinuous(const Geometry& a, const Geometry& b);
 /// Whether Method::Proximity does.
-bool hasProximity(const TriangleMesh& a, const TriangleMesh& b, double thickness);
+bool hasProximity(const Geometry& a, const Geometry& b, double thickness);
 
 /// From the settings, which are good, and how the geometries moved, if that matters.
 PairPlan planOf(const PairSettings&, const Geometry& a, const Geometry& b, bool moves = true);

@@ -63,4 +63,12 @@ ImpactAnswer findApproach(const ImpactQuery&, double distance, double tolerance,
 /// 0 if it was always in the plane. exactDecisions: counts up where floating point could not tell.
 int sideBefore(const ImpactQuery&, double time, std::size_t* exactDecisions = nullptr);
 
+/// The vertices at a time of the step, relative to the first one's way: differences stay sharp far
+/// from the origin, where positions would be rounded. As they are where differences overflow.
+std::array<Eigen::Vector3d, 4> positionsAt(const ImpactQuery&, double time);
+/// From these, the normal where features touch, with no minimum distance.
+Eigen::Vector3d normalOfTouch(const ImpactQuery&, double time,
+                              const std::array<Eigen::Vector3d, 4>& positions,
+                              std::size_t& exactDecisions);
+
 }  // namespace palpate

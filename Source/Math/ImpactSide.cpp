@@ -1,3 +1,4 @@
+#include "Math/ClosestPoint.h"
 #include "Math/CubicRoot.h"
 #include "Math/Exact.h"
 #include "Math/ImpactQuery.h"
@@ -65,6 +66,29 @@ int sideBefore(const ImpactQuery& query, double time, std::size_t* exactDecision
   return query.kind == ImpactQuery::Kind::VertexTriangle
              ? side<ImpactQuery::Kind::VertexTriangle>(query, time, exactDecisions)
              : side<ImpactQuery::Kind::EdgeEdge>(query, time, exactDecisions);
+}
+
+std::array<Eigen::Vector3d, 4> positionsAt(const ImpactQuery& query, double time) {
+  std::array<Eigen::Vector3d, 4> p;
+  const auto place = [&](const Eigen::Vector3d& start, const Eigen::Vector3d& end) {
+    for (int i = 0; i < 4; ++i)
+      p[i] =
+          (1.0 - time) * (query.vertices[i].at(0) - start) + time * (query.vertices[i].at(1) - end);
+  };
+  place(query.vertices[0].at(0), query.vertices[0].at(1));
+  const bool finite = std::all_of(
+      p.begin(), p.end(), [](const Eigen::Vector3d& position) { return position.allFinite(); });
+  if (!finite) place(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+  return p;
+}
+
+Eigen::Vector3d normalOfTouch(const ImpactQuery& query, double time,
+                              const std::array<Eigen::Vector3d, 4>& p,
+                              std::size_t& exactDecisions) {
+  const Eigen::Vector3d normal = query.kind == ImpactQuery::Kind::VertexTriangle
+                                     ? windingNormal(p[1], p[2], p[3])
+                                     : normalOfCrossing(p[0], p[1], p[0], p[0] + (p[3] - p[2]));
+  return sideBefore(query, time, &exactDecisions) < 0 ? Eigen::Vector3d(-normal) : normal;
 }
 
 }  // namespace palpate

@@ -122,7 +122,7 @@ constexpr double kSideError = 0x1p-46;
 /// ever further, so any value will do.
 constexpr double kFirstStepBack = 0x1p-44;
 
-// ---- Shapes (Geometry/Shape.cpp, CollisionDetection/ShapeQuery.cpp) ----
+// ---- Shapes (Shapes/Shape.cpp, CollisionDetection/ShapeQuery.cpp) ----
 
 /// Of an edge: how closely its point nearest to a shape is bracketed, and how near to an end it is
 /// that end. The least distance varies by the square of that.

@@ -197,28 +197,6 @@ void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, Contact
 
 }  // namespace
 
-std::array<Vector3d, 4> positionsAt(const ImpactQuery& query, double time) {
-  std::array<Vector3d, 4> p;
-  const auto place = [&](const Vector3d& start, const Vector3d& end) {
-    for (int i = 0; i < 4; ++i)
-      p[i] =
-          (1.0 - time) * (query.vertices[i].at(0) - start) + time * (query.vertices[i].at(1) - end);
-  };
-  place(query.vertices[0].at(0), query.vertices[0].at(1));
-  const bool finite = std::all_of(p.begin(), p.end(),
-                                  [](const Vector3d& position) { return position.allFinite(); });
-  if (!finite) place(Vector3d::Zero(), Vector3d::Zero());
-  return p;
-}
-
-Vector3d normalOfTouch(const ImpactQuery& query, double time, const std::array<Vector3d, 4>& p,
-                       std::size_t& exactDecisions) {
-  const Vector3d normal = query.kind == Kind::VertexTriangle
-                              ? windingNormal(p[1], p[2], p[3])
-                              : normalOfCrossing(p[0], p[1], p[0], p[0] + (p[3] - p[2]));
-  return sideBefore(query, time, &exactDecisions) < 0 ? Vector3d(-normal) : normal;
-}
-
 void findContinuous(const MeshPair& pair, std::span<const TrianglePair> candidates,
                     ContactBuffers& out) {
   forEachLikelyPair(pair, candidates, out, ContactFinder(pair, out));

@@ -47,14 +47,6 @@ struct Features {
   }
 };
 
-/// The vertices at a time of the step, relative to the first one's way: differences stay sharp far
-/// from the origin, where positions would be rounded. As they are where differences overflow.
-std::array<Eigen::Vector3d, 4> positionsAt(const ImpactQuery&, double time);
-/// From these, the normal where features touch, with no minimum distance.
-Eigen::Vector3d normalOfTouch(const ImpactQuery&, double time,
-                              const std::array<Eigen::Vector3d, 4>& positions,
-                              std::size_t& exactDecisions);
-
 /// One feature pair of Method::Continuous; returns whether it is a contact. ofSecond: the first
 /// feature is of the pair's second mesh.
 template <ImpactQuery::Kind kind>

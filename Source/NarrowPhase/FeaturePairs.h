@@ -3,8 +3,8 @@
 #include <palpate/Types.h>
 
 #include "Core/Buffer.h"
-#include "Geometry/FloatPositions.h"
-#include "Geometry/TriangleMesh.h"
+#include "Mesh/FloatPositions.h"
+#include "Mesh/TriangleMesh.h"
 
 #include <array>
 #include <cstdint>

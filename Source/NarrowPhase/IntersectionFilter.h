@@ -3,7 +3,7 @@
 #include <palpate/Types.h>
 
 #include "Core/Buffer.h"
-#include "Geometry/Positions.h"
+#include "Mesh/Positions.h"
 #include "Math/TriangleIntersection.h"
 
 #include <span>

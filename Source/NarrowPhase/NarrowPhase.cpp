@@ -4,7 +4,7 @@
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Proximity.h"
-#include "NarrowPhase/ShapeContacts.h"
+#include "Shapes/ShapeContacts.h"
 
 #include <algorithm>
 #include <numeric>
@@ -72,8 +72,9 @@ FeatureLists everyFeature(const MeshPair& pair) {
 
 void findContactsByBruteForce(const MeshPair& pair, const FeatureLists& features,
                               ContactBuffers& out) {
-  if (pair.isOfShapes()) return findShapePair(pair, out);
-  if (pair.hasShape()) return findShapeContacts(pair, features.trianglesOfA, out);
+  if (pair.isOfShapes()) return findShapePair(*pair.shapeOfA, *pair.shapeOfB, pair.settings, out);
+  if (pair.hasShape())
+    return findShapeContacts(pair.mesh(), pair.shape(), pair.settings, features.trianglesOfA, out);
   const Method method = pair.settings.method;
   if (method == Method::Proximity) return findProximityByBruteForce(pair, features, out);
   if (method == Method::Intersection) return findIntersectionsByBruteForce(pair, features, out);

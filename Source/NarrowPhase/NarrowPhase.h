@@ -4,9 +4,10 @@
 #include <palpate/Settings.h>
 
 #include "Core/Buffer.h"
-#include "Geometry/TriangleMesh.h"
+#include "Mesh/TriangleMesh.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/IntersectionFilter.h"
+#include "Shapes/ShapeContacts.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -40,6 +41,8 @@ struct MeshPair {
   StepPlan step{};
   const IndexLists* near = nullptr;  ///< restDistance: vertices too near each other at rest
   const ContactPredicate* predicate = nullptr;
+  /// Of a geometry that is a shape, whose mesh has no elements; null: it is none.
+  const PlacedShape *shapeOfA = nullptr, *shapeOfB = nullptr;
   double thicknessAtEnd() const { return settings.thickness + step.extra; }
   /// L: centres further apart are no contacts.
   double reach() const { return thicknessAtEnd() + (a.largestRadius + b.largestRadius); }
@@ -51,12 +54,11 @@ struct MeshPair {
     return vertices.radius(vertex) + others.radius(corners, barycentric);
   }
   bool filters() const { return near || predicate || a.outer || b.outer; }
-  bool hasShape() const { return a.shape || b.shape; }
-  bool isOfShapes() const { return a.shape && b.shape; }
+  bool hasShape() const { return shapeOfA || shapeOfB; }
+  bool isOfShapes() const { return shapeOfA && shapeOfB; }
   /// Of a pair with a shape: the other one, and the shape.
-  const TriangleMesh& mesh() const { return a.shape ? b : a; }
-  const Shape& shape() const { return *(a.shape ? a : b).shape; }
-  const Shape& shapeBefore() const { return *(a.shape ? a : b).shapeBefore; }
+  const TriangleMesh& mesh() const { return shapeOfA ? b : a; }
+  const PlacedShape& shape() const { return *(shapeOfA ? shapeOfA : shapeOfB); }
   bool hasLines() const {
     return a.topology.kind == GeometryKind::Lines || b.topology.kind == GeometryKind::Lines;
   }
@@ -85,20 +87,15 @@ struct StepFacts {
 };
 
 /// What one worker found. Unsorted; cleared and filled again each frame.
-struct ContactBuffers {
+struct ContactBuffers : ShapeContactBuffers {
   Buffer<VertexTriangleContact> vertexTriangle, triangleVertex;
   Buffer<EdgeEdgeContact> edgeEdge;
   Buffer<TrianglePair> intersectingTriangles;
-  Buffer<ShapeContact> shape;
-  Buffer<ShapeShapeContact> shapeShape;
-  ShapePairScratch shapePair;
   FeaturePairs features;                  ///< scratch: of the batch at hand
   Buffer<TrianglePair> part;              ///< scratch: some of the batch at hand
   Buffer<PossibleIntersection> possible;  ///< scratch: of the batch at hand
   StepFacts facts;
-  std::size_t featurePairs = 0;    ///< tested
-  std::size_t exactDecisions = 0;  ///< left to exact arithmetic
-  std::size_t validityPairs = 0;   ///< looked at for startedApart
+  std::size_t validityPairs = 0;  ///< looked at for startedApart
   void clear();
 };
 

@@ -5,7 +5,7 @@
 #include "Rows.h"
 
 #include "CollisionDetection/GeometryChecks.h"
-#include "Geometry/Motion.h"
+#include "Mesh/Motion.h"
 #include "Math/MotionBound.h"
 #include "NarrowPhase/IntersectionFilter.h"
 #include "NarrowPhase/NarrowPhase.h"

@@ -12,33 +12,40 @@ sourceFiles() { find Source -name '*.h' -o -name '*.cpp' | sort; }
 # include lines of a file, one a line: <name> or "name
 includesOf() { sed -nE 's/^[[:space:]]*#[[:space:]]*include[[:space:]]+([<"][^>"]+).*/\1/p' "$1"; }
 
-# What a room may include, by the table in DESIGN: folders, or files of them.
+# The module of a file: its folder in Source, or in Source/Adapters.
+moduleOf() {
+  local path=${1#Source/}
+  path=${path#Adapters/}
+  echo "${path%%/*}"
+}
+
+# What a module may include: folders, or files of them.
 allowedIn() {
   case $1 in
     Core) echo "Core/" ;;
     Math) echo "Math/ Core/" ;;
-    Geometry) echo "Geometry/ Math/ Core/" ;;
+    Mesh) echo "Mesh/ Math/ Core/" ;;
+    Shapes) echo "Shapes/ Mesh/ Math/ Core/" ;;
     Octree) echo "Octree/ Math/Box Core/" ;;
-    NarrowPhase) echo "NarrowPhase/ Geometry/ Math/ Core/" ;;
-    DistanceField) echo "DistanceField/ Octree/ Geometry/ Math/ Core/" ;;
-    CollisionDetection) echo "CollisionDetection/ DistanceField/ NarrowPhase/ Octree/ Geometry/ Math/ Core/" ;;
+    NarrowPhase) echo "NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
+    CollisionDetection) echo "CollisionDetection/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
     Vtk | Fcl) echo "$1/" ;;
   esac
 }
 
 # Includes go down the table only; Core sees no more of Public than its plain types.
 checkIncludes() {
-  local file room include allowed prefix
+  local file module include allowed prefix
   while read -r file; do
-    room=${file#Source/} room=${room%%/*} allowed=$(allowedIn "$room")
+    module=$(moduleOf "$file") allowed=$(allowedIn "$module")
     while read -r include; do
       case $include in
         \"*)
           for prefix in $allowed; do [[ ${include#\"} == "$prefix"* ]] && continue 2; done
-          fault "$file: $room may not include ${include#\"}"
+          fault "$file: $module may not include ${include#\"}"
           ;;
         "<palpate/"*)
-          [[ $room != Core || $include =~ ^.palpate/(Types|Error|Export|Executor|Settings|Platform)\.h$ ]] ||
+          [[ $module != Core || $include =~ ^.palpate/(Types|Error|Export|Executor|Settings|Platform)\.h$ ]] ||
             fault "$file: Core may include Public's plain types only, not ${include#<}"
           ;;
       esac
@@ -57,8 +64,8 @@ checkPlaces() {
           place=Source/Core/Threads.cpp ;;
         "<hwy/"*) place=Source/Core/Simd.h ;;
         "<gmp"*) place=Source/Math/Exact.h ;;
-        "<vtk"* | "<X11/"*) place=Source/Vtk/ ;;
-        "<fcl/"* | "<ccd/"*) place=Source/Fcl/ ;;
+        "<vtk"* | "<X11/"*) place=Source/Adapters/Vtk/ ;;
+        "<fcl/"* | "<ccd/"*) place=Source/Adapters/Fcl/ ;;
         *[./]*) place=nowhere ;;
         *) continue ;;
       esac
@@ -71,8 +78,8 @@ checkPlaces() {
 # that these and the standard library do not.
 # Arguments: the compiler, Eigen's folder.
 checkPublicHeaders() {
-  local compile=("$1" -std=c++20 -Wall -Wextra -Werror -x c++ -ISource/Public -ISource/Vtk/Public
-    -ISource/Fcl/Public -isystem "$2") header include
+  local compile=("$1" -std=c++20 -Wall -Wextra -Werror -x c++ -ISource/Public -ISource/Adapters/Vtk/Public
+    -ISource/Adapters/Fcl/Public -isystem "$2") header include
   reached() { "${compile[@]}" -M "$@" | tr ' \\' '\n\n' | grep / | sort -u; }
   local allowed
   allowed=$(printf '#include <bits/stdc++.h>\n#include <Eigen/Core>\n#include <Eigen/Geometry>\n' |
@@ -84,7 +91,7 @@ checkPublicHeaders() {
         fault "$header includes ${include:1}"
     done < <(includesOf "$header")
     while read -r include; do fault "$header reaches $include"; done < <(
-      comm -13 <(echo "$allowed") <(reached -include "$header" /dev/null) | grep -vE '^(Source/((Vtk|Fcl)/)?Public/palpate/|/dev/null)')
+      comm -13 <(echo "$allowed") <(reached -include "$header" /dev/null) | grep -vE '^(Source/(Adapters/(Vtk|Fcl)/)?Public/palpate/|/dev/null)')
   done
 }
 

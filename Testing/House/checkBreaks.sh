@@ -8,10 +8,10 @@ tree=$(mktemp -d)
 trap 'rm -rf "$tree"' EXIT
 missed=0
 
-# A house with every room, in order.
-for room in Core Math Geometry Octree NarrowPhase DistanceField CollisionDetection Vtk Fcl \
-  Public/palpate Vtk/Public/palpate/vtk; do
-  mkdir -p "$tree/Source/$room"
+# A tree with every module, without faults.
+for module in Core Math Mesh Shapes Octree NarrowPhase CollisionDetection Adapters/Vtk Adapters/Fcl \
+  Public/palpate Adapters/Vtk/Public/palpate/vtk; do
+  mkdir -p "$tree/Source/$module"
 done
 mkdir -p "$tree/Examples" "$tree/Testing"
 cp "$root/.clang-format" "$tree"
@@ -38,23 +38,25 @@ plant() {
 
 plant Includes Source/Core/A.h '#include "Octree/Pool.h"\n'
 plant Includes Source/Core/A.h '#include <palpate/OctreeBasedCD.h>\n'
-plant Includes Source/Math/A.h '#  include "Geometry/TriangleMesh.h"\n'
-plant Includes Source/Octree/A.cpp '#include "Geometry/TriangleMesh.h"\n'
+plant Includes Source/Math/A.h '#  include "Mesh/TriangleMesh.h"\n'
+plant Includes Source/Octree/A.cpp '#include "Mesh/TriangleMesh.h"\n'
 plant Includes Source/NarrowPhase/A.h '#include "Octree/Pool.h"\n'
-plant Includes Source/Vtk/A.cpp '#include "Core/Buffer.h"\n'
+plant Includes Source/Mesh/A.h '#include "Shapes/Shape.h"\n'
+plant Includes Source/Shapes/A.h '#include "NarrowPhase/NarrowPhase.h"\n'
+plant Includes Source/Adapters/Vtk/A.cpp '#include "Core/Buffer.h"\n'
 plant Includes Source/Public/palpate/A.h '#include "Core/Buffer.h"\n'
-plant Places Source/Geometry/A.cpp '#include <tbb/parallel_for.h>\n'
-plant Places Source/Geometry/A.cpp '#include <thread>\n'
+plant Places Source/Mesh/A.cpp '#include <tbb/parallel_for.h>\n'
+plant Places Source/Mesh/A.cpp '#include <thread>\n'
 plant Places Source/Octree/A.cpp '#include <hwy/highway.h>\n'
 plant Places Source/Octree/A.cpp '#include <immintrin.h>\n'
 plant Places Source/CollisionDetection/A.cpp '#include <gmp.h>\n'
 plant Places Source/CollisionDetection/A.cpp '#include <vtkPolyData.h>\n'
-plant Places Source/Vtk/A.cpp '#include <fcl/fcl.h>\n'
+plant Places Source/Adapters/Vtk/A.cpp '#include <fcl/fcl.h>\n'
 plant Places Source/Math/A.cpp '#include <Eigen/Dense>\n'
 plant PublicHeaders Source/Public/palpate/A.h '#pragma once\nstd::size_t a();\n' "$compiler" "$eigen"
 plant PublicHeaders Source/Public/palpate/A.h '#pragma once\n#include <Eigen/LU>\n' "$compiler" "$eigen"
 plant PublicHeaders Source/Public/palpate/A.h '#define LIBRARY <sys/mman.h>\n#include LIBRARY\n' "$compiler" "$eigen"
-plant PublicHeaders Source/Vtk/Public/palpate/vtk/A.h '#pragma once\n#include <vtkPolyData.h>\n' "$compiler" "$eigen"
+plant PublicHeaders Source/Adapters/Vtk/Public/palpate/vtk/A.h '#pragma once\n#include <vtkPolyData.h>\n' "$compiler" "$eigen"
 plant Format Source/Core/A.h '#pragma once\nint  a;\n'
 plant Quiet Source/Math/A.cpp 'void f() { std::cerr << 1; }\n'
 plant Quiet Source/Math/A.cpp 'void f() { std::printf("1"); }\n'

@@ -134,17 +134,14 @@ void expectEachFault(const Scene& scene, List list,
 }
 
 TEST(Audit, FiresForTwoShapes) {
-  const auto boxAt = [](const Eigen::Vector3d& centre) {
-    TriangleMesh mesh;
-    mesh.shape.emplace(Box{centre, {1, 1, 1}}, RigidTransform{});
-    return mesh;
-  };
-  const TriangleMesh a = boxAt({0, 0, 0}), b = boxAt({0, 0, 2.5});
+  const TriangleMesh none;
+  const PlacedShape a(Box{{0, 0, 0}, {1, 1, 1}}), b(Box{{0, 0, 2.5}, {1, 1, 1}});
   const PairSettings settings{.method = Method::Proximity, .thickness = 1};
   const CollisionPair pair{GeometryId{0}, GeometryId{1}, settings};
   const auto audited = [&](const CollisionData::Contents& contents) {
     std::vector<AuditFailure> out;
-    audit({a, b, settings}, pair, CollisionData(contents), kEverything, 1, out);
+    audit({.a = none, .b = none, .settings = settings, .shapeOfA = &a, .shapeOfB = &b}, pair,
+          CollisionData(contents), kEverything, 1, out);
     return out;
   };
   OctreeBasedCD detection;

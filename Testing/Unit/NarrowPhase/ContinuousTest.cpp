@@ -1,7 +1,7 @@
 #include "NarrowPhase/Continuous.h"
 
 #include "Common/RandomMeshes.h"
-#include "Geometry/FloatPositions.h"
+#include "Mesh/FloatPositions.h"
 #include "PublishedFrames.h"
 
 #include <gtest/gtest.h>

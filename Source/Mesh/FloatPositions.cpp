@@ -1,0 +1,135 @@
+#include "Mesh/FloatPositions.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "Shapes/FloatPositions.cpp"
+#include "Core/Simd.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+HWY_ATTR void toFloatsKernel(const Eigen::Vector3d* positions, std::size_t size,
+                             const FloatFrame& frame, FloatPoint* out) {
+  constexpr double kMost = kLargestFloat;
+  std::size_t i = 0;
+#if HWY_MAX_BYTES >= 32
+  // A point and the next one's x, which comes to nothing.
+  const hn::FixedTag<double, 4> d;
+  const hn::FixedTag<float, 4> df;
+  alignas(32) const double corner[4] = {frame.origin[0], frame.origin[1], frame.origin[2], 0.0},
+                           scales[4] = {frame.scale, frame.scale, frame.scale, 0.0};
+  const auto origin = hn::Load(d, corner), scale = hn::Load(d, scales);
+  const auto least = hn::Set(d, -kMost), most = hn::Set(d, kMost);
+  for (; i + 1 < size; ++i) {
+    const auto point = (hn::LoadU(d, positions[i].data()) - origin) * scale;
+    hn::Store(hn::DemoteTo(df, hn::Min(hn::Max(point, least), most)), df, &out[i].x);
+  }
+#endif
+  for (; i < size; ++i) {
+    const auto of = [&](int k) {
+      const double v = (positions[i][k] - frame.origin[k]) * frame.scale;
+      return static_cast<float>(std::min(std::max(v, -kMost), kMost));
+    };
+    out[i] = {of(0), of(1), of(2), 0.0f};
+  }
+}
+
+/// Copies; whether all are finite.
+HWY_ATTR bool copyFiniteKernel(const double* from, std::size_t size, double* to) {
+  const hn::ScalableTag<double> d;
+  const std::size_t lanes = hn::Lanes(d);
+  // x * 0 is 0 for finite x and NaN else; NaN survives any sum. Four sums, none of which waits for
+  // another's.
+  const auto zero = hn::Zero(d);
+  hn::Vec<decltype(d)> sums[4] = {zero, zero, zero, zero};
+  std::size_t i = 0;
+  for (; i + 4 * lanes <= size; i += 4 * lanes)
+    for (std::size_t k = 0; k < 4; ++k) {
+      const auto v = hn::LoadU(d, from + i + k * lanes);
+      hn::StoreU(v, d, to + i + k * lanes);
+      sums[k] = sums[k] + v * zero;
+    }
+  double rest = hn::GetLane(hn::SumOfLanes(d, (sums[0] + sums[1]) + (sums[2] + sums[3])));
+  for (; i < size; ++i) {
+    to[i] = from[i];
+    rest += from[i] * 0.0;
+  }
+  return rest == 0.0;
+}
+
+/// Each value at its rank; infinities fill the last vector.
+HWY_ATTR void sortFewKernel(const double* values, std::size_t size, double* sorted) {
+  const hn::CappedTag<double, 8> d;
+  for (std::size_t i = 0; i < size; ++i) {
+    const auto value = hn::Set(d, values[i]);
+    std::size_t less = 0, upTo = 0;
+    for (std::size_t k = 0; k < size; k += hn::Lanes(d)) {
+      const auto others = hn::Load(d, values + k);
+      less += hn::CountTrue(d, hn::Lt(others, value));
+      upTo += hn::CountTrue(d, hn::Le(others, value));
+    }
+    for (; less < upTo; ++less) sorted[less] = values[i];
+  }
+}
+
+}  // namespace palpate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace palpate {
+
+HWY_EXPORT(sortFewKernel);
+
+SampledExtent sampleExtent(std::span<const Eigen::Vector3d> positions) {
+  SampledExtent extent;
+  if (positions.empty()) return extent;
+  constexpr std::size_t kMost = 31;
+  const std::size_t count = std::min(kMost, positions.size());
+  alignas(64) std::array<double, kMost + 1> sample;
+  sample.fill(std::numeric_limits<double>::infinity());
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < count; ++i)
+      sample[i] = positions[i * positions.size() / count][axis];
+    std::array<double, kMost> sorted;
+    HWY_DYNAMIC_DISPATCH(sortFewKernel)(sample.data(), count, sorted.data());
+    extent.median[axis] = sorted[count / 2];
+    // Halved: the difference of two doubles may be beyond their range.
+    const double first = sorted[count / 8], seventh = sorted[count * 7 / 8];
+    extent.spread = std::max(extent.spread, 2.0 * (0.5 * seventh - 0.5 * first));
+  }
+  return extent;
+}
+
+double frameScale(double spread) {
+  if (!(spread > 0.0)) return 1.0;
+  const int exponent = std::isinf(spread) ? 1024 : std::ilogb(spread);
+  const int steps = std::clamp((exponent + (exponent < 0 ? -16 : 16)) / 32, -31, 31);
+  return std::ldexp(1.0, -32 * steps);
+}
+
+HWY_EXPORT(toFloatsKernel);
+
+void toFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
+              FloatPoint* out) {
+  HWY_DYNAMIC_DISPATCH(toFloatsKernel)(positions.data(), positions.size(), frame, out);
+}
+
+HWY_EXPORT(copyFiniteKernel);
+
+std::size_t copyFinite(std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out) {
+  if (positions.empty() || HWY_DYNAMIC_DISPATCH(copyFiniteKernel)(
+                               positions[0].data(), 3 * positions.size(), out->data()))
+    return positions.size();
+  std::size_t i = 0;
+  while (positions[i].allFinite()) ++i;
+  return i;
+}
+
+}  // namespace palpate
+#endif

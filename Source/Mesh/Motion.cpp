@@ -1,0 +1,121 @@
+#include "Mesh/Motion.h"
+
+#include "Math/Tolerances.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "Shapes/Motion.cpp"
+#include "Core/Simd.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// Of eight vertices after each other, coordinate by coordinate.
+constexpr std::size_t kBlock = 24;
+using D = hn::CappedTag<double, 8>;
+using V = hn::Vec<D>;
+
+/// `blocks` of them. Three vectors' worth at a time: that of eight vertices, with AVX-512.
+HWY_ATTR void addBlocks(const double* before, const double* now, std::size_t blocks,
+                        double (&lowest)[kBlock], double (&highest)[kBlock]) {
+  const D d;
+  for (std::size_t first = 0; first < kBlock; first += 3 * hn::Lanes(d)) {
+    const auto moved = [&](std::size_t block, std::size_t i) HWY_ATTR {
+      const std::size_t at = kBlock * block + first + i * hn::Lanes(d);
+      return hn::LoadU(d, now + at) - hn::LoadU(d, before + at);
+    };
+    V lower[3], upper[3];
+    for (std::size_t i = 0; i < 3; ++i) lower[i] = upper[i] = moved(0, i);
+    for (std::size_t block = 1; block < blocks; ++block)
+      for (std::size_t i = 0; i < 3; ++i) {
+        const V v = moved(block, i);
+        lower[i] = hn::Min(lower[i], v);
+        upper[i] = hn::Max(upper[i], v);
+      }
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t at = first + i * hn::Lanes(d);
+      hn::StoreU(lower[i], d, lowest + at);
+      hn::StoreU(upper[i], d, highest + at);
+    }
+  }
+}
+
+}  // namespace palpate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace palpate {
+
+HWY_EXPORT(addBlocks);
+
+constexpr std::size_t kVertices = 8;  ///< of a block
+
+using Eigen::Vector3d;
+
+constexpr std::size_t kSampled = 512;  ///< of a mesh's vertices, for their mean
+
+void MotionRange::add(const MotionRange& other) {
+  if (other.isEmpty) return;
+  lower = isEmpty ? other.lower : Vector3d(lower.cwiseMin(other.lower));
+  upper = isEmpty ? other.upper : Vector3d(upper.cwiseMax(other.upper));
+  isEmpty = false;
+}
+
+MotionRange motionRange(std::span<const Vector3d> before, std::span<const Vector3d> now) {
+  MotionRange range;
+  const std::size_t blocks = now.size() / kVertices;
+  if (blocks > 0) {
+    double lower[3 * kVertices], upper[3 * kVertices];
+    HWY_DYNAMIC_DISPATCH(addBlocks)(before[0].data(), now[0].data(), blocks, lower, upper);
+    const Eigen::Map<const Eigen::Matrix<double, 3, kVertices>> lowest(lower), highest(upper);
+    range.add({lowest.rowwise().minCoeff(), highest.rowwise().maxCoeff(), false});
+  }
+  for (std::size_t i = blocks * kVertices; i < now.size(); ++i)
+    range.add({now[i] - before[i], now[i] - before[i], false});
+  return range;
+}
+
+MotionRange motionRange(const Positions& before, const Positions& now) {
+  if (!before.isPlaced() && !now.isPlaced()) return motionRange(before.body(), now.body());
+  MotionRange range;
+  for (std::size_t i = 0; i < now.size(); ++i)
+    range.add({now[i] - before[i], now[i] - before[i], false});
+  return range;
+}
+
+double largestMotion(const MotionRange& a, const MotionRange& b) {
+  const Vector3d most = (a.upper - b.lower).cwiseAbs().cwiseMax((b.upper - a.lower).cwiseAbs());
+  const double motion = most.stableNorm() * (1.0 + kMotionError);
+  return motion >= 0.0 ? motion : std::numeric_limits<double>::infinity();  // of NaN, too
+}
+
+double smallestMotion(const MotionRange& a, const MotionRange& b) {
+  const Vector3d least = (a.lower - b.upper).cwiseMax(b.lower - a.upper).cwiseMax(0.0);
+  return least.stableNorm() * (1.0 - kMotionError);
+}
+
+double meanMotion(const TriangleMesh& a, const TriangleMesh& b) {
+  if (a.now.size() == 0 || b.now.size() == 0) return 0.0;
+  Vector3d means[2] = {Vector3d::Zero(), Vector3d::Zero()};
+  double squares = 0.0;
+  for (const bool second : {false, true}) {
+    const TriangleMesh& mesh = second ? b : a;
+    const std::size_t step = 1 + mesh.now.size() / kSampled,
+                      count = 1 + (mesh.now.size() - 1) / step;
+    const double weight = 1.0 / static_cast<double>(count);
+    for (std::size_t v = 0; v < mesh.now.size(); v += step) {
+      const Vector3d moved = mesh.now[v] - mesh.before[v];
+      means[second] += weight * moved;
+      squares += weight * moved.squaredNorm();
+    }
+  }
+  return std::sqrt(std::max(0.0, squares - 2.0 * means[0].dot(means[1])));
+}
+
+}  // namespace palpate
+#endif

@@ -1,0 +1,106 @@
+#include "Mesh/TriangleMesh.h"
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+namespace palpate {
+
+MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle> newTriangles)
+    : vertexCount(newVertexCount),
+      triangles(newTriangles.begin(), newTriangles.end()),
+      triangleEdges(newTriangles.size()),
+      isUsed(newVertexCount, false) {
+  struct Side {
+    Segment edge;
+    std::uint32_t triangle, side;
+  };
+  std::vector<Side> sides;
+  sides.reserve(3 * triangles.size());
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      isUsed[triangles[t][i]] = true;
+      const std::uint32_t p = triangles[t][i], q = triangles[t][(i + 1) % 3];
+      triangleEdges[t][i] = kNoEdge;
+      if (p != q) sides.push_back({{std::min(p, q), std::max(p, q)}, t, i});
+    }
+  }
+  std::sort(sides.begin(), sides.end(), [](const Side& l, const Side& r) {
+    return std::tie(l.edge, l.triangle, l.side) < std::tie(r.edge, r.triangle, r.side);
+  });
+  for (std::size_t i = 0; i < sides.size(); ++i) {
+    const auto& [edge, triangle, side] = sides[i];
+    if (i == 0 || edge != sides[i - 1].edge) edges.push_back(edge);
+    triangleEdges[triangle][side] = static_cast<std::uint32_t>(edges.size() - 1);
+  }
+  findOwners({});
+}
+
+void MeshTopology::disable(std::span<const std::uint32_t> newDisabled) {
+  std::vector<bool> newIsDisabled(newDisabled.empty() ? 0 : triangles.size(), false);
+  for (const std::uint32_t triangle : newDisabled) newIsDisabled[triangle] = true;
+  std::vector<std::uint32_t> sorted;
+  for (std::uint32_t t = 0; t < newIsDisabled.size(); ++t)
+    if (newIsDisabled[t]) sorted.push_back(t);
+  findOwners(newIsDisabled);
+  // Nothing below throws.
+  disabled = std::move(sorted);
+  isDisabled = std::move(newIsDisabled);
+}
+
+/// Changes nothing if it throws.
+void MeshTopology::findOwners(const std::vector<bool>& newIsDisabled) {
+  // What a triangle holds twice counts once.
+  const auto listsOf = [&](std::size_t count, const auto& heldBy) {
+    return listsByKey(count, [&](auto&& incidence) {
+      for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+        if (!newIsDisabled.empty() && newIsDisabled[t]) continue;
+        const auto& [a, b, c] = heldBy[t];
+        if (a != kNoEdge) incidence(a, t);
+        if (b != kNoEdge && b != a) incidence(b, t);
+        if (c != kNoEdge && c != a && c != b) incidence(c, t);
+      }
+    });
+  };
+  IndexLists atVertices = listsOf(vertexCount, triangles);
+  IndexLists atEdges = listsOf(edges.size(), triangleEdges);
+
+  std::vector<std::uint8_t> owners(triangles.size(), 0);
+  const auto own = [&](std::uint32_t item, std::uint32_t owner, const auto& held, unsigned first) {
+    const auto place = std::find(held.begin(), held.end(), item) - held.begin();
+    owners[owner] |= static_cast<std::uint8_t>(first << place);
+  };
+  std::size_t untested = 0;
+  for (std::uint32_t v = 0; v < vertexCount; ++v) {
+    const auto incident = atVertices[v];
+    if (incident.empty())
+      ++untested;
+    else
+      own(v, incident.front(), triangles[incident.front()], 1);
+  }
+  std::vector<std::uint8_t> closedStars(vertexCount, 1);
+  const auto goesUp = [&](std::uint32_t e, std::uint32_t triangle) {
+    const auto side = std::find(triangleEdges[triangle].begin(), triangleEdges[triangle].end(), e);
+    return triangles[triangle][side - triangleEdges[triangle].begin()] == edges[e][0];
+  };
+  for (std::uint32_t e = 0; e < edges.size(); ++e) {
+    const auto incident = atEdges[e];
+    if (!incident.empty()) own(e, incident.front(), triangleEdges[incident.front()], 8);
+    if (incident.size() != 2 || goesUp(e, incident[0]) == goesUp(e, incident[1]))
+      closedStars[edges[e][0]] = closedStars[edges[e][1]] = 0;
+  }
+  // Nothing below throws.
+  vertexTriangles = std::move(atVertices);
+  edgeTriangles = std::move(atEdges);
+  owned = std::move(owners);
+  untestedVertices = untested;
+  hasClosedStar = std::move(closedStars);
+}
+
+std::uint32_t MeshTopology::edgeOf(const Segment& edge) const {
+  const auto place = std::lower_bound(edges.begin(), edges.end(), edge);
+  if (place == edges.end() || *place != edge) return kNoEdge;
+  return static_cast<std::uint32_t>(place - edges.begin());
+}
+
+}  // namespace palpate

@@ -1,0 +1,326 @@
+#include "Shapes/Polytope.h"
+
+#include "Shapes/ShapeLengths.h"
+#include "Math/Compensated.h"
+#include "Math/Foot.h"
+#include "Math/Predicates.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+constexpr std::uint32_t kNone = 0xffffffffu;
+
+int volumeSign(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
+  SignCounts counts;
+  return orient3d(a, b, c, d, counts);
+}
+
+bool spanPlane(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+  SignCounts counts;
+  return orient2d(0, a, b, c, counts) != 0 || orient2d(1, a, b, c, counts) != 0 ||
+         orient2d(2, a, b, c, counts) != 0;
+}
+
+/// Of the points that are `independent`, the one of greatest measure.
+template <class Independent, class Measure>
+const Vector3d* furthest(std::span<const Vector3d> points, Independent&& independent,
+                         Measure&& measure) {
+  const Vector3d* best = nullptr;
+  double most = 0;
+  for (const Vector3d& p : points) {
+    const double its = measure(p);
+    if ((best && !(its > most)) || !independent(p)) continue;
+    best = &p;
+    most = its;
+  }
+  return best;
+}
+
+/// Up to so many points are added in their own order.
+constexpr std::size_t kPointsInOrder = 32;
+
+/// 0, 1, ... in an order that looks random and is the same on every machine: Fisher and Yates, with
+/// the numbers of SplitMix64 (Steele, Lea, Flood 2014).
+std::vector<std::uint32_t> shuffled(std::uint32_t count) {
+  std::vector<std::uint32_t> order(count);
+  std::iota(order.begin(), order.end(), 0u);
+  std::uint64_t state = 0;
+  for (std::uint32_t i = count; i > 1; --i) {
+    std::uint64_t z = state += 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    z ^= z >> 31;
+    std::swap(order[i - 1], order[(z >> 32) * i >> 32]);
+  }
+  return order;
+}
+
+}  // namespace
+
+std::vector<Vector3d> spanOf(std::span<const Vector3d> points) {
+  const auto before = [](const Vector3d& p, const Vector3d& q) {
+    return std::lexicographical_compare(p.begin(), p.end(), q.begin(), q.end());
+  };
+  const auto [first, last] = std::minmax_element(points.begin(), points.end(), before);
+  std::vector<Vector3d> span{*first};
+  if (*first == *last) return span;
+  span.push_back(*last);
+  const Vector3d &a = *first, along = *last - a;
+  const Vector3d* third = furthest(
+      points, [&](const Vector3d& p) { return spanPlane(a, *last, p); },
+      [&](const Vector3d& p) { return along.cross(p - a).squaredNorm(); });
+  if (!third) return span;
+  span.push_back(*third);
+  const Vector3d across = along.cross(*third - a);
+  if (const Vector3d* fourth = furthest(
+          points, [&](const Vector3d& p) { return volumeSign(a, *last, *third, p) != 0; },
+          [&](const Vector3d& p) { return std::abs(across.dot(p - a)); }))
+    span.push_back(*fourth);
+  return span;
+}
+
+Polytope::Polytope(std::span<const Vector3d> points) {
+  std::vector<Vector3d> four = spanOf(points);
+  const bool flat = four.size() == 3;
+  if (flat) {  // with a point beside the plane, which goes again
+    const Vector3d across = (four[1] - four[0]).cross(four[2] - four[0]).cwiseAbs();
+    SignCounts counts;
+    int axis = 0;
+    across.maxCoeff(&axis);
+    for (int k = 0; orient2d(axis, four[0], four[1], four[2], counts) == 0; ++k) axis = k;
+    four.push_back(four[0]);
+    four[3][axis] +=
+        std::max({std::abs(four[0][axis]), largest(four[1] - four[0]), largest(four[2] - four[0])});
+  }
+  start(four);
+  addAll(points);
+  if (flat)
+    keepPlate(3);
+  else
+    keepHull();
+}
+
+void Polytope::start(std::span<const Vector3d> four) {
+  m_points.assign(four.begin(), four.end());
+  m_faces.clear();
+  m_planes.clear();
+  m_free.clear();
+  m_sees.clear();
+  m_next.assign(4, 0);
+  const bool turned = volumeSign(four[0], four[1], four[2], four[3]) > 0;
+  const std::uint32_t b = turned ? 2 : 1, c = turned ? 1 : 2;
+  newFace({0, b, c}, {1, 2, 3});
+  newFace({0, 3, b}, {3, 2, 0});
+  newFace({b, 3, c}, {1, 3, 0});
+  newFace({c, 3, 0}, {2, 1, 0});
+}
+
+std::uint32_t Polytope::newFace(const Triangle& corners, const Triangle& neighbours) {
+  auto face = static_cast<std::uint32_t>(m_faces.size());
+  if (m_free.empty()) {
+    m_faces.emplace_back();
+    m_planes.emplace_back();
+    m_sees.push_back(0);
+  } else {
+    face = m_free.back();
+    m_free.pop_back();
+  }
+  const Vector3d &a = m_points[corners[0]], &b = m_points[corners[1]], &c = m_points[corners[2]];
+  const Vector3d normal = unitCross(a, b, a, c, &m_decisions.undecided);
+  m_faces[face] = {corners, neighbours};
+  m_planes[face] = {normal, dot(normal, a), face};
+  m_sees[face] = 0;
+  return face;
+}
+
+bool Polytope::add(const Vector3d& p) {
+  m_visible.clear();
+  for (std::uint32_t f = 0; f < m_faces.size(); ++f) {
+    m_sees[f] = m_planes[f].face != kNone && sees(p, f);
+    if (m_sees[f]) m_visible.push_back(f);
+  }
+  if (m_visible.empty()) return false;
+  addVisible(p);
+  removeVisible();
+  return true;
+}
+
+/// Faces from p to the border of what it sees.
+void Polytope::addVisible(const Vector3d& p) {
+  m_points.push_back(p);
+  m_next.resize(m_points.size());
+  m_fresh.clear();
+  std::uint32_t last = kNone;
+  for (const std::uint32_t f : m_visible) last = cut(f, last);
+  // Around the border; m_next: the new face that starts at a corner of that.
+  for (std::uint32_t f = last, next = kNone; next != last; f = next) {
+    next = m_next[m_faces[f].corners[1]];
+    m_faces[f].neighbours[1] = next;
+    m_faces[next].neighbours[2] = f;
+  }
+}
+
+void Polytope::removeVisible() {
+  for (const std::uint32_t f : m_visible) {
+    m_planes[f] = {Vector3d::Zero(), std::numeric_limits<double>::infinity(), kNone};
+    m_sees[f] = 0;
+    m_free.push_back(f);
+  }
+}
+
+/// Which of the points that are still to be added see which face.
+///
+/// A point that sees a new face, which has an edge with a face on either side of the border, saw
+/// one of these two: in front of a plane between two others through one line, it is in front of one
+/// of them. And a point outside that saw a face which is removed sees a new one: what it sees is
+/// connected, so either that is all removed, or it saw both faces at an edge of the border.
+struct Polytope::Conflicts {
+  std::vector<std::vector<std::uint32_t>> ofFace;
+  std::vector<std::uint32_t> seen;    ///< per point: a face that it sees; kNone: it is inside
+  std::vector<std::uint32_t> tested;  ///< per point: how many faces there were when it was last
+
+  explicit Conflicts(std::size_t points) : seen(points, kNone), tested(points, 0) {}
+  void add(std::uint32_t point, std::uint32_t face) {
+    ofFace[face].push_back(point);
+    seen[point] = face;
+  }
+};
+
+void Polytope::addAll(std::span<const Vector3d> points) {
+  if (points.size() <= kPointsInOrder) {
+    for (const Vector3d& p : points) add(p);
+    return;
+  }
+  const auto count = static_cast<std::uint32_t>(points.size());
+  Conflicts conflicts(count);
+  conflicts.ofFace.resize(m_faces.size());
+  for (std::uint32_t f = 0; f < m_faces.size(); ++f) {
+    const OrientedPlane plane(corner(f, 0), corner(f, 1), corner(f, 2));
+    for (std::uint32_t i = 0; i < count; ++i)
+      if (plane.side(points[i], m_decisions) > 0) conflicts.add(i, f);
+  }
+  std::uint32_t made = 0;  // faces
+  const auto test = [&](std::uint32_t point, const OrientedPlane& plane, std::uint32_t face) {
+    if (conflicts.tested[point] == made) return;
+    conflicts.tested[point] = made;
+    if (plane.side(points[point], m_decisions) > 0) conflicts.add(point, face);
+  };
+  for (const std::uint32_t i : shuffled(count)) {
+    if (conflicts.seen[i] == kNone) continue;
+    m_visible.assign(1, conflicts.seen[i]);
+    m_sees[conflicts.seen[i]] = 1;
+    for (std::size_t k = 0; k < m_visible.size(); ++k)
+      for (const std::uint32_t other : m_faces[m_visible[k]].neighbours)
+        if (!m_sees[other] && sees(points[i], other)) m_sees[other] = 1, m_visible.push_back(other);
+    addVisible(points[i]);
+    for (const std::uint32_t f : m_visible)
+      for (const std::uint32_t point : conflicts.ofFace[f]) conflicts.seen[point] = kNone;
+    conflicts.ofFace.resize(m_faces.size());
+    for (const auto& [face, seen] : m_fresh) {
+      const OrientedPlane plane(corner(face, 0), corner(face, 1), corner(face, 2));
+      ++made;
+      for (const std::uint32_t from : {seen, m_faces[face].neighbours[0]})
+        for (const std::uint32_t point : conflicts.ofFace[from]) test(point, plane, face);
+    }
+    for (const std::uint32_t f : m_visible) conflicts.ofFace[f].clear();
+    removeVisible();
+  }
+}
+
+/// New faces from the last point to a face's edges behind which it sees nothing. Returns the last
+/// of all.
+std::uint32_t Polytope::cut(std::uint32_t face, std::uint32_t last) {
+  const auto p = static_cast<std::uint32_t>(m_points.size() - 1);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Face seen = m_faces[face];
+    const std::uint32_t u = seen.corners[i], v = seen.corners[(i + 1) % 3],
+                        behind = seen.neighbours[i];
+    if (m_sees[behind]) continue;
+    const std::uint32_t fresh = newFace({u, v, p}, {behind, kNone, kNone});
+    m_next[u] = fresh;
+    m_fresh.push_back({fresh, face});
+    for (std::size_t k = 0; k < 3; ++k)
+      if (m_faces[behind].corners[k] == v && m_faces[behind].corners[(k + 1) % 3] == u)
+        m_faces[behind].neighbours[k] = fresh;
+    last = fresh;
+  }
+  return last;
+}
+
+/// Without what is left of faces and points on the way. Returns the faces' new numbers.
+std::vector<std::uint32_t> Polytope::keepHull() {
+  Buffer<Face> faces;
+  Buffer<Plane> planes;
+  std::vector<std::uint32_t> ofFace(m_faces.size(), kNone), ofPoint(m_points.size(), kNone);
+  std::vector<Vector3d> points;
+  for (std::uint32_t f = 0; f < m_faces.size(); ++f) {
+    if (m_planes[f].face == kNone) continue;
+    ofFace[f] = static_cast<std::uint32_t>(faces.size());
+    faces.push_back(m_faces[f]);
+    planes.push_back(m_planes[f]);
+    planes.back().face = ofFace[f];
+  }
+  for (Face& face : faces)
+    for (std::size_t i = 0; i < 3; ++i) {
+      face.neighbours[i] = ofFace[face.neighbours[i]];
+      std::uint32_t& place = ofPoint[face.corners[i]];
+      if (place == kNone) {
+        place = static_cast<std::uint32_t>(points.size());
+        points.push_back(m_points[face.corners[i]]);
+      }
+      face.corners[i] = place;
+    }
+  m_faces.swap(faces);
+  m_planes.swap(planes);
+  m_points.swap(points);
+  return ofFace;
+}
+
+/// Of the hull with an apex beside the plane: its base, from both sides.
+void Polytope::keepPlate(std::uint32_t apex) {
+  const auto isBase = [&](std::uint32_t f) {
+    const auto& [a, b, c] = m_faces[f].corners;
+    return m_planes[f].face != kNone && a != apex && b != apex && c != apex;
+  };
+  const auto count = static_cast<std::uint32_t>(m_faces.size());
+  std::vector<std::uint32_t> back(count, kNone);
+  m_free.clear();
+  for (std::uint32_t f = 0; f < count; ++f) {
+    if (!isBase(f)) continue;
+    const auto [a, b, c] = m_faces[f].corners;
+    back[f] = newFace({a, c, b}, {});
+  }
+  Buffer<Plane> border;
+  for (std::uint32_t f = 0; f < count; ++f) {
+    if (!isBase(f)) continue;
+    for (std::size_t i = 0; i < 3; ++i) {
+      std::uint32_t& neighbour = m_faces[f].neighbours[i];
+      std::uint32_t& behind = m_faces[back[f]].neighbours[2 - i];
+      if (isBase(neighbour)) {
+        behind = back[neighbour];
+        continue;
+      }
+      neighbour = back[f];
+      behind = f;
+      const Vector3d &u = corner(f, static_cast<int>(i)),
+                     &v = corner(f, static_cast<int>(i + 1) % 3);
+      const Vector3d out = directionOf(v - u).cross(m_planes[f].normal).normalized();
+      border.push_back({out, dot(out, u), f});
+    }
+  }
+  for (std::uint32_t f = 0; f < count; ++f)
+    if (!isBase(f)) m_planes[f].face = kNone;
+  const std::vector<std::uint32_t> ofFace = keepHull();
+  for (Plane& plane : border) plane.face = ofFace[plane.face];
+  m_planes.insert(m_planes.end(), border.begin(), border.end());
+}
+
+}  // namespace palpate

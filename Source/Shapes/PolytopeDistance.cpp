@@ -1,0 +1,219 @@
+#include "Shapes/Polytope.h"
+#include "Math/Compensated.h"
+#include "Math/Tolerances.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+/// Of a convex function of t that is the height of the highest plane: at t, and below it elsewhere.
+struct Polytope::Tangent {
+  double t, height, slope;
+  std::uint32_t plane;
+};
+
+/// Where it is least, and the tangents before and after, which meet there.
+struct Polytope::Valley {
+  double t, height;
+  Tangent before, after;
+  /// Of what their planes have, as much of each as makes the slopes cancel out.
+  template <class F>
+  double mixed(F&& f) const {
+    if (!(after.slope > before.slope)) return f(before.plane);
+    const double weight = std::clamp(after.slope / (after.slope - before.slope), 0.0, 1.0);
+    return weight * f(before.plane) + (1 - weight) * f(after.plane);
+  }
+};
+
+/// Over [0, 1]; the height is within `tie` of the least.
+/// Source   Kelley, The cutting-plane method for solving convex programs (1960), in one dimension:
+///          of functions made of straight pieces the end is found, not approached.
+template <class At>
+Polytope::Valley Polytope::valleyOf(double tie, At&& at) {
+  Tangent before = at(0.0);
+  if (!(before.slope < 0)) return {0, before.height, before, before};
+  Tangent after = at(1.0);
+  if (!(after.slope > 0)) return {1, after.height, after, after};
+  for (;;) {
+    const double width = after.t - before.t;
+    const double step =
+        (after.height - before.height - after.slope * width) / (before.slope - after.slope);
+    const double t = before.t + step, bound = before.height + before.slope * step;
+    if (!(t > before.t && t < after.t)) {
+      const Tangent& lower = after.height < before.height ? after : before;
+      return {lower.t, lower.height, before, after};
+    }
+    const Tangent next = at(t);
+    if (next.slope == 0) return {t, next.height, next, next};
+    if (!(next.height > bound + tie)) return {t, next.height, before, after};
+    (next.slope < 0 ? before : after) = next;
+  }
+}
+
+/// Of the planes along p + t (q - p).
+Polytope::Valley Polytope::valley(const Vector3d& p, const Vector3d& q, double tie) const {
+  const Vector3d along = q - p;
+  return valleyOf(tie, [&](double t) {
+    const Vector3d x = p + t * along;
+    const std::uint32_t top = highest(x, 0);
+    return Tangent{t, m_planes[top].height(x), dot(m_planes[top].normal, along), top};
+  });
+}
+
+std::uint32_t Polytope::highest(const Vector3d& x, double tie) const {
+  std::uint32_t best = 0;
+  double height = -kInfinity;
+  for (std::uint32_t i = 0; i < m_planes.size(); ++i) {
+    const double its = m_planes[i].height(x);
+    if (its > height + tie) best = i, height = its;
+  }
+  return best;
+}
+
+Polytope::OnFace Polytope::onFace(const Vector3d& x, std::uint32_t face) const {
+  return {finiteVertexTriangleDistance(x, corner(face, 0), corner(face, 1), corner(face, 2)), face};
+}
+
+/// f(face) of those at the edge or the corner that is nearest.
+template <class F>
+void Polytope::forEachAround(const OnFace& on, F&& f) const {
+  const auto feature = static_cast<std::size_t>(on.from.feature);
+  if (on.from.feature == TriangleFeature::Face) return;
+  const Face& first = m_faces[on.face];
+  if (feature >= 3) return f(first.neighbours[feature - 3]);
+  const std::uint32_t vertex = first.corners[feature];
+  for (std::uint32_t at = first.neighbours[feature]; at != on.face;) {
+    f(at);
+    const Face& face = m_faces[at];
+    std::size_t i = 0;
+    while (face.corners[i] != vertex) ++i;
+    at = face.neighbours[i];
+  }
+}
+
+/// To the face that is nearest to a point outside, over faces that are in front of it: where none
+/// around is nearer, none at all is, because the body is convex.
+Polytope::OnFace Polytope::walk(const Vector3d& x, std::uint32_t face, double tie) const {
+  OnFace best = onFace(x, face);
+  for (bool nearer = true; nearer;) {
+    nearer = false;
+    const OnFace from = best;
+    forEachAround(from, [&](std::uint32_t other) {
+      if (m_planes[other].height(x) < -tie) return;
+      const OnFace on = onFace(x, other);
+      if (!(on.from.distance < best.from.distance)) return;
+      best = on;
+      nearer = true;
+    });
+  }
+  return best;
+}
+
+Polytope::OnFace Polytope::nearest(const Vector3d& x, double tie) const {
+  const Plane& top = m_planes[highest(x, tie)];
+  if (top.height(x) > tie) return walk(x, top.face, tie);
+  OnFace best = onFace(x, top.face);
+  for (const Plane& plane : m_planes) {
+    if (!(plane.height(x) >= top.height(x) - tie)) continue;
+    const Triangle& corners = m_faces[plane.face].corners;
+    if (std::any_of(corners.begin(), corners.end(),
+                    [&](std::uint32_t v) { return std::abs(top.height(m_points[v])) > tie; }))
+      continue;
+    const OnFace on = onFace(x, plane.face);
+    if (on.from.distance < best.from.distance) best = on;
+  }
+  return best;
+}
+
+SignedDistance Polytope::at(const Vector3d& x, double tie) const {
+  const Plane& top = m_planes[highest(x, tie)];
+  const double height = top.height(x);
+  if (!(height > tie)) return {height, top.normal};
+  const OnFace on = walk(x, top.face, tie);
+  return {on.from.distance, on.from.normal};
+}
+
+Vector3d Polytope::support(const Vector3d& direction, double tie) const {
+  double most = -kInfinity;
+  for (const Vector3d& p : m_points) most = std::max(most, dot(direction, p));
+  Vector3d sum = Vector3d::Zero();
+  double count = 0;
+  for (const Vector3d& p : m_points)
+    if (dot(direction, p) >= most - tie) sum += p, ++count;
+  return sum / count;
+}
+
+/// Of the edge: amid the stretch around t that is nowhere higher, or an end of it if that is one of
+/// the edge.
+double Polytope::flatMiddle(const Vector3d& p, const Vector3d& q, double t, double height) const {
+  double first = 0, last = 1;
+  for (const Plane& plane : m_planes) {
+    const double start = plane.height(p), slope = plane.height(q) - start;
+    const double reached = (height - start) / slope;
+    if (slope > 0) last = std::min(last, reached);
+    if (slope < 0) first = std::max(first, reached);
+  }
+  if (first <= kEdgeWeight || last >= 1 - kEdgeWeight) return first <= kEdgeWeight ? 0 : 1;
+  return first < last ? 0.5 * (first + last) : t;
+}
+
+double Polytope::leastOnEdge(const Vector3d& p, const Vector3d& q, double tie) const {
+  const Vector3d along = q - p;
+  const Valley inside = valley(p, q, tie);
+  double t = inside.t;
+  if (!(inside.height > tie)) return flatMiddle(p, q, t, inside.height + tie);
+  // From the edge to the face that is nearest to a point of it, and back, until neither moves.
+  OnFace on = nearest(p + t * along, tie);
+  for (double least = kInfinity;;) {
+    const Vector3d &a = corner(on.face, 0), &b = corner(on.face, 1), &c = corner(on.face, 2);
+    const double start = finiteVertexTriangleDistance(p, a, b, c).distance,
+                 end = finiteVertexTriangleDistance(q, a, b, c).distance;
+    double distance = std::min(start, end), place = start <= end ? 0 : 1;
+    for (int i = 0; i < 3; ++i) {
+      const EdgeEdgeDistance edge =
+          finiteEdgeEdgeDistance(p, q, corner(on.face, i), corner(on.face, (i + 1) % 3));
+      if (edge.distance < distance) distance = edge.distance, place = edge.weightA;
+    }
+    if (!(distance < std::min(least, on.from.distance))) break;
+    least = distance;
+    t = place;
+    on = walk(p + t * along, on.face, tie);
+  }
+  if (std::abs(dot(on.from.normal, along)) > tie) return t;
+  const Vector3d down = on.from.distance * on.from.normal, touching = p + t * along - down;
+  return flatMiddle(p - down, q - down, t, m_planes[highest(touching, 0)].height(touching) + tie);
+}
+
+std::optional<Vector3d> Polytope::leastInTriangle(const Vector3d& a, const Vector3d& b,
+                                                  const Vector3d& c, double tie) const {
+  const double boundary =
+      std::min({valley(a, b, tie).height, valley(b, c, tie).height, valley(c, a, tie).height});
+  // On the line from a + s u to a + s v, for each s.
+  const Vector3d u = b - a, v = c - a;
+  const auto across = [&](double s) { return valley(a + s * u, a + s * v, tie); };
+  const double s =
+      valleyOf(tie, [&](double at) {
+        const Valley line = across(at);
+        const double growth = line.mixed([&](std::uint32_t plane) {
+          const Vector3d& n = m_planes[plane].normal;
+          return at > 0 ? dot(n, (1 - line.t) * u + line.t * v) : std::min(dot(n, u), dot(n, v));
+        });
+        return Tangent{at, line.height, growth, 0};
+      }).t;
+  const Valley least = across(s);
+  const Vector3d weights(1 - s, s * (1 - least.t), s * least.t);
+  if (!(least.height < boundary - tie && least.height <= tie && weights.minCoeff() > kEdgeWeight))
+    return {};
+  return weights;
+}
+
+}  // namespace palpate

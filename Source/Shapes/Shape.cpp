@@ -1,0 +1,395 @@
+#include "Shapes/Shape.h"
+
+#include "Core/Text.h"
+#include "Shapes/ShapeLengths.h"
+#include "Math/ClosestPoint.h"
+#include "Math/Compensated.h"
+#include "Math/Foot.h"
+#include "Math/Predicates.h"
+#include "Math/Tolerances.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+
+/// Its columns again, at right angles and of length 1 as exactly as double can say.
+Eigen::Matrix3d orthonormal(const Eigen::Matrix3d& rotation) {
+  Eigen::Matrix3d axes;
+  const Vector3d x = rotation.col(0).normalized();
+  axes << x, (rotation.col(1) - x.dot(rotation.col(1)) * x).normalized(), Vector3d::Zero();
+  axes.col(2) = x.cross(axes.col(1));
+  return axes;
+}
+
+/// A rotation that turns z into the direction.
+Eigen::Matrix3d axesAlong(const Vector3d& direction) {
+  const Vector3d z = directionOf(direction), x = z.unitOrthogonal();
+  Eigen::Matrix3d axes;
+  axes << x, z.cross(x), z;
+  return axes;
+}
+
+/// Of a body that is the hull of points, from its origin; none of others.
+std::vector<Vector3d> cornersOf(const AnalyticalGeometry& geometry) {
+  if (const auto* hull = std::get_if<ConvexHull>(&geometry)) return hull->points;
+  std::vector<Vector3d> corners;
+  if (const auto* box = std::get_if<Box>(&geometry))
+    for (int v = 0; v < 8; ++v)
+      corners.push_back(
+          Vector3d(v & 1 ? 1 : -1, v & 2 ? 1 : -1, v & 4 ? 1 : -1).cwiseProduct(box->halfExtents));
+  return corners;
+}
+
+}  // namespace
+
+Shape::Shape(const AnalyticalGeometry& geometry, const RigidTransform& transform) {
+  if (const std::vector<Vector3d> corners = cornersOf(geometry); !corners.empty()) {
+    m_span = spanOf(corners);
+    if (m_span.size() > 2) m_hull = std::make_shared<Polytope>(corners);
+  }
+  if (m_hull) {
+    for (std::uint32_t f = 0; f < m_hull->faceCount(); ++f) {
+      m_faces.push_back(m_hull->corners(f));
+      const auto& [a, b, c] = m_faces.back();
+      for (const auto& edge : {Segment{a, b}, Segment{b, c}, Segment{c, a}})
+        if (edge[0] < edge[1]) m_edges.push_back(edge);  // two faces have it, one each way
+    }
+  } else {
+    m_faces = {{0, 1, 1}};
+    m_edges = {{0, 1}};
+  }
+  place(geometry, transform);
+}
+
+void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& transform) {
+  const auto capsule = [&](const Vector3d& p0, const Vector3d& p1, double radius) {
+    m_kind = Kind::Capsule;
+    m_p0 = transform(p0);
+    m_p1 = transform(p1);
+    m_radius = radius;
+    const Vector3d along = m_p1 - m_p0;
+    const double square = along.squaredNorm();
+    m_axisSquare = isInRange(square) ? square : along == Vector3d::Zero() ? 0.0 : -1.0;
+  };
+  const auto body = [&](Kind kind, const Vector3d& origin, const Eigen::Matrix3d& axes,
+                        const std::array<double, 2>& sizes) {
+    m_kind = kind;
+    m_p0 = m_p1 = transform(origin);
+    m_axes = orthonormal(transform.rotation) * axes;
+    m_sizes = sizes;
+  };
+  if (const auto* sphere = std::get_if<Sphere>(&geometry)) {
+    capsule(sphere->centre, sphere->centre, sphere->radius);
+  } else if (const auto* rod = std::get_if<Capsule>(&geometry)) {
+    capsule(rod->p0, rod->p1, rod->radius);
+  } else if (const auto* plane = std::get_if<Plane>(&geometry)) {
+    body(plane->twoSided ? Kind::TwoSidedPlane : Kind::Plane, plane->point,
+         axesAlong(plane->normal), {});
+  } else if (const auto* cylinder = std::get_if<Cylinder>(&geometry)) {
+    if (cylinder->radius > 0) {
+      const Vector3d axis = cylinder->p1 - cylinder->p0;
+      body(Kind::Cylinder, cylinder->p0 + 0.5 * axis, axesAlong(axis),
+           {cylinder->radius, 0.5 * lengthOf(axis)});
+    } else {
+      capsule(cylinder->p0, cylinder->p1, 0);
+    }
+  } else {
+    const auto* box = std::get_if<Box>(&geometry);
+    const Vector3d origin = box ? box->centre : Vector3d(Vector3d::Zero());
+    if (m_hull)
+      body(Kind::Hull, origin, Eigen::Matrix3d::Identity(), {});
+    else
+      capsule(origin + m_span.front(), origin + m_span.back(), 0);
+  }
+  placeCorners();
+}
+
+Eigen::AlignedBox3d Shape::bounds() const {
+  Vector3d reach =
+      Vector3d::Constant(isPlane() ? std::numeric_limits<double>::infinity() : m_radius);
+  if (isCylinder())
+    for (int k = 0; k < 3; ++k) {
+      // Of a disc: its radius times the sine of the angle between its axis and the coordinate's.
+      const double cosine = m_axes(k, 2);
+      reach[k] = m_sizes[0] * std::sqrt(std::max(0.0, (1.0 - cosine) * (1.0 + cosine)));
+    }
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& corner : m_corners) box.extend(corner);
+  return {box.min() - reach, box.max() + reach};
+}
+
+void Shape::placeBetween(const Shape& before, const Shape& now, double time) {
+  const auto at = [&](std::size_t end) -> Vector3d {
+    return (1.0 - time) * before.m_corners[end] + time * now.m_corners[end];
+  };
+  const Vector3d axis = at(1) - at(0);
+  m_kind = Kind::Cylinder;
+  m_p0 = m_p1 = at(0) + 0.5 * axis;
+  m_axes = axis == Vector3d::Zero() ? before.m_axes : axesAlong(axis);
+  m_sizes = {before.m_sizes[0], 0.5 * lengthOf(axis)};
+  placeCorners();
+}
+
+void Shape::placeCorners() {
+  m_corners = {m_p0, m_p1};
+  if (isCylinder()) {
+    m_corners = {m_p0 - m_sizes[1] * m_axes.col(2), m_p0 + m_sizes[1] * m_axes.col(2)};
+  } else if (m_hull) {
+    m_corners = m_hull->points();
+    for (Vector3d& p : m_corners) p = m_p0 + m_axes * p;
+  }
+  m_magnitude = largest(m_p0);
+  for (const Vector3d& p : m_corners) m_magnitude = std::max(m_magnitude, largest(p));
+  m_magnitude += largest(m_p0) + radius();
+}
+
+Vector3d Shape::inBody(const Vector3d& x) const { return m_axes.transpose() * (x - m_p0); }
+
+Shape::Parts Shape::partsOf(const Vector3d& v, double tie) const {
+  const auto& [radius, across] = polar({v[0], v[1], 0});
+  const Vector3d outward = radius > 0 ? across : Vector3d(1, 0, 0);
+  return {{radius, std::abs(v[2])}, {outward, Vector3d(0, 0, v[2] < -tie ? -1 : 1)}};
+}
+
+SignedDistance Shape::atBody(const Vector3d& u, double tie) const {
+  if (m_hull) return m_hull->at(u, tie);
+  if (isPlane()) {
+    const bool below = m_kind == Kind::TwoSidedPlane && u[2] < 0;
+    return {below ? -u[2] : u[2], {0, 0, m_kind == Kind::TwoSidedPlane && u[2] < -tie ? -1. : 1.}};
+  }
+  return atBody(u, tie, m_sizes);
+}
+
+SignedDistance Shape::atBody(const Vector3d& u, double tie,
+                             const std::array<double, 2>& sizes) const {
+  const Parts parts = partsOf(u, tie);
+  const std::array<double, 2> beyond{parts.lengths[0] - sizes[0], parts.lengths[1] - sizes[1]};
+  if (std::min(beyond[0], beyond[1]) > kOnSurface * m_magnitude) {
+    const auto [distance, normal] =
+        polar(beyond[0] * parts.directions[0] + beyond[1] * parts.directions[1]);
+    return {distance, normal};
+  }
+  const std::size_t nearest = beyond[1] > beyond[0] + tie;
+  return {beyond[nearest], parts.directions[nearest]};
+}
+
+SignedDistance Shape::ofCylinder(const Vector3d& fromCentre, const Vector3d& axis) const {
+  const Eigen::Matrix3d axes = axis == Vector3d::Zero() ? m_axes : axesAlong(axis);
+  const SignedDistance inBodys = atBody(axes.transpose() * fromCentre, kOnSurface * m_magnitude,
+                                        {m_sizes[0], 0.5 * lengthOf(axis)});
+  return {inBodys.distance, axes * inBodys.normal};
+}
+
+SignedDistance Shape::at(const Vector3d& x) const {
+  if (m_kind != Kind::Capsule) {
+    const SignedDistance inBodys = atBody(inBody(x), kOnSurface * m_magnitude);
+    return {inBodys.distance, m_axes * inBodys.normal};
+  }
+  const Vector3d along = m_p1 - m_p0, from = x - m_p0;
+  double weight = 0;
+  if (m_axisSquare != 0) {
+    const double product = from.dot(along);
+    weight = m_axisSquare > 0 && std::abs(product) < kOverflowGuard
+                 ? std::clamp(product / m_axisSquare, 0.0, 1.0)
+                 : weightOnAnyAxis(from, along);
+  }
+  const auto& [distance, outward] = polar(from - weight * along);
+  const bool onAxis = distance <= kOnSurface * m_magnitude;
+  return {distance - m_radius, onAxis ? fromAxis(axisOfLeast(along.cwiseAbs())) : outward};
+}
+
+Vector3d Shape::fromAxis(const Vector3d& normal) const {
+  const Vector3d along = directionOf(m_p1 - m_p0);
+  const Vector3d across = normal - along.dot(normal) * along;
+  return across.squaredNorm() > kAcrossSquare ? across.normalized() : along.unitOrthogonal();
+}
+
+NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const {
+  if (m_kind == Kind::Capsule) {
+    const EdgeEdgeDistance axis = finiteEdgeEdgeDistance(p, q, m_p0, m_p1);
+    return {{1.0 - axis.weightA, axis.weightA, 0.0},
+            axis.distance > kOnSurface * m_magnitude ? axis.normal : fromAxis(axis.normal),
+            axis.distance - m_radius,
+            axis.featureA == EdgeFeature::Interior,
+            axis.exact};
+  }
+  if (m_kind == Kind::TwoSidedPlane) {
+    const double start = inBody(p)[2], end = inBody(q)[2];
+    if ((start < 0 && end > 0) || (start > 0 && end < 0)) {
+      const double t = start / (start - end);
+      return {{1.0 - t, t, 0.0}, m_axes.col(2), 0.0, true};
+    }
+  }
+  const Vector3d from = inBody(p), along = inBody(q) - from;
+  const auto slope = [&](double t) { return atBody(from + t * along, 0).normal.dot(along); };
+  const auto at = [&](double t, bool inInterior) {
+    const SignedDistance least = atBody(from + t * along, kOnSurface * m_magnitude);
+    return NearestToShape{{1.0 - t, t, 0.0}, m_axes * least.normal, least.distance, inInterior};
+  };
+  if (m_hull) {
+    const double t = m_hull->leastOnEdge(from, from + along, kOnSurface * m_magnitude);
+    return at(t, t > 0 && t < 1);
+  }
+  // The distance is convex along the edge: where its slope changes sign.
+  if (slope(0) >= 0) return at(0, false);
+  if (slope(1) <= 0) return at(1, false);
+  // From a falling to a rising slope; a stretch without slope is bracketed from both sides.
+  const auto bracket = [&](auto&& isBefore) {
+    double low = 0, high = 1;
+    while (high - low > kEdgeWeight) {
+      const double middle = 0.5 * (low + high);
+      (isBefore(slope(middle)) ? low : high) = middle;
+    }
+    return 0.5 * (low + high);
+  };
+  const double first = bracket([](double s) { return s < 0; });
+  const double last =
+      slope(first + 2 * kEdgeWeight) > 0 ? first : bracket([](double s) { return !(s > 0); });
+  const double t = 0.5 * (first + last);
+  if (first <= kEdgeWeight) return at(0, false);
+  if (last >= 1 - kEdgeWeight) return at(1, false);
+  return at(t, true);
+}
+
+/// Of a cylinder and the plane normal . u = height, height not negative: the deepest point in the
+/// shape, or the shape's nearest to it. The shape cut down by m on all sides, { at(u) <= -m }, has
+/// the parts' sizes less m; m is the largest for which it still reaches the plane.
+Vector3d Shape::nearestOfPlane(const Vector3d& normal, double height) const {
+  const Parts parts = partsOf(normal, 0);
+  const auto& [lengths, directions] = parts;
+  const double reach = lengths[0] * m_sizes[0] + lengths[1] * m_sizes[1],
+               all = lengths[0] + lengths[1], deepest = -std::min(m_sizes[0], m_sizes[1]);
+  const double level = std::min(0.0, std::max(deepest, (height - reach) / all));
+  Vector3d point = Vector3d::Zero();
+  for (int i = 0; i < 2; ++i)
+    if (lengths[i] > 0) point += (m_sizes[i] + level) * directions[i];
+  const double reached = reach + level * all;
+  return reached > height ? Vector3d(height / reached * point) : point;
+}
+
+/// Of a capsule.
+std::optional<NearestToShape> Shape::nearestToAxis(const Vector3d& a, const Vector3d& b,
+                                                   const Vector3d& c) const {
+  const VertexTriangleDistance ends[] = {finiteVertexTriangleDistance(m_p0, a, b, c),
+                                         finiteVertexTriangleDistance(m_p1, a, b, c)};
+  const Vector3d along = m_p1 - m_p0;
+  const auto answer = [&](const VertexTriangleDistance& end, double distance) {
+    const bool onAxis = distance <= kOnSurface * m_magnitude;
+    return NearestToShape{end.barycentric, onAxis ? fromAxis(-end.normal) : Vector3d(-end.normal),
+                          distance - m_radius, true, end.exact};
+  };
+  const auto isOver = [&](int i) { return ends[i].feature == TriangleFeature::Face; };
+  if (isOver(0) && isOver(1) && signedDot(ends[0].difference, ends[1].difference) > 0) {
+    if (ends[0].distance != ends[1].distance)
+      return answer(ends[ends[1].distance < ends[0].distance],
+                    std::min(ends[0].distance, ends[1].distance));
+    return answer(finiteVertexTriangleDistance(m_p0 + 0.5 * along, a, b, c), ends[0].distance);
+  }
+  for (const int i : {0, 1})  // nearest of all if from there the axis does not come nearer
+    if (isOver(i) && (i == 0 ? 1 : -1) * signedDot(along, ends[i].difference) >= 0)
+      return answer(ends[i], ends[i].distance);
+  SignCounts counts;
+  const OrientedPlane plane(a, b, c);
+  const int side = plane.side(m_p0, counts), turn = orient3d(m_p0, m_p1, a, b, counts);
+  if (side == 0 || turn == 0 || side != -plane.side(m_p1, counts) ||
+      turn != orient3d(m_p0, m_p1, b, c, counts) || turn != orient3d(m_p0, m_p1, c, a, counts))
+    return {};
+  const Vector3d normal = unitCross(a, b, a, c);
+  const double before = std::abs(normal.dot(m_p0 - a)), after = std::abs(normal.dot(m_p1 - a));
+  const double t = before > 0 ? before / (before + after) : 0.0;
+  VertexTriangleDistance through = finiteVertexTriangleDistance(m_p0 + t * along, a, b, c);
+  through.normal = normal;
+  return answer(through, 0.0);
+}
+
+std::optional<NearestToShape> Shape::nearestInTriangle(const Vector3d& a, const Vector3d& b,
+                                                       const Vector3d& c) const {
+  if (m_kind == Kind::Capsule) return nearestToAxis(a, b, c);
+  if (m_hull) return nearestToHull(inBody(a), inBody(b), inBody(c));
+  Vector3d normal = unitCross(a, b, a, c);
+  // In a plane's half-space no interior is deeper than the boundary.
+  if (m_kind < Kind::Capsule || normal == Vector3d::Zero()) return {};
+  double height = normal.dot(a - m_p0);
+  if (height < 0) normal = -normal, height = -height;
+  const Vector3d point = m_p0 + m_axes * nearestOfPlane(m_axes.transpose() * normal, height);
+  const VertexTriangleDistance on = finiteVertexTriangleDistance(point, a, b, c);
+  if (on.feature != TriangleFeature::Face) return {};
+  const Vector3d& weights = on.barycentric;
+  if (on.distance > kOnSurface * m_magnitude)  // the point was the shape's nearest to the plane
+    return NearestToShape{weights, normal, on.distance, true};
+  const SignedDistance least = at(weights[0] * a + weights[1] * b + weights[2] * c);
+  return NearestToShape{weights, least.normal, least.distance, true};
+}
+
+/// Of a triangle in the body's frame.
+std::optional<NearestToShape> Shape::nearestToHull(const Vector3d& a, const Vector3d& b,
+                                                   const Vector3d& c) const {
+  const double tie = kOnSurface * m_magnitude;
+  const Vector3d up = unitCross(a, b, a, c);
+  if (up == Vector3d::Zero()) return {};
+  for (const Vector3d& normal : {up, Vector3d(-up)}) {
+    const Vector3d point = m_hull->support(normal, tie);
+    if (normal.dot(a - point) < -tie) continue;  // the plane goes through
+    const VertexTriangleDistance on = finiteVertexTriangleDistance(point, a, b, c);
+    if (on.feature != TriangleFeature::Face) return {};
+    return NearestToShape{on.barycentric, m_axes * normal, on.distance, true, on.exact};
+  }
+  const std::optional<Vector3d> weights = m_hull->leastInTriangle(a, b, c, tie);
+  if (!weights) return {};
+  const SignedDistance least =
+      m_hull->at((*weights)[0] * a + (*weights)[1] * b + (*weights)[2] * c, tie);
+  return NearestToShape{*weights, m_axes * least.normal, least.distance, true};
+}
+
+std::string faultOf(const AnalyticalGeometry& geometry, std::optional<std::size_t>& element) {
+  std::string fault;
+  constexpr const char* kWithin = "at most 1e+300 in magnitude";
+  const auto isBeyond = [](const Vector3d& v) { return largest(v) > kLargestMeasure; };
+  const auto say = [&](const std::string& name, const auto& value, const char* rule) {
+    fault = name + " is " + textOf(value) + "; it must be " + rule;
+  };
+  forEachField(geometry, [&](const std::string& name, const auto& field) {
+    using Field = std::decay_t<decltype(field)>;
+    if constexpr (std::is_same_v<Field, std::vector<Vector3d>>) {
+      if (field.empty()) fault = "a hull needs at least one point";
+      for (std::size_t i = field.size(); i-- > 0;)
+        if (const bool finite = field[i].allFinite(); !finite || isBeyond(field[i]))
+          say("point " + std::to_string(i), field[i], finite ? kWithin : "finite"), element = i;
+      if (field.size() > kMostHullPoints)
+        fault = "a hull of " + std::to_string(field.size()) + " points; a hull takes at most " +
+                std::to_string(kMostHullPoints);
+    } else if constexpr (!std::is_same_v<Field, bool>) {
+      Vector3d values;
+      values << field, Eigen::VectorXd::Zero(std::is_same_v<Field, double> ? 2 : 0);
+      const bool isSize = name == "radius" || name == "halfExtents";
+      if (!values.allFinite() || (isSize && !(values.minCoeff() >= 0)))
+        say(name, field, isSize ? "finite and not negative" : "finite");
+      else if (name == "normal" ? values == Vector3d::Zero() : isBeyond(values))
+        say(name, field, name == "normal" ? "of some length" : kWithin);
+    }
+  });
+  const auto* cylinder = std::get_if<Cylinder>(&geometry);
+  if (fault.empty() && cylinder && cylinder->p0 == cylinder->p1)
+    say("p1", cylinder->p1, "another point than p0");
+  return fault;
+}
+
+std::string faultOf(const RigidTransform& transform) {
+  const Eigen::Matrix3d& r = transform.rotation;
+  const double off = (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!r.allFinite() || !(off <= kOrthonormal) || !(r.determinant() > 0))
+    return "rotation is not a rotation: its columns' products are off by " + textOf(off) +
+           ", its determinant is " + textOf(r.determinant());
+  if (transform.translation.allFinite()) return {};
+  return "translation is " + textOf(transform.translation) + "; it must be finite";
+}
+
+}  // namespace palpate

@@ -1,0 +1,220 @@
+#include "Shapes/Shape.h"
+#include "Shapes/ShapeLengths.h"
+
+#include "Math/Compensated.h"
+#include "Math/Predicates.h"
+#include "Math/Tolerances.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+
+/// a - b for the furthest points along directions.
+class Differences {
+ public:
+  Differences(const Shape& a, const Shape& b) : m_a(a), m_b(b), m_offset(a.origin() - b.origin()) {}
+
+  struct Point {
+    Vector3d difference, ofA;
+  };
+  Point furthest(const Vector3d& direction) const {
+    const Vector3d ofA = m_a.support(direction, 0);
+    return {(ofA - m_b.support(-direction, 0)) + m_offset, ofA};
+  }
+
+  /// Four that have a volume; or fewer, and the direction in which all of them are one.
+  std::size_t start(std::array<Point, 4>& points, Vector3d& flat) const {
+    const auto at = [&](std::size_t i) -> const Vector3d& { return points[i].difference; };
+    points[0] = furthest(Vector3d::UnitX());
+    flat = Vector3d::UnitX();
+    const Vector3d axes[] = {Vector3d::UnitX(), Vector3d::UnitY(), Vector3d::UnitZ()};
+    if (!extend(points[1], axes, [&](const Vector3d& p) { return lengthOf(p - at(0)); })) return 1;
+    const Vector3d along = directionOf(at(1) - at(0));
+    flat = along.unitOrthogonal();
+    const Vector3d across[] = {flat, along.cross(flat)};
+    if (!extend(points[2], across,
+                [&](const Vector3d& p) { return lengthOf(along.cross(p - at(0))); }))
+      return 2;
+    flat = directionOf(along.cross(at(2) - at(0)));
+    SignCounts counts;
+    if (!extend(points[3], {&flat, 1},
+                [&](const Vector3d& p) { return std::abs(flat.dot(p - at(0))); }) ||
+        orient3d(at(0), at(1), at(2), at(3), counts) == 0)
+      return 3;
+    return 4;
+  }
+
+ private:
+  /// The furthest along or against the directions that has the greatest measure; false for none.
+  template <class Measure>
+  bool extend(Point& best, std::span<const Vector3d> directions, Measure&& measure) const {
+    double most = 0;
+    for (const Vector3d& direction : directions)
+      for (const double sign : {1.0, -1.0}) {
+        const Point point = furthest(sign * direction);
+        if (!(measure(point.difference) > most)) continue;
+        most = measure(point.difference);
+        best = point;
+      }
+    return most > 0;
+  }
+
+  const Shape &m_a, &m_b;
+  Vector3d m_offset;
+};
+
+/// Of bodies with a round side that overlap, at most so many points.
+constexpr std::size_t kMostDifferences = 256;
+
+}  // namespace
+
+Vector3d Shape::support(const Vector3d& direction, double tie) const {
+  if (m_kind == Kind::Capsule) {
+    const Vector3d along = m_p1 - m_p0;
+    const double higher = dot(direction, along);
+    return (std::abs(higher) <= tie ? 0.5 : higher > 0 ? 1.0 : 0.0) * along;
+  }
+  const Vector3d inBodys = m_axes.transpose() * direction;
+  if (m_hull) return m_axes * m_hull->support(inBodys, tie);
+  const Parts parts = partsOf(inBodys, 0);
+  Vector3d point = Vector3d::Zero();
+  for (int i = 0; i < 2; ++i)
+    if (parts.lengths[i] * m_sizes[i] > 0.5 * tie) point += m_sizes[i] * parts.directions[i];
+  return m_axes * point;
+}
+
+bool Shape::precedes(const Shape& other) const {
+  if (m_kind != other.m_kind) return m_kind < other.m_kind;
+  if (radius() != other.radius()) return radius() < other.radius();
+  const auto &ours = m_corners, &theirs = other.m_corners;
+  for (std::size_t i = 0; i < std::min(ours.size(), theirs.size()); ++i)
+    if (ours[i] != theirs[i])
+      return std::lexicographical_compare(ours[i].begin(), ours[i].end(), theirs[i].begin(),
+                                          theirs[i].end());
+  return ours.size() < theirs.size();
+}
+
+/// Of a plane against a body.
+ShapePairDistance Shape::planeFrom(const Shape& body) const {
+  const double tie = kOnSurface * (m_magnitude + body.m_magnitude);
+  ShapePairDistance best{};
+  best.distance = -std::numeric_limits<double>::infinity();
+  for (const double side : {1.0, -1.0}) {
+    if (side < 0 && m_kind != Kind::TwoSidedPlane) break;
+    const Vector3d up = side * m_axes.col(2);
+    const Vector3d lowest = body.support(-up, tie);
+    const double distance = up.dot(lowest) + up.dot(body.m_p0 - m_p0) - body.m_radius;
+    if (!(distance > best.distance)) continue;
+    const Vector3d point = body.m_p0 + lowest - body.m_radius * up;
+    best = {point - distance * up, point, -up, distance};
+  }
+  return best;
+}
+
+/// Of bodies whose differences all lie in one plane, across which they are `flat`: each of them is
+/// in one plane itself.
+ShapePairDistance Shape::flatFrom(const Shape& other, const Vector3d& flat) const {
+  NearestToShape nearest{};
+  Vector3d point = m_p0;
+  nearest.distance = std::numeric_limits<double>::infinity();
+  const auto take = [&](const std::optional<NearestToShape>& found, const Vector3d& a,
+                        const Vector3d& b, const Vector3d& c) {
+    if (!found || !(found->distance < nearest.distance)) return;
+    nearest = *found;
+    point = found->weights[0] * a + found->weights[1] * b + found->weights[2] * c;
+  };
+  const auto test = [&](const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+    take(other.nearestInTriangle(a, b, c), a, b, c);
+    take(other.nearestOfEdge(a, b), a, b, c);
+    take(other.nearestOfEdge(b, c), b, c, a);
+    take(other.nearestOfEdge(c, a), c, a, b);
+  };
+  if (m_hull) {
+    for (const auto& [a, b, c] : m_faces) test(m_corners[a], m_corners[b], m_corners[c]);
+  } else {
+    take(other.nearestOfEdge(m_p0, m_p1), m_p0, m_p1, m_p1);
+  }
+  const double distance = nearest.distance + other.m_radius;  // 0 but of a capsule
+  const double tie = kOnSurface * (m_magnitude + other.m_magnitude);
+  const Vector3d normal = distance > tie ? nearest.normal : flat;
+  const Vector3d pointA = point - m_radius * normal;
+  const double whole = distance - m_radius - other.m_radius;
+  return {pointA, pointA - whole * normal, normal, whole};
+}
+
+ShapePairDistance Shape::grownFrom(const Shape& other, ShapePairScratch& scratch) const {
+  const Differences differences(*this, other);
+  std::array<Differences::Point, 4> first;
+  Vector3d flat;
+  if (differences.start(first, flat) < 4) return flatFrom(other, flat);
+  Polytope& grown = scratch.grown;
+  Buffer<Vector3d>& ofA = scratch.ofA;
+  std::array<Vector3d, 4> corners;
+  ofA.clear();
+  double size = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    corners[i] = first[i].difference;
+    ofA.push_back(first[i].ofA);
+    size = std::max(size, largest(corners[i]));
+  }
+  grown.start(corners);
+  const Vector3d origin = Vector3d::Zero();
+  const double gap = std::max(kShapePairGap * size, kSmallestShapePairGap), tie = kOnSurface * size;
+  SignedDistance out;
+  for (;;) {
+    out = grown.at(origin, tie);
+    const auto [difference, point] = differences.furthest(out.normal);
+    const double reach = dot(out.normal, difference);
+    // A round body may be as deep in as many directions as it has: each of them parts it truly.
+    const bool enough = out.distance < 0 && grown.points().size() >= kMostDifferences &&
+                        (m_kind == Kind::Cylinder || other.m_kind == Kind::Cylinder);
+    if (!(reach + out.distance > gap) || enough || !grown.add(difference)) {
+      if (out.distance < 0) out.distance = -reach;
+      break;
+    }
+    ofA.push_back(point);
+  }
+  const Polytope::OnFace on = grown.nearest(origin, tie);
+  Vector3d point = m_p0;
+  for (int i = 0; i < 3; ++i)
+    point += on.from.barycentric[i] * ofA[grown.corners(on.face)[static_cast<std::size_t>(i)]];
+  const Vector3d normal = -out.normal;
+  return {point - m_radius * normal, point + on.from.difference + other.m_radius * normal, normal,
+          out.distance - m_radius - other.m_radius};
+}
+
+/// Of a capsule against another, or of a sphere against a body.
+ShapePairDistance Shape::axisFrom(const Shape& body) const {
+  NearestToShape nearest{Vector3d::UnitX(), {}, 0, false};
+  if (body.m_kind == Kind::Capsule) {
+    nearest = body.nearestOfEdge(m_p0, m_p1);
+  } else {
+    const SignedDistance at = body.at(m_p0);
+    nearest.normal = at.normal;
+    nearest.distance = at.distance;
+  }
+  const Vector3d point = m_p0 + nearest.weights[1] * (m_p1 - m_p0) - m_radius * nearest.normal;
+  const double distance = nearest.distance - m_radius;
+  return {point, point - distance * nearest.normal, nearest.normal, distance};
+}
+
+ShapePairDistance Shape::distanceFrom(const Shape& b, ShapePairScratch& scratch) const {
+  if (b.precedes(*this)) return b.distanceFrom(*this, scratch).exchanged();
+  if (isPlane()) return planeFrom(b);
+  if (m_kind == Kind::Capsule && b.m_kind == Kind::Capsule && b.m_p0 == b.m_p1)
+    return b.axisFrom(*this).exchanged();
+  if (m_kind == Kind::Capsule && (b.m_kind == Kind::Capsule || m_p0 == m_p1)) return axisFrom(b);
+  return grownFrom(b, scratch);
+}
+
+}  // namespace palpate

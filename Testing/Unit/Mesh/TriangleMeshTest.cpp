@@ -1,0 +1,192 @@
+#include "Mesh/TriangleMesh.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <random>
+#include <set>
+#include <vector>
+
+namespace palpate {
+namespace {
+
+using Triangles = std::vector<Triangle>;
+using Ids = std::vector<std::uint32_t>;
+
+Ids listed(const IndexLists& lists, std::size_t i) { return {lists[i].begin(), lists[i].end()}; }
+
+Segment edgeOf(const Triangle& t, int i) {
+  const std::uint32_t p = t[i], q = t[(i + 1) % 3];
+  return {std::min(p, q), std::max(p, q)};
+}
+
+/// All of it again, from its definitions, with sets and maps and for each element apart.
+void expectTopology(std::size_t vertexCount, const Triangles& triangles) {
+  const MeshTopology mesh(vertexCount, triangles);
+  ASSERT_EQ(mesh.vertexCount, vertexCount);
+  ASSERT_EQ(mesh.triangles, triangles);
+
+  std::map<std::uint32_t, std::set<std::uint32_t>> trianglesOfVertex;
+  std::map<Segment, std::set<std::uint32_t>> trianglesOfEdge;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    for (std::uint32_t v : triangles[t]) trianglesOfVertex[v].insert(t);
+    for (int i = 0; i < 3; ++i) {
+      const Segment edge = edgeOf(triangles[t], i);
+      if (edge[0] != edge[1]) trianglesOfEdge[edge].insert(t);
+    }
+  }
+
+  EXPECT_EQ(mesh.untestedVertices, vertexCount - trianglesOfVertex.size());
+  ASSERT_EQ(mesh.vertexTriangles.offsets.size(), vertexCount + 1);
+  for (std::uint32_t v = 0; v < vertexCount; ++v) {
+    const auto& expected = trianglesOfVertex[v];
+    EXPECT_EQ(listed(mesh.vertexTriangles, v), Ids(expected.begin(), expected.end())) << v;
+  }
+
+  ASSERT_EQ(mesh.edges.size(), trianglesOfEdge.size());
+  ASSERT_EQ(mesh.edgeTriangles.offsets.size(), mesh.edges.size() + 1);
+  std::size_t e = 0;
+  for (const auto& [edge, holders] : trianglesOfEdge) {  // the map's order is the mesh's
+    EXPECT_EQ(mesh.edges[e], edge);
+    EXPECT_EQ(listed(mesh.edgeTriangles, e), Ids(holders.begin(), holders.end()));
+    ++e;
+  }
+
+  ASSERT_EQ(mesh.triangleEdges.size(), triangles.size());
+  ASSERT_EQ(mesh.owned.size(), triangles.size());
+  std::map<std::uint32_t, int> ownersOfVertex;
+  std::map<Segment, int> ownersOfEdge;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    for (int i = 0; i < 3; ++i) {
+      const Segment edge = edgeOf(triangles[t], i);
+      if (edge[0] == edge[1])
+        EXPECT_EQ(mesh.triangleEdges[t][i], kNoEdge);
+      else
+        EXPECT_EQ(mesh.edges.at(mesh.triangleEdges[t][i]), edge);
+      if (mesh.ownsCorner(t, i)) {
+        ++ownersOfVertex[triangles[t][i]];
+        EXPECT_EQ(t, *trianglesOfVertex[triangles[t][i]].begin());
+      }
+      if (mesh.ownsEdge(t, i)) {
+        ++ownersOfEdge[edge];
+        EXPECT_EQ(t, *trianglesOfEdge.at(edge).begin());
+      }
+    }
+    EXPECT_EQ(mesh.owned[t] >> 6, 0);
+  }
+  for (std::uint32_t v = 0; v < vertexCount; ++v)
+    EXPECT_EQ(ownersOfVertex[v], trianglesOfVertex[v].empty() ? 0 : 1) << v;
+  EXPECT_EQ(ownersOfEdge.size(), trianglesOfEdge.size());
+  for (const auto& [edge, owners] : ownersOfEdge) EXPECT_EQ(owners, 1);
+}
+
+Triangles randomSoup(std::uint32_t vertexCount, std::size_t triangleCount, std::mt19937& random) {
+  std::uniform_int_distribution<std::uint32_t> vertex(0, vertexCount - 1);
+  Triangles triangles(triangleCount);
+  for (Triangle& t : triangles) t = {vertex(random), vertex(random), vertex(random)};
+  return triangles;
+}
+
+TEST(TriangleMesh, NoTriangles) {
+  for (std::size_t vertexCount : {0u, 1u, 5u}) {
+    const MeshTopology mesh(vertexCount, {});
+    EXPECT_EQ(mesh.untestedVertices, vertexCount);
+    EXPECT_TRUE(mesh.edges.empty());
+    expectTopology(vertexCount, {});
+  }
+}
+
+TEST(TriangleMesh, OneTriangleOwnsAllOfItself) {
+  const MeshTopology mesh(3, Triangles{{2, 0, 1}});
+  EXPECT_EQ(mesh.owned, std::vector<std::uint8_t>{63});
+  EXPECT_EQ(mesh.edges, (std::vector<Segment>{{0, 1}, {0, 2}, {1, 2}}));
+  expectTopology(3, mesh.triangles);
+}
+
+TEST(TriangleMesh, TwoTrianglesOfEitherWindingShareAnEdge) {
+  for (const Triangle second : {Triangle{2, 1, 3}, Triangle{1, 2, 3}, Triangle{3, 2, 1}}) {
+    const MeshTopology mesh(4, Triangles{{0, 1, 2}, second});
+    EXPECT_EQ(mesh.edges.size(), 5u);
+    const auto shared = std::find(mesh.edges.begin(), mesh.edges.end(), Segment{1, 2});
+    EXPECT_EQ(listed(mesh.edgeTriangles, shared - mesh.edges.begin()), (Ids{0, 1}));
+    expectTopology(4, mesh.triangles);
+  }
+}
+
+TEST(TriangleMesh, AnEdgeOfFiveTriangles) {
+  Triangles fan;
+  for (std::uint32_t i = 0; i < 5; ++i)
+    fan.push_back(i % 2 ? Triangle{1, 0, 2 + i} : Triangle{0, 1, 2 + i});
+  const MeshTopology mesh(7, fan);
+  EXPECT_EQ(listed(mesh.edgeTriangles, 0), (Ids{0, 1, 2, 3, 4}));
+  expectTopology(7, fan);
+}
+
+TEST(TriangleMesh, RepeatedIndices) {
+  // Every triangle over three vertices, so every pattern of repeats, one by one and all together.
+  Triangles all;
+  for (std::uint32_t a = 0; a < 3; ++a)
+    for (std::uint32_t b = 0; b < 3; ++b)
+      for (std::uint32_t c = 0; c < 3; ++c) {
+        all.push_back({a, b, c});
+        expectTopology(3, Triangles{all.back()});
+        expectTopology(4, Triangles{{0, 1, 3}, all.back()});
+      }
+  expectTopology(3, all);
+}
+
+TEST(TriangleMesh, TheSameTriangleAgainOwnsNothing) {
+  const MeshTopology mesh(3, Triangles{{0, 1, 2}, {0, 1, 2}, {2, 1, 0}, {1, 2, 0}});
+  EXPECT_EQ(mesh.owned, (std::vector<std::uint8_t>{63, 0, 0, 0}));
+  expectTopology(3, mesh.triangles);
+}
+
+TEST(TriangleMesh, RandomSoups) {
+  std::mt19937 random(1);
+  for (int run = 0; run < 300; ++run) {
+    const std::uint32_t vertexCount = 1 + random() % 40;
+    expectTopology(vertexCount, randomSoup(vertexCount, random() % 80, random));
+    if (HasFailure()) FAIL() << "run " << run;
+  }
+}
+
+// One vertex more than 16 bits can name: an edge's key must not wrap.
+TEST(TriangleMesh, MoreVerticesThanSixteenBits) {
+  constexpr std::uint32_t kVertexCount = 65'537;
+  Triangles strip;
+  for (std::uint32_t v = 0; v + 2 < kVertexCount; v += 1)
+    strip.push_back(v % 2 ? Triangle{v + 1, v, v + 2} : Triangle{v, v + 1, v + 2});
+  strip.push_back({0, kVertexCount - 1, 1});
+  std::mt19937 random(2);
+  std::shuffle(strip.begin(), strip.end(), random);
+  expectTopology(kVertexCount, strip);
+}
+
+// V - E + F = 2 on a closed surface of one piece: an octahedron, each triangle cut in four, four
+// times.
+TEST(TriangleMesh, ClosedSurfacesObeyEuler) {
+  Triangles triangles{{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
+                      {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
+  std::uint32_t vertexCount = 6;
+  for (int level = 0; level < 4; ++level) {
+    const MeshTopology mesh(vertexCount, triangles);
+    EXPECT_EQ(vertexCount + triangles.size(), mesh.edges.size() + 2);
+    for (std::size_t e = 0; e < mesh.edges.size(); ++e) EXPECT_EQ(mesh.edgeTriangles[e].size(), 2u);
+    expectTopology(vertexCount, triangles);
+
+    Triangles finer;
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      const auto& [a, b, c] = triangles[t];
+      const auto& edges = mesh.triangleEdges[t];
+      const std::uint32_t ab = vertexCount + edges[0], bc = vertexCount + edges[1],
+                          ca = vertexCount + edges[2];
+      finer.insert(finer.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
+    }
+    vertexCount += static_cast<std::uint32_t>(mesh.edges.size());
+    triangles = finer;
+  }
+}
+
+}  // namespace
+}  // namespace palpate

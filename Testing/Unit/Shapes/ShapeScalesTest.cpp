@@ -1,0 +1,329 @@
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/ShapeTruth.h"
+#include "Common/Things.h"
+#include "Shapes/Shape.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+// Shapes of any size: a scene scaled by a power of two has the scaled contacts. Squares of its
+// measures leave the range of double at most of these scales.
+
+namespace palpate::testing {
+namespace {
+
+constexpr double kDenormal = std::numeric_limits<double>::denorm_min();
+/// The largest measure of these scenes, about 1, is near the limit of 1e300 = 2^996.6, or its bits
+/// are near the end of what double holds.
+constexpr int kScales[] = {996, 900, 530, 512, 380, 250, -250, -380, -512, -530, -900, -1022};
+
+AnalyticalGeometry scaled(AnalyticalGeometry geometry, double by) {
+  forEachField(geometry, [&](const std::string& name, auto& field) {
+    using Field = std::decay_t<decltype(field)>;
+    if constexpr (std::is_same_v<Field, std::vector<Vector3d>>) {
+      for (Vector3d& p : field) p *= by;
+    } else if constexpr (!std::is_same_v<Field, bool>) {
+      if (name != "normal") field *= by;
+    }
+  });
+  return geometry;
+}
+
+struct Move {
+  Matrix3d turn;
+  Vector3d shift;
+};
+
+/// A shape and a geometry with elements, or a second shape, in one step.
+struct Scene {
+  AnalyticalGeometry shape;
+  std::array<Move, 2> ends;
+  std::optional<AnalyticalGeometry> other{};
+  std::array<Move, 2> otherEnds{};
+  Thing thing{};
+  Positions now{};
+
+  Scene scaledBy(double by) const {
+    Scene scene = *this;
+    scene.shape = scaled(shape, by);
+    if (other) scene.other = scaled(*other, by);
+    for (auto* moves : {&scene.ends, &scene.otherEnds})
+      for (Move& move : *moves) move.shift *= by;
+    for (auto* list : {&scene.thing.positions, &scene.now})
+      for (Vector3d& p : *list) p *= by;
+    for (double& radius : scene.thing.radii) radius *= by;
+    return scene;
+  }
+
+  CollisionData answer(const PairSettings& pair) const {
+    OctreeBasedCD collisions(settingsOf(Engine::Octree));
+    const GeometryId first = collisions.addAnalyticalGeometry(shape),
+                     second =
+                         other ? collisions.addAnalyticalGeometry(*other) : thing.addTo(collisions);
+    collisions.addCollisionPair(first, second, pair);
+    for (const std::size_t end : {0, 1}) {
+      collisions.setTransform(first, ends[end].turn, ends[end].shift);
+      if (other)
+        collisions.setTransform(second, otherEnds[end].turn, otherEnds[end].shift);
+      else if (end == 1)
+        collisions.setPositions(second, thing.positions, now);
+      collisions.detectCollision();
+    }
+    return collisions.collisionData(first, second);
+  }
+};
+
+std::vector<AnalyticalGeometry> measuredShapes() {
+  return {Sphere{{0.1, 0, 0}, 0.3},
+          Sphere{{0, 0, 0}, 0},
+          Capsule{{-0.5, 0, 0.1}, {0.4, 0.1, 0}, 0.1},
+          Capsule{{-0.4, 0, 0}, {0.3, 0.1, 0}, 0},
+          Plane{{0.1, 0, 0}, {1, 2, 3}},
+          Plane{{0.1, 0, 0}, {1, 2, 3}, true},
+          Box{{0.1, 0, 0}, {0.3, 0.2, 0.1}},
+          Box{{0, 0, 0}, {0.3, 0.2, 0}},
+          Cylinder{{-0.4, 0, 0}, {0.3, 0.1, 0}, 0.2},
+          Cylinder{{-0.4, 0, 0}, {0.3, 0.1, 0}, 0},
+          ConvexHull{{{-0.3, 0, 0}, {0.3, 0.1, 0.2}, {0, 0.4, -0.1}, {0.1, -0.2, 0.4}, {0, 0, 0}}},
+          ConvexHull{{{-0.3, 0, 0}, {0.3, 0, 0.2}, {0, 0, -0.4}, {0.1, 0, 0}}},
+          ConvexHull{{{-0.3, 0, 0}, {0.3, 0, 0}, {0.1, 0, 0}}}};
+}
+
+std::array<Move, 2> randomMoves(Random& random) {
+  std::array<Move, 2> ends;
+  ends[0] = {randomTurn(random), randomPoint(random, -0.3, 0.3)};
+  ends[1] = {randomTurn(random), randomPoint(random, -0.3, 0.3)};
+  return ends;
+}
+
+Thing elements(Random& random, int kind) {
+  Thing thing;
+  thing.kind = static_cast<GeometryKind>(kind);
+  if (kind > 0) thing.radii = {0.01};
+  for (std::uint32_t i = 0; i < 12; ++i) {
+    const Vector3d p = randomPoint(random, -0.7, 0.7);
+    thing.positions.push_back(p);
+    if (kind < 2) thing.positions.push_back(p + randomPoint(random, -0.4, 0.4));
+    if (kind == 0) thing.positions.push_back(p + randomPoint(random, -0.4, 0.4));
+    if (kind == 0) thing.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    if (kind == 1) thing.segments.push_back({2 * i, 2 * i + 1});
+  }
+  return thing;
+}
+
+using Element = std::array<std::uint32_t, 3>;
+std::map<Element, ShapeContact> byElement(const CollisionData& data) {
+  std::map<Element, ShapeContact> contacts;
+  for (const ShapeContact& c : data.shape())
+    contacts.emplace(Element{static_cast<std::uint32_t>(c.element), c.id, c.vertices[1]}, c);
+  return contacts;
+}
+
+/// What may be missing of one: what is almost no contact.
+bool isMarginal(const ShapeContact& c, const PairSettings& pair) {
+  const double weight = c.weights.head(static_cast<int>(c.element) + 1).minCoeff();
+  return weight < 1e-6 || c.timeOfImpact > 1 - 1e-5 ||
+         (pair.method == Method::Proximity && pair.thickness - c.distance < 1e-9);
+}
+
+/// Contacts of a scene and of its copy, `by` times as large.
+/// extent: L, of coordinates.
+std::size_t expectSame(const Scene& scene, const PairSettings& pair, double by, double extent = 1) {
+  // What the smaller one's doubles cannot say is not in either.
+  const Scene copy = scene.scaledBy(by), original = copy.scaledBy(1 / by);
+  PairSettings there = pair;
+  there.thickness *= by;
+  const CollisionData here = original.answer(pair), found = copy.answer(there);
+  const bool step = pair.method == Method::Continuous;
+  const double slack = (step ? 1e-5 : 1e-12) * extent + 100 * (kDenormal / by);
+  const auto near = [&](const Vector3d& small, const Vector3d& large) {
+    EXPECT_LE((small - large / by).cwiseAbs().maxCoeff(), slack);
+  };
+  for (const auto& [ours, theirs] : {std::pair{&here, &found}, {&found, &here}}) {
+    const auto others = byElement(*theirs);
+    for (const auto& [element, c] : byElement(*ours)) {
+      ShapeContact atOne = c;
+      if (ours == &found) atOne.distance /= by;
+      EXPECT_TRUE(others.contains(element) || isMarginal(atOne, pair)) << "element " << element[0];
+    }
+  }
+  const auto contacts = byElement(found);
+  for (const auto& [element, c] : byElement(here)) {
+    const auto other = contacts.find(element);
+    if (other == contacts.end()) continue;
+    const ShapeContact& f = other->second;
+    EXPECT_NEAR(f.distance / by, c.distance, slack);
+    EXPECT_NEAR(f.timeOfImpact, c.timeOfImpact, 3e-6);
+    EXPECT_NEAR(f.normal.norm(), 1, 1e-13);
+    // Inside several places of a triangle may be as deep, and of several ways out as short.
+    if (c.distance < 1e-3) continue;
+    EXPECT_NEAR((f.normal - c.normal).norm(), 0, 1e3 * slack);
+    near(c.point, f.point);
+    near(c.pointOnShape, f.pointOnShape);
+  }
+  EXPECT_EQ(found.shapeShape().size(), here.shapeShape().size());
+  if (here.shapeShape().size() == 1 && found.shapeShape().size() == 1) {
+    const ShapeShapeContact &c = here.shapeShape()[0], &f = found.shapeShape()[0];
+    EXPECT_NEAR(f.distance / by, c.distance, slack);
+    EXPECT_NEAR(f.timeOfImpact, c.timeOfImpact, 3e-6);
+    EXPECT_NEAR(f.normal.norm(), 1, 1e-13);
+  }
+  return here.shape().size() + here.shapeShape().size();
+}
+
+PairSettings settingsWith(Method method, double thickness) {
+  return {method, thickness, Contacts::Distinct};
+}
+
+TEST(ShapeScales, AnswerElementsAtAnySize) {
+  Random random(1);
+  std::array<std::size_t, 2> contacts{};
+  const std::vector<AnalyticalGeometry> shapes = measuredShapes();
+  for (std::size_t s = 0; s < shapes.size(); ++s)
+    for (const int kind : {0, 1, 2})
+      for (const Method method : {Method::Proximity, Method::Continuous}) {
+        const Thing thing = elements(random, kind);
+        Scene scene{shapes[s], randomMoves(random)};
+        scene.thing = thing;
+        scene.now = moved(random, thing.positions, 0.3);
+        for (const int scale : kScales) {
+          SCOPED_TRACE("shape " + std::to_string(s) + " by 2^" + std::to_string(scale) +
+                       ", method " + std::to_string(static_cast<int>(method)) + ", kind " +
+                       std::to_string(kind));
+          contacts[method == Method::Continuous] +=
+              expectSame(scene, settingsWith(method, 0.02), std::ldexp(1, scale));
+        }
+      }
+  EXPECT_GT(contacts[0], 1000u);
+  EXPECT_GT(contacts[1], 1000u);
+}
+
+TEST(ShapeScales, AnswerEachOtherAtAnySize) {
+  Random random(2);
+  const std::vector<AnalyticalGeometry> shapes = measuredShapes();
+  std::size_t contacts = 0;
+  for (std::size_t i = 0; i < shapes.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      if (std::holds_alternative<Plane>(shapes[i]) && std::holds_alternative<Plane>(shapes[j]))
+        continue;
+      const Scene scene{shapes[i], randomMoves(random), shapes[j], randomMoves(random)};
+      for (const int scale : kScales)
+        for (const Method method : {Method::Proximity, Method::Continuous}) {
+          SCOPED_TRACE("shapes " + std::to_string(i) + " and " + std::to_string(j) + " by 2^" +
+                       std::to_string(scale) + ", method " +
+                       std::to_string(static_cast<int>(method)));
+          const double thickness = method == Method::Proximity ? 4 : 0.02;
+          contacts += expectSame(scene, settingsWith(method, thickness), std::ldexp(1, scale));
+        }
+    }
+  EXPECT_GT(contacts, 700u);
+}
+
+/// Placed 2^1000 from the origin, where the last bit of a coordinate is 2^948.
+TEST(ShapeScales, AnswerFarFromTheOrigin) {
+  Random random(3);
+  std::size_t contacts = 0;
+  for (const AnalyticalGeometry& shape : measuredShapes())
+    for (const int kind : {0, 1, 2}) {
+      Scene scene{shape, randomMoves(random)};
+      scene.thing = elements(random, kind);
+      const Vector3d far(0x1p20, -0x1p19, 0x1p18);
+      for (Move& end : scene.ends) end.shift += far;
+      for (Vector3d& p : scene.thing.positions) p += far;
+      scene.now = moved(random, scene.thing.positions, 0.3);
+      // Coordinates are rounded to 2^-32 of the measures here.
+      contacts += expectSame(scene, settingsWith(Method::Proximity, 0.02), 0x1p979, 0x1p20);
+    }
+  EXPECT_GT(contacts, 50u);
+}
+
+TEST(ShapeScales, NormalsOfPlanesMayHaveAnyLength) {
+  for (const double length : {0x1p1023, 0x1p600, 0x1p-600, 0x1p-1060, 0x1p-1074}) {
+    OctreeBasedCD collisions(settingsOf(Engine::Octree));
+    const GeometryId plane =
+        collisions.addAnalyticalGeometry(Plane{{0, 0, 0}, {0, length, length}});
+    const GeometryId points = collisions.addPointSet(Positions{{0, 1, 1}});
+    collisions.addCollisionPair(points, plane, {Method::Proximity, 2.0});
+    collisions.detectCollision();
+    const CollisionData data = collisions.collisionData(points, plane);
+    ASSERT_EQ(data.shape().size(), 1u) << length;
+    EXPECT_NEAR(data.shape()[0].distance, std::sqrt(2.0), 1e-15) << length;
+    EXPECT_NEAR(data.shape()[0].normal.norm(), 1, 1e-15) << length;
+  }
+}
+
+/// Just inside of the limit right answers are what the other tests here expect.
+TEST(ShapeScales, RefuseMeasuresBeyondTheLimit) {
+  const double most = 1e300, beyond = std::nextafter(most, 2 * most);
+  OctreeBasedCD collisions(settingsOf(Engine::Octree));
+  const auto tryBoth = [&](const std::string& name, auto&& shapeOf) {
+    EXPECT_NO_THROW(collisions.removeGeometry(collisions.addAnalyticalGeometry(shapeOf(most))));
+    EXPECT_NO_THROW(collisions.removeGeometry(collisions.addAnalyticalGeometry(shapeOf(0.0))));
+    try {
+      collisions.addAnalyticalGeometry(shapeOf(beyond));
+      ADD_FAILURE() << "accepted: " << name;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::InvalidShape);
+      const std::string what = error.what();
+      EXPECT_NE(what.find(": " + name + " is "), std::string::npos) << what;
+      EXPECT_NE(what.find("at most 1e+300 in magnitude"), std::string::npos) << what;
+    }
+  };
+  tryBoth("radius", [](double x) { return Sphere{{0, 0, 0}, x}; });
+  tryBoth("centre", [](double x) { return Sphere{{0, -x, 0}, 1}; });
+  tryBoth("radius", [](double x) { return Capsule{{0, 0, 0}, {0, 0, 1}, x}; });
+  tryBoth("p0", [](double x) { return Capsule{{-x, 0, 0}, {0, 0, 1}, 1}; });
+  tryBoth("p1", [](double x) { return Capsule{{0, 0, 0}, {0, 0, x}, 1}; });
+  tryBoth("point", [](double x) { return Plane{{0, 0, x}}; });
+  tryBoth("centre", [](double x) { return Box{{0, 0, x}, {1, 1, 1}}; });
+  tryBoth("halfExtents", [](double x) { return Box{{0, 0, 0}, {1, x, 1}}; });
+  tryBoth("radius", [](double x) { return Cylinder{{0, 0, 0}, {0, 0, 1}, x}; });
+  tryBoth("p0", [](double x) { return Cylinder{{x, 0, 0}, {0, 0, 1}, 1}; });
+  tryBoth("p1", [](double x) { return Cylinder{{0, 0, 0}, {0, 1, x}, 1}; });
+  tryBoth("point 1", [](double x) { return ConvexHull{{{0, 0, 0}, {0, -x, 1}}}; });
+  EXPECT_NO_THROW(collisions.addAnalyticalGeometry(Plane{{0, 0, 0}, {0, 0, beyond}}));
+}
+
+TEST(ShapeScales, RefuseHullsOfTooManyPoints) {
+  ConvexHull hull{Positions(kMostHullPoints, Vector3d(1, 2, 3))};
+  hull.points.front() = {0, 0, 0};
+  OctreeBasedCD collisions(settingsOf(Engine::Octree));
+  EXPECT_NO_THROW(collisions.addAnalyticalGeometry(hull));
+  hull.points.push_back({0, 0, 0});
+  try {
+    collisions.addAnalyticalGeometry(hull);
+    ADD_FAILURE() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::InvalidShape);
+    EXPECT_NE(std::string(error.what()).find("131073 points; a hull takes at most 131072"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
+/// The case of the issue: a capsule whose half-length overflows when squared.
+TEST(ShapeScales, LongCapsuleIsMet) {
+  for (const double half : {1e155, 1e160, 1e-160, 1e-300, 1e-308}) {
+    OctreeBasedCD collisions(settingsOf(Engine::Octree));
+    const GeometryId capsule =
+        collisions.addAnalyticalGeometry(Capsule{{-half, 0, 0}, {half, 0, 0}, 0.5 * half});
+    const GeometryId points =
+        collisions.addPointSet(Positions{{0, 0.25 * half, 0}, {0.5 * half, 0, 0.75 * half}});
+    collisions.addCollisionPair(points, capsule, {Method::Proximity, 0.5 * half});
+    collisions.detectCollision();
+    const CollisionData data = collisions.collisionData(points, capsule);
+    ASSERT_EQ(data.shape().size(), 2u) << half;
+    EXPECT_NEAR(data.shape()[0].distance / half, -0.25, 1e-13);
+    EXPECT_NEAR(data.shape()[1].distance / half, 0.25, 1e-13);
+  }
+}
+
+}  // namespace
+}  // namespace palpate::testing
