@@ -118,6 +118,7 @@ void pauseFor(int repeat) {
 }
 
 TEST(ThreadFailures, AnObjectIsDestroyedInTheChildOfAFork) {
+  if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
   for (int repeat = 0; repeat < 50; ++repeat) {
     auto scene = std::make_unique<Scene>(Settings{.threads = 9});
     scene->hash();
@@ -132,6 +133,7 @@ TEST(ThreadFailures, AnObjectIsDestroyedInTheChildOfAFork) {
 }
 
 TEST(ThreadFailures, AFrameInTheChildOfAForkIsRight) {
+  if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
   const std::uint64_t truth = serialHash();
   Scene scene({.threads = 3});
   for (int repeat = 0; repeat < 50; ++repeat) {
@@ -162,6 +164,7 @@ TEST(ThreadFailures, AnObjectMadeInTheChildOfAForkHasThreads) {
 }
 
 TEST(ThreadFailures, AForkWhileAnotherThreadUsesThePoolIsSafe) {
+  if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
   const std::shared_ptr<Executor> pool = makeThreadPool(3);
   std::atomic<bool> over{false};
   std::thread other([&] {
@@ -182,6 +185,7 @@ TEST(ThreadFailures, AForkWhileAnotherThreadUsesThePoolIsSafe) {
 
 #ifndef PALPATE_THREADS_TBB
 TEST(ThreadFailures, AForkInATaskThatOthersShareIsAnErrorInTheChild) {
+  if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
   const Threads threads(2);
   std::atomic<bool> forked{false}, parent{true};
   std::string outcome;
