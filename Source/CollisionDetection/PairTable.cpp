@@ -32,9 +32,14 @@ void PairRecord::commit() noexcept {
 void PairRecord::commitNothing(bool keepsCandidates) noexcept {
   next = {};
   commit();
-  candidates.clear();
   trust.forget();
+  candidates.clear();
   if (keepsCandidates) candidatesOf.commit(state());
+}
+
+void PairRecord::commitNoCandidates() noexcept {
+  candidates.clear();
+  candidatesOf.commit(state());
 }
 
 namespace {
@@ -121,6 +126,12 @@ class Check {
     support(&a != &b || tool || !a.now.isPlaced(), kRigidWithItself);
     support(&a != &b || !tool, "a shape does not meet itself");
     support(!both || !a.shape->isPlane() || !b.shape->isPlane(), "two planes have no distance");
+    if (both && a.shape->needsDifferences(*b.shape)) {
+      const double p = a.shape->size(), q = b.shape->size();
+      support(std::max(p, q) <= kMostSizeRatio * std::min(p, q),
+              "the shapes are " + textOf(p) + " and " + textOf(q) +
+                  " large; beyond a ratio of 2^40 their distance is lost in rounding");
+    }
     const bool any = m_method == Method::Auto || m_method == Method::Proximity;
     support(meshes || continuous || any,
             "Method::Intersection is for two triangle meshes, not for " + nameOf(a.topology.kind) +

@@ -57,6 +57,7 @@ struct PairRecord {
   void commit() noexcept;
   /// Commits an empty answer, of a pair that does not collide.
   void commitNothing(bool keepsCandidates) noexcept;
+  void commitNoCandidates() noexcept;  ///< of a pair that does not collide
 
   const Geometry& mesh() const { return a->mesh.shape ? *b : *a; }  ///< of a pair with a shape
 

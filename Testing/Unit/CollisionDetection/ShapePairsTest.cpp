@@ -278,5 +278,33 @@ TEST(ShapePairs, CapturesHoldThem) {
   replayed(collisions);
 }
 
+/// What cannot be answered is refused; spheres, and two capsules, have any size.
+TEST(ShapePairs, SizesThatDifferTooMuchAreRefused) {
+  for (const double length : {1e14, 1e155, 1e300}) {
+    OctreeBasedCD collisions;
+    const GeometryId box = collisions.addAnalyticalGeometry(Box{{0, 0, 0}, {length, length, 1}}),
+                     rod = collisions.addAnalyticalGeometry(Capsule{{0, 0, 2}, {1, 0, 2}, 0.25}),
+                     ball = collisions.addAnalyticalGeometry(Sphere{{0, 0, 2}, 0.25}),
+                     other = collisions.addAnalyticalGeometry(
+                         Capsule{{-length, 0, 0}, {length, 0, 0}, 0.25});
+    for (const Method method : {Method::Auto, Method::Proximity, Method::Continuous}) {
+      try {
+        collisions.addCollisionPair(box, rod, {method, 1});
+        ADD_FAILURE() << "accepted";
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::UnsupportedMethod);
+        EXPECT_NE(std::string(error.what()).find("beyond a ratio of 2^40"), std::string::npos);
+      }
+    }
+    collisions.addCollisionPair(box, ball, {Method::Proximity, 1});
+    collisions.addCollisionPair(other, rod, {Method::Proximity, 2});
+    collisions.detectCollision();
+    ASSERT_EQ(collisions.collisionData(box, ball).shapeShape().size(), 1u);
+    EXPECT_NEAR(collisions.collisionData(box, ball).shapeShape()[0].distance, 0.75, 1e-12);
+    ASSERT_EQ(collisions.collisionData(other, rod).shapeShape().size(), 1u);
+    EXPECT_NEAR(collisions.collisionData(other, rod).shapeShape()[0].distance, 1.5, 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace palpate::testing
