@@ -306,5 +306,26 @@ TEST(ShapePairs, SizesThatDifferTooMuchAreRefused) {
   }
 }
 
+/// With many directions almost equally short the points were those of a face far from the nearest
+/// one: off by up to the depth.
+TEST(ShapePairs, PointsOfOverlappingCylindersFitTheDistance) {
+  Random random(7);
+  int overlapping = 0;
+  for (int run = 0; run < 60; ++run) {
+    const std::vector<AnalyticalGeometry> all = kinds(random);
+    for (const AnalyticalGeometry& one : all)
+      for (const AnalyticalGeometry& other : all) {
+        if (!std::holds_alternative<Cylinder>(one)) continue;
+        const PlacedShape a{one, randomTurn(random), randomPoint(random, -.3, .3)},
+            b{other, randomTurn(random), randomPoint(random, -.3, .3)};
+        const auto c = answer(a, b);
+        if (!c || c->distance >= 0) continue;
+        EXPECT_LE((c->pointA - c->pointB - c->distance * c->normal).norm(), 1e-7);
+        ++overlapping;
+      }
+  }
+  EXPECT_GT(overlapping, 300);
+}
+
 }  // namespace
 }  // namespace palpate::testing
