@@ -323,15 +323,21 @@ std::string contentOf(const std::filesystem::path& path) {
 
 void writeCapture(const CollisionProblem& problem, const std::filesystem::path& path) {
   const StandardFloatingPoint standard;
+  const std::string text = textOf(problem);
   std::filesystem::path partial = path;
   partial += ".part";
-  std::ofstream file(partial, std::ios::binary);
-  file << textOf(problem);
-  file.close();
-  std::error_code fault, ignored;
-  if (file.good()) std::filesystem::rename(partial, path, fault);
-  if (file.good() && !fault) return;
-  std::filesystem::remove(partial, ignored);
+  std::error_code fault;
+  try {
+    std::ofstream file(partial, std::ios::binary);
+    file << text;
+    file.close();
+    if (file.good()) std::filesystem::rename(partial, path, fault);
+    if (file.good() && !fault) return;
+  } catch (...) {
+    std::filesystem::remove(partial, fault);
+    throw;
+  }
+  std::filesystem::remove(partial, fault);
   throw Error(ErrorCode::File, "the capture \"" + path.string() + "\" cannot be written");
 }
 

@@ -27,7 +27,6 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
   const std::size_t given = rows.size();
   const auto require = [&](const SolverVertices& side, std::uint32_t vertex) {
     if (vertex < side.before.size() && vertex < side.now.size()) return;
-    rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(given), rows.end());
     throw Error(ErrorCode::WrongPositionCount,
                 "appendRows(): a contact has vertex " + std::to_string(vertex) + " of " +
                     (&side == &a ? "a" : "b") + ", which has " +
@@ -49,18 +48,23 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
     row.offset = contact.normal.dot(sum) - contact.distance;
     rows.push_back(row);
   };
-  for (const auto& contact : contacts.vertexTriangle()) add(contact, {&a, &b, &b, &b});
-  for (const auto& contact : contacts.triangleVertex()) add(contact, {&b, &a, &a, &a});
-  for (const auto& contact : contacts.edgeEdge()) add(contact, {&a, &a, &b, &b});
-  const SolverVertices& mesh = a.before.empty() && a.now.empty() ? b : a;  // the other: the shape
-  for (const ShapeContact& contact : contacts.shape()) {
-    const auto& [i, j, k] = contact.vertices;
-    for (const std::uint32_t vertex : contact.vertices) require(mesh, vertex);
-    const std::uint32_t first = mesh.first;
-    rows.push_back({{first + i, first + j, first + k, first + i},
-                    {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
-                    contact.normal,
-                    contact.normal.dot(contact.point) - contact.distance});
+  try {
+    for (const auto& contact : contacts.vertexTriangle()) add(contact, {&a, &b, &b, &b});
+    for (const auto& contact : contacts.triangleVertex()) add(contact, {&b, &a, &a, &a});
+    for (const auto& contact : contacts.edgeEdge()) add(contact, {&a, &a, &b, &b});
+    const SolverVertices& mesh = a.before.empty() && a.now.empty() ? b : a;  // the other: the shape
+    for (const ShapeContact& contact : contacts.shape()) {
+      const auto& [i, j, k] = contact.vertices;
+      for (const std::uint32_t vertex : contact.vertices) require(mesh, vertex);
+      const std::uint32_t first = mesh.first;
+      rows.push_back({{first + i, first + j, first + k, first + i},
+                      {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
+                      contact.normal,
+                      contact.normal.dot(contact.point) - contact.distance});
+    }
+  } catch (...) {
+    rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(given), rows.end());
+    throw;
   }
 }
 

@@ -129,10 +129,13 @@ void checkRadii(GeometryId id, std::span<const double> radii) {
                   id, v);
 }
 
-void checkOnePerVertex(std::span<const Eigen::Vector3d> positions, std::span<const double> radii) {
+void checkOnePerVertex(GeometryId id, std::span<const Eigen::Vector3d> positions,
+                       std::span<const double> radii) {
   if (radii.size() != positions.size())
-    throw Error(ErrorCode::InvalidRadius, std::to_string(radii.size()) + " radii given for " +
-                                              std::to_string(positions.size()) + " vertices");
+    throw Error(ErrorCode::InvalidRadius,
+                nameOf(id) + ": " + std::to_string(radii.size()) + " radii given for " +
+                    std::to_string(positions.size()) + " vertices",
+                id);
 }
 
 void checkPositionCount(const Geometry& geometry, std::size_t count) {

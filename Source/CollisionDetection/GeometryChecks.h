@@ -23,7 +23,7 @@ void checkCounts(GeometryId, std::span<const Eigen::Vector3d>, std::span<const T
 TetrahedralTopology checkedTopology(GeometryId, std::span<const Eigen::Vector3d> rest,
                                     std::span<const Tetrahedron>);
 void checkRadii(GeometryId, std::span<const double>);
-void checkOnePerVertex(std::span<const Eigen::Vector3d>, std::span<const double> radii);
+void checkOnePerVertex(GeometryId, std::span<const Eigen::Vector3d>, std::span<const double> radii);
 void checkPositionCount(const Geometry&, std::size_t count);
 /// Of positions in a body's frame.
 void checkPlaceable(GeometryId, std::span<const Eigen::Vector3d> body, ErrorCode);

@@ -49,8 +49,9 @@ class GeometryTable {
   void updateOctrees(const OctreeSettings&, const Threads&);
   bool updatedAlone() const { return m_updatedAlone; }  ///< by one thread, which has the data
 
+  GeometryId nextId() const;  ///< of what is added next; throws if there are no more
+
  private:
-  GeometryId nextId() const;  ///< of what is added; throws if there are no more
   /// A geometry with its topology, and positions at both ends of the step; not yet in the table.
   std::unique_ptr<Geometry> make(std::vector<Eigen::Vector3d> rest, MeshTopology) const;
   GeometryId add(std::unique_ptr<Geometry>);

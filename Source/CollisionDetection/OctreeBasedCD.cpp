@@ -174,13 +174,9 @@ struct OctreeBasedCD::Implementation {
   /// Pairs whose answer is outdated. That of pairs that do not collide is nothing.
   std::span<PairRecord* const> pairsToDo(PairRecord::Derived PairRecord::*answer) {
     work.clear();
-    for (const auto& record : pairs.records()) {
-      if (((*record).*answer).isCurrent(record->state())) continue;
-      if (record->collides())
+    for (const auto& record : pairs.records())
+      if (record->collides() && !((*record).*answer).isCurrent(record->state()))
         work.push_back(record.get());
-      else
-        record->commitNothing(settings.keepCandidates || answer == &PairRecord::candidatesOf);
-    }
     for (PairRecord* record : work) record->candidatesOf.invalidate();
     return work;
   }
@@ -207,7 +203,10 @@ struct OctreeBasedCD::Implementation {
         record->candidatesOf.commit(record->state());
       }
     }
-    for (const auto& record : pairs.records()) next.candidatePairs += record->candidates.size();
+    for (const auto& record : pairs.records()) {
+      if (!record->collides()) record->commitNoCandidates();
+      next.candidatePairs += record->candidates.size();
+    }
     publish(next);
     hasUpdates = false;
   }
@@ -224,6 +223,8 @@ struct OctreeBasedCD::Implementation {
       frame.detectByBruteForce(records, settings, next);
     for (PairRecord* record : records) record->commit();
     for (const auto& record : pairs.records()) {
+      if (!record->collides() && !record->dataOf.isCurrent(record->state()))
+        record->commitNothing(settings.keepCandidates);
       const CollisionData& data = record->data;
       next.contacts += data.validity().atImpact + data.validity().atEnd;
       next.intersectingTriangles += data.intersectingTriangles().size();
@@ -328,7 +329,7 @@ GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions
                                       std::span<const Segment> segments,
                                       std::span<const double> radii) {
   const Implementation::Change all(m_implementation);
-  checkOnePerVertex(positions, radii);
+  checkOnePerVertex(all->geometries.nextId(), positions, radii);
   return all->geometries.addLines(positions, segments, radii);
 }
 
@@ -340,7 +341,7 @@ GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions
 GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions,
                                       std::span<const double> radii) {
   const Implementation::Change all(m_implementation);
-  checkOnePerVertex(positions, radii);
+  checkOnePerVertex(all->geometries.nextId(), positions, radii);
   return all->geometries.addPoints(positions, radii);
 }
 

@@ -32,9 +32,14 @@ void PairRecord::commit() noexcept {
 void PairRecord::commitNothing(bool keepsCandidates) noexcept {
   next = {};
   commit();
-  candidates.clear();
   trust.forget();
+  candidates.clear();
   if (keepsCandidates) candidatesOf.commit(state());
+}
+
+void PairRecord::commitNoCandidates() noexcept {
+  candidates.clear();
+  candidatesOf.commit(state());
 }
 
 namespace {
@@ -118,6 +123,12 @@ class Check {
     support(!self || a.shape || !a.isPlaced(), kRigidWithItself);
     support(!self || !a.shape, "a shape does not meet itself");
     support(!isPlane(a) || !isPlane(b), "two planes have no distance");
+    if (a.shape && b.shape && a.shape->now.needsDifferences(b.shape->now)) {
+      const double p = a.shape->now.size(), q = b.shape->now.size();
+      support(std::max(p, q) <= kMostSizeRatio * std::min(p, q),
+              "the shapes are " + textOf(p) + " and " + textOf(q) +
+                  " large; beyond a ratio of 2^40 their distance is lost in rounding");
+    }
     const bool any = m_method == Method::Auto || m_method == Method::Proximity;
     support(meshes || continuous || any,
             "Method::Intersection is for two triangle meshes, not for " + nameOf(ofA.kind) +

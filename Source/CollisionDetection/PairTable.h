@@ -59,6 +59,7 @@ struct PairRecord {
   void commit() noexcept;
   /// Commits an empty answer, of a pair that does not collide.
   void commitNothing(bool keepsCandidates) noexcept;
+  void commitNoCandidates() noexcept;  ///< of a pair that does not collide
 
   bool hasShape() const { return a->shape || b->shape; }
   const Geometry& mesh() const { return a->shape ? *b : *a; }  ///< of a pair with a shape

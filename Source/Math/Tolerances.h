@@ -133,6 +133,9 @@ constexpr double kOnSurface = 0x1p-48;
 /// Relative to the largest difference of two shapes' points: how closely their distance is
 /// bracketed. Each difference carries two roundings, its height five more.
 constexpr double kShapePairGap = 0x1p-46;
+/// Of the sizes of two shapes whose distance is that of the body of differences; beyond it that gap
+/// may be larger than the smaller shape.
+constexpr double kMostSizeRatio = 0x1p40;
 /// L: the same where differences are so small that their own roundings are larger.
 constexpr double kSmallestShapePairGap = 0x1p-1068;
 /// Squared sine from a capsule's axis below which another direction across it is taken: any value.

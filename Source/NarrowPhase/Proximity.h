@@ -44,15 +44,22 @@ inline bool holdsVertex(const Triangle& triangle, std::uint32_t vertex) {
   return triangle[0] == vertex || triangle[1] == vertex || triangle[2] == vertex;
 }
 
-/// Of a segment {p, q, q} or a point {p, p, p}, some of whose corners and edges are the same, the
-/// first name that the feature has; of a triangle its only name.
-inline TriangleFeature firstNameOf(TriangleFeature feature, const Triangle& corners) {
-  if (corners[1] != corners[2]) return feature;
-  if (corners[0] == corners[1]) return TriangleFeature::CornerA;
-  if (feature == TriangleFeature::EdgeCA) return TriangleFeature::EdgeAB;
-  return feature <= TriangleFeature::CornerB || feature == TriangleFeature::EdgeAB
-             ? feature
-             : TriangleFeature::CornerB;
+/// What the corners with weights other than 0 span. Of a segment {p, q, q} or a point {p, p, p},
+/// some of whose corners are the same, the first name that the feature has.
+inline TriangleFeature spannedFeature(const Triangle& corners, const Eigen::Vector3d& barycentric) {
+  bool a = barycentric[0] != 0.0, b = barycentric[1] != 0.0, c = barycentric[2] != 0.0;
+  if (corners[1] == corners[2]) b = b || c, c = false;
+  if (corners[0] == corners[1]) a = a || b, b = false;
+  if (a && b && c) return TriangleFeature::Face;
+  if (a && b) return TriangleFeature::EdgeAB;
+  if (b && c) return TriangleFeature::EdgeBC;
+  if (a && c) return TriangleFeature::EdgeCA;
+  return a ? TriangleFeature::CornerA : b ? TriangleFeature::CornerB : TriangleFeature::CornerC;
+}
+
+inline EdgeFeature spannedFeature(double weight) {
+  if (weight == 0.0) return EdgeFeature::Start;
+  return weight == 1.0 ? EdgeFeature::End : EdgeFeature::Interior;
 }
 
 /// The contact of features that are measured at a time of the step: at its end, or at an impact.
@@ -60,7 +67,7 @@ inline VertexTriangleContact contactOf(std::uint32_t vertex, std::uint32_t trian
                                        const Triangle& corners,
                                        const VertexTriangleDistance& answer, double time = 1.0) {
   return {vertex,        triangle,        corners, answer.barycentric,
-          answer.normal, answer.distance, time,    firstNameOf(answer.feature, corners)};
+          answer.normal, answer.distance, time,    spannedFeature(corners, answer.barycentric)};
 }
 
 inline EdgeEdgeContact contactOf(const Segment& a, const Segment& b, const EdgeEdgeDistance& answer,
@@ -72,8 +79,8 @@ inline EdgeEdgeContact contactOf(const Segment& a, const Segment& b, const EdgeE
           answer.normal,
           answer.distance,
           time,
-          answer.featureA,
-          answer.featureB};
+          spannedFeature(answer.weightA),
+          spannedFeature(answer.weightB)};
 }
 
 }  // namespace palpate

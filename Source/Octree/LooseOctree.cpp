@@ -2,6 +2,7 @@
 
 #include <palpate/Error.h>
 
+#include "Core/FloatingPoint.h"
 #include "Octree/Forest.h"
 
 #include <algorithm>
@@ -81,6 +82,7 @@ std::optional<LooseOctree::NodeId> LooseOctree::root(GeometryId geometry) const 
 }
 
 LooseOctree::Node LooseOctree::node(NodeId id) const {
+  const StandardFloatingPoint standard;
   const auto index = static_cast<std::uint32_t>(id);
   const auto next =
       std::upper_bound(m_state->trees.begin(), m_state->trees.end(), index,

@@ -64,6 +64,11 @@ class Polytope {
   SignedDistance at(const Eigen::Vector3d& x, double tie) const;
   /// The face that is nearest to x; inside, of those in the plane of at().
   OnFace nearest(const Eigen::Vector3d& x, double tie) const;
+  /// For a point inside: of the faces whose planes are at most `slack` further away than the
+  /// nearest plane, the one that is nearest itself. Of a body with almost equal planes, whose faces
+  /// are slivers, nearest() may give a face far from the foot on its plane.
+  OnFace nearestFaceWithin(const Eigen::Vector3d& x, double slack) const;
+  const Eigen::Vector3d& normal(std::uint32_t face) const;  ///< unit, outward
   /// The middle of its points that are furthest along a direction.
   Eigen::Vector3d support(const Eigen::Vector3d& direction, double tie) const;
   /// Where on p + t (q - p), t in [0, 1], the signed distance is least: at an end if it is so

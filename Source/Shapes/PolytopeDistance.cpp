@@ -134,6 +134,24 @@ Polytope::OnFace Polytope::nearest(const Vector3d& x, double tie) const {
   return best;
 }
 
+Polytope::OnFace Polytope::nearestFaceWithin(const Vector3d& x, double slack) const {
+  const double top = m_planes[highest(x, 0)].height(x);
+  OnFace best{};
+  best.from.distance = kInfinity;
+  for (const Plane& plane : m_planes) {
+    if (!(plane.height(x) >= top - slack)) continue;
+    const OnFace on = onFace(x, plane.face);
+    if (on.from.distance < best.from.distance) best = on;
+  }
+  return best;
+}
+
+const Vector3d& Polytope::normal(std::uint32_t face) const {
+  return std::find_if(m_planes.begin(), m_planes.end(),
+                      [&](const Plane& plane) { return plane.face == face; })
+      ->normal;
+}
+
 SignedDistance Polytope::at(const Vector3d& x, double tie) const {
   const Plane& top = m_planes[highest(x, tie)];
   const double height = top.height(x);

@@ -85,6 +85,10 @@ class Shape {
   const Eigen::Vector3d& origin() const { return m_p0; }
   bool isPlane() const { return m_kind < Kind::Capsule; }
   bool isCylinder() const { return m_kind == Kind::Cylinder; }
+  /// Whether the distance from another is that of the body of all differences, which is known to
+  /// kShapePairGap of the larger one.
+  bool needsDifferences(const Shape& b) const;
+  double size() const;  ///< L: of the largest measure; infinite for a plane
   bool isTwoSided() const { return m_kind == Kind::TwoSidedPlane; }
 
   // Within a step what a shape is made of moves linearly: a capsule's two ends, which of a sphere

@@ -170,21 +170,26 @@ ShapePairDistance Shape::grownFrom(const Shape& other, ShapePairScratch& scratch
   grown.start(corners);
   const Vector3d origin = Vector3d::Zero();
   const double gap = std::max(kShapePairGap * size, kSmallestShapePairGap), tie = kOnSurface * size;
+  const bool isRound = m_kind == Kind::Cylinder || other.m_kind == Kind::Cylinder;
   SignedDistance out;
   for (;;) {
     out = grown.at(origin, tie);
     const auto [difference, point] = differences.furthest(out.normal);
     const double reach = dot(out.normal, difference);
     // A round body may be as deep in as many directions as it has: each of them parts it truly.
-    const bool enough = out.distance < 0 && grown.points().size() >= kMostDifferences &&
-                        (m_kind == Kind::Cylinder || other.m_kind == Kind::Cylinder);
+    const bool enough = isRound && out.distance < 0 && grown.points().size() >= kMostDifferences;
     if (!(reach + out.distance > gap) || enough || !grown.add(difference)) {
       if (out.distance < 0) out.distance = -reach;
       break;
     }
     ofA.push_back(point);
   }
-  const Polytope::OnFace on = grown.nearest(origin, tie);
+  Polytope::OnFace on = grown.nearest(origin, tie);
+  if (isRound && out.distance < 0) {
+    on = grown.nearestFaceWithin(origin, tie);
+    out.normal = grown.normal(on.face);
+    out.distance = -dot(out.normal, differences.furthest(out.normal).difference);
+  }
   Vector3d point = m_p0;
   for (int i = 0; i < 3; ++i)
     point += on.from.barycentric[i] * ofA[grown.corners(on.face)[static_cast<std::size_t>(i)]];
@@ -206,6 +211,21 @@ ShapePairDistance Shape::axisFrom(const Shape& body) const {
   const Vector3d point = m_p0 + nearest.weights[1] * (m_p1 - m_p0) - m_radius * nearest.normal;
   const double distance = nearest.distance - m_radius;
   return {point, point - distance * nearest.normal, nearest.normal, distance};
+}
+
+bool Shape::needsDifferences(const Shape& b) const {
+  const auto isSphere = [](const Shape& s) {
+    return s.m_kind == Kind::Capsule && s.m_p0 == s.m_p1;
+  };
+  if (isPlane() || b.isPlane() || isSphere(*this) || isSphere(b)) return false;
+  return m_kind != Kind::Capsule || b.m_kind != Kind::Capsule;
+}
+
+double Shape::size() const {
+  if (isPlane()) return std::numeric_limits<double>::infinity();
+  double longest = 0;
+  for (const Vector3d& p : m_corners) longest = std::max(longest, largest(p - m_corners.front()));
+  return longest + radius();
 }
 
 ShapePairDistance Shape::distanceFrom(const Shape& b, ShapePairScratch& scratch) const {

@@ -1,4 +1,6 @@
 #include <palpate/OctreeBasedCD.h>
+#include <palpate/Capture.h>
+#include <palpate/ConstraintRows.h>
 #include <palpate/StepGuard.h>
 
 #include "Common/FailingAllocation.h"
@@ -9,6 +11,8 @@
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
+
+#include <filesystem>
 
 #include <bit>
 #include <functional>
@@ -361,6 +365,63 @@ TEST_P(AllocationFailure, LeavesTheStepOfAGuardAsItWas) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Threads, AllocationFailure, ::testing::Values(1, 2));
+
+/// What solvers append to keeps what it held.
+TEST(AllocationFailureOf, AppendedRowsAndMotions) {
+  const Mesh low = sheet(3, 0.0, 0.0), high = sheet(3, 0.0, 0.2);
+  const CollisionData contacts = detectCollision(
+      {low.positions, low.triangles}, {high.positions, high.triangles}, {Method::Proximity, 0.5});
+  const SolverVertices a{0, low.positions, low.positions}, b{100, high.positions, high.positions};
+  std::vector<ConstraintRow> rows;
+  std::vector<ContactMotion> motions;
+  appendRows(contacts, a, b, rows);
+  ASSERT_GT(rows.size(), 20u);
+  const auto expectKept = [](auto& list, auto&& append) {
+    for (std::size_t n = 1;; ++n) {
+      list.resize(3);
+      list.shrink_to_fit();
+      FailingAllocation::arm(n);
+      bool thrown = false;
+      try {
+        append();
+      } catch (const std::bad_alloc&) {
+        thrown = true;
+      }
+      FailingAllocation::disarm();
+      if (!FailingAllocation::failed()) {
+        EXPECT_GT(n, 2u);
+        return;
+      }
+      EXPECT_TRUE(thrown);
+      EXPECT_EQ(list.size(), 3u) << n;
+    }
+  };
+  expectKept(rows, [&] { appendRows(contacts, a, b, rows); });
+  expectKept(motions, [&] { appendMotions(contacts, {a}, {b}, motions); });
+}
+
+TEST(AllocationFailureOf, ACaptureLeavesNoPartOfAFile) {
+  const Mesh mesh = sheet(2, 0.0, 0.0);
+  OctreeBasedCD collisions;
+  collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+  const auto folder = std::filesystem::temp_directory_path() / "palpate-capture-failures";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directory(folder);
+  for (std::size_t n = 1;; ++n) {
+    FailingAllocation::arm(n);
+    try {
+      capture(collisions, folder / "a.capture");
+    } catch (const std::bad_alloc&) {
+    } catch (const Error&) {
+    }
+    FailingAllocation::disarm();
+    if (!FailingAllocation::failed()) break;
+    for (const auto& entry : std::filesystem::directory_iterator(folder))
+      EXPECT_NE(entry.path().extension(), ".part") << n;
+  }
+  EXPECT_TRUE(std::filesystem::exists(folder / "a.capture"));
+  std::filesystem::remove_all(folder);
+}
 
 }  // namespace
 }  // namespace palpate::testing

@@ -327,5 +327,24 @@ INSTANTIATE_TEST_SUITE_P(
                       MethodCase{"AutoWithoutThickness", {Method::Auto, 0}}),
     [](const auto& test) { return test.param.name; });
 
+/// A step without motion, with features within the thickness. Then a solver moves positions by less
+/// than that, so that the meshes intersect.
+TEST(StartedApart, IsNotSaidAfterACorrectionBeyondWhatWasLeft) {
+  const Mesh low = sheet(4, 0.0, 0.0);
+  std::vector<Eigen::Vector3d> high = low.positions;
+  for (Eigen::Vector3d& p : high) p.z() += 0.02;
+  OctreeBasedCD collisions;
+  const GeometryId a = collisions.addTriangleMesh(low.positions, low.triangles),
+                   b = collisions.addTriangleMesh(high, low.triangles);
+  collisions.addCollisionPair(a, b, {.method = Method::Continuous, .thickness = 0.05});
+  collisions.detectCollision();
+  EXPECT_TRUE(collisions.collisionData(a, b).validity().startedApart);
+  collisions.advance();
+  for (Eigen::Vector3d& p : high) p.z() -= p.x() > 0.5 ? 0.04 : 0.0;
+  collisions.setPositions(b, high, high);
+  collisions.detectCollision();
+  EXPECT_FALSE(collisions.collisionData(a, b).validity().startedApart);
+}
+
 }  // namespace
 }  // namespace palpate

@@ -44,8 +44,8 @@ struct VertexTriangleContact {
   Eigen::Vector3d normal;
   double distance;      ///< L, less the radii, at timeOfImpact; sign: see above
   double timeOfImpact;  ///< [0, 1] of the step; 1 for methods that look at its end
-  /// What holds the closest point at that time, decided exactly: Face, an edge or a corner. Of a
-  /// segment EdgeAB, CornerA or CornerB, of a point CornerA.
+  /// What holds the closest point at that time: what the corners with weights other than 0 span. Of
+  /// a segment EdgeAB, CornerA or CornerB, of a point CornerA.
   TriangleFeature feature = TriangleFeature::Face;
   friend bool operator==(const VertexTriangleContact&, const VertexTriangleContact&) = default;
 };
@@ -56,7 +56,7 @@ struct EdgeEdgeContact {
   double weightA, weightB;                    ///< closest point = p0 + weight (p1 - p0)
   Eigen::Vector3d normal;                     ///< unit, from b towards a
   double distance, timeOfImpact;              ///< L, negative by radii only; as above
-  /// What holds each closest point at that time, decided exactly: the interior or an end.
+  /// What holds each closest point at that time: an end where the weight is 0 or 1.
   EdgeFeature featureA = EdgeFeature::Interior, featureB = EdgeFeature::Interior;
   friend bool operator==(const EdgeEdgeContact&, const EdgeEdgeContact&) = default;
 };
@@ -80,6 +80,7 @@ struct ShapeContact {
 
 /// Two analytical shapes where they are nearest, or, if they overlap, where they leave each other
 /// by the shortest way; with Method::Continuous at the time at which they first come near enough.
+/// Where a cylinder overlaps another shape, distance and points fit within 2e-3 of the two sizes.
 struct ShapeShapeContact {
   Eigen::Vector3d pointA, pointB;  ///< L, on the surfaces of the first and of the second
   Eigen::Vector3d normal;          ///< unit, from b towards a

@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include <algorithm>
 #include <limits>
 #include <map>
@@ -277,6 +279,41 @@ TEST(FirstImpacts, AreFewOnSmoothBodies) {
   RecordProperty("distinct", static_cast<int>(distinct));
   EXPECT_GT(all, 9000u);
   EXPECT_LT(3 * distinct, all);
+}
+
+/// Regular grids that fall onto each other touch where weights are 0 but for rounding.
+TEST(FirstImpacts, AlignedGridsHaveEachPairOfFeaturesOnce) {
+  Random random(18);
+  std::size_t contacts = 0;
+  for (std::uint32_t n = 2; n < 6; ++n)
+    for (int run = 0; run < 40; ++run) {
+      const Mesh floor = sheet(n, 0.0, 0.0), above = sheet(n, 0.0, 0.0);
+      const double along = uniform(random, -0.3, 0.3), time = uniform(random, 0.2, 0.8);
+      std::vector<Eigen::Vector3d> before = above.positions, now = above.positions;
+      for (Eigen::Vector3d& p : before) p += Eigen::Vector3d(along, 0, time);
+      for (Eigen::Vector3d& p : now) p += Eigen::Vector3d(along, 0, time - 1);
+      OctreeBasedCD collisions;
+      const GeometryId a = collisions.addTriangleMesh(floor.positions, floor.triangles),
+                       b = collisions.addTriangleMesh(before, above.triangles);
+      collisions.addCollisionPair(a, b, {.method = Method::Continuous});
+      collisions.setPositions(b, before, now);
+      collisions.detectCollision();
+      // By the vertices with weights other than 0: those of a, then those of b.
+      std::set<std::array<std::set<std::uint32_t>, 2>> seen;
+      const auto add = [&](const auto& contact, std::array<std::size_t, 4> sides) {
+        const Stencil of = stencil(contact);
+        std::array<std::set<std::uint32_t>, 2> features;
+        for (std::size_t i = 0; i < 4; ++i)
+          if (of.weights[i] != 0.0) features[sides[i]].insert(of.vertices[i]);
+        EXPECT_TRUE(seen.insert(features).second) << n << ", run " << run;
+        ++contacts;
+      };
+      const CollisionData& data = collisions.collisionData(a, b);
+      for (const auto& c : data.vertexTriangle()) add(c, {0, 1, 1, 1});
+      for (const auto& c : data.triangleVertex()) add(c, {1, 0, 0, 0});
+      for (const auto& c : data.edgeEdge()) add(c, {0, 0, 1, 1});
+    }
+  EXPECT_GT(contacts, 500u);
 }
 
 }  // namespace

@@ -601,7 +601,7 @@ TEST(Kinds, BadInputIsRefusedByName) {
       collisions.addLineMesh(two, one, std::vector<double>{1, bad});
     });
   }
-  expectRefused(Code::InvalidRadius, "1 radii given for 2 vertices",
+  expectRefused(Code::InvalidRadius, "geometry 0: 1 radii given for 2 vertices",
                 [&] { collisions.addLineMesh(two, one, std::vector<double>{1}); });
 
   const GeometryId line = collisions.addLineMesh(two, one),

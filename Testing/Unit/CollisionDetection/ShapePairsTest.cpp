@@ -278,5 +278,54 @@ TEST(ShapePairs, CapturesHoldThem) {
   replayed(collisions);
 }
 
+/// What cannot be answered is refused; spheres, and two capsules, have any size.
+TEST(ShapePairs, SizesThatDifferTooMuchAreRefused) {
+  for (const double length : {1e14, 1e155, 1e300}) {
+    OctreeBasedCD collisions;
+    const GeometryId box = collisions.addAnalyticalGeometry(Box{{0, 0, 0}, {length, length, 1}}),
+                     rod = collisions.addAnalyticalGeometry(Capsule{{0, 0, 2}, {1, 0, 2}, 0.25}),
+                     ball = collisions.addAnalyticalGeometry(Sphere{{0, 0, 2}, 0.25}),
+                     other = collisions.addAnalyticalGeometry(
+                         Capsule{{-length, 0, 0}, {length, 0, 0}, 0.25});
+    for (const Method method : {Method::Auto, Method::Proximity, Method::Continuous}) {
+      try {
+        collisions.addCollisionPair(box, rod, {method, 1});
+        ADD_FAILURE() << "accepted";
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::UnsupportedMethod);
+        EXPECT_NE(std::string(error.what()).find("beyond a ratio of 2^40"), std::string::npos);
+      }
+    }
+    collisions.addCollisionPair(box, ball, {Method::Proximity, 1});
+    collisions.addCollisionPair(other, rod, {Method::Proximity, 2});
+    collisions.detectCollision();
+    ASSERT_EQ(collisions.collisionData(box, ball).shapeShape().size(), 1u);
+    EXPECT_NEAR(collisions.collisionData(box, ball).shapeShape()[0].distance, 0.75, 1e-12);
+    ASSERT_EQ(collisions.collisionData(other, rod).shapeShape().size(), 1u);
+    EXPECT_NEAR(collisions.collisionData(other, rod).shapeShape()[0].distance, 1.5, 1e-12);
+  }
+}
+
+/// With many directions almost equally short the points were those of a face far from the nearest
+/// one: off by up to the depth.
+TEST(ShapePairs, PointsOfOverlappingCylindersFitTheDistance) {
+  Random random(7);
+  int overlapping = 0;
+  for (int run = 0; run < 60; ++run) {
+    const std::vector<AnalyticalGeometry> all = kinds(random);
+    for (const AnalyticalGeometry& one : all)
+      for (const AnalyticalGeometry& other : all) {
+        if (!std::holds_alternative<Cylinder>(one)) continue;
+        const PlacedShape a{one, randomTurn(random), randomPoint(random, -.3, .3)},
+            b{other, randomTurn(random), randomPoint(random, -.3, .3)};
+        const auto c = answer(a, b);
+        if (!c || c->distance >= 0) continue;
+        EXPECT_LE((c->pointA - c->pointB - c->distance * c->normal).norm(), 1e-7);
+        ++overlapping;
+      }
+  }
+  EXPECT_GT(overlapping, 300);
+}
+
 }  // namespace
 }  // namespace palpate::testing
