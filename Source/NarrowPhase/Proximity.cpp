@@ -49,7 +49,8 @@ class VertexTriangleFinder {
     m_exactDecisions += answer.exact;
     const double radii = m_pair.radii(vertex, corners, answer.barycentric, m_ofSecond);
     if (!(answer.distance - radii <= m_thickness)) return;
-    if (m_check.isAnsweredByImpact(m_features, vertex, triangle, m_ofSecond, answer.distance))
+    m_check.noteDistance(answer.distance);
+    if (m_check.addImpactIfTouched(m_features, vertex, triangle, m_ofSecond, answer.distance))
       return;
     if (refusesVertex(m_pair, vertex, triangle, m_ofSecond)) return;
     const MeshFeature feature = featureOf(m_topology, triangle, answer.feature);
@@ -170,7 +171,8 @@ void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, S
   if (!answer) answer = finiteEdgeEdgeDistance(at(0), at(1), at(2), at(3));
   out.exactDecisions += answer->exact;
   if (!(answer->distance <= pair.thicknessAtEnd())) return;
-  if (check.isAnsweredByImpact(features, edgeA, edgeB, false, answer->distance)) return;
+  check.noteDistance(answer->distance);
+  if (check.addImpactIfTouched(features, edgeA, edgeB, false, answer->distance)) return;
   if (!isContact || refusesEdges(pair, edgeA, edgeB)) return;
   if (pointInwardAtEnd(pair, edgeA, edgeB, *answer)) {
     if (pair.step.impacts) addImpact(pair, features, edgeA, edgeB, false, out);
