@@ -137,7 +137,8 @@ struct Frame::Job {
   ContactBuffers contacts;
   ContactBuffers overlaps;  ///< Auto: Intersection's, where the step starts intersecting
   bool overlapsMissed;      ///< of batches before any was seen to start so
-  Buffer<TrianglePair> candidates, own;
+  Buffer<TrianglePair> candidates;
+  Buffer<TrianglePair> kept;  ///< of the batch at hand, by the filters so far
   double milliseconds = 0, narrowMilliseconds = 0;
 
   /// Batches go to `use`; without, they stay in the sink.
@@ -148,28 +149,44 @@ struct Frame::Job {
 
   /// Not all that the traversal finds is a candidate.
   bool isFiltered() const { return record->anyDisabled() || trees.turned(); }
-  void keepInWorld(double distance) {
-    keepOverlapping(record->meshes(), record->plan.swept(), distance, own);
-  }
+  /// The boxes of the traversal may be larger than those of the pair's method.
+  bool widerBoxes() const { return record->widerBoxes() || record->plan.nearby > 0.0; }
 
+  /// A batch of the traversal, of which `use` takes the candidates.
   static void receive(void* context, std::span<const TrianglePair> pairs) {
     Job& job = *static_cast<Job*>(context);
-    const bool wider = job.record->widerBoxes() || job.record->plan.nearby > 0.0;
-    if (!wider && !job.isFiltered()) {
+    if (!job.widerBoxes() && !job.isFiltered()) {
       job.nearby = true;
       return job.use(job, pairs);
     }
-    const MeshTopology &a = job.record->a->mesh.topology, &b = job.record->b->mesh.topology;
-    job.own.assign(pairs.begin(), pairs.end());
-    if (job.trees.turned()) job.keepInWorld(std::max(job.record->plan.nearby, job.thickness));
-    job.nearby |= !job.own.empty();
-    if (job.record->anyDisabled())
-      std::erase_if(job.own, [&](const TrianglePair& p) { return !a.isOn(p.a) || !b.isOn(p.b); });
-    if (job.trees.turned() && job.record->plan.nearby > job.thickness)
-      job.keepInWorld(job.thickness);
-    else if (wider && !job.trees.turned())
-      keepOverlapping(a, b, job.floats, job.own);
-    if (!job.own.empty()) job.use(job, job.own);
+    job.kept.assign(pairs.begin(), pairs.end());
+    job.keepNearby();
+    job.nearby |= !job.kept.empty();
+    job.keepEnabled();
+    job.keepWithinThickness();
+    if (!job.kept.empty()) job.use(job, job.kept);
+  }
+
+  /// Keeps pairs whose boxes overlap at the thickness of the traversal. Turned trees find more.
+  void keepNearby() {
+    if (trees.turned()) keepInWorld(std::max(record->plan.nearby, thickness));
+  }
+  void keepEnabled() {
+    if (!record->anyDisabled()) return;
+    const MeshTopology &a = record->a->mesh.topology, &b = record->b->mesh.topology;
+    std::erase_if(kept, [&](const TrianglePair& p) { return !a.isOn(p.a) || !b.isOn(p.b); });
+  }
+  /// Keeps pairs whose boxes, as the pair's method has them, overlap at their own thickness.
+  void keepWithinThickness() {
+    if (!trees.turned()) {
+      if (widerBoxes())
+        keepOverlapping(record->a->mesh.topology, record->b->mesh.topology, floats, kept);
+    } else if (record->plan.nearby > thickness) {
+      keepInWorld(thickness);
+    }
+  }
+  void keepInWorld(double distance) {
+    keepOverlapping(record->meshes(), record->plan.swept(), distance, kept);
   }
 
   static void keep(Job& job, std::span<const TrianglePair> pairs) {

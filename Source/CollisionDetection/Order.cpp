@@ -11,46 +11,45 @@ std::uint64_t packed(std::uint32_t first, std::uint32_t second) {
   return std::uint64_t{first} << 32 | second;
 }
 
-/// The lowest bit is left free: ids are below 2^28.
-using Key = std::array<std::uint64_t, 2>;
-Key byVertex(const VertexTriangleContact& c) { return {packed(c.vertex, c.triangle), 0}; }
-Key byTriangle(const VertexTriangleContact& c) { return {packed(c.triangle, c.vertex), 0}; }
-Key byEdges(const EdgeEdgeContact& c) {
-  return {packed(c.edgeA[0], c.edgeA[1]), packed(c.edgeB[0], c.edgeB[1] << 1)};
+/// The ids of a contact's elements, each below 2^28.
+using Ids = std::array<std::uint64_t, 2>;
+Ids byVertex(const VertexTriangleContact& c) { return {packed(c.vertex, c.triangle), 0}; }
+Ids byTriangle(const VertexTriangleContact& c) { return {packed(c.triangle, c.vertex), 0}; }
+Ids byEdges(const EdgeEdgeContact& c) {
+  return {packed(c.edgeA[0], c.edgeA[1]), packed(c.edgeB[0], c.edgeB[1])};
 }
-Key byElement(const ShapeContact& c) {
-  return {packed(static_cast<std::uint32_t>(c.element), c.id), std::uint64_t{c.vertices[1]} << 1};
+Ids byElement(const ShapeContact& c) {
+  return {packed(static_cast<std::uint32_t>(c.element), c.id), c.vertices[1]};
 }
 
 /// Returns how many are of the first `preferred` buffers. flags: if not null, which these are.
-template <class Contact, class Entries, class KeyOf>
+template <class Contact, class Entries, class IdsOf>
 std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferred,
                   Buffer<Contact> ContactBuffers::*member, Entries& entries,
-                  std::vector<Contact>& out, KeyOf&& keyOf, Buffer<std::uint8_t>* flags) {
+                  std::vector<Contact>& out, IdsOf&& idsOf, Buffer<std::uint8_t>* flags) {
   entries.clear();
   for (std::size_t i = 0; i < buffers.size(); ++i)
     for (const Contact& contact : buffers[i]->*member) {
-      entries.push_back({keyOf(contact), &contact});
-      entries.back().key[1] |= i >= preferred;
+      const Ids ids = idsOf(contact);
+      entries.push_back({ContactKey(ids[0], ids[1], i < preferred), &contact});
     }
   std::sort(entries.begin(), entries.end(),
             [](const auto& l, const auto& r) { return l.key < r.key; });
-  entries.erase(std::unique(entries.begin(), entries.end(),
-                            [](const auto& l, const auto& r) {
-                              return l.key[0] == r.key[0] && (l.key[1] | 1) == (r.key[1] | 1);
-                            }),
-                entries.end());
+  entries.erase(
+      std::unique(entries.begin(), entries.end(),
+                  [](const auto& l, const auto& r) { return l.key.hasElementsOf(r.key); }),
+      entries.end());
   out.clear();
   out.reserve(entries.size());
   std::size_t count = 0;
   for (const auto& entry : entries) {
     out.push_back(*entry.contact);
-    count += ~entry.key[1] & 1;
+    count += entry.key.isPreferred();
   }
   if (!flags) return count;
   flags->clear();
   if (preferred > 0)
-    for (const auto& entry : entries) flags->push_back(~entry.key[1] & 1);
+    for (const auto& entry : entries) flags->push_back(entry.key.isPreferred());
   return count;
 }
 

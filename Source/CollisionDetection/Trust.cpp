@@ -114,6 +114,41 @@ std::array<Revision, 8> statesOf(const Geometry& a, const Positions& ofA, const 
           b.revisions.topology, b.revisions.enabled, ofB.bodyRevision(), ofB.transformRevision()};
 }
 
+/// Auto, and the pair has its tolerance.
+bool hasTolerance(const PairSettings& settings, const Geometry& a, const Geometry& b) {
+  return settings.method == Method::Auto && knowsSides(a, b);
+}
+
+/// L: Validity::reach.
+double reachOf(const PairSettings& settings, const Geometry& a, const Geometry& b,
+               const PairPlan& plan) {
+  if (hasTolerance(settings, a, b)) return plan.tolerance;
+  if (plan.method == Method::Continuous) return std::numeric_limits<double>::infinity();
+  return plan.method == Method::Proximity ? settings.thickness
+                                          : std::min(a.smallestHeight, b.smallestHeight);
+}
+
+/// Whether the step met the method's conditions, which are about vertices that move in straight
+/// lines. validity: with startedApart and reach. foundOrFar: triangles intersect at the end, or no
+/// boxes came near each other.
+bool meetsConditions(const PairSettings& settings, const Geometry& a, const Geometry& b,
+                     const PairPlan& plan, const StepFacts& facts, const Validity& validity,
+                     bool foundOrFar) {
+  if (!knowsSides(a, b)) return false;
+  if (settings.method == Method::Auto)
+    return plan.method == Method::Intersection || validity.startedApart;
+  const bool withinReach = plan.motion <= validity.reach;
+  switch (plan.method) {
+    case Method::Intersection:
+      return plan.motion == 0.0 || (withinReach && foundOrFar);
+    case Method::Proximity:
+      return withinReach && validity.startedApart && facts.verticesA.empty() &&
+             facts.verticesB.empty();
+    default:
+      return validity.startedApart;
+  }
+}
+
 }  // namespace
 
 void Trust::forget() {
@@ -185,28 +220,17 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
     m_atStart.of.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
   }
   validity.startedApart = m_atStart.position == Position::Apart;
-  if (settings.method == Method::Auto && knowsSides(a, b)) {
-    validity.reach = plan.tolerance;
-    validity.trusted = plan.method == Method::Intersection || validity.startedApart;
-  } else if (plan.method == Method::Continuous) {
-    validity.reach = std::numeric_limits<double>::infinity();
-    validity.trusted = validity.startedApart;
-  } else {
-    const bool proximity = plan.method == Method::Proximity;
-    validity.reach = proximity ? settings.thickness : std::min(a.smallestHeight, b.smallestHeight);
-    const bool within = plan.motion <= validity.reach;
-    if (!within && !meshes.hasShape()) {
-      addFarMovers(validity.verticesBeyondA, a, b, validity.reach);
-      if (&a != &b) addFarMovers(validity.verticesBeyondB, b, a, validity.reach);
-    }
-    validity.trusted =
-        proximity
-            ? within && validity.startedApart && facts.verticesA.empty() && facts.verticesB.empty()
-            : plan.motion == 0.0 || (within && !(nearby && contents.intersectingTriangles.empty()));
+  validity.reach = reachOf(settings, a, b, plan);
+  const bool listsFarMovers =
+      !hasTolerance(settings, a, b) && plan.method != Method::Continuous && !meshes.hasShape();
+  if (listsFarMovers && !(plan.motion <= validity.reach)) {
+    addFarMovers(validity.verticesBeyondA, a, b, validity.reach);
+    if (&a != &b) addFarMovers(validity.verticesBeyondB, b, a, validity.reach);
   }
-  const bool trusted = validity.trusted && knowsSides(a, b);  // as vertices move, in straight lines
+  const bool trustedIfStraight = meetsConditions(
+      settings, a, b, plan, facts, validity, !nearby || !contents.intersectingTriangles.empty());
   validity.arcDeviation = plan.arcDeviation;
-  validity.trusted = trusted && validity.arcDeviation <= settings.thickness;
+  validity.trusted = trustedIfStraight && validity.arcDeviation <= settings.thickness;
   validity.sideMayBeWrong = plan.method != Method::Intersection && !validity.trusted;
   m_atEnd = {};
   // Intersection measures no distances: meshes that do not intersect may be as near as they like.
@@ -217,7 +241,7 @@ void Trust::finish(const PairSettings& settings, const Geometry& a, const Geomet
     m_atEnd.witness = contents.intersectingTriangles.front();
   } else if (plan.method == Method::Intersection) {
     if (plan.motion == 0.0 && facts.clearance > 0.0) m_atEnd.position = Position::Apart;
-  } else if (trusted && (facts.clearance > 0.0 || plan.motion == 0.0)) {
+  } else if (trustedIfStraight && (facts.clearance > 0.0 || plan.motion == 0.0)) {
     m_atEnd.position = Position::Apart;
   } else if (plan.step.motion > 0.0 && settings.method != Method::Proximity) {
     findEnd(plan, facts, meshes, contents, counts);

@@ -118,12 +118,11 @@ std::optional<Foot> footOnPlane(const Difference& m, const Difference& u, const 
   return foot;
 }
 
-/// foot: of four points' plane or lines, whose distance is zero if they lie in one plane.
-bool isTrue(std::optional<Foot>& foot, const Vector3d& a, const Vector3d& b, const Vector3d& c,
-            const Vector3d& d) {
-  if (!foot || foot->distance > 0.0) return foot.has_value();
-  foot->exact = true;
-  return exact::areCoplanar(a, b, c, d);
+/// Whether the distance that footOnPlane() found is right: it is zero only if the four points, or
+/// the ends of the two edges, lie in one plane.
+bool hasRightDistance(const Foot& foot, const Vector3d& a, const Vector3d& b, const Vector3d& c,
+                      const Vector3d& d) {
+  return foot.distance > 0.0 || exact::areCoplanar(a, b, c, d);
 }
 
 }  // namespace
@@ -163,7 +162,9 @@ Foot footOnFace(const Vector3d& p, const Vector3d& a, const Vector3d& b, const V
   if (!isModerate(extent))
     return atModerateScale(extent, footOnFace, exact::footOnPlane, p, a, b, c);
   std::optional<Foot> foot = footOnPlane(m, u, v, Range::ZeroToOne, extent);
-  return isTrue(foot, p, a, b, c) ? *foot : exact::footOnPlane(p, a, b, c);
+  if (!foot || !hasRightDistance(*foot, p, a, b, c)) return exact::footOnPlane(p, a, b, c);
+  foot->exact = foot->distance == 0.0;
+  return *foot;
 }
 
 EdgePair::EdgePair(const Vector3d& newP0, const Vector3d& newP1, const Vector3d& newQ0,
@@ -186,7 +187,10 @@ Foot footBetweenEdges(const EdgePair& edges) {
     return atModerateScale(extent, find, exact::footBetweenLines, p0, p1, q0, q1);
   }
   std::optional<Foot> foot = footOnPlane(m, u, v, Range::MinusOneToOne, extent);
-  return isTrue(foot, p0, p1, q0, q1) ? *foot : exact::footBetweenLines(p0, p1, q0, q1);
+  if (!foot || !hasRightDistance(*foot, p0, p1, q0, q1))
+    return exact::footBetweenLines(p0, p1, q0, q1);
+  foot->exact = foot->distance == 0.0;
+  return *foot;
 }
 
 Vector3d unitCross(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d,

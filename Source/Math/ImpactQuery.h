@@ -13,8 +13,10 @@ namespace palpate {
 /// the step.
 ///
 /// Both kinds are one problem. With A, B, C moving linearly,
-///   VertexTriangle (v, a, b, c):       A = b - a,   B = c - a,   C = v - a,   x, y >= 0, x + y <=
-///   1 EdgeEdge       (p0, p1, q0, q1):   A = p1 - p0, B = q0 - q1, C = q0 - p0, 0 <= x, y <= 1
+// clang-format off
+///   VertexTriangle  (v, a, b, c):      A = b - a,    B = c - a,    C = v - a,    x, y >= 0, x + y <= 1
+///   EdgeEdge        (p0, p1, q0, q1):  A = p1 - p0,  B = q0 - q1,  C = q0 - p0,  0 <= x, y <= 1
+// clang-format on
 /// the features touch where C = x A + y B for some (x, y) in that triangle or square.
 struct ImpactQuery {
   enum class Kind { VertexTriangle, EdgeEdge };

@@ -87,7 +87,8 @@ TriangleIntersection intersectCrossing(const Placed& a, const Placed& b, SignCou
     if (order[i][0] * order[i][1] < 0) result.edgesOfAThroughB |= 1 << edgesA[i];
     if (order[0][i] * order[1][i] < 0) result.edgesOfBThroughA |= 1 << edgesB[i];
     for (int j = 0; j < 2; ++j) {
-      if (order[i][j] == 0) result.touchingEdges |= 1 << (3 * edgesA[i] + edgesB[j]);
+      if (order[i][j] == 0)
+        result.touchingEdges |= TriangleIntersection::edgesBit(edgesA[i], edgesB[j]);
     }
   }
   return result;
@@ -182,11 +183,12 @@ TriangleIntersection intersectTouching(const Placed& a, const Placed& b, unsigne
     if (a.edgeAside(i) || !boxP.meets(b.box)) continue;
     for (int j = 0; j < 3; ++j) {
       const Eigen::Vector3d &q0 = b.corners[j], &q1 = b.corners[next(j)];
-      if (has(excludedEdges, 3 * i + j) || b.edgeAside(j) || !boxP.meets(Box(q0, q1))) continue;
+      const unsigned bit = TriangleIntersection::edgesBit(i, j);
+      if (excludedEdges & bit || b.edgeAside(j) || !boxP.meets(Box(q0, q1))) continue;
       bool meet = coplanar || orient3d(p0, p1, q0, q1, counts) == 0;
       for (int axis = axes.first; meet && axis <= axes.last; ++axis)
         meet = !sidesOfA.separate(axis, i, j, next(j)) && !sidesOfB.separate(axis, j, i, next(i));
-      result.touchingEdges |= meet << (3 * i + j);
+      if (meet) result.touchingEdges |= bit;
     }
   }
   if (!coplanar) {

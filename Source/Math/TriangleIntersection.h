@@ -15,8 +15,11 @@ using Corners = std::array<Eigen::Vector3d, 3>;
 /// Where nothing touches, triangles that meet do so in a segment, and each of its ends is where an
 /// edge of one crosses the other: either two edges of one, or one of each.
 struct TriangleIntersection {
+  /// Of edge i of a and edge j of b, in sets of edge pairs.
+  static constexpr unsigned edgesBit(int i, int j) { return 1u << (3 * i + j); }
+
   std::uint8_t cornersOfAOnB = 0, cornersOfBOnA = 0;  ///< bit i: corner i
-  std::uint16_t touchingEdges = 0;  ///< bit 3 i + j: edge i of a meets edge j of b
+  std::uint16_t touchingEdges = 0;                    ///< edgesBit()s
   /// Bit i: edge i crosses the other's interior, its ends strictly on either side.
   std::uint8_t edgesOfAThroughB = 0, edgesOfBThroughA = 0;
   bool touch() const { return (cornersOfAOnB | cornersOfBOnA | touchingEdges) != 0; }
@@ -26,7 +29,7 @@ struct TriangleIntersection {
 /// Feature pairs that two triangles of one mesh are not asked for, as they have a vertex in common.
 struct ExcludedFeatures {
   std::uint8_t cornersOfA = 0, cornersOfB = 0;  ///< bit i: corner i is the other triangle's too
-  std::uint16_t edges = 0;                      ///< bit 3 i + j: edge i of a and edge j of b
+  std::uint16_t edges = 0;                      ///< edgesBit()s
 };
 
 /// Every touching and crossing of two triangles, with area or without, outside of excluded

@@ -66,9 +66,9 @@ void MeshTopology::findOwners(const std::vector<bool>& newIsDisabled) {
   IndexLists atEdges = listsOf(edges.size(), triangleEdges);
 
   std::vector<std::uint8_t> owners(triangles.size(), 0);
-  const auto own = [&](std::uint32_t item, std::uint32_t owner, const auto& held, unsigned first) {
+  const auto own = [&](std::uint32_t item, std::uint32_t owner, const auto& held, auto&& bitOf) {
     const auto place = std::find(held.begin(), held.end(), item) - held.begin();
-    owners[owner] |= static_cast<std::uint8_t>(first << place);
+    owners[owner] |= static_cast<std::uint8_t>(bitOf(static_cast<int>(place)));
   };
   std::size_t untested = 0;
   for (std::uint32_t v = 0; v < vertexCount; ++v) {
@@ -76,7 +76,7 @@ void MeshTopology::findOwners(const std::vector<bool>& newIsDisabled) {
     if (incident.empty())
       ++untested;
     else
-      own(v, incident.front(), triangles[incident.front()], 1);
+      own(v, incident.front(), triangles[incident.front()], cornerBit);
   }
   std::vector<std::uint8_t> closedStars(vertexCount, 1);
   const auto goesUp = [&](std::uint32_t e, std::uint32_t triangle) {
@@ -85,7 +85,7 @@ void MeshTopology::findOwners(const std::vector<bool>& newIsDisabled) {
   };
   for (std::uint32_t e = 0; e < edges.size(); ++e) {
     const auto incident = atEdges[e];
-    if (!incident.empty()) own(e, incident.front(), triangleEdges[incident.front()], 8);
+    if (!incident.empty()) own(e, incident.front(), triangleEdges[incident.front()], edgeBit);
     if (incident.size() != 2 || goesUp(e, incident[0]) == goesUp(e, incident[1]))
       closedStars[edges[e][0]] = closedStars[edges[e][1]] = 0;
   }

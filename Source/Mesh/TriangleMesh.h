@@ -52,7 +52,7 @@ struct MeshTopology {
   std::vector<Segment> edges;  ///< unique, lower vertex first, sorted
   /// Edge i joins corners i and i + 1 mod 3; kNoEdge where these are the same vertex.
   std::vector<std::array<std::uint32_t, 3>> triangleEdges;
-  std::vector<std::uint8_t> owned;   ///< per triangle: bit i: owns corner i; bit 3 + i: owns edge i
+  std::vector<std::uint8_t> owned;   ///< per triangle: its cornerBit()s and edgeBit()s
   IndexLists vertexTriangles;        ///< that are on: ascending triangle ids, each once
   IndexLists edgeTriangles;          ///< the same; none: the edge is off
   std::size_t untestedVertices = 0;  ///< in no triangle that is on
@@ -72,12 +72,12 @@ struct MeshTopology {
   std::uint32_t edgeOf(const Segment& edge) const;
   /// Others' vertices are tested against triangles with faces only.
   bool hasFaces() const { return kind == GeometryKind::Triangles; }
+  static constexpr unsigned cornerBit(int corner) { return 1u << corner; }
+  static constexpr unsigned edgeBit(int edge) { return 1u << (3 + edge); }
   bool ownsCorner(std::uint32_t triangle, int corner) const {
-    return owned[triangle] >> corner & 1;
+    return owned[triangle] & cornerBit(corner);
   }
-  bool ownsEdge(std::uint32_t triangle, int edge) const {
-    return owned[triangle] >> (3 + edge) & 1;
-  }
+  bool ownsEdge(std::uint32_t triangle, int edge) const { return owned[triangle] & edgeBit(edge); }
 
  private:
   void findOwners(const std::vector<bool>& isDisabled);

@@ -3,6 +3,7 @@
 #include "Math/Box.h"
 
 #include <algorithm>
+#include <array>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Shapes/UnfoldedStars.cpp"
@@ -19,9 +20,7 @@ using Point = Vector3<V>;
 
 HWY_INLINE V coordinate(const Point& p, int k) { return k == 0 ? p.x : k == 1 ? p.y : p.z; }
 
-/// A triangle's view, in bits: along axis k always seen from above (bit k), or from below (3 + k);
-/// at corner i, from the next corner to the last, coordinate k comes up to the corner's or beyond
-/// (6 + 3 i + k).
+/// The views of triangles, as sets of ViewBit.
 ///
 /// Rounding: let R be at least the size of a coordinate of any corner, S that of both edges from
 /// corner 0 together, at most R. A float is off by 2^-23 R, an edge by E = 2^-21 R, and what
@@ -64,21 +63,22 @@ HWY_ATTR void viewsKernel(const Triangle* triangles, std::size_t size, const Flo
     }
     const auto inRange = hn::Lt(reach, hn::Set(d, kLargest));
     auto view = hn::Zero(du);
-    const auto add = [&](auto mask, int bit) HWY_ATTR {
-      view = hn::Or(view, hn::IfThenElseZero(hn::RebindMask(du, mask), hn::Set(du, 1u << bit)));
+    const auto add = [&](auto mask, std::uint32_t bit) HWY_ATTR {
+      view = hn::Or(view, hn::IfThenElseZero(hn::RebindMask(du, mask), hn::Set(du, bit)));
     };
     for (int k = 0; k < 3; ++k) {
       const int i = (k + 1) % 3, j = (k + 2) % 3;
       const V limit = error[i] * (extent[j] + error[j]) + error[j] * extent[i] +
                       hn::Set(d, OutwardRounding::kAbsolute);
       const V x = coordinate(first, k), y = coordinate(middle, k), z = coordinate(last, k);
-      add(hn::And(inRange, hn::Gt(hn::Min(x, hn::Min(y, z)), limit)), k);
-      add(hn::And(inRange, hn::Lt(hn::Max(x, hn::Max(y, z)), hn::Neg(limit))), 3 + k);
+      add(hn::And(inRange, hn::Gt(hn::Min(x, hn::Min(y, z)), limit)), ViewBit::fromAbove(k));
+      add(hn::And(inRange, hn::Lt(hn::Max(x, hn::Max(y, z)), hn::Neg(limit))),
+          ViewBit::fromBelow(k));
       for (int corner = 0; corner < 3; ++corner) {
         const V at = coordinate(p[0][corner], k);
         add(hn::And(hn::Lt(coordinate(p[0][(corner + 1) % 3], k), at),
                     hn::Ge(coordinate(p[0][(corner + 2) % 3], k), at)),
-            6 + 3 * corner + k);
+            ViewBit::comesUp(corner, k));
       }
     }
     hn::Store(view, du, bits);
@@ -103,17 +103,17 @@ constexpr std::size_t kGrain = 2048;
 bool isUnfolded(const MeshTopology& topology, const Buffer<std::uint32_t>& views,
                 std::size_t vertex) {
   const auto star = topology.vertexTriangles[vertex];
-  if (star.size() > 255) return false;
-  std::uint32_t seen = 63, crossings = 0;  // of coordinate k: byte k
+  std::uint32_t common = ~0u;  // of all views
+  std::array<std::size_t, 3> crossings{};
   for (const std::uint32_t t : star) {
     const Triangle& corners = topology.triangles[t];
-    const unsigned corner = (corners[1] == vertex) + 2 * (corners[2] == vertex);
-    seen &= views[t];
-    const std::uint32_t up = views[t] >> (6 + 3 * corner) & 7;
-    crossings += (up & 1) | (up & 2) << 7 | (up & 4) << 14;
+    const int corner = (corners[1] == vertex) + 2 * (corners[2] == vertex);
+    common &= views[t];
+    for (int k = 0; k < 3; ++k) crossings[k] += (views[t] & ViewBit::comesUp(corner, k)) != 0;
   }
   for (int k = 0; k < 3; ++k)
-    if (seen >> k & 9 && (crossings >> 8 * ((k + 1) % 3) & 255) == 1) return true;
+    if (common & (ViewBit::fromAbove(k) | ViewBit::fromBelow(k)) && crossings[(k + 1) % 3] == 1)
+      return true;
   return false;
 }
 

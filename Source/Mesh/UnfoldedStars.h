@@ -10,6 +10,17 @@
 
 namespace palpate {
 
+/// The bits of a triangle's view.
+struct ViewBit {
+  /// Along the axis, the triangle is seen from above, or from below, during the whole step.
+  static constexpr std::uint32_t fromAbove(int axis) { return 1u << axis; }
+  static constexpr std::uint32_t fromBelow(int axis) { return 1u << (3 + axis); }
+  /// From the next corner to the last, the coordinate comes up to this corner's or beyond.
+  static constexpr std::uint32_t comesUp(int corner, int axis) {
+    return 1u << (6 + 3 * corner + axis);
+  }
+};
+
 /// Triangles around vertices that certainly meet nowhere but in the vertex and in their common
 /// edges, at any time of the step: most of a smooth mesh's neighbours.
 ///
@@ -33,7 +44,7 @@ class UnfoldedStars {
   const Triangle* triangles() const { return m_triangles.data(); }
 
  private:
-  Buffer<std::uint32_t> m_views;  ///< of each triangle
+  Buffer<std::uint32_t> m_views;  ///< of each triangle: ViewBit
   Buffer<std::uint8_t> m_unfolded;
   Buffer<Triangle> m_triangles;
 };

@@ -111,7 +111,8 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
     for (std::uint32_t t = 0; t < against.size(); ++t) {
       const VertexTriangleDistance* answer = against.answer(t);
       if (!answer || !(gap(t) <= pair.thicknessAtEnd())) continue;
-      if (check.isAnsweredByImpact(features, v, t, kSecond, answer->distance)) continue;
+      check.noteDistance(answer->distance);
+      if (check.addImpactIfTouched(features, v, t, kSecond, answer->distance)) continue;
       const auto isRefused = [&](std::uint32_t triangle) {
         return refusesVertex(pair, v, triangle, kSecond) ||
                (!triangles.radii.empty() && !(gap(triangle) <= pair.thicknessAtEnd()));
@@ -151,9 +152,9 @@ void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
           pair.a.now[a[i][0]], pair.a.now[a[i][1]], pair.b.now[b[j][0]], pair.b.now[b[j][1]]);
       ++out.featurePairs;
       out.exactDecisions += answer.exact;
-      if (!(answer.distance <= pair.thicknessAtEnd()) ||
-          check.isAnsweredByImpact(features, i, j, false, answer.distance))
-        continue;
+      if (!(answer.distance <= pair.thicknessAtEnd())) continue;
+      check.noteDistance(answer.distance);
+      if (check.addImpactIfTouched(features, i, j, false, answer.distance)) continue;
       const bool inside = !answer.parallel && answer.featureA == EdgeFeature::Interior &&
                           answer.featureB == EdgeFeature::Interior;
       if (pair.settings.contacts == Contacts::Distinct && !inside) continue;

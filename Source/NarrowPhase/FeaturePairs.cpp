@@ -126,7 +126,7 @@ HWY_ATTR HWY_INLINE void setBounds(const Side& side, const Triangle& corners, Fe
   for (int i = 0; i < 3; ++i) boxes[i] = shifted(cornerBounds<sweep>(side, corners[i]), side.shift);
   boxes[kEdge0] = joined(boxes[0], boxes[1]);
   boxes[kEdge1] = joined(boxes[1], boxes[2]);
-  boxes[kEdge2] = boxes[kEdge2Too] = joined(boxes[2], boxes[0]);
+  boxes[kEdge2] = boxes[kEdge2Again] = joined(boxes[2], boxes[0]);
   boxes[kTriangle] = joined(boxes[kEdge0], boxes[2]);
   const D d;
   alignas(64) float points[2 * kFeatures][4];
@@ -161,18 +161,18 @@ HWY_ATTR HWY_NOINLINE void makeRow(const Side& side, std::uint32_t triangle, Fea
   }
 }
 
-using TestTag = hn::CappedTag<float, kTests>;
+using TestTag = hn::CappedTag<float, kTestPlaces>;
 constexpr std::size_t kTestLanes = hn::MaxLanes(TestTag());
 
 /// How a vector of tests takes its features' lower or upper bounds: a window of the row, and places
 /// in it.
 template <const TestFeatures& features>
 struct Places {
-  std::array<std::size_t, kTests> window{};
-  alignas(64) std::array<std::int32_t, kTests> lower{}, upper{};
+  std::array<std::size_t, kTestPlaces> window{};
+  alignas(64) std::array<std::int32_t, kTestPlaces> lower{}, upper{};
   constexpr Places() {
     constexpr std::size_t kWindow = std::min<std::size_t>(kTestLanes, kFeatures);
-    for (std::size_t test = 0; test < kTests; ++test) {
+    for (std::size_t test = 0; test < kTestPlaces; ++test) {
       window[test] = features[test / kTestLanes * kTestLanes] / kWindow * kWindow;
       lower[test] = static_cast<std::int32_t>(features[test] - window[test]);
       upper[test] = lower[test] + (kTestLanes > kFeatures ? kFeatures : 0);
@@ -195,7 +195,7 @@ HWY_ATTR HWY_INLINE hn::Vec<DT> valuesOf(DT d, const hn::TFromD<DT>* row, std::s
 HWY_ATTR HWY_INLINE unsigned overlappingTests(const FeatureRow& a, const FeatureRow& b) {
   const TestTag d;
   unsigned tests = 0;
-  for (std::size_t i = 0; i < kTests; i += kTestLanes) {
+  for (std::size_t i = 0; i < kTestPlaces; i += kTestLanes) {
     auto mask = hn::FirstN(d, kTestLanes);
     for (int k = 0; k < 3; ++k) {
       mask = hn::And(
@@ -212,10 +212,10 @@ HWY_ATTR HWY_INLINE unsigned overlappingTests(const FeatureRow& a, const Feature
 HWY_ATTR HWY_INLINE unsigned sharingTests(const FeatureRow& a, const FeatureRow& b) {
   const hn::RebindToUnsigned<TestTag> d;
   unsigned same = 0;
-  for (std::size_t i = 0; i < 9; i += kTestLanes)
+  for (std::size_t i = 0; i < kCornerPairs; i += kTestLanes)
     same |= bitsOf(d, hn::Eq(valuesOf<kCornerOfA>(d, a.ids, i), valuesOf<kCornerOfB>(d, b.ids, i)))
             << i;
-  return kSharingTests[same & 511];
+  return kSharingTests[same % kSharingTests.size()];
 }
 
 /// Rows of the triangles met last. Neighbours in the octree meet again soon: of twenty rows asked
@@ -269,8 +269,8 @@ struct ChosenTests {
     std::uint32_t* const both = ids + 2 * kFeatures * i;
     std::copy_n(a.ids, kFeatures, both);
     std::copy_n(b.ids, kFeatures, both + kFeatures);
-    corners[i] = tests & (kCornersOfA | kCornersOfB);
-    edges[i] = static_cast<std::uint16_t>(tests & kEdges);
+    corners[i] = tests & (kCornerTestsOfA | kCornerTestsOfB);
+    edges[i] = static_cast<std::uint16_t>(tests & kEdgeTests);
   }
 };
 
@@ -314,16 +314,21 @@ constexpr IdPlaces kEdgeInA = idPlaces<std::uint16_t>(kOfA, 0),
 constexpr IdPlaces kCornerInA = idPlaces<std::uint8_t>(kOfA, 0),
                    kCornerInB = idPlaces<std::uint8_t>(kOfB, kFeatures);
 /// Of a corner's test the vertex and the triangle, whichever of the two they are of.
-constexpr IdPlaces kVertexIn = idPlaces<std::uint8_t>({0, 1, 2, 0, 8, 9, 10}, 0),
-                   kTriangleIn = idPlaces<std::uint8_t>({14, 14, 14, 0, 6, 6, 6}, 0);
+constexpr IdPlaces kVertexIn = idPlaces<std::uint8_t>(
+                       {kCorner0, kCorner1, kCorner2, 0, kFeatures + kCorner0, kFeatures + kCorner1,
+                        kFeatures + kCorner2},
+                       0),
+                   kTriangleIn = idPlaces<std::uint8_t>(
+                       {kFeatures + kTriangle, kFeatures + kTriangle, kFeatures + kTriangle, 0,
+                        kTriangle, kTriangle, kTriangle},
+                       0);
 
 template <Sweep sweep>
 HWY_ATTR void findFeaturePairsOf(const Side& a, const Side& b, std::span<const TrianglePair> pairs,
                                  FeaturePairs& out) {
   const bool self = &a.topology == &b.topology;
   const unsigned excluded = self ? ~0u : 0u;
-  const unsigned tested = kEdges | (areTested(a.topology, b.topology, true) ? kCornersOfA : 0) |
-                          (areTested(b.topology, a.topology, false) ? kCornersOfB : 0);
+  const unsigned allowed = allowedTests(a.topology, b.topology);
   out.vertexTriangle.resize(pairs.size() * (self ? 6 : 3));
   out.triangleVertex.resize(self ? 0 : pairs.size() * 3);
   out.edgeEdge.resize(pairs.size() * 9);
@@ -335,7 +340,7 @@ HWY_ATTR void findFeaturePairsOf(const Side& a, const Side& b, std::span<const T
     for (const TrianglePair& pair :
          pairs.subspan(begin, std::min(ChosenTests::kMost, pairs.size() - begin))) {
       const auto [rowA, rowB] = cache.rows(pair);
-      unsigned tests = rowA.ownedByA & rowB.ownedByB & tested;
+      unsigned tests = rowA.ownedByA & rowB.ownedByB & allowed;
       tests &= ~(sharingTests(rowA, rowB) & excluded);
       owned += static_cast<std::size_t>(std::popcount(tests));
       tests &= overlappingTests(rowA, rowB);
@@ -343,16 +348,16 @@ HWY_ATTR void findFeaturePairsOf(const Side& a, const Side& b, std::span<const T
     }
     std::fill(chosen.corners + size, std::end(chosen.corners), std::uint8_t{0});
     std::fill(chosen.edges + size, std::end(chosen.edges), std::uint16_t{0});
-    edgeEdge += list(chosen, chosen.edges, size, kEdges, kEdgeInA, kEdgeInB, self,
+    edgeEdge += list(chosen, chosen.edges, size, kEdgeTests, kEdgeInA, kEdgeInB, self,
                      out.edgeEdge.data() + edgeEdge);
     FeaturePair* const corners = out.vertexTriangle.data() + vertexTriangle;
     if (self) {
       vertexTriangle += list(chosen, chosen.corners, size, 255, kVertexIn, kTriangleIn,
                              a.topology.kind == GeometryKind::Points, corners);
     } else {
-      vertexTriangle +=
-          list(chosen, chosen.corners, size, kCornersOfA, kCornerInA, kCornerInB, false, corners);
-      triangleVertex += list(chosen, chosen.corners, size, kCornersOfB, kCornerInA, kCornerInB,
+      vertexTriangle += list(chosen, chosen.corners, size, kCornerTestsOfA, kCornerInA, kCornerInB,
+                             false, corners);
+      triangleVertex += list(chosen, chosen.corners, size, kCornerTestsOfB, kCornerInA, kCornerInB,
                              false, out.triangleVertex.data() + triangleVertex);
     }
   }

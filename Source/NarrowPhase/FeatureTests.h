@@ -1,77 +1,115 @@
 #pragma once
 
-#include <palpate/Types.h>
+#include "Geometry/TriangleMesh.h"
 
 #include <array>
 #include <cstdint>
 
 namespace palpate {
 
-/// The features of a triangle side by side. Edge 2 stands twice, so that each four tests take
-/// theirs from one half.
+/// The features of a triangle side by side. Corner i is feature i. Edge 2 stands twice, so that
+/// each four tests take their features from one half.
 inline constexpr int kFeatures = 8;
-enum Feature : std::uint8_t { kCorner, kEdge2 = 3, kEdge0, kEdge1, kTriangle, kEdge2Too };
+enum Feature : std::uint8_t {
+  kCorner0,
+  kCorner1,
+  kCorner2,
+  kEdge2,
+  kEdge0,
+  kEdge1,
+  kTriangle,
+  kEdge2Again
+};
 
-/// The tests of two triangles side by side, and which feature of each they take: corners of a with
-/// b, corners of b with a, edges with edges. The last is none.
-inline constexpr int kTests = 16;
-using TestFeatures = std::array<std::uint8_t, kTests>;
-inline constexpr TestFeatures kOfA = {0, 1, 2, 3, 6, 6, 6, 4, 4, 4, 5, 5, 5, 7, 7, 7},
-                              kOfB = {6, 6, 6, 7, 0, 1, 2, 3, 4, 5, 4, 5, 7, 4, 5, 7};
-inline constexpr unsigned kCornersOfA = 0x0007, kCornersOfB = 0x0070, kEdges = 0x7f88;
-/// Each corner of a with each of b.
-inline constexpr TestFeatures kCornerOfA = {0, 0, 0, 1, 1, 1, 2, 2, 2},
-                              kCornerOfB = {0, 1, 2, 0, 1, 2, 0, 1, 2};
-
-/// As in MeshTopology::owned.
-constexpr unsigned ownedBit(std::uint8_t feature) {
-  if (feature < kEdge2) return 1u << feature;
-  return feature == kEdge0 ? 8 : feature == kEdge1 ? 16 : 32;
-}
-constexpr unsigned cornersOf(std::uint8_t feature) {
-  if (feature < kEdge2) return 1u << feature;
-  return feature == kTriangle ? 7 : feature == kEdge0 ? 3 : feature == kEdge1 ? 6 : 5;
+constexpr bool isCorner(std::uint8_t feature) { return feature <= kCorner2; }
+constexpr bool isEdge(std::uint8_t feature) { return !isCorner(feature) && feature != kTriangle; }
+/// Of an edge: its number in the triangle.
+constexpr int edgeNumber(std::uint8_t feature) {
+  return feature == kEdge0 ? 0 : feature == kEdge1 ? 1 : 2;
 }
 
-/// Tests whose feature of one triangle it owns, by its bits; a triangle owns itself.
+/// The fifteen feature tests of triangles a and b, in the one order that all sets of tests use: bit
+/// t of a set is test t. The last of sixteen places holds no test.
+inline constexpr int kTests = 15, kTestPlaces = 16;
+using TestFeatures = std::array<std::uint8_t, kTestPlaces>;
+/// The feature of each triangle that a test takes.
+// clang-format off
+inline constexpr TestFeatures
+    kOfA = {kCorner0,  kCorner1,  kCorner2,  kEdge2,
+            kTriangle, kTriangle, kTriangle, kEdge0,
+            kEdge0,    kEdge0,    kEdge1,    kEdge1,
+            kEdge1,    kEdge2Again, kEdge2Again, kEdge2Again},
+    kOfB = {kTriangle, kTriangle, kTriangle, kEdge2Again,
+            kCorner0,  kCorner1,  kCorner2,  kEdge2,
+            kEdge0,    kEdge1,    kEdge0,    kEdge1,
+            kEdge2Again, kEdge0,  kEdge1,    kEdge2Again};
+// clang-format on
+
+/// Corner i of a with b; corner j of b with a; edge i of a with edge j of b.
+constexpr int cornerTestOfA(int i) { return i; }
+constexpr int cornerTestOfB(int j) { return 4 + j; }
+inline constexpr auto kTestOfEdges = [] {
+  std::array<std::array<std::uint8_t, 3>, 3> tests{};
+  for (std::uint8_t test = 0; test < kTests; ++test)
+    if (isEdge(kOfA[test]) && isEdge(kOfB[test]))
+      tests[edgeNumber(kOfA[test])][edgeNumber(kOfB[test])] = test;
+  return tests;
+}();
+constexpr int edgeTest(int i, int j) { return kTestOfEdges[i][j]; }
+
+/// Sets of all tests of one kind.
+inline constexpr unsigned kCornerTestsOfA = 0x0007, kCornerTestsOfB = 0x0070, kEdgeTests = 0x7f88;
+
+/// Tests that the kinds of two meshes allow.
+inline unsigned allowedTests(const MeshTopology& a, const MeshTopology& b) {
+  return kEdgeTests | (areTested(a, b, true) ? kCornerTestsOfA : 0) |
+         (areTested(b, a, false) ? kCornerTestsOfB : 0);
+}
+
+/// Tests whose feature of one triangle it owns, by MeshTopology::owned; a triangle owns itself.
 constexpr auto ownedTests(const TestFeatures& features) {
+  const auto owns = [](unsigned owned, std::uint8_t feature) {
+    return feature == kTriangle ||
+           owned & (isCorner(feature) ? MeshTopology::cornerBit(feature)
+                                      : MeshTopology::edgeBit(edgeNumber(feature)));
+  };
   std::array<std::uint16_t, 64> tests{};
   for (unsigned owned = 0; owned < 64; ++owned)
-    for (int test = 0; test < kTests - 1; ++test)
-      if (features[test] == kTriangle || owned & ownedBit(features[test]))
-        tests[owned] |= static_cast<std::uint16_t>(1u << test);
+    for (int test = 0; test < kTests; ++test)
+      if (owns(owned, features[test])) tests[owned] |= static_cast<std::uint16_t>(1u << test);
   return tests;
 }
 inline constexpr auto kOwnedByA = ownedTests(kOfA), kOwnedByB = ownedTests(kOfB);
 
-/// Tests of features with a vertex in common, by the corners that are the same: bit 3 i + j for a's
-/// i and b's j.
-constexpr auto sharingTests(const TestFeatures& ofA, const TestFeatures& ofB) {
-  std::array<std::uint16_t, 512> tests{};
-  for (unsigned same = 0; same < 512; ++same)
-    for (int test = 0; test < kTests - 1; ++test)
-      for (int bit = 0; bit < 9; ++bit)
-        if (same >> bit & 1 && cornersOf(ofA[test]) >> bit / 3 & 1 &&
-            cornersOf(ofB[test]) >> bit % 3 & 1)
-          tests[same] |= static_cast<std::uint16_t>(1u << test);
-  return tests;
-}
+/// Each corner of a with each of b: the order of the bits of sameCorners().
+inline constexpr int kCornerPairs = 9;
+inline constexpr TestFeatures kCornerOfA = {0, 0, 0, 1, 1, 1, 2, 2, 2},
+                              kCornerOfB = {0, 1, 2, 0, 1, 2, 0, 1, 2};
+/// Which corners of two triangles are the same vertex.
 inline unsigned sameCorners(const Triangle& a, const Triangle& b) {
   unsigned same = 0;
-  for (int bit = 0; bit < 9; ++bit) same |= static_cast<unsigned>(a[bit / 3] == b[bit % 3]) << bit;
+  for (int pair = 0; pair < kCornerPairs; ++pair)
+    same |= static_cast<unsigned>(a[kCornerOfA[pair]] == b[kCornerOfB[pair]]) << pair;
   return same;
 }
-inline constexpr auto kSharingTests = sharingTests(kOfA, kOfB);
 
-/// The same tests in plain order: corner i of a with b, corner j of b with a (from bit 3), edge i
-/// with edge j (at bit 6 + 3 i + j).
-inline constexpr TestFeatures kInA = {0,         1,      2,      kTriangle, kTriangle,
-                                      kTriangle, kEdge0, kEdge0, kEdge0,    kEdge1,
-                                      kEdge1,    kEdge1, kEdge2, kEdge2,    kEdge2},
-                              kInB = {kTriangle, kTriangle, kTriangle, 0,      1,
-                                      2,         kEdge0,    kEdge1,    kEdge2, kEdge0,
-                                      kEdge1,    kEdge2,    kEdge0,    kEdge1, kEdge2};
-inline constexpr auto kOwnedInA = ownedTests(kInA), kOwnedInB = ownedTests(kInB);
-inline constexpr auto kSharing = sharingTests(kInA, kInB);
+constexpr bool holdsCorner(std::uint8_t feature, std::uint8_t corner) {
+  if (isCorner(feature)) return feature == corner;
+  return feature == kTriangle || edgeNumber(feature) == corner ||
+         (edgeNumber(feature) + 1) % 3 == corner;
+}
+/// Tests of features with a vertex in common, by sameCorners().
+inline constexpr auto kSharingTests = [] {
+  std::array<std::uint16_t, 1 << kCornerPairs> tests{};
+  for (int test = 0; test < kTests; ++test) {
+    unsigned sharing = 0;
+    for (int pair = 0; pair < kCornerPairs; ++pair)
+      if (holdsCorner(kOfA[test], kCornerOfA[pair]) && holdsCorner(kOfB[test], kCornerOfB[pair]))
+        sharing |= 1u << pair;
+    for (unsigned same = 0; same < tests.size(); ++same)
+      if (same & sharing) tests[same] |= static_cast<std::uint16_t>(1u << test);
+  }
+  return tests;
+}();
 
 }  // namespace palpate

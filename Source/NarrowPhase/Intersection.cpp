@@ -36,13 +36,13 @@ ExcludedFeatures featuresInCommon(const MeshTriangle& a, const MeshTriangle& b) 
   ExcludedFeatures excluded;
   const unsigned same = sameCorners(a.vertices, b.vertices);
   if (same == 0) return excluded;
-  const unsigned sharing = kSharing[same];
-  excluded.cornersOfA = sharing & 7;
-  excluded.cornersOfB = sharing >> 3 & 7;
-  excluded.edges = static_cast<std::uint16_t>(sharing >> 6);
+  const auto sharesVertex = [&](int test) { return kSharingTests[same] >> test & 1; };
   for (int i = 0; i < 3; ++i) {
-    if (a.edge(i) == kNoEdge) excluded.edges |= 0007 << 3 * i;
-    if (b.edge(i) == kNoEdge) excluded.edges |= 0111 << i;
+    excluded.cornersOfA |= sharesVertex(cornerTestOfA(i)) << i;
+    excluded.cornersOfB |= sharesVertex(cornerTestOfB(i)) << i;
+    for (int j = 0; j < 3; ++j)
+      if (sharesVertex(edgeTest(i, j)) || a.edge(i) == kNoEdge || b.edge(j) == kNoEdge)
+        excluded.edges |= TriangleIntersection::edgesBit(i, j);
   }
   return excluded;
 }
@@ -78,8 +78,8 @@ class IntersectionContacts {
       if (meeting.cornersOfAOnB >> i & 1 && ofA.ownsCorner(m_a.id, i)) addCornerOfA(i);
       if (meeting.cornersOfBOnA >> i & 1 && ofB.ownsCorner(m_b.id, i)) addCornerOfB(i);
       for (int j = 0; j < 3; ++j) {
-        if (meeting.touchingEdges >> (3 * i + j) & 1 && ofA.ownsEdge(m_a.id, i) &&
-            ofB.ownsEdge(m_b.id, j))
+        if (meeting.touchingEdges & TriangleIntersection::edgesBit(i, j) &&
+            ofA.ownsEdge(m_a.id, i) && ofB.ownsEdge(m_b.id, j))
           addEdges(i, j);
       }
     }

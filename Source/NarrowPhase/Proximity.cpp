@@ -49,7 +49,8 @@ class VertexTriangleFinder {
     m_exactDecisions += answer.exact;
     const double radii = m_pair.radii(vertex, corners, answer.barycentric, m_ofSecond);
     if (!(answer.distance - radii <= m_thickness)) return;
-    if (m_check.isAnsweredByImpact(m_features, vertex, triangle, m_ofSecond, answer.distance))
+    m_check.noteDistance(answer.distance);
+    if (m_check.addImpactIfTouched(m_features, vertex, triangle, m_ofSecond, answer.distance))
       return;
     if (refusesVertex(m_pair, vertex, triangle, m_ofSecond)) return;
     const MeshFeature feature = featureOf(m_topology, triangle, answer.feature);
@@ -170,7 +171,8 @@ void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, S
   if (!answer) answer = finiteEdgeEdgeDistance(at(0), at(1), at(2), at(3));
   out.exactDecisions += answer->exact;
   if (!(answer->distance <= pair.thicknessAtEnd())) return;
-  if (check.isAnsweredByImpact(features, edgeA, edgeB, false, answer->distance)) return;
+  check.noteDistance(answer->distance);
+  if (check.addImpactIfTouched(features, edgeA, edgeB, false, answer->distance)) return;
   if (!isContact || refusesEdges(pair, edgeA, edgeB)) return;
   if (pointInwardAtEnd(pair, edgeA, edgeB, *answer)) {
     if (pair.step.impacts) addImpact(pair, features, edgeA, edgeB, false, out);
@@ -202,8 +204,7 @@ class ProximityFinder {
               : pair.b.topology.hasFaces() ? Corners::None
                                            : Corners::All,
               out),
-        m_tested((areTested(pair.a.topology, pair.b.topology, true) ? 07u : 0) |
-                 (areTested(pair.b.topology, pair.a.topology, false) ? 070u : 0) | ~077u),
+        m_allowed(allowedTests(pair.a.topology, pair.b.topology)),
         m_distinct(pair.settings.contacts == Contacts::Distinct && !pair.hasLines()) {}
 
   void find(std::span<const TrianglePair> candidates) {
@@ -216,18 +217,18 @@ class ProximityFinder {
 
   void add(const TrianglePair& candidate) {
     const MeshTopology &a = m_pair.a.topology, &b = m_pair.b.topology;
-    std::uint32_t pairs = kOwnedInA[a.owned[candidate.a]] & kOwnedInB[b.owned[candidate.b]];
+    std::uint32_t tests =
+        kOwnedByA[a.owned[candidate.a]] & kOwnedByB[b.owned[candidate.b]] & m_allowed;
     const Triangle &s = a.triangles[candidate.a], &t = b.triangles[candidate.b];
-    if (m_pair.self()) pairs &= ~kSharing[sameCorners(s, t)];
-    pairs &= m_tested;
-    if (pairs == 0) return;
-    m_pairs[m_size] = pairs;
+    if (m_pair.self()) tests &= ~kSharingTests[sameCorners(s, t)];
+    if (tests == 0) return;
+    m_tests[m_size] = tests;
     m_candidates[m_size] = candidate;
     for (int i = 0; i < 3; ++i) {
       const Vector3d p = m_pair.a.now[s[i]], q = m_pair.b.now[t[i]];
       for (int k = 0; k < 3; ++k) {
-        m_batch.coordinates[3 * i + k][m_size] = p[k];
-        m_batch.coordinates[9 + 3 * i + k][m_size] = q[k];
+        m_batch.coordinates[TrianglePairBatch::rowOfA(i, k)][m_size] = p[k];
+        m_batch.coordinates[TrianglePairBatch::rowOfB(i, k)][m_size] = q[k];
       }
     }
     if (++m_size == TrianglePairBatch::kSize) flush();
@@ -238,20 +239,20 @@ class ProximityFinder {
     std::uint32_t possible[TrianglePairBatch::kSize];
     findPossibleProximity(m_batch, m_pair.reach(), m_distinct, m_check.edgeReach(), possible);
     for (int i = 0; i < m_size; ++i) {
-      m_out.featurePairs += countOf(m_pairs[i]);
-      for (std::uint32_t left = m_pairs[i] & possible[i]; left != 0; left &= left - 1)
+      m_out.featurePairs += countOf(m_tests[i]);
+      for (std::uint32_t left = m_tests[i] & possible[i]; left != 0; left &= left - 1)
         measure(m_candidates[i], std::countr_zero(left));
     }
     m_size = 0;
   }
 
-  /// One feature pair, by its bit.
-  void measure(const TrianglePair& candidate, int bit) {
+  void measure(const TrianglePair& candidate, int test) {
     const MeshTopology &a = m_pair.a.topology, &b = m_pair.b.topology;
-    if (bit < 3) return m_ofA.test(a.triangles[candidate.a][bit], candidate.b);
-    if (bit < 6) return m_ofB.test(b.triangles[candidate.b][bit - 3], candidate.a);
-    std::uint32_t edgeA = a.triangleEdges[candidate.a][(bit - 6) / 3];
-    std::uint32_t edgeB = b.triangleEdges[candidate.b][(bit - 6) % 3];
+    const std::uint8_t ofA = kOfA[test], ofB = kOfB[test];
+    if (ofB == kTriangle) return m_ofA.test(a.triangles[candidate.a][ofA], candidate.b);
+    if (ofA == kTriangle) return m_ofB.test(b.triangles[candidate.b][ofB], candidate.a);
+    std::uint32_t edgeA = a.triangleEdges[candidate.a][edgeNumber(ofA)];
+    std::uint32_t edgeB = b.triangleEdges[candidate.b][edgeNumber(ofB)];
     if (m_pair.self() && edgeB < edgeA) std::swap(edgeA, edgeB);
     if (m_pair.hasLines()) return testLineEdges(m_pair, edgeA, edgeB, m_out);
     testEdges(m_pair, edgeA, edgeB, m_check, m_out);
@@ -261,10 +262,10 @@ class ProximityFinder {
   ContactBuffers& m_out;
   StepCheck m_check;
   VertexTriangleFinder m_ofA, m_ofB;
-  const std::uint32_t m_tested;  ///< by the meshes' kinds
-  const bool m_distinct;         ///< edges that meet at their ends are no contacts
+  const std::uint32_t m_allowed;  ///< tests, by the meshes' kinds
+  const bool m_distinct;          ///< edges that meet at their ends are no contacts
   int m_size = 0;
-  std::uint32_t m_pairs[TrianglePairBatch::kSize];
+  std::uint32_t m_tests[TrianglePairBatch::kSize];
   TrianglePair m_candidates[TrianglePairBatch::kSize];
   TrianglePairBatch m_batch{};
 };

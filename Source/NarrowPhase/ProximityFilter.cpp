@@ -1,17 +1,20 @@
 #include "NarrowPhase/ProximityFilter.h"
 
+#include "NarrowPhase/FeatureTests.h"
+
 // Every pair is taken in floats relative to its corner a0 and scaled by a power of two, so that all
 // its coordinates are below 2. What floats then get wrong, in units of e = 2^-22:
 //
-//   coordinate differences    e per component: two coordinates off by e / 4 each, one rounding of a
-//   number
-//                             below 4
-//   n = u x v                 8.8 e L, |u|, |v| <= L: two factors off by sqrt(3) e, three roundings
-//   of L²,
-//                             and L < 7
-//   n . r                     111 e L, |r| < 7
-//   (n x u) . r               160 e L²
-//   (v . u)(v . r) - (v . v)(u . r)   320 e |v| L; and n . n 280 e |v| L beside it
+// clang-format off
+//   coordinate difference              e per component: two coordinates off by e / 4 each, and one
+//                                      rounding of a number below 4
+//   n = u x v                          8.8 e L, |u|, |v| <= L: two factors off by sqrt(3) e, three
+//                                      roundings of L², and L < 7
+//   n . r                              111 e L, |r| < 7
+//   (n x u) . r                        160 e L²
+//   (v . u)(v . r) - (v . v)(u . r)    320 e |v| L
+//   n . n, compared with it            280 e |v| L
+// clang-format on
 //
 // The thresholds below are those, rounded up, times 1 + thickness, which covers what the same
 // errors do to |n| and |u| in products with the thickness. A comparison with NaN is false and
@@ -26,11 +29,13 @@ namespace palpate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int kSize = TrianglePairBatch::kSize;
+using Batch = TrianglePairBatch;
+constexpr int kSize = Batch::kSize, kRows = Batch::kRows;
+constexpr int kFirstRow = Batch::rowOfA(1, 0);  // not of a0
 
 /// A batch in floats: coordinates relative to a0, scaled to below 2.
 struct ScaledBatch {
-  alignas(64) float coordinates[18][kSize];  // the first three stay unused: a0 is the origin
+  alignas(64) float coordinates[kRows][kSize];  // those of a0, the origin, stay unused
   alignas(64) float thickness[kSize], edgeReach[kSize];
 };
 
@@ -40,11 +45,11 @@ HWY_ATTR void scaleBatch(const TrianglePairBatch& batch, double thickness, doubl
   const hn::RebindToUnsigned<decltype(d)> du;
   const hn::Rebind<float, decltype(d)> df;
   for (int i = 0; i < kSize; i += static_cast<int>(hn::Lanes(d))) {
-    hn::Vec<decltype(d)> relative[18], most = hn::Zero(d);
-    for (int k = 3; k < 18; ++k) {
-      relative[k] =
-          hn::Load(d, batch.coordinates[k] + i) - hn::Load(d, batch.coordinates[k % 3] + i);
-      most = hn::Max(most, hn::Abs(relative[k]));
+    hn::Vec<decltype(d)> relative[kRows], most = hn::Zero(d);
+    for (int row = kFirstRow; row < kRows; ++row) {
+      relative[row] =
+          hn::Load(d, batch.coordinates[row] + i) - hn::Load(d, batch.coordinates[row % 3] + i);
+      most = hn::Max(most, hn::Abs(relative[row]));
     }
     // 2^-e for 2^e <= most < 2^(e + 1), by its exponent bits.
     const auto exponent = hn::And(hn::BitCast(du, most), hn::Set(du, 0x7ff0000000000000u));
@@ -57,8 +62,8 @@ HWY_ATTR void scaleBatch(const TrianglePairBatch& batch, double thickness, doubl
     };
     store(thickness, scaled.thickness);
     store(edgeReach, scaled.edgeReach);
-    for (int k = 3; k < 18; ++k)
-      hn::Store(hn::DemoteTo(df, relative[k] * scale), df, scaled.coordinates[k] + i);
+    for (int row = kFirstRow; row < kRows; ++row)
+      hn::Store(hn::DemoteTo(df, relative[row] * scale), df, scaled.coordinates[row] + i);
   }
 }
 
@@ -91,11 +96,11 @@ struct TriangleFrame {
   }
 };
 
-/// bits with the given one where a pair is not ruled out.
+/// The tests, and the given one for the pairs that it is not ruled out for.
 template <class V, class M>
-HWY_INLINE V withBit(V bits, int bit, M isOut) {
+HWY_INLINE V withTest(V tests, int test, M isOut) {
   const hn::DFromV<V> du;
-  return hn::Or(bits, hn::IfThenZeroElse(hn::RebindMask(du, isOut), hn::Set(du, 1u << bit)));
+  return hn::Or(tests, hn::IfThenZeroElse(hn::RebindMask(du, isOut), hn::Set(du, 1u << test)));
 }
 
 template <bool kTurned, class V>
@@ -124,8 +129,10 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
     TriangleFrame<V> a, b;
     for (int i = 0; i < 3; ++i) {
       const auto load = [&](int row) { return hn::Load(d, scaled.coordinates[row] + lane); };
-      a.corner[i] = {load(3 * i), load(3 * i + 1), load(3 * i + 2)};
-      b.corner[i] = {load(3 * i + 9), load(3 * i + 10), load(3 * i + 11)};
+      a.corner[i] = {load(Batch::rowOfA(i, 0)), load(Batch::rowOfA(i, 1)),
+                     load(Batch::rowOfA(i, 2))};
+      b.corner[i] = {load(Batch::rowOfB(i, 0)), load(Batch::rowOfB(i, 1)),
+                     load(Batch::rowOfB(i, 2))};
     }
     a.corner[0] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     a.set(d, thickness);
@@ -134,10 +141,12 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) from[i][j] = a.corner[i] - b.corner[j];
 
-    auto bits = hn::Zero(hn::RebindToUnsigned<D>());
+    auto tests = hn::Zero(hn::RebindToUnsigned<D>());
     for (int i = 0; i < 3; ++i) {
-      bits = withBit(bits, i, isOutOfReach<false>(b, from[i][0], from[i][1], from[i][2]));
-      bits = withBit(bits, 3 + i, isOutOfReach<true>(a, from[0][i], from[1][i], from[2][i]));
+      tests = withTest(tests, cornerTestOfA(i),
+                       isOutOfReach<false>(b, from[i][0], from[i][1], from[i][2]));
+      tests = withTest(tests, cornerTestOfB(i),
+                       isOutOfReach<true>(a, from[0][i], from[1][i], from[2][i]));
     }
 
     const V slack = (hn::Set(d, 1.0f) + thickness) * hn::Set(d, 0x1p-22f);
@@ -176,10 +185,10 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
           isOut = hn::Or(isOut, hn::Gt(s - normalSquare, sBeyond));
           isOut = hn::Or(isOut, hn::Gt(t - normalSquare, tBeyond));
         }
-        bits = withBit(bits, 6 + 3 * i + j, isOut);
+        tests = withTest(tests, edgeTest(i, j), isOut);
       }
     }
-    hn::StoreU(bits, hn::RebindToUnsigned<D>(), possible + lane);
+    hn::StoreU(tests, hn::RebindToUnsigned<D>(), possible + lane);
   }
 }
 

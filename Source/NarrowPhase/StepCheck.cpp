@@ -15,15 +15,19 @@ using Kind = ImpactQuery::Kind;
 constexpr std::size_t kFreeLooks = 32, kLooksTogether = 16;
 
 template <Kind kind>
-bool StepCheck::isAnsweredByImpact(const Features<kind>& features, std::uint32_t inFirst,
+bool StepCheck::mayTouchInStep(const Features<kind>& features, std::uint32_t inFirst,
+                               std::uint32_t inSecond, double distance) const {
+  const StepPlan& step = m_pair.step;
+  return step.motion != 0.0 && !(distance > step.certain) &&
+         mayHaveTouched<kind>(features.query(inFirst, inSecond), distance, step.motion);
+}
+
+template <Kind kind>
+bool StepCheck::addImpactIfTouched(const Features<kind>& features, std::uint32_t inFirst,
                                    std::uint32_t inSecond, bool ofSecond, double distance) {
-  StepFacts& facts = m_out.facts;
-  facts.clearance = std::min(facts.clearance, distance);
-  if (m_pair.step.motion == 0.0 || distance > m_pair.step.certain ||
-      !mayHaveTouched<kind>(features.query(inFirst, inSecond), distance, m_pair.step.motion))
-    return false;
+  if (!mayTouchInStep(features, inFirst, inSecond, distance)) return false;
   if (m_pair.step.impacts) return addImpact(m_pair, features, inFirst, inSecond, ofSecond, m_out);
-  facts.clearance = 0.0;
+  m_out.facts.clearance = 0.0;
   noteVertices(features, inFirst, inSecond);
   return false;
 }
@@ -157,9 +161,9 @@ template void StepCheck::noteImpact(const Features<Kind::VertexTriangle>&, std::
                                     std::uint32_t, double, double);
 template void StepCheck::noteImpact(const Features<Kind::EdgeEdge>&, std::uint32_t, std::uint32_t,
                                     double, double);
-template bool StepCheck::isAnsweredByImpact(const Features<Kind::VertexTriangle>&, std::uint32_t,
+template bool StepCheck::addImpactIfTouched(const Features<Kind::VertexTriangle>&, std::uint32_t,
                                             std::uint32_t, bool, double);
-template bool StepCheck::isAnsweredByImpact(const Features<Kind::EdgeEdge>&, std::uint32_t,
+template bool StepCheck::addImpactIfTouched(const Features<Kind::EdgeEdge>&, std::uint32_t,
                                             std::uint32_t, bool, double);
 template bool StepCheck::isAnsweredAtEnd(const Features<Kind::VertexTriangle>&, std::uint32_t,
                                          std::uint32_t) const;

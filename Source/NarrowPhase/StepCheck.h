@@ -20,11 +20,15 @@ class StepCheck {
     return std::min(step.motion, step.impacts ? step.extra : m_pair.settings.thickness);
   }
 
-  /// Of a feature pair at most thicknessAtEnd() apart: whether the step may have brought it
-  /// together and its impact was reported in its place. ofSecond: the first feature is of the
-  /// second mesh.
+  /// Of a feature pair at most thicknessAtEnd() apart.
+  void noteDistance(double distance) {
+    m_out.facts.clearance = std::min(m_out.facts.clearance, distance);
+  }
+  /// The same pair, where the step may have brought it together: appends its impact if the step
+  /// asks for impacts, else notes its vertices. Returns whether an impact was appended, which takes
+  /// the place of a contact at the end. ofSecond: the first feature is of the second mesh.
   template <ImpactQuery::Kind kind>
-  bool isAnsweredByImpact(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond,
+  bool addImpactIfTouched(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond,
                           bool ofSecond, double distance);
 
   /// Auto: whether proximity at the step's end says all there is to say of a feature pair.
@@ -42,6 +46,10 @@ class StepCheck {
   void noteEdges(const Segment& p, const Segment& q);
 
  private:
+  /// Whether the step may have brought features together that are so far apart at its end.
+  template <ImpactQuery::Kind kind>
+  bool mayTouchInStep(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond,
+                      double distance) const;
   template <ImpactQuery::Kind kind>
   void noteVertices(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond);
 

@@ -1,6 +1,7 @@
 #include "NarrowPhase/ProximityFilter.h"
 
 #include "Core/SimdPath.h"
+#include "NarrowPhase/FeatureTests.h"
 #include "Math/ClosestPoint.h"
 
 #include <gtest/gtest.h>
@@ -21,18 +22,18 @@ using Eigen::Vector3d;
 using Pair = std::array<Vector3d, 6>;  // corners of a, of b
 using Possible = std::array<std::uint32_t, TrianglePairBatch::kSize>;
 
-constexpr int kFeaturePairs = 15;
+constexpr std::uint32_t kAllTests = (1u << kTests) - 1;
 
-/// Distance of feature pair `bit`; with distinct, none where edges do not cross inside.
-std::optional<double> distanceOf(const Pair& x, int bit, bool distinct) {
+/// Distance of the features of a test; with distinct, none where edges do not cross inside.
+std::optional<double> distanceOf(const Pair& x, int test, bool distinct) {
   const auto corner = [&](int triangle, int i) { return x[3 * triangle + i % 3]; };
-  if (bit < 6) {
-    const int own = bit < 3 ? 0 : 1, other = 1 - own;
-    return vertexTriangleDistance(corner(own, bit % 3), corner(other, 0), corner(other, 1),
-                                  corner(other, 2))
+  const auto distanceTo = [&](int triangle, const Vector3d& p) {
+    return vertexTriangleDistance(p, corner(triangle, 0), corner(triangle, 1), corner(triangle, 2))
         .distance;
-  }
-  const int i = (bit - 6) / 3, j = (bit - 6) % 3;
+  };
+  if (isCorner(kOfA[test])) return distanceTo(1, corner(0, kOfA[test]));
+  if (isCorner(kOfB[test])) return distanceTo(0, corner(1, kOfB[test]));
+  const int i = edgeNumber(kOfA[test]), j = edgeNumber(kOfB[test]);
   if (!distinct)
     return edgeEdgeDistance(corner(0, i), corner(0, i + 1), corner(1, j), corner(1, j + 1))
         .distance;
@@ -105,15 +106,17 @@ TEST(ProximityFilter, LeavesOutNothingWithinTheThickness) {
     for (int i = 0; i < TrianglePairBatch::kSize; ++i) pairs.push_back(pairOf(kind, random));
     const bool distinct = random.below(2) == 0;
     const Pair& chosen = pairs[random.below(TrianglePairBatch::kSize)];
-    const double thickness = distanceOf(chosen, random.below(6), distinct).value();
+    const int corner = random.below(6);
+    const int test = corner < 3 ? cornerTestOfA(corner) : cornerTestOfB(corner - 3);
+    const double thickness = distanceOf(chosen, test, distinct).value();
     const Possible possible = filter(pairs, thickness, distinct);
     for (std::size_t n = 0; n < pairs.size(); ++n) {
-      for (int bit = 0; bit < kFeaturePairs; ++bit) {
-        const std::optional<double> distance = distanceOf(pairs[n], bit, distinct);
+      for (int other = 0; other < kTests; ++other) {
+        const std::optional<double> distance = distanceOf(pairs[n], other, distinct);
         if (!distance || !(*distance <= thickness)) continue;
         ++within;
-        ASSERT_TRUE(possible[n] >> bit & 1)
-            << "kind " << kind << ", round " << round << ", bit " << bit;
+        ASSERT_TRUE(possible[n] >> other & 1)
+            << "kind " << kind << ", round " << round << ", test " << other;
       }
     }
   }
@@ -147,10 +150,10 @@ TEST(ProximityFilter, LeavesOutNearlyAllThatIsBeyondTheThickness) {
     for (int i = 0; i < TrianglePairBatch::kSize; ++i) pairs.push_back(pairOf(round % 2, random));
     const Possible possible = filter(pairs, thickness, true);
     for (std::size_t n = 0; n < pairs.size(); ++n) {
-      all += kFeaturePairs;
-      kept += std::popcount(possible[n] & 0x7fffu);
-      for (int bit = 0; bit < kFeaturePairs; ++bit) {
-        const std::optional<double> distance = distanceOf(pairs[n], bit, true);
+      all += kTests;
+      kept += std::popcount(possible[n] & kAllTests);
+      for (int test = 0; test < kTests; ++test) {
+        const std::optional<double> distance = distanceOf(pairs[n], test, true);
         contacts += distance && *distance <= thickness;
       }
     }
@@ -164,7 +167,7 @@ TEST(ProximityFilter, LeavesOutNothingWhereCoordinatesOverflow) {
   const Pair x{Vector3d(-most, -most, 0), Vector3d(most, -most, 0), Vector3d(0, most, 0),
                Vector3d(0, 0, 1),         Vector3d(1, 0, 1),        Vector3d(0, 1, 2)};
   const std::vector<Pair> pairs(TrianglePairBatch::kSize, x);
-  for (const std::uint32_t bits : filter(pairs, 1.0, true)) EXPECT_EQ(bits & 0x7fffu, 0x7fffu);
+  for (const std::uint32_t bits : filter(pairs, 1.0, true)) EXPECT_EQ(bits & kAllTests, kAllTests);
 }
 
 }  // namespace
