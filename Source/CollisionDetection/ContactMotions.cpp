@@ -2,6 +2,7 @@
 #include <palpate/Error.h>
 
 #include "Core/FloatingPoint.h"
+#include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>
 
@@ -149,9 +150,8 @@ Tangents tangentsOf(const Vector3d& normal, const Tangents& previous) {
   // swaps the previous normal with the opposite of the normal.
   const Vector3d middle = previousNormal + normal;
   const double lengthSquared = middle.squaredNorm();
-  constexpr double kOpposite = 0x1p-80;  // below its root the sum of two normals is rounding
   Vector3d first = previous[0];
-  if (lengthSquared > kOpposite) first -= 2 * middle.dot(first) / lengthSquared * middle;
+  if (lengthSquared > kOppositeSquare) first -= 2 * middle.dot(first) / lengthSquared * middle;
   first -= normal.dot(first) * normal;  // what rounding left
   first /= first.norm();
   return {first, normal.cross(first)};

@@ -4,6 +4,7 @@
 #include "Core/Text.h"
 #include "Math/ClosestPoint.h"
 #include "Math/RayCrossing.h"
+#include "Math/Tolerances.h"
 
 #include <algorithm>
 #include <cmath>
@@ -25,8 +26,9 @@ bool isBeyond(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::V
   const double most = std::max({u.squaredNorm(), v.squaredNorm(), t.squaredNorm()});
   const double along = std::min({u.dot(w), v.dot(w), t.dot(w)}), square = w.squaredNorm();
   return along > 0 &&
-         along * along * (1 - 0x1p-40) >
-             square * (distance * distance + 0x1p-44 * distance * std::sqrt(most) + 0x1p-90 * most);
+         along * along * (1 - kNearestError) >
+             square * (distance * distance + 2 * kNearestSlack * distance * std::sqrt(most) +
+                       kNearestSlack * kNearestSlack * most);
 }
 
 /// One body, asked about points.
@@ -88,7 +90,7 @@ class Body {
       // A little more than the best: distances are rounded, and equal ones are looked for.
       const auto bound = [&] {
         const double distance = best.distance * m_geometry.tree.frame().scale;
-        return distance * distance * (1 + 0x1p-40);
+        return distance * distance * (1 + kNearestError);
       };
       tryOne(std::min(m_last, size() - 1));
       forEachNearest(m_geometry.tree.octree(), m_frame.map(), m_frame.boxOf(p), bound(), m_stack,
@@ -104,7 +106,7 @@ class Body {
 
   bool mayContain(const Eigen::Vector3d& p) const {
     return m_bruteForce ||
-           m_frame.boxOf(p).overlaps(m_frame.map()(m_geometry.tree.octree().blocks()[0].box(0)));
+           m_frame.boxOf(p).overlaps(m_frame.map()(m_geometry.tree.octree().box(0)));
   }
 
  private:

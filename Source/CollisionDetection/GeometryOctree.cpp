@@ -12,9 +12,6 @@ namespace {
 constexpr std::size_t kGrain = 1024;
 constexpr std::size_t kTrianglesPerGroup = 1024;  ///< for bounds, before there are nodes
 constexpr std::size_t kGroupGrain = 128;
-/// A refitted tree is rebuilt when its leaves have become this much larger in relation to their
-/// triangles.
-constexpr double kMostLoosening = 1.5;
 
 void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
                    Buffer<FloatPoint>& floats, const Threads& threads) {
@@ -72,7 +69,7 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
     if (canRefit && settings.update == OctreeUpdate::Auto) {
       fitBoxes(mesh, settings, threads, false);
       lastUpdate = LooseOctree::Update::Refitted;
-      fits = m_octree.looseness() <= kMostLoosening * m_octree.leastLooseness();
+      fits = m_octree.isTight();
     }
     if (!fits) {
       if (!canRefit) {

@@ -61,9 +61,9 @@ class RigidSearch::Step {
     const double unit = 1.0 / m_geometry.tree.frame().scale;
     const auto mayHaveMore = [&](const FloatBox& box) {
       if (box.empty()) return false;
+      if (box.mayBeClamped()) return true;
       Vector3d lower, upper;
       for (int k = 0; k < 3; ++k) lower[k] = box.lower[k], upper[k] = box.upper[k];
-      if (lower.minCoeff() <= -kLargestFloat || upper.maxCoeff() >= kLargestFloat) return true;
       const Vector3d centre = 0.5 * unit * (lower + upper) + m_geometry.tree.frame().origin;
       const double most =
           size(m_matrix * centre + m_vector) + growth.dot(0.5 * unit * (upper - lower));

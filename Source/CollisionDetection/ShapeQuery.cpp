@@ -25,10 +25,9 @@ void findPrimitivesNear(const Geometry& geometry, const Shape& before, const Sha
   const auto mayReach = [&](const FloatBox& stored) {
     if (stored.empty()) return false;
     const FloatBox floats = map(stored);
+    if (floats.mayBeClamped()) return true;
     Eigen::AlignedBox3d box;
     for (int k = 0; k < 3; ++k) box.min()[k] = floats.lower[k], box.max()[k] = floats.upper[k];
-    if (!(box.min().minCoeff() > -kLargestFloat && box.max().maxCoeff() < kLargestFloat))
-      return true;
     box = {unit * box.min(), unit * box.max()};
     if (wholeStep && now.isPlane())
       return step.mayComeNear({box.min() + origin, box.max() + origin}, reach);

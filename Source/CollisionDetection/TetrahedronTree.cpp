@@ -8,19 +8,11 @@ namespace palpate {
 namespace {
 
 constexpr std::size_t kGroupGrain = 128;
-constexpr double kMostLoosening = 1.5;
 
 FloatBox boxOf(const Tetrahedron& tetrahedron, const FloatPoint* floats) {
   FloatBox box;
-  for (const std::uint32_t vertex : tetrahedron) {
-    const FloatPoint& f = floats[vertex];
-    box.add({{f.x, f.y, f.z, 0}, {f.x, f.y, f.z, 0}});
-  }
-  for (int k = 0; k < 3; ++k) {
-    box.lower[k] = OutwardRounding::down(box.lower[k]);
-    box.upper[k] = OutwardRounding::up(box.upper[k]);
-  }
-  return box;
+  for (const std::uint32_t vertex : tetrahedron) box.add(floats[vertex].box());
+  return OutwardRounding::outward(box);
 }
 
 void set(BoxArrays& boxes, std::size_t i, const FloatBox& box) {
@@ -44,7 +36,7 @@ void TetrahedronTree::update(std::span<const Tetrahedron> tetrahedra, const Floa
   if (wasKnown && settings.update == OctreeUpdate::Auto) {
     fit(floats, threads);
     m_octree.measureLooseness();
-    m_known = m_octree.looseness() <= kMostLoosening * m_octree.leastLooseness();
+    m_known = m_octree.isTight();
     if (m_known) return;
   }
   FloatBox bounds;

@@ -4,7 +4,6 @@
 #include "Core/Threads.h"
 #include "Octree/PointQueries.h"
 
-#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -15,27 +14,17 @@ namespace palpate {
 class PointFrame {
  public:
   explicit PointFrame(const Geometry& geometry)
-      : m_scale(geometry.tree.frame().scale),
-        m_origin(worldOrigin(geometry)),
-        m_map(worldMap(geometry, m_origin, 0.0, false)) {}
+      : m_frame{worldOrigin(geometry), geometry.tree.frame().scale},
+        m_map(worldMap(geometry, m_frame.origin, 0.0, false)) {}
 
   const BoxMap& map() const { return m_map; }
-  /// Clamped as the boxes' corners are: that brings no two points further apart.
   FloatBox boxOf(const Eigen::Vector3d& p) const {
-    FloatBox box;
-    for (int k = 0; k < 3; ++k) {
-      const auto at = static_cast<float>(std::clamp((p[k] - m_origin[k]) * m_scale,
-                                                    -double{kLargestFloat}, double{kLargestFloat}));
-      box.lower[k] = OutwardRounding::down(at);
-      box.upper[k] = OutwardRounding::up(at);
-    }
-    return box;
+    return OutwardRounding::outward(m_frame(p).box());
   }
 
  private:
-  double m_scale;
-  Eigen::Vector3d m_origin;  ///< of boxes in the world
-  BoxMap m_map;              ///< that brings them there
+  FloatFrame m_frame;  ///< of boxes in the world
+  BoxMap m_map;        ///< that brings them there
 };
 
 /// Asks something about each vertex of a geometry that is in an element, enabled or not, and keeps

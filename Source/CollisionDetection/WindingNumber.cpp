@@ -75,7 +75,7 @@ void WindingNumbers::prepare(const Geometry& body, const Threads& threads) {
   m_clusters.resize(8 * blocks);
   threads.forChunks(blocks, kBlocksPerPart, [&](std::size_t, std::size_t from, std::size_t to) {
     for (auto node = static_cast<OctreeNode>(8 * from); node < 8 * to; ++node)
-      if (octree.blocks()[node >> 3].isEmpty(node & 7))
+      if (octree.isEmpty(node))
         m_clusters[node] = {};
       else
         addOwn(node);
@@ -136,11 +136,9 @@ WindingNumbers::Answer WindingNumbers::ask(const Vector3d& p, double margin, boo
         const auto& [a, b, c] = m_body->tree.ordered()[i];
         ofNear.add(seenShare(p, now[a], now[b], now[c]));
       }
-      const OctreeBlock& block = octree.blocks()[node >> 3];
-      if (block.isLeaf(node & 7)) continue;
-      const std::uint32_t child = block.child[node & 7];
-      for (unsigned slot = 0; slot < 8; ++slot)
-        if (!octree.blocks()[child].isEmpty(slot)) stack.entries.push_back({0, child * 8 + slot});
+      const OctreeNode first = octree.firstChild(node);
+      for (unsigned slot = 0; first != 0 && slot < 8; ++slot)
+        if (!octree.isEmpty(first + slot)) stack.entries.push_back({0, first + slot});
     }
     // Only where the sum of all, within its own bound, is sure to decide the same.
     const SeenShare sum{

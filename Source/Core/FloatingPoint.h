@@ -13,8 +13,7 @@ namespace palpate {
 /// fesetenv() traps nothing.
 ///
 /// x86-64   the library computes with SSE only, so that MXCSR alone decides. The x87 control word
-/// is
-///          not looked at: its rounding, precision and traps change no result here. Where MXCSR
+///          is not looked at: its rounding, precision and traps change no result here. Where MXCSR
 ///          differs, feenableexcept() may have enabled x87 traps too, and both are set.
 /// aarch64  FPCR decides; FPSR has the flags.
 /// Others   the environment is always set.

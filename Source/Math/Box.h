@@ -27,6 +27,12 @@ struct alignas(16) FloatBox {
     for (int k = 0; k < 3; ++k) all &= lower[k] <= other.upper[k] && upper[k] >= other.lower[k];
     return all;
   }
+  /// Whether what is in the box may reach beyond it, because it was clamped.
+  bool mayBeClamped() const {
+    bool within = true;
+    for (int k = 0; k < 3; ++k) within &= lower[k] > -kLargestFloat && upper[k] < kLargestFloat;
+    return !within;
+  }
   bool empty() const { return !(lower[0] <= upper[0]); }
   void add(const FloatBox& other) {
     for (int k = 0; k < 3; ++k) {
@@ -61,13 +67,20 @@ struct BoxArrays {
 /// 2^-24 of its result) with a factor of about two to spare; kAbsolute covers denormals, and is so
 /// large that its own outward rounding is not one: a product that is costs many processors a
 /// hundred cycles, and coordinates of zero are common. Both bounds are monotone in f, so the bound
-/// of a set is the bound of its least element.
+/// of a set is the bound of its least element. Math/BoxRounding.h does the same in SIMD lanes.
 struct OutwardRounding {
   static constexpr float kRelative = 0x1p-22f;
   static constexpr float kAbsolute = 0x1p-103f;
   static_assert(kAbsolute * kRelative >= std::numeric_limits<float>::min());
   static float down(float f) { return f - (std::fabs(f) * kRelative + kAbsolute); }
   static float up(float f) { return f + (std::fabs(f) * kRelative + kAbsolute); }
+  static FloatBox outward(FloatBox box) {
+    for (int k = 0; k < 3; ++k) {
+      box.lower[k] = down(box.lower[k]);
+      box.upper[k] = up(box.upper[k]);
+    }
+    return box;
+  }
 };
 
 }  // namespace palpate

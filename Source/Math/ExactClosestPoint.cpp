@@ -1,41 +1,16 @@
 #include "Math/ExactClosestPoint.h"
 
-#include "Math/Exact.h"
-#include "Math/WideInteger.h"
+#include "Math/ExactVector.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
-#include <type_traits>
 
 namespace palpate::exact {
 
 namespace {
 
 using Eigen::Vector3d;
-
-/// Integers of 64 bits multiply into 128, others into their kind.
-template <class T>
-using Wide = std::conditional_t<std::is_same_v<T, std::int64_t>, Int128, T>;
-
-template <class T>
-using Vector = std::array<T, 3>;
-
-template <class T>
-Vector<T> operator-(const Vector<T>& a, const Vector<T>& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-template <class T>
-Wide<T> dot(const Vector<T>& a, const Vector<T>& b) {
-  return Wide<T>(a[0]) * b[0] + Wide<T>(a[1]) * b[1] + Wide<T>(a[2]) * b[2];
-}
-template <class T>
-Vector<Wide<T>> cross(const Vector<T>& a, const Vector<T>& b) {
-  using W = Wide<T>;
-  return {W(a[1]) * b[2] - W(a[2]) * b[1], W(a[2]) * b[0] - W(a[0]) * b[2],
-          W(a[0]) * b[1] - W(a[1]) * b[0]};
-}
 
 /// Positions in units of the largest power of two that leaves nothing over: the shortest integers.
 template <std::size_t Count>
@@ -114,13 +89,6 @@ Foot footOnPlane(const Vector<Integer>& from, const Vector<Integer>& u, const Ve
 }
 
 // ---- Signs, in integers of fixed width where the positions fit, else of any size ----
-
-Integer product(const Integer& a, const Integer& b) { return a * b; }
-using palpate::product;
-
-int signOf(const Integer& a) { return sgn(a); }
-int signOf(Int128 a) { return (a > 0) - (a < 0); }
-int signOf(const Int256& a) { return a.sign(); }
 
 /// decision(positions), as vectors of one kind of integer or the other.
 template <class Decision, class... Positions>
@@ -231,11 +199,7 @@ bool areCollinear(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
 bool areCoplanar(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
   return decide(
       [](const auto& at) {
-        const auto normal = cross(at[1] - at[0], at[2] - at[0]);
-        const auto from = at[3] - at[0];
-        const decltype(product(normal[0], from[0])) volume =
-            product(normal[0], from[0]) + product(normal[1], from[1]) + product(normal[2], from[2]);
-        return signOf(volume) == 0;
+        return signOf(volumeOf(at[1] - at[0], at[2] - at[0], at[3] - at[0])) == 0;
       },
       a, b, c, d);
 }

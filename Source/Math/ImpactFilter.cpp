@@ -179,9 +179,7 @@ HWY_INLINE unsigned mayImpactOf(const ImpactBlock& block, double distance, doubl
     if (!hn::AllTrue(d, impossible))
       impossible =
           hn::Or(impossible, lanes.separatedAlong(lanes.gapHalfway(), distance, tolerance));
-    std::uint8_t mask[8] = {};
-    hn::StoreMaskBits(d, hn::Not(impossible), mask);
-    bits |= static_cast<unsigned>(mask[0]) << lane;
+    bits |= bitsOf(d, hn::Not(impossible)) << lane;
   }
   return bits;
 }

@@ -1,6 +1,6 @@
 #include "Math/ClosestPoint.h"
 #include "Math/CubicRoot.h"
-#include "Math/Exact.h"
+#include "Math/ExactVector.h"
 #include "Math/ImpactQuery.h"
 #include "Math/RelativeMotion.h"
 #include "Math/Tolerances.h"
@@ -16,7 +16,7 @@ namespace {
 /// Sign of det(A, B, C) at a multiple of 2^-53 of the step.
 int exactSideAt(const ImpactQuery& query, double time) {
   const auto passed = static_cast<unsigned long>(std::ldexp(time, 53)), left = (1ul << 53) - passed;
-  std::array<std::array<Integer, 3>, 3> rows;
+  std::array<exact::Vector<Integer>, 3> rows;
   const auto axes = ImpactQuery::axes(query.kind);
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k) {
@@ -27,14 +27,13 @@ int exactSideAt(const ImpactQuery& query, double time) {
       rows[i][k] = coordinate(axes[i][0]) - coordinate(axes[i][1]);
     }
   const auto& [a, b, c] = rows;
-  return sgn(Integer((a[1] * b[2] - a[2] * b[1]) * c[0] + (a[2] * b[0] - a[0] * b[2]) * c[1] +
-                     (a[0] * b[1] - a[1] * b[0]) * c[2]));
+  return exact::signOf(exact::volumeOf(a, b, c));
 }
 
 /// The first that is not zero, ever further back.
 int exactSide(const ImpactQuery& query, double time, std::size_t* exactDecisions) {
   if (exactDecisions) ++*exactDecisions;
-  for (double back = 0x1p-44;; back *= 0x1p8) {
+  for (double back = kFirstStepBack;; back *= 0x1p8) {
     const double t = std::max(time - back, 0.0);
     const int sign = exactSideAt(query, t);
     if (sign != 0 || t == 0.0) return sign;

@@ -1,7 +1,7 @@
 #include "Math/Predicates.h"
 
 #include "Math/ExactSum.h"
-#include "Math/WideInteger.h"
+#include "Math/ExactVector.h"
 
 #include <algorithm>
 #include <initializer_list>
@@ -24,13 +24,6 @@ Vector3d flattened(int axis, Vector3d position) {
   return position;
 }
 
-int volumeSign(const FixedGrid<4>& grid) {
-  const auto& [origin, u, v, w] = grid.at;
-  const auto minor = [&](int i, int j) { return Int128{u[i]} * v[j] - Int128{u[j]} * v[i]; };
-  return (product(minor(1, 2), w[0]) + product(minor(2, 0), w[1]) + product(minor(0, 1), w[2]))
-      .sign();
-}
-
 }  // namespace
 
 int orient3dExactly(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d,
@@ -39,7 +32,8 @@ int orient3dExactly(const Vector3d& a, const Vector3d& b, const Vector3d& c, con
     if (flat(axis, {&a, &b, &c, &d})) return 0;
   if (a == b || a == c || a == d || b == c || b == d || c == d) return 0;
   ++counts.undecided;
-  if (const FixedGrid grid(a, b, c, d); grid.fits) return volumeSign(grid);
+  if (const FixedGrid grid(a, b, c, d); grid.fits)
+    return exact::signOf(exact::volumeOf(grid.at[1], grid.at[2], grid.at[3]));
   // [b c d] - [a c d] + [a b d] - [a b c], each of six products of coordinates.
   ExactSum volume;
   const auto add = [&](const Vector3d& p, const Vector3d& q, const Vector3d& r, bool negative) {
@@ -63,8 +57,7 @@ int orient2dExactly(int axis, const Vector3d& a, const Vector3d& b, const Vector
   ++counts.undecided;
   if (const FixedGrid grid(flattened(axis, a), flattened(axis, b), flattened(axis, c)); grid.fits) {
     const auto& [origin, u, v] = grid.at;
-    const Int128 area = Int128{u[x]} * v[y] - Int128{u[y]} * v[x];
-    return (area > 0) - (area < 0);
+    return exact::signOf(Int128{u[x]} * v[y] - Int128{u[y]} * v[x]);
   }
   // [b c] - [a c] + [a b]
   ExactSum area;

@@ -1,7 +1,6 @@
 #include "Math/TetrahedronWeights.h"
 
-#include "Math/Exact.h"
-#include "Math/WideInteger.h"
+#include "Math/ExactVector.h"
 
 #include <cmath>
 
@@ -11,7 +10,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// mantissa 2^exponent.
+/// A magnitude: mantissa 2^exponent.
 struct Value {
   double mantissa;
   long exponent;
@@ -28,29 +27,16 @@ Value valueOf(const Integer& x) {
   return value;
 }
 
-/// The magnitude of u x v . w, of differences of integers.
-Value volume(const std::array<std::int64_t, 3>& u, const std::array<std::int64_t, 3>& v,
-             const std::array<std::int64_t, 3>& w) {
-  const auto minor = [&](int i, int j) { return Int128{u[i]} * v[j] - Int128{u[j]} * v[i]; };
-  return valueOf(product(minor(1, 2), w[0]) + product(minor(2, 0), w[1]) +
-                 product(minor(0, 1), w[2]));
-}
-
-Value volume(const std::array<Integer, 3>& u, const std::array<Integer, 3>& v,
-             const std::array<Integer, 3>& w) {
-  return valueOf(Integer((u[1] * v[2] - u[2] * v[1]) * w[0] + (u[2] * v[0] - u[0] * v[2]) * w[1] +
-                         (u[0] * v[1] - u[1] * v[0]) * w[2]));
-}
-
 /// at: the corners less p. Face i is opposite corner i.
-template <class Point>
-std::array<double, 4> weightsOf(const std::array<Point, 4>& at, const std::array<int, 4>& signs) {
+template <class T>
+std::array<double, 4> weightsOf(const std::array<exact::Vector<T>, 4>& at,
+                                const std::array<int, 4>& signs) {
   std::array<Value, 4> volumes{};
   long largest = 0;
   bool any = false;
   for (std::size_t i = 0; i < 4; ++i) {
     if (signs[i] == 0) continue;
-    volumes[i] = volume(at[(i + 1) % 4], at[(i + 2) % 4], at[(i + 3) % 4]);
+    volumes[i] = valueOf(exact::volumeOf(at[(i + 1) % 4], at[(i + 2) % 4], at[(i + 3) % 4]));
     largest = any ? std::max(largest, volumes[i].exponent) : volumes[i].exponent;
     any = true;
   }
@@ -83,9 +69,8 @@ std::optional<std::array<double, 4>> tetrahedronWeights(const Vector3d& p, const
   }
   if (sign == 0) return {};
   if (const FixedGrid grid(p, a, b, c, d); grid.fits)
-    return weightsOf<std::array<std::int64_t, 3>>({grid.at[1], grid.at[2], grid.at[3], grid.at[4]},
-                                                  signs);
-  std::array<std::array<Integer, 3>, 4> at;
+    return weightsOf<std::int64_t>({grid.at[1], grid.at[2], grid.at[3], grid.at[4]}, signs);
+  std::array<exact::Vector<Integer>, 4> at;
   for (std::size_t i = 0; i < 4; ++i)
     for (std::size_t k = 0; k < 3; ++k)
       at[i][k] = scaledInteger((*corners[i])[k]) - scaledInteger(p[k]);

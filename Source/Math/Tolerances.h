@@ -1,7 +1,8 @@
 #pragma once
 
-// Every tolerance of the library, with its unit and where it comes from. u = 2^-53 is the rounding
-// unit.
+// The tolerances of what is decided in double, with their units and where they come from. u = 2^-53
+// is the rounding unit. Boxes and filters in float have theirs where their derivations are: boxes
+// in Math/Box.h and Octree, filters in Geometry/UnfoldedStars and NarrowPhase.
 namespace palpate {
 
 // ---- Signs of polynomials in coordinate differences (ClosestPoint.cpp) ----
@@ -147,6 +148,15 @@ constexpr double kOrthonormal = 1e-9;
 /// some twenty roundings.
 constexpr double kShapeBoundError = 0x1p-46;
 
+// ---- The nearest point of a surface (CollisionDetection/Containment.cpp) ----
+
+/// Relative, of squared distances and of products of lengths: a dozen roundings each, and above
+/// that.
+constexpr double kNearestError = 0x1p-40;
+/// Relative to the distance of a triangle's furthest corner: what a distance to the triangle is off
+/// by, under 2^-48, and above that.
+constexpr double kNearestSlack = 0x1p-45;
+
 // ---- Winding numbers (SolidAngle.h, CollisionDetection/WindingNumber.cpp) ----
 
 /// Of both parts of a triangle's half solid angle, from unit vectors within 3 u each: 9 u and the
@@ -166,6 +176,11 @@ constexpr double kPlacedError = 0x1p-48;
 /// L: coordinates of bodies and translations up to this are placed without overflow.
 constexpr double kLargestPlaced = 0x1p1000;
 
+// ---- Contact frames (CollisionDetection/ContactMotions.cpp) ----
+
+/// Of the squared sum of two unit vectors: below it they are opposite but for rounding.
+constexpr double kOppositeSquare = 0x1p-80;
+
 // ---- Ways out of bodies (CollisionDetection/FollowedExits.cpp) ----
 
 /// Of a triangle's edge, normal and what is across both from being orthonormal: beyond it the
@@ -181,5 +196,10 @@ constexpr double kMotionError = 0x1p-46;
 /// Of the time tolerance, added to a motion that extends a thickness, relative: covers twice what
 /// Continuous may report early.
 constexpr double kMotionSlack = 4;
+/// Relative, of squared lengths of displacements: how far below the limit certainly slow ones are.
+/// Any value above a dozen roundings.
+constexpr double kSlowSlack = 0x1p-20;
+/// L²: squares above this lose nothing of note to underflow.
+constexpr double kSmallestSlowSquare = 0x1p-900;
 
 }  // namespace palpate

@@ -16,7 +16,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 HWY_ATTR void toFloatsKernel(const Eigen::Vector3d* positions, std::size_t size,
                              const FloatFrame& frame, FloatPoint* out) {
-  constexpr double kMost = kLargestFloat;
   std::size_t i = 0;
 #if HWY_MAX_BYTES >= 32
   // A point and the next one's x, which comes to nothing.
@@ -25,19 +24,13 @@ HWY_ATTR void toFloatsKernel(const Eigen::Vector3d* positions, std::size_t size,
   alignas(32) const double corner[4] = {frame.origin[0], frame.origin[1], frame.origin[2], 0.0},
                            scales[4] = {frame.scale, frame.scale, frame.scale, 0.0};
   const auto origin = hn::Load(d, corner), scale = hn::Load(d, scales);
-  const auto least = hn::Set(d, -kMost), most = hn::Set(d, kMost);
+  const auto most = hn::Set(d, kLargestFloat), least = hn::Neg(most);
   for (; i + 1 < size; ++i) {
     const auto point = (hn::LoadU(d, positions[i].data()) - origin) * scale;
     hn::Store(hn::DemoteTo(df, hn::Min(hn::Max(point, least), most)), df, &out[i].x);
   }
 #endif
-  for (; i < size; ++i) {
-    const auto of = [&](int k) {
-      const double v = (positions[i][k] - frame.origin[k]) * frame.scale;
-      return static_cast<float>(std::min(std::max(v, -kMost), kMost));
-    };
-    out[i] = {of(0), of(1), of(2), 0.0f};
-  }
+  for (; i < size; ++i) out[i] = frame(positions[i]);
 }
 
 /// Copies; whether all are finite.

@@ -5,12 +5,15 @@
 #include "Core/Buffer.h"
 #include "Math/Box.h"
 
+#include <algorithm>
 #include <span>
 
 namespace palpate {
 
 struct alignas(16) FloatPoint {
   float x, y, z, unused;
+
+  FloatBox box() const { return {{x, y, z, 0}, {x, y, z, 0}}; }
 };
 
 /// Where a geometry's floats live: f = (position - origin) * scale.
@@ -21,6 +24,16 @@ struct alignas(16) FloatPoint {
 struct FloatFrame {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   double scale = 1.0;
+
+  /// Rounded to nearest, and clamped to kLargestFloat, which brings no two points further apart.
+  FloatPoint operator()(const Eigen::Vector3d& position) const {
+    const auto of = [&](int k) {
+      constexpr double kMost = kLargestFloat;
+      const double v = (position[k] - origin[k]) * scale;
+      return static_cast<float>(std::min(std::max(v, -kMost), kMost));
+    };
+    return {of(0), of(1), of(2), 0.0f};
+  }
   friend bool operator==(const FloatFrame& l, const FloatFrame& r) {
     return l.origin == r.origin && l.scale == r.scale;
   }
@@ -38,7 +51,7 @@ SampledExtent sampleExtent(std::span<const Eigen::Vector3d> positions);
 /// changes.
 double frameScale(double spread);
 
-/// Rounds to nearest. `out` is as long as `positions`.
+/// The frame of each. `out` is as long as `positions`.
 void toFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame&, FloatPoint* out);
 
 /// Copies; returns the index of the first vertex that is not finite, or the size if all are.

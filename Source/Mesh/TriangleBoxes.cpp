@@ -3,11 +3,10 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Shapes/TriangleBoxes.cpp"
 #include "Core/Simd.h"
+#include "Math/BoxRounding.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-
-namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr std::size_t kChunk = 64;
 
@@ -20,18 +19,12 @@ struct Chunk {
 /// Rounds outward and turns points of four into one array per axis.
 HWY_ATTR void storeRounded(const Chunk& chunk, std::size_t begin, BoxArrays& boxes) {
   const hn::CappedTag<float, 8> d;
-  const auto relative = hn::Set(d, OutwardRounding::kRelative);
-  const auto absolute = hn::Set(d, OutwardRounding::kAbsolute);
   for (std::size_t i = 0; i < kChunk; i += hn::Lanes(d)) {
     hn::Vec<decltype(d)> v[3], unused;
     hn::LoadInterleaved4(d, chunk.lower + 4 * i, v[0], v[1], v[2], unused);
-    for (int k = 0; k < 3; ++k)
-      hn::StoreU(v[k] - (hn::Abs(v[k]) * relative + absolute), d,
-                 boxes.lower[k].data() + begin + i);
+    for (int k = 0; k < 3; ++k) hn::StoreU(roundedDown(v[k]), d, boxes.lower[k].data() + begin + i);
     hn::LoadInterleaved4(d, chunk.upper + 4 * i, v[0], v[1], v[2], unused);
-    for (int k = 0; k < 3; ++k)
-      hn::StoreU(v[k] + (hn::Abs(v[k]) * relative + absolute), d,
-                 boxes.upper[k].data() + begin + i);
+    for (int k = 0; k < 3; ++k) hn::StoreU(roundedUp(v[k]), d, boxes.upper[k].data() + begin + i);
   }
 }
 
@@ -78,13 +71,9 @@ HWY_ATTR void triangleBoxesOf(const FloatPoint* HWY_RESTRICT vertices,
         fill = 0;
       }
     }
-    const V relative = hn::Set(d4, OutwardRounding::kRelative),
-            absolute = hn::Set(d4, OutwardRounding::kAbsolute);
     for (std::size_t k = 0; k < kVectors; ++k) {
-      hn::Store(groupLower[k] - (hn::Abs(groupLower[k]) * relative + absolute), d4,
-                groupBoxes[g].lower.data() + k * kLanes);
-      hn::Store(groupUpper[k] + (hn::Abs(groupUpper[k]) * relative + absolute), d4,
-                groupBoxes[g].upper.data() + k * kLanes);
+      hn::Store(roundedDown(groupLower[k]), d4, groupBoxes[g].lower.data() + k * kLanes);
+      hn::Store(roundedUp(groupUpper[k]), d4, groupBoxes[g].upper.data() + k * kLanes);
     }
   }
   // The rest one by one: a whole vector would overwrite what another thread may have written behind

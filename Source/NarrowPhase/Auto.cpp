@@ -1,5 +1,6 @@
 #include "NarrowPhase/Auto.h"
 
+#include "Math/Tolerances.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
@@ -23,12 +24,12 @@ struct Moves {
   }
 };
 
-/// Whether features of both may move further than `slow` relative to each other. Of more it may be
-/// said than moves so: rounding, and squares out of range.
+/// Whether features of both may move further than `slow` relative to each other. Also
+/// true of some that do not: rounding, and squares out of range.
 bool mayBeFast(const Moves& a, const Moves& b, double slow) {
   const Eigen::Array3d most = (a.upper - b.lower).abs().max((b.upper - a.lower).abs());
   const double square = slow * slow;
-  return !(square > 0x1p-900 && most.square().sum() < square * (1 - 0x1p-20));
+  return !(square > kSmallestSlowSquare && most.square().sum() < square * (1 - kSlowSlack));
 }
 
 }  // namespace

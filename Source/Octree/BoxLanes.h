@@ -1,4 +1,5 @@
 // No include guard: for files with SIMD code, after Core/Simd.h.
+#include "Math/BoxRounding.h"
 #include "Octree/BoxMap.h"
 #include "Octree/Octree.h"
 
@@ -11,21 +12,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using NodeTag = hn::CappedTag<float, 8>;   ///< eight siblings
 using LeafTag = hn::CappedTag<float, 16>;  ///< primitives of a leaf
-
-template <class V>
-HWY_INLINE V margin(V v) {
-  const hn::DFromV<V> d;
-  return hn::Abs(v) * hn::Set(d, OutwardRounding::kRelative) +
-         hn::Set(d, OutwardRounding::kAbsolute);
-}
-template <class V>
-HWY_INLINE V roundedDown(V v, V shift) {
-  return v + shift - margin(v + shift);
-}
-template <class V>
-HWY_INLINE V roundedUp(V v, V shift) {
-  return v + shift + margin(v + shift);
-}
+using BoxTag = hn::CappedTag<float, 1>;
 
 /// Boxes side by side: as many as D has lanes.
 template <class D>
@@ -43,17 +30,31 @@ struct BoxLanes {
     }
     return lanes;
   }
+  /// The same box in each lane.
+  HWY_ATTR HWY_INLINE static BoxLanes of(const FloatBox& box) {
+    const D d;
+    BoxLanes lanes;
+    for (int k = 0; k < 3; ++k) {
+      lanes.lower[k] = hn::Set(d, box.lower[k]);
+      lanes.upper[k] = hn::Set(d, box.upper[k]);
+    }
+    return lanes;
+  }
+  HWY_ATTR HWY_INLINE FloatBox first() const {
+    return {{hn::GetLane(lower[0]), hn::GetLane(lower[1]), hn::GetLane(lower[2]), 0},
+            {hn::GetLane(upper[0]), hn::GetLane(upper[1]), hn::GetLane(upper[2]), 0}};
+  }
   HWY_ATTR HWY_INLINE BoxLanes shifted(const std::array<float, 4>& down,
                                        const std::array<float, 4>& up) const {
     const D d;
     BoxLanes lanes;
     for (int k = 0; k < 3; ++k) {
-      lanes.lower[k] = roundedDown(lower[k], hn::Set(d, down[k]));
-      lanes.upper[k] = roundedUp(upper[k], hn::Set(d, up[k]));
+      lanes.lower[k] = roundedDown(lower[k] + hn::Set(d, down[k]));
+      lanes.upper[k] = roundedUp(upper[k] + hn::Set(d, up[k]));
     }
     return lanes;
   }
-  /// As BoxMap::at(), bit by bit.
+  /// See BoxMap.
   HWY_ATTR HWY_INLINE BoxLanes turned(const BoxMap::End& end) const {
     const D d;
     const auto middle = hn::Set(d, 0.5f), zero = hn::Zero(d);
@@ -75,8 +76,8 @@ struct BoxLanes {
       half = half + (size * hn::Set(d, BoxMap::kRelative) + hn::Set(d, OutwardRounding::kAbsolute));
       half = hn::IfThenElse(hn::Ge(farthest, hn::Set(d, kLargestFloat)),
                             hn::Set(d, std::numeric_limits<float>::infinity()), half);
-      lanes.lower[k] = roundedDown(centre - half, hn::Set(d, end.shiftLower[k]));
-      lanes.upper[k] = roundedUp(centre + half, hn::Set(d, end.shiftUpper[k]));
+      lanes.lower[k] = roundedDown(centre - half + hn::Set(d, end.shiftLower[k]));
+      lanes.upper[k] = roundedUp(centre + half + hn::Set(d, end.shiftUpper[k]));
     }
     return lanes;
   }

@@ -32,11 +32,9 @@ void forEachTree(const LooseOctree::State& state, F&& f) {
 template <class F>
 void forEachNode(const Octree& octree, OctreeNode node, int depth, F&& f) {
   f(node, depth);
-  const OctreeBlock& block = octree.blocks()[node >> 3];
-  if (block.isLeaf(node & 7)) return;
-  const std::uint32_t child = block.child[node & 7];
-  for (unsigned slot = 0; slot < 8; ++slot)
-    if (!octree.blocks()[child].isEmpty(slot)) forEachNode(octree, child * 8 + slot, depth + 1, f);
+  const OctreeNode first = octree.firstChild(node);
+  for (unsigned slot = 0; first != 0 && slot < 8; ++slot)
+    if (!octree.isEmpty(first + slot)) forEachNode(octree, first + slot, depth + 1, f);
 }
 
 double nextDown(double v) { return std::nextafter(v, -std::numeric_limits<double>::infinity()); }
@@ -93,11 +91,9 @@ LooseOctree::Node LooseOctree::node(NodeId id) const {
   const Tree& tree = *std::prev(next);
   const Octree& octree = *tree.octree;
   const OctreeNode node = index - tree.firstNode;
-  if (!octree.isBuilt() || node >= octree.pool().used() * 8 ||
-      octree.blocks()[node >> 3].isEmpty(node & 7))
+  if (!octree.isBuilt() || node >= octree.pool().used() * 8 || octree.isEmpty(node))
     throw Error(ErrorCode::IndexOutOfRange,
                 "octree node " + std::to_string(index) + " does not exist or is empty");
-  const OctreeBlock& block = octree.blocks()[node >> 3];
   const auto [cube, depth] = cellOf(octree, node);
 
   Node result;
@@ -107,20 +103,18 @@ LooseOctree::Node LooseOctree::node(NodeId id) const {
   std::array<double, 3> lower = cube.lower;
   for (double& l : lower) l -= cube.edge * 0.5;
   result.looseBounds = cubeInScene(tree, lower, 2 * cube.edge);
-  const FloatBox box = block.box(node & 7);
+  const FloatBox box = octree.box(node);
   for (int k = 0; k < 3; ++k) {
     result.fittedBox.min()[k] = nextDown(tree.origin[k] + box.lower[k] / tree.scale);
     result.fittedBox.max()[k] = nextUp(tree.origin[k] + box.upper[k] / tree.scale);
   }
   result.geometries = std::uint64_t{1} << (static_cast<std::uint32_t>(tree.geometry) % 64);
   if (node != 0) result.parent = NodeId{tree.firstNode + octree.parent(node >> 3)};
-  result.leaf = block.isLeaf(node & 7);
-  if (!result.leaf) {
-    const std::uint32_t child = block.child[node & 7];
-    for (unsigned slot = 0; slot < 8; ++slot)
-      if (!octree.blocks()[child].isEmpty(slot))
-        result.children[slot] = NodeId{tree.firstNode + child * 8 + slot};
-  }
+  const OctreeNode first = octree.firstChild(node);
+  result.leaf = first == 0;
+  for (unsigned slot = 0; !result.leaf && slot < 8; ++slot)
+    if (!octree.isEmpty(first + slot))
+      result.children[slot] = NodeId{tree.firstNode + first + slot};
   const auto [begin, end] = octree.ownRange(node);
   result.primitives = octree.order().subspan(begin, end - begin);
   return result;

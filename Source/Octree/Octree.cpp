@@ -88,7 +88,7 @@ void Octree::measureLooseness() {
   const Buffer<std::uint32_t>& groups = m_nodes.groups;
   const std::size_t count = m_nodes.groupNodes.size(),
                     stride = std::max<std::size_t>(8, count / 256);
-  double areas = 0, primitives = 0x1p-30 * halfArea(blocks()[0].box(0));  // points have no area
+  double areas = 0, primitives = 0x1p-30 * halfArea(box(0));  // points have no area
   for (const double part : m_groupAreas) areas += part;
   for (std::size_t g = 0; g < count; g += stride)
     for (std::size_t i = groups[g]; i < groups[g + 1]; ++i) primitives += halfArea(m_boxes[i]);

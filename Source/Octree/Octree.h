@@ -155,12 +155,21 @@ class Octree {
   /// Sum of the leaves' half areas over that of some of their primitives: how loose the fitted
   /// boxes are. Grows as a refitted tree degrades; unchanged by motion and scaling of the whole.
   double looseness() const { return m_looseness; }
-  double leastLooseness() const { return m_leastLooseness; }  ///< since it was built
+  /// Whether the leaves have not become much larger, in relation to their primitives, than they
+  /// were at their tightest since the tree was built; else it should be built again.
+  bool isTight() const { return m_looseness <= kMostLoosening * m_leastLooseness; }
 
   const OctreeBlock* blocks() const { return m_nodes.pool.data(); }
   const BlockPool& pool() const { return m_nodes.pool; }
   const Cube& rootCube() const { return m_nodes.rootCube; }
   std::size_t bytes() const;
+  FloatBox box(OctreeNode node) const { return blocks()[node >> 3].box(node & 7); }
+  bool isEmpty(OctreeNode node) const { return blocks()[node >> 3].isEmpty(node & 7); }
+  /// The first of eight children, one after the other; 0 of a leaf, as the root is nobody's child.
+  OctreeNode firstChild(OctreeNode node) const {
+    const OctreeBlock& block = blocks()[node >> 3];
+    return block.isLeaf(node & 7) ? 0 : block.child[node & 7] * 8;
+  }
   /// The node whose children block `block` holds; of block 0, itself.
   OctreeNode parent(std::size_t block) const { return m_nodes.parents[block]; }
 
@@ -174,6 +183,7 @@ class Octree {
   }
 
  private:
+  static constexpr double kMostLoosening = 1.5;
   enum class Stage { Empty, LaidOut, Built };
   [[noreturn]] static void throwNotBuilt();
 

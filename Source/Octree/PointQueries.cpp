@@ -33,45 +33,14 @@ float boundOf(double distanceSquared) {
   return OutwardRounding::up(static_cast<float>(distanceSquared) * (1.0f + 0x1p-19f));
 }
 
-HWY_ATTR void findOverlappingKernel(const Octree& octree, const BoxMap& map, const FloatBox& box,
-                                    PointQueryStack& stack) {
-  const auto overlapping = [&](auto, const auto& boxes, std::size_t)
-                               HWY_ATTR { return boxes.overlapping(box); };
-  const OctreeBlock* blocks = octree.blocks();
-  stack.found.clear();
-  stack.entries.clear();
-  if (map(blocks[0].box(0)).overlaps(box)) stack.entries.push_back({0, 0});
-  while (!stack.entries.empty()) {
-    const OctreeNode node = stack.entries.back().node;
-    stack.entries.pop_back();
-    const auto [begin, end] = octree.ownRange(node);
-    for (std::uint32_t i = begin; i < end; i += kSide) {
-      const std::size_t size = std::min<std::size_t>(kSide, end - i);
-      std::uint32_t bits = takeBoxes(LeafTag(), octree.boxes(), i, size, map, overlapping);
-      for (; bits; bits &= bits - 1)
-        stack.found.push_back(i + static_cast<std::uint32_t>(std::countr_zero(bits)));
-    }
-    const OctreeBlock& block = blocks[node >> 3];
-    if (block.isLeaf(node & 7)) continue;
-    const std::uint32_t child = block.child[node & 7];
-    std::uint32_t bits = takeBoxes(NodeTag(), blocks[child], 0, 8, map, overlapping);
-    for (; bits; bits &= bits - 1)
-      stack.entries.push_back({0, child * 8 + static_cast<std::uint32_t>(std::countr_zero(bits))});
-  }
-}
-
-HWY_ATTR void tryNearestKernel(const Octree& octree, const BoxMap& map, const FloatBox& point,
-                               double distanceSquared, PointQueryStack& stack, void* context,
-                               TryPrimitive tryPrimitive) {
-  const OctreeBlock* blocks = octree.blocks();
+/// Depth first from the root, the nearest siblings first: take() says which of several boxes are of
+/// interest, and their squared distances, of which those up to `bound` still are when their turn
+/// comes; primitive(place), which may lower the bound, is called with each such primitive.
+template <class Take, class Primitive>
+HWY_ATTR HWY_INLINE void descend(const Octree& octree, const BoxMap& map, PointQueryStack& stack,
+                                 const float* squares, const float& bound, Take&& take,
+                                 Primitive&& primitive) {
   using Entry = PointQueryStack::Entry;
-  float bound = boundOf(distanceSquared);
-  alignas(64) float squares[kSide];
-  const auto within = [&](auto d, const auto& boxes, std::size_t i) HWY_ATTR {
-    const auto distances = boxes.distanceFrom(point);
-    hn::Store(distances, d, squares + i);
-    return hn::Le(distances, hn::Set(d, bound));
-  };
   stack.entries.assign(1, {0, 0});
   while (!stack.entries.empty()) {
     const Entry entry = stack.entries.back();
@@ -80,20 +49,19 @@ HWY_ATTR void tryNearestKernel(const Octree& octree, const BoxMap& map, const Fl
     const auto [begin, end] = octree.ownRange(entry.node);
     for (std::uint32_t i = begin; i < end; i += kSide) {
       const std::size_t size = std::min<std::size_t>(kSide, end - i);
-      std::uint32_t bits = takeBoxes(LeafTag(), octree.boxes(), i, size, map, within);
+      std::uint32_t bits = takeBoxes(LeafTag(), octree.boxes(), i, size, map, take);
       for (; bits; bits &= bits - 1) {
         const auto lane = static_cast<std::uint32_t>(std::countr_zero(bits));
-        if (squares[lane] <= bound) bound = boundOf(tryPrimitive(context, i + lane));
+        if (squares[lane] <= bound) primitive(i + lane);
       }
     }
-    const OctreeBlock& block = blocks[entry.node >> 3];
-    if (block.isLeaf(entry.node & 7)) continue;
-    const std::uint32_t child = block.child[entry.node & 7];
+    const OctreeNode child = octree.firstChild(entry.node);
+    if (child == 0) continue;
     const std::size_t first = stack.entries.size();
-    std::uint32_t bits = takeBoxes(NodeTag(), blocks[child], 0, 8, map, within);
+    std::uint32_t bits = takeBoxes(NodeTag(), octree.blocks()[child >> 3], 0, 8, map, take);
     for (; bits; bits &= bits - 1) {
       const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
-      const Entry next{squares[slot], child * 8 + slot};
+      const Entry next{squares[slot], child + slot};
       // Nearest last, to be taken first.
       std::size_t place = stack.entries.size();
       stack.entries.push_back(next);
@@ -103,6 +71,31 @@ HWY_ATTR void tryNearestKernel(const Octree& octree, const BoxMap& map, const Fl
       stack.entries[place] = next;
     }
   }
+}
+
+HWY_ATTR void findOverlappingKernel(const Octree& octree, const BoxMap& map, const FloatBox& box,
+                                    PointQueryStack& stack) {
+  const auto overlapping = [&](auto, const auto& boxes, std::size_t)
+                               HWY_ATTR { return boxes.overlapping(box); };
+  stack.found.clear();
+  if (!takeBoxes(BoxTag(), octree.blocks()[0], 0, 1, map, overlapping)) return;
+  constexpr float kNoSquares[kSide] = {};
+  descend(octree, map, stack, kNoSquares, 0.0f, overlapping,
+          [&](std::uint32_t place) { stack.found.push_back(place); });
+}
+
+HWY_ATTR void tryNearestKernel(const Octree& octree, const BoxMap& map, const FloatBox& point,
+                               double distanceSquared, PointQueryStack& stack, void* context,
+                               TryPrimitive tryPrimitive) {
+  float bound = boundOf(distanceSquared);
+  alignas(64) float squares[kSide];
+  const auto within = [&](auto d, const auto& boxes, std::size_t i) HWY_ATTR {
+    const auto distances = boxes.distanceFrom(point);
+    hn::Store(distances, d, squares + i);
+    return hn::Le(distances, hn::Set(d, bound));
+  };
+  descend(octree, map, stack, squares, bound, within,
+          [&](std::uint32_t place) { bound = boundOf(tryPrimitive(context, place)); });
 }
 
 }  // namespace palpate::HWY_NAMESPACE

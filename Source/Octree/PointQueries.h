@@ -25,19 +25,16 @@ struct PointQueryStack {
 template <class Overlaps, class F>
 void forEachOverlapping(const Octree& octree, Overlaps&& overlaps, PointQueryStack& stack, F&& f) {
   octree.requireBuilt();
-  const OctreeBlock* blocks = octree.blocks();
   stack.entries.clear();
-  if (overlaps(blocks[0].box(0))) stack.entries.push_back({0, 0});
+  if (overlaps(octree.box(0))) stack.entries.push_back({0, 0});
   while (!stack.entries.empty()) {
     const OctreeNode node = stack.entries.back().node;
     stack.entries.pop_back();
     const auto [begin, end] = octree.ownRange(node);
     if (begin < end) f(begin, end);
-    const OctreeBlock& block = blocks[node >> 3];
-    if (block.isLeaf(node & 7)) continue;
-    const std::uint32_t child = block.child[node & 7];
-    for (unsigned slot = 0; slot < 8; ++slot)
-      if (overlaps(blocks[child].box(slot))) stack.entries.push_back({0, child * 8 + slot});
+    const OctreeNode first = octree.firstChild(node);
+    for (unsigned slot = 0; first != 0 && slot < 8; ++slot)
+      if (overlaps(octree.box(first + slot))) stack.entries.push_back({0, first + slot});
   }
 }
 

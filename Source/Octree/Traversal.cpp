@@ -85,18 +85,11 @@ class Walk {
   }
 
   /// One node of a, in the frame that boxes are compared in.
-  FloatBox boxOfA(const OctreeBlock& block, unsigned slot) const {
-    FloatBox box = block.box(slot);
-    if (placing == Placing::None) return box;
-    if (placing == Placing::Turned && m_trees.mapA.count > 0) return m_trees.mapA(box);
-    for (int k = 0; k < 3; ++k) {
-      box.lower[k] = OutwardRounding::down(box.lower[k] + m_trees.shiftLower[k]);
-      box.upper[k] = OutwardRounding::up(box.upper[k] + m_trees.shiftUpper[k]);
-    }
-    return box;
+  HWY_ATTR HWY_INLINE FloatBox boxOfA(const OctreeBlock& block, unsigned slot) const {
+    return placedA(BoxLanes<BoxTag>::load(block, slot)).first();
   }
-  FloatBox boxOfB(const OctreeBlock& block, unsigned slot) const {
-    return placing == Placing::Turned ? m_trees.mapB(block.box(slot)) : block.box(slot);
+  HWY_ATTR HWY_INLINE FloatBox boxOfB(const OctreeBlock& block, unsigned slot) const {
+    return placedB(BoxLanes<BoxTag>::load(block, slot)).first();
   }
 
   /// Bit i: child i of b's block overlaps the box.
@@ -393,11 +386,10 @@ HWY_EXPORT(traverseKernel);
 
 static void setShift(std::array<float, 4>& lower, std::array<float, 4>& upper,
                      const std::array<double, 3>& offset, double thickness) {
-  const auto clamped = [](double v) {
-    return std::min(std::max(v, -double{0x1p125f}), double{0x1p125f});
-  };
+  constexpr double kMost = 0x1p125;  // boxes of kLargestFloat stay finite
+  const auto clamped = [&](double v) { return std::min(std::max(v, -kMost), kMost); };
   for (int k = 0; k < 3; ++k) {
-    const double error = (std::abs(offset[k]) + thickness) * 0x1p-22;
+    const double error = (std::abs(offset[k]) + thickness) * OutwardRounding::kRelative;
     lower[k] = static_cast<float>(clamped(offset[k] - thickness - error));
     upper[k] = static_cast<float>(clamped(offset[k] + thickness + error));
   }

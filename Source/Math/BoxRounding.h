@@ -1,0 +1,26 @@
+// No include guard: for files with SIMD code, after Core/Simd.h.
+#include "Math/Box.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <class V>
+HWY_INLINE V outwardMargin(V v) {
+  const hn::DFromV<V> d;
+  return hn::Abs(v) * hn::Set(d, OutwardRounding::kRelative) +
+         hn::Set(d, OutwardRounding::kAbsolute);
+}
+/// As OutwardRounding, in each lane.
+template <class V>
+HWY_INLINE V roundedDown(V v) {
+  return v - outwardMargin(v);
+}
+template <class V>
+HWY_INLINE V roundedUp(V v) {
+  return v + outwardMargin(v);
+}
+
+}  // namespace palpate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
