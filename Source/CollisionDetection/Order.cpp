@@ -23,15 +23,15 @@ Ids byElement(const ShapeContact& c) {
 }
 
 /// Returns how many are of the first `preferred` buffers. flags: if not null, which these are.
-template <class Contact, class Entries, class IdsOf>
+template <class Contact, class Buffers, class Entries, class IdsOf>
 std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferred,
-                  Buffer<Contact> ContactBuffers::*member, Entries& entries,
+                  Buffer<Contact> Buffers::*member, Entries& entries,
                   std::vector<Contact>& out, IdsOf&& idsOf, Buffer<std::uint8_t>* flags) {
   entries.clear();
   for (std::size_t i = 0; i < buffers.size(); ++i)
     for (const Contact& contact : buffers[i]->*member) {
       const Ids ids = idsOf(contact);
-      entries.push_back({ContactKey(ids[0], ids[1], i < preferred), &contact});
+      entries.push_back({ContactSortKey(ids[0], ids[1], i < preferred), &contact});
     }
   std::sort(entries.begin(), entries.end(),
             [](const auto& l, const auto& r) { return l.key < r.key; });

@@ -11,16 +11,16 @@
 namespace palpate {
 
 /// What contacts are sorted by: the ids of their elements, then preferred ones before others.
-class ContactKey {
+class ContactSortKey {
  public:
   /// `second` is below 2^63.
-  ContactKey(std::uint64_t first, std::uint64_t second, bool isPreferred)
+  ContactSortKey(std::uint64_t first, std::uint64_t second, bool isPreferred)
       : m_words{first, second << 1 | (isPreferred ? 0 : 1)} {}
   bool isPreferred() const { return (m_words[1] & 1) == 0; }
-  bool hasElementsOf(const ContactKey& other) const {
+  bool hasElementsOf(const ContactSortKey& other) const {
     return m_words[0] == other.m_words[0] && m_words[1] >> 1 == other.m_words[1] >> 1;
   }
-  bool operator<(const ContactKey& other) const { return m_words < other.m_words; }
+  bool operator<(const ContactSortKey& other) const { return m_words < other.m_words; }
 
  private:
   /// In the last bit: whether the contact is not preferred. A separate flag makes sorting slower.
@@ -31,7 +31,7 @@ class ContactKey {
 struct OrderScratch {
   template <class Contact>
   struct Entry {
-    ContactKey key;
+    ContactSortKey key;
     const Contact* contact;
   };
   Buffer<Entry<VertexTriangleContact>> vertexTriangle;

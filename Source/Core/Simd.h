@@ -2,7 +2,7 @@
 // compiled once for each instruction set by including itself. Such a file starts with
 //
 //   #undef HWY_TARGET_INCLUDE
-//   #define HWY_TARGET_INCLUDE "Room/File.cpp"
+//   #define HWY_TARGET_INCLUDE "Module/File.cpp"
 //   #include "Core/Simd.h"
 //
 // puts its kernels in namespace palpate::HWY_NAMESPACE between HWY_BEFORE_NAMESPACE() and

@@ -2,7 +2,7 @@
 
 // The tolerances of what is decided in double, with their units and where they come from. u = 2^-53
 // is the rounding unit. Boxes and filters in float have theirs where their derivations are: boxes
-// in Math/Box.h and Octree, filters in Geometry/UnfoldedStars and NarrowPhase.
+// in Math/Box.h and Octree, filters in Mesh/UnfoldedStars and NarrowPhase.
 namespace palpate {
 
 // ---- Signs of polynomials in coordinate differences (ClosestPoint.cpp) ----

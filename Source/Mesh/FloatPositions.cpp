@@ -6,7 +6,7 @@
 #include <limits>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "Shapes/FloatPositions.cpp"
+#define HWY_TARGET_INCLUDE "Mesh/FloatPositions.cpp"
 #include "Core/Simd.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -7,7 +7,7 @@
 #include <limits>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "Shapes/Motion.cpp"
+#define HWY_TARGET_INCLUDE "Mesh/Motion.cpp"
 #include "Core/Simd.h"
 
 HWY_BEFORE_NAMESPACE();

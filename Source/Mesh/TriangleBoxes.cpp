@@ -1,7 +1,7 @@
 #include "Mesh/TriangleBoxes.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "Shapes/TriangleBoxes.cpp"
+#define HWY_TARGET_INCLUDE "Mesh/TriangleBoxes.cpp"
 #include "Core/Simd.h"
 #include "Math/BoxRounding.h"
 

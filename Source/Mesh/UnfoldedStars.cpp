@@ -6,7 +6,7 @@
 #include <array>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "Shapes/UnfoldedStars.cpp"
+#define HWY_TARGET_INCLUDE "Mesh/UnfoldedStars.cpp"
 #include "Core/Simd.h"
 
 HWY_BEFORE_NAMESPACE();

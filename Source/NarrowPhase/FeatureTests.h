@@ -1,6 +1,6 @@
 #pragma once
 
-#include "Geometry/TriangleMesh.h"
+#include "Mesh/TriangleMesh.h"
 
 #include <array>
 #include <cstdint>
