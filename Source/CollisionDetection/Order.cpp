@@ -25,8 +25,8 @@ Ids byElement(const ShapeContact& c) {
 /// Returns how many are of the first `preferred` buffers. flags: if not null, which these are.
 template <class Contact, class Buffers, class Entries, class IdsOf>
 std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferred,
-                  Buffer<Contact> Buffers::*member, Entries& entries,
-                  std::vector<Contact>& out, IdsOf&& idsOf, Buffer<std::uint8_t>* flags) {
+                  Buffer<Contact> Buffers::*member, Entries& entries, std::vector<Contact>& out,
+                  IdsOf&& idsOf, Buffer<std::uint8_t>* flags) {
   entries.clear();
   for (std::size_t i = 0; i < buffers.size(); ++i)
     for (const Contact& contact : buffers[i]->*member) {
