@@ -89,9 +89,10 @@ class BoneDrilling : public LiveScene {
     OctreeBasedCD& detection = m_world.detection();
     const auto id = [&](World::BodyId body) { return m_world.bodies()[body].id; };
     detection.setPositions(id(m_particles), particles);
-    for (const World::BodyId organ : {m_rigid[1], m_rigid[2]})
-      if (!detection.findInsideVertices(id(m_particles), id(organ)).empty())
-        return "particles are inside an organ.";
+    for (const World::BodyId organ : {m_rigid[1], m_rigid[2]}) {
+      detection.queries().findInsideVertices(id(m_particles), id(organ), m_inside);
+      if (!m_inside.empty()) return "particles are inside an organ.";
+    }
     for (const Vector3d& p : m_world.bodies()[m_rigid[0]].rest)
       if ((p - m_burrAt).norm() < (1 - 1e-9) * kBurr) return "the burr is in the bone.";
     return "";
@@ -173,6 +174,7 @@ class BoneDrilling : public LiveScene {
   World m_world;
   std::minstd_rand m_random;
   std::vector<World::BodyId> m_rigid;  // the bone, then organs
+  std::vector<InsideVertex> m_inside;
   World::BodyId m_burr = 0, m_particles = 0;
   Vector3d m_burrAt;
   int m_touching = 0, m_fallen = 0, m_rebuilt = 0;

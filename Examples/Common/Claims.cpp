@@ -90,7 +90,7 @@ std::vector<std::uint32_t> Incidence::holding(std::uint32_t p, std::uint32_t q) 
 }
 
 void Incidence::addTriangles(const FeaturePair& pair, const Incidence& a, const Incidence& b,
-                             std::vector<TrianglePair>& out) {
+                             std::vector<ElementPair>& out) {
   using Kind = FeaturePair::Kind;
   const auto& [i, j, k, l] = pair.ids;
   std::vector<std::uint32_t> ofA{i}, ofB{j};
@@ -104,7 +104,7 @@ void Incidence::addTriangles(const FeaturePair& pair, const Incidence& a, const 
     for (const std::uint32_t t : ofB) out.push_back({s, t});
 }
 
-void sortUnique(std::vector<TrianglePair>& pairs) {
+void sortUnique(std::vector<ElementPair>& pairs) {
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
 }

@@ -37,10 +37,10 @@ struct Claim {
 /// What a method says of a step, in any order.
 struct Claims {
   std::vector<Claim> claims;
-  std::vector<TrianglePair> triangles;  ///< said to touch, besides those that hold the features
-  bool ofTriangles = false;             ///< all of its features are examples
-  bool distinct = false;                ///< impacts of the same closest features are said once
-  std::optional<bool> trusted;          ///< its own word on this answer, if it has one
+  std::vector<ElementPair> triangles;  ///< said to touch, besides those that hold the features
+  bool ofTriangles = false;            ///< all of its features are examples
+  bool distinct = false;               ///< impacts of the same closest features are said once
+  std::optional<bool> trusted;         ///< its own word on this answer, if it has one
 };
 
 /// Which triangles hold a vertex, or an edge.
@@ -52,7 +52,7 @@ class Incidence {
   const Triangle& corners(std::uint32_t triangle) const { return m_triangles[triangle]; }
   /// Every pair of triangles that touch where these features touch.
   static void addTriangles(const FeaturePair&, const Incidence& a, const Incidence& b,
-                           std::vector<TrianglePair>& out);
+                           std::vector<ElementPair>& out);
 
  private:
   std::vector<std::vector<std::uint32_t>> m_byVertex;
@@ -73,7 +73,7 @@ class Substitutes {
   std::map<std::array<Held, 2>, const Claim*> m_byHeld;
 };
 
-void sortUnique(std::vector<TrianglePair>&);
+void sortUnique(std::vector<ElementPair>&);
 
 /// Contacts as claims, and whether they are trusted, besides those added before. from, to: the part
 /// of the step that was detected.

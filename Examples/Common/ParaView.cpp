@@ -139,10 +139,10 @@ VtpText contactsVtp(World& world) {
 
 VtpText octreeVtp(const LooseOctree& octree) {
   VtpText file;
-  std::vector<double> depths, primitives, geometries;
+  std::vector<double> depths, elements, geometries;
   for (const auto id : octree.nodes()) {
     const LooseOctree::Node node = octree.node(id);
-    if (node.primitives.empty()) continue;
+    if (node.elements.empty()) continue;
     const auto first = static_cast<std::uint32_t>(file.points.size());
     using Box = Eigen::AlignedBox3d;
     for (int corner = 0; corner < 8; ++corner)  // bit 0: x, 1: y, 2: z
@@ -152,11 +152,11 @@ VtpText octreeVtp(const LooseOctree& octree) {
         if (!(corner & bit)) file.lines.push_back({first + corner, first + (corner | bit)});
     }
     depths.resize(file.lines.size(), node.depth);
-    primitives.resize(file.lines.size(), static_cast<double>(node.primitives.size()));
+    elements.resize(file.lines.size(), static_cast<double>(node.elements.size()));
     geometries.resize(file.lines.size(), static_cast<double>(node.geometry));
   }
   file.addCellField("depth", depths);
-  file.addCellField("primitives", primitives);
+  file.addCellField("elements", elements);
   file.addCellField("geometry", geometries);
   return file;
 }

@@ -32,7 +32,7 @@ VtpText bodiesVtp(World&);
 /// (0: vertex-triangle, 1: triangle-vertex, 2: edge-edge, 3: shape, 4:
 /// two shapes).
 VtpText contactsVtp(World&);
-/// Edges of the cells that hold primitives; fields "depth", "primitives", "geometry".
+/// Edges of the cells that hold elements; fields "depth", "elements", "geometry".
 VtpText octreeVtp(const LooseOctree&);
 
 /// Frames of a run as FOLDER/{bodies,contacts,octree}_N.vtp, and FOLDER/NAME.pvd over them: all of

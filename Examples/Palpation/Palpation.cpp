@@ -98,7 +98,9 @@ class Palpation : public LiveScene {
     } else {
       for (const World::BodyId body : {m_organ, m_tool})
         m_world.detection().setPositions(id(body), m_world.positions(body));
-      inside = m_world.detection().findInsideVertices(id(m_organ), id(m_tool)).size();
+      std::vector<InsideVertex> found;
+      m_world.detection().queries().findInsideVertices(id(m_organ), id(m_tool), found);
+      inside = found.size();
     }
     return inside == 0 ? ""
                        : std::to_string(inside) + " vertices of the organ are inside the tool.";

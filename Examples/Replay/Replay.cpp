@@ -37,7 +37,7 @@ std::array<std::uint32_t, 4> idsOf(const VertexTriangleContact& c) {
 std::array<std::uint32_t, 4> idsOf(const EdgeEdgeContact& c) {
   return {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]};
 }
-std::array<std::uint32_t, 4> idsOf(const TrianglePair& pair) { return {pair.a, pair.b}; }
+std::array<std::uint32_t, 4> idsOf(const ElementPair& pair) { return {pair.a, pair.b}; }
 
 std::string nameOf(const VertexTriangleContact& c) {
   return "vertex " + std::to_string(c.vertex) + ", triangle " + std::to_string(c.triangle);
@@ -46,7 +46,7 @@ std::string nameOf(const EdgeEdgeContact& c) {
   return "edge (" + std::to_string(c.edgeA[0]) + ", " + std::to_string(c.edgeA[1]) + "), edge (" +
          std::to_string(c.edgeB[0]) + ", " + std::to_string(c.edgeB[1]) + ")";
 }
-std::string nameOf(const TrianglePair& pair) {
+std::string nameOf(const ElementPair& pair) {
   return "triangle " + std::to_string(pair.a) + ", triangle " + std::to_string(pair.b);
 }
 
@@ -58,7 +58,7 @@ auto valuesOf(const EdgeEdgeContact& c) {
   return std::tuple(c.weightA, c.weightB, c.normal[0], c.normal[1], c.normal[2], c.distance,
                     c.timeOfImpact);
 }
-auto valuesOf(const TrianglePair&) { return 0; }
+auto valuesOf(const ElementPair&) { return 0; }
 
 template <class Contact>
 void printDifferences(const char* list, std::span<const Contact> found,

@@ -91,8 +91,9 @@ class RobotArms : public LiveScene {
     m_check.advance();
     for (const auto& [a, b, gap] : m_world.pairs()) {
       const CollisionData& data = m_check.collisionData(m_meshes[a], m_meshes[b]);
-      const bool inA = !m_check.findInsideVertices(m_firsts[b], m_meshes[a]).empty(),
-                 inB = !m_check.findInsideVertices(m_firsts[a], m_meshes[b]).empty();
+      m_check.queries().findInsideVertices(m_firsts[b], m_meshes[a], m_inA);
+      m_check.queries().findInsideVertices(m_firsts[a], m_meshes[b], m_inB);
+      const bool inA = !m_inA.empty(), inB = !m_inB.empty();
       if (!data.intersectingTriangles().empty() || inA || inB != (b == kCavity))
         return bodies[a].name + " and " + bodies[b].name + " overlap.";
     }
@@ -179,6 +180,7 @@ class RobotArms : public LiveScene {
 
   World m_world;
   OctreeBasedCD m_check;
+  std::vector<InsideVertex> m_inA, m_inB;
   std::vector<GeometryId> m_meshes, m_firsts;  // of m_check, by body: tessellation, its vertex 0
   std::vector<InstrumentArm> m_arms;
   std::vector<Row> m_rows;

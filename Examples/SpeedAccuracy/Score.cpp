@@ -12,22 +12,22 @@ double degreesBetween(const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
   return 2 * std::atan2((u - v).norm(), (u + v).norm()) * 180 / std::numbers::pi;
 }
 
-std::size_t countOutside(const std::vector<TrianglePair>& pairs,
-                         const std::vector<TrianglePair>& set) {
+std::size_t countOutside(const std::vector<ElementPair>& pairs,
+                         const std::vector<ElementPair>& set) {
   return static_cast<std::size_t>(std::count_if(pairs.begin(), pairs.end(), [&](const auto& pair) {
     return !std::binary_search(set.begin(), set.end(), pair);
   }));
 }
 
 /// The features that touch, by the triangles that touch with them.
-std::multimap<TrianglePair, const Impact*> byTriangles(const Truth& truth, const Incidence& a,
-                                                       const Incidence& b) {
-  std::multimap<TrianglePair, const Impact*> all;
+std::multimap<ElementPair, const Impact*> byTriangles(const Truth& truth, const Incidence& a,
+                                                      const Incidence& b) {
+  std::multimap<ElementPair, const Impact*> all;
   for (const auto& [features, impact] : truth.impacts) {
     if (!impact) continue;
-    std::vector<TrianglePair> triangles;
+    std::vector<ElementPair> triangles;
     Incidence::addTriangles(features, a, b, triangles);
-    for (const TrianglePair& pair : triangles) all.emplace(pair, &*impact);
+    for (const ElementPair& pair : triangles) all.emplace(pair, &*impact);
   }
   return all;
 }
@@ -61,7 +61,7 @@ void Score::add(const Truth& truth, const Claims& said, const Incidence& a, cons
   }
   claims += first.size();
   const Substitutes substitutes(said);
-  std::vector<TrianglePair> touching = said.triangles;
+  std::vector<ElementPair> touching = said.triangles;
   bool wrong = said.ofTriangles && said.triangles.empty() && !truth.touching.empty();
   for (const auto& [features, impact] : truth.impacts) {
     const Claim* claim = claimOf(features, impact, first, substitutes, a, b);
@@ -84,7 +84,7 @@ void Score::add(const Truth& truth, const Claims& said, const Incidence& a, cons
   m_oldMissed += countOutside(truth.touchingAtStart, touching);
   m_invented += countOutside(touching, truth.touching);
 
-  std::multimap<TrianglePair, const Impact*> impacts;  // for claims about triangles
+  std::multimap<ElementPair, const Impact*> impacts;  // for claims about triangles
   if (!first.empty() && first.begin()->first.kind == FeaturePair::Kind::Triangles)
     impacts = byTriangles(truth, a, b);
   for (const auto& [features, claim] : first) {

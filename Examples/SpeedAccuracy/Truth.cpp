@@ -41,7 +41,7 @@ class Motion {
   std::optional<double> firstTouch() const {
     const auto& [a, b, c, d] = m_before;
     const auto& [p, q, r, s] = m_now;
-    const TimeOfImpactSettings finest{.minimumDistance = 0, .tolerance = 0x1p-50};
+    const TimeOfImpactSettings finest{.minimumDistance = 0, .timeTolerance = 0x1p-50};
     return m_edges ? edgeEdgeTimeOfImpact(a, b, c, d, p, q, r, s, finest)
                    : vertexTriangleTimeOfImpact(a, b, c, d, p, q, r, s, finest);
   }
@@ -184,7 +184,7 @@ Truth truthOf(const Step& step, int substeps) {
   Detection intersection(step, Engine::Octree, Method::Intersection);
   for (int i = 1; i <= substeps; ++i) {
     intersection.moveTo(step, static_cast<double>(i) / substeps);
-    for (const TrianglePair& pair : intersection.detect().intersectingTriangles())
+    for (const ElementPair& pair : intersection.detect().intersectingTriangles())
       truth.contradictions +=
           !std::binary_search(truth.touching.begin(), truth.touching.end(), pair);
   }

@@ -29,8 +29,8 @@ struct Impact {
 
 /// What really happens in a step.
 struct Truth {
-  std::vector<TrianglePair> touching;  ///< at any time of the step; sorted
-  std::vector<TrianglePair> touchingAtStart;
+  std::vector<ElementPair> touching;  ///< at any time of the step; sorted
+  std::vector<ElementPair> touchingAtStart;
   /// Pairs of features that touch within the step; none where they touch from its start, are
   /// parallel, or graze, so that there is no side to speak of.
   std::map<FeaturePair, std::optional<Impact>> impacts;

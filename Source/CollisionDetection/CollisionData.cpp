@@ -55,7 +55,7 @@ std::uint64_t CollisionData::hash() const {
     hash.add(c.edgeA, c.edgeB, c.weightA, c.weightB, c.distance, c.timeOfImpact, c.normal,
              static_cast<std::uint64_t>(c.featureA) << 8 | static_cast<std::uint64_t>(c.featureB));
   hash.add(m_contents.intersectingTriangles.size());
-  for (const TrianglePair& p : m_contents.intersectingTriangles)
+  for (const ElementPair& p : m_contents.intersectingTriangles)
     hash.add(std::uint64_t{p.a} << 32 | p.b);
   for (const ShapeContact& c : m_contents.shape)
     hash.add(static_cast<std::uint64_t>(c.element) << 32 | c.id, c.vertices, c.weights, c.point,

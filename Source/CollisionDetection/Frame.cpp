@@ -1,14 +1,15 @@
 #include "CollisionDetection/Frame.h"
 
-#include "CollisionDetection/BruteForce.h"
-#include "CollisionDetection/ShapeQuery.h"
-#include "CollisionDetection/Stopwatch.h"
+#include "CollisionDetection/DiagnosticsInterface.h"
+#include "Core/Stopwatch.h"
 #include "Core/Spin.h"
 #include "NarrowPhase/Continuous.h"
+#include "NarrowPhase/ElementBoxes.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/Intersection.h"
-#include "Shapes/ShapeContacts.h"
 #include "NarrowPhase/StepCheck.h"
+#include "Queries/ElementsNearShape.h"
+#include "Shapes/ShapeContacts.h"
 
 #include <algorithm>
 #include <atomic>
@@ -99,7 +100,7 @@ void countContacts(const PairPlan& plan, std::size_t ofIntersection,
   contents.validity.atEnd = sizeOf(contents) - contents.validity.atImpact;
 }
 
-/// Contacts::Earliest: of all of a pair's contacts the time.
+/// PairSettings::earliestTimeOnly: of all of a pair's contacts the time.
 void takeEarliest(PairRecord& record, ContactBuffers& contacts) {
   forEachTimed(contacts, [&](auto& list) {
     for (const auto& contact : list)
@@ -117,7 +118,7 @@ bool sharesVertex(const Triangle& s, const Triangle& t) {
 
 /// Part of one pair's traversal, with what it found.
 struct Frame::Job {
-  using Use = void (*)(Job&, std::span<const TrianglePair>);
+  using Use = void (*)(Job&, std::span<const ElementPair>);
 
   PairRecord* record;
   TreePair trees;
@@ -126,19 +127,19 @@ struct Frame::Job {
   double thickness;  ///< L: of boxes
   TraversalStack stack;
   PointQueryStack queries;
-  Buffer<std::uint32_t> primitives;
+  Buffer<std::uint32_t> elements;
   PairSink sink;
   Use use;
   Guarded* guarded;               ///< of forEach()
   std::atomic<double>* earliest;  ///< of all jobs of the pair, where only that is asked for
-  TrianglePair* place;            ///< of collect(): where what was found goes
+  ElementPair* place;             ///< of collect(): where what was found goes
   bool keepCandidates;
   bool nearby;  ///< boxes overlap at the thickness of the traversal, if not at their own
   ContactBuffers contacts;
   ContactBuffers overlaps;  ///< Auto: Intersection's, where the step starts intersecting
   bool overlapsMissed;      ///< of batches before any was seen to start so
-  Buffer<TrianglePair> candidates;
-  Buffer<TrianglePair> kept;  ///< of the batch at hand, by the filters so far
+  Buffer<ElementPair> candidates;
+  Buffer<ElementPair> kept;  ///< of the batch at hand, by the filters so far
   double milliseconds = 0, narrowMilliseconds = 0;
 
   /// Batches go to `use`; without, they stay in the sink.
@@ -153,7 +154,7 @@ struct Frame::Job {
   bool widerBoxes() const { return record->widerBoxes() || record->plan.nearby > 0.0; }
 
   /// A batch of the traversal, of which `use` takes the candidates.
-  static void receive(void* context, std::span<const TrianglePair> pairs) {
+  static void receive(void* context, std::span<const ElementPair> pairs) {
     Job& job = *static_cast<Job*>(context);
     if (!job.widerBoxes() && !job.isFiltered()) {
       job.nearby = true;
@@ -174,7 +175,7 @@ struct Frame::Job {
   void keepEnabled() {
     if (!record->anyDisabled()) return;
     const MeshTopology &a = record->a->mesh.topology, &b = record->b->mesh.topology;
-    std::erase_if(kept, [&](const TrianglePair& p) { return !a.isOn(p.a) || !b.isOn(p.b); });
+    std::erase_if(kept, [&](const ElementPair& p) { return !a.isOn(p.a) || !b.isOn(p.b); });
   }
   /// Keeps pairs whose boxes, as the pair's method has them, overlap at their own thickness.
   void keepWithinThickness() {
@@ -189,18 +190,18 @@ struct Frame::Job {
     keepOverlapping(record->meshes(), record->plan.swept(), distance, kept);
   }
 
-  static void keep(Job& job, std::span<const TrianglePair> pairs) {
+  static void keep(Job& job, std::span<const ElementPair> pairs) {
     job.candidates.insert(job.candidates.end(), pairs.begin(), pairs.end());
   }
 
-  static void handOver(Job& job, std::span<const TrianglePair> pairs) {
+  static void handOver(Job& job, std::span<const ElementPair> pairs) {
     std::unique_lock lock(job.guarded->mutex, std::try_to_lock);
     for (Spin spin; !lock && !spin.isOver() && !lock.try_lock();) spin.wait();
     if (!lock) lock.lock();
     job.guarded->function(job.guarded->context, job.record->pair, pairs);
   }
 
-  static void detect(Job& job, std::span<const TrianglePair> pairs) {
+  static void detect(Job& job, std::span<const ElementPair> pairs) {
     Stopwatch watch;
     const MeshPair meshes = job.record->meshes(job.trees.turned() ? nullptr : &job.floats);
     bool& intersecting = job.contacts.facts.startsIntersecting;
@@ -210,14 +211,14 @@ struct Frame::Job {
       findOverlaps(job, pairs);
     else
       job.overlapsMissed = true;
-    if (meshes.settings.contacts == Contacts::Earliest)
+    if (meshes.settings.earliestTimeOnly)
       job.findEarliest(meshes, pairs);
     else
       findContacts(meshes, pairs, job.contacts);
     job.narrowMilliseconds += watch.lap();
     if (!job.keepCandidates) return;
     const std::vector<Triangle>& triangles = meshes.a.topology.triangles;
-    for (const TrianglePair pair : pairs)
+    for (const ElementPair pair : pairs)
       if (!meshes.self() || !sharesVertex(triangles[pair.a], triangles[pair.b]))
         job.candidates.push_back(pair);
   }
@@ -227,24 +228,24 @@ struct Frame::Job {
     const MeshPair meshes = record->meshes();
     if (meshes.isOfShapes()) {
       findShapePair(*meshes.shapeOfA, *meshes.shapeOfB, meshes.settings, contacts);
-      if (meshes.settings.contacts == Contacts::Earliest) takeEarliest(*record, contacts);
+      if (meshes.settings.earliestTimeOnly) takeEarliest(*record, contacts);
       return;
     }
     const auto& [analytical, now, before] = meshes.shape();
-    findPrimitivesNear(record->mesh(), record->plan.swept() ? before : now, now, meshes.reach(),
-                       queries, primitives);
+    findElementsNear(record->mesh(), record->plan.swept() ? before : now, now, meshes.reach(),
+                     queries, elements);
     Stopwatch watch;
-    findShapeContacts(meshes.mesh(), meshes.shape(), meshes.settings, primitives, contacts);
-    if (meshes.settings.contacts == Contacts::Earliest) takeEarliest(*record, contacts);
+    findShapeContacts(meshes.mesh(), meshes.shape(), meshes.settings, elements, contacts);
+    if (meshes.settings.earliestTimeOnly) takeEarliest(*record, contacts);
     narrowMilliseconds += watch.lap();
   }
 
   /// Auto: what intersects at the step's end.
-  static void findOverlaps(Job& job, std::span<const TrianglePair> pairs) {
+  static void findOverlaps(Job& job, std::span<const ElementPair> pairs) {
     findIntersections(job.record->meshes(), pairs, job.overlaps);
   }
 
-  void findEarliest(const MeshPair& meshes, std::span<const TrianglePair> pairs) {
+  void findEarliest(const MeshPair& meshes, std::span<const ElementPair> pairs) {
     const double found = findEarliestImpact(meshes, pairs, earliest->load(), contacts);
     double known = earliest->load();
     while (found < known && !earliest->compare_exchange_weak(known, found)) {
@@ -322,7 +323,7 @@ void Frame::collect(std::span<PairRecord* const> records, const Threads& threads
     run(*m_jobs[i]);
   });
   const auto found = [&](std::size_t i) {
-    return m_jobs[i]->use ? std::span<const TrianglePair>(m_jobs[i]->candidates)
+    return m_jobs[i]->use ? std::span<const ElementPair>(m_jobs[i]->candidates)
                           : m_jobs[i]->sink.kept();
   };
   std::size_t i = 0;
@@ -334,7 +335,7 @@ void Frame::collect(std::span<PairRecord* const> records, const Threads& threads
       m_jobs[first]->sink.takeKept(record->candidates);
     } else {
       record->candidates.resize(size);
-      TrianglePair* place = record->candidates.data();
+      ElementPair* place = record->candidates.data();
       for (std::size_t k = first; k < i; ++k) {
         m_jobs[k]->place = place;
         place += found(k).size();
@@ -458,8 +459,8 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   ofIntersection = orderContacts(m_buffers, ofIntersection, m_orderScratch, contents);
   contents.earliestTimeOfImpact = record.earliest.load();
   if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
-  record.trust.finish(record.pair.settings, *record.a, *record.b, record.plan, m_facts, nearby,
-                      record.meshes(), contents, m_impacts);
+  record.trust.finish(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan,
+                      m_facts, nearby, record.meshes(), contents, m_impacts);
   statistics.exactDecisions += m_impacts.exactDecisions;
   statistics.validityPairs += m_impacts.validityPairs;
   // Not before trust has looked at every triangle that an impact names.
@@ -473,31 +474,14 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   if (settings.keepCandidates) record.candidatesOf.commit(record.state());
 }
 
-void Frame::findStartByBruteForce(const PairRecord& record, ContactBuffers& contacts,
-                                  ContactBuffers& overlaps) {
-  MeshPair meshes = record.meshes();
-  const auto countA = static_cast<std::uint32_t>(meshes.a.topology.triangles.size()),
-             countB = static_cast<std::uint32_t>(meshes.b.topology.triangles.size());
-  for (std::uint32_t a = 0; a < countA && meshes.step.start; ++a)
-    for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b)
-      contacts.facts.startsIntersecting |= meshes.a.topology.isOn(a) && meshes.b.topology.isOn(b) &&
-                                           intersect(meshes, true, {a, b}, overlaps);
-  if (!record.plan.overlaps ||
-      !(contacts.facts.startsIntersecting || record.plan.startsIntersecting))
-    return;
-  meshes.settings.method = Method::Intersection;
-  findContactsByBruteForce(meshes, overlaps);
-}
-
 void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Settings& settings,
                                FrameStatistics& statistics) {
   for (PairRecord* record : records) {
     Stopwatch watch;
     ContactBuffers contacts, overlaps;
-    findContactsByBruteForce(record->meshes(), contacts);
-    findStartByBruteForce(*record, contacts, overlaps);
+    detectPairByBruteForce(*record, contacts, overlaps);
     record->earliest = std::numeric_limits<double>::infinity();
-    if (record->pair.settings.contacts == Contacts::Earliest) takeEarliest(*record, contacts);
+    if (record->pair.settings.earliestTimeOnly) takeEarliest(*record, contacts);
     if (settings.keepCandidates) findCandidatesByBruteForce(record->meshes(), record->candidates);
     statistics.featurePairs += contacts.featurePairs;
     statistics.exactDecisions += contacts.exactDecisions + overlaps.exactDecisions;

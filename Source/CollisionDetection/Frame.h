@@ -25,8 +25,7 @@ class Frame {
 
   /// Candidates of each pair, unsorted, into its record.
   void collect(std::span<PairRecord* const>, const Threads&, FrameStatistics&);
-  using BatchFunction = void (*)(void* context, const CollisionPair&,
-                                 std::span<const TrianglePair>);
+  using BatchFunction = void (*)(void* context, const CollisionPair&, std::span<const ElementPair>);
   /// Candidates of each pair to a function, batch by batch, never two at once.
   void forEach(std::span<PairRecord* const>, const Threads&, BatchFunction, void* context);
   /// Contacts of each pair, sorted, into PairRecord::next; its candidates too if they are to be
@@ -41,8 +40,6 @@ class Frame {
   void run(Job&) const;
   void finish(PairRecord&, bool nearby, bool candidatesSorted, const Settings&, FrameStatistics&);
   void findMissedOverlaps(const Threads&);
-  static void findStartByBruteForce(const PairRecord&, ContactBuffers& contacts,
-                                    ContactBuffers& overlaps);
   Job& newJob(PairRecord&);
 
   std::vector<std::unique_ptr<Job>>

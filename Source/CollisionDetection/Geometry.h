@@ -3,21 +3,16 @@
 #include <palpate/Settings.h>
 #include <palpate/Types.h>
 
-#include "CollisionDetection/GeometryOctree.h"
 #include "CollisionDetection/GeometryStep.h"
 #include "CollisionDetection/RigidBody.h"
-#include "CollisionDetection/TetrahedronTree.h"
 #include "Mesh/Motion.h"
 #include "Mesh/Revision.h"
-#include "Mesh/TetrahedralTopology.h"
-#include "Mesh/TriangleMesh.h"
 #include "Octree/PointQueries.h"
-#include "Shapes/PlacedShape.h"
+#include "Queries/SearchableGeometry.h"
+#include "Validity/MethodChoice.h"
 
 #include <array>
 #include <cstdint>
-#include <memory>
-#include <optional>
 #include <utility>
 
 namespace palpate {
@@ -49,42 +44,18 @@ class GeometryMotion {
   RigidSearch m_search;
 };
 
-/// What users change of a geometry besides its positions, by state.
-struct GeometryRevisions {
-  RevisionCounter counter;
-  Revision topology;  ///< elements, and the shape at rest
-  Revision enabled;   ///< which elements are enabled
-  Revision filter;
-};
-
-/// The tetrahedra whose surface a geometry is, and an octree over them, built when it is first
-/// asked for.
-struct Solid {
-  TetrahedralTopology topology;
-  TetrahedronTree tree;
-  /// Of the geometry's topology and positions now; and its float frame then.
-  DerivedFrom<2> treeOf;
-  FloatFrame treeFrame;
-};
-
 /// One geometry of an OctreeBasedCD. Each part has one owner, which keeps it consistent; the parts
 /// below use those above.
-struct Geometry {
-  explicit Geometry(GeometryId newId) : id(newId), step(newId) {}
+struct Geometry : SearchableGeometry {
+  explicit Geometry(GeometryId newId) : SearchableGeometry(newId), step(newId) {}
 
-  GeometryId id;
-  GeometryRevisions revisions;
   CollisionFilter filter;
-  TriangleMesh mesh;                 ///< topology and positions; of a shape, its corners
-  std::optional<PlacedShape> shape;  ///< of an analytical geometry
-  GeometryStep step;                 ///< writes the positions of both ends
-  double smallestHeight = 0;         ///< L: of a triangle with area, when the topology was set
+  GeometryStep step;          ///< writes the positions of both ends
+  double smallestHeight = 0;  ///< L: of a triangle with area, when the topology was set
   GeometryMotion motion;
-  GeometryOctree tree;
-  std::unique_ptr<Solid> solid;  ///< of a tetrahedral mesh
 
-  /// Whether setTransform() has placed it: its octree is in the body's frame.
-  bool isPlaced() const { return mesh.now.isPlaced(); }
+  /// For the choice of a method: extent 0 before the first update of the octree.
+  GeometryInStep inStep() const;
   bool meets(const Geometry& other) const {
     return (filter.groups & other.filter.mask) && (other.filter.groups & filter.mask);
   }

@@ -164,13 +164,4 @@ void checkPlaceable(GeometryId id, std::span<const Eigen::Vector3d> body, ErrorC
                   id, v);
 }
 
-void checkTopologyKind(const Geometry& geometry, bool tetrahedra, const char* call) {
-  if (geometry.mesh.topology.hasFaces() && (geometry.solid != nullptr) == tetrahedra) return;
-  throw Error(ErrorCode::UnsupportedMethod,
-              nameOf(geometry.id) + " is " +
-                  (geometry.solid ? "a tetrahedral mesh" : nameOf(geometry.mesh.topology.kind)) +
-                  "; " + call,
-              geometry.id);
-}
-
 }  // namespace palpate

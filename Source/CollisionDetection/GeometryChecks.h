@@ -27,7 +27,5 @@ void checkOnePerVertex(GeometryId, std::span<const Eigen::Vector3d>, std::span<c
 void checkPositionCount(const Geometry&, std::size_t count);
 /// Of positions in a body's frame.
 void checkPlaceable(GeometryId, std::span<const Eigen::Vector3d> body, ErrorCode);
-/// Throws unless the geometry is of triangles (of tetrahedra), which `call` changes.
-void checkTopologyKind(const Geometry&, bool tetrahedra, const char* call);
 
 }  // namespace palpate

@@ -1,5 +1,7 @@
 #include "CollisionDetection/Geometry.h"
 
+#include <algorithm>
+
 namespace palpate {
 
 namespace {
@@ -8,7 +10,30 @@ std::array<Revision, 4> ends(const Positions& from, const Positions& to) {
   return {from.bodyRevision(), from.transformRevision(), to.bodyRevision(), to.transformRevision()};
 }
 
+/// L: along the longest axis; of a body that may be turned, along any.
+double extentOf(const Geometry& geometry) {
+  if (geometry.tree.octree().size() == 0) return 0.0;
+  const FloatBox box = geometry.tree.octree().blocks()[0].box(0);
+  double longest = 0.0;
+  for (int k = 0; k < 3; ++k)
+    longest = std::max(longest, double{box.upper[k]} - double{box.lower[k]});
+  return (geometry.isPlaced() ? 2.0 : 1.0) * longest / geometry.tree.frame().scale;
+}
+
 }  // namespace
+
+GeometryInStep Geometry::inStep() const {
+  return {mesh,
+          shape.has_value(),
+          smallestHeight,
+          motion.range(),
+          motion.correction(),
+          motion.arcDeviation(),
+          tree.isValid() ? extentOf(*this) : 0.0,
+          revisions.topology,
+          revisions.enabled,
+          step.detected()};
+}
 
 void GeometryMotion::take(const TriangleMesh& mesh, const MotionRange& motion) {
   m_range = motion;

@@ -32,15 +32,6 @@ double smallestHeight(const TriangleMesh& mesh) {
 
 }  // namespace
 
-std::string nameOf(GeometryId id) {
-  return "geometry " + std::to_string(static_cast<std::uint32_t>(id));
-}
-
-std::string nameOf(GeometryKind kind) {
-  constexpr const char* kNames[] = {"a triangle mesh", "a line mesh", "a point set", "a shape"};
-  return kNames[static_cast<std::size_t>(kind)];
-}
-
 GeometryId GeometryTable::nextId() const {
   if (m_nextId == 0xffffffffu)
     throw Error(ErrorCode::TooLarge, "no geometry ids are left: 2^32 - 1 were given out");
@@ -67,6 +58,7 @@ GeometryId GeometryTable::add(std::unique_ptr<Geometry> geometry) {
     m_changed.reserve(2 * m_geometries.size() + 1);
   m_geometries.push_back(std::move(geometry));
   ++m_nextId;
+  ++m_state;
   return m_geometries.back()->id;
 }
 
@@ -134,10 +126,12 @@ void GeometryTable::setTransform(GeometryId id, const std::optional<RigidTransfo
   Geometry& geometry = at(id);
   // The positions in the body's frame, and the octree, stay as they are.
   geometry.step.setTransform(geometry.mesh, shapeOf(geometry), before, now);
+  ++m_state;
 }
 
 void GeometryTable::advance() noexcept {
   ++m_stepNumber;
+  ++m_state;
   for (const auto& geometry : m_geometries) {
     geometry->step.advance(geometry->mesh, shapeOf(*geometry));
     geometry->motion.advance();
@@ -160,6 +154,7 @@ Geometry& GeometryTable::at(GeometryId id) const {
 void GeometryTable::remove(GeometryId id) {
   const Geometry* geometry = &at(id);
   std::erase_if(m_geometries, [=](const auto& g) { return g.get() == geometry; });
+  ++m_state;
 }
 
 void GeometryTable::setPositions(GeometryId id,
@@ -171,6 +166,7 @@ void GeometryTable::setPositions(GeometryId id,
   std::optional<MotionRange> moved;
   geometry.step.setPositions(geometry.mesh, before, now, threads,
                              geometry.motion.isWanted() ? &moved : nullptr);
+  ++m_state;
   if (moved) geometry.motion.take(geometry.mesh, *moved);
 }
 
@@ -180,6 +176,7 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
   checkTopologyKind(geometry, false, "setTriangles() is for triangle meshes");
   checkCounts(id, positions, triangles, GeometryKind::Triangles);
   setTopology(geometry, checkedRest(id, positions), {positions.size(), triangles}, {});
+  ++m_state;
 }
 
 void GeometryTable::setTetrahedra(GeometryId id, std::span<const Eigen::Vector3d> positions,
@@ -191,6 +188,7 @@ void GeometryTable::setTetrahedra(GeometryId id, std::span<const Eigen::Vector3d
   solid->topology = checkedTopology(id, rest, tetrahedra);
   MeshTopology topology(positions.size(), solid->topology.surface);
   setTopology(geometry, std::move(rest), std::move(topology), std::move(solid));
+  ++m_state;
 }
 
 void GeometryTable::setTopology(Geometry& geometry, std::vector<Eigen::Vector3d> rest,

@@ -40,6 +40,8 @@ class GeometryTable {
                     const RigidTransform& now);
   void advance() noexcept;
   std::uint64_t stepNumber() const { return m_stepNumber; }  ///< counts advance()
+  /// Names one state of all positions, transforms, elements and shapes; not 0.
+  std::uint64_t state() const { return m_state; }
 
   Geometry* find(GeometryId) const;  ///< null if there is none
   Geometry& at(GeometryId) const;    ///< throws UnknownGeometry
@@ -62,10 +64,7 @@ class GeometryTable {
   std::uint32_t m_nextId = 0;
   std::vector<Geometry*> m_changed;
   bool m_updatedAlone = false;
-  std::uint64_t m_stepNumber = 0;
+  std::uint64_t m_stepNumber = 0, m_state = 1;
 };
-
-std::string nameOf(GeometryId);    ///< "geometry 3"
-std::string nameOf(GeometryKind);  ///< "a line mesh"
 
 }  // namespace palpate

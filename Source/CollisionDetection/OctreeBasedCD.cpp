@@ -1,22 +1,18 @@
 #include <palpate/OctreeBasedCD.h>
 
-#include "CollisionDetection/Audit.h"
-#include "CollisionDetection/BruteForce.h"
-#include "CollisionDetection/Containment.h"
-#include "CollisionDetection/Embedding.h"
-#include "CollisionDetection/FollowedExits.h"
+#include "CollisionDetection/DiagnosticsInterface.h"
 #include "CollisionDetection/Frame.h"
 #include "CollisionDetection/GeometryChecks.h"
 #include "CollisionDetection/GeometryTable.h"
 #include "CollisionDetection/Order.h"
 #include "CollisionDetection/PairTable.h"
-#include "CollisionDetection/Problem.h"
 #include "CollisionDetection/SettingsCheck.h"
-#include "CollisionDetection/Stopwatch.h"
+#include "Core/Stopwatch.h"
 #include "Core/Assert.h"
 #include "Core/FloatingPoint.h"
 #include "Core/Text.h"
 #include "Octree/Forest.h"
+#include "Queries/QuerySource.h"
 
 #include <algorithm>
 #include <atomic>
@@ -40,15 +36,6 @@ Eigen::AlignedBox3d boundsOf(const Geometry& geometry) {
   return box;
 }
 
-/// Of a query for the vertices of one geometry in another.
-void checkVertices(const Geometry& vertices, GeometryId body) {
-  if (vertices.id == body)
-    throw Error(ErrorCode::InvalidSettings, nameOf(body) + ": its own vertices lie on it", body);
-  if (vertices.shape)
-    throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(vertices.id) + " is a shape: it has no vertices", vertices.id);
-}
-
 }  // namespace
 
 void checkCandidates(const PairRecord& record) {
@@ -59,29 +46,25 @@ void checkCandidates(const PairRecord& record) {
 
 struct OctreeBasedCD::Implementation {
   class Change;
+  class QuerySource;
 
-  explicit Implementation(const Settings& newSettings)
-      : settings(checked(newSettings)), threads(newSettings.threads, newSettings.executor) {
-    showOctree();
-  }
+  explicit Implementation(const Settings& newSettings);
+  ~Implementation();
 
   Settings settings;
   Threads threads, one{1};
   GeometryTable geometries;
   PairTable pairs;
   Frame frame;
-  Containment containment;
-  FollowedExits exits;
-  Embedding embedding;
   FrameStatistics statistics;  ///< of the last frame or explicit update
   FrameStatistics updates;     ///< of the updates since the last frame
   bool hasUpdates = false;
   std::optional<LooseOctree> octree;
   std::vector<PairRecord*> work;
-  std::vector<AuditFailure> auditFailures;
-  std::uint64_t detections = 0;
-  int auditFiles = 0;
-  std::mutex sorting;  ///< of candidates, when a const query first asks for them
+  AuditRecord audit;
+  std::shared_ptr<QuerySource> querySource;
+  std::uint64_t octreesOf = 0;  ///< geometries.state() that all octrees are of; 0: of none
+  std::mutex sorting;           ///< of candidates, when a const query first asks for them
   PairOrderScratch sortingScratch;
   std::atomic<bool> isBusy = false;  ///< a call that changes the object has not returned
 
@@ -104,6 +87,7 @@ struct OctreeBasedCD::Implementation {
   /// `detecting`: plans say how all pairs move; else only what candidates depend on.
   void update(bool explicitly = false, bool detecting = false) {
     using Update = LooseOctree::Update;
+    octreesOf = 0;
     state->trees.clear();  // until they are up to date
     if (!hasUpdates) updates = {};
     const bool isFirst = explicitly || !std::exchange(hasUpdates, true);
@@ -120,7 +104,7 @@ struct OctreeBasedCD::Implementation {
           (method == Method::Continuous || method == Method::Auto || !record->hasShape());
       if (moves)
         for (Geometry* geometry : {record->a, record->b}) geometry->motion.update(*geometry);
-      record->plan = planOf(record->pair.settings, *record->a, *record->b, moves);
+      record->plan = planOf(record->pair.settings, record->a->inStep(), record->b->inStep(), moves);
       record->updateNear();
       if (record->plan.swept())
         for (Geometry* geometry : {record->a, record->b}) geometry->tree.setSwept(true);
@@ -143,16 +127,11 @@ struct OctreeBasedCD::Implementation {
     updates.milliseconds.boxes += wall * share;
     updates.milliseconds.octree += wall * (1 - share);
     showOctree();
+    octreesOf = geometries.state();
 #ifdef PALPATE_VALIDATE
     PALPATE_ASSERT(octree->validate().empty());
 #endif
     if (explicitly) publish(updates);
-  }
-
-  /// Before points are asked about.
-  void updateFor(Geometry& body) {
-    update();
-    if (body.solid) updateTetrahedra(body, settings.octree, threads);
   }
 
   void showOctree() {
@@ -216,7 +195,8 @@ struct OctreeBasedCD::Implementation {
     FrameStatistics next = updates;
     const auto records = pairsToDo(&PairRecord::dataOf);
     for (PairRecord* record : records)
-      record->trust.start(record->pair.settings, *record->a, *record->b, record->plan);
+      record->trust.start(record->pair.settings, record->a->inStep(), record->b->inStep(),
+                          record->plan);
     if (settings.engine == Engine::Octree)
       frame.detect(records, settings, threads, next);
     else
@@ -232,33 +212,8 @@ struct OctreeBasedCD::Implementation {
     for (const auto& geometry : geometries.all()) geometry->step.noteDetection(geometry->mesh);
     publish(next);
     hasUpdates = false;
-    auditFrame();
+    auditFrame(settings, geometries, pairs, audit);
   }
-
-  void auditFrame() {
-    auditFailures.clear();
-    ++detections;
-    if (settings.audit.features == 0) return;
-    for (const auto& record : pairs.records()) {
-      if (!record->collides()) continue;
-      const std::size_t first = auditFailures.size();
-      audit(record->meshes(), record->pair, record->data, settings.audit, detections,
-            auditFailures);
-      const auto own = std::span(auditFailures).subspan(first);
-      if (own.empty() || settings.audit.folder.empty()) continue;
-      if (auditFiles < settings.audit.mostFiles) {
-        keepProblem(problemOf(settings, geometries, pairs), settings.audit, own);
-        auditFiles += !own.front().file.empty();
-      } else {
-        for (AuditFailure& failure : own)
-          failure.fileError =
-              "audit.mostFiles were written into \"" + settings.audit.folder.string() + "\" before";
-      }
-    }
-  }
-
-  std::span<const InsideVertex> findInside(GeometryId vertices, GeometryId body,
-                                           const InsideSettings&);
 
   std::shared_ptr<LooseOctree::State> state;
 };
@@ -294,6 +249,44 @@ class OctreeBasedCD::Implementation::Change {
   StandardFloatingPoint m_standard;
   Implementation* m_all;
 };
+
+/// The geometries of an OctreeBasedCD, for queries that may outlive it.
+class OctreeBasedCD::Implementation::QuerySource : public SpatialQueries::Source {
+ public:
+  explicit QuerySource(Implementation& all) : m_all(&all) {}
+
+  void close() { m_all = nullptr; }  ///< the OctreeBasedCD ends
+  /// Brings octrees to the positions now, where they are not.
+  void updateOctrees() {
+    const auto lock = lockOctrees();
+    if (m_all->octreesOf != m_all->geometries.state()) m_all->update();
+  }
+  std::unique_lock<std::mutex> lockOctrees() { return std::unique_lock(m_preparing); }
+
+  std::uint64_t state() const override {
+    if (!m_all) return 0;
+    if (m_all->isBusy.load(std::memory_order_relaxed)) throwBusy();
+    const std::uint64_t now = m_all->geometries.state();
+    return m_all->octreesOf == now ? now : 0;
+  }
+  SearchableGeometry& at(GeometryId id) const override { return m_all->geometries.at(id); }
+  std::uint64_t step() const override { return m_all->geometries.stepNumber(); }
+  Engine engine() const override { return m_all->settings.engine; }
+  const OctreeSettings& octreeSettings() const override { return m_all->settings.octree; }
+  const Threads& threads() const override { return m_all->threads; }
+
+ private:
+  Implementation* m_all;
+};
+
+OctreeBasedCD::Implementation::Implementation(const Settings& newSettings)
+    : settings(checked(newSettings)),
+      threads(newSettings.threads, newSettings.executor),
+      querySource(std::make_shared<QuerySource>(*this)) {
+  showOctree();
+}
+
+OctreeBasedCD::Implementation::~Implementation() { querySource->close(); }
 
 const OctreeBasedCD::Implementation& OctreeBasedCD::read() const {
   if (!m_implementation) throwMovedFrom();
@@ -356,7 +349,6 @@ void OctreeBasedCD::removeGeometry(GeometryId geometry) {
   // Nothing below throws.
   all->pairs.removeAllOf(geometry);
   all->geometries.remove(geometry);
-  all->exits.forget(geometry);
   all->showOctree();
 }
 
@@ -501,59 +493,18 @@ void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFuncti
   std::erase_if(work, [](const PairRecord* record) { return !record->collides(); });
   if (all->settings.engine == Engine::Octree)
     return all->frame.forEach(work, all->threadsFor(work), function, context);
-  Buffer<TrianglePair> candidates;
+  Buffer<ElementPair> candidates;
   for (const PairRecord* record : work) {
     findCandidatesByBruteForce(record->meshes(), candidates);
     if (!candidates.empty()) function(context, record->pair, candidates);
   }
 }
 
-std::span<const InsideVertex> OctreeBasedCD::Implementation::findInside(
-    GeometryId vertices, GeometryId body, const InsideSettings& insideSettings) {
-  const Geometry& asked = geometries.at(vertices);
-  Geometry& around = geometries.at(body);
-  checkVertices(asked, body);
-  checkInside(around, insideSettings);
-  updateFor(around);
-  return containment.find(asked, around, insideSettings, settings.engine, threads);
-}
-
-std::span<const InsideVertex> OctreeBasedCD::findInsideVertices(GeometryId vertices,
-                                                                GeometryId body,
-                                                                const InsideSettings& settings) {
-  const Implementation::Change all(m_implementation);
-  return all->findInside(vertices, body, settings);
-}
-
-std::span<const FollowedVertex> OctreeBasedCD::followInsideVertices(GeometryId vertices,
-                                                                    GeometryId body) {
-  const Implementation::Change all(m_implementation);
-  const auto inside = all->findInside(vertices, body, {});
-  return all->exits.follow(all->geometries.at(vertices), all->geometries.at(body), inside,
-                           all->geometries.stepNumber(), all->settings.engine, all->threads);
-}
-
-std::span<const EmbeddedVertex> OctreeBasedCD::findEmbeddedVertices(GeometryId vertices,
-                                                                    GeometryId body) {
-  const Implementation::Change all(m_implementation);
-  const Geometry& asked = all->geometries.at(vertices);
-  Geometry& solid = all->geometries.at(body);
-  checkVertices(asked, body);
-  checkTopologyKind(solid, true, "findEmbeddedVertices() is for tetrahedral meshes");
-  all->updateFor(solid);
-  return all->embedding.find(asked, solid, all->settings.engine, all->threads);
-}
-
-std::optional<TetrahedronPoint> OctreeBasedCD::findTetrahedron(GeometryId body,
-                                                               const Eigen::Vector3d& point) {
-  const Implementation::Change all(m_implementation);
-  Geometry& solid = all->geometries.at(body);
-  checkTopologyKind(solid, true, "findTetrahedron() is for tetrahedral meshes");
-  if (!point.allFinite())
-    throw Error(ErrorCode::NonFinitePosition,
-                nameOf(body) + ": a point to be found is " + textOf(point), body);
-  all->updateFor(solid);
-  return all->embedding.find(point, solid, all->settings.engine);
+SpatialQueries OctreeBasedCD::queries() const {
+  read();
+  const StandardFloatingPoint standard;
+  m_implementation->querySource->updateOctrees();
+  return SpatialQueries(m_implementation->querySource);
 }
 
 const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) const {
@@ -565,7 +516,7 @@ const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) co
   return record.data;
 }
 
-std::span<const TrianglePair> OctreeBasedCD::candidatePairs(GeometryId a, GeometryId b) const {
+std::span<const ElementPair> OctreeBasedCD::candidatePairs(GeometryId a, GeometryId b) const {
   read();
   Implementation& all = *m_implementation;
   PairRecord& record = all.pairs.at(all.geometries, a, b);
@@ -588,10 +539,11 @@ const FrameStatistics& OctreeBasedCD::statistics() const { return read().statist
 
 const Settings& OctreeBasedCD::settings() const { return read().settings; }
 
-std::span<const AuditFailure> OctreeBasedCD::auditFailures() const { return read().auditFailures; }
+std::span<const AuditFailure> OctreeBasedCD::auditFailures() const { return read().audit.failures; }
 
 CollisionProblem OctreeBasedCD::problem() const {
   const Implementation& all = read();
+  const auto lock = all.querySource->lockOctrees();  // an update chooses methods, too
   const StandardFloatingPoint standard;
   return problemOf(all.settings, all.geometries, all.pairs);
 }

@@ -55,21 +55,21 @@ std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferre
 
 }  // namespace
 
-void orderPairs(Buffer<TrianglePair>& pairs, std::size_t firsts, PairOrderScratch& scratch) {
+void orderPairs(Buffer<ElementPair>& pairs, std::size_t firsts, PairOrderScratch& scratch) {
   if (pairs.size() < firsts / 8) {  // the counters would cost more than they save
     std::sort(pairs.begin(), pairs.end());
     return;
   }
   Buffer<std::uint32_t>& next = scratch.places;  // where a's pairs go; in the end, where they end
   next.assign(firsts, 0);
-  for (const TrianglePair& pair : pairs) ++next[pair.a];
+  for (const ElementPair& pair : pairs) ++next[pair.a];
   std::exclusive_scan(next.begin(), next.end(), next.begin(), 0u);
   scratch.pairs.resize(pairs.size());
-  for (const TrianglePair& pair : pairs) scratch.pairs[next[pair.a]++] = pair;
+  for (const ElementPair& pair : pairs) scratch.pairs[next[pair.a]++] = pair;
   auto begin = scratch.pairs.begin();
   for (const std::uint32_t place : next) {
     const auto end = scratch.pairs.begin() + place;
-    std::sort(begin, end, [](const TrianglePair& l, const TrianglePair& r) { return l.b < r.b; });
+    std::sort(begin, end, [](const ElementPair& l, const ElementPair& r) { return l.b < r.b; });
     begin = end;
   }
   std::copy(scratch.pairs.begin(), scratch.pairs.end(), pairs.begin());

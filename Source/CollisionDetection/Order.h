@@ -44,12 +44,12 @@ struct OrderScratch {
 
 struct PairOrderScratch {
   Buffer<std::uint32_t> places;
-  Buffer<TrianglePair> pairs;
+  Buffer<ElementPair> pairs;
 };
 
 /// Sorts by (a, b), where every a is below `firsts`.
 /// Cost     two passes over the pairs and one over `firsts` counters.
-void orderPairs(Buffer<TrianglePair>& pairs, std::size_t firsts, PairOrderScratch&);
+void orderPairs(Buffer<ElementPair>& pairs, std::size_t firsts, PairOrderScratch&);
 
 /// The buffers' contacts, sorted by element ids, each once: where the first `preferred` buffers
 /// have one of the same features as the others, theirs. Returns how many are theirs.

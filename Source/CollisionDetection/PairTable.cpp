@@ -73,10 +73,10 @@ class Check {
       : m_id(a.id), m_name(nameOf(a.id, b.id)), m_method(settings.method) {
     range(a.mesh, b.mesh, settings);
     kinds(a, b);
-    const bool proximity = hasProximity(a, b, settings.thickness);
+    const bool proximity = hasProximity(a.inStep(), b.inStep(), settings.thickness);
     need(m_method != Method::Proximity || proximity,
          "Method::Proximity needs a positive thickness; it is 0");
-    need(m_method != Method::Auto || proximity || hasContinuous(a, b),
+    need(m_method != Method::Auto || proximity || hasContinuous(a.inStep(), b.inStep()),
          "Method::Auto needs a positive thickness for these radii; it is 0");
   }
 
@@ -93,23 +93,24 @@ class Check {
   }
 
   void range(const TriangleMesh& a, const TriangleMesh& b, const PairSettings& settings) {
-    const auto [method, thickness, contacts, tolerance, rest, timeTolerance] = settings;
+    const auto [method, thickness, contacts, motionTolerance, rest, timeTolerance,
+                earliestTimeOnly] = settings;
     constexpr const char* kNotNegative = "finite and not negative";
     finite("restDistance", rest, rest >= 0.0, kNotNegative);
     need(rest == 0.0 || (&a == &b && a.topology.kind != GeometryKind::Points),
          "restDistance is for a triangle or line mesh with itself");
     finite("thickness", thickness, thickness >= 0.0, kNotNegative);
-    finite("tolerance", tolerance, true, "finite, or negative for half the thickness");
+    finite("motionTolerance", motionTolerance, true, "finite, or negative for half the thickness");
     finite("timeTolerance", timeTolerance,
            timeTolerance >= kSmallestTimeTolerance && timeTolerance <= 1.0, "from 2^-50 to 1");
-    need(contacts >= Contacts::Distinct && contacts <= Contacts::Earliest,
-         "contacts must be Distinct, All or Earliest");
-    need(contacts != Contacts::Earliest || method == Method::Continuous,
-         "Contacts::Earliest is for Method::Continuous only");
+    need(contacts >= Contacts::Distinct && contacts <= Contacts::All,
+         "contacts must be Distinct or All");
+    need(!earliestTimeOnly || method == Method::Continuous,
+         "earliestTimeOnly is for Method::Continuous only");
     need(method >= Method::Auto && method <= Method::Continuous,
          "no such method: " + std::to_string(static_cast<int>(method)));
-    need(method == Method::Auto || tolerance < 0.0,
-         "tolerance is " + textOf(tolerance) + "; Method::" + nameOf(method) +
+    need(method == Method::Auto || motionTolerance < 0.0,
+         "motionTolerance is " + textOf(motionTolerance) + "; Method::" + nameOf(method) +
              " does not use it, only Method::Auto does: leave it negative");
   }
 
@@ -133,7 +134,7 @@ class Check {
     support(meshes || continuous || any,
             "Method::Intersection is for two triangle meshes, not for " + nameOf(ofA.kind) +
                 " and " + nameOf(ofB.kind) + "; Auto, Proximity and Continuous are");
-    support(!continuous || hasContinuous(a, b),
+    support(!continuous || hasContinuous(a.inStep(), b.inStep()),
             "Method::Continuous needs one radius for all vertices; Proximity and Auto do not");
   }
 
@@ -156,7 +157,7 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
   record->pair = {a, b, settings};
   record->a = &first;
   record->b = &second;
-  record->plan = planOf(settings, first, second);
+  record->plan = planOf(settings, first.inStep(), second.inStep());
   record->settingsRevision = m_revisions.next();
   record->updateNear();
   record->index = m_records.size();
@@ -200,7 +201,7 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
   }
   // Nothing below throws.
   record.pair.settings = m_pairs[record.index].settings = settings;
-  record.plan = planOf(settings, *record.a, *record.b);
+  record.plan = planOf(settings, record.a->inStep(), record.b->inStep());
   record.settingsRevision = m_revisions.next();
   record.candidatesOf.invalidate();
 }

@@ -4,7 +4,7 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "CollisionDetection/GeometryTable.h"
-#include "CollisionDetection/Trust.h"
+#include "Validity/Trust.h"
 #include "Core/Buffer.h"
 #include "NarrowPhase/NarrowPhase.h"
 
@@ -39,6 +39,7 @@ struct PairRecord {
   MeshPair meshes(const FloatPair* floats = nullptr) const {
     PairSettings settings = pair.settings;
     settings.method = plan.method;
+    if (settings.earliestTimeOnly) settings.contacts = Contacts::All;
     return {a->mesh,
             b->mesh,
             settings,
@@ -71,11 +72,11 @@ struct PairRecord {
   Revision settingsRevision;
   CollisionData data;  ///< of the last detection that was completed
   Derived dataOf;
-  bool isAnswered = false;          ///< there was one
-  CollisionData next;               ///< of the detection that runs
-  std::atomic<double> earliest;     ///< Contacts::Earliest: found so far in this frame
-  std::size_t found = 0;            ///< candidates, when last collected or handed on
-  Buffer<TrianglePair> candidates;  ///< in the order found until somebody asks for them
+  bool isAnswered = false;         ///< there was one
+  CollisionData next;              ///< of the detection that runs
+  std::atomic<double> earliest;    ///< PairSettings::earliestTimeOnly: found so far in this frame
+  std::size_t found = 0;           ///< candidates, when last collected or handed on
+  Buffer<ElementPair> candidates;  ///< in the order found until somebody asks for them
   Derived candidatesOf;
   bool candidatesSorted = false;
   ContactPredicate predicate;

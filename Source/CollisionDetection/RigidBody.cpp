@@ -92,34 +92,6 @@ class RigidSearch::Step {
   double m_slack;
 };
 
-Vector3d worldOrigin(const Geometry& geometry) {
-  const Vector3d& origin = geometry.tree.frame().origin;
-  return geometry.isPlaced() ? geometry.mesh.now.transform()(origin) : origin;
-}
-
-BoxMap worldMap(const Geometry& geometry, const Vector3d& origin, double thickness,
-                bool wholeStep) {
-  BoxMap map;
-  if (!geometry.isPlaced()) return map;
-  const FloatFrame& frame = geometry.tree.frame();
-  const auto addEnd = [&](const RigidTransform& transform) {
-    std::array<std::array<double, 3>, 3> matrix;
-    for (int k = 0; k < 3; ++k)
-      for (int j = 0; j < 3; ++j) matrix[k][j] = transform.rotation(k, j);
-    const Vector3d offset = (transform(frame.origin) - origin) * frame.scale;
-    const double error =
-        kPlacedError * frame.scale *
-        (2.0 * frame.origin.cwiseAbs().maxCoeff() + transform.translation.cwiseAbs().maxCoeff() +
-         origin.cwiseAbs().maxCoeff());
-    setEnd(map.ends[map.count++], matrix, {offset[0], offset[1], offset[2]}, thickness, error);
-  };
-  const RigidTransform &now = geometry.mesh.now.transform(),
-                       &before = geometry.mesh.before.transform();
-  addEnd(now);
-  if (wholeStep && !(now == before)) addEnd(before);
-  return map;
-}
-
 MotionRange RigidSearch::motion(const Geometry& geometry) {
   Step step(geometry, *this);
   MotionRange range;

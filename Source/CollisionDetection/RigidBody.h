@@ -2,29 +2,14 @@
 
 #include "Mesh/Motion.h"
 #include "Mesh/Revision.h"
-#include "Octree/BoxMap.h"
 #include "Octree/PointQueries.h"
-
-#include <Eigen/Core>
 
 #include <array>
 #include <cstdint>
-#include <span>
 
 namespace palpate {
 
 struct Geometry;
-
-// A geometry that setTransform() moved: its boxes are of its body's frame, and nothing here reads
-// all its vertices more than once.
-
-/// Where a geometry's float frame has its origin in the world.
-Eigen::Vector3d worldOrigin(const Geometry&);
-
-/// Brings the boxes of a geometry's octree into the world, in floats about `origin`, grown by
-/// `thickness` (in those floats): as it is now, or over the whole step. Nothing of one that is not
-/// placed.
-BoxMap worldMap(const Geometry&, const Eigen::Vector3d& origin, double thickness, bool wholeStep);
 
 /// How a body moves of which both ends of the step have the same positions in its frame. The
 /// vertices that move furthest are searched for in its octree, from those of the last search on.

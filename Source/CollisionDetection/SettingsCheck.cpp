@@ -19,7 +19,7 @@ const Settings& checked(const Settings& settings) {
   constexpr int kAny = std::numeric_limits<int>::max();
   const OctreeSettings& octree = settings.octree;
   check("octree.maxDepth", octree.maxDepth, 1, 60, "in [1, 60]");
-  check("octree.maxPrimitivesPerLeaf", octree.maxPrimitivesPerLeaf, 1, 1024, "in [1, 1024]");
+  check("octree.maxElementsPerLeaf", octree.maxElementsPerLeaf, 1, 1024, "in [1, 1024]");
   check("octree.update", octree.update, 0, 1, "Auto or Rebuild");
   check("engine", settings.engine, 0, 1, "Octree or BruteForce");
   check("threads", settings.threads, 0, 1024, "in [0, 1024]");

@@ -1,7 +1,8 @@
 #include "Math/ClosestPoint.h"
 #include "Math/ExactClosestPoint.h"
-#include "Math/FilteredSigns.h"
+#include "Exact/FilteredSigns.h"
 #include "Math/Foot.h"
+#include "Math/Tolerances.h"
 #include "Core/FloatingPoint.h"
 
 #include <array>

@@ -1,6 +1,6 @@
 #include "Math/ExactClosestPoint.h"
 
-#include "Math/ExactVector.h"
+#include "Exact/ExactVector.h"
 
 #include <algorithm>
 #include <array>

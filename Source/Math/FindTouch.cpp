@@ -1,4 +1,4 @@
-#include "Math/CubicRoot.h"
+#include "Exact/CubicRoot.h"
 #include "Math/ImpactQuery.h"
 #include "Math/RelativeMotion.h"
 #include "Math/Tolerances.h"

@@ -1,4 +1,4 @@
-#include "Math/AlgebraicTime.h"
+#include "Exact/AlgebraicTime.h"
 #include "Math/ImpactQuery.h"
 
 #include <algorithm>

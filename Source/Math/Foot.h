@@ -1,6 +1,6 @@
 #pragma once
 
-#include "Math/Compensated.h"
+#include "Exact/Compensated.h"
 
 #include <Eigen/Core>
 

@@ -202,7 +202,7 @@ HWY_EXPORT(mayImpactKernel);
 std::uint8_t mayImpact(ImpactQuery::Kind kind, const ImpactBlock& block,
                        const TimeOfImpactSettings& settings) {
   return static_cast<std::uint8_t>(HWY_DYNAMIC_DISPATCH(mayImpactKernel)(
-      kind, block, std::max(settings.minimumDistance, 0.0), settings.tolerance));
+      kind, block, std::max(settings.minimumDistance, 0.0), settings.timeTolerance));
 }
 
 }  // namespace palpate

@@ -1,6 +1,6 @@
 #include "Math/ClosestPoint.h"
-#include "Math/CubicRoot.h"
-#include "Math/ExactVector.h"
+#include "Exact/CubicRoot.h"
+#include "Exact/ExactVector.h"
 #include "Math/ImpactQuery.h"
 #include "Math/RelativeMotion.h"
 #include "Math/Tolerances.h"

@@ -1,6 +1,6 @@
 #include "Math/RelativeMotion.h"
 
-#include "Math/CubicRoot.h"
+#include "Exact/CubicRoot.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>

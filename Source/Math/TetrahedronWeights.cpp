@@ -1,6 +1,6 @@
 #include "Math/TetrahedronWeights.h"
 
-#include "Math/ExactVector.h"
+#include "Exact/ExactVector.h"
 
 #include <cmath>
 

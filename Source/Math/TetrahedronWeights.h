@@ -1,6 +1,6 @@
 #pragma once
 
-#include "Math/Predicates.h"
+#include "Exact/Predicates.h"
 
 #include <array>
 #include <optional>

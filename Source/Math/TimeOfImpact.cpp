@@ -11,8 +11,8 @@ namespace palpate {
 ImpactAnswer findImpact(const ImpactQuery& query, const TimeOfImpactSettings& settings,
                         double upTo) {
   // A tolerance that is no number counts as the smallest.
-  const double tolerance = settings.tolerance > kSmallestTimeTolerance
-                               ? std::min(settings.tolerance, 1.0)
+  const double tolerance = settings.timeTolerance > kSmallestTimeTolerance
+                               ? std::min(settings.timeTolerance, 1.0)
                                : kSmallestTimeTolerance;
   return settings.minimumDistance > 0.0
              ? findApproach(query, settings.minimumDistance, tolerance, upTo)

@@ -1,35 +1,19 @@
 #pragma once
 
+#include "Exact/ErrorBounds.h"
+
 // The tolerances of what is decided in double, with their units and where they come from. u = 2^-53
 // is the rounding unit. Boxes and filters in float have theirs where their derivations are: boxes
 // in Math/Box.h and Octree, filters in Mesh/UnfoldedStars and NarrowPhase.
 namespace palpate {
 
 // ---- Signs of polynomials in coordinate differences (ClosestPoint.cpp) ----
-// The differences are rounded once each, so each factor carries (1 + u).
 
-/// Of x . y, relative to the sum of |x_i y_i|: 2 u from the factors, u from each product, 2 u from
-/// the sums, and second-order terms.
-constexpr double kDotError = 6 * 0x1p-53;
-/// Of (x x y) . (z x w), relative to |x| |y| |z| |w| in sums of magnitudes: each cross product 4 u
-/// (two factors, product, difference), the dot product 3 u, second-order terms and the bound's own
-/// rounding.
-constexpr double kTripleError = 12 * 0x1p-53;
-/// Sums below this did not overflow in a term.
-constexpr double kOverflowGuard = 0x1p1000;
-/// Two factors below this multiply without overflow.
-constexpr double kSquareOverflowGuard = 0x1p400;
-/// More than a few products lose to underflow (2^-1074 each).
-constexpr double kUnderflowGuard = 0x1p-1000;
 /// The same where they are multiplied by products of moderate coordinates, 2^200 at most.
 constexpr double kUnderflowGuardOfProducts = 0x1p-800;
 
 // ---- Closest points (ClosestPoint.cpp) ----
 
-/// L. Coordinate differences between these have products of degree eight within the range of
-/// double; others are left to integers.
-constexpr double kSmallestModerate = 0x1p-100;
-constexpr double kLargestModerate = 0x1p100;
 /// Added and taken away again it rounds a weight to a multiple of 2^-26, so that its product with
 /// half of a split double is exact.
 constexpr double kCoarseWeight = 0x1.8p26;
@@ -52,15 +36,6 @@ constexpr double kSliverAngleSquare = 0x1p-40;
 /// factors' sums (3 2^-103, and m's own 2^-104 of the positions).
 constexpr double kAccurateCrossError = 0x1p-52;
 constexpr double kAccurateCrossLoss = 0x1p-101;
-
-// ---- Volumes and areas (Predicates.h, which has the derivations) ----
-
-/// Of (b - a) x (c - a) . (d - a), relative to the sum of its six products' magnitudes: 8 u and the
-/// sum's own rounding.
-constexpr double kVolumeError = 10 * 0x1p-53;
-/// Of one component of (b - a) x (c - a), relative to the sum of its products' magnitudes: 4 u and
-/// the sum's own rounding.
-constexpr double kAreaError = 6 * 0x1p-53;
 
 // ---- Impacts (RelativeMotion.cpp, FindTouch.cpp, FindApproach.cpp, ImpactFilter.cpp) ----
 
@@ -88,10 +63,6 @@ constexpr double kAlongError = 16 * 0x1p-53;
 constexpr double kPlaneError = 32 * 0x1p-53;
 /// Below this a direction's length loses precision to underflow.
 constexpr double kShortestDirection = 0x1p-500;
-/// Of the step: brackets of roots start this wide to either side.
-constexpr double kNarrowestBracket = 0x1p-50;
-/// Of the step: and at most this wide; a root that is not inside is bisected for.
-constexpr double kWidestBracket = 0x1p-32;
 /// Of the step: the smallest tolerance that is kept.
 constexpr double kSmallestTimeTolerance = 0x1p-50;
 /// Of a coordinate of a moving corner less the distance, relative to both: the difference of two
@@ -111,12 +82,6 @@ constexpr double kApproachError = 0x1p-35;
 /// on for longer than this or the tolerance. Any value keeps its promises; smaller ones take more
 /// steps within what it may report.
 constexpr double kShortStretch = 0x1p-20;
-/// Of the step: Newton's iteration of a root ends with steps this short; two units in the last
-/// place of a time.
-constexpr double kRootStep = 0x1p-53;
-/// Of a form's Bernstein coefficient converted to double and restricted, relative to the largest
-/// coefficient (CubicTime::sign()): 2^-51 and kBlossomError.
-constexpr double kFormError = 0x1p-46;
 /// Of det(A, B, C) with components up to 1 (sideBefore()): six terms of 12 u, twice.
 constexpr double kSideError = 0x1p-46;
 /// Of the step: how far before an impact sideBefore() looks first; where that is too near to tell,
@@ -186,6 +151,12 @@ constexpr double kOppositeSquare = 0x1p-80;
 /// Of a triangle's edge, normal and what is across both from being orthonormal: beyond it the
 /// normal is no more than rounding. Any value.
 constexpr double kAxesError = 0x1p-20;
+
+// ---- Triangles without area in contacts (NarrowPhase/StepCheck.cpp) ----
+
+/// Squared sine of an angle of a triangle above which it certainly has area: u^2 and more. Any
+/// value above the rounding of a cross product.
+constexpr double kFlatSquare = 0x1p-60;
 
 // ---- Motion bounds (Motion.cpp, MotionBound.cpp) ----
 

@@ -1,6 +1,6 @@
 #include "Mesh/TetrahedralTopology.h"
 
-#include "Math/Predicates.h"
+#include "Exact/Predicates.h"
 
 #include <algorithm>
 #include <utility>

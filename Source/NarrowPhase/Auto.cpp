@@ -34,7 +34,7 @@ bool mayBeFast(const Moves& a, const Moves& b, double slow) {
 
 }  // namespace
 
-void findAuto(const MeshPair& pair, std::span<const TrianglePair> candidates, ContactBuffers& out) {
+void findAuto(const MeshPair& pair, std::span<const ElementPair> candidates, ContactBuffers& out) {
   out.part.assign(candidates.begin(), candidates.end());
   if (pair.floats) {
     FloatPair atEnd = *pair.floats;
@@ -43,15 +43,10 @@ void findAuto(const MeshPair& pair, std::span<const TrianglePair> candidates, Co
   }
   findProximity(pair, out.part, out);
   out.part.clear();
-  for (const TrianglePair& candidate : candidates)
+  for (const ElementPair& candidate : candidates)
     if (mayBeFast({pair.a, candidate.a}, {pair.b, candidate.b}, pair.step.slow))
       out.part.push_back(candidate);
   findFastImpacts(pair, out.part, out);
-}
-
-void findAutoByBruteForce(const MeshPair& pair, const FeatureLists& features, ContactBuffers& out) {
-  findProximityByBruteForce(pair, features, out);
-  findFastImpactsByBruteForce(pair, features, out);
 }
 
 }  // namespace palpate

@@ -12,9 +12,6 @@ namespace palpate {
 /// thickness and `extra`, or if it moves further than `slow` and has an impact in the step. The
 /// first are described at the step's end, with a timeOfImpact of 1, unless the step may have
 /// brought them together and they have an impact; all others as Method::Continuous does.
-void findAuto(const MeshPair&, std::span<const TrianglePair> candidates, ContactBuffers& out);
-
-/// Method::Auto of findContactsByBruteForce().
-void findAutoByBruteForce(const MeshPair&, const FeatureLists&, ContactBuffers& out);
+void findAuto(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);
 
 }  // namespace palpate

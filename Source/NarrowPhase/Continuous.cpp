@@ -24,7 +24,7 @@ TimeOfImpactSettings settingsOf(const MeshPair& pair) {
   TimeOfImpactSettings settings;
   settings.minimumDistance =
       pair.settings.thickness + (pair.a.largestRadius + pair.b.largestRadius);
-  settings.tolerance = pair.settings.timeTolerance;
+  settings.timeTolerance = pair.settings.timeTolerance;
   return settings;
 }
 
@@ -59,7 +59,7 @@ void filterPairs(const Features<kind>& features, std::span<const FeaturePair> pa
 /// The same for every feature pair that the candidates own. ofSecond: the first feature is of the
 /// pair's second mesh.
 template <class F>
-void forEachLikelyPair(const MeshPair& pair, std::span<const TrianglePair> candidates,
+void forEachLikelyPair(const MeshPair& pair, std::span<const ElementPair> candidates,
                        ContactBuffers& out, F&& f) {
   FeaturePairs& pairs = out.features;
   findFeaturePairs(pair.a.topology, pair.b.topology, pair.floats, candidates, pairs);
@@ -100,7 +100,7 @@ class ContactFinder {
            bool ofSecond, const ImpactQuery& query, double time, bool store) {
     const std::array<Vector3d, 4> p = positionsAt(query, time);
     std::array<MeshFeature, 2> held;
-    if (m_pair.settings.contacts == Contacts::Earliest) m_out.facts.clearance = 0.0;
+    if (m_pair.settings.earliestTimeOnly) m_out.facts.clearance = 0.0;
     const auto isLeftOut = [&](const auto& closest, const Vector3d& normal, bool refused) {
       if (store) m_check.noteImpact(features, inFirst, inSecond, time, closest.distance);
       return refused || ((m_pair.a.outer || m_pair.b.outer) &&
@@ -170,34 +170,9 @@ class FastImpactFinder {
   ContactFinder m_find;
 };
 
-/// Those of the lists with every feature of the other mesh, as above.
-template <class F>
-void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, ContactBuffers& out,
-                        F&& f) {
-  for (const bool ofSecond : {false, true}) {
-    const Features<Kind::VertexTriangle> features{ofSecond ? pair.b : pair.a,
-                                                  ofSecond ? pair.a : pair.b};
-    const std::vector<Triangle>& triangles = features.second.topology.triangles;
-    for (const std::uint32_t v : ofSecond ? lists.verticesOfB : lists.verticesOfA) {
-      for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-        if (!features.second.topology.isOn(t) || pair.leavesOutVertex(v, t)) continue;
-        ++out.featurePairs;
-        f(features, v, t, ofSecond);
-      }
-    }
-  }
-  const auto edgeCount = static_cast<std::uint32_t>(pair.b.topology.edges.size());
-  for (const std::uint32_t i : lists.edgesOfA)
-    for (std::uint32_t j = pair.self() ? i + 1 : 0; j < edgeCount; ++j) {
-      if (pair.leavesOut(i, j) || pair.b.topology.edgeTriangles[j].empty()) continue;
-      ++out.featurePairs;
-      f(Features<Kind::EdgeEdge>{pair.a, pair.b}, i, j, false);
-    }
-}
-
 }  // namespace
 
-void findContinuous(const MeshPair& pair, std::span<const TrianglePair> candidates,
+void findContinuous(const MeshPair& pair, std::span<const ElementPair> candidates,
                     ContactBuffers& out) {
   forEachLikelyPair(pair, candidates, out, ContactFinder(pair, out));
 }
@@ -212,31 +187,21 @@ template bool addImpact(const MeshPair&, const Features<Kind::VertexTriangle>&, 
 template bool addImpact(const MeshPair&, const Features<Kind::EdgeEdge>&, std::uint32_t,
                         std::uint32_t, bool, ContactBuffers&);
 
-void findFastImpacts(const MeshPair& pair, std::span<const TrianglePair> candidates,
+void findFastImpacts(const MeshPair& pair, std::span<const ElementPair> candidates,
                      ContactBuffers& out) {
   forEachLikelyPair(pair, candidates, out, FastImpactFinder(pair, out));
-}
-
-void findContinuousByBruteForce(const MeshPair& pair, const FeatureLists& lists,
-                                ContactBuffers& out) {
-  forEachFeaturePair(pair, lists, out, ContactFinder(pair, out));
-}
-
-void findFastImpactsByBruteForce(const MeshPair& pair, const FeatureLists& lists,
-                                 ContactBuffers& out) {
-  forEachFeaturePair(pair, lists, out, FastImpactFinder(pair, out));
 }
 
 /// Boxes over part of the step cost more; a part that is not short throws out too little for that.
 constexpr double kShortPart = 1.0 / 32;
 
-double findEarliestImpact(const MeshPair& pair, std::span<const TrianglePair> candidates,
+double findEarliestImpact(const MeshPair& pair, std::span<const ElementPair> candidates,
                           double upTo, ContactBuffers& counts) {
   const TimeOfImpactSettings settings = settingsOf(pair);
   double earliest = upTo;
   // A reported time may be a tolerance early, so a pair that is left out for an impact after this
   // could not have reported one before `earliest`.
-  const auto end = [&] { return std::min(earliest + settings.tolerance, 1.0); };
+  const auto end = [&] { return std::min(earliest + settings.timeTolerance, 1.0); };
   ContactFinder finder(pair, counts);
   const auto test = [&](const auto& features, std::uint32_t inFirst, std::uint32_t inSecond,
                         bool ofSecond) {

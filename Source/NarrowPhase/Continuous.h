@@ -17,7 +17,7 @@ namespace palpate {
 /// before; where it was always in that plane, the triangle's winding normal or the cross product of
 /// the edges; of degenerate elements the axis that distances use. With a thickness: that of the
 /// distance.
-void findContinuous(const MeshPair&, std::span<const TrianglePair> candidates, ContactBuffers& out);
+void findContinuous(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);
 
 /// The two meshes that feature pairs of one kind come from: vertices of the first with triangles of
 /// the second, or edges of each.
@@ -54,18 +54,13 @@ bool addImpact(const MeshPair&, const Features<kind>&, std::uint32_t inFirst,
                std::uint32_t inSecond, bool ofSecond, ContactBuffers& out);
 
 /// Method::Auto: impacts of those feature pairs that proximity at the step's end does not answer.
-void findFastImpacts(const MeshPair&, std::span<const TrianglePair> candidates,
-                     ContactBuffers& out);
-void findFastImpactsByBruteForce(const MeshPair&, const FeatureLists&, ContactBuffers& out);
-
-/// Method::Continuous of findContactsByBruteForce().
-void findContinuousByBruteForce(const MeshPair&, const FeatureLists&, ContactBuffers& out);
+void findFastImpacts(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);
 
 /// The earliest timeOfImpact that findContinuous() would report, or upTo if that is earlier;
 /// infinity is a good first upTo. Impacts after it cost little, so passing the smallest time of
 /// earlier candidates makes later ones cheap. The smallest over all candidates has the same bits
 /// whatever their order, batches and upTo. counts: featurePairs and exactDecisions only.
-double findEarliestImpact(const MeshPair&, std::span<const TrianglePair> candidates, double upTo,
+double findEarliestImpact(const MeshPair&, std::span<const ElementPair> candidates, double upTo,
                           ContactBuffers& counts);
 
 }  // namespace palpate

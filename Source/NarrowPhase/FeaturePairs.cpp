@@ -230,7 +230,7 @@ class RowCache {
   struct RowPair {
     const FeatureRow &a, &b;
   };
-  HWY_ATTR HWY_INLINE RowPair rows(const TrianglePair& pair) {
+  HWY_ATTR HWY_INLINE RowPair rows(const ElementPair& pair) {
     const std::uint32_t keyA = pair.a, keyB = pair.b ^ m_other;
     const std::size_t placeA = place(keyA), placeB = place(keyB);
     const FeatureRow& a = row(m_sides[0], pair.a, keyA, placeA);
@@ -324,7 +324,7 @@ constexpr IdPlaces kVertexIn = idPlaces<std::uint8_t>(
                        0);
 
 template <Sweep sweep>
-HWY_ATTR void findFeaturePairsOf(const Side& a, const Side& b, std::span<const TrianglePair> pairs,
+HWY_ATTR void findFeaturePairsOf(const Side& a, const Side& b, std::span<const ElementPair> pairs,
                                  FeaturePairs& out) {
   const bool self = &a.topology == &b.topology;
   const unsigned excluded = self ? ~0u : 0u;
@@ -337,7 +337,7 @@ HWY_ATTR void findFeaturePairsOf(const Side& a, const Side& b, std::span<const T
   ChosenTests chosen;
   for (std::size_t begin = 0; begin < pairs.size(); begin += ChosenTests::kMost) {
     std::size_t size = 0;
-    for (const TrianglePair& pair :
+    for (const ElementPair& pair :
          pairs.subspan(begin, std::min(ChosenTests::kMost, pairs.size() - begin))) {
       const auto [rowA, rowB] = cache.rows(pair);
       unsigned tests = rowA.ownedByA & rowB.ownedByB & allowed;
@@ -368,7 +368,7 @@ HWY_ATTR void findFeaturePairsOf(const Side& a, const Side& b, std::span<const T
 }
 
 HWY_ATTR void findFeaturePairsKernel(const MeshTopology& a, const MeshTopology& b,
-                                     const FloatPair& floats, std::span<const TrianglePair> pairs,
+                                     const FloatPair& floats, std::span<const ElementPair> pairs,
                                      FeaturePairs& out) {
   Side sideA{a, floats.a, floats.beforeA, {floats.shiftLower, floats.shiftUpper}, floats.upTo};
   Side sideB{b, floats.b, floats.beforeB, {}, floats.upTo};
@@ -386,10 +386,10 @@ HWY_ATTR void findFeaturePairsKernel(const MeshTopology& a, const MeshTopology& 
 }
 
 HWY_ATTR void keepOverlappingKernel(const MeshTopology& a, const MeshTopology& b,
-                                    const FloatPair& floats, Buffer<TrianglePair>& pairs) {
+                                    const FloatPair& floats, Buffer<ElementPair>& pairs) {
   const Shift shift{floats.shiftLower, floats.shiftUpper};
   std::size_t kept = 0;
-  for (const TrianglePair& pair : pairs) {
+  for (const ElementPair& pair : pairs) {
     pairs[kept] = pair;
     kept += overlap(shifted(triangleBounds(floats.a, a.triangles[pair.a]), shift),
                     triangleBounds(floats.b, b.triangles[pair.b]));
@@ -407,12 +407,12 @@ HWY_EXPORT(findFeaturePairsKernel);
 HWY_EXPORT(keepOverlappingKernel);
 
 void findFeaturePairs(const MeshTopology& a, const MeshTopology& b, const FloatPair* floats,
-                      std::span<const TrianglePair> pairs, FeaturePairs& out) {
+                      std::span<const ElementPair> pairs, FeaturePairs& out) {
   HWY_DYNAMIC_DISPATCH(findFeaturePairsKernel)(a, b, floats ? *floats : FloatPair{}, pairs, out);
 }
 
 void keepOverlapping(const MeshTopology& a, const MeshTopology& b, const FloatPair& floats,
-                     Buffer<TrianglePair>& pairs) {
+                     Buffer<ElementPair>& pairs) {
   HWY_DYNAMIC_DISPATCH(keepOverlappingKernel)(a, b, floats, pairs);
 }
 

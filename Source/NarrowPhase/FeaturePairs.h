@@ -44,10 +44,10 @@ struct FeaturePairs {
 /// Cost     about 12 ns a triangle pair with AVX-512, 15 with AVX2. Memory: 120 bytes a triangle
 ///          pair, for one batch; 140 KB of stack.
 void findFeaturePairs(const MeshTopology& a, const MeshTopology& b, const FloatPair* floats,
-                      std::span<const TrianglePair> pairs, FeaturePairs& out);
+                      std::span<const ElementPair> pairs, FeaturePairs& out);
 
 /// Those of the triangle pairs whose own boxes overlap.
 void keepOverlapping(const MeshTopology& a, const MeshTopology& b, const FloatPair&,
-                     Buffer<TrianglePair>& pairs);
+                     Buffer<ElementPair>& pairs);
 
 }  // namespace palpate

@@ -6,7 +6,7 @@
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
-#include "Math/Predicates.h"
+#include "Exact/Predicates.h"
 #include "Math/TriangleIntersection.h"
 
 #include <algorithm>
@@ -144,7 +144,7 @@ TriangleIntersection meetingOf(const MeshPair& pair, const MeshTriangle& a, cons
 }
 
 /// known: how they meet, or nothing.
-void findOne(const MeshPair& pair, const TrianglePair& candidate, TriangleIntersection known,
+void findOne(const MeshPair& pair, const ElementPair& candidate, TriangleIntersection known,
              SignCounts& counts, ContactBuffers& out) {
   const MeshTriangle a(pair.a, candidate.a, pair.a.now), b(pair.b, candidate.b, pair.b.now);
   if (!known.intersect()) known = meetingOf(pair, a, b, counts);
@@ -157,7 +157,7 @@ void findOne(const MeshPair& pair, const TrianglePair& candidate, TriangleInters
   IntersectionContacts(pair, a, b, out).add(known);
 }
 
-void keepPossible(const MeshPair& pair, bool atStart, std::span<const TrianglePair> candidates,
+void keepPossible(const MeshPair& pair, bool atStart, std::span<const ElementPair> candidates,
                   Buffer<PossibleIntersection>& possible) {
   const auto placed = [&](const TriangleMesh& mesh) {
     return PlacedTriangles{mesh.topology.triangles, atStart ? mesh.before : mesh.now};
@@ -167,7 +167,7 @@ void keepPossible(const MeshPair& pair, bool atStart, std::span<const TrianglePa
 
 }  // namespace
 
-void findIntersections(const MeshPair& pair, std::span<const TrianglePair> candidates,
+void findIntersections(const MeshPair& pair, std::span<const ElementPair> candidates,
                        ContactBuffers& out) {
   SignCounts counts;
   keepPossible(pair, false, candidates, out.possible);
@@ -176,7 +176,7 @@ void findIntersections(const MeshPair& pair, std::span<const TrianglePair> candi
   out.exactDecisions += counts.undecided;
 }
 
-bool intersect(const MeshPair& pair, bool atStart, const TrianglePair& candidate,
+bool intersect(const MeshPair& pair, bool atStart, const ElementPair& candidate,
                ContactBuffers& counts) {
   SignCounts signs;
   const auto of = [&](const TriangleMesh& mesh, std::uint32_t triangle) {
@@ -188,9 +188,9 @@ bool intersect(const MeshPair& pair, bool atStart, const TrianglePair& candidate
   return found;
 }
 
-std::optional<TrianglePair> anyIntersecting(const MeshPair& pair, bool atStart,
-                                            std::span<const TrianglePair> candidates,
-                                            ContactBuffers& counts) {
+std::optional<ElementPair> anyIntersecting(const MeshPair& pair, bool atStart,
+                                           std::span<const ElementPair> candidates,
+                                           ContactBuffers& counts) {
   keepPossible(pair, atStart, candidates, counts.possible);
   counts.validityPairs += candidates.size();
   for (const PossibleIntersection& possible : counts.possible)
@@ -199,13 +199,9 @@ std::optional<TrianglePair> anyIntersecting(const MeshPair& pair, bool atStart,
   return {};
 }
 
-void findIntersectionsByBruteForce(const MeshPair& pair, const FeatureLists& features,
-                                   ContactBuffers& out) {
+void addIntersection(const MeshPair& pair, const ElementPair& candidate, ContactBuffers& out) {
   SignCounts counts;
-  const auto countB = static_cast<std::uint32_t>(pair.b.topology.triangles.size());
-  for (const std::uint32_t a : features.trianglesOfA)
-    for (std::uint32_t b = pair.self() ? a + 1 : 0; b < countB; ++b)
-      if (pair.b.topology.isOn(b)) findOne(pair, {a, b}, {}, counts, out);
+  findOne(pair, candidate, {}, counts, out);
   out.exactDecisions += counts.undecided;
 }
 

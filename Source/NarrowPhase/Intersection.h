@@ -26,10 +26,10 @@ namespace palpate {
 /// one cross the other, and what touches at the common vertex is excluded. A triangle across that
 /// edge gives one, if there is one and it has no vertex in common with the other. Pairs with
 /// common vertices must be among the candidates.
-void findIntersections(const MeshPair&, std::span<const TrianglePair> candidates,
+void findIntersections(const MeshPair&, std::span<const ElementPair> candidates,
                        ContactBuffers& out);
 
-/// Method::Intersection of findContactsByBruteForce(): pairs of triangles.
-void findIntersectionsByBruteForce(const MeshPair&, const FeatureLists&, ContactBuffers& out);
+/// The same of one pair of triangles, without the filters of findIntersections().
+void addIntersection(const MeshPair&, const ElementPair&, ContactBuffers& out);
 
 }  // namespace palpate

@@ -205,7 +205,7 @@ struct Crossings {
 };
 
 /// Appends the first `size` lanes that may intersect.
-HWY_INLINE void keepLanes(const Lanes& ofA, const Lanes& ofB, const TrianglePair* pairs,
+HWY_INLINE void keepLanes(const Lanes& ofA, const Lanes& ofB, const ElementPair* pairs,
                           std::size_t size, PossibleIntersection*& out) {
   const D d;
   M apart = boxesApart(ofA, ofB);
@@ -224,17 +224,17 @@ HWY_INLINE void keepLanes(const Lanes& ofA, const Lanes& ofB, const TrianglePair
 }
 
 HWY_ATTR void keepPossiblyIntersectingKernel(const PlacedTriangles& a, const PlacedTriangles& b,
-                                             bool self, std::span<const TrianglePair> pairs,
+                                             bool self, std::span<const ElementPair> pairs,
                                              Buffer<PossibleIntersection>& out) {
   const D d;
   out.resize(pairs.size());
   PossibleIntersection* end = out.data();
   Batch batch;
-  TrianglePair some[kSize];
+  ElementPair some[kSize];
   for (std::size_t begin = 0; begin < pairs.size(); begin += kSize) {
     const std::size_t size = std::min(kSize, pairs.size() - begin);
     for (std::size_t lane = 0; lane < size; ++lane) {
-      TrianglePair& pair = some[lane] = pairs[begin + lane];
+      ElementPair& pair = some[lane] = pairs[begin + lane];
       if (self && pair.b < pair.a) std::swap(pair.a, pair.b);
       batch.set(lane, 0, a, pair.a, self);
       batch.set(lane, 1, b, pair.b, self);
@@ -258,7 +258,7 @@ namespace palpate {
 HWY_EXPORT(keepPossiblyIntersectingKernel);
 
 void keepPossiblyIntersecting(const PlacedTriangles& a, const PlacedTriangles& b, bool self,
-                              std::span<const TrianglePair> pairs,
+                              std::span<const ElementPair> pairs,
                               Buffer<PossibleIntersection>& out) {
   HWY_DYNAMIC_DISPATCH(keepPossiblyIntersectingKernel)(a, b, self, pairs, out);
 }

@@ -17,7 +17,7 @@ struct PlacedTriangles {
 };
 
 struct PossibleIntersection {
-  TrianglePair triangles;
+  ElementPair triangles;
   TriangleIntersection meeting;  ///< if known: where edges cross and nothing touches
   bool isKnown() const { return meeting.intersect(); }
 };
@@ -28,7 +28,7 @@ struct PossibleIntersection {
 /// excluded.
 /// Errors   none; where coordinates over- or underflow all pairs whose boxes overlap are kept.
 void keepPossiblyIntersecting(const PlacedTriangles& a, const PlacedTriangles& b, bool self,
-                              std::span<const TrianglePair> pairs,
+                              std::span<const ElementPair> pairs,
                               Buffer<PossibleIntersection>& out);
 
 }  // namespace palpate

@@ -90,9 +90,9 @@ struct StepFacts {
 struct ContactBuffers : ShapeContactBuffers {
   Buffer<VertexTriangleContact> vertexTriangle, triangleVertex;
   Buffer<EdgeEdgeContact> edgeEdge;
-  Buffer<TrianglePair> intersectingTriangles;
+  Buffer<ElementPair> intersectingTriangles;
   FeaturePairs features;                  ///< scratch: of the batch at hand
-  Buffer<TrianglePair> part;              ///< scratch: some of the batch at hand
+  Buffer<ElementPair> part;               ///< scratch: some of the batch at hand
   Buffer<PossibleIntersection> possible;  ///< scratch: of the batch at hand
   StepFacts facts;
   std::size_t validityPairs = 0;  ///< looked at for startedApart
@@ -112,24 +112,6 @@ void forEachTimed(Lists& lists, F&& f) {
 /// adjacent ones and (t, t) excluded or not as the caller likes: pairs in which nothing is owned
 /// cost little.
 /// Threads  safe for different output buffers.
-void findContacts(const MeshPair&, std::span<const TrianglePair> candidates, ContactBuffers& out);
-
-/// Features for brute force to test against all of the other mesh: for Intersection triangles, else
-/// vertices and edges; with a shape, primitives of the mesh, as trianglesOfA.
-struct FeatureLists {
-  std::vector<std::uint32_t> verticesOfA, verticesOfB;
-  std::vector<std::uint32_t> edgesOfA,
-      trianglesOfA;  ///< self-collision: against those of higher id
-};
-
-/// All that the pair's method tests; vertices in no triangle are left out.
-FeatureLists everyFeature(const MeshPair&);
-
-/// The oracle: vertices against every triangle and edges against every edge, with no candidates and
-/// no ownership. With every feature the same contacts as findContacts over complete candidates.
-void findContactsByBruteForce(const MeshPair&, const FeatureLists&, ContactBuffers& out);
-inline void findContactsByBruteForce(const MeshPair& pair, ContactBuffers& out) {
-  findContactsByBruteForce(pair, everyFeature(pair), out);
-}
+void findContacts(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);
 
 }  // namespace palpate

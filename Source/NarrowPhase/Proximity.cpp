@@ -207,15 +207,15 @@ class ProximityFinder {
         m_allowed(allowedTests(pair.a.topology, pair.b.topology)),
         m_distinct(pair.settings.contacts == Contacts::Distinct && !pair.hasLines()) {}
 
-  void find(std::span<const TrianglePair> candidates) {
-    for (const TrianglePair& candidate : candidates) add(candidate);
+  void find(std::span<const ElementPair> candidates) {
+    for (const ElementPair& candidate : candidates) add(candidate);
     flush();
   }
 
  private:
   using Corners = VertexTriangleFinder::Corners;
 
-  void add(const TrianglePair& candidate) {
+  void add(const ElementPair& candidate) {
     const MeshTopology &a = m_pair.a.topology, &b = m_pair.b.topology;
     std::uint32_t tests =
         kOwnedByA[a.owned[candidate.a]] & kOwnedByB[b.owned[candidate.b]] & m_allowed;
@@ -246,7 +246,7 @@ class ProximityFinder {
     m_size = 0;
   }
 
-  void measure(const TrianglePair& candidate, int test) {
+  void measure(const ElementPair& candidate, int test) {
     const MeshTopology &a = m_pair.a.topology, &b = m_pair.b.topology;
     const std::uint8_t ofA = kOfA[test], ofB = kOfB[test];
     if (ofB == kTriangle) return m_ofA.test(a.triangles[candidate.a][ofA], candidate.b);
@@ -266,13 +266,13 @@ class ProximityFinder {
   const bool m_distinct;          ///< edges that meet at their ends are no contacts
   int m_size = 0;
   std::uint32_t m_tests[TrianglePairBatch::kSize];
-  TrianglePair m_candidates[TrianglePairBatch::kSize];
+  ElementPair m_candidates[TrianglePairBatch::kSize];
   TrianglePairBatch m_batch{};
 };
 
 }  // namespace
 
-void findProximity(const MeshPair& pair, std::span<const TrianglePair> candidates,
+void findProximity(const MeshPair& pair, std::span<const ElementPair> candidates,
                    ContactBuffers& out) {
   ProximityFinder(pair, out).find(candidates);
 }

@@ -14,10 +14,7 @@ namespace palpate {
 /// Distinct, self-collision: of two vertices nearest to each other's triangles in a corner the
 /// lower one is the contact's vertex. A vertex's own triangles count for nothing: they neither hold
 /// nor drop a contact.
-void findProximity(const MeshPair&, std::span<const TrianglePair> candidates, ContactBuffers& out);
-
-/// Method::Proximity of findContactsByBruteForce().
-void findProximityByBruteForce(const MeshPair&, const FeatureLists&, ContactBuffers& out);
+void findProximity(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);
 
 /// A feature of a mesh that holds a closest point, by the mesh's own ids.
 struct MeshFeature {

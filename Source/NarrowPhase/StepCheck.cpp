@@ -11,9 +11,6 @@ namespace palpate {
 using Eigen::Vector3d;
 using Kind = ImpactQuery::Kind;
 
-/// At the step's end: triangle pairs of a frame without contacts, and pairs looked at at once.
-constexpr std::size_t kFreeLooks = 32, kLooksTogether = 16;
-
 template <Kind kind>
 bool StepCheck::mayTouchInStep(const Features<kind>& features, std::uint32_t inFirst,
                                std::uint32_t inSecond, double distance) const {
@@ -103,46 +100,11 @@ bool StepCheck::isAnsweredAtEnd(const Features<kind>& features, std::uint32_t in
          m_pair.settings.contacts != Contacts::Distinct;
 }
 
-EndOfStep lookAtEnd(const MeshPair& pair, const CollisionData::Contents& contacts,
-                    ContactBuffers& counts) {
-  using Ids = std::span<const std::uint32_t>;
-  const MeshTopology &ofA = pair.a.topology, &ofB = pair.b.topology;
-  const double rounding = pair.step.certain - pair.step.motion;
-  std::size_t left = kFreeLooks;
-  forEachTimed(contacts, [&](const auto& list) { left += list.size(); });
-  Buffer<TrianglePair>& some = counts.part;
-  some.clear();
-  EndOfStep end;
-  const auto look = [&] {
-    end.isKnown = some.size() <= left;
-    if (!end.isKnown) return;
-    left -= some.size();
-    end.intersecting = anyIntersecting(pair, false, some, counts);
-    some.clear();
-  };
-  const auto add = [&](const auto& contact, Ids trianglesOfA, Ids trianglesOfB) {
-    if (end.intersecting || !end.isKnown ||
-        contact.distance > (1.0 - contact.timeOfImpact) * pair.step.motion + rounding)
-      return;
-    for (const std::uint32_t a : trianglesOfA)
-      for (const std::uint32_t b : trianglesOfB)
-        if (!pair.self() || a != b) some.push_back({a, b});
-    if (some.size() >= kLooksTogether) look();
-  };
-  for (const VertexTriangleContact& c : contacts.vertexTriangle)
-    add(c, ofA.vertexTriangles[c.vertex], Ids(&c.triangle, 1));
-  for (const VertexTriangleContact& c : contacts.triangleVertex)
-    add(c, Ids(&c.triangle, 1), ofB.vertexTriangles[c.vertex]);
-  for (const EdgeEdgeContact& c : contacts.edgeEdge)
-    add(c, ofA.edgeTriangles[ofA.edgeOf(c.edgeA)], ofB.edgeTriangles[ofB.edgeOf(c.edgeB)]);
-  if (!end.intersecting && end.isKnown) look();
-  return end;
-}
-
 void StepCheck::noteTriangle(std::uint32_t triangle, bool ofSecond, const Vector3d& a,
                              const Vector3d& b, const Vector3d& c) {
   const Vector3d u = b - a, v = c - a;
-  if (u.cross(v).squaredNorm() > 0x1p-60 * u.squaredNorm() * v.squaredNorm() || hasArea(a, b, c))
+  if (u.cross(v).squaredNorm() > kFlatSquare * u.squaredNorm() * v.squaredNorm() ||
+      hasArea(a, b, c))
     return;
   (ofSecond && !m_pair.self() ? m_out.facts.degenerateB : m_out.facts.degenerateA)
       .push_back(triangle);

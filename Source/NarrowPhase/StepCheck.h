@@ -64,24 +64,10 @@ void answerByImpact(const MeshPair&, const StepFacts& touched, ContactBuffers& f
                     ContactBuffers& out);
 
 /// Whether triangles intersect at the step's start, or its end; exactly. counts: exactDecisions.
-bool intersect(const MeshPair&, bool atStart, const TrianglePair&, ContactBuffers& counts);
+bool intersect(const MeshPair&, bool atStart, const ElementPair&, ContactBuffers& counts);
 /// One of the candidates that does. counts: validityPairs too, and a scratch.
-std::optional<TrianglePair> anyIntersecting(const MeshPair&, bool atStart,
-                                            std::span<const TrianglePair> candidates,
-                                            ContactBuffers& counts);
-
-/// What a step's contacts tell of its end.
-struct EndOfStep {
-  std::optional<TrianglePair> intersecting;
-  /// Without one: no triangles intersect, if none did at the start.
-  bool isKnown = true;
-};
-
-/// Triangles that were apart can only intersect where features of theirs have touched. contacts:
-/// all of the step, in their order, by impact wherever features may have touched.
-/// Cost     a look at a triangle pair for each contact, and a few: where that does not do, nothing
-///          is known.
-EndOfStep lookAtEnd(const MeshPair&, const CollisionData::Contents& contacts,
-                    ContactBuffers& counts);
+std::optional<ElementPair> anyIntersecting(const MeshPair&, bool atStart,
+                                           std::span<const ElementPair> candidates,
+                                           ContactBuffers& counts);
 
 }  // namespace palpate

@@ -11,7 +11,7 @@ namespace palpate::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using NodeTag = hn::CappedTag<float, 8>;   ///< eight siblings
-using LeafTag = hn::CappedTag<float, 16>;  ///< primitives of a leaf
+using LeafTag = hn::CappedTag<float, 16>;  ///< elements of a leaf
 using BoxTag = hn::CappedTag<float, 1>;
 
 /// Boxes side by side: as many as D has lanes.

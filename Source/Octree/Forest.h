@@ -21,10 +21,10 @@ struct LooseOctree::State {
     std::size_t otherBytes;       ///< the geometry's floats
     std::uint32_t firstNode = 0;  ///< node ids of this tree start here
   };
-  std::vector<Tree> trees;  ///< by ascending geometry id; those without primitives left out
+  std::vector<Tree> trees;  ///< by ascending geometry id; those without elements left out
 };
 
-/// Sentences about each invariant that does not hold. `cells`: also that primitives are where a
+/// Sentences about each invariant that does not hold. `cells`: also that elements are where a
 /// rebuild puts them.
 std::vector<std::string> validate(const Octree&, bool cells);
 

@@ -14,7 +14,7 @@ namespace palpate {
 /// Where the parts of a sorted range end, as KeySort::byDigits() writes them.
 ///
 /// Parts are those of the cells below the range's own, down to one level for each digit. They come
-/// in the order of keys: first the cell's own primitives, then the parts of octant 0, of octant 1,
+/// in the order of keys: first the cell's own elements, then the parts of octant 0, of octant 1,
 /// and so on to octant 7, each in the same order. So parts of 3 digits are 1 + 8 * 73 = 585.
 struct PartEnds {
   static constexpr int kMostDigits = 3;

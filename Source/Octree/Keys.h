@@ -26,7 +26,7 @@ constexpr float kSmallestCell = 0x1p-100f;
 
 /// A key within a cube, and behind it a slot. Four bits for each level from the cube's children
 /// down: 8 + the octant that the centre lies in, or 0 where cells are too small. So keys sorted put
-/// a cell's own primitives first and every subtree in one range, and keys sorted by their first
+/// a cell's own elements first and every subtree in one range, and keys sorted by their first
 /// digits do so for the first levels.
 struct Key {
   static constexpr int kMostLevels = 9, kDigitBits = 4, kSlotBits = 28;

@@ -19,7 +19,7 @@ void Layout::start(const OctreeSettings& settings, std::uint32_t taskSize,
   groups.resize(groups.capacity());
   groupNodes.resize(groups.size());
   reserveGroups();
-  m_mostPerLeaf = static_cast<std::uint32_t>(settings.maxPrimitivesPerLeaf);
+  m_mostPerLeaf = static_cast<std::uint32_t>(settings.maxElementsPerLeaf);
   m_maxDepth = std::min(settings.maxDepth, kMostDepth);
   m_taskSize = taskSize;
   m_ends = &ends;

@@ -15,8 +15,8 @@ namespace palpate {
 /// The nodes over a range of keys: the whole tree's top, or one subtree in a task of its own.
 /// Sorts the keys on the way, no further than leaves need.
 ///
-/// The top leaves each subtree of at most taskSize primitives to a task. What is a task depends on
-/// the primitives only, so the same primitives give the same blocks in the same order for any
+/// The top leaves each subtree of at most taskSize elements to a task. What is a task depends on
+/// the elements only, so the same elements give the same blocks in the same order for any
 /// number of threads.
 class Layout {
  public:
@@ -38,7 +38,7 @@ class Layout {
   static Job jobOfRoot(std::uint32_t size, const Cube& cube) {
     return {0, size, cube, 0, 0, 0, 0, 0, kAlike};
   }
-  /// In `groupNodes`: the group is task (entry & ~kTask)'s, or the own primitives of the task's
+  /// In `groupNodes`: the group is task (entry & ~kTask)'s, or the own elements of the task's
   /// root.
   static constexpr OctreeNode kTask = 0x80000000u, kTaskRoot = 0xffffffffu;
 

@@ -116,7 +116,7 @@ LooseOctree::Node LooseOctree::node(NodeId id) const {
     if (!octree.isEmpty(first + slot))
       result.children[slot] = NodeId{tree.firstNode + first + slot};
   const auto [begin, end] = octree.ownRange(node);
-  result.primitives = octree.order().subspan(begin, end - begin);
+  result.elements = octree.order().subspan(begin, end - begin);
   return result;
 }
 
@@ -132,21 +132,21 @@ OctreeStatistics LooseOctree::statistics() const {
     statistics.blocksInUse += octree.pool().used();
     statistics.blocksFree += octree.pool().free();
     statistics.blocksAllocated += octree.pool().allocated();
-    statistics.primitives += octree.size();
+    statistics.elements += octree.size();
     statistics.bytes += octree.bytes() + tree.otherBytes;
     forEachNode(octree, 0, 0, [&](OctreeNode node, int depth) {
       const auto [begin, end] = octree.ownRange(node);
       const auto level = static_cast<std::size_t>(depth);
       if (statistics.nodesByDepth.size() <= level) {
         statistics.nodesByDepth.resize(level + 1);
-        statistics.primitivesByDepth.resize(level + 1);
+        statistics.elementsByDepth.resize(level + 1);
       }
       ++statistics.nodesInUse;
       ++statistics.nodesByDepth[level];
-      statistics.primitivesByDepth[level] += end - begin;
+      statistics.elementsByDepth[level] += end - begin;
       statistics.deepestLevel = std::max(statistics.deepestLevel, depth);
-      statistics.mostPrimitivesInNode =
-          std::max<std::size_t>(statistics.mostPrimitivesInNode, end - begin);
+      statistics.mostElementsInNode =
+          std::max<std::size_t>(statistics.mostElementsInNode, end - begin);
     });
   });
   statistics.nodesAllocated = 8 * statistics.blocksAllocated;

@@ -84,16 +84,16 @@ void Octree::throwNotBuilt() {
 }
 
 void Octree::measureLooseness() {
-  // All groups, as few that have become large cost most; of the primitives a sample's growth.
+  // All groups, as few that have become large cost most; of the elements a sample's growth.
   const Buffer<std::uint32_t>& groups = m_nodes.groups;
   const std::size_t count = m_nodes.groupNodes.size(),
                     stride = std::max<std::size_t>(8, count / 256);
-  double areas = 0, primitives = 0x1p-30 * halfArea(box(0));  // points have no area
+  double areas = 0, elements = 0x1p-30 * halfArea(box(0));  // points have no area
   for (const double part : m_groupAreas) areas += part;
   for (std::size_t g = 0; g < count; g += stride)
-    for (std::size_t i = groups[g]; i < groups[g + 1]; ++i) primitives += halfArea(m_boxes[i]);
-  m_looseness = primitives > 0 ? areas / primitives : 1.0;
-  // Refitting does not tighten: what has fallen was due to primitives that the sample lacks.
+    for (std::size_t i = groups[g]; i < groups[g + 1]; ++i) elements += halfArea(m_boxes[i]);
+  m_looseness = elements > 0 ? areas / elements : 1.0;
+  // Refitting does not tighten: what has fallen was due to elements that the sample lacks.
   m_leastLooseness = m_builtNow ? m_looseness : std::min(m_leastLooseness, m_looseness);
   m_builtNow = false;
 }

@@ -19,8 +19,8 @@ namespace palpate {
 
 /// Eight siblings: their fitted boxes side by side, so that one SIMD comparison prunes all eight.
 ///
-/// Slot i is the child in octant i (bit 0: x, 1: y, 2: z). A slot in use holds primitives [begin,
-/// ...) of the tree's order: as a leaf `count(i)` of them; otherwise its own primitives come first
+/// Slot i is the child in octant i (bit 0: x, 1: y, 2: z). A slot in use holds elements [begin,
+/// ...) of the tree's order: as a leaf `count(i)` of them; otherwise its own elements come first
 /// and end where child block's first begins. An empty slot's box overlaps nothing.
 struct alignas(64) OctreeBlock {
   static constexpr std::uint32_t kLeaf = 0x80000000u;
@@ -28,7 +28,7 @@ struct alignas(64) OctreeBlock {
   float lower[3][8];
   float upper[3][8];
   std::uint32_t begin[8];
-  std::uint32_t child[8];  ///< a block, or kLeaf | number of primitives
+  std::uint32_t child[8];  ///< a block, or kLeaf | number of elements
 
   bool isLeaf(unsigned slot) const { return child[slot] & kLeaf; }
   std::uint32_t count(unsigned slot) const { return child[slot] & ~kLeaf; }
@@ -89,12 +89,12 @@ class BlockPool {
 /// A node: block * 8 + slot. The root is node 0, alone in block 0.
 using OctreeNode = std::uint32_t;
 
-/// What a build makes: the nodes over an order of primitives.
+/// What a build makes: the nodes over an order of elements.
 struct OctreeNodes {
   Cube rootCube{};
   BlockPool pool;
   Buffer<OctreeNode> parents;  ///< of each block
-  /// Leaves and the own primitives of other nodes: group g is primitives [groups[g], groups[g + 1])
+  /// Leaves and the own elements of other nodes: group g is elements [groups[g], groups[g + 1])
   /// of the order.
   Buffer<std::uint32_t> groups;
   Buffer<OctreeNode> groupNodes;  ///< the node of each group
@@ -109,7 +109,7 @@ class OctreeBuilder;
 /// An octree is in one of three stages:
 ///
 ///   empty      after reset(), and, with a size of 0, after a reset() or build() that failed.
-///   laid out   after build(), and after a fit() that failed. Nodes hold their primitives, in a
+///   laid out   after build(), and after a fit() that failed. Nodes hold their elements, in a
 ///              new order(); their boxes are not known yet.
 ///   built      after fit(). Searches work in this stage only, and throw in the others.
 ///
@@ -131,7 +131,7 @@ class Octree {
   std::size_t size() const { return m_order.size(); }
   std::span<const std::uint32_t> order() const {
     return m_order;
-  }  ///< primitive ids as the nodes hold them
+  }  ///< element ids as the nodes hold them
   BoxArrays& boxes() { return m_boxes; }
   const BoxArrays& boxes() const { return m_boxes; }
   std::span<const std::uint32_t> groups() const { return m_nodes.groups; }  ///< see OctreeNodes
@@ -139,7 +139,7 @@ class Octree {
 
   /// Lays out the nodes. Afterwards order() is new, and boxes() are still in the old one.
   /// `bounds`: of all boxes; `bulk`: the extent of most of them, about 0. `keys`: scratch, as many
-  /// elements as there are primitives.
+  /// elements as there are elements.
   void build(const FloatBox& bounds, double bulk, const OctreeSettings&,
              std::span<std::uint64_t> keys, const Threads&);
   /// Carries the groups' boxes to the root.
@@ -152,10 +152,10 @@ class Octree {
     if (!isBuilt()) throwNotBuilt();
   }
 
-  /// Sum of the leaves' half areas over that of some of their primitives: how loose the fitted
+  /// Sum of the leaves' half areas over that of some of their elements: how loose the fitted
   /// boxes are. Grows as a refitted tree degrades; unchanged by motion and scaling of the whole.
   double looseness() const { return m_looseness; }
-  /// Whether the leaves have not become much larger, in relation to their primitives, than they
+  /// Whether the leaves have not become much larger, in relation to their elements, than they
   /// were at their tightest since the tree was built; else it should be built again.
   bool isTight() const { return m_looseness <= kMostLoosening * m_leastLooseness; }
 
@@ -173,7 +173,7 @@ class Octree {
   /// The node whose children block `block` holds; of block 0, itself.
   OctreeNode parent(std::size_t block) const { return m_nodes.parents[block]; }
 
-  /// Primitives that a node holds itself.
+  /// Elements that a node holds itself.
   std::pair<std::uint32_t, std::uint32_t> ownRange(OctreeNode node) const {
     const OctreeBlock& block = m_nodes.pool[node >> 3];
     const unsigned slot = node & 7;

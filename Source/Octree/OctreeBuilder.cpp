@@ -57,7 +57,7 @@ void OctreeBuilder::build(const BoxArrays& boxes, const FloatBox& bounds, double
   layOutTasks(sort, settings, threads);
   // A root that is a leaf may have no keys, and keeps the order.
   if (!(top().links[0].child[0] & OctreeBlock::kLeaf))
-    orderPrimitives(keys, order, nodes.pool, threads);
+    orderElements(keys, order, nodes.pool, threads);
   assemble(size, nodes, threads);
 }
 
@@ -85,9 +85,8 @@ void OctreeBuilder::layOutTasks(const KeySort& keys, const OctreeSettings& setti
   });
 }
 
-void OctreeBuilder::orderPrimitives(std::span<const std::uint64_t> keys,
-                                    Buffer<std::uint32_t>& order, BlockPool& pool,
-                                    const Threads& threads) const {
+void OctreeBuilder::orderElements(std::span<const std::uint64_t> keys, Buffer<std::uint32_t>& order,
+                                  BlockPool& pool, const Threads& threads) const {
   const std::size_t size = order.size(), grain = grainOf(size);
   const std::span<std::uint32_t> before = pool.lend<std::uint32_t>(size);
   threads.forChunks(size, grain, [&](std::size_t, std::size_t from, std::size_t to) {

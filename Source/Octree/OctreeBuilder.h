@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-/// Builds the nodes of an octree from the boxes of its primitives. Owns the scratch that a build
+/// Builds the nodes of an octree from the boxes of its elements. Owns the scratch that a build
 /// needs, so that the next build allocates nothing.
 ///
 /// Phases, as build() runs them:
@@ -19,13 +19,13 @@ namespace palpate {
 ///                     of keys is sorted by a few digits, the nodes that these digits tell apart
 ///                     are laid out, and parts that are too full for leaves are sorted further.
 ///   layOutTasks       the same for each task, side by side.
-///   orderPrimitives   brings the primitives' ids into the order of the sorted keys.
+///   orderElements   brings the elements' ids into the order of the sorted keys.
 ///   assemble          joins the nodes of all tasks to one tree.
 ///
 /// Octree::fit() follows, when the boxes are known in the new order.
 /// Docs/Algorithms/LooseOctree.md follows one small build by hand.
 ///
-/// Memory. Keys need 16 bytes a primitive while a tree is built: for themselves and for a copy
+/// Memory. Keys need 16 bytes an element while a tree is built: for themselves and for a copy
 /// while they are sorted. The caller lends the former. The latter lie in the pool's memory, which
 /// has no blocks until assemble().
 class OctreeBuilder {
@@ -41,8 +41,8 @@ class OctreeBuilder {
   void layOutTop(const KeySort&, std::uint32_t size, const Cube& root, const OctreeSettings&,
                  const Threads&);
   void layOutTasks(const KeySort&, const OctreeSettings&, const Threads&);
-  void orderPrimitives(std::span<const std::uint64_t> keys, Buffer<std::uint32_t>& order,
-                       BlockPool&, const Threads&) const;
+  void orderElements(std::span<const std::uint64_t> keys, Buffer<std::uint32_t>& order, BlockPool&,
+                     const Threads&) const;
   void assemble(std::uint32_t size, OctreeNodes&, const Threads&);
   void placeGroups(std::uint32_t size, OctreeNodes&);
   void writeGroup(std::size_t entry, OctreeNodes&) const;

@@ -11,9 +11,9 @@
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
 
-constexpr std::size_t kSide = 16;  ///< primitives looked at together
+constexpr std::size_t kSide = 16;  ///< elements looked at together
 
-/// Bits of those of sixteen primitives from `first` on, or eight siblings, at most `size`, of which
+/// Bits of those of sixteen elements from `first` on, or eight siblings, at most `size`, of which
 /// `take(d, boxes, lane)` is true, as the map places them.
 template <class D, class Boxes, class Take>
 HWY_ATTR HWY_INLINE std::uint32_t takeBoxes(D d, const Boxes& from, std::size_t first,
@@ -35,11 +35,11 @@ float boundOf(double distanceSquared) {
 
 /// Depth first from the root, the nearest siblings first: take() says which of several boxes are of
 /// interest, and their squared distances, of which those up to `bound` still are when their turn
-/// comes; primitive(place), which may lower the bound, is called with each such primitive.
-template <class Take, class Primitive>
+/// comes; element(place), which may lower the bound, is called with each such element.
+template <class Take, class Element>
 HWY_ATTR HWY_INLINE void descend(const Octree& octree, const BoxMap& map, PointQueryStack& stack,
                                  const float* squares, const float& bound, Take&& take,
-                                 Primitive&& primitive) {
+                                 Element&& element) {
   using Entry = PointQueryStack::Entry;
   stack.entries.assign(1, {0, 0});
   while (!stack.entries.empty()) {
@@ -52,7 +52,7 @@ HWY_ATTR HWY_INLINE void descend(const Octree& octree, const BoxMap& map, PointQ
       std::uint32_t bits = takeBoxes(LeafTag(), octree.boxes(), i, size, map, take);
       for (; bits; bits &= bits - 1) {
         const auto lane = static_cast<std::uint32_t>(std::countr_zero(bits));
-        if (squares[lane] <= bound) primitive(i + lane);
+        if (squares[lane] <= bound) element(i + lane);
       }
     }
     const OctreeNode child = octree.firstChild(entry.node);
@@ -86,7 +86,7 @@ HWY_ATTR void findOverlappingKernel(const Octree& octree, const BoxMap& map, con
 
 HWY_ATTR void tryNearestKernel(const Octree& octree, const BoxMap& map, const FloatBox& point,
                                double distanceSquared, PointQueryStack& stack, void* context,
-                               TryPrimitive tryPrimitive) {
+                               TryElement tryElement) {
   float bound = boundOf(distanceSquared);
   alignas(64) float squares[kSide];
   const auto within = [&](auto d, const auto& boxes, std::size_t i) HWY_ATTR {
@@ -95,7 +95,7 @@ HWY_ATTR void tryNearestKernel(const Octree& octree, const BoxMap& map, const Fl
     return hn::Le(distances, hn::Set(d, bound));
   };
   descend(octree, map, stack, squares, bound, within,
-          [&](std::uint32_t place) { bound = boundOf(tryPrimitive(context, place)); });
+          [&](std::uint32_t place) { bound = boundOf(tryElement(context, place)); });
 }
 
 }  // namespace palpate::HWY_NAMESPACE
@@ -115,10 +115,10 @@ void findOverlapping(const Octree& octree, const BoxMap& map, const FloatBox& bo
 
 void tryNearest(const Octree& octree, const BoxMap& map, const FloatBox& point,
                 double distanceSquared, PointQueryStack& stack, void* context,
-                TryPrimitive tryPrimitive) {
+                TryElement tryElement) {
   octree.requireBuilt();
   HWY_DYNAMIC_DISPATCH(tryNearestKernel)
-  (octree, map, point, distanceSquared, stack, context, tryPrimitive);
+  (octree, map, point, distanceSquared, stack, context, tryElement);
 }
 
 }  // namespace palpate

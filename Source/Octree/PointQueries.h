@@ -20,7 +20,7 @@ struct PointQueryStack {
   Buffer<std::uint32_t> found;  ///< of findOverlapping()
 };
 
-/// f(begin, end) for ranges of the octree's order that hold every primitive whose box `overlaps`,
+/// f(begin, end) for ranges of the octree's order that hold every element whose box `overlaps`,
 /// as do all boxes around it. This and all queries below throw if the octree is not built.
 template <class Overlaps, class F>
 void forEachOverlapping(const Octree& octree, Overlaps&& overlaps, PointQueryStack& stack, F&& f) {
@@ -38,18 +38,18 @@ void forEachOverlapping(const Octree& octree, Overlaps&& overlaps, PointQuerySta
   }
 }
 
-/// The primitives whose boxes, as the map places them, overlap `box`, by their places in the
+/// The elements whose boxes, as the map places them, overlap `box`, by their places in the
 /// octree's order: in stack.found.
 void findOverlapping(const Octree&, const BoxMap&, const FloatBox& box, PointQueryStack& stack);
 
-/// Of a primitive's place in the octree's order: the least squared distance seen so far.
-using TryPrimitive = double (*)(void* context, std::uint32_t place);
+/// Of an element's place in the octree's order: the least squared distance seen so far.
+using TryElement = double (*)(void* context, std::uint32_t place);
 
-/// Nearest nodes first: tries primitives until no other one's box, as the map places it, comes as
+/// Nearest nodes first: tries elements until no other one's box, as the map places it, comes as
 /// near to the point as the least squared distance seen, all in the octree's floats. point: a box
-/// around it; distanceSquared: no primitive further away is of interest.
+/// around it; distanceSquared: no element further away is of interest.
 void tryNearest(const Octree&, const BoxMap&, const FloatBox& point, double distanceSquared,
-                PointQueryStack& stack, void* context, TryPrimitive tryPrimitive);
+                PointQueryStack& stack, void* context, TryElement tryElement);
 
 /// tryNearest() by f(place).
 template <class F>

@@ -13,7 +13,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
 
-/// Primitives of one node, in the tree's order.
+/// Elements of one node, in the tree's order.
 struct LeafRange {
   std::uint32_t begin, end;
 };
@@ -46,10 +46,10 @@ class Walk {
     }
   }
 
-  /// Nothing below but primitives.
+  /// Nothing below but elements.
   bool isLast(NodePair pair) const { return isLeaf(m_a, pair.a) && isLeaf(m_b, pair.b); }
 
-  /// Replaces a node pair by the pairs below it; two leaves by their primitives' pairs.
+  /// Replaces a node pair by the pairs below it; two leaves by their elements' pairs.
   HWY_ATTR void step(NodePair pair) {
     const bool leafA = isLeaf(m_a, pair.a), leafB = isLeaf(m_b, pair.b);
     if (m_trees.self() && pair.a == pair.b)
@@ -208,7 +208,7 @@ class Walk {
     }
   }
 
-  /// Up to kMost primitives of a, their boxes in b's frame.
+  /// Up to kMost elements of a, their boxes in b's frame.
   struct Rows {
     static constexpr std::size_t kMost = 16;
     alignas(64) float placed[2][3][kMost];
@@ -299,7 +299,7 @@ class Walk {
   template <class V, class M>
   HWY_ATTR HWY_INLINE void emit(V a, V b, M found) {
     const hn::DFromV<V> du;
-    TrianglePair* const out = m_sink.room();
+    ElementPair* const out = m_sink.room();
     if (m_trees.self()) {
       const V lower = hn::Min(a, b);
       b = hn::Max(a, b);

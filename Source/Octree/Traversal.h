@@ -14,7 +14,7 @@
 
 namespace palpate {
 
-/// Two nodes whose boxes overlap. kOwn in one: only the primitives that the node holds itself.
+/// Two nodes whose boxes overlap. kOwn in one: only the elements that the node holds itself.
 struct NodePair {
   static constexpr OctreeNode kOwn = 0x80000000u;
   OctreeNode a, b;
@@ -24,7 +24,7 @@ struct NodePair {
 /// to. After an exception, start() again: it forgets what was found.
 class PairSink {
  public:
-  using Function = void (*)(void* context, std::span<const TrianglePair>);
+  using Function = void (*)(void* context, std::span<const ElementPair>);
   static constexpr std::size_t kBatch = 4096;
   static constexpr std::size_t kMostAtOnce = 16;  ///< pairs that room() makes room for
 
@@ -36,7 +36,7 @@ class PairSink {
     m_pairs.resize(std::max(m_pairs.capacity(), kBatch));
   }
   /// Room for kMostAtOnce pairs; advance() says how many were written.
-  TrianglePair* room() {
+  ElementPair* room() {
     if (m_size + kMostAtOnce > m_pairs.size()) {
       if (m_function) flush();
       if (m_size + kMostAtOnce > m_pairs.size())
@@ -52,18 +52,18 @@ class PairSink {
       m_size = 0;
     }
   }
-  std::span<const TrianglePair> kept() const { return std::span(m_pairs).first(m_size); }
+  std::span<const ElementPair> kept() const { return std::span(m_pairs).first(m_size); }
   /// Takes what was kept, in exchange for a buffer to fill next time.
-  void takeKept(Buffer<TrianglePair>& pairs) {
+  void takeKept(Buffer<ElementPair>& pairs) {
     m_pairs.resize(m_size);
     m_pairs.swap(pairs);
     m_size = 0;
   }
   std::size_t total() const { return m_total + m_size; }
-  std::size_t bytes() const { return m_pairs.capacity() * sizeof(TrianglePair); }
+  std::size_t bytes() const { return m_pairs.capacity() * sizeof(ElementPair); }
 
  private:
-  Buffer<TrianglePair> m_pairs;
+  Buffer<ElementPair> m_pairs;
   std::size_t m_size = 0, m_total = 0;
   Function m_function = nullptr;
   void* m_context = nullptr;
@@ -113,7 +113,7 @@ struct TraversalStack {
 /// traverse() does.
 void startPairs(const TreePair&, std::size_t wanted, TraversalStack&);
 
-/// All primitive pairs below the node pairs whose boxes overlap. Empties the span's pairs depth
+/// All element pairs below the node pairs whose boxes overlap. Empties the span's pairs depth
 /// first.
 /// Cost     about a nanosecond for each eight boxes compared.
 void traverse(const TreePair&, std::span<const NodePair>, TraversalStack&, PairSink&);

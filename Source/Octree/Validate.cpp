@@ -26,12 +26,12 @@ class Validation {
     if (all.empty()) fail(0, "the root is empty");
     for (std::size_t i = 0; i < m_holders.size(); ++i)
       if (m_holders[i] != 1)
-        fail(0, "primitive " + std::to_string(m_octree.order()[i]) + " is in " +
+        fail(0, "element " + std::to_string(m_octree.order()[i]) + " is in " +
                     std::to_string(m_holders[i]) + " nodes");
     std::vector<bool> ids(m_octree.size(), false);
     for (const std::uint32_t id : m_octree.order()) {
       if (id >= ids.size() || ids[id]) {
-        fail(0, "the order is no permutation: primitive " + std::to_string(id));
+        fail(0, "the order is no permutation: element " + std::to_string(id));
         break;
       }
       ids[id] = true;
@@ -54,7 +54,7 @@ class Validation {
     const auto [begin, end] = m_octree.ownRange(node);
     FloatBox box;
     if (begin > end || end > m_octree.size()) {
-      fail(node, "its range of primitives is out of bounds");
+      fail(node, "its range of elements is out of bounds");
       return box;
     }
     for (std::uint32_t i = begin; i < end; ++i) {
@@ -87,7 +87,7 @@ class Validation {
 
   void checkCell(OctreeNode node, const Cube& cube, std::uint32_t i, bool leaf) {
     const FloatBox box = m_octree.boxes()[i];
-    const auto primitive = [&] { return "primitive " + std::to_string(m_octree.order()[i]); };
+    const auto element = [&] { return "element " + std::to_string(m_octree.order()[i]); };
     double longest = 0;
     for (int k = 0; k < 3; ++k) {
       const double lower = double{box.lower[k]} - cube.lower[k],
@@ -98,15 +98,15 @@ class Validation {
       static_assert(Key::kMostLevels == 9);
       const double centre = 0.5 * (lower + upper), slack = cube.edge * 0x1p-13;
       if (centre < -slack || centre > cube.edge + slack)
-        fail(node, "the centre of " + primitive() + " is outside its cell");
+        fail(node, "the centre of " + element() + " is outside its cell");
       if (lower < -0.5 * cube.edge || upper > 1.5 * cube.edge)
-        fail(node, primitive() + " is outside its loose bounds");
+        fail(node, element() + " is outside its loose bounds");
     }
-    if (longest > cube.edge) fail(node, primitive() + " is longer than its cell");
-    // An own primitive of a split cell is too large for the cell's children; in a leaf it may be
+    if (longest > cube.edge) fail(node, element() + " is longer than its cell");
+    // An own element of a split cell is too large for the cell's children; in a leaf it may be
     // any size.
     if (!leaf && longest * (1.0 + 0x1p-9) < 0.5 * cube.edge)
-      fail(node, primitive() + " belongs deeper");
+      fail(node, element() + " belongs deeper");
   }
 
   const Octree& m_octree;

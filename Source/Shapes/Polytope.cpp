@@ -1,9 +1,9 @@
 #include "Shapes/Polytope.h"
 
 #include "Shapes/ShapeLengths.h"
-#include "Math/Compensated.h"
+#include "Exact/Compensated.h"
 #include "Math/Foot.h"
-#include "Math/Predicates.h"
+#include "Exact/Predicates.h"
 
 #include <algorithm>
 #include <cmath>

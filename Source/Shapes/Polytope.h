@@ -4,7 +4,7 @@
 
 #include "Core/Buffer.h"
 #include "Math/ClosestPoint.h"
-#include "Math/Predicates.h"
+#include "Exact/Predicates.h"
 
 #include <array>
 #include <cstdint>

@@ -1,5 +1,5 @@
 #include "Shapes/Polytope.h"
-#include "Math/Compensated.h"
+#include "Exact/Compensated.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>

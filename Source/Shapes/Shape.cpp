@@ -3,9 +3,9 @@
 #include "Core/Text.h"
 #include "Shapes/ShapeLengths.h"
 #include "Math/ClosestPoint.h"
-#include "Math/Compensated.h"
+#include "Exact/Compensated.h"
 #include "Math/Foot.h"
-#include "Math/Predicates.h"
+#include "Exact/Predicates.h"
 #include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>

@@ -2,7 +2,7 @@
 
 #include "Shapes/ShapeLengths.h"
 #include "Math/ClosestPoint.h"
-#include "Math/Predicates.h"
+#include "Exact/Predicates.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>

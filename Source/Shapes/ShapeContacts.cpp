@@ -50,7 +50,7 @@ class ShapeImpacts {
         m_isStill(m_mesh.before.hasSameBody(m_mesh.now) && !m_mesh.now.isPlaced()),
         m_out(out) {
     m_settings.minimumDistance = m_distance + m_before.radius();
-    m_settings.tolerance = settings.timeTolerance;
+    m_settings.timeTolerance = settings.timeTolerance;
     for (std::uint32_t i = 0; i < m_before.corners().size(); ++i)
       m_motion = std::max(m_motion, motionOf(corner(i)));
     if (m_before.isPlane()) m_motion = std::numeric_limits<double>::infinity();  // it may turn
@@ -111,7 +111,7 @@ class ShapeImpacts {
   std::optional<double> timeOfVertex(std::uint32_t v) {
     ++m_out.featurePairs;
     return ShapeStep(m_before, m_now)
-        .timeNear({m_mesh.before[v], m_mesh.now[v]}, m_distance, m_settings.tolerance);
+        .timeNear({m_mesh.before[v], m_mesh.now[v]}, m_distance, m_settings.timeTolerance);
   }
   /// Of an edge or a triangle.
   std::optional<double> timeOfElement(ShapeElement element, const Triangle& vertices) {
@@ -122,7 +122,7 @@ class ShapeImpacts {
     ShapeApproach approach({{std::span(ends[0]).first(size), std::span(ends[1]).first(size)}},
                            movingBody(m_before, m_now));
     ++m_out.featurePairs;
-    const auto time = approach.timeNear(m_distance, m_settings.tolerance);
+    const auto time = approach.timeNear(m_distance, m_settings.timeTolerance);
     m_out.exactDecisions += approach.exactDecisions();
     return time;
   }
@@ -240,25 +240,25 @@ class ShapeContactFinder {
         m_impacts(mesh, shape, settings, out),
         m_out(out) {}
 
-  void test(std::uint32_t primitive) {
+  void test(std::uint32_t element) {
     const MeshTopology& topology = m_mesh.topology;
-    const Triangle& corners = topology.triangles[primitive];
-    if (!topology.isOn(primitive)) return;
+    const Triangle& corners = topology.triangles[element];
+    if (!topology.isOn(element)) return;
     for (int i = 0; i < 3; ++i) m_ends[i] = {corners[i], m_shape.at(m_positions[corners[i]])};
     for (int i = 0; i < 3; ++i) {
       const auto& [vertex, from] = m_ends[i];
-      if (topology.ownsCorner(primitive, i))
+      if (topology.ownsCorner(element, i))
         find(ShapeElement::Vertex, vertex, {vertex, vertex, vertex}, std::array{m_ends[i]}, [&] {
           return NearestToShape{Vector3d::UnitX(), from.normal, from.distance, true};
         });
-      if (!topology.ownsEdge(primitive, i)) continue;
-      const Segment& edge = topology.edges[topology.triangleEdges[primitive][i]];
+      if (!topology.ownsEdge(element, i)) continue;
+      const Segment& edge = topology.edges[topology.triangleEdges[element][i]];
       find(ShapeElement::Edge, edge[0], {edge[0], edge[1], edge[1]},
            std::array{m_ends[i], m_ends[(i + 1) % 3]},
            [&] { return m_shape.nearestOfEdge(m_positions[edge[0]], m_positions[edge[1]]); });
     }
     if (topology.hasFaces())
-      find(ShapeElement::Face, primitive, corners, m_ends,
+      find(ShapeElement::Face, element, corners, m_ends,
            [&] { return nearestOfTriangle(corners); });
   }
 
@@ -340,10 +340,10 @@ class ShapeContactFinder {
 }  // namespace
 
 void findShapeContacts(const TriangleMesh& mesh, const PlacedShape& shape,
-                       const PairSettings& settings, std::span<const std::uint32_t> primitives,
+                       const PairSettings& settings, std::span<const std::uint32_t> elements,
                        ShapeContactBuffers& out) {
   ShapeContactFinder finder(mesh, shape, settings, out);
-  for (const std::uint32_t primitive : primitives) finder.test(primitive);
+  for (const std::uint32_t element : elements) finder.test(element);
 }
 
 namespace {

@@ -22,7 +22,7 @@ struct ShapeContactBuffers {
   std::size_t exactDecisions = 0;  ///< left to exact arithmetic
 };
 
-/// Contacts with the shape of the features that the primitives of the mesh own. The settings'
+/// Contacts with the shape of the features that the elements of the mesh own. The settings'
 /// method is Proximity or Continuous.
 ///
 /// All: every vertex, edge and triangle at most the thickness and its radius from the shape, at its
@@ -33,7 +33,7 @@ struct ShapeContactBuffers {
 /// the nearest point is then strictly inside: whatever first comes so near is one of them. A plane
 /// has no edges and no corners. Edges and triangles come near to a cylinder as a whole.
 void findShapeContacts(const TriangleMesh&, const PlacedShape&, const PairSettings&,
-                       std::span<const std::uint32_t> primitives, ShapeContactBuffers& out);
+                       std::span<const std::uint32_t> elements, ShapeContactBuffers& out);
 
 /// The contact of two shapes, if they are near enough; Continuous: where they first are within the
 /// step.

@@ -1,8 +1,8 @@
 #include "Shapes/Shape.h"
 #include "Shapes/ShapeLengths.h"
 
-#include "Math/Compensated.h"
-#include "Math/Predicates.h"
+#include "Exact/Compensated.h"
+#include "Exact/Predicates.h"
 #include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>

@@ -1,7 +1,7 @@
 #include "Shapes/ShapeStep.h"
 
 #include "Shapes/ShapeLengths.h"
-#include "Math/Compensated.h"
+#include "Exact/Compensated.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>

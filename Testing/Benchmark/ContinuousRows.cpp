@@ -28,8 +28,8 @@ constexpr double kTimesEarliest = 5, kTimesEveryTime = 20;
 /// One published step, again and again.
 class Step {
  public:
-  Step(const Workload& workload, Contacts contacts, double thickness)
-      : m_workload(workload), m_earliest(contacts == Contacts::Earliest), m_detection([&] {
+  Step(const Workload& workload, bool earliestTimeOnly, double thickness)
+      : m_workload(workload), m_earliest(earliestTimeOnly), m_detection([&] {
           Settings settings;
           settings.threads = workload.task.threads;
           settings.octree.update = OctreeUpdate::Rebuild;
@@ -37,7 +37,8 @@ class Step {
         }()) {
     PairSettings settings;
     settings.method = Method::Continuous;
-    settings.contacts = contacts;
+    settings.contacts = Contacts::All;
+    settings.earliestTimeOnly = earliestTimeOnly;
     settings.thickness = thickness;
     m_id = m_detection.addTriangleMesh(workload.frames[0][0], workload.task.meshes[0]);
     m_detection.addCollisionPair(m_id, m_id, settings);
@@ -70,13 +71,13 @@ class Step {
 
 struct Kind {
   const char* name;
-  Contacts contacts;
+  bool earliestTimeOnly;
   double thickness;  ///< of the mean edge
 };
-constexpr Kind kKinds[] = {{"earliest time", Contacts::Earliest, 0},
-                           {"all times", Contacts::All, 0},
-                           {"earliest time, thickness", Contacts::Earliest, 0.05},
-                           {"all times, thickness", Contacts::All, 0.05}};
+constexpr Kind kKinds[] = {{"earliest time", true, 0},
+                           {"all times", false, 0},
+                           {"earliest time, thickness", true, 0.05},
+                           {"all times, thickness", false, 0.05}};
 
 /// Median milliseconds of each kind, and of Embree; in turns.
 struct Medians {
@@ -88,7 +89,7 @@ Medians takeTurns(const Workload& workload, const MeasureOptions& options) {
   std::vector<std::unique_ptr<Step>> steps;
   // A workload's thickness is a tenth of the mean edge.
   for (const Kind& kind : kKinds)
-    steps.push_back(std::make_unique<Step>(workload, kind.contacts,
+    steps.push_back(std::make_unique<Step>(workload, kind.earliestTimeOnly,
                                            kind.thickness * 10 * workload.task.thickness));
   std::vector<double> times[std::size(kKinds)], narrow[std::size(kKinds)], embree;
 #ifdef PALPATE_BENCHMARK_PEERS
@@ -142,7 +143,7 @@ void rowsOf(Report& report, const Reference& reference, const Workload& workload
         1e6 * medians.narrow[i] / static_cast<double>(featureCandidates(workload));
     if (kind.contacts == Contacts::All && kind.thickness == 0)
       row("ns a feature candidate", nanoseconds);
-    const bool earliest = kind.contacts == Contacts::Earliest;
+    const bool earliest = kind.earliestTimeOnly;
     char found[32];
     std::snprintf(found, sizeof found, earliest ? "%.6f" : "%.0f", medians.found[i]);
     std::vector<std::string> cells = {name + ", " + kind.name, milliseconds(medians.kinds[i]),

@@ -59,7 +59,7 @@ class FeatureCandidates {
   }
 
  private:
-  static void receive(void* context, std::span<const TrianglePair> pairs) {
+  static void receive(void* context, std::span<const ElementPair> pairs) {
     auto& self = *static_cast<FeatureCandidates*>(context);
     const MeshTopology& topology = self.m_geometry.mesh.topology;
     findFeaturePairs(topology, topology, &self.m_floats, pairs, self.m_features);

@@ -1,5 +1,6 @@
 // Vertices inside a closed body, beside CGAL; and a million particles around it, beside brute
 // force.
+#include "Common/QueryCalls.h"
 #include "Rows.h"
 
 #include "Common/RandomMeshes.h"
@@ -10,6 +11,7 @@
 #endif
 
 #include <palpate/OctreeBasedCD.h>
+#include <palpate/PenetrationTracker.h>
 
 #include <algorithm>
 #include <cmath>
@@ -45,9 +47,10 @@ void insideRow(Report& report, const std::string& name, const testing::Mesh& bod
   std::vector<double> samples;
   std::size_t inside = 0;
   double depth = 0;
+  std::vector<InsideVertex> found;
   for (int i = 0; i < 7; ++i) {
     const double start = now();
-    const auto found = detection.findInsideVertices(asked, id);
+    detection.queries().findInsideVertices(asked, id, found);
     samples.push_back(now() - start);
     inside = found.size();
     depth = 0;
@@ -84,14 +87,15 @@ void windingRow(Report& report, const testing::Mesh& body, const Points& points,
     std::vector<double> samples;
     std::vector<InsideVertex> inside;
     for (int i = 0; i < 4; ++i) {
+      detection.setPositions(id, mesh.positions);  // the same ones: the octree stays
       const double start = now();
-      const auto found =
-          detection.findInsideVertices(asked, id, {.rule = InsideRule::WindingNumber});
+      detection.queries().findInsideVertices(asked, id, inside,
+                                             {.rule = InsideRule::WindingNumber});
       samples.push_back(now() - start);
-      inside.assign(found.begin(), found.end());
     }
     samples.erase(samples.begin());
-    if (&mesh == &body && !std::ranges::equal(detection.findInsideVertices(asked, id), inside))
+    if (&mesh == &body &&
+        !std::ranges::equal(testing::insideVertices(detection, asked, id), inside))
       report.line({"rules answer otherwise"});
     const double each = 1000 * median(samples) / static_cast<double>(points.size());
     report.line({std::string("winding number, ") + name + ", " + std::to_string(threads) +
@@ -103,7 +107,7 @@ void windingRow(Report& report, const testing::Mesh& body, const Points& points,
 }
 
 /// Probes in a solid of 162,000 tetrahedra, which deforms in each frame: us a probe, with the
-/// update; which tetrahedron and weights, or ways out that are followed.
+/// update; which tetrahedron and weights, or tracked penetration directions.
 void embeddedRow(Report& report, const Points& probes, Engine engine, int threads) {
   testing::Random random(2);
   const testing::Solid solid = testing::cells(30, random);
@@ -114,22 +118,24 @@ void embeddedRow(Report& report, const Points& probes, Engine engine, int thread
   OctreeBasedCD detection(settings);
   const GeometryId asked = detection.addPointSet(probes),
                    id = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra);
-  std::vector<double> embedded, followed;
+  PenetrationTracker tracker(asked, id);
+  std::vector<EmbeddedVertex> found;
+  std::vector<double> embedded, tracked;
   Points deformed = solid.positions;
   for (int frame = 0; frame < (bruteForce ? 2 : 9); ++frame) {
     for (std::size_t v = 0; v < deformed.size(); ++v)
       deformed[v].x() = solid.positions[v].x() + 0.4 * std::sin(deformed[v].y() + 0.2 * frame);
     const double start = now();
     detection.setPositions(id, deformed);
-    detection.findEmbeddedVertices(asked, id);
+    detection.queries().findEmbeddedVertices(asked, id, found);
     embedded.push_back(now() - start);
-    if (!bruteForce) detection.followInsideVertices(asked, id);
-    followed.push_back(now() - start - embedded.back());
+    if (!bruteForce) tracker.update(detection.queries());
+    tracked.push_back(now() - start - embedded.back());
   }
-  for (auto* samples : {&embedded, &followed}) {
+  for (auto* samples : {&embedded, &tracked}) {
     samples->erase(samples->begin());
-    if (bruteForce && samples == &followed) continue;
-    const std::string name = samples == &embedded ? "embedded" : "followed";
+    if (bruteForce && samples == &tracked) continue;
+    const std::string name = samples == &embedded ? "embedded" : "tracked";
     const double each = 1000 * median(*samples) / static_cast<double>(probes.size());
     report.line(
         {name + (bruteForce ? ", brute force" : ", " + std::to_string(threads) + " threads"),

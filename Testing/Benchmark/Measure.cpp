@@ -5,7 +5,7 @@
 namespace palpate::benchmark {
 namespace {
 
-using Pairs = std::vector<TrianglePair>;
+using Pairs = std::vector<ElementPair>;
 
 clockid_t g_clock = CLOCK_MONOTONIC;
 
@@ -36,7 +36,7 @@ class SetChecker {
   }
 
  private:
-  double gapOf(std::size_t pair, TrianglePair p) const {
+  double gapOf(std::size_t pair, ElementPair p) const {
     const auto [a, b] = m_task.pairs[pair];
     const double margin = m_task.thickness / 2;
     return gap(boxOf(m_task.meshes[a][p.a], m_positions[a].data(), margin),
@@ -47,7 +47,7 @@ class SetChecker {
     Pairs missing;
     std::set_difference(all.begin(), all.end(), set.begin(), set.end(),
                         std::back_inserter(missing));
-    for (const TrianglePair& p : missing) check.missed += gapOf(pair, p) <= 0;
+    for (const ElementPair& p : missing) check.missed += gapOf(pair, p) <= 0;
   }
 
   void countExtra(std::size_t pair, const Pairs& set, SetCheck& check) const {
@@ -65,7 +65,7 @@ class SetChecker {
 };
 
 void addToHash(std::uint64_t& hash, const Pairs& pairs) {
-  for (const TrianglePair& p : pairs)
+  for (const ElementPair& p : pairs)
     for (const std::uint32_t id : {p.a, p.b}) hash = (hash ^ id) * 0x100000001b3u;
 }
 

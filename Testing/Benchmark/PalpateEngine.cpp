@@ -43,13 +43,13 @@ class PalpateEngine : public Peer {
     }
     m_lists.clear();
     m_scene->detection.forEachCandidate(
-        [this](const CollisionPair& pair, std::span<const TrianglePair> batch) {
-          std::vector<TrianglePair>& list = m_lists.of(indexOf(pair), 0);
+        [this](const CollisionPair& pair, std::span<const ElementPair> batch) {
+          std::vector<ElementPair>& list = m_lists.of(indexOf(pair), 0);
           list.insert(list.end(), batch.begin(), batch.end());
         });
   }
 
-  std::vector<TrianglePair> candidates(std::size_t pair) const override {
+  std::vector<ElementPair> candidates(std::size_t pair) const override {
     if (m_order == PairOrder::Found) return m_lists.sorted(pair);
     const auto pairs = m_scene->detection.candidatePairs(first(pair), second(pair));
     return {pairs.begin(), pairs.end()};

@@ -118,7 +118,7 @@ class ValidityCost {
     }
     return spent;
   }
-  std::span<const TrianglePair> candidatesOf(const std::pair<std::size_t, std::size_t>& pair) {
+  std::span<const ElementPair> candidatesOf(const std::pair<std::size_t, std::size_t>& pair) {
     return m_detection.candidatePairs(m_ids[pair.first], m_ids[pair.second]);
   }
   /// As many pairs as this frame looked at, at what all candidates take.
@@ -138,7 +138,7 @@ class ValidityCost {
   }
   /// With what the step asks for, less without.
   double narrowPhase(const std::pair<std::size_t, std::size_t>& pair) {
-    if (m_settings.contacts == Contacts::Earliest) return 0;
+    if (m_settings.earliestTimeOnly) return 0;
     const auto candidates = candidatesOf(pair);
     MeshPair plain{m_meshes[pair.first], m_meshes[pair.second], m_settings};
     MeshPair asked = plain;
@@ -186,7 +186,7 @@ void validityRows(Report& report, const RowOptions& options) {
     const std::pair<const char*, PairSettings> settings[] = {
         {"Proximity", {.method = Method::Proximity, .thickness = thickness}},
         {"Continuous", {.method = Method::Continuous}},
-        {"earliest", {.method = Method::Continuous, .contacts = Contacts::Earliest}}};
+        {"earliest", {.method = Method::Continuous, .earliestTimeOnly = true}}};
     for (const auto& [name, ofPair] : settings) {
       ValidityCost cost(scene, ofPair);
       double whole = 0, validity = 0;

@@ -52,7 +52,7 @@ inline Row rowOf(const EdgeEdgeContact& c) {
 /// What one pair answers, list by list, in the order given out.
 struct Rows {
   std::vector<Row> vertexTriangle, triangleVertex, edgeEdge;
-  std::vector<TrianglePair> intersectingTriangles;
+  std::vector<ElementPair> intersectingTriangles;
   double earliestTimeOfImpact = std::numeric_limits<double>::infinity();
 
   Rows() = default;
@@ -174,7 +174,7 @@ inline std::vector<MethodCase> methodCases(double thickness) {
           {"Intersection", {Method::Intersection, 0, Contacts::All}},
           {"Continuous", {Method::Continuous, 0, Contacts::All}},
           {"ContinuousWithThickness", {Method::Continuous, thickness, Contacts::All}},
-          {"ContinuousEarliest", {Method::Continuous, 0, Contacts::Earliest}}};
+          {"ContinuousEarliest", {.method = Method::Continuous, .earliestTimeOnly = true}}};
 }
 
 }  // namespace palpate::testing

@@ -1,3 +1,4 @@
+#include "Common/QueryCalls.h"
 #include "Common/History.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +16,7 @@ constexpr int kTypes = 8;  ///< see randomThing() and add()
 Settings settingsOfLife(Random& random) {
   Settings settings = settingsOf(Engine::Octree, random() % 4 == 0 ? 2 : 1,
                                  random() % 3 ? OctreeUpdate::Auto : OctreeUpdate::Rebuild);
-  settings.octree.maxPrimitivesPerLeaf = random() % 2 ? 32 : 2;
+  settings.octree.maxElementsPerLeaf = random() % 2 ? 32 : 2;
   return settings;
 }
 
@@ -39,7 +40,7 @@ std::vector<std::uint64_t> wordsOf(F&& query) {
 void append(std::vector<std::uint64_t>& words, const InsideVertex& v) {
   Row row{v.vertex, v.triangle, v.decided};
   testing::append(row, v.barycentric);
-  testing::append(row, v.exitDirection);
+  testing::append(row, v.direction);
   testing::append(row, v.depth);
   words.insert(words.end(), row.begin(), row.end());
 }
@@ -153,7 +154,7 @@ void RandomHistory::remove(GeometryId id) {
   for (OctreeBasedCD* each : {&m_life, &m_committed}) each->removeGeometry(id);
   m_bodies.erase(id);
   std::erase_if(m_pairs, [=](const Pair& pair) { return pair.a == id || pair.b == id; });
-  if (m_followed && (m_followed->first == id || m_followed->second == id)) m_followed.reset();
+  if (m_tracked && (m_tracked->vertices == id || m_tracked->body == id)) m_tracked.reset();
 }
 
 void RandomHistory::setPositions(GeometryId id) {
@@ -251,7 +252,7 @@ PairSettings RandomHistory::randomSettings() {
   settings.thickness = m_random() % 2 ? uniform(m_random, 0.001, 0.1) : 0.0;
   settings.contacts = m_random() % 2 ? Contacts::Distinct : Contacts::All;
   if (settings.method == Method::Continuous && m_random() % 4 == 0)
-    settings.contacts = Contacts::Earliest;
+    settings.earliestTimeOnly = true;
   if (m_random() % 8 == 0) settings.restDistance = 0.2;
   if (m_random() % 4 == 0) settings.timeTolerance = 1e-3;
   return settings;
@@ -304,17 +305,17 @@ void RandomHistory::query() {
       return;
     }
     case 4:
-      accepts([&] { m_life.findInsideVertices(a, b); });
+      accepts([&] { testing::insideVertices(m_life, a, b); });
       return;
     case 5:
-      accepts([&] { m_life.findInsideVertices(a, b, {.rule = InsideRule::WindingNumber}); });
+      accepts([&] { testing::insideVertices(m_life, a, b, {.rule = InsideRule::WindingNumber}); });
       return;
     case 6:
-      accepts([&] { m_life.findEmbeddedVertices(a, b); });
+      accepts([&] { testing::embeddedVertices(m_life, a, b); });
       return;
     default:
-      if (!m_followed) m_followed = {a, b};
-      accepts([&] { m_life.followInsideVertices(m_followed->first, m_followed->second); });
+      if (!m_tracked) m_tracked.emplace(a, b);
+      accepts([&] { m_tracked->life.update(m_life.queries()); });
   }
 }
 
@@ -434,19 +435,20 @@ void RandomHistory::compareQueries(OctreeBasedCD& other,
     std::vector<std::uint64_t> all;
     for (const InsideRule rule : {InsideRule::Closed, InsideRule::WindingNumber}) {
       const auto words = wordsOf([&](auto& out) {
-        for (const InsideVertex& v : collisions.findInsideVertices(vertices, body, {.rule = rule}))
+        for (const InsideVertex& v :
+             testing::insideVertices(collisions, vertices, body, {.rule = rule}))
           append(out, v);
       });
       all.insert(all.end(), words.begin(), words.end());
     }
     const auto words = wordsOf([&](auto& out) {
-      for (const EmbeddedVertex& v : collisions.findEmbeddedVertices(vertices, body)) {
+      for (const EmbeddedVertex& v : testing::embeddedVertices(collisions, vertices, body)) {
         out.push_back(v.vertex);
         out.push_back(v.at.tetrahedron);
         for (const double weight : v.at.weights)
           out.push_back(std::bit_cast<std::uint64_t>(weight));
       }
-      const auto at = collisions.findTetrahedron(body, point);
+      const auto at = collisions.queries().findTetrahedron(body, point);
       out.push_back(at ? at->tetrahedron : ~0u);
     });
     all.insert(all.end(), words.begin(), words.end());
@@ -475,18 +477,17 @@ void RandomHistory::compareWhatLasts() {
     EXPECT_EQ(life.geometries[i].before, committed.geometries[i].before);
     EXPECT_EQ(life.geometries[i].now, committed.geometries[i].now);
   }
-  if (!m_followed) return;
-  const auto follow = [&](OctreeBasedCD& collisions) {
+  if (!m_tracked) return;
+  const auto track = [&](PenetrationTracker& tracker, OctreeBasedCD& collisions) {
     return wordsOf([&](auto& out) {
-      for (const FollowedVertex& v :
-           collisions.followInsideVertices(m_followed->first, m_followed->second)) {
-        append(out, v.wayOut);
+      for (const TrackedVertex& v : tracker.update(collisions.queries())) {
+        append(out, v.penetration);
         append(out, v.nearest);
         out.push_back(static_cast<std::uint64_t>(v.change));
       }
     });
   };
-  EXPECT_EQ(follow(m_life), follow(m_committed));
+  EXPECT_EQ(track(m_tracked->life, m_life), track(m_tracked->committed, m_committed));
 }
 
 void RandomHistory::endStep() {
@@ -497,7 +498,7 @@ void RandomHistory::endStep() {
     body.translationBefore = body.translation;
     body.isNew = body.bodyGiven = body.transformGiven = false;
   }
-  if (m_random() % 4 == 0) m_followed.reset();
+  if (m_random() % 4 == 0) m_tracked.reset();
 }
 
 void RandomHistory::frame() {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <palpate/OctreeBasedCD.h>
+#include <palpate/PenetrationTracker.h>
 
 #include "Common/PairRun.h"
 #include "Common/Solids.h"
@@ -95,7 +96,13 @@ class RandomHistory {
   OctreeBasedCD m_committed;
   std::map<GeometryId, Body> m_bodies;
   std::vector<Pair> m_pairs;
-  std::optional<std::pair<GeometryId, GeometryId>> m_followed;  ///< asked for in this step
+  /// Vertices and body of the trackers, one for each of the two objects.
+  struct Tracked {
+    Tracked(GeometryId a, GeometryId b) : vertices(a), body(b), life(a, b), committed(a, b) {}
+    GeometryId vertices, body;
+    PenetrationTracker life, committed;
+  };
+  std::optional<Tracked> m_tracked;
   std::size_t m_contacts = 0;
 };
 

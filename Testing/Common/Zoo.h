@@ -230,7 +230,7 @@ inline std::vector<Specimen> zoo() {
       {.name = "two empty meshes", .a = none, .b = none},
       {.name = "one triangle", .a = one, .b = moved(one, {0.25, 0.25, 0.0625})},
       {.name = "one triangle twice named", .a = twins, .b = twins},
-      {.name = "all primitives identical", .a = copies, .b = copies},
+      {.name = "all elements identical", .a = copies, .b = copies},
       {.name = "cell borders and root corners",
        .a = onCellBorders(),
        .b = moved(onCellBorders(), {0.125, 0, 0})},

@@ -36,7 +36,7 @@ struct TriangleTally {
 };
 
 template <class Engine>
-std::vector<TrianglePair> intersecting(const Mesh& a, const Mesh& b) {
+std::vector<ElementPair> intersecting(const Mesh& a, const Mesh& b) {
   Engine engine;
   const GeometryId first = engine.addTriangleMesh(a.positions, a.triangles),
                    second = engine.addTriangleMesh(b.positions, b.triangles);
@@ -71,10 +71,10 @@ TriangleTally compareTriangles(Soups soups, int runs) {
     const auto ours = intersecting<OctreeBasedCD>(a, b), theirs = intersecting<FclEngine>(a, b);
     tally.pairs += a.triangles.size() * b.triangles.size();
     tally.intersecting += ours.size();
-    std::vector<TrianglePair> differing;
+    std::vector<ElementPair> differing;
     std::set_symmetric_difference(ours.begin(), ours.end(), theirs.begin(), theirs.end(),
                                   std::back_inserter(differing));
-    for (const TrianglePair& pair : differing) {
+    for (const ElementPair& pair : differing) {
       const bool truth = intersectExactly(a, pair.a, b, pair.b);
       const bool weSay = std::binary_search(ours.begin(), ours.end(), pair);
       if (weSay != truth) ++tally.palpateWrong;

@@ -11,7 +11,7 @@
 namespace palpate::testing {
 namespace {
 
-std::vector<TrianglePair> pairsOf(const CollisionData& data) {
+std::vector<ElementPair> pairsOf(const CollisionData& data) {
   return {data.intersectingTriangles().begin(), data.intersectingTriangles().end()};
 }
 
@@ -31,7 +31,7 @@ class Both {
   /// Detects, expects the same pairs, and returns how many.
   std::size_t expectSame(GeometryId a, GeometryId b) {
     each([](auto& engine) { engine.detectCollision(); });
-    const std::vector<TrianglePair> pairs = pairsOf(octree.collisionData(a, b));
+    const std::vector<ElementPair> pairs = pairsOf(octree.collisionData(a, b));
     EXPECT_EQ(pairsOf(fcl.collisionData(a, b)), pairs);
     return pairs.size();
   }

@@ -1,5 +1,6 @@
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/QueryCalls.h"
 #include "Common/RandomMeshes.h"
 #include "Common/ShapeTruth.h"
 
@@ -65,7 +66,7 @@ TEST(FclFaults, ContainedMeshesGiveNoContact) {
   OctreeBasedCD collisions;
   const GeometryId a = collisions.addTriangleMesh(outer.positions, outer.triangles),
                    b = collisions.addTriangleMesh(inner.positions, inner.triangles);
-  EXPECT_EQ(collisions.findInsideVertices(b, a).size(), inner.positions.size());
+  EXPECT_EQ(testing::insideVertices(collisions, b, a).size(), inner.positions.size());
 }
 
 // Confirmed: contacts of neighbours at one place; and of triangles in one plane several for a pair.

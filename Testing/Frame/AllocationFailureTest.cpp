@@ -1,8 +1,10 @@
 #include <palpate/OctreeBasedCD.h>
+#include <palpate/PenetrationTracker.h>
 #include <palpate/Capture.h>
 #include <palpate/ConstraintRows.h>
 #include <palpate/StepGuard.h>
 
+#include "Common/QueryCalls.h"
 #include "Common/FailingAllocation.h"
 #include "Common/PairRun.h"
 #include "Common/Solids.h"
@@ -81,6 +83,7 @@ struct Scene {
     for (int i = 0; i < 12; ++i) corners.push_back(randomPoint(random, 0.2, 0.8));
     block = detection.addAnalyticalGeometry(ConvexHull{corners});
     organRest = body.positions;
+    tracker.emplace(drops, organ);
     detection.addCollisionPair(organ, sheetId, {Method::Auto, 0.05});
     detection.addCollisionPair(organ, organ, {Method::Continuous, 0.0});
     detection.addCollisionPair(line, organ, {Method::Proximity, 0.05});
@@ -106,12 +109,12 @@ struct Scene {
       words.push_back(found.size());
       for (const auto& each : found) append(words, depth(each));
     };
-    add(detection.findInsideVertices(drops, organ), [](const auto& v) { return v.depth; });
-    add(detection.findInsideVertices(drops, sheetId, {.rule = InsideRule::WindingNumber}),
+    add(testing::insideVertices(detection, drops, organ), [](const auto& v) { return v.depth; });
+    add(testing::insideVertices(detection, drops, sheetId, {.rule = InsideRule::WindingNumber}),
         [](const auto& v) { return v.depth; });
-    add(detection.findEmbeddedVertices(drops, solid),
+    add(testing::embeddedVertices(detection, drops, solid),
         [](const auto& v) { return v.at.weights[0]; });
-    words.push_back(detection.findTetrahedron(solid, {0.3, 0.3, 0.3}).has_value());
+    words.push_back(detection.queries().findTetrahedron(solid, {0.3, 0.3, 0.3}).has_value());
     detection.detectCollision();
     for (const CollisionPair& pair : detection.pairs()) {
       words.push_back(detection.collisionData(pair.a, pair.b).hash());
@@ -127,6 +130,7 @@ struct Scene {
 
   OctreeBasedCD detection;
   GeometryId organ, sheetId, line, drops, solid, tool, block;
+  std::optional<PenetrationTracker> tracker;
   Positions organRest;
 };
 
@@ -153,18 +157,19 @@ std::vector<Call> calls() {
       {"forEachCandidate", [](Scene& s) { s.detection.forEachCandidate([](auto&&...) {}); }},
       {"update", [](Scene& s) { s.detection.update(); }},
       {"advance", [](Scene& s) { s.detection.advance(); }},
-      {"findInsideVertices", [](Scene& s) { s.detection.findInsideVertices(s.drops, s.organ); }},
-      {"followInsideVertices",
-       [](Scene& s) { s.detection.followInsideVertices(s.drops, s.organ); }},
+      {"findInsideVertices",
+       [](Scene& s) { testing::insideVertices(s.detection, s.drops, s.organ); }},
+      {"PenetrationTracker", [](Scene& s) { s.tracker->update(s.detection.queries()); }},
       {"findInsideVertices by winding number",
        [](Scene& s) {
-         s.detection.findInsideVertices(s.drops, s.sheetId, {.rule = InsideRule::WindingNumber});
+         testing::insideVertices(s.detection, s.drops, s.sheetId,
+                                 {.rule = InsideRule::WindingNumber});
        }},
       {"findEmbeddedVertices",
-       [](Scene& s) { s.detection.findEmbeddedVertices(s.drops, s.solid); }},
+       [](Scene& s) { testing::embeddedVertices(s.detection, s.drops, s.solid); }},
       {"findTetrahedron",
        [](Scene& s) {
-         s.detection.findTetrahedron(s.solid, {0.3, 0.3, 0.3});
+         s.detection.queries().findTetrahedron(s.solid, {0.3, 0.3, 0.3});
        }},
       {"setPositions", [=](Scene& s) { s.detection.setPositions(s.organ, body); }},
       {"setPositions, both", [=](Scene& s) { s.detection.setPositions(s.organ, body, body); }},

@@ -73,8 +73,9 @@ TEST(Auto, AnswersAsBruteForceDoes) {
     const Case c = randomCase(random, motion.slow, motion.fastShare, motion.fast);
     for (const PairSettings& settings :
          {PairSettings{.thickness = kThickness},
-          PairSettings{.thickness = kThickness, .contacts = Contacts::All, .tolerance = 0.005},
-          PairSettings{.thickness = i % 2 ? 0.0 : kThickness, .tolerance = 0.0}}) {
+          PairSettings{
+              .thickness = kThickness, .contacts = Contacts::All, .motionTolerance = 0.005},
+          PairSettings{.thickness = i % 2 ? 0.0 : kThickness, .motionTolerance = 0.0}}) {
       SCOPED_TRACE(std::string(motion.name) + ", case " + std::to_string(i));
       PairRun truth(settingsOf(Engine::BruteForce), c.a, c.b, settings);
       truth.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
@@ -121,7 +122,8 @@ TEST(Auto, MissesNothingThatContinuousFinds) {
     truth.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
     run.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
     const double most =
-        thickness + (automatic.tolerance < 0 ? thickness / 2 : automatic.tolerance) + 1e-6;
+        thickness + (automatic.motionTolerance < 0 ? thickness / 2 : automatic.motionTolerance) +
+        1e-6;
     for (const CollisionPair& pair : run.detection().pairs()) {
       const CollisionData& data = run.detection().collisionData(pair.a, pair.b);
       const auto expected = idsOf(truth.detection().collisionData(pair.a, pair.b)),

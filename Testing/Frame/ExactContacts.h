@@ -40,7 +40,7 @@ class ExactContacts {
     }
   }
 
-  bool intersect(const TrianglePair& pair) const { return Meeting(*this, pair.a, pair.b).any; }
+  bool intersect(const ElementPair& pair) const { return Meeting(*this, pair.a, pair.b).any; }
 
  private:
   static constexpr std::uint32_t kNone = ~0u;
@@ -248,7 +248,7 @@ class ExactContacts {
       for (int end = 0; end < 8; end += 4)
         largest = std::max(largest, (p[end + i] - p[end]).cwiseAbs().maxCoeff());
     }
-    const double error = TimeOfImpactSettings{}.tolerance * displacement +
+    const double error = TimeOfImpactSettings{}.timeTolerance * displacement +
                          0x1p-40 * (largest + m_settings.thickness);
     if (std::abs(least - m_settings.thickness) <= error) return Answer::Either;
     return least < m_settings.thickness ? Answer::Yes : Answer::No;

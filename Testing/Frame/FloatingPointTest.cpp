@@ -152,7 +152,7 @@ Bits featureAnswers(const test::CornersPair& pair, const Mode& mode) {
   const bool intersect =
       unchanged([&] { return trianglesIntersect(a[0], a[1], a[2], b[0], b[1], b[2]); });
   const auto [vertexTime, edgeTime] = both({});
-  const auto [vertexNear, edgeNear] = both({.minimumDistance = 0.125, .tolerance = 0x1p-10});
+  const auto [vertexNear, edgeNear] = both({.minimumDistance = 0.125, .timeTolerance = 0x1p-10});
   const Stencil stencils[] = {
       stencil(VertexTriangleContact{0, 1, {2, 3, 4}, vertex.barycentric, vertex.normal, 0, 0}),
       unchanged([&] {

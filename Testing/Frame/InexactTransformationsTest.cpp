@@ -105,7 +105,7 @@ class InexactTransformations : public ::testing::TestWithParam<MethodCase> {
     }
     const ExactContacts here = exactly(scene, false), thereExactly = exactly(there, false);
     compare(own.intersectingTriangles(run), other.intersectingTriangles(otherRun),
-            [&](const TrianglePair& pair, bool wasFound) {
+            [&](const ElementPair& pair, bool wasFound) {
               EXPECT_EQ(here.intersect(pair), wasFound);
               EXPECT_EQ(thereExactly.intersect(pair), !wasFound);
             });
@@ -125,7 +125,7 @@ TEST_P(InexactTransformations, ChangeOnlyWhatRoundingChanges) {
   RecordProperty("same", std::to_string(m_same));
   RecordProperty("different", std::to_string(m_different));
   std::printf("%zu contacts alike, %zu on one side only\n", m_same, m_different);
-  if (GetParam().settings.contacts == Contacts::Earliest) return;
+  if (GetParam().settings.earliestTimeOnly) return;
   EXPECT_GT(m_same, 1000u);
   // On the lattice everything touches. A minimum distance is kept with a tolerance above rounding.
   EXPECT_EQ(m_different > 0u,
@@ -134,7 +134,7 @@ TEST_P(InexactTransformations, ChangeOnlyWhatRoundingChanges) {
 
 /// The judge above, judged: over a sample of all there is, found or not.
 TEST_P(InexactTransformations, ExactAnswersAreThoseFound) {
-  if (distinct() || GetParam().settings.contacts == Contacts::Earliest) return;
+  if (distinct() || GetParam().settings.earliestTimeOnly) return;
   std::size_t yes = 0, no = 0;
   for (const StepScene& scene : scenes()) {
     if (scene.name != "lattice" && scene.name != "soups") continue;

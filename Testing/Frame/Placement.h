@@ -128,8 +128,8 @@ class Placement {
     return all;
   }
 
-  std::vector<TrianglePair> intersectingTriangles(const PairRun& run) const {
-    std::vector<TrianglePair> all;
+  std::vector<ElementPair> intersectingTriangles(const PairRun& run) const {
+    std::vector<ElementPair> all;
     for (auto [s, t] : run.data().intersectingTriangles()) {
       if (swapped()) std::swap(s, t);
       all.push_back({m_names[0].triangles[s], m_names[1].triangles[t]});

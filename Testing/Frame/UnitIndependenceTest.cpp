@@ -92,7 +92,7 @@ class UnitIndependence : public ::testing::TestWithParam<MethodCase> {
                  std::to_string(truth.ids[4]));
     if (continuous()) {
       // Of a time that may be up to the tolerance early, by as much as the search happened to be.
-      EXPECT_NEAR(found.time, truth.time, TimeOfImpactSettings{}.tolerance);
+      EXPECT_NEAR(found.time, truth.time, TimeOfImpactSettings{}.timeTolerance);
       // The plane turns a little in that time; where features never left it, it has no side.
       const bool turned = hasNoSide(truth) && found.normal.dot(truth.normal) < 0;
       const Vector3d expected = turned ? Vector3d(-truth.normal) : truth.normal;
@@ -122,7 +122,7 @@ TEST_P(UnitIndependence, ByTransformationsThatAreExact) {
       const Placement placement(scene, how);
       const PairRun run = placement.run(settings());
       EXPECT_NEAR(run.data().earliestTimeOfImpact(), truth.data().earliestTimeOfImpact(),
-                  continuous() ? TimeOfImpactSettings{}.tolerance : 0);
+                  continuous() ? TimeOfImpactSettings{}.timeTolerance : 0);
       EXPECT_EQ(placement.intersectingTriangles(run), own.intersectingTriangles(truth));
       for (const bool self : {false, true}) {
         auto found = placement.contacts(run, self, settings().contacts);

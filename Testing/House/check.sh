@@ -23,12 +23,16 @@ moduleOf() {
 allowedIn() {
   case $1 in
     Core) echo "Core/" ;;
-    Math) echo "Math/ Core/" ;;
-    Mesh) echo "Mesh/ Math/ Core/" ;;
-    Shapes) echo "Shapes/ Mesh/ Math/ Core/" ;;
+    Exact) echo "Exact/ Core/" ;;
+    Math) echo "Math/ Exact/ Core/" ;;
+    Mesh) echo "Mesh/ Math/ Exact/ Core/" ;;
+    Shapes) echo "Shapes/ Mesh/ Math/ Exact/ Core/" ;;
     Octree) echo "Octree/ Math/Box Core/" ;;
-    NarrowPhase) echo "NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
-    CollisionDetection) echo "CollisionDetection/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
+    NarrowPhase) echo "NarrowPhase/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
+    Queries) echo "Queries/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
+    Validity) echo "Validity/ NarrowPhase/ Mesh/ Math/ Core/" ;;
+    CollisionDetection) echo "CollisionDetection/ Validity/ Queries/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
+    Diagnostics) echo "Diagnostics/ CollisionDetection/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
     Vtk | Fcl) echo "$1/" ;;
   esac
 }
@@ -63,7 +67,7 @@ checkPlaces() {
         "<tbb/"* | "<oneapi/"* | "<thread" | "<condition_variable" | "<future" | "<execution" | "<pthread.h")
           place=Source/Core/Threads.cpp ;;
         "<hwy/"*) place=Source/Core/Simd.h ;;
-        "<gmp"*) place=Source/Math/Exact.h ;;
+        "<gmp"*) place=Source/Exact/Exact.h ;;
         "<vtk"* | "<X11/"*) place=Source/Adapters/Vtk/ ;;
         "<fcl/"* | "<ccd/"*) place=Source/Adapters/Fcl/ ;;
         *[./]*) place=nowhere ;;

@@ -166,7 +166,7 @@ TEST(Scenes, TakeLessThanAHundredBytesATriangle) {
       detection.update();
     }
     const OctreeStatistics statistics = detection.octree().statistics();
-    EXPECT_LT(statistics.bytes, 100 * statistics.primitives) << scene.meshes[0].triangles.size();
+    EXPECT_LT(statistics.bytes, 100 * statistics.elements) << scene.meshes[0].triangles.size();
   }
 }
 

@@ -86,7 +86,7 @@ TEST_F(ParaView, ReadsTheOctreesCells) {
   const vtkSmartPointer<vtkPolyData> data = read(octreeVtp(octree));
   std::vector<LooseOctree::Node> nodes;
   for (const auto id : octree.nodes())
-    if (!octree.node(id).primitives.empty()) nodes.push_back(octree.node(id));
+    if (!octree.node(id).elements.empty()) nodes.push_back(octree.node(id));
   ASSERT_EQ(data->GetNumberOfLines(), static_cast<vtkIdType>(12 * nodes.size()));
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     for (int line = 0; line < 12; ++line) {
@@ -96,8 +96,8 @@ TEST_F(ParaView, ReadsTheOctreesCells) {
       EXPECT_NEAR((p - q).lpNorm<1>(), nodes[n].bounds.sizes().x(), 1e-12);  // along an axis
       EXPECT_TRUE(nodes[n].bounds.contains(p) && nodes[n].bounds.contains(q));
       EXPECT_EQ(data->GetCellData()->GetArray("depth")->GetTuple1(cell), nodes[n].depth);
-      EXPECT_EQ(data->GetCellData()->GetArray("primitives")->GetTuple1(cell),
-                static_cast<double>(nodes[n].primitives.size()));
+      EXPECT_EQ(data->GetCellData()->GetArray("elements")->GetTuple1(cell),
+                static_cast<double>(nodes[n].elements.size()));
       EXPECT_EQ(data->GetCellData()->GetArray("geometry")->GetTuple1(cell),
                 static_cast<double>(nodes[n].geometry));
     }

@@ -95,7 +95,7 @@ std::string refusal(const Body& a, const Body& b, const PairSettings& settings) 
   return "";
 }
 
-void addTriangles(const Body& a, const Body& b, std::vector<TrianglePair>& pairs) {
+void addTriangles(const Body& a, const Body& b, std::vector<ElementPair>& pairs) {
   for (const Body* body : {&a, &b})
     if (static_cast<const Model&>(*body->geometry).num_tris == 0) return;
   // Without contacts, of which FCL has several for a pair of triangles, there is one of each.

@@ -285,10 +285,10 @@ void Window::Implementation::drawCells() const {
   Glyphs cubes;
   for (const auto id : octree.nodes()) {
     const LooseOctree::Node node = octree.node(id);
-    if (node.primitives.empty()) continue;
+    if (node.elements.empty()) continue;
     const Mesh& mesh = problem.geometries[indices.at(node.geometry)];
     cubes.add(mesh.rotation * node.bounds.center() + mesh.translation,
-              cells == 1 ? node.depth : static_cast<double>(node.primitives.size()),
+              cells == 1 ? node.depth : static_cast<double>(node.elements.size()),
               node.bounds.sizes().x(), Quaterniond(mesh.rotation));
   }
   vtkProperty* look = cubes.show(renderer, vtkNew<vtkCubeSource>(), 0.33, 0.33, 0.3);

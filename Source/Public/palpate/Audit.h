@@ -27,7 +27,7 @@ struct AuditFailure {
     Shape,
     ShapeShape
   };
-  using Contact = std::variant<std::monostate, VertexTriangleContact, EdgeEdgeContact, TrianglePair,
+  using Contact = std::variant<std::monostate, VertexTriangleContact, EdgeEdgeContact, ElementPair,
                                ShapeContact, ShapeShapeContact>;
 
   GeometryId a, b;          ///< the pair, as it was added

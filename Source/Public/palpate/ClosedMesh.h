@@ -44,39 +44,17 @@ struct InsideSettings {
   double margin = 0.0;
 };
 
-/// A vertex inside a body, and the shortest way out.
+/// A vertex inside a body, with the nearest point of its surface.
 struct InsideVertex {
   std::uint32_t vertex, triangle;        ///< of the other geometry; of the body
   std::array<std::uint32_t, 3> corners;  ///< the triangle's vertices
   Eigen::Vector3d barycentric;           ///< of the body's surface point nearest to the vertex
-  Eigen::Vector3d exitDirection;         ///< unit, from the vertex towards that point
-  double depth;                          ///< L, positive: the distance to it
+  Eigen::Vector3d
+      direction;  ///< unit: the penetration direction, from the vertex towards that point
+  double depth;   ///< L, positive: the distance to it
   /// InsideRule::WindingNumber: not within the margin, nor within rounding, of 1/2.
   bool decided = true;
   friend bool operator==(const InsideVertex&, const InsideVertex&) = default;
-};
-
-/// What became of a vertex's way out since the last call of followInsideVertices().
-enum class ExitChange {
-  Entered,  ///< the vertex was not inside then, or topology was set since: the nearest
-  None,     ///< the nearest
-  Kept,     ///< the nearest would have turned further than motion explains: the last direction
-  Jumped    ///< the same, and the last direction is no way out any more: the nearest
-};
-
-/// A vertex inside a body, and a way out that turns no further from call to call than motion
-/// explains, unless it says so.
-struct FollowedVertex {
-  /// Between the last direction and this, as lengths of differences of unit vectors, beyond what
-  /// motion explains.
-  static constexpr double kMostTurn = 0.5;
-  /// A direction is kept while it leaves the body no further away than this times the nearest way.
-  static constexpr double kMostDepth = 2.0;
-
-  InsideVertex wayOut;   ///< Kept: where the direction kept leaves the body
-  InsideVertex nearest;  ///< as findInsideVertices() has it
-  ExitChange change;
-  friend bool operator==(const FollowedVertex&, const FollowedVertex&) = default;
 };
 
 }  // namespace palpate

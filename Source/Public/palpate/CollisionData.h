@@ -116,11 +116,11 @@ class PALPATE_EXPORT CollisionData {
   struct Contents {
     std::vector<VertexTriangleContact> vertexTriangle, triangleVertex;
     std::vector<EdgeEdgeContact> edgeEdge;
-    std::vector<TrianglePair> intersectingTriangles;
+    std::vector<ElementPair> intersectingTriangles;
     std::vector<ShapeContact> shape;
     std::vector<ShapeShapeContact> shapeShape;
     double earliestTimeOfImpact =
-        std::numeric_limits<double>::infinity();  ///< with Contacts::Earliest
+        std::numeric_limits<double>::infinity();  ///< with PairSettings::earliestTimeOnly
     Validity validity;
   };
 
@@ -138,7 +138,7 @@ class PALPATE_EXPORT CollisionData {
   std::span<const EdgeEdgeContact> edgeEdge() const { return m_contents.edgeEdge; }
   /// Filled by Method::Intersection. Each pair has a contact, but for two triangles of one mesh
   /// with a common vertex that meet only where an edge pierces the other.
-  std::span<const TrianglePair> intersectingTriangles() const {
+  std::span<const ElementPair> intersectingTriangles() const {
     return m_contents.intersectingTriangles;
   }
   /// Elements with an analytical shape, which have no other contacts; by (element, id, vertices).

@@ -21,7 +21,7 @@ struct FrameStatistics {
   std::size_t triangles = 0, segments = 0, points = 0;
   std::size_t untestedVertices = 0;  ///< vertices in no triangle or segment: counted, not tested
   std::size_t rebuiltOctrees = 0, refittedOctrees = 0, unchangedOctrees = 0;
-  std::size_t candidatePairs = 0;  ///< primitive pairs handed to the narrow phase
+  std::size_t candidatePairs = 0;  ///< element pairs handed to the narrow phase
   /// vertex-triangle and edge-edge pairs that those own; none for Intersection, which decides each
   /// triangle pair as a whole
   std::size_t featurePairs = 0;

@@ -20,13 +20,13 @@ struct OctreeStatistics {
   std::size_t nodesAllocated = 0;  ///< eight per block of the pool, used or free
   std::size_t blocksInUse = 0, blocksFree = 0, blocksAllocated = 0;
   int deepestLevel = 0;
-  std::size_t primitives = 0;
-  std::size_t mostPrimitivesInNode = 0;
-  std::vector<std::size_t> nodesByDepth, primitivesByDepth;
+  std::size_t elements = 0;
+  std::size_t mostElementsInNode = 0;
+  std::vector<std::size_t> nodesByDepth, elementsByDepth;
   std::size_t bytes = 0;  ///< boxes, keys, nodes and scratch together
 };
 
-/// The octrees of the last update: one for each geometry that has primitives.
+/// The octrees of the last update: one for each geometry that has elements.
 ///
 /// This is a view. It belongs to its OctreeBasedCD, cannot be copied, and is valid as long as its
 /// owner lives. Each update changes what it shows. A geometry whose update was ended by an
@@ -52,7 +52,7 @@ class PALPATE_EXPORT LooseOctree {
     std::optional<NodeId> parent;
     /// by octant (bit 0: x, 1: y, 2: z); empty ones absent
     std::array<std::optional<NodeId>, 8> children;
-    std::span<const std::uint32_t> primitives;  ///< triangles held by this node itself
+    std::span<const std::uint32_t> elements;  ///< triangles held by this node itself
     bool leaf;
   };
 
@@ -64,9 +64,9 @@ class PALPATE_EXPORT LooseOctree {
   Update lastUpdate(GeometryId) const;  ///< what the last update() did to its tree
   OctreeStatistics statistics() const;
 
-  /// Every invariant: each primitive in exactly one node and within the fitted boxes above it,
+  /// Every invariant: each element in exactly one node and within the fitted boxes above it,
   /// fitted boxes tight, links both ways, free + used = allocated; after a rebuild also: each
-  /// primitive in the cell of its centre and inside that cell's loose bounds. Cost O(primitives).
+  /// element in the cell of its centre and inside that cell's loose bounds. Cost O(elements).
   /// Returns what does not hold, one sentence each; empty when all does.
   std::vector<std::string> validate() const;
 

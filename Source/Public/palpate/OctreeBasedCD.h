@@ -2,7 +2,6 @@
 
 #include <palpate/AnalyticalGeometry.h>
 #include <palpate/Audit.h>
-#include <palpate/ClosedMesh.h>
 #include <palpate/CollisionData.h>
 #include <palpate/CollisionProblem.h>
 #include <palpate/Error.h>
@@ -10,6 +9,7 @@
 #include <palpate/FrameStatistics.h>
 #include <palpate/LooseOctree.h>
 #include <palpate/Settings.h>
+#include <palpate/SpatialQueries.h>
 #include <palpate/TetrahedralMesh.h>
 #include <palpate/Types.h>
 
@@ -17,7 +17,6 @@
 
 #include <cstddef>
 #include <memory>
-#include <optional>
 #include <span>
 #include <type_traits>
 
@@ -140,7 +139,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// has no contacts, no candidates and no cost, and is not trusted.
   void setCollisionFilter(GeometryId, const CollisionFilter&);
   /// Switches triangles, segments or points off, and all others on: they are no candidates. A
-  /// vertex or edge is on while anything that holds it is. findInsideVertices() asks all.
+  /// vertex or edge is on while anything that holds it is. SpatialQueries ask all.
   void setDisabledElements(GeometryId, std::span<const std::uint32_t> elements);
 
   /// a == b: self-collision, adjacent features excluded. Kinds and methods that cannot be tested
@@ -161,68 +160,42 @@ class PALPATE_EXPORT OctreeBasedCD {
   void collectCandidates();
   void detectCollision();  ///< broad and narrow phase of every pair; updates if needed
 
-  /// Hands candidate pairs to f(std::span<const TrianglePair>) in batches, unsorted, one at a time,
+  /// Hands candidate pairs to f(std::span<const ElementPair>) in batches, unsorted, one at a time,
   /// not all from the calling thread; memory does not grow with their number. Updates if needed.
   template <class F>
   void forEachCandidate(GeometryId a, GeometryId b, F&& f) {
     const CollisionPair pair{a, b, {}};
     forEachCandidateBatch(
         &pair,
-        [](void* function, const CollisionPair&, std::span<const TrianglePair> batch) {
+        [](void* function, const CollisionPair&, std::span<const ElementPair> batch) {
           (*static_cast<std::remove_reference_t<F>*>(function))(batch);
         },
         const_cast<void*>(static_cast<const void*>(std::addressof(f))));
   }
-  /// Those of every pair to f(const CollisionPair&, std::span<const TrianglePair>).
+  /// Those of every pair to f(const CollisionPair&, std::span<const ElementPair>).
   template <class F>
   void forEachCandidate(F&& f) {
     forEachCandidateBatch(
         nullptr,
-        [](void* function, const CollisionPair& pair, std::span<const TrianglePair> batch) {
+        [](void* function, const CollisionPair& pair, std::span<const ElementPair> batch) {
           (*static_cast<std::remove_reference_t<F>*>(function))(pair, batch);
         },
         const_cast<void*>(static_cast<const void*>(std::addressof(f))));
   }
 
-  /// The vertices of one geometry that are inside another, a closed body, also where it is concave
-  /// and where no triangles cross; updates if needed. Ascending vertices.
+  /// Searches of the positions now. Updates octrees where they are not of these positions; a
+  /// LooseOctree that another thread reads at that time changes.
   ///
-  /// Inside: the body's winding number about the vertex, decided exactly, is not zero, or, of a
-  /// tetrahedral mesh, it is in a tetrahedron; and the vertex does not lie on the surface. The exit
-  /// is the nearest point of the body's surface; of several equally near, on the lowest triangle.
-  /// Depth and exit as exact as vertexTriangleDistance().
-  /// InsideRule::WindingNumber: of bodies with holes, and of soups.
-  /// Errors   NotClosed names the first edge at fault; InvalidSettings for one geometry twice, and
-  ///          for a margin that is none.
-  std::span<const InsideVertex> findInsideVertices(GeometryId vertices, GeometryId body,
-                                                   const InsideSettings& = {});
-  /// The same, with ways out that do not flip from step to step: call it in each step, after
-  /// setPositions(). Directions are followed from the last earlier step in which it was called.
-  ///
-  /// Seen from the triangle that the last exit was on, which turns with the body: where the nearest
-  /// way out is within kMostTurn + m of the last direction, it is taken; m is how far the vertex
-  /// moved from that exit's place, over the root of the last depth times the nearest. Else the last
-  /// direction is kept, if it meets the surface at most kMostDepth times as far away as the nearest
-  /// point is; else the nearest is taken, and the change is Jumped. So depth is at most twice the
-  /// least, and no direction jumps that is not named.
-  std::span<const FollowedVertex> followInsideVertices(GeometryId vertices, GeometryId body);
-  /// The vertices of one geometry in the tetrahedra of another, or on their boundary, decided
-  /// exactly: ascending, each once, in the lowest of its tetrahedra. Updates if needed. One that
-  /// deformation inverted holds points as others do; one without volume has none.
-  ///
-  /// Errors   UnsupportedMethod for a body that is no tetrahedral mesh, InvalidSettings for one
-  ///          geometry twice.
-  std::span<const EmbeddedVertex> findEmbeddedVertices(GeometryId vertices, GeometryId body);
-  /// The same of one point.
-  std::optional<TetrahedronPoint> findTetrahedron(GeometryId body, const Eigen::Vector3d& point);
+  /// Cost     nothing but the update, which the next detection then need not do.
+  SpatialQueries queries() const;
 
   /// The answer of the last detectCollision(); (a, b) in the order in which the pair was added.
   /// Errors   NotAvailable before the first detection of the pair.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;
-  /// Sorted by (a, b): every primitive pair whose boxes, inflated by half the pair's thickness and
+  /// Sorted by (a, b): every element pair whose boxes, inflated by half the pair's thickness and
   /// largest radii each, overlap; more only by outward rounding. (a, a): each unordered pair once,
   /// a < b, sharing no vertex. After detectCollision() only with Settings::keepCandidates.
-  std::span<const TrianglePair> candidatePairs(GeometryId a, GeometryId b) const;
+  std::span<const ElementPair> candidatePairs(GeometryId a, GeometryId b) const;
   const LooseOctree& octree() const;  ///< as of the last update()
   /// Of the last detectCollision() or collectCandidates(), with the updates before it, or of an
   /// update() since. Queries do not change it.
@@ -236,7 +209,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   CollisionProblem problem() const;
 
  private:
-  using BatchFunction = void (*)(void*, const CollisionPair&, std::span<const TrianglePair>);
+  using BatchFunction = void (*)(void*, const CollisionPair&, std::span<const ElementPair>);
   /// `only`: null: of every pair.
   void forEachCandidateBatch(const CollisionPair* only, BatchFunction, void* function);
 

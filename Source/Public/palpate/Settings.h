@@ -19,7 +19,7 @@ enum class OctreeUpdate {
 struct OctreeSettings {
   int maxDepth = 32;  ///< deepest level, root = 0. [1, 60]. Cells too full at this level stay so.
   /// a cell with more is split. [1, 1024]. Fewer: more nodes, tighter boxes.
-  int maxPrimitivesPerLeaf = 32;
+  int maxElementsPerLeaf = 32;
   OctreeUpdate update = OctreeUpdate::Auto;  ///< contacts do not depend on it
 };
 
@@ -67,8 +67,7 @@ enum class Contacts {
   /// of its features, every vertex with a weight other than 0 keeps its earliest time, and
   /// earliestTimeOfImpact() is that of All. Docs/Pairs.md has the reasons.
   Distinct,
-  All,      ///< every pair that the method's definition includes
-  Earliest  ///< Continuous only: no contacts, only earliestTimeOfImpact(); much cheaper
+  All  ///< every pair that the method's definition includes
 };
 
 struct PairSettings {
@@ -86,7 +85,7 @@ struct PairSettings {
   /// to each other, are tested at the step's end, with up to this added to the thickness; others
   /// for impacts. Larger: faster, more contacts that are further apart. Negative: half the
   /// thickness.
-  double tolerance = -1.0;
+  double motionTolerance = -1.0;
   /// L, finite, not negative. A triangle or line mesh with itself: features that are nearer than
   /// this along its edges, in the shape that it was added in or that setTriangles() gave, are no
   /// contacts. 0: only features with a common vertex.
@@ -96,6 +95,9 @@ struct PairSettings {
   /// without, the same ones whatever this is. No effect on Proximity and Intersection, which look
   /// at one time.
   double timeTolerance = 1e-6;
+  /// Method::Continuous only: no contacts, only CollisionData::earliestTimeOfImpact(), which is
+  /// that of all contacts; much cheaper. `contacts` has no effect then.
+  bool earliestTimeOnly = false;
 };
 
 /// From where a triangle mesh is touched.

@@ -12,7 +12,7 @@ struct TimeOfImpactSettings {
   /// L, finite. Not positive: touching counts, and whether there is an impact is decided exactly.
   double minimumDistance = 0.0;
   /// Of the step, [2^-50, 1] (taken as the nearer end outside it). Larger: slightly cheaper.
-  double tolerance = 1e-6;
+  double timeTolerance = 1e-6;
 };
 
 /// When a moving vertex first touches a moving triangle, its border included.
@@ -21,19 +21,19 @@ struct TimeOfImpactSettings {
 ///          one moves along p(t) = (1 - t) before + t now, in real arithmetic, t in [0, 1].
 /// Units    the positions' length unit L; the result is a fraction of the step.
 /// Needs    finite positions; any finite doubles will do.
-/// Returns  a time not after the first impact and at most `tolerance` before it; none if there is no impact.
+/// Returns  a time not after the first impact and at most `timeTolerance` before it; none if there is no impact.
 ///          With minimumDistance 0, impact or none is a true statement about the given doubles,
 ///          whatever they are: a triangle without area or extent, motion in a plane, no motion,
 ///          contact only at 0 or at 1. With a minimum distance d > 0 an impact is a time at which
 ///          the distance is at most d. One may be reported, and then at such a time, where the
-///          distance comes within e of d, e = tolerance * (largest displacement of a vertex of one
-///          feature relative to one of the other) + 2^-35 * (largest difference of their
+///          distance comes within e of d, e = timeTolerance * (largest displacement of a vertex of
+///          one feature relative to one of the other) + 2^-35 * (largest difference of their
 ///          coordinates + d).
 /// Laws     (1) permuting the corners does not change impact or none, nor does swapping before and now.
 ///          (2) scaling all positions by a power of two, where exact, does not either.
 /// Cost     bounded: 0.1 µs for most misses, microseconds where floating point cannot decide. With a
-///          minimum distance at most 1 / tolerance steps of 0.1 µs; few where features do not pass
-///          each other at nearly that distance.
+///          minimum distance at most 1 / timeTolerance steps of 0.1 µs; few where features do not
+///          pass each other at nearly that distance.
 PALPATE_EXPORT std::optional<double> vertexTriangleTimeOfImpact(
     const Eigen::Vector3d& vBefore, const Eigen::Vector3d& aBefore, const Eigen::Vector3d& bBefore,
     const Eigen::Vector3d& cBefore, const Eigen::Vector3d& vNow, const Eigen::Vector3d& aNow,

@@ -11,7 +11,7 @@ namespace palpate {
 /// A geometry of one OctreeBasedCD. Given out once, never reused.
 enum class GeometryId : std::uint32_t {};
 
-/// What a geometry's primitives are.
+/// What a geometry's elements are.
 enum class GeometryKind : std::uint8_t { Triangles, Lines, Points, Shape };
 
 using Triangle = std::array<std::uint32_t, 3>;  ///< vertex indices; winding gives the normal
@@ -20,13 +20,13 @@ using Segment = std::array<std::uint32_t, 2>;
 /// vertex indices, in any order
 using Tetrahedron = std::array<std::uint32_t, 4>;
 
-/// Two primitives (triangles, segments or points) by index in their geometries; `a` from the pair's
+/// Two elements (triangles, segments or points) by index in their geometries; `a` from the pair's
 /// first.
-struct TrianglePair {
+struct ElementPair {
   std::uint32_t a;
   std::uint32_t b;
-  friend bool operator==(const TrianglePair&, const TrianglePair&) = default;
-  friend auto operator<=>(const TrianglePair&, const TrianglePair&) = default;
+  friend bool operator==(const ElementPair&, const ElementPair&) = default;
+  friend auto operator<=>(const ElementPair&, const ElementPair&) = default;
 };
 
 /// A mesh that stays with its owner, for calls that need it only once.

@@ -13,10 +13,10 @@ enum class MethodReason {
   Asked,  ///< the pair's settings name it
   // Method::Auto, by how far features move in the step, relative to each other:
   Still,  ///< not at all: Proximity, or Intersection for two meshes without a thickness
-  Slow,   ///< all at most PairSettings::tolerance: Proximity
+  Slow,   ///< all at most PairSettings::motionTolerance: Proximity
   Fast,   ///< all, or most, further: Continuous
   Mixed,  ///< some further: Continuous for those, Proximity for the rest
-  /// At most the tolerance or not, Continuous costs least: without a thickness, and with
+  /// At most the motion tolerance or not, Continuous costs least: without a thickness, and with
   /// Contacts::All, where distances of everything near would be asked for.
   Cheapest,
   /// A pair with lines, points or shapes: no other method answers it as well. Continuous where
@@ -51,9 +51,9 @@ struct Validity {
   std::size_t atEnd = 0, atImpact = 0;
 
   double displacement = 0;  ///< L: no two features moved further, relative to each other
-  /// L: what displacement must not exceed. Proximity: the thickness. Auto: the tolerance, which
-  /// only chooses the method. Intersection: the smallest height of a triangle when its topology was
-  /// set. Continuous: infinity.
+  /// L: what displacement must not exceed. Proximity: the thickness. Auto: the motion tolerance,
+  /// which only chooses the method. Intersection: the smallest height of a triangle when its
+  /// topology was set. Continuous: infinity.
   double reach = 0;
   /// L: vertices move in straight lines within a step. Where setTransform() turns a body no vertex
   /// is further than this from the way it would take if the body turned evenly about one axis and
@@ -61,7 +61,7 @@ struct Validity {
   /// nothing is trusted.
   double arcDeviation = 0;
   /// L: pairs further apart at the step's end are no contacts, unless by an impact: the thickness,
-  /// or with Auto up to the tolerance more.
+  /// or with Auto up to the motion tolerance more.
   double thickness = 0;
 
   /// Vertices of the first and the second mesh that broke the condition, ascending: those that

@@ -19,7 +19,7 @@ btDbvtVolume volumeOf(const Triangle& t, const Eigen::Vector3d* positions, doubl
 }
 
 struct Between : btDbvt::ICollide {
-  std::vector<TrianglePair>* list;
+  std::vector<ElementPair>* list;
   void Process(const btDbvtNode* a, const btDbvtNode* b) {
     list->push_back(
         {static_cast<std::uint32_t>(a->dataAsInt), static_cast<std::uint32_t>(b->dataAsInt)});
@@ -27,7 +27,7 @@ struct Between : btDbvt::ICollide {
 };
 
 struct Within : btDbvt::ICollide {
-  std::vector<TrianglePair>* list;
+  std::vector<ElementPair>* list;
   const std::vector<Triangle>* triangles;
   void Process(const btDbvtNode* first, const btDbvtNode* second) {
     auto a = static_cast<std::uint32_t>(first->dataAsInt),
@@ -75,7 +75,7 @@ class Bullet : public Peer {
     });
   }
 
-  std::vector<TrianglePair> candidates(std::size_t pair) const override {
+  std::vector<ElementPair> candidates(std::size_t pair) const override {
     return m_lists.sorted(pair);
   }
 

@@ -54,7 +54,7 @@ class Cgal : public Peer {
     });
   }
 
-  std::vector<TrianglePair> candidates(std::size_t pair) const override {
+  std::vector<ElementPair> candidates(std::size_t pair) const override {
     return m_lists.sorted(pair);
   }
 

@@ -51,7 +51,7 @@ struct Target {
   PairLists* lists;
   std::size_t pair;
   const Mesh &a, &b;
-  std::vector<TrianglePair>& list() const {
+  std::vector<ElementPair>& list() const {
     return lists->of(pair, static_cast<std::size_t>(tbb::this_task_arena::current_thread_index()));
   }
 };
@@ -124,7 +124,7 @@ class Embree : public Peer {
     });
   }
 
-  std::vector<TrianglePair> candidates(std::size_t pair) const override {
+  std::vector<ElementPair> candidates(std::size_t pair) const override {
     return m_lists.sorted(pair);
   }
 

@@ -20,7 +20,7 @@ using Model = fcl::BVHModel<Box>;
 
 class Collector : public fcl::detail::BVHCollisionTraversalNode<Box> {
  public:
-  Collector(const Model& a, const Model& b, double distance, std::vector<TrianglePair>& list,
+  Collector(const Model& a, const Model& b, double distance, std::vector<ElementPair>& list,
             const std::vector<Triangle>* within)
       : m_distance(distance), m_list(list), m_within(within) {
     model1 = &a;
@@ -47,7 +47,7 @@ class Collector : public fcl::detail::BVHCollisionTraversalNode<Box> {
 
  private:
   double m_distance;
-  std::vector<TrianglePair>& m_list;
+  std::vector<ElementPair>& m_list;
   const std::vector<Triangle>* m_within;
 };
 
@@ -90,7 +90,7 @@ class Fcl : public Peer {
     });
   }
 
-  std::vector<TrianglePair> candidates(std::size_t pair) const override {
+  std::vector<ElementPair> candidates(std::size_t pair) const override {
     return m_lists.sorted(pair);
   }
 

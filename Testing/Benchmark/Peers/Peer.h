@@ -37,7 +37,7 @@ class Peer {
   virtual void update(const Positions&) = 0;
   virtual void collide() = 0;
   /// The last frame's pairs, sorted; outside the clock.
-  virtual std::vector<TrianglePair> candidates(std::size_t pair) const = 0;
+  virtual std::vector<ElementPair> candidates(std::size_t pair) const = 0;
 };
 
 std::unique_ptr<Peer> makeEmbreeRefit();
@@ -68,11 +68,11 @@ class PairLists {
   void clear() {
     for (List& list : m_lists) list.pairs.clear();
   }
-  std::vector<TrianglePair>& of(std::size_t pair, std::size_t thread) {
+  std::vector<ElementPair>& of(std::size_t pair, std::size_t thread) {
     return m_lists[pair * m_threads + thread].pairs;
   }
-  std::vector<TrianglePair> sorted(std::size_t pair) const {
-    std::vector<TrianglePair> all;
+  std::vector<ElementPair> sorted(std::size_t pair) const {
+    std::vector<ElementPair> all;
     for (std::size_t i = pair * m_threads; i < (pair + 1) * m_threads; ++i)
       all.insert(all.end(), m_lists[i].pairs.begin(), m_lists[i].pairs.end());
     std::sort(all.begin(), all.end());
@@ -81,7 +81,7 @@ class PairLists {
 
  private:
   struct alignas(64) List {
-    std::vector<TrianglePair> pairs;
+    std::vector<ElementPair> pairs;
   };
   std::size_t m_threads = 1;
   std::vector<List> m_lists;

@@ -250,7 +250,7 @@ TEST(AutoKinds, OthersRefuseATolerance) {
   collisions.setPairSettings(a, b, {Method::Auto, 0.1, Contacts::Distinct, 0.25});
   EXPECT_THROW(
       collisions.setPairSettings(a, b, {Method::Continuous, 0.1, Contacts::Distinct, 0.25}), Error);
-  EXPECT_EQ(collisions.pairs()[0].settings.tolerance, 0.25);
+  EXPECT_EQ(collisions.pairs()[0].settings.motionTolerance, 0.25);
 }
 
 /// A newcomer's first pair: a suture against itself and against an organ, with no settings at all.

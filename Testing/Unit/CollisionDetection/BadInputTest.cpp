@@ -204,7 +204,7 @@ void expectPossible(Call call) {
   refuse({.method = Method::Proximity, .thickness = -0.0},
          {ErrorCode::InvalidSettings, {"Proximity", "thickness"}});
   for (Method method : {Method::Auto, Method::Proximity, Method::Intersection})
-    refuse({.method = method, .thickness = 1, .contacts = Contacts::Earliest},
+    refuse({.method = method, .thickness = 1, .earliestTimeOnly = true},
            {ErrorCode::InvalidSettings, {"Earliest", "Continuous"}});
   for (const double bad : {0.0, 0x1p-51, 1.5, -1.0, kNan})
     refuse({.timeTolerance = bad}, {ErrorCode::InvalidSettings, {"timeTolerance", "2^-50"}});
@@ -224,7 +224,7 @@ TEST(BadInput, SettingsOutOfRange) {
   for (int depth : {-1, 0, 61, std::numeric_limits<int>::max(), std::numeric_limits<int>::min()})
     refuse({.octree = {.maxDepth = depth}}, "maxDepth");
   for (int most : {-1, 0, 1025, std::numeric_limits<int>::max()})
-    refuse({.octree = {.maxPrimitivesPerLeaf = most}}, "maxPrimitivesPerLeaf");
+    refuse({.octree = {.maxElementsPerLeaf = most}}, "maxElementsPerLeaf");
   for (int threads : {-1, 1025, std::numeric_limits<int>::max()})
     refuse({.threads = threads}, "threads");
   refuse({.octree = {.update = static_cast<OctreeUpdate>(99)}}, "update");
@@ -233,7 +233,7 @@ TEST(BadInput, SettingsOutOfRange) {
   for (int depth : {1, 60})
     for (int most : {1, 1024})
       EXPECT_NO_THROW(OctreeBasedCD(
-          Settings{.octree = {.maxDepth = depth, .maxPrimitivesPerLeaf = most}, .threads = 1}));
+          Settings{.octree = {.maxDepth = depth, .maxElementsPerLeaf = most}, .threads = 1}));
 }
 
 TEST(BadInput, AddTriangleMesh) {
@@ -351,7 +351,7 @@ TEST(BadInput, RemoveCollisionPair) {
 
 TEST(BadInput, ForEachCandidate) {
   const auto ask = [](Scene& scene, GeometryId a, GeometryId b) {
-    scene.collisions.forEachCandidate(a, b, [](std::span<const TrianglePair>) { FAIL(); });
+    scene.collisions.forEachCandidate(a, b, [](std::span<const ElementPair>) { FAIL(); });
   };
   expectKnown([&](Scene& scene, GeometryId id) { ask(scene, scene.tool, id); });
   expectKnown([&](Scene& scene, GeometryId id) { ask(scene, id, scene.tool); });

@@ -30,7 +30,7 @@ PairSettings proximity(double thickness) {
 }
 
 /// True boxes in exact comparison of doubles: nothing missed; more only by outward rounding.
-void expectComplete(std::span<const TrianglePair> found, std::span<const TrianglePair> truth) {
+void expectComplete(std::span<const ElementPair> found, std::span<const ElementPair> truth) {
   EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
   EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
   EXPECT_TRUE(std::includes(found.begin(), found.end(), truth.begin(), truth.end()));
@@ -40,18 +40,18 @@ void expectComplete(std::span<const TrianglePair> found, std::span<const Triangl
 /// forEachCandidate(), of one pair and of all, hands on what candidatePairs() has.
 void expectSameInBatches(OctreeBasedCD& octree,
                          const std::vector<std::array<GeometryId, 2>>& pairs) {
-  std::map<std::pair<GeometryId, GeometryId>, std::vector<TrianglePair>> ofAll;
-  octree.forEachCandidate([&](const CollisionPair& pair, std::span<const TrianglePair> batch) {
+  std::map<std::pair<GeometryId, GeometryId>, std::vector<ElementPair>> ofAll;
+  octree.forEachCandidate([&](const CollisionPair& pair, std::span<const ElementPair> batch) {
     auto& own = ofAll[{pair.a, pair.b}];
     own.insert(own.end(), batch.begin(), batch.end());
   });
   for (const auto& [a, b] : pairs) {
-    std::vector<TrianglePair> own;
-    octree.forEachCandidate(a, b, [&](std::span<const TrianglePair> batch) {
+    std::vector<ElementPair> own;
+    octree.forEachCandidate(a, b, [&](std::span<const ElementPair> batch) {
       own.insert(own.end(), batch.begin(), batch.end());
     });
     const auto expected = octree.candidatePairs(a, b);
-    for (std::vector<TrianglePair>* found : {&own, &ofAll[{a, b}]}) {
+    for (std::vector<ElementPair>* found : {&own, &ofAll[{a, b}]}) {
       std::sort(found->begin(), found->end());
       EXPECT_TRUE(std::equal(found->begin(), found->end(), expected.begin(), expected.end()));
     }

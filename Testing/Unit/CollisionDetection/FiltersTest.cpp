@@ -40,7 +40,7 @@ struct Case {
 struct Answer {
   Rows rows;
   Validity validity;
-  std::vector<TrianglePair> candidates;
+  std::vector<ElementPair> candidates;
 };
 
 Answer answer(Settings settings, const Case& c) {
@@ -71,7 +71,7 @@ Answer truth(const Case& c) {
     expectSameRows(found.rows, expected.rows);
     EXPECT_EQ(found.validity.trusted, expected.validity.trusted);
     EXPECT_EQ(found.validity.atImpact, expected.validity.atImpact);
-    for (const TrianglePair& pair : expected.candidates)
+    for (const ElementPair& pair : expected.candidates)
       EXPECT_TRUE(std::binary_search(found.candidates.begin(), found.candidates.end(), pair));
   }
   return expected;
@@ -82,7 +82,7 @@ std::vector<PairSettings> everyMethod(double thickness) {
   for (const MethodCase& method : methodCases(thickness)) all.push_back(method.settings);
   for (const double tolerance : {0.0, 0.02, 1.0}) {
     PairSettings automatic{Method::Auto, thickness, Contacts::Distinct};
-    automatic.tolerance = tolerance;
+    automatic.motionTolerance = tolerance;
     all.push_back(automatic);
   }
   return all;
@@ -150,7 +150,7 @@ TEST(Filters, WhatIsOffIsAsIfItWereNotThere) {
       for (Row& row : expected.rows.vertexTriangle) row[1] = keptB[row[1]];
       for (Row& row : expected.rows.triangleVertex) row[0] = keptA[row[0]];
       for (auto* pairs : {&expected.rows.intersectingTriangles, &expected.candidates})
-        for (TrianglePair& p : *pairs) p = {keptA[p.a], keptB[p.b]};
+        for (ElementPair& p : *pairs) p = {keptA[p.a], keptB[p.b]};
       expectSameRows(found.rows, expected.rows);
       EXPECT_EQ(found.candidates, expected.candidates);
       EXPECT_EQ(found.validity.trusted, expected.validity.trusted);
@@ -311,8 +311,8 @@ TEST(Filters, RestDistanceLeavesOutWhatIsNearAlongTheSurface) {
     };
     compare(found.rows.vertexTriangle, all.rows.vertexTriangle, vertexIsFar);
     compare(found.rows.edgeEdge, all.rows.edgeEdge, edgesAreFar);
-    std::vector<TrianglePair> expected;
-    for (const TrianglePair& p : all.rows.intersectingTriangles) {
+    std::vector<ElementPair> expected;
+    for (const ElementPair& p : all.rows.intersectingTriangles) {
       const auto &s = c.a.triangles[p.a], &t = c.a.triangles[p.b];
       if (isFar({s[0], s[1], s[2]}, {t[0], t[1], t[2]})) expected.push_back(p);
     }
@@ -380,7 +380,7 @@ TEST(Filters, GroupsAndMasksChooseThePairs) {
       EXPECT_TRUE(detection.candidatePairs(run.a(), run.b()).empty());
       std::size_t candidates = 0;
       detection.forEachCandidate(run.a(), run.b(),
-                                 [&](std::span<const TrianglePair> p) { candidates += p.size(); });
+                                 [&](std::span<const ElementPair> p) { candidates += p.size(); });
       EXPECT_EQ(candidates, 0u);
       detection.setCollisionFilter(run.a(), {2, 4});
       detection.setCollisionFilter(run.b(), {4, 2});
@@ -450,7 +450,7 @@ TEST(Filters, CapturesAndTheAuditHoldThem) {
     for (const CollisionPair& p : detection.pairs())
       expectSameRows(Rows(again.collisionData(p.a, p.b)), Rows(detection.collisionData(p.a, p.b)));
     EXPECT_GT(detection.statistics().contacts + detection.statistics().intersectingTriangles +
-                  (pair.contacts == Contacts::Earliest),
+                  (pair.earliestTimeOnly),
               0u);
     // A predicate is not in the file, but said; the audit asks it.
     detection.setContactPredicate(b, a, hashed);

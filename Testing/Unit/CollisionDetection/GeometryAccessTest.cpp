@@ -1,5 +1,7 @@
 #include <palpate/OctreeBasedCD.h>
+#include <palpate/PenetrationTracker.h>
 
+#include "Common/QueryCalls.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Things.h"
 
@@ -154,12 +156,12 @@ TEST(GeometryAccess, VerticesOfDisabledElementsAreFoundInABody) {
   OctreeBasedCD collisions;
   const GeometryId vertices = collisions.addTriangleMesh(inner.positions, inner.triangles),
                    body = collisions.addTriangleMesh(outer.positions, outer.triangles);
-  const std::size_t count = collisions.findInsideVertices(vertices, body).size();
+  const std::size_t count = testing::insideVertices(collisions, vertices, body).size();
   EXPECT_EQ(count, inner.positions.size());
   std::vector<std::uint32_t> all(inner.triangles.size());
   for (std::uint32_t t = 0; t < all.size(); ++t) all[t] = t;
   collisions.setDisabledElements(vertices, all);
-  EXPECT_EQ(collisions.findInsideVertices(vertices, body).size(), count);
+  EXPECT_EQ(testing::insideVertices(collisions, vertices, body).size(), count);
 }
 
 TEST(GeometryAccess, AShapeHasNoVerticesToFind) {
@@ -170,12 +172,12 @@ TEST(GeometryAccess, AShapeHasNoVerticesToFind) {
   const auto refuse = [&](auto&& call) {
     expectRefused(ErrorCode::UnsupportedMethod, "geometry 0 is a shape: it has no vertices", call);
   };
-  refuse([&] { (void)collisions.findInsideVertices(shape, body); });
-  refuse([&] { (void)collisions.followInsideVertices(shape, body); });
+  refuse([&] { (void)testing::insideVertices(collisions, shape, body); });
+  refuse([&] { (void)PenetrationTracker(shape, body).update(collisions.queries()); });
   refuse([&] {
     const Positions corners{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     const std::vector<Tetrahedron> one{{0, 1, 2, 3}};
-    (void)collisions.findEmbeddedVertices(shape, collisions.addTetrahedralMesh(corners, one));
+    (void)testing::embeddedVertices(collisions, shape, collisions.addTetrahedralMesh(corners, one));
   });
 }
 

@@ -2,6 +2,7 @@
 #include <palpate/Distance.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/QueryCalls.h"
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
@@ -620,7 +621,7 @@ TEST(Kinds, BadInputIsRefusedByName) {
     collisions.addCollisionPair(line, mesh, {Method::Proximity, 0.0});
   });
   expectRefused(Code::NotClosed, "geometry 0 is a line mesh, which has no inside",
-                [&] { collisions.findInsideVertices(points, line); });
+                [&] { testing::insideVertices(collisions, points, line); });
   expectRefused(Code::UnsupportedMethod, "geometry 0 is a line mesh",
                 [&] { collisions.setTriangles(line, two, {}); });
   PairSettings rest = near;

@@ -14,11 +14,11 @@ TEST(OrderPairs, IsThatOfSort) {
   PairOrderScratch scratch;
   for (const std::size_t firsts : {1u, 7u, 1000u}) {
     for (const std::size_t size : {0u, 1u, 2u, 100u, 5000u}) {
-      Buffer<TrianglePair> pairs(size);
-      for (TrianglePair& pair : pairs)
+      Buffer<ElementPair> pairs(size);
+      for (ElementPair& pair : pairs)
         pair = {static_cast<std::uint32_t>(random() % firsts),
                 static_cast<std::uint32_t>(random())};
-      std::vector<TrianglePair> expected(pairs.begin(), pairs.end());
+      std::vector<ElementPair> expected(pairs.begin(), pairs.end());
       std::sort(expected.begin(), expected.end());
       orderPairs(pairs, firsts, scratch);
       EXPECT_TRUE(std::equal(pairs.begin(), pairs.end(), expected.begin(), expected.end()))

@@ -1,3 +1,4 @@
+#include "Common/QueryCalls.h"
 #include "Common/Replayed.h"
 #include "Common/Things.h"
 
@@ -89,7 +90,7 @@ class Life {
   }
   OctreeBasedCD& collisions() { return m_collisions; }
   const CollisionData& data() const { return m_collisions.collisionData(m_a, m_b); }
-  std::span<const TrianglePair> candidates() const { return m_collisions.candidatePairs(m_a, m_b); }
+  std::span<const ElementPair> candidates() const { return m_collisions.candidatePairs(m_a, m_b); }
   GeometryId body() const { return m_body; }
 
  private:
@@ -452,7 +453,7 @@ TEST(Rigid, InsideIsAsOfPositions) {
           collisions.setPositions(id, place(body.positions));
           collisions.setPositions(points, ofSmoke(smoke.positions));
         }
-        const auto inside = collisions.findInsideVertices(points, id);
+        const auto inside = testing::insideVertices(collisions, points, id);
         found.emplace_back(inside.begin(), inside.end());
       }
     EXPECT_GT(found[0].size(), 50u);

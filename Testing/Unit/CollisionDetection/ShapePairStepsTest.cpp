@@ -222,7 +222,7 @@ void expectTrue(const Tool& a, const Tool& b, const PairSettings& pair, Tally& t
   }
   EXPECT_EQ(answer(a, b, pair, Engine::BruteForce).hash(), data.hash());
   PairSettings earliest = pair;
-  earliest.contacts = Contacts::Earliest;
+  earliest.earliestTimeOnly = true;
   for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
     const CollisionData only = answer(a, b, earliest, engine);
     EXPECT_TRUE(only.shapeShape().empty());

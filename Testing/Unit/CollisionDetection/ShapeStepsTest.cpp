@@ -310,7 +310,7 @@ TEST(ShapeSteps, AreNeverLateAndNoEarlierThanTheTolerance) {
                         .hash(),
                     data.hash());
         PairSettings earliest = pair;
-        earliest.contacts = Contacts::Earliest;
+        earliest.earliestTimeOnly = true;
         const CollisionData only = answer(settingsOf(Engine::Octree, 2), body, tool, earliest);
         EXPECT_TRUE(only.shape().empty());
         EXPECT_EQ(only.earliestTimeOfImpact(), data.earliestTimeOfImpact());

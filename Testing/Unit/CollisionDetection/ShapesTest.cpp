@@ -1,6 +1,7 @@
 #include <palpate/Capture.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/QueryCalls.h"
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
@@ -106,14 +107,14 @@ struct Placed {
 struct Body {
   GeometryKind kind;
   Positions positions;
-  std::vector<Triangle> primitives;
+  std::vector<Triangle> elements;
   double radius = 0.0;
 
   GeometryId addTo(OctreeBasedCD& collisions) const {
-    if (kind == GeometryKind::Triangles) return collisions.addTriangleMesh(positions, primitives);
+    if (kind == GeometryKind::Triangles) return collisions.addTriangleMesh(positions, elements);
     if (kind == GeometryKind::Points) return collisions.addPointSet(positions, radius);
     std::vector<Segment> segments;
-    for (const auto& [p, q, _] : primitives) segments.push_back({p, q});
+    for (const auto& [p, q, _] : elements) segments.push_back({p, q});
     return collisions.addLineMesh(positions, segments, radius);
   }
 };
@@ -124,7 +125,7 @@ Body thread(Random& random, std::uint32_t segments, double radius) {
   Body line{GeometryKind::Lines, {randomPoint(random, 0.2, 0.8)}, {}, radius};
   for (std::uint32_t i = 1; i <= segments; ++i) {
     line.positions.push_back(line.positions.back() + randomPoint(random, -0.1, 0.1));
-    line.primitives.push_back({i - 1, i, i});
+    line.elements.push_back({i - 1, i, i});
   }
   return line;
 }
@@ -133,7 +134,7 @@ Body particles(Random& random, std::uint32_t count, double radius) {
   Body points{GeometryKind::Points, {}, {}, radius};
   for (std::uint32_t i = 0; i < count; ++i) {
     points.positions.push_back(randomPoint(random, 0, 1));
-    points.primitives.push_back({i, i, i});
+    points.elements.push_back({i, i, i});
   }
   return points;
 }
@@ -298,8 +299,8 @@ std::map<Element, Truth> truthOf(const Body& body, const Placed& shape, double r
   constexpr double kNone = std::numeric_limits<double>::infinity();
   std::map<Element, Truth> truth;
   const auto& at = body.positions;
-  for (std::uint32_t t = 0; t < body.primitives.size(); ++t) {
-    const Triangle& corners = body.primitives[t];
+  for (std::uint32_t t = 0; t < body.elements.size(); ++t) {
+    const Triangle& corners = body.elements[t];
     double edges = kNone;
     for (int i = 0; i < 3; ++i) {
       const std::uint32_t p = std::min(corners[i], corners[(i + 1) % 3]),
@@ -444,7 +445,7 @@ TEST(Shapes, AgreeWithTheirTessellations) {
       const Placed shape{isBall ? AnalyticalGeometry(Sphere{{0, 0, 0}, 0.3})
                                 : AnalyticalGeometry(Box{{0, 0, 0}, {0.3, 0.2, 0.1}}),
                          turn, at};
-      const Mesh own{body.positions, body.primitives};
+      const Mesh own{body.positions, body.elements};
       PairRun meshes(settingsOf(Engine::Octree), own, mesh, {Method::Proximity, 1.0}, false);
       meshes.detect();
       const double truth = nearest(meshes.data()),
@@ -603,7 +604,7 @@ TEST(Shapes, DegenerateElementsAnswerTheDefinition) {
     const auto any = [&] { return static_cast<std::uint32_t>(random() % 12); };
     for (int t = 0; t < 14; ++t) {
       const std::uint32_t a = any(), b = any(), c = any();
-      zoo.primitives.push_back({a, b, c});
+      zoo.elements.push_back({a, b, c});
     }
     for (const Placed& shape : all) {
       if (shape.geometry.index() == 1 &&
@@ -696,11 +697,11 @@ TEST(Shapes, BadInputIsRefusedByName) {
   expectRefused(Code::UnsupportedMethod, "is a shape; setTriangles()",
                 [&] { collisions.setTriangles(tool, Positions{}, {}); });
   expectRefused(Code::NotClosed, "is a shape",
-                [&] { collisions.findInsideVertices(points, tool); });
+                [&] { testing::insideVertices(collisions, points, tool); });
   expectRefused(Code::NotAvailable, "no candidate pairs",
                 [&] { collisions.candidatePairs(tool, points); });
   expectRefused(Code::NotAvailable, "no candidate pairs", [&] {
-    collisions.forEachCandidate(tool, points, [](std::span<const TrianglePair>) {});
+    collisions.forEachCandidate(tool, points, [](std::span<const ElementPair>) {});
   });
   expectRefused(Code::UnsupportedMethod, "no features to ask about", [&] {
     collisions.setContactPredicate(tool, points, [](const ContactFeatures&) { return true; });

@@ -1,5 +1,6 @@
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/QueryCalls.h"
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
@@ -36,7 +37,8 @@ std::vector<bool> areInside(const Mesh& body, const Positions& places) {
   const GeometryId probes = detection.addPointSet(places),
                    id = detection.addTriangleMesh(body.positions, body.triangles);
   std::vector<bool> inside(places.size());
-  for (const InsideVertex& v : detection.findInsideVertices(probes, id)) inside[v.vertex] = true;
+  for (const InsideVertex& v : testing::insideVertices(detection, probes, id))
+    inside[v.vertex] = true;
   return inside;
 }
 
@@ -192,7 +194,7 @@ TEST(Sidedness, EveryMethodAnswersAsBruteForce) {
     for (const MethodCase& method : methodCases(0.05)) methods.push_back(method.settings);
     for (const double tolerance : {0.0, 0.05, 1.0}) {
       methods.push_back({Method::Auto, 0.05, Contacts::All});
-      methods.back().tolerance = tolerance;
+      methods.back().motionTolerance = tolerance;
     }
     std::set<Row> impacts;
     for (const PairSettings& pair : methods) {

@@ -1,4 +1,5 @@
 #include <palpate/OctreeBasedCD.h>
+#include <palpate/PenetrationTracker.h>
 #include <palpate/StepGuard.h>
 
 #include "Common/ShapeTruth.h"
@@ -105,9 +106,9 @@ TEST(SteadyFrame, AllocatesNothingWithAuto) {
          {std::pair{4.0, 0.0}, std::pair{0.5, 0.2}, std::pair{4.0, 0.2}}) {
       // Many times the edges of its small triangles: each frame takes half a second and is exact.
       if (scene.name == "uneven triangles" && tolerance * thickness > 0.5) continue;
-      const LastPass pass = lastPass(
-          scene, {.threads = 1},
-          {.thickness = thickness * scene.thickness, .tolerance = tolerance * scene.thickness});
+      const LastPass pass = lastPass(scene, {.threads = 1},
+                                     {.thickness = thickness * scene.thickness,
+                                      .motionTolerance = tolerance * scene.thickness});
       EXPECT_EQ(pass.allocations, 0u)
           << scene.name << ", thickness " << thickness << ", tolerance " << tolerance;
       reasons.insert(pass.reasons.begin(), pass.reasons.end());
@@ -296,7 +297,10 @@ TEST(SteadyFrame, AllocatesNothingWithTetrahedra) {
                      points = detection.addPointSet(probes);
     detection.addCollisionPair(points, body, {Method::Proximity, 0.1});
     std::size_t before = 0, found = 0;
-    std::set<ExitChange> changes;
+    std::set<DirectionChange> changes;
+    std::vector<EmbeddedVertex> embedded;
+    std::vector<InsideVertex> inside;
+    PenetrationTracker tracker(points, body);
     const IntegersApart apart;
     std::vector<Eigen::Vector3d> now = solid.positions;
     for (int frame = 0; frame < 40; ++frame) {
@@ -306,9 +310,12 @@ TEST(SteadyFrame, AllocatesNothingWithTetrahedra) {
       detection.setPositions(body, now);
       detection.detectCollision();
       detection.advance();
-      found += detection.findEmbeddedVertices(points, body).size();
-      found += detection.findTetrahedron(body, probes[0]).has_value();
-      for (const FollowedVertex& f : detection.followInsideVertices(points, body))
+      const SpatialQueries queries = detection.queries();
+      queries.findEmbeddedVertices(points, body, embedded);
+      queries.findInsideVertices(points, body, inside, {.rule = InsideRule::WindingNumber});
+      found += embedded.size() + inside.size();
+      found += queries.findTetrahedron(body, probes[0]).has_value();
+      for (const TrackedVertex& f : tracker.update(queries))
         if (frame < 20) changes.insert(f.change);
     }
     EXPECT_EQ(allocations - before, 0u);

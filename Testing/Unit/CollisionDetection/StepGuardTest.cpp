@@ -47,7 +47,7 @@ struct Guarding {
 /// Whether vertices of a touch triangles of b, or, with edges, edges those of b; by the definition.
 std::size_t countTouches(const Guarding& all, std::size_t a, std::size_t b, bool edges,
                          const std::vector<Positions>& now) {
-  const TimeOfImpactSettings coarse{.tolerance = 1.0};
+  const TimeOfImpactSettings coarse{.timeTolerance = 1.0};
   std::size_t touches = 0;
   const auto start = [&](std::size_t body, std::uint32_t v) { return all.before[body][v]; };
   const auto end = [&](std::size_t body, std::uint32_t v) { return now[body][v]; };

@@ -1,6 +1,8 @@
 #include <palpate/CollisionProblem.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/QueryCalls.h"
+
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -241,7 +243,7 @@ TEST_F(Step, QueriesKeepStatistics) {
   const FrameStatistics before = m_detection.statistics();
   EXPECT_GT(before.contacts, 0u);
   m_detection.setPositions(m_id, at(0.05));
-  m_detection.findInsideVertices(m_id, other, {.rule = InsideRule::WindingNumber});
+  testing::insideVertices(m_detection, m_id, other, {.rule = InsideRule::WindingNumber});
   m_detection.forEachCandidate(m_id, other, [](auto) {});
   EXPECT_EQ(m_detection.statistics().contacts, before.contacts);
   EXPECT_EQ(m_detection.statistics().candidatePairs, before.candidatePairs);

@@ -38,14 +38,14 @@ double exactTime(const VertexTriangleContact& c, const Moving& vertex, const Mov
   const Positions &v = vertex.mesh.positions, &t = triangle.mesh.positions;
   return *vertexTriangleTimeOfImpact(v[c.vertex], t[i], t[j], t[k], vertex.now[c.vertex],
                                      triangle.now[i], triangle.now[j], triangle.now[k],
-                                     {.tolerance = 0x1p-50});
+                                     {.timeTolerance = 0x1p-50});
 }
 double exactTime(const EdgeEdgeContact& c, const Moving& a, const Moving& b) {
   const auto [i, j] = c.edgeA;
   const auto [k, l] = c.edgeB;
   const Positions &p = a.mesh.positions, &q = b.mesh.positions;
   return *edgeEdgeTimeOfImpact(p[i], p[j], q[k], q[l], a.now[i], a.now[j], b.now[k], b.now[l],
-                               {.tolerance = 0x1p-50});
+                               {.timeTolerance = 0x1p-50});
 }
 
 std::vector<std::array<std::uint32_t, 4>> idsOf(const CollisionData& data) {
@@ -85,7 +85,7 @@ TEST(TimeTolerance, BoundsHowEarlyAndNothingElse) {
     for (const auto& c : data.triangleVertex()) expectTime(c.timeOfImpact, exactTime(c, b, a));
     for (const auto& c : data.edgeEdge()) expectTime(c.timeOfImpact, exactTime(c, a, b));
     PairSettings only = settings;
-    only.contacts = Contacts::Earliest;
+    only.earliestTimeOnly = true;
     EXPECT_EQ(runOf({}, only, a, b).data().earliestTimeOfImpact(), earliest);
   }
 }
@@ -121,7 +121,8 @@ TEST(TimeTolerance, AutoFindsWhatContinuousFinds) {
   Random random(6);
   const Moving a = movingSoup(random), b = movingSoup(random);
   for (const double tolerance : {1e-10, 1e-3, 0.25}) {
-    const PairSettings settings{.thickness = 0.1, .tolerance = 0.3, .timeTolerance = tolerance};
+    const PairSettings settings{
+        .thickness = 0.1, .motionTolerance = 0.3, .timeTolerance = tolerance};
     testing::expectSame(runOf({}, settings, a, b).answers(),
                         runOf(testing::settingsOf(Engine::BruteForce), settings, a, b).answers());
   }
@@ -152,8 +153,7 @@ TEST(Earliest, IsTheOneEarlierThanTheRest) {
     for (const int threads : {1, 2}) {
       OctreeBasedCD detection({.threads = threads});
       const GeometryId id = detection.addTriangleMesh(mesh.positions, mesh.triangles);
-      detection.addCollisionPair(id, id,
-                                 {.method = Method::Continuous, .contacts = Contacts::Earliest});
+      detection.addCollisionPair(id, id, {.method = Method::Continuous, .earliestTimeOnly = true});
       detection.setPositions(id, mesh.positions, now);
       detection.detectCollision();
       const double time = detection.collisionData(id, id).earliestTimeOfImpact();
@@ -177,15 +177,18 @@ TEST(Earliest, OfManyTrianglesIsThatOfAllContacts) {
     for (const double thickness : {0.0, 1e-4})
       for (const bool self : {false, true}) {
         SCOPED_TRACE(::testing::Message() << speed << " " << thickness << " " << self);
-        const auto run = [&](Contacts contacts, int threads,
-                             std::vector<TrianglePair>& candidates) {
+        const auto run = [&](bool earliestTimeOnly, int threads,
+                             std::vector<ElementPair>& candidates) {
           OctreeBasedCD detection({.threads = threads});
           const GeometryId first = detection.addTriangleMesh(a.positions, a.triangles),
                            second =
                                self ? first : detection.addTriangleMesh(b.positions, b.triangles);
           detection.addCollisionPair(
               first, second,
-              {.method = Method::Continuous, .thickness = thickness, .contacts = contacts});
+              {.method = Method::Continuous,
+               .thickness = thickness,
+               .contacts = Contacts::All,
+               .earliestTimeOnly = earliestTimeOnly});
           detection.setPositions(first, a.positions, nowA);
           if (!self) detection.setPositions(second, b.positions, nowB);
           detection.detectCollision();
@@ -197,12 +200,12 @@ TEST(Earliest, OfManyTrianglesIsThatOfAllContacts) {
           candidates.assign(found.begin(), found.end());
           return earliest;
         };
-        std::vector<TrianglePair> expected;
-        const double time = run(Contacts::All, 1, expected);
+        std::vector<ElementPair> expected;
+        const double time = run(false, 1, expected);
         ASSERT_LE(time, 1.0);
         for (const int threads : {1, 2}) {
-          std::vector<TrianglePair> candidates;
-          EXPECT_EQ(run(Contacts::Earliest, threads, candidates), time);
+          std::vector<ElementPair> candidates;
+          EXPECT_EQ(run(true, threads, candidates), time);
           EXPECT_EQ(candidates, expected);
         }
       }
@@ -219,7 +222,7 @@ TEST(Earliest, OfAShapeBesideOtherPairs) {
   const GeometryId tissue = detection.addTriangleMesh(a.positions, a.triangles),
                    first = detection.addTriangleMesh(b.positions, b.triangles),
                    tool = detection.addAnalyticalGeometry(Box{{0.5, 0.5, 0.5}, {0.3, 0.3, 0.3}});
-  const PairSettings earliest{.method = Method::Continuous, .contacts = Contacts::Earliest};
+  const PairSettings earliest{.method = Method::Continuous, .earliestTimeOnly = true};
   detection.addCollisionPair(tool, tissue, earliest);
   detection.addCollisionPair(first, first, earliest);
   detection.setTransform(tool, Eigen::Matrix3d::Identity(), {0, 0, 0});
@@ -244,8 +247,7 @@ TEST(Earliest, AThrowLeavesTheOctreesWhole) {
   for (Eigen::Vector3d& p : now) p += testing::randomPoint(random, -0.02, 0.02);
   OctreeBasedCD detection({.threads = 1});
   const GeometryId id = detection.addTriangleMesh(a.positions, a.triangles);
-  detection.addCollisionPair(id, id,
-                             {.method = Method::Continuous, .contacts = Contacts::Earliest});
+  detection.addCollisionPair(id, id, {.method = Method::Continuous, .earliestTimeOnly = true});
   int calls = 0, allowed = std::numeric_limits<int>::max();
   detection.setContactPredicate(id, id, [&](const ContactFeatures&) {
     if (++calls > allowed) throw std::runtime_error("enough");

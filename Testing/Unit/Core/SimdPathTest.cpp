@@ -13,7 +13,7 @@ namespace {
 TEST(SimdPath, EachGivesTheSameCandidates) {
   testing::Random random(1);
   const testing::Mesh a = testing::soup(random, 3000, 0.02), b = testing::sheet(40, 0.5, 0.3);
-  std::vector<TrianglePair> first, self;
+  std::vector<ElementPair> first, self;
   for (const std::string& path : simdPaths()) {
     useSimdPath(path);
     EXPECT_EQ(simdPath(), path);

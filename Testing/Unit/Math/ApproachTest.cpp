@@ -23,7 +23,7 @@ double statedError(const ImpactCase& query, const TimeOfImpactSettings& settings
       for (std::size_t end = 0; end < 8; end += 4)
         largest = std::max(largest, (p[end + i] - p[end + j]).cwiseAbs().maxCoeff());
     }
-  return (settings.tolerance * displacement + 0x1p-35 * (largest + settings.minimumDistance)) *
+  return (settings.timeTolerance * displacement + 0x1p-35 * (largest + settings.minimumDistance)) *
          (1.0 + 0x1p-40);
 }
 

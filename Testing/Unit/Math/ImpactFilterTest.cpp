@@ -106,7 +106,7 @@ TEST(ImpactFilter, KeepsWhatTheSearchReports) {
         settings.minimumDistance =
             oracle::rootAbove(square) * (1.0 - std::ldexp(1.0, -random.below(50)));
     }
-    if (i % 5 == 0) settings.tolerance = std::ldexp(1.0, -random.below(50));
+    if (i % 5 == 0) settings.timeTolerance = std::ldexp(1.0, -random.below(50));
     const unsigned out = leftOut(eight, settings);
     for (std::size_t lane = 0; lane < eight.size(); ++lane) {
       const bool impact = findImpact(eight[lane].query(), settings).impact;

@@ -2,7 +2,7 @@
 
 #include <palpate/Distance.h>
 
-#include "Math/Exact.h"
+#include "Exact/Exact.h"
 
 #include <algorithm>
 #include <array>

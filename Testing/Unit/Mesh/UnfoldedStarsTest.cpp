@@ -34,7 +34,7 @@ bool share(const Triangle& a, const Triangle& b) {
 }
 
 /// Pairs of neighbours that need no test; the same on every path and by any number of threads.
-std::vector<TrianglePair> answered(const Step& step) {
+std::vector<ElementPair> answered(const Step& step) {
   const SampledExtent extent = sampleExtent(step.now);
   const FloatFrame frame{extent.median, frameScale(extent.spread)};
   std::vector<FloatPoint> before(step.before.size()), now(before.size());
@@ -54,7 +54,7 @@ std::vector<TrianglePair> answered(const Step& step) {
     }
   }
   useSimdPath("");
-  std::vector<TrianglePair> pairs;
+  std::vector<ElementPair> pairs;
   for (std::uint32_t a = 0; a < first.size(); ++a)
     for (std::uint32_t b = a + 1; b < first.size(); ++b)
       if (share(first[a], first[b])) pairs.push_back({a, b});
@@ -62,7 +62,7 @@ std::vector<TrianglePair> answered(const Step& step) {
 }
 
 /// Whether features of the two triangles with no vertex in common touch in the step.
-bool touch(const Step& step, const TrianglePair& pair) {
+bool touch(const Step& step, const ElementPair& pair) {
   const Triangle &a = step.topology.triangles[pair.a], &b = step.topology.triangles[pair.b];
   const Positions &p = step.before, &q = step.now;
   const auto corners = [&](const Triangle& s, const Triangle& t) {
@@ -83,8 +83,8 @@ bool touch(const Step& step, const TrianglePair& pair) {
 
 /// Returns how many of the neighbours are answered.
 double expectRight(const Step& step) {
-  const std::vector<TrianglePair> pairs = answered(step);
-  for (const TrianglePair& pair : pairs)
+  const std::vector<ElementPair> pairs = answered(step);
+  for (const ElementPair& pair : pairs)
     EXPECT_FALSE(touch(step, pair)) << pair.a << " and " << pair.b;
   double neighbours = 0;
   const auto& triangles = step.topology.triangles;

@@ -54,7 +54,7 @@ TEST_P(ContinuousScenes, FindsEveryTruePairAndInventsNone) {
     GTEST_SKIP() << "no ccd-scenes in PALPATE_SHARED_DATA";
   const TriangleMesh mesh = testing::readStep(folder / "frames" / (std::string(before) + ".ply"),
                                               folder / "frames" / (std::string(now) + ".ply"));
-  const std::vector<TrianglePair> candidates = testing::sweptCandidates(mesh);
+  const std::vector<ElementPair> candidates = testing::sweptCandidates(mesh);
   const MeshPair pair{mesh, mesh, {Method::Continuous, 0.0, Contacts::All}};
   ContactBuffers found{};
   findContinuous(pair, candidates, found);

@@ -1,3 +1,4 @@
+#include "Diagnostics/ContactsByBruteForce.h"
 #include "NarrowPhase/Continuous.h"
 
 #include "Common/RandomMeshes.h"
@@ -37,8 +38,8 @@ TriangleMesh movingSoup(testing::Random& random, std::size_t triangles, double s
   return meshOf(mesh.positions, now, mesh.triangles);
 }
 
-std::vector<TrianglePair> everyPair(const TriangleMesh& a, const TriangleMesh& b) {
-  std::vector<TrianglePair> pairs;
+std::vector<ElementPair> everyPair(const TriangleMesh& a, const TriangleMesh& b) {
+  std::vector<ElementPair> pairs;
   for (std::uint32_t i = 0; i < a.topology.triangles.size(); ++i)
     for (std::uint32_t j = &a == &b ? i + 1 : 0; j < b.topology.triangles.size(); ++j)
       pairs.push_back({i, j});
@@ -85,8 +86,8 @@ std::vector<FloatPoint> floatsOf(const Positions& positions) {
 
 void expectSameAsBruteForce(MeshPair pair) {
   ContactBuffers found{}, boxed{}, expected{}, counts{};
-  const std::vector<TrianglePair> candidates = everyPair(pair.a, pair.b);
-  findContinuousByBruteForce(pair, everyFeature(pair), expected);
+  const std::vector<ElementPair> candidates = everyPair(pair.a, pair.b);
+  findContactsByBruteForce(pair, expected);
   EXPECT_GT(expected.vertexTriangle.size(), 0u);
   EXPECT_GT(expected.edgeEdge.size(), 0u);
   findContinuous(pair, candidates, found);
@@ -128,7 +129,7 @@ TEST(Continuous, EarliestDoesNotDependOnOrderOrBatches) {
   for (int i = 0; i < 20; ++i) {
     const TriangleMesh a = movingSoup(random, 20, 0.3, i % 2 ? 0.25 : 0.0);
     const MeshPair pair{a, a, {Method::Continuous, i % 4 == 3 ? 0.01 : 0.0, Contacts::All}};
-    std::vector<TrianglePair> candidates = everyPair(a, a);
+    std::vector<ElementPair> candidates = everyPair(a, a);
     ContactBuffers counts{}, all{};
     findContinuous(pair, candidates, all);
     for (int repeat = 0; repeat < 4; ++repeat) {
@@ -162,7 +163,7 @@ TEST(Continuous, VertexContactsSayWhereAndFromWhichSide) {
     const TriangleMesh a = meshOf(before, now, {{0, 1, 2}}),
                        b = meshOf(target.before, target.now, target.triangle);
     ContactBuffers found{};
-    const std::vector<TrianglePair> candidates{{0, 0}};
+    const std::vector<ElementPair> candidates{{0, 0}};
     findContinuous({a, b, {Method::Continuous, 0.0, Contacts::All}}, candidates, found);
     ASSERT_EQ(found.vertexTriangle.size(), 1u);
     EXPECT_TRUE(found.triangleVertex.empty());
@@ -198,7 +199,7 @@ TEST(Continuous, EdgeContactsSayWhereAndFromWhichSide) {
                                   {{-1, 0, -side}, {3, 0, -side}, {1, 0, 9 * side}}, {{0, 1, 2}});
     const TriangleMesh b = meshOf({{0, -1, 0}, {0, 1, 0}, {0, 0, -9 * side}},
                                   {{0, -1, 0}, {0, 1, 0}, {0, 0, -9 * side}}, {{0, 1, 2}});
-    const std::vector<TrianglePair> candidates{{0, 0}};
+    const std::vector<ElementPair> candidates{{0, 0}};
     ContactBuffers found{}, swapped{};
     findContinuous({a, b, {Method::Continuous, 0.0, Contacts::All}}, candidates, found);
     const auto contact =
@@ -228,7 +229,7 @@ TEST(Continuous, NeighboursMeetInWhatTheyDoNotShare) {
       now{{0, 0, 0}, {1, 0, 0}, {0.5, 1, 0}, {0.5, 0.5, -1}};
   const TriangleMesh mesh = meshOf(before, now, {{0, 1, 2}, {1, 0, 3}});
   ContactBuffers found{};
-  const std::vector<TrianglePair> candidates{{0, 1}};
+  const std::vector<ElementPair> candidates{{0, 1}};
   findContinuous({mesh, mesh, {Method::Continuous, 0.0, Contacts::All}}, candidates, found);
   ASSERT_EQ(found.vertexTriangle.size(), 1u);
   EXPECT_EQ(found.vertexTriangle[0].vertex, 3u);

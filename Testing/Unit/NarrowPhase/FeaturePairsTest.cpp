@@ -57,7 +57,7 @@ TEST(FeaturePairs, KeepWhatOverlapsUpToAnyTime) {
       FloatPair floats{a.floatsNow.data(), b.floatsNow.data(), a.floatsBefore.data(),
                        b.floatsBefore.data()};
       floats.upTo = upTo;
-      std::vector<TrianglePair> candidates;
+      std::vector<ElementPair> candidates;
       for (std::uint32_t i = 0; i < 40; ++i)
         for (std::uint32_t j = 0; j < 40; ++j) candidates.push_back({i, j});
       FeaturePairs pairs;
@@ -115,7 +115,7 @@ TEST(FeaturePairs, AreEachTestedOnce) {
     const MeshTopology a = crowded(random, 40, size), b = crowded(random, 900, 50);
     for (const MeshTopology* second : {&a, &b}) {
       const bool self = second == &a;
-      std::vector<TrianglePair> candidates;
+      std::vector<ElementPair> candidates;
       for (std::uint32_t i = 0; i < a.triangles.size(); ++i)
         for (std::uint32_t j = self ? i + 1 : 0; j < second->triangles.size(); ++j)
           candidates.push_back({i, j});
@@ -236,7 +236,7 @@ TEST(FeaturePairs, ReachAsFarAsTheThickness) {
     const FloatPair floats{floatsA.data(),   self ? floatsA.data() : floatsB.data(),
                            nullptr,          nullptr,
                            shift.shiftLower, shift.shiftUpper};
-    std::vector<TrianglePair> candidates;
+    std::vector<ElementPair> candidates;
     for (std::uint32_t i = 0; i < first.triangles.size(); ++i)
       for (std::uint32_t j = self ? i + 1 : 0; j < b.triangles.size(); ++j)
         candidates.push_back({i, j});

@@ -1,3 +1,4 @@
+#include "Diagnostics/ContactsByBruteForce.h"
 #include "NarrowPhase/IntersectionFilter.h"
 
 #include "Core/SimdPath.h"
@@ -44,7 +45,7 @@ struct Answers {
 };
 
 Answers answersTo(const PlacedTriangles& a, const PlacedTriangles& b, bool self,
-                  const std::vector<TrianglePair>& pairs) {
+                  const std::vector<ElementPair>& pairs) {
   std::vector<Answers> ofPaths;
   for (const std::string& path : simdPaths()) {
     useSimdPath(path);
@@ -52,7 +53,7 @@ Answers answersTo(const PlacedTriangles& a, const PlacedTriangles& b, bool self,
     keepPossiblyIntersecting(a, b, self, pairs, out);
     Answers& answers = ofPaths.emplace_back();
     std::size_t next = 0;
-    for (const TrianglePair& pair : pairs) {
+    for (const ElementPair& pair : pairs) {
       const bool isKept =
           next < out.size() && out[next].triangles.a == pair.a && out[next].triangles.b == pair.b;
       answers.isKept.push_back(isKept);
@@ -72,7 +73,7 @@ TEST(IntersectionFilter, KeepsWhateverIntersects) {
   // The largest, the smallest, and where products of three are denormal.
   constexpr int kScales[] = {900, -900, -355};
   Side a, b;
-  std::vector<TrianglePair> pairs;
+  std::vector<ElementPair> pairs;
   std::vector<bool> isScaled;
   for (std::uint32_t i = 0; i < kCount; ++i) {
     CornersPair pair = makePair(static_cast<Kind>(i % kKinds), random);
@@ -114,7 +115,7 @@ TEST(IntersectionFilter, KeepsWhateverIntersects) {
 TEST(IntersectionFilter, KeepsCornersOnThePlane) {
   Random random(2);
   Side a, b;
-  std::vector<TrianglePair> pairs;
+  std::vector<ElementPair> pairs;
   for (std::uint32_t i = 0; i < 40000; ++i) {
     // a's plane is x + y + z = 0 of a grid, exactly; far away and at any scale.
     const double unit = std::ldexp(1.0, random.between(-20, 20));
@@ -146,15 +147,15 @@ TEST(IntersectionFilter, OfOneMeshLeavesOutCornersInCommonAsTheDefinitionDoes) {
     for (Triangle& t : triangles)
       for (std::uint32_t& v : t) v = static_cast<std::uint32_t>(random.below(6));
     const TriangleMesh mesh{MeshTopology(positions.size(), triangles), positions, positions};
-    std::vector<TrianglePair> pairs;
+    std::vector<ElementPair> pairs;
     for (std::uint32_t i = 0; i < triangles.size(); ++i)
       for (std::uint32_t j = i; j < triangles.size(); ++j) pairs.push_back({i, j});
     const PlacedTriangles placed{triangles, positions};
     const std::vector<bool> isKept = answersTo(placed, placed, true, pairs).isKept;
     ContactBuffers out;
     findContactsByBruteForce({mesh, mesh, {.method = Method::Intersection}}, out);
-    for (const TrianglePair& pair : out.intersectingTriangles) {
-      const auto same = [&](const TrianglePair& p) { return p.a == pair.a && p.b == pair.b; };
+    for (const ElementPair& pair : out.intersectingTriangles) {
+      const auto same = [&](const ElementPair& p) { return p.a == pair.a && p.b == pair.b; };
       const auto at = std::find_if(pairs.begin(), pairs.end(), same) - pairs.begin();
       ASSERT_TRUE(isKept[static_cast<std::size_t>(at)]) << repeat;
     }

@@ -1,3 +1,4 @@
+#include "Diagnostics/ContactsByBruteForce.h"
 #include "NarrowPhase/NarrowPhase.h"
 
 #include "Meshes.h"
@@ -265,7 +266,7 @@ TEST(SelfIntersection, AnEdgeThroughAFaceAtACommonVertexIsListed) {
   EXPECT_TRUE(fanned({1, 1, 1}, {1, 1, 2}).intersectingTriangles.empty());
   EXPECT_TRUE(fanned({-1, -1, -1}, {-1, -1, 2}).intersectingTriangles.empty());
   const ContactBuffers found = fanned({1, 1, -1}, {1, 1, 2});
-  EXPECT_EQ(found.intersectingTriangles, (Buffer<TrianglePair>{{0, 1}}));
+  EXPECT_EQ(found.intersectingTriangles, (Buffer<ElementPair>{{0, 1}}));
   EXPECT_TRUE(found.vertexTriangle.empty() && found.edgeEdge.empty());
   EXPECT_EQ(idsOf(rowsOf(fanned({1, 1, 0}, {1, 1, 2}).vertexTriangle)), (std::vector<Row>{{3, 0}}));
 }

@@ -1,3 +1,4 @@
+#include "Diagnostics/ContactsByBruteForce.h"
 #include "NarrowPhase/NarrowPhase.h"
 
 #include "Meshes.h"
@@ -31,8 +32,8 @@ Eigen::AlignedBox3d boxOf(const TriangleMesh& mesh, std::uint32_t triangle) {
 }
 
 /// Every triangle pair whose boxes, the first inflated by the thickness and a little, overlap.
-std::vector<TrianglePair> candidatesOf(const MeshPair& pair) {
-  std::vector<TrianglePair> candidates;
+std::vector<ElementPair> candidatesOf(const MeshPair& pair) {
+  std::vector<ElementPair> candidates;
   const auto count = [](const TriangleMesh& mesh) {
     return static_cast<std::uint32_t>(mesh.topology.triangles.size());
   };
@@ -93,7 +94,7 @@ struct Found {
 Found find(const TriangleMesh& a, const TriangleMesh& b, double thickness, Contacts contacts) {
   const MeshPair pair{a, b, {Method::Proximity, thickness, contacts}};
   Found found;
-  const std::vector<TrianglePair> candidates = candidatesOf(pair);
+  const std::vector<ElementPair> candidates = candidatesOf(pair);
   // In batches of odd sizes: contacts must not depend on them.
   for (std::size_t begin = 0; begin < candidates.size(); begin += 37)
     findContacts(

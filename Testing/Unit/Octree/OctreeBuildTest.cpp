@@ -21,7 +21,7 @@ TEST(OctreeBuild, FollowsTheWorkedExample) {
       boxAbout({4, 4, 4}, 7.875),          // 5
   };
   OctreeSettings settings;
-  settings.maxPrimitivesPerLeaf = 2;
+  settings.maxElementsPerLeaf = 2;
   BoxOctree tree;
   tree.build(boxes, settings, Threads(1));
   const Octree& octree = tree.octree;

@@ -63,8 +63,8 @@ struct Case {
 std::vector<Case> cases() {
   Random random(21);
   OctreeSettings few, many;
-  few.maxPrimitivesPerLeaf = 4;
-  many.maxPrimitivesPerLeaf = 100;
+  few.maxElementsPerLeaf = 4;
+  many.maxElementsPerLeaf = 100;
   return {{"one leaf", testing::randomBoxes(random, 3, 0.1), few},
           {"one digit", testing::randomBoxes(random, 200, 0.01), few},
           {"two digits", testing::randomBoxes(random, 900, 0.01), few},
@@ -73,7 +73,7 @@ std::vector<Case> cases() {
 }
 
 /// Fails the n-th allocation of a build for every n. `smaller`: of a tree that was built before
-/// with fewer primitives, and so has part of its memory.
+/// with fewer elements, and so has part of its memory.
 void failEach(const Case& c, const Threads& threads, bool smaller) {
   BoxOctree fresh;
   fresh.build(c.boxes, c.settings, threads);

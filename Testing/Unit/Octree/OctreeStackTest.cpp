@@ -58,7 +58,7 @@ TEST(OctreeStack, IsSmallForTheDeepestTree) {
   const Boxes boxes = testing::nestedBoxes(random, 40, 58, 3000);
   OctreeSettings settings;
   settings.maxDepth = 60;
-  settings.maxPrimitivesPerLeaf = 1;
+  settings.maxElementsPerLeaf = 1;
   const Threads one(1);
   BoxOctree tree;
   TraversalStack pairs;

@@ -24,7 +24,7 @@ Settings rebuilding(int threads = 1) {
   return settings;
 }
 
-/// Cells by their bounds, each with the primitives it holds: what a tree is, whatever its nodes are
+/// Cells by their bounds, each with the elements it holds: what a tree is, whatever its nodes are
 /// called.
 using Tree = std::set<std::pair<std::vector<double>, std::vector<std::uint32_t>>>;
 
@@ -32,15 +32,15 @@ Tree treeOf(const OctreeBasedCD& detection, GeometryId geometry) {
   Tree tree;
   for (const LooseOctree::NodeId id : detection.octree().nodes(geometry)) {
     const LooseOctree::Node node = detection.octree().node(id);
-    std::vector<std::uint32_t> primitives(node.primitives.begin(), node.primitives.end());
-    std::sort(primitives.begin(), primitives.end());
+    std::vector<std::uint32_t> elements(node.elements.begin(), node.elements.end());
+    std::sort(elements.begin(), elements.end());
     const Eigen::Vector3d low = node.bounds.min(), high = node.bounds.max();
-    tree.insert({{low[0], low[1], low[2], high[0], high[1], high[2]}, primitives});
+    tree.insert({{low[0], low[1], low[2], high[0], high[1], high[2]}, elements});
   }
   return tree;
 }
 
-TEST(Octree, HoldsEachPrimitiveOnceWithinItsLooseBounds) {
+TEST(Octree, HoldsEachElementOnceWithinItsLooseBounds) {
   Random random(1);
   for (const std::size_t size : {1u, 2u, 17u, 500u, 20000u})
     for (const double extent : {1e-4, 0.02, 0.7}) {
@@ -53,7 +53,7 @@ TEST(Octree, HoldsEachPrimitiveOnceWithinItsLooseBounds) {
       std::vector<int> holders(size, 0);
       for (const auto node : detection.octree().nodes()) {
         const LooseOctree::Node n = detection.octree().node(node);
-        for (const std::uint32_t t : n.primitives) {
+        for (const std::uint32_t t : n.elements) {
           ++holders[t];
           for (const std::uint32_t corner : mesh.triangles[t]) {
             EXPECT_TRUE(n.looseBounds.contains(mesh.positions[corner]));
@@ -124,7 +124,7 @@ TEST(Octree, KeepsItsLimits) {
     for (const int leaf : {1, 8, 100}) {
       Settings settings = rebuilding();
       settings.octree.maxDepth = depth;
-      settings.octree.maxPrimitivesPerLeaf = leaf;
+      settings.octree.maxElementsPerLeaf = leaf;
       OctreeBasedCD detection(settings);
       const GeometryId id = detection.addTriangleMesh(mesh.positions, mesh.triangles);
       detection.update();
@@ -133,8 +133,8 @@ TEST(Octree, KeepsItsLimits) {
       // A leaf may be fuller only at the maximum depth, or where all are as large as its cell.
       for (const auto node : detection.octree().nodes(id)) {
         const LooseOctree::Node n = detection.octree().node(node);
-        if (n.leaf && n.depth < depth && n.primitives.size() > static_cast<std::size_t>(leaf)) {
-          for (const std::uint32_t t : n.primitives) {
+        if (n.leaf && n.depth < depth && n.elements.size() > static_cast<std::size_t>(leaf)) {
+          for (const std::uint32_t t : n.elements) {
             Eigen::AlignedBox3d box;
             for (const std::uint32_t corner : mesh.triangles[t]) box.extend(mesh.positions[corner]);
             EXPECT_GT(box.sizes().maxCoeff(), 0.49 * n.bounds.sizes()[0]);
@@ -154,8 +154,8 @@ TEST(Octree, OneFarTriangleDoesNotFlattenIt) {
       detection.addTriangleMesh(mesh.positions, mesh.triangles);
       detection.update();
       EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
-      EXPECT_LE(detection.octree().statistics().mostPrimitivesInNode,
-                static_cast<std::size_t>(OctreeSettings{}.maxPrimitivesPerLeaf));
+      EXPECT_LE(detection.octree().statistics().mostElementsInNode,
+                static_cast<std::size_t>(OctreeSettings{}.maxElementsPerLeaf));
     }
 }
 
@@ -232,7 +232,7 @@ TEST(Octree, PoolTakesBlocksBack) {
   EXPECT_LT(after.blocksInUse, before.blocksInUse / 10);
   EXPECT_EQ(after.blocksInUse + after.blocksFree, after.blocksAllocated);
   EXPECT_GE(after.blocksAllocated, 64u);
-  EXPECT_EQ(after.primitives, 50u);
+  EXPECT_EQ(after.elements, 50u);
   EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
 }
 

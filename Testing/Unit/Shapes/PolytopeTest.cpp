@@ -1,6 +1,6 @@
 #include "Common/RandomMeshes.h"
 #include "Shapes/Polytope.h"
-#include "Math/Predicates.h"
+#include "Exact/Predicates.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,349 @@
+#include "Diagnostics/Audit.h"
+
+#include <palpate/Capture.h>
+
+#include "CollisionDetection/DiagnosticsInterface.h"
+#include "CollisionDetection/FirstImpacts.h"
+#include "CollisionDetection/Order.h"
+#include "NarrowPhase/Continuous.h"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <initializer_list>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <random>
+#include <string>
+#include <system_error>
+#include <tuple>
+#include <type_traits>
+
+namespace palpate {
+
+namespace {
+
+std::uint32_t low(std::uint64_t value) { return static_cast<std::uint32_t>(value); }
+std::uint32_t high(std::uint64_t value) { return static_cast<std::uint32_t>(value >> 32); }
+
+/// `count` of the numbers below `size`, ascending. (Bentley and Floyd, A sample of brilliance,
+/// Communications of the ACM 30, 1987.)
+std::vector<std::uint64_t> drawNumbers(std::uint64_t count, std::uint64_t size,
+                                       std::mt19937_64& random) {
+  std::vector<std::uint64_t> drawn;
+  for (std::uint64_t last = size - count; last < size; ++last) {
+    std::uint64_t number = random() % (last + 1);
+    auto place = std::lower_bound(drawn.begin(), drawn.end(), number);
+    if (place != drawn.end() && *place == number) {
+      number = last;
+      place = drawn.end();
+    }
+    drawn.insert(place, number);
+  }
+  return drawn;
+}
+
+/// The ids by which contacts are ordered and told apart.
+std::array<std::uint32_t, 2> idsOf(const VertexTriangleContact& c) {
+  return {c.vertex, c.triangle};
+}
+std::array<std::uint32_t, 4> idsOf(const EdgeEdgeContact& c) {
+  return {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]};
+}
+std::array<std::uint32_t, 2> idsOf(const ElementPair& pair) { return {pair.a, pair.b}; }
+std::array<std::uint32_t, 3> idsOf(const ShapeContact& c) {
+  return {static_cast<std::uint32_t>(c.element), c.id, c.vertices[1]};
+}
+int idsOf(const ShapeShapeContact&) { return 0; }  // there is one
+
+/// Which contacts a sample of features tells everything about.
+class Coverage {
+ public:
+  Coverage(const MeshPair& meshes, const FeatureLists& sample)
+      : m_meshes(meshes),
+        m_sample(sample),
+        m_byTriangles(meshes.settings.method == Method::Intersection) {}
+
+  bool ofVertexTriangle(const VertexTriangleContact& c) const {
+    if (c.vertex >= m_meshes.a.topology.vertexCount) return true;  // there is no such vertex
+    if (!m_byTriangles) return holds(m_sample.verticesOfA, c.vertex);
+    return all(m_meshes.a.topology.vertexTriangles[c.vertex], [&](std::uint32_t s) {
+      return ofTriangles({s, c.triangle});
+    });
+  }
+  bool ofTriangleVertex(const VertexTriangleContact& c) const {
+    return m_byTriangles ? holds(m_sample.trianglesOfA, c.triangle)
+                         : holds(m_sample.verticesOfB, c.vertex);
+  }
+  bool ofEdges(const EdgeEdgeContact& c) const {
+    const MeshTopology &a = m_meshes.a.topology, &b = m_meshes.b.topology;
+    const std::uint32_t edgeA = a.edgeOf(c.edgeA), edgeB = b.edgeOf(c.edgeB);
+    if (edgeA == kNoEdge || edgeB == kNoEdge) return true;  // nor such edges
+    if (!m_byTriangles) return holds(m_sample.edgesOfA, edgeA);
+    return all(a.edgeTriangles[edgeA], [&](std::uint32_t s) {
+      return all(b.edgeTriangles[edgeB], [&](std::uint32_t t) { return ofTriangles({s, t}); });
+    });
+  }
+  /// By the element that owns the element.
+  bool ofShape(const ShapeContact& c) const {
+    const MeshTopology& mesh = m_meshes.mesh().topology;
+    if (c.element == ShapeElement::Face) return holds(m_sample.trianglesOfA, c.id);
+    const bool isVertex = c.element == ShapeElement::Vertex;
+    const std::uint32_t edge = isVertex ? 0 : mesh.edgeOf({c.vertices[0], c.vertices[1]});
+    if (isVertex ? c.id >= mesh.vertexCount : edge == kNoEdge) return true;  // there is none such
+    const auto owners = isVertex ? mesh.vertexTriangles[c.id] : mesh.edgeTriangles[edge];
+    return owners.empty() || holds(m_sample.trianglesOfA, owners.front());
+  }
+  bool ofTriangles(const ElementPair& pair) const {
+    return holds(m_sample.trianglesOfA, m_meshes.self() ? std::min(pair.a, pair.b) : pair.a);
+  }
+
+ private:
+  static bool holds(const std::vector<std::uint32_t>& list, std::uint32_t id) {
+    return std::binary_search(list.begin(), list.end(), id);
+  }
+  template <class F>
+  static bool all(std::span<const std::uint32_t> ids, F&& f) {
+    return std::all_of(ids.begin(), ids.end(), f);
+  }
+
+  const MeshPair& m_meshes;
+  const FeatureLists& m_sample;
+  bool m_byTriangles;
+};
+
+/// Contacts::Distinct of impacts: drops what an earlier contact stands for, which is expected as
+/// well or, where the sample does not have it, is in the answer.
+void dropWhatOthersStandFor(const MeshPair& meshes, const CollisionData& answer,
+                            CollisionData::Contents& expected) {
+  const bool impactsOnly = meshes.settings.method == Method::Continuous;
+  if (meshes.settings.contacts != Contacts::Distinct || !(impactsOnly || meshes.step.impacts))
+    return;
+  const double end = impactsOnly ? std::numeric_limits<double>::infinity() : 1.0;
+  using Rank = std::tuple<double, int, std::array<std::uint32_t, 4>>;
+  const auto rankOf = [](const auto& contact, int list) -> Rank {
+    if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
+      return {contact.timeOfImpact, list, idsOf(contact)};
+    else if (list == 1)
+      return {contact.timeOfImpact, list, {contact.triangle, contact.vertex, 0, 0}};
+    else
+      return {contact.timeOfImpact, list, {contact.vertex, contact.triangle, 0, 0}};
+  };
+  const auto featuresOf = [&](const auto& contact, int list) {
+    if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
+      return sharedFeatures(contact, meshes.self());
+    else
+      return sharedFeatures(contact, list == 1, meshes.self());
+  };
+  std::map<ImpactFeatures, Rank> first;
+  const auto note = [&](const auto& contacts, int list) {
+    for (const auto& contact : contacts)
+      if (const auto features = featuresOf(contact, list); features && contact.timeOfImpact < end) {
+        const Rank rank = rankOf(contact, list);
+        const auto [place, isNew] = first.emplace(*features, rank);
+        if (!isNew) place->second = std::min(place->second, rank);
+      }
+  };
+  note(answer.vertexTriangle(), 0);
+  note(answer.triangleVertex(), 1);
+  note(answer.edgeEdge(), 2);
+  forEachImpactList(expected, note);
+  const auto isDropped = [&](const auto& contact, int list) {
+    const auto features = featuresOf(contact, list);
+    const auto place = features ? first.find(*features) : first.end();
+    return place != first.end() && contact.timeOfImpact < end &&
+           place->second < rankOf(contact, list);
+  };
+  // Auto may answer by its impact what brute force finds at the step's end, and drop that.
+  const auto isDroppedImpact = [&](const auto& contact, int list) {
+    if (contact.timeOfImpact < end) return false;
+    ContactBuffers impact;
+    if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>) {
+      const Features<ImpactQuery::Kind::EdgeEdge> features{meshes.a, meshes.b};
+      addImpact(meshes, features, meshes.a.topology.edgeOf(contact.edgeA),
+                meshes.b.topology.edgeOf(contact.edgeB), false, impact);
+    } else {
+      const bool ofSecond = list == 1;
+      const Features<ImpactQuery::Kind::VertexTriangle> features{ofSecond ? meshes.b : meshes.a,
+                                                                 ofSecond ? meshes.a : meshes.b};
+      addImpact(meshes, features, contact.vertex, contact.triangle, ofSecond, impact);
+    }
+    bool dropped = false;
+    forEachImpactList(impact, [&](const auto& contacts, int of) {
+      for (const auto& found : contacts) dropped |= isDropped(found, of);
+    });
+    return dropped;
+  };
+  forEachImpactList(expected, [&](auto& contacts, int list) {
+    std::erase_if(contacts, [&](const auto& contact) {
+      return isDropped(contact, list) || isDroppedImpact(contact, list);
+    });
+  });
+}
+
+/// Calls report(fault, expected, found) where two lists differ: of those found that are not
+/// expected, in those covered.
+template <class Contact, class Covered, class Report>
+void compare(std::vector<Contact> expected, std::span<const Contact> allFound, Covered&& covered,
+             Report&& report) {
+  const auto before = [](const Contact& l, const Contact& r) { return idsOf(l) < idsOf(r); };
+  std::vector<Contact> found;
+  std::stable_sort(expected.begin(), expected.end(), before);
+  std::copy_if(allFound.begin(), allFound.end(), std::back_inserter(found), [&](const Contact& c) {
+    return covered(c) || std::binary_search(expected.begin(), expected.end(), c, before);
+  });
+  std::stable_sort(found.begin(), found.end(), before);
+  using Fault = AuditFailure::Fault;
+  auto f = found.begin();
+  for (const Contact& e : expected) {
+    for (; f != found.end() && before(*f, e); ++f) report(Fault::Invented, {}, *f);
+    if (f == found.end() || before(e, *f)) {
+      report(Fault::Missing, e, {});
+    } else {
+      if (!(*f == e)) report(Fault::Different, e, *f);
+      ++f;
+    }
+  }
+  for (; f != found.end(); ++f) report(Fault::Invented, {}, *f);
+}
+
+}  // namespace
+
+FeatureLists drawFeatures(const MeshPair& meshes, const CollisionPair& pair,
+                          const AuditSettings& settings, std::uint64_t frame) {
+  FeatureLists features = everyFeature(meshes);
+  const std::initializer_list<std::vector<std::uint32_t>*> lists{
+      &features.verticesOfA, &features.verticesOfB, &features.edgesOfA, &features.trianglesOfA};
+  std::uint64_t size = 0;
+  for (const auto* list : lists) size += list->size();
+  const auto count = static_cast<std::uint64_t>(settings.features);
+  if (count >= size) return features;
+
+  const auto a = static_cast<std::uint32_t>(pair.a), b = static_cast<std::uint32_t>(pair.b);
+  std::seed_seq seed{low(settings.seed), high(settings.seed), low(frame), high(frame), a, b};
+  std::mt19937_64 random(seed);
+  const std::vector<std::uint64_t> drawn = drawNumbers(count, size, random);
+  auto next = drawn.begin();
+  std::uint64_t first = 0;
+  for (auto* list : lists) {
+    const std::uint64_t listSize = list->size();
+    std::size_t kept = 0;
+    for (; next != drawn.end() && *next < first + listSize; ++next)
+      (*list)[kept++] = (*list)[*next - first];
+    list->resize(kept);
+    first += listSize;
+  }
+  return features;
+}
+
+void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionData& data,
+           const AuditSettings& settings, std::uint64_t frame, std::vector<AuditFailure>& out) {
+  ContactBuffers contacts;
+  const FeatureLists sample = drawFeatures(meshes, pair, settings, frame);
+  findContactsByBruteForce(meshes, sample, contacts);
+  ContactBuffers* const buffers[] = {&contacts};
+  OrderScratch scratch;
+  CollisionData::Contents expected;
+  orderContacts(buffers, 0, scratch, expected);
+
+  using List = AuditFailure::List;
+  using Fault = AuditFailure::Fault;
+  using Any = AuditFailure::Contact;
+  // What Auto takes from other methods in place of its own is not of features.
+  const bool withOthers = pair.settings.method == Method::Auto;
+  const auto into = [&](List list) {
+    return [=, &pair, &out](Fault fault, const Any& e, const Any& f) {
+      if (withOthers && fault != Fault::Missing) return;
+      out.push_back({pair.a, pair.b, frame, fault, list, e, f, {}, {}});
+    };
+  };
+  if (meshes.settings.earliestTimeOnly) {
+    return forEachTimed(expected, [&](const auto& all) {
+      for (const auto& contact : all)
+        if (contact.timeOfImpact < data.earliestTimeOfImpact())
+          into(List::Earliest)(Fault::Missing, contact, {});
+    });
+  }
+  dropWhatOthersStandFor(meshes, data, expected);
+  const Coverage coverage(meshes, sample);
+  const auto differ = [&](const auto& truth, const auto& found, auto covers, List list) {
+    compare(truth, found, std::bind_front(covers, &coverage), into(list));
+  };
+  differ(expected.vertexTriangle, data.vertexTriangle(), &Coverage::ofVertexTriangle,
+         List::VertexTriangle);
+  differ(expected.triangleVertex, data.triangleVertex(), &Coverage::ofTriangleVertex,
+         List::TriangleVertex);
+  differ(expected.edgeEdge, data.edgeEdge(), &Coverage::ofEdges, List::EdgeEdge);
+  differ(expected.intersectingTriangles, data.intersectingTriangles(), &Coverage::ofTriangles,
+         List::IntersectingTriangles);
+  differ(expected.shape, data.shape(), &Coverage::ofShape, List::Shape);
+  compare(
+      expected.shapeShape, data.shapeShape(), [](const auto&) { return true; },
+      into(List::ShapeShape));
+}
+
+CollisionProblem pairAlone(const CollisionProblem& whole, GeometryId idA, GeometryId idB) {
+  CollisionProblem problem{whole.settings, {}, {}};
+  for (CollisionProblem::Pair pair : whole.pairs) {
+    const CollisionProblem::Mesh &a = whole.geometries[pair.a], &b = whole.geometries[pair.b];
+    if (a.id != idA || b.id != idB) continue;
+    problem.geometries.push_back(a);
+    if (pair.a != pair.b) problem.geometries.push_back(b);
+    pair.b = pair.a == pair.b ? 0 : 1;
+    pair.a = 0;
+    problem.pairs.push_back(pair);
+  }
+  return problem;
+}
+
+/// Writes the problem of one pair's failures into a new file of the settings' folder, and its name
+/// into each of them.
+static void keepProblem(const CollisionProblem& problem, const AuditSettings& settings,
+                        std::span<AuditFailure> failures) {
+  const AuditFailure& first = failures.front();
+  const std::string name = "frame" + std::to_string(first.frame) + "-pair" +
+                           std::to_string(static_cast<std::uint32_t>(first.a)) + "-" +
+                           std::to_string(static_cast<std::uint32_t>(first.b));
+  std::filesystem::path file = settings.folder / (name + ".capture");
+  std::error_code fault;
+  for (int copy = 2; std::filesystem::exists(file, fault); ++copy)
+    file = settings.folder / (name + "-" + std::to_string(copy) + ".capture");
+  std::string error;
+  try {
+    writeCapture(pairAlone(problem, first.a, first.b), file);
+  } catch (const Error& e) {
+    error = e.what();
+    file.clear();
+  }
+  for (AuditFailure& failure : failures) {
+    failure.file = file;
+    failure.fileError = error;
+  }
+}
+
+void auditFrame(const Settings& settings, const GeometryTable& geometries, const PairTable& pairs,
+                AuditRecord& record) {
+  std::vector<AuditFailure>& failures = record.failures;
+  failures.clear();
+  ++record.frame;
+  if (settings.audit.features == 0) return;
+  for (const auto& pair : pairs.records()) {
+    if (!pair->collides()) continue;
+    const std::size_t first = failures.size();
+    audit(pair->meshes(), pair->pair, pair->data, settings.audit, record.frame, failures);
+    const auto own = std::span(failures).subspan(first);
+    if (own.empty() || settings.audit.folder.empty()) continue;
+    if (record.files < settings.audit.mostFiles) {
+      keepProblem(problemOf(settings, geometries, pairs), settings.audit, own);
+      record.files += !own.front().file.empty();
+    } else {
+      for (AuditFailure& failure : own)
+        failure.fileError =
+            "audit.mostFiles were written into \"" + settings.audit.folder.string() + "\" before";
+    }
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,412 @@
+#include <palpate/Capture.h>
+
+#include "Diagnostics/Audit.h"
+#include "Core/FloatingPoint.h"
+#include "Shapes/Shape.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <type_traits>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+constexpr std::string_view kTitle = "palpate-capture";
+constexpr int kVersion = 9;
+
+// Values of enumerations are written by name: in the order of their declarations.
+constexpr std::array<std::string_view, 4> kMethods{"Auto", "Intersection", "Proximity",
+                                                   "Continuous"};
+constexpr std::array<std::string_view, 4> kKinds{"Triangles", "Lines", "Points", "Shape"};
+constexpr std::array<std::string_view, 2> kSides{"Both", "Outer"};
+constexpr std::array<std::string_view, 6> kShapes{"Sphere", "Capsule",  "Plane",
+                                                  "Box",    "Cylinder", "ConvexHull"};
+constexpr std::array<std::string_view, 2> kContacts{"Distinct", "All"};
+// Before version 9 one word said what earliestTimeOnly says, too.
+enum class ContactsBefore9 { Distinct, All, Earliest };
+constexpr std::array<std::string_view, 3> kContactsBefore9{"Distinct", "All", "Earliest"};
+constexpr std::array<std::string_view, 2> kEngines{"Octree", "BruteForce"};
+constexpr std::array<std::string_view, 2> kUpdates{"Auto", "Rebuild"};
+
+std::string quoted(std::string_view text) { return std::string("\"").append(text).append("\""); }
+
+/// A text of words, with lines for people.
+class Writer {
+ public:
+  void word(std::string_view text) { (m_text += text) += ' '; }
+  template <class Enumerator, std::size_t size>
+  void word(Enumerator value, const std::array<std::string_view, size>& names) {
+    word(names.at(static_cast<std::size_t>(value)));
+  }
+  template <class Integer>
+  void integer(Integer value) {
+    word(std::to_string(value));
+  }
+  /// Hexadecimal: exact, and the same in every locale.
+  void real(double value) {
+    char text[32];
+    const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::hex).ptr;
+    word({text, static_cast<std::size_t>(end - text)});
+  }
+  void expect(std::string_view text) { word(text); }
+  void count(std::size_t value) { integer(value); }
+  void endLine() { m_text.back() = '\n'; }
+  const std::string& text() const { return m_text; }
+
+ private:
+  std::string m_text;
+};
+
+/// The same, read. Throws Error (ErrorCode::File) that names the file and the line.
+class Reader {
+ public:
+  Reader(const std::filesystem::path& path, std::string text)
+      : m_name("the capture \"" + path.string() + "\""), m_text(std::move(text)), m_rest(m_text) {}
+
+  std::string_view word() {
+    constexpr std::string_view kSpaces = " \t\r\n";
+    const std::size_t begin = std::min(m_rest.find_first_not_of(kSpaces), m_rest.size());
+    m_line += std::count(m_rest.begin(), m_rest.begin() + static_cast<std::ptrdiff_t>(begin), '\n');
+    m_rest.remove_prefix(begin);
+    if (m_rest.empty()) refuse("it is cut off");
+    const std::size_t size = std::min(m_rest.find_first_of(kSpaces), m_rest.size());
+    const std::string_view found = m_rest.substr(0, size);
+    m_rest.remove_prefix(size);
+    return found;
+  }
+  void expect(std::string_view text) {
+    if (const std::string_view found = word(); found != text)
+      refuse(quoted(found) + " where " + quoted(text) + " should be");
+  }
+  template <class Enumerator, std::size_t size>
+  void word(Enumerator& value, const std::array<std::string_view, size>& names) {
+    const std::string_view found = word();
+    const auto place = std::find(names.begin(), names.end(), found);
+    if (place == names.end()) refuse(quoted(found) + " is not a name known here");
+    value = static_cast<Enumerator>(place - names.begin());
+  }
+  template <class Integer>
+  void integer(Integer& value) {
+    const std::string_view found = word();
+    if (const auto [end, fault] = std::from_chars(found.begin(), found.end(), value);
+        end != found.end() || fault != std::errc())
+      refuse(quoted(found) + " is not an integer in range");
+  }
+  void real(double& value) {
+    const std::string_view found = word();
+    if (const auto [end, fault] =
+            std::from_chars(found.begin(), found.end(), value, std::chars_format::hex);
+        end != found.end() || fault != std::errc())
+      refuse(quoted(found) + " is not a number");
+  }
+  /// How many of something follow: never more than the file has characters.
+  void count(std::size_t& value) {
+    integer(value);
+    if (value > m_rest.size()) refuse("it is cut off: too few lines for " + std::to_string(value));
+  }
+  void endLine() {}
+  void expectEnd() {
+    if (m_rest.find_first_not_of(" \t\r\n") != m_rest.npos) refuse("more follows after its end");
+  }
+  std::string_view rest() const { return m_rest; }
+  [[noreturn]] void refuse(const std::string& reason) const {
+    throw Error(ErrorCode::File, m_name + ", line " + std::to_string(m_line) + ": " + reason);
+  }
+  [[noreturn]] void refuseWhole(const std::string& reason) const {
+    throw Error(ErrorCode::File, m_name + ": " + reason);
+  }
+
+ private:
+  std::string m_name, m_text;
+  std::string_view m_rest;
+  std::ptrdiff_t m_line = 1;
+};
+
+// The lines of a file, either way: `file` is a Writer or a Reader.
+
+template <class File>
+constexpr bool kReads = std::is_same_v<File, Reader>;
+
+template <class File, class SettingsType>
+void settingsLine(File& file, SettingsType& settings) {
+  file.word(settings.engine, kEngines);
+  file.integer(settings.threads);
+  file.integer(settings.octree.maxDepth);
+  file.integer(settings.octree.maxElementsPerLeaf);
+  file.word(settings.octree.update, kUpdates);
+}
+
+template <class File>
+void fieldOf(File& file, auto& value) {
+  using Value = std::decay_t<decltype(value)>;
+  if constexpr (std::is_same_v<Value, double>) {
+    file.real(value);
+  } else if constexpr (std::is_same_v<Value, bool>) {
+    int number = value;
+    file.integer(number);
+    if constexpr (kReads<File>) value = number != 0;
+  } else if constexpr (std::is_integral_v<Value>) {
+    file.integer(value);
+  } else {
+    for (auto& part : value) fieldOf(file, part);
+  }
+}
+
+/// How many a list has.
+template <class File>
+void sizeOf(File& file, auto& list) {
+  std::size_t size = list.size();
+  file.count(size);
+  if constexpr (kReads<File>) list.resize(size);
+}
+
+template <class File>
+void listOf(File& file, auto& list) {
+  sizeOf(file, list);
+  fieldOf(file, list);
+}
+
+template <class File, class SettingsType>
+void contactsOf(File& file, SettingsType& settings, int version) {
+  if (version >= 9) {
+    file.word(settings.contacts, kContacts);
+    return fieldOf(file, settings.earliestTimeOnly);
+  }
+  if constexpr (kReads<File>) {
+    ContactsBefore9 contacts{};
+    file.word(contacts, kContactsBefore9);
+    settings.earliestTimeOnly = contacts == ContactsBefore9::Earliest;
+    settings.contacts = contacts == ContactsBefore9::All ? Contacts::All : PairSettings().contacts;
+  }
+}
+
+template <class File, class PairType>
+void pairLine(File& file, PairType& pair, int version) {
+  file.integer(pair.a);
+  file.integer(pair.b);
+  file.word(pair.settings.method, kMethods);
+  file.word(pair.method, kMethods);
+  file.real(pair.settings.thickness);
+  contactsOf(file, pair.settings, version);
+  if (version >= 2) file.real(pair.settings.motionTolerance);
+  if (version >= 3) file.real(pair.settings.restDistance);
+  if (version >= 4) fieldOf(file, pair.predicate);
+  if (version >= 6) file.real(pair.settings.timeTolerance);
+}
+
+template <class File, class FilterType>
+void filterOf(File& file, FilterType& filter) {
+  file.integer(filter.groups);
+  file.integer(filter.mask);
+  file.word(filter.sidedness, kSides);
+}
+
+/// A shape's measures and where it is.
+template <class File, class MeshType>
+void shapeOf(File& file, MeshType& mesh, int version) {
+  forEachField(*mesh.analytical, [&](std::string_view, auto& field) {
+    if constexpr (requires { field.capacity(); }) sizeOf(file, field);
+    fieldOf(file, field);
+  });
+  const auto transform = [&](auto& rotation, auto& translation) {
+    for (int k = 0; k < 3; ++k) {
+      for (int i = 0; i < 3; ++i) fieldOf(file, rotation(k, i));
+      fieldOf(file, translation[k]);
+    }
+  };
+  transform(mesh.rotation, mesh.translation);
+  if (version >= 7) return transform(mesh.rotationBefore, mesh.translationBefore);
+  if constexpr (kReads<File>) {
+    mesh.rotationBefore = mesh.rotation;
+    mesh.translationBefore = mesh.translation;
+  }
+}
+
+/// The kind of shape by its number.
+template <std::size_t... kinds>
+AnalyticalGeometry shapeOfKind(std::size_t kind, std::index_sequence<kinds...>) {
+  AnalyticalGeometry shape;
+  (void)((kind == kinds && (shape.emplace<kinds>(), true)) || ...);
+  return shape;
+}
+
+template <class File, class MeshType>
+void meshLines(File& file, MeshType& mesh, int version) {
+  file.expect("geometry");
+  auto id = static_cast<std::uint32_t>(mesh.id);
+  file.integer(id);
+  sizeOf(file, mesh.now);
+  sizeOf(file, mesh.triangles);
+  if (version >= 3) {
+    file.word(mesh.kind, kKinds);
+    listOf(file, mesh.radii);
+    if (mesh.kind == GeometryKind::Shape) {
+      std::size_t kind = mesh.analytical ? mesh.analytical->index() : 0;
+      file.word(kind, kShapes);
+      if constexpr (kReads<File>)
+        mesh.analytical = shapeOfKind(kind, std::make_index_sequence<kShapes.size()>());
+      shapeOf(file, mesh, version);
+    }
+  }
+  std::size_t rest = kReads<File> ? mesh.kind == GeometryKind::Lines : mesh.rest.size();
+  if (version >= 4) {
+    filterOf(file, mesh.filter);
+    listOf(file, mesh.disabled);
+    file.count(rest);
+  }
+  if (version >= 8) sizeOf(file, mesh.tetrahedra);
+  file.endLine();
+  if constexpr (kReads<File>) {
+    mesh.id = GeometryId{id};
+    mesh.before.resize(mesh.now.size());
+    mesh.rest.resize(rest ? mesh.now.size() : 0);
+  }
+  for (std::size_t v = 0; v < mesh.now.size(); ++v) {
+    fieldOf(file, mesh.before.at(v));
+    fieldOf(file, mesh.now[v]);
+    if (rest) fieldOf(file, mesh.rest.at(v));
+    file.endLine();
+  }
+  const auto elements = [&](auto& list) {
+    for (auto& element : list) {
+      fieldOf(file, element);
+      file.endLine();
+    }
+  };
+  elements(mesh.triangles);
+  elements(mesh.tetrahedra);
+}
+
+/// All but the title.
+template <class File, class ProblemType>
+void problemLines(File& file, ProblemType& problem, int version) {
+  settingsLine(file, problem.settings);
+  file.endLine();
+  sizeOf(file, problem.geometries);
+  sizeOf(file, problem.pairs);
+  file.endLine();
+  for (auto& mesh : problem.geometries) meshLines(file, mesh, version);
+  for (auto& pair : problem.pairs) {
+    file.expect("pair");
+    pairLine(file, pair, version);
+    file.endLine();
+  }
+  file.expect("end");
+  file.endLine();
+}
+
+std::string textOf(const CollisionProblem& problem) {
+  Writer file;
+  file.word(kTitle);
+  file.integer(kVersion);
+  file.endLine();
+  problemLines(file, problem, kVersion);
+  return file.text();
+}
+
+GeometryId add(OctreeBasedCD& detection, const CollisionProblem::Mesh& mesh) {
+  if (mesh.analytical) return detection.addAnalyticalGeometry(*mesh.analytical);
+  const std::vector<Eigen::Vector3d>& rest = mesh.rest.empty() ? mesh.now : mesh.rest;
+  if (!mesh.tetrahedra.empty()) return detection.addTetrahedralMesh(rest, mesh.tetrahedra);
+  if (mesh.kind == GeometryKind::Triangles) return detection.addTriangleMesh(rest, mesh.triangles);
+  const bool one = mesh.radii.size() <= 1;
+  const double radius = one && !mesh.radii.empty() ? mesh.radii.front() : 0.0;
+  if (mesh.kind == GeometryKind::Points)
+    return one ? detection.addPointSet(mesh.now, radius)
+               : detection.addPointSet(mesh.now, mesh.radii);
+  std::vector<Segment> segments;
+  for (const auto& [p, q, _] : mesh.triangles) segments.push_back({p, q});
+  return one ? detection.addLineMesh(rest, segments, radius)
+             : detection.addLineMesh(rest, segments, mesh.radii);
+}
+
+std::string contentOf(const std::filesystem::path& path) {
+  std::error_code fault;
+  std::ifstream file(path, std::ios::binary);
+  if (!file.is_open() || !std::filesystem::is_regular_file(path, fault))
+    throw Error(ErrorCode::File, "the capture \"" + path.string() + "\" cannot be read");
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+}  // namespace
+
+void writeCapture(const CollisionProblem& problem, const std::filesystem::path& path) {
+  const StandardFloatingPoint standard;
+  const std::string text = textOf(problem);
+  std::filesystem::path partial = path;
+  partial += ".part";
+  std::error_code fault;
+  try {
+    std::ofstream file(partial, std::ios::binary);
+    file << text;
+    file.close();
+    if (file.good()) std::filesystem::rename(partial, path, fault);
+    if (file.good() && !fault) return;
+  } catch (...) {
+    std::filesystem::remove(partial, fault);
+    throw;
+  }
+  std::filesystem::remove(partial, fault);
+  throw Error(ErrorCode::File, "the capture \"" + path.string() + "\" cannot be written");
+}
+
+void capture(const OctreeBasedCD& detection, const std::filesystem::path& path) {
+  writeCapture(detection.problem(), path);
+}
+
+void capture(const OctreeBasedCD& detection, const AuditFailure& failure,
+             const std::filesystem::path& path) {
+  const StandardFloatingPoint standard;
+  writeCapture(pairAlone(detection.problem(), failure.a, failure.b), path);
+}
+
+CollisionProblem readCapture(const std::filesystem::path& path) {
+  const StandardFloatingPoint standard;
+  Reader file(path, contentOf(path));
+  if (!file.rest().starts_with(kTitle)) file.refuseWhole("it is not a capture");
+  file.expect(kTitle);
+  int version = 0;
+  file.integer(version);
+  if (version < 1 || version > kVersion)
+    file.refuseWhole("it is of version " + std::to_string(version) + "; versions up to " +
+                     std::to_string(kVersion) + " can be read");
+  CollisionProblem problem;
+  problemLines(file, problem, version);
+  if (version == 1)  // Auto stood for one method then
+    for (CollisionProblem::Pair& pair : problem.pairs) pair.settings.method = pair.method;
+  file.expectEnd();
+  try {
+    setUp(problem);
+  } catch (const Error& error) {
+    file.refuseWhole(error.what());
+  }
+  return problem;
+}
+
+OctreeBasedCD setUp(const CollisionProblem& problem) {
+  const StandardFloatingPoint standard;
+  OctreeBasedCD detection(problem.settings);
+  for (const CollisionProblem::Mesh& mesh : problem.geometries) {
+    const GeometryId id = add(detection, mesh);
+    if (mesh.analytical)
+      detection.setTransform(id, mesh.rotationBefore, mesh.translationBefore, mesh.rotation,
+                             mesh.translation);
+    else
+      detection.setPositions(id, mesh.before, mesh.now);
+    detection.setCollisionFilter(id, mesh.filter);
+    detection.setDisabledElements(id, mesh.disabled);
+  }
+  for (const CollisionProblem::Pair& pair : problem.pairs)
+    detection.addCollisionPair(GeometryId{pair.a}, GeometryId{pair.b}, pair.settings);
+  return detection;
+}
+
+}  // namespace palpate

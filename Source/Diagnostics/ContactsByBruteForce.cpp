@@ -1,0 +1,328 @@
+#include "Diagnostics/ContactsByBruteForce.h"
+
+#include "Math/ClosestPoint.h"
+#include "NarrowPhase/Continuous.h"
+#include "NarrowPhase/Filters.h"
+#include "NarrowPhase/Intersection.h"
+#include "NarrowPhase/LineEdges.h"
+#include "NarrowPhase/Proximity.h"
+#include "NarrowPhase/StepCheck.h"
+#include "Shapes/ShapeContacts.h"
+
+#include <algorithm>
+#include <numeric>
+#include <optional>
+#include <vector>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+
+/// One vertex against every triangle of a mesh, as the definition of Contacts::Distinct reads.
+class VertexAgainstMesh {
+ public:
+  explicit VertexAgainstMesh(const TriangleMesh& triangles) : m_mesh(triangles) {}
+
+  void measure(const MeshPair& pair, const Vector3d& p, std::uint32_t vertex, ContactBuffers& out) {
+    m_position = p;
+    const std::vector<Triangle>& triangles = m_mesh.topology.triangles;
+    m_answers.assign(triangles.size(), {});
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+      if (!m_mesh.topology.isOn(t) || pair.leavesOutVertex(vertex, t)) continue;
+      const auto& [a, b, c] = triangles[t];
+      m_answers[t] = finiteVertexTriangleDistance(p, m_mesh.now[a], m_mesh.now[b], m_mesh.now[c]);
+      ++out.featurePairs;
+      out.exactDecisions += m_answers[t]->exact;
+    }
+  }
+
+  std::size_t size() const { return m_answers.size(); }
+
+  /// Null of a triangle at the vertex.
+  const VertexTriangleDistance* answer(std::uint32_t triangle) const {
+    return m_answers[triangle] ? &*m_answers[triangle] : nullptr;
+  }
+
+  MeshFeature feature(std::uint32_t triangle) const {
+    return featureOf(m_mesh.topology, triangle, m_answers[triangle]->feature);
+  }
+
+  /// The lowest triangle whose closest point the feature holds, while none that holds the feature
+  /// is nearer. Triangles that are refused do not count.
+  template <class Refused>
+  bool isDistinct(std::uint32_t triangle, Refused&& isRefused) const {
+    const MeshFeature own = feature(triangle);
+    for (std::uint32_t other = 0; other < m_answers.size(); ++other) {
+      if (!m_answers[other] || other == triangle) continue;
+      if ((feature(other) == own ? other < triangle : holds(other, own) && isNearer(other, own)) &&
+          !isRefused(other))
+        return false;
+    }
+    return true;
+  }
+
+ private:
+  bool holds(std::uint32_t triangle, const MeshFeature& feature) const {
+    const MeshTopology& topology = m_mesh.topology;
+    switch (feature.kind) {
+      case MeshFeature::Kind::Vertex:
+        return holdsVertex(topology.triangles[triangle], feature.id);
+      case MeshFeature::Kind::Edge:
+        return holdsVertex(topology.triangles[triangle], topology.edges[feature.id][0]) &&
+               holdsVertex(topology.triangles[triangle], topology.edges[feature.id][1]);
+      case MeshFeature::Kind::Face:
+        return triangle == feature.id;
+    }
+    return false;
+  }
+
+  /// Whether a triangle that holds the feature, but whose closest point another feature of it
+  /// holds, is nearer. One with area is: its closest point is unique. In one without area several
+  /// features may hold that point.
+  bool isNearer(std::uint32_t triangle, const MeshFeature& feature) const {
+    const Triangle& corners = m_mesh.topology.triangles[triangle];
+    const Vector3d a = m_mesh.now[corners[0]], b = m_mesh.now[corners[1]],
+                   c = m_mesh.now[corners[2]];
+    if (hasArea(a, b, c)) return true;
+    if (feature.kind != MeshFeature::Kind::Vertex) return false;
+    const Vector3d at = m_mesh.now[feature.id];
+    return comesNearer(m_position, at, a) || comesNearer(m_position, at, b) ||
+           comesNearer(m_position, at, c);
+  }
+
+  const TriangleMesh& m_mesh;
+  Vector3d m_position;
+  std::vector<std::optional<VertexTriangleDistance>> m_answers;
+};
+
+/// kSecond: the vertices are the second mesh's.
+template <bool kSecond>
+void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sample,
+                        ContactBuffers& out) {
+  const TriangleMesh &vertices = kSecond ? pair.b : pair.a, &triangles = kSecond ? pair.a : pair.b;
+  const bool distinct = pair.settings.contacts == Contacts::Distinct;
+  const Features<ImpactQuery::Kind::VertexTriangle> features{vertices, triangles};
+  StepCheck check(pair, out);
+  VertexAgainstMesh against(triangles);
+  for (const std::uint32_t v : sample) {
+    against.measure(pair, vertices.now[v], v, out);
+    const auto gap = [&](std::uint32_t t) {
+      const VertexTriangleDistance& measured = *against.answer(t);
+      return measured.distance -
+             pair.radii(v, triangles.topology.triangles[t], measured.barycentric, kSecond);
+    };
+    for (std::uint32_t t = 0; t < against.size(); ++t) {
+      const VertexTriangleDistance* answer = against.answer(t);
+      if (!answer || !(gap(t) <= pair.thicknessAtEnd())) continue;
+      check.noteDistance(answer->distance);
+      if (check.addImpactIfTouched(features, v, t, kSecond, answer->distance)) continue;
+      const auto isRefused = [&](std::uint32_t triangle) {
+        return refusesVertex(pair, v, triangle, kSecond) ||
+               (!triangles.radii.empty() && !(gap(triangle) <= pair.thicknessAtEnd()));
+      };
+      if (isRefused(t)) continue;
+      const MeshFeature feature = against.feature(t);
+      if (distinct) {
+        const bool isVertex = feature.kind == MeshFeature::Kind::Vertex;
+        const bool reportedByOther =
+            pair.self() ? feature.id < v : kSecond && pair.b.topology.hasFaces();
+        if (isVertex && reportedByOther) continue;
+        if (!against.isDistinct(t, isRefused)) continue;
+      }
+      if (pointsInwardAtEnd(pair, v, feature, *answer, kSecond)) {
+        if (pair.step.impacts) addImpact(pair, features, v, t, kSecond, out);
+        continue;
+      }
+      const Triangle& corners = triangles.topology.triangles[t];
+      check.noteTriangle(t, !kSecond, triangles.now[corners[0]], triangles.now[corners[1]],
+                         triangles.now[corners[2]]);
+      auto& list = kSecond ? out.triangleVertex : out.vertexTriangle;
+      list.push_back(contactOf(v, t, corners, *answer));
+      list.back().distance = gap(t);
+    }
+  }
+}
+
+void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
+                  ContactBuffers& out) {
+  const std::vector<Segment>&a = pair.a.topology.edges, &b = pair.b.topology.edges;
+  const Features<ImpactQuery::Kind::EdgeEdge> features{pair.a, pair.b};
+  StepCheck check(pair, out);
+  for (const std::uint32_t i : sample) {
+    for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
+      if (pair.leavesOut(i, j) || pair.b.topology.edgeTriangles[j].empty()) continue;
+      const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(
+          pair.a.now[a[i][0]], pair.a.now[a[i][1]], pair.b.now[b[j][0]], pair.b.now[b[j][1]]);
+      ++out.featurePairs;
+      out.exactDecisions += answer.exact;
+      if (!(answer.distance <= pair.thicknessAtEnd())) continue;
+      check.noteDistance(answer.distance);
+      if (check.addImpactIfTouched(features, i, j, false, answer.distance)) continue;
+      const bool inside = !answer.parallel && answer.featureA == EdgeFeature::Interior &&
+                          answer.featureB == EdgeFeature::Interior;
+      if (pair.settings.contacts == Contacts::Distinct && !inside) continue;
+      if (refusesEdges(pair, i, j)) continue;
+      if (pointInwardAtEnd(pair, i, j, answer)) {
+        if (pair.step.impacts) addImpact(pair, features, i, j, false, out);
+        continue;
+      }
+      check.noteEdges(a[i], b[j]);
+      out.edgeEdge.push_back(contactOf(a[i], b[j], answer));
+    }
+  }
+}
+
+/// Edges that hold a feature, of all.
+std::vector<std::uint32_t> edgesOf(const MeshTopology& topology, const MeshFeature& feature) {
+  if (feature.kind == MeshFeature::Kind::Edge) return {feature.id};
+  std::vector<std::uint32_t> holders;
+  for (std::uint32_t e = 0; e < topology.edges.size(); ++e)
+    if ((topology.edges[e][0] == feature.id || topology.edges[e][1] == feature.id) &&
+        !topology.edgeTriangles[e].empty())
+      holders.push_back(e);
+  return holders;
+}
+
+/// As testLineEdges() defines Distinct: every pair of holders asked, the lowest taken at the end.
+bool isDistinctOfLines(const MeshPair& pair, const std::array<std::uint32_t, 2>& edges,
+                       const std::array<MeshFeature, 2>& features) {
+  if (!isForEdges(pair, features)) return false;
+  std::array<std::uint32_t, 2> lowest = edges;
+  for (const std::uint32_t a : edgesOf(pair.a.topology, features[0]))
+    for (const std::uint32_t b : edgesOf(pair.b.topology, features[1])) {
+      std::array<std::uint32_t, 2> ids{a, b};
+      std::array<MeshFeature, 2> shared = features;
+      if (pair.self() && b < a) {
+        std::swap(ids[0], ids[1]);
+        std::swap(shared[0], shared[1]);
+      }
+      const std::optional<EdgesNearby> other = measureEdges(pair, ids[0], ids[1]);
+      if (!other) continue;
+      if (other->features != shared) return false;
+      lowest = std::min(lowest, ids);
+    }
+  return lowest == edges;
+}
+
+void findLineEdges(const MeshPair& pair, std::span<const std::uint32_t> sample,
+                   ContactBuffers& out) {
+  const std::vector<Segment>&a = pair.a.topology.edges, &b = pair.b.topology.edges;
+  for (const std::uint32_t i : sample)
+    for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
+      if (pair.b.topology.edgeTriangles[j].empty()) continue;
+      ++out.featurePairs;
+      const std::optional<EdgesNearby> nearby = measureEdges(pair, i, j);
+      if (!nearby ||
+          (pair.settings.contacts == Contacts::Distinct &&
+           !isDistinctOfLines(pair, {i, j}, nearby->features)) ||
+          pointInwardAtEnd(pair, i, j, nearby->centres))
+        continue;
+      out.exactDecisions += nearby->centres.exact;
+      out.edgeEdge.push_back(contactOf(a[i], b[j], nearby->centres));
+      out.edgeEdge.back().distance = nearby->distance;
+    }
+}
+
+void findProximity(const MeshPair& pair, const FeatureLists& features, ContactBuffers& out) {
+  findVertexTriangle<false>(pair, features.verticesOfA, out);
+  findVertexTriangle<true>(pair, features.verticesOfB, out);
+  if (pair.hasLines())
+    findLineEdges(pair, features.edgesOfA, out);
+  else
+    findEdgeEdge(pair, features.edgesOfA, out);
+}
+
+/// Calls f(features, inFirst, inSecond, ofSecond) for the listed features with every feature of the
+/// other mesh. ofSecond: the first feature is of the pair's second mesh.
+template <class F>
+void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, ContactBuffers& out,
+                        F&& f) {
+  for (const bool ofSecond : {false, true}) {
+    const Features<ImpactQuery::Kind::VertexTriangle> features{ofSecond ? pair.b : pair.a,
+                                                               ofSecond ? pair.a : pair.b};
+    const std::vector<Triangle>& triangles = features.second.topology.triangles;
+    for (const std::uint32_t v : ofSecond ? lists.verticesOfB : lists.verticesOfA) {
+      for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+        if (!features.second.topology.isOn(t) || pair.leavesOutVertex(v, t)) continue;
+        ++out.featurePairs;
+        f(features, v, t, ofSecond);
+      }
+    }
+  }
+  const auto edgeCount = static_cast<std::uint32_t>(pair.b.topology.edges.size());
+  for (const std::uint32_t i : lists.edgesOfA)
+    for (std::uint32_t j = pair.self() ? i + 1 : 0; j < edgeCount; ++j) {
+      if (pair.leavesOut(i, j) || pair.b.topology.edgeTriangles[j].empty()) continue;
+      ++out.featurePairs;
+      f(Features<ImpactQuery::Kind::EdgeEdge>{pair.a, pair.b}, i, j, false);
+    }
+}
+
+void findImpacts(const MeshPair& pair, const FeatureLists& lists, ContactBuffers& out) {
+  forEachFeaturePair(
+      pair, lists, out,
+      [&](const auto& features, std::uint32_t inFirst, std::uint32_t inSecond, bool ofSecond) {
+        addImpact(pair, features, inFirst, inSecond, ofSecond, out);
+      });
+}
+
+/// Impacts that proximity at the step's end does not answer.
+void findFastImpacts(const MeshPair& pair, const FeatureLists& lists, ContactBuffers& out) {
+  const StepCheck check(pair, out);
+  forEachFeaturePair(
+      pair, lists, out,
+      [&](const auto& features, std::uint32_t inFirst, std::uint32_t inSecond, bool ofSecond) {
+        if (!check.isAnsweredAtEnd(features, inFirst, inSecond))
+          addImpact(pair, features, inFirst, inSecond, ofSecond, out);
+      });
+}
+
+void findIntersections(const MeshPair& pair, const FeatureLists& lists, ContactBuffers& out) {
+  const auto countB = static_cast<std::uint32_t>(pair.b.topology.triangles.size());
+  for (const std::uint32_t a : lists.trianglesOfA)
+    for (std::uint32_t b = pair.self() ? a + 1 : 0; b < countB; ++b)
+      if (pair.b.topology.isOn(b)) addIntersection(pair, {a, b}, out);
+}
+
+}  // namespace
+
+FeatureLists everyFeature(const MeshPair& pair) {
+  FeatureLists every;
+  const auto fill = [](std::vector<std::uint32_t>& list, std::size_t size) {
+    list.resize(size);
+    std::iota(list.begin(), list.end(), 0u);
+  };
+  const auto fillTested = [&](std::vector<std::uint32_t>& list, const MeshTopology& topology) {
+    fill(list, topology.vertexCount);
+    std::erase_if(list, [&](std::uint32_t v) { return topology.vertexTriangles[v].empty(); });
+  };
+  if (pair.settings.method == Method::Intersection || pair.hasShape()) {
+    const MeshTopology& mesh = pair.hasShape() ? pair.mesh().topology : pair.a.topology;
+    fill(every.trianglesOfA, mesh.triangles.size());
+    std::erase_if(every.trianglesOfA, [&](std::uint32_t t) { return !mesh.isOn(t); });
+    return every;
+  }
+  const MeshTopology &a = pair.a.topology, &b = pair.b.topology;
+  if (areTested(a, b, true)) fillTested(every.verticesOfA, a);
+  if (areTested(b, a, false) && !pair.self()) fillTested(every.verticesOfB, b);
+  fill(every.edgesOfA, pair.a.topology.edges.size());
+  std::erase_if(every.edgesOfA,
+                [&](std::uint32_t e) { return pair.a.topology.edgeTriangles[e].empty(); });
+  return every;
+}
+
+void findContactsByBruteForce(const MeshPair& pair, const FeatureLists& features,
+                              ContactBuffers& out) {
+  if (pair.isOfShapes()) return findShapePair(*pair.shapeOfA, *pair.shapeOfB, pair.settings, out);
+  if (pair.hasShape())
+    return findShapeContacts(pair.mesh(), pair.shape(), pair.settings, features.trianglesOfA, out);
+  const Method method = pair.settings.method;
+  if (method == Method::Intersection) return findIntersections(pair, features, out);
+  if (method == Method::Continuous) return findImpacts(pair, features, out);
+  findProximity(pair, features, out);
+  if (method == Method::Auto) findFastImpacts(pair, features, out);
+}
+
+}  // namespace palpate

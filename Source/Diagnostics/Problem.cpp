@@ -1,0 +1,48 @@
+#include "CollisionDetection/DiagnosticsInterface.h"
+
+#include <unordered_map>
+
+namespace palpate {
+
+namespace {
+
+CollisionProblem::Mesh meshOf(const Geometry& geometry) {
+  const TriangleMesh& mesh = geometry.mesh;
+  CollisionProblem::Mesh copy;
+  copy.id = geometry.id;
+  copy.kind = mesh.topology.kind;
+  copy.radii = mesh.radii;
+  copy.filter = geometry.filter;
+  copy.disabled = mesh.topology.disabled;
+  if (geometry.shape) copy.analytical = geometry.shape->analytical;
+  if (!geometry.shape) copy.before = mesh.before.all(), copy.now = mesh.now.all();
+  const RigidTransform &before = mesh.before.transform(), &now = mesh.now.transform();
+  copy.rotation = now.rotation, copy.translation = now.translation;
+  copy.rotationBefore = before.rotation, copy.translationBefore = before.translation;
+  if (copy.kind != GeometryKind::Points) copy.triangles = mesh.topology.triangles;
+  if (copy.radii.empty() && mesh.largestRadius > 0.0) copy.radii = {mesh.largestRadius};
+  if (geometry.solid) copy.tetrahedra = geometry.solid->topology.tetrahedra, copy.rest = mesh.rest;
+  return copy;
+}
+
+}  // namespace
+
+CollisionProblem problemOf(const Settings& settings, const GeometryTable& geometries,
+                           const PairTable& pairs) {
+  CollisionProblem problem{settings, {}, {}};
+  problem.settings.executor = nullptr;
+  std::unordered_map<const Geometry*, std::uint32_t> indices;
+  for (const auto& geometry : geometries.all()) {
+    indices.emplace(geometry.get(), static_cast<std::uint32_t>(indices.size()));
+    problem.geometries.push_back(meshOf(*geometry));
+  }
+  for (const auto& record : pairs.records()) {
+    problem.pairs.push_back({indices.at(record->a), indices.at(record->b), record->pair.settings,
+                             record->plan.method, static_cast<bool>(record->predicate)});
+    if (record->pair.settings.restDistance > 0.0)
+      problem.geometries[problem.pairs.back().a].rest = record->a->mesh.rest;
+  }
+  return problem;
+}
+
+}  // namespace palpate

@@ -1,0 +1,144 @@
+#pragma once
+
+#include "Exact/Exact.h"
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace palpate {
+
+/// A polynomial of t in [0, 1] as Σ c[i] t^i (1-t)^(N-i). With x = t / (1-t), which runs from 0 to
+/// infinity with t, its sign is that of Σ c[i] x^i; at t = 1, that of c[N].
+template <std::size_t N>
+using Form = std::array<Integer, N + 1>;
+
+template <std::size_t N>
+bool isZero(const std::array<Integer, N>& form) {
+  for (const Integer& coefficient : form)
+    if (coefficient != 0) return false;
+  return true;
+}
+
+struct StartOfStep {
+  template <std::size_t N>
+  int sign(const std::array<Integer, N>& form) const {
+    return sgn(form.front());
+  }
+};
+
+struct EndOfStep {
+  template <std::size_t N>
+  int sign(const std::array<Integer, N>& form) const {
+    return sgn(form.back());
+  }
+};
+
+/// The moment at which x = (p + q √d) / r > 0, with r > 0, d >= 0, q in {-1, 0, 1}.
+struct QuadraticTime {
+  Integer p, r, d;
+  int q = 0;
+
+  template <std::size_t N>
+  int sign(const std::array<Integer, N>& form) const;
+  double timeBelow() const;  ///< at most 2^-51 below
+};
+
+/// The moments strictly inside the step at which a form that is not zero vanishes, ascending, each
+/// once.
+std::vector<QuadraticTime> rootsInside(const Form<1>&);
+std::vector<QuadraticTime> rootsInside(const Form<2>&);
+
+/// A simple root of a cubic strictly inside the step, in an open interval of x on which the cubic
+/// is monotone. Signs of quadratics there need no refinement: it is enough to compare it with their
+/// roots, which are quadratic numbers, and to do that the sign of the cubic at those, which is
+/// found in closed form.
+class CubicTime {
+ public:
+  /// cell: which of the intervals between the cubic's critical points on the real line; rising: the
+  /// sign of its slope there; lower, upper: times between which the root lies, to look for it.
+  CubicTime(const Form<3>& cubic, int cell, int rising, double lower, double upper);
+
+  int sign(const Form<2>&) const;
+  double timeBelow(double tolerance) const;
+
+ private:
+  int compare(const QuadraticTime&) const;  ///< sign of this - other
+  int compare(double t) const;
+  int cellOf(const QuadraticTime&) const;
+  void bracket(double lower, double upper);
+
+  Form<3> m_cubic;
+  int m_cell, m_rising;
+  double m_low = 0.0, m_high = 1.0;  ///< the root's time lies in [m_low, m_high]
+};
+
+/// f(root) for each root of the cubic, not zero, strictly inside the step, ascending, until one
+/// returns true; a root is a QuadraticTime or a CubicTime. (Multiple roots are critical points, so
+/// they are quadratic.)
+template <class F>
+bool anyRootInside(Form<3> cubic, F&& f);
+
+// Implementation of the templates.
+
+template <std::size_t N>
+int QuadraticTime::sign(const std::array<Integer, N>& form) const {
+  // Horner in a + b √d, times r^(N-1) > 0.
+  Integer a = form[N - 1], b, power = r, next;
+  for (std::size_t i = N - 1; i-- > 0;) {
+    next = a * p;
+    if (q != 0) {
+      if (b != 0) {
+        const Integer bd = b * d;
+        if (q > 0)
+          next += bd;
+        else
+          next -= bd;
+        b *= p;
+      }
+      if (q > 0)
+        b += a;
+      else
+        b -= a;
+    }
+    next += form[i] * power;
+    a = next;
+    if (i > 0) power *= r;
+  }
+  const int signA = sgn(a), signB = sgn(d) == 0 ? 0 : sgn(b);
+  if (signA == signB || signB == 0) return signA;
+  if (signA == 0) return signB;
+  const int larger = cmp(Integer(a * a), Integer(b * b * d));
+  return larger > 0 ? signA : larger < 0 ? signB : 0;
+}
+
+/// Where a cubic turns, strictly inside the step, and how many turns it makes before the step.
+struct Turns {
+  std::vector<QuadraticTime> inside;
+  int before = 0;
+};
+Turns turns(const Form<3>&);
+/// The sign of the highest coefficient that is not zero: that just before t = 1.
+int signBeforeEnd(const Form<3>&);
+/// Divides by t until the form is not zero at 0.
+void removeRootsAtStart(Form<3>&);
+
+template <class F>
+bool anyRootInside(Form<3> cubic, F&& f) {
+  removeRootsAtStart(cubic);
+  const Turns cubicTurns = turns(cubic);
+  int sign = sgn(cubic[0]), cell = cubicTurns.before;
+  double time = 0.0;
+  for (std::size_t i = 0; i <= cubicTurns.inside.size(); ++i, ++cell) {
+    const bool last = i == cubicTurns.inside.size();
+    const int signThere = last ? signBeforeEnd(cubic) : cubicTurns.inside[i].sign(cubic);
+    const double timeThere = last ? 1.0 : cubicTurns.inside[i].timeBelow();
+    if (sign * signThere < 0 && f(CubicTime(cubic, cell, signThere, time, timeThere))) return true;
+    if (signThere == 0 && f(cubicTurns.inside[i])) return true;
+    sign = signThere;
+    time = timeThere;
+  }
+  return false;
+}
+
+}  // namespace palpate

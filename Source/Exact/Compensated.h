@@ -1,0 +1,138 @@
+#pragma once
+
+#include "Exact/ErrorBounds.h"
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace palpate {
+
+/// value + error is the exact result of an operation whose rounded result is value.
+struct RoundedWithError {
+  double value, error;
+};
+
+inline RoundedWithError exactSum(double a, double b) {
+  const double sum = a + b, bRounded = sum - a;
+  return {sum, (a - (sum - bRounded)) + (b - bRounded)};
+}
+
+/// Veltkamp: halves of at most 26 bits that sum to a.
+inline RoundedWithError halves(double a) {
+  const double scaled = 134217729.0 * a;  // 2^27 + 1
+  const double high = scaled - (scaled - a);
+  return {high, a - high};
+}
+
+/// Dekker, without fused multiply-add: the baseline instruction set has none.
+inline RoundedWithError exactProduct(double a, double b, const RoundedWithError& bHalves) {
+  const double product = a * b;
+  const auto [high, low] = halves(a);
+  return {product, ((high * bHalves.value - product) + high * bHalves.error + low * bHalves.value) +
+                       low * bHalves.error};
+}
+
+inline RoundedWithError exactProduct(double a, double b) { return exactProduct(a, b, halves(b)); }
+
+// Sums in one order, whatever Eigen would choose.
+inline double dot(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
+}
+inline double sumOfMagnitudes(const Eigen::Vector3d& a) {
+  return (std::abs(a[0]) + std::abs(a[1])) + std::abs(a[2]);
+}
+inline double largest(const Eigen::Vector3d& a) {
+  return std::max({std::abs(a[0]), std::abs(a[1]), std::abs(a[2])});
+}
+
+/// Whether products of degree eight of coordinates so large stay within the range of double.
+inline bool isModerate(double extent) {
+  return extent > kSmallestModerate && extent < kLargestModerate;
+}
+/// The exponent of a power of two that brings an extent near 1; of zero, infinity and NaN the last
+/// there is.
+inline int exponentTowardsOne(double extent) {
+  return extent <= std::numeric_limits<double>::max() ? -std::clamp(std::ilogb(extent), -1074, 1023)
+                                                      : -1023;
+}
+inline Eigen::Vector3d scaled(const Eigen::Vector3d& a, int exponent) {
+  return {std::ldexp(a[0], exponent), std::ldexp(a[1], exponent), std::ldexp(a[2], exponent)};
+}
+
+/// high + low exactly, each component of high the double nearest to it.
+struct Difference {
+  Eigen::Vector3d high, low;
+};
+
+/// a - b exactly.
+inline Difference difference(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  Difference result;
+  for (int i = 0; i < 3; ++i) {
+    const auto [high, low] = exactSum(a[i], -b[i]);
+    result.high[i] = high;
+    result.low[i] = low;
+  }
+  return result;
+}
+
+/// a + b within 2^-104 of its terms; the same bits in either order.
+inline Difference sum(const Difference& a, const Difference& b) {
+  Difference result;
+  for (int i = 0; i < 3; ++i) {
+    const RoundedWithError high = exactSum(a.high[i], b.high[i]);
+    const RoundedWithError all = exactSum(high.value, high.error + (a.low[i] + b.low[i]));
+    result.high[i] = all.value;
+    result.low[i] = all.error;
+  }
+  return result;
+}
+
+inline Difference half(const Difference& a) { return {0.5 * a.high, 0.5 * a.low}; }
+
+/// m + s u + t v within 2^-53 of the result and 2^-78 of the terms; the same bits when (s, u) and
+/// (t, v) change places. s, t: at most 27 significant bits.
+inline Eigen::Vector3d combination(const Difference& m, double s, const Difference& u, double t,
+                                   const Difference& v) {
+  Eigen::Vector3d result;
+  for (int i = 0; i < 3; ++i) {
+    const auto [uHigh, uLow] = halves(u.high[i]);
+    const auto [vHigh, vLow] = halves(v.high[i]);
+    const RoundedWithError plane = exactSum(s * uHigh, t * vHigh);
+    const RoundedWithError all = exactSum(m.high[i], plane.value);
+    const double rest = (s * uLow + t * vLow) + (s * u.low[i] + t * v.low[i]);
+    result[i] = all.value + ((all.error + plane.error) + (m.low[i] + rest));
+  }
+  return result;
+}
+
+/// The same with one vector.
+inline Eigen::Vector3d combination(const Difference& m, double s, const Difference& u) {
+  Eigen::Vector3d result;
+  for (int i = 0; i < 3; ++i) {
+    const auto [uHigh, uLow] = halves(u.high[i]);
+    const RoundedWithError all = exactSum(m.high[i], s * uHigh);
+    result[i] = all.value + (all.error + (m.low[i] + (s * uLow + s * u.low[i])));
+  }
+  return result;
+}
+
+/// u x v within 2^-52 of each component and 2^-103 of |u| |v|; turns exactly when u and v change
+/// places.
+inline Eigen::Vector3d accurateCross(const Difference& u, const Difference& v) {
+  Eigen::Vector3d result;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    const RoundedWithError plus = exactProduct(u.high[j], v.high[k], halves(v.high[k]));
+    const RoundedWithError minus = exactProduct(u.high[k], v.high[j], halves(v.high[j]));
+    const RoundedWithError high = exactSum(plus.value, -minus.value);
+    const double mixed = (u.high[j] * v.low[k] + u.low[j] * v.high[k]) -
+                         (u.high[k] * v.low[j] + u.low[k] * v.high[j]);
+    result[i] = high.value + (high.error + ((plus.error - minus.error) + mixed));
+  }
+  return result;
+}
+
+}  // namespace palpate

@@ -1,0 +1,45 @@
+#pragma once
+
+#include "Exact/ErrorBounds.h"
+
+#include <algorithm>
+#include <array>
+
+namespace palpate {
+
+/// A polynomial on [0, 1] by its Bernstein coefficients.
+using CubicBernstein = std::array<double, 4>;
+using QuadraticBernstein = std::array<double, 3>;
+
+inline double between(double l, double r, double t) { return (1.0 - t) * l + t * r; }
+
+/// The symmetric multi-affine form whose diagonal is the polynomial. Computed with an error of at
+/// most 16 u times the largest coefficient's magnitude (nine roundings), u = 2^-53.
+inline double blossom(const QuadraticBernstein& b, double r, double s) {
+  return between(between(b[0], b[1], r), between(b[1], b[2], r), s);
+}
+inline double blossom(const CubicBernstein& b, double r, double s, double t) {
+  return blossom(
+      QuadraticBernstein{between(b[0], b[1], r), between(b[1], b[2], r), between(b[2], b[3], r)}, s,
+      t);
+}
+
+/// About where in [low, high] a cubic crosses zero, going up if rising is positive, else down.
+/// Never leaves the interval, whatever the coefficients.
+inline double approximateRoot(const CubicBernstein& b, double low, double high, int rising) {
+  const QuadraticBernstein slope{3.0 * (b[1] - b[0]), 3.0 * (b[2] - b[1]), 3.0 * (b[3] - b[2])};
+  double t = 0.5 * (low + high);
+  for (int i = 0; i < 64; ++i) {
+    const double value = blossom(b, t, t, t);
+    if (value == 0.0) return t;
+    ((value > 0.0) == (rising > 0) ? high : low) = t;
+    double next = t - value / blossom(slope, t, t);
+    if (!(next > low && next < high)) next = 0.5 * (low + high);
+    const double step = next - t;
+    t = next;
+    if (step < kRootStep && step > -kRootStep) break;
+  }
+  return t;
+}
+
+}  // namespace palpate

@@ -1,0 +1,188 @@
+#include "Queries/Containment.h"
+
+#include <palpate/Error.h>
+
+#include "Queries/Embedding.h"
+#include "Core/Text.h"
+#include "Math/ClosestPoint.h"
+#include "Math/RayCrossing.h"
+#include "Math/Tolerances.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+namespace palpate {
+
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+/// Whether a triangle is certainly further from p than `distance`, and is measured so: no point of
+/// it is nearer than the nearest of its corners, seen along one direction, here towards their mean.
+/// Distances are off by 2^-48 of the furthest corner's at most, u . w by 2^-50 of |u| |w|.
+bool isBeyond(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+              const Eigen::Vector3d& c, double distance) {
+  const Eigen::Vector3d u = a - p, v = b - p, t = c - p, w = u + v + t;
+  const double most = std::max({u.squaredNorm(), v.squaredNorm(), t.squaredNorm()});
+  const double along = std::min({u.dot(w), v.dot(w), t.dot(w)}), square = w.squaredNorm();
+  return along > 0 &&
+         along * along * (1 - kNearestError) >
+             square * (distance * distance + 2 * kNearestSlack * distance * std::sqrt(most) +
+                       kNearestSlack * kNearestSlack * most);
+}
+
+/// One body, asked about points.
+class Body {
+ public:
+  Body(const SearchableGeometry& geometry, Engine engine, PointQueryStack& stack)
+      : m_geometry(geometry),
+        m_bruteForce(engine == Engine::BruteForce),
+        m_stack(stack),
+        m_frame(geometry) {}
+
+  /// How often the surface winds about p; 0 on the surface.
+  int windingNumber(const Eigen::Vector3d& p) {
+    int number = 0;
+    bool on = false;
+    SignCounts counts;
+    const auto count = [&](std::uint32_t i) {
+      const auto& [a, b, c] = m_geometry.tree.ordered()[i];
+      const auto& now = m_geometry.mesh.now;
+      const RayCrossing crossing = crossRay(p, now[a], now[b], now[c], counts);
+      if (crossing == RayCrossing::OnTriangle)
+        on = true;
+      else
+        number += static_cast<int>(crossing);
+    };
+    if (m_bruteForce) {
+      for (std::uint32_t i = 0; i < size(); ++i) count(i);
+    } else {
+      FloatBox ray = m_frame.boxOf(p);
+      ray.upper[0] = kInfinity;
+      findOverlapping(m_geometry.tree.octree(), m_frame.map(), ray, m_stack);
+      for (const std::uint32_t i : m_stack.found) count(i);
+    }
+    return on ? 0 : number;
+  }
+
+  /// The nearest point of the surface; of several, on the lowest triangle.
+  InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p) {
+    VertexTriangleDistance best{Eigen::Vector3d::Zero(),  Eigen::Vector3d::Zero(),
+                                Eigen::Vector3d::Zero(),  std::numeric_limits<double>::infinity(),
+                                TriangleFeature::CornerA, false};
+    std::uint32_t at = 0, id = 0xffffffffu;
+    const auto tryOne = [&](std::uint32_t i) {
+      const auto& [a, b, c] = m_geometry.tree.ordered()[i];
+      const auto& now = m_geometry.mesh.now;
+      if (!m_bruteForce && isBeyond(p, now[a], now[b], now[c], best.distance)) return;
+      const VertexTriangleDistance distance =
+          finiteVertexTriangleDistance(p, now[a], now[b], now[c]);
+      const std::uint32_t own = m_geometry.tree.octree().order()[i];
+      if (distance.distance > best.distance || (distance.distance == best.distance && own > id))
+        return;
+      best = distance;
+      at = i;
+      id = own;
+    };
+    if (m_bruteForce) {
+      for (std::uint32_t i = 0; i < size(); ++i) tryOne(i);
+    } else {
+      // A little more than the best: distances are rounded, and equal ones are looked for.
+      const auto bound = [&] {
+        const double distance = best.distance * m_geometry.tree.frame().scale;
+        return distance * distance * (1 + kNearestError);
+      };
+      tryOne(std::min(m_last, size() - 1));
+      forEachNearest(m_geometry.tree.octree(), m_frame.map(), m_frame.boxOf(p), bound(), m_stack,
+                     [&](std::uint32_t i) {
+                       tryOne(i);
+                       return bound();
+                     });
+      m_last = at;
+    }
+    return {vertex,        id,  m_geometry.tree.ordered()[at], best.barycentric, -best.normal,
+            best.distance, true};
+  }
+
+  bool mayContain(const Eigen::Vector3d& p) const {
+    return m_bruteForce ||
+           m_frame.boxOf(p).overlaps(m_frame.map()(m_geometry.tree.octree().box(0)));
+  }
+
+ private:
+  std::uint32_t size() const {
+    return static_cast<std::uint32_t>(m_geometry.tree.ordered().size());
+  }
+
+  const SearchableGeometry& m_geometry;
+  bool m_bruteForce;
+  PointQueryStack& m_stack;
+  PointFrame m_frame;
+  std::uint32_t m_last = 0;  ///< nearest to the point before: not far from the next, often
+};
+
+}  // namespace
+
+void findInside(const SearchableGeometry& vertices, const SearchableGeometry& body,
+                const InsideSettings& settings, Engine engine, const Threads& threads,
+                VertexSearch<InsideVertex>& scratch, std::vector<InsideVertex>& out) {
+  if (body.tree.octree().size() == 0) return out.clear();
+  const bool closed = settings.rule == InsideRule::Closed,
+             bruteForce = engine == Engine::BruteForce;
+  searchVertices(vertices.mesh.topology, threads, scratch, out, [&](PointQueryStack& stack) {
+    return [&, asked = Body(body, engine, stack), solid = SolidQuery(body, engine, stack)](
+               std::uint32_t v) mutable -> std::optional<InsideVertex> {
+      const Eigen::Vector3d& p = vertices.mesh.now[v];
+      const auto isIn = [&] {
+        return body.solid ? solid.lowest(p).has_value()
+                          : asked.mayContain(p) && asked.windingNumber(p) != 0;
+      };
+      const WindingNumbers::Answer answer =
+          closed ? WindingNumbers::Answer{isIn(), true}
+                 : body.windingNumbers.ask(body, p, settings.margin, bruteForce, stack);
+      if (!answer.inside) return {};
+      InsideVertex inside = asked.nearest(v, p);
+      inside.decided = answer.decided;
+      if (!(inside.depth > 0)) return {};
+      return inside;
+    };
+  });
+}
+
+void checkInside(SearchableGeometry& body, const InsideSettings& settings) {
+  if (settings.rule != InsideRule::Closed && settings.rule != InsideRule::WindingNumber)
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(body.id) + ": rule is " + std::to_string(static_cast<int>(settings.rule)) +
+                    "; it must be Closed or WindingNumber",
+                body.id);
+  if (!(settings.margin >= 0.0 && settings.margin < 0.5))
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(body.id) + ": margin is " + textOf(settings.margin) +
+                    "; it must be from 0 to below 1/2",
+                body.id);
+  MeshTopology& topology = body.mesh.topology;
+  if (!topology.hasFaces())
+    throw Error(ErrorCode::NotClosed,
+                nameOf(body.id) + " is " + nameOf(topology.kind) + ", which has no inside",
+                body.id);
+  if (settings.rule == InsideRule::WindingNumber) return;
+  if (body.solid) return;  // it has its tetrahedra
+  if (!topology.closed) topology.closed = findMeshDefects(topology.triangles).closed();
+  if (*topology.closed) return;
+  const MeshDefects defects = findMeshDefects(topology.triangles);
+  const auto said = [](const std::vector<Segment>& edges, const char* what) {
+    if (edges.empty()) return std::string();
+    return ", " + std::to_string(edges.size()) + " edges " + what + ", the first of vertices " +
+           std::to_string(edges[0][0]) + " and " + std::to_string(edges[0][1]);
+  };
+  throw Error(ErrorCode::NotClosed,
+              nameOf(body.id) + " has no inside: it is not closed and consistently oriented" +
+                  said(defects.open, "have one triangle only") +
+                  said(defects.flipped, "are run through twice in one direction") +
+                  said(defects.shared, "have three triangles or more"),
+              body.id);
+}
+
+}  // namespace palpate

@@ -1,0 +1,55 @@
+#include "Queries/Embedding.h"
+
+#include "Math/TetrahedronWeights.h"
+
+namespace palpate {
+
+void updateTetrahedra(SearchableGeometry& solid, const OctreeSettings& settings,
+                      const Threads& threads) {
+  const DerivedFrom<2>::Sources now{solid.revisions.topology, solid.mesh.now.bodyRevision()};
+  const FloatFrame& frame = solid.tree.frame();
+  Solid& tetrahedra = *solid.solid;
+  if (tetrahedra.treeOf.isCurrent(now) && tetrahedra.treeFrame == frame) return;
+  tetrahedra.treeOf.invalidate();
+  tetrahedra.tree.update(tetrahedra.topology.tetrahedra, solid.tree.floats(),
+                         solid.tree.spread() * frame.scale, settings, threads);
+  tetrahedra.treeFrame = frame;
+  tetrahedra.treeOf.commit(now);
+}
+
+std::optional<TetrahedronPoint> SolidQuery::lowest(const Eigen::Vector3d& p) {
+  const std::vector<Tetrahedron>& tetrahedra = m_solid.solid->topology.tetrahedra;
+  const Positions& now = m_solid.mesh.now;
+  std::optional<TetrahedronPoint> best;
+  SignCounts counts;
+  const auto tryOne = [&](std::uint32_t id, const Tetrahedron& t) {
+    if (best && best->tetrahedron < id) return;
+    if (const auto weights =
+            tetrahedronWeights(p, now[t[0]], now[t[1]], now[t[2]], now[t[3]], counts))
+      best = {id, t, *weights};
+  };
+  if (m_bruteForce) {
+    for (std::uint32_t i = 0; i < tetrahedra.size(); ++i) tryOne(i, tetrahedra[i]);
+    return best;
+  }
+  const TetrahedronTree& tree = m_solid.solid->tree;
+  if (tree.octree().size() == 0) return best;
+  findOverlapping(tree.octree(), m_frame.map(), m_frame.boxOf(p), m_stack);
+  for (const std::uint32_t i : m_stack.found) tryOne(tree.octree().order()[i], tree.ordered()[i]);
+  return best;
+}
+
+void findEmbedded(const SearchableGeometry& vertices, const SearchableGeometry& solid,
+                  Engine engine, const Threads& threads, VertexSearch<EmbeddedVertex>& scratch,
+                  std::vector<EmbeddedVertex>& out) {
+  searchVertices(vertices.mesh.topology, threads, scratch, out, [&](PointQueryStack& stack) {
+    return [&, query = SolidQuery(solid, engine, stack)](
+               std::uint32_t v) mutable -> std::optional<EmbeddedVertex> {
+      const auto at = query.lowest(vertices.mesh.now[v]);
+      if (!at) return {};
+      return EmbeddedVertex{v, *at};
+    };
+  });
+}
+
+}  // namespace palpate

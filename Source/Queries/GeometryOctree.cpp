@@ -1,0 +1,159 @@
+#include "Queries/GeometryOctree.h"
+
+#include "Core/Stopwatch.h"
+#include "Mesh/TriangleBoxes.h"
+
+#include <algorithm>
+
+namespace palpate {
+
+namespace {
+
+constexpr std::size_t kGrain = 1024;
+constexpr std::size_t kTrianglesPerGroup = 1024;  ///< for bounds, before there are nodes
+constexpr std::size_t kGroupGrain = 128;
+
+void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
+                   Buffer<FloatPoint>& floats, const Threads& threads) {
+  floats.resize(positions.size());
+  threads.forChunks(positions.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+    toFloats(positions.subspan(from, to - from), frame, floats.data() + from);
+  });
+}
+
+}  // namespace
+
+GeometryOctree::Derived::Sources GeometryOctree::sources(const TriangleMesh& mesh,
+                                                         Revision topology) const {
+  // A step without motion has the boxes of its end.
+  const Positions& before = m_swept ? mesh.before : mesh.now;
+  return {topology, mesh.now.bodyRevision(), before.bodyRevision()};
+}
+
+bool GeometryOctree::isCurrent(const TriangleMesh& mesh, Revision topology, double scale) const {
+  return m_tree.isCurrent(sources(mesh, topology)) && m_frame.scale == scale;
+}
+
+bool GeometryOctree::encloses(const TriangleMesh& mesh, Revision topology) const {
+  return m_tree.isValid() && m_isBuilt && m_tree.sources()[0] == topology &&
+         m_tree.sources()[1] == mesh.now.bodyRevision();
+}
+
+double GeometryOctree::sampleFrame(const TriangleMesh& mesh, Revision topology) {
+  if (!m_tree.isCurrent(sources(mesh, topology))) {
+    m_tree.invalidate();
+    const SampledExtent extent = sampleExtent(mesh.now.body());
+    m_frame.origin = extent.median;
+    m_spread = extent.spread;
+  }
+  return m_spread;
+}
+
+void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double scale,
+                            const OctreeSettings& settings, const Threads& threads) {
+  const Derived::Sources now = sources(mesh, topology);
+  const bool isSameTopology = m_tree.sources()[0] == topology;
+  const bool canRefit = m_isBuilt && isSameTopology;
+  m_tree.invalidate();
+  m_isBuilt = false;
+  m_frame.scale = scale;
+  m_treeSwept = m_swept && !mesh.now.hasSameBody(mesh.before);
+  Stopwatch watch;
+  computeFloats(mesh.now.body(), m_frame, m_floats, threads);
+  if (m_treeSwept) computeFloats(mesh.before.body(), m_frame, m_floatsBefore, threads);
+  boxMilliseconds += watch.lap();
+  if (mesh.topology.triangles.empty()) {
+    m_octree.reset(0);
+  } else {
+    bool fits = false;
+    if (canRefit && settings.update == OctreeUpdate::Auto) {
+      fitBoxes(mesh, settings, threads, false);
+      lastUpdate = LooseOctree::Update::Refitted;
+      fits = m_octree.isTight();
+    }
+    if (!fits) {
+      if (!canRefit) {
+        m_octree.reset(mesh.topology.triangles.size());
+        startOrdered(mesh.topology.triangles.size());
+        std::copy(mesh.topology.triangles.begin(), mesh.topology.triangles.end(),
+                  m_ordered.begin());
+      }
+      rebuild(mesh, settings, threads);
+      fitBoxes(mesh, settings, threads, true);
+      lastUpdate = LooseOctree::Update::Rebuilt;
+    }
+    m_isBuilt = true;
+  }
+  ++m_updates;
+  m_tree.commit(now);
+}
+
+/// Boxes in the order of m_ordered, and those of the groups; in a new order these come first.
+void GeometryOctree::computeBoxes(const TriangleMesh& mesh, std::span<const std::uint32_t> groups,
+                                  FloatBox* groupBoxes, std::size_t grain, const Threads& threads,
+                                  bool reordered) {
+  const std::vector<Triangle>& triangles = mesh.topology.triangles;
+  threads.forChunks(groups.size() - 1, grain, [&](std::size_t, std::size_t from, std::size_t to) {
+    for (std::size_t i = groups[from]; reordered && i < groups[to]; ++i)
+      m_ordered[i] = triangles[m_octree.order()[i]];
+    triangleBoxes(m_floats.data(), m_treeSwept ? m_floatsBefore.data() : nullptr, m_ordered.data(),
+                  groups.subspan(from, to - from + 1), m_octree.boxes(), groupBoxes + from);
+  });
+}
+
+/// Boxes in the order of m_ordered, and the bounds of all.
+FloatBox GeometryOctree::bounds(const TriangleMesh& mesh, const Threads& threads) {
+  const std::size_t size = m_ordered.size(),
+                    count = (size + kTrianglesPerGroup - 1) / kTrianglesPerGroup;
+  m_boundsGroups.resize(count + 1);
+  for (std::size_t i = 0; i <= count; ++i)
+    m_boundsGroups[i] = static_cast<std::uint32_t>(std::min(i * kTrianglesPerGroup, size));
+  m_boundsBoxes.resize(count);
+  computeBoxes(mesh, m_boundsGroups, m_boundsBoxes.data(), 2, threads, false);
+  FloatBox all;
+  for (const FloatBox& box : m_boundsBoxes) all.add(box);
+  return all;
+}
+
+/// Triangles in the memory that may have been keys. Their values are indeterminate.
+void GeometryOctree::startOrdered(std::size_t size) {
+  m_ordered = {};
+  m_ordered = m_orderedMemory.start<Triangle>(size + BoxArrays::kPadding).first(size);
+}
+
+void GeometryOctree::rebuild(const TriangleMesh& mesh, const OctreeSettings& settings,
+                             const Threads& threads) {
+  Stopwatch watch;
+  const FloatBox all = bounds(mesh, threads);
+  boxMilliseconds += watch.lap();
+  // Triangles in the old order are of no use any more: their memory is the keys'.
+  const std::size_t size = m_ordered.size();
+  m_ordered = {};
+  const auto keys = m_orderedMemory.start<std::uint64_t>(size);
+  m_octree.build(all, m_spread * m_frame.scale, settings, keys, threads);
+  startOrdered(size);
+  octreeMilliseconds += watch.lap();
+}
+
+void GeometryOctree::fitBoxes(const TriangleMesh& mesh, const OctreeSettings& settings,
+                              const Threads& threads, bool rebuilt) {
+  Stopwatch watch;
+  computeBoxes(mesh, m_octree.groups(), m_octree.groupBoxes(), kGroupGrain, threads, rebuilt);
+  boxMilliseconds += watch.lap();
+  m_octree.fit(threads);
+  if (settings.update == OctreeUpdate::Auto) m_octree.measureLooseness();
+  octreeMilliseconds += watch.lap();
+}
+
+const Triangle* GeometryOctree::findUnfoldedStars(const TriangleMesh& mesh,
+                                                  const Threads& threads) {
+  m_stars.find(mesh.topology, m_ordered, floatsAtStart(), m_floats.data(), threads);
+  return m_stars.triangles();
+}
+
+std::size_t GeometryOctree::bytesBesidesOctree() const {
+  return (m_floats.capacity() + m_floatsBefore.capacity()) * sizeof(FloatPoint) +
+         m_orderedMemory.bytes();
+}
+
+}  // namespace palpate

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <palpate/LooseOctree.h>
+#include <palpate/Settings.h>
+
+#include "Core/Arena.h"
+#include "Core/Buffer.h"
+#include "Core/Threads.h"
+#include "Mesh/FloatPositions.h"
+#include "Mesh/Revision.h"
+#include "Mesh/TriangleMesh.h"
+#include "Mesh/UnfoldedStars.h"
+#include "Octree/Octree.h"
+
+#include <cstdint>
+#include <span>
+
+namespace palpate {
+
+/// The octree over one geometry's elements, with the float positions that its boxes come from.
+///
+/// An update that throws leaves no tree: the next one builds it anew.
+class GeometryOctree {
+ public:
+  /// Before update(): whether boxes must enclose the whole step, because a pair's method needs it.
+  void setSwept(bool swept) { m_swept = swept; }
+  bool isSwept() const { return m_swept; }
+  /// Before update(): the float frame's origin for the positions now, if the tree is outdated.
+  /// Returns the extent (L) of the bulk of the geometry.
+  double sampleFrame(const TriangleMesh&, Revision topology);
+  bool isCurrent(const TriangleMesh&, Revision topology, double scale) const;
+  /// scale: of the float frame, common to all geometries.
+  void update(const TriangleMesh&, Revision topology, double scale, const OctreeSettings&,
+              const Threads&);
+  /// Triangles that meet nowhere but in common vertices and edges, of a self-collision pair.
+  const Triangle* findUnfoldedStars(const TriangleMesh&, const Threads&);
+
+  /// Whether the boxes enclose these positions in the body's frame, whatever else they enclose.
+  bool encloses(const TriangleMesh&, Revision topology) const;
+  std::uint64_t updates() const { return m_updates; }  ///< counts update()
+  bool isValid() const { return m_tree.isValid(); }    ///< no update has failed since
+  const Octree& octree() const { return m_octree; }
+  const FloatFrame& frame() const { return m_frame; }
+  double spread() const { return m_spread; }  ///< L: extent of most positions
+  const FloatPoint* floats() const { return m_floats.data(); }
+  /// Of the step's start, where boxes enclose the step; else of the positions now.
+  const FloatPoint* floatsAtStart() const {
+    return (m_treeSwept ? m_floatsBefore : m_floats).data();
+  }
+  /// Elements in the octree's order, readable BoxArrays::kPadding past their end.
+  std::span<const Triangle> ordered() const { return m_ordered; }
+  std::size_t bytesBesidesOctree() const;
+
+  // Of the last update:
+  LooseOctree::Update lastUpdate = LooseOctree::Update::Unchanged;
+  double boxMilliseconds = 0, octreeMilliseconds = 0;
+
+ private:
+  using Derived = DerivedFrom<3>;  ///< topology, positions now, positions before
+  Derived::Sources sources(const TriangleMesh&, Revision topology) const;
+  void computeBoxes(const TriangleMesh&, std::span<const std::uint32_t> groups,
+                    FloatBox* groupBoxes, std::size_t grain, const Threads&, bool reordered);
+  FloatBox bounds(const TriangleMesh&, const Threads&);
+  void startOrdered(std::size_t size);
+  void rebuild(const TriangleMesh&, const OctreeSettings&, const Threads&);
+  void fitBoxes(const TriangleMesh&, const OctreeSettings&, const Threads&, bool rebuilt);
+
+  FloatFrame m_frame;
+  double m_spread = 0;
+  bool m_swept = false, m_treeSwept = false;
+  Buffer<FloatPoint> m_floats, m_floatsBefore;
+  std::span<Triangle> m_ordered;  ///< none during a build
+  Arena m_orderedMemory;          ///< of these, or of the keys of a build
+  UnfoldedStars m_stars;
+  Octree m_octree;
+  Buffer<std::uint32_t> m_boundsGroups;  ///< scratch of a rebuild
+  Buffer<FloatBox> m_boundsBoxes;
+  Derived m_tree;
+  std::uint64_t m_updates = 0;
+  bool m_isBuilt = false;  ///< for the topology of m_tree, so that it can be refitted
+};
+
+}  // namespace palpate

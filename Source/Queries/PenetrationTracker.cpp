@@ -1,0 +1,217 @@
+#include <palpate/PenetrationTracker.h>
+
+#include <palpate/Error.h>
+
+#include "Core/FloatingPoint.h"
+#include "Exact/Predicates.h"
+#include "Math/Tolerances.h"
+#include "Queries/QuerySource.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace palpate {
+
+namespace {
+
+using Corners = std::array<Eigen::Vector3d, 3>;
+
+Corners cornersOf(const SearchableGeometry& body, const Triangle& t) {
+  const Positions& now = body.mesh.now;
+  return {now[t[0]], now[t[1]], now[t[2]]};
+}
+
+Eigen::Vector3d pointAt(const Corners& corners, const Eigen::Vector3d& weights) {
+  return weights[0] * corners[0] + weights[1] * corners[1] + weights[2] * corners[2];
+}
+
+/// An edge's direction, the normal, and what is across both; none of a triangle without area.
+std::optional<Eigen::Matrix3d> axesOf(const Corners& t) {
+  Eigen::Matrix3d axes;
+  const Eigen::Vector3d edge = t[1] - t[0], normal = edge.cross(t[2] - t[0]);
+  axes.col(0) = edge.stableNormalized();
+  axes.col(1) = normal.stableNormalized();
+  axes.col(2) = axes.col(0).cross(axes.col(1));
+  if (!(std::abs(axes.determinant() - 1.0) < kAxesError)) return {};
+  return axes;
+}
+
+/// How a triangle turned; not at all where that cannot be said.
+Eigen::Matrix3d turnOf(const Corners& before, const Corners& now) {
+  if (before == now) return Eigen::Matrix3d::Identity();
+  const auto from = axesOf(before), to = axesOf(now);
+  if (!from || !to) return Eigen::Matrix3d::Identity();
+  return *to * from->transpose();
+}
+
+/// Where the segment from p to q crosses a triangle that it is not in the plane of: weights of the
+/// corners. Whether it does is exact.
+std::optional<Eigen::Vector3d> crossing(const Eigen::Vector3d& p, const Eigen::Vector3d& q,
+                                        const Corners& t, SignCounts& counts) {
+  if (orient3d(t[0], t[1], t[2], p, counts) == orient3d(t[0], t[1], t[2], q, counts)) return {};
+  Eigen::Vector3d weights = Eigen::Vector3d::Zero();
+  int side = 0;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d &from = t[(i + 1) % 3], &to = t[(i + 2) % 3];
+    const int sign = orient3d(p, q, from, to, counts);
+    if (sign == 0) continue;
+    if (sign == -side) return {};
+    side = sign;
+    weights[i] = std::abs((q - p).dot((from - p).cross(to - p)));
+  }
+  const double sum = weights.sum();
+  if (!(sum > 0)) return {};
+  return weights / sum;
+}
+
+}  // namespace
+
+struct PenetrationTracker::Implementation {
+  /// A vertex and its surface point, as they were.
+  struct Place {
+    std::uint32_t vertex, triangle;
+    Eigen::Vector3d barycentric, direction;
+    double depth;
+    Eigen::Vector3d position;  ///< of the vertex
+    Corners triangleAt;
+  };
+  class Search;
+
+  GeometryId vertices, body;
+  std::uint64_t source = 0;      ///< SpatialQueries::Source::id()
+  DerivedFrom<2> lastOf, nowOf;  ///< topology of the vertices' geometry and of the body
+  std::uint64_t step = 0;        ///< in which `now` was computed
+  std::vector<Place> last, now;  ///< ascending vertices
+  std::vector<InsideVertex> inside;
+  std::vector<TrackedVertex> found;
+  std::vector<PointQueryStack> stacks;
+};
+
+/// Finds where directions leave the body.
+class PenetrationTracker::Implementation::Search {
+ public:
+  Search(const SearchableGeometry& body, Engine engine, PointQueryStack& stack)
+      : m_body(body), m_bruteForce(engine == Engine::BruteForce), m_stack(stack), m_frame(body) {}
+
+  /// The first point of the surface from p along a unit direction, at most so far away; of several
+  /// triangles the lowest.
+  std::optional<InsideVertex> along(std::uint32_t vertex, const Eigen::Vector3d& p,
+                                    const Eigen::Vector3d& direction, double most) {
+    const Eigen::Vector3d q = p + most * direction;
+    std::optional<InsideVertex> first;
+    if (!q.allFinite()) return first;
+    SignCounts counts;
+    const auto tryOne = [&](std::uint32_t i) {
+      const std::uint32_t id = m_body.tree.octree().order()[i];
+      const Triangle& triangle = m_body.tree.ordered()[i];
+      const Corners corners = cornersOf(m_body, triangle);
+      const auto weights = crossing(p, q, corners, counts);
+      if (!weights) return;
+      const double depth = (pointAt(corners, *weights) - p).dot(direction);
+      if (!(depth > 0) ||
+          (first && (depth > first->depth || (depth == first->depth && id > first->triangle))))
+        return;
+      first = {vertex, id, triangle, *weights, direction, depth};
+    };
+    if (m_bruteForce) {
+      for (std::uint32_t i = 0; i < m_body.tree.ordered().size(); ++i) tryOne(i);
+      return first;
+    }
+    FloatBox way = m_frame.boxOf(p);
+    way.add(m_frame.boxOf(q));
+    findOverlapping(m_body.tree.octree(), m_frame.map(), way, m_stack);
+    for (const std::uint32_t i : m_stack.found) tryOne(i);
+    return first;
+  }
+
+  TrackedVertex operator()(const InsideVertex& nearest, const Eigen::Vector3d& p,
+                           const Place* last) {
+    if (!last) return {nearest, nearest, DirectionChange::Entered};
+    const Corners corners = cornersOf(m_body, m_body.mesh.topology.triangles[last->triangle]);
+    const Eigen::Matrix3d turn = turnOf(last->triangleAt, corners);
+    const Eigen::Vector3d direction = (turn * last->direction).normalized();
+    const Eigen::Vector3d moved =
+        (p - pointAt(corners, last->barycentric)) -
+        turn * (last->position - pointAt(last->triangleAt, last->barycentric));
+    const double explained = moved.norm() / std::sqrt(last->depth) / std::sqrt(nearest.depth);
+    if ((nearest.direction - direction).norm() <= TrackedVertex::kMostTurn + explained)
+      return {nearest, nearest, DirectionChange::None};
+    if (const auto kept =
+            along(nearest.vertex, p, direction, TrackedVertex::kMostDepth * nearest.depth))
+      return {*kept, nearest, DirectionChange::Kept};
+    return {nearest, nearest, DirectionChange::Jumped};
+  }
+
+ private:
+  const SearchableGeometry& m_body;
+  bool m_bruteForce;
+  PointQueryStack& m_stack;
+  PointFrame m_frame;
+};
+
+PenetrationTracker::PenetrationTracker(GeometryId vertices, GeometryId body)
+    : m_implementation(std::make_unique<Implementation>()) {
+  m_implementation->vertices = vertices;
+  m_implementation->body = body;
+}
+PenetrationTracker::PenetrationTracker(PenetrationTracker&&) noexcept = default;
+PenetrationTracker& PenetrationTracker::operator=(PenetrationTracker&&) noexcept = default;
+PenetrationTracker::~PenetrationTracker() = default;
+
+std::span<const TrackedVertex> PenetrationTracker::update(const SpatialQueries& queries) {
+  constexpr std::size_t kGrain = 256;
+  if (!m_implementation)
+    throw Error(ErrorCode::InvalidCall, "this PenetrationTracker was moved from");
+  Implementation& all = *m_implementation;
+  queries.findInsideVertices(all.vertices, all.body, all.inside);
+  SpatialQueries::Source& source = queries.valid();
+  const StandardFloatingPoint standard;
+  const SearchableGeometry &vertices = source.at(all.vertices), &body = source.at(all.body);
+  const std::size_t size = all.inside.size(), parts = (size + kGrain - 1) / kGrain;
+  const bool isSameSource = all.source == source.id();
+  const bool isNewStep = !isSameSource || all.step != source.step();
+  // What throws comes before what changes, except for the entries of this step.
+  if (isNewStep && isSameSource && all.nowOf.isValid()) {
+    std::swap(all.last, all.now);
+    all.lastOf = all.nowOf;
+  }
+  if (!isSameSource) all.lastOf.invalidate();
+  all.nowOf.invalidate();
+  all.source = source.id();
+  all.step = source.step();
+  all.found.resize(size);
+  all.now.resize(size);
+  if (all.stacks.size() < parts) all.stacks.resize(parts);
+  const DerivedFrom<2>::Sources topologies{vertices.revisions.topology, body.revisions.topology};
+  using Place = Implementation::Place;
+  const std::span<const Place> places = all.lastOf.isCurrent(topologies)
+                                            ? std::span<const Place>(all.last)
+                                            : std::span<const Place>();
+  const SpatialQueries::Source::Workers workers(source);
+  const Threads& threads = workers;
+  threads.forChunks(size, kGrain, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    Implementation::Search search(body, source.engine(), all.stacks[chunk]);
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t vertex = all.inside[i].vertex;
+      const auto last =
+          std::lower_bound(places.begin(), places.end(), vertex,
+                           [](const Place& place, std::uint32_t v) { return place.vertex < v; });
+      const bool known = last != places.end() && last->vertex == vertex;
+      const Eigen::Vector3d p = vertices.mesh.now[vertex];
+      all.found[i] = search(all.inside[i], p, known ? &*last : nullptr);
+      const InsideVertex& at = all.found[i].penetration;
+      all.now[i] = {vertex,
+                    at.triangle,
+                    at.barycentric,
+                    at.direction,
+                    at.depth,
+                    p,
+                    cornersOf(body, at.corners)};
+    }
+  });
+  all.nowOf.commit(topologies);
+  return all.found;
+}
+
+}  // namespace palpate

@@ -1,0 +1,73 @@
+#include "Queries/TetrahedronTree.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+constexpr std::size_t kGroupGrain = 128;
+
+FloatBox boxOf(const Tetrahedron& tetrahedron, const FloatPoint* floats) {
+  FloatBox box;
+  for (const std::uint32_t vertex : tetrahedron) box.add(floats[vertex].box());
+  return OutwardRounding::outward(box);
+}
+
+void set(BoxArrays& boxes, std::size_t i, const FloatBox& box) {
+  for (int k = 0; k < 3; ++k) {
+    boxes.lower[k][i] = box.lower[k];
+    boxes.upper[k][i] = box.upper[k];
+  }
+}
+
+}  // namespace
+
+void TetrahedronTree::update(std::span<const Tetrahedron> tetrahedra, const FloatPoint* floats,
+                             double bulk, const OctreeSettings& settings, const Threads& threads) {
+  const std::size_t size = tetrahedra.size();
+  const bool wasKnown = std::exchange(m_known, false);
+  if (!wasKnown) {
+    m_octree.reset(size);
+    m_ordered.assign(tetrahedra.begin(), tetrahedra.end());
+  }
+  if (size == 0) return;
+  if (wasKnown && settings.update == OctreeUpdate::Auto) {
+    fit(floats, threads);
+    m_octree.measureLooseness();
+    m_known = m_octree.isTight();
+    if (m_known) return;
+  }
+  FloatBox bounds;
+  for (std::size_t i = 0; i < size; ++i) {
+    const FloatBox box = boxOf(m_ordered[i], floats);
+    set(m_octree.boxes(), i, box);
+    bounds.add(box);
+  }
+  m_keys.resize(size);
+  m_octree.build(bounds, bulk, settings, m_keys, threads);
+  for (std::size_t i = 0; i < size; ++i) m_ordered[i] = tetrahedra[m_octree.order()[i]];
+  fit(floats, threads);
+  m_octree.measureLooseness();
+  m_known = true;
+}
+
+void TetrahedronTree::fit(const FloatPoint* floats, const Threads& threads) {
+  const std::span<const std::uint32_t> groups = m_octree.groups();
+  threads.forChunks(groups.size() - 1, kGroupGrain,
+                    [&](std::size_t, std::size_t from, std::size_t to) {
+                      for (std::size_t g = from; g < to; ++g) {
+                        FloatBox all;
+                        for (std::uint32_t i = groups[g]; i < groups[g + 1]; ++i) {
+                          const FloatBox box = boxOf(m_ordered[i], floats);
+                          set(m_octree.boxes(), i, box);
+                          all.add(box);
+                        }
+                        m_octree.groupBoxes()[g] = all;
+                      }
+                    });
+  m_octree.fit(threads);
+}
+
+}  // namespace palpate

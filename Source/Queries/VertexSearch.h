@@ -1,0 +1,68 @@
+#pragma once
+
+#include "Queries/SearchableGeometry.h"
+#include "Core/Threads.h"
+#include "Octree/PointQueries.h"
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace palpate {
+
+/// Takes points of the world to the float frame of a geometry's octree, also of a placed one.
+class PointFrame {
+ public:
+  explicit PointFrame(const SearchableGeometry& geometry)
+      : m_frame{worldOrigin(geometry), geometry.tree.frame().scale},
+        m_map(worldMap(geometry, m_frame.origin, 0.0, false)) {}
+
+  const BoxMap& map() const { return m_map; }
+  FloatBox boxOf(const Eigen::Vector3d& p) const {
+    return OutwardRounding::outward(m_frame(p).box());
+  }
+
+ private:
+  FloatFrame m_frame;  ///< of boxes in the world
+  BoxMap m_map;        ///< that brings them there
+};
+
+/// Scratch of searchVertices(), which remembers its peak.
+template <class Answer>
+struct VertexSearch {
+  struct Part {
+    PointQueryStack stack;
+    std::vector<Answer> found;
+  };
+  std::vector<Part> parts;
+};
+
+/// Calls ask(vertex) for each vertex of a geometry that is in an element, enabled or not; `out`
+/// receives the answers, by ascending vertices. start(stack): makes `ask` for a range of vertices;
+/// ask(vertex) returns a std::optional<Answer>.
+template <class Answer, class Start>
+void searchVertices(const MeshTopology& topology, const Threads& threads,
+                    VertexSearch<Answer>& scratch, std::vector<Answer>& out, Start&& start) {
+  constexpr std::size_t kGrain = 256;
+  auto& parts = scratch.parts;
+  const std::size_t count = (topology.vertexCount + kGrain - 1) / kGrain;
+  if (parts.size() < count) parts.resize(count);
+  threads.forChunks(topology.vertexCount, kGrain,
+                    [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+                      auto& part = parts[chunk];
+                      part.found.clear();
+                      auto ask = start(part.stack);
+                      for (std::size_t v = begin; v < end; ++v)
+                        if (topology.isUsed[v])
+                          if (const auto answer = ask(static_cast<std::uint32_t>(v)))
+                            part.found.push_back(*answer);
+                    });
+  std::size_t size = 0;
+  for (std::size_t i = 0; i < count; ++i) size += parts[i].found.size();
+  out.reserve(size);  // nothing below throws
+  out.clear();
+  for (std::size_t i = 0; i < count; ++i)
+    out.insert(out.end(), parts[i].found.begin(), parts[i].found.end());
+}
+
+}  // namespace palpate

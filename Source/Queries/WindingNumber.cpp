@@ -1,0 +1,159 @@
+#include "Queries/WindingNumber.h"
+
+#include "Math/Tolerances.h"
+#include "Queries/SearchableGeometry.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr std::size_t kBlocksPerPart = 64;
+/// Radii of a cluster from which it is far away, the cheapest first: any give the same answers.
+constexpr std::array<double, 3> kFar = {4, 8, 24};
+
+WindingNumbers::Answer answer(double least, double most, double margin) {
+  const bool outside = most<0.5 - margin, inside = least> 0.5 + margin;  // false for NaN
+  return {!outside, outside || inside};
+}
+
+/// Whose number the sum is off by the error: of either sign.
+WindingNumbers::Answer answer(const SeenShare& sum, double margin) {
+  const double number = std::abs(sum.value);
+  return answer(number - sum.error, number + sum.error, margin);
+}
+
+}  // namespace
+
+void WindingNumbers::Cluster::add(const Cluster& other) {
+  const double all = area + other.area;
+  const Vector3d before = centre;
+  if (all > 0)
+    centre += (other.area / all) * (other.centre - centre);
+  else if (radius == 0)
+    centre = other.centre;
+  spread += (before - centre) * normal.transpose() + other.spread +
+            (other.centre - centre) * other.normal.transpose();
+  normal += other.normal;
+  area = all;
+}
+
+void WindingNumbers::Cluster::reach(const Cluster& part) {
+  radius = std::max(radius, (part.centre - centre).norm() + part.radius);
+}
+
+/// The triangles that a node holds itself.
+void WindingNumbers::addOwn(const SearchableGeometry& body, OctreeNode node) {
+  Cluster& all = m_clusters[node] = {};
+  const auto [begin, end] = body.tree.octree().ownRange(node);
+  const Positions& now = body.mesh.now;
+  for (const bool reach : {false, true})
+    for (std::uint32_t i = begin; i < end; ++i) {
+      const auto& [ia, ib, ic] = body.tree.ordered()[i];
+      const Vector3d a = now[ia], b = now[ib], c = now[ic], u = b - a, v = c - a;
+      if (reach) {
+        for (const Vector3d& corner : {a, b, c})
+          all.radius = std::max(all.radius, (corner - all.centre).norm());
+        continue;
+      }
+      Cluster one;
+      one.centre = a + (u + v) / 3;
+      one.normal = 0.5 * u.cross(v);
+      one.area = one.normal.norm();
+      all.add(one);
+    }
+}
+
+void WindingNumbers::update(const SearchableGeometry& body, const Threads& threads) {
+  const DerivedFrom<2>::Sources now{body.mesh.now.bodyRevision(),
+                                    body.mesh.now.transformRevision()};
+  if (m_clustersOf.isCurrent(now) && m_treeUpdates == body.tree.updates()) return;
+  m_clustersOf.invalidate();
+  const Octree& octree = body.tree.octree();
+  const std::size_t blocks = octree.pool().used();
+  m_clusters.resize(8 * blocks);
+  threads.forChunks(blocks, kBlocksPerPart, [&](std::size_t, std::size_t from, std::size_t to) {
+    for (auto node = static_cast<OctreeNode>(8 * from); node < 8 * to; ++node)
+      if (octree.isEmpty(node))
+        m_clusters[node] = {};
+      else
+        addOwn(body, node);
+  });
+  // Children come after their parents.
+  for (std::size_t block = blocks; block-- > 1;) {
+    Cluster& parent = m_clusters[octree.parent(block)];
+    Cluster own = parent;
+    const std::span children = std::span(m_clusters).subspan(8 * block, 8);
+    for (const Cluster& child : children) parent.add(child);
+    parent.radius = 0;
+    if (own.radius > 0) parent.reach(own);
+    for (const Cluster& child : children)
+      if (child.radius > 0) parent.reach(child);
+  }
+  m_magnitude = m_clusters[0].centre.cwiseAbs().maxCoeff() + m_clusters[0].radius;
+  m_treeUpdates = body.tree.updates();
+  m_clustersOf.commit(now);
+}
+
+SeenShare WindingNumbers::share(const Cluster& cluster, const Vector3d& p, double distance) const {
+  const Vector3d from = cluster.centre - p;
+  const double square = distance * distance, cube = square * distance,
+               nearest = distance - cluster.radius, squareOfNearest = nearest * nearest;
+  const double seen = cluster.normal.dot(from) / cube + cluster.spread.trace() / cube -
+                      3 * from.dot(cluster.spread * from) / (cube * square);
+  const double left = 3 * cluster.radius * cluster.radius / (squareOfNearest * squareOfNearest);
+  const double rounding = kClusterError * (1 + m_magnitude / nearest) / squareOfNearest;
+  constexpr double kSphere = 4 * std::numbers::pi;
+  return {seen / kSphere, cluster.area * (left + rounding) / kSphere};
+}
+
+static SeenShare sumOfAll(const TriangleMesh& mesh, const Vector3d& p) {
+  SeenShare sum;
+  const Positions& now = mesh.now;
+  for (const auto& [a, b, c] : mesh.topology.triangles)
+    sum.add(seenShare(p, now[a], now[b], now[c]));
+  return sum;
+}
+
+WindingNumbers::Answer WindingNumbers::ask(const SearchableGeometry& body, const Vector3d& p,
+                                           double margin, bool bruteForce,
+                                           PointQueryStack& stack) const {
+  const Octree& octree = body.tree.octree();
+  const Positions& now = body.mesh.now;
+  for (const double far : kFar) {
+    if (bruteForce) break;
+    SeenShare ofFar, ofNear;
+    stack.entries.assign(1, {0, 0});
+    while (!stack.entries.empty()) {
+      const OctreeNode node = stack.entries.back().node;
+      stack.entries.pop_back();
+      const Cluster& cluster = m_clusters[node];
+      const double distance = (cluster.centre - p).norm();
+      if (distance > far * cluster.radius) {
+        ofFar.add(share(cluster, p, distance));
+        continue;
+      }
+      const auto [begin, end] = octree.ownRange(node);
+      for (std::uint32_t i = begin; i < end; ++i) {
+        const auto& [a, b, c] = body.tree.ordered()[i];
+        ofNear.add(seenShare(p, now[a], now[b], now[c]));
+      }
+      const OctreeNode first = octree.firstChild(node);
+      for (unsigned slot = 0; first != 0 && slot < 8; ++slot)
+        if (!octree.isEmpty(first + slot)) stack.entries.push_back({0, first + slot});
+    }
+    // Only where the sum of all, within its own bound, is sure to decide the same.
+    const SeenShare sum{
+        ofFar.value + ofNear.value,
+        ofFar.error + 2 * ofNear.error + kWindingSlack * static_cast<double>(octree.size())};
+    if (const Answer found = answer(sum, margin); found.decided) return found;
+  }
+  return answer(sumOfAll(body.mesh, p), margin);
+}
+
+}  // namespace palpate

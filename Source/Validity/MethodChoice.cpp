@@ -1,0 +1,77 @@
+#include "Validity/MethodChoice.h"
+
+#include "Math/Tolerances.h"
+
+#include <algorithm>
+
+namespace palpate {
+
+bool knowsSides(const GeometryInStep& a, const GeometryInStep& b) {
+  return a.mesh.topology.hasFaces() && b.mesh.topology.hasFaces();
+}
+
+bool hasContinuous(const GeometryInStep& a, const GeometryInStep& b) {
+  return a.mesh.radii.empty() && b.mesh.radii.empty();
+}
+
+bool hasProximity(const GeometryInStep& a, const GeometryInStep& b, double thickness) {
+  return a.isShape || b.isShape || thickness + (a.mesh.largestRadius + b.mesh.largestRadius) > 0.0;
+}
+
+/// Auto with lines, points or shapes: at rest Proximity, which costs least; in a step that moves
+/// features Continuous, which alone misses no impact.
+static void chooseMethod(const PairSettings& settings, const GeometryInStep& a,
+                         const GeometryInStep& b, PairPlan& plan) {
+  const bool proximity = hasProximity(a, b, settings.thickness);
+  const bool still = plan.motion == 0.0 && proximity;
+  plan.method = still || !hasContinuous(a, b) ? Method::Proximity : Method::Continuous;
+  plan.reason = still ? MethodReason::Still : MethodReason::Only;
+}
+
+PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
+                bool moves) {
+  PairPlan plan;
+  plan.method = settings.method;
+  StepPlan& step = plan.step;
+  const double thickness = settings.thickness;
+  if (moves) {
+    plan.motion = largestMotion(a.range, b.range);
+    plan.arcDeviation = a.arcDeviation + b.arcDeviation;
+  }
+  if (!knowsSides(a, b)) {
+    if (settings.method == Method::Auto) chooseMethod(settings, a, b, plan);
+    return plan;
+  }
+  step.motion = plan.motion;
+  if (settings.method == Method::Auto) {
+    plan.motionTolerance = step.slow =
+        settings.motionTolerance < 0 ? thickness / 2 : settings.motionTolerance;
+    if (plan.motion == 0.0) {
+      plan.method = thickness > 0.0 ? Method::Proximity : Method::Intersection;
+      plan.reason = MethodReason::Still;
+    } else if (thickness == 0.0 || settings.contacts == Contacts::All) {
+      plan.method = Method::Continuous;
+      plan.reason = MethodReason::Cheapest;
+    } else if (plan.motion <= plan.motionTolerance) {
+      plan.method = Method::Proximity;
+      plan.reason = MethodReason::Slow;
+    } else if (smallestMotion(a.range, b.range) > plan.motionTolerance ||
+               meanMotion(a.mesh, b.mesh) > plan.motionTolerance) {
+      plan.method = Method::Continuous;
+      plan.reason = MethodReason::Fast;
+    } else {
+      plan.reason = MethodReason::Mixed;
+    }
+    step.impacts = plan.method == Method::Proximity || plan.method == Method::Auto;
+    if (step.impacts)
+      step.extra = std::min(plan.motion, plan.motionTolerance) *
+                   (1.0 + kMotionSlack * settings.timeTolerance);
+  } else if (settings.method == Method::Intersection) {
+    plan.nearby = plan.motion <= std::min(a.smallestHeight, b.smallestHeight) ? plan.motion : 0.0;
+  } else if (settings.method == Method::Proximity && plan.motion > thickness) {
+    step.motion = 0.0;  // not to be trusted, whatever is found
+  }
+  return plan;
+}
+
+}  // namespace palpate

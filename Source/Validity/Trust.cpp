@@ -1,0 +1,199 @@
+#include "Validity/Trust.h"
+
+#include "Math/Tolerances.h"
+#include "NarrowPhase/StepCheck.h"
+#include "Validity/EndOfStep.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace palpate {
+
+namespace {
+
+/// An intersection check of all candidates at the step's start may take half a frame, with
+/// earliestTimeOnly two thirds. One check is allowed per kFramesPerCheck frames; up to four that
+/// were not needed are saved for later, with earliestTimeOnly one.
+constexpr int kFramesPerCheck = 16, kMostSaved = 4 * kFramesPerCheck;
+
+/// Vertices that may have moved further than `reach` relative to the other mesh.
+void addFarMovers(std::vector<std::uint32_t>& out, const GeometryInStep& mesh,
+                  const GeometryInStep& other, double reach) {
+  const MotionRange& range = other.range;
+  const Eigen::Vector3d centre = 0.5 * (range.lower + range.upper), extent = range.upper - centre;
+  for (std::uint32_t v = 0; v < mesh.mesh.now.size(); ++v) {
+    const Eigen::Vector3d moved =
+        (mesh.mesh.now[v] - mesh.mesh.before[v] - centre).cwiseAbs() + extent;
+    if (!(moved.squaredNorm() <= reach * reach)) out.push_back(v);
+    if (out.size() == Validity::kMostFarMovers) return;
+  }
+}
+
+}  // namespace
+
+namespace {
+
+std::array<Revision, 8> statesOf(const GeometryInStep& a, const Positions& ofA,
+                                 const GeometryInStep& b, const Positions& ofB) {
+  return {a.topology, a.enabled, ofA.bodyRevision(), ofA.transformRevision(),
+          b.topology, b.enabled, ofB.bodyRevision(), ofB.transformRevision()};
+}
+
+/// Auto, and the pair has its tolerance.
+bool hasTolerance(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b) {
+  return settings.method == Method::Auto && knowsSides(a, b);
+}
+
+/// L: Validity::reach.
+double reachOf(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
+               const PairPlan& plan) {
+  if (hasTolerance(settings, a, b)) return plan.motionTolerance;
+  if (plan.method == Method::Continuous) return std::numeric_limits<double>::infinity();
+  return plan.method == Method::Proximity ? settings.thickness
+                                          : std::min(a.smallestHeight, b.smallestHeight);
+}
+
+/// Whether the step met the method's conditions, which are about vertices that move in straight
+/// lines. validity: with startedApart and reach. foundOrFar: triangles intersect at the end, or no
+/// boxes came near each other.
+bool meetsConditions(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
+                     const PairPlan& plan, const StepFacts& facts, const Validity& validity,
+                     bool foundOrFar) {
+  if (!knowsSides(a, b)) return false;
+  if (settings.method == Method::Auto)
+    return plan.method == Method::Intersection || validity.startedApart;
+  const bool withinReach = plan.motion <= validity.reach;
+  switch (plan.method) {
+    case Method::Intersection:
+      return plan.motion == 0.0 || (withinReach && foundOrFar);
+    case Method::Proximity:
+      return withinReach && validity.startedApart && facts.verticesA.empty() &&
+             facts.verticesB.empty();
+    default:
+      return validity.startedApart;
+  }
+}
+
+}  // namespace
+
+void Trust::forget() {
+  m_topologies.invalidate();
+  for (Known* known : {&m_atStart, &m_atEnd}) known->of.invalidate();
+}
+
+void Trust::start(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
+                  PairPlan& plan) {
+  // No two features within the thickness are further apart, in any coordinate, than both meshes.
+  const double size = a.extent + b.extent + settings.thickness + plan.step.extra;
+  plan.step.certain = plan.step.motion + 2.0 * kMotionError * (plan.step.motion + size);
+
+  const auto before = statesOf(a, a.mesh.before, b, b.mesh.before);
+  if (!m_atStart.of.isCurrent(before)) {
+    m_atStart = {};
+    if (m_atEnd.of.isCurrent(before)) {
+      m_atStart = m_atEnd;
+    } else if (m_atEnd.of.isCurrent(statesOf(a, a.detected, b, b.detected)) &&
+               m_atEnd.position == Position::Apart &&
+               largestMotion(a.correction, b.correction) < m_atEnd.clearance) {
+      m_atStart.position = Position::Apart;
+      m_atStart.of.commit(before);
+    }
+  }
+  const bool startsApart = m_atStart.position == Position::Apart;
+  plan.startsIntersecting = m_atStart.position == Position::Intersecting;
+
+  const std::array<Revision, 4> topologies{a.topology, a.enabled, b.topology, b.enabled};
+  const int most = settings.earliestTimeOnly ? kFramesPerCheck : kMostSaved;
+  m_saved = m_topologies.isCurrent(topologies) ? std::min(m_saved + 1, most) : most;
+  m_topologies.commit(topologies);
+  if (!knowsSides(a, b) || startsApart || plan.method == Method::Intersection ||
+      (plan.method == Method::Proximity && plan.motion > 0.0 && plan.step.motion == 0.0))
+    return;
+  plan.overlaps = settings.method == Method::Auto;
+  plan.step.start = !plan.startsIntersecting && (plan.overlaps || m_saved >= kFramesPerCheck);
+  if (plan.step.start) m_saved = std::max(m_saved - kFramesPerCheck, 0);
+  // It will not be trusted, whatever is seen of the step.
+  if (plan.method == Method::Proximity && settings.method == plan.method && !plan.step.start)
+    plan.step.motion = 0.0;
+}
+
+void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
+                   const PairPlan& plan, const StepFacts& facts, bool nearby,
+                   const MeshPair& meshes, CollisionData::Contents& contents,
+                   ContactBuffers& counts) {
+  Validity& validity = contents.validity;
+  validity.method = plan.method;
+  validity.reason = plan.reason;
+  validity.displacement = plan.motion;
+  validity.thickness =
+      plan.method == Method::Intersection ? 0.0 : settings.thickness + plan.step.extra;
+  const auto take = [](std::vector<std::uint32_t>& out, const Buffer<std::uint32_t>& ids) {
+    out.assign(ids.begin(), ids.end());
+  };
+  take(validity.degenerateTrianglesA, facts.degenerateA);
+  take(validity.degenerateTrianglesB, facts.degenerateB);
+  validity.verticesBeyondA.clear();
+  validity.verticesBeyondB.clear();
+  if (!plan.step.impacts) {
+    take(validity.verticesBeyondA, facts.verticesA);
+    take(validity.verticesBeyondB, facts.verticesB);
+  }
+  if (plan.step.start) {
+    m_atStart = {};
+    m_atStart.position = facts.startsIntersecting ? Position::Intersecting : Position::Apart;
+    m_atStart.of.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
+  }
+  validity.startedApart = m_atStart.position == Position::Apart;
+  validity.reach = reachOf(settings, a, b, plan);
+  const bool listsFarMovers =
+      !hasTolerance(settings, a, b) && plan.method != Method::Continuous && !meshes.hasShape();
+  if (listsFarMovers && !(plan.motion <= validity.reach)) {
+    addFarMovers(validity.verticesBeyondA, a, b, validity.reach);
+    if (&a.mesh != &b.mesh) addFarMovers(validity.verticesBeyondB, b, a, validity.reach);
+  }
+  const bool trustedIfStraight = meetsConditions(
+      settings, a, b, plan, facts, validity, !nearby || !contents.intersectingTriangles.empty());
+  validity.arcDeviation = plan.arcDeviation;
+  validity.trusted = trustedIfStraight && validity.arcDeviation <= settings.thickness;
+  validity.sideMayBeWrong = plan.method != Method::Intersection && !validity.trusted;
+  m_atEnd = {};
+  // Intersection measures no distances: meshes that do not intersect may be as near as they like.
+  m_atEnd.clearance =
+      plan.method == Method::Intersection ? 0.0 : std::min(facts.clearance, settings.thickness);
+  if (!contents.intersectingTriangles.empty()) {
+    m_atEnd.position = Position::Intersecting;
+    m_atEnd.witness = contents.intersectingTriangles.front();
+  } else if (plan.method == Method::Intersection) {
+    if (plan.motion == 0.0 && facts.clearance > 0.0) m_atEnd.position = Position::Apart;
+  } else if (trustedIfStraight && (facts.clearance > 0.0 || plan.motion == 0.0)) {
+    m_atEnd.position = Position::Apart;
+  } else if (plan.step.motion > 0.0 && settings.method != Method::Proximity) {
+    findEnd(plan, facts, meshes, contents, counts);
+  }
+  m_atEnd.of.commit(statesOf(a, a.mesh.now, b, b.mesh.now));
+}
+
+void Trust::findEnd(const PairPlan& plan, const StepFacts& facts, const MeshPair& meshes,
+                    const CollisionData::Contents& contents, ContactBuffers& counts) {
+  m_atEnd.clearance = 0.0;
+  if (plan.overlaps && facts.startsIntersecting) {  // Intersection has tested all, and found none
+    if (!meshes.near) m_atEnd.position = Position::Apart;
+    return;
+  }
+  // Earliest times come without contacts, and filtered features are not among the contacts.
+  if (meshes.settings.earliestTimeOnly || meshes.filters()) return;
+  EndOfStep end;
+  if (m_atStart.position == Position::Intersecting && m_atStart.witness &&
+      intersect(meshes, false, *m_atStart.witness, counts))
+    end.intersecting = m_atStart.witness;
+  else
+    end = checkEnd(meshes, contents, counts);
+  if (end.intersecting) {
+    m_atEnd.position = Position::Intersecting;
+    m_atEnd.witness = end.intersecting;
+  } else if (contents.validity.startedApart && end.isKnown) {
+    m_atEnd.position = Position::Apart;
+  }
+}
+
+}  // namespace palpate

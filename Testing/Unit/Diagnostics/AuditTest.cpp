@@ -1,0 +1,330 @@
+#include "Diagnostics/Audit.h"
+
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/RandomMeshes.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace palpate {
+namespace {
+
+using testing::Mesh;
+using testing::Random;
+using List = AuditFailure::List;
+using Fault = AuditFailure::Fault;
+
+const AuditSettings kEverything{.features = 1 << 20};
+constexpr PairSettings kPairSettings[]{
+    {.method = Method::Intersection},
+    {.method = Method::Proximity, .thickness = 0.05},
+    {.method = Method::Proximity, .thickness = 0.05, .contacts = Contacts::All},
+    {.method = Method::Continuous},
+    {.method = Method::Continuous, .thickness = 0.05},
+    {.method = Method::Continuous, .thickness = 0.05, .contacts = Contacts::All}};
+
+TriangleMesh movingMesh(Random& random, const Mesh& mesh) {
+  std::vector<Eigen::Vector3d> now = mesh.positions;
+  for (Eigen::Vector3d& p : now) p += testing::randomPoint(random, -0.05, 0.05);
+  return {MeshTopology(mesh.positions.size(), mesh.triangles), now, mesh.positions};
+}
+
+/// Two meshes in contact, what is found, and the internal way to audit other data than that.
+struct Scene {
+  Mesh first, second;
+  TriangleMesh a, b;
+  PairSettings settings;
+  bool self;
+  CollisionPair pair{GeometryId{0}, GeometryId{self ? 0u : 1u}, settings};
+  OctreeBasedCD detection{Settings{.threads = 1}};
+
+  Scene(Random& random, const PairSettings& pairSettings, bool withItself)
+      : first(testing::soup(random, 30, 0.3)),
+        second(testing::soup(random, 30, 0.3)),
+        a(movingMesh(random, first)),
+        b(movingMesh(random, second)),
+        settings(pairSettings),
+        self(withItself) {
+    detection.addTriangleMesh(first.positions, first.triangles);
+    detection.addTriangleMesh(second.positions, second.triangles);
+    detection.setPositions(GeometryId{0}, a.before.all(), a.now.all());
+    detection.setPositions(GeometryId{1}, b.before.all(), b.now.all());
+    detection.addCollisionPair(pair.a, pair.b, settings);
+    detection.detectCollision();
+    detection.advance();
+  }
+
+  MeshPair meshes() const { return {a, self ? a : b, settings}; }
+  CollisionData::Contents found() const {
+    return CollisionData(detection.collisionData(pair.a, pair.b)).contents();
+  }
+  std::vector<AuditFailure> failures(const CollisionData::Contents& contents,
+                                     const AuditSettings& auditSettings = kEverything,
+                                     std::uint64_t frame = 1) const {
+    std::vector<AuditFailure> out;
+    audit(meshes(), pair, CollisionData(contents), auditSettings, frame, out);
+    return out;
+  }
+};
+
+template <class F>
+void forEachScene(F&& f) {
+  Random random(11);
+  for (const PairSettings& settings : kPairSettings)
+    for (const bool self : {false, true}) {
+      SCOPED_TRACE(static_cast<int>(settings.method) * 10 + self);
+      f(Scene(random, settings, self));
+    }
+}
+
+void expectOne(const std::vector<AuditFailure>& failures, const Scene& scene, Fault fault,
+               List list, const AuditFailure::Contact& expected,
+               const AuditFailure::Contact& found) {
+  ASSERT_EQ(failures.size(), 1u);
+  EXPECT_EQ(failures[0].fault, fault);
+  EXPECT_EQ(failures[0].list, list);
+  EXPECT_EQ(failures[0].a, scene.pair.a);
+  EXPECT_EQ(failures[0].b, scene.pair.b);
+  EXPECT_EQ(failures[0].frame, 1u);
+  EXPECT_TRUE(failures[0].expected == expected);
+  EXPECT_TRUE(failures[0].found == found);
+}
+
+/// Values that no frame would give.
+void falsify(VertexTriangleContact& c) { c.distance = std::nextafter(c.distance, 2.0); }
+void falsify(EdgeEdgeContact& c) { c.normal = -c.normal; }
+/// Ids that no frame would give: the last of those there are.
+void rename(VertexTriangleContact& c) { c.vertex = c.triangle = 29; }
+void rename(EdgeEdgeContact& c) { c.edgeA = {0, 1}, c.edgeB = {88, 89}; }
+void rename(ElementPair& pair) { pair = {28, 29}; }
+
+/// Takes each contact of a list out in turn, or changes it, or puts another one beside it: it must
+/// be the one failure.
+template <class Contact>
+void expectEachFault(const Scene& scene, List list,
+                     std::vector<Contact> CollisionData::Contents::*member) {
+  const CollisionData::Contents good = scene.found();
+  for (std::size_t i = 0; i < (good.*member).size(); ++i) {
+    const Contact& contact = (good.*member)[i];
+    CollisionData::Contents faulty = good;
+    (faulty.*member).erase((faulty.*member).begin() + static_cast<std::ptrdiff_t>(i));
+    expectOne(scene.failures(faulty), scene, Fault::Missing, list, contact, {});
+    if (i % 5 != 0) continue;
+    faulty = good;
+    (faulty.*member).push_back(contact);
+    expectOne(scene.failures(faulty), scene, Fault::Invented, list, {}, contact);
+    Contact other = contact;
+    rename(other);
+    if (std::find((good.*member).begin(), (good.*member).end(), other) == (good.*member).end()) {
+      (faulty.*member).back() = other;
+      expectOne(scene.failures(faulty), scene, Fault::Invented, list, {}, other);
+    }
+    if constexpr (requires { falsify(other); }) {
+      faulty = good;
+      other = contact;
+      falsify(other);
+      (faulty.*member)[i] = other;
+      expectOne(scene.failures(faulty), scene, Fault::Different, list, contact, other);
+    }
+  }
+}
+
+TEST(Audit, FiresForTwoShapes) {
+  const TriangleMesh none;
+  const PlacedShape a(Box{{0, 0, 0}, {1, 1, 1}}), b(Box{{0, 0, 2.5}, {1, 1, 1}});
+  const PairSettings settings{.method = Method::Proximity, .thickness = 1};
+  const CollisionPair pair{GeometryId{0}, GeometryId{1}, settings};
+  const auto audited = [&](const CollisionData::Contents& contents) {
+    std::vector<AuditFailure> out;
+    audit({.a = none, .b = none, .settings = settings, .shapeOfA = &a, .shapeOfB = &b}, pair,
+          CollisionData(contents), kEverything, 1, out);
+    return out;
+  };
+  OctreeBasedCD detection;
+  detection.addAnalyticalGeometry(Box{{0, 0, 0}, {1, 1, 1}});
+  detection.addAnalyticalGeometry(Box{{0, 0, 2.5}, {1, 1, 1}});
+  detection.addCollisionPair(pair.a, pair.b, settings);
+  detection.detectCollision();
+  const auto good = CollisionData(detection.collisionData(pair.a, pair.b)).contents();
+  ASSERT_EQ(good.shapeShape.size(), 1u);
+  EXPECT_TRUE(audited(good).empty());
+  const auto expectFault = [&](const CollisionData::Contents& faulty, Fault fault) {
+    const std::vector<AuditFailure> failures = audited(faulty);
+    ASSERT_EQ(failures.size(), 1u);
+    EXPECT_EQ(failures[0].fault, fault);
+    EXPECT_EQ(failures[0].list, List::ShapeShape);
+  };
+  expectFault({}, Fault::Missing);
+  CollisionData::Contents faulty = good;
+  faulty.shapeShape[0].distance = 0.25;
+  expectFault(faulty, Fault::Different);
+  faulty = good;
+  faulty.shapeShape.push_back(good.shapeShape[0]);
+  expectFault(faulty, Fault::Invented);
+}
+
+TEST(Audit, FiresForEachContactTakenOutAddedOrChanged) {
+  std::size_t contacts = 0;
+  forEachScene([&](const Scene& scene) {
+    EXPECT_TRUE(scene.failures(scene.found()).empty());
+    expectEachFault(scene, List::VertexTriangle, &CollisionData::Contents::vertexTriangle);
+    expectEachFault(scene, List::TriangleVertex, &CollisionData::Contents::triangleVertex);
+    expectEachFault(scene, List::EdgeEdge, &CollisionData::Contents::edgeEdge);
+    expectEachFault(scene, List::IntersectingTriangles,
+                    &CollisionData::Contents::intersectingTriangles);
+    EXPECT_GT(scene.found().vertexTriangle.size(), 0u);
+    EXPECT_GT(scene.found().edgeEdge.size(), 0u);
+    contacts += scene.found().edgeEdge.size();
+  });
+  EXPECT_GT(contacts, 50u);
+}
+
+TEST(Audit, FiresForAnImpactBeforeTheEarliest) {
+  Random random(4);
+  const Scene scene(
+      random, {.method = Method::Continuous, .thickness = 0.001, .earliestTimeOnly = true}, false);
+  CollisionData::Contents contents = scene.found();
+  EXPECT_TRUE(scene.failures(contents).empty());
+  const double earliest = contents.earliestTimeOfImpact;
+  ASSERT_LT(earliest, 1.0);
+  contents.earliestTimeOfImpact = std::nextafter(earliest, 1.0);
+  const std::vector<AuditFailure> failures = scene.failures(contents);
+  ASSERT_GT(failures.size(), 0u);
+  for (const AuditFailure& failure : failures) {
+    EXPECT_EQ(failure.list, List::Earliest);
+    std::visit(
+        [&](const auto& contact) {
+          if constexpr (requires { contact.timeOfImpact; })
+            EXPECT_EQ(contact.timeOfImpact, earliest);
+          else
+            ADD_FAILURE();
+        },
+        failure.expected);
+  }
+}
+
+TEST(Audit, SmallSamplesFindAFaultInTime) {
+  forEachScene([&](const Scene& scene) {
+    CollisionData::Contents faulty = scene.found();
+    faulty.edgeEdge.pop_back();
+    std::size_t fired = 0;
+    for (std::uint64_t frame = 1; frame <= 400; ++frame) {
+      const auto failures = scene.failures(faulty, {.features = 5, .seed = 3}, frame);
+      EXPECT_LE(failures.size(), 1u);
+      fired += failures.size();
+    }
+    EXPECT_GT(fired, 0u);
+    EXPECT_LT(fired, 200u);
+  });
+}
+
+std::vector<std::size_t> sizesOf(const FeatureLists& lists) {
+  return {lists.verticesOfA.size(), lists.verticesOfB.size(), lists.edgesOfA.size(),
+          lists.trianglesOfA.size()};
+}
+
+TEST(Audit, DrawsFeaturesEvenlyBySeedFrameAndPair) {
+  forEachScene([&](const Scene& scene) {
+    const FeatureLists every = everyFeature(scene.meshes());
+    std::size_t all = 0;
+    for (const std::size_t size : sizesOf(every)) all += size;
+    const auto listsOf = [](const FeatureLists& lists) {
+      return std::array{lists.verticesOfA, lists.verticesOfB, lists.edgesOfA, lists.trianglesOfA};
+    };
+    const auto allLists = listsOf(every);
+    std::array<std::multiset<std::uint32_t>, 4> times;
+    const int most = static_cast<int>(all);
+    for (const int features : {1, 2, 7, most / 2, most - 1, most, most + 1}) {
+      for (std::uint64_t frame = 1; frame <= 50; ++frame) {
+        const AuditSettings settings{.features = features, .seed = 9};
+        const FeatureLists drawn = drawFeatures(scene.meshes(), scene.pair, settings, frame);
+        std::size_t total = 0;
+        for (std::size_t list = 0; list < 4; ++list) {
+          const std::vector<std::uint32_t> ids = listsOf(drawn)[list];
+          const std::vector<std::uint32_t> from = listsOf(every)[list];
+          total += ids.size();
+          EXPECT_TRUE(std::is_sorted(ids.begin(), ids.end()));
+          EXPECT_EQ(std::adjacent_find(ids.begin(), ids.end()), ids.end());
+          EXPECT_TRUE(std::includes(from.begin(), from.end(), ids.begin(), ids.end()));
+          if (features == most / 2) times[list].insert(ids.begin(), ids.end());
+        }
+        EXPECT_EQ(total, std::min<std::size_t>(all, static_cast<std::size_t>(features)));
+        EXPECT_EQ(listsOf(drawn),
+                  listsOf(drawFeatures(scene.meshes(), scene.pair, settings, frame)));
+      }
+    }
+    // Half of all in each of 50 frames: 25 times each on average; 8 is more than 4 sigma away.
+    for (std::size_t list = 0; list < 4; ++list)
+      for (const std::uint32_t id : allLists[list]) EXPECT_GT(times[list].count(id), 7u);
+
+    const auto draw = [&](std::uint64_t seed, std::uint64_t frame, std::uint32_t b) {
+      const CollisionPair pair{GeometryId{0}, GeometryId{b}, scene.settings};
+      return listsOf(drawFeatures(scene.meshes(), pair, {.features = 8, .seed = seed}, frame));
+    };
+    EXPECT_NE(draw(1, 1, 1), draw(2, 1, 1));
+    EXPECT_NE(draw(1, 1, 1), draw(std::uint64_t{1} << 32, 1, 1));
+    EXPECT_NE(draw(1, 1, 1), draw(1, 2, 1));
+    EXPECT_NE(draw(1, 1, 1), draw(1, 1, 2));
+  });
+}
+
+TEST(Audit, FindsNothingInGoodFrames) {
+  Random random(5);
+  for (const int features : {0, 1, 20, 1 << 20}) {
+    OctreeBasedCD detection({.threads = 2, .audit = {.features = features, .seed = 1}});
+    Mesh meshes[2] = {testing::sphere(6, 9, {0, 0, 0}, 1), testing::soup(random, 60, 0.3)};
+    for (const Mesh& mesh : meshes) detection.addTriangleMesh(mesh.positions, mesh.triangles);
+    detection.addCollisionPair(GeometryId{0}, GeometryId{1}, {.thickness = 0.1});
+    detection.addCollisionPair(GeometryId{1}, GeometryId{1});
+    std::size_t contacts = 0;
+    for (int frame = 0; frame < 8; ++frame) {
+      for (Eigen::Vector3d& p : meshes[1].positions) p += testing::randomPoint(random, -0.1, 0.1);
+      detection.setPositions(GeometryId{1}, meshes[1].positions);
+      detection.detectCollision();
+      detection.advance();
+      EXPECT_TRUE(detection.auditFailures().empty());
+      contacts += detection.statistics().contacts;
+    }
+    EXPECT_GT(contacts, 0u);
+  }
+}
+
+TEST(Audit, RefusesANegativeSample) {
+  try {
+    OctreeBasedCD({.audit = {.features = -1}});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::InvalidSettings);
+    EXPECT_NE(std::string(error.what()).find("audit.features is -1"), std::string::npos);
+  }
+}
+
+/// Of Intersection what several pairs of triangles find may be of one that is in the sample, and
+/// others that are not.
+TEST(Audit, SamplesConnectedMeshes) {
+  for (const PairSettings& settings : kPairSettings) {
+    Settings audited{.threads = 1};
+    audited.audit.features = 30;
+    OctreeBasedCD detection(audited);
+    const Mesh a = testing::sphere(12, 16, {0, 0, 0}, 1), b = testing::sphere(9, 14, {1, 0, 0}, 1);
+    const GeometryId first = detection.addTriangleMesh(a.positions, a.triangles),
+                     second = detection.addTriangleMesh(b.positions, b.triangles);
+    detection.addCollisionPair(first, second, settings);
+    std::vector<Eigen::Vector3d> now = b.positions;
+    for (int frame = 0; frame < 20; ++frame) {
+      for (Eigen::Vector3d& p : now) p.y() += 0.01;
+      detection.setPositions(second, now);
+      detection.detectCollision();
+      detection.advance();
+      EXPECT_TRUE(detection.auditFailures().empty());
+      EXPECT_GT(detection.statistics().contacts, 0u);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,311 @@
+#include <palpate/Capture.h>
+
+#include "Common/RandomMeshes.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <unistd.h>
+
+namespace palpate {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Mesh;
+using testing::Random;
+
+class Capture : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    m_folder = fs::temp_directory_path() /
+               ("palpate-" + std::string(test->name()) + std::to_string(::getpid()));
+    fs::create_directories(m_folder);
+  }
+  void TearDown() override { fs::remove_all(m_folder); }
+
+  fs::path file(const char* name = "file.capture") const { return m_folder / name; }
+  std::size_t fileCount() const {
+    return static_cast<std::size_t>(
+        std::distance(fs::directory_iterator(m_folder), fs::directory_iterator()));
+  }
+
+  std::string textOf(const fs::path& path) const {
+    std::ifstream stream(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  void write(const std::string& text) const {
+    std::ofstream(file(), std::ios::binary | std::ios::trunc) << text;
+  }
+
+  /// The file is refused, by its name and with `reason`.
+  void expectRefused(const std::string& reason) const {
+    try {
+      readCapture(file());
+      ADD_FAILURE() << "not refused: " << reason;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::File);
+      const std::string sentence = error.what();
+      EXPECT_NE(sentence.find(file().string()), std::string::npos) << sentence;
+      EXPECT_NE(sentence.find(reason), std::string::npos) << sentence;
+    }
+  }
+
+  fs::path m_folder;
+};
+
+bool sameBits(const std::vector<Eigen::Vector3d>& l, const std::vector<Eigen::Vector3d>& r) {
+  return l.size() == r.size() &&
+         (l.empty() || std::memcmp(l.data(), r.data(), l.size() * sizeof l[0]) == 0);
+}
+
+void expectSame(const CollisionProblem& l, const CollisionProblem& r) {
+  EXPECT_EQ(l.settings.engine, r.settings.engine);
+  EXPECT_EQ(l.settings.threads, r.settings.threads);
+  EXPECT_EQ(l.settings.octree.maxDepth, r.settings.octree.maxDepth);
+  EXPECT_EQ(l.settings.octree.maxElementsPerLeaf, r.settings.octree.maxElementsPerLeaf);
+  EXPECT_EQ(l.settings.octree.update, r.settings.octree.update);
+  ASSERT_EQ(l.geometries.size(), r.geometries.size());
+  for (std::size_t i = 0; i < l.geometries.size(); ++i) {
+    EXPECT_EQ(l.geometries[i].id, r.geometries[i].id);
+    EXPECT_TRUE(sameBits(l.geometries[i].before, r.geometries[i].before));
+    EXPECT_TRUE(sameBits(l.geometries[i].now, r.geometries[i].now));
+    EXPECT_EQ(l.geometries[i].triangles, r.geometries[i].triangles);
+  }
+  ASSERT_EQ(l.pairs.size(), r.pairs.size());
+  for (std::size_t i = 0; i < l.pairs.size(); ++i) {
+    EXPECT_EQ(l.pairs[i].a, r.pairs[i].a);
+    EXPECT_EQ(l.pairs[i].b, r.pairs[i].b);
+    EXPECT_EQ(l.pairs[i].method, r.pairs[i].method);
+    EXPECT_EQ(l.pairs[i].settings.method, r.pairs[i].settings.method);
+    EXPECT_EQ(l.pairs[i].settings.thickness, r.pairs[i].settings.thickness);
+    EXPECT_EQ(l.pairs[i].settings.motionTolerance, r.pairs[i].settings.motionTolerance);
+    EXPECT_EQ(l.pairs[i].settings.timeTolerance, r.pairs[i].settings.timeTolerance);
+    EXPECT_EQ(l.pairs[i].settings.contacts, r.pairs[i].settings.contacts);
+  }
+}
+
+/// Geometries 1 and 2 of three, after a frame in which they moved; pairs (2, 1), (1, 1).
+OctreeBasedCD movedScene() {
+  Random random(3);
+  const Mesh first = testing::soup(random, 20, 0.3), second = testing::sphere(4, 5, {0, 0, 0}, 1);
+  OctreeBasedCD detection(
+      {.octree = {.maxDepth = 9, .maxElementsPerLeaf = 4, .update = OctreeUpdate::Rebuild},
+       .threads = 2});
+  const GeometryId removed = detection.addTriangleMesh(first.positions, first.triangles);
+  const GeometryId a = detection.addTriangleMesh(first.positions, first.triangles);
+  const GeometryId b = detection.addTriangleMesh(second.positions, second.triangles);
+  detection.removeGeometry(removed);
+  detection.addCollisionPair(
+      b, a, {.thickness = 0.1, .contacts = Contacts::All, .timeTolerance = 0x1p-9});
+  detection.addCollisionPair(a, a);
+  detection.detectCollision();
+  detection.advance();
+  std::vector<Eigen::Vector3d> now = first.positions;
+  for (Eigen::Vector3d& p : now) p += testing::randomPoint(random, -0.1, 0.1);
+  detection.setPositions(a, now);
+  detection.detectCollision();
+  return detection;
+}
+
+TEST_F(Capture, ReplaysTheLastFrame) {
+  const OctreeBasedCD detection = movedScene();
+  const GeometryId a{1}, b{2};
+  capture(detection, file());
+  EXPECT_EQ(fileCount(), 1u);
+  const CollisionProblem problem = readCapture(file());
+  expectSame(problem, detection.problem());
+  ASSERT_EQ(problem.geometries.size(), 2u);
+  EXPECT_EQ(problem.geometries[0].id, a);
+  EXPECT_FALSE(sameBits(problem.geometries[0].before, problem.geometries[0].now));
+  ASSERT_EQ(problem.pairs.size(), 2u);
+  EXPECT_EQ(problem.pairs[0].settings.method, Method::Auto);
+  EXPECT_EQ(problem.pairs[0].method, detection.collisionData(b, a).validity().method);
+  EXPECT_EQ(problem.pairs[1].method, detection.collisionData(a, a).validity().method);
+
+  OctreeBasedCD replay = setUp(problem);
+  replay.detectCollision();
+  const CollisionData& data = replay.collisionData(GeometryId{1}, GeometryId{0});
+  EXPECT_GT(data.vertexTriangle().size(), 0u);
+  EXPECT_EQ(data.hash(), detection.collisionData(b, a).hash());
+  EXPECT_EQ(replay.collisionData(GeometryId{0}, GeometryId{0}).hash(),
+            detection.collisionData(a, a).hash());
+}
+
+TEST_F(Capture, KeepsThePairOfAnAuditsFailure) {
+  const OctreeBasedCD detection = movedScene();
+  const GeometryId a{1}, b{2};
+  const CollisionData& whole = detection.collisionData(b, a);
+  const AuditFailure failure{.a = b, .b = a};
+  capture(detection, failure, file());
+  CollisionProblem problem = readCapture(file());
+  ASSERT_EQ(problem.pairs.size(), 1u);
+  ASSERT_EQ(problem.geometries.size(), 2u);
+  EXPECT_EQ(problem.geometries[problem.pairs[0].a].id, b);
+  EXPECT_EQ(problem.geometries[problem.pairs[0].b].id, a);
+  OctreeBasedCD replay = setUp(problem);
+  replay.detectCollision();
+  EXPECT_EQ(replay.collisionData(GeometryId{0}, GeometryId{1}).hash(), whole.hash());
+
+  const AuditFailure ofItself{.a = a, .b = a};
+  capture(detection, ofItself, file());
+  problem = readCapture(file());
+  ASSERT_EQ(problem.geometries.size(), 1u);
+  OctreeBasedCD selfReplay = setUp(problem);
+  selfReplay.detectCollision();
+  EXPECT_EQ(selfReplay.collisionData(GeometryId{0}, GeometryId{0}).hash(),
+            detection.collisionData(a, a).hash());
+}
+
+CollisionProblem smallProblem() {
+  constexpr double kMin = std::numeric_limits<double>::denorm_min(),
+                   kMax = std::numeric_limits<double>::max();
+  CollisionProblem problem;
+  problem.geometries = {{GeometryId{5},
+                         {{0, 0, 0}, {1, 0, 0}, {0, 1, -0.0}},
+                         {{0.1, 0, 0}, {1, 0, 0}, {0, 1, 1e-300}},
+                         {{0, 1, 2}}},
+                        {GeometryId{8},
+                         {{kMin, -kMin, 0}, {-3, 0, 0}, {0, 1, 1}},
+                         {{0, 0, 0}, {1, 0, 0}, {0, -kMax, 1.0 / 3}},
+                         {{2, 1, 0}}},
+                        {GeometryId{9}, {}, {}, {}}};
+  problem.pairs = {{0, 1, {.thickness = 0.1}, Method::Proximity},
+                   {1, 1, {.method = Method::Intersection}, Method::Intersection}};
+  return problem;
+}
+
+TEST_F(Capture, IsExact) {
+  writeCapture(smallProblem(), file());
+  const CollisionProblem read = readCapture(file());
+  expectSame(read, smallProblem());
+  EXPECT_TRUE(std::signbit(read.geometries[0].before[2][2]));
+  writeCapture(CollisionProblem(), file());
+  expectSame(readCapture(file()), CollisionProblem());
+}
+
+TEST_F(Capture, RefusesEveryFileCutOff) {
+  writeCapture(smallProblem(), file());
+  const std::string whole = textOf(file());
+  ASSERT_TRUE(whole.ends_with("end\n"));
+  for (std::size_t size = 0; size + 1 < whole.size(); size += 2) {
+    write(whole.substr(0, size));
+    EXPECT_THROW(readCapture(file()), Error) << size;
+  }
+  write(whole.substr(0, whole.size() / 2));
+  expectRefused("line ");
+  write(whole.substr(0, whole.size() - 5));
+  expectRefused("it is cut off");
+  write("");
+  expectRefused("it is not a capture");
+}
+
+TEST_F(Capture, RefusesWhatIsWrongByName) {
+  expectRefused("cannot be read");
+  fs::create_directory(file());
+  expectRefused("cannot be read");
+  fs::remove(file());
+
+  writeCapture(smallProblem(), file());
+  const std::string whole = textOf(file());
+  const auto expectRefusedWith = [&](const std::string& from, const std::string& to,
+                                     const std::string& reason) {
+    std::string text = whole;
+    const std::size_t place = text.find(from);
+    ASSERT_NE(place, text.npos) << from;
+    write(text.replace(place, from.size(), to));
+    expectRefused(reason);
+  };
+  expectRefusedWith("palpate-capture 8", "solid 3", "it is not a capture");
+  expectRefusedWith("palpate-capture 8", "palpate-capture 9",
+                    "it is of version 9; versions up to 8");
+  expectRefusedWith("palpate-capture 8", "palpate-capture x", "line 1: \"x\" is not an integer");
+  expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
+  expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
+  expectRefusedWith("0 1 2\n", "0 1 99999999999\n", "is not an integer in range");
+  expectRefusedWith("0p+0 0p+0 0p+0 ", "nan 0p+0 0p+0 ", "geometry 0, vertex 0: position before");
+  expectRefusedWith("0 1 2\n", "0 1\n", "");
+  expectRefusedWith("pair 0 1 ", "pair 0 7 ", "geometry 7 was never added");
+  expectRefusedWith("pair 1 1 ", "pair 1 0 ", "was added before");
+  expectRefusedWith("pair 1 1 ", "twin 1 1 ", "\"twin\" where \"pair\" should be");
+  expectRefusedWith("Proximity", "Guess", "\"Guess\" is not a name known here");
+  expectRefusedWith("geometry 5 3 1", "geometry 5 333333 1", "it is cut off");
+  expectRefusedWith("geometry 5 3 1", "geometry 5 4 1", "");
+  expectRefusedWith("Octree 0 32", "Octree 0 61", "octree.maxDepth is 61");
+  expectRefusedWith("end\n", "end\nend\n", "more follows after its end");
+  write(whole);
+  EXPECT_NO_THROW(readCapture(file()));
+}
+
+TEST_F(Capture, ReadsEarlierVersions) {
+  writeCapture(smallProblem(), file());
+  std::string text = textOf(file());
+  const auto replaceAll = [&](const std::string& words, const std::string& with) {
+    ASSERT_NE(text.find(words), text.npos) << words;
+    for (std::size_t at; (at = text.find(words)) != text.npos;)
+      text.replace(at, words.size(), with);
+  };
+  const auto asVersion = [&](int version) {
+    text.replace(text.find("palpate-capture "), 17, "palpate-capture " + std::to_string(version));
+    write(text);
+    return readCapture(file());
+  };
+  replaceAll(" Both 0 0 0\n", " Both 0 0\n");  // tetrahedra
+  replaceAll(" 1.0c6f7a0b5ed8dp-20\n", "\n");  // timeTolerance
+  EXPECT_EQ(asVersion(5).pairs[0].settings.timeTolerance, PairSettings().timeTolerance);
+  replaceAll(" 0 1 4294967295 Both 0 0\n", " 0\n");  // filters, rest
+  replaceAll(" 0p+0 0\n", " 0p+0\n");                // predicate
+  EXPECT_EQ(asVersion(3).geometries[0].filter, CollisionFilter());
+  replaceAll(" Triangles 0\n", "\n");
+  replaceAll(" -1p+0 0p+0\n", " -1p+0\n");  // restDistance
+  EXPECT_EQ(asVersion(2).pairs[0].settings.method, smallProblem().pairs[0].settings.method);
+  replaceAll(" -1p+0\n", "\n");  // tolerance
+  const CollisionProblem read = asVersion(1);
+  EXPECT_EQ(read.pairs[0].settings.method, Method::Proximity);  // for which Auto stood
+  EXPECT_EQ(read.pairs[0].settings.motionTolerance, PairSettings().motionTolerance);
+}
+
+TEST_F(Capture, RefusesNanAndInfinity) {
+  CollisionProblem problem = smallProblem();
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    problem = smallProblem();
+    problem.geometries[1].now[2][0] = bad;
+    writeCapture(problem, file());
+    expectRefused("geometry 1, vertex 2: position is");
+    problem = smallProblem();
+    problem.pairs[0].settings.thickness = bad;
+    writeCapture(problem, file());
+    expectRefused("thickness is");
+  }
+}
+
+TEST_F(Capture, LeavesNothingHalfWritten) {
+  const fs::path nowhere = m_folder / "missing" / "file.capture";
+  EXPECT_THROW(writeCapture(smallProblem(), nowhere), Error);
+  EXPECT_EQ(fileCount(), 0u);
+  // A folder in the file's place: the rename fails.
+  fs::create_directories(file() / "full");
+  try {
+    writeCapture(smallProblem(), file());
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::File);
+    EXPECT_NE(std::string(error.what()).find(file().string()), std::string::npos);
+  }
+  EXPECT_EQ(fileCount(), 1u);
+  // Part of it written, no more room: what was there stays.
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+  writeCapture(CollisionProblem(), file("kept.capture"));
+  fs::create_symlink("/dev/full", file("kept.capture.part"));
+  EXPECT_THROW(writeCapture(smallProblem(), file("kept.capture")), Error);
+  EXPECT_TRUE(readCapture(file("kept.capture")).geometries.empty());
+  EXPECT_EQ(fileCount(), 2u);
+}
+
+}  // namespace
+}  // namespace palpate

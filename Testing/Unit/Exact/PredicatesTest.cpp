@@ -1,0 +1,190 @@
+#include "Exact/Exact.h"
+#include "Exact/ExactSum.h"
+#include "Exact/Predicates.h"
+#include "Unit/Math/TrianglePairs.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <limits>
+#include <vector>
+
+namespace palpate::test {
+namespace {
+
+/// The determinant expanded without differences, in integers: nothing shared with what it checks.
+int volumeSign(const std::array<Eigen::Vector3d, 4>& p) {
+  std::array<std::array<Integer, 3>, 4> q;
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 3; ++k) q[i][k] = scaledInteger(p[i][k]);
+  const auto triple = [&](int i, int j, int k) -> Integer {
+    return q[i][0] * q[j][1] * q[k][2] + q[i][1] * q[j][2] * q[k][0] + q[i][2] * q[j][0] * q[k][1] -
+           q[i][2] * q[j][1] * q[k][0] - q[i][0] * q[j][2] * q[k][1] - q[i][1] * q[j][0] * q[k][2];
+  };
+  return sgn(Integer(triple(1, 2, 3) - triple(0, 2, 3) + triple(0, 1, 3) - triple(0, 1, 2)));
+}
+
+int areaSign(int axis, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+             const Eigen::Vector3d& c) {
+  const int x = (axis + 1) % 3, y = (axis + 2) % 3;
+  const auto cross = [&](const Eigen::Vector3d& p, const Eigen::Vector3d& q) -> Integer {
+    return scaledInteger(p[x]) * scaledInteger(q[y]) - scaledInteger(p[y]) * scaledInteger(q[x]);
+  };
+  return sgn(Integer(cross(a, b) + cross(b, c) + cross(c, a)));
+}
+
+TEST(Predicates, EverySignIsThatOfTheIntegerDeterminant) {
+  Random random(1);
+  SignCounts counts;
+  for (int k = 0; k < static_cast<int>(Kind::Count); ++k) {
+    for (int repeat = 0; repeat < 1500; ++repeat) {
+      const auto [a, b] = makePair(static_cast<Kind>(k), random);
+      ASSERT_EQ(orient3d(a[0], a[1], a[2], b[0], counts), volumeSign({a[0], a[1], a[2], b[0]}))
+          << k;
+      ASSERT_EQ(orient3d(a[0], b[1], a[2], b[0], counts), volumeSign({a[0], b[1], a[2], b[0]}))
+          << k;
+      for (int axis = 0; axis < 3; ++axis)
+        ASSERT_EQ(orient2d(axis, a[0], a[1], b[0], counts), areaSign(axis, a[0], a[1], b[0])) << k;
+    }
+  }
+  EXPECT_GT(counts.undecided, 10000u);
+}
+
+Eigen::Vector3d nudged(Eigen::Vector3d p, int axis, Random& random) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  p[axis] = std::nextafter(p[axis], random.below(2) ? infinity : -infinity);
+  return p;
+}
+
+TEST(Predicates, OneUlpOffThePlaneOrTheLineIsSeen) {
+  Random random(2);
+  SignCounts counts;
+  for (int repeat = 0; repeat < 5000; ++repeat) {
+    const Eigen::Vector3d a = random.inCube(), b = random.inCube(), c = random.inCube();
+    const int axis = random.below(3);
+    const Eigen::Vector3d d = nudged(pointOn({a, b, c}, random), axis, random);
+    ASSERT_EQ(orient3d(a, b, c, d, counts), volumeSign({a, b, c, d}));
+    const Eigen::Vector3d e = nudged(a + random.unit() * (b - a), axis, random);
+    for (int along = 0; along < 3; ++along)
+      ASSERT_EQ(orient2d(along, a, b, e, counts), areaSign(along, a, b, e));
+  }
+}
+
+/// Where products end among the denormals, and all around.
+TEST(Predicates, NoUnderflowTurnsAVolume) {
+  Random random(5);
+  SignCounts counts;
+  for (int exponent = -1020; exponent <= 1000;
+       exponent += std::abs(exponent + 450) < 120 ? 1 : 30) {
+    for (int repeat = 0; repeat < 60; ++repeat) {
+      CornersPair pair{cornersOf([&] { return random.inCube(); }), {}};
+      pair.second = cornersOf([&] { return pointOn(pair.first, random); });
+      const auto [a, b] = scaled(pair, exponent);
+      ASSERT_EQ(orient3d(a[0], a[1], a[2], b[0], counts), volumeSign({a[0], a[1], a[2], b[0]}))
+          << exponent;
+    }
+  }
+}
+
+TEST(Predicates, NoUnderflowTurnsAnArea) {
+  Random random(6);
+  SignCounts counts;
+  for (int exponent = -545; exponent <= -490; ++exponent) {
+    for (int repeat = 0; repeat < 1500; ++repeat) {
+      const Eigen::Vector3d a = scaled(random.inCube(), exponent),
+                            b = scaled(random.inCube(), exponent);
+      const Eigen::Vector3d c = a + random.unit() * (b - a);
+      ASSERT_EQ(orient2d(repeat % 3, a, b, c, counts), areaSign(repeat % 3, a, b, c)) << exponent;
+    }
+  }
+}
+
+/// Where products round to multiples of the least double, of differences that were rounded
+/// themselves: the relative error alone says too little.
+TEST(Predicates, NoUnderflowTurnsAnAreaOfRoundedDifferences) {
+  Random random(7);
+  SignCounts counts;
+  const auto uneven = [&] {
+    Eigen::Vector3d p = random.inCube();
+    for (double& x : p) x = std::ldexp(x, -random.below(8));
+    return p;
+  };
+  for (int exponent = -516; exponent <= -506; ++exponent) {
+    for (int repeat = 0; repeat < 6000; ++repeat) {
+      const Eigen::Vector3d a = scaled(uneven(), exponent), b = scaled(uneven(), exponent);
+      const Eigen::Vector3d c = a + random.unit() * (b - a);
+      ASSERT_EQ(orient2d(repeat % 3, a, b, c, counts), areaSign(repeat % 3, a, b, c)) << exponent;
+    }
+  }
+}
+
+TEST(Predicates, SwappingTwoPositionsTurnsTheSign) {
+  Random random(3);
+  SignCounts counts;
+  for (int repeat = 0; repeat < 20000; ++repeat) {
+    const auto [a, b] = makePair(static_cast<Kind>(repeat % static_cast<int>(Kind::Count)), random);
+    const int sign = orient3d(a[0], a[1], a[2], b[0], counts);
+    ASSERT_EQ(orient3d(a[1], a[0], a[2], b[0], counts), -sign);
+    ASSERT_EQ(orient3d(a[0], a[2], a[1], b[0], counts), -sign);
+    ASSERT_EQ(orient3d(a[0], a[1], b[0], a[2], counts), -sign);
+  }
+}
+
+TEST(Predicates, FloatingPointDecidesWhatIsNotDegenerate) {
+  Random random(4);
+  SignCounts counts;
+  for (int repeat = 0; repeat < 100000; ++repeat) {
+    const auto [a, b] = makePair(Kind::Random, random);
+    orient3d(a[0], a[1], a[2], b[0], counts);
+    orient2d(repeat % 3, a[0], a[1], a[2], counts);
+  }
+  EXPECT_EQ(counts.undecided, 0u);
+}
+
+/// Over all exponents, with carries through many words; back to zero in another order.
+TEST(ExactSum, HasTheSignOfTheIntegerSum) {
+  Random random(8);
+  const double largest = std::numeric_limits<double>::max();
+  const auto anyDouble = [&](int exponent) {
+    const double x = random.below(8) == 0 ? 1.0 : 0.5 + random.unit() / 2;
+    return (random.below(2) ? x : -x) * std::ldexp(1.0, exponent);
+  };
+  int zeros = 0;
+  for (int repeat = 0; repeat < 20000; ++repeat) {
+    std::vector<std::array<double, 3>> products;
+    const int exponent = random.between(-1074, 1023);
+    for (int i = random.between(1, 6); i > 0; --i) {
+      const bool anywhere = random.below(3) == 0;
+      std::array<double, 3> product;
+      for (double& x : product) x = anyDouble(anywhere ? random.between(-1074, 1023) : exponent);
+      if (random.below(20) == 0) product.fill(largest);
+      products.push_back(product);
+      if (random.below(2)) products.push_back({product[1], product[2], -product[0]});
+    }
+    ExactSum sum;
+    Integer truth = 0;
+    for (const auto& [x, y, z] : products) {
+      const bool negative = random.below(2);
+      sum.add(x, y, z, negative);
+      const Integer product = scaledInteger(x) * scaledInteger(y) * scaledInteger(z);
+      truth += negative ? Integer(-product) : product;
+      ASSERT_EQ(sum.sign(), sgn(truth)) << repeat;
+    }
+    zeros += truth == 0;
+  }
+  EXPECT_GT(zeros, 500);
+}
+
+TEST(Exact, ScaledIntegersKeepTheirOrder) {
+  const double denormal = std::numeric_limits<double>::denorm_min();
+  EXPECT_TRUE(scaledInteger(denormal) == 1);
+  EXPECT_TRUE(scaledInteger(-3 * denormal) == -3);
+  EXPECT_TRUE(scaledInteger(-0.0) == 0);
+  EXPECT_TRUE(scaledInteger(0x1p-1022) == Integer(1) << 52);
+  EXPECT_TRUE(scaledInteger(1.5) == Integer(3) << 1073);
+  EXPECT_TRUE(scaledInteger(std::numeric_limits<double>::max()) == ((Integer(1) << 53) - 1)
+                                                                       << 2045);
+}
+
+}  // namespace
+}  // namespace palpate::test

@@ -1,0 +1,346 @@
+#include "Common/QueryCalls.h"
+#include "Common/Solids.h"
+#include "Common/Things.h"
+
+#include <palpate/OctreeBasedCD.h>
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <optional>
+#include <set>
+#include <string>
+
+namespace palpate::testing {
+namespace {
+
+using Point = std::array<std::int64_t, 3>;
+
+/// Six times the volume of integer positions, exactly.
+std::int64_t volume(const std::array<Vector3d, 4>& at) {
+  std::array<Point, 3> e;
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k) e[i][k] = static_cast<std::int64_t>(at[i + 1][k] - at[0][k]);
+  return e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) +
+         e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
+         e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
+}
+
+/// The lowest tetrahedron that holds p, from the definition, with its four volumes.
+struct Held {
+  std::uint32_t tetrahedron;
+  std::array<std::int64_t, 4> volumes;
+};
+std::optional<Held> holder(const Vector3d& p, const Solid& solid) {
+  for (std::uint32_t t = 0; t < solid.tetrahedra.size(); ++t) {
+    std::array<std::int64_t, 4> volumes;
+    std::int64_t least = 0, most = 0;
+    for (int i = 0; i < 4; ++i) {
+      std::array<Vector3d, 4> at;
+      for (int k = 0; k < 4; ++k) at[k] = solid.positions[solid.tetrahedra[t][k]];
+      at[i] = p;
+      volumes[i] = volume(at);
+      least = std::min(least, volumes[i]);
+      most = std::max(most, volumes[i]);
+    }
+    if ((least < 0) == (most > 0)) continue;  // on both sides of faces, or no volume at all
+    return Held{t, volumes};
+  }
+  return {};
+}
+
+/// All points of the integer lattice in [-1, n + 1]³, of each kind.
+std::vector<Thing> lattices(int n) {
+  Thing points{GeometryKind::Points, {}, {}, {}, {0}};
+  for (int x = -1; x <= n + 1; ++x)
+    for (int y = -1; y <= n + 1; ++y)
+      for (int z = -1; z <= n + 1; ++z) points.positions.emplace_back(x, y, z);
+  Thing line{GeometryKind::Lines, points.positions, {}, {}, {0}},
+      mesh{GeometryKind::Triangles, points.positions, {}, {}, {0}};
+  for (std::uint32_t v = 0; v + 1 < points.positions.size(); ++v)
+    line.segments.push_back({v, v + 1});
+  for (std::uint32_t v = 0; v + 2 < points.positions.size(); ++v)
+    mesh.triangles.push_back({v, v + 1, v + 2});
+  return {points, line, mesh};
+}
+
+std::vector<EmbeddedVertex> embedded(const Settings& settings, const Thing& probes,
+                                     const Solid& solid) {
+  OctreeBasedCD detection(settings);
+  const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
+                   other = probes.addTo(detection);
+  const auto span = testing::embeddedVertices(detection, other, body);
+  const std::vector<EmbeddedVertex> found(span.begin(), span.end());
+  for (const EmbeddedVertex& v : found)
+    EXPECT_EQ(detection.queries().findTetrahedron(body, probes.positions[v.vertex]), v.at);
+  return found;
+}
+
+TEST(EmbeddedVertices, AreThoseOfExactVolumesOnAGrid) {
+  Random random(1);
+  std::size_t inside = 0, onBoundary = 0, inverted = 0;
+  for (int run = 0; run < 12; ++run) {
+    constexpr int n = 3;
+    Solid solid = cells(n, random, [&](const auto&) { return random() % 4 > 0; });
+    // As it is, folded, anywhere: inverted and flat ones too.
+    for (Vector3d& p : solid.positions)
+      for (int k = 0; k < 3 && run % 3 > 0; ++k)
+        p[k] = run % 3 == 1 ? p[k] + static_cast<double>(random() % 3) - 1.0
+                            : static_cast<double>(random() % (n + 1));
+    for (const Thing& probes : lattices(n)) {
+      std::size_t next = 0;
+      const auto found = embedded(settingsOf(Engine::Octree, 2), probes, solid);
+      for (std::uint32_t v = 0; v < probes.positions.size(); ++v) {
+        const auto truth = holder(probes.positions[v], solid);
+        if (!truth) continue;
+        ASSERT_LT(next, found.size());
+        const EmbeddedVertex& e = found[next++];
+        EXPECT_EQ(e.vertex, v);
+        EXPECT_EQ(e.at.tetrahedron, truth->tetrahedron);
+        EXPECT_EQ(e.at.corners, solid.tetrahedra[truth->tetrahedron]);
+        std::int64_t sum = 0;
+        for (const std::int64_t volume : truth->volumes) sum += volume;
+        for (int i = 0; i < 4; ++i)
+          EXPECT_EQ(e.at.weights[i],
+                    static_cast<double>(truth->volumes[i]) / static_cast<double>(sum));
+        ++inside;
+        onBoundary += std::count(truth->volumes.begin(), truth->volumes.end(), 0) > 0;
+        inverted += sum < 0;
+      }
+      EXPECT_EQ(next, found.size());
+      EXPECT_EQ(embedded(settingsOf(Engine::BruteForce), probes, solid), found);
+    }
+  }
+  EXPECT_GT(inside, 500u);
+  EXPECT_GT(onBoundary, 300u);
+  EXPECT_GT(inverted, 100u);
+}
+
+/// Lives of deforming solids: moved, inverted, cut, placed; any threads, rebuilt or refitted.
+TEST(EmbeddedVertices, AreAsByBruteForceForAnyThreads) {
+  const auto life = [](const Settings& settings, double scale, double far) {
+    Random random(2);
+    OctreeBasedCD detection(settings);
+    Solid solid = cells(4, random);
+    const auto place = [&](Positions positions) {
+      for (Vector3d& p : positions) p = scale * (p + Vector3d(far, -far, 0));
+      return positions;
+    };
+    const GeometryId body = detection.addTetrahedralMesh(place(solid.positions), solid.tetrahedra);
+    Positions probes = solid.positions;  // corners are exactly in several
+    for (int i = 0; i < 600; ++i) probes.push_back(randomPoint(random, -1, 5));
+    const GeometryId points = detection.addPointSet(place(probes));
+    std::vector<std::vector<EmbeddedVertex>> all;
+    for (int frame = 0; frame < 8; ++frame) {
+      if (frame == 4) {
+        std::erase_if(solid.tetrahedra, [&](const auto&) { return random() % 4 == 0; });
+        detection.setTetrahedra(body, place(solid.positions), solid.tetrahedra);
+      } else {
+        detection.setPositions(body, place(moved(random, solid.positions, 0.4 * frame)));
+      }
+      if (frame == 6)
+        detection.setTransform(
+            body, Eigen::AngleAxisd(0.3, Vector3d(1, 2, 3).normalized()).toRotationMatrix(),
+            {0.1 * scale, 0, 0});
+      if (frame == 7)
+        detection.setTransform(points, Eigen::AngleAxisd(0.1, Vector3d::UnitZ()).toRotationMatrix(),
+                               Vector3d::Zero());
+      const auto found = testing::embeddedVertices(detection, points, body);
+      all.emplace_back(found.begin(), found.end());
+      if (frame % 2) detection.detectCollision();
+      detection.advance();
+    }
+    return all;
+  };
+  for (const auto& [scale, far] :
+       {std::pair{1.0, 0.0}, std::pair{1.0, 1e6}, std::pair{0x1p-40, 0.0}, std::pair{1e9, 3.0}}) {
+    const auto truth = life(settingsOf(Engine::BruteForce), scale, far);
+    for (std::size_t frame = 0; frame < truth.size(); ++frame)
+      EXPECT_TRUE(truth[frame].size() > 40 || (far > 1 && frame >= 6)) << frame;
+    for (const Settings& settings : octreeSettings()) EXPECT_EQ(life(settings, scale, far), truth);
+  }
+}
+
+/// One vertex moves at a time, so that nothing else tells that positions are new.
+TEST(EmbeddedVertices, AreOfTheLastPositions) {
+  Random random(8);
+  const Solid solid = cells(4, random);
+  const Thing probes = particles(random, 150, 0);
+  Positions places = probes.positions;
+  for (Vector3d& p : places) p *= 4;
+  std::set<std::size_t> sizes;
+  std::vector<std::vector<EmbeddedVertex>> answers[2];
+  for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
+    OctreeBasedCD detection(settingsOf(engine));
+    const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
+                     points = detection.addPointSet(places);
+    for (std::size_t v = 0; v < solid.positions.size(); ++v) {
+      Positions now = solid.positions;
+      now[v] = Vector3d(2, 2, 2) + 0.6 * (now[v] - Vector3d(2, 2, 2));
+      detection.setPositions(body, now);
+      const auto found = testing::embeddedVertices(detection, points, body);
+      answers[engine == Engine::Octree].emplace_back(found.begin(), found.end());
+      sizes.insert(found.size());
+    }
+  }
+  EXPECT_EQ(answers[0], answers[1]);
+  EXPECT_GT(sizes.size(), 4u);
+}
+
+TEST(EmbeddedVertices, WeightsGiveThePointBack) {
+  Random random(3);
+  Solid solid = cells(3, random);
+  for (Vector3d& p : solid.positions) p = 40.0 * p + randomPoint(random, -15, 15);
+  Thing probes = particles(random, 2000, 0);
+  for (Vector3d& p : probes.positions) p *= 120;
+  const auto found = embedded(settingsOf(Engine::Octree), probes, solid);
+  EXPECT_GT(found.size(), 1000u);
+  for (const auto& [vertex, at] : found) {
+    Vector3d sum = Vector3d::Zero();
+    double one = 0;
+    for (int i = 0; i < 4; ++i) {
+      EXPECT_GE(at.weights[i], 0);
+      sum += at.weights[i] * solid.positions[at.corners[i]];
+      one += at.weights[i];
+    }
+    EXPECT_NEAR(one, 1, 0x1p-50);
+    EXPECT_LT((sum - probes.positions[vertex]).norm(), 1e-12);
+  }
+}
+
+TEST(EmbeddedVertices, DoNotDependOnTheOrderOfCorners) {
+  Random random(4);
+  Solid solid = cells(3, random), turned = solid;
+  for (Tetrahedron& t : turned.tetrahedra) std::shuffle(t.begin(), t.end(), random);
+  const Thing probes = lattices(3)[0];
+  const auto expected = embedded(settingsOf(Engine::Octree), probes, solid),
+             found = embedded(settingsOf(Engine::Octree), probes, turned);
+  ASSERT_EQ(found.size(), expected.size());
+  EXPECT_EQ(found.size(), 64u);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_EQ(found[i].vertex, expected[i].vertex);
+    EXPECT_EQ(found[i].at.tetrahedron, expected[i].at.tetrahedron);
+    for (int k = 0; k < 4; ++k)
+      for (int l = 0; l < 4; ++l)
+        if (found[i].at.corners[k] == expected[i].at.corners[l]) {
+          EXPECT_EQ(found[i].at.weights[k], expected[i].at.weights[l]);
+        }
+  }
+}
+
+// ---- Inside, by tetrahedra ----
+
+std::vector<InsideVertex> inside(const Settings& settings, const Thing& probes, const Solid& solid,
+                                 bool asTriangles) {
+  OctreeBasedCD detection(settings);
+  const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
+                   other = probes.addTo(detection);
+  if (!asTriangles) {
+    const auto found = testing::insideVertices(detection, other, body);
+    return {found.begin(), found.end()};
+  }
+  const GeometryId surface =
+      detection.addTriangleMesh(solid.positions, detection.surface(body).triangles);
+  const auto found = testing::insideVertices(detection, other, surface);
+  return {found.begin(), found.end()};
+}
+
+TEST(EmbeddedVertices, InsideIsThatOfTheSurfaceAtRest) {
+  Random random(5);
+  constexpr int n = 3;
+  const std::function<bool(const std::array<int, 3>&)> bodies[] = {
+      [](const auto&) { return true; }, [](const auto& c) { return c[2] == 0 || c[0] == 0; },
+      [](const auto& c) {
+        return c != std::array{1, 1, 1};
+      }};
+  for (const auto& filled : bodies) {
+    Solid solid = cells(n, random, filled);
+    for (Vector3d& p : solid.positions) p *= 2;
+    for (const Thing& probes : lattices(2 * n)) {
+      const auto truth = inside(settingsOf(Engine::Octree), probes, solid, true);
+      EXPECT_GT(truth.size(), 10u);
+      EXPECT_EQ(inside(settingsOf(Engine::Octree, 2), probes, solid, false), truth);
+      EXPECT_EQ(inside(settingsOf(Engine::BruteForce), probes, solid, false), truth);
+    }
+  }
+}
+
+/// Where the surface is not closed and oriented, and where it is turned inside out.
+TEST(EmbeddedVertices, InsideIsInATetrahedronAndNotOnTheSurface) {
+  Random random(6);
+  std::size_t found = 0;
+  for (int run = 0; run < 8; ++run) {
+    constexpr int n = 3;
+    Solid solid = cells(n, random, [&](const auto&) { return random() % 2 > 0; });
+    for (Vector3d& p : solid.positions)
+      for (int k = 0; k < 3; ++k)
+        p[k] = run % 2 ? 2 * p[k] : static_cast<double>(random() % (2 * n + 1));
+    const Thing probes = lattices(2 * n)[0];
+    Settings settings = settingsOf(Engine::Octree);
+    OctreeBasedCD detection(settings);
+    const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
+                     points = probes.addTo(detection);
+    detection.addCollisionPair(points, body, {Method::Proximity, 100.0});
+    detection.detectCollision();
+    std::vector<double> nearest(probes.positions.size(), 1e9);
+    for (const auto& c : detection.collisionData(points, body).vertexTriangle())
+      nearest[c.vertex] = std::min(nearest[c.vertex], c.distance);
+    const auto all = testing::insideVertices(detection, points, body);
+    std::size_t next = 0;
+    for (std::uint32_t v = 0; v < probes.positions.size(); ++v) {
+      if (!holder(probes.positions[v], solid) || nearest[v] == 0) continue;
+      ASSERT_LT(next, all.size());
+      EXPECT_EQ(all[next].vertex, v);
+      EXPECT_EQ(all[next].depth, nearest[v]);
+      ++next;
+    }
+    EXPECT_EQ(next, all.size());
+    found += next;
+  }
+  EXPECT_GT(found, 50u);
+}
+
+TEST(EmbeddedVertices, WhatCannotBeAskedIsRefusedByName) {
+  Random random(7);
+  const Solid solid = cells(1, random);
+  OctreeBasedCD detection(settingsOf(Engine::Octree));
+  const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
+                   points = detection.addPointSet(solid.positions);
+  const auto expectRefused = [](ErrorCode code, const std::string& words, auto&& call) {
+    try {
+      call();
+      ADD_FAILURE() << "accepted; expected: " << words;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), code);
+      EXPECT_EQ(std::string(error.what()), words);
+    }
+  };
+  expectRefused(ErrorCode::UnsupportedMethod,
+                "geometry 1 is a point set; findEmbeddedVertices() is for tetrahedral meshes",
+                [&] { testing::embeddedVertices(detection, body, points); });
+  expectRefused(ErrorCode::UnsupportedMethod,
+                "geometry 1 is a point set; findTetrahedron() is for tetrahedral meshes",
+                [&] { detection.queries().findTetrahedron(points, Vector3d::Zero()); });
+  expectRefused(ErrorCode::InvalidSettings, "geometry 0: its own vertices lie on it",
+                [&] { testing::embeddedVertices(detection, body, body); });
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  expectRefused(ErrorCode::NonFinitePosition, "geometry 0: a point to be found is (nan, 0, 0)",
+                [&] {
+                  detection.queries().findTetrahedron(body, {nan, 0, 0});
+                });
+  EXPECT_FALSE(detection.queries().findTetrahedron(body, {2, 0, 0}));
+  EXPECT_TRUE(detection.queries().findTetrahedron(body, {1, 1, 1}));
+  // Nothing at all, and nothing but surface that is on both sides.
+  const GeometryId empty = detection.addTetrahedralMesh(solid.positions, {});
+  EXPECT_TRUE(testing::embeddedVertices(detection, points, empty).empty());
+  EXPECT_TRUE(testing::insideVertices(detection, points, empty).empty());
+  const Tetrahedron one = solid.tetrahedra[0];
+  const GeometryId twice =
+      detection.addTetrahedralMesh(solid.positions, std::vector<Tetrahedron>{one, one});
+  EXPECT_TRUE(detection.surface(twice).triangles.empty());
+  EXPECT_EQ(testing::embeddedVertices(detection, points, twice).size(), 4u);
+}
+
+}  // namespace
+}  // namespace palpate::testing

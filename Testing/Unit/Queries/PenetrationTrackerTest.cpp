@@ -1,0 +1,327 @@
+#include "Common/QueryCalls.h"
+#include "Common/Solids.h"
+#include "Common/Things.h"
+
+#include <palpate/OctreeBasedCD.h>
+#include <palpate/PenetrationTracker.h>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <optional>
+
+namespace palpate::testing {
+namespace {
+
+using Corners = std::array<Vector3d, 3>;
+
+/// A body that moves and deforms, and points in and around it.
+struct Story {
+  std::vector<Triangle> triangles;
+  std::vector<Positions> body, points;  ///< by frame, in the world
+};
+
+Corners at(const Story& story, std::size_t frame, const Triangle& t) {
+  const Positions& p = story.body[frame];
+  return {p[t[0]], p[t[1]], p[t[2]]};
+}
+
+Vector3d weighted(const Corners& c, const Vector3d& w) {
+  return w[0] * c[0] + w[1] * c[1] + w[2] * c[2];
+}
+
+/// What takes a triangle's edge and normal from one frame to the next.
+Eigen::Matrix3d turn(const Corners& before, const Corners& now) {
+  const auto axes = [](const Corners& c) {
+    Eigen::Matrix3d m;
+    m.col(0) = (c[1] - c[0]).normalized();
+    m.col(2) = m.col(0).cross(c[2] - c[0]).normalized();
+    m.col(1) = m.col(2).cross(m.col(0));
+    return m;
+  };
+  return axes(now) * axes(before).transpose();
+}
+
+/// How far along a ray the surface is first met, by each triangle's plane; met: certainly.
+double firstMet(const Story& story, std::size_t frame, const Vector3d& p, const Vector3d& u,
+                bool certainly) {
+  double first = std::numeric_limits<double>::infinity();
+  const double slack = certainly ? -1e-9 : 1e-9;
+  for (const Triangle& triangle : story.triangles) {
+    const auto [a, b, c] = at(story, frame, triangle);
+    Eigen::Matrix3d m;
+    m << a - b, a - c, u;
+    const Vector3d x = m.fullPivLu().solve(a - p);
+    if (!(std::abs(m.determinant()) > 1e-12)) continue;
+    if (x[0] >= -slack && x[1] >= -slack && x[0] + x[1] <= 1 + slack && x[2] > 0)
+      first = std::min(first, x[2]);
+  }
+  return first;
+}
+
+struct Tally {
+  std::map<DirectionChange, std::size_t> changes;
+  double largestTurn = 0;  ///< beyond what motion explains, not named
+};
+
+using Answers = std::vector<std::vector<TrackedVertex>>;
+
+Answers answers(const Settings& settings, const Story& story) {
+  OctreeBasedCD detection(settings);
+  const GeometryId body = detection.addTriangleMesh(story.body[0], story.triangles),
+                   points = detection.addPointSet(story.points[0]);
+  PenetrationTracker tracker(points, body);
+  Answers all;
+  for (std::size_t frame = 0; frame < story.body.size(); ++frame) {
+    detection.setPositions(body, story.body[frame]);
+    detection.setPositions(points, story.points[frame]);
+    const auto nearest = testing::insideVertices(detection, points, body);
+    const std::vector<InsideVertex> truth(nearest.begin(), nearest.end());
+    const auto found = tracker.update(detection.queries());
+    all.emplace_back(found.begin(), found.end());
+    EXPECT_EQ(found.size(), truth.size());
+    for (std::size_t i = 0; i < found.size(); ++i) EXPECT_EQ(found[i].nearest, truth[i]);
+    if (frame % 3 == 0) detection.detectCollision();         // which is nothing to it
+    const auto again = tracker.update(detection.queries());  // of the same step
+    EXPECT_TRUE(std::equal(again.begin(), again.end(), all.back().begin(), all.back().end()));
+    detection.advance();
+  }
+  return all;
+}
+
+/// Every change against the definition, and the promise: turns beyond what motion explains are
+/// named, and nothing else is.
+Tally expectDefined(const Story& story, const Answers& all) {
+  constexpr double kSlack = 1e-9;
+  Tally tally;
+  for (std::size_t frame = 0; frame < all.size(); ++frame) {
+    std::map<std::uint32_t, TrackedVertex> last;
+    if (frame > 0)
+      for (const TrackedVertex& f : all[frame - 1]) last.emplace(f.penetration.vertex, f);
+    for (const TrackedVertex& f : all[frame]) {
+      const Vector3d p = story.points[frame][f.penetration.vertex];
+      ++tally.changes[f.change];
+      EXPECT_EQ(f.penetration.vertex, f.nearest.vertex);
+      EXPECT_LE(f.penetration.depth, TrackedVertex::kMostDepth * f.nearest.depth * (1 + kSlack));
+      EXPECT_GE(f.penetration.depth, f.nearest.depth * (1 - kSlack));
+      EXPECT_NEAR(f.penetration.direction.norm(), 1, 1e-12);
+      EXPECT_EQ(f.penetration.corners, story.triangles[f.penetration.triangle]);
+      const Vector3d exit =
+          weighted(at(story, frame, f.penetration.corners), f.penetration.barycentric);
+      EXPECT_LT((p + f.penetration.depth * f.penetration.direction - exit).norm(), 1e-9);
+      const auto before = last.find(f.penetration.vertex);
+      EXPECT_EQ(f.change == DirectionChange::Entered, before == last.end());
+      if (f.change != DirectionChange::Kept) {
+        EXPECT_EQ(f.penetration, f.nearest);
+      }
+      if (before == last.end()) continue;
+      const InsideVertex& old = before->second.penetration;
+      const Corners then = at(story, frame - 1, old.corners), now = at(story, frame, old.corners);
+      const Eigen::Matrix3d turned = turn(then, now);
+      const Vector3d direction = turned * old.direction,
+                     moved = (p - weighted(now, old.barycentric)) -
+                             turned * (story.points[frame - 1][f.penetration.vertex] -
+                                       weighted(then, old.barycentric));
+      const double explained = moved.norm() / std::sqrt(old.depth * f.nearest.depth);
+      const double excess = (f.penetration.direction - direction).norm() - explained,
+                   nearestExcess = (f.nearest.direction - direction).norm() - explained;
+      if (f.change == DirectionChange::Jumped) {
+        EXPECT_GE(excess, TrackedVertex::kMostTurn - kSlack);
+        EXPECT_GT(firstMet(story, frame, p, direction, true),
+                  TrackedVertex::kMostDepth * f.nearest.depth * (1 - kSlack));
+      } else {
+        EXPECT_LE(excess, TrackedVertex::kMostTurn + kSlack);
+        tally.largestTurn = std::max(tally.largestTurn, excess);
+      }
+      if (f.change == DirectionChange::Kept) {
+        EXPECT_GE(nearestExcess, TrackedVertex::kMostTurn - kSlack);
+        EXPECT_LT((f.penetration.direction - direction).norm(), 1e-9);
+        EXPECT_GT(f.penetration.depth * (1 + kSlack), firstMet(story, frame, p, direction, false));
+        EXPECT_LT(f.penetration.depth * (1 - kSlack), firstMet(story, frame, p, direction, true));
+      }
+    }
+  }
+  return tally;
+}
+
+/// The surface of some cells, each side n long.
+Mesh blocks(int n, Random& random, const std::function<bool(const std::array<int, 3>&)>& filled) {
+  const Solid solid = cells(n, random, filled);
+  OctreeBasedCD detection(settingsOf(Engine::Octree));
+  const auto surface =
+      detection.surface(detection.addTetrahedralMesh(solid.positions, solid.tetrahedra));
+  return {solid.positions, {surface.triangles.begin(), surface.triangles.end()}};
+}
+
+/// Bodies with sharp edges, notches and a hollow, round ones, and two slabs with a crack between.
+std::vector<Mesh> bodies(Random& random) {
+  Mesh slabs = blocks(3, random, [](const auto& c) { return c[2] != 1; });
+  for (Vector3d& p : slabs.positions) p.z() -= p.z() > 1.5 ? 0.9 : 0.0;
+  return {slabs, blocks(2, random, [](const auto&) { return true; }),
+          blocks(3, random, [](const auto& c) { return c[2] == 0 || c[0] == 0; }),
+          blocks(3, random,
+                 [](const auto& c) {
+                   return c != std::array{1, 1, 1};
+                 }),
+          sphere(8, 12, {1.5, 1.5, 1.5}, 1.4)};
+}
+
+TEST(PenetrationTracker, FlipNowhereUnnamedInPointsThatMoveThroughABodyAtRest) {
+  Random random(1);
+  std::map<DirectionChange, std::size_t> changes;
+  for (const Mesh& mesh : bodies(random)) {
+    Story story{mesh.triangles, {}, {}};
+    Positions points, steps;
+    for (int i = 0; i < 80; ++i) {
+      points.push_back(randomPoint(random, -0.5, 3));
+      steps.push_back(randomPoint(random, -1, 1) * (i % 2 ? 0.02 : 0.1));
+    }
+    for (int frame = 0; frame < 60; ++frame) {
+      for (std::size_t i = 0; i < points.size(); ++i)
+        points[i] += steps[i] + randomPoint(random, -0.003, 0.003);
+      story.body.push_back(mesh.positions);
+      story.points.push_back(points);
+    }
+    for (const auto& [change, count] :
+         expectDefined(story, answers(settingsOf(Engine::Octree), story)).changes)
+      changes[change] += count;
+  }
+  EXPECT_GT(changes[DirectionChange::Entered], 100u);
+  EXPECT_GT(changes[DirectionChange::None], 3000u);
+  EXPECT_GT(changes[DirectionChange::Kept], 100u);
+  EXPECT_GT(changes[DirectionChange::Jumped], 20u);
+}
+
+TEST(PenetrationTracker, FlipNowhereUnnamedInBodiesThatTurnAndDeform) {
+  Random random(2);
+  std::map<DirectionChange, std::size_t> changes;
+  for (const Mesh& mesh : bodies(random)) {
+    Story story{mesh.triangles, {}, {}};
+    Positions points;
+    for (int i = 0; i < 80; ++i) points.push_back(randomPoint(random, 0, 3));
+    const Vector3d axis = randomPoint(random, -1, 1).normalized();
+    for (int frame = 0; frame < 50; ++frame) {
+      const Eigen::Matrix3d rotation = Eigen::AngleAxisd(0.03 * frame, axis).toRotationMatrix();
+      Positions body = mesh.positions;
+      for (Vector3d& p : body) {
+        p.z() *= 1 + 0.2 * std::sin(0.2 * frame + p.x());
+        p = rotation * (p - Vector3d(1.5, 1.5, 1.5)) + Vector3d(1.5 + 0.02 * frame, 1.5, 1.5);
+      }
+      story.body.push_back(body);
+      story.points.push_back(points);
+    }
+    const Answers all = answers(settingsOf(Engine::Octree), story);
+    for (const auto& [change, count] : expectDefined(story, all).changes) changes[change] += count;
+    for (const Settings& settings :
+         {settingsOf(Engine::BruteForce), settingsOf(Engine::Octree, 2, OctreeUpdate::Rebuild),
+          settingsOf(Engine::Octree, 8)})
+      EXPECT_EQ(answers(settings, story), all);
+  }
+  EXPECT_GT(changes[DirectionChange::None], 3000u);
+  EXPECT_GT(changes[DirectionChange::Kept], 50u);
+  EXPECT_GT(changes[DirectionChange::Jumped], 10u);
+}
+
+/// A block pushed slowly through a slab, trembling: the way out is back where it came from until
+/// that is twice as far as on, then on; once for each vertex.
+TEST(PenetrationTracker, APushedBodyIsLetThroughOnce) {
+  Random random(3);
+  const Mesh slab = blocks(1, random, [](const auto&) { return true; }),
+             block = blocks(2, random, [](const auto&) { return true; });
+  Story story{slab.triangles, {}, {}};
+  for (int frame = 0; frame < 400; ++frame) {
+    Positions body = slab.positions, points = block.positions;
+    for (Vector3d& p : body) p = Vector3d(40 * p.x() - 20, 40 * p.y() - 20, p.z());
+    for (Vector3d& p : points)
+      p = 0.05 * p + Vector3d(1, 2, -0.15 + 0.003 * frame) + randomPoint(random, -0.004, 0.004);
+    story.body.push_back(body);
+    story.points.push_back(points);
+  }
+  const Answers all = answers(settingsOf(Engine::Octree), story);
+  const Tally tally = expectDefined(story, all);
+  EXPECT_LT(tally.largestTurn, 1e-9);
+  std::map<std::uint32_t, std::size_t> jumps;
+  for (std::size_t frame = 0; frame < all.size(); ++frame)
+    for (const TrackedVertex& f : all[frame]) {
+      const bool on = f.penetration.direction.z() > 0;
+      EXPECT_NEAR(std::abs(f.penetration.direction.z()), 1, 1e-12);
+      jumps[f.penetration.vertex] += f.change == DirectionChange::Jumped;
+      EXPECT_EQ(on, jumps[f.penetration.vertex] == 1);
+      if (f.change == DirectionChange::Jumped) {
+        EXPECT_NEAR(story.points[frame][f.penetration.vertex].z(), 2.0 / 3.0, 0.01);
+      }
+    }
+  EXPECT_EQ(jumps.size(), 27u);
+  for (const auto& [vertex, count] : jumps) EXPECT_EQ(count, 1u);
+}
+
+/// A body by a transform, its probes by the same: nothing changes but all turns.
+TEST(PenetrationTracker, TurnWithTheBody) {
+  Random random(4);
+  const Mesh mesh = blocks(3, random, [](const auto& c) { return c[2] == 0 || c[0] == 0; });
+  Positions points;
+  for (int i = 0; i < 100; ++i) points.push_back(randomPoint(random, 0, 3));
+  OctreeBasedCD detection(settingsOf(Engine::Octree));
+  const GeometryId body = detection.addTriangleMesh(mesh.positions, mesh.triangles),
+                   probes = detection.addPointSet(points);
+  PenetrationTracker tracker(probes, body);
+  std::vector<TrackedVertex> first;
+  for (int frame = 0; frame < 30; ++frame) {
+    const Eigen::Matrix3d rotation =
+        Eigen::AngleAxisd(0.4 * frame, Vector3d(1, 1, 0).normalized()).toRotationMatrix();
+    const Vector3d away(0.5 * frame, -1.0 * frame, 0);
+    detection.setTransform(body, rotation, away);
+    detection.setTransform(probes, rotation, away);
+    const auto found = tracker.update(detection.queries());
+    if (frame == 0) first.assign(found.begin(), found.end());
+    ASSERT_EQ(found.size(), first.size());
+    EXPECT_GT(found.size(), 30u);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      EXPECT_EQ(found[i].change, frame == 0 ? DirectionChange::Entered : DirectionChange::None);
+      EXPECT_LT((found[i].penetration.direction - rotation * first[i].penetration.direction).norm(),
+                1e-9);
+    }
+    detection.advance();
+  }
+}
+
+TEST(PenetrationTracker, StartAnewWithTopology) {
+  Random random(5);
+  const Mesh mesh = sphere(6, 8, {0, 0, 0}, 1);
+  const Positions points{{0.5, 0, 0}, {0, 0, 5}};
+  OctreeBasedCD detection(settingsOf(Engine::Octree));
+  const GeometryId body = detection.addTriangleMesh(mesh.positions, mesh.triangles),
+                   probes = detection.addPointSet(points), others = detection.addPointSet(points);
+  std::map<GeometryId, PenetrationTracker> trackers;
+  for (const GeometryId vertices : {probes, others})
+    trackers.emplace(vertices, PenetrationTracker(vertices, body));
+  const auto change = [&](GeometryId vertices) {
+    const auto found = trackers.at(vertices).update(detection.queries());
+    EXPECT_EQ(found.size(), 1u);
+    detection.advance();
+    return found.front().change;
+  };
+  EXPECT_EQ(change(probes), DirectionChange::Entered);
+  EXPECT_EQ(change(probes), DirectionChange::None);
+  EXPECT_EQ(change(others), DirectionChange::Entered);  // each tracker for itself
+  EXPECT_EQ(change(probes), DirectionChange::None);
+  detection.setTriangles(body, mesh.positions, mesh.triangles);
+  EXPECT_EQ(change(probes), DirectionChange::Entered);
+  detection.setPositions(probes, Positions{{5, 0, 0}, {0, 0, 5}});
+  EXPECT_TRUE(trackers.at(probes).update(detection.queries()).empty());
+  detection.advance();
+  detection.setPositions(probes, points);
+  EXPECT_EQ(change(probes), DirectionChange::Entered);
+  EXPECT_EQ(change(probes), DirectionChange::None);
+  detection.removeGeometry(others);
+  EXPECT_EQ(change(probes), DirectionChange::None);
+  EXPECT_THROW(trackers.at(others).update(detection.queries()), Error);
+  PenetrationTracker itself(body, body);
+  EXPECT_THROW(itself.update(detection.queries()), Error);
+}
+
+}  // namespace
+}  // namespace palpate::testing

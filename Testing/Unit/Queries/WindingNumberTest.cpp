@@ -1,0 +1,275 @@
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/QueryCalls.h"
+#include "Common/PairRun.h"
+#include "Common/RandomMeshes.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <set>
+#include <vector>
+
+// findInsideVertices() of bodies that are not closed, against the sum of all solid angles.
+
+namespace palpate {
+namespace {
+
+using Eigen::Vector3d;
+using testing::Mesh;
+using testing::Random;
+using testing::randomPoint;
+using testing::settingsOf;
+using testing::sphere;
+using testing::uniform;
+using Positions = std::vector<Vector3d>;
+using Wide = Eigen::Matrix<long double, 3, 1>;
+
+/// The solid angle by the angles of the spherical triangle, in 64 bits.
+long double solidAngle(const Wide& a, const Wide& b, const Wide& c) {
+  const long double volume = a.dot(b.cross(c));
+  const auto corner = [&](const Wide& u, const Wide& v, const Wide& w) {
+    return std::atan2(u.norm() * std::abs(volume), u.cross(v).dot(u.cross(w)));
+  };
+  const long double excess =
+      corner(a, b, c) + corner(b, c, a) + corner(c, a, b) - std::numbers::pi_v<long double>;
+  return volume > 0 ? excess : volume < 0 ? -excess : 0;
+}
+
+double truth(const Mesh& body, const Vector3d& p) {
+  long double sum = 0;
+  for (const auto& [a, b, c] : body.triangles) {
+    const auto from = [&](std::uint32_t v) -> Wide {
+      return body.positions[v].cast<long double>() - p.cast<long double>();
+    };
+    sum += solidAngle(from(a), from(b), from(c));
+  }
+  return static_cast<double>(std::abs(sum) / (4 * std::numbers::pi_v<long double>));
+}
+
+std::vector<InsideVertex> find(const Positions& points, const Mesh& body,
+                               const InsideSettings& inside,
+                               const Settings& settings = settingsOf(Engine::Octree)) {
+  OctreeBasedCD detection(settings);
+  const GeometryId asked = detection.addPointSet(points),
+                   id = detection.addTriangleMesh(body.positions, body.triangles);
+  const auto found = testing::insideVertices(detection, asked, id, inside);
+  return {found.begin(), found.end()};
+}
+
+constexpr InsideSettings byNumber(double margin = 0) { return {InsideRule::WindingNumber, margin}; }
+
+Positions pointsAround(Random& random, std::size_t count, double half) {
+  Positions points(count);
+  for (Vector3d& p : points) p = randomPoint(random, -half, half);
+  return points;
+}
+
+/// Found, and decided, as the truth says, but where that is open to rounding; the same by brute
+/// force and any threads. Returns how many are found.
+std::size_t expectTrue(const Positions& points, const Mesh& body, double margin = 0) {
+  const std::vector<InsideVertex> found = find(points, body, byNumber(margin));
+  EXPECT_EQ(find(points, body, byNumber(margin), settingsOf(Engine::BruteForce)), found);
+  EXPECT_EQ(find(points, body, byNumber(margin), settingsOf(Engine::Octree, 3)), found);
+  auto next = found.begin();
+  for (std::uint32_t v = 0; v < points.size(); ++v) {
+    const bool isFound = next != found.end() && next->vertex == v;
+    const double number = truth(body, points[v]), off = std::abs(number - 0.5) - margin;
+    if (std::abs(number - (0.5 - margin)) > 1e-9) {
+      EXPECT_EQ(isFound, number > 0.5 - margin) << v << ": " << number;
+    }
+    if (isFound && std::abs(off) > 1e-9) {
+      EXPECT_EQ(next->decided, off > 0) << v << ": " << number;
+    }
+    next += isFound;
+  }
+  EXPECT_EQ(next, found.end());
+  return found.size();
+}
+
+/// A sphere of radius 1 with bumps.
+Mesh lump(Random& random, std::uint32_t rings, std::uint32_t segments) {
+  Mesh mesh = sphere(rings, segments, {0, 0, 0}, 1);
+  for (Vector3d& p : mesh.positions) p *= uniform(random, 0.85, 1);
+  return mesh;
+}
+
+/// With another one turned inside out.
+void add(Mesh& mesh, const Mesh& hollow) {
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  mesh.positions.insert(mesh.positions.end(), hollow.positions.begin(), hollow.positions.end());
+  for (const auto& [a, b, c] : hollow.triangles)
+    mesh.triangles.push_back({first + a, first + c, first + b});
+}
+
+TEST(WindingNumber, OfClosedBodiesIsAsDecidedExactly) {
+  Random random(1);
+  for (int run = 0; run < 6; ++run) {
+    Mesh body = lump(random, 12, 16);
+    if (run % 3 == 1)  // with a hollow
+      add(body, sphere(9, 12, {0.1, 0, 0}, 0.5));
+    if (run % 3 == 2)
+      for (Triangle& t : body.triangles) std::swap(t[0], t[1]);
+    Positions points = pointsAround(random, 200, 1.1);
+    points.insert(points.end(), body.positions.begin(), body.positions.end());  // on it
+    for (const Vector3d& p : body.positions) points.push_back(0.999 * p);
+    const double scale = run % 2 ? 1e-3 : 1, far = run % 2 ? 1e3 : 0;
+    for (Positions* positions : {&points, &body.positions})
+      for (Vector3d& p : *positions) p = scale * p + Vector3d(far, -far, far);
+    const std::vector<InsideVertex> exact = find(points, body, {});
+    EXPECT_EQ(find(points, body, byNumber()), exact);
+    EXPECT_EQ(find(points, body, byNumber(0.4)), exact);
+    EXPECT_EQ(find(points, body, byNumber(), settingsOf(Engine::BruteForce)), exact);
+    EXPECT_GT(exact.size(), 50u);
+  }
+}
+
+TEST(WindingNumber, SpansHolesAsTheyGrow) {
+  Random random(2);
+  const Mesh whole = lump(random, 24, 30);
+  const Positions points = pointsAround(random, 150, 1.1);
+  std::size_t before = points.size();
+  for (const double height : {0.8, 0.7, 0.5, 0.0, -0.5, -0.8}) {
+    Mesh open = whole;
+    std::erase_if(open.triangles, [&](const Triangle& t) {
+      return std::all_of(t.begin(), t.end(),
+                         [&](std::uint32_t v) { return open.positions[v].z() > height; });
+    });
+    ASSERT_LT(open.triangles.size(), whole.triangles.size());
+    const std::size_t found = expectTrue(points, open);
+    EXPECT_LE(found, before);
+    before = found;
+    const std::vector<InsideVertex> deep = find({{0, 0, height - 0.5}}, open, byNumber());
+    EXPECT_EQ(deep.size(), height >= 0 ? 1u : 0u) << height;
+  }
+}
+
+TEST(WindingNumber, OfDoubledAndFlippedTriangles) {
+  Random random(3);
+  const Positions points = pointsAround(random, 150, 1.1);
+  Mesh doubled = lump(random, 20, 24), flipped = doubled;
+  for (std::size_t t = 0; t < 500; t += 7) {
+    doubled.triangles.push_back(doubled.triangles[t]);
+    if (t % 3 == 0) std::swap(flipped.triangles[t][0], flipped.triangles[t][2]);
+  }
+  EXPECT_GT(expectTrue(points, doubled), 30u);
+  EXPECT_GT(expectTrue(points, flipped), 30u);
+  EXPECT_GT(expectTrue(points, flipped, 0.2), 30u);
+}
+
+TEST(WindingNumber, OfASoupOfASpheresTriangles) {
+  Random random(4);
+  const Mesh whole = sphere(24, 30, {0, 0, 0}, 1);
+  Mesh soup;
+  for (const Triangle& t : whole.triangles) {
+    const Vector3d off = randomPoint(random, -0.02, 0.02);
+    for (const std::uint32_t v : t) soup.positions.push_back(whole.positions[v] + off);
+    const auto last = static_cast<std::uint32_t>(soup.positions.size());
+    soup.triangles.push_back({last - 3, last - 2, last - 1});
+  }
+  EXPECT_GT(findMeshDefects(soup.triangles).open.size(), 1000u);
+  const Positions points = pointsAround(random, 200, 1.2);
+  expectTrue(points, soup);
+  expectTrue(points, soup, 0.25);
+  std::set<std::uint32_t> found;
+  for (const InsideVertex& v : find(points, soup, byNumber())) found.insert(v.vertex);
+  for (std::uint32_t v = 0; v < points.size(); ++v)
+    if (std::abs(points[v].norm() - 1) > 0.1) {
+      EXPECT_EQ(found.contains(v), points[v].norm() < 1) << points[v].norm();
+    }
+}
+
+/// From the middle of an open face a cube takes exactly half of all directions.
+TEST(WindingNumber, OfOneHalfIsNotDecided) {
+  Mesh cube;
+  for (int v = 0; v < 8; ++v) cube.positions.push_back(Vector3d(v & 1, v >> 1 & 1, v >> 2));
+  const auto face = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d) {
+    cube.triangles.push_back({a, b, c});
+    cube.triangles.push_back({a, c, d});
+  };
+  face(0, 2, 3, 1), face(0, 1, 5, 4), face(1, 3, 7, 5), face(3, 2, 6, 7), face(2, 0, 4, 6);
+  const Positions points{
+      {0.5, 0.5, 1}, {0.5, 0.5, 1 - 1e-6}, {0.5, 0.5, 1 + 1e-6}, {0.5, 0.5, 0.9}};
+  const std::vector<InsideVertex> found = find(points, cube, byNumber());
+  ASSERT_EQ(found.size(), 3u);
+  for (const InsideVertex& v : found) EXPECT_EQ(v.decided, v.vertex != 0);
+  EXPECT_EQ(found[0].depth, 0.5);
+  const std::vector<InsideVertex> within = find(points, cube, byNumber(0.01));
+  ASSERT_EQ(within.size(), 4u);
+  for (const InsideVertex& v : within) EXPECT_EQ(v.decided, v.vertex == 3);
+}
+
+TEST(WindingNumber, DoesNotDependOnTheOctree) {
+  Random random(5);
+  Mesh body = lump(random, 30, 40);
+  body.triangles.resize(body.triangles.size() - 200);
+  const Positions points = pointsAround(random, 300, 1.2);
+  OctreeBasedCD detection(settingsOf(Engine::Octree));
+  const GeometryId asked = detection.addPointSet(points),
+                   id = detection.addTriangleMesh(body.positions, body.triangles);
+  detection.update();
+  for (int frame = 0; frame < 3; ++frame) {
+    for (Vector3d& p : body.positions) p += randomPoint(random, -0.02, 0.02);
+    detection.setPositions(id, body.positions);
+    const auto found = testing::insideVertices(detection, asked, id, byNumber(0.1));
+    EXPECT_EQ(std::vector<InsideVertex>(found.begin(), found.end()),
+              find(points, body, byNumber(0.1)));
+  }
+  const double angle = 0.7;
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, Vector3d(1, 2, 3).normalized()).matrix();
+  detection.setTransform(id, turn, {0.1, 0.2, 0.3});
+  Mesh moved = body;
+  for (Vector3d& p : moved.positions)
+    p = (turn.col(0) * p[0] + turn.col(1) * p[1]) + turn.col(2) * p[2] + Vector3d(0.1, 0.2, 0.3);
+  const auto found = testing::insideVertices(detection, asked, id, byNumber());
+  EXPECT_EQ(std::vector<InsideVertex>(found.begin(), found.end()), find(points, moved, byNumber()));
+}
+
+TEST(WindingNumber, OfAnySizeAndOfWhatHasNoArea) {
+  Random random(6);
+  for (const double scale : {0x1p-1000, 0x1p-400, 0x1p-100, 0x1p100, 0x1p300}) {
+    Mesh body = lump(random, 8, 10);
+    const Positions points = pointsAround(random, 60, 1.1);
+    const std::vector<InsideVertex> truth = find(points, body, byNumber());
+    Positions scaled = points;
+    body.triangles.push_back({3, 3, 3});
+    body.triangles.push_back({3, 9, 3});
+    for (Positions* positions : {&scaled, &body.positions})
+      for (Vector3d& p : *positions) p *= scale;
+    const std::vector<InsideVertex> found = find(scaled, body, byNumber());
+    ASSERT_EQ(found.size(), truth.size());
+    for (std::size_t i = 0; i < truth.size(); ++i) EXPECT_EQ(found[i].vertex, truth[i].vertex);
+  }
+  Mesh flat;
+  flat.positions = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}};
+  flat.triangles = {{0, 1, 2}};
+  EXPECT_TRUE(find({{0, 1, 0}, {3, 0, 0}, {0.5, 0, 0}}, flat, byNumber()).empty());
+}
+
+TEST(WindingNumber, RefusesWhatItCannot) {
+  const Mesh body = sphere(4, 5, {0, 0, 0}, 1);
+  OctreeBasedCD detection;
+  const GeometryId id = detection.addTriangleMesh(body.positions, body.triangles),
+                   points = detection.addPointSet(body.positions);
+  const auto refused = [&](GeometryId asked, GeometryId around, const InsideSettings& settings) {
+    try {
+      testing::insideVertices(detection, asked, around, settings);
+    } catch (const Error& error) {
+      return error.code();
+    }
+    ADD_FAILURE() << "accepted";
+    return ErrorCode::UnknownGeometry;
+  };
+  for (const double margin : {-0.1, 0.5, std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_EQ(refused(points, id, byNumber(margin)), ErrorCode::InvalidSettings);
+  EXPECT_EQ(refused(points, id, {static_cast<InsideRule>(7), 0}), ErrorCode::InvalidSettings);
+  EXPECT_EQ(refused(id, points, byNumber()), ErrorCode::NotClosed);
+  EXPECT_EQ(refused(id, id, byNumber()), ErrorCode::InvalidSettings);
+}
+
+}  // namespace
+}  // namespace palpate
