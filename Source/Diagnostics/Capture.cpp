@@ -176,10 +176,7 @@ void listOf(File& file, auto& list) {
 
 template <class File, class SettingsType>
 void contactsOf(File& file, SettingsType& settings, int version) {
-  if (version >= 9) {
-    file.word(settings.contacts, kContacts);
-    return fieldOf(file, settings.earliestTimeOnly);
-  }
+  if (version >= 9) return file.word(settings.contacts, kContacts);
   if constexpr (kReads<File>) {
     ContactsBefore9 contacts{};
     file.word(contacts, kContactsBefore9);
@@ -200,6 +197,7 @@ void pairLine(File& file, PairType& pair, int version) {
   if (version >= 3) file.real(pair.settings.restDistance);
   if (version >= 4) fieldOf(file, pair.predicate);
   if (version >= 6) file.real(pair.settings.timeTolerance);
+  if (version >= 9) fieldOf(file, pair.settings.earliestTimeOnly);
 }
 
 template <class File, class FilterType>

@@ -1,5 +1,10 @@
 #include "Octree/BoxMap.h"
 
+#include "Math/Box.h"
+
+#include <algorithm>
+#include <cmath>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Octree/BoxMap.cpp"
 #include "Core/Simd.h"
@@ -19,6 +24,24 @@ HWY_AFTER_NAMESPACE();
 namespace palpate {
 
 HWY_EXPORT(mapKernel);
+
+void setShift(std::array<float, 4>& lower, std::array<float, 4>& upper,
+              const std::array<double, 3>& offset, double thickness) {
+  constexpr double kMost = 0x1p125;  // boxes of kLargestFloat stay finite
+  const auto clamped = [&](double v) { return std::min(std::max(v, -kMost), kMost); };
+  for (int k = 0; k < 3; ++k) {
+    const double error = (std::abs(offset[k]) + thickness) * OutwardRounding::kRelative;
+    lower[k] = static_cast<float>(clamped(offset[k] - thickness - error));
+    upper[k] = static_cast<float>(clamped(offset[k] + thickness + error));
+  }
+}
+
+void setEnd(BoxMap::End& end, const std::array<std::array<double, 3>, 3>& matrix,
+            const std::array<double, 3>& offset, double thickness, double error) {
+  for (int k = 0; k < 3; ++k)
+    for (int j = 0; j < 3; ++j) end.matrix[k][j] = static_cast<float>(matrix[k][j]);
+  setShift(end.shiftLower, end.shiftUpper, offset, thickness + error);
+}
 
 FloatBox BoxMap::operator()(const FloatBox& box) const {
   if (count == 0 || box.empty()) return box;

@@ -6,6 +6,15 @@
 
 namespace palpate {
 
+/// Shifts for the bounds of boxes between frames whose origins are `offset` apart (in units of the
+/// frame), and a thickness.
+///
+/// Rounding: a bound is moved by fl(lower + shift) and then outward by OutwardRounding. The shift's
+/// own error is at most 2^-24 of |offset| + thickness, which is added to it here; the sum's is at
+/// most 2^-24 of the sum, which the outward step covers.
+void setShift(std::array<float, 4>& lower, std::array<float, 4>& upper,
+              const std::array<double, 3>& offset, double thickness);
+
 /// Brings boxes of one float frame into another: turned and shifted; by two maps, of the ends of a
 /// step, to the box of both.
 ///
@@ -27,5 +36,9 @@ struct BoxMap {
   /// Empty boxes stay. BoxLanes::turned() has the arithmetic.
   FloatBox operator()(const FloatBox&) const;
 };
+
+/// One end's map. error: of the offset and of all positions that are in the boxes.
+void setEnd(BoxMap::End&, const std::array<std::array<double, 3>, 3>& matrix,
+            const std::array<double, 3>& offset, double thickness, double error);
 
 }  // namespace palpate

@@ -384,26 +384,8 @@ namespace palpate {
 HWY_EXPORT(startPairsKernel);
 HWY_EXPORT(traverseKernel);
 
-static void setShift(std::array<float, 4>& lower, std::array<float, 4>& upper,
-                     const std::array<double, 3>& offset, double thickness) {
-  constexpr double kMost = 0x1p125;  // boxes of kLargestFloat stay finite
-  const auto clamped = [&](double v) { return std::min(std::max(v, -kMost), kMost); };
-  for (int k = 0; k < 3; ++k) {
-    const double error = (std::abs(offset[k]) + thickness) * OutwardRounding::kRelative;
-    lower[k] = static_cast<float>(clamped(offset[k] - thickness - error));
-    upper[k] = static_cast<float>(clamped(offset[k] + thickness + error));
-  }
-}
-
 void setShift(TreePair& trees, const std::array<double, 3>& offset, double thickness) {
   setShift(trees.shiftLower, trees.shiftUpper, offset, thickness);
-}
-
-void setEnd(BoxMap::End& end, const std::array<std::array<double, 3>, 3>& matrix,
-            const std::array<double, 3>& offset, double thickness, double error) {
-  for (int k = 0; k < 3; ++k)
-    for (int j = 0; j < 3; ++j) end.matrix[k][j] = static_cast<float>(matrix[k][j]);
-  setShift(end.shiftLower, end.shiftUpper, offset, thickness + error);
 }
 
 void startPairs(const TreePair& trees, std::size_t wanted, TraversalStack& stack) {

@@ -91,16 +91,9 @@ struct TreePair {
   }
 };
 
-/// Shifts for frames whose origins are `offset` apart (a's minus b's, in units of the frame), and a
-/// thickness.
-///
-/// Rounding: a bound of a is moved by fl(lower + shift) and then outward by OutwardRounding. The
-/// shift's own error is at most 2^-24 of |offset| + thickness, which is added to it here; the sum's
-/// is at most 2^-24 of the sum, which the outward step covers.
+/// Shifts of a's boxes for frames whose origins are `offset` apart (a's minus b's, in units of the
+/// frame), and a thickness.
 void setShift(TreePair&, const std::array<double, 3>& offset, double thickness);
-/// The same after a turn; error: of the offset and of all positions that are in the boxes.
-void setEnd(BoxMap::End&, const std::array<std::array<double, 3>, 3>& matrix,
-            const std::array<double, 3>& offset, double thickness, double error);
 
 /// Scratch of one traversal, which remembers its peak. Each traversal overwrites it first, so one
 /// that an exception ended leaves nothing to the next.

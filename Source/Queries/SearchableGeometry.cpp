@@ -3,7 +3,6 @@
 #include <palpate/Error.h>
 
 #include "Math/Tolerances.h"
-#include "Octree/Traversal.h"
 
 #include <array>
 #include <cstddef>

@@ -241,7 +241,7 @@ TEST(AutoKinds, OthersRefuseATolerance) {
         ADD_FAILURE() << name << " accepts a tolerance";
       } catch (const Error& error) {
         EXPECT_EQ(error.code(), ErrorCode::InvalidSettings);
-        EXPECT_NE(std::string(error.what()).find("tolerance is "), std::string::npos);
+        EXPECT_NE(std::string(error.what()).find("motionTolerance is "), std::string::npos);
         EXPECT_NE(std::string(error.what()).find("Method::" + name), std::string::npos);
       }
       EXPECT_TRUE(collisions.pairs().empty());

@@ -205,7 +205,7 @@ void expectPossible(Call call) {
          {ErrorCode::InvalidSettings, {"Proximity", "thickness"}});
   for (Method method : {Method::Auto, Method::Proximity, Method::Intersection})
     refuse({.method = method, .thickness = 1, .earliestTimeOnly = true},
-           {ErrorCode::InvalidSettings, {"Earliest", "Continuous"}});
+           {ErrorCode::InvalidSettings, {"earliestTimeOnly", "Continuous"}});
   for (const double bad : {0.0, 0x1p-51, 1.5, -1.0, kNan})
     refuse({.timeTolerance = bad}, {ErrorCode::InvalidSettings, {"timeTolerance", "2^-50"}});
   refuse({.method = static_cast<Method>(99), .thickness = 1}, {ErrorCode::InvalidSettings, {}});

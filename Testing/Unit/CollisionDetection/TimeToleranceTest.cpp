@@ -183,12 +183,11 @@ TEST(Earliest, OfManyTrianglesIsThatOfAllContacts) {
           const GeometryId first = detection.addTriangleMesh(a.positions, a.triangles),
                            second =
                                self ? first : detection.addTriangleMesh(b.positions, b.triangles);
-          detection.addCollisionPair(
-              first, second,
-              {.method = Method::Continuous,
-               .thickness = thickness,
-               .contacts = Contacts::All,
-               .earliestTimeOnly = earliestTimeOnly});
+          detection.addCollisionPair(first, second,
+                                     {.method = Method::Continuous,
+                                      .thickness = thickness,
+                                      .contacts = Contacts::All,
+                                      .earliestTimeOnly = earliestTimeOnly});
           detection.setPositions(first, a.positions, nowA);
           if (!self) detection.setPositions(second, b.positions, nowB);
           detection.detectCollision();

@@ -220,10 +220,10 @@ TEST_F(Capture, RefusesWhatIsWrongByName) {
     write(text.replace(place, from.size(), to));
     expectRefused(reason);
   };
-  expectRefusedWith("palpate-capture 8", "solid 3", "it is not a capture");
-  expectRefusedWith("palpate-capture 8", "palpate-capture 9",
-                    "it is of version 9; versions up to 8");
-  expectRefusedWith("palpate-capture 8", "palpate-capture x", "line 1: \"x\" is not an integer");
+  expectRefusedWith("palpate-capture 9", "solid 3", "it is not a capture");
+  expectRefusedWith("palpate-capture 9", "palpate-capture 10",
+                    "it is of version 10; versions up to 9");
+  expectRefusedWith("palpate-capture 9", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 99999999999\n", "is not an integer in range");
@@ -254,6 +254,12 @@ TEST_F(Capture, ReadsEarlierVersions) {
     write(text);
     return readCapture(file());
   };
+  replaceAll(" 1.0c6f7a0b5ed8dp-20 0\n", " 1.0c6f7a0b5ed8dp-20\n");  // earliestTimeOnly
+  const std::string version8 = text;
+  replaceAll(" Distinct ", " Earliest ");
+  EXPECT_TRUE(asVersion(8).pairs[0].settings.earliestTimeOnly);
+  text = version8;
+  EXPECT_FALSE(asVersion(8).pairs[0].settings.earliestTimeOnly);
   replaceAll(" Both 0 0 0\n", " Both 0 0\n");  // tetrahedra
   replaceAll(" 1.0c6f7a0b5ed8dp-20\n", "\n");  // timeTolerance
   EXPECT_EQ(asVersion(5).pairs[0].settings.timeTolerance, PairSettings().timeTolerance);
