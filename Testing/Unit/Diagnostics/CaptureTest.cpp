@@ -256,10 +256,12 @@ TEST_F(Capture, ReadsEarlierVersions) {
   };
   replaceAll(" 1.0c6f7a0b5ed8dp-20 0\n", " 1.0c6f7a0b5ed8dp-20\n");  // earliestTimeOnly
   const std::string version8 = text;
-  replaceAll(" Distinct ", " Earliest ");
+  EXPECT_FALSE(asVersion(8).pairs[0].settings.earliestTimeOnly);
+  text = version8;
+  const std::string pair = "pair 0 1 Auto Proximity 1.999999999999ap-4 ";
+  replaceAll(pair + "Distinct", "pair 0 1 Continuous Continuous 1.999999999999ap-4 Earliest");
   EXPECT_TRUE(asVersion(8).pairs[0].settings.earliestTimeOnly);
   text = version8;
-  EXPECT_FALSE(asVersion(8).pairs[0].settings.earliestTimeOnly);
   replaceAll(" Both 0 0 0\n", " Both 0 0\n");  // tetrahedra
   replaceAll(" 1.0c6f7a0b5ed8dp-20\n", "\n");  // timeTolerance
   EXPECT_EQ(asVersion(5).pairs[0].settings.timeTolerance, PairSettings().timeTolerance);
