@@ -88,7 +88,7 @@ constexpr double kSideError = 0x1p-46;
 /// ever further, so any value will do.
 constexpr double kFirstStepBack = 0x1p-44;
 
-// ---- Shapes (Shapes/Shape.cpp, CollisionDetection/ShapeQuery.cpp) ----
+// ---- Shapes (Shapes/Shape.cpp, Queries/ElementsNearShape.cpp) ----
 
 /// Of an edge: how closely its point nearest to a shape is bracketed, and how near to an end it is
 /// that end. The least distance varies by the square of that.
@@ -113,7 +113,7 @@ constexpr double kOrthonormal = 1e-9;
 /// some twenty roundings.
 constexpr double kShapeBoundError = 0x1p-46;
 
-// ---- The nearest point of a surface (CollisionDetection/Containment.cpp) ----
+// ---- The nearest point of a surface (Queries/Containment.cpp) ----
 
 /// Relative, of squared distances and of products of lengths: a dozen roundings each, and above
 /// that.
@@ -122,7 +122,7 @@ constexpr double kNearestError = 0x1p-40;
 /// by, under 2^-48, and above that.
 constexpr double kNearestSlack = 0x1p-45;
 
-// ---- Winding numbers (SolidAngle.h, CollisionDetection/WindingNumber.cpp) ----
+// ---- Winding numbers (SolidAngle.h, Queries/WindingNumber.cpp) ----
 
 /// Of both parts of a triangle's half solid angle, from unit vectors within 3 u each: 9 u and the
 /// products' 6 u, and 3 (6 u + 4 u) and the sums' 8 u; with the angle's own rounding.
@@ -146,7 +146,7 @@ constexpr double kLargestPlaced = 0x1p1000;
 /// Of the squared sum of two unit vectors: below it they are opposite but for rounding.
 constexpr double kOppositeSquare = 0x1p-80;
 
-// ---- Ways out of bodies (CollisionDetection/FollowedExits.cpp) ----
+// ---- Penetration directions (Queries/PenetrationTracker.cpp) ----
 
 /// Of a triangle's edge, normal and what is across both from being orthonormal: beyond it the
 /// normal is no more than rounding. Any value.

@@ -20,13 +20,15 @@ struct PointQueryStack {
   Buffer<std::uint32_t> found;  ///< of findOverlapping()
 };
 
-/// f(begin, end) for ranges of the octree's order that hold every element whose box `overlaps`,
-/// as do all boxes around it. This and all queries below throw if the octree is not built.
-template <class Overlaps, class F>
-void forEachOverlapping(const Octree& octree, Overlaps&& overlaps, PointQueryStack& stack, F&& f) {
+/// Descends from the root into the nodes that `enter(node)` accepts, which is asked for each node
+/// that is not empty, a parent before its children; f(begin, end): the ranges of the octree's order
+/// that accepted nodes hold themselves. This and all queries below throw if the octree is not
+/// built.
+template <class Enter, class F>
+void forEachEntered(const Octree& octree, Enter&& enter, PointQueryStack& stack, F&& f) {
   octree.requireBuilt();
   stack.entries.clear();
-  if (overlaps(octree.box(0))) stack.entries.push_back({0, 0});
+  if (enter(OctreeNode{0})) stack.entries.push_back({0, 0});
   while (!stack.entries.empty()) {
     const OctreeNode node = stack.entries.back().node;
     stack.entries.pop_back();
@@ -34,8 +36,17 @@ void forEachOverlapping(const Octree& octree, Overlaps&& overlaps, PointQuerySta
     if (begin < end) f(begin, end);
     const OctreeNode first = octree.firstChild(node);
     for (unsigned slot = 0; first != 0 && slot < 8; ++slot)
-      if (overlaps(octree.box(first + slot))) stack.entries.push_back({0, first + slot});
+      if (!octree.isEmpty(first + slot) && enter(first + slot))
+        stack.entries.push_back({0, first + slot});
   }
+}
+
+/// f(begin, end) for ranges of the octree's order that hold every element whose box `overlaps`, as
+/// do all boxes around it.
+template <class Overlaps, class F>
+void forEachOverlapping(const Octree& octree, Overlaps&& overlaps, PointQueryStack& stack, F&& f) {
+  forEachEntered(
+      octree, [&](OctreeNode node) { return overlaps(octree.box(node)); }, stack, f);
 }
 
 /// The elements whose boxes, as the map places them, overlap `box`, by their places in the

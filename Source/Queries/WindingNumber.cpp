@@ -128,25 +128,19 @@ WindingNumbers::Answer WindingNumbers::ask(const SearchableGeometry& body, const
   for (const double far : kFar) {
     if (bruteForce) break;
     SeenShare ofFar, ofNear;
-    stack.entries.assign(1, {0, 0});
-    while (!stack.entries.empty()) {
-      const OctreeNode node = stack.entries.back().node;
-      stack.entries.pop_back();
+    const auto isNear = [&](OctreeNode node) {
       const Cluster& cluster = m_clusters[node];
       const double distance = (cluster.centre - p).norm();
-      if (distance > far * cluster.radius) {
-        ofFar.add(share(cluster, p, distance));
-        continue;
-      }
-      const auto [begin, end] = octree.ownRange(node);
+      if (!(distance > far * cluster.radius)) return true;
+      ofFar.add(share(cluster, p, distance));
+      return false;
+    };
+    forEachEntered(octree, isNear, stack, [&](std::uint32_t begin, std::uint32_t end) {
       for (std::uint32_t i = begin; i < end; ++i) {
         const auto& [a, b, c] = body.tree.ordered()[i];
         ofNear.add(seenShare(p, now[a], now[b], now[c]));
       }
-      const OctreeNode first = octree.firstChild(node);
-      for (unsigned slot = 0; first != 0 && slot < 8; ++slot)
-        if (!octree.isEmpty(first + slot)) stack.entries.push_back({0, first + slot});
-    }
+    });
     // Only where the sum of all, within its own bound, is sure to decide the same.
     const SeenShare sum{
         ofFar.value + ofNear.value,
