@@ -141,8 +141,7 @@ void rowsOf(Report& report, const Reference& reference, const Workload& workload
     // All of the narrow phase, so that listing the candidates counts too.
     const double nanoseconds =
         1e6 * medians.narrow[i] / static_cast<double>(featureCandidates(workload));
-    if (kind.contacts == Contacts::All && kind.thickness == 0)
-      row("ns a feature candidate", nanoseconds);
+    if (!kind.earliestTimeOnly && kind.thickness == 0) row("ns a feature candidate", nanoseconds);
     const bool earliest = kind.earliestTimeOnly;
     char found[32];
     std::snprintf(found, sizeof found, earliest ? "%.6f" : "%.0f", medians.found[i]);
