@@ -1,0 +1,53 @@
+#!/bin/bash
+# CMake/docs.sh: builds the documentation site into build/docs/html, with packages of Debian and without network. Fails
+# on any warning: a broken link between pages, a page that no table of contents names, a name that Doxygen cannot resolve.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+CMake/packages.sh docs
+out=$PWD/build/docs
+rm -rf "$out"
+mkdir -p "$out/source" "$out/doxygen"
+
+# The pages keep their places, so that their links are the same here and in the repository.
+find README.md CHANGELOG.md CONTRIBUTING.md Docs Data Examples -name '*.md' 2>/dev/null | while read -r page; do
+  mkdir -p "$out/source/$(dirname "$page")"
+  cp "$page" "$out/source/$page"
+done
+find Docs -name '*.png' -o -name '*.svg' -o -name '*.csv' -o -name '*.webp' | while read -r file; do
+  cp --parents "$file" "$out/source"
+done
+mv "$out/source/Docs/Site/index.md" "$out/source/index.md"
+
+# One page of the reference for each public header.
+mkdir "$out/source/reference"
+{
+  printf '# C++ API\n\nOne page for each public header.\n\n```{toctree}\n:maxdepth: 1\n'
+  (cd Source && find Public/palpate Adapters/*/Public/palpate -name '*.h' | sort) | while read -r header; do
+    name=$(basename "$header" .h)
+    [[ $name == Palpate || $name == Export ]] && continue
+    echo "$name"
+    printf '# `<palpate/%s>`\n\n```{eval-rst}\n.. doxygenfile:: %s\n   :project: palpate\n```\n' \
+      "${header#*Public/palpate/}" "$(basename "$header")" >"$out/source/reference/$name.md"
+  done
+  printf '```\n'
+} >"$out/source/reference/index.md"
+# The page of the notes lists the notes.
+{
+  printf '# Laboratory notes\n\nHow figures came about, what did not pay, and what bounds a figure. Users need none of it.\n\n'
+  printf '```{toctree}\n:maxdepth: 1\n'
+  (cd Docs/Notes && ls *.md | sed 's/\.md$//')
+  printf '```\n'
+} >"$out/source/Docs/Notes/index.md"
+
+PALPATE_VERSION=$(sed -nE 's/^project\(Palpate VERSION ([0-9.]+).*/\1/p' CMakeLists.txt)
+export PALPATE_VERSION PALPATE_DOXYGEN_XML=$out/doxygen/xml
+{
+  cat Docs/Site/Doxyfile
+  echo "INPUT = Source/Public/palpate Source/Adapters/Vtk/Public/palpate Source/Adapters/Fcl/Public/palpate"
+  echo "OUTPUT_DIRECTORY = $out/doxygen"
+  echo "INPUT_FILTER = \"python3 Docs/Site/filter.py\""
+} >"$out/Doxyfile"
+doxygen "$out/Doxyfile"
+sphinx-build -W --keep-going -q -b html -c Docs/Site "$out/source" "$out/html"
+echo "The documentation is in build/docs/html/index.html."
