@@ -19,19 +19,6 @@ find Docs -name '*.png' -o -name '*.svg' -o -name '*.csv' -o -name '*.webp' | wh
 done
 mv "$out/source/Docs/Site/index.md" "$out/source/index.md"
 
-# One page of the reference for each public header.
-mkdir "$out/source/reference"
-{
-  printf '# C++ API\n\nOne page for each public header.\n\n```{toctree}\n:maxdepth: 1\n'
-  (cd Source && find Public/palpate Adapters/*/Public/palpate -name '*.h' | sort) | while read -r header; do
-    name=$(basename "$header" .h)
-    [[ $name == Palpate || $name == Export ]] && continue
-    echo "$name"
-    printf '# `<palpate/%s>`\n\n```{eval-rst}\n.. doxygenfile:: %s\n   :project: palpate\n```\n' \
-      "${header#*Public/palpate/}" "$(basename "$header")" >"$out/source/reference/$name.md"
-  done
-  printf '```\n'
-} >"$out/source/reference/index.md"
 # The page of the notes lists the notes.
 {
   printf '# Laboratory notes\n\nHow figures came about, what did not pay, and what bounds a figure. Users need none of it.\n\n'
@@ -49,5 +36,7 @@ export PALPATE_VERSION PALPATE_DOXYGEN_XML=$out/doxygen/xml
   echo "INPUT_FILTER = \"python3 Docs/Site/filter.py\""
 } >"$out/Doxyfile"
 doxygen "$out/Doxyfile"
+mkdir "$out/source/reference"
+find Source -path '*Public/palpate/*.h' | sort | xargs python3 Docs/Site/reference.py "$out/doxygen/xml" "$out/source/reference"
 sphinx-build -W --keep-going -q -b html -c Docs/Site "$out/source" "$out/html"
 echo "The documentation is in build/docs/html/index.html."
