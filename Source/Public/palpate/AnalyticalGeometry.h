@@ -51,10 +51,10 @@ struct Cylinder {
 /// points in one plane a plate, on one line a segment, at one place a point: exactly so, points
 /// near a plane span a thin body.
 /// Errors   more than kMostHullPoints points are refused.
-/// Cost     when added, n log n for n points, expected, whatever their order: 1,000, 8,000 and 64,000
-///          points of a sphere take 3, 27 and 340 ms of one core of an Intel Xeon. A distance asks
-///          each triangle of the hull, some of them several times: 0.06, 0.5 and 4 ms for a point
-///          beside these hulls. Points inside cost nothing after that.
+/// Cost     when added, n log n for n points, expected, whatever their order: 1,000, 8,000 and
+///          64,000 points of a sphere take 3, 27 and 340 ms of one core of an Intel Xeon. A
+///          distance asks each triangle of the hull, some of them several times: 0.06, 0.5 and 4 ms
+///          for a point beside these hulls. Points inside cost nothing after that.
 struct ConvexHull {
   std::vector<Eigen::Vector3d> points;  ///< finite
 };

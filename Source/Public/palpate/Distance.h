@@ -35,21 +35,21 @@ struct VertexTriangleDistance {
 /// Closest point on triangle (a, b, c) to a vertex.
 ///
 /// Shapes   p, a, b, c: one position each. Any winding, any finite doubles.
-/// Returns  distance, difference and closest point within 8 ulp of the largest coordinate difference among
-///          the four positions, the normal within that over the distance; the feature as exact
-///          arithmetic decides it. At distance zero the normal is the triangle's winding normal; of
-///          a triangle without area the coordinate axis along which it extends least, x before y
-///          before z.
-/// Laws     (1) permuting the corners, mirroring an axis and scaling by powers of two give the same bits,
-///          mapped (where corners are mirror images of each other, weights may differ by 2^-53); a
-///          scale may neither take bits of positions and answers nor bring their differences beyond
-///          double.
+/// Returns  distance, difference and closest point within 8 ulp of the largest coordinate
+///          difference among the four positions, the normal within that over the distance; the
+///          feature as exact arithmetic decides it. At distance zero the normal is the triangle's
+///          winding normal; of a triangle without area the coordinate axis along which it extends
+///          least, x before y before z.
+/// Laws     (1) permuting the corners, mirroring an axis and scaling by powers of two give the same
+///          bits, mapped (where corners are mirror images of each other, weights may differ by
+///          2^-53); a scale may neither take bits of positions and answers nor bring their
+///          differences beyond double.
 ///          (2) a point held by an edge or corner has the same bits from every triangle that shares
 ///          it.
-/// Errors   none. A triangle without area is answered for its longest edge, one without length for its
-///          corner; NaN or infinity in gives NaN out.
-/// Source   Gram-determinant signs certified by error bounds, else by integers; one compensated Newton step
-///          in the feature's own coordinates. See Docs/Accuracy.md.
+/// Errors   none. A triangle without area is answered for its longest edge, one without length for
+///          its corner; NaN or infinity in gives NaN out.
+/// Source   Gram-determinant signs certified by error bounds, else by integers; one compensated
+///          Newton step in the feature's own coordinates. See Docs/Accuracy.md.
 PALPATE_EXPORT VertexTriangleDistance vertexTriangleDistance(const Eigen::Vector3d& p,
                                                              const Eigen::Vector3d& a,
                                                              const Eigen::Vector3d& b,
@@ -68,10 +68,10 @@ struct EdgeEdgeDistance {
 /// Closest points of edges (p0, p1) and (q0, q1).
 ///
 /// Shapes   one position each, any finite doubles.
-/// Returns  as vertexTriangleDistance(). At distance zero the normal is the cross product of p1 - p0 and
-///          q1 - q0; of parallel edges the coordinate axis along which both together extend least,
-///          x before y before z. Parallel edges side by side are closest in the middle of the
-///          stretch they share.
+/// Returns  as vertexTriangleDistance(). At distance zero the normal is the cross product of p1 -
+///          p0 and q1 - q0; of parallel edges the coordinate axis along which both together extend
+///          least, x before y before z. Parallel edges side by side are closest in the middle of
+///          the stretch they share.
 /// Laws     (1) swapping the ends of an edge turns its weight w into 1 - w, same bits otherwise.
 ///          (2) swapping the edges swaps the weights and turns difference and normal.
 /// Errors   none; NaN or infinity in gives NaN out.

@@ -63,9 +63,9 @@ struct GuardedVertex {
 ///           since the round before, with octrees of the guard's own. A geometry that is not
 ///           given costs nothing. Steady steps allocate nothing.
 /// Order     results do not depend on the number of threads, nor on the order of the steps.
-/// Errors    every function throws palpate::Error where its data are wrong, and then changes nothing:
-///           neither the guard nor the caller's positions. After a move everything but assignment
-///           and destruction throws InvalidCall.
+/// Errors    every function throws palpate::Error where its data are wrong, and then changes
+///           nothing: neither the guard nor the caller's positions. After a move everything but
+///           assignment and destruction throws InvalidCall.
 /// Threads   an object is used from one thread at a time. Two objects share nothing.
 class PALPATE_EXPORT StepGuard {
  public:

@@ -16,8 +16,8 @@ namespace palpate {
 /// shapes by
 ///          Method::Proximity: shapeShape(). A plane has no distance in FCL, only overlaps:
 ///          thickness 0.
-/// Errors   as OctreeBasedCD's, which keeps and checks what is handed in: every function that takes data
-///          throws palpate::Error and changes nothing. All other pairs and methods:
+/// Errors   as OctreeBasedCD's, which keeps and checks what is handed in: every function that takes
+///          data throws palpate::Error and changes nothing. All other pairs and methods:
 ///          UnsupportedMethod. Where FCL itself gives up, detectCollision() throws NotAvailable.
 /// Threads  none of its own.
 class PALPATE_EXPORT FclEngine {

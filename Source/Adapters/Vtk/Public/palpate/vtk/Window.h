@@ -39,8 +39,8 @@ PALPATE_EXPORT std::shared_ptr<void> openDisplay();
 ///          t: times; r: all in view; space: waits; q: closes.
 /// Errors   ErrorCode::NotAvailable: no display to draw with, on screen or off (without a screen,
 ///          run the program under xvfb-run). InvalidSettings: a size out of [1, 16384] pixels.
-/// Needs    the OctreeBasedCD stays where it is, and as it is but for positions and transforms from show()
-///          to press() and pick().
+/// Needs    the OctreeBasedCD stays where it is, and as it is but for positions and transforms from
+///          show() to press() and pick().
 /// Threads  all calls from the thread that made it.
 class PALPATE_EXPORT Window {
  public:
