@@ -17,8 +17,8 @@ namespace palpate {
 
 // Contacts of every method satisfy one law. Take the positions at the contact's timeOfImpact. The
 // sum of the positions of its stencil() times their weights equals (distance + radii) * normal,
-// with the radii interpolated at the closest points. For a ShapeContact this sum is point -
-// pointOnShape.
+// with the radii interpolated at the closest points. A ShapeContact has two points instead of a
+// stencil: point - pointOnShape equals (distance + radius) * normal.
 //
 // Error    32 ulp of the largest coordinate difference among the four vertices, and the rounding of
 //          the positions at that time. Method::Continuous adds timeTolerance times the vertices'
@@ -27,14 +27,13 @@ namespace palpate {
 //          them, have the time 1.
 // Sign     A distance is negative in three cases. (1) Radii overlap. (2) An element is inside a
 //          shape, or two shapes overlap. (3) A vertex-triangle contact of Method::Intersection,
-//          also as part of Auto, has its vertex behind the triangle; its winding normal points to
-//          the front. The normal of such a method's vertex-triangle contact is the winding normal
+//          also as part of Auto, has its vertex behind the triangle; the winding normal points to
+//          the front. The normal of Intersection's vertex-triangle contacts is the winding normal
 //          if the triangle's interior holds the closest point. If an edge or a corner holds it, the
 //          normal lies along the line through both closest points, on the winding normal's side.
 // Touching If the centres are at distance 0, the normal is the winding normal or the cross product
-// of
-//          the edges, as <palpate/Distance.h> states. Method::Continuous without a thickness turns
-//          it to the side from which the features came.
+//          of the edges, as <palpate/Distance.h> states. Method::Continuous without a thickness
+//          turns it to the side from which the features came.
 
 /// A contact of a vertex with a triangle. A contact of a vertex with the segment {p, q} has the
 /// corners {p, q, q}. A contact of a vertex with the point p has the corners {p, p, p}.
@@ -154,7 +153,8 @@ class PALPATE_EXPORT CollisionData {
   std::span<const EdgeEdgeContact> edgeEdge() const { return m_contents.edgeEdge; }
   /// Pairs of triangles that intersect at the step's end, from Method::Intersection, also as part
   /// of Auto. Each pair has a contact, with one exception: two triangles of one mesh with a common
-  /// vertex, of which an edge of one pierces the other and nothing else meets.
+  /// vertex, of which an edge of one pierces the other and nothing else meets. A predicate drops
+  /// contacts, but no entries of this list.
   std::span<const ElementPair> intersectingTriangles() const {
     return m_contents.intersectingTriangles;
   }
