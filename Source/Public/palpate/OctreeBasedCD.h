@@ -132,8 +132,9 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Cost     linear in the vertices.
   Eigen::AlignedBox3d bounds(GeometryId) const;
 
-  /// Ends the step of all geometries: `now` becomes `before`. Results stay readable. Without it
-  /// `before` stays as it was, and each detection tests the motion since then.
+  /// Ends the step of all geometries: `now` becomes `before`. Results stay readable. If you stop
+  /// calling it, each detection tests the motion since the last call. If you never call it, the
+  /// one-array form of setPositions() leaves all geometries at rest.
   ///
   /// Cost     does not grow with the number of vertices.
   void advance();
@@ -179,7 +180,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Errors   InvalidTransform if R^T R is off the identity by more than 1e-9 in an entry, if the
   ///          determinant is not positive, or if a translation or position is not finite or beyond
   ///          2^1000; UnsupportedMethod if the geometry has a pair with itself.
-  /// Cost     does not grow with the size of the geometry, after the first call for it.
+  /// Cost     does not grow with the size of the geometry, with two exceptions: the first call
+  ///          reads all positions, and each call for a ConvexHull turns its corners.
   void setTransform(GeometryId, const Eigen::Matrix3d& rotation,
                     const Eigen::Vector3d& translation);
   void setTransform(GeometryId, const Eigen::Matrix3d& rotationBefore,
