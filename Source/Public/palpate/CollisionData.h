@@ -46,8 +46,8 @@ struct VertexTriangleContact {
   Eigen::Vector3d normal;
   double distance;      ///< L, at timeOfImpact, between the surfaces of the radii; sign: see above
   double timeOfImpact;  ///< [0, 1] of the step; 1 for methods that test the step's end
-  /// What holds the closest point at that time: the corner, edge or face that the corners with
-  /// weights other than 0 span. A segment has EdgeAB, CornerA or CornerB, a point CornerA.
+  /// The part that holds the closest point at that time: the corner, edge or face that the corners
+  /// with weights other than 0 span. A segment has EdgeAB, CornerA or CornerB, a point CornerA.
   TriangleFeature feature = TriangleFeature::Face;
   friend bool operator==(const VertexTriangleContact&, const VertexTriangleContact&) = default;
 };
@@ -59,12 +59,12 @@ struct EdgeEdgeContact {
   Eigen::Vector3d normal;                     ///< unit, from edge b to edge a
   /// L and fraction of the step. The distance is negative only where radii overlap.
   double distance, timeOfImpact;
-  /// What holds each closest point at that time: an end if the weight is 0 or 1.
+  /// The part that holds each closest point at that time: an end if the weight is 0 or 1.
   EdgeFeature featureA = EdgeFeature::Interior, featureB = EdgeFeature::Interior;
   friend bool operator==(const EdgeEdgeContact&, const EdgeEdgeContact&) = default;
 };
 
-/// What of a mesh, line mesh or point set meets an analytical shape.
+/// The type of feature that touches an analytical shape.
 enum class ShapeElement : std::uint32_t { Vertex, Edge, Face };
 
 /// A contact of a vertex, edge or triangle with an analytical shape. All values are those at
@@ -152,9 +152,9 @@ class PALPATE_EXPORT CollisionData {
   /// Edges of the first geometry with edges of the second.
   std::span<const EdgeEdgeContact> edgeEdge() const { return m_contents.edgeEdge; }
   /// Pairs of triangles that intersect at the step's end, from Method::Intersection, also as part
-  /// of Auto. Each pair has a contact, with one exception: two triangles of one mesh with a common
-  /// vertex, of which an edge of one pierces the other and nothing else meets. A predicate drops
-  /// contacts, but no entries of this list.
+  /// of Auto. Each pair has a contact unless a predicate refuses it. There is one exception for a
+  /// mesh with itself: two triangles with a common vertex that intersect only where an edge of one
+  /// pierces the other have no contact.
   std::span<const ElementPair> intersectingTriangles() const {
     return m_contents.intersectingTriangles;
   }

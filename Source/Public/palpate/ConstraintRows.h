@@ -23,13 +23,13 @@ namespace palpate {
 ///          element, the distance also changes with the radius at the closest point. Where the
 ///          centres are at distance 0, the distance has no gradient; the row has that of the
 ///          distance along the normal.
-///          (3) let a step along the row alone move each vertex by a multiple of its inverse mass,
-///          its weight and the normal, to a gap g > 0. Then the signed distance is g, up to
-///          (g + radii) (4 s / h)^2. Here s is the longest displacement of a vertex of a triangle
-///          or an edge; h is the triangle's least height, or the shorter edge times the sine of the
-///          angle between the edges. One case is weaker: a vertex behind a triangle (distance below
-///          0 from Method::Intersection) whose closest point an edge or a corner holds. It comes to
-///          the outer side, at a signed distance above 0 and at most g.
+///          (3) let a step along this row alone bring the gap to g > 0. It moves each vertex by a
+///          multiple of its inverse mass, its weight and the normal. Then the signed distance is g,
+///          up to (g + radii) (4 s / h)^2. Here s is the longest displacement of a vertex of a
+///          triangle or an edge; h is the triangle's least height, or the shorter edge times the
+///          sine of the angle between the edges. One case is weaker: a vertex behind a triangle
+///          (distance below 0 from Method::Intersection) whose closest point an edge or a corner
+///          holds. It comes to the outer side, at a signed distance above 0 and at most g.
 struct ConstraintRow {
   std::array<std::uint32_t, 4> vertices;  ///< numbers of the solver; one may occur several times
   std::array<double, 4> weights;          ///< 0: this vertex does not count

@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-/// What was wrong with a call. Each function documents the codes that it throws.
+/// The reason for an Error. Each function documents the codes that it throws.
 enum class ErrorCode {
   NonFinitePosition,   ///< a position is NaN or infinite, or beyond 2^1000 under setTransform()
   WrongPositionCount,  ///< the number of positions differs from the number of vertices

@@ -177,9 +177,10 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// and transform are independent of each other. Vertices move in straight lines between the two
   /// ends (Validity::arcDeviation).
   ///
-  /// Errors   InvalidTransform if R^T R is off the identity by more than 1e-9 in an entry, if the
-  ///          determinant is not positive, or if a translation or position is not finite or beyond
-  ///          2^1000; UnsupportedMethod if the geometry has a pair with itself.
+  /// Errors   InvalidTransform if `rotation` is no rotation: an entry of R^T R is off the identity
+  ///          by more than 1e-9, or the determinant is not positive. InvalidTransform also if an
+  ///          entry is not finite, or if a translation or position is beyond 2^1000.
+  ///          UnsupportedMethod if the geometry has a pair with itself.
   /// Cost     does not grow with the size of the geometry, with two exceptions: the first call
   ///          reads all positions, and each call for a ConvexHull turns its corners.
   void setTransform(GeometryId, const Eigen::Matrix3d& rotation,

@@ -58,7 +58,7 @@ struct TrackedVertex {
 ///          surface point, divided by the square root of the last depth times the least depth now.
 /// Method   the last direction turns with the triangle of the last surface point. If the nearest
 ///          direction is within kMostTurn + m of it, the nearest is taken (None). Else the last
-///          direction is kept if it meets the surface within kMostDepth times the least depth
+///          direction is kept if it leaves the body within kMostDepth times the least depth
 ///          (Kept). Else the nearest is taken (Jumped).
 /// Threads  use an object from one thread at a time.
 class PALPATE_EXPORT PenetrationTracker {
@@ -75,7 +75,7 @@ class PALPATE_EXPORT PenetrationTracker {
   ///
   /// Order    by vertex, ascending.
   /// Errors   those of SpatialQueries::findInsideVertices() with default settings; the tracker then
-  ///          keeps what it knows. InvalidCall after a move.
+  ///          keeps the directions of earlier steps. InvalidCall after a move.
   std::span<const TrackedVertex> update(const SpatialQueries&);
 
  private:

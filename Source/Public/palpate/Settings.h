@@ -65,8 +65,7 @@ struct Settings {
   std::shared_ptr<Executor> executor{};
 };
 
-/// What makes two features a contact. Docs/Pairs.md lists the methods of each pair of geometry
-/// types.
+/// The definition of a contact. Docs/Pairs.md lists the methods of each pair of geometry types.
 enum class Method {
   /// The library chooses among the other methods in each frame, from the motion in the step. It
   /// answers every pair that any method answers. Wherever Continuous answers the pair, Auto misses
@@ -106,9 +105,9 @@ struct PairSettings {
   Contacts contacts = Contacts::Distinct;
   /// L, finite. Only Auto accepts a value that is not negative. Negative: half the thickness. It
   /// has an effect for two triangle or tetrahedral meshes with Distinct and a positive thickness.
-  /// Features that move at most this far relative to each other are tested at the step's end, at a
-  /// distance of up to this much more than the thickness. Other features are tested for impacts. A
-  /// larger value is faster and gives more contacts of features that are further apart.
+  /// Auto tests features that move at most this far, relative to each other, at the step's end. The
+  /// thickness is up to this much larger there. Auto tests other features for impacts. A larger
+  /// value is faster and gives more contacts of features that are further apart.
   double motionTolerance = -1.0;
   /// L, finite, not negative. Only a triangle, tetrahedral or line mesh with itself accepts a value
   /// other than 0. Features that are nearer to each other than this along the mesh's edges are no

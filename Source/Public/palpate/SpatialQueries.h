@@ -38,7 +38,7 @@ class PALPATE_EXPORT SpatialQueries {
   ///
   /// A vertex is inside by the rule in InsideSettings, and does not lie on the surface. With
   /// InsideRule::Closed a vertex is inside a triangle mesh if the mesh's winding number about it is
-  /// not 0, and inside a tetrahedral mesh if it is in a tetrahedron. Both are decided exactly.
+  /// not 0. It is inside a tetrahedral mesh if it is in a tetrahedron. Both are decided exactly.
   /// InsideRule::WindingNumber also takes bodies with holes, and any set of triangles.
   ///
   /// Each vertex comes with its surface point: the nearest point of the surface, of several equally

@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// What counts as an impact, and how exact its time is.
+/// The definition of an impact and the accuracy of its time.
 struct TimeOfImpactSettings {
   /// L, finite. An impact is a time at which the distance is at most this. 0 or negative: an impact
   /// is a time at which the features touch, and whether there is one is decided exactly.
@@ -29,9 +29,10 @@ struct TimeOfImpactSettings {
 ///          there is no impact. With minimumDistance 0 the decision between impact and none is
 ///          exact for the given doubles. This includes triangles without area or extent, motion in
 ///          a plane, no motion, and contact only at time 0 or 1. With a minimum distance d > 0
-///          there may be false positives: times at which the distance is at most d + e, with e =
-///          timeTolerance * (largest displacement of a vertex of one feature relative to one of the
-///          other) + 2^-35 * (largest difference of their coordinates + d).
+///          there may be false positives: times at which the distance is at most d + e. Here
+///          e = timeTolerance * m + 2^-35 * (c + d), with m the largest displacement of a vertex of
+///          one feature relative to a vertex of the other, and c the largest difference of their
+///          coordinates.
 /// Laws     (1) permuting the corners does not change whether there is an impact, nor does swapping
 ///          before and now.
 ///          (2) scaling all positions by a power of two does not either, where it is exact.

@@ -41,9 +41,9 @@ PALPATE_EXPORT std::shared_ptr<void> openDisplay();
 ///          t: times; r: all in view; space: waits until it is pressed again; q: closes.
 /// Needs    the OctreeBasedCD must stay at its address while the window lives. From show() to
 ///          press() and pick() only its positions and transforms may change.
-/// Errors   the constructor throws NotAvailable if there is no display, on screen or off (without a
-///          screen, run the program under xvfb-run), and InvalidSettings for a size outside
-///          [1, 16384] pixels.
+/// Errors   the constructor throws NotAvailable if there is no display, which it also needs to draw
+///          off screen: run the program under xvfb-run. It throws InvalidSettings for a size
+///          outside [1, 16384] pixels.
 /// Threads  make all calls from the thread that made the window.
 class PALPATE_EXPORT Window {
  public:
