@@ -163,8 +163,10 @@ class PALPATE_EXPORT CollisionData {
   /// Two analytical shapes with each other: one contact if they are at most the thickness apart,
   /// with Method::Continuous at some time of the step.
   std::span<const ShapeShapeContact> shapeShape() const { return m_contents.shapeShape; }
-  /// Fraction of the step: the least timeOfImpact of all contacts, or infinity without contacts. 1
-  /// if all contacts come from methods that test the step's end. Cost: linear in the contacts.
+  /// Fraction of the step: the least timeOfImpact of all contacts, or infinity if there is none. 1
+  /// if all contacts come from methods that test the step's end. With
+  /// PairSettings::earliestTimeOnly it is the time of the first contact, although no list has it.
+  /// Cost     linear in the contacts.
   double earliestTimeOfImpact() const;
 
   /// Whether this answer can be trusted, and why not.

@@ -233,7 +233,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Errors   UnknownPair.
   const PairSettings& pairSettings(GeometryId a, GeometryId b) const;
 
-  /// Brings boxes and octrees to the positions now. The other functions do this themselves.
+  /// Brings boxes and octrees to the positions now. Functions that need them do this themselves.
   void update();
   /// Runs the broad phase of every pair, for a narrow phase of your own. It fills candidatePairs()
   /// and updates octrees if needed.

@@ -30,7 +30,8 @@ enum class MethodReason {
 ///
 /// Laws     (1) if trusted, and the method is Proximity, Continuous or Auto: every normal is on the
 ///          side from which its features came, and no features that touched or crossed within the
-///          step are missing. With Contacts::Distinct another contact may stand for them.
+///          step are missing. With Contacts::Distinct another contact may stand for them, and
+///          filters may refuse their contacts.
 ///          (2) if trusted, and the method is Intersection: if the meshes touched within the step,
 ///          the answer is not empty.
 ///          (3) if not trusted, the library does not know. Pairs with lines, points or shapes, and
