@@ -8,53 +8,57 @@
 
 namespace palpate {
 
-// Shapes by their measures, all in L, in a body frame that OctreeBasedCD::setTransform() places in
-// the world. All are solid and convex. Measures may be zero: the shape is then what is left of it,
-// a sphere without radius a point, a capsule without length a sphere, a box without height a plate.
-// Each coordinate and each size is at most kLargestMeasure in magnitude, and may be as small as
-// double goes; others are refused (ErrorCode::InvalidShape).
+// Analytical shapes, in a body frame that OctreeBasedCD::setTransform() places in the world. All
+// measures are in L. All shapes are solid and convex, except a two-sided plane, which has no
+// inside. A measure of 0 is valid: a sphere without radius is a point, a capsule without length a
+// sphere, a box without height a plate. Each coordinate and each size is at most kLargestMeasure in
+// magnitude, and may be as small as the smallest double. addAnalyticalGeometry() throws
+// InvalidShape for all other values.
 
 inline constexpr double kLargestMeasure = 1e300;                      ///< L
 inline constexpr std::size_t kMostHullPoints = std::size_t{1} << 17;  ///< of one ConvexHull
 
+/// A ball.
 struct Sphere {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double radius = 0.0;  ///< finite, not negative
 };
 
-/// All points at most the radius from the segment.
+/// All points whose distance from the segment p0 p1 is at most the radius.
 struct Capsule {
   Eigen::Vector3d p0 = Eigen::Vector3d::Zero(), p1 = Eigen::Vector3d::Zero();
   double radius = 0.0;  ///< finite, not negative
 };
 
-/// The half-space behind the plane; of two sides: the plane alone, which has no inside.
+/// The half-space behind the plane. If two-sided, the plane alone, which has no inside.
 struct Plane {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< out of the half-space; any length but 0
   bool twoSided = false;
 };
 
-/// Along the axes of the body frame.
+/// A box whose edges are parallel to the axes of the body frame.
 struct Box {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   Eigen::Vector3d halfExtents = Eigen::Vector3d::Zero();  ///< finite, not negative
 };
 
-/// With flat ends, whose centres p0 and p1 must differ.
+/// A cylinder with flat ends. Their centres p0 and p1 must differ.
 struct Cylinder {
   Eigen::Vector3d p0 = Eigen::Vector3d::Zero(), p1 = Eigen::Vector3d::UnitZ();
   double radius = 0.0;  ///< finite, not negative
 };
 
-/// The convex hull of points: a tool's tip. At least one point; any may be doubled or inside. Of
-/// points in one plane a plate, on one line a segment, at one place a point: exactly so, points
-/// near a plane span a thin body.
-/// Errors   more than kMostHullPoints points are refused.
-/// Cost     when added, n log n for n points, expected, whatever their order: 1,000, 8,000 and 64,000
-///          points of a sphere take 3, 27 and 340 ms of one core of an Intel Xeon. A distance asks
-///          each triangle of the hull, some of them several times: 0.06, 0.5 and 4 ms for a point
-///          beside these hulls. Points inside cost nothing after that.
+/// The convex hull of at least one point, such as the tip of a tool. Points may be doubled or
+/// inside. If all points are exactly in one plane, on one line or at one place, the hull is a
+/// plate, a segment or a point. Points near a plane span a thin body.
+///
+/// Errors   addAnalyticalGeometry() throws InvalidShape for no points, and for more than
+///          kMostHullPoints.
+/// Cost     to add: n log n for n points, on average, in any order. 1,000, 8,000 and 64,000 points
+///          of a sphere take 3, 27 and 340 ms on one core of an Intel Xeon. A distance tests each
+///          triangle of the hull, and some of them several times: 0.06, 0.5 and 4 ms for a point
+///          beside these hulls. Points inside the hull cost nothing after it was added.
 struct ConvexHull {
   std::vector<Eigen::Vector3d> points;  ///< finite
 };

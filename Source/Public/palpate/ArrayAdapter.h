@@ -13,13 +13,15 @@
 
 namespace palpate {
 
-// For simulators that keep vectors as contiguous triples (VecDataArray and its like) and want
-// contacts as cells: Docs/FromIMSTK.md shows both in a loop.
+// Adapters for simulators that keep vectors as contiguous triples of doubles, and that want
+// contacts as pairs of cells. Docs/FromIMSTK.md shows both in a loop.
 
 static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double));
 
-/// Contiguous double triples where they are: nothing is copied.
-/// Needs    an array with getPointer(), to double triples in a row, and size(), their number.
+/// The positions in an array of contiguous triples of doubles. Nothing is copied: the span is valid
+/// as long as the array.
+/// Needs    an array with getPointer(), which returns the first of its triples, and size(), their
+///          number.
 template <class Array>
 std::span<const Eigen::Vector3d> positionsOf(const Array& array) {
   static_assert(sizeof(*array.getPointer()) == sizeof(Eigen::Vector3d));
@@ -27,9 +29,9 @@ std::span<const Eigen::Vector3d> positionsOf(const Array& array) {
           static_cast<std::size_t>(array.size())};
 }
 
-/// Elements of N vertices (Triangle: 3, Segment: 2), copied: topology is handed over once.
-/// Needs    an array with size() and operator[], whose elements have operator[] in turn.
-/// Errors   IndexOutOfRange names the element with an index below 0.
+/// A copy of the elements of an array, with N vertices each (Triangle: 3, Segment: 2).
+/// Needs    an array with size() and operator[]; its elements have operator[], too.
+/// Errors   IndexOutOfRange names the first element with a negative index.
 template <std::size_t N, class Array>
 std::vector<std::array<std::uint32_t, N>> elementsOf(const Array& array) {
   std::vector<std::array<std::uint32_t, N>> elements;
@@ -50,16 +52,18 @@ std::vector<std::array<std::uint32_t, N>> elementsOf(const Array& array) {
   return elements;
 }
 
-/// A simulator's own names of cells.
+/// The cell types of a simulator, for appendCells().
 template <class CellType>
 struct CellTypes {
   CellType vertex, edge, triangle;
 };
 
-/// Contacts as pairs of cells: element i of `a` against element i of `b`, in the order
-/// vertexTriangle(), triangleVertex(), edgeEdge(). Vertices and triangles are given by their
-/// number (idCount 1), edges by their two vertices (idCount 2).
-/// Needs    Element with ids[4], idCount and cellType.
+/// Appends a pair of cells for each contact: one to `a` for the first geometry, one to `b` for the
+/// second. A vertex or triangle is given by its index (idCount 1), an edge by its two vertices
+/// (idCount 2). Contacts with analytical shapes are not included.
+///
+/// Order    vertexTriangle(), triangleVertex(), edgeEdge().
+/// Needs    an Element with ids[4], idCount and cellType.
 template <class Element, class CellType>
 void appendCells(const CollisionData& contacts, const CellTypes<CellType>& types,
                  std::vector<Element>& a, std::vector<Element>& b) {

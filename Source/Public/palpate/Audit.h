@@ -10,14 +10,17 @@
 
 namespace palpate {
 
-/// A contact on which a frame's CollisionData and brute force differ: a fault of this library. Of
-/// Method::Auto, which may mix the answers of several methods, only what is missing is told.
+/// A contact in which a frame's CollisionData and brute force differ. This is a fault of the
+/// library. Method::Auto may mix the answers of several methods; for it the audit reports only
+/// missing contacts.
 struct AuditFailure {
   enum class Fault {
-    Missing,   ///< expected, not found; List::Earliest: there is one before earliestTimeOfImpact()
+    /// Expected, not found. In List::Earliest: a contact is earlier than earliestTimeOfImpact().
+    Missing,
     Invented,  ///< found, not expected, or found twice
     Different  ///< found with other values than expected
   };
+  /// The list of CollisionData, or its earliest time.
   enum class List {
     VertexTriangle,
     TriangleVertex,
@@ -30,14 +33,13 @@ struct AuditFailure {
   using Contact = std::variant<std::monostate, VertexTriangleContact, EdgeEdgeContact, ElementPair,
                                ShapeContact, ShapeShapeContact>;
 
-  GeometryId a, b;          ///< the pair, as it was added
-  std::uint64_t frame = 0;  ///< counts detectCollision() from 1
+  GeometryId a, b;          ///< the pair, in the order in which it was added
+  std::uint64_t frame = 0;  ///< number of the detectCollision() call, from 1
   Fault fault = Fault::Missing;
-  List list = List::VertexTriangle;  ///< of the CollisionData
-  Contact expected{}, found{};       ///< with ids and values; monostate where there is none
-  std::filesystem::path
-      file{};               ///< replays the pair's frame; empty if none was asked for or written
-  std::string fileError{};  ///< why it was not written, with its name
+  List list = List::VertexTriangle;  ///< in which the contact is or should be
+  Contact expected{}, found{};       ///< the contact; monostate if there is none
+  std::filesystem::path file{};  ///< a capture of the pair's frame; empty if the audit wrote none
+  std::string fileError{};       ///< why the capture was not written, with its name
 };
 
 }  // namespace palpate

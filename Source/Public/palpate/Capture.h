@@ -9,24 +9,33 @@
 
 namespace palpate {
 
-/// Writes the problem of the last frame, exactly, as text. Call it before positions change.
+// A capture is a text file with a CollisionProblem. It replays a frame exactly: every double keeps
+// its bits.
+
+/// Writes OctreeBasedCD::problem() to a file. Call it after a frame and before positions change:
+/// the capture then replays that frame.
 ///
-/// Errors   ErrorCode::File if it cannot be written; there is then no part of it, and a file that was
-///          there before is unharmed.
+/// Errors   File if the file cannot be written. Then there is no partial file, and a file that
+///          existed before is unchanged.
 PALPATE_EXPORT void capture(const OctreeBasedCD&, const std::filesystem::path&);
 
-/// The same of the pair of an audit's failure alone: a file that replays it.
+/// The same for the pair of an audit's failure alone. Call it before positions change, too.
 PALPATE_EXPORT void capture(const OctreeBasedCD&, const AuditFailure&,
                             const std::filesystem::path&);
 
+/// Writes a problem to a file, with the errors of capture().
 PALPATE_EXPORT void writeCapture(const CollisionProblem&, const std::filesystem::path&);
 
-/// Errors   ErrorCode::File, with the file's name and what is wrong with it: missing, not a capture,
-///          of another version, cut off, or with what an OctreeBasedCD would refuse.
+/// Reads a capture.
+///
+/// Errors   File, with the file's name and the reason: the file is missing, is no capture, has an
+///          unknown version, is truncated, or has content that an OctreeBasedCD refuses.
 PALPATE_EXPORT CollisionProblem readCapture(const std::filesystem::path&);
 
-/// Ready for detectCollision(): geometry i is GeometryId{i}. What an octree owes to earlier frames
-/// is not part of a problem: it is built anew.
+/// Makes an OctreeBasedCD from a problem, ready for detectCollision(). Geometry i has the id
+/// GeometryId{i}. Its octrees are built anew; contacts do not depend on their history.
+///
+/// Errors   those of the functions of OctreeBasedCD that add geometries and pairs.
 PALPATE_EXPORT OctreeBasedCD setUp(const CollisionProblem&);
 
 }  // namespace palpate

@@ -12,47 +12,55 @@
 
 namespace palpate {
 
-/// What keeps a mesh from being closed and consistently oriented. Edges lower vertex first, sorted.
+/// The edges because of which a mesh is not closed and consistently oriented. A closed mesh without
+/// such edges has an inside.
+///
+/// Order    each list is sorted. Each edge has its lower vertex first.
 struct MeshDefects {
-  std::vector<Segment> open;     ///< edges of one triangle only: the rim of a hole
-  std::vector<Segment> flipped;  ///< edges that two triangles run through in the same direction
+  std::vector<Segment> open;     ///< edges of only one triangle, as at the rim of a hole
+  std::vector<Segment> flipped;  ///< edges that both triangles traverse in the same direction
   std::vector<Segment> shared;   ///< edges of three triangles or more
 
+  /// Whether the mesh has no defects.
   bool closed() const { return open.empty() && flipped.empty() && shared.empty(); }
 };
 
-/// Edges by their vertices' indices: vertices at one place are not one vertex. A triangle that
-/// names a vertex twice has no edges.
+/// Finds the defects of a triangle mesh. Edges are compared by vertex indices: two vertices at one
+/// place are two vertices. A triangle that names a vertex twice has no edges.
+/// Errors   none.
 PALPATE_EXPORT MeshDefects findMeshDefects(std::span<const Triangle> triangles);
 
-/// What is inside a body.
+/// Which points are inside a body.
 enum class InsideRule {
-  /// Where its winding number, decided exactly, is not zero. It must be closed and consistently
-  /// oriented.
+  /// Points about which the body's winding number, decided exactly, is not 0. The body must be
+  /// closed and consistently oriented; a tetrahedral mesh always has an inside.
   Closed,
-  /// Where the magnitude of its generalised winding number is at least 1/2: of any triangles, with
-  /// holes, flipped, doubled, of soups that only almost enclose something. A hole's inside ends
-  /// near
-  /// it in a surface that spans it; of a closed body the same vertices as Closed.
+  /// Points about which the magnitude of the body's generalised winding number is at least 1/2. The
+  /// body may be any set of triangles: with holes, flipped or doubled triangles, or triangles that
+  /// enclose something only approximately. The inside ends near a hole in a surface that spans it.
+  /// For a closed body the rule finds the same vertices as Closed.
   WindingNumber
 };
 
+/// Values out of range throw InvalidSettings.
 struct InsideSettings {
   InsideRule rule = InsideRule::Closed;
-  /// [0, 1/2). WindingNumber: vertices whose number's magnitude is no further than this from 1/2
-  /// are found, but not decided.
+  /// In [0, 1/2). WindingNumber only: a vertex whose number differs in magnitude from 1/2 by at
+  /// most this is found, with InsideVertex::decided false.
   double margin = 0.0;
 };
 
-/// A vertex inside a body, with the nearest point of its surface.
+/// A vertex inside a body, with its surface point: the point of the body's surface that is nearest
+/// to the vertex.
 struct InsideVertex {
-  std::uint32_t vertex, triangle;        ///< of the other geometry; of the body
-  std::array<std::uint32_t, 3> corners;  ///< the triangle's vertices
-  Eigen::Vector3d barycentric;           ///< of the body's surface point nearest to the vertex
-  Eigen::Vector3d
-      direction;  ///< unit: the penetration direction, from the vertex towards that point
-  double depth;   ///< L, positive: the distance to it
-  /// InsideRule::WindingNumber: not within the margin, nor within rounding, of 1/2.
+  std::uint32_t vertex, triangle;        ///< a vertex of the other geometry, a triangle of the body
+  std::array<std::uint32_t, 3> corners;  ///< the vertices of that triangle
+  Eigen::Vector3d barycentric;           ///< weights of the corners at the surface point
+  /// Unit: the penetration direction, from the vertex to the surface point.
+  Eigen::Vector3d direction;
+  double depth;  ///< L, positive: the distance to the surface point
+  /// False only with InsideRule::WindingNumber: the number is so near to 1/2 that the margin, or
+  /// rounding, leaves open whether the vertex is inside.
   bool decided = true;
   friend bool operator==(const InsideVertex&, const InsideVertex&) = default;
 };

@@ -15,102 +15,115 @@
 
 namespace palpate {
 
-// Contacts of every method satisfy one law. With the positions at the contact's timeOfImpact, the
-// sum of the positions of its stencil() times their weights is (distance + radii) * normal, with
-// the radii interpolated at the closest points; of a ShapeContact this is point - pointOnShape.
+// Contacts of every method satisfy one law. Take the positions at the contact's timeOfImpact. The
+// sum of the positions of its stencil() times their weights equals (distance + radii) * normal,
+// with the radii interpolated at the closest points. A ShapeContact has two points instead of a
+// stencil: point - pointOnShape equals (distance + radius) * normal.
 //
 // Error    32 ulp of the largest coordinate difference among the four vertices, and the rounding of
 //          the positions at that time. Method::Continuous adds timeTolerance times the vertices'
 //          relative motion.
-// Time     methods that look at the step's end (Proximity, Intersection, Auto's contacts from them)
-//          give 1.
-// Sign     distances are negative by radii, of shapes inside them, and for vertex-triangle contacts
-//          of Method::Intersection, also as part of Auto, where the vertex lies behind the triangle
-//          as its winding normal points. The normal of these is the winding normal where the
-//          triangle's interior holds the closest point. Where an edge or a corner holds it, the
-//          normal is along the line through both closest points, on the winding normal's side.
-// Touching centres at distance 0 have the winding normal, or the cross product of the edges, as
-//          <palpate/Distance.h> states. Method::Continuous without a thickness turns it to the side
-//          from which the features came.
+// Time     Proximity and Intersection test the step's end. Their contacts, and Auto's contacts from
+//          them, have the time 1.
+// Sign     A distance is negative in three cases. (1) Radii overlap. (2) An element is inside a
+//          shape, or two shapes overlap. (3) A vertex-triangle contact of Method::Intersection,
+//          also as part of Auto, has its vertex behind the triangle; the winding normal points to
+//          the front. The normal of Intersection's vertex-triangle contacts is the winding normal
+//          if the triangle's interior holds the closest point. If an edge or a corner holds it, the
+//          normal lies along the line through both closest points, on the winding normal's side.
+// Touching If the centres are at distance 0, the normal is the winding normal or the cross product
+//          of the edges, as <palpate/Distance.h> states. Method::Continuous without a thickness
+//          turns it to the side from which the features came.
 
-/// A vertex against a triangle; a point against a segment {p, q} is one with the corners {p, q, q},
-/// and against another point {p, p, p}.
+/// A contact of a vertex with a triangle. A contact of a vertex with the segment {p, q} has the
+/// corners {p, q, q}. A contact of a vertex with the point p has the corners {p, p, p}.
 struct VertexTriangleContact {
-  std::uint32_t vertex, triangle;
-  std::array<std::uint32_t, 3> corners;  ///< the triangle's vertices
-  Eigen::Vector3d barycentric;           ///< of the closest point, in the triangle's corner order
-  /// unit, from the triangle towards the vertex; turned round where Intersection's vertex lies
-  /// behind
+  std::uint32_t vertex, triangle;        ///< indices; `triangle` may be a segment or a point
+  std::array<std::uint32_t, 3> corners;  ///< the vertices of the triangle, segment or point
+  Eigen::Vector3d barycentric;           ///< weights of the corners at the closest point
+  /// Unit. It points from the triangle to the vertex, except where Intersection finds the vertex
+  /// behind the triangle: there it points from the vertex to the triangle.
   Eigen::Vector3d normal;
-  double distance;      ///< L, less the radii, at timeOfImpact; sign: see above
-  double timeOfImpact;  ///< [0, 1] of the step; 1 for methods that look at its end
-  /// What holds the closest point at that time: what the corners with weights other than 0 span. Of
-  /// a segment EdgeAB, CornerA or CornerB, of a point CornerA.
+  double distance;      ///< L, at timeOfImpact, between the surfaces of the radii; sign: see above
+  double timeOfImpact;  ///< [0, 1] of the step; 1 for methods that test the step's end
+  /// The part that holds the closest point at that time: the corner, edge or face that the corners
+  /// with weights other than 0 span. A segment has EdgeAB, CornerA or CornerB, a point CornerA.
   TriangleFeature feature = TriangleFeature::Face;
   friend bool operator==(const VertexTriangleContact&, const VertexTriangleContact&) = default;
 };
 
-/// An edge against an edge.
+/// A contact of two edges.
 struct EdgeEdgeContact {
   std::array<std::uint32_t, 2> edgeA, edgeB;  ///< vertex indices, lower first
   double weightA, weightB;                    ///< closest point = p0 + weight (p1 - p0)
-  Eigen::Vector3d normal;                     ///< unit, from b towards a
-  double distance, timeOfImpact;              ///< L, negative by radii only; as above
-  /// What holds each closest point at that time: an end where the weight is 0 or 1.
+  Eigen::Vector3d normal;                     ///< unit, from edge b to edge a
+  /// L and fraction of the step. The distance is negative only where radii overlap.
+  double distance, timeOfImpact;
+  /// The part that holds each closest point at that time: an end if the weight is 0 or 1.
   EdgeFeature featureA = EdgeFeature::Interior, featureB = EdgeFeature::Interior;
   friend bool operator==(const EdgeEdgeContact&, const EdgeEdgeContact&) = default;
 };
 
+/// The type of feature that touches an analytical shape.
 enum class ShapeElement : std::uint32_t { Vertex, Edge, Face };
 
-/// An element of a mesh against an analytical shape.
+/// A contact of a vertex, edge or triangle with an analytical shape. All values are those at
+/// timeOfImpact.
 struct ShapeContact {
   ShapeElement element;
-  std::uint32_t id;  ///< vertex or triangle; of an edge its lower vertex
-  /// The element's: {v, v, v}, {p, q, q} with the lower first, or the triangle's corners.
+  std::uint32_t id;  ///< index of the vertex or triangle; for an edge its lower vertex
+  /// {v, v, v} for a vertex, {p, q, q} with p < q for an edge, or the triangle's corners.
   std::array<std::uint32_t, 3> vertices;
-  Eigen::Vector3d weights;       ///< of the vertices; sum 1
-  Eigen::Vector3d point;         ///< L, of the element: of lines and points on their centre line
-  Eigen::Vector3d pointOnShape;  ///< L
-  Eigen::Vector3d normal;        ///< unit, out of the shape, towards the element
-  double distance;               ///< L, less the element's radius; negative: as deep inside
-  double timeOfImpact = 1.0;     ///< [0, 1] of the step, and all else then; 1 for Proximity
+  Eigen::Vector3d weights;       ///< of the vertices at `point`; sum 1
+  Eigen::Vector3d point;         ///< L, on the element; for lines and points on the centre line
+  Eigen::Vector3d pointOnShape;  ///< L, on the shape's surface
+  Eigen::Vector3d normal;        ///< unit, out of the shape towards the element
+  double distance;               ///< L, less the element's radius; negative: the depth inside
+  double timeOfImpact = 1.0;     ///< [0, 1] of the step; 1 for Proximity
   friend bool operator==(const ShapeContact&, const ShapeContact&) = default;
 };
 
-/// Two analytical shapes where they are nearest, or, if they overlap, where they leave each other
-/// by the shortest way; with Method::Continuous at the time at which they first come near enough.
-/// Where a cylinder overlaps another shape, distance and points fit within 2e-3 of the two sizes.
+/// A contact of two analytical shapes. All values are those at timeOfImpact: with
+/// Method::Continuous the time at which the shapes first come near enough. If the shapes are apart,
+/// the points are the closest points. If they overlap, the normal is the direction of the shortest
+/// translation that separates them.
+///
+/// Error    pointA - pointB equals distance * normal. Where a cylinder overlaps another shape, the
+///          two differ by up to 2e-3 of the two sizes.
 struct ShapeShapeContact {
-  Eigen::Vector3d pointA, pointB;  ///< L, on the surfaces of the first and of the second
-  Eigen::Vector3d normal;          ///< unit, from b towards a
-  /// L: pointA - pointB is the normal times this; negative: moved so far along it a just touches b
+  Eigen::Vector3d pointA, pointB;  ///< L, on the surfaces of the first and of the second shape
+  Eigen::Vector3d normal;          ///< unit, from shape b to shape a
+  /// L. Negative: if shape a moves by -distance along the normal, it just touches shape b.
   double distance;
-  double timeOfImpact = 1.0;  ///< [0, 1] of the step, and all else then; 1 for Proximity
+  double timeOfImpact = 1.0;  ///< [0, 1] of the step; 1 for Proximity
   friend bool operator==(const ShapeShapeContact&, const ShapeShapeContact&) = default;
 };
 
-/// Four vertices with signed weights: their weighted sum of positions is the vector between the two
-/// closest points, and weight i times a force along the normal is the force on vertex i.
+/// Four vertices with signed weights. The weighted sum of their positions is the vector between the
+/// two closest points. A contact force along the normal acts on vertex i with weight i.
 struct Stencil {
   std::array<std::uint32_t, 4> vertices;
   std::array<double, 4> weights;
 };
 
-/// vertices: the vertex (weight 1), then the triangle's corners (weights -barycentric).
+/// The vertex with weight 1, then the triangle's corners with the weights -barycentric.
 inline Stencil stencil(const VertexTriangleContact& contact) {
   return {{contact.vertex, contact.corners[0], contact.corners[1], contact.corners[2]},
           {1.0, -contact.barycentric[0], -contact.barycentric[1], -contact.barycentric[2]}};
 }
 
-/// vertices: edge a's two ends (positive weights), then edge b's (negative weights).
+/// The two ends of edge a with weights of at least 0, then those of edge b with weights of at most
+/// 0.
 PALPATE_EXPORT Stencil stencil(const EdgeEdgeContact& contact);
 
-/// The contacts of one pair of geometries in the last frame, sorted by element ids.
+/// The contacts of one pair of geometries in the last frame.
 ///
 /// Order    vertexTriangle by (vertex, triangle), triangleVertex by (triangle, vertex), edgeEdge by
-///          (edgeA, edgeB), intersectingTriangles by (a, b).
-/// Shapes   spans live until the next call that is not const on their OctreeBasedCD.
+///          (edgeA, edgeB), intersectingTriangles by (a, b), shape by (element, id, vertices).
+/// Valid    a reference from OctreeBasedCD::collisionData(), and the spans of that object, are
+///          valid until the next call on the OctreeBasedCD that is not const. A copy stays as it
+///          is.
+/// Errors   none.
 class PALPATE_EXPORT CollisionData {
  public:
   struct Contents {
@@ -120,42 +133,51 @@ class PALPATE_EXPORT CollisionData {
     std::vector<ShapeContact> shape;
     std::vector<ShapeShapeContact> shapeShape;
     double earliestTimeOfImpact =
-        std::numeric_limits<double>::infinity();  ///< with PairSettings::earliestTimeOnly
+        std::numeric_limits<double>::infinity();  ///< only with PairSettings::earliestTimeOnly
     Validity validity;
   };
 
   CollisionData() = default;
   explicit CollisionData(Contents contents) : m_contents(std::move(contents)) {}
 
-  /// Vertices of the first geometry, triangles of the second.
+  /// Vertices of the first geometry with triangles, segments or points of the second.
   std::span<const VertexTriangleContact> vertexTriangle() const {
     return m_contents.vertexTriangle;
   }
-  /// Triangles of the first geometry, vertices of the second; empty for self-collision.
+  /// Triangles, segments or points of the first geometry with vertices of the second. Empty for a
+  /// geometry with itself.
   std::span<const VertexTriangleContact> triangleVertex() const {
     return m_contents.triangleVertex;
   }
+  /// Edges of the first geometry with edges of the second.
   std::span<const EdgeEdgeContact> edgeEdge() const { return m_contents.edgeEdge; }
-  /// Filled by Method::Intersection. Each pair has a contact, but for two triangles of one mesh
-  /// with a common vertex that meet only where an edge pierces the other.
+  /// Pairs of triangles that intersect at the step's end, from Method::Intersection, also as part
+  /// of Auto. Each pair has a contact unless a predicate refuses it. There is one exception for a
+  /// mesh with itself: two triangles with a common vertex that intersect only where an edge of one
+  /// pierces the other have no contact.
   std::span<const ElementPair> intersectingTriangles() const {
     return m_contents.intersectingTriangles;
   }
-  /// Elements with an analytical shape, which have no other contacts; by (element, id, vertices).
+  /// Vertices, edges and triangles with an analytical shape. Such a pair has no other contacts.
   std::span<const ShapeContact> shape() const { return m_contents.shape; }
-  /// Of two analytical shapes: one, if they are at most the thickness apart.
+  /// Two analytical shapes with each other: one contact if they are at most the thickness apart,
+  /// with Method::Continuous at some time of the step.
   std::span<const ShapeShapeContact> shapeShape() const { return m_contents.shapeShape; }
-  /// Infinity if there is no contact. Contacts of methods that look at the step's end have 1.
+  /// Fraction of the step: the least timeOfImpact of all contacts, or infinity if there is none. 1
+  /// if all contacts come from methods that test the step's end. With
+  /// PairSettings::earliestTimeOnly it is the time of the first contact, although no list has it.
+  /// Cost     linear in the contacts.
   double earliestTimeOfImpact() const;
 
-  /// Whether to believe it.
+  /// Whether this answer can be trusted, and why not.
   const Validity& validity() const { return m_contents.validity; }
 
-  /// Same answer, same bits, same hash: over ids, weights, normals, distances, times and features,
-  /// in order.
+  /// Two answers with the same bits have the same hash, on every machine. It includes the ids,
+  /// weights, normals, distances, times and features of all contacts in their order, and no part of
+  /// validity().
   std::uint64_t hash() const;
 
-  /// For the engine that fills it.
+  /// For engines that fill this object.
   Contents& contents() { return m_contents; }
 
  private:

@@ -10,36 +10,42 @@
 
 namespace palpate {
 
-/// All that one frame's answers depend on.
+/// Everything on which the answers of one frame depend, except predicates. Get it from
+/// OctreeBasedCD::problem(). <palpate/Capture.h> writes and reads it, and makes an OctreeBasedCD
+/// from it.
 struct CollisionProblem {
+  /// A geometry of any type.
   struct Mesh {
-    GeometryId id;                             ///< where it comes from; nothing depends on it
-    std::vector<Eigen::Vector3d> before, now;  ///< in the world, also of a body that was moved
-    std::vector<Triangle> triangles;           ///< a segment {p, q} is {p, q, q}; none of points
+    GeometryId id;  ///< in the original OctreeBasedCD; no answer depends on it
+    /// L, in the world, also if setTransform() placed the geometry.
+    std::vector<Eigen::Vector3d> before, now;
+    std::vector<Triangle> triangles;  ///< segment {p, q} is {p, q, q}; empty for points
     GeometryKind kind = GeometryKind::Triangles;
-    std::vector<double> radii{};  ///< L: none, one for all, or one for each vertex
-    /// The shape that restDistance, and tetrahedra's surface, are of; none: now.
+    std::vector<double> radii{};  ///< L: none, one for all vertices, or one per vertex
+    /// L: the positions that determine PairSettings::restDistance and the winding of the surface of
+    /// tetrahedra. Empty: `now`.
     std::vector<Eigen::Vector3d> rest{};
     CollisionFilter filter{};
-    std::vector<std::uint32_t> disabled{};           ///< elements that are off
-    std::optional<AnalyticalGeometry> analytical{};  ///< of a shape, placed by what follows
+    std::vector<std::uint32_t> disabled{};           ///< disabled elements
+    std::optional<AnalyticalGeometry> analytical{};  ///< a shape; the poses below place it
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
     Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-    Eigen::Matrix3d rotationBefore = Eigen::Matrix3d::Identity();  ///< of a shape
+    Eigen::Matrix3d rotationBefore = Eigen::Matrix3d::Identity();  ///< for a shape only
     Eigen::Vector3d translationBefore = Eigen::Vector3d::Zero();
-    std::vector<Tetrahedron> tetrahedra{};  ///< whose surface the triangles are; none: just these
+    std::vector<Tetrahedron> tetrahedra{};  ///< `triangles` is their surface; empty: no tetrahedra
   };
+  /// A collision pair.
   struct Pair {
-    std::uint32_t a, b;  ///< indices of geometries
+    std::uint32_t a, b;  ///< indices in `geometries`
     PairSettings settings;
-    Method method;  ///< that answered, of Validity; nothing depends on it
-    /// A predicate was asked, which is not part of a problem: without it there may be more
-    /// contacts.
+    Method method;  ///< the method that answered; no answer depends on it
+    /// Whether the pair has a predicate. A problem does not contain it, so that a replay may find
+    /// more contacts.
     bool predicate = false;
   };
-  Settings settings;
+  Settings settings;  ///< without an executor
   std::vector<Mesh> geometries;
-  std::vector<Pair> pairs;  ///< in the order added
+  std::vector<Pair> pairs;  ///< in the order in which they were added
 };
 
 }  // namespace palpate

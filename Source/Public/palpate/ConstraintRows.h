@@ -13,55 +13,59 @@
 
 namespace palpate {
 
-/// A contact as a solver's row: gap(x) = normal . sum of weights[i] x[vertices[i]] - offset.
+/// A contact as a row of a solver: gap(x) = normal . sum of weights[i] x[vertices[i]] - offset.
 ///
-/// Units    the gap is in L. A solver keeps it at least as large as it wants its bodies apart.
+/// Units    the gap is in L. A solver keeps it at least as large as the distance that it wants.
 /// Laws     (1) with the positions at the contact's timeOfImpact the gap is the contact's distance.
-///          (2) the gap's gradient at vertex i is weights[i] normal. There it is the distance's
-///          gradient as well, because weights and normal change the distance in the second order
-///          only. Two exceptions: radii that differ along an element, where the distance also
-///          changes by what the closest point's way along the element changes of the radius; and
-///          centres at distance 0, where the distance itself has no gradient and the row has that
-///          of the distance along the normal.
-///          (3) a step along the row alone, each vertex by a multiple of its inverse mass, its
-///          weight and the normal, to a gap g > 0 makes the signed distance g, up to (g + radii)
-///          (4 s / h)^2: s is the longest displacement of a vertex of a triangle or an edge, h the
-///          triangle's least height, or the shorter edge times the sine between the edges. Where a
-///          vertex lies behind a triangle (distance below 0 from Method::Intersection) and an edge
-///          or a corner holds the closest point, the vertex comes to the outer side, at a signed
-///          distance above 0 and at most g.
+///          (2) the gap's gradient at vertex i is weights[i] normal. At these positions it is also
+///          the gradient of the distance, because the motion of the closest points changes the
+///          distance only in second order. There are two exceptions. Where radii differ along an
+///          element, the distance also changes with the radius at the closest point. Where the
+///          centres are at distance 0, the distance has no gradient; the row has that of the
+///          distance along the normal.
+///          (3) let a step along this row alone bring the gap to g > 0. It moves each vertex by a
+///          multiple of its inverse mass, its weight and the normal. Then the signed distance is g,
+///          up to (g + radii) (4 s / h)^2. Here s is the longest displacement of a vertex of a
+///          triangle or an edge; h is the triangle's least height, or the shorter edge times the
+///          sine of the angle between the edges. One case is weaker: a vertex behind a triangle
+///          (distance below 0 from Method::Intersection) whose closest point an edge or a corner
+///          holds. It comes to the outer side, at a signed distance above 0 and at most g.
 struct ConstraintRow {
-  std::array<std::uint32_t, 4> vertices;  ///< in the solver's numbering; may repeat
-  std::array<double, 4> weights;          ///< 0: not there
+  std::array<std::uint32_t, 4> vertices;  ///< numbers of the solver; one may occur several times
+  std::array<double, 4> weights;          ///< 0: this vertex does not count
   Eigen::Vector3d normal;                 ///< unit
   double offset;                          ///< L
 
-  /// L; positions: of all that the solver numbers.
+  /// L, at these positions, one for each vertex number of the solver.
   PALPATE_EXPORT double gap(std::span<const Eigen::Vector3d> positions) const;
 };
 
-/// The vertices of one geometry among those of a solver; a shape has none.
+/// The place of one geometry's vertices among those of a solver. Leave it empty for a shape.
 struct SolverVertices {
-  std::uint32_t first = 0;                       ///< number of the geometry's vertex 0
-  std::span<const Eigen::Vector3d> before, now;  ///< as handed to setPositions()
+  std::uint32_t first = 0;                       ///< the solver's number of vertex 0
+  std::span<const Eigen::Vector3d> before, now;  ///< L, in the world, one per vertex
 };
 
-/// Adds a row for each contact of a pair (a, b), in the order vertexTriangle(), triangleVertex(),
-/// edgeEdge(), shape(), each at its timeOfImpact, whatever method found it. Of a pair with a shape
-/// the side without any positions is the shape.
-/// Errors   WrongPositionCount names the first vertex that a contact has and `before` or `now` has
-///          not; no row is added.
+/// Appends a row for each contact of a pair (a, b), linearised at its timeOfImpact, whatever method
+/// found it. For a pair with a shape, leave the shape's SolverVertices empty.
+///
+/// Order    vertexTriangle(), triangleVertex(), edgeEdge(), shape(). Contacts in shapeShape() have
+///          no row.
+/// Errors   WrongPositionCount names the first vertex of a contact for which `before` or `now` has
+///          no position. No row is added then.
+/// Cost     linear in the contacts.
 PALPATE_EXPORT void appendRows(const CollisionData& contacts, const SolverVertices& a,
                                const SolverVertices& b, std::vector<ConstraintRow>& rows);
 
-/// Calls entry(context, row, column, value) for each entry of the rows' Jacobian that is not zero;
-/// column: 3 vertex + axis. appendTriplets() is the convenient form.
+/// Calls entry(context, row, column, value) for each entry that is not 0 of the rows' Jacobian,
+/// that is of the gaps' derivatives by the positions. column: 3 vertex + axis. If a row has one
+/// vertex twice, the entries of the two add up. appendTriplets() is more convenient.
 PALPATE_EXPORT void forEachEntry(std::span<const ConstraintRow> rows,
                                  void (*entry)(void* context, int row, int column, double value),
                                  void* context);
 
-/// The rows' Jacobian of gaps by positions as triplets (row, 3 vertex + axis, value), for a matrix
-/// that sums equal places, as Eigen::SparseMatrix::setFromTriplets() does.
+/// Appends the rows' Jacobian as triplets (row, 3 vertex + axis, value). The matrix must sum the
+/// values at equal places, as Eigen::SparseMatrix::setFromTriplets() does.
 /// Needs    Triplet(row, column, value), such as Eigen::Triplet<double>.
 template <class Triplet>
 void appendTriplets(std::span<const ConstraintRow> rows, std::vector<Triplet>& triplets) {
@@ -73,8 +77,8 @@ void appendTriplets(std::span<const ConstraintRow> rows, std::vector<Triplet>& t
       &triplets);
 }
 
-/// How setTransform() moves an analytical shape in the step; as it is, the shape stays in its body
-/// frame.
+/// The poses of an analytical shape at both ends of the step, as you passed them to setTransform().
+/// The default is a shape that setTransform() never placed.
 struct ShapeMotion {
   Eigen::Matrix3d rotationBefore = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translationBefore = Eigen::Vector3d::Zero();  ///< L
@@ -84,53 +88,55 @@ struct ShapeMotion {
 
 /// One geometry of a pair, for appendMotions().
 struct ContactSide {
-  SolverVertices vertices{};           ///< of a mesh, lines or points; a shape has none
-  std::span<const double> radii = {};  ///< L: none, one for all, or one for each vertex
-  ShapeMotion shape{};                 ///< of a shape
+  SolverVertices vertices{};           ///< of a mesh, lines or points; empty for a shape
+  std::span<const double> radii = {};  ///< L: none, one for all vertices, or one per vertex
+  ShapeMotion shape{};                 ///< for a shape only
 };
 
-/// Where a contact is and how its sides slide: what friction and haptics need beside its row. The
-/// first side is the one that the normal points to: its weights in the row are positive.
+/// The place of a contact and how its two sides slide along each other, for friction and haptics.
+/// The first side is the geometry to which the normal points. Its weights in the row are positive.
 ///
-/// Units    L. relativeDisplacement is that of the whole step; divided by the step's duration it is
-///          the relative velocity.
-/// Laws     (1) point - opposite = distance normal, within the error of the contact's own law:
-///          of Continuous without a thickness features touch, and both are one point.
-///          (2) of two geometries with vertices, normal . relativeDisplacement is the row's gap at
-///          `now` less its gap at `before`, within rounding. A direction t in place of the row's
-///          normal, with offset 0, is the row of sliding along t.
+/// Units    L. relativeDisplacement is that of the whole step. Divide it by the step's duration to
+///          get the relative velocity.
+/// Laws     (1) point - opposite = distance normal, within the error of the contact's own law. For
+///          Continuous without a thickness features touch, and both points are the same.
+///          (2) for two geometries with vertices, normal . relativeDisplacement is the row's gap at
+///          `now` less its gap at `before`, within rounding. To get the row of sliding along a
+///          tangent t, replace the normal by t and the offset by 0.
 struct ContactMotion {
-  /// On the surface of the first side at the contact's time; of lines and points a radius from the
-  /// centre line or centre.
+  /// On the surface of the first side, at the contact's time. For lines and points this is a radius
+  /// away from the centre line or centre.
   Eigen::Vector3d point;
-  Eigen::Vector3d opposite;  ///< the same of the other side
-  /// Of the first side's material at the contact, relative to the other side's, over the step. The
-  /// material moves with the contact's weights; lines and points do not spin.
+  Eigen::Vector3d opposite;  ///< the same on the other side
+  /// The displacement over the step of the first side's material at the contact, minus that of the
+  /// other side's material. The material moves with the contact's weights. Lines and points do not
+  /// spin about their axes.
   Eigen::Vector3d relativeDisplacement;
 };
 
-/// Adds a motion for each contact of a pair (a, b), in the order of appendRows(); then, where both
-/// are shapes, that of shapeShape(), which has no row: its first side is a.
+/// Appends a ContactMotion for each contact of a pair (a, b).
 ///
-/// Time     each contact is at its timeOfImpact. A shape's material there is that of its pose
-///          between the two ends, of which each point moves in a straight line.
+/// Order    that of appendRows(); for two shapes the contact in shapeShape(), whose first side is
+///          a.
+/// Time     each contact is at its timeOfImpact. At that time a shape is between its two poses;
+///          each of its points moves in a straight line.
 /// Needs    shapes that turn by less than 90 degrees in the step.
-/// Errors   WrongPositionCount as appendRows(), and for a contact with a shape, too; InvalidRadius
-///          unless radii are none, one, or one for each vertex. No motion is added.
-/// Cost     linear in the contacts; no allocation where the vector has room.
+/// Errors   WrongPositionCount as appendRows(); InvalidRadius unless radii are none, one, or one
+///          for each vertex. No motion is added then.
+/// Cost     linear in the contacts. The function allocates nothing if the vector has room.
 PALPATE_EXPORT void appendMotions(const CollisionData& contacts, const ContactSide& a,
                                   const ContactSide& b, std::vector<ContactMotion>& motions);
 
-/// Two directions that are perpendicular to a unit normal and to each other. In this order, with
-/// the normal as the third, they are a right-handed system.
+/// Two unit vectors that are perpendicular to a unit normal and to each other. (first, second,
+/// normal) is a right-handed system.
 using Tangents = std::array<Eigen::Vector3d, 2>;
 
-/// Tangents by a rule that depends only on the normal: the x and the y axis, turned as the shortest
-/// turn from the z axis to the normal turns them.
+/// The tangents of a normal, by a rule that depends on the normal only: the shortest rotation from
+/// the z axis to the normal turns the x and the y axis into them.
 ///
-/// Laws     (1) continuous but at the normal -z, which no rule for all normals can avoid: where the
-///          normal turns by a small angle e, tangents change by at most 2 e / |normal + z|.
-///          (2) tangents are unit and perpendicular within 4 ulp, next to -z as well.
+/// Laws     (1) the rule is continuous except at the normal -z; no rule is continuous everywhere.
+///          If the normal turns by a small angle e, tangents change by at most 2 e / |normal + z|.
+///          (2) tangents are unit and perpendicular within 4 ulp, also next to -z.
 /// Needs    a unit normal.
 /// Errors   none; the normal -z has the tangents -x and y.
 /// Source   Frisvad, Building an Orthonormal Basis from a 3D Unit Vector Without Normalization
@@ -138,19 +144,19 @@ using Tangents = std::array<Eigen::Vector3d, 2>;
 ///          rounding next to -z.
 PALPATE_EXPORT Tangents tangentsOf(const Eigen::Vector3d& normal);
 
-/// Tangents carried over from an earlier frame: turned as the shortest turn from the previous
-/// normal, their cross product, to the normal turns them. Friction that keeps a force or a stretch
-/// for each contact takes these.
+/// The tangents of a normal that continue those of an earlier frame: the shortest rotation from the
+/// previous normal to the normal turns the previous tangents into them. Use it for friction that
+/// keeps a force or a stretch for each contact.
 ///
 /// Laws     (1) each tangent changes by at most the change of the normal: |t - previous t| <=
-///          |normal - previous normal|, within 2^-40. No normal is an exception.
-///          (2) tangents are unit and perpendicular within 4 ulp, however many frames they are
-///          carried.
-///          (3) a normal that comes back by another way may come back with turned tangents: by the
-///          solid angle between the ways.
-/// Needs    a unit normal. Previous tangents of an earlier call, or zero.
-/// Errors   none; previous tangents that are zero or NaN are as none: tangentsOf(normal). Of a
-///          normal opposite to the previous one the first tangent stays and the second turns.
+///          |normal - previous normal|, within 2^-40. This holds for every normal.
+///          (2) tangents are unit and perpendicular within 4 ulp, over any number of frames.
+///          (3) if a normal returns by another path, its tangents may differ by an angle: the solid
+///          angle between the two paths.
+/// Needs    a unit normal; tangents from an earlier call, or zero.
+/// Errors   none. If the previous tangents are zero or NaN, the result is tangentsOf(normal). If
+///          the normal is opposite to the previous one, the first tangent stays and the second
+///          turns.
 PALPATE_EXPORT Tangents tangentsOf(const Eigen::Vector3d& normal, const Tangents& previous);
 
 }  // namespace palpate

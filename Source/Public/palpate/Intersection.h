@@ -6,11 +6,12 @@
 
 namespace palpate {
 
-/// Whether two triangles have a point in common, as closed sets: touching counts. Decided in exact
-/// arithmetic for any finite doubles.
+/// Whether two triangles have a point in common. Touching counts. Decided exactly for all finite
+/// doubles.
 ///
-/// Shapes   three corners each, any winding. Without area a triangle is the segment or the point that it covers.
-/// Errors   none; a NaN or an infinity in gives an answer without meaning.
+/// Shapes   three corners each, any winding. A triangle without area is the segment or the point
+///          that it covers.
+/// Errors   none. If a position is NaN or infinite, the result has no meaning.
 /// Cost     about 0.1 µs where floating point decides, 1 µs where features touch, 100 µs at worst.
 PALPATE_EXPORT bool trianglesIntersect(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1,
                                        const Eigen::Vector3d& a2, const Eigen::Vector3d& b0,

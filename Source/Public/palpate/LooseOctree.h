@@ -15,61 +15,71 @@
 
 namespace palpate {
 
+/// Sizes of all octrees of an OctreeBasedCD together.
 struct OctreeStatistics {
-  std::size_t nodesInUse = 0;      ///< that hold something in their subtree
-  std::size_t nodesAllocated = 0;  ///< eight per block of the pool, used or free
+  std::size_t nodesInUse = 0;      ///< nodes with an element in their subtree
+  std::size_t nodesAllocated = 0;  ///< eight per block of the pools, used or free
   std::size_t blocksInUse = 0, blocksFree = 0, blocksAllocated = 0;
-  int deepestLevel = 0;
+  int deepestLevel = 0;  ///< root: 0
   std::size_t elements = 0;
   std::size_t mostElementsInNode = 0;
-  std::vector<std::size_t> nodesByDepth, elementsByDepth;
-  std::size_t bytes = 0;  ///< boxes, keys, nodes and scratch together
+  std::vector<std::size_t> nodesByDepth, elementsByDepth;  ///< one entry per level, from the root
+  std::size_t bytes = 0;  ///< memory of boxes, keys, nodes and scratch
 };
 
-/// The octrees of the last update: one for each geometry that has elements.
+/// A view of the octrees of the last update, for diagnostics and display. There is one octree for
+/// each geometry that has elements; analytical shapes have none.
 ///
-/// This is a view. It belongs to its OctreeBasedCD, cannot be copied, and is valid as long as its
-/// owner lives. Each update changes what it shows. A geometry whose update was ended by an
-/// exception has no nodes until the next update.
-///
-/// A tree's root follows its geometry, so a body that moves as a whole keeps its cells. The tree of
-/// a geometry that setTransform() moves is in its body's frame, and so are all its boxes. See
+/// The tree's root follows its geometry, so that a body that moves as a whole keeps its cells. If
+/// setTransform() placed the geometry, the tree and all its boxes are in the body's frame. See
 /// Docs/Algorithms/LooseOctree.md.
+///
+/// Units    boxes are in L.
+/// Valid    as long as the OctreeBasedCD to which it belongs. Each update changes what it shows;
+///          node ids are valid until the next update. It cannot be copied. If an exception ended an
+///          update, the geometries concerned have no nodes until the next update.
+/// Threads  as const functions of OctreeBasedCD, but not while queries() updates octrees.
 class PALPATE_EXPORT LooseOctree {
  public:
   enum class NodeId : std::uint32_t {};
   enum class Update { Rebuilt, Refitted, Unchanged };
 
+  /// A node, copied. Its element span is valid until the next update.
   struct Node {
     GeometryId geometry;
     int depth;                        ///< root: 0
     Eigen::AlignedBox3d bounds;       ///< the cell's cube
     Eigen::AlignedBox3d looseBounds;  ///< the cube doubled about its centre
-    /// of all that the subtree holds, at most outward-rounded float wider
+    /// encloses all elements of the subtree; float, rounded outward
     Eigen::AlignedBox3d fittedBox;
-    /// group set: bit (geometry id mod 64) of each geometry in the subtree
+    /// set of geometries in the subtree: bit (geometry id mod 64) of each
     std::uint64_t geometries;
     std::optional<NodeId> parent;
-    /// by octant (bit 0: x, 1: y, 2: z); empty ones absent
+    /// by octant (bit 0: x, bit 1: y, bit 2: z); empty children are absent
     std::array<std::optional<NodeId>, 8> children;
-    std::span<const std::uint32_t> elements;  ///< triangles held by this node itself
+    std::span<const std::uint32_t> elements;  ///< ids of the elements in this node itself
     bool leaf;
   };
 
-  /// Nodes in use, root first, parents before children; of one geometry, or of all by geometry id.
+  /// The nodes in use of one geometry, or of all geometries by geometry id. A parent comes before
+  /// its children. Empty for a geometry without nodes, or an unknown one.
   std::vector<NodeId> nodes(GeometryId) const;
   std::vector<NodeId> nodes() const;
-  std::optional<NodeId> root(GeometryId) const;  ///< none: the geometry has no nodes
-  Node node(NodeId) const;              ///< throws IndexOutOfRange for a node that does not exist
-  Update lastUpdate(GeometryId) const;  ///< what the last update() did to its tree
+  std::optional<NodeId> root(GeometryId) const;  ///< none if the geometry has no nodes
+  Node node(NodeId) const;              ///< throws IndexOutOfRange if the node does not exist
+  Update lastUpdate(GeometryId) const;  ///< what the last update did to its tree
   OctreeStatistics statistics() const;
 
-  /// Every invariant: each element in exactly one node and within the fitted boxes above it,
-  /// fitted boxes tight, links both ways, free + used = allocated; after a rebuild also: each
-  /// element in the cell of its centre and inside that cell's loose bounds. Cost O(elements).
-  /// Returns what does not hold, one sentence each; empty when all does.
+  /// Checks every invariant of the trees: each element is in exactly one node and within the fitted
+  /// boxes above it; fitted boxes are tight; links agree in both directions; free and used blocks
+  /// add up to those allocated. After a rebuild it also checks that each element is in the cell of
+  /// its centre and inside that cell's loose bounds.
+  ///
+  /// Returns  one sentence for each violation; empty if there is none.
+  /// Cost     linear in the elements.
   std::vector<std::string> validate() const;
 
+  /// For OctreeBasedCD only.
   struct State;
   explicit LooseOctree(std::shared_ptr<const State> state) : m_state(std::move(state)) {}
   LooseOctree(const LooseOctree&) = delete;

@@ -22,146 +22,239 @@
 
 namespace palpate {
 
+/// A pair of geometries that is tested in each frame, with its settings.
 struct CollisionPair {
   GeometryId a, b;
   PairSettings settings;
 };
 
-/// Collision detection over deforming triangle meshes, lines, points and analytical shapes. Add
-/// geometries and pairs once. Then, in each step: setPositions(), detectCollision(), read
-/// collisionData(), advance().
+/// Collision detection of deforming triangle and tetrahedral meshes, lines and points, and of
+/// analytical shapes. Add geometries and pairs once. Then call in each step setPositions(),
+/// detectCollision(), collisionData() and advance().
 ///
 /// Step     a step runs from the positions `before` to the positions `now`; each vertex moves in a
 ///          straight line. advance() ends the step: `now` becomes `before`, for positions and
 ///          transforms of all geometries. A geometry that is not set after advance() is at rest.
-///          Within a step all calls may be made any number of times and in any order; an answer
+///          Within a step you may make all calls any number of times and in any order. An answer
 ///          depends only on the last values.
-/// Errors   every function that takes data throws palpate::Error and changes nothing. An exception
-///          while a frame is computed (memory, a predicate or callback that throws) leaves the last
-///          answers readable and the object ready for the next frame. Exact arithmetic on integers
-///          of any size is GMP's, which ends the process where it gets no memory.
-///          After a move everything but assignment and destruction throws InvalidCall; so does a
-///          call from a predicate or callback to the object that calls it.
-/// Threads  const functions are safe from many threads while no other function runs. Two objects
-///          share nothing.
-/// Floating point  the caller's rounding mode, traps and treatment of denormals change nothing.
+/// Units    L is the length unit of the positions. All lengths are in L.
+/// Errors   a function that takes data throws palpate::Error for invalid data and changes nothing.
+///          Each function lists its error codes. In addition, every function that takes a
+///          GeometryId, except contains(), throws UnknownGeometry for a geometry that was never
+///          added or was removed.
+///          If an exception ends a frame, the last answers stay readable and the object is ready
+///          for the next frame. Such exceptions come from memory, predicates, callbacks and
+///          executors. Exact arithmetic may use GMP, which ends the process if it gets no memory.
+///          After a move every function except assignment and destruction throws InvalidCall. A
+///          call from a predicate or callback to the object that calls it throws InvalidCall, too.
+/// Valid    spans and references that functions return are valid until the next call that is not
+///          const, unless a function says more.
+/// Threads  const functions are safe from any number of threads while no other function runs. Two
+///          objects share nothing but an executor.
+/// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
 class PALPATE_EXPORT OctreeBasedCD {
  public:
+  /// Errors   InvalidSettings for a setting outside its range, an audit folder that does not exist,
+  ///          or an executor whose concurrency() is below 1.
   explicit OctreeBasedCD(const Settings& = {});
   OctreeBasedCD(OctreeBasedCD&&) noexcept;
   OctreeBasedCD& operator=(OctreeBasedCD&&) noexcept;
   ~OctreeBasedCD();
 
-  /// Any soup: several components, borders, non-manifold edges, no triangles at all. Copied in.
+  /// Adds a triangle mesh. The library copies it. Any set of triangles is valid: several
+  /// components, borders, non-manifold edges, triangles without area, no triangles at all.
+  ///
+  /// Errors   NonFinitePosition; IndexOutOfRange for a vertex index; TooLarge for more than 2^28
+  ///          vertices or triangles, or if no geometry ids are left, as all functions that add one.
   GeometryId addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                              std::span<const Triangle> triangles);
-  /// A solid, deforming or not: its surface() is a triangle mesh to every pair and method, with
-  /// the solid's vertex ids. No face may be of more than two tetrahedra, no vertex twice in one.
+  /// Adds a tetrahedral mesh. Every pair and method treats its surface() as a triangle mesh, with
+  /// the vertex ids of the tetrahedral mesh.
+  ///
+  /// Errors   NonFinitePosition; IndexOutOfRange for a vertex index, or a tetrahedron that has one
+  ///          vertex twice; SharedFace for a face of more than two tetrahedra; TooLarge for more
+  ///          than 2^28 vertices or 2^26 tetrahedra.
   GeometryId addTetrahedralMesh(std::span<const Eigen::Vector3d> positions,
                                 std::span<const Tetrahedron> tetrahedra);
-  /// A thread of any shape: open, closed, branching, several. radius: L, of all, or one for each
-  /// vertex and linear between; finite, not negative. No segment may join a vertex with itself.
+  /// Adds a line mesh, such as a suture, a needle or a centre line. It may be open, closed or
+  /// branching, and consist of several parts. radius: L, of all vertices. radii: L, one per vertex,
+  /// linear along each segment. Radii are finite and not negative. They never change.
   ///
-  /// Edges meet triangles' edges and other lines' edges in edgeEdge(), vertices meet triangles;
-  /// points meet its segments in vertexTriangle() or triangleVertex(): segment {p, q} is triangle
-  /// {p, q, q}. Features touch where centre lines come closest, if their distance there is at most
-  /// the thickness and the radii there. Docs/Pairs.md has what each pair of kinds answers.
+  /// Contacts edgeEdge() has its segments with edges of triangles and with segments of line meshes.
+  ///          vertexTriangle() or triangleVertex() has its vertices with triangles, and points with
+  ///          its segments: segment {p, q} is the triangle {p, q, q} there. Features touch where
+  ///          their centre lines come closest, if the distance there is at most the thickness and
+  ///          the radii there. Docs/Pairs.md has the contacts of each pair of geometry types.
+  /// Errors   NonFinitePosition; IndexOutOfRange for a vertex index, or a segment that joins a
+  ///          vertex with itself; InvalidRadius, also if there is not one per vertex; TooLarge for
+  ///          more than 2^28 vertices or segments.
   GeometryId addLineMesh(std::span<const Eigen::Vector3d> positions,
                          std::span<const Segment> segments, double radius = 0.0);
   GeometryId addLineMesh(std::span<const Eigen::Vector3d> positions,
                          std::span<const Segment> segments, std::span<const double> radii);
-  /// Point i is vertex i. Points meet triangles, segments and points: point p is triangle {p, p,
-  /// p}. Of two point sets the first has the vertices, of one with itself the lower point is the
-  /// vertex.
+  /// Adds a point set. Point i is vertex i. Radii are as in addLineMesh().
+  ///
+  /// Contacts vertexTriangle() or triangleVertex() has its points with triangles, segments and
+  ///          other points: point p is the triangle {p, p, p} there. For two point sets the points
+  ///          of the first set are the vertices. For a point set with itself the lower point is the
+  ///          vertex.
+  /// Errors   NonFinitePosition; InvalidRadius, also if there is not one per point; TooLarge for
+  ///          more than 2^28 points.
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, double radius = 0.0);
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
-  /// A tool, a needle's tip, a table: placed by setTransform(). Meets triangles, lines and points
-  /// in CollisionData::shape(), and other shapes in shapeShape(), each by Method::Auto, Proximity
-  /// and Continuous. The thickness may be 0.
+  /// Adds an analytical shape, such as a tool, a needle's tip or a table. setTransform() places it.
+  /// shape() of a pair's CollisionData has its contacts with triangles, lines and points,
+  /// shapeShape() its contacts with another shape. Method::Auto, Proximity and Continuous answer
+  /// such pairs, also with a thickness of 0.
   ///
-  ///   const GeometryId tool = detection.addAnalyticalGeometry(Capsule{{0, 0, 0}, {0, 0,
-  ///   80}, 2.5}); detection.addCollisionPair(organ, tool, {Method::Proximity, 0.5});
+  ///   const Capsule probe{{0, 0, 0}, {0, 0, 80}, 2.5};
+  ///   const GeometryId tool = detection.addAnalyticalGeometry(probe);
+  ///   detection.addCollisionPair(organ, tool, {Method::Proximity, 0.5});
   ///   detection.setTransform(tool, rotation, tip);
   ///   detection.detectCollision();
   ///   for (const ShapeContact& c : detection.collisionData(organ, tool).shape())
   ///     push(c.vertices, c.weights, c.normal, 0.5 - c.distance);
+  ///
+  /// Errors   InvalidShape if a measure is out of the range that <palpate/AnalyticalGeometry.h>
+  ///          states.
   GeometryId addAnalyticalGeometry(const AnalyticalGeometry&);
-  void removeGeometry(GeometryId);  ///< and its pairs
+  /// Removes a geometry and all its pairs.
+  void removeGeometry(GeometryId);
 
-  bool contains(GeometryId) const;            ///< whether it was added and not removed
-  std::size_t vertexCount(GeometryId) const;  ///< 0 of a shape
-  /// The positions now, as setPositions() gave them: of a geometry that setTransform() has placed,
-  /// in the body's frame. Empty for a shape. The span lives until the next call that is not const.
+  /// Whether the geometry was added and not removed. Any id is valid.
+  bool contains(GeometryId) const;
+  std::size_t vertexCount(GeometryId) const;  ///< 0 for a shape
+  /// L: the positions now, as setPositions() gave them. If setTransform() has placed the geometry,
+  /// they are in the body's frame. Empty for a shape.
   std::span<const Eigen::Vector3d> positions(GeometryId) const;
-  /// L: an axis-aligned box in the world around all vertices now, with their radii, or around a
-  /// shape. Empty where there are no vertices; infinite for a plane. Exact but for rounding.
+  /// L: the axis-aligned box in the world around all vertices now with their radii, or around a
+  /// shape. Empty if there are no vertices; infinite for a plane. Exact up to rounding.
   /// Cost     linear in the vertices.
   Eigen::AlignedBox3d bounds(GeometryId) const;
 
-  /// Ends the step of all geometries: `now` becomes `before`. Results stay readable. Loops that
-  /// never call it sweep from where they began: see Validity::displacement.
+  /// Ends the step of all geometries: `now` becomes `before`. Results stay readable. If you stop
+  /// calling it, each detection tests the motion since the last call. If you never call it, the
+  /// one-array form of setPositions() leaves all geometries at rest.
   ///
-  /// Cost     does not grow with vertices.
+  /// Cost     does not grow with the number of vertices.
   void advance();
 
-  /// One array sets `now`; two arrays set both ends of the step. Only the second form and advance()
-  /// set `before`. In the step in which a geometry is added, or its topology is set, `before`
-  /// follows `now` unless it is given.
+  /// Sets the positions, one per vertex. One array sets `now`; two arrays set both ends of the
+  /// step. Only the second form and advance() set `before`. In the step in which a geometry is
+  /// added, or its topology is set, `before` follows `now` unless you pass it.
+  ///
+  /// Errors   WrongPositionCount, also for a shape; NonFinitePosition, also for a coordinate beyond
+  ///          2^1000 if setTransform() has placed the geometry.
+  /// Cost     linear in the vertices.
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> now);
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> before,
                     std::span<const Eigen::Vector3d> now);
-  /// Sets a new topology, as after a cut, and the positions at both ends of the step. Triangle
-  /// meshes only.
+  /// Sets the topology of a triangle mesh, as after a cut, and its positions at both ends of the
+  /// step. All elements are enabled afterwards.
+  ///
+  /// Errors   UnsupportedMethod for another geometry type; IndexOutOfRange and TooLarge as in
+  ///          addTriangleMesh(); NonFinitePosition as in setPositions().
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
-  /// The same of tetrahedral meshes only.
+  /// The same for a tetrahedral mesh.
+  ///
+  /// Errors   UnsupportedMethod for another geometry type; IndexOutOfRange, SharedFace and TooLarge
+  ///          as in addTetrahedralMesh(); NonFinitePosition as in setPositions().
   void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
                      std::span<const Tetrahedron>);
-  /// Of a tetrahedral mesh; the spans live until it is changed or removed.
+  /// The triangles with which a tetrahedral mesh collides. The spans are valid until
+  /// setTetrahedra() changes the mesh, or until it is removed.
+  ///
+  /// Errors   UnsupportedMethod for another geometry type.
   TetrahedralSurface surface(GeometryId) const;
 
-  /// Moves a geometry as a whole, from now on: a point x of its body's frame is at rotation x +
-  /// translation, which of vertices is the double ((r0 x + r1 y) + r2 z) + t. The positions given
-  /// before, and by later setPositions() and setTriangles(), are in the body's frame, and so is its
-  /// octree, which stays as it is. The step is as with setPositions(): one pose sets `now`, two
-  /// poses set both ends. Positions and transform are set independently of each other. Vertices
-  /// move in straight lines between the two ends (Validity::arcDeviation).
+  /// Places a geometry as a whole, from now on: a point x of the body's frame is at rotation x +
+  /// translation in the world. For a vertex this is the double ((r0 x + r1 y) + r2 z) + t.
+  /// Positions that were set before, or that setPositions(), setTriangles() or setTetrahedra() set
+  /// later, are in the body's frame. The octree is in that frame, too, and does not change.
   ///
-  /// Errors   InvalidTransform unless the rotation is one within 1e-9 and all is finite, below
-  ///          2^1000; UnsupportedMethod where the geometry has a pair with itself.
-  /// Cost     does not grow with the geometry.
+  /// As with setPositions(), one pose sets `now`, two poses set both ends of the step. Positions
+  /// and transform are independent of each other. Vertices move in straight lines between the two
+  /// ends (Validity::arcDeviation).
+  ///
+  /// Errors   InvalidTransform if `rotation` is no rotation: an entry of R^T R is off the identity
+  ///          by more than 1e-9, or the determinant is not positive. InvalidTransform also if an
+  ///          entry is not finite, or if a translation or position is beyond 2^1000.
+  ///          UnsupportedMethod if the geometry has a pair with itself.
+  /// Cost     does not grow with the size of the geometry, with two exceptions: the first call
+  ///          reads all positions, and each call for a ConvexHull turns its corners.
   void setTransform(GeometryId, const Eigen::Matrix3d& rotation,
                     const Eigen::Vector3d& translation);
   void setTransform(GeometryId, const Eigen::Matrix3d& rotationBefore,
                     const Eigen::Vector3d& translationBefore, const Eigen::Matrix3d& rotation,
                     const Eigen::Vector3d& translation);
-  /// Two geometries meet where each is in a group that the other's mask has; a pair that does not
-  /// has no contacts, no candidates and no cost, and is not trusted.
+  /// Sets which geometries this one collides with, and from which sides. Two geometries collide
+  /// only if the mask of each contains a group of the other. A pair that does not collide has no
+  /// contacts, no candidates and no cost, and is not trusted.
+  ///
+  /// Errors   InvalidSettings for a value that Sidedness does not have, and for Sidedness::Outer of
+  ///          lines, points and shapes.
   void setCollisionFilter(GeometryId, const CollisionFilter&);
-  /// Switches triangles, segments or points off, and all others on: they are no candidates. A
-  /// vertex or edge is on while anything that holds it is. SpatialQueries ask all.
+  /// Disables these elements and enables all others. An element is a triangle, a segment or a
+  /// point; of a tetrahedral mesh a triangle of surface(). Disabled elements are in no candidate
+  /// pair. A vertex or edge is tested as long as an enabled element holds it. SpatialQueries search
+  /// disabled elements, too.
+  ///
+  /// Errors   IndexOutOfRange.
+  /// Cost     linear in the elements. The octree stays as it is.
   void setDisabledElements(GeometryId, std::span<const std::uint32_t> elements);
 
-  /// a == b: self-collision, adjacent features excluded. Kinds and methods that cannot be tested
-  /// are refused: UnsupportedMethod.
+  /// Adds a pair that each detection tests. a == b tests a geometry with itself (self-collision):
+  /// features with a common vertex are no contacts. The order of a and b determines the order of
+  /// ids in all results.
+  ///
+  /// Errors   UnsupportedMethod if the method does not exist for these geometries (Docs/Pairs.md),
+  ///          also for a geometry with itself that setTransform() has placed; InvalidSettings;
+  ///          DuplicatePair; TooLarge for PairSettings::restDistance.
   void addCollisionPair(GeometryId a, GeometryId b, const PairSettings& = {});
+  /// Replaces the settings of a pair. (a, b) may be in either order.
+  ///
+  /// Errors   UnknownPair; UnsupportedMethod, InvalidSettings and TooLarge as in
+  ///          addCollisionPair().
   void setPairSettings(GeometryId a, GeometryId b, const PairSettings&);
-  /// Features that it refuses are no contacts and hide none; intersectingTriangles() and validity()
-  /// do not ask it. In the order in which the pair was added; an empty one refuses nothing.
+  /// Sets a predicate that refuses contacts. Refused features are no contacts, and they suppress no
+  /// other contact. intersectingTriangles() and validity() do not use the predicate. An empty
+  /// predicate refuses nothing. (a, b) is in the order in which the pair was added.
+  ///
+  /// Errors   UnknownPair; UnsupportedMethod for a pair with a shape.
   void setContactPredicate(GeometryId a, GeometryId b, ContactPredicate);
+  /// Removes a pair and its answer. (a, b) may be in either order.
+  ///
+  /// Errors   UnknownPair.
   void removeCollisionPair(GeometryId a, GeometryId b);
-  std::span<const CollisionPair> pairs() const;  ///< in the order added
-  /// As they were given last; (a, b) in the order in which the pair was added. The reference lives
-  /// until the next call that is not const.
+  std::span<const CollisionPair> pairs() const;  ///< in the order in which they were added
+  /// The settings as you passed them last. (a, b) is in the order in which the pair was added.
+  ///
+  /// Errors   UnknownPair.
   const PairSettings& pairSettings(GeometryId a, GeometryId b) const;
 
-  void update();  ///< boxes and octrees for the positions now
-  /// broad phase only, for a narrow phase of your own; fills candidatePairs()
+  /// Brings boxes and octrees to the positions now. Functions that need them do this themselves.
+  void update();
+  /// Runs the broad phase of every pair, for a narrow phase of your own. It fills candidatePairs()
+  /// and updates octrees if needed.
   void collectCandidates();
-  void detectCollision();  ///< broad and narrow phase of every pair; updates if needed
+  /// Runs the broad phase and the narrow phase of every pair, and updates octrees if needed. Pairs
+  /// for which nothing changed since the last detection keep their answer. A steady frame allocates
+  /// no memory.
+  ///
+  /// Errors   whatever a predicate or executor throws; InvalidSettings if an executor's run()
+  ///          returns too early; NotAvailable if a task called fork() (see makeThreadPool());
+  ///          TooLarge for PairSettings::restDistance after a change of topology. Predicates apart,
+  ///          update(), collectCandidates(), forEachCandidate() and queries() throw the same.
+  void detectCollision();
 
-  /// Hands candidate pairs to f(std::span<const ElementPair>) in batches, unsorted, one at a time,
-  /// not all from the calling thread; memory does not grow with their number. Updates if needed.
+  /// Passes the candidate pairs of (a, b) to f(std::span<const ElementPair>) in batches. The
+  /// batches are unsorted. Calls of f come one at a time, but from several threads. With
+  /// Engine::Octree memory does not grow with the number of pairs. Updates octrees if needed. (a,
+  /// b) may be in either order.
+  ///
+  /// Errors   UnknownPair; NotAvailable for a pair with a shape; InvalidCall if f
+  ///          calls a function of this object; whatever f throws.
   template <class F>
   void forEachCandidate(GeometryId a, GeometryId b, F&& f) {
     const CollisionPair pair{a, b, {}};
@@ -172,7 +265,8 @@ class PALPATE_EXPORT OctreeBasedCD {
         },
         const_cast<void*>(static_cast<const void*>(std::addressof(f))));
   }
-  /// Those of every pair to f(const CollisionPair&, std::span<const ElementPair>).
+  /// The same for every pair, with f(const CollisionPair&, std::span<const ElementPair>). Pairs
+  /// with a shape have no candidate pairs.
   template <class F>
   void forEachCandidate(F&& f) {
     forEachCandidateBatch(
@@ -183,34 +277,46 @@ class PALPATE_EXPORT OctreeBasedCD {
         const_cast<void*>(static_cast<const void*>(std::addressof(f))));
   }
 
-  /// Searches of the positions now. Updates octrees where they are not of these positions; a
-  /// LooseOctree that another thread reads at that time changes.
+  /// Spatial queries at the positions now. Updates octrees if needed. While it does, the
+  /// LooseOctree of octree() changes, so that no other thread may read it.
   ///
-  /// Cost     nothing but the update, which the next detection then need not do.
+  /// Cost     none but the update, which the next detection then does not repeat.
   SpatialQueries queries() const;
 
-  /// The answer of the last detectCollision(); (a, b) in the order in which the pair was added.
-  /// Errors   NotAvailable before the first detection of the pair.
+  /// The answer of the last detectCollision(). (a, b) is in the order in which the pair was added.
+  ///
+  /// Errors   UnknownPair; NotAvailable before the first detection of the pair.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;
-  /// Sorted by (a, b): every element pair whose boxes, inflated by half the pair's thickness and
-  /// largest radii each, overlap; more only by outward rounding. (a, a): each unordered pair once,
-  /// a < b, sharing no vertex. After detectCollision() only with Settings::keepCandidates.
+  /// The candidate pairs of the last collectCandidates(), or of the last detectCollision() with
+  /// Settings::keepCandidates. They are all pairs of enabled elements whose boxes overlap, each box
+  /// inflated by half the thickness and by the largest radius of its geometry. If the method needs
+  /// the motion in the step, the boxes enclose the whole step. Outward rounding may add pairs.
+  /// (a, b) may be in either order.
+  ///
+  /// Order    by (a, b), with `a` of the first geometry with which the pair was added. For a
+  ///          geometry with itself each unordered pair once, a < b, and no pair with a common
+  ///          vertex.
+  /// Errors   UnknownPair; NotAvailable for a pair with a shape, or if no candidates were kept.
+  /// Cost     the first call after a frame sorts the pairs.
   std::span<const ElementPair> candidatePairs(GeometryId a, GeometryId b) const;
-  const LooseOctree& octree() const;  ///< as of the last update()
-  /// Of the last detectCollision() or collectCandidates(), with the updates before it, or of an
-  /// update() since. Queries do not change it.
+  /// The octrees of all geometries, as of the last update. The reference is valid as long as this
+  /// object; each update changes what it shows.
+  const LooseOctree& octree() const;
+  /// Times and counts of the last detectCollision() or collectCandidates() with the updates before
+  /// it, or of a later update(). queries() does not change them.
   const FrameStatistics& statistics() const;
   const Settings& settings() const;
-  /// With Settings::audit, where the last detectCollision() and brute force differ, as far as its
-  /// sample of features shows: empty unless this library is at fault. Never an exception: a file
-  /// that could not be written is said in its failures.
+  /// The differences that the audit (Settings::audit) found between the last detectCollision() and
+  /// brute force. They are faults of this library; the audit finds those in its sample of features.
+  /// A capture that cannot be written is no exception: AuditFailure::fileError names the reason.
   std::span<const AuditFailure> auditFailures() const;
-  /// What detectCollision() would be given now, copied out; straight after a frame, that frame's.
+  /// A copy of everything that the next detectCollision() would compute its answers from. Directly
+  /// after a frame it is the problem of that frame.
   CollisionProblem problem() const;
 
  private:
   using BatchFunction = void (*)(void*, const CollisionPair&, std::span<const ElementPair>);
-  /// `only`: null: of every pair.
+  /// only: the pair, or null for every pair.
   void forEachCandidateBatch(const CollisionPair* only, BatchFunction, void* function);
 
   struct Implementation;
@@ -218,7 +324,11 @@ class PALPATE_EXPORT OctreeBasedCD {
   std::unique_ptr<Implementation> m_implementation;
 };
 
-/// One call from two meshes to their contacts, over the same code; static methods only.
+/// The contacts of two triangle meshes in one call, without a step. It runs the code of
+/// OctreeBasedCD on one thread.
+///
+/// Errors   UnsupportedMethod for Method::Continuous, which needs a step; those of
+///          addTriangleMesh() and addCollisionPair().
 PALPATE_EXPORT CollisionData detectCollision(const TriangleMeshView& a, const TriangleMeshView& b,
                                              const PairSettings& = {});
 

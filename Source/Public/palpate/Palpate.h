@@ -1,6 +1,6 @@
 #pragma once
 
-/// Everything that an ordinary user needs.
+/// Includes the headers that most programs need.
 #include <palpate/Capture.h>
 #include <palpate/CollisionData.h>
 #include <palpate/ConstraintRows.h>

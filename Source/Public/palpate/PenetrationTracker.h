@@ -10,32 +10,40 @@
 
 namespace palpate {
 
-/// How a vertex's penetration direction differs from that of the step before.
+/// How PenetrationTracker chose the penetration direction of a vertex. The *nearest direction*
+/// leads to the nearest surface point, the *last direction* is that of the last step, turned with
+/// the body.
 enum class DirectionChange {
-  Entered,  ///< the vertex was not inside then, or topology was set since: the nearest
-  None,     ///< the nearest
-  Kept,     ///< the nearest would have turned further than motion explains: the last direction
-  Jumped    ///< the same, but the last direction does not leave the body any more: the nearest
+  /// The nearest direction. The vertex was not inside in the last step, or topology was set since.
+  Entered,
+  None,  ///< the nearest direction; it turned no further than motion explains
+  /// The last direction. The nearest direction would have turned further than motion explains.
+  Kept,
+  /// The nearest direction, which turned further than motion explains. The last direction no longer
+  /// leaves the body within the allowed depth.
+  Jumped
 };
 
-/// A vertex inside a body, with a penetration direction that turns no further from step to step
-/// than motion explains, unless `change` says so.
+/// A vertex inside a body with a penetration direction that is stable over time: from step to step
+/// it turns no further than motion explains, unless `change` is Jumped or Entered.
 struct TrackedVertex {
-  /// Between the last direction and this, as lengths of differences of unit vectors, beyond what
-  /// motion explains.
+  /// Largest turn beyond what motion explains, as the length of the difference of the two unit
+  /// vectors; 0.5 is about 29 degrees.
   static constexpr double kMostTurn = 0.5;
-  /// A direction is kept while it leaves the body at most this many times as far away as the
-  /// nearest surface point is.
+  /// The last direction is kept only while its depth is at most this many times the distance to the
+  /// nearest surface point.
   static constexpr double kMostDepth = 2.0;
 
-  InsideVertex penetration;  ///< Kept: where the direction kept leaves the body
-  InsideVertex nearest;      ///< as findInsideVertices() has it
+  InsideVertex penetration;  ///< Kept: where the last direction leaves the body
+  InsideVertex nearest;      ///< as findInsideVertices() finds it
   DirectionChange change;
   friend bool operator==(const TrackedVertex&, const TrackedVertex&) = default;
 };
 
-/// The vertices of one geometry inside another, a closed body, with penetration directions that do
-/// not flip from step to step. Call update() in each step, after setPositions():
+/// Finds the vertices of one geometry that are inside another, a closed body, with penetration
+/// directions that are stable over time. The nearest surface point jumps where two parts of the
+/// surface are equally near; these directions do not. Call update() in each step, after
+/// setPositions():
 ///
 ///   PenetrationTracker tracker(needle, organ);
 ///   for (;;) {
@@ -44,27 +52,30 @@ struct TrackedVertex {
 ///     collisions.advance();
 ///   }
 ///
-/// Rule     the last direction is taken with the triangle of the last surface point, which turns
-///          with the body. Where the nearest direction is within kMostTurn + m of it, the nearest
-///          is taken; m is how far the vertex moved from that surface point, over the root of the
-///          last depth times the nearest depth. Else the last direction is kept if it meets the
-///          surface at most kMostDepth times as far away as the nearest point is. Else the nearest
-///          is taken, and the change is Jumped. So the depth is at most twice the least, and no
-///          direction jumps without being marked.
-/// Threads  one thread at a time.
+/// Laws     (1) the depth is at most kMostDepth times the least depth.
+///          (2) a direction turns further than kMostTurn + m only if its change is Jumped. Here m
+///          is the turn that motion explains: the distance that the vertex moved from its last
+///          surface point, divided by the square root of the last depth times the least depth now.
+/// Method   the last direction turns with the triangle of the last surface point. If the nearest
+///          direction is within kMostTurn + m of it, the nearest is taken (None). Else the last
+///          direction is kept if it leaves the body within kMostDepth times the least depth
+///          (Kept). Else the nearest is taken (Jumped).
+/// Threads  use an object from one thread at a time.
 class PALPATE_EXPORT PenetrationTracker {
  public:
+  /// The ids are those of the OctreeBasedCD whose queries update() receives; update() checks them.
   PenetrationTracker(GeometryId vertices, GeometryId body);
   PenetrationTracker(PenetrationTracker&&) noexcept;
   PenetrationTracker& operator=(PenetrationTracker&&) noexcept;
   ~PenetrationTracker();
 
-  /// Directions are followed from the last earlier step in which this was called with queries of
-  /// the same OctreeBasedCD, however often it is called in this step. Ascending vertices; the span
-  /// lives until the next call.
+  /// Computes the directions of this step. You may call it any number of times in a step: it
+  /// continues from the last earlier step in which it received queries of the same OctreeBasedCD.
+  /// The span is valid until the next call.
   ///
-  /// Errors   those of SpatialQueries::findInsideVertices(); what is remembered stays. InvalidCall
-  ///          after a move.
+  /// Order    by vertex, ascending.
+  /// Errors   those of SpatialQueries::findInsideVertices() with default settings; the tracker then
+  ///          keeps the directions of earlier steps. InvalidCall after a move.
   std::span<const TrackedVertex> update(const SpatialQueries&);
 
  private:

@@ -6,8 +6,8 @@
 
 namespace palpate {
 
-/// The instruction set that this process's frames run on, chosen at run time: "AVX3" (AVX-512),
-/// "AVX2", "SSE4" or "Scalar". Results do not depend on it.
+/// The instruction set that the library uses in this process: "AVX3" (AVX-512), "AVX2", "SSE4" or
+/// "Scalar". The library selects it at run time. Results do not depend on it.
 PALPATE_EXPORT std::string simdPath();
 
 }  // namespace palpate

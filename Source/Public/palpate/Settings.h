@@ -10,124 +10,157 @@
 
 namespace palpate {
 
-/// How `update()` brings an octree to the positions now.
+/// How an octree follows its geometry to the positions now. Contacts do not depend on it.
 enum class OctreeUpdate {
-  Auto,    ///< keep the tree and refit its boxes while that stays tight, else rebuild
-  Rebuild  ///< always rebuild from sorted keys
+  Auto,    ///< keep the tree and refit its boxes while they stay tight, else rebuild the tree
+  Rebuild  ///< rebuild the tree from sorted keys in every update
 };
 
 struct OctreeSettings {
-  int maxDepth = 32;  ///< deepest level, root = 0. [1, 60]. Cells too full at this level stay so.
-  /// a cell with more is split. [1, 1024]. Fewer: more nodes, tighter boxes.
+  /// Deepest level, in [1, 60]; the root has level 0. The library does not split cells of this
+  /// level.
+  int maxDepth = 32;
+  /// The library splits a cell that holds more elements, in [1, 1024]. A smaller number gives more
+  /// nodes and tighter boxes.
   int maxElementsPerLeaf = 32;
-  OctreeUpdate update = OctreeUpdate::Auto;  ///< contacts do not depend on it
+  OctreeUpdate update = OctreeUpdate::Auto;
 };
 
+/// How the library finds candidates. Both engines give the same contacts.
 enum class Engine {
   Octree,     ///< pooled loose octrees
-  BruteForce  ///< every triangle against every other: the oracle, behind the same calls
+  BruteForce  ///< every element against every other: the reference for tests, and very slow
 };
 
-/// A check of the library by itself, in any build: after each detectCollision() a sample of
-/// features is tested against all of the other mesh, with no octree.
+/// The audit: a check of the library by itself, in any build. After each detectCollision() it tests
+/// a sample of features against the whole other geometry, without an octree.
 struct AuditSettings {
-  /// Features tested per pair and frame: vertices and edges, or triangles for Intersection. At
-  /// least 0; 0: no audit, at no cost. Each costs a test against every triangle or edge.
+  /// Number of features that the audit tests per pair and frame, at least 0; 0: no audit and no
+  /// cost. Features are vertices and edges, or triangles for Intersection. The cost of each feature
+  /// is a test against every triangle or edge of the other geometry.
   int features = 0;
-  std::uint64_t seed = 0;  ///< same seed, frame number and pair: same sample
-  /// Where to keep a file (see <palpate/Capture.h>) for each pair and frame with failures: a folder
-  /// that is there. Empty: none are kept. Files that are there stay as they are.
+  std::uint64_t seed = 0;  ///< the sample depends only on the seed, the frame number and the pair
+  /// An existing folder. The audit writes a capture (<palpate/Capture.h>) into it for each pair and
+  /// frame with failures, and never overwrites a file. Empty: the audit writes no files.
   std::filesystem::path folder{};
-  int mostFiles = 100;  ///< over the life of an OctreeBasedCD, at least 0
+  int mostFiles = 100;  ///< most files over the life of an OctreeBasedCD, at least 0
 };
 
+/// Settings of an OctreeBasedCD, for its whole life. Its constructor throws InvalidSettings for a
+/// value outside its range, and for an audit folder that does not exist.
 struct Settings {
   OctreeSettings octree{};
   Engine engine = Engine::Octree;
-  /// Threads of a frame, in [0, 1024]; 0: one for each core, or the executor's concurrency. Results
-  /// do not depend on it. Where the system refuses to start so many, those that it started do the
-  /// work.
+  /// Number of threads of a frame, in [0, 1024]; 0: one per core, or the executor's concurrency. If
+  /// the system refuses to start so many, the threads that started do the work. Results do not
+  /// depend on it.
   int threads = 0;
-  /// detectCollision() also fills candidatePairs(); costs their memory and a sort
+  /// Whether detectCollision() also fills candidatePairs(). This costs memory for the pairs, and
+  /// candidatePairs() sorts them.
   bool keepCandidates = false;
   AuditSettings audit{};
-  /// Runs the work of a frame, on at most `threads` of its threads; several objects may share one.
-  /// Null: a pool of the object's own. Results do not depend on it. It is no part of a
-  /// CollisionProblem or a capture.
+  /// Runs the work of a frame on at most `threads` of its threads. Several objects may share one
+  /// executor. Null: the object makes its own thread pool. Results do not depend on it. A
+  /// CollisionProblem and a capture do not contain it.
   std::shared_ptr<Executor> executor{};
 };
 
-enum class Method { Auto, Intersection, Proximity, Continuous };
-
-enum class Contacts {
-  /// One per pair of closest features. Proximity: where the distance is smallest. Continuous, and
-  /// impacts of Auto: of all impacts between the same two features (vertex, edge or interior of a
-  /// triangle, by the weights other than 0) the earliest; of equally early ones the first in
-  /// vertexTriangle(), triangleVertex(), edgeEdge(). So a dropped contact is never the first impact
-  /// of its features, every vertex with a weight other than 0 keeps its earliest time, and
-  /// earliestTimeOfImpact() is that of All. Docs/Pairs.md has the reasons.
-  Distinct,
-  All  ///< every pair that the method's definition includes
+/// The definition of a contact. Docs/Pairs.md lists the methods of each pair of geometry types.
+enum class Method {
+  /// The library chooses among the other methods in each frame, from the motion in the step. It
+  /// answers every pair that any method answers. Wherever Continuous answers the pair, Auto misses
+  /// no impact within the step. See <palpate/Validity.h>.
+  Auto,
+  /// Triangles that intersect at the step's end, decided exactly. Touching counts.
+  Intersection,
+  /// Features whose distance at the step's end is at most the thickness and their radii.
+  Proximity,
+  /// Features whose distance is at most the thickness and their radii at some time of the step,
+  /// with the time of impact: continuous collision detection (CCD).
+  Continuous
 };
 
+/// Which of several contacts at the same features the library reports.
+enum class Contacts {
+  /// One contact for each pair of closest features. A feature is a vertex, an edge or the interior
+  /// of a triangle. Proximity reports the features that hold the smallest distance. Continuous, and
+  /// the impacts of Auto, report the earliest of all impacts between the same two features. Among
+  /// equally early impacts the first in the order vertexTriangle(), triangleVertex(), edgeEdge()
+  /// remains. A dropped contact is therefore never the first impact of its features. Every vertex
+  /// with a weight other than 0 keeps its earliest time, and earliestTimeOfImpact() is that of All.
+  /// Docs/Pairs.md has the reasons.
+  Distinct,
+  All  ///< every feature pair that the method's definition includes
+};
+
+/// How one pair is tested. Docs/Pairs.md lists which methods use which settings. A setting that a
+/// method refuses, or a value outside its range, throws InvalidSettings.
 struct PairSettings {
-  /// Auto: per frame Proximity, Continuous, or each for the features it suits. It answers every
-  /// pair that any method answers, and misses no impact within the step of any pair that Continuous
-  /// answers. See <palpate/Validity.h>.
   Method method = Method::Auto;
-  /// L, finite, not negative. Proximity needs it positive, or radii. Intersection's contacts do not
-  /// depend on it.
+  /// L, finite, not negative. The contact distance, which IPC users know as d-hat: features at most
+  /// this far apart are contacts. Radii of lines and points add to it. Proximity needs a positive
+  /// thickness, or radii, or an analytical shape. The contacts of Intersection do not depend on it.
   double thickness = 0.0;
-  /// Intersection reports all.
+  /// Intersection reports all contacts in either case.
   Contacts contacts = Contacts::Distinct;
-  /// L. For Auto only: any other method refuses it unless it is negative. Two triangle or
-  /// tetrahedral meshes, Distinct with a thickness: features that move at most this far, relative
-  /// to each other, are tested at the step's end, with up to this added to the thickness; others
-  /// for impacts. Larger: faster, more contacts that are further apart. Negative: half the
-  /// thickness.
+  /// L, finite. Only Auto accepts a value that is not negative. Negative: half the thickness. It
+  /// has an effect for two triangle or tetrahedral meshes with Distinct and a positive thickness.
+  /// Auto tests features that move at most this far, relative to each other, at the step's end. The
+  /// thickness is up to this much larger there. Auto tests other features for impacts. A larger
+  /// value is faster and gives more contacts of features that are further apart.
   double motionTolerance = -1.0;
-  /// L, finite, not negative. A triangle or line mesh with itself: features that are nearer than
-  /// this along its edges, in the shape that it was added in or that setTriangles() gave, are no
-  /// contacts. 0: only features with a common vertex.
+  /// L, finite, not negative. Only a triangle, tetrahedral or line mesh with itself accepts a value
+  /// other than 0. Features that are nearer to each other than this along the mesh's edges are no
+  /// contacts. These distances are measured once, at the positions with which the mesh was added or
+  /// its topology was set. More than 2^28 pairs of vertices that are so near throw TooLarge. 0:
+  /// only features with a common vertex are no contacts.
   double restDistance = 0.0;
-  /// Of the step, in [2^-50, 1]: reported times of impact are at most this early, never late. With
-  /// a thickness features are reported, too, that come within it and this part of their motion;
-  /// without, the same ones whatever this is. No effect on Proximity and Intersection, which look
-  /// at one time.
+  /// Fraction of the step, in [2^-50, 1]. A reported time of impact is never late, and early by at
+  /// most this. With a thickness, Continuous and Auto also report features that only come within
+  /// the thickness and this fraction of their relative motion. Without a thickness the set of
+  /// contacts does not depend on it. Proximity and Intersection test one time only and do not use
+  /// it.
   double timeTolerance = 1e-6;
-  /// Method::Continuous only: no contacts, only CollisionData::earliestTimeOfImpact(), which is
-  /// that of all contacts; much cheaper. `contacts` has no effect then.
+  /// Only Continuous accepts true. The pair then reports no contacts, only
+  /// CollisionData::earliestTimeOfImpact(), which is that of all contacts. This is much cheaper.
+  /// `contacts` has no effect then.
   bool earliestTimeOnly = false;
 };
 
-/// From where a triangle mesh is touched.
+/// From which sides other geometries can touch a triangle mesh.
 enum class Sidedness {
   Both,
-  /// Only from where its triangles' winding normals point. A contact whose direction, from the
-  /// feature of this mesh that holds the closest point, points inward is none. Intersection's
-  /// contacts are on surfaces that cross: none of them points inward.
+  /// Only from the side to which the winding normals point. The direction of a contact leads from
+  /// the feature of this mesh that holds the closest point to the other closest point. If it points
+  /// inward there, the contact is dropped. Contacts of Intersection, and contacts with analytical
+  /// shapes, are never dropped.
   Outer
 };
 
-/// What of a geometry takes part in its pairs.
+/// Which pairs a geometry takes part in, and from which sides.
 struct CollisionFilter {
-  std::uint32_t groups = 1;  ///< bits: the groups that it is in
-  std::uint32_t mask =
-      0xffffffff;  ///< bits: the groups that it meets. Both must ask for each other
-  Sidedness sidedness = Sidedness::Both;  ///< Outer: of triangle meshes only
+  std::uint32_t groups = 1;  ///< bits: the groups that the geometry belongs to
+  /// bits: the groups that the geometry collides with. Two geometries collide only if the mask of
+  /// each contains a group of the other.
+  std::uint32_t mask = 0xffffffff;
+  Sidedness sidedness = Sidedness::Both;  ///< Outer: triangle and tetrahedral meshes only
   friend bool operator==(const CollisionFilter&, const CollisionFilter&) = default;
 };
 
-/// Two features that are about to be a contact, of the pair's first and second geometry.
+/// Two features that may become a contact. `a` belongs to the pair's first geometry, `b` to the
+/// second.
 struct ContactFeatures {
   enum class Kind { VertexTriangle, TriangleVertex, EdgeEdge } kind;
-  /// a vertex or a triangle (twice the same number), or an edge's vertices, lower first
+  /// The index of a vertex or triangle, twice; or the two vertices of an edge, lower first.
   std::array<std::uint32_t, 2> a, b;
 };
 
-/// Whether two features may be a contact. Called by several threads at once, in any order, only for
-/// features near enough; must answer the same each time in a frame. An exception ends the
-/// frame, which throws it.
+/// Returns whether two features may be a contact. The library calls it only for features that are
+/// near enough, once or several times each. A call does not mean that the features are a contact.
+///
+/// Needs    within one frame it must always return the same for the same features.
+/// Threads  several threads call it at once, in any order.
+/// Errors   an exception ends the frame, and detectCollision() throws it.
 using ContactPredicate = std::function<bool(const ContactFeatures&)>;
 
 }  // namespace palpate

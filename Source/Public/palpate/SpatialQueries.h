@@ -14,8 +14,9 @@
 
 namespace palpate {
 
-/// Searches over the geometries of one OctreeBasedCD, at their positions now. Get it from
-/// OctreeBasedCD::queries(). Collision filters do not apply, and disabled elements take part.
+/// Spatial queries over the geometries of one OctreeBasedCD, at their positions now. Get the object
+/// from OctreeBasedCD::queries(). Collision filters do not apply. Queries search disabled elements,
+/// too.
 ///
 ///   const SpatialQueries queries = collisions.queries();
 ///   std::vector<InsideVertex> inside;
@@ -23,39 +24,49 @@ namespace palpate {
 ///   for (const InsideVertex& v : inside) pushOut(v.vertex, v.depth * v.direction);
 ///
 /// Valid    until positions, transforms, topology or geometries change, or advance() is called. A
-///          detection leaves it valid. Copies are cheap.
+///          detection leaves it valid. Copies are cheap and valid as long.
 /// Threads  all functions are safe from any number of threads.
-/// Results  go to the caller's vectors, which are overwritten. Where a function throws, they are
-///          unchanged.
-/// Errors   InvalidCall where the queries are not valid any more, or where a predicate or callback
-///          asks while its OctreeBasedCD computes; UnknownGeometry.
+/// Returns  lists go to the caller's vectors and replace their content. If a function throws, the
+///          vector is unchanged.
+/// Errors   every function throws InvalidCall if the object is no longer valid or was moved from,
+///          or if a predicate or callback calls it while the OctreeBasedCD computes;
+///          UnknownGeometry.
 class PALPATE_EXPORT SpatialQueries {
  public:
-  /// The vertices of one geometry that are inside another, a closed body, also where it is concave
-  /// and where no triangles cross. `out`: ascending vertices.
+  /// Finds the vertices of one geometry that are inside another, the body. It finds them at any
+  /// depth, also in concave bodies, and where no triangles intersect.
   ///
-  /// Inside: the body's winding number about the vertex, decided exactly, is not zero, or, for a
-  /// tetrahedral mesh, the vertex is in a tetrahedron; and the vertex does not lie on the surface.
-  /// The surface point is the nearest one; of several equally near, that on the lowest triangle.
-  /// Depth and surface point are as exact as vertexTriangleDistance().
-  /// InsideRule::WindingNumber: for bodies with holes, and for any set of triangles.
-  /// Errors   NotClosed names the first edge at fault; InvalidSettings for one geometry twice, and
-  ///          for a margin outside its range; UnsupportedMethod for a shape as `vertices`.
+  /// A vertex is inside by the rule in InsideSettings, and does not lie on the surface. With
+  /// InsideRule::Closed a vertex is inside a triangle mesh if the mesh's winding number about it is
+  /// not 0. It is inside a tetrahedral mesh if it is in a tetrahedron. Both are decided exactly.
+  /// InsideRule::WindingNumber also takes bodies with holes, and any set of triangles.
+  ///
+  /// Each vertex comes with its surface point: the nearest point of the surface, of several equally
+  /// near ones that on the lowest triangle. Depth and surface point have the accuracy of
+  /// vertexTriangleDistance().
+  ///
+  /// Order    by vertex, ascending.
+  /// Errors   NotClosed if the body has no inside: it is not a mesh, or with InsideRule::Closed it
+  ///          is a triangle mesh with defects (the message names the first edge); InvalidSettings
+  ///          if both geometries are the same, or if a setting is out of range; UnsupportedMethod
+  ///          if `vertices` is a shape.
   void findInsideVertices(GeometryId vertices, GeometryId body, std::vector<InsideVertex>& out,
                           const InsideSettings& = {}) const;
-  /// The vertices of one geometry in the tetrahedra of another, or on their boundary, decided
-  /// exactly. `out`: ascending vertices, each once, in the lowest of its tetrahedra. A tetrahedron
-  /// that deformation inverted holds points as others do; one without volume has none.
+  /// Finds the vertices of one geometry that are in a tetrahedron of another, or on its boundary,
+  /// decided exactly. A vertex that several tetrahedra contain is in the lowest of them. Inverted
+  /// tetrahedra contain points as others do; tetrahedra without volume contain none.
   ///
-  /// Errors   UnsupportedMethod for a body that is no tetrahedral mesh and for a shape as
-  ///          `vertices`, InvalidSettings for one geometry twice.
+  /// Order    by vertex, ascending, each vertex once.
+  /// Errors   UnsupportedMethod if the body is no tetrahedral mesh or if `vertices` is a shape;
+  ///          InvalidSettings if both geometries are the same.
   void findEmbeddedVertices(GeometryId vertices, GeometryId body,
                             std::vector<EmbeddedVertex>& out) const;
-  /// The same for one point.
-  /// Errors   NonFinitePosition, too.
+  /// The same for one point, in L in the world. Returns nothing if no tetrahedron contains it.
+  /// Errors   UnsupportedMethod if the body is no tetrahedral mesh; NonFinitePosition.
   std::optional<TetrahedronPoint> findTetrahedron(GeometryId body,
                                                   const Eigen::Vector3d& point) const;
 
+  /// For OctreeBasedCD::queries() only.
   class Source;
   explicit SpatialQueries(std::shared_ptr<Source>);
 
@@ -64,7 +75,7 @@ class PALPATE_EXPORT SpatialQueries {
   Source& valid() const;  ///< throws InvalidCall
 
   std::shared_ptr<Source> m_source;
-  std::uint64_t m_state;  ///< Source::state() when it was made
+  std::uint64_t m_state;  ///< Source::state() when this object was made
 };
 
 }  // namespace palpate

@@ -14,14 +14,15 @@
 
 namespace palpate {
 
-/// The step of one geometry. Each vertex moves in a straight line from `before` to `now`.
+/// The step of one geometry, for StepGuard::hold(). Each vertex moves in a straight line from
+/// `before` to `now`.
 struct GuardedStep {
   GeometryId geometry;
   std::span<const Eigen::Vector3d> before;  ///< L, one for each vertex
-  std::span<Eigen::Vector3d> now;           ///< L, one for each vertex; hold() changes it
+  std::span<Eigen::Vector3d> now;           ///< L, one for each vertex; hold() may change it
 };
 
-/// A vertex of a geometry of a StepGuard.
+/// A vertex of one of the geometries of a StepGuard.
 struct GuardedVertex {
   GeometryId geometry;
   std::uint32_t vertex;
@@ -29,9 +30,10 @@ struct GuardedVertex {
   friend auto operator<=>(const GuardedVertex&, const GuardedVertex&) = default;
 };
 
-/// Keeps geometries from passing through each other at the end of a solver's step. Constraints are
-/// met one after another, so a solver may leave an impact in its step. hold() moves vertices of
-/// features that touch within the step from `now` back to `before`, until no features touch.
+/// Prevents geometries from passing through each other at the end of a solver's step. A solver
+/// meets constraints one after another, so that an impact may remain in its step. hold() finds
+/// features that touch within the step, and moves their vertices from `now` back to `before`, until
+/// no features touch.
 ///
 ///   StepGuard guard;
 ///   const GeometryId organ = guard.addTriangleMesh(positions, triangles);
@@ -43,84 +45,99 @@ struct GuardedVertex {
 ///                          GuardedStep{thread, lineBefore, lineNow}};
 ///   guard.hold(steps);
 ///
-/// Features  a vertex and a triangle, or two edges, as of Method::Continuous without a thickness;
-///           of a geometry with itself those without a common vertex. Radii are not asked: lines
-///           are their centre lines, and points are their centres. What touches at the first or the
-///           last moment of the step touches.
+/// Features  a vertex and a triangle, or two edges, as in Method::Continuous without a thickness;
+///           for a geometry with itself those without a common vertex. Radii have no effect: lines
+///           are their centre lines, points are their centres. Features that touch only at the
+///           first or the last moment of the step touch.
 /// Laws      (1) after hold() no features of the given pairs touch within the step. This is decided
 ///           exactly on the given doubles.
 ///           (2) after hold() each vertex is exactly at `before` or exactly at the `now` that the
 ///           solver gave.
-///           (3) a step that hold() ended starts the next one without a touch, if the next `before`
-///           is this `now`.
-///           (4) hold() needs at most one round more than it holds vertices: each round but the
-///           last moves at least one vertex back, and no vertex moves back twice.
-/// Limits    surfaces that already cross at `before` are not parted: only features that touch
-///           count. Intersection at the start is for Method::Intersection and
-///           Validity::startedApart. Analytical geometries and transforms are not guarded: give a
-///           tool as a mesh, with its vertices at both ends of the step.
+///           (3) if the next `before` is this `now`, the next step starts without a touch.
+///           (4) if hold() moves n vertices back, it needs at most n + 1 rounds: each round except
+///           the last moves at least one vertex back, and no vertex moves back twice.
+/// Limits    surfaces that cross already at `before` stay as they are: only features that touch
+///           count. Method::Intersection and Validity::startedApart find such surfaces. Analytical
+///           geometries and transforms are not guarded: add a tool as a mesh, with its vertices at
+///           both ends of the step.
 /// Cost      each round is one detection by Method::Continuous of the pairs whose positions changed
-///           since the round before, with octrees of the guard's own. A geometry that is not
-///           given costs nothing. Steady steps allocate nothing.
-/// Order     results do not depend on the number of threads, nor on the order of the steps.
-/// Errors    every function throws palpate::Error where its data are wrong, and then changes nothing:
-///           neither the guard nor the caller's positions. After a move everything but assignment
-///           and destruction throws InvalidCall.
-/// Threads   an object is used from one thread at a time. Two objects share nothing.
+///           since the round before, with octrees that belong to the guard. A geometry that you do
+///           not pass to hold() costs nothing. Steady steps allocate nothing.
+/// Order     results depend neither on the number of threads nor on the order of the steps.
+/// Errors    every function throws palpate::Error for invalid data, and then changes neither the
+///           guard nor the caller's positions. Every function that takes a GeometryId throws
+///           UnknownGeometry. After a move every function except assignment and destruction throws
+///           InvalidCall.
+/// Threads   use an object from one thread at a time. Two objects share nothing but an executor.
 class PALPATE_EXPORT StepGuard {
  public:
-  /// settings: of the detections; both engines hold the same vertices.
+  /// settings: those of the detections; held vertices do not depend on them.
+  /// Errors   InvalidSettings.
   explicit StepGuard(const Settings& = {});
   StepGuard(StepGuard&&) noexcept;
   StepGuard& operator=(StepGuard&&) noexcept;
   ~StepGuard();
 
-  // Ids are the guard's own. Data are checked as by the functions of OctreeBasedCD of these names.
+  // These functions add geometries to the guard, which has ids of its own. Their parameters and
+  // errors are those of the functions of OctreeBasedCD with these names.
+
   GeometryId addTriangleMesh(std::span<const Eigen::Vector3d> positions, std::span<const Triangle>);
-  /// Its surface is guarded: a vertex that is on no face of the surface never moves back.
+  /// The guard holds the surface. A vertex that belongs to no face of the surface never moves back
+  /// on its own.
   GeometryId addTetrahedralMesh(std::span<const Eigen::Vector3d> positions,
                                 std::span<const Tetrahedron>);
   GeometryId addLineMesh(std::span<const Eigen::Vector3d> positions, std::span<const Segment>);
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions);
-  /// New topology, as after a cut. The vertices that stay keep their groups and stay fixed;
-  /// vertices that are new are free.
+  /// These set a new topology, as after a cut, with the errors of OctreeBasedCD. Vertices that stay
+  /// keep their groups and stay fixed; new vertices are free.
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
   void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
                      std::span<const Tetrahedron>);
-  void removeGeometry(GeometryId);  ///< and its pairs
+  /// Removes a geometry and its pairs.
+  void removeGeometry(GeometryId);
 
-  /// These never pass through each other. a == b: the geometry does not pass through itself.
+  /// The two geometries must not pass through each other. a == b: the geometry must not pass
+  /// through itself.
+  ///
+  /// Errors   DuplicatePair; UnsupportedMethod.
   void addPair(GeometryId a, GeometryId b);
-  void removePair(GeometryId a, GeometryId b);
-  /// Triangles, segments or points that may be passed through, as where a needle pierced; all
-  /// others are on. A vertex or edge is on while an element that holds it is.
+  void removePair(GeometryId a, GeometryId b);  ///< in either order; throws UnknownPair
+  /// Disables these triangles, segments or points and enables all others. Other geometries may pass
+  /// through disabled elements, as where a needle pierced. A vertex or edge is enabled while an
+  /// enabled element holds it.
+  ///
+  /// Errors   IndexOutOfRange.
   void setDisabledElements(GeometryId, std::span<const std::uint32_t> elements);
 
-  /// These vertices move back together: all, or none. Groups with a common vertex become one.
+  /// These vertices move back together: all or none. Groups with a common vertex become one group.
+  ///
+  /// Errors   IndexOutOfRange.
   void addRigidGroup(std::span<const GuardedVertex>);
-  /// All vertices of a geometry.
+  /// The same for all vertices of a geometry.
   void addRigidGroup(GeometryId);
-  /// These vertices never move back, as those of a tool that nothing holds; all others may. A group
-  /// with a fixed vertex never moves back.
+  /// These vertices of a geometry never move back, and all its other vertices may. Use it for a
+  /// tool that nothing holds. A group with a fixed vertex never moves back.
+  ///
+  /// Errors   IndexOutOfRange.
   void setFixedVertices(GeometryId, std::span<const std::uint32_t> vertices);
 
   /// Moves vertices in the given `now` back to their `before`, until no features touch within the
-  /// step. All vertices of features that touch move back, with their groups, but fixed ones.
-  /// A geometry that is not given is at rest where the last successful hold() left it, or where it
-  /// was added or given a topology.
+  /// step. If features touch, all their vertices move back with their groups, except fixed ones. A
+  /// geometry without a step in `steps` is at rest, where the last successful hold() left it or
+  /// where it was added or received a topology.
   ///
   /// Returns  the number of vertices that moved back; vertices at rest do not count.
-  /// Errors   ImpactRemains names the geometries and features that touch and cannot be parted:
-  ///          they touched before the step, or all their vertices that move are fixed.
-  ///          UnknownGeometry, WrongPositionCount and NonFinitePosition as setPositions() of
-  ///          OctreeBasedCD; InvalidSettings for a geometry that is given twice.
+  /// Errors   ImpactRemains if features touch and cannot move back: they touched before the step,
+  ///          or all their vertices that move are fixed. The message names geometries and features.
+  ///          UnknownGeometry, WrongPositionCount and NonFinitePosition as in setPositions() of
+  ///          OctreeBasedCD; InvalidSettings if a geometry has two steps.
   std::size_t hold(std::span<const GuardedStep> steps);
 
-  /// The vertices that the last successful hold() moved back, ascending. The span lives until the
-  /// next hold().
+  /// The vertices that the last successful hold() moved back, ascending. The span is valid until
+  /// the next hold().
   std::span<const GuardedVertex> held() const;
-  std::size_t rounds() const;  ///< detections of the last successful hold()
+  std::size_t rounds() const;  ///< number of detections in the last successful hold()
 
  private:
   struct Implementation;

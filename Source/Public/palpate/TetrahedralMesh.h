@@ -8,32 +8,33 @@
 
 namespace palpate {
 
-/// The triangles that a tetrahedral mesh collides with: the faces of exactly one tetrahedron, each
-/// with the one whose face it is.
+/// The triangles with which a tetrahedral mesh collides: the faces of exactly one tetrahedron.
+/// tetrahedra[i] is the tetrahedron to which triangles[i] belongs. Contacts name these triangles.
 ///
-/// Order    by tetrahedron, then as its corners are that the faces do not have. So `tetrahedra`
-///          ascends.
-/// Winding  outward of the tetrahedron as it is at rest, whichever way its corners are given: that
-///          is decided exactly. One without volume is wound as its neighbours are, from one with
-///          volume on by the fewest faces, of several ways one; with none of these, as the lowest
-///          is given. Deformed and inverted, triangles keep their winding.
+/// Order    by tetrahedron, ascending; faces of one tetrahedron in the order of the corners that
+///          they do not have.
+/// Winding  outward at rest, decided exactly; the order in which you pass the corners does not
+///          matter. A tetrahedron without volume is wound as its neighbours are: the library goes
+///          from tetrahedra with volume to their neighbours, over the fewest faces. If no such
+///          tetrahedron is connected to it, the lowest tetrahedron counts as wound correctly.
+///          Deformation does not change the winding, also if it inverts a tetrahedron.
 struct TetrahedralSurface {
   std::span<const Triangle> triangles;
   std::span<const std::uint32_t> tetrahedra;
 };
 
-/// Where a point is in a tetrahedral mesh: the weighted sum of the corners' positions.
+/// A point in a tetrahedral mesh. Its position is the weighted sum of the corners' positions.
 ///
-/// Weights  sum 1 within 2^-50; each at least 0, and exactly 0 where the point is on the face
-///          without that corner; within 2^-49 of its value.
+/// Weights  at least 0; their sum is 1 within 2^-50. A weight is exactly 0 if the point is on the
+///          face without that corner. Each is within 2^-49 of its exact value.
 struct TetrahedronPoint {
-  std::uint32_t tetrahedron;
-  Tetrahedron corners;
-  std::array<double, 4> weights;
+  std::uint32_t tetrahedron;      ///< its index in the mesh
+  Tetrahedron corners;            ///< its vertices
+  std::array<double, 4> weights;  ///< of the corners
   friend bool operator==(const TetrahedronPoint&, const TetrahedronPoint&) = default;
 };
 
-/// A vertex of another geometry in a tetrahedral mesh.
+/// A vertex of another geometry, and its place in a tetrahedral mesh.
 struct EmbeddedVertex {
   std::uint32_t vertex;
   TetrahedronPoint at;

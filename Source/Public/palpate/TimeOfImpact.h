@@ -8,40 +8,48 @@
 
 namespace palpate {
 
+/// The definition of an impact and the accuracy of its time.
 struct TimeOfImpactSettings {
-  /// L, finite. Not positive: touching counts, and whether there is an impact is decided exactly.
+  /// L, finite. An impact is a time at which the distance is at most this. 0 or negative: an impact
+  /// is a time at which the features touch, and whether there is one is decided exactly.
   double minimumDistance = 0.0;
-  /// Of the step, [2^-50, 1] (taken as the nearer end outside it). Larger: slightly cheaper.
+  /// Fraction of the step, in [2^-50, 1]: the result may be this much too early. A value outside
+  /// the range counts as the nearer end. A larger value is slightly cheaper.
   double timeTolerance = 1e-6;
 };
 
-/// When a moving vertex first touches a moving triangle, its border included.
+/// The time at which a moving vertex first touches a moving triangle. The triangle includes its
+/// border.
 ///
-/// Shapes   positions before the step, then now: of the vertex v and the triangle's corners a, b, c. Every
-///          one moves along p(t) = (1 - t) before + t now, in real arithmetic, t in [0, 1].
-/// Units    the positions' length unit L; the result is a fraction of the step.
-/// Needs    finite positions; any finite doubles will do.
-/// Returns  a time not after the first impact and at most `timeTolerance` before it; none if there is no impact.
-///          With minimumDistance 0, impact or none is a true statement about the given doubles,
-///          whatever they are: a triangle without area or extent, motion in a plane, no motion,
-///          contact only at 0 or at 1. With a minimum distance d > 0 an impact is a time at which
-///          the distance is at most d. One may be reported, and then at such a time, where the
-///          distance comes within e of d, e = timeTolerance * (largest displacement of a vertex of
-///          one feature relative to one of the other) + 2^-35 * (largest difference of their
-///          coordinates + d).
-/// Laws     (1) permuting the corners does not change impact or none, nor does swapping before and now.
-///          (2) scaling all positions by a power of two, where exact, does not either.
-/// Cost     bounded: 0.1 µs for most misses, microseconds where floating point cannot decide. With a
-///          minimum distance at most 1 / timeTolerance steps of 0.1 µs; few where features do not
-///          pass each other at nearly that distance.
+/// Shapes   positions before the step, then now: of the vertex v and of the triangle's corners a,
+///          b, c. Each moves along p(t) = (1 - t) before + t now, in real arithmetic, t in [0, 1].
+/// Units    in: the length unit L of the positions. Out: a fraction of the step.
+/// Needs    finite positions. All finite doubles are valid.
+/// Returns  a time at most `timeTolerance` before the first impact and never after it; none if
+///          there is no impact. With minimumDistance 0 the decision between impact and none is
+///          exact for the given doubles. This includes triangles without area or extent, motion in
+///          a plane, no motion, and contact only at time 0 or 1. With a minimum distance d > 0
+///          there may be false positives: times at which the distance is at most d + e. Here
+///          e = timeTolerance * m + 2^-35 * (c + d), with m the largest displacement of a vertex of
+///          one feature relative to a vertex of the other, and c the largest difference of their
+///          coordinates.
+/// Laws     (1) permuting the corners does not change whether there is an impact, nor does swapping
+///          before and now.
+///          (2) scaling all positions by a power of two does not either, where it is exact.
+/// Errors   none.
+/// Cost     bounded: 0.1 µs for most pairs without an impact, microseconds where floating point
+///          cannot decide. With a minimum distance at most 1 / timeTolerance search steps of 0.1
+///          µs; few unless the features pass each other at nearly that distance.
 PALPATE_EXPORT std::optional<double> vertexTriangleTimeOfImpact(
     const Eigen::Vector3d& vBefore, const Eigen::Vector3d& aBefore, const Eigen::Vector3d& bBefore,
     const Eigen::Vector3d& cBefore, const Eigen::Vector3d& vNow, const Eigen::Vector3d& aNow,
     const Eigen::Vector3d& bNow, const Eigen::Vector3d& cNow, const TimeOfImpactSettings& = {});
 
-/// When two moving edges first touch, their ends included: as vertexTriangleTimeOfImpact, for the
-/// edges p0 p1 and q0 q1. Edges may be parallel, collinear, of no length.
-/// Laws     (3) swapping the edges, or the ends of either, does not change impact or none.
+/// The time at which two moving edges, p0 p1 and q0 q1, first touch. The edges include their ends.
+/// They may be parallel, collinear or without length. All else is as in
+/// vertexTriangleTimeOfImpact().
+/// Laws     (3) swapping the edges, or the ends of either, does not change whether there is an
+///          impact.
 PALPATE_EXPORT std::optional<double> edgeEdgeTimeOfImpact(
     const Eigen::Vector3d& p0Before, const Eigen::Vector3d& p1Before,
     const Eigen::Vector3d& q0Before, const Eigen::Vector3d& q1Before, const Eigen::Vector3d& p0Now,

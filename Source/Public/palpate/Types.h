@@ -8,20 +8,23 @@
 
 namespace palpate {
 
-/// A geometry of one OctreeBasedCD. Given out once, never reused.
+/// Identifies a geometry of one OctreeBasedCD or StepGuard. An id is never given out twice, also
+/// after its geometry was removed.
 enum class GeometryId : std::uint32_t {};
 
-/// What a geometry's elements are.
+/// The geometry type: what the elements of a geometry are. The surface of a tetrahedral mesh
+/// consists of Triangles. A Shape is an analytical shape and has no elements.
 enum class GeometryKind : std::uint8_t { Triangles, Lines, Points, Shape };
 
-using Triangle = std::array<std::uint32_t, 3>;  ///< vertex indices; winding gives the normal
-/// vertex indices, lower first where it is an edge of a mesh
+/// Three vertex indices. The winding gives the normal: (b - a) x (c - a) for the corners a, b, c.
+using Triangle = std::array<std::uint32_t, 3>;
+/// Two vertex indices. The edge of a mesh has the lower index first.
 using Segment = std::array<std::uint32_t, 2>;
-/// vertex indices, in any order
+/// Four vertex indices in any order.
 using Tetrahedron = std::array<std::uint32_t, 4>;
 
-/// Two elements (triangles, segments or points) by index in their geometries; `a` from the pair's
-/// first.
+/// Two elements, each by its index in its geometry. An element is a triangle, a segment or a point.
+/// `a` belongs to the first geometry of the pair, `b` to the second.
 struct ElementPair {
   std::uint32_t a;
   std::uint32_t b;
@@ -29,9 +32,10 @@ struct ElementPair {
   friend auto operator<=>(const ElementPair&, const ElementPair&) = default;
 };
 
-/// A mesh that stays with its owner, for calls that need it only once.
+/// A triangle mesh that stays in the caller's memory. A call that takes a view reads it and keeps
+/// no reference to it.
 struct TriangleMeshView {
-  std::span<const Eigen::Vector3d> positions;
+  std::span<const Eigen::Vector3d> positions;  ///< L
   std::span<const Triangle> triangles;
 };
 

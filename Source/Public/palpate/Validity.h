@@ -8,72 +8,84 @@
 
 namespace palpate {
 
-/// Why a pair was answered by the method that it was answered by.
+/// Why the library answered a pair by Validity::method.
 enum class MethodReason {
-  Asked,  ///< the pair's settings name it
-  // Method::Auto, by how far features move in the step, relative to each other:
-  Still,  ///< not at all: Proximity, or Intersection for two meshes without a thickness
-  Slow,   ///< all at most PairSettings::motionTolerance: Proximity
-  Fast,   ///< all, or most, further: Continuous
-  Mixed,  ///< some further: Continuous for those, Proximity for the rest
-  /// At most the motion tolerance or not, Continuous costs least: without a thickness, and with
-  /// Contacts::All, where distances of everything near would be asked for.
+  Asked,  ///< the pair's settings name the method
+  // The reasons of Method::Auto. Motion is that of features in the step, relative to each other.
+  Still,  ///< nothing moves: Proximity, or Intersection for two meshes without a thickness
+  Slow,   ///< all features move at most PairSettings::motionTolerance: Proximity
+  Fast,   ///< all or most features move further: Continuous
+  Mixed,  ///< some features move further: Continuous for them, Proximity for the rest
+  /// Continuous costs least, whatever the motion: without a thickness, and with Contacts::All,
+  /// where Proximity would report every feature pair within the enlarged thickness.
   Cheapest,
-  /// A pair with lines, points or shapes: no other method answers it as well. Continuous where
-  /// features move, or where Proximity would need a thickness or a radius. Proximity where
-  /// Continuous does not answer the pair: what passes within the step may then be missing.
+  /// The pair has lines, points or shapes, and no other method answers it as well. Continuous, if
+  /// features move, or if Proximity would need a thickness or a radius. Proximity, if Continuous
+  /// does not answer the pair: then impacts within the step may be missing.
   Only
 };
 
-/// What one pair's method assumes, and whether the last frame kept to it.
+/// Whether the last answer for one pair can be trusted, and what the library knows about the step.
+/// Each method relies on conditions, and each detectCollision() checks them.
 ///
-/// trusted  Proximity, Continuous, Auto: every normal is on the side from which its features came,
-/// and
-///          no features that touched or crossed within the step are missing, save those for which
-///          Contacts::Distinct reports another contact. Intersection: that the
-///          meshes touched within the step is not missing.
-///          False where the library does not know; never true where it is wrong.
-/// Cost     at most 5 % of the frames, but for a look at the step's start in the pair's first one.
-///          Where motion may have brought the meshes together since, and the step's impacts do not
-///          tell, that is taken again, by Auto at once, else once in sixteen frames.
+/// Laws     (1) if trusted, and the method is Proximity, Continuous or Auto: every normal is on the
+///          side from which its features came, and no features that touched or crossed within the
+///          step are missing. With Contacts::Distinct another contact may stand for them, and
+///          filters may refuse their contacts.
+///          (2) if trusted, and the method is Intersection: if the meshes touched within the step,
+///          the answer is not empty.
+///          (3) if not trusted, the library does not know. Pairs with lines, points or shapes, and
+///          pairs that collision filters separate, are never trusted.
+/// Cost     at most 5 % of the frames' time, except in the first frame of a pair. That frame has an
+///          initial intersection check. If later motion may have brought the meshes together, and
+///          the step's impacts do not decide it, the library repeats the check: with Auto at once,
+///          with other methods at most once in 16 frames on average.
 /// Source   Docs/Algorithms/Validity.md has the conditions and their proofs.
 struct Validity {
   bool trusted = false;
-  /// Nothing intersected at the step's start: found, or carried over from earlier frames by bounds
-  /// on motion. Without it sides may be wrong. Intersection does not ask.
+  /// Whether the geometries are known not to intersect at the step's start. The library knows it
+  /// from an initial intersection check, or from earlier frames and bounds on the motion since. If
+  /// false, normals may be on the wrong side. Method::Intersection does not need it and runs no
+  /// check.
   bool startedApart = false;
-  bool sideMayBeWrong = true;  ///< of some normal. Of Intersection's, never
+  /// Whether some normal may be on the wrong side. Never true for Method::Intersection.
+  bool sideMayBeWrong = true;
 
-  Method method =
-      Method::Auto;  ///< that answered; Auto: Proximity and Continuous, feature by feature
+  /// The method that answered. Auto stands for Proximity and Continuous, feature by feature.
+  Method method = Method::Auto;
   MethodReason reason = MethodReason::Asked;
-  /// Contacts found at the step's end by their distance, and within the step by their impact.
+  /// Number of contacts from the step's end, by distance or intersection; and number of contacts
+  /// from within the step, by impact.
   std::size_t atEnd = 0, atImpact = 0;
 
-  double displacement = 0;  ///< L: no two features moved further, relative to each other
-  /// L: what displacement must not exceed. Proximity: the thickness. Auto: the motion tolerance,
-  /// which only chooses the method. Intersection: the smallest height of a triangle when its
+  /// L: upper bound on the motion of any two features in the step, relative to each other.
+  double displacement = 0;
+  /// L: the limit for `displacement`. Proximity: the thickness. Auto: the motion tolerance, which
+  /// only chooses the method. Intersection: the smallest height of a triangle, measured when the
   /// topology was set. Continuous: infinity.
   double reach = 0;
-  /// L: vertices move in straight lines within a step. Where setTransform() turns a body no vertex
-  /// is further than this from the way it would take if the body turned evenly about one axis and
-  /// slid along it; of two bodies the sum, of a plane that turns infinity. Beyond the thickness
-  /// nothing is trusted.
+  /// L: how far the straight motion of vertices is off the arcs of bodies that setTransform()
+  /// turns. It bounds the distance of a vertex from its path if the body turned evenly about one
+  /// axis and slid along it. It is the sum over both bodies, and infinity for a plane that turns.
+  /// If it exceeds the thickness, the answer is not trusted.
   double arcDeviation = 0;
-  /// L: pairs further apart at the step's end are no contacts, unless by an impact: the thickness,
-  /// or with Auto up to the motion tolerance more.
+  /// L: feature pairs further apart at the step's end are contacts only by an impact. It is the
+  /// thickness, with Auto up to the motion tolerance more; 0 for Intersection.
   double thickness = 0;
 
-  /// Vertices of the first and the second mesh that broke the condition, ascending: those that
-  /// moved further than the reach allows, and those of features that the step may have brought
-  /// together although they are apart at its end. Self-collision: all are in the first list.
+  /// Vertices of the first and of the second mesh because of which the answer is not trusted,
+  /// ascending: vertices that moved further than `reach` allows, and vertices of features that may
+  /// have touched within the step although they are apart at its end. For a mesh with itself all
+  /// are in the first list.
   std::vector<std::uint32_t> verticesBeyondA, verticesBeyondB;
-  /// Triangles without area in contacts, ascending: their normals are those documented.
+  /// Triangles without area that are in contacts, ascending. Their normals follow the rules of
+  /// <palpate/Distance.h>.
   std::vector<std::uint32_t> degenerateTrianglesA, degenerateTrianglesB;
 
-  static constexpr std::size_t kMostFarMovers = 128;  ///< of a mesh that are listed
+  /// Most vertices of a mesh that are listed because they moved too far.
+  static constexpr std::size_t kMostFarMovers = 128;
 
-  /// Above 1 the motion is beyond the method's condition.
+  /// A value above 1 means that the motion violates the method's condition.
   double displacementOverReach() const { return displacement > 0 ? displacement / reach : 0; }
 
   friend bool operator==(const Validity&, const Validity&) = default;

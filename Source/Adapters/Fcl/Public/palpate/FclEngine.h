@@ -7,19 +7,19 @@
 
 namespace palpate {
 
-/// Collision detection by FCL, with the functions of OctreeBasedCD that have a meaning there: to
-/// switch and to compare. FCL decides in floating point, within tolerances that do not scale with
-/// the bodies: nothing that OctreeBasedCD promises is promised here (Docs/Fcl.md), and validity()
-/// never trusts.
+/// Collision detection by FCL, with functions of OctreeBasedCD, to compare both or to change
+/// between them. FCL decides in floating point, within tolerances that do not scale with the
+/// bodies. The promises of OctreeBasedCD do not hold here (Docs/Fcl.md), and validity() is never
+/// trusted.
 ///
-/// Pairs    triangle meshes by Method::Intersection: intersectingTriangles(), no contacts. Two
-/// shapes by
-///          Method::Proximity: shapeShape(). A plane has no distance in FCL, only overlaps:
-///          thickness 0.
-/// Errors   as OctreeBasedCD's, which keeps and checks what is handed in: every function that takes data
-///          throws palpate::Error and changes nothing. All other pairs and methods:
-///          UnsupportedMethod. Where FCL itself gives up, detectCollision() throws NotAvailable.
-/// Threads  none of its own.
+/// Pairs    two triangle meshes by Method::Intersection, with intersectingTriangles() and no
+///          contacts; two shapes by Method::Proximity, with shapeShape(). The thickness must be 0
+///          unless FCL has a closed form of the distance: for a sphere with a sphere, capsule, box
+///          or cylinder, and for two capsules.
+/// Errors   as in OctreeBasedCD, which keeps and checks the data: every function that takes data
+///          throws palpate::Error and changes nothing. addCollisionPair() throws UnsupportedMethod
+///          for all other pairs and methods. detectCollision() throws NotAvailable if FCL throws.
+/// Threads  it starts none. Use an object from one thread at a time.
 class PALPATE_EXPORT FclEngine {
  public:
   FclEngine();
@@ -30,7 +30,7 @@ class PALPATE_EXPORT FclEngine {
   GeometryId addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                              std::span<const Triangle> triangles);
   GeometryId addAnalyticalGeometry(const AnalyticalGeometry&);
-  void removeGeometry(GeometryId);  ///< and its pairs
+  void removeGeometry(GeometryId);  ///< removes its pairs, too
 
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> now);
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
@@ -42,9 +42,11 @@ class PALPATE_EXPORT FclEngine {
   void removeCollisionPair(GeometryId a, GeometryId b);
   std::span<const CollisionPair> pairs() const;
 
+  /// Tests every pair at the positions now. If it throws, the last answers stay readable.
   void detectCollision();
-  /// Normals are FCL's, or lead from its one nearest point to the other, and are zero where these
-  /// are one.
+  /// The answer of the last detectCollision(), with the errors of OctreeBasedCD. For shapes that
+  /// overlap the normal is FCL's. For shapes that are apart it points along FCL's two nearest
+  /// points; it is 0 if these are the same.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;
 
  private:

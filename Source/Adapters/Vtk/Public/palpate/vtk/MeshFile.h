@@ -10,6 +10,7 @@
 
 namespace palpate::vtk {
 
+/// The content of a mesh file, in the file's length unit.
 struct MeshFile {
   std::vector<Eigen::Vector3d> positions;
   std::vector<Triangle> triangles;
@@ -17,18 +18,18 @@ struct MeshFile {
   operator TriangleMeshView() const { return {positions, triangles}; }
 };
 
-/// Triangle mesh from an OBJ, STL, PLY, VTK (legacy) or VTP file; the kind follows from the file's
-/// name.
+/// Reads a triangle mesh from an OBJ, STL, PLY, VTK (legacy) or VTP file. The extension of the
+/// file's name selects the format; upper and lower case are the same.
 ///
-/// Shapes   the file's own vertices in its order, also those in no triangle; normals, texture coordinates and
-///          other attributes ignored. STL has no sharing of its own: its vertices at equal
-///          positions become one. Polygons become fans about their first corner, strips become
-///          their triangles.
-/// Errors   ErrorCode::File, with the file's name and the reason: missing, empty, truncated, not a mesh, an
-///          index out of range, a coordinate that is not finite. Nothing is printed. Formats
-///          without a count or an end mark (OBJ) that end between two lines cannot be known to be
-///          truncated.
-/// Threads  safe from many threads.
+/// Shapes   all vertices of the file in its order, also those in no triangle. Normals, texture
+///          coordinates and other attributes are ignored. STL files do not share vertices: vertices
+///          at equal positions become one. Polygons become fans about their first corner, strips
+///          become their triangles.
+/// Errors   File, with the file's name and the reason: missing, empty, truncated, not a mesh, an
+///          index out of range, a coordinate that is not finite. Nothing is printed. OBJ has
+///          neither a count nor an end mark; a file that ends between two lines cannot be
+///          recognised as truncated.
+/// Threads  safe from any number of threads.
 PALPATE_EXPORT MeshFile readTriangleMesh(const std::filesystem::path& path);
 
 }  // namespace palpate::vtk
