@@ -12,7 +12,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// What degenerate input mostly is, and no arithmetic is needed for: flat along an axis.
+/// Whether the positions are flat along an axis. Most degenerate input is, and this test needs no
+/// arithmetic.
 bool flat(int axis, std::initializer_list<const Vector3d*> positions) {
   const double first = (**positions.begin())[axis];
   return std::all_of(positions.begin(), positions.end(),

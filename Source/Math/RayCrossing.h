@@ -16,9 +16,10 @@ enum class RayCrossing : std::int8_t {
 /// How the ray from p along +x crosses triangle (a, b, c).
 ///
 /// Exact for any finite doubles. The ray is moved aside by (0, e, e²) for a vanishing e > 0, so
-/// that it meets no edge and no corner: over a closed mesh, leaving less entering is the winding
-/// number of p, whatever the ray would have hit. A start on the boundary of a triangle may be told
-/// by another one or by none.
+/// that it meets no edge and no corner. Over a closed mesh, the number of Leaving less that of
+/// Entering is therefore the winding number of p, whatever the ray would have hit. If p is on the
+/// boundary of a triangle, this call may return None, and another triangle or none may return
+/// OnTriangle.
 /// Source   Simulation of simplicity (Edelsbrunner, Mücke, 1990), for the two coordinates of p.
 inline RayCrossing crossRay(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                             const Eigen::Vector3d& b, const Eigen::Vector3d& c,
@@ -34,7 +35,7 @@ inline RayCrossing crossRay(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
   if (facing == 0 || turn(b, c) != facing || turn(c, a) != facing) return RayCrossing::None;
   const int side = orient3d(a, b, c, p, counts);
   if (side == 0) return RayCrossing::OnTriangle;
-  if (side == facing) return RayCrossing::None;  // it is behind the start
+  if (side == facing) return RayCrossing::None;  // the triangle is behind the start
   return facing > 0 ? RayCrossing::Leaving : RayCrossing::Entering;
 }
 
