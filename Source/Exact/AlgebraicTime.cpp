@@ -77,8 +77,7 @@ std::vector<QuadraticTime> rootsInside(const Form<2>& form) {
     return roots;
   }
   root.q = -1;
-  if (signC > 0)
-    roots.push_back(root);  // both roots have the same sign, which is positive as -b is
+  if (signC > 0) roots.push_back(root);  // both roots have one sign, positive as -b is
   root.q = 1;
   roots.push_back(std::move(root));
   return roots;

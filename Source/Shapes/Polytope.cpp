@@ -186,9 +186,8 @@ void Polytope::removeVisible() {
 /// is removed, or the point saw both faces at an edge of the border.
 struct Polytope::Conflicts {
   std::vector<std::vector<std::uint32_t>> ofFace;
-  std::vector<std::uint32_t> seen;  ///< per point: a face that it sees; kNone: it is inside
-  std::vector<std::uint32_t>
-      tested;  ///< per point: the number of faces made when it was last tested
+  std::vector<std::uint32_t> seen;    ///< per point: a face that it sees; kNone: it is inside
+  std::vector<std::uint32_t> tested;  ///< per point: faces made before its last test
 
   explicit Conflicts(std::size_t points) : seen(points, kNone), tested(points, 0) {}
   void add(std::uint32_t point, std::uint32_t face) {
