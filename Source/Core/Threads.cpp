@@ -147,7 +147,7 @@ class Workers {
   }
 
  private:
-  /// On the stack of the thread that runs it.
+  /// A loop, which lives on the stack of the thread that runs it.
   struct Loop {
     std::size_t size;
     Executor::Task task;
@@ -155,7 +155,7 @@ class Workers {
     std::uint64_t number = 0;
     Loop *older = nullptr, *newer = nullptr;     ///< in the list; under the lock
     std::size_t first = 0;                       ///< taken by the thread that runs it
-    std::atomic<std::size_t> last{0}, taken{0};  ///< by those who joined; by all
+    std::atomic<std::size_t> last{0}, taken{0};  ///< taken by threads that joined; by all threads
     std::atomic<int> joined{0};
   };
 
@@ -256,7 +256,7 @@ class Workers {
   BriefLock m_lock;
   Loop* m_newest = nullptr;  ///< the head of the list of loops; under the lock
   std::uint64_t m_lastNumber = 0;
-  std::condition_variable m_changed;  ///< a loop was posted, or the last one left a loop
+  std::condition_variable m_changed;  ///< a loop was posted, or the last thread left one
   std::atomic<int> m_blocked{0};      ///< threads that wait for m_changed
   std::atomic<int> m_posted{0};       ///< counts posts: workers sleep until it changes
   std::atomic<bool> m_over{false};

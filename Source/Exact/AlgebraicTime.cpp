@@ -186,7 +186,7 @@ int CubicTime::sign(const Form<2>& form) const {
     const int order = compare(*root);
     if (order == 0) return 0;
     if (order > 0) return result;
-    if (root->q != 0 || signs[2] == 0 || signs[0] == 0) result = -result;  // else a double root
+    if (root->q != 0 || signs[2] == 0 || signs[0] == 0) result = -result;  // a double root keeps it
   }
   return result;
 }

@@ -87,7 +87,7 @@ bool anyRootInside(Form<3> cubic, F&& f);
 
 template <std::size_t N>
 int QuadraticTime::sign(const std::array<Integer, N>& form) const {
-  // Horner in a + b √d, times r^(N-1) > 0.
+  // Horner's scheme in numbers a + b √d. The result is multiplied by r^(N-1) > 0.
   Integer a = form[N - 1], b, power = r, next;
   for (std::size_t i = N - 1; i-- > 0;) {
     next = a * p;

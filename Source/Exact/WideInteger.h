@@ -77,7 +77,7 @@ struct ExponentRange {
 /// double.
 template <std::size_t Count>
 struct FixedGrid {
-  std::array<std::array<std::int64_t, 3>, Count> at;  ///< relative to the first
+  std::array<std::array<std::int64_t, 3>, Count> at;  ///< relative to the first position
   bool fits = true;
 
   template <class... Positions>

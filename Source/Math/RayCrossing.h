@@ -26,8 +26,8 @@ inline RayCrossing crossRay(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                             SignCounts& counts) {
   const auto turn = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
     if (const int sign = orient2d(0, from, to, p, counts)) return sign;
-    // (to - from) x (p - from) seen from +x falls with p.y by to.z - from.z and grows with p.z by
-    // to.y - from.y.
+    // The x component of (to - from) x (p - from) falls with p.y by to.z - from.z and grows with
+    // p.z by to.y - from.y.
     if (to.z() != from.z()) return to.z() < from.z() ? 1 : -1;
     return (to.y() > from.y()) - (to.y() < from.y());
   };

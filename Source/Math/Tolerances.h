@@ -7,13 +7,13 @@
 // Math/Box.h and Octree, filters in Mesh/UnfoldedStars and NarrowPhase.
 namespace palpate {
 
-// ---- Signs of polynomials in coordinate differences (ClosestPoint.cpp) ----
+// ---- Signs of polynomials in coordinate differences (EdgeEdgeDistance.cpp, Shapes) ----
 
 /// kUnderflowGuard for signs that are multiplied by products of moderate coordinates, 2^200 at
 /// most.
 constexpr double kUnderflowGuardOfProducts = 0x1p-800;
 
-// ---- Closest points (ClosestPoint.cpp) ----
+// ---- Closest points (Foot.cpp, EdgeEdgeDistance.cpp) ----
 
 /// Adding and subtracting this rounds a weight to a multiple of 2^-26. Its product with half of a
 /// split double is then exact.
@@ -75,8 +75,9 @@ constexpr double kApproachBoxError = 0x1p-51;
 constexpr double kQuotientError = 0x1p-50;
 /// Relative to the largest coordinate difference and the minimum distance: how far beyond tolerance
 /// * displacement findApproach() may report. At 2^-36 the direction in which its features are apart
-/// is right to 2^-39 (2^-50, and 2^-76 of twice the largest difference over the distance). This
-/// takes at most 2^-38 of the largest difference, √3 of it away, from what corners are apart.
+/// is right to 2^-39 (2^-50, and 2^-76 of twice the largest difference over the distance). A corner
+/// is at most √3 of the largest difference away. The error therefore takes at most 2^-38 of the
+/// largest difference from its distance along the direction.
 constexpr double kApproachSlack = 0x1p-36;
 /// The bound that is promised to users: kApproachSlack and the error of the distance computed at
 /// the reported time, under 2^-45.
@@ -91,7 +92,7 @@ constexpr double kSideError = 0x1p-46;
 /// further where that is too near to decide, so any value will do.
 constexpr double kFirstStepBack = 0x1p-44;
 
-// ---- Shapes (Shapes/Shape.cpp, Queries/ElementsNearShape.cpp) ----
+// ---- Shapes (Shapes, Queries/ElementsNearShape.cpp) ----
 
 /// Weight on an edge: the width to which its point nearest to a shape is bracketed. A point this
 /// near to an end counts as the end. The least distance varies by the square of this.
@@ -164,7 +165,7 @@ constexpr double kAxesError = 0x1p-20;
 /// Any value above the rounding of a cross product will do.
 constexpr double kFlatSquare = 0x1p-60;
 
-// ---- Motion bounds (Motion.cpp, MotionBound.cpp) ----
+// ---- Motion bounds (Mesh/Motion.cpp, MotionBound.cpp, Validity, NarrowPhase/Auto.cpp) ----
 
 /// Relative error of motions; for a distance, relative to the largest coordinate difference. A
 /// displacement carries 2 u, a difference of two 5 u, and its length 4 u more. A distance is within

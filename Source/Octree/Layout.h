@@ -30,7 +30,7 @@ class Layout {
     OctreeNode node;
     int depth;
     int levels;          ///< number of levels of its keys; 0: there are none yet
-    int level;           ///< of the node among them
+    int level;           ///< level of the node within its keys
     int sorted;          ///< levels of the keys by which the range is sorted, at least `level`
     std::uint32_t ends;  ///< where the node's PartEnds begin; kAlike: all keys have the same digits
   };
@@ -45,8 +45,8 @@ class Layout {
   /// The links of each block, in depth-first order. Block numbers are local to this layout.
   Buffer<Links> links;
   Buffer<OctreeNode> parents;     ///< of each block
-  Buffer<std::uint32_t> groups;   ///< where each begins
-  Buffer<OctreeNode> groupNodes;  ///< the node of each
+  Buffer<std::uint32_t> groups;   ///< where each group begins
+  Buffer<OctreeNode> groupNodes;  ///< the node of each group
   Buffer<Job> tasks;
   std::uint32_t rootChild = 0;  ///< of a task: its block 0, or kLeaf and a count
 

@@ -62,7 +62,7 @@ class Shape {
 
   SignedDistance at(const Eigen::Vector3d& x) const;
   NearestToShape nearestOfEdge(const Eigen::Vector3d& p, const Eigen::Vector3d& q) const;
-  /// None where a point of the triangle's boundary is as near.
+  /// None if a point of the triangle's boundary is as near.
   std::optional<NearestToShape> nearestInTriangle(const Eigen::Vector3d& a,
                                                   const Eigen::Vector3d& b,
                                                   const Eigen::Vector3d& c) const;

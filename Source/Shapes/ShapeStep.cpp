@@ -78,7 +78,7 @@ bool ShapeStep::staysOutside(const Moment& a, const Moment& b, const Scaled& is)
   if ((0.5 * (a.from + b.from)).norm() - half >
       distance + std::hypot(radius, 0.5 * std::sqrt(longest)) + error)
     return true;
-  // Beyond an end: from . u less half the square of u.
+  // Beyond an end: the polynomial is from . u less half the square of u.
   const std::array<double, 3> along{a.from.dot(a.u), 0.5 * (a.from.dot(b.u) + b.from.dot(a.u)),
                                     b.from.dot(b.u)};
   const double needed = std::sqrt(longest) * (distance + error);
@@ -87,7 +87,7 @@ bool ShapeStep::staysOutside(const Moment& a, const Moment& b, const Scaled& is)
     for (int i = 0; i < 3; ++i) beyond[i] = side * along[i] - 0.5 * squares[i];
     if (areBeyond(beyond, needed, false)) return true;
   }
-  // Beyond the mantle: the square of from x u less that of the reach times u.
+  // Beyond the mantle: the polynomial is the square of from x u less that of the reach times u.
   const Vector3d k0 = a.from.cross(a.u), k1 = 0.5 * (a.from.cross(b.u) + b.from.cross(a.u)),
                  k2 = b.from.cross(b.u);
   const auto& [q0, q1, q2] = squares;
