@@ -80,13 +80,13 @@ Separation accurateSeparation(const RelativeMotion<kind>& motion, double t) {
 /// as computed, e = tolerance * displacement + kApproachSlack * (largest difference + distance).
 /// Their distance is off by less than 2^-45 of the largest difference.
 ///
-/// Bounded: if no such points are found, the features' distance exceeds `near`. Along the direction
-/// of accurateSeparation(), right to 2^-39 at such distances, all corners are then beyond the
-/// distance by more than tolerance * displacement, and it takes more than the tolerance to lose
-/// that. So each interval is longer than the tolerance, or than kShortStretch where they are near.
-/// (Few are needed: they are Newton's steps towards the impact. Features that turn as they pass
-/// each other at little more than the distance need most. There the turning direction and the plane
-/// reach further.) The value of upTo does not change the steps before it.
+/// Bounded: if no such points are found, the features' distance exceeds `near`. The direction of
+/// accurateSeparation() is right to 2^-39 at such distances. Along it, all corners are then beyond
+/// the distance by more than tolerance * displacement. They take longer than the tolerance to lose
+/// that margin. So each interval is longer than the tolerance, or than kShortStretch where they are
+/// near. (Few are needed: they are Newton's steps towards the impact. Features that turn as they
+/// pass each other at little more than the distance need most. There the turning direction and the
+/// plane reach further.) The value of upTo does not change the steps before it.
 template <Kind kind>
 ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, double upTo) {
   const RelativeMotion<kind> motion(query);

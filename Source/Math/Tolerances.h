@@ -141,9 +141,9 @@ constexpr double kWindingSlack = 0x1p-44;
 
 // ---- Bodies placed in the world (CollisionDetection/RigidBody.cpp) ----
 
-/// Error relative to the sum of the terms' magnitudes: 4 u for fl(R x + t), 9 u for a difference of
-/// two, and some ten roundings for a value that is computed from a box's centre and compared with
-/// them.
+/// Error relative to the sum of the terms' magnitudes: 4 u for fl(R x + t), and 9 u for a
+/// difference of two. Values that are computed from a box's centre and compared with them have some
+/// ten roundings.
 constexpr double kPlacedError = 0x1p-48;
 /// L: coordinates of bodies and translations up to this are transformed without overflow.
 constexpr double kLargestPlaced = 0x1p1000;

@@ -19,8 +19,8 @@ void setShift(std::array<float, 4>& lower, std::array<float, 4>& upper,
 /// two ends of a step, give the box of both results.
 ///
 /// Rounding. With S the sum of |m_kj| (|centre_j| + half_j), S bounds each corner's turned
-/// coordinate. The errors, relative to S, are 2^-24 for the matrix' conversion to float, 2^-24 each
-/// for centre and half, and at most 2^-22 in all for three products and two sums each. Together
+/// coordinate. The errors, relative to S, are 2^-24 for the matrix' conversion to float and 2^-24
+/// each for centre and half. Three products and two sums each add at most 2^-22 in all. Together
 /// they are less than 2^-21; kRelative doubles that. setEnd() covers the shift's part. A box
 /// clamped to float's range (kLargestFloat) may reach anywhere, so that its image is infinite. An
 /// empty box gives NaN, which overlaps nothing.

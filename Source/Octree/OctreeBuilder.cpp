@@ -17,10 +17,10 @@ std::size_t grainOf(std::size_t size) { return std::clamp<std::size_t>(size / 8,
 /// The power-of-two cube that contains the box. Its corner is on a grid so coarse that the corners
 /// of cells are exact.
 ///
-/// If the box is much larger than the bulk, which lies about 0, the cube is placed so that 0 is a
-/// third of the way along each of its edges. At every level, 0 is then a third or two thirds along
-/// the edges of its cell. No cell border cuts the bulk, or runs close to it, until cells are as
-/// small as the bulk.
+/// The bulk of the elements lies about 0. If the box is much larger than the bulk, 0 is placed a
+/// third of the way along each of the cube's edges. At every level, 0 is then a third or two thirds
+/// along the edges of its cell. No cell border cuts the bulk, or runs close to it, until cells are
+/// as small as the bulk.
 Cube cubeOf(const FloatBox& bounds, double bulk) {
   constexpr double kMuchLarger = 256;
   Cube cube;

@@ -18,9 +18,9 @@ class ShapeApproach {
 
   /// The first time at which the bodies are at most `distance` apart; none if they never are.
   ///
-  /// Never late. It is early by at most the tolerance, or the bodies are then apart by at most the
-  /// sum of `distance`, kShapeBoundError of their size, and their relative motion in a part of the
-  /// step as long as the tolerance. For a cylinder that turns, the motion of all its points counts.
+  /// Never late. It is early by at most the tolerance, or the bodies are then at most `distance` +
+  /// e apart. e is kShapeBoundError of their size, plus their relative motion in a part of the step
+  /// as long as the tolerance. For a cylinder that turns, the motion of all its points counts.
   ///
   /// Source   a part of the step is passed if one direction separates the bodies at both its ends.
   ///          The distance along a fixed direction is the least of linear functions of time; in

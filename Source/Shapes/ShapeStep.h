@@ -57,8 +57,8 @@ class ShapeStep {
 
   /// The first time at which the point is at most `distance` from the shape; for a two-sided plane,
   /// from either side. The point must be further away before the step. Never late. It is early by
-  /// at most the tolerance, or the point is then within `distance` plus its motion, and that of the
-  /// shape's points beside it, in a part of the step as long as the tolerance.
+  /// at most the tolerance, or the point is then within `distance` + e. e is the motion of the
+  /// point, and of the shape's points beside it, in a part of the step as long as the tolerance.
   ///
   /// Source   parts of the step are passed where bounds on polynomials keep the point outside, and
   ///          halved where they do not. The polynomials, in Bernstein form, are the point's height
