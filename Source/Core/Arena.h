@@ -24,16 +24,18 @@ class Arena {
 
   std::size_t bytes() const { return m_bytes; }
 
-  /// Makes room for so many bytes. Where it has to grow, all elements are lost, also if it throws.
+  /// Makes room for so many bytes. If the memory has to grow, all elements are lost, even if this
+  /// throws.
   void reserve(std::size_t bytes) {
     if (bytes <= m_bytes) return;
     m_bytes = 0;
-    m_memory.reset();  // first, so that old and new memory do not add up
+    m_memory.reset();  // first, so that old and new memory do not exist at the same time
     m_memory.reset(static_cast<std::byte*>(::operator new (bytes, std::align_val_t{kAlignment})));
     m_bytes = bytes;
   }
 
-  /// `count` elements with indeterminate values. All earlier elements are lost, also if it throws.
+  /// `count` elements with indeterminate values. All earlier elements are lost, even if this
+  /// throws.
   template <class T>
   std::span<T> start(std::size_t count) {
     static_assert(std::is_trivially_default_constructible_v<T> &&

@@ -29,8 +29,8 @@ struct UninitializedAllocator : std::allocator<T> {
 template <class T>
 using Buffer = std::vector<T, UninitializedAllocator<T>>;
 
-/// resize() of what is about to be overwritten, growing by an eighth to spare where std::vector
-/// would double.
+/// resize() for contents that are about to be overwritten. It grows by an eighth to spare where
+/// std::vector would double.
 template <class T>
 void resizeSparingly(Buffer<T>& buffer, std::size_t size) {
   if (size > buffer.capacity()) {

@@ -8,17 +8,17 @@ namespace palpate {
 /// Puts this thread into the default floating-point environment for as long as the object lives:
 /// rounding to nearest, denormals kept, no traps. Error bounds and exact decisions rely on it.
 ///
-/// Afterwards the caller's environment is as it was, including its exception flags. Exceptions that
+/// The destructor restores the caller's environment, including its exception flags. Exceptions that
 /// the library's own arithmetic raises are neither reported nor trapped, because setting flags by
 /// fesetenv() traps nothing.
 ///
 /// x86-64   the library computes with SSE only, so that MXCSR alone decides. The x87 control word
-///          is not looked at: its rounding, precision and traps change no result here. Where MXCSR
-///          differs, feenableexcept() may have enabled x87 traps too, and both are set.
+///          is not checked: its rounding, precision and traps change no result here. If MXCSR is
+///          not standard, feenableexcept() may have enabled x87 traps too, and both are set.
 /// aarch64  FPCR decides; FPSR has the flags.
 /// Others   the environment is always set.
-/// Cost     3 nanoseconds; 0.5 microseconds where the caller's environment is not the default. Nested
-///          objects cost as much as one in the default environment.
+/// Cost     3 nanoseconds; 0.5 microseconds if the caller's environment is not the default.
+///          Nested objects cost as much as one in the default environment.
 class StandardFloatingPoint {
  public:
   StandardFloatingPoint() : m_control(readControl()), m_changed(!isStandard(m_control)) {
@@ -35,8 +35,9 @@ class StandardFloatingPoint {
     else
       restoreFlags(m_control);
   }
-  /// The result, computed while the object lives. Compilers do not know that arithmetic depends on
-  /// the environment: what a function returns in registers they may compute after the destructor.
+  /// Forces the result to be computed while the object lives. Compilers do not know that arithmetic
+  /// depends on the environment. Without this, they may compute a function's result after the
+  /// destructor if it is returned in registers.
   template <class Result>
   static Result kept(Result result) {
     asm volatile("" : "+m"(result));
@@ -47,7 +48,7 @@ class StandardFloatingPoint {
   StandardFloatingPoint& operator=(const StandardFloatingPoint&) = delete;
 
  private:
-  /// What is loaded from or stored to memory is not moved across this.
+  /// Compilers do not move loads and stores across this.
   static void keepOrder() { asm volatile("" ::: "memory"); }
 
 #if defined(__x86_64__)

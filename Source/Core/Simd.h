@@ -23,7 +23,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
 
-/// A mask of at most 16 lanes as bits, the first lane's lowest.
+/// A mask of at most 16 lanes as bits, with the first lane in the lowest bit.
 template <class D, class M>
 HWY_ATTR HWY_INLINE std::uint32_t bitsOf(D d, M mask) {
   std::uint8_t bytes[8] = {};
@@ -33,7 +33,7 @@ HWY_ATTR HWY_INLINE std::uint32_t bitsOf(D d, M mask) {
   return bits;
 }
 
-/// Of as many positions as V has lanes.
+/// As many positions as V has lanes.
 template <class V>
 struct Vector3 {
   V x, y, z;

@@ -5,14 +5,14 @@
 
 namespace palpate {
 
-/// The path that runs now.
+/// The SIMD path that is in use.
 std::string currentSimdPath();
 
 /// The paths that this machine can run, best first.
 std::vector<std::string> simdPaths();
 
-/// For tests and benchmarks, between frames: runs the whole process on a path of simdPaths() from
-/// now on; empty: on the best.
+/// For tests and benchmarks, between frames: switches the whole process to a path of simdPaths().
+/// An empty path selects the best one.
 void useSimdPath(const std::string& path);
 
 }  // namespace palpate

@@ -2,10 +2,10 @@
 
 namespace palpate {
 
-/// Waiting on the core, as waking a thread takes longer than a small frame's loops.
+/// Busy waiting, because waking a thread takes longer than the loops of a small frame.
 class Spin {
  public:
-  bool isOver() const { return m_count >= kMost; }  ///< better to leave the core to others
+  bool isOver() const { return m_count >= kMost; }  ///< other threads should get the core now
   void wait() {
     ++m_count;
 #ifdef __x86_64__

@@ -4,7 +4,7 @@
 
 namespace palpate {
 
-/// Milliseconds since it was made or last read.
+/// Milliseconds since construction or the last lap().
 class Stopwatch {
  public:
   double lap() {

@@ -7,7 +7,7 @@
 
 namespace palpate {
 
-/// In six digits: 0.25 or (0, 0.25, nan).
+/// Text with six significant digits: 0.25 or (0, 0.25, nan).
 inline std::string textOf(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%g", value);

@@ -40,9 +40,9 @@ int resolved(int count) {
   return cores == 0 ? 1 : static_cast<int>(cores);
 }
 
-/// How many forks lie between this process and the first one that made a pool. A pool compares it
-/// with what it was when its threads started: they are not in the child of a fork(). getpid() would
-/// tell as much for 0.2 microseconds in each loop.
+/// The number of forks between this process and the first one that made a pool. A pool compares it
+/// with the number at which its threads started, because threads do not exist in the child of a
+/// fork(). getpid() would tell as much for 0.2 microseconds in each loop.
 std::atomic<unsigned> forks{0};
 
 unsigned watchForks() {
@@ -57,8 +57,8 @@ unsigned watchForks() {
 
 #ifdef PALPATE_THREADS_TBB
 
-/// At most as many workers as the process may have: oneTBB has no more, and prints a warning when
-/// asked.
+/// At most as many workers as the process may have. oneTBB has no more, and prints a warning if
+/// more are requested.
 class Workers {
  public:
   explicit Workers(int count) : m_count(count), m_arena(std::min(count, allowed())) {}
@@ -83,7 +83,8 @@ class Workers {
 
 #else
 
-/// Held for a few instructions at a time. Blocks in the end: its holder may need this core.
+/// A lock that is held for a few instructions at a time. It finally blocks, because the thread that
+/// holds it may need this core.
 class BriefLock {
  public:
   void lock() {
@@ -98,10 +99,10 @@ class BriefLock {
   std::mutex mutex;
 };
 
-/// A plain pool. Indices of a loop are taken one by one, from the first on by the thread that runs
-/// it, from the last on by whoever joins, so that from loop to loop a thread meets the same data:
-/// workers join, and threads that wait for the last indices of a loop of their own. So loops within
-/// loops are shared too.
+/// A plain pool. Threads take the indices of a loop one by one: the thread that runs the loop from
+/// the first one on, threads that join it from the last one on. From loop to loop, a thread
+/// therefore works on the same data. Both workers and threads that wait for the last indices of
+/// their own loop join. Loops within loops are therefore shared too.
 class Workers {
  public:
   /// Starts as many threads as the system permits.
@@ -130,8 +131,8 @@ class Workers {
     while (takeOne(loop, false)) {
     }
     if (forks.load(std::memory_order_relaxed) != forksBefore) {
-      // A task called fork(), and this is the child. The lock may be held by a thread that is not
-      // here, and so may indices.
+      // A task called fork(), and this is the child. A thread that does not exist here may hold the
+      // lock, and may have taken indices.
       if (loop.joined > 0)
         throw Error(ErrorCode::NotAvailable,
                     "fork() was called while threads were at work; the child cannot end the work");
@@ -146,7 +147,7 @@ class Workers {
   }
 
  private:
-  /// On the stack of the thread that runs it.
+  /// A loop, which lives on the stack of the thread that runs it.
   struct Loop {
     std::size_t size;
     Executor::Task task;
@@ -154,7 +155,7 @@ class Workers {
     std::uint64_t number = 0;
     Loop *older = nullptr, *newer = nullptr;     ///< in the list; under the lock
     std::size_t first = 0;                       ///< taken by the thread that runs it
-    std::atomic<std::size_t> last{0}, taken{0};  ///< by those who joined; by all
+    std::atomic<std::size_t> last{0}, taken{0};  ///< taken by threads that joined; by all threads
     std::atomic<int> joined{0};
   };
 
@@ -172,14 +173,14 @@ class Workers {
       m_posted.notify_one();
   }
 
-  /// Under the lock: the newest loop after the one numbered that has indices left.
+  /// The newest loop with a number greater than `after` that has indices left. Call under the lock.
   Loop* findOpen(std::uint64_t after) const {
     for (Loop* loop = m_newest; loop && loop->number > after; loop = loop->older)
       if (loop->taken < loop->size) return loop;
     return nullptr;
   }
 
-  /// findOpen(); it stays until left.
+  /// findOpen(); the loop stays valid until leave().
   Loop* join(std::uint64_t after) {
     const std::lock_guard guard(m_lock);
     Loop* const loop = findOpen(after);
@@ -187,19 +188,19 @@ class Workers {
     return loop;
   }
 
-  /// The loop may end as soon as the last one has left it. Who is blocked has counted itself in
-  /// m_blocked before it looked at `joined`, so one of the two sees the other.
+  /// The loop may end as soon as the last thread has left it. A thread that blocks increments
+  /// m_blocked before it reads `joined`. At least one of the two therefore notices the other.
   void leave(Loop& loop) {
     if (--loop.joined > 0 || m_blocked == 0) return;
     const std::lock_guard guard(m_lock);
     m_changed.notify_all();
   }
 
-  /// Others are at the loop's last indices. What they wait for is in newer loops: no two threads
-  /// can wait for each other.
+  /// Waits while other threads work on the loop's last indices. These threads only wait for newer
+  /// loops, so that no two threads can wait for each other.
   ///
-  /// Waking a blocked thread takes as long as much of a small frame, so the thread first gives its
-  /// core away for a while, which is enough for most last indices.
+  /// Waking a blocked thread takes a large part of the time of a small frame. The thread therefore
+  /// first yields its core for a while, which is enough for most last indices.
   void waitForOthers(const Loop& loop) {
     using Clock = std::chrono::steady_clock;
     constexpr std::chrono::microseconds kMostYielding{500};
@@ -253,10 +254,10 @@ class Workers {
   }
 
   BriefLock m_lock;
-  Loop* m_newest = nullptr;  ///< of the list of loops; under the lock
+  Loop* m_newest = nullptr;  ///< the head of the list of loops; under the lock
   std::uint64_t m_lastNumber = 0;
-  std::condition_variable m_changed;  ///< a loop was posted, or the last one left a loop
-  std::atomic<int> m_blocked{0};      ///< threads that wait for it
+  std::condition_variable m_changed;  ///< a loop was posted, or the last thread left one
+  std::atomic<int> m_blocked{0};      ///< threads that wait for m_changed
   std::atomic<int> m_posted{0};       ///< counts posts: workers sleep until it changes
   std::atomic<bool> m_over{false};
   std::vector<std::thread> m_threads;
@@ -293,7 +294,7 @@ class ThreadPool final : public Executor {
   int m_concurrency;
 };
 
-/// A loop's function, and the exception of the lowest index that has thrown one.
+/// A loop's function, and the exception of the lowest index that threw one.
 class Body {
  public:
   Body(void (*call)(void*, std::size_t), void* function) : m_call(call), m_function(function) {}
@@ -304,7 +305,7 @@ class Body {
     try {
       m_call(m_function, i);
     } catch (...) {
-      // current_exception() is never null here: where there is no memory it gives std::bad_alloc.
+      // current_exception() is never null here: without memory it returns std::bad_alloc.
       const std::lock_guard guard(m_lock);
       if (i > m_failed) return;
       m_failed = i;
@@ -325,14 +326,14 @@ class Body {
   std::exception_ptr m_exception;
 };
 
-/// A loop on an executor that may be faulty. The executor is given runs, each of which takes
-/// indices one by one until none is left: it does not matter in which order the runs come, nor how
-/// often each does. A run that comes too late finds the loop closed.
+/// A loop on an executor that may be faulty. The executor gets runs, each of which takes indices
+/// one by one until none is left. The order of the runs does not matter, nor how often each one is
+/// called. A run that is called too late finds the loop closed.
 class LoopOnExecutor {
  public:
   LoopOnExecutor* nextAbandoned = nullptr;
 
-  /// No run of the last loop can come any more.
+  /// Whether no run of the last loop can still be called.
   bool isFree() {
     const std::lock_guard guard(m_lock);
     return !m_open && m_begun >= m_runs;
@@ -366,7 +367,7 @@ class LoopOnExecutor {
     m_open = true;
   }
 
-  /// Waits for the runs that have begun. False if not all have.
+  /// Waits for the runs that have begun. Returns false if some run has not begun.
   bool close() {
     std::unique_lock guard(m_lock);
     const bool all = m_begun >= m_runs;
@@ -404,11 +405,11 @@ void checkThreads(int threads) {
 
 }  // namespace
 
-/// Loops that are used again and again, as many as have ever run at the same time.
+/// A pool of loop objects for reuse. It has as many as have ever run at the same time.
 struct Threads::LoopsOnExecutor {
   LoopsOnExecutor() = default;
-  /// What an executor has kept a run of is never freed: the run may still come. A list of all such
-  /// loops tells leak checkers that this is meant.
+  /// A loop of which the executor still holds a run is never freed, because the run may still be
+  /// called. A list of all such loops tells leak checkers that this is intended.
   ~LoopsOnExecutor() {
     static std::atomic<LoopOnExecutor*> abandoned{nullptr};
     for (auto& loop : all)

@@ -22,8 +22,8 @@ QuadraticTime momentAt(double t) {
   return moment;
 }
 
-/// Coefficients divided by one power of two so that the largest is about 1; each within 2^-51 of
-/// itself.
+/// Coefficients divided by one power of two, so that the largest is about 1. Each has a relative
+/// error of at most 2^-51.
 template <std::size_t N>
 std::array<double, N> toDoubles(const std::array<Integer, N>& form) {
   std::array<double, N> mantissas;
@@ -64,7 +64,7 @@ std::vector<QuadraticTime> rootsInside(const Form<2>& form) {
   if (sign == 0) return rootsInside(Form<1>{form[0], form[1]});
   // sign · form has a positive leading coefficient. Its roots are (-b ± √(b² - 4 a c)) / 2 a.
   const int signB = sign * sgn(form[1]), signC = sign * sgn(form[0]);
-  if (signC >= 0 && signB >= 0) return {};  // no change of sign: no positive root
+  if (signC >= 0 && signB >= 0) return {};  // the signs do not change: there is no positive root
   if (signC == 0) return rootsInside(Form<1>{form[1], form[2]});
   std::vector<QuadraticTime> roots;
   QuadraticTime root;
@@ -77,7 +77,7 @@ std::vector<QuadraticTime> rootsInside(const Form<2>& form) {
     return roots;
   }
   root.q = -1;
-  if (signC > 0) roots.push_back(root);  // both have one sign, which is positive as -b is
+  if (signC > 0) roots.push_back(root);  // both roots have one sign, positive as -b is
   root.q = 1;
   roots.push_back(std::move(root));
   return roots;
@@ -113,8 +113,9 @@ CubicTime::CubicTime(const Form<3>& cubic, int cell, int rising, double lower, d
   bracket(lower, upper);
 }
 
-/// Twice the index of the interval between critical points that holds the other moment; odd: at the
-/// critical point between two; m_cell's own where there are no critical points.
+/// The place of the other moment among the critical points: twice the index of the interval that
+/// contains it, or an odd number if it is the critical point between two intervals. If there are no
+/// critical points, m_cell's own value.
 int CubicTime::cellOf(const QuadraticTime& other) const {
   const Form<2> slope{m_cubic[1], 2 * m_cubic[2], 3 * m_cubic[3]};
   if (m_cubic[3] == 0) {
@@ -179,13 +180,13 @@ int CubicTime::sign(const Form<2>& form) const {
   if (low > error && middle > error && high > error) return 1;
   if (low < -error && middle < -error && high < -error) return -1;
 
-  int result = signs[2] != 0 ? signs[2] : signs[1];  // beyond the last root
+  int result = signs[2] != 0 ? signs[2] : signs[1];  // the sign beyond the last root
   const std::vector<QuadraticTime> roots = rootsInside(form);
   for (auto root = roots.rbegin(); root != roots.rend(); ++root) {
     const int order = compare(*root);
     if (order == 0) return 0;
     if (order > 0) return result;
-    if (root->q != 0 || signs[2] == 0 || signs[0] == 0) result = -result;  // else a double root
+    if (root->q != 0 || signs[2] == 0 || signs[0] == 0) result = -result;  // a double root keeps it
   }
   return result;
 }

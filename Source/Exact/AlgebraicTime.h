@@ -8,8 +8,9 @@
 
 namespace palpate {
 
-/// A polynomial of t in [0, 1] as Σ c[i] t^i (1-t)^(N-i). With x = t / (1-t), which runs from 0 to
-/// infinity with t, its sign is that of Σ c[i] x^i; at t = 1, that of c[N].
+/// A polynomial of t in [0, 1] as Σ c[i] t^i (1-t)^(N-i). Let x = t / (1-t), which runs from 0 to
+/// infinity with t. For t < 1 the polynomial's sign is that of Σ c[i] x^i; at t = 1 it is that of
+/// c[N].
 template <std::size_t N>
 using Form = std::array<Integer, N + 1>;
 
@@ -41,22 +42,25 @@ struct QuadraticTime {
 
   template <std::size_t N>
   int sign(const std::array<Integer, N>& form) const;
-  double timeBelow() const;  ///< at most 2^-51 below
+  double timeBelow() const;  ///< at most 2^-51 below the exact time
 };
 
-/// The moments strictly inside the step at which a form that is not zero vanishes, ascending, each
-/// once.
+/// The moments strictly inside the step at which a form vanishes, ascending, each once. The form
+/// must not be zero.
 std::vector<QuadraticTime> rootsInside(const Form<1>&);
 std::vector<QuadraticTime> rootsInside(const Form<2>&);
 
 /// A simple root of a cubic strictly inside the step, in an open interval of x on which the cubic
-/// is monotone. Signs of quadratics there need no refinement: it is enough to compare it with their
-/// roots, which are quadratic numbers, and to do that the sign of the cubic at those, which is
-/// found in closed form.
+/// is monotone.
+///
+/// The signs of quadratics at this root need no refinement. It is enough to compare the root with
+/// the quadratics' roots, which are quadratic numbers. This takes the sign of the cubic at those
+/// numbers, which has a closed form.
 class CubicTime {
  public:
-  /// cell: which of the intervals between the cubic's critical points on the real line; rising: the
-  /// sign of its slope there; lower, upper: times between which the root lies, to look for it.
+  /// cell: the index of the interval between the cubic's critical points on the real line. rising:
+  /// the sign of the cubic's slope there. lower, upper: times between which the root lies, where
+  /// the search starts.
   CubicTime(const Form<3>& cubic, int cell, int rising, double lower, double upper);
 
   int sign(const Form<2>&) const;
@@ -73,9 +77,9 @@ class CubicTime {
   double m_low = 0.0, m_high = 1.0;  ///< the root's time lies in [m_low, m_high]
 };
 
-/// f(root) for each root of the cubic, not zero, strictly inside the step, ascending, until one
-/// returns true; a root is a QuadraticTime or a CubicTime. (Multiple roots are critical points, so
-/// they are quadratic.)
+/// Calls f(root) for each root of the cubic strictly inside the step, ascending, until f returns
+/// true. The cubic must not be zero. A root is a QuadraticTime or a CubicTime. (Multiple roots are
+/// critical points, so they are quadratic.)
 template <class F>
 bool anyRootInside(Form<3> cubic, F&& f);
 
@@ -83,7 +87,7 @@ bool anyRootInside(Form<3> cubic, F&& f);
 
 template <std::size_t N>
 int QuadraticTime::sign(const std::array<Integer, N>& form) const {
-  // Horner in a + b √d, times r^(N-1) > 0.
+  // Horner's scheme in numbers a + b √d. The result is multiplied by r^(N-1) > 0.
   Integer a = form[N - 1], b, power = r, next;
   for (std::size_t i = N - 1; i-- > 0;) {
     next = a * p;
@@ -112,13 +116,15 @@ int QuadraticTime::sign(const std::array<Integer, N>& form) const {
   return larger > 0 ? signA : larger < 0 ? signB : 0;
 }
 
-/// Where a cubic turns, strictly inside the step, and how many turns it makes before the step.
+/// The critical points of a cubic strictly inside the step, and the number of critical points
+/// before the step.
 struct Turns {
   std::vector<QuadraticTime> inside;
   int before = 0;
 };
 Turns turns(const Form<3>&);
-/// The sign of the highest coefficient that is not zero: that just before t = 1.
+/// The sign of the highest coefficient that is not zero, which is the form's sign just before t =
+/// 1.
 int signBeforeEnd(const Form<3>&);
 /// Divides by t until the form is not zero at 0.
 void removeRootsAtStart(Form<3>&);

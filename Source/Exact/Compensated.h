@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-/// value + error is the exact result of an operation whose rounded result is value.
+/// The rounded result of an operation; value + error is the exact result.
 struct RoundedWithError {
   double value, error;
 };
@@ -20,14 +20,15 @@ inline RoundedWithError exactSum(double a, double b) {
   return {sum, (a - (sum - bRounded)) + (b - bRounded)};
 }
 
-/// Veltkamp: halves of at most 26 bits that sum to a.
+/// Splits a into two halves of at most 26 bits that sum to a (Veltkamp).
 inline RoundedWithError halves(double a) {
   const double scaled = 134217729.0 * a;  // 2^27 + 1
   const double high = scaled - (scaled - a);
   return {high, a - high};
 }
 
-/// Dekker, without fused multiply-add: the baseline instruction set has none.
+/// The exact product (Dekker). It uses no fused multiply-add, as the baseline instruction set has
+/// none.
 inline RoundedWithError exactProduct(double a, double b, const RoundedWithError& bHalves) {
   const double product = a * b;
   const auto [high, low] = halves(a);
@@ -37,7 +38,7 @@ inline RoundedWithError exactProduct(double a, double b, const RoundedWithError&
 
 inline RoundedWithError exactProduct(double a, double b) { return exactProduct(a, b, halves(b)); }
 
-// Sums in one order, whatever Eigen would choose.
+// These add in a fixed order, whatever Eigen would choose.
 inline double dot(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
 }
@@ -48,12 +49,12 @@ inline double largest(const Eigen::Vector3d& a) {
   return std::max({std::abs(a[0]), std::abs(a[1]), std::abs(a[2])});
 }
 
-/// Whether products of degree eight of coordinates so large stay within the range of double.
+/// Whether products of eight coordinates of this size stay within the range of double.
 inline bool isModerate(double extent) {
   return extent > kSmallestModerate && extent < kLargestModerate;
 }
-/// The exponent of a power of two that brings an extent near 1; of zero, infinity and NaN the last
-/// there is.
+/// The exponent of a power of two that brings an extent near 1. For zero, infinity and NaN it is
+/// the limit of the exponents' range.
 inline int exponentTowardsOne(double extent) {
   return extent <= std::numeric_limits<double>::max() ? -std::clamp(std::ilogb(extent), -1074, 1023)
                                                       : -1023;
@@ -62,7 +63,8 @@ inline Eigen::Vector3d scaled(const Eigen::Vector3d& a, int exponent) {
   return {std::ldexp(a[0], exponent), std::ldexp(a[1], exponent), std::ldexp(a[2], exponent)};
 }
 
-/// high + low exactly, each component of high the double nearest to it.
+/// A vector that is high + low exactly. Each component of high is the double nearest to the exact
+/// value.
 struct Difference {
   Eigen::Vector3d high, low;
 };
@@ -78,7 +80,7 @@ inline Difference difference(const Eigen::Vector3d& a, const Eigen::Vector3d& b)
   return result;
 }
 
-/// a + b within 2^-104 of its terms; the same bits in either order.
+/// a + b within 2^-104 of its terms. Either order gives the same bits.
 inline Difference sum(const Difference& a, const Difference& b) {
   Difference result;
   for (int i = 0; i < 3; ++i) {
@@ -92,8 +94,8 @@ inline Difference sum(const Difference& a, const Difference& b) {
 
 inline Difference half(const Difference& a) { return {0.5 * a.high, 0.5 * a.low}; }
 
-/// m + s u + t v within 2^-53 of the result and 2^-78 of the terms; the same bits when (s, u) and
-/// (t, v) change places. s, t: at most 27 significant bits.
+/// m + s u + t v within 2^-53 of the result and 2^-78 of the terms. Swapping (s, u) and (t, v)
+/// gives the same bits. s, t: at most 27 significant bits.
 inline Eigen::Vector3d combination(const Difference& m, double s, const Difference& u, double t,
                                    const Difference& v) {
   Eigen::Vector3d result;
@@ -108,7 +110,7 @@ inline Eigen::Vector3d combination(const Difference& m, double s, const Differen
   return result;
 }
 
-/// The same with one vector.
+/// m + s u with the same error.
 inline Eigen::Vector3d combination(const Difference& m, double s, const Difference& u) {
   Eigen::Vector3d result;
   for (int i = 0; i < 3; ++i) {
@@ -119,8 +121,8 @@ inline Eigen::Vector3d combination(const Difference& m, double s, const Differen
   return result;
 }
 
-/// u x v within 2^-52 of each component and 2^-103 of |u| |v|; turns exactly when u and v change
-/// places.
+/// u x v within 2^-52 of each component and 2^-103 of |u| |v|. Swapping u and v negates the result
+/// exactly.
 inline Eigen::Vector3d accurateCross(const Difference& u, const Difference& v) {
   Eigen::Vector3d result;
   for (int i = 0; i < 3; ++i) {

@@ -7,7 +7,7 @@
 
 namespace palpate {
 
-/// A polynomial on [0, 1] by its Bernstein coefficients.
+/// The Bernstein coefficients of a polynomial on [0, 1].
 using CubicBernstein = std::array<double, 4>;
 using QuadraticBernstein = std::array<double, 3>;
 
@@ -24,8 +24,8 @@ inline double blossom(const CubicBernstein& b, double r, double s, double t) {
       t);
 }
 
-/// About where in [low, high] a cubic crosses zero, going up if rising is positive, else down.
-/// Never leaves the interval, whatever the coefficients.
+/// An approximation of the point in [low, high] at which a cubic crosses zero: upwards if rising is
+/// positive, else downwards. The result is in the interval for any coefficients.
 inline double approximateRoot(const CubicBernstein& b, double low, double high, int rising) {
   const QuadraticBernstein slope{3.0 * (b[1] - b[0]), 3.0 * (b[2] - b[1]), 3.0 * (b[3] - b[2])};
   double t = 0.5 * (low + high);

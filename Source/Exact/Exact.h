@@ -1,6 +1,7 @@
 #pragma once
 
-// The one place that names GMP: integers of any size, for what floating point cannot decide.
+// The one place that includes GMP: integers of any size, for decisions that floating point cannot
+// make.
 #include <gmpxx.h>
 
 #include "Exact/WideInteger.h"
@@ -9,8 +10,8 @@ namespace palpate {
 
 using Integer = mpz_class;
 
-/// value · 2^-exponent: an integer for every finite double with the least exponent there is, zero
-/// for both zeros.
+/// value · 2^-exponent. With the least exponent of doubles, this is an integer for every finite
+/// double, and zero for both zeros.
 inline Integer scaledInteger(double value, int exponent = -1074) {
   static_assert(sizeof(unsigned long) == 8);
   const auto [mantissa, own] = splitDouble(value);

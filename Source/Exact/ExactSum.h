@@ -9,17 +9,19 @@
 
 namespace palpate {
 
-/// A sum of products of three finite doubles with no rounding at all and no memory of the heap:
-/// what is added and what is taken away, each as an integer of 6,400 bits in units of 2^-3222, of
-/// which every such product is a multiple. Products stay below 2^3072, so that 2^100 of them fit.
-/// Source   Kulisch, Computer Arithmetic and Validity (2013), 8: the long accumulator.
-///          Difference: of three factors; signs apart, so that no borrow runs through all words.
+/// A sum of products of three finite doubles without rounding and without heap memory. Positive and
+/// negative products are summed separately. Each sum is an integer of 6,400 bits in units of
+/// 2^-3222, of which every such product is a multiple. Products stay below 2^3072, so that 2^100 of
+/// them fit.
+/// Source   Kulisch, Computer Arithmetic and Validity (2013), 8: the long accumulator. Difference:
+///          three factors; separate signs, so that no borrow runs through all words.
 class ExactSum {
  public:
   void add(double x, double y, double z, bool negative = false) {
     const auto p = splitDouble(x), q = splitDouble(y), r = splitDouble(z);
     if (p.mantissa == 0 || q.mantissa == 0 || r.mantissa == 0) return;
-    // 159 bits in three words, moved by what is not a whole word into four.
+    // The product has 159 bits in three words. Shifting it by the part of the exponent that is not
+    // a whole word extends it to four words.
     const UnsignedInt128 two = UnsignedInt128{p.mantissa} * q.mantissa;
     const UnsignedInt128 low = UnsignedInt128{static_cast<std::uint64_t>(two)} * r.mantissa;
     const UnsignedInt128 high = (two >> 64) * r.mantissa + (low >> 64);

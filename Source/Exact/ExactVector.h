@@ -6,10 +6,10 @@
 #include <cstdint>
 #include <type_traits>
 
-// Vectors of integers, of fixed width or of any size.
+// Vectors of integers, either of fixed width or of any size.
 namespace palpate::exact {
 
-/// Integers of 64 bits multiply into 128, others into their kind.
+/// The type of a product: 128 bits for integers of 64 bits, the same type for others.
 template <class T>
 using Wide = std::conditional_t<std::is_same_v<T, std::int64_t>, Int128, T>;
 
@@ -31,12 +31,12 @@ Vector<Wide<T>> cross(const Vector<T>& a, const Vector<T>& b) {
           W(a[0]) * b[1] - W(a[1]) * b[0]};
 }
 
-/// Integers of 128 bits multiply into 256.
+/// Products of integers of 128 bits have 256 bits.
 inline Integer product(const Integer& a, const Integer& b) { return a * b; }
 using palpate::product;
 
-/// (u x v) . w: six times the volume of the tetrahedron of the origin and three points. Those of 64
-/// bits must stay below 2^61.
+/// (u x v) . w: six times the volume of the tetrahedron of the origin and three points. Coordinates
+/// of 64 bits must stay below 2^61.
 template <class T>
 auto volumeOf(const Vector<T>& u, const Vector<T>& v, const Vector<T>& w) {
   const Vector<Wide<T>> normal = cross(u, v);

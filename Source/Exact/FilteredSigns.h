@@ -7,7 +7,7 @@
 
 namespace palpate {
 
-/// A sign as floating point knows it.
+/// A sign as far as floating point can decide it.
 enum class Sign { NotPositive, Positive, Unknown };
 
 inline Sign signOf(double value, double error) {
@@ -16,13 +16,14 @@ inline Sign signOf(double value, double error) {
   return Sign::Unknown;  // NaN too
 }
 
-/// Sign of u . v of differences that were rounded once.
+/// Sign of u . v, where u and v are differences that were rounded once.
 inline Sign signAlong(const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
   const double magnitude = (std::abs(u[0] * v[0]) + std::abs(u[1] * v[1])) + std::abs(u[2] * v[2]);
   if (!(magnitude < kOverflowGuard)) return Sign::Unknown;
   const Sign sign = signOf(dot(u, v), kDotError * magnitude + kUnderflowGuard);
   if (sign != Sign::Unknown) return sign;
-  // Perpendicular axis by axis, as edges of boxes are: a product with zero has no error.
+  // Vectors that are perpendicular axis by axis, as edges of boxes are: a product with zero has no
+  // error.
   for (int i = 0; i < 3; ++i)
     if (u[i] != 0.0 && v[i] != 0.0) return Sign::Unknown;
   return Sign::NotPositive;

@@ -12,7 +12,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// What degenerate input mostly is, and no arithmetic is needed for: flat along an axis.
+/// Whether the positions are flat along an axis. Most degenerate input is, and this test needs no
+/// arithmetic.
 bool flat(int axis, std::initializer_list<const Vector3d*> positions) {
   const double first = (**positions.begin())[axis];
   return std::all_of(positions.begin(), positions.end(),
@@ -34,7 +35,8 @@ int orient3dExactly(const Vector3d& a, const Vector3d& b, const Vector3d& c, con
   ++counts.undecided;
   if (const FixedGrid grid(a, b, c, d); grid.fits)
     return exact::signOf(exact::volumeOf(grid.at[1], grid.at[2], grid.at[3]));
-  // [b c d] - [a c d] + [a b d] - [a b c], each of six products of coordinates.
+  // The volume is [b c d] - [a c d] + [a b d] - [a b c], determinants of six products of
+  // coordinates each.
   ExactSum volume;
   const auto add = [&](const Vector3d& p, const Vector3d& q, const Vector3d& r, bool negative) {
     for (int i = 0; i < 3; ++i) {
@@ -59,7 +61,7 @@ int orient2dExactly(int axis, const Vector3d& a, const Vector3d& b, const Vector
     const auto& [origin, u, v] = grid.at;
     return exact::signOf(Int128{u[x]} * v[y] - Int128{u[y]} * v[x]);
   }
-  // [b c] - [a c] + [a b]
+  // The area is [b c] - [a c] + [a b], determinants of two products of coordinates each.
   ExactSum area;
   const auto add = [&](const Vector3d& p, const Vector3d& q, bool negative) {
     area.add(p[x], q[y], 1.0, negative);

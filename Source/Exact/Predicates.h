@@ -11,12 +11,12 @@
 
 namespace palpate {
 
-/// How often the floating filter did not decide.
+/// Counts how often the floating-point filter did not decide.
 struct SignCounts {
-  std::size_t undecided = 0;  ///< but for trivial zeros
+  std::size_t undecided = 0;  ///< trivial zeros are not counted
 };
 
-/// Signs of the same determinants, with no rounding at all. Slow.
+/// The signs of orient3d() and orient2d() without rounding. Slow.
 int orient3dExactly(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                     const Eigen::Vector3d& d, SignCounts&);
 int orient2dExactly(int axis, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
@@ -34,16 +34,17 @@ class OrientedPlane {
     m_magnitude = forward.abs() + backward.abs();
   }
 
-  /// Sign of (b - a) × (c - a) · (d - a): 1 where the winding normal points, -1 behind, 0 on the
-  /// plane, or anywhere if the triangle has no area. Exact for any finite doubles.
+  /// Sign of (b - a) × (c - a) · (d - a): 1 on the side to which the winding normal points, -1 on
+  /// the other side, 0 on the plane. 0 everywhere if the triangle has no area. Exact for any finite
+  /// doubles.
   ///
   /// The filter: with e = 2^-53 each of the six products of three differences takes at most eight
-  /// roundings (three differences, two products, three sums), so the error is at most
-  /// ((1 + e)^8 - 1) P, P the sum of their exact magnitudes; the computed P is at least (1 - e)^8
-  /// of that, so kVolumeError P covers both and its own rounding. An inner product that underflows
-  /// errs by at most 2^-1075 more and is then multiplied by a component of d - a; six of those,
-  /// three outer products and the roundings after them stay under 2^-1000 (1 + |d - a|₁). What
-  /// overflows makes the bound infinite or NaN, and neither comparison is then true.
+  /// roundings (three differences, two products, three sums). The error is therefore at most ((1 +
+  /// e)^8 - 1) P, P the sum of their exact magnitudes. The computed P is at least (1 - e)^8 of
+  /// that, so kVolumeError P covers both and its own rounding. An inner product that underflows
+  /// errs by at most 2^-1075 more and is then multiplied by a component of d - a. Six of those,
+  /// three outer products and the roundings after them stay under 2^-1000 (1 + |d - a|₁). An
+  /// overflow makes the bound infinite or NaN, and neither comparison is then true.
   int side(const Eigen::Vector3d& d, SignCounts& counts) const {
     const Eigen::Array3d w = d - m_a;
     const Eigen::Array3d wMagnitude = w.abs();
@@ -66,8 +67,8 @@ inline int orient3d(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Ei
   return OrientedPlane(a, b, c).side(d, counts);
 }
 
-/// Sign of the component along an axis (0, 1, 2) of (b - a) × (c - a): the turn of a, b, c seen
-/// from that axis' positive end. Exact for any finite doubles. The filter is as above: four
+/// Sign of the component along an axis (0, 1, 2) of (b - a) × (c - a): the turn of a, b, c as
+/// viewed from the axis' positive end. Exact for any finite doubles. The filter is as above: four
 /// roundings a product.
 inline int orient2d(int axis, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                     const Eigen::Vector3d& c, SignCounts& counts) {

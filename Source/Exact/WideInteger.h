@@ -13,7 +13,7 @@ namespace palpate {
 __extension__ using Int128 = __int128;
 __extension__ using UnsignedInt128 = unsigned __int128;
 
-/// Two's complement.
+/// A signed integer of 256 bits in two's complement.
 struct Int256 {
   UnsignedInt128 high = 0, low = 0;
 
@@ -53,8 +53,8 @@ inline DoubleParts splitDouble(double x) {
   return {fraction | std::uint64_t{1} << 52, exponent - 1075};
 }
 
-/// The exponent of the largest power of two of which all coordinates are multiples, and of one
-/// above them all; none is of zeros.
+/// lowest: the exponent of the largest power of two of which all coordinates are multiples.
+/// highest: the exponent of a power of two above them all. Zeros are ignored.
 struct ExponentRange {
   static constexpr int kNone = 2000;
   int lowest = kNone, highest = -kNone;
@@ -72,11 +72,12 @@ struct ExponentRange {
   }
 };
 
-/// Positions as integers in units of a power of two, exactly, where differences fit 61 bits: of
-/// meshes near each other whose coordinates have not many more bits than a double.
+/// Positions as exact integers in units of a power of two, if their differences fit in 61 bits.
+/// This holds for meshes near each other whose coordinates do not have many more bits than a
+/// double.
 template <std::size_t Count>
 struct FixedGrid {
-  std::array<std::array<std::int64_t, 3>, Count> at;  ///< relative to the first
+  std::array<std::array<std::int64_t, 3>, Count> at;  ///< relative to the first position
   bool fits = true;
 
   template <class... Positions>

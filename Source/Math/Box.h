@@ -10,13 +10,13 @@
 
 namespace palpate {
 
-/// Floats are clamped to this, so that boxes of scenes beyond float's range stay finite and
-/// conservative.
+/// Floats are clamped to this magnitude. Boxes of scenes beyond float's range therefore stay finite
+/// and conservative.
 constexpr float kLargestFloat = 0x1p120f;
 
 /// An axis-aligned box in a geometry's float frame, rounded outward. Fourth lanes are padding.
 struct alignas(16) FloatBox {
-  /// Overlaps nothing, neutral for add().
+  /// The bounds of an empty box, which overlaps nothing and is neutral for add().
   static constexpr float kEmptyLower = std::numeric_limits<float>::infinity();
 
   std::array<float, 4> lower{kEmptyLower, kEmptyLower, kEmptyLower, 0};
@@ -27,7 +27,7 @@ struct alignas(16) FloatBox {
     for (int k = 0; k < 3; ++k) all &= lower[k] <= other.upper[k] && upper[k] >= other.lower[k];
     return all;
   }
-  /// Whether what is in the box may reach beyond it, because it was clamped.
+  /// Whether the contents may reach beyond the box because it was clamped.
   bool mayBeClamped() const {
     bool within = true;
     for (int k = 0; k < 3; ++k) within &= lower[k] > -kLargestFloat && upper[k] < kLargestFloat;
@@ -42,7 +42,7 @@ struct alignas(16) FloatBox {
   }
 };
 
-/// Boxes side by side, one array per bound, each readable kPadding elements past its size.
+/// Boxes as one array per bound, each readable kPadding elements past its size.
 struct BoxArrays {
   static constexpr std::size_t kPadding = 16;  ///< the widest SIMD vector of floats
 
@@ -61,13 +61,14 @@ struct BoxArrays {
 
 /// Outward rounding of bounds that were rounded to nearest float.
 ///
-/// Let v be a coordinate in the frame, fl64(x - origin) * scale with |error| <= 2^-53 |v|, and f
+/// Let v be a coordinate in the frame, fl64(x - origin) * scale with |error| <= 2^-53 |v|. Let f be
 /// the float nearest to it: |f - v| <= 2^-24 |v| where f is normal, <= 2^-150 where it is denormal.
 /// kRelative |f| = 2^-22 |f| covers that, the 2^-53, and the rounding of the subtraction itself (<=
-/// 2^-24 of its result) with a factor of about two to spare; kAbsolute covers denormals, and is so
-/// large that its own outward rounding is not one: a product that is costs many processors a
-/// hundred cycles, and coordinates of zero are common. Both bounds are monotone in f, so the bound
-/// of a set is the bound of its least element. Math/BoxRounding.h does the same in SIMD lanes.
+/// 2^-24 of its result), with a factor of about two to spare. kAbsolute covers denormals. It is so
+/// large that kAbsolute * kRelative is not denormal, because a denormal product costs many
+/// processors a hundred cycles, and coordinates of zero are common. Both bounds are monotone in f,
+/// so the bound of a set is the bound of its least element. Math/BoxRounding.h does the same in
+/// SIMD lanes.
 struct OutwardRounding {
   static constexpr float kRelative = 0x1p-22f;
   static constexpr float kAbsolute = 0x1p-103f;

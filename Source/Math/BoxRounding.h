@@ -12,7 +12,7 @@ HWY_INLINE V outwardMargin(V v) {
   return hn::Abs(v) * hn::Set(d, OutwardRounding::kRelative) +
          hn::Set(d, OutwardRounding::kAbsolute);
 }
-/// As OutwardRounding, in each lane.
+/// OutwardRounding in each lane.
 template <class V>
 HWY_INLINE V roundedDown(V v) {
   return v - outwardMargin(v);

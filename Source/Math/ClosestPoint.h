@@ -7,7 +7,7 @@
 namespace palpate {
 
 // The public functions of <palpate/Distance.h> without their check for NaN and infinity, and the
-// decisions they are made of. Every decision is true of the given doubles.
+// decisions that they use. Every decision is exact for the given doubles.
 
 VertexTriangleDistance finiteVertexTriangleDistance(const Eigen::Vector3d& p,
                                                     const Eigen::Vector3d& a,
@@ -16,21 +16,21 @@ VertexTriangleDistance finiteVertexTriangleDistance(const Eigen::Vector3d& p,
 EdgeEdgeDistance finiteEdgeEdgeDistance(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
                                         const Eigen::Vector3d& q0, const Eigen::Vector3d& q1);
 
-/// As edgeEdgeDistance(), if the edges are not parallel and both closest points lie strictly
-/// inside.
+/// The same as edgeEdgeDistance() if the edges are not parallel and both closest points lie
+/// strictly inside, else none.
 std::optional<EdgeEdgeDistance> crossingEdgesDistance(const Eigen::Vector3d& p0,
                                                       const Eigen::Vector3d& p1,
                                                       const Eigen::Vector3d& q0,
                                                       const Eigen::Vector3d& q1);
 
-/// The normals that these answer at a distance of zero: of edges that touch, and of a triangle with
-/// its corner a.
+/// The normals that the distance functions return at a distance of zero: for edges that touch, and
+/// for a triangle and its corner a.
 Eigen::Vector3d normalOfCrossing(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
                                  const Eigen::Vector3d& q0, const Eigen::Vector3d& q1);
 Eigen::Vector3d windingNormal(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                               const Eigen::Vector3d& c);
 
-/// What of triangle (a, b, c) holds the point closest to p.
+/// The feature of triangle (a, b, c) that holds the point closest to p.
 TriangleFeature closestTriangleFeature(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                                        const Eigen::Vector3d& b, const Eigen::Vector3d& c);
 

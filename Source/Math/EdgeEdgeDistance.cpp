@@ -25,8 +25,9 @@ struct CrossingDecision {
   bool exact;
 };
 
-/// Whether u x v is zero, where products tell: each component's two are equal, rounding and all, or
-/// have a factor zero. Of edges below kLargestModerate.
+/// Whether products prove that u x v is zero. The two products of each component must be equal,
+/// including their rounding errors, or each must have a factor zero. Edges must be below
+/// kLargestModerate.
 bool areCertainlyParallel(const Difference& u, const Difference& v) {
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3, k = (i + 2) % 3;
@@ -43,8 +44,8 @@ bool areCertainlyParallel(const Difference& u, const Difference& v) {
   return true;
 }
 
-/// What is compared to tell whether lines are closest inside both edges: it is so if the square is
-/// more than either. Each is off by its error at most.
+/// The terms that decide whether two lines are closest inside both edges: they are if `square` is
+/// more than s and t. Each term is off by its error at most.
 struct CrossingTerms {
   double square, squareError, s, sError, t, tError;
 
@@ -57,7 +58,8 @@ struct CrossingTerms {
   }
 };
 
-/// m was rounded in terms as large as the edges at least: mSum has them.
+/// The terms in plain floating point. m was rounded from terms at least as large as the edges,
+/// which mSum includes.
 CrossingTerms roundedTerms(const EdgePair& edges, double mSum, double uSum, double vSum) {
   const Vector3d &m = edges.m.high, &u = edges.u.high, &v = edges.v.high;
   const double magnitude = uSum * vSum;
@@ -70,9 +72,10 @@ CrossingTerms roundedTerms(const EdgePair& edges, double mSum, double uSum, doub
           kTripleError * mSum * uSum * magnitude};
 }
 
-/// The same of edges that are nearly parallel, whose plain normal is rounding. A product's sum of
-/// magnitudes is off by kAccurateCrossError of itself and kAccurateCrossLoss of its factors'; so
-/// are a scalar product's terms, by what either makes of the other, and by its own rounding.
+/// The terms for nearly parallel edges, whose plain normal is only rounding. A cross product's sum
+/// of magnitudes has two errors: kAccurateCrossError relative to itself, and kAccurateCrossLoss
+/// relative to that of its factors. The terms of a scalar product have the errors of both its
+/// factors, and its own rounding.
 CrossingTerms compensatedTerms(const EdgePair& edges, double mSum, double uSum, double vSum) {
   const Vector3d normal = accurateCross(edges.u, edges.v);
   const Vector3d ofS = accurateCross(edges.m, edges.v), ofT = accurateCross(edges.u, edges.m);
@@ -97,7 +100,7 @@ CrossingDecision crossingOf(const EdgePair& edges) {
       return {*decision, false};
     if (areCertainlyParallel(difference(p1, p0), difference(q1, q0)))
       return {Crossing::Parallel, false};
-    // What m lost is of positions, which may be far from the origin.
+    // The error of m is relative to the positions, which may be far from the origin.
     const double far = mSum + sumOfMagnitudes(p0) + sumOfMagnitudes(p1) + sumOfMagnitudes(q0) +
                        sumOfMagnitudes(q1);
     if (std::min(uSum, vSum) > kSmallestModerate && far < kLargestModerate)
@@ -121,7 +124,7 @@ EdgeEdgeDistance interiorDistance(const EdgePair& edges, bool decidedExactly) {
           decidedExactly || foot.exact};
 }
 
-/// One edge's end against the other edge.
+/// The foot of one edge's end on the other edge.
 struct EndFoot {
   Foot foot;
   EdgeFeature feature;
@@ -135,7 +138,7 @@ EndFoot footOfEnd(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
   return end;
 }
 
-/// Whether p lies beside edge ab, not beyond one of its ends.
+/// Whether p's foot is on edge ab, not beyond one of its ends.
 bool isBeside(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
   const auto isBefore = [&p](const Vector3d& from, const Vector3d& to) {
     const Vector3d edge = to - from, beyond = from - p;
@@ -150,7 +153,7 @@ EdgeFeature featureAt(double weight) {
   return weight == 1.0 ? EdgeFeature::End : EdgeFeature::Interior;
 }
 
-/// The four ends, each against the other edge: p0, p1, q0, q1.
+/// The feet of the four ends, each on the other edge: p0, p1, q0, q1.
 class EndFeet {
  public:
   explicit EndFeet(const EdgePair& edges)
@@ -161,7 +164,8 @@ class EndFeet {
   double weightA(int i) const { return i < 2 ? static_cast<double>(i) : m_ends[i].foot.s; }
   double weightB(int i) const { return i < 2 ? m_ends[i].foot.s : static_cast<double>(i - 2); }
 
-  /// tied: another pair of points is as near, within rounding.
+  /// The index of the nearest end. tied: set if another pair of points is equally near, within
+  /// rounding.
   int nearest(bool& tied) const {
     int nearest = 0;
     for (int i = 1; i < 4; ++i)
@@ -189,13 +193,13 @@ class EndFeet {
             foot.exact};
   }
 
-  /// Moves the answer for parallel edges to the middle of the stretch that they share, which runs
-  /// from end to end.
+  /// Moves the closest points of parallel edges to the middle of the interval that the edges share,
+  /// which runs from one end to another.
   void moveToMiddle(EdgeEdgeDistance& answer) const {
     const auto& [p0, p1, q0, q1, m, u, v] = m_edges;
     const std::array<bool, 4> beside{isBeside(p0, q0, q1), isBeside(p1, q0, q1),
                                      isBeside(q0, p0, p1), isBeside(q1, p0, p1)};
-    // Both weights: on an edge without length the other's are equal.
+    // Both weights are compared: if one edge has no length, the weights on the other are equal.
     const auto before = [&](int i, int j) {
       return std::pair(weightA(i), weightB(i)) < std::pair(weightA(j), weightB(j));
     };
@@ -219,12 +223,12 @@ class EndFeet {
   std::array<EndFoot, 4> m_ends;
 };
 
-/// The closest points of edges of which at least one is met at an end.
+/// The closest points of edges, where at least one point is an end.
 EdgeEdgeDistance endDistance(const EdgePair& edges, bool parallel, bool decidedExactly) {
   const EndFeet ends(edges);
   bool tied = false;
   int nearest = ends.nearest(tied);
-  tied = tied && !parallel;  // there any pair of the stretch that they share will do
+  tied = tied && !parallel;  // for parallel edges, any pair within the shared interval will do
   if (tied) nearest = exact::nearestEnd(edges.p0, edges.p1, edges.q0, edges.q1);
   EdgeEdgeDistance answer = ends.answer(nearest);
   answer.exact = answer.exact || decidedExactly || tied;

@@ -12,7 +12,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Positions in units of the largest power of two that leaves nothing over: the shortest integers.
+/// Positions as integers in units of the largest power of two of which all are multiples, so that
+/// the integers are as short as possible.
 template <std::size_t Count>
 struct Integers {
   std::array<Vector<Integer>, Count> at;
@@ -36,10 +37,11 @@ Vector<Integer> scaled(const Integer& factor, const Vector<Integer>& a) {
 
 int bits(const Integer& a) { return static_cast<int>(mpz_sizeinbase(a.get_mpz_t(), 2)); }
 
-/// numerator 2^exponent / denominator, within an ulp; denominator positive.
+/// numerator 2^exponent / denominator, within an ulp; denominator must be positive.
 double quotient(const Integer& numerator, const Integer& denominator, int exponent) {
   if (numerator == 0) return 0.0;
-  // 64 or 65 bits of quotient, cut to 63, so that one rounding to double is left.
+  // The quotient has 64 or 65 bits and is truncated to 63, so that only one rounding to double
+  // remains.
   const int shift = 64 - bits(numerator) + bits(denominator);
   const Integer magnitude = abs(numerator);
   Integer ratio = shift >= 0 ? Integer((magnitude << shift) / denominator)
@@ -60,7 +62,7 @@ double weight(const Integer& numerator, const Integer& denominator) {
 Vector3d unit(const Vector<Integer>& a) {
   const Integer square = dot(a, a);
   if (square == 0) return Vector3d::Zero();
-  const int shift = std::max(0, (140 - bits(square)) / 2 + 1);  // of a root with 70 bits
+  const int shift = std::max(0, (140 - bits(square)) / 2 + 1);  // so that the root has 70 bits
   const Integer root = sqrt(Integer(square << 2 * shift));
   Vector3d result;
   for (int i = 0; i < 3; ++i) result[i] = quotient(a[i] << shift, root, 0);
@@ -77,7 +79,7 @@ Foot footFrom(const Vector<Integer>& a, const Integer& denominator, int exponent
   return foot;
 }
 
-/// Of the perpendicular from the origin to the plane from + s u + t v.
+/// The foot of the perpendicular from the origin to the plane from + s u + t v.
 Foot footOnPlane(const Vector<Integer>& from, const Vector<Integer>& u, const Vector<Integer>& v,
                  int exponent) {
   const Vector<Integer> normal = cross(u, v);
@@ -88,9 +90,9 @@ Foot footOnPlane(const Vector<Integer>& from, const Vector<Integer>& u, const Ve
   return foot;
 }
 
-// ---- Signs, in integers of fixed width where the positions fit, else of any size ----
+// ---- Signs, in integers of fixed width if the positions fit, else of any size ----
 
-/// decision(positions), as vectors of one kind of integer or the other.
+/// Calls decision(positions) with vectors of integers of fixed width if they fit, else of any size.
 template <class Decision, class... Positions>
 auto decide(Decision&& decision, const Positions&... positions) {
   if (const FixedGrid grid(positions...); grid.fits) return decision(grid.at);
@@ -121,7 +123,7 @@ bool isZero(const Vector<T>& a) {
   return a[0] == 0 && a[1] == 0 && a[2] == 0;
 }
 
-/// Of a triangle without area: its longest edge, the first of equals.
+/// The longest edge of a triangle without area; the first one if several are equal.
 template <class T>
 int longestEdge(const std::array<Vector<T>, 4>& at) {
   int longest = 0;

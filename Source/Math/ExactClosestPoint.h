@@ -4,13 +4,13 @@
 
 #include "Math/Foot.h"
 
-/// Closest points in integer arithmetic: every sign is true of the given doubles, every value
-/// within an ulp of its own. Any finite doubles. About fifty times as slow as floating point, and
-/// allocates.
+/// Closest points in integer arithmetic. Every sign is exact for the given doubles, and every value
+/// is within an ulp of the exact one. Any finite doubles are allowed. This is about fifty times as
+/// slow as floating point, and allocates.
 namespace palpate {
 
-/// How two edges lie to each other. Interior: their lines' closest points lie strictly inside both.
-/// Parallel: exactly, or one has no length.
+/// The relation of two edges. Interior: the closest points of their lines lie strictly inside both
+/// edges. Parallel: exactly parallel, or one edge has no length.
 enum class Crossing { Interior, Outside, Parallel };
 
 }  // namespace palpate
@@ -20,38 +20,39 @@ namespace palpate::exact {
 /// Sign of (p - a) . (b - a).
 int along(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b);
 
-/// Where p's projection onto the plane of (a, b, c) lies, seen from edge ab: 1 on c's side, 0 on
-/// the line or the triangle has no area, -1 beyond.
+/// The side of edge ab on which p's projection onto the plane of (a, b, c) lies. 1: c's side. 0: on
+/// the line, or the triangle has no area. -1: the other side.
 int side(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
          const Eigen::Vector3d& c);
 
 TriangleFeature closestFeature(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                                const Eigen::Vector3d& b, const Eigen::Vector3d& c);
 
-/// Whether they lie on one line; in one plane.
+/// Whether the points lie on one line, or in one plane.
 bool areCollinear(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c);
 bool areCoplanar(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                  const Eigen::Vector3d& d);
 
-/// p seen from point a.
+/// The foot of p on point a.
 Foot footOnPoint(const Eigen::Vector3d& p, const Eigen::Vector3d& a);
-/// Line a + s (b - a), b not a.
+/// The foot of p on the line a + s (b - a); b must differ from a.
 Foot footOnLine(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b);
-/// Plane a + s (b - a) + t (c - a) of a triangle with area.
+/// The foot of p on the plane a + s (b - a) + t (c - a) of a triangle, which must have area.
 Foot footOnPlane(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                  const Eigen::Vector3d& c);
 
 Crossing crossing(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1, const Eigen::Vector3d& q0,
                   const Eigen::Vector3d& q1);
-/// The closest points p0 + s (p1 - p0), q0 + t (q1 - q0) of two lines that are not parallel.
+/// The closest points p0 + s (p1 - p0) and q0 + t (q1 - q0) of two lines, which must not be
+/// parallel.
 Foot footBetweenLines(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
                       const Eigen::Vector3d& q0, const Eigen::Vector3d& q1);
-/// Which of p0, p1 (against edge q), q0, q1 (against edge p) is nearest: 0 to 3, the first of
-/// equals.
+/// The index (0 to 3) of the nearest end: p0, p1 against edge q; q0, q1 against edge p. The first
+/// one if several are equally near.
 int nearestEnd(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1, const Eigen::Vector3d& q0,
                const Eigen::Vector3d& q1);
 
-/// Unit vector along (b - a) x (d - c); zero where that is.
+/// Unit vector along (b - a) x (d - c); zero if that product is zero.
 Eigen::Vector3d unitCross(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                           const Eigen::Vector3d& c, const Eigen::Vector3d& d);
 

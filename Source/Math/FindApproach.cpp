@@ -14,9 +14,9 @@ namespace {
 using Eigen::Vector3d;
 using Kind = ImpactQuery::Kind;
 
-/// Until then some coordinate certainly keeps the features further apart than the distance. What
-/// only nearly comes so close is not found before: whoever compared boxes over part of the step
-/// may have left it out.
+/// The time until which some coordinate certainly keeps the features further apart than the
+/// distance. No impact is reported before it, even if features come almost as near. Callers that
+/// compare boxes over part of the step may have filtered such pairs.
 template <Kind kind>
 double boxesSeparateUntil(const RelativeMotion<kind>& motion, double distance) {
   double latest = 0.0;
@@ -37,8 +37,9 @@ double boxesSeparateUntil(const RelativeMotion<kind>& motion, double distance) {
   return latest;
 }
 
-/// The distance at time t of two points inside the features, where the line along A x B meets both;
-/// infinity where it does not. Not below the features' distance, but for rounding.
+/// The distance at time t of the two points at which the line along A x B meets the features'
+/// interiors; infinity if it does not meet both. Except for rounding, it is not below the features'
+/// distance.
 template <Kind kind>
 double distanceInside(const RelativeMotion<kind>& motion, double t) {
   const Vector3d a = at(t, motion.a), b = at(t, motion.b), c = at(t, motion.c);
@@ -51,8 +52,8 @@ double distanceInside(const RelativeMotion<kind>& motion, double t) {
   return inside ? (c - x * a - y * b).norm() : INFINITY;
 }
 
-/// The direction of the features' distance at time t, where that is not zero, within 2^-50 of its
-/// length and 2^-76 of the largest difference.
+/// The direction of the features' distance at time t, if the distance is not zero. It is within
+/// 2^-50 of its length and 2^-76 of the largest difference.
 template <Kind kind>
 Separation accurateSeparation(const RelativeMotion<kind>& motion, double t) {
   const Vector3d zero = Vector3d::Zero(), first = at(t, motion.corner[0]);
@@ -68,23 +69,24 @@ Separation accurateSeparation(const RelativeMotion<kind>& motion, double t) {
   return separation;
 }
 
-/// Marches through times at which the features are certainly further apart than the distance, and
-/// reports an impact where it cannot go on.
+/// Advances through times at which the features are certainly further apart than the distance, and
+/// reports an impact where it cannot advance.
 ///
-/// Not late, none missed: a stretch is passed only where all corners stay beyond the distance along
-/// a direction, fixed or turning, or the plane does, with errors bounded (RelativeMotion.cpp).
+/// No false negative, never late: an interval is passed only if all corners stay beyond the
+/// distance along a direction, fixed or turning, or if the plane does. All errors are bounded
+/// (RelativeMotion.cpp).
 ///
-/// None invented: at a reported time two points of the features are within near = distance + e as
-/// computed, e = tolerance * displacement + kApproachSlack * (largest difference + distance). Their
-/// distance is off by less than 2^-45 of the largest difference.
+/// No false positive: at a reported time two points of the features are within near = distance + e
+/// as computed, e = tolerance * displacement + kApproachSlack * (largest difference + distance).
+/// Their distance is off by less than 2^-45 of the largest difference.
 ///
-/// Bounded: where they are not, the features' distance exceeds `near`. Along the direction of
-/// accurateSeparation(), right to 2^-39 at such distances, all corners then are beyond the distance
-/// by more than tolerance * displacement, and it takes more than the tolerance to lose that. So
-/// each stretch is longer than the tolerance, or than kShortStretch where they are near. (Few are
-/// needed: they are Newton's steps towards the impact. Features that turn as they pass each other
-/// at little more than the distance need most; there the turning direction and the plane reach
-/// further.) Where the march ends early changes no step before.
+/// Bounded: if no such points are found, the features' distance exceeds `near`. The direction of
+/// accurateSeparation() is right to 2^-39 at such distances. Along it, all corners are then beyond
+/// the distance by more than tolerance * displacement. They take longer than the tolerance to lose
+/// that margin. So each interval is longer than the tolerance, or than kShortStretch where they are
+/// near. (Few are needed: they are Newton's steps towards the impact. Features that turn as they
+/// pass each other at little more than the distance need most. There the turning direction and the
+/// plane reach further.) The value of upTo does not change the steps before it.
 template <Kind kind>
 ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, double upTo) {
   const RelativeMotion<kind> motion(query);
@@ -97,7 +99,7 @@ ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, d
   const double near =
       distance + tolerance * displacement + kApproachSlack * (largest.maxCoeff() + distance);
 
-  constexpr int kPatience = 6;  // stretches before directions are turned
+  constexpr int kPatience = 6;  // intervals before turning directions are tried
   const double shortest = std::max(tolerance, kShortStretch);
   double stride = 0.0;
   Separation here = motion.bestSeparation(t);
@@ -107,7 +109,7 @@ ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, d
       if (here.nearest <= near || distanceInside(motion, t) <= near) return {true, false, t};
       here = accurateSeparation(motion, t);
       clear = motion.separatedAround(t, largest, here, distance).high;
-      if (!(clear > t)) return {true, false, t};  // does not happen, as said above
+      if (!(clear > t)) return {true, false, t};  // does not happen: see "Bounded" above
     }
     if (clear > upTo || clear == 1.0) return {};
     if (step >= kPatience) {
@@ -129,8 +131,8 @@ ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, d
   }
 }
 
-/// A power of two that brings the largest coordinate near 1 where it is so large or small that
-/// products of differences would leave the range of doubles, else 1.
+/// A power of two that brings the largest coordinate near 1 if products of differences would
+/// otherwise leave the range of doubles, else 1.
 double scaleFor(const ImpactQuery& query) {
   double largest = 0.0;
   for (const auto& vertex : query.vertices)

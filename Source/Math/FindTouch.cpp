@@ -13,8 +13,8 @@ namespace {
 using Eigen::Vector3d;
 using Kind = ImpactQuery::Kind;
 
-/// det(A, B, C), each coefficient within `error`. One bound serves all four, as the permanent does;
-/// each takes 11 roundings.
+/// The Bernstein coefficients of det(A, B, C), each within `error`. One bound serves all four,
+/// because the permanent bounds all of them. Each takes 11 roundings.
 struct Coplanarity {
   CubicBernstein coefficients;
   double error;
@@ -32,7 +32,7 @@ Coplanarity coplanarity(const RelativeMotion<kind>& motion) {
   return result;
 }
 
-/// 1 or -1 where all coefficients certainly have that sign.
+/// 1 or -1 if all coefficients certainly have that sign, else 0.
 template <std::size_t N>
 int certainSign(const std::array<double, N>& coefficients, double error) {
   const auto [least, most] = std::minmax_element(coefficients.begin(), coefficients.end());
@@ -51,9 +51,9 @@ CubicBernstein restrict(const CubicBernstein& b, const Interval& t) {
           blossom(b, t.low, t.high, t.high), blossom(b, t.high, t.high, t.high)};
 }
 
-/// Whether the coefficients certainly change sign exactly once, so that there is exactly one root,
-/// and it is simple (Descartes' rule): the sign after, or 0. One doubtful coefficient between two
-/// signs does no harm.
+/// The sign after the only root if the coefficients certainly change sign exactly once, else 0.
+/// There is then exactly one root, and it is simple (Descartes' rule). One uncertain coefficient
+/// between two signs does not matter.
 int signAfterOnlyRoot(const CubicBernstein& b, double error) {
   int signs[4];
   for (int i = 0; i < 4; ++i) signs[i] = b[i] > error ? 1 : b[i] < -error ? -1 : 0;
@@ -71,7 +71,7 @@ class ImpactSearch {
   ImpactSearch(const RelativeMotion<kind>& motion, double tolerance)
       : m_motion(motion), m_tolerance(tolerance), m_largest(motion.largestDifference()) {}
 
-  /// None: undecided.
+  /// None if floating point could not decide.
   std::optional<ImpactAnswer> run(double upTo);
 
  private:
@@ -90,13 +90,13 @@ class ImpactSearch {
   double m_error = 0.0;  ///< of m_cubic restricted to any part of the step
 };
 
-/// A narrow interval at whose ends the cubic certainly has different signs, around its only root in
-/// the piece.
+/// A narrow interval around the cubic's only root in the piece. At its ends the cubic certainly has
+/// different signs.
 template <Kind kind>
 std::optional<Interval> ImpactSearch<kind>::bracketRoot(const Interval& piece,
                                                         int signAfter) const {
   const double t = approximateRoot(m_cubic, piece.low, piece.high, signAfter);
-  // To both sides, so half of the tolerance is the widest that is not too early.
+  // The width applies to both sides, so half of the tolerance is the widest that is not too early.
   for (double width = kNarrowestBracket; width <= 0.5 * m_tolerance; width *= 64.0) {
     const Interval bracket{std::max(t - width, piece.low), std::min(t + width, piece.high)};
     if (signAfter * blossom(m_cubic, bracket.low, bracket.low, bracket.low) < -m_error &&
@@ -106,7 +106,7 @@ std::optional<Interval> ImpactSearch<kind>::bracketRoot(const Interval& piece,
   return {};
 }
 
-/// The sign of l x r, component k, over an interval: a quadratic within 8 roundings of each
+/// Component k of l x r over an interval, for its sign: a quadratic within 8 roundings of each
 /// coefficient.
 struct CrossComponent {
   QuadraticBernstein coefficients;
@@ -134,8 +134,8 @@ struct CrossComponent {
   int sign() const { return certainSign(coefficients, error); }
 };
 
-/// Whether, at a time within the bracket at which A, B and C are in one plane, C = x A + y B is in
-/// the domain: Cramer's rule in the coordinates that tell A and B apart best.
+/// Whether C = x A + y B is in the domain at the time within the bracket at which A, B and C are in
+/// one plane. Uses Cramer's rule in the coordinates that separate A and B best.
 template <Kind kind>
 typename ImpactSearch<kind>::Verdict ImpactSearch<kind>::judge(const Interval& bracket) const {
   const double t = 0.5 * (bracket.low + bracket.high);
@@ -168,7 +168,7 @@ std::optional<ImpactAnswer> ImpactSearch<kind>::run(double upTo) {
   m_error = cubic.error + kBlossomError * largest;
   const bool alwaysCoplanar = largest <= cubic.error;
 
-  // What is left of the step, later pieces first.
+  // The pieces of the step that remain, later pieces first.
   constexpr int kMostPieces = 16, kMostSteps = 32;
   std::array<Interval, kMostPieces> pieces;
   int count = 0;
@@ -210,7 +210,8 @@ ImpactAnswer find(const ImpactQuery& query, double tolerance, double upTo) {
   if (motion.boxesSeparate()) return {};
   ImpactSearch<kind> search(motion, tolerance);
   std::optional<ImpactAnswer> answer = search.run(upTo);
-  // What part of the step cannot decide the whole may: the time must not depend on upTo.
+  // The search is repeated over the whole step, as that may decide what a part cannot: the time
+  // must not depend on upTo.
   if (upTo < 1.0 && (!answer || answer->impact)) answer = search.run(1.0);
   return answer ? *answer : findTouchExactly(query, tolerance);
 }

@@ -11,10 +11,10 @@ namespace palpate {
 
 namespace {
 
-using Linear = std::array<Form<1>, 3>;  ///< a vector that moves linearly, by its values at 0 and 1
+using Linear = std::array<Form<1>, 3>;  ///< a vector that moves linearly: its values at 0 and 1
 using Quadratic = std::array<Form<2>, 3>;
 
-/// odd · 2^exponent.
+/// The number odd · 2^exponent.
 struct Dyadic {
   long odd = 0;
   int exponent = 0;
@@ -56,7 +56,8 @@ Form<2> operator-(Form<2> l, const Form<2>& r) {
   return l;
 }
 
-/// A point and the end of a segment from the origin: touching where point = z segment, z in [0, 1].
+/// A moving point, and the moving end of a segment from the origin. They touch where point = z
+/// segment, z in [0, 1].
 struct PointAndSegment {
   Linear point, segment;
 
@@ -64,7 +65,7 @@ struct PointAndSegment {
   bool touchAt(const Moment& moment) const {
     for (int k = 0; k < 3; ++k)
       if (moment.sign(crossComponent(point, segment, k)) != 0) return false;
-    // With point = z segment: z (1 - z) |segment|², and -|point|² where the segment is a point.
+    // With point = z segment this is z (1 - z) |segment|², or -|point|² if the segment is a point.
     Form<2> inside;
     const Linear rest = segment - point;
     for (int k = 0; k < 3; ++k) addProduct(inside, point[k], rest[k]);
@@ -74,7 +75,7 @@ struct PointAndSegment {
   std::optional<double> firstTouchAfterStart() const;
 };
 
-/// When a moving point is first at the origin, if it ever is after the start.
+/// The first time after the start at which a moving point is at the origin, if there is one.
 std::optional<double> firstZeroAfterStart(const Linear& point) {
   for (int k = 0; k < 3; ++k) {
     if (isZero(point[k])) continue;
@@ -89,7 +90,8 @@ std::optional<double> firstZeroAfterStart(const Linear& point) {
   return 0.0;
 }
 
-/// Times after the start only, where point and segment were not touching, or are about to end to.
+/// Finds times after the start only. At the start, point and segment must be apart or about to
+/// separate.
 std::optional<double> PointAndSegment::firstTouchAfterStart() const {
   for (int k = 0; k < 3; ++k) {
     const Form<2> cross = crossComponent(point, segment, k);
@@ -99,7 +101,7 @@ std::optional<double> PointAndSegment::firstTouchAfterStart() const {
     if (touchAt(EndOfStep{})) return 1.0;
     return {};
   }
-  // Always on one line: the point comes in over an end.
+  // They are always on one line: the point enters the segment over an end.
   const std::optional<double> first = firstZeroAfterStart(point),
                               second = firstZeroAfterStart(point - segment);
   return first && second ? std::min(*first, *second) : first ? first : second;
@@ -162,9 +164,9 @@ std::vector<PointAndSegment> ExactQuery::border() const {
   return {{m_c, m_a}, {m_c, m_b}, {m_c - m_b, m_a}, {m_c - m_a, m_b}};
 }
 
-/// At a moment at which A, B and C are in one plane: is C = x A + y B for an (x, y) in the domain?
-/// By Cramer's rule on two of the coordinates, where these tell A and B apart; else A and B are on
-/// one line, and where there is such an (x, y), there is one on the domain's border.
+/// Whether C = x A + y B for an (x, y) in the domain, at a moment at which A, B and C are in one
+/// plane. If A and B are not on one line, Cramer's rule on two of the coordinates decides.
+/// Otherwise, if there is such an (x, y), there is one on the domain's border.
 template <class Moment>
 bool ExactQuery::touchAt(const Moment& moment) const {
   for (int k = 0; k < 3; ++k) {
@@ -197,8 +199,8 @@ std::optional<double> ExactQuery::firstTouch(double tolerance) const {
     if (!first && cubic[3] == 0 && touchAt(EndOfStep{})) first = 1.0;
     return first;
   }
-  // Always in one plane: what is inside the domain stays there for a while, so the first touch
-  // after the start is on its border.
+  // They are always in one plane. A point inside the domain stays there for a while, so the first
+  // touch after the start is on the domain's border.
   for (const PointAndSegment& side : border())
     if (const std::optional<double> time = side.firstTouchAfterStart();
         time && (!first || *time < *first))

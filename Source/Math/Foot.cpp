@@ -15,26 +15,27 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A weight as a coarse part, a multiple of 2^-26, and the little that is missing.
+/// A weight as the sum of a coarse part, a multiple of 2^-26, and a small remainder.
 struct Weight {
   double coarse, fine;
 };
 
 double toCoarse(double value) { return (value + kCoarseWeight) - kCoarseWeight; }
-/// To the nearest multiple of 2^-53, |value| below 1/4; turns with the value's sign.
+/// Rounds to the nearest multiple of 2^-53; |value| must be below 1/4. -value gives the negated
+/// result.
 double toGrid(double value) { return (value + 0.75) - 0.75; }
 
-/// In [0, 1], multiples of 2^-53.
+/// The weight in [0, 1], as a multiple of 2^-53.
 double unitWeight(const Weight& weight) {
   return std::clamp(weight.coarse + toGrid(weight.fine), 0.0, 1.0);
 }
-/// From [-1, 1] to the same; -w gives 1 minus what w gives.
+/// Maps a weight in [-1, 1] to [0, 1], as a multiple of 2^-53. The results for w and -w sum to 1.
 double halvedWeight(const Weight& weight) {
   return std::clamp(0.5 * (1.0 + weight.coarse) + toGrid(0.5 * weight.fine), 0.0, 1.0);
 }
 
-/// find(positions...) of positions near 1, scaled back; exactly(positions...) where a bit would be
-/// lost on the way.
+/// Calls find(positions...) with positions scaled near 1, and scales the result back. Calls
+/// exactly(positions...) instead if scaling would lose a bit.
 template <class Find, class Exactly, class... Positions>
 Foot atModerateScale(double extent, Find&& find, Exactly&& exactly, const Positions&... positions) {
   const int exponent = exponentTowardsOne(extent);
@@ -48,13 +49,14 @@ Foot atModerateScale(double extent, Find&& find, Exactly&& exactly, const Positi
   return foot;
 }
 
-/// The vector from the middle of b to the middle of a; the same bits whichever end comes first.
+/// The vector from the middle of b to the middle of a. Swapping the ends of either gives the same
+/// bits.
 Difference betweenMiddles(const Vector3d& a0, const Vector3d& a1, const Vector3d& b0,
                           const Vector3d& b1) {
   return half(sum(difference(a0, -a1), difference(-b0, b1)));
 }
 
-/// What a weight of a foot runs over.
+/// The range of a foot's weights.
 enum class Range { ZeroToOne, MinusOneToOne };
 
 double weightOf(const Weight& weight, Range range) {
@@ -66,12 +68,12 @@ double extentOf(const Difference& m, const Difference& u, const Difference& v, R
   return std::max(largest(m.high), range == Range::ZeroToOne ? edges : 2.0 * edges);
 }
 
-/// The foot of the perpendicular from the origin to the plane m + s u + t v by one Newton step from
-/// coarse weights, whose residual is compensated. None if floating point cannot tell it. The
-/// distance is left at zero where it may be that.
+/// The foot of the perpendicular from the origin to the plane m + s u + t v. It is found by one
+/// Newton step from coarse weights, whose residual is compensated. None if floating point cannot
+/// decide. The distance is zero if it may be zero.
 ///
-/// Needs    a moderate extent: extentOf() them.
-/// The same bits, mapped, when (u, s) and (v, t) change places.
+/// Needs    a moderate extent, from extentOf().
+/// Swapping (u, s) and (v, t) gives the same bits, mapped.
 std::optional<Foot> footOnPlane(const Difference& m, const Difference& u, const Difference& v,
                                 Range range, double extent) {
   const double square = dot(u.high, u.high) * dot(v.high, v.high);
@@ -98,8 +100,8 @@ std::optional<Foot> footOnPlane(const Difference& m, const Difference& u, const 
   const Vector3d residual = combination(m, s.coarse, u, t.coarse, v);
 
   double length = std::sqrt(normalSquare), height = dot(normal, residual) / length;
-  // The plain normal is off by 5 u |u| |v| / |n| and 4 u more, u the rounding unit; it may be by 7
-  // u times the extent over the height.
+  // The plain normal is off by 5 u |u| |v| / |n| and 4 u more, u the rounding unit. The largest
+  // error allowed is 7 u times the extent over the height.
   const double factors = std::sqrt(square);
   if (!accurate && !(std::abs(height) * (5.0 * factors + 4.0 * length) < 7.0 * extent * length)) {
     makeAccurate();
@@ -118,8 +120,8 @@ std::optional<Foot> footOnPlane(const Difference& m, const Difference& u, const 
   return foot;
 }
 
-/// Whether the distance that footOnPlane() found is right: it is zero only if the four points, or
-/// the ends of the two edges, lie in one plane.
+/// Whether the distance from footOnPlane() is right. It may be zero only if the four points, or the
+/// ends of the two edges, lie in one plane.
 bool hasRightDistance(const Foot& foot, const Vector3d& a, const Vector3d& b, const Vector3d& c,
                       const Vector3d& d) {
   return foot.distance > 0.0 || exact::areCoplanar(a, b, c, d);
@@ -145,7 +147,7 @@ Foot footOnLine(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
   weight.coarse = toCoarse(std::clamp(dot(m.high, edge.high) / square, -1.0, 1.0));
   const Vector3d residual = combination(m, -weight.coarse, edge);
   weight.fine = dot(residual, edge.high) / square;
-  // NaN, of an edge too short to square, is not below either.
+  // If the edge is too short to square, the weight is NaN, and this condition holds too.
   if (!(std::abs(weight.fine) < kFineWeight)) return exact::footOnLine(p, a, b);
   const Vector3d difference = residual - weight.fine * edge.high;
   if (!(largest(difference) > kTouching * extent)) {

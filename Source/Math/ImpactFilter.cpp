@@ -19,7 +19,7 @@ using V = hn::Vec<D>;
 using M = hn::Mask<D>;
 
 using Point = Vector3<V>;
-/// At the start of the step and at its end.
+/// A point at the start and at the end of the step.
 struct Ends {
   Point at[2];
 };
@@ -29,7 +29,7 @@ HWY_INLINE Point largest(const Point& a, const Point& b) {
   return {largest(a.x, b.x), largest(a.y, b.y), largest(a.z, b.z)};
 }
 HWY_INLINE Point largest(const Ends& ends) { return largest(ends.at[0], ends.at[1]); }
-/// Into [0, 1]; anything there where the divisor is not positive.
+/// l / r clamped to [0, 1]. Any value in [0, 1] if the divisor is not positive.
 HWY_INLINE V clampedQuotient(V l, V r) {
   const D d;
   const V quotient = hn::Div(l, hn::Max(r, hn::Set(d, kShortestDirection)));
@@ -44,14 +44,14 @@ HWY_INLINE Point nearer(const Point& l, const Point& r) {
           hn::IfThenElse(first, l.z, r.z)};
 }
 
-/// One vector's worth of queries.
+/// As many queries as a vector has lanes.
 template <ImpactQuery::Kind kind>
 class FilterLanes {
  public:
   HWY_INLINE FilterLanes(const ImpactBlock& block, int lane) : m_block(block), m_lane(lane) {}
 
-  /// Along some coordinate all corners are always further than the distance to one side, as
-  /// findTouch() and findApproach() have it.
+  /// Whether all corners are always further than the distance to one side along some coordinate, by
+  /// the same criterion as in findTouch() and findApproach().
   HWY_INLINE M separatedByBoxes(double distance) const {
     const D d;
     constexpr auto corners = ImpactQuery::corners(kind);
@@ -71,7 +71,7 @@ class FilterLanes {
     return separated;
   }
 
-  /// det(A, B, C) has one sign throughout.
+  /// Whether det(A, B, C) certainly has one sign throughout the step.
   HWY_INLINE M neverCoplanar() const {
     const D d;
     constexpr auto axes = ImpactQuery::axes(kind);
@@ -94,8 +94,8 @@ class FilterLanes {
                    hn::Le(magnitude, hn::Set(d, kLargestImpactDifference)));
   }
 
-  /// All corners are always further than the distance, and than findApproach() may report, along a
-  /// direction that does not move. Any direction will do.
+  /// Whether all corners are always further along a fixed direction than the distance, and than
+  /// findApproach() may report. Any direction is valid.
   HWY_INLINE M separatedAlong(const Point& direction, double distance, double tolerance) const {
     const D d;
     constexpr auto corners = ImpactQuery::corners(kind);
@@ -124,13 +124,14 @@ class FilterLanes {
     return hn::And(hn::Or(hn::Gt(least, limit), hn::Lt(most, hn::Neg(limit))), inRange);
   }
 
-  /// A x B as it is halfway.
+  /// A x B at half time.
   HWY_INLINE Point normalHalfway() const {
     constexpr auto axes = ImpactQuery::axes(kind);
     return cross(halfway(axes[0]), halfway(axes[1]));
   }
 
-  /// About from one feature's closest point to the other's, halfway, where these are on borders.
+  /// Approximately the vector between the features' closest points at half time, if these are on
+  /// the features' borders.
   HWY_INLINE Point gapHalfway() const {
     constexpr auto axes = ImpactQuery::axes(kind);
     const Point a = halfway(axes[0]), b = halfway(axes[1]), c = halfway(axes[2]);

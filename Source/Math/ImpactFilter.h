@@ -19,8 +19,8 @@ struct ImpactBlock {
   }
 };
 
-/// Throws out most queries without an impact: bit i is clear only where findImpact() with these
-/// settings certainly finds none, and set where it may find one.
+/// Filters out most queries without an impact. Bit i is clear only if findImpact() with these
+/// settings certainly finds no impact. It is set if findImpact() may find one.
 /// Needs    a tolerance in [2^-50, 1].
 /// Cost     a few tens of nanoseconds a query.
 std::uint8_t mayImpact(ImpactQuery::Kind, const ImpactBlock&, const TimeOfImpactSettings&);

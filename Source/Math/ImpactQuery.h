@@ -9,8 +9,8 @@
 
 namespace palpate {
 
-/// Two moving features that may touch: which, and where their four vertices are before and after
-/// the step.
+/// Two moving features that may touch: their kind, and the positions of their four vertices before
+/// and after the step.
 ///
 /// Both kinds are one problem. With A, B, C moving linearly,
 // clang-format off
@@ -34,41 +34,44 @@ struct ImpactQuery {
     if (kind == Kind::VertexTriangle) return {{{2, 1}, {3, 1}, {0, 1}}};
     return {{{1, 0}, {2, 3}, {2, 0}}};
   }
-  /// C - x A - y B at the corners of the domain, C first; the features touch where these surround
-  /// zero.
+  /// C - x A - y B at the corners of the domain, C first. The features touch when these points
+  /// surround zero.
   static constexpr std::array<Difference, 4> corners(Kind kind) {
     if (kind == Kind::VertexTriangle) return {{{0, 1}, {0, 2}, {0, 3}}};  // only three
     return {{{2, 0}, {2, 1}, {3, 0}, {3, 1}}};
   }
 };
 
-/// What an impact test says, and what it took.
+/// The result of an impact test.
 struct ImpactAnswer {
   bool impact = false;
   bool exact = false;  ///< floating point could not decide
-  double time = 0.0;   ///< [0, 1] of the step; of an impact only
+  double time = 0.0;   ///< [0, 1] of the step; valid if there is an impact
 };
 
-/// As vertexTriangleTimeOfImpact and edgeEdgeTimeOfImpact. An impact after upTo, in [0, 1], may be
-/// left out; the time of one that is found does not depend on upTo.
+/// The same as vertexTriangleTimeOfImpact and edgeEdgeTimeOfImpact, limited to times in [0, upTo].
+/// An impact after upTo may be missed. The time of an impact that is found does not depend on upTo.
 ImpactAnswer findImpact(const ImpactQuery&, const TimeOfImpactSettings&, double upTo = 1.0);
 
-/// Its parts; tolerance in [2^-50, 1]. Touching: floating point first, then exact arithmetic.
+/// findImpact() for a distance of 0; tolerance in [2^-50, 1]. Floating point first, then exact
+/// arithmetic.
 ImpactAnswer findTouch(const ImpactQuery&, double tolerance, double upTo = 1.0);
-/// The same answer by exact arithmetic alone.
+/// The same result by exact arithmetic alone.
 ImpactAnswer findTouchExactly(const ImpactQuery&, double tolerance);
-/// Coming within a distance > 0.
+/// findImpact() for a distance > 0: when the features come within it.
 ImpactAnswer findApproach(const ImpactQuery&, double distance, double tolerance, double upTo = 1.0);
 
-/// The side of the contact plane on which the first feature was last before the time: 1 if that of
-/// A x B, the triangle's winding normal or (p1 - p0) x (q0 - q1), towards which C points; else -1;
-/// 0 if it was always in the plane. exactDecisions: counts up where floating point could not tell.
+/// The side of the contact plane on which the first feature last was before the time. 1: the side
+/// of A x B, towards which C points; this is the triangle's winding normal, or (p1 - p0) x (q0 -
+/// q1). -1: the other side. 0: it was always in the plane. exactDecisions: incremented if floating
+/// point could not decide.
 int sideBefore(const ImpactQuery&, double time, std::size_t* exactDecisions = nullptr);
 
-/// The vertices at a time of the step, relative to the first one's way: differences stay sharp far
-/// from the origin, where positions would be rounded. As they are where differences overflow.
+/// The vertices at a time of the step, relative to the first vertex. Differences thus stay accurate
+/// far from the origin, where positions would be rounded. If the differences overflow, positions
+/// are absolute.
 std::array<Eigen::Vector3d, 4> positionsAt(const ImpactQuery&, double time);
-/// From these, the normal where features touch, with no minimum distance.
+/// The normal at a touch, from the positions at that time; for a minimum distance of zero.
 Eigen::Vector3d normalOfTouch(const ImpactQuery&, double time,
                               const std::array<Eigen::Vector3d, 4>& positions,
                               std::size_t& exactDecisions);

@@ -30,7 +30,7 @@ int exactSideAt(const ImpactQuery& query, double time) {
   return exact::signOf(exact::volumeOf(a, b, c));
 }
 
-/// The first that is not zero, ever further back.
+/// The first side that is not zero at times further and further before the impact.
 int exactSide(const ImpactQuery& query, double time, std::size_t* exactDecisions) {
   if (exactDecisions) ++*exactDecisions;
   for (double back = kFirstStepBack;; back *= 0x1p8) {
@@ -49,7 +49,7 @@ int side(const ImpactQuery& query, double time, std::size_t* exactDecisions) {
     if (!(largest > 0.0 && std::isfinite(largest))) return exactSide(query, time, exactDecisions);
     for (Eigen::Vector3d& end : *ends) end /= largest;
   }
-  // Ever further back, until rounding cannot hide the side.
+  // Goes further and further back until the side is beyond rounding.
   for (double back = kFirstStepBack;; back *= 0x1p8) {
     const double t = std::max(time - back, 0.0);
     const double volume = at(t, motion.a).cross(at(t, motion.b)).dot(at(t, motion.c));

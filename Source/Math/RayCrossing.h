@@ -16,17 +16,18 @@ enum class RayCrossing : std::int8_t {
 /// How the ray from p along +x crosses triangle (a, b, c).
 ///
 /// Exact for any finite doubles. The ray is moved aside by (0, e, e²) for a vanishing e > 0, so
-/// that it meets no edge and no corner: over a closed mesh, leaving less entering is the winding
-/// number of p, whatever the ray would have hit. A start on the boundary of a triangle may be told
-/// by another one or by none.
+/// that it meets no edge and no corner. Over a closed mesh, the number of Leaving less that of
+/// Entering is therefore the winding number of p, whatever the ray would have hit. If p is on the
+/// boundary of a triangle, this call may return None, and another triangle or none may return
+/// OnTriangle.
 /// Source   Simulation of simplicity (Edelsbrunner, Mücke, 1990), for the two coordinates of p.
 inline RayCrossing crossRay(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                             const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                             SignCounts& counts) {
   const auto turn = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
     if (const int sign = orient2d(0, from, to, p, counts)) return sign;
-    // (to - from) x (p - from) seen from +x falls with p.y by to.z - from.z and grows with p.z by
-    // to.y - from.y.
+    // The x component of (to - from) x (p - from) falls with p.y by to.z - from.z and grows with
+    // p.z by to.y - from.y.
     if (to.z() != from.z()) return to.z() < from.z() ? 1 : -1;
     return (to.y() > from.y()) - (to.y() < from.y());
   };
@@ -34,7 +35,7 @@ inline RayCrossing crossRay(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
   if (facing == 0 || turn(b, c) != facing || turn(c, a) != facing) return RayCrossing::None;
   const int side = orient3d(a, b, c, p, counts);
   if (side == 0) return RayCrossing::OnTriangle;
-  if (side == facing) return RayCrossing::None;  // it is behind the start
+  if (side == facing) return RayCrossing::None;  // the triangle is behind the start
   return facing > 0 ? RayCrossing::Leaving : RayCrossing::Entering;
 }
 

@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The vector from its nearest point on the segment [0, segment] to the point.
+/// The vector to the point from its nearest point on the segment [0, segment].
 Vector3d awayFromSegment(const Vector3d& point, const Vector3d& segment) {
   const double along = point.dot(segment), lengthSquared = segment.dot(segment);
   if (!(along > 0.0)) return point;
@@ -26,7 +26,7 @@ Separation RelativeMotion<kind>::bestSeparation(double t) const {
   std::array<Vector3d, corners> position;
   for (int i = 0; i < corners; ++i) position[i] = at(t, corner[i]);
 
-  // Compared squared: no root for each.
+  // Squares are compared, which needs no square roots.
   Separation best;
   double bestLeast = 0.0, bestSquare = 1.0, nearestSquare = INFINITY;
   const auto consider = [&](const Vector3d& direction, double lengthSquared) {
@@ -73,8 +73,8 @@ Interval RelativeMotion<kind>::separatedAround(double t, const Vector3d& largest
     const double first = separation.direction.dot(ends[0]) - needed,
                  last = separation.direction.dot(ends[1]) - needed;
     if (!(between(first, last, t) > 0.0)) return {1.0, 0.0};
-    // Where the end itself is not positive the limit is the zero between, moved towards t by more
-    // than the quotient's three roundings.
+    // If an end is not positive, the limit is the zero in between, moved towards t by more than the
+    // quotient's three roundings.
     const double zero = first / (first - last);
     if (!(first > 0.0)) interval.low = std::max(interval.low, zero * (1.0 + kQuotientError));
     if (!(last > 0.0)) interval.high = std::min(interval.high, zero * (1.0 - kQuotientError));
@@ -82,8 +82,8 @@ Interval RelativeMotion<kind>::separatedAround(double t, const Vector3d& largest
   return interval;
 }
 
-/// Along n(t) a corner moves as a quadratic, above its Bernstein coefficients; |n(t)| is at most
-/// the larger length at the ends.
+/// A corner's coordinate along n(t) is a quadratic, and not below its least Bernstein coefficient.
+/// |n(t)| is at most the larger length at the ends.
 template <ImpactQuery::Kind kind>
 bool RelativeMotion<kind>::separatedBetween(double t0, const Separation& first, double t1,
                                             const Separation& last, const Vector3d& largest,
@@ -101,8 +101,8 @@ bool RelativeMotion<kind>::separatedBetween(double t0, const Separation& first, 
   return true;
 }
 
-/// |det(A, B, C)| is above its Bernstein coefficients of one sign, |A x B| below the longest of
-/// its.
+/// If the Bernstein coefficients of det(A, B, C) have one sign, |det(A, B, C)| is not below the
+/// least of their magnitudes. |A x B| is at most the length of its longest coefficient.
 template <ImpactQuery::Kind kind>
 bool RelativeMotion<kind>::separatedByPlane(double t0, double t1, double distance) const {
   const Vector3d u = at(t0, a), v = at(t0, b), w = at(t0, c);

@@ -14,7 +14,7 @@ struct Interval {
   bool empty() const { return !(low <= high); }
 };
 
-/// The largest magnitudes over the step.
+/// The largest magnitude of each component over the step.
 inline Eigen::Vector3d largestOf(const std::array<Eigen::Vector3d, 2>& ends) {
   return ends[0].cwiseAbs().cwiseMax(ends[1].cwiseAbs());
 }
@@ -23,15 +23,16 @@ inline Eigen::Vector3d at(double t, const std::array<Eigen::Vector3d, 2>& ends) 
   return (1.0 - t) * ends[0] + t * ends[1];
 }
 
-/// A fixed direction in which all corners may lie on one side of zero at time t: the least of them
-/// over the length is the features' distance where the direction is right. Zero: none was found.
+/// A fixed direction along which all corners may lie on one side of zero at time t. If the
+/// direction is right, the least of their coordinates along it, divided by the length, is the
+/// features' distance. Zero if no direction was found.
 struct Separation {
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();
   double length = 0.0;
-  double nearest = INFINITY;  ///< the distance of two points on the features' borders
+  double nearest = INFINITY;  ///< L: the distance of two points on the features' borders
 };
 /// An ImpactQuery's A, B, C, and the corners of C - x A - y B, at both ends of the step, in
-/// doubles. Each component is the real one rounded once, with its exact sign.
+/// doubles. Each component is the exact value rounded once, and has the exact sign.
 template <ImpactQuery::Kind kind>
 struct RelativeMotion {
   static constexpr bool square = kind == ImpactQuery::Kind::EdgeEdge;
@@ -55,7 +56,8 @@ struct RelativeMotion {
     }
   }
 
-  /// A coordinate has one strict sign at every corner at both ends, and so throughout. Exact.
+  /// Whether some coordinate has the same strict sign at every corner and both ends, and therefore
+  /// throughout the step. Exact.
   bool boxesSeparate() const {
     for (int k = 0; k < 3; ++k) {
       double least = corner[0][0][k], most = least;
@@ -69,7 +71,7 @@ struct RelativeMotion {
     return false;
   }
 
-  /// Per coordinate, over the corners and the step.
+  /// The largest magnitude of each coordinate, over the corners and the step.
   Eigen::Vector3d largestDifference() const {
     Eigen::Vector3d largest = Eigen::Vector3d::Zero();
     for (const Ends& ends : corner)
@@ -86,19 +88,19 @@ struct RelativeMotion {
 
   Separation bestSeparation(double t) const;
 
-  /// The times around t at which all corners are certainly further than `distance` along the
-  /// direction: the corners move linearly along it, so this is an interval. Empty where they are
-  /// not at t itself. largest is largestDifference().
+  /// The interval of times around t during which all corners are certainly further than `distance`
+  /// along the direction. It is an interval because the corners move linearly. Empty if this does
+  /// not hold at t itself. largest is largestDifference().
   Interval separatedAround(double t, const Eigen::Vector3d& largest, const Separation&,
                            double distance) const;
 
-  /// All corners are certainly further than `distance` from t0 to t1 along a direction that goes
-  /// linearly from one to the other.
+  /// Whether all corners are certainly further than `distance` from t0 to t1, along a direction
+  /// that changes linearly from one separation's to the other's.
   bool separatedBetween(double t0, const Separation&, double t1, const Separation&,
                         const Eigen::Vector3d& largest, double distance) const;
 
-  /// The plane of A and B, through the one feature or along both, certainly stays further than
-  /// `distance` from C, which the other goes through.
+  /// Whether the plane of A and B certainly stays further than `distance` from C. The plane goes
+  /// through one feature, or along both edges; C goes through the other.
   bool separatedByPlane(double t0, double t1, double distance) const;
 };
 

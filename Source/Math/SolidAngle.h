@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-/// A sum of what is seen, as shares of the whole sphere, and how far it may be off.
+/// A solid angle as a share of the whole sphere, and a bound on its error.
 struct SeenShare {
   double value = 0, error = 0;
   void add(const SeenShare& other) { value += other.value, error += other.error; }
@@ -23,12 +23,11 @@ inline Eigen::Vector3d directionOf(const Eigen::Vector3d& v) {
              : v.stableNormalized();
 }
 
-/// How much of all directions from p a triangle takes; positive from behind, where its winding
-/// normal leads away from p.
+/// The share of all directions from p that a triangle covers. Positive from behind, where the
+/// triangle's winding normal leads away from p.
 ///
-/// Source   Van Oosterom and Strackee, The solid angle of a plane triangle (1983). Difference: of unit
-///          vectors, with a bound on the error, which grows where p is near to the triangle's
-///          border.
+/// Source   Van Oosterom and Strackee, The solid angle of a plane triangle (1983). Difference: unit
+///          vectors, and a bound on the error, which grows where p is near the triangle's border.
 inline SeenShare seenShare(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                            const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d u = directionOf(a - p), v = directionOf(b - p), w = directionOf(c - p);

@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A magnitude: mantissa 2^exponent.
+/// The magnitude mantissa 2^exponent.
 struct Value {
   double mantissa;
   long exponent;
@@ -27,7 +27,7 @@ Value valueOf(const Integer& x) {
   return value;
 }
 
-/// at: the corners less p. Face i is opposite corner i.
+/// at: the corners relative to p. Face i is opposite corner i.
 template <class T>
 std::array<double, 4> weightsOf(const std::array<exact::Vector<T>, 4>& at,
                                 const std::array<int, 4>& signs) {
@@ -55,7 +55,7 @@ std::array<double, 4> weightsOf(const std::array<exact::Vector<T>, 4>& at,
 std::optional<std::array<double, 4>> tetrahedronWeights(const Vector3d& p, const Vector3d& a,
                                                         const Vector3d& b, const Vector3d& c,
                                                         const Vector3d& d, SignCounts& counts) {
-  // The four volumes with p in a corner's place sum to the whole, so their signs decide.
+  // The four volumes in which p replaces one corner sum to the whole volume, so their signs decide.
   const std::array<const Vector3d*, 4> corners{&a, &b, &c, &d};
   std::array<int, 4> signs{};
   int sign = 0;

@@ -7,11 +7,11 @@
 
 namespace palpate {
 
-/// Weights of a tetrahedron's corners at a point in it or on its boundary; none outside, and none
-/// of a tetrahedron without volume. Either orientation.
+/// Weights of a tetrahedron's corners at a point in it or on its boundary. None if the point is
+/// outside, or if the tetrahedron has no volume. Either orientation.
 ///
-/// Exact    whether there are any, and which are 0: that of corner i where the point is on the face
-///          opposite. The others are positive, each within 2^-50 of its value.
+/// Exact    whether there are weights, and which are 0: the weight of corner i is 0 if the point is
+///          on the opposite face. The others are positive, each within 2^-50 of its value.
 std::optional<std::array<double, 4>> tetrahedronWeights(const Eigen::Vector3d& p,
                                                         const Eigen::Vector3d& a,
                                                         const Eigen::Vector3d& b,

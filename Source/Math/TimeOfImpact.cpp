@@ -10,7 +10,7 @@ namespace palpate {
 
 ImpactAnswer findImpact(const ImpactQuery& query, const TimeOfImpactSettings& settings,
                         double upTo) {
-  // A tolerance that is no number counts as the smallest.
+  // A tolerance of NaN counts as the smallest one.
   const double tolerance = settings.timeTolerance > kSmallestTimeTolerance
                                ? std::min(settings.timeTolerance, 1.0)
                                : kSmallestTimeTolerance;

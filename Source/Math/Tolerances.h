@@ -2,175 +2,182 @@
 
 #include "Exact/ErrorBounds.h"
 
-// The tolerances of what is decided in double, with their units and where they come from. u = 2^-53
-// is the rounding unit. Boxes and filters in float have theirs where their derivations are: boxes
-// in Math/Box.h and Octree, filters in Mesh/UnfoldedStars and NarrowPhase.
+// The tolerances of decisions in double, with their units and derivations. u = 2^-53 is the
+// rounding unit. Tolerances of boxes and filters in float are beside their derivations: boxes in
+// Math/Box.h and Octree, filters in Mesh/UnfoldedStars and NarrowPhase.
 namespace palpate {
 
-// ---- Signs of polynomials in coordinate differences (ClosestPoint.cpp) ----
+// ---- Signs of polynomials in coordinate differences (EdgeEdgeDistance.cpp, Shapes) ----
 
-/// The same where they are multiplied by products of moderate coordinates, 2^200 at most.
+/// kUnderflowGuard for signs that are multiplied by products of moderate coordinates, 2^200 at
+/// most.
 constexpr double kUnderflowGuardOfProducts = 0x1p-800;
 
-// ---- Closest points (ClosestPoint.cpp) ----
+// ---- Closest points (Foot.cpp, EdgeEdgeDistance.cpp) ----
 
-/// Added and taken away again it rounds a weight to a multiple of 2^-26, so that its product with
-/// half of a split double is exact.
+/// Adding and subtracting this rounds a weight to a multiple of 2^-26. Its product with half of a
+/// split double is then exact.
 constexpr double kCoarseWeight = 0x1.8p26;
-/// The Newton step after the coarse weight must be this short at most: its own rounding is then
-/// 2^-70 of the largest coordinate difference at the narrowest angle below. A longer one means that
-/// the first estimate was bad, as of a feature tiny beside its distance.
+/// The longest Newton step that is accepted after the coarse weight. Its own rounding is then 2^-70
+/// of the largest coordinate difference at the narrowest angle below. A longer step means that the
+/// first estimate was bad, as for a feature that is tiny compared to its distance.
 constexpr double kFineWeight = 0x1p-20;
-/// Relative to the largest coordinate difference. A residual is off by 2^-76 at most, so that
-/// longer ones have a true direction and shorter ones may be zero.
+/// Relative to the largest coordinate difference. A residual is off by 2^-76 at most. Longer
+/// residuals therefore have a true direction, and shorter ones may be zero.
 constexpr double kTouching = 0x1p-66;
-/// Of two lengths, each within 4 u: closer ones are told apart in integers, because the closest
-/// points of nearly parallel edges may lie far apart at almost the same distance.
+/// Ratio of two lengths, each within 4 u. Lengths that are closer than this are compared in
+/// integers, because the closest points of nearly parallel edges may lie far apart at almost the
+/// same distance.
 constexpr double kTie = 1 + 0x1p-49;
-/// Squared sine of the angle between two edges below which their cross product is taken with
-/// compensation: its plain error of 5 u over the sine would spoil the Newton step.
+/// Squared sine of the angle between two edges. Below it, their cross product is computed with
+/// compensation, because its plain error of 5 u over the sine would spoil the Newton step.
 constexpr double kNarrowAngleSquare = 0x1p-16;
-/// Squared sine below which the compensated Newton step is left to integers.
+/// Squared sine below which integers replace the compensated Newton step.
 constexpr double kSliverAngleSquare = 0x1p-40;
-/// Of accurateCross(), in the sum of magnitudes: relative to the result, and to the product of the
-/// factors' sums (3 2^-103, and m's own 2^-104 of the positions).
+/// Errors of accurateCross(), in the sum of magnitudes: relative to the result, and relative to the
+/// product of the factors' sums (3 2^-103, and m's own 2^-104 of the positions).
 constexpr double kAccurateCrossError = 0x1p-52;
 constexpr double kAccurateCrossLoss = 0x1p-101;
 
 // ---- Impacts (RelativeMotion.cpp, FindTouch.cpp, FindApproach.cpp, ImpactFilter.cpp) ----
 
-/// L. Bounds hold for coordinate differences up to this: no product overflows, and all that
-/// underflow can lose, under 2^-800, is within kImpactUnderflow.
+/// L. The bounds hold for coordinate differences up to this. No product then overflows, and
+/// kImpactUnderflow covers all that underflow can lose, which is under 2^-800.
 constexpr double kLargestImpactDifference = 0x1p200;
 constexpr double kImpactUnderflow = 0x1p-700;
-/// Of a Bernstein coefficient of det(A, B, C), relative to the permanent of the largest magnitudes
-/// over the step, of whose terms none is exceeded: 11 u (three differences, two products, at most
+/// Error of a Bernstein coefficient of det(A, B, C), relative to the permanent of the largest
+/// magnitudes over the step, which bound every term: 11 u (three differences, two products, at most
 /// six sums and a division) and the permanent's own rounding.
 constexpr double kCoplanarityError = 16 * 0x1p-53;
-/// Of restricting a polynomial to part of the step, relative to its largest coefficient: nine
+/// Error of restricting a polynomial to part of the step, relative to its largest coefficient: nine
 /// roundings and those of the weights.
 constexpr double kBlossomError = 16 * 0x1p-53;
-/// Of a Bernstein coefficient of a component of a cross product restricted to part of the step,
-/// relative to the sum of the two products' largest magnitudes: 8 u, and 6 u from restricting.
+/// Error of a Bernstein coefficient of a component of a cross product restricted to part of the
+/// step, relative to the sum of the two products' largest magnitudes: 8 u, and 6 u from
+/// restricting.
 constexpr double kCrossError = 32 * 0x1p-53;
-/// Of a corner's position along a direction, relative to the sum of the products' magnitudes: 1 u
-/// from the difference, 3 u from the dot product, 4 u from interpolating in time, and the same
-/// again for what it is compared with.
+/// Error of a corner's position along a direction, relative to the sum of the products' magnitudes:
+/// 1 u from the difference, 3 u from the dot product, 4 u from interpolating in time, and the same
+/// again for the value that it is compared with.
 constexpr double kAlongError = 16 * 0x1p-53;
-/// Of det(A, B, C) between two times, relative to the permanent, and of A x B, relative to the
-/// product of their largest lengths: 4 u for each factor at a time, and at most 16 u as for
+/// Error of det(A, B, C) between two times, relative to the permanent, and of A x B, relative to
+/// the product of their largest lengths: 4 u for each factor at a time, and at most 16 u as for
 /// kCoplanarityError.
 constexpr double kPlaneError = 32 * 0x1p-53;
 /// Below this a direction's length loses precision to underflow.
 constexpr double kShortestDirection = 0x1p-500;
-/// Of the step: the smallest tolerance that is kept.
+/// Share of the step: smaller time tolerances are raised to this.
 constexpr double kSmallestTimeTolerance = 0x1p-50;
-/// Of a coordinate of a moving corner less the distance, relative to both: the difference of two
-/// positions, that less the distance, and this bound's own rounding.
+/// Error of a moving corner's coordinate less the distance, relative to both: the difference of two
+/// positions, the subtraction of the distance, and this bound's own rounding.
 constexpr double kApproachBoxError = 0x1p-51;
-/// Of the quotient of two differences, each its operands' nearest, relative: 3 u, and above that.
+/// Relative error of the quotient of two correctly rounded differences: 3 u, and a margin.
 constexpr double kQuotientError = 0x1p-50;
-/// Relative to the largest coordinate difference and the minimum distance: the distance at which
-/// findApproach() may report, beyond tolerance * displacement. At 2^-36 the direction in which its
-/// features are apart is right to 2^-39 (2^-50, and 2^-76 of twice the largest difference over the
-/// distance), which takes at most 2^-38 of the largest difference, √3 of it away, from what corners
-/// are apart.
+/// Relative to the largest coordinate difference and the minimum distance: how far beyond tolerance
+/// * displacement findApproach() may report. At 2^-36 the direction in which its features are apart
+/// is right to 2^-39 (2^-50, and 2^-76 of twice the largest difference over the distance). A corner
+/// is at most √3 of the largest difference away. The error therefore takes at most 2^-38 of the
+/// largest difference from its distance along the direction.
 constexpr double kApproachSlack = 0x1p-36;
-/// The same as promised: with what the distance computed there is off by, under 2^-45.
+/// The bound that is promised to users: kApproachSlack and the error of the distance computed at
+/// the reported time, under 2^-45.
 constexpr double kApproachError = 0x1p-35;
-/// Of the step: findApproach() asks whether the features are near, and reports, where it cannot go
-/// on for longer than this or the tolerance. Any value keeps its promises; smaller ones take more
-/// steps within what it may report.
+/// Share of the step: findApproach() checks whether the features are near, and reports, if it
+/// cannot advance by more than this or the tolerance. Any value keeps its promises; smaller values
+/// take more steps within the distance at which it may report.
 constexpr double kShortStretch = 0x1p-20;
-/// Of det(A, B, C) with components up to 1 (sideBefore()): six terms of 12 u, twice.
+/// Error of det(A, B, C) with components up to 1 (sideBefore()): six terms of 12 u, twice.
 constexpr double kSideError = 0x1p-46;
-/// Of the step: how far before an impact sideBefore() looks first; where that is too near to tell,
-/// ever further, so any value will do.
+/// Share of the step: how far before an impact sideBefore() evaluates the side first. It goes back
+/// further where that is too near to decide, so any value will do.
 constexpr double kFirstStepBack = 0x1p-44;
 
-// ---- Shapes (Shapes/Shape.cpp, Queries/ElementsNearShape.cpp) ----
+// ---- Shapes (Shapes, Queries/ElementsNearShape.cpp) ----
 
-/// Of an edge: how closely its point nearest to a shape is bracketed, and how near to an end it is
-/// that end. The least distance varies by the square of that.
+/// Weight on an edge: the width to which its point nearest to a shape is bracketed. A point this
+/// near to an end counts as the end. The least distance varies by the square of this.
 constexpr double kEdgeWeight = 0x1p-50;
-/// Relative to a shape's magnitude: nearer to a capsule's axis, or out of a face, the direction to
-/// it is rounding; and of two faces, this much nearer, which is nearer.
+/// Relative to a shape's magnitude. A point this near to a capsule's axis, or this little outside a
+/// face, has a direction that is only rounding. Two faces whose distances differ by no more than
+/// this are equally near.
 constexpr double kOnSurface = 0x1p-48;
-/// Relative to the largest difference of two shapes' points: how closely their distance is
+/// Relative to the largest difference of two shapes' points: the width to which their distance is
 /// bracketed. Each difference carries two roundings, its height five more.
 constexpr double kShapePairGap = 0x1p-46;
-/// Of the sizes of two shapes whose distance is that of the body of differences; beyond it that gap
-/// may be larger than the smaller shape.
+/// Largest ratio of the sizes of two shapes whose distance uses the Minkowski difference. Beyond
+/// it, kShapePairGap may be larger than the smaller shape.
 constexpr double kMostSizeRatio = 0x1p40;
-/// L: the same where differences are so small that their own roundings are larger.
+/// L: replaces kShapePairGap where differences are so small that their own roundings are larger.
 constexpr double kSmallestShapePairGap = 0x1p-1068;
-/// Squared sine from a capsule's axis below which another direction across it is taken: any value.
+/// Squared sine of the angle between a direction and a capsule's axis. Below it, another direction
+/// across the axis is used. Any value will do.
 constexpr double kAcrossSquare = 0x1p-10;
-/// Of R^T R from 1: rotations as exact as users have them; boxes and cylinders take the nearest one
-/// that is exact to double.
+/// Largest deviation of R^T R from the identity. Users' rotations are this exact; boxes and
+/// cylinders use the nearest rotation that is exact to double.
 constexpr double kOrthonormal = 1e-9;
-/// Relative to the magnitudes of a box and a shape: a distance bounded from a box's centre carries
-/// some twenty roundings.
+/// Error of a distance bounded from a box's centre, relative to the magnitudes of the box and the
+/// shape: some twenty roundings.
 constexpr double kShapeBoundError = 0x1p-46;
 
 // ---- The nearest point of a surface (Queries/Containment.cpp) ----
 
-/// Relative, of squared distances and of products of lengths: a dozen roundings each, and above
-/// that.
+/// Relative error of squared distances and of products of lengths: a dozen roundings each, and a
+/// margin.
 constexpr double kNearestError = 0x1p-40;
-/// Relative to the distance of a triangle's furthest corner: what a distance to the triangle is off
-/// by, under 2^-48, and above that.
+/// Error of a distance to a triangle, relative to the distance of its furthest corner: under 2^-48,
+/// and a margin.
 constexpr double kNearestSlack = 0x1p-45;
 
 // ---- Winding numbers (SolidAngle.h, Queries/WindingNumber.cpp) ----
 
-/// Of both parts of a triangle's half solid angle, from unit vectors within 3 u each: 9 u and the
-/// products' 6 u, and 3 (6 u + 4 u) and the sums' 8 u; with the angle's own rounding.
+/// Error of both parts of a triangle's half solid angle, from unit vectors within 3 u each: 9 u and
+/// the products' 6 u, and 3 (6 u + 4 u) and the sums' 8 u; with the angle's own rounding.
 constexpr double kSolidAngleError = 80 * 0x1p-53;
-/// Relative to what clusters add: some thirty roundings on the way up the tree, and of their
-/// centres relative to the coordinates.
+/// Error relative to what clusters add: some thirty roundings on the way up the tree. The error of
+/// their centres is relative to the coordinates.
 constexpr double kClusterError = 0x1p-46;
-/// For each triangle: twice what one that is not near adds to the error of a sum of all.
+/// For each triangle: twice what a triangle that is not near adds to the error of the whole sum.
 constexpr double kWindingSlack = 0x1p-44;
 
 // ---- Bodies placed in the world (CollisionDetection/RigidBody.cpp) ----
 
-/// Of fl(R x + t), relative to the sum of its terms' magnitudes: 4 u; of a difference of two 9 u;
-/// and of what is compared with them, computed from a box's centre, some ten roundings.
+/// Error relative to the sum of the terms' magnitudes: 4 u for fl(R x + t), and 9 u for a
+/// difference of two. Values that are computed from a box's centre and compared with them have some
+/// ten roundings.
 constexpr double kPlacedError = 0x1p-48;
-/// L: coordinates of bodies and translations up to this are placed without overflow.
+/// L: coordinates of bodies and translations up to this are transformed without overflow.
 constexpr double kLargestPlaced = 0x1p1000;
 
 // ---- Contact frames (CollisionDetection/ContactMotions.cpp) ----
 
-/// Of the squared sum of two unit vectors: below it they are opposite but for rounding.
+/// Squared length of the sum of two unit vectors. Below it they are opposite within rounding.
 constexpr double kOppositeSquare = 0x1p-80;
 
 // ---- Penetration directions (Queries/PenetrationTracker.cpp) ----
 
-/// Of a triangle's edge, normal and what is across both from being orthonormal: beyond it the
-/// normal is no more than rounding. Any value.
+/// Largest deviation from orthonormal of a triangle's edge, normal and the direction across both.
+/// Beyond it the normal is no more than rounding. Any value will do.
 constexpr double kAxesError = 0x1p-20;
 
 // ---- Triangles without area in contacts (NarrowPhase/StepCheck.cpp) ----
 
-/// Squared sine of an angle of a triangle above which it certainly has area: u^2 and more. Any
-/// value above the rounding of a cross product.
+/// Squared sine of a triangle's angle above which the triangle certainly has area: u^2 and more.
+/// Any value above the rounding of a cross product will do.
 constexpr double kFlatSquare = 0x1p-60;
 
-// ---- Motion bounds (Motion.cpp, MotionBound.cpp) ----
+// ---- Motion bounds (Mesh/Motion.cpp, MotionBound.cpp, Validity, NarrowPhase/Auto.cpp) ----
 
-/// Relative, and of a distance relative to the largest coordinate difference beside it: a
-/// displacement carries 2 u, a difference of two 5 u, its length 4 u more; a distance is within 16
-/// u of the largest coordinate difference (<palpate/Distance.h>).
+/// Relative error of motions; for a distance, relative to the largest coordinate difference. A
+/// displacement carries 2 u, a difference of two 5 u, and its length 4 u more. A distance is within
+/// 16 u of the largest coordinate difference (<palpate/Distance.h>).
 constexpr double kMotionError = 0x1p-46;
-/// Of the time tolerance, added to a motion that extends a thickness, relative: covers twice what
-/// Continuous may report early.
+/// Multiple of the time tolerance by which a motion that extends a thickness is enlarged. It covers
+/// twice what Continuous may report early.
 constexpr double kMotionSlack = 4;
-/// Relative, of squared lengths of displacements: how far below the limit certainly slow ones are.
-/// Any value above a dozen roundings.
+/// Relative to squared lengths of displacements: how far below the limit certainly slow ones are.
+/// Any value above a dozen roundings will do.
 constexpr double kSlowSlack = 0x1p-20;
-/// L²: squares above this lose nothing of note to underflow.
+/// L²: squares above this lose nothing significant to underflow.
 constexpr double kSmallestSlowSquare = 0x1p-900;
 
 }  // namespace palpate

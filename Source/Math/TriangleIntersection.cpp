@@ -37,11 +37,11 @@ struct Box {
   }
 };
 
-/// A triangle and, for each of its corners, the side of the other's plane that it is on.
+/// A triangle and, for each of its corners, its side of the other triangle's plane.
 struct Placed {
   const Corners& corners;
   const Box& box;
-  unsigned excluded;  ///< bit i: corner i is the other's too
+  unsigned excluded;  ///< bit i: corner i is a corner of the other, too
   Signs sides{};
 
   void place(const Corners& other, SignCounts& counts) {
@@ -49,8 +49,8 @@ struct Placed {
     for (int i = 0; i < 3; ++i)
       if (!has(excluded, i)) sides[i] = plane.side(corners[i], counts);
   }
-  /// All corners that are not the other's are strictly on one side: the other has area, and no more
-  /// than the corners in common lie on its plane.
+  /// Whether all corners that are not shared are strictly on one side. The other triangle then has
+  /// area, and at most the shared corners lie on its plane.
   bool aside() const {
     int sum = 0, count = 0;
     for (int i = 0; i < 3; ++i) {
@@ -64,14 +64,14 @@ struct Placed {
   bool edgeCrosses(int i) const { return sides[i] * sides[next(i)] < 0; }
 };
 
-/// The corner that is alone on its side of a plane which the triangle crosses, no corner being on
-/// the plane.
+/// The corner that is alone on its side of a plane. The triangle must cross the plane, and no
+/// corner may lie on it.
 int lonelyCorner(const Signs& s) { return s[0] == s[1] ? 2 : s[0] == s[2] ? 1 : 0; }
 
-/// Neither triangle has a corner on the other's plane and both cross it: the planes meet in a line,
-/// on which each triangle covers an interval that ends at the two edges of its lonely corner. The
-/// sign of the volume of an edge of a and one of b, both taken from the lonely corners, says which
-/// end comes first, in a sense common to all four.
+/// For triangles that both cross the other's plane and have no corner on it. The planes meet in a
+/// line. On this line each triangle covers an interval that ends at the two edges of its lonely
+/// corner. The sign of the volume of an edge of a and an edge of b, both starting at the lonely
+/// corners, decides which end comes first. The sense is common to all four volumes.
 TriangleIntersection intersectCrossing(const Placed& a, const Placed& b, SignCounts& counts) {
   const int p = lonelyCorner(a.sides), q = lonelyCorner(b.sides);
   const std::array<int, 2> edgesA{p, next(next(p))}, edgesB{q, next(next(q))};
@@ -94,23 +94,25 @@ TriangleIntersection intersectCrossing(const Placed& a, const Placed& b, SignCou
   return result;
 }
 
-// Which points of one plane coincide is decided by projections along the axes. What meets in space
-// meets in all three; and along at least one axis the plane is seen at full dimension, so what
-// meets in all three meets in space. Where such an axis is known, it alone is enough.
+// Coincidence of points in one plane is decided by projections along the axes. Features that meet
+// in space meet in all three projections. Along at least one axis the plane's projection has full
+// dimension, so features that meet in all three projections meet in space. If such an axis is
+// known, it alone is enough.
 
 struct Axes {
   int first = 0, last = 2;
   bool known() const { return first == last; }
 };
 
-/// One along which a triangle is seen with area; all if it has none.
+/// An axis along which the triangle's projection has area; all axes if there is none.
 Axes axesOf(const Corners& t, SignCounts& counts) {
   for (int axis = 0; axis < 3; ++axis)
     if (orient2d(axis, t[0], t[1], t[2], counts) != 0) return {axis, axis};
   return {};
 }
 
-/// The sides of a triangle's edges that another's corners are on, seen along an axis.
+/// The sides of a triangle's edges on which another triangle's corners lie, in the projection along
+/// an axis.
 class SidesOfEdges {
  public:
   SidesOfEdges(const Corners& triangle, const Corners& points, SignCounts& counts)
@@ -136,9 +138,10 @@ class SidesOfEdges {
   SignCounts& m_counts;
 };
 
-/// Bit i: corner i of a is on the triangle. A point on its plane and in its box, which its edges do
-/// not see from different sides, is: with area, no point outside is seen so; without, only points
-/// on the triangle's line are, and the box does the rest.
+/// Bit i: corner i of a is on the triangle. A point on the triangle's plane and in its box is on
+/// the triangle if, in projection, it is not on different sides of the edges. With area, no point
+/// outside satisfies this. Without area, only points on the triangle's line do, and the box
+/// excludes the rest of the line.
 std::uint8_t cornersOn(const Placed& a, const Placed& triangle, const Axes& axes,
                        SidesOfEdges& sidesOf) {
   std::uint8_t found = 0;
@@ -164,9 +167,9 @@ std::uint8_t edgesThrough(const Placed& a, const Corners& triangle, SignCounts& 
   return found;
 }
 
-/// Corners on the other's plane, a triangle without area, or both: every feature is tested by
-/// itself. Segments in one plane whose boxes overlap meet if neither is strictly to one side of the
-/// other, those without length included.
+/// For triangles with corners on the other's plane, without area, or both: every feature is tested
+/// by itself. Segments in one plane whose boxes overlap meet if neither is strictly to one side of
+/// the other. This includes segments without length.
 TriangleIntersection intersectTouching(const Placed& a, const Placed& b, unsigned excludedEdges,
                                        SignCounts& counts) {
   const Axes ofA = axesOf(a.corners, counts), ofB = axesOf(b.corners, counts);

@@ -54,7 +54,7 @@ FeatureDecision closestFeature(const Vector3d& p, const CornerPointers& corners)
   return exactly();
 }
 
-/// In a unit of their own, so that none overflows or vanishes.
+/// Squared lengths in a common unit in which none overflows or vanishes.
 std::array<double, 3> squares(const std::array<Vector3d, 3>& a) {
   const double extent = std::max({largest(a[0]), largest(a[1]), largest(a[2])});
   if (isModerate(extent)) return {dot(a[0], a[0]), dot(a[1], a[1]), dot(a[2], a[2])};
@@ -66,8 +66,8 @@ std::array<double, 3> squares(const std::array<Vector3d, 3>& a) {
   return result;
 }
 
-/// The corner opposite the longest edge: the two shortest edges meet there. Equals are told apart
-/// by distance from p, then by coordinates, never by their order.
+/// The corner opposite the longest edge, where the two shortest edges meet. If edges are equal, the
+/// distance from p decides, then the coordinates, never the order of the corners.
 int widestCorner(const Vector3d& p, const CornerPointers& corners) {
   const auto& [a, b, c] = corners;
   const std::array<double, 3> opposite = squares({*b - *c, *c - *a, *a - *b}),

@@ -18,7 +18,7 @@ HWY_ATTR void toFloatsKernel(const Eigen::Vector3d* positions, std::size_t size,
                              const FloatFrame& frame, FloatPoint* out) {
   std::size_t i = 0;
 #if HWY_MAX_BYTES >= 32
-  // A point and the next one's x, which comes to nothing.
+  // Each load has a point and the next point's x, which is scaled to zero.
   const hn::FixedTag<double, 4> d;
   const hn::FixedTag<float, 4> df;
   alignas(32) const double corner[4] = {frame.origin[0], frame.origin[1], frame.origin[2], 0.0},
@@ -33,12 +33,12 @@ HWY_ATTR void toFloatsKernel(const Eigen::Vector3d* positions, std::size_t size,
   for (; i < size; ++i) out[i] = frame(positions[i]);
 }
 
-/// Copies; whether all are finite.
+/// Copies the values. Returns whether all are finite.
 HWY_ATTR bool copyFiniteKernel(const double* from, std::size_t size, double* to) {
   const hn::ScalableTag<double> d;
   const std::size_t lanes = hn::Lanes(d);
-  // x * 0 is 0 for finite x and NaN else; NaN survives any sum. Four sums, none of which waits for
-  // another's.
+  // x * 0 is 0 for finite x and NaN otherwise, and NaN survives any sum. Four independent sums
+  // avoid waiting for each other.
   const auto zero = hn::Zero(d);
   hn::Vec<decltype(d)> sums[4] = {zero, zero, zero, zero};
   std::size_t i = 0;
@@ -56,7 +56,7 @@ HWY_ATTR bool copyFiniteKernel(const double* from, std::size_t size, double* to)
   return rest == 0.0;
 }
 
-/// Each value at its rank; infinities fill the last vector.
+/// Writes each value at its rank. Infinities must fill the last vector.
 HWY_ATTR void sortFewKernel(const double* values, std::size_t size, double* sorted) {
   const hn::CappedTag<double, 8> d;
   for (std::size_t i = 0; i < size; ++i) {
@@ -92,7 +92,7 @@ SampledExtent sampleExtent(std::span<const Eigen::Vector3d> positions) {
     std::array<double, kMost> sorted;
     HWY_DYNAMIC_DISPATCH(sortFewKernel)(sample.data(), count, sorted.data());
     extent.median[axis] = sorted[count / 2];
-    // Halved: the difference of two doubles may be beyond their range.
+    // Halved, because the difference of two doubles may be beyond their range.
     const double first = sorted[count / 8], seventh = sorted[count * 7 / 8];
     extent.spread = std::max(extent.spread, 2.0 * (0.5 * seventh - 0.5 * first));
   }

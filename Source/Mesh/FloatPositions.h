@@ -16,16 +16,16 @@ struct alignas(16) FloatPoint {
   FloatBox box() const { return {{x, y, z, 0}, {x, y, z, 0}}; }
 };
 
-/// Where a geometry's floats live: f = (position - origin) * scale.
+/// The frame of a geometry's floats: f = (position - origin) * scale.
 ///
-/// The origin is the median of a sample of the geometry's own positions, so that the floats resolve
-/// the bulk of it wherever the scene is and however far single vertices are flung; the scale, a
-/// power of two shared by a scene, only keeps floats within their range.
+/// The origin is the median of a sample of the geometry's own positions. The floats therefore
+/// resolve most of the geometry wherever the scene is, even if single vertices are far away. The
+/// scale is a power of two shared by a scene, which only keeps floats within their range.
 struct FloatFrame {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   double scale = 1.0;
 
-  /// Rounded to nearest, and clamped to kLargestFloat, which brings no two points further apart.
+  /// Rounds to nearest and clamps to kLargestFloat. Clamping brings no two points further apart.
   FloatPoint operator()(const Eigen::Vector3d& position) const {
     const auto of = [&](int k) {
       constexpr double kMost = kLargestFloat;
@@ -39,8 +39,9 @@ struct FloatFrame {
   }
 };
 
-/// Of up to 31 evenly spaced positions: the median of each axis, and the largest distance along an
-/// axis between the first and the last eighth; a few vertices far away change neither.
+/// The extent of a sample of up to 31 evenly spaced positions. median: of each axis. spread: the
+/// largest distance along an axis between the first and the last eighth. A few vertices far away
+/// change neither.
 struct SampledExtent {
   Eigen::Vector3d median = Eigen::Vector3d::Zero();
   double spread = 0.0;
@@ -51,10 +52,11 @@ SampledExtent sampleExtent(std::span<const Eigen::Vector3d> positions);
 /// changes.
 double frameScale(double spread);
 
-/// The frame of each. `out` is as long as `positions`.
+/// Converts positions to floats of the frame. `out` is as long as `positions`.
 void toFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame&, FloatPoint* out);
 
-/// Copies; returns the index of the first vertex that is not finite, or the size if all are.
+/// Copies positions. Returns the index of the first vertex that is not finite, or the size if all
+/// are finite.
 std::size_t copyFinite(std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out);
 
 }  // namespace palpate

@@ -15,12 +15,13 @@ namespace palpate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Of eight vertices after each other, coordinate by coordinate.
+/// The number of coordinates of eight consecutive vertices.
 constexpr std::size_t kBlock = 24;
 using D = hn::CappedTag<double, 8>;
 using V = hn::Vec<D>;
 
-/// `blocks` of them. Three vectors' worth at a time: that of eight vertices, with AVX-512.
+/// Finds the least and the largest displacement over so many blocks, for each coordinate of a
+/// block. It handles three vectors at a time; with AVX-512 these are eight vertices.
 HWY_ATTR void addBlocks(const double* before, const double* now, std::size_t blocks,
                         double (&lowest)[kBlock], double (&highest)[kBlock]) {
   const D d;
@@ -53,11 +54,11 @@ namespace palpate {
 
 HWY_EXPORT(addBlocks);
 
-constexpr std::size_t kVertices = 8;  ///< of a block
+constexpr std::size_t kVertices = 8;  ///< in a block
 
 using Eigen::Vector3d;
 
-constexpr std::size_t kSampled = 512;  ///< of a mesh's vertices, for their mean
+constexpr std::size_t kSampled = 512;  ///< vertices of a mesh that meanMotion() samples
 
 void MotionRange::add(const MotionRange& other) {
   if (other.isEmpty) return;
@@ -91,7 +92,7 @@ MotionRange motionRange(const Positions& before, const Positions& now) {
 double largestMotion(const MotionRange& a, const MotionRange& b) {
   const Vector3d most = (a.upper - b.lower).cwiseAbs().cwiseMax((b.upper - a.lower).cwiseAbs());
   const double motion = most.stableNorm() * (1.0 + kMotionError);
-  return motion >= 0.0 ? motion : std::numeric_limits<double>::infinity();  // of NaN, too
+  return motion >= 0.0 ? motion : std::numeric_limits<double>::infinity();  // for NaN, too
 }
 
 double smallestMotion(const MotionRange& a, const MotionRange& b) {

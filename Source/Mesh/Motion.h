@@ -9,26 +9,28 @@
 
 namespace palpate {
 
-/// The box that holds the displacements of vertices in a step.
+/// The box that contains the displacements of vertices in a step.
 struct MotionRange {
   Eigen::Vector3d lower = Eigen::Vector3d::Zero(), upper = Eigen::Vector3d::Zero();
-  bool isEmpty = true;  ///< of no vertices
+  bool isEmpty = true;  ///< no vertices were added
   void add(const MotionRange&);
   bool isZero() const { return lower.isZero(0.0) && upper.isZero(0.0); }
 };
 
-/// From `before` to `now`, which are as many; zero of none.
-/// Cost     about a third of a nanosecond a vertex, or what reading both takes, which is twice that
-///          from the second cache; ten where they are placed.
+/// The range of displacements from `before` to `now`, which have the same size; zero if they are
+/// empty.
+/// Cost     about a third of a nanosecond a vertex, or the time to read both, which is twice that
+///          from the second-level cache; ten nanoseconds for placed positions.
 MotionRange motionRange(std::span<const Eigen::Vector3d> before,
                         std::span<const Eigen::Vector3d> now);
 MotionRange motionRange(const Positions& before, const Positions& now);
 
-/// L. No point of the one moves further relative to a point of the other, and none less far. What
-/// both have in common, such as a translation, does not count.
+/// L. Bounds on the motion of a point of one range relative to a point of the other: none moves
+/// further, and none less far. Common motion, such as a translation of both, does not count.
 double largestMotion(const MotionRange&, const MotionRange&);
 double smallestMotion(const MotionRange&, const MotionRange&);
-/// L: the root mean square over pairs of a vertex of each, of a sample of a few hundred.
+/// L: root mean square of the relative motion over pairs of one vertex of each, for a sample of a
+/// few hundred vertices.
 double meanMotion(const TriangleMesh&, const TriangleMesh&);
 
 }  // namespace palpate

@@ -17,8 +17,8 @@ struct RigidTransform {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 
-  /// Rounded as it is written: ((r0 x + r1 y) + r2 z) + t. Wherever something of a body is in the
-  /// world, it is there by this.
+  /// Rounded as it is written: ((r0 x + r1 y) + r2 z) + t. Everything that places a body in the
+  /// world uses this, so that all of it has the same rounding.
   Eigen::Vector3d operator()(const Eigen::Vector3d& p) const {
     const auto row = [&](int k) {
       return rotation(k, 0) * p[0] + rotation(k, 1) * p[1] + rotation(k, 2) * p[2] + translation[k];
@@ -30,10 +30,10 @@ struct RigidTransform {
   }
 };
 
-/// The positions of a geometry's vertices at one end of a step. Those of a rigid body are kept in
-/// its own frame, shared by both ends, and are placed in the world where they are read.
+/// The positions of a geometry's vertices at one end of a step. A rigid body's positions are stored
+/// in its own frame, shared by both ends, and are transformed to the world when they are read.
 ///
-/// Two ends of one geometry with equal revisions are at the same positions.
+/// Two ends of one geometry with equal revisions have the same positions.
 class Positions {
  public:
   using Body = std::shared_ptr<const std::vector<Eigen::Vector3d>>;
@@ -54,7 +54,7 @@ class Positions {
     return world;
   }
 
-  /// In the body's frame; the world where it is not placed.
+  /// In the body's frame, which is the world unless isPlaced().
   std::span<const Eigen::Vector3d> body() const { return *m_body; }
   bool hasSameBody(const Positions& other) const { return m_body == other.m_body; }
   void setBody(Body body, Revision revision = {}) noexcept {

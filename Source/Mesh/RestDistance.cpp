@@ -15,7 +15,7 @@ namespace {
 constexpr double kFar = std::numeric_limits<double>::infinity();
 constexpr std::size_t kMostPairs = std::size_t{1} << 28;
 
-/// Shortest ways from one vertex after the other. (Dijkstra, A note on two problems in connexion
+/// Shortest paths from one vertex after another. (Dijkstra, A note on two problems in connexion
 /// with graphs, Numerische Mathematik 1, 1959.)
 class ShortestWays {
  public:
@@ -30,7 +30,7 @@ class ShortestWays {
                              })),
         m_way(topology.vertexCount, kFar) {}
 
-  /// Ascending, `from` among them; until the next call.
+  /// The vertices within the distance, ascending, including `from`. Valid until the next call.
   std::span<const std::uint32_t> reachedFrom(std::uint32_t from) {
     for (const std::uint32_t vertex : m_reached) m_way[vertex] = kFar;
     m_reached.clear();

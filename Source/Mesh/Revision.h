@@ -6,10 +6,10 @@
 
 namespace palpate {
 
-/// Names one state of something that changes: equal revisions mean equal states.
+/// Identifies one state of an object that changes: equal revisions mean equal states.
 class Revision {
  public:
-  Revision() = default;  ///< of a state that nobody has changed yet
+  Revision() = default;  ///< the initial state, before any change
   friend bool operator==(Revision, Revision) = default;
 
  private:
@@ -18,7 +18,7 @@ class Revision {
   std::uint64_t m_number = 0;
 };
 
-/// Gives out revisions, none of them twice. Revisions of different counters are not comparable.
+/// Creates revisions, each of them once. Revisions of different counters are not comparable.
 class RevisionCounter {
  public:
   Revision next() { return Revision(++m_last); }
@@ -29,8 +29,8 @@ class RevisionCounter {
 
 /// The states that a derived value was computed from: the one place that compares revisions.
 ///
-/// Whoever computes the value calls invalidate() before the first change to it and commit() after
-/// the last one, so that a computation that fails leaves a value that counts as outdated.
+/// Code that computes the value calls invalidate() before the first change to it and commit() after
+/// the last one. If a computation fails, the value therefore counts as outdated.
 template <std::size_t count>
 class DerivedFrom {
  public:

@@ -11,19 +11,19 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
 
-/// A face by its vertices, ascending.
+/// A face, identified by its vertices in ascending order.
 struct Face {
   Triangle vertices;
-  std::uint32_t side;  ///< 4 times the tetrahedron and which of its faces
+  std::uint32_t side;  ///< 4 times the tetrahedron's index, plus the face's
 };
 
-/// Whether a face's winding, as faceOf() gives it, is that of its vertices ascending.
+/// Whether a face's winding, as faceOf() returns it, is that of its vertices in ascending order.
 bool ascends(const Tetrahedron& tetrahedron, std::uint32_t side) {
   const auto [a, b, c] = faceOf(tetrahedron, side % 4);
   return (a < b) + (b < c) + (c < a) == 2;
 }
 
-/// What lies beyond each side; kNone: the outside.
+/// For each side, the side of the tetrahedron beyond it; kNone: the outside.
 std::vector<std::uint32_t> opposites(std::span<const Tetrahedron> tetrahedra,
                                      std::optional<OverusedFace>& fault) {
   std::vector<Face> faces;
@@ -49,7 +49,7 @@ std::vector<std::uint32_t> opposites(std::span<const Tetrahedron> tetrahedra,
   return beyond;
 }
 
-/// For each tetrahedron whether its corners as given are wound as if its volume were positive.
+/// For each tetrahedron, whether its corners as given are wound as if its volume were positive.
 std::vector<bool> findTurns(std::span<const Eigen::Vector3d> rest,
                             std::span<const Tetrahedron> tetrahedra,
                             std::span<const std::uint32_t> beyond) {
@@ -64,8 +64,8 @@ std::vector<bool> findTurns(std::span<const Eigen::Vector3d> rest,
     if (sign != 0) queue.push_back(t);
   }
   if (queue.size() == tetrahedra.size()) return positive;
-  // Those without volume, from their neighbours on: two sides of one face are wound against each
-  // other.
+  // Tetrahedra without volume follow from their neighbours: two sides of one face are wound in
+  // opposite directions.
   const auto spread = [&] {
     for (std::size_t next = 0; next < queue.size(); ++next)
       for (std::uint32_t side = 4 * queue[next]; side < 4 * queue[next] + 4; ++side) {

@@ -16,7 +16,7 @@ struct Chunk {
   alignas(64) float upper[4 * kChunk];
 };
 
-/// Rounds outward and turns points of four into one array per axis.
+/// Rounds outward and transposes points of four floats into one array per axis.
 HWY_ATTR void storeRounded(const Chunk& chunk, std::size_t begin, BoxArrays& boxes) {
   const hn::CappedTag<float, 8> d;
   for (std::size_t i = 0; i < kChunk; i += hn::Lanes(d)) {
@@ -76,8 +76,8 @@ HWY_ATTR void triangleBoxesOf(const FloatPoint* HWY_RESTRICT vertices,
       hn::Store(roundedUp(groupUpper[k]), d4, groupBoxes[g].upper.data() + k * kLanes);
     }
   }
-  // The rest one by one: a whole vector would overwrite what another thread may have written behind
-  // it.
+  // The rest is written one by one, because a whole vector would overwrite values that another
+  // thread may have written behind it.
   for (std::size_t i = 0; i < fill; ++i)
     for (int k = 0; k < 3; ++k) {
       boxes.lower[k][chunkBegin + i] = OutwardRounding::down(chunk.lower[4 * i + k]);

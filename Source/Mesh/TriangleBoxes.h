@@ -10,10 +10,11 @@
 
 namespace palpate {
 
-/// Outward-rounded boxes of triangles [begin, end), and the box of each group of consecutive
-/// triangles.
+/// Computes outward-rounded boxes of triangles [begin, end), and the box of each group of
+/// consecutive triangles.
 ///
-/// Shapes   vertices: of the mesh now; before: the same at the step's start, so that boxes sweep the step, or null.
+/// Shapes   vertices: the mesh's positions now. before: those at the step's start, in which case
+///          boxes enclose the motion over the step; or null.
 ///          groups: group g is triangles [groups[g], groups[g + 1]); the first starts at `begin`,
 ///          the last ends at `end`. groupBoxes: one per group.
 /// Cost     about 20 instructions a triangle.

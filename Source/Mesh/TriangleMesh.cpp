@@ -50,7 +50,7 @@ void MeshTopology::disable(std::span<const std::uint32_t> newDisabled) {
 
 /// Changes nothing if it throws.
 void MeshTopology::findOwners(const std::vector<bool>& newIsDisabled) {
-  // What a triangle holds twice counts once.
+  // A vertex or edge that a triangle contains twice counts once.
   const auto listsOf = [&](std::size_t count, const auto& heldBy) {
     return listsByKey(count, [&](auto&& incidence) {
       for (std::uint32_t t = 0; t < triangles.size(); ++t) {

@@ -23,7 +23,7 @@ struct IndexLists {
   }
 };
 
-/// Lists per key from (key, item) incidences, which come in ascending order of items.
+/// Builds lists per key from (key, item) incidences, which must come in ascending order of items.
 template <class ForEach>
 IndexLists listsByKey(std::size_t keyCount, ForEach&& forEachIncidence) {
   IndexLists lists;
@@ -36,10 +36,10 @@ IndexLists listsByKey(std::size_t keyCount, ForEach&& forEachIncidence) {
   return lists;
 }
 
-/// What follows from the triangles alone, computed once.
+/// The connectivity of a mesh, which follows from its triangles alone and is computed once.
 ///
-/// Each vertex and each edge is owned by the lowest triangle that is on and holds it, so that of
-/// all the triangle pairs that a feature pair lies in exactly one tests it. (Curtis et al., Fast
+/// Each vertex and each edge is owned by the lowest enabled triangle that contains it. Exactly one
+/// of all the triangle pairs that contain a feature pair therefore tests it. (Curtis et al., Fast
 /// collision detection for deformable models using representative-triangles, I3D 2008.)
 struct MeshTopology {
   MeshTopology() = default;
@@ -50,27 +50,28 @@ struct MeshTopology {
   std::size_t vertexCount = 0;
   std::vector<Triangle> triangles;
   std::vector<Segment> edges;  ///< unique, lower vertex first, sorted
-  /// Edge i joins corners i and i + 1 mod 3; kNoEdge where these are the same vertex.
+  /// Edge i joins corners i and i + 1 mod 3; kNoEdge if both are the same vertex.
   std::vector<std::array<std::uint32_t, 3>> triangleEdges;
   std::vector<std::uint8_t> owned;   ///< per triangle: its cornerBit()s and edgeBit()s
-  IndexLists vertexTriangles;        ///< that are on: ascending triangle ids, each once
-  IndexLists edgeTriangles;          ///< the same; none: the edge is off
-  std::size_t untestedVertices = 0;  ///< in no triangle that is on
-  std::vector<bool> isUsed;          ///< per vertex: in a triangle, on or off
-  /// Per vertex: each of its edges is in two triangles that are on, in opposite directions.
+  IndexLists vertexTriangles;        ///< enabled triangles only: ascending ids, each once
+  IndexLists edgeTriangles;          ///< the same; an empty list: the edge is disabled
+  std::size_t untestedVertices = 0;  ///< number of vertices in no enabled triangle
+  std::vector<bool> isUsed;          ///< per vertex: in a triangle, enabled or not
+  /// Per vertex: each of its edges is in exactly two enabled triangles, in opposite directions.
   std::vector<std::uint8_t> hasClosedStar;
-  std::vector<std::uint32_t> disabled{};  ///< triangles that are off, ascending
-  std::vector<bool> isDisabled{};         ///< the same by triangle; empty if none is
-  std::optional<bool> closed;             ///< and consistently oriented; once asked
+  std::vector<std::uint32_t> disabled{};  ///< disabled triangles, ascending
+  std::vector<bool> isDisabled{};         ///< per triangle; empty if none is disabled
+  std::optional<bool> closed;             ///< and consistently oriented; set when first needed
 
   /// Disables these triangles and enables all others. Changes nothing if it throws.
   /// Cost     linear: about a tenth of the constructor's.
   void disable(std::span<const std::uint32_t> triangles);
   bool isOn(std::uint32_t triangle) const { return isDisabled.empty() || !isDisabled[triangle]; }
 
-  /// Of an edge, lower vertex first; kNoEdge if there is none such.
+  /// The index of an edge, whose lower vertex comes first; kNoEdge if there is no such edge.
   std::uint32_t edgeOf(const Segment& edge) const;
-  /// Others' vertices are tested against triangles with faces only.
+  /// Whether elements have faces. Vertices of other meshes are tested only against triangles with
+  /// faces.
   bool hasFaces() const { return kind == GeometryKind::Triangles; }
   static constexpr unsigned cornerBit(int corner) { return 1u << corner; }
   static constexpr unsigned edgeBit(int edge) { return 1u << (3 + edge); }
@@ -83,8 +84,8 @@ struct MeshTopology {
   void findOwners(const std::vector<bool>& isDisabled);
 };
 
-/// Whether vertices of one mesh of a pair are tested against what the other is made of. Of two
-/// point sets those of the first are.
+/// Whether the vertices of one mesh of a pair are tested against the other mesh's elements.
+/// ofFirst: the vertices are the first mesh's; of two point sets, only these are tested.
 inline bool areTested(const MeshTopology& vertices, const MeshTopology& others, bool ofFirst) {
   return others.hasFaces() ||
          (vertices.kind == GeometryKind::Points && (others.kind == GeometryKind::Lines || ofFirst));
@@ -94,21 +95,21 @@ inline bool shareVertex(const Segment& a, const Segment& b) {
   return a[0] == b[0] || a[0] == b[1] || a[1] == b[0] || a[1] == b[1];
 }
 
-/// A mesh as handed in: topology once, positions per frame. A segment is the triangle {p, q, q}, a
-/// point {p, p, p}.
+/// A mesh as the caller defined it: its topology, set once, and its positions, set per frame. A
+/// segment is the triangle {p, q, q}, a point is {p, p, p}.
 struct TriangleMesh {
   MeshTopology topology;
   Positions now;
   Positions before;
-  std::vector<double> radii{};          ///< L, per vertex; empty: all have the largest
+  std::vector<double> radii{};          ///< L, per vertex; empty: all have the largest radius
   double largestRadius = 0.0;           ///< L
-  std::vector<Eigen::Vector3d> rest{};  ///< when the topology was set
+  std::vector<Eigen::Vector3d> rest{};  ///< positions when the topology was set
   bool outer = false;                   ///< Sidedness::Outer
 
   double radius(std::uint32_t vertex) const {
     return radii.empty() ? largestRadius : radii[vertex];
   }
-  /// At p0 + weight (p1 - p0).
+  /// The radius at p0 + weight (p1 - p0).
   double radius(const Segment& edge, double weight) const {
     if (radii.empty()) return largestRadius;
     return (1.0 - weight) * radii[edge[0]] + weight * radii[edge[1]];

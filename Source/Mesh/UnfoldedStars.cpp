@@ -23,8 +23,9 @@ HWY_INLINE V coordinate(const Point& p, int k) { return k == 0 ? p.x : k == 1 ? 
 /// The views of triangles, as sets of ViewBit.
 ///
 /// Rounding: let R be at least the size of a coordinate of any corner, S that of both edges from
-/// corner 0 together, at most R. A float is off by 2^-23 R, an edge by E = 2^-21 R, and what
-/// crosses two edges, or the sum of two such, by less than 4 (E_i S_j + S_i E_j) + 16 E_i E_j.
+/// corner 0 together, at most R. A float is off by 2^-23 R, an edge by E = 2^-21 R. A component of
+/// the cross product of two edges, or the sum of two such components, is off by less than 4 (E_i
+/// S_j + S_i E_j) + 16 E_i E_j.
 HWY_ATTR void viewsKernel(const Triangle* triangles, std::size_t size, const FloatPoint* before,
                           const FloatPoint* now, std::uint32_t* views) {
   constexpr float kLargest = 0x1p60f;  // products are in range, and no float was clamped
@@ -98,12 +99,12 @@ namespace {
 
 constexpr std::size_t kGrain = 2048;
 
-/// Whether the closed star is seen from one side along an axis, and goes around the vertex once:
-/// so often another coordinate comes up to the vertex's.
+/// Whether the closed star is visible from one side along an axis, and goes around the vertex once.
+/// The number of times that another coordinate rises to the vertex's value counts the turns.
 bool isUnfolded(const MeshTopology& topology, const Buffer<std::uint32_t>& views,
                 std::size_t vertex) {
   const auto star = topology.vertexTriangles[vertex];
-  std::uint32_t common = ~0u;  // of all views
+  std::uint32_t common = ~0u;  // bits that all views have
   std::array<std::size_t, 3> crossings{};
   for (const std::uint32_t t : star) {
     const Triangle& corners = topology.triangles[t];

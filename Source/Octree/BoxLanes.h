@@ -14,12 +14,12 @@ using NodeTag = hn::CappedTag<float, 8>;   ///< eight siblings
 using LeafTag = hn::CappedTag<float, 16>;  ///< elements of a leaf
 using BoxTag = hn::CappedTag<float, 1>;
 
-/// Boxes side by side: as many as D has lanes.
+/// As many boxes as D has lanes, one box in each lane.
 template <class D>
 struct BoxLanes {
   hn::Vec<D> lower[3], upper[3];
 
-  /// Of OctreeBlock or BoxArrays, from the i-th on.
+  /// Loads boxes from the i-th on. Boxes: OctreeBlock or BoxArrays.
   template <class Boxes>
   HWY_ATTR HWY_INLINE static BoxLanes load(const Boxes& boxes, std::size_t i) {
     const D d;
@@ -54,7 +54,7 @@ struct BoxLanes {
     }
     return lanes;
   }
-  /// See BoxMap.
+  /// Maps the boxes by one end of a BoxMap, whose comment derives the rounding.
   HWY_ATTR HWY_INLINE BoxLanes turned(const BoxMap::End& end) const {
     const D d;
     const auto middle = hn::Set(d, 0.5f), zero = hn::Zero(d);
@@ -103,7 +103,7 @@ struct BoxLanes {
     }
     return mask;
   }
-  /// Squared; of empty boxes infinity.
+  /// Squared distance; infinity for empty boxes.
   HWY_ATTR HWY_INLINE hn::Vec<D> distanceFrom(const FloatBox& box) const {
     const D d;
     auto sum = hn::Zero(d);

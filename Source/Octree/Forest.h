@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-/// What a LooseOctree shows: the trees of all geometries, each in its own float frame.
+/// The trees of all geometries that a LooseOctree gives access to, each in its own float frame.
 struct LooseOctree::State {
   struct Tree {
     GeometryId geometry;
@@ -18,14 +18,14 @@ struct LooseOctree::State {
     Eigen::Vector3d origin;  ///< position = origin + float / scale
     double scale;
     Update lastUpdate;
-    std::size_t otherBytes;       ///< the geometry's floats
+    std::size_t otherBytes;       ///< memory of the geometry's floats
     std::uint32_t firstNode = 0;  ///< node ids of this tree start here
   };
-  std::vector<Tree> trees;  ///< by ascending geometry id; those without elements left out
+  std::vector<Tree> trees;  ///< by ascending geometry id; only trees with elements
 };
 
-/// Sentences about each invariant that does not hold. `cells`: also that elements are where a
-/// rebuild puts them.
+/// Describes each invariant that does not hold in a sentence. cells: also check that elements are
+/// in the cells where a rebuild would put them.
 std::vector<std::string> validate(const Octree&, bool cells);
 
 /// The cell of a node and its depth.

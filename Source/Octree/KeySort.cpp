@@ -14,10 +14,11 @@
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
 
-// No vectors: newer processors' shifts by a variable take a third of the time.
+// No vectors are used here. Shifts by a variable take a third of the time on newer processors.
 
-/// Calls f(bin, i, length) for keys side by side in one bin. From frame to frame most stay so: by
-/// so many at once no count waits for its last store.
+/// Calls f(bin, i, length) for each run of consecutive keys in one bin. Most keys stay in such runs
+/// from frame to frame. Counting a whole run at once avoids waiting for the last store to the same
+/// count.
 template <class F>
 HWY_INLINE HWY_ATTR void forRuns(const std::uint64_t* keys, std::size_t size, int shift,
                                  std::size_t bins, F&& f) {
@@ -37,7 +38,7 @@ HWY_INLINE HWY_ATTR void forRuns(const std::uint64_t* keys, std::size_t size, in
   for (; i < size; ++i) f(keys[i] >> shift & mask, i, std::integral_constant<std::size_t, 1>());
 }
 
-/// Counts the keys of each bin. Returns the bits in which any differ.
+/// Counts the keys of each bin. Returns the bits in which any two keys differ.
 HWY_ATTR std::uint64_t countKeysKernel(const std::uint64_t* keys, std::size_t size, int shift,
                                        std::size_t bins, std::uint32_t* counts) {
   forRuns(keys, size, shift, bins, [=](std::size_t bin, std::size_t, auto length) {
@@ -57,10 +58,10 @@ HWY_ATTR void scatterKeysKernel(const std::uint64_t* keys, std::size_t size, int
   });
 }
 
-/// At most 255 keys by one digit. Returns where the octants begin, a byte each.
+/// Sorts at most 255 keys by one digit. Returns where the octants begin, one byte each.
 HWY_ATTR std::uint64_t sortFewKeysKernel(const std::uint64_t* keys, std::size_t size, int shift,
                                          std::uint64_t* out) {
-  // Eight counts in the bytes of one integer: none waits for its store.
+  // Eight counts in the bytes of one integer, so that no count waits for its last store.
   constexpr std::uint64_t kOnes = 0x0101010101010101;
   const auto one = [](std::uint64_t digit) {
     return digit / Key::kOctant << digit % Key::kOctant * 8;
@@ -94,7 +95,7 @@ HWY_EXPORT(sortFewKeysKernel);
 
 namespace {
 
-/// Calls f(bin) for each that keys can have in so many digits, ascending.
+/// Calls f(bin) for each bin that keys of so many digits can have, ascending.
 template <int digits, class F>
 void forBins(unsigned before, F&& f) {
   f(before << Key::kDigitBits * digits);
@@ -127,11 +128,11 @@ void KeySort::takeKeys(const KeyRange& range, std::size_t from, std::size_t to,
 int KeySort::byDigits(const KeyRange& range, std::uint32_t* ends, const Threads* threads) const {
   const std::size_t size = range.end - range.begin,
                     bins = std::size_t{1} << Key::kDigitBits * range.digits;
-  // A part for each thread: keys come in the same order by any.
+  // One part for each thread; the sorted order does not depend on the number of parts.
   const bool shared = threads && threads->count() > 1 && size >= KeyRange::kShared;
   const std::size_t wanted = shared ? static_cast<std::size_t>(threads->count()) : 1,
                     grain = (size + wanted - 1) / wanted, parts = (size + grain - 1) / grain;
-  // 16 KB of the stack. Nothing that is called from here sorts, so this is there once at a time.
+  // 16 KB on the stack. No function called from here sorts, so they exist only once at a time.
   std::array<std::uint32_t, 1 << Key::kDigitBits * PartEnds::kMostDigits> ownCounts;
   if (shared) m_sharedCounts.resize(bins * parts);
   std::uint32_t* counts = shared ? m_sharedCounts.data() : ownCounts.data();
@@ -163,7 +164,7 @@ int KeySort::byDigits(const KeyRange& range, std::uint32_t* ends, const Threads*
     HWY_DYNAMIC_DISPATCH(scatterKeysKernel)
     (scratch + from, to - from, shift, bins, counts + chunk * bins, m_keys.data());
   });
-  // Where the last thread's part of a bin ends, the bin does.
+  // Each bin ends where the last thread's part of it ends.
   const std::uint32_t* last = counts + (parts - 1) * bins;
   forBins(range.digits, [&](std::size_t bin) { *ends++ = last[bin]; });
   return 0;

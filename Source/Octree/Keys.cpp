@@ -15,7 +15,7 @@ namespace palpate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Puts three zero bits between each two of the low eight bits.
+/// Inserts three zero bits between each two of the low eight bits.
 template <class V>
 HWY_INLINE V spreadBits(V v) {
   const hn::DFromV<V> d;
@@ -42,8 +42,8 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
       static_cast<std::int32_t>(std::bit_cast<std::uint32_t>(static_cast<float>(cube.edge)) >> 23));
   const auto deepest = hn::Set(di, levels);
   const auto zero = hn::Zero(di), lastCell = hn::Set(di, kCells - 1);
-  // Gathered, unless the slots are consecutive, well before it is read as vectors: a load that
-  // spans fresh narrower stores waits for them.
+  // If the slots are not consecutive, boxes are gathered well before they are loaded as vectors. A
+  // wide load from freshly written narrower values would stall.
   constexpr std::size_t kGathered = 64;
   alignas(64) float gathered[6][kGathered];
   alignas(64) std::int32_t gatheredSlots[kGathered];
@@ -54,7 +54,7 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
     const std::size_t count = size - i < lanes ? size - i : lanes, place = i % kGathered;
     if (slots && place == 0) {
       const std::size_t last = (size - i < kGathered ? size - i : kGathered) - 1;
-      // They ascend: equal keys stay in order.
+      // Slots ascend, because equal keys stay in order.
       first = Key::slot(slots[i]) - static_cast<std::uint32_t>(i);
       gathers = Key::slot(slots[i + last]) - first != i + last;
       for (std::size_t next = 0; gathers && next <= last; ++next) {
@@ -74,7 +74,8 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
       const auto upper =
           hn::LoadU(d, gathers ? gathered[3 + k] + place : boxes.upper[k].data() + first + i);
       longest = hn::Max(longest, upper - lower);
-      // The cube's corner in two floats: the differences are as good as exact near it.
+      // The cube's corner is split into two floats. Near it, the differences are then practically
+      // exact.
       const float corner = static_cast<float>(cube.lower[k]);
       const auto high = hn::Set(d, corner),
                  low = hn::Set(d, static_cast<float>(cube.lower[k] - corner));
@@ -83,11 +84,11 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
           hn::Min(hn::Max(fromCorner * cellsPerUnit, hn::Zero(d)), hn::Set(d, cells));
       cell[k] = hn::Min(hn::ConvertTo(di, scaled), lastCell);
     }
-    // ceil(log2(size)): the exponent of size, one more if any bit of its fraction is set.
+    // ceil(log2(size)): the exponent of size, plus one if any bit of its fraction is set.
     const auto sizeBits = hn::BitCast(di, longest * slack);
     const auto sizeExponent = hn::ShiftRight<23>(sizeBits + hn::Set(di, 0x7fffff));
     const auto level = hn::Min(hn::Max(edgeExponent - sizeExponent, zero), deepest);
-    // Eight levels in the upper half; the ninth in the lower one, above the slot.
+    // Eight levels are in the key's upper half, and the ninth is in its lower half, above the slot.
     static_assert(Key::kMostLevels == 9 && Key::kDigitBits == 4 && Key::kSlotBits == 28);
     const auto octants = [&](auto x, auto y, auto z) {
       return hn::Or(hn::Or(x, hn::ShiftLeft<1>(y)), hn::ShiftLeft<2>(z));
@@ -96,7 +97,7 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
                                hn::BitCast(du, octants(spreadBits(hn::ShiftRight<1>(cell[0])),
                                                        spreadBits(hn::ShiftRight<1>(cell[1])),
                                                        spreadBits(hn::ShiftRight<1>(cell[2])))));
-    // By half of its digits' bits twice: a shift by all 32 is none.
+    // Shifts by half of the digits' bits twice, because a single shift by 32 would shift nothing.
     const auto halfBits = hn::BitCast(du, level + level);
     const auto tooSmall = hn::Shr(hn::Shr(hn::Set(du, ~0u), halfBits), halfBits);
     const auto key = hn::BitCast(di, hn::AndNot(tooSmall, digits));
@@ -108,7 +109,7 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
     const auto slot = gathers ? hn::LoadU(di, gatheredSlots + place)
                               : hn::Iota(di, static_cast<std::int32_t>(first + i));
     const auto low = hn::Or(ninth, slot);
-    // Keys are 64-bit integers: bytes of other types get there by copying only.
+    // Keys are 64-bit integers. Only copying may write bytes of other types to them.
     static_assert(std::endian::native == std::endian::little);
     hn::StoreInterleaved2(low, key, di, made);
     if (count == lanes)

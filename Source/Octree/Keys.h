@@ -7,8 +7,8 @@
 
 namespace palpate {
 
-/// A cube in the float frame, a power of two wide; its lower corner and those of its cells are
-/// exact in double.
+/// A cube in the float frame. Its edge is a power of two. Its lower corner and those of its cells
+/// are exact in double.
 struct Cube {
   std::array<double, 3> lower;
   double edge;
@@ -21,18 +21,18 @@ struct Cube {
   }
 };
 
-/// Cells are not split below this: floats could not tell their children's sizes any more.
+/// Cells are not split below this size, as floats could not tell the sizes of their children apart.
 constexpr float kSmallestCell = 0x1p-100f;
 
-/// A key within a cube, and behind it a slot. Four bits for each level from the cube's children
-/// down: 8 + the octant that the centre lies in, or 0 where cells are too small. So keys sorted put
-/// a cell's own elements first and every subtree in one range, and keys sorted by their first
-/// digits do so for the first levels.
+/// A key within a cube, followed by a slot. The key has four bits for each level, starting with the
+/// cube's children: 8 + the octant that contains the centre, or 0 where the cells are too small for
+/// the box. Sorted keys therefore put a cell's own elements first, and every subtree in one range.
+/// Keys sorted by their first digits do so for the first levels.
 struct Key {
   static constexpr int kMostLevels = 9, kDigitBits = 4, kSlotBits = 28;
   static constexpr std::uint64_t kOctant = 8;
 
-  /// The digits after the first `level`, as many as asked for.
+  /// The `count` digits after the first `level` digits.
   static std::uint64_t digits(std::uint64_t key, int level, int count) {
     return key >> (64 - kDigitBits * (level + count)) &
            ((std::uint64_t{1} << kDigitBits * count) - 1);
@@ -42,9 +42,9 @@ struct Key {
   }
 };
 
-/// keys[i], for the box of each slot: level from its size, the deepest of at most `levels` whose
-/// cell edge is not shorter than its longest side (a part in a thousand is kept for rounding), and
-/// cell from its centre.
+/// Computes keys[i] for the box of each slot. The box's level is the deepest of at most `levels`
+/// whose cell edge is not shorter than the box's longest side; a thousandth of the size is kept for
+/// rounding. The box's cell is the one that contains its centre.
 /// Shapes   slots: keys whose slots are those of `boxes`, ascending; null: first, first + 1, ...
 void octreeKeys(const BoxArrays& boxes, const std::uint64_t* slots, std::uint32_t first,
                 std::size_t size, const Cube&, int levels, std::uint64_t* keys);

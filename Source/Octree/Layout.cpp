@@ -6,8 +6,8 @@
 
 namespace palpate {
 
-/// A cell whose keys are not sorted is one task's up to this size: sorted in the top it would keep
-/// other threads waiting.
+/// A cell of up to this size becomes one task if its keys are not sorted yet. Sorting it in the top
+/// would keep other threads waiting.
 constexpr std::uint32_t kMostInOneTask = 8192;
 
 void Layout::start(const OctreeSettings& settings, std::uint32_t taskSize,
@@ -57,8 +57,8 @@ void Layout::layOutTask(const KeySort& keys, const Job& job, const OctreeSetting
   finish();
 }
 
-/// Returns what the parent's slot says of the job's node. An explicit path in place of recursion:
-/// its size on the stack is known, about 7 KB.
+/// Lays out the job's node and its subtree. Returns the value of the parent's slot for the node. An
+/// explicit path replaces recursion, so that its size on the stack is known: about 7 KB.
 std::uint32_t Layout::layOut(const KeySort& keys, const Job& job) {
   std::array<OpenNode, kMostDepth + 1> path;
   OpenNode* node = path.data();
@@ -80,8 +80,8 @@ std::uint32_t Layout::layOut(const KeySort& keys, const Job& job) {
   }
 }
 
-/// Gives a node its link: to a leaf, a task, or a block. Returns whether it is a block, whose
-/// slots are then to be laid out.
+/// Sets a node's link to a leaf, a task or a block. Returns whether it is a block, whose slots are
+/// then to be laid out.
 bool Layout::open(const KeySort& keys, OpenNode& node) {
   Job& job = node.job;
   const std::uint32_t size = job.end - job.begin;
@@ -91,10 +91,10 @@ bool Layout::open(const KeySort& keys, OpenNode& node) {
   }
   const bool sorted = job.level < job.sorted;
   if (m_taskSize > 0 && size <= (sorted ? m_taskSize : std::max(m_taskSize, kMostInOneTask))) {
-    job.sorted = job.level;  // `ends` are gone by then
+    job.sorted = job.level;  // `ends` no longer exist when the task runs
     tasks.push_back(job);
     addLeaf(job.begin, job.end, kTask | static_cast<std::uint32_t>(tasks.size() - 1));
-    node.link = 0;  // known when the tasks are done
+    node.link = 0;  // set when the tasks are done
     return false;
   }
   node.endsBefore = static_cast<std::uint32_t>(m_ends->size());
@@ -114,8 +114,9 @@ bool Layout::open(const KeySort& keys, OpenNode& node) {
   return true;
 }
 
-/// Sorts the node's range by the next digits, three if it is long and else two or one, and finds
-/// its parts. Where no digits are left, new keys are computed within the node's cell.
+/// Sorts the node's range by the next digits and finds its parts. A long range is sorted by three
+/// digits, others by two or one. If no digits are left, new keys are computed within the node's
+/// cell.
 void Layout::sort(const KeySort& keys, OpenNode& node) {
   Job& job = node.job;
   KeyRange range{job.begin, job.end, job.level};
@@ -141,7 +142,7 @@ void Layout::sort(const KeySort& keys, OpenNode& node) {
   findParts(keys, node);
 }
 
-/// Where the octants of a sorted range begin, and where it ends.
+/// Finds where the octants of a sorted range begin, and where the range ends.
 void Layout::findParts(const KeySort& keys, OpenNode& node) const {
   const Job& job = node.job;
   if (job.ends == kAlike) {
@@ -158,7 +159,7 @@ void Layout::findParts(const KeySort& keys, OpenNode& node) const {
 
 std::uint32_t Layout::addBlock(const OpenNode& node) {
   const auto block = static_cast<std::uint32_t>(links.size());
-  if (block == links.capacity()) {  // by less than std::vector would: there are many layouts
+  if (block == links.capacity()) {  // grows less than std::vector would: there are many layouts
     links.reserve(block + block / 8 + 2);
     parents.reserve(links.capacity());
   }
@@ -171,15 +172,16 @@ std::uint32_t Layout::addBlock(const OpenNode& node) {
   return block;
 }
 
-/// Adds the groups of leaves from nextSlot on, up to the next child that is to be laid out itself.
-/// Returns whether there is one.
+/// Adds the groups of leaves from nextSlot on, up to the next child that needs a layout of its own.
+/// Returns whether there is such a child.
 bool Layout::nextChild(OpenNode& parent, Job& child) {
   const Job& job = parent.job;
   for (unsigned slot = parent.nextSlot; slot < 8; ++slot) {
     const std::uint32_t begin = parent.begins[slot], size = parent.begins[slot + 1] - begin;
     const OctreeNode node = parent.link * 8 + slot;
     if (size <= m_mostPerLeaf) {
-      // An empty slot's is overwritten by the next: no branch to be mispredicted.
+      // The next group overwrites that of an empty slot: this avoids a branch that would be
+      // mispredicted.
       groups[m_groupCount] = begin;
       groupNodes[m_groupCount] = node;
       m_groupCount += size > 0;
@@ -210,7 +212,7 @@ std::uint32_t Layout::addLeaf(std::uint32_t begin, std::uint32_t end, OctreeNode
   return OctreeBlock::kLeaf | (end - begin);
 }
 
-/// Room for those of a block's eight slots and one more.
+/// Makes room for the groups of a block's eight slots and one more.
 void Layout::reserveGroups() {
   if (m_groupCount + 9 <= groups.size()) return;
   groups.reserve(groups.size() + groups.size() / 8 + 16);

@@ -12,48 +12,48 @@
 
 namespace palpate {
 
-/// The nodes over a range of keys: the whole tree's top, or one subtree in a task of its own.
-/// Sorts the keys on the way, no further than leaves need.
+/// The nodes over a range of keys: the top of the whole tree, or one subtree that is a task of its
+/// own. Sorts the keys as it lays out nodes, only as far as leaves need.
 ///
-/// The top leaves each subtree of at most taskSize elements to a task. What is a task depends on
-/// the elements only, so the same elements give the same blocks in the same order for any
-/// number of threads.
+/// The top leaves each subtree of at most taskSize elements to a task. Which subtrees become tasks
+/// depends on the elements only. The same elements therefore give the same blocks in the same order
+/// for any number of threads.
 class Layout {
  public:
   struct Links {
     std::uint32_t begin[8], child[8];
   };
-  /// A node to be laid out.
+  /// A node that is to be laid out.
   struct Job {
     std::uint32_t begin, end;
     Cube cube;
     OctreeNode node;
     int depth;
-    int levels;          ///< of its keys; 0: there are none yet
-    int level;           ///< of the node among them
-    int sorted;          ///< levels of keys that the range is sorted by, at least `level`
+    int levels;          ///< number of levels of its keys; 0: there are none yet
+    int level;           ///< level of the node within its keys
+    int sorted;          ///< levels of the keys by which the range is sorted, at least `level`
     std::uint32_t ends;  ///< where the node's PartEnds begin; kAlike: all keys have the same digits
   };
   static constexpr std::uint32_t kAlike = 0xffffffffu;
   static Job jobOfRoot(std::uint32_t size, const Cube& cube) {
     return {0, size, cube, 0, 0, 0, 0, 0, kAlike};
   }
-  /// In `groupNodes`: the group is task (entry & ~kTask)'s, or the own elements of the task's
-  /// root.
+  /// Values in `groupNodes`. kTask | i: the entry stands for all groups of task i. kTaskRoot: the
+  /// group has the own elements of the task's root.
   static constexpr OctreeNode kTask = 0x80000000u, kTaskRoot = 0xffffffffu;
 
-  /// In depth-first order. Block numbers are this layout's own.
+  /// The links of each block, in depth-first order. Block numbers are local to this layout.
   Buffer<Links> links;
   Buffer<OctreeNode> parents;     ///< of each block
-  Buffer<std::uint32_t> groups;   ///< where each begins
-  Buffer<OctreeNode> groupNodes;  ///< the node of each
+  Buffer<std::uint32_t> groups;   ///< where each group begins
+  Buffer<OctreeNode> groupNodes;  ///< the node of each group
   Buffer<Job> tasks;
-  std::uint32_t rootChild = 0;  ///< of a task: its block 0, or a leaf
+  std::uint32_t rootChild = 0;  ///< of a task: its block 0, or kLeaf and a count
 
-  /// Of the whole tree: block 0 holds the root alone. `ends`: scratch.
+  /// Lays out the top of the whole tree; block 0 holds the root alone. `ends` is scratch.
   void layOutTop(const KeySort&, const Job& root, const OctreeSettings&, std::uint32_t taskSize,
                  Buffer<std::uint32_t>& ends, const Threads&);
-  /// Of one task: block 0 holds the children of its root, unless that is a leaf.
+  /// Lays out one task; block 0 holds the children of its root, unless the root is a leaf.
   void layOutTask(const KeySort&, const Job&, const OctreeSettings&, Buffer<std::uint32_t>& ends);
 
   std::size_t bytes() const;
@@ -65,9 +65,8 @@ class Layout {
   struct OpenNode {
     Job job;
     std::array<std::uint32_t, 9> begins;  ///< of the octants, and the end of the last
-    std::uint32_t link;                   ///< its child block; of other nodes what the parent's
-                                          ///< slot says
-    std::uint32_t endsBefore;             ///< size of the scratch before its range was sorted
+    std::uint32_t link;  ///< its child block, or for other nodes the value of the parent's slot
+    std::uint32_t endsBefore;  ///< size of the scratch before its range was sorted
     unsigned nextSlot;
   };
 
@@ -86,8 +85,8 @@ class Layout {
   std::size_t m_groupCount = 0;
   std::uint32_t m_mostPerLeaf = 0, m_taskSize = 0;
   int m_maxDepth = 0;
-  Buffer<std::uint32_t>* m_ends = nullptr;  ///< of all sorted ranges that are still open
-  const Threads* m_threads = nullptr;       ///< none within a task
+  Buffer<std::uint32_t>* m_ends = nullptr;  ///< PartEnds of all sorted ranges that are still open
+  const Threads* m_threads = nullptr;       ///< null within a task
 };
 
 }  // namespace palpate

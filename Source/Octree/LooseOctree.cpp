@@ -21,7 +21,7 @@ const Tree* treeOf(const LooseOctree::State& state, GeometryId geometry) {
   return found == state.trees.end() ? nullptr : &*found;
 }
 
-/// Calls f(tree) for those that have nodes. A tree whose last update failed has none.
+/// Calls f(tree) for each tree with nodes. A tree whose last update failed has none.
 template <class F>
 void forEachTree(const LooseOctree::State& state, F&& f) {
   for (const Tree& tree : state.trees)

@@ -69,7 +69,7 @@ void Octree::fit(const Threads& threads) {
                       }
                       m_groupAreas[chunk] = areas;
                     });
-  // Children come after their parents in a part, and other parts after the top.
+  // In each part, children come after their parents, and all other parts come after the top.
   const std::size_t parts = nodes.partBlocks.size() - 1;
   threads.forEach(parts - 1, [&](std::size_t task) {
     fitBlocks(nodes.pool.data(), nodes.parents.data(), nodes.partBlocks[task + 1],
@@ -84,7 +84,8 @@ void Octree::throwNotBuilt() {
 }
 
 void Octree::measureLooseness() {
-  // All groups, as few that have become large cost most; of the elements a sample's growth.
+  // All groups count, because a few that have become large cost most. For the elements, a sample is
+  // enough.
   const Buffer<std::uint32_t>& groups = m_nodes.groups;
   const std::size_t count = m_nodes.groupNodes.size(),
                     stride = std::max<std::size_t>(8, count / 256);
@@ -93,7 +94,8 @@ void Octree::measureLooseness() {
   for (std::size_t g = 0; g < count; g += stride)
     for (std::size_t i = groups[g]; i < groups[g + 1]; ++i) elements += halfArea(m_boxes[i]);
   m_looseness = elements > 0 ? areas / elements : 1.0;
-  // Refitting does not tighten: what has fallen was due to elements that the sample lacks.
+  // Refitting does not tighten a tree. If looseness falls, the sample missed the elements that
+  // caused it.
   m_leastLooseness = m_builtNow ? m_looseness : std::min(m_leastLooseness, m_looseness);
   m_builtNow = false;
 }

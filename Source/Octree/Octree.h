@@ -17,11 +17,13 @@
 
 namespace palpate {
 
-/// Eight siblings: their fitted boxes side by side, so that one SIMD comparison prunes all eight.
+/// Eight siblings with their fitted boxes side by side, so that one SIMD comparison tests all
+/// eight.
 ///
-/// Slot i is the child in octant i (bit 0: x, 1: y, 2: z). A slot in use holds elements [begin,
-/// ...) of the tree's order: as a leaf `count(i)` of them; otherwise its own elements come first
-/// and end where child block's first begins. An empty slot's box overlaps nothing.
+/// Slot i is the child in octant i (bit 0: x, 1: y, 2: z). The elements of a slot in use start at
+/// begin[i] of the tree's order. A leaf has `count(i)` elements. For any other slot, its own
+/// elements come first and end where the first element of its child block begins. The box of an
+/// empty slot overlaps nothing.
 struct alignas(64) OctreeBlock {
   static constexpr std::uint32_t kLeaf = 0x80000000u;
 
@@ -47,22 +49,22 @@ struct alignas(64) OctreeBlock {
 static_assert(sizeof(OctreeBlock) == 256,
               "four cache lines: two of bounds on each side, one of links");
 
-/// Blocks, numbered from 0. Grows by at least kGrowth blocks and by half of what it has; blocks
-/// that a smaller tree no longer needs stay in it, free.
+/// Blocks, numbered from 0. The pool grows by at least kGrowth blocks and by half of its size.
+/// Blocks that a smaller tree does not need stay in the pool as free blocks.
 ///
-/// While a tree is built, before it has blocks, their memory is lent to other elements.
+/// Before a tree that is being built has blocks, their memory is lent to other elements.
 class BlockPool {
  public:
   static constexpr std::size_t kGrowth = 64;
 
-  /// So many elements in place of all blocks. Their values are indeterminate.
+  /// Replaces all blocks by `count` elements. Their values are indeterminate.
   template <class T>
   std::span<T> lend(std::size_t count) {
     m_blocks = {};
     reserve((count * sizeof(T) + sizeof(OctreeBlock) - 1) / sizeof(OctreeBlock));
     return m_memory.start<T>(count);
   }
-  /// So many blocks in place of what was there. Their values are indeterminate.
+  /// Replaces the contents by so many blocks. Their values are indeterminate.
   void start(std::size_t blocks) {
     m_blocks = {};
     reserve(blocks);
@@ -89,22 +91,24 @@ class BlockPool {
 /// A node: block * 8 + slot. The root is node 0, alone in block 0.
 using OctreeNode = std::uint32_t;
 
-/// What a build makes: the nodes over an order of elements.
+/// The result of a build: the nodes over an order of elements.
 struct OctreeNodes {
   Cube rootCube{};
   BlockPool pool;
   Buffer<OctreeNode> parents;  ///< of each block
-  /// Leaves and the own elements of other nodes: group g is elements [groups[g], groups[g + 1])
-  /// of the order.
+  /// One group for each leaf, and for the own elements of each other node. Group g has elements
+  /// [groups[g], groups[g + 1]) of the order.
   Buffer<std::uint32_t> groups;
   Buffer<OctreeNode> groupNodes;  ///< the node of each group
-  /// Part i of the build made blocks [partBlocks[i], partBlocks[i + 1]). Part 0 is the top.
+  /// Part i of the build made blocks [partBlocks[i], partBlocks[i + 1]). Part 0 is the top, the
+  /// others are tasks.
   Buffer<std::uint32_t> partBlocks;
 };
 
 class OctreeBuilder;
 
-/// The loose octree of one geometry: sees boxes and positions in an order, no meshes.
+/// The loose octree of one geometry. It works on boxes and positions in an order, and does not
+/// depend on meshes.
 ///
 /// An octree is in one of three stages:
 ///
@@ -113,11 +117,11 @@ class OctreeBuilder;
 ///              new order(); their boxes are not known yet.
 ///   built      after fit(). Searches work in this stage only, and throw in the others.
 ///
-/// A frame that rebuilds the tree goes through all: the caller writes boxes() in the order() of the
-/// last frame; build(); the caller writes boxes() in the new order(), and groupBoxes(); fit(). A
-/// frame that refits it begins after build().
+/// A frame that rebuilds the tree goes through all stages. The caller writes boxes() in the order()
+/// of the last frame and calls build(). It then writes boxes() in the new order(), and
+/// groupBoxes(), and calls fit(). A frame that refits the tree starts after build().
 ///
-/// An exception from any member leaves an octree that can be reset() and built as a new one.
+/// After an exception from any member, the octree can be reset() and built like a new one.
 class Octree {
  public:
   Octree();
@@ -137,26 +141,26 @@ class Octree {
   std::span<const std::uint32_t> groups() const { return m_nodes.groups; }  ///< see OctreeNodes
   FloatBox* groupBoxes() { return m_groupBoxes.data(); }
 
-  /// Lays out the nodes. Afterwards order() is new, and boxes() are still in the old one.
-  /// `bounds`: of all boxes; `bulk`: the extent of most of them, about 0. `keys`: scratch, as many
-  /// elements as there are elements.
+  /// Lays out the nodes. Afterwards order() is new, and boxes() are still in the old order. bounds:
+  /// of all boxes. bulk: the extent about 0 of most boxes. keys: scratch, one for each element.
   void build(const FloatBox& bounds, double bulk, const OctreeSettings&,
              std::span<std::uint64_t> keys, const Threads&);
-  /// Carries the groups' boxes to the root.
+  /// Computes the boxes of all nodes from the groups' boxes.
   void fit(const Threads&);
-  void measureLooseness();  ///< of what was fitted
+  void measureLooseness();  ///< of the fitted boxes
 
   bool isBuilt() const { return m_stage == Stage::Built; }
-  /// Throws unless isBuilt(): where every search starts.
+  /// Throws unless isBuilt(). Every search starts with this.
   void requireBuilt() const {
     if (!isBuilt()) throwNotBuilt();
   }
 
-  /// Sum of the leaves' half areas over that of some of their elements: how loose the fitted
-  /// boxes are. Grows as a refitted tree degrades; unchanged by motion and scaling of the whole.
+  /// The sum of the leaves' half areas divided by that of a sample of their elements. It measures
+  /// how loose the fitted boxes are, and grows as a refitted tree degrades. Motion and scaling of
+  /// the whole do not change it.
   double looseness() const { return m_looseness; }
-  /// Whether the leaves have not become much larger, in relation to their elements, than they
-  /// were at their tightest since the tree was built; else it should be built again.
+  /// Whether the leaves are at most kMostLoosening times as loose as at their tightest since the
+  /// build. Otherwise the tree should be built again.
   bool isTight() const { return m_looseness <= kMostLoosening * m_leastLooseness; }
 
   const OctreeBlock* blocks() const { return m_nodes.pool.data(); }
@@ -165,15 +169,15 @@ class Octree {
   std::size_t bytes() const;
   FloatBox box(OctreeNode node) const { return blocks()[node >> 3].box(node & 7); }
   bool isEmpty(OctreeNode node) const { return blocks()[node >> 3].isEmpty(node & 7); }
-  /// The first of eight children, one after the other; 0 of a leaf, as the root is nobody's child.
+  /// The first of eight consecutive children. 0 for a leaf, as the root is nobody's child.
   OctreeNode firstChild(OctreeNode node) const {
     const OctreeBlock& block = blocks()[node >> 3];
     return block.isLeaf(node & 7) ? 0 : block.child[node & 7] * 8;
   }
-  /// The node whose children block `block` holds; of block 0, itself.
+  /// The node whose children are in block `block`. For block 0, the root itself.
   OctreeNode parent(std::size_t block) const { return m_nodes.parents[block]; }
 
-  /// Elements that a node holds itself.
+  /// The range of elements that a node holds itself.
   std::pair<std::uint32_t, std::uint32_t> ownRange(OctreeNode node) const {
     const OctreeBlock& block = m_nodes.pool[node >> 3];
     const unsigned slot = node & 7;
@@ -191,11 +195,11 @@ class Octree {
   Buffer<std::uint32_t> m_order;
   BoxArrays m_boxes;
   OctreeNodes m_nodes;
-  std::unique_ptr<OctreeBuilder> m_builder;  ///< with its scratch, from the first build on
+  std::unique_ptr<OctreeBuilder> m_builder;  ///< keeps its scratch; null before the first build
   Buffer<FloatBox> m_groupBoxes;
-  Buffer<double> m_groupAreas;  ///< sums of a chunk of groups each
+  Buffer<double> m_groupAreas;  ///< one sum for each chunk of groups
   double m_looseness = 0, m_leastLooseness = 0;
-  bool m_builtNow = false;  ///< no looseness was measured since
+  bool m_builtNow = false;  ///< looseness was not measured since the build
 };
 
 }  // namespace palpate

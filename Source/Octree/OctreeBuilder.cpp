@@ -8,19 +8,19 @@ namespace palpate {
 
 namespace {
 
-/// Below this, one thread is faster than handing out work.
+/// Below this size, one thread is faster than several.
 constexpr std::size_t kSerialSize = 16384;
-/// Of passes over keys: at least eight parts, so that a thread keeps about its half from pass to
-/// pass.
+/// The grain of passes over keys: at least eight parts, so that each thread roughly keeps its half
+/// from pass to pass.
 std::size_t grainOf(std::size_t size) { return std::clamp<std::size_t>(size / 8, 1024, 8192); }
 
-/// The power-of-two cube that holds the box, its corner on a grid so coarse that cells' corners are
-/// exact.
+/// The power-of-two cube that contains the box. Its corner is on a grid so coarse that the corners
+/// of cells are exact.
 ///
-/// Where the box is much larger than the bulk, which lies about 0, the cube is placed so that 0 is
-/// a third of the way along each of its edges: then 0 is a third or two thirds along those of its
-/// cell at any level, and no cell border cuts the bulk, nor runs close to it, before cells are of
-/// its size.
+/// The bulk of the elements lies about 0. If the box is much larger than the bulk, 0 is placed a
+/// third of the way along each of the cube's edges. At every level, 0 is then a third or two thirds
+/// along the edges of its cell. No cell border cuts the bulk, or runs close to it, until cells are
+/// as small as the bulk.
 Cube cubeOf(const FloatBox& bounds, double bulk) {
   constexpr double kMuchLarger = 256;
   Cube cube;
@@ -55,7 +55,7 @@ void OctreeBuilder::build(const BoxArrays& boxes, const FloatBox& bounds, double
   const KeySort sort(boxes, keys, nodes.pool.lend<std::uint64_t>(size), m_sharedCounts);
   layOutTop(sort, size, nodes.rootCube, settings, threads);
   layOutTasks(sort, settings, threads);
-  // A root that is a leaf may have no keys, and keeps the order.
+  // A root that is a leaf may have no keys; the order then stays.
   if (!(top().links[0].child[0] & OctreeBlock::kLeaf))
     orderElements(keys, order, nodes.pool, threads);
   assemble(size, nodes, threads);
@@ -117,7 +117,8 @@ void OctreeBuilder::assemble(std::uint32_t size, OctreeNodes& nodes, const Threa
   }
 }
 
-/// Where each entry of the top's groups goes: a task's takes as many places as the task made.
+/// Computes the place of each entry of the top's groups. A task's entry takes as many places as the
+/// task has groups.
 void OctreeBuilder::placeGroups(std::uint32_t size, OctreeNodes& nodes) {
   m_groupPlaces.resize(top().groups.size());
   std::uint32_t count = 0;

@@ -11,10 +11,10 @@
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
 
-constexpr std::size_t kSide = 16;  ///< elements looked at together
+constexpr std::size_t kSide = 16;  ///< elements tested together
 
-/// Bits of those of sixteen elements from `first` on, or eight siblings, at most `size`, of which
-/// `take(d, boxes, lane)` is true, as the map places them.
+/// Tests at most `size` boxes from `first` on: sixteen elements or eight siblings, as the map
+/// places them. Bit i is set if `take(d, boxes, lane)` is true for box i.
 template <class D, class Boxes, class Take>
 HWY_ATTR HWY_INLINE std::uint32_t takeBoxes(D d, const Boxes& from, std::size_t first,
                                             std::size_t size, const BoxMap& map, Take&& take) {
@@ -26,16 +26,17 @@ HWY_ATTR HWY_INLINE std::uint32_t takeBoxes(D d, const Boxes& from, std::size_t 
   return bits;
 }
 
-/// At least as far as a box may seem that is no further than this: a squared distance is off by
-/// less than 2^-20 of itself, and by what outward rounding has to spare where its squares are
-/// denormal.
+/// An upper bound on the computed squared distance of a box that is no further than the given one.
+/// A computed squared distance is off by less than 2^-20 of itself. If its squares are denormal,
+/// outward rounding covers its error.
 float boundOf(double distanceSquared) {
   return OutwardRounding::up(static_cast<float>(distanceSquared) * (1.0f + 0x1p-19f));
 }
 
-/// Depth first from the root, the nearest siblings first: take() says which of several boxes are of
-/// interest, and their squared distances, of which those up to `bound` still are when their turn
-/// comes; element(place), which may lower the bound, is called with each such element.
+/// Descends depth first from the root, nearest siblings first. take() selects boxes and writes
+/// their squared distances to `squares`. A selected node or element is skipped if its distance
+/// exceeds `bound` when its turn comes. element(place) is called for each remaining element, and
+/// may lower the bound.
 template <class Take, class Element>
 HWY_ATTR HWY_INLINE void descend(const Octree& octree, const BoxMap& map, PointQueryStack& stack,
                                  const float* squares, const float& bound, Take&& take,
@@ -62,7 +63,7 @@ HWY_ATTR HWY_INLINE void descend(const Octree& octree, const BoxMap& map, PointQ
     for (; bits; bits &= bits - 1) {
       const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
       const Entry next{squares[slot], child + slot};
-      // Nearest last, to be taken first.
+      // Sorted with the nearest last, because the last entry is taken first.
       std::size_t place = stack.entries.size();
       stack.entries.push_back(next);
       for (; place > first && stack.entries[place - 1].distanceSquared < next.distanceSquared;

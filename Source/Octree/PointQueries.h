@@ -9,8 +9,8 @@
 
 namespace palpate {
 
-/// Scratch of point queries, which remembers its peak. Each query clears it first, so a query that
-/// an exception ended leaves nothing to the next.
+/// Scratch of point queries, which keeps its peak capacity. Each query clears it first, so that a
+/// query that ended with an exception does not affect the next one.
 struct PointQueryStack {
   struct Entry {
     float distanceSquared;
@@ -20,10 +20,10 @@ struct PointQueryStack {
   Buffer<std::uint32_t> found;  ///< of findOverlapping()
 };
 
-/// Descends from the root into the nodes that `enter(node)` accepts, which is asked for each node
-/// that is not empty, a parent before its children; f(begin, end): the ranges of the octree's order
-/// that accepted nodes hold themselves. This and all queries below throw if the octree is not
-/// built.
+/// Descends from the root into the nodes that `enter(node)` accepts. It calls enter() for each node
+/// that is not empty if the parent was accepted. It calls f(begin, end) with the range of the
+/// octree's order that each accepted node holds itself. This and all queries below throw if the
+/// octree is not built.
 template <class Enter, class F>
 void forEachEntered(const Octree& octree, Enter&& enter, PointQueryStack& stack, F&& f) {
   octree.requireBuilt();
@@ -41,28 +41,29 @@ void forEachEntered(const Octree& octree, Enter&& enter, PointQueryStack& stack,
   }
 }
 
-/// f(begin, end) for ranges of the octree's order that hold every element whose box `overlaps`, as
-/// do all boxes around it.
+/// Calls f(begin, end) for ranges of the octree's order that together hold every element whose box
+/// `overlaps` accepts. A box around an accepted box must be accepted, too.
 template <class Overlaps, class F>
 void forEachOverlapping(const Octree& octree, Overlaps&& overlaps, PointQueryStack& stack, F&& f) {
   forEachEntered(
       octree, [&](OctreeNode node) { return overlaps(octree.box(node)); }, stack, f);
 }
 
-/// The elements whose boxes, as the map places them, overlap `box`, by their places in the
-/// octree's order: in stack.found.
+/// Finds the elements whose boxes, as the map places them, overlap `box`. Their places in the
+/// octree's order are written to stack.found.
 void findOverlapping(const Octree&, const BoxMap&, const FloatBox& box, PointQueryStack& stack);
 
-/// Of an element's place in the octree's order: the least squared distance seen so far.
+/// Tests the element at a place of the octree's order. Returns the least squared distance found so
+/// far.
 using TryElement = double (*)(void* context, std::uint32_t place);
 
-/// Nearest nodes first: tries elements until no other one's box, as the map places it, comes as
-/// near to the point as the least squared distance seen, all in the octree's floats. point: a box
-/// around it; distanceSquared: no element further away is of interest.
+/// Visits nearest nodes first. Stops when the box of no other element, as the map places it, is as
+/// near to the point as the least squared distance found. All distances are in the octree's floats.
+/// point: a box around the point. distanceSquared: elements further away than this are ignored.
 void tryNearest(const Octree&, const BoxMap&, const FloatBox& point, double distanceSquared,
                 PointQueryStack& stack, void* context, TryElement tryElement);
 
-/// tryNearest() by f(place).
+/// tryNearest() with f(place) in place of the function pointer.
 template <class F>
 void forEachNearest(const Octree& octree, const BoxMap& map, const FloatBox& point,
                     double distanceSquared, PointQueryStack& stack, F&& f) {

@@ -18,8 +18,8 @@ struct LeafRange {
   std::uint32_t begin, end;
 };
 
-/// What is done with boxes on the way: nothing, a's are shifted, or those of at least one tree are
-/// turned.
+/// How boxes are transformed: not at all, a's boxes are shifted, or the boxes of at least one tree
+/// are turned.
 enum class Placing { None, Shifted, Turned };
 
 template <Placing placing>
@@ -46,10 +46,11 @@ class Walk {
     }
   }
 
-  /// Nothing below but elements.
+  /// Whether a pair has only elements below it.
   bool isLast(NodePair pair) const { return isLeaf(m_a, pair.a) && isLeaf(m_b, pair.b); }
 
-  /// Replaces a node pair by the pairs below it; two leaves by their elements' pairs.
+  /// Replaces a node pair by the pairs below it. Two leaves are replaced by the pairs of their
+  /// elements.
   HWY_ATTR void step(NodePair pair) {
     const bool leafA = isLeaf(m_a, pair.a), leafB = isLeaf(m_b, pair.b);
     if (m_trees.self() && pair.a == pair.b)
@@ -84,7 +85,7 @@ class Walk {
     return placing == Placing::Turned ? boxes.turned(m_trees.mapB) : boxes;
   }
 
-  /// One node of a, in the frame that boxes are compared in.
+  /// The box of one node of a, in the frame in which boxes are compared.
   HWY_ATTR HWY_INLINE FloatBox boxOfA(const OctreeBlock& block, unsigned slot) const {
     return placedA(BoxLanes<BoxTag>::load(block, slot)).first();
   }
@@ -110,7 +111,7 @@ class Walk {
     }
   };
 
-  /// a's eight children, placed; returns which overlap b's node.
+  /// Places the boxes of a's eight children. Returns which of them overlap b's node.
   HWY_ATTR std::uint32_t shiftBlock(const OctreeBlock& a, const OctreeBlock& b, unsigned slotB,
                                     ShiftedBlock& out) const {
     const NodeTag d;
@@ -148,8 +149,8 @@ class Walk {
     return longest;
   }
 
-  /// A node larger than the other comes down alone, else the small one would be at its leaves
-  /// before the large one has come to its size.
+  /// Descends into a much larger node alone. Otherwise the smaller node would be at its leaves
+  /// before the larger one has reached its size.
   HWY_ATTR void descendLarger(NodePair pair) {
     const float a = extent(m_a, pair.a), b = extent(m_b, pair.b);
     if (a > 2 * b)
@@ -212,9 +213,9 @@ class Walk {
   struct Rows {
     static constexpr std::size_t kMost = 16;
     alignas(64) float placed[2][3][kMost];
-    const float *lower[3], *upper[3];  ///< there, or where they were
+    const float *lower[3], *upper[3];  ///< in `placed`, or in the tree's boxes
     std::size_t first;                 ///< in a's order
-    std::uint32_t bits;                ///< which of them are of interest
+    std::uint32_t bits;                ///< elements that may overlap the other leaf
   };
 
   HWY_ATTR HWY_INLINE void leaves(NodePair pair) {
@@ -239,7 +240,7 @@ class Walk {
     }
   }
 
-  /// Those from `first` on, of which the ones are of interest that overlap the box.
+  /// Loads the elements from `first` on. Their bit is set if they overlap the box.
   HWY_ATTR HWY_INLINE void load(Rows& rows, std::size_t first, std::size_t end,
                                 const FloatBox& box) const {
     const LeafTag d;
@@ -261,8 +262,8 @@ class Walk {
     }
   }
 
-  /// Rows against a range of b, a vector of which stays in registers for all rows. kWithin: of one
-  /// leaf, against what comes after each row.
+  /// Compares rows with a range of b. One vector of b stays in registers for all rows. kWithin:
+  /// both are in one leaf, and each row is compared with the elements after it.
   template <bool kWithin>
   HWY_ATTR HWY_INLINE void compare(const Rows& rows, LeafRange b) {
     const LeafTag d;
@@ -305,7 +306,7 @@ class Walk {
       b = hn::Max(a, b);
       a = lower;
     }
-    if constexpr (HWY_TARGET == HWY_AVX2) {  // no compression but by a table, slower than a loop
+    if constexpr (HWY_TARGET == HWY_AVX2) {  // compression would need a table, slower than a loop
       alignas(32) std::uint32_t ids[2][8];
       hn::Store(a, du, ids[0]);
       hn::Store(b, du, ids[1]);
@@ -316,7 +317,7 @@ class Walk {
       }
       m_sink.advance(count);
     } else {
-      if (m_trees.self()) a = hn::Compress(a, found);  // else the same in all lanes
+      if (m_trees.self()) a = hn::Compress(a, found);  // otherwise all lanes are equal
       hn::StoreInterleaved2(a, hn::Compress(b, found), du, reinterpret_cast<std::uint32_t*>(out));
       m_sink.advance(hn::CountTrue(du, found));
     }
@@ -348,7 +349,8 @@ HWY_ATTR void start(W& walk, std::size_t wanted, TraversalStack& stack) {
   stack.pairs.clear();
   if (!walk.rootsOverlap()) return;
   stack.pairs.push_back({0, 0});
-  // Level by level: each round replaces every pair that is not of two leaves by those below it.
+  // Proceeds level by level. Each round replaces every pair that is not two leaves by the pairs
+  // below it.
   for (bool progress = true; progress && stack.pairs.size() < wanted;) {
     progress = false;
     stack.level.swap(stack.pairs);

@@ -14,14 +14,16 @@
 
 namespace palpate {
 
-/// Two nodes whose boxes overlap. kOwn in one: only the elements that the node holds itself.
+/// Two nodes whose boxes overlap. With the bit kOwn, a node stands only for the elements that it
+/// holds itself.
 struct NodePair {
   static constexpr OctreeNode kOwn = 0x80000000u;
   OctreeNode a, b;
 };
 
-/// Found pairs: handed on in batches, or kept until taken where there is no function to hand them
-/// to. After an exception, start() again: it forgets what was found.
+/// Receives the pairs that were found. They are passed to a function in batches, or kept until
+/// taken if there is no function. start() discards earlier pairs; it is required after an
+/// exception.
 class PairSink {
  public:
   using Function = void (*)(void* context, std::span<const ElementPair>);
@@ -53,7 +55,7 @@ class PairSink {
     }
   }
   std::span<const ElementPair> kept() const { return std::span(m_pairs).first(m_size); }
-  /// Takes what was kept, in exchange for a buffer to fill next time.
+  /// Swaps the kept pairs with a buffer, which is filled next time.
   void takeKept(Buffer<ElementPair>& pairs) {
     m_pairs.resize(m_size);
     m_pairs.swap(pairs);
@@ -69,18 +71,18 @@ class PairSink {
   void* m_context = nullptr;
 };
 
-/// One pair of octrees (or one octree with itself), with what brings a's boxes into b's frame.
+/// One pair of octrees (or one octree with itself), with the transformation from a's frame to b's
+/// frame.
 struct TreePair {
   const Octree* a;
-  const Octree* b;  ///< the same one: each unordered pair once, a < b
-  /// Triangles in the order of each tree, readable BoxArrays::kPadding past their end: pairs that
-  /// share a vertex are left out. Null: nothing is.
+  const Octree* b;  ///< if equal to a: each unordered pair once, a < b
+  /// Triangles in the order of each tree, readable BoxArrays::kPadding past their end. Pairs that
+  /// share a vertex are not reported. Null: all pairs are.
   const Triangle* adjacency = nullptr;
-  /// Added to a's bounds: the distance between the frames, and half the thickness on each side
-  /// twice.
+  /// Added to a's bounds: the offset between the frames, and the thickness on each side.
   std::array<float, 4> shiftLower{}, shiftUpper{};
-  /// Where a tree is of a rigid body that was moved, what brings its boxes into the world; a's then
-  /// in place of the shift. Not of one tree with itself.
+  /// For a rigid body that was moved, the map that brings the tree's boxes into the world. mapA
+  /// then replaces the shift. Not used for one tree with itself.
   BoxMap mapA{}, mapB{};
 
   bool self() const { return a == b; }
@@ -91,23 +93,21 @@ struct TreePair {
   }
 };
 
-/// Shifts of a's boxes for frames whose origins are `offset` apart (a's minus b's, in units of the
-/// frame), and a thickness.
+/// Sets the shifts of a's boxes. offset: a's origin minus b's, in units of the frame.
 void setShift(TreePair&, const std::array<double, 3>& offset, double thickness);
 
-/// Scratch of one traversal, which remembers its peak. Each traversal overwrites it first, so one
-/// that an exception ended leaves nothing to the next.
+/// Scratch of one traversal, which keeps its peak capacity. Each traversal overwrites it first, so
+/// that a traversal that ended with an exception does not affect the next one.
 struct TraversalStack {
   Buffer<NodePair> pairs, level;
 };
 
-/// The node pairs to start from, into stack.pairs: none if the roots do not overlap; else at least
-/// `wanted` if the trees are large enough, found breadth first. Throws if a tree is not built, as
-/// traverse() does.
+/// Writes the node pairs to start from to stack.pairs. If the roots do not overlap there are none,
+/// else there are at least `wanted` if the trees are large enough. They are found breadth first.
+/// Throws if a tree is not built, as traverse() does.
 void startPairs(const TreePair&, std::size_t wanted, TraversalStack&);
 
-/// All element pairs below the node pairs whose boxes overlap. Empties the span's pairs depth
-/// first.
+/// Finds all element pairs below the given node pairs whose boxes overlap, depth first.
 /// Cost     about a nanosecond for each eight boxes compared.
 void traverse(const TreePair&, std::span<const NodePair>, TraversalStack&, PairSink&);
 

@@ -93,8 +93,9 @@ class Validation {
       const double lower = double{box.lower[k]} - cube.lower[k],
                    upper = double{box.upper[k]} - cube.lower[k];
       longest = std::max(longest, upper - lower);
-      // The centre's cell is found in float arithmetic relative to a cube up to 2^9 times as long:
-      // four roundings of 2^-24 of that. What levels keep for rounding, 2^-10 of the size, is more.
+      // The cell of the centre is computed in float arithmetic relative to a cube up to 2^9 times
+      // as long, with four roundings of 2^-24 of that length. The margin for rounding in levels,
+      // 2^-10 of the size, is larger.
       static_assert(Key::kMostLevels == 9);
       const double centre = 0.5 * (lower + upper), slack = cube.edge * 0x1p-13;
       if (centre < -slack || centre > cube.edge + slack)
@@ -103,7 +104,7 @@ class Validation {
         fail(node, element() + " is outside its loose bounds");
     }
     if (longest > cube.edge) fail(node, element() + " is longer than its cell");
-    // An own element of a split cell is too large for the cell's children; in a leaf it may be
+    // A split cell's own element is too large for the cell's children. A leaf may have elements of
     // any size.
     if (!leaf && longest * (1.0 + 0x1p-9) < 0.5 * cube.edge)
       fail(node, element() + " belongs deeper");

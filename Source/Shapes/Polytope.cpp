@@ -29,7 +29,7 @@ bool spanPlane(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
          orient2d(2, a, b, c, counts) != 0;
 }
 
-/// Of the points that are `independent`, the one of greatest measure.
+/// The point of greatest measure among those that are `independent`; null if there is none.
 template <class Independent, class Measure>
 const Vector3d* furthest(std::span<const Vector3d> points, Independent&& independent,
                          Measure&& measure) {
@@ -44,7 +44,7 @@ const Vector3d* furthest(std::span<const Vector3d> points, Independent&& indepen
   return best;
 }
 
-/// Up to so many points are added in their own order.
+/// Up to this many points are added in their own order.
 constexpr std::size_t kPointsInOrder = 32;
 
 /// 0, 1, ... in an order that looks random and is the same on every machine: Fisher and Yates, with
@@ -90,7 +90,7 @@ std::vector<Vector3d> spanOf(std::span<const Vector3d> points) {
 Polytope::Polytope(std::span<const Vector3d> points) {
   std::vector<Vector3d> four = spanOf(points);
   const bool flat = four.size() == 3;
-  if (flat) {  // with a point beside the plane, which goes again
+  if (flat) {  // adds a point beside the plane, which is removed at the end
     const Vector3d across = (four[1] - four[0]).cross(four[2] - four[0]).cwiseAbs();
     SignCounts counts;
     int axis = 0;
@@ -153,14 +153,15 @@ bool Polytope::add(const Vector3d& p) {
   return true;
 }
 
-/// Faces from p to the border of what it sees.
+/// Adds p, and faces from p to the border of the region that p sees.
 void Polytope::addVisible(const Vector3d& p) {
   m_points.push_back(p);
   m_next.resize(m_points.size());
   m_fresh.clear();
   std::uint32_t last = kNone;
   for (const std::uint32_t f : m_visible) last = cut(f, last);
-  // Around the border; m_next: the new face that starts at a corner of that.
+  // Links the new faces around the border. m_next: the new face that starts at a corner of the
+  // border.
   for (std::uint32_t f = last, next = kNone; next != last; f = next) {
     next = m_next[m_faces[f].corners[1]];
     m_faces[f].neighbours[1] = next;
@@ -176,16 +177,17 @@ void Polytope::removeVisible() {
   }
 }
 
-/// Which of the points that are still to be added see which face.
+/// The points that are still to be added, and which faces they see.
 ///
-/// A point that sees a new face, which has an edge with a face on either side of the border, saw
-/// one of these two: in front of a plane between two others through one line, it is in front of one
-/// of them. And a point outside that saw a face which is removed sees a new one: what it sees is
-/// connected, so either that is all removed, or it saw both faces at an edge of the border.
+/// A new face shares an edge with two old faces, one on either side of the border. A point that
+/// sees the new face saw one of these two: the plane of the new face is between theirs through a
+/// common line, so that a point in front of it is in front of one of them. An outside point that
+/// saw a removed face sees a new one. The region that it sees is connected, so either all of that
+/// is removed, or the point saw both faces at an edge of the border.
 struct Polytope::Conflicts {
   std::vector<std::vector<std::uint32_t>> ofFace;
   std::vector<std::uint32_t> seen;    ///< per point: a face that it sees; kNone: it is inside
-  std::vector<std::uint32_t> tested;  ///< per point: how many faces there were when it was last
+  std::vector<std::uint32_t> tested;  ///< per point: faces made before its last test
 
   explicit Conflicts(std::size_t points) : seen(points, kNone), tested(points, 0) {}
   void add(std::uint32_t point, std::uint32_t face) {
@@ -235,8 +237,8 @@ void Polytope::addAll(std::span<const Vector3d> points) {
   }
 }
 
-/// New faces from the last point to a face's edges behind which it sees nothing. Returns the last
-/// of all.
+/// Makes new faces from the last point to those edges of a face beyond which it sees nothing.
+/// Returns the last new face.
 std::uint32_t Polytope::cut(std::uint32_t face, std::uint32_t last) {
   const auto p = static_cast<std::uint32_t>(m_points.size() - 1);
   for (std::size_t i = 0; i < 3; ++i) {
@@ -255,7 +257,8 @@ std::uint32_t Polytope::cut(std::uint32_t face, std::uint32_t last) {
   return last;
 }
 
-/// Without what is left of faces and points on the way. Returns the faces' new numbers.
+/// Removes the entries of removed faces and of points that are not corners. Returns the faces' new
+/// numbers.
 std::vector<std::uint32_t> Polytope::keepHull() {
   Buffer<Face> faces;
   Buffer<Plane> planes;
@@ -284,7 +287,7 @@ std::vector<std::uint32_t> Polytope::keepHull() {
   return ofFace;
 }
 
-/// Of the hull with an apex beside the plane: its base, from both sides.
+/// Reduces the hull with an apex beside the plane to a plate: its base, from both sides.
 void Polytope::keepPlate(std::uint32_t apex) {
   const auto isBase = [&](std::uint32_t f) {
     const auto& [a, b, c] = m_faces[f].corners;

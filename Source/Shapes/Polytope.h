@@ -14,77 +14,82 @@
 
 namespace palpate {
 
-/// From a convex body's surface: negative inside.
+/// Signed distance from the surface of a convex body; negative inside.
 struct SignedDistance {
   double distance;         ///< L
-  Eigen::Vector3d normal;  ///< unit: the distance grows fastest along it
+  Eigen::Vector3d normal;  ///< unit; the direction in which the distance grows fastest
 };
 
-/// As many of the points as it takes to span what they all do: one, the two ends of a line, three
-/// in a plane, or four. Exact.
+/// The fewest of the points that span the same affine space as all of them: one point, the two ends
+/// of a line, three points of a plane, or four points with a volume. The decisions are exact.
 std::vector<Eigen::Vector3d> spanOf(std::span<const Eigen::Vector3d> points);
 
-/// A convex body as triangles: the hull of its points. Which point sees which triangle is decided
-/// exactly, so that no rounding makes a hole or a fold, and none of the points lies outside.
+/// A convex body as triangles: the convex hull of its points. A point sees a face if it is strictly
+/// in front of the face's plane. This is decided exactly, so that rounding makes no hole and no
+/// fold, and none of the points lies outside.
 ///
-/// Ties     `tie`, L, is a height that counts as none: of two planes that are equally near the
-///          first counts.
-/// Source   the beneath-beyond method: Preparata, Shamos, Computational Geometry (1985), 3.4.2. Of
+/// Ties     heights that differ by at most `tie`, L, count as equal. Among planes that are equally
+///          near, the first one counts.
+/// Source   the beneath-beyond method: Preparata, Shamos, Computational Geometry (1985), 3.4.2. For
 ///          many points with conflict lists: Clarkson, Shor, Applications of random sampling in
 ///          computational geometry II (1989).
 class Polytope {
  public:
   struct OnFace {
-    VertexTriangleDistance from;  ///< as of a vertex against the face
+    VertexTriangleDistance from;  ///< distance between the given point and the face
     std::uint32_t face;
   };
 
-  /// The hull of points that span a plane or more. Of a plane: a plate, whose triangles are there
-  /// in both windings.
-  /// Cost     n log n expected for n points in any order. They are added in an order that looks
-  ///          random but is always the same, so that the hull is the same in every run; up to
-  ///          32 of them are added in their own order.
+  /// The hull of points that span a plane or more. The hull of points in one plane is a plate,
+  /// whose triangles exist in both windings.
+  /// Cost     n log n expected for n points in any order. More than 32 points are added in a
+  ///          shuffled order, which is the same in every run. Up to 32 points are added in their
+  ///          own order.
   explicit Polytope(std::span<const Eigen::Vector3d> points);
   Polytope() = default;
 
-  /// The hull of four points that have a volume.
+  /// Restarts as the hull of four points, which must have a volume.
   void start(std::span<const Eigen::Vector3d> four);
-  /// Grows to hold p; false if it does already.
+  /// Grows the hull to contain p. Returns false if the hull already contains p.
   bool add(const Eigen::Vector3d& p);
 
-  /// Of a hull that is not to grow: all of them are its own.
+  /// A hull made by the constructor has corners only. A hull that add() grew also keeps points that
+  /// are no longer corners.
   const std::vector<Eigen::Vector3d>& points() const { return m_points; }
-  /// Left to exact arithmetic by start() and add(), ever.
+  /// Decisions left to exact arithmetic over the object's lifetime; start() does not reset them.
   std::size_t exactDecisions() const { return m_decisions.undecided; }
   std::size_t faceCount() const { return m_faces.size(); }
   const Triangle& corners(std::uint32_t face) const { return m_faces[face].corners; }
-  /// Of one that grows: what is left of a face that is no more has corners, too.
+  /// Whether a face is part of the hull. A hull that grows keeps the entries of removed faces until
+  /// it reuses them.
   bool hasFace(std::uint32_t face) const { return m_planes[face].face == face; }
 
   SignedDistance at(const Eigen::Vector3d& x, double tie) const;
-  /// The face that is nearest to x; inside, of those in the plane of at().
+  /// The face nearest to x. For x inside, only the faces in the plane that at() measures from are
+  /// considered.
   OnFace nearest(const Eigen::Vector3d& x, double tie) const;
-  /// For a point inside: of the faces whose planes are at most `slack` further away than the
-  /// nearest plane, the one that is nearest itself. Of a body with almost equal planes, whose faces
-  /// are slivers, nearest() may give a face far from the foot on its plane.
+  /// For a point inside: among the faces whose planes are at most `slack` further away than the
+  /// nearest plane, the face nearest to x. If sliver faces lie in almost equal planes, nearest()
+  /// may return a face far from the foot of x on its plane.
   OnFace nearestFaceWithin(const Eigen::Vector3d& x, double slack) const;
   const Eigen::Vector3d& normal(std::uint32_t face) const;  ///< unit, outward
-  /// The middle of its points that are furthest along a direction.
+  /// The mean of the points that are furthest along a direction.
   Eigen::Vector3d support(const Eigen::Vector3d& direction, double tie) const;
-  /// Where on p + t (q - p), t in [0, 1], the signed distance is least: at an end if it is so
-  /// there, else amid all such t.
+  /// The t in [0, 1] at which the signed distance of p + t (q - p) is least. If several t share the
+  /// least distance, the result is an end of the edge if that is one of them, else their middle.
   double leastOnEdge(const Eigen::Vector3d& p, const Eigen::Vector3d& q, double tie) const;
-  /// Weights of the point of a triangle whose plane cuts the hull where the signed distance is
-  /// least; none if it is as small on the boundary, or if the triangle is outside.
+  /// Weights of the triangle's point at which the signed distance is least. The triangle's plane
+  /// must cut the hull. None if a point of the boundary is as deep, or if the triangle is outside.
   std::optional<Eigen::Vector3d> leastInTriangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                                  const Eigen::Vector3d& c, double tie) const;
 
  private:
   struct Face {
     Triangle corners;
-    std::array<std::uint32_t, 3> neighbours;  ///< across corners i and i + 1
+    std::array<std::uint32_t, 3> neighbours;  ///< neighbour i shares corners i and i + 1
   };
-  /// normal . x = offset; of a face that is no more it is below everything.
+  /// The plane normal . x = offset. A removed face has an infinite offset, so that its plane is
+  /// never the highest.
   struct Plane {
     Eigen::Vector3d normal;
     double offset;
@@ -121,15 +126,15 @@ class Polytope {
 
   std::vector<Eigen::Vector3d> m_points;
   Buffer<Face> m_faces;
-  Buffer<Plane> m_planes;                           ///< of the faces, and of a plate's border
+  Buffer<Plane> m_planes;  ///< one for each face, then those of a plate's border
   Buffer<std::uint32_t> m_free, m_visible, m_next;  ///< scratch of add()
-  /// A new face, and the face that was seen across its edge on the border.
+  /// A new face, and the removed face from which it took its border edge.
   struct Fresh {
     std::uint32_t face, seen;
   };
   Buffer<Fresh> m_fresh;  ///< scratch of add()
   SignCounts m_decisions;
-  Buffer<std::uint8_t> m_sees;  ///< per face: the point that is being added
+  Buffer<std::uint8_t> m_sees;  ///< per face: whether the point being added sees it
 };
 
 }  // namespace palpate

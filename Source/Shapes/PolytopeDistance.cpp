@@ -15,17 +15,19 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-/// Of a convex function of t that is the height of the highest plane: at t, and below it elsewhere.
+/// A tangent of a convex function of t: the height of the highest plane at t, which is a lower
+/// bound of the function elsewhere.
 struct Polytope::Tangent {
   double t, height, slope;
   std::uint32_t plane;
 };
 
-/// Where it is least, and the tangents before and after, which meet there.
+/// The minimum of the function, and the tangents before and after it, which meet there.
 struct Polytope::Valley {
   double t, height;
   Tangent before, after;
-  /// Of what their planes have, as much of each as makes the slopes cancel out.
+  /// The weighted mean of f over the two tangents' planes, with weights that make the slopes cancel
+  /// out.
   template <class F>
   double mixed(F&& f) const {
     if (!(after.slope > before.slope)) return f(before.plane);
@@ -34,9 +36,9 @@ struct Polytope::Valley {
   }
 };
 
-/// Over [0, 1]; the height is within `tie` of the least.
-/// Source   Kelley, The cutting-plane method for solving convex programs (1960), in one dimension:
-///          of functions made of straight pieces the end is found, not approached.
+/// The minimum over [0, 1]; the height is within `tie` of the least.
+/// Source   Kelley, The cutting-plane method for solving convex programs (1960), in one dimension.
+///          For piecewise linear functions it finds the minimum after finitely many steps.
 template <class At>
 Polytope::Valley Polytope::valleyOf(double tie, At&& at) {
   Tangent before = at(0.0);
@@ -59,7 +61,7 @@ Polytope::Valley Polytope::valleyOf(double tie, At&& at) {
   }
 }
 
-/// Of the planes along p + t (q - p).
+/// The minimum of the highest plane's height along p + t (q - p).
 Polytope::Valley Polytope::valley(const Vector3d& p, const Vector3d& q, double tie) const {
   const Vector3d along = q - p;
   return valleyOf(tie, [&](double t) {
@@ -83,7 +85,7 @@ Polytope::OnFace Polytope::onFace(const Vector3d& x, std::uint32_t face) const {
   return {finiteVertexTriangleDistance(x, corner(face, 0), corner(face, 1), corner(face, 2)), face};
 }
 
-/// f(face) of those at the edge or the corner that is nearest.
+/// Calls f(face) for the other faces at the nearest edge or corner.
 template <class F>
 void Polytope::forEachAround(const OnFace& on, F&& f) const {
   const auto feature = static_cast<std::size_t>(on.from.feature);
@@ -100,8 +102,8 @@ void Polytope::forEachAround(const OnFace& on, F&& f) const {
   }
 }
 
-/// To the face that is nearest to a point outside, over faces that are in front of it: where none
-/// around is nearer, none at all is, because the body is convex.
+/// Walks to the face nearest to a point outside, over faces that the point is in front of. If none
+/// of the surrounding faces is nearer, no face is, because the body is convex.
 Polytope::OnFace Polytope::walk(const Vector3d& x, std::uint32_t face, double tie) const {
   OnFace best = onFace(x, face);
   for (bool nearer = true; nearer;) {
@@ -170,8 +172,8 @@ Vector3d Polytope::support(const Vector3d& direction, double tie) const {
   return sum / count;
 }
 
-/// Of the edge: amid the stretch around t that is nowhere higher, or an end of it if that is one of
-/// the edge.
+/// The middle of the interval of t on which no plane is higher than `height`; an end of the edge if
+/// the interval contains it.
 double Polytope::flatMiddle(const Vector3d& p, const Vector3d& q, double t, double height) const {
   double first = 0, last = 1;
   for (const Plane& plane : m_planes) {
@@ -189,7 +191,8 @@ double Polytope::leastOnEdge(const Vector3d& p, const Vector3d& q, double tie) c
   const Valley inside = valley(p, q, tie);
   double t = inside.t;
   if (!(inside.height > tie)) return flatMiddle(p, q, t, inside.height + tie);
-  // From the edge to the face that is nearest to a point of it, and back, until neither moves.
+  // Alternates between the face nearest to a point of the edge and the edge's point nearest to that
+  // face, until neither changes.
   OnFace on = nearest(p + t * along, tie);
   for (double least = kInfinity;;) {
     const Vector3d &a = corner(on.face, 0), &b = corner(on.face, 1), &c = corner(on.face, 2);
@@ -215,7 +218,7 @@ std::optional<Vector3d> Polytope::leastInTriangle(const Vector3d& a, const Vecto
                                                   const Vector3d& c, double tie) const {
   const double boundary =
       std::min({valley(a, b, tie).height, valley(b, c, tie).height, valley(c, a, tie).height});
-  // On the line from a + s u to a + s v, for each s.
+  // For each s, the minimum on the line from a + s u to a + s v.
   const Vector3d u = b - a, v = c - a;
   const auto across = [&](double s) { return valley(a + s * u, a + s * v, tie); };
   const double s =

@@ -20,7 +20,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Its columns again, at right angles and of length 1 as exactly as double can say.
+/// The matrix with its columns made orthonormal to the precision of double.
 Eigen::Matrix3d orthonormal(const Eigen::Matrix3d& rotation) {
   Eigen::Matrix3d axes;
   const Vector3d x = rotation.col(0).normalized();
@@ -37,7 +37,7 @@ Eigen::Matrix3d axesAlong(const Vector3d& direction) {
   return axes;
 }
 
-/// Of a body that is the hull of points, from its origin; none of others.
+/// The corners of a box or a hull, relative to its origin; empty for other shapes.
 std::vector<Vector3d> cornersOf(const AnalyticalGeometry& geometry) {
   if (const auto* hull = std::get_if<ConvexHull>(&geometry)) return hull->points;
   std::vector<Vector3d> corners;
@@ -60,7 +60,7 @@ Shape::Shape(const AnalyticalGeometry& geometry, const RigidTransform& transform
       m_faces.push_back(m_hull->corners(f));
       const auto& [a, b, c] = m_faces.back();
       for (const auto& edge : {Segment{a, b}, Segment{b, c}, Segment{c, a}})
-        if (edge[0] < edge[1]) m_edges.push_back(edge);  // two faces have it, one each way
+        if (edge[0] < edge[1]) m_edges.push_back(edge);  // two faces share it, one each way
     }
   } else {
     m_faces = {{0, 1, 1}};
@@ -117,7 +117,8 @@ Eigen::AlignedBox3d Shape::bounds() const {
       Vector3d::Constant(isPlane() ? std::numeric_limits<double>::infinity() : m_radius);
   if (isCylinder())
     for (int k = 0; k < 3; ++k) {
-      // Of a disc: its radius times the sine of the angle between its axis and the coordinate's.
+      // A disc reaches its radius times the sine of the angle between its axis and the coordinate
+      // axis.
       const double cosine = m_axes(k, 2);
       reach[k] = m_sizes[0] * std::sqrt(std::max(0.0, (1.0 - cosine) * (1.0 + cosine)));
     }
@@ -238,10 +239,11 @@ NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const 
     const double t = m_hull->leastOnEdge(from, from + along, kOnSurface * m_magnitude);
     return at(t, t > 0 && t < 1);
   }
-  // The distance is convex along the edge: where its slope changes sign.
+  // The distance is convex along the edge. Its minimum is where the slope changes sign.
   if (slope(0) >= 0) return at(0, false);
   if (slope(1) <= 0) return at(1, false);
-  // From a falling to a rising slope; a stretch without slope is bracketed from both sides.
+  // Finds where the slope turns from falling to rising. An interval without slope is bracketed from
+  // both sides.
   const auto bracket = [&](auto&& isBefore) {
     double low = 0, high = 1;
     while (high - low > kEdgeWeight) {
@@ -259,9 +261,10 @@ NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const 
   return at(t, true);
 }
 
-/// Of a cylinder and the plane normal . u = height, height not negative: the deepest point in the
-/// shape, or the shape's nearest to it. The shape cut down by m on all sides, { at(u) <= -m }, has
-/// the parts' sizes less m; m is the largest for which it still reaches the plane.
+/// For a cylinder and the plane normal . u = height, with height not negative: the plane's point
+/// that is deepest in the shape, or the shape's point nearest to the plane. The shape shrunk by m
+/// on all sides, { at(u) <= -m }, has the parts' sizes less m. m is the largest value for which it
+/// still reaches the plane.
 Vector3d Shape::nearestOfPlane(const Vector3d& normal, double height) const {
   const Parts parts = partsOf(normal, 0);
   const auto& [lengths, directions] = parts;
@@ -275,7 +278,7 @@ Vector3d Shape::nearestOfPlane(const Vector3d& normal, double height) const {
   return reached > height ? Vector3d(height / reached * point) : point;
 }
 
-/// Of a capsule.
+/// nearestInTriangle() for a capsule.
 std::optional<NearestToShape> Shape::nearestToAxis(const Vector3d& a, const Vector3d& b,
                                                    const Vector3d& c) const {
   const VertexTriangleDistance ends[] = {finiteVertexTriangleDistance(m_p0, a, b, c),
@@ -293,7 +296,7 @@ std::optional<NearestToShape> Shape::nearestToAxis(const Vector3d& a, const Vect
                     std::min(ends[0].distance, ends[1].distance));
     return answer(finiteVertexTriangleDistance(m_p0 + 0.5 * along, a, b, c), ends[0].distance);
   }
-  for (const int i : {0, 1})  // nearest of all if from there the axis does not come nearer
+  for (const int i : {0, 1})  // this end is nearest if the axis does not come nearer from it
     if (isOver(i) && (i == 0 ? 1 : -1) * signedDot(along, ends[i].difference) >= 0)
       return answer(ends[i], ends[i].distance);
   SignCounts counts;
@@ -315,7 +318,7 @@ std::optional<NearestToShape> Shape::nearestInTriangle(const Vector3d& a, const 
   if (m_kind == Kind::Capsule) return nearestToAxis(a, b, c);
   if (m_hull) return nearestToHull(inBody(a), inBody(b), inBody(c));
   Vector3d normal = unitCross(a, b, a, c);
-  // In a plane's half-space no interior is deeper than the boundary.
+  // In a half-space, no interior point of a triangle is deeper than all of its boundary.
   if (m_kind < Kind::Capsule || normal == Vector3d::Zero()) return {};
   double height = normal.dot(a - m_p0);
   if (height < 0) normal = -normal, height = -height;
@@ -323,13 +326,13 @@ std::optional<NearestToShape> Shape::nearestInTriangle(const Vector3d& a, const 
   const VertexTriangleDistance on = finiteVertexTriangleDistance(point, a, b, c);
   if (on.feature != TriangleFeature::Face) return {};
   const Vector3d& weights = on.barycentric;
-  if (on.distance > kOnSurface * m_magnitude)  // the point was the shape's nearest to the plane
+  if (on.distance > kOnSurface * m_magnitude)  // the point is the shape's nearest to the plane
     return NearestToShape{weights, normal, on.distance, true};
   const SignedDistance least = at(weights[0] * a + weights[1] * b + weights[2] * c);
   return NearestToShape{weights, least.normal, least.distance, true};
 }
 
-/// Of a triangle in the body's frame.
+/// nearestInTriangle() for a hull. The triangle is in the body's frame.
 std::optional<NearestToShape> Shape::nearestToHull(const Vector3d& a, const Vector3d& b,
                                                    const Vector3d& c) const {
   const double tie = kOnSurface * m_magnitude;

@@ -19,22 +19,23 @@
 
 namespace palpate {
 
-/// Where a vertex, an edge or a triangle comes nearest to a shape, or is deepest inside.
+/// The point of a vertex, an edge or a triangle that is nearest to a shape, or deepest inside it.
 struct NearestToShape {
-  Eigen::Vector3d weights;  ///< of its vertices; never negative
-  Eigen::Vector3d normal;   ///< unit, from the shape towards it
+  Eigen::Vector3d weights;  ///< of the feature's vertices; never negative
+  Eigen::Vector3d normal;   ///< unit, from the shape towards the feature
   double distance;          ///< L, negative inside
-  bool inInterior;          ///< strictly: not on an end, not on an edge
-  bool exact = false;       ///< floating point left it to exact arithmetic
+  bool inInterior;          ///< strictly: not at an end or on an edge of the feature
+  bool exact = false;       ///< exact arithmetic decided, as floating point could not
 };
 
-/// The same at a time of the step.
+/// A feature's nearest point at a time of the step.
 struct ShapeImpact {
   double time;
   NearestToShape nearest;
 };
 
-/// How far two shapes are apart; negative: as far as the shortest way to part them.
+/// Signed distance between two shapes. If they overlap, it is negative, and its magnitude is the
+/// length of the shortest translation that separates them.
 struct ShapePairDistance {
   Eigen::Vector3d pointA, pointB;  ///< L, on the surfaces
   Eigen::Vector3d normal;          ///< unit, from b towards a
@@ -47,59 +48,66 @@ struct ShapePairScratch;
 
 /// An analytical shape in the world.
 ///
-/// The signed distance to a convex shape is convex, so that an element has one least distance.
-/// Where several of its points share it, one on its boundary is taken if there is one, else the
-/// middle.
+/// The signed distance to a convex shape is convex, so that a feature has one least distance. If
+/// several of its points share it, a point on the feature's boundary is chosen if there is one,
+/// else the middle.
 class Shape {
  public:
   Shape(const AnalyticalGeometry&, const RigidTransform&);
-  /// The same shape elsewhere.
+  /// Places the shape elsewhere. The geometry must be the constructor's.
   void place(const AnalyticalGeometry&, const RigidTransform&);
-  /// A cylinder at a time of a step: a right one between its ends, which move linearly.
+  /// Places a cylinder at a time of a step: a right cylinder between its end centres, which move
+  /// linearly.
   void placeBetween(const Shape& before, const Shape& now, double time);
 
   SignedDistance at(const Eigen::Vector3d& x) const;
   NearestToShape nearestOfEdge(const Eigen::Vector3d& p, const Eigen::Vector3d& q) const;
-  /// None where a point of the triangle's boundary is as near.
+  /// None if a point of the triangle's boundary is as near.
   std::optional<NearestToShape> nearestInTriangle(const Eigen::Vector3d& a,
                                                   const Eigen::Vector3d& b,
                                                   const Eigen::Vector3d& c) const;
-  /// From another shape, b; not both planes. Exchanged shapes give the same bits, exchanged.
+  /// Signed distance from another shape, b. At most one of the two may be a plane. Exchanged shapes
+  /// give the same bits, exchanged.
   ///
-  /// Planes by the other's furthest point, spheres by the distance of a point, two capsules by that
-  /// of edges; all others by how far the origin is from the body of all differences a - b, less the
-  /// radii. Within that a polytope grows from its furthest points along the direction in which the
-  /// origin is nearest to leave it. The origin's distance to the polytope and its height over the
-  /// last furthest point are bounds on either side; they meet within kShapePairGap.
+  /// A plane uses the other shape's furthest point, a sphere the distance of a point, and two
+  /// capsules the distance of edges. All other pairs use the Minkowski difference, the body of all
+  /// differences a - b. The distance is that of the origin from this body, less the radii. A
+  /// polytope grows within the body: it repeatedly takes the body's furthest point along the
+  /// outward normal where the origin is nearest to the polytope's surface. The origin's distance to
+  /// the polytope and its height over the last furthest point bound the result from both sides. The
+  /// search ends when the bounds differ by at most kShapePairGap.
   ///
-  /// Source   Gilbert, Johnson, Keerthi (1988) and van den Bergen (2001) where shapes are apart and
-  ///          where they overlap. Difference: one polytope for both, of all points so far, whose
+  /// Source   Gilbert, Johnson, Keerthi (1988) for shapes that are apart; van den Bergen (2001) for
+  ///          shapes that overlap. Difference: one polytope for both, of all points so far, whose
   ///          triangles are kept by exact predicates.
   ShapePairDistance distanceFrom(const Shape& b, ShapePairScratch&) const;
-  /// In some order of all shapes; of two of which neither precedes the other the measures are the
-  /// same.
+  /// A strict weak order of all shapes. If neither of two shapes precedes the other, their measures
+  /// are the same.
   bool precedes(const Shape&) const;
-  /// The middle of what of a body but for a capsule's radius is furthest along a direction, from
-  /// its origin. tie: L, a difference of heights that is none.
+  /// The furthest point along a direction, relative to origin(). A capsule's radius is not
+  /// included. If several points are furthest, the result is their middle. tie: L, heights that
+  /// differ by at most this count as equal.
   Eigen::Vector3d support(const Eigen::Vector3d& direction, double tie) const;
   const Eigen::Vector3d& origin() const { return m_p0; }
   bool isPlane() const { return m_kind < Kind::Capsule; }
   bool isCylinder() const { return m_kind == Kind::Cylinder; }
-  /// Whether the distance from another is that of the body of all differences, which is known to
-  /// kShapePairGap of the larger one.
+  /// Whether distanceFrom() uses the Minkowski difference. The distance is then known to within
+  /// kShapePairGap of the larger shape.
   bool needsDifferences(const Shape& b) const;
-  double size() const;  ///< L: of the largest measure; infinite for a plane
+  double size() const;  ///< L: the largest extent; infinite for a plane
   bool isTwoSided() const { return m_kind == Kind::TwoSidedPlane; }
 
-  // Within a step what a shape is made of moves linearly: a capsule's two ends, which of a sphere
-  // are one, or a hull's corners. Of planes and cylinders: ShapeStep.
+  // Within a step the corners of a shape move linearly: a hull's corners, or a capsule's two ends,
+  // which coincide for a sphere. ShapeStep is for planes and cylinders.
 
   bool hasCorners() const { return m_kind == Kind::Capsule || m_kind == Kind::Hull; }
-  std::span<const Eigen::Vector3d> corners() const { return m_corners; }  ///< or a cylinder's ends
-  const Eigen::Matrix3d& axes() const { return m_axes; }  ///< of a plane, the normal last
-  /// With this one's radius and another axis, from its centre.
+  /// A cylinder's corners are its end centres.
+  std::span<const Eigen::Vector3d> corners() const { return m_corners; }
+  const Eigen::Matrix3d& axes() const { return m_axes; }  ///< a plane's normal is the last column
+  /// Signed distance of a point from a cylinder that has this cylinder's radius and another axis.
+  /// The point is relative to the centre.
   SignedDistance ofCylinder(const Eigen::Vector3d& fromCentre, const Eigen::Vector3d& axis) const;
-  /// Of a hull, or a capsule's axis, by corners: {p, q, q}.
+  /// A hull's faces, by corners. A capsule's axis counts as the triangle {p, q, q}.
   std::span<const Triangle> faces() const { return m_faces; }
   std::span<const Segment> edges() const { return m_edges; }
   double radius() const { return isCylinder() ? m_sizes[0] : m_radius; }  ///< L
@@ -114,20 +122,21 @@ class Shape {
   ShapePairDistance grownFrom(const Shape&, ShapePairScratch&) const;
 
   enum class Kind { Plane, TwoSidedPlane, Capsule, Cylinder, Hull };
-  /// A vector by what the distance to a cylinder is made of: radius and height.
+  /// A vector's radial and axial components, which determine the distance to a cylinder.
   struct Parts {
     std::array<double, 2> lengths;  ///< never negative
     std::array<Eigen::Vector3d, 2> directions;
   };
-  /// tie: lengths on either side of the middle that count as above it.
+  /// tie: L, a point at most this far below the middle counts as above it.
   Parts partsOf(const Eigen::Vector3d& v, double tie) const;
   void placeCorners();
   Eigen::Vector3d inBody(const Eigen::Vector3d& x) const;
-  /// At a capsule's axis, where every direction across it leads out: one near to the given one.
+  /// An outward direction for a point on a capsule's axis, where every direction across the axis
+  /// leads out. It is near the given one.
   Eigen::Vector3d fromAxis(const Eigen::Vector3d& normal) const;
-  /// tie: L, of two faces that are equally near the first counts.
+  /// tie: L, if two faces are equally near within this, the first one counts.
   SignedDistance atBody(const Eigen::Vector3d& u, double tie) const;
-  /// The same of a cylinder with other sizes.
+  /// The same for a cylinder with other sizes.
   SignedDistance atBody(const Eigen::Vector3d& u, double tie,
                         const std::array<double, 2>& sizes) const;
   Eigen::Vector3d nearestOfPlane(const Eigen::Vector3d& normal, double height) const;
@@ -139,10 +148,10 @@ class Shape {
   Kind m_kind = Kind::Plane;
   Eigen::Vector3d m_p0, m_p1;  ///< a capsule's axis; others: both the body's origin
   double m_radius = 0;         ///< of a capsule
-  double m_axisSquare = 0;     ///< L²: of its length; negative where that leaves double's range
+  double m_axisSquare = 0;     ///< L²: its squared length; negative beyond double's range
   Eigen::Matrix3d m_axes = Eigen::Matrix3d::Identity();  ///< of the body
-  std::array<double, 2> m_sizes{};                       ///< of a cylinder's parts
-  std::vector<Eigen::Vector3d> m_span;                   ///< of a hull's points
+  std::array<double, 2> m_sizes{};                       ///< of a cylinder: radius, half its height
+  std::vector<Eigen::Vector3d> m_span;                   ///< spanOf() a hull's points
   std::vector<Eigen::Vector3d> m_corners;
   std::vector<Triangle> m_faces;
   std::vector<Segment> m_edges;
@@ -150,8 +159,8 @@ class Shape {
   double m_magnitude;
 };
 
-/// Scratch, which remembers its peak: a body inside that of all a - b, and the points of a; and a
-/// shape at a time of the step.
+/// Scratch for pairs of shapes, which keeps its peak capacity: a polytope inside the Minkowski
+/// difference, the points of a that its points came from, and a shape at a time of the step.
 struct ShapePairScratch {
   Polytope grown;
   Buffer<Eigen::Vector3d> ofA;
@@ -181,9 +190,10 @@ void forEachField(Geometry& geometry, F&& f) {
       geometry);
 }
 
-/// What is wrong with a shape's measures; empty if nothing is. element: the point of a hull.
+/// Describes what is invalid in a shape's measures; empty if they are valid. element: the index of
+/// a hull's invalid point.
 std::string faultOf(const AnalyticalGeometry&, std::optional<std::size_t>& element);
-/// Of a transform: its matrix must be a rotation within 1e-9.
+/// The same for a transform, whose matrix must be a rotation within 1e-9.
 std::string faultOf(const RigidTransform&);
 
 }  // namespace palpate

@@ -14,8 +14,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Points of a round body that are looked at, at most; between corners far fewer come nearer and
-/// nearer.
+/// The most points of a round body that are computed. Between corners, far fewer points come nearer
+/// and nearer.
 constexpr int kMostPoints = 128;
 
 }  // namespace
@@ -38,7 +38,7 @@ Vector3d ShapeApproach::corner(const MovingBody& body, std::size_t i, double tim
          time * (body.corners[1][i] - m_reference[1]);
 }
 
-/// Of the corners: the greatest height along a direction.
+/// The greatest height of the corners along a direction.
 double ShapeApproach::highest(const MovingBody& body, const Vector3d& direction,
                               double time) const {
   double most = -std::numeric_limits<double>::infinity();
@@ -59,14 +59,15 @@ Vector3d ShapeApproach::furthest(const MovingBody& body, const Vector3d& directi
   if (!(body.mantle > 0)) return best;
   const Vector3d axis = directionOf(corner(body, 1, time) - corner(body, 0, time));
   Vector3d across = direction - dot(direction, axis) * axis;
-  if (!(across.squaredNorm() > kOnSurface * kOnSurface)) return best;  // it would be rounding
+  if (!(across.squaredNorm() > kOnSurface * kOnSurface)) return best;  // only rounding
   across = across.normalized();
   return best + body.mantle * (across - dot(across, axis) * axis).normalized();
 }
 
-/// How far a cylinder's mantle reaches beyond its axis along a direction, at most, in a part of the
-/// step. The axis turns in a plane, by less than half a turn: the sine of its angle to the
-/// direction is greatest at an end, unless the axis comes across the direction.
+/// An upper bound on how far a cylinder's mantle reaches beyond its axis along a direction, in a
+/// part of the step. The axis turns in a plane, by less than half a turn. The sine of its angle to
+/// the direction is therefore greatest at an end, unless the axis becomes perpendicular to the
+/// direction in between.
 double ShapeApproach::mantleReach(const MovingBody& body, const Vector3d& direction, double from,
                                   double to) const {
   if (!(body.mantle > 0)) return 0;
@@ -86,7 +87,7 @@ bool ShapeApproach::separates(const Vector3d& direction, double from, double to,
          distance + kShapeBoundError * (m_size + distance);
 }
 
-/// Up to four points of the body of all differences a - b, and their point nearest to the origin.
+/// Up to four points of the Minkowski difference a - b, and their point nearest to the origin.
 struct ShapeApproach::Simplex {
   struct Point {
     Vector3d difference, ofA;
@@ -100,7 +101,7 @@ struct ShapeApproach::Simplex {
                        [&](const Point& p) { return p.difference == difference; });
   }
 
-  /// Whether the origin is in a tetrahedron.
+  /// Whether the origin is in the tetrahedron of all four points.
   bool surroundsOrigin(SignCounts& counts) const {
     const Vector3d origin = Vector3d::Zero();
     const auto at = [&](int i) -> const Vector3d& { return points[i & 3].difference; };
@@ -112,8 +113,9 @@ struct ShapeApproach::Simplex {
     return true;
   }
 
-  /// Keeps the points that hold the one nearest to the origin. Of a tetrahedron that is on a face
-  /// with its last point: the others were nearest to the origin before, without it.
+  /// Keeps only the points whose hull contains the point nearest to the origin. For a tetrahedron,
+  /// that point is on a face with the last point, because the other three points were the nearest
+  /// ones before it was added.
   VertexTriangleDistance reduce() {
     const Vector3d origin = Vector3d::Zero();
     const auto of = [&](int i, int j, int k) {
@@ -138,7 +140,8 @@ struct ShapeApproach::Simplex {
   }
 };
 
-/// isEnough(normal, lower, upper): whether bounds on the distance, and a direction, will do.
+/// isEnough(normal, lower, upper): whether the bounds on the distance, and the direction, are good
+/// enough.
 template <class IsEnough>
 ShapeApproach::Nearest ShapeApproach::nearest(double time, IsEnough&& isEnough) {
   SignCounts counts;

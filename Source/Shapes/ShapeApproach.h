@@ -11,36 +11,37 @@
 
 namespace palpate {
 
-/// Two moving bodies, and when they first come near each other.
+/// Finds when two moving bodies first come near each other.
 class ShapeApproach {
  public:
   ShapeApproach(const MovingBody& a, const MovingBody& b);
 
   /// The first time at which the bodies are at most `distance` apart; none if they never are.
   ///
-  /// Never late. Early by at most the tolerance, or at a time at which the bodies are at most
-  /// `distance`, and kShapeBoundError of their size, and what they move relative to each other in
-  /// that part of the step apart. With a cylinder that turns, this motion is that of all its
-  /// points.
+  /// Never late. It is early by at most the tolerance, or the bodies are then at most `distance` +
+  /// e apart. e is kShapeBoundError of their size, plus their relative motion in a part of the step
+  /// as long as the tolerance. For a cylinder that turns, the motion of all its points counts.
   ///
-  /// Source   a part of the step is passed if one direction separates the bodies at both its ends:
-  ///          the distance along a fixed direction is the least of linear functions of time, so
-  ///          that in between it is not less than at both ends. A cylinder's mantle reaches
-  ///          furthest along the direction at an end of the part, or where it is across its axis.
-  ///          Parts that are not passed are halved. The direction is that in which the bodies are
-  ///          nearest at the middle of the part: Gilbert, Johnson, Keerthi (1988), with the
-  ///          library's distance of a point from a triangle. It is verified, not trusted.
+  /// Source   a part of the step is passed if one direction separates the bodies at both its ends.
+  ///          The distance along a fixed direction is the least of linear functions of time; in
+  ///          between it is therefore not less than at both ends. A cylinder's mantle reaches
+  ///          furthest along the direction at an end of the part, or when its axis is perpendicular
+  ///          to the direction. Parts that are not passed are halved. The direction joins the
+  ///          nearest points of the bodies at the middle of the part: Gilbert, Johnson, Keerthi
+  ///          (1988), with the library's distance of a point from a triangle. That it separates the
+  ///          bodies is verified.
   std::optional<double> timeNear(double distance, double tolerance);
-  /// At a time at which they are apart; negative distances are of what the radii overlap.
+  /// The nearest points at a time at which the bodies without their radii are apart. A negative
+  /// distance is the overlap of the radii.
   ShapePairDistance nearestAt(double time);
 
   std::size_t exactDecisions() const { return m_exactDecisions; }
 
  private:
   struct Simplex;
-  /// Of the bodies without their radii.
+  /// Nearest points of the bodies without their radii.
   struct Nearest {
-    Eigen::Vector3d ofA, ofB;  ///< L, from the reference
+    Eigen::Vector3d ofA, ofB;  ///< L, relative to m_reference
     Eigen::Vector3d normal;    ///< unit, from b towards a
     double distance;           ///< L; 0: they touch or overlap
   };
@@ -55,9 +56,9 @@ class ShapeApproach {
   Nearest nearest(double time, IsEnough&& isEnough);
 
   const MovingBody m_a, m_b;
-  std::array<Eigen::Vector3d, 2> m_reference;  ///< L: positions are seen from here
-  double m_size;                               ///< L: of all positions, so seen, and radii
-  Eigen::Vector3d m_direction;                 ///< that separated them last
+  std::array<Eigen::Vector3d, 2> m_reference;  ///< L: positions are relative to it
+  double m_size;                ///< L: extent of the relative positions, plus the radii
+  Eigen::Vector3d m_direction;  ///< the last one that separated the bodies
   std::size_t m_exactDecisions = 0;
 };
 

@@ -22,7 +22,7 @@ using Eigen::Vector3d;
 
 using Kind = ImpactQuery::Kind;
 
-/// Of a triangle's edges; at(i): its corners.
+/// The nearest point on a triangle's edges. at(i): its corners.
 template <class At>
 NearestToShape nearestOnBoundary(const Shape& shape, At&& at) {
   NearestToShape best{};
@@ -38,7 +38,7 @@ NearestToShape nearestOnBoundary(const Shape& shape, At&& at) {
   return best;
 }
 
-/// When elements of a mesh come near to a shape within the step.
+/// Finds when features of a mesh come near a shape within the step.
 class ShapeImpacts {
  public:
   ShapeImpacts(const TriangleMesh& mesh, const PlacedShape& shape, const PairSettings& settings,
@@ -53,12 +53,12 @@ class ShapeImpacts {
     m_settings.timeTolerance = settings.timeTolerance;
     for (std::uint32_t i = 0; i < m_before.corners().size(); ++i)
       m_motion = std::max(m_motion, motionOf(corner(i)));
-    if (m_before.isPlane()) m_motion = std::numeric_limits<double>::infinity();  // it may turn
+    if (m_before.isPlane()) m_motion = std::numeric_limits<double>::infinity();  // a plane may turn
     if (m_before.isCylinder())  // its mantle turns with its ends
       m_motion += (m_now.axes().col(2) - m_before.axes().col(2)).norm() * m_before.radius();
   }
 
-  /// L: what distances before the step may be off by, and what the step may take from them.
+  /// L: the error of distances before the step, and how much the step may reduce them.
   std::array<double, 2> slack(ShapeElement element, const Triangle& vertices) const {
     double size = m_before.magnitude() + m_distance, square = 0;
     for (const std::uint32_t v : vertices) {
@@ -74,8 +74,9 @@ class ShapeImpacts {
     return {kShapeBoundError * size, still ? 0.0 : motion + m_motion};
   }
 
-  /// Of an element that is further away before the step: the first time at which its inside is near
-  /// one of the shape's features; what moves without those is met by vertices first.
+  /// The first time at which a feature's interior is near a feature of the shape. The mesh's
+  /// feature must be further away before the step. If it comes near elsewhere on the shape, its
+  /// vertices do so first.
   std::optional<ShapeImpact> find(ShapeElement element, const Triangle& vertices) {
     const auto& [a, b, c] = vertices;
     if (!m_before.hasCorners())
@@ -113,7 +114,7 @@ class ShapeImpacts {
     return ShapeStep(m_before, m_now)
         .timeNear({m_mesh.before[v], m_mesh.now[v]}, m_distance, m_settings.timeTolerance);
   }
-  /// Of an edge or a triangle.
+  /// The first time at which an edge or a triangle is near the cylinder.
   std::optional<double> timeOfElement(ShapeElement element, const Triangle& vertices) {
     const std::size_t size = element == ShapeElement::Edge ? 2 : 3;
     std::array<std::array<Vector3d, 3>, 2> ends;
@@ -127,8 +128,8 @@ class ShapeImpacts {
     return time;
   }
 
-  /// An edge or a triangle is a contact where it first comes near, unless what is nearest then is
-  /// on its boundary and a contact itself, no later.
+  /// An edge or a triangle is a contact when it first comes near. It is not if its nearest point is
+  /// then on its boundary, and the boundary's feature is itself a contact at that time or earlier.
   std::optional<ShapeImpact> findOfCylinder(ShapeElement element, const Triangle& vertices) {
     const auto time = timeOfElement(element, vertices);
     if (!time) return {};
@@ -152,7 +153,8 @@ class ShapeImpacts {
     return nearestOnBoundary(shape, [&](int i) { return x[i]; });
   }
 
-  /// Whether what holds the point of these weights is near the shape at this time, or was before.
+  /// Whether the feature that contains the point of these weights is near the shape at this time,
+  /// or was before.
   bool boundaryIsNear(const Triangle& vertices, const Vector3d& weights, double time) {
     std::array<std::uint32_t, 3> held{};
     std::size_t count = 0;
@@ -167,7 +169,7 @@ class ShapeImpacts {
     return first && *first <= time;
   }
 
-  /// So that weights say which element it is.
+  /// Moves the point into the feature's interior, so that the weights identify the feature.
   static void moveInside(ShapeElement element, NearestToShape& nearest) {
     const int size = element == ShapeElement::Edge ? 2 : 3;
     Vector3d& weights = nearest.weights;
@@ -218,11 +220,11 @@ class ShapeImpacts {
 
   const TriangleMesh& m_mesh;
   const Shape &m_before, &m_now;
-  const double m_distance;  ///< L: with the mesh's radius
+  const double m_distance;  ///< L: the thickness and the mesh's largest radius
   const bool m_isStill;     ///< no vertex of the mesh moves
   ShapeContactBuffers& m_out;
   TimeOfImpactSettings m_settings;
-  double m_motion = 0;  ///< L: of the shape's points at most
+  double m_motion = 0;  ///< L: a bound on the motion of the shape's points
   double m_time = 1.0;
   std::optional<ImpactQuery> m_first;
 };
@@ -268,8 +270,9 @@ class ShapeContactFinder {
     SignedDistance from;
   };
 
-  /// By the slope at each end the distance, which is convex, is nowhere less than a bound; and
-  /// where it falls in no direction the end itself is nearest.
+  /// Whether a feature may be within reach. The distance is convex, so the slope at each end bounds
+  /// it from below. If the distance does not fall in any direction from an end, that end is
+  /// nearest.
   template <std::size_t size>
   bool mayTouch(const std::array<End, size>& ends, double reach) {
     if (size > 1) ++m_out.featurePairs;
@@ -284,7 +287,7 @@ class ShapeContactFinder {
     return true;
   }
 
-  /// The contact of an element: as it is, or first within the step.
+  /// Finds the contact of a feature: at its positions, or the first one within the step.
   template <std::size_t size, class Nearest>
   void find(ShapeElement element, std::uint32_t id, const Triangle& vertices,
             const std::array<End, size>& ends, Nearest&& nearest) {
@@ -348,8 +351,8 @@ void findShapeContacts(const TriangleMesh& mesh, const PlacedShape& shape,
 
 namespace {
 
-/// When two shapes come near each other within the step, by one order of the two whatever the
-/// pair's.
+/// Finds when two shapes come near each other within the step. The shapes are ordered first, so
+/// that the order of the pair does not matter.
 void findShapeImpact(const PlacedShape& first, const PlacedShape& second,
                      const PairSettings& settings, ShapeContactBuffers& out) {
   const PlacedShape *a = &first, *b = &second;

@@ -22,21 +22,23 @@ struct ShapeContactBuffers {
   std::size_t exactDecisions = 0;  ///< left to exact arithmetic
 };
 
-/// Contacts with the shape of the features that the elements of the mesh own. The settings'
-/// method is Proximity or Continuous.
+/// Finds the contacts between the shape and the features that the given elements of the mesh own.
+/// settings.method must be Proximity or Continuous.
 ///
-/// All: every vertex, edge and triangle at most the thickness and its radius from the shape, at its
-/// point nearest to it. Distinct: those of them of which that point is strictly inside.
+/// All: reports every vertex, edge and triangle whose distance from the shape is at most the
+/// thickness plus its radius, at its point nearest to the shape. Distinct: reports those of them
+/// whose nearest point is strictly inside the feature.
 ///
-/// Continuous: those within the distance before the step, as Distinct, at time 0; else vertices
-/// that come so near to the shape, edges that do to its edges, and triangles to its corners, where
-/// the nearest point is then strictly inside: whatever first comes so near is one of them. A plane
-/// has no edges and no corners. Edges and triangles come near to a cylinder as a whole.
+/// Continuous: features within the distance before the step are reported at time 0, as with
+/// Distinct. Otherwise, vertices are tested against the shape, edges against its edges, and
+/// triangles against its corners. They are reported if they come within the distance at a point
+/// strictly inside the feature. Whichever feature of the mesh first comes so near is among them. A
+/// plane has no edges and no corners. Edges and triangles are tested against a cylinder as a whole.
 void findShapeContacts(const TriangleMesh&, const PlacedShape&, const PairSettings&,
                        std::span<const std::uint32_t> elements, ShapeContactBuffers& out);
 
-/// The contact of two shapes, if they are near enough; Continuous: where they first are within the
-/// step.
+/// Finds the contact of two shapes, if they are near enough. Continuous: at the first time of the
+/// step at which they are.
 void findShapePair(const PlacedShape& a, const PlacedShape& b, const PairSettings&,
                    ShapeContactBuffers& out);
 

@@ -25,7 +25,7 @@ double weightOnAnyAxis(const Vector3d& from, const Vector3d& along) {
   const int exponent = exponentTowardsOne(std::max(largest(from), largest(along)));
   const Vector3d nearAlong = scaled(along, exponent);
   const double square = nearAlong.squaredNorm();
-  if (!(square > 0.0)) return 0.0;  // it is a point beside the distance
+  if (!(square > 0.0)) return 0.0;  // compared to the distance, the axis is a point
   return std::clamp(scaled(from, exponent).dot(nearAlong) / square, 0.0, 1.0);
 }
 

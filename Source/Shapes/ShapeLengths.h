@@ -9,7 +9,7 @@
 #include <cmath>
 
 /// Lengths and angles of vectors whose squares may leave the range of double. Where they do not,
-/// these have the bits of the plain formulas.
+/// the results have the same bits as the plain formulas.
 namespace palpate {
 
 /// Whether a square, or a dot product, neither overflowed nor lost bits to underflow.
@@ -23,7 +23,7 @@ struct LengthAndDirection {
   Eigen::Vector3d direction;  ///< unit; zero if the length is
 };
 
-/// Of a vector of any length; slower.
+/// polar() of a vector of any length; slower.
 LengthAndDirection polarOfAnyLength(const Eigen::Vector3d&);
 
 inline LengthAndDirection polar(const Eigen::Vector3d& v) {
@@ -36,27 +36,27 @@ inline LengthAndDirection polar(const Eigen::Vector3d& v) {
 inline double lengthOf(const Eigen::Vector3d& v) {
   const double squared = v.squaredNorm();
   if (isInRange(squared)) return std::sqrt(squared);
-  // What does not move is common.
+  // Displacements of zero are common.
   return v == Eigen::Vector3d::Zero() ? 0.0 : polarOfAnyLength(v).length;
 }
 
-/// Unit; zero of no length.
+/// A unit vector; zero for a vector without length.
 inline Eigen::Vector3d directionOf(const Eigen::Vector3d& v) {
   const double extent = largest(v);
   return (isModerate(extent) ? v : scaled(v, exponentTowardsOne(extent))).stableNormalized();
 }
 
-/// Of a . b, which may be anything, a number of the same sign; slower.
+/// A number with the sign of a . b, which may leave the range of double; slower.
 double signedDotOfAny(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
 
-/// a . b, or where that leaves the range of double a number of the same sign.
+/// a . b; where that leaves the range of double, a number with the same sign.
 inline double signedDot(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   const double product = a.dot(b);
   return isInRange(product) ? product : signedDotOfAny(a, b);
 }
 
-/// The weight in [0, 1] of the point on an axis that is nearest to `from`, both seen from the
-/// axis' start. Of any vectors; slower than the quotient.
+/// The weight in [0, 1] of the point on an axis that is nearest to `from`. Both vectors start at
+/// the axis' start and may have any length. Slower than the plain quotient.
 double weightOnAnyAxis(const Eigen::Vector3d& from, const Eigen::Vector3d& along);
 
 }  // namespace palpate

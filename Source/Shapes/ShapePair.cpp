@@ -19,7 +19,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// a - b for the furthest points along directions.
+/// Points of the Minkowski difference of two shapes, a - b: the furthest ones along directions.
 class Differences {
  public:
   Differences(const Shape& a, const Shape& b) : m_a(a), m_b(b), m_offset(a.origin() - b.origin()) {}
@@ -32,7 +32,8 @@ class Differences {
     return {(ofA - m_b.support(-direction, 0)) + m_offset, ofA};
   }
 
-  /// Four that have a volume; or fewer, and the direction in which all of them are one.
+  /// Finds four points that have a volume. Returns fewer if there are none, and a direction `flat`
+  /// along which all points are equal.
   std::size_t start(std::array<Point, 4>& points, Vector3d& flat) const {
     const auto at = [&](std::size_t i) -> const Vector3d& { return points[i].difference; };
     points[0] = furthest(Vector3d::UnitX());
@@ -55,7 +56,8 @@ class Differences {
   }
 
  private:
-  /// The furthest along or against the directions that has the greatest measure; false for none.
+  /// Finds the point with the greatest measure among those furthest along or against the
+  /// directions. Returns false if no measure is positive.
   template <class Measure>
   bool extend(Point& best, std::span<const Vector3d> directions, Measure&& measure) const {
     double most = 0;
@@ -73,7 +75,7 @@ class Differences {
   Vector3d m_offset;
 };
 
-/// Of bodies with a round side that overlap, at most so many points.
+/// The most points that are added for overlapping bodies with a round side.
 constexpr std::size_t kMostDifferences = 256;
 
 }  // namespace
@@ -104,7 +106,7 @@ bool Shape::precedes(const Shape& other) const {
   return ours.size() < theirs.size();
 }
 
-/// Of a plane against a body.
+/// The distance of this plane from a body.
 ShapePairDistance Shape::planeFrom(const Shape& body) const {
   const double tie = kOnSurface * (m_magnitude + body.m_magnitude);
   ShapePairDistance best{};
@@ -121,8 +123,8 @@ ShapePairDistance Shape::planeFrom(const Shape& body) const {
   return best;
 }
 
-/// Of bodies whose differences all lie in one plane, across which they are `flat`: each of them is
-/// in one plane itself.
+/// The distance of bodies whose Minkowski difference lies in one plane with normal `flat`. Each
+/// body then lies in one plane itself.
 ShapePairDistance Shape::flatFrom(const Shape& other, const Vector3d& flat) const {
   NearestToShape nearest{};
   Vector3d point = m_p0;
@@ -144,7 +146,7 @@ ShapePairDistance Shape::flatFrom(const Shape& other, const Vector3d& flat) cons
   } else {
     take(other.nearestOfEdge(m_p0, m_p1), m_p0, m_p1, m_p1);
   }
-  const double distance = nearest.distance + other.m_radius;  // 0 but of a capsule
+  const double distance = nearest.distance + other.m_radius;  // a radius of 0 except for capsules
   const double tie = kOnSurface * (m_magnitude + other.m_magnitude);
   const Vector3d normal = distance > tie ? nearest.normal : flat;
   const Vector3d pointA = point - m_radius * normal;
@@ -176,7 +178,8 @@ ShapePairDistance Shape::grownFrom(const Shape& other, ShapePairScratch& scratch
     out = grown.at(origin, tie);
     const auto [difference, point] = differences.furthest(out.normal);
     const double reach = dot(out.normal, difference);
-    // A round body may be as deep in as many directions as it has: each of them parts it truly.
+    // A round body may be equally deep in any number of directions. Each of them separates the
+    // bodies.
     const bool enough = isRound && out.distance < 0 && grown.points().size() >= kMostDifferences;
     if (!(reach + out.distance > gap) || enough || !grown.add(difference)) {
       if (out.distance < 0) out.distance = -reach;
@@ -198,7 +201,7 @@ ShapePairDistance Shape::grownFrom(const Shape& other, ShapePairScratch& scratch
           out.distance - m_radius - other.m_radius};
 }
 
-/// Of a capsule against another, or of a sphere against a body.
+/// The distance of this capsule from another one, or of this sphere from a body.
 ShapePairDistance Shape::axisFrom(const Shape& body) const {
   NearestToShape nearest{Vector3d::UnitX(), {}, 0, false};
   if (body.m_kind == Kind::Capsule) {

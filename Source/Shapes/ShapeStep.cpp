@@ -19,7 +19,7 @@ std::array<Vector3d, 3> normalsOf(const Moment& a, const Moment& b) {
   return {a.u.cross(a.v), 0.5 * (a.u.cross(b.v) + b.u.cross(a.v)), b.u.cross(b.v)};
 }
 
-/// normal . from, likewise.
+/// normal . from, in Bernstein form.
 template <class Moment>
 std::array<double, 4> heightsOf(const std::array<Vector3d, 3>& n, const Moment& a,
                                 const Moment& b) {
@@ -27,7 +27,8 @@ std::array<double, 4> heightsOf(const std::array<Vector3d, 3>& n, const Moment& 
           (2 * n[1].dot(b.from) + n[2].dot(a.from)) / 3, n[2].dot(b.from)};
 }
 
-/// Whether all are beyond a bound; with `either`, or all beyond it on the other side.
+/// Whether all heights are above a bound; with `either`, also whether all are below the negative
+/// bound.
 template <std::size_t size>
 bool areBeyond(const std::array<double, size>& heights, double bound, bool either) {
   const auto [least, most] = std::minmax_element(heights.begin(), heights.end());
@@ -72,12 +73,12 @@ bool ShapeStep::staysOutside(const Moment& a, const Moment& b, const Scaled& is)
   const std::array<double, 3> squares{a.u.squaredNorm(), a.u.dot(b.u), b.u.squaredNorm()};
   const double longest = std::max(squares[0], squares[2]),
                furthest = std::sqrt(std::max(a.from.squaredNorm(), b.from.squaredNorm()));
-  // All of it is in a ball about its centre.
+  // The cylinder is in a ball about its centre.
   const double half = 0.5 * (b.from - a.from).norm();
   if ((0.5 * (a.from + b.from)).norm() - half >
       distance + std::hypot(radius, 0.5 * std::sqrt(longest)) + error)
     return true;
-  // Beyond an end: from . u less half the square of u.
+  // Beyond an end: the polynomial is from . u less half the square of u.
   const std::array<double, 3> along{a.from.dot(a.u), 0.5 * (a.from.dot(b.u) + b.from.dot(a.u)),
                                     b.from.dot(b.u)};
   const double needed = std::sqrt(longest) * (distance + error);
@@ -86,7 +87,7 @@ bool ShapeStep::staysOutside(const Moment& a, const Moment& b, const Scaled& is)
     for (int i = 0; i < 3; ++i) beyond[i] = side * along[i] - 0.5 * squares[i];
     if (areBeyond(beyond, needed, false)) return true;
   }
-  // Beyond the mantle: the square of from x u less that of the reach times u.
+  // Beyond the mantle: the polynomial is the square of from x u less that of the reach times u.
   const Vector3d k0 = a.from.cross(a.u), k1 = 0.5 * (a.from.cross(b.u) + b.from.cross(a.u)),
                  k2 = b.from.cross(b.u);
   const auto& [q0, q1, q2] = squares;
@@ -98,14 +99,15 @@ bool ShapeStep::staysOutside(const Moment& a, const Moment& b, const Scaled& is)
   return areBeyond(across, error * (furthest + reach) * longest, false) || staysFar(a, b, is);
 }
 
-/// At half time the point is further from the cylinder than either moves until then: from there a
-/// cylinder comes to any other by turning about its centre, and growing along its axis.
+/// Whether the point, at half time, is further from the cylinder than both can move until the ends
+/// of the part. From its state at half time, the cylinder gets to any other by turning about its
+/// centre and growing along its axis.
 bool ShapeStep::staysFar(const Moment& a, const Moment& b, const Scaled& is) const {
   const Moment middle = between(a, b, 0.5);
   const Vector3d along = middle.u.normalized();
   const double chord =
       std::max((a.u.normalized() - along).norm(), (b.u.normalized() - along).norm());
-  if (!(chord < 1)) return false;  // or one has no direction: only by the ball
+  if (!(chord < 1)) return false;  // also if an axis has no direction; then only the ball decides
   const double moves = 0.5 * (b.from - a.from).norm() + 0.25 * (b.u - a.u).norm() +
                        chord * std::hypot(is.radius, 0.5 * middle.u.norm());
   const double middleDistance =
@@ -137,7 +139,8 @@ std::optional<double> ShapeStep::timeNear(const Point& point, double distance,
   return firstNotPassed(tolerance, passes);
 }
 
-/// The side of a plane on which a body is before the step; of a half-space it is always outside.
+/// The side of a two-sided plane on which a body is before the step. For a half-space, always the
+/// outside.
 double ShapeStep::sideOf(const MovingBody& body) const {
   return m_before.isTwoSided() && distanceAt(before(body.corners[0][0])).distance < 0 ? -1.0 : 1.0;
 }
@@ -163,7 +166,8 @@ std::optional<double> ShapeStep::timeNear(const MovingBody& body, double distanc
         std::sqrt(std::max({n[0].squaredNorm(), n[1].squaredNorm(), n[2].squaredNorm()}));
     double bound = needed * length + error;
     if (mantle > 0) {
-      // It reaches as far as the sine between normal and axis, times the normal's length.
+      // The mantle reaches as far as its radius times the sine of the angle between normal and
+      // axis, times the normal's length.
       const Vector3d start = momentOf(1, from).from - first.from,
                      end = momentOf(1, to).from - last.from;
       const double shortest = 0.5 * (start + end).norm() - 0.5 * (end - start).norm();

@@ -11,21 +11,22 @@
 
 namespace palpate {
 
-/// A convex body that moves in a step: the hull of corners that move linearly, or a right cylinder
-/// whose ends' centres do; and all that is at most a radius from it.
+/// A convex body that moves in a step. It is the hull of corners that move linearly, or a right
+/// cylinder whose end centres move linearly. All points at most a radius from it belong to it, too.
 struct MovingBody {
   std::array<std::span<const Eigen::Vector3d>, 2> corners;  ///< L: before and now; or the ends
   double radius = 0.0;                                      ///< L: of a ball about each point
-  double mantle = 0.0;                                      ///< L: of a cylinder, about its axis
+  double mantle = 0.0;  ///< L: a cylinder's radius about its axis
 };
-/// Of any shape but a plane.
+/// Any shape except a plane.
 MovingBody movingBody(const Shape& before, const Shape& now);
 
-/// Of the step: parts that are not passed are halved down to this share of the tolerance, so that
-/// what bounds lose on them is within it.
+/// Share of the time tolerance down to which parts of the step that are not passed are halved. What
+/// the bounds lose on the smallest parts is then within the tolerance.
 inline constexpr double kShareOfTolerance = 0.25;
 
-/// Where a step that is passed part by part is held up first; none if it is not.
+/// Passes the step part by part, and halves parts that are not passed. Returns the start of the
+/// first part that is not passed at the smallest length; none if the whole step is passed.
 /// passes(from, to): whether nothing happens in that part.
 template <class Passes>
 std::optional<double> firstNotPassed(double tolerance, Passes&& passes) {
@@ -43,38 +44,43 @@ std::optional<double> firstNotPassed(double tolerance, Passes&& passes) {
   return {};
 }
 
-/// A plane or a cylinder that moves in a step, and when points come near to it.
+/// A plane or a cylinder that moves in a step, and when points come near it.
 ///
-/// Of a plane every point moves linearly, as those of a box do, so that its normal is the cross
-/// product of two directions that do. Of a cylinder the ends' centres do, and the radius stays: it
-/// is a right cylinder between them at each time.
+/// Every point of a plane moves linearly, as a box's points do. The plane's normal is therefore the
+/// cross product of two directions that change linearly. A cylinder's end centres move linearly,
+/// and its radius stays. At each time it is the right cylinder between them.
 class ShapeStep {
  public:
   ShapeStep(const Shape& before, const Shape& now) : m_before(before), m_now(now) {}
 
   using Point = std::array<Eigen::Vector3d, 2>;  ///< L: before and now; it moves linearly
 
-  /// When the point, further away before the step, first is at most `distance` from the shape; of a
-  /// plane of two sides from either. Never late, and early by at most the tolerance, or where it
-  /// comes within the distance and that part of its motion and of the points beside it.
+  /// The first time at which the point is at most `distance` from the shape; for a two-sided plane,
+  /// from either side. The point must be further away before the step. Never late. It is early by
+  /// at most the tolerance, or the point is then within `distance` + e. e is the motion of the
+  /// point, and of the shape's points beside it, in a part of the step as long as the tolerance.
   ///
-  /// Source   parts of the step are passed where bounds on polynomials keep the point outside, halved
-  ///          where they do not: of its height over a plane, and over a cylinder's ends and axis,
-  ///          in Bernstein form; beside a cylinder's rim, of how far all can move.
+  /// Source   parts of the step are passed where bounds on polynomials keep the point outside, and
+  ///          halved where they do not. The polynomials, in Bernstein form, are the point's height
+  ///          over a plane, and over a cylinder's ends and axis. Beside a cylinder's rim, the bound
+  ///          is how far the point and the cylinder can move.
   std::optional<double> timeNear(const Point&, double distance, double tolerance) const;
-  /// Of it then; of a plane of two sides on the side from where it came.
+  /// Signed distance of the point at that time; for a two-sided plane, on the side from which the
+  /// point came.
   SignedDistance at(const Point&, double time) const;
-  /// Of a plane, and a body in place of the point: of a plane of two sides from the side on which
-  /// the body was before the step.
+  /// For a plane: the same with a body in place of the point. A two-sided plane counts from the
+  /// side on which the body was before the step.
   std::optional<double> timeNear(const MovingBody&, double distance, double tolerance) const;
-  /// From the body, then. Where several of its points are as near, the middle of them.
+  /// For a plane: the distance from the body at that time. If several points of the body are
+  /// equally near, the result is their middle.
   ShapePairDistance at(const MovingBody&, double time) const;
-  /// Of a plane: whether a point that stays in the box may come so near.
+  /// For a plane: whether a point that stays in the box may come within the distance.
   bool mayComeNear(const Eigen::AlignedBox3d&, double distance) const;
 
  private:
-  /// At a time: the point from a plane's point or a cylinder's centre; two directions in the plane,
-  /// or from one end of the cylinder to the other.
+  /// The point and the shape at one time. from: the point relative to a plane's point or a
+  /// cylinder's centre. u, v: two directions in the plane; or u, the vector from one end of a
+  /// cylinder to the other.
   struct Moment {
     Eigen::Vector3d from, u, v;
   };
