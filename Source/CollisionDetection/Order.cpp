@@ -61,8 +61,7 @@ void orderPairs(Buffer<ElementPair>& pairs, std::size_t firsts, PairOrderScratch
     std::sort(pairs.begin(), pairs.end());
     return;
   }
-  Buffer<std::uint32_t>& next =
-      scratch.places;  // by a: the place of its next pair; at last its end
+  Buffer<std::uint32_t>& next = scratch.places;  // per a: where its next pair goes; at last its end
   next.assign(firsts, 0);
   for (const ElementPair& pair : pairs) ++next[pair.a];
   std::exclusive_scan(next.begin(), next.end(), next.begin(), 0u);

@@ -41,7 +41,8 @@ class SpatialQueries::Source {
   Source();
   virtual ~Source() = default;
 
-  /// A number for the present state of all geometries. 0: their octrees are not up to date.
+  /// A number for the present state of all geometries. 0: the octrees are not up to date, or the
+  /// owner is gone.
   virtual std::uint64_t state() const = 0;
   /// Throws UnknownGeometry.
   virtual SearchableGeometry& at(GeometryId) const = 0;
