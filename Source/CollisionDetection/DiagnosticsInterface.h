@@ -17,8 +17,8 @@
 namespace palpate {
 
 /// Lists all element pairs whose boxes in double overlap when each is inflated by half the
-/// thickness; sorted. This is the reference for the octree's candidate pairs. Self-collision: a <
-/// b, without pairs that share a vertex.
+/// thickness; sorted. This is the reference for the octree's candidate pairs. For self-collision it
+/// lists pairs with a < b that share no vertex.
 void findCandidatesByBruteForce(const MeshPair&, Buffer<ElementPair>& out);
 
 /// Finds the same as a frame for one pair, by testing every feature against every other. overlaps:

@@ -11,9 +11,9 @@
 
 namespace palpate {
 
-/// The two features that hold an impact's closest points, as a key: an edge by its vertices, lower
-/// first, a vertex twice. `self`: the contact is of one mesh with itself, and the features come in
-/// ascending order.
+/// The two features that hold an impact's closest points, as a key. An edge is given by its two
+/// vertices, the lower first, and a vertex by its id twice. self: the contact is of one mesh with
+/// itself, and the two features are in ascending order.
 /// Returns  nothing for the interior of a triangle and for the interiors of two edges: no other
 ///          contact has the same features.
 using ImpactFeatures = std::array<std::uint64_t, 2>;

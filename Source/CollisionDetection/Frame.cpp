@@ -168,7 +168,8 @@ struct Frame::Job {
     if (!job.kept.empty()) job.use(job, job.kept);
   }
 
-  /// Keeps pairs whose boxes overlap at the thickness of the traversal. Turned trees find more.
+  /// Keeps pairs whose boxes overlap at the thickness of the traversal. Only the traversal of
+  /// turned trees finds other pairs as well.
   void keepNearby() {
     if (trees.turned()) keepInWorld(std::max(record->plan.nearby, thickness));
   }

@@ -47,7 +47,7 @@ class Frame {
   std::size_t m_jobCount = 0;
   Buffer<NodePair> m_nodePairs;
   TraversalStack m_stack;
-  std::vector<ContactBuffers*> m_buffers, m_overlaps;  ///< of the pair at hand
+  std::vector<ContactBuffers*> m_buffers, m_overlaps;  ///< of the pair that finish() handles
   ContactBuffers m_impacts;
   StepFacts m_facts;
   OrderScratch m_orderScratch;

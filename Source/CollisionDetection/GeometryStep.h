@@ -69,7 +69,7 @@ class GeometryStep {
   /// Positions are checked while they are copied into one of these that no end uses: three ends
   /// and two incoming arrays.
   std::array<std::shared_ptr<std::vector<Eigen::Vector3d>>, 5> m_bodies;
-  std::optional<Shape> m_spare, m_spareBefore;  ///< placed before anything is committed
+  std::optional<Shape> m_spare, m_spareBefore;  ///< hold new placements until nothing can throw
 };
 
 }  // namespace palpate

@@ -23,9 +23,9 @@ class RigidSearch {
   /// that axis; such a motion exists between any two placements (Chasles). Too large by a few
   /// rounding errors at most.
   ///
-  /// Source   a vertex r from the axis, turned by the angle t, is furthest from its chord at half
-  ///          time: r (1 - cos(t / 2)); its chord across the axis is 2 r sin(t / 2), so that is
-  ///          half the chord times tan(t / 4).
+  /// Source   Let a vertex at the distance r from the axis turn by the angle t. It is furthest from
+  ///          its chord at half time, by r (1 - cos(t / 2)). The chord across the axis is
+  ///          2 r sin(t / 2), so that this distance is half the chord times tan(t / 4).
   double arcDeviation(const Geometry&);
 
  private:

@@ -20,8 +20,8 @@ FeatureLists drawFeatures(const MeshPair&, const CollisionPair&, const AuditSett
                           std::uint64_t frame);
 
 /// Compares `data` with brute force for a drawn sample of features, and appends every contact that
-/// only one of the two has. For Method::Auto it appends missing contacts only, and with
-/// earliestTimeOnly impacts before the reported time.
+/// is missing, invented or different in `data`. For Method::Auto it appends missing contacts only,
+/// and with earliestTimeOnly impacts before the reported time.
 void audit(const MeshPair&, const CollisionPair&, const CollisionData& data, const AuditSettings&,
            std::uint64_t frame, std::vector<AuditFailure>& out);
 

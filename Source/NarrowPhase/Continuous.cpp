@@ -154,7 +154,7 @@ class ContactFinder {
   const TimeOfImpactSettings m_settings;
 };
 
-/// The same for pairs for which proximity at the step's end does not suffice.
+/// Does the same, but only for pairs for which proximity at the step's end does not suffice.
 class FastImpactFinder {
  public:
   FastImpactFinder(const MeshPair& pair, ContactBuffers& out)

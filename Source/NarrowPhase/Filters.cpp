@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 /// because their results differ between processors.
 double angleBetween(const Vector3d& u, const Vector3d& v) {
   const double y = (u - v).norm(), x = (u + v).norm();
-  double t = y / (x + std::sqrt(x * x + y * y));  // the tangent of a quarter
+  double t = y / (x + std::sqrt(x * x + y * y));  // the tangent of a quarter of the angle
   for (int i = 0; i < 3; ++i) t /= 1.0 + std::sqrt(1.0 + t * t);
   double series = 0.0;
   for (int k = 13; k > 0; k -= 2) series = 1.0 / k - t * t * series;
@@ -33,8 +33,8 @@ class Surface {
   /// it is below all of the edge's triangles, at any other edge if it is below one of them.
   ///
   /// Source   Bærentzen and Aanæs, Signed distance computation using the angle weighted pseudonormal,
-  ///          IEEE TVCG 11 (2005). Difference: an edge by its two planes, which is exact too where
-  ///          the direction is not that of a closest point.
+  ///          IEEE TVCG 11 (2005). Difference: an edge is tested by its two planes. This is exact
+  ///          even where the direction is not that of a closest point.
   bool isBelow(const MeshFeature& feature, const Vector3d& direction) const {
     switch (feature.kind) {
       case MeshFeature::Kind::Vertex: {

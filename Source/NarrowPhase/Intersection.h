@@ -15,16 +15,16 @@ namespace palpate {
 /// Touching features are reported once, by the pair of triangles that own them. Other contacts are
 /// reported by several triangle pairs, each time with the same bits.
 ///
-/// A vertex behind the triangle, where the winding normal points to the front, has a negative
-/// distance. The normal of a vertex-triangle contact is the winding normal if the closest point is
-/// in the triangle's interior or the vertex touches the triangle. If the closest point is on an
-/// edge or a corner, the normal is along the line through both points, on the winding normal's
-/// side. For a triangle without area, and for touching parallel edges, it is the axis that
-/// <palpate/Distance.h> defines. Distances of edges have no sign.
+/// The winding normal points to the triangle's front. A vertex behind the triangle has a negative
+/// distance; distances of edges have no sign. The normal of a vertex-triangle contact is the
+/// winding normal if the closest point is in the triangle's interior or the vertex touches the
+/// triangle. If the closest point is on an edge or a corner, the normal is along the line through
+/// both points, on the winding normal's side. For a triangle without area, and for touching
+/// parallel edges, it is the axis that <palpate/Distance.h> defines.
 ///
 /// Self-collision: two triangles with common vertices intersect in three cases:
 /// (1) A vertex touches the other triangle and is not a corner of it.
-/// (2) An edge of each touch and have no common vertex.
+/// (2) An edge of one touches an edge of the other, and these have no common vertex.
 /// (3) An edge crosses the other triangle's interior.
 /// Case 3 alone gives no contact: no two edges of one triangle cross the other, and features that
 /// touch at the common vertex are excluded. The neighbouring triangle at that edge gives the

@@ -96,9 +96,9 @@ struct ContactBuffers : ShapeContactBuffers {
   Buffer<VertexTriangleContact> vertexTriangle, triangleVertex;
   Buffer<EdgeEdgeContact> edgeEdge;
   Buffer<ElementPair> intersectingTriangles;
-  FeaturePairs features;                  ///< scratch: of the batch at hand
-  Buffer<ElementPair> part;               ///< scratch: some of the batch at hand
-  Buffer<PossibleIntersection> possible;  ///< scratch: of the batch at hand
+  FeaturePairs features;                  ///< scratch: of the present batch
+  Buffer<ElementPair> part;               ///< scratch: some pairs of the present batch
+  Buffer<PossibleIntersection> possible;  ///< scratch: of the present batch
   StepFacts facts;
   std::size_t validityPairs = 0;  ///< triangle pairs tested for Validity::startedApart
   void clear();

@@ -22,8 +22,8 @@ using Eigen::Vector3d;
 /// Tests vertices of one mesh against triangles of the other mesh, or of the same one.
 class VertexTriangleFinder {
  public:
-  /// Contacts of two vertices that this finder may report: all, those whose contact names the lower
-  /// vertex as its vertex, or none.
+  /// Contacts of a vertex and a corner that this finder may report: all, only those whose vertex is
+  /// lower than the corner's vertex, or none.
   enum class Corners { All, LowerVertexOnly, None };
 
   VertexTriangleFinder(const MeshPair& pair, bool ofSecond, Corners corners, ContactBuffers& out)

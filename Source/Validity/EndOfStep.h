@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// Whether triangles intersect at a step's end, as far as its contacts tell.
+/// Whether triangles intersect at a step's end, as far as its contacts determine this.
 struct EndOfStep {
   std::optional<ElementPair> intersecting;  ///< a pair that does
   /// If there is no such pair: whether it is certain that no triangles intersect at the step's end,

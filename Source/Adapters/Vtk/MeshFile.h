@@ -38,7 +38,7 @@ class FileText {
   std::string_view take(std::size_t bytes);
   double number(NumberType type = typeNamed("double"));
   std::vector<double> numbers(NumberType type, std::size_t count);
-  std::size_t count() { return toCount(toNumber(word()), left()); }  ///< at most bytes left
+  std::size_t count() { return toCount(toNumber(word()), left()); }  ///< at most the bytes left
 
  private:
   std::string_view m_rest;

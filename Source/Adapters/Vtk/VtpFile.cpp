@@ -68,7 +68,7 @@ class Reader {
  public:
   explicit Reader(std::string_view content)
       : m_xml(content.substr(0, content.find("<AppendedData"))), m_most(1000 * content.size()) {
-    // Appended data need not be XML: they are what follows "_" behind their tag.
+    // Appended data need not be XML. They follow the "_" after their tag.
     const std::string_view appended = content.substr(m_xml.size());
     const std::size_t start = appended.find('_', appended.find('>'));
     if (start != appended.npos) m_appended = appended.substr(start + 1);

@@ -349,7 +349,7 @@ void Window::Implementation::drawContacts() const {
   if (untrusted) wrong.show(renderer, ball, 0.83, 0.83, 1);
 }
 
-/// Aims the camera from the front, somewhat to the right and above, as near as all is in view.
+/// Aims the camera from the front, somewhat to the right and above, with everything in view.
 void Window::Implementation::aim() {
   const Vector3d focus = box.center(), position = focus + Vector3d(0.5, -1.0, 0.6);
   vtkCamera* camera = renderer->GetActiveCamera();
