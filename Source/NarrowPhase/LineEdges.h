@@ -29,8 +29,8 @@ std::optional<EdgesNearby> measureEdges(const MeshPair&, std::uint32_t edgeA, st
 /// Distinct: several nearby edge pairs may hold the same two features. A contact is reported only
 /// if all of these pairs have their closest points on the two features, and only by the lowest
 /// pair. Otherwise some pair is at least as near elsewhere, and reports its contact there. With a
-/// triangle mesh, a contact is reported only where the closest point on the line is not a vertex,
-/// because vertices of lines are tested against whole triangles.
+/// triangle mesh, a contact is not reported where the closest point on the line is a vertex:
+/// vertices of lines are tested against whole triangles.
 /// Source   Take one point on each of two edges. If the distance does not decrease along either
 ///          edge alone, the edges are nowhere nearer: the squared distance is convex in both
 ///          weights. Vertices that hold a contact are therefore local minima over all their edges.
