@@ -18,7 +18,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// What a vertex of a contact has.
 struct VertexMotion {
   Vector3d position, displacement;  ///< L; at the contact's time, and over the step
   double radius;                    ///< L
@@ -54,7 +53,7 @@ Vector3d solve(const Matrix3d& matrix, const Vector3d& right) {
   return Vector3d(normal.dot(right), w.cross(u).dot(right), u.cross(v).dot(right)) / u.dot(normal);
 }
 
-/// Of the shape's point that is at `point` at the time.
+/// The displacement over the step of the shape's point that is at `point` at this time.
 Vector3d displacementAt(const ShapeMotion& motion, const Vector3d& point, double time) {
   const Matrix3d rotation = (1 - time) * motion.rotationBefore + time * motion.rotation;
   const Vector3d translation = (1 - time) * motion.translationBefore + time * motion.translation;
@@ -133,7 +132,8 @@ Tangents tangentsOf(const Vector3d& normal) {
     const double scale = 1 / (1 + z);
     xx = x * x * scale, xy = x * y * scale, yy = y * y * scale;
   } else {
-    // 1 + z = (x² + y²) / (1 - z), with x and y over the larger one so that no square vanishes.
+    // 1 + z = (x² + y²) / (1 - z). x and y are divided by the larger one, so that no square
+    // underflows.
     const double most = std::max(std::abs(x), std::abs(y));
     const double u = most > 0 ? x / most : 1, v = most > 0 ? y / most : 0;
     const double scale = (1 - z) / (u * u + v * v);
@@ -146,13 +146,13 @@ Tangents tangentsOf(const Vector3d& normal, const Tangents& previous) {
   const StandardFloatingPoint standard;
   const Vector3d previousNormal = previous[0].cross(previous[1]);
   if (!(previousNormal.squaredNorm() > 0.5)) return tangentsOf(normal);  // NaN as well
-  // To a vector perpendicular to the previous normal the turn does what the reflection does that
-  // swaps the previous normal with the opposite of the normal.
+  // For vectors perpendicular to the previous normal, the rotation from the previous normal to the
+  // normal equals the reflection that swaps the previous normal with the negated normal.
   const Vector3d middle = previousNormal + normal;
   const double lengthSquared = middle.squaredNorm();
   Vector3d first = previous[0];
   if (lengthSquared > kOppositeSquare) first -= 2 * middle.dot(first) / lengthSquared * middle;
-  first -= normal.dot(first) * normal;  // what rounding left
+  first -= normal.dot(first) * normal;  // removes the rounding error along the normal
   first /= first.norm();
   return {first, normal.cross(first)};
 }

@@ -12,19 +12,20 @@
 #include <cstdint>
 #include <vector>
 
-// What the frame needs of the module Diagnostics, which includes this module and defines these
-// functions. Nothing else of Diagnostics is known here.
+// Functions that this module calls and the module Diagnostics defines. Diagnostics includes this
+// module; nothing else in this module depends on Diagnostics.
 namespace palpate {
 
-/// All element pairs whose boxes in double, inflated by half the thickness each, overlap; sorted:
-/// the reference for the octree's candidate pairs. Self-collision: a < b, sharing no vertex.
+/// Lists all element pairs whose boxes in double overlap when each is inflated by half the
+/// thickness; sorted. This is the reference for the octree's candidate pairs. For self-collision it
+/// lists pairs with a < b that share no vertex.
 void findCandidatesByBruteForce(const MeshPair&, Buffer<ElementPair>& out);
 
-/// What a frame finds for one pair, from every feature against every other. overlaps: what Auto
-/// takes from Intersection.
+/// Finds the same as a frame for one pair, by testing every feature against every other. overlaps:
+/// receives the contacts that Auto takes from Intersection.
 void detectPairByBruteForce(const PairRecord&, ContactBuffers& contacts, ContactBuffers& overlaps);
 
-/// What a detection would be given now.
+/// The complete input of a detection at this moment.
 CollisionProblem problemOf(const Settings&, const GeometryTable&, const PairTable&);
 
 /// The audit of one OctreeBasedCD over its life.
@@ -34,8 +35,8 @@ struct AuditRecord {
   int files = 0;                       ///< written so far
 };
 
-/// Compares the answers of a frame with brute force for a sample of features, as the settings ask.
-/// A file that cannot be written is named in the failures.
+/// Compares the results of a frame with brute force for the sample of features that Settings::audit
+/// defines. If a file cannot be written, the failures name it.
 void auditFrame(const Settings&, const GeometryTable&, const PairTable&, AuditRecord&);
 
 }  // namespace palpate

@@ -11,9 +11,9 @@
 
 namespace palpate {
 
-/// The two features that hold an impact's closest points, as a key: an edge by its vertices, lower
-/// first, a vertex twice. `self`: the contact is of one mesh with itself, and the features come in
-/// ascending order.
+/// The two features that hold an impact's closest points, as a key. An edge is given by its two
+/// vertices, the lower first, and a vertex by its id twice. self: the contact is of one mesh with
+/// itself, and the two features are in ascending order.
 /// Returns  nothing for the interior of a triangle and for the interiors of two edges: no other
 ///          contact has the same features.
 using ImpactFeatures = std::array<std::uint64_t, 2>;
@@ -21,26 +21,26 @@ std::optional<ImpactFeatures> sharedFeatures(const VertexTriangleContact&, bool 
                                              bool self);
 std::optional<ImpactFeatures> sharedFeatures(const EdgeEdgeContact&, bool self);
 
-/// f(list, number) of the three lists of contacts between meshes.
+/// Calls f(list, number) for the three lists of contacts between meshes.
 template <class Lists, class F>
 void forEachImpactList(Lists&& lists, F&& f) {
   f(lists.vertexTriangle, 0), f(lists.triangleVertex, 1), f(lists.edgeEdge, 2);
 }
 
-/// Contacts::Distinct of impacts: of all impacts between the same two features the earliest stays;
-/// of equally early ones the first of the lists vertexTriangle, triangleVertex and edgeEdge, and in
-/// one list the first.
+/// Contacts::Distinct for impacts: keeps the earliest of all impacts between the same two features.
+/// Of equally early impacts it keeps the first by the order of the lists vertexTriangle,
+/// triangleVertex and edgeEdge, and within a list by the order there.
 ///
-/// Laws     (1) a dropped contact has the same features as the contact that stands for it, which is
+/// Laws     (1) A dropped contact has the same features as the contact that is kept for it, which is
 ///          not later. (2) So each vertex, edge and triangle interior keeps the earliest time at
-///          which it holds a closest point, and the earliest time of all stays. (3) keeping twice
-///          is keeping once.
+///          which it holds a closest point, and the earliest time of all is kept. (3) A second call
+///          changes nothing.
 /// Cost     n log n in the number of contacts with shared features.
 class FirstImpacts {
  public:
-  /// Of contents that orderContacts() has just filled with this scratch. Contacts of its preferred
-  /// buffers stay, and so do those whose time of impact is at least `end`; no contact is dropped
-  /// for one of these.
+  /// Call after orderContacts() has filled the contents with this scratch. Contacts from its
+  /// preferred buffers are kept, and so are contacts with a time of impact of at least `end`. No
+  /// contact is dropped because of one of these.
   void keep(bool self, double end, const OrderScratch&, CollisionData::Contents&);
 
  private:

@@ -30,17 +30,17 @@ namespace {
 /// Node pairs and jobs for each collision pair, where there is more than one thread.
 constexpr std::size_t kNodePairsWanted = 256;
 constexpr std::size_t kJobsPerPair = 32;
-/// Below this many triangles handing out parts of a pair costs more than it saves.
+/// Below this many triangles, splitting a pair among threads costs more than it saves.
 constexpr std::size_t kSharedSize = 8192;
 
-/// Whether neighbours in a mesh may be told apart before they are found: nothing but their touching
-/// is asked for, at any time of the step.
+/// Whether the traversal may skip neighbours that UnfoldedStars proves not to touch. It may if the
+/// method reports nothing but touching features: Continuous, without a thickness.
 bool asksForTouching(const PairRecord& record) {
   return record.a == record.b && record.plan.method == Method::Continuous &&
          record.a->mesh.topology.hasFaces() && record.meshes().reach() == 0.0;
 }
 
-/// thickness: L, of the boxes. unfolded: triangles of which neighbours need no test, or null.
+/// thickness: L, of the boxes. unfolded: UnfoldedStars::triangles(), or null.
 TreePair treesOf(const PairRecord& record, bool adjacentPairs, const Triangle* unfolded,
                  double thickness) {
   const GeometryOctree &a = record.a->tree, &b = record.b->tree;
@@ -85,7 +85,7 @@ std::size_t sizeOf(const CollisionData::Contents& contents) {
   return size;
 }
 
-/// ofIntersection: how many are Intersection's, of the step's end.
+/// ofIntersection: the number of contacts that Method::Intersection found at the step's end.
 void countContacts(const PairPlan& plan, std::size_t ofIntersection,
                    CollisionData::Contents& contents) {
   std::size_t atImpact = 0;
@@ -100,7 +100,7 @@ void countContacts(const PairPlan& plan, std::size_t ofIntersection,
   contents.validity.atEnd = sizeOf(contents) - contents.validity.atImpact;
 }
 
-/// PairSettings::earliestTimeOnly: of all of a pair's contacts the time.
+/// PairSettings::earliestTimeOnly: replaces a pair's contacts by the earliest of their times.
 void takeEarliest(PairRecord& record, ContactBuffers& contacts) {
   forEachTimed(contacts, [&](auto& list) {
     for (const auto& contact : list)
@@ -116,7 +116,7 @@ bool sharesVertex(const Triangle& s, const Triangle& t) {
 
 }  // namespace
 
-/// Part of one pair's traversal, with what it found.
+/// A part of one pair's traversal, and its results.
 struct Frame::Job {
   using Use = void (*)(Job&, std::span<const ElementPair>);
 
@@ -124,36 +124,36 @@ struct Frame::Job {
   TreePair trees;
   std::size_t begin, end;  ///< of m_nodePairs
   FloatPair floats;
-  double thickness;  ///< L: of boxes
+  double thickness;  ///< L: of the boxes that the pair's method compares
   TraversalStack stack;
   PointQueryStack queries;
   Buffer<std::uint32_t> elements;
   PairSink sink;
   Use use;
   Guarded* guarded;               ///< of forEach()
-  std::atomic<double>* earliest;  ///< of all jobs of the pair, where only that is asked for
-  ElementPair* place;             ///< of collect(): where what was found goes
+  std::atomic<double>* earliest;  ///< shared by all jobs of the pair, for earliestTimeOnly
+  ElementPair* place;             ///< of collect(): where the job's candidates are copied
   bool keepCandidates;
-  bool nearby;  ///< boxes overlap at the thickness of the traversal, if not at their own
+  bool nearby;  ///< some boxes overlap at the thickness of the traversal
   ContactBuffers contacts;
   ContactBuffers overlaps;  ///< Auto: Intersection's, where the step starts intersecting
-  bool overlapsMissed;      ///< of batches before any was seen to start so
+  bool overlapsMissed;      ///< findOverlaps() did not run for every batch
   Buffer<ElementPair> candidates;
-  Buffer<ElementPair> kept;  ///< of the batch at hand, by the filters so far
+  Buffer<ElementPair> kept;  ///< pairs of the present batch that passed the filters so far
   double milliseconds = 0, narrowMilliseconds = 0;
 
-  /// Batches go to `use`; without, they stay in the sink.
+  /// Batches are passed to `use`. If it is null, they stay in the sink.
   void start(Use newUse) {
     use = newUse;
     sink.start(use ? &receive : nullptr, this);
   }
 
-  /// Not all that the traversal finds is a candidate.
+  /// Whether the traversal may find pairs that are no candidates.
   bool isFiltered() const { return record->anyDisabled() || trees.turned(); }
-  /// The boxes of the traversal may be larger than those of the pair's method.
+  /// Whether the boxes of the traversal may be larger than those of the pair's method.
   bool widerBoxes() const { return record->widerBoxes() || record->plan.nearby > 0.0; }
 
-  /// A batch of the traversal, of which `use` takes the candidates.
+  /// Receives a batch of the traversal, and passes its candidates to `use`.
   static void receive(void* context, std::span<const ElementPair> pairs) {
     Job& job = *static_cast<Job*>(context);
     if (!job.widerBoxes() && !job.isFiltered()) {
@@ -168,7 +168,8 @@ struct Frame::Job {
     if (!job.kept.empty()) job.use(job, job.kept);
   }
 
-  /// Keeps pairs whose boxes overlap at the thickness of the traversal. Turned trees find more.
+  /// Keeps pairs whose boxes overlap at the thickness of the traversal. Only the traversal of
+  /// turned trees finds other pairs as well.
   void keepNearby() {
     if (trees.turned()) keepInWorld(std::max(record->plan.nearby, thickness));
   }
@@ -177,7 +178,8 @@ struct Frame::Job {
     const MeshTopology &a = record->a->mesh.topology, &b = record->b->mesh.topology;
     std::erase_if(kept, [&](const ElementPair& p) { return !a.isOn(p.a) || !b.isOn(p.b); });
   }
-  /// Keeps pairs whose boxes, as the pair's method has them, overlap at their own thickness.
+  /// Keeps pairs whose boxes overlap at the pair's own thickness. The boxes are those of the pair's
+  /// method: at the step's end, or over the whole step.
   void keepWithinThickness() {
     if (!trees.turned()) {
       if (widerBoxes())
@@ -223,7 +225,7 @@ struct Frame::Job {
         job.candidates.push_back(pair);
   }
 
-  /// The whole of a pair with a shape.
+  /// Detects the contacts of a pair with a shape, without a traversal.
   void detectShape() {
     const MeshPair meshes = record->meshes();
     if (meshes.isOfShapes()) {
@@ -240,7 +242,7 @@ struct Frame::Job {
     narrowMilliseconds += watch.lap();
   }
 
-  /// Auto: what intersects at the step's end.
+  /// Auto: finds intersections at the step's end.
   static void findOverlaps(Job& job, std::span<const ElementPair> pairs) {
     findIntersections(job.record->meshes(), pairs, job.overlaps);
   }
@@ -386,7 +388,8 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
     statistics.exactDecisions += job.contacts.exactDecisions + job.overlaps.exactDecisions;
     statistics.validityPairs += job.overlaps.validityPairs;
   }
-  // Threads work on both stages at once: the wall clock is shared out as their work was.
+  // Threads work on both stages at once. The wall-clock time is therefore divided in proportion to
+  // the work of each stage.
   const double wall = watch.lap();
   statistics.milliseconds.narrowPhase = all > 0 ? wall * narrow / all : 0;
   statistics.milliseconds.pairs = wall - statistics.milliseconds.narrowPhase;
@@ -411,7 +414,8 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
   statistics.milliseconds.order = watch.lap();
 }
 
-/// Most steps that start intersecting are known to before, or by their first batch.
+/// Repeats jobs in which some batches ran before the step was known to start intersecting. This is
+/// rare: most such steps are known before, or from their first batch.
 void Frame::findMissedOverlaps(const Threads& threads) {
   const auto missed = [](const Job& job) {
     return job.overlapsMissed && job.record->plan.overlaps && job.record->plan.startsIntersecting;
@@ -463,7 +467,7 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
                       m_facts, nearby, record.meshes(), contents, m_impacts);
   statistics.exactDecisions += m_impacts.exactDecisions;
   statistics.validityPairs += m_impacts.validityPairs;
-  // Not before trust has looked at every triangle that an impact names.
+  // After trust.finish(), which tests the triangles around every impact.
   if (record.pair.settings.contacts == Contacts::Distinct &&
       (record.plan.step.impacts || record.plan.method == Method::Continuous))
     m_firstImpacts.keep(record.a == record.b,

@@ -16,22 +16,22 @@
 
 namespace palpate {
 
-/// The pairs' way through a frame: octrees to candidates to contacts. Its scratch remembers its
-/// peak.
+/// Takes the pairs through a frame: from octrees to candidates to contacts. Its scratch remembers
+/// its peak.
 class Frame {
  public:
   Frame();
   ~Frame();
 
-  /// Candidates of each pair, unsorted, into its record.
+  /// Writes the candidates of each pair, unsorted, to its record.
   void collect(std::span<PairRecord* const>, const Threads&, FrameStatistics&);
   using BatchFunction = void (*)(void* context, const CollisionPair&, std::span<const ElementPair>);
-  /// Candidates of each pair to a function, batch by batch, never two at once.
+  /// Passes the candidates of each pair to a function, batch by batch, one call at a time.
   void forEach(std::span<PairRecord* const>, const Threads&, BatchFunction, void* context);
-  /// Contacts of each pair, sorted, into PairRecord::next; its candidates too if they are to be
-  /// kept.
+  /// Writes the contacts of each pair, sorted, to PairRecord::next. With Settings::keepCandidates
+  /// it also writes the candidates to the record.
   void detect(std::span<PairRecord* const>, const Settings&, const Threads&, FrameStatistics&);
-  /// The same answers from every feature against every other.
+  /// Writes the same results, found by testing every feature against every other.
   void detectByBruteForce(std::span<PairRecord* const>, const Settings&, FrameStatistics&);
 
  private:
@@ -47,7 +47,7 @@ class Frame {
   std::size_t m_jobCount = 0;
   Buffer<NodePair> m_nodePairs;
   TraversalStack m_stack;
-  std::vector<ContactBuffers*> m_buffers, m_overlaps;  ///< of the pair at hand
+  std::vector<ContactBuffers*> m_buffers, m_overlaps;  ///< of the pair that finish() handles
   ContactBuffers m_impacts;
   StepFacts m_facts;
   OrderScratch m_orderScratch;

@@ -22,16 +22,16 @@ struct Geometry;
 /// How a geometry moves in its step.
 class GeometryMotion {
  public:
-  /// Brings what follows up to date.
+  /// Updates range(), correction() and arcDeviation().
   void update(const Geometry&);
-  /// Takes the motion of the step's positions, measured while they were copied.
+  /// Stores the motion in the step, which was measured while the positions were copied.
   void take(const TriangleMesh&, const MotionRange&);
-  /// Whether it pays to measure motion while positions are copied: the step before asked for it.
+  /// Whether motion should be measured while positions are copied: the step before needed it.
   bool isWanted() const { return m_wasUsed; }
   void advance() { m_wasUsed = std::exchange(m_isUsed, false); }
 
   const MotionRange& range() const { return m_range; }  ///< from before to now
-  /// From the end that the last detection saw to the start of this step.
+  /// From the end of the last detection's step to the start of this step.
   const MotionRange& correction() const { return m_correction; }
   double arcDeviation() const { return m_arcDeviation; }  ///< L
 
@@ -51,15 +51,15 @@ struct Geometry : SearchableGeometry {
 
   CollisionFilter filter;
   GeometryStep step;          ///< writes the positions of both ends
-  double smallestHeight = 0;  ///< L: of a triangle with area, when the topology was set
+  double smallestHeight = 0;  ///< L: of all triangles with area, in the shape at rest
   GeometryMotion motion;
 
-  /// For the choice of a method: extent 0 before the first update of the octree.
+  /// The data for the choice of a method. extent is 0 before the first update of the octree.
   GeometryInStep inStep() const;
   bool meets(const Geometry& other) const {
     return (filter.groups & other.filter.mask) && (other.filter.groups & filter.mask);
   }
-  /// All that answers about it depend on.
+  /// The revisions on which all results for the geometry depend.
   std::array<Revision, 7> state() const {
     return {revisions.topology,
             revisions.enabled,

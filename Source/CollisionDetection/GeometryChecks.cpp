@@ -14,8 +14,8 @@ namespace palpate {
 
 namespace {
 
-constexpr std::size_t kCopyGrain = 16384, kPiece = 512;  ///< what the nearest cache holds
-// Ids are 32 bits, and the highest bit of octree node numbers is taken.
+constexpr std::size_t kCopyGrain = 16384, kPiece = 512;  ///< kPiece fits in the nearest cache
+// Ids have 32 bits, and the highest bit of octree node numbers is in use.
 constexpr std::size_t kMostElements = std::size_t{1} << 28;
 constexpr std::size_t kMostTetrahedra = kMostElements / 4;  // of four faces each
 

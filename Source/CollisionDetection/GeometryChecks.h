@@ -9,14 +9,15 @@
 
 namespace palpate {
 
-// What users hand in: each throws what is wrong with it.
+// Checks of the user's input. Each function throws an Error that describes the fault.
 
-/// Copied to `out` while checked. which: " before", " now" or nothing, for the message. moved: from
-/// `before`, if that is given, while they are at hand; half of what reading both again costs.
+/// Copies the positions to `out` while checking them. which: " before", " now" or nothing, for the
+/// message. If `before` is given, `moved` receives the motion from there; this costs half as much
+/// as reading both arrays again.
 void checkPositions(GeometryId, std::span<const Eigen::Vector3d>, Eigen::Vector3d* out,
                     const char* which, const Threads&, const Eigen::Vector3d* before = nullptr,
                     MotionRange* moved = nullptr);
-/// Positions of a new topology, copied.
+/// Returns a copy of the positions of a new topology.
 std::vector<Eigen::Vector3d> checkedRest(GeometryId, std::span<const Eigen::Vector3d>);
 void checkCounts(GeometryId, std::span<const Eigen::Vector3d>, std::span<const Triangle>,
                  GeometryKind);
@@ -25,7 +26,7 @@ TetrahedralTopology checkedTopology(GeometryId, std::span<const Eigen::Vector3d>
 void checkRadii(GeometryId, std::span<const double>);
 void checkOnePerVertex(GeometryId, std::span<const Eigen::Vector3d>, std::span<const double> radii);
 void checkPositionCount(const Geometry&, std::size_t count);
-/// Of positions in a body's frame.
+/// Checks that positions in a body's frame are small enough for setTransform().
 void checkPlaceable(GeometryId, std::span<const Eigen::Vector3d> body, ErrorCode);
 
 }  // namespace palpate

@@ -10,7 +10,8 @@ std::array<Revision, 4> ends(const Positions& from, const Positions& to) {
   return {from.bodyRevision(), from.transformRevision(), to.bodyRevision(), to.transformRevision()};
 }
 
-/// L: along the longest axis; of a body that may be turned, along any.
+/// L: an upper bound of the extent along any axis of the world. A placed body may be turned, so the
+/// longest side of its box is doubled.
 double extentOf(const Geometry& geometry) {
   if (geometry.tree.octree().size() == 0) return 0.0;
   const FloatBox box = geometry.tree.octree().blocks()[0].box(0);

@@ -38,7 +38,7 @@ Positions::Body GeometryStep::checkedBody(std::span<const Eigen::Vector3d> posit
 }
 
 void GeometryStep::setBody(TriangleMesh& mesh, Positions& end, Positions::Body body) noexcept {
-  // The ends often share one body, which is compared once.
+  // The ends often share one body; it is compared only once.
   const Positions* last = nullptr;
   for (const Positions* other : {&std::as_const(end), &std::as_const(mesh.now),
                                  &std::as_const(m_detected), &std::as_const(mesh.before)}) {
@@ -114,7 +114,7 @@ void GeometryStep::setTransform(TriangleMesh& mesh, PlacedShape* shape,
 }
 
 void GeometryStep::advance(TriangleMesh& mesh, PlacedShape* shape) noexcept {
-  // The shapes are of one body: assigning one to another keeps the memory.
+  // Both are placements of one shape, so that the assignment reuses the memory.
   if (shape && !mesh.before.isSameAs(mesh.now)) shape->before = shape->now;
   mesh.before = mesh.now;
   m_isNew = m_bodyGiven = m_transformGiven = false;

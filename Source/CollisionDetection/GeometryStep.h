@@ -48,7 +48,7 @@ class GeometryStep {
   /// The end `now` becomes `before`.
   void advance(TriangleMesh&, PlacedShape* shape) noexcept;
 
-  /// A detection has seen the end `now`.
+  /// A detection has used the end `now`.
   void noteDetection(const TriangleMesh& mesh) noexcept { m_detected = mesh.now; }
   /// The end `now` of the last detection; a solver may have corrected it since.
   const Positions& detected() const { return m_detected; }
@@ -64,12 +64,12 @@ class GeometryStep {
   GeometryId m_id;
   Positions m_detected;
   bool m_isNew = true;
-  bool m_bodyGiven = false, m_transformGiven = false;  ///< of `before`, in this step
+  bool m_bodyGiven = false, m_transformGiven = false;  ///< `before` was given in this step
   RevisionCounter m_revisions;
   /// Positions are checked while they are copied into one of these that no end uses: three ends
   /// and two incoming arrays.
   std::array<std::shared_ptr<std::vector<Eigen::Vector3d>>, 5> m_bodies;
-  std::optional<Shape> m_spare, m_spareBefore;  ///< placed before anything is committed
+  std::optional<Shape> m_spare, m_spareBefore;  ///< hold new placements until nothing can throw
 };
 
 }  // namespace palpate

@@ -12,13 +12,14 @@ namespace palpate {
 
 namespace {
 
-/// Below this many triangles a geometry is updated by one thread, beside others.
+/// Below this many triangles one thread updates a geometry, beside threads that update others.
 constexpr std::size_t kSmall = 16384;
-/// Refitting fewer triangles in all, cores take longer to hand over data than to compute it.
+/// If fewer triangles than this are updated in all, one thread updates all geometries: cores take
+/// longer to hand over the data than to compute them.
 constexpr std::size_t kSmallRefit = 24576;
-/// In the body's frame, so that it does not depend on where the body is.
 PlacedShape* shapeOf(Geometry& geometry) { return geometry.shape ? &*geometry.shape : nullptr; }
 
+/// Computed in the body's frame, so that it does not depend on the transform.
 double smallestHeight(const TriangleMesh& mesh) {
   double smallest = std::numeric_limits<double>::infinity();
   for (const auto& [i, j, k] : mesh.topology.triangles) {
@@ -54,7 +55,7 @@ std::unique_ptr<Geometry> GeometryTable::make(std::vector<Eigen::Vector3d> rest,
 }
 
 GeometryId GeometryTable::add(std::unique_ptr<Geometry> geometry) {
-  if (m_changed.capacity() == m_geometries.size())  // so that no frame needs more
+  if (m_changed.capacity() == m_geometries.size())  // so that no frame allocates
     m_changed.reserve(2 * m_geometries.size() + 1);
   m_geometries.push_back(std::move(geometry));
   ++m_nextId;
@@ -241,8 +242,8 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   for (const auto& geometry : m_geometries)
     if (!geometry->tree.isCurrent(geometry->mesh, geometry->revisions.topology, scale))
       m_changed.push_back(geometry.get());
-  // Side by side, the largest first, and a large one's work is shared too: what one does alone is
-  // hidden by another.
+  // Geometries are updated in parallel, the largest first, and large ones use several threads each.
+  // The serial parts of one update thus run beside the work on other geometries.
   const auto size = [](const Geometry* geometry) {
     return geometry->mesh.topology.triangles.size();
   };

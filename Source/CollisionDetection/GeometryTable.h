@@ -15,7 +15,7 @@
 
 namespace palpate {
 
-/// Geometries by id, with the checks of what users hand in.
+/// Geometries by id. Checks the user's input.
 class GeometryTable {
  public:
   /// radii: none, one for all, or as many as positions.
@@ -40,16 +40,16 @@ class GeometryTable {
                     const RigidTransform& now);
   void advance() noexcept;
   std::uint64_t stepNumber() const { return m_stepNumber; }  ///< counts advance()
-  /// Names one state of all positions, transforms, elements and shapes; not 0.
+  /// A number for the present state of all positions, transforms, elements and shapes; not 0.
   std::uint64_t state() const { return m_state; }
 
   Geometry* find(GeometryId) const;  ///< null if there is none
   Geometry& at(GeometryId) const;    ///< throws UnknownGeometry
   std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }
 
-  /// Brings octrees up to the positions now, or to the whole step where that is wanted.
+  /// Updates the octrees to the positions now, or to the whole step (GeometryOctree::setSwept()).
   void updateOctrees(const OctreeSettings&, const Threads&);
-  bool updatedAlone() const { return m_updatedAlone; }  ///< by one thread, which has the data
+  bool updatedAlone() const { return m_updatedAlone; }  ///< by one thread, whose cache has the data
 
   GeometryId nextId() const;  ///< of what is added next; throws if there are no more
 

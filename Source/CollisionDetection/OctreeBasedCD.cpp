@@ -63,12 +63,12 @@ struct OctreeBasedCD::Implementation {
   std::vector<PairRecord*> work;
   AuditRecord audit;
   std::shared_ptr<QuerySource> querySource;
-  std::uint64_t octreesOf = 0;  ///< geometries.state() that all octrees are of; 0: of none
-  std::mutex sorting;           ///< of candidates, when a const query first asks for them
+  std::uint64_t octreesOf = 0;  ///< geometries.state() for which all octrees hold; 0: for none
+  std::mutex sorting;           ///< locked while candidatePairs(), a const call, sorts candidates
   PairOrderScratch sortingScratch;
   std::atomic<bool> isBusy = false;  ///< a call that changes the object has not returned
 
-  /// The last thing that a frame does.
+  /// Adds the counts of geometries to the statistics, and makes them visible.
   void publish(FrameStatistics next) {
     next.geometries = next.triangles = next.segments = next.points = next.untestedVertices = 0;
     for (const auto& geometry : geometries.all()) {
@@ -82,13 +82,15 @@ struct OctreeBasedCD::Implementation {
     statistics = next;
   }
 
-  /// Brings octrees up to date. The next frame's statistics include what it did; an explicit
-  /// update() forgets what earlier updates did to single trees.
-  /// `detecting`: plans say how all pairs move; else only what candidates depend on.
+  /// Updates the octrees. The next frame's statistics include updates for queries.
+  /// explicitly: the user called update(). The statistics are published at once, and count as
+  /// rebuilt or refitted only the trees that this call changed.
+  /// detecting: plans include the motion of all pairs. Otherwise they include only the motion on
+  /// which candidates depend.
   void update(bool explicitly = false, bool detecting = false) {
     using Update = LooseOctree::Update;
     octreesOf = 0;
-    state->trees.clear();  // until they are up to date
+    state->trees.clear();  // they are invalid until the update is complete
     if (!hasUpdates) updates = {};
     const bool isFirst = explicitly || !std::exchange(hasUpdates, true);
     for (const auto& geometry : geometries.all()) {
@@ -122,7 +124,8 @@ struct OctreeBasedCD::Implementation {
       boxes += tree.boxMilliseconds;
       octrees += tree.octreeMilliseconds;
     }
-    // Geometries are updated side by side: the wall clock is shared out as their work was.
+    // Geometries are updated in parallel. The wall-clock time is therefore divided in proportion to
+    // the work on boxes and on octrees.
     const double share = boxes + octrees > 0 ? boxes / (boxes + octrees) : 0;
     updates.milliseconds.boxes += wall * share;
     updates.milliseconds.octree += wall * (1 - share);
@@ -150,7 +153,8 @@ struct OctreeBasedCD::Implementation {
     }
   }
 
-  /// Pairs whose answer is outdated. That of pairs that do not collide is nothing.
+  /// Pairs whose result is outdated. Pairs that do not collide are not among them: their result is
+  /// empty.
   std::span<PairRecord* const> pairsToDo(PairRecord::Derived PairRecord::*answer) {
     work.clear();
     for (const auto& record : pairs.records())
@@ -160,8 +164,8 @@ struct OctreeBasedCD::Implementation {
     return work;
   }
 
-  /// Where one thread has refitted the octrees and few pairs are to be expected, another would wait
-  /// for the data longer than it could help.
+  /// Returns `one` if one thread has refitted the octrees and few candidates are expected: other
+  /// threads would wait for the data longer than they could help.
   const Threads& threadsFor(std::span<PairRecord* const> records) const {
     constexpr std::size_t kFew = 16384;
     std::size_t found = 0;
@@ -231,8 +235,9 @@ namespace {
 
 }  // namespace
 
-/// While it lives, a call that changes the object runs: others are refused, so that callbacks
-/// cannot change what is being computed, and floating point is as the library needs it.
+/// Exists while a call that changes the object runs. Other calls are refused meanwhile, so that
+/// callbacks cannot change data in use. It also sets the floating-point mode that the library
+/// needs.
 class OctreeBasedCD::Implementation::Change {
  public:
   explicit Change(const std::unique_ptr<Implementation>& all) : m_all(all.get()) {
@@ -255,8 +260,8 @@ class OctreeBasedCD::Implementation::QuerySource : public SpatialQueries::Source
  public:
   explicit QuerySource(Implementation& all) : m_all(&all) {}
 
-  void close() { m_all = nullptr; }  ///< the OctreeBasedCD ends
-  /// Brings octrees to the positions now, where they are not.
+  void close() { m_all = nullptr; }  ///< called when the OctreeBasedCD is destroyed
+  /// Updates the octrees unless they are up to date with the positions now.
   void updateOctrees() {
     const auto lock = lockOctrees();
     if (m_all->octreesOf != m_all->geometries.state()) m_all->update();
@@ -543,7 +548,7 @@ std::span<const AuditFailure> OctreeBasedCD::auditFailures() const { return read
 
 CollisionProblem OctreeBasedCD::problem() const {
   const Implementation& all = read();
-  const auto lock = all.querySource->lockOctrees();  // an update chooses methods, too
+  const auto lock = all.querySource->lockOctrees();  // because an update also chooses methods
   const StandardFloatingPoint standard;
   return problemOf(all.settings, all.geometries, all.pairs);
 }

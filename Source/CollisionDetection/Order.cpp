@@ -22,7 +22,8 @@ Ids byElement(const ShapeContact& c) {
   return {packed(static_cast<std::uint32_t>(c.element), c.id), c.vertices[1]};
 }
 
-/// Returns how many are of the first `preferred` buffers. flags: if not null, which these are.
+/// Sorts the buffers' contacts of one list, each once, into `out`. Returns the number of contacts
+/// from the first `preferred` buffers. flags: if not null, receives which contacts these are.
 template <class Contact, class Buffers, class Entries, class IdsOf>
 std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferred,
                   Buffer<Contact> Buffers::*member, Entries& entries, std::vector<Contact>& out,
@@ -60,7 +61,7 @@ void orderPairs(Buffer<ElementPair>& pairs, std::size_t firsts, PairOrderScratch
     std::sort(pairs.begin(), pairs.end());
     return;
   }
-  Buffer<std::uint32_t>& next = scratch.places;  // where a's pairs go; in the end, where they end
+  Buffer<std::uint32_t>& next = scratch.places;  // per a: where its next pair goes; at last its end
   next.assign(firsts, 0);
   for (const ElementPair& pair : pairs) ++next[pair.a];
   std::exclusive_scan(next.begin(), next.end(), next.begin(), 0u);

@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-/// What contacts are sorted by: the ids of their elements, then preferred ones before others.
+/// The sort key of a contact: the ids of its elements; then preferred contacts before others.
 class ContactSortKey {
  public:
   /// `second` is below 2^63.
@@ -23,7 +23,7 @@ class ContactSortKey {
   bool operator<(const ContactSortKey& other) const { return m_words < other.m_words; }
 
  private:
-  /// In the last bit: whether the contact is not preferred. A separate flag makes sorting slower.
+  /// The last bit is set if the contact is not preferred. A separate flag makes sorting slower.
   std::array<std::uint64_t, 2> m_words;
 };
 
@@ -37,8 +37,8 @@ struct OrderScratch {
   Buffer<Entry<VertexTriangleContact>> vertexTriangle;
   Buffer<Entry<EdgeEdgeContact>> edgeEdge;
   Buffer<Entry<ShapeContact>> shape;
-  /// Of vertexTriangle, triangleVertex and edgeEdge as ordered last: which contacts are of the
-  /// preferred buffers. Empty where there are no such buffers.
+  /// For the lists vertexTriangle, triangleVertex and edgeEdge of the last call: which contacts are
+  /// from preferred buffers. Empty if there are no such buffers.
   std::array<Buffer<std::uint8_t>, 3> preferred;
 };
 
@@ -51,8 +51,9 @@ struct PairOrderScratch {
 /// Cost     two passes over the pairs and one over `firsts` counters.
 void orderPairs(Buffer<ElementPair>& pairs, std::size_t firsts, PairOrderScratch&);
 
-/// The buffers' contacts, sorted by element ids, each once: where the first `preferred` buffers
-/// have one of the same features as the others, theirs. Returns how many are theirs.
+/// Collects the buffers' contacts, sorted by element ids, each once. The first `preferred` buffers
+/// have precedence over the others where both have a contact of the same elements. Returns the
+/// number of contacts from preferred buffers.
 std::size_t orderContacts(std::span<ContactBuffers* const>, std::size_t preferred, OrderScratch&,
                           CollisionData::Contents&);
 

@@ -66,7 +66,7 @@ const char* nameOf(Method method) {
   return "?";
 }
 
-/// Throws what is wrong with the settings.
+/// Checks the settings of a pair. Throws an Error that describes the fault.
 class Check {
  public:
   Check(const Geometry& a, const Geometry& b, const PairSettings& settings)

@@ -19,7 +19,7 @@
 
 namespace palpate {
 
-/// One collision pair, with its answers and what they are answers to.
+/// One collision pair, with its results and the states for which they hold.
 struct PairRecord {
   CollisionPair pair;
   Geometry* a;
@@ -54,33 +54,33 @@ struct PairRecord {
   bool anyDisabled() const {
     return !a->mesh.topology.disabled.empty() || !b->mesh.topology.disabled.empty();
   }
-  /// Finds the vertices that are too near at rest, where these may have changed.
+  /// Updates `near` if settings.restDistance is set and the topology has changed.
   void updateNear();
-  /// Makes `next` the answer.
+  /// Makes `next` the pair's result.
   void commit() noexcept;
-  /// Commits an empty answer, of a pair that does not collide.
+  /// Commits an empty result, for a pair that does not collide.
   void commitNothing(bool keepsCandidates) noexcept;
-  void commitNoCandidates() noexcept;  ///< of a pair that does not collide
+  void commitNoCandidates() noexcept;  ///< for a pair that does not collide
 
   bool hasShape() const { return a->shape || b->shape; }
-  const Geometry& mesh() const { return a->shape ? *b : *a; }  ///< of a pair with a shape
+  const Geometry& mesh() const { return a->shape ? *b : *a; }  ///< for a pair with a shape
 
-  /// Stored boxes may hold more than this pair's method asks for.
+  /// Whether stored boxes may enclose the whole step though this pair's method needs only its end.
   bool widerBoxes() const { return !plan.swept() && (a->tree.isSwept() || b->tree.isSwept()); }
 
   std::size_t index = 0;  ///< in the table
   Revision settingsRevision;
   CollisionData data;  ///< of the last detection that was completed
   Derived dataOf;
-  bool isAnswered = false;         ///< there was one
+  bool isAnswered = false;         ///< a detection was completed
   CollisionData next;              ///< of the detection that runs
   std::atomic<double> earliest;    ///< PairSettings::earliestTimeOnly: found so far in this frame
-  std::size_t found = 0;           ///< candidates, when last collected or handed on
-  Buffer<ElementPair> candidates;  ///< in the order found until somebody asks for them
+  std::size_t found = 0;           ///< number of candidates when last found
+  Buffer<ElementPair> candidates;  ///< unsorted until candidatePairs() is called
   Derived candidatesOf;
   bool candidatesSorted = false;
   ContactPredicate predicate;
-  IndexLists near;  ///< of settings.restDistance
+  IndexLists near;  ///< per vertex: later ones within settings.restDistance at rest
   DerivedFrom<1> nearOf;
 };
 
@@ -106,7 +106,7 @@ class PairTable {
   void removeIf(Predicate&&) noexcept;
 
   std::vector<std::unique_ptr<PairRecord>> m_records;  ///< in the order added
-  std::vector<CollisionPair> m_pairs;                  ///< of m_records, for the user
+  std::vector<CollisionPair> m_pairs;                  ///< copies of those in m_records
   RevisionCounter m_revisions;
   std::unordered_map<std::uint64_t, PairRecord*> m_byIds;
 };

@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 
 }  // namespace
 
-/// The step of one body, and searches for the vertices that go furthest in it.
+/// The step of one body, with the search for the vertices that move furthest in it.
 class RigidSearch::Step {
  public:
   Step(const Geometry& geometry, RigidSearch& search)
@@ -45,8 +45,9 @@ class RigidSearch::Step {
   const RigidTransform& now() const { return m_now; }
   const Matrix3d& matrix() const { return m_matrix; }
 
-  /// The largest size(displacement) of a vertex, and up to the slack more. Of a box of positions:
-  /// no more than that at its centre and, for each axis, growth(axis) times half its edge.
+  /// An upper bound of size(displacement) over all vertices: the largest value plus twice the slack
+  /// for rounding errors. In a box of positions, size(displacement) is at most its value at the
+  /// centre plus, for each axis, growth(axis) times half the box's edge.
   template <class Size>
   double largest(std::uint32_t& vertex, const Vector3d& growth, Size&& size) {
     const std::span<const Vector3d> body = m_geometry.mesh.now.body();
@@ -87,7 +88,7 @@ class RigidSearch::Step {
   const Geometry& m_geometry;
   RigidSearch& m_search;
   const RigidTransform &m_before, &m_now;
-  Matrix3d m_matrix;  ///< a displacement is matrix x + vector
+  Matrix3d m_matrix;  ///< a position x in the body's frame is displaced by m_matrix x + m_vector
   Vector3d m_vector;
   double m_slack;
 };

@@ -11,19 +11,21 @@ namespace palpate {
 
 struct Geometry;
 
-/// How a body moves of which both ends of the step have the same positions in its frame. The
-/// vertices that move furthest are searched for in its octree, from those of the last search on.
+/// Measures how a rigid body moves: both ends of the step have the same positions in its frame. The
+/// search for the vertices that move furthest uses its octree, and begins with the vertices found
+/// last.
 class RigidSearch {
  public:
-  /// Bounds at most a few roundings beyond the furthest vertices.
+  /// Bounds of the vertices' displacements, too large by a few rounding errors at most.
   MotionRange motion(const Geometry&);
-  /// L: how far a vertex is at most, at any time of the step, from where it would be if the body
-  /// turned evenly about one axis while it slid along it, which takes it from any place to any
-  /// other (Chasles). At most a few roundings too much.
+  /// L: the largest distance, at any time of the step, between a vertex on its straight way and the
+  /// same vertex on its arc. On arcs, the body turns evenly about one axis while it slides along
+  /// that axis; such a motion exists between any two placements (Chasles). Too large by a few
+  /// rounding errors at most.
   ///
-  /// Source   a vertex r from the axis, turned by the angle t, is furthest from its chord at half
-  ///          time: r (1 - cos(t / 2)); its chord across the axis is 2 r sin(t / 2), so that is
-  ///          half the chord times tan(t / 4).
+  /// Source   Let a vertex at the distance r from the axis turn by the angle t. It is furthest from
+  ///          its chord at half time, by r (1 - cos(t / 2)). The chord across the axis is
+  ///          2 r sin(t / 2), so that this distance is half the chord times tan(t / 4).
   double arcDeviation(const Geometry&);
 
  private:

@@ -4,7 +4,7 @@
 
 namespace palpate {
 
-/// The same; throws what is wrong with them.
+/// Returns the settings, or throws InvalidSettings with the fault.
 const Settings& checked(const Settings&);
 
 }  // namespace palpate

@@ -25,13 +25,13 @@ constexpr std::uint32_t kNoGroup = std::numeric_limits<std::uint32_t>::max();
 struct Guarded {
   GeometryId id{};
   GeometryKind kind = GeometryKind::Triangles;
-  std::vector<Vector3d> settled{};     ///< where the last hold() left it
+  std::vector<Vector3d> settled{};     ///< positions after the last hold()
   std::vector<std::uint32_t> group{};  ///< by vertex, or kNoGroup
   std::vector<std::uint8_t> fixed{};   ///< by vertex
   GuardedStep step{};
-  bool isGiven = false;   ///< it has a step
-  bool hasMoved = false;  ///< vertices went back in this round
-  bool isStale = false;   ///< a failed call left the detection elsewhere than settled
+  bool isGiven = false;   ///< this hold() has a step for it
+  bool hasMoved = false;  ///< vertices were moved back in this round
+  bool isStale = false;   ///< after a failed call, the detection has other positions than `settled`
 };
 
 struct Group {
@@ -92,7 +92,7 @@ struct StepGuard::Implementation {
   }
   Guarded& at(GeometryId id) { return geometries[indexOf(id)]; }
 
-  /// add(): the geometry's id in the detection.
+  /// add() adds the geometry to the detection and returns its id.
   template <class Add>
   GeometryId add(std::span<const Vector3d> positions, GeometryKind kind, Add&& add) {
     Guarded geometry;
@@ -107,7 +107,7 @@ struct StepGuard::Implementation {
     return geometries.back().id;
   }
 
-  /// set(): changes the topology in the detection.
+  /// set() changes the topology in the detection.
   template <class Set>
   void setTopology(GeometryId id, std::span<const Vector3d> positions, Set&& set) {
     Guarded& geometry = at(id);
@@ -131,7 +131,7 @@ struct StepGuard::Implementation {
     leaveGroups(id, 0);
   }
 
-  /// Vertices from this one on are no longer there.
+  /// Removes the geometry's vertices from number `from` on from all groups.
   void leaveGroups(GeometryId id, std::uint32_t from) {
     for (Group& group : groups)
       std::erase_if(group.vertices,
@@ -181,7 +181,7 @@ struct StepGuard::Implementation {
   }
 
   std::size_t hold(std::span<const GuardedStep> steps) {
-    const StandardFloatingPoint standard;  // denormal differences are differences
+    const StandardFloatingPoint standard;  // so that denormal differences do not become zero
     movedBack.clear();
     try {
       begin(steps);
@@ -236,7 +236,7 @@ struct StepGuard::Implementation {
     }
   }
 
-  /// f(contact, its vertices) for each contact of the pair.
+  /// Calls f(contact, vertices) for each contact of the pair.
   template <class F>
   void forEachTouch(const CollisionPair& pair, F&& f) const {
     const auto& [a, b, settings] = pair;
@@ -293,7 +293,7 @@ struct StepGuard::Implementation {
             edgeOf(geometries[indexOf(vertices[2].geometry)], contact.edgeB)};
   }
 
-  /// Of features that touch, none of which can move back.
+  /// Throws an Error about the first of the touching features, when none of them can move back.
   [[noreturn]] void throwFirstTouch() const {
     std::optional<Touch> touch;
     for (const CollisionPair& pair : detection.pairs())
@@ -386,7 +386,7 @@ void StepGuard::setTetrahedra(GeometryId id, std::span<const Vector3d> positions
 void StepGuard::removeGeometry(GeometryId id) { all().remove(id); }
 
 void StepGuard::addPair(GeometryId a, GeometryId b) {
-  // Whether features touch does not depend on the time's tolerance; the coarsest is the cheapest.
+  // Whether features touch does not depend on timeTolerance. The largest value is the cheapest.
   all().detection.addCollisionPair(
       a, b, {.method = Method::Continuous, .contacts = Contacts::All, .timeTolerance = 1.0});
 }

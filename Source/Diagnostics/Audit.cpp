@@ -45,7 +45,7 @@ std::vector<std::uint64_t> drawNumbers(std::uint64_t count, std::uint64_t size,
   return drawn;
 }
 
-/// The ids by which contacts are ordered and told apart.
+/// The ids by which contacts are ordered and distinguished.
 std::array<std::uint32_t, 2> idsOf(const VertexTriangleContact& c) {
   return {c.vertex, c.triangle};
 }
@@ -58,7 +58,8 @@ std::array<std::uint32_t, 3> idsOf(const ShapeContact& c) {
 }
 int idsOf(const ShapeShapeContact&) { return 0; }  // there is one
 
-/// Which contacts a sample of features tells everything about.
+/// Decides which contacts a sample of features covers. Brute force for the sample finds every
+/// covered contact.
 class Coverage {
  public:
   Coverage(const MeshPair& meshes, const FeatureLists& sample)
@@ -80,19 +81,19 @@ class Coverage {
   bool ofEdges(const EdgeEdgeContact& c) const {
     const MeshTopology &a = m_meshes.a.topology, &b = m_meshes.b.topology;
     const std::uint32_t edgeA = a.edgeOf(c.edgeA), edgeB = b.edgeOf(c.edgeB);
-    if (edgeA == kNoEdge || edgeB == kNoEdge) return true;  // nor such edges
+    if (edgeA == kNoEdge || edgeB == kNoEdge) return true;  // there are no such edges
     if (!m_byTriangles) return holds(m_sample.edgesOfA, edgeA);
     return all(a.edgeTriangles[edgeA], [&](std::uint32_t s) {
       return all(b.edgeTriangles[edgeB], [&](std::uint32_t t) { return ofTriangles({s, t}); });
     });
   }
-  /// By the element that owns the element.
+  /// Vertices and edges are covered by the element that owns them.
   bool ofShape(const ShapeContact& c) const {
     const MeshTopology& mesh = m_meshes.mesh().topology;
     if (c.element == ShapeElement::Face) return holds(m_sample.trianglesOfA, c.id);
     const bool isVertex = c.element == ShapeElement::Vertex;
     const std::uint32_t edge = isVertex ? 0 : mesh.edgeOf({c.vertices[0], c.vertices[1]});
-    if (isVertex ? c.id >= mesh.vertexCount : edge == kNoEdge) return true;  // there is none such
+    if (isVertex ? c.id >= mesh.vertexCount : edge == kNoEdge) return true;  // no such element
     const auto owners = isVertex ? mesh.vertexTriangles[c.id] : mesh.edgeTriangles[edge];
     return owners.empty() || holds(m_sample.trianglesOfA, owners.front());
   }
@@ -114,8 +115,8 @@ class Coverage {
   bool m_byTriangles;
 };
 
-/// Contacts::Distinct of impacts: drops what an earlier contact stands for, which is expected as
-/// well or, where the sample does not have it, is in the answer.
+/// Contacts::Distinct for impacts: drops expected contacts for which an earlier contact is kept.
+/// The earlier contact is either expected, too, or in the answer if the sample does not cover it.
 void dropWhatOthersStandFor(const MeshPair& meshes, const CollisionData& answer,
                             CollisionData::Contents& expected) {
   const bool impactsOnly = meshes.settings.method == Method::Continuous;
@@ -156,7 +157,8 @@ void dropWhatOthersStandFor(const MeshPair& meshes, const CollisionData& answer,
     return place != first.end() && contact.timeOfImpact < end &&
            place->second < rankOf(contact, list);
   };
-  // Auto may answer by its impact what brute force finds at the step's end, and drop that.
+  // Brute force may find a contact at the step's end that Auto reports by its impact. Auto may then
+  // drop this impact.
   const auto isDroppedImpact = [&](const auto& contact, int list) {
     if (contact.timeOfImpact < end) return false;
     ContactBuffers impact;
@@ -183,8 +185,8 @@ void dropWhatOthersStandFor(const MeshPair& meshes, const CollisionData& answer,
   });
 }
 
-/// Calls report(fault, expected, found) where two lists differ: of those found that are not
-/// expected, in those covered.
+/// Calls report(fault, expected, found) where two lists differ. A contact that was found but not
+/// expected counts only if it is covered.
 template <class Contact, class Covered, class Report>
 void compare(std::vector<Contact> expected, std::span<const Contact> allFound, Covered&& covered,
              Report&& report) {
@@ -251,7 +253,8 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
   using List = AuditFailure::List;
   using Fault = AuditFailure::Fault;
   using Any = AuditFailure::Contact;
-  // What Auto takes from other methods in place of its own is not of features.
+  // Auto replaces some of its contacts by those of other methods. Brute force for a sample does not
+  // reproduce this, so that only missing contacts are reported.
   const bool withOthers = pair.settings.method == Method::Auto;
   const auto into = [&](List list) {
     return [=, &pair, &out](Fault fault, const Any& e, const Any& f) {
@@ -298,8 +301,8 @@ CollisionProblem pairAlone(const CollisionProblem& whole, GeometryId idA, Geomet
   return problem;
 }
 
-/// Writes the problem of one pair's failures into a new file of the settings' folder, and its name
-/// into each of them.
+/// Writes the problem of one pair's failures to a new file in the settings' folder, and sets the
+/// file's name in each failure.
 static void keepProblem(const CollisionProblem& problem, const AuditSettings& settings,
                         std::span<AuditFailure> failures) {
   const AuditFailure& first = failures.front();

@@ -14,18 +14,18 @@
 
 namespace palpate {
 
-/// At most settings.features of all that the pair's method tests, each as likely as any other. The
-/// same for the same seed, frame and pair.
+/// Draws at most settings.features of all features that the pair's method tests, each with the same
+/// probability. The same seed, frame and pair give the same sample.
 FeatureLists drawFeatures(const MeshPair&, const CollisionPair&, const AuditSettings&,
                           std::uint64_t frame);
 
-/// Appends every contact that a drawn sample of features should have by brute force and has not in
-/// `data`, or the other way round. Of Method::Auto only what is missing, with earliestTimeOnly
-/// impacts before the one known.
+/// Compares `data` with brute force for a drawn sample of features, and appends every contact that
+/// is missing, invented or different in `data`. For Method::Auto it appends missing contacts only,
+/// and with earliestTimeOnly impacts before the reported time.
 void audit(const MeshPair&, const CollisionPair&, const CollisionData& data, const AuditSettings&,
            std::uint64_t frame, std::vector<AuditFailure>& out);
 
-/// One pair of the problem alone.
+/// The problem reduced to one of its pairs.
 CollisionProblem pairAlone(const CollisionProblem&, GeometryId a, GeometryId b);
 
 }  // namespace palpate

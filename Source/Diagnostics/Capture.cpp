@@ -22,7 +22,7 @@ namespace {
 constexpr std::string_view kTitle = "palpate-capture";
 constexpr int kVersion = 9;
 
-// Values of enumerations are written by name: in the order of their declarations.
+// Enumerators are written by name. The names are in the order of the declarations.
 constexpr std::array<std::string_view, 4> kMethods{"Auto", "Intersection", "Proximity",
                                                    "Continuous"};
 constexpr std::array<std::string_view, 4> kKinds{"Triangles", "Lines", "Points", "Shape"};
@@ -30,7 +30,7 @@ constexpr std::array<std::string_view, 2> kSides{"Both", "Outer"};
 constexpr std::array<std::string_view, 6> kShapes{"Sphere", "Capsule",  "Plane",
                                                   "Box",    "Cylinder", "ConvexHull"};
 constexpr std::array<std::string_view, 2> kContacts{"Distinct", "All"};
-// Before version 9 one word said what earliestTimeOnly says, too.
+// Before version 9, a third value of `contacts` stood for earliestTimeOnly.
 enum class ContactsBefore9 { Distinct, All, Earliest };
 constexpr std::array<std::string_view, 3> kContactsBefore9{"Distinct", "All", "Earliest"};
 constexpr std::array<std::string_view, 2> kEngines{"Octree", "BruteForce"};
@@ -38,7 +38,7 @@ constexpr std::array<std::string_view, 2> kUpdates{"Auto", "Rebuild"};
 
 std::string quoted(std::string_view text) { return std::string("\"").append(text).append("\""); }
 
-/// A text of words, with lines for people.
+/// Writes a text of words. Line breaks are for human readers only.
 class Writer {
  public:
   void word(std::string_view text) { (m_text += text) += ' '; }
@@ -65,7 +65,7 @@ class Writer {
   std::string m_text;
 };
 
-/// The same, read. Throws Error (ErrorCode::File) that names the file and the line.
+/// Reads such a text. Throws Error (ErrorCode::File) that names the file and the line.
 class Reader {
  public:
   Reader(const std::filesystem::path& path, std::string text)
@@ -107,7 +107,7 @@ class Reader {
         end != found.end() || fault != std::errc())
       refuse(quoted(found) + " is not a number");
   }
-  /// How many of something follow: never more than the file has characters.
+  /// Reads the number of items that follow. Refuses more than the file has characters left.
   void count(std::size_t& value) {
     integer(value);
     if (value > m_rest.size()) refuse("it is cut off: too few lines for " + std::to_string(value));
@@ -130,7 +130,7 @@ class Reader {
   std::ptrdiff_t m_line = 1;
 };
 
-// The lines of a file, either way: `file` is a Writer or a Reader.
+// Functions that write or read parts of a file: `file` is a Writer or a Reader.
 
 template <class File>
 constexpr bool kReads = std::is_same_v<File, Reader>;
@@ -160,7 +160,7 @@ void fieldOf(File& file, auto& value) {
   }
 }
 
-/// How many a list has.
+/// The size of a list. A Reader resizes the list to it.
 template <class File>
 void sizeOf(File& file, auto& list) {
   std::size_t size = list.size();
@@ -207,7 +207,7 @@ void filterOf(File& file, FilterType& filter) {
   file.word(filter.sidedness, kSides);
 }
 
-/// A shape's measures and where it is.
+/// A shape's dimensions, and its placements at both ends of the step.
 template <class File, class MeshType>
 void shapeOf(File& file, MeshType& mesh, int version) {
   forEachField(*mesh.analytical, [&](std::string_view, auto& field) {
@@ -228,7 +228,7 @@ void shapeOf(File& file, MeshType& mesh, int version) {
   }
 }
 
-/// The kind of shape by its number.
+/// A shape of the kind with this number.
 template <std::size_t... kinds>
 AnalyticalGeometry shapeOfKind(std::size_t kind, std::index_sequence<kinds...>) {
   AnalyticalGeometry shape;
@@ -283,7 +283,7 @@ void meshLines(File& file, MeshType& mesh, int version) {
   elements(mesh.tetrahedra);
 }
 
-/// All but the title.
+/// All lines except the title.
 template <class File, class ProblemType>
 void problemLines(File& file, ProblemType& problem, int version) {
   settingsLine(file, problem.settings);
@@ -378,7 +378,7 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
                      std::to_string(kVersion) + " can be read");
   CollisionProblem problem;
   problemLines(file, problem, version);
-  if (version == 1)  // Auto stood for one method then
+  if (version == 1)  // Auto then stood for the one method in pair.method
     for (CollisionProblem::Pair& pair : problem.pairs) pair.settings.method = pair.method;
   file.expectEnd();
   try {

@@ -20,7 +20,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// One vertex against every triangle of a mesh, as the definition of Contacts::Distinct reads.
+/// Tests one vertex against every triangle of a mesh, directly by the definition of
+/// Contacts::Distinct.
 class VertexAgainstMesh {
  public:
   explicit VertexAgainstMesh(const TriangleMesh& triangles) : m_mesh(triangles) {}
@@ -40,7 +41,7 @@ class VertexAgainstMesh {
 
   std::size_t size() const { return m_answers.size(); }
 
-  /// Null of a triangle at the vertex.
+  /// Null for disabled triangles, and for those that self-collision excludes.
   const VertexTriangleDistance* answer(std::uint32_t triangle) const {
     return m_answers[triangle] ? &*m_answers[triangle] : nullptr;
   }
@@ -49,8 +50,8 @@ class VertexAgainstMesh {
     return featureOf(m_mesh.topology, triangle, m_answers[triangle]->feature);
   }
 
-  /// The lowest triangle whose closest point the feature holds, while none that holds the feature
-  /// is nearer. Triangles that are refused do not count.
+  /// Whether a triangle is the lowest with its closest point on the same feature, and no triangle
+  /// that holds this feature is nearer. Refused triangles do not count.
   template <class Refused>
   bool isDistinct(std::uint32_t triangle, Refused&& isRefused) const {
     const MeshFeature own = feature(triangle);
@@ -78,9 +79,9 @@ class VertexAgainstMesh {
     return false;
   }
 
-  /// Whether a triangle that holds the feature, but whose closest point another feature of it
-  /// holds, is nearer. One with area is: its closest point is unique. In one without area several
-  /// features may hold that point.
+  /// Whether a triangle that holds the feature is nearer than the feature, if the triangle's
+  /// closest point is on another of its features. With area it is nearer, because its closest point
+  /// is unique. Without area, several features may hold that point.
   bool isNearer(std::uint32_t triangle, const MeshFeature& feature) const {
     const Triangle& corners = m_mesh.topology.triangles[triangle];
     const Vector3d a = m_mesh.now[corners[0]], b = m_mesh.now[corners[1]],
@@ -97,7 +98,7 @@ class VertexAgainstMesh {
   std::vector<std::optional<VertexTriangleDistance>> m_answers;
 };
 
-/// kSecond: the vertices are the second mesh's.
+/// kSecond: the vertices are of MeshPair::b.
 template <bool kSecond>
 void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sample,
                         ContactBuffers& out) {
@@ -174,7 +175,7 @@ void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
   }
 }
 
-/// Edges that hold a feature, of all.
+/// All edges that hold a feature.
 std::vector<std::uint32_t> edgesOf(const MeshTopology& topology, const MeshFeature& feature) {
   if (feature.kind == MeshFeature::Kind::Edge) return {feature.id};
   std::vector<std::uint32_t> holders;
@@ -185,7 +186,8 @@ std::vector<std::uint32_t> edgesOf(const MeshTopology& topology, const MeshFeatu
   return holders;
 }
 
-/// As testLineEdges() defines Distinct: every pair of holders asked, the lowest taken at the end.
+/// The condition for Contacts::Distinct that testLineEdges() describes. Measures every pair of
+/// edges that hold the two features, and determines the lowest at the end.
 bool isDistinctOfLines(const MeshPair& pair, const std::array<std::uint32_t, 2>& edges,
                        const std::array<MeshFeature, 2>& features) {
   if (!isForEdges(pair, features)) return false;
@@ -235,7 +237,7 @@ void findProximity(const MeshPair& pair, const FeatureLists& features, ContactBu
 }
 
 /// Calls f(features, inFirst, inSecond, ofSecond) for the listed features with every feature of the
-/// other mesh. ofSecond: the first feature is of the pair's second mesh.
+/// other mesh. ofSecond: features.first is MeshPair::b.
 template <class F>
 void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, ContactBuffers& out,
                         F&& f) {
@@ -268,7 +270,7 @@ void findImpacts(const MeshPair& pair, const FeatureLists& lists, ContactBuffers
       });
 }
 
-/// Impacts that proximity at the step's end does not answer.
+/// Appends the impacts of feature pairs for which proximity at the step's end does not suffice.
 void findFastImpacts(const MeshPair& pair, const FeatureLists& lists, ContactBuffers& out) {
   const StepCheck check(pair, out);
   forEachFeaturePair(

@@ -9,7 +9,7 @@ namespace palpate {
 
 namespace {
 
-/// How far a triangle's corners move, at the least and at the most along each axis.
+/// Bounds of the displacements of a triangle's corners, along each axis.
 struct Moves {
   Eigen::Array3d lower, upper;
 
@@ -24,8 +24,8 @@ struct Moves {
   }
 };
 
-/// Whether features of both may move further than `slow` relative to each other. Also
-/// true of some that do not: rounding, and squares out of range.
+/// Whether features of two triangles may move further than `slow` relative to each other. Rounding,
+/// and squares out of range, make it true for some slower triangles.
 bool mayBeFast(const Moves& a, const Moves& b, double slow) {
   const Eigen::Array3d most = (a.upper - b.lower).abs().max((b.upper - a.lower).abs());
   const double square = slow * slow;

@@ -6,12 +6,14 @@
 
 namespace palpate {
 
-/// Method::Auto of findContacts(), where some features are slow and others fast.
+/// Implements Method::Auto of findContacts() for pairs with both slow and fast features.
 ///
-/// A pair of features is a contact if at the step's end it is one of Method::Proximity at the
-/// thickness and `extra`, or if it moves further than `slow` and has an impact in the step. The
-/// first are described at the step's end, with a timeOfImpact of 1, unless the step may have
-/// brought them together and they have an impact; all others as Method::Continuous does.
+/// A feature pair is a contact in two cases:
+/// (1) Method::Proximity reports it at the step's end, at the thickness plus StepPlan::extra.
+/// (2) It moves further than StepPlan::slow and has an impact in the step.
+/// A contact of case 1 describes the step's end and has a timeOfImpact of 1. If the step may have
+/// brought the features together and they have an impact, it describes the impact instead. Contacts
+/// of case 2 are described as by Method::Continuous.
 void findAuto(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);
 
 }  // namespace palpate

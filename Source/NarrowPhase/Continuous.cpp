@@ -28,8 +28,9 @@ TimeOfImpactSettings settingsOf(const MeshPair& pair) {
   return settings;
 }
 
-/// f(features, inFirst, inSecond, ofSecond) for those pairs that may meet, eight at a time.
-/// ofSecond: pairs name a feature of `second` first.
+/// Calls f(features, inFirst, inSecond, ofSecond) for the pairs that may have an impact, after a
+/// test of eight pairs at a time. ofSecond: each of `pairs` lists a feature of features.second
+/// first.
 template <bool ofSecond, Kind kind, class F>
 void filterPairs(const Features<kind>& features, std::span<const FeaturePair> pairs,
                  const TimeOfImpactSettings& settings, F&& f) {
@@ -56,14 +57,15 @@ void filterPairs(const Features<kind>& features, std::span<const FeaturePair> pa
   }
 }
 
-/// The same for every feature pair that the candidates own. ofSecond: the first feature is of the
-/// pair's second mesh.
+/// Calls f likewise for the feature pairs that the candidates own. ofSecond: features.first is
+/// MeshPair::b.
 template <class F>
 void forEachLikelyPair(const MeshPair& pair, std::span<const ElementPair> candidates,
                        ContactBuffers& out, F&& f) {
   FeaturePairs& pairs = out.features;
   findFeaturePairs(pair.a.topology, pair.b.topology, pair.floats, candidates, pairs);
-  // Where nothing is asked of the step: refused below, too.
+  // An early exit: f refuses these pairs as well. It is not taken where validity needs the facts of
+  // all feature pairs.
   if (pair.near && pair.step.motion == 0.0)
     std::erase_if(pairs.edgeEdge, [&](const FeaturePair& edges) {
       return areNearAtRest(pair, pair.a.topology.edges[edges.a], pair.b.topology.edges[edges.b]);
@@ -77,13 +79,13 @@ void forEachLikelyPair(const MeshPair& pair, std::span<const ElementPair> candid
   filterPairs<false>(Features<Kind::EdgeEdge>{pair.a, pair.b}, pairs.edgeEdge, settings, f);
 }
 
-/// Tests pairs and describes the contacts found.
+/// Tests feature pairs for impacts and appends their contacts.
 class ContactFinder {
  public:
   ContactFinder(const MeshPair& pair, ContactBuffers& out)
       : m_pair(pair), m_check(pair, out), m_out(out), m_settings(settingsOf(pair)) {}
 
-  /// Whether it is a contact that no filter leaves out.
+  /// Returns whether the pair is a contact that passes all filters.
   template <Kind kind>
   bool operator()(const Features<kind>& features, std::uint32_t inFirst, std::uint32_t inSecond,
                   bool ofSecond) {
@@ -93,8 +95,8 @@ class ContactFinder {
     return answer.impact && add(features, inFirst, inSecond, ofSecond, query, answer.time, true);
   }
 
-  /// The contact of an impact, and whether there is one for all filters. store: it is noted and
-  /// kept.
+  /// Makes the contact of an impact and returns whether it passes all filters. store: the impact is
+  /// recorded in the facts, and the contact is appended if it passes.
   template <Kind kind>
   bool add(const Features<kind>& features, std::uint32_t inFirst, std::uint32_t inSecond,
            bool ofSecond, const ImpactQuery& query, double time, bool store) {
@@ -152,7 +154,7 @@ class ContactFinder {
   const TimeOfImpactSettings m_settings;
 };
 
-/// The same for those that proximity at the step's end does not answer.
+/// Does the same, but only for pairs for which proximity at the step's end does not suffice.
 class FastImpactFinder {
  public:
   FastImpactFinder(const MeshPair& pair, ContactBuffers& out)
@@ -192,15 +194,16 @@ void findFastImpacts(const MeshPair& pair, std::span<const ElementPair> candidat
   forEachLikelyPair(pair, candidates, out, FastImpactFinder(pair, out));
 }
 
-/// Boxes over part of the step cost more; a part that is not short throws out too little for that.
+/// Boxes over a part of the step cost more than boxes over the whole step. Only if the part is
+/// shorter than this do they discard enough feature pairs.
 constexpr double kShortPart = 1.0 / 32;
 
 double findEarliestImpact(const MeshPair& pair, std::span<const ElementPair> candidates,
                           double upTo, ContactBuffers& counts) {
   const TimeOfImpactSettings settings = settingsOf(pair);
   double earliest = upTo;
-  // A reported time may be a tolerance early, so a pair that is left out for an impact after this
-  // could not have reported one before `earliest`.
+  // A reported time may be early by the tolerance. A pair whose impact is after this end therefore
+  // cannot report a time before `earliest`.
   const auto end = [&] { return std::min(earliest + settings.timeTolerance, 1.0); };
   ContactFinder finder(pair, counts);
   const auto test = [&](const auto& features, std::uint32_t inFirst, std::uint32_t inSecond,

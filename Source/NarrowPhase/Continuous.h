@@ -8,19 +8,20 @@
 
 namespace palpate {
 
-/// Method::Continuous of findContacts(): every vertex-triangle and edge-edge pair with an impact in
-/// the step from `before` to `now`, with the thickness as its minimum distance.
+/// Implements Method::Continuous of findContacts(): appends every vertex-triangle and edge-edge
+/// pair with an impact in the step from `before` to `now`. An impact is a distance of at most the
+/// thickness.
 ///
-/// timeOfImpact is not after the first impact and at most the settings' timeTolerance before it;
-/// all else is of that time.
-/// The normal, at thickness 0: the contact plane's, on the side where the vertex, or edge a, was
-/// before; where it was always in that plane, the triangle's winding normal or the cross product of
-/// the edges; of degenerate elements the axis that distances use. With a thickness: that of the
-/// distance.
+/// timeOfImpact is not after the first impact and at most the settings' timeTolerance before it.
+/// All other members of a contact describe that time.
+/// With a thickness, the normal is that of the distance. With thickness 0, it is the normal of the
+/// contact plane, on the side where the vertex, or edge a, was before. If that feature was always
+/// in the plane, the normal is the triangle's winding normal or the cross product of the edges.
+/// For degenerate elements it is the axis that <palpate/Distance.h> defines.
 void findContinuous(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);
 
-/// The two meshes that feature pairs of one kind come from: vertices of the first with triangles of
-/// the second, or edges of each.
+/// The two meshes of feature pairs of one kind: vertices of `first` with triangles of `second`, or
+/// edges of `first` with edges of `second`.
 template <ImpactQuery::Kind kind>
 struct Features {
   const TriangleMesh& first;
@@ -47,19 +48,21 @@ struct Features {
   }
 };
 
-/// One feature pair of Method::Continuous; returns whether it is a contact. ofSecond: the first
-/// feature is of the pair's second mesh.
+/// Tests one feature pair as Method::Continuous does and appends its contact. Returns whether there
+/// was one. ofSecond: Features::first is MeshPair::b.
 template <ImpactQuery::Kind kind>
 bool addImpact(const MeshPair&, const Features<kind>&, std::uint32_t inFirst,
                std::uint32_t inSecond, bool ofSecond, ContactBuffers& out);
 
-/// Method::Auto: impacts of those feature pairs that proximity at the step's end does not answer.
+/// Method::Auto: appends the impacts of feature pairs for which proximity at the step's end does
+/// not suffice (StepCheck::isAnsweredAtEnd()).
 void findFastImpacts(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);
 
-/// The earliest timeOfImpact that findContinuous() would report, or upTo if that is earlier;
-/// infinity is a good first upTo. Impacts after it cost little, so passing the smallest time of
-/// earlier candidates makes later ones cheap. The smallest over all candidates has the same bits
-/// whatever their order, batches and upTo. counts: featurePairs and exactDecisions only.
+/// Returns the earliest timeOfImpact that findContinuous() would report, or upTo if that is
+/// earlier. Pass infinity first, then the smallest time of earlier candidates: impacts after upTo
+/// cost little. The smallest time over all candidates has the same bits for every order, batch size
+/// and upTo. counts: receives featurePairs and exactDecisions; facts.clearance becomes 0 where an
+/// impact was checked against the user's filters.
 double findEarliestImpact(const MeshPair&, std::span<const ElementPair> candidates, double upTo,
                           ContactBuffers& counts);
 

@@ -21,7 +21,7 @@ bool overlap(const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b, double 
 
 namespace {
 
-/// Keeps the boxes asked for last: candidate pairs of two leaves name the same elements many times.
+/// A cache of element boxes: the candidate pairs of two leaves name the same elements many times.
 class BoxesMetLast {
  public:
   BoxesMetLast(const TriangleMesh& mesh, bool swept) : m_mesh(mesh), m_swept(swept) {

@@ -10,7 +10,8 @@
 
 namespace palpate {
 
-/// L, in the world: the box of an element's vertices, swept: at both ends of the step.
+/// The box of an element's vertices at the step's end, in world coordinates (L). swept: it encloses
+/// the vertices at both ends of the step.
 Eigen::AlignedBox3d elementBox(const TriangleMesh&, std::uint32_t element, bool swept);
 
 /// Whether the gap between two boxes is at most the thickness along every axis.

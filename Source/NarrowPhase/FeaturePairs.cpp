@@ -17,7 +17,7 @@ namespace palpate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Four floats: one vector, or four where there is no SIMD.
+/// Four floats are held in one vector, or in four where there is no SIMD.
 constexpr std::size_t kLanes = HWY_TARGET == HWY_SCALAR ? 1 : 4, kVectors = 4 / kLanes;
 using D = hn::FixedTag<float, kLanes>;
 using V = hn::Vec<D>;
@@ -43,7 +43,7 @@ HWY_ATTR HWY_INLINE Bounds joined(const Bounds& s, const Bounds& t) {
   return bounds;
 }
 
-/// What brings boxes into the frame they are compared in.
+/// The shift that moves boxes into the frame in which they are compared.
 struct Shift {
   std::array<float, 4> lower{}, upper{};
 };
@@ -53,7 +53,7 @@ HWY_ATTR HWY_INLINE Bounds triangleBounds(const FloatPoint* now, const Triangle&
                 boundsOf(now[triangle[2]]));
 }
 
-/// Inflated, outward.
+/// Adds the shift and rounds outward.
 HWY_ATTR HWY_INLINE Bounds shifted(const Bounds& bounds, const Shift& shift) {
   const D d;
   const V relative = hn::Set(d, OutwardRounding::kRelative),
@@ -76,11 +76,11 @@ HWY_ATTR HWY_INLINE bool overlap(const Bounds& s, const Bounds& t) {
   return all;
 }
 
-/// The features of a triangle side by side.
+/// The features of a triangle, in the order of NarrowPhase/FeatureTests.h.
 struct alignas(64) FeatureRow {
   float bounds[3][2 * kFeatures];    ///< of each axis: lower, then upper
-  std::uint32_t ids[kFeatures];      ///< vertices, edges, the triangle
-  std::uint16_t ownedByA, ownedByB;  ///< tests, if this is triangle a, or b
+  std::uint32_t ids[kFeatures];      ///< of the vertices, the edges and the triangle
+  std::uint16_t ownedByA, ownedByB;  ///< owned tests if this is triangle a, or triangle b
 };
 static_assert(sizeof(FeatureRow) == 256, "three lines of bounds, one of the rest");
 
@@ -94,9 +94,10 @@ struct Side {
   float upTo;
 };
 
-/// A vertex, or its way through the step or the first part of it. The float nearest to where it is
-/// at upTo is within the margin: the ends and that float are off by 2^-24 of themselves each, the
-/// three operations by as much again. (Clamped ends say nothing of what is between.)
+/// Bounds of a vertex at the step's end, over the step, or over the step's part up to upTo. The
+/// float nearest to the vertex's position at upTo is within the margin: both ends and that float
+/// have a relative error of 2^-24 each, and so has each of the three operations. Where an end is
+/// clamped to the largest float, the position at upTo is unknown, and the bounds enclose both ends.
 template <Sweep sweep>
 HWY_ATTR HWY_INLINE Bounds cornerBounds(const Side& side, std::uint32_t vertex) {
   const D d;
@@ -119,7 +120,7 @@ HWY_ATTR HWY_INLINE Bounds cornerBounds(const Side& side, std::uint32_t vertex) 
   return bounds;
 }
 
-/// Outward rounding is monotone: boxes of shifted corners are shifted boxes.
+/// Outward rounding is monotone. The box around shifted corners is therefore the shifted box.
 template <Sweep sweep>
 HWY_ATTR HWY_INLINE void setBounds(const Side& side, const Triangle& corners, FeatureRow& row) {
   Bounds boxes[kFeatures];
@@ -164,8 +165,8 @@ HWY_ATTR HWY_NOINLINE void makeRow(const Side& side, std::uint32_t triangle, Fea
 using TestTag = hn::CappedTag<float, kTestPlaces>;
 constexpr std::size_t kTestLanes = hn::MaxLanes(TestTag());
 
-/// How a vector of tests takes its features' lower or upper bounds: a window of the row, and places
-/// in it.
+/// Where a vector of tests finds the lower or upper bounds of its features: the start of a window
+/// in the row, and the places in that window.
 template <const TestFeatures& features>
 struct Places {
   std::array<std::size_t, kTestPlaces> window{};
@@ -180,7 +181,7 @@ struct Places {
   }
 };
 
-/// Values of the tests from `test` on, out of a row's.
+/// Gathers from a row one value for each test, from `test` on.
 template <const TestFeatures& features, class DT>
 HWY_ATTR HWY_INLINE hn::Vec<DT> valuesOf(DT d, const hn::TFromD<DT>* row, std::size_t test,
                                          bool upper = false) {
@@ -218,8 +219,8 @@ HWY_ATTR HWY_INLINE unsigned sharingTests(const FeatureRow& a, const FeatureRow&
   return kSharingTests[same % kSharingTests.size()];
 }
 
-/// Rows of the triangles met last. Neighbours in the octree meet again soon: of twenty rows asked
-/// for nineteen are there.
+/// A cache of rows. Neighbours in the octree come up again soon: 19 of 20 requests find their row
+/// here.
 template <Sweep sweep>
 class RowCache {
  public:
@@ -258,7 +259,8 @@ class RowCache {
   FeatureRow m_rows[kSpare + 1];
 };
 
-/// Triangle pairs whose tests are chosen, to be listed together: corners' tests and edges' apart.
+/// Triangle pairs with their chosen tests, which list() turns into feature pairs. Tests of corners
+/// and tests of edges are kept apart.
 struct ChosenTests {
   static constexpr std::size_t kMost = 128;
   alignas(64) std::uint32_t ids[kMost * 2 * kFeatures];  ///< of both rows
@@ -274,8 +276,8 @@ struct ChosenTests {
   }
 };
 
-/// Where in ChosenTests::ids the feature of a test is, for as many pairs as have their tests in 64
-/// bits.
+/// For each bit of a 64-bit word of tests, the index in ChosenTests::ids of the test's feature. A
+/// word holds the tests of several triangle pairs.
 using IdPlaces = std::array<std::uint8_t, 64>;
 template <class Tests>
 constexpr IdPlaces idPlaces(const TestFeatures& features, int offset) {
@@ -286,8 +288,8 @@ constexpr IdPlaces idPlaces(const TestFeatures& features, int offset) {
   return places;
 }
 
-/// Writes the chosen tests of `size` pairs, those in `mask`; ordered: the lower id first. Returns
-/// how many.
+/// Writes the feature pairs of those chosen tests of `size` triangle pairs that are in `mask`, and
+/// returns their number. ordered: the lower id first.
 template <class Tests>
 inline std::size_t list(const ChosenTests& chosen, const Tests* tests, std::size_t size,
                         unsigned mask, const IdPlaces& firstIn, const IdPlaces& secondIn,
@@ -301,7 +303,7 @@ inline std::size_t list(const ChosenTests& chosen, const Tests* tests, std::size
       const auto bit = static_cast<unsigned>(std::countr_zero(bits));
       const std::uint32_t* const ids = chosen.ids + 2 * kFeatures * i;
       const std::uint64_t first = ids[firstIn[bit]], second = ids[secondIn[bit]];
-      // Which is lower is as good as random: no branch.
+      // Without a branch: which id is lower cannot be predicted.
       const std::uint64_t pair = std::rotl(first | second << 32, 32 * (ordered & (second < first)));
       std::memcpy(out + count++, &pair, sizeof pair);
     }
@@ -313,7 +315,7 @@ constexpr IdPlaces kEdgeInA = idPlaces<std::uint16_t>(kOfA, 0),
                    kEdgeInB = idPlaces<std::uint16_t>(kOfB, kFeatures);
 constexpr IdPlaces kCornerInA = idPlaces<std::uint8_t>(kOfA, 0),
                    kCornerInB = idPlaces<std::uint8_t>(kOfB, kFeatures);
-/// Of a corner's test the vertex and the triangle, whichever of the two they are of.
+/// The vertex and the triangle of a corner's test, for corners of a and of b alike.
 constexpr IdPlaces kVertexIn = idPlaces<std::uint8_t>(
                        {kCorner0, kCorner1, kCorner2, 0, kFeatures + kCorner0, kFeatures + kCorner1,
                         kFeatures + kCorner2},

@@ -7,8 +7,8 @@
 
 namespace palpate {
 
-/// The features of a triangle side by side. Corner i is feature i. Edge 2 stands twice, so that
-/// each four tests take their features from one half.
+/// Places of a triangle's features in a row. Corner i is feature i. Edge 2 has two places, so that
+/// each group of four tests takes its features from one half of the row.
 inline constexpr int kFeatures = 8;
 enum Feature : std::uint8_t {
   kCorner0,
@@ -23,16 +23,16 @@ enum Feature : std::uint8_t {
 
 constexpr bool isCorner(std::uint8_t feature) { return feature <= kCorner2; }
 constexpr bool isEdge(std::uint8_t feature) { return !isCorner(feature) && feature != kTriangle; }
-/// Of an edge: its number in the triangle.
+/// The number of an edge in its triangle.
 constexpr int edgeNumber(std::uint8_t feature) {
   return feature == kEdge0 ? 0 : feature == kEdge1 ? 1 : 2;
 }
 
-/// The fifteen feature tests of triangles a and b, in the one order that all sets of tests use: bit
-/// t of a set is test t. The last of sixteen places holds no test.
+/// The fifteen feature tests of triangles a and b. All sets of tests use one order: bit t of a set
+/// is test t. The last of the sixteen places holds no test.
 inline constexpr int kTests = 15, kTestPlaces = 16;
 using TestFeatures = std::array<std::uint8_t, kTestPlaces>;
-/// The feature of each triangle that a test takes.
+/// For each test, its feature of triangle a and its feature of triangle b.
 // clang-format off
 inline constexpr TestFeatures
     kOfA = {kCorner0,  kCorner1,  kCorner2,  kEdge2,
@@ -45,7 +45,7 @@ inline constexpr TestFeatures
             kEdge2Again, kEdge0,  kEdge1,    kEdge2Again};
 // clang-format on
 
-/// Corner i of a with b; corner j of b with a; edge i of a with edge j of b.
+/// Numbers of the tests: corner i of a with b, corner j of b with a, edge i of a with edge j of b.
 constexpr int cornerTestOfA(int i) { return i; }
 constexpr int cornerTestOfB(int j) { return 4 + j; }
 inline constexpr auto kTestOfEdges = [] {
@@ -60,13 +60,14 @@ constexpr int edgeTest(int i, int j) { return kTestOfEdges[i][j]; }
 /// Sets of all tests of one kind.
 inline constexpr unsigned kCornerTestsOfA = 0x0007, kCornerTestsOfB = 0x0070, kEdgeTests = 0x7f88;
 
-/// Tests that the kinds of two meshes allow.
+/// The tests that apply to the geometry types of two meshes.
 inline unsigned allowedTests(const MeshTopology& a, const MeshTopology& b) {
   return kEdgeTests | (areTested(a, b, true) ? kCornerTestsOfA : 0) |
          (areTested(b, a, false) ? kCornerTestsOfB : 0);
 }
 
-/// Tests whose feature of one triangle it owns, by MeshTopology::owned; a triangle owns itself.
+/// For each value of MeshTopology::owned, the tests whose feature the triangle owns. Each triangle
+/// owns itself.
 constexpr auto ownedTests(const TestFeatures& features) {
   const auto owns = [](unsigned owned, std::uint8_t feature) {
     return feature == kTriangle ||
@@ -81,7 +82,7 @@ constexpr auto ownedTests(const TestFeatures& features) {
 }
 inline constexpr auto kOwnedByA = ownedTests(kOfA), kOwnedByB = ownedTests(kOfB);
 
-/// Each corner of a with each of b: the order of the bits of sameCorners().
+/// Each corner of a with each corner of b, in the order of the bits of sameCorners().
 inline constexpr int kCornerPairs = 9;
 inline constexpr TestFeatures kCornerOfA = {0, 0, 0, 1, 1, 1, 2, 2, 2},
                               kCornerOfB = {0, 1, 2, 0, 1, 2, 0, 1, 2};
@@ -98,7 +99,7 @@ constexpr bool holdsCorner(std::uint8_t feature, std::uint8_t corner) {
   return feature == kTriangle || edgeNumber(feature) == corner ||
          (edgeNumber(feature) + 1) % 3 == corner;
 }
-/// Tests of features with a vertex in common, by sameCorners().
+/// For each value of sameCorners(), the tests whose features have a vertex in common.
 inline constexpr auto kSharingTests = [] {
   std::array<std::uint16_t, 1 << kCornerPairs> tests{};
   for (int test = 0; test < kTests; ++test) {

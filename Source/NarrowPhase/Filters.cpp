@@ -12,10 +12,11 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Between unit vectors, in [0, pi]. The standard library's functions differ between processors.
+/// The angle between unit vectors, in [0, pi]. Does not use the standard library's functions,
+/// because their results differ between processors.
 double angleBetween(const Vector3d& u, const Vector3d& v) {
   const double y = (u - v).norm(), x = (u + v).norm();
-  double t = y / (x + std::sqrt(x * x + y * y));  // the tangent of a quarter
+  double t = y / (x + std::sqrt(x * x + y * y));  // the tangent of a quarter of the angle
   for (int i = 0; i < 3; ++i) t /= 1.0 + std::sqrt(1.0 + t * t);
   double series = 0.0;
   for (int k = 13; k > 0; k -= 2) series = 1.0 / k - t * t * series;
@@ -27,12 +28,13 @@ class Surface {
  public:
   Surface(const TriangleMesh& mesh, double time) : m_mesh(mesh), m_time(time) {}
 
-  /// Below a vertex where it is below the mean of the normals, weighted by the triangles' angles;
-  /// below an edge that bulges if it is below all its triangles, else if it is below any.
+  /// Whether a direction from a feature points below the surface. At a vertex it does if it is
+  /// below the mean of the normals, weighted by the triangles' angles. At a bulging edge it does if
+  /// it is below all of the edge's triangles, at any other edge if it is below one of them.
   ///
   /// Source   Bærentzen and Aanæs, Signed distance computation using the angle weighted pseudonormal,
-  ///          IEEE TVCG 11 (2005). Difference: an edge by its two planes, which is exact too where
-  ///          the direction is not that of a closest point.
+  ///          IEEE TVCG 11 (2005). Difference: an edge is tested by its two planes. This is exact
+  ///          even where the direction is not that of a closest point.
   bool isBelow(const MeshFeature& feature, const Vector3d& direction) const {
     switch (feature.kind) {
       case MeshFeature::Kind::Vertex: {
@@ -53,7 +55,7 @@ class Surface {
   Vector3d at(std::uint32_t vertex) const {
     return (1.0 - m_time) * m_mesh.before[vertex] + m_time * m_mesh.now[vertex];
   }
-  /// Unit; zero of a triangle without area, which has no sides.
+  /// A unit vector; zero for a triangle without area, which has no sides.
   Vector3d normalOf(std::uint32_t triangle) const {
     const auto& [i, j, k] = m_mesh.topology.triangles[triangle];
     const Vector3d a = at(i);
@@ -72,8 +74,8 @@ class Surface {
     return bulges(edge) ? std::all_of(triangles.begin(), triangles.end(), isBelowFace)
                         : std::any_of(triangles.begin(), triangles.end(), isBelowFace);
   }
-  /// Whether of two triangles at an edge the second is below the first; also where there are not
-  /// two.
+  /// Whether the second of the two triangles at an edge is below the first. True if the edge does
+  /// not have two triangles.
   bool bulges(std::uint32_t edge) const {
     const auto triangles = m_mesh.topology.edgeTriangles[edge];
     if (triangles.size() != 2) return true;

@@ -7,10 +7,11 @@
 
 namespace palpate {
 
-// What the user filters out. Facts about the step are noted of all features, filtered or not, so
-// that what validity says of sides and touches does not depend on filters.
+// The user's filters. StepFacts are recorded for all features, filtered or not, so that what
+// Validity reports about sides and touching features does not depend on filters.
 
-/// Whether any vertex of one feature is too near to one of the other, along the mesh at rest.
+/// Whether a vertex of one feature is nearer to a vertex of the other than
+/// PairSettings::restDistance, along the edges of the mesh at rest.
 template <class Vertices, class Others>
 bool areNearAtRest(const MeshPair& pair, const Vertices& vertices, const Others& others) {
   if (!pair.near) return false;
@@ -22,19 +23,19 @@ bool areNearAtRest(const MeshPair& pair, const Vertices& vertices, const Others&
   return false;
 }
 
-/// Whether a vertex and a triangle may not be a contact. ofSecond: the vertex is of the second
-/// mesh.
+/// Whether a filter suppresses the contact of a vertex and a triangle. ofSecond: the vertex is of
+/// MeshPair::b.
 bool refusesVertex(const MeshPair&, std::uint32_t vertex, std::uint32_t triangle, bool ofSecond);
 bool refusesEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB);
 
-/// Whether a contact points inward of a mesh that is touched from outside only. The features hold
-/// the closest points; direction: from the pair's second mesh to the first, not zero; time: of the
-/// step, of positions and direction.
+/// Whether a contact points into a mesh with Sidedness::Outer. features: those that hold the
+/// closest points. direction: from the pair's second mesh to the first, not zero. time: in [0, 1],
+/// of the positions and the direction.
 bool pointsInward(const MeshPair&, const std::array<MeshFeature, 2>& features,
                   const Eigen::Vector3d& direction, double time);
 
-/// The same at the step's end, of features as far apart as they were measured: what touches points
-/// nowhere.
+/// The same at the step's end, for features with a measured distance. Features at distance 0 have
+/// no direction, and never point inward.
 inline bool pointsInwardAtEnd(const MeshPair& pair, std::uint32_t vertex,
                               const MeshFeature& ofTriangle, const VertexTriangleDistance& measured,
                               bool ofSecond) {

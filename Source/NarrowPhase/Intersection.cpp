@@ -71,7 +71,8 @@ class IntersectionContacts {
   }
 
  private:
-  /// Features that touch do so in their owners too, whose pair adds them.
+  /// Touching features also touch in the triangles that own them. Only the pair of these triangles
+  /// adds the contact.
   void addTouching(const TriangleIntersection& meeting) {
     const MeshTopology &ofA = m_a.mesh.topology, &ofB = m_b.mesh.topology;
     for (int i = 0; i < 3; ++i) {
@@ -100,15 +101,15 @@ class IntersectionContacts {
     contacts.push_back(contactOf(of.vertices[corner], triangle.id, triangle.vertices, answer));
   }
 
-  /// The normal to the side where the winding normal points, the distance below zero behind it. At
-  /// distance zero the normal is the winding normal already.
+  /// Turns the normal to the winding normal's side, and makes the distance of a vertex behind the
+  /// triangle negative. At distance zero the normal is the winding normal already.
   void turnToOutside(const Eigen::Vector3d& p, const Corners& triangle,
                      VertexTriangleDistance& answer) {
     const auto& [a, b, c] = triangle;
     SignCounts counts;
     const bool behind = orient3d(a, b, c, p, counts) < 0;
     m_out.exactDecisions += counts.undecided;
-    // At a face this is the direction of the difference, and the same from wherever it is seen.
+    // At a face this is the direction of the difference, and has the same bits for every vertex.
     if (answer.feature == TriangleFeature::Face)
       answer.normal = windingNormal(a, b, c);
     else if (behind)
@@ -143,7 +144,7 @@ TriangleIntersection meetingOf(const MeshPair& pair, const MeshTriangle& a, cons
                             pair.self() ? featuresInCommon(a, b) : ExcludedFeatures());
 }
 
-/// known: how they meet, or nothing.
+/// known: the pair's intersection if it has been computed, else empty.
 void findOne(const MeshPair& pair, const ElementPair& candidate, TriangleIntersection known,
              SignCounts& counts, ContactBuffers& out) {
   const MeshTriangle a(pair.a, candidate.a, pair.a.now), b(pair.b, candidate.b, pair.b.now);

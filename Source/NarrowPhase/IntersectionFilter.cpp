@@ -19,8 +19,8 @@ using D = hn::CappedTag<double, kSize>;
 using V = hn::Vec<D>;
 using M = hn::Mask<D>;
 
-/// Triangle pairs side by side: coordinates at 9 triangle + 3 corner + axis, and vertices' ids at 3
-/// triangle + corner.
+/// Triangle pairs side by side. With triangle 0 or 1: rows 9 triangle + 3 corner + axis hold
+/// coordinates, rows 3 triangle + corner hold vertex ids.
 struct Batch {
   alignas(64) double coordinates[18][kSize] = {};
   alignas(64) double ids[6][kSize] = {};
@@ -36,10 +36,10 @@ struct Batch {
   }
 };
 
-/// One of the triangles of as many pairs as V has lanes.
+/// One triangle of each pair, for as many pairs as V has lanes.
 struct Lanes {
   Vector3<V> corner[3];
-  M excluded[3];  ///< corners that are the other's too
+  M excluded[3];  ///< corners that are corners of the other triangle, too
 
   HWY_INLINE void set(const Batch& batch, std::size_t lane, int side, bool withIds) {
     const D d;
@@ -74,7 +74,7 @@ HWY_INLINE Vector3<V> magnitudes(const Vector3<V>& a) {
   return {hn::Abs(a.x), hn::Abs(a.y), hn::Abs(a.z)};
 }
 
-/// What is certain of a volume's sign.
+/// Where a volume is certainly positive (above) or negative (below).
 struct Sides {
   M above, below;
   HWY_INLINE M certain() const { return hn::Or(above, below); }
@@ -91,7 +91,8 @@ struct Normal {
     normal = forward - backward;
     magnitude = magnitudes(forward) + magnitudes(backward);
   }
-  /// With the bound of OrientedPlane::side(). w: from p; most: its magnitudes, or larger.
+  /// Uses the error bound of OrientedPlane::side(). w: the vector from p. most: at least the
+  /// magnitudes of w.
   HWY_INLINE Sides sidesOf(const Vector3<V>& w, const Vector3<V>& most) const {
     const D d;
     const V volume = dot(normal, w);
@@ -106,8 +107,8 @@ struct Normal {
 struct CornerSides {
   Sides corner[3];
 
-  /// The bound grows with each magnitude, so that one with the largest of three corners does for
-  /// all.
+  /// The error bound grows with each magnitude. The bound for the largest magnitudes of the three
+  /// corners therefore holds for all of them.
   HWY_INLINE CornerSides(const Lanes& triangle, const Lanes& plane) {
     const auto& [p, q, r] = plane.corner;
     const Normal normal(p, q, r);
@@ -120,8 +121,8 @@ struct CornerSides {
     }
     for (int i = 0; i < 3; ++i) corner[i] = normal.sidesOf(w[i], most);
   }
-  /// All corners that are not the plane's too are strictly to one side. If all are the plane's:
-  /// false.
+  /// Whether all corners that are not excluded are strictly on one side of the plane. False if all
+  /// are excluded.
   HWY_INLINE M aside(const M (&excluded)[3]) const {
     M above = hn::FirstN(D(), kSize), below = above;
     for (int i = 0; i < 3; ++i) {
@@ -135,7 +136,8 @@ struct CornerSides {
   }
 };
 
-/// A triangle that crosses a plane, from the corner that is alone on its side.
+/// The corners of a triangle that crosses a plane, beginning with the corner that is alone on its
+/// side.
 struct FromLonely {
   M isLast, isMiddle;
   Vector3<V> lonely, ends[2];  ///< the corners after it, in their order
@@ -159,7 +161,7 @@ struct FromLonely {
   }
 };
 
-/// Lanes as bits: intersectCrossing() of Math/TriangleIntersection, side by side.
+/// The SIMD form of intersectCrossing() in Math/TriangleIntersection. Results are one bit per lane.
 struct Crossings {
   struct OfOne {
     std::uint32_t isLast, isMiddle, through[2];
@@ -171,7 +173,7 @@ struct Crossings {
       return static_cast<std::uint8_t>(found);
     }
   } a, b;
-  std::uint32_t known;  ///< nothing touches, and which edges cross is certain
+  std::uint32_t known;  ///< certainly no features touch, and the crossing edges are certain
 
   HWY_INLINE Crossings(const Lanes& ofA, const CornerSides& sidesOfA, const Lanes& ofB,
                        const CornerSides& sidesOfB) {
@@ -204,7 +206,7 @@ struct Crossings {
   }
 };
 
-/// Appends the first `size` lanes that may intersect.
+/// Appends those of the first `size` lanes that may intersect.
 HWY_INLINE void keepLanes(const Lanes& ofA, const Lanes& ofB, const ElementPair* pairs,
                           std::size_t size, PossibleIntersection*& out) {
   const D d;

@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-/// Triangles where they are at some time.
+/// Triangles and their positions at one time.
 struct PlacedTriangles {
   std::span<const Triangle> triangles;
   Positions positions;
@@ -18,15 +18,16 @@ struct PlacedTriangles {
 
 struct PossibleIntersection {
   ElementPair triangles;
-  TriangleIntersection meeting;  ///< if known: where edges cross and nothing touches
+  TriangleIntersection meeting;  ///< if known: which edges cross; no features touch
   bool isKnown() const { return meeting.intersect(); }
 };
 
-/// The pairs that may intersect, in their order, with what intersectTriangles() finds wherever
-/// floating point is certain; those left out are proven not to. self: the two are one mesh, pairs
-/// come with the lower triangle first, and what triangles with a common vertex are not asked for is
-/// excluded.
-/// Errors   none; where coordinates over- or underflow all pairs whose boxes overlap are kept.
+/// Keeps the pairs that may intersect, in their order; all other pairs are proven not to. Where
+/// floating point is certain, a kept pair also has the result of intersectTriangles(). self: a and
+/// b are one mesh. Each kept pair then has the lower triangle first, and common vertices do not
+/// count as intersections.
+/// Errors   none; where coordinates overflow or underflow, all pairs with overlapping boxes are
+///          kept.
 void keepPossiblyIntersecting(const PlacedTriangles& a, const PlacedTriangles& b, bool self,
                               std::span<const ElementPair> pairs,
                               Buffer<PossibleIntersection>& out);

@@ -9,7 +9,8 @@ namespace palpate {
 
 namespace {
 
-/// f(edge) for each edge that holds the feature, once, while it returns true.
+/// Calls f(edge) once for each edge that holds the feature, until f returns false. Returns whether
+/// all calls returned true.
 template <class F>
 bool allEdgesAt(const MeshTopology& topology, const MeshFeature& feature, F&& f) {
   if (feature.kind == MeshFeature::Kind::Edge) return f(feature.id);
@@ -23,7 +24,7 @@ bool allEdgesAt(const MeshTopology& topology, const MeshFeature& feature, F&& f)
   return true;
 }
 
-/// As testLineEdges() says.
+/// The condition for Contacts::Distinct that testLineEdges() describes.
 bool isDistinct(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
                 const std::array<MeshFeature, 2>& features, ContactBuffers& out) {
   if (!isForEdges(pair, features)) return false;

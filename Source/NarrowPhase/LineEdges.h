@@ -11,28 +11,33 @@
 
 namespace palpate {
 
-/// Two edges, at least one of a line mesh, at most the thickness and their radii apart.
+/// Two edges, at least one of a line mesh, whose distance less their radii is at most the
+/// thickness.
 struct EdgesNearby {
   EdgeEdgeDistance centres;
   double distance;                      ///< L, less the radii
-  std::array<MeshFeature, 2> features;  ///< that hold the closest points: vertices or edges
+  std::array<MeshFeature, 2> features;  ///< vertices or edges that hold the closest points
 };
 
-/// None if the edges are left out or too far apart. Self-collision: the lower edge first.
+/// Returns nothing if the edges are excluded, filtered or too far apart. Self-collision: pass the
+/// lower edge first.
 std::optional<EdgesNearby> measureEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB);
 
-/// The contacts of edges with lines, by Method::Proximity.
+/// Appends the contact of two edges by Method::Proximity, where at least one edge is of a line
+/// mesh.
 ///
-/// Distinct: of edges nearby, those whose closest points every other pair nearby that holds the
-/// same two features shares, under the lowest such pair; other pairs are as near or nearer
-/// elsewhere and report it there. Against triangles only where the line's own closest point is not
-/// a vertex: vertices of lines are tested against whole triangles.
-/// Source   Two edges at a common pair of points are nowhere nearer if neither comes nearer along
-///          either edge alone (the squared distance is convex in both weights), so that vertices
-///          which hold a contact are local minima over all their edges.
+/// Distinct: several nearby edge pairs may hold the same two features. A contact is reported only
+/// if all of these pairs have their closest points on the two features, and only by the lowest
+/// pair. Otherwise some pair is at least as near elsewhere, and reports its contact there. With a
+/// triangle mesh, a contact is not reported where the closest point on the line is a vertex:
+/// vertices of lines are tested against whole triangles.
+/// Source   Take one point on each of two edges. If the distance does not decrease along either
+///          edge alone, the edges are nowhere nearer: the squared distance is convex in both
+///          weights. Vertices that hold a contact are therefore local minima over all their edges.
 void testLineEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB, ContactBuffers& out);
 
-/// Whether a feature on the side of the pair's first or second mesh may be reported by edges.
+/// Whether edge pairs report contacts between these features, of the pair's first and second mesh.
+/// They do not report a vertex against a triangle mesh.
 inline bool isForEdges(const MeshPair& pair, const std::array<MeshFeature, 2>& features) {
   constexpr auto kVertex = MeshFeature::Kind::Vertex;
   return !(pair.b.topology.hasFaces() && features[0].kind == kVertex) &&

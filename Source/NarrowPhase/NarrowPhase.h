@@ -18,36 +18,39 @@
 
 namespace palpate {
 
-/// What a pair's step asks of the narrow phase; Docs/Algorithms/Validity.md has the reasons.
+/// What the narrow phase must find out about a pair's step. Docs/Algorithms/Validity.md explains
+/// why.
 struct StepPlan {
-  /// L: no two features move further, relative to each other. 0: nothing is asked of the step.
+  /// L: no two features move further relative to each other. 0: the step is not examined, only its
+  /// end.
   double motion = 0.0;
-  /// L: motion, and what rounding adds to it; features further apart at the end did not touch.
+  /// L: `motion` plus rounding errors. Features further apart at the step's end did not touch in
+  /// the step.
   double certain = std::numeric_limits<double>::infinity();
   double slow = 0.0;   ///< L: Auto's Proximity misses no feature pair that moves at most this far
   double extra = 0.0;  ///< L: added to the thickness for proximity at the step's end
-  /// Auto: feature pairs that the step may have brought together are answered by their impact.
+  /// Auto: feature pairs that may have touched in the step are reported by their impact.
   bool impacts = false;
-  bool start = false;  ///< whether triangles intersect at the step's start is asked
+  bool start = false;  ///< whether the initial intersection check runs
 };
 
 /// One pair of meshes in one frame.
 struct MeshPair {
   const TriangleMesh& a;
   const TriangleMesh& b;  ///< the same object for self-collision
-  PairSettings settings;  ///< method resolved; Auto: Proximity and Continuous
-  /// For throwing out feature pairs by their boxes; without, the same answer takes longer.
+  PairSettings settings;  ///< with the method chosen; Auto here: both Proximity and Continuous
+  /// For discarding feature pairs by their boxes. Null: the results are the same, but take longer.
   const FloatPair* floats = nullptr;
   StepPlan step{};
-  const IndexLists* near = nullptr;  ///< restDistance: vertices too near each other at rest
+  const IndexLists* near = nullptr;  ///< per vertex: later ones within restDistance at rest
   const ContactPredicate* predicate = nullptr;
-  /// Of a geometry that is a shape, whose mesh has no elements; null: it is none.
+  /// The shape of an analytical geometry, whose mesh has no elements. Null for all others.
   const PlacedShape *shapeOfA = nullptr, *shapeOfB = nullptr;
   double thicknessAtEnd() const { return settings.thickness + step.extra; }
-  /// L: centres further apart are no contacts.
+  /// L: features whose distance without radii is larger than this are no contacts.
   double reach() const { return thicknessAtEnd() + (a.largestRadius + b.largestRadius); }
   bool self() const { return &a == &b; }
-  /// L: a vertex's and that of what it is tested against, where it is closest.
+  /// L: the radius of a vertex plus that of the other element at its closest point.
   double radii(std::uint32_t vertex, const Triangle& corners, const Eigen::Vector3d& barycentric,
                bool ofSecond) const {
     const TriangleMesh &vertices = ofSecond ? b : a, &others = ofSecond ? a : b;
@@ -56,28 +59,30 @@ struct MeshPair {
   bool filters() const { return near || predicate || a.outer || b.outer; }
   bool hasShape() const { return shapeOfA || shapeOfB; }
   bool isOfShapes() const { return shapeOfA && shapeOfB; }
-  /// Of a pair with a shape: the other one, and the shape.
+  /// For a pair with a shape: the mesh of the other geometry, and the shape.
   const TriangleMesh& mesh() const { return shapeOfA ? b : a; }
   const PlacedShape& shape() const { return *(shapeOfA ? shapeOfA : shapeOfB); }
   bool hasLines() const {
     return a.topology.kind == GeometryKind::Lines || b.topology.kind == GeometryKind::Lines;
   }
-  /// Self-collision: a vertex with a triangle at it; of two points the lower is the vertex.
+  /// Self-collision excludes a vertex with the triangles around it. Of two points, the lower one is
+  /// tested as the vertex.
   bool leavesOutVertex(std::uint32_t vertex, std::uint32_t triangle) const {
     if (!self()) return false;
     const auto& [i, j, k] = a.topology.triangles[triangle];
     return vertex == i || vertex == j || vertex == k ||
            (a.topology.kind == GeometryKind::Points && triangle < vertex);
   }
-  /// Self-collision: edges with a common vertex.
+  /// Self-collision excludes edges with a common vertex.
   bool leavesOut(std::uint32_t edgeA, std::uint32_t edgeB) const {
     return self() && shareVertex(a.topology.edges[edgeA], a.topology.edges[edgeB]);
   }
 };
 
-/// What was seen of a method's conditions. Ids may repeat.
+/// What the narrow phase found out about the conditions of a pair's method. Ids may repeat.
 struct StepFacts {
-  /// L: no pair of features that is a contact is nearer at the step's end; 0: it may have touched.
+  /// L: at the step's end, no feature pair that is a contact, filtered or not, is nearer than this.
+  /// 0: a feature pair may have touched in the step.
   double clearance = std::numeric_limits<double>::infinity();
   bool startsIntersecting = false;
   Buffer<std::uint32_t> verticesA, verticesB;      ///< of features that may have touched
@@ -91,26 +96,25 @@ struct ContactBuffers : ShapeContactBuffers {
   Buffer<VertexTriangleContact> vertexTriangle, triangleVertex;
   Buffer<EdgeEdgeContact> edgeEdge;
   Buffer<ElementPair> intersectingTriangles;
-  FeaturePairs features;                  ///< scratch: of the batch at hand
-  Buffer<ElementPair> part;               ///< scratch: some of the batch at hand
-  Buffer<PossibleIntersection> possible;  ///< scratch: of the batch at hand
+  FeaturePairs features;                  ///< scratch: of the present batch
+  Buffer<ElementPair> part;               ///< scratch: some pairs of the present batch
+  Buffer<PossibleIntersection> possible;  ///< scratch: of the present batch
   StepFacts facts;
-  std::size_t validityPairs = 0;  ///< looked at for startedApart
+  std::size_t validityPairs = 0;  ///< triangle pairs tested for Validity::startedApart
   void clear();
 };
 
-/// f(list) of contacts that have a time of impact.
+/// Calls f(list) for each list of contacts that have a time of impact.
 template <class Lists, class F>
 void forEachTimed(Lists& lists, F&& f) {
   f(lists.vertexTriangle), f(lists.triangleVertex), f(lists.edgeEdge), f(lists.shape);
   f(lists.shapeShape);
 }
 
-/// Appends the contacts of the candidate triangle pairs. Each contact that the pair's method
-/// includes comes out once over all batches of a frame, except Intersection's, which may repeat and
-/// are made unique by whoever orders them. Self-collision: every unordered triangle pair once,
-/// adjacent ones and (t, t) excluded or not as the caller likes: pairs in which nothing is owned
-/// cost little.
+/// Appends the contacts of the candidate triangle pairs. Each contact is appended once over all
+/// batches of a frame. Only Method::Intersection may repeat contacts; orderContacts() removes the
+/// copies. Self-collision: pass each unordered triangle pair once. Adjacent pairs and (t, t) may be
+/// among them: pairs that own no feature pair cost little.
 /// Threads  safe for different output buffers.
 void findContacts(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);
 

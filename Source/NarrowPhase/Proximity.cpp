@@ -19,10 +19,11 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The vertices of one mesh against the triangles of another, or of the same.
+/// Tests vertices of one mesh against triangles of the other mesh, or of the same one.
 class VertexTriangleFinder {
  public:
-  /// keepCorner: whether a vertex may meet a corner's vertex here, by their ids.
+  /// Contacts of a vertex and a corner that this finder may report: all, only those whose vertex is
+  /// lower than the corner's vertex, or none.
   enum class Corners { All, LowerVertexOnly, None };
 
   VertexTriangleFinder(const MeshPair& pair, bool ofSecond, Corners corners, ContactBuffers& out)
@@ -67,8 +68,8 @@ class VertexTriangleFinder {
   }
 
  private:
-  /// Whether the contact is this triangle's to report: no other triangle that holds the feature is
-  /// nearer, and no lower one has its closest point on it too.
+  /// Whether this triangle reports the contact. Of the other triangles that hold the feature, none
+  /// may be nearer, and none with a lower id may have its closest point on the feature.
   bool isDistinct(std::uint32_t vertex, std::uint32_t triangle, const MeshFeature& feature) const {
     if (feature.kind == MeshFeature::Kind::Face) return true;
     const bool isVertex = feature.kind == MeshFeature::Kind::Vertex;
@@ -88,7 +89,8 @@ class VertexTriangleFinder {
     });
   }
 
-  /// Of a triangle at least as near as one that is: where radii differ it may not be.
+  /// Whether a vertex and a triangle are within the thickness. The triangle is at least as near as
+  /// one that is within the thickness, so only differing radii can make this false.
   bool isNearEnough(std::uint32_t vertex, std::uint32_t triangle) const {
     if (m_features.second.radii.empty()) return true;
     const Triangle& corners = m_topology.triangles[triangle];
@@ -113,7 +115,8 @@ class VertexTriangleFinder {
     });
   }
 
-  /// Whether a triangle at an edge comes nearer to p, which lies beside the edge, than the edge.
+  /// Whether a triangle at an edge comes nearer to p than the edge. The edge's point nearest to p
+  /// is inside the edge.
   bool isNearerThanEdge(const Vector3d& p, std::uint32_t edge, std::uint32_t triangle) const {
     const auto& sides = m_topology.triangleEdges[triangle];
     const auto side = std::find(sides.begin(), sides.end(), edge) - sides.begin();
@@ -137,8 +140,9 @@ class VertexTriangleFinder {
   std::size_t& m_exactDecisions;
 };
 
-/// Whether edges are certainly further apart: along a coordinate axis, or perpendicular to either
-/// edge, which tells parallel ones.
+/// Whether two edges are certainly further apart than `distance`. The function tests for a gap
+/// along the coordinate axes and along a direction perpendicular to each edge; the latter separates
+/// parallel edges.
 bool areFurtherApart(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0, const Vector3d& q1,
                      double distance) {
   const Vector3d gap =
@@ -183,7 +187,7 @@ void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, S
   out.edgeEdge.push_back(contactOf(p, q, *answer));
 }
 
-/// Of bits below 2^16. The baseline has no instruction for it.
+/// The number of set bits, for `bits` below 2^16. The baseline processor has no instruction for it.
 std::size_t countOf(std::uint32_t bits) {
   bits -= bits >> 1 & 0x5555;
   bits = (bits & 0x3333) + (bits >> 2 & 0x3333);
@@ -191,7 +195,8 @@ std::size_t countOf(std::uint32_t bits) {
   return (bits + (bits >> 8)) & 0x1f;
 }
 
-/// Fills batches with the triangle pairs that own something, and measures what the filter leaves.
+/// Collects batches of triangle pairs that own feature pairs, and measures the feature pairs that
+/// findPossibleProximity() keeps.
 class ProximityFinder {
  public:
   ProximityFinder(const MeshPair& pair, ContactBuffers& out)
@@ -262,8 +267,8 @@ class ProximityFinder {
   ContactBuffers& m_out;
   StepCheck m_check;
   VertexTriangleFinder m_ofA, m_ofB;
-  const std::uint32_t m_allowed;  ///< tests, by the meshes' kinds
-  const bool m_distinct;          ///< edges that meet at their ends are no contacts
+  const std::uint32_t m_allowed;  ///< tests that apply to the meshes' geometry types
+  const bool m_distinct;          ///< edges whose closest points are ends are no contacts
   int m_size = 0;
   std::uint32_t m_tests[TrianglePairBatch::kSize];
   ElementPair m_candidates[TrianglePairBatch::kSize];

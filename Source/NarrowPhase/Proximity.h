@@ -9,11 +9,11 @@
 
 namespace palpate {
 
-/// Method::Proximity of findContacts().
+/// Implements Method::Proximity of findContacts().
 ///
-/// Distinct, self-collision: of two vertices nearest to each other's triangles in a corner the
-/// lower one is the contact's vertex. A vertex's own triangles count for nothing: they neither hold
-/// nor drop a contact.
+/// Self-collision with Contacts::Distinct: if the closest points are two vertices, the contact
+/// names the lower one as its vertex. The triangles around a vertex neither report nor suppress
+/// contacts of that vertex.
 void findProximity(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);
 
 /// A feature of a mesh that holds a closest point, by the mesh's own ids.
@@ -41,8 +41,8 @@ inline bool holdsVertex(const Triangle& triangle, std::uint32_t vertex) {
   return triangle[0] == vertex || triangle[1] == vertex || triangle[2] == vertex;
 }
 
-/// What the corners with weights other than 0 span. Of a segment {p, q, q} or a point {p, p, p},
-/// some of whose corners are the same, the first name that the feature has.
+/// The feature that the corners with weights other than 0 span. In a segment {p, q, q} or a point
+/// {p, p, p} a feature has several names; returns the first.
 inline TriangleFeature spannedFeature(const Triangle& corners, const Eigen::Vector3d& barycentric) {
   bool a = barycentric[0] != 0.0, b = barycentric[1] != 0.0, c = barycentric[2] != 0.0;
   if (corners[1] == corners[2]) b = b || c, c = false;
@@ -59,7 +59,7 @@ inline EdgeFeature spannedFeature(double weight) {
   return weight == 1.0 ? EdgeFeature::End : EdgeFeature::Interior;
 }
 
-/// The contact of features that are measured at a time of the step: at its end, or at an impact.
+/// The contact of two features whose distance was measured at `time`: the step's end or an impact.
 inline VertexTriangleContact contactOf(std::uint32_t vertex, std::uint32_t triangle,
                                        const Triangle& corners,
                                        const VertexTriangleDistance& answer, double time = 1.0) {

@@ -2,8 +2,8 @@
 
 #include "NarrowPhase/FeatureTests.h"
 
-// Every pair is taken in floats relative to its corner a0 and scaled by a power of two, so that all
-// its coordinates are below 2. What floats then get wrong, in units of e = 2^-22:
+// The coordinates of every pair are taken relative to its corner a0, scaled by a power of two to
+// below 2, and rounded to floats. The errors that follow, in units of e = 2^-22:
 //
 // clang-format off
 //   coordinate difference              e per component: two coordinates off by e / 4 each, and one
@@ -16,9 +16,9 @@
 //   n . n, compared with it            280 e |v| L
 // clang-format on
 //
-// The thresholds below are those, rounded up, times 1 + thickness, which covers what the same
-// errors do to |n| and |u| in products with the thickness. A comparison with NaN is false and
-// leaves nothing out.
+// The thresholds below are these errors, rounded up, times 1 + thickness. The factor covers the
+// effect of the same errors on |n| and |u| in products with the thickness. A comparison with NaN is
+// false, and drops no feature pair.
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "NarrowPhase/ProximityFilter.cpp"
@@ -31,7 +31,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using Batch = TrianglePairBatch;
 constexpr int kSize = Batch::kSize, kRows = Batch::kRows;
-constexpr int kFirstRow = Batch::rowOfA(1, 0);  // not of a0
+constexpr int kFirstRow = Batch::rowOfA(1, 0);  // the first row after those of a0
 
 /// A batch in floats: coordinates relative to a0, scaled to below 2.
 struct ScaledBatch {
@@ -67,14 +67,14 @@ HWY_ATTR void scaleBatch(const TrianglePairBatch& batch, double thickness, doubl
   }
 }
 
-/// A triangle with what several tests of it share.
+/// A triangle with the values that several of its tests share.
 template <class V>
 struct TriangleFrame {
   Vector3<V> corner[3], edge[3];
   V square[3];                   // of the edges
   V length;                      // of the longest edge
-  Vector3<V> normal, inward[3];  // inward: from each edge, in the plane
-  V height, beyond[3];           // farther from the plane, or beyond an edge, is out of reach
+  Vector3<V> normal, inward[3];  // inward: perpendicular to each edge, in the plane
+  V height, beyond[3];           // thresholds: over the plane, and (negative) beyond each edge
 
   template <class D>
   HWY_INLINE void set(D d, V thickness) {
@@ -96,7 +96,7 @@ struct TriangleFrame {
   }
 };
 
-/// The tests, and the given one for the pairs that it is not ruled out for.
+/// Adds a test to the sets of those pairs for which it is not ruled out.
 template <class V, class M>
 HWY_INLINE V withTest(V tests, int test, M isOut) {
   const hn::DFromV<V> du;
@@ -108,7 +108,8 @@ HWY_INLINE V along(const Vector3<V>& a, const Vector3<V>& b) {
   return kTurned ? hn::Neg(dot(a, b)) : dot(a, b);
 }
 
-/// from: from each of the triangle's corners to the vertex; turned: the other way round.
+/// Whether a vertex is out of reach of a triangle. from0 to from2: the vectors from the triangle's
+/// corners to the vertex; kTurned: the opposite vectors.
 template <bool kTurned, class V>
 HWY_INLINE auto isOutOfReach(const TriangleFrame<V>& triangle, const Vector3<V>& from0,
                              const Vector3<V>& from1, const Vector3<V>& from2) {
@@ -118,7 +119,8 @@ HWY_INLINE auto isOutOfReach(const TriangleFrame<V>& triangle, const Vector3<V>&
   return hn::Or(isOut, hn::Lt(along<kTurned>(triangle.inward[2], from2), triangle.beyond[2]));
 }
 
-/// kReach: edges may matter by their distance though their closest points are not inside both.
+/// kReach: keeps edge pairs within edgeReach even if their closest points are not inside both
+/// edges.
 template <bool kDistinct, bool kReach>
 HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[kSize]) {
   const hn::CappedTag<float, kSize> d;
@@ -137,7 +139,7 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
     a.corner[0] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     a.set(d, thickness);
     b.set(d, thickness);
-    Vector3<V> from[3][3];  // a's corner i seen from b's corner j
+    Vector3<V> from[3][3];  // from b's corner j to a's corner i
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) from[i][j] = a.corner[i] - b.corner[j];
 
@@ -174,8 +176,8 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
           const V t = a.square[i] * vr - uv * ur;
           V sBeyond = sError, tBeyond = tError;
           if constexpr (kReach) {
-            // A line's closest point that is x beyond the edge's end leaves that end, and with it
-            // the edge, further than x |n| / (|u| |v|) from the other's line.
+            // Let the closest point of an edge's line be x beyond the edge's end. That end, and the
+            // whole edge, are then further than x |n| / (|u| |v|) from the other edge's line.
             const V normal = hn::Sqrt(normalSquare);
             sBeyond = sError + normal * reachB[j];
             tBeyond = tError + normal * reachA[i];

@@ -14,13 +14,13 @@ struct TrianglePairBatch {
   alignas(64) double coordinates[kRows][kSize];
 };
 
-/// Which feature pairs of each triangle pair may be within the thickness. Those left out are proven
-/// not to be.
+/// Finds the feature pairs of each triangle pair that may be within the thickness. All others are
+/// proven to be further apart.
 ///
 /// Shapes   possible: per pair, a set of the tests in NarrowPhase/FeatureTests.h.
-/// distinct leaves out edges, too, whose closest points are proven not to lie inside both; but
-/// keeps those that may be at most edgeReach apart.
-/// Errors   none; where coordinates over- or underflow nothing is left out.
+/// distinct: also drops edge pairs whose closest points are proven not to be inside both edges,
+/// except those that may be at most edgeReach apart.
+/// Errors   none; where coordinates overflow or underflow, no feature pair is dropped.
 void findPossibleProximity(const TrianglePairBatch&, double thickness, bool distinct,
                            double edgeReach, std::uint32_t (&possible)[TrianglePairBatch::kSize]);
 

@@ -94,8 +94,7 @@ bool StepCheck::isAnsweredAtEnd(const Features<kind>& features, std::uint32_t in
   else
     distance = finiteEdgeEdgeDistance(at(0), at(1), at(2), at(3)).distance;
   if (distance > m_pair.thicknessAtEnd()) return false;
-  // Distinct: edges that are nearest at their ends were not measured further apart than
-  // edgeReach().
+  // With Distinct, edges whose closest points are ends were measured only up to edgeReach().
   return distance > motion || kind == Kind::VertexTriangle ||
          m_pair.settings.contacts != Contacts::Distinct;
 }

@@ -9,44 +9,48 @@
 
 namespace palpate {
 
-/// What a pair's step means for features that were measured at its end.
+/// Checks whether features that were measured at the step's end may have touched in the step, and
+/// records this in ContactBuffers::facts.
 class StepCheck {
  public:
   StepCheck(const MeshPair& pair, ContactBuffers& out) : m_pair(pair), m_out(out) {}
 
-  /// L: edges up to this far apart matter, even where their ends are nearest to each other.
+  /// L: edges up to this far apart are measured even where Contacts::Distinct reports no contact,
+  /// because they may have touched in the step.
   double edgeReach() const {
     const StepPlan& step = m_pair.step;
     return std::min(step.motion, step.impacts ? step.extra : m_pair.settings.thickness);
   }
 
-  /// Of a feature pair at most thicknessAtEnd() apart.
+  /// Records a feature pair that is at most thicknessAtEnd() apart.
   void noteDistance(double distance) {
     m_out.facts.clearance = std::min(m_out.facts.clearance, distance);
   }
-  /// The same pair, where the step may have brought it together: appends its impact if the step
-  /// asks for impacts, else notes its vertices. Returns whether an impact was appended, which takes
-  /// the place of a contact at the end. ofSecond: the first feature is of the second mesh.
+  /// Checks the same pair for a touch in the step. If it may have touched, appends its impact where
+  /// StepPlan::impacts is set, and otherwise records its vertices. Returns whether an impact was
+  /// appended; it replaces the contact at the step's end. ofSecond: Features::first is MeshPair::b.
   template <ImpactQuery::Kind kind>
   bool addImpactIfTouched(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond,
                           bool ofSecond, double distance);
 
-  /// Auto: whether proximity at the step's end says all there is to say of a feature pair.
+  /// Auto: whether proximity at the step's end suffices for a feature pair, so that no impact has
+  /// to be computed.
   template <ImpactQuery::Kind kind>
   bool isAnsweredAtEnd(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond) const;
 
-  /// Of an impact that is reported: what the rest of the step leaves of the distance.
+  /// Records an impact: lowers the clearance to what the rest of the step may leave of the
+  /// distance.
   template <ImpactQuery::Kind kind>
   void noteImpact(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond, double time,
                   double distance);
 
-  /// Triangles of contacts: notes those without area.
+  /// Records the triangle of a contact if it has no area.
   void noteTriangle(std::uint32_t triangle, bool ofSecond, const Eigen::Vector3d& a,
                     const Eigen::Vector3d& b, const Eigen::Vector3d& c);
   void noteEdges(const Segment& p, const Segment& q);
 
  private:
-  /// Whether the step may have brought features together that are so far apart at its end.
+  /// Whether features at this distance at the step's end may have touched in the step.
   template <ImpactQuery::Kind kind>
   bool mayTouchInStep(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond,
                       double distance) const;
@@ -57,15 +61,18 @@ class StepCheck {
   ContactBuffers& m_out;
 };
 
-/// Auto: of the contacts at the step's end those that share a vertex with features that may have
-/// touched (`touched`, sorted) are moved to `out` as their impacts, if they have one. A vertex that
-/// came through one triangle is on the wrong side of the next, too.
+/// Auto: replaces contacts at the step's end by impacts. This applies to contacts that share a
+/// vertex with features that may have touched (`touched`, sorted). If such a contact has an impact,
+/// it is removed from `found` and the impact is added to `out`. Reason: a vertex that passed
+/// through one triangle is on the wrong side of the neighbouring triangles, too.
 void answerByImpact(const MeshPair&, const StepFacts& touched, ContactBuffers& found,
                     ContactBuffers& out);
 
-/// Whether triangles intersect at the step's start, or its end; exactly. counts: exactDecisions.
+/// Whether two triangles intersect at the step's start or at its end; exact. counts: receives
+/// exactDecisions.
 bool intersect(const MeshPair&, bool atStart, const ElementPair&, ContactBuffers& counts);
-/// One of the candidates that does. counts: validityPairs too, and a scratch.
+/// Returns one of the candidates that intersect, if there is one. counts: receives exactDecisions
+/// and validityPairs, and serves as scratch.
 std::optional<ElementPair> anyIntersecting(const MeshPair&, bool atStart,
                                            std::span<const ElementPair> candidates,
                                            ContactBuffers& counts);

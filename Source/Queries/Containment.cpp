@@ -19,9 +19,10 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// Whether a triangle is certainly further from p than `distance`, and is measured so: no point of
-/// it is nearer than the nearest of its corners, seen along one direction, here towards their mean.
-/// Distances are off by 2^-48 of the furthest corner's at most, u . w by 2^-50 of |u| |w|.
+/// Whether a triangle is certainly further from p than `distance`, and so is its rounded distance.
+/// Along any direction, here towards the mean of the corners, no point of the triangle is nearer
+/// than its nearest corner. Errors: distances at most 2^-48 of the furthest corner's distance,
+/// u . w at most 2^-50 of |u| |w|.
 bool isBeyond(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
               const Eigen::Vector3d& c, double distance) {
   const Eigen::Vector3d u = a - p, v = b - p, t = c - p, w = u + v + t;
@@ -33,7 +34,7 @@ bool isBeyond(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::V
                        kNearestSlack * kNearestSlack * most);
 }
 
-/// One body, asked about points.
+/// Point queries for one body.
 class Body {
  public:
   Body(const SearchableGeometry& geometry, Engine engine, PointQueryStack& stack)
@@ -42,7 +43,7 @@ class Body {
         m_stack(stack),
         m_frame(geometry) {}
 
-  /// How often the surface winds about p; 0 on the surface.
+  /// The winding number of the surface about p; 0 on the surface.
   int windingNumber(const Eigen::Vector3d& p) {
     int number = 0;
     bool on = false;
@@ -67,7 +68,7 @@ class Body {
     return on ? 0 : number;
   }
 
-  /// The nearest point of the surface; of several, on the lowest triangle.
+  /// The nearest point of the surface. If several triangles are equally near, on the lowest.
   InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p) {
     VertexTriangleDistance best{Eigen::Vector3d::Zero(),  Eigen::Vector3d::Zero(),
                                 Eigen::Vector3d::Zero(),  std::numeric_limits<double>::infinity(),
@@ -89,7 +90,8 @@ class Body {
     if (m_bruteForce) {
       for (std::uint32_t i = 0; i < size(); ++i) tryOne(i);
     } else {
-      // A little more than the best: distances are rounded, and equal ones are looked for.
+      // A little more than the best distance squared: distances are rounded, and the search must
+      // also find equally near triangles.
       const auto bound = [&] {
         const double distance = best.distance * m_geometry.tree.frame().scale;
         return distance * distance * (1 + kNearestError);
@@ -120,7 +122,7 @@ class Body {
   bool m_bruteForce;
   PointQueryStack& m_stack;
   PointFrame m_frame;
-  std::uint32_t m_last = 0;  ///< nearest to the point before: not far from the next, often
+  std::uint32_t m_last = 0;  ///< the triangle nearest to the last point: often near the next one
 };
 
 }  // namespace
@@ -168,7 +170,7 @@ void checkInside(SearchableGeometry& body, const InsideSettings& settings) {
                 nameOf(body.id) + " is " + nameOf(topology.kind) + ", which has no inside",
                 body.id);
   if (settings.rule == InsideRule::WindingNumber) return;
-  if (body.solid) return;  // it has its tetrahedra
+  if (body.solid) return;  // its tetrahedra define its inside
   if (!topology.closed) topology.closed = findMeshDefects(topology.triangles).closed();
   if (*topology.closed) return;
   const MeshDefects defects = findMeshDefects(topology.triangles);

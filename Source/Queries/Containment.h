@@ -11,15 +11,18 @@
 
 namespace palpate {
 
-/// Which vertices of one geometry are inside another: by the winding number about each, counted
-/// exactly along a ray, or by solid angles; then the nearest point of the surface. Octrees must be
-/// of the positions now, and so must body.windingNumbers for InsideRule::WindingNumber. `out`:
-/// ascending vertices.
+/// Finds the vertices of one geometry that are inside another, and the nearest point of its surface
+/// for each. InsideRule::Closed counts the winding number about a vertex exactly along a ray, or
+/// searches the tetrahedra of a solid. InsideRule::WindingNumber sums solid angles. The octrees
+/// must be up to date with the positions now, and so must body.windingNumbers for
+/// InsideRule::WindingNumber. `out`: ascending vertices.
 void findInside(const SearchableGeometry& vertices, const SearchableGeometry& body,
                 const InsideSettings&, Engine, const Threads&, VertexSearch<InsideVertex>&,
                 std::vector<InsideVertex>& out);
 
-/// Throws NotClosed, with the first edge at fault, where the settings ask for a closed body.
+/// Throws InvalidSettings for settings out of range. Throws NotClosed for a body without faces. For
+/// InsideRule::Closed it also throws NotClosed, with the first edge at fault, if the body is not
+/// closed.
 void checkInside(SearchableGeometry& body, const InsideSettings&);
 
 }  // namespace palpate

@@ -5,13 +5,12 @@
 
 namespace palpate {
 
-/// Elements of the geometry's octree of which some point may be within `reach` of the shape: all
-/// that are, and some more.
+/// Finds all elements in the geometry's octree that are within `reach` of the shape at some time of
+/// the step, and some more. before, now: the shape at the ends of the step. Pass the same object
+/// twice for the step's end alone.
 ///
-/// Source   the distance to a convex shape is convex: over a box it is nowhere less than at the centre, less
-///          what the slope there takes away on the way to a corner.
-///
-/// At any time of the step; the same shape twice: as it is now.
+/// Source   The distance to a convex shape is convex. Over a box it is therefore at least the
+///          distance at the centre minus what the gradient there takes away up to a corner.
 void findElementsNear(const SearchableGeometry&, const Shape& before, const Shape& now,
                       double reach, PointQueryStack&, Buffer<std::uint32_t>& out);
 

@@ -9,10 +9,12 @@
 
 namespace palpate {
 
-/// Brings the octree over a solid's tetrahedra to the positions now; that over its surface must be.
+/// Updates the octree over a solid's tetrahedra to the positions now. The octree over its surface
+/// must be up to date.
 void updateTetrahedra(SearchableGeometry& solid, const OctreeSettings&, const Threads&);
 
-/// Searches for points in one solid; the octree of its tetrahedra must be of the positions now.
+/// Finds the tetrahedron of a solid that contains a point. The octree over the tetrahedra must be
+/// up to date.
 class SolidQuery {
  public:
   SolidQuery(const SearchableGeometry& solid, Engine engine, PointQueryStack& stack)
@@ -21,7 +23,7 @@ class SolidQuery {
         m_stack(stack),
         m_frame(solid) {}
 
-  /// The lowest tetrahedron that p is in.
+  /// The tetrahedron with the lowest id that contains p.
   std::optional<TetrahedronPoint> lowest(const Eigen::Vector3d& p);
 
  private:
@@ -31,8 +33,8 @@ class SolidQuery {
   PointFrame m_frame;
 };
 
-/// Which vertices of one geometry are in tetrahedra of another, and where in them. `out`: ascending
-/// vertices.
+/// Finds the vertices of one geometry that are in tetrahedra of another, with their weights there.
+/// `out`: ascending vertices.
 void findEmbedded(const SearchableGeometry& vertices, const SearchableGeometry& solid, Engine,
                   const Threads&, VertexSearch<EmbeddedVertex>&, std::vector<EmbeddedVertex>& out);
 

@@ -10,7 +10,7 @@ namespace palpate {
 namespace {
 
 constexpr std::size_t kGrain = 1024;
-constexpr std::size_t kTrianglesPerGroup = 1024;  ///< for bounds, before there are nodes
+constexpr std::size_t kTrianglesPerGroup = 1024;  ///< for bounds(), before there are nodes
 constexpr std::size_t kGroupGrain = 128;
 
 void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
@@ -25,7 +25,7 @@ void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame&
 
 GeometryOctree::Derived::Sources GeometryOctree::sources(const TriangleMesh& mesh,
                                                          Revision topology) const {
-  // A step without motion has the boxes of its end.
+  // Without motion, boxes over the step equal those at its end, and both have the same sources.
   const Positions& before = m_swept ? mesh.before : mesh.now;
   return {topology, mesh.now.bodyRevision(), before.bodyRevision()};
 }
@@ -88,7 +88,8 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
   m_tree.commit(now);
 }
 
-/// Boxes in the order of m_ordered, and those of the groups; in a new order these come first.
+/// Computes the boxes of the triangles in m_ordered, and those of the groups. reordered: first
+/// brings m_ordered into the octree's order.
 void GeometryOctree::computeBoxes(const TriangleMesh& mesh, std::span<const std::uint32_t> groups,
                                   FloatBox* groupBoxes, std::size_t grain, const Threads& threads,
                                   bool reordered) {
@@ -101,7 +102,7 @@ void GeometryOctree::computeBoxes(const TriangleMesh& mesh, std::span<const std:
   });
 }
 
-/// Boxes in the order of m_ordered, and the bounds of all.
+/// Computes the boxes of the triangles in m_ordered, and returns the bounds of all.
 FloatBox GeometryOctree::bounds(const TriangleMesh& mesh, const Threads& threads) {
   const std::size_t size = m_ordered.size(),
                     count = (size + kTrianglesPerGroup - 1) / kTrianglesPerGroup;
@@ -115,7 +116,7 @@ FloatBox GeometryOctree::bounds(const TriangleMesh& mesh, const Threads& threads
   return all;
 }
 
-/// Triangles in the memory that may have been keys. Their values are indeterminate.
+/// Starts m_ordered in memory that may have held keys. Its values are indeterminate.
 void GeometryOctree::startOrdered(std::size_t size) {
   m_ordered = {};
   m_ordered = m_orderedMemory.start<Triangle>(size + BoxArrays::kPadding).first(size);
@@ -126,7 +127,7 @@ void GeometryOctree::rebuild(const TriangleMesh& mesh, const OctreeSettings& set
   Stopwatch watch;
   const FloatBox all = bounds(mesh, threads);
   boxMilliseconds += watch.lap();
-  // Triangles in the old order are of no use any more: their memory is the keys'.
+  // Triangles in the old order are no longer needed. The keys use their memory.
   const std::size_t size = m_ordered.size();
   m_ordered = {};
   const auto keys = m_orderedMemory.start<std::uint64_t>(size);

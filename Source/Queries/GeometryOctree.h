@@ -19,23 +19,24 @@ namespace palpate {
 
 /// The octree over one geometry's elements, with the float positions that its boxes come from.
 ///
-/// An update that throws leaves no tree: the next one builds it anew.
+/// If an update throws, there is no valid tree, and the next update builds it anew.
 class GeometryOctree {
  public:
-  /// Before update(): whether boxes must enclose the whole step, because a pair's method needs it.
+  /// Call before update(). swept: a pair's method needs boxes that enclose the whole step.
   void setSwept(bool swept) { m_swept = swept; }
   bool isSwept() const { return m_swept; }
-  /// Before update(): the float frame's origin for the positions now, if the tree is outdated.
-  /// Returns the extent (L) of the bulk of the geometry.
+  /// Call before update(). Chooses the float frame's origin for the positions now, if the tree is
+  /// outdated. Returns spread().
   double sampleFrame(const TriangleMesh&, Revision topology);
   bool isCurrent(const TriangleMesh&, Revision topology, double scale) const;
-  /// scale: of the float frame, common to all geometries.
+  /// scale: the scale of the float frames, common to all geometries.
   void update(const TriangleMesh&, Revision topology, double scale, const OctreeSettings&,
               const Threads&);
-  /// Triangles that meet nowhere but in common vertices and edges, of a self-collision pair.
+  /// For self-collision: finds neighbouring triangles that certainly meet nowhere but in common
+  /// vertices and edges. Returns UnfoldedStars::triangles().
   const Triangle* findUnfoldedStars(const TriangleMesh&, const Threads&);
 
-  /// Whether the boxes enclose these positions in the body's frame, whatever else they enclose.
+  /// Whether the boxes enclose the positions now, in the body's frame. They may enclose more.
   bool encloses(const TriangleMesh&, Revision topology) const;
   std::uint64_t updates() const { return m_updates; }  ///< counts update()
   bool isValid() const { return m_tree.isValid(); }    ///< no update has failed since
@@ -43,7 +44,7 @@ class GeometryOctree {
   const FloatFrame& frame() const { return m_frame; }
   double spread() const { return m_spread; }  ///< L: extent of most positions
   const FloatPoint* floats() const { return m_floats.data(); }
-  /// Of the step's start, where boxes enclose the step; else of the positions now.
+  /// The floats at the step's start if the boxes enclose the step, else those of the positions now.
   const FloatPoint* floatsAtStart() const {
     return (m_treeSwept ? m_floatsBefore : m_floats).data();
   }
@@ -69,15 +70,15 @@ class GeometryOctree {
   double m_spread = 0;
   bool m_swept = false, m_treeSwept = false;
   Buffer<FloatPoint> m_floats, m_floatsBefore;
-  std::span<Triangle> m_ordered;  ///< none during a build
-  Arena m_orderedMemory;          ///< of these, or of the keys of a build
+  std::span<Triangle> m_ordered;  ///< empty during a build
+  Arena m_orderedMemory;          ///< of m_ordered, or of the keys during a build
   UnfoldedStars m_stars;
   Octree m_octree;
   Buffer<std::uint32_t> m_boundsGroups;  ///< scratch of a rebuild
   Buffer<FloatBox> m_boundsBoxes;
   Derived m_tree;
   std::uint64_t m_updates = 0;
-  bool m_isBuilt = false;  ///< for the topology of m_tree, so that it can be refitted
+  bool m_isBuilt = false;  ///< for the topology of m_tree; the tree can be refitted
 };
 
 }  // namespace palpate

@@ -26,7 +26,8 @@ Eigen::Vector3d pointAt(const Corners& corners, const Eigen::Vector3d& weights) 
   return weights[0] * corners[0] + weights[1] * corners[1] + weights[2] * corners[2];
 }
 
-/// An edge's direction, the normal, and what is across both; none of a triangle without area.
+/// An edge's direction, the normal, and the direction perpendicular to both. Nothing for a triangle
+/// without area.
 std::optional<Eigen::Matrix3d> axesOf(const Corners& t) {
   Eigen::Matrix3d axes;
   const Eigen::Vector3d edge = t[1] - t[0], normal = edge.cross(t[2] - t[0]);
@@ -37,7 +38,7 @@ std::optional<Eigen::Matrix3d> axesOf(const Corners& t) {
   return axes;
 }
 
-/// How a triangle turned; not at all where that cannot be said.
+/// The rotation of a triangle between two states; the identity where a triangle has no area.
 Eigen::Matrix3d turnOf(const Corners& before, const Corners& now) {
   if (before == now) return Eigen::Matrix3d::Identity();
   const auto from = axesOf(before), to = axesOf(now);
@@ -45,8 +46,8 @@ Eigen::Matrix3d turnOf(const Corners& before, const Corners& now) {
   return *to * from->transpose();
 }
 
-/// Where the segment from p to q crosses a triangle that it is not in the plane of: weights of the
-/// corners. Whether it does is exact.
+/// The weights of the corners at the point where the segment from p to q crosses a triangle.
+/// Nothing if it does not cross the triangle, or lies in its plane; this decision is exact.
 std::optional<Eigen::Vector3d> crossing(const Eigen::Vector3d& p, const Eigen::Vector3d& q,
                                         const Corners& t, SignCounts& counts) {
   if (orient3d(t[0], t[1], t[2], p, counts) == orient3d(t[0], t[1], t[2], q, counts)) return {};
@@ -68,7 +69,7 @@ std::optional<Eigen::Vector3d> crossing(const Eigen::Vector3d& p, const Eigen::V
 }  // namespace
 
 struct PenetrationTracker::Implementation {
-  /// A vertex and its surface point, as they were.
+  /// A vertex and its surface point at the end of a step.
   struct Place {
     std::uint32_t vertex, triangle;
     Eigen::Vector3d barycentric, direction;
@@ -88,14 +89,14 @@ struct PenetrationTracker::Implementation {
   std::vector<PointQueryStack> stacks;
 };
 
-/// Finds where directions leave the body.
+/// Finds surface points along directions, and chooses the penetration direction of a vertex.
 class PenetrationTracker::Implementation::Search {
  public:
   Search(const SearchableGeometry& body, Engine engine, PointQueryStack& stack)
       : m_body(body), m_bruteForce(engine == Engine::BruteForce), m_stack(stack), m_frame(body) {}
 
-  /// The first point of the surface from p along a unit direction, at most so far away; of several
-  /// triangles the lowest.
+  /// The first point of the surface from p along a unit direction, at most the distance `most`
+  /// away. If it is on several triangles, names the lowest.
   std::optional<InsideVertex> along(std::uint32_t vertex, const Eigen::Vector3d& p,
                                     const Eigen::Vector3d& direction, double most) {
     const Eigen::Vector3d q = p + most * direction;
@@ -171,7 +172,8 @@ std::span<const TrackedVertex> PenetrationTracker::update(const SpatialQueries& 
   const std::size_t size = all.inside.size(), parts = (size + kGrain - 1) / kGrain;
   const bool isSameSource = all.source == source.id();
   const bool isNewStep = !isSameSource || all.step != source.step();
-  // What throws comes before what changes, except for the entries of this step.
+  // If a call below throws, only the entries of this step are lost. Those of the step before stay
+  // in `last`, and the next update() of this step uses them.
   if (isNewStep && isSameSource && all.nowOf.isValid()) {
     std::swap(all.last, all.now);
     all.lastOf = all.nowOf;

@@ -14,7 +14,8 @@
 
 namespace palpate {
 
-/// What SpatialQueries search, with the scratch of their calls. Its owner implements the lookups.
+/// The geometries that SpatialQueries search, and the scratch of their calls. The owner of the
+/// geometries implements the virtual functions.
 class SpatialQueries::Source {
  public:
   /// Scratch of one call, which remembers its peak.
@@ -40,8 +41,8 @@ class SpatialQueries::Source {
   Source();
   virtual ~Source() = default;
 
-  /// Names one state of all geometries whose octrees are of the positions now. 0: there is none
-  /// such now.
+  /// A number for the present state of all geometries. 0: the octrees are not up to date, or the
+  /// owner is gone.
   virtual std::uint64_t state() const = 0;
   /// Throws UnknownGeometry.
   virtual SearchableGeometry& at(GeometryId) const = 0;
@@ -50,9 +51,9 @@ class SpatialQueries::Source {
   virtual const OctreeSettings& octreeSettings() const = 0;
   virtual const Threads& threads() const = 0;
 
-  std::uint64_t id() const { return m_id; }  ///< no other source of the process has it
+  std::uint64_t id() const { return m_id; }  ///< unique in the process
 
-  /// The threads for one call: one, where another call has the pool.
+  /// The threads for one call: the pool, or a single thread while another call uses the pool.
   class Workers {
    public:
     explicit Workers(Source& source)
@@ -65,12 +66,12 @@ class SpatialQueries::Source {
     const Threads& m_threads;
   };
 
-  // Brings up to date what is made when a query first needs it; one thread at a time.
+  // Update the structures that are made when a query first needs them. Run by one thread at a time.
   void prepareInside(SearchableGeometry& body, const InsideSettings&);
   void prepareTetrahedra(SearchableGeometry& solid);
 
  protected:
-  /// Held while octrees, or what queries add to them, are brought up to date.
+  /// Locked while octrees, and the structures that queries add to them, are updated.
   std::mutex m_preparing;
 
  private:
@@ -81,8 +82,8 @@ class SpatialQueries::Source {
   std::vector<std::unique_ptr<Scratch>> m_free;
 };
 
-/// Throws where the vertices of one geometry cannot be searched for in another:
-/// InvalidSettings for one geometry twice, UnsupportedMethod for a shape as `vertices`.
+/// Throws InvalidSettings if both geometries are the same, and UnsupportedMethod if `vertices` is a
+/// shape.
 void checkVertices(const SearchableGeometry& vertices, GeometryId body);
 
 }  // namespace palpate

@@ -20,7 +20,7 @@
 
 namespace palpate {
 
-/// The states of what users change of a geometry besides its positions.
+/// Revisions of the parts of a geometry that users can change, besides its positions.
 struct GeometryRevisions {
   RevisionCounter counter;
   Revision topology;  ///< elements, and the shape at rest
@@ -28,44 +28,45 @@ struct GeometryRevisions {
   Revision filter;
 };
 
-/// The tetrahedra whose surface a geometry is, and an octree over them, which is built when a query
-/// first needs it.
+/// The tetrahedra of a geometry that is the surface of a tetrahedral mesh, and an octree over them.
+/// The octree is built when a query first needs it.
 struct Solid {
   TetrahedralTopology topology;
   TetrahedronTree tree;
-  /// Of the geometry's topology and positions now; and its float frame then.
+  /// The topology and positions for which `tree` was updated, and the geometry's float frame then.
   DerivedFrom<2> treeOf;
   FloatFrame treeFrame;
 };
 
-/// A geometry with the octree over its elements: all that queries need of it.
+/// A geometry with the octree over its elements, and all other data that queries need.
 struct SearchableGeometry {
   explicit SearchableGeometry(GeometryId newId) : id(newId) {}
 
   GeometryId id;
   GeometryRevisions revisions;
-  TriangleMesh mesh;                 ///< topology and positions; of a shape, its corners
+  TriangleMesh mesh;                 ///< of a shape: no elements, and its corners as positions
   std::optional<PlacedShape> shape;  ///< of an analytical geometry
   GeometryOctree tree;
   std::unique_ptr<Solid> solid;  ///< of a tetrahedral mesh
   WindingNumbers windingNumbers;
 
-  /// Whether setTransform() has placed it: its octree is in the body's frame.
+  /// Whether setTransform() has placed the geometry. Its octree is then in the body's frame.
   bool isPlaced() const { return mesh.now.isPlaced(); }
 };
 
 /// The origin of a geometry's float frame in the world.
 Eigen::Vector3d worldOrigin(const SearchableGeometry&);
 
-/// Brings the boxes of a geometry's octree into the world, in floats about `origin`, grown by
-/// `thickness` (in those floats): at the positions now, or over the whole step. Changes nothing
-/// where the geometry is not placed.
+/// The map from boxes of a geometry's octree to boxes in the world, as floats relative to `origin`.
+/// It grows them by `thickness`, in units of these floats. The boxes enclose the positions now, or
+/// the whole step. For a geometry that is not placed, the map changes nothing.
 BoxMap worldMap(const SearchableGeometry&, const Eigen::Vector3d& origin, double thickness,
                 bool wholeStep);
 
 std::string nameOf(GeometryId);    ///< "geometry 3"
 std::string nameOf(GeometryKind);  ///< "a line mesh"
-/// Throws unless the geometry is of triangles (of tetrahedra), which `call` changes.
+/// Throws UnsupportedMethod unless the geometry is a triangle mesh or, with `tetrahedra`, a
+/// tetrahedral mesh. call: the end of the message.
 void checkTopologyKind(const SearchableGeometry&, bool tetrahedra, const char* call);
 
 }  // namespace palpate

@@ -14,11 +14,12 @@
 
 namespace palpate {
 
-/// An octree over the boxes of tetrahedra, for points in them. Refitted where only positions
-/// changed, until it has become loose.
+/// An octree over the boxes of tetrahedra, for point-in-tetrahedron queries. It is refitted until
+/// it has become loose, and then rebuilt.
 class TetrahedronTree {
  public:
-  /// floats: of the vertices, in a frame of which `bulk` is the extent of most of them.
+  /// Each update must have the same tetrahedra. floats: the positions of the vertices. bulk: the
+  /// extent of most of them, in the same frame.
   void update(std::span<const Tetrahedron>, const FloatPoint* floats, double bulk,
               const OctreeSettings&, const Threads&);
 
@@ -32,7 +33,7 @@ class TetrahedronTree {
   Octree m_octree;
   std::vector<Tetrahedron> m_ordered;
   Buffer<std::uint64_t> m_keys;  ///< scratch
-  bool m_known = false;          ///< built, and the last update did not fail
+  bool m_known = false;          ///< the tree is built, and the last update did not throw
 };
 
 }  // namespace palpate

@@ -10,7 +10,8 @@
 
 namespace palpate {
 
-/// Takes points of the world to the float frame of a geometry's octree, also of a placed one.
+/// Converts points in the world to float boxes, for comparison with the boxes of a geometry's
+/// octree after map().
 class PointFrame {
  public:
   explicit PointFrame(const SearchableGeometry& geometry)
@@ -24,7 +25,7 @@ class PointFrame {
 
  private:
   FloatFrame m_frame;  ///< of boxes in the world
-  BoxMap m_map;        ///< that brings them there
+  BoxMap m_map;        ///< from the octree's boxes to m_frame
 };
 
 /// Scratch of searchVertices(), which remembers its peak.
@@ -37,9 +38,9 @@ struct VertexSearch {
   std::vector<Part> parts;
 };
 
-/// Calls ask(vertex) for each vertex of a geometry that is in an element, enabled or not; `out`
-/// receives the answers, by ascending vertices. start(stack): makes `ask` for a range of vertices;
-/// ask(vertex) returns a std::optional<Answer>.
+/// Calls ask(vertex) for each vertex of a geometry that is in an element, enabled or not, and
+/// collects the answers in `out`, by ascending vertices. start(stack) makes `ask` for a range of
+/// vertices; ask(vertex) returns a std::optional<Answer>.
 template <class Answer, class Start>
 void searchVertices(const MeshTopology& topology, const Threads& threads,
                     VertexSearch<Answer>& scratch, std::vector<Answer>& out, Start&& start) {

@@ -14,7 +14,8 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::size_t kBlocksPerPart = 64;
-/// Radii of a cluster from which it is far away, the cheapest first: any give the same answers.
+/// The distances, in radii of a cluster, from which it counts as far away. The cheapest comes
+/// first; all give the same answers.
 constexpr std::array<double, 3> kFar = {4, 8, 24};
 
 WindingNumbers::Answer answer(double least, double most, double margin) {
@@ -22,7 +23,7 @@ WindingNumbers::Answer answer(double least, double most, double margin) {
   return {!outside, outside || inside};
 }
 
-/// Whose number the sum is off by the error: of either sign.
+/// The answer for a sum with an error bound. The sum may have either sign.
 WindingNumbers::Answer answer(const SeenShare& sum, double margin) {
   const double number = std::abs(sum.value);
   return answer(number - sum.error, number + sum.error, margin);
@@ -47,7 +48,7 @@ void WindingNumbers::Cluster::reach(const Cluster& part) {
   radius = std::max(radius, (part.centre - centre).norm() + part.radius);
 }
 
-/// The triangles that a node holds itself.
+/// Computes the cluster of the triangles that a node holds itself, without its children.
 void WindingNumbers::addOwn(const SearchableGeometry& body, OctreeNode node) {
   Cluster& all = m_clusters[node] = {};
   const auto [begin, end] = body.tree.octree().ownRange(node);
@@ -84,7 +85,7 @@ void WindingNumbers::update(const SearchableGeometry& body, const Threads& threa
       else
         addOwn(body, node);
   });
-  // Children come after their parents.
+  // Children come after their parents, so that this order completes the children first.
   for (std::size_t block = blocks; block-- > 1;) {
     Cluster& parent = m_clusters[octree.parent(block)];
     Cluster own = parent;
@@ -141,7 +142,8 @@ WindingNumbers::Answer WindingNumbers::ask(const SearchableGeometry& body, const
         ofNear.add(seenShare(p, now[a], now[b], now[c]));
       }
     });
-    // Only where the sum of all, within its own bound, is sure to decide the same.
+    // Decided only if the sum over all triangles, within its own error bound, certainly gives the
+    // same decision.
     const SeenShare sum{
         ofFar.value + ofNear.value,
         ofFar.error + 2 * ofNear.error + kWindingSlack * static_cast<double>(octree.size())};

@@ -14,31 +14,33 @@ namespace palpate {
 
 struct SearchableGeometry;
 
-/// The generalised winding number of any triangles about points: the sum of the shares of all
-/// directions that they take, each by its side. Of a closed body it is the winding number.
+/// The generalised winding number of any triangles about points: the sum of their solid angles, as
+/// shares of the sphere, signed by the side that faces the point. For a closed body it is the
+/// winding number.
 ///
 /// Source   Jacobson, Kavan, Sorkine-Hornung (2013); Barill, Dickson, Schmidt, Levin, Jacobson: Fast
-///          winding numbers for soups and clouds (2018). Difference: of what is far the error is
-///          bounded, 3 A r² / 4 pi (d - r)^4 for triangles of area A within r of a centre at the
-///          distance d, which is what the third derivatives of 1 / d leave of the first two
-///          moments; near ones are summed; and where the bounds do not decide, further ones are, at
-///          last all.
+///          winding numbers for soups and clouds (2018). Difference: the error of far triangles is
+///          bounded. For triangles of total area A within r of a centre at the distance d it is at
+///          most 3 A r² / 4 pi (d - r)^4: the remainder after the first two moments, from the third
+///          derivatives of 1 / d. Near triangles are summed one by one. Where the bounds do not
+///          decide, further triangles are summed too, in the end all.
 class WindingNumbers {
  public:
   struct Answer {
-    bool inside;   ///< or not decided
-    bool decided;  ///< which all bounds agree on
+    bool inside;   ///< also true if not decided
+    bool decided;  ///< the error bounds leave no doubt
   };
 
-  /// Brings the clusters to the body's positions now, which its octree must be of.
+  /// Updates the clusters to the body's positions now. The body's octree must be up to date.
   void update(const SearchableGeometry& body, const Threads&);
-  /// After update(). Whether the number's magnitude is at least 1/2; not decided within the margin
-  /// of that, and what rounding leaves open. As by the sum of all, whatever the octree.
+  /// Call after update(). Returns whether the winding number's magnitude is at least 1/2. Not
+  /// decided if it is within `margin` of 1/2, or if rounding errors leave this open. The answer is
+  /// that of the sum over all triangles, and does not depend on the octree.
   Answer ask(const SearchableGeometry& body, const Eigen::Vector3d&, double margin, bool bruteForce,
              PointQueryStack&) const;
 
  private:
-  /// Triangles far away: seen from their centre of mass.
+  /// Moments of a set of triangles about their centre of mass, for points far away.
   struct Cluster {
     Eigen::Vector3d centre = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();  ///< integral of (x - centre) normal^T
@@ -50,7 +52,7 @@ class WindingNumbers {
   SeenShare share(const Cluster&, const Eigen::Vector3d& p, double distance) const;
 
   DerivedFrom<2> m_clustersOf;      ///< positions in the body's frame, and the transform
-  std::uint64_t m_treeUpdates = 0;  ///< GeometryOctree::updates() then
+  std::uint64_t m_treeUpdates = 0;  ///< GeometryOctree::updates() for which m_clusters hold
   Buffer<Cluster> m_clusters;       ///< by octree node
   double m_magnitude = 0;           ///< L: of the coordinates
 };

@@ -9,7 +9,7 @@ namespace palpate {
 
 namespace {
 
-/// Triangle pairs that may be checked in a frame without contacts, and pairs checked at once.
+/// Triangle pairs that may be tested besides one for each contact, and pairs tested together.
 constexpr std::size_t kFreeChecks = 32, kChecksTogether = 16;
 
 }  // namespace

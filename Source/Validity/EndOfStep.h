@@ -8,17 +8,20 @@
 
 namespace palpate {
 
-/// What a step's contacts tell of its end.
+/// Whether triangles intersect at a step's end, as far as its contacts determine this.
 struct EndOfStep {
-  std::optional<ElementPair> intersecting;
-  /// Without one: no triangles intersect, if none did at the start.
+  std::optional<ElementPair> intersecting;  ///< a pair that does
+  /// If there is no such pair: whether it is certain that no triangles intersect at the step's end,
+  /// provided that none did at its start.
   bool isKnown = true;
 };
 
-/// Triangles that were apart can only intersect where features of theirs have touched. contacts:
-/// all of the step, in their order, by impact wherever features may have touched.
-/// Cost     checks at most one triangle pair for each contact and a few more; where these do not
-///          suffice nothing is known.
+/// Tests the triangles around a step's contacts for intersections at the step's end. This suffices
+/// because triangles that were apart can only intersect where their features have touched.
+/// contacts: all contacts of the step, sorted. Features that may have touched must be among them by
+/// their impacts.
+/// Cost     tests at most one triangle pair for each contact and 32 more. If these do not suffice,
+///          isKnown is false.
 EndOfStep checkEnd(const MeshPair&, const CollisionData::Contents& contacts,
                    ContactBuffers& counts);
 

@@ -18,8 +18,9 @@ bool hasProximity(const GeometryInStep& a, const GeometryInStep& b, double thick
   return a.isShape || b.isShape || thickness + (a.mesh.largestRadius + b.mesh.largestRadius) > 0.0;
 }
 
-/// Auto with lines, points or shapes: at rest Proximity, which costs least; in a step that moves
-/// features Continuous, which alone misses no impact.
+/// Auto with lines, points or shapes. At rest it chooses Proximity, which costs least. In a step
+/// that moves features it chooses Continuous, which alone misses no impact, if the pair supports
+/// it.
 static void chooseMethod(const PairSettings& settings, const GeometryInStep& a,
                          const GeometryInStep& b, PairPlan& plan) {
   const bool proximity = hasProximity(a, b, settings.thickness);
@@ -69,7 +70,7 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
   } else if (settings.method == Method::Intersection) {
     plan.nearby = plan.motion <= std::min(a.smallestHeight, b.smallestHeight) ? plan.motion : 0.0;
   } else if (settings.method == Method::Proximity && plan.motion > thickness) {
-    step.motion = 0.0;  // not to be trusted, whatever is found
+    step.motion = 0.0;  // the result cannot be trusted, so the step need not be examined
   }
   return plan;
 }

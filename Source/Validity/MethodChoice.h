@@ -10,11 +10,11 @@
 
 namespace palpate {
 
-/// What the choice of a method, and what makes its answer trusted, depend on of one geometry.
+/// The data of one geometry from which a method is chosen and Validity::trusted is decided.
 struct GeometryInStep {
   const TriangleMesh& mesh;
   bool isShape;
-  double smallestHeight;       ///< L: of a triangle with area, when the topology was set
+  double smallestHeight;       ///< L: of all triangles with area, in the shape at rest
   MotionRange range;           ///< from before to now
   MotionRange correction;      ///< from `detected` to before
   double arcDeviation;         ///< L: Validity::arcDeviation
@@ -23,29 +23,33 @@ struct GeometryInStep {
   const Positions& detected;   ///< the end `now` of the last detection
 };
 
-/// How a pair is answered in this frame.
+/// The method of a pair in this frame, and what the narrow phase must find out for it.
 struct PairPlan {
   Method method = Method::Intersection;  ///< Auto: Proximity and Continuous
   MethodReason reason = MethodReason::Asked;
-  double motion = 0;           ///< L: largest of two features, relative to each other
+  double motion = 0;           ///< L: largest motion of two features relative to each other
   double arcDeviation = 0;     ///< L: of both geometries
   double motionTolerance = 0;  ///< L: Auto's
-  double nearby = 0;  ///< L: Intersection asks for boxes within this, to know of what was near
+  /// L: for Intersection the traversal finds boxes up to this far apart, because its validity
+  /// depends on whether anything was near.
+  double nearby = 0;
   StepPlan step;
-  bool overlaps = false;  ///< Auto: Intersection is asked, too, unless the step starts apart
-  bool startsIntersecting = false;  ///< known before
-  /// Boxes hold the whole step.
+  bool overlaps = false;            ///< Auto: Intersection runs, too, unless the step starts apart
+  bool startsIntersecting = false;  ///< triangles are known to intersect at the step's start
+  /// Whether the boxes enclose the motion over the whole step.
   bool swept() const { return method == Method::Continuous || method == Method::Auto; }
 };
 
-/// Whether Method::Continuous answers a pair of these geometries.
+/// Whether Method::Continuous supports a pair of these geometries.
 bool hasContinuous(const GeometryInStep& a, const GeometryInStep& b);
-/// Whether Method::Proximity does.
+/// Whether Method::Proximity supports a pair of these geometries.
 bool hasProximity(const GeometryInStep& a, const GeometryInStep& b, double thickness);
-/// Whether both are of triangles. Bounds on motion hold for these, as they have no radius.
+/// Whether both geometries have triangles. Only for these do the bounds on motion hold, because
+/// they have no radius.
 bool knowsSides(const GeometryInStep& a, const GeometryInStep& b);
 
-/// From the settings, which are good, and how the geometries moved, if that matters.
+/// Plans a pair's frame from valid settings and from how the geometries moved. moves: whether that
+/// motion is used; otherwise it counts as 0.
 PairPlan planOf(const PairSettings&, const GeometryInStep& a, const GeometryInStep& b,
                 bool moves = true);
 

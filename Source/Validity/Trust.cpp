@@ -16,7 +16,8 @@ namespace {
 /// were not needed are saved for later, with earliestTimeOnly one.
 constexpr int kFramesPerCheck = 16, kMostSaved = 4 * kFramesPerCheck;
 
-/// Vertices that may have moved further than `reach` relative to the other mesh.
+/// Appends vertices that may have moved further than `reach` relative to the other mesh, until
+/// `out` has Validity::kMostFarMovers.
 void addFarMovers(std::vector<std::uint32_t>& out, const GeometryInStep& mesh,
                   const GeometryInStep& other, double reach) {
   const MotionRange& range = other.range;
@@ -39,7 +40,7 @@ std::array<Revision, 8> statesOf(const GeometryInStep& a, const Positions& ofA,
           b.topology, b.enabled, ofB.bodyRevision(), ofB.transformRevision()};
 }
 
-/// Auto, and the pair has its tolerance.
+/// Whether the pair uses Auto's motion tolerance.
 bool hasTolerance(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b) {
   return settings.method == Method::Auto && knowsSides(a, b);
 }
@@ -53,9 +54,9 @@ double reachOf(const PairSettings& settings, const GeometryInStep& a, const Geom
                                           : std::min(a.smallestHeight, b.smallestHeight);
 }
 
-/// Whether the step met the method's conditions, which are about vertices that move in straight
-/// lines. validity: with startedApart and reach. foundOrFar: triangles intersect at the end, or no
-/// boxes came near each other.
+/// Whether the step met the method's conditions, if vertices move in straight lines. validity:
+/// startedApart and reach must be set. foundOrFar: triangles intersect at the end, or no boxes came
+/// near each other.
 bool meetsConditions(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
                      const PairPlan& plan, const StepFacts& facts, const Validity& validity,
                      bool foundOrFar) {
@@ -83,7 +84,7 @@ void Trust::forget() {
 
 void Trust::start(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
                   PairPlan& plan) {
-  // No two features within the thickness are further apart, in any coordinate, than both meshes.
+  // Coordinates of two features within the thickness differ by at most this size.
   const double size = a.extent + b.extent + settings.thickness + plan.step.extra;
   plan.step.certain = plan.step.motion + 2.0 * kMotionError * (plan.step.motion + size);
 
@@ -112,7 +113,7 @@ void Trust::start(const PairSettings& settings, const GeometryInStep& a, const G
   plan.overlaps = settings.method == Method::Auto;
   plan.step.start = !plan.startsIntersecting && (plan.overlaps || m_saved >= kFramesPerCheck);
   if (plan.step.start) m_saved = std::max(m_saved - kFramesPerCheck, 0);
-  // It will not be trusted, whatever is seen of the step.
+  // The result cannot be trusted, so the step need not be examined.
   if (plan.method == Method::Proximity && settings.method == plan.method && !plan.step.start)
     plan.step.motion = 0.0;
 }
@@ -157,7 +158,7 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   validity.trusted = trustedIfStraight && validity.arcDeviation <= settings.thickness;
   validity.sideMayBeWrong = plan.method != Method::Intersection && !validity.trusted;
   m_atEnd = {};
-  // Intersection measures no distances: meshes that do not intersect may be as near as they like.
+  // Intersection measures no distances: meshes that do not intersect may be arbitrarily near.
   m_atEnd.clearance =
       plan.method == Method::Intersection ? 0.0 : std::min(facts.clearance, settings.thickness);
   if (!contents.intersectingTriangles.empty()) {

@@ -12,13 +12,14 @@ namespace palpate {
 
 /// Whether a pair's meshes are known to be apart where a step starts.
 ///
-/// What was found out is kept with the states of both geometries that it holds for. So it serves
-/// the next step, which starts where this one ends, and further detections of the same step.
+/// Each result is stored with the states of both geometries for which it holds. It therefore also
+/// serves the next step, which starts where this one ends, and further detections of the same step.
 class Trust {
  public:
-  /// Before a detection: decides whether it also tests the step's start.
+  /// Call before a detection. Decides whether the initial intersection check runs.
   void start(const PairSettings&, const GeometryInStep& a, const GeometryInStep& b, PairPlan&);
-  /// After it, with what the narrow phase has found. counts: as of anyIntersecting().
+  /// Call after the detection, with the results of the narrow phase. Writes Contents::validity.
+  /// nearby: whether any boxes came near each other. counts: as for anyIntersecting().
   void finish(const PairSettings&, const GeometryInStep& a, const GeometryInStep& b,
               const PairPlan&, const StepFacts&, bool nearby, const MeshPair&,
               CollisionData::Contents&, ContactBuffers& counts);
@@ -30,18 +31,17 @@ class Trust {
   struct Known {
     DerivedFrom<8> of;
     Position position = Position::Unknown;
-    double clearance = 0;                ///< L: Apart by at least
-    std::optional<ElementPair> witness;  ///< Intersecting: a pair that does, if known
+    double clearance = 0;                ///< L: if Apart, by at least this distance
+    std::optional<ElementPair> witness;  ///< if Intersecting, a pair that does, if known
   };
 
-  /// Where bounds on motion do not tell.
+  /// Determines m_atEnd where bounds on motion do not.
   void findEnd(const PairPlan&, const StepFacts&, const MeshPair&, const CollisionData::Contents&,
                ContactBuffers& counts);
 
   Known m_atStart, m_atEnd;  ///< of the step last detected
   DerivedFrom<4> m_topologies;
-  int m_saved =
-      0;  ///< tests of the step's start that were earned and not used, times kFramesPerCheck
+  int m_saved = 0;  ///< initial intersection checks saved for later, times kFramesPerCheck
 };
 
 }  // namespace palpate

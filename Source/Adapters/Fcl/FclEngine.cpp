@@ -25,7 +25,7 @@ using Eigen::Vector3d;
 using Model = fcl::BVHModel<fcl::OBBRSS<double>>;
 using Geometry = std::shared_ptr<fcl::CollisionGeometry<double>>;
 
-/// A geometry as FCL has it: shapes amid its own frame, capsules and cylinders along z.
+/// A geometry as FCL stores it: a shape is centred in its own frame, a capsule or cylinder along z.
 struct Body {
   Geometry geometry;
   fcl::Transform3d inFrame = fcl::Transform3d::Identity(), frame = fcl::Transform3d::Identity();
@@ -37,7 +37,7 @@ struct Body {
 
 Geometry modelOf(std::span<const Vector3d> positions, std::span<const Triangle> triangles) {
   auto model = std::make_shared<Model>();
-  if (triangles.empty()) return model;  // FCL would say so on the terminal
+  if (triangles.empty()) return model;  // FCL would print a warning
   std::vector<fcl::Triangle> indices;
   for (const auto& [a, b, c] : triangles) indices.emplace_back(a, b, c);
   model->beginModel(static_cast<int>(triangles.size()), static_cast<int>(positions.size()));
@@ -66,20 +66,21 @@ Body bodyOf(const Plane& p) {
   if (p.twoSided) return {Geometry(new fcl::Planed(normal, offset))};
   return {Geometry(new fcl::Halfspaced(normal, offset))};
 }
-/// Without faces, which FCL needs to walk along only: it asks every point.
+/// The hull has no faces. FCL uses faces only to walk over the surface; without them it tests every
+/// point.
 Body bodyOf(const ConvexHull& h) {
   return {std::make_shared<fcl::Convexd>(std::make_shared<const std::vector<Vector3d>>(h.points), 0,
                                          std::make_shared<const std::vector<int>>())};
 }
 
-/// Whether FCL has the distance in closed form. Others it searches for, and ends the process by an
-/// assertion where bodies lie along each other.
+/// Whether FCL computes the distance in closed form. For other pairs it searches for the distance,
+/// and an assertion in FCL ends the process where bodies lie along each other.
 bool hasDistance(fcl::NODE_TYPE a, fcl::NODE_TYPE b) {
   if (a == fcl::GEOM_SPHERE || b == fcl::GEOM_SPHERE) return std::max(a, b) < fcl::GEOM_CONVEX;
   return a == fcl::GEOM_CAPSULE && b == fcl::GEOM_CAPSULE;
 }
 
-/// Why FCL cannot answer a pair; empty if it can.
+/// Why FCL does not support a pair; empty if it does.
 std::string refusal(const Body& a, const Body& b, const PairSettings& settings) {
   if (&a == &b) return "does not find what a mesh does to itself";
   if (a.isMesh() != b.isMesh()) return "is asked for two triangle meshes or two shapes only";
@@ -98,7 +99,7 @@ std::string refusal(const Body& a, const Body& b, const PairSettings& settings) 
 void addTriangles(const Body& a, const Body& b, std::vector<ElementPair>& pairs) {
   for (const Body* body : {&a, &b})
     if (static_cast<const Model&>(*body->geometry).num_tris == 0) return;
-  // Without contacts, of which FCL has several for a pair of triangles, there is one of each.
+  // Without enable_contact (false) FCL reports each pair of triangles once, else several times.
   fcl::CollisionResultd result;
   fcl::collide(a.geometry.get(), a.place(), b.geometry.get(), b.place(),
                fcl::CollisionRequestd(std::numeric_limits<int>::max(), false), result);
@@ -111,7 +112,7 @@ void addTriangles(const Body& a, const Body& b, std::vector<ElementPair>& pairs)
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
 }
 
-/// By the deepest contact of collide() where they overlap, by distance() where they are apart.
+/// Appends the deepest contact of collide() if the bodies overlap, else that of distance().
 void addContact(const Body& a, const Body& b, double thickness,
                 std::vector<ShapeShapeContact>& contacts) {
   fcl::CollisionResultd overlap;
@@ -138,7 +139,7 @@ void addContact(const Body& a, const Body& b, double thickness,
 }  // namespace
 
 struct FclEngine::Implementation {
-  OctreeBasedCD input;  ///< keeps and checks what is handed in; computes no frame
+  OctreeBasedCD input;  ///< stores and checks the user's input; detects nothing
   std::map<GeometryId, Body> bodies;
   std::map<std::pair<GeometryId, GeometryId>, CollisionData> answers;
 };
@@ -170,7 +171,7 @@ void FclEngine::setPositions(GeometryId id, std::span<const Vector3d> now) {
   m_implementation->input.setPositions(id, now);
   auto& model = static_cast<Model&>(*m_implementation->bodies[id].geometry);
   if (model.num_tris == 0) return;
-  model.beginReplaceModel();  // endUpdateModel() would fit boxes over two frames
+  model.beginReplaceModel();  // endUpdateModel() would fit boxes over old and new positions
   model.replaceSubModel({now.begin(), now.end()});
   model.endReplaceModel(true, true);
 }
@@ -192,7 +193,7 @@ void FclEngine::setTransform(GeometryId id, const Eigen::Matrix3d& rotation,
 void FclEngine::addCollisionPair(GeometryId a, GeometryId b, const PairSettings& settings) {
   const auto& bodies = m_implementation->bodies;
   const auto first = bodies.find(a), second = bodies.find(b);
-  if (first != bodies.end() && second != bodies.end())  // others are refused below
+  if (first != bodies.end() && second != bodies.end())  // for unknown ids the call below throws
     if (const std::string reason = refusal(first->second, second->second, settings); reason != "")
       throw Error(ErrorCode::UnsupportedMethod,
                   "pair (" + std::to_string(static_cast<std::uint32_t>(a)) + ", " +

@@ -51,12 +51,12 @@ double toNumber(std::string_view word) {
   const auto [end, fault] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (fault == std::errc::invalid_argument || end != digits.data() + digits.size())
     throw FileFault{"\"" + std::string(word.substr(0, 40)) + "\" stands where a number should"};
-  // Out of double's range: from_chars leaves the value alone. Tiny ones are zero for any mesh.
+  // For numbers out of double's range from_chars does not set the value. Tiny ones count as zero.
   if (fault == std::errc::result_out_of_range) return digits.rfind('-') + 1 > 1 ? 0.0 : HUGE_VAL;
   return value;
 }
 
-std::size_t toCount(double number, std::size_t most) {  // NaN is none
+std::size_t toCount(double number, std::size_t most) {  // refuses NaN
   if (number > static_cast<double>(most)) throw FileFault{"it is shorter than its own counts say"};
   if (!(number >= 0 && number == std::floor(number)))
     throw FileFault{"one of its counts is no whole number from 0 on"};

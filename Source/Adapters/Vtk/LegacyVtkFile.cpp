@@ -5,9 +5,9 @@
 
 namespace palpate::vtk {
 
-// Read here and not by VTK 9.1, whose reader crashes on truncated files and wrong polygon sizes, or
-// gives a part of the mesh. Source: "VTK File Formats", Kitware: the simple legacy formats,
-// versions 1 to 5.1.
+// These files are not read by VTK 9.1: its reader crashes on truncated files and wrong polygon
+// sizes, or returns a part of the mesh. Source: "VTK File Formats", Kitware: the simple legacy
+// formats, versions 1 to 5.1.
 
 namespace {
 
@@ -25,7 +25,7 @@ class Reader {
     if (encoding == "BINARY") m_text.setEncoding(Encoding::BigEndian);
     if (encoding != "ASCII" && encoding != "BINARY")
       throw FileFault{"it says neither ASCII nor BINARY"};
-    // Data of points and of cells end what makes the mesh.
+    // The mesh ends where POINT_DATA or CELL_DATA begins.
     for (std::string section = keyword(); !section.empty() && !section.ends_with("_DATA");
          section = keyword())
       readSection(section);
@@ -67,7 +67,7 @@ class Reader {
     }
   }
 
-  /// Behind the name of its type; binary numbers begin after the end of the line.
+  /// Reads the name of a type, and numbers of that type. Binary numbers begin on the next line.
   std::vector<double> readArray(std::size_t count) {
     const NumberType type = typeNamed(m_text.word());
     m_text.line();
@@ -76,7 +76,7 @@ class Reader {
 
   void readCells(Polygons& polygons, bool strips) {
     const std::size_t first = m_text.count(), second = m_text.count();
-    if (m_offsets) {  // where each cell begins, and one more; then all corners
+    if (m_offsets) {  // the start of each cell and the end of the last; then all corners
       const std::vector<double> offsets = readNamed("OFFSETS", first);
       return polygons.addCells(offsets, readNamed("CONNECTIVITY", second), strips);
     }
@@ -100,7 +100,7 @@ class Reader {
   }
 
   FileText m_text;
-  bool m_offsets = false;  ///< cells as from version 5 on
+  bool m_offsets = false;  ///< cells are stored by offsets, as from version 5 on
   Polygons m_polygons;
 };
 

@@ -8,7 +8,7 @@
 
 namespace palpate::vtk {
 
-/// Why a file is refused: the sentence's part after its name.
+/// Why a file is rejected: the part of the message after the file's name.
 struct FileFault {
   std::string reason;
 };
@@ -18,13 +18,14 @@ struct NumberType {
   double (*decode)(const char* bytes);
 };
 
-/// By the name that any of the formats has for it; FileFault if none has.
+/// The type that any of the formats calls by this name. Throws FileFault if there is none.
 NumberType typeNamed(std::string_view name);
-double toNumber(std::string_view word);                ///< FileFault if it is none
-std::size_t toCount(double number, std::size_t most);  ///< FileFault unless whole, in [0, most]
+double toNumber(std::string_view word);                ///< throws FileFault if it is no number
+std::size_t toCount(double number, std::size_t most);  ///< throws unless whole and in [0, most]
 enum class Encoding { Ascii, LittleEndian, BigEndian };
 
-/// Reads a file's content from front to back; FileFault where it ends too early or holds no number.
+/// Reads a file's content from front to back. Throws FileFault where it ends too early or where a
+/// number is malformed.
 class FileText {
  public:
   explicit FileText(std::string_view content, Encoding encoding = Encoding::Ascii)
@@ -37,14 +38,14 @@ class FileText {
   std::string_view take(std::size_t bytes);
   double number(NumberType type = typeNamed("double"));
   std::vector<double> numbers(NumberType type, std::size_t count);
-  std::size_t count() { return toCount(toNumber(word()), left()); }  ///< each takes a byte
+  std::size_t count() { return toCount(toNumber(word()), left()); }  ///< at most the bytes left
 
  private:
   std::string_view m_rest;
   Encoding m_encoding;
 };
 
-/// What the formats have in common. Corners as the file gives them: not yet checked.
+/// The polygons of a file in any format, with unchecked corners.
 struct Polygons {
   std::vector<Eigen::Vector3d> positions;
   std::vector<std::vector<double>> corners;
@@ -55,7 +56,8 @@ struct Polygons {
   void addCells(std::span<const double> offsets, std::span<const double> all, bool strips);
 };
 
-// One function for each format, from the file's content; FileFault if it is not what it should be.
+// One reader for each format. It takes the file's content, and throws FileFault if that is
+// malformed.
 Polygons readObj(std::string_view content);
 Polygons readPly(std::string_view content);
 Polygons readLegacyVtk(std::string_view content);

@@ -4,11 +4,13 @@
 
 namespace palpate::vtk {
 
-// Read here and not by VTK, whose reader splits vertices by their normals and texture coordinates.
+// These files are not read by VTK: its reader splits vertices by their normals and texture
+// coordinates.
 
 namespace {
 
-/// "7", "7/1", "7//2" or "7/1/2", from 1, or negative: back from the newest vertex.
+/// Reads the vertex of "7", "7/1", "7//2" or "7/1/2". Positive indices begin at 1; negative indices
+/// count back from the newest vertex.
 double vertexOf(std::string_view corner, std::size_t vertexCount) {
   const double index = toNumber(corner.substr(0, corner.find('/')));
   if (index != std::floor(index)) throw FileFault{"an index is no whole number"};

@@ -5,8 +5,8 @@
 
 namespace palpate::vtk {
 
-// Read here and not by VTK 9.1, whose reader crashes on almost any truncated or damaged file, and
-// makes floats of doubles.
+// These files are not read by VTK 9.1: its reader crashes on almost any truncated or damaged file,
+// and converts doubles to floats.
 
 namespace {
 
@@ -55,7 +55,7 @@ std::vector<Element> readHeader(FileText& text) {
   throw FileFault{"its PLY header ends too early"};
 }
 
-/// A face's corners; strips one after the other, parted by -1.
+/// Adds the corners of a face, or triangle strips that are separated by -1.
 void addList(const std::string& element, const std::vector<double>& list, Polygons& polygons) {
   if (element == "face") polygons.corners.push_back(list);
   for (auto begin = list.begin(); element == "tristrips" && begin != list.end();) {

@@ -5,12 +5,13 @@
 
 namespace palpate::vtk {
 
-// Read here and not by VTK, whose reader drops facets without area and trusts a binary file's
+// These files are not read by VTK: its reader drops facets without area, and trusts a binary file's
 // count.
 
 namespace {
 
-/// Three coordinates after each "vertex"; a file that ends before "endsolid" is cut off.
+/// Reads three coordinates after each "vertex". A file that does not end with "endsolid" is
+/// truncated.
 std::vector<double> readText(FileText text) {
   std::vector<double> coordinates;
   bool ended = false;
@@ -24,7 +25,7 @@ std::vector<double> readText(FileText text) {
   return coordinates;
 }
 
-/// After a header facets of 50 bytes: a normal, three corners, two bytes more.
+/// Reads facets of 50 bytes after a header: a normal, three corners and two more bytes.
 std::vector<double> readBinary(FileText facets) {
   const NumberType real = typeNamed("float");
   std::vector<double> coordinates;
@@ -48,7 +49,7 @@ Polygons readStl(std::string_view content) {
   std::map<std::array<double, 3>, double> vertices;
   for (std::size_t i = 0; i < corners.positions.size(); ++i) {
     const Eigen::Vector3d& p = corners.positions[i];
-    if (!p.allFinite()) return corners;  // refused later
+    if (!p.allFinite()) return corners;  // the checks of all formats refuse these positions
     const double next = static_cast<double>(polygons.positions.size());
     const auto [vertex, isNew] = vertices.try_emplace({p.x(), p.y(), p.z()}, next);
     if (isNew) polygons.positions.push_back(p);

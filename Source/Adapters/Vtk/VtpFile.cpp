@@ -13,12 +13,13 @@
 
 namespace palpate::vtk {
 
-// VTK 9.1 uncompresses its blocks, and no more: its reader of these files prints past its
-// observers, divides by a damaged header's zero, and allocates and copies what its sizes say.
+// VTK 9.1 only decompresses the blocks of these files. Its reader is not used: it prints messages
+// that observers do not receive, divides by a zero in a damaged header, and allocates and copies by
+// unchecked sizes.
 
 namespace {
 
-/// Up to what is none; padding ends a group, not the text.
+/// Decodes the text up to the first group that is not Base64. Padding ends a group, not the text.
 std::string fromBase64(std::string_view text) {
   std::string bytes, group;
   for (const char c : text) {
@@ -27,7 +28,7 @@ std::string fromBase64(std::string_view text) {
     unsigned char decoded[3];
     const int count = vtkBase64Utilities::DecodeTriplet(group[0], group[1], group[2], group[3],
                                                         decoded, decoded + 1, decoded + 2);
-    const std::size_t padding = group.find('=');  // VTK takes it anywhere
+    const std::size_t padding = group.find('=');  // VTK accepts it anywhere
     if (count == 0 || padding < 2 || group.find_first_not_of('=', padding) != group.npos) break;
     bytes.append(decoded, decoded + count);
     group.clear();
@@ -35,7 +36,7 @@ std::string fromBase64(std::string_view text) {
   return bytes;
 }
 
-/// From an element's first tag to its last.
+/// The text from an element's first tag to its last.
 std::string_view elementIn(std::string_view text, const std::string& name) {
   const std::size_t begin = text.find("<" + name), end = text.find("</" + name);
   if (begin == text.npos) throw FileFault{"it holds no " + name};
@@ -43,7 +44,7 @@ std::string_view elementIn(std::string_view text, const std::string& name) {
   return text.substr(begin, end - begin);
 }
 
-/// Of an element's tag; empty if it has none.
+/// The value of an attribute in an element's tag; empty if there is none.
 std::string_view attributeOf(std::string_view element, const std::string& name) {
   const std::string_view tag = element.substr(0, element.find('>'));
   const std::size_t begin = tag.find(" " + name + "=\"");
@@ -67,7 +68,7 @@ class Reader {
  public:
   explicit Reader(std::string_view content)
       : m_xml(content.substr(0, content.find("<AppendedData"))), m_most(1000 * content.size()) {
-    // Appended data need not be XML: they are what follows "_" behind their tag.
+    // Appended data need not be XML. They follow the "_" after their tag.
     const std::string_view appended = content.substr(m_xml.size());
     const std::size_t start = appended.find('_', appended.find('>'));
     if (start != appended.npos) m_appended = appended.substr(start + 1);
@@ -103,7 +104,7 @@ class Reader {
     std::vector<double> corners =
         readArray(piece, group, "connectivity", toCount(offsets.back(), m_most));
     const double points = static_cast<double>(m_polygons.positions.size() - first);
-    for (double& corner : corners)  // one that is not of the piece becomes wrong in the whole
+    for (double& corner : corners)  // -1 is refused later: the corner is not in the piece
       corner = corner >= 0 && corner < points ? corner + static_cast<double>(first) : -1;
     m_polygons.addCells(offsets, corners, group == "Strips");
   }
@@ -130,8 +131,9 @@ class Reader {
     return FileText(bytes, m_encoding).numbers(type, size);
   }
 
-  /// A block's bytes behind its header: its length; or the number of compressed blocks, their
-  /// length and the last one's (0: as the others) before compression, and the lengths after it.
+  /// The bytes that follow a block's header, decompressed. Without compression the header is the
+  /// length. Otherwise it is the number of compressed blocks, their length before compression, that
+  /// of the last one (0: as the others), and all lengths after compression.
   std::string uncompressed(std::string_view block, std::size_t expected) const {
     FileText text(block, m_encoding);
     const auto length = [&] { return toCount(text.number(m_headerType), std::size_t{1} << 53); };
@@ -153,7 +155,7 @@ class Reader {
   }
 
   std::string_view m_xml, m_appended;
-  std::size_t m_most;  ///< numbers in such a file: a thousandth of a byte each, hardly less
+  std::size_t m_most;  ///< limit of counts: compressed numbers hardly take less than 1/1000 byte
   bool m_raw = false;
   vtkSmartPointer<vtkDataCompressor> m_compressor;
   Encoding m_encoding = Encoding::LittleEndian;

@@ -62,7 +62,7 @@ constexpr std::array<std::array<double, 3>, 6> kBodyColours{{{0.72, 0.25, 0.25},
                                                              {0.80, 0.65, 0.45},
                                                              {0.60, 0.60, 0.65}}};
 
-/// Copies of one shape, each at its place, turned, sized and coloured by its value.
+/// Copies of one shape, each with its place, size, rotation, and a value that gives its colour.
 class Glyphs {
  public:
   Glyphs() {
@@ -77,7 +77,8 @@ class Glyphs {
     m_sizes->InsertNextValue(size);
     m_turns->InsertNextTuple4(turn.w(), turn.x(), turn.y(), turn.z());
   }
-  /// Hues in [0, 1] from the least value to the greatest, and how dark the least is.
+  /// Adds the copies to the renderer. from, to: hues in [0, 1] of the least and the greatest value.
+  /// dark: the brightness of the least value.
   vtkProperty* show(vtkRenderer* renderer, vtkAlgorithm* shape, double from, double to,
                     double dark) const {
     vtkNew<vtkPolyData> data;
@@ -109,7 +110,8 @@ class Glyphs {
   vtkNew<vtkDoubleArray> m_values, m_sizes, m_turns;
 };
 
-/// The point of a shape that lies furthest along d, in its frame; of a plane at most `size` away.
+/// The point of a shape that lies furthest along d, in the shape's frame. A plane counts as bounded
+/// by the distance `size` from its point.
 Vector3d furthest(const AnalyticalGeometry& shape, const Vector3d& d, double size) {
   const auto across = [&](const Vector3d& n) {
     return Vector3d(d - d.dot(n) / n.squaredNorm() * n);
@@ -129,7 +131,7 @@ Vector3d furthest(const AnalyticalGeometry& shape, const Vector3d& d, double siz
   });
 }
 
-/// A shape as a mesh: directions all around, and how far it reaches along them.
+/// Gives a shape a mesh: the furthest points along directions all around.
 void tessellate(Mesh& shape, double size) {
   vtkNew<vtkSphereSource> sphere;
   sphere->SetThetaResolution(32);
@@ -148,7 +150,7 @@ void tessellate(Mesh& shape, double size) {
   }
 }
 
-/// Its cells are the body's elements, in their order.
+/// Adds a body to the renderer. The cells are the body's elements, in their order.
 vtkProp* addBody(vtkRenderer* renderer, const Mesh& mesh, std::size_t index) {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
@@ -263,7 +265,8 @@ struct Window::Implementation {
   void aim();
 };
 
-/// The frame, copied: what the user moves next does not move what keys draw anew.
+/// Copies the frame. Keys that redraw it then show this frame, even after the user has moved
+/// geometries.
 void Window::Implementation::take() {
   problem = detection.problem();
   bodies.clear();
@@ -297,7 +300,7 @@ void Window::Implementation::drawCells() const {
   look->SetOpacity(0.5);
 }
 
-/// Nothing before the first detection.
+/// The result of a pair; empty before the first detection.
 const CollisionData& Window::Implementation::answer(GeometryId a, GeometryId b) const {
   static const CollisionData none;
   try {
@@ -346,7 +349,7 @@ void Window::Implementation::drawContacts() const {
   if (untrusted) wrong.show(renderer, ball, 0.83, 0.83, 1);
 }
 
-/// From the front, somewhat to the right and above, as near as has all in view.
+/// Aims the camera from the front, somewhat to the right and above, with everything in view.
 void Window::Implementation::aim() {
   const Vector3d focus = box.center(), position = focus + Vector3d(0.5, -1.0, 0.6);
   vtkCamera* camera = renderer->GetActiveCamera();
@@ -460,7 +463,7 @@ std::string Window::pick(int x, int y) {
 
 Image Window::image() const {
   vtkRenderWindow* window = m_implementation->window;
-  window->SwapBuffersOff();  // so that what was drawn is still there
+  window->SwapBuffersOff();  // so that the pixels can be read after rendering
   window->Render();
   vtkNew<vtkUnsignedCharArray> pixels;
   const int *size = window->GetSize(), width = size[0], height = size[1];
