@@ -17,7 +17,8 @@ done
 find Docs -name '*.png' -o -name '*.svg' -o -name '*.csv' -o -name '*.webp' | while read -r file; do
   cp --parents "$file" "$out/source"
 done
-mv "$out/source/Docs/Site/index.md" "$out/source/index.md"
+sed 's#](../#](Docs/#' Docs/Site/index.md >"$out/source/index.md"
+rm -r "$out/source/Docs/Site"
 
 # The page of the notes lists the notes.
 {
