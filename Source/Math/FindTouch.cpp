@@ -22,14 +22,9 @@ struct Coplanarity {
 
 template <Kind kind>
 Coplanarity coplanarity(const RelativeMotion<kind>& motion) {
-  const auto& [a, b, c] = std::tie(motion.a, motion.b, motion.c);
-  const Vector3d normal[3] = {a[0].cross(b[0]), a[0].cross(b[1]) + a[1].cross(b[0]),
-                              a[1].cross(b[1])};
-  Coplanarity result;
-  result.coefficients = {normal[0].dot(c[0]), (normal[1].dot(c[0]) + normal[0].dot(c[1])) / 3.0,
-                         (normal[2].dot(c[0]) + normal[1].dot(c[1])) / 3.0, normal[2].dot(c[1])};
-  result.error = kCoplanarityError * motion.permanent() + kImpactUnderflow;
-  return result;
+  const auto found = motion.coplanarity();
+  const auto& [f0, f1, f2, f3] = found.coefficients;
+  return {{f0, f1, f2, f3}, kCoplanarityError * found.permanent + kImpactUnderflow};
 }
 
 /// 1 or -1 if all coefficients certainly have that sign, else 0.

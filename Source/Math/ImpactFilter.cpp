@@ -8,6 +8,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Math/ImpactFilter.cpp"
 #include "Core/Simd.h"
+#include "Math/ImpactFormulas.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
@@ -76,17 +77,10 @@ class FilterLanes {
     const D d;
     constexpr auto axes = ImpactQuery::axes(kind);
     const Ends a = difference(axes[0]), b = difference(axes[1]), c = difference(axes[2]);
-    const Point first = cross(a.at[0], b.at[0]), last = cross(a.at[1], b.at[1]),
-                middle = cross(a.at[0], b.at[1]) + cross(a.at[1], b.at[0]);
-    const V third = hn::Set(d, 1.0 / 3.0);
-    const V f0 = dot(first, c.at[0]), f3 = dot(last, c.at[1]),
-            f1 = third * (dot(middle, c.at[0]) + dot(first, c.at[1])),
-            f2 = third * (dot(last, c.at[0]) + dot(middle, c.at[1]));
-    const V least = hn::Min(hn::Min(f0, f1), hn::Min(f2, f3)),
-            most = hn::Max(hn::Max(f0, f1), hn::Max(f2, f3));
     const Point p = largest(a), q = largest(b), r = largest(c);
-    const V permanent = r.x * (p.y * q.z + p.z * q.y) + r.y * (p.z * q.x + p.x * q.z) +
-                        r.z * (p.x * q.y + p.y * q.x);
+    const auto [f, permanent] = coplanarityOf(a.at, b.at, c.at, p, q, r, hn::Set(d, 3.0));
+    const V least = hn::Min(hn::Min(f[0], f[1]), hn::Min(f[2], f[3])),
+            most = hn::Max(hn::Max(f[0], f[1]), hn::Max(f[2], f[3]));
     const V error = permanent * hn::Set(d, kCoplanarityError) + hn::Set(d, kImpactUnderflow);
     const V magnitude = hn::Max(hn::Max(hn::Max(p.x, p.y), hn::Max(p.z, q.x)),
                                 hn::Max(hn::Max(q.y, q.z), hn::Max(r.x, hn::Max(r.y, r.z))));

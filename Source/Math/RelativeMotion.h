@@ -1,5 +1,6 @@
 #pragma once
 
+#include "Math/ImpactFormulas.h"
 #include "Math/ImpactQuery.h"
 
 #include <Eigen/Geometry>
@@ -79,12 +80,17 @@ struct RelativeMotion {
     return largest;
   }
 
-  /// The permanent of the largest magnitudes: no term of det(A, B, C) exceeds one of its six.
-  double permanent() const {
-    const Eigen::Vector3d p = largestOf(a), q = largestOf(b), r = largestOf(c);
-    return r[0] * (p[1] * q[2] + p[2] * q[1]) + r[1] * (p[2] * q[0] + p[0] * q[2]) +
-           r[2] * (p[0] * q[1] + p[1] * q[0]);
+  CoplanarityOf<double> coplanarity() const {
+    struct Components {
+      double x, y, z;
+    };
+    const auto of = [](const Eigen::Vector3d& v) { return Components{v[0], v[1], v[2]}; };
+    const Components ofA[2] = {of(a[0]), of(a[1])}, ofB[2] = {of(b[0]), of(b[1])},
+                     ofC[2] = {of(c[0]), of(c[1])};
+    return coplanarityOf(ofA, ofB, ofC, of(largestOf(a)), of(largestOf(b)), of(largestOf(c)), 3.0);
   }
+  /// The permanent of the largest magnitudes: no term of det(A, B, C) exceeds one of its six.
+  double permanent() const { return coplanarity().permanent; }
 
   Separation bestSeparation(double t) const;
 

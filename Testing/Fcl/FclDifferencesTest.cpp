@@ -97,7 +97,7 @@ TEST(FclDifferences, Triangles) {
   }
 }
 
-/// Of overlapping cylinders, as Docs/Pairs.md says: a thousandth of the largest difference.
+/// Of overlapping cylinders, as Docs/Shapes.md says: a thousandth of the largest difference.
 double mostOf(const std::string& a, const std::string& b) {
   return a == "cylinder" || b == "cylinder" ? 3e-3 : kTolerance;
 }

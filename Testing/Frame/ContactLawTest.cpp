@@ -242,7 +242,7 @@ class Law {
     m_seen.add("two shapes");
     expectTime(c.timeOfImpact);
     EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);
-    // A cylinder that overlaps is answered within 1e-3 of the size (Docs/Pairs.md).
+    // A cylinder that overlaps is answered within 1e-3 of the size (Docs/Shapes.md).
     const double error = m_hasCylinder && c.distance < 0 ? 1e-3 : 0x1p-48;
     EXPECT_LE((c.pointA - c.pointB - c.distance * c.normal).norm(),
               error * (1 + c.pointA.norm() + c.pointB.norm()));

@@ -6,6 +6,7 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/Error.h>
 #include <palpate/OctreeBasedCD.h>
+#include <palpate/PenetrationTracker.h>
 #include <palpate/Settings.h>
 #include <palpate/StepGuard.h>
 #include <palpate/Types.h>

@@ -80,7 +80,7 @@ std::vector<Vector3d> someDirections(Random& random, int count) {
 void expectDistance(Random& random, const PlacedShape& a, const PlacedShape& b,
                     const ShapeShapeContact& c, double scale, double rounding = 1e-6) {
   const double slack = 2e-13 * scale;
-  // With cylinders: as Docs/Pairs.md says.
+  // With cylinders: as Docs/Shapes.md says.
   const bool isRound = !isPlane(a) && !isPlane(b) &&
                        (std::holds_alternative<Cylinder>(a.geometry) ||
                         std::holds_alternative<Cylinder>(b.geometry));
