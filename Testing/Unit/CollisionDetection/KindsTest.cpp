@@ -541,7 +541,9 @@ TEST(Kinds, DocumentSaysWhatIsAnswered) {
         ++accepted;
         cell += (cell.empty() ? "`" : ", `") + name + "`";
       }
-      row += " " + (accepted == 4 ? "every method" : accepted == 0 ? "refused" : cell) + " |";
+      row += ' ';
+      row += accepted == 4 ? "every method" : accepted == 0 ? "refused" : cell;
+      row += " |";
     }
     EXPECT_NE(document.find(row + "\n"), document.npos) << row;
   }
