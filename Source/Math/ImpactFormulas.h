@@ -25,7 +25,7 @@ struct CoplanarityOf {
 
 template <class P>
 [[gnu::always_inline]] inline auto dotProduct(const P& u, const P& v) {
-  return u.x * v.x + (u.y * v.y + u.z * v.z);
+  return u.x * v.x + u.y * v.y + u.z * v.z;
 }
 
 template <class P>
