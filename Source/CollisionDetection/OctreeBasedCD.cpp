@@ -63,8 +63,9 @@ struct OctreeBasedCD::Implementation {
   std::vector<PairRecord*> work;
   AuditRecord audit;
   std::shared_ptr<QuerySource> querySource;
-  std::uint64_t octreesOf = 0;  ///< geometries.state() for which all octrees hold; 0: for none
-  std::mutex sorting;           ///< locked while candidatePairs(), a const call, sorts candidates
+  std::atomic<std::uint64_t> octreesOf =
+      0;               ///< geometries.state() for which all octrees hold; 0: for none
+  std::mutex sorting;  ///< locked while candidatePairs(), a const call, sorts candidates
   PairOrderScratch sortingScratch;
   std::atomic<bool> isBusy = false;  ///< a call that changes the object has not returned
 

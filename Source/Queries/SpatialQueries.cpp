@@ -75,7 +75,8 @@ SpatialQueries::Source& SpatialQueries::valid() const {
   if (m_state == 0 || m_source->state() != m_state)
     throw Error(ErrorCode::InvalidCall,
                 "these SpatialQueries are of an earlier state: positions, transforms, topology or "
-                "geometries changed, or advance() was called; call queries() again");
+                "geometries changed, advance() was called, or their OctreeBasedCD is gone; call "
+                "queries() again");
   return *m_source;
 }
 
@@ -84,12 +85,12 @@ void SpatialQueries::findInsideVertices(GeometryId vertices, GeometryId body,
                                         const InsideSettings& settings) const {
   Source& source = valid();
   const StandardFloatingPoint standard;
-  const SearchableGeometry& asked = source.at(vertices);
-  SearchableGeometry& around = source.at(body);
-  checkVertices(asked, body);
-  source.prepareInside(around, settings);
+  const SearchableGeometry& owner = source.at(vertices);
+  SearchableGeometry& container = source.at(body);
+  checkVertices(owner, body);
+  source.prepareInside(container, settings);
   const Source::Loan scratch(source);
-  findInside(asked, around, settings, source.engine(), Source::Workers(source), scratch->inside,
+  findInside(owner, container, settings, source.engine(), Source::Workers(source), scratch->inside,
              out);
 }
 
@@ -97,13 +98,13 @@ void SpatialQueries::findEmbeddedVertices(GeometryId vertices, GeometryId body,
                                           std::vector<EmbeddedVertex>& out) const {
   Source& source = valid();
   const StandardFloatingPoint standard;
-  const SearchableGeometry& asked = source.at(vertices);
+  const SearchableGeometry& owner = source.at(vertices);
   SearchableGeometry& solid = source.at(body);
-  checkVertices(asked, body);
+  checkVertices(owner, body);
   checkTopologyKind(solid, true, "findEmbeddedVertices() is for tetrahedral meshes");
   source.prepareTetrahedra(solid);
   const Source::Loan scratch(source);
-  findEmbedded(asked, solid, source.engine(), Source::Workers(source), scratch->embedded, out);
+  findEmbedded(owner, solid, source.engine(), Source::Workers(source), scratch->embedded, out);
 }
 
 std::optional<TetrahedronPoint> SpatialQueries::findTetrahedron(

@@ -1,6 +1,7 @@
 #include <palpate/Capture.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/ExpectRefused.h"
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
@@ -470,15 +471,6 @@ TEST(Filters, BadInputIsRefusedByName) {
   OctreeBasedCD detection(settingsOf(Engine::Octree));
   const GeometryId mesh = detection.addTriangleMesh(one.positions, one.triangles),
                    line = detection.addLineMesh(one.positions, std::vector<Segment>{{0, 1}});
-  const auto expectRefused = [](ErrorCode code, const std::string& words, auto&& call) {
-    try {
-      call();
-      ADD_FAILURE() << "accepted; expected: " << words;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), code);
-      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
-    }
-  };
   const std::vector<std::uint32_t> beyond{0, 1};
   expectRefused(ErrorCode::IndexOutOfRange, "geometry 0: element 1 is out of range; it has 1",
                 [&] { detection.setDisabledElements(mesh, beyond); });

@@ -1,6 +1,7 @@
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/PenetrationTracker.h>
 
+#include "Common/ExpectRefused.h"
 #include "Common/QueryCalls.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Things.h"
@@ -16,17 +17,6 @@
 
 namespace palpate::testing {
 namespace {
-
-template <class F>
-void expectRefused(ErrorCode code, const std::string& words, F&& call) {
-  try {
-    call();
-    ADD_FAILURE() << "accepted; expected: " << words;
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), code);
-    EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
-  }
-}
 
 Positions copyOf(std::span<const Vector3d> positions) {
   return {positions.begin(), positions.end()};

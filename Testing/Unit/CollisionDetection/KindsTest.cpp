@@ -2,6 +2,7 @@
 #include <palpate/Distance.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/ExpectRefused.h"
 #include "Common/QueryCalls.h"
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
@@ -565,17 +566,6 @@ TEST(Kinds, DocumentSaysWhatIsAnswered) {
       row += " `Auto`, `Proximity`, `Continuous` |";
     }
     EXPECT_NE(document.find(row + "\n"), document.npos) << row;
-  }
-}
-
-template <class F>
-void expectRefused(ErrorCode code, const std::string& words, F&& call) {
-  try {
-    call();
-    ADD_FAILURE() << "accepted; expected: " << words;
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), code);
-    EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
   }
 }
 

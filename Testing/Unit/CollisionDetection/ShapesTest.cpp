@@ -1,6 +1,7 @@
 #include <palpate/Capture.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/ExpectRefused.h"
 #include "Common/QueryCalls.h"
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
@@ -629,17 +630,6 @@ TEST(Shapes, DegenerateElementsAnswerTheDefinition) {
 }
 
 // ---- Refused ----
-
-template <class F>
-void expectRefused(ErrorCode code, const std::string& words, F&& call) {
-  try {
-    call();
-    ADD_FAILURE() << "accepted; expected: " << words;
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), code);
-    EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
-  }
-}
 
 TEST(Shapes, BadInputIsRefusedByName) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN(),

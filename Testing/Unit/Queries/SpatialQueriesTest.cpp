@@ -1,3 +1,4 @@
+#include "Common/ExpectRefused.h"
 #include "Common/QueryCalls.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Solids.h"
@@ -65,15 +66,8 @@ Answers ask(const Scene& scene, const SpatialQueries& queries) {
   return answers;
 }
 
-template <class Call>
-void expectInvalid(Call&& call, const std::string& part) {
-  try {
-    call();
-    ADD_FAILURE() << "nothing was thrown";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::InvalidCall);
-    EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
-  }
+void expectInvalid(const std::function<void()>& call, const std::string& words) {
+  expectRefused(ErrorCode::InvalidCall, words, call);
 }
 
 TEST(SpatialQueries, LaterCallsLeaveEarlierResults) {
@@ -213,6 +207,20 @@ TEST(SpatialQueries, ManyThreadsGetTheAnswersOfOne) {
       scene.collisions.setPositions(scene.ball, scene.ballRest);
       scene.collisions.advance();
     }
+  }
+}
+
+/// Outdated queries are refused, also while another thread brings the octrees up to date.
+TEST(SpatialQueries, OutdatedOnesAreRefusedBesideNewOnes) {
+  Scene scene;
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    const SpatialQueries old = scene.collisions.queries();
+    Positions moved = scene.ballRest;
+    for (Eigen::Vector3d& p : moved) p.x() += 1e-3 * repeat;
+    scene.collisions.setPositions(scene.ball, moved);
+    const std::jthread updating([&] { (void)scene.collisions.queries(); });
+    for (int i = 0; i < 50; ++i)
+      expectInvalid([&] { (void)old.findTetrahedron(scene.solid, {0, 0, 0}); }, "queries() again");
   }
 }
 
