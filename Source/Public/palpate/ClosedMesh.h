@@ -53,12 +53,12 @@ struct InsideSettings {
 /// A vertex inside a body, with its surface point: the point of the body's surface that is nearest
 /// to the vertex.
 struct InsideVertex {
-  std::uint32_t vertex, triangle;        ///< a vertex of the other geometry, a triangle of the body
-  std::array<std::uint32_t, 3> corners;  ///< the vertices of that triangle
-  Eigen::Vector3d barycentric;           ///< weights of the corners at the surface point
+  std::uint32_t vertex, triangle;  ///< a vertex of the other geometry, a triangle of the body.
+  std::array<std::uint32_t, 3> corners;  ///< the vertices of that triangle.
+  Eigen::Vector3d barycentric;           ///< weights of the corners at the surface point.
   /// Unit: the penetration direction, from the vertex to the surface point.
   Eigen::Vector3d direction;
-  double depth;  ///< L, positive: the distance to the surface point
+  double depth;  ///< L, positive: the distance to the surface point.
   /// False only with InsideRule::WindingNumber: the number is so near to 1/2 that the margin, or
   /// rounding, leaves open whether the vertex is inside.
   bool decided = true;

@@ -44,8 +44,8 @@ struct VertexTriangleContact {
   /// Unit. It points from the triangle to the vertex, except where Intersection finds the vertex
   /// behind the triangle: there it points from the vertex to the triangle.
   Eigen::Vector3d normal;
-  double distance;      ///< L, at timeOfImpact, between the surfaces of the radii; sign: see above
-  double timeOfImpact;  ///< [0, 1] of the step; 1 for methods that test the step's end
+  double distance;      ///< L, at timeOfImpact, between the surfaces of the radii; sign: see above.
+  double timeOfImpact;  ///< [0, 1] of the step; 1 for methods that test the step's end.
   /// The part that holds the closest point at that time: the corner, edge or face that the corners
   /// with weights other than 0 span. A segment has EdgeAB, CornerA or CornerB, a point CornerA.
   TriangleFeature feature = TriangleFeature::Face;
@@ -71,12 +71,12 @@ enum class ShapeElement : std::uint32_t { Vertex, Edge, Face };
 /// timeOfImpact.
 struct ShapeContact {
   ShapeElement element;
-  std::uint32_t id;  ///< index of the vertex or triangle; for an edge its lower vertex
+  std::uint32_t id;  ///< index of the vertex or triangle; for an edge its lower vertex.
   /// {v, v, v} for a vertex, {p, q, q} with p < q for an edge, or the triangle's corners.
   std::array<std::uint32_t, 3> vertices;
-  Eigen::Vector3d weights;       ///< of the vertices at `point`; sum 1
-  Eigen::Vector3d point;         ///< L, on the element; for lines and points on the centre line
-  Eigen::Vector3d pointOnShape;  ///< L, on the shape's surface
+  Eigen::Vector3d weights;       ///< of the vertices at `point`; sum 1.
+  Eigen::Vector3d point;         ///< L, on the element; for lines and points on the centre line.
+  Eigen::Vector3d pointOnShape;  ///< L, on the shape's surface.
   Eigen::Vector3d normal;        ///< unit, out of the shape towards the element
   double distance;               ///< L, less the element's radius; negative: the depth inside
   double timeOfImpact = 1.0;     ///< [0, 1] of the step; 1 for Proximity
@@ -163,7 +163,7 @@ class PALPATE_EXPORT CollisionData {
   /// Two analytical shapes with each other: one contact if they are at most the thickness apart,
   /// with Method::Continuous at some time of the step.
   std::span<const ShapeShapeContact> shapeShape() const { return m_contents.shapeShape; }
-  /// Fraction of the step: the least timeOfImpact of all contacts, or infinity if there is none. 1
+  /// Fraction of the step: the least timeOfImpact of all contacts, or infinity without contacts. 1
   /// if all contacts come from methods that test the step's end. With
   /// PairSettings::earliestTimeOnly it is the time of the first contact, although no list has it.
   /// Cost     linear in the contacts.
