@@ -112,7 +112,8 @@ void sortUnique(std::vector<ElementPair>& pairs) {
 void addClaims(const CollisionData& data, double from, double to, Claims& out) {
   using Kind = FeaturePair::Kind;
   // Where triangles intersect, contacts of the step's end are Intersection's.
-  const bool intersects = data.validity().thickness == 0.0 && !data.intersectingTriangles().empty();
+  const bool intersects =
+      data.validity().effectiveThickness == 0.0 && !data.intersectingTriangles().empty();
   const auto add = [&](const FeaturePair& features, const auto& contact, double side,
                        const std::array<Held, 2>& held) {
     const double part = contact.timeOfImpact;

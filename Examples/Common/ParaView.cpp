@@ -82,7 +82,7 @@ VtpText bodiesVtp(World& world) {
     file.points.insert(file.points.end(), positions.begin(), positions.end());
     for (const Vector3d& p : body.drawn.positions)
       file.points.push_back(body.rotation * p + body.translation);
-    for (std::uint32_t i = 0; body.kind == GeometryKind::Points && i < body.count; ++i)
+    for (std::uint32_t i = 0; body.type == GeometryType::Points && i < body.count; ++i)
       file.vertices.push_back(first + i);
     for (const auto& [p, q] : body.segments) file.lines.push_back({first + p, first + q});
     for (const auto* triangles : {&body.triangles, &body.drawn.triangles})

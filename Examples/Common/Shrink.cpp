@@ -21,14 +21,14 @@ bool accept(CollisionProblem& problem, CollisionProblem smaller, const Fails& fa
 
 std::size_t triangleCount(const CollisionProblem& problem) {
   std::size_t count = 0;
-  for (const CollisionProblem::Mesh& mesh : problem.geometries) count += mesh.triangles.size();
+  for (const CollisionProblem::Geometry& mesh : problem.geometries) count += mesh.triangles.size();
   return count;
 }
 
 /// Triangles begin to end, counted over all meshes, left out.
 CollisionProblem withoutTriangles(CollisionProblem problem, std::size_t begin, std::size_t end) {
   std::size_t first = 0;
-  for (CollisionProblem::Mesh& mesh : problem.geometries) {
+  for (CollisionProblem::Geometry& mesh : problem.geometries) {
     const std::size_t size = mesh.triangles.size();
     const auto place = [&](std::size_t i) {
       return mesh.triangles.begin() +
@@ -71,8 +71,8 @@ bool dropPairs(CollisionProblem& problem, const Fails& fails) {
   return dropped;
 }
 
-void removeUnusedVertices(CollisionProblem::Mesh& mesh) {
-  if (mesh.kind == GeometryKind::Points) return;
+void removeUnusedVertices(CollisionProblem::Geometry& mesh) {
+  if (mesh.type == GeometryType::Points) return;
   std::vector<std::uint32_t> newIndex(mesh.now.size(), kUnused);
   for (const Triangle& triangle : mesh.triangles)
     for (const std::uint32_t corner : triangle) newIndex[corner] = 0;
@@ -94,7 +94,7 @@ void removeUnusedVertices(CollisionProblem::Mesh& mesh) {
 }
 
 CollisionProblem withoutUnusedVertices(CollisionProblem problem) {
-  for (CollisionProblem::Mesh& mesh : problem.geometries) removeUnusedVertices(mesh);
+  for (CollisionProblem::Geometry& mesh : problem.geometries) removeUnusedVertices(mesh);
   return problem;
 }
 
@@ -129,7 +129,8 @@ const CollisionData& dataOf(const OctreeBasedCD& detection, const CollisionProbl
 }
 
 CollisionProblem shrink(CollisionProblem problem, const Fails& fails) {
-  for (CollisionProblem::Mesh& mesh : problem.geometries) mesh.tetrahedra.clear();  // but surfaces
+  for (CollisionProblem::Geometry& mesh : problem.geometries)
+    mesh.tetrahedra.clear();  // but surfaces
   dropPairs(problem, fails);
   while (dropTriangles(problem, fails) && dropPairs(problem, fails)) continue;
   accept(problem, withoutUnusedVertices(problem), fails);

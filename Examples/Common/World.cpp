@@ -39,7 +39,7 @@ World::BodyId World::add(Body body, std::span<const Vector3d> positions, double 
 
 World::BodyId World::addMesh(std::string name, const SceneMesh& mesh, double inverseMass) {
   const GeometryId id = m_detection.addTriangleMesh(mesh.positions, mesh.triangles);
-  return add({std::move(name), id, GeometryKind::Triangles, 0, 0, mesh.triangles, {}, 0, {}},
+  return add({std::move(name), id, GeometryType::Triangles, 0, 0, mesh.triangles, {}, 0, {}},
              mesh.positions, inverseMass);
 }
 
@@ -54,20 +54,20 @@ World::BodyId World::addThread(std::string name, std::span<const Vector3d> posit
   std::vector<Segment> segments;
   for (std::uint32_t i = 0; i + 1 < positions.size(); ++i) segments.push_back({i, i + 1});
   const GeometryId id = m_detection.addLineMesh(positions, segments, radius);
-  return add({std::move(name), id, GeometryKind::Lines, 0, 0, {}, std::move(segments), radius, {}},
+  return add({std::move(name), id, GeometryType::Lines, 0, 0, {}, std::move(segments), radius, {}},
              positions, inverseMass);
 }
 
 World::BodyId World::addPoints(std::string name, std::span<const Vector3d> positions, double radius,
                                double inverseMass) {
   const GeometryId id = m_detection.addPointSet(positions, radius);
-  return add({std::move(name), id, GeometryKind::Points, 0, 0, {}, {}, radius, {}}, positions,
+  return add({std::move(name), id, GeometryType::Points, 0, 0, {}, {}, radius, {}}, positions,
              inverseMass);
 }
 
 World::BodyId World::addShape(std::string name, const AnalyticalGeometry& shape, SceneMesh drawn) {
   const GeometryId id = m_detection.addAnalyticalGeometry(shape);
-  return add({std::move(name), id, GeometryKind::Shape, 0, 0, {}, {}, 0, std::move(drawn)}, {}, 0);
+  return add({std::move(name), id, GeometryType::Shape, 0, 0, {}, {}, 0, std::move(drawn)}, {}, 0);
 }
 
 void World::addStiffness(BodyId body, double edgeCompliance, double bendingCompliance) {
@@ -112,7 +112,7 @@ void World::addPair(BodyId a, BodyId b, const PairSettings& settings, double gap
 GeometryId World::guarded(BodyId id) {
   const Body& body = m_bodies[id];
   if (!m_guardIds[id])
-    m_guardIds[id] = body.kind == GeometryKind::Lines
+    m_guardIds[id] = body.type == GeometryType::Lines
                          ? m_guard.addLineMesh(positions(id), body.segments)
                          : m_guard.addTriangleMesh(positions(id), body.triangles);
   return *m_guardIds[id];
@@ -120,7 +120,7 @@ GeometryId World::guarded(BodyId id) {
 
 void World::addGuard(BodyId a, BodyId b) {
   const GeometryId first = guarded(a), second = guarded(b);
-  m_guard.addPair(first, second);
+  m_guard.addCollisionPair(first, second);
 }
 
 void World::addRigid(BodyId body, std::uint32_t count) {

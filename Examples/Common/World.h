@@ -30,7 +30,7 @@ class World {
   struct Body {
     std::string name;
     GeometryId id;
-    GeometryKind kind;
+    GeometryType type;
     std::uint32_t first, count;  ///< its particles; a shape has none
     std::vector<Triangle> triangles;
     std::vector<Segment> segments;

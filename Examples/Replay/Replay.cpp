@@ -119,7 +119,7 @@ bool report(const CollisionProblem& problem) {
 
 std::size_t triangleCount(const CollisionProblem& problem) {
   std::size_t count = 0;
-  for (const CollisionProblem::Mesh& mesh : problem.geometries) count += mesh.triangles.size();
+  for (const CollisionProblem::Geometry& mesh : problem.geometries) count += mesh.triangles.size();
   return count;
 }
 

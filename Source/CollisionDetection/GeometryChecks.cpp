@@ -70,8 +70,8 @@ std::vector<Eigen::Vector3d> checkedRest(GeometryId id,
 }
 
 void checkCounts(GeometryId id, std::span<const Eigen::Vector3d> positions,
-                 std::span<const Triangle> triangles, GeometryKind kind) {
-  const bool lines = kind == GeometryKind::Lines;
+                 std::span<const Triangle> triangles, GeometryType type) {
+  const bool lines = type == GeometryType::Lines;
   const std::string element = lines ? "segment" : "triangle";
   if (positions.size() > kMostElements || triangles.size() > kMostElements)
     throw Error(ErrorCode::TooLarge,

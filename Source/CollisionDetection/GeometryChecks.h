@@ -20,7 +20,7 @@ void checkPositions(GeometryId, std::span<const Eigen::Vector3d>, Eigen::Vector3
 /// Returns a copy of the positions of a new topology.
 std::vector<Eigen::Vector3d> checkedRest(GeometryId, std::span<const Eigen::Vector3d>);
 void checkCounts(GeometryId, std::span<const Eigen::Vector3d>, std::span<const Triangle>,
-                 GeometryKind);
+                 GeometryType);
 TetrahedralTopology checkedTopology(GeometryId, std::span<const Eigen::Vector3d> rest,
                                     std::span<const Tetrahedron>);
 void checkRadii(GeometryId, std::span<const double>);

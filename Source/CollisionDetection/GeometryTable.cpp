@@ -64,13 +64,13 @@ GeometryId GeometryTable::add(std::unique_ptr<Geometry> geometry) {
 }
 
 GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
-                              std::span<const Triangle> triangles, GeometryKind kind,
+                              std::span<const Triangle> triangles, GeometryType type,
                               std::span<const double> radii) {
   const GeometryId id = nextId();
-  checkCounts(id, positions, triangles, kind);
+  checkCounts(id, positions, triangles, type);
   checkRadii(id, radii);
   MeshTopology topology(positions.size(), triangles);
-  topology.kind = kind;
+  topology.type = type;
   auto geometry = make(checkedRest(id, positions), std::move(topology));
   TriangleMesh& mesh = geometry->mesh;
   if (!radii.empty()) mesh.largestRadius = *std::max_element(radii.begin(), radii.end());
@@ -84,14 +84,14 @@ GeometryId GeometryTable::addLines(std::span<const Eigen::Vector3d> positions,
   std::vector<Triangle> triangles;
   triangles.reserve(segments.size());
   for (const auto& [p, q] : segments) triangles.push_back({p, q, q});
-  return add(positions, triangles, GeometryKind::Lines, radii);
+  return add(positions, triangles, GeometryType::Lines, radii);
 }
 
 GeometryId GeometryTable::addPoints(std::span<const Eigen::Vector3d> positions,
                                     std::span<const double> radii) {
   std::vector<Triangle> triangles(positions.size());
   for (std::uint32_t i = 0; i < triangles.size(); ++i) triangles[i] = {i, i, i};
-  return add(positions, triangles, GeometryKind::Points, radii);
+  return add(positions, triangles, GeometryType::Points, radii);
 }
 
 GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
@@ -113,7 +113,7 @@ GeometryId GeometryTable::add(const AnalyticalGeometry& analytical) {
     throw Error(ErrorCode::InvalidShape, nameOf(id) + ": " + fault, id, element);
   const PlacedShape shape(analytical);
   MeshTopology topology;
-  topology.kind = GeometryKind::Shape;
+  topology.type = GeometryType::Shape;
   auto geometry =
       make({shape.now.corners().begin(), shape.now.corners().end()}, std::move(topology));
   geometry->mesh.rest.clear();
@@ -175,7 +175,7 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
                                  std::span<const Triangle> triangles) {
   Geometry& geometry = at(id);
   checkTopologyKind(geometry, false, "setTriangles() is for triangle meshes");
-  checkCounts(id, positions, triangles, GeometryKind::Triangles);
+  checkCounts(id, positions, triangles, GeometryType::Triangles);
   setTopology(geometry, checkedRest(id, positions), {positions.size(), triangles}, {});
   ++m_state;
 }
@@ -212,7 +212,7 @@ void GeometryTable::setFilter(GeometryId id, const CollisionFilter& filter) {
     throw Error(ErrorCode::InvalidSettings, nameOf(id) + ": sidedness must be Both or Outer", id);
   if (filter.sidedness == Sidedness::Outer && !geometry.mesh.topology.hasFaces())
     throw Error(ErrorCode::InvalidSettings,
-                nameOf(id) + " is " + nameOf(geometry.mesh.topology.kind) + ", which has no sides",
+                nameOf(id) + " is " + nameOf(geometry.mesh.topology.type) + ", which has no sides",
                 id);
   geometry.filter = filter;
   geometry.mesh.outer = filter.sidedness == Sidedness::Outer;

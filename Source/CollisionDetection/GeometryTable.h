@@ -20,7 +20,7 @@ class GeometryTable {
  public:
   /// radii: none, one for all, or as many as positions.
   GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Triangle>,
-                 GeometryKind = GeometryKind::Triangles, std::span<const double> radii = {});
+                 GeometryType = GeometryType::Triangles, std::span<const double> radii = {});
   GeometryId addLines(std::span<const Eigen::Vector3d> positions, std::span<const Segment>,
                       std::span<const double> radii);
   GeometryId addPoints(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);

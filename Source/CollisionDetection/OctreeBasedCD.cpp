@@ -76,7 +76,7 @@ struct OctreeBasedCD::Implementation {
       ++next.geometries;
       const MeshTopology& topology = geometry->mesh.topology;
       (topology.hasFaces()                    ? next.triangles
-       : topology.kind == GeometryKind::Lines ? next.segments
+       : topology.type == GeometryType::Lines ? next.segments
                                               : next.points) += topology.triangles.size();
       next.untestedVertices += topology.untestedVertices;
     }

@@ -97,7 +97,7 @@ class Check {
                 earliestTimeOnly] = settings;
     constexpr const char* kNotNegative = "finite and not negative";
     finite("restDistance", rest, rest >= 0.0, kNotNegative);
-    need(rest == 0.0 || (&a == &b && a.topology.kind != GeometryKind::Points),
+    need(rest == 0.0 || (&a == &b && a.topology.type != GeometryType::Points),
          "restDistance is for a triangle or line mesh with itself");
     finite("thickness", thickness, thickness >= 0.0, kNotNegative);
     finite("motionTolerance", motionTolerance, true, "finite, or negative for half the thickness");
@@ -132,8 +132,8 @@ class Check {
     }
     const bool any = m_method == Method::Auto || m_method == Method::Proximity;
     support(meshes || continuous || any,
-            "Method::Intersection is for two triangle meshes, not for " + nameOf(ofA.kind) +
-                " and " + nameOf(ofB.kind) + "; Auto, Proximity and Continuous are");
+            "Method::Intersection is for two triangle meshes, not for " + nameOf(ofA.type) +
+                " and " + nameOf(ofB.type) + "; Auto, Proximity and Continuous are");
     support(!continuous || hasContinuous(a.inStep(), b.inStep()),
             "Method::Continuous needs one radius for all vertices; Proximity and Auto do not");
   }

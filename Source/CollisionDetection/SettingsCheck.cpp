@@ -24,7 +24,7 @@ const Settings& checked(const Settings& settings) {
   check("engine", settings.engine, 0, 1, "Octree or BruteForce");
   check("threads", settings.threads, 0, 1024, "in [0, 1024]");
   check("audit.features", settings.audit.features, 0, kAny, "at least 0");
-  check("audit.mostFiles", settings.audit.mostFiles, 0, kAny, "at least 0");
+  check("audit.maxFiles", settings.audit.maxFiles, 0, kAny, "at least 0");
   std::error_code fault;
   if (const auto& folder = settings.audit.folder;
       !folder.empty() && !std::filesystem::is_directory(folder, fault))

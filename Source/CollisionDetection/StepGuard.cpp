@@ -24,7 +24,7 @@ constexpr std::uint32_t kNoGroup = std::numeric_limits<std::uint32_t>::max();
 /// A geometry, and during a hold() its step.
 struct Guarded {
   GeometryId id{};
-  GeometryKind kind = GeometryKind::Triangles;
+  GeometryType type = GeometryType::Triangles;
   std::vector<Vector3d> settled{};     ///< positions after the last hold()
   std::vector<std::uint32_t> group{};  ///< by vertex, or kNoGroup
   std::vector<std::uint8_t> fixed{};   ///< by vertex
@@ -52,8 +52,8 @@ struct Touch {
 };
 
 std::string elementOf(const Guarded& geometry, std::uint32_t index) {
-  const char* name = geometry.kind == GeometryKind::Lines    ? ", segment "
-                     : geometry.kind == GeometryKind::Points ? ", point "
+  const char* name = geometry.type == GeometryType::Lines    ? ", segment "
+                     : geometry.type == GeometryType::Points ? ", point "
                                                              : ", triangle ";
   return nameOf(geometry.id) + name + std::to_string(index);
 }
@@ -94,9 +94,9 @@ struct StepGuard::Implementation {
 
   /// add() adds the geometry to the detection and returns its id.
   template <class Add>
-  GeometryId add(std::span<const Vector3d> positions, GeometryKind kind, Add&& add) {
+  GeometryId add(std::span<const Vector3d> positions, GeometryType type, Add&& add) {
     Guarded geometry;
-    geometry.kind = kind;
+    geometry.type = type;
     geometry.settled.assign(positions.begin(), positions.end());
     geometry.group.assign(positions.size(), kNoGroup);
     geometry.fixed.assign(positions.size(), 0);
@@ -346,27 +346,27 @@ StepGuard::~StepGuard() = default;
 GeometryId StepGuard::addTriangleMesh(std::span<const Vector3d> positions,
                                       std::span<const Triangle> triangles) {
   Implementation& guard = all();
-  return guard.add(positions, GeometryKind::Triangles,
+  return guard.add(positions, GeometryType::Triangles,
                    [&] { return guard.detection.addTriangleMesh(positions, triangles); });
 }
 
 GeometryId StepGuard::addTetrahedralMesh(std::span<const Vector3d> positions,
                                          std::span<const Tetrahedron> tetrahedra) {
   Implementation& guard = all();
-  return guard.add(positions, GeometryKind::Triangles,
+  return guard.add(positions, GeometryType::Triangles,
                    [&] { return guard.detection.addTetrahedralMesh(positions, tetrahedra); });
 }
 
 GeometryId StepGuard::addLineMesh(std::span<const Vector3d> positions,
                                   std::span<const Segment> segments) {
   Implementation& guard = all();
-  return guard.add(positions, GeometryKind::Lines,
+  return guard.add(positions, GeometryType::Lines,
                    [&] { return guard.detection.addLineMesh(positions, segments); });
 }
 
 GeometryId StepGuard::addPointSet(std::span<const Vector3d> positions) {
   Implementation& guard = all();
-  return guard.add(positions, GeometryKind::Points,
+  return guard.add(positions, GeometryType::Points,
                    [&] { return guard.detection.addPointSet(positions); });
 }
 
@@ -385,13 +385,13 @@ void StepGuard::setTetrahedra(GeometryId id, std::span<const Vector3d> positions
 
 void StepGuard::removeGeometry(GeometryId id) { all().remove(id); }
 
-void StepGuard::addPair(GeometryId a, GeometryId b) {
+void StepGuard::addCollisionPair(GeometryId a, GeometryId b) {
   // Whether features touch does not depend on timeTolerance. The largest value is the cheapest.
   all().detection.addCollisionPair(
       a, b, {.method = Method::Continuous, .contacts = Contacts::All, .timeTolerance = 1.0});
 }
 
-void StepGuard::removePair(GeometryId a, GeometryId b) {
+void StepGuard::removeCollisionPair(GeometryId a, GeometryId b) {
   all().detection.removeCollisionPair(a, b);
 }
 

@@ -200,15 +200,15 @@ void compare(std::vector<Contact> expected, std::span<const Contact> allFound, C
   using Fault = AuditFailure::Fault;
   auto f = found.begin();
   for (const Contact& e : expected) {
-    for (; f != found.end() && before(*f, e); ++f) report(Fault::Invented, {}, *f);
+    for (; f != found.end() && before(*f, e); ++f) report(Fault::FalsePositive, {}, *f);
     if (f == found.end() || before(e, *f)) {
-      report(Fault::Missing, e, {});
+      report(Fault::FalseNegative, e, {});
     } else {
       if (!(*f == e)) report(Fault::Different, e, *f);
       ++f;
     }
   }
-  for (; f != found.end(); ++f) report(Fault::Invented, {}, *f);
+  for (; f != found.end(); ++f) report(Fault::FalsePositive, {}, *f);
 }
 
 }  // namespace
@@ -258,7 +258,7 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
   const bool withOthers = pair.settings.method == Method::Auto;
   const auto into = [&](List list) {
     return [=, &pair, &out](Fault fault, const Any& e, const Any& f) {
-      if (withOthers && fault != Fault::Missing) return;
+      if (withOthers && fault != Fault::FalseNegative) return;
       out.push_back({pair.a, pair.b, frame, fault, list, e, f, {}, {}});
     };
   };
@@ -266,7 +266,7 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
     return forEachTimed(expected, [&](const auto& all) {
       for (const auto& contact : all)
         if (contact.timeOfImpact < data.earliestTimeOfImpact())
-          into(List::Earliest)(Fault::Missing, contact, {});
+          into(List::Earliest)(Fault::FalseNegative, contact, {});
     });
   }
   dropWhatOthersStandFor(meshes, data, expected);
@@ -290,7 +290,7 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
 CollisionProblem pairAlone(const CollisionProblem& whole, GeometryId idA, GeometryId idB) {
   CollisionProblem problem{whole.settings, {}, {}};
   for (CollisionProblem::Pair pair : whole.pairs) {
-    const CollisionProblem::Mesh &a = whole.geometries[pair.a], &b = whole.geometries[pair.b];
+    const CollisionProblem::Geometry &a = whole.geometries[pair.a], &b = whole.geometries[pair.b];
     if (a.id != idA || b.id != idB) continue;
     problem.geometries.push_back(a);
     if (pair.a != pair.b) problem.geometries.push_back(b);
@@ -338,13 +338,13 @@ void auditFrame(const Settings& settings, const GeometryTable& geometries, const
     audit(pair->meshes(), pair->pair, pair->data, settings.audit, record.frame, failures);
     const auto own = std::span(failures).subspan(first);
     if (own.empty() || settings.audit.folder.empty()) continue;
-    if (record.files < settings.audit.mostFiles) {
+    if (record.files < settings.audit.maxFiles) {
       keepProblem(problemOf(settings, geometries, pairs), settings.audit, own);
       record.files += !own.front().file.empty();
     } else {
       for (AuditFailure& failure : own)
         failure.fileError =
-            "audit.mostFiles were written into \"" + settings.audit.folder.string() + "\" before";
+            "audit.maxFiles were written into \"" + settings.audit.folder.string() + "\" before";
     }
   }
 }

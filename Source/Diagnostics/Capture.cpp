@@ -244,9 +244,9 @@ void meshLines(File& file, MeshType& mesh, int version) {
   sizeOf(file, mesh.now);
   sizeOf(file, mesh.triangles);
   if (version >= 3) {
-    file.word(mesh.kind, kKinds);
+    file.word(mesh.type, kKinds);
     listOf(file, mesh.radii);
-    if (mesh.kind == GeometryKind::Shape) {
+    if (mesh.type == GeometryType::Shape) {
       std::size_t kind = mesh.analytical ? mesh.analytical->index() : 0;
       file.word(kind, kShapes);
       if constexpr (kReads<File>)
@@ -254,7 +254,7 @@ void meshLines(File& file, MeshType& mesh, int version) {
       shapeOf(file, mesh, version);
     }
   }
-  std::size_t rest = kReads<File> ? mesh.kind == GeometryKind::Lines : mesh.rest.size();
+  std::size_t rest = kReads<File> ? mesh.type == GeometryType::Lines : mesh.rest.size();
   if (version >= 4) {
     filterOf(file, mesh.filter);
     listOf(file, mesh.disabled);
@@ -310,14 +310,14 @@ std::string textOf(const CollisionProblem& problem) {
   return file.text();
 }
 
-GeometryId add(OctreeBasedCD& detection, const CollisionProblem::Mesh& mesh) {
+GeometryId add(OctreeBasedCD& detection, const CollisionProblem::Geometry& mesh) {
   if (mesh.analytical) return detection.addAnalyticalGeometry(*mesh.analytical);
   const std::vector<Eigen::Vector3d>& rest = mesh.rest.empty() ? mesh.now : mesh.rest;
   if (!mesh.tetrahedra.empty()) return detection.addTetrahedralMesh(rest, mesh.tetrahedra);
-  if (mesh.kind == GeometryKind::Triangles) return detection.addTriangleMesh(rest, mesh.triangles);
+  if (mesh.type == GeometryType::Triangles) return detection.addTriangleMesh(rest, mesh.triangles);
   const bool one = mesh.radii.size() <= 1;
   const double radius = one && !mesh.radii.empty() ? mesh.radii.front() : 0.0;
-  if (mesh.kind == GeometryKind::Points)
+  if (mesh.type == GeometryType::Points)
     return one ? detection.addPointSet(mesh.now, radius)
                : detection.addPointSet(mesh.now, mesh.radii);
   std::vector<Segment> segments;
@@ -392,7 +392,7 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
 OctreeBasedCD setUp(const CollisionProblem& problem) {
   const StandardFloatingPoint standard;
   OctreeBasedCD detection(problem.settings);
-  for (const CollisionProblem::Mesh& mesh : problem.geometries) {
+  for (const CollisionProblem::Geometry& mesh : problem.geometries) {
     const GeometryId id = add(detection, mesh);
     if (mesh.analytical)
       detection.setTransform(id, mesh.rotationBefore, mesh.translationBefore, mesh.rotation,

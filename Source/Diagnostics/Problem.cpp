@@ -6,11 +6,11 @@ namespace palpate {
 
 namespace {
 
-CollisionProblem::Mesh meshOf(const Geometry& geometry) {
+CollisionProblem::Geometry meshOf(const Geometry& geometry) {
   const TriangleMesh& mesh = geometry.mesh;
-  CollisionProblem::Mesh copy;
+  CollisionProblem::Geometry copy;
   copy.id = geometry.id;
-  copy.kind = mesh.topology.kind;
+  copy.type = mesh.topology.type;
   copy.radii = mesh.radii;
   copy.filter = geometry.filter;
   copy.disabled = mesh.topology.disabled;
@@ -19,7 +19,7 @@ CollisionProblem::Mesh meshOf(const Geometry& geometry) {
   const RigidTransform &before = mesh.before.transform(), &now = mesh.now.transform();
   copy.rotation = now.rotation, copy.translation = now.translation;
   copy.rotationBefore = before.rotation, copy.translationBefore = before.translation;
-  if (copy.kind != GeometryKind::Points) copy.triangles = mesh.topology.triangles;
+  if (copy.type != GeometryType::Points) copy.triangles = mesh.topology.triangles;
   if (copy.radii.empty() && mesh.largestRadius > 0.0) copy.radii = {mesh.largestRadius};
   if (geometry.solid) copy.tetrahedra = geometry.solid->topology.tetrahedra, copy.rest = mesh.rest;
   return copy;

@@ -46,7 +46,7 @@ struct MeshTopology {
   /// Indices must be below vertexCount.
   MeshTopology(std::size_t vertexCount, std::span<const Triangle> triangles);
 
-  GeometryKind kind = GeometryKind::Triangles;
+  GeometryType type = GeometryType::Triangles;
   std::size_t vertexCount = 0;
   std::vector<Triangle> triangles;
   std::vector<Segment> edges;  ///< unique, lower vertex first, sorted
@@ -72,7 +72,7 @@ struct MeshTopology {
   std::uint32_t edgeOf(const Segment& edge) const;
   /// Whether elements have faces. Vertices of other meshes are tested only against triangles with
   /// faces.
-  bool hasFaces() const { return kind == GeometryKind::Triangles; }
+  bool hasFaces() const { return type == GeometryType::Triangles; }
   static constexpr unsigned cornerBit(int corner) { return 1u << corner; }
   static constexpr unsigned edgeBit(int edge) { return 1u << (3 + edge); }
   bool ownsCorner(std::uint32_t triangle, int corner) const {
@@ -88,7 +88,7 @@ struct MeshTopology {
 /// ofFirst: the vertices are the first mesh's; of two point sets, only these are tested.
 inline bool areTested(const MeshTopology& vertices, const MeshTopology& others, bool ofFirst) {
   return others.hasFaces() ||
-         (vertices.kind == GeometryKind::Points && (others.kind == GeometryKind::Lines || ofFirst));
+         (vertices.type == GeometryType::Points && (others.type == GeometryType::Lines || ofFirst));
 }
 
 inline bool shareVertex(const Segment& a, const Segment& b) {

@@ -355,7 +355,7 @@ HWY_ATTR void findFeaturePairsOf(const Side& a, const Side& b, std::span<const E
     FeaturePair* const corners = out.vertexTriangle.data() + vertexTriangle;
     if (self) {
       vertexTriangle += list(chosen, chosen.corners, size, 255, kVertexIn, kTriangleIn,
-                             a.topology.kind == GeometryKind::Points, corners);
+                             a.topology.type == GeometryType::Points, corners);
     } else {
       vertexTriangle += list(chosen, chosen.corners, size, kCornerTestsOfA, kCornerInA, kCornerInB,
                              false, corners);

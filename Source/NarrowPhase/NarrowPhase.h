@@ -63,7 +63,7 @@ struct MeshPair {
   const TriangleMesh& mesh() const { return shapeOfA ? b : a; }
   const PlacedShape& shape() const { return *(shapeOfA ? shapeOfA : shapeOfB); }
   bool hasLines() const {
-    return a.topology.kind == GeometryKind::Lines || b.topology.kind == GeometryKind::Lines;
+    return a.topology.type == GeometryType::Lines || b.topology.type == GeometryType::Lines;
   }
   /// Self-collision excludes a vertex with the triangles around it. Of two points, the lower one is
   /// tested as the vertex.
@@ -71,7 +71,7 @@ struct MeshPair {
     if (!self()) return false;
     const auto& [i, j, k] = a.topology.triangles[triangle];
     return vertex == i || vertex == j || vertex == k ||
-           (a.topology.kind == GeometryKind::Points && triangle < vertex);
+           (a.topology.type == GeometryType::Points && triangle < vertex);
   }
   /// Self-collision excludes edges with a common vertex.
   bool leavesOut(std::uint32_t edgeA, std::uint32_t edgeB) const {

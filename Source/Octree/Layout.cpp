@@ -20,7 +20,7 @@ void Layout::start(const OctreeSettings& settings, std::uint32_t taskSize,
   groupNodes.resize(groups.size());
   reserveGroups();
   m_mostPerLeaf = static_cast<std::uint32_t>(settings.maxElementsPerLeaf);
-  m_maxDepth = std::min(settings.maxDepth, kMostDepth);
+  m_maxDepth = std::min(settings.maxDepth, kMaxDepthRatio);
   m_taskSize = taskSize;
   m_ends = &ends;
   m_ends->clear();
@@ -60,7 +60,7 @@ void Layout::layOutTask(const KeySort& keys, const Job& job, const OctreeSetting
 /// Lays out the job's node and its subtree. Returns the value of the parent's slot for the node. An
 /// explicit path replaces recursion, so that its size on the stack is known: about 7 KB.
 std::uint32_t Layout::layOut(const KeySort& keys, const Job& job) {
-  std::array<OpenNode, kMostDepth + 1> path;
+  std::array<OpenNode, kMaxDepthRatio + 1> path;
   OpenNode* node = path.data();
   node->job = job;
   if (!open(keys, *node)) return node->link;

@@ -59,7 +59,7 @@ class Layout {
   std::size_t bytes() const;
 
  private:
-  static constexpr int kMostDepth = 60;  ///< as OctreeSettings::maxDepth
+  static constexpr int kMaxDepthRatio = 60;  ///< as OctreeSettings::maxDepth
 
   /// A node whose children are being laid out.
   struct OpenNode {

@@ -145,8 +145,8 @@ OctreeStatistics LooseOctree::statistics() const {
       ++statistics.nodesByDepth[level];
       statistics.elementsByDepth[level] += end - begin;
       statistics.deepestLevel = std::max(statistics.deepestLevel, depth);
-      statistics.mostElementsInNode =
-          std::max<std::size_t>(statistics.mostElementsInNode, end - begin);
+      statistics.maxElementsInNode =
+          std::max<std::size_t>(statistics.maxElementsInNode, end - begin);
     });
   });
   statistics.nodesAllocated = 8 * statistics.blocksAllocated;

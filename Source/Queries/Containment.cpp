@@ -167,7 +167,7 @@ void checkInside(SearchableGeometry& body, const InsideSettings& settings) {
   MeshTopology& topology = body.mesh.topology;
   if (!topology.hasFaces())
     throw Error(ErrorCode::NotClosed,
-                nameOf(body.id) + " is " + nameOf(topology.kind) + ", which has no inside",
+                nameOf(body.id) + " is " + nameOf(topology.type) + ", which has no inside",
                 body.id);
   if (settings.rule == InsideRule::WindingNumber) return;
   if (body.solid) return;  // its tetrahedra define its inside

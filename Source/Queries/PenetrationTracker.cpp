@@ -136,10 +136,10 @@ class PenetrationTracker::Implementation::Search {
         (p - pointAt(corners, last->barycentric)) -
         turn * (last->position - pointAt(last->triangleAt, last->barycentric));
     const double explained = moved.norm() / std::sqrt(last->depth) / std::sqrt(nearest.depth);
-    if ((nearest.direction - direction).norm() <= TrackedVertex::kMostTurn + explained)
+    if ((nearest.direction - direction).norm() <= TrackedVertex::kMaxTurn + explained)
       return {nearest, nearest, DirectionChange::None};
     if (const auto kept =
-            along(nearest.vertex, p, direction, TrackedVertex::kMostDepth * nearest.depth))
+            along(nearest.vertex, p, direction, TrackedVertex::kMaxDepthRatio * nearest.depth))
       return {*kept, nearest, DirectionChange::Kept};
     return {nearest, nearest, DirectionChange::Jumped};
   }

@@ -43,16 +43,16 @@ std::string nameOf(GeometryId id) {
   return "geometry " + std::to_string(static_cast<std::uint32_t>(id));
 }
 
-std::string nameOf(GeometryKind kind) {
+std::string nameOf(GeometryType type) {
   constexpr const char* kNames[] = {"a triangle mesh", "a line mesh", "a point set", "a shape"};
-  return kNames[static_cast<std::size_t>(kind)];
+  return kNames[static_cast<std::size_t>(type)];
 }
 
 void checkTopologyKind(const SearchableGeometry& geometry, bool tetrahedra, const char* call) {
   if (geometry.mesh.topology.hasFaces() && (geometry.solid != nullptr) == tetrahedra) return;
   throw Error(ErrorCode::UnsupportedMethod,
               nameOf(geometry.id) + " is " +
-                  (geometry.solid ? "a tetrahedral mesh" : nameOf(geometry.mesh.topology.kind)) +
+                  (geometry.solid ? "a tetrahedral mesh" : nameOf(geometry.mesh.topology.type)) +
                   "; " + call,
               geometry.id);
 }

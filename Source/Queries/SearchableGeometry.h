@@ -64,7 +64,7 @@ BoxMap worldMap(const SearchableGeometry&, const Eigen::Vector3d& origin, double
                 bool wholeStep);
 
 std::string nameOf(GeometryId);    ///< "geometry 3"
-std::string nameOf(GeometryKind);  ///< "a line mesh"
+std::string nameOf(GeometryType);  ///< "a line mesh"
 /// Throws UnsupportedMethod unless the geometry is a triangle mesh or, with `tetrahedra`, a
 /// tetrahedral mesh. call: the end of the message.
 void checkTopologyKind(const SearchableGeometry&, bool tetrahedra, const char* call);

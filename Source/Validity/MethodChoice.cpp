@@ -26,7 +26,7 @@ static void chooseMethod(const PairSettings& settings, const GeometryInStep& a,
   const bool proximity = hasProximity(a, b, settings.thickness);
   const bool still = plan.motion == 0.0 && proximity;
   plan.method = still || !hasContinuous(a, b) ? Method::Proximity : Method::Continuous;
-  plan.reason = still ? MethodReason::Still : MethodReason::Only;
+  plan.reason = still ? MethodReason::Still : MethodReason::NoAlternative;
 }
 
 PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,

@@ -26,7 +26,7 @@ struct GeometryInStep {
 /// The method of a pair in this frame, and what the narrow phase must find out for it.
 struct PairPlan {
   Method method = Method::Intersection;  ///< Auto: Proximity and Continuous
-  MethodReason reason = MethodReason::Asked;
+  MethodReason reason = MethodReason::Requested;
   double motion = 0;           ///< L: largest motion of two features relative to each other
   double arcDeviation = 0;     ///< L: of both geometries
   double motionTolerance = 0;  ///< L: Auto's

@@ -17,7 +17,7 @@ namespace {
 constexpr int kFramesPerCheck = 16, kMostSaved = 4 * kFramesPerCheck;
 
 /// Appends vertices that may have moved further than `reach` relative to the other mesh, until
-/// `out` has Validity::kMostFarMovers.
+/// `out` has Validity::kMaxFastVertices.
 void addFarMovers(std::vector<std::uint32_t>& out, const GeometryInStep& mesh,
                   const GeometryInStep& other, double reach) {
   const MotionRange& range = other.range;
@@ -26,7 +26,7 @@ void addFarMovers(std::vector<std::uint32_t>& out, const GeometryInStep& mesh,
     const Eigen::Vector3d moved =
         (mesh.mesh.now[v] - mesh.mesh.before[v] - centre).cwiseAbs() + extent;
     if (!(moved.squaredNorm() <= reach * reach)) out.push_back(v);
-    if (out.size() == Validity::kMostFarMovers) return;
+    if (out.size() == Validity::kMaxFastVertices) return;
   }
 }
 
@@ -63,7 +63,7 @@ bool meetsConditions(const PairSettings& settings, const GeometryInStep& a, cons
   if (!knowsSides(a, b)) return false;
   if (settings.method == Method::Auto)
     return plan.method == Method::Intersection || validity.startedApart;
-  const bool withinReach = plan.motion <= validity.reach;
+  const bool withinReach = plan.motion <= validity.displacementLimit;
   switch (plan.method) {
     case Method::Intersection:
       return plan.motion == 0.0 || (withinReach && foundOrFar);
@@ -126,18 +126,18 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   validity.method = plan.method;
   validity.reason = plan.reason;
   validity.displacement = plan.motion;
-  validity.thickness =
+  validity.effectiveThickness =
       plan.method == Method::Intersection ? 0.0 : settings.thickness + plan.step.extra;
   const auto take = [](std::vector<std::uint32_t>& out, const Buffer<std::uint32_t>& ids) {
     out.assign(ids.begin(), ids.end());
   };
   take(validity.degenerateTrianglesA, facts.degenerateA);
   take(validity.degenerateTrianglesB, facts.degenerateB);
-  validity.verticesBeyondA.clear();
-  validity.verticesBeyondB.clear();
+  validity.untrustedVerticesA.clear();
+  validity.untrustedVerticesB.clear();
   if (!plan.step.impacts) {
-    take(validity.verticesBeyondA, facts.verticesA);
-    take(validity.verticesBeyondB, facts.verticesB);
+    take(validity.untrustedVerticesA, facts.verticesA);
+    take(validity.untrustedVerticesB, facts.verticesB);
   }
   if (plan.step.start) {
     m_atStart = {};
@@ -145,12 +145,13 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
     m_atStart.of.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
   }
   validity.startedApart = m_atStart.position == Position::Apart;
-  validity.reach = reachOf(settings, a, b, plan);
+  validity.displacementLimit = reachOf(settings, a, b, plan);
   const bool listsFarMovers =
       !hasTolerance(settings, a, b) && plan.method != Method::Continuous && !meshes.hasShape();
-  if (listsFarMovers && !(plan.motion <= validity.reach)) {
-    addFarMovers(validity.verticesBeyondA, a, b, validity.reach);
-    if (&a.mesh != &b.mesh) addFarMovers(validity.verticesBeyondB, b, a, validity.reach);
+  if (listsFarMovers && !(plan.motion <= validity.displacementLimit)) {
+    addFarMovers(validity.untrustedVerticesA, a, b, validity.displacementLimit);
+    if (&a.mesh != &b.mesh)
+      addFarMovers(validity.untrustedVerticesB, b, a, validity.displacementLimit);
   }
   const bool trustedIfStraight = meetsConditions(
       settings, a, b, plan, facts, validity, !nearby || !contents.intersectingTriangles.empty());

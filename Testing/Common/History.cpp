@@ -49,8 +49,8 @@ void append(std::vector<std::uint64_t>& words, const InsideVertex& v) {
 
 std::size_t RandomHistory::Body::elements() const {
   if (shape) return 0;
-  return thing.kind == GeometryKind::Points  ? thing.positions.size()
-         : thing.kind == GeometryKind::Lines ? thing.segments.size()
+  return thing.type == GeometryType::Points  ? thing.positions.size()
+         : thing.type == GeometryType::Lines ? thing.segments.size()
                                              : thing.triangles.size();
 }
 
@@ -399,7 +399,7 @@ void RandomHistory::compareContacts(const OctreeBasedCD& other,
     EXPECT_EQ(v.atEnd, t.atEnd);
     EXPECT_EQ(v.atImpact, t.atImpact);
     EXPECT_NEAR(v.displacement, t.displacement, 1e-12);
-    EXPECT_EQ(v.reach, t.reach);
+    EXPECT_EQ(v.displacementLimit, t.displacementLimit);
     if (std::isinf(t.arcDeviation))
       EXPECT_EQ(v.arcDeviation, t.arcDeviation);
     else

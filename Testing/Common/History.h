@@ -46,7 +46,7 @@ class RandomHistory {
     CollisionFilter filter{};
     std::vector<std::uint32_t> disabled{};
 
-    bool isMesh() const { return !shape && thing.kind == GeometryKind::Triangles; }
+    bool isMesh() const { return !shape && thing.type == GeometryType::Triangles; }
     std::size_t elements() const;
   };
   struct Pair {

@@ -22,23 +22,23 @@ using Positions = std::vector<Vector3d>;
 
 /// A geometry of any kind.
 struct Thing {
-  GeometryKind kind = GeometryKind::Triangles;
+  GeometryType type = GeometryType::Triangles;
   Positions positions;
   std::vector<Triangle> triangles;
   std::vector<Segment> segments;
   std::vector<double> radii{0.0};
 
   GeometryId addTo(OctreeBasedCD& collisions) const {
-    switch (kind) {
-      case GeometryKind::Triangles:
+    switch (type) {
+      case GeometryType::Triangles:
         return collisions.addTriangleMesh(positions, triangles);
-      case GeometryKind::Lines:
+      case GeometryType::Lines:
         return radii.size() == 1 ? collisions.addLineMesh(positions, segments, radii[0])
                                  : collisions.addLineMesh(positions, segments, radii);
-      case GeometryKind::Points:
+      case GeometryType::Points:
         return radii.size() == 1 ? collisions.addPointSet(positions, radii[0])
                                  : collisions.addPointSet(positions, radii);
-      case GeometryKind::Shape:
+      case GeometryType::Shape:
         break;
     }
     return {};
@@ -56,7 +56,7 @@ struct Thing {
 };
 
 inline Thing things(const Mesh& mesh) {
-  return {GeometryKind::Triangles, mesh.positions, mesh.triangles, {}};
+  return {GeometryType::Triangles, mesh.positions, mesh.triangles, {}};
 }
 
 using Pairs = std::vector<std::pair<const Thing*, const Thing*>>;
@@ -64,7 +64,7 @@ using Pairs = std::vector<std::pair<const Thing*, const Thing*>>;
 /// A random walk in the unit cube, closed or not.
 inline Thing thread(Random& random, std::uint32_t segments, double step, double radius,
                     bool closed) {
-  Thing line{GeometryKind::Lines, {randomPoint(random, 0.2, 0.8)}, {}, {}, {radius}};
+  Thing line{GeometryType::Lines, {randomPoint(random, 0.2, 0.8)}, {}, {}, {radius}};
   for (std::uint32_t i = 1; i <= segments; ++i) {
     line.positions.push_back((line.positions.back() + randomPoint(random, -step, step))
                                  .cwiseMax(Vector3d::Zero())
@@ -76,7 +76,7 @@ inline Thing thread(Random& random, std::uint32_t segments, double step, double 
 }
 
 inline Thing particles(Random& random, std::size_t count, double radius) {
-  Thing points{GeometryKind::Points, {}, {}, {}, {radius}};
+  Thing points{GeometryType::Points, {}, {}, {}, {radius}};
   for (std::size_t i = 0; i < count; ++i) points.positions.push_back(randomPoint(random, 0, 1));
   return points;
 }

@@ -75,7 +75,7 @@ std::size_t compare(const std::map<Ids, Exact>& all, const std::map<Ids, double>
 std::vector<Triangle> elementsOf(const Thing& thing) {
   std::vector<Triangle> elements = thing.triangles;
   for (const auto& [p, q] : thing.segments) elements.push_back({p, q, q});
-  for (std::uint32_t i = 0; thing.kind == GeometryKind::Points && i < thing.positions.size(); ++i)
+  for (std::uint32_t i = 0; thing.type == GeometryType::Points && i < thing.positions.size(); ++i)
     elements.push_back({i, i, i});
   return elements;
 }
@@ -85,7 +85,7 @@ std::size_t compareWithRationals(const Thing& a, const Thing& b, double thicknes
   const CollisionData data = answer(a, b, {Method::Proximity, thickness, Contacts::All});
   std::map<Ids, Exact> vertexTriangle, edges;
   std::map<Ids, double> foundVertexTriangle, foundEdges;
-  if (a.kind == GeometryKind::Points) {
+  if (a.type == GeometryType::Points) {
     const std::vector<Triangle> elements = elementsOf(b);
     for (std::uint32_t v = 0; v < a.positions.size(); ++v)
       for (std::uint32_t t = &a == &b ? v + 1 : 0; t < elements.size(); ++t)
@@ -221,9 +221,9 @@ TEST(ExactKinds, ImpactsAreTheFirst) {
 
 /// With no radius and no thickness, on positions where meeting is exact.
 TEST(ExactKinds, TouchesAreFoundExactly) {
-  const Thing drop{GeometryKind::Points, {{0, 0, 2}, {3, 0, 2}, {1, 0, 0}}, {}, {}, {0}};
+  const Thing drop{GeometryType::Points, {{0, 0, 2}, {3, 0, 2}, {1, 0, 0}}, {}, {}, {0}};
   const Positions now{{0, 0, -2}, {3, 0.0625, -2}, {5, 0, 0}};
-  const Thing wall{GeometryKind::Points, {{0, 0, 1}, {3, 0, 0}, {2, 0, 0}}, {}, {}, {0}};
+  const Thing wall{GeometryType::Points, {{0, 0, 1}, {3, 0, 0}, {2, 0, 0}}, {}, {}, {0}};
   const auto hits = [&](const Thing& other, const Positions& otherNow) {
     std::map<Ids, double> times;
     const CollisionData data = answer(settingsOf(Engine::Octree), drop, other,
@@ -245,7 +245,7 @@ TEST(ExactKinds, TouchesAreFoundExactly) {
   };
   expectTimes(hits(wall, wall.positions), {{{0, 0}, 0.25}, {{2, 1}, 0.5}, {{2, 2}, 0.25}});
   // Across a segment, past its end, along it, and on a point of no length.
-  Thing line{GeometryKind::Lines,
+  Thing line{GeometryType::Lines,
              {{-1, 0, 1}, {1, 0, 1}, {4, 0, 0}, {4.5, 0, 0}, {2, 0, 0}, {2, 0, 0}},
              {},
              {{0, 1}, {2, 3}, {4, 5}},

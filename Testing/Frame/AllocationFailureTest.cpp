@@ -40,7 +40,7 @@ void append(Words& words, const Positions& positions) {
 Words stateOf(const OctreeBasedCD& detection) {
   Words words;
   const CollisionProblem problem = detection.problem();
-  for (const CollisionProblem::Mesh& mesh : problem.geometries) {
+  for (const CollisionProblem::Geometry& mesh : problem.geometries) {
     words.push_back(static_cast<std::uint64_t>(mesh.id));
     append(words, mesh.before);
     append(words, mesh.now);
@@ -345,7 +345,7 @@ TEST_P(AllocationFailure, LeavesTheStepOfAGuardAsItWas) {
     for (StepGuard* each : {&guard, &unfailed}) {
       ids = {each->addTriangleMesh(body.positions, body.triangles),
              each->addTriangleMesh(floor.positions, floor.triangles)};
-      each->addPair(ids[0], ids[1]);
+      each->addCollisionPair(ids[0], ids[1]);
     }
     Positions a = bodyNow, b = floorNow, sameA = bodyNow;
     FailingAllocation::arm(n);

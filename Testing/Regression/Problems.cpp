@@ -34,7 +34,7 @@ CollisionProblem intersection(const Positions& a, const Triangles& trianglesA, c
 /// The tip far from where everything was before the step.
 CollisionProblem outsideRoot() {
   CollisionProblem problem = intersection(kFloor, kTriangle, kTip, kTetrahedron);
-  for (CollisionProblem::Mesh& mesh : problem.geometries)
+  for (CollisionProblem::Geometry& mesh : problem.geometries)
     mesh.now = moved(mesh.before, {4096, -8192, 1024});
   return problem;
 }

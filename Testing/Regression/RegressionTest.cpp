@@ -120,7 +120,7 @@ TEST(Regression, ATriangleThatGrewAndShrank) {
 CollisionProblem strips(std::uint32_t count) {
   CollisionProblem problem;
   for (std::uint32_t g = 0; g < 3; ++g) {
-    CollisionProblem::Mesh mesh{GeometryId{g}, {}, {}, {}};
+    CollisionProblem::Geometry mesh{GeometryId{g}, {}, {}, {}};
     for (std::uint32_t v = 0; v < count + 2; ++v)
       mesh.now.push_back({double(v), double(v % 2), double(g)});
     mesh.before = mesh.now;
@@ -134,7 +134,7 @@ CollisionProblem strips(std::uint32_t count) {
 
 /// Whether a mesh has a triangle whose first corner is at x.
 bool hasTriangleAt(const CollisionProblem& problem, GeometryId id, double x) {
-  for (const CollisionProblem::Mesh& mesh : problem.geometries)
+  for (const CollisionProblem::Geometry& mesh : problem.geometries)
     for (const Triangle& triangle : mesh.triangles)
       if (mesh.id == id && mesh.now[triangle[0]].x() == x) return true;
   return false;
@@ -159,7 +159,7 @@ TEST(Shrink, KeepsOnlyWhatFails) {
   ASSERT_EQ(small.pairs.size(), 1u);
   EXPECT_EQ(small.pairs[0].a, 0u);
   EXPECT_EQ(small.pairs[0].b, 1u);
-  for (const CollisionProblem::Mesh& mesh : small.geometries) {
+  for (const CollisionProblem::Geometry& mesh : small.geometries) {
     ASSERT_EQ(mesh.triangles.size(), 1u);
     EXPECT_EQ(mesh.triangles[0], (Triangle{0, 1, 2}));
     EXPECT_EQ(mesh.now.size(), 3u);
@@ -177,7 +177,8 @@ TEST(Shrink, KeepsWhatAPredicateNeeds) {
   const CollisionProblem small = scenes::shrink(whole, needsVertices);
   EXPECT_TRUE(needsVertices(small));
   EXPECT_TRUE(small.pairs.empty());
-  for (const CollisionProblem::Mesh& mesh : small.geometries) EXPECT_TRUE(mesh.triangles.empty());
+  for (const CollisionProblem::Geometry& mesh : small.geometries)
+    EXPECT_TRUE(mesh.triangles.empty());
 }
 
 }  // namespace

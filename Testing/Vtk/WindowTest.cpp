@@ -201,7 +201,7 @@ TEST(Window, MarksWhatIsNotTrusted) {
     p.z() = -0.04;  // through the other, further than the thickness
   detection.setPositions(a, upper.positions);
   detection.detectCollision();
-  ASSERT_FALSE(detection.collisionData(a, b).validity().verticesBeyondA.empty());
+  ASSERT_FALSE(detection.collisionData(a, b).validity().untrustedVerticesA.empty());
   Window window(detection, false, 300, 300);
   window.show();
   window.press('c');

@@ -52,7 +52,7 @@ namespace palpate::vtk {
 namespace {
 
 using Eigen::Vector3d, Eigen::Quaterniond;
-using Mesh = CollisionProblem::Mesh;
+using Mesh = CollisionProblem::Geometry;
 
 constexpr timespec kPause{0, 20'000'000};  // 20 ms
 constexpr std::array<std::array<double, 3>, 6> kBodyColours{{{0.72, 0.25, 0.25},
@@ -160,13 +160,13 @@ vtkProp* addBody(vtkRenderer* renderer, const Mesh& mesh, std::size_t index) {
     const std::array<vtkIdType, 3> corners{a, b, c};
     cells->InsertNextCell(b == c ? 2 : 3, corners.data());
   }
-  for (vtkIdType i = 0; mesh.kind == GeometryKind::Points && i < points->GetNumberOfPoints(); ++i)
+  for (vtkIdType i = 0; mesh.type == GeometryType::Points && i < points->GetNumberOfPoints(); ++i)
     cells->InsertNextCell(1, &i);
   vtkNew<vtkPolyData> data;
   data->SetPoints(points);
-  const bool thin = mesh.kind == GeometryKind::Lines || mesh.kind == GeometryKind::Points;
-  if (mesh.kind == GeometryKind::Points) data->SetVerts(cells);
-  if (mesh.kind == GeometryKind::Lines) data->SetLines(cells);
+  const bool thin = mesh.type == GeometryType::Lines || mesh.type == GeometryType::Points;
+  if (mesh.type == GeometryType::Points) data->SetVerts(cells);
+  if (mesh.type == GeometryType::Lines) data->SetLines(cells);
   if (!thin) data->SetPolys(cells);
   vtkNew<vtkPolyDataNormals> normals;
   normals->SetInputData(data);
@@ -249,7 +249,7 @@ struct Window::Implementation {
       const Mesh& mesh = *bodies.at(picker->GetActor());
       picked = "geometry " + std::to_string(static_cast<std::uint32_t>(mesh.id));
       picked += mesh.analytical ? ", a shape"
-                                : kNames[static_cast<std::size_t>(mesh.kind)] +
+                                : kNames[static_cast<std::size_t>(mesh.type)] +
                                       std::to_string(picker->GetCellId());
     }
     text->SetInput(picked.c_str());
@@ -338,8 +338,8 @@ void Window::Implementation::drawContacts() const {
       wrong.add(mesh.now[vertex], 0, 0.01 * size, Quaterniond::Identity());
     };
     const Validity& validity = data.validity();
-    for (const auto v : validity.verticesBeyondA) mark(a, v);
-    for (const auto v : validity.verticesBeyondB) mark(b, v);
+    for (const auto v : validity.untrustedVerticesA) mark(a, v);
+    for (const auto v : validity.untrustedVerticesB) mark(b, v);
     for (const auto t : validity.degenerateTrianglesA) mark(a, a.triangles[t][0]);
     for (const auto t : validity.degenerateTrianglesB) mark(b, b.triangles[t][0]);
   }

@@ -16,9 +16,9 @@ namespace palpate {
 struct AuditFailure {
   enum class Fault {
     /// Expected, not found. In List::Earliest: a contact is earlier than earliestTimeOfImpact().
-    Missing,
-    Invented,  ///< found, not expected, or found twice
-    Different  ///< found with other values than expected
+    FalseNegative,
+    FalsePositive,  ///< found, not expected, or found twice
+    Different       ///< found with other values than expected
   };
   /// The list of CollisionData, or its earliest time.
   enum class List {
@@ -35,7 +35,7 @@ struct AuditFailure {
 
   GeometryId a, b;          ///< the pair, in the order in which it was added
   std::uint64_t frame = 0;  ///< number of the detectCollision() call, from 1
-  Fault fault = Fault::Missing;
+  Fault fault = Fault::FalseNegative;
   List list = List::VertexTriangle;  ///< in which the contact is or should be.
   Contact expected{}, found{};       ///< the contact; monostate: it does not exist.
   std::filesystem::path file{};      ///< capture of the pair's frame; empty: not written.

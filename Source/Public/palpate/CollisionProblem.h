@@ -15,12 +15,12 @@ namespace palpate {
 /// from it.
 struct CollisionProblem {
   /// A geometry of any type.
-  struct Mesh {
+  struct Geometry {
     GeometryId id;  ///< in the original OctreeBasedCD; no answer depends on it
     /// L, in the world, also if setTransform() placed the geometry.
     std::vector<Eigen::Vector3d> before, now;
     std::vector<Triangle> triangles;  ///< segment {p, q} is {p, q, q}; empty for points
-    GeometryKind kind = GeometryKind::Triangles;
+    GeometryType type = GeometryType::Triangles;
     std::vector<double> radii{};  ///< L: none, one for all vertices, or one per vertex
     /// L: the positions that determine PairSettings::restDistance and the winding of the surface of
     /// tetrahedra. Empty: `now`.
@@ -44,7 +44,7 @@ struct CollisionProblem {
     bool predicate = false;
   };
   Settings settings;  ///< without an executor
-  std::vector<Mesh> geometries;
+  std::vector<Geometry> geometries;
   std::vector<Pair> pairs;  ///< in the order in which they were added
 };
 

@@ -22,7 +22,7 @@ struct OctreeStatistics {
   std::size_t blocksInUse = 0, blocksFree = 0, blocksAllocated = 0;
   int deepestLevel = 0;  ///< root: 0
   std::size_t elements = 0;
-  std::size_t mostElementsInNode = 0;
+  std::size_t maxElementsInNode = 0;
   std::vector<std::size_t> nodesByDepth, elementsByDepth;  ///< one entry per level, from the root
   std::size_t bytes = 0;  ///< memory of boxes, keys, nodes and scratch
 };

@@ -29,10 +29,10 @@ enum class DirectionChange {
 struct TrackedVertex {
   /// Largest turn beyond what motion explains, as the length of the difference of the two unit
   /// vectors; 0.5 is about 29 degrees.
-  static constexpr double kMostTurn = 0.5;
+  static constexpr double kMaxTurn = 0.5;
   /// The last direction is kept only while its depth is at most this many times the distance to the
   /// nearest surface point.
-  static constexpr double kMostDepth = 2.0;
+  static constexpr double kMaxDepthRatio = 2.0;
 
   InsideVertex penetration;  ///< Kept: where the last direction leaves the body
   InsideVertex nearest;      ///< as findInsideVertices() finds it
@@ -52,13 +52,13 @@ struct TrackedVertex {
 ///     collisions.advance();
 ///   }
 ///
-/// Laws     (1) the depth is at most kMostDepth times the least depth.
-///          (2) a direction turns further than kMostTurn + m only if its change is Jumped. Here m
+/// Laws     (1) the depth is at most kMaxDepthRatio times the least depth.
+///          (2) a direction turns further than kMaxTurn + m only if its change is Jumped. Here m
 ///          is the turn that motion explains: the distance that the vertex moved from its last
 ///          surface point, divided by the square root of the last depth times the least depth now.
 /// Method   the last direction turns with the triangle of the last surface point. If the nearest
-///          direction is within kMostTurn + m of it, the nearest is taken (None). Else the last
-///          direction is kept if it leaves the body within kMostDepth times the least depth
+///          direction is within kMaxTurn + m of it, the nearest is taken (None). Else the last
+///          direction is kept if it leaves the body within kMaxDepthRatio times the least depth
 ///          (Kept). Else the nearest is taken (Jumped).
 /// Threads  use an object from one thread at a time.
 class PALPATE_EXPORT PenetrationTracker {

@@ -43,7 +43,7 @@ struct AuditSettings {
   /// An existing folder. The audit writes a capture (<palpate/Capture.h>) into it for each pair and
   /// frame with failures, and never overwrites a file. Empty: the audit writes no files.
   std::filesystem::path folder{};
-  int mostFiles = 100;  ///< most files over the life of an OctreeBasedCD, at least 0
+  int maxFiles = 100;  ///< most files over the life of an OctreeBasedCD, at least 0
 };
 
 /// Settings of an OctreeBasedCD, for its whole life. Its constructor throws InvalidSettings for a

@@ -38,8 +38,8 @@ struct GuardedVertex {
 ///   StepGuard guard;
 ///   const GeometryId organ = guard.addTriangleMesh(positions, triangles);
 ///   const GeometryId thread = guard.addLineMesh(line, segments);
-///   guard.addPair(organ, thread);
-///   guard.addPair(thread, thread);
+///   guard.addCollisionPair(organ, thread);
+///   guard.addCollisionPair(thread, thread);
 ///   // after the solver's last correction of a step:
 ///   const std::array steps{GuardedStep{organ, before, now},
 ///                          GuardedStep{thread, lineBefore, lineNow}};
@@ -101,8 +101,8 @@ class PALPATE_EXPORT StepGuard {
   /// through itself.
   ///
   /// Errors   DuplicatePair; UnsupportedMethod.
-  void addPair(GeometryId a, GeometryId b);
-  void removePair(GeometryId a, GeometryId b);  ///< in either order; throws UnknownPair
+  void addCollisionPair(GeometryId a, GeometryId b);
+  void removeCollisionPair(GeometryId a, GeometryId b);  ///< in either order; throws UnknownPair
   /// Disables these triangles, segments or points and enables all others. Other geometries may pass
   /// through disabled elements, as where a needle pierced. A vertex or edge is enabled while an
   /// enabled element holds it.

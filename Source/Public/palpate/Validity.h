@@ -10,7 +10,7 @@ namespace palpate {
 
 /// Why the library answered a pair by Validity::method.
 enum class MethodReason {
-  Asked,  ///< the pair's settings name the method
+  Requested,  ///< the pair's settings name the method
   // The reasons of Method::Auto. Motion is that of features in the step, relative to each other.
   Still,  ///< nothing moves: Proximity, or Intersection for two meshes without a thickness
   Slow,   ///< all features move at most PairSettings::motionTolerance: Proximity
@@ -22,7 +22,7 @@ enum class MethodReason {
   /// The pair has lines, points or shapes, and no other method answers it as well. Continuous, if
   /// features move, or if Proximity would need a thickness or a radius. Proximity, if Continuous
   /// does not answer the pair: then impacts within the step may be missing.
-  Only
+  NoAlternative
 };
 
 /// Whether the last answer for one pair can be trusted, and what the library knows about the step.
@@ -53,7 +53,7 @@ struct Validity {
 
   /// The method that answered. Auto stands for Proximity and Continuous, feature by feature.
   Method method = Method::Auto;
-  MethodReason reason = MethodReason::Asked;
+  MethodReason reason = MethodReason::Requested;
   /// Number of contacts from the step's end, by distance or intersection; and number of contacts
   /// from within the step, by impact.
   std::size_t atEnd = 0, atImpact = 0;
@@ -63,7 +63,7 @@ struct Validity {
   /// L: the limit for `displacement`. Proximity: the thickness. Auto: the motion tolerance, which
   /// only chooses the method. Intersection: the smallest height of a triangle, measured when the
   /// topology was set. Continuous: infinity.
-  double reach = 0;
+  double displacementLimit = 0;
   /// L: how far the straight motion of vertices is off the arcs of bodies that setTransform()
   /// turns. It bounds the distance of a vertex from its path if the body turned evenly about one
   /// axis and slid along it. It is the sum over both bodies, and infinity for a plane that turns.
@@ -71,22 +71,24 @@ struct Validity {
   double arcDeviation = 0;
   /// L: feature pairs further apart at the step's end are contacts only by an impact. It is the
   /// thickness, with Auto up to the motion tolerance more; 0 for Intersection.
-  double thickness = 0;
+  double effectiveThickness = 0;
 
   /// Vertices of the first and of the second mesh because of which the answer is not trusted,
-  /// ascending: vertices that moved further than `reach` allows, and vertices of features that may
-  /// have touched within the step although they are apart at its end. For a mesh with itself all
-  /// are in the first list.
-  std::vector<std::uint32_t> verticesBeyondA, verticesBeyondB;
+  /// ascending: vertices that moved further than `displacementLimit`, and vertices of features that
+  /// may have touched within the step although they are apart at its end. For a mesh with itself
+  /// all are in the first list.
+  std::vector<std::uint32_t> untrustedVerticesA, untrustedVerticesB;
   /// Triangles without area that are in contacts, ascending. Their normals follow the rules of
   /// <palpate/Distance.h>.
   std::vector<std::uint32_t> degenerateTrianglesA, degenerateTrianglesB;
 
-  /// Most vertices of a mesh that are listed because they moved too far.
-  static constexpr std::size_t kMostFarMovers = 128;
+  /// Maximum number of vertices of one mesh that are listed because they moved too far.
+  static constexpr std::size_t kMaxFastVertices = 128;
 
   /// A value above 1 means that the motion violates the method's condition.
-  double displacementOverReach() const { return displacement > 0 ? displacement / reach : 0; }
+  double displacementOverLimit() const {
+    return displacement > 0 ? displacement / displacementLimit : 0;
+  }
 
   friend bool operator==(const Validity&, const Validity&) = default;
 };

@@ -195,7 +195,7 @@ TEST(AutoKinds, AnswersAsTheMethodThatItNames) {
               (moves && hasContinuous) || !hasProximity ? Method::Continuous : Method::Proximity;
           EXPECT_EQ(validity.method, named.method);
           EXPECT_EQ(validity.reason,
-                    !moves && hasProximity ? MethodReason::Still : MethodReason::Only);
+                    !moves && hasProximity ? MethodReason::Still : MethodReason::NoAlternative);
           EXPECT_FALSE(validity.trusted);
           EXPECT_EQ(validity.displacement > 0.0, moves);
           expectSameContacts(found, Pair(a, b, named).detect(moves));
@@ -270,7 +270,7 @@ TEST(AutoKinds, NeedsNoSettingsForASuture) {
   ASSERT_FALSE(data.vertexTriangle().empty());
   EXPECT_EQ(data.vertexTriangle()[0].vertex, 1u);
   EXPECT_EQ(data.validity().method, Method::Continuous);
-  EXPECT_EQ(data.validity().reason, MethodReason::Only);
+  EXPECT_EQ(data.validity().reason, MethodReason::NoAlternative);
 }
 
 }  // namespace

@@ -205,8 +205,8 @@ TEST(ConstraintRows, OfTaperedLinesAreTheDerivativesOfCentreLines) {
 /// At distance 0 the row has the gradient of the signed distance along the normal.
 TEST(ConstraintRows, OfTouchingFeaturesMeasureAlongTheNormal) {
   const Thing ground{
-      GeometryKind::Triangles, {{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}, {{0, 1, 2}}, {}, {}},
-      tip{GeometryKind::Triangles, {{1, 1, 0}, {1, 2, 3}, {2, 1, 3}}, {{0, 1, 2}}, {}, {}};
+      GeometryType::Triangles, {{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}, {{0, 1, 2}}, {}, {}},
+      tip{GeometryType::Triangles, {{1, 1, 0}, {1, 2, 3}, {2, 1, 3}}, {{0, 1, 2}}, {}, {}};
   const Positions at = joined(tip.positions, ground.positions);
   const Rowed found = rowed(tip, ground, {Method::Proximity, 0.1}, at);
   ASSERT_EQ(found.rows.size(), 1u);
@@ -245,7 +245,7 @@ TEST(ConstraintRows, TooFewPositionsAreRefusedByVertex) {
 }
 
 TEST(ConstraintRows, TooFewPositionsBesideAShapeAreRefusedByVertex) {
-  const Thing drops{GeometryKind::Points, {{0, 0, 1}, {0, 0, 0.1}, {1, 0, 0.1}}, {}, {}, {0.0}};
+  const Thing drops{GeometryType::Points, {{0, 0, 1}, {0, 0, 0.1}, {1, 0, 0.1}}, {}, {}, {0.0}};
   OctreeBasedCD collisions;
   const GeometryId points = drops.addTo(collisions),
                    plane = collisions.addAnalyticalGeometry(Plane{});

@@ -80,8 +80,8 @@ TEST(ContactMotions, TouchingFeaturesOfAStepWithoutThicknessMeetAtOnePoint) {
 }
 
 TEST(ContactMotions, OfADropOverATriangleAreExact) {
-  const Thing drop{GeometryKind::Points, {{0.25, 0.25, 1}}, {}, {}, {0.25}},
-      floor{GeometryKind::Triangles, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, {}, {}};
+  const Thing drop{GeometryType::Points, {{0.25, 0.25, 1}}, {}, {}, {0.25}},
+      floor{GeometryType::Triangles, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, {}, {}};
   const Positions dropNow{{0.375, 0.25, 0.5}}, floorNow{{0, 1, 0}, {1, 1, 0}, {0, 2, 0}};
   for (const bool dropFirst : {true, false}) {
     const Thing &a = dropFirst ? drop : floor, &b = dropFirst ? floor : drop;

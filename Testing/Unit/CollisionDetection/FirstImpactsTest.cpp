@@ -210,11 +210,11 @@ TEST(FirstImpacts, BreakTiesByOrder) {
 TEST(FirstImpacts, OfACornerOnACornerIsOne) {
   // The apexes of two pyramids of four triangles each meet at half time.
   const std::vector<Triangle> sides{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}};
-  const Thing up{GeometryKind::Triangles,
+  const Thing up{GeometryType::Triangles,
                  {{0, 0, 0}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, -1}, {1, -1, -1}},
                  sides,
                  {}};
-  const Thing down{GeometryKind::Triangles,
+  const Thing down{GeometryType::Triangles,
                    {{0, 0, 1}, {1, 0, 2}, {0, 1, 2}, {-1, 0, 2}, {0, -1, 2}},
                    sides,
                    {}};

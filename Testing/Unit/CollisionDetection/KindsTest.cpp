@@ -79,13 +79,13 @@ using Ids = std::vector<std::uint32_t>;
 std::set<Ids> expectedVertexTriangle(const Thing& vertices, const Thing& others, double thickness,
                                      bool ofSecond) {
   std::set<Ids> ids;
-  const bool points = vertices.kind == GeometryKind::Points;
-  if (others.kind != GeometryKind::Triangles &&
-      !(points && (others.kind == GeometryKind::Lines || !ofSecond)))
+  const bool points = vertices.type == GeometryType::Points;
+  if (others.type != GeometryType::Triangles &&
+      !(points && (others.type == GeometryType::Lines || !ofSecond)))
     return ids;
   std::vector<Triangle> elements = others.triangles;
   for (const auto& [p, q] : others.segments) elements.push_back({p, q, q});
-  for (std::uint32_t i = 0; others.kind == GeometryKind::Points && i < others.positions.size(); ++i)
+  for (std::uint32_t i = 0; others.type == GeometryType::Points && i < others.positions.size(); ++i)
     elements.push_back({i, i, i});
   const auto at = [&](std::uint32_t i) { return others.positions[i]; };
   for (std::uint32_t v = 0; v < vertices.positions.size(); ++v)
@@ -278,7 +278,7 @@ TEST(Kinds, SwappingTwoPointSetsTurnsTheirContacts) {
 // ---- Meaning, by hand ----
 
 Thing lineOf(Positions positions, double radius = 0.0) {
-  Thing line{GeometryKind::Lines, std::move(positions), {}, {}, {radius}};
+  Thing line{GeometryType::Lines, std::move(positions), {}, {}, {radius}};
   for (std::uint32_t i = 1; i < line.positions.size(); ++i) line.segments.push_back({i - 1, i});
   return line;
 }
@@ -310,7 +310,7 @@ TEST(Kinds, EndToEndIsOneContact) {
 }
 
 TEST(Kinds, ApexUnderAThreadIsFound) {
-  const Thing pyramid{GeometryKind::Triangles,
+  const Thing pyramid{GeometryType::Triangles,
                       {{0, 0, 0}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, -1}, {1, -1, -1}},
                       {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}},
                       {}};
@@ -333,8 +333,8 @@ TEST(Kinds, ParallelEdgesMeetInTheMiddle) {
 
 TEST(Kinds, ParticleOnAPlaneReportsItsDepth) {
   const Thing ground{
-      GeometryKind::Triangles, {{-4, -4, 0}, {4, -4, 0}, {0, 4, 0}}, {{0, 1, 2}}, {}};
-  const Thing drop{GeometryKind::Points, {{0, 0, 0.25}, {0, 0, -3}}, {}, {}, {0.5, 1.0}};
+      GeometryType::Triangles, {{-4, -4, 0}, {4, -4, 0}, {0, 4, 0}}, {{0, 1, 2}}, {}};
+  const Thing drop{GeometryType::Points, {{0, 0, 0.25}, {0, 0, -3}}, {}, {}, {0.5, 1.0}};
   const CollisionData data = answer(drop, ground, {Method::Proximity, 0.0, Contacts::Distinct});
   ASSERT_EQ(data.vertexTriangle().size(), 1u);
   EXPECT_EQ(data.vertexTriangle()[0].vertex, 0u);
@@ -344,7 +344,7 @@ TEST(Kinds, ParticleOnAPlaneReportsItsDepth) {
 
 TEST(Kinds, ParticlesMeetThreadsAndEachOther) {
   const Thing thread = lineOf({{0, 0, 0}, {4, 0, 0}, {4, 4, 0}}, 0.125);
-  const Thing drops{GeometryKind::Points,
+  const Thing drops{GeometryType::Points,
                     {{1, 0, 0.5}, {4.25, -0.25, 0}, {9, 9, 9}, {1, 0.25, 0.5}},
                     {},
                     {},
@@ -373,7 +373,7 @@ TEST(Kinds, ThickEndOfATaperIsNotHiddenByItsThinOne) {
   // Both segments at the thick vertex come nearer to the particle, where they are thin.
   Thing spindle = lineOf({{-2, 0, 0.5}, {0, 0, 0}, {2, 0, 0.5}});
   spindle.radii = {0, 1, 0};
-  const Thing drop{GeometryKind::Points, {{0, 0, 1.125}}, {}, {}, {0}};
+  const Thing drop{GeometryType::Points, {{0, 0, 1.125}}, {}, {}, {0}};
   const CollisionData data = answer(drop, spindle, {Method::Proximity, 0.5, Contacts::Distinct});
   EXPECT_EQ(data.vertexTriangle().size(), 2u);
   const Thing far = lineOf({{-2, 0, 0.5}, {0, 0, 0}, {2, 0, 0.5}}, 0.625);
@@ -383,8 +383,8 @@ TEST(Kinds, ThickEndOfATaperIsNotHiddenByItsThinOne) {
 
 TEST(Kinds, ContinuousStopsAtTheRadius) {
   const Thing ground{
-      GeometryKind::Triangles, {{-4, -4, 0}, {4, -4, 0}, {0, 4, 0}}, {{0, 1, 2}}, {}};
-  const Thing drop{GeometryKind::Points, {{0, 0, 2}}, {}, {}, {0.5}};
+      GeometryType::Triangles, {{-4, -4, 0}, {4, -4, 0}, {0, 4, 0}}, {{0, 1, 2}}, {}};
+  const Thing drop{GeometryType::Points, {{0, 0, 2}}, {}, {}, {0.5}};
   const CollisionData data = answer(settingsOf(Engine::Octree), drop, ground, {Method::Continuous},
                                     {{0, 0, -2}}, ground.positions);
   ASSERT_EQ(data.vertexTriangle().size(), 1u);
@@ -437,8 +437,8 @@ TEST(Kinds, RestDistanceLeavesOutNeighboursAlongTheThread) {
 TEST(Kinds, DegeneratePointsAnswerAsBruteForce) {
   Random random(9);
   for (int run = 0; run < 20; ++run) {
-    const auto onGrid = [&](GeometryKind kind, std::size_t count, double radius) {
-      Thing thing{kind, {}, {}, {}, {radius}};
+    const auto onGrid = [&](GeometryType type, std::size_t count, double radius) {
+      Thing thing{type, {}, {}, {}, {radius}};
       for (std::size_t v = 0; v < count; ++v) {
         const auto at = [&] { return static_cast<double>(random() % 3); };
         const double x = at(), y = at(), z = at();
@@ -446,9 +446,9 @@ TEST(Kinds, DegeneratePointsAnswerAsBruteForce) {
       }
       return thing;
     };
-    const Thing drops = onGrid(GeometryKind::Points, 20, run % 2 ? 0.25 : 0.0),
-                others = onGrid(GeometryKind::Points, 20, 0.0);
-    Thing line = onGrid(GeometryKind::Lines, 12, 0.25);  // some segments without length
+    const Thing drops = onGrid(GeometryType::Points, 20, run % 2 ? 0.25 : 0.0),
+                others = onGrid(GeometryType::Points, 20, 0.0);
+    Thing line = onGrid(GeometryType::Lines, 12, 0.25);  // some segments without length
     for (std::uint32_t e = 0; e < 16; ++e) {
       const auto p = static_cast<std::uint32_t>(random() % 12);
       line.segments.push_back({p, static_cast<std::uint32_t>((p + 1 + random() % 11) % 12)});
@@ -475,7 +475,7 @@ TEST(Kinds, DegenerateLinesAnswerAsBruteForce) {
   Random random(6);
   const Thing organ = things(sphere(4, 6, {1, 1, 1}, 1));
   for (int run = 0; run < 30; ++run) {
-    Thing zoo{GeometryKind::Lines, {}, {}, {}, {run % 2 ? 0.25 : 0.0}};
+    Thing zoo{GeometryType::Lines, {}, {}, {}, {run % 2 ? 0.25 : 0.0}};
     // On a coarse grid: coincident, parallel and collinear segments, some without length.
     for (int v = 0; v < 12; ++v) {
       const auto at = [&] { return static_cast<double>(random() % 3); };
@@ -509,9 +509,9 @@ TEST(Kinds, DocumentSaysWhatIsAnswered) {
                                                     {Method::Proximity, "Proximity"},
                                                     {Method::Continuous, "Continuous"}};
   const std::string names[] = {"triangles", "lines", "points", "tetrahedra", "shapes"};
-  const Thing kinds[] = {{GeometryKind::Triangles, some, {{0, 1, 2}}, {}},
-                         {GeometryKind::Lines, some, {}, {{0, 1}}},
-                         {GeometryKind::Points, some, {}, {}}};
+  const Thing kinds[] = {{GeometryType::Triangles, some, {{0, 1, 2}}, {}},
+                         {GeometryType::Lines, some, {}, {{0, 1}}},
+                         {GeometryType::Points, some, {}, {}}};
   const auto add = [&](OctreeBasedCD& detection, int kind) {
     if (kind == 3) return detection.addTetrahedralMesh(some, std::vector<Tetrahedron>{});
     return kind == 4 ? detection.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1.0})

@@ -123,8 +123,8 @@ void expectSameValidity(const Validity& found, const Validity& truth, double siz
   EXPECT_EQ(found.reason, truth.reason);
   EXPECT_EQ(found.atEnd, truth.atEnd);
   EXPECT_EQ(found.atImpact, truth.atImpact);
-  EXPECT_EQ(found.verticesBeyondA, truth.verticesBeyondA);
-  EXPECT_EQ(found.verticesBeyondB, truth.verticesBeyondB);
+  EXPECT_EQ(found.untrustedVerticesA, truth.untrustedVerticesA);
+  EXPECT_EQ(found.untrustedVerticesB, truth.untrustedVerticesB);
 }
 
 /// Every engine with transforms answers as the positions do; returns the contacts of all frames.
@@ -215,7 +215,7 @@ TEST(Rigid, LinesAndPointsAnswerAsTheirPositionsDo) {
     for (const PairSettings& pair :
          settingsFor(0.02, body->radii.size() == 1 && other->radii.size() == 1))
       for (const Way way : {Way::Small, Way::Large, Way::Far}) {
-        SCOPED_TRACE(::testing::Message() << "kinds " << int(body->kind) << int(other->kind)
+        SCOPED_TRACE(::testing::Message() << "kinds " << int(body->type) << int(other->type)
                                           << " method " << int(pair.method) << " way " << int(way));
         expectAsPositions(random, *body, *other, pair, {way, way != Way::Large, way == Way::Large});
         if (HasFailure()) return;

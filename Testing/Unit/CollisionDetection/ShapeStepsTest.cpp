@@ -261,9 +261,9 @@ std::vector<AnalyticalGeometry> geometries(Random& random) {
   return all;
 }
 
-Moving movingBody(Random& random, int kind, double radius) {
+Moving movingBody(Random& random, int type, double radius) {
   Moving body;
-  body.thing.kind = static_cast<GeometryKind>(kind);
+  body.thing.type = static_cast<GeometryType>(type);
   body.thing.radii = {radius};
   Vector3d push;  // past the middle
   const auto add = [&](const Vector3d& p) {
@@ -275,10 +275,10 @@ Moving movingBody(Random& random, int kind, double radius) {
     const Vector3d p = randomPoint(random, -1, 1);
     push = -1.6 * p;
     const std::uint32_t a = add(p);
-    if (kind == 2) continue;
+    if (type == 2) continue;
     const std::uint32_t b = add(p + randomPoint(random, -0.6, 0.6));
-    if (kind == 1) body.thing.segments.push_back({a, b});
-    if (kind == 0) body.thing.triangles.push_back({a, b, add(p + randomPoint(random, -.6, .6))});
+    if (type == 1) body.thing.segments.push_back({a, b});
+    if (type == 0) body.thing.triangles.push_back({a, b, add(p + randomPoint(random, -.6, .6))});
   }
   return body;
 }
@@ -325,7 +325,7 @@ TEST(ShapeSteps, AreNeverLateAndNoEarlierThanTheTolerance) {
 Moving still(const Thing& thing) { return {thing, thing.positions}; }
 
 Thing triangleAtZero() {
-  return {GeometryKind::Triangles, {{-8, -8, 0}, {8, -8, 0}, {0, 8, 0}}, {{0, 1, 2}}, {}};
+  return {GeometryType::Triangles, {{-8, -8, 0}, {8, -8, 0}, {0, 8, 0}}, {{0, 1, 2}}, {}};
 }
 
 Tool moving(const AnalyticalGeometry& geometry, const Vector3d& from, const Vector3d& to) {
@@ -381,7 +381,7 @@ TEST(ShapeSteps, StartsAndEndsCount) {
 
 /// One moving point.
 Moving particle(const Vector3d& from, const Vector3d& to) {
-  return {{GeometryKind::Points, {from}, {}, {}}, {to}};
+  return {{GeometryType::Points, {from}, {}, {}}, {to}};
 }
 
 TEST(ShapeSteps, PlanesMeetWhatFallsThroughThem) {
@@ -403,7 +403,7 @@ TEST(ShapeSteps, PlanesMeetWhatFallsThroughThem) {
   EXPECT_EQ(below.normal, -Vector3d::UnitZ());
   EXPECT_EQ(only(particle({3, 4, -9}, {5, 4, 9}), floor, 0).timeOfImpact, 0);  // it was inside
   // What a plane of two sides goes through before the step: two of a triangle's edges.
-  const Thing up{GeometryKind::Triangles, {{0, 0, -2}, {1, 0, 2}, {0, 1, 2}}, {{0, 1, 2}}, {}};
+  const Thing up{GeometryType::Triangles, {{0, 0, -2}, {1, 0, 2}, {0, 1, 2}}, {{0, 1, 2}}, {}};
   const CollisionData data = answer(settingsOf(Engine::Octree), still(up), sheet, continuous(0));
   ASSERT_EQ(data.shape().size(), 2u);
   for (const ShapeContact& c : data.shape()) {

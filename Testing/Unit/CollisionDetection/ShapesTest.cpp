@@ -106,24 +106,24 @@ struct Placed {
 
 /// A geometry with elements: triangles, segments {p, q, q} or points {p, p, p}.
 struct Body {
-  GeometryKind kind;
+  GeometryType type;
   Positions positions;
   std::vector<Triangle> elements;
   double radius = 0.0;
 
   GeometryId addTo(OctreeBasedCD& collisions) const {
-    if (kind == GeometryKind::Triangles) return collisions.addTriangleMesh(positions, elements);
-    if (kind == GeometryKind::Points) return collisions.addPointSet(positions, radius);
+    if (type == GeometryType::Triangles) return collisions.addTriangleMesh(positions, elements);
+    if (type == GeometryType::Points) return collisions.addPointSet(positions, radius);
     std::vector<Segment> segments;
     for (const auto& [p, q, _] : elements) segments.push_back({p, q});
     return collisions.addLineMesh(positions, segments, radius);
   }
 };
 
-Body organ(const Mesh& mesh) { return {GeometryKind::Triangles, mesh.positions, mesh.triangles}; }
+Body organ(const Mesh& mesh) { return {GeometryType::Triangles, mesh.positions, mesh.triangles}; }
 
 Body thread(Random& random, std::uint32_t segments, double radius) {
-  Body line{GeometryKind::Lines, {randomPoint(random, 0.2, 0.8)}, {}, radius};
+  Body line{GeometryType::Lines, {randomPoint(random, 0.2, 0.8)}, {}, radius};
   for (std::uint32_t i = 1; i <= segments; ++i) {
     line.positions.push_back(line.positions.back() + randomPoint(random, -0.1, 0.1));
     line.elements.push_back({i - 1, i, i});
@@ -132,7 +132,7 @@ Body thread(Random& random, std::uint32_t segments, double radius) {
 }
 
 Body particles(Random& random, std::uint32_t count, double radius) {
-  Body points{GeometryKind::Points, {}, {}, radius};
+  Body points{GeometryType::Points, {}, {}, radius};
   for (std::uint32_t i = 0; i < count; ++i) {
     points.positions.push_back(randomPoint(random, 0, 1));
     points.elements.push_back({i, i, i});
@@ -313,7 +313,7 @@ std::map<Element, Truth> truthOf(const Body& body, const Placed& shape, double r
       truth[{1, p, q}] = {edge, std::min(start, end)};
       edges = std::min(edges, edge);
     }
-    if (body.kind != GeometryKind::Triangles) continue;
+    if (body.type != GeometryType::Triangles) continue;
     const auto& [a, b, c] = corners;
     const Vector3d middle = (at[a] + at[b] + at[c]) / 3;
     const double size =
@@ -596,7 +596,7 @@ TEST(Shapes, DegenerateElementsAnswerTheDefinition) {
                           {ConvexHull{{{1, 1, 1}}}},
                           {ConvexHull{unitCube}}};
   for (int run = 0; run < casesOf(6); ++run) {
-    Body zoo{GeometryKind::Triangles, {}, {}, 0};  // on a coarse grid
+    Body zoo{GeometryType::Triangles, {}, {}, 0};  // on a coarse grid
     for (int v = 0; v < 12; ++v) {
       const auto at = [&] { return static_cast<double>(random() % 3); };
       const double x = at(), y = at(), z = at();

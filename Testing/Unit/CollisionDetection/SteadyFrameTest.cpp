@@ -331,8 +331,8 @@ TEST(SteadyFrame, AllocatesNothingInAGuard) {
   StepGuard guard({.threads = 1});
   const GeometryId a = guard.addTriangleMesh(body.positions, body.triangles),
                    b = guard.addTriangleMesh(floor.positions, floor.triangles);
-  guard.addPair(a, b);
-  guard.addPair(b, b);
+  guard.addCollisionPair(a, b);
+  guard.addCollisionPair(b, b);
   const std::vector<std::uint32_t> fixed{0, 5};
   guard.setFixedVertices(b, fixed);
   std::vector<Eigen::Vector3d> far = body.positions, now, still;

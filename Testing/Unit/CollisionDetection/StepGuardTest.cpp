@@ -26,14 +26,14 @@ struct Guarding {
   StepGuard guard(const Settings& settings) const {
     StepGuard guard(settings);
     for (const Thing& body : bodies) {
-      if (body.kind == GeometryKind::Triangles)
+      if (body.type == GeometryType::Triangles)
         guard.addTriangleMesh(body.positions, body.triangles);
-      else if (body.kind == GeometryKind::Lines)
+      else if (body.type == GeometryType::Lines)
         guard.addLineMesh(body.positions, body.segments);
       else
         guard.addPointSet(body.positions);
     }
-    for (const auto& [a, b] : pairs) guard.addPair(idOf(a), idOf(b));
+    for (const auto& [a, b] : pairs) guard.addCollisionPair(idOf(a), idOf(b));
     return guard;
   }
   static GeometryId idOf(std::size_t body) { return GeometryId{static_cast<std::uint32_t>(body)}; }
@@ -146,7 +146,7 @@ TEST(StepGuard, SurfacesOfTetrahedralMeshesAreGuarded) {
   StepGuard guard;
   const GeometryId solid = guard.addTetrahedralMesh(cube.positions, cube.tetrahedra),
                    drops = guard.addPointSet(points);
-  guard.addPair(solid, drops);
+  guard.addCollisionPair(solid, drops);
   Positions raised = cube.positions, fallen{{0.9, 0.8, 1.5}};
   for (Vector3d& p : raised) p.z() += 0.25;
   const Positions given = raised;
@@ -195,7 +195,7 @@ TEST(StepGuard, RigidGroupsMoveBackAsAWhole) {
 /// Particles on a line, of which all but the last move further than to the next.
 Guarding chain(std::uint32_t count) {
   Guarding all;
-  Thing points{GeometryKind::Points, {}, {}, {}, {0.0}};
+  Thing points{GeometryType::Points, {}, {}, {}, {0.0}};
   for (std::uint32_t i = 0; i < count; ++i) points.positions.emplace_back(0, 0, i);
   all.add(points);
   all.pairs.push_back({0, 0});
@@ -214,8 +214,8 @@ TEST(StepGuard, TakesOneRoundMoreThanVerticesAtMost) {
 /// A vertex above a triangle that contains the origin.
 Guarding vertexOverTriangle(double end) {
   Guarding all;
-  all.add({GeometryKind::Triangles, {{-1, -1, 0}, {2, -1, 0}, {-1, 2, 0}}, {{0, 1, 2}}, {}, {}});
-  all.add({GeometryKind::Points, {{0.1, 0.1, 1}}, {}, {}, {0.0}});
+  all.add({GeometryType::Triangles, {{-1, -1, 0}, {2, -1, 0}, {-1, 2, 0}}, {{0, 1, 2}}, {}, {}});
+  all.add({GeometryType::Points, {{0.1, 0.1, 1}}, {}, {}, {0.0}});
   all.pairs.push_back({0, 1});
   all.now[1][0].z() = end;
   return all;
@@ -267,8 +267,8 @@ TEST(StepGuard, StepsThatStartWithATouchAreRefused) {
   }
   // Edges are named by their vertices.
   Guarding edges;
-  edges.add({GeometryKind::Lines, {{-1, 0, 0}, {1, 0, 0}}, {}, {{0, 1}}, {}});
-  edges.add({GeometryKind::Lines, {{0, -1, 0}, {0, 1, 0}}, {}, {{0, 1}}, {}});
+  edges.add({GeometryType::Lines, {{-1, 0, 0}, {1, 0, 0}}, {}, {{0, 1}}, {}});
+  edges.add({GeometryType::Lines, {{0, -1, 0}, {0, 1, 0}}, {}, {{0, 1}}, {}});
   edges.pairs.push_back({1, 0});
   StepGuard guard = edges.guard(settingsOf(Engine::Octree));
   expectImpactRemains(
@@ -356,8 +356,10 @@ TEST(StepGuard, BadInputIsRefusedAndChangesNothing) {
   together[0] = together[1];
   expectRefused(ErrorCode::ImpactRemains, [&](auto& steps) { steps[4].before = together; });
 
-  expectError(ErrorCode::UnknownGeometry, [&] { guard.addPair(GeometryId{0}, GeometryId{9}); });
-  expectError(ErrorCode::DuplicatePair, [&] { guard.addPair(GeometryId{1}, GeometryId{0}); });
+  expectError(ErrorCode::UnknownGeometry,
+              [&] { guard.addCollisionPair(GeometryId{0}, GeometryId{9}); });
+  expectError(ErrorCode::DuplicatePair,
+              [&] { guard.addCollisionPair(GeometryId{1}, GeometryId{0}); });
   expectError(ErrorCode::UnknownGeometry, [&] { guard.addRigidGroup(GeometryId{9}); });
   expectError(ErrorCode::IndexOutOfRange, [&] {
     guard.addRigidGroup(
@@ -394,9 +396,9 @@ TEST(StepGuard, GeometriesAndPairsComeAndGo) {
   Guarding all = vertexOverTriangle(-1);
   StepGuard guard = all.guard(settingsOf(Engine::Octree));
   const std::vector<Positions> given = all.now;
-  guard.removePair(GeometryId{0}, GeometryId{1});
+  guard.removeCollisionPair(GeometryId{0}, GeometryId{1});
   EXPECT_EQ(guard.hold(all.steps(all.now)), 0u);
-  guard.addPair(GeometryId{0}, GeometryId{1});
+  guard.addCollisionPair(GeometryId{0}, GeometryId{1});
   EXPECT_EQ(guard.hold(all.steps(all.now)), 1u);
   // A cut moves the triangle away, with a fourth vertex; later ones are free again.
   all.now = given;

@@ -162,7 +162,7 @@ TEST_F(Step, WithoutAdvanceGrowsAndSaysSo) {
     m_detection.detectCollision();
     const Validity& validity = m_detection.collisionData(m_id, sheet).validity();
     EXPECT_NEAR(validity.displacement, frame, 1e-9);
-    EXPECT_EQ(validity.displacementOverReach() > 1, frame > 1);
+    EXPECT_EQ(validity.displacementOverLimit() > 1, frame > 1);
     EXPECT_EQ(validity.trusted, frame == 1);
   }
 }

@@ -183,15 +183,15 @@ TEST(TetrahedralMesh, CollidesAsItsSurfaceWithEveryKindByEveryMethod) {
   Settings audited = settingsOf(Engine::Octree, 2);
   audited.audit.features = 20;
   std::size_t contacts = 0;
-  for (const Thing& kind : kinds) {
+  for (const Thing& thing : kinds) {
     std::vector<PairSettings> settings = settingsFor(0.02);
-    if (kind.kind == GeometryKind::Triangles) {
+    if (thing.type == GeometryType::Triangles) {
       settings.push_back({Method::Intersection, 0.0});
       settings.push_back({Method::Auto, 0.02});
     }
     for (const PairSettings& pair : settings) {
-      const auto rows = life(audited, solid, cut, false, kind, pair);
-      expectSame(rows, life(audited, solid, cut, true, kind, pair));
+      const auto rows = life(audited, solid, cut, false, thing, pair);
+      expectSame(rows, life(audited, solid, cut, true, thing, pair));
       for (const Rows& r : rows) contacts += r.contacts();
     }
   }

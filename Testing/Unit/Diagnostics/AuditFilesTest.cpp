@@ -135,7 +135,7 @@ TEST_F(AuditFiles, WithoutAFolderThereAreNone) {
 
 TEST_F(AuditFiles, NoMoreThanAskedForAndAFolderThatIsGoneIsSaidByName) {
   AuditSettings settings = everything();
-  settings.mostFiles = 2;
+  settings.maxFiles = 2;
   OctreeBasedCD faulty = detection(settings);
   for (int frame = 1; frame <= 3; ++frame) {
     faultyFrame(faulty);
@@ -167,7 +167,7 @@ TEST_F(AuditFiles, AFolderThatIsNotThereIsRefusedByName) {
       EXPECT_NE(std::string(error.what()).find(folder.string()), std::string::npos);
     }
   }
-  EXPECT_THROW(detection({.features = 1, .mostFiles = -1}), Error);
+  EXPECT_THROW(detection({.features = 1, .maxFiles = -1}), Error);
 }
 
 }  // namespace

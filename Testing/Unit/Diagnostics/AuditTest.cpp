@@ -112,16 +112,16 @@ void expectEachFault(const Scene& scene, List list,
     const Contact& contact = (good.*member)[i];
     CollisionData::Contents faulty = good;
     (faulty.*member).erase((faulty.*member).begin() + static_cast<std::ptrdiff_t>(i));
-    expectOne(scene.failures(faulty), scene, Fault::Missing, list, contact, {});
+    expectOne(scene.failures(faulty), scene, Fault::FalseNegative, list, contact, {});
     if (i % 5 != 0) continue;
     faulty = good;
     (faulty.*member).push_back(contact);
-    expectOne(scene.failures(faulty), scene, Fault::Invented, list, {}, contact);
+    expectOne(scene.failures(faulty), scene, Fault::FalsePositive, list, {}, contact);
     Contact other = contact;
     rename(other);
     if (std::find((good.*member).begin(), (good.*member).end(), other) == (good.*member).end()) {
       (faulty.*member).back() = other;
-      expectOne(scene.failures(faulty), scene, Fault::Invented, list, {}, other);
+      expectOne(scene.failures(faulty), scene, Fault::FalsePositive, list, {}, other);
     }
     if constexpr (requires { falsify(other); }) {
       faulty = good;
@@ -158,13 +158,13 @@ TEST(Audit, FiresForTwoShapes) {
     EXPECT_EQ(failures[0].fault, fault);
     EXPECT_EQ(failures[0].list, List::ShapeShape);
   };
-  expectFault({}, Fault::Missing);
+  expectFault({}, Fault::FalseNegative);
   CollisionData::Contents faulty = good;
   faulty.shapeShape[0].distance = 0.25;
   expectFault(faulty, Fault::Different);
   faulty = good;
   faulty.shapeShape.push_back(good.shapeShape[0]);
-  expectFault(faulty, Fault::Invented);
+  expectFault(faulty, Fault::FalsePositive);
 }
 
 TEST(Audit, FiresForEachContactTakenOutAddedOrChanged) {

@@ -154,7 +154,7 @@ TEST(Octree, OneFarTriangleDoesNotFlattenIt) {
       detection.addTriangleMesh(mesh.positions, mesh.triangles);
       detection.update();
       EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
-      EXPECT_LE(detection.octree().statistics().mostElementsInNode,
+      EXPECT_LE(detection.octree().statistics().maxElementsInNode,
                 static_cast<std::size_t>(OctreeSettings{}.maxElementsPerLeaf));
     }
 }

@@ -52,12 +52,12 @@ std::optional<Held> holder(const Vector3d& p, const Solid& solid) {
 
 /// All points of the integer lattice in [-1, n + 1]³, of each kind.
 std::vector<Thing> lattices(int n) {
-  Thing points{GeometryKind::Points, {}, {}, {}, {0}};
+  Thing points{GeometryType::Points, {}, {}, {}, {0}};
   for (int x = -1; x <= n + 1; ++x)
     for (int y = -1; y <= n + 1; ++y)
       for (int z = -1; z <= n + 1; ++z) points.positions.emplace_back(x, y, z);
-  Thing line{GeometryKind::Lines, points.positions, {}, {}, {0}},
-      mesh{GeometryKind::Triangles, points.positions, {}, {}, {0}};
+  Thing line{GeometryType::Lines, points.positions, {}, {}, {0}},
+      mesh{GeometryType::Triangles, points.positions, {}, {}, {0}};
   for (std::uint32_t v = 0; v + 1 < points.positions.size(); ++v)
     line.segments.push_back({v, v + 1});
   for (std::uint32_t v = 0; v + 2 < points.positions.size(); ++v)

@@ -105,7 +105,8 @@ Tally expectDefined(const Story& story, const Answers& all) {
       const Vector3d p = story.points[frame][f.penetration.vertex];
       ++tally.changes[f.change];
       EXPECT_EQ(f.penetration.vertex, f.nearest.vertex);
-      EXPECT_LE(f.penetration.depth, TrackedVertex::kMostDepth * f.nearest.depth * (1 + kSlack));
+      EXPECT_LE(f.penetration.depth,
+                TrackedVertex::kMaxDepthRatio * f.nearest.depth * (1 + kSlack));
       EXPECT_GE(f.penetration.depth, f.nearest.depth * (1 - kSlack));
       EXPECT_NEAR(f.penetration.direction.norm(), 1, 1e-12);
       EXPECT_EQ(f.penetration.corners, story.triangles[f.penetration.triangle]);
@@ -129,15 +130,15 @@ Tally expectDefined(const Story& story, const Answers& all) {
       const double excess = (f.penetration.direction - direction).norm() - explained,
                    nearestExcess = (f.nearest.direction - direction).norm() - explained;
       if (f.change == DirectionChange::Jumped) {
-        EXPECT_GE(excess, TrackedVertex::kMostTurn - kSlack);
+        EXPECT_GE(excess, TrackedVertex::kMaxTurn - kSlack);
         EXPECT_GT(firstMet(story, frame, p, direction, true),
-                  TrackedVertex::kMostDepth * f.nearest.depth * (1 - kSlack));
+                  TrackedVertex::kMaxDepthRatio * f.nearest.depth * (1 - kSlack));
       } else {
-        EXPECT_LE(excess, TrackedVertex::kMostTurn + kSlack);
+        EXPECT_LE(excess, TrackedVertex::kMaxTurn + kSlack);
         tally.largestTurn = std::max(tally.largestTurn, excess);
       }
       if (f.change == DirectionChange::Kept) {
-        EXPECT_GE(nearestExcess, TrackedVertex::kMostTurn - kSlack);
+        EXPECT_GE(nearestExcess, TrackedVertex::kMaxTurn - kSlack);
         EXPECT_LT((f.penetration.direction - direction).norm(), 1e-9);
         EXPECT_GT(f.penetration.depth * (1 + kSlack), firstMet(story, frame, p, direction, false));
         EXPECT_LT(f.penetration.depth * (1 - kSlack), firstMet(story, frame, p, direction, true));

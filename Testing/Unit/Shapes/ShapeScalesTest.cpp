@@ -103,17 +103,17 @@ std::array<Move, 2> randomMoves(Random& random) {
   return ends;
 }
 
-Thing elements(Random& random, int kind) {
+Thing elements(Random& random, int type) {
   Thing thing;
-  thing.kind = static_cast<GeometryKind>(kind);
-  if (kind > 0) thing.radii = {0.01};
+  thing.type = static_cast<GeometryType>(type);
+  if (type > 0) thing.radii = {0.01};
   for (std::uint32_t i = 0; i < 12; ++i) {
     const Vector3d p = randomPoint(random, -0.7, 0.7);
     thing.positions.push_back(p);
-    if (kind < 2) thing.positions.push_back(p + randomPoint(random, -0.4, 0.4));
-    if (kind == 0) thing.positions.push_back(p + randomPoint(random, -0.4, 0.4));
-    if (kind == 0) thing.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
-    if (kind == 1) thing.segments.push_back({2 * i, 2 * i + 1});
+    if (type < 2) thing.positions.push_back(p + randomPoint(random, -0.4, 0.4));
+    if (type == 0) thing.positions.push_back(p + randomPoint(random, -0.4, 0.4));
+    if (type == 0) thing.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    if (type == 1) thing.segments.push_back({2 * i, 2 * i + 1});
   }
   return thing;
 }
@@ -187,16 +187,16 @@ TEST(ShapeScales, AnswerElementsAtAnySize) {
   std::array<std::size_t, 2> contacts{};
   const std::vector<AnalyticalGeometry> shapes = measuredShapes();
   for (std::size_t s = 0; s < shapes.size(); ++s)
-    for (const int kind : {0, 1, 2})
+    for (const int type : {0, 1, 2})
       for (const Method method : {Method::Proximity, Method::Continuous}) {
-        const Thing thing = elements(random, kind);
+        const Thing thing = elements(random, type);
         Scene scene{shapes[s], randomMoves(random)};
         scene.thing = thing;
         scene.now = moved(random, thing.positions, 0.3);
         for (const int scale : kScales) {
           SCOPED_TRACE("shape " + std::to_string(s) + " by 2^" + std::to_string(scale) +
-                       ", method " + std::to_string(static_cast<int>(method)) + ", kind " +
-                       std::to_string(kind));
+                       ", method " + std::to_string(static_cast<int>(method)) + ", type " +
+                       std::to_string(type));
           contacts[method == Method::Continuous] +=
               expectSame(scene, settingsWith(method, 0.02), std::ldexp(1, scale));
         }
@@ -231,9 +231,9 @@ TEST(ShapeScales, AnswerFarFromTheOrigin) {
   Random random(3);
   std::size_t contacts = 0;
   for (const AnalyticalGeometry& shape : measuredShapes())
-    for (const int kind : {0, 1, 2}) {
+    for (const int type : {0, 1, 2}) {
       Scene scene{shape, randomMoves(random)};
-      scene.thing = elements(random, kind);
+      scene.thing = elements(random, type);
       const Vector3d far(0x1p20, -0x1p19, 0x1p18);
       for (Move& end : scene.ends) end.shift += far;
       for (Vector3d& p : scene.thing.positions) p += far;
