@@ -5,7 +5,7 @@ set -euo pipefail
 
 build="cmake ninja-build g++ pkg-config libeigen3-dev libtbb-dev libhwy-dev libgmp-dev
   libvtk9-dev libfcl-dev libccd-dev libcli11-dev nlohmann-json3-dev xvfb xauth libgl1-mesa-dri"
-test="libgtest-dev libcgal-dev libmpfr-dev clang-format-14 qemu-user"
+test="python3 libgtest-dev libcgal-dev libmpfr-dev clang-format-14 qemu-user"
 docs="doxygen python3-sphinx furo python3-myst-parser python3-breathe"
 benchmark="python3 libbenchmark-dev libembree-dev libbullet-dev libcgal-dev"
 

@@ -1,5 +1,5 @@
 #!/bin/bash
-# From nothing to tested: packages, every configuration that CI builds, their tests. Every configuration runs, also
+# From nothing to tested: packages, the documentation site, every configuration that CI builds, their tests. Every configuration runs, also
 # after another one failed. The script fails if any stage failed or did not run. The release tests run last, so that
 # ctest's summary of them is the last thing printed.
 set -uo pipefail
@@ -62,6 +62,7 @@ fixedAddresses=()
 setarch --addr-no-randomize true 2>/dev/null && fixedAddresses=(setarch --addr-no-randomize)
 
 stage packages CMake/packages.sh build test
+stage documentation CMake/docs.sh
 build release
 # The core as a static library, without SIMD, VTK and FCL, with oneTBB's threads.
 configuration scalar -DBUILD_SHARED_LIBS=OFF
