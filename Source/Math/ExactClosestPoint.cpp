@@ -247,7 +247,37 @@ Quotient squaredDistanceToEdge(const Vector<Integer>& p, const Vector<Integer>& 
   return {dot(from, from) * square - along * along, square};
 }
 
+/// corners: of a triangle, whose feature holds the point closest to p.
+Quotient squaredDistance(const Vector<Integer>& p, const Vector<Integer>* corners,
+                         TriangleFeature feature) {
+  const int index = static_cast<int>(feature);
+  if (index < 3) {
+    const Vector<Integer> from = p - corners[index];
+    return {dot(from, from), 1};
+  }
+  if (index < 6) return squaredDistanceToEdge(p, corners[index - 3], corners[(index - 2) % 3]);
+  const Vector<Integer> normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
+  const Integer height = dot(p - corners[0], normal);
+  return {height * height, dot(normal, normal)};
+}
+
 }  // namespace
+
+int compareDistances(const Vector3d& p, const ClosestFeature& first, const ClosestFeature& second) {
+  const auto at = Integers(p, first.a, first.b, first.c, second.a, second.b, second.c).at;
+  const Quotient one = squaredDistance(at[0], &at[1], first.feature),
+                 two = squaredDistance(at[0], &at[4], second.feature);
+  return sgn(Integer(one.numerator * two.denominator - two.numerator * one.denominator));
+}
+
+int compareDistance(const Vector3d& p, const ClosestFeature& feature, double length, double more) {
+  // The lengths take part as coordinates, so that they have the same unit.
+  const Vector3d lengths(length, more, 0.0);
+  const auto at = Integers(p, feature.a, feature.b, feature.c, lengths).at;
+  const Quotient own = squaredDistance(at[0], &at[1], feature.feature);
+  const Integer sum = at[4][0] + at[4][1];
+  return sgn(Integer(own.numerator - sum * sum * own.denominator));
+}
 
 int nearestEnd(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0, const Vector3d& q1) {
   const auto at = Integers(p0, p1, q0, q1).at;

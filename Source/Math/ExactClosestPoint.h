@@ -52,6 +52,16 @@ Foot footBetweenLines(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
 int nearestEnd(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1, const Eigen::Vector3d& q0,
                const Eigen::Vector3d& q1);
 
+/// A triangle and the feature of it that holds the point closest to a position.
+struct ClosestFeature {
+  const Eigen::Vector3d &a, &b, &c;
+  TriangleFeature feature;
+};
+/// Sign of p's distance from one triangle less its distance from another.
+int compareDistances(const Eigen::Vector3d& p, const ClosestFeature&, const ClosestFeature&);
+/// Sign of p's distance from a triangle less the sum of two lengths, which must not be negative.
+int compareDistance(const Eigen::Vector3d& p, const ClosestFeature&, double length, double more);
+
 /// Unit vector along (b - a) x (d - c); zero if that product is zero.
 Eigen::Vector3d unitCross(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                           const Eigen::Vector3d& c, const Eigen::Vector3d& d);

@@ -127,6 +127,12 @@ constexpr double kNearestError = 0x1p-40;
 /// Error of a distance to a triangle, relative to the distance of its furthest corner: under 2^-48,
 /// and a margin.
 constexpr double kNearestSlack = 0x1p-45;
+/// Error of the distance between two points in a geometry's floats, relative to the largest
+/// coordinate: each of six coordinates is rounded by 2^-24.
+constexpr float kFloatPointError = 0x1p-21f;
+/// Error of a point that was brought into a body's frame, relative to the magnitudes of the
+/// coordinates: under 2^-49 for the point and for a vertex, and a margin.
+constexpr double kPlacedPointError = 0x1p-46;
 
 // ---- Winding numbers (SolidAngle.h, Queries/WindingNumber.cpp) ----
 

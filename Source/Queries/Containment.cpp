@@ -17,7 +17,7 @@ namespace palpate {
 
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kFloatInfinity = std::numeric_limits<float>::infinity();
 
 /// Whether a triangle is certainly further from p than `distance`, and so is its rounded distance.
 /// Along any direction, here towards the mean of the corners, no point of the triangle is nearer
@@ -61,7 +61,7 @@ class Body {
       for (std::uint32_t i = 0; i < size(); ++i) count(i);
     } else {
       FloatBox ray = m_frame.boxOf(p);
-      ray.upper[0] = kInfinity;
+      ray.upper[0] = kFloatInfinity;
       findOverlapping(m_geometry.tree.octree(), m_frame.map(), ray, m_stack);
       for (const std::uint32_t i : m_stack.found) count(i);
     }

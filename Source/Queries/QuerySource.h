@@ -4,6 +4,7 @@
 #include <palpate/SpatialQueries.h>
 
 #include "Core/Threads.h"
+#include "Queries/PointDistances.h"
 #include "Queries/SearchableGeometry.h"
 #include "Queries/VertexSearch.h"
 
@@ -23,6 +24,8 @@ class SpatialQueries::Source {
     PointQueryStack stack;
     VertexSearch<InsideVertex> inside;
     VertexSearch<EmbeddedVertex> embedded;
+    std::vector<PointDistances::Near> near;
+    std::vector<std::uint32_t> elements;
   };
   /// Scratch lent to one call.
   class Loan {

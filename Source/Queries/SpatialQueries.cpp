@@ -6,9 +6,12 @@
 #include "Core/Text.h"
 #include "Queries/Containment.h"
 #include "Queries/Embedding.h"
+#include "Queries/PointDistances.h"
 #include "Queries/QuerySource.h"
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <utility>
 
 namespace palpate {
@@ -78,6 +81,116 @@ SpatialQueries::Source& SpatialQueries::valid() const {
                 "geometries changed, advance() was called, or their OctreeBasedCD is gone; call "
                 "queries() again");
   return *m_source;
+}
+
+namespace {
+
+void checkPoint(const Eigen::Vector3d& point) {
+  if (!point.allFinite())
+    throw Error(ErrorCode::NonFinitePosition, "the query's point is " + textOf(point));
+}
+
+void checkLength(double length, const char* name, bool finite) {
+  if (!(length >= 0) || (finite && std::isinf(length)))
+    throw Error(ErrorCode::InvalidSettings, std::string(name) + " is " + textOf(length) +
+                                                "; it must not be negative" +
+                                                (finite ? " and must be finite" : ""));
+}
+
+/// Throws UnsupportedMethod for an analytical shape.
+void checkHasElements(const SearchableGeometry& geometry) {
+  if (geometry.shape)
+    throw Error(ErrorCode::UnsupportedMethod,
+                nameOf(geometry.id) + " is a shape: it has no elements", geometry.id);
+}
+
+std::optional<SurfacePoint> closestPointOf(const SearchableGeometry& geometry,
+                                           const Eigen::Vector3d& point, double maxDistance,
+                                           bool bruteForce, std::uint32_t& likely) {
+  if (geometry.tree.ordered().empty()) return {};
+  const PointDistances distances(geometry, point, bruteForce);
+  const auto near = distances.nearest(maxDistance, likely);
+  if (!near) return {};
+  likely = near->place;
+  return distances.surfacePoint(*near);
+}
+
+}  // namespace
+
+std::optional<SurfacePoint> SpatialQueries::closestPoint(GeometryId id,
+                                                         const Eigen::Vector3d& point,
+                                                         double maxDistance) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  checkPoint(point);
+  checkLength(maxDistance, "maxDistance", false);
+  const SearchableGeometry& geometry = source.at(id);
+  checkHasElements(geometry);
+  std::uint32_t likely = kNoElement;
+  return closestPointOf(geometry, point, maxDistance, source.engine() == Engine::BruteForce,
+                        likely);
+}
+
+void SpatialQueries::closestPoints(GeometryId id, std::span<const Eigen::Vector3d> points,
+                                   std::span<SurfacePoint> out, double maxDistance) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  if (points.size() != out.size())
+    throw Error(ErrorCode::InvalidSettings, std::to_string(points.size()) +
+                                                " points, but room for " +
+                                                std::to_string(out.size()) + " answers");
+  for (const Eigen::Vector3d& point : points) checkPoint(point);
+  checkLength(maxDistance, "maxDistance", false);
+  const SearchableGeometry& geometry = source.at(id);
+  checkHasElements(geometry);
+  const bool bruteForce = source.engine() == Engine::BruteForce;
+  const SpatialQueries::Source::Workers workers(source);
+  static_cast<const Threads&>(workers).forChunks(
+      points.size(), 64, [&](std::size_t, std::size_t begin, std::size_t end) {
+        std::uint32_t likely = kNoElement;
+        for (std::size_t i = begin; i < end; ++i)
+          out[i] = closestPointOf(geometry, points[i], maxDistance, bruteForce, likely)
+                       .value_or(SurfacePoint{id, kNoElement, {}, {0, 0, 0}, {0, 0, 0}, kInfinity});
+      });
+}
+
+void SpatialQueries::nearestElements(GeometryId id, const Eigen::Vector3d& point, int k,
+                                     std::vector<SurfacePoint>& out, double maxDistance) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  checkPoint(point);
+  checkLength(maxDistance, "maxDistance", false);
+  if (k < 1)
+    throw Error(ErrorCode::InvalidSettings, "k is " + std::to_string(k) + "; it must be 1 or more");
+  const SearchableGeometry& geometry = source.at(id);
+  checkHasElements(geometry);
+  const Source::Loan scratch(source);
+  scratch->near.clear();
+  if (geometry.tree.ordered().empty()) return out.clear();
+  const PointDistances distances(geometry, point, source.engine() == Engine::BruteForce);
+  distances.nearest(static_cast<std::size_t>(k), maxDistance, scratch->near);
+  out.reserve(scratch->near.size());  // nothing below throws
+  out.clear();
+  for (const PointDistances::Near& near : scratch->near)
+    out.push_back(distances.surfacePoint(near));
+}
+
+void SpatialQueries::elementsWithin(GeometryId id, const Eigen::Vector3d& point, double radius,
+                                    std::vector<std::uint32_t>& elements) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  checkPoint(point);
+  checkLength(radius, "radius", true);
+  const SearchableGeometry& geometry = source.at(id);
+  checkHasElements(geometry);
+  const Source::Loan scratch(source);
+  std::vector<std::uint32_t>& found = scratch->elements;
+  found.clear();
+  if (!geometry.tree.ordered().empty())
+    PointDistances(geometry, point, source.engine() == Engine::BruteForce).within(radius, found);
+  std::sort(found.begin(), found.end());
+  elements.reserve(found.size());  // nothing below throws
+  elements.assign(found.begin(), found.end());
 }
 
 void SpatialQueries::findInsideVertices(GeometryId vertices, GeometryId body,

@@ -7,12 +7,30 @@
 
 #include <Eigen/Core>
 
+#include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace palpate {
+
+inline constexpr std::uint32_t kNoElement = 0xffffffff;
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// A point of a geometry's surface.
+struct SurfacePoint {
+  GeometryId geometry;
+  std::uint32_t element = kNoElement;     ///< triangle, segment or point; kNoElement for a shape
+  std::array<std::uint32_t, 3> vertices;  ///< {p, q, q} of a segment, {p, p, p} of a point
+  Eigen::Vector3d weights;                ///< of the vertices; at least 0, sum 1
+  /// L: on the triangle, the centre line or the point.
+  Eigen::Vector3d position;
+  /// L, less the radius of lines and points: negative inside the radius.
+  double distance;
+};
 
 /// Spatial queries over the geometries of one OctreeBasedCD, at their positions now. Get the object
 /// from OctreeBasedCD::queries(). Collision filters do not apply. Queries search disabled elements,
@@ -33,6 +51,34 @@ namespace palpate {
 ///          UnknownGeometry.
 class PALPATE_EXPORT SpatialQueries {
  public:
+  /// Finds the point of a geometry's surface that is nearest to a point, decided exactly. Of
+  /// several equally near elements it is on the lowest. Returns nothing if no surface point is
+  /// within maxDistance.
+  ///
+  /// Units    point, maxDistance: L; both are in the world.
+  /// Errors   NonFinitePosition; InvalidSettings if maxDistance is negative or NaN.
+  /// Cost     about logarithmic in the elements. Allocates nothing.
+  std::optional<SurfacePoint> closestPoint(GeometryId, const Eigen::Vector3d& point,
+                                           double maxDistance = kInfinity) const;
+  /// The same for many points, on all threads. Points without an answer have element kNoElement.
+  ///
+  /// Errors   InvalidSettings, too, if `out` has another size than `points`.
+  void closestPoints(GeometryId, std::span<const Eigen::Vector3d> points,
+                     std::span<SurfacePoint> out, double maxDistance = kInfinity) const;
+  /// Finds the k elements that are nearest to a point, or all if there are fewer, with their
+  /// closest points.
+  ///
+  /// Order    by distance, then by element, decided exactly.
+  /// Errors   those of closestPoint(); InvalidSettings if k is below 1.
+  void nearestElements(GeometryId, const Eigen::Vector3d& point, int k,
+                       std::vector<SurfacePoint>& out, double maxDistance = kInfinity) const;
+  /// Finds the elements with a point within a radius, decided exactly.
+  ///
+  /// Order    ascending.
+  /// Errors   NonFinitePosition; InvalidSettings if the radius is negative or not finite.
+  void elementsWithin(GeometryId, const Eigen::Vector3d& point, double radius,
+                      std::vector<std::uint32_t>& elements) const;
+
   /// Finds the vertices of one geometry that are inside another, the body. It finds them at any
   /// depth, also in concave bodies, and where no triangles intersect.
   ///

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <palpate/Distance.h>
+#include <palpate/SpatialQueries.h>
+
+#include "Core/Threads.h"
+#include "Queries/NearestElements.h"
+#include "Queries/SearchableGeometry.h"
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace palpate {
+
+/// Distances of one point to the elements of one geometry with an octree, and searches by them.
+/// Distances of lines and points are less their radius at the closest point.
+class PointDistances {
+ public:
+  /// An element and its closest point.
+  struct Near {
+    std::uint32_t place, element;  ///< in the octree's order, and its id
+    VertexTriangleDistance closest;
+    double distance;  ///< L, less the radius
+  };
+
+  /// bruteForce: searches test every element.
+  PointDistances(const SearchableGeometry&, const Eigen::Vector3d& point, bool bruteForce);
+
+  Near at(std::uint32_t place) const;
+  /// Whether a is nearer than b, decided exactly, or as near with a lower element. If radii vary
+  /// along a line, its rounded distances decide.
+  bool isNearer(const Near& a, const Near& b) const;
+  bool isWithin(const Near&, double distance) const;  ///< decided exactly, with the same exception
+  SurfacePoint surfacePoint(const Near&) const;
+
+  /// The nearest element. None is further away than maxDistance. likely: the place of an element
+  /// that is likely near; any place is valid.
+  std::optional<Near> nearest(double maxDistance, std::uint32_t likely) const;
+  /// The k nearest elements, or fewer, in the order of isNearer(). None is further away than
+  /// maxDistance. out: replaced.
+  void nearest(std::size_t k, double maxDistance, std::vector<Near>& out) const;
+  /// Calls f(element) for each element within a distance, in any order.
+  void within(double distance, std::vector<std::uint32_t>& elements) const;
+
+ private:
+  /// Calls f(candidates, size) for elements whose distance, less the radius, may be at most `most`.
+  /// f returns such a bound. count: how many nearest elements are wanted; 0 for all.
+  template <class F>
+  void search(double most, std::size_t count, F&& f) const;
+  float boundOf(double distance) const;  ///< in the octree's floats
+
+  const SearchableGeometry& m_geometry;
+  const Eigen::Vector3d m_point;
+  const bool m_bruteForce;
+  bool m_variesAlongElement;  ///< a line mesh has different radii
+  NearestSearch m_search;
+};
+
+}  // namespace palpate
