@@ -1,6 +1,6 @@
 #include "Math/ExactClosestPoint.h"
 
-#include "Exact/ExactVector.h"
+#include "Exact/Rational.h"
 
 #include <algorithm>
 #include <array>
@@ -12,45 +12,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Positions as integers in units of the largest power of two of which all are multiples, so that
-/// the integers are as short as possible.
-template <std::size_t Count>
-struct Integers {
-  std::array<Vector<Integer>, Count> at;
-  int exponent;
-
-  template <class... Positions>
-  explicit Integers(const Positions&... positions) : exponent(ExponentRange(positions...).lowest) {
-    const auto integers = [&](const Vector3d& a) -> Vector<Integer> {
-      return {scaledInteger(a[0], exponent), scaledInteger(a[1], exponent),
-              scaledInteger(a[2], exponent)};
-    };
-    at = {integers(positions)...};
-  }
-};
-template <class... Positions>
-Integers(const Positions&...) -> Integers<sizeof...(Positions)>;
-
 Vector<Integer> scaled(const Integer& factor, const Vector<Integer>& a) {
   return {factor * a[0], factor * a[1], factor * a[2]};
-}
-
-int bits(const Integer& a) { return static_cast<int>(mpz_sizeinbase(a.get_mpz_t(), 2)); }
-
-/// numerator 2^exponent / denominator, within an ulp; denominator must be positive.
-double quotient(const Integer& numerator, const Integer& denominator, int exponent) {
-  if (numerator == 0) return 0.0;
-  // The quotient has 64 or 65 bits and is truncated to 63, so that only one rounding to double
-  // remains.
-  const int shift = 64 - bits(numerator) + bits(denominator);
-  const Integer magnitude = abs(numerator);
-  Integer ratio = shift >= 0 ? Integer((magnitude << shift) / denominator)
-                             : Integer(magnitude / (denominator << -shift));
-  const int excess = bits(ratio) - 63;
-  ratio >>= excess;
-  const double value =
-      std::ldexp(static_cast<double>(mpz_get_ui(ratio.get_mpz_t())), exponent - shift + excess);
-  return sgn(numerator) < 0 ? -value : value;
 }
 
 /// numerator / denominator to the nearest multiple of 2^-53, where 0 <= numerator <= denominator.
@@ -233,12 +196,7 @@ Foot footBetweenLines(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0
 
 namespace {
 
-/// Squared distance as a quotient.
-struct Quotient {
-  Integer numerator, denominator;
-};
-
-Quotient squaredDistanceToEdge(const Vector<Integer>& p, const Vector<Integer>& a,
+Rational squaredDistanceToEdge(const Vector<Integer>& p, const Vector<Integer>& a,
                                const Vector<Integer>& b) {
   const Vector<Integer> from = p - a, edge = b - a;
   const Integer along = dot(from, edge), square = dot(edge, edge);
@@ -248,7 +206,7 @@ Quotient squaredDistanceToEdge(const Vector<Integer>& p, const Vector<Integer>& 
 }
 
 /// corners: of a triangle, whose feature holds the point closest to p.
-Quotient squaredDistance(const Vector<Integer>& p, const Vector<Integer>* corners,
+Rational squaredDistance(const Vector<Integer>& p, const Vector<Integer>* corners,
                          TriangleFeature feature) {
   const int index = static_cast<int>(feature);
   if (index < 3) {
@@ -265,16 +223,16 @@ Quotient squaredDistance(const Vector<Integer>& p, const Vector<Integer>* corner
 
 int compareDistances(const Vector3d& p, const ClosestFeature& first, const ClosestFeature& second) {
   const auto at = Integers(p, first.a, first.b, first.c, second.a, second.b, second.c).at;
-  const Quotient one = squaredDistance(at[0], &at[1], first.feature),
+  const Rational one = squaredDistance(at[0], &at[1], first.feature),
                  two = squaredDistance(at[0], &at[4], second.feature);
-  return sgn(Integer(one.numerator * two.denominator - two.numerator * one.denominator));
+  return compare(one, two);
 }
 
 int compareDistance(const Vector3d& p, const ClosestFeature& feature, double length, double more) {
   // The lengths take part as coordinates, so that they have the same unit.
   const Vector3d lengths(length, more, 0.0);
   const auto at = Integers(p, feature.a, feature.b, feature.c, lengths).at;
-  const Quotient own = squaredDistance(at[0], &at[1], feature.feature);
+  const Rational own = squaredDistance(at[0], &at[1], feature.feature);
   const Integer sum = at[4][0] + at[4][1];
   return sgn(Integer(own.numerator - sum * sum * own.denominator));
 }
@@ -282,11 +240,11 @@ int compareDistance(const Vector3d& p, const ClosestFeature& feature, double len
 int nearestEnd(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0, const Vector3d& q1) {
   const auto at = Integers(p0, p1, q0, q1).at;
   int nearest = 0;
-  Quotient least = squaredDistanceToEdge(at[0], at[2], at[3]);
+  Rational least = squaredDistanceToEdge(at[0], at[2], at[3]);
   for (int i = 1; i < 4; ++i) {
     const int other = i < 2 ? 2 : 0;
-    const Quotient own = squaredDistanceToEdge(at[i], at[other], at[other + 1]);
-    if (own.numerator * least.denominator < least.numerator * own.denominator) {
+    const Rational own = squaredDistanceToEdge(at[i], at[other], at[other + 1]);
+    if (compare(own, least) < 0) {
       least = own;
       nearest = i;
     }

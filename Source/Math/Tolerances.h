@@ -127,6 +127,15 @@ constexpr double kNearestError = 0x1p-40;
 /// Error of a distance to a triangle, relative to the distance of its furthest corner: under 2^-48,
 /// and a margin.
 constexpr double kNearestSlack = 0x1p-45;
+/// Error of a ray's point on a triangle, relative to the largest coordinate difference between the
+/// ray's origin and the triangle. Where floating point would err by more, integers compute it.
+constexpr double kRayError = 0x1p-50;
+/// Relative error of a quotient of integers that was rounded to double.
+constexpr double kRationalError = 0x1p-52;
+/// Error of a ray's interval inside a round segment, relative to the lengths that it comes from.
+constexpr double kRoundRayError = 0x1p-44;
+/// Error of a ray in a geometry's floats, relative to the largest coordinate (RayHits.cpp).
+constexpr double kFloatRayError = 0x1p-18;
 /// Error of the distance between two points in a geometry's floats, relative to the largest
 /// coordinate: each of six coordinates is rounded by 2^-24.
 constexpr float kFloatPointError = 0x1p-21f;

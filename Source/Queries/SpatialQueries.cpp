@@ -8,6 +8,7 @@
 #include "Queries/Embedding.h"
 #include "Queries/PointDistances.h"
 #include "Queries/QuerySource.h"
+#include "Queries/RayHits.h"
 
 #include <algorithm>
 #include <atomic>
@@ -115,7 +116,69 @@ std::optional<SurfacePoint> closestPointOf(const SearchableGeometry& geometry,
   return distances.surfacePoint(*near);
 }
 
+void checkRay(const Ray& ray) {
+  if (!ray.origin.allFinite() || !ray.direction.allFinite())
+    throw Error(ErrorCode::NonFinitePosition, "the ray has origin " + textOf(ray.origin) +
+                                                  " and direction " + textOf(ray.direction));
+  if (ray.direction == Eigen::Vector3d::Zero())
+    throw Error(ErrorCode::InvalidSettings, "the ray's direction has length 0");
+  if (!std::isfinite(ray.tMin) || !(ray.tMin <= ray.tMax))
+    throw Error(ErrorCode::InvalidSettings, "the ray has tMin " + textOf(ray.tMin) + " and tMax " +
+                                                textOf(ray.tMax) +
+                                                "; tMin must be finite and at most tMax");
+}
+
 }  // namespace
+
+std::optional<RayHit> SpatialQueries::firstHit(GeometryId id, const Ray& ray) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  checkRay(ray);
+  const SearchableGeometry& geometry = source.at(id);
+  checkHasElements(geometry);
+  return RayHits(geometry, ray, source.engine() == Engine::BruteForce).first(ray.tMax);
+}
+
+bool SpatialQueries::anyHit(GeometryId id, const Ray& ray) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  checkRay(ray);
+  const SearchableGeometry& geometry = source.at(id);
+  checkHasElements(geometry);
+  return RayHits(geometry, ray, source.engine() == Engine::BruteForce).any();
+}
+
+void SpatialQueries::firstHits(GeometryId id, std::span<const Ray> rays,
+                               std::span<RayHit> out) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  if (rays.size() != out.size())
+    throw Error(ErrorCode::InvalidSettings, std::to_string(rays.size()) + " rays, but room for " +
+                                                std::to_string(out.size()) + " answers");
+  for (const Ray& ray : rays) checkRay(ray);
+  const SearchableGeometry& geometry = source.at(id);
+  checkHasElements(geometry);
+  const bool bruteForce = source.engine() == Engine::BruteForce;
+  const SpatialQueries::Source::Workers workers(source);
+  static_cast<const Threads&>(workers).forChunks(
+      rays.size(), 64, [&](std::size_t, std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i)
+          out[i] = RayHits(geometry, rays[i], bruteForce)
+                       .first(rays[i].tMax)
+                       .value_or(RayHit{id, kNoElement, {}, {0, 0, 0}, kInfinity, false, false});
+      });
+}
+
+void SpatialQueries::allHits(GeometryId id, const Ray& ray, std::vector<RayHit>& out) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  checkRay(ray);
+  const SearchableGeometry& geometry = source.at(id);
+  checkHasElements(geometry);
+  std::vector<RayHit> hits;
+  RayHits(geometry, ray, source.engine() == Engine::BruteForce).all(hits);
+  out = std::move(hits);
+}
 
 std::optional<SurfacePoint> SpatialQueries::closestPoint(GeometryId id,
                                                          const Eigen::Vector3d& point,

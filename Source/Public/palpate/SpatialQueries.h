@@ -32,6 +32,28 @@ struct SurfacePoint {
   double distance;
 };
 
+/// The points origin + t direction with t in [tMin, tMax], both included.
+struct Ray {
+  Eigen::Vector3d origin, direction;  ///< L; the direction has any length but 0
+  double tMin = 0.0, tMax = kInfinity;
+};
+
+/// One connected part of what a ray and a surface share: its smallest t, on the lowest element
+/// there. A ray along an edge, or in the plane of triangles, has one hit there. Lines and points
+/// with radii have a hit where the ray enters them and one where it leaves them; overlapping
+/// elements are one body.
+struct RayHit {
+  GeometryId geometry;
+  std::uint32_t element = kNoElement;
+  std::array<std::uint32_t, 3> vertices;  ///< as in SurfacePoint
+  Eigen::Vector3d weights;
+  double t;
+  bool frontFace;  ///< whether the ray comes against the winding normal
+  /// Whether the ray changes from one side of the surface to the other. From inside a closed mesh
+  /// the number of such hits is odd.
+  bool crosses;
+};
+
 /// Spatial queries over the geometries of one OctreeBasedCD, at their positions now. Get the object
 /// from OctreeBasedCD::queries(). Collision filters do not apply. Queries search disabled elements,
 /// too.
@@ -78,6 +100,23 @@ class PALPATE_EXPORT SpatialQueries {
   /// Errors   NonFinitePosition; InvalidSettings if the radius is negative or not finite.
   void elementsWithin(GeometryId, const Eigen::Vector3d& point, double radius,
                       std::vector<std::uint32_t>& elements) const;
+
+  /// Finds the first hit of a ray on a geometry. Rays are watertight: no ray passes between
+  /// triangles that share an edge or vertex.
+  ///
+  /// Errors   NonFinitePosition for an origin or direction; InvalidSettings for a direction of
+  ///          length 0, or if tMin is not finite or not at most tMax.
+  /// Cost     about logarithmic in the elements.
+  std::optional<RayHit> firstHit(GeometryId, const Ray&) const;
+  bool anyHit(GeometryId, const Ray&) const;  ///< whether there is a hit
+  /// First hits of many rays, on all threads. Rays without a hit have element kNoElement.
+  ///
+  /// Errors   InvalidSettings, too, if `out` has another size than `rays`.
+  void firstHits(GeometryId, std::span<const Ray> rays, std::span<RayHit> out) const;
+  /// All hits.
+  ///
+  /// Order    by ascending t.
+  void allHits(GeometryId, const Ray&, std::vector<RayHit>& out) const;
 
   /// Finds the vertices of one geometry that are inside another, the body. It finds them at any
   /// depth, also in concave bodies, and where no triangles intersect.

@@ -1,0 +1,228 @@
+#include "Math/RayTriangle.h"
+
+#include "Exact/ErrorBounds.h"
+#include "Exact/Rational.h"
+#include "Math/Tolerances.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace palpate {
+
+namespace exact {
+namespace {
+
+using Eigen::Vector3d;
+using Vectors = Vector<Integer>;
+
+/// A ray and a triangle in integers of one unit, with the ray's origin at 0.
+struct RayProblem {
+  std::array<Vectors, 3> corners;
+  Vectors direction;
+
+  RayProblem(const RaySegment& ray, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+    const auto at = Integers(ray.origin, a, b, c, ray.direction).at;
+    for (std::size_t i = 0; i < 3; ++i) corners[i] = at[i + 1] - at[0];
+    direction = at[4];
+  }
+};
+
+struct RationalInterval {
+  Rational first, last;
+};
+
+bool isZero(const Vectors& a) { return a[0] == 0 && a[1] == 0 && a[2] == 0; }
+
+/// The parameter at which the ray passes a point of its line.
+Rational parameterOf(const RayProblem& problem, const Vectors& point) {
+  return {dot(point, problem.direction), dot(problem.direction, problem.direction)};
+}
+
+/// What the ray's line shares with the segment from p to q, which may be a point.
+std::optional<RationalInterval> onSegment(const RayProblem& problem, const Vectors& p,
+                                          const Vectors& q) {
+  const Vectors along = q - p, across = cross(along, problem.direction);
+  if (isZero(across)) {
+    if (!isZero(cross(p, problem.direction))) return {};
+    Rational first = parameterOf(problem, p), last = parameterOf(problem, q);
+    if (compare(last, first) < 0) std::swap(first, last);
+    return RationalInterval{first, last};
+  }
+  if (dot(across, p) != 0) return {};
+  // p + s along = t direction
+  const Integer square = dot(across, across), s = -dot(cross(p, problem.direction), across);
+  if (s < 0 || s > square) return {};
+  const Rational t{-dot(cross(p, along), across), square};
+  return RationalInterval{t, t};
+}
+
+/// What the ray's line shares with a triangle in whose plane it lies.
+std::optional<RationalInterval> inPlane(const RayProblem& problem, const Vectors& normal) {
+  std::array<Integer, 3> sides, along;
+  for (std::size_t i = 0; i < 3; ++i) {
+    sides[i] = dot(cross(problem.corners[i], problem.direction), normal);
+    along[i] = dot(problem.corners[i], problem.direction);
+  }
+  const Integer square = dot(problem.direction, problem.direction);
+  std::optional<RationalInterval> interval;
+  const auto add = [&](const Rational& t) {
+    if (!interval) {
+      interval = {t, t};
+      return;
+    }
+    if (compare(t, interval->first) < 0) interval->first = t;
+    if (compare(t, interval->last) > 0) interval->last = t;
+  };
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3;
+    if (sides[i] == 0) add({along[i], square});
+    if (sgn(sides[i]) * sgn(sides[j]) < 0) {
+      Rational t{sides[i] * along[j] - sides[j] * along[i], (sides[i] - sides[j]) * square};
+      if (t.denominator < 0) t = {-t.numerator, -t.denominator};
+      add(t);
+    }
+  }
+  return interval;
+}
+
+/// What the ray's whole line shares with a triangle.
+std::optional<RationalInterval> onLine(const RayProblem& problem) {
+  const auto& [a, b, c] = problem.corners;
+  const Vectors normal = cross(b - a, c - a);
+  if (isZero(normal)) {
+    // The longest edge holds all corners.
+    std::size_t longest = 0;
+    Integer most = -1;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vectors edge = problem.corners[(i + 1) % 3] - problem.corners[i];
+      if (const Integer square = dot(edge, edge); square > most) {
+        most = square;
+        longest = i;
+      }
+    }
+    return onSegment(problem, problem.corners[longest], problem.corners[(longest + 1) % 3]);
+  }
+  const Integer facing = dot(problem.direction, normal), height = dot(a, normal);
+  if (facing == 0) {
+    if (height != 0) return {};
+    return inPlane(problem, normal);
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Integer side =
+        dot(problem.direction, cross(problem.corners[i], problem.corners[(i + 1) % 3]));
+    if (sgn(side) * sgn(facing) < 0) return {};
+  }
+  const Rational t = facing > 0 ? Rational{height, facing} : Rational{-height, -facing};
+  return RationalInterval{t, t};
+}
+
+/// What the ray shares with a triangle.
+std::optional<RationalInterval> intersect(const RaySegment& ray, const RayProblem& problem) {
+  auto interval = onLine(problem);
+  if (!interval || compare(interval->last, ray.tMin) < 0 || compare(interval->first, ray.tMax) > 0)
+    return {};
+  if (compare(interval->first, ray.tMin) < 0) interval->first = rational(ray.tMin);
+  if (compare(interval->last, ray.tMax) > 0) interval->last = rational(ray.tMax);
+  return interval;
+}
+
+/// The sign of RayInterval::crossing if the ray, moved aside, meets the triangle.
+int crossingOf(const RayProblem& problem) {
+  const auto& [a, b, c] = problem.corners;
+  const int facing = sgn(dot(problem.direction, cross(b - a, c - a)));
+  for (std::size_t i = 0; facing != 0 && i < 3; ++i) {
+    const Vectors &p = problem.corners[i], &q = problem.corners[(i + 1) % 3];
+    int side = sgn(dot(problem.direction, cross(p, q)));
+    // Moving the origin along axis k changes the volume by component k of (p - q) x direction.
+    const Vectors change = cross(p - q, problem.direction);
+    for (std::size_t k = 0; side == 0 && k < 3; ++k) side = sgn(change[k]);
+    if (side != facing) return 0;
+  }
+  return facing;
+}
+
+RayInterval intervalOf(const RayProblem& problem, const RationalInterval& interval) {
+  const auto& [a, b, c] = problem.corners;
+  const double first = toDouble(interval.first), last = toDouble(interval.last);
+  const bool isDouble = compare(interval.first, first) == 0 && compare(interval.last, last) == 0;
+  return {first, last, isDouble ? 0.0 : kRationalError * std::max(std::abs(first), std::abs(last)),
+          static_cast<std::int8_t>(crossingOf(problem)),
+          sgn(dot(problem.direction, cross(b - a, c - a))) < 0};
+}
+
+}  // namespace
+
+int compareRayEnds(const RaySegment& ray, const RayEnd& one, const RayEnd& two) {
+  const auto end = [&](const RayEnd& of) {
+    const auto interval = intersect(ray, RayProblem(ray, of.a, of.b, of.c));
+    return of.last ? interval->last : interval->first;
+  };
+  return compare(end(one), end(two));
+}
+
+}  // namespace exact
+
+namespace {
+
+std::optional<RayInterval> intersectRayExactly(const RaySegment& ray, const Eigen::Vector3d& a,
+                                               const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+  const exact::RayProblem problem(ray, a, b, c);
+  const auto interval = exact::intersect(ray, problem);
+  if (!interval) return {};
+  return exact::intervalOf(problem, *interval);
+}
+
+/// A determinant of three vectors, and a bound on its error.
+struct Volume {
+  double value, error;
+
+  /// The sign where it is certain, else 0.
+  int sign() const { return (value > error) - (value < -error); }
+};
+
+/// direction . (p x q), where p and q are differences that were rounded once.
+Volume volumeOf(const Eigen::Vector3d& direction, const Eigen::Vector3d& p,
+                const Eigen::Vector3d& q) {
+  double value = 0.0, magnitude = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    const double forward = p[j] * q[k], backward = p[k] * q[j];
+    value += direction[i] * (forward - backward);
+    magnitude += std::abs(direction[i]) * (std::abs(forward) + std::abs(backward));
+  }
+  return {value, kVolumeError * magnitude +
+                     kUnderflowGuard * (1.0 + direction.cwiseAbs().sum() + magnitude)};
+}
+
+}  // namespace
+
+std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vector3d& a,
+                                        const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+  const Eigen::Vector3d p = a - ray.origin, q = b - ray.origin, r = c - ray.origin;
+  const int sides[] = {volumeOf(ray.direction, p, q).sign(), volumeOf(ray.direction, q, r).sign(),
+                       volumeOf(ray.direction, r, p).sign()};
+  const auto [least, most] = std::minmax({sides[0], sides[1], sides[2]});
+  if (least < 0 && most > 0) return {};
+  if (least == 0 || most == 0 || least != most) return intersectRayExactly(ray, a, b, c);
+  const Eigen::Vector3d u = b - a, v = c - a;
+  const Volume height = volumeOf(p, u, v), facing = volumeOf(ray.direction, u, v);
+  const double t = height.value / facing.value;
+  const double error =
+      (height.error + std::abs(t) * facing.error) / std::abs(facing.value) * (1.0 + 0x1p-40) +
+      std::abs(t) * 0x1p-52;
+  // Where the ray grazes the triangle, t is computed exactly and then rounded.
+  const double extent =
+      std::max({p.cwiseAbs().maxCoeff(), q.cwiseAbs().maxCoeff(), r.cwiseAbs().maxCoeff()});
+  const bool isAccurate =
+      facing.sign() == most && error * ray.direction.cwiseAbs().maxCoeff() <= kRayError * extent;
+  if (!isAccurate) return intersectRayExactly(ray, a, b, c);
+  if (t + error < ray.tMin || t - error > ray.tMax) return {};
+  if (!(t - error >= ray.tMin && t + error <= ray.tMax)) return intersectRayExactly(ray, a, b, c);
+  return RayInterval{t, t, error, static_cast<std::int8_t>(most), most < 0};
+}
+
+}  // namespace palpate

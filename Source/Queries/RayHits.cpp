@@ -1,0 +1,228 @@
+#include "Queries/RayHits.h"
+
+#include "Math/RoundSegment.h"
+#include "Math/Tolerances.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+
+/// A ray in a geometry's floats.
+struct ClippedRay {
+  FloatRay ray;
+  double start, perT;  ///< t = start + ray's t / perT
+
+  float floatOf(double t) const {
+    return OutwardRounding::up(static_cast<float>((t - start) * perT * (1.0 + kNearestError)));
+  }
+};
+
+/// None if the ray certainly misses all boxes.
+std::optional<ClippedRay> clip(const SearchableGeometry& geometry, const RaySegment& ray) {
+  const FloatFrame& frame = geometry.tree.frame();
+  const Positions& now = geometry.mesh.now;
+  Vector3d origin = ray.origin, direction = ray.direction;
+  double error = 0.0;  // L
+  if (now.isPlaced()) {
+    const RigidTransform& pose = now.transform();
+    origin = pose.rotation.transpose() * (origin - pose.translation);
+    direction = pose.rotation.transpose() * direction;
+    error = kPlacedPointError * (ray.origin.cwiseAbs().sum() + pose.translation.cwiseAbs().sum() +
+                                 origin.cwiseAbs().sum());
+  }
+  const double perT = direction.cwiseAbs().maxCoeff() * frame.scale;
+  origin = (origin - frame.origin) * frame.scale;
+  direction /= direction.cwiseAbs().maxCoeff();
+  const FloatBox root = geometry.tree.octree().box(0);
+  double extent = 0.0;
+  for (std::size_t k = 0; k < 3; ++k)
+    extent = std::max({extent, double{std::abs(root.lower[k])}, double{std::abs(root.upper[k])}});
+  // Within the root box every coordinate is at most `extent`, and t grows by at most three times
+  // that. Its floats err by at most 2^-20 of it; kFloatRayError has a margin. The rest are errors
+  // of the origin in double.
+  const double slack = kFloatRayError * extent + kPlacedPointError * origin.cwiseAbs().maxCoeff() +
+                       error * frame.scale + OutwardRounding::kAbsolute;
+  ClippedRay clipped{
+      {{0, 0, 0}, {}, 0, OutwardRounding::up(static_cast<float>(slack))}, ray.tMin, perT};
+  if (!(extent < kLargestFloat) || !(perT >= 0x1p-900) || !(perT <= 0x1p900) ||
+      !(slack < kLargestFloat)) {  // every box is entered at once
+    clipped.ray.slack = clipped.ray.tMax = std::numeric_limits<float>::infinity();
+    clipped.ray.inverse = {1, 1, 1};
+    clipped.perT = 0.0;
+    return clipped;
+  }
+  double enter = ray.tMin * perT, leave = ray.tMax * perT;
+  for (int k = 0; k < 3; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    const double lower = root.lower[at] - slack, upper = root.upper[at] + slack;
+    if (direction[k] == 0.0) {
+      if (origin[k] < lower || origin[k] > upper) return {};
+      continue;
+    }
+    const double s = (lower - origin[k]) / direction[k], t = (upper - origin[k]) / direction[k];
+    const double margin = kNearestError * std::max(std::abs(s), std::abs(t));
+    enter = std::max(enter, std::min(s, t) - margin);
+    leave = std::min(leave, std::max(s, t) + margin);
+  }
+  if (!(enter <= leave)) return {};
+  clipped.start = enter / perT;
+  clipped.ray.tMax =
+      OutwardRounding::up(static_cast<float>((leave - enter) * (1.0 + kNearestError)));
+  for (int k = 0; k < 3; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    clipped.ray.origin[at] = static_cast<float>(origin[k] + enter * direction[k]);
+    const double least = std::copysign(std::max(std::abs(direction[k]), 0x1p-100), direction[k]);
+    clipped.ray.inverse[at] = static_cast<float>(1.0 / least);
+  }
+  return clipped;
+}
+
+}  // namespace
+
+RayHits::RayHits(const SearchableGeometry& geometry, const Ray& ray, bool bruteForce)
+    : m_geometry(geometry),
+      m_ray{ray.origin, ray.direction, ray.tMin, ray.tMax},
+      m_bruteForce(bruteForce),
+      m_isSolid(geometry.mesh.largestRadius > 0) {}
+
+template <class F>
+void RayHits::intersect(std::uint32_t place, F&& f) const {
+  const auto& [a, b, c] = m_geometry.tree.ordered()[place];
+  const TriangleMesh& mesh = m_geometry.mesh;
+  if (!m_isSolid) {
+    if (const auto interval = intersectRay(m_ray, mesh.now[a], mesh.now[b], mesh.now[c]))
+      f(*interval);
+    return;
+  }
+  const RoundIntervals parts =
+      intersectRay(m_ray, mesh.now[a], mesh.now[b], mesh.radius(a), mesh.radius(b));
+  for (std::size_t i = 0; i < parts.size; ++i) f(parts.intervals[i]);
+}
+
+double RayHits::collect(Wanted wanted, double tMax, double atLeast) {
+  m_met.clear();
+  if (m_geometry.tree.ordered().empty()) return atLeast;
+  // The part that begins first, as far as it is known, with the error of its ends. Until an element
+  // is met, it has no end before tMax.
+  double first = kInfinity, last = tMax, error = 0.0, least = tMax;
+  const auto take = [&](std::uint32_t place) {
+    intersect(place, [&](const RayInterval& interval) {
+      m_met.push_back({interval, place, m_geometry.tree.octree().order()[place]});
+      if (wanted != Wanted::First || interval.first - interval.error > last + error) return;
+      const bool isApart = first == kInfinity || interval.last + interval.error < first - error;
+      first = std::min(first, interval.first);
+      last = isApart ? interval.last : std::max(last, interval.last);
+      error = std::max(error, interval.error);
+      least = std::min(least, std::max(last + error, atLeast));
+    });
+  };
+  if (m_bruteForce) {
+    for (std::uint32_t place = 0; place < m_geometry.tree.ordered().size(); ++place) take(place);
+    return atLeast;
+  }
+  const auto ray = clip(m_geometry, m_ray);
+  if (!ray) return atLeast;
+  forEachOnRay(m_geometry.tree.octree(), ray->ray, [&](std::uint32_t place) {
+    take(place);
+    if (wanted == Wanted::Any && !m_met.empty()) return -1.0f;
+    return std::min(ray->ray.tMax, ray->floatOf(std::max(last + error, atLeast)));
+  });
+  return std::min(tMax, last + error) > least ? std::min(tMax, last + error) : atLeast;
+}
+
+int RayHits::compare(const Met& one, bool lastOfFirst, const Met& two, bool lastOfSecond) const {
+  const double s = lastOfFirst ? one.interval.last : one.interval.first,
+               t = lastOfSecond ? two.interval.last : two.interval.first;
+  if (std::abs(s - t) > one.interval.error + two.interval.error || m_isSolid ||
+      one.interval.error + two.interval.error == 0)
+    return (s > t) - (s < t);
+  if (one.place == two.place && lastOfFirst == lastOfSecond) return 0;
+  const Triangle &first = m_geometry.tree.ordered()[one.place],
+                 &second = m_geometry.tree.ordered()[two.place];
+  const Positions& now = m_geometry.mesh.now;
+  const Vector3d a = now[first[0]], b = now[first[1]], c = now[first[2]], d = now[second[0]],
+                 e = now[second[1]], f = now[second[2]];
+  return exact::compareRayEnds(m_ray, {a, b, c, lastOfFirst}, {d, e, f, lastOfSecond});
+}
+
+RayHit RayHits::hitOf(const Met& met, double t, bool frontFace, bool crosses) const {
+  const Triangle& corners = m_geometry.tree.ordered()[met.place];
+  const Positions& now = m_geometry.mesh.now;
+  const Vector3d point = m_ray.origin + t * m_ray.direction;
+  const Vector3d weights =
+      vertexTriangleDistance(point, now[corners[0]], now[corners[1]], now[corners[2]]).barycentric;
+  return {m_geometry.id, met.element, corners, weights, t, frontFace, crosses};
+}
+
+/// The hits of the part of m_met in [begin, end), whose entry `furthest` ends last.
+template <class F>
+bool RayHits::hitsOfPart(std::size_t begin, std::size_t end, std::size_t furthest, F&& f) const {
+  const Met& first = m_met[begin];
+  if (!m_isSolid) {
+    int crossing = 0;
+    for (std::size_t i = begin; i < end; ++i) crossing += m_met[i].interval.crossing;
+    return f(hitOf(first, first.interval.first, first.interval.frontFace, crossing % 2 != 0));
+  }
+  // The ends of a solid part are hits, except where the ray itself begins or ends.
+  const Met& last = m_met[furthest];
+  const bool isPoint = first.interval.first == last.interval.last;
+  if (isPoint) return f(hitOf(first, first.interval.first, true, false));
+  if (first.interval.frontFace && !f(hitOf(first, first.interval.first, true, true))) return false;
+  return last.interval.crossing == 0 || f(hitOf(last, last.interval.last, false, true));
+}
+
+template <class F>
+void RayHits::forEachHit(F&& f) {
+  std::sort(m_met.begin(), m_met.end(), [&](const Met& a, const Met& b) {
+    const int order = compare(a, false, b, false);
+    return order < 0 || (order == 0 && a.element < b.element);
+  });
+  for (std::size_t begin = 0; begin < m_met.size();) {
+    std::size_t furthest = begin, end = begin + 1;
+    for (; end < m_met.size() && compare(m_met[end], false, m_met[furthest], true) <= 0; ++end)
+      if (compare(m_met[end], true, m_met[furthest], true) > 0) furthest = end;
+    if (!hitsOfPart(begin, end, furthest, f)) return;
+    begin = end;
+  }
+}
+
+std::optional<RayHit> RayHits::first(double t) {
+  const Wanted wanted = m_isSolid ? Wanted::All : Wanted::First;
+  // Elements beyond a part's end may have been skipped before the part grew. The search is then
+  // repeated as far as the part is known.
+  for (double atLeast = m_ray.tMin;;) {
+    const double needed = collect(wanted, t, atLeast);
+    if (!(needed > atLeast)) break;
+    atLeast = needed;
+  }
+  std::optional<RayHit> hit;
+  forEachHit([&](const RayHit& first) {
+    hit = first;
+    return false;
+  });
+  return hit;
+}
+
+bool RayHits::any() {
+  // A solid element that holds the whole ray has no hit.
+  if (m_isSolid) return first(m_ray.tMax).has_value();
+  collect(Wanted::Any, m_ray.tMax, m_ray.tMin);
+  return !m_met.empty();
+}
+
+void RayHits::all(std::vector<RayHit>& out) {
+  collect(Wanted::All, m_ray.tMax, m_ray.tMin);
+  forEachHit([&](const RayHit& hit) {
+    out.push_back(hit);
+    return true;
+  });
+}
+
+}  // namespace palpate

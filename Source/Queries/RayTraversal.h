@@ -1,0 +1,44 @@
+#pragma once
+
+#include "Octree/Octree.h"
+
+#include <array>
+#include <cstdint>
+#include <type_traits>
+
+namespace palpate {
+
+/// A ray in an octree's floats: points origin + t direction with t in [0, tMax]. The largest
+/// component of the direction has magnitude 1.
+struct FloatRay {
+  std::array<float, 3> origin;
+  /// 1 / direction; a very large number for a component of zero.
+  std::array<float, 3> inverse;
+  float tMax;
+  /// Boxes grow by this. It covers every rounding of the ray and of its intersection with a box,
+  /// so that a ray enters each box that the exact ray enters, no later.
+  float slack;
+};
+
+/// Tests the element at a place of the octree's order. Returns the largest t that is still wanted;
+/// a negative number ends the traversal.
+using TestElement = float (*)(void* context, std::uint32_t place);
+
+/// Visits the elements whose boxes the ray meets. Nodes come in the order in which the ray enters
+/// them. A node or element is skipped if the ray enters its box beyond the t that was returned
+/// last.
+/// Source   Revelles, Urena, Lastra, An efficient parametric algorithm for octree traversal (2000),
+///          for the order. Difference: cells overlap, so that each node sorts its children by their
+///          fitted boxes.
+void traverseRay(const Octree&, const FloatRay&, void* context, TestElement);
+
+/// traverseRay() with f(place) in place of the function pointer.
+template <class F>
+void forEachOnRay(const Octree& octree, const FloatRay& ray, F&& f) {
+  const auto call = [](void* context, std::uint32_t place) {
+    return (*static_cast<std::remove_reference_t<F>*>(context))(place);
+  };
+  traverseRay(octree, ray, &f, call);
+}
+
+}  // namespace palpate
