@@ -16,9 +16,9 @@ The number at a name is the difficulty at which the error first occurs. Dashed: 
 Orange: the recommended methods. Methods without a curve have no such error in the sweep. {none}"""
 RECOMMENDED = ("Auto", "Auto: distinct", "Continuous")
 # Columns of the CSV with their line styles, title, and the sentence of a panel without errors.
-PANELS = [({"false_negatives": "-", "false_positives": (0, (4, 2))}, "False negatives and false positives",
+PANELS = [({"false_negatives": "-", "false_positives": (0, (4, 2))}, "False negatives and false positives (% of cases)",
            "No method has a false negative or a false positive."),
-          ({"wrong_side": "-"}, "Normals on the wrong side", "No method has a normal on the wrong side.")]
+          ({"wrong_side": "-"}, "Normals on the wrong side (% of cases)", "No method has a normal on the wrong side.")]
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # What a label says of a column beside the method.
 SAYS = {"false_negatives": "", "false_positives": ", false positives", "wrong_side": ""}

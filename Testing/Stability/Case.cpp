@@ -201,8 +201,8 @@ std::vector<Sweep> sweeps() {
        }},
       {"gap", "gap or depth at the end / size", powers(0, -16), gapped},
       {"offset", "distance from the origin / size", powers(0, 15), farAway},
-      {"small scale", "size of the triangles", powers(0, -150), scaled},
-      {"large scale", "size of the triangles", powers(0, 150), scaled},
+      {"small scale", "size of the triangles (L)", powers(0, -150), scaled},
+      {"large scale", "size of the triangles (L)", powers(0, 150), scaled},
       {"size ratio", "size of one / size of the other", powers(0, 12),
        [](double x, Random& random) {
          Design design = easy(random);
