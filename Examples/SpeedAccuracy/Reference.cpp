@@ -1,4 +1,4 @@
-#include "Truth.h"
+#include "Reference.h"
 
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/TimeOfImpact.h>
@@ -20,7 +20,7 @@ Vector3d between(const Vector3d& before, const Vector3d& now, double t) {
   return (1 - t) * before + t * now;
 }
 
-/// Four vertices that move, and what the two features' closest points and plane are made of.
+/// The four moving vertices of a feature pair, with their common plane and closest points.
 class Motion {
  public:
   Motion(const FeaturePair& pair, const Step& step) : m_edges(pair.kind == Kind::EdgeEdge) {
@@ -52,7 +52,7 @@ class Motion {
     return positions;
   }
 
-  /// Of the common plane; zero where there is none within 1e-6 of a right angle's sine.
+  /// Unit normal of the common plane. Zero if the sine of the spanning angle is below 1e-6.
   Vector3d normalAt(double t) const {
     const auto [p, q, r, s] = at(t);
     const Vector3d u = m_edges ? Vector3d(q - p) : Vector3d(r - q),
@@ -61,13 +61,14 @@ class Motion {
     return normal.normalized();
   }
 
-  /// Of the first vertex over the plane of the others, or of the edges' lines, times an area.
+  /// Height of the vertex over the triangle's plane, or of edge a over edge b, times an area.
   double heightAt(double t) const {
     const auto [p, q, r, s] = at(t);
     return m_edges ? (q - p).cross(s - r).dot(p - r) : (r - q).cross(s - q).dot(p - q);
   }
 
-  /// From the second feature's point to the first's, where these are the points that touch at t.
+  /// Difference of the two points that touch at t, from the second feature to the first: before,
+  /// now.
   std::array<Vector3d, 2> differencesOfPointsThatTouchAt(double t) const {
     const auto [p, q, r, s] = at(t);
     Eigen::Vector4d weights;  // of the four vertices, in the difference
@@ -83,7 +84,7 @@ class Motion {
       weights << 1, onR + onS - 1, -onR, -onS;
     }
     std::array<Vector3d, 2> sums{Vector3d::Zero(), Vector3d::Zero()};
-    for (int i = 0; i < 4; ++i) {  // relative to the first, so that a place far away loses nothing
+    for (int i = 0; i < 4; ++i) {  // relative to the first vertex: exact enough far from the origin
       sums[0] += weights[i] * (m_before[i] - m_before[0]);
       sums[1] += weights[i] * (m_now[i] - m_now[0]);
     }
@@ -101,8 +102,8 @@ class Motion {
   std::array<Vector3d, 4> m_before, m_now;
 };
 
-/// The side on which the features were shortly before t, if it is the same over the last
-/// hundredth, thousandth and ten-thousandth of the step.
+/// The side of the features shortly before t: the common sign 1e-2, 1e-3 and 1e-4 of the step
+/// earlier, or 0 if these differ.
 int sideBefore(const Motion& motion, double t) {
   int side = 0;
   for (const double earlier : {1e-2, 1e-3, 1e-4}) {
@@ -128,7 +129,7 @@ std::optional<Impact> impactOf(const FeaturePair& pair, const Step& step) {
   return impact;
 }
 
-/// Both meshes of a step.
+/// A detection of the two meshes of a step.
 class Detection {
  public:
   Detection(const Step& step, Engine engine, Method method)
@@ -139,7 +140,7 @@ class Detection {
     m_detection.setPositions(m_a, step.aBefore, step.aNow);
     m_detection.setPositions(m_b, step.bBefore, step.bNow);
   }
-  /// To a time of the step, at which they rest.
+  /// Moves both meshes to a time of the step, at rest.
   void moveTo(const Step& step, double t) {
     const auto positions = [t](const auto& before, const auto& now) {
       std::vector<Vector3d> all(now.size());
@@ -163,32 +164,32 @@ class Detection {
 
 }  // namespace
 
-Truth truthOf(const Step& step, int substeps) {
-  Truth truth;
+Reference referenceOf(const Step& step, int substeps) {
+  Reference reference;
   Claims contacts;
   const auto began = std::chrono::steady_clock::now();
   addClaims(Detection(step, Engine::BruteForce, Method::Continuous).detect(), 0, 1, contacts);
-  truth.milliseconds =
+  reference.milliseconds =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
   const Incidence a(step.a.triangles), b(step.b.triangles);
   for (const Claim& contact : contacts.claims) {
-    truth.impacts.emplace(contact.features, impactOf(contact.features, step));
-    Incidence::addTriangles(contact.features, a, b, truth.touching);
+    reference.impacts.emplace(contact.features, impactOf(contact.features, step));
+    Incidence::addTriangles(contact.features, a, b, reference.touching);
   }
   Detection start(step, Engine::BruteForce, Method::Intersection);
-  start.moveTo(step, 0);  // those that touch from the start and may never touch anew
+  start.moveTo(step, 0);  // pairs that touch at the start may have no impact within the step
   const auto atStart = start.detect().intersectingTriangles();
-  truth.touchingAtStart.assign(atStart.begin(), atStart.end());
-  truth.touching.insert(truth.touching.end(), atStart.begin(), atStart.end());
-  sortUnique(truth.touching);
+  reference.touchingAtStart.assign(atStart.begin(), atStart.end());
+  reference.touching.insert(reference.touching.end(), atStart.begin(), atStart.end());
+  sortUnique(reference.touching);
   Detection intersection(step, Engine::Octree, Method::Intersection);
   for (int i = 1; i <= substeps; ++i) {
     intersection.moveTo(step, static_cast<double>(i) / substeps);
     for (const ElementPair& pair : intersection.detect().intersectingTriangles())
-      truth.contradictions +=
-          !std::binary_search(truth.touching.begin(), truth.touching.end(), pair);
+      reference.contradictions +=
+          !std::binary_search(reference.touching.begin(), reference.touching.end(), pair);
   }
-  return truth;
+  return reference;
 }
 
 }  // namespace palpate::accuracy

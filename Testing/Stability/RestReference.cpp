@@ -1,4 +1,4 @@
-#include "RestTruth.h"
+#include "RestReference.h"
 
 #include "Unit/Math/RationalOracle.h"
 
@@ -12,14 +12,14 @@ namespace {
 
 using Kind = FeaturePair::Kind;
 using oracle::Rational;
-using oracle::operator-;  // of its vectors, which are the standard's arrays
+using oracle::operator-;  // for its vectors, which are std::array
 
 Rational volume(const oracle::Vector& a, const oracle::Vector& b, const oracle::Vector& c,
                 const oracle::Vector& d) {
   return oracle::dot(b - a, oracle::cross(c - a, d - a));
 }
 
-/// An edge passes through a triangle's plane strictly inside the triangle.
+/// True if the edge crosses the triangle's plane strictly inside the triangle.
 bool pierces(const oracle::Vector& p, const oracle::Vector& q,
              const std::array<oracle::Vector, 3>& t) {
   if (sgn(volume(p, t[0], t[1], t[2])) * sgn(volume(q, t[0], t[1], t[2])) >= 0) return false;
@@ -37,7 +37,8 @@ bool anyEdgePierces(const Corners& edges, const Corners& triangle) {
   return pierces(e[0], e[1], t) || pierces(e[1], e[2], t) || pierces(e[2], e[0], t);
 }
 
-/// The boxes of the first `count` positions and of the others are further apart along an axis.
+/// True if the box of the first `count` positions is further than `distance` from the box of the
+/// others, along an axis.
 template <std::size_t N>
 bool areApart(const std::array<Eigen::Vector3d, N>& p, std::size_t count, double distance) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -68,7 +69,7 @@ Rest restOf(const Case::Frame& frame, double thickness) {
         {pair, oracle::root(closest.square).get_d(), 8 * oracle::ulpOfLargestDifference(p)});
     rest.intersect |= closest.square == 0;
   }
-  // Triangles with a point in common whose features have none: an edge goes through a face.
+  // Triangles can intersect although no closest distance is zero: an edge crosses a face.
   rest.intersect = rest.intersect || anyEdgePierces(a, b) || anyEdgePierces(b, a);
   return rest;
 }

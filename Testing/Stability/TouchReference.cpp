@@ -1,4 +1,4 @@
-#include "TouchTruth.h"
+#include "TouchReference.h"
 
 #include <Eigen/Geometry>
 
@@ -10,9 +10,9 @@ namespace palpate::stability {
 namespace {
 
 using Kind = FeaturePair::Kind;
-using impact::operator-;  // of its vectors, which are the standard's arrays
+using impact::operator-;  // for its vectors, which are std::array
 
-/// The boxes of two features over the step have no point in common.
+/// True if the boxes of the two features over the step are disjoint.
 bool stayApart(bool edges, const impact::Positions& p) {
   const int first = edges ? 2 : 1;  // vertices of the first feature
   for (int axis = 0; axis < 3; ++axis) {
@@ -27,9 +27,9 @@ bool stayApart(bool edges, const impact::Positions& p) {
   return false;
 }
 
-/// The volume that the four vertices span has one strict sign over the whole step: it is a cubic,
-/// and all of its Bernstein coefficients are beyond what 80-bit arithmetic rounds in them, a
-/// hundred times over.
+/// True if the volume of the four vertices certainly keeps one strict sign over the step. The
+/// volume is a cubic. Its Bernstein coefficients are compared with a hundred times the rounding
+/// error of 80-bit arithmetic.
 bool neverInOnePlane(const impact::Positions& p) {
   using Vector = Eigen::Matrix<long double, 3, 1>;
   const auto from = [&](int end, int vertex) -> Vector {
@@ -63,7 +63,7 @@ std::array<impact::Vector, 2> planeSpan(bool edges, const impact::Positions& p) 
   return {at(2) - at(1), at(3) - at(1)};
 }
 
-/// Of the first vertex over the plane, or edge a over edge b.
+/// Height of the vertex over the plane, or of edge a over edge b.
 impact::Polynomial heightOf(bool edges, const impact::Query& query) {
   impact::Polynomial height = query.coplanarity();
   if (!edges)
@@ -72,25 +72,25 @@ impact::Polynomial heightOf(bool edges, const impact::Query& query) {
 }
 
 int sideJustBefore(const impact::Polynomial& height, impact::Real time) {
-  if (time.p.empty()) return 0;  // from the start
+  if (time.p.empty()) return 0;  // touches from the start
   while (impact::valueAt(height, time.low) == 0) time.halve();
   return sgn(impact::valueAt(height, time.low));
 }
 
 }  // namespace
 
-bool Touch::isBefore(double answered) const {
+bool Touch::isBefore(double reported) const {
   impact::Real exact = time;
-  return exact.compare(impact::Rational(answered)) < 0;
+  return exact.compare(impact::Rational(reported)) < 0;
 }
 
-bool Touch::isTimely(double answered) const {
+bool Touch::isTimely(double reported) const {
   impact::Real exact = time;
   const impact::Rational early(1, 1'000'000);
-  return !isBefore(answered) && exact.compare(impact::Rational(answered) + early) <= 0;
+  return !isBefore(reported) && exact.compare(impact::Rational(reported) + early) <= 0;
 }
 
-bool Touch::isTurned(const Eigen::Vector3d& answered, double at) const {
+bool Touch::isWrongSide(const Eigen::Vector3d& reported, double at) const {
   impact::Real touch = time;
   const int sideThen = touch.compare(impact::Rational(at)) > 0
                            ? sgn(impact::valueAt(height, impact::Rational(at)))
@@ -109,10 +109,10 @@ bool Touch::isTurned(const Eigen::Vector3d& answered, double at) const {
                                        u[0] * v[1] - u[1] * v[0]};
   const Rational square = dot(normal, normal);
   if (square * Rational(0x1p100) < dot(u, u) * dot(v, v)) return false;
-  const std::array<Rational, 3> said{Rational(answered[0]), Rational(answered[1]),
-                                     Rational(answered[2])};
-  const Rational along = dot(normal, said);
-  // A triangle's normal points to the vertex, whichever mesh that is of.
+  const std::array<Rational, 3> normalReported{Rational(reported[0]), Rational(reported[1]),
+                                               Rational(reported[2])};
+  const Rational along = dot(normal, normalReported);
+  // The triangle's normal points to the vertex, for either order of the meshes.
   const int sign = features.kind == Kind::TriangleVertex ? -sideThen : sideThen;
   return along * sign < 0 && along * along > square / 100;
 }
