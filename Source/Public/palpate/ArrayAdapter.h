@@ -14,7 +14,7 @@
 namespace palpate {
 
 // Adapters for simulators that keep vectors as contiguous triples of doubles, and that want
-// contacts as pairs of cells. Docs/FromIMSTK.md shows both in a loop.
+// contacts as pairs of cells. Docs/HowTo/FromIMSTK.md shows both in a loop.
 
 static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double));
 
