@@ -31,7 +31,7 @@ namespace palpate {
 //          the front. The normal of Intersection's vertex-triangle contacts is the winding normal
 //          if the triangle's interior holds the closest point. If an edge or a corner holds it, the
 //          normal lies along the line through both closest points, on the winding normal's side.
-// Touching If the centres are at distance 0, the normal is the winding normal or the cross product
+// Touch    If the centres are at distance 0, the normal is the winding normal or the cross product
 //          of the edges, as <palpate/Distance.h> states. Method::Continuous without a thickness
 //          turns it to the side from which the features came.
 

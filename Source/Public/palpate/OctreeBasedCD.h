@@ -80,7 +80,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// branching, and consist of several parts. radius: L, of all vertices. radii: L, one per vertex,
   /// linear along each segment. Radii are finite and not negative. They never change.
   ///
-  /// Contacts edgeEdge() has its segments with edges of triangles and with segments of line meshes.
+  /// Lists    edgeEdge() has its segments with edges of triangles and with segments of line meshes.
   ///          vertexTriangle() or triangleVertex() has its vertices with triangles, and points with
   ///          its segments: segment {p, q} is the triangle {p, q, q} there. Features touch where
   ///          their centre lines come closest, if the distance there is at most the thickness and
@@ -94,7 +94,7 @@ class PALPATE_EXPORT OctreeBasedCD {
                          std::span<const Segment> segments, std::span<const double> radii);
   /// Adds a point set. Point i is vertex i. Radii are as in addLineMesh().
   ///
-  /// Contacts vertexTriangle() or triangleVertex() has its points with triangles, segments and
+  /// Lists    vertexTriangle() or triangleVertex() has its points with triangles, segments and
   ///          other points: point p is the triangle {p, p, p} there. For two point sets the points
   ///          of the first set are the vertices. For a point set with itself the lower point is the
   ///          vertex.
