@@ -13,7 +13,7 @@ namespace palpate {
 ///          that it covers.
 /// Errors   none. If a position is NaN or infinite, the result has no meaning.
 /// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
-/// Cost     about 0.1 µs where floating point decides, 1 µs where features touch, 100 µs at worst.
+/// Cost     bounded: least where floating point decides, most where only exact sums do.
 PALPATE_EXPORT bool trianglesIntersect(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1,
                                        const Eigen::Vector3d& a2, const Eigen::Vector3d& b0,
                                        const Eigen::Vector3d& b1, const Eigen::Vector3d& b2);

@@ -38,9 +38,9 @@ struct TimeOfImpactSettings {
 ///          (2) scaling all positions by a power of two does not either, where it is exact.
 /// Errors   none.
 /// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
-/// Cost     bounded: 0.1 µs for most pairs without an impact, microseconds where floating point
-///          cannot decide. With a minimum distance at most 1 / timeTolerance search steps of 0.1
-///          µs; few unless the features pass each other at nearly that distance.
+/// Cost     bounded: least for pairs without an impact, most where floating point cannot decide
+///          (Docs/Performance.md). With a minimum distance there are at most 1 / timeTolerance
+///          search steps; few unless the features pass each other at nearly that distance.
 PALPATE_EXPORT std::optional<double> vertexTriangleTimeOfImpact(
     const Eigen::Vector3d& vBefore, const Eigen::Vector3d& aBefore, const Eigen::Vector3d& bBefore,
     const Eigen::Vector3d& cBefore, const Eigen::Vector3d& vNow, const Eigen::Vector3d& aNow,

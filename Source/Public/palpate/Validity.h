@@ -36,10 +36,10 @@ enum class MethodReason {
 ///          the answer is not empty.
 ///          (3) if not trusted, the library does not know. Pairs with lines, points or shapes, and
 ///          pairs that collision filters separate, are never trusted.
-/// Cost     at most 5 % of the frames' time, except in the first frame of a pair. That frame has an
-///          initial intersection check. If later motion may have brought the meshes together, and
-///          the step's impacts do not decide it, the library repeats the check: with Auto at once,
-///          with other methods at most once in 16 frames on average.
+/// Cost     a small part of the frames' time (Docs/Performance.md), except in the first frame of a
+///          pair. That frame has an initial intersection check. If later motion may have brought
+///          the meshes together, and the step's impacts do not decide it, the library repeats the
+///          check: with Auto at once, with other methods at most once in 16 frames on average.
 /// Source   Docs/Algorithms/Validity.md has the conditions and their proofs.
 struct Validity {
   bool trusted = false;
