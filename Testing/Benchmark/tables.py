@@ -120,6 +120,11 @@ TABLES = {
     "validity": metrics("validity", "1 thread"),
     "queries": metrics("queries", "1 thread"),
     "simd": metrics("simd", "1 thread"),
+    "lines": metrics("lines", "1 / 2 threads"),
+    "points": metrics("points", "1 / 2 threads"),
+    "shapes": metrics("shapes", "1 thread"),
+    "rigid": metrics("rigid", "1 / 2 threads"),
+    "inside": metrics("inside", "1 / 2 threads"),
 }
 
 

@@ -123,7 +123,8 @@ struct ContactMotion {
 /// Needs    shapes that turn by less than 90 degrees in the step.
 /// Errors   WrongPositionCount as appendRows(); InvalidRadius unless radii are none, one, or one
 ///          for each vertex. No motion is added then.
-/// Cost     linear in the contacts. The function allocates nothing if the vector has room.
+/// Cost     linear in the contacts. The function allocates nothing if the vector's capacity is
+///          large enough.
 PALPATE_EXPORT void appendMotions(const CollisionData& contacts, const ContactSide& a,
                                   const ContactSide& b, std::vector<ContactMotion>& motions);
 
@@ -131,7 +132,7 @@ PALPATE_EXPORT void appendMotions(const CollisionData& contacts, const ContactSi
 /// normal) is a right-handed system.
 using Tangents = std::array<Eigen::Vector3d, 2>;
 
-/// The tangents of a normal, by a rule that depends on the normal only: the shortest rotation from
+/// The tangents of a normal, by a rule that depends on the normal only. The shortest rotation from
 /// the z axis to the normal turns the x and the y axis into them.
 ///
 /// Laws     (1) the rule is continuous except at the normal -z; no rule is continuous everywhere.

@@ -501,7 +501,7 @@ TEST(Kinds, DegenerateLinesAnswerAsBruteForce) {
 
 // ---- Refused ----
 
-/// Docs/Pairs.md's matrix is what the code accepts.
+/// The matrix of Docs/SupportMatrix.md is what the code accepts.
 TEST(Kinds, DocumentSaysWhatIsAnswered) {
   const Positions some{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const std::pair<Method, std::string> methods[] = {{Method::Intersection, "Intersection"},
@@ -517,7 +517,7 @@ TEST(Kinds, DocumentSaysWhatIsAnswered) {
     return kind == 4 ? detection.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1.0})
                      : kinds[kind].addTo(detection);
   };
-  std::ifstream file(PALPATE_SOURCE_DIR "/Docs/Pairs.md");
+  std::ifstream file(PALPATE_SOURCE_DIR "/Docs/SupportMatrix.md");
   const std::string document{std::istreambuf_iterator<char>(file), {}};
   for (int a = 0; a < 5; ++a) {
     std::string row = "| **" + names[a] + "** |";

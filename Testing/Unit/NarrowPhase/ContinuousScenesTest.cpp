@@ -1,6 +1,6 @@
-// Two steps of published simulations, with symbolic truth for feature pairs that come close. (Wang
-// et al., Time of impact dataset for continuous collision detection and a scalable conservative
-// algorithm, 2021.)
+// Two steps of published simulations, with symbolic truth for feature pairs that come close.
+// (Belgrod et al., Time of impact dataset for continuous collision detection and a scalable
+// conservative algorithm, 2021.)
 #include "NarrowPhase/Continuous.h"
 
 #include "PublishedFrames.h"
