@@ -136,8 +136,10 @@ def main():
         (folder / "CMakeLists.txt").write_text(head + code)
         for source in {"main.cpp", *re.findall(r"\b\w+\.cpp\b", code)}:
             (folder / source).write_text("#include <palpate/Palpate.h>\nint main() { palpate::OctreeBasedCD collisions; }\n")
-    (out / "names.cmake").write_text("set(programs " + " ".join(program.name for program in programs) + ")\n"
-                                     + "set(projects " + " ".join(name for name, _ in projects) + ")\n")
+    names = {"programs": [program.name for program in programs],
+             "notRun": [program.name for program in programs if not program.runs],
+             "projects": [name for name, _ in projects]}
+    (out / "names.cmake").write_text("".join(f"set({key} {' '.join(value)})\n" for key, value in names.items()))
     print(f"{len(programs)} programs, {len(projects)} CMake projects")
 
 
