@@ -9,7 +9,7 @@ namespace palpate {
 
 Stencil stencil(const EdgeEdgeContact& contact) {
   const StandardFloatingPoint standard;
-  return standard.kept(
+  return standard.evaluated(
       Stencil{{contact.edgeA[0], contact.edgeA[1], contact.edgeB[0], contact.edgeB[1]},
               {1.0 - contact.weightA, contact.weightA, contact.weightB - 1.0, -contact.weightB}});
 }
@@ -18,7 +18,7 @@ double ConstraintRow::gap(std::span<const Eigen::Vector3d> positions) const {
   const StandardFloatingPoint standard;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < 4; ++i) sum += weights[i] * positions[vertices[i]];
-  return standard.kept(normal.dot(sum) - offset);
+  return standard.evaluated(normal.dot(sum) - offset);
 }
 
 void appendRows(const CollisionData& contacts, const SolverVertices& a, const SolverVertices& b,

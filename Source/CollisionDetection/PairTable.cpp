@@ -126,7 +126,7 @@ class Check {
     support(!isPlane(a) || !isPlane(b), "two planes have no distance");
     if (a.shape && b.shape && a.shape->now.needsDifferences(b.shape->now)) {
       const double p = a.shape->now.size(), q = b.shape->now.size();
-      support(std::max(p, q) <= kMostSizeRatio * std::min(p, q),
+      support(std::max(p, q) <= kMaxSizeRatio * std::min(p, q),
               "the shapes are " + textOf(p) + " and " + textOf(q) +
                   " large; beyond a ratio of 2^40 their distance is lost in rounding");
     }

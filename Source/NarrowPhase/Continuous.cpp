@@ -90,7 +90,7 @@ class ContactFinder {
   bool operator()(const Features<kind>& features, std::uint32_t inFirst, std::uint32_t inSecond,
                   bool ofSecond) {
     const ImpactQuery query = features.query(inFirst, inSecond);
-    const ImpactAnswer answer = findImpact(query, m_settings);
+    const ImpactResult answer = findImpact(query, m_settings);
     m_out.exactDecisions += answer.exact;
     return answer.impact && add(features, inFirst, inSecond, ofSecond, query, answer.time, true);
   }
@@ -209,7 +209,7 @@ double findEarliestImpact(const MeshPair& pair, std::span<const ElementPair> can
   const auto test = [&](const auto& features, std::uint32_t inFirst, std::uint32_t inSecond,
                         bool ofSecond) {
     const ImpactQuery query = features.query(inFirst, inSecond);
-    const ImpactAnswer answer = findImpact(query, settings, end());
+    const ImpactResult answer = findImpact(query, settings, end());
     counts.exactDecisions += answer.exact;
     if (answer.impact && answer.time < earliest &&
         (!pair.filters() ||

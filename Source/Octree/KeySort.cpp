@@ -133,7 +133,7 @@ int KeySort::byDigits(const KeyRange& range, std::uint32_t* ends, const Threads*
   const std::size_t wanted = shared ? static_cast<std::size_t>(threads->count()) : 1,
                     grain = (size + wanted - 1) / wanted, parts = (size + grain - 1) / grain;
   // 16 KB on the stack. No function called from here sorts, so they exist only once at a time.
-  std::array<std::uint32_t, 1 << Key::kDigitBits * PartEnds::kMostDigits> ownCounts;
+  std::array<std::uint32_t, 1 << Key::kDigitBits * PartEnds::kMaxDigits> ownCounts;
   if (shared) m_sharedCounts.resize(bins * parts);
   std::uint32_t* counts = shared ? m_sharedCounts.data() : ownCounts.data();
   std::uint64_t* scratch = m_scratch.data() + range.begin;
@@ -150,7 +150,7 @@ int KeySort::byDigits(const KeyRange& range, std::uint32_t* ends, const Threads*
     differ |= HWY_DYNAMIC_DISPATCH(countKeysKernel)(scratch + from, to - from, shift, bins, own);
   });
   for (std::size_t i = 0; i < size; i += grain) differ |= scratch[0] ^ scratch[i];
-  const int alike = std::min(std::countl_zero(differ.load()) / Key::kDigitBits, Key::kMostLevels);
+  const int alike = std::min(std::countl_zero(differ.load()) / Key::kDigitBits, Key::kMaxLevels);
   if (alike >= range.level + range.digits) {
     std::copy_n(scratch, range.cube ? size : 0, m_keys.data() + range.begin);
     return alike;

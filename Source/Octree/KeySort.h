@@ -18,8 +18,8 @@ namespace palpate {
 /// octant 1, and so on to octant 7, each in the same order. Three digits therefore have 1 + 8 * 73
 /// = 585 parts.
 struct PartEnds {
-  static constexpr int kMostDigits = 3;
-  static constexpr std::array<std::uint32_t, kMostDigits + 1> kCounts{1, 9, 73, 585};
+  static constexpr int kMaxDigits = 3;
+  static constexpr std::array<std::uint32_t, kMaxDigits + 1> kCounts{1, 9, 73, 585};
 };
 
 /// One sort of keys [begin, end) by the digits that follow `level`.

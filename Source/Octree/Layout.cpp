@@ -123,7 +123,7 @@ void Layout::sort(const KeySort& keys, OpenNode& node) {
   if (job.level == job.levels) {
     range.first = job.levels == 0;
     range.level = job.level = 0;
-    range.levels = job.levels = std::min(Key::kMostLevels, m_maxDepth - job.depth);
+    range.levels = job.levels = std::min(Key::kMaxLevels, m_maxDepth - job.depth);
     range.cube = &job.cube;
   }
   const std::uint32_t size = job.end - job.begin;
@@ -133,7 +133,7 @@ void Layout::sort(const KeySort& keys, OpenNode& node) {
     return;
   }
   range.digits =
-      std::min(size >= KeyRange::kMany ? PartEnds::kMostDigits : 2, Key::kMostLevels - job.level);
+      std::min(size >= KeyRange::kMany ? PartEnds::kMaxDigits : 2, Key::kMaxLevels - job.level);
   const std::size_t count = PartEnds::kCounts[static_cast<std::size_t>(range.digits)];
   m_ends->resize(node.endsBefore + count);
   const int alike = keys.byDigits(range, m_ends->data() + node.endsBefore, m_threads);

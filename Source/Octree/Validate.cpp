@@ -96,7 +96,7 @@ class Validation {
       // The cell of the centre is computed in float arithmetic relative to a cube up to 2^9 times
       // as long, with four roundings of 2^-24 of that length. The margin for rounding in levels,
       // 2^-10 of the size, is larger.
-      static_assert(Key::kMostLevels == 9);
+      static_assert(Key::kMaxLevels == 9);
       const double centre = 0.5 * (lower + upper), slack = cube.edge * 0x1p-13;
       if (centre < -slack || centre > cube.edge + slack)
         fail(node, "the centre of " + element() + " is outside its cell");

@@ -24,7 +24,7 @@ WindingNumbers::Answer answer(double least, double most, double margin) {
 }
 
 /// The answer for a sum with an error bound. The sum may have either sign.
-WindingNumbers::Answer answer(const SeenShare& sum, double margin) {
+WindingNumbers::Answer answer(const SolidAngleShare& sum, double margin) {
   const double number = std::abs(sum.value);
   return answer(number - sum.error, number + sum.error, margin);
 }
@@ -101,7 +101,8 @@ void WindingNumbers::update(const SearchableGeometry& body, const Threads& threa
   m_clustersOf.commit(now);
 }
 
-SeenShare WindingNumbers::share(const Cluster& cluster, const Vector3d& p, double distance) const {
+SolidAngleShare WindingNumbers::share(const Cluster& cluster, const Vector3d& p,
+                                      double distance) const {
   const Vector3d from = cluster.centre - p;
   const double square = distance * distance, cube = square * distance,
                nearest = distance - cluster.radius, squareOfNearest = nearest * nearest;
@@ -113,11 +114,11 @@ SeenShare WindingNumbers::share(const Cluster& cluster, const Vector3d& p, doubl
   return {seen / kSphere, cluster.area * (left + rounding) / kSphere};
 }
 
-static SeenShare sumOfAll(const TriangleMesh& mesh, const Vector3d& p) {
-  SeenShare sum;
+static SolidAngleShare sumOfAll(const TriangleMesh& mesh, const Vector3d& p) {
+  SolidAngleShare sum;
   const Positions& now = mesh.now;
   for (const auto& [a, b, c] : mesh.topology.triangles)
-    sum.add(seenShare(p, now[a], now[b], now[c]));
+    sum.add(solidAngleShare(p, now[a], now[b], now[c]));
   return sum;
 }
 
@@ -128,7 +129,7 @@ WindingNumbers::Answer WindingNumbers::ask(const SearchableGeometry& body, const
   const Positions& now = body.mesh.now;
   for (const double far : kFar) {
     if (bruteForce) break;
-    SeenShare ofFar, ofNear;
+    SolidAngleShare ofFar, ofNear;
     const auto isNear = [&](OctreeNode node) {
       const Cluster& cluster = m_clusters[node];
       const double distance = (cluster.centre - p).norm();
@@ -139,12 +140,12 @@ WindingNumbers::Answer WindingNumbers::ask(const SearchableGeometry& body, const
     forEachEntered(octree, isNear, stack, [&](std::uint32_t begin, std::uint32_t end) {
       for (std::uint32_t i = begin; i < end; ++i) {
         const auto& [a, b, c] = body.tree.ordered()[i];
-        ofNear.add(seenShare(p, now[a], now[b], now[c]));
+        ofNear.add(solidAngleShare(p, now[a], now[b], now[c]));
       }
     });
     // Decided only if the sum over all triangles, within its own error bound, certainly gives the
     // same decision.
-    const SeenShare sum{
+    const SolidAngleShare sum{
         ofFar.value + ofNear.value,
         ofFar.error + 2 * ofNear.error + kWindingSlack * static_cast<double>(octree.size())};
     if (const Answer found = answer(sum, margin); found.decided) return found;

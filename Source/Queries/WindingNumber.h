@@ -49,7 +49,7 @@ class WindingNumbers {
     void reach(const Cluster&);
   };
   void addOwn(const SearchableGeometry& body, OctreeNode);
-  SeenShare share(const Cluster&, const Eigen::Vector3d& p, double distance) const;
+  SolidAngleShare share(const Cluster&, const Eigen::Vector3d& p, double distance) const;
 
   DerivedFrom<2> m_clustersOf;      ///< positions in the body's frame, and the transform
   std::uint64_t m_treeUpdates = 0;  ///< GeometryOctree::updates() for which m_clusters hold

@@ -204,7 +204,7 @@ SignedDistance Shape::at(const Vector3d& x) const {
   }
   const auto& [distance, outward] = polar(from - weight * along);
   const bool onAxis = distance <= kOnSurface * m_magnitude;
-  return {distance - m_radius, onAxis ? fromAxis(axisOfLeast(along.cwiseAbs())) : outward};
+  return {distance - m_radius, onAxis ? fromAxis(axisOfLeastComponent(along.cwiseAbs())) : outward};
 }
 
 Vector3d Shape::fromAxis(const Vector3d& normal) const {

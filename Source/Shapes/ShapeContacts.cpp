@@ -184,7 +184,7 @@ class ShapeImpacts {
   static double motionOf(const ImpactQuery::Step& step) { return lengthOf(step.now - step.before); }
 
   void ask(const ImpactQuery& query) {
-    const ImpactAnswer answer = findImpact(query, m_settings, m_time);
+    const ImpactResult answer = findImpact(query, m_settings, m_time);
     ++m_out.featurePairs;
     m_out.exactDecisions += answer.exact;
     if (!answer.impact || (m_first && !(answer.time < m_time))) return;
