@@ -176,7 +176,8 @@ struct Frame::Job {
   void keepEnabled() {
     if (!record->anyDisabled()) return;
     const MeshTopology &a = record->a->mesh.topology, &b = record->b->mesh.topology;
-    std::erase_if(kept, [&](const ElementPair& p) { return !a.isOn(p.a) || !b.isOn(p.b); });
+    std::erase_if(kept,
+                  [&](const ElementPair& p) { return !a.isEnabled(p.a) || !b.isEnabled(p.b); });
   }
   /// Keeps pairs whose boxes overlap at the pair's own thickness. The boxes are those of the pair's
   /// method: at the step's end, or over the whole step.

@@ -215,7 +215,7 @@ void GeometryTable::setFilter(GeometryId id, const CollisionFilter& filter) {
                 nameOf(id) + " is " + nameOf(geometry.mesh.topology.type) + ", which has no sides",
                 id);
   geometry.filter = filter;
-  geometry.mesh.outer = filter.sidedness == Sidedness::Outer;
+  geometry.mesh.outerSideOnly = filter.sidedness == Sidedness::Outer;
   geometry.revisions.filter = geometry.revisions.counter.next();
 }
 

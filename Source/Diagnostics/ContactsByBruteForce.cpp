@@ -31,7 +31,7 @@ class VertexAgainstMesh {
     const std::vector<Triangle>& triangles = m_mesh.topology.triangles;
     m_answers.assign(triangles.size(), {});
     for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-      if (!m_mesh.topology.isOn(t) || pair.leavesOutVertex(vertex, t)) continue;
+      if (!m_mesh.topology.isEnabled(t) || pair.leavesOutVertex(vertex, t)) continue;
       const auto& [a, b, c] = triangles[t];
       m_answers[t] = finiteVertexTriangleDistance(p, m_mesh.now[a], m_mesh.now[b], m_mesh.now[c]);
       ++out.featurePairs;
@@ -247,7 +247,7 @@ void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, Contact
     const std::vector<Triangle>& triangles = features.second.topology.triangles;
     for (const std::uint32_t v : ofSecond ? lists.verticesOfB : lists.verticesOfA) {
       for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-        if (!features.second.topology.isOn(t) || pair.leavesOutVertex(v, t)) continue;
+        if (!features.second.topology.isEnabled(t) || pair.leavesOutVertex(v, t)) continue;
         ++out.featurePairs;
         f(features, v, t, ofSecond);
       }
@@ -285,7 +285,7 @@ void findIntersections(const MeshPair& pair, const FeatureLists& lists, ContactB
   const auto countB = static_cast<std::uint32_t>(pair.b.topology.triangles.size());
   for (const std::uint32_t a : lists.trianglesOfA)
     for (std::uint32_t b = pair.self() ? a + 1 : 0; b < countB; ++b)
-      if (pair.b.topology.isOn(b)) addIntersection(pair, {a, b}, out);
+      if (pair.b.topology.isEnabled(b)) addIntersection(pair, {a, b}, out);
 }
 
 }  // namespace
@@ -303,7 +303,7 @@ FeatureLists everyFeature(const MeshPair& pair) {
   if (pair.settings.method == Method::Intersection || pair.hasShape()) {
     const MeshTopology& mesh = pair.hasShape() ? pair.mesh().topology : pair.a.topology;
     fill(every.trianglesOfA, mesh.triangles.size());
-    std::erase_if(every.trianglesOfA, [&](std::uint32_t t) { return !mesh.isOn(t); });
+    std::erase_if(every.trianglesOfA, [&](std::uint32_t t) { return !mesh.isEnabled(t); });
     return every;
   }
   const MeshTopology &a = pair.a.topology, &b = pair.b.topology;

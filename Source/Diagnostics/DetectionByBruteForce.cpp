@@ -12,7 +12,8 @@ void detectPairByBruteForce(const PairRecord& record, ContactBuffers& contacts,
              countB = static_cast<std::uint32_t>(meshes.b.topology.triangles.size());
   for (std::uint32_t a = 0; a < countA && meshes.step.start; ++a)
     for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b)
-      contacts.facts.startsIntersecting |= meshes.a.topology.isOn(a) && meshes.b.topology.isOn(b) &&
+      contacts.facts.startsIntersecting |= meshes.a.topology.isEnabled(a) &&
+                                           meshes.b.topology.isEnabled(b) &&
                                            intersect(meshes, true, {a, b}, overlaps);
   if (!record.plan.overlaps ||
       !(contacts.facts.startsIntersecting || record.plan.startsIntersecting))

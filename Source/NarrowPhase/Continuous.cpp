@@ -105,7 +105,7 @@ class ContactFinder {
     if (m_pair.settings.earliestTimeOnly) m_out.facts.clearance = 0.0;
     const auto isLeftOut = [&](const auto& closest, const Vector3d& normal, bool refused) {
       if (store) m_check.noteImpact(features, inFirst, inSecond, time, closest.distance);
-      return refused || ((m_pair.a.outer || m_pair.b.outer) &&
+      return refused || ((m_pair.a.outerSideOnly || m_pair.b.outerSideOnly) &&
                          pointsInward(m_pair, held, ofSecond ? -normal : normal, time));
     };
     if constexpr (kind == Kind::VertexTriangle) {

@@ -111,8 +111,8 @@ bool refusesEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB
 
 bool pointsInward(const MeshPair& pair, const std::array<MeshFeature, 2>& features,
                   const Vector3d& direction, double time) {
-  return (pair.a.outer && Surface(pair.a, time).isBelow(features[0], -direction)) ||
-         (pair.b.outer && Surface(pair.b, time).isBelow(features[1], direction));
+  return (pair.a.outerSideOnly && Surface(pair.a, time).isBelow(features[0], -direction)) ||
+         (pair.b.outerSideOnly && Surface(pair.b, time).isBelow(features[1], direction));
 }
 
 }  // namespace palpate

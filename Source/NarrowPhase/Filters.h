@@ -40,13 +40,13 @@ inline bool pointsInwardAtEnd(const MeshPair& pair, std::uint32_t vertex,
                               const MeshFeature& ofTriangle, const VertexTriangleDistance& measured,
                               bool ofSecond) {
   const MeshFeature ofVertex{MeshFeature::Kind::Vertex, vertex};
-  if (!(pair.a.outer || pair.b.outer) || measured.distance == 0.0) return false;
+  if (!(pair.a.outerSideOnly || pair.b.outerSideOnly) || measured.distance == 0.0) return false;
   return ofSecond ? pointsInward(pair, {ofTriangle, ofVertex}, -measured.normal, 1.0)
                   : pointsInward(pair, {ofVertex, ofTriangle}, measured.normal, 1.0);
 }
 inline bool pointInwardAtEnd(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
                              const EdgeEdgeDistance& measured) {
-  if (!(pair.a.outer || pair.b.outer) || measured.distance == 0.0) return false;
+  if (!(pair.a.outerSideOnly || pair.b.outerSideOnly) || measured.distance == 0.0) return false;
   return pointsInward(pair,
                       {featureOf(pair.a.topology, edgeA, measured.featureA),
                        featureOf(pair.b.topology, edgeB, measured.featureB)},

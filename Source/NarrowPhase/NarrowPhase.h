@@ -56,7 +56,7 @@ struct MeshPair {
     const TriangleMesh &vertices = ofSecond ? b : a, &others = ofSecond ? a : b;
     return vertices.radius(vertex) + others.radius(corners, barycentric);
   }
-  bool filters() const { return near || predicate || a.outer || b.outer; }
+  bool filters() const { return near || predicate || a.outerSideOnly || b.outerSideOnly; }
   bool hasShape() const { return shapeOfA || shapeOfB; }
   bool isOfShapes() const { return shapeOfA && shapeOfB; }
   /// For a pair with a shape: the mesh of the other geometry, and the shape.

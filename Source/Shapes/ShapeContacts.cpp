@@ -245,7 +245,7 @@ class ShapeContactFinder {
   void test(std::uint32_t element) {
     const MeshTopology& topology = m_mesh.topology;
     const Triangle& corners = topology.triangles[element];
-    if (!topology.isOn(element)) return;
+    if (!topology.isEnabled(element)) return;
     for (int i = 0; i < 3; ++i) m_ends[i] = {corners[i], m_shape.at(m_positions[corners[i]])};
     for (int i = 0; i < 3; ++i) {
       const auto& [vertex, from] = m_ends[i];
