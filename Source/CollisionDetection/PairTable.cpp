@@ -124,7 +124,7 @@ class Check {
     support(!self || a.shape || !a.isPlaced(), kRigidWithItself);
     support(!self || !a.shape, "a shape does not meet itself");
     support(!isPlane(a) || !isPlane(b), "two planes have no distance");
-    if (a.shape && b.shape && a.shape->now.needsDifferences(b.shape->now)) {
+    if (a.shape && b.shape && a.shape->now.needsMinkowskiDifference(b.shape->now)) {
       const double p = a.shape->now.size(), q = b.shape->now.size();
       support(std::max(p, q) <= kMaxSizeRatio * std::min(p, q),
               "the shapes are " + textOf(p) + " and " + textOf(q) +

@@ -60,8 +60,8 @@ std::array<double, 3> squares(const std::array<Vector3d, 3>& a) {
   if (isModerate(extent)) return {dot(a[0], a[0]), dot(a[1], a[1]), dot(a[2], a[2])};
   std::array<double, 3> result;
   for (int i = 0; i < 3; ++i) {
-    const Vector3d near = scaled(a[i], exponentTowardsOne(extent));
-    result[i] = dot(near, near);
+    const Vector3d moderate = scaled(a[i], exponentTowardsOne(extent));
+    result[i] = dot(moderate, moderate);
   }
   return result;
 }
