@@ -149,7 +149,7 @@ struct Frame::Job {
   }
 
   /// Whether the traversal may find pairs that are no candidates.
-  bool isFiltered() const { return record->anyDisabled() || trees.turned(); }
+  bool isFiltered() const { return record->anyDisabled() || trees.isMapped(); }
   /// Whether the boxes of the traversal may be larger than those of the pair's method.
   bool widerBoxes() const { return record->widerBoxes() || record->plan.nearby > 0.0; }
 
@@ -169,9 +169,9 @@ struct Frame::Job {
   }
 
   /// Keeps pairs whose boxes overlap at the thickness of the traversal. Only the traversal of
-  /// turned trees finds other pairs as well.
+  /// mapped trees finds other pairs as well.
   void keepNearby() {
-    if (trees.turned()) keepInWorld(std::max(record->plan.nearby, thickness));
+    if (trees.isMapped()) keepInWorld(std::max(record->plan.nearby, thickness));
   }
   void keepEnabled() {
     if (!record->anyDisabled()) return;
@@ -182,7 +182,7 @@ struct Frame::Job {
   /// Keeps pairs whose boxes overlap at the pair's own thickness. The boxes are those of the pair's
   /// method: at the step's end, or over the whole step.
   void keepWithinThickness() {
-    if (!trees.turned()) {
+    if (!trees.isMapped()) {
       if (widerBoxes())
         keepOverlapping(record->a->mesh.topology, record->b->mesh.topology, floats, kept);
     } else if (record->plan.nearby > thickness) {
@@ -206,7 +206,7 @@ struct Frame::Job {
 
   static void detect(Job& job, std::span<const ElementPair> pairs) {
     Stopwatch watch;
-    const MeshPair meshes = job.record->meshes(job.trees.turned() ? nullptr : &job.floats);
+    const MeshPair meshes = job.record->meshes(job.trees.isMapped() ? nullptr : &job.floats);
     bool& intersecting = job.contacts.facts.startsIntersecting;
     if (meshes.step.start && !intersecting)
       intersecting = anyIntersecting(meshes, true, pairs, job.overlaps).has_value();
