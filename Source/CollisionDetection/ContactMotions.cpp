@@ -82,14 +82,14 @@ void appendMotions(const CollisionData& contacts, const ContactSide& a, const Co
   const auto nameOf = [&](const ContactSide& side) { return &side == &a ? "a" : "b"; };
   const std::size_t given = motions.size();
 
-  // inFirst: how many of the stencil's vertices are on the side that the normal points to.
+  // firstCount: how many of the stencil's vertices are on the side that the normal points to.
   const auto add = [&](const auto& contact, const ContactSide& first, const ContactSide& second,
-                       std::size_t inFirst) {
+                       std::size_t firstCount) {
     const auto [vertices, weights] = stencil(contact);
     SideSum one, other;
     for (std::size_t i = 0; i < 4; ++i) {
-      const ContactSide& side = i < inFirst ? first : second;
-      (i < inFirst ? one : other)
+      const ContactSide& side = i < firstCount ? first : second;
+      (i < firstCount ? one : other)
           .add(std::abs(weights[i]),
                motionOf(side, nameOf(side), vertices[i], contact.timeOfImpact));
     }

@@ -37,7 +37,7 @@ constexpr std::size_t kSharedSize = 8192;
 /// method reports nothing but touching features: Continuous, without a thickness.
 bool asksForTouching(const PairRecord& record) {
   return record.a == record.b && record.plan.method == Method::Continuous &&
-         record.a->mesh.topology.hasFaces() && record.meshes().reach() == 0.0;
+         record.a->mesh.topology.hasFaces() && record.meshes().maxFeatureDistance() == 0.0;
 }
 
 /// thickness: L, of the boxes. unfolded: UnfoldedStars::triangles(), or null.
@@ -61,7 +61,7 @@ std::size_t trianglesOf(const PairRecord& record) {
 }
 
 double boxThickness(const PairRecord& record) {
-  return record.plan.method == Method::Intersection ? 0.0 : record.meshes().reach();
+  return record.plan.method == Method::Intersection ? 0.0 : record.meshes().maxFeatureDistance();
 }
 
 FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
@@ -89,7 +89,7 @@ std::size_t sizeOf(const CollisionData::Contents& contents) {
 void countContacts(const PairPlan& plan, std::size_t ofIntersection,
                    CollisionData::Contents& contents) {
   std::size_t atImpact = 0;
-  if (plan.step.impacts) {
+  if (plan.step.reportsImpacts) {
     forEachTimed(contents, [&](const auto& contacts) {
       for (const auto& contact : contacts) atImpact += contact.timeOfImpact < 1.0;
     });
@@ -208,7 +208,7 @@ struct Frame::Job {
     Stopwatch watch;
     const MeshPair meshes = job.record->meshes(job.trees.isMapped() ? nullptr : &job.floats);
     bool& intersecting = job.contacts.facts.startsIntersecting;
-    if (meshes.step.start && !intersecting)
+    if (meshes.step.checksStart && !intersecting)
       intersecting = anyIntersecting(meshes, true, pairs, job.overlaps).has_value();
     if (job.record->plan.overlaps && (intersecting || job.record->plan.startsIntersecting))
       findOverlaps(job, pairs);
@@ -229,14 +229,14 @@ struct Frame::Job {
   /// Detects the contacts of a pair with a shape, without a traversal.
   void detectShape() {
     const MeshPair meshes = record->meshes();
-    if (meshes.isOfShapes()) {
+    if (meshes.isShapePair()) {
       findShapePair(*meshes.shapeOfA, *meshes.shapeOfB, meshes.settings, contacts);
       if (meshes.settings.earliestTimeOnly) takeEarliest(*record, contacts);
       return;
     }
     const auto& [analytical, now, before] = meshes.shape();
-    findElementsNear(record->mesh(), record->plan.swept() ? before : now, now, meshes.reach(),
-                     queries, elements);
+    findElementsNear(record->mesh(), record->plan.swept() ? before : now, now,
+                     meshes.maxFeatureDistance(), queries, elements);
     Stopwatch watch;
     findShapeContacts(meshes.mesh(), meshes.shape(), meshes.settings, elements, contacts);
     if (meshes.settings.earliestTimeOnly) takeEarliest(*record, contacts);
@@ -447,9 +447,9 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   for (auto list : {&StepFacts::verticesA, &StepFacts::verticesB, &StepFacts::degenerateA,
                     &StepFacts::degenerateB})
     sortUnique(m_facts.*list);
-  if (record.plan.step.impacts && m_facts.clearance == 0.0) {
+  if (record.plan.step.reportsImpacts && m_facts.clearance == 0.0) {
     for (ContactBuffers* found : m_buffers)
-      answerByImpact(record.meshes(), m_facts, *found, m_impacts);
+      replaceByImpacts(record.meshes(), m_facts, *found, m_impacts);
     m_buffers.push_back(&m_impacts);
   }
   m_facts.startsIntersecting |= record.plan.startsIntersecting;
@@ -470,10 +470,11 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   statistics.validityPairs += m_impacts.validityPairs;
   // After trust.finish(), which tests the triangles around every impact.
   if (record.pair.settings.contacts == Contacts::Distinct &&
-      (record.plan.step.impacts || record.plan.method == Method::Continuous))
-    m_firstImpacts.keep(record.a == record.b,
-                        record.plan.step.impacts ? 1.0 : std::numeric_limits<double>::infinity(),
-                        m_orderScratch, contents);
+      (record.plan.step.reportsImpacts || record.plan.method == Method::Continuous))
+    m_firstImpacts.keep(
+        record.a == record.b,
+        record.plan.step.reportsImpacts ? 1.0 : std::numeric_limits<double>::infinity(),
+        m_orderScratch, contents);
   countContacts(record.plan, ofIntersection, contents);
   record.candidatesSorted = candidatesSorted;
   if (settings.keepCandidates) record.candidatesOf.commit(record.state());

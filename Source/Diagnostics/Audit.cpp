@@ -120,7 +120,8 @@ class Coverage {
 void dropWhatOthersStandFor(const MeshPair& meshes, const CollisionData& answer,
                             CollisionData::Contents& expected) {
   const bool impactsOnly = meshes.settings.method == Method::Continuous;
-  if (meshes.settings.contacts != Contacts::Distinct || !(impactsOnly || meshes.step.impacts))
+  if (meshes.settings.contacts != Contacts::Distinct ||
+      !(impactsOnly || meshes.step.reportsImpacts))
     return;
   const double end = impactsOnly ? std::numeric_limits<double>::infinity() : 1.0;
   using Rank = std::tuple<double, int, std::array<std::uint32_t, 4>>;
@@ -167,10 +168,10 @@ void dropWhatOthersStandFor(const MeshPair& meshes, const CollisionData& answer,
       addImpact(meshes, features, meshes.a.topology.edgeOf(contact.edgeA),
                 meshes.b.topology.edgeOf(contact.edgeB), false, impact);
     } else {
-      const bool ofSecond = list == 1;
-      const Features<ImpactQuery::Kind::VertexTriangle> features{ofSecond ? meshes.b : meshes.a,
-                                                                 ofSecond ? meshes.a : meshes.b};
-      addImpact(meshes, features, contact.vertex, contact.triangle, ofSecond, impact);
+      const bool swapped = list == 1;
+      const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? meshes.b : meshes.a,
+                                                                 swapped ? meshes.a : meshes.b};
+      addImpact(meshes, features, contact.vertex, contact.triangle, swapped, impact);
     }
     bool dropped = false;
     forEachImpactList(impact, [&](const auto& contacts, int of) {

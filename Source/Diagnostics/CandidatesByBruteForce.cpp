@@ -13,7 +13,8 @@ static std::vector<Eigen::AlignedBox3d> boxesOf(const TriangleMesh& mesh, bool s
 }
 
 void findCandidatesByBruteForce(const MeshPair& meshes, Buffer<ElementPair>& out) {
-  const double thickness = meshes.settings.method == Method::Intersection ? 0.0 : meshes.reach();
+  const double thickness =
+      meshes.settings.method == Method::Intersection ? 0.0 : meshes.maxFeatureDistance();
   const bool swept =
       meshes.settings.method == Method::Continuous || meshes.settings.method == Method::Auto;
   const std::vector<Eigen::AlignedBox3d> boxesA = boxesOf(meshes.a, swept),

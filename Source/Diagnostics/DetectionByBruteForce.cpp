@@ -10,7 +10,7 @@ void detectPairByBruteForce(const PairRecord& record, ContactBuffers& contacts,
   findContactsByBruteForce(meshes, contacts);
   const auto countA = static_cast<std::uint32_t>(meshes.a.topology.triangles.size()),
              countB = static_cast<std::uint32_t>(meshes.b.topology.triangles.size());
-  for (std::uint32_t a = 0; a < countA && meshes.step.start; ++a)
+  for (std::uint32_t a = 0; a < countA && meshes.step.checksStart; ++a)
     for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b)
       contacts.facts.startsIntersecting |= meshes.a.topology.isEnabled(a) &&
                                            meshes.b.topology.isEnabled(b) &&

@@ -18,7 +18,7 @@ EndOfStep checkEnd(const MeshPair& pair, const CollisionData::Contents& contacts
                    ContactBuffers& counts) {
   using Ids = std::span<const std::uint32_t>;
   const MeshTopology &ofA = pair.a.topology, &ofB = pair.b.topology;
-  const double rounding = pair.step.certain - pair.step.motion;
+  const double rounding = pair.step.motionWithRounding - pair.step.motion;
   std::size_t left = kFreeChecks;
   forEachTimed(contacts, [&](const auto& list) { left += list.size(); });
   Buffer<ElementPair>& some = counts.part;

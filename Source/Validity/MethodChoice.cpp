@@ -45,7 +45,7 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
   }
   step.motion = plan.motion;
   if (settings.method == Method::Auto) {
-    plan.motionTolerance = step.slow =
+    plan.motionTolerance = step.slowMotion =
         settings.motionTolerance < 0 ? thickness / 2 : settings.motionTolerance;
     if (plan.motion == 0.0) {
       plan.method = thickness > 0.0 ? Method::Proximity : Method::Intersection;
@@ -63,10 +63,10 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
     } else {
       plan.reason = MethodReason::Mixed;
     }
-    step.impacts = plan.method == Method::Proximity || plan.method == Method::Auto;
-    if (step.impacts)
-      step.extra = std::min(plan.motion, plan.motionTolerance) *
-                   (1.0 + kMotionSlack * settings.timeTolerance);
+    step.reportsImpacts = plan.method == Method::Proximity || plan.method == Method::Auto;
+    if (step.reportsImpacts)
+      step.extraThickness = std::min(plan.motion, plan.motionTolerance) *
+                            (1.0 + kMotionSlack * settings.timeTolerance);
   } else if (settings.method == Method::Intersection) {
     plan.nearby = plan.motion <= std::min(a.smallestHeight, b.smallestHeight) ? plan.motion : 0.0;
   } else if (settings.method == Method::Proximity && plan.motion > thickness) {

@@ -85,8 +85,8 @@ void Trust::forget() {
 void Trust::start(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
                   PairPlan& plan) {
   // Coordinates of two features within the thickness differ by at most this size.
-  const double size = a.extent + b.extent + settings.thickness + plan.step.extra;
-  plan.step.certain = plan.step.motion + 2.0 * kMotionError * (plan.step.motion + size);
+  const double size = a.extent + b.extent + settings.thickness + plan.step.extraThickness;
+  plan.step.motionWithRounding = plan.step.motion + 2.0 * kMotionError * (plan.step.motion + size);
 
   const auto before = statesOf(a, a.mesh.before, b, b.mesh.before);
   if (!m_atStart.of.isCurrent(before)) {
@@ -111,10 +111,10 @@ void Trust::start(const PairSettings& settings, const GeometryInStep& a, const G
       (plan.method == Method::Proximity && plan.motion > 0.0 && plan.step.motion == 0.0))
     return;
   plan.overlaps = settings.method == Method::Auto;
-  plan.step.start = !plan.startsIntersecting && (plan.overlaps || m_saved >= kFramesPerCheck);
-  if (plan.step.start) m_saved = std::max(m_saved - kFramesPerCheck, 0);
+  plan.step.checksStart = !plan.startsIntersecting && (plan.overlaps || m_saved >= kFramesPerCheck);
+  if (plan.step.checksStart) m_saved = std::max(m_saved - kFramesPerCheck, 0);
   // The result cannot be trusted, so the step need not be examined.
-  if (plan.method == Method::Proximity && settings.method == plan.method && !plan.step.start)
+  if (plan.method == Method::Proximity && settings.method == plan.method && !plan.step.checksStart)
     plan.step.motion = 0.0;
 }
 
@@ -127,7 +127,7 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   validity.reason = plan.reason;
   validity.displacement = plan.motion;
   validity.effectiveThickness =
-      plan.method == Method::Intersection ? 0.0 : settings.thickness + plan.step.extra;
+      plan.method == Method::Intersection ? 0.0 : settings.thickness + plan.step.extraThickness;
   const auto take = [](std::vector<std::uint32_t>& out, const Buffer<std::uint32_t>& ids) {
     out.assign(ids.begin(), ids.end());
   };
@@ -135,11 +135,11 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   take(validity.degenerateTrianglesB, facts.degenerateB);
   validity.untrustedVerticesA.clear();
   validity.untrustedVerticesB.clear();
-  if (!plan.step.impacts) {
+  if (!plan.step.reportsImpacts) {
     take(validity.untrustedVerticesA, facts.verticesA);
     take(validity.untrustedVerticesB, facts.verticesB);
   }
-  if (plan.step.start) {
+  if (plan.step.checksStart) {
     m_atStart = {};
     m_atStart.position = facts.startsIntersecting ? Position::Intersecting : Position::Apart;
     m_atStart.of.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
@@ -179,11 +179,11 @@ void Trust::findEnd(const PairPlan& plan, const StepFacts& facts, const MeshPair
                     const CollisionData::Contents& contents, ContactBuffers& counts) {
   m_atEnd.clearance = 0.0;
   if (plan.overlaps && facts.startsIntersecting) {  // Intersection has tested all, and found none
-    if (!meshes.near) m_atEnd.position = Position::Apart;
+    if (!meshes.nearAtRest) m_atEnd.position = Position::Apart;
     return;
   }
   // Earliest times come without contacts, and filtered features are not among the contacts.
-  if (meshes.settings.earliestTimeOnly || meshes.filters()) return;
+  if (meshes.settings.earliestTimeOnly || meshes.hasFilters()) return;
   EndOfStep end;
   if (m_atStart.position == Position::Intersecting && m_atStart.witness &&
       intersect(meshes, false, *m_atStart.witness, counts))
