@@ -174,7 +174,7 @@ void GeometryTable::setPositions(GeometryId id,
 void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles) {
   Geometry& geometry = at(id);
-  checkTopologyKind(geometry, false, "setTriangles() is for triangle meshes");
+  checkMeshType(geometry, false, "setTriangles() is for triangle meshes");
   checkCounts(id, positions, triangles, GeometryType::Triangles);
   setTopology(geometry, checkedRest(id, positions), {positions.size(), triangles}, {});
   ++m_state;
@@ -183,7 +183,7 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
 void GeometryTable::setTetrahedra(GeometryId id, std::span<const Eigen::Vector3d> positions,
                                   std::span<const Tetrahedron> tetrahedra) {
   Geometry& geometry = at(id);
-  checkTopologyKind(geometry, true, "setTetrahedra() is for tetrahedral meshes");
+  checkMeshType(geometry, true, "setTetrahedra() is for tetrahedral meshes");
   std::vector<Eigen::Vector3d> rest = checkedRest(id, positions);
   auto solid = std::make_unique<Solid>();
   solid->topology = checkedTopology(id, rest, tetrahedra);

@@ -267,7 +267,7 @@ class OctreeBasedCD::Implementation::QuerySource : public SpatialQueries::Source
     const auto lock = lockOctrees();
     if (m_all->octreesOf != m_all->geometries.state()) m_all->update();
   }
-  std::unique_lock<std::mutex> lockOctrees() { return std::unique_lock(m_preparing); }
+  std::unique_lock<std::mutex> lockOctrees() { return std::unique_lock(m_preparationMutex); }
 
   std::uint64_t state() const override {
     if (!m_all) return 0;
@@ -407,7 +407,7 @@ void OctreeBasedCD::setTetrahedra(GeometryId geometry, std::span<const Eigen::Ve
 
 TetrahedralSurface OctreeBasedCD::surface(GeometryId geometry) const {
   const Geometry& solid = read().geometries.at(geometry);
-  checkTopologyKind(solid, true, "surface() is of tetrahedral meshes");
+  checkMeshType(solid, true, "surface() is of tetrahedral meshes");
   return {solid.solid->topology.surface, solid.solid->topology.surfaceOwner};
 }
 

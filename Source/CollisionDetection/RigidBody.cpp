@@ -55,7 +55,7 @@ class RigidSearch::Step {
     if (body.empty()) return 0.0;
     if (vertex >= body.size()) vertex = 0;
     double best = sizeOf(vertex);
-    const auto tryOne = [&](std::uint32_t v) {
+    const auto testOne = [&](std::uint32_t v) {
       const double other = sizeOf(v);
       if (other > best) best = other, vertex = v;
     };
@@ -76,10 +76,10 @@ class RigidSearch::Step {
                          [&](std::uint32_t begin, std::uint32_t end) {
                            for (std::uint32_t i = begin; i < end; ++i)
                              if (mayHaveMore(tree.octree().boxes()[i]))
-                               for (const std::uint32_t v : tree.ordered()[i]) tryOne(v);
+                               for (const std::uint32_t v : tree.ordered()[i]) testOne(v);
                          });
     } else {
-      for (std::uint32_t v = 0; v < body.size(); ++v) tryOne(v);
+      for (std::uint32_t v = 0; v < body.size(); ++v) testOne(v);
     }
     return best + 2.0 * m_slack;
   }

@@ -26,10 +26,10 @@ SpatialQueries::Source::Source() : m_id(nextSourceId()) {}
 
 SpatialQueries::Source::Loan::Loan(Source& source) : m_source(source) {
   {
-    const std::lock_guard lock(source.m_lending);
-    if (!source.m_free.empty()) {
-      m_scratch = std::move(source.m_free.back());
-      source.m_free.pop_back();
+    const std::lock_guard lock(source.m_scratchMutex);
+    if (!source.m_freeScratch.empty()) {
+      m_scratch = std::move(source.m_freeScratch.back());
+      source.m_freeScratch.pop_back();
       return;
     }
   }
@@ -37,16 +37,16 @@ SpatialQueries::Source::Loan::Loan(Source& source) : m_source(source) {
 }
 
 SpatialQueries::Source::Loan::~Loan() {
-  const std::lock_guard lock(m_source.m_lending);
+  const std::lock_guard lock(m_source.m_scratchMutex);
   try {
-    m_source.m_free.push_back(std::move(m_scratch));
+    m_source.m_freeScratch.push_back(std::move(m_scratch));
   } catch (...) {  // no memory to keep it: the next call makes another
   }
 }
 
 void SpatialQueries::Source::prepareInside(SearchableGeometry& body,
                                            const InsideSettings& settings) {
-  const std::lock_guard lock(m_preparing);
+  const std::lock_guard lock(m_preparationMutex);
   checkInside(body, settings);
   if (settings.rule == InsideRule::WindingNumber && body.tree.octree().size() > 0)
     body.windingNumbers.update(body, Workers(*this));
@@ -55,7 +55,7 @@ void SpatialQueries::Source::prepareInside(SearchableGeometry& body,
 }
 
 void SpatialQueries::Source::prepareTetrahedra(SearchableGeometry& solid) {
-  const std::lock_guard lock(m_preparing);
+  const std::lock_guard lock(m_preparationMutex);
   updateTetrahedra(solid, octreeSettings(), Workers(*this));
 }
 
@@ -101,7 +101,7 @@ void SpatialQueries::findEmbeddedVertices(GeometryId vertices, GeometryId body,
   const SearchableGeometry& owner = source.at(vertices);
   SearchableGeometry& solid = source.at(body);
   checkVertices(owner, body);
-  checkTopologyKind(solid, true, "findEmbeddedVertices() is for tetrahedral meshes");
+  checkMeshType(solid, true, "findEmbeddedVertices() is for tetrahedral meshes");
   source.prepareTetrahedra(solid);
   const Source::Loan scratch(source);
   findEmbedded(owner, solid, source.engine(), Source::Workers(source), scratch->embedded, out);
@@ -112,7 +112,7 @@ std::optional<TetrahedronPoint> SpatialQueries::findTetrahedron(
   Source& source = valid();
   const StandardFloatingPoint standard;
   SearchableGeometry& solid = source.at(body);
-  checkTopologyKind(solid, true, "findTetrahedron() is for tetrahedral meshes");
+  checkMeshType(solid, true, "findTetrahedron() is for tetrahedral meshes");
   if (!point.allFinite())
     throw Error(ErrorCode::NonFinitePosition,
                 nameOf(body) + ": a point to be found is " + textOf(point), body);
