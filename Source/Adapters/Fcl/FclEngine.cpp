@@ -30,8 +30,8 @@ struct Body {
   Geometry geometry;
   fcl::Transform3d inFrame = fcl::Transform3d::Identity(), frame = fcl::Transform3d::Identity();
 
-  fcl::NODE_TYPE kind() const { return geometry->getNodeType(); }
-  bool isMesh() const { return kind() == fcl::BV_OBBRSS; }
+  fcl::NODE_TYPE nodeType() const { return geometry->getNodeType(); }
+  bool isMesh() const { return nodeType() == fcl::BV_OBBRSS; }
   fcl::Transform3d place() const { return frame * inFrame; }
 };
 
@@ -81,17 +81,17 @@ bool hasDistance(fcl::NODE_TYPE a, fcl::NODE_TYPE b) {
 }
 
 /// Why FCL does not support a pair; empty if it does.
-std::string refusal(const Body& a, const Body& b, const PairSettings& settings) {
+std::string unsupportedReason(const Body& a, const Body& b, const PairSettings& settings) {
   if (&a == &b) return "does not find what a mesh does to itself";
   if (a.isMesh() != b.isMesh()) return "is asked for two triangle meshes or two shapes only";
   if (a.isMesh() && settings.method != Method::Intersection)
     return "answers triangle meshes by Method::Intersection only";
   if (!a.isMesh() && settings.method != Method::Proximity)
     return "answers shapes by Method::Proximity only";
-  const auto [lower, higher] = std::minmax({a.kind(), b.kind()});
+  const auto [lower, higher] = std::minmax({a.nodeType(), b.nodeType()});
   if (lower == fcl::GEOM_CONVEX && higher == fcl::GEOM_PLANE)
     return "does not know a hull with a plane of two sides";
-  if (!a.isMesh() && settings.thickness > 0 && !hasDistance(a.kind(), b.kind()))
+  if (!a.isMesh() && settings.thickness > 0 && !hasDistance(a.nodeType(), b.nodeType()))
     return "has no distance of these that can be relied on: the thickness must be 0";
   return "";
 }
@@ -194,7 +194,8 @@ void FclEngine::addCollisionPair(GeometryId a, GeometryId b, const PairSettings&
   const auto& bodies = m_implementation->bodies;
   const auto first = bodies.find(a), second = bodies.find(b);
   if (first != bodies.end() && second != bodies.end())  // for unknown ids the call below throws
-    if (const std::string reason = refusal(first->second, second->second, settings); reason != "")
+    if (const std::string reason = unsupportedReason(first->second, second->second, settings);
+        reason != "")
       throw Error(ErrorCode::UnsupportedMethod,
                   "pair (" + std::to_string(static_cast<std::uint32_t>(a)) + ", " +
                       std::to_string(static_cast<std::uint32_t>(b)) + "): FCL " + reason,

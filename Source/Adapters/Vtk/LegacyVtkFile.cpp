@@ -41,8 +41,8 @@ class Reader {
 
   void readSection(const std::string& section) {
     if (section == "DATASET") {
-      const std::string kind = keyword();
-      if (kind != "POLYDATA") throw FileFault{"its data set is " + kind + ", not POLYDATA"};
+      const std::string dataSet = keyword();
+      if (dataSet != "POLYDATA") throw FileFault{"its data set is " + dataSet + ", not POLYDATA"};
     } else if (section == "POINTS") {
       const std::size_t count = m_text.count();
       m_polygons.positions.clear();

@@ -46,15 +46,15 @@ std::string contentOf(const std::filesystem::path& path) {
 }
 
 Polygons polygonsOf(const std::filesystem::path& path) {
-  std::string kind = path.extension().string();
-  std::transform(kind.begin(), kind.end(), kind.begin(),
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return std::tolower(c); });
   const std::string content = contentOf(path);
-  if (kind == ".obj") return readObj(content);
-  if (kind == ".ply") return readPly(content);
-  if (kind == ".vtk") return readLegacyVtk(content);
-  if (kind == ".stl") return readStl(content);
-  if (kind == ".vtp") return readVtp(content);
+  if (extension == ".obj") return readObj(content);
+  if (extension == ".ply") return readPly(content);
+  if (extension == ".vtk") return readLegacyVtk(content);
+  if (extension == ".stl") return readStl(content);
+  if (extension == ".vtp") return readVtp(content);
   throw FileFault{"its name does not end in .obj, .stl, .ply, .vtk or .vtp"};
 }
 

@@ -67,7 +67,7 @@ vtkSmartPointer<vtkDataCompressor> compressorNamed(std::string_view name) {
 class Reader {
  public:
   explicit Reader(std::string_view content)
-      : m_xml(content.substr(0, content.find("<AppendedData"))), m_most(1000 * content.size()) {
+      : m_xml(content.substr(0, content.find("<AppendedData"))), m_maxCount(1000 * content.size()) {
     // Appended data need not be XML. They follow the "_" after their tag.
     const std::string_view appended = content.substr(m_xml.size());
     const std::size_t start = appended.find('_', appended.find('>'));
@@ -94,7 +94,7 @@ class Reader {
  private:
   std::size_t count(std::string_view piece, const std::string& group) const {
     const std::string_view text = attributeOf(piece, "NumberOf" + group);
-    return text.empty() ? 0 : toCount(toNumber(text), m_most);
+    return text.empty() ? 0 : toCount(toNumber(text), m_maxCount);
   }
 
   void readCells(std::string_view piece, const std::string& group, std::size_t cells,
@@ -102,7 +102,7 @@ class Reader {
     std::vector<double> offsets = readArray(piece, group, "offsets", cells);
     offsets.insert(offsets.begin(), 0.0);
     std::vector<double> corners =
-        readArray(piece, group, "connectivity", toCount(offsets.back(), m_most));
+        readArray(piece, group, "connectivity", toCount(offsets.back(), m_maxCount));
     const double points = static_cast<double>(m_polygons.positions.size() - first);
     for (double& corner : corners)  // -1 is refused later: the corner is not in the piece
       corner = corner >= 0 && corner < points ? corner + static_cast<double>(first) : -1;
@@ -155,7 +155,8 @@ class Reader {
   }
 
   std::string_view m_xml, m_appended;
-  std::size_t m_most;  ///< limit of counts: compressed numbers hardly take less than 1/1000 byte
+  /// Limit of counts: compressed numbers hardly take less than 1/1000 byte.
+  std::size_t m_maxCount;
   bool m_raw = false;
   vtkSmartPointer<vtkDataCompressor> m_compressor;
   Encoding m_encoding = Encoding::LittleEndian;
