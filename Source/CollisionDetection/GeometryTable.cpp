@@ -166,9 +166,9 @@ void GeometryTable::setPositions(GeometryId id,
   checkPositionCount(geometry, now.size());
   std::optional<MotionRange> moved;
   geometry.step.setPositions(geometry.mesh, before, now, threads,
-                             geometry.motion.isWanted() ? &moved : nullptr);
+                             geometry.motion.shouldMeasure() ? &moved : nullptr);
   ++m_state;
-  if (moved) geometry.motion.take(geometry.mesh, *moved);
+  if (moved) geometry.motion.set(geometry.mesh, *moved);
 }
 
 void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions,
@@ -254,8 +254,8 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   std::size_t total = 0;
   for (const Geometry* geometry : m_changed) total += size(geometry);
   const Threads one(1);
-  m_updatedAlone = settings.update == OctreeUpdate::Auto && total < kSmallRefit;
-  (m_updatedAlone ? one : threads).forEach(m_changed.size(), [&](std::size_t i) {
+  m_wasUpdatedByOneThread = settings.update == OctreeUpdate::Auto && total < kSmallRefit;
+  (m_wasUpdatedByOneThread ? one : threads).forEach(m_changed.size(), [&](std::size_t i) {
     Geometry& geometry = *m_changed[i];
     geometry.tree.update(geometry.mesh, geometry.revisions.topology, scale, settings,
                          size(&geometry) < kSmall ? one : threads);

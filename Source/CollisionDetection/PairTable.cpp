@@ -15,31 +15,31 @@ std::string nameOf(GeometryId a, GeometryId b) {
          std::to_string(static_cast<std::uint32_t>(b)) + ")";
 }
 
-void PairRecord::updateNear() {
+void PairRecord::updateNearAtRest() {
   const double distance = pair.settings.restDistance;
-  if (distance == 0.0 || nearOf.isCurrent({a->revisions.topology})) return;
-  nearOf.invalidate();
-  near = verticesWithin(a->mesh.topology, a->mesh.rest, distance);
-  nearOf.commit({a->revisions.topology});
+  if (distance == 0.0 || nearAtRestVersion.isCurrent({a->revisions.topology})) return;
+  nearAtRestVersion.invalidate();
+  nearAtRest = verticesWithin(a->mesh.topology, a->mesh.rest, distance);
+  nearAtRestVersion.commit({a->revisions.topology});
 }
 
 void PairRecord::commit() noexcept {
   std::swap(data, next);
-  isAnswered = true;
-  dataOf.commit(state());
+  hasData = true;
+  dataVersion.commit(state());
 }
 
-void PairRecord::commitNothing(bool keepsCandidates) noexcept {
+void PairRecord::commitEmpty(bool keepsCandidates) noexcept {
   next = {};
   commit();
   trust.forget();
   candidates.clear();
-  if (keepsCandidates) candidatesOf.commit(state());
+  if (keepsCandidates) candidatesVersion.commit(state());
 }
 
 void PairRecord::commitNoCandidates() noexcept {
   candidates.clear();
-  candidatesOf.commit(state());
+  candidatesVersion.commit(state());
 }
 
 namespace {
@@ -72,7 +72,7 @@ class Check {
   Check(const Geometry& a, const Geometry& b, const PairSettings& settings)
       : m_id(a.id), m_name(nameOf(a.id, b.id)), m_method(settings.method) {
     range(a.mesh, b.mesh, settings);
-    kinds(a, b);
+    types(a, b);
     const bool proximity = hasProximity(a.inStep(), b.inStep(), settings.thickness);
     need(m_method != Method::Proximity || proximity,
          "Method::Proximity needs a positive thickness; it is 0");
@@ -114,7 +114,7 @@ class Check {
              " does not use it, only Method::Auto does: leave it negative");
   }
 
-  void kinds(const Geometry& a, const Geometry& b) {
+  void types(const Geometry& a, const Geometry& b) {
     const auto isPlane = [](const Geometry& each) {
       return each.shape && each.shape->now.isPlane();
     };
@@ -159,7 +159,7 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
   record->b = &second;
   record->plan = planOf(settings, first.inStep(), second.inStep());
   record->settingsRevision = m_revisions.next();
-  record->updateNear();
+  record->updateNearAtRest();
   record->index = m_records.size();
   const auto reserve = [](auto& vector) {
     if (vector.size() == vector.capacity()) vector.reserve(2 * vector.size() + 1);
@@ -194,16 +194,16 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
   PairRecord& record = at(geometries, a, b);
   Check(*record.a, *record.b, settings);
   if (record.pair.settings.restDistance != settings.restDistance && settings.restDistance > 0.0) {
-    IndexLists near =
+    IndexLists newNearAtRest =
         verticesWithin(record.a->mesh.topology, record.a->mesh.rest, settings.restDistance);
-    record.near = std::move(near);
-    record.nearOf.commit({record.a->revisions.topology});
+    record.nearAtRest = std::move(newNearAtRest);
+    record.nearAtRestVersion.commit({record.a->revisions.topology});
   }
   // Nothing below throws.
   record.pair.settings = m_pairs[record.index].settings = settings;
   record.plan = planOf(settings, record.a->inStep(), record.b->inStep());
   record.settingsRevision = m_revisions.next();
-  record.candidatesOf.invalidate();
+  record.candidatesVersion.invalidate();
 }
 
 void PairTable::checkRigid(GeometryId geometry) const {

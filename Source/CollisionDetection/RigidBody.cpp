@@ -31,11 +31,11 @@ class RigidSearch::Step {
         m_matrix(m_now.rotation - m_before.rotation),
         m_vector(m_now.translation - m_before.translation) {
     const DerivedFrom<1>::Sources body{geometry.mesh.now.bodyRevision()};
-    if (!search.m_largestOf.isCurrent(body)) {
+    if (!search.m_largestVersion.isCurrent(body)) {
       search.m_largest = 0.0;
       for (const Vector3d& p : geometry.mesh.now.body())
         search.m_largest = std::max(search.m_largest, p.cwiseAbs().maxCoeff());
-      search.m_largestOf.commit(body);
+      search.m_largestVersion.commit(body);
     }
     m_slack = kPlacedError * (4.0 * search.m_largest + m_before.translation.cwiseAbs().maxCoeff() +
                               m_now.translation.cwiseAbs().maxCoeff());

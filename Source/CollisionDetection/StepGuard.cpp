@@ -42,7 +42,7 @@ struct Group {
 struct MovedBack {
   GuardedVertex vertex;
   Vector3d* now;
-  Vector3d was;
+  Vector3d previous;
 };
 
 /// Two features that touch.
@@ -316,7 +316,7 @@ struct StepGuard::Implementation {
   }
 
   void undo() noexcept {
-    for (const MovedBack& moved : movedBack) *moved.now = moved.was;
+    for (const MovedBack& moved : movedBack) *moved.now = moved.previous;
     for (Guarded& geometry : geometries) geometry.isGiven = geometry.hasMoved = false;
   }
 

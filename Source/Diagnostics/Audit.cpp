@@ -117,8 +117,8 @@ class Coverage {
 
 /// Contacts::Distinct for impacts: drops expected contacts for which an earlier contact is kept.
 /// The earlier contact is either expected, too, or in the answer if the sample does not cover it.
-void dropWhatOthersStandFor(const MeshPair& meshes, const CollisionData& answer,
-                            CollisionData::Contents& expected) {
+void dropRepeatedImpacts(const MeshPair& meshes, const CollisionData& answer,
+                         CollisionData::Contents& expected) {
   const bool impactsOnly = meshes.settings.method == Method::Continuous;
   if (meshes.settings.contacts != Contacts::Distinct ||
       !(impactsOnly || meshes.step.reportsImpacts))
@@ -140,7 +140,7 @@ void dropWhatOthersStandFor(const MeshPair& meshes, const CollisionData& answer,
       return sharedFeatures(contact, list == 1, meshes.self());
   };
   std::map<ImpactFeatures, Rank> first;
-  const auto note = [&](const auto& contacts, int list) {
+  const auto recordFirst = [&](const auto& contacts, int list) {
     for (const auto& contact : contacts)
       if (const auto features = featuresOf(contact, list); features && contact.timeOfImpact < end) {
         const Rank rank = rankOf(contact, list);
@@ -148,10 +148,10 @@ void dropWhatOthersStandFor(const MeshPair& meshes, const CollisionData& answer,
         if (!isNew) place->second = std::min(place->second, rank);
       }
   };
-  note(answer.vertexTriangle(), 0);
-  note(answer.triangleVertex(), 1);
-  note(answer.edgeEdge(), 2);
-  forEachImpactList(expected, note);
+  recordFirst(answer.vertexTriangle(), 0);
+  recordFirst(answer.triangleVertex(), 1);
+  recordFirst(answer.edgeEdge(), 2);
+  forEachImpactList(expected, recordFirst);
   const auto isDropped = [&](const auto& contact, int list) {
     const auto features = featuresOf(contact, list);
     const auto place = features ? first.find(*features) : first.end();
@@ -256,10 +256,10 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
   using Any = AuditFailure::Contact;
   // Auto replaces some of its contacts by those of other methods. Brute force for a sample does not
   // reproduce this, so that only missing contacts are reported.
-  const bool withOthers = pair.settings.method == Method::Auto;
+  const bool isAuto = pair.settings.method == Method::Auto;
   const auto into = [&](List list) {
     return [=, &pair, &out](Fault fault, const Any& e, const Any& f) {
-      if (withOthers && fault != Fault::FalseNegative) return;
+      if (isAuto && fault != Fault::FalseNegative) return;
       out.push_back({pair.a, pair.b, frame, fault, list, e, f, {}, {}});
     };
   };
@@ -270,7 +270,7 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
           into(List::Earliest)(Fault::FalseNegative, contact, {});
     });
   }
-  dropWhatOthersStandFor(meshes, data, expected);
+  dropRepeatedImpacts(meshes, data, expected);
   const Coverage coverage(meshes, sample);
   const auto differ = [&](const auto& truth, const auto& found, auto covers, List list) {
     compare(truth, found, std::bind_front(covers, &coverage), into(list));
@@ -288,7 +288,7 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
       into(List::ShapeShape));
 }
 
-CollisionProblem pairAlone(const CollisionProblem& whole, GeometryId idA, GeometryId idB) {
+CollisionProblem reducedToPair(const CollisionProblem& whole, GeometryId idA, GeometryId idB) {
   CollisionProblem problem{whole.settings, {}, {}};
   for (CollisionProblem::Pair pair : whole.pairs) {
     const CollisionProblem::Geometry &a = whole.geometries[pair.a], &b = whole.geometries[pair.b];
@@ -316,7 +316,7 @@ static void keepProblem(const CollisionProblem& problem, const AuditSettings& se
     file = settings.folder / (name + "-" + std::to_string(copy) + ".capture");
   std::string error;
   try {
-    writeCapture(pairAlone(problem, first.a, first.b), file);
+    writeCapture(reducedToPair(problem, first.a, first.b), file);
   } catch (const Error& e) {
     error = e.what();
     file.clear();

@@ -26,6 +26,6 @@ void audit(const MeshPair&, const CollisionPair&, const CollisionData& data, con
            std::uint64_t frame, std::vector<AuditFailure>& out);
 
 /// The problem reduced to one of its pairs.
-CollisionProblem pairAlone(const CollisionProblem&, GeometryId a, GeometryId b);
+CollisionProblem reducedToPair(const CollisionProblem&, GeometryId a, GeometryId b);
 
 }  // namespace palpate

@@ -5,7 +5,7 @@
 namespace palpate {
 
 void detectPairByBruteForce(const PairRecord& record, ContactBuffers& contacts,
-                            ContactBuffers& overlaps) {
+                            ContactBuffers& intersections) {
   MeshPair meshes = record.meshes();
   findContactsByBruteForce(meshes, contacts);
   const auto countA = static_cast<std::uint32_t>(meshes.a.topology.triangles.size()),
@@ -14,12 +14,12 @@ void detectPairByBruteForce(const PairRecord& record, ContactBuffers& contacts,
     for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b)
       contacts.facts.startsIntersecting |= meshes.a.topology.isEnabled(a) &&
                                            meshes.b.topology.isEnabled(b) &&
-                                           intersect(meshes, true, {a, b}, overlaps);
-  if (!record.plan.overlaps ||
+                                           intersect(meshes, true, {a, b}, intersections);
+  if (!record.plan.runsIntersection ||
       !(contacts.facts.startsIntersecting || record.plan.startsIntersecting))
     return;
   meshes.settings.method = Method::Intersection;
-  findContactsByBruteForce(meshes, overlaps);
+  findContactsByBruteForce(meshes, intersections);
 }
 
 }  // namespace palpate

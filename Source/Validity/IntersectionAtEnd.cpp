@@ -1,4 +1,4 @@
-#include "Validity/EndOfStep.h"
+#include "Validity/IntersectionAtEnd.h"
 
 #include "NarrowPhase/StepCheck.h"
 
@@ -14,8 +14,8 @@ constexpr std::size_t kFreeChecks = 32, kChecksTogether = 16;
 
 }  // namespace
 
-EndOfStep checkEnd(const MeshPair& pair, const CollisionData::Contents& contacts,
-                   ContactBuffers& counts) {
+IntersectionAtEnd checkEnd(const MeshPair& pair, const CollisionData::Contents& contacts,
+                           ContactBuffers& counts) {
   using Ids = std::span<const std::uint32_t>;
   const MeshTopology &ofA = pair.a.topology, &ofB = pair.b.topology;
   const double rounding = pair.step.motionWithRounding - pair.step.motion;
@@ -23,7 +23,7 @@ EndOfStep checkEnd(const MeshPair& pair, const CollisionData::Contents& contacts
   forEachTimed(contacts, [&](const auto& list) { left += list.size(); });
   Buffer<ElementPair>& some = counts.part;
   some.clear();
-  EndOfStep end;
+  IntersectionAtEnd end;
   const auto check = [&] {
     end.isKnown = some.size() <= left;
     if (!end.isKnown) return;

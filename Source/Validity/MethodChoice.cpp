@@ -6,7 +6,7 @@
 
 namespace palpate {
 
-bool knowsSides(const GeometryInStep& a, const GeometryInStep& b) {
+bool haveTriangles(const GeometryInStep& a, const GeometryInStep& b) {
   return a.mesh.topology.hasFaces() && b.mesh.topology.hasFaces();
 }
 
@@ -39,7 +39,7 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
     plan.motion = largestMotion(a.range, b.range);
     plan.arcDeviation = a.arcDeviation + b.arcDeviation;
   }
-  if (!knowsSides(a, b)) {
+  if (!haveTriangles(a, b)) {
     if (settings.method == Method::Auto) chooseMethod(settings, a, b, plan);
     return plan;
   }
@@ -68,7 +68,8 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
       step.extraThickness = std::min(plan.motion, plan.motionTolerance) *
                             (1.0 + kMotionSlack * settings.timeTolerance);
   } else if (settings.method == Method::Intersection) {
-    plan.nearby = plan.motion <= std::min(a.smallestHeight, b.smallestHeight) ? plan.motion : 0.0;
+    plan.searchDistance =
+        plan.motion <= std::min(a.smallestHeight, b.smallestHeight) ? plan.motion : 0.0;
   } else if (settings.method == Method::Proximity && plan.motion > thickness) {
     step.motion = 0.0;  // the result cannot be trusted, so the step need not be examined
   }
