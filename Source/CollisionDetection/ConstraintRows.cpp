@@ -28,7 +28,7 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
   const auto require = [&](const SolverVertices& side, std::uint32_t vertex) {
     if (vertex < side.before.size() && vertex < side.now.size()) return;
     throw Error(ErrorCode::WrongPositionCount,
-                "appendRows(): a contact has vertex " + std::to_string(vertex) + " of " +
+                "appendRows(): a contact refers to vertex " + std::to_string(vertex) + " of " +
                     (&side == &a ? "a" : "b") + ", which has " +
                     std::to_string(side.before.size()) + " positions before and " +
                     std::to_string(side.now.size()) + " now",

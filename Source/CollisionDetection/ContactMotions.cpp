@@ -29,9 +29,9 @@ VertexMotion motionOf(const ContactSide& side, const char* name, std::uint32_t v
   const auto& [first, before, now] = side.vertices;
   if (vertex >= before.size() || vertex >= now.size())
     throw Error(ErrorCode::WrongPositionCount,
-                "appendMotions(): a contact has vertex " + std::to_string(vertex) + " of " + name +
-                    ", which has " + std::to_string(before.size()) + " positions before and " +
-                    std::to_string(now.size()) + " now",
+                "appendMotions(): a contact refers to vertex " + std::to_string(vertex) + " of " +
+                    name + ", which has " + std::to_string(before.size()) +
+                    " positions before and " + std::to_string(now.size()) + " now",
                 {}, vertex);
   const std::span<const double> radii = side.radii;
   return {(1 - time) * before[vertex] + time * now[vertex], now[vertex] - before[vertex],
@@ -41,10 +41,10 @@ VertexMotion motionOf(const ContactSide& side, const char* name, std::uint32_t v
 void checkRadiusCount(const ContactSide& side, const char* name) {
   const std::size_t count = side.radii.size();
   if (count > 1 && count != side.vertices.now.size())
-    throw Error(ErrorCode::InvalidRadius, "appendMotions(): " + std::string(name) + " has " +
-                                              std::to_string(count) + " radii and " +
-                                              std::to_string(side.vertices.now.size()) +
-                                              " positions; one radius, or one for each is needed");
+    throw Error(ErrorCode::InvalidRadius,
+                "appendMotions(): " + std::string(name) + " has " + std::to_string(count) +
+                    " radii and " + std::to_string(side.vertices.now.size()) +
+                    " positions; it must have none, one, or one for each position");
 }
 
 /// Solves matrix x = right.

@@ -35,7 +35,7 @@ double smallestHeight(const TriangleMesh& mesh) {
 
 GeometryId GeometryTable::nextId() const {
   if (m_nextId == 0xffffffffu)
-    throw Error(ErrorCode::TooLarge, "no geometry ids are left: 2^32 - 1 were given out");
+    throw Error(ErrorCode::TooLarge, "no geometry id is left: 2^32 - 1 geometries were added");
   return GeometryId{m_nextId};
 }
 
@@ -209,7 +209,11 @@ void GeometryTable::setTopology(Geometry& geometry, std::vector<Eigen::Vector3d>
 void GeometryTable::setFilter(GeometryId id, const CollisionFilter& filter) {
   Geometry& geometry = at(id);
   if (filter.sidedness != Sidedness::Both && filter.sidedness != Sidedness::Outer)
-    throw Error(ErrorCode::InvalidSettings, nameOf(id) + ": sidedness must be Both or Outer", id);
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(id) + ": sidedness is " +
+                    std::to_string(static_cast<int>(filter.sidedness)) +
+                    "; it must be Both or Outer",
+                id);
   if (filter.sidedness == Sidedness::Outer && !geometry.mesh.topology.hasFaces())
     throw Error(ErrorCode::InvalidSettings,
                 nameOf(id) + " is " + nameOf(geometry.mesh.topology.type) + ", which has no sides",
@@ -226,7 +230,8 @@ void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> el
     if (element >= topology.triangles.size())
       throw Error(ErrorCode::IndexOutOfRange,
                   nameOf(id) + ": element " + std::to_string(element) +
-                      " is out of range; it has " + std::to_string(topology.triangles.size()),
+                      " is out of range; the geometry has " +
+                      std::to_string(topology.triangles.size()) + " elements",
                   id, element);
   topology.disable(elements);
   geometry.revisions.enabled = geometry.revisions.counter.next();

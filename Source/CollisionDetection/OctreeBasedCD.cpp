@@ -40,8 +40,10 @@ Eigen::AlignedBox3d boundsOf(const Geometry& geometry) {
 
 void checkCandidates(const PairRecord& record) {
   if (record.hasShape())
-    throw Error(ErrorCode::NotAvailable, "a pair with a shape has no candidate pairs",
-                record.pair.a);
+    throw Error(
+        ErrorCode::NotAvailable,
+        nameOf(record.pair.a, record.pair.b) + " includes a shape and has no candidate pairs",
+        record.pair.a);
 }
 
 struct OctreeBasedCD::Implementation {
@@ -231,7 +233,7 @@ namespace {
 
 [[noreturn]] void throwBusy() {
   throw Error(ErrorCode::InvalidCall,
-              "a predicate or callback may not call the OctreeBasedCD that calls it");
+              "a predicate or callback must not call the OctreeBasedCD that calls it");
 }
 
 }  // namespace
@@ -407,7 +409,7 @@ void OctreeBasedCD::setTetrahedra(GeometryId geometry, std::span<const Eigen::Ve
 
 TetrahedralSurface OctreeBasedCD::surface(GeometryId geometry) const {
   const Geometry& solid = read().geometries.at(geometry);
-  checkMeshType(solid, true, "surface() is of tetrahedral meshes");
+  checkMeshType(solid, true, "surface() is for tetrahedral meshes");
   return {solid.solid->topology.surface, solid.solid->topology.surfaceOwner};
 }
 
@@ -518,7 +520,7 @@ const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) co
   const PairRecord& record = all.pairs.inOrder(all.geometries, a, b);
   if (!record.hasData)
     throw Error(ErrorCode::NotAvailable,
-                nameOf(a, b) + " has no answer yet: call detectCollision()", a);
+                nameOf(a, b) + " has no results yet: call detectCollision() first", a);
   return record.data;
 }
 
@@ -529,8 +531,9 @@ std::span<const ElementPair> OctreeBasedCD::candidatePairs(GeometryId a, Geometr
   checkCandidates(record);
   if (!record.candidatesVersion.isValid())
     throw Error(ErrorCode::NotAvailable,
-                "candidates were not kept: call collectCandidates(), or set "
-                "Settings::keepCandidates before detectCollision()",
+                nameOf(a, b) +
+                    " has no candidates: call collectCandidates(), or set "
+                    "Settings::keepCandidates before detectCollision()",
                 a);
   const std::lock_guard lock(all.sorting);
   if (!record.candidatesSorted)

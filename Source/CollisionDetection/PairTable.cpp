@@ -77,7 +77,7 @@ class Check {
     need(m_method != Method::Proximity || proximity,
          "Method::Proximity needs a positive thickness; it is 0");
     need(m_method != Method::Auto || proximity || hasContinuous(a.inStep(), b.inStep()),
-         "Method::Auto needs a positive thickness for these radii; it is 0");
+         "Method::Auto needs a positive thickness if radii differ between vertices; it is 0");
   }
 
  private:
@@ -108,10 +108,11 @@ class Check {
     need(!earliestTimeOnly || method == Method::Continuous,
          "earliestTimeOnly is for Method::Continuous only");
     need(method >= Method::Auto && method <= Method::Continuous,
-         "no such method: " + std::to_string(static_cast<int>(method)));
+         "method is " + std::to_string(static_cast<int>(method)) +
+             "; it must be Auto, Intersection, Proximity or Continuous");
     need(method == Method::Auto || motionTolerance < 0.0,
-         "motionTolerance is " + textOf(motionTolerance) + "; Method::" + nameOf(method) +
-             " does not use it, only Method::Auto does: leave it negative");
+         "motionTolerance is " + textOf(motionTolerance) +
+             "; only Method::Auto uses it, so it must be negative for Method::" + nameOf(method));
   }
 
   void types(const Geometry& a, const Geometry& b) {
@@ -122,18 +123,18 @@ class Check {
     const bool continuous = m_method == Method::Continuous, self = &a == &b,
                meshes = ofA.hasFaces() && ofB.hasFaces();
     support(!self || a.shape || !a.isPlaced(), kRigidWithItself);
-    support(!self || !a.shape, "a shape does not meet itself");
-    support(!isPlane(a) || !isPlane(b), "two planes have no distance");
+    support(!self || !a.shape, "a shape cannot be tested against itself");
+    support(!isPlane(a) || !isPlane(b), "a pair of two planes is not supported");
     if (a.shape && b.shape && a.shape->now.needsMinkowskiDifference(b.shape->now)) {
       const double p = a.shape->now.size(), q = b.shape->now.size();
       support(std::max(p, q) <= kMaxSizeRatio * std::min(p, q),
-              "the shapes are " + textOf(p) + " and " + textOf(q) +
-                  " large; beyond a ratio of 2^40 their distance is lost in rounding");
+              "the sizes of the shapes are " + textOf(p) + " and " + textOf(q) +
+                  "; their ratio must be at most 2^40");
     }
     const bool any = m_method == Method::Auto || m_method == Method::Proximity;
     support(meshes || continuous || any,
             "Method::Intersection is for two triangle meshes, not for " + nameOf(ofA.type) +
-                " and " + nameOf(ofB.type) + "; Auto, Proximity and Continuous are");
+                " and " + nameOf(ofB.type) + "; use Auto, Proximity or Continuous");
     support(!continuous || hasContinuous(a.inStep(), b.inStep()),
             "Method::Continuous needs one radius for all vertices; Proximity and Auto do not");
   }
@@ -217,7 +218,9 @@ void PairTable::setPredicate(const GeometryTable& geometries, GeometryId a, Geom
   PairRecord& record = inOrder(geometries, a, b);
   if (predicate && record.hasShape())
     throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(a, b) + ": a shape has no features to ask about", a);
+                nameOf(a, b) +
+                    ": contact predicates are for pairs of meshes, and one of the two is a shape",
+                a);
   record.predicate = std::move(predicate);
   record.settingsRevision = m_revisions.next();
 }

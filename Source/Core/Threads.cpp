@@ -135,7 +135,8 @@ class Workers {
       // lock, and may have taken indices.
       if (loop.joined > 0)
         throw Error(ErrorCode::NotAvailable,
-                    "fork() was called while threads were at work; the child cannot end the work");
+                    "a task called fork() while other threads ran tasks of the same loop; the "
+                    "child process cannot finish the loop");
       return;
     }
     {

@@ -344,8 +344,8 @@ void auditFrame(const Settings& settings, const GeometryTable& geometries, const
       record.files += !own.front().file.empty();
     } else {
       for (AuditFailure& failure : own)
-        failure.fileError =
-            "audit.maxFiles were written into \"" + settings.audit.folder.string() + "\" before";
+        failure.fileError = "audit.maxFiles files were already written into \"" +
+                            settings.audit.folder.string() + "\"";
     }
   }
 }

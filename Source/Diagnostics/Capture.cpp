@@ -76,7 +76,7 @@ class Reader {
     const std::size_t begin = std::min(m_rest.find_first_not_of(kSpaces), m_rest.size());
     m_line += std::count(m_rest.begin(), m_rest.begin() + static_cast<std::ptrdiff_t>(begin), '\n');
     m_rest.remove_prefix(begin);
-    if (m_rest.empty()) fail("it is cut off");
+    if (m_rest.empty()) fail("the file is truncated");
     const std::size_t size = std::min(m_rest.find_first_of(kSpaces), m_rest.size());
     const std::string_view found = m_rest.substr(0, size);
     m_rest.remove_prefix(size);
@@ -84,13 +84,13 @@ class Reader {
   }
   void expect(std::string_view text) {
     if (const std::string_view found = word(); found != text)
-      fail(quoted(found) + " where " + quoted(text) + " should be");
+      fail("found " + quoted(found) + ", expected " + quoted(text));
   }
   template <class Enumerator, std::size_t size>
   void word(Enumerator& value, const std::array<std::string_view, size>& names) {
     const std::string_view found = word();
     const auto place = std::find(names.begin(), names.end(), found);
-    if (place == names.end()) fail(quoted(found) + " is not a name known here");
+    if (place == names.end()) fail(quoted(found) + " is not a known name");
     value = static_cast<Enumerator>(place - names.begin());
   }
   template <class Integer>
@@ -110,11 +110,12 @@ class Reader {
   /// Reads the number of items that follow. Refuses more than the file has characters left.
   void count(std::size_t& value) {
     integer(value);
-    if (value > m_rest.size()) fail("it is cut off: too few lines for " + std::to_string(value));
+    if (value > m_rest.size())
+      fail("the file is truncated: too few lines for " + std::to_string(value));
   }
   void endLine() {}
   void expectEnd() {
-    if (m_rest.find_first_not_of(" \t\r\n") != m_rest.npos) fail("more follows after its end");
+    if (m_rest.find_first_not_of(" \t\r\n") != m_rest.npos) fail("there is text after the end");
   }
   std::string_view rest() const { return m_rest; }
   [[noreturn]] void fail(const std::string& reason) const {
@@ -374,7 +375,7 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
   int version = 0;
   file.integer(version);
   if (version < 1 || version > kVersion)
-    file.failWhole("it is of version " + std::to_string(version) + "; versions up to " +
+    file.failWhole("its version is " + std::to_string(version) + "; versions up to " +
                    std::to_string(kVersion) + " can be read");
   CollisionProblem problem;
   problemLines(file, problem, version);

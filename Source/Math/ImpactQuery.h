@@ -12,7 +12,7 @@ namespace palpate {
 /// Two moving features that may touch: their kind, and the positions of their four vertices before
 /// and after the step.
 ///
-/// Both kinds are one problem. With A, B, C moving linearly,
+/// Both kinds of feature pair lead to one problem. With A, B, C moving linearly,
 // clang-format off
 ///   VertexTriangle  (v, a, b, c):      A = b - a,    B = c - a,    C = v - a,    x, y >= 0, x + y <= 1
 ///   EdgeEdge        (p0, p1, q0, q1):  A = p1 - p0,  B = q0 - q1,  C = q0 - p0,  0 <= x, y <= 1

@@ -212,7 +212,7 @@ std::uint32_t Layout::addLeaf(std::uint32_t begin, std::uint32_t end, OctreeNode
   return OctreeBlock::kLeaf | (end - begin);
 }
 
-/// Makes room for the groups of a block's eight slots and one more.
+/// Reserves space for the groups of a block's eight slots and one more.
 void Layout::reserveGroups() {
   if (m_groupCount + 9 <= groups.size()) return;
   groups.reserve(groups.size() + groups.size() / 8 + 16);

@@ -163,7 +163,7 @@ void checkInside(SearchableGeometry& body, const InsideSettings& settings) {
   if (!(settings.margin >= 0.0 && settings.margin < 0.5))
     throw Error(ErrorCode::InvalidSettings,
                 nameOf(body.id) + ": margin is " + textOf(settings.margin) +
-                    "; it must be from 0 to below 1/2",
+                    "; it must be at least 0 and below 0.5",
                 body.id);
   MeshTopology& topology = body.mesh.topology;
   if (!topology.hasFaces())
@@ -177,14 +177,14 @@ void checkInside(SearchableGeometry& body, const InsideSettings& settings) {
   const MeshDefects defects = findMeshDefects(topology.triangles);
   const auto describe = [](const std::vector<Segment>& edges, const char* what) {
     if (edges.empty()) return std::string();
-    return ", " + std::to_string(edges.size()) + " edges " + what + ", the first of vertices " +
-           std::to_string(edges[0][0]) + " and " + std::to_string(edges[0][1]);
+    return "; " + std::to_string(edges.size()) + " edges " + what + ", the first is (" +
+           std::to_string(edges[0][0]) + ", " + std::to_string(edges[0][1]) + ")";
   };
   throw Error(ErrorCode::NotClosed,
               nameOf(body.id) + " has no inside: it is not closed and consistently oriented" +
-                  describe(defects.open, "have one triangle only") +
-                  describe(defects.flipped, "are run through twice in one direction") +
-                  describe(defects.shared, "have three triangles or more"),
+                  describe(defects.open, "belong to one triangle only") +
+                  describe(defects.flipped, "have the same direction in both of their triangles") +
+                  describe(defects.shared, "belong to three triangles or more"),
               body.id);
 }
 

@@ -61,22 +61,25 @@ void SpatialQueries::Source::prepareTetrahedra(SearchableGeometry& solid) {
 
 void checkVertices(const SearchableGeometry& vertices, GeometryId body) {
   if (vertices.id == body)
-    throw Error(ErrorCode::InvalidSettings, nameOf(body) + ": its own vertices lie on it", body);
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(body) + " is both the body and the owner of the vertices; these must differ",
+                body);
   if (vertices.shape)
     throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(vertices.id) + " is a shape: it has no vertices", vertices.id);
+                nameOf(vertices.id) + " is a shape, which has no vertices", vertices.id);
 }
 
 SpatialQueries::SpatialQueries(std::shared_ptr<Source> source)
     : m_source(std::move(source)), m_state(m_source->state()) {}
 
 SpatialQueries::Source& SpatialQueries::valid() const {
-  if (!m_source) throw Error(ErrorCode::InvalidCall, "these SpatialQueries were moved from");
+  if (!m_source) throw Error(ErrorCode::InvalidCall, "this SpatialQueries object was moved from");
   if (m_state == 0 || m_source->state() != m_state)
-    throw Error(ErrorCode::InvalidCall,
-                "these SpatialQueries are of an earlier state: positions, transforms, topology or "
-                "geometries changed, advance() was called, or their OctreeBasedCD is gone; call "
-                "queries() again");
+    throw Error(
+        ErrorCode::InvalidCall,
+        "this SpatialQueries object is outdated: positions, transforms, topology or geometries "
+        "changed, advance() was called, or the OctreeBasedCD was destroyed; call "
+        "queries() again");
   return *m_source;
 }
 
@@ -115,7 +118,7 @@ std::optional<TetrahedronPoint> SpatialQueries::findTetrahedron(
   checkMeshType(solid, true, "findTetrahedron() is for tetrahedral meshes");
   if (!point.allFinite())
     throw Error(ErrorCode::NonFinitePosition,
-                nameOf(body) + ": a point to be found is " + textOf(point), body);
+                nameOf(body) + ": the point is " + textOf(point) + "; it must be finite", body);
   source.prepareTetrahedra(solid);
   const Source::Loan scratch(source);
   return SolidQuery(solid, source.engine(), scratch->stack).lowest(point);

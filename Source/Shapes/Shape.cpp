@@ -365,12 +365,12 @@ std::string faultOf(const AnalyticalGeometry& geometry, std::optional<std::size_
   forEachField(geometry, [&](const std::string& name, const auto& field) {
     using Field = std::decay_t<decltype(field)>;
     if constexpr (std::is_same_v<Field, std::vector<Vector3d>>) {
-      if (field.empty()) fault = "a hull needs at least one point";
+      if (field.empty()) fault = "the hull has no points; it needs at least one";
       for (std::size_t i = field.size(); i-- > 0;)
         if (const bool finite = field[i].allFinite(); !finite || isBeyond(field[i]))
           report("point " + std::to_string(i), field[i], finite ? kWithin : "finite"), element = i;
       if (field.size() > kMostHullPoints)
-        fault = "a hull of " + std::to_string(field.size()) + " points; a hull takes at most " +
+        fault = "the hull has " + std::to_string(field.size()) + " points; it must have at most " +
                 std::to_string(kMostHullPoints);
     } else if constexpr (!std::is_same_v<Field, bool>) {
       Vector3d values;
@@ -379,12 +379,12 @@ std::string faultOf(const AnalyticalGeometry& geometry, std::optional<std::size_
       if (!values.allFinite() || (isSize && !(values.minCoeff() >= 0)))
         report(name, field, isSize ? "finite and not negative" : "finite");
       else if (name == "normal" ? values == Vector3d::Zero() : isBeyond(values))
-        report(name, field, name == "normal" ? "of some length" : kWithin);
+        report(name, field, name == "normal" ? "longer than zero" : kWithin);
     }
   });
   const auto* cylinder = std::get_if<Cylinder>(&geometry);
   if (fault.empty() && cylinder && cylinder->p0 == cylinder->p1)
-    report("p1", cylinder->p1, "another point than p0");
+    report("p1", cylinder->p1, "different from p0");
   return fault;
 }
 
@@ -392,8 +392,8 @@ std::string faultOf(const RigidTransform& transform) {
   const Eigen::Matrix3d& r = transform.rotation;
   const double off = (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!r.allFinite() || !(off <= kOrthonormal) || !(r.determinant() > 0))
-    return "rotation is not a rotation: its columns' products are off by " + textOf(off) +
-           ", its determinant is " + textOf(r.determinant());
+    return "rotation is not a rotation matrix: R^T R differs from the identity by " + textOf(off) +
+           ", and its determinant is " + textOf(r.determinant());
   if (transform.translation.allFinite()) return {};
   return "translation is " + textOf(transform.translation) + "; it must be finite";
 }

@@ -34,7 +34,7 @@ struct PairPlan {
   /// depends on whether anything was near.
   double searchDistance = 0;
   StepPlan step;
-  bool runsIntersection = false;    ///< Auto: Intersection runs, too, unless the step starts apart
+  bool runsIntersection = false;    ///< Auto: Intersection runs, too, if the start intersects
   bool startsIntersecting = false;  ///< triangles are known to intersect at the step's start
   /// Whether the boxes enclose the motion over the whole step.
   bool swept() const { return method == Method::Continuous || method == Method::Auto; }

@@ -39,8 +39,8 @@ std::string fromBase64(std::string_view text) {
 /// The text from an element's first tag to its last.
 std::string_view elementIn(std::string_view text, const std::string& name) {
   const std::size_t begin = text.find("<" + name), end = text.find("</" + name);
-  if (begin == text.npos) throw FileFault{"it holds no " + name};
-  if (end == text.npos || end < begin) throw FileFault{"it ends too early"};
+  if (begin == text.npos) throw FileFault{"it has no element " + name};
+  if (end == text.npos || end < begin) throw FileFault{"it is truncated"};
   return text.substr(begin, end - begin);
 }
 
@@ -59,7 +59,7 @@ vtkSmartPointer<vtkDataCompressor> compressorNamed(std::string_view name) {
   if (name == "vtkZLibDataCompressor") compressor = vtkSmartPointer<vtkZLibDataCompressor>::New();
   if (name == "vtkLZ4DataCompressor") compressor = vtkSmartPointer<vtkLZ4DataCompressor>::New();
   if (name == "vtkLZMADataCompressor") compressor = vtkSmartPointer<vtkLZMADataCompressor>::New();
-  if (compressor == nullptr) throw FileFault{"it is compressed in an unknown way"};
+  if (compressor == nullptr) throw FileFault{"its compressor is unknown"};
   compressor->AddObserver(vtkCommand::ErrorEvent, vtkNew<vtkCallbackCommand>());  // prints nothing
   return compressor;
 }
@@ -115,7 +115,7 @@ class Reader {
     std::string_view array = elementIn(piece, group);
     do {
       array = array.substr(std::min(array.find("<DataArray", 1), array.size()));
-      if (array.empty()) throw FileFault{"it lacks an array of its " + group};
+      if (array.empty()) throw FileFault{"its element " + group + " lacks an array"};
     } while (!name.empty() && attributeOf(array, "Name") != name);
 
     const NumberType type = typeNamed(attributeOf(array, "type"));
