@@ -24,7 +24,7 @@ double ConstraintRow::gap(std::span<const Eigen::Vector3d> positions) const {
 void appendRows(const CollisionData& contacts, const SolverVertices& a, const SolverVertices& b,
                 std::vector<ConstraintRow>& rows) {
   const StandardFloatingPoint standard;
-  const std::size_t given = rows.size();
+  const std::size_t initialSize = rows.size();
   const auto require = [&](const SolverVertices& side, std::uint32_t vertex) {
     if (vertex < side.before.size() && vertex < side.now.size()) return;
     throw Error(ErrorCode::WrongPositionCount,
@@ -63,7 +63,7 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
                       contact.normal.dot(contact.point) - contact.distance});
     }
   } catch (...) {
-    rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(given), rows.end());
+    rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(initialSize), rows.end());
     throw;
   }
 }

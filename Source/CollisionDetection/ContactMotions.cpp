@@ -80,7 +80,7 @@ void appendMotions(const CollisionData& contacts, const ContactSide& a, const Co
                    std::vector<ContactMotion>& motions) {
   const StandardFloatingPoint standard;
   const auto nameOf = [&](const ContactSide& side) { return &side == &a ? "a" : "b"; };
-  const std::size_t given = motions.size();
+  const std::size_t initialSize = motions.size();
 
   // firstCount: how many of the stencil's vertices are on the side that the normal points to.
   const auto add = [&](const auto& contact, const ContactSide& first, const ContactSide& second,
@@ -119,7 +119,7 @@ void appendMotions(const CollisionData& contacts, const ContactSide& a, const Co
                          displacementAt(a.shape, contact.pointA, contact.timeOfImpact) -
                              displacementAt(b.shape, contact.pointB, contact.timeOfImpact)});
   } catch (...) {
-    motions.erase(motions.begin() + static_cast<std::ptrdiff_t>(given), motions.end());
+    motions.erase(motions.begin() + static_cast<std::ptrdiff_t>(initialSize), motions.end());
     throw;
   }
 }

@@ -85,8 +85,8 @@ std::size_t sizeOf(const CollisionData::Contents& contents) {
   return size;
 }
 
-/// ofIntersection: the number of contacts that Method::Intersection found at the step's end.
-void countContacts(const PairPlan& plan, std::size_t ofIntersection,
+/// intersectionCount: the number of contacts that Method::Intersection found at the step's end.
+void countContacts(const PairPlan& plan, std::size_t intersectionCount,
                    CollisionData::Contents& contents) {
   std::size_t atImpact = 0;
   if (plan.step.reportsImpacts) {
@@ -94,7 +94,7 @@ void countContacts(const PairPlan& plan, std::size_t ofIntersection,
       for (const auto& contact : contacts) atImpact += contact.timeOfImpact < 1.0;
     });
   } else if (plan.method == Method::Continuous) {
-    atImpact = sizeOf(contents) - ofIntersection;
+    atImpact = sizeOf(contents) - intersectionCount;
   }
   contents.validity.atImpact = atImpact;
   contents.validity.atEnd = sizeOf(contents) - contents.validity.atImpact;
@@ -457,15 +457,16 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
     m_buffers.push_back(&m_impacts);
   }
   m_facts.startsIntersecting |= record.plan.startsIntersecting;
-  std::size_t ofIntersection = 0;
+  std::size_t preferredBuffers = 0;
   if (m_facts.startsIntersecting && record.plan.runsIntersection) {
-    ofIntersection = m_intersections.size();
+    preferredBuffers = m_intersections.size();
     m_buffers.insert(m_buffers.begin(), m_intersections.begin(), m_intersections.end());
   }
   // A feature pair that Intersection reports is not reported by distance or impact as well: where
   // the step starts intersecting only Intersection knows the side.
   CollisionData::Contents& contents = record.next.contents();
-  ofIntersection = orderContacts(m_buffers, ofIntersection, m_orderScratch, contents);
+  const std::size_t intersectionCount =
+      orderContacts(m_buffers, preferredBuffers, m_orderScratch, contents);
   contents.earliestTimeOfImpact = record.earliest.load();
   if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
   record.trust.finish(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan,
@@ -479,7 +480,7 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
         record.a == record.b,
         record.plan.step.reportsImpacts ? 1.0 : std::numeric_limits<double>::infinity(),
         m_orderScratch, contents);
-  countContacts(record.plan, ofIntersection, contents);
+  countContacts(record.plan, intersectionCount, contents);
   record.candidatesSorted = candidatesSorted;
   if (settings.keepCandidates) record.candidatesVersion.commit(record.state());
 }

@@ -62,13 +62,13 @@ void GeometryMotion::update(const Geometry& geometry) {
     m_arcDeviation = m_search.arcDeviation(geometry);
     m_arcVersion.commit(step);
   }
-  const std::array<Revision, 4> given = ends(geometry.step.detected(), mesh.before);
-  if (!m_correctionVersion.isCurrent(given)) {
+  const std::array<Revision, 4> correctionEnds = ends(geometry.step.detected(), mesh.before);
+  if (!m_correctionVersion.isCurrent(correctionEnds)) {
     m_correctionVersion.invalidate();
     m_correction = geometry.step.detected().isSameAs(mesh.before)
                        ? MotionRange{}
                        : motionRange(geometry.step.detected(), mesh.before);
-    m_correctionVersion.commit(given);
+    m_correctionVersion.commit(correctionEnds);
   }
 }
 

@@ -62,7 +62,7 @@ struct OctreeBasedCD::Implementation {
   FrameStatistics updates;     ///< of the updates since the last frame
   bool hasUpdates = false;
   std::optional<LooseOctree> octree;
-  std::vector<PairRecord*> work;
+  std::vector<PairRecord*> selectedPairs;
   AuditRecord audit;
   std::shared_ptr<QuerySource> querySource;
   /// geometries.state() for which all octrees hold; 0: for none.
@@ -159,12 +159,12 @@ struct OctreeBasedCD::Implementation {
   /// Pairs whose result is outdated. Pairs that do not collide are not among them: their result is
   /// empty.
   std::span<PairRecord* const> outdatedPairs(PairRecord::Derived PairRecord::*version) {
-    work.clear();
+    selectedPairs.clear();
     for (const auto& record : pairs.records())
       if (record->collides() && !((*record).*version).isCurrent(record->state()))
-        work.push_back(record.get());
-    for (PairRecord* record : work) record->candidatesVersion.invalidate();
-    return work;
+        selectedPairs.push_back(record.get());
+    for (PairRecord* record : selectedPairs) record->candidatesVersion.invalidate();
+    return selectedPairs;
   }
 
   /// Returns `singleThread` if one thread has refitted the octrees and few candidates are expected:
@@ -489,20 +489,20 @@ void OctreeBasedCD::detectCollision() {
 void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFunction function,
                                           void* context) {
   const Implementation::ChangeGuard all(m_implementation);
-  std::vector<PairRecord*>& work = all->work;
-  work.clear();
+  std::vector<PairRecord*>& selectedPairs = all->selectedPairs;
+  selectedPairs.clear();
   if (only) {
-    work.push_back(&all->pairs.at(all->geometries, only->a, only->b));
-    checkCandidates(*work.front());
+    selectedPairs.push_back(&all->pairs.at(all->geometries, only->a, only->b));
+    checkCandidates(*selectedPairs.front());
   } else {
-    for (const auto& record : all->pairs.records()) work.push_back(record.get());
+    for (const auto& record : all->pairs.records()) selectedPairs.push_back(record.get());
   }
   all->update();
-  std::erase_if(work, [](const PairRecord* record) { return !record->collides(); });
+  std::erase_if(selectedPairs, [](const PairRecord* record) { return !record->collides(); });
   if (all->settings.engine == Engine::Octree)
-    return all->frame.forEach(work, all->threadsFor(work), function, context);
+    return all->frame.forEach(selectedPairs, all->threadsFor(selectedPairs), function, context);
   Buffer<ElementPair> candidates;
-  for (const PairRecord* record : work) {
+  for (const PairRecord* record : selectedPairs) {
     findCandidatesByBruteForce(record->meshes(), candidates);
     if (!candidates.empty()) function(context, record->pair, candidates);
   }

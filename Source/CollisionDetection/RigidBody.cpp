@@ -60,7 +60,7 @@ class RigidSearch::Step {
       if (other > best) best = other, vertex = v;
     };
     const double unit = 1.0 / m_geometry.tree.frame().scale;
-    const auto mayHaveMore = [&](const FloatBox& box) {
+    const auto mayExceed = [&](const FloatBox& box) {
       if (box.empty()) return false;
       if (box.mayBeClamped()) return true;
       Vector3d lower, upper;
@@ -72,10 +72,10 @@ class RigidSearch::Step {
     };
     const GeometryOctree& tree = m_geometry.tree;
     if (tree.encloses(m_geometry.mesh, m_geometry.revisions.topology)) {
-      forEachOverlapping(tree.octree(), mayHaveMore, m_search.m_queries,
+      forEachOverlapping(tree.octree(), mayExceed, m_search.m_queries,
                          [&](std::uint32_t begin, std::uint32_t end) {
                            for (std::uint32_t i = begin; i < end; ++i)
-                             if (mayHaveMore(tree.octree().boxes()[i]))
+                             if (mayExceed(tree.octree().boxes()[i]))
                                for (const std::uint32_t v : tree.ordered()[i]) testOne(v);
                          });
     } else {

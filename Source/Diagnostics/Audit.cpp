@@ -67,28 +67,28 @@ class Coverage {
         m_sample(sample),
         m_byTriangles(meshes.settings.method == Method::Intersection) {}
 
-  bool ofVertexTriangle(const VertexTriangleContact& c) const {
+  bool coversVertexTriangle(const VertexTriangleContact& c) const {
     if (c.vertex >= m_meshes.a.topology.vertexCount) return true;  // there is no such vertex
     if (!m_byTriangles) return holds(m_sample.verticesOfA, c.vertex);
     return all(m_meshes.a.topology.vertexTriangles[c.vertex], [&](std::uint32_t s) {
-      return ofTriangles({s, c.triangle});
+      return coversTriangles({s, c.triangle});
     });
   }
-  bool ofTriangleVertex(const VertexTriangleContact& c) const {
+  bool coversTriangleVertex(const VertexTriangleContact& c) const {
     return m_byTriangles ? holds(m_sample.trianglesOfA, c.triangle)
                          : holds(m_sample.verticesOfB, c.vertex);
   }
-  bool ofEdges(const EdgeEdgeContact& c) const {
+  bool coversEdges(const EdgeEdgeContact& c) const {
     const MeshTopology &a = m_meshes.a.topology, &b = m_meshes.b.topology;
     const std::uint32_t edgeA = a.edgeOf(c.edgeA), edgeB = b.edgeOf(c.edgeB);
     if (edgeA == kNoEdge || edgeB == kNoEdge) return true;  // there are no such edges
     if (!m_byTriangles) return holds(m_sample.edgesOfA, edgeA);
     return all(a.edgeTriangles[edgeA], [&](std::uint32_t s) {
-      return all(b.edgeTriangles[edgeB], [&](std::uint32_t t) { return ofTriangles({s, t}); });
+      return all(b.edgeTriangles[edgeB], [&](std::uint32_t t) { return coversTriangles({s, t}); });
     });
   }
   /// Vertices and edges are covered by the element that owns them.
-  bool ofShape(const ShapeContact& c) const {
+  bool coversShape(const ShapeContact& c) const {
     const MeshTopology& mesh = m_meshes.mesh().topology;
     if (c.element == ShapeElement::Face) return holds(m_sample.trianglesOfA, c.id);
     const bool isVertex = c.element == ShapeElement::Vertex;
@@ -97,7 +97,7 @@ class Coverage {
     const auto owners = isVertex ? mesh.vertexTriangles[c.id] : mesh.edgeTriangles[edge];
     return owners.empty() || holds(m_sample.trianglesOfA, owners.front());
   }
-  bool ofTriangles(const ElementPair& pair) const {
+  bool coversTriangles(const ElementPair& pair) const {
     return holds(m_sample.trianglesOfA, m_meshes.self() ? std::min(pair.a, pair.b) : pair.a);
   }
 
@@ -257,7 +257,7 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
   // Auto replaces some of its contacts by those of other methods. Brute force for a sample does not
   // reproduce this, so that only missing contacts are reported.
   const bool isAuto = pair.settings.method == Method::Auto;
-  const auto into = [&](List list) {
+  const auto reporterFor = [&](List list) {
     return [=, &pair, &out](Fault fault, const Any& e, const Any& f) {
       if (isAuto && fault != Fault::FalseNegative) return;
       out.push_back({pair.a, pair.b, frame, fault, list, e, f, {}, {}});
@@ -267,25 +267,25 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
     return forEachTimed(expected, [&](const auto& all) {
       for (const auto& contact : all)
         if (contact.timeOfImpact < data.earliestTimeOfImpact())
-          into(List::Earliest)(Fault::FalseNegative, contact, {});
+          reporterFor(List::Earliest)(Fault::FalseNegative, contact, {});
     });
   }
   dropRepeatedImpacts(meshes, data, expected);
   const Coverage coverage(meshes, sample);
-  const auto differ = [&](const auto& truth, const auto& found, auto covers, List list) {
-    compare(truth, found, std::bind_front(covers, &coverage), into(list));
+  const auto compareList = [&](const auto& truth, const auto& found, auto covers, List list) {
+    compare(truth, found, std::bind_front(covers, &coverage), reporterFor(list));
   };
-  differ(expected.vertexTriangle, data.vertexTriangle(), &Coverage::ofVertexTriangle,
-         List::VertexTriangle);
-  differ(expected.triangleVertex, data.triangleVertex(), &Coverage::ofTriangleVertex,
-         List::TriangleVertex);
-  differ(expected.edgeEdge, data.edgeEdge(), &Coverage::ofEdges, List::EdgeEdge);
-  differ(expected.intersectingTriangles, data.intersectingTriangles(), &Coverage::ofTriangles,
-         List::IntersectingTriangles);
-  differ(expected.shape, data.shape(), &Coverage::ofShape, List::Shape);
+  compareList(expected.vertexTriangle, data.vertexTriangle(), &Coverage::coversVertexTriangle,
+              List::VertexTriangle);
+  compareList(expected.triangleVertex, data.triangleVertex(), &Coverage::coversTriangleVertex,
+              List::TriangleVertex);
+  compareList(expected.edgeEdge, data.edgeEdge(), &Coverage::coversEdges, List::EdgeEdge);
+  compareList(expected.intersectingTriangles, data.intersectingTriangles(),
+              &Coverage::coversTriangles, List::IntersectingTriangles);
+  compareList(expected.shape, data.shape(), &Coverage::coversShape, List::Shape);
   compare(
       expected.shapeShape, data.shapeShape(), [](const auto&) { return true; },
-      into(List::ShapeShape));
+      reporterFor(List::ShapeShape));
 }
 
 CollisionProblem reducedToPair(const CollisionProblem& whole, GeometryId idA, GeometryId idB) {

@@ -12,7 +12,7 @@ using Signs = std::array<int, 3>;
 
 constexpr int next(int i) { return i == 2 ? 0 : i + 1; }
 
-bool has(unsigned bits, int i) { return bits >> i & 1; }
+bool hasBit(unsigned bits, int i) { return bits >> i & 1; }
 
 bool strictlyOneSide(const Signs& s) { return s[0] != 0 && s[0] == s[1] && s[0] == s[2]; }
 bool anyZero(const Signs& s) { return s[0] == 0 || s[1] == 0 || s[2] == 0; }
@@ -47,14 +47,14 @@ struct ClassifiedTriangle {
   void classify(const Corners& other, SignCounts& counts) {
     const OrientedPlane plane(other[0], other[1], other[2]);
     for (int i = 0; i < 3; ++i)
-      if (!has(excluded, i)) sides[i] = plane.side(corners[i], counts);
+      if (!hasBit(excluded, i)) sides[i] = plane.side(corners[i], counts);
   }
   /// Whether all corners that are not shared are strictly on one side. The other triangle then has
   /// area, and at most the shared corners lie on its plane.
   bool isOnOneSide() const {
     int sum = 0, count = 0;
     for (int i = 0; i < 3; ++i) {
-      if (has(excluded, i)) continue;
+      if (hasBit(excluded, i)) continue;
       sum += sides[i];
       ++count;
     }
@@ -147,7 +147,7 @@ std::uint8_t cornersOn(const ClassifiedTriangle& a, const ClassifiedTriangle& tr
                        const ProjectionAxes& axes, SidesOfEdges& sidesOf) {
   std::uint8_t found = 0;
   for (int i = 0; i < 3; ++i) {
-    bool on = a.sides[i] == 0 && !has(a.excluded, i) && triangle.box.contains(a.corners[i]);
+    bool on = a.sides[i] == 0 && !hasBit(a.excluded, i) && triangle.box.contains(a.corners[i]);
     for (int axis = axes.first; on && axis <= axes.last; ++axis)
       on = !haveBothSigns({sidesOf(axis, 0, i), sidesOf(axis, 1, i), sidesOf(axis, 2, i)});
     found |= on << i;

@@ -233,11 +233,11 @@ HWY_ATTR void keepPossiblyIntersectingKernel(const PlacedTriangles& a, const Pla
   out.resize(pairs.size());
   PossibleIntersection* end = out.data();
   Batch batch;
-  ElementPair some[kSize];
+  ElementPair batchPairs[kSize];
   for (std::size_t begin = 0; begin < pairs.size(); begin += kSize) {
     const std::size_t size = std::min(kSize, pairs.size() - begin);
     for (std::size_t lane = 0; lane < size; ++lane) {
-      ElementPair& pair = some[lane] = pairs[begin + lane];
+      ElementPair& pair = batchPairs[lane] = pairs[begin + lane];
       if (self && pair.b < pair.a) std::swap(pair.a, pair.b);
       batch.set(lane, 0, a, pair.a, self);
       batch.set(lane, 1, b, pair.b, self);
@@ -246,7 +246,7 @@ HWY_ATTR void keepPossiblyIntersectingKernel(const PlacedTriangles& a, const Pla
       Lanes ofA, ofB;
       ofA.set(batch, first, 0, self);
       ofB.set(batch, first, 1, self);
-      keepLanes(ofA, ofB, some + first, std::min(hn::Lanes(d), size - first), end);
+      keepLanes(ofA, ofB, batchPairs + first, std::min(hn::Lanes(d), size - first), end);
     }
   }
   out.resize(static_cast<std::size_t>(end - out.data()));

@@ -111,12 +111,13 @@ void StepCheck::recordTriangle(std::uint32_t triangle, bool isOfB, const Vector3
 }
 
 void StepCheck::recordEdges(const Segment& p, const Segment& q) {
-  const auto note = [](const TriangleMesh& mesh, const Segment& edge, auto& list) {
+  const auto recordIfDegenerate = [](const TriangleMesh& mesh, const Segment& edge, auto& list) {
     if (mesh.now[edge[0]] == mesh.now[edge[1]])
       list.push_back(mesh.topology.edgeTriangles[mesh.topology.edgeOf(edge)].front());
   };
-  note(m_pair.a, p, m_out.facts.degenerateA);
-  note(m_pair.b, q, m_pair.self() ? m_out.facts.degenerateA : m_out.facts.degenerateB);
+  recordIfDegenerate(m_pair.a, p, m_out.facts.degenerateA);
+  recordIfDegenerate(m_pair.b, q,
+                     m_pair.self() ? m_out.facts.degenerateA : m_out.facts.degenerateB);
 }
 
 template void StepCheck::recordImpact(const Features<Kind::VertexTriangle>&, std::uint32_t,

@@ -247,9 +247,9 @@ class Walk {
     rows.first = first;
     rows.bits = 0;
     for (int k = 0; k < 3; ++k) {
-      const bool asTheyAre = placement == Placement::None;
-      rows.lower[k] = asTheyAre ? m_boxesA.lower[k].data() + first : rows.placed[0][k];
-      rows.upper[k] = asTheyAre ? m_boxesA.upper[k].data() + first : rows.placed[1][k];
+      const bool usesTreeBoxes = placement == Placement::None;
+      rows.lower[k] = usesTreeBoxes ? m_boxesA.lower[k].data() + first : rows.placed[0][k];
+      rows.upper[k] = usesTreeBoxes ? m_boxesA.upper[k].data() + first : rows.placed[1][k];
     }
     for (std::size_t lane = 0; lane < Rows::kMost && first + lane < end; lane += hn::Lanes(d)) {
       const std::size_t i = first + lane;

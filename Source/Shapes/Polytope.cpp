@@ -187,13 +187,14 @@ void Polytope::removeVisible() {
 /// from the point is connected, so either all of that region is removed, or both faces at an edge
 /// of the horizon were visible.
 struct Polytope::Conflicts {
-  std::vector<std::vector<std::uint32_t>> ofFace;  ///< per face: points from which it is visible
-  std::vector<std::uint32_t> visibleFace;  ///< per point: one of its faces; kNone: it is inside
+  /// Per face: points from which it is visible.
+  std::vector<std::vector<std::uint32_t>> pointsOfFace;
+  std::vector<std::uint32_t> visibleFace;  ///< per point: a visible face; kNone: it is inside
   std::vector<std::uint32_t> tested;       ///< per point: faces made before its last test
 
   explicit Conflicts(std::size_t points) : visibleFace(points, kNone), tested(points, 0) {}
   void add(std::uint32_t point, std::uint32_t face) {
-    ofFace[face].push_back(point);
+    pointsOfFace[face].push_back(point);
     visibleFace[point] = face;
   }
 };
@@ -205,7 +206,7 @@ void Polytope::addAll(std::span<const Vector3d> points) {
   }
   const auto count = static_cast<std::uint32_t>(points.size());
   Conflicts conflicts(count);
-  conflicts.ofFace.resize(m_faces.size());
+  conflicts.pointsOfFace.resize(m_faces.size());
   for (std::uint32_t f = 0; f < m_faces.size(); ++f) {
     const OrientedPlane plane(corner(f, 0), corner(f, 1), corner(f, 2));
     for (std::uint32_t i = 0; i < count; ++i)
@@ -227,15 +228,16 @@ void Polytope::addAll(std::span<const Vector3d> points) {
           m_isVisible[other] = 1, m_visible.push_back(other);
     addVisible(points[i]);
     for (const std::uint32_t f : m_visible)
-      for (const std::uint32_t point : conflicts.ofFace[f]) conflicts.visibleFace[point] = kNone;
-    conflicts.ofFace.resize(m_faces.size());
+      for (const std::uint32_t point : conflicts.pointsOfFace[f])
+        conflicts.visibleFace[point] = kNone;
+    conflicts.pointsOfFace.resize(m_faces.size());
     for (const auto& [face, removed] : m_newFaces) {
       const OrientedPlane plane(corner(face, 0), corner(face, 1), corner(face, 2));
       ++made;
       for (const std::uint32_t from : {removed, m_faces[face].neighbours[0]})
-        for (const std::uint32_t point : conflicts.ofFace[from]) test(point, plane, face);
+        for (const std::uint32_t point : conflicts.pointsOfFace[from]) test(point, plane, face);
     }
-    for (const std::uint32_t f : m_visible) conflicts.ofFace[f].clear();
+    for (const std::uint32_t f : m_visible) conflicts.pointsOfFace[f].clear();
     removeVisible();
   }
 }
@@ -265,19 +267,20 @@ std::uint32_t Polytope::addHorizonFaces(std::uint32_t face, std::uint32_t last) 
 std::vector<std::uint32_t> Polytope::compact() {
   Buffer<Face> faces;
   Buffer<Plane> planes;
-  std::vector<std::uint32_t> ofFace(m_faces.size(), kNone), ofPoint(m_points.size(), kNone);
+  std::vector<std::uint32_t> newFaceNumber(m_faces.size(), kNone),
+      newPointNumber(m_points.size(), kNone);
   std::vector<Vector3d> points;
   for (std::uint32_t f = 0; f < m_faces.size(); ++f) {
     if (m_planes[f].face == kNone) continue;
-    ofFace[f] = static_cast<std::uint32_t>(faces.size());
+    newFaceNumber[f] = static_cast<std::uint32_t>(faces.size());
     faces.push_back(m_faces[f]);
     planes.push_back(m_planes[f]);
-    planes.back().face = ofFace[f];
+    planes.back().face = newFaceNumber[f];
   }
   for (Face& face : faces)
     for (std::size_t i = 0; i < 3; ++i) {
-      face.neighbours[i] = ofFace[face.neighbours[i]];
-      std::uint32_t& place = ofPoint[face.corners[i]];
+      face.neighbours[i] = newFaceNumber[face.neighbours[i]];
+      std::uint32_t& place = newPointNumber[face.corners[i]];
       if (place == kNone) {
         place = static_cast<std::uint32_t>(points.size());
         points.push_back(m_points[face.corners[i]]);
@@ -287,7 +290,7 @@ std::vector<std::uint32_t> Polytope::compact() {
   m_faces.swap(faces);
   m_planes.swap(planes);
   m_points.swap(points);
-  return ofFace;
+  return newFaceNumber;
 }
 
 /// Reduces the hull with an apex beside the plane to a plate: its base, from both sides.
@@ -324,8 +327,8 @@ void Polytope::reduceToPlate(std::uint32_t apex) {
   }
   for (std::uint32_t f = 0; f < count; ++f)
     if (!isBase(f)) m_planes[f].face = kNone;
-  const std::vector<std::uint32_t> ofFace = compact();
-  for (Plane& plane : border) plane.face = ofFace[plane.face];
+  const std::vector<std::uint32_t> newFaceNumber = compact();
+  for (Plane& plane : border) plane.face = newFaceNumber[plane.face];
   m_planes.insert(m_planes.end(), border.begin(), border.end());
 }
 

@@ -292,15 +292,16 @@ std::optional<NearestToShape> Shape::nearestToAxis(const Vector3d& a, const Vect
                           onAxis ? directionFromAxis(-end.normal) : Vector3d(-end.normal),
                           distance - m_radius, true, end.exact};
   };
-  const auto isOver = [&](int i) { return ends[i].feature == TriangleFeature::Face; };
-  if (isOver(0) && isOver(1) && signedDot(ends[0].difference, ends[1].difference) > 0) {
+  const auto projectsOntoFace = [&](int i) { return ends[i].feature == TriangleFeature::Face; };
+  if (projectsOntoFace(0) && projectsOntoFace(1) &&
+      signedDot(ends[0].difference, ends[1].difference) > 0) {
     if (ends[0].distance != ends[1].distance)
       return answer(ends[ends[1].distance < ends[0].distance],
                     std::min(ends[0].distance, ends[1].distance));
     return answer(finiteVertexTriangleDistance(m_p0 + 0.5 * along, a, b, c), ends[0].distance);
   }
   for (const int i : {0, 1})  // this end is nearest if the axis does not come nearer from it
-    if (isOver(i) && (i == 0 ? 1 : -1) * signedDot(along, ends[i].difference) >= 0)
+    if (projectsOntoFace(i) && (i == 0 ? 1 : -1) * signedDot(along, ends[i].difference) >= 0)
       return answer(ends[i], ends[i].distance);
   SignCounts counts;
   const OrientedPlane plane(a, b, c);

@@ -138,11 +138,12 @@ class Reader {
     FileText text(block, m_encoding);
     const auto length = [&] { return toCount(text.number(m_headerType), std::size_t{1} << 53); };
     if (m_compressor == nullptr) return std::string(text.take(length()));
-    const std::size_t blocks = length(), whole = length(), last = length();
+    const std::size_t blocks = length(), fullSize = length(), lastSize = length();
     const std::vector<double> lengths = text.numbers(m_headerType, blocks);
     std::string bytes;
     for (std::size_t i = 0; i < blocks; ++i) {
-      const std::size_t size = i + 1 == blocks && last > 0 ? last : whole, start = bytes.size();
+      const std::size_t size = i + 1 == blocks && lastSize > 0 ? lastSize : fullSize,
+                        start = bytes.size();
       if (size > expected - start) throw FileFault{"one of its compressed blocks has a wrong size"};
       const std::string_view compressed = text.take(toCount(lengths[i], text.left()));
       bytes.resize(start + size);
