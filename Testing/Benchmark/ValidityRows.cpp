@@ -149,7 +149,7 @@ class ValidityCost {
     if (m_settings.method == Method::Continuous ||
         (validity.startedApart && motion <= m_settings.thickness))
       asked.step.motion = motion;
-    asked.step.certain = motion * (1 + 1e-9);
+    asked.step.motionWithRounding = motion * (1 + 1e-9);
     double least[2] = {std::numeric_limits<double>::infinity(),
                        std::numeric_limits<double>::infinity()};
     for (int turn = 0; turn < 10; ++turn) {

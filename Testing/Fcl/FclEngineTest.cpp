@@ -131,16 +131,18 @@ TEST(FclEngine, WhatFclCannotIsRefusedByName) {
     }
   };
   for (const Method method : {Method::Auto, Method::Proximity, Method::Continuous})
-    refuse(mesh, other, {method, 0.1}, "pair (0, 1): FCL answers triangle meshes by Method::Inter");
-  refuse(mesh, mesh, {Method::Intersection}, "pair (0, 0): FCL does not find what a mesh does to");
-  refuse(box, mesh, {Method::Proximity, 0.1}, "pair (2, 0): FCL is asked for two triangle meshes");
-  refuse(hull, twoSided, {Method::Proximity}, "pair (3, 5): FCL does not know a hull with a plane");
-  refuse(twoSided, hull, {Method::Proximity}, "pair (5, 3): FCL does not know a hull with a plane");
+    refuse(mesh, other, {method, 0.1},
+           "pair (0, 1): FCL supports triangle meshes by Method::Inter");
+  refuse(mesh, mesh, {Method::Intersection},
+         "pair (0, 0): FCL does not support a geometry with itself");
+  refuse(box, mesh, {Method::Proximity, 0.1}, "pair (2, 0): FCL supports two triangle meshes");
+  refuse(hull, twoSided, {Method::Proximity}, "pair (3, 5): FCL does not support a hull with");
+  refuse(twoSided, hull, {Method::Proximity}, "pair (5, 3): FCL does not support a hull with");
   refuse(box, plane, {Method::Proximity, 0.1}, "the thickness must be 0");
   refuse(box, hull, {Method::Proximity, 0.1}, "the thickness must be 0");
-  refuse(plane, twoSided, {Method::Proximity}, "two planes have no distance");
+  refuse(plane, twoSided, {Method::Proximity}, "a pair of two planes is not supported");
   for (const Method method : {Method::Auto, Method::Intersection, Method::Continuous})
-    refuse(box, hull, {method}, "pair (2, 3): FCL answers shapes by Method::Proximity only");
+    refuse(box, hull, {method}, "pair (2, 3): FCL supports shapes by Method::Proximity only");
   EXPECT_TRUE(engine.pairs().empty());
 }
 

@@ -237,7 +237,7 @@ TEST_F(MeshFiles, MissingEmptyFoldersAndUnknownKindsAreRefused) {
 }
 
 TEST_F(MeshFiles, IndicesOutOfRangeAreRefused) {
-  const std::string reason = "polygon 0 (from 0) names a vertex that is not among its 5";
+  const std::string reason = "polygon 0 (from 0) has a vertex index out of range; the file has 5";
   EXPECT_NE(refusal("high.obj", replaced(kObj, "4//1", "6//1")).find(reason), std::string::npos);
   EXPECT_NE(refusal("zero.obj", replaced(kObj, "4//1", "0//1")).find(reason), std::string::npos);
   EXPECT_NE(refusal("back.obj", replaced(kObj, "4//1", "-6")).find(reason), std::string::npos);
@@ -282,7 +282,7 @@ TEST_F(MeshFiles, CoordinatesThatAreNotFiniteAreRefused) {
 }
 
 TEST_F(MeshFiles, CountsLargerThanTheFileAreRefused) {
-  const std::string reason = "shorter than its own counts say";
+  const std::string reason = "shorter than its counts require";
   EXPECT_NE(refusal("a.ply", replaced(kPly, "vertex 5", "vertex 4000000000")).find(reason),
             std::string::npos);
   EXPECT_NE(refusal("a.vtk", replaced(kVtk, "POINTS 5", "POINTS 400000000000")).find(reason),
@@ -305,7 +305,7 @@ TEST_F(MeshFiles, OtherDataSetsAreRefused) {
             std::string::npos);
   EXPECT_NE(refusal("short.obj", "v 0 0 0\nv 1 0\n").find("in line 2 a number is missing"),
             std::string::npos);
-  EXPECT_NE(refusal("half.obj", replaced(kObj, "4//1", "1.5")).find("no whole number"),
+  EXPECT_NE(refusal("half.obj", replaced(kObj, "4//1", "1.5")).find("not a whole number"),
             std::string::npos);
 }
 

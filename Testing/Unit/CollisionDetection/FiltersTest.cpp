@@ -472,12 +472,13 @@ TEST(Filters, BadInputIsRefusedByName) {
   const GeometryId mesh = detection.addTriangleMesh(one.positions, one.triangles),
                    line = detection.addLineMesh(one.positions, std::vector<Segment>{{0, 1}});
   const std::vector<std::uint32_t> beyond{0, 1};
-  expectRefused(ErrorCode::IndexOutOfRange, "geometry 0: element 1 is out of range; it has 1",
+  expectRefused(ErrorCode::IndexOutOfRange,
+                "geometry 0: element 1 is out of range; the geometry has 1",
                 [&] { detection.setDisabledElements(mesh, beyond); });
   expectRefused(ErrorCode::InvalidSettings, "geometry 1 is a line mesh, which has no sides", [&] {
     detection.setCollisionFilter(line, {1, 1, Sidedness::Outer});
   });
-  expectRefused(ErrorCode::InvalidSettings, "sidedness must be Both or Outer", [&] {
+  expectRefused(ErrorCode::InvalidSettings, "it must be Both or Outer", [&] {
     detection.setCollisionFilter(mesh, {1, 1, static_cast<Sidedness>(7)});
   });
   expectRefused(ErrorCode::UnknownGeometry, "geometry 9 was never added",

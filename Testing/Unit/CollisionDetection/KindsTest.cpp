@@ -585,7 +585,7 @@ TEST(Kinds, BadInputIsRefusedByName) {
                 [&] {
                   collisions.addLineMesh(two, std::vector<Segment>{{0, 2}});
                 });
-  expectRefused(Code::IndexOutOfRange, "segment 1: joins vertex 1 with itself", [&] {
+  expectRefused(Code::IndexOutOfRange, "segment 1 joins vertex 1 with itself", [&] {
     collisions.addLineMesh(two, std::vector<Segment>{{0, 1}, {1, 1}});
   });
   for (const double bad : {-1.0, kNan, std::numeric_limits<double>::infinity()}) {
@@ -604,7 +604,7 @@ TEST(Kinds, BadInputIsRefusedByName) {
   EXPECT_EQ(line, GeometryId{0});  // nothing refused took an id
   const PairSettings near{Method::Proximity, 1.0};
   for (const GeometryId other : {mesh, line, points})
-    expectRefused(Code::UnsupportedMethod, "Auto, Proximity and Continuous are",
+    expectRefused(Code::UnsupportedMethod, "use Auto, Proximity or Continuous",
                   [&] { collisions.addCollisionPair(line, other, {Method::Intersection}); });
   expectRefused(Code::UnsupportedMethod, "one radius for all vertices", [&] {
     collisions.addCollisionPair(thick, mesh, {Method::Continuous, 1.0});

@@ -644,9 +644,9 @@ TEST(Shapes, BadInputIsRefusedByName) {
   refuse(Sphere{{0, kNan, 0}, 1}, "centre is (0, nan, 0); it must be finite");
   refuse(Capsule{{0, 0, 0}, {0, 0, kInfinity}, 1}, "p1 is (0, 0, inf); it must be finite");
   refuse(Capsule{{0, 0, 0}, {0, 0, 1}, kNan}, "radius is nan");
-  refuse(Plane{{0, 0, 0}, {0, 0, 0}}, "normal is (0, 0, 0); it must be of some length");
+  refuse(Plane{{0, 0, 0}, {0, 0, 0}}, "normal is (0, 0, 0); it must be longer than zero");
   refuse(Box{{0, 0, 0}, {1, -2, 1}}, "halfExtents is (1, -2, 1); it must be finite and not neg");
-  refuse(ConvexHull{}, "a hull needs at least one point");
+  refuse(ConvexHull{}, "the hull has no points; it needs at least one");
   refuse(ConvexHull{{{0, 0, 0}, {0, kNan, 1}, {kNan, 0, 0}}},
          "point 1 is (0, nan, 1); it must be finite");
   try {
@@ -655,12 +655,13 @@ TEST(Shapes, BadInputIsRefusedByName) {
   } catch (const Error& error) {
     EXPECT_EQ(error.element(), std::size_t{1});
   }
-  refuse(Cylinder{{1, 2, 3}, {1, 2, 3}, 1}, "p1 is (1, 2, 3); it must be another point than p0");
+  refuse(Cylinder{{1, 2, 3}, {1, 2, 3}, 1}, "p1 is (1, 2, 3); it must be different from p0");
 
   const GeometryId tool = collisions.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1}),
                    points = collisions.addPointSet(Positions{{0, 0, 0.5}});
   EXPECT_EQ(tool, GeometryId{0});  // nothing refused took an id
-  expectRefused(Code::UnsupportedMethod, "a shape and a point set; Auto, Proximity and Continuous",
+  expectRefused(Code::UnsupportedMethod,
+                "a shape and a point set; use Auto, Proximity or Continuous",
                 [&] { collisions.addCollisionPair(tool, points, {Method::Intersection}); });
   collisions.addCollisionPair(tool, points, {Method::Proximity, 0.0});
   collisions.detectCollision();
@@ -693,7 +694,7 @@ TEST(Shapes, BadInputIsRefusedByName) {
   expectRefused(Code::NotAvailable, "no candidate pairs", [&] {
     collisions.forEachCandidate(tool, points, [](std::span<const ElementPair>) {});
   });
-  expectRefused(Code::UnsupportedMethod, "no features to ask about", [&] {
+  expectRefused(Code::UnsupportedMethod, "one of the two is a shape", [&] {
     collisions.setContactPredicate(tool, points, [](const ContactFeatures&) { return true; });
   });
   turned(0, 1) = 1e-10;

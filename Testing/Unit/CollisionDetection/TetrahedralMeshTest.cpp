@@ -259,13 +259,13 @@ TEST(TetrahedralMesh, BadInputIsRefusedByName) {
                   [&] {
                     give(some, {{0, 1, 2, 3}, {1, 2, 3, 6}});
                   });
-    expectRefused(ErrorCode::IndexOutOfRange, 0, name + ", tetrahedron 0: has vertex 3 twice", [&] {
+    expectRefused(ErrorCode::IndexOutOfRange, 0, name + ", tetrahedron 0 has vertex 3 twice", [&] {
       give(some, {{3, 1, 2, 3}});
     });
     expectRefused(ErrorCode::SharedFace, 3,
                   name +
-                      ", tetrahedron 3: its face of vertices 0, 1 and 2 is one of tetrahedra 0 "
-                      "and 1 already",
+                      ", tetrahedron 3: its face with vertices 0, 1 and 2 already belongs to "
+                      "tetrahedra 0 and 1",
                   [&] {
                     give(some, {{0, 1, 2, 3}, {4, 2, 1, 0}, {1, 2, 3, 5}, {5, 0, 1, 2}});
                   });
@@ -283,7 +283,7 @@ TEST(TetrahedralMesh, BadInputIsRefusedByName) {
                 "geometry 0 is a triangle mesh; setTetrahedra() is for tetrahedral meshes",
                 [&] { detection.setTetrahedra(mesh, some, {}); });
   expectRefused(ErrorCode::UnsupportedMethod, {},
-                "geometry 0 is a triangle mesh; surface() is of tetrahedral meshes",
+                "geometry 0 is a triangle mesh; surface() is for tetrahedral meshes",
                 [&] { detection.surface(mesh); });
   expectRefused(ErrorCode::WrongPositionCount, {},
                 "geometry 1: 5 positions given, but it has 6 vertices; setTetrahedra() changes "

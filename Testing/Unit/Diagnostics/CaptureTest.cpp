@@ -199,7 +199,7 @@ TEST_F(Capture, RefusesEveryFileCutOff) {
   write(whole.substr(0, whole.size() / 2));
   expectRefused("line ");
   write(whole.substr(0, whole.size() - 5));
-  expectRefused("it is cut off");
+  expectRefused("the file is truncated");
   write("");
   expectRefused("it is not a capture");
 }
@@ -222,7 +222,7 @@ TEST_F(Capture, RefusesWhatIsWrongByName) {
   };
   expectRefusedWith("palpate-capture 9", "solid 3", "it is not a capture");
   expectRefusedWith("palpate-capture 9", "palpate-capture 10",
-                    "it is of version 10; versions up to 9");
+                    "its version is 10; versions up to 9");
   expectRefusedWith("palpate-capture 9", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
@@ -231,12 +231,12 @@ TEST_F(Capture, RefusesWhatIsWrongByName) {
   expectRefusedWith("0 1 2\n", "0 1\n", "");
   expectRefusedWith("pair 0 1 ", "pair 0 7 ", "geometry 7 was never added");
   expectRefusedWith("pair 1 1 ", "pair 1 0 ", "was added before");
-  expectRefusedWith("pair 1 1 ", "twin 1 1 ", "\"twin\" where \"pair\" should be");
-  expectRefusedWith("Proximity", "Guess", "\"Guess\" is not a name known here");
-  expectRefusedWith("geometry 5 3 1", "geometry 5 333333 1", "it is cut off");
+  expectRefusedWith("pair 1 1 ", "twin 1 1 ", "found \"twin\", expected \"pair\"");
+  expectRefusedWith("Proximity", "Guess", "\"Guess\" is not a known name");
+  expectRefusedWith("geometry 5 3 1", "geometry 5 333333 1", "the file is truncated");
   expectRefusedWith("geometry 5 3 1", "geometry 5 4 1", "");
   expectRefusedWith("Octree 0 32", "Octree 0 61", "octree.maxDepth is 61");
-  expectRefusedWith("end\n", "end\nend\n", "more follows after its end");
+  expectRefusedWith("end\n", "end\nend\n", "there is text after the end");
   write(whole);
   EXPECT_NO_THROW(readCapture(file()));
 }

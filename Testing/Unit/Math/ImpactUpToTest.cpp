@@ -9,7 +9,7 @@
 namespace palpate {
 namespace {
 
-ImpactAnswer find(const ImpactCase& query, double distance, double upTo) {
+ImpactResult find(const ImpactCase& query, double distance, double upTo) {
   ImpactQuery q{query.edges ? ImpactQuery::Kind::EdgeEdge : ImpactQuery::Kind::VertexTriangle, {}};
   for (int i = 0; i < 4; ++i) q.vertices[i] = {query.positions[i], query.positions[4 + i]};
   return findImpact(q, {.minimumDistance = distance}, upTo);
@@ -42,13 +42,13 @@ TEST(ImpactUpTo, FindsTheSameTimeWhereverTheSearchEnds) {
   for (int i = 0; i < 20000; ++i) {
     const double distance = i % 3 == 0 ? 0.0 : 0.1 * random.unit();
     const ImpactCase query = someCase(random, distance);
-    const ImpactAnswer whole = find(query, distance, 1.0);
+    const ImpactResult whole = find(query, distance, 1.0);
     for (int k = 0; k < 4; ++k) {
       const double upTo = k < 2           ? random.unit()
                           : !whole.impact ? 0x1p-5
                           : k == 2        ? whole.time
                                           : std::min(1.0, whole.time + 1e-6);
-      const ImpactAnswer part = find(query, distance, upTo);
+      const ImpactResult part = find(query, distance, upTo);
       if (part.impact) {
         ASSERT_TRUE(whole.impact) << i;
         ASSERT_EQ(part.time, whole.time) << i << ", up to " << upTo;

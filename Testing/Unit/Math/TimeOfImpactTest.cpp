@@ -26,7 +26,7 @@ std::string text(const ImpactCase& query) {
   return result;
 }
 
-ImpactAnswer exactly(const ImpactCase& query, double tolerance) {
+ImpactResult exactly(const ImpactCase& query, double tolerance) {
   ImpactQuery q{query.edges ? ImpactQuery::Kind::EdgeEdge : ImpactQuery::Kind::VertexTriangle, {}};
   for (int i = 0; i < 4; ++i) q.vertices[i] = {query.positions[i], query.positions[4 + i]};
   return findTouchExactly(q, tolerance);
@@ -44,7 +44,7 @@ void expectTrue(const ImpactCase& query, double tolerance, int& impacts) {
   };
   const std::optional<double> time = query.time({0.0, tolerance});
   check(time.has_value(), time.value_or(0.0), "findTouch");
-  const ImpactAnswer exact = exactly(query, tolerance);
+  const ImpactResult exact = exactly(query, tolerance);
   check(exact.impact, exact.time, "findTouchExactly");
   impacts += truth.has_value();
 }

@@ -57,7 +57,7 @@ Answers answersTo(const PlacedTriangles& a, const PlacedTriangles& b, bool self,
       const bool isKept =
           next < out.size() && out[next].triangles.a == pair.a && out[next].triangles.b == pair.b;
       answers.isKept.push_back(isKept);
-      answers.meetings.push_back(isKept ? out[next].meeting : TriangleIntersection());
+      answers.meetings.push_back(isKept ? out[next].intersection : TriangleIntersection());
       next += isKept;
     }
     EXPECT_EQ(next, out.size()) << path;

@@ -31,9 +31,9 @@ std::optional<double> distanceOf(const Pair& x, int test, bool distinct) {
     return vertexTriangleDistance(p, corner(triangle, 0), corner(triangle, 1), corner(triangle, 2))
         .distance;
   };
-  if (isCorner(kOfA[test])) return distanceTo(1, corner(0, kOfA[test]));
-  if (isCorner(kOfB[test])) return distanceTo(0, corner(1, kOfB[test]));
-  const int i = edgeNumber(kOfA[test]), j = edgeNumber(kOfB[test]);
+  if (isCorner(kFeatureOfA[test])) return distanceTo(1, corner(0, kFeatureOfA[test]));
+  if (isCorner(kFeatureOfB[test])) return distanceTo(0, corner(1, kFeatureOfB[test]));
+  const int i = edgeNumber(kFeatureOfA[test]), j = edgeNumber(kFeatureOfB[test]);
   if (!distinct)
     return edgeEdgeDistance(corner(0, i), corner(0, i + 1), corner(1, j), corner(1, j + 1))
         .distance;

@@ -256,10 +256,11 @@ TEST(InsideVertices, NeedAClosedBody) {
     EXPECT_EQ(error.code(), ErrorCode::NotClosed);
     EXPECT_EQ(error.geometry(), a);
     const Segment& edge = holes.open[0];
-    EXPECT_EQ(std::string(error.what()),
-              "geometry 0 has no inside: it is not closed and consistently oriented, 3 edges have "
-              "one triangle only, the first of vertices " +
-                  std::to_string(edge[0]) + " and " + std::to_string(edge[1]));
+    EXPECT_EQ(
+        std::string(error.what()),
+        "geometry 0 has no inside: it is not closed and consistently oriented; 3 edges belong "
+        "to one triangle only, the first is (" +
+            std::to_string(edge[0]) + ", " + std::to_string(edge[1]) + ")");
   }
   EXPECT_THROW(testing::insideVertices(detection, a, b), Error);
   EXPECT_THROW(testing::insideVertices(detection, a, a), Error);

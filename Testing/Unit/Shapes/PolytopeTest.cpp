@@ -155,7 +155,7 @@ TEST(Polytope, GrowsPointByPoint) {
     for (const Vector3d& p : cloud) EXPECT_FALSE(hull.add(p));
     for (int i = 0; i < 20; ++i) {
       const Vector3d x = randomPoint(random, -1.5, 1.5);
-      EXPECT_NEAR(hull.at(x, 0).distance, whole.at(x, 0).distance, 1e-15);
+      EXPECT_NEAR(hull.signedDistance(x, 0).distance, whole.signedDistance(x, 0).distance, 1e-15);
     }
   }
 }
@@ -180,10 +180,10 @@ TEST(Polytope, PlatesHaveTwoSides) {
       ASSERT_NE(back, edges.end());
       EXPECT_EQ(number, back->second);
     }
-    for (const Vector3d& p : cloud) EXPECT_NEAR(plate.at(p, 1e-14).distance, 0, 1e-14);
+    for (const Vector3d& p : cloud) EXPECT_NEAR(plate.signedDistance(p, 1e-14).distance, 0, 1e-14);
     const Vector3d up = Vector3d(-2, 1, 1).normalized(), middle = (cloud[0] + cloud[1]) / 2;
     for (const double height : {0.5, -0.5})
-      EXPECT_NEAR(plate.at(middle + height * up, 1e-14).distance, 0.5, 1e-14);
+      EXPECT_NEAR(plate.signedDistance(middle + height * up, 1e-14).distance, 0.5, 1e-14);
   }
 }
 
@@ -210,7 +210,7 @@ TEST(Polytope, DistanceIsThatOfTheNearestTriangle) {
         const auto flat = vertexTriangleDistance(points[a], points[a], points[b], points[c]);
         highest = std::max(highest, flat.normal.dot(x - points[a]));
       }
-      const SignedDistance found = hull.at(x, tie);
+      const SignedDistance found = hull.signedDistance(x, tie);
       EXPECT_NEAR(std::abs(found.distance), nearest, 8 * tie);
       EXPECT_NEAR(found.normal.norm(), 1, 1e-14);
       EXPECT_TRUE(std::abs(highest) <= 1e-6 * size || (found.distance < 0) == (highest < 0));

@@ -1,4 +1,4 @@
-#include "Validity/EndOfStep.h"
+#include "Validity/IntersectionAtEnd.h"
 
 #include "NarrowPhase/StepCheck.h"
 
@@ -14,22 +14,22 @@ constexpr std::size_t kFreeChecks = 32, kChecksTogether = 16;
 
 }  // namespace
 
-EndOfStep checkEnd(const MeshPair& pair, const CollisionData::Contents& contacts,
-                   ContactBuffers& counts) {
+IntersectionAtEnd checkEnd(const MeshPair& pair, const CollisionData::Contents& contacts,
+                           ContactBuffers& counts) {
   using Ids = std::span<const std::uint32_t>;
   const MeshTopology &ofA = pair.a.topology, &ofB = pair.b.topology;
-  const double rounding = pair.step.certain - pair.step.motion;
-  std::size_t left = kFreeChecks;
-  forEachTimed(contacts, [&](const auto& list) { left += list.size(); });
-  Buffer<ElementPair>& some = counts.part;
-  some.clear();
-  EndOfStep end;
+  const double rounding = pair.step.motionWithRounding - pair.step.motion;
+  std::size_t checksLeft = kFreeChecks;
+  forEachTimed(contacts, [&](const auto& list) { checksLeft += list.size(); });
+  Buffer<ElementPair>& batch = counts.part;
+  batch.clear();
+  IntersectionAtEnd end;
   const auto check = [&] {
-    end.isKnown = some.size() <= left;
+    end.isKnown = batch.size() <= checksLeft;
     if (!end.isKnown) return;
-    left -= some.size();
-    end.intersecting = anyIntersecting(pair, false, some, counts);
-    some.clear();
+    checksLeft -= batch.size();
+    end.intersecting = anyIntersecting(pair, false, batch, counts);
+    batch.clear();
   };
   const auto add = [&](const auto& contact, Ids trianglesOfA, Ids trianglesOfB) {
     if (end.intersecting || !end.isKnown ||
@@ -37,8 +37,8 @@ EndOfStep checkEnd(const MeshPair& pair, const CollisionData::Contents& contacts
       return;
     for (const std::uint32_t a : trianglesOfA)
       for (const std::uint32_t b : trianglesOfB)
-        if (!pair.self() || a != b) some.push_back({a, b});
-    if (some.size() >= kChecksTogether) check();
+        if (!pair.self() || a != b) batch.push_back({a, b});
+    if (batch.size() >= kChecksTogether) check();
   };
   for (const VertexTriangleContact& c : contacts.vertexTriangle)
     add(c, ofA.vertexTriangles[c.vertex], Ids(&c.triangle, 1));

@@ -9,7 +9,7 @@
 namespace palpate {
 
 /// Whether triangles intersect at a step's end, as far as its contacts determine this.
-struct EndOfStep {
+struct IntersectionAtEnd {
   std::optional<ElementPair> intersecting;  ///< a pair that does
   /// If there is no such pair: whether it is certain that no triangles intersect at the step's end,
   /// provided that none did at its start.
@@ -22,7 +22,7 @@ struct EndOfStep {
 /// their impacts.
 /// Cost     tests at most one triangle pair for each contact and 32 more. If these do not suffice,
 ///          isKnown is false.
-EndOfStep checkEnd(const MeshPair&, const CollisionData::Contents& contacts,
-                   ContactBuffers& counts);
+IntersectionAtEnd checkEnd(const MeshPair&, const CollisionData::Contents& contacts,
+                           ContactBuffers& counts);
 
 }  // namespace palpate
