@@ -370,9 +370,9 @@ std::string faultOf(const AnalyticalGeometry& geometry, std::optional<std::size_
       for (std::size_t i = field.size(); i-- > 0;)
         if (const bool finite = field[i].allFinite(); !finite || isBeyond(field[i]))
           report("point " + std::to_string(i), field[i], finite ? kWithin : "finite"), element = i;
-      if (field.size() > kMostHullPoints)
+      if (field.size() > kMaxHullPoints)
         fault = "the hull has " + std::to_string(field.size()) + " points; it must have at most " +
-                std::to_string(kMostHullPoints);
+                std::to_string(kMaxHullPoints);
     } else if constexpr (!std::is_same_v<Field, bool>) {
       Vector3d values;
       values << field, Eigen::VectorXd::Zero(std::is_same_v<Field, double> ? 2 : 0);

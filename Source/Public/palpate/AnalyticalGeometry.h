@@ -16,7 +16,7 @@ namespace palpate {
 // InvalidShape for all other values.
 
 inline constexpr double kLargestMeasure = 1e300;                      ///< L
-inline constexpr std::size_t kMostHullPoints = std::size_t{1} << 17;  ///< of one ConvexHull
+inline constexpr std::size_t kMaxHullPoints = std::size_t{1} << 17;  ///< of one ConvexHull
 
 /// A ball.
 struct Sphere {
@@ -54,7 +54,7 @@ struct Cylinder {
 /// plate, a segment or a point. Points near a plane span a thin body.
 ///
 /// Errors   addAnalyticalGeometry() throws InvalidShape for no points, and for more than
-///          kMostHullPoints.
+///          kMaxHullPoints.
 /// Cost     to add: n log n for n points, on average, in any order. A distance tests each triangle
 ///          of the hull, and some of them several times. Points inside the hull cost nothing after
 ///          it was added.

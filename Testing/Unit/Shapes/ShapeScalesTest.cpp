@@ -292,7 +292,7 @@ TEST(ShapeScales, RefuseMeasuresBeyondTheLimit) {
 }
 
 TEST(ShapeScales, RefuseHullsOfTooManyPoints) {
-  ConvexHull hull{Positions(kMostHullPoints, Vector3d(1, 2, 3))};
+  ConvexHull hull{Positions(kMaxHullPoints, Vector3d(1, 2, 3))};
   hull.points.front() = {0, 0, 0};
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
   EXPECT_NO_THROW(collisions.addAnalyticalGeometry(hull));
