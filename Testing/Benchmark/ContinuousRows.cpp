@@ -92,9 +92,9 @@ Medians takeTurns(const Workload& workload, const MeasureOptions& options) {
     steps.push_back(std::make_unique<Step>(workload, kind.earliestTimeOnly,
                                            kind.thickness * 10 * workload.task.thickness));
   std::vector<double> times[std::size(kKinds)], narrow[std::size(kKinds)], embree;
-#ifdef PALPATE_BENCHMARK_PEERS
-  const auto peer = makeEmbreeMorton();
-  peer->prepare(workload.task, workload.frames[0]);
+#ifdef PALPATE_BENCHMARK_BASELINES
+  const auto embreeRebuild = makeEmbreeMorton();
+  embreeRebuild->prepare(workload.task, workload.frames[0]);
 #endif
   for (int repetition = 0; repetition < 1 + options.repetitions; ++repetition) {
     for (std::size_t i = 0; i < steps.size(); ++i) {
@@ -103,11 +103,11 @@ Medians takeTurns(const Workload& workload, const MeasureOptions& options) {
       times[i].push_back(took);
       narrow[i].push_back(steps[i]->statistics().milliseconds.narrowPhase);
     }
-#ifdef PALPATE_BENCHMARK_PEERS
+#ifdef PALPATE_BENCHMARK_BASELINES
     for (const Positions& frame : workload.frames) {
       const double start = now();
-      peer->update(frame);
-      peer->collide();
+      embreeRebuild->update(frame);
+      embreeRebuild->collide();
       if (repetition > 0) embree.push_back(now() - start);
     }
 #endif

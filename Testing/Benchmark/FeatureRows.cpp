@@ -87,9 +87,9 @@ Medians takeTurns(const Workload& workload, FeatureCandidates (&kinds)[2],
                   const MeasureOptions& options) {
   const auto &first = workload.frames[0][0], &second = workload.frames[1][0];
   std::vector<double> times[2], embree;
-#ifdef PALPATE_BENCHMARK_PEERS
-  const auto peer = makeEmbreeMorton();
-  peer->prepare(workload.task, workload.frames[0]);
+#ifdef PALPATE_BENCHMARK_BASELINES
+  const auto embreeRebuild = makeEmbreeMorton();
+  embreeRebuild->prepare(workload.task, workload.frames[0]);
 #endif
   for (int repetition = 0; repetition < 1 + 2 * options.repetitions; ++repetition) {
     for (int swept = 0; swept < 2; ++swept) {
@@ -98,11 +98,11 @@ Medians takeTurns(const Workload& workload, FeatureCandidates (&kinds)[2],
       kinds[swept].frame(first, second);
       if (repetition > 0) times[swept].push_back(now() - start);
     }
-#ifdef PALPATE_BENCHMARK_PEERS
+#ifdef PALPATE_BENCHMARK_BASELINES
     for (const Positions& frame : workload.frames) {
       const double start = now();
-      peer->update(frame);
-      peer->collide();
+      embreeRebuild->update(frame);
+      embreeRebuild->collide();
       if (repetition > 0) embree.push_back(now() - start);
     }
 #endif

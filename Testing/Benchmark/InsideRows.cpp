@@ -6,8 +6,8 @@
 #include "Common/RandomMeshes.h"
 #include "Common/Solids.h"
 
-#ifdef PALPATE_BENCHMARK_PEERS
-#include "Peers/Peer.h"
+#ifdef PALPATE_BENCHMARK_BASELINES
+#include "BroadPhase.h"
 #endif
 
 #include <palpate/OctreeBasedCD.h>
@@ -60,7 +60,7 @@ void insideRow(Report& report, const std::string& name, const testing::Mesh& bod
   const double each = 1000 * median(samples) / static_cast<double>(inside);
   report.line({name + ", " + std::to_string(threads) + " threads", milliseconds(each)});
   report.row("inside", name, threads, "Palpate", "us a vertex inside", each);
-#ifdef PALPATE_BENCHMARK_PEERS
+#ifdef PALPATE_BENCHMARK_BASELINES
   if (threads != 1) return;
   const InsideAnswer answer = insideByCgal(body.positions, body.triangles, points);
   if (answer.inside != inside || std::abs(answer.depth - depth) > 1e-9 * depth)

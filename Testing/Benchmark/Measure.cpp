@@ -69,7 +69,7 @@ void addToHash(std::uint64_t& hash, const Pairs& pairs) {
     for (const std::uint32_t id : {p.a, p.b}) hash = (hash ^ id) * 0x100000001b3u;
 }
 
-void checkSets(const Workload& workload, std::span<const std::unique_ptr<Peer>> engines,
+void checkSets(const Workload& workload, std::span<const std::unique_ptr<BroadPhase>> engines,
                Outcome& outcome) {
   const std::size_t count = workload.frames.size();
   std::vector<std::size_t> frames = {0, count / 3, 2 * count / 3, count - 1};
@@ -90,7 +90,7 @@ void checkSets(const Workload& workload, std::span<const std::unique_ptr<Peer>> 
   }
 }
 
-void countPairs(const Workload& workload, Peer& engine, Outcome& outcome) {
+void countPairs(const Workload& workload, BroadPhase& engine, Outcome& outcome) {
   std::vector<double> counts;
   for (const Positions& frame : workload.frames) {
     engine.update(frame);
@@ -108,7 +108,8 @@ struct Samples {
   std::vector<double> total, update;
 };
 
-void repeat(Peer& engine, const std::vector<Positions>& frames, Timing& timing, Samples& samples) {
+void repeat(BroadPhase& engine, const std::vector<Positions>& frames, Timing& timing,
+            Samples& samples) {
   std::vector<double> totals;
   for (std::size_t frame = 0; frame < frames.size(); ++frame) {
     const double start = now();
@@ -144,7 +145,7 @@ double quantile(std::vector<double> values, double fraction) {
 
 double median(std::vector<double> values) { return quantile(std::move(values), 0.5); }
 
-Outcome measure(const Workload& workload, std::span<const std::unique_ptr<Peer>> engines,
+Outcome measure(const Workload& workload, std::span<const std::unique_ptr<BroadPhase>> engines,
                 const MeasureOptions& options) {
   Outcome outcome;
   for (const auto& engine : engines) {

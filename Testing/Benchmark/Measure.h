@@ -38,7 +38,7 @@ struct Timing {
 double ratio(const Timing&, const Timing& other);
 
 struct Contestant {
-  Peer* engine;
+  BroadPhase* engine;
   const std::vector<Positions>* frames;
 };
 
@@ -65,7 +65,7 @@ struct Outcome {
 };
 
 /// Prepares all engines, compares their pairs, and times them.
-Outcome measure(const Workload&, std::span<const std::unique_ptr<Peer>> engines,
+Outcome measure(const Workload&, std::span<const std::unique_ptr<BroadPhase>> engines,
                 const MeasureOptions&);
 
 }  // namespace palpate::benchmark

@@ -12,7 +12,7 @@ Settings settingsFor(OctreeUpdate update, int threads) {
   return settings;
 }
 
-class PalpateEngine : public Peer {
+class PalpateEngine : public BroadPhase {
  public:
   PalpateEngine(OctreeUpdate update, PairOrder order) : m_update(update), m_order(order) {}
 
@@ -90,7 +90,7 @@ void PalpateScene::setPositions(const Positions& positions) {
     detection.setPositions(ids[mesh], positions[mesh]);
 }
 
-std::unique_ptr<Peer> makePalpate(OctreeUpdate update, PairOrder order) {
+std::unique_ptr<BroadPhase> makePalpate(OctreeUpdate update, PairOrder order) {
   return std::make_unique<PalpateEngine>(update, order);
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "Peers/Peer.h"
+#include "BroadPhase.h"
 
 #include <palpate/OctreeBasedCD.h>
 
@@ -12,7 +12,7 @@ enum class PairOrder {
 };
 
 /// Palpate as a user calls it; settings are the defaults but for the two that the name says.
-std::unique_ptr<Peer> makePalpate(OctreeUpdate, PairOrder);
+std::unique_ptr<BroadPhase> makePalpate(OctreeUpdate, PairOrder);
 
 /// The task's meshes and pairs in a new OctreeBasedCD. thickness 0: the task's own.
 struct PalpateScene {

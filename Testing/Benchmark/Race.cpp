@@ -21,14 +21,14 @@ struct Options {
   RowOptions rows;
 };
 
-using Engines = std::vector<std::unique_ptr<Peer>>;
+using Engines = std::vector<std::unique_ptr<BroadPhase>>;
 
 Engines makeEngines(const std::vector<std::string>& wanted) {
   Engines all;
   for (const PairOrder order : {PairOrder::Found, PairOrder::Sorted})
     for (const OctreeUpdate update : {OctreeUpdate::Auto, OctreeUpdate::Rebuild})
       all.push_back(makePalpate(update, order));
-#ifdef PALPATE_BENCHMARK_PEERS
+#ifdef PALPATE_BENCHMARK_BASELINES
   for (const auto make : {makeEmbreeRefit, makeEmbreeMorton, makeBullet, makeFcl, makeCgal})
     all.push_back(make());
 #endif
@@ -58,7 +58,7 @@ const Entry* find(const Outcome& outcome, const std::string& engine) {
 
 /// Against the complete peer that comes nearest; of those that rebuild, if asked for. 0: there is
 /// none.
-double againstPeers(const Outcome& outcome, const Timing& palpate, bool rebuilding) {
+double againstBaselines(const Outcome& outcome, const Timing& palpate, bool rebuilding) {
   double least = 0;
   for (const Entry& entry : outcome.entries) {
     if (isPalpate(entry) || entry.check.missed > 0 || (rebuilding && !entry.rebuilds)) continue;
@@ -81,18 +81,18 @@ void verdicts(Report& report, const Workload& workload, const Outcome& outcome) 
   const Entry *shipped = find(outcome, "Palpate"),
               *rebuilt = find(outcome, "Palpate, full rebuild");
   const Entry* embree = find(outcome, "Embree 3.13, Morton rebuild + rtcCollide");
-  if (!shipped || !rebuilt || againstPeers(outcome, shipped->timing, false) == 0) return;
+  if (!shipped || !rebuilt || againstBaselines(outcome, shipped->timing, false) == 0) return;
   const auto [a, b] = workload.task.pairs[0];
   verdict(report, workload, "as shipped, against the fastest peer",
-          againstPeers(outcome, shipped->timing, false), a == b ? 2.5 : 1.3);
+          againstBaselines(outcome, shipped->timing, false), a == b ? 2.5 : 1.3);
   if (embree)
     verdict(report, workload, "full rebuild: update against Embree's rebuild",
             embree->timing.update / rebuilt->timing.update, 4);
-  if (const double factor = againstPeers(outcome, rebuilt->timing, true); factor > 0)
+  if (const double factor = againstBaselines(outcome, rebuilt->timing, true); factor > 0)
     verdict(report, workload, "full rebuild, against rebuilding peers", factor, 2);
   if (!workload.name.starts_with("sheets"))
     verdict(report, workload, "full rebuild, against the fastest peer",
-            againstPeers(outcome, rebuilt->timing, false), 1);
+            againstBaselines(outcome, rebuilt->timing, false), 1);
 }
 
 void race(Report& report, const Options& options, Workload& workload, int threads) {

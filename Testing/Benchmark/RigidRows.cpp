@@ -4,8 +4,8 @@
 
 #include "Common/RandomMeshes.h"
 
-#ifdef PALPATE_BENCHMARK_PEERS
-#include "Peers/FclBody.h"
+#ifdef PALPATE_BENCHMARK_BASELINES
+#include "Baselines/FclBody.h"
 #endif
 
 #include <palpate/OctreeBasedCD.h>
@@ -108,7 +108,7 @@ void rigidRows(Report& report, const RowOptions& options) {
         report.row("rigid", "bone-tissue", threads, name, "frame ms", median(moved.samples),
                    moved.hash);
       }
-#ifdef PALPATE_BENCHMARK_PEERS
+#ifdef PALPATE_BENCHMARK_BASELINES
   FclBody fcl(tissue(0).positions, tissue(0).triangles, body.positions, body.triangles);
   std::vector<double> samples;
   std::size_t contacts = 0;

@@ -78,11 +78,11 @@ void stageRow(Report& report, const Workload& workload, OctreeUpdate update, int
   row("order ns a pair", order * perPair);
 }
 
-std::unique_ptr<Peer> shipped() { return makePalpate(OctreeUpdate::Auto, PairOrder::Found); }
+std::unique_ptr<BroadPhase> shipped() { return makePalpate(OctreeUpdate::Auto, PairOrder::Found); }
 
 /// The same engine over two workloads, in turns; the second against the first.
 void pairedRow(Report& report, const char* table, const Workload& first, const Workload& second,
-               std::unique_ptr<Peer> (*make)(), const MeasureOptions& options) {
+               std::unique_ptr<BroadPhase> (*make)(), const MeasureOptions& options) {
   const auto engineA = make(), engineB = make();
   engineA->prepare(first.task, first.frames[0]);
   engineB->prepare(second.task, second.frames[0]);
@@ -101,7 +101,9 @@ void pairedRow(Report& report, const char* table, const Workload& first, const W
   row("ratio", factor);
 }
 
-std::unique_ptr<Peer> rebuilding() { return makePalpate(OctreeUpdate::Rebuild, PairOrder::Found); }
+std::unique_ptr<BroadPhase> rebuilding() {
+  return makePalpate(OctreeUpdate::Rebuild, PairOrder::Found);
+}
 
 }  // namespace
 
@@ -142,10 +144,10 @@ void wholeFrameRows(Report& report, const RowOptions& options) {
       }
     }
     std::string embree = "-";
-#ifdef PALPATE_BENCHMARK_PEERS
-    const auto peer = makeEmbreeMorton();
-    peer->prepare(workload.task, workload.frames[0]);
-    const Contestant contestant{peer.get(), &workload.frames};
+#ifdef PALPATE_BENCHMARK_BASELINES
+    const auto embreeRebuild = makeEmbreeMorton();
+    embreeRebuild->prepare(workload.task, workload.frames[0]);
+    const Contestant contestant{embreeRebuild.get(), &workload.frames};
     embree = milliseconds(takeTurns({&contestant, 1}, options.measure)[0].total);
     report.row("whole frame", "organs", threads, "Embree rebuild + collide", "median ms",
                std::stod(embree));
@@ -171,7 +173,7 @@ void farFlungRows(Report& report, const RowOptions& options) {
     flingTriangle(flung);
     pairedRow(report, "far-flung", plain, flung, shipped, options.measure);
     pairedRow(report, "far-flung", plain, flung, rebuilding, options.measure);
-#ifdef PALPATE_BENCHMARK_PEERS
+#ifdef PALPATE_BENCHMARK_BASELINES
     pairedRow(report, "far-flung", plain, flung, makeEmbreeRefit, options.measure);
     pairedRow(report, "far-flung", plain, flung, makeEmbreeMorton, options.measure);
 #endif
@@ -253,7 +255,7 @@ void scaleRows(Report& report, const RowOptions& options) {
   if (!options.quick) names.push_back("sheets-4M");
   for (const std::string& name : names) {
     Workload workload = makeWorkload(name, options.frames, options.sharedData);
-    std::unique_ptr<Peer> engines[4];
+    std::unique_ptr<BroadPhase> engines[4];
     std::vector<Contestant> contestants;
     for (int i = 0; i < 4; ++i) {
       workload.task.threads = 1 + i / 2;
@@ -331,7 +333,7 @@ void simdRows(Report& report, const RowOptions& options) {
     const Workload workload = makeWorkload(name, options.frames, options.sharedData);
     for (const std::string& path : simdPaths()) {
       useSimdPath(path);
-      std::vector<std::unique_ptr<Peer>> engines;
+      std::vector<std::unique_ptr<BroadPhase>> engines;
       engines.push_back(shipped());
       engines.push_back(rebuilding());
       const Outcome outcome = measure(workload, engines, options.measure);

@@ -3,8 +3,8 @@
 // FCL.
 #include "Rows.h"
 
-#ifdef PALPATE_BENCHMARK_PEERS
-#include "Peers/FclCapsule.h"
+#ifdef PALPATE_BENCHMARK_BASELINES
+#include "Baselines/FclCapsule.h"
 #endif
 
 #include <palpate/OctreeBasedCD.h>
@@ -65,7 +65,7 @@ double pairTime(OctreeBasedCD& detection, GeometryId mesh, GeometryId tool, int 
   return milliseconds;
 }
 
-#ifdef PALPATE_BENCHMARK_PEERS
+#ifdef PALPATE_BENCHMARK_BASELINES
 void fclRow(Report& report) {
   FclCapsule fcl(waves(0), quads());
   std::vector<double> samples;
@@ -114,7 +114,7 @@ void shapeRows(Report& report, const RowOptions& options) {
         report.row("shapes", scene, settings.threads, name, "of 0.1 ms",
                    median(samples) / kMilliseconds);
     }
-#ifdef PALPATE_BENCHMARK_PEERS
+#ifdef PALPATE_BENCHMARK_BASELINES
     if (triangles) fclRow(report);
 #endif
   }

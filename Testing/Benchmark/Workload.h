@@ -1,6 +1,6 @@
 #pragma once
 
-#include "Peers/Peer.h"
+#include "BroadPhase.h"
 
 #include <string>
 #include <vector>

@@ -1,5 +1,5 @@
 // Octrees to candidate pairs: of trees as shipped, and of fresh ones.
-#include "Arrows/Arrow.h"
+#include "Stages/TimeStage.h"
 
 using namespace palpate;
 using namespace palpate::benchmark;

@@ -27,9 +27,9 @@ using Positions = std::vector<std::vector<Eigen::Vector3d>>;
 /// An engine that answers a frame's positions with all pairs of triangles whose boxes overlap, in
 /// memory and in the order found. Self-collision: each unordered pair once, a < b, no vertex
 /// shared.
-class Peer {
+class BroadPhase {
  public:
-  virtual ~Peer() = default;
+  virtual ~BroadPhase() = default;
   virtual std::string name() const = 0;
   virtual bool rebuilds() const = 0;  ///< from nothing every frame
   virtual void prepare(const Task&, const Positions&) = 0;
@@ -40,11 +40,11 @@ class Peer {
   virtual std::vector<ElementPair> candidates(std::size_t pair) const = 0;
 };
 
-std::unique_ptr<Peer> makeEmbreeRefit();
-std::unique_ptr<Peer> makeEmbreeMorton();
-std::unique_ptr<Peer> makeBullet();
-std::unique_ptr<Peer> makeFcl();
-std::unique_ptr<Peer> makeCgal();
+std::unique_ptr<BroadPhase> makeEmbreeRefit();
+std::unique_ptr<BroadPhase> makeEmbreeMorton();
+std::unique_ptr<BroadPhase> makeBullet();
+std::unique_ptr<BroadPhase> makeFcl();
+std::unique_ptr<BroadPhase> makeCgal();
 
 /// Which points are inside a closed body, with the nearest point of its surface: how long it took
 /// without the building of its trees, how many they are, and their depths' sum.
