@@ -11,7 +11,7 @@ namespace palpate::testing {
 namespace {
 
 constexpr std::size_t kMostBodies = 6, kMostPairs = 6;
-constexpr int kTypes = 8;  ///< see randomThing() and add()
+constexpr int kTypes = 8;  ///< see randomGeometry() and add()
 
 Settings settingsOfLife(Random& random) {
   Settings settings = settingsOf(Engine::Octree, random() % 4 == 0 ? 2 : 1,
@@ -49,9 +49,9 @@ void append(std::vector<std::uint64_t>& words, const InsideVertex& v) {
 
 std::size_t RandomHistory::Body::elements() const {
   if (shape) return 0;
-  return thing.type == GeometryType::Points  ? thing.positions.size()
-         : thing.type == GeometryType::Lines ? thing.segments.size()
-                                             : thing.triangles.size();
+  return geometry.type == GeometryType::Points  ? geometry.positions.size()
+         : geometry.type == GeometryType::Lines ? geometry.segments.size()
+                                                : geometry.triangles.size();
 }
 
 RandomHistory::RandomHistory(std::uint64_t seed)
@@ -87,21 +87,22 @@ Positions RandomHistory::randomMotion(const Positions& from) {
   return to;
 }
 
-Thing RandomHistory::randomThing(int type) {
+TestGeometry RandomHistory::randomGeometry(int type) {
   switch (type) {
     case 0:
     case 1:
-      return things(soup(m_random, m_random() % 12, uniform(m_random, 0.05, 0.4)));
+      return testGeometry(soup(m_random, m_random() % 12, uniform(m_random, 0.05, 0.4)));
     case 2:
-      return things(sphere(3, 4, randomPoint(m_random, 0.3, 0.7), uniform(m_random, 0.1, 0.5)));
+      return testGeometry(
+          sphere(3, 4, randomPoint(m_random, 0.3, 0.7), uniform(m_random, 0.1, 0.5)));
     case 3:
-      return things(sheet(2, uniform(m_random, 0.3, 0.7), 0));
+      return testGeometry(sheet(2, uniform(m_random, 0.3, 0.7), 0));
     case 4: {
-      const Thing line = thread(m_random, 2 + m_random() % 8, 0.3, 0.02, m_random() % 2);
+      const TestGeometry line = thread(m_random, 2 + m_random() % 8, 0.3, 0.02, m_random() % 2);
       return m_random() % 3 ? line : tapered(m_random, line, 0.05);
     }
     default: {
-      const Thing points = particles(m_random, 1 + m_random() % 12, 0.05);
+      const TestGeometry points = particles(m_random, 1 + m_random() % 12, 0.05);
       return m_random() % 3 ? points : tapered(m_random, points, 0.1);
     }
   }
@@ -118,8 +119,8 @@ Solid RandomHistory::randomSolid() {
 GeometryId RandomHistory::addTo(OctreeBasedCD& collisions, const Body& body) {
   if (body.shape) return collisions.addAnalyticalGeometry(*body.shape);
   if (!body.tetrahedra.empty())
-    return collisions.addTetrahedralMesh(body.thing.positions, body.tetrahedra);
-  return body.thing.addTo(collisions);
+    return collisions.addTetrahedralMesh(body.geometry.positions, body.tetrahedra);
+  return body.geometry.addTo(collisions);
 }
 
 void RandomHistory::add() {
@@ -128,7 +129,7 @@ void RandomHistory::add() {
   const int type = static_cast<int>(m_random() % kTypes);
   if (type == 6) {
     const Solid solid = randomSolid();
-    body.thing.positions = solid.positions;
+    body.geometry.positions = solid.positions;
     body.tetrahedra = solid.tetrahedra;
   } else if (type == 7) {
     const std::array<AnalyticalGeometry, 5> shapes{
@@ -137,16 +138,16 @@ void RandomHistory::add() {
         ConvexHull{soup(m_random, 2, 0.3).positions}};
     body.shape = shapes[m_random() % 5];
   } else {
-    body.thing = randomThing(type);
+    body.geometry = randomGeometry(type);
   }
   const GeometryId id = addTo(m_life, body);
   ASSERT_EQ(addTo(m_committed, body), id);
   ASSERT_FALSE(m_bodies.contains(id)) << "an id was given out twice";
   if (!body.tetrahedra.empty()) {
     const auto surface = m_life.surface(id).triangles;
-    body.thing.triangles.assign(surface.begin(), surface.end());
+    body.geometry.triangles.assign(surface.begin(), surface.end());
   }
-  body.before = body.now = body.thing.positions;
+  body.before = body.now = body.geometry.positions;
   m_bodies.emplace(id, std::move(body));
 }
 
@@ -159,7 +160,7 @@ void RandomHistory::remove(GeometryId id) {
 
 void RandomHistory::setPositions(GeometryId id) {
   Body& body = m_bodies.at(id);
-  const Positions now = randomMotion(m_random() % 4 ? body.now : body.thing.positions);
+  const Positions now = randomMotion(m_random() % 4 ? body.now : body.geometry.positions);
   if (m_random() % 4 == 0) {
     const Positions before = m_random() % 3 ? randomMotion(body.before) : body.before;
     if (!accepts([&] { m_life.setPositions(id, before, now); })) return;
@@ -202,20 +203,21 @@ void RandomHistory::setTopology(GeometryId id) {
   Body& body = m_bodies.at(id);
   Body next = body;
   if (body.tetrahedra.empty()) {
-    next.thing = randomThing(static_cast<int>(m_random() % 4));
+    next.geometry = randomGeometry(static_cast<int>(m_random() % 4));
     for (OctreeBasedCD* each : {&m_life, &m_committed})
-      if (!accepts([&] { each->setTriangles(id, next.thing.positions, next.thing.triangles); }))
+      if (!accepts(
+              [&] { each->setTriangles(id, next.geometry.positions, next.geometry.triangles); }))
         return;
   } else {
     const Solid solid = randomSolid();
-    next.thing.positions = solid.positions;
+    next.geometry.positions = solid.positions;
     next.tetrahedra = solid.tetrahedra;
     for (OctreeBasedCD* each : {&m_life, &m_committed})
       each->setTetrahedra(id, solid.positions, solid.tetrahedra);
     const auto surface = m_life.surface(id).triangles;
-    next.thing.triangles.assign(surface.begin(), surface.end());
+    next.geometry.triangles.assign(surface.begin(), surface.end());
   }
-  next.before = next.now = next.thing.positions;
+  next.before = next.now = next.geometry.positions;
   next.isNew = true;
   next.bodyGiven = false;
   next.disabled.clear();

@@ -5,7 +5,7 @@
 
 #include "Common/PairRun.h"
 #include "Common/Solids.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <Eigen/Geometry>
 
@@ -36,7 +36,7 @@ class RandomHistory {
 
  private:
   struct Body {
-    Thing thing;                          ///< of the last topology; its positions at rest
+    TestGeometry geometry;                ///< of the last topology; its positions at rest
     std::vector<Tetrahedron> tetrahedra;  ///< of a tetrahedral mesh
     std::optional<AnalyticalGeometry> shape;
     Positions before, now;  ///< in the body's frame
@@ -46,7 +46,7 @@ class RandomHistory {
     CollisionFilter filter{};
     std::vector<std::uint32_t> disabled{};
 
-    bool isMesh() const { return !shape && thing.type == GeometryType::Triangles; }
+    bool isMesh() const { return !shape && geometry.type == GeometryType::Triangles; }
     std::size_t elements() const;
   };
   struct Pair {
@@ -68,7 +68,7 @@ class RandomHistory {
   void query();
 
   GeometryId anyBody();
-  Thing randomThing(int type);
+  TestGeometry randomGeometry(int type);
   Solid randomSolid();
   PairSettings randomSettings();
   Positions randomMotion(const Positions&);

@@ -129,9 +129,9 @@ void compareShapes(const char* name, Layout layout) {
     }
 }
 
-TEST(FclDifferences, ShapesAtRandom) { compareShapes("at random", Layout::Any); }
+TEST(FclDifferences, RandomShapes) { compareShapes("at random", Layout::Any); }
 TEST(FclDifferences, ShapesOnAGrid) { compareShapes("on a grid", Layout::Grid); }
-TEST(FclDifferences, ShapesAThousandthAsLarge) { compareShapes("of 1e-3", Layout::Small); }
+TEST(FclDifferences, ShapesScaledByAThousandth) { compareShapes("of 1e-3", Layout::Small); }
 
 }  // namespace
 }  // namespace palpate::testing

@@ -39,7 +39,7 @@ class Both {
   FclEngine fcl;
 };
 
-TEST(FclEngine, MeshesIntersectAsInOctreeBasedCD) {
+TEST(FclEngine, MeshIntersectionsMatchOctreeBasedCD) {
   Random random(1);
   Both both;
   Mesh sheets[] = {sheet(12, 0.5, 0), soup(random, 60, 0.2)};
@@ -63,7 +63,7 @@ TEST(FclEngine, MeshesIntersectAsInOctreeBasedCD) {
   EXPECT_GT(found, 300u);
 }
 
-TEST(FclEngine, MeshesWithoutTrianglesHaveNone) {
+TEST(FclEngine, MeshesWithoutTrianglesHaveNoContacts) {
   FclEngine engine;
   const std::vector<Vector3d> positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const GeometryId a = engine.addTriangleMesh(positions, {}),
@@ -78,7 +78,7 @@ TEST(FclEngine, MeshesWithoutTrianglesHaveNone) {
   EXPECT_FALSE(engine.collisionData(a, b).validity().trusted);
 }
 
-TEST(FclEngine, ShapesByHand) {
+TEST(FclEngine, ShapesMatchHandComputedValues) {
   const auto only = [](const AnalyticalGeometry& a, const AnalyticalGeometry& b, double thickness) {
     FclEngine engine;
     const GeometryId first = engine.addAnalyticalGeometry(a),
@@ -110,7 +110,7 @@ TEST(FclEngine, ShapesByHand) {
   EXPECT_TRUE(only(ball, Plane{}, 0).empty());
 }
 
-TEST(FclEngine, WhatFclCannotIsRefusedByName) {
+TEST(FclEngine, UnsupportedPairsThrowErrorsThatNameThem) {
   FclEngine engine;
   const std::vector<Vector3d> positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const std::vector<Triangle> triangles{{0, 1, 2}};
@@ -144,7 +144,7 @@ TEST(FclEngine, WhatFclCannotIsRefusedByName) {
   EXPECT_TRUE(engine.pairs().empty());
 }
 
-TEST(FclEngine, BadInputIsRefusedAsByOctreeBasedCD) {
+TEST(FclEngine, BadInputThrowsTheErrorsOfOctreeBasedCD) {
   FclEngine engine;
   const auto refusal = [](auto&& call) {
     try {

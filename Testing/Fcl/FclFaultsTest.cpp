@@ -70,7 +70,7 @@ TEST(FclFaults, ContainedMeshesGiveNoContact) {
 }
 
 // Confirmed: contacts of neighbours at one place; and of triangles in one plane several for a pair.
-TEST(FclFaults, ContactsComeSeveralTimes) {
+TEST(FclFaults, ContactsAreReportedSeveralTimes) {
   const auto count = [](const Mesh& first, const Mesh& second) {
     const fcl::CollisionResultd result = collide(*modelOf(first), kHere, *modelOf(second), kHere);
     std::set<std::pair<std::intptr_t, std::intptr_t>> pairs;
@@ -91,7 +91,7 @@ TEST(FclFaults, ContactsComeSeveralTimes) {
 }
 
 // Refuted of the tree, confirmed of the model's own box, by which the broad phase goes.
-TEST(FclFaults, AModelsOwnBoxStaysWhereItWas) {
+TEST(FclFaults, BoxOfAReplacedModelIsNotUpdated) {
   Mesh mesh = sphere(8, 8, {0, 0, 0}, 1);
   const auto model = modelOf(mesh), still = modelOf(sphere(8, 8, {10.5, 0, 0}, 1));
   fcl::CollisionObjectd moved(model), other(still);
@@ -119,7 +119,7 @@ TEST(FclFaults, AModelsOwnBoxStaysWhereItWas) {
 }
 
 // Refuted of normals, but for one in a hundred; confirmed of depths.
-TEST(FclFaults, DepthsDependOnTheOrder) {
+TEST(FclFaults, DepthsDependOnTheOrderOfTheObjects) {
   Random random(3);
   const fcl::Capsuled a(0.2, 0.8), b(0.3, 0.5);
   int overlaps = 0, otherNormals = 0, otherDepths = 0;
@@ -151,7 +151,7 @@ TEST(FclFaultsDeathTest, SignedDistanceOfConcentricSpheresNeverEnds) {
 }
 
 // Found here: on a grid an assertion of FCL's own ends the process.
-TEST(FclFaultsDeathTest, DistanceEndsTheProcessOnAGrid) {
+TEST(FclFaultsDeathTest, DistanceOnAGridAbortsTheProcess) {
   const auto ask = [] {
     Random random(1);
     for (int run = 0; run < 10000; ++run) {
@@ -170,7 +170,7 @@ TEST(FclFaultsDeathTest, DistanceEndsTheProcessOnAGrid) {
 }
 
 // Found here: of a hull with a plane of two sides FCL calls a function that is not there.
-TEST(FclFaultsDeathTest, HullWithPlaneEndsTheProcess) {
+TEST(FclFaultsDeathTest, HullAgainstPlaneAbortsTheProcess) {
   const auto ask = [] {
     const auto points = std::make_shared<std::vector<Vector3d>>(
         std::vector<Vector3d>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}});

@@ -8,7 +8,7 @@
 #include "Common/FailingAllocation.h"
 #include "Common/PairRun.h"
 #include "Common/Solids.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 #include "Common/Sanitized.h"
 
 #include <Eigen/Geometry>
@@ -234,7 +234,7 @@ class AllocationFailure : public ::testing::TestWithParam<int> {
   Settings settings() const { return settingsOf(Engine::Octree, GetParam()); }
 };
 
-TEST_P(AllocationFailure, LeavesTheObjectAsItWas) {
+TEST_P(AllocationFailure, LeavesTheObjectUnchanged) {
   std::size_t failures = 0;
   for (const Call& call : calls()) {
     SCOPED_TRACE(call.name);
@@ -277,7 +277,7 @@ TEST_P(AllocationFailure, LeavesTheObjectAsItWas) {
 }
 
 /// The first and the second frame of two sheets of 800 triangles.
-TEST_P(AllocationFailure, LeavesTheNextFrameRight) {
+TEST_P(AllocationFailure, NextFrameIsCorrect) {
   for (const Method method :
        {Method::Proximity, Method::Continuous, Method::Intersection, Method::Auto})
     for (const bool first : {true, false}) {
@@ -331,7 +331,7 @@ TEST_P(AllocationFailure, LeavesTheNextFrameRight) {
     }
 }
 
-TEST_P(AllocationFailure, LeavesTheStepOfAGuardAsItWas) {
+TEST_P(AllocationFailure, LeavesTheStepGuardUnchanged) {
   const Mesh body = sphere(5, 6, {0.51, 0.47, 0.53}, 0.4), floor = sheet(4, 0.5, 0.3);
   Random random(6);
   const Positions bodyNow = moved(random, body.positions, 0.3),
@@ -372,7 +372,7 @@ TEST_P(AllocationFailure, LeavesTheStepOfAGuardAsItWas) {
 INSTANTIATE_TEST_SUITE_P(Threads, AllocationFailure, ::testing::Values(1, 2));
 
 /// What solvers append to keeps what it held.
-TEST(AllocationFailureOf, AppendedRowsAndMotions) {
+TEST(AllocationFailureWhileAppendingOrCapturing, AppendedRowsAndMotionsStayUnchanged) {
   const Mesh low = sheet(3, 0.0, 0.0), high = sheet(3, 0.0, 0.2);
   const CollisionData contacts = detectCollision(
       {low.positions, low.triangles}, {high.positions, high.triangles}, {Method::Proximity, 0.5});
@@ -405,7 +405,7 @@ TEST(AllocationFailureOf, AppendedRowsAndMotions) {
   expectKept(motions, [&] { appendMotions(contacts, {a}, {b}, motions); });
 }
 
-TEST(AllocationFailureOf, ACaptureLeavesNoPartOfAFile) {
+TEST(AllocationFailureWhileAppendingOrCapturing, CaptureLeavesNoPartialFile) {
   const Mesh mesh = sheet(2, 0.0, 0.0);
   OctreeBasedCD collisions;
   collisions.addTriangleMesh(mesh.positions, mesh.triangles);

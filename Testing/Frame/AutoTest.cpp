@@ -65,7 +65,7 @@ constexpr Motion kMotions[]{{"still", 0, 0, 0},
                             {"mixed", 0.0005, 0.1, 0.2},
                             {"fast", 0.1, 0, 0}};
 
-TEST(Auto, AnswersAsBruteForceDoes) {
+TEST(Auto, MatchesBruteForce) {
   Random random(11);
   std::set<MethodReason> reasons;
   for (int i = 0; i < 120; ++i) {
@@ -106,7 +106,7 @@ std::set<std::array<std::uint32_t, 5>> idsOf(const CollisionData& data) {
   return ids;
 }
 
-TEST(Auto, MissesNothingThatContinuousFinds) {
+TEST(Auto, FindsEverythingThatContinuousFinds) {
   Random random(12);
   std::size_t found = 0;
   for (int i = 0; i < 1500; ++i) {
@@ -142,7 +142,7 @@ TEST(Auto, MissesNothingThatContinuousFinds) {
 
 /// Distinct: what Continuous finds is there, or a contact of the same vertex (of a vertex of each
 /// edge) stands for it.
-TEST(Auto, DistinctContactsStandForAllThatContinuousFinds) {
+TEST(Auto, DistinctContactsRepresentAllThatContinuousFinds) {
   Random random(13);
   std::size_t found = 0;
   for (int i = 0; i < 1500; ++i) {

@@ -1,5 +1,5 @@
 #include "Common/PairRun.h"
-#include "Common/Zoo.h"
+#include "Common/DegenerateCases.h"
 
 #include <gtest/gtest.h>
 
@@ -54,7 +54,7 @@ void count(const Mesh& a, const Mesh& b, const PairSettings& settings, const Vec
 
 class CandidateOffsets : public ::testing::TestWithParam<MethodCase> {};
 
-TEST_P(CandidateOffsets, AreCompleteAndFewMoreUpToWhereFeaturesBlur) {
+TEST_P(CandidateOffsets, CandidatesAreCompleteAndFewAtEveryOffset) {
   Random random(1);
   const std::pair<Mesh, Mesh> scenes[]{
       {soup(random, 250, 0.05), soup(random, 200, 0.08)},

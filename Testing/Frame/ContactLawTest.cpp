@@ -2,8 +2,8 @@
 
 #include "Common/PairRun.h"
 #include "Common/Solids.h"
-#include "Common/Things.h"
-#include "Common/Zoo.h"
+#include "Common/TestGeometry.h"
+#include "Common/DegenerateCases.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -264,30 +264,30 @@ struct Body {
   std::function<void(OctreeBasedCD&, GeometryId)> move;
 };
 
-Body bodyOf(std::string name, const Thing& thing, Positions now) {
+Body bodyOf(std::string name, const TestGeometry& geometry, Positions now) {
   return {std::move(name),
-          [thing](OctreeBasedCD& collisions) { return thing.addTo(collisions); },
-          {thing.positions, now, thing.radii},
+          [geometry](OctreeBasedCD& collisions) { return geometry.addTo(collisions); },
+          {geometry.positions, now, geometry.radii},
           [=](OctreeBasedCD& collisions, GeometryId id) {
-            collisions.setPositions(id, thing.positions, now);
+            collisions.setPositions(id, geometry.positions, now);
           }};
 }
 
 /// The same placed: the body's frame is turned and shifted, and turns further in the step.
-Body placed(std::string name, const Thing& thing, double angle, const Vector3d& shift) {
+Body placed(std::string name, const TestGeometry& geometry, double angle, const Vector3d& shift) {
   using Turn = Eigen::AngleAxisd;
   const Vector3d axis = Vector3d(1, 2, 3).normalized(), centre(0.5, 0.5, 0.5);
   const std::array<Eigen::Matrix3d, 2> turns{Turn(0.3, axis).toRotationMatrix(),
                                              Turn(0.3 + angle, axis).toRotationMatrix()};
   const std::array<Vector3d, 2> shifts{centre - turns[0] * centre,
                                        centre - turns[1] * centre + shift};
-  Side side{{}, {}, thing.radii};
-  for (const Vector3d& x : thing.positions) {
+  Side side{{}, {}, geometry.radii};
+  for (const Vector3d& x : geometry.positions) {
     side.before.push_back(turns[0] * x + shifts[0]);
     side.now.push_back(turns[1] * x + shifts[1]);
   }
-  return {std::move(name), [thing](OctreeBasedCD& collisions) { return thing.addTo(collisions); },
-          side,
+  return {std::move(name),
+          [geometry](OctreeBasedCD& collisions) { return geometry.addTo(collisions); }, side,
           [=](OctreeBasedCD& collisions, GeometryId id) {
             collisions.setTransform(id, turns[0], shifts[0], turns[1], shifts[1]);
           }};
@@ -305,10 +305,12 @@ Body shapeOf(std::string name, const AnalyticalGeometry& shape, const Vector3d& 
 
 /// Every kind of geometry in the unit cube, with steps of about `motion`.
 std::vector<Body> bodies(Random& random, double motion) {
-  const Thing triangles = things(soup(random, 60, 0.15)), sheets = things(sheet(6, 0.5, 0.3)),
-              line = thread(random, 40, 0.15, 0.02, false), points = particles(random, 50, 0.03);
-  const Thing taperedLine = tapered(random, line, 0.05),
-              taperedPoints = tapered(random, points, 0.05);
+  const TestGeometry triangles = testGeometry(soup(random, 60, 0.15)),
+                     sheets = testGeometry(sheet(6, 0.5, 0.3)),
+                     line = thread(random, 40, 0.15, 0.02, false),
+                     points = particles(random, 50, 0.03);
+  const TestGeometry taperedLine = tapered(random, line, 0.05),
+                     taperedPoints = tapered(random, points, 0.05);
   Solid block = cells(2, random);
   for (Vector3d& x : block.positions) x = 0.25 * x + Vector3d(0.3, 0.25, 0.27);
   const Positions blockNow = moved(random, block.positions, motion);
@@ -426,13 +428,12 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
 /// Degenerate meshes, coordinates near the ends of what double holds, and self-collision.
 TEST(ContactLaw, HoldsForDegenerateMeshes) {
   Seen seen;
-  for (const Specimen& specimen : zoo()) {
-    const auto aBefore = specimen.aBefore(), bBefore = specimen.bBefore();
-    const Side a{aBefore, specimen.a.positions, {}}, b{bBefore, specimen.b.positions, {}};
-    for (const MethodCase& method : methodCases(specimen.thickness)) {
-      SCOPED_TRACE(specimen.name + ", " + method.name);
-      PairRun run(settingsOf(Engine::Octree), specimen.a, specimen.b, method.settings,
-                  !specimen.large);
+  for (const DegenerateCase& input : degenerateCases()) {
+    const auto aBefore = input.aBefore(), bBefore = input.bBefore();
+    const Side a{aBefore, input.a.positions, {}}, b{bBefore, input.b.positions, {}};
+    for (const MethodCase& method : methodCases(input.thickness)) {
+      SCOPED_TRACE(input.name + ", " + method.name);
+      PairRun run(settingsOf(Engine::Octree), input.a, input.b, method.settings, !input.large);
       run.step(aBefore, a.now, bBefore, b.now);
       for (const CollisionPair& pair : run.detection().pairs())
         Law(run.detection().collisionData(pair.a, pair.b), pair.a == run.a() ? a : b,

@@ -1,5 +1,5 @@
 #include "Common/PairRun.h"
-#include "Common/Zoo.h"
+#include "Common/DegenerateCases.h"
 #include "Unit/Math/TrianglePairs.h"
 
 #include <palpate/ConstraintRows.h>
@@ -79,14 +79,14 @@ auto unchanged(F&& call) {
 }
 
 /// Answers of one frame, in a mode that is set before everything.
-std::vector<Rows> answers(const Specimen& specimen, const PairSettings& settings, int threads,
+std::vector<Rows> answers(const DegenerateCase& input, const PairSettings& settings, int threads,
                           const Mode& mode) {
-  const std::vector<Eigen::Vector3d> aBefore = specimen.aBefore(), bBefore = specimen.bBefore();
+  const std::vector<Eigen::Vector3d> aBefore = input.aBefore(), bBefore = input.bBefore();
   const InMode inMode(mode);
   const unsigned set = _mm_getcsr();
-  PairRun run(settingsOf(Engine::Octree, threads), specimen.a, specimen.b, settings);
-  run.detection().setPositions(run.a(), aBefore, specimen.a.positions);
-  run.detection().setPositions(run.b(), bBefore, specimen.b.positions);
+  PairRun run(settingsOf(Engine::Octree, threads), input.a, input.b, settings);
+  run.detection().setPositions(run.a(), aBefore, input.a.positions);
+  run.detection().setPositions(run.b(), bBefore, input.b.positions);
   run.detection().detectCollision();
   EXPECT_EQ(_mm_getcsr() & ~0x3fu, set & ~0x3fu);
   return run.answers();
@@ -94,18 +94,18 @@ std::vector<Rows> answers(const Specimen& specimen, const PairSettings& settings
 
 class FloatingPoint : public ::testing::TestWithParam<MethodCase> {};
 
-TEST_P(FloatingPoint, OfTheCallerChangesNoBit) {
+TEST_P(FloatingPoint, ModeOfTheCallerChangesNoBit) {
   const std::set<std::string> names{"denormal coordinates",   "among the smallest normals",
                                     "beyond float's range",   "slivers of 1e-12",
                                     "vertex exactly on face", "one vertex far away"};
   std::size_t seen = 0;
-  for (const Specimen& specimen : zoo()) {
-    if (!names.contains(specimen.name)) continue;
-    SCOPED_TRACE(specimen.name);
+  for (const DegenerateCase& input : degenerateCases()) {
+    if (!names.contains(input.name)) continue;
+    SCOPED_TRACE(input.name);
     ++seen;
     PairSettings settings = GetParam().settings;
-    settings.thickness *= specimen.thickness;
-    const std::vector<Rows> truth = answers(specimen, settings, 1, kStandard);
+    settings.thickness *= input.thickness;
+    const std::vector<Rows> truth = answers(input, settings, 1, kStandard);
     // A thickness that is denormal would be refused as zero where denormals are.
     const bool denormal = settings.thickness < 0x1p-1022;
     const unsigned both = kFlushToZero | (denormal ? 0 : kDenormalsAreZero);
@@ -113,7 +113,7 @@ TEST_P(FloatingPoint, OfTheCallerChangesNoBit) {
                              Mode{"flushing and downward", FE_DOWNWARD, both},
                              Mode{"trapping", FE_TONEAREST, 0, true}}) {
       SCOPED_TRACE(mode.name);
-      expectSame(answers(specimen, settings, 2, mode), truth);
+      expectSame(answers(input, settings, 2, mode), truth);
     }
   }
   EXPECT_EQ(seen, names.size());
@@ -178,7 +178,7 @@ Bits featureAnswers(const test::CornersPair& pair, const Mode& mode) {
   return bits;
 }
 
-TEST(FloatingPointOfSingleFeatures, ChangesNoBit) {
+TEST(FloatingPointInSingleFunctions, ModeOfTheCallerChangesNoBit) {
   test::Random random(1);
   for (int repeat = 0; repeat < 3200; ++repeat) {
     const auto kind = static_cast<test::Kind>(repeat % static_cast<int>(test::Kind::Count));
@@ -195,9 +195,9 @@ struct TripletOfBits {
 };
 
 /// Of detectCollision() on two meshes, and of what makes a solver's rows of its contacts.
-Bits meshAnswers(const Specimen& specimen, const PairSettings& settings, const Mode& mode) {
-  const Mesh &a = specimen.a, &b = specimen.b;
-  const std::vector<Eigen::Vector3d> aBefore = specimen.aBefore(), bBefore = specimen.bBefore();
+Bits meshAnswers(const DegenerateCase& input, const PairSettings& settings, const Mode& mode) {
+  const Mesh &a = input.a, &b = input.b;
+  const std::vector<Eigen::Vector3d> aBefore = input.aBefore(), bBefore = input.bBefore();
   const auto first = static_cast<std::uint32_t>(a.positions.size());
   std::vector<Eigen::Vector3d> all = a.positions;
   all.insert(all.end(), b.positions.begin(), b.positions.end());
@@ -225,19 +225,19 @@ Bits meshAnswers(const Specimen& specimen, const PairSettings& settings, const M
   return bits;
 }
 
-TEST(FloatingPointOfOneCall, ChangesNoBit) {
+TEST(FloatingPointInOneCall, ModeOfTheCallerChangesNoBit) {
   std::size_t rows = 0;
-  for (const Specimen& specimen : zoo()) {
+  for (const DegenerateCase& input : degenerateCases()) {
     PairSettings settings;
     settings.method = Method::Proximity;
-    settings.thickness = specimen.thickness;
+    settings.thickness = input.thickness;
     // A thickness that is denormal would be refused as zero where denormals are.
-    if (specimen.large || settings.thickness < 0x1p-1022) continue;
-    SCOPED_TRACE(specimen.name);
-    const Bits truth = meshAnswers(specimen, settings, kStandard);
+    if (input.large || settings.thickness < 0x1p-1022) continue;
+    SCOPED_TRACE(input.name);
+    const Bits truth = meshAnswers(input, settings, kStandard);
     rows += truth.size();
     for (const Mode& mode : kModes)
-      ASSERT_EQ(meshAnswers(specimen, settings, mode), truth) << mode.name;
+      ASSERT_EQ(meshAnswers(input, settings, mode), truth) << mode.name;
   }
   EXPECT_GT(rows, 1000u);
 }
@@ -247,16 +247,16 @@ std::string contentOf(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-TEST(FloatingPointOfCaptures, ChangesNoByte) {
+TEST(FloatingPointInCaptures, ModeOfTheCallerChangesNoByte) {
   const std::filesystem::path folder = std::filesystem::temp_directory_path(),
                               path = folder / ("FloatingPoint" + std::to_string(getpid()));
-  for (const Specimen& specimen : zoo()) {
+  for (const DegenerateCase& input : degenerateCases()) {
     PairSettings settings;
     settings.method = Method::Continuous;
-    if (specimen.large) continue;
-    SCOPED_TRACE(specimen.name);
-    PairRun run({.threads = 1}, specimen.a, specimen.b, settings);
-    run.step(specimen.aBefore(), specimen.a.positions, specimen.bBefore(), specimen.b.positions);
+    if (input.large) continue;
+    SCOPED_TRACE(input.name);
+    PairRun run({.threads = 1}, input.a, input.b, settings);
+    run.step(input.aBefore(), input.a.positions, input.bBefore(), input.b.positions);
     capture(run.detection(), path);
     const std::string truth = contentOf(path);
     const std::uint64_t hash = run.data().hash();

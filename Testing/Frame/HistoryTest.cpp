@@ -27,7 +27,7 @@ std::size_t live(std::uint64_t seed, int frames) {
 
 class History : public ::testing::TestWithParam<int> {};
 
-TEST_P(History, AnswersByTheLastValuesOnly) {
+TEST_P(History, ContactsDependOnTheLastValuesOnly) {
   EXPECT_GT(live(static_cast<std::uint64_t>(GetParam()), kFrames),
             static_cast<std::size_t>(kFrames));
 }
@@ -35,7 +35,7 @@ TEST_P(History, AnswersByTheLastValuesOnly) {
 INSTANTIATE_TEST_SUITE_P(Lives, History, ::testing::Range(0, kLives));
 
 /// PALPATE_HISTORY_LIVES lives more, each of 1,000 frames; none unless it is set.
-TEST(LongHistory, AnswersByTheLastValuesOnly) {
+TEST(LongHistory, ContactsDependOnTheLastValuesOnly) {
   const char* const lives = std::getenv("PALPATE_HISTORY_LIVES");
   if (!lives) GTEST_SKIP() << "skipped: PALPATE_HISTORY_LIVES is not set";
   std::size_t contacts = 0;

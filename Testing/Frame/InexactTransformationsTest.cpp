@@ -1,5 +1,5 @@
 #include "Common/PairRun.h"
-#include "Common/Zoo.h"
+#include "Common/DegenerateCases.h"
 #include "Frame/ExactContacts.h"
 #include "Frame/Placement.h"
 
@@ -116,7 +116,7 @@ class InexactTransformations : public ::testing::TestWithParam<MethodCase> {
   }
 };
 
-TEST_P(InexactTransformations, ChangeOnlyWhatRoundingChanges) {
+TEST_P(InexactTransformations, ChangeContactsByRoundingOnly) {
   for (const StepScene& scene : scenes())
     for (const Transformation& how : transformations()) {
       SCOPED_TRACE(scene.name + ", " + how.name);
@@ -133,7 +133,7 @@ TEST_P(InexactTransformations, ChangeOnlyWhatRoundingChanges) {
 }
 
 /// The judge above, judged: over a sample of all there is, found or not.
-TEST_P(InexactTransformations, ExactAnswersAreThoseFound) {
+TEST_P(InexactTransformations, ExactContactsMatchReportedOnes) {
   if (distinct() || GetParam().settings.earliestTimeOnly) return;
   std::size_t yes = 0, no = 0;
   for (const StepScene& scene : scenes()) {

@@ -1,6 +1,6 @@
 #include "Common/ObjText.h"
 #include "Common/PairRun.h"
-#include "Common/Zoo.h"
+#include "Common/DegenerateCases.h"
 
 #include <gtest/gtest.h>
 

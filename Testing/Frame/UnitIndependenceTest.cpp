@@ -1,7 +1,7 @@
 #include <palpate/TimeOfImpact.h>
 
 #include "Common/PairRun.h"
-#include "Common/Zoo.h"
+#include "Common/DegenerateCases.h"
 #include "Frame/Placement.h"
 
 #include <gtest/gtest.h>
@@ -111,7 +111,7 @@ class UnitIndependence : public ::testing::TestWithParam<MethodCase> {
   }
 };
 
-TEST_P(UnitIndependence, ByTransformationsThatAreExact) {
+TEST_P(UnitIndependence, ExactTransformationsChangeNothing) {
   for (const StepScene& scene : scenes()) {
     SCOPED_TRACE(scene.name);
     const Placement own(scene, {});

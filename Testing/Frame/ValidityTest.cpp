@@ -131,7 +131,7 @@ Tally livesOf(const PairSettings& settings, double speed, std::uint64_t seed, st
 
 struct MethodTest : ::testing::TestWithParam<MethodCase> {};
 
-TEST_P(MethodTest, FailsNeverSilently) {
+TEST_P(MethodTest, NeverFailsSilently) {
   for (const bool response : {false, true}) {
     Tally all;
     for (const double speed : {0.01, 0.1, 0.3, 0.7, 1.0, 1.5, 3.0, 10.0, 50.0}) {
@@ -214,7 +214,7 @@ Known livesThrough(const PairSettings& settings, const Mesh& a, const Mesh* b, i
   return known;
 }
 
-TEST_P(MethodTest, KnowsTheStartFromImpactsOfTheStepBefore) {
+TEST_P(MethodTest, KnowsStartedApartFromImpactsOfThePreviousStep) {
   const PairSettings& settings = GetParam().settings;
   if (settings.method == Method::Intersection) return;  // it does not ask
   const BallAndSheet scene;
@@ -280,7 +280,7 @@ TEST_P(MethodTest, KnowsTheStartFromImpactsOfTheStepBefore) {
 }
 
 /// Read as positions are copied, or later: of whichever step it is.
-TEST(Displacement, IsThatOfTheStep) {
+TEST(Displacement, IsTheRelativeMotionOfTheStep) {
   for (const int threads : {1, 2}) {
     Random random(3);
     const Mesh mesh = soup(random, 7000, 0.01);
@@ -329,7 +329,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 /// A step without motion, with features within the thickness. Then a solver moves positions by less
 /// than that, so that the meshes intersect.
-TEST(StartedApart, IsNotSaidAfterACorrectionBeyondWhatWasLeft) {
+TEST(StartedApart, IsFalseAfterACorrectionBeyondTheRemainingDistance) {
   const Mesh low = sheet(4, 0.0, 0.0);
   std::vector<Eigen::Vector3d> high = low.positions;
   for (Eigen::Vector3d& p : high) p.z() += 0.02;

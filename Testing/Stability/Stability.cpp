@@ -133,7 +133,8 @@ report::View view() {
   report::View view;
   view.title = "Palpate: past the failing point";
   view.paragraphs = {
-      "Two triangles meet in a step, over and over, and one thing about them gets harder from step "
+      "Two triangles meet in a step, over and over, and one geometry about them gets harder from "
+      "step "
       "to step of a sweep. Failed: "
       "they touch and nothing is reported, or something is reported to touch and does not, or a "
       "normal points to the side "

@@ -165,7 +165,7 @@ const std::vector<std::pair<std::string, std::string>> kGood{{"a.obj", kObj},
                                                              {"a.stl", kStl},
                                                              {"binary.stl", binaryStl()}};
 
-TEST_F(MeshFiles, EveryFormatGivesItsVerticesAndFans) {
+TEST_F(MeshFiles, EveryFormatGivesVerticesAndPolygonsAsFans) {
   for (const auto& [name, content] : kGood) {
     const MeshFile mesh = read(name, content);
     const bool hasUnused = name.find("stl") == std::string::npos;
@@ -176,7 +176,7 @@ TEST_F(MeshFiles, EveryFormatGivesItsVerticesAndFans) {
   }
 }
 
-TEST_F(MeshFiles, TruncatedAnywhereIsRefusedOrWhole) {
+TEST_F(MeshFiles, TruncatedFilesAreRefusedOrComplete) {
   // In silence: VTK's own messages would come here.
   testing::internal::CaptureStderr();
   testing::internal::CaptureStdout();
@@ -197,7 +197,7 @@ TEST_F(MeshFiles, TruncatedAnywhereIsRefusedOrWhole) {
   for (const std::string& one : wrong) EXPECT_TRUE(one.starts_with("a.obj")) << one;
 }
 
-TEST_F(MeshFiles, AnyDamagedByteIsReadOrRefusedInSilence) {
+TEST_F(MeshFiles, DamagedFilesAreReadOrRefusedWithoutOutput) {
   testing::internal::CaptureStderr();
   testing::internal::CaptureStdout();
   for (const auto& [name, content] : kGood) {
@@ -224,7 +224,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
-TEST_F(MeshFiles, MissingEmptyFoldersAndUnknownKindsAreRefused) {
+TEST_F(MeshFiles, MissingFilesEmptyFilesFoldersAndUnknownFormatsAreRefused) {
   for (const char* kind : {".obj", ".ply", ".vtk", ".vtp", ".stl"}) {
     EXPECT_NE(refusal(folder / ("missing" + std::string(kind))).find("no such file"),
               std::string::npos);
@@ -251,7 +251,7 @@ TEST_F(MeshFiles, IndicesOutOfRangeAreRefused) {
   EXPECT_NE(refusal("half.vtp", replaced(kVtp, "2 3<", "2 2.5<")).find(reason), std::string::npos);
 }
 
-TEST_F(MeshFiles, PiecesOfAVtpFileAreOneMeshAndKeepToTheirVertices) {
+TEST_F(MeshFiles, PiecesOfAVtpFileAreOneMeshAndUseTheirOwnVertices) {
   const std::size_t begin = kVtp.find("<Piece"), end = kVtp.find("</PolyData>");
   const std::string piece = kVtp.substr(begin, end - begin);
   const auto withFirst = [&](const std::string& first) {
@@ -320,7 +320,7 @@ TEST_F(MeshFiles, StlKeepsFacetsWithoutArea) {
   EXPECT_EQ(read("a.stl", flat).triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 2}}));
 }
 
-TEST(MeshFile, OrgansComeBackAsMade) {
+TEST(MeshFile, OrgansAreReadAsWritten) {
   for (const auto& [name, mesh] : scenes::organMeshes()) {
     const MeshFile read =
         readTriangleMesh(std::string(PALPATE_SOURCE_DIR) + "/Data/Organs/" + name + ".obj");

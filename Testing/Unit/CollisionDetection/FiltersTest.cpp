@@ -133,7 +133,7 @@ std::vector<std::uint32_t> takeOut(Mesh& mesh, const std::vector<std::uint32_t>&
   return kept;
 }
 
-TEST(Filters, WhatIsOffIsAsIfItWereNotThere) {
+TEST(Filters, DisabledElementsCountAsRemoved) {
   Random random(1);
   std::size_t contacts = 0;
   for (const bool self : {false, true})
@@ -160,7 +160,7 @@ TEST(Filters, WhatIsOffIsAsIfItWereNotThere) {
   EXPECT_GT(contacts, 500u);
 }
 
-TEST(Filters, SwitchingOffPassesVerticesAndEdgesOn) {
+TEST(Filters, DisablingATrianglePassesItsFeaturesToNeighbours) {
   // Two triangles at an edge, and a point over a corner of both.
   const Mesh roof{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {4, 4, 0}}, {{0, 1, 2}, {1, 3, 2}}};
   OctreeBasedCD detection(settingsOf(Engine::Octree));
@@ -194,7 +194,7 @@ bool hashed(const ContactFeatures& f) {
   return (f.a[0] * 7 + f.a[1] * 3 + f.b[0] * 5 + f.b[1] * 11 + static_cast<unsigned>(f.kind)) % 3;
 }
 
-TEST(Filters, PredicateLeavesOutWhatItRefuses) {
+TEST(Filters, PredicateExcludesWhatItRefuses) {
   Random random(2);
   std::size_t left = 0, out = 0;
   for (const bool self : {false, true})
@@ -234,7 +234,7 @@ TEST(Filters, PredicateLeavesOutWhatItRefuses) {
   EXPECT_GT(out, 100u);
 }
 
-TEST(Filters, WhatIsRefusedHidesNothing) {
+TEST(Filters, RefusedContactsSuppressNoOthers) {
   const Mesh roof{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {4, 4, 0}}, {{0, 1, 2}, {1, 3, 2}}};
   OctreeBasedCD detection(settingsOf(Engine::Octree));
   const GeometryId mesh = detection.addTriangleMesh(roof.positions, roof.triangles),
@@ -276,7 +276,7 @@ std::vector<std::vector<double>> restDistances(const Mesh& mesh) {
   return d;
 }
 
-TEST(Filters, RestDistanceLeavesOutWhatIsNearAlongTheSurface) {
+TEST(Filters, RestDistanceExcludesNeighboursAlongTheSurface) {
   Random random(3);
   std::size_t left = 0, out = 0;
   for (const PairSettings& pair : everyMethod(0.15)) {
@@ -323,7 +323,7 @@ TEST(Filters, RestDistanceLeavesOutWhatIsNearAlongTheSurface) {
   EXPECT_GT(out, 200u);
 }
 
-TEST(Filters, RestIsTheShapeOfTheTopology) {
+TEST(Filters, RestPositionsAreThoseGivenWithTheTopology) {
   const Positions flat{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 2, 0}, {1, 2, 0}};
   const std::vector<Triangle> strip{{0, 1, 2}, {1, 3, 2}, {2, 3, 4}, {3, 5, 4}};
   Positions folded = flat;  // the far end over the near one
@@ -356,7 +356,7 @@ TEST(Filters, RestIsTheShapeOfTheTopology) {
 
 // ---- Groups ----
 
-TEST(Filters, GroupsAndMasksChooseThePairs) {
+TEST(Filters, GroupsAndMasksSelectThePairs) {
   Random random(4);
   const Case c = sheetsInContact(random, false);
   for (const Settings& settings :
@@ -392,7 +392,7 @@ TEST(Filters, GroupsAndMasksChooseThePairs) {
 // ---- From frame to frame, files, errors ----
 
 /// Whatever was filtered before, a frame says what a new engine would say.
-TEST(Filters, OnlyTheLastFiltersCount) {
+TEST(Filters, LastFiltersCount) {
   Random random(5);
   for (const bool self : {false, true})
     for (const PairSettings& pair : everyMethod(0.04)) {
@@ -422,7 +422,7 @@ TEST(Filters, OnlyTheLastFiltersCount) {
     }
 }
 
-TEST(Filters, CapturesAndTheAuditHoldThem) {
+TEST(Filters, CapturesAndAuditIncludeThem) {
   Random random(6);
   const auto path = std::filesystem::temp_directory_path() / "palpate-filters.capture";
   Settings audited = settingsOf(Engine::Octree);
@@ -466,7 +466,7 @@ TEST(Filters, CapturesAndTheAuditHoldThem) {
   std::filesystem::remove(path);
 }
 
-TEST(Filters, BadInputIsRefusedByName) {
+TEST(Filters, BadInputThrowsErrorsThatNameIt) {
   const Mesh one{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
   OctreeBasedCD detection(settingsOf(Engine::Octree));
   const GeometryId mesh = detection.addTriangleMesh(one.positions, one.triangles),
@@ -521,7 +521,7 @@ struct ThreeSheets {
 };
 
 /// Of a pair that does not collide, too: only a detection answers.
-TEST(Filters, CollectingCandidatesAnswersNothing) {
+TEST(Filters, CollectingCandidatesLeavesContactsUnchanged) {
   for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
     ThreeSheets scene(engine);
     scene.detection.setCollisionFilter(scene.ids[0], {2, 2, Sidedness::Both});
@@ -540,7 +540,7 @@ TEST(Filters, CollectingCandidatesAnswersNothing) {
   }
 }
 
-TEST(Filters, AFrameThatThrowsReplacesNoAnswer) {
+TEST(Filters, FrameThatThrowsLeavesContactsUnchanged) {
   for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
     ThreeSheets scene(engine);
     scene.detection.detectCollision();

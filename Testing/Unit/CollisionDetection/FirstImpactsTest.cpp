@@ -3,7 +3,7 @@
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <gtest/gtest.h>
 
@@ -120,7 +120,7 @@ std::map<Side, double> earliestByVertex(const CollisionData& data, bool self) {
 
 /// One step of a pair: answers of every engine against the definition, and what it promises.
 /// Returns how many contacts Distinct drops.
-std::size_t expectFirstImpacts(const Thing& a, const Thing& b, PairSettings pair,
+std::size_t expectFirstImpacts(const TestGeometry& a, const TestGeometry& b, PairSettings pair,
                                const Positions& nowA, const Positions& nowB) {
   const bool self = &a == &b;
   pair.contacts = Contacts::All;
@@ -151,13 +151,13 @@ std::size_t expectFirstImpacts(const Thing& a, const Thing& b, PairSettings pair
   return Rows(all).contacts() - expected.contacts();
 }
 
-TEST(FirstImpacts, AreThoseOfTheDefinitionForEveryPairOfGeometries) {
+TEST(FirstImpacts, MatchTheDefinitionForEveryPairOfGeometryTypes) {
   Random random(1);
-  const Thing organ = things(sphere(6, 8, {0.5, 0.5, 0.5}, 0.35)),
-              cloth = things(sheet(7, 0.4, 1.0));
-  const Thing line = thread(random, 60, 0.12, 0.01, false),
-              loop = thread(random, 40, 0.15, 0, true);
-  const Thing smoke = particles(random, 60, 0.02), dust = particles(random, 80, 0);
+  const TestGeometry organ = testGeometry(sphere(6, 8, {0.5, 0.5, 0.5}, 0.35)),
+                     cloth = testGeometry(sheet(7, 0.4, 1.0));
+  const TestGeometry line = thread(random, 60, 0.12, 0.01, false),
+                     loop = thread(random, 40, 0.15, 0, true);
+  const TestGeometry smoke = particles(random, 60, 0.02), dust = particles(random, 80, 0);
   std::size_t dropped = 0;
   for (const auto& [a, b] : Pairs{{&organ, &cloth},
                                   {&cloth, &organ},
@@ -190,10 +190,10 @@ TEST(FirstImpacts, AreThoseOfTheDefinitionForEveryPairOfGeometries) {
 }
 
 /// Equal positions and equal times: everything is a tie.
-TEST(FirstImpacts, BreakTiesByOrder) {
-  Thing above = things(sheet(4, 0, 0)), below = above;
-  for (Thing* thing : {&above, &below})
-    for (Vector3d& p : thing->positions) p[2] = 0.0;
+TEST(FirstImpacts, TiesAreBrokenByOrder) {
+  TestGeometry above = testGeometry(sheet(4, 0, 0)), below = above;
+  for (TestGeometry* geometry : {&above, &below})
+    for (Vector3d& p : geometry->positions) p[2] = 0.0;
   for (Vector3d& p : above.positions) p[2] = 1.0;
   Positions landed = above.positions;
   for (Vector3d& p : landed) p[2] = -0.5;
@@ -207,17 +207,17 @@ TEST(FirstImpacts, BreakTiesByOrder) {
   EXPECT_GT(dropped, 1000u);
 }
 
-TEST(FirstImpacts, OfACornerOnACornerIsOne) {
+TEST(FirstImpacts, CornerOnCornerIsOneContact) {
   // The apexes of two pyramids of four triangles each meet at half time.
   const std::vector<Triangle> sides{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}};
-  const Thing up{GeometryType::Triangles,
-                 {{0, 0, 0}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, -1}, {1, -1, -1}},
-                 sides,
-                 {}};
-  const Thing down{GeometryType::Triangles,
-                   {{0, 0, 1}, {1, 0, 2}, {0, 1, 2}, {-1, 0, 2}, {0, -1, 2}},
-                   sides,
-                   {}};
+  const TestGeometry up{GeometryType::Triangles,
+                        {{0, 0, 0}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, -1}, {1, -1, -1}},
+                        sides,
+                        {}};
+  const TestGeometry down{GeometryType::Triangles,
+                          {{0, 0, 1}, {1, 0, 2}, {0, 1, 2}, {-1, 0, 2}, {0, -1, 2}},
+                          sides,
+                          {}};
   Positions landed = down.positions;
   for (Vector3d& p : landed) p[2] -= 1.5;
   PairSettings pair{Method::Continuous, 0.25, Contacts::All};
@@ -238,7 +238,7 @@ TEST(FirstImpacts, OfACornerOnACornerIsOne) {
 }
 
 /// What a filter refuses is no contact, so it stands for none.
-TEST(FirstImpacts, AreOfWhatFiltersLeave) {
+TEST(FirstImpacts, FilteredContactsSuppressNoOthers) {
   Random random(3);
   const Mesh organ = sphere(8, 10, {0.5, 0.5, 0.55}, 0.35), cloth = sheet(9, 0, 0);
   Positions pressed = organ.positions;
@@ -282,7 +282,7 @@ TEST(FirstImpacts, AreFewOnSmoothBodies) {
 }
 
 /// Regular grids that fall onto each other touch where weights are 0 but for rounding.
-TEST(FirstImpacts, AlignedGridsHaveEachPairOfFeaturesOnce) {
+TEST(FirstImpacts, AlignedGridsReportEachFeaturePairOnce) {
   Random random(18);
   std::size_t contacts = 0;
   for (std::uint32_t n = 2; n < 6; ++n)

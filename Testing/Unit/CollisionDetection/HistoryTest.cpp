@@ -86,7 +86,7 @@ struct Meeting {
   }
 };
 
-TEST(History, BodiesThatLeaveAndComeBackMeetAsBefore) {
+TEST(History, BodiesThatLeaveAndComeBackGiveTheSameContacts) {
   Meeting meeting;
   ASSERT_GT(meeting.contacts, 50u);
   for (const double far : {3.0, 1e3, 1e9}) {
@@ -96,7 +96,7 @@ TEST(History, BodiesThatLeaveAndComeBackMeetAsBefore) {
   }
 }
 
-TEST(History, ATriangleThatGrowsPastTheSceneAndShrinksAgain) {
+TEST(History, TriangleMayGrowPastTheSceneAndShrink) {
   Meeting meeting;
   for (const double size : {1.0, 4.0, 1e3, 1e9, 10.0}) {
     Positions grown = meeting.b.positions;
@@ -107,13 +107,13 @@ TEST(History, ATriangleThatGrowsPastTheSceneAndShrinksAgain) {
   }
 }
 
-TEST(History, AFrameWithoutNewPositionsAnswersTheSame) {
+TEST(History, FrameWithoutNewPositionsGivesTheSameContacts) {
   Meeting meeting;
   for (int frame = 0; frame < 3; ++frame)
     EXPECT_EQ(meeting.engines.expectEqualFrames(), meeting.contacts);
 }
 
-TEST(History, ConstQueriesFromManyThreads) {
+TEST(History, ConstQueriesWorkFromManyThreads) {
   Random random(3);
   const Mesh a = soup(random, 300, 0.2), b = soup(random, 300, 0.2);
   Settings settings = settingsOf(Engine::Octree, 2);

@@ -9,7 +9,7 @@ namespace palpate {
 namespace {
 
 // Few and many pairs for the number of first triangles: both ways of sorting, one scratch.
-TEST(OrderPairs, IsThatOfSort) {
+TEST(OrderPairs, MatchesStdSort) {
   std::mt19937 random(3);
   PairOrderScratch scratch;
   for (const std::size_t firsts : {1u, 7u, 1000u}) {

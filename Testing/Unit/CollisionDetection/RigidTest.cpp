@@ -1,6 +1,6 @@
 #include "Common/QueryCalls.h"
 #include "Common/Replayed.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <Eigen/Geometry>
 
@@ -67,8 +67,8 @@ std::vector<Place> placesOf(Random& random, Way way) {
 /// A pair over some frames: the body is moved by transforms, or by the same positions.
 class Life {
  public:
-  Life(Settings settings, const Thing& body, const Thing& other, const PairSettings& pair,
-       bool bodyFirst, bool byTransform)
+  Life(Settings settings, const TestGeometry& body, const TestGeometry& other,
+       const PairSettings& pair, bool bodyFirst, bool byTransform)
       : m_collisions((settings.keepCandidates = true, settings)),
         m_positions(body.positions),
         m_byTransform(byTransform),
@@ -128,7 +128,7 @@ void expectSameValidity(const Validity& found, const Validity& truth, double siz
 }
 
 /// Every engine with transforms answers as the positions do; returns the contacts of all frames.
-std::size_t expectAsPositions(Random& random, const Thing& body, const Thing& other,
+std::size_t expectAsPositions(Random& random, const TestGeometry& body, const TestGeometry& other,
                               const PairSettings& pair, const LifeCase& life) {
   const std::vector<Place> places = placesOf(random, life.way);
   std::vector<Life> rigid;
@@ -168,10 +168,10 @@ std::size_t expectAsPositions(Random& random, const Thing& body, const Thing& ot
 
 constexpr Way kWays[] = {Way::Still, Way::Exact, Way::Small, Way::Large, Way::Far};
 
-TEST(Rigid, TrianglesAnswerAsTheirPositionsDo) {
+TEST(Rigid, TrianglesMatchSetPositions) {
   Random random(1);
-  const Thing body = things(sphere(4, 5, {0.5, 0.5, 0.5}, 0.4)),
-              tissue = things(sheet(4, 0.5, 1.0));
+  const TestGeometry body = testGeometry(sphere(4, 5, {0.5, 0.5, 0.5}, 0.4)),
+                     tissue = testGeometry(sheet(4, 0.5, 1.0));
   std::vector<PairSettings> all = settingsFor(0.03);
   all.push_back({Method::Intersection, 0.0});
   all.push_back({Method::Auto, 0.0});
@@ -190,20 +190,22 @@ TEST(Rigid, TrianglesAnswerAsTheirPositionsDo) {
     }
 }
 
-TEST(Rigid, SoupsAnswerAsTheirPositionsDo) {
+TEST(Rigid, SoupsMatchSetPositions) {
   Random random(2);
-  const Thing body = things(soup(random, 40, 0.2)), other = things(soup(random, 40, 0.2));
+  const TestGeometry body = testGeometry(soup(random, 40, 0.2)),
+                     other = testGeometry(soup(random, 40, 0.2));
   for (const PairSettings& pair :
        {PairSettings{Method::Intersection, 0.0}, {Method::Proximity, 0.05}, {Method::Auto, 0.05}})
     for (const Way way : kWays)
       EXPECT_GT(expectAsPositions(random, body, other, pair, {way, way == Way::Far}), 20u);
 }
 
-TEST(Rigid, LinesAndPointsAnswerAsTheirPositionsDo) {
+TEST(Rigid, LinesAndPointsMatchSetPositions) {
   Random random(3);
-  const Thing tissue = things(sheet(4, 0.5, 1.0)), needle = thread(random, 20, 0.2, 0.02, false),
-              tapering = tapered(random, thread(random, 20, 0.2, 0, true), 0.05),
-              smoke = particles(random, 60, 0.02);
+  const TestGeometry tissue = testGeometry(sheet(4, 0.5, 1.0)),
+                     needle = thread(random, 20, 0.2, 0.02, false),
+                     tapering = tapered(random, thread(random, 20, 0.2, 0, true), 0.05),
+                     smoke = particles(random, 60, 0.02);
   for (const auto& [body, other] : Pairs{{&tissue, &needle},
                                          {&tissue, &smoke},
                                          {&needle, &tissue},
@@ -222,10 +224,10 @@ TEST(Rigid, LinesAndPointsAnswerAsTheirPositionsDo) {
       }
 }
 
-TEST(Rigid, FiltersHoldForThem) {
+TEST(Rigid, FiltersApply) {
   Random random(4);
-  const Thing body = things(sphere(7, 9, {0.5, 0.5, 0.5}, 0.4)),
-              tissue = things(sheet(7, 0.5, 1.0));
+  const TestGeometry body = testGeometry(sphere(7, 9, {0.5, 0.5, 0.5}, 0.4)),
+                     tissue = testGeometry(sheet(7, 0.5, 1.0));
   for (const Method method : {Method::Proximity, Method::Continuous, Method::Intersection}) {
     const auto filter = [](OctreeBasedCD& collisions, GeometryId id) {
       collisions.setCollisionFilter(id, {.sidedness = Sidedness::Outer});
@@ -239,20 +241,21 @@ TEST(Rigid, FiltersHoldForThem) {
 }
 
 /// A vertex so far that floats are clamped, another that flattens the tree.
-TEST(Rigid, VerticesFarFlung) {
+TEST(Rigid, VerticesFarAwayMatchSetPositions) {
   Random random(5);
   for (const double far : {1e4, 1e30, 1e60}) {
-    Thing body = things(soup(random, 40, 0.2));
+    TestGeometry body = testGeometry(soup(random, 40, 0.2));
     body.positions[3] = {far, 0.5 * far, -far};
-    const Thing other = things(soup(random, 40, 0.2));
+    const TestGeometry other = testGeometry(soup(random, 40, 0.2));
     expectAsPositions(random, body, other, {Method::Proximity, 0.05, Contacts::All}, {Way::Small});
     expectAsPositions(random, body, other, {Method::Continuous, 0.0}, {Way::Small});
   }
 }
 
-TEST(Rigid, TheTreeIsNotTouched) {
+TEST(Rigid, OctreeIsNotUpdated) {
   Random random(6);
-  const Thing bone = things(sphere(40, 50, {0.5, 0.5, 0.5}, 0.4)), organ = things(sheet(6, 0.5, 1));
+  const TestGeometry bone = testGeometry(sphere(40, 50, {0.5, 0.5, 0.5}, 0.4)),
+                     organ = testGeometry(sheet(6, 0.5, 1));
   OctreeBasedCD collisions(settingsOf(Engine::Octree, 1, OctreeUpdate::Rebuild));
   const GeometryId body = bone.addTo(collisions), other = organ.addTo(collisions);
   collisions.addCollisionPair(body, other, {Method::Continuous, 0.0});
@@ -320,7 +323,7 @@ TEST_F(RigidStep, BeginsWhereTheLastStepEnded) {
   expect(5, 5);      // without a call it is at rest
 }
 
-TEST_F(RigidStep, FollowsAMeshThatWasMovedByPositions) {
+TEST_F(RigidStep, BeginsWhereSetPositionsLeftTheMesh) {
   expectLast(0, 0);
   m_collisions.setPositions(m_id, at(3));
   expectLast(0, 3);
@@ -392,9 +395,10 @@ TEST_F(RigidStep, NewTrianglesAreAtRest) {
   expect(6, 7);  // unless both poses are given
 }
 
-TEST(Rigid, PositionsThatChangeOnTheWay) {
+TEST(Rigid, PositionsMayChangeBetweenTransforms) {
   Random random(7);
-  const Thing body = things(soup(random, 40, 0.2)), other = things(soup(random, 40, 0.2));
+  const TestGeometry body = testGeometry(soup(random, 40, 0.2)),
+                     other = testGeometry(soup(random, 40, 0.2));
   for (const Method method : {Method::Continuous, Method::Proximity, Method::Auto}) {
     std::vector<OctreeBasedCD> rigid, world;
     for (auto* all : {&rigid, &world}) {
@@ -433,10 +437,10 @@ TEST(Rigid, PositionsThatChangeOnTheWay) {
   }
 }
 
-TEST(Rigid, InsideIsAsOfPositions) {
+TEST(Rigid, InsideVerticesMatchSetPositions) {
   Random random(8);
-  const Thing body = things(sphere(12, 14, {0.5, 0.5, 0.5}, 0.4)),
-              smoke = particles(random, 400, 0.0);
+  const TestGeometry body = testGeometry(sphere(12, 14, {0.5, 0.5, 0.5}, 0.4)),
+                     smoke = particles(random, 400, 0.0);
   for (const double far : {0.0, 1e7}) {
     Place place = somewhere(random);
     place.translation += Vector3d(far, -far, far);
@@ -469,9 +473,9 @@ TEST(Rigid, InsideIsAsOfPositions) {
   }
 }
 
-TEST(Rigid, ShapesMeetThemAsTheirPositions) {
+TEST(Rigid, ContactsWithShapesMatchSetPositions) {
   Random random(9);
-  const Thing body = things(sphere(8, 9, {0.5, 0.5, 0.5}, 0.4));
+  const TestGeometry body = testGeometry(sphere(8, 9, {0.5, 0.5, 0.5}, 0.4));
   std::size_t contacts = 0;
   for (const AnalyticalGeometry& shape : std::vector<AnalyticalGeometry>{
            Capsule{{0, 0, 0.5}, {1, 1, 0.5}, 0.1}, Box{{0.1, 0.5, 0.5}, {0.2, 0.3, 0.1}},
@@ -498,9 +502,10 @@ TEST(Rigid, ShapesMeetThemAsTheirPositions) {
   EXPECT_GT(contacts, 100u);
 }
 
-TEST(Rigid, CapturesReplayThem) {
+TEST(Rigid, CapturesIncludeTransforms) {
   Random random(10);
-  const Thing body = things(soup(random, 60, 0.2)), other = things(soup(random, 60, 0.2));
+  const TestGeometry body = testGeometry(soup(random, 60, 0.2)),
+                     other = testGeometry(soup(random, 60, 0.2));
   for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto}) {
     Settings settings = settingsOf(Engine::Octree);
     settings.audit.features = 100000;
@@ -532,9 +537,10 @@ double deviationInParts(const Positions& body, const Place& before, const Vector
   return most;
 }
 
-TEST(Rigid, ArcsAreMeasured) {
+TEST(Rigid, ArcDeviationIsMeasured) {
   Random random(11);
-  const Thing body = things(sphere(5, 6, {0.5, 0.5, 0.5}, 0.4)), far = things(sheet(2, 50, 0));
+  const TestGeometry body = testGeometry(sphere(5, 6, {0.5, 0.5, 0.5}, 0.4)),
+                     far = testGeometry(sheet(2, 50, 0));
   for (const double angle : {1e-3, 0.05, 0.7, 2.0, 3.1})
     for (const double slide : {0.0, 0.6}) {
       const Vector3d axis = randomPoint(random, -1, 1), through = randomPoint(random, -2, 2);
@@ -565,7 +571,7 @@ TEST(Rigid, ArcsAreMeasured) {
 TEST(Rigid, BadTransformsAreRefused) {
   using Code = ErrorCode;
   Random random(12);
-  const Thing body = things(soup(random, 5, 0.2));
+  const TestGeometry body = testGeometry(soup(random, 5, 0.2));
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
   const GeometryId id = body.addTo(collisions), huge = body.addTo(collisions);
   const auto expectRefused = [&](Code code, const std::string& reason, const auto& call) {

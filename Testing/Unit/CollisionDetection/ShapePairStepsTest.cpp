@@ -254,7 +254,7 @@ std::vector<AnalyticalGeometry> kinds(Random& random) {
           ConvexHull{{{0.1, 0, 0}, {0.1, 0, 0}}}};
 }
 
-TEST(ShapePairSteps, AreNeverLateAndNoEarlierThanTheTolerance) {
+TEST(ShapePairSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
   Random random(1);
   Tally tally;
   for (int run = 0; run < 6; ++run) {
@@ -288,7 +288,7 @@ TEST(ShapePairSteps, AreNeverLateAndNoEarlierThanTheTolerance) {
 }
 
 /// Everything parallel, in one plane or on one line, on a grid.
-TEST(ShapePairSteps, DegenerateOnesAreTrue) {
+TEST(ShapePairSteps, DegenerateShapesHaveCorrectTimes) {
   Random random(2);
   const std::vector<AnalyticalGeometry> all{
       Sphere{{0, 0, 0}, 1},
@@ -331,7 +331,7 @@ TEST(ShapePairSteps, DegenerateOnesAreTrue) {
   EXPECT_GT(tally.within, 30);
 }
 
-TEST(ShapePairSteps, ByHand) {
+TEST(ShapePairSteps, MatchHandComputedValues) {
   const auto only = [](const Tool& a, const Tool& b, double thickness) {
     const auto c = contactOf(answer(a, b, continuous(thickness)));
     EXPECT_TRUE(c);
@@ -388,7 +388,7 @@ TEST(ShapePairSteps, ByHand) {
             0u);
 }
 
-TEST(ShapePairSteps, CapturesAndAuditsHoldThem) {
+TEST(ShapePairSteps, CapturesAndAuditIncludeThem) {
   Random random(3);
   Settings audited = settingsOf(Engine::Octree, 2);
   audited.audit.features = 10;

@@ -117,7 +117,7 @@ void expectPair(Random& random, const PlacedShape& a, const PlacedShape& b, doub
   EXPECT_EQ(back->pointB, found->pointA);
 }
 
-TEST(ShapePairs, AnswerTheDefinition) {
+TEST(ShapePairs, MatchTheDefinition) {
   Random random(1);
   int apart = 0, overlapping = 0;
   for (int run = 0; run < 12; ++run) {
@@ -148,7 +148,7 @@ TEST(ShapePairs, AnswerTheDefinition) {
 }
 
 /// Everything parallel, touching or in one plane.
-TEST(ShapePairs, DegenerateOnesAnswerTheDefinition) {
+TEST(ShapePairs, DegenerateShapesMatchTheDefinition) {
   Random random(2);
   const std::vector<AnalyticalGeometry> all{
       Sphere{{0, 0, 0}, 1},
@@ -213,7 +213,7 @@ TEST(ShapePairs, DoNotDependOnScale) {
       }
 }
 
-TEST(ShapePairs, ByHand) {
+TEST(ShapePairs, MatchHandComputedValues) {
   const auto only = [](const AnalyticalGeometry& a, const AnalyticalGeometry& b) {
     return *answer({a}, {b});
   };
@@ -239,7 +239,7 @@ TEST(ShapePairs, ByHand) {
   EXPECT_NEAR(c.distance, -2.25, 1e-14);
 }
 
-TEST(ShapePairs, BadInputIsRefusedByName) {
+TEST(ShapePairs, BadInputThrowsErrorsThatNameIt) {
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
   const GeometryId box = collisions.addAnalyticalGeometry(Box{{0, 0, 0}, {1, 1, 1}}),
                    plane = collisions.addAnalyticalGeometry(Plane{}),
@@ -259,7 +259,7 @@ TEST(ShapePairs, BadInputIsRefusedByName) {
   refuse(box, plane, Method::Intersection, "a shape and a shape; Auto, Proximity and Continuous");
 }
 
-TEST(ShapePairs, CapturesHoldThem) {
+TEST(ShapePairs, CapturesIncludeThem) {
   Random random(4);
   Settings audited = settingsOf(Engine::Octree, 2);
   audited.audit.features = 10;
@@ -308,7 +308,7 @@ TEST(ShapePairs, SizesThatDifferTooMuchAreRefused) {
 
 /// With many directions almost equally short the points were those of a face far from the nearest
 /// one: off by up to the depth.
-TEST(ShapePairs, PointsOfOverlappingCylindersFitTheDistance) {
+TEST(ShapePairs, PointsOfOverlappingCylindersMatchTheDistance) {
   Random random(7);
   int overlapping = 0;
   for (int run = 0; run < 60; ++run) {

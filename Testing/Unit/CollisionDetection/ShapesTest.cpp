@@ -208,7 +208,7 @@ std::map<Element, ShapeContact> byElement(const CollisionData& data) {
   return contacts;
 }
 
-TEST(Shapes, AnswerAsBruteForce) {
+TEST(Shapes, MatchBruteForce) {
   Random random(1);
   const std::vector<Body> bodies{organ(sphere(10, 14, {0.5, 0.5, 0.5}, 0.4)),
                                  organ(sheet(14, 0.5, 0)), organ(soup(random, 150, 0.2)),
@@ -338,7 +338,7 @@ void expectWellFormed(const ShapeContact& c, const Body& body, const Placed& sha
   EXPECT_GE(signedDistance(shape, c.point + 1e-3 * c.normal), centre + 1e-3 - 1e-10);
 }
 
-TEST(Shapes, AnswerTheDefinition) {
+TEST(Shapes, MatchTheDefinition) {
   Random random(2);
   const std::vector<Body> bodies{organ(soup(random, 60, 0.3)), organ(soup(random, 60, 0.8)),
                                  organ(sphere(8, 12, {.5, .5, .5}, .4)), thread(random, 60, 0.02),
@@ -409,7 +409,7 @@ TEST(Shapes, MoveWithTheirBodies) {
   }
 }
 
-TEST(Shapes, AgreeWithTheirTessellations) {
+TEST(Shapes, MatchTheirTessellations) {
   Random random(4);
   const Body body = organ(soup(random, 60, 0.15));
   const auto nearest = [](const CollisionData& data) {
@@ -460,7 +460,7 @@ TEST(Shapes, AgreeWithTheirTessellations) {
   EXPECT_GT(apart, casesOf(20));
 }
 
-TEST(Shapes, HullsAgreeWithWhatTheyAreHullsOf) {
+TEST(Shapes, HullsMatchEqualBoxesAndCapsules) {
   Random random(7);
   const Body body = organ(soup(random, 100, 0.3));
   Positions corners, round;
@@ -537,7 +537,7 @@ TEST(Shapes, CubeOnTableTouchesWithItsCorners) {
   }
 }
 
-TEST(Shapes, TriangleIsMetWhereItIsNearest) {
+TEST(Shapes, TriangleIsTouchedAtItsClosestPoint) {
   const Body triangle = organ({{{-8, -8, 0}, {8, -8, 0}, {0, 8, 0}}, {{0, 1, 2}}});
   const auto only = [&](const AnalyticalGeometry& shape) {
     const CollisionData data = answer(triangle, {shape}, {Method::Proximity, 1.0});
@@ -573,7 +573,7 @@ TEST(Shapes, TriangleIsMetWhereItIsNearest) {
   EXPECT_EQ(c.distance, 0.5);
 }
 
-TEST(Shapes, DegenerateElementsAnswerTheDefinition) {
+TEST(Shapes, DegenerateElementsMatchTheDefinition) {
   Random random(5);
   Positions unitCube{{1, 1, 1}};
   for (int v = 0; v < 8; ++v)
@@ -596,42 +596,43 @@ TEST(Shapes, DegenerateElementsAnswerTheDefinition) {
                           {ConvexHull{{{1, 1, 1}}}},
                           {ConvexHull{unitCube}}};
   for (int run = 0; run < casesOf(6); ++run) {
-    Body zoo{GeometryType::Triangles, {}, {}, 0};  // on a coarse grid
+    Body degenerate{GeometryType::Triangles, {}, {}, 0};  // on a coarse grid
     for (int v = 0; v < 12; ++v) {
       const auto at = [&] { return static_cast<double>(random() % 3); };
       const double x = at(), y = at(), z = at();
-      zoo.positions.push_back({x, y, z});
+      degenerate.positions.push_back({x, y, z});
     }
     const auto any = [&] { return static_cast<std::uint32_t>(random() % 12); };
     for (int t = 0; t < 14; ++t) {
       const std::uint32_t a = any(), b = any(), c = any();
-      zoo.elements.push_back({a, b, c});
+      degenerate.elements.push_back({a, b, c});
     }
     for (const Placed& shape : all) {
       if (shape.geometry.index() == 1 &&
           std::get<Capsule>(shape.geometry).p0 == std::get<Capsule>(shape.geometry).p1)
         continue;  // the test's own formula needs a length
       SCOPED_TRACE("shape " + std::to_string(shape.geometry.index()));
-      const auto found = byElement(answer(zoo, shape, {Method::Proximity, 0.75, Contacts::All}));
-      for (const auto& [element, truth] : truthOf(zoo, shape, 0.75)) {
+      const auto found =
+          byElement(answer(degenerate, shape, {Method::Proximity, 0.75, Contacts::All}));
+      for (const auto& [element, truth] : truthOf(degenerate, shape, 0.75)) {
         const auto c = found.find(element);
         if (c == found.end())
           EXPECT_GT(truth.own, 0.75 - kSearch);
         else
           EXPECT_NEAR(c->second.distance, truth.own, kSearch);
       }
-      for (const auto& [element, c] : found) expectWellFormed(c, zoo, shape);
+      for (const auto& [element, c] : found) expectWellFormed(c, degenerate, shape);
     }
     // A capsule without length is a sphere.
     const PairSettings pair{Method::Proximity, 0.5};
-    EXPECT_EQ(answer(zoo, {Capsule{{1, 1, 1}, {1, 1, 1}, 0.5}}, pair).hash(),
-              answer(zoo, {Sphere{{1, 1, 1}, 0.5}}, pair).hash());
+    EXPECT_EQ(answer(degenerate, {Capsule{{1, 1, 1}, {1, 1, 1}, 0.5}}, pair).hash(),
+              answer(degenerate, {Sphere{{1, 1, 1}, 0.5}}, pair).hash());
   }
 }
 
 // ---- Refused ----
 
-TEST(Shapes, BadInputIsRefusedByName) {
+TEST(Shapes, BadInputThrowsErrorsThatNameIt) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN(),
                    kInfinity = std::numeric_limits<double>::infinity();
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
@@ -707,7 +708,7 @@ TEST(Shapes, BadInputIsRefusedByName) {
 
 // ---- Round the library ----
 
-TEST(Shapes, CapturesAndAuditsHoldThem) {
+TEST(Shapes, CapturesAndAuditIncludeThem) {
   Random random(6);
   const Body body = organ(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
   for (const int features : {20, 100000}) {

@@ -149,7 +149,7 @@ Tool toolOf(Random& random, std::uint32_t size, double step, bool lines) {
   return tool;
 }
 
-TEST(Sidedness, OuterIsWhatIsOutside) {
+TEST(Sidedness, OuterReportsContactsOutsideOnly) {
   Random random(1);
   std::size_t told = 0;
   for (int run = 0; run < 12; ++run) {
@@ -174,7 +174,7 @@ std::set<Row> idsOf(const Rows& rows) {
   return ids;
 }
 
-TEST(Sidedness, EveryMethodAnswersAsBruteForce) {
+TEST(Sidedness, EveryMethodMatchesBruteForce) {
   Random random(2);
   for (int run = 0; run < 6; ++run) {
     const Mesh a = burr(random);

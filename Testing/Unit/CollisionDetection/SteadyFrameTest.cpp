@@ -228,7 +228,7 @@ TEST(SteadyFrame, AllocatesNothingWithStepsOfShapes) {
 
 /// Axes parallel to each other: exact arithmetic has its integers, and tells how often it was
 /// asked.
-TEST(SteadyFrame, CountsWhatExactArithmeticDecidesOfShapes) {
+TEST(SteadyFrame, CountsExactDecisionsBetweenShapes) {
   OctreeBasedCD detection(Settings{.threads = 1});
   std::vector<GeometryId> tools;
   for (const AnalyticalGeometry& tool : std::vector<AnalyticalGeometry>{

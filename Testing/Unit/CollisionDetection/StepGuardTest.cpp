@@ -3,7 +3,7 @@
 #include <palpate/TimeOfImpact.h>
 
 #include "Common/Solids.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <cmath>
 #include <limits>
@@ -13,11 +13,11 @@ namespace {
 
 /// Geometries with their pairs, and a step.
 struct Guarding {
-  std::vector<Thing> bodies{};
+  std::vector<TestGeometry> bodies{};
   std::vector<std::array<std::size_t, 2>> pairs{};
   std::vector<Positions> before{}, now{};
 
-  void add(Thing body) {
+  void add(TestGeometry body) {
     before.push_back(body.positions);
     now.push_back(body.positions);
     bodies.push_back(std::move(body));
@@ -25,7 +25,7 @@ struct Guarding {
   /// Ids are the bodies' indices.
   StepGuard guard(const Settings& settings) const {
     StepGuard guard(settings);
-    for (const Thing& body : bodies) {
+    for (const TestGeometry& body : bodies) {
       if (body.type == GeometryType::Triangles)
         guard.addTriangleMesh(body.positions, body.triangles);
       else if (body.type == GeometryType::Lines)
@@ -81,10 +81,10 @@ std::size_t countTouches(const Guarding& all, const std::vector<Positions>& now)
 
 Guarding everything(Random& random) {
   Guarding all;
-  all.add(things(sphere(6, 8, {0.53, 0.46, 0.51}, 0.3)));
-  all.add(things(sheet(6, 0.5, 0.3)));
-  all.add(things(soup(random, 30, 0.1)));
-  Thing line = thread(random, 40, 0.1, 0.0, false);
+  all.add(testGeometry(sphere(6, 8, {0.53, 0.46, 0.51}, 0.3)));
+  all.add(testGeometry(sheet(6, 0.5, 0.3)));
+  all.add(testGeometry(soup(random, 30, 0.1)));
+  TestGeometry line = thread(random, 40, 0.1, 0.0, false);
   // The walk ends at the cube's faces, and segments that lie in one plane may touch at the start.
   line.positions = moved(random, line.positions, 0.01);
   all.add(line);
@@ -139,7 +139,7 @@ TEST(StepGuard, NoImpactRemainsBetweenGeometriesOfAllTypes) {
   }
 }
 
-TEST(StepGuard, SurfacesOfTetrahedralMeshesAreGuarded) {
+TEST(StepGuard, NoImpactRemainsOnSurfacesOfTetrahedralMeshes) {
   Random random(182);
   Solid cube = cells(2, random, [](const std::array<int, 3>&) { return true; });
   const Positions points{{0.9, 0.8, 2.5}};
@@ -195,7 +195,7 @@ TEST(StepGuard, RigidGroupsMoveBackAsAWhole) {
 /// Particles on a line, of which all but the last move further than to the next.
 Guarding chain(std::uint32_t count) {
   Guarding all;
-  Thing points{GeometryType::Points, {}, {}, {}, {0.0}};
+  TestGeometry points{GeometryType::Points, {}, {}, {}, {0.0}};
   for (std::uint32_t i = 0; i < count; ++i) points.positions.emplace_back(0, 0, i);
   all.add(points);
   all.pairs.push_back({0, 0});
@@ -203,7 +203,7 @@ Guarding chain(std::uint32_t count) {
   return all;
 }
 
-TEST(StepGuard, TakesOneRoundMoreThanVerticesAtMost) {
+TEST(StepGuard, NeedsAtMostOneRoundMoreThanVertices) {
   Guarding all = chain(20);
   StepGuard guard = all.guard(settingsOf(Engine::Octree));
   EXPECT_EQ(guard.hold(all.steps(all.now)), 19u);
@@ -221,7 +221,7 @@ Guarding vertexOverTriangle(double end) {
   return all;
 }
 
-TEST(StepGuard, DecidesTouchExactly) {
+TEST(StepGuard, TouchIsDecidedExactly) {
   const double tiny = std::numeric_limits<double>::denorm_min();
   for (const double end : {0.0, -0.0, -tiny, tiny, 0x1p-60}) {
     Guarding all = vertexOverTriangle(end);
@@ -275,7 +275,7 @@ TEST(StepGuard, StepsThatStartWithATouchAreRefused) {
       guard, edges, "geometry 1, edge (0, 1), and geometry 0, edge (0, 1) touched before the step");
 }
 
-TEST(StepGuard, FixedVerticesStayAndTheRestGivesWay) {
+TEST(StepGuard, FixedVerticesStayAndOthersMoveBack) {
   const std::string fixed =
       "geometry 1, vertex 0, and geometry 0, triangle 0 touch within the step, and all their "
       "vertices that move are fixed";
@@ -392,7 +392,7 @@ TEST(StepGuard, BadInputIsRefusedAndChangesNothing) {
   EXPECT_EQ(other.hold({}), 0u);
 }
 
-TEST(StepGuard, GeometriesAndPairsComeAndGo) {
+TEST(StepGuard, GeometriesAndPairsCanBeAddedAndRemoved) {
   Guarding all = vertexOverTriangle(-1);
   StepGuard guard = all.guard(settingsOf(Engine::Octree));
   const std::vector<Positions> given = all.now;

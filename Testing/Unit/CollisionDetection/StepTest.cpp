@@ -36,14 +36,14 @@ class Step : public ::testing::Test {
   GeometryId m_id = m_detection.addTriangleMesh(at(0), triangle());
 };
 
-TEST_F(Step, OfANewGeometryIsAtRest) {
+TEST_F(Step, NewGeometryIsAtRest) {
   m_detection.setPositions(m_id, at(1));
   expect(1, 1);
   m_detection.setPositions(m_id, at(2));
   expectLast(2, 2);
 }
 
-TEST_F(Step, OfANewGeometryMayBeGivenByBothEnds) {
+TEST_F(Step, NewGeometryMayHaveBothEndsGiven) {
   m_detection.setPositions(m_id, at(1), at(2));
   m_detection.setPositions(m_id, at(3));
   expectLast(1, 3);
@@ -91,7 +91,7 @@ TEST_F(Step, EndsByAdvanceOnly) {
 }
 
 /// With candidates alone `before` becomes the last `now`, as with every other call.
-TEST_F(Step, AdvancesForCandidatesInBatchesToo) {
+TEST_F(Step, AdvanceAppliesToCandidatesInBatches) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.5), triangle());
   m_detection.addCollisionPair(m_id, other, {.method = Method::Continuous});
   m_detection.advance();
@@ -104,7 +104,7 @@ TEST_F(Step, AdvancesForCandidatesInBatchesToo) {
   }
 }
 
-TEST_F(Step, AnswersByTheLastValuesOnly) {
+TEST_F(Step, ContactsDependOnTheLastValuesOnly) {
   m_detection.advance();
   m_detection.setPositions(m_id, at(1));
   m_detection.update();
@@ -122,7 +122,7 @@ TEST_F(Step, AnswersByTheLastValuesOnly) {
   expectLast(5, 9);
 }
 
-TEST_F(Step, OfANewTopologyIsAtRest) {
+TEST_F(Step, NewTopologyIsAtRest) {
   m_detection.advance();
   m_detection.setTriangles(m_id, at(5), triangle());
   expect(5, 5);
@@ -152,7 +152,7 @@ TEST_F(Step, DoesNotRepeatMotionThatHasEnded) {
 }
 
 /// A loop that never ends its steps sweeps from where it began, and validity() says how far.
-TEST_F(Step, WithoutAdvanceGrowsAndSaysSo) {
+TEST_F(Step, WithoutAdvanceGrowsAndIsNotTrusted) {
   const GeometryId sheet = m_detection.addTriangleMesh(at(50), triangle());
   m_detection.addCollisionPair(m_id, sheet, {.method = Method::Proximity, .thickness = 1.5});
   m_detection.detectCollision();
@@ -168,7 +168,7 @@ TEST_F(Step, WithoutAdvanceGrowsAndSaysSo) {
 }
 
 /// Intersection measures no distances: a thickness does not tell how far apart its meshes were.
-TEST_F(Step, OfIntersectionStartsApartOnlyWhereItEnded) {
+TEST_F(Step, StartedApartOfIntersectionNeedsTheSamePositions) {
   const std::vector<Eigen::Vector3d> wall{{0.2, 0.2, -1}, {0.2, 0.2, 1}, {0.3, 0.2, 1}};
   const GeometryId id = m_detection.addTriangleMesh(wall, triangle());
   m_detection.addCollisionPair(m_id, id, {.method = Method::Intersection, .thickness = 5});
@@ -182,7 +182,7 @@ TEST_F(Step, OfIntersectionStartsApartOnlyWhereItEnded) {
 }
 
 /// A solver with rounds: the step's start stays known, and positions are corrected between rounds.
-TEST_F(Step, KeepsItsStartThroughRounds) {
+TEST_F(Step, KeepsBeforeThroughSeveralDetections) {
   const GeometryId sheet = m_detection.addTriangleMesh(at(1), triangle());
   m_detection.addCollisionPair(m_id, sheet, {.method = Method::Continuous});
   m_detection.detectCollision();
@@ -200,7 +200,7 @@ TEST_F(Step, KeepsItsStartThroughRounds) {
   }
 }
 
-TEST_F(Step, WithTheSamePositionsLeavesOctreeAndStaticAnswersAlone) {
+TEST_F(Step, SamePositionsKeepOctreeAndStaticContacts) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.1), triangle());
   PairSettings settings;
   settings.method = Method::Proximity;
@@ -222,7 +222,7 @@ TEST_F(Step, WithTheSamePositionsLeavesOctreeAndStaticAnswersAlone) {
   EXPECT_EQ(hash(), first);
 }
 
-TEST_F(Step, WithTheSamePositionsIsANewOneForContinuous) {
+TEST_F(Step, SamePositionsAreANewStepForContinuous) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.5), triangle());
   m_detection.addCollisionPair(m_id, other, {.method = Method::Continuous});
   m_detection.advance();
@@ -262,7 +262,7 @@ ErrorCode codeOf(const std::function<void()>& call) {
   return {};
 }
 
-TEST_F(Step, HasNoAnswerBeforeADetection) {
+TEST_F(Step, HasNoContactsBeforeADetection) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.1), triangle());
   const auto ask = [&] { m_detection.collisionData(m_id, other); };
   m_detection.addCollisionPair(m_id, other, {.method = Method::Proximity, .thickness = 0.5});
@@ -279,7 +279,7 @@ TEST_F(Step, HasNoAnswerBeforeADetection) {
   EXPECT_EQ(codeOf(ask), ErrorCode::NotAvailable);
 }
 
-TEST_F(Step, OfAMovedFromObjectDoesNotExist) {
+TEST_F(Step, MovedFromObjectRefusesCalls) {
   OctreeBasedCD other = std::move(m_detection);
   EXPECT_EQ(codeOf([&] { m_detection.advance(); }), ErrorCode::InvalidCall);
   EXPECT_EQ(codeOf([&] { m_detection.setPositions(m_id, at(1)); }), ErrorCode::InvalidCall);

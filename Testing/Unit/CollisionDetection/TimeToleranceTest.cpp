@@ -58,7 +58,7 @@ std::vector<std::array<std::uint32_t, 4>> idsOf(const CollisionData& data) {
 }
 
 /// Whatever the tolerance, the same features touch; times are early by at most as much, not late.
-TEST(TimeTolerance, BoundsHowEarlyAndNothingElse) {
+TEST(TimeTolerance, BoundsHowEarlyTimesAreAndChangesNothingElse) {
   Random random(5);
   const Moving a = movingSoup(random), b = movingSoup(random);
   const auto truth = idsOf(runOf(testing::settingsOf(Engine::BruteForce),
@@ -92,7 +92,7 @@ TEST(TimeTolerance, BoundsHowEarlyAndNothingElse) {
 
 /// With a thickness: what comes within it is reported, and nothing that stays further away than it
 /// and the tolerance's part of the motion.
-TEST(TimeTolerance, WithThicknessBoundsTimeAndDistance) {
+TEST(TimeTolerance, BoundsTimeAndDistanceWithAThickness) {
   Random random(7);
   const Moving a = movingSoup(random), b = movingSoup(random);
   const auto idsAt = [&](double tolerance, double thickness) {
@@ -130,7 +130,7 @@ TEST(TimeTolerance, AutoFindsWhatContinuousFinds) {
 
 /// A thousand impacts at a fiftieth of the step, and one at a hundredth: boxes of features sweep
 /// the step's first part once that is short, and not a part of the part.
-TEST(Earliest, IsTheOneEarlierThanTheRest) {
+TEST(Earliest, IsFoundAmongManyLaterImpacts) {
   testing::Mesh mesh;
   Positions now;
   const auto add = [&](const Eigen::Vector3d& at, double height, double fall) {
@@ -165,7 +165,7 @@ TEST(Earliest, IsTheOneEarlierThanTheRest) {
 
 /// Of many triangles, whatever was known when, the time is that of all contacts, and the octrees
 /// are of the whole step.
-TEST(Earliest, OfManyTrianglesIsThatOfAllContacts) {
+TEST(Earliest, MatchesAllContactsOfManyTriangles) {
   Random random(9);
   testing::Mesh a = testing::soup(random, 4500, 0.02), b = testing::soup(random, 4500, 0.02);
   for (const double speed : {1e-3, 1e-2, 0.1}) {
@@ -212,7 +212,7 @@ TEST(Earliest, OfManyTrianglesIsThatOfAllContacts) {
 }
 
 /// A shape's octree is empty, and its pair is left as it is.
-TEST(Earliest, OfAShapeBesideOtherPairs) {
+TEST(Earliest, MatchesAllContactsOfAShapeBesideOtherPairs) {
   Random random(12);
   const testing::Mesh a = testing::soup(random, 9000, 0.02), b = testing::soup(random, 9000, 0.02);
   Positions now = a.positions;
@@ -239,7 +239,7 @@ TEST(Earliest, OfAShapeBesideOtherPairs) {
 }
 
 /// A predicate that throws after boxes sweep less: the next frame sees the whole step.
-TEST(Earliest, AThrowLeavesTheOctreesWhole) {
+TEST(Earliest, PredicateThatThrowsLeavesTheOctreesCorrect) {
   Random random(13);
   const testing::Mesh a = testing::soup(random, 9000, 0.02);
   Positions now = a.positions;

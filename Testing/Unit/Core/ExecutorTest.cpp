@@ -149,7 +149,7 @@ TEST(Executor, IsSharedByObjectsInSeveralThreads) {
   }
 }
 
-TEST(Executor, CountIsItsConcurrencyOrLess) {
+TEST(Executor, ThreadCountIsAtMostItsConcurrency) {
   EXPECT_EQ(Threads(0, executorOf(5, backwards)).count(), 5);
   EXPECT_EQ(Threads(3, executorOf(5, backwards)).count(), 3);
   EXPECT_EQ(Threads(9, executorOf(5, backwards)).count(), 5);
@@ -158,7 +158,7 @@ TEST(Executor, CountIsItsConcurrencyOrLess) {
   EXPECT_GE(makeThreadPool()->concurrency(), 1);
 }
 
-TEST(Executor, NoMoreThreadsThanAskedFor) {
+TEST(Executor, NoMoreThreadsThanRequested) {
   for (const std::shared_ptr<Executor>& executor :
        {makeThreadPool(8), std::shared_ptr<Executor>(executorOf(8, onThreads))}) {
     const Threads threads(2, executor);
@@ -185,7 +185,7 @@ TEST(Executor, NestedLoopsAreComplete) {
   }
 }
 
-TEST(Executor, TheExceptionOfTheLowestIndexIsRethrown) {
+TEST(Executor, ExceptionOfTheLowestIndexIsRethrown) {
   for (const auto& [name, executor] : executors()) {
     for (const int count : {0, 2}) {
       const Threads threads(count, executor);
@@ -223,7 +223,7 @@ struct Later {
   void* context;
 };
 
-TEST(Executor, ReturningEarlyIsAnErrorAndTasksThatComeLaterDoNothing) {
+TEST(Executor, ReturningEarlyIsAnErrorAndLaterTasksDoNothing) {
   std::vector<Later> later;
   bool faulty = true;
   const auto executor = executorOf(3, [&](std::size_t count, Executor::Task task, void* context) {
@@ -283,7 +283,7 @@ TEST(Executor, ReturningWhileTasksRunWaitsForThem) {
   }
 }
 
-TEST(Executor, ItsExceptionPassesOnAfterTheTasksThatHadBegun) {
+TEST(Executor, ItsExceptionIsRethrownAfterStartedTasksEnd) {
   std::thread running;
   bool faulty = true;
   const auto executor = executorOf(2, [&](std::size_t count, Executor::Task task, void* context) {
@@ -311,7 +311,7 @@ TEST(Executor, ItsExceptionPassesOnAfterTheTasksThatHadBegun) {
   EXPECT_TRUE(allRun(*threads));
 }
 
-TEST(Executor, IsNoPartOfAProblem) {
+TEST(Executor, IsNotPartOfACollisionProblem) {
   OctreeBasedCD detection(sharing(executorOf(2, backwards)));
   EXPECT_TRUE(detection.settings().executor);
   const CollisionProblem problem = detection.problem();
@@ -319,7 +319,7 @@ TEST(Executor, IsNoPartOfAProblem) {
   EXPECT_FALSE(setUp(problem).settings().executor);
 }
 
-TEST(Executor, ThePoolRunsTasksOfTheProgram) {
+TEST(Executor, PoolRunsTasksOfTheProgram) {
   const std::shared_ptr<Executor> pool = makeThreadPool(3);
   std::vector<int> runs(100, 0);
   pool->run(

@@ -88,7 +88,7 @@ constexpr bool kStartsAsMany =
 constexpr bool kStartsAsMany = true;
 #endif
 
-TEST(ThreadFailures, WithTooLittleMemoryForThreadsFewerDoTheWork) {
+TEST(ThreadFailures, FewerThreadsDoTheWorkIfMemoryIsShort) {
   if (testing::kSanitized) GTEST_SKIP() << "sanitizers reserve address space of their own";
   for (const std::size_t bytes : {std::size_t{16} << 20, std::size_t{200} << 20})
     EXPECT_EQ(inChild([&] {
@@ -99,7 +99,7 @@ TEST(ThreadFailures, WithTooLittleMemoryForThreadsFewerDoTheWork) {
               "passed");
 }
 
-TEST(ThreadFailures, AFrameWithTooLittleMemoryForThreadsIsRight) {
+TEST(ThreadFailures, FrameIsCorrectIfMemoryForThreadsIsShort) {
   if (testing::kSanitized) GTEST_SKIP() << "sanitizers reserve address space of their own";
   const std::uint64_t truth = serialHash();
   EXPECT_EQ(inChild([&] {
@@ -117,7 +117,7 @@ void pauseFor(int repeat) {
   if (repeat % 4 != 0) std::this_thread::sleep_for(std::chrono::microseconds(5 * repeat));
 }
 
-TEST(ThreadFailures, AnObjectIsDestroyedInTheChildOfAFork) {
+TEST(ThreadFailures, ObjectCanBeDestroyedInTheChildOfAFork) {
   if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
   for (int repeat = 0; repeat < 50; ++repeat) {
     auto scene = std::make_unique<Scene>(Settings{.threads = 9});
@@ -132,7 +132,7 @@ TEST(ThreadFailures, AnObjectIsDestroyedInTheChildOfAFork) {
   }
 }
 
-TEST(ThreadFailures, AFrameInTheChildOfAForkIsRight) {
+TEST(ThreadFailures, FrameInTheChildOfAForkIsCorrect) {
   if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
   const std::uint64_t truth = serialHash();
   Scene scene({.threads = 3});
@@ -145,7 +145,7 @@ TEST(ThreadFailures, AFrameInTheChildOfAForkIsRight) {
   EXPECT_EQ(scene.hash(), truth);
 }
 
-TEST(ThreadFailures, AnObjectMadeInTheChildOfAForkHasThreads) {
+TEST(ThreadFailures, ObjectMadeInTheChildOfAForkHasThreads) {
   if (testing::kSanitized) GTEST_SKIP() << "sanitizers do not start threads after a fork()";
   const Threads before(3);
   ASSERT_TRUE(allRun(before));
@@ -163,7 +163,7 @@ TEST(ThreadFailures, AnObjectMadeInTheChildOfAForkHasThreads) {
             "passed");
 }
 
-TEST(ThreadFailures, AForkWhileAnotherThreadUsesThePoolIsSafe) {
+TEST(ThreadFailures, ForkWhileAnotherThreadUsesThePoolIsSafe) {
   if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
   const std::shared_ptr<Executor> pool = makeThreadPool(3);
   std::atomic<bool> over{false};
@@ -184,7 +184,7 @@ TEST(ThreadFailures, AForkWhileAnotherThreadUsesThePoolIsSafe) {
 }
 
 #ifndef PALPATE_THREADS_TBB
-TEST(ThreadFailures, AForkInATaskThatOthersShareIsAnErrorInTheChild) {
+TEST(ThreadFailures, ForkInASharedTaskIsAnErrorInTheChild) {
   if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
   const Threads threads(2);
   std::atomic<bool> forked{false}, parent{true};
@@ -237,7 +237,7 @@ void work(std::chrono::nanoseconds time) {
 
 /// A worker that the real-time caller has preempted holds the last index of a loop. On one core it
 /// goes on only once the caller blocks, or in what the kernel saves for others (a twentieth).
-TEST(ThreadFailures, ARealTimeCallerOnTheCoreOfItsWorkerDoesNotSpinForever) {
+TEST(ThreadFailures, RealTimeCallerOnTheCoreOfItsWorkerDoesNotSpinForever) {
 #ifdef PALPATE_THREADS_TBB
   GTEST_SKIP() << "oneTBB's own rules hold";
 #endif
@@ -270,7 +270,7 @@ TEST(ThreadFailures, ARealTimeCallerOnTheCoreOfItsWorkerDoesNotSpinForever) {
 }
 
 /// Many short loops, in which either may hold the pool's lock when the other one preempts it.
-TEST(ThreadFailures, ARealTimeCallerOnTheCoreOfItsWorkersRunsManyLoops) {
+TEST(ThreadFailures, RealTimeCallerOnTheCoreOfItsWorkersRunsManyLoops) {
   const std::string outcome = inChild(
       [] {
         cpu_set_t cores;

@@ -69,7 +69,7 @@ class AuditFiles : public ::testing::Test {
   }
 };
 
-TEST_F(AuditFiles, AFaultInAFrameIsListedAndKeptInAFileThatReplaysIt) {
+TEST_F(AuditFiles, FaultIsListedAndWrittenToAFileThatReplaysIt) {
   OctreeBasedCD faulty = detection(everything());
   faulty.detectCollision();
   EXPECT_TRUE(faulty.auditFailures().empty());
@@ -111,7 +111,7 @@ TEST_F(AuditFiles, AFaultInAFrameIsListedAndKeptInAFileThatReplaysIt) {
   EXPECT_TRUE(faulty.auditFailures().empty());
 }
 
-TEST_F(AuditFiles, FilesThatAreThereStay) {
+TEST_F(AuditFiles, ExistingFilesAreKept) {
   const fs::path first = m_folder / "frame1-pair0-1.capture",
                  second = m_folder / "frame1-pair0-1-2.capture";
   std::ofstream(first) << "precious";
@@ -123,7 +123,7 @@ TEST_F(AuditFiles, FilesThatAreThereStay) {
   EXPECT_NO_THROW(readCapture(second));
 }
 
-TEST_F(AuditFiles, WithoutAFolderThereAreNone) {
+TEST_F(AuditFiles, WithoutAFolderNoFileIsWritten) {
   OctreeBasedCD faulty = detection({.features = 1 << 20});
   faultyFrame(faulty);
   ASSERT_FALSE(faulty.auditFailures().empty());
@@ -133,7 +133,7 @@ TEST_F(AuditFiles, WithoutAFolderThereAreNone) {
   }
 }
 
-TEST_F(AuditFiles, NoMoreThanAskedForAndAFolderThatIsGoneIsSaidByName) {
+TEST_F(AuditFiles, AtMostMaxFilesAreWrittenAndARemovedFolderIsNamed) {
   AuditSettings settings = everything();
   settings.maxFiles = 2;
   OctreeBasedCD faulty = detection(settings);
@@ -157,7 +157,7 @@ TEST_F(AuditFiles, NoMoreThanAskedForAndAFolderThatIsGoneIsSaidByName) {
   }
 }
 
-TEST_F(AuditFiles, AFolderThatIsNotThereIsRefusedByName) {
+TEST_F(AuditFiles, MissingFolderThrowsAnErrorThatNamesIt) {
   for (const fs::path& folder : {m_folder / "missing", fs::path("/dev/null")}) {
     try {
       detection({.features = 1, .folder = folder});

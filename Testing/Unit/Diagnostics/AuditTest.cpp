@@ -133,7 +133,7 @@ void expectEachFault(const Scene& scene, List list,
   }
 }
 
-TEST(Audit, FiresForTwoShapes) {
+TEST(Audit, FindsFaultsBetweenTwoShapes) {
   const TriangleMesh none;
   const PlacedShape a(Box{{0, 0, 0}, {1, 1, 1}}), b(Box{{0, 0, 2.5}, {1, 1, 1}});
   const PairSettings settings{.method = Method::Proximity, .thickness = 1};
@@ -167,7 +167,7 @@ TEST(Audit, FiresForTwoShapes) {
   expectFault(faulty, Fault::FalsePositive);
 }
 
-TEST(Audit, FiresForEachContactTakenOutAddedOrChanged) {
+TEST(Audit, FindsEachRemovedAddedOrChangedContact) {
   std::size_t contacts = 0;
   forEachScene([&](const Scene& scene) {
     EXPECT_TRUE(scene.failures(scene.found()).empty());
@@ -183,7 +183,7 @@ TEST(Audit, FiresForEachContactTakenOutAddedOrChanged) {
   EXPECT_GT(contacts, 50u);
 }
 
-TEST(Audit, FiresForAnImpactBeforeTheEarliest) {
+TEST(Audit, FindsAnImpactBeforeTheEarliest) {
   Random random(4);
   const Scene scene(
       random, {.method = Method::Continuous, .thickness = 0.001, .earliestTimeOnly = true}, false);
@@ -207,7 +207,7 @@ TEST(Audit, FiresForAnImpactBeforeTheEarliest) {
   }
 }
 
-TEST(Audit, SmallSamplesFindAFaultInTime) {
+TEST(Audit, SmallSamplesFindAFaultWithinSomeFrames) {
   forEachScene([&](const Scene& scene) {
     CollisionData::Contents faulty = scene.found();
     faulty.edgeEdge.pop_back();
@@ -227,7 +227,7 @@ std::vector<std::size_t> sizesOf(const FeatureLists& lists) {
           lists.trianglesOfA.size()};
 }
 
-TEST(Audit, DrawsFeaturesEvenlyBySeedFrameAndPair) {
+TEST(Audit, DrawsFeaturesUniformlyBySeedFrameAndPair) {
   forEachScene([&](const Scene& scene) {
     const FeatureLists every = everyFeature(scene.meshes());
     std::size_t all = 0;
@@ -272,7 +272,7 @@ TEST(Audit, DrawsFeaturesEvenlyBySeedFrameAndPair) {
   });
 }
 
-TEST(Audit, FindsNothingInGoodFrames) {
+TEST(Audit, FindsNoFaultInCorrectFrames) {
   Random random(5);
   for (const int features : {0, 1, 20, 1 << 20}) {
     OctreeBasedCD detection({.threads = 2, .audit = {.features = features, .seed = 1}});

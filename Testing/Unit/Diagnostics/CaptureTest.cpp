@@ -136,7 +136,7 @@ TEST_F(Capture, ReplaysTheLastFrame) {
             detection.collisionData(a, a).hash());
 }
 
-TEST_F(Capture, KeepsThePairOfAnAuditsFailure) {
+TEST_F(Capture, KeepsThePairOfAnAuditFailure) {
   const OctreeBasedCD detection = movedScene();
   const GeometryId a{1}, b{2};
   const CollisionData& whole = detection.collisionData(b, a);
@@ -179,7 +179,7 @@ CollisionProblem smallProblem() {
   return problem;
 }
 
-TEST_F(Capture, IsExact) {
+TEST_F(Capture, KeepsEveryBit) {
   writeCapture(smallProblem(), file());
   const CollisionProblem read = readCapture(file());
   expectSame(read, smallProblem());
@@ -188,7 +188,7 @@ TEST_F(Capture, IsExact) {
   expectSame(readCapture(file()), CollisionProblem());
 }
 
-TEST_F(Capture, RefusesEveryFileCutOff) {
+TEST_F(Capture, RefusesTruncatedFiles) {
   writeCapture(smallProblem(), file());
   const std::string whole = textOf(file());
   ASSERT_TRUE(whole.ends_with("end\n"));
@@ -204,7 +204,7 @@ TEST_F(Capture, RefusesEveryFileCutOff) {
   expectRefused("it is not a capture");
 }
 
-TEST_F(Capture, RefusesWhatIsWrongByName) {
+TEST_F(Capture, ErrorsNameTheFault) {
   expectRefused("cannot be read");
   fs::create_directory(file());
   expectRefused("cannot be read");
@@ -292,7 +292,7 @@ TEST_F(Capture, RefusesNanAndInfinity) {
   }
 }
 
-TEST_F(Capture, LeavesNothingHalfWritten) {
+TEST_F(Capture, LeavesNoPartialFile) {
   const fs::path nowhere = m_folder / "missing" / "file.capture";
   EXPECT_THROW(writeCapture(smallProblem(), nowhere), Error);
   EXPECT_EQ(fileCount(), 0u);

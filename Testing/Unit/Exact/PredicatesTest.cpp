@@ -33,7 +33,7 @@ int areaSign(int axis, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
   return sgn(Integer(cross(a, b) + cross(b, c) + cross(c, a)));
 }
 
-TEST(Predicates, EverySignIsThatOfTheIntegerDeterminant) {
+TEST(Predicates, EverySignMatchesTheIntegerDeterminant) {
   Random random(1);
   SignCounts counts;
   for (int k = 0; k < static_cast<int>(Kind::Count); ++k) {
@@ -56,7 +56,7 @@ Eigen::Vector3d nudged(Eigen::Vector3d p, int axis, Random& random) {
   return p;
 }
 
-TEST(Predicates, OneUlpOffThePlaneOrTheLineIsSeen) {
+TEST(Predicates, OneUlpOffThePlaneOrTheLineIsDetected) {
   Random random(2);
   SignCounts counts;
   for (int repeat = 0; repeat < 5000; ++repeat) {
@@ -71,7 +71,7 @@ TEST(Predicates, OneUlpOffThePlaneOrTheLineIsSeen) {
 }
 
 /// Where products end among the denormals, and all around.
-TEST(Predicates, NoUnderflowTurnsAVolume) {
+TEST(Predicates, UnderflowDoesNotFlipAVolume) {
   Random random(5);
   SignCounts counts;
   for (int exponent = -1020; exponent <= 1000;
@@ -86,7 +86,7 @@ TEST(Predicates, NoUnderflowTurnsAVolume) {
   }
 }
 
-TEST(Predicates, NoUnderflowTurnsAnArea) {
+TEST(Predicates, UnderflowDoesNotFlipAnArea) {
   Random random(6);
   SignCounts counts;
   for (int exponent = -545; exponent <= -490; ++exponent) {
@@ -101,7 +101,7 @@ TEST(Predicates, NoUnderflowTurnsAnArea) {
 
 /// Where products round to multiples of the least double, of differences that were rounded
 /// themselves: the relative error alone says too little.
-TEST(Predicates, NoUnderflowTurnsAnAreaOfRoundedDifferences) {
+TEST(Predicates, UnderflowDoesNotFlipAnAreaOfRoundedDifferences) {
   Random random(7);
   SignCounts counts;
   const auto uneven = [&] {
@@ -118,7 +118,7 @@ TEST(Predicates, NoUnderflowTurnsAnAreaOfRoundedDifferences) {
   }
 }
 
-TEST(Predicates, SwappingTwoPositionsTurnsTheSign) {
+TEST(Predicates, SwappingTwoPositionsFlipsTheSign) {
   Random random(3);
   SignCounts counts;
   for (int repeat = 0; repeat < 20000; ++repeat) {
@@ -130,7 +130,7 @@ TEST(Predicates, SwappingTwoPositionsTurnsTheSign) {
   }
 }
 
-TEST(Predicates, FloatingPointDecidesWhatIsNotDegenerate) {
+TEST(Predicates, FloatingPointFilterDecidesNonDegenerateInput) {
   Random random(4);
   SignCounts counts;
   for (int repeat = 0; repeat < 100000; ++repeat) {

@@ -62,7 +62,7 @@ void expectTrue(const ImpactCase& query, const TimeOfImpactSettings& settings,
   }
 }
 
-TEST(Approach, IsNeitherLateNorMissedNorInvented) {
+TEST(Approach, HasNoLateTimesFalseNegativesOrFalsePositives) {
   const char* cases = std::getenv("PALPATE_IMPACT_CASES");
   const long count = cases ? std::atol(cases) : 3000;
   HardCases hard(21);

@@ -177,7 +177,7 @@ TEST(ClosestPoint, AgreesWithRationalArithmetic) {
 }
 
 /// Each border between two regions lies where a weight or an offset is zero.
-TEST(ClosestPoint, EveryRegionOfATriangleIsCrossed) {
+TEST(ClosestPoint, EveryRegionBorderOfATriangleIsCrossed) {
   const std::vector<std::array<Vector3d, 3>> triangles{
       {Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(0, 1, 0)},
       {Vector3d(0.1, 0.2, 0.3), Vector3d(1.3, -0.4, 0.7), Vector3d(0.6, 1.1, -0.2)},
@@ -199,7 +199,7 @@ TEST(ClosestPoint, EveryRegionOfATriangleIsCrossed) {
   }
 }
 
-TEST(ClosestPoint, EveryRegionOfTwoEdgesIsCrossed) {
+TEST(ClosestPoint, EveryRegionBorderOfTwoEdgesIsCrossed) {
   for (const double tilt : {0.0, 1e-300, 1e-16, 1e-8, 0.3, 2.0})
     for (const double s : {-0.25, -1e-15, 0.0, 1e-15, 0.5, 1.0, 1.0 + 1e-15, 1.5})
       for (const double t : {-0.25, 0.0, 1e-15, 0.5, 1.0 - 1e-15, 1.0, 1.5})
@@ -261,7 +261,7 @@ TEST(ClosestPoint, PermutingCornersPermutesWeights) {
   }
 }
 
-TEST(ClosestPoint, SwappingEdgesOrEndsSwapsTheAnswer) {
+TEST(ClosestPoint, SwappingEdgesOrEndsSwapsTheResult) {
   Random random;
   for (int kind = 0; kind < kKinds; ++kind) {
     for (int i = 0; i < 500; ++i) {
@@ -352,7 +352,7 @@ TEST(ClosestPoint, MovingOnAGridKeepsTheBits) {
   }
 }
 
-TEST(ClosestPoint, TrianglesThatShareAnEdgeAnswerAlikeForIt) {
+TEST(ClosestPoint, TrianglesThatShareAnEdgeAgreeOnIt) {
   Random random;
   int shared = 0;
   for (int i = 0; i < 3000; ++i) {
@@ -375,7 +375,7 @@ TEST(ClosestPoint, TrianglesThatShareAnEdgeAnswerAlikeForIt) {
 
 // ---- By value ----
 
-TEST(ClosestPoint, TouchingFeaturesHaveTheirRulesNormal) {
+TEST(ClosestPoint, NormalsOfTouchingFeaturesFollowTheirRule) {
   const Vector3d a(0, 0, 0), b(2, 0, 0), c(0, 2, 0);
   for (const Vector3d& p : {a, Vector3d(1, 0, 0), Vector3d(0.5, 0.5, 0)}) {
     EXPECT_EQ(vertexTriangleDistance(p, a, b, c).distance, 0.0);
@@ -389,7 +389,7 @@ TEST(ClosestPoint, TouchingFeaturesHaveTheirRulesNormal) {
   EXPECT_EQ(crossed.normal, Vector3d(0, 0, 1));
 }
 
-TEST(ClosestPoint, DegenerateFeaturesAreAnsweredForWhatIsLeft) {
+TEST(ClosestPoint, DegenerateFeaturesCountAsSegmentsOrPoints) {
   const Vector3d point(1, 2, 3);
   const VertexTriangleDistance onPoint =
       vertexTriangleDistance(point + Vector3d(0, 3, 4), point, point, point);
@@ -411,7 +411,7 @@ TEST(ClosestPoint, DegenerateFeaturesAreAnsweredForWhatIsLeft) {
   EXPECT_EQ(points.normal, Vector3d(1, 0, 0));
 }
 
-TEST(ClosestPoint, ParallelEdgesMeetInTheMiddleOfTheirStretch) {
+TEST(ClosestPoint, ParallelEdgesAreClosestInTheMiddleOfTheirOverlap) {
   const EdgeEdgeDistance beside = edgeEdgeDistance({0, 0, 0}, {4, 0, 0}, {5, 1, 0}, {1, 1, 0});
   EXPECT_TRUE(beside.parallel);
   EXPECT_EQ(beside.weightA, 0.625);
@@ -424,7 +424,7 @@ TEST(ClosestPoint, ParallelEdgesMeetInTheMiddleOfTheirStretch) {
   EXPECT_EQ(beyond.distance, 5.0);
 }
 
-TEST(ClosestPoint, TheLargestDoublesAreAnswered) {
+TEST(ClosestPoint, LargestDoublesGiveFiniteResults) {
   const double most = std::numeric_limits<double>::max();
   const VertexTriangleDistance far = vertexTriangleDistance(
       {most, most, most}, {-most, -most, -most}, {-most, most, -most}, {-most, -most, most});
@@ -449,7 +449,7 @@ TEST(ClosestPoint, NaNGivesNaN) {
 
 /// Edges of grids that lie on each other, as computed coordinates make them: exactly parallel, or
 /// by a rounding not; far from the origin, and with what is left over of zero.
-TEST(ClosestPoint, TellsHowEdgesOfGridsCross) {
+TEST(ClosestPoint, EdgesOfGridsAreClassifiedExactly) {
   std::mt19937 random(11);
   const auto below = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
   int parallel = 0, interior = 0, outside = 0, inIntegers = 0;

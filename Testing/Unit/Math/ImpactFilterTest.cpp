@@ -89,7 +89,7 @@ TEST(ImpactFilter, KeepsEveryQueryThatComesWithinTheDistance) {
 
 /// As brute force does not ask the filter: with a distance, the search may report what does not
 /// quite come within it.
-TEST(ImpactFilter, KeepsWhatTheSearchReports) {
+TEST(ImpactFilter, KeepsEveryImpactThatTheSearchReports) {
   HardCases hard(15);
   test::Random random(16);
   int found = 0, dropped = 0;

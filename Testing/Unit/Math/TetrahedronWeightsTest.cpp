@@ -57,7 +57,7 @@ void expectExact(const Vector3d& p, std::array<Vector3d, 4> corners, std::size_t
   } while (std::next_permutation(order.begin(), order.end()));
 }
 
-TEST(TetrahedronWeights, AreThoseOfRationalNumbersInAnyOrderOfCorners) {
+TEST(TetrahedronWeights, MatchRationalArithmeticInAnyOrderOfCorners) {
   Random random(1);
   std::size_t inside = 0, zeros = 0;
   for (int run = 0; run < 700; ++run) {

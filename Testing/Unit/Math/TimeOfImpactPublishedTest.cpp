@@ -36,7 +36,7 @@ TEST(TimeOfImpactPublished, EveryLabelHoldsInEveryOrderAndDirection) {
 
 /// Every impact and some misses, as the oracle is slow: the truth, and a time that is not late and
 /// not early.
-TEST(TimeOfImpactPublished, TimesAreThoseOfTheOracle) {
+TEST(TimeOfImpactPublished, TimesMatchTheOracle) {
   if (published().empty()) GTEST_SKIP() << "no ccd-queries in PALPATE_SHARED_DATA";
   for (const auto& set : published()) {
     for (std::size_t i = 0; i < set.queries.size(); ++i) {

@@ -147,7 +147,7 @@ TEST(TimeOfImpact, DoesNotDependOnTheOrderOfCorners) {
   }
 }
 
-TEST(TimeOfImpact, IsTheSameDecisionBackwards) {
+TEST(TimeOfImpact, DecisionIsTheSameBackwards) {
   test::Random random(4);
   for (int i = 0; i < 6000; ++i) {
     const ImpactCase query =
@@ -166,7 +166,7 @@ TEST(TimeOfImpact, ScalesByPowersOfTwo) {
   }
 }
 
-TEST(TimeOfImpact, MovesWithTheOrigin) {
+TEST(TimeOfImpact, DoesNotDependOnTheOrigin) {
   test::Random random(6);
   for (int i = 0; i < 2000 && !testing::Test::HasFatalFailure(); ++i) {
     const ImpactCase query = randomGridCase(random, i % 2 == 0, 2);
@@ -215,7 +215,7 @@ TEST(TimeOfImpact, TakesAnyToleranceAndDistanceThatIsNotPositive) {
   }
 }
 
-TEST(TimeOfImpact, AnswersStepsWithoutMotion) {
+TEST(TimeOfImpact, HandlesStepsWithoutMotion) {
   const Eigen::Vector3d a(0, 0, 0), b(1, 0, 0), c(0, 1, 0);
   const auto still = [](const Eigen::Vector3d& v, const Eigen::Vector3d& p,
                         const Eigen::Vector3d& q, const Eigen::Vector3d& r) {

@@ -61,7 +61,7 @@ void expectSame(const TriangleIntersection& r, const TriangleIntersection& s, in
 const std::array<Order, 6> kOrders{
     {{{0, 1, 2}}, {{1, 2, 0}}, {{2, 0, 1}}, {{0, 2, 1}}, {{2, 1, 0}}, {{1, 0, 2}}}};
 
-TEST(TriangleIntersection, ReorderedCornersAndSwappedTrianglesMoveTheBits) {
+TEST(TriangleIntersection, ReorderingCornersOrTrianglesPermutesTheResult) {
   Random random(11);
   SignCounts counts;
   for (int repeat = 0; repeat < 300 * kKinds; ++repeat) {
@@ -106,7 +106,7 @@ TEST(TriangleIntersection, MirroringExchangingAxesAndPowersOfTwoChangeNothing) {
 }
 
 /// What the features say must fit together, whatever the triangles.
-TEST(TriangleIntersection, WhatMeetsWithoutTouchingHasTwoCrossings) {
+TEST(TriangleIntersection, IntersectionWithoutTouchHasTwoCrossings) {
   Random random(13);
   SignCounts counts;
   std::array<int, 3> seen{};
@@ -179,7 +179,7 @@ TEST(TriangleIntersection, EachSimpleConfigurationHasItsFeatures) {
 }
 
 /// What the comparison with CGAL's exact kernel (Testing/Exact) goes through.
-TEST(TriangleIntersection, EveryKindOfPairIsWhatItsNameSays) {
+TEST(TriangleIntersection, GeneratedPairsHaveTheirNamedProperty) {
   Random random(15);
   std::array<int, 16> cornersOn{};
   for (int k = 0; k < kKinds; ++k) {
@@ -222,7 +222,7 @@ TEST(TriangleIntersection, EveryKindOfPairIsWhatItsNameSays) {
   for (int i = 0; i < 16; ++i) EXPECT_GT(cornersOn[i], 10) << i;
 }
 
-TEST(TriangleIntersection, SegmentsAndPointsAreWhatTheyCover) {
+TEST(TriangleIntersection, SegmentsAndPointsCountAsDegenerateTriangles) {
   const Eigen::Vector3d p(1, 1, 0), q(1, 1, 5), r(9, 9, 9), none(0, 0, 1);
   const Eigen::Vector3d a(0, 0, 0), b(4, 0, 0), c(0, 4, 0);
   EXPECT_TRUE(trianglesIntersect(a, b, c, p, p, p));

@@ -58,7 +58,7 @@ std::vector<double> significands(Random& random) {
   return all;
 }
 
-TEST(OutwardRounding, HoldsEveryExponentThatFloatsReach) {
+TEST(OutwardRounding, EnclosesEveryExponentOfFloats) {
   Random random(1);
   for (int exponent = -1074; exponent < 120; ++exponent)
     for (const double s : significands(random))
@@ -70,7 +70,7 @@ TEST(OutwardRounding, HoldsEveryExponentThatFloatsReach) {
   expectHeld(-0.0, 0, 1);
 }
 
-TEST(OutwardRounding, HoldsEveryExponentInItsOwnScale) {
+TEST(OutwardRounding, EnclosesEveryExponentInItsOwnScale) {
   Random random(2);
   for (int exponent = -1074; exponent < 1024; ++exponent) {
     const double size = std::ldexp(1.0, exponent), scale = frameScale(size);
@@ -87,7 +87,7 @@ TEST(OutwardRounding, HoldsEveryExponentInItsOwnScale) {
   }
 }
 
-TEST(OutwardRounding, HoldsDifferencesFromTheOrigin) {
+TEST(OutwardRounding, EnclosesDifferencesFromTheOrigin) {
   Random random(3);
   for (int exponent = -1060; exponent < 1000; exponent += 3) {
     const double origin = std::ldexp(testing::uniform(random, 1, 2), exponent);
@@ -124,7 +124,7 @@ TEST(OutwardRounding, IsMonotone) {
 
 /// What clamping does beyond the floats' range: bounds stay finite and in order, and two that
 /// overlap still do.
-TEST(OutwardRounding, BeyondTheRangeIsClampedAndFinite) {
+TEST(OutwardRounding, ValuesBeyondTheRangeAreClampedAndFinite) {
   const std::vector<Vector3d> positions{{1e300, -1e300, 0x1p121}, {-1e300, 1e300, -0x1p121}};
   FloatPoint points[2];
   toFloats(positions, {}, points);
@@ -136,7 +136,7 @@ TEST(OutwardRounding, BeyondTheRangeIsClampedAndFinite) {
 }
 
 /// The boxes that the SIMD code makes are those of OutwardRounding, bit for bit.
-TEST(OutwardRounding, BoxesOfTrianglesAreThoseOfTheirCorners) {
+TEST(OutwardRounding, SimdTriangleBoxesMatchOutwardRounding) {
   Random random(4);
   const std::size_t count = 3000;
   std::vector<FloatPoint> points(3 * count);

@@ -97,7 +97,7 @@ TEST(TriangleMesh, NoTriangles) {
   }
 }
 
-TEST(TriangleMesh, OneTriangleOwnsAllOfItself) {
+TEST(TriangleMesh, OneTriangleOwnsAllItsFeatures) {
   const MeshTopology mesh(3, Triangles{{2, 0, 1}});
   EXPECT_EQ(mesh.owned, std::vector<std::uint8_t>{63});
   EXPECT_EQ(mesh.edges, (std::vector<Segment>{{0, 1}, {0, 2}, {1, 2}}));
@@ -114,7 +114,7 @@ TEST(TriangleMesh, TwoTrianglesOfEitherWindingShareAnEdge) {
   }
 }
 
-TEST(TriangleMesh, AnEdgeOfFiveTriangles) {
+TEST(TriangleMesh, EdgeOfFiveTriangles) {
   Triangles fan;
   for (std::uint32_t i = 0; i < 5; ++i)
     fan.push_back(i % 2 ? Triangle{1, 0, 2 + i} : Triangle{0, 1, 2 + i});
@@ -136,7 +136,7 @@ TEST(TriangleMesh, RepeatedIndices) {
   expectTopology(3, all);
 }
 
-TEST(TriangleMesh, TheSameTriangleAgainOwnsNothing) {
+TEST(TriangleMesh, DuplicateTriangleOwnsNothing) {
   const MeshTopology mesh(3, Triangles{{0, 1, 2}, {0, 1, 2}, {2, 1, 0}, {1, 2, 0}});
   EXPECT_EQ(mesh.owned, (std::vector<std::uint8_t>{63, 0, 0, 0}));
   expectTopology(3, mesh.triangles);
@@ -165,7 +165,7 @@ TEST(TriangleMesh, MoreVerticesThanSixteenBits) {
 
 // V - E + F = 2 on a closed surface of one piece: an octahedron, each triangle cut in four, four
 // times.
-TEST(TriangleMesh, ClosedSurfacesObeyEuler) {
+TEST(TriangleMesh, ClosedSurfacesSatisfyEulersFormula) {
   Triangles triangles{{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
                       {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
   std::uint32_t vertexCount = 6;

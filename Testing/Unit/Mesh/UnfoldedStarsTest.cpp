@@ -100,7 +100,7 @@ Positions moved(const Positions& positions, testing::Random& random, double by) 
   return out;
 }
 
-TEST(UnfoldedStars, NoNeighboursThatTheyAnswerTouch) {
+TEST(UnfoldedStars, ExcludedNeighboursDoNotTouch) {
   testing::Random random(41);
   std::size_t touching = 0;
   for (int round = 0; round < 60; ++round) {
@@ -121,7 +121,7 @@ TEST(UnfoldedStars, NoNeighboursThatTheyAnswerTouch) {
   EXPECT_GT(touching, 100u);
 }
 
-TEST(UnfoldedStars, AnswerMostNeighboursOfASmoothMesh) {
+TEST(UnfoldedStars, ExcludeMostNeighboursOfASmoothMesh) {
   testing::Random random(43);
   const testing::Mesh mesh = testing::sheet(12, 0.0, 0.3);
   const auto turned = [&](const Vector3d& p) {
@@ -136,7 +136,7 @@ TEST(UnfoldedStars, AnswerMostNeighboursOfASmoothMesh) {
 }
 
 /// Stars so small in their frame that floats are off by about their size.
-TEST(UnfoldedStars, KnowWhatFloatsDoNot) {
+TEST(UnfoldedStars, AreCorrectWhereFloatsAreImprecise) {
   testing::Random random(47);
   for (int round = 0; round < 40; ++round) {
     testing::Mesh mesh = testing::sheet(5, 0.0, 0.3);
@@ -149,7 +149,7 @@ TEST(UnfoldedStars, KnowWhatFloatsDoNot) {
 }
 
 /// Floats are clamped: a vertex nearly on the x axis looks as if it were halfway to the y axis.
-TEST(UnfoldedStars, AreWithinTheRangeOfFloats) {
+TEST(UnfoldedStars, AreCorrectBeyondTheRangeOfFloats) {
   testing::Mesh mesh{{Vector3d::Zero()}, {}};
   for (const Vector3d& p : {Vector3d(1, -1, 0), Vector3d(2, 1, 0), Vector3d(0x1p140, 0x1p125, 0),
                             Vector3d(-1, 1, 0), Vector3d(-1, -1, 0)})
@@ -176,7 +176,7 @@ bool isAnswered(const testing::Mesh& mesh, const Positions& now) {
   return !answered({mesh, now}).empty();
 }
 
-TEST(UnfoldedStars, GoOnceAround) {
+TEST(UnfoldedStars, WindOnceAroundTheVertex) {
   for (const std::uint32_t n : {3u, 4u, 7u, 255u}) {
     const testing::Mesh once = fan(n, 1, 0.01), twice = fan(2 * n + 1, 2, 0.01);
     EXPECT_TRUE(isAnswered(once, once.positions)) << n;
@@ -210,7 +210,7 @@ TEST(UnfoldedStars, StayUnfoldedThroughoutTheStep) {
   EXPECT_FALSE(isAnswered(mesh, over));
 }
 
-TEST(UnfoldedStars, AreClosedAndOfOneWinding) {
+TEST(UnfoldedStars, MustBeClosedAndOfOneWinding) {
   const testing::Mesh whole = fan(6, 1, 0.1);
   const auto closed = [](const testing::Mesh& mesh, std::vector<std::uint32_t> disabled = {}) {
     MeshTopology topology(mesh.positions.size(), mesh.triangles);

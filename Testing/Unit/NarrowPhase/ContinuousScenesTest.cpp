@@ -47,7 +47,7 @@ struct PublishedIds {
   std::uint32_t firstEdge, triangles;
 };
 
-TEST_P(ContinuousScenes, FindsEveryTruePairAndInventsNone) {
+TEST_P(ContinuousScenes, HaveNoFalseNegativesAndNoFalsePositives) {
   const auto& [scene, before, now, vertexTriangle, edgeEdge] = GetParam();
   const std::filesystem::path folder = std::string(PALPATE_SHARED_DATA) + "/ccd-scenes/" + scene;
   if (!std::filesystem::is_directory(folder))

@@ -48,7 +48,7 @@ struct Moving {
 
 /// Boxes over [0, upTo], exact but for rounding in double: all that overlap are kept, and few
 /// others.
-TEST(FeaturePairs, KeepWhatOverlapsUpToAnyTime) {
+TEST(FeaturePairs, KeepOverlappingPairsUpToAnyTime) {
   testing::Random random(1);
   for (const float upTo : {0.0f, 1e-6f, 0.01f, 0.3f, 0.999f, 1.0f}) {
     for (const double distance : {0.0, 1e4}) {
@@ -170,7 +170,7 @@ struct PublishedStep {
   std::size_t vertexTriangle, edgeEdge;
 };
 
-TEST(FeaturePairs, OfPublishedStepsAreThoseOfBoxesInDouble) {
+TEST(FeaturePairs, MatchBoxesInDoubleOnPublishedSteps) {
   const std::string folder = std::string(PALPATE_SHARED_DATA) + "/ccd-scenes/";
   if (!std::filesystem::is_directory(folder))
     GTEST_SKIP() << "no ccd-scenes in PALPATE_SHARED_DATA";
@@ -211,7 +211,7 @@ TEST(FeaturePairs, OfPublishedStepsAreThoseOfBoxesInDouble) {
 
 /// Of a mesh with itself, and of two in frames of their own, whose boxes are the thickness apart at
 /// the most.
-TEST(FeaturePairs, ReachAsFarAsTheThickness) {
+TEST(FeaturePairs, IncludePairsWithinTheThickness) {
   testing::Random random(3);
   constexpr double kThickness = 0.02;
   testing::Mesh sheet = testing::sheet(20, 0, 0), soup = testing::soup(random, 300, 0.1);

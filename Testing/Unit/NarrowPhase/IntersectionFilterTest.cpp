@@ -67,7 +67,7 @@ Answers answersTo(const PlacedTriangles& a, const PlacedTriangles& b, bool self,
   return ofPaths.front();
 }
 
-TEST(IntersectionFilter, KeepsWhateverIntersects) {
+TEST(IntersectionFilter, KeepsEveryIntersectingPair) {
   Random random(1);
   constexpr int kKinds = static_cast<int>(Kind::Count), kCount = 40000;
   // The largest, the smallest, and where products of three are denormal.
@@ -137,7 +137,7 @@ TEST(IntersectionFilter, KeepsCornersOnThePlane) {
   EXPECT_EQ(std::count(isKept.begin(), isKept.end(), false), 0);
 }
 
-TEST(IntersectionFilter, OfOneMeshLeavesOutCornersInCommonAsTheDefinitionDoes) {
+TEST(IntersectionFilter, IgnoresCommonCornersOfOneMeshAsTheDefinitionDoes) {
   Random random(3);
   int found = 0, left = 0;
   for (int repeat = 0; repeat < 3000; ++repeat) {

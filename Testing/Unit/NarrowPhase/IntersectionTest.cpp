@@ -162,7 +162,7 @@ TEST(Intersection, NormalsOfFacesAreWindingNormalsAndDistancesBehindThemAreNegat
 
 /// The tip is below the ground and beyond its edge y = 0: the nearest point of the ground is (1, 0,
 /// 0), the normal leads from the tip through that.
-TEST(Intersection, NormalsOfEdgesLeadToTheWindingNormalsSide) {
+TEST(Intersection, NormalsOfEdgesPointToTheSideOfTheWindingNormal) {
   const Corners slanted{{{1, -3, -4}, {1, 3, 2}, {1.5, 3, 2}}};
   const ContactBuffers found = contactsOf(meshOf(slanted), meshOf(kGround));
   ASSERT_EQ(found.vertexTriangle.size(), 1u);
@@ -171,7 +171,7 @@ TEST(Intersection, NormalsOfEdgesLeadToTheWindingNormalsSide) {
   EXPECT_TRUE(found.vertexTriangle[0].normal.isApprox(Vector3d(0, 0.6, 0.8), 1e-15));
 }
 
-TEST(Intersection, EveryKindOfPairHasContactsWithUnitNormals) {
+TEST(Intersection, EveryTouchingPairHasContactsWithUnitNormals) {
   Random random(31);
   int seen = 0;
   for (int repeat = 0; repeat < 4000; ++repeat) {
@@ -198,7 +198,7 @@ TEST(Intersection, EveryKindOfPairHasContactsWithUnitNormals) {
   EXPECT_GT(seen, 1000);
 }
 
-TEST(Intersection, SpheresMeetInOneRingWithTheSameBitsFromEveryPair) {
+TEST(Intersection, SpheresIntersectInOneRingWithTheSameBitsFromEveryPair) {
   SceneMesh second = scenes::sphere(6);
   for (Vector3d& p : second.positions) p += Vector3d(0.9, 0.31, 0.17);
   const TriangleMesh a = meshOf(scenes::sphere(6)), b = meshOf(second);
@@ -246,7 +246,7 @@ TEST(SelfIntersection, DuplicatedVerticesTouch) {
   EXPECT_EQ(found.intersectingTriangles.size(), 1u);
 }
 
-TEST(SelfIntersection, AFoldByAHalfTurnAboutAnEdgeIsFound) {
+TEST(SelfIntersection, FoldByAHalfTurnAboutAnEdgeIsFound) {
   const std::vector<Triangle> hinge{{0, 1, 2}, {1, 0, 3}};
   const auto folded = [&](const Vector3d& wing) {
     return selfContactsOf(meshOf({{0, 0, 0}, {4, 0, 0}, {1, 3, 1}, wing}, hinge));
@@ -258,7 +258,7 @@ TEST(SelfIntersection, AFoldByAHalfTurnAboutAnEdgeIsFound) {
   EXPECT_EQ(idsOf(rowsOf(found.vertexTriangle)), (std::vector<Row>{{3, 0}}));
 }
 
-TEST(SelfIntersection, AnEdgeThroughAFaceAtACommonVertexIsListed) {
+TEST(SelfIntersection, EdgeThroughAFaceAtACommonVertexIsListed) {
   const std::vector<Triangle> fan{{0, 1, 2}, {0, 3, 4}};
   const auto fanned = [&](const Vector3d& p, const Vector3d& q) {
     return selfContactsOf(meshOf({{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, p, q}, fan));
@@ -272,7 +272,7 @@ TEST(SelfIntersection, AnEdgeThroughAFaceAtACommonVertexIsListed) {
 }
 
 /// By definition: two edges of one must cross the other, or one of each.
-TEST(SelfIntersection, AnEdgeThroughAFaceHasAContactFromATriangleAcrossItThatSharesNoVertex) {
+TEST(SelfIntersection, EdgeThroughAFaceHasAContactWithATriangleThatSharesNoVertex) {
   const std::vector<Vector3d> positions{{0, 0, 0},  {4, 0, 0}, {0, 4, 0},
                                         {1, 1, -1}, {1, 1, 2}, {8, 8, 1}};
   const auto contactsWith = [&](const Triangle& across) {
@@ -287,7 +287,7 @@ TEST(SelfIntersection, AnEdgeThroughAFaceHasAContactFromATriangleAcrossItThatSha
   EXPECT_TRUE(sharing.vertexTriangle.empty() && sharing.edgeEdge.empty());
 }
 
-TEST(SelfIntersection, TheSameTriangleTwiceSharesEverything) {
+TEST(SelfIntersection, DuplicateTrianglesShareEverything) {
   const TriangleMesh mesh =
       meshOf({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {2, 0, 1}, {1, 1, 0}});
   EXPECT_TRUE(selfContactsOf(mesh).intersectingTriangles.empty());

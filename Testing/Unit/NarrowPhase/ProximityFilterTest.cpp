@@ -97,7 +97,7 @@ Pair pairOf(int kind, Random& random) {
 }
 
 /// The thickness is exactly the distance of one of the feature pairs, which must not be left out.
-TEST(ProximityFilter, LeavesOutNothingWithinTheThickness) {
+TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
   Random random;
   std::size_t within = 0;
   for (int round = 0; round < 1400; ++round) {
@@ -123,7 +123,7 @@ TEST(ProximityFilter, LeavesOutNothingWithinTheThickness) {
   EXPECT_GT(within, 5000u);
 }
 
-TEST(ProximityFilter, EveryPathLeavesOutTheSame) {
+TEST(ProximityFilter, EverySimdPathDropsTheSamePairs) {
   Random random;
   for (int round = 0; round < 300; ++round) {
     std::vector<Pair> pairs;
@@ -141,7 +141,7 @@ TEST(ProximityFilter, EveryPathLeavesOutTheSame) {
 }
 
 /// Of well-shaped triangles little is kept that is not within reach.
-TEST(ProximityFilter, LeavesOutNearlyAllThatIsBeyondTheThickness) {
+TEST(ProximityFilter, DropsNearlyAllPairsBeyondTheThickness) {
   Random random;
   const double thickness = 0.03;
   int kept = 0, contacts = 0, all = 0;
@@ -162,7 +162,7 @@ TEST(ProximityFilter, LeavesOutNearlyAllThatIsBeyondTheThickness) {
   EXPECT_LT(kept, contacts + contacts / 10);
 }
 
-TEST(ProximityFilter, LeavesOutNothingWhereCoordinatesOverflow) {
+TEST(ProximityFilter, KeepsEveryPairWhereCoordinatesOverflow) {
   const double most = std::numeric_limits<double>::max();
   const Pair x{Vector3d(-most, -most, 0), Vector3d(most, -most, 0), Vector3d(0, most, 0),
                Vector3d(0, 0, 1),         Vector3d(1, 0, 1),        Vector3d(0, 1, 2)};

@@ -243,14 +243,15 @@ TEST(Proximity, OffsetsAndScalesAgreeWithBruteForce) {
 
 TEST(Proximity, DegenerateMeshesAgreeWithBruteForce) {
   Random random;
-  SceneMesh zoo = scenes::sheet(4);
+  SceneMesh degenerate = scenes::sheet(4);
   // Duplicate triangles, zero areas by value and by index, a point, slivers, huge and tiny ones.
-  zoo.triangles.push_back(zoo.triangles[3]);
-  zoo.triangles.push_back({zoo.triangles[5][1], zoo.triangles[5][0], zoo.triangles[5][2]});
+  degenerate.triangles.push_back(degenerate.triangles[3]);
+  degenerate.triangles.push_back(
+      {degenerate.triangles[5][1], degenerate.triangles[5][0], degenerate.triangles[5][2]});
   const auto add = [&](const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-    const auto first = static_cast<std::uint32_t>(zoo.positions.size());
-    zoo.positions.insert(zoo.positions.end(), {a, b, c});
-    zoo.triangles.push_back({first, first + 1, first + 2});
+    const auto first = static_cast<std::uint32_t>(degenerate.positions.size());
+    degenerate.positions.insert(degenerate.positions.end(), {a, b, c});
+    degenerate.triangles.push_back({first, first + 1, first + 2});
   };
   add({0, 0, 0.01}, {0.5, 0.5, 0.01}, {1, 1, 0.01});
   add({0, 0, 0.01}, {1, 1, 0.01}, {0.25, 0.25, 0.01});
@@ -259,17 +260,17 @@ TEST(Proximity, DegenerateMeshesAgreeWithBruteForce) {
   add({-1e6, -1e6, 0.03}, {1e6, -1e6, 0.03}, {0, 1e6, 0.03});
   add({0.3, 0.3, 0.01}, {0.3 + 1e-9, 0.3, 0.01}, {0.3, 0.3 + 1e-9, 0.01});
   add({1e-310, 0, 0.01}, {0, 1e-310, 0.01}, {1e-310, 1e-310, 0.01});
-  zoo.triangles.push_back({0, 0, 1});
-  zoo.triangles.push_back({2, 3, 2});
-  zoo.triangles.push_back({4, 4, 4});
-  zoo.triangles.push_back({0, 12, 24});  // collinear, over vertices of others
-  zoo.triangles.push_back({0, 6, 12});
-  EXPECT_GT(expectSameWithItself(zoo, 0.05), 0u);
-  EXPECT_GT(expectSame(zoo, moved(zoo, {0.1, 0.1, 0.01}), 0.05), 0u);
-  EXPECT_GT(expectSame(zoo, zoo, 0.05), 0u);
+  degenerate.triangles.push_back({0, 0, 1});
+  degenerate.triangles.push_back({2, 3, 2});
+  degenerate.triangles.push_back({4, 4, 4});
+  degenerate.triangles.push_back({0, 12, 24});  // collinear, over vertices of others
+  degenerate.triangles.push_back({0, 6, 12});
+  EXPECT_GT(expectSameWithItself(degenerate, 0.05), 0u);
+  EXPECT_GT(expectSame(degenerate, moved(degenerate, {0.1, 0.1, 0.01}), 0.05), 0u);
+  EXPECT_GT(expectSame(degenerate, degenerate, 0.05), 0u);
   const SceneMesh empty;
-  EXPECT_EQ(expectSame(zoo, empty, 0.05), 0u);
-  EXPECT_EQ(expectSame(empty, zoo, 0.05), 0u);
+  EXPECT_EQ(expectSame(degenerate, empty, 0.05), 0u);
+  EXPECT_EQ(expectSame(empty, degenerate, 0.05), 0u);
 }
 
 TEST(Proximity, ThicknessLargerThanEverythingAgreesWithBruteForce) {
@@ -277,7 +278,7 @@ TEST(Proximity, ThicknessLargerThanEverythingAgreesWithBruteForce) {
   EXPECT_GT(expectSameWithItself(scenes::sphere(2), 10.0), 0u);
 }
 
-TEST(Proximity, TwoUnitCubesFaceToFaceMeetInFourContactsOrFive) {
+TEST(Proximity, TwoUnitCubesFaceToFaceHaveFourOrFiveContacts) {
   const TriangleMesh below = meshOf(cube(false));
   for (const bool otherDiagonals : {false, true}) {
     const TriangleMesh above = meshOf(moved(cube(otherDiagonals), {0, 0, 1.0625}));

@@ -111,7 +111,7 @@ void failEach(const Case& c, const Threads& threads, bool smaller) {
 
 class OctreeFailure : public ::testing::TestWithParam<int> {};
 
-TEST_P(OctreeFailure, OfAnyAllocationLeavesATreeThatCanBeBuilt) {
+TEST_P(OctreeFailure, FailedAllocationLeavesAnOctreeThatCanBeBuilt) {
   const Threads threads(GetParam());
   for (const Case& c : cases())
     for (const bool smaller : {false, true}) {
@@ -122,7 +122,7 @@ TEST_P(OctreeFailure, OfAnyAllocationLeavesATreeThatCanBeBuilt) {
 
 INSTANTIATE_TEST_SUITE_P(Threads, OctreeFailure, ::testing::Values(1, 2));
 
-TEST(OctreeFailure, StagesAreNotMixedUp) {
+TEST(OctreeFailure, StagesMustRunInTheirOrder) {
   Random random(22);
   const Boxes boxes = testing::randomBoxes(random, 500, 0.01);
   const Threads one(1);
@@ -139,7 +139,7 @@ TEST(OctreeFailure, StagesAreNotMixedUp) {
 
 /// A geometry whose update failed, or that was to be updated after one that failed, is updated by
 /// the next call.
-TEST_P(OctreeFailure, OfAnUpdateIsMadeUpForByTheNext) {
+TEST_P(OctreeFailure, NextUpdateCompletesAFailedOne) {
   Random random(24);
   const testing::Mesh small = testing::soup(random, 300, 0.1),
                       other = testing::soup(random, 40, 0.1);
@@ -206,7 +206,7 @@ static_assert(!std::is_copy_constructible_v<LooseOctree> &&
               !std::is_copy_assignable_v<LooseOctree>);
 
 /// What a query or traversal left behind when it ended early is not part of the next one's answer.
-TEST(OctreeFailure, OfAQueryLeavesNothingToTheNext) {
+TEST(OctreeFailure, FailedQueryDoesNotAffectTheNext) {
   Random random(23);
   const Boxes boxes = testing::randomBoxes(random, 3000, 0.15);
   BoxOctree tree;

@@ -117,7 +117,7 @@ TEST(Octree, HoldsSizesOfManyLevelsTheSameForAnyNumberOfThreads) {
   }
 }
 
-TEST(Octree, KeepsItsLimits) {
+TEST(Octree, KeepsMaxDepthAndMaxElementsPerLeaf) {
   Random random(3);
   const Mesh mesh = testing::soup(random, 5000, 0.001);
   for (const int depth : {1, 2, 5, 9, 10, 20})
@@ -144,7 +144,7 @@ TEST(Octree, KeepsItsLimits) {
     }
 }
 
-TEST(Octree, OneFarTriangleDoesNotFlattenIt) {
+TEST(Octree, OneFarTriangleDoesNotCoarsenIt) {
   Random random(4);
   for (const std::size_t size : {200u, 3000u, 20000u})
     for (const int threads : {1, 2}) {
@@ -159,7 +159,7 @@ TEST(Octree, OneFarTriangleDoesNotFlattenIt) {
     }
 }
 
-TEST(Octree, FollowsItsGeometryAndSaysWhatRan) {
+TEST(Octree, UpdatesWithItsGeometryAndReportsHow) {
   using Update = LooseOctree::Update;
   Random random(5);
   const Mesh mesh = testing::sphere(20, 30, {0, 0, 0}, 1.0);
@@ -181,7 +181,7 @@ TEST(Octree, FollowsItsGeometryAndSaysWhatRan) {
   for (const Eigen::Vector3d& p : positions) EXPECT_TRUE(root.fittedBox.contains(p));
 }
 
-TEST(Octree, IsRebuiltWhenRefittingLoosensIt) {
+TEST(Octree, RebuildsWhenBoxesGrow) {
   Random random(7);
   const Mesh mesh = testing::soup(random, 2000, 0.01);
   std::vector<Eigen::Vector3d> positions = mesh.positions;
@@ -198,7 +198,7 @@ TEST(Octree, IsRebuiltWhenRefittingLoosensIt) {
   EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
 }
 
-TEST(Octree, IsRebuiltWhereFewLeap) {
+TEST(Octree, RebuildsWhereFewElementsJump) {
   Random random(9);
   std::vector<Eigen::Vector3d> positions(20'000);
   for (Eigen::Vector3d& p : positions) p = testing::randomPoint(random, -1, 1);
@@ -218,7 +218,7 @@ TEST(Octree, IsRebuiltWhereFewLeap) {
   }
 }
 
-TEST(Octree, PoolTakesBlocksBack) {
+TEST(Octree, PoolReusesFreedBlocks) {
   Random random(6);
   const Mesh large = testing::soup(random, 20000, 0.005), small = testing::soup(random, 50, 0.1);
   OctreeBasedCD detection(rebuilding());

@@ -90,7 +90,7 @@ void forEachCase(F&& f) {
   useSimdPath("");
 }
 
-TEST(PointQueries, FindWhatOverlaps) {
+TEST(PointQueries, FindEveryOverlappingElement) {
   Random random(8);
   std::size_t all = 0, none = 0;
   forEachCase([&](const Case& c, const BoxMap& map, double reach) {
@@ -111,7 +111,7 @@ TEST(PointQueries, FindWhatOverlaps) {
   EXPECT_GT(none, 100u);
 }
 
-TEST(PointQueries, TryNoMoreThanTheNearest) {
+TEST(PointQueries, VisitNoElementFartherThanTheNearest) {
   Random random(9);
   forEachCase([&](const Case& c, const BoxMap& map, double reach) {
     PointQueryStack stack;

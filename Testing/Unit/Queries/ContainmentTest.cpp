@@ -108,7 +108,7 @@ const std::vector<std::function<bool(Cell)>> kBodies = {
     },
 };
 
-TEST(InsideVertices, AreThoseOfTheCellsThoughRaysMeetEdgesAndCorners) {
+TEST(InsideVertices, MatchTheCellsWhereRaysHitEdgesAndCorners) {
   constexpr int n = 4;
   const Mesh points = lattice(n);
   for (const auto& filled : kBodies) {
@@ -141,7 +141,7 @@ TEST(InsideVertices, AreThoseOfTheCellsThoughRaysMeetEdgesAndCorners) {
   }
 }
 
-TEST(InsideVertices, AreAsByBruteForceForAnyThreads) {
+TEST(InsideVertices, MatchBruteForceForAnyNumberOfThreads) {
   testing::Random random(11);
   for (int trial = 0; trial < 6; ++trial) {
     // From apart to one wholly within the other, far from the origin too.
@@ -179,7 +179,7 @@ TEST(InsideVertices, AreAsByBruteForceForAnyThreads) {
 
 /// Cells of 2^-1060: a caller that takes denormals for zero would find nothing.
 /// The search starts from what was nearest to the vertex before.
-TEST(InsideVertices, DoNotDependOnTheVertexBefore) {
+TEST(InsideVertices, DoNotDependOnThePreviousVertex) {
   Random random(11);
   for (int run = 0; run < 30; ++run) {
     const double scale = run % 3 == 0 ? 1e-6 : run % 3 == 1 ? 1.0 : 1e7;
@@ -222,7 +222,7 @@ TEST(InsideVertices, DoNotDependOnTheCallersFloatingPoint) {
   EXPECT_EQ(std::vector<InsideVertex>(found.begin(), found.end()), expected);
 }
 
-TEST(InsideVertices, OfTheLastPositions) {
+TEST(InsideVertices, UseTheLastPositions) {
   const Mesh a = testing::sphere(8, 8, {0, 0, 0}, 0.5);
   Mesh b = testing::sphere(8, 8, {0, 0, 0}, 2);
   OctreeBasedCD detection;

@@ -1,6 +1,6 @@
 #include "Common/QueryCalls.h"
 #include "Common/Solids.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <palpate/OctreeBasedCD.h>
 
@@ -51,12 +51,12 @@ std::optional<Held> holder(const Vector3d& p, const Solid& solid) {
 }
 
 /// All points of the integer lattice in [-1, n + 1]³, of each kind.
-std::vector<Thing> lattices(int n) {
-  Thing points{GeometryType::Points, {}, {}, {}, {0}};
+std::vector<TestGeometry> lattices(int n) {
+  TestGeometry points{GeometryType::Points, {}, {}, {}, {0}};
   for (int x = -1; x <= n + 1; ++x)
     for (int y = -1; y <= n + 1; ++y)
       for (int z = -1; z <= n + 1; ++z) points.positions.emplace_back(x, y, z);
-  Thing line{GeometryType::Lines, points.positions, {}, {}, {0}},
+  TestGeometry line{GeometryType::Lines, points.positions, {}, {}, {0}},
       mesh{GeometryType::Triangles, points.positions, {}, {}, {0}};
   for (std::uint32_t v = 0; v + 1 < points.positions.size(); ++v)
     line.segments.push_back({v, v + 1});
@@ -65,7 +65,7 @@ std::vector<Thing> lattices(int n) {
   return {points, line, mesh};
 }
 
-std::vector<EmbeddedVertex> embedded(const Settings& settings, const Thing& probes,
+std::vector<EmbeddedVertex> embedded(const Settings& settings, const TestGeometry& probes,
                                      const Solid& solid) {
   OctreeBasedCD detection(settings);
   const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
@@ -77,7 +77,7 @@ std::vector<EmbeddedVertex> embedded(const Settings& settings, const Thing& prob
   return found;
 }
 
-TEST(EmbeddedVertices, AreThoseOfExactVolumesOnAGrid) {
+TEST(EmbeddedVertices, MatchExactVolumesOnAGrid) {
   Random random(1);
   std::size_t inside = 0, onBoundary = 0, inverted = 0;
   for (int run = 0; run < 12; ++run) {
@@ -88,7 +88,7 @@ TEST(EmbeddedVertices, AreThoseOfExactVolumesOnAGrid) {
       for (int k = 0; k < 3 && run % 3 > 0; ++k)
         p[k] = run % 3 == 1 ? p[k] + static_cast<double>(random() % 3) - 1.0
                             : static_cast<double>(random() % (n + 1));
-    for (const Thing& probes : lattices(n)) {
+    for (const TestGeometry& probes : lattices(n)) {
       std::size_t next = 0;
       const auto found = embedded(settingsOf(Engine::Octree, 2), probes, solid);
       for (std::uint32_t v = 0; v < probes.positions.size(); ++v) {
@@ -118,7 +118,7 @@ TEST(EmbeddedVertices, AreThoseOfExactVolumesOnAGrid) {
 }
 
 /// Lives of deforming solids: moved, inverted, cut, placed; any threads, rebuilt or refitted.
-TEST(EmbeddedVertices, AreAsByBruteForceForAnyThreads) {
+TEST(EmbeddedVertices, MatchBruteForceForAnyNumberOfThreads) {
   const auto life = [](const Settings& settings, double scale, double far) {
     Random random(2);
     OctreeBasedCD detection(settings);
@@ -163,10 +163,10 @@ TEST(EmbeddedVertices, AreAsByBruteForceForAnyThreads) {
 }
 
 /// One vertex moves at a time, so that nothing else tells that positions are new.
-TEST(EmbeddedVertices, AreOfTheLastPositions) {
+TEST(EmbeddedVertices, UseTheLastPositions) {
   Random random(8);
   const Solid solid = cells(4, random);
-  const Thing probes = particles(random, 150, 0);
+  const TestGeometry probes = particles(random, 150, 0);
   Positions places = probes.positions;
   for (Vector3d& p : places) p *= 4;
   std::set<std::size_t> sizes;
@@ -188,11 +188,11 @@ TEST(EmbeddedVertices, AreOfTheLastPositions) {
   EXPECT_GT(sizes.size(), 4u);
 }
 
-TEST(EmbeddedVertices, WeightsGiveThePointBack) {
+TEST(EmbeddedVertices, WeightsReproduceThePoint) {
   Random random(3);
   Solid solid = cells(3, random);
   for (Vector3d& p : solid.positions) p = 40.0 * p + randomPoint(random, -15, 15);
-  Thing probes = particles(random, 2000, 0);
+  TestGeometry probes = particles(random, 2000, 0);
   for (Vector3d& p : probes.positions) p *= 120;
   const auto found = embedded(settingsOf(Engine::Octree), probes, solid);
   EXPECT_GT(found.size(), 1000u);
@@ -213,7 +213,7 @@ TEST(EmbeddedVertices, DoNotDependOnTheOrderOfCorners) {
   Random random(4);
   Solid solid = cells(3, random), turned = solid;
   for (Tetrahedron& t : turned.tetrahedra) std::shuffle(t.begin(), t.end(), random);
-  const Thing probes = lattices(3)[0];
+  const TestGeometry probes = lattices(3)[0];
   const auto expected = embedded(settingsOf(Engine::Octree), probes, solid),
              found = embedded(settingsOf(Engine::Octree), probes, turned);
   ASSERT_EQ(found.size(), expected.size());
@@ -231,8 +231,8 @@ TEST(EmbeddedVertices, DoNotDependOnTheOrderOfCorners) {
 
 // ---- Inside, by tetrahedra ----
 
-std::vector<InsideVertex> inside(const Settings& settings, const Thing& probes, const Solid& solid,
-                                 bool asTriangles) {
+std::vector<InsideVertex> inside(const Settings& settings, const TestGeometry& probes,
+                                 const Solid& solid, bool asTriangles) {
   OctreeBasedCD detection(settings);
   const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
                    other = probes.addTo(detection);
@@ -246,7 +246,7 @@ std::vector<InsideVertex> inside(const Settings& settings, const Thing& probes, 
   return {found.begin(), found.end()};
 }
 
-TEST(EmbeddedVertices, InsideIsThatOfTheSurfaceAtRest) {
+TEST(EmbeddedVertices, InsideMatchesTheSurfaceAtRest) {
   Random random(5);
   constexpr int n = 3;
   const std::function<bool(const std::array<int, 3>&)> bodies[] = {
@@ -257,7 +257,7 @@ TEST(EmbeddedVertices, InsideIsThatOfTheSurfaceAtRest) {
   for (const auto& filled : bodies) {
     Solid solid = cells(n, random, filled);
     for (Vector3d& p : solid.positions) p *= 2;
-    for (const Thing& probes : lattices(2 * n)) {
+    for (const TestGeometry& probes : lattices(2 * n)) {
       const auto truth = inside(settingsOf(Engine::Octree), probes, solid, true);
       EXPECT_GT(truth.size(), 10u);
       EXPECT_EQ(inside(settingsOf(Engine::Octree, 2), probes, solid, false), truth);
@@ -267,7 +267,7 @@ TEST(EmbeddedVertices, InsideIsThatOfTheSurfaceAtRest) {
 }
 
 /// Where the surface is not closed and oriented, and where it is turned inside out.
-TEST(EmbeddedVertices, InsideIsInATetrahedronAndNotOnTheSurface) {
+TEST(EmbeddedVertices, InsideMeansInATetrahedronAndNotOnTheSurface) {
   Random random(6);
   std::size_t found = 0;
   for (int run = 0; run < 8; ++run) {
@@ -276,7 +276,7 @@ TEST(EmbeddedVertices, InsideIsInATetrahedronAndNotOnTheSurface) {
     for (Vector3d& p : solid.positions)
       for (int k = 0; k < 3; ++k)
         p[k] = run % 2 ? 2 * p[k] : static_cast<double>(random() % (2 * n + 1));
-    const Thing probes = lattices(2 * n)[0];
+    const TestGeometry probes = lattices(2 * n)[0];
     Settings settings = settingsOf(Engine::Octree);
     OctreeBasedCD detection(settings);
     const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
@@ -301,7 +301,7 @@ TEST(EmbeddedVertices, InsideIsInATetrahedronAndNotOnTheSurface) {
   EXPECT_GT(found, 50u);
 }
 
-TEST(EmbeddedVertices, WhatCannotBeAskedIsRefusedByName) {
+TEST(EmbeddedVertices, BadCallsThrowErrorsThatNameTheCause) {
   Random random(7);
   const Solid solid = cells(1, random);
   OctreeBasedCD detection(settingsOf(Engine::Octree));

@@ -1,6 +1,6 @@
 #include "Common/QueryCalls.h"
 #include "Common/Solids.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/PenetrationTracker.h>
@@ -170,7 +170,7 @@ std::vector<Mesh> bodies(Random& random) {
           sphere(8, 12, {1.5, 1.5, 1.5}, 1.4)};
 }
 
-TEST(PenetrationTracker, FlipNowhereUnnamedInPointsThatMoveThroughABodyAtRest) {
+TEST(PenetrationTracker, ReportsLargeChangesForPointsThatMoveThroughABodyAtRest) {
   Random random(1);
   std::map<DirectionChange, std::size_t> changes;
   for (const Mesh& mesh : bodies(random)) {
@@ -196,7 +196,7 @@ TEST(PenetrationTracker, FlipNowhereUnnamedInPointsThatMoveThroughABodyAtRest) {
   EXPECT_GT(changes[DirectionChange::Jumped], 20u);
 }
 
-TEST(PenetrationTracker, FlipNowhereUnnamedInBodiesThatTurnAndDeform) {
+TEST(PenetrationTracker, ReportsLargeChangesInBodiesThatTurnAndDeform) {
   Random random(2);
   std::map<DirectionChange, std::size_t> changes;
   for (const Mesh& mesh : bodies(random)) {
@@ -228,7 +228,7 @@ TEST(PenetrationTracker, FlipNowhereUnnamedInBodiesThatTurnAndDeform) {
 
 /// A block pushed slowly through a slab, trembling: the way out is back where it came from until
 /// that is twice as far as on, then on; once for each vertex.
-TEST(PenetrationTracker, APushedBodyIsLetThroughOnce) {
+TEST(PenetrationTracker, PushedBodyChangesSidesOnce) {
   Random random(3);
   const Mesh slab = blocks(1, random, [](const auto&) { return true; }),
              block = blocks(2, random, [](const auto&) { return true; });
@@ -260,7 +260,7 @@ TEST(PenetrationTracker, APushedBodyIsLetThroughOnce) {
 }
 
 /// A body by a transform, its probes by the same: nothing changes but all turns.
-TEST(PenetrationTracker, TurnWithTheBody) {
+TEST(PenetrationTracker, DirectionsTurnWithTheBody) {
   Random random(4);
   const Mesh mesh = blocks(3, random, [](const auto& c) { return c[2] == 0 || c[0] == 0; });
   Positions points;
@@ -289,7 +289,7 @@ TEST(PenetrationTracker, TurnWithTheBody) {
   }
 }
 
-TEST(PenetrationTracker, StartAnewWithTopology) {
+TEST(PenetrationTracker, RestartsWithNewTopology) {
   Random random(5);
   const Mesh mesh = sphere(6, 8, {0, 0, 0}, 1);
   const Positions points{{0.5, 0, 0}, {0, 0, 5}};

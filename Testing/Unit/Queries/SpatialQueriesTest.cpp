@@ -70,7 +70,7 @@ void expectInvalid(const std::function<void()>& call, const std::string& words) 
   expectRefused(ErrorCode::InvalidCall, words, call);
 }
 
-TEST(SpatialQueries, LaterCallsLeaveEarlierResults) {
+TEST(SpatialQueries, LaterCallsDoNotChangeEarlierResults) {
   Scene scene;
   const SpatialQueries queries = scene.collisions.queries();
   std::vector<InsideVertex> first, second;
@@ -84,7 +84,7 @@ TEST(SpatialQueries, LaterCallsLeaveEarlierResults) {
   EXPECT_EQ(first, kept);
 }
 
-TEST(SpatialQueries, AreInvalidAfterAnyChangeOfWhatTheySearch) {
+TEST(SpatialQueries, AreInvalidAfterAnyChangeOfTheirGeometries) {
   const Eigen::Matrix3d unit = Eigen::Matrix3d::Identity();
   const std::vector<std::pair<std::string, std::function<void(Scene&)>>> changes{
       {"setPositions", [](Scene& s) { s.collisions.setPositions(s.ball, s.ballRest); }},
@@ -163,7 +163,7 @@ TEST(SpatialQueries, StayValidAfterAFrameThatThrows) {
   EXPECT_EQ(ask(scene, queries), before);
 }
 
-TEST(SpatialQueries, MayOutliveAndFollowTheirOwner) {
+TEST(SpatialQueries, MayOutliveAndMoveWithTheirOwner) {
   std::optional<Scene> scene(std::in_place);
   const SpatialQueries queries = scene->collisions.queries();
   const Answers before = ask(*scene, queries);
@@ -176,7 +176,7 @@ TEST(SpatialQueries, MayOutliveAndFollowTheirOwner) {
   expectInvalid([&] { (void)empty.findTetrahedron(scene->solid, {0, 0, 0}); }, "moved from");
 }
 
-TEST(SpatialQueries, AreRefusedWithinACallbackOfTheirOwner) {
+TEST(SpatialQueries, ThrowWithinACallbackOfTheirOwner) {
   Scene scene;
   OctreeBasedCD& collisions = scene.collisions;
   collisions.addCollisionPair(scene.points, scene.ball, {Method::Proximity, 0.2});
@@ -191,7 +191,7 @@ TEST(SpatialQueries, AreRefusedWithinACallbackOfTheirOwner) {
 }
 
 /// Octrees, tetrahedra's octrees and winding numbers are made by whichever thread needs them first.
-TEST(SpatialQueries, ManyThreadsGetTheAnswersOfOne) {
+TEST(SpatialQueries, ManyThreadsGetTheResultsOfOne) {
   for (const int threads : {1, 3}) {
     const Scene alone;
     const Answers expected = ask(alone, alone.collisions.queries());
@@ -211,7 +211,7 @@ TEST(SpatialQueries, ManyThreadsGetTheAnswersOfOne) {
 }
 
 /// Outdated queries are refused, also while another thread brings the octrees up to date.
-TEST(SpatialQueries, OutdatedOnesAreRefusedBesideNewOnes) {
+TEST(SpatialQueries, OutdatedOnesThrowBesideNewOnes) {
   Scene scene;
   for (int repeat = 0; repeat < 20; ++repeat) {
     const SpatialQueries old = scene.collisions.queries();
@@ -224,7 +224,7 @@ TEST(SpatialQueries, OutdatedOnesAreRefusedBesideNewOnes) {
   }
 }
 
-TEST(SpatialQueries, ChangeNoStatisticsAndNoAnswers) {
+TEST(SpatialQueries, ChangeNoStatisticsAndNoContacts) {
   Scene scene;
   OctreeBasedCD& collisions = scene.collisions;
   collisions.addCollisionPair(scene.points, scene.ball, {Method::Proximity, 0.1});
@@ -241,7 +241,7 @@ TEST(SpatialQueries, ChangeNoStatisticsAndNoAnswers) {
 }
 
 /// What a tracker remembers is its own: of one object, and left by a call that throws.
-TEST(PenetrationTracker, RemembersByItself) {
+TEST(PenetrationTracker, KeepsItsOwnState) {
   Scene first, second;
   PenetrationTracker one(first.points, first.ball), other(first.points, first.ball);
   const auto change = [](PenetrationTracker& tracker, Scene& scene) {

@@ -128,7 +128,7 @@ TEST(Polytope, IsTheHullOfManyPoints) {
 /// 64 times as many points take less than 64 * 64 / 8 times as long, of the
 /// processor's time: with n log n it is about 100,
 /// with n squared 4096.
-TEST(Polytope, OfManyPointsIsMadeInNLogN) {
+TEST(Polytope, HullOfManyPointsTakesNLogNTime) {
   Random random(6);
   const auto secondsFor = [&](int count) {
     const Positions cloud = onSphere(random, count);
@@ -144,7 +144,7 @@ TEST(Polytope, OfManyPointsIsMadeInNLogN) {
   EXPECT_LT(large, 512 * small) << small << " s and " << large << " s";
 }
 
-TEST(Polytope, GrowsPointByPoint) {
+TEST(Polytope, HullGrowsPointByPoint) {
   Random random(2);
   for (int run = 0; run < 30; ++run) {
     Positions cloud = onSphere(random, 20);
@@ -187,7 +187,7 @@ TEST(Polytope, PlatesHaveTwoSides) {
   }
 }
 
-TEST(Polytope, DistanceIsThatOfTheNearestTriangle) {
+TEST(Polytope, DistanceMatchesTheNearestTriangle) {
   Random random(4);
   std::vector<Positions> all = clouds(random);
   Positions needle = onSphere(random, 100);

@@ -1,7 +1,7 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/ShapeTruth.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 #include "Shapes/Shape.h"
 
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ struct Scene {
   std::array<Move, 2> ends;
   std::optional<AnalyticalGeometry> other{};
   std::array<Move, 2> otherEnds{};
-  Thing thing{};
+  TestGeometry geometry{};
   Positions now{};
 
   Scene scaledBy(double by) const {
@@ -56,24 +56,24 @@ struct Scene {
     if (other) scene.other = scaled(*other, by);
     for (auto* moves : {&scene.ends, &scene.otherEnds})
       for (Move& move : *moves) move.shift *= by;
-    for (auto* list : {&scene.thing.positions, &scene.now})
+    for (auto* list : {&scene.geometry.positions, &scene.now})
       for (Vector3d& p : *list) p *= by;
-    for (double& radius : scene.thing.radii) radius *= by;
+    for (double& radius : scene.geometry.radii) radius *= by;
     return scene;
   }
 
   CollisionData answer(const PairSettings& pair) const {
     OctreeBasedCD collisions(settingsOf(Engine::Octree));
     const GeometryId first = collisions.addAnalyticalGeometry(shape),
-                     second =
-                         other ? collisions.addAnalyticalGeometry(*other) : thing.addTo(collisions);
+                     second = other ? collisions.addAnalyticalGeometry(*other)
+                                    : geometry.addTo(collisions);
     collisions.addCollisionPair(first, second, pair);
     for (const std::size_t end : {0, 1}) {
       collisions.setTransform(first, ends[end].turn, ends[end].shift);
       if (other)
         collisions.setTransform(second, otherEnds[end].turn, otherEnds[end].shift);
       else if (end == 1)
-        collisions.setPositions(second, thing.positions, now);
+        collisions.setPositions(second, geometry.positions, now);
       collisions.detectCollision();
     }
     return collisions.collisionData(first, second);
@@ -103,19 +103,19 @@ std::array<Move, 2> randomMoves(Random& random) {
   return ends;
 }
 
-Thing elements(Random& random, int type) {
-  Thing thing;
-  thing.type = static_cast<GeometryType>(type);
-  if (type > 0) thing.radii = {0.01};
+TestGeometry elements(Random& random, int type) {
+  TestGeometry geometry;
+  geometry.type = static_cast<GeometryType>(type);
+  if (type > 0) geometry.radii = {0.01};
   for (std::uint32_t i = 0; i < 12; ++i) {
     const Vector3d p = randomPoint(random, -0.7, 0.7);
-    thing.positions.push_back(p);
-    if (type < 2) thing.positions.push_back(p + randomPoint(random, -0.4, 0.4));
-    if (type == 0) thing.positions.push_back(p + randomPoint(random, -0.4, 0.4));
-    if (type == 0) thing.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
-    if (type == 1) thing.segments.push_back({2 * i, 2 * i + 1});
+    geometry.positions.push_back(p);
+    if (type < 2) geometry.positions.push_back(p + randomPoint(random, -0.4, 0.4));
+    if (type == 0) geometry.positions.push_back(p + randomPoint(random, -0.4, 0.4));
+    if (type == 0) geometry.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    if (type == 1) geometry.segments.push_back({2 * i, 2 * i + 1});
   }
-  return thing;
+  return geometry;
 }
 
 using Element = std::array<std::uint32_t, 3>;
@@ -182,17 +182,17 @@ PairSettings settingsWith(Method method, double thickness) {
   return {method, thickness, Contacts::Distinct};
 }
 
-TEST(ShapeScales, AnswerElementsAtAnySize) {
+TEST(ShapeScales, ContactsWithElementsAreCorrectAtAnySize) {
   Random random(1);
   std::array<std::size_t, 2> contacts{};
   const std::vector<AnalyticalGeometry> shapes = measuredShapes();
   for (std::size_t s = 0; s < shapes.size(); ++s)
     for (const int type : {0, 1, 2})
       for (const Method method : {Method::Proximity, Method::Continuous}) {
-        const Thing thing = elements(random, type);
+        const TestGeometry geometry = elements(random, type);
         Scene scene{shapes[s], randomMoves(random)};
-        scene.thing = thing;
-        scene.now = moved(random, thing.positions, 0.3);
+        scene.geometry = geometry;
+        scene.now = moved(random, geometry.positions, 0.3);
         for (const int scale : kScales) {
           SCOPED_TRACE("shape " + std::to_string(s) + " by 2^" + std::to_string(scale) +
                        ", method " + std::to_string(static_cast<int>(method)) + ", type " +
@@ -205,7 +205,7 @@ TEST(ShapeScales, AnswerElementsAtAnySize) {
   EXPECT_GT(contacts[1], 1000u);
 }
 
-TEST(ShapeScales, AnswerEachOtherAtAnySize) {
+TEST(ShapeScales, ContactsBetweenShapesAreCorrectAtAnySize) {
   Random random(2);
   const std::vector<AnalyticalGeometry> shapes = measuredShapes();
   std::size_t contacts = 0;
@@ -227,17 +227,17 @@ TEST(ShapeScales, AnswerEachOtherAtAnySize) {
 }
 
 /// Placed 2^1000 from the origin, where the last bit of a coordinate is 2^948.
-TEST(ShapeScales, AnswerFarFromTheOrigin) {
+TEST(ShapeScales, ContactsAreCorrectFarFromTheOrigin) {
   Random random(3);
   std::size_t contacts = 0;
   for (const AnalyticalGeometry& shape : measuredShapes())
     for (const int type : {0, 1, 2}) {
       Scene scene{shape, randomMoves(random)};
-      scene.thing = elements(random, type);
+      scene.geometry = elements(random, type);
       const Vector3d far(0x1p20, -0x1p19, 0x1p18);
       for (Move& end : scene.ends) end.shift += far;
-      for (Vector3d& p : scene.thing.positions) p += far;
-      scene.now = moved(random, scene.thing.positions, 0.3);
+      for (Vector3d& p : scene.geometry.positions) p += far;
+      scene.now = moved(random, scene.geometry.positions, 0.3);
       // Coordinates are rounded to 2^-32 of the measures here.
       contacts += expectSame(scene, settingsWith(Method::Proximity, 0.02), 0x1p979, 0x1p20);
     }
@@ -260,7 +260,7 @@ TEST(ShapeScales, NormalsOfPlanesMayHaveAnyLength) {
 }
 
 /// Just inside of the limit right answers are what the other tests here expect.
-TEST(ShapeScales, RefuseMeasuresBeyondTheLimit) {
+TEST(ShapeScales, SizesBeyondTheLimitAreRefused) {
   const double most = 1e300, beyond = std::nextafter(most, 2 * most);
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
   const auto tryBoth = [&](const std::string& name, auto&& shapeOf) {
@@ -291,7 +291,7 @@ TEST(ShapeScales, RefuseMeasuresBeyondTheLimit) {
   EXPECT_NO_THROW(collisions.addAnalyticalGeometry(Plane{{0, 0, 0}, {0, 0, beyond}}));
 }
 
-TEST(ShapeScales, RefuseHullsOfTooManyPoints) {
+TEST(ShapeScales, HullsOfTooManyPointsAreRefused) {
   ConvexHull hull{Positions(kMostHullPoints, Vector3d(1, 2, 3))};
   hull.points.front() = {0, 0, 0};
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
@@ -309,7 +309,7 @@ TEST(ShapeScales, RefuseHullsOfTooManyPoints) {
 }
 
 /// The case of the issue: a capsule whose half-length overflows when squared.
-TEST(ShapeScales, LongCapsuleIsMet) {
+TEST(ShapeScales, LongCapsuleIsTouched) {
   for (const double half : {1e155, 1e160, 1e-160, 1e-300, 1e-308}) {
     OctreeBasedCD collisions(settingsOf(Engine::Octree));
     const GeometryId capsule =

@@ -3,7 +3,7 @@
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <gtest/gtest.h>
 
@@ -42,9 +42,9 @@ struct Body {
   }
 };
 
-Body bodyOf(Random& random, std::string name, Thing thing) {
-  Body body{std::move(name), {}, thing.positions, moved(random, thing.positions, 0.08)};
-  body.add = [thing](OctreeBasedCD& collisions) { return thing.addTo(collisions); };
+Body bodyOf(Random& random, std::string name, TestGeometry geometry) {
+  Body body{std::move(name), {}, geometry.positions, moved(random, geometry.positions, 0.08)};
+  body.add = [geometry](OctreeBasedCD& collisions) { return geometry.addTo(collisions); };
   return body;
 }
 
@@ -71,7 +71,7 @@ Body tetrahedra(Random& random) {
 
 std::vector<Body> bodies(Random& random) {
   std::vector<Body> all;
-  all.push_back(bodyOf(random, "triangles", things(sphere(6, 8, {0.5, 0.5, 0.5}, 0.35))));
+  all.push_back(bodyOf(random, "triangles", testGeometry(sphere(6, 8, {0.5, 0.5, 0.5}, 0.35))));
   all.push_back(bodyOf(random, "lines", thread(random, 40, 0.15, 0.0, false)));
   all.push_back(bodyOf(random, "thick lines", thread(random, 40, 0.15, 0.02, true)));
   all.push_back(bodyOf(random, "points", particles(random, 80, 0.0)));
@@ -160,7 +160,7 @@ void forEachPair(F&& f) {
     }
 }
 
-TEST(AutoKinds, IsAcceptedWhereverAnyMethodIs) {
+TEST(AutoGeometryTypes, AutoIsAcceptedWhereAnyOtherMethodIs) {
   std::size_t refused = 0;
   forEachPair([&](const Body& a, const Body& b) {
     for (const double thickness : {0.0, 0.1}) {
@@ -174,7 +174,7 @@ TEST(AutoKinds, IsAcceptedWhereverAnyMethodIs) {
   EXPECT_EQ(refused, 2u * 4u);  // each shape with itself
 }
 
-TEST(AutoKinds, AnswersAsTheMethodThatItNames) {
+TEST(AutoGeometryTypes, ContactsMatchTheReportedMethod) {
   std::size_t contacts = 0, continuous = 0, proximity = 0;  // the last two: pairs with contacts
   forEachPair([&](const Body& a, const Body& b) {
     if (isOfTriangles(a) && isOfTriangles(b)) return;  // AutoTest.cpp
@@ -214,7 +214,7 @@ TEST(AutoKinds, AnswersAsTheMethodThatItNames) {
 }
 
 /// The method changes from frame to frame, and with it the boxes of the octrees.
-TEST(AutoKinds, ChangesItsMethodFromFrameToFrame) {
+TEST(AutoGeometryTypes, MethodMayChangeFromFrameToFrame) {
   forEachPair([&](const Body& a, const Body& b) {
     if (isOfTriangles(a) && isOfTriangles(b)) return;
     const PairSettings automatic{Method::Auto, 0.05};
@@ -226,7 +226,7 @@ TEST(AutoKinds, ChangesItsMethodFromFrameToFrame) {
 }
 
 /// The tolerance belongs to Auto: other methods refuse it by name, unless it is negative.
-TEST(AutoKinds, OthersRefuseATolerance) {
+TEST(AutoGeometryTypes, OtherMethodsRefuseAMotionTolerance) {
   OctreeBasedCD collisions;
   const Mesh organ = sheet(2, 0.0, 0.0);
   const GeometryId a = collisions.addTriangleMesh(organ.positions, organ.triangles),
@@ -254,7 +254,7 @@ TEST(AutoKinds, OthersRefuseATolerance) {
 }
 
 /// A newcomer's first pair: a suture against itself and against an organ, with no settings at all.
-TEST(AutoKinds, NeedsNoSettingsForASuture) {
+TEST(AutoGeometryTypes, SutureNeedsNoSettings) {
   OctreeBasedCD collisions;
   const Mesh organ = sheet(6, 0.0, 0.0);
   const GeometryId tissue = collisions.addTriangleMesh(organ.positions, organ.triangles);
