@@ -14,7 +14,7 @@ double gap(const DoubleBox& a, const DoubleBox& b) {
   return (a.min - b.max).cwiseMax(b.min - a.max).maxCoeff();
 }
 
-/// Of one mesh pair in one frame, for all engines' sets.
+/// Compares the pair sets of all engines, for one mesh pair in one frame.
 class SetChecker {
  public:
   SetChecker(const Task& task, const Positions& positions) : m_task(task), m_positions(positions) {
@@ -31,8 +31,9 @@ class SetChecker {
     for (std::size_t i = 0; i < sets.size(); ++i) {
       if (sets[i] != all) compare(pair, sets[i], all, entries[i].check);
     }
-    // What is in every set can still lie outside the truth: every engine rounded outward.
-    for (std::size_t i = 0; i < sets.size(); ++i) countExtra(pair, sets[i], entries[i].check);
+    // A pair in every set can still be a false positive, because every engine rounds outward.
+    for (std::size_t i = 0; i < sets.size(); ++i)
+      countFalsePositives(pair, sets[i], entries[i].check);
   }
 
  private:
@@ -47,15 +48,15 @@ class SetChecker {
     Pairs missing;
     std::set_difference(all.begin(), all.end(), set.begin(), set.end(),
                         std::back_inserter(missing));
-    for (const ElementPair& p : missing) check.missed += gapOf(pair, p) <= 0;
+    for (const ElementPair& p : missing) check.falseNegatives += gapOf(pair, p) <= 0;
   }
 
-  void countExtra(std::size_t pair, const Pairs& set, SetCheck& check) const {
+  void countFalsePositives(std::size_t pair, const Pairs& set, SetCheck& check) const {
     for (std::size_t i = 0; i < set.size(); ++i) {
       const double apart = gapOf(pair, set[i]);
       const bool twice = i > 0 && set[i] == set[i - 1];
-      check.extra += apart > 0 || twice;
-      check.widestExtra = std::max(check.widestExtra, apart / m_largest);
+      check.falsePositives += apart > 0 || twice;
+      check.widestFalsePositive = std::max(check.widestFalsePositive, apart / m_largest);
     }
   }
 

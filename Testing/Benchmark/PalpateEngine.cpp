@@ -36,7 +36,7 @@ class PalpateEngine : public BroadPhase {
   void collide() override {
     if (m_order == PairOrder::Sorted) {
       m_scene->detection.collectCandidates();
-      // Sorted when first asked for.
+      // Sorted on the first call.
       for (std::size_t pair = 0; pair < m_task.pairs.size(); ++pair)
         m_scene->detection.candidatePairs(first(pair), second(pair));
       return;

@@ -1,4 +1,4 @@
-// Contacts to sorted contacts. (Candidate pairs are sorted when asked for, outside of a frame.)
+// Contacts to sorted contacts. (Candidate pairs are sorted on demand, outside of a frame.)
 #include "Stages/TimeStage.h"
 
 using namespace palpate;

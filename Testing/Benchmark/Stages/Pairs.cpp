@@ -1,4 +1,4 @@
-// Octrees to candidate pairs: of trees as shipped, and of fresh ones.
+// Octrees to candidate pairs: of octrees as shipped, and of rebuilt ones.
 #include "Stages/TimeStage.h"
 
 using namespace palpate;
