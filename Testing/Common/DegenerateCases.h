@@ -16,7 +16,7 @@ struct DegenerateCase {
   double thickness = 0.125;
   Eigen::Vector3d aCameBy{0, 0, -0.5};  ///< displacement of a in the step
   Eigen::Vector3d bCameBy{0, 0, 0};
-  bool large = false;  ///< too many features for brute force over a mesh with itself
+  bool large = false;  ///< too many features for brute force on a mesh with itself
 
   std::vector<Eigen::Vector3d> aBefore() const { return before(a, aCameBy); }
   std::vector<Eigen::Vector3d> bBefore() const { return before(b, bCameBy); }
@@ -29,7 +29,7 @@ struct DegenerateCase {
   }
 };
 
-/// One triangle with vertices of its own.
+/// Adds one triangle with three new vertices.
 inline void addTriangle(Mesh& mesh, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                         const Eigen::Vector3d& c) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());

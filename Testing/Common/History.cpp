@@ -25,7 +25,7 @@ std::uint32_t hashOf(const ContactFeatures& features) {
          static_cast<std::uint32_t>(features.kind);
 }
 
-/// Words of what a query found, or why it was refused.
+/// The results of a query as words, or the error that it threw.
 template <class F>
 std::vector<std::uint64_t> wordsOf(F&& query) {
   std::vector<std::uint64_t> words;
@@ -339,7 +339,7 @@ void RandomHistory::act() {
   setPositions(id);
 }
 
-/// Both ends of a geometry that is new in the object.
+/// Both ends of the step, for a geometry that is new in the object.
 void RandomHistory::setEnds(OctreeBasedCD& collisions, GeometryId id, const Body& body) {
   if (!body.shape) collisions.setPositions(id, body.before, body.now);
   if (body.placed)
@@ -364,7 +364,7 @@ OctreeBasedCD RandomHistory::fresh(Engine engine, std::map<GeometryId, GeometryI
   return collisions;
 }
 
-/// Of two triangle meshes, by exact arithmetic.
+/// Whether two triangle meshes intersect, by exact arithmetic.
 bool RandomHistory::startsApart(const Pair& pair) const {
   OctreeBasedCD collisions(settingsOf(Engine::BruteForce));
   const auto add = [&](GeometryId id) {
@@ -406,8 +406,9 @@ void RandomHistory::compareContacts(const OctreeBasedCD& other,
       EXPECT_EQ(v.arcDeviation, t.arcDeviation);
     else
       EXPECT_NEAR(v.arcDeviation, t.arcDeviation, 1e-12);
-    // A new object always knows; one with a history may not, but is never wrong.
-    if (!isBruteForce) {  // without boxes Intersection does not know what was near
+    // A new object always knows startedApart. One with a history may not know it, but is never
+    // wrong.
+    if (!isBruteForce) {  // without boxes, Intersection does not know distances
       EXPECT_LE(v.trusted, t.trusted);
     }
     if (v.startedApart && !t.startedApart) {
@@ -459,7 +460,7 @@ void RandomHistory::compareQueries(OctreeBasedCD& other,
   EXPECT_EQ(ask(m_life, a, b), ask(other, ids.at(a), ids.at(b)));
 }
 
-/// At the end of a step.
+/// Ends the step.
 void RandomHistory::compareWhatLasts() {
   for (const auto& [id, body] : m_bodies) {
     if (!body.shape && body.bodyGiven)

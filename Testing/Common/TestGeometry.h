@@ -81,7 +81,7 @@ inline TestGeometry particles(Random& random, std::size_t count, double radius) 
   return points;
 }
 
-/// Radii of its own for each vertex.
+/// Gives each vertex its own radius.
 inline TestGeometry tapered(Random& random, TestGeometry geometry, double most) {
   geometry.radii.clear();
   for (std::size_t v = 0; v < geometry.positions.size(); ++v)
@@ -126,7 +126,8 @@ inline std::vector<PairSettings> settingsFor(double thickness, bool continuous =
   return all;
 }
 
-/// Octrees with any threads answer as brute force does, bit by bit; returns how many contacts.
+/// Expects the contacts of brute force, bit by bit, from octrees with any number of threads.
+/// Returns how many contacts there are.
 inline std::size_t expectOracle(Random& random, const TestGeometry& a, const TestGeometry& b,
                                 const PairSettings& pair) {
   const Positions nowA = moved(random, a.positions, 0.03), nowB = moved(random, b.positions, 0.03);

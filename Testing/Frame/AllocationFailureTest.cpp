@@ -21,8 +21,8 @@
 #include <new>
 #include <string>
 
-// Every allocation of every public call fails once. A call that changes the object leaves it as it
-// was; a frame leaves it ready for the next one.
+// Makes every allocation of every public call fail once. A call that changes the object leaves it
+// unchanged. After a frame that failed, the next frame is correct.
 
 namespace palpate::testing {
 namespace {
@@ -36,7 +36,7 @@ void append(Words& words, const Positions& positions) {
     for (const double x : p) append(words, x);
 }
 
-/// All that a frame's answer depends on.
+/// Everything that a frame's contacts depend on.
 Words stateOf(const OctreeBasedCD& detection) {
   Words words;
   const CollisionProblem problem = detection.problem();
@@ -315,7 +315,7 @@ TEST_P(AllocationFailure, NextFrameIsCorrect) {
           if (first) {
             EXPECT_THROW(run->data(), Error);
           } else {
-            ASSERT_EQ(run->data().hash(), hash);  // the last answer
+            ASSERT_EQ(run->data().hash(), hash);  // the contacts of the previous frame
           }
           EXPECT_TRUE(run->detection().octree().validate().empty());
           run->detect();
@@ -359,8 +359,7 @@ TEST_P(AllocationFailure, LeavesTheStepGuardUnchanged) {
     if (!threw) break;
     ++failures;
     ASSERT_TRUE(guard.held().empty());
-    // The second geometry is not given: it is where it was added, not where the call that failed
-    // moved it.
+    // The second geometry is not set: it is where it was added, not where the failed call moved it.
     a = bodyNow;
     guard.hold(std::array{GuardedStep{ids[0], body.positions, a}});
     unfailed.hold(std::array{GuardedStep{ids[0], body.positions, sameA}});
@@ -371,7 +370,7 @@ TEST_P(AllocationFailure, LeavesTheStepGuardUnchanged) {
 
 INSTANTIATE_TEST_SUITE_P(Threads, AllocationFailure, ::testing::Values(1, 2));
 
-/// What solvers append to keeps what it held.
+/// Vectors that appendRows() and appendMotions() extend keep their content.
 TEST(AllocationFailureWhileAppendingOrCapturing, AppendedRowsAndMotionsStayUnchanged) {
   const Mesh low = sheet(3, 0.0, 0.0), high = sheet(3, 0.0, 0.2);
   const CollisionData contacts = detectCollision(

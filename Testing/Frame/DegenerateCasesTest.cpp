@@ -104,7 +104,7 @@ TEST(DegenerateCaseDefinitions, MatchTheDefinition) {
       EXPECT_EQ(intersection.intersectingTriangles.size(), 3u);
       EXPECT_EQ(intersection.contacts(), 1u);
     } else if (input.name == "vertex exactly on vertex") {
-      EXPECT_GE(intersection.contacts(), 6u);  // each way, and every edge at either
+      EXPECT_GE(intersection.contacts(), 6u);  // both vertices, and edges of both
       EXPECT_EQ(distinct.vertexTriangle.size(), 1u);
     } else if (input.name == "one closed mesh inside another") {
       EXPECT_EQ(intersection.contacts() + distinct.contacts(), 0u);

@@ -22,9 +22,9 @@
 #include <utility>
 #include <xmmintrin.h>
 
-// Answers do not depend on the calling thread's floating-point environment: how it rounds, whether
-// it flushes denormals to zero, as audio and graphics code often asks for, and whether exceptions
-// trap. The environment is left as it was, with its exception flags.
+// Results do not depend on the floating-point environment of the calling thread: rounding mode,
+// flushing denormals to zero as audio and graphics code often does, trapping exceptions. The
+// environment and its exception flags stay unchanged.
 
 namespace palpate {
 namespace {
@@ -51,7 +51,7 @@ const std::vector<Mode> kModes{{"trapping", FE_TONEAREST, 0, true},
                                {"trapping, upward", FE_UPWARD, 0, true},
                                {"all", FE_TOWARDZERO, kBoth, true}};
 
-/// This thread is in the mode while the object lives.
+/// Sets the mode of this thread while the object exists.
 class InMode {
  public:
   explicit InMode(const Mode& mode) {
@@ -69,7 +69,8 @@ class InMode {
   std::fenv_t m_before;
 };
 
-/// What a call answers; it must leave the environment and the exception flags as they were.
+/// Returns the results of a call, which must leave the environment and the exception flags
+/// unchanged.
 template <class F>
 auto unchanged(F&& call) {
   const unsigned before = _mm_getcsr();
@@ -78,7 +79,7 @@ auto unchanged(F&& call) {
   return result;
 }
 
-/// Answers of one frame, in a mode that is set before everything.
+/// Contacts of one frame, in a mode that is set before everything.
 std::vector<Rows> answers(const DegenerateCase& input, const PairSettings& settings, int threads,
                           const Mode& mode) {
   const std::vector<Eigen::Vector3d> aBefore = input.aBefore(), bBefore = input.bBefore();
@@ -106,7 +107,7 @@ TEST_P(FloatingPoint, ModeOfTheCallerChangesNoBit) {
     PairSettings settings = GetParam().settings;
     settings.thickness *= input.thickness;
     const std::vector<Rows> truth = answers(input, settings, 1, kStandard);
-    // A thickness that is denormal would be refused as zero where denormals are.
+    // In a mode without denormals, a denormal thickness would be refused as zero.
     const bool denormal = settings.thickness < 0x1p-1022;
     const unsigned both = kFlushToZero | (denormal ? 0 : kDenormalsAreZero);
     for (const Mode& mode : {Mode{"upward", FE_UPWARD}, Mode{"flushing", FE_TONEAREST, both},
@@ -134,7 +135,7 @@ void append(Bits& bits, const Value& value) {
     bits.push_back(static_cast<std::uint64_t>(value));
 }
 
-/// Bits of what the functions of single features answer, in a mode.
+/// Bits of the results of the functions of single features, in a mode.
 Bits featureAnswers(const test::CornersPair& pair, const Mode& mode) {
   const auto& [a, b] = pair;
   const auto both = [&, &a = a, &b = b](const TimeOfImpactSettings& settings) {
@@ -194,7 +195,8 @@ struct TripletOfBits {
   double value;
 };
 
-/// Of detectCollision() on two meshes, and of what makes a solver's rows of its contacts.
+/// The results of detectCollision() on two meshes and of the functions that make a solver's rows
+/// from them.
 Bits meshAnswers(const DegenerateCase& input, const PairSettings& settings, const Mode& mode) {
   const Mesh &a = input.a, &b = input.b;
   const std::vector<Eigen::Vector3d> aBefore = input.aBefore(), bBefore = input.bBefore();
@@ -231,7 +233,7 @@ TEST(FloatingPointInOneCall, ModeOfTheCallerChangesNoBit) {
     PairSettings settings;
     settings.method = Method::Proximity;
     settings.thickness = input.thickness;
-    // A thickness that is denormal would be refused as zero where denormals are.
+    // In a mode without denormals, a denormal thickness would be refused as zero.
     if (input.large || settings.thickness < 0x1p-1022) continue;
     SCOPED_TRACE(input.name);
     const Bits truth = meshAnswers(input, settings, kStandard);

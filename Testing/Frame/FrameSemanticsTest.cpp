@@ -5,7 +5,7 @@
 
 #include <thread>
 
-// What a frame is of: positions before and now, ids, pairs, and calls that change nothing.
+// The input of a frame: positions before and now, ids, pairs. Some calls change nothing.
 
 namespace palpate {
 namespace {
@@ -26,7 +26,7 @@ class SpikeAndSheet : public ::testing::Test {
   const GeometryId m_b = m_detection.addTriangleMesh(m_sheet.positions, m_sheet.triangles);
 
   void SetUp() override { m_detection.addCollisionPair(m_a, m_b, kContinuous); }
-  /// Of the step, which it ends.
+  /// Sets both ends of the step, detects, and ends the step.
   double time() {
     m_detection.detectCollision();
     m_detection.advance();

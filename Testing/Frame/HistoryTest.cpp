@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <string>
 
-// Random lives against a model that keeps only the last values: see Common/History.h.
+// Random histories against a model that keeps only the last values: see Common/History.h.
 
 namespace palpate::testing {
 namespace {
@@ -34,7 +34,7 @@ TEST_P(History, ContactsDependOnTheLastValuesOnly) {
 
 INSTANTIATE_TEST_SUITE_P(Lives, History, ::testing::Range(0, kLives));
 
-/// PALPATE_HISTORY_LIVES lives more, each of 1,000 frames; none unless it is set.
+/// PALPATE_HISTORY_LIVES more histories of 1,000 frames each; none unless it is set.
 TEST(LongHistory, ContactsDependOnTheLastValuesOnly) {
   const char* const lives = std::getenv("PALPATE_HISTORY_LIVES");
   if (!lives) GTEST_SKIP() << "skipped: PALPATE_HISTORY_LIVES is not set";

@@ -5,7 +5,7 @@
 namespace palpate::testing {
 namespace {
 
-/// As simulators keep them: contiguous vectors of N, behind a pointer.
+/// Like the arrays of simulators: a pointer to contiguous vectors of N numbers.
 template <class T, int N>
 class VecArray {
  public:

@@ -12,8 +12,9 @@
 #include <utility>
 #include <vector>
 
-// Method::Auto, the default, for every pair of geometry types: accepted wherever any method is, the
-// contacts of Method::Continuous where features move and of Method::Proximity where they rest.
+// Method::Auto, the default, for every pair of geometry types. It is accepted where any other
+// method is. Its contacts are those of Method::Continuous where features move, and of
+// Method::Proximity where they rest.
 
 namespace palpate::testing {
 namespace {
@@ -24,7 +25,7 @@ using Eigen::Matrix3d;
 struct Body {
   std::string name;
   std::function<GeometryId(OctreeBasedCD&)> add;
-  Positions before, now;  ///< none of a shape
+  Positions before, now;  ///< empty for a shape
   Vector3d movedBy = Vector3d::Zero();
   Matrix3d turnedBy = Matrix3d::Identity();
 
@@ -86,7 +87,7 @@ std::vector<Body> bodies(Random& random) {
   return all;
 }
 
-/// One pair in a step of its own.
+/// One pair in one step.
 class Pair {
  public:
   Pair(const Body& a, const Body& b, const PairSettings& settings, Engine engine = Engine::Octree,
@@ -98,7 +99,7 @@ class Pair {
   }
   const CollisionData& detect(bool moves) {
     if (m_first.isShape() || m_second.isShape()) {
-      // Shapes are placed before the step and in it; others get both ends.
+      // Shapes are placed before the step and in it. For other geometries both ends are set.
       for (const auto& [body, id] : both()) body->place(m_collisions, id, false);
       m_collisions.advance();
       for (const auto& [body, id] : both()) {
@@ -225,7 +226,7 @@ TEST(AutoGeometryTypes, MethodMayChangeFromFrameToFrame) {
   });
 }
 
-/// The tolerance belongs to Auto: other methods refuse it by name, unless it is negative.
+/// The motion tolerance belongs to Auto. Other methods refuse it by name, unless it is negative.
 TEST(AutoGeometryTypes, OtherMethodsRefuseAMotionTolerance) {
   OctreeBasedCD collisions;
   const Mesh organ = sheet(2, 0.0, 0.0);
@@ -253,7 +254,7 @@ TEST(AutoGeometryTypes, OtherMethodsRefuseAMotionTolerance) {
   EXPECT_EQ(collisions.pairs()[0].settings.motionTolerance, 0.25);
 }
 
-/// A newcomer's first pair: a suture against itself and against an organ, with no settings at all.
+/// A first pair of a new user: a suture against itself and against an organ, with default settings.
 TEST(AutoGeometryTypes, SutureNeedsNoSettings) {
   OctreeBasedCD collisions;
   const Mesh organ = sheet(6, 0.0, 0.0);

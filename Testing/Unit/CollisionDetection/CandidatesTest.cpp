@@ -29,7 +29,8 @@ PairSettings proximity(double thickness) {
   return settings;
 }
 
-/// True boxes in exact comparison of doubles: nothing missed; more only by outward rounding.
+/// Compares with exact boxes in double: no false negatives, and false positives by outward rounding
+/// only.
 void expectComplete(std::span<const ElementPair> found, std::span<const ElementPair> truth) {
   EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
   EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
@@ -37,7 +38,7 @@ void expectComplete(std::span<const ElementPair> found, std::span<const ElementP
   EXPECT_LE(found.size(), truth.size() + truth.size() / 100 + 2);
 }
 
-/// forEachCandidate(), of one pair and of all, hands on what candidatePairs() has.
+/// forEachCandidate(), of one pair and of all, gives the pairs of candidatePairs().
 void expectSameInBatches(OctreeBasedCD& octree,
                          const std::vector<std::array<GeometryId, 2>>& pairs) {
   std::map<std::pair<GeometryId, GeometryId>, std::vector<ElementPair>> ofAll;
@@ -59,8 +60,8 @@ void expectSameInBatches(OctreeBasedCD& octree,
   EXPECT_EQ(ofAll.size(), pairs.size());
 }
 
-/// The octree's candidates of a and b, and of a with itself, over frames in which both move,
-/// against brute force.
+/// Compares the octree's candidates of a and b, and of a with itself, with brute force, over frames
+/// in which both move.
 void compare(const Mesh& a, const Mesh& b, double thickness, const Eigen::Vector3d& offset,
              double scale, int threads, OctreeUpdate update) {
   OctreeBasedCD octree(settingsOf(Engine::Octree, threads, update)),

@@ -10,8 +10,8 @@
 namespace palpate::testing {
 namespace {
 
-/// A pair at some positions: its contacts and their rows, the second geometry's vertices after the
-/// first's.
+/// A pair at some positions: its contacts and their rows. The second geometry's vertices are
+/// numbered after the first's.
 struct Rowed {
   CollisionData contacts;
   std::vector<ConstraintRow> rows;
@@ -47,7 +47,7 @@ void collect(Rowed& result, const SolverVertices& a, const SolverVertices& b) {
   });
 }
 
-/// all: the first geometry's positions, then the second's, of which self-collision has none.
+/// all: the positions of the first geometry, then of the second. Self-collision has only the first.
 Rowed rowed(const TestGeometry& a, const TestGeometry& b, const PairSettings& pair,
             const Positions& all) {
   const auto split = all.begin() + static_cast<std::ptrdiff_t>(a.positions.size());
@@ -80,8 +80,8 @@ Eigen::SparseMatrix<double> jacobian(const Rowed& found, std::size_t vertices) {
   return matrix;
 }
 
-/// Gaps are distances, and the Jacobian is what distances do when all positions move a little in
-/// random directions. Returns how many contacts were compared.
+/// Compares gaps with distances, and the Jacobian with the change of distances when all positions
+/// move a little in random directions. Returns how many contacts were compared.
 template <class Find>  // Rowed of positions
 std::size_t expectDerivatives(Random& random, const Positions& at, Find&& find) {
   constexpr double kStep = 0x1p-18;
@@ -107,7 +107,7 @@ std::size_t expectDerivatives(Random& random, const Positions& at, Find&& find) 
     const auto one = ahead.find(found.keys[r]), other = behind.find(found.keys[r]);
     if (one == ahead.end() || other == behind.end()) continue;  // at the thickness
     const double quotient = (one->second - other->second) / (2 * kStep);
-    // A central difference errs by the square of the step over the distance.
+    // The error of a central difference is the square of the step over the distance.
     const double ratio = kStep / std::max(std::abs(found.distances[r]), 1e-4);
     EXPECT_NEAR(predicted[static_cast<Eigen::Index>(r)], quotient, 1e-6 + 30 * ratio * ratio) << r;
     ++compared;
@@ -152,8 +152,8 @@ TEST(ConstraintRows, AreDerivativesOfDistancesToShapes) {
   }
 }
 
-/// Where radii differ along a line the row has the gradient of the distance between the centre
-/// lines. The distance itself also changes by the radius, as the closest point moves along.
+/// If radii differ along a line, the row has the gradient of the distance between the centre lines.
+/// The distance itself also changes by the radius, because the closest point moves along.
 TEST(ConstraintRows, AreDerivativesOfCentreLineDistancesForTaperedLines) {
   Random random(75);
   const TestGeometry line = thread(random, 60, 0.1, 0.01, false);

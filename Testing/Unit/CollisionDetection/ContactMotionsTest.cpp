@@ -28,7 +28,7 @@ struct Moved {
   CollisionData contacts;
   std::vector<ConstraintRow> rows;
   std::vector<ContactMotion> motions;
-  Positions before, now;  ///< of both, as the rows number them
+  Positions before, now;  ///< positions of both, in the numbering of the rows
 };
 
 Moved step(Random& random, const TestGeometry& a, const TestGeometry& b, const PairSettings& pair,
@@ -58,7 +58,8 @@ TEST(ContactMotions, PointsMatchDistancesAndDisplacementsMatchGapChanges) {
   for (const auto& [a, b] : pairs) {
     for (const Method method : {Method::Proximity, Method::Continuous}) {
       const bool isTapered = a == &cone || b == &cone;
-      if (isTapered && method == Method::Continuous) continue;  // its distances take largest radii
+      if (isTapered && method == Method::Continuous)
+        continue;  // its distances take the largest radii
       const Moved found = step(random, *a, *b, {method, 0.1, Contacts::All}, 0.05);
       ASSERT_EQ(found.motions.size(), found.rows.size());
       EXPECT_GT(found.motions.size(), 10u);
@@ -156,7 +157,7 @@ TEST(ContactMotions, AreDerivativesOfDistancesToShapes) {
             continue;
           for (const ShapeContact& other : start.shape()) {
             if (other.element != contact.element || other.vertices != contact.vertices) continue;
-            // Of the same features the normal turns by the step over their distance at most, and
+            // With the same features, the normal turns by at most the step over their distance, and
             // the closest points slide as little.
             const double apart = std::abs(contact.distance + geometry->radii[0]);
             if ((other.normal - contact.normal).norm() > 10 * kStep / apart ||
@@ -227,8 +228,8 @@ TEST(ContactMotions, UseThePoseAtTheImpactWithAShape) {
     ASSERT_EQ(motions.size(), contacts.shape().size());
     EXPECT_GT(motions.size(), 20u);
     for (std::size_t i = 0; i < motions.size(); ++i) {
-      // The shape's point goes straight: back from the contact it comes to its place before, and
-      // ahead to that now. Both poses have it at one place of the body.
+      // The shape's point moves in a straight line: back from the contact to its place before, and
+      // ahead to its place now. In both poses it is the same point of the body.
       const double time = contacts.shape()[i].timeOfImpact;
       const Vector3d way = -motions[i].relativeDisplacement,
                      start = motions[i].opposite - time * way, end = start + way;

@@ -40,10 +40,10 @@ VertexSet verticesOf(const std::array<std::uint32_t, 2>& edge, double weight) {
   return vertices;
 }
 
-/// What the definition needs to know of a contact.
+/// The data of a contact that the definition needs.
 struct Impact {
   FeaturePair features;
-  std::uint32_t triangle;  ///< that holds a closest point in its interior, or none
+  std::uint32_t triangle;  ///< the edge or face with a closest point in its interior, or none
   double time;
   int list;
   std::size_t index;
@@ -81,7 +81,7 @@ std::vector<Impact> impactsOf(const CollisionData& data) {
   return impacts;
 }
 
-/// The definition: every contact against every other.
+/// The definition: it compares every contact with every other.
 Rows reduced(const CollisionData& all, bool self) {
   const std::vector<Impact> impacts = impactsOf(all);
   const Rows rows(all);
@@ -100,9 +100,10 @@ Rows reduced(const CollisionData& all, bool self) {
   return kept;
 }
 
-using Side = std::pair<int, std::uint32_t>;  // of the pair's first or second geometry, and a vertex
+using Side =
+    std::pair<int, std::uint32_t>;  // the geometry of the pair, first or second, and a vertex
 
-/// By each vertex with a weight other than 0: its earliest time.
+/// The earliest time of each vertex with a weight other than 0.
 std::map<Side, double> earliestByVertex(const CollisionData& data, bool self) {
   std::map<Side, double> earliest;
   const auto note = [&](int side, const VertexSet& vertices, double time) {
@@ -118,8 +119,8 @@ std::map<Side, double> earliestByVertex(const CollisionData& data, bool self) {
   return earliest;
 }
 
-/// One step of a pair: answers of every engine against the definition, and what it promises.
-/// Returns how many contacts Distinct drops.
+/// Compares one step of a pair in every engine with the definition and the guarantees. Returns how
+/// many contacts Distinct drops.
 std::size_t expectFirstImpacts(const TestGeometry& a, const TestGeometry& b, PairSettings pair,
                                const Positions& nowA, const Positions& nowB) {
   const bool self = &a == &b;
@@ -137,7 +138,7 @@ std::size_t expectFirstImpacts(const TestGeometry& a, const TestGeometry& b, Pai
   EXPECT_EQ(distinct.validity().trusted, all.validity().trusted);
   EXPECT_EQ(distinct.validity().startedApart, all.validity().startedApart);
   EXPECT_EQ(distinct.validity().atImpact, expected.contacts());
-  // Each pair of features that meets is reported once, with its first time.
+  // Each touching feature pair is reported once, with its first time.
   const std::vector<Impact> kept = impactsOf(distinct);
   for (const Impact& impact : impactsOf(all)) {
     std::size_t count = 0;
@@ -189,7 +190,7 @@ TEST(FirstImpacts, MatchTheDefinitionForEveryPairOfGeometryTypes) {
   EXPECT_GT(dropped, 1000u);
 }
 
-/// Equal positions and equal times: everything is a tie.
+/// With equal positions and equal times, all contacts are tied.
 TEST(FirstImpacts, TiesAreBrokenByOrder) {
   TestGeometry above = testGeometry(sheet(4, 0, 0)), below = above;
   for (TestGeometry* geometry : {&above, &below})
@@ -237,7 +238,7 @@ TEST(FirstImpacts, CornerOnCornerIsOneContact) {
   EXPECT_EQ(distinct.vertexTriangle()[0].triangle, 0u);
 }
 
-/// What a filter refuses is no contact, so it stands for none.
+/// A refused contact does not represent other contacts.
 TEST(FirstImpacts, FilteredContactsSuppressNoOthers) {
   Random random(3);
   const Mesh organ = sphere(8, 10, {0.5, 0.5, 0.55}, 0.35), cloth = sheet(9, 0, 0);
@@ -261,7 +262,7 @@ TEST(FirstImpacts, FilteredContactsSuppressNoOthers) {
     expectSameRows(Rows(answerOf(settings, Contacts::Distinct)), expected);
 }
 
-/// A smooth body is pressed into another. How many contacts a solver is spared.
+/// A smooth body is pressed into another: how many contacts Distinct drops.
 TEST(FirstImpacts, AreFewOnSmoothBodies) {
   const Mesh cloth = sheet(52, 0, 0);
   const Mesh body = sphere(52, 50, {0.5, 0.5, 0.36}, 0.28);
@@ -281,7 +282,7 @@ TEST(FirstImpacts, AreFewOnSmoothBodies) {
   EXPECT_LT(3 * distinct, all);
 }
 
-/// Regular grids that fall onto each other touch where weights are 0 but for rounding.
+/// Regular grids that fall onto each other touch where weights are 0 up to rounding.
 TEST(FirstImpacts, AlignedGridsReportEachFeaturePairOnce) {
   Random random(18);
   std::size_t contacts = 0;
@@ -298,7 +299,7 @@ TEST(FirstImpacts, AlignedGridsReportEachFeaturePairOnce) {
       collisions.addCollisionPair(a, b, {.method = Method::Continuous});
       collisions.setPositions(b, before, now);
       collisions.detectCollision();
-      // By the vertices with weights other than 0: those of a, then those of b.
+      // Grouped by the vertices with weights other than 0: those of a, then those of b.
       std::set<std::array<std::set<std::uint32_t>, 2>> seen;
       const auto add = [&](const auto& contact, std::array<std::size_t, 4> sides) {
         const Stencil of = stencil(contact);

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-// What a caller can ask of the geometries and pairs that an OctreeBasedCD has.
+// Functions that read the geometries and pairs of an OctreeBasedCD.
 
 namespace palpate::testing {
 namespace {
@@ -48,7 +48,7 @@ TEST(GeometryAccess, PositionsAreTheCurrentOnes) {
   EXPECT_EQ(copyOf(collisions.positions(id)), next);
   collisions.setPositions(id, next, mesh.positions);
   EXPECT_EQ(copyOf(collisions.positions(id)), mesh.positions);
-  // A placed body's are in its own frame.
+  // Positions of a placed body are in its own frame.
   collisions.setTransform(id, Eigen::Matrix3d::Identity(), {1, 2, 3});
   EXPECT_EQ(copyOf(collisions.positions(id)), mesh.positions);
   EXPECT_EQ(collisions.vertexCount(id), mesh.positions.size());
@@ -89,7 +89,7 @@ TEST(GeometryAccess, BoundsEncloseVerticesWithTheirRadii) {
   EXPECT_TRUE(collisions.bounds(collisions.addPointSet({})).isEmpty());
 }
 
-/// Of each shape the furthest point along each axis, found from its definition.
+/// The furthest point of each shape along each axis, from its definition.
 TEST(GeometryAccess, BoundsOfShapesAreTight) {
   const Eigen::Matrix3d turn =
       Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
@@ -140,7 +140,7 @@ TEST(GeometryAccess, PairSettingsAreTheLastOnes) {
                 [&] { (void)collisions.pairSettings(b, a); });
 }
 
-/// Which elements are enabled decides what collides, not where the vertices are.
+/// Disabled elements do not collide, but vertices are found inside bodies anyway.
 TEST(GeometryAccess, VerticesOfDisabledElementsAreFoundInABody) {
   const Mesh inner = sphere(3, 4, {0.5, 0.5, 0.5}, 0.1), outer = sphere(6, 8, {0.5, 0.5, 0.5}, 0.4);
   OctreeBasedCD collisions;

@@ -23,8 +23,8 @@
 #include <utility>
 #include <vector>
 
-// Lines and points: every pair of kinds against brute force and against the definition, written
-// here over <palpate/Distance.h>; what cannot be tested is refused.
+// Lines and points: every pair of geometry types against brute force and against the definition,
+// which is written here with <palpate/Distance.h>. Unsupported pairs are refused.
 
 namespace palpate::testing {
 namespace {
@@ -74,8 +74,9 @@ TEST(GeometryTypes, MatchBruteForce) {
 
 using Ids = std::vector<std::uint32_t>;
 
-/// The definition of All over public functions: vertices of others against triangles, points also
-/// against segments and, of the first of two point sets, against points.
+/// The definition of All with public functions: vertices of the other geometry against triangles,
+/// and points also against segments. For two point sets: points of the first against points of the
+/// second.
 std::set<Ids> expectedVertexTriangle(const TestGeometry& vertices, const TestGeometry& others,
                                      double thickness, bool ofSecond) {
   std::set<Ids> ids;
@@ -180,9 +181,9 @@ TEST(GeometryTypes, DistinctHasFewerContactsAndKeepsTheNearest) {
   }
 }
 
-// ---- Laws ----
+// ---- Invariances ----
 
-/// Vertices of the two exchanged.
+/// The vertices of the two geometries are exchanged.
 CollisionData swapped(const CollisionData& data) {
   CollisionData::Contents contents;
   contents.earliestTimeOfImpact = data.earliestTimeOfImpact();
@@ -254,7 +255,7 @@ TEST(GeometryTypes, ExactTransformationsChangeNothing) {
     }
 }
 
-/// Of two points neither is a triangle: the other one's place in the list.
+/// In a contact of two points neither is a triangle: the second point takes its place in the list.
 TEST(GeometryTypes, SwappingPointSetsReversesTheirContacts) {
   Random random(8);
   const TestGeometry drops = tapered(random, particles(random, 300, 0), 0.05),
@@ -276,7 +277,7 @@ TEST(GeometryTypes, SwappingPointSetsReversesTheirContacts) {
   }
 }
 
-// ---- Meaning, by hand ----
+// ---- Hand-computed contacts ----
 
 TestGeometry lineOf(Positions positions, double radius = 0.0) {
   TestGeometry line{GeometryType::Lines, std::move(positions), {}, {}, {radius}};
@@ -358,7 +359,8 @@ TEST(GeometryTypes, ParticlesTouchThreadsAndEachOther) {
   EXPECT_EQ(over.barycentric, Vector3d(0.75, 0.25, 0));
   EXPECT_EQ(over.distance, 0.125);  // 0.5 less both radii
   EXPECT_EQ(over.normal, Vector3d(0, 0, 1));
-  EXPECT_EQ(corner.triangle, 0u);  // of the two segments at the corner the lower
+  EXPECT_EQ(corner.triangle,
+            0u);  // of the two segments at the corner, the one with the lower index
   EXPECT_EQ(corner.barycentric[0], 0.0);
   EXPECT_EQ(answer(drops, thread, {Method::Proximity, 0.25, Contacts::All}).vertexTriangle().size(),
             4u);
@@ -371,7 +373,7 @@ TEST(GeometryTypes, ParticlesTouchThreadsAndEachOther) {
 }
 
 TEST(GeometryTypes, ThinEndOfATaperDoesNotSuppressItsThickEnd) {
-  // Both segments at the thick vertex come nearer to the particle, where they are thin.
+  // Both segments at the thick vertex are nearer to the particle at their thin ends.
   TestGeometry spindle = lineOf({{-2, 0, 0.5}, {0, 0, 0}, {2, 0, 0.5}});
   spindle.radii = {0, 1, 0};
   const TestGeometry drop{GeometryType::Points, {{0, 0, 1.125}}, {}, {}, {0}};
@@ -408,20 +410,20 @@ TEST(GeometryTypes, RestDistanceExcludesNeighboursAlongTheThread) {
   EXPECT_EQ(pairsFound(), (std::set<Ids>{{0, 1, 3, 4}}));
   pair.restDistance = 2.5;
   EXPECT_TRUE(pairsFound().empty());
-  // Only the shape that it was added in counts.
+  // Only the positions given with the topology count as the rest positions.
   Positions stretched = hairpin.positions;
   stretched[2][0] = 400;
   EXPECT_EQ(Rows(answer(settingsOf(Engine::Octree), hairpin, hairpin, pair, stretched, stretched))
                 .edgeEdge.size(),
             0u);
-  // Round a closed thread the shorter way counts.
+  // On a closed thread, the shorter way around counts.
   TestGeometry ring = lineOf({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}});
   ring.segments.push_back({3, 0});
   pair = {Method::Proximity, 1.5, Contacts::All};
   EXPECT_EQ(answer(ring, ring, pair).edgeEdge().size(), 2u);
   pair.restDistance = 1.25;  // opposite edges are one apart, either way
   EXPECT_EQ(answer(ring, ring, pair).edgeEdge().size(), 0u);
-  // So does the shortest way between branches.
+  // The shortest way between branches counts, too.
   TestGeometry branching = lineOf({{0, 0, 0}, {0, 0, 1}, {0, 0, 2}});
   branching.positions.insert(branching.positions.end(), {{1, 0, 1}, {1, 0, 2}});
   branching.segments.insert(branching.segments.end(), {{1, 3}, {3, 4}});
@@ -477,7 +479,7 @@ TEST(GeometryTypes, DegenerateLinesMatchBruteForce) {
   const TestGeometry organ = testGeometry(sphere(4, 6, {1, 1, 1}, 1));
   for (int run = 0; run < 30; ++run) {
     TestGeometry degenerate{GeometryType::Lines, {}, {}, {}, {run % 2 ? 0.25 : 0.0}};
-    // On a coarse grid: coincident, parallel and collinear segments, some without length.
+    // On a coarse grid: coincident, parallel and collinear segments, and some without length.
     for (int v = 0; v < 12; ++v) {
       const auto at = [&] { return static_cast<double>(random() % 3); };
       const double x = at(), y = at(), z = at();
@@ -500,9 +502,9 @@ TEST(GeometryTypes, DegenerateLinesMatchBruteForce) {
   }
 }
 
-// ---- Refused ----
+// ---- Refused calls ----
 
-/// Docs/Pairs.md's matrix is what the code accepts.
+/// The matrix in Docs/Pairs.md is what the code accepts.
 TEST(GeometryTypes, DocumentedSupportMatchesTheCode) {
   const Positions some{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const std::pair<Method, std::string> methods[] = {{Method::Intersection, "Intersection"},
@@ -538,7 +540,8 @@ TEST(GeometryTypes, DocumentedSupportMatchesTheCode) {
             EXPECT_EQ(error.code(), ErrorCode::UnsupportedMethod);
           }
         }
-        EXPECT_TRUE(ways == 0 || ways == 1 + (a == b && a != 4));  // no shape meets itself
+        EXPECT_TRUE(ways == 0 ||
+                    ways == 1 + (a == b && a != 4));  // a shape does not collide with itself
         if (ways == 0) continue;
         ++accepted;
         cell += (cell.empty() ? "`" : ", `") + name + "`";
@@ -602,7 +605,7 @@ TEST(GeometryTypes, BadInputThrowsErrorsThatNameIt) {
                    points = collisions.addPointSet(two, 1.0),
                    thick = collisions.addLineMesh(two, one, std::vector<double>{1, 2}),
                    mesh = collisions.addTriangleMesh(two, std::vector<Triangle>{{0, 1, 0}});
-  EXPECT_EQ(line, GeometryId{0});  // nothing refused took an id
+  EXPECT_EQ(line, GeometryId{0});  // refused calls used no id
   const PairSettings near{Method::Proximity, 1.0};
   for (const GeometryId other : {mesh, line, points})
     expectRefused(Code::UnsupportedMethod, "Auto, Proximity and Continuous are",
@@ -630,7 +633,7 @@ TEST(GeometryTypes, BadInputThrowsErrorsThatNameIt) {
   collisions.addCollisionPair(thick, mesh, {Method::Proximity, 0.0});  // the radii are not 0
 }
 
-// ---- Round the library ----
+// ---- Captures ----
 
 TEST(GeometryTypes, CapturesIncludeThem) {
   Random random(7);

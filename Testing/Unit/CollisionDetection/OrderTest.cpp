@@ -8,7 +8,8 @@
 namespace palpate {
 namespace {
 
-// Few and many pairs for the number of first triangles: both ways of sorting, one scratch.
+// Few and many pairs for the number of first triangles, so that both ways of sorting run on one
+// scratch.
 TEST(OrderPairs, MatchesStdSort) {
   std::mt19937 random(3);
   PairOrderScratch scratch;

@@ -6,8 +6,8 @@
 
 #include <functional>
 
-// Geometries that setTransform() moves: the truth is the same scene whose positions are given as
-// fl(R x + t), and brute force.
+// Geometries that setTransform() moves. The reference is the same scene with positions fl(R x + t),
+// and brute force.
 
 namespace palpate::testing {
 namespace {
@@ -28,7 +28,7 @@ struct Place {
     for (Vector3d& p : positions) p = (*this)(p);
     return positions;
   }
-  /// Then turned by the angle about an axis through a point, and moved.
+  /// Then turns by the angle about an axis through a point, and shifts.
   Place then(const Vector3d& axis, double angle, const Vector3d& through,
              const Vector3d& by) const {
     const Matrix3d turn = Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
@@ -41,7 +41,7 @@ Place somewhere(Random& random) {
                       randomPoint(random, -0.1, 0.1));
 }
 
-/// What the transforms of the frames are.
+/// The transforms of the frames.
 enum class Way { Still, Exact, Small, Large, Far };
 
 std::vector<Place> placesOf(Random& random, Way way) {
@@ -64,7 +64,7 @@ std::vector<Place> placesOf(Random& random, Way way) {
   return places;
 }
 
-/// A pair over some frames: the body is moved by transforms, or by the same positions.
+/// A pair over some frames. The body is moved by transforms, or by the same positions.
 class Life {
  public:
   Life(Settings settings, const TestGeometry& body, const TestGeometry& other,
@@ -113,7 +113,7 @@ struct LifeCase {
   std::function<void(OctreeBasedCD&, GeometryId body)> setUp = [](auto&, GeometryId) {};
 };
 
-/// size: L, of coordinates, of which motion is bounded with rounding to spare.
+/// size: L, the size of coordinates, from which motion is bounded with a reserve for rounding.
 void expectSameValidity(const Validity& found, const Validity& truth, double size) {
   EXPECT_NEAR(found.displacement, truth.displacement, 1e-13 * size);
   EXPECT_GE(found.displacement, truth.displacement);
@@ -127,7 +127,8 @@ void expectSameValidity(const Validity& found, const Validity& truth, double siz
   EXPECT_EQ(found.untrustedVerticesB, truth.untrustedVerticesB);
 }
 
-/// Every engine with transforms answers as the positions do; returns the contacts of all frames.
+/// Every engine with transforms has the contacts of the same positions. Returns the contacts of all
+/// frames.
 std::size_t expectAsPositions(Random& random, const TestGeometry& body, const TestGeometry& other,
                               const PairSettings& pair, const LifeCase& life) {
   const std::vector<Place> places = placesOf(random, life.way);
@@ -240,7 +241,7 @@ TEST(Rigid, FiltersApply) {
   }
 }
 
-/// A vertex so far that floats are clamped, another that flattens the tree.
+/// A vertex so far away that floats are clamped, and another that makes the octree flat.
 TEST(Rigid, VerticesFarAwayMatchSetPositions) {
   Random random(5);
   for (const double far : {1e4, 1e30, 1e60}) {
@@ -283,7 +284,7 @@ TEST(Rigid, OctreeIsNotUpdated) {
   EXPECT_EQ(collisions.statistics().rebuiltOctrees, 1u);
 }
 
-/// What a step's ends are, as Step does it in StepTest.cpp.
+/// The ends of a step, as the fixture Step of StepTest.cpp tests them.
 class RigidStep : public ::testing::Test {
  protected:
   static Positions at(double z) { return {{0, 0, z}, {1, 0, z}, {0, 1, z}}; }
@@ -319,7 +320,7 @@ TEST_F(RigidStep, BeginsWhereTheLastStepEnded) {
   moveTo(7);
   m_collisions.update();
   moveTo(5);
-  expectLast(2, 5);  // of several calls the last counts
+  expectLast(2, 5);  // the last of several calls counts
   expect(5, 5);      // without a call it is at rest
 }
 
@@ -367,7 +368,7 @@ TEST_F(RigidStep, TwoPosesSetBothEnds) {
   expectLast(11, 22);
 }
 
-/// Of a new geometry's first step every order of calls gives the same.
+/// In the first step of a new geometry, every order of calls gives the same.
 TEST_F(RigidStep, DoesNotDependOnTheOrderOfCalls) {
   m_collisions.setPositions(m_id, at(5), at(6));
   moveTo(10);
@@ -521,7 +522,7 @@ TEST(Rigid, CapturesIncludeTransforms) {
   }
 }
 
-/// The way of a body that turns evenly about an axis and slides along it, in a thousand parts.
+/// The path of a body that turns evenly about an axis and slides along it, in a thousand parts.
 double deviationInParts(const Positions& body, const Place& before, const Vector3d& axis,
                         double angle, const Vector3d& through, double slide) {
   constexpr int kParts = 1000;

@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-// Analytical shapes with each other. What parts them along a direction bounds their distance from
-// below; points of both bound it from above where they are apart, and every other direction where
-// they overlap.
+// Analytical shapes with each other. A separating direction bounds their distance from below.
+// Points of both shapes bound it from above where they are apart. Where they overlap, every other
+// direction does.
 
 namespace palpate::testing {
 namespace {
@@ -75,12 +75,12 @@ std::vector<Vector3d> someDirections(Random& random, int count) {
   return all;
 }
 
-/// scale: L, of the shapes and what is between them. rounding: relative to that, where cylinders
-/// overlap, how much longer than the shortest the way may be.
+/// scale: L, of the shapes and of the gap between them. rounding: how much longer than the shortest
+/// the penetration may be where cylinders overlap, relative to the scale.
 void expectDistance(Random& random, const PlacedShape& a, const PlacedShape& b,
                     const ShapeShapeContact& c, double scale, double rounding = 1e-6) {
   const double slack = 2e-13 * scale;
-  // With cylinders: as Docs/Shapes.md says.
+  // With cylinders as in Docs/Shapes.md.
   const bool isRound = !isPlane(a) && !isPlane(b) &&
                        (std::holds_alternative<Cylinder>(a.geometry) ||
                         std::holds_alternative<Cylinder>(b.geometry));
@@ -98,7 +98,7 @@ void expectDistance(Random& random, const PlacedShape& a, const PlacedShape& b,
   for (const std::vector<Vector3d>& directions : {facets, some}) {
     EXPECT_TRUE(holds(a, c.pointA, directions, slack));
     EXPECT_TRUE(holds(b, c.pointB, directions, slack));
-    if (c.distance > 0 && !isPlane(a) && !isPlane(b)) continue;  // the points bound it
+    if (c.distance > 0 && !isPlane(a) && !isPlane(b)) continue;  // the points are a bound
     for (const Vector3d& m : directions)
       EXPECT_LE(apartAlong(a, b, m), c.distance + most) << "another direction parts them sooner";
   }
@@ -131,7 +131,7 @@ TEST(ShapePairs, MatchTheDefinition) {
         expectPair(random, a, b, 1);
         const double distance = answer(a, b)->distance;
         ++(distance > 0 ? apart : overlapping);
-        // Moved by its depth and a little more, it is that little apart.
+        // After a shift by its depth and a little more, the distance is that little.
         const ShapeShapeContact c = *answer(a, b);
         PlacedShape moved = a;
         moved.translation += (0.01 - c.distance) * c.normal;
@@ -147,7 +147,7 @@ TEST(ShapePairs, MatchTheDefinition) {
   EXPECT_GT(overlapping, 300);
 }
 
-/// Everything parallel, touching or in one plane.
+/// Shapes that are parallel, touching or in one plane.
 TEST(ShapePairs, DegenerateShapesMatchTheDefinition) {
   Random random(2);
   const std::vector<AnalyticalGeometry> all{
@@ -178,7 +178,7 @@ TEST(ShapePairs, DegenerateShapesMatchTheDefinition) {
         const PlacedShape a{all[i]},
             b{all[j], Matrix3d::Identity(), run == 0 ? Vector3d(0, 0, 0) : Vector3d(x, y, z)};
         if (isPlane(a) && isPlane(b)) continue;
-        if (i == j && b.translation.isZero()) continue;  // exchanged they are as they were
+        if (i == j && b.translation.isZero()) continue;  // exchanged, the contact is the same
         SCOPED_TRACE("kinds " + std::to_string(i) + " and " + std::to_string(j) + " at " +
                      std::to_string(x) + " " + std::to_string(y) + " " + std::to_string(z));
         expectPair(random, a, b, 4, 1e-3);
@@ -235,7 +235,8 @@ TEST(ShapePairs, MatchHandComputedValues) {
   c = only(Cylinder{{0, 0, 2}, {0, 0, 4}, 1}, Box{{0, 0, 0}, {2, 2, 1}});
   EXPECT_NEAR(c.distance, 1, 1e-15);
   EXPECT_EQ(c.normal, Vector3d::UnitZ());
-  c = only(Capsule{{0, 0, -2}, {0, 0, 1}, 0.25}, Box{{0, 0, 0}, {2, 2, 1}});  // out sideways or up
+  c = only(Capsule{{0, 0, -2}, {0, 0, 1}, 0.25},
+           Box{{0, 0, 0}, {2, 2, 1}});  // out sideways or upwards
   EXPECT_NEAR(c.distance, -2.25, 1e-14);
 }
 
@@ -278,7 +279,7 @@ TEST(ShapePairs, CapturesIncludeThem) {
   replayed(collisions);
 }
 
-/// What cannot be answered is refused; spheres, and two capsules, have any size.
+/// Unsupported shapes are refused. Spheres, and pairs of capsules, may have any size.
 TEST(ShapePairs, SizesThatDifferTooMuchAreRefused) {
   for (const double length : {1e14, 1e155, 1e300}) {
     OctreeBasedCD collisions;
@@ -306,8 +307,8 @@ TEST(ShapePairs, SizesThatDifferTooMuchAreRefused) {
   }
 }
 
-/// With many directions almost equally short the points were those of a face far from the nearest
-/// one: off by up to the depth.
+/// A regression: among many directions of almost equal length, the points were those of a face far
+/// from the nearest one, and off by up to the depth.
 TEST(ShapePairs, PointsOfOverlappingCylindersMatchTheDistance) {
   Random random(7);
   int overlapping = 0;

@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-// Method::Continuous with shapes, against distances along the step that are written here.
+// Method::Continuous with shapes, against distances along the step that this file computes.
 
 namespace palpate::testing {
 namespace {
@@ -37,7 +37,7 @@ struct Tool {
   AnalyticalGeometry geometry;
   std::array<Transform, 2> ends;
 
-  /// A point of its frame at a time: it moves linearly.
+  /// A point of its frame at a time. It moves linearly.
   Vector3d at(const Vector3d& p, double t) const { return (1 - t) * ends[0](p) + t * ends[1](p); }
 };
 
@@ -46,7 +46,8 @@ Positions cornersOf(const AnalyticalGeometry& geometry) {
   return testing::cornersOf({geometry}, radius);
 }
 
-/// Of a hull of points in general position, or of a box: three corners with all others on one side.
+/// The faces of a hull of points in general position, or of a box: three corners with all others on
+/// one side.
 std::vector<Triangle> facesOf(const Positions& p) {
   std::vector<Triangle> faces;
   const auto n = static_cast<std::uint32_t>(p.size());
@@ -63,7 +64,7 @@ std::vector<Triangle> facesOf(const Positions& p) {
   return faces;
 }
 
-/// Of a plane by three of its points; of a cylinder a point, by the centres of its ends.
+/// For a plane, by three of its points. For a cylinder and a point, by the centres of its ends.
 double distanceAt(const Plane& plane, const Tool& tool, const std::array<Vector3d, 3>& x,
                   double t) {
   const Vector3d along = plane.normal.unitOrthogonal(), across = plane.normal.cross(along);
@@ -79,7 +80,7 @@ double distanceAt(const Plane& plane, const Tool& tool, const std::array<Vector3
   return std::max({0.0, least, plane.twoSided ? -most : 0.0});
 }
 
-/// Least of a convex function over [0, 1].
+/// The minimum of a convex function over [0, 1].
 template <class F>
 double least(F&& f) {
   double low = 0, high = 1;
@@ -101,7 +102,7 @@ double distanceAt(const Cylinder& cylinder, const Tool& tool, const Vector3d& x,
   return std::hypot(std::max(0.0, across), std::max(0.0, beyond));
 }
 
-/// Of an element.
+/// The faces of an element.
 double distanceAt(const Cylinder& cylinder, const Tool& tool, const std::array<Vector3d, 3>& x,
                   double t) {
   const auto onEdge = [&](const Vector3d& p, const Vector3d& q) {
@@ -112,7 +113,7 @@ double distanceAt(const Cylinder& cylinder, const Tool& tool, const std::array<V
       [&](double s) { return onEdge(x[0] + s * (x[1] - x[0]), x[0] + s * (x[2] - x[0])); });
 }
 
-/// How far an element, {p, p, p}, {p, q, q} or a triangle, is from the tool, at a time; 0 inside.
+/// The distance of an element, {p, p, p}, {p, q, q} or a triangle, to the tool at a time; 0 inside.
 double distanceAt(const Tool& tool, const std::vector<Triangle>& faces,
                   const std::array<Vector3d, 3>& x, double t) {
   if (const auto* plane = std::get_if<Plane>(&tool.geometry)) return distanceAt(*plane, tool, x, t);
@@ -150,7 +151,7 @@ struct Moving {
       x[i] = (1 - t) * geometry.positions[corners[i]] + t * now[corners[i]];
     return x;
   }
-  /// Vertices, edges and triangles, by what their contacts say: element, and vertices.
+  /// The vertices, edges and triangles as contacts name them: type, and vertices.
   std::vector<std::pair<ShapeElement, Triangle>> elements() const {
     std::vector<std::pair<ShapeElement, Triangle>> all;
     for (std::uint32_t v = 0; v < now.size(); ++v) all.push_back({ShapeElement::Vertex, {v, v, v}});
@@ -189,8 +190,8 @@ struct Tally {
   std::size_t contacts = 0, within = 0;
 };
 
-/// Every contact is near then; of everything that comes near, it or something on its boundary is a
-/// contact, not later.
+/// At the time of every contact its element is near. For every element that comes near, it or a
+/// part of its boundary has a contact, and that is not later.
 Tally expectTrue(const CollisionData& data, const Moving& body, const Tool& tool,
                  const PairSettings& pair) {
   Tally tally;
@@ -222,7 +223,7 @@ Tally expectTrue(const CollisionData& data, const Moving& body, const Tool& tool
               centres + early);
   }
   for (const auto& [element, corners] : body.elements()) {
-    // Distances grow no faster than things move: up to there, or a small step further.
+    // Distances grow no faster than the geometries move: up to there, or a small step further.
     const auto gap = [&](double t) {
       return distanceAt(tool, faces, body.at(corners, t), t) - distance;
     };
@@ -321,7 +322,7 @@ TEST(ShapeSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
   EXPECT_GT(within, 25u);
 }
 
-// ---- By hand ----
+// ---- Hand-computed contacts ----
 
 Moving still(const TestGeometry& geometry) { return {geometry, geometry.positions}; }
 
@@ -359,7 +360,7 @@ TEST(ShapeSteps, FastShapesDoNotTunnel) {
       EXPECT_NEAR((c.normal + up).norm(), 0, 1e-12);
       EXPECT_NEAR((c.point - Vector3d(0, -2, 0)).norm(), 0, 1e-12);
     }
-  // A box is flat on it: its corners meet the triangle, and which of them is not said.
+  // The flat face of a box meets the triangle. Any of its corners may be named.
   const ShapeContact flat = only(sheet, moving(Box{{0, 0, 0}, {1, 1, 0.5}}, above, below), 0);
   EXPECT_EQ(flat.element, ShapeElement::Face);
   EXPECT_NEAR(flat.timeOfImpact, 0.475, 1e-6);
@@ -403,7 +404,7 @@ TEST(ShapeSteps, PlanesFindWhatFallsThroughThem) {
   EXPECT_NEAR(below.timeOfImpact, 0.5, 1e-6);
   EXPECT_EQ(below.normal, -Vector3d::UnitZ());
   EXPECT_EQ(only(particle({3, 4, -9}, {5, 4, 9}), floor, 0).timeOfImpact, 0);  // it was inside
-  // What a plane of two sides goes through before the step: two of a triangle's edges.
+  // A two-sided plane through which two of a triangle's edges pass before the step.
   const TestGeometry up{
       GeometryType::Triangles, {{0, 0, -2}, {1, 0, 2}, {0, 1, 2}}, {{0, 1, 2}}, {}};
   const CollisionData data = answer(settingsOf(Engine::Octree), still(up), sheet, continuous(0));
@@ -442,7 +443,7 @@ TEST(ShapeSteps, TouchesOfPlanesAndCylindersAtTheStartAndTheEndCount) {
   }
 }
 
-/// Past the rim at little more than the distance, and along a plane and a mantle.
+/// Past the rim at little more than the distance, and along a plane and the side of a cylinder.
 TEST(ShapeSteps, NearMissesAreNoContacts) {
   const Tool can = moving(Cylinder{{0, 0, -2}, {0, 0, 2}, 1}, {0, 0, 0}, {0, 0, 0});
   const auto count = [](const Vector3d& from, const Vector3d& to, const Tool& tool,
@@ -461,7 +462,7 @@ TEST(ShapeSteps, NearMissesAreNoContacts) {
   }
 }
 
-/// A plane is what a face of a large box is, also where both turn.
+/// A plane acts like the face of a large box, also where both turn.
 TEST(ShapeSteps, MovingPlanesMatchFacesOfBoxes) {
   Random random(5);
   const double size = 64;
@@ -487,7 +488,7 @@ TEST(ShapeSteps, MovingPlanesMatchFacesOfBoxes) {
   }
 }
 
-/// Turned over in one step what moves so has no extent at half time; nothing is late for that.
+/// A shape turned over in one step has no extent at half time. No impact is late because of that.
 TEST(ShapeSteps, HalfTurnsHaveNoFalseNegatives) {
   Tool over = moving(Plane{}, {0, 0, 0}, {0, 0, 0});
   over.ends[1].rotation = Eigen::DiagonalMatrix<double, 3>(1, -1, -1);

@@ -24,7 +24,7 @@
 #include <vector>
 
 // Analytical shapes against triangles, lines and points: brute force bit by bit, and the definition
-// by a signed distance and a search written here.
+// by a signed distance and a search that are written here.
 
 namespace palpate::testing {
 namespace {
@@ -34,7 +34,7 @@ using Eigen::Vector3d;
 using Positions = std::vector<Vector3d>;
 
 /// Triangles that cover a hull's surface, each with its plane: every three points with all others
-/// on one side. Of points in one plane: every three.
+/// on one side. If all points are in one plane: every three.
 struct Facets {
   struct Facet {
     std::array<Vector3d, 3> corners;
@@ -147,7 +147,7 @@ Matrix3d randomRotation(Random& random) {
       .toRotationMatrix();
 }
 
-/// One of each, about the unit cube's middle.
+/// One of each type, around the middle of the unit cube.
 std::vector<Placed> shapes(Random& random) {
   std::vector<Placed> all;
   const auto place = [&](const AnalyticalGeometry& geometry) {
@@ -240,7 +240,7 @@ TEST(Shapes, MatchBruteForce) {
 
 // ---- The definition ----
 
-/// Written once more, from what each shape is.
+/// The distance of each shape, from its definition.
 double signedDistance(const Placed& placed, const Vector3d& world) {
   const Vector3d x = placed.rotation.transpose() * (world - placed.translation);
   const auto ofBox = [](std::initializer_list<double> beyond) {
@@ -270,7 +270,7 @@ double signedDistance(const Placed& placed, const Vector3d& world) {
       {u.cross(from).norm() - c.radius, std::abs(u.dot(from)) - 0.5 * (c.p1 - c.p0).norm()});
 }
 
-/// Least of a convex function over [0, 1].
+/// The minimum of a convex function over [0, 1].
 double least(const std::function<double(double)>& f) {
   double low = 0, high = 1;
   for (int i = 0; i < 45; ++i) {
@@ -289,13 +289,13 @@ double leastOn(const Placed& shape, const Vector3d& a, const Vector3d& b, const 
   return least([&](double t) { return leastOn(shape, a + t * (b - a), a + t * (c - a)); });
 }
 
-constexpr double kSearch = 1e-7;  ///< of the search above where distances are even
+constexpr double kSearch = 1e-7;  ///< error of the search above where distances are constant
 
-/// Every element with its least distance, and the least on its boundary.
+/// Every element with its least distance, and the least distance on its boundary.
 struct Truth {
   double own, boundary;
 };
-/// Of faces further than `reach` some distance beyond that.
+/// The least distance of a face beyond `reach` is a lower bound only.
 std::map<Element, Truth> truthOf(const Body& body, const Placed& shape, double reach) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   std::map<Element, Truth> truth;
@@ -393,7 +393,7 @@ TEST(Shapes, MoveWithTheirBodies) {
           moved, {shape.geometry, turn * shape.rotation, turn * shape.translation + shift}, pair));
       for (const auto& [element, c] : here) {
         const auto found = there.find(element);
-        if (found == there.end()) {  // on the border of being one
+        if (found == there.end()) {  // on the border of being a contact
           const double edge = std::min(c.weights.minCoeff(), 0.05 - c.distance);
           EXPECT_TRUE(element[0] > 0 || edge < 1e-12) << element[0] << ' ' << c.weights.transpose();
           continue;
@@ -453,7 +453,7 @@ TEST(Shapes, MatchTheirTessellations) {
                    found = nearest(answer(body, shape, {Method::Proximity, 1.0}));
       if (!(truth > 0.01)) continue;
       ++apart;
-      // Chords of 6 degrees are this far inside at most.
+      // Chords of 6 degrees are at most this far inside.
       EXPECT_NEAR(found, truth, isBall ? 0.3 * 2 * (1 - std::cos(3.1415927 / 60)) : 1e-14);
     }
   }
@@ -496,7 +496,7 @@ TEST(Shapes, HullsMatchEqualBoxesAndCapsules) {
   }
 }
 
-// ---- By hand ----
+// ---- Hand-computed contacts ----
 
 TEST(Shapes, CubeOnTableTouchesWithItsCorners) {
   Body cube = organ({{},
@@ -552,7 +552,7 @@ TEST(Shapes, TriangleIsTouchedAtItsClosestPoint) {
   c = only(Sphere{{0, 0, -0.5}, 1.5});
   EXPECT_EQ(c.distance, -1);
   EXPECT_EQ(c.normal, Vector3d::UnitZ());
-  c = only(Capsule{{-1, 0, 2}, {1, 0, 2}, 1.5});  // parallel: in the middle
+  c = only(Capsule{{-1, 0, 2}, {1, 0, 2}, 1.5});  // parallel: in the middle of the overlap
   EXPECT_EQ(c.point, Vector3d::Zero());
   c = only(Capsule{{0, 0, 4}, {1, 0, 2}, 1.5});
   EXPECT_EQ(c.point, Vector3d(1, 0, 0));
@@ -563,7 +563,7 @@ TEST(Shapes, TriangleIsTouchedAtItsClosestPoint) {
   c = only(Box{{0, 0, 2}, {1, 1, 1.5}});  // flat: in the middle
   EXPECT_EQ(c.point, Vector3d::Zero());
   EXPECT_EQ(c.distance, 0.5);
-  c = only(Box{{0, 0, 1}, {1, 1, 1.5}});  // the nearest way out is below
+  c = only(Box{{0, 0, 1}, {1, 1, 1.5}});  // the nearest surface point is below
   EXPECT_EQ(c.distance, -0.5);
   EXPECT_EQ(c.normal, -Vector3d::UnitZ());
   c = only(Cylinder{{0, 0, 0.5}, {0, 0, 4}, 1});
@@ -630,7 +630,7 @@ TEST(Shapes, DegenerateElementsMatchTheDefinition) {
   }
 }
 
-// ---- Refused ----
+// ---- Refused calls ----
 
 TEST(Shapes, BadInputThrowsErrorsThatNameIt) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN(),
@@ -660,7 +660,7 @@ TEST(Shapes, BadInputThrowsErrorsThatNameIt) {
 
   const GeometryId tool = collisions.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1}),
                    points = collisions.addPointSet(Positions{{0, 0, 0.5}});
-  EXPECT_EQ(tool, GeometryId{0});  // nothing refused took an id
+  EXPECT_EQ(tool, GeometryId{0});  // refused calls used no id
   expectRefused(Code::UnsupportedMethod, "a shape and a point set; Auto, Proximity and Continuous",
                 [&] { collisions.addCollisionPair(tool, points, {Method::Intersection}); });
   collisions.addCollisionPair(tool, points, {Method::Proximity, 0.0});
@@ -706,7 +706,7 @@ TEST(Shapes, BadInputThrowsErrorsThatNameIt) {
   EXPECT_TRUE(collisions.pairs().empty());
 }
 
-// ---- Round the library ----
+// ---- Captures and audit ----
 
 TEST(Shapes, CapturesAndAuditIncludeThem) {
   Random random(6);

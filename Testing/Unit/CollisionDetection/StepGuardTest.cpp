@@ -22,7 +22,7 @@ struct Guarding {
     now.push_back(body.positions);
     bodies.push_back(std::move(body));
   }
-  /// Ids are the bodies' indices.
+  /// The ids are the indices of the bodies.
   StepGuard guard(const Settings& settings) const {
     StepGuard guard(settings);
     for (const TestGeometry& body : bodies) {
@@ -44,7 +44,8 @@ struct Guarding {
   }
 };
 
-/// Whether vertices of a touch triangles of b, or, with edges, edges those of b; by the definition.
+/// Whether vertices of a touch triangles of b, or, with edges, edges those of b. Computed from the
+/// definition.
 std::size_t countTouches(const Guarding& all, std::size_t a, std::size_t b, bool edges,
                          const std::vector<Positions>& now) {
   const TimeOfImpactSettings coarse{.timeTolerance = 1.0};
@@ -114,7 +115,7 @@ TEST(StepGuard, NoImpactRemainsBetweenGeometriesOfAllTypes) {
     for (int step = 0; step < 3; ++step) {
       std::vector<Positions> given = all.before;
       for (Positions& positions : given) positions = moved(random, positions, most);
-      if (step == 2) given[0] = all.before[0];  // at rest where it was held, and not given
+      if (step == 2) given[0] = all.before[0];  // at rest where it was held, and not set
       EXPECT_GT(countTouches(all, given), 0u);
       std::vector<std::vector<Positions>> ends(guards.size(), given);
       for (std::size_t i = 0; i < guards.size(); ++i) {
@@ -158,7 +159,7 @@ TEST(StepGuard, NoImpactRemainsOnSurfacesOfTetrahedralMeshes) {
     if (cube.positions[v] != Vector3d(1, 1, 1)) continue;
     EXPECT_EQ(raised[v], given[v]) << "no vertex of the surface";
   }
-  // After a cut that leaves one tetrahedron the point may fall where there is nothing.
+  // After a cut that leaves one tetrahedron, the point may fall through the removed part.
   guard.setTetrahedra(solid, raised, std::array<Tetrahedron, 1>{cube.tetrahedra.front()});
   Positions away{{0.9, 0.8, 2.25}};
   EXPECT_EQ(guard.hold(std::array{GuardedStep{drops, points, away}}), 0u);
@@ -171,7 +172,7 @@ TEST(StepGuard, RigidGroupsMoveBackAsAWhole) {
     Guarding all = everything(random);
     StepGuard guard = all.guard(settingsOf(Engine::Octree));
     guard.addRigidGroup(GeometryId{1});
-    // Two groups that share a vertex are one, over two geometries.
+    // Two groups that share a vertex are one group, over two geometries.
     const std::vector<GuardedVertex> one{{GeometryId{3}, 0}, {GeometryId{3}, 7}},
         other{{GeometryId{3}, 7}, {GeometryId{4}, 2}, {GeometryId{4}, 30}};
     guard.addRigidGroup(one);
@@ -192,7 +193,7 @@ TEST(StepGuard, RigidGroupsMoveBackAsAWhole) {
   }
 }
 
-/// Particles on a line, of which all but the last move further than to the next.
+/// Particles on a line. All but the last move further than the next one.
 Guarding chain(std::uint32_t count) {
   Guarding all;
   TestGeometry points{GeometryType::Points, {}, {}, {}, {0.0}};
@@ -239,7 +240,8 @@ TEST(StepGuard, TouchIsDecidedExactly) {
   EXPECT_EQ(all.now[1][0].z(), tiny);
 }
 
-/// hold() throws this, names the geometry and the vertex, and changes no position.
+/// Expects hold() to throw this error, to name the geometry and the vertex, and to change no
+/// position.
 void expectImpactRemains(StepGuard& guard, Guarding& all, const std::string& sentence) {
   const std::vector<Positions> given = all.now;
   try {
@@ -265,7 +267,7 @@ TEST(StepGuard, StepsThatStartWithATouchAreRefused) {
     EXPECT_EQ(guard.hold(all.steps(all.now)), 0u) << "a disabled triangle is not there";
     EXPECT_EQ(all.now[1][0].z(), end);
   }
-  // Edges are named by their vertices.
+  // Errors name edges by their vertices.
   Guarding edges;
   edges.add({GeometryType::Lines, {{-1, 0, 0}, {1, 0, 0}}, {}, {{0, 1}}, {}});
   edges.add({GeometryType::Lines, {{0, -1, 0}, {0, 1, 0}}, {}, {{0, 1}}, {}});
@@ -283,7 +285,7 @@ TEST(StepGuard, FixedVerticesStayAndOthersMoveBack) {
   StepGuard guard = all.guard(settingsOf(Engine::Octree));
   guard.setFixedVertices(GeometryId{1}, std::array{0u});
   expectImpactRemains(guard, all, fixed);
-  // The triangle moves and could go back, but this does not part them.
+  // The triangle moves and could go back, but this does not separate them.
   for (Vector3d& p : all.now[0]) p.z() = -0.5;
   expectImpactRemains(guard, all, fixed);
   // A triangle that moves into a vertex at rest goes back; as part of a fixed group it cannot.
@@ -351,7 +353,7 @@ TEST(StepGuard, BadInputIsRefusedAndChangesNothing) {
   expectRefused(ErrorCode::WrongPositionCount,
                 [](auto& steps) { steps[2].now = steps[2].now.first(3); });
   expectRefused(ErrorCode::NonFinitePosition, [&](auto& steps) { steps[4].now[5].y() = nan; });
-  // Particle 0 is before the step where particle 1 is, after vertices of others have gone back.
+  // Vertices of others have gone back. Then particle 0 is before the step where particle 1 is.
   Positions together = all.before[4];
   together[0] = together[1];
   expectRefused(ErrorCode::ImpactRemains, [&](auto& steps) { steps[4].before = together; });
@@ -374,7 +376,7 @@ TEST(StepGuard, BadInputIsRefusedAndChangesNothing) {
   expectError(ErrorCode::UnsupportedMethod,
               [&] { guard.setTriangles(GeometryId{4}, all.before[4], {}); });
 
-  // What is not given is where the last hold() that succeeded left it, not where a failed one
+  // A geometry that is not set is where the last successful hold() left it, not where a failed one
   // began or ended.
   for (StepGuard* each : {&guard, &unfailed}) {
     std::vector<Positions> ends = given;
@@ -400,7 +402,7 @@ TEST(StepGuard, GeometriesAndPairsCanBeAddedAndRemoved) {
   EXPECT_EQ(guard.hold(all.steps(all.now)), 0u);
   guard.addCollisionPair(GeometryId{0}, GeometryId{1});
   EXPECT_EQ(guard.hold(all.steps(all.now)), 1u);
-  // A cut moves the triangle away, with a fourth vertex; later ones are free again.
+  // A cut moves the triangle and a fourth vertex away. The later vertices are free again.
   all.now = given;
   const Positions cut{{5, 0, 0}, {6, 0, 0}, {5, 1, 0}, {6, 1, 0}};
   guard.setFixedVertices(GeometryId{0}, std::array{0u, 2u});

@@ -25,7 +25,7 @@ class Step : public ::testing::Test {
     EXPECT_EQ(problem.geometries[0].before, at(before));
     EXPECT_EQ(problem.geometries[0].now, at(now));
   }
-  /// The same, and then the step ends.
+  /// Sets both ends of the step and ends it.
   void expectLast(double before, double now) {
     expect(before, now);
     m_detection.advance();
@@ -90,7 +90,7 @@ TEST_F(Step, EndsByAdvanceOnly) {
   expect(1, 1);
 }
 
-/// With candidates alone `before` becomes the last `now`, as with every other call.
+/// With candidates alone, `before` becomes the last `now`, as with every other call.
 TEST_F(Step, AdvanceAppliesToCandidatesInBatches) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.5), triangle());
   m_detection.addCollisionPair(m_id, other, {.method = Method::Continuous});
@@ -136,8 +136,8 @@ TEST_F(Step, NewTopologyIsAtRest) {
   expectLast(2, 4);
 }
 
-/// A tool passes through z = 0 in one step and is not set again; a sheet is placed at z = 0 in the
-/// next one: nothing touched.
+/// A tool passes through z = 0 in one step and is not set again. A sheet is placed at z = 0 in the
+/// next step: nothing touches.
 TEST_F(Step, DoesNotRepeatMotionThatHasEnded) {
   const GeometryId sheet = m_detection.addTriangleMesh(at(50), triangle());
   m_detection.addCollisionPair(m_id, sheet, {.method = Method::Continuous});
@@ -151,7 +151,8 @@ TEST_F(Step, DoesNotRepeatMotionThatHasEnded) {
   EXPECT_EQ(m_detection.collisionData(m_id, sheet).validity().displacement, 0.0);
 }
 
-/// A loop that never ends its steps sweeps from where it began, and validity() says how far.
+/// A loop without advance() sweeps from its first positions, and validity() reports the
+/// displacement.
 TEST_F(Step, WithoutAdvanceGrowsAndIsNotTrusted) {
   const GeometryId sheet = m_detection.addTriangleMesh(at(50), triangle());
   m_detection.addCollisionPair(m_id, sheet, {.method = Method::Proximity, .thickness = 1.5});
@@ -167,7 +168,7 @@ TEST_F(Step, WithoutAdvanceGrowsAndIsNotTrusted) {
   }
 }
 
-/// Intersection measures no distances: a thickness does not tell how far apart its meshes were.
+/// Intersection measures no distances, so a thickness does not bound the distance of its meshes.
 TEST_F(Step, StartedApartOfIntersectionNeedsTheSamePositions) {
   const std::vector<Eigen::Vector3d> wall{{0.2, 0.2, -1}, {0.2, 0.2, 1}, {0.3, 0.2, 1}};
   const GeometryId id = m_detection.addTriangleMesh(wall, triangle());
@@ -181,7 +182,8 @@ TEST_F(Step, StartedApartOfIntersectionNeedsTheSamePositions) {
   EXPECT_FALSE(m_detection.collisionData(m_id, id).validity().startedApart);
 }
 
-/// A solver with rounds: the step's start stays known, and positions are corrected between rounds.
+/// A solver with several detections in a step: `before` stays, and positions are corrected in
+/// between.
 TEST_F(Step, KeepsBeforeThroughSeveralDetections) {
   const GeometryId sheet = m_detection.addTriangleMesh(at(1), triangle());
   m_detection.addCollisionPair(m_id, sheet, {.method = Method::Continuous});
@@ -235,7 +237,7 @@ TEST_F(Step, SamePositionsAreANewStepForContinuous) {
   EXPECT_TRUE(m_detection.collisionData(m_id, other).vertexTriangle().empty());
 }
 
-/// Statistics are those of the last frame, whatever is asked for since.
+/// Statistics are those of the last frame, whatever is called afterwards.
 TEST_F(Step, QueriesKeepStatistics) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.1), triangle());
   m_detection.addCollisionPair(m_id, other, {.method = Method::Proximity, .thickness = 0.5});
@@ -248,7 +250,7 @@ TEST_F(Step, QueriesKeepStatistics) {
   EXPECT_EQ(m_detection.statistics().contacts, before.contacts);
   EXPECT_EQ(m_detection.statistics().candidatePairs, before.candidatePairs);
   EXPECT_EQ(m_detection.statistics().rebuiltOctrees, before.rebuiltOctrees);
-  m_detection.detectCollision();  // which counts the octree that a query updated
+  m_detection.detectCollision();  // this counts the octree that a query updated
   EXPECT_EQ(m_detection.statistics().refittedOctrees + m_detection.statistics().rebuiltOctrees, 1u);
 }
 
@@ -295,7 +297,7 @@ TEST_F(Step, MovedFromObjectRefusesCalls) {
   expectLast(1, 1);
 }
 
-/// A predicate or callback that calls the object gets an error, and the object stays usable.
+/// A predicate or callback that calls the object gets an error. The object stays usable.
 TEST_F(Step, CannotBeChangedByCallbacks) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.1), triangle());
   m_detection.addCollisionPair(m_id, other, {.method = Method::Proximity, .thickness = 0.5});
@@ -323,13 +325,14 @@ TEST_F(Step, CannotBeChangedByCallbacks) {
     m_detection.detectCollision();
     EXPECT_GT(refused, 0);
     EXPECT_EQ(m_detection.collisionData(m_id, other).hash(), hash);
-    // The error may also leave the predicate: then it ends the frame.
+    // The predicate may also let the error pass. Then the error ends the frame.
     m_detection.setContactPredicate(m_id, other, [&](const ContactFeatures&) {
       call();
       return true;
     });
     EXPECT_EQ(codeOf([&] { m_detection.detectCollision(); }), ErrorCode::InvalidCall);
-    EXPECT_EQ(m_detection.collisionData(m_id, other).hash(), hash);  // the last answer
+    EXPECT_EQ(m_detection.collisionData(m_id, other).hash(),
+              hash);  // the contacts of the previous frame
     EXPECT_EQ(codeOf([&] { m_detection.forEachCandidate(m_id, other, [&](auto) { call(); }); }),
               ErrorCode::InvalidCall);
     m_detection.setContactPredicate(m_id, other, {});

@@ -51,7 +51,7 @@ Triangle sorted(Triangle t) {
   return t;
 }
 
-/// From the definition: which faces, of which, in which order, and which way they are wound.
+/// From the definition: the faces, their tetrahedra, their order, and their winding.
 void expectDefined(const Solid& solid, const Surface& surface) {
   std::map<Triangle, int> uses;
   const auto without = [&](const Tetrahedron& t, int corner) {
@@ -101,8 +101,8 @@ TEST(TetrahedralMesh, TetrahedraWithoutVolumeAreWoundAsTheirNeighbours) {
   for (int run = 0; run < 40; ++run) {
     Solid solid = cells(3, random);
     const Surface whole = surfaceOf(solid);
-    // Flat ones on its surface: each covers two triangles of a square by the other two, the next
-    // the same back again.
+    // Flat tetrahedra on its surface: each covers two triangles of a square with the other two. The
+    // next one covers them back again.
     std::map<Segment, std::vector<Triangle>> byEdge;
     for (const Triangle& t : whole.triangles)
       for (int i = 0; i < 3; ++i) {
@@ -132,7 +132,8 @@ TEST(TetrahedralMesh, TetrahedraWithoutVolumeAreWoundAsTheirNeighbours) {
     EXPECT_EQ(surface.triangles.size(), whole.triangles.size());
     EXPECT_TRUE(findMeshDefects(surface.triangles).closed());
   }
-  // All flat: the first as given, the others by it, so that the surface has no flipped edges.
+  // All are flat. The first keeps its winding, and the others follow it, so that the surface has no
+  // flipped edges.
   Solid plate = cells(2, random);
   for (Vector3d& p : plate.positions) p[2] = 0;
   EXPECT_TRUE(findMeshDefects(surfaceOf(plate).triangles).closed());
@@ -141,7 +142,7 @@ TEST(TetrahedralMesh, TetrahedraWithoutVolumeAreWoundAsTheirNeighbours) {
   EXPECT_EQ(surfaceOf({}).triangles.size(), 0u);
 }
 
-/// Contacts of a pair over three frames, of which the solid's body is deformed, moved and cut.
+/// Contacts of a pair over three frames, in which the solid is deformed, moved and cut.
 std::vector<Rows> life(const Settings& settings, const Solid& solid, const Solid& cut,
                        bool asTriangles, const TestGeometry& other, const PairSettings& pair) {
   Random random(3);
@@ -290,7 +291,7 @@ TEST(TetrahedralMesh, BadInputThrowsErrorsThatNameIt) {
                 "their number",
                 [&] { detection.setPositions(solid, Positions(5, Vector3d::Zero())); });
   EXPECT_EQ(detection.surface(solid).triangles.size(), 4u);
-  EXPECT_EQ(detection.addPointSet(some), GeometryId{2});  // nothing refused took an id
+  EXPECT_EQ(detection.addPointSet(some), GeometryId{2});  // refused calls used no id
 }
 
 TEST(TetrahedralMesh, CapturesIncludeIt) {

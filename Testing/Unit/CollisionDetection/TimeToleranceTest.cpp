@@ -57,7 +57,8 @@ std::vector<std::array<std::uint32_t, 4>> idsOf(const CollisionData& data) {
   return ids;
 }
 
-/// Whatever the tolerance, the same features touch; times are early by at most as much, not late.
+/// With any tolerance, the same features touch. Times are early by at most the tolerance, and not
+/// late.
 TEST(TimeTolerance, BoundsHowEarlyTimesAreAndChangesNothingElse) {
   Random random(5);
   const Moving a = movingSoup(random), b = movingSoup(random);
@@ -90,8 +91,8 @@ TEST(TimeTolerance, BoundsHowEarlyTimesAreAndChangesNothingElse) {
   }
 }
 
-/// With a thickness: what comes within it is reported, and nothing that stays further away than it
-/// and the tolerance's part of the motion.
+/// With a thickness: features that come within it are reported. Features that stay farther apart
+/// than the thickness and the tolerance times the motion are not.
 TEST(TimeTolerance, BoundsTimeAndDistanceWithAThickness) {
   Random random(7);
   const Moving a = movingSoup(random), b = movingSoup(random);
@@ -116,7 +117,7 @@ TEST(TimeTolerance, BoundsTimeAndDistanceWithAThickness) {
   EXPECT_TRUE(std::includes(wider.begin(), wider.end(), coarse.begin(), coarse.end()));
 }
 
-/// Auto misses nothing that Continuous finds, whatever it may report early.
+/// Auto finds everything that Continuous finds. It may report more, earlier.
 TEST(TimeTolerance, AutoFindsWhatContinuousFinds) {
   Random random(6);
   const Moving a = movingSoup(random), b = movingSoup(random);
@@ -128,8 +129,8 @@ TEST(TimeTolerance, AutoFindsWhatContinuousFinds) {
   }
 }
 
-/// A thousand impacts at a fiftieth of the step, and one at a hundredth: boxes of features sweep
-/// the step's first part once that is short, and not a part of the part.
+/// A thousand impacts at a fiftieth of the step, and one at a hundredth. Once the remaining time is
+/// short, boxes of features sweep the first part of the step only.
 TEST(Earliest, IsFoundAmongManyLaterImpacts) {
   testing::Mesh mesh;
   Positions now;
@@ -163,8 +164,8 @@ TEST(Earliest, IsFoundAmongManyLaterImpacts) {
   }
 }
 
-/// Of many triangles, whatever was known when, the time is that of all contacts, and the octrees
-/// are of the whole step.
+/// With many triangles, the time is that of all contacts, in any order of the search. The octrees
+/// sweep the whole step.
 TEST(Earliest, MatchesAllContactsOfManyTriangles) {
   Random random(9);
   testing::Mesh a = testing::soup(random, 4500, 0.02), b = testing::soup(random, 4500, 0.02);
@@ -211,7 +212,7 @@ TEST(Earliest, MatchesAllContactsOfManyTriangles) {
   }
 }
 
-/// A shape's octree is empty, and its pair is left as it is.
+/// A shape's octree is empty. Its pair is unchanged.
 TEST(Earliest, MatchesAllContactsOfAShapeBesideOtherPairs) {
   Random random(12);
   const testing::Mesh a = testing::soup(random, 9000, 0.02), b = testing::soup(random, 9000, 0.02);
@@ -238,7 +239,7 @@ TEST(Earliest, MatchesAllContactsOfAShapeBesideOtherPairs) {
   EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
 }
 
-/// A predicate that throws after boxes sweep less: the next frame sees the whole step.
+/// A predicate that throws after boxes sweep less: the next frame has boxes of the whole step.
 TEST(Earliest, PredicateThatThrowsLeavesTheOctreesCorrect) {
   Random random(13);
   const testing::Mesh a = testing::soup(random, 9000, 0.02);
@@ -254,7 +255,7 @@ TEST(Earliest, PredicateThatThrowsLeavesTheOctreesCorrect) {
   });
   const auto frame = [&] {
     detection.setPositions(id, a.positions, now);
-    detection.setPairSettings(id, id, detection.pairs().front().settings);  // not answered yet
+    detection.setPairSettings(id, id, detection.pairs().front().settings);  // no contacts yet
     calls = 0;
     detection.detectCollision();
     return detection.collisionData(id, id).earliestTimeOfImpact();

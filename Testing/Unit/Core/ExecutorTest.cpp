@@ -22,7 +22,7 @@
 #include <utility>
 #include <vector>
 
-// Executors of the caller's: what they do with tasks changes no result.
+// Executors of the caller. Their way to run tasks changes no result.
 
 namespace palpate {
 namespace {
@@ -52,7 +52,7 @@ void backwards(std::size_t count, Executor::Task task, void* context) {
   while (count-- > 0) task(context, count);
 }
 
-/// A thread for each task, none of them the caller's.
+/// One thread for each task, other than the caller's.
 void onThreads(std::size_t count, Executor::Task task, void* context) {
   std::vector<std::thread> threads;
   for (std::size_t i = 0; i < count; ++i) threads.emplace_back([=] { task(context, i); });
@@ -217,7 +217,7 @@ TEST(Executor, WithoutConcurrencyIsRefused) {
   for (const int threads : {-1, 1025}) EXPECT_THROW(makeThreadPool(threads), Error) << threads;
 }
 
-/// Tasks that a faulty executor has put off.
+/// Tasks that a faulty executor has postponed.
 struct Later {
   Executor::Task task;
   void* context;
@@ -252,7 +252,7 @@ TEST(Executor, ReturningEarlyIsAnErrorAndLaterTasksDoNothing) {
     faulty = false;
     EXPECT_TRUE(allRun(threads));
     EXPECT_EQ(runs, 0);
-    // The last two come in the end, so that the memory of all loops is given back.
+    // The last two tasks run in the end, so that the memory of all loops is returned.
     for (std::size_t i = 7; i < later.size(); ++i) later[i].task(later[i].context, 0);
   }
 }
@@ -276,7 +276,7 @@ TEST(Executor, ReturningWhileTasksRunWaitsForThem) {
     } catch (const Error&) {
       complete = false;
     }
-    // No task is at work any more: reading is no race, and where there was no error all have run.
+    // No task runs any more: reading is no race, and without an error all have run.
     for (const int n : runs) EXPECT_TRUE(n == 1 || (n == 0 && !complete));
     for (std::thread& thread : running) thread.join();
     running.clear();

@@ -22,7 +22,7 @@
 #include <time.h>
 #include <vector>
 
-// What threads do when the system refuses them, in the child of a fork(), and under real-time
+// Behaviour of threads if the system refuses them, in the child of a fork(), and under real-time
 // scheduling.
 
 namespace palpate {
@@ -71,7 +71,7 @@ bool allRun(const Threads& threads, std::size_t size = 1000) {
 
 // --- The system refuses threads
 
-/// At most so much more address space than now.
+/// Limits the address space to this much more than now.
 void limitAddressSpace(std::size_t bytes) {
   std::size_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
@@ -83,7 +83,7 @@ void limitAddressSpace(std::size_t bytes) {
 constexpr int kAsked = 1024;
 #ifdef PALPATE_THREADS_TBB
 constexpr bool kStartsAsMany =
-    false;  // oneTBB starts no more than there are cores, and says nothing
+    false;  // oneTBB starts at most as many threads as there are cores, without a message
 #else
 constexpr bool kStartsAsMany = true;
 #endif
@@ -153,7 +153,7 @@ TEST(ThreadFailures, ObjectMadeInTheChildOfAForkHasThreads) {
               const Threads threads(3);
               if (!kStartsAsMany) return allRun(threads);  // oneTBB has no threads in the child
               std::atomic<int> met{0};
-              // Only returns where two threads are at work.
+              // This returns only if two threads run.
               threads.forEach(2, [&](std::size_t) {
                 ++met;
                 while (met < 2) std::this_thread::yield();
@@ -236,7 +236,8 @@ void work(std::chrono::nanoseconds time) {
 }
 
 /// A worker that the real-time caller has preempted holds the last index of a loop. On one core it
-/// goes on only once the caller blocks, or in what the kernel saves for others (a twentieth).
+/// goes on only if the caller blocks, or in the share that the kernel reserves for others (a
+/// twentieth).
 TEST(ThreadFailures, RealTimeCallerOnTheCoreOfItsWorkerDoesNotSpinForever) {
 #ifdef PALPATE_THREADS_TBB
   GTEST_SKIP() << "oneTBB's own rules hold";
@@ -258,7 +259,7 @@ TEST(ThreadFailures, RealTimeCallerOnTheCoreOfItsWorkerDoesNotSpinForever) {
           begun = true;
           work(std::chrono::milliseconds(2));
         } else {
-          // Gives the core to the worker until it has begun; is real-time again then.
+          // Gives the core to the worker until it has begun, then is real-time again.
           while (!begun) std::this_thread::sleep_for(std::chrono::microseconds(50));
         }
       });
@@ -269,7 +270,7 @@ TEST(ThreadFailures, RealTimeCallerOnTheCoreOfItsWorkerDoesNotSpinForever) {
   EXPECT_EQ(outcome, "passed");
 }
 
-/// Many short loops, in which either may hold the pool's lock when the other one preempts it.
+/// Many short loops. Either thread may hold the pool's lock when the other one preempts it.
 TEST(ThreadFailures, RealTimeCallerOnTheCoreOfItsWorkersRunsManyLoops) {
   const std::string outcome = inChild(
       [] {

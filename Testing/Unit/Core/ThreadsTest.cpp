@@ -190,7 +190,7 @@ TEST(Threads, DeeplyNestedLoopsAreComplete) {
   }
 }
 
-/// Waiting is in vain first: the caller blocks, and must wake up to help with a newer loop.
+/// Its wait is in vain first: the caller blocks, and must wake up to help with a later loop.
 TEST(Threads, WaitingCallerHelpsWithALaterLoop) {
   const Threads threads(2);
   for (int run = 0; run < 5; ++run) {
@@ -203,7 +203,7 @@ TEST(Threads, WaitingCallerHelpsWithALaterLoop) {
       }
       begun = true;
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
-      // Only returns where two threads are at work.
+      // This returns only if two threads run.
       threads.forEach(2, [&](std::size_t) {
         ++met;
         while (met < 2) std::this_thread::yield();
