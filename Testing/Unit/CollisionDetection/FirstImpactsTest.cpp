@@ -43,7 +43,7 @@ VertexSet verticesOf(const std::array<std::uint32_t, 2>& edge, double weight) {
 /// The data of a contact that the definition needs.
 struct Impact {
   FeaturePair features;
-  std::uint32_t triangle;  ///< the edge or face with a closest point in its interior, or none
+  std::uint32_t triangle;  ///< the triangle with a closest point in its interior, or none
   double time;
   int list;
   std::size_t index;

@@ -12,7 +12,8 @@
 namespace palpate::test {
 namespace {
 
-/// The determinant expanded without differences, in integers: nothing shared with what it checks.
+/// The determinant, expanded without differences, in integers. It shares no code with the
+/// predicates.
 int volumeSign(const std::array<Eigen::Vector3d, 4>& p) {
   std::array<std::array<Integer, 3>, 4> q;
   for (int i = 0; i < 4; ++i)
@@ -70,7 +71,7 @@ TEST(Predicates, OneUlpOffThePlaneOrTheLineIsDetected) {
   }
 }
 
-/// Where products end among the denormals, and all around.
+/// Products that end among the denormals, and all around.
 TEST(Predicates, UnderflowDoesNotFlipAVolume) {
   Random random(5);
   SignCounts counts;
@@ -99,8 +100,8 @@ TEST(Predicates, UnderflowDoesNotFlipAnArea) {
   }
 }
 
-/// Where products round to multiples of the least double, of differences that were rounded
-/// themselves: the relative error alone says too little.
+/// Products that round to multiples of the least double, of differences that are rounded
+/// themselves. The relative error alone is no bound.
 TEST(Predicates, UnderflowDoesNotFlipAnAreaOfRoundedDifferences) {
   Random random(7);
   SignCounts counts;
@@ -141,7 +142,7 @@ TEST(Predicates, FloatingPointFilterDecidesNonDegenerateInput) {
   EXPECT_EQ(counts.undecided, 0u);
 }
 
-/// Over all exponents, with carries through many words; back to zero in another order.
+/// All exponents, with carries through many words, and back to zero in another order.
 TEST(ExactSum, HasTheSignOfTheIntegerSum) {
   Random random(8);
   const double largest = std::numeric_limits<double>::max();

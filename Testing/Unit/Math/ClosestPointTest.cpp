@@ -35,8 +35,8 @@ class Random {
   std::mt19937_64 m_engine;
 };
 
-/// One kind of configuration each: random; slivers; far from the origin; on a small grid; nearly
-/// touching; nearly parallel; nearly coincident; from the smallest to the largest doubles.
+/// One category of configurations each: random; slivers; far from the origin; on a small grid;
+/// nearly touching; nearly parallel; nearly coincident; from the smallest to the largest doubles.
 constexpr int kKinds = 8;
 
 Four configuration(int kind, Random& random) {
@@ -83,7 +83,8 @@ void expectWithin(const oracle::Errors& errors) {
   EXPECT_LE(errors.normal, kAllowedUlp);
 }
 
-/// Of features that touch: along the exact direction; sum of squares, root and quotient round.
+/// The normal of touching features: along the exact direction. The sum of squares, the root and the
+/// quotient round.
 void expectDirection(const Vector3d& normal, const oracle::Vector& along) {
   const mpf_class length = oracle::root(oracle::dot(along, along));
   if (length == 0) return;
@@ -151,7 +152,7 @@ oracle::Errors checkEdgeEdge(const Four& x) {
   return errors;
 }
 
-/// Of each kind. Long tests ask for more, and for others.
+/// The number of cases of each category. Long tests run more, and others.
 int pairsOfEachKind() {
   const char* asked = std::getenv("PALPATE_DISTANCE_PAIRS");
   return asked ? std::atoi(asked) / kKinds : 1500;
@@ -176,7 +177,7 @@ TEST(ClosestPoint, AgreesWithRationalArithmetic) {
   print("edge-edge", edgeEdge);
 }
 
-/// Each border between two regions lies where a weight or an offset is zero.
+/// Each border between two regions is where a weight or an offset is zero.
 TEST(ClosestPoint, EveryRegionBorderOfATriangleIsCrossed) {
   const std::vector<std::array<Vector3d, 3>> triangles{
       {Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(0, 1, 0)},
@@ -213,7 +214,7 @@ TEST(ClosestPoint, EveryRegionBorderOfTwoEdgesIsCrossed) {
         }
 }
 
-// ---- Laws ----
+// ---- Invariances ----
 
 using Bits = std::vector<std::uint64_t>;
 
@@ -312,7 +313,7 @@ TEST(ClosestPoint, MirroringKeepsTheBits) {
   }
 }
 
-/// From where distances of 1e-17 of the positions still have all their bits to where squared
+/// Scales from where distances of 1e-17 of the positions still have all their bits to where squared
 /// lengths have long overflowed.
 TEST(ClosestPoint, PowersOfTwoKeepTheBits) {
   Random random;
@@ -373,7 +374,7 @@ TEST(ClosestPoint, TrianglesThatShareAnEdgeAgreeOnIt) {
   EXPECT_GT(shared, 100);
 }
 
-// ---- By value ----
+// ---- Single values ----
 
 TEST(ClosestPoint, NormalsOfTouchingFeaturesFollowTheirRule) {
   const Vector3d a(0, 0, 0), b(2, 0, 0), c(0, 2, 0);
@@ -447,8 +448,9 @@ TEST(ClosestPoint, NaNGivesNaN) {
   }
 }
 
-/// Edges of grids that lie on each other, as computed coordinates make them: exactly parallel, or
-/// by a rounding not; far from the origin, and with what is left over of zero.
+/// Edges of grids that lie on each other. Their coordinates are computed, so that they are parallel
+/// exactly or up to a rounding. Some are far from the origin, and some have rounding errors instead
+/// of zeros.
 TEST(ClosestPoint, EdgesOfGridsAreClassifiedExactly) {
   std::mt19937 random(11);
   const auto below = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };

@@ -16,8 +16,8 @@ namespace {
 
 constexpr int kKinds = static_cast<int>(Kind::Count);
 
-/// Bits moved to where they would be if corner i had been named corner order[i]: what
-/// intersectTriangles must answer for a and b with their corners so ordered.
+/// Moves the bits to their places if corner i had been named corner order[i]. This is the expected
+/// result of intersectTriangles for a and b with their corners in that order.
 struct Order {
   std::array<int, 3> corner;
   Corners operator()(const Corners& t) const { return {t[corner[0]], t[corner[1]], t[corner[2]]}; }
@@ -94,7 +94,7 @@ TEST(TriangleIntersection, MirroringExchangingAxesAndPowersOfTwoChangeNothing) {
     expectSame(intersectTriangles(mirrored.first, mirrored.second, counts), result,
                repeat % kKinds);
     expectSame(intersectTriangles(turned.first, turned.second, counts), result, repeat % kKinds);
-    // Only where no bit is lost: grids may go to the denormals, others stay well above.
+    // Only where no bit is lost: grids may reach the denormals, others stay well above.
     if (kind == Kind::SmallGrid || kind == Kind::Random || kind == Kind::CoplanarTilted) {
       for (const int exponent : {-900, -400, 400, 900}) {
         const CornersPair other = scaled(pair, exponent);
@@ -105,7 +105,7 @@ TEST(TriangleIntersection, MirroringExchangingAxesAndPowersOfTwoChangeNothing) {
   }
 }
 
-/// What the features say must fit together, whatever the triangles.
+/// The reported features must be consistent for any triangles.
 TEST(TriangleIntersection, IntersectionWithoutTouchHasTwoCrossings) {
   Random random(13);
   SignCounts counts;
@@ -122,7 +122,7 @@ TEST(TriangleIntersection, IntersectionWithoutTouchHasTwoCrossings) {
   for (const int count : seen) EXPECT_GT(count, 100);
 }
 
-/// Two independent decisions of the same thing. Distances under the smallest denormal round to
+/// Two independent decisions of the same question. Distances under the smallest denormal round to
 /// zero.
 TEST(TriangleIntersection, FeaturesTouchWhereTheirDistanceIsZero) {
   Random random(14);
@@ -178,7 +178,7 @@ TEST(TriangleIntersection, EachSimpleConfigurationHasItsFeatures) {
   EXPECT_EQ(same.touchingEdges, 0b111111111);
 }
 
-/// What the comparison with CGAL's exact kernel (Testing/Exact) goes through.
+/// The categories that the comparison with CGAL's exact kernel (Testing/Exact) uses.
 TEST(TriangleIntersection, GeneratedPairsHaveTheirNamedProperty) {
   Random random(15);
   std::array<int, 16> cornersOn{};
@@ -215,10 +215,10 @@ TEST(TriangleIntersection, GeneratedPairsHaveTheirNamedProperty) {
     EXPECT_TRUE(byPoint || kind != Kind::Points);
     const bool extreme = kind == Kind::Huge || kind == Kind::Tiny || kind == Kind::Denormal;
     EXPECT_EQ(beyondProducts, extreme) << k;
-    // Beyond what floating point decides.
+    // Floating point cannot decide these.
     EXPECT_TRUE(counts.undecided > 100 || !(extreme || kind == Kind::MixedExponents)) << k;
   }
-  // In one plane: however many corners of one lie on the other, all and none included.
+  // In one plane, any number of corners of one may lie on the other, from none to all.
   for (int i = 0; i < 16; ++i) EXPECT_GT(cornersOn[i], 10) << i;
 }
 

@@ -48,7 +48,7 @@ TEST(Motion, RangeMatchesEachVertexOnEverySimdPath) {
   useSimdPath("");
 }
 
-/// Of a sample that is all of small meshes.
+/// The mean is of a sample, which contains all vertices of small meshes.
 TEST(Motion, MeanMatchesThatOfAllPairs) {
   std::mt19937 random(2);
   std::normal_distribution<double> normal;

@@ -21,7 +21,7 @@ Segment edgeOf(const Triangle& t, int i) {
   return {std::min(p, q), std::max(p, q)};
 }
 
-/// All of it again, from its definitions, with sets and maps and for each element apart.
+/// The whole topology again, from the definitions, with sets and maps, separately for each element.
 void expectTopology(std::size_t vertexCount, const Triangles& triangles) {
   const MeshTopology mesh(vertexCount, triangles);
   ASSERT_EQ(mesh.vertexCount, vertexCount);
@@ -47,7 +47,8 @@ void expectTopology(std::size_t vertexCount, const Triangles& triangles) {
   ASSERT_EQ(mesh.edges.size(), trianglesOfEdge.size());
   ASSERT_EQ(mesh.edgeTriangles.offsets.size(), mesh.edges.size() + 1);
   std::size_t e = 0;
-  for (const auto& [edge, holders] : trianglesOfEdge) {  // the map's order is the mesh's
+  for (const auto& [edge, holders] :
+       trianglesOfEdge) {  // the order of the map is the order of the mesh
     EXPECT_EQ(mesh.edges[e], edge);
     EXPECT_EQ(listed(mesh.edgeTriangles, e), Ids(holders.begin(), holders.end()));
     ++e;
@@ -151,7 +152,7 @@ TEST(TriangleMesh, RandomSoups) {
   }
 }
 
-// One vertex more than 16 bits can name: an edge's key must not wrap.
+// One vertex more than 16 bits can number: an edge's key must not wrap.
 TEST(TriangleMesh, MoreVerticesThanSixteenBits) {
   constexpr std::uint32_t kVertexCount = 65'537;
   Triangles strip;

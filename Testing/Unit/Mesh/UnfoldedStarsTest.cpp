@@ -11,7 +11,7 @@
 #include <cmath>
 #include <limits>
 
-// Pairs that an unfolded star answers are judged by the exact times of impact of all their
+// Pairs that an unfolded star excludes are checked by the exact times of impact of all their
 // features, on every SIMD path.
 
 namespace palpate {
@@ -33,7 +33,7 @@ bool share(const Triangle& a, const Triangle& b) {
                      [&](std::uint32_t v) { return std::find(b.begin(), b.end(), v) != b.end(); });
 }
 
-/// Pairs of neighbours that need no test; the same on every path and by any number of threads.
+/// Pairs of neighbours that need no test: the same on every path and with any number of threads.
 std::vector<ElementPair> answered(const Step& step) {
   const SampledExtent extent = sampleExtent(step.now);
   const FloatFrame frame{extent.median, frameScale(extent.spread)};
@@ -81,7 +81,7 @@ bool touch(const Step& step, const ElementPair& pair) {
   return found;
 }
 
-/// Returns how many of the neighbours are answered.
+/// Returns how many of the neighbours are excluded.
 double expectRight(const Step& step) {
   const std::vector<ElementPair> pairs = answered(step);
   for (const ElementPair& pair : pairs)
@@ -135,7 +135,7 @@ TEST(UnfoldedStars, ExcludeMostNeighboursOfASmoothMesh) {
   }
 }
 
-/// Stars so small in their frame that floats are off by about their size.
+/// Stars so small in their frame that the errors of floats are about their size.
 TEST(UnfoldedStars, AreCorrectWhereFloatsAreImprecise) {
   testing::Random random(47);
   for (int round = 0; round < 40; ++round) {
@@ -148,7 +148,7 @@ TEST(UnfoldedStars, AreCorrectWhereFloatsAreImprecise) {
   }
 }
 
-/// Floats are clamped: a vertex nearly on the x axis looks as if it were halfway to the y axis.
+/// Floats are clamped, so that a vertex near the x axis seems to be halfway to the y axis.
 TEST(UnfoldedStars, AreCorrectBeyondTheRangeOfFloats) {
   testing::Mesh mesh{{Vector3d::Zero()}, {}};
   for (const Vector3d& p : {Vector3d(1, -1, 0), Vector3d(2, 1, 0), Vector3d(0x1p140, 0x1p125, 0),
@@ -161,7 +161,7 @@ TEST(UnfoldedStars, AreCorrectBeyondTheRangeOfFloats) {
   EXPECT_TRUE(answered({mesh, mesh.positions}).empty());
 }
 
-/// n triangles around vertex 0, which their rim goes round `turns` times.
+/// n triangles around vertex 0. Their rim winds around it `turns` times.
 testing::Mesh fan(std::uint32_t n, int turns, double height) {
   testing::Mesh mesh{{Vector3d::Zero()}, {}};
   for (std::uint32_t i = 0; i < n; ++i) {
@@ -184,7 +184,7 @@ TEST(UnfoldedStars, WindOnceAroundTheVertex) {
   }
   const testing::Mesh large = fan(1000, 1, 0.001);
   EXPECT_TRUE(isAnswered(large, large.positions));
-  // Two fans with one apex, one over the other.
+  // Two fans with one apex, one above the other.
   testing::Mesh both = fan(5, 1, 0.0);
   const testing::Mesh other = fan(6, 1, 0.0);
   for (std::size_t i = 1; i < other.positions.size(); ++i)

@@ -24,7 +24,7 @@ TriangleMesh meshOf(const std::vector<Vector3d>& before, const std::vector<Vecto
   return {MeshTopology(now.size(), triangles), now, before};
 }
 
-/// A soup in which each vertex moves its own way, in grid steps where `grid` is positive.
+/// A soup in which each vertex has its own motion, in grid steps if `grid` is positive.
 TriangleMesh movingSoup(testing::Random& random, std::size_t triangles, double size, double grid) {
   testing::Mesh mesh = testing::soup(random, triangles, size);
   // Some share vertices, so that triangles are neighbours too.
@@ -46,7 +46,7 @@ std::vector<ElementPair> everyPair(const TriangleMesh& a, const TriangleMesh& b)
   return pairs;
 }
 
-/// Everything of a contact but its weights' exact bits is in its ids, time, distance and normal.
+/// A contact without the exact bits of its weights: ids, time, distance and normal.
 std::vector<std::tuple<std::uint32_t, std::uint32_t, double, double>> sorted(
     const Buffer<VertexTriangleContact>& contacts) {
   std::vector<std::tuple<std::uint32_t, std::uint32_t, double, double>> keys;
@@ -222,8 +222,7 @@ TEST(Continuous, EdgeContactsHaveTheirPointAndSide) {
   }
 }
 
-/// Two triangles that share an edge and fold flat onto each other: the features they do not share
-/// meet.
+/// Two triangles that share an edge and fold flat onto each other: their unshared features touch.
 TEST(Continuous, NeighboursTouchOnlyInUnsharedFeatures) {
   const std::vector<Vector3d> before{{0, 0, 0}, {1, 0, 0}, {0.5, 1, 0}, {0.5, -0.5, 1}},
       now{{0, 0, 0}, {1, 0, 0}, {0.5, 1, 0}, {0.5, 0.5, -1}};

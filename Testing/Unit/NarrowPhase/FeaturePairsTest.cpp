@@ -46,7 +46,7 @@ struct Moving {
   }
 };
 
-/// Boxes over [0, upTo], exact but for rounding in double: all that overlap are kept, and few
+/// Boxes over [0, upTo], exact up to rounding in double: all overlapping pairs are kept, and few
 /// others.
 TEST(FeaturePairs, KeepOverlappingPairsUpToAnyTime) {
   testing::Random random(1);
@@ -108,7 +108,7 @@ MeshTopology crowded(testing::Random& random, std::uint32_t vertices, std::size_
   return {vertices, list};
 }
 
-/// Without boxes: all that the definition allows, each once, in the same order on every SIMD path.
+/// Without boxes: all pairs of the definition, each once, in the same order on every SIMD path.
 TEST(FeaturePairs, AreEachTestedOnce) {
   testing::Random random(2);
   for (const std::size_t size : {1, 2, 7, 60, 300}) {
@@ -156,7 +156,7 @@ TEST(FeaturePairs, AreEachTestedOnce) {
   }
 }
 
-/// All that overlap by boxes in double, each once, and hardly more.
+/// All pairs with overlapping boxes in double, each once, and hardly more.
 void expectOverlapping(std::span<const FeaturePair> found, std::vector<Ids> exact) {
   const std::vector<Ids> ids = sorted(found);
   std::sort(exact.begin(), exact.end());
@@ -209,8 +209,8 @@ TEST(FeaturePairs, MatchBoxesInDoubleOnPublishedSteps) {
   }
 }
 
-/// Of a mesh with itself, and of two in frames of their own, whose boxes are the thickness apart at
-/// the most.
+/// A mesh with itself, and two meshes in frames of their own, whose boxes are at most the thickness
+/// apart.
 TEST(FeaturePairs, IncludePairsWithinTheThickness) {
   testing::Random random(3);
   constexpr double kThickness = 0.02;

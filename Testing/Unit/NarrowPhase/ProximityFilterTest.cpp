@@ -24,7 +24,8 @@ using Possible = std::array<std::uint32_t, TrianglePairBatch::kSize>;
 
 constexpr std::uint32_t kAllTests = (1u << kTests) - 1;
 
-/// Distance of the features of a test; with distinct, none where edges do not cross inside.
+/// The distance of the features of a test. With `distinct`, edges that do not cross inside have
+/// none.
 std::optional<double> distanceOf(const Pair& x, int test, bool distinct) {
   const auto corner = [&](int triangle, int i) { return x[3 * triangle + i % 3]; };
   const auto distanceTo = [&](int triangle, const Vector3d& p) {
@@ -96,7 +97,7 @@ Pair pairOf(int kind, Random& random) {
   return x;
 }
 
-/// The thickness is exactly the distance of one of the feature pairs, which must not be left out.
+/// The thickness is exactly the distance of one of the feature pairs, which must be kept.
 TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
   Random random;
   std::size_t within = 0;
@@ -140,7 +141,7 @@ TEST(ProximityFilter, EverySimdPathDropsTheSamePairs) {
   useSimdPath("");
 }
 
-/// Of well-shaped triangles little is kept that is not within reach.
+/// For well-shaped triangles, few pairs beyond the thickness are kept.
 TEST(ProximityFilter, DropsNearlyAllPairsBeyondTheThickness) {
   Random random;
   const double thickness = 0.03;

@@ -31,7 +31,8 @@ Eigen::AlignedBox3d boxOf(const TriangleMesh& mesh, std::uint32_t triangle) {
   return box;
 }
 
-/// Every triangle pair whose boxes, the first inflated by the thickness and a little, overlap.
+/// Every triangle pair with overlapping boxes, the first inflated by the thickness and a little
+/// more.
 std::vector<ElementPair> candidatesOf(const MeshPair& pair) {
   std::vector<ElementPair> candidates;
   const auto count = [](const TriangleMesh& mesh) {
@@ -95,7 +96,7 @@ Found find(const TriangleMesh& a, const TriangleMesh& b, double thickness, Conta
   const MeshPair pair{a, b, {Method::Proximity, thickness, contacts}};
   Found found;
   const std::vector<ElementPair> candidates = candidatesOf(pair);
-  // In batches of odd sizes: contacts must not depend on them.
+  // Batches have odd sizes, and contacts must not depend on them.
   for (std::size_t begin = 0; begin < candidates.size(); begin += 37)
     findContacts(
         pair,
@@ -105,7 +106,7 @@ Found find(const TriangleMesh& a, const TriangleMesh& b, double thickness, Conta
   return found;
 }
 
-/// Same sets, same bits, nothing twice. Returns how many contacts there are.
+/// Expects equal sets with equal bits and without duplicates. Returns how many contacts there are.
 std::size_t expectSame(const TriangleMesh& a, const TriangleMesh& b, double thickness) {
   std::size_t count = 0;
   for (const Contacts contacts : {Contacts::Distinct, Contacts::All}) {
@@ -148,7 +149,7 @@ class Random {
   std::mt19937_64 m_engine{11};
 };
 
-/// Triangles between random vertices, repeated corners and non-manifold edges included.
+/// Triangles between random vertices, with repeated corners and non-manifold edges.
 SceneMesh soup(std::uint32_t vertices, std::uint32_t triangles, double size, Random& random) {
   SceneMesh mesh;
   for (std::uint32_t i = 0; i < vertices; ++i) mesh.positions.push_back(size * random.vector());
@@ -302,13 +303,13 @@ TEST(Proximity, TwoUnitCubesFaceToFaceHaveFourOrFiveContacts) {
 
 // ---- Unit independence ----
 
-/// Touching features have a normal by rule, which winding and mirroring turn.
+/// Normals of touching features follow a rule, and change with winding and mirroring.
 Vector3d mappedNormal(const Vector3d& normal, double distance, bool mirrored) {
   if (distance == 0.0) return Vector3d::Zero();
   return mirrored ? Vector3d(-normal.x(), normal.y(), normal.z()) : normal;
 }
 
-/// Each corner's vertex with its weight, so that the order of corners does not matter.
+/// The vertex of each corner with its weight, so that the order of corners does not matter.
 Row unorderedRowOf(const VertexTriangleContact& c, bool mirrored, double scale) {
   Row row{c.vertex, c.triangle};
   std::array<std::pair<std::uint32_t, double>, 3> corners;
@@ -337,7 +338,7 @@ std::vector<Row> unorderedRows(const ContactBuffers& found, bool mirrored, doubl
   return rows;
 }
 
-/// On a grid, so that moving it is exact.
+/// On a grid, so that translations are exact.
 SceneMesh gridSheet(int cells, double phase) {
   SceneMesh mesh = wavySheet(cells, phase);
   for (Vector3d& p : mesh.positions)

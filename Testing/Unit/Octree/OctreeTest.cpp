@@ -24,8 +24,8 @@ Settings rebuilding(int threads = 1) {
   return settings;
 }
 
-/// Cells by their bounds, each with the elements it holds: what a tree is, whatever its nodes are
-/// called.
+/// Cells by their bounds, each with its elements: the content of an octree without its node
+/// indices.
 using Tree = std::set<std::pair<std::vector<double>, std::vector<std::uint32_t>>>;
 
 Tree treeOf(const OctreeBasedCD& detection, GeometryId geometry) {
@@ -95,7 +95,7 @@ TEST(Octree, IsTheSameForAnyNumberOfThreadsAndAnyHistory) {
   }
 }
 
-/// Ever more and smaller triangles towards a point: cells of many more levels than a key has.
+/// Ever more and smaller triangles towards a point: more levels of cells than a key has.
 TEST(Octree, HoldsSizesOfManyLevelsTheSameForAnyNumberOfThreads) {
   Random random(12);
   for (const std::size_t size : {255u, 256u, 1100u, 3000u, 30000u}) {
@@ -130,7 +130,7 @@ TEST(Octree, KeepsMaxDepthAndMaxElementsPerLeaf) {
       detection.update();
       EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
       EXPECT_LE(detection.octree().statistics().deepestLevel, depth);
-      // A leaf may be fuller only at the maximum depth, or where all are as large as its cell.
+      // A leaf has more elements only at the maximum depth, or if all are as large as its cell.
       for (const auto node : detection.octree().nodes(id)) {
         const LooseOctree::Node n = detection.octree().node(node);
         if (n.leaf && n.depth < depth && n.elements.size() > static_cast<std::size_t>(leaf)) {
@@ -188,7 +188,7 @@ TEST(Octree, RebuildsWhenBoxesGrow) {
   OctreeBasedCD detection;
   const GeometryId id = detection.addTriangleMesh(positions, mesh.triangles);
   detection.update();
-  for (const Triangle& t : mesh.triangles) {  // neighbours part
+  for (const Triangle& t : mesh.triangles) {  // neighbours separate
     const Eigen::Vector3d away = testing::randomPoint(random, -1, 1);
     for (const std::uint32_t corner : t) positions[corner] += away;
   }

@@ -20,7 +20,7 @@ using testing::Mesh;
 using testing::Random;
 using testing::uniform;
 
-/// A geometry's octree, and maps of its boxes: none, and one and two turns.
+/// A geometry's octree, and maps of its boxes: the identity, and one and two rotations.
 struct Case {
   GeometryTable table;
   const Octree* octree;
@@ -67,7 +67,7 @@ double squaredDistance(const FloatBox& a, const FloatBox& b) {
   return sum;
 }
 
-/// f(case, map, reach): with the largest coordinate of the case's boxes, on every path.
+/// Calls f(case, map, reach) on every SIMD path. reach: the largest coordinate of the case's boxes.
 template <class F>
 void forEachCase(F&& f) {
   Random random(7);
@@ -120,7 +120,7 @@ TEST(PointQueries, VisitNoElementFartherThanTheNearest) {
       double nearest = std::numeric_limits<double>::infinity();
       for (std::uint32_t i = 0; i < c.size(); ++i)
         nearest = std::min(nearest, squaredDistance(map(c.octree->boxes()[i]), point));
-      // None, exactly as far as the nearest, and less.
+      // No limit, exactly the distance of the nearest, and less.
       for (const double limit : {std::numeric_limits<double>::infinity(), nearest, 0.5 * nearest}) {
         double best = limit;
         std::vector<int> times(c.size(), 0);

@@ -27,7 +27,7 @@ std::int64_t volume(const std::array<Vector3d, 4>& at) {
          e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
 }
 
-/// The lowest tetrahedron that holds p, from the definition, with its four volumes.
+/// The lowest tetrahedron that contains p, from the definition, with its four volumes.
 struct Held {
   std::uint32_t tetrahedron;
   std::array<std::int64_t, 4> volumes;
@@ -50,7 +50,7 @@ std::optional<Held> holder(const Vector3d& p, const Solid& solid) {
   return {};
 }
 
-/// All points of the integer lattice in [-1, n + 1]³, of each kind.
+/// All points of the integer lattice in [-1, n + 1]³, as points, lines and triangles.
 std::vector<TestGeometry> lattices(int n) {
   TestGeometry points{GeometryType::Points, {}, {}, {}, {0}};
   for (int x = -1; x <= n + 1; ++x)
@@ -83,7 +83,7 @@ TEST(EmbeddedVertices, MatchExactVolumesOnAGrid) {
   for (int run = 0; run < 12; ++run) {
     constexpr int n = 3;
     Solid solid = cells(n, random, [&](const auto&) { return random() % 4 > 0; });
-    // As it is, folded, anywhere: inverted and flat ones too.
+    // As given, folded, and at random positions, so that inverted and flat tetrahedra occur, too.
     for (Vector3d& p : solid.positions)
       for (int k = 0; k < 3 && run % 3 > 0; ++k)
         p[k] = run % 3 == 1 ? p[k] + static_cast<double>(random() % 3) - 1.0
@@ -117,7 +117,7 @@ TEST(EmbeddedVertices, MatchExactVolumesOnAGrid) {
   EXPECT_GT(inverted, 100u);
 }
 
-/// Lives of deforming solids: moved, inverted, cut, placed; any threads, rebuilt or refitted.
+/// Histories of deforming solids: moved, inverted, cut, placed; any threads, rebuilt or refitted.
 TEST(EmbeddedVertices, MatchBruteForceForAnyNumberOfThreads) {
   const auto life = [](const Settings& settings, double scale, double far) {
     Random random(2);
@@ -162,7 +162,7 @@ TEST(EmbeddedVertices, MatchBruteForceForAnyNumberOfThreads) {
   }
 }
 
-/// One vertex moves at a time, so that nothing else tells that positions are new.
+/// One vertex moves at a time, so that nothing else shows that positions are new.
 TEST(EmbeddedVertices, UseTheLastPositions) {
   Random random(8);
   const Solid solid = cells(4, random);
@@ -331,7 +331,7 @@ TEST(EmbeddedVertices, BadCallsThrowErrorsThatNameTheCause) {
                 });
   EXPECT_FALSE(detection.queries().findTetrahedron(body, {2, 0, 0}));
   EXPECT_TRUE(detection.queries().findTetrahedron(body, {1, 1, 1}));
-  // Nothing at all, and nothing but surface that is on both sides.
+  // No tetrahedra at all, and only surface that is on both sides.
   const GeometryId empty = detection.addTetrahedralMesh(solid.positions, {});
   EXPECT_TRUE(testing::embeddedVertices(detection, points, empty).empty());
   EXPECT_TRUE(testing::insideVertices(detection, points, empty).empty());

@@ -33,7 +33,7 @@ Vector3d weighted(const Corners& c, const Vector3d& w) {
   return w[0] * c[0] + w[1] * c[1] + w[2] * c[2];
 }
 
-/// What takes a triangle's edge and normal from one frame to the next.
+/// The transform of a triangle's edge and normal from one frame to the next.
 Eigen::Matrix3d turn(const Corners& before, const Corners& now) {
   const auto axes = [](const Corners& c) {
     Eigen::Matrix3d m;
@@ -45,7 +45,8 @@ Eigen::Matrix3d turn(const Corners& before, const Corners& now) {
   return axes(now) * axes(before).transpose();
 }
 
-/// How far along a ray the surface is first met, by each triangle's plane; met: certainly.
+/// The distance along a ray at which the surface is first hit, by each triangle's plane. met:
+/// certainly.
 double firstMet(const Story& story, std::size_t frame, const Vector3d& p, const Vector3d& u,
                 bool certainly) {
   double first = std::numeric_limits<double>::infinity();
@@ -64,7 +65,7 @@ double firstMet(const Story& story, std::size_t frame, const Vector3d& p, const 
 
 struct Tally {
   std::map<DirectionChange, std::size_t> changes;
-  double largestTurn = 0;  ///< beyond what motion explains, not named
+  double largestTurn = 0;  ///< beyond the body's motion, but not reported
 };
 
 using Answers = std::vector<std::vector<TrackedVertex>>;
@@ -92,8 +93,8 @@ Answers answers(const Settings& settings, const Story& story) {
   return all;
 }
 
-/// Every change against the definition, and the promise: turns beyond what motion explains are
-/// named, and nothing else is.
+/// Compares every change with the definition and the guarantee: turns beyond the body's motion are
+/// reported, and nothing else is.
 Tally expectDefined(const Story& story, const Answers& all) {
   constexpr double kSlack = 1e-9;
   Tally tally;
@@ -226,8 +227,8 @@ TEST(PenetrationTracker, ReportsLargeChangesInBodiesThatTurnAndDeform) {
   EXPECT_GT(changes[DirectionChange::Jumped], 10u);
 }
 
-/// A block pushed slowly through a slab, trembling: the way out is back where it came from until
-/// that is twice as far as on, then on; once for each vertex.
+/// A block pushed slowly through a slab, trembling. The penetration direction leads back until that
+/// is twice as far as ahead, then ahead. It changes once for each vertex.
 TEST(PenetrationTracker, PushedBodyChangesSidesOnce) {
   Random random(3);
   const Mesh slab = blocks(1, random, [](const auto&) { return true; }),
@@ -259,7 +260,7 @@ TEST(PenetrationTracker, PushedBodyChangesSidesOnce) {
   for (const auto& [vertex, count] : jumps) EXPECT_EQ(count, 1u);
 }
 
-/// A body by a transform, its probes by the same: nothing changes but all turns.
+/// A body moves by a transform, its probes by the same: nothing changes but the directions turn.
 TEST(PenetrationTracker, DirectionsTurnWithTheBody) {
   Random random(4);
   const Mesh mesh = blocks(3, random, [](const auto& c) { return c[2] == 0 || c[0] == 0; });
@@ -307,7 +308,7 @@ TEST(PenetrationTracker, RestartsWithNewTopology) {
   };
   EXPECT_EQ(change(probes), DirectionChange::Entered);
   EXPECT_EQ(change(probes), DirectionChange::None);
-  EXPECT_EQ(change(others), DirectionChange::Entered);  // each tracker for itself
+  EXPECT_EQ(change(others), DirectionChange::Entered);  // each tracker by itself
   EXPECT_EQ(change(probes), DirectionChange::None);
   detection.setTriangles(body, mesh.positions, mesh.triangles);
   EXPECT_EQ(change(probes), DirectionChange::Entered);

@@ -16,8 +16,8 @@
 #include <utility>
 #include <vector>
 
-// How long SpatialQueries are valid, what they write, and from where they may be called. What they
-// answer is compared with brute force in the tests of each query.
+// Validity of SpatialQueries, their output, and the threads and callbacks that may call them. The
+// tests of each query compare its results with brute force.
 namespace palpate::testing {
 namespace {
 
@@ -79,7 +79,7 @@ TEST(SpatialQueries, LaterCallsDoNotChangeEarlierResults) {
   queries.findInsideVertices(scene.open, scene.ball, second);
   EXPECT_EQ(first, kept);
   EXPECT_NE(first, second);
-  // What throws leaves the vector, too.
+  // A call that throws leaves the vector unchanged, too.
   EXPECT_THROW(queries.findInsideVertices(scene.points, scene.open, first), Error);
   EXPECT_EQ(first, kept);
 }
@@ -109,7 +109,7 @@ TEST(SpatialQueries, AreInvalidAfterAnyChangeOfTheirGeometries) {
           (void)queries.findTetrahedron(scene.solid, {0, 0, 0});
         },
         "call queries() again");
-    // Those that are asked for now are valid; the earlier ones stay as they are.
+    // Queries that are requested now are valid. The earlier ones stay outdated.
     ask(scene, scene.collisions.queries());
     expectInvalid(
         [&] {
@@ -149,7 +149,7 @@ TEST(SpatialQueries, StayValidThroughDetectionsAndPairs) {
   EXPECT_EQ(ask(scene, copy), before);
 }
 
-/// A frame that an exception ends leaves queries as they were.
+/// A frame that an exception ends leaves queries valid.
 TEST(SpatialQueries, StayValidAfterAFrameThatThrows) {
   Scene scene;
   OctreeBasedCD& collisions = scene.collisions;
@@ -190,7 +190,7 @@ TEST(SpatialQueries, ThrowWithinACallbackOfTheirOwner) {
   ask(scene, queries);
 }
 
-/// Octrees, tetrahedra's octrees and winding numbers are made by whichever thread needs them first.
+/// The thread that needs them first builds octrees, octrees of tetrahedra and winding numbers.
 TEST(SpatialQueries, ManyThreadsGetTheResultsOfOne) {
   for (const int threads : {1, 3}) {
     const Scene alone;
@@ -210,7 +210,7 @@ TEST(SpatialQueries, ManyThreadsGetTheResultsOfOne) {
   }
 }
 
-/// Outdated queries are refused, also while another thread brings the octrees up to date.
+/// Outdated queries throw, also while another thread updates the octrees.
 TEST(SpatialQueries, OutdatedOnesThrowBesideNewOnes) {
   Scene scene;
   for (int repeat = 0; repeat < 20; ++repeat) {
@@ -240,7 +240,7 @@ TEST(SpatialQueries, ChangeNoStatisticsAndNoContacts) {
   EXPECT_EQ(collisions.collisionData(scene.points, scene.ball).hash(), hash);
 }
 
-/// What a tracker remembers is its own: of one object, and left by a call that throws.
+/// The state of a tracker belongs to one object, and a call that throws leaves it unchanged.
 TEST(PenetrationTracker, KeepsItsOwnState) {
   Scene first, second;
   PenetrationTracker one(first.points, first.ball), other(first.points, first.ball);

@@ -69,8 +69,8 @@ Positions pointsAround(Random& random, std::size_t count, double half) {
   return points;
 }
 
-/// Found, and decided, as the truth says, but where that is open to rounding; the same by brute
-/// force and any threads. Returns how many are found.
+/// The vertices and `decided` match the exact values, except within rounding. Brute force and any
+/// threads give the same. Returns how many are found.
 std::size_t expectTrue(const Positions& points, const Mesh& body, double margin = 0) {
   const std::vector<InsideVertex> found = find(points, body, byNumber(margin));
   EXPECT_EQ(find(points, body, byNumber(margin), settingsOf(Engine::BruteForce)), found);
@@ -98,7 +98,7 @@ Mesh lump(Random& random, std::uint32_t rings, std::uint32_t segments) {
   return mesh;
 }
 
-/// With another one turned inside out.
+/// With another body inside, turned inside out.
 void add(Mesh& mesh, const Mesh& hollow) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   mesh.positions.insert(mesh.positions.end(), hollow.positions.begin(), hollow.positions.end());
@@ -183,7 +183,7 @@ TEST(WindingNumber, WorksOnATriangleSoup) {
     }
 }
 
-/// From the middle of an open face a cube takes exactly half of all directions.
+/// From the middle of an open face, a cube covers exactly half of all directions.
 TEST(WindingNumber, NearOneHalfIsUndecided) {
   Mesh cube;
   for (int v = 0; v < 8; ++v) cube.positions.push_back(Vector3d(v & 1, v >> 1 & 1, v >> 2));

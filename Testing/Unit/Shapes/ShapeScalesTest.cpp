@@ -14,14 +14,14 @@
 #include <vector>
 
 // Shapes of any size: a scene scaled by a power of two has the scaled contacts. Squares of its
-// measures leave the range of double at most of these scales.
+// lengths leave the range of double at most of these scales.
 
 namespace palpate::testing {
 namespace {
 
 constexpr double kDenormal = std::numeric_limits<double>::denorm_min();
-/// The largest measure of these scenes, about 1, is near the limit of 1e300 = 2^996.6, or its bits
-/// are near the end of what double holds.
+/// The largest length of these scenes is about 1. Scaled, it is near the limit of 1e300 = 2^996.6,
+/// or its last bits are near the end of the range of double.
 constexpr int kScales[] = {996, 900, 530, 512, 380, 250, -250, -380, -512, -530, -900, -1022};
 
 AnalyticalGeometry scaled(AnalyticalGeometry geometry, double by) {
@@ -41,7 +41,7 @@ struct Move {
   Vector3d shift;
 };
 
-/// A shape and a geometry with elements, or a second shape, in one step.
+/// A shape and a geometry with elements, or two shapes, in one step.
 struct Scene {
   AnalyticalGeometry shape;
   std::array<Move, 2> ends;
@@ -126,7 +126,7 @@ std::map<Element, ShapeContact> byElement(const CollisionData& data) {
   return contacts;
 }
 
-/// What may be missing of one: what is almost no contact.
+/// The contacts that may be missing: those at the border of being one.
 bool isMarginal(const ShapeContact& c, const PairSettings& pair) {
   const double weight = c.weights.head(static_cast<int>(c.element) + 1).minCoeff();
   return weight < 1e-6 || c.timeOfImpact > 1 - 1e-5 ||
@@ -136,7 +136,7 @@ bool isMarginal(const ShapeContact& c, const PairSettings& pair) {
 /// Contacts of a scene and of its copy, `by` times as large.
 /// extent: L, of coordinates.
 std::size_t expectSame(const Scene& scene, const PairSettings& pair, double by, double extent = 1) {
-  // What the smaller one's doubles cannot say is not in either.
+  // Lengths below the resolution of the smaller scene are in neither.
   const Scene copy = scene.scaledBy(by), original = copy.scaledBy(1 / by);
   PairSettings there = pair;
   there.thickness *= by;
@@ -162,7 +162,8 @@ std::size_t expectSame(const Scene& scene, const PairSettings& pair, double by, 
     EXPECT_NEAR(f.distance / by, c.distance, slack);
     EXPECT_NEAR(f.timeOfImpact, c.timeOfImpact, 3e-6);
     EXPECT_NEAR(f.normal.norm(), 1, 1e-13);
-    // Inside several places of a triangle may be as deep, and of several ways out as short.
+    // Inside, several points of a triangle may be equally deep, and several directions equally
+    // short.
     if (c.distance < 1e-3) continue;
     EXPECT_NEAR((f.normal - c.normal).norm(), 0, 1e3 * slack);
     near(c.point, f.point);
@@ -238,7 +239,7 @@ TEST(ShapeScales, ContactsAreCorrectFarFromTheOrigin) {
       for (Move& end : scene.ends) end.shift += far;
       for (Vector3d& p : scene.geometry.positions) p += far;
       scene.now = moved(random, scene.geometry.positions, 0.3);
-      // Coordinates are rounded to 2^-32 of the measures here.
+      // Coordinates are rounded to 2^-32 of the lengths here.
       contacts += expectSame(scene, settingsWith(Method::Proximity, 0.02), 0x1p979, 0x1p20);
     }
   EXPECT_GT(contacts, 50u);
@@ -259,7 +260,7 @@ TEST(ShapeScales, NormalsOfPlanesMayHaveAnyLength) {
   }
 }
 
-/// Just inside of the limit right answers are what the other tests here expect.
+/// Just inside the limit, the other tests of this file expect correct contacts.
 TEST(ShapeScales, SizesBeyondTheLimitAreRefused) {
   const double most = 1e300, beyond = std::nextafter(most, 2 * most);
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
@@ -308,7 +309,7 @@ TEST(ShapeScales, HullsOfTooManyPointsAreRefused) {
   }
 }
 
-/// The case of the issue: a capsule whose half-length overflows when squared.
+/// A regression: a capsule whose half-length overflows when squared.
 TEST(ShapeScales, LongCapsuleIsTouched) {
   for (const double half : {1e155, 1e160, 1e-160, 1e-300, 1e-308}) {
     OctreeBasedCD collisions(settingsOf(Engine::Octree));
