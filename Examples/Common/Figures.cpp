@@ -12,7 +12,7 @@ namespace palpate::report {
 
 namespace {
 
-/// A text in a line of CSV has neither comma nor quote nor line break.
+/// A text of a CSV line must not contain a comma, a quote or a line break.
 void checkText(const std::string& text) {
   if (text.find_first_of(",\"\n\r") != std::string::npos)
     throw std::invalid_argument("\"" + text + "\" cannot be a field of CSV");

@@ -10,10 +10,10 @@ namespace palpate::report {
 /// A column of numbers.
 struct Quantity {
   std::string key;    ///< in CSV
-  std::string label;  ///< with its unit, at an axis
+  std::string label;  ///< name and unit on an axis
 };
 
-/// What a program measured: each row some texts that name it, then its numbers, NaN where there is
+/// The figures of a program. Each row has some texts that name it, then its numbers, or NaN for
 /// none.
 class Figures {
  public:
@@ -30,12 +30,12 @@ class Figures {
   const std::vector<Quantity>& quantities() const { return m_quantities; }
   const std::vector<Row>& rows() const { return m_rows; }
   std::size_t indexOf(const std::string& quantity) const;  ///< throws std::out_of_range
-  /// The row of these first texts, or none.
+  /// The row with these first texts, or none.
   const Row* find(std::span<const std::string> texts) const;
 
   std::string csv() const;
-  /// Adds the rows of a file that csv() wrote; none if there is no such file or its columns are
-  /// others.
+  /// Adds the rows of a file that csv() wrote. Adds none if the file is missing or has other
+  /// columns.
   void addFrom(const std::filesystem::path& csv);
 
  private:

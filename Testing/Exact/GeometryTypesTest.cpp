@@ -11,8 +11,9 @@
 #include <utility>
 #include <vector>
 
-// Lines and points against rational arithmetic: which are near enough, and how near, on random and
-// on degenerate positions; impacts against distances along the step in 64 bits and more.
+// Lines and points against rational arithmetic: which features are within the thickness, and their
+// distances, on random and on degenerate positions. Impacts are compared with distances along the
+// step in 64 bits and more.
 
 namespace palpate::testing {
 namespace {
@@ -55,11 +56,11 @@ Exact edgeEdge(const TestGeometry& a, const Segment& p, const TestGeometry& b, c
           oracle::ulpOfLargestDifference({at[p[0]], at[p[1]], on[q[0]], on[q[1]]})};
 }
 
-/// Found must be what is near enough, but for those within rounding of it; distances too.
+/// The contacts are the features within the thickness, up to rounding, with their distances.
 std::size_t compare(const std::map<Ids, Exact>& all, const std::map<Ids, double>& found,
                     double thickness) {
   for (const auto& [ids, exact] : all) {
-    // Centres within 8 ulp, weights too; and the radii are rounded, and subtracted.
+    // Centres and weights are within 8 ulp. Radii are rounded and subtracted.
     const double error = 16 * exact.scale + 0x1p-51 * exact.radii.get_d(),
                  gap = exact.distance() - thickness;
     const auto place = found.find(ids);
@@ -105,7 +106,7 @@ std::size_t compareWithRationals(const TestGeometry& a, const TestGeometry& b, d
          compare(edges, foundEdges, thickness);
 }
 
-/// On a coarse grid: coincident, collinear, without length.
+/// Moves positions to a coarse grid: coincident, collinear, without length.
 void snap(TestGeometry& geometry) {
   for (Eigen::Vector3d& p : geometry.positions)
     for (double& x : p) x = std::round(4 * x) / 4;
@@ -125,7 +126,8 @@ TEST(ExactGeometryTypes, DistancesMatchRationalArithmetic) {
       if (far)
         for (Eigen::Vector3d& p : geometry->positions) p += Eigen::Vector3d(1e6, -3e5, 7e4);
     }
-    // Where several weights are as near radii differ: tapered edges only in general position.
+    // Where several weights are equally near, radii differ. So tapered edges are tested in general
+    // position only.
     contacts += compareWithRationals(drops, line, 0.1) + compareWithRationals(smoke, line, 0.1) +
                 compareWithRationals(drops, smoke, 0.1) + compareWithRationals(drops, drops, 0.1) +
                 compareWithRationals(smoke, smoke, 0.0) + compareWithRationals(smoke, needle, 0.0);
@@ -142,7 +144,7 @@ TEST(ExactGeometryTypes, DistancesMatchRationalArithmetic) {
 using Wide = long double;
 using WideVector = Eigen::Matrix<Wide, 3, 1>;
 
-/// From a point to a segment, or to a point where it has no length.
+/// The distance from a point to a segment, or to a point if the segment has no length.
 Wide distanceTo(const WideVector& p, const WideVector& a, const WideVector& b) {
   const WideVector edge = b - a;
   const Wide square = edge.squaredNorm();
@@ -150,7 +152,7 @@ Wide distanceTo(const WideVector& p, const WideVector& a, const WideVector& b) {
   return (p - a - t * edge).norm();
 }
 
-/// Of a point that moves along a line past a segment: when they first are `reach` apart, or 2. The
+/// The first time at which a point that moves along a line is `reach` from a segment, or 2. The
 /// distance is convex in time.
 Wide firstTime(const Eigen::Vector3d& before, const Eigen::Vector3d& now, const Eigen::Vector3d& a,
                const Eigen::Vector3d& b, Wide reach, bool& close) {
@@ -185,7 +187,7 @@ TEST(ExactGeometryTypes, ImpactTimesAreTheEarliest) {
     if (radius + thickness == 0.0) other.radii = {0.0};
     const Eigen::Vector3d drift = randomPoint(random, -0.3, 0.3);
     Positions now = moved(random, drops.positions, 0.5), drifted = other.positions;
-    if (radius + thickness == 0.0)  // aimed, or nothing would be hit
+    if (radius + thickness == 0.0)  // aimed at the other geometry, so that some touch
       for (std::size_t v = 0; v < now.size(); ++v) {
         const Eigen::Vector3d& target = other.positions[v % other.positions.size()];
         now[v] = 2 * target - drops.positions[v];
@@ -207,7 +209,7 @@ TEST(ExactGeometryTypes, ImpactTimesAreTheEarliest) {
                                     other.positions[i], other.positions[k], reach, close);
         const auto place = found.find({v, t});
         if (close && reach > 0) continue;
-        if (reach == 0) {  // one that is aimed may pass by an ulp: what is found is near
+        if (reach == 0) {  // an aimed point may miss by an ulp; a reported contact is near
           EXPECT_TRUE(close || place == found.end());
           continue;
         }
@@ -221,7 +223,7 @@ TEST(ExactGeometryTypes, ImpactTimesAreTheEarliest) {
   EXPECT_GT(impacts, 200u);
 }
 
-/// With no radius and no thickness, on positions where meeting is exact.
+/// Without radius and thickness, on positions where touching is exact.
 TEST(ExactGeometryTypes, TouchesAreFoundExactly) {
   const TestGeometry drop{GeometryType::Points, {{0, 0, 2}, {3, 0, 2}, {1, 0, 0}}, {}, {}, {0}};
   const Positions now{{0, 0, -2}, {3, 0.0625, -2}, {5, 0, 0}};
@@ -246,14 +248,14 @@ TEST(ExactGeometryTypes, TouchesAreFoundExactly) {
     }
   };
   expectTimes(hits(wall, wall.positions), {{{0, 0}, 0.25}, {{2, 1}, 0.5}, {{2, 2}, 0.25}});
-  // Across a segment, past its end, along it, and on a point of no length.
+  // Across a segment, past its end, along it, and onto a point without length.
   TestGeometry line{GeometryType::Lines,
                     {{-1, 0, 1}, {1, 0, 1}, {4, 0, 0}, {4.5, 0, 0}, {2, 0, 0}, {2, 0, 0}},
                     {},
                     {{0, 1}, {2, 3}, {4, 5}},
                     {0}};
   expectTimes(hits(line, line.positions), {{{0, 0}, 0.25}, {{2, 1}, 0.75}, {{2, 2}, 0.25}});
-  // Which meets it: half as long.
+  // Half as long, so that it touches.
   Positions towards = line.positions;
   towards[0][2] = towards[1][2] = 5;
   expectTimes(hits(line, towards), {{{0, 0}, 0.125}, {{2, 1}, 0.75}, {{2, 2}, 0.25}});

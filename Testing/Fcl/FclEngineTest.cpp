@@ -46,7 +46,7 @@ TEST(FclEngine, MeshIntersectionsMatchOctreeBasedCD) {
   const GeometryId a = both.add(sheets[0]), b = both.add(sheets[1]);
   both.each([&](auto& engine) { engine.addCollisionPair(a, b, {Method::Intersection}); });
   std::size_t found = both.expectSame(a, b);
-  for (int frame = 0; frame < 10; ++frame) {  // far, so that boxes must follow
+  for (int frame = 0; frame < 10; ++frame) {  // far, so that the boxes must follow
     for (Vector3d& p : sheets[0].positions) p += Vector3d(0.02, 0, 0.03 * (frame % 3));
     both.each([&](auto& engine) { engine.setPositions(a, sheets[0].positions); });
     found += both.expectSame(a, b);

@@ -142,7 +142,7 @@ bool hasTriangleAt(const CollisionProblem& problem, GeometryId id, double x) {
 
 TEST(Shrink, KeepsOnlyWhatFails) {
   std::size_t calls = 0;
-  // Fails by one triangle each of meshes 0 and 2, where the pair (0, 2) is there.
+  // Fails if one triangle each of meshes 0 and 2 and the pair (0, 2) exist.
   const auto fails = [&](const CollisionProblem& problem) {
     ++calls;
     bool hasPair = false;

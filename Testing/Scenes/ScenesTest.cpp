@@ -77,7 +77,8 @@ TEST(Meshes, GradedSphereSpansItsRangeOfSizes) {
   const SceneMesh mesh = gradedSphere(119, 1e-4);
   double least = 1, most = 0;
   for (const auto& [a, b, c] :
-       std::span(mesh.triangles).first(mesh.triangles.size() - 2 * 119)) {  // less the fans
+       std::span(mesh.triangles)
+           .first(mesh.triangles.size() - 2 * 119)) {  // without the fans at the poles
     const Vector3d& corner = mesh.positions[a];
     const double size =
         std::sqrt((mesh.positions[b] - corner).cross(mesh.positions[c] - corner).norm());
@@ -147,8 +148,8 @@ TEST(Scenes, HaveTheirTriangleCounts) {
   }
 }
 
-// Boxes, keys, octree and scratch together, also where every frame is rebuilt and each has needed
-// its most.
+// Boxes, keys, octree and scratch together, also if every frame is rebuilt and each buffer has its
+// peak size.
 TEST(Scenes, NeedLessThanAHundredBytesPerTriangle) {
   for (const Scene& scene : {organs(), foldedCloth(), interleavedSheets(64'000)}) {
     Settings settings;

@@ -36,7 +36,7 @@ class MeshFiles : public testing::Test {
     return readTriangleMesh(write(name, content));
   }
 
-  /// The sentence with which it is refused; it must name the file. Empty: not refused.
+  /// The message of the error, which must name the file. Empty if the file is read.
   std::string refusal(const fs::path& path) const {
     try {
       readTriangleMesh(path);
@@ -55,7 +55,7 @@ class MeshFiles : public testing::Test {
   fs::path folder;
 };
 
-// A square of four vertices with a fifth that nothing uses: one polygon where the format has them.
+// A square of four vertices and a fifth unused one: one polygon if the format has polygons.
 const std::vector<Vector3d> kSquare{{0, 0, 0}, {1, 0, 0}, {1, 1, 0.5}, {0, 1, 0}, {7, 7, 7}};
 const std::vector<Triangle> kFan{{0, 1, 2}, {0, 2, 3}};
 
@@ -86,7 +86,7 @@ const std::string kVtp =
     "3</DataArray>"
     "<DataArray type=\"Int64\" Name=\"offsets\" "
     "format=\"ascii\">4</DataArray></Polys></Piece></PolyData></VTKFile>\n";
-// The same as VTK's own writer leaves it: compressed, appended.
+// The same file as VTK's own writer makes it: compressed, appended.
 const std::string kAppendedVtp =
     "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" "
     "byte_order=\"LittleEndian\" "
@@ -177,7 +177,7 @@ TEST_F(MeshFiles, EveryFormatGivesVerticesAndPolygonsAsFans) {
 }
 
 TEST_F(MeshFiles, TruncatedFilesAreRefusedOrComplete) {
-  // In silence: VTK's own messages would come here.
+  // VTK must print no messages.
   testing::internal::CaptureStderr();
   testing::internal::CaptureStdout();
   std::vector<std::string> wrong;
@@ -192,7 +192,7 @@ TEST_F(MeshFiles, TruncatedFilesAreRefusedOrComplete) {
   }
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
   EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
-  // Of these formats, text that ends within its last line or number cannot be told from a shorter
+  // In these formats, a text that ends within its last line or number cannot be told from a shorter
   // one.
   for (const std::string& one : wrong) EXPECT_TRUE(one.starts_with("a.obj")) << one;
 }

@@ -50,7 +50,8 @@ void expectTrue(const ImpactCase& query, const TimeOfImpactSettings& settings,
   if (time) {
     const Rational reach =
         Rational(settings.minimumDistance) + Rational(statedError(query, settings));
-    EXPECT_TRUE(isWithin(oracle::squareDistanceAt(query, *time), reach)) << "invented at " << *time;
+    EXPECT_TRUE(isWithin(oracle::squareDistanceAt(query, *time), reach))
+        << "false positive at " << *time;
   }
   const double end = time.value_or(1.0);
   for (int i = 0; i < 12; ++i) {
@@ -58,7 +59,7 @@ void expectTrue(const ImpactCase& query, const TimeOfImpactSettings& settings,
     if (i < 5) t = end * i / 4.0;
     if (time && t >= *time) continue;
     EXPECT_FALSE(isWithin(oracle::squareDistanceAt(query, t), Rational(settings.minimumDistance)))
-        << (time ? "late, or nearer at " : "missed at ") << t;
+        << (time ? "late, or nearer at " : "false negative at ") << t;
   }
 }
 
