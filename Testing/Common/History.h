@@ -92,16 +92,16 @@ class RandomHistory {
   void endStep();
 
   Random m_random;
-  OctreeBasedCD m_life;
+  OctreeBasedCD m_collisions;
   /// An object that is given only the last values of each step.
   OctreeBasedCD m_committed;
   std::map<GeometryId, Body> m_bodies;
   std::vector<Pair> m_pairs;
   /// Vertices and body of the trackers, one for each of the two objects.
   struct Tracked {
-    Tracked(GeometryId a, GeometryId b) : vertices(a), body(b), life(a, b), committed(a, b) {}
+    Tracked(GeometryId a, GeometryId b) : vertices(a), body(b), running(a, b), committed(a, b) {}
     GeometryId vertices, body;
-    PenetrationTracker life, committed;
+    PenetrationTracker running, committed;
   };
   std::optional<Tracked> m_tracked;
   std::size_t m_contacts = 0;

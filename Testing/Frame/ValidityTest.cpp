@@ -68,11 +68,11 @@ struct Tally {
 };
 
 /// Histories of a ball that bobs over a sheet by `speed` thicknesses per frame, up to crossing it.
-Tally livesOf(const PairSettings& settings, double speed, std::uint64_t seed, std::size_t lives,
-              bool response) {
+Tally historiesOf(const PairSettings& settings, double speed, std::uint64_t seed,
+                  std::size_t histories, bool response) {
   Random random(seed);
   Tally tally;
-  for (std::size_t life = 0; life < lives; ++life) {
+  for (std::size_t history = 0; history < histories; ++history) {
     const BallAndSheet scene;
     PairRun run(settingsOf(Engine::Octree), scene.ball, scene.sheet, settings, false);
     Positions ball = scene.ball.positions, sheet = scene.sheet.positions;
@@ -129,13 +129,13 @@ Tally livesOf(const PairSettings& settings, double speed, std::uint64_t seed, st
   return tally;
 }
 
-struct MethodTest : ::testing::TestWithParam<MethodCase> {};
+struct ValidityOfMethod : ::testing::TestWithParam<MethodCase> {};
 
-TEST_P(MethodTest, NeverFailsSilently) {
+TEST_P(ValidityOfMethod, NeverFailsSilently) {
   for (const bool response : {false, true}) {
     Tally all;
     for (const double speed : {0.01, 0.1, 0.3, 0.7, 1.0, 1.5, 3.0, 10.0, 50.0}) {
-      const Tally tally = livesOf(GetParam().settings, speed, 5, 40, response);
+      const Tally tally = historiesOf(GetParam().settings, speed, 5, 40, response);
       EXPECT_EQ(tally.silent, 0u) << "speed " << speed;
       std::cout << (response ? "response, " : "") << "speed " << speed << ": " << tally << "\n";
       all.wrong += tally.wrong;
@@ -214,7 +214,7 @@ Known livesThrough(const PairSettings& settings, const Mesh& a, const Mesh* b, i
   return known;
 }
 
-TEST_P(MethodTest, KnowsStartedApartFromImpactsOfThePreviousStep) {
+TEST_P(ValidityOfMethod, KnowsStartedApartFromImpactsOfThePreviousStep) {
   const PairSettings& settings = GetParam().settings;
   if (settings.method == Method::Intersection) return;  // the check does not run
   const BallAndSheet scene;
@@ -317,7 +317,7 @@ TEST(Displacement, IsTheRelativeMotionOfTheStep) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Validity, MethodTest,
+    Validity, ValidityOfMethod,
     ::testing::Values(MethodCase{"Intersection", {Method::Intersection}},
                       MethodCase{"ProximityDistinct", {Method::Proximity, kThickness}},
                       MethodCase{"ProximityAll", {Method::Proximity, kThickness, Contacts::All}},

@@ -119,15 +119,15 @@ TEST(ContactMotions, AreDerivativesOfDistancesToShapes) {
   const TestGeometry drops = particles(random, 300, 0.02),
                      line = thread(random, 200, 0.1, 0.01, false);
   constexpr double kStep = 0x1p-16;
-  for (const TestGeometry* geometry : {&drops, &line})
+  for (const TestGeometry* elements : {&drops, &line})
     for (const AnalyticalGeometry& geometry : kShapes)
       for (const bool shapeFirst : {true, false}) {
         const Vector3d middle(0.5, 0.5, 0.5), spin(0.3, -0.7, 0.5), slide(-0.6, 0.2, 0.4);
         const Eigen::Matrix3d tilt = turn({0.4, 0.3, -0.2});
         const ShapeMotion motion{tilt, middle, turn(kStep * spin) * tilt, middle + kStep * slide};
-        const Positions now = moved(random, geometry->positions, kStep);
+        const Positions now = moved(random, elements->positions, kStep);
         OctreeBasedCD detection;
-        const GeometryId soft = geometry->addTo(detection),
+        const GeometryId soft = elements->addTo(detection),
                          shape = detection.addAnalyticalGeometry(geometry);
         const GeometryId a = shapeFirst ? shape : soft, b = shapeFirst ? soft : shape;
         detection.addCollisionPair(a, b, {Method::Proximity, 0.1, Contacts::All});
@@ -138,10 +138,10 @@ TEST(ContactMotions, AreDerivativesOfDistancesToShapes) {
           detection.detectCollision();
           return detection.collisionData(a, b);
         };
-        const CollisionData start = detect(geometry->positions, tilt, middle),
+        const CollisionData start = detect(elements->positions, tilt, middle),
                             end = detect(now, motion.rotation, motion.translation);
         std::vector<ContactMotion> motions;
-        const ContactSide mesh{{0, geometry->positions, now}, geometry->radii},
+        const ContactSide mesh{{0, elements->positions, now}, elements->radii},
             tool{{}, {}, motion};
         appendMotions(end, shapeFirst ? tool : mesh, shapeFirst ? mesh : tool, motions);
         ASSERT_EQ(motions.size(), end.shape().size());
@@ -153,7 +153,7 @@ TEST(ContactMotions, AreDerivativesOfDistancesToShapes) {
               1e-13);
           // An edge is deepest in a box where two faces are equally near: the depth has a kink.
           if (std::holds_alternative<Box>(geometry) && contact.element == ShapeElement::Edge &&
-              contact.distance + geometry->radii[0] < 0)
+              contact.distance + elements->radii[0] < 0)
             continue;
           for (const ShapeContact& other : start.shape()) {
             if (other.element != contact.element || other.vertices != contact.vertices) continue;

@@ -65,10 +65,10 @@ std::vector<Place> placesOf(Random& random, Way way) {
 }
 
 /// A pair over some frames. The body is moved by transforms, or by the same positions.
-class Life {
+class RigidRun {
  public:
-  Life(Settings settings, const TestGeometry& body, const TestGeometry& other,
-       const PairSettings& pair, bool bodyFirst, bool byTransform)
+  RigidRun(Settings settings, const TestGeometry& body, const TestGeometry& other,
+           const PairSettings& pair, bool bodyFirst, bool byTransform)
       : m_collisions((settings.keepCandidates = true, settings)),
         m_positions(body.positions),
         m_byTransform(byTransform),
@@ -107,7 +107,7 @@ class Life {
   bool m_hasFrame = false;
 };
 
-struct LifeCase {
+struct RigidCase {
   Way way = Way::Small;
   bool bodyFirst = true, bothRigid = false;
   std::function<void(OctreeBasedCD&, GeometryId body)> setUp = [](auto&, GeometryId) {};
@@ -130,16 +130,15 @@ void expectSameValidity(const Validity& found, const Validity& truth, double siz
 /// Every engine with transforms has the contacts of the same positions. Returns the contacts of all
 /// frames.
 std::size_t expectAsPositions(Random& random, const TestGeometry& body, const TestGeometry& other,
-                              const PairSettings& pair, const LifeCase& life) {
-  const std::vector<Place> places = placesOf(random, life.way);
-  std::vector<Life> rigid;
+                              const PairSettings& pair, const RigidCase& run) {
+  const std::vector<Place> places = placesOf(random, run.way);
+  std::vector<RigidRun> rigid;
   for (const int threads : {1, 2})
-    rigid.emplace_back(settingsOf(Engine::Octree, threads), body, other, pair, life.bodyFirst,
-                       true);
-  rigid.emplace_back(settingsOf(Engine::BruteForce), body, other, pair, life.bodyFirst, true);
-  Life truth(settingsOf(Engine::Octree), body, other, pair, life.bodyFirst, false);
-  for (Life& one : rigid) life.setUp(one.collisions(), one.body());
-  life.setUp(truth.collisions(), truth.body());
+    rigid.emplace_back(settingsOf(Engine::Octree, threads), body, other, pair, run.bodyFirst, true);
+  rigid.emplace_back(settingsOf(Engine::BruteForce), body, other, pair, run.bodyFirst, true);
+  RigidRun truth(settingsOf(Engine::Octree), body, other, pair, run.bodyFirst, false);
+  for (RigidRun& one : rigid) run.setUp(one.collisions(), one.body());
+  run.setUp(truth.collisions(), truth.body());
   std::size_t contacts = 0;
   double largest = 0;
   for (const Vector3d& p : body.positions) largest = std::max(largest, p.norm());
@@ -147,14 +146,14 @@ std::size_t expectAsPositions(Random& random, const TestGeometry& body, const Te
   for (const Place& place : places) {
     ofOther = ofOther.then({1, 2, 3}, 0.01, ofOther({0.5, 0.5, 0.5}), {0, 0, 0});
     Positions now =
-        life.bothRigid ? other.positions : places[0](moved(random, other.positions, 0.02));
-    for (Life& one : rigid) one.frame(place, life.bothRigid ? &ofOther : nullptr, now);
-    truth.frame(place, life.bothRigid ? &ofOther : nullptr, now);
+        run.bothRigid ? other.positions : places[0](moved(random, other.positions, 0.02));
+    for (RigidRun& one : rigid) one.frame(place, run.bothRigid ? &ofOther : nullptr, now);
+    truth.frame(place, run.bothRigid ? &ofOther : nullptr, now);
     const Rows expected(truth.data());
     contacts += expected.contacts() + expected.intersectingTriangles.size() +
                 (expected.earliestTimeOfImpact <= 1.0);
     const auto candidates = rigid.back().candidates();
-    for (const Life& one : rigid) {
+    for (const RigidRun& one : rigid) {
       expectSameRows(Rows(one.data()), expected);
       expectSameValidity(one.data().validity(), truth.data().validity(),
                          10 + place.translation.norm() + largest);
@@ -510,15 +509,15 @@ TEST(Rigid, CapturesIncludeTransforms) {
   for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto}) {
     Settings settings = settingsOf(Engine::Octree);
     settings.audit.features = 100000;
-    Life life(settings, body, other, {method, 0.02}, true, true);
+    RigidRun run(settings, body, other, {method, 0.02}, true, true);
     Place place = somewhere(random);
     for (int frame = 0; frame < 2; ++frame) {
       place = place.then({1, 2, 3}, 0.1, {0.5, 0.5, 0.5}, {0, 0, 0.01});
-      life.frame(place, nullptr, other.positions);
+      run.frame(place, nullptr, other.positions);
     }
-    EXPECT_TRUE(life.collisions().auditFailures().empty());
-    replayed(life.collisions());
-    EXPECT_GT(life.collisions().statistics().contacts, 10u);
+    EXPECT_TRUE(run.collisions().auditFailures().empty());
+    replayed(run.collisions());
+    EXPECT_GT(run.collisions().statistics().contacts, 10u);
   }
 }
 
@@ -549,23 +548,23 @@ TEST(Rigid, ArcDeviationIsMeasured) {
                   now = before.then(axis, angle, through, slide * axis.normalized());
       const double truth = deviationInParts(body.positions, before, axis, angle, through, slide);
       for (const double thickness : {truth * 1.001, truth * 0.999}) {
-        Life life(settingsOf(Engine::Octree), body, far, {Method::Continuous, thickness}, true,
-                  true);
-        life.frame(before, nullptr, far.positions);
-        EXPECT_EQ(life.data().validity().arcDeviation, 0.0);
-        EXPECT_TRUE(life.data().validity().trusted);
-        life.frame(now, nullptr, far.positions);
-        EXPECT_NEAR(life.data().validity().arcDeviation, truth, 1e-9 * truth + 1e-13);
-        EXPECT_EQ(life.data().validity().trusted, thickness > truth);
+        RigidRun run(settingsOf(Engine::Octree), body, far, {Method::Continuous, thickness}, true,
+                     true);
+        run.frame(before, nullptr, far.positions);
+        EXPECT_EQ(run.data().validity().arcDeviation, 0.0);
+        EXPECT_TRUE(run.data().validity().trusted);
+        run.frame(now, nullptr, far.positions);
+        EXPECT_NEAR(run.data().validity().arcDeviation, truth, 1e-9 * truth + 1e-13);
+        EXPECT_EQ(run.data().validity().trusted, thickness > truth);
       }
     }
   // Without a turn there is no arc.
-  Life life(settingsOf(Engine::Octree), body, far, {Method::Continuous, 0.0}, true, true);
+  RigidRun run(settingsOf(Engine::Octree), body, far, {Method::Continuous, 0.0}, true, true);
   Place place = somewhere(random);
   for (int frame = 0; frame < 2; ++frame, place.translation += Vector3d(1, 2, 3)) {
-    life.frame(place, nullptr, far.positions);
-    EXPECT_EQ(life.data().validity().arcDeviation, 0.0);
-    EXPECT_TRUE(life.data().validity().trusted);
+    run.frame(place, nullptr, far.positions);
+    EXPECT_EQ(run.data().validity().arcDeviation, 0.0);
+    EXPECT_TRUE(run.data().validity().trusted);
   }
 }
 

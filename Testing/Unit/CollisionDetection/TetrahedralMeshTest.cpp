@@ -143,8 +143,9 @@ TEST(TetrahedralMesh, TetrahedraWithoutVolumeAreWoundAsTheirNeighbours) {
 }
 
 /// Contacts of a pair over three frames, in which the solid is deformed, moved and cut.
-std::vector<Rows> life(const Settings& settings, const Solid& solid, const Solid& cut,
-                       bool asTriangles, const TestGeometry& other, const PairSettings& pair) {
+std::vector<Rows> contactsOver(const Settings& settings, const Solid& solid, const Solid& cut,
+                               bool asTriangles, const TestGeometry& other,
+                               const PairSettings& pair) {
   Random random(3);
   OctreeBasedCD detection(settings);
   const Surface before = surfaceOf(solid), after = surfaceOf(cut);
@@ -191,8 +192,8 @@ TEST(TetrahedralMesh, CollidesAsItsSurfaceWithEveryGeometryTypeByEveryMethod) {
       settings.push_back({Method::Auto, 0.02});
     }
     for (const PairSettings& pair : settings) {
-      const auto rows = life(audited, solid, cut, false, geometry, pair);
-      expectSame(rows, life(audited, solid, cut, true, geometry, pair));
+      const auto rows = contactsOver(audited, solid, cut, false, geometry, pair);
+      expectSame(rows, contactsOver(audited, solid, cut, true, geometry, pair));
       for (const Rows& r : rows) contacts += r.contacts();
     }
   }

@@ -131,7 +131,7 @@ TEST(TimeTolerance, AutoFindsWhatContinuousFinds) {
 
 /// A thousand impacts at a fiftieth of the step, and one at a hundredth. Once the remaining time is
 /// short, boxes of features sweep the first part of the step only.
-TEST(Earliest, IsFoundAmongManyLaterImpacts) {
+TEST(EarliestTime, IsFoundAmongManyLaterImpacts) {
   testing::Mesh mesh;
   Positions now;
   const auto add = [&](const Eigen::Vector3d& at, double height, double fall) {
@@ -166,7 +166,7 @@ TEST(Earliest, IsFoundAmongManyLaterImpacts) {
 
 /// With many triangles, the time is that of all contacts, in any order of the search. The octrees
 /// sweep the whole step.
-TEST(Earliest, MatchesAllContactsOfManyTriangles) {
+TEST(EarliestTime, MatchesAllContactsOfManyTriangles) {
   Random random(9);
   testing::Mesh a = testing::soup(random, 4500, 0.02), b = testing::soup(random, 4500, 0.02);
   for (const double speed : {1e-3, 1e-2, 0.1}) {
@@ -213,7 +213,7 @@ TEST(Earliest, MatchesAllContactsOfManyTriangles) {
 }
 
 /// A shape's octree is empty. Its pair is unchanged.
-TEST(Earliest, MatchesAllContactsOfAShapeBesideOtherPairs) {
+TEST(EarliestTime, MatchesAllContactsOfAShapeBesideOtherPairs) {
   Random random(12);
   const testing::Mesh a = testing::soup(random, 9000, 0.02), b = testing::soup(random, 9000, 0.02);
   Positions now = a.positions;
@@ -240,7 +240,7 @@ TEST(Earliest, MatchesAllContactsOfAShapeBesideOtherPairs) {
 }
 
 /// A predicate that throws after boxes sweep less: the next frame has boxes of the whole step.
-TEST(Earliest, PredicateThatThrowsLeavesTheOctreesCorrect) {
+TEST(EarliestTime, PredicateThatThrowsLeavesTheOctreesCorrect) {
   Random random(13);
   const testing::Mesh a = testing::soup(random, 9000, 0.02);
   Positions now = a.positions;

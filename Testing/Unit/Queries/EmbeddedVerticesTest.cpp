@@ -119,7 +119,7 @@ TEST(EmbeddedVertices, MatchExactVolumesOnAGrid) {
 
 /// Histories of deforming solids: moved, inverted, cut, placed; any threads, rebuilt or refitted.
 TEST(EmbeddedVertices, MatchBruteForceForAnyNumberOfThreads) {
-  const auto life = [](const Settings& settings, double scale, double far) {
+  const auto resultsOf = [](const Settings& settings, double scale, double far) {
     Random random(2);
     OctreeBasedCD detection(settings);
     Solid solid = cells(4, random);
@@ -155,10 +155,11 @@ TEST(EmbeddedVertices, MatchBruteForceForAnyNumberOfThreads) {
   };
   for (const auto& [scale, far] :
        {std::pair{1.0, 0.0}, std::pair{1.0, 1e6}, std::pair{0x1p-40, 0.0}, std::pair{1e9, 3.0}}) {
-    const auto truth = life(settingsOf(Engine::BruteForce), scale, far);
+    const auto truth = resultsOf(settingsOf(Engine::BruteForce), scale, far);
     for (std::size_t frame = 0; frame < truth.size(); ++frame)
       EXPECT_TRUE(truth[frame].size() > 40 || (far > 1 && frame >= 6)) << frame;
-    for (const Settings& settings : octreeSettings()) EXPECT_EQ(life(settings, scale, far), truth);
+    for (const Settings& settings : octreeSettings())
+      EXPECT_EQ(resultsOf(settings, scale, far), truth);
   }
 }
 
