@@ -159,7 +159,7 @@ TEST(ContactMotions, AreDerivativesOfDistancesToShapes) {
             if (other.element != contact.element || other.vertices != contact.vertices) continue;
             // With the same features, the normal turns by at most the step over their distance, and
             // the closest points slide as little.
-            const double apart = std::abs(contact.distance + geometry->radii[0]);
+            const double apart = std::abs(contact.distance + elements->radii[0]);
             if ((other.normal - contact.normal).norm() > 10 * kStep / apart ||
                 (other.weights - contact.weights).norm() > 1000 * kStep)
               continue;
