@@ -8,7 +8,7 @@
 namespace palpate::benchmark {
 
 /// Prints tables and writes every figure as a row of CSV: table, scene, threads, engine, metric,
-/// value, hash, and on each row the machine, compiler, SIMD path and commit that gave it.
+/// value, hash, machine, compiler, SIMD path and commit.
 class Report {
  public:
   Report(const std::string& csvPath, std::string commit, std::string simdPath);
@@ -23,6 +23,9 @@ class Report {
   std::ofstream m_csv;
   std::string m_provenance;
 };
+
+/// The usual name of a path of palpate::simdPath(): "AVX-512" for "AVX3".
+std::string instructionSet(std::string simdPath);
 
 std::string milliseconds(double);  ///< three significant digits
 std::string times(double);         ///< "1.34x"

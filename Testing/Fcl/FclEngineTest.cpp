@@ -39,14 +39,14 @@ class Both {
   FclEngine fcl;
 };
 
-TEST(FclEngine, MeshesIntersectAsInOctreeBasedCD) {
+TEST(FclEngine, MeshIntersectionsMatchOctreeBasedCD) {
   Random random(1);
   Both both;
   Mesh sheets[] = {sheet(12, 0.5, 0), soup(random, 60, 0.2)};
   const GeometryId a = both.add(sheets[0]), b = both.add(sheets[1]);
   both.each([&](auto& engine) { engine.addCollisionPair(a, b, {Method::Intersection}); });
   std::size_t found = both.expectSame(a, b);
-  for (int frame = 0; frame < 10; ++frame) {  // far, so that boxes must follow
+  for (int frame = 0; frame < 10; ++frame) {  // far, so that the boxes must follow
     for (Vector3d& p : sheets[0].positions) p += Vector3d(0.02, 0, 0.03 * (frame % 3));
     both.each([&](auto& engine) { engine.setPositions(a, sheets[0].positions); });
     found += both.expectSame(a, b);
@@ -63,7 +63,7 @@ TEST(FclEngine, MeshesIntersectAsInOctreeBasedCD) {
   EXPECT_GT(found, 300u);
 }
 
-TEST(FclEngine, MeshesWithoutTrianglesHaveNone) {
+TEST(FclEngine, MeshesWithoutTrianglesHaveNoContacts) {
   FclEngine engine;
   const std::vector<Vector3d> positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const GeometryId a = engine.addTriangleMesh(positions, {}),
@@ -78,7 +78,7 @@ TEST(FclEngine, MeshesWithoutTrianglesHaveNone) {
   EXPECT_FALSE(engine.collisionData(a, b).validity().trusted);
 }
 
-TEST(FclEngine, ShapesByHand) {
+TEST(FclEngine, ShapesMatchHandComputedValues) {
   const auto only = [](const AnalyticalGeometry& a, const AnalyticalGeometry& b, double thickness) {
     FclEngine engine;
     const GeometryId first = engine.addAnalyticalGeometry(a),
@@ -110,7 +110,7 @@ TEST(FclEngine, ShapesByHand) {
   EXPECT_TRUE(only(ball, Plane{}, 0).empty());
 }
 
-TEST(FclEngine, WhatFclCannotIsRefusedByName) {
+TEST(FclEngine, UnsupportedPairsThrowErrorsThatNameThem) {
   FclEngine engine;
   const std::vector<Vector3d> positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const std::vector<Triangle> triangles{{0, 1, 2}};
@@ -146,7 +146,7 @@ TEST(FclEngine, WhatFclCannotIsRefusedByName) {
   EXPECT_TRUE(engine.pairs().empty());
 }
 
-TEST(FclEngine, BadInputIsRefusedAsByOctreeBasedCD) {
+TEST(FclEngine, BadInputThrowsTheErrorsOfOctreeBasedCD) {
   FclEngine engine;
   const auto refusal = [](auto&& call) {
     try {

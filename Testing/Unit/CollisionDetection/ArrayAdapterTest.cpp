@@ -1,11 +1,11 @@
 #include <palpate/ArrayAdapter.h>
 
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 namespace palpate::testing {
 namespace {
 
-/// As simulators keep them: contiguous vectors of N, behind a pointer.
+/// Like the arrays of simulators: a pointer to contiguous vectors of N numbers.
 template <class T, int N>
 class VecArray {
  public:
@@ -31,18 +31,19 @@ struct Arrays {
   VecArray<int, 3> triangles;
 };
 
-Arrays arraysOf(const Thing& thing) {
+Arrays arraysOf(const TestGeometry& geometry) {
   Arrays arrays;
-  for (const Vector3d& p : thing.positions) arrays.positions.push_back(p);
-  for (const auto& [a, b, c] : thing.triangles)
+  for (const Vector3d& p : geometry.positions) arrays.positions.push_back(p);
+  for (const auto& [a, b, c] : geometry.triangles)
     arrays.triangles.push_back(
         Eigen::Vector3i(static_cast<int>(a), static_cast<int>(b), static_cast<int>(c)));
   return arrays;
 }
 
-TEST(ArrayAdapter, GivesTheSameContactsAsSpansDo) {
+TEST(ArrayAdapter, GivesTheSameContactsAsSpans) {
   Random random(81);
-  const Thing first = things(sheet(6, 0.5, 0.3)), second = things(soup(random, 60, 0.1));
+  const TestGeometry first = testGeometry(sheet(6, 0.5, 0.3)),
+                     second = testGeometry(soup(random, 60, 0.1));
   const PairSettings settings{Method::Proximity, 0.1, Contacts::All};
   const CollisionData truth = answer(first, second, settings);
 

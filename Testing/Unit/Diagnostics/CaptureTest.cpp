@@ -42,7 +42,7 @@ class Capture : public ::testing::Test {
     std::ofstream(file(), std::ios::binary | std::ios::trunc) << text;
   }
 
-  /// The file is refused, by its name and with `reason`.
+  /// Expects that the file is refused with its name and `reason`.
   void expectRefused(const std::string& reason) const {
     try {
       readCapture(file());
@@ -136,7 +136,7 @@ TEST_F(Capture, ReplaysTheLastFrame) {
             detection.collisionData(a, a).hash());
 }
 
-TEST_F(Capture, KeepsThePairOfAnAuditsFailure) {
+TEST_F(Capture, KeepsThePairOfAnAuditFailure) {
   const OctreeBasedCD detection = movedScene();
   const GeometryId a{1}, b{2};
   const CollisionData& whole = detection.collisionData(b, a);
@@ -179,7 +179,7 @@ CollisionProblem smallProblem() {
   return problem;
 }
 
-TEST_F(Capture, IsExact) {
+TEST_F(Capture, KeepsEveryBit) {
   writeCapture(smallProblem(), file());
   const CollisionProblem read = readCapture(file());
   expectSame(read, smallProblem());
@@ -188,7 +188,7 @@ TEST_F(Capture, IsExact) {
   expectSame(readCapture(file()), CollisionProblem());
 }
 
-TEST_F(Capture, RefusesEveryFileCutOff) {
+TEST_F(Capture, RefusesTruncatedFiles) {
   writeCapture(smallProblem(), file());
   const std::string whole = textOf(file());
   ASSERT_TRUE(whole.ends_with("end\n"));
@@ -204,7 +204,7 @@ TEST_F(Capture, RefusesEveryFileCutOff) {
   expectRefused("it is not a capture");
 }
 
-TEST_F(Capture, RefusesWhatIsWrongByName) {
+TEST_F(Capture, ErrorsNameTheFault) {
   expectRefused("cannot be read");
   fs::create_directory(file());
   expectRefused("cannot be read");
@@ -273,7 +273,7 @@ TEST_F(Capture, ReadsEarlierVersions) {
   EXPECT_EQ(asVersion(2).pairs[0].settings.method, smallProblem().pairs[0].settings.method);
   replaceAll(" -1p+0\n", "\n");  // tolerance
   const CollisionProblem read = asVersion(1);
-  EXPECT_EQ(read.pairs[0].settings.method, Method::Proximity);  // for which Auto stood
+  EXPECT_EQ(read.pairs[0].settings.method, Method::Proximity);  // methods that Auto chose
   EXPECT_EQ(read.pairs[0].settings.motionTolerance, PairSettings().motionTolerance);
 }
 
@@ -292,11 +292,11 @@ TEST_F(Capture, RefusesNanAndInfinity) {
   }
 }
 
-TEST_F(Capture, LeavesNothingHalfWritten) {
+TEST_F(Capture, LeavesNoPartialFile) {
   const fs::path nowhere = m_folder / "missing" / "file.capture";
   EXPECT_THROW(writeCapture(smallProblem(), nowhere), Error);
   EXPECT_EQ(fileCount(), 0u);
-  // A folder in the file's place: the rename fails.
+  // A folder has the file's name, so the rename fails.
   fs::create_directories(file() / "full");
   try {
     writeCapture(smallProblem(), file());
@@ -306,7 +306,7 @@ TEST_F(Capture, LeavesNothingHalfWritten) {
     EXPECT_NE(std::string(error.what()).find(file().string()), std::string::npos);
   }
   EXPECT_EQ(fileCount(), 1u);
-  // Part of it written, no more room: what was there stays.
+  // The disk is full after a part: the existing file stays.
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
   writeCapture(CollisionProblem(), file("kept.capture"));
   fs::create_symlink("/dev/full", file("kept.capture.part"));

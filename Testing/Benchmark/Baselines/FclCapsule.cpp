@@ -1,6 +1,6 @@
 // FCL 0.7: BVHModel<OBBRSS<double>>, refitted, against a capsule through collide(), which gives one
 // contact for each triangle that overlaps it.
-#include "Peers/FclCapsule.h"
+#include "Baselines/FclCapsule.h"
 
 #include "Measure.h"
 

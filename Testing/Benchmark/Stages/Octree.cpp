@@ -1,5 +1,5 @@
 // Boxes to octree: as shipped, and rebuilt from sorted keys every frame.
-#include "Arrows/Arrow.h"
+#include "Stages/TimeStage.h"
 
 using namespace palpate;
 using namespace palpate::benchmark;

@@ -3,7 +3,7 @@
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <gtest/gtest.h>
 
@@ -12,8 +12,9 @@
 #include <utility>
 #include <vector>
 
-// Method::Auto, the default, for every pair of geometry types: accepted wherever any method is, the
-// contacts of Method::Continuous where features move and of Method::Proximity where they rest.
+// Method::Auto, the default, for every pair of geometry types. It is accepted where any other
+// method is. Its contacts are those of Method::Continuous where features move, and of
+// Method::Proximity where they rest.
 
 namespace palpate::testing {
 namespace {
@@ -24,7 +25,7 @@ using Eigen::Matrix3d;
 struct Body {
   std::string name;
   std::function<GeometryId(OctreeBasedCD&)> add;
-  Positions before, now;  ///< none of a shape
+  Positions before, now;  ///< empty for a shape
   Vector3d movedBy = Vector3d::Zero();
   Matrix3d turnedBy = Matrix3d::Identity();
 
@@ -42,9 +43,9 @@ struct Body {
   }
 };
 
-Body bodyOf(Random& random, std::string name, Thing thing) {
-  Body body{std::move(name), {}, thing.positions, moved(random, thing.positions, 0.08)};
-  body.add = [thing](OctreeBasedCD& collisions) { return thing.addTo(collisions); };
+Body bodyOf(Random& random, std::string name, TestGeometry geometry) {
+  Body body{std::move(name), {}, geometry.positions, moved(random, geometry.positions, 0.08)};
+  body.add = [geometry](OctreeBasedCD& collisions) { return geometry.addTo(collisions); };
   return body;
 }
 
@@ -71,7 +72,7 @@ Body tetrahedra(Random& random) {
 
 std::vector<Body> bodies(Random& random) {
   std::vector<Body> all;
-  all.push_back(bodyOf(random, "triangles", things(sphere(6, 8, {0.5, 0.5, 0.5}, 0.35))));
+  all.push_back(bodyOf(random, "triangles", testGeometry(sphere(6, 8, {0.5, 0.5, 0.5}, 0.35))));
   all.push_back(bodyOf(random, "lines", thread(random, 40, 0.15, 0.0, false)));
   all.push_back(bodyOf(random, "thick lines", thread(random, 40, 0.15, 0.02, true)));
   all.push_back(bodyOf(random, "points", particles(random, 80, 0.0)));
@@ -86,7 +87,7 @@ std::vector<Body> bodies(Random& random) {
   return all;
 }
 
-/// One pair in a step of its own.
+/// One pair in one step.
 class Pair {
  public:
   Pair(const Body& a, const Body& b, const PairSettings& settings, Engine engine = Engine::Octree,
@@ -98,7 +99,7 @@ class Pair {
   }
   const CollisionData& detect(bool moves) {
     if (m_first.isShape() || m_second.isShape()) {
-      // Shapes are placed before the step and in it; others get both ends.
+      // Shapes are placed before the step and in it. For other geometries both ends are set.
       for (const auto& [body, id] : both()) body->place(m_collisions, id, false);
       m_collisions.advance();
       for (const auto& [body, id] : both()) {
@@ -160,7 +161,7 @@ void forEachPair(F&& f) {
     }
 }
 
-TEST(AutoKinds, IsAcceptedWhereverAnyMethodIs) {
+TEST(AutoGeometryTypes, AutoIsAcceptedWhereAnyOtherMethodIs) {
   std::size_t refused = 0;
   forEachPair([&](const Body& a, const Body& b) {
     for (const double thickness : {0.0, 0.1}) {
@@ -174,7 +175,7 @@ TEST(AutoKinds, IsAcceptedWhereverAnyMethodIs) {
   EXPECT_EQ(refused, 2u * 4u);  // each shape with itself
 }
 
-TEST(AutoKinds, AnswersAsTheMethodThatItNames) {
+TEST(AutoGeometryTypes, ContactsMatchTheReportedMethod) {
   std::size_t contacts = 0, continuous = 0, proximity = 0;  // the last two: pairs with contacts
   forEachPair([&](const Body& a, const Body& b) {
     if (isOfTriangles(a) && isOfTriangles(b)) return;  // AutoTest.cpp
@@ -214,7 +215,7 @@ TEST(AutoKinds, AnswersAsTheMethodThatItNames) {
 }
 
 /// The method changes from frame to frame, and with it the boxes of the octrees.
-TEST(AutoKinds, ChangesItsMethodFromFrameToFrame) {
+TEST(AutoGeometryTypes, MethodMayChangeFromFrameToFrame) {
   forEachPair([&](const Body& a, const Body& b) {
     if (isOfTriangles(a) && isOfTriangles(b)) return;
     const PairSettings automatic{Method::Auto, 0.05};
@@ -225,8 +226,8 @@ TEST(AutoKinds, ChangesItsMethodFromFrameToFrame) {
   });
 }
 
-/// The tolerance belongs to Auto: other methods refuse it by name, unless it is negative.
-TEST(AutoKinds, OthersRefuseATolerance) {
+/// The motion tolerance belongs to Auto. Other methods refuse it by name, unless it is negative.
+TEST(AutoGeometryTypes, OtherMethodsRefuseAMotionTolerance) {
   OctreeBasedCD collisions;
   const Mesh organ = sheet(2, 0.0, 0.0);
   const GeometryId a = collisions.addTriangleMesh(organ.positions, organ.triangles),
@@ -253,8 +254,8 @@ TEST(AutoKinds, OthersRefuseATolerance) {
   EXPECT_EQ(collisions.pairs()[0].settings.motionTolerance, 0.25);
 }
 
-/// A newcomer's first pair: a suture against itself and against an organ, with no settings at all.
-TEST(AutoKinds, NeedsNoSettingsForASuture) {
+/// A first pair of a new user: a suture against itself and against an organ, with default settings.
+TEST(AutoGeometryTypes, SutureNeedsNoSettings) {
   OctreeBasedCD collisions;
   const Mesh organ = sheet(6, 0.0, 0.0);
   const GeometryId tissue = collisions.addTriangleMesh(organ.positions, organ.triangles);

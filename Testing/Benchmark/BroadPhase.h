@@ -12,7 +12,7 @@
 
 namespace palpate::benchmark {
 
-/// What every engine is given before the clock starts: which triangles, which meshes against which.
+/// The input of every engine before the clock starts: triangles, and pairs of meshes.
 struct Task {
   std::vector<std::vector<Triangle>> meshes;
   std::vector<std::array<std::size_t, 2>>
@@ -24,40 +24,39 @@ struct Task {
 /// One position array per mesh of the task.
 using Positions = std::vector<std::vector<Eigen::Vector3d>>;
 
-/// An engine that answers a frame's positions with all pairs of triangles whose boxes overlap, in
-/// memory and in the order found. Self-collision: each unordered pair once, a < b, no vertex
-/// shared.
-class Peer {
+/// An engine that finds all pairs of triangles whose boxes overlap, in memory and in the order
+/// found: Palpate or a baseline. In self-collision it finds each unordered pair once, with a < b
+/// and without pairs that share a vertex.
+class BroadPhase {
  public:
-  virtual ~Peer() = default;
+  virtual ~BroadPhase() = default;
   virtual std::string name() const = 0;
-  virtual bool rebuilds() const = 0;  ///< from nothing every frame
+  virtual bool rebuilds() const = 0;  ///< builds its trees anew in every frame
   virtual void prepare(const Task&, const Positions&) = 0;
-  /// A frame: update() to boxes and trees, collide() to pairs. The clock runs over both.
+  /// A frame: update() makes boxes and trees, collide() finds pairs. The clock runs over both.
   virtual void update(const Positions&) = 0;
   virtual void collide() = 0;
-  /// The last frame's pairs, sorted; outside the clock.
+  /// The last frame's pairs, sorted. This is not timed.
   virtual std::vector<ElementPair> candidates(std::size_t pair) const = 0;
 };
 
-std::unique_ptr<Peer> makeEmbreeRefit();
-std::unique_ptr<Peer> makeEmbreeMorton();
-std::unique_ptr<Peer> makeBullet();
-std::unique_ptr<Peer> makeFcl();
-std::unique_ptr<Peer> makeCgal();
+std::unique_ptr<BroadPhase> makeEmbreeRefit();
+std::unique_ptr<BroadPhase> makeEmbreeMorton();
+std::unique_ptr<BroadPhase> makeBullet();
+std::unique_ptr<BroadPhase> makeFcl();
+std::unique_ptr<BroadPhase> makeCgal();
 
-/// Which points are inside a closed body, with the nearest point of its surface: how long it took
-/// without the building of its trees, how many they are, and their depths' sum.
+/// The points inside a closed body, with the nearest points of its surface.
 struct InsideAnswer {
-  double milliseconds = 0;
-  std::size_t inside = 0;
-  double depth = 0;
+  double milliseconds = 0;  ///< without building the trees
+  std::size_t inside = 0;   ///< number of points
+  double depth = 0;         ///< sum of their depths
 };
 InsideAnswer insideByCgal(const std::vector<Eigen::Vector3d>& positions,
                           const std::vector<Triangle>& triangles,
                           const std::vector<Eigen::Vector3d>& points);
 
-/// Pairs found, one list for each mesh pair and thread, so that nothing is shared; keeps its
+/// One list of pairs for each mesh pair and thread, so that threads share none. It keeps its
 /// capacity.
 class PairLists {
  public:

@@ -1,5 +1,5 @@
-// Contacts to sorted contacts. (Candidate pairs are sorted when asked for, outside of a frame.)
-#include "Arrows/Arrow.h"
+// Contacts to sorted contacts. (Candidate pairs are sorted on demand, outside of a frame.)
+#include "Stages/TimeStage.h"
 
 using namespace palpate;
 using namespace palpate::benchmark;

@@ -1,6 +1,6 @@
 // CGAL 5.5: box_intersection_d on pointers to boxes (its manual: for boxes larger than a pointer),
 // closed boxes, the default cutoff; Parallel_tag with more than one thread.
-#include "Peers/Peer.h"
+#include "BroadPhase.h"
 
 #include <CGAL/Box_intersection_d/Box_with_info_d.h>
 #include <CGAL/box_intersection_d.h>
@@ -23,7 +23,7 @@ using Box =
     CGAL::Box_intersection_d::Box_with_info_d<double, 3, std::uint32_t,
                                               CGAL::Box_intersection_d::ID_FROM_BOX_ADDRESS>;
 
-class Cgal : public Peer {
+class Cgal : public BroadPhase {
  public:
   std::string name() const override { return "CGAL 5.5 box_intersection_d"; }
   bool rebuilds() const override { return true; }
@@ -138,6 +138,6 @@ InsideAnswer insideByCgal(const std::vector<Eigen::Vector3d>& positions,
   return answer;
 }
 
-std::unique_ptr<Peer> makeCgal() { return std::make_unique<Cgal>(); }
+std::unique_ptr<BroadPhase> makeCgal() { return std::make_unique<Cgal>(); }
 
 }  // namespace palpate::benchmark

@@ -2,7 +2,7 @@
 // own recursion with a traversal node that keeps every pair of leaves whose boxes, inflated,
 // overlap. FCL fits its boxes to the vertices, so the test carries the thickness. (endUpdateModel()
 // would fit boxes over the last two frames.)
-#include "Peers/Peer.h"
+#include "BroadPhase.h"
 
 #include <fcl/math/bv/utility.h>
 #include <fcl/geometry/bvh/BVH_model.h>
@@ -51,7 +51,7 @@ class Collector : public fcl::detail::BVHCollisionTraversalNode<Box> {
   const std::vector<Triangle>* m_within;
 };
 
-class Fcl : public Peer {
+class Fcl : public BroadPhase {
  public:
   std::string name() const override { return "FCL 0.7 BVHModel<AABB>, refit"; }
   bool rebuilds() const override { return false; }
@@ -113,6 +113,6 @@ class Fcl : public Peer {
 
 }  // namespace
 
-std::unique_ptr<Peer> makeFcl() { return std::make_unique<Fcl>(); }
+std::unique_ptr<BroadPhase> makeFcl() { return std::make_unique<Fcl>(); }
 
 }  // namespace palpate::benchmark

@@ -1,9 +1,8 @@
 #!/bin/bash
-# checkBreaks.sh ROOT COMPILER EIGEN: plants faults, one at a time, in a copy of the tree, and expects
-# check.sh to find each of them.
+# testChecks.sh ROOT COMPILER EIGEN: plants faults, one at a time, in a copy of the tree. check.sh must find each of them.
 set -uo pipefail
 root=$1 compiler=$2 eigen=$3
-check=$root/Testing/House/check.sh
+check=$root/Testing/Conventions/check.sh
 tree=$(mktemp -d)
 trap 'rm -rf "$tree"' EXIT
 missed=0

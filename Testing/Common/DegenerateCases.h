@@ -9,14 +9,14 @@
 
 namespace palpate::testing {
 
-/// Two small meshes that something is wrong with, and a step that brings them together.
-struct Specimen {
+/// Two small meshes with a degenerate feature, and a step that brings them together.
+struct DegenerateCase {
   std::string name;
   Mesh a, b;  ///< now
   double thickness = 0.125;
   Eigen::Vector3d aCameBy{0, 0, -0.5};  ///< displacement of a in the step
   Eigen::Vector3d bCameBy{0, 0, 0};
-  bool large = false;  ///< too many features for brute force over a mesh with itself
+  bool large = false;  ///< too many features for brute force on a mesh with itself
 
   std::vector<Eigen::Vector3d> aBefore() const { return before(a, aCameBy); }
   std::vector<Eigen::Vector3d> bBefore() const { return before(b, bCameBy); }
@@ -29,7 +29,7 @@ struct Specimen {
   }
 };
 
-/// One triangle with vertices of its own.
+/// Adds one triangle with three new vertices.
 inline void addTriangle(Mesh& mesh, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                         const Eigen::Vector3d& c) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
@@ -72,7 +72,7 @@ inline Mesh spike(const Eigen::Vector3d& tip, double size = 0.25) {
   return mesh;
 }
 
-namespace specimens {
+namespace degenerate {
 
 using Eigen::Vector3d;
 
@@ -170,11 +170,11 @@ inline Mesh denormal(double unit) {
   return mesh;
 }
 
-}  // namespace specimens
+}  // namespace degenerate
 
-/// Every method answers each of these as brute force does.
-inline std::vector<Specimen> zoo() {
-  using namespace specimens;
+/// The degenerate cases. Every method gives the same contacts for them as brute force does.
+inline std::vector<DegenerateCase> degenerateCases() {
+  using namespace degenerate;
   const double denorm = std::numeric_limits<double>::denorm_min();
   const Mesh sheet2 = flat(2, 0), sheet3 = flat(3, 0), sheet4 = flat(4, 0), none;
   Mesh one, twins, copies, strewn = flat(2, 0), twoLayers = flat(3, 0), far = flat(3, 0.0625);

@@ -1,7 +1,7 @@
 // Bullet 3: one btDbvt for each mesh, built once from the top, its volumes refitted bottom-up in
 // the way of Bullet's own soft bodies (btSoftBody::updateFaceTree), then collideTT. Bullet has no
 // parallel traversal of one pair of trees; with threads, meshes and pairs are spread over them.
-#include "Peers/Peer.h"
+#include "BroadPhase.h"
 
 #include <BulletCollision/BroadphaseCollision/btDbvt.h>
 
@@ -37,7 +37,7 @@ struct Within : btDbvt::ICollide {
   }
 };
 
-class Bullet : public Peer {
+class Bullet : public BroadPhase {
  public:
   std::string name() const override { return "Bullet 3.24 btDbvt, refit"; }
   bool rebuilds() const override { return false; }
@@ -114,6 +114,6 @@ class Bullet : public Peer {
 
 }  // namespace
 
-std::unique_ptr<Peer> makeBullet() { return std::make_unique<Bullet>(); }
+std::unique_ptr<BroadPhase> makeBullet() { return std::make_unique<Bullet>(); }
 
 }  // namespace palpate::benchmark

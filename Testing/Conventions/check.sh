@@ -1,6 +1,6 @@
 #!/bin/bash
-# check.sh CHECK ROOT [ARGUMENT...]: what the design promises of the house itself, one check a call.
-# Prints each line at fault and fails if there is one; 77: skipped. CheckBreaks.sh shows that each fails.
+# check.sh CHECK ROOT [ARGUMENT...]: checks one convention of the source tree, for example which module may include which.
+# Prints each line at fault. Exit code 0: no fault, 1: faults, 77: skipped. testChecks.sh shows that each check can fail.
 set -uo pipefail
 cd "$2"
 check=$1

@@ -10,7 +10,7 @@ namespace {
 using namespace palpate::benchmark;
 using palpate::testing::PublishedQueries;
 
-/// The mean is the row's time over its queries; the counters are of single calls.
+/// The mean is the time of the row over its queries. The counters are of single calls.
 void timeOfImpacts(benchmark::State& state, const PublishedQueries& set) {
   for (auto _ : state)
     for (const auto& query : set.queries) benchmark::DoNotOptimize(timeOfImpact(set.edges, query));
@@ -19,11 +19,11 @@ void timeOfImpacts(benchmark::State& state, const PublishedQueries& set) {
   state.counters["mean_us"] = times.mean;
   state.counters["median_us"] = times.median;
   state.counters["worst_us"] = times.worst;
-  state.counters["missed"] = times.missed;
-  state.counters["invented"] = times.invented;
+  state.counters["false_negatives"] = times.falseNegatives;
+  state.counters["false_positives"] = times.falsePositives;
 }
 
-/// One row a set.
+/// One row for each set.
 const bool registered = [] {
   for (const PublishedQueries& set : publishedSets(PALPATE_SHARED_DATA))
     benchmark::RegisterBenchmark(("timeOfImpact/" + set.name).c_str(), timeOfImpacts, set);

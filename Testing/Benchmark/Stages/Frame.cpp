@@ -1,5 +1,5 @@
 // Whole frames: positions to candidate pairs, and to contacts.
-#include "Arrows/Arrow.h"
+#include "Stages/TimeStage.h"
 
 using namespace palpate;
 using namespace palpate::benchmark;

@@ -8,7 +8,7 @@
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Replayed.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <gtest/gtest.h>
 
@@ -23,20 +23,20 @@
 #include <utility>
 #include <vector>
 
-// Lines and points: every pair of kinds against brute force and against the definition, written
-// here over <palpate/Distance.h>; what cannot be tested is refused.
+// Lines and points: every pair of geometry types against brute force and against the definition,
+// which is written here with <palpate/Distance.h>. Unsupported pairs are refused.
 
 namespace palpate::testing {
 namespace {
 
-TEST(Kinds, AnswerAsBruteForce) {
+TEST(GeometryTypes, MatchBruteForce) {
   Random random(1);
-  const Thing organ = things(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
-  const Thing line = thread(random, 150, 0.12, 0.01, false),
-              loop = thread(random, 80, 0.15, 0, true);
-  const Thing needle = tapered(random, thread(random, 60, 0.1, 0, false), 0.03);
-  const Thing smoke = particles(random, 200, 0.02), dust = particles(random, 300, 0),
-              drops = tapered(random, particles(random, 200, 0), 0.04);
+  const TestGeometry organ = testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
+  const TestGeometry line = thread(random, 150, 0.12, 0.01, false),
+                     loop = thread(random, 80, 0.15, 0, true);
+  const TestGeometry needle = tapered(random, thread(random, 60, 0.1, 0, false), 0.03);
+  const TestGeometry smoke = particles(random, 200, 0.02), dust = particles(random, 300, 0),
+                     drops = tapered(random, particles(random, 200, 0), 0.04);
   std::size_t contacts = 0;
   for (const auto& [a, b] : Pairs{{&organ, &line},
                                   {&line, &organ},
@@ -74,10 +74,11 @@ TEST(Kinds, AnswerAsBruteForce) {
 
 using Ids = std::vector<std::uint32_t>;
 
-/// The definition of All over public functions: vertices of others against triangles, points also
-/// against segments and, of the first of two point sets, against points.
-std::set<Ids> expectedVertexTriangle(const Thing& vertices, const Thing& others, double thickness,
-                                     bool ofSecond) {
+/// The definition of All with public functions: vertices of the other geometry against triangles,
+/// and points also against segments. For two point sets: points of the first against points of the
+/// second.
+std::set<Ids> expectedVertexTriangle(const TestGeometry& vertices, const TestGeometry& others,
+                                     double thickness, bool ofSecond) {
   std::set<Ids> ids;
   const bool points = vertices.type == GeometryType::Points;
   if (others.type != GeometryType::Triangles &&
@@ -103,7 +104,7 @@ std::set<Ids> expectedVertexTriangle(const Thing& vertices, const Thing& others,
   return ids;
 }
 
-std::set<Ids> expectedEdgeEdge(const Thing& a, const Thing& b, double thickness) {
+std::set<Ids> expectedEdgeEdge(const TestGeometry& a, const TestGeometry& b, double thickness) {
   std::set<Ids> ids;
   for (const Segment& p : a.edges())
     for (const Segment& q : b.edges()) {
@@ -111,8 +112,8 @@ std::set<Ids> expectedEdgeEdge(const Thing& a, const Thing& b, double thickness)
         continue;
       const EdgeEdgeDistance d = edgeEdgeDistance(a.positions[p[0]], a.positions[p[1]],
                                                   b.positions[q[0]], b.positions[q[1]]);
-      const auto radius = [](const Thing& thing, const Segment& edge, double weight) {
-        return (1 - weight) * thing.radius(edge[0]) + weight * thing.radius(edge[1]);
+      const auto radius = [](const TestGeometry& geometry, const Segment& edge, double weight) {
+        return (1 - weight) * geometry.radius(edge[0]) + weight * geometry.radius(edge[1]);
       };
       if (d.distance - (radius(a, p, d.weightA) + radius(b, q, d.weightB)) <= thickness)
         ids.insert({p[0], p[1], q[0], q[1]});
@@ -127,12 +128,12 @@ std::set<Ids> idsOf(const std::vector<Row>& rows, std::size_t words) {
   return ids;
 }
 
-TEST(Kinds, AllIsWhatTheDefinitionSays) {
+TEST(GeometryTypes, AllMatchesTheDefinition) {
   Random random(2);
-  const Thing organ = things(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
-  const Thing line = tapered(random, thread(random, 120, 0.12, 0, false), 0.03);
-  const Thing loop = thread(random, 80, 0.15, 0, true), drops = particles(random, 300, 0.03);
-  const Thing smoke = tapered(random, particles(random, 250, 0), 0.04);
+  const TestGeometry organ = testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
+  const TestGeometry line = tapered(random, thread(random, 120, 0.12, 0, false), 0.03);
+  const TestGeometry loop = thread(random, 80, 0.15, 0, true), drops = particles(random, 300, 0.03);
+  const TestGeometry smoke = tapered(random, particles(random, 250, 0), 0.04);
   constexpr double kThickness = 0.02;
   for (const auto& [a, b] : Pairs{{&organ, &line},
                                   {&line, &organ},
@@ -163,11 +164,12 @@ double least(const CollisionData& data) {
   return least;
 }
 
-TEST(Kinds, DistinctIsFewerAndKeepsTheNearest) {
+TEST(GeometryTypes, DistinctHasFewerContactsAndKeepsTheNearest) {
   Random random(3);
   for (int run = 0; run < 40; ++run) {
-    const Thing organ = things(soup(random, 30, 0.2));
-    const Thing line = thread(random, 12, 0.3, 0.02, false), loop = thread(random, 9, 0.3, 0, true);
+    const TestGeometry organ = testGeometry(soup(random, 30, 0.2));
+    const TestGeometry line = thread(random, 12, 0.3, 0.02, false),
+                       loop = thread(random, 9, 0.3, 0, true);
     for (const auto& [a, b] :
          Pairs{{&organ, &line}, {&line, &organ}, {&line, &loop}, {&loop, &line}, {&line, &line}}) {
       const CollisionData all = answer(*a, *b, {Method::Proximity, 0.1, Contacts::All}),
@@ -179,9 +181,9 @@ TEST(Kinds, DistinctIsFewerAndKeepsTheNearest) {
   }
 }
 
-// ---- Laws ----
+// ---- Invariances ----
 
-/// Vertices of the two exchanged.
+/// The vertices of the two geometries are exchanged.
 CollisionData swapped(const CollisionData& data) {
   CollisionData::Contents contents;
   contents.earliestTimeOfImpact = data.earliestTimeOfImpact();
@@ -204,12 +206,12 @@ CollisionData swapped(const CollisionData& data) {
   return CollisionData(contents);
 }
 
-TEST(Kinds, SwappingSwapsTheAnswer) {
+TEST(GeometryTypes, SwappingGeometriesSwapsContacts) {
   Random random(4);
-  const Thing organ = things(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
-  const Thing line = thread(random, 120, 0.1, 0.02, false),
-              loop = thread(random, 90, 0.1, 0.01, true);
-  const Thing drops = particles(random, 300, 0.03);
+  const TestGeometry organ = testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
+  const TestGeometry line = thread(random, 120, 0.1, 0.02, false),
+                     loop = thread(random, 90, 0.1, 0.01, true);
+  const TestGeometry drops = particles(random, 300, 0.03);
   for (const auto& [a, b] :
        Pairs{{&organ, &line}, {&line, &loop}, {&drops, &organ}, {&drops, &line}, {&loop, &drops}})
     for (const PairSettings& pair : settingsFor(0.02)) {
@@ -218,33 +220,33 @@ TEST(Kinds, SwappingSwapsTheAnswer) {
     }
 }
 
-TEST(Kinds, MotionThatIsExactChangesNothing) {
+TEST(GeometryTypes, ExactTransformationsChangeNothing) {
   Random random(5);
-  const auto onGrid = [](Thing thing) {
-    for (Vector3d& p : thing.positions)
+  const auto onGrid = [](TestGeometry geometry) {
+    for (Vector3d& p : geometry.positions)
       for (double& x : p) x = std::round(x * 1024) / 1024;
-    return thing;
+    return geometry;
   };
-  const Thing organ = onGrid(things(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4)));
-  const Thing line = onGrid(thread(random, 150, 0.1, 0.0625, false));
-  const Thing drops = onGrid(particles(random, 300, 0.0625));
-  const auto translated = [](Thing thing) {
-    for (Vector3d& p : thing.positions) p += Vector3d(512, -64, 8192);
-    return thing;
+  const TestGeometry organ = onGrid(testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4)));
+  const TestGeometry line = onGrid(thread(random, 150, 0.1, 0.0625, false));
+  const TestGeometry drops = onGrid(particles(random, 300, 0.0625));
+  const auto translated = [](TestGeometry geometry) {
+    for (Vector3d& p : geometry.positions) p += Vector3d(512, -64, 8192);
+    return geometry;
   };
-  const auto turned = [](Thing thing) {  // x to y to z to x
-    for (Vector3d& p : thing.positions) p = Vector3d(p[2], p[0], p[1]);
-    return thing;
+  const auto turned = [](TestGeometry geometry) {  // x to y to z to x
+    for (Vector3d& p : geometry.positions) p = Vector3d(p[2], p[0], p[1]);
+    return geometry;
   };
-  const Thing* const pairs[][2] = {{&organ, &line}, {&organ, &drops}, {&line, &line},
-                                   {&line, &drops}, {&drops, &line},  {&drops, &drops}};
+  const TestGeometry* const pairs[][2] = {{&organ, &line}, {&organ, &drops}, {&line, &line},
+                                          {&line, &drops}, {&drops, &line},  {&drops, &drops}};
   for (const auto& [a, b] : pairs)
     for (const Contacts contacts : {Contacts::Distinct, Contacts::All}) {
       const PairSettings pair{Method::Proximity, 0.03125, contacts};
       const Rows rows(answer(*a, *b, pair));
-      const Thing farA = translated(*a), farB = translated(*b);
+      const TestGeometry farA = translated(*a), farB = translated(*b);
       expectSameRows(Rows(answer(farA, a == b ? farA : farB, pair)), rows);
-      const Thing turnedA = turned(*a), turnedB = turned(*b);
+      const TestGeometry turnedA = turned(*a), turnedB = turned(*b);
       const Rows other(answer(turnedA, a == b ? turnedA : turnedB, pair));
       EXPECT_EQ(idsOf(other.edgeEdge, 4), idsOf(rows.edgeEdge, 4));
       EXPECT_EQ(idsOf(other.triangleVertex, 2), idsOf(rows.triangleVertex, 2));
@@ -253,11 +255,11 @@ TEST(Kinds, MotionThatIsExactChangesNothing) {
     }
 }
 
-/// Of two points neither is a triangle: the other one's place in the list.
-TEST(Kinds, SwappingTwoPointSetsTurnsTheirContacts) {
+/// In a contact of two points neither is a triangle: the second point takes its place in the list.
+TEST(GeometryTypes, SwappingPointSetsReversesTheirContacts) {
   Random random(8);
-  const Thing drops = tapered(random, particles(random, 300, 0), 0.05),
-              smoke = particles(random, 200, 0.02);
+  const TestGeometry drops = tapered(random, particles(random, 300, 0), 0.05),
+                     smoke = particles(random, 200, 0.02);
   const CollisionData there = answer(drops, smoke, {Method::Proximity, 0.02}),
                       back = answer(smoke, drops, {Method::Proximity, 0.02});
   ASSERT_EQ(there.vertexTriangle().size(), back.vertexTriangle().size());
@@ -275,20 +277,20 @@ TEST(Kinds, SwappingTwoPointSetsTurnsTheirContacts) {
   }
 }
 
-// ---- Meaning, by hand ----
+// ---- Hand-computed contacts ----
 
-Thing lineOf(Positions positions, double radius = 0.0) {
-  Thing line{GeometryType::Lines, std::move(positions), {}, {}, {radius}};
+TestGeometry lineOf(Positions positions, double radius = 0.0) {
+  TestGeometry line{GeometryType::Lines, std::move(positions), {}, {}, {radius}};
   for (std::uint32_t i = 1; i < line.positions.size(); ++i) line.segments.push_back({i - 1, i});
   return line;
 }
 
 constexpr PairSettings kNear{Method::Proximity, 0.25, Contacts::Distinct};
 
-TEST(Kinds, VertexOverEdgeIsOneContactUnderTheLowestEdge) {
+TEST(GeometryTypes, VertexOverEdgeIsOneContactOfTheLowestEdge) {
   // A thread's bend points down at the middle of a straight one.
-  const Thing bend = lineOf({{-1, 0, 1}, {0, 0, 0.125}, {1, 0, 1}});
-  const Thing straight = lineOf({{0, -4, 0}, {0, 4, 0}});
+  const TestGeometry bend = lineOf({{-1, 0, 1}, {0, 0, 0.125}, {1, 0, 1}});
+  const TestGeometry straight = lineOf({{0, -4, 0}, {0, 4, 0}});
   const CollisionData data = answer(bend, straight, kNear);
   ASSERT_EQ(data.edgeEdge().size(), 1u);
   const EdgeEdgeContact& c = data.edgeEdge()[0];
@@ -299,9 +301,9 @@ TEST(Kinds, VertexOverEdgeIsOneContactUnderTheLowestEdge) {
   EXPECT_EQ(c.normal, Vector3d(0, 0, 1));
 }
 
-TEST(Kinds, EndToEndIsOneContact) {
-  const Thing down = lineOf({{-1, 0, 1}, {0, 0, 0.125}, {1, 0, 1}});
-  const Thing up = lineOf({{0, -1, -1}, {0, 0, 0}, {0, 1, -1}}, 0.125);
+TEST(GeometryTypes, EndsOfTwoLinesGiveOneContact) {
+  const TestGeometry down = lineOf({{-1, 0, 1}, {0, 0, 0.125}, {1, 0, 1}});
+  const TestGeometry up = lineOf({{0, -1, -1}, {0, 0, 0}, {0, 1, -1}}, 0.125);
   const CollisionData data = answer(down, up, kNear);
   ASSERT_EQ(data.edgeEdge().size(), 1u);
   EXPECT_EQ(data.edgeEdge()[0].weightA, 1.0);
@@ -309,12 +311,12 @@ TEST(Kinds, EndToEndIsOneContact) {
   EXPECT_EQ(data.edgeEdge()[0].distance, 0.0);  // 0.125 less the radius
 }
 
-TEST(Kinds, ApexUnderAThreadIsFound) {
-  const Thing pyramid{GeometryType::Triangles,
-                      {{0, 0, 0}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, -1}, {1, -1, -1}},
-                      {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}},
-                      {}};
-  const Thing straight = lineOf({{-8, 0, 0.25}, {8, 0, 0.25}}, 0.5);
+TEST(GeometryTypes, ApexUnderAThreadIsAContact) {
+  const TestGeometry pyramid{GeometryType::Triangles,
+                             {{0, 0, 0}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, -1}, {1, -1, -1}},
+                             {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}},
+                             {}};
+  const TestGeometry straight = lineOf({{-8, 0, 0.25}, {8, 0, 0.25}}, 0.5);
   const CollisionData data = answer(pyramid, straight, kNear);
   EXPECT_TRUE(data.triangleVertex().empty());
   ASSERT_EQ(data.edgeEdge().size(), 1u);
@@ -323,18 +325,18 @@ TEST(Kinds, ApexUnderAThreadIsFound) {
   EXPECT_EQ(data.edgeEdge()[0].distance, -0.25);  // overlap
 }
 
-TEST(Kinds, ParallelEdgesMeetInTheMiddle) {
-  const Thing a = lineOf({{0, 0, 0}, {4, 0, 0}}), b = lineOf({{2, 0, 0.125}, {6, 0, 0.125}});
+TEST(GeometryTypes, ContactOfParallelEdgesIsInTheMiddle) {
+  const TestGeometry a = lineOf({{0, 0, 0}, {4, 0, 0}}), b = lineOf({{2, 0, 0.125}, {6, 0, 0.125}});
   const CollisionData data = answer(a, b, kNear);
   ASSERT_EQ(data.edgeEdge().size(), 1u);
   EXPECT_EQ(data.edgeEdge()[0].weightA, 0.75);
   EXPECT_EQ(data.edgeEdge()[0].weightB, 0.25);
 }
 
-TEST(Kinds, ParticleOnAPlaneReportsItsDepth) {
-  const Thing ground{
+TEST(GeometryTypes, ParticleOnAPlaneReportsItsDepth) {
+  const TestGeometry ground{
       GeometryType::Triangles, {{-4, -4, 0}, {4, -4, 0}, {0, 4, 0}}, {{0, 1, 2}}, {}};
-  const Thing drop{GeometryType::Points, {{0, 0, 0.25}, {0, 0, -3}}, {}, {}, {0.5, 1.0}};
+  const TestGeometry drop{GeometryType::Points, {{0, 0, 0.25}, {0, 0, -3}}, {}, {}, {0.5, 1.0}};
   const CollisionData data = answer(drop, ground, {Method::Proximity, 0.0, Contacts::Distinct});
   ASSERT_EQ(data.vertexTriangle().size(), 1u);
   EXPECT_EQ(data.vertexTriangle()[0].vertex, 0u);
@@ -342,13 +344,13 @@ TEST(Kinds, ParticleOnAPlaneReportsItsDepth) {
   EXPECT_EQ(data.vertexTriangle()[0].normal, Vector3d(0, 0, 1));
 }
 
-TEST(Kinds, ParticlesMeetThreadsAndEachOther) {
-  const Thing thread = lineOf({{0, 0, 0}, {4, 0, 0}, {4, 4, 0}}, 0.125);
-  const Thing drops{GeometryType::Points,
-                    {{1, 0, 0.5}, {4.25, -0.25, 0}, {9, 9, 9}, {1, 0.25, 0.5}},
-                    {},
-                    {},
-                    {0.25}};
+TEST(GeometryTypes, ParticlesTouchThreadsAndEachOther) {
+  const TestGeometry thread = lineOf({{0, 0, 0}, {4, 0, 0}, {4, 4, 0}}, 0.125);
+  const TestGeometry drops{GeometryType::Points,
+                           {{1, 0, 0.5}, {4.25, -0.25, 0}, {9, 9, 9}, {1, 0.25, 0.5}},
+                           {},
+                           {},
+                           {0.25}};
   const PairSettings near{Method::Proximity, 0.25, Contacts::Distinct};
   const CollisionData data = answer(drops, thread, near);
   ASSERT_EQ(data.vertexTriangle().size(), 3u);
@@ -357,7 +359,8 @@ TEST(Kinds, ParticlesMeetThreadsAndEachOther) {
   EXPECT_EQ(over.barycentric, Vector3d(0.75, 0.25, 0));
   EXPECT_EQ(over.distance, 0.125);  // 0.5 less both radii
   EXPECT_EQ(over.normal, Vector3d(0, 0, 1));
-  EXPECT_EQ(corner.triangle, 0u);  // of the two segments at the corner the lower
+  EXPECT_EQ(corner.triangle,
+            0u);  // of the two segments at the corner, the one with the lower index
   EXPECT_EQ(corner.barycentric[0], 0.0);
   EXPECT_EQ(answer(drops, thread, {Method::Proximity, 0.25, Contacts::All}).vertexTriangle().size(),
             4u);
@@ -369,22 +372,22 @@ TEST(Kinds, ParticlesMeetThreadsAndEachOther) {
   EXPECT_EQ(self.vertexTriangle()[0].normal, Vector3d(0, -1, 0));
 }
 
-TEST(Kinds, ThickEndOfATaperIsNotHiddenByItsThinOne) {
-  // Both segments at the thick vertex come nearer to the particle, where they are thin.
-  Thing spindle = lineOf({{-2, 0, 0.5}, {0, 0, 0}, {2, 0, 0.5}});
+TEST(GeometryTypes, ThinEndOfATaperDoesNotSuppressItsThickEnd) {
+  // Both segments at the thick vertex are nearer to the particle at their thin ends.
+  TestGeometry spindle = lineOf({{-2, 0, 0.5}, {0, 0, 0}, {2, 0, 0.5}});
   spindle.radii = {0, 1, 0};
-  const Thing drop{GeometryType::Points, {{0, 0, 1.125}}, {}, {}, {0}};
+  const TestGeometry drop{GeometryType::Points, {{0, 0, 1.125}}, {}, {}, {0}};
   const CollisionData data = answer(drop, spindle, {Method::Proximity, 0.5, Contacts::Distinct});
   EXPECT_EQ(data.vertexTriangle().size(), 2u);
-  const Thing far = lineOf({{-2, 0, 0.5}, {0, 0, 0}, {2, 0, 0.5}}, 0.625);
+  const TestGeometry far = lineOf({{-2, 0, 0.5}, {0, 0, 0}, {2, 0, 0.5}}, 0.625);
   EXPECT_EQ(answer(drop, far, {Method::Proximity, 0.5, Contacts::Distinct}).vertexTriangle().size(),
             2u);
 }
 
-TEST(Kinds, ContinuousStopsAtTheRadius) {
-  const Thing ground{
+TEST(GeometryTypes, ContinuousStopsAtTheRadius) {
+  const TestGeometry ground{
       GeometryType::Triangles, {{-4, -4, 0}, {4, -4, 0}, {0, 4, 0}}, {{0, 1, 2}}, {}};
-  const Thing drop{GeometryType::Points, {{0, 0, 2}}, {}, {}, {0.5}};
+  const TestGeometry drop{GeometryType::Points, {{0, 0, 2}}, {}, {}, {0.5}};
   const CollisionData data = answer(settingsOf(Engine::Octree), drop, ground, {Method::Continuous},
                                     {{0, 0, -2}}, ground.positions);
   ASSERT_EQ(data.vertexTriangle().size(), 1u);
@@ -392,13 +395,13 @@ TEST(Kinds, ContinuousStopsAtTheRadius) {
   EXPECT_NEAR(data.vertexTriangle()[0].distance, 0.0, 1e-5);
 }
 
-std::set<Ids> pairsFoundIn(const Thing& line, const PairSettings& pair) {
+std::set<Ids> pairsFoundIn(const TestGeometry& line, const PairSettings& pair) {
   return idsOf(Rows(answer(line, line, pair)).edgeEdge, 4);
 }
 
-TEST(Kinds, RestDistanceLeavesOutNeighboursAlongTheThread) {
+TEST(GeometryTypes, RestDistanceExcludesNeighboursAlongTheThread) {
   // A hairpin with corners half a unit apart, ten units long: 0-1-2-3 and back at height 0.125.
-  const Thing hairpin =
+  const TestGeometry hairpin =
       lineOf({{0, 0, 0}, {4, 0, 0}, {5, 0, 0.0625}, {4, 0, 0.125}, {0, 0, 0.125}});
   PairSettings pair{Method::Proximity, 0.25, Contacts::All};
   const auto pairsFound = [&] { return pairsFoundIn(hairpin, pair); };
@@ -407,21 +410,21 @@ TEST(Kinds, RestDistanceLeavesOutNeighboursAlongTheThread) {
   EXPECT_EQ(pairsFound(), (std::set<Ids>{{0, 1, 3, 4}}));
   pair.restDistance = 2.5;
   EXPECT_TRUE(pairsFound().empty());
-  // Only the shape that it was added in counts.
+  // Only the positions given with the topology count as the rest positions.
   Positions stretched = hairpin.positions;
   stretched[2][0] = 400;
   EXPECT_EQ(Rows(answer(settingsOf(Engine::Octree), hairpin, hairpin, pair, stretched, stretched))
                 .edgeEdge.size(),
             0u);
-  // Round a closed thread the shorter way counts.
-  Thing ring = lineOf({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}});
+  // On a closed thread, the shorter way around counts.
+  TestGeometry ring = lineOf({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}});
   ring.segments.push_back({3, 0});
   pair = {Method::Proximity, 1.5, Contacts::All};
   EXPECT_EQ(answer(ring, ring, pair).edgeEdge().size(), 2u);
   pair.restDistance = 1.25;  // opposite edges are one apart, either way
   EXPECT_EQ(answer(ring, ring, pair).edgeEdge().size(), 0u);
-  // So does the shortest way between branches.
-  Thing branching = lineOf({{0, 0, 0}, {0, 0, 1}, {0, 0, 2}});
+  // The shortest way between branches counts, too.
+  TestGeometry branching = lineOf({{0, 0, 0}, {0, 0, 1}, {0, 0, 2}});
   branching.positions.insert(branching.positions.end(), {{1, 0, 1}, {1, 0, 2}});
   branching.segments.insert(branching.segments.end(), {{1, 3}, {3, 4}});
   pair = {Method::Proximity, 1.0, Contacts::All};
@@ -434,21 +437,21 @@ TEST(Kinds, RestDistanceLeavesOutNeighboursAlongTheThread) {
 
 // ---- Degenerate ----
 
-TEST(Kinds, DegeneratePointsAnswerAsBruteForce) {
+TEST(GeometryTypes, DegeneratePointsMatchBruteForce) {
   Random random(9);
   for (int run = 0; run < 20; ++run) {
     const auto onGrid = [&](GeometryType type, std::size_t count, double radius) {
-      Thing thing{type, {}, {}, {}, {radius}};
+      TestGeometry geometry{type, {}, {}, {}, {radius}};
       for (std::size_t v = 0; v < count; ++v) {
         const auto at = [&] { return static_cast<double>(random() % 3); };
         const double x = at(), y = at(), z = at();
-        thing.positions.push_back({x, y, z});
+        geometry.positions.push_back({x, y, z});
       }
-      return thing;
+      return geometry;
     };
-    const Thing drops = onGrid(GeometryType::Points, 20, run % 2 ? 0.25 : 0.0),
-                others = onGrid(GeometryType::Points, 20, 0.0);
-    Thing line = onGrid(GeometryType::Lines, 12, 0.25);  // some segments without length
+    const TestGeometry drops = onGrid(GeometryType::Points, 20, run % 2 ? 0.25 : 0.0),
+                       others = onGrid(GeometryType::Points, 20, 0.0);
+    TestGeometry line = onGrid(GeometryType::Lines, 12, 0.25);  // some segments without length
     for (std::uint32_t e = 0; e < 16; ++e) {
       const auto p = static_cast<std::uint32_t>(random() % 12);
       line.segments.push_back({p, static_cast<std::uint32_t>((p + 1 + random() % 11) % 12)});
@@ -471,47 +474,47 @@ TEST(Kinds, DegeneratePointsAnswerAsBruteForce) {
   }
 }
 
-TEST(Kinds, DegenerateLinesAnswerAsBruteForce) {
+TEST(GeometryTypes, DegenerateLinesMatchBruteForce) {
   Random random(6);
-  const Thing organ = things(sphere(4, 6, {1, 1, 1}, 1));
+  const TestGeometry organ = testGeometry(sphere(4, 6, {1, 1, 1}, 1));
   for (int run = 0; run < 30; ++run) {
-    Thing zoo{GeometryType::Lines, {}, {}, {}, {run % 2 ? 0.25 : 0.0}};
-    // On a coarse grid: coincident, parallel and collinear segments, some without length.
+    TestGeometry degenerate{GeometryType::Lines, {}, {}, {}, {run % 2 ? 0.25 : 0.0}};
+    // On a coarse grid: coincident, parallel and collinear segments, and some without length.
     for (int v = 0; v < 12; ++v) {
       const auto at = [&] { return static_cast<double>(random() % 3); };
       const double x = at(), y = at(), z = at();
-      zoo.positions.push_back({x, y, z});
+      degenerate.positions.push_back({x, y, z});
     }
     for (std::uint32_t e = 0; e < 16; ++e) {
       const auto p = static_cast<std::uint32_t>(random() % 12);
-      zoo.segments.push_back({p, static_cast<std::uint32_t>((p + 1 + random() % 11) % 12)});
+      degenerate.segments.push_back({p, static_cast<std::uint32_t>((p + 1 + random() % 11) % 12)});
     }
     for (const Contacts contacts : {Contacts::Distinct, Contacts::All})
-      for (const Thing* other : std::vector<const Thing*>{&organ, &zoo})
+      for (const TestGeometry* other : std::vector<const TestGeometry*>{&organ, &degenerate})
         for (const double thickness : {0.5, 1.0}) {
           const PairSettings pair{Method::Proximity, thickness, contacts};
-          const Rows truth(answer(settingsOf(Engine::BruteForce), zoo, *other, pair, zoo.positions,
-                                  other->positions));
-          expectSameRows(Rows(answer(zoo, *other, pair)), truth);
-          const CollisionData data = answer(zoo, *other, pair);
+          const Rows truth(answer(settingsOf(Engine::BruteForce), degenerate, *other, pair,
+                                  degenerate.positions, other->positions));
+          expectSameRows(Rows(answer(degenerate, *other, pair)), truth);
+          const CollisionData data = answer(degenerate, *other, pair);
           for (const auto& c : data.edgeEdge()) expectWellFormed(c);
         }
   }
 }
 
-// ---- Refused ----
+// ---- Refused calls ----
 
-/// The matrix of Docs/SupportMatrix.md is what the code accepts.
-TEST(Kinds, DocumentSaysWhatIsAnswered) {
+/// The matrix in Docs/SupportMatrix.md is what the code accepts.
+TEST(GeometryTypes, DocumentedSupportMatchesTheCode) {
   const Positions some{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const std::pair<Method, std::string> methods[] = {{Method::Intersection, "Intersection"},
                                                     {Method::Auto, "Auto"},
                                                     {Method::Proximity, "Proximity"},
                                                     {Method::Continuous, "Continuous"}};
   const std::string names[] = {"triangles", "lines", "points", "tetrahedra", "shapes"};
-  const Thing kinds[] = {{GeometryType::Triangles, some, {{0, 1, 2}}, {}},
-                         {GeometryType::Lines, some, {}, {{0, 1}}},
-                         {GeometryType::Points, some, {}, {}}};
+  const TestGeometry kinds[] = {{GeometryType::Triangles, some, {{0, 1, 2}}, {}},
+                                {GeometryType::Lines, some, {}, {{0, 1}}},
+                                {GeometryType::Points, some, {}, {}}};
   const auto add = [&](OctreeBasedCD& detection, int kind) {
     if (kind == 3) return detection.addTetrahedralMesh(some, std::vector<Tetrahedron>{});
     return kind == 4 ? detection.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1.0})
@@ -537,7 +540,8 @@ TEST(Kinds, DocumentSaysWhatIsAnswered) {
             EXPECT_EQ(error.code(), ErrorCode::UnsupportedMethod);
           }
         }
-        EXPECT_TRUE(ways == 0 || ways == 1 + (a == b && a != 4));  // no shape meets itself
+        EXPECT_TRUE(ways == 0 ||
+                    ways == 1 + (a == b && a != 4));  // a shape does not collide with itself
         if (ways == 0) continue;
         ++accepted;
         cell += (cell.empty() ? "`" : ", `") + name + "`";
@@ -557,7 +561,7 @@ TEST(Kinds, DocumentSaysWhatIsAnswered) {
       {ConvexHull{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, "hull"}};
   for (const auto& [shape, name] : shapes) {
     std::string row = "| **" + name + "** |";
-    for (const Thing& kind : kinds) {
+    for (const TestGeometry& kind : kinds) {
       OctreeBasedCD detection;
       const GeometryId mesh = kind.addTo(detection), tool = detection.addAnalyticalGeometry(shape);
       detection.addCollisionPair(mesh, tool, {Method::Auto, 1.0});
@@ -569,7 +573,7 @@ TEST(Kinds, DocumentSaysWhatIsAnswered) {
   }
 }
 
-TEST(Kinds, BadInputIsRefusedByName) {
+TEST(GeometryTypes, BadInputThrowsErrorsThatNameIt) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
   const Positions two{{0, 0, 0}, {1, 0, 0}};
@@ -601,7 +605,7 @@ TEST(Kinds, BadInputIsRefusedByName) {
                    points = collisions.addPointSet(two, 1.0),
                    thick = collisions.addLineMesh(two, one, std::vector<double>{1, 2}),
                    mesh = collisions.addTriangleMesh(two, std::vector<Triangle>{{0, 1, 0}});
-  EXPECT_EQ(line, GeometryId{0});  // nothing refused took an id
+  EXPECT_EQ(line, GeometryId{0});  // refused calls used no id
   const PairSettings near{Method::Proximity, 1.0};
   for (const GeometryId other : {mesh, line, points})
     expectRefused(Code::UnsupportedMethod, "use Auto, Proximity or Continuous",
@@ -629,13 +633,13 @@ TEST(Kinds, BadInputIsRefusedByName) {
   collisions.addCollisionPair(thick, mesh, {Method::Proximity, 0.0});  // the radii are not 0
 }
 
-// ---- Round the library ----
+// ---- Captures ----
 
-TEST(Kinds, CapturesHoldThem) {
+TEST(GeometryTypes, CapturesIncludeThem) {
   Random random(7);
-  const Thing organ = things(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
-  const Thing line = tapered(random, thread(random, 100, 0.1, 0, false), 0.02),
-              drops = particles(random, 50, 0.03);
+  const TestGeometry organ = testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
+  const TestGeometry line = tapered(random, thread(random, 100, 0.1, 0, false), 0.02),
+                     drops = particles(random, 50, 0.03);
   Settings audited = settingsOf(Engine::Octree);
   audited.audit.features = 100000;
   OctreeBasedCD collisions(audited);

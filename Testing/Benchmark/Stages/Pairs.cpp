@@ -1,5 +1,5 @@
-// Octrees to candidate pairs: of trees as shipped, and of fresh ones.
-#include "Arrows/Arrow.h"
+// Octrees to candidate pairs: of octrees as shipped, and of rebuilt ones.
+#include "Stages/TimeStage.h"
 
 using namespace palpate;
 using namespace palpate::benchmark;

@@ -1,4 +1,4 @@
-#include "Arrows/Arrow.h"
+#include "Stages/TimeStage.h"
 
 #include "PalpateEngine.h"
 #include "Workload.h"

@@ -1,6 +1,6 @@
 // FCL 0.7: BVHModel<OBBRSS<double>>, one refitted, one placed by a transform, through collide(),
 // which gives one contact for each pair of triangles that intersect.
-#include "Peers/FclBody.h"
+#include "Baselines/FclBody.h"
 
 #include "Measure.h"
 

@@ -1,5 +1,5 @@
 // Candidate pairs to proximity contacts.
-#include "Arrows/Arrow.h"
+#include "Stages/TimeStage.h"
 
 using namespace palpate;
 using namespace palpate::benchmark;

@@ -1,5 +1,5 @@
 // Positions to float boxes.
-#include "Arrows/Arrow.h"
+#include "Stages/TimeStage.h"
 
 using namespace palpate;
 using namespace palpate::benchmark;

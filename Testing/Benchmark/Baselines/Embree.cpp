@@ -3,7 +3,7 @@
 // Leaves of the tree that is refitted hold several primitives, all of which rtcCollide reports:
 // "the user is expected to [...] filter out false positives in the callback", here by the boxes
 // that the bounds callback kept.
-#include "Peers/Peer.h"
+#include "BroadPhase.h"
 
 #include <embree3/rtcore.h>
 
@@ -77,7 +77,7 @@ void collectWithin(void* user, RTCCollision* collisions, unsigned count) {
   }
 }
 
-class Embree : public Peer {
+class Embree : public BroadPhase {
  public:
   explicit Embree(RTCBuildQuality quality) : m_quality(quality) {}
   ~Embree() override { release(); }
@@ -168,9 +168,11 @@ class Embree : public Peer {
 
 }  // namespace
 
-std::unique_ptr<Peer> makeEmbreeRefit() {
+std::unique_ptr<BroadPhase> makeEmbreeRefit() {
   return std::make_unique<Embree>(RTC_BUILD_QUALITY_REFIT);
 }
-std::unique_ptr<Peer> makeEmbreeMorton() { return std::make_unique<Embree>(RTC_BUILD_QUALITY_LOW); }
+std::unique_ptr<BroadPhase> makeEmbreeMorton() {
+  return std::make_unique<Embree>(RTC_BUILD_QUALITY_LOW);
+}
 
 }  // namespace palpate::benchmark

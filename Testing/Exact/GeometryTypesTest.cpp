@@ -1,6 +1,6 @@
 #include <palpate/OctreeBasedCD.h>
 
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 #include "Unit/Math/RationalOracle.h"
 
 #include <gtest/gtest.h>
@@ -11,8 +11,9 @@
 #include <utility>
 #include <vector>
 
-// Lines and points against rational arithmetic: which are near enough, and how near, on random and
-// on degenerate positions; impacts against distances along the step in 64 bits and more.
+// Lines and points against rational arithmetic: which features are within the thickness, and their
+// distances, on random and on degenerate positions. Impacts are compared with distances along the
+// step in 64 bits and more.
 
 namespace palpate::testing {
 namespace {
@@ -21,8 +22,8 @@ using oracle::Rational;
 using Ids = std::vector<std::uint32_t>;
 
 /// An element's vertices in exact numbers.
-Rational radiusOf(const Thing& thing, std::uint32_t vertex) {
-  return Rational(thing.radius(vertex));
+Rational radiusOf(const TestGeometry& geometry, std::uint32_t vertex) {
+  return Rational(geometry.radius(vertex));
 }
 
 struct Exact {
@@ -34,7 +35,7 @@ struct Exact {
   }
 };
 
-Exact pointElement(const Thing& points, std::uint32_t v, const Thing& others,
+Exact pointElement(const TestGeometry& points, std::uint32_t v, const TestGeometry& others,
                    const Triangle& element) {
   const auto& p = others.positions;
   const auto& [i, j, k] = element;
@@ -45,7 +46,7 @@ Exact pointElement(const Thing& points, std::uint32_t v, const Thing& others,
           oracle::ulpOfLargestDifference({points.positions[v], p[i], p[j], p[k]})};
 }
 
-Exact edgeEdge(const Thing& a, const Segment& p, const Thing& b, const Segment& q) {
+Exact edgeEdge(const TestGeometry& a, const Segment& p, const TestGeometry& b, const Segment& q) {
   const auto &at = a.positions, &on = b.positions;
   const oracle::Closest closest = oracle::edgeEdge(at[p[0]], at[p[1]], on[q[0]], on[q[1]]);
   const Rational s = closest.weights[0], t = closest.weights[1];
@@ -55,11 +56,11 @@ Exact edgeEdge(const Thing& a, const Segment& p, const Thing& b, const Segment& 
           oracle::ulpOfLargestDifference({at[p[0]], at[p[1]], on[q[0]], on[q[1]]})};
 }
 
-/// Found must be what is near enough, but for those within rounding of it; distances too.
+/// The contacts are the features within the thickness, up to rounding, with their distances.
 std::size_t compare(const std::map<Ids, Exact>& all, const std::map<Ids, double>& found,
                     double thickness) {
   for (const auto& [ids, exact] : all) {
-    // Centres within 8 ulp, weights too; and the radii are rounded, and subtracted.
+    // Centres and weights are within 8 ulp. Radii are rounded and subtracted.
     const double error = 16 * exact.scale + 0x1p-51 * exact.radii.get_d(),
                  gap = exact.distance() - thickness;
     const auto place = found.find(ids);
@@ -72,16 +73,17 @@ std::size_t compare(const std::map<Ids, Exact>& all, const std::map<Ids, double>
   return found.size();
 }
 
-std::vector<Triangle> elementsOf(const Thing& thing) {
-  std::vector<Triangle> elements = thing.triangles;
-  for (const auto& [p, q] : thing.segments) elements.push_back({p, q, q});
-  for (std::uint32_t i = 0; thing.type == GeometryType::Points && i < thing.positions.size(); ++i)
+std::vector<Triangle> elementsOf(const TestGeometry& geometry) {
+  std::vector<Triangle> elements = geometry.triangles;
+  for (const auto& [p, q] : geometry.segments) elements.push_back({p, q, q});
+  for (std::uint32_t i = 0; geometry.type == GeometryType::Points && i < geometry.positions.size();
+       ++i)
     elements.push_back({i, i, i});
   return elements;
 }
 
 /// Points against lines or points, and lines against lines.
-std::size_t compareWithRationals(const Thing& a, const Thing& b, double thickness) {
+std::size_t compareWithRationals(const TestGeometry& a, const TestGeometry& b, double thickness) {
   const CollisionData data = answer(a, b, {Method::Proximity, thickness, Contacts::All});
   std::map<Ids, Exact> vertexTriangle, edges;
   std::map<Ids, double> foundVertexTriangle, foundEdges;
@@ -104,27 +106,28 @@ std::size_t compareWithRationals(const Thing& a, const Thing& b, double thicknes
          compare(edges, foundEdges, thickness);
 }
 
-/// On a coarse grid: coincident, collinear, without length.
-void snap(Thing& thing) {
-  for (Eigen::Vector3d& p : thing.positions)
+/// Moves positions to a coarse grid: coincident, collinear, without length.
+void snap(TestGeometry& geometry) {
+  for (Eigen::Vector3d& p : geometry.positions)
     for (double& x : p) x = std::round(4 * x) / 4;
 }
 
-TEST(ExactKinds, DistancesAreThoseOfRationalArithmetic) {
+TEST(ExactGeometryTypes, DistancesMatchRationalArithmetic) {
   Random random(1);
   std::size_t contacts = 0;
   for (int run = 0; run < 12; ++run) {
     const bool degenerate = run % 3 == 2, far = run % 3 == 1;
-    Thing line = thread(random, 24, 0.3, 0.02, run % 2), drops = particles(random, 30, 0.03),
-          smoke = particles(random, 30, 0.0), needle = thread(random, 20, 0.3, 0, false);
+    TestGeometry line = thread(random, 24, 0.3, 0.02, run % 2), drops = particles(random, 30, 0.03),
+                 smoke = particles(random, 30, 0.0), needle = thread(random, 20, 0.3, 0, false);
     smoke = tapered(random, smoke, 0.05);
     needle = tapered(random, needle, 0.05);
-    for (Thing* thing : {&line, &drops, &smoke, &needle}) {
-      if (degenerate) snap(*thing);
+    for (TestGeometry* geometry : {&line, &drops, &smoke, &needle}) {
+      if (degenerate) snap(*geometry);
       if (far)
-        for (Eigen::Vector3d& p : thing->positions) p += Eigen::Vector3d(1e6, -3e5, 7e4);
+        for (Eigen::Vector3d& p : geometry->positions) p += Eigen::Vector3d(1e6, -3e5, 7e4);
     }
-    // Where several weights are as near radii differ: tapered edges only in general position.
+    // Where several weights are equally near, radii differ. So tapered edges are tested in general
+    // position only.
     contacts += compareWithRationals(drops, line, 0.1) + compareWithRationals(smoke, line, 0.1) +
                 compareWithRationals(drops, smoke, 0.1) + compareWithRationals(drops, drops, 0.1) +
                 compareWithRationals(smoke, smoke, 0.0) + compareWithRationals(smoke, needle, 0.0);
@@ -141,7 +144,7 @@ TEST(ExactKinds, DistancesAreThoseOfRationalArithmetic) {
 using Wide = long double;
 using WideVector = Eigen::Matrix<Wide, 3, 1>;
 
-/// From a point to a segment, or to a point where it has no length.
+/// The distance from a point to a segment, or to a point if the segment has no length.
 Wide distanceTo(const WideVector& p, const WideVector& a, const WideVector& b) {
   const WideVector edge = b - a;
   const Wide square = edge.squaredNorm();
@@ -149,7 +152,7 @@ Wide distanceTo(const WideVector& p, const WideVector& a, const WideVector& b) {
   return (p - a - t * edge).norm();
 }
 
-/// Of a point that moves along a line past a segment: when they first are `reach` apart, or 2. The
+/// The first time at which a point that moves along a line is `reach` from a segment, or 2. The
 /// distance is convex in time.
 Wide firstTime(const Eigen::Vector3d& before, const Eigen::Vector3d& now, const Eigen::Vector3d& a,
                const Eigen::Vector3d& b, Wide reach, bool& close) {
@@ -173,17 +176,18 @@ Wide firstTime(const Eigen::Vector3d& before, const Eigen::Vector3d& now, const 
   return within;
 }
 
-TEST(ExactKinds, ImpactsAreTheFirst) {
+TEST(ExactGeometryTypes, ImpactTimesAreTheEarliest) {
   Random random(2);
   std::size_t impacts = 0;
   for (int run = 0; run < 90; ++run) {
     const double radius = run % 2 ? 0.05 : 0.0, thickness = run % 4 < 2 ? 0.02 : 0.0;
-    const Thing drops = particles(random, 20, radius);
-    Thing other = run % 3 ? particles(random, 15, 0.03) : thread(random, 15, 0.3, 0.03, false);
+    const TestGeometry drops = particles(random, 20, radius);
+    TestGeometry other =
+        run % 3 ? particles(random, 15, 0.03) : thread(random, 15, 0.3, 0.03, false);
     if (radius + thickness == 0.0) other.radii = {0.0};
     const Eigen::Vector3d drift = randomPoint(random, -0.3, 0.3);
     Positions now = moved(random, drops.positions, 0.5), drifted = other.positions;
-    if (radius + thickness == 0.0)  // aimed, or nothing would be hit
+    if (radius + thickness == 0.0)  // aimed at the other geometry, so that some touch
       for (std::size_t v = 0; v < now.size(); ++v) {
         const Eigen::Vector3d& target = other.positions[v % other.positions.size()];
         now[v] = 2 * target - drops.positions[v];
@@ -205,7 +209,7 @@ TEST(ExactKinds, ImpactsAreTheFirst) {
                                     other.positions[i], other.positions[k], reach, close);
         const auto place = found.find({v, t});
         if (close && reach > 0) continue;
-        if (reach == 0) {  // one that is aimed may pass by an ulp: what is found is near
+        if (reach == 0) {  // an aimed point may miss by an ulp; a reported contact is near
           EXPECT_TRUE(close || place == found.end());
           continue;
         }
@@ -219,12 +223,12 @@ TEST(ExactKinds, ImpactsAreTheFirst) {
   EXPECT_GT(impacts, 200u);
 }
 
-/// With no radius and no thickness, on positions where meeting is exact.
-TEST(ExactKinds, TouchesAreFoundExactly) {
-  const Thing drop{GeometryType::Points, {{0, 0, 2}, {3, 0, 2}, {1, 0, 0}}, {}, {}, {0}};
+/// Without radius and thickness, on positions where touching is exact.
+TEST(ExactGeometryTypes, TouchesAreFoundExactly) {
+  const TestGeometry drop{GeometryType::Points, {{0, 0, 2}, {3, 0, 2}, {1, 0, 0}}, {}, {}, {0}};
   const Positions now{{0, 0, -2}, {3, 0.0625, -2}, {5, 0, 0}};
-  const Thing wall{GeometryType::Points, {{0, 0, 1}, {3, 0, 0}, {2, 0, 0}}, {}, {}, {0}};
-  const auto hits = [&](const Thing& other, const Positions& otherNow) {
+  const TestGeometry wall{GeometryType::Points, {{0, 0, 1}, {3, 0, 0}, {2, 0, 0}}, {}, {}, {0}};
+  const auto hits = [&](const TestGeometry& other, const Positions& otherNow) {
     std::map<Ids, double> times;
     const CollisionData data = answer(settingsOf(Engine::Octree), drop, other,
                                       {Method::Continuous, 0.0, Contacts::All}, now, otherNow);
@@ -244,14 +248,14 @@ TEST(ExactKinds, TouchesAreFoundExactly) {
     }
   };
   expectTimes(hits(wall, wall.positions), {{{0, 0}, 0.25}, {{2, 1}, 0.5}, {{2, 2}, 0.25}});
-  // Across a segment, past its end, along it, and on a point of no length.
-  Thing line{GeometryType::Lines,
-             {{-1, 0, 1}, {1, 0, 1}, {4, 0, 0}, {4.5, 0, 0}, {2, 0, 0}, {2, 0, 0}},
-             {},
-             {{0, 1}, {2, 3}, {4, 5}},
-             {0}};
+  // Across a segment, past its end, along it, and onto a point without length.
+  TestGeometry line{GeometryType::Lines,
+                    {{-1, 0, 1}, {1, 0, 1}, {4, 0, 0}, {4.5, 0, 0}, {2, 0, 0}, {2, 0, 0}},
+                    {},
+                    {{0, 1}, {2, 3}, {4, 5}},
+                    {0}};
   expectTimes(hits(line, line.positions), {{{0, 0}, 0.25}, {{2, 1}, 0.75}, {{2, 2}, 0.25}});
-  // Which meets it: half as long.
+  // Half as long, so that it touches.
   Positions towards = line.positions;
   towards[0][2] = towards[1][2] = 5;
   expectTimes(hits(line, towards), {{{0, 0}, 0.125}, {{2, 1}, 0.75}, {{2, 2}, 0.25}});

@@ -14,14 +14,14 @@
 #include <utility>
 #include <vector>
 
-/// Geometries of every kind, and one frame of a pair of them.
+/// Random geometries of every type, and one frame of a pair of them.
 namespace palpate::testing {
 
 using Eigen::Vector3d;
 using Positions = std::vector<Vector3d>;
 
-/// A geometry of any kind.
-struct Thing {
+/// A geometry with vertices, of any type.
+struct TestGeometry {
   GeometryType type = GeometryType::Triangles;
   Positions positions;
   std::vector<Triangle> triangles;
@@ -55,16 +55,16 @@ struct Thing {
   }
 };
 
-inline Thing things(const Mesh& mesh) {
+inline TestGeometry testGeometry(const Mesh& mesh) {
   return {GeometryType::Triangles, mesh.positions, mesh.triangles, {}};
 }
 
-using Pairs = std::vector<std::pair<const Thing*, const Thing*>>;
+using Pairs = std::vector<std::pair<const TestGeometry*, const TestGeometry*>>;
 
 /// A random walk in the unit cube, closed or not.
-inline Thing thread(Random& random, std::uint32_t segments, double step, double radius,
-                    bool closed) {
-  Thing line{GeometryType::Lines, {randomPoint(random, 0.2, 0.8)}, {}, {}, {radius}};
+inline TestGeometry thread(Random& random, std::uint32_t segments, double step, double radius,
+                           bool closed) {
+  TestGeometry line{GeometryType::Lines, {randomPoint(random, 0.2, 0.8)}, {}, {}, {radius}};
   for (std::uint32_t i = 1; i <= segments; ++i) {
     line.positions.push_back((line.positions.back() + randomPoint(random, -step, step))
                                  .cwiseMax(Vector3d::Zero())
@@ -75,18 +75,18 @@ inline Thing thread(Random& random, std::uint32_t segments, double step, double 
   return line;
 }
 
-inline Thing particles(Random& random, std::size_t count, double radius) {
-  Thing points{GeometryType::Points, {}, {}, {}, {radius}};
+inline TestGeometry particles(Random& random, std::size_t count, double radius) {
+  TestGeometry points{GeometryType::Points, {}, {}, {}, {radius}};
   for (std::size_t i = 0; i < count; ++i) points.positions.push_back(randomPoint(random, 0, 1));
   return points;
 }
 
-/// Radii of its own for each vertex.
-inline Thing tapered(Random& random, Thing thing, double most) {
-  thing.radii.clear();
-  for (std::size_t v = 0; v < thing.positions.size(); ++v)
-    thing.radii.push_back(uniform(random, 0, most));
-  return thing;
+/// Gives each vertex its own radius.
+inline TestGeometry tapered(Random& random, TestGeometry geometry, double most) {
+  geometry.radii.clear();
+  for (std::size_t v = 0; v < geometry.positions.size(); ++v)
+    geometry.radii.push_back(uniform(random, 0, most));
+  return geometry;
 }
 
 inline Positions moved(Random& random, Positions positions, double most) {
@@ -95,7 +95,7 @@ inline Positions moved(Random& random, Positions positions, double most) {
 }
 
 /// One frame of a pair.
-inline CollisionData answer(const Settings& settings, const Thing& a, const Thing& b,
+inline CollisionData answer(const Settings& settings, const TestGeometry& a, const TestGeometry& b,
                             const PairSettings& pair, const Positions& nowA,
                             const Positions& nowB) {
   OctreeBasedCD collisions(settings);
@@ -110,7 +110,8 @@ inline CollisionData answer(const Settings& settings, const Thing& a, const Thin
   return collisions.collisionData(first, second);
 }
 
-inline CollisionData answer(const Thing& a, const Thing& b, const PairSettings& pair) {
+inline CollisionData answer(const TestGeometry& a, const TestGeometry& b,
+                            const PairSettings& pair) {
   return answer(settingsOf(Engine::Octree), a, b, pair, a.positions, b.positions);
 }
 
@@ -125,8 +126,9 @@ inline std::vector<PairSettings> settingsFor(double thickness, bool continuous =
   return all;
 }
 
-/// Octrees with any threads answer as brute force does, bit by bit; returns how many contacts.
-inline std::size_t expectOracle(Random& random, const Thing& a, const Thing& b,
+/// Expects the contacts of brute force, bit by bit, from octrees with any number of threads.
+/// Returns how many contacts there are.
+inline std::size_t expectOracle(Random& random, const TestGeometry& a, const TestGeometry& b,
                                 const PairSettings& pair) {
   const Positions nowA = moved(random, a.positions, 0.03), nowB = moved(random, b.positions, 0.03);
   const Rows truth(answer(settingsOf(Engine::BruteForce), a, b, pair, nowA, nowB));

@@ -14,8 +14,8 @@ enum class Through {
 
 using Stage = double (*)(const FrameStatistics::Stages&);  ///< milliseconds
 
-/// Frames of a scene (arguments: its number, threads); the time is that of one stage, as the
-/// frame's own statistics have it, so that each arrow is timed within the frame that it belongs to.
+/// Runs frames of a scene (arguments: its number, threads). The time is that of one stage from the
+/// frame's statistics, so that each stage is timed within its frame.
 void timeStage(::benchmark::State&, Through, OctreeUpdate, Stage);
 
 /// Arguments for timeStage(): every scene of up to 140,000 triangles, 1 and 2 threads; manual time.
