@@ -25,7 +25,6 @@ std::string field(const std::string& text) {
 }  // namespace
 
 Report::Report(const std::string& csvPath, std::string commit, std::string simdPath) {
-  simdPath = instructionSet(simdPath);
   const std::string cores = std::to_string(std::thread::hardware_concurrency());
   m_provenance = field(processor() + " (" + cores + " cores)") + ',' +
                  field("g++ " + std::string(__VERSION__)) + ',' + field(simdPath) + ',' +
@@ -54,11 +53,6 @@ void Report::row(const std::string& table, const std::string& scene, int threads
         << field(metric) << ',' << value << ',' << std::hex << hash << std::dec << ','
         << m_provenance << '\n';
   m_csv.flush();
-}
-
-std::string instructionSet(std::string simdPath) {
-  if (simdPath.starts_with("AVX3")) simdPath.replace(0, 4, "AVX-512");
-  return simdPath;
 }
 
 std::string milliseconds(double value) {

@@ -24,9 +24,6 @@ class Report {
   std::string m_provenance;
 };
 
-/// The usual name of a path of palpate::simdPath(): "AVX-512" for "AVX3".
-std::string instructionSet(std::string simdPath);
-
 std::string milliseconds(double);  ///< three significant digits
 std::string times(double);         ///< "1.34x"
 

@@ -343,13 +343,11 @@ void simdRows(Report& report, const RowOptions& options) {
       const Timing &auto_ = outcome.entries[0].timing, &rebuilt = outcome.entries[1].timing;
       char hash[32];
       std::snprintf(hash, sizeof hash, "%016lx", outcome.hash);
-      report.line({workload.name + ", " + instructionSet(simdPath()), milliseconds(auto_.update),
+      report.line({workload.name + ", " + simdPath(), milliseconds(auto_.update),
                    milliseconds(auto_.total - auto_.update), milliseconds(rebuilt.update),
                    milliseconds(rebuilt.total - rebuilt.update), std::string("  ") + hash});
-      report.row("simd", name, 1, instructionSet(simdPath()), "as shipped ms", auto_.total,
-                 outcome.hash);
-      report.row("simd", name, 1, instructionSet(simdPath()), "full rebuild ms", rebuilt.total,
-                 outcome.hash);
+      report.row("simd", name, 1, simdPath(), "as shipped ms", auto_.total, outcome.hash);
+      report.row("simd", name, 1, simdPath(), "full rebuild ms", rebuilt.total, outcome.hash);
     }
     useSimdPath("");
   }

@@ -15,7 +15,7 @@ namespace palpate {
 // magnitude, and may be as small as the smallest double. addAnalyticalGeometry() throws
 // InvalidShape for all other values.
 
-inline constexpr double kLargestMeasure = 1e300;                      ///< L
+inline constexpr double kLargestMeasure = 1e300;                     ///< L
 inline constexpr std::size_t kMaxHullPoints = std::size_t{1} << 17;  ///< of one ConvexHull
 
 /// A ball.
