@@ -1,6 +1,7 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/Error.h>
 
+#include "CollisionDetection/ShapePointMotion.h"
 #include "Core/FloatingPoint.h"
 
 #include <string>
@@ -22,7 +23,7 @@ double ConstraintRow::gap(std::span<const Eigen::Vector3d> positions) const {
 }
 
 void appendRows(const CollisionData& contacts, const SolverVertices& a, const SolverVertices& b,
-                std::vector<ConstraintRow>& rows) {
+                std::vector<ConstraintRow>& rows, const ShapeMotion& shape) {
   const StandardFloatingPoint standard;
   const std::size_t initialSize = rows.size();
   const auto require = [&](const SolverVertices& side, std::uint32_t vertex) {
@@ -57,10 +58,12 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
       const auto& [i, j, k] = contact.vertices;
       for (const std::uint32_t vertex : contact.vertices) require(mesh, vertex);
       const std::uint32_t first = mesh.first;
+      const double time = contact.timeOfImpact;
+      const Eigen::Vector3d rest = (1 - time) * displacementAt(shape, contact.pointOnShape, time);
       rows.push_back({{first + i, first + j, first + k, first + i},
                       {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
                       contact.normal,
-                      contact.normal.dot(contact.point) - contact.distance});
+                      contact.normal.dot(contact.point + rest) - contact.distance});
     }
   } catch (...) {
     rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(initialSize), rows.end());

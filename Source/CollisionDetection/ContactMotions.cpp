@@ -1,6 +1,7 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/Error.h>
 
+#include "CollisionDetection/ShapePointMotion.h"
 #include "Core/FloatingPoint.h"
 #include "Math/Tolerances.h"
 
@@ -15,7 +16,6 @@ namespace palpate {
 
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 struct VertexMotion {
@@ -45,21 +45,6 @@ void checkRadiusCount(const ContactSide& side, const char* name) {
                 "appendMotions(): " + std::string(name) + " has " + std::to_string(count) +
                     " radii and " + std::to_string(side.vertices.now.size()) +
                     " positions; it must have none, one, or one for each position");
-}
-
-/// Solves matrix x = right.
-Vector3d solve(const Matrix3d& matrix, const Vector3d& right) {
-  const Vector3d u = matrix.col(0), v = matrix.col(1), w = matrix.col(2), normal = v.cross(w);
-  return Vector3d(normal.dot(right), w.cross(u).dot(right), u.cross(v).dot(right)) / u.dot(normal);
-}
-
-/// The displacement over the step of the shape's point that is at `point` at this time.
-Vector3d displacementAt(const ShapeMotion& motion, const Vector3d& point, double time) {
-  const Matrix3d rotation = (1 - time) * motion.rotationBefore + time * motion.rotation;
-  const Vector3d translation = (1 - time) * motion.translationBefore + time * motion.translation;
-  const Vector3d body = solve(rotation, point - translation);
-  return (motion.rotation - motion.rotationBefore) * body +
-         (motion.translation - motion.translationBefore);
 }
 
 /// A weighted sum of the vertices on one side of a contact.

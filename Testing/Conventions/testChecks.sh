@@ -75,20 +75,15 @@ plant Tests Testing/Unit/Math/BTest.cpp '\n' "$commands" Unit
 plant Tests Testing/Unit/BTest.cpp '\n' "$commands" Unit -Unit/Math
 rm -r "$tree/Testing/Unit" "$commands"
 
-mkdir -p "$tree/Testing/Consumer/Project"
-printf '```cpp\na();\n  b();\n```\n' >"$tree/README.md"
-planted="other statements than README's"
-printf '  // README begins\n  a();\n    b();\n  // README ends\n' >"$tree/Testing/Consumer/Project/Contacts.cpp"
-expect holds Readme
-printf '  // README begins\n  a();\n    c();\n  // README ends\n' >"$tree/Testing/Consumer/Project/Contacts.cpp"
-expect fails Readme
 planted="a link that leads nowhere"
-printf '  // README begins\n  a();\n    b();\n  // README ends\n' >"$tree/Testing/Consumer/Project/Contacts.cpp"
 printf '[b](b.md)\n' >"$tree/Examples/A.md"
-expect fails Readme
+expect fails Links
 touch "$tree/Examples/b.md"
-expect holds Readme
-rm -r "$tree/README.md" "$tree/Examples/A.md" "$tree/Testing/Consumer"
+expect holds Links
+planted="code that looks like a link"
+printf '```cpp\n[](double x) {}\n```\n' >"$tree/Examples/A.md"
+expect holds Links
+rm -r "$tree/Examples/A.md"
 
 planted="a stray symbol"
 printf 'namespace palpate { int a; }\n' | "$compiler" -shared -fPIC -x c++ -o "$tree/lib.so" -

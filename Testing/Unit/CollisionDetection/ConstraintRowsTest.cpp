@@ -3,6 +3,7 @@
 
 #include "Common/TestGeometry.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/SparseCore>
 
 #include <map>
@@ -366,6 +367,49 @@ TEST(ConstraintRows, RowsOfImpactsHaveTheirGapWhereFeaturesTouch) {
       }
     }
   }
+}
+
+/// The rows of a shape that moves refer to the shape at the step's end.
+TEST(ConstraintRows, RowsOfAMovingShapeFollowItToTheEndOfTheStep) {
+  Random random(76);
+  const TestGeometry triangles = testGeometry(soup(random, 80, 0.1));
+  const Positions before = triangles.positions, now = moved(random, before, 0.05);
+  std::size_t impacts = 0;
+  for (const double turn : {0.0, 0.7}) {
+    ShapeMotion motion;
+    motion.translationBefore = {-0.4, 0.1, 0};
+    motion.translation = {0.9, 0, 0.2};
+    motion.rotation = Eigen::AngleAxisd(turn, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+    OctreeBasedCD collisions(settingsOf(Engine::Octree));
+    const GeometryId mesh = triangles.addTo(collisions),
+                     tool = collisions.addAnalyticalGeometry(Sphere{{0.1, 0.4, 0.5}, 0.2});
+    collisions.addCollisionPair(mesh, tool, {Method::Continuous, 0.02, Contacts::All});
+    collisions.setPositions(mesh, before, now);
+    collisions.setTransform(tool, motion.rotationBefore, motion.translationBefore, motion.rotation,
+                            motion.translation);
+    collisions.detectCollision();
+    const CollisionData& contacts = collisions.collisionData(mesh, tool);
+    std::vector<ConstraintRow> rows, rowsAtRest;
+    appendRows(contacts, {0, before, now}, {}, rows, motion);
+    appendRows(contacts, {0, before, now}, {}, rowsAtRest);
+    ASSERT_EQ(rows.size(), contacts.shape().size());
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      const ShapeContact& c = contacts.shape()[r];
+      const double time = c.timeOfImpact;
+      impacts += time < 1.0;
+      Vector3d point = Vector3d::Zero();  // of the element, at the end
+      for (int i = 0; i < 3; ++i) point += c.weights[i] * now[c.vertices[i]];
+      // The point of the shape that the contact touches, at the end.
+      const Eigen::Matrix3d then = (1 - time) * motion.rotationBefore + time * motion.rotation;
+      const Vector3d body =
+          then.inverse() *
+          (c.pointOnShape - (1 - time) * motion.translationBefore - time * motion.translation);
+      const Vector3d opposite = motion.rotation * body + motion.translation;
+      EXPECT_NEAR(rows[r].gap(now), c.normal.dot(point - opposite), 1e-12);
+      EXPECT_NEAR(rowsAtRest[r].gap(now), c.normal.dot(point - c.pointOnShape), 1e-12);
+    }
+  }
+  EXPECT_GT(impacts, 20u);
 }
 
 }  // namespace
