@@ -14,15 +14,14 @@ find README.md CHANGELOG.md CONTRIBUTING.md Docs Data Examples -name '*.md' 2>/d
   mkdir -p "$out/source/$(dirname "$page")"
   cp "$page" "$out/source/$page"
 done
-find Docs -name '*.png' -o -name '*.svg' -o -name '*.csv' -o -name '*.webp' | while read -r file; do
-  cp --parents "$file" "$out/source"
-done
-sed 's#](../#](Docs/#' Docs/Site/index.md >"$out/source/index.md"
+find Docs -maxdepth 1 -name '*.csv' | xargs cp --parents -t "$out/source"
+[[ ! -d Docs/Pictures ]] || cp -r --parents -t "$out/source" Docs/Pictures
+sed 's#](../#](Docs/#g' Docs/Site/index.md >"$out/source/index.md"
 rm -r "$out/source/Docs/Site"
 
 # The page of the notes lists the notes.
 {
-  printf '# Laboratory notes\n\nHow figures came about, what did not pay, and what bounds a figure. Users need none of it.\n\n'
+  printf '# Laboratory notes\n\nThese notes are for developers: lists of tests, single measurements, and experiments without gain.\n\n'
   printf '```{toctree}\n:maxdepth: 1\n'
   (cd Docs/Notes && ls *.md | sed 's/\.md$//')
   printf '```\n'

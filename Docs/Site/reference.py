@@ -1,8 +1,10 @@
 """reference.py XML OUT HEADER...: writes one page of the C++ reference for each public header.
 
 XML: the folder of Doxygen's XML. OUT: the folder of the pages. HEADER: a path that contains Public/palpate/.
+A page begins with the first "//" comment inside the header's namespace, which is about the header as a whole.
 """
 import pathlib
+import re
 import sys
 import xml.etree.ElementTree as ElementTree
 
@@ -19,6 +21,20 @@ files = {compound.findtext("name"): compound.get("refid") for compound in index.
 
 def text(element):
     return "".join(element.itertext()) if element is not None else ""
+
+
+def introduction(header):
+    """The first comment of the namespace as Markdown, if it is not about one declaration."""
+    body = pathlib.Path(header).read_text(encoding="utf-8").split("\nnamespace palpate", 1)
+    found = re.match(r"[^\n]*\{\n\n((?:// ?[^/\n][^\n]*\n|//\n)+)\n", body[1]) if len(body) > 1 else None
+    if not found:
+        return ""
+    lines = []
+    for line in found[1].splitlines():
+        label = re.match(r"// ([A-Z][a-z]+) {2,}(\S.*)", line)
+        lines += ["", f"**{label[1]}.** {label[2]}"] if label else [line[2:].strip()]
+    text = "\n".join(lines).replace("<", "\\<")
+    return re.sub(r"\bDocs/(\w+(?:/\w+)*)\.md\b", r"[\1](/Docs/\1.md)", text) + "\n\n"
 
 
 def signature(member):
@@ -50,7 +66,7 @@ def directives(header):
     return "".join(f".. {directive}:: {name}\n{options}\n" for _, directive, name, options in sorted(found))
 
 
-names = []
+names, table = [], []
 for header in headers:
     page = directives(header)
     if not page:
@@ -58,7 +74,23 @@ for header in headers:
     included = header.split("Public/palpate/", 1)[1]
     name = pathlib.Path(header).stem
     names.append(name)
-    (out / f"{name}.md").write_text(f"# `<palpate/{included}>`\n\n```{{eval-rst}}\n{page}```\n", encoding="utf-8")
-lines = "\n".join(names)
-(out / "index.md").write_text(f"# C++ API\n\nOne page for each public header.\n\n```{{toctree}}\n:maxdepth: 1\n{lines}\n```\n",
-                              encoding="utf-8")
+    declared = list(dict.fromkeys(re.findall(r"^\.\. \w+:: (?:palpate::)?([\w:]+)", page, re.MULTILINE)))
+    table.append(f"| [`<palpate/{included}>`]({name}.md) | {', '.join(f'`{each}`' for each in declared)} |")
+    (out / f"{name}.md").write_text(f"# `<palpate/{included}>`\n\n{introduction(header)}```{{eval-rst}}\n{page}```\n",
+                                    encoding="utf-8")
+lines, rows = "\n".join(names), "\n".join(table)
+(out / "index.md").write_text(f"""# C++ API
+
+This reference has one page for each public header. `<palpate/Palpate.h>` includes the headers that most programs need.
+[Errors](/Docs/Errors.md) explains the codes that functions throw, and [Settings](/Docs/Settings.md) lists all settings.
+
+| header | declares |
+|---|---|
+{rows}
+
+```{{toctree}}
+:hidden:
+:maxdepth: 1
+{lines}
+```
+""", encoding="utf-8")

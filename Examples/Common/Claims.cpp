@@ -111,7 +111,7 @@ void sortUnique(std::vector<ElementPair>& pairs) {
 
 void addClaims(const CollisionData& data, double from, double to, Claims& out) {
   using Kind = FeaturePair::Kind;
-  // Where triangles intersect, contacts of the step's end are Intersection's.
+  // Where triangles intersect, contacts at the step's end are Intersection's.
   const bool intersects =
       data.validity().effectiveThickness == 0.0 && !data.intersectingTriangles().empty();
   const auto add = [&](const FeaturePair& features, const auto& contact, double side,

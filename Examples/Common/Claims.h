@@ -23,34 +23,34 @@ struct FeaturePair {
 /// A vertex, an edge or a triangle by its vertices, ascending, the last one repeated.
 using Held = std::array<std::uint32_t, 3>;
 
-/// What a method says of two features.
+/// A contact that a method reports for two features.
 struct Claim {
   FeaturePair features;
   Eigen::Vector3d normal;  ///< unit, from the second mesh towards the first
   double distance;         ///< L; negative: depth
-  double time;             ///< of the step, that this is said of
-  bool example = false;    ///< of triangles that intersect and are named themselves
-  /// What holds the two closest points, in the first mesh and in the second.
+  double time;             ///< the time of the step for which it is reported
+  bool example = false;    ///< of triangles that intersect and are reported themselves
+  /// The feature with each of the closest points, in the first mesh and in the second.
   std::array<Held, 2> held{};
 };
 
-/// What a method says of a step, in any order.
+/// All contacts that a method reports in a step, in any order.
 struct Claims {
   std::vector<Claim> claims;
-  std::vector<ElementPair> triangles;  ///< said to touch, besides those that hold the features
-  bool ofTriangles = false;            ///< all of its features are examples
-  bool distinct = false;               ///< impacts of the same closest features are said once
-  std::optional<bool> trusted;         ///< its own word on this answer, if it has one
+  std::vector<ElementPair> triangles;  ///< reported triangle pairs, besides those of the features
+  bool ofTriangles = false;            ///< the features of a pair are examples only
+  bool distinct = false;               ///< impacts of the same closest features are reported once
+  std::optional<bool> trusted;         ///< the method's own statement on this answer, if it has one
 };
 
-/// Which triangles hold a vertex, or an edge.
+/// The triangles of each vertex and of each edge.
 class Incidence {
  public:
   explicit Incidence(const std::vector<Triangle>& triangles);
   std::vector<std::uint32_t> holding(std::uint32_t vertex) const { return m_byVertex[vertex]; }
   std::vector<std::uint32_t> holding(std::uint32_t p, std::uint32_t q) const;
   const Triangle& corners(std::uint32_t triangle) const { return m_triangles[triangle]; }
-  /// Every pair of triangles that touch where these features touch.
+  /// Calls f with every pair of triangles that touch where these features touch.
   static void addTriangles(const FeaturePair&, const Incidence& a, const Incidence& b,
                            std::vector<ElementPair>& out);
 
@@ -59,14 +59,14 @@ class Incidence {
   std::vector<Triangle> m_triangles;
 };
 
-/// Which claim stands for an impact that is not claimed itself, where impacts of the same closest
-/// features are said once.
+/// Finds the claim that represents an unreported impact, if impacts of the same closest features
+/// are reported once.
 class Substitutes {
  public:
-  /// Those of `distinct` claims within the step; the claims must outlive this.
+  /// Uses the `distinct` claims within the step. They must outlive this object.
   explicit Substitutes(const Claims&);
-  /// The first claim in time whose closest features belong to these elements; null if there is
-  /// none. It stands for an impact that is not earlier.
+  /// The first claim in time whose closest features belong to these elements, or null. It
+  /// represents an impact that is not earlier.
   const Claim* find(const FeaturePair&, const Incidence& a, const Incidence& b) const;
 
  private:
@@ -75,8 +75,8 @@ class Substitutes {
 
 void sortUnique(std::vector<ElementPair>&);
 
-/// Contacts as claims, and whether they are trusted, besides those added before. from, to: the part
-/// of the step that was detected.
+/// Adds contacts as claims, and whether they are trusted. from, to: the part of the step that was
+/// detected.
 void addClaims(const CollisionData&, double from, double to, Claims& out);
 
 }  // namespace palpate::accuracy

@@ -7,8 +7,8 @@
 
 namespace palpate::scenes {
 
-/// A program's exit code: 0 when f() returns. What it throws is said in one line on stderr, and
-/// gives 1; help and arguments that CLI11 refuses end as it has them.
+/// The exit code of a program: 0 if f() returns. If it throws, one line goes to stderr, and the
+/// code is 1. CLI11 sets the code for help and for wrong arguments.
 template <class F>
 int exitCodeOf(const CLI::App& app, F&& f) {
   try {

@@ -73,7 +73,7 @@ class PalpateRun : public Run {
   bool m_distinct;
 };
 
-/// What is given to the library besides the pair's method.
+/// The settings besides the pair's method.
 struct Choice {
   double thickness = 0;  ///< mean edges
   Contacts contacts = Contacts::All;

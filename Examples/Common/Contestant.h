@@ -17,10 +17,10 @@ using Positions = std::vector<std::vector<Eigen::Vector3d>>;
 class Run {
  public:
   virtual ~Run() = default;
-  /// From the positions of the last frame, before the first those at which the run started, to
-  /// `now`. Returns milliseconds on the wall's clock, from positions handed in to contacts.
+  /// Runs one step, from the positions of the last frame to `now`. The first step starts at
+  /// `start`. Returns milliseconds of wall time, from positions to contacts.
   virtual double step(const Positions& now) = 0;
-  /// Of the last step; outside the clock.
+  /// The claims of the last step. This is not timed.
   virtual Claims claims(std::size_t pair) const = 0;
 };
 
@@ -30,7 +30,7 @@ struct Contestant {
   std::function<std::unique_ptr<Run>(const scenes::Scene&, const Positions& start)> run;
 };
 
-/// Every method of the chart: a line each.
+/// Every method of the chart, one line each.
 std::vector<Contestant> contestants();
 
 /// FCL's collide() on two BVHModel<OBBRSS>, refitted to each frame's positions.

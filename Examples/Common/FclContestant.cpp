@@ -43,7 +43,7 @@ class FclRun : public Run {
         .count();
   }
 
-  /// Its normals go from the first to the second; it speaks of the frame's end.
+  /// Its normals point from the first to the second mesh. Its contacts are at the frame's end.
   Claims claims(std::size_t pair) const override {
     const fcl::CollisionResultd& result = m_results[pair];
 

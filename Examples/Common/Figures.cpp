@@ -12,10 +12,10 @@ namespace palpate::report {
 
 namespace {
 
-/// A text in a line of CSV has neither comma nor quote nor line break.
+/// Refuses texts with a comma, a quote or a line break, which a field of this CSV cannot hold.
 void checkText(const std::string& text) {
   if (text.find_first_of(",\"\n\r") != std::string::npos)
-    throw std::invalid_argument("\"" + text + "\" cannot be a field of CSV");
+    throw std::invalid_argument("\"" + text + "\" has a comma, a quote or a line break");
 }
 
 std::string number(const char* format, double value) {
@@ -39,7 +39,7 @@ std::vector<std::string> fieldsOf(const std::string& line) {
 
 void Figures::add(Row row) {
   if (row.texts.size() != m_textKeys.size() || row.values.size() != m_quantities.size())
-    throw std::invalid_argument("a row of figures with other columns");
+    throw std::invalid_argument("The row has other columns than the table.");
   for (const std::string& text : row.texts) checkText(text);
   m_rows.push_back(std::move(row));
 }

@@ -7,14 +7,14 @@
 
 namespace palpate::report {
 
-/// A column of numbers.
+/// A column of numbers in a table of figures.
 struct Quantity {
-  std::string key;    ///< in CSV
-  std::string label;  ///< with its unit, at an axis
+  std::string key;    ///< name in the CSV
+  std::string label;  ///< text at an axis, with the unit
 };
 
-/// What a program measured: each row some texts that name it, then its numbers, NaN where there is
-/// none.
+/// A table of measured figures. Each row has texts that name it, and numbers. A missing number is
+/// NaN.
 class Figures {
  public:
   struct Row {
@@ -30,12 +30,12 @@ class Figures {
   const std::vector<Quantity>& quantities() const { return m_quantities; }
   const std::vector<Row>& rows() const { return m_rows; }
   std::size_t indexOf(const std::string& quantity) const;  ///< throws std::out_of_range
-  /// The row of these first texts, or none.
+  /// The row whose first texts are these, or null.
   const Row* find(std::span<const std::string> texts) const;
 
   std::string csv() const;
-  /// Adds the rows of a file that csv() wrote; none if there is no such file or its columns are
-  /// others.
+  /// Adds the rows of a file that csv() wrote. Adds none if the file does not exist or has other
+  /// columns.
   void addFrom(const std::filesystem::path& csv);
 
  private:
@@ -46,7 +46,7 @@ class Figures {
   std::vector<Row> m_rows;
 };
 
-/// Three significant digits.
+/// Formats a number with three significant digits.
 std::string shortNumber(double);
 
 }  // namespace palpate::report

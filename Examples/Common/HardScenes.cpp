@@ -26,8 +26,7 @@ double ripple(const Vector3d& p, double phase) {
   return std::sin(9 * p.x() + phase) * std::sin(7 * p.y() - phase);
 }
 
-/// Two soft bodies whose flattened sides come together and part by a tenth of the thickness a
-/// frame.
+/// Two soft bodies whose flattened sides meet and separate by a tenth of the thickness per frame.
 Scene slowPressing(std::string name, const Vector3d& at) {
   const auto press = [at](double side) -> Motion {
     return [at, side](const Vector3d& rest, double time) -> Vector3d {
@@ -42,8 +41,8 @@ Scene slowPressing(std::string name, const Vector3d& at) {
   return hardScene(std::move(name), {sphere(7), sphere(7)}, {press(1), press(-1)});
 }
 
-/// A needle driven through a membrane of two layers, fastest where it passes it: at most half its
-/// length is seen there in a frame.
+/// A needle driven through a membrane of two layers, fastest where it passes: at most half its
+/// length moves through in a frame.
 Scene fastNeedle() {
   SceneMesh needle = tube(8, 8), membrane = sheet(22), layer = sheet(22);
   for (Vector3d& p : needle.positions) {
@@ -62,7 +61,7 @@ Scene fastNeedle() {
   return hardScene("fast needle", {std::move(needle), std::move(membrane)}, {drive, breathe});
 }
 
-/// A thread lies and slides on tissue while its far end whips: slow and fast in one pair.
+/// A thread lies and slides on tissue while its far end whips: slow and fast motion in one pair.
 Scene slidingSuture() {
   SceneMesh thread = tube(6, 50);
   for (Vector3d& p : thread.positions) p = Vector3d(p.z(), 0.02 * p.x(), 0.02 * p.y());
@@ -81,7 +80,7 @@ Scene slidingSuture() {
   return hardScene("sliding suture", {std::move(thread), sheet(18)}, {slide, tissue});
 }
 
-/// Two soft closed bodies that glide right through each other.
+/// Two soft closed bodies that glide through each other.
 Scene deepPenetration() {
   Scene scene = glidingMeshes({sphere(6), sphere(7)});
   scene.name = "deep penetration";
@@ -89,7 +88,7 @@ Scene deepPenetration() {
   return scene;
 }
 
-/// Four sheets, one on the other, that clap together and part.
+/// Four stacked sheets that clap together and separate.
 Scene stackedSheets() {
   Scene scene;
   const auto wave = [](int layer) -> Motion {
@@ -106,7 +105,7 @@ Scene stackedSheets() {
   return scene;
 }
 
-/// Two rows of ridges, one across the other, that touch with their sharp edges only.
+/// Two rows of crossing ridges that touch with their sharp edges only.
 Scene sharpEdges() {
   const auto ridges = [](double side) -> Motion {
     return [side](const Vector3d& rest, double time) -> Vector3d {

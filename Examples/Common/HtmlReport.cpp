@@ -9,7 +9,7 @@ namespace palpate::report {
 
 namespace {
 
-/// HtmlReport.html, its bytes put here by CMake.
+/// The content of HtmlReport.html, which CMake inserts.
 constexpr std::string_view kPage =
 #include "HtmlReportPage.inc"
     ;
@@ -20,7 +20,7 @@ void replace(std::string& text, std::string_view mark, const std::string& by) {
   text.replace(text.find(mark), mark.size(), by);
 }
 
-/// "</script>" in a text would end the data.
+/// Escapes "</", because "</script>" in a text would end the data.
 std::string inScript(const Json& json) {
   std::string text = json.dump();
   for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3)
@@ -49,6 +49,7 @@ std::string toHtml(const Figures& figures, const View& view) {
             {"group", view.group}, {"series", view.series},
             {"label", view.label}, {"first", view.first},
             {"x", view.x},         {"y", view.y},
+            {"xLow", view.xLow},   {"xHigh", view.xHigh},
             {"front", view.front}, {"lines", view.lines},
             {"logX", view.logX},   {"texts", figures.textKeys()}};
   json["pictures"] = Json::array();

@@ -7,22 +7,23 @@
 
 namespace palpate::report {
 
-/// How figures are first shown; the reader may choose otherwise.
+/// What the page shows at first. The reader can change it there.
 struct View {
   std::string title;
-  std::vector<std::string> paragraphs;  ///< what was measured and how it is to be read
-  std::string group;                    ///< text column: one of its values is shown at a time
-  std::string series;                   ///< text column: a colour each
-  std::string label;                    ///< text column: what a point is called within its series
-  std::string first;                    ///< of the group's values
-  std::string x, y;                     ///< quantities; smaller is better
-  bool front = false;                   ///< the Pareto front is drawn
-  bool lines = false;                   ///< a series' points are joined in the order of x
+  std::vector<std::string> paragraphs;  ///< what was measured, and how to read it
+  std::string group;            ///< text column; the page shows the rows of one value at a time
+  std::string series;           ///< text column; each value has a colour and a mark
+  std::string label;            ///< text column; name of a point within its series
+  std::string first;            ///< value of the group
+  std::string x, y;             ///< quantities; smaller is better
+  std::string xLow{}, xHigh{};  ///< quantities: bounds of x, drawn as a bar; or empty
+  bool front = false;           ///< draws the Pareto front
+  bool lines = false;           ///< joins a series' points in the order of x
   bool logX = true;
   std::vector<std::string> pictures{};  ///< contents of PNG files
 };
 
-/// One page that needs neither network nor any other file.
+/// Returns one HTML page that needs no other file and no network.
 std::string toHtml(const Figures&, const View&);
 
 }  // namespace palpate::report

@@ -9,7 +9,7 @@ using Eigen::Vector3d;
 namespace {
 
 constexpr double kShaft = 75, kElbow = 22, kWrist = 12, kJaw = 14;
-/// Which joints move each link: the first so many. The jaws turn against each other.
+/// The number of joints that move each link. The jaws turn against each other.
 constexpr std::array<int, InstrumentArm::kLinks> kJointsOf{3, 4, 5, 6, 6};
 
 /// A box from low to high that narrows along z. Corner i has bit 0: x, 1: y, 2: z.

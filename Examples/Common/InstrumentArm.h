@@ -16,7 +16,7 @@ namespace palpate::scenes {
 class InstrumentArm {
  public:
   static constexpr int kLinks = 5;
-  /// Yaw and pitch about the port, depth, elbow, wrist, opening of the jaws: radians, but the
+  /// Yaw and pitch about the port, depth, elbow, wrist, opening of the jaws. All in radians but the
   /// depth.
   using Joints = Eigen::Matrix<double, 6, 1>;
 
@@ -26,19 +26,19 @@ class InstrumentArm {
     SceneMesh drawn;  ///< closed, its vertices on the shape's surface
   };
   static std::array<Link, kLinks> makeLinks();
-  /// Whether these two meet at a joint.
+  /// Whether these two links meet at a joint.
   static bool areJoined(int a, int b);
 
-  /// port: z leads into the body.
+  /// port: z points into the body.
   InstrumentArm(const Eigen::Isometry3d& port, const Joints& joints) : m_port(port) {
     bend(joints);
   }
   void bend(const Joints&);
   const Joints& joints() const { return m_joints; }
   const Eigen::Isometry3d& link(int link) const { return m_links[link]; }
-  /// How a point of a link moves along a direction, in mm for each joint's unit.
+  /// The motion of a link's point along a direction, in mm for each joint's unit.
   Joints slope(int link, const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const;
-  /// mm: how far the arm's points move at most for each joint's unit.
+  /// mm: the largest motion of the arm's points for each joint's unit.
   static Joints reach() { return (Joints() << 100, 100, 1, 50, 28, 15).finished(); }
 
  private:

@@ -15,8 +15,8 @@ using std::numbers::pi;
 
 namespace {
 
-/// Rows of equally many positions; each row closed to a ring if asked. Normals: along the row × to
-/// the next.
+/// Rows of equally many positions. With `closed`, each row is a ring. Normals are along the row ×
+/// to the next row.
 void stitchRows(std::vector<Triangle>& triangles, std::uint32_t rows, std::uint32_t perRow,
                 bool closed) {
   for (std::uint32_t row = 0; row + 1 < rows; ++row) {

@@ -19,8 +19,8 @@ struct SceneMesh {
 /// Outward winding.
 SceneMesh sphere(int frequency);
 
-/// Unit sphere: six square sheets around a cube, blown up, 12 cells² triangles of about one size;
-/// where sheets meet each has its own vertices. Outward winding.
+/// Unit sphere: six square sheets around a cube, projected to the sphere, 12 cells² triangles of
+/// about one size. Each sheet has its own vertices at its border. Outward winding.
 SceneMesh cubeSphere(int cells);
 
 /// The square [-1, 1]² at z = 0, 2 cells² triangles, normals up.
@@ -35,11 +35,11 @@ SceneMesh tube(int around, int along);
 /// smallest) / 2π.
 SceneMesh gradedSphere(int around, double smallest);
 
-/// Sphere of this radius about p0, its half towards p1 moved there. Outward winding.
+/// Sphere of this radius around p0, with the half towards p1 moved there. Outward winding.
 SceneMesh capsule(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1, double radius,
                   int frequency);
 
-/// Open tube about a polyline of at least two positions, for pictures.
+/// Open tube around a polyline of at least two positions, for pictures.
 SceneMesh tubeAround(std::span<const Eigen::Vector3d> line, double radius, int around);
 
 void append(SceneMesh& mesh, const SceneMesh& other);

@@ -13,8 +13,7 @@ using std::numbers::pi;
 
 namespace {
 
-/// A sphere made bumpy (star-shaped while the bumps stay below 1), stretched, tapered and bent
-/// along x.
+/// A bumpy sphere (star-shaped while the bumps stay below 1), stretched, tapered and bent along x.
 struct OrganShape {
   const char* name;
   int frequency;
@@ -45,15 +44,15 @@ SceneMesh shaped(const OrganShape& shape) {
   return mesh;
 }
 
-/// Towards body `index` of `count`, evenly around the z axis and alternately above and below.
+/// The direction of body `index` of `count`: evenly around the z axis, alternately above and below.
 Vector3d direction(std::size_t index, std::size_t count) {
   const double angle = 2 * pi * static_cast<double>(index) / static_cast<double>(count);
   return Vector3d(std::cos(angle), std::sin(angle), count > 2 ? (index % 2 == 0 ? 0.4 : -0.4) : 0.0)
       .normalized();
 }
 
-/// Glides from one side through the centre to the other and back, breathes, ripples and turns on
-/// the way.
+/// Glides from one side through the centre to the other and back. On the way it breathes, ripples
+/// and turns.
 Motion glide(std::size_t index, std::size_t count, double reach, double size) {
   const Vector3d towards = direction(index, count);
   const double phase = 1.3 * static_cast<double>(index);
@@ -70,7 +69,7 @@ Motion glide(std::size_t index, std::size_t count, double reach, double size) {
   };
 }
 
-/// sizes: of each mesh, half its extent: how far it ripples.
+/// sizes: half the extent of each mesh, which scales its ripples.
 Scene glidingScene(std::string name, std::vector<SceneMesh> meshes, double reach,
                    const std::vector<double>& sizes) {
   Scene scene{std::move(name), std::move(meshes), {}, {}};

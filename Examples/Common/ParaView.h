@@ -15,7 +15,7 @@ class VtpText {
   std::vector<Triangle> triangles;
   std::vector<Segment> lines;
   std::vector<std::uint32_t> vertices;
-  /// A value, or the three of a vector, for each point, or for each cell: vertices, lines,
+  /// A value, or the three of a vector, for each point or for each cell: vertices, lines,
   /// triangles.
   void addPointField(const std::string& name, const std::vector<double>& values,
                      int components = 1);
@@ -28,18 +28,18 @@ class VtpText {
 
 /// All bodies; field "body".
 VtpText bodiesVtp(World&);
-/// A point midway of each contact; fields "distance", "time of impact", "normal", "pair", "kind"
-/// (0: vertex-triangle, 1: triangle-vertex, 2: edge-edge, 3: shape, 4:
-/// two shapes).
+/// A point in the middle of each contact, with the fields "distance", "time of impact", "normal",
+/// "pair" and "kind" (0: vertex-triangle, 1: triangle-vertex, 2: edge-edge, 3: shape, 4: two
+/// shapes).
 VtpText contactsVtp(World&);
-/// Edges of the cells that hold elements; fields "depth", "elements", "geometry".
+/// Edges of the cells that hold elements, with the fields "depth", "elements" and "geometry".
 VtpText octreeVtp(const LooseOctree&);
 
-/// Frames of a run as FOLDER/{bodies,contacts,octree}_N.vtp, and FOLDER/NAME.pvd over them: all of
-/// it, once finished, or nothing.
+/// Frames of a run as FOLDER/{bodies,contacts,octree}_N.vtp, and FOLDER/NAME.pvd over them. If the
+/// run fails, nothing is written.
 class ParaViewSeries {
  public:
-  /// Throws Error (ErrorCode::File) where the folder cannot be made or written to.
+  /// Throws Error (ErrorCode::File) if the folder cannot be made or written to.
   explicit ParaViewSeries(std::filesystem::path folder);
   ~ParaViewSeries();
   ParaViewSeries(const ParaViewSeries&) = delete;

@@ -40,7 +40,7 @@ struct Column {
   bool isTime;
 };
 
-/// What a run measured, a value per column and frame.
+/// The figures of a run: a value for each column and frame.
 class RunLog {
  public:
   void add(const std::string& name, double value, bool isTime = false) {
@@ -147,7 +147,7 @@ std::string page(const RunLog& log, const SceneProgram& program, const Options& 
 }
 
 #ifdef PALPATE_HAS_VTK
-/// As it is at the frame's end.
+/// The picture of the frame's end.
 void place(World& world) {
   for (World::BodyId id = 0; id < world.bodies().size(); ++id)
     if (const World::Body& body = world.bodies()[id]; body.count > 0 && body.rest.empty())
@@ -155,7 +155,7 @@ void place(World& world) {
 }
 #endif
 
-/// Says why where there is none.
+/// Prints the reason if there is none.
 std::string picture([[maybe_unused]] World& world, [[maybe_unused]] const std::string& keys) {
 #ifdef PALPATE_HAS_VTK
   try {

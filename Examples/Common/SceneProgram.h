@@ -22,14 +22,14 @@ class LiveScene {
   virtual ~LiveScene() = default;
   virtual void computeFrame(int frame) = 0;
   virtual World& world() = 0;
-  /// What was chosen for this run, for whoever reads its figures.
+  /// The options of this run, for readers of its figures.
   virtual std::string settings() { return ""; }
-  /// Of the frame just computed: columns and their values, the same columns in every frame.
+  /// Columns and values of the last computed frame. The columns are the same in every frame.
   virtual std::vector<std::pair<std::string, double>> values() { return {}; }
-  /// What the scene promises and the frame just computed does not hold, as a sentence; else empty.
+  /// The promise of the scene that the last computed frame breaks, as a sentence, or an empty text.
   virtual std::string fault() { return ""; }
-  /// Of those computed, the one whose picture says most, where a frame needs none before it; else
-  /// the picture is of the last.
+  /// The best frame for a picture, if it needs no earlier frame. Otherwise the picture shows the
+  /// last frame.
   virtual std::optional<int> frameToShow() { return {}; }
 };
 
@@ -46,11 +46,11 @@ struct SceneProgram {
 /// main() of a scene: reads the command line, computes the frames, prints times beside budgets,
 /// writes frames.csv, report.html and, with a display, scene.png.
 ///
-/// Returns  the exit code. Not 0 where something is wrong with the call or the scene did not hold
-///          what it promises: one sentence says what, and nothing is written.
+/// Returns  the exit code. It is not 0 if the call is wrong or the scene broke its promise. Then
+///          one sentence gives the reason, and nothing is written.
 int runScene(const SceneProgram&, int count, char** arguments);
 
-/// Throws Error: the file cannot be used, or the program was built without VTK.
+/// Throws Error if the file cannot be used, or if the program was built without VTK.
 SceneMesh readMesh(const std::filesystem::path&);
 
 }  // namespace palpate::scenes

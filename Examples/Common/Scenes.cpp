@@ -17,7 +17,7 @@ double swell(double time) { return 0.5 - 0.5 * std::cos(2 * pi * time); }
 
 Vector3d still(const Vector3d& rest, double) { return rest; }
 
-/// With the thickness that follows from the edges in a frame.
+/// Sets the thickness from the edges in a frame.
 Scene withThickness(Scene scene, int frame) {
   std::vector<SceneMesh> meshes = scene.meshes;
   for (std::size_t m = 0; m < meshes.size(); ++m) scene.positions(frame, m, meshes[m].positions);
@@ -44,8 +44,8 @@ Scene clothOnBall() {
   constexpr double kRadius = 0.5;
   SceneMesh ball = sphere(35);
   for (Vector3d& p : ball.positions) p *= kRadius;
-  // Along each ray from the sheet's middle: on the ball up to `wrapped`, from there straight on
-  // along the tangent, where folds take up what the circumference leaves over.
+  // Along each ray from the sheet's middle: on the ball up to `wrapped`, then straight along the
+  // tangent, where folds take up the spare circumference.
   const Motion drape = [](const Vector3d& rest, double time) -> Vector3d {
     const double along = rest.head<2>().norm(), angle = std::atan2(rest.y(), rest.x());
     const double radius =

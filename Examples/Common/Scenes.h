@@ -9,10 +9,10 @@
 
 namespace palpate::scenes {
 
-/// Where a vertex at `rest` is at `time` in [0, 1] of the scene's period.
+/// The position at `time` in [0, 1] of the scene's period, of a vertex at `rest`.
 using Motion = std::function<Eigen::Vector3d(const Eigen::Vector3d& rest, double time)>;
 
-/// Meshes that move, the same in every run: shared by tests, benchmarks and examples.
+/// Meshes that move, the same in every run. Tests, benchmarks and examples share them.
 struct Scene {
   std::string name;
   std::vector<SceneMesh> meshes;                           ///< at rest
@@ -21,7 +21,7 @@ struct Scene {
   double thickness = 0;                                    ///< L: a twentieth of the mean edge
   int frames = 120;                                        ///< after which the motion repeats
 
-  /// Of a mesh in any frame (0, 1, ...); overwrites `out`.
+  /// The positions of a mesh in any frame (0, 1, ...). Overwrites `out`.
   void positions(int frame, std::size_t mesh, std::vector<Eigen::Vector3d>& out) const;
   std::size_t triangleCount() const;
 };
@@ -38,14 +38,14 @@ std::vector<Organ> organMeshes();
 SceneMesh liver(int frequency);  ///< finer or coarser than its file's 11: 20 frequency² triangles
 std::string organObj(const Organ& organ);  ///< the text of its file in Data/Organs
 
-/// Any meshes, centred, that glide through each other as the organs do; at least one, one meets its
-/// copy.
+/// Any meshes, centred, that glide through each other as the organs do. At least one; a single mesh
+/// meets its copy.
 Scene glidingMeshes(std::vector<SceneMesh> meshes);
 
 /// A sheet of 112,338 triangles that settles on a ball and hangs down around it in folds.
 Scene clothOnBall();
 
-/// Two bodies of `around` triangles around, whose sizes span four orders of magnitude.
+/// Two bodies with `around` triangles around, whose sizes span four orders of magnitude.
 Scene gradedBodies(int around);
 Scene unevenBodies();  ///< with 119 around: 103,292 triangles in all
 
@@ -58,9 +58,9 @@ Scene foldedCloth();
 /// Self-collision: one mesh of seven rods, 80,640 triangles, twisted about their common axis.
 Scene twistedRods();
 
-/// Eight small scenes, each of which some method gets wrong: soft bodies pressed slowly; a needle
+/// Eight small scenes. Some method fails on each of them: soft bodies pressed slowly; a needle
 /// through a membrane; a suture that slides while its end whips; bodies deep in each other; stacked
-/// sheets; ridges across ridges; triangles over four orders of size; the first of them a million
+/// sheets; crossing ridges; triangle sizes over four orders of magnitude; the first scene a million
 /// times its size from the origin.
 std::vector<Scene> hardScenes();
 

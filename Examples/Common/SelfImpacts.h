@@ -7,8 +7,8 @@
 
 namespace palpate::scenes {
 
-/// Pairs of a polyline's segments without a common vertex that touch within a step: exactly, every
-/// segment against every other, with no octree.
+/// Pairs of a polyline's segments without a common vertex that touch within a step. Exact, every
+/// segment against every other, without an octree.
 std::size_t countSelfImpacts(std::span<const Eigen::Vector3d> before,
                              std::span<const Eigen::Vector3d> now);
 

@@ -25,7 +25,7 @@ std::size_t triangleCount(const CollisionProblem& problem) {
   return count;
 }
 
-/// Triangles begin to end, counted over all meshes, left out.
+/// Removes the triangles from begin to end, counted over all meshes.
 CollisionProblem withoutTriangles(CollisionProblem problem, std::size_t begin, std::size_t end) {
   std::size_t first = 0;
   for (CollisionProblem::Geometry& mesh : problem.geometries) {
@@ -55,7 +55,7 @@ bool dropTriangles(CollisionProblem& problem, const Fails& fails) {
       else
         begin += part;
     dropped |= droppedNow;
-    // Single ones again until none can go.
+    // Removes single triangles again until none can go.
     part = part > 1 ? (part + 1) / 2 : droppedNow ? 1 : 0;
   }
   return dropped;

@@ -7,14 +7,14 @@
 
 namespace palpate::scenes {
 
-/// After one frame of the problem, by this engine.
+/// The object after one frame of the problem, by this engine.
 OctreeBasedCD solve(CollisionProblem problem, Engine engine);
-/// Of one of its pairs, after solve().
+/// The contacts of one of its pairs, after solve().
 const CollisionData& dataOf(const OctreeBasedCD& detection, const CollisionProblem::Pair& pair);
 
-/// A smaller problem that still fails: triangles are dropped by halves, then by smaller parts down
-/// to single ones, then pairs, then what no triangle or pair uses, each time only if what is left
-/// fails.
+/// A smaller problem that still fails. It drops triangles by halves, then by smaller parts down to
+/// single ones. Then it drops pairs, and everything that no triangle or pair uses. It keeps a
+/// change only if the rest fails.
 ///
 /// Needs    fails(problem) to hold, and to answer the same each time.
 /// Returns  a problem that fails; without any one of its triangles or pairs it does not.

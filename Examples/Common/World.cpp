@@ -12,7 +12,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Adds to `milliseconds` what passes until its end.
+/// Adds its lifetime to `milliseconds`.
 class Timed {
  public:
   explicit Timed(double& milliseconds) : m_milliseconds(milliseconds) {}
@@ -201,7 +201,8 @@ void World::solve(int iterations) {
   for (std::size_t r = 0; r < m_rows.size(); ++r) {
     const Vector3d force = multipliers[r] / (m_seconds * m_seconds) * m_rows[r].normal;
     const auto& [a, b, gap] = m_pairs[m_rowPairs[r]];
-    const Body& first = m_bodies[a];  // weights above 0 are of the side that the normal points to
+    const Body& first =
+        m_bodies[a];  // weights above 0 belong to the side to which the normal points
     const std::uint32_t pushed = m_rows[r].vertices[0];
     const bool towardsA = pushed >= first.first && pushed < first.first + first.count;
     m_forces[a] += towardsA ? force : Vector3d(-force);

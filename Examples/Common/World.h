@@ -13,7 +13,7 @@
 
 namespace palpate::scenes {
 
-/// Bodies whose particles one solver moves and one OctreeBasedCD sees. A step of a scene's loop:
+/// Bodies that one solver moves and one OctreeBasedCD tests for contacts. A step of a scene's loop:
 ///
 ///   world.predict(seconds, {});      // where velocities lead
 ///   ...                              // tools go where hands lead: positions(tool), place(tool)
@@ -63,22 +63,22 @@ class World {
   BodyId addPoints(std::string name, std::span<const Eigen::Vector3d> positions, double radius,
                    double inverseMass);
   BodyId addShape(std::string name, const AnalyticalGeometry&, SceneMesh drawn);
-  /// Distances along each edge of a mesh and across it between the opposite corners; of a thread
-  /// along each segment and each two.
+  /// Keeps distances along each edge of a mesh and across it between the opposite corners. For a
+  /// thread: along each segment and each two.
   void addStiffness(BodyId, double edgeCompliance, double bendingCompliance);
   void addVolume(BodyId, double compliance);
-  /// Vertices of which this holds stay where they are, or are moved by hand.
+  /// Vertices for which this holds stay at their places, or are moved by hand.
   void pin(BodyId, const std::function<bool(const Eigen::Vector3d&)>&);
-  /// The first vertices of a body move together: hold() holds all or none.
+  /// The first vertices of a body move together: hold() moves all back or none.
   void addRigid(BodyId, std::uint32_t count);
 
-  /// gap: L, what the solver keeps them apart.
+  /// gap: L, the distance that the solver keeps.
   void addPair(BodyId a, BodyId b, const PairSettings&, double gap);
-  /// These never pass through each other: hold() sees to it.
+  /// These never pass through each other: hold() prevents it.
   void addGuard(BodyId a, BodyId b);
-  /// These triangles are no longer there, as where something pierced them; all others are.
+  /// Disables these triangles, as where something pierced them. All others are enabled.
   void disable(BodyId, std::span<const std::uint32_t> triangles);
-  /// A shape or a rigid mesh.
+  /// Places a shape or a rigid mesh.
   void place(BodyId, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation);
 
   void predict(double seconds, const Eigen::Vector3d& acceleration, double damping);

@@ -5,10 +5,10 @@
 
 namespace palpate::scenes {
 
-/// Written beside its place, then moved there. Throws Error (ErrorCode::File).
+/// Writes to a temporary file, then moves it to its place. Throws Error (ErrorCode::File).
 void writeWhole(const std::filesystem::path& path, const std::string& content);
 
-/// Throws Error (ErrorCode::File) where it cannot be made or written to.
+/// Throws Error (ErrorCode::File) if it cannot be made or written to.
 void makeFolder(const std::filesystem::path& folder);
 
 }  // namespace palpate::scenes

@@ -32,7 +32,7 @@ std::span<const double> Xpbd::solve(double seconds, std::span<const ConstraintRo
                                     int iterations) {
   m_rowMultipliers.assign(rows.size(), 0.0);
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    // There and back, so that a pull on either end of a thread reaches the other at once.
+    // Forwards and backwards, so that a pull on either end of a thread reaches the other at once.
     const std::size_t count = distances.size();
     for (std::size_t i = 0; i < count; ++i)
       solveDistance(iteration % 2 == 0 ? i : count - 1 - i, seconds);

@@ -17,7 +17,7 @@ struct DistanceConstraint {
   double compliance;  ///< L / force; 0: stiff
 };
 
-/// Keeps what a closed surface holds.
+/// Keeps the volume of a closed surface.
 struct VolumeConstraint {
   std::uint32_t first, count;       ///< the surface's particles
   std::vector<Triangle> triangles;  ///< of the surface's own vertices 0, 1, ...; outward winding
@@ -37,15 +37,15 @@ class Xpbd {
   std::vector<DistanceConstraint> distances;
   std::vector<VolumeConstraint> volumes;
 
-  /// Returns the number of the first.
+  /// Returns the number of the first particle.
   std::uint32_t add(std::span<const Eigen::Vector3d> positions, double inverseMass);
 
-  /// now = before + what velocities and the acceleration bring. damping: share of velocity lost.
+  /// now = before + the effect of velocities and acceleration. damping: share of velocity lost.
   void predict(double seconds, const Eigen::Vector3d& acceleration, double damping);
-  /// Corrects `now`. Rows push only. Returns the rows' multipliers: each is a force times seconds².
+  /// Corrects `now`. Rows only push. Returns the rows' multipliers: each is a force times seconds².
   std::span<const double> solve(double seconds, std::span<const ConstraintRow> rows,
                                 int iterations);
-  /// Velocities from what became of the step; before = now.
+  /// Sets velocities from the result of the step, and before = now.
   void commit(double seconds);
 
  private:

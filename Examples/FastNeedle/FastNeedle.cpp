@@ -137,7 +137,7 @@ int main(int count, char** arguments) {
   return runScene(
       {.name = "FastNeedle",
        .description = "A needle at 20 thicknesses a frame through a membrane, found by Proximity "
-                      "(left: missed), Continuous (middle) and Auto (right).",
+                      "(left: no contacts), Continuous (middle) and Auto (right).",
        .frames = 96,
        .frameMilliseconds = 1000.0 / 60,
        .collisionMilliseconds = 1,

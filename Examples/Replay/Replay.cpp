@@ -75,17 +75,17 @@ void printDifferences(const char* list, std::span<const Contact> found,
   };
   for (std::size_t i = 0, j = 0; i < f.size() || j < e.size();) {
     if (j == e.size() || (i < f.size() && idsOf(f[i]) < idsOf(e[j]))) {
-      print("not in brute force's", f[i++]);
+      print("false positive in", f[i++]);
     } else if (i == f.size() || idsOf(e[j]) < idsOf(f[i])) {
-      print("missing in", e[j++]);
+      print("false negative in", e[j++]);
     } else {
-      if (valuesOf(f[i]) != valuesOf(e[j])) print("other values in", f[i]);
+      if (valuesOf(f[i]) != valuesOf(e[j])) print("different values in", f[i]);
       ++i, ++j;
     }
   }
 }
 
-/// Returns whether a pair's answers differ.
+/// Prints the contacts of every pair. Returns whether any differ from brute force.
 bool report(const CollisionProblem& problem) {
   constexpr const char* kMethods[]{"Auto", "Intersection", "Proximity", "Continuous"};
   const OctreeBasedCD octree = solve(problem, Engine::Octree),
@@ -102,7 +102,7 @@ bool report(const CollisionProblem& problem) {
         static_cast<unsigned>(problem.geometries[pair.b].id),
         kMethods[static_cast<int>(pair.method)], found.vertexTriangle().size(),
         found.triangleVertex().size(), found.edgeEdge().size(),
-        found.intersectingTriangles().size(), equal ? "as by brute force" : "differs");
+        found.intersectingTriangles().size(), equal ? "equal to brute force" : "differs");
     if (equal) continue;
     printDifferences("vertexTriangle", found.vertexTriangle(), expected.vertexTriangle());
     printDifferences("triangleVertex", found.triangleVertex(), expected.triangleVertex());
@@ -125,12 +125,12 @@ std::size_t triangleCount(const CollisionProblem& problem) {
 
 }  // namespace
 
-/// 0: as by brute force; 1: differs; 2: not run.
+/// Returns 0: contacts equal those of brute force; 1: they differ; 2: the problem was not run.
 int main(int argc, char** argv) {
   CLI::App app("Replays a captured collision problem and compares it with brute force.");
   std::string file, out;
   app.add_option("file", file, "a capture")->required();
-  app.add_option("--shrink", out, "where to write a smaller problem that still differs");
+  app.add_option("--shrink", out, "file for a smaller problem that still differs");
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp& help) {

@@ -1,6 +1,6 @@
 #!/bin/bash
-# test.sh PROGRAM CAPTURES [FAULT]: Replay's answers and refusals; with a library that, loaded first, makes octrees lose
-# contacts, also what it shrinks.
+# test.sh PROGRAM CAPTURES [FAULT]: what Replay prints and refuses. FAULT is a library that, loaded first, makes octrees
+# lose contacts. With it the script tests what Replay shrinks, too.
 set -uo pipefail
 program=$1 captures=$2 fault=${3-}
 folder=$(mktemp -d)
@@ -33,15 +33,15 @@ if [[ -n $fault ]]; then
   strips >"$folder/strips.capture"
   "$program" "$folder/strips.capture" >"$folder/text" || fail "differs without a fault: $(cat "$folder/text")"
   LD_PRELOAD=$fault "$program" "$folder/strips.capture" --shrink "$folder/small.capture" >"$folder/text"
-  [[ $? -eq 1 ]] || fail "the fault was not seen: $(cat "$folder/text")"
-  grep -q "missing in edgeEdge: edge" "$folder/text" || fail "not said what is missing: $(cat "$folder/text")"
+  [[ $? -eq 1 ]] || fail "the fault was not found: $(cat "$folder/text")"
+  grep -q "false negative in edgeEdge: edge" "$folder/text" || fail "the false negative is not named: $(cat "$folder/text")"
   grep -q "^2 of 120 triangles still differ" "$folder/text" || fail "not shrunk: $(tail -1 "$folder/text")"
   LD_PRELOAD=$fault "$program" "$folder/small.capture" >"$folder/text"
   [[ $? -eq 1 ]] || fail "the smaller problem does not differ: $(cat "$folder/text")"
   "$program" "$folder/small.capture" >"$folder/text" || fail "it differs without the fault"
 fi
 
-# Refused in one line, with a code of its own.
+# Refused calls print one line and have their own exit code.
 refused() {
   "$program" "$@" >"$folder/text" 2>"$folder/messages"
   [[ $? -eq 2 ]] || fail "not refused: $*"

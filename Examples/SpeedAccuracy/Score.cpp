@@ -19,11 +19,11 @@ std::size_t countOutside(const std::vector<ElementPair>& pairs,
   }));
 }
 
-/// The features that touch, by the triangles that touch with them.
-std::multimap<ElementPair, const Impact*> byTriangles(const Truth& truth, const Incidence& a,
-                                                      const Incidence& b) {
+/// The impacts of each pair of triangles.
+std::multimap<ElementPair, const Impact*> byTriangles(const Reference& reference,
+                                                      const Incidence& a, const Incidence& b) {
   std::multimap<ElementPair, const Impact*> all;
-  for (const auto& [features, impact] : truth.impacts) {
+  for (const auto& [features, impact] : reference.impacts) {
     if (!impact) continue;
     std::vector<ElementPair> triangles;
     Incidence::addTriangles(features, a, b, triangles);
@@ -32,14 +32,14 @@ std::multimap<ElementPair, const Impact*> byTriangles(const Truth& truth, const 
   return all;
 }
 
-/// The claim about features that touch, or the one that stands for it; null if there is none.
+/// The claim about features that touch, or its substitute; null if there is none.
 const Claim* claimOf(const FeaturePair& features, const std::optional<Impact>& impact,
                      const std::map<FeaturePair, Claim>& claims, const Substitutes& substitutes,
                      const Incidence& a, const Incidence& b) {
   const auto claim = claims.find(features);
   if (claim != claims.end()) return &claim->second;
   const Claim* substitute = substitutes.find(features, a, b);
-  constexpr double kTimeError = 1e-12;  // of the truth and of rounding
+  constexpr double kTimeError = 1e-12;  // of the reference and of rounding
   return substitute && impact && substitute->time > impact->time + kTimeError ? nullptr
                                                                               : substitute;
 }
@@ -52,52 +52,53 @@ void Score::addErrors(const Claim& claim, const Impact& impact) {
   time.add(100 * std::abs(claim.time - impact.time));
 }
 
-void Score::add(const Truth& truth, const Claims& said, const Incidence& a, const Incidence& b) {
-  // Of several claims about the same features the first in time counts.
+void Score::add(const Reference& reference, const Claims& answer, const Incidence& a,
+                const Incidence& b) {
+  // If several claims are about the same features, the first in time counts.
   std::map<FeaturePair, Claim> first;
-  for (const Claim& claim : said.claims) {
+  for (const Claim& claim : answer.claims) {
     const auto [entry, isNew] = first.try_emplace(claim.features, claim);
     if (!isNew && claim.time < entry->second.time) entry->second = claim;
   }
   claims += first.size();
-  const Substitutes substitutes(said);
-  std::vector<ElementPair> touching = said.triangles;
-  bool wrong = said.ofTriangles && said.triangles.empty() && !truth.touching.empty();
-  for (const auto& [features, impact] : truth.impacts) {
+  const Substitutes substitutes(answer);
+  std::vector<ElementPair> touching = answer.triangles;
+  bool wrong = answer.ofTriangles && answer.triangles.empty() && !reference.touching.empty();
+  for (const auto& [features, impact] : reference.impacts) {
     const Claim* claim = claimOf(features, impact, first, substitutes, a, b);
-    // Of features that do touch in the step every triangle that holds them is found.
+    // All triangles that share the touching features count as reported.
     if (claim) Incidence::addTriangles(features, a, b, touching);
-    if (!said.ofTriangles) wrong |= !claim || (impact && claim->normal.dot(impact->normal) < 0);
+    if (!answer.ofTriangles) wrong |= !claim || (impact && claim->normal.dot(impact->normal) < 0);
   }
-  if (said.trusted) {
+  if (answer.trusted) {
     ++m_judged;
-    silentFailures += wrong && *said.trusted;
-    m_falseAlarms += !wrong && !*said.trusted;
+    wrongTrusted += wrong && *answer.trusted;
+    m_rightUntrusted += !wrong && !*answer.trusted;
   }
   for (const auto& [features, claim] : first)
     if (!claim.example) Incidence::addTriangles(features, a, b, touching);
   sortUnique(touching);
-  m_touching += truth.touching.size();
+  m_touching += reference.touching.size();
   m_claimed += touching.size();
-  m_missed += countOutside(truth.touching, touching);
-  m_old += truth.touchingAtStart.size();
-  m_oldMissed += countOutside(truth.touchingAtStart, touching);
-  m_invented += countOutside(touching, truth.touching);
+  m_falseNegatives += countOutside(reference.touching, touching);
+  m_touchingAtStart += reference.touchingAtStart.size();
+  m_falseNegativesAtStart += countOutside(reference.touchingAtStart, touching);
+  m_falsePositives += countOutside(touching, reference.touching);
 
-  std::multimap<ElementPair, const Impact*> impacts;  // for claims about triangles
+  std::multimap<ElementPair, const Impact*> impacts;  // used by claims about triangles
   if (!first.empty() && first.begin()->first.kind == FeaturePair::Kind::Triangles)
-    impacts = byTriangles(truth, a, b);
+    impacts = byTriangles(reference, a, b);
   for (const auto& [features, claim] : first) {
     if (features.kind == FeaturePair::Kind::Triangles) {
-      // It does not say which features: the kindest of the pair's counts.
+      // The claim does not name features: the impact with the smallest error counts.
       const auto [begin, end] = impacts.equal_range({features.ids[0], features.ids[1]});
-      const auto kindest = std::min_element(begin, end, [&](const auto& l, const auto& r) {
+      const auto nearest = std::min_element(begin, end, [&](const auto& l, const auto& r) {
         return l.second->normal.dot(claim.normal) > r.second->normal.dot(claim.normal);
       });
-      if (kindest != end) addErrors(claim, *kindest->second);
+      if (nearest != end) addErrors(claim, *nearest->second);
     } else {
-      const auto impact = truth.impacts.find(features);
-      if (impact != truth.impacts.end() && impact->second) addErrors(claim, *impact->second);
+      const auto impact = reference.impacts.find(features);
+      if (impact != reference.impacts.end() && impact->second) addErrors(claim, *impact->second);
     }
   }
 }

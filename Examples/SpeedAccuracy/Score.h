@@ -1,6 +1,6 @@
 #pragma once
 
-#include "Truth.h"
+#include "Reference.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 
 namespace palpate::accuracy {
 
-/// Of errors, each not negative.
+/// Worst and RMS of errors that are not negative.
 class ErrorStatistics {
  public:
   void add(double error) {
@@ -28,24 +28,29 @@ class ErrorStatistics {
   std::size_t m_count = 0;
 };
 
-/// What a method got wrong over the steps that were added.
+/// The errors of a method, over all steps that were added.
 class Score {
  public:
-  void add(const Truth&, const Claims&, const Incidence& a, const Incidence& b);
+  void add(const Reference&, const Claims&, const Incidence& a, const Incidence& b);
 
-  double missedPercent() const { return percent(m_missed, m_touching); }
-  /// Of the pairs that were apart at the step's start.
-  double newMissedPercent() const { return percent(m_missed - m_oldMissed, m_touching - m_old); }
-  double inventedPercent() const { return percent(m_invented, m_claimed); }
-  double meanEdge = 1;                     ///< L, to which distances are relative
+  /// Share of the touching pairs that are not reported.
+  double falseNegativesPercent() const { return percent(m_falseNegatives, m_touching); }
+  /// The same for pairs that do not intersect at the step's start.
+  double newFalseNegativesPercent() const {
+    return percent(m_falseNegatives - m_falseNegativesAtStart, m_touching - m_touchingAtStart);
+  }
+  /// Share of the reported pairs that do not touch.
+  double falsePositivesPercent() const { return percent(m_falsePositives, m_claimed); }
+  double meanEdge = 1;                     ///< L: unit of the distance errors
   ErrorStatistics distance, normal, time;  ///< % of the mean edge, degrees, % of the step
   std::size_t claims = 0;
-  /// Of answers: trusted ones that are wrong, and others that are right. Wrong: features that touch
-  /// within the step are not among the claims, or a claim's normal points to the other side; of a
-  /// method that speaks of triangles, that nothing touches although something does.
-  std::size_t silentFailures = 0;
-  double falseAlarmsPercent() const {
-    return m_judged == 0 ? NAN : percent(m_falseAlarms, m_judged);
+  /// Answers that are wrong and trusted. An answer is wrong if it lacks features that touch within
+  /// the step, or if a normal points to the wrong side. An answer of triangles is wrong if it has
+  /// none although triangles touch.
+  std::size_t wrongTrusted = 0;
+  /// Share of the answers that are right and not trusted.
+  double rightUntrustedPercent() const {
+    return m_judged == 0 ? NAN : percent(m_rightUntrusted, m_judged);
   }
 
  private:
@@ -54,8 +59,9 @@ class Score {
   }
   void addErrors(const Claim&, const Impact&);
 
-  std::size_t m_touching = 0, m_missed = 0, m_old = 0, m_oldMissed = 0, m_judged = 0,
-              m_falseAlarms = 0, m_claimed = 0, m_invented = 0;
+  std::size_t m_touching = 0, m_touchingAtStart = 0, m_falseNegatives = 0,
+              m_falseNegativesAtStart = 0, m_claimed = 0, m_falsePositives = 0, m_judged = 0,
+              m_rightUntrusted = 0;
 };
 
 }  // namespace palpate::accuracy

@@ -1,6 +1,7 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/Error.h>
 
+#include "CollisionDetection/ShapePointMotion.h"
 #include "Core/FloatingPoint.h"
 
 #include <string>
@@ -9,7 +10,7 @@ namespace palpate {
 
 Stencil stencil(const EdgeEdgeContact& contact) {
   const StandardFloatingPoint standard;
-  return standard.kept(
+  return standard.evaluated(
       Stencil{{contact.edgeA[0], contact.edgeA[1], contact.edgeB[0], contact.edgeB[1]},
               {1.0 - contact.weightA, contact.weightA, contact.weightB - 1.0, -contact.weightB}});
 }
@@ -18,17 +19,17 @@ double ConstraintRow::gap(std::span<const Eigen::Vector3d> positions) const {
   const StandardFloatingPoint standard;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < 4; ++i) sum += weights[i] * positions[vertices[i]];
-  return standard.kept(normal.dot(sum) - offset);
+  return standard.evaluated(normal.dot(sum) - offset);
 }
 
 void appendRows(const CollisionData& contacts, const SolverVertices& a, const SolverVertices& b,
-                std::vector<ConstraintRow>& rows) {
+                std::vector<ConstraintRow>& rows, const ShapeMotion& shape) {
   const StandardFloatingPoint standard;
-  const std::size_t given = rows.size();
+  const std::size_t initialSize = rows.size();
   const auto require = [&](const SolverVertices& side, std::uint32_t vertex) {
     if (vertex < side.before.size() && vertex < side.now.size()) return;
     throw Error(ErrorCode::WrongPositionCount,
-                "appendRows(): a contact has vertex " + std::to_string(vertex) + " of " +
+                "appendRows(): a contact refers to vertex " + std::to_string(vertex) + " of " +
                     (&side == &a ? "a" : "b") + ", which has " +
                     std::to_string(side.before.size()) + " positions before and " +
                     std::to_string(side.now.size()) + " now",
@@ -57,13 +58,15 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
       const auto& [i, j, k] = contact.vertices;
       for (const std::uint32_t vertex : contact.vertices) require(mesh, vertex);
       const std::uint32_t first = mesh.first;
+      const double time = contact.timeOfImpact;
+      const Eigen::Vector3d rest = (1 - time) * displacementAt(shape, contact.pointOnShape, time);
       rows.push_back({{first + i, first + j, first + k, first + i},
                       {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
                       contact.normal,
-                      contact.normal.dot(contact.point) - contact.distance});
+                      contact.normal.dot(contact.point + rest) - contact.distance});
     }
   } catch (...) {
-    rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(given), rows.end());
+    rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(initialSize), rows.end());
     throw;
   }
 }

@@ -1,6 +1,7 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/Error.h>
 
+#include "CollisionDetection/ShapePointMotion.h"
 #include "Core/FloatingPoint.h"
 #include "Math/Tolerances.h"
 
@@ -15,7 +16,6 @@ namespace palpate {
 
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 struct VertexMotion {
@@ -29,9 +29,9 @@ VertexMotion motionOf(const ContactSide& side, const char* name, std::uint32_t v
   const auto& [first, before, now] = side.vertices;
   if (vertex >= before.size() || vertex >= now.size())
     throw Error(ErrorCode::WrongPositionCount,
-                "appendMotions(): a contact has vertex " + std::to_string(vertex) + " of " + name +
-                    ", which has " + std::to_string(before.size()) + " positions before and " +
-                    std::to_string(now.size()) + " now",
+                "appendMotions(): a contact refers to vertex " + std::to_string(vertex) + " of " +
+                    name + ", which has " + std::to_string(before.size()) +
+                    " positions before and " + std::to_string(now.size()) + " now",
                 {}, vertex);
   const std::span<const double> radii = side.radii;
   return {(1 - time) * before[vertex] + time * now[vertex], now[vertex] - before[vertex],
@@ -41,25 +41,10 @@ VertexMotion motionOf(const ContactSide& side, const char* name, std::uint32_t v
 void checkRadiusCount(const ContactSide& side, const char* name) {
   const std::size_t count = side.radii.size();
   if (count > 1 && count != side.vertices.now.size())
-    throw Error(ErrorCode::InvalidRadius, "appendMotions(): " + std::string(name) + " has " +
-                                              std::to_string(count) + " radii and " +
-                                              std::to_string(side.vertices.now.size()) +
-                                              " positions; one radius, or one for each is needed");
-}
-
-/// Solves matrix x = right.
-Vector3d solve(const Matrix3d& matrix, const Vector3d& right) {
-  const Vector3d u = matrix.col(0), v = matrix.col(1), w = matrix.col(2), normal = v.cross(w);
-  return Vector3d(normal.dot(right), w.cross(u).dot(right), u.cross(v).dot(right)) / u.dot(normal);
-}
-
-/// The displacement over the step of the shape's point that is at `point` at this time.
-Vector3d displacementAt(const ShapeMotion& motion, const Vector3d& point, double time) {
-  const Matrix3d rotation = (1 - time) * motion.rotationBefore + time * motion.rotation;
-  const Vector3d translation = (1 - time) * motion.translationBefore + time * motion.translation;
-  const Vector3d body = solve(rotation, point - translation);
-  return (motion.rotation - motion.rotationBefore) * body +
-         (motion.translation - motion.translationBefore);
+    throw Error(ErrorCode::InvalidRadius,
+                "appendMotions(): " + std::string(name) + " has " + std::to_string(count) +
+                    " radii and " + std::to_string(side.vertices.now.size()) +
+                    " positions; it must have none, one, or one for each position");
 }
 
 /// A weighted sum of the vertices on one side of a contact.
@@ -80,16 +65,16 @@ void appendMotions(const CollisionData& contacts, const ContactSide& a, const Co
                    std::vector<ContactMotion>& motions) {
   const StandardFloatingPoint standard;
   const auto nameOf = [&](const ContactSide& side) { return &side == &a ? "a" : "b"; };
-  const std::size_t given = motions.size();
+  const std::size_t initialSize = motions.size();
 
-  // inFirst: how many of the stencil's vertices are on the side that the normal points to.
+  // firstCount: how many of the stencil's vertices are on the side that the normal points to.
   const auto add = [&](const auto& contact, const ContactSide& first, const ContactSide& second,
-                       std::size_t inFirst) {
+                       std::size_t firstCount) {
     const auto [vertices, weights] = stencil(contact);
     SideSum one, other;
     for (std::size_t i = 0; i < 4; ++i) {
-      const ContactSide& side = i < inFirst ? first : second;
-      (i < inFirst ? one : other)
+      const ContactSide& side = i < firstCount ? first : second;
+      (i < firstCount ? one : other)
           .add(std::abs(weights[i]),
                motionOf(side, nameOf(side), vertices[i], contact.timeOfImpact));
     }
@@ -119,7 +104,7 @@ void appendMotions(const CollisionData& contacts, const ContactSide& a, const Co
                          displacementAt(a.shape, contact.pointA, contact.timeOfImpact) -
                              displacementAt(b.shape, contact.pointB, contact.timeOfImpact)});
   } catch (...) {
-    motions.erase(motions.begin() + static_cast<std::ptrdiff_t>(given), motions.end());
+    motions.erase(motions.begin() + static_cast<std::ptrdiff_t>(initialSize), motions.end());
     throw;
   }
 }

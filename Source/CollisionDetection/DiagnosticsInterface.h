@@ -21,9 +21,10 @@ namespace palpate {
 /// lists pairs with a < b that share no vertex.
 void findCandidatesByBruteForce(const MeshPair&, Buffer<ElementPair>& out);
 
-/// Finds the same as a frame for one pair, by testing every feature against every other. overlaps:
-/// receives the contacts that Auto takes from Intersection.
-void detectPairByBruteForce(const PairRecord&, ContactBuffers& contacts, ContactBuffers& overlaps);
+/// Finds the same as a frame for one pair, by testing every feature against every other.
+/// intersections: receives the contacts that Auto takes from Intersection.
+void detectPairByBruteForce(const PairRecord&, ContactBuffers& contacts,
+                            ContactBuffers& intersections);
 
 /// The complete input of a detection at this moment.
 CollisionProblem problemOf(const Settings&, const GeometryTable&, const PairTable&);

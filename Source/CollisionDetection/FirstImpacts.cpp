@@ -25,14 +25,14 @@ ImpactFeatures inOrder(std::uint64_t first, std::uint64_t second, bool swap) {
 
 }  // namespace
 
-std::optional<ImpactFeatures> sharedFeatures(const VertexTriangleContact& c, bool ofSecond,
+std::optional<ImpactFeatures> sharedFeatures(const VertexTriangleContact& c, bool swapped,
                                              bool self) {
   if (c.feature == TriangleFeature::Face) return {};
   const int i = static_cast<int>(c.feature);
   const std::uint64_t vertex = featureOf(c.vertex, c.vertex),
                       other = i < 3 ? featureOf(c.corners[i], c.corners[i])
                                     : featureOf(c.corners[i - 3], c.corners[(i - 2) % 3]);
-  return inOrder(vertex, other, self ? other < vertex : ofSecond);
+  return inOrder(vertex, other, self ? other < vertex : swapped);
 }
 
 std::optional<ImpactFeatures> sharedFeatures(const EdgeEdgeContact& c, bool self) {

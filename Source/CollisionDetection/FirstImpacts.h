@@ -12,13 +12,13 @@
 namespace palpate {
 
 /// The two features that hold an impact's closest points, as a key. An edge is given by its two
-/// vertices, the lower first, and a vertex by its id twice. self: the contact is of one mesh with
-/// itself, and the two features are in ascending order.
+/// vertices, the lower first, and a vertex by its id twice. swapped: the contact's vertex is of the
+/// pair's second mesh. self: the contact is of one mesh with itself, and the two features are in
+/// ascending order.
 /// Returns  nothing for the interior of a triangle and for the interiors of two edges: no other
 ///          contact has the same features.
 using ImpactFeatures = std::array<std::uint64_t, 2>;
-std::optional<ImpactFeatures> sharedFeatures(const VertexTriangleContact&, bool ofSecond,
-                                             bool self);
+std::optional<ImpactFeatures> sharedFeatures(const VertexTriangleContact&, bool swapped, bool self);
 std::optional<ImpactFeatures> sharedFeatures(const EdgeEdgeContact&, bool self);
 
 /// Calls f(list, number) for the three lists of contacts between meshes.

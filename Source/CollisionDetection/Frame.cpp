@@ -19,7 +19,7 @@
 namespace palpate {
 
 /// A user's function, called by one thread at a time.
-struct Guarded {
+struct GuardedFunction {
   std::mutex mutex;
   Frame::BatchFunction function;
   void* context;
@@ -35,9 +35,9 @@ constexpr std::size_t kSharedSize = 8192;
 
 /// Whether the traversal may skip neighbours that UnfoldedStars proves not to touch. It may if the
 /// method reports nothing but touching features: Continuous, without a thickness.
-bool asksForTouching(const PairRecord& record) {
+bool reportsOnlyTouching(const PairRecord& record) {
   return record.a == record.b && record.plan.method == Method::Continuous &&
-         record.a->mesh.topology.hasFaces() && record.meshes().reach() == 0.0;
+         record.a->mesh.topology.hasFaces() && record.meshes().maxFeatureDistance() == 0.0;
 }
 
 /// thickness: L, of the boxes. unfolded: UnfoldedStars::triangles(), or null.
@@ -61,7 +61,7 @@ std::size_t trianglesOf(const PairRecord& record) {
 }
 
 double boxThickness(const PairRecord& record) {
-  return record.plan.method == Method::Intersection ? 0.0 : record.meshes().reach();
+  return record.plan.method == Method::Intersection ? 0.0 : record.meshes().maxFeatureDistance();
 }
 
 FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
@@ -85,16 +85,16 @@ std::size_t sizeOf(const CollisionData::Contents& contents) {
   return size;
 }
 
-/// ofIntersection: the number of contacts that Method::Intersection found at the step's end.
-void countContacts(const PairPlan& plan, std::size_t ofIntersection,
+/// intersectionCount: the number of contacts that Method::Intersection found at the step's end.
+void countContacts(const PairPlan& plan, std::size_t intersectionCount,
                    CollisionData::Contents& contents) {
   std::size_t atImpact = 0;
-  if (plan.step.impacts) {
+  if (plan.step.reportsImpacts) {
     forEachTimed(contents, [&](const auto& contacts) {
       for (const auto& contact : contacts) atImpact += contact.timeOfImpact < 1.0;
     });
   } else if (plan.method == Method::Continuous) {
-    atImpact = sizeOf(contents) - ofIntersection;
+    atImpact = sizeOf(contents) - intersectionCount;
   }
   contents.validity.atImpact = atImpact;
   contents.validity.atEnd = sizeOf(contents) - contents.validity.atImpact;
@@ -130,14 +130,14 @@ struct Frame::Job {
   Buffer<std::uint32_t> elements;
   PairSink sink;
   Use use;
-  Guarded* guarded;               ///< of forEach()
+  GuardedFunction* guarded;       ///< of forEach()
   std::atomic<double>* earliest;  ///< shared by all jobs of the pair, for earliestTimeOnly
   ElementPair* place;             ///< of collect(): where the job's candidates are copied
   bool keepCandidates;
   bool nearby;  ///< some boxes overlap at the thickness of the traversal
   ContactBuffers contacts;
-  ContactBuffers overlaps;  ///< Auto: Intersection's, where the step starts intersecting
-  bool overlapsMissed;      ///< findOverlaps() did not run for every batch
+  ContactBuffers intersections;  ///< Auto: Intersection's, where the step starts intersecting
+  bool intersectionsMissed;      ///< detectIntersections() did not run for every batch
   Buffer<ElementPair> candidates;
   Buffer<ElementPair> kept;  ///< pairs of the present batch that passed the filters so far
   double milliseconds = 0, narrowMilliseconds = 0;
@@ -149,14 +149,16 @@ struct Frame::Job {
   }
 
   /// Whether the traversal may find pairs that are no candidates.
-  bool isFiltered() const { return record->anyDisabled() || trees.turned(); }
+  bool isFiltered() const { return record->anyDisabled() || trees.isMapped(); }
   /// Whether the boxes of the traversal may be larger than those of the pair's method.
-  bool widerBoxes() const { return record->widerBoxes() || record->plan.nearby > 0.0; }
+  bool hasWiderBoxes() const {
+    return record->hasWiderBoxes() || record->plan.searchDistance > 0.0;
+  }
 
   /// Receives a batch of the traversal, and passes its candidates to `use`.
   static void receive(void* context, std::span<const ElementPair> pairs) {
     Job& job = *static_cast<Job*>(context);
-    if (!job.widerBoxes() && !job.isFiltered()) {
+    if (!job.hasWiderBoxes() && !job.isFiltered()) {
       job.nearby = true;
       return job.use(job, pairs);
     }
@@ -169,22 +171,23 @@ struct Frame::Job {
   }
 
   /// Keeps pairs whose boxes overlap at the thickness of the traversal. Only the traversal of
-  /// turned trees finds other pairs as well.
+  /// mapped trees finds other pairs as well.
   void keepNearby() {
-    if (trees.turned()) keepInWorld(std::max(record->plan.nearby, thickness));
+    if (trees.isMapped()) keepInWorld(std::max(record->plan.searchDistance, thickness));
   }
   void keepEnabled() {
     if (!record->anyDisabled()) return;
     const MeshTopology &a = record->a->mesh.topology, &b = record->b->mesh.topology;
-    std::erase_if(kept, [&](const ElementPair& p) { return !a.isOn(p.a) || !b.isOn(p.b); });
+    std::erase_if(kept,
+                  [&](const ElementPair& p) { return !a.isEnabled(p.a) || !b.isEnabled(p.b); });
   }
   /// Keeps pairs whose boxes overlap at the pair's own thickness. The boxes are those of the pair's
   /// method: at the step's end, or over the whole step.
   void keepWithinThickness() {
-    if (!trees.turned()) {
-      if (widerBoxes())
+    if (!trees.isMapped()) {
+      if (hasWiderBoxes())
         keepOverlapping(record->a->mesh.topology, record->b->mesh.topology, floats, kept);
-    } else if (record->plan.nearby > thickness) {
+    } else if (record->plan.searchDistance > thickness) {
       keepInWorld(thickness);
     }
   }
@@ -196,7 +199,7 @@ struct Frame::Job {
     job.candidates.insert(job.candidates.end(), pairs.begin(), pairs.end());
   }
 
-  static void handOver(Job& job, std::span<const ElementPair> pairs) {
+  static void callGuarded(Job& job, std::span<const ElementPair> pairs) {
     std::unique_lock lock(job.guarded->mutex, std::try_to_lock);
     for (Spin spin; !lock && !spin.isOver() && !lock.try_lock();) spin.wait();
     if (!lock) lock.lock();
@@ -205,14 +208,14 @@ struct Frame::Job {
 
   static void detect(Job& job, std::span<const ElementPair> pairs) {
     Stopwatch watch;
-    const MeshPair meshes = job.record->meshes(job.trees.turned() ? nullptr : &job.floats);
+    const MeshPair meshes = job.record->meshes(job.trees.isMapped() ? nullptr : &job.floats);
     bool& intersecting = job.contacts.facts.startsIntersecting;
-    if (meshes.step.start && !intersecting)
-      intersecting = anyIntersecting(meshes, true, pairs, job.overlaps).has_value();
-    if (job.record->plan.overlaps && (intersecting || job.record->plan.startsIntersecting))
-      findOverlaps(job, pairs);
+    if (meshes.step.checksStart && !intersecting)
+      intersecting = anyIntersecting(meshes, true, pairs, job.intersections).has_value();
+    if (job.record->plan.runsIntersection && (intersecting || job.record->plan.startsIntersecting))
+      detectIntersections(job, pairs);
     else
-      job.overlapsMissed = true;
+      job.intersectionsMissed = true;
     if (meshes.settings.earliestTimeOnly)
       job.findEarliest(meshes, pairs);
     else
@@ -228,14 +231,14 @@ struct Frame::Job {
   /// Detects the contacts of a pair with a shape, without a traversal.
   void detectShape() {
     const MeshPair meshes = record->meshes();
-    if (meshes.isOfShapes()) {
+    if (meshes.isShapePair()) {
       findShapePair(*meshes.shapeOfA, *meshes.shapeOfB, meshes.settings, contacts);
       if (meshes.settings.earliestTimeOnly) takeEarliest(*record, contacts);
       return;
     }
     const auto& [analytical, now, before] = meshes.shape();
-    findElementsNear(record->mesh(), record->plan.swept() ? before : now, now, meshes.reach(),
-                     queries, elements);
+    findElementsNear(record->mesh(), record->plan.swept() ? before : now, now,
+                     meshes.maxFeatureDistance(), queries, elements);
     Stopwatch watch;
     findShapeContacts(meshes.mesh(), meshes.shape(), meshes.settings, elements, contacts);
     if (meshes.settings.earliestTimeOnly) takeEarliest(*record, contacts);
@@ -243,8 +246,8 @@ struct Frame::Job {
   }
 
   /// Auto: finds intersections at the step's end.
-  static void findOverlaps(Job& job, std::span<const ElementPair> pairs) {
-    findIntersections(job.record->meshes(), pairs, job.overlaps);
+  static void detectIntersections(Job& job, std::span<const ElementPair> pairs) {
+    findIntersections(job.record->meshes(), pairs, job.intersections);
   }
 
   void findEarliest(const MeshPair& meshes, std::span<const ElementPair> pairs) {
@@ -263,8 +266,8 @@ Frame::Job& Frame::newJob(PairRecord& record) {
   Job& job = *m_jobs[m_jobCount++];
   job.record = &record;
   job.contacts.clear();
-  job.overlaps.clear();
-  job.nearby = job.overlapsMissed = false;
+  job.intersections.clear();
+  job.nearby = job.intersectionsMissed = false;
   job.place = nullptr;
   job.candidates.clear();
   job.milliseconds = job.narrowMilliseconds = 0;
@@ -284,14 +287,14 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
     }
     if (record->a->tree.octree().size() == 0 || record->b->tree.octree().size() == 0) continue;
     const Triangle* const unfolded =
-        adjacentPairs && asksForTouching(*record)
+        adjacentPairs && reportsOnlyTouching(*record)
             ? record->a->tree.findUnfoldedStars(record->a->mesh, threads)
             : nullptr;
     const double thickness = boxThickness(*record);
     const TreePair own = treesOf(*record, adjacentPairs, unfolded, thickness);
     const TreePair trees =
         treesOf(*record, adjacentPairs, unfolded,
-                adjacentPairs ? std::max(thickness, record->plan.nearby) : thickness);
+                adjacentPairs ? std::max(thickness, record->plan.searchDistance) : thickness);
     const bool shared = threads.count() > 1 && trianglesOf(*record) >= kSharedSize;
     startPairs(trees, shared ? kNodePairsWanted : 1, m_stack);
     const std::size_t first = m_nodePairs.size(), count = m_stack.pairs.size();
@@ -321,7 +324,7 @@ void Frame::collect(std::span<PairRecord* const> records, const Threads& threads
   start(records, threads, false);
   threads.forEach(m_jobCount, [&](std::size_t i) {
     const PairRecord& record = *m_jobs[i]->record;
-    m_jobs[i]->start(record.widerBoxes() || m_jobs[i]->isFiltered() ? &Job::keep : nullptr);
+    m_jobs[i]->start(record.hasWiderBoxes() || m_jobs[i]->isFiltered() ? &Job::keep : nullptr);
     run(*m_jobs[i]);
   });
   const auto found = [&](std::size_t i) {
@@ -344,26 +347,27 @@ void Frame::collect(std::span<PairRecord* const> records, const Threads& threads
       }
     }
     record->candidatesSorted = false;
-    record->found = size;
+    record->candidateCount = size;
   }
   threads.forEach(m_jobCount, [&](std::size_t k) {
     if (m_jobs[k]->place) std::copy(found(k).begin(), found(k).end(), m_jobs[k]->place);
   });
-  for (PairRecord* record : records) record->candidatesOf.commit(record->state());
+  for (PairRecord* record : records) record->candidatesVersion.commit(record->state());
   statistics.milliseconds.pairs = watch.lap();
 }
 
 void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads,
                     BatchFunction function, void* context) {
   start(records, threads, false);
-  Guarded guarded{{}, function, context};
+  GuardedFunction guarded{{}, function, context};
   threads.forEach(m_jobCount, [&](std::size_t i) {
     m_jobs[i]->guarded = &guarded;
-    m_jobs[i]->start(&Job::handOver);
+    m_jobs[i]->start(&Job::callGuarded);
     run(*m_jobs[i]);
   });
-  for (PairRecord* record : records) record->found = 0;
-  for (std::size_t i = 0; i < m_jobCount; ++i) m_jobs[i]->record->found += m_jobs[i]->sink.total();
+  for (PairRecord* record : records) record->candidateCount = 0;
+  for (std::size_t i = 0; i < m_jobCount; ++i)
+    m_jobs[i]->record->candidateCount += m_jobs[i]->sink.total();
 }
 
 void Frame::detect(std::span<PairRecord* const> records, const Settings& settings,
@@ -377,7 +381,7 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
     m_jobs[i]->record->hasShape() ? m_jobs[i]->detectShape() : run(*m_jobs[i]);
     m_jobs[i]->milliseconds = job.lap();
   });
-  findMissedOverlaps(threads);
+  findMissedIntersections(threads);
   double all = 0, narrow = 0;
   for (std::size_t i = 0; i < m_jobCount; ++i) {
     const Job& job = *m_jobs[i];
@@ -385,8 +389,8 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
     narrow += job.narrowMilliseconds;
     statistics.candidatePairs += job.sink.total();
     statistics.featurePairs += job.contacts.featurePairs;
-    statistics.exactDecisions += job.contacts.exactDecisions + job.overlaps.exactDecisions;
-    statistics.validityPairs += job.overlaps.validityPairs;
+    statistics.exactDecisions += job.contacts.exactDecisions + job.intersections.exactDecisions;
+    statistics.validityPairs += job.intersections.validityPairs;
   }
   // Threads work on both stages at once. The wall-clock time is therefore divided in proportion to
   // the work of each stage.
@@ -397,13 +401,13 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
   std::size_t i = 0;
   for (PairRecord* record : records) {
     m_buffers.clear();
-    m_overlaps.clear();
+    m_intersections.clear();
     bool nearby = false;
     if (settings.keepCandidates) record->candidates.clear();
     for (; i < m_jobCount && m_jobs[i]->record == record; ++i) {
       Job& job = *m_jobs[i];
       m_buffers.push_back(&job.contacts);
-      m_overlaps.push_back(&job.overlaps);
+      m_intersections.push_back(&job.intersections);
       nearby |= job.nearby;
       if (settings.keepCandidates)
         record->candidates.insert(record->candidates.end(), job.candidates.begin(),
@@ -416,9 +420,10 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
 
 /// Repeats jobs in which some batches ran before the step was known to start intersecting. This is
 /// rare: most such steps are known before, or from their first batch.
-void Frame::findMissedOverlaps(const Threads& threads) {
+void Frame::findMissedIntersections(const Threads& threads) {
   const auto missed = [](const Job& job) {
-    return job.overlapsMissed && job.record->plan.overlaps && job.record->plan.startsIntersecting;
+    return job.intersectionsMissed && job.record->plan.runsIntersection &&
+           job.record->plan.startsIntersecting;
   };
   bool any = false;
   for (std::size_t i = 0; i < m_jobCount; ++i)
@@ -429,7 +434,7 @@ void Frame::findMissedOverlaps(const Threads& threads) {
     Job& job = *m_jobs[i];
     if (!missed(job)) return;
     Stopwatch watch;
-    job.start(&Job::findOverlaps);
+    job.start(&Job::detectIntersections);
     run(job);
     const double spent = watch.lap();
     job.milliseconds += spent;
@@ -441,26 +446,27 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
                    FrameStatistics& statistics) {
   m_facts.clear();
   m_impacts.clear();
-  for (const auto* buffers : {&m_buffers, &m_overlaps})
+  for (const auto* buffers : {&m_buffers, &m_intersections})
     for (const ContactBuffers* found : *buffers) m_facts.add(found->facts);
   for (auto list : {&StepFacts::verticesA, &StepFacts::verticesB, &StepFacts::degenerateA,
                     &StepFacts::degenerateB})
     sortUnique(m_facts.*list);
-  if (record.plan.step.impacts && m_facts.clearance == 0.0) {
+  if (record.plan.step.reportsImpacts && m_facts.clearance == 0.0) {
     for (ContactBuffers* found : m_buffers)
-      answerByImpact(record.meshes(), m_facts, *found, m_impacts);
+      replaceByImpacts(record.meshes(), m_facts, *found, m_impacts);
     m_buffers.push_back(&m_impacts);
   }
   m_facts.startsIntersecting |= record.plan.startsIntersecting;
-  std::size_t ofIntersection = 0;
-  if (m_facts.startsIntersecting && record.plan.overlaps) {
-    ofIntersection = m_overlaps.size();
-    m_buffers.insert(m_buffers.begin(), m_overlaps.begin(), m_overlaps.end());
+  std::size_t preferredBuffers = 0;
+  if (m_facts.startsIntersecting && record.plan.runsIntersection) {
+    preferredBuffers = m_intersections.size();
+    m_buffers.insert(m_buffers.begin(), m_intersections.begin(), m_intersections.end());
   }
   // A feature pair that Intersection reports is not reported by distance or impact as well: where
   // the step starts intersecting only Intersection knows the side.
   CollisionData::Contents& contents = record.next.contents();
-  ofIntersection = orderContacts(m_buffers, ofIntersection, m_orderScratch, contents);
+  const std::size_t intersectionCount =
+      orderContacts(m_buffers, preferredBuffers, m_orderScratch, contents);
   contents.earliestTimeOfImpact = record.earliest.load();
   if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
   record.trust.finish(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan,
@@ -469,30 +475,31 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   statistics.validityPairs += m_impacts.validityPairs;
   // After trust.finish(), which tests the triangles around every impact.
   if (record.pair.settings.contacts == Contacts::Distinct &&
-      (record.plan.step.impacts || record.plan.method == Method::Continuous))
-    m_firstImpacts.keep(record.a == record.b,
-                        record.plan.step.impacts ? 1.0 : std::numeric_limits<double>::infinity(),
-                        m_orderScratch, contents);
-  countContacts(record.plan, ofIntersection, contents);
+      (record.plan.step.reportsImpacts || record.plan.method == Method::Continuous))
+    m_firstImpacts.keep(
+        record.a == record.b,
+        record.plan.step.reportsImpacts ? 1.0 : std::numeric_limits<double>::infinity(),
+        m_orderScratch, contents);
+  countContacts(record.plan, intersectionCount, contents);
   record.candidatesSorted = candidatesSorted;
-  if (settings.keepCandidates) record.candidatesOf.commit(record.state());
+  if (settings.keepCandidates) record.candidatesVersion.commit(record.state());
 }
 
 void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Settings& settings,
                                FrameStatistics& statistics) {
   for (PairRecord* record : records) {
     Stopwatch watch;
-    ContactBuffers contacts, overlaps;
-    detectPairByBruteForce(*record, contacts, overlaps);
+    ContactBuffers contacts, intersections;
+    detectPairByBruteForce(*record, contacts, intersections);
     record->earliest = std::numeric_limits<double>::infinity();
     if (record->pair.settings.earliestTimeOnly) takeEarliest(*record, contacts);
     if (settings.keepCandidates) findCandidatesByBruteForce(record->meshes(), record->candidates);
     statistics.featurePairs += contacts.featurePairs;
-    statistics.exactDecisions += contacts.exactDecisions + overlaps.exactDecisions;
-    statistics.validityPairs += overlaps.validityPairs;
+    statistics.exactDecisions += contacts.exactDecisions + intersections.exactDecisions;
+    statistics.validityPairs += intersections.validityPairs;
     statistics.milliseconds.narrowPhase += watch.lap();
     m_buffers = {&contacts};
-    m_overlaps = {&overlaps};
+    m_intersections = {&intersections};
     finish(*record, true, true, settings, statistics);
     statistics.milliseconds.order += watch.lap();
   }

@@ -39,7 +39,7 @@ class Frame {
   void start(std::span<PairRecord* const>, const Threads&, bool adjacentPairs);
   void run(Job&) const;
   void finish(PairRecord&, bool nearby, bool candidatesSorted, const Settings&, FrameStatistics&);
-  void findMissedOverlaps(const Threads&);
+  void findMissedIntersections(const Threads&);
   Job& newJob(PairRecord&);
 
   std::vector<std::unique_ptr<Job>>
@@ -47,7 +47,7 @@ class Frame {
   std::size_t m_jobCount = 0;
   Buffer<NodePair> m_nodePairs;
   TraversalStack m_stack;
-  std::vector<ContactBuffers*> m_buffers, m_overlaps;  ///< of the pair that finish() handles
+  std::vector<ContactBuffers*> m_buffers, m_intersections;  ///< of the pair that finish() handles
   ContactBuffers m_impacts;
   StepFacts m_facts;
   OrderScratch m_orderScratch;

@@ -25,9 +25,9 @@ class GeometryMotion {
   /// Updates range(), correction() and arcDeviation().
   void update(const Geometry&);
   /// Stores the motion in the step, which was measured while the positions were copied.
-  void take(const TriangleMesh&, const MotionRange&);
+  void set(const TriangleMesh&, const MotionRange&);
   /// Whether motion should be measured while positions are copied: the step before needed it.
-  bool isWanted() const { return m_wasUsed; }
+  bool shouldMeasure() const { return m_wasUsed; }
   void advance() { m_wasUsed = std::exchange(m_isUsed, false); }
 
   const MotionRange& range() const { return m_range; }  ///< from before to now
@@ -37,7 +37,7 @@ class GeometryMotion {
 
  private:
   using Ends = DerivedFrom<4>;  ///< body and transform of two ends
-  Ends m_rangeOf, m_arcOf, m_correctionOf;
+  Ends m_rangeVersion, m_arcVersion, m_correctionVersion;
   MotionRange m_range, m_correction;
   double m_arcDeviation = 0;
   bool m_isUsed = false, m_wasUsed = false;

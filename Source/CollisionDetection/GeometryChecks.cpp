@@ -77,13 +77,13 @@ void checkCounts(GeometryId id, std::span<const Eigen::Vector3d> positions,
     throw Error(ErrorCode::TooLarge,
                 nameOf(id) + ": " + std::to_string(positions.size()) + " vertices and " +
                     std::to_string(triangles.size()) + " " + element +
-                    "s; at most 2^28 of each can be named",
+                    "s; at most 2^28 of each are supported",
                 id);
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     checkIndices(id, element, t, triangles[t], positions.size());
     if (lines && triangles[t][0] == triangles[t][1])
       throw Error(ErrorCode::IndexOutOfRange,
-                  nameOf(id) + ", segment " + std::to_string(t) + ": joins vertex " +
+                  nameOf(id) + ", segment " + std::to_string(t) + " joins vertex " +
                       std::to_string(triangles[t][0]) + " with itself",
                   id, t);
   }
@@ -95,7 +95,7 @@ TetrahedralTopology checkedTopology(GeometryId id, std::span<const Eigen::Vector
     throw Error(ErrorCode::TooLarge,
                 nameOf(id) + ": " + std::to_string(rest.size()) + " vertices and " +
                     std::to_string(tetrahedra.size()) +
-                    " tetrahedra; at most 2^28 and 2^26 can be named",
+                    " tetrahedra; at most 2^28 and 2^26 are supported",
                 id);
   for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
     checkIndices(id, "tetrahedron", t, tetrahedra[t], rest.size());
@@ -103,7 +103,7 @@ TetrahedralTopology checkedTopology(GeometryId id, std::span<const Eigen::Vector
     std::sort(sorted.begin(), sorted.end());
     if (const auto twice = std::adjacent_find(sorted.begin(), sorted.end()); twice != sorted.end())
       throw Error(ErrorCode::IndexOutOfRange,
-                  nameOf(id) + ", tetrahedron " + std::to_string(t) + ": has vertex " +
+                  nameOf(id) + ", tetrahedron " + std::to_string(t) + " has vertex " +
                       std::to_string(*twice) + " twice",
                   id, t);
   }
@@ -113,10 +113,10 @@ TetrahedralTopology checkedTopology(GeometryId id, std::span<const Eigen::Vector
   const auto& [a, b, c] = fault->face;
   const auto& [s, t, u] = fault->tetrahedra;
   throw Error(ErrorCode::SharedFace,
-              nameOf(id) + ", tetrahedron " + std::to_string(u) + ": its face of vertices " +
+              nameOf(id) + ", tetrahedron " + std::to_string(u) + ": its face with vertices " +
                   std::to_string(a) + ", " + std::to_string(b) + " and " + std::to_string(c) +
-                  " is one of tetrahedra " + std::to_string(s) + " and " + std::to_string(t) +
-                  " already",
+                  " already belongs to tetrahedra " + std::to_string(s) + " and " +
+                  std::to_string(t),
               id, u);
 }
 
@@ -160,7 +160,8 @@ void checkPlaceable(GeometryId id, std::span<const Eigen::Vector3d> body, ErrorC
     if (!(body[v].cwiseAbs().maxCoeff() <= kLargestPlaced))
       throw Error(code,
                   nameOf(id) + ", vertex " + std::to_string(v) +
-                      ": its position in the body's frame is beyond 2^1000",
+                      ": position in the body's frame is " + textOf(body[v]) +
+                      "; it must be at most 2^1000 in magnitude",
                   id, v);
 }
 

@@ -36,17 +36,17 @@ GeometryInStep Geometry::inStep() const {
           step.detected()};
 }
 
-void GeometryMotion::take(const TriangleMesh& mesh, const MotionRange& motion) {
+void GeometryMotion::set(const TriangleMesh& mesh, const MotionRange& motion) {
   m_range = motion;
-  m_rangeOf.commit(ends(mesh.before, mesh.now));
+  m_rangeVersion.commit(ends(mesh.before, mesh.now));
 }
 
 void GeometryMotion::update(const Geometry& geometry) {
   m_isUsed = true;
   const TriangleMesh& mesh = geometry.mesh;
   const std::array<Revision, 4> step = ends(mesh.before, mesh.now);
-  if (!m_rangeOf.isCurrent(step)) {
-    m_rangeOf.invalidate();
+  if (!m_rangeVersion.isCurrent(step)) {
+    m_rangeVersion.invalidate();
     if (mesh.before.isSameAs(mesh.now)) {
       m_range = {};
       m_range.isEmpty = mesh.now.size() == 0;
@@ -55,20 +55,20 @@ void GeometryMotion::update(const Geometry& geometry) {
     } else {
       m_range = motionRange(mesh.before, mesh.now);
     }
-    m_rangeOf.commit(step);
+    m_rangeVersion.commit(step);
   }
-  if (!m_arcOf.isCurrent(step)) {
-    m_arcOf.invalidate();
+  if (!m_arcVersion.isCurrent(step)) {
+    m_arcVersion.invalidate();
     m_arcDeviation = m_search.arcDeviation(geometry);
-    m_arcOf.commit(step);
+    m_arcVersion.commit(step);
   }
-  const std::array<Revision, 4> given = ends(geometry.step.detected(), mesh.before);
-  if (!m_correctionOf.isCurrent(given)) {
-    m_correctionOf.invalidate();
+  const std::array<Revision, 4> correctionEnds = ends(geometry.step.detected(), mesh.before);
+  if (!m_correctionVersion.isCurrent(correctionEnds)) {
+    m_correctionVersion.invalidate();
     m_correction = geometry.step.detected().isSameAs(mesh.before)
                        ? MotionRange{}
                        : motionRange(geometry.step.detected(), mesh.before);
-    m_correctionOf.commit(given);
+    m_correctionVersion.commit(correctionEnds);
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include "CollisionDetection/GeometryChecks.h"
 #include "Core/Assert.h"
+#include "Core/Text.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
@@ -90,7 +91,9 @@ void GeometryStep::setTransform(TriangleMesh& mesh, PlacedShape* shape,
       throw Error(ErrorCode::InvalidTransform, nameOf(m_id) + ": " + which + fault, m_id);
     if (!(transform.translation.cwiseAbs().maxCoeff() <= kLargestPlaced))
       throw Error(ErrorCode::InvalidTransform,
-                  nameOf(m_id) + ": " + which + "the translation is beyond 2^1000", m_id);
+                  nameOf(m_id) + ": " + which + "translation is " + textOf(transform.translation) +
+                      "; it must be at most 2^1000 in magnitude",
+                  m_id);
   };
   if (before) check(*before, "before: ");
   check(now, before ? "now: " : "");

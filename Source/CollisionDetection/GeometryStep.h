@@ -49,7 +49,7 @@ class GeometryStep {
   void advance(TriangleMesh&, PlacedShape* shape) noexcept;
 
   /// A detection has used the end `now`.
-  void noteDetection(const TriangleMesh& mesh) noexcept { m_detected = mesh.now; }
+  void recordDetection(const TriangleMesh& mesh) noexcept { m_detected = mesh.now; }
   /// The end `now` of the last detection; a solver may have corrected it since.
   const Positions& detected() const { return m_detected; }
   bool isNew() const { return m_isNew; }

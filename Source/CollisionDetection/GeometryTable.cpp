@@ -35,7 +35,7 @@ double smallestHeight(const TriangleMesh& mesh) {
 
 GeometryId GeometryTable::nextId() const {
   if (m_nextId == 0xffffffffu)
-    throw Error(ErrorCode::TooLarge, "no geometry ids are left: 2^32 - 1 were given out");
+    throw Error(ErrorCode::TooLarge, "no geometry id is left: 2^32 - 1 geometries were added");
   return GeometryId{m_nextId};
 }
 
@@ -166,15 +166,15 @@ void GeometryTable::setPositions(GeometryId id,
   checkPositionCount(geometry, now.size());
   std::optional<MotionRange> moved;
   geometry.step.setPositions(geometry.mesh, before, now, threads,
-                             geometry.motion.isWanted() ? &moved : nullptr);
+                             geometry.motion.shouldMeasure() ? &moved : nullptr);
   ++m_state;
-  if (moved) geometry.motion.take(geometry.mesh, *moved);
+  if (moved) geometry.motion.set(geometry.mesh, *moved);
 }
 
 void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles) {
   Geometry& geometry = at(id);
-  checkTopologyKind(geometry, false, "setTriangles() is for triangle meshes");
+  checkMeshType(geometry, false, "setTriangles() is for triangle meshes");
   checkCounts(id, positions, triangles, GeometryType::Triangles);
   setTopology(geometry, checkedRest(id, positions), {positions.size(), triangles}, {});
   ++m_state;
@@ -183,7 +183,7 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
 void GeometryTable::setTetrahedra(GeometryId id, std::span<const Eigen::Vector3d> positions,
                                   std::span<const Tetrahedron> tetrahedra) {
   Geometry& geometry = at(id);
-  checkTopologyKind(geometry, true, "setTetrahedra() is for tetrahedral meshes");
+  checkMeshType(geometry, true, "setTetrahedra() is for tetrahedral meshes");
   std::vector<Eigen::Vector3d> rest = checkedRest(id, positions);
   auto solid = std::make_unique<Solid>();
   solid->topology = checkedTopology(id, rest, tetrahedra);
@@ -209,13 +209,17 @@ void GeometryTable::setTopology(Geometry& geometry, std::vector<Eigen::Vector3d>
 void GeometryTable::setFilter(GeometryId id, const CollisionFilter& filter) {
   Geometry& geometry = at(id);
   if (filter.sidedness != Sidedness::Both && filter.sidedness != Sidedness::Outer)
-    throw Error(ErrorCode::InvalidSettings, nameOf(id) + ": sidedness must be Both or Outer", id);
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(id) + ": sidedness is " +
+                    std::to_string(static_cast<int>(filter.sidedness)) +
+                    "; it must be Both or Outer",
+                id);
   if (filter.sidedness == Sidedness::Outer && !geometry.mesh.topology.hasFaces())
     throw Error(ErrorCode::InvalidSettings,
                 nameOf(id) + " is " + nameOf(geometry.mesh.topology.type) + ", which has no sides",
                 id);
   geometry.filter = filter;
-  geometry.mesh.outer = filter.sidedness == Sidedness::Outer;
+  geometry.mesh.outerSideOnly = filter.sidedness == Sidedness::Outer;
   geometry.revisions.filter = geometry.revisions.counter.next();
 }
 
@@ -226,7 +230,8 @@ void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> el
     if (element >= topology.triangles.size())
       throw Error(ErrorCode::IndexOutOfRange,
                   nameOf(id) + ": element " + std::to_string(element) +
-                      " is out of range; it has " + std::to_string(topology.triangles.size()),
+                      " is out of range; the geometry has " +
+                      std::to_string(topology.triangles.size()) + " elements",
                   id, element);
   topology.disable(elements);
   geometry.revisions.enabled = geometry.revisions.counter.next();
@@ -254,8 +259,8 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   std::size_t total = 0;
   for (const Geometry* geometry : m_changed) total += size(geometry);
   const Threads one(1);
-  m_updatedAlone = settings.update == OctreeUpdate::Auto && total < kSmallRefit;
-  (m_updatedAlone ? one : threads).forEach(m_changed.size(), [&](std::size_t i) {
+  m_wasUpdatedByOneThread = settings.update == OctreeUpdate::Auto && total < kSmallRefit;
+  (m_wasUpdatedByOneThread ? one : threads).forEach(m_changed.size(), [&](std::size_t i) {
     Geometry& geometry = *m_changed[i];
     geometry.tree.update(geometry.mesh, geometry.revisions.topology, scale, settings,
                          size(&geometry) < kSmall ? one : threads);

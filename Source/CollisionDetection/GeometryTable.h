@@ -49,7 +49,8 @@ class GeometryTable {
 
   /// Updates the octrees to the positions now, or to the whole step (GeometryOctree::setSwept()).
   void updateOctrees(const OctreeSettings&, const Threads&);
-  bool updatedAlone() const { return m_updatedAlone; }  ///< by one thread, whose cache has the data
+  /// Whether one thread made the last update. Its cache then has the data.
+  bool wasUpdatedByOneThread() const { return m_wasUpdatedByOneThread; }
 
   GeometryId nextId() const;  ///< of what is added next; throws if there are no more
 
@@ -63,7 +64,7 @@ class GeometryTable {
   std::vector<std::unique_ptr<Geometry>> m_geometries;  ///< ascending ids
   std::uint32_t m_nextId = 0;
   std::vector<Geometry*> m_changed;
-  bool m_updatedAlone = false;
+  bool m_wasUpdatedByOneThread = false;
   std::uint64_t m_stepNumber = 0, m_state = 1;
 };
 

@@ -30,8 +30,8 @@ Eigen::AlignedBox3d boundsOf(const Geometry& geometry) {
   const TriangleMesh& mesh = geometry.mesh;
   Eigen::AlignedBox3d box;
   for (std::uint32_t v = 0; v < mesh.now.size(); ++v) {
-    const Eigen::Vector3d centre = mesh.now[v], reach = Eigen::Vector3d::Constant(mesh.radius(v));
-    box.extend(Eigen::AlignedBox3d(centre - reach, centre + reach));
+    const Eigen::Vector3d centre = mesh.now[v], margin = Eigen::Vector3d::Constant(mesh.radius(v));
+    box.extend(Eigen::AlignedBox3d(centre - margin, centre + margin));
   }
   return box;
 }
@@ -40,19 +40,21 @@ Eigen::AlignedBox3d boundsOf(const Geometry& geometry) {
 
 void checkCandidates(const PairRecord& record) {
   if (record.hasShape())
-    throw Error(ErrorCode::NotAvailable, "a pair with a shape has no candidate pairs",
-                record.pair.a);
+    throw Error(
+        ErrorCode::NotAvailable,
+        nameOf(record.pair.a, record.pair.b) + " includes a shape and has no candidate pairs",
+        record.pair.a);
 }
 
 struct OctreeBasedCD::Implementation {
-  class Change;
+  class ChangeGuard;
   class QuerySource;
 
   explicit Implementation(const Settings& newSettings);
   ~Implementation();
 
   Settings settings;
-  Threads threads, one{1};
+  Threads threads, singleThread{1};
   GeometryTable geometries;
   PairTable pairs;
   Frame frame;
@@ -60,11 +62,11 @@ struct OctreeBasedCD::Implementation {
   FrameStatistics updates;     ///< of the updates since the last frame
   bool hasUpdates = false;
   std::optional<LooseOctree> octree;
-  std::vector<PairRecord*> work;
+  std::vector<PairRecord*> selectedPairs;
   AuditRecord audit;
   std::shared_ptr<QuerySource> querySource;
-  std::atomic<std::uint64_t> octreesOf =
-      0;               ///< geometries.state() for which all octrees hold; 0: for none
+  /// geometries.state() for which all octrees hold; 0: for none.
+  std::atomic<std::uint64_t> octreesState = 0;
   std::mutex sorting;  ///< locked while candidatePairs(), a const call, sorts candidates
   PairOrderScratch sortingScratch;
   std::atomic<bool> isBusy = false;  ///< a call that changes the object has not returned
@@ -90,7 +92,7 @@ struct OctreeBasedCD::Implementation {
   /// which candidates depend.
   void update(bool explicitly = false, bool detecting = false) {
     using Update = LooseOctree::Update;
-    octreesOf = 0;
+    octreesState = 0;
     state->trees.clear();  // they are invalid until the update is complete
     if (!hasUpdates) updates = {};
     const bool isFirst = explicitly || !std::exchange(hasUpdates, true);
@@ -108,7 +110,7 @@ struct OctreeBasedCD::Implementation {
       if (moves)
         for (Geometry* geometry : {record->a, record->b}) geometry->motion.update(*geometry);
       record->plan = planOf(record->pair.settings, record->a->inStep(), record->b->inStep(), moves);
-      record->updateNear();
+      record->updateNearAtRest();
       if (record->plan.swept())
         for (Geometry* geometry : {record->a, record->b}) geometry->tree.setSwept(true);
     }
@@ -130,15 +132,15 @@ struct OctreeBasedCD::Implementation {
     const double share = boxes + octrees > 0 ? boxes / (boxes + octrees) : 0;
     updates.milliseconds.boxes += wall * share;
     updates.milliseconds.octree += wall * (1 - share);
-    showOctree();
-    octreesOf = geometries.state();
+    updateOctreeView();
+    octreesState = geometries.state();
 #ifdef PALPATE_VALIDATE
     PALPATE_ASSERT(octree->validate().empty());
 #endif
     if (explicitly) publish(updates);
   }
 
-  void showOctree() {
+  void updateOctreeView() {
     if (!state) {
       state = std::make_shared<LooseOctree::State>();
       octree.emplace(state);
@@ -156,35 +158,35 @@ struct OctreeBasedCD::Implementation {
 
   /// Pairs whose result is outdated. Pairs that do not collide are not among them: their result is
   /// empty.
-  std::span<PairRecord* const> pairsToDo(PairRecord::Derived PairRecord::*answer) {
-    work.clear();
+  std::span<PairRecord* const> outdatedPairs(PairRecord::Derived PairRecord::*version) {
+    selectedPairs.clear();
     for (const auto& record : pairs.records())
-      if (record->collides() && !((*record).*answer).isCurrent(record->state()))
-        work.push_back(record.get());
-    for (PairRecord* record : work) record->candidatesOf.invalidate();
-    return work;
+      if (record->collides() && !((*record).*version).isCurrent(record->state()))
+        selectedPairs.push_back(record.get());
+    for (PairRecord* record : selectedPairs) record->candidatesVersion.invalidate();
+    return selectedPairs;
   }
 
-  /// Returns `one` if one thread has refitted the octrees and few candidates are expected: other
-  /// threads would wait for the data longer than they could help.
+  /// Returns `singleThread` if one thread has refitted the octrees and few candidates are expected:
+  /// other threads would wait for the data longer than they could help.
   const Threads& threadsFor(std::span<PairRecord* const> records) const {
     constexpr std::size_t kFew = 16384;
     std::size_t found = 0;
-    for (const PairRecord* record : records) found += record->found;
-    return geometries.updatedAlone() && found < kFew ? one : threads;
+    for (const PairRecord* record : records) found += record->candidateCount;
+    return geometries.wasUpdatedByOneThread() && found < kFew ? singleThread : threads;
   }
 
   void collect() {
     update();
     FrameStatistics next = updates;
-    const auto records = pairsToDo(&PairRecord::candidatesOf);
+    const auto records = outdatedPairs(&PairRecord::candidatesVersion);
     if (settings.engine == Engine::Octree) {
       frame.collect(records, threadsFor(records), next);
     } else {
       for (PairRecord* record : records) {
         findCandidatesByBruteForce(record->meshes(), record->candidates);
         record->candidatesSorted = true;
-        record->candidatesOf.commit(record->state());
+        record->candidatesVersion.commit(record->state());
       }
     }
     for (const auto& record : pairs.records()) {
@@ -198,7 +200,7 @@ struct OctreeBasedCD::Implementation {
   void detect() {
     update(false, true);
     FrameStatistics next = updates;
-    const auto records = pairsToDo(&PairRecord::dataOf);
+    const auto records = outdatedPairs(&PairRecord::dataVersion);
     for (PairRecord* record : records)
       record->trust.start(record->pair.settings, record->a->inStep(), record->b->inStep(),
                           record->plan);
@@ -208,13 +210,13 @@ struct OctreeBasedCD::Implementation {
       frame.detectByBruteForce(records, settings, next);
     for (PairRecord* record : records) record->commit();
     for (const auto& record : pairs.records()) {
-      if (!record->collides() && !record->dataOf.isCurrent(record->state()))
-        record->commitNothing(settings.keepCandidates);
+      if (!record->collides() && !record->dataVersion.isCurrent(record->state()))
+        record->commitEmpty(settings.keepCandidates);
       const CollisionData& data = record->data;
       next.contacts += data.validity().atImpact + data.validity().atEnd;
       next.intersectingTriangles += data.intersectingTriangles().size();
     }
-    for (const auto& geometry : geometries.all()) geometry->step.noteDetection(geometry->mesh);
+    for (const auto& geometry : geometries.all()) geometry->step.recordDetection(geometry->mesh);
     publish(next);
     hasUpdates = false;
     auditFrame(settings, geometries, pairs, audit);
@@ -231,7 +233,7 @@ namespace {
 
 [[noreturn]] void throwBusy() {
   throw Error(ErrorCode::InvalidCall,
-              "a predicate or callback may not call the OctreeBasedCD that calls it");
+              "a predicate or callback must not call the OctreeBasedCD that calls it");
 }
 
 }  // namespace
@@ -239,15 +241,15 @@ namespace {
 /// Exists while a call that changes the object runs. Other calls are refused meanwhile, so that
 /// callbacks cannot change data in use. It also sets the floating-point mode that the library
 /// needs.
-class OctreeBasedCD::Implementation::Change {
+class OctreeBasedCD::Implementation::ChangeGuard {
  public:
-  explicit Change(const std::unique_ptr<Implementation>& all) : m_all(all.get()) {
+  explicit ChangeGuard(const std::unique_ptr<Implementation>& all) : m_all(all.get()) {
     if (!m_all) throwMovedFrom();
     if (m_all->isBusy.exchange(true, std::memory_order_relaxed)) throwBusy();
   }
-  ~Change() { m_all->isBusy.store(false, std::memory_order_relaxed); }
-  Change(const Change&) = delete;
-  Change& operator=(const Change&) = delete;
+  ~ChangeGuard() { m_all->isBusy.store(false, std::memory_order_relaxed); }
+  ChangeGuard(const ChangeGuard&) = delete;
+  ChangeGuard& operator=(const ChangeGuard&) = delete;
   Implementation* operator->() const { return m_all; }
   Implementation& operator*() const { return *m_all; }
 
@@ -265,15 +267,15 @@ class OctreeBasedCD::Implementation::QuerySource : public SpatialQueries::Source
   /// Updates the octrees unless they are up to date with the positions now.
   void updateOctrees() {
     const auto lock = lockOctrees();
-    if (m_all->octreesOf != m_all->geometries.state()) m_all->update();
+    if (m_all->octreesState != m_all->geometries.state()) m_all->update();
   }
-  std::unique_lock<std::mutex> lockOctrees() { return std::unique_lock(m_preparing); }
+  std::unique_lock<std::mutex> lockOctrees() { return std::unique_lock(m_preparationMutex); }
 
   std::uint64_t state() const override {
     if (!m_all) return 0;
     if (m_all->isBusy.load(std::memory_order_relaxed)) throwBusy();
     const std::uint64_t now = m_all->geometries.state();
-    return m_all->octreesOf == now ? now : 0;
+    return m_all->octreesState == now ? now : 0;
   }
   SearchableGeometry& at(GeometryId id) const override { return m_all->geometries.at(id); }
   std::uint64_t step() const override { return m_all->geometries.stepNumber(); }
@@ -289,7 +291,7 @@ OctreeBasedCD::Implementation::Implementation(const Settings& newSettings)
     : settings(checked(newSettings)),
       threads(newSettings.threads, newSettings.executor),
       querySource(std::make_shared<QuerySource>(*this)) {
-  showOctree();
+  updateOctreeView();
 }
 
 OctreeBasedCD::Implementation::~Implementation() { querySource->close(); }
@@ -308,75 +310,75 @@ OctreeBasedCD::~OctreeBasedCD() = default;
 
 GeometryId OctreeBasedCD::addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                                           std::span<const Triangle> triangles) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   return all->geometries.add(positions, triangles);
 }
 
 GeometryId OctreeBasedCD::addTetrahedralMesh(std::span<const Eigen::Vector3d> positions,
                                              std::span<const Tetrahedron> tetrahedra) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   return all->geometries.add(positions, tetrahedra);
 }
 
 GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
                                       std::span<const Segment> segments, double radius) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   return all->geometries.addLines(positions, segments, {&radius, 1});
 }
 
 GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
                                       std::span<const Segment> segments,
                                       std::span<const double> radii) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   checkOnePerVertex(all->geometries.nextId(), positions, radii);
   return all->geometries.addLines(positions, segments, radii);
 }
 
 GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions, double radius) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   return all->geometries.addPoints(positions, {&radius, 1});
 }
 
 GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions,
                                       std::span<const double> radii) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   checkOnePerVertex(all->geometries.nextId(), positions, radii);
   return all->geometries.addPoints(positions, radii);
 }
 
 GeometryId OctreeBasedCD::addAnalyticalGeometry(const AnalyticalGeometry& geometry) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   return all->geometries.add(geometry);
 }
 
 void OctreeBasedCD::removeGeometry(GeometryId geometry) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->geometries.at(geometry);
   // Nothing below throws.
   all->pairs.removeAllOf(geometry);
   all->geometries.remove(geometry);
-  all->showOctree();
+  all->updateOctreeView();
 }
 
 void OctreeBasedCD::advance() {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->geometries.advance();
 }
 
 void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vector3d> now) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->geometries.setPositions(geometry, {}, now, all->threads);
 }
 
 void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vector3d> before,
                                  std::span<const Eigen::Vector3d> now) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->geometries.setPositions(geometry, before, now, all->threads);
 }
 
 void OctreeBasedCD::setTransform(GeometryId geometry, const Eigen::Matrix3d& rotation,
                                  const Eigen::Vector3d& translation) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->geometries.at(geometry);
   all->pairs.checkRigid(geometry);
   all->geometries.setTransform(geometry, {}, {rotation, translation});
@@ -386,7 +388,7 @@ void OctreeBasedCD::setTransform(GeometryId geometry, const Eigen::Matrix3d& rot
                                  const Eigen::Vector3d& translationBefore,
                                  const Eigen::Matrix3d& rotation,
                                  const Eigen::Vector3d& translation) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->geometries.at(geometry);
   all->pairs.checkRigid(geometry);
   all->geometries.setTransform(geometry, RigidTransform{rotationBefore, translationBefore},
@@ -395,50 +397,50 @@ void OctreeBasedCD::setTransform(GeometryId geometry, const Eigen::Matrix3d& rot
 
 void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->geometries.setTriangles(geometry, positions, triangles);
 }
 
 void OctreeBasedCD::setTetrahedra(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
                                   std::span<const Tetrahedron> tetrahedra) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->geometries.setTetrahedra(geometry, positions, tetrahedra);
 }
 
 TetrahedralSurface OctreeBasedCD::surface(GeometryId geometry) const {
   const Geometry& solid = read().geometries.at(geometry);
-  checkTopologyKind(solid, true, "surface() is of tetrahedral meshes");
+  checkMeshType(solid, true, "surface() is for tetrahedral meshes");
   return {solid.solid->topology.surface, solid.solid->topology.surfaceOwner};
 }
 
 void OctreeBasedCD::setCollisionFilter(GeometryId geometry, const CollisionFilter& filter) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->geometries.setFilter(geometry, filter);
 }
 
 void OctreeBasedCD::setDisabledElements(GeometryId geometry,
                                         std::span<const std::uint32_t> elements) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->geometries.setDisabled(geometry, elements);
 }
 
 void OctreeBasedCD::setContactPredicate(GeometryId a, GeometryId b, ContactPredicate predicate) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->pairs.setPredicate(all->geometries, a, b, std::move(predicate));
 }
 
 void OctreeBasedCD::addCollisionPair(GeometryId a, GeometryId b, const PairSettings& settings) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->pairs.add(all->geometries, a, b, settings);
 }
 
 void OctreeBasedCD::setPairSettings(GeometryId a, GeometryId b, const PairSettings& settings) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->pairs.set(all->geometries, a, b, settings);
 }
 
 void OctreeBasedCD::removeCollisionPair(GeometryId a, GeometryId b) {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->pairs.remove(all->geometries, a, b);
 }
 
@@ -458,49 +460,49 @@ std::size_t OctreeBasedCD::vertexCount(GeometryId geometry) const {
 }
 
 std::span<const Eigen::Vector3d> OctreeBasedCD::positions(GeometryId geometry) const {
-  const Geometry& asked = read().geometries.at(geometry);
-  if (asked.shape) return {};
-  return asked.mesh.now.body();
+  const Geometry& found = read().geometries.at(geometry);
+  if (found.shape) return {};
+  return found.mesh.now.body();
 }
 
 Eigen::AlignedBox3d OctreeBasedCD::bounds(GeometryId geometry) const {
-  const Geometry& asked = read().geometries.at(geometry);
+  const Geometry& found = read().geometries.at(geometry);
   const StandardFloatingPoint standard;
-  return boundsOf(asked);
+  return boundsOf(found);
 }
 
 void OctreeBasedCD::update() {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->update(true);
 }
 
 void OctreeBasedCD::collectCandidates() {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->collect();
 }
 
 void OctreeBasedCD::detectCollision() {
-  const Implementation::Change all(m_implementation);
+  const Implementation::ChangeGuard all(m_implementation);
   all->detect();
 }
 
 void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFunction function,
                                           void* context) {
-  const Implementation::Change all(m_implementation);
-  std::vector<PairRecord*>& work = all->work;
-  work.clear();
+  const Implementation::ChangeGuard all(m_implementation);
+  std::vector<PairRecord*>& selectedPairs = all->selectedPairs;
+  selectedPairs.clear();
   if (only) {
-    work.push_back(&all->pairs.at(all->geometries, only->a, only->b));
-    checkCandidates(*work.front());
+    selectedPairs.push_back(&all->pairs.at(all->geometries, only->a, only->b));
+    checkCandidates(*selectedPairs.front());
   } else {
-    for (const auto& record : all->pairs.records()) work.push_back(record.get());
+    for (const auto& record : all->pairs.records()) selectedPairs.push_back(record.get());
   }
   all->update();
-  std::erase_if(work, [](const PairRecord* record) { return !record->collides(); });
+  std::erase_if(selectedPairs, [](const PairRecord* record) { return !record->collides(); });
   if (all->settings.engine == Engine::Octree)
-    return all->frame.forEach(work, all->threadsFor(work), function, context);
+    return all->frame.forEach(selectedPairs, all->threadsFor(selectedPairs), function, context);
   Buffer<ElementPair> candidates;
-  for (const PairRecord* record : work) {
+  for (const PairRecord* record : selectedPairs) {
     findCandidatesByBruteForce(record->meshes(), candidates);
     if (!candidates.empty()) function(context, record->pair, candidates);
   }
@@ -516,9 +518,9 @@ SpatialQueries OctreeBasedCD::queries() const {
 const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) const {
   const Implementation& all = read();
   const PairRecord& record = all.pairs.inOrder(all.geometries, a, b);
-  if (!record.isAnswered)
+  if (!record.hasData)
     throw Error(ErrorCode::NotAvailable,
-                nameOf(a, b) + " has no answer yet: call detectCollision()", a);
+                nameOf(a, b) + " has no results yet: call detectCollision() first", a);
   return record.data;
 }
 
@@ -527,10 +529,11 @@ std::span<const ElementPair> OctreeBasedCD::candidatePairs(GeometryId a, Geometr
   Implementation& all = *m_implementation;
   PairRecord& record = all.pairs.at(all.geometries, a, b);
   checkCandidates(record);
-  if (!record.candidatesOf.isValid())
+  if (!record.candidatesVersion.isValid())
     throw Error(ErrorCode::NotAvailable,
-                "candidates were not kept: call collectCandidates(), or set "
-                "Settings::keepCandidates before detectCollision()",
+                nameOf(a, b) +
+                    " has no candidates: call collectCandidates(), or set "
+                    "Settings::keepCandidates before detectCollision()",
                 a);
   const std::lock_guard lock(all.sorting);
   if (!record.candidatesSorted)

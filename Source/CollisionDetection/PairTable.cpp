@@ -15,31 +15,31 @@ std::string nameOf(GeometryId a, GeometryId b) {
          std::to_string(static_cast<std::uint32_t>(b)) + ")";
 }
 
-void PairRecord::updateNear() {
+void PairRecord::updateNearAtRest() {
   const double distance = pair.settings.restDistance;
-  if (distance == 0.0 || nearOf.isCurrent({a->revisions.topology})) return;
-  nearOf.invalidate();
-  near = verticesWithin(a->mesh.topology, a->mesh.rest, distance);
-  nearOf.commit({a->revisions.topology});
+  if (distance == 0.0 || nearAtRestVersion.isCurrent({a->revisions.topology})) return;
+  nearAtRestVersion.invalidate();
+  nearAtRest = verticesWithin(a->mesh.topology, a->mesh.rest, distance);
+  nearAtRestVersion.commit({a->revisions.topology});
 }
 
 void PairRecord::commit() noexcept {
   std::swap(data, next);
-  isAnswered = true;
-  dataOf.commit(state());
+  hasData = true;
+  dataVersion.commit(state());
 }
 
-void PairRecord::commitNothing(bool keepsCandidates) noexcept {
+void PairRecord::commitEmpty(bool keepsCandidates) noexcept {
   next = {};
   commit();
   trust.forget();
   candidates.clear();
-  if (keepsCandidates) candidatesOf.commit(state());
+  if (keepsCandidates) candidatesVersion.commit(state());
 }
 
 void PairRecord::commitNoCandidates() noexcept {
   candidates.clear();
-  candidatesOf.commit(state());
+  candidatesVersion.commit(state());
 }
 
 namespace {
@@ -72,12 +72,12 @@ class Check {
   Check(const Geometry& a, const Geometry& b, const PairSettings& settings)
       : m_id(a.id), m_name(nameOf(a.id, b.id)), m_method(settings.method) {
     range(a.mesh, b.mesh, settings);
-    kinds(a, b);
+    types(a, b);
     const bool proximity = hasProximity(a.inStep(), b.inStep(), settings.thickness);
     need(m_method != Method::Proximity || proximity,
          "Method::Proximity needs a positive thickness; it is 0");
     need(m_method != Method::Auto || proximity || hasContinuous(a.inStep(), b.inStep()),
-         "Method::Auto needs a positive thickness for these radii; it is 0");
+         "Method::Auto needs a positive thickness if radii differ between vertices; it is 0");
   }
 
  private:
@@ -108,13 +108,14 @@ class Check {
     need(!earliestTimeOnly || method == Method::Continuous,
          "earliestTimeOnly is for Method::Continuous only");
     need(method >= Method::Auto && method <= Method::Continuous,
-         "no such method: " + std::to_string(static_cast<int>(method)));
+         "method is " + std::to_string(static_cast<int>(method)) +
+             "; it must be Auto, Intersection, Proximity or Continuous");
     need(method == Method::Auto || motionTolerance < 0.0,
-         "motionTolerance is " + textOf(motionTolerance) + "; Method::" + nameOf(method) +
-             " does not use it, only Method::Auto does: leave it negative");
+         "motionTolerance is " + textOf(motionTolerance) +
+             "; only Method::Auto uses it, so it must be negative for Method::" + nameOf(method));
   }
 
-  void kinds(const Geometry& a, const Geometry& b) {
+  void types(const Geometry& a, const Geometry& b) {
     const auto isPlane = [](const Geometry& each) {
       return each.shape && each.shape->now.isPlane();
     };
@@ -122,18 +123,18 @@ class Check {
     const bool continuous = m_method == Method::Continuous, self = &a == &b,
                meshes = ofA.hasFaces() && ofB.hasFaces();
     support(!self || a.shape || !a.isPlaced(), kRigidWithItself);
-    support(!self || !a.shape, "a shape does not meet itself");
-    support(!isPlane(a) || !isPlane(b), "two planes have no distance");
-    if (a.shape && b.shape && a.shape->now.needsDifferences(b.shape->now)) {
+    support(!self || !a.shape, "a shape cannot be tested against itself");
+    support(!isPlane(a) || !isPlane(b), "a pair of two planes is not supported");
+    if (a.shape && b.shape && a.shape->now.needsMinkowskiDifference(b.shape->now)) {
       const double p = a.shape->now.size(), q = b.shape->now.size();
-      support(std::max(p, q) <= kMostSizeRatio * std::min(p, q),
-              "the shapes are " + textOf(p) + " and " + textOf(q) +
-                  " large; beyond a ratio of 2^40 their distance is lost in rounding");
+      support(std::max(p, q) <= kMaxSizeRatio * std::min(p, q),
+              "the sizes of the shapes are " + textOf(p) + " and " + textOf(q) +
+                  "; their ratio must be at most 2^40");
     }
     const bool any = m_method == Method::Auto || m_method == Method::Proximity;
     support(meshes || continuous || any,
             "Method::Intersection is for two triangle meshes, not for " + nameOf(ofA.type) +
-                " and " + nameOf(ofB.type) + "; Auto, Proximity and Continuous are");
+                " and " + nameOf(ofB.type) + "; use Auto, Proximity or Continuous");
     support(!continuous || hasContinuous(a.inStep(), b.inStep()),
             "Method::Continuous needs one radius for all vertices; Proximity and Auto do not");
   }
@@ -159,7 +160,7 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
   record->b = &second;
   record->plan = planOf(settings, first.inStep(), second.inStep());
   record->settingsRevision = m_revisions.next();
-  record->updateNear();
+  record->updateNearAtRest();
   record->index = m_records.size();
   const auto reserve = [](auto& vector) {
     if (vector.size() == vector.capacity()) vector.reserve(2 * vector.size() + 1);
@@ -194,16 +195,16 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
   PairRecord& record = at(geometries, a, b);
   Check(*record.a, *record.b, settings);
   if (record.pair.settings.restDistance != settings.restDistance && settings.restDistance > 0.0) {
-    IndexLists near =
+    IndexLists newNearAtRest =
         verticesWithin(record.a->mesh.topology, record.a->mesh.rest, settings.restDistance);
-    record.near = std::move(near);
-    record.nearOf.commit({record.a->revisions.topology});
+    record.nearAtRest = std::move(newNearAtRest);
+    record.nearAtRestVersion.commit({record.a->revisions.topology});
   }
   // Nothing below throws.
   record.pair.settings = m_pairs[record.index].settings = settings;
   record.plan = planOf(settings, record.a->inStep(), record.b->inStep());
   record.settingsRevision = m_revisions.next();
-  record.candidatesOf.invalidate();
+  record.candidatesVersion.invalidate();
 }
 
 void PairTable::checkRigid(GeometryId geometry) const {
@@ -217,7 +218,9 @@ void PairTable::setPredicate(const GeometryTable& geometries, GeometryId a, Geom
   PairRecord& record = inOrder(geometries, a, b);
   if (predicate && record.hasShape())
     throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(a, b) + ": a shape has no features to ask about", a);
+                nameOf(a, b) +
+                    ": contact predicates are for pairs of meshes, and one of the two is a shape",
+                a);
   record.predicate = std::move(predicate);
   record.settingsRevision = m_revisions.next();
 }

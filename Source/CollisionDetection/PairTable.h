@@ -45,7 +45,7 @@ struct PairRecord {
             settings,
             floats,
             plan.step,
-            settings.restDistance > 0.0 ? &near : nullptr,
+            settings.restDistance > 0.0 ? &nearAtRest : nullptr,
             predicate ? &predicate : nullptr,
             a->shape ? &*a->shape : nullptr,
             b->shape ? &*b->shape : nullptr};
@@ -54,34 +54,34 @@ struct PairRecord {
   bool anyDisabled() const {
     return !a->mesh.topology.disabled.empty() || !b->mesh.topology.disabled.empty();
   }
-  /// Updates `near` if settings.restDistance is set and the topology has changed.
-  void updateNear();
+  /// Updates `nearAtRest` if settings.restDistance is set and the topology has changed.
+  void updateNearAtRest();
   /// Makes `next` the pair's result.
   void commit() noexcept;
   /// Commits an empty result, for a pair that does not collide.
-  void commitNothing(bool keepsCandidates) noexcept;
+  void commitEmpty(bool keepsCandidates) noexcept;
   void commitNoCandidates() noexcept;  ///< for a pair that does not collide
 
   bool hasShape() const { return a->shape || b->shape; }
   const Geometry& mesh() const { return a->shape ? *b : *a; }  ///< for a pair with a shape
 
   /// Whether stored boxes may enclose the whole step though this pair's method needs only its end.
-  bool widerBoxes() const { return !plan.swept() && (a->tree.isSwept() || b->tree.isSwept()); }
+  bool hasWiderBoxes() const { return !plan.swept() && (a->tree.isSwept() || b->tree.isSwept()); }
 
   std::size_t index = 0;  ///< in the table
   Revision settingsRevision;
   CollisionData data;  ///< of the last detection that was completed
-  Derived dataOf;
-  bool isAnswered = false;         ///< a detection was completed
+  Derived dataVersion;
+  bool hasData = false;            ///< a detection was completed
   CollisionData next;              ///< of the detection that runs
   std::atomic<double> earliest;    ///< PairSettings::earliestTimeOnly: found so far in this frame
-  std::size_t found = 0;           ///< number of candidates when last found
+  std::size_t candidateCount = 0;  ///< number of candidates when last found
   Buffer<ElementPair> candidates;  ///< unsorted until candidatePairs() is called
-  Derived candidatesOf;
+  Derived candidatesVersion;
   bool candidatesSorted = false;
   ContactPredicate predicate;
-  IndexLists near;  ///< per vertex: later ones within settings.restDistance at rest
-  DerivedFrom<1> nearOf;
+  IndexLists nearAtRest;  ///< per vertex: later ones within settings.restDistance at rest
+  DerivedFrom<1> nearAtRestVersion;
 };
 
 /// Collision pairs, found by their geometries in either order.

@@ -31,11 +31,11 @@ class RigidSearch::Step {
         m_matrix(m_now.rotation - m_before.rotation),
         m_vector(m_now.translation - m_before.translation) {
     const DerivedFrom<1>::Sources body{geometry.mesh.now.bodyRevision()};
-    if (!search.m_largestOf.isCurrent(body)) {
+    if (!search.m_largestVersion.isCurrent(body)) {
       search.m_largest = 0.0;
       for (const Vector3d& p : geometry.mesh.now.body())
         search.m_largest = std::max(search.m_largest, p.cwiseAbs().maxCoeff());
-      search.m_largestOf.commit(body);
+      search.m_largestVersion.commit(body);
     }
     m_slack = kPlacedError * (4.0 * search.m_largest + m_before.translation.cwiseAbs().maxCoeff() +
                               m_now.translation.cwiseAbs().maxCoeff());
@@ -55,12 +55,12 @@ class RigidSearch::Step {
     if (body.empty()) return 0.0;
     if (vertex >= body.size()) vertex = 0;
     double best = sizeOf(vertex);
-    const auto tryOne = [&](std::uint32_t v) {
+    const auto testOne = [&](std::uint32_t v) {
       const double other = sizeOf(v);
       if (other > best) best = other, vertex = v;
     };
     const double unit = 1.0 / m_geometry.tree.frame().scale;
-    const auto mayHaveMore = [&](const FloatBox& box) {
+    const auto mayExceed = [&](const FloatBox& box) {
       if (box.empty()) return false;
       if (box.mayBeClamped()) return true;
       Vector3d lower, upper;
@@ -72,14 +72,14 @@ class RigidSearch::Step {
     };
     const GeometryOctree& tree = m_geometry.tree;
     if (tree.encloses(m_geometry.mesh, m_geometry.revisions.topology)) {
-      forEachOverlapping(tree.octree(), mayHaveMore, m_search.m_queries,
+      forEachOverlapping(tree.octree(), mayExceed, m_search.m_queries,
                          [&](std::uint32_t begin, std::uint32_t end) {
                            for (std::uint32_t i = begin; i < end; ++i)
-                             if (mayHaveMore(tree.octree().boxes()[i]))
-                               for (const std::uint32_t v : tree.ordered()[i]) tryOne(v);
+                             if (mayExceed(tree.octree().boxes()[i]))
+                               for (const std::uint32_t v : tree.ordered()[i]) testOne(v);
                          });
     } else {
-      for (std::uint32_t v = 0; v < body.size(); ++v) tryOne(v);
+      for (std::uint32_t v = 0; v < body.size(); ++v) testOne(v);
     }
     return best + 2.0 * m_slack;
   }

@@ -42,7 +42,7 @@ struct Group {
 struct MovedBack {
   GuardedVertex vertex;
   Vector3d* now;
-  Vector3d was;
+  Vector3d previous;
 };
 
 /// Two features that touch.
@@ -65,8 +65,8 @@ std::string edgeOf(const Guarded& geometry, const std::array<std::uint32_t, 2>& 
 
 [[noreturn]] void throwNoVertex(GeometryId id, std::uint32_t vertex, std::size_t count) {
   throw Error(ErrorCode::IndexOutOfRange,
-              nameOf(id) + ": vertex " + std::to_string(vertex) + " is out of range; it has " +
-                  std::to_string(count) + " vertices",
+              nameOf(id) + ": vertex " + std::to_string(vertex) +
+                  " is out of range; the geometry has " + std::to_string(count) + " vertices",
               id, vertex);
 }
 
@@ -203,7 +203,7 @@ struct StepGuard::Implementation {
     for (const GuardedStep& step : steps) {
       Guarded& geometry = at(step.geometry);
       if (geometry.isGiven)
-        throw Error(ErrorCode::InvalidSettings, nameOf(step.geometry) + " is given twice",
+        throw Error(ErrorCode::InvalidSettings, nameOf(step.geometry) + " has more than one step",
                     step.geometry);
       geometry.isGiven = true;
       geometry.isStale = true;  // until this hold() has succeeded
@@ -316,7 +316,7 @@ struct StepGuard::Implementation {
   }
 
   void undo() noexcept {
-    for (const MovedBack& moved : movedBack) *moved.now = moved.was;
+    for (const MovedBack& moved : movedBack) *moved.now = moved.previous;
     for (Guarded& geometry : geometries) geometry.isGiven = geometry.hasMoved = false;
   }
 

@@ -24,7 +24,7 @@ class Arena {
 
   std::size_t bytes() const { return m_bytes; }
 
-  /// Makes room for so many bytes. If the memory has to grow, all elements are lost, even if this
+  /// Reserves so many bytes. If the memory has to grow, all elements are lost, even if this
   /// throws.
   void reserve(std::size_t bytes) {
     if (bytes <= m_bytes) return;

@@ -23,15 +23,15 @@ class StandardFloatingPoint {
  public:
   StandardFloatingPoint() : m_control(readControl()), m_changed(!isStandard(m_control)) {
     if (m_changed) {
-      std::fegetenv(&m_callers);
+      std::fegetenv(&m_callersEnvironment);
       std::fesetenv(FE_DFL_ENV);
     }
-    keepOrder();
+    compilerBarrier();
   }
   ~StandardFloatingPoint() {
-    keepOrder();
+    compilerBarrier();
     if (m_changed)
-      std::fesetenv(&m_callers);
+      std::fesetenv(&m_callersEnvironment);
     else
       restoreFlags(m_control);
   }
@@ -39,7 +39,7 @@ class StandardFloatingPoint {
   /// depends on the environment. Without this, they may compute a function's result after the
   /// destructor if it is returned in registers.
   template <class Result>
-  static Result kept(Result result) {
+  static Result evaluated(Result result) {
     asm volatile("" : "+m"(result));
     return result;
   }
@@ -49,7 +49,7 @@ class StandardFloatingPoint {
 
  private:
   /// Compilers do not move loads and stores across this.
-  static void keepOrder() { asm volatile("" ::: "memory"); }
+  static void compilerBarrier() { asm volatile("" ::: "memory"); }
 
 #if defined(__x86_64__)
   static constexpr std::uint64_t kFlags = 0x3f, kDefault = 0x1f80;  // all exceptions masked
@@ -83,7 +83,7 @@ class StandardFloatingPoint {
 
   std::uint64_t m_control;
   bool m_changed;
-  std::fenv_t m_callers;
+  std::fenv_t m_callersEnvironment;
 };
 
 }  // namespace palpate

@@ -17,16 +17,25 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace palpate {
 
+namespace {
+
+/// The usual name of an instruction set. Highway calls AVX-512 "AVX3".
+std::string nameOf(std::int64_t target) {
+  return target == HWY_AVX3 ? "AVX-512" : hwy::TargetName(target);
+}
+
+}  // namespace
+
 HWY_EXPORT(targetKernel);
 
-std::string currentSimdPath() { return hwy::TargetName(HWY_DYNAMIC_DISPATCH(targetKernel)()); }
+std::string currentSimdPath() { return nameOf(HWY_DYNAMIC_DISPATCH(targetKernel)()); }
 
 std::vector<std::string> simdPaths() {
   useSimdPath("");
   std::vector<std::string> paths;
   for (std::int64_t targets = hwy::SupportedTargets() & HWY_TARGETS; targets != 0;
        targets &= targets - 1)
-    paths.push_back(hwy::TargetName(targets & -targets));
+    paths.push_back(nameOf(targets & -targets));
   return paths;
 }
 
@@ -34,7 +43,7 @@ void useSimdPath(const std::string& path) {
   hwy::SetSupportedTargetsForTest(0);
   for (std::int64_t targets = hwy::SupportedTargets() & HWY_TARGETS; targets != 0;
        targets &= targets - 1)
-    if (hwy::TargetName(targets & -targets) == path) {
+    if (nameOf(targets & -targets) == path) {
       hwy::SetSupportedTargetsForTest(targets & -targets);
       break;
     }

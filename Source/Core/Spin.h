@@ -5,7 +5,7 @@ namespace palpate {
 /// Busy waiting, because waking a thread takes longer than the loops of a small frame.
 class Spin {
  public:
-  bool isOver() const { return m_count >= kMost; }  ///< other threads should get the core now
+  bool isOver() const { return m_count >= kMaxCount; }  ///< other threads should get the core now
   void wait() {
     ++m_count;
 #ifdef __x86_64__
@@ -14,7 +14,7 @@ class Spin {
   }
 
  private:
-  static constexpr int kMost = 2000;  ///< 20 to 80 microseconds
+  static constexpr int kMaxCount = 2000;  ///< 20 to 80 microseconds
   int m_count = 0;
 };
 

@@ -32,9 +32,9 @@ namespace palpate {
 
 namespace {
 
-constexpr int kMostThreads = 1024;
+constexpr int kMaxThreads = 1024;
 
-int resolved(int count) {
+int threadCount(int count) {
   if (count > 0) return count;
   const unsigned cores = std::thread::hardware_concurrency();
   return cores == 0 ? 1 : static_cast<int>(cores);
@@ -115,7 +115,7 @@ class Workers {
     }
   }
   ~Workers() {
-    m_over = true;
+    m_isStopping = true;
     ++m_posted;
     m_posted.notify_all();
     for (std::thread& thread : m_threads) thread.join();
@@ -135,7 +135,8 @@ class Workers {
       // lock, and may have taken indices.
       if (loop.joined > 0)
         throw Error(ErrorCode::NotAvailable,
-                    "fork() was called while threads were at work; the child cannot end the work");
+                    "a task called fork() while other threads ran tasks of the same loop; the "
+                    "child process cannot finish the loop");
       return;
     }
     {
@@ -203,15 +204,15 @@ class Workers {
   /// first yields its core for a while, which is enough for most last indices.
   void waitForOthers(const Loop& loop) {
     using Clock = std::chrono::steady_clock;
-    constexpr std::chrono::microseconds kMostYielding{500};
-    bool first = true;
-    int seen = 0;
+    constexpr std::chrono::microseconds kMaxYielding{500};
+    bool mustSearch = true;
+    int lastPosted = 0;
     std::optional<Clock::time_point> yielding;
     for (Spin spin; loop.joined.load(std::memory_order_acquire) > 0;) {
-      if (const int now = m_posted; first || now != seen) {
-        seen = now;
+      if (const int now = m_posted; mustSearch || now != lastPosted) {
+        lastPosted = now;
         Loop* const newer = join(loop.number);
-        first = newer != nullptr;
+        mustSearch = newer != nullptr;
         if (newer) {
           takeOne(*newer, true);
           leave(*newer);
@@ -220,7 +221,7 @@ class Workers {
         }
       } else if (!spin.isOver()) {
         spin.wait();
-      } else if (!yielding || Clock::now() - *yielding < kMostYielding) {
+      } else if (!yielding || Clock::now() - *yielding < kMaxYielding) {
         if (!yielding) yielding = Clock::now();
         std::this_thread::yield();
       } else {
@@ -228,7 +229,7 @@ class Workers {
         ++m_blocked;
         m_changed.wait(guard, [&] { return loop.joined == 0 || findOpen(loop.number); });
         --m_blocked;
-        first = true;
+        mustSearch = true;
         spin = {};
         yielding.reset();
       }
@@ -242,14 +243,14 @@ class Workers {
   }
 
   void work() {
-    for (int seen = m_posted; !m_over; seen = m_posted) {
+    for (int lastPosted = m_posted; !m_isStopping; lastPosted = m_posted) {
       while (Loop* loop = join(0)) {
         while (takeOne(*loop, true)) {
         }
         leave(*loop);
       }
-      for (Spin spin; m_posted == seen && !spin.isOver();) spin.wait();
-      m_posted.wait(seen);
+      for (Spin spin; m_posted == lastPosted && !spin.isOver();) spin.wait();
+      m_posted.wait(lastPosted);
     }
   }
 
@@ -259,7 +260,7 @@ class Workers {
   std::condition_variable m_changed;  ///< a loop was posted, or the last thread left one
   std::atomic<int> m_blocked{0};      ///< threads that wait for m_changed
   std::atomic<int> m_posted{0};       ///< counts posts: workers sleep until it changes
-  std::atomic<bool> m_over{false};
+  std::atomic<bool> m_isStopping{false};
   std::vector<std::thread> m_threads;
 };
 
@@ -295,24 +296,24 @@ class ThreadPool final : public Executor {
 };
 
 /// A loop's function, and the exception of the lowest index that threw one.
-class Body {
+class LoopBody {
  public:
-  Body(void (*call)(void*, std::size_t), void* function) : m_call(call), m_function(function) {}
+  LoopBody(void (*call)(void*, std::size_t), void* function) : m_call(call), m_function(function) {}
 
   void runOne(std::size_t i) noexcept {
-    if (i > m_failed.load(std::memory_order_relaxed)) return;
+    if (i > m_lowestFailed.load(std::memory_order_relaxed)) return;
     const StandardFloatingPoint standard;
     try {
       m_call(m_function, i);
     } catch (...) {
       // current_exception() is never null here: without memory it returns std::bad_alloc.
       const std::lock_guard guard(m_lock);
-      if (i > m_failed) return;
-      m_failed = i;
+      if (i > m_lowestFailed) return;
+      m_lowestFailed = i;
       m_exception = std::current_exception();
     }
   }
-  static void task(void* body, std::size_t i) noexcept { static_cast<Body*>(body)->runOne(i); }
+  static void task(void* body, std::size_t i) noexcept { static_cast<LoopBody*>(body)->runOne(i); }
 
   void rethrow() const {
     if (m_exception) std::rethrow_exception(m_exception);
@@ -321,7 +322,7 @@ class Body {
  private:
   void (*m_call)(void*, std::size_t);
   void* m_function;
-  std::atomic<std::size_t> m_failed{std::numeric_limits<std::size_t>::max()};
+  std::atomic<std::size_t> m_lowestFailed{std::numeric_limits<std::size_t>::max()};
   std::mutex m_lock;
   std::exception_ptr m_exception;
 };
@@ -339,7 +340,7 @@ class LoopOnExecutor {
     return !m_open && m_begun >= m_runs;
   }
 
-  void run(Executor& executor, std::size_t runs, std::size_t size, Body& body) {
+  void run(Executor& executor, std::size_t runs, std::size_t size, LoopBody& body) {
     open(runs, size, body);
     try {
       executor.run(runs, task, this);
@@ -357,7 +358,7 @@ class LoopOnExecutor {
     static_cast<LoopOnExecutor*>(loop)->takeAll();
   }
 
-  void open(std::size_t runs, std::size_t size, Body& body) {
+  void open(std::size_t runs, std::size_t size, LoopBody& body) {
     const std::lock_guard guard(m_lock);
     m_body = &body;
     m_size = size;
@@ -391,14 +392,14 @@ class LoopOnExecutor {
 
   std::mutex m_lock;
   std::condition_variable m_ended;
-  Body* m_body = nullptr;
+  LoopBody* m_body = nullptr;
   std::size_t m_size = 0, m_runs = 0, m_begun = 0, m_active = 0;
   std::atomic<std::size_t> m_next{0};
   bool m_open = false;
 };
 
 void checkThreads(int threads) {
-  if (threads < 0 || threads > kMostThreads)
+  if (threads < 0 || threads > kMaxThreads)
     throw Error(ErrorCode::InvalidSettings,
                 "threads is " + std::to_string(threads) + "; it must be in [0, 1024]");
 }
@@ -448,7 +449,7 @@ struct Threads::LoopsOnExecutor {
 Threads::Threads(int count, std::shared_ptr<Executor> executor)
     : m_executor(std::move(executor)), m_count(1) {
   if (!m_executor) {
-    if (resolved(count) > 1) m_executor = std::make_shared<ThreadPool>(resolved(count));
+    if (threadCount(count) > 1) m_executor = std::make_shared<ThreadPool>(threadCount(count));
     if (m_executor) m_count = m_executor->concurrency();
     return;
   }
@@ -477,9 +478,9 @@ Threads& Threads::operator=(Threads&& other) noexcept {
 }
 
 void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* function) const {
-  Body body(call, function);
+  LoopBody body(call, function);
   if (!m_loops) {
-    m_executor->run(size, Body::task, &body);
+    m_executor->run(size, LoopBody::task, &body);
   } else {
     LoopOnExecutor* const loop = m_loops->take();
     const struct Return {
@@ -496,7 +497,7 @@ Executor::~Executor() = default;
 
 std::shared_ptr<Executor> makeThreadPool(int threads) {
   checkThreads(threads);
-  return std::make_shared<ThreadPool>(resolved(threads));
+  return std::make_shared<ThreadPool>(threadCount(threads));
 }
 
 }  // namespace palpate

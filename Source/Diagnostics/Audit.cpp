@@ -67,28 +67,28 @@ class Coverage {
         m_sample(sample),
         m_byTriangles(meshes.settings.method == Method::Intersection) {}
 
-  bool ofVertexTriangle(const VertexTriangleContact& c) const {
+  bool coversVertexTriangle(const VertexTriangleContact& c) const {
     if (c.vertex >= m_meshes.a.topology.vertexCount) return true;  // there is no such vertex
     if (!m_byTriangles) return holds(m_sample.verticesOfA, c.vertex);
     return all(m_meshes.a.topology.vertexTriangles[c.vertex], [&](std::uint32_t s) {
-      return ofTriangles({s, c.triangle});
+      return coversTriangles({s, c.triangle});
     });
   }
-  bool ofTriangleVertex(const VertexTriangleContact& c) const {
+  bool coversTriangleVertex(const VertexTriangleContact& c) const {
     return m_byTriangles ? holds(m_sample.trianglesOfA, c.triangle)
                          : holds(m_sample.verticesOfB, c.vertex);
   }
-  bool ofEdges(const EdgeEdgeContact& c) const {
+  bool coversEdges(const EdgeEdgeContact& c) const {
     const MeshTopology &a = m_meshes.a.topology, &b = m_meshes.b.topology;
     const std::uint32_t edgeA = a.edgeOf(c.edgeA), edgeB = b.edgeOf(c.edgeB);
     if (edgeA == kNoEdge || edgeB == kNoEdge) return true;  // there are no such edges
     if (!m_byTriangles) return holds(m_sample.edgesOfA, edgeA);
     return all(a.edgeTriangles[edgeA], [&](std::uint32_t s) {
-      return all(b.edgeTriangles[edgeB], [&](std::uint32_t t) { return ofTriangles({s, t}); });
+      return all(b.edgeTriangles[edgeB], [&](std::uint32_t t) { return coversTriangles({s, t}); });
     });
   }
   /// Vertices and edges are covered by the element that owns them.
-  bool ofShape(const ShapeContact& c) const {
+  bool coversShape(const ShapeContact& c) const {
     const MeshTopology& mesh = m_meshes.mesh().topology;
     if (c.element == ShapeElement::Face) return holds(m_sample.trianglesOfA, c.id);
     const bool isVertex = c.element == ShapeElement::Vertex;
@@ -97,7 +97,7 @@ class Coverage {
     const auto owners = isVertex ? mesh.vertexTriangles[c.id] : mesh.edgeTriangles[edge];
     return owners.empty() || holds(m_sample.trianglesOfA, owners.front());
   }
-  bool ofTriangles(const ElementPair& pair) const {
+  bool coversTriangles(const ElementPair& pair) const {
     return holds(m_sample.trianglesOfA, m_meshes.self() ? std::min(pair.a, pair.b) : pair.a);
   }
 
@@ -117,10 +117,11 @@ class Coverage {
 
 /// Contacts::Distinct for impacts: drops expected contacts for which an earlier contact is kept.
 /// The earlier contact is either expected, too, or in the answer if the sample does not cover it.
-void dropWhatOthersStandFor(const MeshPair& meshes, const CollisionData& answer,
-                            CollisionData::Contents& expected) {
+void dropRepeatedImpacts(const MeshPair& meshes, const CollisionData& answer,
+                         CollisionData::Contents& expected) {
   const bool impactsOnly = meshes.settings.method == Method::Continuous;
-  if (meshes.settings.contacts != Contacts::Distinct || !(impactsOnly || meshes.step.impacts))
+  if (meshes.settings.contacts != Contacts::Distinct ||
+      !(impactsOnly || meshes.step.reportsImpacts))
     return;
   const double end = impactsOnly ? std::numeric_limits<double>::infinity() : 1.0;
   using Rank = std::tuple<double, int, std::array<std::uint32_t, 4>>;
@@ -139,7 +140,7 @@ void dropWhatOthersStandFor(const MeshPair& meshes, const CollisionData& answer,
       return sharedFeatures(contact, list == 1, meshes.self());
   };
   std::map<ImpactFeatures, Rank> first;
-  const auto note = [&](const auto& contacts, int list) {
+  const auto recordFirst = [&](const auto& contacts, int list) {
     for (const auto& contact : contacts)
       if (const auto features = featuresOf(contact, list); features && contact.timeOfImpact < end) {
         const Rank rank = rankOf(contact, list);
@@ -147,10 +148,10 @@ void dropWhatOthersStandFor(const MeshPair& meshes, const CollisionData& answer,
         if (!isNew) place->second = std::min(place->second, rank);
       }
   };
-  note(answer.vertexTriangle(), 0);
-  note(answer.triangleVertex(), 1);
-  note(answer.edgeEdge(), 2);
-  forEachImpactList(expected, note);
+  recordFirst(answer.vertexTriangle(), 0);
+  recordFirst(answer.triangleVertex(), 1);
+  recordFirst(answer.edgeEdge(), 2);
+  forEachImpactList(expected, recordFirst);
   const auto isDropped = [&](const auto& contact, int list) {
     const auto features = featuresOf(contact, list);
     const auto place = features ? first.find(*features) : first.end();
@@ -167,10 +168,10 @@ void dropWhatOthersStandFor(const MeshPair& meshes, const CollisionData& answer,
       addImpact(meshes, features, meshes.a.topology.edgeOf(contact.edgeA),
                 meshes.b.topology.edgeOf(contact.edgeB), false, impact);
     } else {
-      const bool ofSecond = list == 1;
-      const Features<ImpactQuery::Kind::VertexTriangle> features{ofSecond ? meshes.b : meshes.a,
-                                                                 ofSecond ? meshes.a : meshes.b};
-      addImpact(meshes, features, contact.vertex, contact.triangle, ofSecond, impact);
+      const bool swapped = list == 1;
+      const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? meshes.b : meshes.a,
+                                                                 swapped ? meshes.a : meshes.b};
+      addImpact(meshes, features, contact.vertex, contact.triangle, swapped, impact);
     }
     bool dropped = false;
     forEachImpactList(impact, [&](const auto& contacts, int of) {
@@ -255,10 +256,10 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
   using Any = AuditFailure::Contact;
   // Auto replaces some of its contacts by those of other methods. Brute force for a sample does not
   // reproduce this, so that only missing contacts are reported.
-  const bool withOthers = pair.settings.method == Method::Auto;
-  const auto into = [&](List list) {
+  const bool isAuto = pair.settings.method == Method::Auto;
+  const auto reporterFor = [&](List list) {
     return [=, &pair, &out](Fault fault, const Any& e, const Any& f) {
-      if (withOthers && fault != Fault::FalseNegative) return;
+      if (isAuto && fault != Fault::FalseNegative) return;
       out.push_back({pair.a, pair.b, frame, fault, list, e, f, {}, {}});
     };
   };
@@ -266,28 +267,28 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
     return forEachTimed(expected, [&](const auto& all) {
       for (const auto& contact : all)
         if (contact.timeOfImpact < data.earliestTimeOfImpact())
-          into(List::Earliest)(Fault::FalseNegative, contact, {});
+          reporterFor(List::Earliest)(Fault::FalseNegative, contact, {});
     });
   }
-  dropWhatOthersStandFor(meshes, data, expected);
+  dropRepeatedImpacts(meshes, data, expected);
   const Coverage coverage(meshes, sample);
-  const auto differ = [&](const auto& truth, const auto& found, auto covers, List list) {
-    compare(truth, found, std::bind_front(covers, &coverage), into(list));
+  const auto compareList = [&](const auto& truth, const auto& found, auto covers, List list) {
+    compare(truth, found, std::bind_front(covers, &coverage), reporterFor(list));
   };
-  differ(expected.vertexTriangle, data.vertexTriangle(), &Coverage::ofVertexTriangle,
-         List::VertexTriangle);
-  differ(expected.triangleVertex, data.triangleVertex(), &Coverage::ofTriangleVertex,
-         List::TriangleVertex);
-  differ(expected.edgeEdge, data.edgeEdge(), &Coverage::ofEdges, List::EdgeEdge);
-  differ(expected.intersectingTriangles, data.intersectingTriangles(), &Coverage::ofTriangles,
-         List::IntersectingTriangles);
-  differ(expected.shape, data.shape(), &Coverage::ofShape, List::Shape);
+  compareList(expected.vertexTriangle, data.vertexTriangle(), &Coverage::coversVertexTriangle,
+              List::VertexTriangle);
+  compareList(expected.triangleVertex, data.triangleVertex(), &Coverage::coversTriangleVertex,
+              List::TriangleVertex);
+  compareList(expected.edgeEdge, data.edgeEdge(), &Coverage::coversEdges, List::EdgeEdge);
+  compareList(expected.intersectingTriangles, data.intersectingTriangles(),
+              &Coverage::coversTriangles, List::IntersectingTriangles);
+  compareList(expected.shape, data.shape(), &Coverage::coversShape, List::Shape);
   compare(
       expected.shapeShape, data.shapeShape(), [](const auto&) { return true; },
-      into(List::ShapeShape));
+      reporterFor(List::ShapeShape));
 }
 
-CollisionProblem pairAlone(const CollisionProblem& whole, GeometryId idA, GeometryId idB) {
+CollisionProblem reducedToPair(const CollisionProblem& whole, GeometryId idA, GeometryId idB) {
   CollisionProblem problem{whole.settings, {}, {}};
   for (CollisionProblem::Pair pair : whole.pairs) {
     const CollisionProblem::Geometry &a = whole.geometries[pair.a], &b = whole.geometries[pair.b];
@@ -315,7 +316,7 @@ static void keepProblem(const CollisionProblem& problem, const AuditSettings& se
     file = settings.folder / (name + "-" + std::to_string(copy) + ".capture");
   std::string error;
   try {
-    writeCapture(pairAlone(problem, first.a, first.b), file);
+    writeCapture(reducedToPair(problem, first.a, first.b), file);
   } catch (const Error& e) {
     error = e.what();
     file.clear();
@@ -343,8 +344,8 @@ void auditFrame(const Settings& settings, const GeometryTable& geometries, const
       record.files += !own.front().file.empty();
     } else {
       for (AuditFailure& failure : own)
-        failure.fileError =
-            "audit.maxFiles were written into \"" + settings.audit.folder.string() + "\" before";
+        failure.fileError = "audit.maxFiles files were already written into \"" +
+                            settings.audit.folder.string() + "\"";
     }
   }
 }

@@ -19,13 +19,13 @@ namespace palpate {
 FeatureLists drawFeatures(const MeshPair&, const CollisionPair&, const AuditSettings&,
                           std::uint64_t frame);
 
-/// Compares `data` with brute force for a drawn sample of features, and appends every contact that
-/// is missing, invented or different in `data`. For Method::Auto it appends missing contacts only,
-/// and with earliestTimeOnly impacts before the reported time.
+/// Compares `data` with brute force for a drawn sample of features. Appends false negatives, false
+/// positives, and contacts that differ. For Method::Auto it appends false negatives only, and with
+/// earliestTimeOnly impacts before the reported time.
 void audit(const MeshPair&, const CollisionPair&, const CollisionData& data, const AuditSettings&,
            std::uint64_t frame, std::vector<AuditFailure>& out);
 
 /// The problem reduced to one of its pairs.
-CollisionProblem pairAlone(const CollisionProblem&, GeometryId a, GeometryId b);
+CollisionProblem reducedToPair(const CollisionProblem&, GeometryId a, GeometryId b);
 
 }  // namespace palpate

@@ -13,7 +13,8 @@ static std::vector<Eigen::AlignedBox3d> boxesOf(const TriangleMesh& mesh, bool s
 }
 
 void findCandidatesByBruteForce(const MeshPair& meshes, Buffer<ElementPair>& out) {
-  const double thickness = meshes.settings.method == Method::Intersection ? 0.0 : meshes.reach();
+  const double thickness =
+      meshes.settings.method == Method::Intersection ? 0.0 : meshes.maxFeatureDistance();
   const bool swept =
       meshes.settings.method == Method::Continuous || meshes.settings.method == Method::Auto;
   const std::vector<Eigen::AlignedBox3d> boxesA = boxesOf(meshes.a, swept),
@@ -28,7 +29,7 @@ void findCandidatesByBruteForce(const MeshPair& meshes, Buffer<ElementPair>& out
   for (std::uint32_t s = 0; s < boxesA.size(); ++s)
     for (std::uint32_t t = meshes.self() ? s + 1 : 0; t < boxesB.size(); ++t)
       if (overlap(boxesA[s], boxesB[t], thickness) && !(meshes.self() && adjacent(s, t)) &&
-          meshes.a.topology.isOn(s) && meshes.b.topology.isOn(t))
+          meshes.a.topology.isEnabled(s) && meshes.b.topology.isEnabled(t))
         out.push_back({s, t});
 }
 

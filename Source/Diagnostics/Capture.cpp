@@ -25,7 +25,7 @@ constexpr int kVersion = 9;
 // Enumerators are written by name. The names are in the order of the declarations.
 constexpr std::array<std::string_view, 4> kMethods{"Auto", "Intersection", "Proximity",
                                                    "Continuous"};
-constexpr std::array<std::string_view, 4> kKinds{"Triangles", "Lines", "Points", "Shape"};
+constexpr std::array<std::string_view, 4> kGeometryTypes{"Triangles", "Lines", "Points", "Shape"};
 constexpr std::array<std::string_view, 2> kSides{"Both", "Outer"};
 constexpr std::array<std::string_view, 6> kShapes{"Sphere", "Capsule",  "Plane",
                                                   "Box",    "Cylinder", "ConvexHull"};
@@ -76,7 +76,7 @@ class Reader {
     const std::size_t begin = std::min(m_rest.find_first_not_of(kSpaces), m_rest.size());
     m_line += std::count(m_rest.begin(), m_rest.begin() + static_cast<std::ptrdiff_t>(begin), '\n');
     m_rest.remove_prefix(begin);
-    if (m_rest.empty()) refuse("it is cut off");
+    if (m_rest.empty()) fail("the file is truncated");
     const std::size_t size = std::min(m_rest.find_first_of(kSpaces), m_rest.size());
     const std::string_view found = m_rest.substr(0, size);
     m_rest.remove_prefix(size);
@@ -84,13 +84,13 @@ class Reader {
   }
   void expect(std::string_view text) {
     if (const std::string_view found = word(); found != text)
-      refuse(quoted(found) + " where " + quoted(text) + " should be");
+      fail("found " + quoted(found) + ", expected " + quoted(text));
   }
   template <class Enumerator, std::size_t size>
   void word(Enumerator& value, const std::array<std::string_view, size>& names) {
     const std::string_view found = word();
     const auto place = std::find(names.begin(), names.end(), found);
-    if (place == names.end()) refuse(quoted(found) + " is not a name known here");
+    if (place == names.end()) fail(quoted(found) + " is not a known name");
     value = static_cast<Enumerator>(place - names.begin());
   }
   template <class Integer>
@@ -98,29 +98,30 @@ class Reader {
     const std::string_view found = word();
     if (const auto [end, fault] = std::from_chars(found.begin(), found.end(), value);
         end != found.end() || fault != std::errc())
-      refuse(quoted(found) + " is not an integer in range");
+      fail(quoted(found) + " is not an integer in range");
   }
   void real(double& value) {
     const std::string_view found = word();
     if (const auto [end, fault] =
             std::from_chars(found.begin(), found.end(), value, std::chars_format::hex);
         end != found.end() || fault != std::errc())
-      refuse(quoted(found) + " is not a number");
+      fail(quoted(found) + " is not a number");
   }
   /// Reads the number of items that follow. Refuses more than the file has characters left.
   void count(std::size_t& value) {
     integer(value);
-    if (value > m_rest.size()) refuse("it is cut off: too few lines for " + std::to_string(value));
+    if (value > m_rest.size())
+      fail("the file is truncated: too few lines for " + std::to_string(value));
   }
   void endLine() {}
   void expectEnd() {
-    if (m_rest.find_first_not_of(" \t\r\n") != m_rest.npos) refuse("more follows after its end");
+    if (m_rest.find_first_not_of(" \t\r\n") != m_rest.npos) fail("there is text after the end");
   }
   std::string_view rest() const { return m_rest; }
-  [[noreturn]] void refuse(const std::string& reason) const {
+  [[noreturn]] void fail(const std::string& reason) const {
     throw Error(ErrorCode::File, m_name + ", line " + std::to_string(m_line) + ": " + reason);
   }
-  [[noreturn]] void refuseWhole(const std::string& reason) const {
+  [[noreturn]] void failWhole(const std::string& reason) const {
     throw Error(ErrorCode::File, m_name + ": " + reason);
   }
 
@@ -228,11 +229,11 @@ void shapeOf(File& file, MeshType& mesh, int version) {
   }
 }
 
-/// A shape of the kind with this number.
-template <std::size_t... kinds>
-AnalyticalGeometry shapeOfKind(std::size_t kind, std::index_sequence<kinds...>) {
+/// A shape of the type with this index.
+template <std::size_t... indices>
+AnalyticalGeometry shapeOfType(std::size_t index, std::index_sequence<indices...>) {
   AnalyticalGeometry shape;
-  (void)((kind == kinds && (shape.emplace<kinds>(), true)) || ...);
+  (void)((index == indices && (shape.emplace<indices>(), true)) || ...);
   return shape;
 }
 
@@ -244,13 +245,13 @@ void meshLines(File& file, MeshType& mesh, int version) {
   sizeOf(file, mesh.now);
   sizeOf(file, mesh.triangles);
   if (version >= 3) {
-    file.word(mesh.type, kKinds);
+    file.word(mesh.type, kGeometryTypes);
     listOf(file, mesh.radii);
     if (mesh.type == GeometryType::Shape) {
-      std::size_t kind = mesh.analytical ? mesh.analytical->index() : 0;
-      file.word(kind, kShapes);
+      std::size_t index = mesh.analytical ? mesh.analytical->index() : 0;
+      file.word(index, kShapes);
       if constexpr (kReads<File>)
-        mesh.analytical = shapeOfKind(kind, std::make_index_sequence<kShapes.size()>());
+        mesh.analytical = shapeOfType(index, std::make_index_sequence<kShapes.size()>());
       shapeOf(file, mesh, version);
     }
   }
@@ -363,19 +364,19 @@ void capture(const OctreeBasedCD& detection, const std::filesystem::path& path) 
 void capture(const OctreeBasedCD& detection, const AuditFailure& failure,
              const std::filesystem::path& path) {
   const StandardFloatingPoint standard;
-  writeCapture(pairAlone(detection.problem(), failure.a, failure.b), path);
+  writeCapture(reducedToPair(detection.problem(), failure.a, failure.b), path);
 }
 
 CollisionProblem readCapture(const std::filesystem::path& path) {
   const StandardFloatingPoint standard;
   Reader file(path, contentOf(path));
-  if (!file.rest().starts_with(kTitle)) file.refuseWhole("it is not a capture");
+  if (!file.rest().starts_with(kTitle)) file.failWhole("it is not a capture");
   file.expect(kTitle);
   int version = 0;
   file.integer(version);
   if (version < 1 || version > kVersion)
-    file.refuseWhole("it is of version " + std::to_string(version) + "; versions up to " +
-                     std::to_string(kVersion) + " can be read");
+    file.failWhole("its version is " + std::to_string(version) + "; versions up to " +
+                   std::to_string(kVersion) + " can be read");
   CollisionProblem problem;
   problemLines(file, problem, version);
   if (version == 1)  // Auto then stood for the one method in pair.method
@@ -384,7 +385,7 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
   try {
     setUp(problem);
   } catch (const Error& error) {
-    file.refuseWhole(error.what());
+    file.failWhole(error.what());
   }
   return problem;
 }

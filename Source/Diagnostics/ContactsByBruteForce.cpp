@@ -31,7 +31,7 @@ class VertexAgainstMesh {
     const std::vector<Triangle>& triangles = m_mesh.topology.triangles;
     m_answers.assign(triangles.size(), {});
     for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-      if (!m_mesh.topology.isOn(t) || pair.leavesOutVertex(vertex, t)) continue;
+      if (!m_mesh.topology.isEnabled(t) || pair.excludesVertex(vertex, t)) continue;
       const auto& [a, b, c] = triangles[t];
       m_answers[t] = finiteVertexTriangleDistance(p, m_mesh.now[a], m_mesh.now[b], m_mesh.now[c]);
       ++out.featurePairs;
@@ -51,14 +51,14 @@ class VertexAgainstMesh {
   }
 
   /// Whether a triangle is the lowest with its closest point on the same feature, and no triangle
-  /// that holds this feature is nearer. Refused triangles do not count.
-  template <class Refused>
-  bool isDistinct(std::uint32_t triangle, Refused&& isRefused) const {
+  /// that holds this feature is nearer. Rejected triangles do not count.
+  template <class IsRejected>
+  bool isDistinct(std::uint32_t triangle, IsRejected&& isRejected) const {
     const MeshFeature own = feature(triangle);
     for (std::uint32_t other = 0; other < m_answers.size(); ++other) {
       if (!m_answers[other] || other == triangle) continue;
       if ((feature(other) == own ? other < triangle : holds(other, own) && isNearer(other, own)) &&
-          !isRefused(other))
+          !isRejected(other))
         return false;
     }
     return true;
@@ -69,10 +69,10 @@ class VertexAgainstMesh {
     const MeshTopology& topology = m_mesh.topology;
     switch (feature.kind) {
       case MeshFeature::Kind::Vertex:
-        return holdsVertex(topology.triangles[triangle], feature.id);
+        return containsVertex(topology.triangles[triangle], feature.id);
       case MeshFeature::Kind::Edge:
-        return holdsVertex(topology.triangles[triangle], topology.edges[feature.id][0]) &&
-               holdsVertex(topology.triangles[triangle], topology.edges[feature.id][1]);
+        return containsVertex(topology.triangles[triangle], topology.edges[feature.id][0]) &&
+               containsVertex(topology.triangles[triangle], topology.edges[feature.id][1]);
       case MeshFeature::Kind::Face:
         return triangle == feature.id;
     }
@@ -98,11 +98,12 @@ class VertexAgainstMesh {
   std::vector<std::optional<VertexTriangleDistance>> m_answers;
 };
 
-/// kSecond: the vertices are of MeshPair::b.
-template <bool kSecond>
+/// kSwapped: the vertices are of MeshPair::b.
+template <bool kSwapped>
 void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sample,
                         ContactBuffers& out) {
-  const TriangleMesh &vertices = kSecond ? pair.b : pair.a, &triangles = kSecond ? pair.a : pair.b;
+  const TriangleMesh &vertices = kSwapped ? pair.b : pair.a,
+                     &triangles = kSwapped ? pair.a : pair.b;
   const bool distinct = pair.settings.contacts == Contacts::Distinct;
   const Features<ImpactQuery::Kind::VertexTriangle> features{vertices, triangles};
   StepCheck check(pair, out);
@@ -112,34 +113,34 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
     const auto gap = [&](std::uint32_t t) {
       const VertexTriangleDistance& measured = *against.answer(t);
       return measured.distance -
-             pair.radii(v, triangles.topology.triangles[t], measured.barycentric, kSecond);
+             pair.radii(v, triangles.topology.triangles[t], measured.barycentric, kSwapped);
     };
     for (std::uint32_t t = 0; t < against.size(); ++t) {
       const VertexTriangleDistance* answer = against.answer(t);
       if (!answer || !(gap(t) <= pair.thicknessAtEnd())) continue;
-      check.noteDistance(answer->distance);
-      if (check.addImpactIfTouched(features, v, t, kSecond, answer->distance)) continue;
-      const auto isRefused = [&](std::uint32_t triangle) {
-        return refusesVertex(pair, v, triangle, kSecond) ||
+      check.recordDistance(answer->distance);
+      if (check.addImpactIfTouched(features, v, t, kSwapped, answer->distance)) continue;
+      const auto isRejected = [&](std::uint32_t triangle) {
+        return rejectsVertex(pair, v, triangle, kSwapped) ||
                (!triangles.radii.empty() && !(gap(triangle) <= pair.thicknessAtEnd()));
       };
-      if (isRefused(t)) continue;
+      if (isRejected(t)) continue;
       const MeshFeature feature = against.feature(t);
       if (distinct) {
         const bool isVertex = feature.kind == MeshFeature::Kind::Vertex;
         const bool reportedByOther =
-            pair.self() ? feature.id < v : kSecond && pair.b.topology.hasFaces();
+            pair.self() ? feature.id < v : kSwapped && pair.b.topology.hasFaces();
         if (isVertex && reportedByOther) continue;
-        if (!against.isDistinct(t, isRefused)) continue;
+        if (!against.isDistinct(t, isRejected)) continue;
       }
-      if (pointsInwardAtEnd(pair, v, feature, *answer, kSecond)) {
-        if (pair.step.impacts) addImpact(pair, features, v, t, kSecond, out);
+      if (pointsInwardAtEnd(pair, v, feature, *answer, kSwapped)) {
+        if (pair.step.reportsImpacts) addImpact(pair, features, v, t, kSwapped, out);
         continue;
       }
       const Triangle& corners = triangles.topology.triangles[t];
-      check.noteTriangle(t, !kSecond, triangles.now[corners[0]], triangles.now[corners[1]],
-                         triangles.now[corners[2]]);
-      auto& list = kSecond ? out.triangleVertex : out.vertexTriangle;
+      check.recordTriangle(t, !kSwapped, triangles.now[corners[0]], triangles.now[corners[1]],
+                           triangles.now[corners[2]]);
+      auto& list = kSwapped ? out.triangleVertex : out.vertexTriangle;
       list.push_back(contactOf(v, t, corners, *answer));
       list.back().distance = gap(t);
     }
@@ -153,23 +154,23 @@ void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
   StepCheck check(pair, out);
   for (const std::uint32_t i : sample) {
     for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
-      if (pair.leavesOut(i, j) || pair.b.topology.edgeTriangles[j].empty()) continue;
+      if (pair.excludesEdges(i, j) || pair.b.topology.edgeTriangles[j].empty()) continue;
       const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(
           pair.a.now[a[i][0]], pair.a.now[a[i][1]], pair.b.now[b[j][0]], pair.b.now[b[j][1]]);
       ++out.featurePairs;
       out.exactDecisions += answer.exact;
       if (!(answer.distance <= pair.thicknessAtEnd())) continue;
-      check.noteDistance(answer.distance);
+      check.recordDistance(answer.distance);
       if (check.addImpactIfTouched(features, i, j, false, answer.distance)) continue;
       const bool inside = !answer.parallel && answer.featureA == EdgeFeature::Interior &&
                           answer.featureB == EdgeFeature::Interior;
       if (pair.settings.contacts == Contacts::Distinct && !inside) continue;
-      if (refusesEdges(pair, i, j)) continue;
+      if (rejectsEdges(pair, i, j)) continue;
       if (pointInwardAtEnd(pair, i, j, answer)) {
-        if (pair.step.impacts) addImpact(pair, features, i, j, false, out);
+        if (pair.step.reportsImpacts) addImpact(pair, features, i, j, false, out);
         continue;
       }
-      check.noteEdges(a[i], b[j]);
+      check.recordEdges(a[i], b[j]);
       out.edgeEdge.push_back(contactOf(a[i], b[j], answer));
     }
   }
@@ -190,7 +191,7 @@ std::vector<std::uint32_t> edgesOf(const MeshTopology& topology, const MeshFeatu
 /// edges that hold the two features, and determines the lowest at the end.
 bool isDistinctOfLines(const MeshPair& pair, const std::array<std::uint32_t, 2>& edges,
                        const std::array<MeshFeature, 2>& features) {
-  if (!isForEdges(pair, features)) return false;
+  if (!areReportedByEdges(pair, features)) return false;
   std::array<std::uint32_t, 2> lowest = edges;
   for (const std::uint32_t a : edgesOf(pair.a.topology, features[0]))
     for (const std::uint32_t b : edgesOf(pair.b.topology, features[1])) {
@@ -200,7 +201,7 @@ bool isDistinctOfLines(const MeshPair& pair, const std::array<std::uint32_t, 2>&
         std::swap(ids[0], ids[1]);
         std::swap(shared[0], shared[1]);
       }
-      const std::optional<EdgesNearby> other = measureEdges(pair, ids[0], ids[1]);
+      const std::optional<NearbyEdges> other = measureEdges(pair, ids[0], ids[1]);
       if (!other) continue;
       if (other->features != shared) return false;
       lowest = std::min(lowest, ids);
@@ -215,7 +216,7 @@ void findLineEdges(const MeshPair& pair, std::span<const std::uint32_t> sample,
     for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
       if (pair.b.topology.edgeTriangles[j].empty()) continue;
       ++out.featurePairs;
-      const std::optional<EdgesNearby> nearby = measureEdges(pair, i, j);
+      const std::optional<NearbyEdges> nearby = measureEdges(pair, i, j);
       if (!nearby ||
           (pair.settings.contacts == Contacts::Distinct &&
            !isDistinctOfLines(pair, {i, j}, nearby->features)) ||
@@ -236,27 +237,27 @@ void findProximity(const MeshPair& pair, const FeatureLists& features, ContactBu
     findEdgeEdge(pair, features.edgesOfA, out);
 }
 
-/// Calls f(features, inFirst, inSecond, ofSecond) for the listed features with every feature of the
-/// other mesh. ofSecond: features.first is MeshPair::b.
+/// Calls f(features, firstId, secondId, swapped) for the listed features with every feature of the
+/// other mesh. swapped: features.first is MeshPair::b.
 template <class F>
 void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, ContactBuffers& out,
                         F&& f) {
-  for (const bool ofSecond : {false, true}) {
-    const Features<ImpactQuery::Kind::VertexTriangle> features{ofSecond ? pair.b : pair.a,
-                                                               ofSecond ? pair.a : pair.b};
+  for (const bool swapped : {false, true}) {
+    const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? pair.b : pair.a,
+                                                               swapped ? pair.a : pair.b};
     const std::vector<Triangle>& triangles = features.second.topology.triangles;
-    for (const std::uint32_t v : ofSecond ? lists.verticesOfB : lists.verticesOfA) {
+    for (const std::uint32_t v : swapped ? lists.verticesOfB : lists.verticesOfA) {
       for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-        if (!features.second.topology.isOn(t) || pair.leavesOutVertex(v, t)) continue;
+        if (!features.second.topology.isEnabled(t) || pair.excludesVertex(v, t)) continue;
         ++out.featurePairs;
-        f(features, v, t, ofSecond);
+        f(features, v, t, swapped);
       }
     }
   }
   const auto edgeCount = static_cast<std::uint32_t>(pair.b.topology.edges.size());
   for (const std::uint32_t i : lists.edgesOfA)
     for (std::uint32_t j = pair.self() ? i + 1 : 0; j < edgeCount; ++j) {
-      if (pair.leavesOut(i, j) || pair.b.topology.edgeTriangles[j].empty()) continue;
+      if (pair.excludesEdges(i, j) || pair.b.topology.edgeTriangles[j].empty()) continue;
       ++out.featurePairs;
       f(Features<ImpactQuery::Kind::EdgeEdge>{pair.a, pair.b}, i, j, false);
     }
@@ -265,8 +266,8 @@ void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, Contact
 void findImpacts(const MeshPair& pair, const FeatureLists& lists, ContactBuffers& out) {
   forEachFeaturePair(
       pair, lists, out,
-      [&](const auto& features, std::uint32_t inFirst, std::uint32_t inSecond, bool ofSecond) {
-        addImpact(pair, features, inFirst, inSecond, ofSecond, out);
+      [&](const auto& features, std::uint32_t firstId, std::uint32_t secondId, bool swapped) {
+        addImpact(pair, features, firstId, secondId, swapped, out);
       });
 }
 
@@ -275,9 +276,9 @@ void findFastImpacts(const MeshPair& pair, const FeatureLists& lists, ContactBuf
   const StepCheck check(pair, out);
   forEachFeaturePair(
       pair, lists, out,
-      [&](const auto& features, std::uint32_t inFirst, std::uint32_t inSecond, bool ofSecond) {
-        if (!check.isAnsweredAtEnd(features, inFirst, inSecond))
-          addImpact(pair, features, inFirst, inSecond, ofSecond, out);
+      [&](const auto& features, std::uint32_t firstId, std::uint32_t secondId, bool swapped) {
+        if (!check.proximitySuffices(features, firstId, secondId))
+          addImpact(pair, features, firstId, secondId, swapped, out);
       });
 }
 
@@ -285,7 +286,7 @@ void findIntersections(const MeshPair& pair, const FeatureLists& lists, ContactB
   const auto countB = static_cast<std::uint32_t>(pair.b.topology.triangles.size());
   for (const std::uint32_t a : lists.trianglesOfA)
     for (std::uint32_t b = pair.self() ? a + 1 : 0; b < countB; ++b)
-      if (pair.b.topology.isOn(b)) addIntersection(pair, {a, b}, out);
+      if (pair.b.topology.isEnabled(b)) addIntersection(pair, {a, b}, out);
 }
 
 }  // namespace
@@ -303,7 +304,7 @@ FeatureLists everyFeature(const MeshPair& pair) {
   if (pair.settings.method == Method::Intersection || pair.hasShape()) {
     const MeshTopology& mesh = pair.hasShape() ? pair.mesh().topology : pair.a.topology;
     fill(every.trianglesOfA, mesh.triangles.size());
-    std::erase_if(every.trianglesOfA, [&](std::uint32_t t) { return !mesh.isOn(t); });
+    std::erase_if(every.trianglesOfA, [&](std::uint32_t t) { return !mesh.isEnabled(t); });
     return every;
   }
   const MeshTopology &a = pair.a.topology, &b = pair.b.topology;
@@ -317,7 +318,7 @@ FeatureLists everyFeature(const MeshPair& pair) {
 
 void findContactsByBruteForce(const MeshPair& pair, const FeatureLists& features,
                               ContactBuffers& out) {
-  if (pair.isOfShapes()) return findShapePair(*pair.shapeOfA, *pair.shapeOfB, pair.settings, out);
+  if (pair.isShapePair()) return findShapePair(*pair.shapeOfA, *pair.shapeOfB, pair.settings, out);
   if (pair.hasShape())
     return findShapeContacts(pair.mesh(), pair.shape(), pair.settings, features.trianglesOfA, out);
   const Method method = pair.settings.method;

@@ -5,20 +5,21 @@
 namespace palpate {
 
 void detectPairByBruteForce(const PairRecord& record, ContactBuffers& contacts,
-                            ContactBuffers& overlaps) {
+                            ContactBuffers& intersections) {
   MeshPair meshes = record.meshes();
   findContactsByBruteForce(meshes, contacts);
   const auto countA = static_cast<std::uint32_t>(meshes.a.topology.triangles.size()),
              countB = static_cast<std::uint32_t>(meshes.b.topology.triangles.size());
-  for (std::uint32_t a = 0; a < countA && meshes.step.start; ++a)
+  for (std::uint32_t a = 0; a < countA && meshes.step.checksStart; ++a)
     for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b)
-      contacts.facts.startsIntersecting |= meshes.a.topology.isOn(a) && meshes.b.topology.isOn(b) &&
-                                           intersect(meshes, true, {a, b}, overlaps);
-  if (!record.plan.overlaps ||
+      contacts.facts.startsIntersecting |= meshes.a.topology.isEnabled(a) &&
+                                           meshes.b.topology.isEnabled(b) &&
+                                           intersect(meshes, true, {a, b}, intersections);
+  if (!record.plan.runsIntersection ||
       !(contacts.facts.startsIntersecting || record.plan.startsIntersecting))
     return;
   meshes.settings.method = Method::Intersection;
-  findContactsByBruteForce(meshes, overlaps);
+  findContactsByBruteForce(meshes, intersections);
 }
 
 }  // namespace palpate

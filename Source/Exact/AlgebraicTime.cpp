@@ -41,7 +41,7 @@ std::array<double, N> toDoubles(const std::array<Integer, N>& form) {
 
 }  // namespace
 
-double QuadraticTime::timeBelow() const {
+double QuadraticTime::timeLowerBound() const {
   // floor(2^64 (p + q √d)), or one less.
   Integer numerator = d << 128;
   numerator = sqrt(numerator);
@@ -93,9 +93,9 @@ void removeRootsAtStart(Form<3>& form) {
   while (form[0] == 0) form = {form[1], form[2], form[3], 0};
 }
 
-Turns turns(const Form<3>& form) {
+CriticalPoints criticalPoints(const Form<3>& form) {
   const Form<2> slope{form[1], 2 * form[2], 3 * form[3]};
-  Turns result;
+  CriticalPoints result;
   if (form[3] == 0) {
     if (form[2] == 0) return result;
     result.inside = rootsInside(Form<1>{slope[0], slope[1]});
@@ -157,7 +157,7 @@ void CubicTime::bracket(double lower, double upper) {
   }
 }
 
-double CubicTime::timeBelow(double tolerance) const {
+double CubicTime::timeLowerBound(double tolerance) const {
   double low = m_low, high = m_high;
   while (high - low > tolerance) {
     const double middle = 0.5 * (low + high);

@@ -42,7 +42,7 @@ struct QuadraticTime {
 
   template <std::size_t N>
   int sign(const std::array<Integer, N>& form) const;
-  double timeBelow() const;  ///< at most 2^-51 below the exact time
+  double timeLowerBound() const;  ///< at most 2^-51 below the exact time
 };
 
 /// The moments strictly inside the step at which a form vanishes, ascending, each once. The form
@@ -64,7 +64,7 @@ class CubicTime {
   CubicTime(const Form<3>& cubic, int cell, int rising, double lower, double upper);
 
   int sign(const Form<2>&) const;
-  double timeBelow(double tolerance) const;
+  double timeLowerBound(double tolerance) const;
 
  private:
   int compare(const QuadraticTime&) const;  ///< sign of this - other
@@ -118,11 +118,11 @@ int QuadraticTime::sign(const std::array<Integer, N>& form) const {
 
 /// The critical points of a cubic strictly inside the step, and the number of critical points
 /// before the step.
-struct Turns {
+struct CriticalPoints {
   std::vector<QuadraticTime> inside;
   int before = 0;
 };
-Turns turns(const Form<3>&);
+CriticalPoints criticalPoints(const Form<3>&);
 /// The sign of the highest coefficient that is not zero, which is the form's sign just before t =
 /// 1.
 int signBeforeEnd(const Form<3>&);
@@ -132,15 +132,15 @@ void removeRootsAtStart(Form<3>&);
 template <class F>
 bool anyRootInside(Form<3> cubic, F&& f) {
   removeRootsAtStart(cubic);
-  const Turns cubicTurns = turns(cubic);
-  int sign = sgn(cubic[0]), cell = cubicTurns.before;
+  const CriticalPoints critical = criticalPoints(cubic);
+  int sign = sgn(cubic[0]), cell = critical.before;
   double time = 0.0;
-  for (std::size_t i = 0; i <= cubicTurns.inside.size(); ++i, ++cell) {
-    const bool last = i == cubicTurns.inside.size();
-    const int signThere = last ? signBeforeEnd(cubic) : cubicTurns.inside[i].sign(cubic);
-    const double timeThere = last ? 1.0 : cubicTurns.inside[i].timeBelow();
+  for (std::size_t i = 0; i <= critical.inside.size(); ++i, ++cell) {
+    const bool last = i == critical.inside.size();
+    const int signThere = last ? signBeforeEnd(cubic) : critical.inside[i].sign(cubic);
+    const double timeThere = last ? 1.0 : critical.inside[i].timeLowerBound();
     if (sign * signThere < 0 && f(CubicTime(cubic, cell, signThere, time, timeThere))) return true;
-    if (signThere == 0 && f(cubicTurns.inside[i])) return true;
+    if (signThere == 0 && f(critical.inside[i])) return true;
     sign = signThere;
     time = timeThere;
   }

@@ -15,28 +15,32 @@ struct RoundedWithError {
   double value, error;
 };
 
+/// The exact sum (TwoSum: Knuth, The Art of Computer Programming, volume 2, 4.2.2).
 inline RoundedWithError exactSum(double a, double b) {
   const double sum = a + b, bRounded = sum - a;
   return {sum, (a - (sum - bRounded)) + (b - bRounded)};
 }
 
 /// Splits a into two halves of at most 26 bits that sum to a (Veltkamp).
-inline RoundedWithError halves(double a) {
+inline RoundedWithError splitInHalves(double a) {
   const double scaled = 134217729.0 * a;  // 2^27 + 1
   const double high = scaled - (scaled - a);
   return {high, a - high};
 }
 
-/// The exact product (Dekker). It uses no fused multiply-add, as the baseline instruction set has
-/// none.
+/// The exact product (TwoProduct: Dekker, A floating-point technique for extending the available
+/// precision, Numerische Mathematik 18, 1971). It uses no fused multiply-add, as the baseline
+/// instruction set has none.
 inline RoundedWithError exactProduct(double a, double b, const RoundedWithError& bHalves) {
   const double product = a * b;
-  const auto [high, low] = halves(a);
+  const auto [high, low] = splitInHalves(a);
   return {product, ((high * bHalves.value - product) + high * bHalves.error + low * bHalves.value) +
                        low * bHalves.error};
 }
 
-inline RoundedWithError exactProduct(double a, double b) { return exactProduct(a, b, halves(b)); }
+inline RoundedWithError exactProduct(double a, double b) {
+  return exactProduct(a, b, splitInHalves(b));
+}
 
 // These add in a fixed order, whatever Eigen would choose.
 inline double dot(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -100,8 +104,8 @@ inline Eigen::Vector3d combination(const Difference& m, double s, const Differen
                                    const Difference& v) {
   Eigen::Vector3d result;
   for (int i = 0; i < 3; ++i) {
-    const auto [uHigh, uLow] = halves(u.high[i]);
-    const auto [vHigh, vLow] = halves(v.high[i]);
+    const auto [uHigh, uLow] = splitInHalves(u.high[i]);
+    const auto [vHigh, vLow] = splitInHalves(v.high[i]);
     const RoundedWithError plane = exactSum(s * uHigh, t * vHigh);
     const RoundedWithError all = exactSum(m.high[i], plane.value);
     const double rest = (s * uLow + t * vLow) + (s * u.low[i] + t * v.low[i]);
@@ -114,7 +118,7 @@ inline Eigen::Vector3d combination(const Difference& m, double s, const Differen
 inline Eigen::Vector3d combination(const Difference& m, double s, const Difference& u) {
   Eigen::Vector3d result;
   for (int i = 0; i < 3; ++i) {
-    const auto [uHigh, uLow] = halves(u.high[i]);
+    const auto [uHigh, uLow] = splitInHalves(u.high[i]);
     const RoundedWithError all = exactSum(m.high[i], s * uHigh);
     result[i] = all.value + (all.error + (m.low[i] + (s * uLow + s * u.low[i])));
   }
@@ -127,8 +131,8 @@ inline Eigen::Vector3d accurateCross(const Difference& u, const Difference& v) {
   Eigen::Vector3d result;
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3, k = (i + 2) % 3;
-    const RoundedWithError plus = exactProduct(u.high[j], v.high[k], halves(v.high[k]));
-    const RoundedWithError minus = exactProduct(u.high[k], v.high[j], halves(v.high[j]));
+    const RoundedWithError plus = exactProduct(u.high[j], v.high[k], splitInHalves(v.high[k]));
+    const RoundedWithError minus = exactProduct(u.high[k], v.high[j], splitInHalves(v.high[j]));
     const RoundedWithError high = exactSum(plus.value, -minus.value);
     const double mixed = (u.high[j] * v.low[k] + u.low[j] * v.high[k]) -
                          (u.high[k] * v.low[j] + u.low[k] * v.high[j]);

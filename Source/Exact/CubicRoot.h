@@ -11,17 +11,19 @@ namespace palpate {
 using CubicBernstein = std::array<double, 4>;
 using QuadraticBernstein = std::array<double, 3>;
 
-inline double between(double l, double r, double t) { return (1.0 - t) * l + t * r; }
+inline double interpolate(double l, double r, double t) { return (1.0 - t) * l + t * r; }
 
-/// The symmetric multi-affine form whose diagonal is the polynomial. Computed with an error of at
-/// most 16 u times the largest coefficient's magnitude (nine roundings), u = 2^-53.
+/// The blossom of the polynomial: the symmetric multi-affine form whose diagonal is the polynomial.
+/// Computed with an error of at most 16 u times the largest coefficient's magnitude (nine
+/// roundings), u = 2^-53. (Ramshaw, Blossoms are polar forms, Computer Aided Geometric Design 6,
+/// 1989.)
 inline double blossom(const QuadraticBernstein& b, double r, double s) {
-  return between(between(b[0], b[1], r), between(b[1], b[2], r), s);
+  return interpolate(interpolate(b[0], b[1], r), interpolate(b[1], b[2], r), s);
 }
 inline double blossom(const CubicBernstein& b, double r, double s, double t) {
-  return blossom(
-      QuadraticBernstein{between(b[0], b[1], r), between(b[1], b[2], r), between(b[2], b[3], r)}, s,
-      t);
+  return blossom(QuadraticBernstein{interpolate(b[0], b[1], r), interpolate(b[1], b[2], r),
+                                    interpolate(b[2], b[3], r)},
+                 s, t);
 }
 
 /// An approximation of the point in [low, high] at which a cubic crosses zero: upwards if rising is

@@ -16,6 +16,10 @@ struct SignCounts {
   std::size_t undecided = 0;  ///< trivial zeros are not counted
 };
 
+// orient2d() and orient3d() are named as in Shewchuk, Adaptive precision floating-point arithmetic
+// and fast robust geometric predicates, Discrete & Computational Geometry 18 (1997). Difference:
+// one filter in floating point, then integers of fixed width or ExactSum.
+
 /// The signs of orient3d() and orient2d() without rounding. Slow.
 int orient3dExactly(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                     const Eigen::Vector3d& d, SignCounts&);

@@ -78,17 +78,21 @@ CrossingTerms roundedTerms(const EdgePair& edges, double mSum, double uSum, doub
 /// factors, and its own rounding.
 CrossingTerms compensatedTerms(const EdgePair& edges, double mSum, double uSum, double vSum) {
   const Vector3d normal = accurateCross(edges.u, edges.v);
-  const Vector3d ofS = accurateCross(edges.m, edges.v), ofT = accurateCross(edges.u, edges.m);
+  const Vector3d crossForS = accurateCross(edges.m, edges.v),
+                 crossForT = accurateCross(edges.u, edges.m);
   const double normalSum = sumOfMagnitudes(normal), factors = uSum * vSum;
-  const auto errorWith = [&](const Vector3d& other, double itsFactors) {
+  const auto errorWith = [&](const Vector3d& other, double otherFactors) {
     const double otherSum = sumOfMagnitudes(other);
     return 4 * kAccurateCrossError * normalSum * otherSum +
-           kAccurateCrossLoss * (factors * otherSum + itsFactors * normalSum) +
-           kAccurateCrossLoss * kAccurateCrossLoss * factors * itsFactors;
+           kAccurateCrossLoss * (factors * otherSum + otherFactors * normalSum) +
+           kAccurateCrossLoss * kAccurateCrossLoss * factors * otherFactors;
   };
-  return {dot(normal, normal),        errorWith(normal, factors) + kUnderflowGuardOfProducts,
-          std::abs(dot(ofS, normal)), errorWith(ofS, mSum * vSum),
-          std::abs(dot(ofT, normal)), errorWith(ofT, mSum * uSum)};
+  return {dot(normal, normal),
+          errorWith(normal, factors) + kUnderflowGuardOfProducts,
+          std::abs(dot(crossForS, normal)),
+          errorWith(crossForS, mSum * vSum),
+          std::abs(dot(crossForT, normal)),
+          errorWith(crossForT, mSum * uSum)};
 }
 
 CrossingDecision crossingOf(const EdgePair& edges) {
@@ -101,10 +105,10 @@ CrossingDecision crossingOf(const EdgePair& edges) {
     if (areCertainlyParallel(difference(p1, p0), difference(q1, q0)))
       return {Crossing::Parallel, false};
     // The error of m is relative to the positions, which may be far from the origin.
-    const double far = mSum + sumOfMagnitudes(p0) + sumOfMagnitudes(p1) + sumOfMagnitudes(q0) +
-                       sumOfMagnitudes(q1);
-    if (std::min(uSum, vSum) > kSmallestModerate && far < kLargestModerate)
-      if (const auto decision = compensatedTerms(edges, far, uSum, vSum).decision())
+    const double positionSum = mSum + sumOfMagnitudes(p0) + sumOfMagnitudes(p1) +
+                               sumOfMagnitudes(q0) + sumOfMagnitudes(q1);
+    if (std::min(uSum, vSum) > kSmallestModerate && positionSum < kLargestModerate)
+      if (const auto decision = compensatedTerms(edges, positionSum, uSum, vSum).decision())
         return {*decision, false};
   }
   return {exact::crossing(p0, p1, q0, q1), true};
@@ -244,7 +248,8 @@ Vector3d normalOfCrossing(const Vector3d& p0, const Vector3d& p1, const Vector3d
   const Vector3d normal = unitCross(p0, p1, q0, q1);
   if (normal != Vector3d::Zero()) return normal;
   // Quartered, so that the extents of the largest doubles stay finite.
-  return axisOfLeast((0.25 * p1 - 0.25 * p0).cwiseAbs() + (0.25 * q1 - 0.25 * q0).cwiseAbs());
+  return axisOfLeastComponent((0.25 * p1 - 0.25 * p0).cwiseAbs() +
+                              (0.25 * q1 - 0.25 * q0).cwiseAbs());
 }
 
 std::optional<EdgeEdgeDistance> crossingEdgesDistance(const Vector3d& p0, const Vector3d& p1,
@@ -266,7 +271,7 @@ EdgeEdgeDistance finiteEdgeEdgeDistance(const Vector3d& p0, const Vector3d& p1, 
 EdgeEdgeDistance edgeEdgeDistance(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0,
                                   const Vector3d& q1) {
   const StandardFloatingPoint standard;
-  if (areFinite(p0, p1, q0, q1)) return standard.kept(finiteEdgeEdgeDistance(p0, p1, q0, q1));
+  if (areFinite(p0, p1, q0, q1)) return standard.evaluated(finiteEdgeEdgeDistance(p0, p1, q0, q1));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const Vector3d none = Vector3d::Constant(nan);
   return {nan, nan, none, none, nan, EdgeFeature::Start, EdgeFeature::Start, false, false};

@@ -76,19 +76,19 @@ Separation accurateSeparation(const RelativeMotion<kind>& motion, double t) {
 /// distance along a direction, fixed or turning, or if the plane does. All errors are bounded
 /// (RelativeMotion.cpp).
 ///
-/// No false positive: at a reported time two points of the features are within near = distance + e
-/// as computed, e = tolerance * displacement + kApproachSlack * (largest difference + distance).
-/// Their distance is off by less than 2^-45 of the largest difference.
+/// No false positive: at a reported time two points of the features are within reportable =
+/// distance + e as computed, e = tolerance * displacement + kApproachSlack * (largest difference +
+/// distance). Their distance is off by less than 2^-45 of the largest difference.
 ///
-/// Bounded: if no such points are found, the features' distance exceeds `near`. The direction of
-/// accurateSeparation() is right to 2^-39 at such distances. Along it, all corners are then beyond
-/// the distance by more than tolerance * displacement. They take longer than the tolerance to lose
-/// that margin. So each interval is longer than the tolerance, or than kShortStretch where they are
-/// near. (Few are needed: they are Newton's steps towards the impact. Features that turn as they
-/// pass each other at little more than the distance need most. There the turning direction and the
-/// plane reach further.) The value of upTo does not change the steps before it.
+/// Bounded: if no such points are found, the features' distance exceeds `reportable`. The direction
+/// of accurateSeparation() is right to 2^-39 at such distances. Along it, all corners are then
+/// beyond the distance by more than tolerance * displacement. They take longer than the tolerance
+/// to lose that margin. So each interval is longer than the tolerance, or than kShortestAdvance
+/// where they are near. (Few are needed: they are Newton's steps towards the impact. Features that
+/// turn as they pass each other at little more than the distance need most. There the turning
+/// direction and the plane reach further.) The value of upTo does not change the steps before it.
 template <Kind kind>
-ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, double upTo) {
+ImpactResult find(const ImpactQuery& query, double distance, double tolerance, double upTo) {
   const RelativeMotion<kind> motion(query);
   double t = boxesSeparateUntil(motion, distance);
   if (t > upTo || t == 1.0) return {};
@@ -96,24 +96,25 @@ ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, d
   double displacement = 0.0;
   for (const auto& ends : motion.corner)
     displacement = std::max(displacement, (ends[1] - ends[0]).norm());
-  const double near =
+  const double reportable =
       distance + tolerance * displacement + kApproachSlack * (largest.maxCoeff() + distance);
 
-  constexpr int kPatience = 6;  // intervals before turning directions are tried
-  const double shortest = std::max(tolerance, kShortStretch);
+  constexpr int kFixedDirectionIntervals = 6;  // intervals before turning directions are tried
+  const double shortest = std::max(tolerance, kShortestAdvance);
   double stride = 0.0;
   Separation here = motion.bestSeparation(t);
   for (int step = 0;; ++step) {
-    double clear = motion.separatedAround(t, largest, here, distance).high;
-    if (!(clear == 1.0 || clear - t > shortest)) {
-      if (here.nearest <= near || distanceInside(motion, t) <= near) return {true, false, t};
+    double separatedUntil = motion.separatedAround(t, largest, here, distance).high;
+    if (!(separatedUntil == 1.0 || separatedUntil - t > shortest)) {
+      if (here.nearest <= reportable || distanceInside(motion, t) <= reportable)
+        return {true, false, t};
       here = accurateSeparation(motion, t);
-      clear = motion.separatedAround(t, largest, here, distance).high;
-      if (!(clear > t)) return {true, false, t};  // does not happen: see "Bounded" above
+      separatedUntil = motion.separatedAround(t, largest, here, distance).high;
+      if (!(separatedUntil > t)) return {true, false, t};  // does not happen: see "Bounded" above
     }
-    if (clear > upTo || clear == 1.0) return {};
-    if (step >= kPatience) {
-      stride = std::max(stride, 2.0 * (clear - t));
+    if (separatedUntil > upTo || separatedUntil == 1.0) return {};
+    if (step >= kFixedDirectionIntervals) {
+      stride = std::max(stride, 2.0 * (separatedUntil - t));
       const double ahead = std::min(t + stride, 1.0);
       const Separation there = motion.bestSeparation(ahead);
       if (motion.separatedBetween(t, here, ahead, there, largest, distance) ||
@@ -126,7 +127,7 @@ ImpactAnswer find(const ImpactQuery& query, double distance, double tolerance, d
       }
       stride *= 0.25;
     }
-    t = clear;
+    t = separatedUntil;
     here = motion.bestSeparation(t);
   }
 }
@@ -144,7 +145,7 @@ double scaleFor(const ImpactQuery& query) {
 
 }  // namespace
 
-ImpactAnswer findApproach(const ImpactQuery& query, double distance, double tolerance,
+ImpactResult findApproach(const ImpactQuery& query, double distance, double tolerance,
                           double upTo) {
   const double scale = scaleFor(query);
   ImpactQuery scaled = query;

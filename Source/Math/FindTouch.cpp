@@ -67,13 +67,13 @@ class ImpactSearch {
       : m_motion(motion), m_tolerance(tolerance), m_largest(motion.largestDifference()) {}
 
   /// None if floating point could not decide.
-  std::optional<ImpactAnswer> run(double upTo);
+  std::optional<ImpactResult> run(double upTo);
 
  private:
   enum class Verdict { Inside, Outside, Unknown };
 
   std::optional<Interval> bracketRoot(const Interval& piece, int signAfter) const;
-  Verdict judge(const Interval& bracket) const;
+  Verdict classify(const Interval& bracket) const;
   Interval separatedAround(double t) const {
     return m_motion.separatedAround(t, m_largest, m_motion.bestSeparation(t), 0.0);
   }
@@ -132,7 +132,7 @@ struct CrossComponent {
 /// Whether C = x A + y B is in the domain at the time within the bracket at which A, B and C are in
 /// one plane. Uses Cramer's rule in the coordinates that separate A and B best.
 template <Kind kind>
-typename ImpactSearch<kind>::Verdict ImpactSearch<kind>::judge(const Interval& bracket) const {
+typename ImpactSearch<kind>::Verdict ImpactSearch<kind>::classify(const Interval& bracket) const {
   const double t = 0.5 * (bracket.low + bracket.high);
   int k;
   at(t, m_motion.a).cross(at(t, m_motion.b)).cwiseAbs().maxCoeff(&k);
@@ -154,22 +154,22 @@ typename ImpactSearch<kind>::Verdict ImpactSearch<kind>::judge(const Interval& b
 }
 
 template <Kind kind>
-std::optional<ImpactAnswer> ImpactSearch<kind>::run(double upTo) {
+std::optional<ImpactResult> ImpactSearch<kind>::run(double upTo) {
   if (!(m_largest.maxCoeff() <= kLargestImpactDifference)) return {};
   const Coplanarity cubic = coplanarity(m_motion);
-  if (certainSign(cubic.coefficients, cubic.error) != 0) return ImpactAnswer{};
+  if (certainSign(cubic.coefficients, cubic.error) != 0) return ImpactResult{};
   m_cubic = cubic.coefficients;
   const double largest = largestMagnitude(m_cubic);
   m_error = cubic.error + kBlossomError * largest;
   const bool alwaysCoplanar = largest <= cubic.error;
 
   // The pieces of the step that remain, later pieces first.
-  constexpr int kMostPieces = 16, kMostSteps = 32;
-  std::array<Interval, kMostPieces> pieces;
+  constexpr int kMaxPieces = 16, kMaxSteps = 32;
+  std::array<Interval, kMaxPieces> pieces;
   int count = 0;
   pieces[count++] = {0.0, upTo};
   for (int step = 0; count > 0; ++step) {
-    if (step == kMostSteps || count + 2 > kMostPieces) return {};
+    if (step == kMaxSteps || count + 2 > kMaxPieces) return {};
     const Interval piece = pieces[--count];
     const CubicBernstein part = restrict(m_cubic, piece);
     if (certainSign(part, m_error) != 0) continue;
@@ -178,42 +178,42 @@ std::optional<ImpactAnswer> ImpactSearch<kind>::run(double upTo) {
     if (signAfter != 0) {
       const std::optional<Interval> bracket = bracketRoot(piece, signAfter);
       if (!bracket) return {};
-      const Verdict verdict = judge(*bracket);
-      if (verdict == Verdict::Inside) return ImpactAnswer{true, false, bracket->low};
+      const Verdict verdict = classify(*bracket);
+      if (verdict == Verdict::Inside) return ImpactResult{true, false, bracket->low};
       if (verdict == Verdict::Outside) continue;
       t = 0.5 * (bracket->low + bracket->high);
-      const Interval clear = separatedAround(t);
-      if (clear.low <= bracket->low && clear.high >= bracket->high) continue;
+      const Interval separated = separatedAround(t);
+      if (separated.low <= bracket->low && separated.high >= bracket->high) continue;
       return {};
     }
-    const Interval clear = separatedAround(t);
-    if (!clear.empty()) {
-      if (clear.high < piece.high) pieces[count++] = {clear.high, piece.high};
-      if (clear.low > piece.low) pieces[count++] = {piece.low, clear.low};
+    const Interval separated = separatedAround(t);
+    if (!separated.empty()) {
+      if (separated.high < piece.high) pieces[count++] = {separated.high, piece.high};
+      if (separated.low > piece.low) pieces[count++] = {piece.low, separated.low};
     } else {
       if (alwaysCoplanar) return {};
       pieces[count++] = {t, piece.high};
       pieces[count++] = {piece.low, t};
     }
   }
-  return ImpactAnswer{};
+  return ImpactResult{};
 }
 
 template <Kind kind>
-ImpactAnswer find(const ImpactQuery& query, double tolerance, double upTo) {
+ImpactResult find(const ImpactQuery& query, double tolerance, double upTo) {
   const RelativeMotion<kind> motion(query);
   if (motion.boxesSeparate()) return {};
   ImpactSearch<kind> search(motion, tolerance);
-  std::optional<ImpactAnswer> answer = search.run(upTo);
+  std::optional<ImpactResult> result = search.run(upTo);
   // The search is repeated over the whole step, as that may decide what a part cannot: the time
   // must not depend on upTo.
-  if (upTo < 1.0 && (!answer || answer->impact)) answer = search.run(1.0);
-  return answer ? *answer : findTouchExactly(query, tolerance);
+  if (upTo < 1.0 && (!result || result->impact)) result = search.run(1.0);
+  return result ? *result : findTouchExactly(query, tolerance);
 }
 
 }  // namespace
 
-ImpactAnswer findTouch(const ImpactQuery& query, double tolerance, double upTo) {
+ImpactResult findTouch(const ImpactQuery& query, double tolerance, double upTo) {
   return query.kind == Kind::VertexTriangle ? find<Kind::VertexTriangle>(query, tolerance, upTo)
                                             : find<Kind::EdgeEdge>(query, tolerance, upTo);
 }

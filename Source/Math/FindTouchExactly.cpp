@@ -83,7 +83,7 @@ std::optional<double> firstZeroAfterStart(const Linear& point) {
       return moment.sign(point[0]) == 0 && moment.sign(point[1]) == 0 && moment.sign(point[2]) == 0;
     };
     for (const QuadraticTime& root : rootsInside(point[k]))
-      if (vanishes(root)) return root.timeBelow();
+      if (vanishes(root)) return root.timeLowerBound();
     if (vanishes(EndOfStep{})) return 1.0;
     return {};
   }
@@ -97,7 +97,7 @@ std::optional<double> PointAndSegment::firstTouchAfterStart() const {
     const Form<2> cross = crossComponent(point, segment, k);
     if (isZero(cross)) continue;
     for (const QuadraticTime& root : rootsInside(cross))
-      if (touchAt(root)) return root.timeBelow();
+      if (touchAt(root)) return root.timeLowerBound();
     if (touchAt(EndOfStep{})) return 1.0;
     return {};
   }
@@ -190,10 +190,10 @@ std::optional<double> ExactQuery::firstTouch(double tolerance) const {
   if (!isZero(cubic)) {
     anyRootInside(cubic, [&](const auto& root) {
       if (!touchAt(root)) return false;
-      if constexpr (requires { root.timeBelow(tolerance); })
-        first = root.timeBelow(tolerance);
+      if constexpr (requires { root.timeLowerBound(tolerance); })
+        first = root.timeLowerBound(tolerance);
       else
-        first = root.timeBelow();
+        first = root.timeLowerBound();
       return true;
     });
     if (!first && cubic[3] == 0 && touchAt(EndOfStep{})) first = 1.0;
@@ -210,7 +210,7 @@ std::optional<double> ExactQuery::firstTouch(double tolerance) const {
 
 }  // namespace
 
-ImpactAnswer findTouchExactly(const ImpactQuery& query, double tolerance) {
+ImpactResult findTouchExactly(const ImpactQuery& query, double tolerance) {
   const std::optional<double> time = ExactQuery(query).firstTouch(tolerance);
   return {time.has_value(), true, time.value_or(0.0)};
 }

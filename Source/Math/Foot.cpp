@@ -214,7 +214,7 @@ Vector3d unitCross(const Vector3d& a, const Vector3d& b, const Vector3d& c, cons
   return exact::unitCross(a, b, c, d);
 }
 
-Vector3d axisOfLeast(const Vector3d& extents) {
+Vector3d axisOfLeastComponent(const Vector3d& extents) {
   int axis;
   extents.minCoeff(&axis);
   return Vector3d::Unit(axis);

@@ -45,6 +45,6 @@ Eigen::Vector3d unitCross(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                           std::size_t* exactDecisions = nullptr);
 
 /// The coordinate axis of the least component; the first one if several are equal.
-Eigen::Vector3d axisOfLeast(const Eigen::Vector3d& extents);
+Eigen::Vector3d axisOfLeastComponent(const Eigen::Vector3d& extents);
 
 }  // namespace palpate

@@ -94,22 +94,22 @@ class FilterLanes {
     const D d;
     constexpr auto corners = ImpactQuery::corners(kind);
     V least = hn::Set(d, std::numeric_limits<double>::infinity()), most = hn::Neg(least);
-    Point reach{hn::Zero(d), hn::Zero(d), hn::Zero(d)}, displacement = reach;
+    Point largestCorner{hn::Zero(d), hn::Zero(d), hn::Zero(d)}, displacement = largestCorner;
     for (int i = 0; i < cornerCount(); ++i) {
       const Ends corner = difference(corners[i]);
       const V first = dot(direction, corner.at[0]), last = dot(direction, corner.at[1]);
       least = hn::Min(least, hn::Min(first, last));
       most = hn::Max(most, hn::Max(first, last));
-      reach = largest(reach, largest(corner));
+      largestCorner = largest(largestCorner, largest(corner));
       displacement = largest(displacement, corner.at[1] - corner.at[0]);
     }
     const V lengthSquared = dot(direction, direction);
-    const V farthest = hn::Max(reach.x, hn::Max(reach.y, reach.z));
+    const V farthest = hn::Max(largestCorner.x, hn::Max(largestCorner.y, largestCorner.z));
     const V approach = hn::Sqrt(dot(displacement, displacement)) * hn::Set(d, tolerance) +
                        (farthest + hn::Set(d, distance)) * hn::Set(d, kApproachError);
     const V needed = (hn::Set(d, distance) + approach) * hn::Sqrt(lengthSquared);
     const Point size{hn::Abs(direction.x), hn::Abs(direction.y), hn::Abs(direction.z)};
-    const V limit = (dot(size, reach) + needed) * hn::Set(d, kAlongError) +
+    const V limit = (dot(size, largestCorner) + needed) * hn::Set(d, kAlongError) +
                     (needed + hn::Set(d, kImpactUnderflow));
     const V magnitude = hn::Max(farthest, hn::Max(size.x, hn::Max(size.y, size.z)));
     const M inRange =

@@ -12,7 +12,7 @@ namespace palpate {
 /// Two moving features that may touch: their kind, and the positions of their four vertices before
 /// and after the step.
 ///
-/// Both kinds are one problem. With A, B, C moving linearly,
+/// Both kinds of feature pair lead to one problem. With A, B, C moving linearly,
 // clang-format off
 ///   VertexTriangle  (v, a, b, c):      A = b - a,    B = c - a,    C = v - a,    x, y >= 0, x + y <= 1
 ///   EdgeEdge        (p0, p1, q0, q1):  A = p1 - p0,  B = q0 - q1,  C = q0 - p0,  0 <= x, y <= 1
@@ -43,7 +43,7 @@ struct ImpactQuery {
 };
 
 /// The result of an impact test.
-struct ImpactAnswer {
+struct ImpactResult {
   bool impact = false;
   bool exact = false;  ///< floating point could not decide
   double time = 0.0;   ///< [0, 1] of the step; valid if there is an impact
@@ -51,15 +51,15 @@ struct ImpactAnswer {
 
 /// The same as vertexTriangleTimeOfImpact and edgeEdgeTimeOfImpact, limited to times in [0, upTo].
 /// An impact after upTo may be missed. The time of an impact that is found does not depend on upTo.
-ImpactAnswer findImpact(const ImpactQuery&, const TimeOfImpactSettings&, double upTo = 1.0);
+ImpactResult findImpact(const ImpactQuery&, const TimeOfImpactSettings&, double upTo = 1.0);
 
 /// findImpact() for a distance of 0; tolerance in [2^-50, 1]. Floating point first, then exact
 /// arithmetic.
-ImpactAnswer findTouch(const ImpactQuery&, double tolerance, double upTo = 1.0);
+ImpactResult findTouch(const ImpactQuery&, double tolerance, double upTo = 1.0);
 /// The same result by exact arithmetic alone.
-ImpactAnswer findTouchExactly(const ImpactQuery&, double tolerance);
+ImpactResult findTouchExactly(const ImpactQuery&, double tolerance);
 /// findImpact() for a distance > 0: when the features come within it.
-ImpactAnswer findApproach(const ImpactQuery&, double distance, double tolerance, double upTo = 1.0);
+ImpactResult findApproach(const ImpactQuery&, double distance, double tolerance, double upTo = 1.0);
 
 /// The side of the contact plane on which the first feature last was before the time. 1: the side
 /// of A x B, towards which C points; this is the triangle's winding normal, or (p1 - p0) x (q0 -

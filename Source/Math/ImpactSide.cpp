@@ -15,14 +15,15 @@ namespace {
 
 /// Sign of det(A, B, C) at a multiple of 2^-53 of the step.
 int exactSideAt(const ImpactQuery& query, double time) {
-  const auto passed = static_cast<unsigned long>(std::ldexp(time, 53)), left = (1ul << 53) - passed;
+  const auto elapsed = static_cast<unsigned long>(std::ldexp(time, 53)),
+             remaining = (1ul << 53) - elapsed;
   std::array<exact::Vector<Integer>, 3> rows;
   const auto axes = ImpactQuery::axes(query.kind);
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k) {
       const auto coordinate = [&](int vertex) -> Integer {
         const ImpactQuery::Step& step = query.vertices[vertex];
-        return scaledInteger(step.before[k]) * left + scaledInteger(step.now[k]) * passed;
+        return scaledInteger(step.before[k]) * remaining + scaledInteger(step.now[k]) * elapsed;
       };
       rows[i][k] = coordinate(axes[i][0]) - coordinate(axes[i][1]);
     }

@@ -34,8 +34,8 @@ double motionBound(const ImpactQuery& query) {
 }
 
 template <ImpactQuery::Kind kind>
-bool mayHaveTouched(const ImpactQuery& query, double distance, double most) {
-  return distance <= most + kMotionError * (most + sizeAtEnd<kind>(query)) &&
+bool mayHaveTouched(const ImpactQuery& query, double distance, double motionLimit) {
+  return distance <= motionLimit + kMotionError * (motionLimit + sizeAtEnd<kind>(query)) &&
          distance <= motionBound<kind>(query);
 }
 

@@ -12,9 +12,9 @@ template <ImpactQuery::Kind kind>
 double motionBound(const ImpactQuery&);
 
 /// Whether features at this computed distance at the step's end may have touched before: whether
-/// the distance is at most motionBound(). most: a bound on the motion of all features, which often
-/// decides sooner.
+/// the distance is at most motionBound(). motionLimit: a bound on the motion of all features, which
+/// often decides sooner.
 template <ImpactQuery::Kind kind>
-bool mayHaveTouched(const ImpactQuery&, double distance, double most);
+bool mayHaveTouched(const ImpactQuery&, double distance, double motionLimit);
 
 }  // namespace palpate

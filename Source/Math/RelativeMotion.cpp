@@ -72,7 +72,7 @@ Interval RelativeMotion<kind>::separatedAround(double t, const Vector3d& largest
   for (const auto& ends : corner) {
     const double first = separation.direction.dot(ends[0]) - needed,
                  last = separation.direction.dot(ends[1]) - needed;
-    if (!(between(first, last, t) > 0.0)) return {1.0, 0.0};
+    if (!(interpolate(first, last, t) > 0.0)) return {1.0, 0.0};
     // If an end is not positive, the limit is the zero in between, moved towards t by more than the
     // quotient's three roundings.
     const double zero = first / (first - last);

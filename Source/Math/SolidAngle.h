@@ -11,9 +11,9 @@
 namespace palpate {
 
 /// A solid angle as a share of the whole sphere, and a bound on its error.
-struct SeenShare {
+struct SolidAngleShare {
   double value = 0, error = 0;
-  void add(const SeenShare& other) { value += other.value, error += other.error; }
+  void add(const SolidAngleShare& other) { value += other.value, error += other.error; }
 };
 
 inline Eigen::Vector3d directionOf(const Eigen::Vector3d& v) {
@@ -28,8 +28,8 @@ inline Eigen::Vector3d directionOf(const Eigen::Vector3d& v) {
 ///
 /// Source   Van Oosterom and Strackee, The solid angle of a plane triangle (1983). Difference: unit
 ///          vectors, and a bound on the error, which grows where p is near the triangle's border.
-inline SeenShare seenShare(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
-                           const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+inline SolidAngleShare solidAngleShare(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
+                                       const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d u = directionOf(a - p), v = directionOf(b - p), w = directionOf(c - p);
   const double sine = u.dot(v.cross(w)), cosine = 1 + u.dot(v) + v.dot(w) + w.dot(u);
   const double length = std::sqrt(sine * sine + cosine * cosine);

@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-ImpactAnswer findImpact(const ImpactQuery& query, const TimeOfImpactSettings& settings,
+ImpactResult findImpact(const ImpactQuery& query, const TimeOfImpactSettings& settings,
                         double upTo) {
   // A tolerance of NaN counts as the smallest one.
   const double tolerance = settings.timeTolerance > kSmallestTimeTolerance
@@ -23,8 +23,8 @@ namespace {
 
 std::optional<double> timeOf(const ImpactQuery& query, const TimeOfImpactSettings& settings) {
   const StandardFloatingPoint standard;
-  const ImpactAnswer answer = findImpact(query, settings);
-  return standard.kept(answer.impact ? std::optional(answer.time) : std::nullopt);
+  const ImpactResult result = findImpact(query, settings);
+  return standard.evaluated(result.impact ? std::optional(result.time) : std::nullopt);
 }
 
 }  // namespace

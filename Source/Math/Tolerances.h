@@ -85,7 +85,7 @@ constexpr double kApproachError = 0x1p-35;
 /// Share of the step: findApproach() checks whether the features are near, and reports, if it
 /// cannot advance by more than this or the tolerance. Any value keeps its promises; smaller values
 /// take more steps within the distance at which it may report.
-constexpr double kShortStretch = 0x1p-20;
+constexpr double kShortestAdvance = 0x1p-20;
 /// Error of det(A, B, C) with components up to 1 (sideBefore()): six terms of 12 u, twice.
 constexpr double kSideError = 0x1p-46;
 /// Share of the step: how far before an impact sideBefore() evaluates the side first. It goes back
@@ -106,7 +106,7 @@ constexpr double kOnSurface = 0x1p-48;
 constexpr double kShapePairGap = 0x1p-46;
 /// Largest ratio of the sizes of two shapes whose distance uses the Minkowski difference. Beyond
 /// it, kShapePairGap may be larger than the smaller shape.
-constexpr double kMostSizeRatio = 0x1p40;
+constexpr double kMaxSizeRatio = 0x1p40;
 /// L: replaces kShapePairGap where differences are so small that their own roundings are larger.
 constexpr double kSmallestShapePairGap = 0x1p-1068;
 /// Squared sine of the angle between a direction and a capsule's axis. Below it, another direction

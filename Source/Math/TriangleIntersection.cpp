@@ -12,12 +12,12 @@ using Signs = std::array<int, 3>;
 
 constexpr int next(int i) { return i == 2 ? 0 : i + 1; }
 
-bool has(unsigned bits, int i) { return bits >> i & 1; }
+bool hasBit(unsigned bits, int i) { return bits >> i & 1; }
 
 bool strictlyOneSide(const Signs& s) { return s[0] != 0 && s[0] == s[1] && s[0] == s[2]; }
 bool anyZero(const Signs& s) { return s[0] == 0 || s[1] == 0 || s[2] == 0; }
 bool allZero(const Signs& s) { return s[0] == 0 && s[1] == 0 && s[2] == 0; }
-bool mixed(const Signs& s) {
+bool haveBothSigns(const Signs& s) {
   return (s[0] > 0 || s[1] > 0 || s[2] > 0) && (s[0] < 0 || s[1] < 0 || s[2] < 0);
 }
 
@@ -29,7 +29,7 @@ struct Box {
     lower = lower.min(c[2].array());
     upper = upper.max(c[2].array());
   }
-  bool meets(const Box& other) const {
+  bool overlaps(const Box& other) const {
     return (lower <= other.upper).all() && (other.lower <= upper).all();
   }
   bool contains(const Eigen::Vector3d& p) const {
@@ -38,42 +38,43 @@ struct Box {
 };
 
 /// A triangle and, for each of its corners, its side of the other triangle's plane.
-struct Placed {
+struct ClassifiedTriangle {
   const Corners& corners;
   const Box& box;
   unsigned excluded;  ///< bit i: corner i is a corner of the other, too
   Signs sides{};
 
-  void place(const Corners& other, SignCounts& counts) {
+  void classify(const Corners& other, SignCounts& counts) {
     const OrientedPlane plane(other[0], other[1], other[2]);
     for (int i = 0; i < 3; ++i)
-      if (!has(excluded, i)) sides[i] = plane.side(corners[i], counts);
+      if (!hasBit(excluded, i)) sides[i] = plane.side(corners[i], counts);
   }
   /// Whether all corners that are not shared are strictly on one side. The other triangle then has
   /// area, and at most the shared corners lie on its plane.
-  bool aside() const {
+  bool isOnOneSide() const {
     int sum = 0, count = 0;
     for (int i = 0; i < 3; ++i) {
-      if (has(excluded, i)) continue;
+      if (hasBit(excluded, i)) continue;
       sum += sides[i];
       ++count;
     }
     return sum != 0 && std::abs(sum) == count;
   }
-  bool edgeAside(int i) const { return sides[i] * sides[next(i)] > 0; }
+  bool isEdgeOnOneSide(int i) const { return sides[i] * sides[next(i)] > 0; }
   bool edgeCrosses(int i) const { return sides[i] * sides[next(i)] < 0; }
 };
 
 /// The corner that is alone on its side of a plane. The triangle must cross the plane, and no
 /// corner may lie on it.
-int lonelyCorner(const Signs& s) { return s[0] == s[1] ? 2 : s[0] == s[2] ? 1 : 0; }
+int isolatedCorner(const Signs& s) { return s[0] == s[1] ? 2 : s[0] == s[2] ? 1 : 0; }
 
 /// For triangles that both cross the other's plane and have no corner on it. The planes meet in a
-/// line. On this line each triangle covers an interval that ends at the two edges of its lonely
-/// corner. The sign of the volume of an edge of a and an edge of b, both starting at the lonely
+/// line. On this line each triangle covers an interval that ends at the two edges of its isolated
+/// corner. The sign of the volume of an edge of a and an edge of b, both starting at the isolated
 /// corners, decides which end comes first. The sense is common to all four volumes.
-TriangleIntersection intersectCrossing(const Placed& a, const Placed& b, SignCounts& counts) {
-  const int p = lonelyCorner(a.sides), q = lonelyCorner(b.sides);
+TriangleIntersection intersectCrossing(const ClassifiedTriangle& a, const ClassifiedTriangle& b,
+                                       SignCounts& counts) {
+  const int p = isolatedCorner(a.sides), q = isolatedCorner(b.sides);
   const std::array<int, 2> edgesA{p, next(next(p))}, edgesB{q, next(next(q))};
   const std::array<int, 2> endsA{next(p), edgesA[1]}, endsB{next(q), edgesB[1]};
   std::array<std::array<int, 2>, 2> order;
@@ -99,13 +100,13 @@ TriangleIntersection intersectCrossing(const Placed& a, const Placed& b, SignCou
 // dimension, so features that meet in all three projections meet in space. If such an axis is
 // known, it alone is enough.
 
-struct Axes {
+struct ProjectionAxes {
   int first = 0, last = 2;
-  bool known() const { return first == last; }
+  bool isSingle() const { return first == last; }
 };
 
 /// An axis along which the triangle's projection has area; all axes if there is none.
-Axes axesOf(const Corners& t, SignCounts& counts) {
+ProjectionAxes projectionAxes(const Corners& t, SignCounts& counts) {
   for (int axis = 0; axis < 3; ++axis)
     if (orient2d(axis, t[0], t[1], t[2], counts) != 0) return {axis, axis};
   return {};
@@ -142,19 +143,20 @@ class SidesOfEdges {
 /// the triangle if, in projection, it is not on different sides of the edges. With area, no point
 /// outside satisfies this. Without area, only points on the triangle's line do, and the box
 /// excludes the rest of the line.
-std::uint8_t cornersOn(const Placed& a, const Placed& triangle, const Axes& axes,
-                       SidesOfEdges& sidesOf) {
+std::uint8_t cornersOn(const ClassifiedTriangle& a, const ClassifiedTriangle& triangle,
+                       const ProjectionAxes& axes, SidesOfEdges& sidesOf) {
   std::uint8_t found = 0;
   for (int i = 0; i < 3; ++i) {
-    bool on = a.sides[i] == 0 && !has(a.excluded, i) && triangle.box.contains(a.corners[i]);
+    bool on = a.sides[i] == 0 && !hasBit(a.excluded, i) && triangle.box.contains(a.corners[i]);
     for (int axis = axes.first; on && axis <= axes.last; ++axis)
-      on = !mixed({sidesOf(axis, 0, i), sidesOf(axis, 1, i), sidesOf(axis, 2, i)});
+      on = !haveBothSigns({sidesOf(axis, 0, i), sidesOf(axis, 1, i), sidesOf(axis, 2, i)});
     found |= on << i;
   }
   return found;
 }
 
-std::uint8_t edgesThrough(const Placed& a, const Corners& triangle, SignCounts& counts) {
+std::uint8_t edgesThrough(const ClassifiedTriangle& a, const Corners& triangle,
+                          SignCounts& counts) {
   std::uint8_t found = 0;
   for (int i = 0; i < 3; ++i) {
     if (!a.edgeCrosses(i)) continue;
@@ -170,12 +172,13 @@ std::uint8_t edgesThrough(const Placed& a, const Corners& triangle, SignCounts& 
 /// For triangles with corners on the other's plane, without area, or both: every feature is tested
 /// by itself. Segments in one plane whose boxes overlap meet if neither is strictly to one side of
 /// the other. This includes segments without length.
-TriangleIntersection intersectTouching(const Placed& a, const Placed& b, unsigned excludedEdges,
-                                       SignCounts& counts) {
-  const Axes ofA = axesOf(a.corners, counts), ofB = axesOf(b.corners, counts);
-  const bool inPlaneOfA = allZero(b.sides) && ofA.known();
-  const bool coplanar = inPlaneOfA || (allZero(a.sides) && ofB.known());
-  const Axes axes = inPlaneOfA ? ofA : coplanar ? ofB : Axes();
+TriangleIntersection intersectTouching(const ClassifiedTriangle& a, const ClassifiedTriangle& b,
+                                       unsigned excludedEdges, SignCounts& counts) {
+  const ProjectionAxes ofA = projectionAxes(a.corners, counts),
+                       ofB = projectionAxes(b.corners, counts);
+  const bool inPlaneOfA = allZero(b.sides) && ofA.isSingle();
+  const bool coplanar = inPlaneOfA || (allZero(a.sides) && ofB.isSingle());
+  const ProjectionAxes axes = inPlaneOfA ? ofA : coplanar ? ofB : ProjectionAxes();
   SidesOfEdges sidesOfA(a.corners, b.corners, counts), sidesOfB(b.corners, a.corners, counts);
   TriangleIntersection result;
   result.cornersOfAOnB = cornersOn(a, b, ofB, sidesOfB);
@@ -183,15 +186,15 @@ TriangleIntersection intersectTouching(const Placed& a, const Placed& b, unsigne
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d &p0 = a.corners[i], &p1 = a.corners[next(i)];
     const Box boxP(p0, p1);
-    if (a.edgeAside(i) || !boxP.meets(b.box)) continue;
+    if (a.isEdgeOnOneSide(i) || !boxP.overlaps(b.box)) continue;
     for (int j = 0; j < 3; ++j) {
       const Eigen::Vector3d &q0 = b.corners[j], &q1 = b.corners[next(j)];
       const unsigned bit = TriangleIntersection::edgesBit(i, j);
-      if (excludedEdges & bit || b.edgeAside(j) || !boxP.meets(Box(q0, q1))) continue;
-      bool meet = coplanar || orient3d(p0, p1, q0, q1, counts) == 0;
-      for (int axis = axes.first; meet && axis <= axes.last; ++axis)
-        meet = !sidesOfA.separate(axis, i, j, next(j)) && !sidesOfB.separate(axis, j, i, next(i));
-      if (meet) result.touchingEdges |= bit;
+      if (excludedEdges & bit || b.isEdgeOnOneSide(j) || !boxP.overlaps(Box(q0, q1))) continue;
+      bool touch = coplanar || orient3d(p0, p1, q0, q1, counts) == 0;
+      for (int axis = axes.first; touch && axis <= axes.last; ++axis)
+        touch = !sidesOfA.separate(axis, i, j, next(j)) && !sidesOfB.separate(axis, j, i, next(i));
+      if (touch) result.touchingEdges |= bit;
     }
   }
   if (!coplanar) {
@@ -206,12 +209,13 @@ TriangleIntersection intersectTouching(const Placed& a, const Placed& b, unsigne
 TriangleIntersection intersectTriangles(const Corners& cornersOfA, const Corners& cornersOfB,
                                         SignCounts& counts, const ExcludedFeatures& excluded) {
   const Box boxA(cornersOfA), boxB(cornersOfB);
-  if (!boxA.meets(boxB)) return {};
-  Placed a{cornersOfA, boxA, excluded.cornersOfA}, b{cornersOfB, boxB, excluded.cornersOfB};
-  a.place(cornersOfB, counts);
-  if (a.aside()) return {};
-  b.place(cornersOfA, counts);
-  if (b.aside()) return {};
+  if (!boxA.overlaps(boxB)) return {};
+  ClassifiedTriangle a{cornersOfA, boxA, excluded.cornersOfA},
+      b{cornersOfB, boxB, excluded.cornersOfB};
+  a.classify(cornersOfB, counts);
+  if (a.isOnOneSide()) return {};
+  b.classify(cornersOfA, counts);
+  if (b.isOnOneSide()) return {};
   if (anyZero(a.sides) || anyZero(b.sides)) return intersectTouching(a, b, excluded.edges, counts);
   return intersectCrossing(a, b, counts);
 }
@@ -221,7 +225,7 @@ bool trianglesIntersect(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1,
                         const Eigen::Vector3d& b1, const Eigen::Vector3d& b2) {
   const StandardFloatingPoint standard;
   SignCounts counts;
-  return standard.kept(intersectTriangles({a0, a1, a2}, {b0, b1, b2}, counts).intersect());
+  return standard.evaluated(intersectTriangles({a0, a1, a2}, {b0, b1, b2}, counts).intersect());
 }
 
 }  // namespace palpate

@@ -60,8 +60,8 @@ std::array<double, 3> squares(const std::array<Vector3d, 3>& a) {
   if (isModerate(extent)) return {dot(a[0], a[0]), dot(a[1], a[1]), dot(a[2], a[2])};
   std::array<double, 3> result;
   for (int i = 0; i < 3; ++i) {
-    const Vector3d near = scaled(a[i], exponentTowardsOne(extent));
-    result[i] = dot(near, near);
+    const Vector3d moderate = scaled(a[i], exponentTowardsOne(extent));
+    result[i] = dot(moderate, moderate);
   }
   return result;
 }
@@ -87,7 +87,7 @@ Vector3d windingNormal(const Vector3d& p, const CornerPointers& corners) {
   const Vector3d normal = unitCross(a, b, a, c);
   if (normal != Vector3d::Zero()) return normal;
   // Halved, so that the extent of the largest doubles stays finite.
-  return axisOfLeast(0.5 * a.cwiseMax(b).cwiseMax(c) - 0.5 * a.cwiseMin(b).cwiseMin(c));
+  return axisOfLeastComponent(0.5 * a.cwiseMax(b).cwiseMax(c) - 0.5 * a.cwiseMin(b).cwiseMin(c));
 }
 
 }  // namespace
@@ -148,7 +148,7 @@ VertexTriangleDistance finiteVertexTriangleDistance(const Vector3d& p, const Vec
 VertexTriangleDistance vertexTriangleDistance(const Vector3d& p, const Vector3d& a,
                                               const Vector3d& b, const Vector3d& c) {
   const StandardFloatingPoint standard;
-  if (areFinite(p, a, b, c)) return standard.kept(finiteVertexTriangleDistance(p, a, b, c));
+  if (areFinite(p, a, b, c)) return standard.evaluated(finiteVertexTriangleDistance(p, a, b, c));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const Vector3d none = Vector3d::Constant(nan);
   return {none, none, none, nan, TriangleFeature::CornerA, false};

@@ -82,14 +82,14 @@ HWY_EXPORT(sortFewKernel);
 SampledExtent sampleExtent(std::span<const Eigen::Vector3d> positions) {
   SampledExtent extent;
   if (positions.empty()) return extent;
-  constexpr std::size_t kMost = 31;
-  const std::size_t count = std::min(kMost, positions.size());
-  alignas(64) std::array<double, kMost + 1> sample;
+  constexpr std::size_t kMax = 31;
+  const std::size_t count = std::min(kMax, positions.size());
+  alignas(64) std::array<double, kMax + 1> sample;
   sample.fill(std::numeric_limits<double>::infinity());
   for (int axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < count; ++i)
       sample[i] = positions[i * positions.size() / count][axis];
-    std::array<double, kMost> sorted;
+    std::array<double, kMax> sorted;
     HWY_DYNAMIC_DISPATCH(sortFewKernel)(sample.data(), count, sorted.data());
     extent.median[axis] = sorted[count / 2];
     // Halved, because the difference of two doubles may be beyond their range.

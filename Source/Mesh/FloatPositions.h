@@ -28,9 +28,9 @@ struct FloatFrame {
   /// Rounds to nearest and clamps to kLargestFloat. Clamping brings no two points further apart.
   FloatPoint operator()(const Eigen::Vector3d& position) const {
     const auto of = [&](int k) {
-      constexpr double kMost = kLargestFloat;
+      constexpr double kMax = kLargestFloat;
       const double v = (position[k] - origin[k]) * scale;
-      return static_cast<float>(std::min(std::max(v, -kMost), kMost));
+      return static_cast<float>(std::min(std::max(v, -kMax), kMax));
     };
     return {of(0), of(1), of(2), 0.0f};
   }

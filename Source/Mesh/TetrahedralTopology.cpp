@@ -50,9 +50,9 @@ std::vector<std::uint32_t> opposites(std::span<const Tetrahedron> tetrahedra,
 }
 
 /// For each tetrahedron, whether its corners as given are wound as if its volume were positive.
-std::vector<bool> findTurns(std::span<const Eigen::Vector3d> rest,
-                            std::span<const Tetrahedron> tetrahedra,
-                            std::span<const std::uint32_t> beyond) {
+std::vector<bool> findOrientations(std::span<const Eigen::Vector3d> rest,
+                                   std::span<const Tetrahedron> tetrahedra,
+                                   std::span<const std::uint32_t> beyond) {
   std::vector<bool> positive(tetrahedra.size()), known(tetrahedra.size());
   std::vector<std::uint32_t> queue;
   SignCounts counts;
@@ -66,7 +66,7 @@ std::vector<bool> findTurns(std::span<const Eigen::Vector3d> rest,
   if (queue.size() == tetrahedra.size()) return positive;
   // Tetrahedra without volume follow from their neighbours: two sides of one face are wound in
   // opposite directions.
-  const auto spread = [&] {
+  const auto propagate = [&] {
     for (std::size_t next = 0; next < queue.size(); ++next)
       for (std::uint32_t side = 4 * queue[next]; side < 4 * queue[next] + 4; ++side) {
         const std::uint32_t other = beyond[side];
@@ -77,12 +77,12 @@ std::vector<bool> findTurns(std::span<const Eigen::Vector3d> rest,
         queue.push_back(other / 4);
       }
   };
-  spread();
+  propagate();
   for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
     if (known[t]) continue;
     known[t] = true;
     queue.assign(1, t);
-    spread();
+    propagate();
   }
   return positive;
 }
@@ -95,7 +95,7 @@ TetrahedralTopology topologyOf(std::span<const Eigen::Vector3d> rest,
   const std::vector<std::uint32_t> beyond = opposites(tetrahedra, fault);
   TetrahedralTopology topology{{tetrahedra.begin(), tetrahedra.end()}, {}, {}};
   if (fault) return topology;
-  const std::vector<bool> positive = findTurns(rest, tetrahedra, beyond);
+  const std::vector<bool> positive = findOrientations(rest, tetrahedra, beyond);
   for (std::uint32_t side = 0; side < beyond.size(); ++side) {
     if (beyond[side] != kNone) continue;
     Triangle& face = topology.surface.emplace_back(faceOf(tetrahedra[side / 4], side % 4));

@@ -66,7 +66,8 @@ void MeshTopology::findOwners(const std::vector<bool>& newIsDisabled) {
   IndexLists atEdges = listsOf(edges.size(), triangleEdges);
 
   std::vector<std::uint8_t> owners(triangles.size(), 0);
-  const auto own = [&](std::uint32_t item, std::uint32_t owner, const auto& held, auto&& bitOf) {
+  const auto assignOwner = [&](std::uint32_t item, std::uint32_t owner, const auto& held,
+                               auto&& bitOf) {
     const auto place = std::find(held.begin(), held.end(), item) - held.begin();
     owners[owner] |= static_cast<std::uint8_t>(bitOf(static_cast<int>(place)));
   };
@@ -76,17 +77,18 @@ void MeshTopology::findOwners(const std::vector<bool>& newIsDisabled) {
     if (incident.empty())
       ++untested;
     else
-      own(v, incident.front(), triangles[incident.front()], cornerBit);
+      assignOwner(v, incident.front(), triangles[incident.front()], cornerBit);
   }
   std::vector<std::uint8_t> closedStars(vertexCount, 1);
-  const auto goesUp = [&](std::uint32_t e, std::uint32_t triangle) {
+  const auto isForward = [&](std::uint32_t e, std::uint32_t triangle) {
     const auto side = std::find(triangleEdges[triangle].begin(), triangleEdges[triangle].end(), e);
     return triangles[triangle][side - triangleEdges[triangle].begin()] == edges[e][0];
   };
   for (std::uint32_t e = 0; e < edges.size(); ++e) {
     const auto incident = atEdges[e];
-    if (!incident.empty()) own(e, incident.front(), triangleEdges[incident.front()], edgeBit);
-    if (incident.size() != 2 || goesUp(e, incident[0]) == goesUp(e, incident[1]))
+    if (!incident.empty())
+      assignOwner(e, incident.front(), triangleEdges[incident.front()], edgeBit);
+    if (incident.size() != 2 || isForward(e, incident[0]) == isForward(e, incident[1]))
       closedStars[edges[e][0]] = closedStars[edges[e][1]] = 0;
   }
   // Nothing below throws.

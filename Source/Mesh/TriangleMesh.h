@@ -66,7 +66,9 @@ struct MeshTopology {
   /// Disables these triangles and enables all others. Changes nothing if it throws.
   /// Cost     linear: about a tenth of the constructor's.
   void disable(std::span<const std::uint32_t> triangles);
-  bool isOn(std::uint32_t triangle) const { return isDisabled.empty() || !isDisabled[triangle]; }
+  bool isEnabled(std::uint32_t triangle) const {
+    return isDisabled.empty() || !isDisabled[triangle];
+  }
 
   /// The index of an edge, whose lower vertex comes first; kNoEdge if there is no such edge.
   std::uint32_t edgeOf(const Segment& edge) const;
@@ -85,10 +87,10 @@ struct MeshTopology {
 };
 
 /// Whether the vertices of one mesh of a pair are tested against the other mesh's elements.
-/// ofFirst: the vertices are the first mesh's; of two point sets, only these are tested.
-inline bool areTested(const MeshTopology& vertices, const MeshTopology& others, bool ofFirst) {
-  return others.hasFaces() ||
-         (vertices.type == GeometryType::Points && (others.type == GeometryType::Lines || ofFirst));
+/// isFirstMesh: the vertices are the first mesh's; of two point sets, only these are tested.
+inline bool areTested(const MeshTopology& vertices, const MeshTopology& others, bool isFirstMesh) {
+  return others.hasFaces() || (vertices.type == GeometryType::Points &&
+                               (others.type == GeometryType::Lines || isFirstMesh));
 }
 
 inline bool shareVertex(const Segment& a, const Segment& b) {
@@ -104,7 +106,7 @@ struct TriangleMesh {
   std::vector<double> radii{};          ///< L, per vertex; empty: all have the largest radius
   double largestRadius = 0.0;           ///< L
   std::vector<Eigen::Vector3d> rest{};  ///< positions when the topology was set
-  bool outer = false;                   ///< Sidedness::Outer
+  bool outerSideOnly = false;           ///< Sidedness::Outer
 
   double radius(std::uint32_t vertex) const {
     return radii.empty() ? largestRadius : radii[vertex];

@@ -52,7 +52,7 @@ HWY_ATTR void viewsKernel(const Triangle* triangles, std::size_t size, const Flo
     const Point a = p[0][1] - p[0][0], b = p[0][2] - p[0][0], c = p[1][1] - p[1][0],
                 e = p[1][2] - p[1][0];
     const Point first = cross(a, b), middle = cross(a, e) + cross(c, b), last = cross(c, e);
-    V extent[3], error[3], reach = hn::Zero(d);
+    V extent[3], error[3], largest = hn::Zero(d);
     for (int k = 0; k < 3; ++k) {
       const auto most = [&](const Point& s, const Point& t) HWY_ATTR {
         return hn::Max(hn::Abs(coordinate(s, k)), hn::Abs(coordinate(t, k)));
@@ -60,9 +60,9 @@ HWY_ATTR void viewsKernel(const Triangle* triangles, std::size_t size, const Flo
       extent[k] = most(a, c) + most(b, e);
       const V farthest = most(p[0][0], p[1][0]) + extent[k];
       error[k] = farthest * hn::Set(d, 0x1p-19f) + hn::Set(d, OutwardRounding::kAbsolute);
-      reach = hn::Max(reach, farthest);
+      largest = hn::Max(largest, farthest);
     }
-    const auto inRange = hn::Lt(reach, hn::Set(d, kLargest));
+    const auto inRange = hn::Lt(largest, hn::Set(d, kLargest));
     auto view = hn::Zero(du);
     const auto add = [&](auto mask, std::uint32_t bit) HWY_ATTR {
       view = hn::Or(view, hn::IfThenElseZero(hn::RebindMask(du, mask), hn::Set(du, bit)));

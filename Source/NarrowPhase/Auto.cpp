@@ -10,10 +10,10 @@ namespace palpate {
 namespace {
 
 /// Bounds of the displacements of a triangle's corners, along each axis.
-struct Moves {
+struct DisplacementBounds {
   Eigen::Array3d lower, upper;
 
-  Moves(const TriangleMesh& mesh, std::uint32_t triangle) {
+  DisplacementBounds(const TriangleMesh& mesh, std::uint32_t triangle) {
     const auto& [a, b, c] = mesh.topology.triangles[triangle];
     const auto moved = [&](std::uint32_t v) -> Eigen::Array3d {
       return mesh.now[v] - mesh.before[v];
@@ -26,7 +26,7 @@ struct Moves {
 
 /// Whether features of two triangles may move further than `slow` relative to each other. Rounding,
 /// and squares out of range, make it true for some slower triangles.
-bool mayBeFast(const Moves& a, const Moves& b, double slow) {
+bool mayBeFast(const DisplacementBounds& a, const DisplacementBounds& b, double slow) {
   const Eigen::Array3d most = (a.upper - b.lower).abs().max((b.upper - a.lower).abs());
   const double square = slow * slow;
   return !(square > kSmallestSlowSquare && most.square().sum() < square * (1 - kSlowSlack));
@@ -44,7 +44,7 @@ void findAuto(const MeshPair& pair, std::span<const ElementPair> candidates, Con
   findProximity(pair, out.part, out);
   out.part.clear();
   for (const ElementPair& candidate : candidates)
-    if (mayBeFast({pair.a, candidate.a}, {pair.b, candidate.b}, pair.step.slow))
+    if (mayBeFast({pair.a, candidate.a}, {pair.b, candidate.b}, pair.step.slowMotion))
       out.part.push_back(candidate);
   findFastImpacts(pair, out.part, out);
 }

@@ -28,22 +28,22 @@ TimeOfImpactSettings settingsOf(const MeshPair& pair) {
   return settings;
 }
 
-/// Calls f(features, inFirst, inSecond, ofSecond) for the pairs that may have an impact, after a
-/// test of eight pairs at a time. ofSecond: each of `pairs` lists a feature of features.second
+/// Calls f(features, firstId, secondId, swapped) for the pairs that may have an impact, after a
+/// test of eight pairs at a time. kSwapped: each of `pairs` lists a feature of features.second
 /// first.
-template <bool ofSecond, Kind kind, class F>
+template <bool kSwapped, Kind kind, class F>
 void filterPairs(const Features<kind>& features, std::span<const FeaturePair> pairs,
                  const TimeOfImpactSettings& settings, F&& f) {
   ImpactBlock block;
   const auto test = [&](const FeaturePair& pair, auto&& with) {
-    return ofSecond ? with(pair.b, pair.a) : with(pair.a, pair.b);
+    return kSwapped ? with(pair.b, pair.a) : with(pair.a, pair.b);
   };
   for (std::size_t begin = 0; begin < pairs.size(); begin += ImpactBlock::kLanes) {
     const auto eight =
         pairs.subspan(begin, std::min<std::size_t>(ImpactBlock::kLanes, pairs.size() - begin));
     for (int lane = 0; lane < static_cast<int>(eight.size()); ++lane)
-      test(eight[lane], [&](std::uint32_t inFirst, std::uint32_t inSecond) {
-        const auto ids = features.vertices(inFirst, inSecond);
+      test(eight[lane], [&](std::uint32_t firstId, std::uint32_t secondId) {
+        const auto ids = features.vertices(firstId, secondId);
         for (int i = 0; i < 4; ++i) {
           const TriangleMesh& mesh = features.meshOf(i);
           block.set(lane, i, mesh.before[ids[i]], mesh.now[ids[i]]);
@@ -51,22 +51,22 @@ void filterPairs(const Features<kind>& features, std::span<const FeaturePair> pa
       });
     unsigned lanes = mayImpact(kind, block, settings) & ((1u << eight.size()) - 1);
     for (; lanes != 0; lanes &= lanes - 1)
-      test(eight[std::countr_zero(lanes)], [&](std::uint32_t inFirst, std::uint32_t inSecond) {
-        f(features, inFirst, inSecond, ofSecond);
+      test(eight[std::countr_zero(lanes)], [&](std::uint32_t firstId, std::uint32_t secondId) {
+        f(features, firstId, secondId, kSwapped);
       });
   }
 }
 
-/// Calls f likewise for the feature pairs that the candidates own. ofSecond: features.first is
+/// Calls f likewise for the feature pairs that the candidates own. swapped: features.first is
 /// MeshPair::b.
 template <class F>
 void forEachLikelyPair(const MeshPair& pair, std::span<const ElementPair> candidates,
                        ContactBuffers& out, F&& f) {
   FeaturePairs& pairs = out.features;
   findFeaturePairs(pair.a.topology, pair.b.topology, pair.floats, candidates, pairs);
-  // An early exit: f refuses these pairs as well. It is not taken where validity needs the facts of
+  // An early exit: f rejects these pairs as well. It is not taken where validity needs the facts of
   // all feature pairs.
-  if (pair.near && pair.step.motion == 0.0)
+  if (pair.nearAtRest && pair.step.motion == 0.0)
     std::erase_if(pairs.edgeEdge, [&](const FeaturePair& edges) {
       return areNearAtRest(pair, pair.a.topology.edges[edges.a], pair.b.topology.edges[edges.b]);
     });
@@ -87,53 +87,56 @@ class ContactFinder {
 
   /// Returns whether the pair is a contact that passes all filters.
   template <Kind kind>
-  bool operator()(const Features<kind>& features, std::uint32_t inFirst, std::uint32_t inSecond,
-                  bool ofSecond) {
-    const ImpactQuery query = features.query(inFirst, inSecond);
-    const ImpactAnswer answer = findImpact(query, m_settings);
+  bool operator()(const Features<kind>& features, std::uint32_t firstId, std::uint32_t secondId,
+                  bool swapped) {
+    const ImpactQuery query = features.query(firstId, secondId);
+    const ImpactResult answer = findImpact(query, m_settings);
     m_out.exactDecisions += answer.exact;
-    return answer.impact && add(features, inFirst, inSecond, ofSecond, query, answer.time, true);
+    return answer.impact && add(features, firstId, secondId, swapped, query, answer.time, true);
   }
 
   /// Makes the contact of an impact and returns whether it passes all filters. store: the impact is
   /// recorded in the facts, and the contact is appended if it passes.
   template <Kind kind>
-  bool add(const Features<kind>& features, std::uint32_t inFirst, std::uint32_t inSecond,
-           bool ofSecond, const ImpactQuery& query, double time, bool store) {
+  bool add(const Features<kind>& features, std::uint32_t firstId, std::uint32_t secondId,
+           bool swapped, const ImpactQuery& query, double time, bool store) {
     const std::array<Vector3d, 4> p = positionsAt(query, time);
-    std::array<MeshFeature, 2> held;
+    std::array<MeshFeature, 2> closestFeatures;
     if (m_pair.settings.earliestTimeOnly) m_out.facts.clearance = 0.0;
-    const auto isLeftOut = [&](const auto& closest, const Vector3d& normal, bool refused) {
-      if (store) m_check.noteImpact(features, inFirst, inSecond, time, closest.distance);
-      return refused || ((m_pair.a.outer || m_pair.b.outer) &&
-                         pointsInward(m_pair, held, ofSecond ? -normal : normal, time));
+    const auto isSuppressed = [&](const auto& closest, const Vector3d& normal, bool rejected) {
+      if (store) m_check.recordImpact(features, firstId, secondId, time, closest.distance);
+      return rejected || ((m_pair.a.outerSideOnly || m_pair.b.outerSideOnly) &&
+                          pointsInward(m_pair, closestFeatures, swapped ? -normal : normal, time));
     };
     if constexpr (kind == Kind::VertexTriangle) {
       const MeshTopology& topology = features.second.topology;
       const auto closest = finiteVertexTriangleDistance(p[0], p[1], p[2], p[3]);
       m_out.exactDecisions += closest.exact;
       VertexTriangleContact contact =
-          contactOf(inFirst, inSecond, topology.triangles[inSecond], closest);
+          contactOf(firstId, secondId, topology.triangles[secondId], closest);
       complete(contact, query, time, p);
-      held[ofSecond] = {MeshFeature::Kind::Vertex, inFirst};
-      held[!ofSecond] = featureOf(topology, inSecond, closest.feature);
-      if (isLeftOut(closest, contact.normal, refusesVertex(m_pair, inFirst, inSecond, ofSecond)))
+      closestFeatures[swapped] = {MeshFeature::Kind::Vertex, firstId};
+      closestFeatures[!swapped] = featureOf(topology, secondId, closest.feature);
+      if (isSuppressed(closest, contact.normal, rejectsVertex(m_pair, firstId, secondId, swapped)))
         return false;
       if (!store) return true;
-      (ofSecond && !m_pair.self() ? m_out.triangleVertex : m_out.vertexTriangle).push_back(contact);
-      m_check.noteTriangle(inSecond, !ofSecond, p[1], p[2], p[3]);
+      (swapped && !m_pair.self() ? m_out.triangleVertex : m_out.vertexTriangle).push_back(contact);
+      m_check.recordTriangle(secondId, !swapped, p[1], p[2], p[3]);
     } else {
-      const MeshTopology &ofA = features.first.topology, &ofB = features.second.topology;
+      const MeshTopology &firstTopology = features.first.topology,
+                         &secondTopology = features.second.topology;
       const auto closest = finiteEdgeEdgeDistance(p[0], p[1], p[2], p[3]);
       m_out.exactDecisions += closest.exact;
-      EdgeEdgeContact contact = contactOf(ofA.edges[inFirst], ofB.edges[inSecond], closest);
+      EdgeEdgeContact contact =
+          contactOf(firstTopology.edges[firstId], secondTopology.edges[secondId], closest);
       complete(contact, query, time, p);
-      held = {featureOf(ofA, inFirst, closest.featureA),
-              featureOf(ofB, inSecond, closest.featureB)};
-      if (isLeftOut(closest, contact.normal, refusesEdges(m_pair, inFirst, inSecond))) return false;
+      closestFeatures = {featureOf(firstTopology, firstId, closest.featureA),
+                         featureOf(secondTopology, secondId, closest.featureB)};
+      if (isSuppressed(closest, contact.normal, rejectsEdges(m_pair, firstId, secondId)))
+        return false;
       if (!store) return true;
       m_out.edgeEdge.push_back(contact);
-      m_check.noteEdges(contact.edgeA, contact.edgeB);
+      m_check.recordEdges(contact.edgeA, contact.edgeB);
     }
     return true;
   }
@@ -161,10 +164,10 @@ class FastImpactFinder {
       : m_check(pair, out), m_find(pair, out) {}
 
   template <Kind kind>
-  void operator()(const Features<kind>& features, std::uint32_t inFirst, std::uint32_t inSecond,
-                  bool ofSecond) {
-    if (!m_check.isAnsweredAtEnd(features, inFirst, inSecond))
-      m_find(features, inFirst, inSecond, ofSecond);
+  void operator()(const Features<kind>& features, std::uint32_t firstId, std::uint32_t secondId,
+                  bool swapped) {
+    if (!m_check.proximitySuffices(features, firstId, secondId))
+      m_find(features, firstId, secondId, swapped);
   }
 
  private:
@@ -180,9 +183,9 @@ void findContinuous(const MeshPair& pair, std::span<const ElementPair> candidate
 }
 
 template <Kind kind>
-bool addImpact(const MeshPair& pair, const Features<kind>& features, std::uint32_t inFirst,
-               std::uint32_t inSecond, bool ofSecond, ContactBuffers& out) {
-  return ContactFinder(pair, out)(features, inFirst, inSecond, ofSecond);
+bool addImpact(const MeshPair& pair, const Features<kind>& features, std::uint32_t firstId,
+               std::uint32_t secondId, bool swapped, ContactBuffers& out) {
+  return ContactFinder(pair, out)(features, firstId, secondId, swapped);
 }
 template bool addImpact(const MeshPair&, const Features<Kind::VertexTriangle>&, std::uint32_t,
                         std::uint32_t, bool, ContactBuffers&);
@@ -206,14 +209,14 @@ double findEarliestImpact(const MeshPair& pair, std::span<const ElementPair> can
   // cannot report a time before `earliest`.
   const auto end = [&] { return std::min(earliest + settings.timeTolerance, 1.0); };
   ContactFinder finder(pair, counts);
-  const auto test = [&](const auto& features, std::uint32_t inFirst, std::uint32_t inSecond,
-                        bool ofSecond) {
-    const ImpactQuery query = features.query(inFirst, inSecond);
-    const ImpactAnswer answer = findImpact(query, settings, end());
+  const auto test = [&](const auto& features, std::uint32_t firstId, std::uint32_t secondId,
+                        bool swapped) {
+    const ImpactQuery query = features.query(firstId, secondId);
+    const ImpactResult answer = findImpact(query, settings, end());
     counts.exactDecisions += answer.exact;
     if (answer.impact && answer.time < earliest &&
-        (!pair.filters() ||
-         finder.add(features, inFirst, inSecond, ofSecond, query, answer.time, false)))
+        (!pair.hasFilters() ||
+         finder.add(features, firstId, secondId, swapped, query, answer.time, false)))
       earliest = answer.time;
   };
   if (earliest <= 0.0) return earliest;

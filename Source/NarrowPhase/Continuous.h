@@ -21,26 +21,26 @@ namespace palpate {
 void findContinuous(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);
 
 /// The two meshes of feature pairs of one kind: vertices of `first` with triangles of `second`, or
-/// edges of `first` with edges of `second`.
+/// edges of `first` with edges of `second`. firstId, secondId: the features' ids in these meshes.
 template <ImpactQuery::Kind kind>
 struct Features {
   const TriangleMesh& first;
   const TriangleMesh& second;
 
-  std::array<std::uint32_t, 4> vertices(std::uint32_t inFirst, std::uint32_t inSecond) const {
+  std::array<std::uint32_t, 4> vertices(std::uint32_t firstId, std::uint32_t secondId) const {
     if constexpr (kind == ImpactQuery::Kind::VertexTriangle) {
-      const auto& [a, b, c] = second.topology.triangles[inSecond];
-      return {inFirst, a, b, c};
+      const auto& [a, b, c] = second.topology.triangles[secondId];
+      return {firstId, a, b, c};
     } else {
-      const Segment &p = first.topology.edges[inFirst], &q = second.topology.edges[inSecond];
+      const Segment &p = first.topology.edges[firstId], &q = second.topology.edges[secondId];
       return {p[0], p[1], q[0], q[1]};
     }
   }
   const TriangleMesh& meshOf(int vertex) const {
     return vertex < (kind == ImpactQuery::Kind::VertexTriangle ? 1 : 2) ? first : second;
   }
-  ImpactQuery query(std::uint32_t inFirst, std::uint32_t inSecond) const {
-    const auto ids = vertices(inFirst, inSecond);
+  ImpactQuery query(std::uint32_t firstId, std::uint32_t secondId) const {
+    const auto ids = vertices(firstId, secondId);
     ImpactQuery result{kind, {}};
     for (int i = 0; i < 4; ++i)
       result.vertices[i] = {meshOf(i).before[ids[i]], meshOf(i).now[ids[i]]};
@@ -49,13 +49,13 @@ struct Features {
 };
 
 /// Tests one feature pair as Method::Continuous does and appends its contact. Returns whether there
-/// was one. ofSecond: Features::first is MeshPair::b.
+/// was one. swapped: Features::first is MeshPair::b.
 template <ImpactQuery::Kind kind>
-bool addImpact(const MeshPair&, const Features<kind>&, std::uint32_t inFirst,
-               std::uint32_t inSecond, bool ofSecond, ContactBuffers& out);
+bool addImpact(const MeshPair&, const Features<kind>&, std::uint32_t firstId,
+               std::uint32_t secondId, bool swapped, ContactBuffers& out);
 
 /// Method::Auto: appends the impacts of feature pairs for which proximity at the step's end does
-/// not suffice (StepCheck::isAnsweredAtEnd()).
+/// not suffice (StepCheck::proximitySuffices()).
 void findFastImpacts(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);
 
 /// Returns the earliest timeOfImpact that findContinuous() would report, or upTo if that is

@@ -22,9 +22,9 @@ bool overlap(const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b, double 
 namespace {
 
 /// A cache of element boxes: the candidate pairs of two leaves name the same elements many times.
-class BoxesMetLast {
+class BoxCache {
  public:
-  BoxesMetLast(const TriangleMesh& mesh, bool swept) : m_mesh(mesh), m_swept(swept) {
+  BoxCache(const TriangleMesh& mesh, bool swept) : m_mesh(mesh), m_swept(swept) {
     m_ids.fill(0xffffffffu);
   }
   const Eigen::AlignedBox3d& box(std::uint32_t triangle) {
@@ -48,7 +48,7 @@ class BoxesMetLast {
 
 void keepOverlapping(const MeshPair& meshes, bool swept, double thickness,
                      Buffer<ElementPair>& pairs) {
-  BoxesMetLast ofA(meshes.a, swept), ofB(meshes.b, swept);
+  BoxCache ofA(meshes.a, swept), ofB(meshes.b, swept);
   std::erase_if(pairs, [&](const ElementPair& pair) {
     return !overlap(ofA.box(pair.a), ofB.box(pair.b), thickness);
   });

@@ -106,11 +106,11 @@ HWY_ATTR HWY_INLINE Bounds cornerBounds(const Side& side, std::uint32_t vertex) 
   for (std::size_t k = 0; k < kVectors; ++k) {
     const V p = bounds.lower[k], q = hn::Load(d, &side.before[vertex].x + k * kLanes);
     if constexpr (sweep == Sweep::PartOfStep) {
-      const V reach = hn::Add(hn::Abs(p), hn::Abs(q));
+      const V extent = hn::Add(hn::Abs(p), hn::Abs(q));
       const V margin =
-          hn::Add(hn::Mul(reach, hn::Set(d, 0x1p-21f)), hn::Set(d, OutwardRounding::kAbsolute));
+          hn::Add(hn::Mul(extent, hn::Set(d, 0x1p-21f)), hn::Set(d, OutwardRounding::kAbsolute));
       const V moved = hn::Add(q, hn::Mul(hn::Set(d, side.upTo), hn::Sub(p, q)));
-      const auto inRange = hn::Lt(reach, hn::Set(d, kLargestFloat));
+      const auto inRange = hn::Lt(extent, hn::Set(d, kLargestFloat));
       bounds.lower[k] = hn::IfThenElse(inRange, hn::Sub(moved, margin), p);
       bounds.upper[k] = hn::IfThenElse(inRange, hn::Add(moved, margin), p);
     }
@@ -199,10 +199,10 @@ HWY_ATTR HWY_INLINE unsigned overlappingTests(const FeatureRow& a, const Feature
   for (std::size_t i = 0; i < kTestPlaces; i += kTestLanes) {
     auto mask = hn::FirstN(d, kTestLanes);
     for (int k = 0; k < 3; ++k) {
-      mask = hn::And(
-          mask, hn::Le(valuesOf<kOfA>(d, a.bounds[k], i), valuesOf<kOfB>(d, b.bounds[k], i, true)));
-      mask = hn::And(
-          mask, hn::Le(valuesOf<kOfB>(d, b.bounds[k], i), valuesOf<kOfA>(d, a.bounds[k], i, true)));
+      mask = hn::And(mask, hn::Le(valuesOf<kFeatureOfA>(d, a.bounds[k], i),
+                                  valuesOf<kFeatureOfB>(d, b.bounds[k], i, true)));
+      mask = hn::And(mask, hn::Le(valuesOf<kFeatureOfB>(d, b.bounds[k], i),
+                                  valuesOf<kFeatureOfA>(d, a.bounds[k], i, true)));
     }
     tests |= bitsOf(d, mask) << i;
   }
@@ -225,14 +225,14 @@ template <Sweep sweep>
 class RowCache {
  public:
   RowCache(const Side& a, const Side& b)
-      : m_sides{a, b}, m_other(&a.topology == &b.topology ? 0 : 0x80000000u) {
+      : m_sides{a, b}, m_secondMeshBit(&a.topology == &b.topology ? 0 : 0x80000000u) {
     std::fill(std::begin(m_keys), std::end(m_keys), kNoKey);
   }
   struct RowPair {
     const FeatureRow &a, &b;
   };
   HWY_ATTR HWY_INLINE RowPair rows(const ElementPair& pair) {
-    const std::uint32_t keyA = pair.a, keyB = pair.b ^ m_other;
+    const std::uint32_t keyA = pair.a, keyB = pair.b ^ m_secondMeshBit;
     const std::size_t placeA = place(keyA), placeB = place(keyB);
     const FeatureRow& a = row(m_sides[0], pair.a, keyA, placeA);
     return {a, row(m_sides[1], pair.b, keyB, placeB == placeA ? kSpare : placeB)};
@@ -254,13 +254,13 @@ class RowCache {
   }
 
   const Side m_sides[2];
-  const std::uint32_t m_other;
+  const std::uint32_t m_secondMeshBit;
   std::uint32_t m_keys[kSpare + 1];
   FeatureRow m_rows[kSpare + 1];
 };
 
-/// Triangle pairs with their chosen tests, which list() turns into feature pairs. Tests of corners
-/// and tests of edges are kept apart.
+/// Triangle pairs with their chosen tests, which listPairs() turns into feature pairs. Tests of
+/// corners and tests of edges are kept apart.
 struct ChosenTests {
   static constexpr std::size_t kMost = 128;
   alignas(64) std::uint32_t ids[kMost * 2 * kFeatures];  ///< of both rows
@@ -291,9 +291,9 @@ constexpr IdPlaces idPlaces(const TestFeatures& features, int offset) {
 /// Writes the feature pairs of those chosen tests of `size` triangle pairs that are in `mask`, and
 /// returns their number. ordered: the lower id first.
 template <class Tests>
-inline std::size_t list(const ChosenTests& chosen, const Tests* tests, std::size_t size,
-                        unsigned mask, const IdPlaces& firstIn, const IdPlaces& secondIn,
-                        bool ordered, FeaturePair* out) {
+inline std::size_t listPairs(const ChosenTests& chosen, const Tests* tests, std::size_t size,
+                             unsigned mask, const IdPlaces& firstIn, const IdPlaces& secondIn,
+                             bool ordered, FeaturePair* out) {
   constexpr std::size_t kPairs = 8 / sizeof(Tests);
   std::size_t count = 0;
   for (std::size_t i = 0; i < size; i += kPairs) {
@@ -311,10 +311,10 @@ inline std::size_t list(const ChosenTests& chosen, const Tests* tests, std::size
   return count;
 }
 
-constexpr IdPlaces kEdgeInA = idPlaces<std::uint16_t>(kOfA, 0),
-                   kEdgeInB = idPlaces<std::uint16_t>(kOfB, kFeatures);
-constexpr IdPlaces kCornerInA = idPlaces<std::uint8_t>(kOfA, 0),
-                   kCornerInB = idPlaces<std::uint8_t>(kOfB, kFeatures);
+constexpr IdPlaces kEdgeInA = idPlaces<std::uint16_t>(kFeatureOfA, 0),
+                   kEdgeInB = idPlaces<std::uint16_t>(kFeatureOfB, kFeatures);
+constexpr IdPlaces kCornerInA = idPlaces<std::uint8_t>(kFeatureOfA, 0),
+                   kCornerInB = idPlaces<std::uint8_t>(kFeatureOfB, kFeatures);
 /// The vertex and the triangle of a corner's test, for corners of a and of b alike.
 constexpr IdPlaces kVertexIn = idPlaces<std::uint8_t>(
                        {kCorner0, kCorner1, kCorner2, 0, kFeatures + kCorner0, kFeatures + kCorner1,
@@ -350,17 +350,17 @@ HWY_ATTR void findFeaturePairsOf(const Side& a, const Side& b, std::span<const E
     }
     std::fill(chosen.corners + size, std::end(chosen.corners), std::uint8_t{0});
     std::fill(chosen.edges + size, std::end(chosen.edges), std::uint16_t{0});
-    edgeEdge += list(chosen, chosen.edges, size, kEdgeTests, kEdgeInA, kEdgeInB, self,
-                     out.edgeEdge.data() + edgeEdge);
+    edgeEdge += listPairs(chosen, chosen.edges, size, kEdgeTests, kEdgeInA, kEdgeInB, self,
+                          out.edgeEdge.data() + edgeEdge);
     FeaturePair* const corners = out.vertexTriangle.data() + vertexTriangle;
     if (self) {
-      vertexTriangle += list(chosen, chosen.corners, size, 255, kVertexIn, kTriangleIn,
-                             a.topology.type == GeometryType::Points, corners);
+      vertexTriangle += listPairs(chosen, chosen.corners, size, 255, kVertexIn, kTriangleIn,
+                                  a.topology.type == GeometryType::Points, corners);
     } else {
-      vertexTriangle += list(chosen, chosen.corners, size, kCornerTestsOfA, kCornerInA, kCornerInB,
-                             false, corners);
-      triangleVertex += list(chosen, chosen.corners, size, kCornerTestsOfB, kCornerInA, kCornerInB,
-                             false, out.triangleVertex.data() + triangleVertex);
+      vertexTriangle += listPairs(chosen, chosen.corners, size, kCornerTestsOfA, kCornerInA,
+                                  kCornerInB, false, corners);
+      triangleVertex += listPairs(chosen, chosen.corners, size, kCornerTestsOfB, kCornerInA,
+                                  kCornerInB, false, out.triangleVertex.data() + triangleVertex);
     }
   }
   out.owned = owned;

@@ -35,11 +35,11 @@ using TestFeatures = std::array<std::uint8_t, kTestPlaces>;
 /// For each test, its feature of triangle a and its feature of triangle b.
 // clang-format off
 inline constexpr TestFeatures
-    kOfA = {kCorner0,  kCorner1,  kCorner2,  kEdge2,
+    kFeatureOfA = {kCorner0,  kCorner1,  kCorner2,  kEdge2,
             kTriangle, kTriangle, kTriangle, kEdge0,
             kEdge0,    kEdge0,    kEdge1,    kEdge1,
             kEdge1,    kEdge2Again, kEdge2Again, kEdge2Again},
-    kOfB = {kTriangle, kTriangle, kTriangle, kEdge2Again,
+    kFeatureOfB = {kTriangle, kTriangle, kTriangle, kEdge2Again,
             kCorner0,  kCorner1,  kCorner2,  kEdge2,
             kEdge0,    kEdge1,    kEdge0,    kEdge1,
             kEdge2Again, kEdge0,  kEdge1,    kEdge2Again};
@@ -51,8 +51,8 @@ constexpr int cornerTestOfB(int j) { return 4 + j; }
 inline constexpr auto kTestOfEdges = [] {
   std::array<std::array<std::uint8_t, 3>, 3> tests{};
   for (std::uint8_t test = 0; test < kTests; ++test)
-    if (isEdge(kOfA[test]) && isEdge(kOfB[test]))
-      tests[edgeNumber(kOfA[test])][edgeNumber(kOfB[test])] = test;
+    if (isEdge(kFeatureOfA[test]) && isEdge(kFeatureOfB[test]))
+      tests[edgeNumber(kFeatureOfA[test])][edgeNumber(kFeatureOfB[test])] = test;
   return tests;
 }();
 constexpr int edgeTest(int i, int j) { return kTestOfEdges[i][j]; }
@@ -80,7 +80,7 @@ constexpr auto ownedTests(const TestFeatures& features) {
       if (owns(owned, features[test])) tests[owned] |= static_cast<std::uint16_t>(1u << test);
   return tests;
 }
-inline constexpr auto kOwnedByA = ownedTests(kOfA), kOwnedByB = ownedTests(kOfB);
+inline constexpr auto kOwnedByA = ownedTests(kFeatureOfA), kOwnedByB = ownedTests(kFeatureOfB);
 
 /// Each corner of a with each corner of b, in the order of the bits of sameCorners().
 inline constexpr int kCornerPairs = 9;
@@ -94,7 +94,7 @@ inline unsigned sameCorners(const Triangle& a, const Triangle& b) {
   return same;
 }
 
-constexpr bool holdsCorner(std::uint8_t feature, std::uint8_t corner) {
+constexpr bool containsCorner(std::uint8_t feature, std::uint8_t corner) {
   if (isCorner(feature)) return feature == corner;
   return feature == kTriangle || edgeNumber(feature) == corner ||
          (edgeNumber(feature) + 1) % 3 == corner;
@@ -105,7 +105,8 @@ inline constexpr auto kSharingTests = [] {
   for (int test = 0; test < kTests; ++test) {
     unsigned sharing = 0;
     for (int pair = 0; pair < kCornerPairs; ++pair)
-      if (holdsCorner(kOfA[test], kCornerOfA[pair]) && holdsCorner(kOfB[test], kCornerOfB[pair]))
+      if (containsCorner(kFeatureOfA[test], kCornerOfA[pair]) &&
+          containsCorner(kFeatureOfB[test], kCornerOfB[pair]))
         sharing |= 1u << pair;
     for (unsigned same = 0; same < tests.size(); ++same)
       if (same & sharing) tests[same] |= static_cast<std::uint16_t>(1u << test);

@@ -29,7 +29,7 @@ class Surface {
   Surface(const TriangleMesh& mesh, double time) : m_mesh(mesh), m_time(time) {}
 
   /// Whether a direction from a feature points below the surface. At a vertex it does if it is
-  /// below the mean of the normals, weighted by the triangles' angles. At a bulging edge it does if
+  /// below the mean of the normals, weighted by the triangles' angles. At a convex edge it does if
   /// it is below all of the edge's triangles, at any other edge if it is below one of them.
   ///
   /// Source   Bærentzen and Aanæs, Signed distance computation using the angle weighted pseudonormal,
@@ -71,12 +71,12 @@ class Surface {
   bool isBelowEdge(std::uint32_t edge, const Vector3d& direction) const {
     const auto triangles = m_mesh.topology.edgeTriangles[edge];
     const auto isBelowFace = [&](std::uint32_t t) { return direction.dot(normalOf(t)) < 0.0; };
-    return bulges(edge) ? std::all_of(triangles.begin(), triangles.end(), isBelowFace)
-                        : std::any_of(triangles.begin(), triangles.end(), isBelowFace);
+    return isConvexEdge(edge) ? std::all_of(triangles.begin(), triangles.end(), isBelowFace)
+                              : std::any_of(triangles.begin(), triangles.end(), isBelowFace);
   }
   /// Whether the second of the two triangles at an edge is below the first. True if the edge does
   /// not have two triangles.
-  bool bulges(std::uint32_t edge) const {
+  bool isConvexEdge(std::uint32_t edge) const {
     const auto triangles = m_mesh.topology.edgeTriangles[edge];
     if (triangles.size() != 2) return true;
     const auto [p, q] = m_mesh.topology.edges[edge];
@@ -91,19 +91,19 @@ class Surface {
 
 }  // namespace
 
-bool refusesVertex(const MeshPair& pair, std::uint32_t vertex, std::uint32_t triangle,
-                   bool ofSecond) {
-  const TriangleMesh& mesh = ofSecond ? pair.a : pair.b;
+bool rejectsVertex(const MeshPair& pair, std::uint32_t vertex, std::uint32_t triangle,
+                   bool swapped) {
+  const TriangleMesh& mesh = swapped ? pair.a : pair.b;
   if (areNearAtRest(pair, std::array{vertex}, mesh.topology.triangles[triangle])) return true;
   if (!pair.predicate) return false;
   using Kind = ContactFeatures::Kind;
   const std::array<std::uint32_t, 2> v{vertex, vertex}, t{triangle, triangle};
-  const bool triangleFirst = ofSecond && !pair.self();
+  const bool triangleFirst = swapped && !pair.self();
   return !(*pair.predicate)(triangleFirst ? ContactFeatures{Kind::TriangleVertex, t, v}
                                           : ContactFeatures{Kind::VertexTriangle, v, t});
 }
 
-bool refusesEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB) {
+bool rejectsEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB) {
   const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
   return areNearAtRest(pair, p, q) ||
          (pair.predicate && !(*pair.predicate)({ContactFeatures::Kind::EdgeEdge, p, q}));
@@ -111,8 +111,8 @@ bool refusesEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB
 
 bool pointsInward(const MeshPair& pair, const std::array<MeshFeature, 2>& features,
                   const Vector3d& direction, double time) {
-  return (pair.a.outer && Surface(pair.a, time).isBelow(features[0], -direction)) ||
-         (pair.b.outer && Surface(pair.b, time).isBelow(features[1], direction));
+  return (pair.a.outerSideOnly && Surface(pair.a, time).isBelow(features[0], -direction)) ||
+         (pair.b.outerSideOnly && Surface(pair.b, time).isBelow(features[1], direction));
 }
 
 }  // namespace palpate

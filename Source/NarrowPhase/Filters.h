@@ -14,19 +14,19 @@ namespace palpate {
 /// PairSettings::restDistance, along the edges of the mesh at rest.
 template <class Vertices, class Others>
 bool areNearAtRest(const MeshPair& pair, const Vertices& vertices, const Others& others) {
-  if (!pair.near) return false;
+  if (!pair.nearAtRest) return false;
   for (const std::uint32_t v : vertices)
     for (const std::uint32_t w : others) {
-      const auto after = (*pair.near)[std::min(v, w)];
+      const auto after = (*pair.nearAtRest)[std::min(v, w)];
       if (v == w || std::binary_search(after.begin(), after.end(), std::max(v, w))) return true;
     }
   return false;
 }
 
-/// Whether a filter suppresses the contact of a vertex and a triangle. ofSecond: the vertex is of
+/// Whether a filter suppresses the contact of a vertex and a triangle. swapped: the vertex is of
 /// MeshPair::b.
-bool refusesVertex(const MeshPair&, std::uint32_t vertex, std::uint32_t triangle, bool ofSecond);
-bool refusesEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB);
+bool rejectsVertex(const MeshPair&, std::uint32_t vertex, std::uint32_t triangle, bool swapped);
+bool rejectsEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB);
 
 /// Whether a contact points into a mesh with Sidedness::Outer. features: those that hold the
 /// closest points. direction: from the pair's second mesh to the first, not zero. time: in [0, 1],
@@ -38,15 +38,15 @@ bool pointsInward(const MeshPair&, const std::array<MeshFeature, 2>& features,
 /// no direction, and never point inward.
 inline bool pointsInwardAtEnd(const MeshPair& pair, std::uint32_t vertex,
                               const MeshFeature& ofTriangle, const VertexTriangleDistance& measured,
-                              bool ofSecond) {
+                              bool swapped) {
   const MeshFeature ofVertex{MeshFeature::Kind::Vertex, vertex};
-  if (!(pair.a.outer || pair.b.outer) || measured.distance == 0.0) return false;
-  return ofSecond ? pointsInward(pair, {ofTriangle, ofVertex}, -measured.normal, 1.0)
-                  : pointsInward(pair, {ofVertex, ofTriangle}, measured.normal, 1.0);
+  if (!(pair.a.outerSideOnly || pair.b.outerSideOnly) || measured.distance == 0.0) return false;
+  return swapped ? pointsInward(pair, {ofTriangle, ofVertex}, -measured.normal, 1.0)
+                 : pointsInward(pair, {ofVertex, ofTriangle}, measured.normal, 1.0);
 }
 inline bool pointInwardAtEnd(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
                              const EdgeEdgeDistance& measured) {
-  if (!(pair.a.outer || pair.b.outer) || measured.distance == 0.0) return false;
+  if (!(pair.a.outerSideOnly || pair.b.outerSideOnly) || measured.distance == 0.0) return false;
   return pointsInward(pair,
                       {featureOf(pair.a.topology, edgeA, measured.featureA),
                        featureOf(pair.b.topology, edgeB, measured.featureB)},

@@ -57,30 +57,31 @@ class IntersectionContacts {
                        ContactBuffers& out)
       : m_pair(pair), m_a(a), m_b(b), m_out(out), m_check(pair, out), m_self(pair.self()) {}
 
-  void add(const TriangleIntersection& meeting) {
-    const unsigned ofA = meeting.edgesOfAThroughB, ofB = meeting.edgesOfBThroughA;
-    if (meeting.touch()) {
-      addTouching(meeting);
-    } else if (std::popcount(ofA) == 2) {
-      addCornerOfA(sharedCorner(ofA));
-    } else if (std::popcount(ofB) == 2) {
-      addCornerOfB(sharedCorner(ofB));
-    } else if (ofA != 0 && ofB != 0) {
-      addEdges(std::countr_zero(ofA), std::countr_zero(ofB));
+  void add(const TriangleIntersection& intersection) {
+    const unsigned edgesOfA = intersection.edgesOfAThroughB,
+                   edgesOfB = intersection.edgesOfBThroughA;
+    if (intersection.touch()) {
+      addTouching(intersection);
+    } else if (std::popcount(edgesOfA) == 2) {
+      addCornerOfA(sharedCorner(edgesOfA));
+    } else if (std::popcount(edgesOfB) == 2) {
+      addCornerOfB(sharedCorner(edgesOfB));
+    } else if (edgesOfA != 0 && edgesOfB != 0) {
+      addEdges(std::countr_zero(edgesOfA), std::countr_zero(edgesOfB));
     }
   }
 
  private:
   /// Touching features also touch in the triangles that own them. Only the pair of these triangles
   /// adds the contact.
-  void addTouching(const TriangleIntersection& meeting) {
-    const MeshTopology &ofA = m_a.mesh.topology, &ofB = m_b.mesh.topology;
+  void addTouching(const TriangleIntersection& intersection) {
+    const MeshTopology &topologyA = m_a.mesh.topology, &topologyB = m_b.mesh.topology;
     for (int i = 0; i < 3; ++i) {
-      if (meeting.cornersOfAOnB >> i & 1 && ofA.ownsCorner(m_a.id, i)) addCornerOfA(i);
-      if (meeting.cornersOfBOnA >> i & 1 && ofB.ownsCorner(m_b.id, i)) addCornerOfB(i);
+      if (intersection.cornersOfAOnB >> i & 1 && topologyA.ownsCorner(m_a.id, i)) addCornerOfA(i);
+      if (intersection.cornersOfBOnA >> i & 1 && topologyB.ownsCorner(m_b.id, i)) addCornerOfB(i);
       for (int j = 0; j < 3; ++j) {
-        if (meeting.touchingEdges & TriangleIntersection::edgesBit(i, j) &&
-            ofA.ownsEdge(m_a.id, i) && ofB.ownsEdge(m_b.id, j))
+        if (intersection.touchingEdges & TriangleIntersection::edgesBit(i, j) &&
+            topologyA.ownsEdge(m_a.id, i) && topologyB.ownsEdge(m_b.id, j))
           addEdges(i, j);
       }
     }
@@ -92,12 +93,12 @@ class IntersectionContacts {
 
   void addCorner(const MeshTriangle& of, int corner, const MeshTriangle& triangle,
                  Buffer<VertexTriangleContact>& contacts) {
-    if (refusesVertex(m_pair, of.vertices[corner], triangle.id, &of == &m_b)) return;
+    if (rejectsVertex(m_pair, of.vertices[corner], triangle.id, &of == &m_b)) return;
     const auto& [a, b, c] = triangle.positions;
     VertexTriangleDistance answer = finiteVertexTriangleDistance(of.positions[corner], a, b, c);
     m_out.exactDecisions += answer.exact;
     if (answer.distance > 0.0) turnToOutside(of.positions[corner], triangle.positions, answer);
-    m_check.noteTriangle(triangle.id, &triangle == &m_b, a, b, c);
+    m_check.recordTriangle(triangle.id, &triangle == &m_b, a, b, c);
     contacts.push_back(contactOf(of.vertices[corner], triangle.id, triangle.vertices, answer));
   }
 
@@ -120,13 +121,13 @@ class IntersectionContacts {
   void addEdges(int i, int j) {
     std::uint32_t edgeA = m_a.edge(i), edgeB = m_b.edge(j);
     if (m_self && edgeB < edgeA) std::swap(edgeA, edgeB);
-    if (refusesEdges(m_pair, edgeA, edgeB)) return;
+    if (rejectsEdges(m_pair, edgeA, edgeB)) return;
     const Segment &p = m_a.mesh.topology.edges[edgeA], &q = m_b.mesh.topology.edges[edgeB];
     const auto &positionsA = m_a.mesh.now, &positionsB = m_b.mesh.now;
     const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(positionsA[p[0]], positionsA[p[1]],
                                                            positionsB[q[0]], positionsB[q[1]]);
     m_out.exactDecisions += answer.exact;
-    m_check.noteEdges(p, q);
+    m_check.recordEdges(p, q);
     m_out.edgeEdge.push_back(contactOf(p, q, answer));
   }
 
@@ -137,8 +138,8 @@ class IntersectionContacts {
   bool m_self;
 };
 
-TriangleIntersection meetingOf(const MeshPair& pair, const MeshTriangle& a, const MeshTriangle& b,
-                               SignCounts& counts) {
+TriangleIntersection intersectionOf(const MeshPair& pair, const MeshTriangle& a,
+                                    const MeshTriangle& b, SignCounts& counts) {
   if (pair.self() && a.id == b.id) return {};
   return intersectTriangles(a.positions, b.positions, counts,
                             pair.self() ? featuresInCommon(a, b) : ExcludedFeatures());
@@ -148,7 +149,7 @@ TriangleIntersection meetingOf(const MeshPair& pair, const MeshTriangle& a, cons
 void findOne(const MeshPair& pair, const ElementPair& candidate, TriangleIntersection known,
              SignCounts& counts, ContactBuffers& out) {
   const MeshTriangle a(pair.a, candidate.a, pair.a.now), b(pair.b, candidate.b, pair.b.now);
-  if (!known.intersect()) known = meetingOf(pair, a, b, counts);
+  if (!known.intersect()) known = intersectionOf(pair, a, b, counts);
   if (!known.intersect()) return;
   if (areNearAtRest(pair, a.vertices, b.vertices)) {
     out.facts.clearance = 0.0;
@@ -173,7 +174,7 @@ void findIntersections(const MeshPair& pair, std::span<const ElementPair> candid
   SignCounts counts;
   keepPossible(pair, false, candidates, out.possible);
   for (const PossibleIntersection& possible : out.possible)
-    findOne(pair, possible.triangles, possible.meeting, counts, out);
+    findOne(pair, possible.triangles, possible.intersection, counts, out);
   out.exactDecisions += counts.undecided;
 }
 
@@ -184,7 +185,7 @@ bool intersect(const MeshPair& pair, bool atStart, const ElementPair& candidate,
     return MeshTriangle(mesh, triangle, atStart ? mesh.before : mesh.now);
   };
   const bool found =
-      meetingOf(pair, of(pair.a, candidate.a), of(pair.b, candidate.b), signs).intersect();
+      intersectionOf(pair, of(pair.a, candidate.a), of(pair.b, candidate.b), signs).intersect();
   counts.exactDecisions += signs.undecided;
   return found;
 }

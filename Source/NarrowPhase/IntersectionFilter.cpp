@@ -123,7 +123,7 @@ struct CornerSides {
   }
   /// Whether all corners that are not excluded are strictly on one side of the plane. False if all
   /// are excluded.
-  HWY_INLINE M aside(const M (&excluded)[3]) const {
+  HWY_INLINE M isOnOneSide(const M (&excluded)[3]) const {
     M above = hn::FirstN(D(), kSize), below = above;
     for (int i = 0; i < 3; ++i) {
       above = hn::And(above, hn::Or(excluded[i], corner[i].above));
@@ -138,16 +138,16 @@ struct CornerSides {
 
 /// The corners of a triangle that crosses a plane, beginning with the corner that is alone on its
 /// side.
-struct FromLonely {
+struct FromIsolatedCorner {
   M isLast, isMiddle;
-  Vector3<V> lonely, ends[2];  ///< the corners after it, in their order
+  Vector3<V> isolated, ends[2];  ///< the corners after it, in their order
 
-  HWY_INLINE FromLonely(const Lanes& triangle, const CornerSides& sides) {
+  HWY_INLINE FromIsolatedCorner(const Lanes& triangle, const CornerSides& sides) {
     const auto& [c0, c1, c2] = triangle.corner;
     const auto* const s = sides.corner;
     isLast = hn::Not(hn::Xor(s[0].above, s[1].above));
     isMiddle = hn::AndNot(isLast, hn::Not(hn::Xor(s[0].above, s[2].above)));
-    lonely = choose(c2, c1, c0);
+    isolated = choose(c2, c1, c0);
     ends[0] = choose(c0, c2, c1);
     ends[1] = choose(c1, c0, c2);
   }
@@ -163,13 +163,13 @@ struct FromLonely {
 
 /// The SIMD form of intersectCrossing() in Math/TriangleIntersection. Results are one bit per lane.
 struct Crossings {
-  struct OfOne {
+  struct OneTriangle {
     std::uint32_t isLast, isMiddle, through[2];
 
     std::uint8_t edges(std::size_t lane) const {
-      const int lonely = isLast >> lane & 1 ? 2 : static_cast<int>(isMiddle >> lane & 1);
-      const unsigned found = (through[0] >> lane & 1) << lonely |
-                             (through[1] >> lane & 1) << (lonely == 0 ? 2 : lonely - 1);
+      const int isolated = isLast >> lane & 1 ? 2 : static_cast<int>(isMiddle >> lane & 1);
+      const unsigned found = (through[0] >> lane & 1) << isolated |
+                             (through[1] >> lane & 1) << (isolated == 0 ? 2 : isolated - 1);
       return static_cast<std::uint8_t>(found);
     }
   } a, b;
@@ -178,11 +178,11 @@ struct Crossings {
   HWY_INLINE Crossings(const Lanes& ofA, const CornerSides& sidesOfA, const Lanes& ofB,
                        const CornerSides& sidesOfB) {
     const D d;
-    const FromLonely fromA(ofA, sidesOfA), fromB(ofB, sidesOfB);
-    const Vector3<V> towards[2] = {fromB.ends[0] - fromA.lonely, fromB.ends[1] - fromA.lonely};
+    const FromIsolatedCorner fromA(ofA, sidesOfA), fromB(ofB, sidesOfB);
+    const Vector3<V> towards[2] = {fromB.ends[0] - fromA.isolated, fromB.ends[1] - fromA.isolated};
     M certain = hn::And(sidesOfA.certain(), sidesOfB.certain()), above[2][2];
     for (int i = 0; i < 2; ++i) {
-      const Normal normal(fromA.lonely, fromA.ends[i], fromB.lonely);
+      const Normal normal(fromA.isolated, fromA.ends[i], fromB.isolated);
       for (int j = 0; j < 2; ++j) {
         const Sides sides = normal.sidesOf(towards[j]);
         certain = hn::And(certain, sides.certain());
@@ -198,7 +198,7 @@ struct Crossings {
     }
   }
   bool isKnown(std::size_t lane) const { return known >> lane & 1; }
-  TriangleIntersection meeting(std::size_t lane) const {
+  TriangleIntersection intersection(std::size_t lane) const {
     TriangleIntersection found;
     found.edgesOfAThroughB = a.edges(lane);
     found.edgesOfBThroughA = b.edges(lane);
@@ -213,14 +213,15 @@ HWY_INLINE void keepLanes(const Lanes& ofA, const Lanes& ofB, const ElementPair*
   M apart = boxesApart(ofA, ofB);
   if (hn::AllTrue(d, apart)) return;
   const CornerSides sidesOfA(ofA, ofB), sidesOfB(ofB, ofA);
-  apart = hn::Or(apart, hn::Or(sidesOfA.aside(ofA.excluded), sidesOfB.aside(ofB.excluded)));
+  apart =
+      hn::Or(apart, hn::Or(sidesOfA.isOnOneSide(ofA.excluded), sidesOfB.isOnOneSide(ofB.excluded)));
   if (hn::AllTrue(d, apart)) return;
   const std::uint32_t isApart = bitsOf(d, apart);
   const Crossings crossings(ofA, sidesOfA, ofB, sidesOfB);
   for (std::size_t lane = 0; lane < size; ++lane) {
     if (isApart >> lane & 1) continue;
     *out = {pairs[lane],
-            crossings.isKnown(lane) ? crossings.meeting(lane) : TriangleIntersection()};
+            crossings.isKnown(lane) ? crossings.intersection(lane) : TriangleIntersection()};
     out += out->isKnown() || !crossings.isKnown(lane);
   }
 }
@@ -232,11 +233,11 @@ HWY_ATTR void keepPossiblyIntersectingKernel(const PlacedTriangles& a, const Pla
   out.resize(pairs.size());
   PossibleIntersection* end = out.data();
   Batch batch;
-  ElementPair some[kSize];
+  ElementPair batchPairs[kSize];
   for (std::size_t begin = 0; begin < pairs.size(); begin += kSize) {
     const std::size_t size = std::min(kSize, pairs.size() - begin);
     for (std::size_t lane = 0; lane < size; ++lane) {
-      ElementPair& pair = some[lane] = pairs[begin + lane];
+      ElementPair& pair = batchPairs[lane] = pairs[begin + lane];
       if (self && pair.b < pair.a) std::swap(pair.a, pair.b);
       batch.set(lane, 0, a, pair.a, self);
       batch.set(lane, 1, b, pair.b, self);
@@ -245,7 +246,7 @@ HWY_ATTR void keepPossiblyIntersectingKernel(const PlacedTriangles& a, const Pla
       Lanes ofA, ofB;
       ofA.set(batch, first, 0, self);
       ofB.set(batch, first, 1, self);
-      keepLanes(ofA, ofB, some + first, std::min(hn::Lanes(d), size - first), end);
+      keepLanes(ofA, ofB, batchPairs + first, std::min(hn::Lanes(d), size - first), end);
     }
   }
   out.resize(static_cast<std::size_t>(end - out.data()));

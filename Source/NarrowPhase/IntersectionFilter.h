@@ -18,8 +18,8 @@ struct PlacedTriangles {
 
 struct PossibleIntersection {
   ElementPair triangles;
-  TriangleIntersection meeting;  ///< if known: which edges cross; no features touch
-  bool isKnown() const { return meeting.intersect(); }
+  TriangleIntersection intersection;  ///< if known: which edges cross; no features touch
+  bool isKnown() const { return intersection.intersect(); }
 };
 
 /// Keeps the pairs that may intersect, in their order; all other pairs are proven not to. Where

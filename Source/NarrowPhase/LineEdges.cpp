@@ -27,34 +27,34 @@ bool allEdgesAt(const MeshTopology& topology, const MeshFeature& feature, F&& f)
 /// The condition for Contacts::Distinct that testLineEdges() describes.
 bool isDistinct(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
                 const std::array<MeshFeature, 2>& features, ContactBuffers& out) {
-  if (!isForEdges(pair, features)) return false;
+  if (!areReportedByEdges(pair, features)) return false;
   return allEdgesAt(pair.a.topology, features[0], [&](std::uint32_t a) {
     return allEdgesAt(pair.b.topology, features[1], [&](std::uint32_t b) {
       if (a == edgeA && b == edgeB) return true;
-      const bool turned = pair.self() && b < a;
-      const std::uint32_t first = turned ? b : a, second = turned ? a : b;
-      const std::optional<EdgesNearby> other = measureEdges(pair, first, second);
+      const bool swapped = pair.self() && b < a;
+      const std::uint32_t first = swapped ? b : a, second = swapped ? a : b;
+      const std::optional<NearbyEdges> other = measureEdges(pair, first, second);
       if (!other) return true;
       out.exactDecisions += other->centres.exact;
-      auto theirs = other->features;
-      if (turned) std::swap(theirs[0], theirs[1]);
-      return theirs == features && std::pair(edgeA, edgeB) < std::pair(first, second);
+      auto otherFeatures = other->features;
+      if (swapped) std::swap(otherFeatures[0], otherFeatures[1]);
+      return otherFeatures == features && std::pair(edgeA, edgeB) < std::pair(first, second);
     });
   });
 }
 
 }  // namespace
 
-std::optional<EdgesNearby> measureEdges(const MeshPair& pair, std::uint32_t edgeA,
+std::optional<NearbyEdges> measureEdges(const MeshPair& pair, std::uint32_t edgeA,
                                         std::uint32_t edgeB) {
   const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
-  if (pair.leavesOut(edgeA, edgeB) || areNearAtRest(pair, p, q)) return {};
+  if (pair.excludesEdges(edgeA, edgeB) || areNearAtRest(pair, p, q)) return {};
   const EdgeEdgeDistance centres = finiteEdgeEdgeDistance(pair.a.now[p[0]], pair.a.now[p[1]],
                                                           pair.b.now[q[0]], pair.b.now[q[1]]);
   const double radii = pair.a.radius(p, centres.weightA) + pair.b.radius(q, centres.weightB);
   const double distance = centres.distance - radii;
-  if (!(distance <= pair.settings.thickness) || refusesEdges(pair, edgeA, edgeB)) return {};
-  return EdgesNearby{centres,
+  if (!(distance <= pair.settings.thickness) || rejectsEdges(pair, edgeA, edgeB)) return {};
+  return NearbyEdges{centres,
                      distance,
                      {featureOf(pair.a.topology, edgeA, centres.featureA),
                       featureOf(pair.b.topology, edgeB, centres.featureB)}};
@@ -62,7 +62,7 @@ std::optional<EdgesNearby> measureEdges(const MeshPair& pair, std::uint32_t edge
 
 void testLineEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
                    ContactBuffers& out) {
-  const std::optional<EdgesNearby> nearby = measureEdges(pair, edgeA, edgeB);
+  const std::optional<NearbyEdges> nearby = measureEdges(pair, edgeA, edgeB);
   if (!nearby) return;
   out.exactDecisions += nearby->centres.exact;
   if (pair.settings.contacts == Contacts::Distinct &&

@@ -13,7 +13,7 @@ namespace palpate {
 
 /// Two edges, at least one of a line mesh, whose distance less their radii is at most the
 /// thickness.
-struct EdgesNearby {
+struct NearbyEdges {
   EdgeEdgeDistance centres;
   double distance;                      ///< L, less the radii
   std::array<MeshFeature, 2> features;  ///< vertices or edges that hold the closest points
@@ -21,7 +21,7 @@ struct EdgesNearby {
 
 /// Returns nothing if the edges are excluded, filtered or too far apart. Self-collision: pass the
 /// lower edge first.
-std::optional<EdgesNearby> measureEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB);
+std::optional<NearbyEdges> measureEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB);
 
 /// Appends the contact of two edges by Method::Proximity, where at least one edge is of a line
 /// mesh.
@@ -38,7 +38,7 @@ void testLineEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB, Co
 
 /// Whether edge pairs report contacts between these features, of the pair's first and second mesh.
 /// They do not report a vertex against a triangle mesh.
-inline bool isForEdges(const MeshPair& pair, const std::array<MeshFeature, 2>& features) {
+inline bool areReportedByEdges(const MeshPair& pair, const std::array<MeshFeature, 2>& features) {
   constexpr auto kVertex = MeshFeature::Kind::Vertex;
   return !(pair.b.topology.hasFaces() && features[0].kind == kVertex) &&
          !(pair.a.topology.hasFaces() && features[1].kind == kVertex);

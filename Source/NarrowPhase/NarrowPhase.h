@@ -26,12 +26,13 @@ struct StepPlan {
   double motion = 0.0;
   /// L: `motion` plus rounding errors. Features further apart at the step's end did not touch in
   /// the step.
-  double certain = std::numeric_limits<double>::infinity();
-  double slow = 0.0;   ///< L: Auto's Proximity misses no feature pair that moves at most this far
-  double extra = 0.0;  ///< L: added to the thickness for proximity at the step's end
+  double motionWithRounding = std::numeric_limits<double>::infinity();
+  /// L: Auto's Proximity has no false negative among feature pairs that move at most this far.
+  double slowMotion = 0.0;
+  double extraThickness = 0.0;  ///< L: added to the thickness for proximity at the step's end
   /// Auto: feature pairs that may have touched in the step are reported by their impact.
-  bool impacts = false;
-  bool start = false;  ///< whether the initial intersection check runs
+  bool reportsImpacts = false;
+  bool checksStart = false;  ///< whether the initial intersection check runs
 };
 
 /// One pair of meshes in one frame.
@@ -42,23 +43,26 @@ struct MeshPair {
   /// For discarding feature pairs by their boxes. Null: the results are the same, but take longer.
   const FloatPair* floats = nullptr;
   StepPlan step{};
-  const IndexLists* near = nullptr;  ///< per vertex: later ones within restDistance at rest
+  const IndexLists* nearAtRest = nullptr;  ///< per vertex: later ones within restDistance at rest
   const ContactPredicate* predicate = nullptr;
   /// The shape of an analytical geometry, whose mesh has no elements. Null for all others.
   const PlacedShape *shapeOfA = nullptr, *shapeOfB = nullptr;
-  double thicknessAtEnd() const { return settings.thickness + step.extra; }
+  double thicknessAtEnd() const { return settings.thickness + step.extraThickness; }
   /// L: features whose distance without radii is larger than this are no contacts.
-  double reach() const { return thicknessAtEnd() + (a.largestRadius + b.largestRadius); }
+  double maxFeatureDistance() const {
+    return thicknessAtEnd() + (a.largestRadius + b.largestRadius);
+  }
   bool self() const { return &a == &b; }
-  /// L: the radius of a vertex plus that of the other element at its closest point.
+  /// L: the radius of a vertex plus that of the other element at its closest point. swapped: the
+  /// vertex is of b.
   double radii(std::uint32_t vertex, const Triangle& corners, const Eigen::Vector3d& barycentric,
-               bool ofSecond) const {
-    const TriangleMesh &vertices = ofSecond ? b : a, &others = ofSecond ? a : b;
+               bool swapped) const {
+    const TriangleMesh &vertices = swapped ? b : a, &others = swapped ? a : b;
     return vertices.radius(vertex) + others.radius(corners, barycentric);
   }
-  bool filters() const { return near || predicate || a.outer || b.outer; }
+  bool hasFilters() const { return nearAtRest || predicate || a.outerSideOnly || b.outerSideOnly; }
   bool hasShape() const { return shapeOfA || shapeOfB; }
-  bool isOfShapes() const { return shapeOfA && shapeOfB; }
+  bool isShapePair() const { return shapeOfA && shapeOfB; }
   /// For a pair with a shape: the mesh of the other geometry, and the shape.
   const TriangleMesh& mesh() const { return shapeOfA ? b : a; }
   const PlacedShape& shape() const { return *(shapeOfA ? shapeOfA : shapeOfB); }
@@ -67,14 +71,14 @@ struct MeshPair {
   }
   /// Self-collision excludes a vertex with the triangles around it. Of two points, the lower one is
   /// tested as the vertex.
-  bool leavesOutVertex(std::uint32_t vertex, std::uint32_t triangle) const {
+  bool excludesVertex(std::uint32_t vertex, std::uint32_t triangle) const {
     if (!self()) return false;
     const auto& [i, j, k] = a.topology.triangles[triangle];
     return vertex == i || vertex == j || vertex == k ||
            (a.topology.type == GeometryType::Points && triangle < vertex);
   }
   /// Self-collision excludes edges with a common vertex.
-  bool leavesOut(std::uint32_t edgeA, std::uint32_t edgeB) const {
+  bool excludesEdges(std::uint32_t edgeA, std::uint32_t edgeB) const {
     return self() && shareVertex(a.topology.edges[edgeA], a.topology.edges[edgeB]);
   }
 };

@@ -26,10 +26,10 @@ class VertexTriangleFinder {
   /// lower than the corner's vertex, or none.
   enum class Corners { All, LowerVertexOnly, None };
 
-  VertexTriangleFinder(const MeshPair& pair, bool ofSecond, Corners corners, ContactBuffers& out)
+  VertexTriangleFinder(const MeshPair& pair, bool swapped, Corners corners, ContactBuffers& out)
       : m_pair(pair),
-        m_features{ofSecond ? pair.b : pair.a, ofSecond ? pair.a : pair.b},
-        m_ofSecond(ofSecond),
+        m_features{swapped ? pair.b : pair.a, swapped ? pair.a : pair.b},
+        m_swapped(swapped),
         m_vertices(m_features.first.now),
         m_positions(m_features.second.now),
         m_topology(m_features.second.topology),
@@ -39,7 +39,7 @@ class VertexTriangleFinder {
         m_corners(corners),
         m_check(pair, out),
         m_buffers(out),
-        m_out(ofSecond && !pair.self() ? out.triangleVertex : out.vertexTriangle),
+        m_out(swapped && !pair.self() ? out.triangleVertex : out.vertexTriangle),
         m_exactDecisions(out.exactDecisions) {}
 
   void test(std::uint32_t vertex, std::uint32_t triangle) {
@@ -48,21 +48,21 @@ class VertexTriangleFinder {
     const VertexTriangleDistance answer = finiteVertexTriangleDistance(
         p, m_positions[corners[0]], m_positions[corners[1]], m_positions[corners[2]]);
     m_exactDecisions += answer.exact;
-    const double radii = m_pair.radii(vertex, corners, answer.barycentric, m_ofSecond);
+    const double radii = m_pair.radii(vertex, corners, answer.barycentric, m_swapped);
     if (!(answer.distance - radii <= m_thickness)) return;
-    m_check.noteDistance(answer.distance);
-    if (m_check.addImpactIfTouched(m_features, vertex, triangle, m_ofSecond, answer.distance))
+    m_check.recordDistance(answer.distance);
+    if (m_check.addImpactIfTouched(m_features, vertex, triangle, m_swapped, answer.distance))
       return;
-    if (refusesVertex(m_pair, vertex, triangle, m_ofSecond)) return;
+    if (rejectsVertex(m_pair, vertex, triangle, m_swapped)) return;
     const MeshFeature feature = featureOf(m_topology, triangle, answer.feature);
     if (m_distinct && !isDistinct(vertex, triangle, feature)) return;
-    if (pointsInwardAtEnd(m_pair, vertex, feature, answer, m_ofSecond)) {
-      if (m_pair.step.impacts)
-        addImpact(m_pair, m_features, vertex, triangle, m_ofSecond, m_buffers);
+    if (pointsInwardAtEnd(m_pair, vertex, feature, answer, m_swapped)) {
+      if (m_pair.step.reportsImpacts)
+        addImpact(m_pair, m_features, vertex, triangle, m_swapped, m_buffers);
       return;
     }
-    m_check.noteTriangle(triangle, !m_ofSecond, m_positions[corners[0]], m_positions[corners[1]],
-                         m_positions[corners[2]]);
+    m_check.recordTriangle(triangle, !m_swapped, m_positions[corners[0]], m_positions[corners[1]],
+                           m_positions[corners[2]]);
     m_out.push_back(contactOf(vertex, triangle, corners, answer));
     m_out.back().distance -= radii;
   }
@@ -75,18 +75,20 @@ class VertexTriangleFinder {
     const bool isVertex = feature.kind == MeshFeature::Kind::Vertex;
     if (isVertex && m_corners == Corners::None) return false;
     if (isVertex && m_corners == Corners::LowerVertexOnly && feature.id < vertex) return false;
-    const auto holders =
+    const auto incidentTriangles =
         isVertex ? m_topology.vertexTriangles[feature.id] : m_topology.edgeTriangles[feature.id];
     const Vector3d p = m_vertices[vertex];
-    return std::none_of(holders.begin(), holders.end(), [&](std::uint32_t other) {
-      if (other == triangle || (m_self && holdsVertex(m_topology.triangles[other], vertex)) ||
-          refusesVertex(m_pair, vertex, other, m_ofSecond))
-        return false;
-      const bool isNearer = isVertex ? isNearerThanVertex(p, feature.id, other)
-                                     : isNearerThanEdge(p, feature.id, other);
-      return (isNearer || (other < triangle && closestFeatureOf(p, other) == feature)) &&
-             isNearEnough(vertex, other);
-    });
+    return std::none_of(
+        incidentTriangles.begin(), incidentTriangles.end(), [&](std::uint32_t other) {
+          if (other == triangle ||
+              (m_self && containsVertex(m_topology.triangles[other], vertex)) ||
+              rejectsVertex(m_pair, vertex, other, m_swapped))
+            return false;
+          const bool isNearer = isVertex ? isNearerThanVertex(p, feature.id, other)
+                                         : isNearerThanEdge(p, feature.id, other);
+          return (isNearer || (other < triangle && closestFeatureOf(p, other) == feature)) &&
+                 isNearEnough(vertex, other);
+        });
   }
 
   /// Whether a vertex and a triangle are within the thickness. The triangle is at least as near as
@@ -97,7 +99,7 @@ class VertexTriangleFinder {
     const VertexTriangleDistance measured =
         finiteVertexTriangleDistance(m_vertices[vertex], m_positions[corners[0]],
                                      m_positions[corners[1]], m_positions[corners[2]]);
-    return measured.distance - m_pair.radii(vertex, corners, measured.barycentric, m_ofSecond) <=
+    return measured.distance - m_pair.radii(vertex, corners, measured.barycentric, m_swapped) <=
            m_thickness;
   }
 
@@ -127,7 +129,7 @@ class VertexTriangleFinder {
 
   const MeshPair& m_pair;
   const Features<ImpactQuery::Kind::VertexTriangle> m_features;
-  const bool m_ofSecond;
+  const bool m_swapped;
   const Positions &m_vertices, &m_positions;
   const MeshTopology& m_topology;
   bool m_self;
@@ -170,20 +172,21 @@ void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, S
   std::optional<EdgeEdgeDistance> answer;
   if (distinct) answer = crossingEdgesDistance(at(0), at(1), at(2), at(3));
   const bool isContact = answer || !distinct;
-  if (!isContact && check.edgeReach() == 0.0) return;
-  if (!isContact && areFurtherApart(at(0), at(1), at(2), at(3), check.edgeReach())) return;
+  if (!isContact && check.checkedEdgeDistance() == 0.0) return;
+  if (!isContact && areFurtherApart(at(0), at(1), at(2), at(3), check.checkedEdgeDistance()))
+    return;
   if (!answer) answer = finiteEdgeEdgeDistance(at(0), at(1), at(2), at(3));
   out.exactDecisions += answer->exact;
   if (!(answer->distance <= pair.thicknessAtEnd())) return;
-  check.noteDistance(answer->distance);
+  check.recordDistance(answer->distance);
   if (check.addImpactIfTouched(features, edgeA, edgeB, false, answer->distance)) return;
-  if (!isContact || refusesEdges(pair, edgeA, edgeB)) return;
+  if (!isContact || rejectsEdges(pair, edgeA, edgeB)) return;
   if (pointInwardAtEnd(pair, edgeA, edgeB, *answer)) {
-    if (pair.step.impacts) addImpact(pair, features, edgeA, edgeB, false, out);
+    if (pair.step.reportsImpacts) addImpact(pair, features, edgeA, edgeB, false, out);
     return;
   }
   const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
-  check.noteEdges(p, q);
+  check.recordEdges(p, q);
   out.edgeEdge.push_back(contactOf(p, q, *answer));
 }
 
@@ -203,12 +206,12 @@ class ProximityFinder {
       : m_pair(pair),
         m_out(out),
         m_check(pair, out),
-        m_ofA(pair, false, pair.self() ? Corners::LowerVertexOnly : Corners::All, out),
-        m_ofB(pair, true,
-              pair.self()                  ? Corners::LowerVertexOnly
-              : pair.b.topology.hasFaces() ? Corners::None
-                                           : Corners::All,
-              out),
+        m_verticesOfA(pair, false, pair.self() ? Corners::LowerVertexOnly : Corners::All, out),
+        m_verticesOfB(pair, true,
+                      pair.self()                  ? Corners::LowerVertexOnly
+                      : pair.b.topology.hasFaces() ? Corners::None
+                                                   : Corners::All,
+                      out),
         m_allowed(allowedTests(pair.a.topology, pair.b.topology)),
         m_distinct(pair.settings.contacts == Contacts::Distinct && !pair.hasLines()) {}
 
@@ -242,7 +245,8 @@ class ProximityFinder {
   void flush() {
     if (m_size == 0) return;
     std::uint32_t possible[TrianglePairBatch::kSize];
-    findPossibleProximity(m_batch, m_pair.reach(), m_distinct, m_check.edgeReach(), possible);
+    findPossibleProximity(m_batch, m_pair.maxFeatureDistance(), m_distinct,
+                          m_check.checkedEdgeDistance(), possible);
     for (int i = 0; i < m_size; ++i) {
       m_out.featurePairs += countOf(m_tests[i]);
       for (std::uint32_t left = m_tests[i] & possible[i]; left != 0; left &= left - 1)
@@ -253,9 +257,9 @@ class ProximityFinder {
 
   void measure(const ElementPair& candidate, int test) {
     const MeshTopology &a = m_pair.a.topology, &b = m_pair.b.topology;
-    const std::uint8_t ofA = kOfA[test], ofB = kOfB[test];
-    if (ofB == kTriangle) return m_ofA.test(a.triangles[candidate.a][ofA], candidate.b);
-    if (ofA == kTriangle) return m_ofB.test(b.triangles[candidate.b][ofB], candidate.a);
+    const std::uint8_t ofA = kFeatureOfA[test], ofB = kFeatureOfB[test];
+    if (ofB == kTriangle) return m_verticesOfA.test(a.triangles[candidate.a][ofA], candidate.b);
+    if (ofA == kTriangle) return m_verticesOfB.test(b.triangles[candidate.b][ofB], candidate.a);
     std::uint32_t edgeA = a.triangleEdges[candidate.a][edgeNumber(ofA)];
     std::uint32_t edgeB = b.triangleEdges[candidate.b][edgeNumber(ofB)];
     if (m_pair.self() && edgeB < edgeA) std::swap(edgeA, edgeB);
@@ -266,7 +270,7 @@ class ProximityFinder {
   const MeshPair& m_pair;
   ContactBuffers& m_out;
   StepCheck m_check;
-  VertexTriangleFinder m_ofA, m_ofB;
+  VertexTriangleFinder m_verticesOfA, m_verticesOfB;
   const std::uint32_t m_allowed;  ///< tests that apply to the meshes' geometry types
   const bool m_distinct;          ///< edges whose closest points are ends are no contacts
   int m_size = 0;

@@ -37,7 +37,7 @@ inline MeshFeature featureOf(const MeshTopology& topology, std::uint32_t edge,
   return {MeshFeature::Kind::Vertex, topology.edges[edge][feature == EdgeFeature::End]};
 }
 
-inline bool holdsVertex(const Triangle& triangle, std::uint32_t vertex) {
+inline bool containsVertex(const Triangle& triangle, std::uint32_t vertex) {
   return triangle[0] == vertex || triangle[1] == vertex || triangle[2] == vertex;
 }
 

@@ -36,11 +36,11 @@ constexpr int kFirstRow = Batch::rowOfA(1, 0);  // the first row after those of 
 /// A batch in floats: coordinates relative to a0, scaled to below 2.
 struct ScaledBatch {
   alignas(64) float coordinates[kRows][kSize];  // those of a0, the origin, stay unused
-  alignas(64) float thickness[kSize], edgeReach[kSize];
+  alignas(64) float thickness[kSize], checkedEdgeDistance[kSize];
 };
 
-HWY_ATTR void scaleBatch(const TrianglePairBatch& batch, double thickness, double edgeReach,
-                         ScaledBatch& scaled) {
+HWY_ATTR void scaleBatch(const TrianglePairBatch& batch, double thickness,
+                         double checkedEdgeDistance, ScaledBatch& scaled) {
   const hn::CappedTag<double, kSize> d;
   const hn::RebindToUnsigned<decltype(d)> du;
   const hn::Rebind<float, decltype(d)> df;
@@ -61,7 +61,7 @@ HWY_ATTR void scaleBatch(const TrianglePairBatch& batch, double thickness, doubl
       hn::Store(hn::DemoteTo(df, scaledLength) * hn::Set(df, 1.0f + 0x1p-20f), df, out + i);
     };
     store(thickness, scaled.thickness);
-    store(edgeReach, scaled.edgeReach);
+    store(checkedEdgeDistance, scaled.checkedEdgeDistance);
     for (int row = kFirstRow; row < kRows; ++row)
       hn::Store(hn::DemoteTo(df, relative[row] * scale), df, scaled.coordinates[row] + i);
   }
@@ -103,25 +103,25 @@ HWY_INLINE V withTest(V tests, int test, M isOut) {
   return hn::Or(tests, hn::IfThenZeroElse(hn::RebindMask(du, isOut), hn::Set(du, 1u << test)));
 }
 
-template <bool kTurned, class V>
+template <bool kOpposite, class V>
 HWY_INLINE V along(const Vector3<V>& a, const Vector3<V>& b) {
-  return kTurned ? hn::Neg(dot(a, b)) : dot(a, b);
+  return kOpposite ? hn::Neg(dot(a, b)) : dot(a, b);
 }
 
-/// Whether a vertex is out of reach of a triangle. from0 to from2: the vectors from the triangle's
-/// corners to the vertex; kTurned: the opposite vectors.
-template <bool kTurned, class V>
-HWY_INLINE auto isOutOfReach(const TriangleFrame<V>& triangle, const Vector3<V>& from0,
-                             const Vector3<V>& from1, const Vector3<V>& from2) {
+/// Whether a vertex is too far from a triangle. from0 to from2: the vectors from the triangle's
+/// corners to the vertex; kOpposite: the opposite vectors.
+template <bool kOpposite, class V>
+HWY_INLINE auto isTooFar(const TriangleFrame<V>& triangle, const Vector3<V>& from0,
+                         const Vector3<V>& from1, const Vector3<V>& from2) {
   auto isOut = hn::Gt(hn::Abs(dot(triangle.normal, from0)), triangle.height);
-  isOut = hn::Or(isOut, hn::Lt(along<kTurned>(triangle.inward[0], from0), triangle.beyond[0]));
-  isOut = hn::Or(isOut, hn::Lt(along<kTurned>(triangle.inward[1], from1), triangle.beyond[1]));
-  return hn::Or(isOut, hn::Lt(along<kTurned>(triangle.inward[2], from2), triangle.beyond[2]));
+  isOut = hn::Or(isOut, hn::Lt(along<kOpposite>(triangle.inward[0], from0), triangle.beyond[0]));
+  isOut = hn::Or(isOut, hn::Lt(along<kOpposite>(triangle.inward[1], from1), triangle.beyond[1]));
+  return hn::Or(isOut, hn::Lt(along<kOpposite>(triangle.inward[2], from2), triangle.beyond[2]));
 }
 
-/// kReach: keeps edge pairs within edgeReach even if their closest points are not inside both
-/// edges.
-template <bool kDistinct, bool kReach>
+/// kKeepsNearEdges: keeps edge pairs within checkedEdgeDistance even if their closest points are
+/// not inside both edges.
+template <bool kDistinct, bool kKeepsNearEdges>
 HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[kSize]) {
   const hn::CappedTag<float, kSize> d;
   using D = decltype(d);
@@ -145,10 +145,10 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
 
     auto tests = hn::Zero(hn::RebindToUnsigned<D>());
     for (int i = 0; i < 3; ++i) {
-      tests = withTest(tests, cornerTestOfA(i),
-                       isOutOfReach<false>(b, from[i][0], from[i][1], from[i][2]));
-      tests = withTest(tests, cornerTestOfB(i),
-                       isOutOfReach<true>(a, from[0][i], from[1][i], from[2][i]));
+      tests =
+          withTest(tests, cornerTestOfA(i), isTooFar<false>(b, from[i][0], from[i][1], from[i][2]));
+      tests =
+          withTest(tests, cornerTestOfB(i), isTooFar<true>(a, from[0][i], from[1][i], from[2][i]));
     }
 
     const V slack = (hn::Set(d, 1.0f) + thickness) * hn::Set(d, 0x1p-22f);
@@ -157,11 +157,11 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
     const V sError = hn::Set(d, 640.0f) * longest * b.length + tiny;
     const V tError = hn::Set(d, 640.0f) * longest * a.length + tiny;
     const V thicknessSquare = thickness * thickness;
-    V reachA[3], reachB[3];  // edges' lengths times the reach
-    for (int i = 0; i < 3 && kReach; ++i) {
-      const V reach = hn::Load(d, scaled.edgeReach + lane);
-      reachA[i] = reach * hn::Sqrt(a.square[i]);
-      reachB[i] = reach * hn::Sqrt(b.square[i]);
+    V distanceA[3], distanceB[3];  // edges' lengths times checkedEdgeDistance
+    for (int i = 0; i < 3 && kKeepsNearEdges; ++i) {
+      const V distance = hn::Load(d, scaled.checkedEdgeDistance + lane);
+      distanceA[i] = distance * hn::Sqrt(a.square[i]);
+      distanceB[i] = distance * hn::Sqrt(b.square[i]);
     }
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
@@ -175,12 +175,12 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
           const V s = uv * vr - b.square[j] * ur;
           const V t = a.square[i] * vr - uv * ur;
           V sBeyond = sError, tBeyond = tError;
-          if constexpr (kReach) {
+          if constexpr (kKeepsNearEdges) {
             // Let the closest point of an edge's line be x beyond the edge's end. That end, and the
             // whole edge, are then further than x |n| / (|u| |v|) from the other edge's line.
             const V normal = hn::Sqrt(normalSquare);
-            sBeyond = sError + normal * reachB[j];
-            tBeyond = tError + normal * reachA[i];
+            sBeyond = sError + normal * distanceB[j];
+            tBeyond = tError + normal * distanceA[i];
           }
           isOut = hn::Or(isOut, hn::Lt(s, hn::Neg(sBeyond)));
           isOut = hn::Or(isOut, hn::Lt(t, hn::Neg(tBeyond)));
@@ -195,12 +195,12 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
 }
 
 HWY_ATTR void filterKernel(const TrianglePairBatch& batch, double thickness, bool distinct,
-                           double edgeReach, std::uint32_t (&possible)[kSize]) {
+                           double checkedEdgeDistance, std::uint32_t (&possible)[kSize]) {
   ScaledBatch scaled;
-  scaleBatch(batch, thickness, edgeReach, scaled);
+  scaleBatch(batch, thickness, checkedEdgeDistance, scaled);
   if (!distinct)
     filterScaled<false, false>(scaled, possible);
-  else if (edgeReach > 0.0)
+  else if (checkedEdgeDistance > 0.0)
     filterScaled<true, true>(scaled, possible);
   else
     filterScaled<true, false>(scaled, possible);
@@ -215,8 +215,9 @@ namespace palpate {
 HWY_EXPORT(filterKernel);
 
 void findPossibleProximity(const TrianglePairBatch& batch, double thickness, bool distinct,
-                           double edgeReach, std::uint32_t (&possible)[TrianglePairBatch::kSize]) {
-  HWY_DYNAMIC_DISPATCH(filterKernel)(batch, thickness, distinct, edgeReach, possible);
+                           double checkedEdgeDistance,
+                           std::uint32_t (&possible)[TrianglePairBatch::kSize]) {
+  HWY_DYNAMIC_DISPATCH(filterKernel)(batch, thickness, distinct, checkedEdgeDistance, possible);
 }
 
 }  // namespace palpate

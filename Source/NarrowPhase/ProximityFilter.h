@@ -19,9 +19,10 @@ struct TrianglePairBatch {
 ///
 /// Shapes   possible: per pair, a set of the tests in NarrowPhase/FeatureTests.h.
 /// distinct: also drops edge pairs whose closest points are proven not to be inside both edges,
-/// except those that may be at most edgeReach apart.
+/// except those that may be at most checkedEdgeDistance apart.
 /// Errors   none; where coordinates overflow or underflow, no feature pair is dropped.
 void findPossibleProximity(const TrianglePairBatch&, double thickness, bool distinct,
-                           double edgeReach, std::uint32_t (&possible)[TrianglePairBatch::kSize]);
+                           double checkedEdgeDistance,
+                           std::uint32_t (&possible)[TrianglePairBatch::kSize]);
 
 }  // namespace palpate

@@ -12,27 +12,28 @@ using Eigen::Vector3d;
 using Kind = ImpactQuery::Kind;
 
 template <Kind kind>
-bool StepCheck::mayTouchInStep(const Features<kind>& features, std::uint32_t inFirst,
-                               std::uint32_t inSecond, double distance) const {
+bool StepCheck::mayTouchInStep(const Features<kind>& features, std::uint32_t firstId,
+                               std::uint32_t secondId, double distance) const {
   const StepPlan& step = m_pair.step;
-  return step.motion != 0.0 && !(distance > step.certain) &&
-         mayHaveTouched<kind>(features.query(inFirst, inSecond), distance, step.motion);
+  return step.motion != 0.0 && !(distance > step.motionWithRounding) &&
+         mayHaveTouched<kind>(features.query(firstId, secondId), distance, step.motion);
 }
 
 template <Kind kind>
-bool StepCheck::addImpactIfTouched(const Features<kind>& features, std::uint32_t inFirst,
-                                   std::uint32_t inSecond, bool ofSecond, double distance) {
-  if (!mayTouchInStep(features, inFirst, inSecond, distance)) return false;
-  if (m_pair.step.impacts) return addImpact(m_pair, features, inFirst, inSecond, ofSecond, m_out);
+bool StepCheck::addImpactIfTouched(const Features<kind>& features, std::uint32_t firstId,
+                                   std::uint32_t secondId, bool swapped, double distance) {
+  if (!mayTouchInStep(features, firstId, secondId, distance)) return false;
+  if (m_pair.step.reportsImpacts)
+    return addImpact(m_pair, features, firstId, secondId, swapped, m_out);
   m_out.facts.clearance = 0.0;
-  noteVertices(features, inFirst, inSecond);
+  recordVertices(features, firstId, secondId);
   return false;
 }
 
 template <Kind kind>
-void StepCheck::noteVertices(const Features<kind>& features, std::uint32_t inFirst,
-                             std::uint32_t inSecond) {
-  const auto vertices = features.vertices(inFirst, inSecond);
+void StepCheck::recordVertices(const Features<kind>& features, std::uint32_t firstId,
+                               std::uint32_t secondId) {
+  const auto vertices = features.vertices(firstId, secondId);
   for (int i = 0; i < 4; ++i) {
     const bool ofB = !m_pair.self() && &features.meshOf(i) == &m_pair.b;
     (ofB ? m_out.facts.verticesB : m_out.facts.verticesA).push_back(vertices[i]);
@@ -40,38 +41,38 @@ void StepCheck::noteVertices(const Features<kind>& features, std::uint32_t inFir
 }
 
 template <Kind kind>
-void StepCheck::noteImpact(const Features<kind>& features, std::uint32_t inFirst,
-                           std::uint32_t inSecond, double time, double distance) {
+void StepCheck::recordImpact(const Features<kind>& features, std::uint32_t firstId,
+                             std::uint32_t secondId, double time, double distance) {
   const StepPlan& step = m_pair.step;
   double& clearance = m_out.facts.clearance;
-  if (clearance == 0.0 && !step.impacts) return;
-  const double rounding = step.certain - step.motion;
+  if (clearance == 0.0 && !step.reportsImpacts) return;
+  const double rounding = step.motionWithRounding - step.motion;
   double left = (1.0 - time) * step.motion + rounding;
   if (distance <= left)
-    left = (1.0 - time) * motionBound<kind>(features.query(inFirst, inSecond)) + rounding;
+    left = (1.0 - time) * motionBound<kind>(features.query(firstId, secondId)) + rounding;
   clearance = std::min(clearance, std::max(0.0, distance - left));
-  if (step.impacts && distance <= left) noteVertices(features, inFirst, inSecond);
+  if (step.reportsImpacts && distance <= left) recordVertices(features, firstId, secondId);
 }
 
-void answerByImpact(const MeshPair& pair, const StepFacts& touched, ContactBuffers& found,
-                    ContactBuffers& out) {
+void replaceByImpacts(const MeshPair& pair, const StepFacts& touched, ContactBuffers& found,
+                      ContactBuffers& out) {
   const auto isTouched = [&](const Buffer<std::uint32_t>& sorted, auto... vertices) {
     return (std::binary_search(sorted.begin(), sorted.end(), vertices) || ...);
   };
   const auto &ofA = touched.verticesA, &ofB = pair.self() ? ofA : touched.verticesB;
-  const auto moveOut = [&](Buffer<VertexTriangleContact>& list, bool ofSecond) {
-    const Features<Kind::VertexTriangle> features{ofSecond ? pair.b : pair.a,
-                                                  ofSecond ? pair.a : pair.b};
-    const auto &vertices = ofSecond ? ofB : ofA, &corners = ofSecond ? ofA : ofB;
+  const auto moveImpacts = [&](Buffer<VertexTriangleContact>& list, bool swapped) {
+    const Features<Kind::VertexTriangle> features{swapped ? pair.b : pair.a,
+                                                  swapped ? pair.a : pair.b};
+    const auto &vertices = swapped ? ofB : ofA, &corners = swapped ? ofA : ofB;
     std::erase_if(list, [&](const VertexTriangleContact& c) {
       return c.timeOfImpact == 1.0 &&
              (isTouched(vertices, c.vertex) ||
               isTouched(corners, c.corners[0], c.corners[1], c.corners[2])) &&
-             addImpact(pair, features, c.vertex, c.triangle, ofSecond, out);
+             addImpact(pair, features, c.vertex, c.triangle, swapped, out);
     });
   };
-  moveOut(found.vertexTriangle, false);
-  moveOut(found.triangleVertex, true);
+  moveImpacts(found.vertexTriangle, false);
+  moveImpacts(found.triangleVertex, true);
   const Features<Kind::EdgeEdge> edges{pair.a, pair.b};
   std::erase_if(found.edgeEdge, [&](const EdgeEdgeContact& c) {
     return c.timeOfImpact == 1.0 &&
@@ -82,11 +83,11 @@ void answerByImpact(const MeshPair& pair, const StepFacts& touched, ContactBuffe
 }
 
 template <Kind kind>
-bool StepCheck::isAnsweredAtEnd(const Features<kind>& features, std::uint32_t inFirst,
-                                std::uint32_t inSecond) const {
-  const ImpactQuery query = features.query(inFirst, inSecond);
+bool StepCheck::proximitySuffices(const Features<kind>& features, std::uint32_t firstId,
+                                  std::uint32_t secondId) const {
+  const ImpactQuery query = features.query(firstId, secondId);
   const double motion = motionBound<kind>(query);
-  if (motion <= m_pair.step.slow) return true;
+  if (motion <= m_pair.step.slowMotion) return true;
   const auto at = [&](int i) -> const Vector3d& { return query.vertices[i].at(1); };
   double distance;
   if constexpr (kind == Kind::VertexTriangle)
@@ -94,41 +95,42 @@ bool StepCheck::isAnsweredAtEnd(const Features<kind>& features, std::uint32_t in
   else
     distance = finiteEdgeEdgeDistance(at(0), at(1), at(2), at(3)).distance;
   if (distance > m_pair.thicknessAtEnd()) return false;
-  // With Distinct, edges whose closest points are ends were measured only up to edgeReach().
+  // With Distinct, edges whose closest points are ends were measured only up to
+  // checkedEdgeDistance().
   return distance > motion || kind == Kind::VertexTriangle ||
          m_pair.settings.contacts != Contacts::Distinct;
 }
 
-void StepCheck::noteTriangle(std::uint32_t triangle, bool ofSecond, const Vector3d& a,
-                             const Vector3d& b, const Vector3d& c) {
+void StepCheck::recordTriangle(std::uint32_t triangle, bool isOfB, const Vector3d& a,
+                               const Vector3d& b, const Vector3d& c) {
   const Vector3d u = b - a, v = c - a;
   if (u.cross(v).squaredNorm() > kFlatSquare * u.squaredNorm() * v.squaredNorm() ||
       hasArea(a, b, c))
     return;
-  (ofSecond && !m_pair.self() ? m_out.facts.degenerateB : m_out.facts.degenerateA)
-      .push_back(triangle);
+  (isOfB && !m_pair.self() ? m_out.facts.degenerateB : m_out.facts.degenerateA).push_back(triangle);
 }
 
-void StepCheck::noteEdges(const Segment& p, const Segment& q) {
-  const auto note = [](const TriangleMesh& mesh, const Segment& edge, auto& list) {
+void StepCheck::recordEdges(const Segment& p, const Segment& q) {
+  const auto recordIfDegenerate = [](const TriangleMesh& mesh, const Segment& edge, auto& list) {
     if (mesh.now[edge[0]] == mesh.now[edge[1]])
       list.push_back(mesh.topology.edgeTriangles[mesh.topology.edgeOf(edge)].front());
   };
-  note(m_pair.a, p, m_out.facts.degenerateA);
-  note(m_pair.b, q, m_pair.self() ? m_out.facts.degenerateA : m_out.facts.degenerateB);
+  recordIfDegenerate(m_pair.a, p, m_out.facts.degenerateA);
+  recordIfDegenerate(m_pair.b, q,
+                     m_pair.self() ? m_out.facts.degenerateA : m_out.facts.degenerateB);
 }
 
-template void StepCheck::noteImpact(const Features<Kind::VertexTriangle>&, std::uint32_t,
-                                    std::uint32_t, double, double);
-template void StepCheck::noteImpact(const Features<Kind::EdgeEdge>&, std::uint32_t, std::uint32_t,
-                                    double, double);
+template void StepCheck::recordImpact(const Features<Kind::VertexTriangle>&, std::uint32_t,
+                                      std::uint32_t, double, double);
+template void StepCheck::recordImpact(const Features<Kind::EdgeEdge>&, std::uint32_t, std::uint32_t,
+                                      double, double);
 template bool StepCheck::addImpactIfTouched(const Features<Kind::VertexTriangle>&, std::uint32_t,
                                             std::uint32_t, bool, double);
 template bool StepCheck::addImpactIfTouched(const Features<Kind::EdgeEdge>&, std::uint32_t,
                                             std::uint32_t, bool, double);
-template bool StepCheck::isAnsweredAtEnd(const Features<Kind::VertexTriangle>&, std::uint32_t,
-                                         std::uint32_t) const;
-template bool StepCheck::isAnsweredAtEnd(const Features<Kind::EdgeEdge>&, std::uint32_t,
-                                         std::uint32_t) const;
+template bool StepCheck::proximitySuffices(const Features<Kind::VertexTriangle>&, std::uint32_t,
+                                           std::uint32_t) const;
+template bool StepCheck::proximitySuffices(const Features<Kind::EdgeEdge>&, std::uint32_t,
+                                           std::uint32_t) const;
 
 }  // namespace palpate

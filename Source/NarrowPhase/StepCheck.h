@@ -17,45 +17,48 @@ class StepCheck {
 
   /// L: edges up to this far apart are measured even where Contacts::Distinct reports no contact,
   /// because they may have touched in the step.
-  double edgeReach() const {
+  double checkedEdgeDistance() const {
     const StepPlan& step = m_pair.step;
-    return std::min(step.motion, step.impacts ? step.extra : m_pair.settings.thickness);
+    return std::min(step.motion,
+                    step.reportsImpacts ? step.extraThickness : m_pair.settings.thickness);
   }
 
   /// Records a feature pair that is at most thicknessAtEnd() apart.
-  void noteDistance(double distance) {
+  void recordDistance(double distance) {
     m_out.facts.clearance = std::min(m_out.facts.clearance, distance);
   }
   /// Checks the same pair for a touch in the step. If it may have touched, appends its impact where
-  /// StepPlan::impacts is set, and otherwise records its vertices. Returns whether an impact was
-  /// appended; it replaces the contact at the step's end. ofSecond: Features::first is MeshPair::b.
+  /// StepPlan::reportsImpacts is set, and otherwise records its vertices. Returns whether an impact
+  /// was appended; it replaces the contact at the step's end. swapped: Features::first is
+  /// MeshPair::b.
   template <ImpactQuery::Kind kind>
-  bool addImpactIfTouched(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond,
-                          bool ofSecond, double distance);
+  bool addImpactIfTouched(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId,
+                          bool swapped, double distance);
 
   /// Auto: whether proximity at the step's end suffices for a feature pair, so that no impact has
   /// to be computed.
   template <ImpactQuery::Kind kind>
-  bool isAnsweredAtEnd(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond) const;
+  bool proximitySuffices(const Features<kind>&, std::uint32_t firstId,
+                         std::uint32_t secondId) const;
 
   /// Records an impact: lowers the clearance to what the rest of the step may leave of the
   /// distance.
   template <ImpactQuery::Kind kind>
-  void noteImpact(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond, double time,
-                  double distance);
+  void recordImpact(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId,
+                    double time, double distance);
 
   /// Records the triangle of a contact if it has no area.
-  void noteTriangle(std::uint32_t triangle, bool ofSecond, const Eigen::Vector3d& a,
-                    const Eigen::Vector3d& b, const Eigen::Vector3d& c);
-  void noteEdges(const Segment& p, const Segment& q);
+  void recordTriangle(std::uint32_t triangle, bool isOfB, const Eigen::Vector3d& a,
+                      const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+  void recordEdges(const Segment& p, const Segment& q);
 
  private:
   /// Whether features at this distance at the step's end may have touched in the step.
   template <ImpactQuery::Kind kind>
-  bool mayTouchInStep(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond,
+  bool mayTouchInStep(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId,
                       double distance) const;
   template <ImpactQuery::Kind kind>
-  void noteVertices(const Features<kind>&, std::uint32_t inFirst, std::uint32_t inSecond);
+  void recordVertices(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId);
 
   const MeshPair& m_pair;
   ContactBuffers& m_out;
@@ -65,8 +68,8 @@ class StepCheck {
 /// vertex with features that may have touched (`touched`, sorted). If such a contact has an impact,
 /// it is removed from `found` and the impact is added to `out`. Reason: a vertex that passed
 /// through one triangle is on the wrong side of the neighbouring triangles, too.
-void answerByImpact(const MeshPair&, const StepFacts& touched, ContactBuffers& found,
-                    ContactBuffers& out);
+void replaceByImpacts(const MeshPair&, const StepFacts& touched, ContactBuffers& found,
+                      ContactBuffers& out);
 
 /// Whether two triangles intersect at the step's start or at its end; exact. counts: receives
 /// exactDecisions.

@@ -55,7 +55,7 @@ struct BoxLanes {
     return lanes;
   }
   /// Maps the boxes by one end of a BoxMap, whose comment derives the rounding.
-  HWY_ATTR HWY_INLINE BoxLanes turned(const BoxMap::End& end) const {
+  HWY_ATTR HWY_INLINE BoxLanes mapped(const BoxMap::End& end) const {
     const D d;
     const auto middle = hn::Set(d, 0.5f), zero = hn::Zero(d);
     hn::Vec<D> c[3], h[3], farthest = zero;
@@ -81,11 +81,11 @@ struct BoxLanes {
     }
     return lanes;
   }
-  HWY_ATTR HWY_INLINE BoxLanes turned(const BoxMap& map) const {
+  HWY_ATTR HWY_INLINE BoxLanes mapped(const BoxMap& map) const {
     if (map.count == 0) return *this;
-    BoxLanes lanes = turned(map.ends[0]);
+    BoxLanes lanes = mapped(map.ends[0]);
     if (map.count == 1) return lanes;
-    const BoxLanes other = turned(map.ends[1]);
+    const BoxLanes other = mapped(map.ends[1]);
     for (int k = 0; k < 3; ++k) {
       lanes.lower[k] = hn::Min(lanes.lower[k], other.lower[k]);
       lanes.upper[k] = hn::Max(lanes.upper[k], other.upper[k]);

@@ -14,7 +14,7 @@ HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
 
 HWY_ATTR void mapKernel(const BoxMap& map, const FloatBox& box, FloatBox& mapped) {
-  mapped = BoxLanes<BoxTag>::of(box).turned(map).first();
+  mapped = BoxLanes<BoxTag>::of(box).mapped(map).first();
 }
 
 }  // namespace palpate::HWY_NAMESPACE
@@ -27,8 +27,8 @@ HWY_EXPORT(mapKernel);
 
 void setShift(std::array<float, 4>& lower, std::array<float, 4>& upper,
               const std::array<double, 3>& offset, double thickness) {
-  constexpr double kMost = 0x1p125;  // boxes of kLargestFloat stay finite
-  const auto clamped = [&](double v) { return std::min(std::max(v, -kMost), kMost); };
+  constexpr double kMax = 0x1p125;  // boxes of kLargestFloat stay finite
+  const auto clamped = [&](double v) { return std::min(std::max(v, -kMax), kMax); };
   for (int k = 0; k < 3; ++k) {
     const double error = (std::abs(offset[k]) + thickness) * OutwardRounding::kRelative;
     lower[k] = static_cast<float>(clamped(offset[k] - thickness - error));

@@ -34,7 +34,7 @@ struct BoxMap {
   std::array<End, 2> ends{};
   int count = 0;  ///< number of ends; 0: boxes are unchanged
 
-  /// Empty boxes are unchanged. BoxLanes::turned() has the arithmetic.
+  /// Empty boxes are unchanged. BoxLanes::mapped() has the arithmetic.
   FloatBox operator()(const FloatBox&) const;
 };
 

@@ -115,7 +115,7 @@ int shiftOf(int level, int digits) { return 64 - Key::kDigitBits * (level + digi
 
 }  // namespace
 
-void KeySort::takeKeys(const KeyRange& range, std::size_t from, std::size_t to,
+void KeySort::loadKeys(const KeyRange& range, std::size_t from, std::size_t to,
                        std::uint64_t* out) const {
   const std::uint64_t* keys = m_keys.data() + range.begin + from;
   if (range.cube)
@@ -125,7 +125,8 @@ void KeySort::takeKeys(const KeyRange& range, std::size_t from, std::size_t to,
     std::copy_n(keys, to - from, out);
 }
 
-int KeySort::byDigits(const KeyRange& range, std::uint32_t* ends, const Threads* threads) const {
+int KeySort::sortByDigits(const KeyRange& range, std::uint32_t* ends,
+                          const Threads* threads) const {
   const std::size_t size = range.end - range.begin,
                     bins = std::size_t{1} << Key::kDigitBits * range.digits;
   // One part for each thread; the sorted order does not depend on the number of parts.
@@ -133,7 +134,7 @@ int KeySort::byDigits(const KeyRange& range, std::uint32_t* ends, const Threads*
   const std::size_t wanted = shared ? static_cast<std::size_t>(threads->count()) : 1,
                     grain = (size + wanted - 1) / wanted, parts = (size + grain - 1) / grain;
   // 16 KB on the stack. No function called from here sorts, so they exist only once at a time.
-  std::array<std::uint32_t, 1 << Key::kDigitBits * PartEnds::kMostDigits> ownCounts;
+  std::array<std::uint32_t, 1 << Key::kDigitBits * PartEnds::kMaxDigits> ownCounts;
   if (shared) m_sharedCounts.resize(bins * parts);
   std::uint32_t* counts = shared ? m_sharedCounts.data() : ownCounts.data();
   std::uint64_t* scratch = m_scratch.data() + range.begin;
@@ -144,16 +145,17 @@ int KeySort::byDigits(const KeyRange& range, std::uint32_t* ends, const Threads*
   };
   std::atomic<std::uint64_t> differ = 0;
   forChunks([&](std::size_t chunk, std::size_t from, std::size_t to) {
-    takeKeys(range, from, to, scratch + from);
+    loadKeys(range, from, to, scratch + from);
     std::uint32_t* own = counts + chunk * bins;
     std::fill_n(own, bins, 0u);
     differ |= HWY_DYNAMIC_DISPATCH(countKeysKernel)(scratch + from, to - from, shift, bins, own);
   });
   for (std::size_t i = 0; i < size; i += grain) differ |= scratch[0] ^ scratch[i];
-  const int alike = std::min(std::countl_zero(differ.load()) / Key::kDigitBits, Key::kMostLevels);
-  if (alike >= range.level + range.digits) {
+  const int equalDigits =
+      std::min(std::countl_zero(differ.load()) / Key::kDigitBits, Key::kMaxLevels);
+  if (equalDigits >= range.level + range.digits) {
     std::copy_n(scratch, range.cube ? size : 0, m_keys.data() + range.begin);
-    return alike;
+    return equalDigits;
   }
   std::uint32_t sum = range.begin;
   forBins(range.digits, [&](std::size_t bin) {
@@ -170,10 +172,10 @@ int KeySort::byDigits(const KeyRange& range, std::uint32_t* ends, const Threads*
   return 0;
 }
 
-void KeySort::byOneDigit(const KeyRange& range, std::array<std::uint32_t, 9>& begins) const {
+void KeySort::sortByOneDigit(const KeyRange& range, std::array<std::uint32_t, 9>& begins) const {
   const std::size_t size = range.end - range.begin;
   std::array<std::uint64_t, KeyRange::kFew> keys;
-  takeKeys(range, 0, size, keys.data());
+  loadKeys(range, 0, size, keys.data());
   const std::uint64_t places = HWY_DYNAMIC_DISPATCH(sortFewKeysKernel)(
       keys.data(), size, shiftOf(range.level, 1), m_keys.data() + range.begin);
   for (unsigned octant = 0; octant < 8; ++octant)

@@ -11,15 +11,15 @@
 
 namespace palpate {
 
-/// Where the parts of a sorted range end, as KeySort::byDigits() writes them.
+/// Where the parts of a sorted range end, as KeySort::sortByDigits() writes them.
 ///
 /// There is one part for each cell below the range's own cell, down to one level for each digit.
 /// Parts are in the order of keys: first the cell's own elements, then the parts of octant 0, of
 /// octant 1, and so on to octant 7, each in the same order. Three digits therefore have 1 + 8 * 73
 /// = 585 parts.
 struct PartEnds {
-  static constexpr int kMostDigits = 3;
-  static constexpr std::array<std::uint32_t, kMostDigits + 1> kCounts{1, 9, 73, 585};
+  static constexpr int kMaxDigits = 3;
+  static constexpr std::array<std::uint32_t, kMaxDigits + 1> kCounts{1, 9, 73, 585};
 };
 
 /// One sort of keys [begin, end) by the digits that follow `level`.
@@ -51,16 +51,16 @@ class KeySort {
   /// Sorts a range and writes where its parts end. If `threads` is given, they share the work.
   /// Returns 0, or, if all keys of the range have the same digits, the number of leading digits
   /// that they share. In the second case nothing is moved or written to `ends`.
-  int byDigits(const KeyRange&, std::uint32_t* ends, const Threads* threads) const;
+  int sortByDigits(const KeyRange&, std::uint32_t* ends, const Threads* threads) const;
   /// Sorts at most KeyRange::kFew keys by one digit. Writes where the octants begin, and where the
   /// last one ends. The result goes directly to its destination, because a wide load from freshly
   /// written narrower values would stall.
-  void byOneDigit(const KeyRange&, std::array<std::uint32_t, 9>& begins) const;
+  void sortByOneDigit(const KeyRange&, std::array<std::uint32_t, 9>& begins) const;
 
  private:
   /// Writes the keys of a part of the range to `out`. They are computed if the range requires it,
   /// else copied.
-  void takeKeys(const KeyRange&, std::size_t from, std::size_t to, std::uint64_t* out) const;
+  void loadKeys(const KeyRange&, std::size_t from, std::size_t to, std::uint64_t* out) const;
 
   const BoxArrays& m_boxes;
   std::span<std::uint64_t> m_keys, m_scratch;

@@ -31,7 +31,7 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
   const hn::RebindToSigned<decltype(d)> di;
   const hn::RebindToUnsigned<decltype(d)> du;
   const std::size_t lanes = hn::Lanes(d);
-  constexpr int kCells = 1 << Key::kMostLevels;
+  constexpr int kCells = 1 << Key::kMaxLevels;
   const float cells = kCells;
   const auto cellsPerUnit = hn::Set(d, static_cast<float>(cells / cube.edge));
   const auto slack = hn::Set(d, 1.0f + 0x1p-10f);
@@ -47,8 +47,8 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
   constexpr std::size_t kGathered = 64;
   alignas(64) float gathered[6][kGathered];
   alignas(64) std::int32_t gatheredSlots[kGathered];
-  alignas(64) std::int32_t made[32];
-  bool gathers = false;
+  alignas(64) std::int32_t packed[32];
+  bool isGathered = false;
 
   for (std::size_t i = 0; i < size; i += lanes) {
     const std::size_t count = size - i < lanes ? size - i : lanes, place = i % kGathered;
@@ -56,8 +56,8 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
       const std::size_t last = (size - i < kGathered ? size - i : kGathered) - 1;
       // Slots ascend, because equal keys stay in order.
       first = Key::slot(slots[i]) - static_cast<std::uint32_t>(i);
-      gathers = Key::slot(slots[i + last]) - first != i + last;
-      for (std::size_t next = 0; gathers && next <= last; ++next) {
+      isGathered = Key::slot(slots[i + last]) - first != i + last;
+      for (std::size_t next = 0; isGathered && next <= last; ++next) {
         const std::uint32_t slot = Key::slot(slots[i + next]);
         gatheredSlots[next] = static_cast<std::int32_t>(slot);
         for (int k = 0; k < 3; ++k) {
@@ -70,9 +70,9 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
     auto longest = hn::Zero(d);
     for (int k = 0; k < 3; ++k) {
       const auto lower =
-          hn::LoadU(d, gathers ? gathered[k] + place : boxes.lower[k].data() + first + i);
+          hn::LoadU(d, isGathered ? gathered[k] + place : boxes.lower[k].data() + first + i);
       const auto upper =
-          hn::LoadU(d, gathers ? gathered[3 + k] + place : boxes.upper[k].data() + first + i);
+          hn::LoadU(d, isGathered ? gathered[3 + k] + place : boxes.upper[k].data() + first + i);
       longest = hn::Max(longest, upper - lower);
       // The cube's corner is split into two floats. Near it, the differences are then practically
       // exact.
@@ -89,7 +89,7 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
     const auto sizeExponent = hn::ShiftRight<23>(sizeBits + hn::Set(di, 0x7fffff));
     const auto level = hn::Min(hn::Max(edgeExponent - sizeExponent, zero), deepest);
     // Eight levels are in the key's upper half, and the ninth is in its lower half, above the slot.
-    static_assert(Key::kMostLevels == 9 && Key::kDigitBits == 4 && Key::kSlotBits == 28);
+    static_assert(Key::kMaxLevels == 9 && Key::kDigitBits == 4 && Key::kSlotBits == 28);
     const auto octants = [&](auto x, auto y, auto z) {
       return hn::Or(hn::Or(x, hn::ShiftLeft<1>(y)), hn::ShiftLeft<2>(z));
     };
@@ -104,18 +104,18 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
     const auto one = hn::Set(di, 1);
     const auto last = hn::Or(hn::Set(di, 8), octants(hn::And(cell[0], one), hn::And(cell[1], one),
                                                      hn::And(cell[2], one)));
-    const auto ninth = hn::IfThenElseZero(hn::Eq(level, hn::Set(di, Key::kMostLevels)),
+    const auto ninth = hn::IfThenElseZero(hn::Eq(level, hn::Set(di, Key::kMaxLevels)),
                                           hn::ShiftLeft<Key::kSlotBits>(last));
-    const auto slot = gathers ? hn::LoadU(di, gatheredSlots + place)
-                              : hn::Iota(di, static_cast<std::int32_t>(first + i));
+    const auto slot = isGathered ? hn::LoadU(di, gatheredSlots + place)
+                                 : hn::Iota(di, static_cast<std::int32_t>(first + i));
     const auto low = hn::Or(ninth, slot);
     // Keys are 64-bit integers. Only copying may write bytes of other types to them.
     static_assert(std::endian::native == std::endian::little);
-    hn::StoreInterleaved2(low, key, di, made);
+    hn::StoreInterleaved2(low, key, di, packed);
     if (count == lanes)
-      std::memcpy(keys + i, made, hn::Lanes(d) * sizeof(std::uint64_t));
+      std::memcpy(keys + i, packed, hn::Lanes(d) * sizeof(std::uint64_t));
     else
-      std::memcpy(keys + i, made, count * sizeof(std::uint64_t));
+      std::memcpy(keys + i, packed, count * sizeof(std::uint64_t));
   }
 }
 

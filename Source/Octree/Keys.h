@@ -29,7 +29,7 @@ constexpr float kSmallestCell = 0x1p-100f;
 /// the box. Sorted keys therefore put a cell's own elements first, and every subtree in one range.
 /// Keys sorted by their first digits do so for the first levels.
 struct Key {
-  static constexpr int kMostLevels = 9, kDigitBits = 4, kSlotBits = 28;
+  static constexpr int kMaxLevels = 9, kDigitBits = 4, kSlotBits = 28;
   static constexpr std::uint64_t kOctant = 8;
 
   /// The `count` digits after the first `level` digits.

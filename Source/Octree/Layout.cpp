@@ -8,7 +8,7 @@ namespace palpate {
 
 /// A cell of up to this size becomes one task if its keys are not sorted yet. Sorting it in the top
 /// would keep other threads waiting.
-constexpr std::uint32_t kMostInOneTask = 8192;
+constexpr std::uint32_t kMaxInOneTask = 8192;
 
 void Layout::start(const OctreeSettings& settings, std::uint32_t taskSize,
                    Buffer<std::uint32_t>& ends, const Threads* threads) {
@@ -19,8 +19,8 @@ void Layout::start(const OctreeSettings& settings, std::uint32_t taskSize,
   groups.resize(groups.capacity());
   groupNodes.resize(groups.size());
   reserveGroups();
-  m_mostPerLeaf = static_cast<std::uint32_t>(settings.maxElementsPerLeaf);
-  m_maxDepth = std::min(settings.maxDepth, kMaxDepthRatio);
+  m_maxPerLeaf = static_cast<std::uint32_t>(settings.maxElementsPerLeaf);
+  m_maxDepth = std::min(settings.maxDepth, kMaxDepth);
   m_taskSize = taskSize;
   m_ends = &ends;
   m_ends->clear();
@@ -60,7 +60,7 @@ void Layout::layOutTask(const KeySort& keys, const Job& job, const OctreeSetting
 /// Lays out the job's node and its subtree. Returns the value of the parent's slot for the node. An
 /// explicit path replaces recursion, so that its size on the stack is known: about 7 KB.
 std::uint32_t Layout::layOut(const KeySort& keys, const Job& job) {
-  std::array<OpenNode, kMaxDepthRatio + 1> path;
+  std::array<OpenNode, kMaxDepth + 1> path;
   OpenNode* node = path.data();
   node->job = job;
   if (!open(keys, *node)) return node->link;
@@ -85,12 +85,12 @@ std::uint32_t Layout::layOut(const KeySort& keys, const Job& job) {
 bool Layout::open(const KeySort& keys, OpenNode& node) {
   Job& job = node.job;
   const std::uint32_t size = job.end - job.begin;
-  if (size <= m_mostPerLeaf || job.depth >= m_maxDepth || job.cube.edge <= kSmallestCell) {
+  if (size <= m_maxPerLeaf || job.depth >= m_maxDepth || job.cube.edge <= kSmallestCell) {
     node.link = addLeaf(job.begin, job.end, job.node);
     return false;
   }
   const bool sorted = job.level < job.sorted;
-  if (m_taskSize > 0 && size <= (sorted ? m_taskSize : std::max(m_taskSize, kMostInOneTask))) {
+  if (m_taskSize > 0 && size <= (sorted ? m_taskSize : std::max(m_taskSize, kMaxInOneTask))) {
     job.sorted = job.level;  // `ends` no longer exist when the task runs
     tasks.push_back(job);
     addLeaf(job.begin, job.end, kTask | static_cast<std::uint32_t>(tasks.size() - 1));
@@ -123,29 +123,29 @@ void Layout::sort(const KeySort& keys, OpenNode& node) {
   if (job.level == job.levels) {
     range.first = job.levels == 0;
     range.level = job.level = 0;
-    range.levels = job.levels = std::min(Key::kMostLevels, m_maxDepth - job.depth);
+    range.levels = job.levels = std::min(Key::kMaxLevels, m_maxDepth - job.depth);
     range.cube = &job.cube;
   }
   const std::uint32_t size = job.end - job.begin;
   if (size <= KeyRange::kFew) {
     job.sorted = job.level + 1;
-    keys.byOneDigit(range, node.begins);
+    keys.sortByOneDigit(range, node.begins);
     return;
   }
   range.digits =
-      std::min(size >= KeyRange::kMany ? PartEnds::kMostDigits : 2, Key::kMostLevels - job.level);
+      std::min(size >= KeyRange::kMany ? PartEnds::kMaxDigits : 2, Key::kMaxLevels - job.level);
   const std::size_t count = PartEnds::kCounts[static_cast<std::size_t>(range.digits)];
   m_ends->resize(node.endsBefore + count);
-  const int alike = keys.byDigits(range, m_ends->data() + node.endsBefore, m_threads);
-  job.sorted = alike ? alike : job.level + range.digits;
-  job.ends = alike ? kAlike : node.endsBefore;
+  const int equalDigits = keys.sortByDigits(range, m_ends->data() + node.endsBefore, m_threads);
+  job.sorted = equalDigits ? equalDigits : job.level + range.digits;
+  job.ends = equalDigits ? kEqualDigits : node.endsBefore;
   findParts(keys, node);
 }
 
 /// Finds where the octants of a sorted range begin, and where the range ends.
 void Layout::findParts(const KeySort& keys, OpenNode& node) const {
   const Job& job = node.job;
-  if (job.ends == kAlike) {
+  if (job.ends == kEqualDigits) {
     const std::uint64_t digit = Key::digits(keys[job.begin], job.level, 1);
     for (unsigned octant = 0; octant < 9; ++octant)
       node.begins[octant] = digit >= Key::kOctant + octant ? job.begin : job.end;
@@ -179,7 +179,7 @@ bool Layout::nextChild(OpenNode& parent, Job& child) {
   for (unsigned slot = parent.nextSlot; slot < 8; ++slot) {
     const std::uint32_t begin = parent.begins[slot], size = parent.begins[slot + 1] - begin;
     const OctreeNode node = parent.link * 8 + slot;
-    if (size <= m_mostPerLeaf) {
+    if (size <= m_maxPerLeaf) {
       // The next group overwrites that of an empty slot: this avoids a branch that would be
       // mispredicted.
       groups[m_groupCount] = begin;
@@ -196,8 +196,8 @@ bool Layout::nextChild(OpenNode& parent, Job& child) {
     child.levels = job.levels;
     child.level = job.level + 1;
     child.sorted = job.sorted;
-    child.ends = kAlike;
-    if (job.ends != kAlike && child.level < job.sorted)
+    child.ends = kEqualDigits;
+    if (job.ends != kEqualDigits && child.level < job.sorted)
       child.ends = job.ends + 1 +
                    slot * PartEnds::kCounts[static_cast<std::size_t>(job.sorted - job.level - 1)];
     return true;
@@ -212,7 +212,7 @@ std::uint32_t Layout::addLeaf(std::uint32_t begin, std::uint32_t end, OctreeNode
   return OctreeBlock::kLeaf | (end - begin);
 }
 
-/// Makes room for the groups of a block's eight slots and one more.
+/// Reserves space for the groups of a block's eight slots and one more.
 void Layout::reserveGroups() {
   if (m_groupCount + 9 <= groups.size()) return;
   groups.reserve(groups.size() + groups.size() / 8 + 16);

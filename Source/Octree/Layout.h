@@ -29,14 +29,15 @@ class Layout {
     Cube cube;
     OctreeNode node;
     int depth;
-    int levels;          ///< number of levels of its keys; 0: there are none yet
-    int level;           ///< level of the node within its keys
-    int sorted;          ///< levels of the keys by which the range is sorted, at least `level`
-    std::uint32_t ends;  ///< where the node's PartEnds begin; kAlike: all keys have the same digits
+    int levels;  ///< number of levels of its keys; 0: there are none yet
+    int level;   ///< level of the node within its keys
+    int sorted;  ///< levels of the keys by which the range is sorted, at least `level`
+    /// Where the node's PartEnds begin; kEqualDigits: all keys have the same digits.
+    std::uint32_t ends;
   };
-  static constexpr std::uint32_t kAlike = 0xffffffffu;
-  static Job jobOfRoot(std::uint32_t size, const Cube& cube) {
-    return {0, size, cube, 0, 0, 0, 0, 0, kAlike};
+  static constexpr std::uint32_t kEqualDigits = 0xffffffffu;
+  static Job rootJob(std::uint32_t size, const Cube& cube) {
+    return {0, size, cube, 0, 0, 0, 0, 0, kEqualDigits};
   }
   /// Values in `groupNodes`. kTask | i: the entry stands for all groups of task i. kTaskRoot: the
   /// group has the own elements of the task's root.
@@ -59,7 +60,7 @@ class Layout {
   std::size_t bytes() const;
 
  private:
-  static constexpr int kMaxDepthRatio = 60;  ///< as OctreeSettings::maxDepth
+  static constexpr int kMaxDepth = 60;  ///< as OctreeSettings::maxDepth
 
   /// A node whose children are being laid out.
   struct OpenNode {
@@ -83,7 +84,7 @@ class Layout {
   void finish();
 
   std::size_t m_groupCount = 0;
-  std::uint32_t m_mostPerLeaf = 0, m_taskSize = 0;
+  std::uint32_t m_maxPerLeaf = 0, m_taskSize = 0;
   int m_maxDepth = 0;
   Buffer<std::uint32_t>* m_ends = nullptr;  ///< PartEnds of all sorted ranges that are still open
   const Threads* m_threads = nullptr;       ///< null within a task

@@ -50,7 +50,7 @@ void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& se
     m_order.clear();
     throw;
   }
-  m_builtNow = true;
+  m_isUnmeasured = true;
   m_stage = Stage::LaidOut;
 }
 
@@ -96,8 +96,8 @@ void Octree::measureLooseness() {
   m_looseness = elements > 0 ? areas / elements : 1.0;
   // Refitting does not tighten a tree. If looseness falls, the sample missed the elements that
   // caused it.
-  m_leastLooseness = m_builtNow ? m_looseness : std::min(m_leastLooseness, m_looseness);
-  m_builtNow = false;
+  m_leastLooseness = m_isUnmeasured ? m_looseness : std::min(m_leastLooseness, m_looseness);
+  m_isUnmeasured = false;
 }
 
 std::size_t Octree::bytes() const {

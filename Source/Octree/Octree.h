@@ -159,9 +159,9 @@ class Octree {
   /// how loose the fitted boxes are, and grows as a refitted tree degrades. Motion and scaling of
   /// the whole do not change it.
   double looseness() const { return m_looseness; }
-  /// Whether the leaves are at most kMostLoosening times as loose as at their tightest since the
+  /// Whether the leaves are at most kMaxLoosening times as loose as at their tightest since the
   /// build. Otherwise the tree should be built again.
-  bool isTight() const { return m_looseness <= kMostLoosening * m_leastLooseness; }
+  bool isTight() const { return m_looseness <= kMaxLoosening * m_leastLooseness; }
 
   const OctreeBlock* blocks() const { return m_nodes.pool.data(); }
   const BlockPool& pool() const { return m_nodes.pool; }
@@ -187,7 +187,7 @@ class Octree {
   }
 
  private:
-  static constexpr double kMostLoosening = 1.5;
+  static constexpr double kMaxLoosening = 1.5;
   enum class Stage { Empty, LaidOut, Built };
   [[noreturn]] static void throwNotBuilt();
 
@@ -199,7 +199,7 @@ class Octree {
   Buffer<FloatBox> m_groupBoxes;
   Buffer<double> m_groupAreas;  ///< one sum for each chunk of groups
   double m_looseness = 0, m_leastLooseness = 0;
-  bool m_builtNow = false;  ///< looseness was not measured since the build
+  bool m_isUnmeasured = false;  ///< looseness was not measured since the build
 };
 
 }  // namespace palpate

@@ -65,8 +65,7 @@ void OctreeBuilder::layOutTop(const KeySort& keys, std::uint32_t size, const Cub
                               const OctreeSettings& settings, const Threads& threads) {
   if (m_ends.empty()) m_ends.resize(1);
   const std::uint32_t taskSize = size < kSerialSize ? 0 : std::max<std::uint32_t>(size / 64, 1024);
-  m_layouts[0].layOutTop(keys, Layout::jobOfRoot(size, root), settings, taskSize, m_ends[0],
-                         threads);
+  m_layouts[0].layOutTop(keys, Layout::rootJob(size, root), settings, taskSize, m_ends[0], threads);
 }
 
 void OctreeBuilder::layOutTasks(const KeySort& keys, const OctreeSettings& settings,

@@ -11,17 +11,18 @@
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
 
-constexpr std::size_t kSide = 16;  ///< elements tested together
+constexpr std::size_t kTestedTogether = 16;  ///< elements
 
 /// Tests at most `size` boxes from `first` on: sixteen elements or eight siblings, as the map
-/// places them. Bit i is set if `take(d, boxes, lane)` is true for box i.
-template <class D, class Boxes, class Take>
-HWY_ATTR HWY_INLINE std::uint32_t takeBoxes(D d, const Boxes& from, std::size_t first,
-                                            std::size_t size, const BoxMap& map, Take&& take) {
+/// places them. Bit i is set if `select(d, boxes, lane)` is true for box i.
+template <class D, class Boxes, class Select>
+HWY_ATTR HWY_INLINE std::uint32_t selectBoxes(D d, const Boxes& from, std::size_t first,
+                                              std::size_t size, const BoxMap& map,
+                                              Select&& select) {
   std::uint32_t bits = 0;
   for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
-    const auto boxes = BoxLanes<D>::load(from, first + i).turned(map);
-    bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), take(d, boxes, i))) << i;
+    const auto boxes = BoxLanes<D>::load(from, first + i).mapped(map);
+    bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), select(d, boxes, i))) << i;
   }
   return bits;
 }
@@ -33,13 +34,13 @@ float boundOf(double distanceSquared) {
   return OutwardRounding::up(static_cast<float>(distanceSquared) * (1.0f + 0x1p-19f));
 }
 
-/// Descends depth first from the root, nearest siblings first. take() selects boxes and writes
+/// Descends depth first from the root, nearest siblings first. select() tests boxes and writes
 /// their squared distances to `squares`. A selected node or element is skipped if its distance
 /// exceeds `bound` when its turn comes. element(place) is called for each remaining element, and
 /// may lower the bound.
-template <class Take, class Element>
+template <class Select, class Element>
 HWY_ATTR HWY_INLINE void descend(const Octree& octree, const BoxMap& map, PointQueryStack& stack,
-                                 const float* squares, const float& bound, Take&& take,
+                                 const float* squares, const float& bound, Select&& select,
                                  Element&& element) {
   using Entry = PointQueryStack::Entry;
   stack.entries.assign(1, {0, 0});
@@ -48,9 +49,9 @@ HWY_ATTR HWY_INLINE void descend(const Octree& octree, const BoxMap& map, PointQ
     stack.entries.pop_back();
     if (entry.distanceSquared > bound) continue;
     const auto [begin, end] = octree.ownRange(entry.node);
-    for (std::uint32_t i = begin; i < end; i += kSide) {
-      const std::size_t size = std::min<std::size_t>(kSide, end - i);
-      std::uint32_t bits = takeBoxes(LeafTag(), octree.boxes(), i, size, map, take);
+    for (std::uint32_t i = begin; i < end; i += kTestedTogether) {
+      const std::size_t size = std::min<std::size_t>(kTestedTogether, end - i);
+      std::uint32_t bits = selectBoxes(LeafTag(), octree.boxes(), i, size, map, select);
       for (; bits; bits &= bits - 1) {
         const auto lane = static_cast<std::uint32_t>(std::countr_zero(bits));
         if (squares[lane] <= bound) element(i + lane);
@@ -59,7 +60,7 @@ HWY_ATTR HWY_INLINE void descend(const Octree& octree, const BoxMap& map, PointQ
     const OctreeNode child = octree.firstChild(entry.node);
     if (child == 0) continue;
     const std::size_t first = stack.entries.size();
-    std::uint32_t bits = takeBoxes(NodeTag(), octree.blocks()[child >> 3], 0, 8, map, take);
+    std::uint32_t bits = selectBoxes(NodeTag(), octree.blocks()[child >> 3], 0, 8, map, select);
     for (; bits; bits &= bits - 1) {
       const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
       const Entry next{squares[slot], child + slot};
@@ -79,24 +80,24 @@ HWY_ATTR void findOverlappingKernel(const Octree& octree, const BoxMap& map, con
   const auto overlapping = [&](auto, const auto& boxes, std::size_t)
                                HWY_ATTR { return boxes.overlapping(box); };
   stack.found.clear();
-  if (!takeBoxes(BoxTag(), octree.blocks()[0], 0, 1, map, overlapping)) return;
-  constexpr float kNoSquares[kSide] = {};
+  if (!selectBoxes(BoxTag(), octree.blocks()[0], 0, 1, map, overlapping)) return;
+  constexpr float kNoSquares[kTestedTogether] = {};
   descend(octree, map, stack, kNoSquares, 0.0f, overlapping,
           [&](std::uint32_t place) { stack.found.push_back(place); });
 }
 
-HWY_ATTR void tryNearestKernel(const Octree& octree, const BoxMap& map, const FloatBox& point,
-                               double distanceSquared, PointQueryStack& stack, void* context,
-                               TryElement tryElement) {
+HWY_ATTR void visitNearestKernel(const Octree& octree, const BoxMap& map, const FloatBox& point,
+                                 double distanceSquared, PointQueryStack& stack, void* context,
+                                 VisitElement visitElement) {
   float bound = boundOf(distanceSquared);
-  alignas(64) float squares[kSide];
+  alignas(64) float squares[kTestedTogether];
   const auto within = [&](auto d, const auto& boxes, std::size_t i) HWY_ATTR {
     const auto distances = boxes.distanceFrom(point);
     hn::Store(distances, d, squares + i);
     return hn::Le(distances, hn::Set(d, bound));
   };
   descend(octree, map, stack, squares, bound, within,
-          [&](std::uint32_t place) { bound = boundOf(tryElement(context, place)); });
+          [&](std::uint32_t place) { bound = boundOf(visitElement(context, place)); });
 }
 
 }  // namespace palpate::HWY_NAMESPACE
@@ -106,7 +107,7 @@ HWY_AFTER_NAMESPACE();
 namespace palpate {
 
 HWY_EXPORT(findOverlappingKernel);
-HWY_EXPORT(tryNearestKernel);
+HWY_EXPORT(visitNearestKernel);
 
 void findOverlapping(const Octree& octree, const BoxMap& map, const FloatBox& box,
                      PointQueryStack& stack) {
@@ -114,12 +115,12 @@ void findOverlapping(const Octree& octree, const BoxMap& map, const FloatBox& bo
   HWY_DYNAMIC_DISPATCH(findOverlappingKernel)(octree, map, box, stack);
 }
 
-void tryNearest(const Octree& octree, const BoxMap& map, const FloatBox& point,
-                double distanceSquared, PointQueryStack& stack, void* context,
-                TryElement tryElement) {
+void visitNearest(const Octree& octree, const BoxMap& map, const FloatBox& point,
+                  double distanceSquared, PointQueryStack& stack, void* context,
+                  VisitElement visitElement) {
   octree.requireBuilt();
-  HWY_DYNAMIC_DISPATCH(tryNearestKernel)
-  (octree, map, point, distanceSquared, stack, context, tryElement);
+  HWY_DYNAMIC_DISPATCH(visitNearestKernel)
+  (octree, map, point, distanceSquared, stack, context, visitElement);
 }
 
 }  // namespace palpate

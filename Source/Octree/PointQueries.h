@@ -55,22 +55,22 @@ void findOverlapping(const Octree&, const BoxMap&, const FloatBox& box, PointQue
 
 /// Tests the element at a place of the octree's order. Returns the least squared distance found so
 /// far.
-using TryElement = double (*)(void* context, std::uint32_t place);
+using VisitElement = double (*)(void* context, std::uint32_t place);
 
 /// Visits nearest nodes first. Stops when the box of no other element, as the map places it, is as
 /// near to the point as the least squared distance found. All distances are in the octree's floats.
 /// point: a box around the point. distanceSquared: elements further away than this are ignored.
-void tryNearest(const Octree&, const BoxMap&, const FloatBox& point, double distanceSquared,
-                PointQueryStack& stack, void* context, TryElement tryElement);
+void visitNearest(const Octree&, const BoxMap&, const FloatBox& point, double distanceSquared,
+                  PointQueryStack& stack, void* context, VisitElement visitElement);
 
-/// tryNearest() with f(place) in place of the function pointer.
+/// visitNearest() with f(place) in place of the function pointer.
 template <class F>
 void forEachNearest(const Octree& octree, const BoxMap& map, const FloatBox& point,
                     double distanceSquared, PointQueryStack& stack, F&& f) {
   const auto call = [](void* context, std::uint32_t place) {
     return (*static_cast<std::remove_reference_t<F>*>(context))(place);
   };
-  tryNearest(octree, map, point, distanceSquared, stack, &f, call);
+  visitNearest(octree, map, point, distanceSquared, stack, &f, call);
 }
 
 }  // namespace palpate

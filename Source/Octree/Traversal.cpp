@@ -19,10 +19,10 @@ struct LeafRange {
 };
 
 /// How boxes are transformed: not at all, a's boxes are shifted, or the boxes of at least one tree
-/// are turned.
-enum class Placing { None, Shifted, Turned };
+/// are mapped by a BoxMap.
+enum class Placement { None, Shifted, Mapped };
 
-template <Placing placing>
+template <Placement placement>
 class Walk {
  public:
   Walk(const TreePair& trees, TraversalStack& stack, PairSink& sink)
@@ -54,9 +54,9 @@ class Walk {
   HWY_ATTR void step(NodePair pair) {
     const bool leafA = isLeaf(m_a, pair.a), leafB = isLeaf(m_b, pair.b);
     if (m_trees.self() && pair.a == pair.b)
-      leafA ? withinLeaf(range(*m_trees.a, pair.a)) : withinNode(pair.a);
+      leafA ? compareWithinLeaf(range(*m_trees.a, pair.a)) : descendWithinNode(pair.a);
     else if (leafA && leafB)
-      leaves(pair);
+      compareLeaves(pair);
     else if (leafA)
       descendB(pair);
     else if (leafB)
@@ -76,13 +76,13 @@ class Walk {
 
   template <class D>
   HWY_ATTR HWY_INLINE BoxLanes<D> placedA(const BoxLanes<D>& boxes) const {
-    if (placing == Placing::None) return boxes;
-    if (placing == Placing::Turned && m_trees.mapA.count > 0) return boxes.turned(m_trees.mapA);
+    if (placement == Placement::None) return boxes;
+    if (placement == Placement::Mapped && m_trees.mapA.count > 0) return boxes.mapped(m_trees.mapA);
     return boxes.shifted(m_trees.shiftLower, m_trees.shiftUpper);
   }
   template <class D>
   HWY_ATTR HWY_INLINE BoxLanes<D> placedB(const BoxLanes<D>& boxes) const {
-    return placing == Placing::Turned ? boxes.turned(m_trees.mapB) : boxes;
+    return placement == Placement::Mapped ? boxes.mapped(m_trees.mapB) : boxes;
   }
 
   /// The box of one node of a, in the frame in which boxes are compared.
@@ -193,7 +193,7 @@ class Walk {
     }
   }
 
-  HWY_ATTR void withinNode(OctreeNode node) {
+  HWY_ATTR void descendWithinNode(OctreeNode node) {
     const OctreeNode child = m_a[node >> 3].child[node & 7];
     const OctreeBlock& siblings = m_a[child];
     const bool own = hasOwn(m_a, node);
@@ -218,7 +218,7 @@ class Walk {
     std::uint32_t bits;                ///< elements that may overlap the other leaf
   };
 
-  HWY_ATTR HWY_INLINE void leaves(NodePair pair) {
+  HWY_ATTR HWY_INLINE void compareLeaves(NodePair pair) {
     const LeafRange a = range(*m_trees.a, pair.a), b = range(*m_trees.b, pair.b);
     const OctreeNode nodeB = pair.b & ~NodePair::kOwn;
     const FloatBox box = boxOfB(m_b[nodeB >> 3], nodeB & 7);
@@ -229,7 +229,7 @@ class Walk {
     }
   }
 
-  HWY_ATTR void withinLeaf(LeafRange leaf) {
+  HWY_ATTR void compareWithinLeaf(LeafRange leaf) {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     const FloatBox all{{-kInfinity, -kInfinity, -kInfinity, 0},
                        {kInfinity, kInfinity, kInfinity, 0}};
@@ -247,14 +247,14 @@ class Walk {
     rows.first = first;
     rows.bits = 0;
     for (int k = 0; k < 3; ++k) {
-      const bool asTheyAre = placing == Placing::None;
-      rows.lower[k] = asTheyAre ? m_boxesA.lower[k].data() + first : rows.placed[0][k];
-      rows.upper[k] = asTheyAre ? m_boxesA.upper[k].data() + first : rows.placed[1][k];
+      const bool usesTreeBoxes = placement == Placement::None;
+      rows.lower[k] = usesTreeBoxes ? m_boxesA.lower[k].data() + first : rows.placed[0][k];
+      rows.upper[k] = usesTreeBoxes ? m_boxesA.upper[k].data() + first : rows.placed[1][k];
     }
     for (std::size_t lane = 0; lane < Rows::kMost && first + lane < end; lane += hn::Lanes(d)) {
       const std::size_t i = first + lane;
       const auto boxes = placedA(BoxLanes<LeafTag>::load(m_boxesA, i));
-      for (int k = 0; k < 3 && placing != Placing::None; ++k) {
+      for (int k = 0; k < 3 && placement != Placement::None; ++k) {
         hn::Store(boxes.lower[k], d, rows.placed[0][k] + lane);
         hn::Store(boxes.upper[k], d, rows.placed[1][k] + lane);
       }
@@ -300,7 +300,7 @@ class Walk {
   template <class V, class M>
   HWY_ATTR HWY_INLINE void emit(V a, V b, M found) {
     const hn::DFromV<V> du;
-    ElementPair* const out = m_sink.room();
+    ElementPair* const out = m_sink.reserveSpace();
     if (m_trees.self()) {
       const V lower = hn::Min(a, b);
       b = hn::Max(a, b);
@@ -336,12 +336,12 @@ class Walk {
 
 template <class F>
 HWY_ATTR void withWalk(const TreePair& trees, TraversalStack& stack, PairSink& sink, F&& f) {
-  if (trees.turned())
-    f(Walk<Placing::Turned>(trees, stack, sink));
-  else if (trees.shifted())
-    f(Walk<Placing::Shifted>(trees, stack, sink));
+  if (trees.isMapped())
+    f(Walk<Placement::Mapped>(trees, stack, sink));
+  else if (trees.isShifted())
+    f(Walk<Placement::Shifted>(trees, stack, sink));
   else
-    f(Walk<Placing::None>(trees, stack, sink));
+    f(Walk<Placement::None>(trees, stack, sink));
 }
 
 template <class W>

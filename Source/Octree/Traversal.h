@@ -28,7 +28,7 @@ class PairSink {
  public:
   using Function = void (*)(void* context, std::span<const ElementPair>);
   static constexpr std::size_t kBatch = 4096;
-  static constexpr std::size_t kMostAtOnce = 16;  ///< pairs that room() makes room for
+  static constexpr std::size_t kMaxAtOnce = 16;  ///< pairs for which reserveSpace() reserves space
 
   void start(Function function, void* context) {
     m_function = function;
@@ -37,12 +37,12 @@ class PairSink {
     m_total = 0;
     m_pairs.resize(std::max(m_pairs.capacity(), kBatch));
   }
-  /// Room for kMostAtOnce pairs; advance() says how many were written.
-  ElementPair* room() {
-    if (m_size + kMostAtOnce > m_pairs.size()) {
+  /// Returns space for kMaxAtOnce pairs. Call advance() with the number of pairs written there.
+  ElementPair* reserveSpace() {
+    if (m_size + kMaxAtOnce > m_pairs.size()) {
       if (m_function) flush();
-      if (m_size + kMostAtOnce > m_pairs.size())
-        m_pairs.resize(std::max({2 * m_pairs.size(), m_size + kMostAtOnce, kBatch}));
+      if (m_size + kMaxAtOnce > m_pairs.size())
+        m_pairs.resize(std::max({2 * m_pairs.size(), m_size + kMaxAtOnce, kBatch}));
     }
     return m_pairs.data() + m_size;
   }
@@ -86,8 +86,8 @@ struct TreePair {
   BoxMap mapA{}, mapB{};
 
   bool self() const { return a == b; }
-  bool turned() const { return mapA.count > 0 || mapB.count > 0; }
-  bool shifted() const {
+  bool isMapped() const { return mapA.count > 0 || mapB.count > 0; }
+  bool isShifted() const {
     const std::array<float, 4> none{};
     return shiftLower != none || shiftUpper != none;
   }

@@ -18,26 +18,27 @@ class Validation {
     }
     const BlockPool& pool = m_octree.pool();
     if (pool.used() + pool.free() != pool.allocated())
-      fail(0, "used and free blocks do not add up to the allocated");
+      fail(0, "the numbers of used and free blocks do not sum to that of allocated blocks");
     m_holders.assign(m_octree.size(), 0);
-    m_blockSeen.assign(pool.used(), false);
-    m_blockSeen[0] = true;
+    m_blockVisited.assign(pool.used(), false);
+    m_blockVisited[0] = true;
     const FloatBox all = visit(0, m_octree.rootCube());
     if (all.empty()) fail(0, "the root is empty");
     for (std::size_t i = 0; i < m_holders.size(); ++i)
       if (m_holders[i] != 1)
         fail(0, "element " + std::to_string(m_octree.order()[i]) + " is in " +
-                    std::to_string(m_holders[i]) + " nodes");
+                    std::to_string(m_holders[i]) + " nodes instead of 1");
     std::vector<bool> ids(m_octree.size(), false);
     for (const std::uint32_t id : m_octree.order()) {
       if (id >= ids.size() || ids[id]) {
-        fail(0, "the order is no permutation: element " + std::to_string(id));
+        fail(0, "the order is not a permutation: element " + std::to_string(id) +
+                    " is repeated or out of range");
         break;
       }
       ids[id] = true;
     }
-    for (std::size_t block = 0; block < m_blockSeen.size(); ++block)
-      if (!m_blockSeen[block])
+    for (std::size_t block = 0; block < m_blockVisited.size(); ++block)
+      if (!m_blockVisited[block])
         fail(static_cast<OctreeNode>(block * 8), "a block in use has no parent");
     return std::move(m_failures);
   }
@@ -64,12 +65,12 @@ class Validation {
     }
     if (!block.isLeaf(slot)) {
       const std::uint32_t child = block.child[slot];
-      if (child >= m_blockSeen.size() || m_blockSeen[child]) {
+      if (child >= m_blockVisited.size() || m_blockVisited[child]) {
         fail(node, "its child block is shared or out of bounds");
         return box;
       }
-      m_blockSeen[child] = true;
-      if (m_octree.parent(child) != node) fail(node, "its children name another parent");
+      m_blockVisited[child] = true;
+      if (m_octree.parent(child) != node) fail(node, "its child block refers to another parent");
       for (unsigned octant = 0; octant < 8; ++octant) {
         if (m_octree.blocks()[child].isEmpty(octant)) {
           if (!m_octree.blocks()[child].box(octant).empty())
@@ -81,7 +82,7 @@ class Validation {
     }
     const FloatBox fitted = block.box(slot);
     if (fitted.lower != box.lower || fitted.upper != box.upper)
-      fail(node, "its fitted box is not the tight one");
+      fail(node, "its fitted box differs from the bounds of its elements and children");
     return box;
   }
 
@@ -96,7 +97,7 @@ class Validation {
       // The cell of the centre is computed in float arithmetic relative to a cube up to 2^9 times
       // as long, with four roundings of 2^-24 of that length. The margin for rounding in levels,
       // 2^-10 of the size, is larger.
-      static_assert(Key::kMostLevels == 9);
+      static_assert(Key::kMaxLevels == 9);
       const double centre = 0.5 * (lower + upper), slack = cube.edge * 0x1p-13;
       if (centre < -slack || centre > cube.edge + slack)
         fail(node, "the centre of " + element() + " is outside its cell");
@@ -107,14 +108,14 @@ class Validation {
     // A split cell's own element is too large for the cell's children. A leaf may have elements of
     // any size.
     if (!leaf && longest * (1.0 + 0x1p-9) < 0.5 * cube.edge)
-      fail(node, element() + " belongs deeper");
+      fail(node, element() + " fits into a child cell");
   }
 
   const Octree& m_octree;
   bool m_cells;
   std::vector<std::string> m_failures;
   std::vector<int> m_holders;
-  std::vector<bool> m_blockSeen;
+  std::vector<bool> m_blockVisited;
 };
 
 }  // namespace

@@ -35,9 +35,9 @@ bool isBeyond(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::V
 }
 
 /// Point queries for one body.
-class Body {
+class BodyQuery {
  public:
-  Body(const SearchableGeometry& geometry, Engine engine, PointQueryStack& stack)
+  BodyQuery(const SearchableGeometry& geometry, Engine engine, PointQueryStack& stack)
       : m_geometry(geometry),
         m_bruteForce(engine == Engine::BruteForce),
         m_stack(stack),
@@ -74,7 +74,7 @@ class Body {
                                 Eigen::Vector3d::Zero(),  std::numeric_limits<double>::infinity(),
                                 TriangleFeature::CornerA, false};
     std::uint32_t at = 0, id = 0xffffffffu;
-    const auto tryOne = [&](std::uint32_t i) {
+    const auto testOne = [&](std::uint32_t i) {
       const auto& [a, b, c] = m_geometry.tree.ordered()[i];
       const auto& now = m_geometry.mesh.now;
       if (!m_bruteForce && isBeyond(p, now[a], now[b], now[c], best.distance)) return;
@@ -88,7 +88,7 @@ class Body {
       id = own;
     };
     if (m_bruteForce) {
-      for (std::uint32_t i = 0; i < size(); ++i) tryOne(i);
+      for (std::uint32_t i = 0; i < size(); ++i) testOne(i);
     } else {
       // A little more than the best distance squared: distances are rounded, and the search must
       // also find equally near triangles.
@@ -96,10 +96,10 @@ class Body {
         const double distance = best.distance * m_geometry.tree.frame().scale;
         return distance * distance * (1 + kNearestError);
       };
-      tryOne(std::min(m_last, size() - 1));
+      testOne(std::min(m_last, size() - 1));
       forEachNearest(m_geometry.tree.octree(), m_frame.map(), m_frame.boxOf(p), bound(), m_stack,
                      [&](std::uint32_t i) {
-                       tryOne(i);
+                       testOne(i);
                        return bound();
                      });
       m_last = at;
@@ -134,19 +134,20 @@ void findInside(const SearchableGeometry& vertices, const SearchableGeometry& bo
   const bool closed = settings.rule == InsideRule::Closed,
              bruteForce = engine == Engine::BruteForce;
   searchVertices(vertices.mesh.topology, threads, scratch, out, [&](PointQueryStack& stack) {
-    return [&, asked = Body(body, engine, stack), solid = SolidQuery(body, engine, stack)](
+    return [&, bodyQuery = BodyQuery(body, engine, stack),
+            solidQuery = SolidQuery(body, engine, stack)](
                std::uint32_t v) mutable -> std::optional<InsideVertex> {
       const Eigen::Vector3d& p = vertices.mesh.now[v];
-      const auto isIn = [&] {
-        return body.solid ? solid.lowest(p).has_value()
-                          : asked.mayContain(p) && asked.windingNumber(p) != 0;
+      const auto isInside = [&] {
+        return body.solid ? solidQuery.lowest(p).has_value()
+                          : bodyQuery.mayContain(p) && bodyQuery.windingNumber(p) != 0;
       };
-      const WindingNumbers::Answer answer =
-          closed ? WindingNumbers::Answer{isIn(), true}
-                 : body.windingNumbers.ask(body, p, settings.margin, bruteForce, stack);
-      if (!answer.inside) return {};
-      InsideVertex inside = asked.nearest(v, p);
-      inside.decided = answer.decided;
+      const WindingNumbers::Result result =
+          closed ? WindingNumbers::Result{isInside(), true}
+                 : body.windingNumbers.evaluate(body, p, settings.margin, bruteForce, stack);
+      if (!result.inside) return {};
+      InsideVertex inside = bodyQuery.nearest(v, p);
+      inside.decided = result.decided;
       if (!(inside.depth > 0)) return {};
       return inside;
     };
@@ -162,7 +163,7 @@ void checkInside(SearchableGeometry& body, const InsideSettings& settings) {
   if (!(settings.margin >= 0.0 && settings.margin < 0.5))
     throw Error(ErrorCode::InvalidSettings,
                 nameOf(body.id) + ": margin is " + textOf(settings.margin) +
-                    "; it must be from 0 to below 1/2",
+                    "; it must be at least 0 and below 0.5",
                 body.id);
   MeshTopology& topology = body.mesh.topology;
   if (!topology.hasFaces())
@@ -174,16 +175,16 @@ void checkInside(SearchableGeometry& body, const InsideSettings& settings) {
   if (!topology.closed) topology.closed = findMeshDefects(topology.triangles).closed();
   if (*topology.closed) return;
   const MeshDefects defects = findMeshDefects(topology.triangles);
-  const auto said = [](const std::vector<Segment>& edges, const char* what) {
+  const auto describe = [](const std::vector<Segment>& edges, const char* what) {
     if (edges.empty()) return std::string();
-    return ", " + std::to_string(edges.size()) + " edges " + what + ", the first of vertices " +
-           std::to_string(edges[0][0]) + " and " + std::to_string(edges[0][1]);
+    return "; " + std::to_string(edges.size()) + " edges " + what + ", the first is (" +
+           std::to_string(edges[0][0]) + ", " + std::to_string(edges[0][1]) + ")";
   };
   throw Error(ErrorCode::NotClosed,
               nameOf(body.id) + " has no inside: it is not closed and consistently oriented" +
-                  said(defects.open, "have one triangle only") +
-                  said(defects.flipped, "are run through twice in one direction") +
-                  said(defects.shared, "have three triangles or more"),
+                  describe(defects.open, "belong to one triangle only") +
+                  describe(defects.flipped, "have the same direction in both of their triangles") +
+                  describe(defects.shared, "belong to three triangles or more"),
               body.id);
 }
 

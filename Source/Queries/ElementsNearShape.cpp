@@ -8,21 +8,21 @@
 namespace palpate {
 
 void findElementsNear(const SearchableGeometry& geometry, const Shape& before, const Shape& now,
-                      double reach, PointQueryStack& stack, Buffer<std::uint32_t>& out) {
+                      double maxDistance, PointQueryStack& stack, Buffer<std::uint32_t>& out) {
   using Eigen::Vector3d;
   const bool wholeStep = &before != &now;
   const Vector3d origin = worldOrigin(geometry);
   const BoxMap map = worldMap(geometry, origin, 0.0, wholeStep);
   const double unit = 1.0 / geometry.tree.frame().scale;
-  const double error = kShapeBoundError * (before.magnitude() + now.magnitude() + reach +
+  const double error = kShapeBoundError * (before.magnitude() + now.magnitude() + maxDistance +
                                            2.0 * origin.cwiseAbs().maxCoeff());
   Eigen::AlignedBox3d swept;
   for (const Shape* shape : {&before, &now})
     for (const Vector3d& corner : shape->corners()) swept.extend(corner - origin);
   const ShapeStep step(before, now);
-  const Vector3d grown = Vector3d::Constant(reach + now.radius() + error);
+  const Vector3d grown = Vector3d::Constant(maxDistance + now.radius() + error);
   swept = {swept.min() - grown, swept.max() + grown};
-  const auto mayReach = [&](const FloatBox& stored) {
+  const auto mayBeNear = [&](const FloatBox& stored) {
     if (stored.empty()) return false;
     const FloatBox floats = map(stored);
     if (floats.mayBeClamped()) return true;
@@ -30,19 +30,19 @@ void findElementsNear(const SearchableGeometry& geometry, const Shape& before, c
     for (int k = 0; k < 3; ++k) box.min()[k] = floats.lower[k], box.max()[k] = floats.upper[k];
     box = {unit * box.min(), unit * box.max()};
     if (wholeStep && now.isPlane())
-      return step.mayComeNear({box.min() + origin, box.max() + origin}, reach);
+      return step.mayComeNear({box.min() + origin, box.max() + origin}, maxDistance);
     if (wholeStep) return swept.intersects(box);
     const Vector3d centre = box.center() + origin;
-    const SignedDistance at = now.at(centre);
+    const SignedDistance at = now.signedDistance(centre);
     const double size = centre.cwiseAbs().maxCoeff() + box.sizes().sum();
     return !(at.distance - 0.5 * at.normal.cwiseAbs().dot(box.sizes()) >
-             reach + error + kShapeBoundError * size);  // NaN: it may
+             maxDistance + error + kShapeBoundError * size);  // NaN: it may
   };
   out.clear();
-  forEachOverlapping(geometry.tree.octree(), mayReach, stack,
+  forEachOverlapping(geometry.tree.octree(), mayBeNear, stack,
                      [&](std::uint32_t begin, std::uint32_t end) {
                        for (std::uint32_t i = begin; i < end; ++i)
-                         if (mayReach(geometry.tree.octree().boxes()[i]))
+                         if (mayBeNear(geometry.tree.octree().boxes()[i]))
                            out.push_back(geometry.tree.octree().order()[i]);
                      });
 }

@@ -5,13 +5,13 @@
 
 namespace palpate {
 
-/// Finds all elements in the geometry's octree that are within `reach` of the shape at some time of
-/// the step, and some more. before, now: the shape at the ends of the step. Pass the same object
-/// twice for the step's end alone.
+/// Finds all elements in the geometry's octree that are within `maxDistance` of the shape at some
+/// time of the step, and some more. before, now: the shape at the ends of the step. Pass the same
+/// object twice for the step's end alone.
 ///
 /// Source   The distance to a convex shape is convex. Over a box it is therefore at least the
 ///          distance at the centre minus what the gradient there takes away up to a corner.
 void findElementsNear(const SearchableGeometry&, const Shape& before, const Shape& now,
-                      double reach, PointQueryStack&, Buffer<std::uint32_t>& out);
+                      double maxDistance, PointQueryStack&, Buffer<std::uint32_t>& out);
 
 }  // namespace palpate

@@ -9,12 +9,12 @@ void updateTetrahedra(SearchableGeometry& solid, const OctreeSettings& settings,
   const DerivedFrom<2>::Sources now{solid.revisions.topology, solid.mesh.now.bodyRevision()};
   const FloatFrame& frame = solid.tree.frame();
   Solid& tetrahedra = *solid.solid;
-  if (tetrahedra.treeOf.isCurrent(now) && tetrahedra.treeFrame == frame) return;
-  tetrahedra.treeOf.invalidate();
+  if (tetrahedra.treeVersion.isCurrent(now) && tetrahedra.treeFrame == frame) return;
+  tetrahedra.treeVersion.invalidate();
   tetrahedra.tree.update(tetrahedra.topology.tetrahedra, solid.tree.floats(),
                          solid.tree.spread() * frame.scale, settings, threads);
   tetrahedra.treeFrame = frame;
-  tetrahedra.treeOf.commit(now);
+  tetrahedra.treeVersion.commit(now);
 }
 
 std::optional<TetrahedronPoint> SolidQuery::lowest(const Eigen::Vector3d& p) {
@@ -22,20 +22,20 @@ std::optional<TetrahedronPoint> SolidQuery::lowest(const Eigen::Vector3d& p) {
   const Positions& now = m_solid.mesh.now;
   std::optional<TetrahedronPoint> best;
   SignCounts counts;
-  const auto tryOne = [&](std::uint32_t id, const Tetrahedron& t) {
+  const auto testOne = [&](std::uint32_t id, const Tetrahedron& t) {
     if (best && best->tetrahedron < id) return;
     if (const auto weights =
             tetrahedronWeights(p, now[t[0]], now[t[1]], now[t[2]], now[t[3]], counts))
       best = {id, t, *weights};
   };
   if (m_bruteForce) {
-    for (std::uint32_t i = 0; i < tetrahedra.size(); ++i) tryOne(i, tetrahedra[i]);
+    for (std::uint32_t i = 0; i < tetrahedra.size(); ++i) testOne(i, tetrahedra[i]);
     return best;
   }
   const TetrahedronTree& tree = m_solid.solid->tree;
   if (tree.octree().size() == 0) return best;
   findOverlapping(tree.octree(), m_frame.map(), m_frame.boxOf(p), m_stack);
-  for (const std::uint32_t i : m_stack.found) tryOne(tree.octree().order()[i], tree.ordered()[i]);
+  for (const std::uint32_t i : m_stack.found) testOne(tree.octree().order()[i], tree.ordered()[i]);
   return best;
 }
 

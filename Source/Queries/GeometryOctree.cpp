@@ -31,17 +31,17 @@ GeometryOctree::Derived::Sources GeometryOctree::sources(const TriangleMesh& mes
 }
 
 bool GeometryOctree::isCurrent(const TriangleMesh& mesh, Revision topology, double scale) const {
-  return m_tree.isCurrent(sources(mesh, topology)) && m_frame.scale == scale;
+  return m_treeVersion.isCurrent(sources(mesh, topology)) && m_frame.scale == scale;
 }
 
 bool GeometryOctree::encloses(const TriangleMesh& mesh, Revision topology) const {
-  return m_tree.isValid() && m_isBuilt && m_tree.sources()[0] == topology &&
-         m_tree.sources()[1] == mesh.now.bodyRevision();
+  return m_treeVersion.isValid() && m_isBuilt && m_treeVersion.sources()[0] == topology &&
+         m_treeVersion.sources()[1] == mesh.now.bodyRevision();
 }
 
 double GeometryOctree::sampleFrame(const TriangleMesh& mesh, Revision topology) {
-  if (!m_tree.isCurrent(sources(mesh, topology))) {
-    m_tree.invalidate();
+  if (!m_treeVersion.isCurrent(sources(mesh, topology))) {
+    m_treeVersion.invalidate();
     const SampledExtent extent = sampleExtent(mesh.now.body());
     m_frame.origin = extent.median;
     m_spread = extent.spread;
@@ -52,9 +52,9 @@ double GeometryOctree::sampleFrame(const TriangleMesh& mesh, Revision topology) 
 void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double scale,
                             const OctreeSettings& settings, const Threads& threads) {
   const Derived::Sources now = sources(mesh, topology);
-  const bool isSameTopology = m_tree.sources()[0] == topology;
+  const bool isSameTopology = m_treeVersion.sources()[0] == topology;
   const bool canRefit = m_isBuilt && isSameTopology;
-  m_tree.invalidate();
+  m_treeVersion.invalidate();
   m_isBuilt = false;
   m_frame.scale = scale;
   m_treeSwept = m_swept && !mesh.now.hasSameBody(mesh.before);
@@ -85,7 +85,7 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
     m_isBuilt = true;
   }
   ++m_updates;
-  m_tree.commit(now);
+  m_treeVersion.commit(now);
 }
 
 /// Computes the boxes of the triangles in m_ordered, and those of the groups. reordered: first

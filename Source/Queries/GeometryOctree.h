@@ -38,8 +38,8 @@ class GeometryOctree {
 
   /// Whether the boxes enclose the positions now, in the body's frame. They may enclose more.
   bool encloses(const TriangleMesh&, Revision topology) const;
-  std::uint64_t updates() const { return m_updates; }  ///< counts update()
-  bool isValid() const { return m_tree.isValid(); }    ///< no update has failed since
+  std::uint64_t updates() const { return m_updates; }       ///< counts update()
+  bool isValid() const { return m_treeVersion.isValid(); }  ///< no update has failed since
   const Octree& octree() const { return m_octree; }
   const FloatFrame& frame() const { return m_frame; }
   double spread() const { return m_spread; }  ///< L: extent of most positions
@@ -76,9 +76,9 @@ class GeometryOctree {
   Octree m_octree;
   Buffer<std::uint32_t> m_boundsGroups;  ///< scratch of a rebuild
   Buffer<FloatBox> m_boundsBoxes;
-  Derived m_tree;
+  Derived m_treeVersion;
   std::uint64_t m_updates = 0;
-  bool m_isBuilt = false;  ///< for the topology of m_tree; the tree can be refitted
+  bool m_isBuilt = false;  ///< for the topology of m_treeVersion; the tree can be refitted
 };
 
 }  // namespace palpate

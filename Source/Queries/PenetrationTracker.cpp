@@ -39,7 +39,7 @@ std::optional<Eigen::Matrix3d> axesOf(const Corners& t) {
 }
 
 /// The rotation of a triangle between two states; the identity where a triangle has no area.
-Eigen::Matrix3d turnOf(const Corners& before, const Corners& now) {
+Eigen::Matrix3d rotationOf(const Corners& before, const Corners& now) {
   if (before == now) return Eigen::Matrix3d::Identity();
   const auto from = axesOf(before), to = axesOf(now);
   if (!from || !to) return Eigen::Matrix3d::Identity();
@@ -70,7 +70,7 @@ std::optional<Eigen::Vector3d> crossing(const Eigen::Vector3d& p, const Eigen::V
 
 struct PenetrationTracker::Implementation {
   /// A vertex and its surface point at the end of a step.
-  struct Place {
+  struct VertexState {
     std::uint32_t vertex, triangle;
     Eigen::Vector3d barycentric, direction;
     double depth;
@@ -80,10 +80,10 @@ struct PenetrationTracker::Implementation {
   class Search;
 
   GeometryId vertices, body;
-  std::uint64_t source = 0;      ///< SpatialQueries::Source::id()
-  DerivedFrom<2> lastOf, nowOf;  ///< topology of the vertices' geometry and of the body
-  std::uint64_t step = 0;        ///< in which `now` was computed
-  std::vector<Place> last, now;  ///< ascending vertices
+  std::uint64_t sourceId = 0;                ///< SpatialQueries::Source::id()
+  DerivedFrom<2> lastTopology, nowTopology;  ///< topology of the vertices' geometry and of the body
+  std::uint64_t step = 0;                    ///< in which `now` was computed
+  std::vector<VertexState> last, now;        ///< ascending vertices
   std::vector<InsideVertex> inside;
   std::vector<TrackedVertex> found;
   std::vector<PointQueryStack> stacks;
@@ -97,13 +97,13 @@ class PenetrationTracker::Implementation::Search {
 
   /// The first point of the surface from p along a unit direction, at most the distance `most`
   /// away. If it is on several triangles, names the lowest.
-  std::optional<InsideVertex> along(std::uint32_t vertex, const Eigen::Vector3d& p,
-                                    const Eigen::Vector3d& direction, double most) {
+  std::optional<InsideVertex> firstHitAlong(std::uint32_t vertex, const Eigen::Vector3d& p,
+                                            const Eigen::Vector3d& direction, double most) {
     const Eigen::Vector3d q = p + most * direction;
     std::optional<InsideVertex> first;
     if (!q.allFinite()) return first;
     SignCounts counts;
-    const auto tryOne = [&](std::uint32_t i) {
+    const auto testOne = [&](std::uint32_t i) {
       const std::uint32_t id = m_body.tree.octree().order()[i];
       const Triangle& triangle = m_body.tree.ordered()[i];
       const Corners corners = cornersOf(m_body, triangle);
@@ -116,30 +116,30 @@ class PenetrationTracker::Implementation::Search {
       first = {vertex, id, triangle, *weights, direction, depth};
     };
     if (m_bruteForce) {
-      for (std::uint32_t i = 0; i < m_body.tree.ordered().size(); ++i) tryOne(i);
+      for (std::uint32_t i = 0; i < m_body.tree.ordered().size(); ++i) testOne(i);
       return first;
     }
-    FloatBox way = m_frame.boxOf(p);
-    way.add(m_frame.boxOf(q));
-    findOverlapping(m_body.tree.octree(), m_frame.map(), way, m_stack);
-    for (const std::uint32_t i : m_stack.found) tryOne(i);
+    FloatBox segmentBox = m_frame.boxOf(p);
+    segmentBox.add(m_frame.boxOf(q));
+    findOverlapping(m_body.tree.octree(), m_frame.map(), segmentBox, m_stack);
+    for (const std::uint32_t i : m_stack.found) testOne(i);
     return first;
   }
 
   TrackedVertex operator()(const InsideVertex& nearest, const Eigen::Vector3d& p,
-                           const Place* last) {
+                           const VertexState* last) {
     if (!last) return {nearest, nearest, DirectionChange::Entered};
     const Corners corners = cornersOf(m_body, m_body.mesh.topology.triangles[last->triangle]);
-    const Eigen::Matrix3d turn = turnOf(last->triangleAt, corners);
-    const Eigen::Vector3d direction = (turn * last->direction).normalized();
+    const Eigen::Matrix3d rotation = rotationOf(last->triangleAt, corners);
+    const Eigen::Vector3d direction = (rotation * last->direction).normalized();
     const Eigen::Vector3d moved =
         (p - pointAt(corners, last->barycentric)) -
-        turn * (last->position - pointAt(last->triangleAt, last->barycentric));
-    const double explained = moved.norm() / std::sqrt(last->depth) / std::sqrt(nearest.depth);
-    if ((nearest.direction - direction).norm() <= TrackedVertex::kMaxTurn + explained)
+        rotation * (last->position - pointAt(last->triangleAt, last->barycentric));
+    const double turnByMotion = moved.norm() / std::sqrt(last->depth) / std::sqrt(nearest.depth);
+    if ((nearest.direction - direction).norm() <= TrackedVertex::kMaxTurn + turnByMotion)
       return {nearest, nearest, DirectionChange::None};
-    if (const auto kept =
-            along(nearest.vertex, p, direction, TrackedVertex::kMaxDepthRatio * nearest.depth))
+    if (const auto kept = firstHitAlong(nearest.vertex, p, direction,
+                                        TrackedVertex::kMaxDepthRatio * nearest.depth))
       return {*kept, nearest, DirectionChange::Kept};
     return {nearest, nearest, DirectionChange::Jumped};
   }
@@ -170,36 +170,36 @@ std::span<const TrackedVertex> PenetrationTracker::update(const SpatialQueries& 
   const StandardFloatingPoint standard;
   const SearchableGeometry &vertices = source.at(all.vertices), &body = source.at(all.body);
   const std::size_t size = all.inside.size(), parts = (size + kGrain - 1) / kGrain;
-  const bool isSameSource = all.source == source.id();
+  const bool isSameSource = all.sourceId == source.id();
   const bool isNewStep = !isSameSource || all.step != source.step();
   // If a call below throws, only the entries of this step are lost. Those of the step before stay
   // in `last`, and the next update() of this step uses them.
-  if (isNewStep && isSameSource && all.nowOf.isValid()) {
+  if (isNewStep && isSameSource && all.nowTopology.isValid()) {
     std::swap(all.last, all.now);
-    all.lastOf = all.nowOf;
+    all.lastTopology = all.nowTopology;
   }
-  if (!isSameSource) all.lastOf.invalidate();
-  all.nowOf.invalidate();
-  all.source = source.id();
+  if (!isSameSource) all.lastTopology.invalidate();
+  all.nowTopology.invalidate();
+  all.sourceId = source.id();
   all.step = source.step();
   all.found.resize(size);
   all.now.resize(size);
   if (all.stacks.size() < parts) all.stacks.resize(parts);
   const DerivedFrom<2>::Sources topologies{vertices.revisions.topology, body.revisions.topology};
-  using Place = Implementation::Place;
-  const std::span<const Place> places = all.lastOf.isCurrent(topologies)
-                                            ? std::span<const Place>(all.last)
-                                            : std::span<const Place>();
+  using VertexState = Implementation::VertexState;
+  const std::span<const VertexState> previous = all.lastTopology.isCurrent(topologies)
+                                                    ? std::span<const VertexState>(all.last)
+                                                    : std::span<const VertexState>();
   const SpatialQueries::Source::Workers workers(source);
   const Threads& threads = workers;
   threads.forChunks(size, kGrain, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     Implementation::Search search(body, source.engine(), all.stacks[chunk]);
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t vertex = all.inside[i].vertex;
-      const auto last =
-          std::lower_bound(places.begin(), places.end(), vertex,
-                           [](const Place& place, std::uint32_t v) { return place.vertex < v; });
-      const bool known = last != places.end() && last->vertex == vertex;
+      const auto last = std::lower_bound(
+          previous.begin(), previous.end(), vertex,
+          [](const VertexState& state, std::uint32_t v) { return state.vertex < v; });
+      const bool known = last != previous.end() && last->vertex == vertex;
       const Eigen::Vector3d p = vertices.mesh.now[vertex];
       all.found[i] = search(all.inside[i], p, known ? &*last : nullptr);
       const InsideVertex& at = all.found[i].penetration;
@@ -212,7 +212,7 @@ std::span<const TrackedVertex> PenetrationTracker::update(const SpatialQueries& 
                     cornersOf(body, at.corners)};
     }
   });
-  all.nowOf.commit(topologies);
+  all.nowTopology.commit(topologies);
   return all.found;
 }
 

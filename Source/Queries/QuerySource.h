@@ -60,8 +60,8 @@ class SpatialQueries::Source {
   class Workers {
    public:
     explicit Workers(Source& source)
-        : m_lock(source.m_poolUse, std::try_to_lock),
-          m_threads(m_lock ? source.threads() : source.m_one) {}
+        : m_lock(source.m_poolMutex, std::try_to_lock),
+          m_threads(m_lock ? source.threads() : source.m_singleThread) {}
     operator const Threads&() const { return m_threads; }
 
    private:
@@ -75,14 +75,14 @@ class SpatialQueries::Source {
 
  protected:
   /// Locked while octrees, and the structures that queries add to them, are updated.
-  std::mutex m_preparing;
+  std::mutex m_preparationMutex;
 
  private:
   const std::uint64_t m_id;
-  Threads m_one{1};
-  std::mutex m_poolUse;
-  std::mutex m_lending;
-  std::vector<std::unique_ptr<Scratch>> m_free;
+  Threads m_singleThread{1};
+  std::mutex m_poolMutex;
+  std::mutex m_scratchMutex;
+  std::vector<std::unique_ptr<Scratch>> m_freeScratch;
 };
 
 /// Throws InvalidSettings if both geometries are the same, and UnsupportedMethod if `vertices` is a

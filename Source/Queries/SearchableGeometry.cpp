@@ -48,7 +48,7 @@ std::string nameOf(GeometryType type) {
   return kNames[static_cast<std::size_t>(type)];
 }
 
-void checkTopologyKind(const SearchableGeometry& geometry, bool tetrahedra, const char* call) {
+void checkMeshType(const SearchableGeometry& geometry, bool tetrahedra, const char* call) {
   if (geometry.mesh.topology.hasFaces() && (geometry.solid != nullptr) == tetrahedra) return;
   throw Error(ErrorCode::UnsupportedMethod,
               nameOf(geometry.id) + " is " +

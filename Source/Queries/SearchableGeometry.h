@@ -34,7 +34,7 @@ struct Solid {
   TetrahedralTopology topology;
   TetrahedronTree tree;
   /// The topology and positions for which `tree` was updated, and the geometry's float frame then.
-  DerivedFrom<2> treeOf;
+  DerivedFrom<2> treeVersion;
   FloatFrame treeFrame;
 };
 
@@ -67,6 +67,6 @@ std::string nameOf(GeometryId);    ///< "geometry 3"
 std::string nameOf(GeometryType);  ///< "a line mesh"
 /// Throws UnsupportedMethod unless the geometry is a triangle mesh or, with `tetrahedra`, a
 /// tetrahedral mesh. call: the end of the message.
-void checkTopologyKind(const SearchableGeometry&, bool tetrahedra, const char* call);
+void checkMeshType(const SearchableGeometry&, bool tetrahedra, const char* call);
 
 }  // namespace palpate

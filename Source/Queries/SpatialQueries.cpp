@@ -30,10 +30,10 @@ SpatialQueries::Source::Source() : m_id(nextSourceId()) {}
 
 SpatialQueries::Source::Loan::Loan(Source& source) : m_source(source) {
   {
-    const std::lock_guard lock(source.m_lending);
-    if (!source.m_free.empty()) {
-      m_scratch = std::move(source.m_free.back());
-      source.m_free.pop_back();
+    const std::lock_guard lock(source.m_scratchMutex);
+    if (!source.m_freeScratch.empty()) {
+      m_scratch = std::move(source.m_freeScratch.back());
+      source.m_freeScratch.pop_back();
       return;
     }
   }
@@ -41,16 +41,16 @@ SpatialQueries::Source::Loan::Loan(Source& source) : m_source(source) {
 }
 
 SpatialQueries::Source::Loan::~Loan() {
-  const std::lock_guard lock(m_source.m_lending);
+  const std::lock_guard lock(m_source.m_scratchMutex);
   try {
-    m_source.m_free.push_back(std::move(m_scratch));
+    m_source.m_freeScratch.push_back(std::move(m_scratch));
   } catch (...) {  // no memory to keep it: the next call makes another
   }
 }
 
 void SpatialQueries::Source::prepareInside(SearchableGeometry& body,
                                            const InsideSettings& settings) {
-  const std::lock_guard lock(m_preparing);
+  const std::lock_guard lock(m_preparationMutex);
   checkInside(body, settings);
   if (settings.rule == InsideRule::WindingNumber && body.tree.octree().size() > 0)
     body.windingNumbers.update(body, Workers(*this));
@@ -59,28 +59,31 @@ void SpatialQueries::Source::prepareInside(SearchableGeometry& body,
 }
 
 void SpatialQueries::Source::prepareTetrahedra(SearchableGeometry& solid) {
-  const std::lock_guard lock(m_preparing);
+  const std::lock_guard lock(m_preparationMutex);
   updateTetrahedra(solid, octreeSettings(), Workers(*this));
 }
 
 void checkVertices(const SearchableGeometry& vertices, GeometryId body) {
   if (vertices.id == body)
-    throw Error(ErrorCode::InvalidSettings, nameOf(body) + ": its own vertices lie on it", body);
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(body) + " is both the body and the owner of the vertices; these must differ",
+                body);
   if (vertices.shape)
     throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(vertices.id) + " is a shape: it has no vertices", vertices.id);
+                nameOf(vertices.id) + " is a shape, which has no vertices", vertices.id);
 }
 
 SpatialQueries::SpatialQueries(std::shared_ptr<Source> source)
     : m_source(std::move(source)), m_state(m_source->state()) {}
 
 SpatialQueries::Source& SpatialQueries::valid() const {
-  if (!m_source) throw Error(ErrorCode::InvalidCall, "these SpatialQueries were moved from");
+  if (!m_source) throw Error(ErrorCode::InvalidCall, "this SpatialQueries object was moved from");
   if (m_state == 0 || m_source->state() != m_state)
-    throw Error(ErrorCode::InvalidCall,
-                "these SpatialQueries are of an earlier state: positions, transforms, topology or "
-                "geometries changed, advance() was called, or their OctreeBasedCD is gone; call "
-                "queries() again");
+    throw Error(
+        ErrorCode::InvalidCall,
+        "this SpatialQueries object is outdated: positions, transforms, topology or geometries "
+        "changed, advance() was called, or the OctreeBasedCD was destroyed; call "
+        "queries() again");
   return *m_source;
 }
 
@@ -277,7 +280,7 @@ void SpatialQueries::findEmbeddedVertices(GeometryId vertices, GeometryId body,
   const SearchableGeometry& owner = source.at(vertices);
   SearchableGeometry& solid = source.at(body);
   checkVertices(owner, body);
-  checkTopologyKind(solid, true, "findEmbeddedVertices() is for tetrahedral meshes");
+  checkMeshType(solid, true, "findEmbeddedVertices() is for tetrahedral meshes");
   source.prepareTetrahedra(solid);
   const Source::Loan scratch(source);
   findEmbedded(owner, solid, source.engine(), Source::Workers(source), scratch->embedded, out);
@@ -288,10 +291,10 @@ std::optional<TetrahedronPoint> SpatialQueries::findTetrahedron(
   Source& source = valid();
   const StandardFloatingPoint standard;
   SearchableGeometry& solid = source.at(body);
-  checkTopologyKind(solid, true, "findTetrahedron() is for tetrahedral meshes");
+  checkMeshType(solid, true, "findTetrahedron() is for tetrahedral meshes");
   if (!point.allFinite())
     throw Error(ErrorCode::NonFinitePosition,
-                nameOf(body) + ": a point to be found is " + textOf(point), body);
+                nameOf(body) + ": the point is " + textOf(point) + "; it must be finite", body);
   source.prepareTetrahedra(solid);
   const Source::Loan scratch(source);
   return SolidQuery(solid, source.engine(), scratch->stack).lowest(point);

@@ -27,17 +27,17 @@ void set(BoxArrays& boxes, std::size_t i, const FloatBox& box) {
 void TetrahedronTree::update(std::span<const Tetrahedron> tetrahedra, const FloatPoint* floats,
                              double bulk, const OctreeSettings& settings, const Threads& threads) {
   const std::size_t size = tetrahedra.size();
-  const bool wasKnown = std::exchange(m_known, false);
-  if (!wasKnown) {
+  const bool wasBuilt = std::exchange(m_isBuilt, false);
+  if (!wasBuilt) {
     m_octree.reset(size);
     m_ordered.assign(tetrahedra.begin(), tetrahedra.end());
   }
   if (size == 0) return;
-  if (wasKnown && settings.update == OctreeUpdate::Auto) {
+  if (wasBuilt && settings.update == OctreeUpdate::Auto) {
     fit(floats, threads);
     m_octree.measureLooseness();
-    m_known = m_octree.isTight();
-    if (m_known) return;
+    m_isBuilt = m_octree.isTight();
+    if (m_isBuilt) return;
   }
   FloatBox bounds;
   for (std::size_t i = 0; i < size; ++i) {
@@ -50,7 +50,7 @@ void TetrahedronTree::update(std::span<const Tetrahedron> tetrahedra, const Floa
   for (std::size_t i = 0; i < size; ++i) m_ordered[i] = tetrahedra[m_octree.order()[i]];
   fit(floats, threads);
   m_octree.measureLooseness();
-  m_known = true;
+  m_isBuilt = true;
 }
 
 void TetrahedronTree::fit(const FloatPoint* floats, const Threads& threads) {

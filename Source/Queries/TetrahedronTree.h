@@ -33,7 +33,7 @@ class TetrahedronTree {
   Octree m_octree;
   std::vector<Tetrahedron> m_ordered;
   Buffer<std::uint64_t> m_keys;  ///< scratch
-  bool m_known = false;          ///< the tree is built, and the last update did not throw
+  bool m_isBuilt = false;        ///< the tree is built, and the last update did not throw
 };
 
 }  // namespace palpate

@@ -29,21 +29,22 @@ class PointFrame {
 };
 
 /// Scratch of searchVertices(), which remembers its peak.
-template <class Answer>
+template <class Result>
 struct VertexSearch {
   struct Part {
     PointQueryStack stack;
-    std::vector<Answer> found;
+    std::vector<Result> found;
   };
   std::vector<Part> parts;
 };
 
-/// Calls ask(vertex) for each vertex of a geometry that is in an element, enabled or not, and
-/// collects the answers in `out`, by ascending vertices. start(stack) makes `ask` for a range of
-/// vertices; ask(vertex) returns a std::optional<Answer>.
-template <class Answer, class Start>
+/// Calls query(vertex) for each vertex of a geometry that is in an element, enabled or not, and
+/// collects the results in `out`, by ascending vertices. makeQuery(stack) makes `query` for a range
+/// of vertices; query(vertex) returns a std::optional<Result>.
+template <class Result, class MakeQuery>
 void searchVertices(const MeshTopology& topology, const Threads& threads,
-                    VertexSearch<Answer>& scratch, std::vector<Answer>& out, Start&& start) {
+                    VertexSearch<Result>& scratch, std::vector<Result>& out,
+                    MakeQuery&& makeQuery) {
   constexpr std::size_t kGrain = 256;
   auto& parts = scratch.parts;
   const std::size_t count = (topology.vertexCount + kGrain - 1) / kGrain;
@@ -52,11 +53,11 @@ void searchVertices(const MeshTopology& topology, const Threads& threads,
                     [&](std::size_t chunk, std::size_t begin, std::size_t end) {
                       auto& part = parts[chunk];
                       part.found.clear();
-                      auto ask = start(part.stack);
+                      auto query = makeQuery(part.stack);
                       for (std::size_t v = begin; v < end; ++v)
                         if (topology.isUsed[v])
-                          if (const auto answer = ask(static_cast<std::uint32_t>(v)))
-                            part.found.push_back(*answer);
+                          if (const auto result = query(static_cast<std::uint32_t>(v)))
+                            part.found.push_back(*result);
                     });
   std::size_t size = 0;
   for (std::size_t i = 0; i < count; ++i) size += parts[i].found.size();

@@ -16,17 +16,17 @@ using Eigen::Vector3d;
 constexpr std::size_t kBlocksPerPart = 64;
 /// The distances, in radii of a cluster, from which it counts as far away. The cheapest comes
 /// first; all give the same answers.
-constexpr std::array<double, 3> kFar = {4, 8, 24};
+constexpr std::array<double, 3> kFarRadii = {4, 8, 24};
 
-WindingNumbers::Answer answer(double least, double most, double margin) {
+WindingNumbers::Result decide(double least, double most, double margin) {
   const bool outside = most<0.5 - margin, inside = least> 0.5 + margin;  // false for NaN
   return {!outside, outside || inside};
 }
 
 /// The answer for a sum with an error bound. The sum may have either sign.
-WindingNumbers::Answer answer(const SeenShare& sum, double margin) {
+WindingNumbers::Result decide(const SolidAngleShare& sum, double margin) {
   const double number = std::abs(sum.value);
-  return answer(number - sum.error, number + sum.error, margin);
+  return decide(number - sum.error, number + sum.error, margin);
 }
 
 }  // namespace
@@ -44,20 +44,20 @@ void WindingNumbers::Cluster::add(const Cluster& other) {
   area = all;
 }
 
-void WindingNumbers::Cluster::reach(const Cluster& part) {
+void WindingNumbers::Cluster::enclose(const Cluster& part) {
   radius = std::max(radius, (part.centre - centre).norm() + part.radius);
 }
 
 /// Computes the cluster of the triangles that a node holds itself, without its children.
-void WindingNumbers::addOwn(const SearchableGeometry& body, OctreeNode node) {
+void WindingNumbers::computeOwnCluster(const SearchableGeometry& body, OctreeNode node) {
   Cluster& all = m_clusters[node] = {};
   const auto [begin, end] = body.tree.octree().ownRange(node);
   const Positions& now = body.mesh.now;
-  for (const bool reach : {false, true})
+  for (const bool measuresRadius : {false, true})
     for (std::uint32_t i = begin; i < end; ++i) {
       const auto& [ia, ib, ic] = body.tree.ordered()[i];
       const Vector3d a = now[ia], b = now[ib], c = now[ic], u = b - a, v = c - a;
-      if (reach) {
+      if (measuresRadius) {
         for (const Vector3d& corner : {a, b, c})
           all.radius = std::max(all.radius, (corner - all.centre).norm());
         continue;
@@ -73,8 +73,8 @@ void WindingNumbers::addOwn(const SearchableGeometry& body, OctreeNode node) {
 void WindingNumbers::update(const SearchableGeometry& body, const Threads& threads) {
   const DerivedFrom<2>::Sources now{body.mesh.now.bodyRevision(),
                                     body.mesh.now.transformRevision()};
-  if (m_clustersOf.isCurrent(now) && m_treeUpdates == body.tree.updates()) return;
-  m_clustersOf.invalidate();
+  if (m_clustersVersion.isCurrent(now) && m_treeUpdates == body.tree.updates()) return;
+  m_clustersVersion.invalidate();
   const Octree& octree = body.tree.octree();
   const std::size_t blocks = octree.pool().used();
   m_clusters.resize(8 * blocks);
@@ -83,7 +83,7 @@ void WindingNumbers::update(const SearchableGeometry& body, const Threads& threa
       if (octree.isEmpty(node))
         m_clusters[node] = {};
       else
-        addOwn(body, node);
+        computeOwnCluster(body, node);
   });
   // Children come after their parents, so that this order completes the children first.
   for (std::size_t block = blocks; block-- > 1;) {
@@ -92,64 +92,66 @@ void WindingNumbers::update(const SearchableGeometry& body, const Threads& threa
     const std::span children = std::span(m_clusters).subspan(8 * block, 8);
     for (const Cluster& child : children) parent.add(child);
     parent.radius = 0;
-    if (own.radius > 0) parent.reach(own);
+    if (own.radius > 0) parent.enclose(own);
     for (const Cluster& child : children)
-      if (child.radius > 0) parent.reach(child);
+      if (child.radius > 0) parent.enclose(child);
   }
   m_magnitude = m_clusters[0].centre.cwiseAbs().maxCoeff() + m_clusters[0].radius;
   m_treeUpdates = body.tree.updates();
-  m_clustersOf.commit(now);
+  m_clustersVersion.commit(now);
 }
 
-SeenShare WindingNumbers::share(const Cluster& cluster, const Vector3d& p, double distance) const {
+SolidAngleShare WindingNumbers::clusterShare(const Cluster& cluster, const Vector3d& p,
+                                             double distance) const {
   const Vector3d from = cluster.centre - p;
   const double square = distance * distance, cube = square * distance,
                nearest = distance - cluster.radius, squareOfNearest = nearest * nearest;
-  const double seen = cluster.normal.dot(from) / cube + cluster.spread.trace() / cube -
-                      3 * from.dot(cluster.spread * from) / (cube * square);
-  const double left = 3 * cluster.radius * cluster.radius / (squareOfNearest * squareOfNearest);
+  const double angle = cluster.normal.dot(from) / cube + cluster.spread.trace() / cube -
+                       3 * from.dot(cluster.spread * from) / (cube * square);
+  const double remainder =
+      3 * cluster.radius * cluster.radius / (squareOfNearest * squareOfNearest);
   const double rounding = kClusterError * (1 + m_magnitude / nearest) / squareOfNearest;
   constexpr double kSphere = 4 * std::numbers::pi;
-  return {seen / kSphere, cluster.area * (left + rounding) / kSphere};
+  return {angle / kSphere, cluster.area * (remainder + rounding) / kSphere};
 }
 
-static SeenShare sumOfAll(const TriangleMesh& mesh, const Vector3d& p) {
-  SeenShare sum;
+static SolidAngleShare sumOfAll(const TriangleMesh& mesh, const Vector3d& p) {
+  SolidAngleShare sum;
   const Positions& now = mesh.now;
   for (const auto& [a, b, c] : mesh.topology.triangles)
-    sum.add(seenShare(p, now[a], now[b], now[c]));
+    sum.add(solidAngleShare(p, now[a], now[b], now[c]));
   return sum;
 }
 
-WindingNumbers::Answer WindingNumbers::ask(const SearchableGeometry& body, const Vector3d& p,
-                                           double margin, bool bruteForce,
-                                           PointQueryStack& stack) const {
+WindingNumbers::Result WindingNumbers::evaluate(const SearchableGeometry& body, const Vector3d& p,
+                                                double margin, bool bruteForce,
+                                                PointQueryStack& stack) const {
   const Octree& octree = body.tree.octree();
   const Positions& now = body.mesh.now;
-  for (const double far : kFar) {
+  for (const double farRadii : kFarRadii) {
     if (bruteForce) break;
-    SeenShare ofFar, ofNear;
+    SolidAngleShare farSum, nearSum;
     const auto isNear = [&](OctreeNode node) {
       const Cluster& cluster = m_clusters[node];
       const double distance = (cluster.centre - p).norm();
-      if (!(distance > far * cluster.radius)) return true;
-      ofFar.add(share(cluster, p, distance));
+      if (!(distance > farRadii * cluster.radius)) return true;
+      farSum.add(clusterShare(cluster, p, distance));
       return false;
     };
     forEachEntered(octree, isNear, stack, [&](std::uint32_t begin, std::uint32_t end) {
       for (std::uint32_t i = begin; i < end; ++i) {
         const auto& [a, b, c] = body.tree.ordered()[i];
-        ofNear.add(seenShare(p, now[a], now[b], now[c]));
+        nearSum.add(solidAngleShare(p, now[a], now[b], now[c]));
       }
     });
     // Decided only if the sum over all triangles, within its own error bound, certainly gives the
     // same decision.
-    const SeenShare sum{
-        ofFar.value + ofNear.value,
-        ofFar.error + 2 * ofNear.error + kWindingSlack * static_cast<double>(octree.size())};
-    if (const Answer found = answer(sum, margin); found.decided) return found;
+    const SolidAngleShare sum{
+        farSum.value + nearSum.value,
+        farSum.error + 2 * nearSum.error + kWindingSlack * static_cast<double>(octree.size())};
+    if (const Result found = decide(sum, margin); found.decided) return found;
   }
-  return answer(sumOfAll(body.mesh, p), margin);
+  return decide(sumOfAll(body.mesh, p), margin);
 }
 
 }  // namespace palpate

@@ -26,7 +26,7 @@ struct SearchableGeometry;
 ///          decide, further triangles are summed too, in the end all.
 class WindingNumbers {
  public:
-  struct Answer {
+  struct Result {
     bool inside;   ///< also true if not decided
     bool decided;  ///< the error bounds leave no doubt
   };
@@ -36,8 +36,8 @@ class WindingNumbers {
   /// Call after update(). Returns whether the winding number's magnitude is at least 1/2. Not
   /// decided if it is within `margin` of 1/2, or if rounding errors leave this open. The answer is
   /// that of the sum over all triangles, and does not depend on the octree.
-  Answer ask(const SearchableGeometry& body, const Eigen::Vector3d&, double margin, bool bruteForce,
-             PointQueryStack&) const;
+  Result evaluate(const SearchableGeometry& body, const Eigen::Vector3d&, double margin,
+                  bool bruteForce, PointQueryStack&) const;
 
  private:
   /// Moments of a set of triangles about their centre of mass, for points far away.
@@ -46,15 +46,15 @@ class WindingNumbers {
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();  ///< integral of (x - centre) normal^T
     double area = 0, radius = 0;
     void add(const Cluster&);
-    void reach(const Cluster&);
+    void enclose(const Cluster&);
   };
-  void addOwn(const SearchableGeometry& body, OctreeNode);
-  SeenShare share(const Cluster&, const Eigen::Vector3d& p, double distance) const;
+  void computeOwnCluster(const SearchableGeometry& body, OctreeNode);
+  SolidAngleShare clusterShare(const Cluster&, const Eigen::Vector3d& p, double distance) const;
 
-  DerivedFrom<2> m_clustersOf;      ///< positions in the body's frame, and the transform
-  std::uint64_t m_treeUpdates = 0;  ///< GeometryOctree::updates() for which m_clusters hold
-  Buffer<Cluster> m_clusters;       ///< by octree node
-  double m_magnitude = 0;           ///< L: of the coordinates
+  DerivedFrom<2> m_clustersVersion;  ///< positions in the body's frame, and the transform
+  std::uint64_t m_treeUpdates = 0;   ///< GeometryOctree::updates() for which m_clusters hold
+  Buffer<Cluster> m_clusters;        ///< by octree node
+  double m_magnitude = 0;            ///< L: of the coordinates
 };
 
 }  // namespace palpate

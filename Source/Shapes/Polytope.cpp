@@ -36,10 +36,10 @@ const Vector3d* furthest(std::span<const Vector3d> points, Independent&& indepen
   const Vector3d* best = nullptr;
   double most = 0;
   for (const Vector3d& p : points) {
-    const double its = measure(p);
-    if ((best && !(its > most)) || !independent(p)) continue;
+    const double value = measure(p);
+    if ((best && !(value > most)) || !independent(p)) continue;
     best = &p;
-    most = its;
+    most = value;
   }
   return best;
 }
@@ -103,9 +103,9 @@ Polytope::Polytope(std::span<const Vector3d> points) {
   start(four);
   addAll(points);
   if (flat)
-    keepPlate(3);
+    reduceToPlate(3);
   else
-    keepHull();
+    compact();
 }
 
 void Polytope::start(std::span<const Vector3d> four) {
@@ -113,7 +113,7 @@ void Polytope::start(std::span<const Vector3d> four) {
   m_faces.clear();
   m_planes.clear();
   m_free.clear();
-  m_sees.clear();
+  m_isVisible.clear();
   m_next.assign(4, 0);
   const bool turned = volumeSign(four[0], four[1], four[2], four[3]) > 0;
   const std::uint32_t b = turned ? 2 : 1, c = turned ? 1 : 2;
@@ -128,7 +128,7 @@ std::uint32_t Polytope::newFace(const Triangle& corners, const Triangle& neighbo
   if (m_free.empty()) {
     m_faces.emplace_back();
     m_planes.emplace_back();
-    m_sees.push_back(0);
+    m_isVisible.push_back(0);
   } else {
     face = m_free.back();
     m_free.pop_back();
@@ -137,15 +137,15 @@ std::uint32_t Polytope::newFace(const Triangle& corners, const Triangle& neighbo
   const Vector3d normal = unitCross(a, b, a, c, &m_decisions.undecided);
   m_faces[face] = {corners, neighbours};
   m_planes[face] = {normal, dot(normal, a), face};
-  m_sees[face] = 0;
+  m_isVisible[face] = 0;
   return face;
 }
 
 bool Polytope::add(const Vector3d& p) {
   m_visible.clear();
   for (std::uint32_t f = 0; f < m_faces.size(); ++f) {
-    m_sees[f] = m_planes[f].face != kNone && sees(p, f);
-    if (m_sees[f]) m_visible.push_back(f);
+    m_isVisible[f] = m_planes[f].face != kNone && isVisibleFrom(p, f);
+    if (m_isVisible[f]) m_visible.push_back(f);
   }
   if (m_visible.empty()) return false;
   addVisible(p);
@@ -153,15 +153,15 @@ bool Polytope::add(const Vector3d& p) {
   return true;
 }
 
-/// Adds p, and faces from p to the border of the region that p sees.
+/// Adds p, and faces from p to the horizon: the border of the region that is visible from p.
 void Polytope::addVisible(const Vector3d& p) {
   m_points.push_back(p);
   m_next.resize(m_points.size());
-  m_fresh.clear();
+  m_newFaces.clear();
   std::uint32_t last = kNone;
-  for (const std::uint32_t f : m_visible) last = cut(f, last);
-  // Links the new faces around the border. m_next: the new face that starts at a corner of the
-  // border.
+  for (const std::uint32_t f : m_visible) last = addHorizonFaces(f, last);
+  // Links the new faces around the horizon. m_next: the new face that starts at a corner of the
+  // horizon.
   for (std::uint32_t f = last, next = kNone; next != last; f = next) {
     next = m_next[m_faces[f].corners[1]];
     m_faces[f].neighbours[1] = next;
@@ -172,27 +172,30 @@ void Polytope::addVisible(const Vector3d& p) {
 void Polytope::removeVisible() {
   for (const std::uint32_t f : m_visible) {
     m_planes[f] = {Vector3d::Zero(), std::numeric_limits<double>::infinity(), kNone};
-    m_sees[f] = 0;
+    m_isVisible[f] = 0;
     m_free.push_back(f);
   }
 }
 
-/// The points that are still to be added, and which faces they see.
+/// The points that are still to be added, and the faces that are visible from them (the conflict
+/// lists of Clarkson and Shor).
 ///
-/// A new face shares an edge with two old faces, one on either side of the border. A point that
-/// sees the new face saw one of these two: the plane of the new face is between theirs through a
-/// common line, so that a point in front of it is in front of one of them. An outside point that
-/// saw a removed face sees a new one. The region that it sees is connected, so either all of that
-/// is removed, or the point saw both faces at an edge of the border.
+/// A new face shares an edge of the horizon with two old faces, one on either side of the horizon.
+/// If the new face is visible from a point, one of these two was: the plane of the new face is
+/// between theirs through a common line, so that a point in front of it is in front of one of them.
+/// If a removed face was visible from an outside point, a new face is. The region that is visible
+/// from the point is connected, so either all of that region is removed, or both faces at an edge
+/// of the horizon were visible.
 struct Polytope::Conflicts {
-  std::vector<std::vector<std::uint32_t>> ofFace;
-  std::vector<std::uint32_t> seen;    ///< per point: a face that it sees; kNone: it is inside
-  std::vector<std::uint32_t> tested;  ///< per point: faces made before its last test
+  /// Per face: points from which it is visible.
+  std::vector<std::vector<std::uint32_t>> pointsOfFace;
+  std::vector<std::uint32_t> visibleFace;  ///< per point: a visible face; kNone: it is inside
+  std::vector<std::uint32_t> tested;       ///< per point: faces made before its last test
 
-  explicit Conflicts(std::size_t points) : seen(points, kNone), tested(points, 0) {}
+  explicit Conflicts(std::size_t points) : visibleFace(points, kNone), tested(points, 0) {}
   void add(std::uint32_t point, std::uint32_t face) {
-    ofFace[face].push_back(point);
-    seen[point] = face;
+    pointsOfFace[face].push_back(point);
+    visibleFace[point] = face;
   }
 };
 
@@ -203,7 +206,7 @@ void Polytope::addAll(std::span<const Vector3d> points) {
   }
   const auto count = static_cast<std::uint32_t>(points.size());
   Conflicts conflicts(count);
-  conflicts.ofFace.resize(m_faces.size());
+  conflicts.pointsOfFace.resize(m_faces.size());
   for (std::uint32_t f = 0; f < m_faces.size(); ++f) {
     const OrientedPlane plane(corner(f, 0), corner(f, 1), corner(f, 2));
     for (std::uint32_t i = 0; i < count; ++i)
@@ -216,65 +219,68 @@ void Polytope::addAll(std::span<const Vector3d> points) {
     if (plane.side(points[point], m_decisions) > 0) conflicts.add(point, face);
   };
   for (const std::uint32_t i : shuffled(count)) {
-    if (conflicts.seen[i] == kNone) continue;
-    m_visible.assign(1, conflicts.seen[i]);
-    m_sees[conflicts.seen[i]] = 1;
+    if (conflicts.visibleFace[i] == kNone) continue;
+    m_visible.assign(1, conflicts.visibleFace[i]);
+    m_isVisible[conflicts.visibleFace[i]] = 1;
     for (std::size_t k = 0; k < m_visible.size(); ++k)
       for (const std::uint32_t other : m_faces[m_visible[k]].neighbours)
-        if (!m_sees[other] && sees(points[i], other)) m_sees[other] = 1, m_visible.push_back(other);
+        if (!m_isVisible[other] && isVisibleFrom(points[i], other))
+          m_isVisible[other] = 1, m_visible.push_back(other);
     addVisible(points[i]);
     for (const std::uint32_t f : m_visible)
-      for (const std::uint32_t point : conflicts.ofFace[f]) conflicts.seen[point] = kNone;
-    conflicts.ofFace.resize(m_faces.size());
-    for (const auto& [face, seen] : m_fresh) {
+      for (const std::uint32_t point : conflicts.pointsOfFace[f])
+        conflicts.visibleFace[point] = kNone;
+    conflicts.pointsOfFace.resize(m_faces.size());
+    for (const auto& [face, removed] : m_newFaces) {
       const OrientedPlane plane(corner(face, 0), corner(face, 1), corner(face, 2));
       ++made;
-      for (const std::uint32_t from : {seen, m_faces[face].neighbours[0]})
-        for (const std::uint32_t point : conflicts.ofFace[from]) test(point, plane, face);
+      for (const std::uint32_t from : {removed, m_faces[face].neighbours[0]})
+        for (const std::uint32_t point : conflicts.pointsOfFace[from]) test(point, plane, face);
     }
-    for (const std::uint32_t f : m_visible) conflicts.ofFace[f].clear();
+    for (const std::uint32_t f : m_visible) conflicts.pointsOfFace[f].clear();
     removeVisible();
   }
 }
 
-/// Makes new faces from the last point to those edges of a face beyond which it sees nothing.
+/// Makes new faces from the last point to those edges of a visible face that are on the horizon.
 /// Returns the last new face.
-std::uint32_t Polytope::cut(std::uint32_t face, std::uint32_t last) {
+std::uint32_t Polytope::addHorizonFaces(std::uint32_t face, std::uint32_t last) {
   const auto p = static_cast<std::uint32_t>(m_points.size() - 1);
   for (std::size_t i = 0; i < 3; ++i) {
-    const Face seen = m_faces[face];
-    const std::uint32_t u = seen.corners[i], v = seen.corners[(i + 1) % 3],
-                        behind = seen.neighbours[i];
-    if (m_sees[behind]) continue;
-    const std::uint32_t fresh = newFace({u, v, p}, {behind, kNone, kNone});
-    m_next[u] = fresh;
-    m_fresh.push_back({fresh, face});
+    const Face old = m_faces[face];
+    const std::uint32_t u = old.corners[i], v = old.corners[(i + 1) % 3],
+                        behind = old.neighbours[i];
+    if (m_isVisible[behind]) continue;
+    const std::uint32_t added = newFace({u, v, p}, {behind, kNone, kNone});
+    m_next[u] = added;
+    m_newFaces.push_back({added, face});
     for (std::size_t k = 0; k < 3; ++k)
       if (m_faces[behind].corners[k] == v && m_faces[behind].corners[(k + 1) % 3] == u)
-        m_faces[behind].neighbours[k] = fresh;
-    last = fresh;
+        m_faces[behind].neighbours[k] = added;
+    last = added;
   }
   return last;
 }
 
 /// Removes the entries of removed faces and of points that are not corners. Returns the faces' new
 /// numbers.
-std::vector<std::uint32_t> Polytope::keepHull() {
+std::vector<std::uint32_t> Polytope::compact() {
   Buffer<Face> faces;
   Buffer<Plane> planes;
-  std::vector<std::uint32_t> ofFace(m_faces.size(), kNone), ofPoint(m_points.size(), kNone);
+  std::vector<std::uint32_t> newFaceNumber(m_faces.size(), kNone),
+      newPointNumber(m_points.size(), kNone);
   std::vector<Vector3d> points;
   for (std::uint32_t f = 0; f < m_faces.size(); ++f) {
     if (m_planes[f].face == kNone) continue;
-    ofFace[f] = static_cast<std::uint32_t>(faces.size());
+    newFaceNumber[f] = static_cast<std::uint32_t>(faces.size());
     faces.push_back(m_faces[f]);
     planes.push_back(m_planes[f]);
-    planes.back().face = ofFace[f];
+    planes.back().face = newFaceNumber[f];
   }
   for (Face& face : faces)
     for (std::size_t i = 0; i < 3; ++i) {
-      face.neighbours[i] = ofFace[face.neighbours[i]];
-      std::uint32_t& place = ofPoint[face.corners[i]];
+      face.neighbours[i] = newFaceNumber[face.neighbours[i]];
+      std::uint32_t& place = newPointNumber[face.corners[i]];
       if (place == kNone) {
         place = static_cast<std::uint32_t>(points.size());
         points.push_back(m_points[face.corners[i]]);
@@ -284,11 +290,11 @@ std::vector<std::uint32_t> Polytope::keepHull() {
   m_faces.swap(faces);
   m_planes.swap(planes);
   m_points.swap(points);
-  return ofFace;
+  return newFaceNumber;
 }
 
 /// Reduces the hull with an apex beside the plane to a plate: its base, from both sides.
-void Polytope::keepPlate(std::uint32_t apex) {
+void Polytope::reduceToPlate(std::uint32_t apex) {
   const auto isBase = [&](std::uint32_t f) {
     const auto& [a, b, c] = m_faces[f].corners;
     return m_planes[f].face != kNone && a != apex && b != apex && c != apex;
@@ -321,8 +327,8 @@ void Polytope::keepPlate(std::uint32_t apex) {
   }
   for (std::uint32_t f = 0; f < count; ++f)
     if (!isBase(f)) m_planes[f].face = kNone;
-  const std::vector<std::uint32_t> ofFace = keepHull();
-  for (Plane& plane : border) plane.face = ofFace[plane.face];
+  const std::vector<std::uint32_t> newFaceNumber = compact();
+  for (Plane& plane : border) plane.face = newFaceNumber[plane.face];
   m_planes.insert(m_planes.end(), border.begin(), border.end());
 }
 

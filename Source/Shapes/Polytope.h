@@ -24,9 +24,9 @@ struct SignedDistance {
 /// of a line, three points of a plane, or four points with a volume. The decisions are exact.
 std::vector<Eigen::Vector3d> spanOf(std::span<const Eigen::Vector3d> points);
 
-/// A convex body as triangles: the convex hull of its points. A point sees a face if it is strictly
-/// in front of the face's plane. This is decided exactly, so that rounding makes no hole and no
-/// fold, and none of the points lies outside.
+/// A convex body as triangles: the convex hull of its points. A face is visible from a point that
+/// is strictly in front of the face's plane. This is decided exactly, so that rounding makes no
+/// hole and no fold, and none of the points lies outside.
 ///
 /// Ties     heights that differ by at most `tie`, L, count as equal. Among planes that are equally
 ///          near, the first one counts.
@@ -64,9 +64,9 @@ class Polytope {
   /// it reuses them.
   bool hasFace(std::uint32_t face) const { return m_planes[face].face == face; }
 
-  SignedDistance at(const Eigen::Vector3d& x, double tie) const;
-  /// The face nearest to x. For x inside, only the faces in the plane that at() measures from are
-  /// considered.
+  SignedDistance signedDistance(const Eigen::Vector3d& x, double tie) const;
+  /// The face nearest to x. For x inside, only the faces in the plane that signedDistance()
+  /// measures from are considered.
   OnFace nearest(const Eigen::Vector3d& x, double tie) const;
   /// For a point inside: among the faces whose planes are at most `slack` further away than the
   /// nearest plane, the face nearest to x. If sliver faces lie in almost equal planes, nearest()
@@ -101,40 +101,40 @@ class Polytope {
     return m_points[m_faces[face].corners[static_cast<std::size_t>(i)]];
   }
   struct Conflicts;
-  bool sees(const Eigen::Vector3d& p, std::uint32_t face) {
+  bool isVisibleFrom(const Eigen::Vector3d& p, std::uint32_t face) {
     return orient3d(corner(face, 0), corner(face, 1), corner(face, 2), p, m_decisions) > 0;
   }
   void addAll(std::span<const Eigen::Vector3d> points);
   void addVisible(const Eigen::Vector3d& p);
   void removeVisible();
   std::uint32_t newFace(const Triangle& corners, const Triangle& neighbours);
-  std::uint32_t cut(std::uint32_t face, std::uint32_t last);
-  std::vector<std::uint32_t> keepHull();
-  void keepPlate(std::uint32_t apex);
-  std::uint32_t highest(const Eigen::Vector3d& x, double tie) const;
+  std::uint32_t addHorizonFaces(std::uint32_t face, std::uint32_t last);
+  std::vector<std::uint32_t> compact();
+  void reduceToPlate(std::uint32_t apex);
+  std::uint32_t highestPlane(const Eigen::Vector3d& x, double tie) const;
   OnFace onFace(const Eigen::Vector3d& x, std::uint32_t face) const;
-  OnFace walk(const Eigen::Vector3d& x, std::uint32_t face, double tie) const;
+  OnFace walkToNearest(const Eigen::Vector3d& x, std::uint32_t face, double tie) const;
   template <class F>
   void forEachAround(const OnFace&, F&& f) const;
   struct Tangent;
-  struct Valley;
+  struct Minimum;
   template <class At>
-  static Valley valleyOf(double tie, At&& at);
-  Valley valley(const Eigen::Vector3d& p, const Eigen::Vector3d& q, double tie) const;
-  double flatMiddle(const Eigen::Vector3d& p, const Eigen::Vector3d& q, double t,
-                    double height) const;
+  static Minimum minimize(double tie, At&& at);
+  Minimum minimizeOnSegment(const Eigen::Vector3d& p, const Eigen::Vector3d& q, double tie) const;
+  double sublevelMiddle(const Eigen::Vector3d& p, const Eigen::Vector3d& q, double t,
+                        double height) const;
 
   std::vector<Eigen::Vector3d> m_points;
   Buffer<Face> m_faces;
   Buffer<Plane> m_planes;  ///< one for each face, then those of a plate's border
   Buffer<std::uint32_t> m_free, m_visible, m_next;  ///< scratch of add()
-  /// A new face, and the removed face from which it took its border edge.
-  struct Fresh {
-    std::uint32_t face, seen;
+  /// A new face, and the removed face whose edge on the horizon it took.
+  struct NewFace {
+    std::uint32_t face, removed;
   };
-  Buffer<Fresh> m_fresh;  ///< scratch of add()
+  Buffer<NewFace> m_newFaces;  ///< scratch of add()
   SignCounts m_decisions;
-  Buffer<std::uint8_t> m_sees;  ///< per face: whether the point being added sees it
+  Buffer<std::uint8_t> m_isVisible;  ///< per face: from the point that is being added
 };
 
 }  // namespace palpate

@@ -23,13 +23,13 @@ struct Polytope::Tangent {
 };
 
 /// The minimum of the function, and the tangents before and after it, which meet there.
-struct Polytope::Valley {
+struct Polytope::Minimum {
   double t, height;
   Tangent before, after;
   /// The weighted mean of f over the two tangents' planes, with weights that make the slopes cancel
   /// out.
   template <class F>
-  double mixed(F&& f) const {
+  double weightedMean(F&& f) const {
     if (!(after.slope > before.slope)) return f(before.plane);
     const double weight = std::clamp(after.slope / (after.slope - before.slope), 0.0, 1.0);
     return weight * f(before.plane) + (1 - weight) * f(after.plane);
@@ -40,7 +40,7 @@ struct Polytope::Valley {
 /// Source   Kelley, The cutting-plane method for solving convex programs (1960), in one dimension.
 ///          For piecewise linear functions it finds the minimum after finitely many steps.
 template <class At>
-Polytope::Valley Polytope::valleyOf(double tie, At&& at) {
+Polytope::Minimum Polytope::minimize(double tie, At&& at) {
   Tangent before = at(0.0);
   if (!(before.slope < 0)) return {0, before.height, before, before};
   Tangent after = at(1.0);
@@ -62,21 +62,22 @@ Polytope::Valley Polytope::valleyOf(double tie, At&& at) {
 }
 
 /// The minimum of the highest plane's height along p + t (q - p).
-Polytope::Valley Polytope::valley(const Vector3d& p, const Vector3d& q, double tie) const {
+Polytope::Minimum Polytope::minimizeOnSegment(const Vector3d& p, const Vector3d& q,
+                                              double tie) const {
   const Vector3d along = q - p;
-  return valleyOf(tie, [&](double t) {
+  return minimize(tie, [&](double t) {
     const Vector3d x = p + t * along;
-    const std::uint32_t top = highest(x, 0);
+    const std::uint32_t top = highestPlane(x, 0);
     return Tangent{t, m_planes[top].height(x), dot(m_planes[top].normal, along), top};
   });
 }
 
-std::uint32_t Polytope::highest(const Vector3d& x, double tie) const {
+std::uint32_t Polytope::highestPlane(const Vector3d& x, double tie) const {
   std::uint32_t best = 0;
   double height = -kInfinity;
   for (std::uint32_t i = 0; i < m_planes.size(); ++i) {
-    const double its = m_planes[i].height(x);
-    if (its > height + tie) best = i, height = its;
+    const double value = m_planes[i].height(x);
+    if (value > height + tie) best = i, height = value;
   }
   return best;
 }
@@ -104,7 +105,7 @@ void Polytope::forEachAround(const OnFace& on, F&& f) const {
 
 /// Walks to the face nearest to a point outside, over faces that the point is in front of. If none
 /// of the surrounding faces is nearer, no face is, because the body is convex.
-Polytope::OnFace Polytope::walk(const Vector3d& x, std::uint32_t face, double tie) const {
+Polytope::OnFace Polytope::walkToNearest(const Vector3d& x, std::uint32_t face, double tie) const {
   OnFace best = onFace(x, face);
   for (bool nearer = true; nearer;) {
     nearer = false;
@@ -121,8 +122,8 @@ Polytope::OnFace Polytope::walk(const Vector3d& x, std::uint32_t face, double ti
 }
 
 Polytope::OnFace Polytope::nearest(const Vector3d& x, double tie) const {
-  const Plane& top = m_planes[highest(x, tie)];
-  if (top.height(x) > tie) return walk(x, top.face, tie);
+  const Plane& top = m_planes[highestPlane(x, tie)];
+  if (top.height(x) > tie) return walkToNearest(x, top.face, tie);
   OnFace best = onFace(x, top.face);
   for (const Plane& plane : m_planes) {
     if (!(plane.height(x) >= top.height(x) - tie)) continue;
@@ -137,7 +138,7 @@ Polytope::OnFace Polytope::nearest(const Vector3d& x, double tie) const {
 }
 
 Polytope::OnFace Polytope::nearestFaceWithin(const Vector3d& x, double slack) const {
-  const double top = m_planes[highest(x, 0)].height(x);
+  const double top = m_planes[highestPlane(x, 0)].height(x);
   OnFace best{};
   best.from.distance = kInfinity;
   for (const Plane& plane : m_planes) {
@@ -154,11 +155,11 @@ const Vector3d& Polytope::normal(std::uint32_t face) const {
       ->normal;
 }
 
-SignedDistance Polytope::at(const Vector3d& x, double tie) const {
-  const Plane& top = m_planes[highest(x, tie)];
+SignedDistance Polytope::signedDistance(const Vector3d& x, double tie) const {
+  const Plane& top = m_planes[highestPlane(x, tie)];
   const double height = top.height(x);
   if (!(height > tie)) return {height, top.normal};
-  const OnFace on = walk(x, top.face, tie);
+  const OnFace on = walkToNearest(x, top.face, tie);
   return {on.from.distance, on.from.normal};
 }
 
@@ -174,7 +175,8 @@ Vector3d Polytope::support(const Vector3d& direction, double tie) const {
 
 /// The middle of the interval of t on which no plane is higher than `height`; an end of the edge if
 /// the interval contains it.
-double Polytope::flatMiddle(const Vector3d& p, const Vector3d& q, double t, double height) const {
+double Polytope::sublevelMiddle(const Vector3d& p, const Vector3d& q, double t,
+                                double height) const {
   double first = 0, last = 1;
   for (const Plane& plane : m_planes) {
     const double start = plane.height(p), slope = plane.height(q) - start;
@@ -188,9 +190,9 @@ double Polytope::flatMiddle(const Vector3d& p, const Vector3d& q, double t, doub
 
 double Polytope::leastOnEdge(const Vector3d& p, const Vector3d& q, double tie) const {
   const Vector3d along = q - p;
-  const Valley inside = valley(p, q, tie);
+  const Minimum inside = minimizeOnSegment(p, q, tie);
   double t = inside.t;
-  if (!(inside.height > tie)) return flatMiddle(p, q, t, inside.height + tie);
+  if (!(inside.height > tie)) return sublevelMiddle(p, q, t, inside.height + tie);
   // Alternates between the face nearest to a point of the edge and the edge's point nearest to that
   // face, until neither changes.
   OnFace on = nearest(p + t * along, tie);
@@ -207,30 +209,32 @@ double Polytope::leastOnEdge(const Vector3d& p, const Vector3d& q, double tie) c
     if (!(distance < std::min(least, on.from.distance))) break;
     least = distance;
     t = place;
-    on = walk(p + t * along, on.face, tie);
+    on = walkToNearest(p + t * along, on.face, tie);
   }
   if (std::abs(dot(on.from.normal, along)) > tie) return t;
   const Vector3d down = on.from.distance * on.from.normal, touching = p + t * along - down;
-  return flatMiddle(p - down, q - down, t, m_planes[highest(touching, 0)].height(touching) + tie);
+  return sublevelMiddle(p - down, q - down, t,
+                        m_planes[highestPlane(touching, 0)].height(touching) + tie);
 }
 
 std::optional<Vector3d> Polytope::leastInTriangle(const Vector3d& a, const Vector3d& b,
                                                   const Vector3d& c, double tie) const {
   const double boundary =
-      std::min({valley(a, b, tie).height, valley(b, c, tie).height, valley(c, a, tie).height});
+      std::min({minimizeOnSegment(a, b, tie).height, minimizeOnSegment(b, c, tie).height,
+                minimizeOnSegment(c, a, tie).height});
   // For each s, the minimum on the line from a + s u to a + s v.
   const Vector3d u = b - a, v = c - a;
-  const auto across = [&](double s) { return valley(a + s * u, a + s * v, tie); };
+  const auto across = [&](double s) { return minimizeOnSegment(a + s * u, a + s * v, tie); };
   const double s =
-      valleyOf(tie, [&](double at) {
-        const Valley line = across(at);
-        const double growth = line.mixed([&](std::uint32_t plane) {
+      minimize(tie, [&](double at) {
+        const Minimum line = across(at);
+        const double growth = line.weightedMean([&](std::uint32_t plane) {
           const Vector3d& n = m_planes[plane].normal;
           return at > 0 ? dot(n, (1 - line.t) * u + line.t * v) : std::min(dot(n, u), dot(n, v));
         });
         return Tangent{at, line.height, growth, 0};
       }).t;
-  const Valley least = across(s);
+  const Minimum least = across(s);
   const Vector3d weights(1 - s, s * (1 - least.t), s * least.t);
   if (!(least.height < boundary - tie && least.height <= tie && weights.minCoeff() > kEdgeWeight))
     return {};

@@ -71,7 +71,7 @@ Shape::Shape(const AnalyticalGeometry& geometry, const RigidTransform& transform
 
 void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& transform) {
   const auto capsule = [&](const Vector3d& p0, const Vector3d& p1, double radius) {
-    m_kind = Kind::Capsule;
+    m_type = Type::Capsule;
     m_p0 = transform(p0);
     m_p1 = transform(p1);
     m_radius = radius;
@@ -79,9 +79,9 @@ void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& tran
     const double square = along.squaredNorm();
     m_axisSquare = isInRange(square) ? square : along == Vector3d::Zero() ? 0.0 : -1.0;
   };
-  const auto body = [&](Kind kind, const Vector3d& origin, const Eigen::Matrix3d& axes,
+  const auto body = [&](Type type, const Vector3d& origin, const Eigen::Matrix3d& axes,
                         const std::array<double, 2>& sizes) {
-    m_kind = kind;
+    m_type = type;
     m_p0 = m_p1 = transform(origin);
     m_axes = orthonormal(transform.rotation) * axes;
     m_sizes = sizes;
@@ -91,12 +91,12 @@ void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& tran
   } else if (const auto* rod = std::get_if<Capsule>(&geometry)) {
     capsule(rod->p0, rod->p1, rod->radius);
   } else if (const auto* plane = std::get_if<Plane>(&geometry)) {
-    body(plane->twoSided ? Kind::TwoSidedPlane : Kind::Plane, plane->point,
+    body(plane->twoSided ? Type::TwoSidedPlane : Type::Plane, plane->point,
          axesAlong(plane->normal), {});
   } else if (const auto* cylinder = std::get_if<Cylinder>(&geometry)) {
     if (cylinder->radius > 0) {
       const Vector3d axis = cylinder->p1 - cylinder->p0;
-      body(Kind::Cylinder, cylinder->p0 + 0.5 * axis, axesAlong(axis),
+      body(Type::Cylinder, cylinder->p0 + 0.5 * axis, axesAlong(axis),
            {cylinder->radius, 0.5 * lengthOf(axis)});
     } else {
       capsule(cylinder->p0, cylinder->p1, 0);
@@ -105,7 +105,7 @@ void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& tran
     const auto* box = std::get_if<Box>(&geometry);
     const Vector3d origin = box ? box->centre : Vector3d(Vector3d::Zero());
     if (m_hull)
-      body(Kind::Hull, origin, Eigen::Matrix3d::Identity(), {});
+      body(Type::Hull, origin, Eigen::Matrix3d::Identity(), {});
     else
       capsule(origin + m_span.front(), origin + m_span.back(), 0);
   }
@@ -113,18 +113,18 @@ void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& tran
 }
 
 Eigen::AlignedBox3d Shape::bounds() const {
-  Vector3d reach =
+  Vector3d margin =
       Vector3d::Constant(isPlane() ? std::numeric_limits<double>::infinity() : m_radius);
   if (isCylinder())
     for (int k = 0; k < 3; ++k) {
       // A disc reaches its radius times the sine of the angle between its axis and the coordinate
       // axis.
       const double cosine = m_axes(k, 2);
-      reach[k] = m_sizes[0] * std::sqrt(std::max(0.0, (1.0 - cosine) * (1.0 + cosine)));
+      margin[k] = m_sizes[0] * std::sqrt(std::max(0.0, (1.0 - cosine) * (1.0 + cosine)));
     }
   Eigen::AlignedBox3d box;
   for (const Vector3d& corner : m_corners) box.extend(corner);
-  return {box.min() - reach, box.max() + reach};
+  return {box.min() - margin, box.max() + margin};
 }
 
 void Shape::placeBetween(const Shape& before, const Shape& now, double time) {
@@ -132,7 +132,7 @@ void Shape::placeBetween(const Shape& before, const Shape& now, double time) {
     return (1.0 - time) * before.m_corners[end] + time * now.m_corners[end];
   };
   const Vector3d axis = at(1) - at(0);
-  m_kind = Kind::Cylinder;
+  m_type = Type::Cylinder;
   m_p0 = m_p1 = at(0) + 0.5 * axis;
   m_axes = axis == Vector3d::Zero() ? before.m_axes : axesAlong(axis);
   m_sizes = {before.m_sizes[0], 0.5 * lengthOf(axis)};
@@ -154,45 +154,46 @@ void Shape::placeCorners() {
 
 Vector3d Shape::inBody(const Vector3d& x) const { return m_axes.transpose() * (x - m_p0); }
 
-Shape::Parts Shape::partsOf(const Vector3d& v, double tie) const {
+Shape::Components Shape::componentsOf(const Vector3d& v, double tie) const {
   const auto& [radius, across] = polar({v[0], v[1], 0});
   const Vector3d outward = radius > 0 ? across : Vector3d(1, 0, 0);
   return {{radius, std::abs(v[2])}, {outward, Vector3d(0, 0, v[2] < -tie ? -1 : 1)}};
 }
 
 SignedDistance Shape::atBody(const Vector3d& u, double tie) const {
-  if (m_hull) return m_hull->at(u, tie);
+  if (m_hull) return m_hull->signedDistance(u, tie);
   if (isPlane()) {
-    const bool below = m_kind == Kind::TwoSidedPlane && u[2] < 0;
-    return {below ? -u[2] : u[2], {0, 0, m_kind == Kind::TwoSidedPlane && u[2] < -tie ? -1. : 1.}};
+    const bool below = m_type == Type::TwoSidedPlane && u[2] < 0;
+    return {below ? -u[2] : u[2], {0, 0, m_type == Type::TwoSidedPlane && u[2] < -tie ? -1. : 1.}};
   }
   return atBody(u, tie, m_sizes);
 }
 
 SignedDistance Shape::atBody(const Vector3d& u, double tie,
                              const std::array<double, 2>& sizes) const {
-  const Parts parts = partsOf(u, tie);
-  const std::array<double, 2> beyond{parts.lengths[0] - sizes[0], parts.lengths[1] - sizes[1]};
+  const Components components = componentsOf(u, tie);
+  const std::array<double, 2> beyond{components.lengths[0] - sizes[0],
+                                     components.lengths[1] - sizes[1]};
   if (std::min(beyond[0], beyond[1]) > kOnSurface * m_magnitude) {
     const auto [distance, normal] =
-        polar(beyond[0] * parts.directions[0] + beyond[1] * parts.directions[1]);
+        polar(beyond[0] * components.directions[0] + beyond[1] * components.directions[1]);
     return {distance, normal};
   }
   const std::size_t nearest = beyond[1] > beyond[0] + tie;
-  return {beyond[nearest], parts.directions[nearest]};
+  return {beyond[nearest], components.directions[nearest]};
 }
 
-SignedDistance Shape::ofCylinder(const Vector3d& fromCentre, const Vector3d& axis) const {
+SignedDistance Shape::distanceFromCylinder(const Vector3d& fromCentre, const Vector3d& axis) const {
   const Eigen::Matrix3d axes = axis == Vector3d::Zero() ? m_axes : axesAlong(axis);
-  const SignedDistance inBodys = atBody(axes.transpose() * fromCentre, kOnSurface * m_magnitude,
-                                        {m_sizes[0], 0.5 * lengthOf(axis)});
-  return {inBodys.distance, axes * inBodys.normal};
+  const SignedDistance inBodyFrame = atBody(axes.transpose() * fromCentre, kOnSurface * m_magnitude,
+                                            {m_sizes[0], 0.5 * lengthOf(axis)});
+  return {inBodyFrame.distance, axes * inBodyFrame.normal};
 }
 
-SignedDistance Shape::at(const Vector3d& x) const {
-  if (m_kind != Kind::Capsule) {
-    const SignedDistance inBodys = atBody(inBody(x), kOnSurface * m_magnitude);
-    return {inBodys.distance, m_axes * inBodys.normal};
+SignedDistance Shape::signedDistance(const Vector3d& x) const {
+  if (m_type != Type::Capsule) {
+    const SignedDistance inBodyFrame = atBody(inBody(x), kOnSurface * m_magnitude);
+    return {inBodyFrame.distance, m_axes * inBodyFrame.normal};
   }
   const Vector3d along = m_p1 - m_p0, from = x - m_p0;
   double weight = 0;
@@ -204,25 +205,26 @@ SignedDistance Shape::at(const Vector3d& x) const {
   }
   const auto& [distance, outward] = polar(from - weight * along);
   const bool onAxis = distance <= kOnSurface * m_magnitude;
-  return {distance - m_radius, onAxis ? fromAxis(axisOfLeast(along.cwiseAbs())) : outward};
+  return {distance - m_radius,
+          onAxis ? directionFromAxis(axisOfLeastComponent(along.cwiseAbs())) : outward};
 }
 
-Vector3d Shape::fromAxis(const Vector3d& normal) const {
+Vector3d Shape::directionFromAxis(const Vector3d& normal) const {
   const Vector3d along = directionOf(m_p1 - m_p0);
   const Vector3d across = normal - along.dot(normal) * along;
   return across.squaredNorm() > kAcrossSquare ? across.normalized() : along.unitOrthogonal();
 }
 
 NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const {
-  if (m_kind == Kind::Capsule) {
+  if (m_type == Type::Capsule) {
     const EdgeEdgeDistance axis = finiteEdgeEdgeDistance(p, q, m_p0, m_p1);
     return {{1.0 - axis.weightA, axis.weightA, 0.0},
-            axis.distance > kOnSurface * m_magnitude ? axis.normal : fromAxis(axis.normal),
+            axis.distance > kOnSurface * m_magnitude ? axis.normal : directionFromAxis(axis.normal),
             axis.distance - m_radius,
             axis.featureA == EdgeFeature::Interior,
             axis.exact};
   }
-  if (m_kind == Kind::TwoSidedPlane) {
+  if (m_type == Type::TwoSidedPlane) {
     const double start = inBody(p)[2], end = inBody(q)[2];
     if ((start < 0 && end > 0) || (start > 0 && end < 0)) {
       const double t = start / (start - end);
@@ -263,19 +265,19 @@ NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const 
 
 /// For a cylinder and the plane normal . u = height, with height not negative: the plane's point
 /// that is deepest in the shape, or the shape's point nearest to the plane. The shape shrunk by m
-/// on all sides, { at(u) <= -m }, has the parts' sizes less m. m is the largest value for which it
-/// still reaches the plane.
+/// on all sides, { u: distance <= -m }, has the components' sizes less m. m is the largest value
+/// for which it still reaches the plane.
 Vector3d Shape::nearestOfPlane(const Vector3d& normal, double height) const {
-  const Parts parts = partsOf(normal, 0);
-  const auto& [lengths, directions] = parts;
-  const double reach = lengths[0] * m_sizes[0] + lengths[1] * m_sizes[1],
+  const Components components = componentsOf(normal, 0);
+  const auto& [lengths, directions] = components;
+  const double supportHeight = lengths[0] * m_sizes[0] + lengths[1] * m_sizes[1],
                all = lengths[0] + lengths[1], deepest = -std::min(m_sizes[0], m_sizes[1]);
-  const double level = std::min(0.0, std::max(deepest, (height - reach) / all));
+  const double level = std::min(0.0, std::max(deepest, (height - supportHeight) / all));
   Vector3d point = Vector3d::Zero();
   for (int i = 0; i < 2; ++i)
     if (lengths[i] > 0) point += (m_sizes[i] + level) * directions[i];
-  const double reached = reach + level * all;
-  return reached > height ? Vector3d(height / reached * point) : point;
+  const double pointHeight = supportHeight + level * all;
+  return pointHeight > height ? Vector3d(height / pointHeight * point) : point;
 }
 
 /// nearestInTriangle() for a capsule.
@@ -286,18 +288,20 @@ std::optional<NearestToShape> Shape::nearestToAxis(const Vector3d& a, const Vect
   const Vector3d along = m_p1 - m_p0;
   const auto answer = [&](const VertexTriangleDistance& end, double distance) {
     const bool onAxis = distance <= kOnSurface * m_magnitude;
-    return NearestToShape{end.barycentric, onAxis ? fromAxis(-end.normal) : Vector3d(-end.normal),
+    return NearestToShape{end.barycentric,
+                          onAxis ? directionFromAxis(-end.normal) : Vector3d(-end.normal),
                           distance - m_radius, true, end.exact};
   };
-  const auto isOver = [&](int i) { return ends[i].feature == TriangleFeature::Face; };
-  if (isOver(0) && isOver(1) && signedDot(ends[0].difference, ends[1].difference) > 0) {
+  const auto projectsOntoFace = [&](int i) { return ends[i].feature == TriangleFeature::Face; };
+  if (projectsOntoFace(0) && projectsOntoFace(1) &&
+      signedDot(ends[0].difference, ends[1].difference) > 0) {
     if (ends[0].distance != ends[1].distance)
       return answer(ends[ends[1].distance < ends[0].distance],
                     std::min(ends[0].distance, ends[1].distance));
     return answer(finiteVertexTriangleDistance(m_p0 + 0.5 * along, a, b, c), ends[0].distance);
   }
   for (const int i : {0, 1})  // this end is nearest if the axis does not come nearer from it
-    if (isOver(i) && (i == 0 ? 1 : -1) * signedDot(along, ends[i].difference) >= 0)
+    if (projectsOntoFace(i) && (i == 0 ? 1 : -1) * signedDot(along, ends[i].difference) >= 0)
       return answer(ends[i], ends[i].distance);
   SignCounts counts;
   const OrientedPlane plane(a, b, c);
@@ -315,11 +319,11 @@ std::optional<NearestToShape> Shape::nearestToAxis(const Vector3d& a, const Vect
 
 std::optional<NearestToShape> Shape::nearestInTriangle(const Vector3d& a, const Vector3d& b,
                                                        const Vector3d& c) const {
-  if (m_kind == Kind::Capsule) return nearestToAxis(a, b, c);
+  if (m_type == Type::Capsule) return nearestToAxis(a, b, c);
   if (m_hull) return nearestToHull(inBody(a), inBody(b), inBody(c));
   Vector3d normal = unitCross(a, b, a, c);
   // In a half-space, no interior point of a triangle is deeper than all of its boundary.
-  if (m_kind < Kind::Capsule || normal == Vector3d::Zero()) return {};
+  if (m_type < Type::Capsule || normal == Vector3d::Zero()) return {};
   double height = normal.dot(a - m_p0);
   if (height < 0) normal = -normal, height = -height;
   const Vector3d point = m_p0 + m_axes * nearestOfPlane(m_axes.transpose() * normal, height);
@@ -328,7 +332,7 @@ std::optional<NearestToShape> Shape::nearestInTriangle(const Vector3d& a, const 
   const Vector3d& weights = on.barycentric;
   if (on.distance > kOnSurface * m_magnitude)  // the point is the shape's nearest to the plane
     return NearestToShape{weights, normal, on.distance, true};
-  const SignedDistance least = at(weights[0] * a + weights[1] * b + weights[2] * c);
+  const SignedDistance least = signedDistance(weights[0] * a + weights[1] * b + weights[2] * c);
   return NearestToShape{weights, least.normal, least.distance, true};
 }
 
@@ -348,7 +352,7 @@ std::optional<NearestToShape> Shape::nearestToHull(const Vector3d& a, const Vect
   const std::optional<Vector3d> weights = m_hull->leastInTriangle(a, b, c, tie);
   if (!weights) return {};
   const SignedDistance least =
-      m_hull->at((*weights)[0] * a + (*weights)[1] * b + (*weights)[2] * c, tie);
+      m_hull->signedDistance((*weights)[0] * a + (*weights)[1] * b + (*weights)[2] * c, tie);
   return NearestToShape{*weights, m_axes * least.normal, least.distance, true};
 }
 
@@ -356,32 +360,32 @@ std::string faultOf(const AnalyticalGeometry& geometry, std::optional<std::size_
   std::string fault;
   constexpr const char* kWithin = "at most 1e+300 in magnitude";
   const auto isBeyond = [](const Vector3d& v) { return largest(v) > kLargestMeasure; };
-  const auto say = [&](const std::string& name, const auto& value, const char* rule) {
+  const auto report = [&](const std::string& name, const auto& value, const char* rule) {
     fault = name + " is " + textOf(value) + "; it must be " + rule;
   };
   forEachField(geometry, [&](const std::string& name, const auto& field) {
     using Field = std::decay_t<decltype(field)>;
     if constexpr (std::is_same_v<Field, std::vector<Vector3d>>) {
-      if (field.empty()) fault = "a hull needs at least one point";
+      if (field.empty()) fault = "the hull has no points; it needs at least one";
       for (std::size_t i = field.size(); i-- > 0;)
         if (const bool finite = field[i].allFinite(); !finite || isBeyond(field[i]))
-          say("point " + std::to_string(i), field[i], finite ? kWithin : "finite"), element = i;
-      if (field.size() > kMostHullPoints)
-        fault = "a hull of " + std::to_string(field.size()) + " points; a hull takes at most " +
-                std::to_string(kMostHullPoints);
+          report("point " + std::to_string(i), field[i], finite ? kWithin : "finite"), element = i;
+      if (field.size() > kMaxHullPoints)
+        fault = "the hull has " + std::to_string(field.size()) + " points; it must have at most " +
+                std::to_string(kMaxHullPoints);
     } else if constexpr (!std::is_same_v<Field, bool>) {
       Vector3d values;
       values << field, Eigen::VectorXd::Zero(std::is_same_v<Field, double> ? 2 : 0);
       const bool isSize = name == "radius" || name == "halfExtents";
       if (!values.allFinite() || (isSize && !(values.minCoeff() >= 0)))
-        say(name, field, isSize ? "finite and not negative" : "finite");
+        report(name, field, isSize ? "finite and not negative" : "finite");
       else if (name == "normal" ? values == Vector3d::Zero() : isBeyond(values))
-        say(name, field, name == "normal" ? "of some length" : kWithin);
+        report(name, field, name == "normal" ? "longer than zero" : kWithin);
     }
   });
   const auto* cylinder = std::get_if<Cylinder>(&geometry);
   if (fault.empty() && cylinder && cylinder->p0 == cylinder->p1)
-    say("p1", cylinder->p1, "another point than p0");
+    report("p1", cylinder->p1, "different from p0");
   return fault;
 }
 
@@ -389,8 +393,8 @@ std::string faultOf(const RigidTransform& transform) {
   const Eigen::Matrix3d& r = transform.rotation;
   const double off = (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!r.allFinite() || !(off <= kOrthonormal) || !(r.determinant() > 0))
-    return "rotation is not a rotation: its columns' products are off by " + textOf(off) +
-           ", its determinant is " + textOf(r.determinant());
+    return "rotation is not a rotation matrix: R^T R differs from the identity by " + textOf(off) +
+           ", and its determinant is " + textOf(r.determinant());
   if (transform.translation.allFinite()) return {};
   return "translation is " + textOf(transform.translation) + "; it must be finite";
 }

@@ -60,7 +60,7 @@ class Shape {
   /// linearly.
   void placeBetween(const Shape& before, const Shape& now, double time);
 
-  SignedDistance at(const Eigen::Vector3d& x) const;
+  SignedDistance signedDistance(const Eigen::Vector3d& x) const;
   NearestToShape nearestOfEdge(const Eigen::Vector3d& p, const Eigen::Vector3d& q) const;
   /// None if a point of the triangle's boundary is as near.
   std::optional<NearestToShape> nearestInTriangle(const Eigen::Vector3d& a,
@@ -89,24 +89,25 @@ class Shape {
   /// differ by at most this count as equal.
   Eigen::Vector3d support(const Eigen::Vector3d& direction, double tie) const;
   const Eigen::Vector3d& origin() const { return m_p0; }
-  bool isPlane() const { return m_kind < Kind::Capsule; }
-  bool isCylinder() const { return m_kind == Kind::Cylinder; }
+  bool isPlane() const { return m_type < Type::Capsule; }
+  bool isCylinder() const { return m_type == Type::Cylinder; }
   /// Whether distanceFrom() uses the Minkowski difference. The distance is then known to within
   /// kShapePairGap of the larger shape.
-  bool needsDifferences(const Shape& b) const;
+  bool needsMinkowskiDifference(const Shape& b) const;
   double size() const;  ///< L: the largest extent; infinite for a plane
-  bool isTwoSided() const { return m_kind == Kind::TwoSidedPlane; }
+  bool isTwoSided() const { return m_type == Type::TwoSidedPlane; }
 
   // Within a step the corners of a shape move linearly: a hull's corners, or a capsule's two ends,
   // which coincide for a sphere. ShapeStep is for planes and cylinders.
 
-  bool hasCorners() const { return m_kind == Kind::Capsule || m_kind == Kind::Hull; }
+  bool hasCorners() const { return m_type == Type::Capsule || m_type == Type::Hull; }
   /// A cylinder's corners are its end centres.
   std::span<const Eigen::Vector3d> corners() const { return m_corners; }
   const Eigen::Matrix3d& axes() const { return m_axes; }  ///< a plane's normal is the last column
   /// Signed distance of a point from a cylinder that has this cylinder's radius and another axis.
   /// The point is relative to the centre.
-  SignedDistance ofCylinder(const Eigen::Vector3d& fromCentre, const Eigen::Vector3d& axis) const;
+  SignedDistance distanceFromCylinder(const Eigen::Vector3d& fromCentre,
+                                      const Eigen::Vector3d& axis) const;
   /// A hull's faces, by corners. A capsule's axis counts as the triangle {p, q, q}.
   std::span<const Triangle> faces() const { return m_faces; }
   std::span<const Segment> edges() const { return m_edges; }
@@ -116,24 +117,24 @@ class Shape {
   double magnitude() const { return m_magnitude; }
 
  private:
-  ShapePairDistance planeFrom(const Shape& body) const;
-  ShapePairDistance axisFrom(const Shape& body) const;
-  ShapePairDistance flatFrom(const Shape&, const Eigen::Vector3d& flat) const;
-  ShapePairDistance grownFrom(const Shape&, ShapePairScratch&) const;
+  ShapePairDistance planeDistance(const Shape& body) const;
+  ShapePairDistance axisDistance(const Shape& body) const;
+  ShapePairDistance planarDistance(const Shape&, const Eigen::Vector3d& flat) const;
+  ShapePairDistance minkowskiDistance(const Shape&, ShapePairScratch&) const;
 
-  enum class Kind { Plane, TwoSidedPlane, Capsule, Cylinder, Hull };
+  enum class Type { Plane, TwoSidedPlane, Capsule, Cylinder, Hull };
   /// A vector's radial and axial components, which determine the distance to a cylinder.
-  struct Parts {
+  struct Components {
     std::array<double, 2> lengths;  ///< never negative
     std::array<Eigen::Vector3d, 2> directions;
   };
   /// tie: L, a point at most this far below the middle counts as above it.
-  Parts partsOf(const Eigen::Vector3d& v, double tie) const;
+  Components componentsOf(const Eigen::Vector3d& v, double tie) const;
   void placeCorners();
   Eigen::Vector3d inBody(const Eigen::Vector3d& x) const;
   /// An outward direction for a point on a capsule's axis, where every direction across the axis
   /// leads out. It is near the given one.
-  Eigen::Vector3d fromAxis(const Eigen::Vector3d& normal) const;
+  Eigen::Vector3d directionFromAxis(const Eigen::Vector3d& normal) const;
   /// tie: L, if two faces are equally near within this, the first one counts.
   SignedDistance atBody(const Eigen::Vector3d& u, double tie) const;
   /// The same for a cylinder with other sizes.
@@ -145,7 +146,7 @@ class Shape {
   std::optional<NearestToShape> nearestToAxis(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                               const Eigen::Vector3d& c) const;
 
-  Kind m_kind = Kind::Plane;
+  Type m_type = Type::Plane;
   Eigen::Vector3d m_p0, m_p1;  ///< a capsule's axis; others: both the body's origin
   double m_radius = 0;         ///< of a capsule
   double m_axisSquare = 0;     ///< L²: its squared length; negative beyond double's range
@@ -162,9 +163,9 @@ class Shape {
 /// Scratch for pairs of shapes, which keeps its peak capacity: a polytope inside the Minkowski
 /// difference, the points of a that its points came from, and a shape at a time of the step.
 struct ShapePairScratch {
-  Polytope grown;
-  Buffer<Eigen::Vector3d> ofA;
-  std::optional<Shape> then;
+  Polytope polytope;
+  Buffer<Eigen::Vector3d> pointsOfA;
+  std::optional<Shape> shapeAtTime;
 };
 
 /// Calls f(name, field) for each field of a shape: vectors, doubles, flags and lists of vectors.

@@ -16,13 +16,13 @@ using Eigen::Vector3d;
 
 /// The most points of a round body that are computed. Between corners, far fewer points come nearer
 /// and nearer.
-constexpr int kMostPoints = 128;
+constexpr int kMaxPoints = 128;
 
 }  // namespace
 
 ShapeApproach::ShapeApproach(const MovingBody& a, const MovingBody& b)
     : m_a(a), m_b(b), m_reference{b.corners[0][0], b.corners[1][0]} {
-  m_size = (a.radius + b.radius) + (a.mantle + b.mantle);
+  m_size = (a.radius + b.radius) + (a.cylinderRadius + b.cylinderRadius);
   double furthest = 0;
   for (const MovingBody* body : {&m_a, &m_b})
     for (const std::size_t end : {0, 1})
@@ -56,33 +56,35 @@ Vector3d ShapeApproach::furthest(const MovingBody& body, const Vector3d& directi
     const double height = dot(direction, p);
     if (height > most) most = height, best = p;
   }
-  if (!(body.mantle > 0)) return best;
+  if (!(body.cylinderRadius > 0)) return best;
   const Vector3d axis = directionOf(corner(body, 1, time) - corner(body, 0, time));
   Vector3d across = direction - dot(direction, axis) * axis;
   if (!(across.squaredNorm() > kOnSurface * kOnSurface)) return best;  // only rounding
   across = across.normalized();
-  return best + body.mantle * (across - dot(across, axis) * axis).normalized();
+  return best + body.cylinderRadius * (across - dot(across, axis) * axis).normalized();
 }
 
-/// An upper bound on how far a cylinder's mantle reaches beyond its axis along a direction, in a
-/// part of the step. The axis turns in a plane, by less than half a turn. The sine of its angle to
-/// the direction is therefore greatest at an end, unless the axis becomes perpendicular to the
-/// direction in between.
-double ShapeApproach::mantleReach(const MovingBody& body, const Vector3d& direction, double from,
-                                  double to) const {
-  if (!(body.mantle > 0)) return 0;
+/// An upper bound on how far a cylinder's lateral surface reaches beyond its axis along a
+/// direction, in a part of the step. The axis turns in a plane, by less than half a turn. The sine
+/// of its angle to the direction is therefore greatest at an end, unless the axis becomes
+/// perpendicular to the direction in between.
+double ShapeApproach::lateralExtent(const MovingBody& body, const Vector3d& direction, double from,
+                                    double to) const {
+  if (!(body.cylinderRadius > 0)) return 0;
   const Vector3d first = directionOf(corner(body, 1, from) - corner(body, 0, from)),
                  last = directionOf(corner(body, 1, to) - corner(body, 0, to));
   const double start = dot(direction, first), end = dot(direction, last);
-  if (!((start > 0 && end > 0) || (start < 0 && end < 0))) return body.mantle;
-  return body.mantle * std::max(direction.cross(first).norm(), direction.cross(last).norm());
+  if (!((start > 0 && end > 0) || (start < 0 && end < 0))) return body.cylinderRadius;
+  return body.cylinderRadius *
+         std::max(direction.cross(first).norm(), direction.cross(last).norm());
 }
 
 bool ShapeApproach::separates(const Vector3d& direction, double from, double to,
                               double distance) const {
   const double between = std::min(-highest(m_a, -direction, from) - highest(m_b, direction, from),
                                   -highest(m_a, -direction, to) - highest(m_b, direction, to));
-  return between - (mantleReach(m_a, direction, from, to) + mantleReach(m_b, direction, from, to)) -
+  return between -
+             (lateralExtent(m_a, direction, from, to) + lateralExtent(m_b, direction, from, to)) -
              (m_a.radius + m_b.radius) >
          distance + kShapeBoundError * (m_size + distance);
 }
@@ -96,7 +98,7 @@ struct ShapeApproach::Simplex {
   std::array<double, 4> weights;
   int size = 0;
 
-  bool holds(const Vector3d& difference) const {
+  bool contains(const Vector3d& difference) const {
     return std::any_of(points.begin(), points.begin() + size,
                        [&](const Point& p) { return p.difference == difference; });
   }
@@ -148,12 +150,12 @@ ShapeApproach::Nearest ShapeApproach::nearest(double time, IsEnough&& isEnough) 
   Simplex simplex;
   Nearest found{Vector3d::Zero(), Vector3d::Zero(), m_direction, 0};
   double upper = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < kMostPoints; ++i) {
+  for (int i = 0; i < kMaxPoints; ++i) {
     const Vector3d ofA = furthest(m_a, -found.normal, time),
                    difference = ofA - furthest(m_b, found.normal, time);
     const double lower = dot(found.normal, difference);
     if (isEnough(found.normal, lower, upper) || !(upper - lower > kShapePairGap * m_size) ||
-        simplex.holds(difference))
+        simplex.contains(difference))
       break;
     simplex.points[simplex.size++] = {difference, ofA};
     if (simplex.size == 4 && simplex.surroundsOrigin(counts)) {
@@ -174,22 +176,22 @@ ShapeApproach::Nearest ShapeApproach::nearest(double time, IsEnough&& isEnough) 
   return found;
 }
 
-bool ShapeApproach::passes(double from, double to, double distance) {
+bool ShapeApproach::isExcluded(double from, double to, double distance) {
   if (separates(m_direction, from, to, distance)) return true;
-  const double reach = distance + (m_a.radius + m_b.radius);
-  bool passed = false;
+  const double centreDistance = distance + (m_a.radius + m_b.radius);
+  bool excluded = false;
   nearest(0.5 * (from + to), [&](const Vector3d& normal, double lower, double upper) {
-    if (!(upper > reach)) return true;  // too near already
-    if (!(lower > reach) || !separates(normal, from, to, distance)) return false;
+    if (!(upper > centreDistance)) return true;  // too near already
+    if (!(lower > centreDistance) || !separates(normal, from, to, distance)) return false;
     m_direction = normal;
-    return passed = true;
+    return excluded = true;
   });
-  return passed;
+  return excluded;
 }
 
-std::optional<double> ShapeApproach::timeNear(double distance, double tolerance) {
-  return firstNotPassed(tolerance,
-                        [&](double from, double to) { return passes(from, to, distance); });
+std::optional<double> ShapeApproach::firstTimeWithin(double distance, double tolerance) {
+  return firstTimeNotExcluded(
+      tolerance, [&](double from, double to) { return isExcluded(from, to, distance); });
 }
 
 ShapePairDistance ShapeApproach::nearestAt(double time) {

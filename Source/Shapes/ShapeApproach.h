@@ -22,15 +22,15 @@ class ShapeApproach {
   /// e apart. e is kShapeBoundError of their size, plus their relative motion in a part of the step
   /// as long as the tolerance. For a cylinder that turns, the motion of all its points counts.
   ///
-  /// Source   a part of the step is passed if one direction separates the bodies at both its ends.
+  /// Source   a part of the step is excluded if one direction separates the bodies at both its ends.
   ///          The distance along a fixed direction is the least of linear functions of time; in
-  ///          between it is therefore not less than at both ends. A cylinder's mantle reaches
-  ///          furthest along the direction at an end of the part, or when its axis is perpendicular
-  ///          to the direction. Parts that are not passed are halved. The direction joins the
-  ///          nearest points of the bodies at the middle of the part: Gilbert, Johnson, Keerthi
-  ///          (1988), with the library's distance of a point from a triangle. That it separates the
-  ///          bodies is verified.
-  std::optional<double> timeNear(double distance, double tolerance);
+  ///          between it is therefore not less than at both ends. A cylinder's lateral surface
+  ///          reaches furthest along the direction at an end of the part, or when its axis is
+  ///          perpendicular to the direction. Parts that are not excluded are halved. The direction
+  ///          joins the nearest points of the bodies at the middle of the part: Gilbert, Johnson,
+  ///          Keerthi (1988), with the library's distance of a point from a triangle. That it
+  ///          separates the bodies is verified.
+  std::optional<double> firstTimeWithin(double distance, double tolerance);
   /// The nearest points at a time at which the bodies without their radii are apart. A negative
   /// distance is the overlap of the radii.
   ShapePairDistance nearestAt(double time);
@@ -48,10 +48,10 @@ class ShapeApproach {
   Eigen::Vector3d corner(const MovingBody&, std::size_t i, double time) const;
   double highest(const MovingBody&, const Eigen::Vector3d& direction, double time) const;
   Eigen::Vector3d furthest(const MovingBody&, const Eigen::Vector3d& direction, double time) const;
-  double mantleReach(const MovingBody&, const Eigen::Vector3d& direction, double from,
-                     double to) const;
+  double lateralExtent(const MovingBody&, const Eigen::Vector3d& direction, double from,
+                       double to) const;
   bool separates(const Eigen::Vector3d& direction, double from, double to, double distance) const;
-  bool passes(double from, double to, double distance);
+  bool isExcluded(double from, double to, double distance);
   template <class IsEnough>
   Nearest nearest(double time, IsEnough&& isEnough);
 

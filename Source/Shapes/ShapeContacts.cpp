@@ -54,7 +54,7 @@ class ShapeImpacts {
     for (std::uint32_t i = 0; i < m_before.corners().size(); ++i)
       m_motion = std::max(m_motion, motionOf(corner(i)));
     if (m_before.isPlane()) m_motion = std::numeric_limits<double>::infinity();  // a plane may turn
-    if (m_before.isCylinder())  // its mantle turns with its ends
+    if (m_before.isCylinder())  // its lateral surface turns with its ends
       m_motion += (m_now.axes().col(2) - m_before.axes().col(2)).norm() * m_before.radius();
   }
 
@@ -81,20 +81,20 @@ class ShapeImpacts {
     const auto& [a, b, c] = vertices;
     if (!m_before.hasCorners())
       return element == ShapeElement::Vertex ? findOfVertex(a) : findOfCylinder(element, vertices);
-    m_first.reset();
+    m_earliest.reset();
     m_time = 1.0;
     if (element == ShapeElement::Vertex) {
       for (const auto& [i, j, k] : m_before.faces())
-        ask({Kind::VertexTriangle, {{vertex(a), corner(i), corner(j), corner(k)}}});
+        testImpact({Kind::VertexTriangle, {{vertex(a), corner(i), corner(j), corner(k)}}});
     } else if (element == ShapeElement::Edge) {
       for (const auto& [i, j] : m_before.edges())
-        ask({Kind::EdgeEdge, {{vertex(a), vertex(b), corner(i), corner(j)}}});
+        testImpact({Kind::EdgeEdge, {{vertex(a), vertex(b), corner(i), corner(j)}}});
     } else {
       for (std::uint32_t i = 0; i < m_before.corners().size(); ++i)
-        ask({Kind::VertexTriangle, {{corner(i), vertex(a), vertex(b), vertex(c)}}});
+        testImpact({Kind::VertexTriangle, {{corner(i), vertex(a), vertex(b), vertex(c)}}});
     }
-    if (!m_first) return {};
-    return ShapeImpact{m_time, nearest(element, *m_first)};
+    if (!m_earliest) return {};
+    return ShapeImpact{m_time, nearest(element, *m_earliest)};
   }
 
  private:
@@ -105,14 +105,14 @@ class ShapeImpacts {
   std::optional<ShapeImpact> findOfVertex(std::uint32_t v) {
     const auto time = timeOfVertex(v);
     if (!time) return {};
-    const SignedDistance then =
-        ShapeStep(m_before, m_now).at({m_mesh.before[v], m_mesh.now[v]}, *time);
-    return ShapeImpact{*time, {Vector3d::UnitX(), then.normal, then.distance, true}};
+    const SignedDistance atTime =
+        ShapeStep(m_before, m_now).signedDistanceAt({m_mesh.before[v], m_mesh.now[v]}, *time);
+    return ShapeImpact{*time, {Vector3d::UnitX(), atTime.normal, atTime.distance, true}};
   }
   std::optional<double> timeOfVertex(std::uint32_t v) {
     ++m_out.featurePairs;
     return ShapeStep(m_before, m_now)
-        .timeNear({m_mesh.before[v], m_mesh.now[v]}, m_distance, m_settings.timeTolerance);
+        .firstTimeWithin({m_mesh.before[v], m_mesh.now[v]}, m_distance, m_settings.timeTolerance);
   }
   /// The first time at which an edge or a triangle is near the cylinder.
   std::optional<double> timeOfElement(ShapeElement element, const Triangle& vertices) {
@@ -123,7 +123,7 @@ class ShapeImpacts {
     ShapeApproach approach({{std::span(ends[0]).first(size), std::span(ends[1]).first(size)}},
                            movingBody(m_before, m_now));
     ++m_out.featurePairs;
-    const auto time = approach.timeNear(m_distance, m_settings.timeTolerance);
+    const auto time = approach.firstTimeWithin(m_distance, m_settings.timeTolerance);
     m_out.exactDecisions += approach.exactDecisions();
     return time;
   }
@@ -133,14 +133,14 @@ class ShapeImpacts {
   std::optional<ShapeImpact> findOfCylinder(ShapeElement element, const Triangle& vertices) {
     const auto time = timeOfElement(element, vertices);
     if (!time) return {};
-    std::optional<Shape>& then = m_out.shapePair.then;
-    if (!then) then = m_before;
-    then->placeBetween(m_before, m_now, *time);
+    std::optional<Shape>& shapeAtTime = m_out.shapePair.shapeAtTime;
+    if (!shapeAtTime) shapeAtTime = m_before;
+    shapeAtTime->placeBetween(m_before, m_now, *time);
     std::array<Vector3d, 3> x;
     for (int i = 0; i < 3; ++i)
       x[i] = (1.0 - *time) * m_mesh.before[vertices[i]] + *time * m_mesh.now[vertices[i]];
-    ShapeImpact impact{*time, element == ShapeElement::Edge ? then->nearestOfEdge(x[0], x[1])
-                                                            : nearestOfTriangle(*then, x)};
+    ShapeImpact impact{*time, element == ShapeElement::Edge ? shapeAtTime->nearestOfEdge(x[0], x[1])
+                                                            : nearestOfTriangle(*shapeAtTime, x)};
     NearestToShape& nearest = impact.nearest;
     m_out.exactDecisions += nearest.exact;
     if (!nearest.inInterior && boundaryIsNear(vertices, nearest.weights, *time)) return {};
@@ -156,16 +156,18 @@ class ShapeImpacts {
   /// Whether the feature that contains the point of these weights is near the shape at this time,
   /// or was before.
   bool boundaryIsNear(const Triangle& vertices, const Vector3d& weights, double time) {
-    std::array<std::uint32_t, 3> held{};
+    std::array<std::uint32_t, 3> boundaryVertices{};
     std::size_t count = 0;
     for (int i = 0; i < 3; ++i)
-      if (weights[i] > 0 && (count == 0 || held[count - 1] != vertices[i]))
-        held[count++] = vertices[i];
+      if (weights[i] > 0 && (count == 0 || boundaryVertices[count - 1] != vertices[i]))
+        boundaryVertices[count++] = vertices[i];
     if (count > 2) return false;
-    const auto first = count == 1 ? timeOfVertex(held[0])
-                                  : timeOfElement(ShapeElement::Edge, {std::min(held[0], held[1]),
-                                                                       std::max(held[0], held[1]),
-                                                                       std::max(held[0], held[1])});
+    const auto first = count == 1
+                           ? timeOfVertex(boundaryVertices[0])
+                           : timeOfElement(ShapeElement::Edge,
+                                           {std::min(boundaryVertices[0], boundaryVertices[1]),
+                                            std::max(boundaryVertices[0], boundaryVertices[1]),
+                                            std::max(boundaryVertices[0], boundaryVertices[1])});
     return first && *first <= time;
   }
 
@@ -183,13 +185,13 @@ class ShapeImpacts {
 
   static double motionOf(const ImpactQuery::Step& step) { return lengthOf(step.now - step.before); }
 
-  void ask(const ImpactQuery& query) {
-    const ImpactAnswer answer = findImpact(query, m_settings, m_time);
+  void testImpact(const ImpactQuery& query) {
+    const ImpactResult answer = findImpact(query, m_settings, m_time);
     ++m_out.featurePairs;
     m_out.exactDecisions += answer.exact;
-    if (!answer.impact || (m_first && !(answer.time < m_time))) return;
+    if (!answer.impact || (m_earliest && !(answer.time < m_time))) return;
     m_time = answer.time;
-    m_first = query;
+    m_earliest = query;
   }
 
   NearestToShape nearest(ShapeElement element, const ImpactQuery& query) {
@@ -226,7 +228,7 @@ class ShapeImpacts {
   TimeOfImpactSettings m_settings;
   double m_motion = 0;  ///< L: a bound on the motion of the shape's points
   double m_time = 1.0;
-  std::optional<ImpactQuery> m_first;
+  std::optional<ImpactQuery> m_earliest;
 };
 
 class ShapeContactFinder {
@@ -245,8 +247,9 @@ class ShapeContactFinder {
   void test(std::uint32_t element) {
     const MeshTopology& topology = m_mesh.topology;
     const Triangle& corners = topology.triangles[element];
-    if (!topology.isOn(element)) return;
-    for (int i = 0; i < 3; ++i) m_ends[i] = {corners[i], m_shape.at(m_positions[corners[i]])};
+    if (!topology.isEnabled(element)) return;
+    for (int i = 0; i < 3; ++i)
+      m_ends[i] = {corners[i], m_shape.signedDistance(m_positions[corners[i]])};
     for (int i = 0; i < 3; ++i) {
       const auto& [vertex, from] = m_ends[i];
       if (topology.ownsCorner(element, i))
@@ -274,14 +277,14 @@ class ShapeContactFinder {
   /// it from below. If the distance does not fall in any direction from an end, that end is
   /// nearest.
   template <std::size_t size>
-  bool mayTouch(const std::array<End, size>& ends, double reach) {
+  bool mayTouch(const std::array<End, size>& ends, double limit) {
     if (size > 1) ++m_out.featurePairs;
     for (const End& end : ends) {
       double slope = 0;
       for (const End& other : ends)
         slope = std::min(slope,
                          end.from.normal.dot(m_positions[other.vertex] - m_positions[end.vertex]));
-      if (end.from.distance + slope > reach) return false;
+      if (end.from.distance + slope > limit) return false;
       if (m_distinct && !m_continuous && size > 1 && slope == 0) return false;
     }
     return true;
@@ -295,13 +298,13 @@ class ShapeContactFinder {
     std::array<double, 2> slack{0.0, 0.0};
     if (m_continuous) slack = m_impacts.slack(element, vertices);
     const auto& [error, motion] = slack;
-    const double reach = distance + error + motion;
-    if (!mayTouch(ends, reach)) return;
+    const double limit = distance + error + motion;
+    if (!mayTouch(ends, limit)) return;
     NearestToShape first = nearest();
     m_out.exactDecisions += first.exact;
     if (!m_continuous) return add(element, id, vertices, first, 1.0);
     if (first.distance <= distance + error) return add(element, id, vertices, first, 0.0);
-    if (first.distance > reach) return;
+    if (first.distance > limit) return;
     if (const auto impact = m_impacts.find(element, vertices))
       add(element, id, vertices, impact->nearest, impact->time);
   }
@@ -362,28 +365,28 @@ void findShapeImpact(const PlacedShape& first, const PlacedShape& second,
   const double thickness = settings.thickness, timeTolerance = settings.timeTolerance;
   const MovingBody body = movingBody(b->before, b->now);
   std::optional<double> time;
-  ShapePairDistance then{};
+  ShapePairDistance atTime{};
   if (a->now.isPlane()) {
     const ShapeStep step(a->before, a->now);
-    time = step.timeNear(body, thickness, timeTolerance);
-    if (time) then = step.at(body, *time);
+    time = step.firstTimeWithin(body, thickness, timeTolerance);
+    if (time) atTime = step.nearestAt(body, *time);
   } else {
     ShapeApproach approach(movingBody(a->before, a->now), body);
-    time = approach.timeNear(thickness, timeTolerance);
-    if (time && *time > 0) then = approach.nearestAt(*time);
+    time = approach.firstTimeWithin(thickness, timeTolerance);
+    if (time && *time > 0) atTime = approach.nearestAt(*time);
     out.exactDecisions += approach.exactDecisions();
   }
   if (!time) return;
-  if (*time == 0) then = a->before.distanceFrom(b->before, out.shapePair);
-  if (exchanged) then = then.exchanged();
-  out.shapeShape.push_back({then.pointA, then.pointB, then.normal, then.distance, *time});
+  if (*time == 0) atTime = a->before.distanceFrom(b->before, out.shapePair);
+  if (exchanged) atTime = atTime.exchanged();
+  out.shapeShape.push_back({atTime.pointA, atTime.pointB, atTime.normal, atTime.distance, *time});
 }
 
 }  // namespace
 
 void findShapePair(const PlacedShape& a, const PlacedShape& b, const PairSettings& settings,
                    ShapeContactBuffers& out) {
-  const std::size_t before = out.shapePair.grown.exactDecisions();
+  const std::size_t before = out.shapePair.polytope.exactDecisions();
   ++out.featurePairs;
   if (settings.method == Method::Continuous) {
     findShapeImpact(a, b, settings, out);
@@ -392,7 +395,7 @@ void findShapePair(const PlacedShape& a, const PlacedShape& b, const PairSetting
     if (distance <= settings.thickness)
       out.shapeShape.push_back({pointA, pointB, normal, distance, 1.0});
   }
-  out.exactDecisions += out.shapePair.grown.exactDecisions() - before;
+  out.exactDecisions += out.shapePair.polytope.exactDecisions() - before;
 }
 
 }  // namespace palpate

@@ -47,12 +47,12 @@ inline Eigen::Vector3d directionOf(const Eigen::Vector3d& v) {
 }
 
 /// A number with the sign of a . b, which may leave the range of double; slower.
-double signedDotOfAny(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
+double signedDotOfAnyLength(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
 
 /// a . b; where that leaves the range of double, a number with the same sign.
 inline double signedDot(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   const double product = a.dot(b);
-  return isInRange(product) ? product : signedDotOfAny(a, b);
+  return isInRange(product) ? product : signedDotOfAnyLength(a, b);
 }
 
 /// The weight in [0, 1] of the point on an axis that is nearest to `from`. Both vectors start at

@@ -20,9 +20,10 @@ namespace {
 using Eigen::Vector3d;
 
 /// Points of the Minkowski difference of two shapes, a - b: the furthest ones along directions.
-class Differences {
+class MinkowskiDifference {
  public:
-  Differences(const Shape& a, const Shape& b) : m_a(a), m_b(b), m_offset(a.origin() - b.origin()) {}
+  MinkowskiDifference(const Shape& a, const Shape& b)
+      : m_a(a), m_b(b), m_offset(a.origin() - b.origin()) {}
 
   struct Point {
     Vector3d difference, ofA;
@@ -76,27 +77,28 @@ class Differences {
 };
 
 /// The most points that are added for overlapping bodies with a round side.
-constexpr std::size_t kMostDifferences = 256;
+constexpr std::size_t kMaxDifferencePoints = 256;
 
 }  // namespace
 
 Vector3d Shape::support(const Vector3d& direction, double tie) const {
-  if (m_kind == Kind::Capsule) {
+  if (m_type == Type::Capsule) {
     const Vector3d along = m_p1 - m_p0;
     const double higher = dot(direction, along);
     return (std::abs(higher) <= tie ? 0.5 : higher > 0 ? 1.0 : 0.0) * along;
   }
-  const Vector3d inBodys = m_axes.transpose() * direction;
-  if (m_hull) return m_axes * m_hull->support(inBodys, tie);
-  const Parts parts = partsOf(inBodys, 0);
+  const Vector3d bodyDirection = m_axes.transpose() * direction;
+  if (m_hull) return m_axes * m_hull->support(bodyDirection, tie);
+  const Components components = componentsOf(bodyDirection, 0);
   Vector3d point = Vector3d::Zero();
   for (int i = 0; i < 2; ++i)
-    if (parts.lengths[i] * m_sizes[i] > 0.5 * tie) point += m_sizes[i] * parts.directions[i];
+    if (components.lengths[i] * m_sizes[i] > 0.5 * tie)
+      point += m_sizes[i] * components.directions[i];
   return m_axes * point;
 }
 
 bool Shape::precedes(const Shape& other) const {
-  if (m_kind != other.m_kind) return m_kind < other.m_kind;
+  if (m_type != other.m_type) return m_type < other.m_type;
   if (radius() != other.radius()) return radius() < other.radius();
   const auto &ours = m_corners, &theirs = other.m_corners;
   for (std::size_t i = 0; i < std::min(ours.size(), theirs.size()); ++i)
@@ -107,12 +109,12 @@ bool Shape::precedes(const Shape& other) const {
 }
 
 /// The distance of this plane from a body.
-ShapePairDistance Shape::planeFrom(const Shape& body) const {
+ShapePairDistance Shape::planeDistance(const Shape& body) const {
   const double tie = kOnSurface * (m_magnitude + body.m_magnitude);
   ShapePairDistance best{};
   best.distance = -std::numeric_limits<double>::infinity();
   for (const double side : {1.0, -1.0}) {
-    if (side < 0 && m_kind != Kind::TwoSidedPlane) break;
+    if (side < 0 && m_type != Type::TwoSidedPlane) break;
     const Vector3d up = side * m_axes.col(2);
     const Vector3d lowest = body.support(-up, tie);
     const double distance = up.dot(lowest) + up.dot(body.m_p0 - m_p0) - body.m_radius;
@@ -125,7 +127,7 @@ ShapePairDistance Shape::planeFrom(const Shape& body) const {
 
 /// The distance of bodies whose Minkowski difference lies in one plane with normal `flat`. Each
 /// body then lies in one plane itself.
-ShapePairDistance Shape::flatFrom(const Shape& other, const Vector3d& flat) const {
+ShapePairDistance Shape::planarDistance(const Shape& other, const Vector3d& flat) const {
   NearestToShape nearest{};
   Vector3d point = m_p0;
   nearest.distance = std::numeric_limits<double>::infinity();
@@ -154,60 +156,62 @@ ShapePairDistance Shape::flatFrom(const Shape& other, const Vector3d& flat) cons
   return {pointA, pointA - whole * normal, normal, whole};
 }
 
-ShapePairDistance Shape::grownFrom(const Shape& other, ShapePairScratch& scratch) const {
-  const Differences differences(*this, other);
-  std::array<Differences::Point, 4> first;
+ShapePairDistance Shape::minkowskiDistance(const Shape& other, ShapePairScratch& scratch) const {
+  const MinkowskiDifference minkowski(*this, other);
+  std::array<MinkowskiDifference::Point, 4> first;
   Vector3d flat;
-  if (differences.start(first, flat) < 4) return flatFrom(other, flat);
-  Polytope& grown = scratch.grown;
-  Buffer<Vector3d>& ofA = scratch.ofA;
+  if (minkowski.start(first, flat) < 4) return planarDistance(other, flat);
+  Polytope& polytope = scratch.polytope;
+  Buffer<Vector3d>& pointsOfA = scratch.pointsOfA;
   std::array<Vector3d, 4> corners;
-  ofA.clear();
+  pointsOfA.clear();
   double size = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     corners[i] = first[i].difference;
-    ofA.push_back(first[i].ofA);
+    pointsOfA.push_back(first[i].ofA);
     size = std::max(size, largest(corners[i]));
   }
-  grown.start(corners);
+  polytope.start(corners);
   const Vector3d origin = Vector3d::Zero();
   const double gap = std::max(kShapePairGap * size, kSmallestShapePairGap), tie = kOnSurface * size;
-  const bool isRound = m_kind == Kind::Cylinder || other.m_kind == Kind::Cylinder;
+  const bool isRound = m_type == Type::Cylinder || other.m_type == Type::Cylinder;
   SignedDistance out;
   for (;;) {
-    out = grown.at(origin, tie);
-    const auto [difference, point] = differences.furthest(out.normal);
-    const double reach = dot(out.normal, difference);
+    out = polytope.signedDistance(origin, tie);
+    const auto [difference, point] = minkowski.furthest(out.normal);
+    const double supportHeight = dot(out.normal, difference);
     // A round body may be equally deep in any number of directions. Each of them separates the
     // bodies.
-    const bool enough = isRound && out.distance < 0 && grown.points().size() >= kMostDifferences;
-    if (!(reach + out.distance > gap) || enough || !grown.add(difference)) {
-      if (out.distance < 0) out.distance = -reach;
+    const bool enough =
+        isRound && out.distance < 0 && polytope.points().size() >= kMaxDifferencePoints;
+    if (!(supportHeight + out.distance > gap) || enough || !polytope.add(difference)) {
+      if (out.distance < 0) out.distance = -supportHeight;
       break;
     }
-    ofA.push_back(point);
+    pointsOfA.push_back(point);
   }
-  Polytope::OnFace on = grown.nearest(origin, tie);
+  Polytope::OnFace on = polytope.nearest(origin, tie);
   if (isRound && out.distance < 0) {
-    on = grown.nearestFaceWithin(origin, tie);
-    out.normal = grown.normal(on.face);
-    out.distance = -dot(out.normal, differences.furthest(out.normal).difference);
+    on = polytope.nearestFaceWithin(origin, tie);
+    out.normal = polytope.normal(on.face);
+    out.distance = -dot(out.normal, minkowski.furthest(out.normal).difference);
   }
   Vector3d point = m_p0;
   for (int i = 0; i < 3; ++i)
-    point += on.from.barycentric[i] * ofA[grown.corners(on.face)[static_cast<std::size_t>(i)]];
+    point +=
+        on.from.barycentric[i] * pointsOfA[polytope.corners(on.face)[static_cast<std::size_t>(i)]];
   const Vector3d normal = -out.normal;
   return {point - m_radius * normal, point + on.from.difference + other.m_radius * normal, normal,
           out.distance - m_radius - other.m_radius};
 }
 
 /// The distance of this capsule from another one, or of this sphere from a body.
-ShapePairDistance Shape::axisFrom(const Shape& body) const {
+ShapePairDistance Shape::axisDistance(const Shape& body) const {
   NearestToShape nearest{Vector3d::UnitX(), {}, 0, false};
-  if (body.m_kind == Kind::Capsule) {
+  if (body.m_type == Type::Capsule) {
     nearest = body.nearestOfEdge(m_p0, m_p1);
   } else {
-    const SignedDistance at = body.at(m_p0);
+    const SignedDistance at = body.signedDistance(m_p0);
     nearest.normal = at.normal;
     nearest.distance = at.distance;
   }
@@ -216,12 +220,12 @@ ShapePairDistance Shape::axisFrom(const Shape& body) const {
   return {point, point - distance * nearest.normal, nearest.normal, distance};
 }
 
-bool Shape::needsDifferences(const Shape& b) const {
+bool Shape::needsMinkowskiDifference(const Shape& b) const {
   const auto isSphere = [](const Shape& s) {
-    return s.m_kind == Kind::Capsule && s.m_p0 == s.m_p1;
+    return s.m_type == Type::Capsule && s.m_p0 == s.m_p1;
   };
   if (isPlane() || b.isPlane() || isSphere(*this) || isSphere(b)) return false;
-  return m_kind != Kind::Capsule || b.m_kind != Kind::Capsule;
+  return m_type != Type::Capsule || b.m_type != Type::Capsule;
 }
 
 double Shape::size() const {
@@ -233,11 +237,12 @@ double Shape::size() const {
 
 ShapePairDistance Shape::distanceFrom(const Shape& b, ShapePairScratch& scratch) const {
   if (b.precedes(*this)) return b.distanceFrom(*this, scratch).exchanged();
-  if (isPlane()) return planeFrom(b);
-  if (m_kind == Kind::Capsule && b.m_kind == Kind::Capsule && b.m_p0 == b.m_p1)
-    return b.axisFrom(*this).exchanged();
-  if (m_kind == Kind::Capsule && (b.m_kind == Kind::Capsule || m_p0 == m_p1)) return axisFrom(b);
-  return grownFrom(b, scratch);
+  if (isPlane()) return planeDistance(b);
+  if (m_type == Type::Capsule && b.m_type == Type::Capsule && b.m_p0 == b.m_p1)
+    return b.axisDistance(*this).exchanged();
+  if (m_type == Type::Capsule && (b.m_type == Type::Capsule || m_p0 == m_p1))
+    return axisDistance(b);
+  return minkowskiDistance(b, scratch);
 }
 
 }  // namespace palpate

@@ -39,7 +39,7 @@ bool areBeyond(const std::array<double, size>& heights, double bound, bool eithe
 
 MovingBody movingBody(const Shape& before, const Shape& now) {
   MovingBody body{{before.corners(), now.corners()}};
-  (before.isCylinder() ? body.mantle : body.radius) = before.radius();
+  (before.isCylinder() ? body.cylinderRadius : body.radius) = before.radius();
   return body;
 }
 
@@ -60,15 +60,16 @@ ShapeStep::Moment ShapeStep::scaledBy(int exponent, const Moment& moment) const 
   return {scaled(moment.from, exponent), scaled(moment.u, exponent), moment.v};
 }
 
-bool ShapeStep::staysAbove(const Moment& a, const Moment& b, const Scaled& is) const {
+bool ShapeStep::staysAbove(const Moment& a, const Moment& b, const ScaledLengths& lengths) const {
   const std::array<Vector3d, 3> n = normalsOf(a, b);
   const double length =
       std::sqrt(std::max({n[0].squaredNorm(), n[1].squaredNorm(), n[2].squaredNorm()}));
-  return areBeyond(heightsOf(n, a, b), is.distance * length + is.error, m_before.isTwoSided());
+  return areBeyond(heightsOf(n, a, b), lengths.distance * length + lengths.error,
+                   m_before.isTwoSided());
 }
 
-bool ShapeStep::staysOutside(const Moment& a, const Moment& b, const Scaled& is) const {
-  const auto& [exponent, distance, error, radius] = is;
+bool ShapeStep::staysOutside(const Moment& a, const Moment& b, const ScaledLengths& lengths) const {
+  const auto& [exponent, distance, error, radius] = lengths;
   const double reach = radius + distance;
   const std::array<double, 3> squares{a.u.squaredNorm(), a.u.dot(b.u), b.u.squaredNorm()};
   const double longest = std::max(squares[0], squares[2]),
@@ -87,7 +88,8 @@ bool ShapeStep::staysOutside(const Moment& a, const Moment& b, const Scaled& is)
     for (int i = 0; i < 3; ++i) beyond[i] = side * along[i] - 0.5 * squares[i];
     if (areBeyond(beyond, needed, false)) return true;
   }
-  // Beyond the mantle: the polynomial is the square of from x u less that of the reach times u.
+  // Beyond the lateral surface: the polynomial is the square of from x u less that of the reach
+  // times u.
   const Vector3d k0 = a.from.cross(a.u), k1 = 0.5 * (a.from.cross(b.u) + b.from.cross(a.u)),
                  k2 = b.from.cross(b.u);
   const auto& [q0, q1, q2] = squares;
@@ -96,23 +98,23 @@ bool ShapeStep::staysOutside(const Moment& a, const Moment& b, const Scaled& is)
       k0.dot(k0) - square * q0, k0.dot(k1) - square * (q0 + q1) / 2,
       (k0.dot(k2) + 2 * k1.dot(k1)) / 3 - square * (q0 + 4 * q1 + q2) / 6,
       k1.dot(k2) - square * (q1 + q2) / 2, k2.dot(k2) - square * q2};
-  return areBeyond(across, error * (furthest + reach) * longest, false) || staysFar(a, b, is);
+  return areBeyond(across, error * (furthest + reach) * longest, false) || staysFar(a, b, lengths);
 }
 
 /// Whether the point, at half time, is further from the cylinder than both can move until the ends
 /// of the part. From its state at half time, the cylinder gets to any other by turning about its
 /// centre and growing along its axis.
-bool ShapeStep::staysFar(const Moment& a, const Moment& b, const Scaled& is) const {
+bool ShapeStep::staysFar(const Moment& a, const Moment& b, const ScaledLengths& lengths) const {
   const Moment middle = between(a, b, 0.5);
   const Vector3d along = middle.u.normalized();
   const double chord =
       std::max((a.u.normalized() - along).norm(), (b.u.normalized() - along).norm());
   if (!(chord < 1)) return false;  // also if an axis has no direction; then only the ball decides
-  const double moves = 0.5 * (b.from - a.from).norm() + 0.25 * (b.u - a.u).norm() +
-                       chord * std::hypot(is.radius, 0.5 * middle.u.norm());
+  const double motion = 0.5 * (b.from - a.from).norm() + 0.25 * (b.u - a.u).norm() +
+                        chord * std::hypot(lengths.radius, 0.5 * middle.u.norm());
   const double middleDistance =
-      std::ldexp(distanceAt(scaledBy(-is.exponent, middle)).distance, is.exponent);
-  return middleDistance - moves > is.distance + is.error;
+      std::ldexp(distanceAt(scaledBy(-lengths.exponent, middle)).distance, lengths.exponent);
+  return middleDistance - motion > lengths.distance + lengths.error;
 }
 
 SignedDistance ShapeStep::distanceAt(const Moment& moment) const {
@@ -120,23 +122,25 @@ SignedDistance ShapeStep::distanceAt(const Moment& moment) const {
     const Vector3d normal = moment.u.cross(moment.v).stableNormalized();
     return {normal.dot(moment.from), normal};
   }
-  return m_before.ofCylinder(moment.from, moment.u);
+  return m_before.distanceFromCylinder(moment.from, moment.u);
 }
 
-std::optional<double> ShapeStep::timeNear(const Point& point, double distance,
-                                          double tolerance) const {
+std::optional<double> ShapeStep::firstTimeWithin(const Point& point, double distance,
+                                                 double tolerance) const {
   const double size =
       m_before.magnitude() + m_now.magnitude() + largest(point[0]) + largest(point[1]) + distance;
   const int exponent = isModerate(size) ? 0 : exponentTowardsOne(size);
-  const auto near = [&](double length) { return std::ldexp(length, exponent); };
-  const Scaled is{exponent, near(distance), kShapeBoundError * near(size), near(m_before.radius())};
+  const auto scaledLength = [&](double length) { return std::ldexp(length, exponent); };
+  const ScaledLengths lengths{exponent, scaledLength(distance),
+                              kShapeBoundError * scaledLength(size),
+                              scaledLength(m_before.radius())};
   const Moment start = scaledBy(exponent, before(point[0])),
                end = scaledBy(exponent, now(point[1]));
-  const auto passes = [&](double from, double to) {
+  const auto isExcluded = [&](double from, double to) {
     const Moment a = between(start, end, from), b = between(start, end, to);
-    return m_before.isPlane() ? staysAbove(a, b, is) : staysOutside(a, b, is);
+    return m_before.isPlane() ? staysAbove(a, b, lengths) : staysOutside(a, b, lengths);
   };
-  return firstNotPassed(tolerance, passes);
+  return firstTimeNotExcluded(tolerance, isExcluded);
 }
 
 /// The side of a two-sided plane on which a body is before the step. For a half-space, always the
@@ -145,29 +149,29 @@ double ShapeStep::sideOf(const MovingBody& body) const {
   return m_before.isTwoSided() && distanceAt(before(body.corners[0][0])).distance < 0 ? -1.0 : 1.0;
 }
 
-std::optional<double> ShapeStep::timeNear(const MovingBody& body, double distance,
-                                          double tolerance) const {
+std::optional<double> ShapeStep::firstTimeWithin(const MovingBody& body, double distance,
+                                                 double tolerance) const {
   double size = 0;
   for (const auto& corners : body.corners)
     for (const Vector3d& p : corners) size = std::max(size, largest(p));
-  size += m_before.magnitude() + m_now.magnitude() + (distance + body.radius + body.mantle);
+  size += m_before.magnitude() + m_now.magnitude() + (distance + body.radius + body.cylinderRadius);
   const int exponent = isModerate(size) ? 0 : exponentTowardsOne(size);
-  const double side = sideOf(body), mantle = std::ldexp(body.mantle, exponent),
+  const double side = sideOf(body), cylinderRadius = std::ldexp(body.cylinderRadius, exponent),
                needed = std::ldexp(distance + body.radius, exponent),
                error = kShapeBoundError * std::ldexp(size, exponent);
   const auto momentOf = [&](std::size_t i, double time) {
     return between(scaledBy(exponent, before(body.corners[0][i])),
                    scaledBy(exponent, now(body.corners[1][i])), time);
   };
-  return firstNotPassed(tolerance, [&](double from, double to) {
+  return firstTimeNotExcluded(tolerance, [&](double from, double to) {
     const Moment first = momentOf(0, from), last = momentOf(0, to);
     const std::array<Vector3d, 3> n = normalsOf(first, last);
     const double length =
         std::sqrt(std::max({n[0].squaredNorm(), n[1].squaredNorm(), n[2].squaredNorm()}));
     double bound = needed * length + error;
-    if (mantle > 0) {
-      // The mantle reaches as far as its radius times the sine of the angle between normal and
-      // axis, times the normal's length.
+    if (cylinderRadius > 0) {
+      // The lateral surface reaches as far as its radius times the sine of the angle between normal
+      // and axis, times the normal's length.
       const Vector3d start = momentOf(1, from).from - first.from,
                      end = momentOf(1, to).from - last.from;
       const double shortest = 0.5 * (start + end).norm() - 0.5 * (end - start).norm();
@@ -176,7 +180,7 @@ std::optional<double> ShapeStep::timeNear(const MovingBody& body, double distanc
                               ((n[0].cross(end) + 2 * n[1].cross(start)) / 3).squaredNorm(),
                               ((2 * n[1].cross(end) + n[2].cross(start)) / 3).squaredNorm(),
                               n[2].cross(end).squaredNorm()}));
-      bound += mantle * (across < length * shortest ? across / shortest : length);
+      bound += cylinderRadius * (across < length * shortest ? across / shortest : length);
     }
     for (std::size_t i = 0; i < body.corners[0].size(); ++i)
       for (const double height : heightsOf(n, momentOf(i, from), momentOf(i, to)))
@@ -185,7 +189,7 @@ std::optional<double> ShapeStep::timeNear(const MovingBody& body, double distanc
   });
 }
 
-ShapePairDistance ShapeStep::at(const MovingBody& body, double time) const {
+ShapePairDistance ShapeStep::nearestAt(const MovingBody& body, double time) const {
   const auto momentOf = [&](std::size_t i) {
     return between(before(body.corners[0][i]), now(body.corners[1][i]), time);
   };
@@ -203,10 +207,11 @@ ShapePairDistance ShapeStep::at(const MovingBody& body, double time) const {
     if (dot(normal, from) <= lowest + tie) nearest += from, ++count;
   }
   nearest /= count;
-  if (body.mantle > 0) {
+  if (body.cylinderRadius > 0) {
     const Vector3d axis = directionOf(momentOf(1).from - any.from);
     const LengthAndDirection across = polar(dot(normal, axis) * axis - normal);
-    if (across.length * body.mantle > 0.5 * tie) nearest += body.mantle * across.direction;
+    if (across.length * body.cylinderRadius > 0.5 * tie)
+      nearest += body.cylinderRadius * across.direction;
   }
   const double distance = dot(normal, nearest) - body.radius;
   const Vector3d point =
@@ -214,9 +219,9 @@ ShapePairDistance ShapeStep::at(const MovingBody& body, double time) const {
   return {point - distance * normal, point, -normal, distance};
 }
 
-SignedDistance ShapeStep::at(const Point& point, double time) const {
-  const Moment start = before(point[0]), then = between(start, now(point[1]), time);
-  SignedDistance nearest = distanceAt(then);
+SignedDistance ShapeStep::signedDistanceAt(const Point& point, double time) const {
+  const Moment start = before(point[0]), atTime = between(start, now(point[1]), time);
+  SignedDistance nearest = distanceAt(atTime);
   if (m_before.isPlane() && nearest.normal == Vector3d::Zero())
     nearest.normal = m_before.axes().col(2);
   if (m_before.isTwoSided() && distanceAt(start).distance < 0)

@@ -16,23 +16,23 @@ namespace palpate {
 struct MovingBody {
   std::array<std::span<const Eigen::Vector3d>, 2> corners;  ///< L: before and now; or the ends
   double radius = 0.0;                                      ///< L: of a ball about each point
-  double mantle = 0.0;  ///< L: a cylinder's radius about its axis
+  double cylinderRadius = 0.0;  ///< L: a cylinder's radius about its axis
 };
 /// Any shape except a plane.
 MovingBody movingBody(const Shape& before, const Shape& now);
 
-/// Share of the time tolerance down to which parts of the step that are not passed are halved. What
-/// the bounds lose on the smallest parts is then within the tolerance.
+/// Share of the time tolerance down to which parts of the step that are not excluded are halved.
+/// What the bounds lose on the smallest parts is then within the tolerance.
 inline constexpr double kShareOfTolerance = 0.25;
 
-/// Passes the step part by part, and halves parts that are not passed. Returns the start of the
-/// first part that is not passed at the smallest length; none if the whole step is passed.
-/// passes(from, to): whether nothing happens in that part.
-template <class Passes>
-std::optional<double> firstNotPassed(double tolerance, Passes&& passes) {
+/// Excludes the step part by part, and halves parts that are not excluded. Returns the start of the
+/// first part that is not excluded at the smallest length; none if the whole step is excluded.
+/// isExcluded(from, to): whether nothing happens in that part.
+template <class IsExcluded>
+std::optional<double> firstTimeNotExcluded(double tolerance, IsExcluded&& isExcluded) {
   double time = 0, part = 1;  // time is a multiple of part, and both are exact
   while (time < 1) {
-    if (passes(time, time + part)) {
+    if (isExcluded(time, time + part)) {
       time += part;
       while (part < 1 && std::fmod(time, 2 * part) == 0) part *= 2;
     } else if (part > kShareOfTolerance * tolerance) {
@@ -60,20 +60,20 @@ class ShapeStep {
   /// at most the tolerance, or the point is then within `distance` + e. e is the motion of the
   /// point, and of the shape's points beside it, in a part of the step as long as the tolerance.
   ///
-  /// Source   parts of the step are passed where bounds on polynomials keep the point outside, and
+  /// Source   parts of the step are excluded where bounds on polynomials keep the point outside, and
   ///          halved where they do not. The polynomials, in Bernstein form, are the point's height
   ///          over a plane, and over a cylinder's ends and axis. Beside a cylinder's rim, the bound
   ///          is how far the point and the cylinder can move.
-  std::optional<double> timeNear(const Point&, double distance, double tolerance) const;
+  std::optional<double> firstTimeWithin(const Point&, double distance, double tolerance) const;
   /// Signed distance of the point at that time; for a two-sided plane, on the side from which the
   /// point came.
-  SignedDistance at(const Point&, double time) const;
+  SignedDistance signedDistanceAt(const Point&, double time) const;
   /// For a plane: the same with a body in place of the point. A two-sided plane counts from the
   /// side on which the body was before the step.
-  std::optional<double> timeNear(const MovingBody&, double distance, double tolerance) const;
+  std::optional<double> firstTimeWithin(const MovingBody&, double distance, double tolerance) const;
   /// For a plane: the distance from the body at that time. If several points of the body are
   /// equally near, the result is their middle.
-  ShapePairDistance at(const MovingBody&, double time) const;
+  ShapePairDistance nearestAt(const MovingBody&, double time) const;
   /// For a plane: whether a point that stays in the box may come within the distance.
   bool mayComeNear(const Eigen::AlignedBox3d&, double distance) const;
 
@@ -85,7 +85,7 @@ class ShapeStep {
     Eigen::Vector3d from, u, v;
   };
   /// Lengths times a power of two, so that their fourth powers stay in the range of double.
-  struct Scaled {
+  struct ScaledLengths {
     int exponent;
     double distance, error, radius;
   };
@@ -96,9 +96,9 @@ class ShapeStep {
   static Moment between(const Moment&, const Moment&, double time);
   SignedDistance distanceAt(const Moment&) const;
   double sideOf(const MovingBody&) const;
-  bool staysAbove(const Moment&, const Moment&, const Scaled&) const;
-  bool staysOutside(const Moment&, const Moment&, const Scaled&) const;
-  bool staysFar(const Moment&, const Moment&, const Scaled&) const;
+  bool staysAbove(const Moment&, const Moment&, const ScaledLengths&) const;
+  bool staysOutside(const Moment&, const Moment&, const ScaledLengths&) const;
+  bool staysFar(const Moment&, const Moment&, const ScaledLengths&) const;
 
   const Shape &m_before, &m_now;
 };

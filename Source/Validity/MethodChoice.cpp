@@ -6,7 +6,7 @@
 
 namespace palpate {
 
-bool knowsSides(const GeometryInStep& a, const GeometryInStep& b) {
+bool haveTriangles(const GeometryInStep& a, const GeometryInStep& b) {
   return a.mesh.topology.hasFaces() && b.mesh.topology.hasFaces();
 }
 
@@ -39,13 +39,13 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
     plan.motion = largestMotion(a.range, b.range);
     plan.arcDeviation = a.arcDeviation + b.arcDeviation;
   }
-  if (!knowsSides(a, b)) {
+  if (!haveTriangles(a, b)) {
     if (settings.method == Method::Auto) chooseMethod(settings, a, b, plan);
     return plan;
   }
   step.motion = plan.motion;
   if (settings.method == Method::Auto) {
-    plan.motionTolerance = step.slow =
+    plan.motionTolerance = step.slowMotion =
         settings.motionTolerance < 0 ? thickness / 2 : settings.motionTolerance;
     if (plan.motion == 0.0) {
       plan.method = thickness > 0.0 ? Method::Proximity : Method::Intersection;
@@ -63,12 +63,13 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
     } else {
       plan.reason = MethodReason::Mixed;
     }
-    step.impacts = plan.method == Method::Proximity || plan.method == Method::Auto;
-    if (step.impacts)
-      step.extra = std::min(plan.motion, plan.motionTolerance) *
-                   (1.0 + kMotionSlack * settings.timeTolerance);
+    step.reportsImpacts = plan.method == Method::Proximity || plan.method == Method::Auto;
+    if (step.reportsImpacts)
+      step.extraThickness = std::min(plan.motion, plan.motionTolerance) *
+                            (1.0 + kMotionSlack * settings.timeTolerance);
   } else if (settings.method == Method::Intersection) {
-    plan.nearby = plan.motion <= std::min(a.smallestHeight, b.smallestHeight) ? plan.motion : 0.0;
+    plan.searchDistance =
+        plan.motion <= std::min(a.smallestHeight, b.smallestHeight) ? plan.motion : 0.0;
   } else if (settings.method == Method::Proximity && plan.motion > thickness) {
     step.motion = 0.0;  // the result cannot be trusted, so the step need not be examined
   }

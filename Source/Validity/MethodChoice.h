@@ -32,9 +32,9 @@ struct PairPlan {
   double motionTolerance = 0;  ///< L: Auto's
   /// L: for Intersection the traversal finds boxes up to this far apart, because its validity
   /// depends on whether anything was near.
-  double nearby = 0;
+  double searchDistance = 0;
   StepPlan step;
-  bool overlaps = false;            ///< Auto: Intersection runs, too, unless the step starts apart
+  bool runsIntersection = false;    ///< Auto: Intersection runs, too, if the start intersects
   bool startsIntersecting = false;  ///< triangles are known to intersect at the step's start
   /// Whether the boxes enclose the motion over the whole step.
   bool swept() const { return method == Method::Continuous || method == Method::Auto; }
@@ -46,7 +46,7 @@ bool hasContinuous(const GeometryInStep& a, const GeometryInStep& b);
 bool hasProximity(const GeometryInStep& a, const GeometryInStep& b, double thickness);
 /// Whether both geometries have triangles. Only for these do the bounds on motion hold, because
 /// they have no radius.
-bool knowsSides(const GeometryInStep& a, const GeometryInStep& b);
+bool haveTriangles(const GeometryInStep& a, const GeometryInStep& b);
 
 /// Plans a pair's frame from valid settings and from how the geometries moved. moves: whether that
 /// motion is used; otherwise it counts as 0.

@@ -2,7 +2,7 @@
 
 #include "Math/Tolerances.h"
 #include "NarrowPhase/StepCheck.h"
-#include "Validity/EndOfStep.h"
+#include "Validity/IntersectionAtEnd.h"
 
 #include <algorithm>
 #include <limits>
@@ -14,18 +14,18 @@ namespace {
 /// An intersection check of all candidates at the step's start may take half a frame, with
 /// earliestTimeOnly two thirds. One check is allowed per kFramesPerCheck frames; up to four that
 /// were not needed are saved for later, with earliestTimeOnly one.
-constexpr int kFramesPerCheck = 16, kMostSaved = 4 * kFramesPerCheck;
+constexpr int kFramesPerCheck = 16, kMaxCheckCredit = 4 * kFramesPerCheck;
 
-/// Appends vertices that may have moved further than `reach` relative to the other mesh, until
+/// Appends vertices that may have moved further than the limit relative to the other mesh, until
 /// `out` has Validity::kMaxFastVertices.
-void addFarMovers(std::vector<std::uint32_t>& out, const GeometryInStep& mesh,
-                  const GeometryInStep& other, double reach) {
+void addFastVertices(std::vector<std::uint32_t>& out, const GeometryInStep& mesh,
+                     const GeometryInStep& other, double displacementLimit) {
   const MotionRange& range = other.range;
   const Eigen::Vector3d centre = 0.5 * (range.lower + range.upper), extent = range.upper - centre;
   for (std::uint32_t v = 0; v < mesh.mesh.now.size(); ++v) {
     const Eigen::Vector3d moved =
         (mesh.mesh.now[v] - mesh.mesh.before[v] - centre).cwiseAbs() + extent;
-    if (!(moved.squaredNorm() <= reach * reach)) out.push_back(v);
+    if (!(moved.squaredNorm() <= displacementLimit * displacementLimit)) out.push_back(v);
     if (out.size() == Validity::kMaxFastVertices) return;
   }
 }
@@ -41,34 +41,35 @@ std::array<Revision, 8> statesOf(const GeometryInStep& a, const Positions& ofA,
 }
 
 /// Whether the pair uses Auto's motion tolerance.
-bool hasTolerance(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b) {
-  return settings.method == Method::Auto && knowsSides(a, b);
+bool usesMotionTolerance(const PairSettings& settings, const GeometryInStep& a,
+                         const GeometryInStep& b) {
+  return settings.method == Method::Auto && haveTriangles(a, b);
 }
 
-/// L: Validity::reach.
-double reachOf(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
-               const PairPlan& plan) {
-  if (hasTolerance(settings, a, b)) return plan.motionTolerance;
+/// L: Validity::displacementLimit.
+double displacementLimitOf(const PairSettings& settings, const GeometryInStep& a,
+                           const GeometryInStep& b, const PairPlan& plan) {
+  if (usesMotionTolerance(settings, a, b)) return plan.motionTolerance;
   if (plan.method == Method::Continuous) return std::numeric_limits<double>::infinity();
   return plan.method == Method::Proximity ? settings.thickness
                                           : std::min(a.smallestHeight, b.smallestHeight);
 }
 
 /// Whether the step met the method's conditions, if vertices move in straight lines. validity:
-/// startedApart and reach must be set. foundOrFar: triangles intersect at the end, or no boxes came
-/// near each other.
+/// startedApart and displacementLimit must be set. foundOrFar: triangles intersect at the end, or
+/// no boxes came near each other.
 bool meetsConditions(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
                      const PairPlan& plan, const StepFacts& facts, const Validity& validity,
                      bool foundOrFar) {
-  if (!knowsSides(a, b)) return false;
+  if (!haveTriangles(a, b)) return false;
   if (settings.method == Method::Auto)
     return plan.method == Method::Intersection || validity.startedApart;
-  const bool withinReach = plan.motion <= validity.displacementLimit;
+  const bool isWithinLimit = plan.motion <= validity.displacementLimit;
   switch (plan.method) {
     case Method::Intersection:
-      return plan.motion == 0.0 || (withinReach && foundOrFar);
+      return plan.motion == 0.0 || (isWithinLimit && foundOrFar);
     case Method::Proximity:
-      return withinReach && validity.startedApart && facts.verticesA.empty() &&
+      return isWithinLimit && validity.startedApart && facts.verticesA.empty() &&
              facts.verticesB.empty();
     default:
       return validity.startedApart;
@@ -79,42 +80,43 @@ bool meetsConditions(const PairSettings& settings, const GeometryInStep& a, cons
 
 void Trust::forget() {
   m_topologies.invalidate();
-  for (Known* known : {&m_atStart, &m_atEnd}) known->of.invalidate();
+  for (KnownState* known : {&m_atStart, &m_atEnd}) known->version.invalidate();
 }
 
 void Trust::start(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
                   PairPlan& plan) {
   // Coordinates of two features within the thickness differ by at most this size.
-  const double size = a.extent + b.extent + settings.thickness + plan.step.extra;
-  plan.step.certain = plan.step.motion + 2.0 * kMotionError * (plan.step.motion + size);
+  const double size = a.extent + b.extent + settings.thickness + plan.step.extraThickness;
+  plan.step.motionWithRounding = plan.step.motion + 2.0 * kMotionError * (plan.step.motion + size);
 
   const auto before = statesOf(a, a.mesh.before, b, b.mesh.before);
-  if (!m_atStart.of.isCurrent(before)) {
+  if (!m_atStart.version.isCurrent(before)) {
     m_atStart = {};
-    if (m_atEnd.of.isCurrent(before)) {
+    if (m_atEnd.version.isCurrent(before)) {
       m_atStart = m_atEnd;
-    } else if (m_atEnd.of.isCurrent(statesOf(a, a.detected, b, b.detected)) &&
+    } else if (m_atEnd.version.isCurrent(statesOf(a, a.detected, b, b.detected)) &&
                m_atEnd.position == Position::Apart &&
                largestMotion(a.correction, b.correction) < m_atEnd.clearance) {
       m_atStart.position = Position::Apart;
-      m_atStart.of.commit(before);
+      m_atStart.version.commit(before);
     }
   }
   const bool startsApart = m_atStart.position == Position::Apart;
   plan.startsIntersecting = m_atStart.position == Position::Intersecting;
 
   const std::array<Revision, 4> topologies{a.topology, a.enabled, b.topology, b.enabled};
-  const int most = settings.earliestTimeOnly ? kFramesPerCheck : kMostSaved;
-  m_saved = m_topologies.isCurrent(topologies) ? std::min(m_saved + 1, most) : most;
+  const int most = settings.earliestTimeOnly ? kFramesPerCheck : kMaxCheckCredit;
+  m_checkCredit = m_topologies.isCurrent(topologies) ? std::min(m_checkCredit + 1, most) : most;
   m_topologies.commit(topologies);
-  if (!knowsSides(a, b) || startsApart || plan.method == Method::Intersection ||
+  if (!haveTriangles(a, b) || startsApart || plan.method == Method::Intersection ||
       (plan.method == Method::Proximity && plan.motion > 0.0 && plan.step.motion == 0.0))
     return;
-  plan.overlaps = settings.method == Method::Auto;
-  plan.step.start = !plan.startsIntersecting && (plan.overlaps || m_saved >= kFramesPerCheck);
-  if (plan.step.start) m_saved = std::max(m_saved - kFramesPerCheck, 0);
+  plan.runsIntersection = settings.method == Method::Auto;
+  plan.step.checksStart =
+      !plan.startsIntersecting && (plan.runsIntersection || m_checkCredit >= kFramesPerCheck);
+  if (plan.step.checksStart) m_checkCredit = std::max(m_checkCredit - kFramesPerCheck, 0);
   // The result cannot be trusted, so the step need not be examined.
-  if (plan.method == Method::Proximity && settings.method == plan.method && !plan.step.start)
+  if (plan.method == Method::Proximity && settings.method == plan.method && !plan.step.checksStart)
     plan.step.motion = 0.0;
 }
 
@@ -127,7 +129,7 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   validity.reason = plan.reason;
   validity.displacement = plan.motion;
   validity.effectiveThickness =
-      plan.method == Method::Intersection ? 0.0 : settings.thickness + plan.step.extra;
+      plan.method == Method::Intersection ? 0.0 : settings.thickness + plan.step.extraThickness;
   const auto take = [](std::vector<std::uint32_t>& out, const Buffer<std::uint32_t>& ids) {
     out.assign(ids.begin(), ids.end());
   };
@@ -135,23 +137,23 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   take(validity.degenerateTrianglesB, facts.degenerateB);
   validity.untrustedVerticesA.clear();
   validity.untrustedVerticesB.clear();
-  if (!plan.step.impacts) {
+  if (!plan.step.reportsImpacts) {
     take(validity.untrustedVerticesA, facts.verticesA);
     take(validity.untrustedVerticesB, facts.verticesB);
   }
-  if (plan.step.start) {
+  if (plan.step.checksStart) {
     m_atStart = {};
     m_atStart.position = facts.startsIntersecting ? Position::Intersecting : Position::Apart;
-    m_atStart.of.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
+    m_atStart.version.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
   }
   validity.startedApart = m_atStart.position == Position::Apart;
-  validity.displacementLimit = reachOf(settings, a, b, plan);
-  const bool listsFarMovers =
-      !hasTolerance(settings, a, b) && plan.method != Method::Continuous && !meshes.hasShape();
-  if (listsFarMovers && !(plan.motion <= validity.displacementLimit)) {
-    addFarMovers(validity.untrustedVerticesA, a, b, validity.displacementLimit);
+  validity.displacementLimit = displacementLimitOf(settings, a, b, plan);
+  const bool listsFastVertices = !usesMotionTolerance(settings, a, b) &&
+                                 plan.method != Method::Continuous && !meshes.hasShape();
+  if (listsFastVertices && !(plan.motion <= validity.displacementLimit)) {
+    addFastVertices(validity.untrustedVerticesA, a, b, validity.displacementLimit);
     if (&a.mesh != &b.mesh)
-      addFarMovers(validity.untrustedVerticesB, b, a, validity.displacementLimit);
+      addFastVertices(validity.untrustedVerticesB, b, a, validity.displacementLimit);
   }
   const bool trustedIfStraight = meetsConditions(
       settings, a, b, plan, facts, validity, !nearby || !contents.intersectingTriangles.empty());
@@ -172,19 +174,20 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   } else if (plan.step.motion > 0.0 && settings.method != Method::Proximity) {
     findEnd(plan, facts, meshes, contents, counts);
   }
-  m_atEnd.of.commit(statesOf(a, a.mesh.now, b, b.mesh.now));
+  m_atEnd.version.commit(statesOf(a, a.mesh.now, b, b.mesh.now));
 }
 
 void Trust::findEnd(const PairPlan& plan, const StepFacts& facts, const MeshPair& meshes,
                     const CollisionData::Contents& contents, ContactBuffers& counts) {
   m_atEnd.clearance = 0.0;
-  if (plan.overlaps && facts.startsIntersecting) {  // Intersection has tested all, and found none
-    if (!meshes.near) m_atEnd.position = Position::Apart;
+  // Where Intersection ran, it has tested all pairs, and found none.
+  if (plan.runsIntersection && facts.startsIntersecting) {
+    if (!meshes.nearAtRest) m_atEnd.position = Position::Apart;
     return;
   }
   // Earliest times come without contacts, and filtered features are not among the contacts.
-  if (meshes.settings.earliestTimeOnly || meshes.filters()) return;
-  EndOfStep end;
+  if (meshes.settings.earliestTimeOnly || meshes.hasFilters()) return;
+  IntersectionAtEnd end;
   if (m_atStart.position == Position::Intersecting && m_atStart.witness &&
       intersect(meshes, false, *m_atStart.witness, counts))
     end.intersecting = m_atStart.witness;

@@ -28,8 +28,8 @@ class Trust {
  private:
   enum class Position { Unknown, Apart, Intersecting };
   /// One state of both geometries.
-  struct Known {
-    DerivedFrom<8> of;
+  struct KnownState {
+    DerivedFrom<8> version;
     Position position = Position::Unknown;
     double clearance = 0;                ///< L: if Apart, by at least this distance
     std::optional<ElementPair> witness;  ///< if Intersecting, a pair that does, if known
@@ -39,9 +39,9 @@ class Trust {
   void findEnd(const PairPlan&, const StepFacts&, const MeshPair&, const CollisionData::Contents&,
                ContactBuffers& counts);
 
-  Known m_atStart, m_atEnd;  ///< of the step last detected
+  KnownState m_atStart, m_atEnd;  ///< of the step last detected
   DerivedFrom<4> m_topologies;
-  int m_saved = 0;  ///< initial intersection checks saved for later, times kFramesPerCheck
+  int m_checkCredit = 0;  ///< initial intersection checks saved for later, times kFramesPerCheck
 };
 
 }  // namespace palpate

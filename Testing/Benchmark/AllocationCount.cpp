@@ -1,4 +1,5 @@
-// malloc and its kin, counted: these definitions in the executable come before the C library's.
+// Counts malloc and related functions: these definitions in the executable replace those of the C
+// library.
 #include "AllocationCount.h"
 
 #include <link.h>
@@ -18,7 +19,7 @@ void* __libc_memalign(std::size_t, std::size_t);
 namespace {
 
 std::atomic<std::size_t> g_own, g_oneTbb;
-std::uintptr_t g_begin, g_end;  // of libtbb's code; until found, nothing
+std::uintptr_t g_begin, g_end;  // address range of the code of libtbb, empty until it is found
 
 int findTbb(dl_phdr_info* library, std::size_t, void*) {
   if (!std::strstr(library->dlpi_name, "libtbb.so")) return 0;

@@ -1,7 +1,8 @@
 // Continuous detection of the two published steps, from positions to times of impact, beside
-// Embree on the same frame: the earliest time against IPC toolkit's faster engine, all times
-// against every candidate's time by Tight-Inclusion. Their figures were measured elsewhere on this
-// class of machine and are scaled by what Embree took there and takes here.
+// Embree on the same frame. The earliest time is compared with the faster engine of the IPC
+// toolkit, all times with Tight-Inclusion on every candidate. These baselines were measured
+// elsewhere on this class of machine. Their times are scaled by Embree's time here over its time
+// there.
 #include "Queries.h"
 #include "Rows.h"
 
@@ -44,7 +45,7 @@ class Step {
     m_detection.addCollisionPair(m_id, m_id, settings);
   }
 
-  /// Milliseconds from positions to the answer. Other positions first, so that these are new.
+  /// Milliseconds from positions to contacts. It sets other positions first, so that these are new.
   double frame() {
     const auto &first = m_workload.frames[0][0], &second = m_workload.frames[1][0];
     m_detection.setPositions(m_id, second, first);
@@ -72,7 +73,7 @@ class Step {
 struct Kind {
   const char* name;
   bool earliestTimeOnly;
-  double thickness;  ///< of the mean edge
+  double thickness;  ///< over the mean edge
 };
 constexpr Kind kKinds[] = {{"earliest time", true, 0},
                            {"all times", false, 0},
@@ -92,9 +93,9 @@ Medians takeTurns(const Workload& workload, const MeasureOptions& options) {
     steps.push_back(std::make_unique<Step>(workload, kind.earliestTimeOnly,
                                            kind.thickness * 10 * workload.task.thickness));
   std::vector<double> times[std::size(kKinds)], narrow[std::size(kKinds)], embree;
-#ifdef PALPATE_BENCHMARK_PEERS
-  const auto peer = makeEmbreeMorton();
-  peer->prepare(workload.task, workload.frames[0]);
+#ifdef PALPATE_BENCHMARK_BASELINES
+  const auto embreeRebuild = makeEmbreeMorton();
+  embreeRebuild->prepare(workload.task, workload.frames[0]);
 #endif
   for (int repetition = 0; repetition < 1 + options.repetitions; ++repetition) {
     for (std::size_t i = 0; i < steps.size(); ++i) {
@@ -103,11 +104,11 @@ Medians takeTurns(const Workload& workload, const MeasureOptions& options) {
       times[i].push_back(took);
       narrow[i].push_back(steps[i]->statistics().milliseconds.narrowPhase);
     }
-#ifdef PALPATE_BENCHMARK_PEERS
+#ifdef PALPATE_BENCHMARK_BASELINES
     for (const Positions& frame : workload.frames) {
       const double start = now();
-      peer->update(frame);
-      peer->collide();
+      embreeRebuild->update(frame);
+      embreeRebuild->collide();
       if (repetition > 0) embree.push_back(now() - start);
     }
 #endif
@@ -138,10 +139,10 @@ void rowsOf(Report& report, const Reference& reference, const Workload& workload
     };
     row("ms", medians.kinds[i]);
     row("narrow phase ms", medians.narrow[i]);
-    // All of the narrow phase, so that listing the candidates counts too.
+    // The whole narrow phase, so that listing the candidates counts too.
     const double nanoseconds =
         1e6 * medians.narrow[i] / static_cast<double>(featureCandidates(workload));
-    if (!kind.earliestTimeOnly && kind.thickness == 0) row("ns a feature candidate", nanoseconds);
+    if (!kind.earliestTimeOnly && kind.thickness == 0) row("ns per feature candidate", nanoseconds);
     const bool earliest = kind.earliestTimeOnly;
     char found[32];
     std::snprintf(found, sizeof found, earliest ? "%.6f" : "%.0f", medians.found[i]);
@@ -149,15 +150,15 @@ void rowsOf(Report& report, const Reference& reference, const Workload& workload
                                       milliseconds(medians.narrow[i]), found,
                                       milliseconds(nanoseconds)};
     const int column = threads - 1;
-    const double limit = kind.thickness > 0 || column > 1 ? 0
-                         : earliest ? reference.earliest[column] / kTimesEarliest
-                                    : reference.everyTime[column] / kTimesEveryTime;
-    if (limit > 0 && medians.embree > 0) {
-      const double scaled = limit * medians.embree / reference.embree[column];
-      row("limit ms", scaled);
-      row("times as fast as the limit", scaled / medians.kinds[i]);
+    const double target = kind.thickness > 0 || column > 1 ? 0
+                          : earliest ? reference.earliest[column] / kTimesEarliest
+                                     : reference.everyTime[column] / kTimesEveryTime;
+    if (target > 0 && medians.embree > 0) {
+      const double scaled = target * medians.embree / reference.embree[column];
+      row("target ms", scaled);
+      row("speed-up over the target", scaled / medians.kinds[i]);
       cells.insert(cells.end(), {milliseconds(scaled), times(scaled / medians.kinds[i]),
-                                 scaled >= medians.kinds[i] ? "holds" : "SHORT"});
+                                 scaled >= medians.kinds[i] ? "met" : "NOT MET"});
     }
     report.line(cells);
   }
@@ -165,13 +166,13 @@ void rowsOf(Report& report, const Reference& reference, const Workload& workload
 
 /// Published queries one by one, microseconds.
 void queryRows(Report& report, const std::string& sharedData) {
-  report.heading("Published continuous queries, microseconds a query; 1 thread");
-  report.line({"", "queries", "mean", "median", "worst", "missed", "invented"});
+  report.heading("Published continuous queries, microseconds per query; 1 thread");
+  report.line({"", "queries", "mean", "median", "worst", "false neg.", "false pos."});
   for (const testing::PublishedQueries& set : publishedSets(sharedData)) {
     const QueryTimes times = timeQueries(set);
     report.line({set.name, std::to_string(set.queries.size()), milliseconds(times.mean),
                  milliseconds(times.median), milliseconds(times.worst),
-                 std::to_string(times.missed), std::to_string(times.invented)});
+                 std::to_string(times.falseNegatives), std::to_string(times.falsePositives)});
     const auto row = [&](const char* metric, double value) {
       report.row("queries", set.name, 1, "Palpate", metric, value);
     };
@@ -179,8 +180,8 @@ void queryRows(Report& report, const std::string& sharedData) {
     row("mean us", times.mean);
     row("median us", times.median);
     row("worst us", times.worst);
-    row("missed", times.missed);
-    row("invented", times.invented);
+    row("false negatives", times.falseNegatives);
+    row("false positives", times.falsePositives);
   }
 }
 
@@ -188,7 +189,7 @@ void queryRows(Report& report, const std::string& sharedData) {
 
 void continuousRows(Report& report, const RowOptions& options) {
   report.heading("Continuous, whole step of the published frames, octree rebuilt; ms");
-  report.line({"", "median", "narrow", "found", "ns/candidate", "limit", "ratio"});
+  report.line({"", "median", "narrow", "found", "ns/candidate", "target", "speed-up"});
   const std::vector<std::string> names = workloadNames(options.sharedData);
   for (const Reference& reference : kReferences) {
     if (std::find(names.begin(), names.end(), reference.scene) == names.end()) continue;

@@ -6,8 +6,8 @@
 #include "Common/RandomMeshes.h"
 #include "Common/Solids.h"
 
-#ifdef PALPATE_BENCHMARK_PEERS
-#include "Peers/Peer.h"
+#ifdef PALPATE_BENCHMARK_BASELINES
+#include "BroadPhase.h"
 #endif
 
 #include <palpate/OctreeBasedCD.h>
@@ -42,7 +42,7 @@ void insideRow(Report& report, const std::string& name, const testing::Mesh& bod
   Settings settings;
   settings.threads = threads;
   OctreeBasedCD detection(settings);
-  const GeometryId asked = detection.addPointSet(points),
+  const GeometryId pointSet = detection.addPointSet(points),
                    id = detection.addTriangleMesh(body.positions, body.triangles);
   std::vector<double> samples;
   std::size_t inside = 0;
@@ -50,7 +50,7 @@ void insideRow(Report& report, const std::string& name, const testing::Mesh& bod
   std::vector<InsideVertex> found;
   for (int i = 0; i < 7; ++i) {
     const double start = now();
-    detection.queries().findInsideVertices(asked, id, found);
+    detection.queries().findInsideVertices(pointSet, id, found);
     samples.push_back(now() - start);
     inside = found.size();
     depth = 0;
@@ -59,58 +59,57 @@ void insideRow(Report& report, const std::string& name, const testing::Mesh& bod
   samples.erase(samples.begin());  // which builds octrees
   const double each = 1000 * median(samples) / static_cast<double>(inside);
   report.line({name + ", " + std::to_string(threads) + " threads", milliseconds(each)});
-  report.row("inside", name, threads, "Palpate", "us a vertex inside", each);
-#ifdef PALPATE_BENCHMARK_PEERS
+  report.row("inside", name, threads, "Palpate", "us per inside vertex", each);
+#ifdef PALPATE_BENCHMARK_BASELINES
   if (threads != 1) return;
   const InsideAnswer answer = insideByCgal(body.positions, body.triangles, points);
   if (answer.inside != inside || std::abs(answer.depth - depth) > 1e-9 * depth)
-    report.line({"CGAL answers otherwise", std::to_string(answer.inside), std::to_string(inside)});
+    report.line({"CGAL has other results", std::to_string(answer.inside), std::to_string(inside)});
   const double theirs = 1000 * answer.milliseconds / static_cast<double>(answer.inside);
   report.line({name + ", CGAL 5.5", milliseconds(theirs)});
-  report.row("inside", name, 1, "CGAL 5.5 Side_of_triangle_mesh, AABB_tree", "us a vertex inside",
+  report.row("inside", name, 1, "CGAL 5.5 Side_of_triangle_mesh, AABB_tree", "us per inside vertex",
              theirs);
 #endif
 }
 
-/// The same body by winding number, beside the rule for closed bodies, which finds the same; and
-/// with a tenth of its triangles left out, where no other rule answers: us a vertex, with the
-/// update.
+/// Microseconds per vertex with the update, by winding number: of the same body, where the rule for
+/// closed bodies finds the same, and of the body without a tenth of its triangles.
 void windingRow(Report& report, const testing::Mesh& body, const Points& points, int threads) {
-  testing::Mesh torn = body;
-  std::erase_if(torn.triangles, [&](const auto& triangle) { return triangle[0] % 10 == 0; });
-  const std::pair<const char*, const testing::Mesh&> bodies[] = {{"closed", body}, {"torn", torn}};
+  testing::Mesh open = body;
+  std::erase_if(open.triangles, [&](const auto& triangle) { return triangle[0] % 10 == 0; });
+  const std::pair<const char*, const testing::Mesh&> bodies[] = {{"closed", body}, {"open", open}};
   for (const auto& [name, mesh] : bodies) {
     Settings settings;
     settings.threads = threads;
     OctreeBasedCD detection(settings);
-    const GeometryId asked = detection.addPointSet(points),
+    const GeometryId pointSet = detection.addPointSet(points),
                      id = detection.addTriangleMesh(mesh.positions, mesh.triangles);
     std::vector<double> samples;
     std::vector<InsideVertex> inside;
     Points moved = mesh.positions;
     for (Eigen::Vector3d& p : moved) p += Eigen::Vector3d(1e-3, 0, 0);
-    for (int i = 0; i < 4; ++i) {  // the last ones are those of the mesh
+    for (int i = 0; i < 4; ++i) {  // the last positions are those of the mesh
       detection.setPositions(id, i % 2 ? mesh.positions : moved);
       const double start = now();
-      detection.queries().findInsideVertices(asked, id, inside,
+      detection.queries().findInsideVertices(pointSet, id, inside,
                                              {.rule = InsideRule::WindingNumber});
       samples.push_back(now() - start);
     }
     samples.erase(samples.begin());
     if (&mesh == &body &&
-        !std::ranges::equal(testing::insideVertices(detection, asked, id), inside))
-      report.line({"rules answer otherwise"});
+        !std::ranges::equal(testing::insideVertices(detection, pointSet, id), inside))
+      report.line({"the rules give different results"});
     const double each = 1000 * median(samples) / static_cast<double>(points.size());
     report.line({std::string("winding number, ") + name + ", " + std::to_string(threads) +
-                     " threads, us a vertex, with the update",
+                     " threads, us per vertex with update",
                  milliseconds(each)});
     report.row("inside", std::string("winding, ") + name, threads, "Palpate",
-               "us a vertex, with the update", each);
+               "us per vertex with update", each);
   }
 }
 
-/// Probes in a solid of 162,000 tetrahedra, which deforms in each frame: us a probe, with the
-/// update; which tetrahedron and weights, or tracked penetration directions.
+/// Microseconds per probe with the update, in a solid of 162,000 tetrahedra that deforms in each
+/// frame: tetrahedron and weights, or tracked penetration directions.
 void embeddedRow(Report& report, const Points& probes, Engine engine, int threads) {
   testing::Random random(2);
   const testing::Solid solid = testing::cells(30, random);
@@ -119,9 +118,9 @@ void embeddedRow(Report& report, const Points& probes, Engine engine, int thread
   settings.engine = engine;
   const bool bruteForce = engine == Engine::BruteForce;
   OctreeBasedCD detection(settings);
-  const GeometryId asked = detection.addPointSet(probes),
+  const GeometryId pointSet = detection.addPointSet(probes),
                    id = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra);
-  PenetrationTracker tracker(asked, id);
+  PenetrationTracker tracker(pointSet, id);
   std::vector<EmbeddedVertex> found;
   std::vector<double> embedded, tracked;
   Points deformed = solid.positions;
@@ -130,7 +129,7 @@ void embeddedRow(Report& report, const Points& probes, Engine engine, int thread
       deformed[v].x() = solid.positions[v].x() + 0.4 * std::sin(deformed[v].y() + 0.2 * frame);
     const double start = now();
     detection.setPositions(id, deformed);
-    detection.queries().findEmbeddedVertices(asked, id, found);
+    detection.queries().findEmbeddedVertices(pointSet, id, found);
     embedded.push_back(now() - start);
     if (!bruteForce) tracker.update(detection.queries());
     tracked.push_back(now() - start - embedded.back());
@@ -144,7 +143,7 @@ void embeddedRow(Report& report, const Points& probes, Engine engine, int thread
         {name + (bruteForce ? ", brute force" : ", " + std::to_string(threads) + " threads"),
          milliseconds(each)});
     report.row("inside", name, threads, bruteForce ? "Palpate, brute force" : "Palpate",
-               "us a probe", each);
+               "us per probe", each);
   }
 }
 
@@ -173,7 +172,8 @@ double particleFrame(const Settings& settings, const testing::Mesh& body, const 
 }  // namespace
 
 void insideRows(Report& report, const RowOptions& options) {
-  report.heading("Vertices inside a body of 100,352 triangles: us each, with depth and exit");
+  report.heading(
+      "Vertices inside a body of 100,352 triangles: us each, with depth and penetration direction");
   testing::Random random(1);
   const testing::Mesh body = bone();
   const Points deep = pointsIn(random, 20000, 0.5), around = pointsIn(random, 60000, 1.0);
@@ -190,7 +190,8 @@ void insideRows(Report& report, const RowOptions& options) {
   for (Eigen::Vector3d& p : probes) p += Eigen::Vector3d(15, 15, 15);
   for (const int threads : options.threads) embeddedRow(report, probes, Engine::Octree, threads);
   embeddedRow(report, Points(probes.begin(), probes.begin() + 50), Engine::BruteForce, 1);
-  report.heading("A million particles against it: ms a frame, millions of particles a second");
+  report.heading(
+      "A million particles against the body: ms per frame, millions of particles per second");
   const Points smoke = pointsIn(random, 1000000, 1.2);
   std::uint64_t hash = 0;
   for (const int threads : options.threads) {
@@ -200,8 +201,8 @@ void insideRows(Report& report, const RowOptions& options) {
     report.line(
         {std::to_string(threads) + " threads", milliseconds(frame), milliseconds(1000 / frame)});
     report.row("points", "particles-bone", threads, "Palpate", "frame ms", frame, hash);
-    report.row("points", "particles-bone", threads, "Palpate", "of 20 million a second",
-               frame / 50);
+    report.row("points", "particles-bone", threads, "Palpate",
+               "share of the target time of 20 million per second", frame / 50);
   }
   Settings bruteForce;
   bruteForce.engine = Engine::BruteForce;

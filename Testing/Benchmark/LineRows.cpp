@@ -1,5 +1,5 @@
-// A suture of 1,000 segments with itself and with the organs as one mesh, beside brute force over
-// the same frame.
+// A suture of 1,000 segments with itself and with the organs as one mesh. The baseline is brute
+// force on the same frame.
 #include "Rows.h"
 
 #include "Scenes.h"
@@ -15,7 +15,7 @@ namespace palpate::benchmark {
 namespace {
 
 constexpr int kSegments = 1000;
-constexpr double kMilliseconds = 0.5;  ///< aimed at for both pairs
+constexpr double kMilliseconds = 0.5;  ///< the target for both pairs
 
 /// Wound through the organs and over itself; `phase` in [0, 1] moves it along.
 void windSuture(const Eigen::AlignedBox3d& box, double phase, std::vector<Eigen::Vector3d>& out) {
@@ -60,7 +60,7 @@ class SutureScene {
     }
     windSuture(m_box, 0.02 * frame, m_thread);
   }
-  /// Milliseconds from positions to both answers.
+  /// Milliseconds from positions to the contacts of both pairs.
   double detect() {
     const double start = now();
     m_detection.setPositions(m_suture, m_thread);
@@ -83,7 +83,7 @@ class SutureScene {
 }  // namespace
 
 void lineRows(Report& report, const RowOptions& options) {
-  report.heading("A suture of 1,000 segments with itself and with 10,840 triangles: ms a frame");
+  report.heading("A suture of 1,000 segments with itself and with 10,840 triangles: ms per frame");
   report.line({"", "frame", "worst", "own", "organs'"});
   const scenes::Scene scene = scenes::organs();
   constexpr int kFrames = 60;
@@ -106,7 +106,8 @@ void lineRows(Report& report, const RowOptions& options) {
                  milliseconds(median(others))});
     report.row("lines", "suture-organs", threads, "Palpate", "frame ms", middle,
                suture.withOrgans().hash());
-    report.row("lines", "suture-organs", threads, "Palpate", "of 0.5 ms", middle / kMilliseconds);
+    report.row("lines", "suture-organs", threads, "Palpate", "share of the target of 0.5 ms",
+               middle / kMilliseconds);
   }
   Settings bruteForce;
   bruteForce.engine = Engine::BruteForce;

@@ -14,7 +14,7 @@ double gap(const DoubleBox& a, const DoubleBox& b) {
   return (a.min - b.max).cwiseMax(b.min - a.max).maxCoeff();
 }
 
-/// Of one mesh pair in one frame, for all engines' sets.
+/// Compares the pair sets of all engines, for one mesh pair in one frame.
 class SetChecker {
  public:
   SetChecker(const Task& task, const Positions& positions) : m_task(task), m_positions(positions) {
@@ -31,8 +31,9 @@ class SetChecker {
     for (std::size_t i = 0; i < sets.size(); ++i) {
       if (sets[i] != all) compare(pair, sets[i], all, entries[i].check);
     }
-    // What is in every set can still lie outside the truth: every engine rounded outward.
-    for (std::size_t i = 0; i < sets.size(); ++i) countExtra(pair, sets[i], entries[i].check);
+    // A pair in every set can still be a false positive, because every engine rounds outward.
+    for (std::size_t i = 0; i < sets.size(); ++i)
+      countFalsePositives(pair, sets[i], entries[i].check);
   }
 
  private:
@@ -47,15 +48,15 @@ class SetChecker {
     Pairs missing;
     std::set_difference(all.begin(), all.end(), set.begin(), set.end(),
                         std::back_inserter(missing));
-    for (const ElementPair& p : missing) check.missed += gapOf(pair, p) <= 0;
+    for (const ElementPair& p : missing) check.falseNegatives += gapOf(pair, p) <= 0;
   }
 
-  void countExtra(std::size_t pair, const Pairs& set, SetCheck& check) const {
+  void countFalsePositives(std::size_t pair, const Pairs& set, SetCheck& check) const {
     for (std::size_t i = 0; i < set.size(); ++i) {
       const double apart = gapOf(pair, set[i]);
       const bool twice = i > 0 && set[i] == set[i - 1];
-      check.extra += apart > 0 || twice;
-      check.widestExtra = std::max(check.widestExtra, apart / m_largest);
+      check.falsePositives += apart > 0 || twice;
+      check.widestFalsePositive = std::max(check.widestFalsePositive, apart / m_largest);
     }
   }
 
@@ -69,7 +70,7 @@ void addToHash(std::uint64_t& hash, const Pairs& pairs) {
     for (const std::uint32_t id : {p.a, p.b}) hash = (hash ^ id) * 0x100000001b3u;
 }
 
-void checkSets(const Workload& workload, std::span<const std::unique_ptr<Peer>> engines,
+void checkSets(const Workload& workload, std::span<const std::unique_ptr<BroadPhase>> engines,
                Outcome& outcome) {
   const std::size_t count = workload.frames.size();
   std::vector<std::size_t> frames = {0, count / 3, 2 * count / 3, count - 1};
@@ -90,7 +91,7 @@ void checkSets(const Workload& workload, std::span<const std::unique_ptr<Peer>> 
   }
 }
 
-void countPairs(const Workload& workload, Peer& engine, Outcome& outcome) {
+void countPairs(const Workload& workload, BroadPhase& engine, Outcome& outcome) {
   std::vector<double> counts;
   for (const Positions& frame : workload.frames) {
     engine.update(frame);
@@ -108,7 +109,8 @@ struct Samples {
   std::vector<double> total, update;
 };
 
-void repeat(Peer& engine, const std::vector<Positions>& frames, Timing& timing, Samples& samples) {
+void repeat(BroadPhase& engine, const std::vector<Positions>& frames, Timing& timing,
+            Samples& samples) {
   std::vector<double> totals;
   for (std::size_t frame = 0; frame < frames.size(); ++frame) {
     const double start = now();
@@ -144,7 +146,7 @@ double quantile(std::vector<double> values, double fraction) {
 
 double median(std::vector<double> values) { return quantile(std::move(values), 0.5); }
 
-Outcome measure(const Workload& workload, std::span<const std::unique_ptr<Peer>> engines,
+Outcome measure(const Workload& workload, std::span<const std::unique_ptr<BroadPhase>> engines,
                 const MeasureOptions& options) {
   Outcome outcome;
   for (const auto& engine : engines) {

@@ -12,19 +12,19 @@ namespace palpate::benchmark {
 double median(std::vector<double> values);
 double quantile(std::vector<double> values, double fraction);  ///< fraction in [0, 1]
 
-/// Milliseconds from an arbitrary start: on the wall's clock, or after useCpuClock() of this
-/// process's time on processors, which a busy machine disturbs less and which is of use with one
-/// thread only.
+/// Milliseconds from an arbitrary start, of wall time. After useCpuClock() it is the process's CPU
+/// time. A busy machine disturbs CPU time less, but it measures one thread only.
 double now();
 void useCpuClock();
 
-/// An engine's pairs against the truth: all pairs that any engine of the race found and whose exact
-/// boxes overlap.
+/// An engine's pairs compared with the reference: all pairs that any engine of the run found and
+/// whose exact boxes overlap.
 struct SetCheck {
-  std::size_t missed = 0;
-  std::size_t extra = 0;   ///< boxes apart, reported by outward rounding
-  double widestExtra = 0;  ///< the widest gap among those, in units of the largest coordinate
-  bool equal() const { return missed == 0 && extra == 0; }
+  std::size_t falseNegatives = 0;
+  std::size_t falsePositives =
+      0;  ///< boxes apart, reported because of outward rounding; pairs twice
+  double widestFalsePositive = 0;  ///< the widest gap of their boxes over the largest coordinate
+  bool equal() const { return falseNegatives == 0 && falsePositives == 0; }
 };
 
 /// Milliseconds of whole frames; `update` is the part of `total` before the pairs.
@@ -34,11 +34,11 @@ struct Timing {
   std::vector<double> repetitions;  ///< median over the frames of each
 };
 
-/// How many times as long as the other: the median over the repetitions that both have.
+/// The time over the other's time: the median over the repetitions that both have.
 double ratio(const Timing&, const Timing& other);
 
 struct Contestant {
-  Peer* engine;
+  BroadPhase* engine;
   const std::vector<Positions>* frames;
 };
 
@@ -47,8 +47,8 @@ struct MeasureOptions {
   double secondsPerEngine = 2;  ///< no further repetition of an engine that took longer
 };
 
-/// Repetitions of all contestants take turns, so that what disturbs the machine meets them alike.
-/// In each, the first frame is not timed (a jump back in the motion).
+/// The contestants take turns, so that disturbances of the machine affect all alike. The first
+/// frame of each repetition is not timed, because the motion jumps back there.
 std::vector<Timing> takeTurns(std::span<const Contestant>, const MeasureOptions&);
 
 struct Entry {
@@ -65,7 +65,7 @@ struct Outcome {
 };
 
 /// Prepares all engines, compares their pairs, and times them.
-Outcome measure(const Workload&, std::span<const std::unique_ptr<Peer>> engines,
+Outcome measure(const Workload&, std::span<const std::unique_ptr<BroadPhase>> engines,
                 const MeasureOptions&);
 
 }  // namespace palpate::benchmark

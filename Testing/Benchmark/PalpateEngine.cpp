@@ -12,7 +12,7 @@ Settings settingsFor(OctreeUpdate update, int threads) {
   return settings;
 }
 
-class PalpateEngine : public Peer {
+class PalpateEngine : public BroadPhase {
  public:
   PalpateEngine(OctreeUpdate update, PairOrder order) : m_update(update), m_order(order) {}
 
@@ -36,7 +36,7 @@ class PalpateEngine : public Peer {
   void collide() override {
     if (m_order == PairOrder::Sorted) {
       m_scene->detection.collectCandidates();
-      // Sorted when first asked for.
+      // Sorted on the first call.
       for (std::size_t pair = 0; pair < m_task.pairs.size(); ++pair)
         m_scene->detection.candidatePairs(first(pair), second(pair));
       return;
@@ -90,7 +90,7 @@ void PalpateScene::setPositions(const Positions& positions) {
     detection.setPositions(ids[mesh], positions[mesh]);
 }
 
-std::unique_ptr<Peer> makePalpate(OctreeUpdate update, PairOrder order) {
+std::unique_ptr<BroadPhase> makePalpate(OctreeUpdate update, PairOrder order) {
   return std::make_unique<PalpateEngine>(update, order);
 }
 

@@ -1,20 +1,21 @@
 #pragma once
 
-#include "Peers/Peer.h"
+#include "BroadPhase.h"
 
 #include <palpate/OctreeBasedCD.h>
 
 namespace palpate::benchmark {
 
 enum class PairOrder {
-  Found,  ///< forEachCandidate(), kept as they come: what the peers deliver
+  Found,  ///< forEachCandidate(), in the order found, as the baselines deliver them
   Sorted  ///< collectCandidates() and candidatePairs()
 };
 
-/// Palpate as a user calls it; settings are the defaults but for the two that the name says.
-std::unique_ptr<Peer> makePalpate(OctreeUpdate, PairOrder);
+/// Palpate as a user calls it. All other settings are the defaults.
+std::unique_ptr<BroadPhase> makePalpate(OctreeUpdate, PairOrder);
 
-/// The task's meshes and pairs in a new OctreeBasedCD. thickness 0: the task's own.
+/// The task's meshes and pairs in a new OctreeBasedCD. With thickness 0 it takes the task's
+/// thickness.
 struct PalpateScene {
   PalpateScene(const Task&, const Positions&, OctreeUpdate = OctreeUpdate::Auto,
                double thickness = 0);

@@ -41,8 +41,8 @@ QueryTimes timeQueries(const testing::PublishedQueries& set) {
       best = std::min(best, took.count());
     }
     microseconds.push_back(best);
-    times.missed += query.impact && !impact;
-    times.invented += !query.impact && impact;
+    times.falseNegatives += query.impact && !impact;
+    times.falsePositives += !query.impact && impact;
     times.mean += best / static_cast<double>(set.queries.size());
   }
   std::sort(microseconds.begin(), microseconds.end());

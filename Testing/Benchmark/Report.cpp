@@ -1,7 +1,6 @@
 #include "Report.h"
 
 #include <cstdio>
-#include <sstream>
 #include <thread>
 
 namespace palpate::benchmark {
@@ -15,13 +14,21 @@ std::string processor() {
   return "unknown processor";
 }
 
+/// A field of CSV, in quotes if it needs them.
+std::string field(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + '"';
+}
+
 }  // namespace
 
 Report::Report(const std::string& csvPath, std::string commit, std::string simdPath) {
-  std::ostringstream provenance;
-  provenance << processor() << " (" << std::thread::hardware_concurrency() << " cores),g++ "
-             << __VERSION__ << ',' << simdPath << ',' << commit;
-  m_provenance = provenance.str();
+  const std::string cores = std::to_string(std::thread::hardware_concurrency());
+  m_provenance = field(processor() + " (" + cores + " cores)") + ',' +
+                 field("g++ " + std::string(__VERSION__)) + ',' + field(simdPath) + ',' +
+                 field(commit);
   std::printf("machine %s, compiler g++ %s, SIMD %s, commit %s\n", processor().c_str(), __VERSION__,
               simdPath.c_str(), commit.c_str());
   if (csvPath.empty()) return;
@@ -42,8 +49,9 @@ void Report::row(const std::string& table, const std::string& scene, int threads
                  const std::string& engine, const std::string& metric, double value,
                  std::uint64_t hash) {
   if (!m_csv.is_open()) return;
-  m_csv << table << ',' << scene << ',' << threads << ",\"" << engine << "\"," << metric << ','
-        << value << ',' << std::hex << hash << std::dec << ',' << m_provenance << '\n';
+  m_csv << field(table) << ',' << field(scene) << ',' << threads << ',' << field(engine) << ','
+        << field(metric) << ',' << value << ',' << std::hex << hash << std::dec << ','
+        << m_provenance << '\n';
   m_csv.flush();
 }
 

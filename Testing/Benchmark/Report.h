@@ -8,7 +8,7 @@
 namespace palpate::benchmark {
 
 /// Prints tables and writes every figure as a row of CSV: table, scene, threads, engine, metric,
-/// value, hash, and on each row the machine, compiler, SIMD path and commit that gave it.
+/// value, hash, machine, compiler, SIMD path and commit.
 class Report {
  public:
   Report(const std::string& csvPath, std::string commit, std::string simdPath);

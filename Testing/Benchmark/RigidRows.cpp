@@ -1,11 +1,11 @@
-// A bone of half a million triangles that turns and presses into 10,952 deforming ones: moved by
-// its transform, and by the same positions; beside FCL with its transform.
+// A bone of half a million triangles that turns and presses into 10,952 deforming ones. It is moved
+// by its transform, or by the same positions. The baseline is FCL with its transform.
 #include "Rows.h"
 
 #include "Common/RandomMeshes.h"
 
-#ifdef PALPATE_BENCHMARK_PEERS
-#include "Peers/FclBody.h"
+#ifdef PALPATE_BENCHMARK_BASELINES
+#include "Baselines/FclBody.h"
 #endif
 
 #include <palpate/OctreeBasedCD.h>
@@ -85,30 +85,30 @@ Moved move(const testing::Mesh& body, const PairSettings& pair, int threads, boo
 }  // namespace
 
 void rigidRows(Report& report, const RowOptions& options) {
-  report.heading("A bone of 502,000 triangles in 10,952 deforming ones: ms a frame");
+  report.heading("A bone of 502,000 triangles in 10,952 deforming ones: ms per frame");
   report.line({"", "frame", "worst", "contacts of all frames"});
   const testing::Mesh body = bone();
-  struct Asked {
+  struct MethodCase {
     const char* name;
     PairSettings settings;
   };
-  const Asked all[] = {{"Intersection", {Method::Intersection, 0.0}},
-                       {"Proximity", {Method::Proximity, kThickness}},
-                       {"Continuous", {Method::Continuous, 0.0}},
-                       {"Auto", {Method::Auto, kThickness}}};
-  for (const Asked& asked : all)
+  const MethodCase all[] = {{"Intersection", {Method::Intersection, 0.0}},
+                            {"Proximity", {Method::Proximity, kThickness}},
+                            {"Continuous", {Method::Continuous, 0.0}},
+                            {"Auto", {Method::Auto, kThickness}}};
+  for (const MethodCase& method : all)
     for (const int threads : options.threads)
       for (const bool byTransform : {true, false}) {
-        const Moved moved = move(body, asked.settings, threads, byTransform);
+        const Moved moved = move(body, method.settings, threads, byTransform);
         const std::string name =
-            std::string(asked.name) + (byTransform ? ", setTransform" : ", setPositions");
+            std::string(method.name) + (byTransform ? ", setTransform" : ", setPositions");
         report.line({name + ", " + std::to_string(threads) + " threads",
                      milliseconds(median(moved.samples)), milliseconds(quantile(moved.samples, 1)),
                      std::to_string(moved.contacts)});
         report.row("rigid", "bone-tissue", threads, name, "frame ms", median(moved.samples),
                    moved.hash);
       }
-#ifdef PALPATE_BENCHMARK_PEERS
+#ifdef PALPATE_BENCHMARK_BASELINES
   FclBody fcl(tissue(0).positions, tissue(0).triangles, body.positions, body.triangles);
   std::vector<double> samples;
   std::size_t contacts = 0;

@@ -29,7 +29,7 @@ std::string tenths(double value) {
   return text;
 }
 
-/// Milliseconds by stage of every frame of some passes, the first frame of each pass left out.
+/// Milliseconds by stage of every frame of some passes, without the first frame of each pass.
 struct StageSamples {
   std::vector<double> boxes, octree, pairs, narrowPhase, order, total;
 
@@ -72,17 +72,17 @@ void stageRow(Report& report, const Workload& workload, OctreeUpdate update, int
   row("octree ms", octree);
   row("pairs ms", found);
   row("order ms", order);
-  row("boxes ns a triangle", boxes * perTriangle);
-  row("octree ns a triangle", octree * perTriangle);
-  row("pairs ns a pair", found * perPair);
-  row("order ns a pair", order * perPair);
+  row("boxes ns per triangle", boxes * perTriangle);
+  row("octree ns per triangle", octree * perTriangle);
+  row("pairs ns per pair", found * perPair);
+  row("order ns per pair", order * perPair);
 }
 
-std::unique_ptr<Peer> shipped() { return makePalpate(OctreeUpdate::Auto, PairOrder::Found); }
+std::unique_ptr<BroadPhase> shipped() { return makePalpate(OctreeUpdate::Auto, PairOrder::Found); }
 
-/// The same engine over two workloads, in turns; the second against the first.
+/// Times one engine on two workloads in turns, and the second over the first.
 void pairedRow(Report& report, const char* table, const Workload& first, const Workload& second,
-               std::unique_ptr<Peer> (*make)(), const MeasureOptions& options) {
+               std::unique_ptr<BroadPhase> (*make)(), const MeasureOptions& options) {
   const auto engineA = make(), engineB = make();
   engineA->prepare(first.task, first.frames[0]);
   engineB->prepare(second.task, second.frames[0]);
@@ -101,14 +101,16 @@ void pairedRow(Report& report, const char* table, const Workload& first, const W
   row("ratio", factor);
 }
 
-std::unique_ptr<Peer> rebuilding() { return makePalpate(OctreeUpdate::Rebuild, PairOrder::Found); }
+std::unique_ptr<BroadPhase> rebuilding() {
+  return makePalpate(OctreeUpdate::Rebuild, PairOrder::Found);
+}
 
 }  // namespace
 
 void stageRows(Report& report, const RowOptions& options) {
   for (const int threads : options.threads) {
-    report.heading("Stages, median ms, ns a triangle and ns a pair, " + std::to_string(threads) +
-                   (threads == 1 ? " thread" : " threads"));
+    report.heading("Stages, median ms, ns per triangle and ns per pair, " +
+                   std::to_string(threads) + (threads == 1 ? " thread" : " threads"));
     report.line({"", "boxes", "octree", "pairs", "order", "boxes/tri", "octree/tri", "pairs/tri",
                  "pairs/pair", "order/pair"});
     for (const std::string& name : workloadNames(options.sharedData)) {
@@ -135,17 +137,17 @@ void wholeFrameRows(Report& report, const RowOptions& options) {
         scene.setPositions(frame);
         scene.detection.detectCollision();
         const double end = now();
-        if (repetition == 0) continue;  // until every buffer has seen its peak
+        if (repetition == 0) continue;  // until every buffer has its peak size
         total.push_back(end - start);
         narrow.push_back(scene.detection.statistics().milliseconds.narrowPhase);
         contacts.push_back(static_cast<double>(scene.detection.statistics().contacts));
       }
     }
     std::string embree = "-";
-#ifdef PALPATE_BENCHMARK_PEERS
-    const auto peer = makeEmbreeMorton();
-    peer->prepare(workload.task, workload.frames[0]);
-    const Contestant contestant{peer.get(), &workload.frames};
+#ifdef PALPATE_BENCHMARK_BASELINES
+    const auto embreeRebuild = makeEmbreeMorton();
+    embreeRebuild->prepare(workload.task, workload.frames[0]);
+    const Contestant contestant{embreeRebuild.get(), &workload.frames};
     embree = milliseconds(takeTurns({&contestant, 1}, options.measure)[0].total);
     report.row("whole frame", "organs", threads, "Embree rebuild + collide", "median ms",
                std::stod(embree));
@@ -162,24 +164,25 @@ void wholeFrameRows(Report& report, const RowOptions& options) {
   report.line({"* rebuild + rtcCollide, candidate pairs only"});
 }
 
-void farFlungRows(Report& report, const RowOptions& options) {
+void farTriangleRows(Report& report, const RowOptions& options) {
   report.heading("One triangle a million scene sizes away: update and frame, ms; 1 thread");
   report.line({"", "update", "frame", "with: update", "frame", "ratio"});
   for (const char* name : {"organs", "sheets-64K"}) {
     const Workload plain = makeWorkload(name, options.frames, options.sharedData);
-    Workload flung = plain;
-    flingTriangle(flung);
-    pairedRow(report, "far-flung", plain, flung, shipped, options.measure);
-    pairedRow(report, "far-flung", plain, flung, rebuilding, options.measure);
-#ifdef PALPATE_BENCHMARK_PEERS
-    pairedRow(report, "far-flung", plain, flung, makeEmbreeRefit, options.measure);
-    pairedRow(report, "far-flung", plain, flung, makeEmbreeMorton, options.measure);
+    Workload withFar = plain;
+    addFarTriangle(withFar);
+    pairedRow(report, "far triangle", plain, withFar, shipped, options.measure);
+    pairedRow(report, "far triangle", plain, withFar, rebuilding, options.measure);
+#ifdef PALPATE_BENCHMARK_BASELINES
+    pairedRow(report, "far triangle", plain, withFar, makeEmbreeRefit, options.measure);
+    pairedRow(report, "far triangle", plain, withFar, makeEmbreeMorton, options.measure);
 #endif
   }
 }
 
-void stillRows(Report& report, const RowOptions& options) {
-  report.heading("Nothing moved: update() ms while moving, given the same positions, given none");
+void atRestRows(Report& report, const RowOptions& options) {
+  report.heading(
+      "At rest: update() in ms while moving, with the same positions set, with none set");
   for (const char* name : {"organs", "sheets-64K", "sheets-1M"}) {
     const Workload workload = makeWorkload(name, options.frames, options.sharedData);
     PalpateScene scene(workload.task, workload.frames[0]);
@@ -202,14 +205,14 @@ void stillRows(Report& report, const RowOptions& options) {
     });
     const double none = time([&](const Positions&) { scene.detection.update(); });
     report.line({workload.name, milliseconds(moving), milliseconds(same), milliseconds(none)});
-    report.row("still", name, 1, "Palpate", "moving ms", moving);
-    report.row("still", name, 1, "Palpate", "same positions ms", same);
-    report.row("still", name, 1, "Palpate", "no positions ms", none);
+    report.row("at rest", name, 1, "Palpate", "moving ms", moving);
+    report.row("at rest", name, 1, "Palpate", "same positions ms", same);
+    report.row("at rest", name, 1, "Palpate", "no positions ms", none);
   }
 }
 
-void payRows(Report& report, const RowOptions& options) {
-  report.heading("A tool of 1,280 triangles over a still sheet, and far from it; 1 thread, ms");
+void smallToolRows(Report& report, const RowOptions& options) {
+  report.heading("A tool of 1,280 triangles over a sheet at rest, and far from it; 1 thread, ms");
   report.line({"", "frame", "pairs", "far: frame"});
   for (const int cells : {90, 180, 360, 720}) {
     const scenes::SceneMesh sheet = scenes::sheet(cells), sphere = scenes::sphere(8);
@@ -219,7 +222,7 @@ void payRows(Report& report, const RowOptions& options) {
     task.pairs = {{0, 1}};
     task.thickness = edge / 10;
     PalpateScene scene(task, {sheet.positions, sphere.positions});
-    // As large as ten of the sheet's cells, so that as many triangles meet for every sheet.
+    // Ten cells of the sheet wide, so that the number of candidates does not depend on the sheet.
     std::vector<Eigen::Vector3d> tool(sphere.positions.size());
     const auto timeAt = [&](double height, double& pairs) {
       std::vector<double> samples;
@@ -240,20 +243,21 @@ void payRows(Report& report, const RowOptions& options) {
     const double near = timeAt(0, pairs), far = timeAt(10, none);
     const std::string name = "sheet of " + std::to_string(sheet.triangles.size());
     report.line({name, milliseconds(near), whole(pairs), milliseconds(far)});
-    report.row("pay", name, 1, "Palpate", "frame ms", near);
-    report.row("pay", name, 1, "Palpate", "pairs", pairs);
-    report.row("pay", name, 1, "Palpate", "far ms", far);
+    report.row("small tool", name, 1, "Palpate", "frame ms", near);
+    report.row("small tool", name, 1, "Palpate", "pairs", pairs);
+    report.row("small tool", name, 1, "Palpate", "far ms", far);
   }
 }
 
 void scaleRows(Report& report, const RowOptions& options) {
-  report.heading("Scale: ns a triangle, update + pairs as found; bytes a triangle; 2 threads");
+  report.heading(
+      "Scale: ns per triangle, update and pairs in the order found; bytes per triangle; speed-up");
   report.line({"", "shipped", "rebuild", "bytes/tri", "2 threads", "2, rebuild", "pairs/tri"});
   std::vector<std::string> names = {"sheets-16K", "sheets-64K", "sheets-256K", "sheets-1M"};
   if (!options.quick) names.push_back("sheets-4M");
   for (const std::string& name : names) {
     Workload workload = makeWorkload(name, options.frames, options.sharedData);
-    std::unique_ptr<Peer> engines[4];
+    std::unique_ptr<BroadPhase> engines[4];
     std::vector<Contestant> contestants;
     for (int i = 0; i < 4; ++i) {
       workload.task.threads = 1 + i / 2;
@@ -281,16 +285,16 @@ void scaleRows(Report& report, const RowOptions& options) {
                  tenths(bytes[0]) + "/" + tenths(bytes[1]), times(speedUp[0]), times(speedUp[1]),
                  tenths(pairs)});
     for (int i = 0; i < 2; ++i) {
-      report.row("scale", name, 1, kUpdateNames[i], "ns a triangle",
+      report.row("scale", name, 1, kUpdateNames[i], "ns per triangle",
                  timings[static_cast<std::size_t>(i)].total * 1e6 / triangles);
-      report.row("scale", name, 2, kUpdateNames[i], "times as fast as 1 thread", speedUp[i]);
-      report.row("scale", name, 1, kUpdateNames[i], "bytes a triangle", bytes[i]);
+      report.row("scale", name, 2, kUpdateNames[i], "speed-up over 1 thread", speedUp[i]);
+      report.row("scale", name, 1, kUpdateNames[i], "bytes per triangle", bytes[i]);
     }
   }
 }
 
 void steadyRows(Report& report, const RowOptions& options) {
-  report.heading("Steady: organs, whole frames after one full pass");
+  report.heading("Steady frames: organs, whole frames after one full pass");
   report.line({"", "frames", "mallocs", "by oneTBB", "p99/median"});
   for (const int threads : options.threads) {
     Workload workload = makeWorkload("organs", 0, options.sharedData);
@@ -301,7 +305,7 @@ void steadyRows(Report& report, const RowOptions& options) {
       scene.setPositions(frame);
       scene.detection.detectCollision();
     }
-    std::vector<std::vector<double>> byFrame(period);  // frames with as many pairs: the same frame
+    std::vector<std::vector<double>> byFrame(period);  // the same frame of each pass
     for (auto& samples : byFrame) samples.reserve(count / period + 1);
     const AllocationCount before = allocationCount();
     for (std::size_t i = 0; i < count; ++i) {
@@ -318,20 +322,21 @@ void steadyRows(Report& report, const RowOptions& options) {
     const auto oneTbb = static_cast<double>(after.oneTbb - before.oneTbb);
     report.line({std::to_string(threads) + " threads", std::to_string(count), whole(own),
                  whole(oneTbb), times(quantile(relative, 0.99))});
-    report.row("steady", "organs", threads, "Palpate", "mallocs", own);
-    report.row("steady", "organs", threads, "Palpate", "mallocs by oneTBB", oneTbb);
-    report.row("steady", "organs", threads, "Palpate", "p99 over median", quantile(relative, 0.99));
+    report.row("steady frames", "organs", threads, "Palpate", "mallocs", own);
+    report.row("steady frames", "organs", threads, "Palpate", "mallocs by oneTBB", oneTbb);
+    report.row("steady frames", "organs", threads, "Palpate", "p99 over median",
+               quantile(relative, 0.99));
   }
 }
 
 void simdRows(Report& report, const RowOptions& options) {
-  report.heading("SIMD paths: update ms, pairs ms, as shipped and by full rebuild; 1 thread");
+  report.heading("SIMD paths: update ms, pairs ms, as shipped and with full rebuild; 1 thread");
   report.line({"", "update", "pairs", "rebuild", "pairs"});
   for (const char* name : {"organs", "sheets-64K"}) {
     const Workload workload = makeWorkload(name, options.frames, options.sharedData);
     for (const std::string& path : simdPaths()) {
       useSimdPath(path);
-      std::vector<std::unique_ptr<Peer>> engines;
+      std::vector<std::unique_ptr<BroadPhase>> engines;
       engines.push_back(shipped());
       engines.push_back(rebuilding());
       const Outcome outcome = measure(workload, engines, options.measure);
@@ -341,8 +346,8 @@ void simdRows(Report& report, const RowOptions& options) {
       report.line({workload.name + ", " + simdPath(), milliseconds(auto_.update),
                    milliseconds(auto_.total - auto_.update), milliseconds(rebuilt.update),
                    milliseconds(rebuilt.total - rebuilt.update), std::string("  ") + hash});
-      report.row("simd", name, 1, simdPath(), "shipped ms", auto_.total, outcome.hash);
-      report.row("simd", name, 1, simdPath(), "rebuild ms", rebuilt.total, outcome.hash);
+      report.row("simd", name, 1, simdPath(), "as shipped ms", auto_.total, outcome.hash);
+      report.row("simd", name, 1, simdPath(), "full rebuild ms", rebuilt.total, outcome.hash);
     }
     useSimdPath("");
   }

@@ -1,7 +1,7 @@
-// What validity() costs: copying positions with how far they moved beside the same without, what
-// the narrow phase does for it beside the same without, of the same candidates, in turns, and the
-// triangle pairs that were looked at for where the step starts, by what one costs. Beside it the
-// whole frame.
+// The cost of validity(). It has three parts: measuring the motion while positions are copied, the
+// additional work of the narrow phase, and the triangle pairs of the initial intersection check.
+// The first two are differences of times with and without, on the same candidates and in turns. The
+// third is the number of pairs times the cost of one. The whole frame is given beside it.
 #include "Rows.h"
 
 #include "CollisionDetection/GeometryChecks.h"
@@ -27,8 +27,8 @@ using Step = std::vector<std::vector<Eigen::Vector3d>>;
 
 constexpr int kFrames = 24;
 
-/// A sheet that lies on another within the thickness and creeps along it: no step is untrusted, and
-/// every contact is looked at.
+/// A sheet that lies on another within the thickness and creeps along it: every step is trusted,
+/// and every contact is checked.
 scenes::Scene restingSheets() {
   scenes::Scene scene{"resting sheets", {scenes::sheet(30), scenes::sheet(30)}, {}, {{0, 1}}};
   scene.frames = 24;
@@ -61,9 +61,9 @@ class ValidityCost {
 
   /// Milliseconds of the next frame.
   struct Frame {
-    double whole =
-        std::numeric_limits<double>::infinity();  ///< as it is shipped, and candidates kept
-    double validity = 0;                          ///< of which
+    double whole = std::numeric_limits<double>::infinity();  ///< the whole frame as shipped;
+                                                             ///< candidates are kept
+    double validity = 0;                                     ///< the part of validity()
   };
   Frame next(int frame) {
     m_before = std::exchange(m_now, at(frame));
@@ -99,7 +99,7 @@ class ValidityCost {
     }
     return least;
   }
-  /// As positions are copied, less copying them.
+  /// Measuring the motion: copying positions with it, less copying them without.
   double findMotion() {
     const Threads one(1);
     double spent = 0;
@@ -121,7 +121,7 @@ class ValidityCost {
   std::span<const ElementPair> candidatesOf(const std::pair<std::size_t, std::size_t>& pair) {
     return m_detection.candidatePairs(m_ids[pair.first], m_ids[pair.second]);
   }
-  /// As many pairs as this frame looked at, at what all candidates take.
+  /// The initial intersection check: its number of pairs, times the cost per candidate.
   double looks() {
     const std::size_t looked = m_detection.statistics().validityPairs;
     if (looked == 0) return 0;
@@ -136,20 +136,20 @@ class ValidityCost {
     });
     return all / static_cast<double>(candidates) * static_cast<double>(looked);
   }
-  /// With what the step asks for, less without.
+  /// The additional work of the narrow phase: its time with validity, less its time without.
   double narrowPhase(const std::pair<std::size_t, std::size_t>& pair) {
     if (m_settings.earliestTimeOnly) return 0;
     const auto candidates = candidatesOf(pair);
     MeshPair plain{m_meshes[pair.first], m_meshes[pair.second], m_settings};
     MeshPair asked = plain;
     const double motion = largestMotion(m_motion[pair.first], m_motion[pair.second]);
-    // As the library does: where the step is not known to start apart nothing is asked of it.
+    // As in the library: if the step is not known to start apart, there is no such work.
     const Validity& validity =
         m_detection.collisionData(m_ids[pair.first], m_ids[pair.second]).validity();
     if (m_settings.method == Method::Continuous ||
         (validity.startedApart && motion <= m_settings.thickness))
       asked.step.motion = motion;
-    asked.step.certain = motion * (1 + 1e-9);
+    asked.step.motionWithRounding = motion * (1 + 1e-9);
     double least[2] = {std::numeric_limits<double>::infinity(),
                        std::numeric_limits<double>::infinity()};
     for (int turn = 0; turn < 10; ++turn) {
@@ -176,7 +176,7 @@ class ValidityCost {
 }  // namespace
 
 void validityRows(Report& report, const RowOptions& options) {
-  report.heading("What validity() costs: of a frame, ms; 1 thread");
+  report.heading("Cost of validity() in a frame, ms; 1 thread");
   report.line({"", "frame", "validity", "percent"});
   std::vector<scenes::Scene> all = scenes::hardScenes();
   all.push_back(scenes::organs());

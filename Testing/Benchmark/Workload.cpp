@@ -14,8 +14,8 @@ using Eigen::Vector3d;
 struct PublishedFrames {
   const char *name, *first, *second;
 };
-// Scenes come with a thickness of a twentieth of their mean edge; the race inflates each of a
-// pair's two boxes by that much, which is half the pair's thickness each.
+// Scenes come with a thickness of a twentieth of their mean edge. The benchmark
+// inflates both boxes of a pair by it, so that the thickness of the pair is a tenth.
 constexpr double kInflated = 2;
 constexpr PublishedFrames kPublished[] = {
     {"cloth-funnel", "cloth-funnel/frames/227.ply", "cloth-funnel/frames/228.ply"},
@@ -105,7 +105,7 @@ Workload makeWorkload(const std::string& name, std::size_t frames, const std::st
   workload.task.thickness = kInflated * scene.thickness;
   const auto period = static_cast<std::size_t>(scene.frames);
   if (frames == 0) frames = std::clamp<std::size_t>(3'000'000 / workload.triangles(), 4, period);
-  // Less than a whole period: from its quarter on, where things move and touch.
+  // Less than a whole period starts at its quarter, where the meshes move and touch.
   const std::size_t first = frames < period ? period / 4 : 0;
   workload.frames.assign(frames, Positions(scene.meshes.size()));
   for (std::size_t i = 0; i < frames; ++i)
@@ -114,7 +114,7 @@ Workload makeWorkload(const std::string& name, std::size_t frames, const std::st
   return workload;
 }
 
-void flingTriangle(Workload& workload) {
+void addFarTriangle(Workload& workload) {
   const auto corner = static_cast<std::uint32_t>(workload.frames[0][0].size());
   workload.task.meshes[0].push_back({corner, corner + 1, corner + 2});
   for (Positions& frame : workload.frames) {

@@ -1,13 +1,13 @@
 #pragma once
 
-#include "Peers/Peer.h"
+#include "BroadPhase.h"
 
 #include <string>
 #include <vector>
 
 namespace palpate::benchmark {
 
-/// A scene with its positions computed before any clock starts, boxes inflated by a twentieth of
+/// A scene with its positions computed before any clock starts, and a thickness of a tenth of
 /// the mean edge.
 struct Workload {
   std::string name;
@@ -20,11 +20,11 @@ struct Workload {
 /// twisted-rods, and where the published frames are present, cloth-funnel and rod-twist.
 std::vector<std::string> workloadNames(const std::string& sharedData);
 
-/// frames = 0: as many consecutive ones as keep the workload near three million triangles, 4 to
-/// 120. Any "sheets-<number>K" or "sheets-<number>M" is understood.
+/// `frames` 0 means 4 to 120 consecutive frames, near three million triangles in all. Any
+/// "sheets-<number>K" or "sheets-<number>M" is a valid name.
 Workload makeWorkload(const std::string& name, std::size_t frames, const std::string& sharedData);
 
-/// One more triangle in the first mesh, a million scene sizes away.
-void flingTriangle(Workload&);
+/// Adds a triangle to the first mesh, a million scene sizes away.
+void addFarTriangle(Workload&);
 
 }  // namespace palpate::benchmark

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Writes the tables of a page from the race's CSV.
+"""Writes the tables of a page from the CSV of palpate_race.
 
 usage: tables.py FIGURES.csv PAGE.md
 
-Each table stands in the page between the lines "<!-- table NAME -->" and "<!-- end -->"; what is
-between them is replaced, all else stays.
+Each table stands in the page between the lines "<!-- table NAME -->" and "<!-- end -->". The script
+replaces the lines between these two and leaves all others unchanged.
 """
 import csv
 import re
@@ -60,30 +60,30 @@ def race(figures):
 
 
 def sets(figures):
-    header = ["pairs missed, and more by outward rounding, in four frames"] + figures.distinct("race", "scene")
+    header = ["false negatives, false positives, in four frames"] + figures.distinct("race", "scene")
     rows = []
     for engine in figures.distinct("race", "engine"):
         if engine == "scene":
             continue
         cells = []
         for scene in header[1:]:
-            missed, extra = (figures.value("race", scene, 1, engine, m) for m in ("missed", "extra"))
-            cells.append("-" if missed is None else f"{missed:.0f}, {extra:.0f}")
+            negatives, positives = (figures.value("race", scene, 1, engine, m) for m in ("false negatives", "false positives"))
+            cells.append("-" if negatives is None else f"{negatives:.0f}, {positives:.0f}")
         rows.append([engine] + cells)
     return markdown(header, rows)
 
 
-def verdict(figures):
-    scenes = figures.distinct("verdict", "scene")
+def comparison(figures):
+    scenes = figures.distinct("comparison", "scene")
     rows = []
-    for what in figures.distinct("verdict", "engine"):
+    for what in figures.distinct("comparison", "engine"):
         cells = []
         for scene in scenes:
-            limit = figures.value("verdict", scene, 1, what, "limit")
-            ratios = joined(figures, "verdict", scene, what, "ratio")
-            cells.append("-" if limit is None else f"{ratios} of {limit:g}")
+            target = figures.value("comparison", scene, 1, what, "target")
+            ratios = joined(figures, "comparison", scene, what, "ratio")
+            cells.append("-" if target is None else f"{ratios} of {target:g}")
         rows.append([what] + cells)
-    return markdown(["times as fast, 1 / 2 threads, of those asked for"] + scenes, rows)
+    return markdown(["speed-up, 1 / 2 threads, of the target"] + scenes, rows)
 
 
 def metrics(table, first):
@@ -107,19 +107,24 @@ TABLES = {
     "provenance": provenance,
     "race": race,
     "sets": sets,
-    "verdict": verdict,
+    "comparison": comparison,
     "stages": metrics("stages", "1 / 2 threads"),
     "whole-frame": metrics("whole frame", "1 / 2 threads"),
-    "far-flung": metrics("far-flung", "1 thread"),
-    "still": metrics("still", "1 thread"),
-    "pay": metrics("pay", "1 thread"),
+    "far-triangle": metrics("far triangle", "1 thread"),
+    "at-rest": metrics("at rest", "1 thread"),
+    "small-tool": metrics("small tool", "1 thread"),
     "scale": metrics("scale", "1 / 2 threads"),
-    "steady": metrics("steady", "1 / 2 threads"),
+    "steady": metrics("steady frames", "1 / 2 threads"),
     "features": metrics("features", "1 thread"),
     "continuous": metrics("continuous", "1 / 2 threads"),
     "validity": metrics("validity", "1 thread"),
     "queries": metrics("queries", "1 thread"),
     "simd": metrics("simd", "1 thread"),
+    "lines": metrics("lines", "1 / 2 threads"),
+    "points": metrics("points", "1 / 2 threads"),
+    "shapes": metrics("shapes", "1 thread"),
+    "rigid": metrics("rigid", "1 / 2 threads"),
+    "inside": metrics("inside", "1 / 2 threads"),
 }
 
 

@@ -23,16 +23,16 @@ inline constexpr bool kSanitized = true;
 inline constexpr bool kSanitized = false;
 #endif
 
-/// AddressSanitizer does not lock its allocator around fork(). The child of a process with other
-/// threads may find it locked for ever, by one that was allocating.
+/// AddressSanitizer does not lock its allocator around fork(). If another thread of the parent
+/// allocates at that moment, the child finds the allocator locked for ever.
 #if defined(__SANITIZE_ADDRESS__)
 inline constexpr bool kForksBesideThreads = false;
 #else
 inline constexpr bool kForksBesideThreads = true;
 #endif
 
-/// What became of a child: "passed", "failed", "exit 3", or "signal 14" (SIGALRM: it hung).
-/// The child runs `body` and leaves without running what is registered for the end of the process.
+/// The result of a child: "passed", "failed", "exit 3", or "signal 14" (SIGALRM: it hung). The
+/// child runs `body` and exits without running the exit handlers of the process.
 inline std::string inChild(const std::function<bool()>& body, unsigned seconds = 20) {
   const pid_t child = fork();
   if (child < 0) return "no fork";

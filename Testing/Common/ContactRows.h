@@ -24,7 +24,7 @@ inline void append(Row& row, const Eigen::Vector3d& value) {
   for (const double x : value) append(row, x);
 }
 
-/// kTriangleFirst: of triangleVertex(), which is sorted by the triangle.
+/// kTriangleFirst: the row is of triangleVertex(), which is sorted by the triangle.
 template <bool kTriangleFirst>
 Row rowOf(const VertexTriangleContact& c) {
   Row row{kTriangleFirst ? c.triangle : c.vertex, kTriangleFirst ? c.vertex : c.triangle,
@@ -49,7 +49,7 @@ inline Row rowOf(const EdgeEdgeContact& c) {
   return row;
 }
 
-/// What one pair answers, list by list, in the order given out.
+/// All contacts of one pair, list by list, in the reported order.
 struct Rows {
   std::vector<Row> vertexTriangle, triangleVertex, edgeEdge;
   std::vector<ElementPair> intersectingTriangles;
@@ -93,7 +93,7 @@ inline std::string firstDifference(const std::vector<Row>& found, const std::vec
          "\n  truth, of " + std::to_string(truth.size()) + ":" + text(truth, i);
 }
 
-/// Whole sets, bit by bit.
+/// Expects equal sets of contacts, bit by bit.
 inline void expectSameRows(const Rows& found, const Rows& truth) {
   EXPECT_EQ(firstDifference(found.vertexTriangle, truth.vertexTriangle), "") << "vertexTriangle";
   EXPECT_EQ(firstDifference(found.triangleVertex, truth.triangleVertex), "") << "triangleVertex";
@@ -102,7 +102,7 @@ inline void expectSameRows(const Rows& found, const Rows& truth) {
   EXPECT_EQ(found.earliestTimeOfImpact, truth.earliestTimeOfImpact);
 }
 
-/// Rows ascend by their two ids, each pair of ids once.
+/// Rows ascend by their first ids, and each row occurs once.
 inline bool ascend(const std::vector<Row>& rows, std::size_t idWords) {
   return std::adjacent_find(rows.begin(), rows.end(), [&](const Row& p, const Row& q) {
            return !std::lexicographical_compare(p.begin(), p.begin() + idWords, q.begin(),
@@ -112,7 +112,7 @@ inline bool ascend(const std::vector<Row>& rows, std::size_t idWords) {
 
 inline void expectWellFormed(const VertexTriangleContact& c, const Mesh& triangles) {
   EXPECT_EQ(c.corners, triangles.triangles[c.triangle]);
-  EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);  // NaN is near nothing
+  EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);  // a NaN is near nothing
   EXPECT_GE(c.barycentric.minCoeff(), 0.0);
   EXPECT_EQ(c.barycentric.sum(), 1.0);
 }
@@ -124,7 +124,7 @@ inline void expectWellFormed(const EdgeEdgeContact& c) {
   for (const double weight : {c.weightA, c.weightB}) EXPECT_TRUE(weight >= 0 && weight <= 1);
 }
 
-/// Sorted, nothing twice, unit normals, weights that are weights, times within the step.
+/// Expects sorted rows without duplicates, unit normals, valid weights, and times within the step.
 inline void expectWellFormed(const CollisionData& data, const Mesh& a, const Mesh& b,
                              const PairSettings& settings) {
   const Rows rows(data);
@@ -160,14 +160,14 @@ inline void expectWellFormed(const CollisionData& data, const Mesh& a, const Mes
   }
 }
 
-/// One way to ask about a pair.
+/// Named settings of one pair.
 struct MethodCase {
   std::string name;
   PairSettings settings;
   friend void PrintTo(const MethodCase& method, std::ostream* out) { *out << method.name; }
 };
 
-/// Every method and every choice of contacts; `thickness` where the method has one.
+/// Every method and every choice of contacts. The thickness applies where the method has one.
 inline std::vector<MethodCase> methodCases(double thickness) {
   return {{"ProximityDistinct", {Method::Proximity, thickness, Contacts::Distinct}},
           {"ProximityAll", {Method::Proximity, thickness, Contacts::All}},

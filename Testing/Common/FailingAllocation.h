@@ -14,13 +14,14 @@ class FailingAllocation {
  public:
   enum class Failures {
     One,  ///< only the n-th allocation fails
-    All   ///< it and all after it fail
+    All   ///< the n-th allocation and all later ones fail
   };
 
-  /// The n-th allocation from now on fails, n from 1. n = 0: none does; they are only counted.
+  /// The n-th allocation from now on fails, counted from 1. With n = 0 none fails; they are only
+  /// counted.
   static void arm(std::size_t n, Failures failures = Failures::One);
   static void disarm();
-  /// Allocations between the last arm() and the disarm() after it, or now; failed ones count.
+  /// Allocations between the last arm() and the disarm() after it, or until now. Failed ones count.
   static std::size_t count();
   /// Whether an allocation failed since the last arm().
   static bool failed();

@@ -11,7 +11,7 @@ namespace palpate::testing {
 namespace {
 
 constexpr std::size_t kMostBodies = 6, kMostPairs = 6;
-constexpr int kTypes = 8;  ///< see randomThing() and add()
+constexpr int kTypes = 8;  ///< see randomGeometry() and add()
 
 Settings settingsOfLife(Random& random) {
   Settings settings = settingsOf(Engine::Octree, random() % 4 == 0 ? 2 : 1,
@@ -25,7 +25,7 @@ std::uint32_t hashOf(const ContactFeatures& features) {
          static_cast<std::uint32_t>(features.kind);
 }
 
-/// Words of what a query found, or why it was refused.
+/// The results of a query as words, or the error that it threw.
 template <class F>
 std::vector<std::uint64_t> wordsOf(F&& query) {
   std::vector<std::uint64_t> words;
@@ -49,13 +49,15 @@ void append(std::vector<std::uint64_t>& words, const InsideVertex& v) {
 
 std::size_t RandomHistory::Body::elements() const {
   if (shape) return 0;
-  return thing.type == GeometryType::Points  ? thing.positions.size()
-         : thing.type == GeometryType::Lines ? thing.segments.size()
-                                             : thing.triangles.size();
+  return geometry.type == GeometryType::Points  ? geometry.positions.size()
+         : geometry.type == GeometryType::Lines ? geometry.segments.size()
+                                                : geometry.triangles.size();
 }
 
 RandomHistory::RandomHistory(std::uint64_t seed)
-    : m_random(seed), m_life(settingsOfLife(m_random)), m_committed(settingsOf(Engine::Octree)) {}
+    : m_random(seed),
+      m_collisions(settingsOfLife(m_random)),
+      m_committed(settingsOf(Engine::Octree)) {}
 
 template <class F>
 bool RandomHistory::accepts(F&& call) {
@@ -87,21 +89,22 @@ Positions RandomHistory::randomMotion(const Positions& from) {
   return to;
 }
 
-Thing RandomHistory::randomThing(int type) {
+TestGeometry RandomHistory::randomGeometry(int type) {
   switch (type) {
     case 0:
     case 1:
-      return things(soup(m_random, m_random() % 12, uniform(m_random, 0.05, 0.4)));
+      return testGeometry(soup(m_random, m_random() % 12, uniform(m_random, 0.05, 0.4)));
     case 2:
-      return things(sphere(3, 4, randomPoint(m_random, 0.3, 0.7), uniform(m_random, 0.1, 0.5)));
+      return testGeometry(
+          sphere(3, 4, randomPoint(m_random, 0.3, 0.7), uniform(m_random, 0.1, 0.5)));
     case 3:
-      return things(sheet(2, uniform(m_random, 0.3, 0.7), 0));
+      return testGeometry(sheet(2, uniform(m_random, 0.3, 0.7), 0));
     case 4: {
-      const Thing line = thread(m_random, 2 + m_random() % 8, 0.3, 0.02, m_random() % 2);
+      const TestGeometry line = thread(m_random, 2 + m_random() % 8, 0.3, 0.02, m_random() % 2);
       return m_random() % 3 ? line : tapered(m_random, line, 0.05);
     }
     default: {
-      const Thing points = particles(m_random, 1 + m_random() % 12, 0.05);
+      const TestGeometry points = particles(m_random, 1 + m_random() % 12, 0.05);
       return m_random() % 3 ? points : tapered(m_random, points, 0.1);
     }
   }
@@ -118,8 +121,8 @@ Solid RandomHistory::randomSolid() {
 GeometryId RandomHistory::addTo(OctreeBasedCD& collisions, const Body& body) {
   if (body.shape) return collisions.addAnalyticalGeometry(*body.shape);
   if (!body.tetrahedra.empty())
-    return collisions.addTetrahedralMesh(body.thing.positions, body.tetrahedra);
-  return body.thing.addTo(collisions);
+    return collisions.addTetrahedralMesh(body.geometry.positions, body.tetrahedra);
+  return body.geometry.addTo(collisions);
 }
 
 void RandomHistory::add() {
@@ -128,7 +131,7 @@ void RandomHistory::add() {
   const int type = static_cast<int>(m_random() % kTypes);
   if (type == 6) {
     const Solid solid = randomSolid();
-    body.thing.positions = solid.positions;
+    body.geometry.positions = solid.positions;
     body.tetrahedra = solid.tetrahedra;
   } else if (type == 7) {
     const std::array<AnalyticalGeometry, 5> shapes{
@@ -137,21 +140,21 @@ void RandomHistory::add() {
         ConvexHull{soup(m_random, 2, 0.3).positions}};
     body.shape = shapes[m_random() % 5];
   } else {
-    body.thing = randomThing(type);
+    body.geometry = randomGeometry(type);
   }
-  const GeometryId id = addTo(m_life, body);
+  const GeometryId id = addTo(m_collisions, body);
   ASSERT_EQ(addTo(m_committed, body), id);
   ASSERT_FALSE(m_bodies.contains(id)) << "an id was given out twice";
   if (!body.tetrahedra.empty()) {
-    const auto surface = m_life.surface(id).triangles;
-    body.thing.triangles.assign(surface.begin(), surface.end());
+    const auto surface = m_collisions.surface(id).triangles;
+    body.geometry.triangles.assign(surface.begin(), surface.end());
   }
-  body.before = body.now = body.thing.positions;
+  body.before = body.now = body.geometry.positions;
   m_bodies.emplace(id, std::move(body));
 }
 
 void RandomHistory::remove(GeometryId id) {
-  for (OctreeBasedCD* each : {&m_life, &m_committed}) each->removeGeometry(id);
+  for (OctreeBasedCD* each : {&m_collisions, &m_committed}) each->removeGeometry(id);
   m_bodies.erase(id);
   std::erase_if(m_pairs, [=](const Pair& pair) { return pair.a == id || pair.b == id; });
   if (m_tracked && (m_tracked->vertices == id || m_tracked->body == id)) m_tracked.reset();
@@ -159,13 +162,13 @@ void RandomHistory::remove(GeometryId id) {
 
 void RandomHistory::setPositions(GeometryId id) {
   Body& body = m_bodies.at(id);
-  const Positions now = randomMotion(m_random() % 4 ? body.now : body.thing.positions);
+  const Positions now = randomMotion(m_random() % 4 ? body.now : body.geometry.positions);
   if (m_random() % 4 == 0) {
     const Positions before = m_random() % 3 ? randomMotion(body.before) : body.before;
-    if (!accepts([&] { m_life.setPositions(id, before, now); })) return;
+    if (!accepts([&] { m_collisions.setPositions(id, before, now); })) return;
     body.before = before;
     body.bodyGiven = true;
-  } else if (!accepts([&] { m_life.setPositions(id, now); })) {
+  } else if (!accepts([&] { m_collisions.setPositions(id, now); })) {
     return;
   }
   body.now = now;
@@ -181,13 +184,13 @@ void RandomHistory::setTransform(GeometryId id) {
     const Eigen::Matrix3d rotationBefore = randomTurn() * body.rotationBefore;
     const Vector3d translationBefore = body.translationBefore + randomPoint(m_random, -0.1, 0.1);
     if (!accepts([&] {
-          m_life.setTransform(id, rotationBefore, translationBefore, rotation, translation);
+          m_collisions.setTransform(id, rotationBefore, translationBefore, rotation, translation);
         }))
       return;
     body.rotationBefore = rotationBefore;
     body.translationBefore = translationBefore;
     body.transformGiven = true;
-  } else if (!accepts([&] { m_life.setTransform(id, rotation, translation); })) {
+  } else if (!accepts([&] { m_collisions.setTransform(id, rotation, translation); })) {
     return;
   }
   body.rotation = rotation;
@@ -202,20 +205,21 @@ void RandomHistory::setTopology(GeometryId id) {
   Body& body = m_bodies.at(id);
   Body next = body;
   if (body.tetrahedra.empty()) {
-    next.thing = randomThing(static_cast<int>(m_random() % 4));
-    for (OctreeBasedCD* each : {&m_life, &m_committed})
-      if (!accepts([&] { each->setTriangles(id, next.thing.positions, next.thing.triangles); }))
+    next.geometry = randomGeometry(static_cast<int>(m_random() % 4));
+    for (OctreeBasedCD* each : {&m_collisions, &m_committed})
+      if (!accepts(
+              [&] { each->setTriangles(id, next.geometry.positions, next.geometry.triangles); }))
         return;
   } else {
     const Solid solid = randomSolid();
-    next.thing.positions = solid.positions;
+    next.geometry.positions = solid.positions;
     next.tetrahedra = solid.tetrahedra;
-    for (OctreeBasedCD* each : {&m_life, &m_committed})
+    for (OctreeBasedCD* each : {&m_collisions, &m_committed})
       each->setTetrahedra(id, solid.positions, solid.tetrahedra);
-    const auto surface = m_life.surface(id).triangles;
-    next.thing.triangles.assign(surface.begin(), surface.end());
+    const auto surface = m_collisions.surface(id).triangles;
+    next.geometry.triangles.assign(surface.begin(), surface.end());
   }
-  next.before = next.now = next.thing.positions;
+  next.before = next.now = next.geometry.positions;
   next.isNew = true;
   next.bodyGiven = false;
   next.disabled.clear();
@@ -231,7 +235,8 @@ void RandomHistory::setFilter(GeometryId id) {
   if (m_random() % 3 == 0) filter.groups = 1 + m_random() % 3;
   if (m_random() % 3 == 0) filter.mask = 1 + m_random() % 3;
   if (m_random() % 2) filter.sidedness = Sidedness::Outer;
-  if (accepts([&] { m_life.setCollisionFilter(id, filter); })) m_bodies.at(id).filter = filter;
+  if (accepts([&] { m_collisions.setCollisionFilter(id, filter); }))
+    m_bodies.at(id).filter = filter;
 }
 
 void RandomHistory::setDisabled(GeometryId id) {
@@ -239,7 +244,7 @@ void RandomHistory::setDisabled(GeometryId id) {
   std::vector<std::uint32_t> disabled;
   for (std::uint32_t i = 0; i < body.elements(); ++i)
     if (m_random() % 4 == 0) disabled.push_back(i);
-  for (OctreeBasedCD* each : {&m_life, &m_committed})
+  for (OctreeBasedCD* each : {&m_collisions, &m_committed})
     if (!accepts([&] { each->setDisabledElements(id, disabled); })) return;
   body.disabled = disabled;
 }
@@ -272,19 +277,20 @@ void RandomHistory::addOrChangePair() {
     return (p.a == a && p.b == b) || (p.a == b && p.b == a);
   });
   if (pair == m_pairs.end()) {
-    if (m_pairs.size() < kMostPairs && accepts([&] { m_life.addCollisionPair(a, b, settings); }))
+    if (m_pairs.size() < kMostPairs &&
+        accepts([&] { m_collisions.addCollisionPair(a, b, settings); }))
       m_pairs.push_back({a, b, settings});
     return;
   }
   const auto action = m_random() % 4;
   if (action == 0) {
-    m_life.removeCollisionPair(a, b);
+    m_collisions.removeCollisionPair(a, b);
     m_pairs.erase(pair);
   } else if (action == 1) {
     const int number = static_cast<int>(m_random() % 5);
-    if (accepts([&] { m_life.setContactPredicate(pair->a, pair->b, predicateOf(number)); }))
+    if (accepts([&] { m_collisions.setContactPredicate(pair->a, pair->b, predicateOf(number)); }))
       pair->predicate = number;
-  } else if (accepts([&] { m_life.setPairSettings(a, b, settings); })) {
+  } else if (accepts([&] { m_collisions.setPairSettings(a, b, settings); })) {
     pair->settings = settings;
   }
 }
@@ -294,28 +300,31 @@ void RandomHistory::query() {
   const GeometryId a = anyBody(), b = anyBody();
   switch (m_random() % 8) {
     case 0:
-      return m_life.update();
+      return m_collisions.update();
     case 1:
-      return m_life.collectCandidates();
+      return m_collisions.collectCandidates();
     case 2:
-      return m_life.detectCollision();
+      return m_collisions.detectCollision();
     case 3: {
       std::size_t count = 0;
-      m_life.forEachCandidate([&](const CollisionPair&, auto batch) { count += batch.size(); });
+      m_collisions.forEachCandidate(
+          [&](const CollisionPair&, auto batch) { count += batch.size(); });
       return;
     }
     case 4:
-      accepts([&] { testing::insideVertices(m_life, a, b); });
+      accepts([&] { testing::insideVertices(m_collisions, a, b); });
       return;
     case 5:
-      accepts([&] { testing::insideVertices(m_life, a, b, {.rule = InsideRule::WindingNumber}); });
+      accepts([&] {
+        testing::insideVertices(m_collisions, a, b, {.rule = InsideRule::WindingNumber});
+      });
       return;
     case 6:
-      accepts([&] { testing::embeddedVertices(m_life, a, b); });
+      accepts([&] { testing::embeddedVertices(m_collisions, a, b); });
       return;
     default:
       if (!m_tracked) m_tracked.emplace(a, b);
-      accepts([&] { m_tracked->life.update(m_life.queries()); });
+      accepts([&] { m_tracked->running.update(m_collisions.queries()); });
   }
 }
 
@@ -337,7 +346,7 @@ void RandomHistory::act() {
   setPositions(id);
 }
 
-/// Both ends of a geometry that is new in the object.
+/// Both ends of the step, for a geometry that is new in the object.
 void RandomHistory::setEnds(OctreeBasedCD& collisions, GeometryId id, const Body& body) {
   if (!body.shape) collisions.setPositions(id, body.before, body.now);
   if (body.placed)
@@ -362,7 +371,7 @@ OctreeBasedCD RandomHistory::fresh(Engine engine, std::map<GeometryId, GeometryI
   return collisions;
 }
 
-/// Of two triangle meshes, by exact arithmetic.
+/// Whether two triangle meshes intersect, by exact arithmetic.
 bool RandomHistory::startsApart(const Pair& pair) const {
   OctreeBasedCD collisions(settingsOf(Engine::BruteForce));
   const auto add = [&](GeometryId id) {
@@ -384,7 +393,7 @@ void RandomHistory::compareContacts(const OctreeBasedCD& other,
                                     const std::map<GeometryId, GeometryId>& ids,
                                     bool isBruteForce) {
   for (const Pair& pair : m_pairs) {
-    const CollisionData& found = m_life.collisionData(pair.a, pair.b);
+    const CollisionData& found = m_collisions.collisionData(pair.a, pair.b);
     const CollisionData& truth = other.collisionData(ids.at(pair.a), ids.at(pair.b));
     SCOPED_TRACE(::testing::Message() << "pair (" << static_cast<unsigned>(pair.a) << ", "
                                       << static_cast<unsigned>(pair.b) << "), method "
@@ -404,8 +413,9 @@ void RandomHistory::compareContacts(const OctreeBasedCD& other,
       EXPECT_EQ(v.arcDeviation, t.arcDeviation);
     else
       EXPECT_NEAR(v.arcDeviation, t.arcDeviation, 1e-12);
-    // A new object always knows; one with a history may not, but is never wrong.
-    if (!isBruteForce) {  // without boxes Intersection does not know what was near
+    // A new object always knows startedApart. One with a history may not know it, but is never
+    // wrong.
+    if (!isBruteForce) {  // without boxes, Intersection does not know distances
       EXPECT_LE(v.trusted, t.trusted);
     }
     if (v.startedApart && !t.startedApart) {
@@ -416,11 +426,11 @@ void RandomHistory::compareContacts(const OctreeBasedCD& other,
 
 void RandomHistory::compareCandidates(OctreeBasedCD& bruteForce,
                                       const std::map<GeometryId, GeometryId>& ids) {
-  m_life.collectCandidates();
+  m_collisions.collectCandidates();
   bruteForce.collectCandidates();
   for (const Pair& pair : m_pairs) {
     if (m_bodies.at(pair.a).shape || m_bodies.at(pair.b).shape) continue;
-    const auto found = m_life.candidatePairs(pair.a, pair.b),
+    const auto found = m_collisions.candidatePairs(pair.a, pair.b),
                truth = bruteForce.candidatePairs(ids.at(pair.a), ids.at(pair.b));
     EXPECT_TRUE(std::includes(found.begin(), found.end(), truth.begin(), truth.end()));
     EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
@@ -454,10 +464,10 @@ void RandomHistory::compareQueries(OctreeBasedCD& other,
     all.insert(all.end(), words.begin(), words.end());
     return all;
   };
-  EXPECT_EQ(ask(m_life, a, b), ask(other, ids.at(a), ids.at(b)));
+  EXPECT_EQ(ask(m_collisions, a, b), ask(other, ids.at(a), ids.at(b)));
 }
 
-/// At the end of a step.
+/// Ends the step.
 void RandomHistory::compareWhatLasts() {
   for (const auto& [id, body] : m_bodies) {
     if (!body.shape && body.bodyGiven)
@@ -470,12 +480,12 @@ void RandomHistory::compareWhatLasts() {
     else if (body.placed)
       m_committed.setTransform(id, body.rotation, body.translation);
   }
-  const CollisionProblem life = m_life.problem(), committed = m_committed.problem();
-  ASSERT_EQ(life.geometries.size(), m_bodies.size());
+  const CollisionProblem running = m_collisions.problem(), committed = m_committed.problem();
+  ASSERT_EQ(running.geometries.size(), m_bodies.size());
   ASSERT_EQ(committed.geometries.size(), m_bodies.size());
   for (std::size_t i = 0; i < m_bodies.size(); ++i) {
-    EXPECT_EQ(life.geometries[i].before, committed.geometries[i].before);
-    EXPECT_EQ(life.geometries[i].now, committed.geometries[i].now);
+    EXPECT_EQ(running.geometries[i].before, committed.geometries[i].before);
+    EXPECT_EQ(running.geometries[i].now, committed.geometries[i].now);
   }
   if (!m_tracked) return;
   const auto track = [&](PenetrationTracker& tracker, OctreeBasedCD& collisions) {
@@ -487,11 +497,11 @@ void RandomHistory::compareWhatLasts() {
       }
     });
   };
-  EXPECT_EQ(track(m_tracked->life, m_life), track(m_tracked->committed, m_committed));
+  EXPECT_EQ(track(m_tracked->running, m_collisions), track(m_tracked->committed, m_committed));
 }
 
 void RandomHistory::endStep() {
-  for (OctreeBasedCD* each : {&m_life, &m_committed}) each->advance();
+  for (OctreeBasedCD* each : {&m_collisions, &m_committed}) each->advance();
   for (auto& [id, body] : m_bodies) {
     body.before = body.now;
     body.rotationBefore = body.rotation;
@@ -503,9 +513,9 @@ void RandomHistory::endStep() {
 
 void RandomHistory::frame() {
   for (auto count = m_random() % 8; count > 0; --count) act();
-  m_life.detectCollision();
-  m_contacts += m_life.statistics().contacts;
-  EXPECT_EQ(m_life.octree().validate(), std::vector<std::string>{});
+  m_collisions.detectCollision();
+  m_contacts += m_collisions.statistics().contacts;
+  EXPECT_EQ(m_collisions.octree().validate(), std::vector<std::string>{});
   if (!m_bodies.empty()) {
     std::map<GeometryId, GeometryId> ids, bruteIds;
     OctreeBasedCD octree = fresh(Engine::Octree, ids),

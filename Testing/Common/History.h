@@ -5,7 +5,7 @@
 
 #include "Common/PairRun.h"
 #include "Common/Solids.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <Eigen/Geometry>
 
@@ -18,25 +18,25 @@
 
 namespace palpate::testing {
 
-/// A random life of an OctreeBasedCD: geometries of every type and pairs of every method come and
-/// go, move within steps and from step to step, change topology, filters, disabled elements and
-/// predicates, with queries, updates and detections in between.
+/// A random history of an OctreeBasedCD. Geometries of every type and pairs of every method are
+/// added and removed. Geometries move within steps and between steps. Topology, filters, disabled
+/// elements and predicates change, with queries, updates and detections in between.
 ///
-/// Beside it a model keeps only the last values, by the rules of the step as DESIGN states them. At
-/// the end of each frame the life must answer as a new object that is given the model, and as brute
-/// force is. What is meant to last from step to step must be as in an object that was given only
-/// the last values of each step.
+/// A model beside it keeps only the last values, by the rules of a step. After each frame the
+/// object must have the same contacts as a new object with the values of the model, and as brute
+/// force. State that lasts from step to step must be as in an object that was given only the last
+/// values of each step.
 class RandomHistory {
  public:
   explicit RandomHistory(std::uint64_t seed);
 
-  /// Some random calls, a detection, and all comparisons. Failures are GoogleTest's.
+  /// Makes some random calls and a detection, and compares everything. Failures are GoogleTest's.
   void frame();
   std::size_t contacts() const { return m_contacts; }  ///< of all frames
 
  private:
   struct Body {
-    Thing thing;                          ///< of the last topology; its positions at rest
+    TestGeometry geometry;                ///< of the last topology; its positions at rest
     std::vector<Tetrahedron> tetrahedra;  ///< of a tetrahedral mesh
     std::optional<AnalyticalGeometry> shape;
     Positions before, now;  ///< in the body's frame
@@ -46,7 +46,7 @@ class RandomHistory {
     CollisionFilter filter{};
     std::vector<std::uint32_t> disabled{};
 
-    bool isMesh() const { return !shape && thing.type == GeometryType::Triangles; }
+    bool isMesh() const { return !shape && geometry.type == GeometryType::Triangles; }
     std::size_t elements() const;
   };
   struct Pair {
@@ -55,7 +55,8 @@ class RandomHistory {
     int predicate = 0;  ///< 0: none
   };
 
-  // Random calls. Each changes the life and the model, or neither where the library refuses it.
+  // Random calls. Each changes the object and the model, or neither if the library refuses the
+  // call.
   void act();
   void add();
   void remove(GeometryId);
@@ -68,19 +69,19 @@ class RandomHistory {
   void query();
 
   GeometryId anyBody();
-  Thing randomThing(int type);
+  TestGeometry randomGeometry(int type);
   Solid randomSolid();
   PairSettings randomSettings();
   Positions randomMotion(const Positions&);
   Eigen::Matrix3d randomTurn();
   static ContactPredicate predicateOf(int number);
-  /// call() throws where it is refused; returns whether it was accepted.
+  /// call() throws if it is refused. Returns whether it was accepted.
   template <class F>
   static bool accepts(F&& call);
 
   static GeometryId addTo(OctreeBasedCD&, const Body&);
   static void setEnds(OctreeBasedCD&, GeometryId, const Body&);
-  /// A new object with the last values. ids: of the life's geometries in it.
+  /// A new object with the last values. ids: the history's geometries in it.
   OctreeBasedCD fresh(Engine, std::map<GeometryId, GeometryId>& ids) const;
   void compareContacts(const OctreeBasedCD& other, const std::map<GeometryId, GeometryId>&,
                        bool isBruteForce);
@@ -91,16 +92,16 @@ class RandomHistory {
   void endStep();
 
   Random m_random;
-  OctreeBasedCD m_life;
-  /// Given only the last values of each step.
+  OctreeBasedCD m_collisions;
+  /// An object that is given only the last values of each step.
   OctreeBasedCD m_committed;
   std::map<GeometryId, Body> m_bodies;
   std::vector<Pair> m_pairs;
   /// Vertices and body of the trackers, one for each of the two objects.
   struct Tracked {
-    Tracked(GeometryId a, GeometryId b) : vertices(a), body(b), life(a, b), committed(a, b) {}
+    Tracked(GeometryId a, GeometryId b) : vertices(a), body(b), running(a, b), committed(a, b) {}
     GeometryId vertices, body;
-    PenetrationTracker life, committed;
+    PenetrationTracker running, committed;
   };
   std::optional<Tracked> m_tracked;
   std::size_t m_contacts = 0;

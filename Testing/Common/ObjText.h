@@ -9,8 +9,8 @@
 
 namespace palpate::testing {
 
-/// Vertices and triangles of a plain OBJ file, normals and texture coordinates ignored; for tests
-/// that must do without VTK.
+/// Vertices and triangles of a plain OBJ file. Normals and texture coordinates are ignored. It
+/// serves tests that are built without VTK.
 inline Mesh readObj(const std::filesystem::path& path) {
   Mesh mesh;
   std::ifstream file(path);

@@ -20,7 +20,7 @@ inline Settings settingsOf(Engine engine, int threads = 1,
   return settings;
 }
 
-/// Octrees with 1, 2 and 8 threads, kept or always rebuilt.
+/// Octrees with 1, 2 and 8 threads, refitted or always rebuilt.
 inline std::vector<Settings> octreeSettings() {
   std::vector<Settings> all;
   for (const OctreeUpdate update : {OctreeUpdate::Auto, OctreeUpdate::Rebuild})
@@ -73,7 +73,7 @@ class PairRun {
   GeometryId a() const { return m_a; }
   GeometryId b() const { return m_b; }
 
-  /// Of (a, b), then of each mesh with itself.
+  /// Contacts of (a, b), then of each mesh with itself.
   std::vector<Rows> answers() const {
     std::vector<Rows> rows;
     for (const CollisionPair& pair : m_detection.pairs())

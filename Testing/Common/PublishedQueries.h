@@ -12,7 +12,7 @@
 
 namespace palpate::testing {
 
-/// A continuous query with exact truth: (v, a, b, c) or (p0, p1, q0, q1), before and then now.
+/// A continuous query with its exact result: (v, a, b, c) or (p0, p1, q0, q1), before and then now.
 struct PublishedQuery {
   std::array<Eigen::Vector3d, 8> positions;
   bool impact = false;
@@ -23,8 +23,8 @@ struct PublishedQueries {
   std::vector<PublishedQuery> queries;
 };
 
-/// Eight rows a query; a row has three fractions, as numerator and denominator, and the truth. The
-/// fractions are doubles exactly, and so are their parts.
+/// Eight rows per query. A row has three fractions, as numerator and denominator, and the label.
+/// The fractions and their parts are exact in double.
 inline std::vector<PublishedQuery> readQueries(const std::filesystem::path& file) {
   std::vector<PublishedQuery> queries;
   std::ifstream stream(file);
@@ -43,7 +43,7 @@ inline std::vector<PublishedQuery> readQueries(const std::filesystem::path& file
   return queries;
 }
 
-/// All files of sharedData/ccd-queries, by name; none where the folder is absent.
+/// All files of sharedData/ccd-queries, by name. Empty if the folder is absent.
 inline std::vector<PublishedQueries> publishedQueries(const std::filesystem::path& sharedData) {
   const std::filesystem::path folder = sharedData / "ccd-queries";
   std::vector<PublishedQueries> sets;

@@ -39,7 +39,7 @@ inline Mesh soup(Random& random, std::size_t triangles, double size) {
   return mesh;
 }
 
-/// An n by n sheet of quads over the unit square, waving in z about `height`.
+/// An n by n sheet of quads over the unit square, with waves of about `height` in z.
 inline Mesh sheet(std::uint32_t n, double height, double phase) {
   Mesh mesh;
   for (std::uint32_t j = 0; j <= n; ++j)

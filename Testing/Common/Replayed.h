@@ -10,8 +10,8 @@
 
 namespace palpate::testing {
 
-/// The last frame's problem written to a file, read back, and computed again: by what is in the
-/// file, every pair's answer is the same.
+/// Writes the last frame's problem to a file, reads it back and computes it again. Every pair has
+/// the same contacts.
 inline OctreeBasedCD replayed(const OctreeBasedCD& detection) {
   const auto path = std::filesystem::temp_directory_path() /
                     ("palpate-replayed-" + std::to_string(::getpid()) + ".capture");

@@ -2,8 +2,8 @@
 
 namespace palpate::testing {
 
-/// Sanitizers make tests ten times slower. A test that compares many random cases may take a part
-/// of them in such a build; the ordinary builds take all.
+/// Sanitizers make tests ten times slower. In such a build, a test with many random cases may run a
+/// part of them. The ordinary builds run all.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 inline constexpr int kShareOfCases = 5;
 #else

@@ -11,7 +11,7 @@
 #include <limits>
 #include <vector>
 
-/// Analytical shapes by what they are: how far they reach along a direction.
+/// Analytical shapes by their definition: their extent along a direction.
 namespace palpate::testing {
 
 using Eigen::Matrix3d;
@@ -30,7 +30,8 @@ inline Matrix3d randomTurn(Random& random) {
       .toRotationMatrix();
 }
 
-/// The corners of a body that is their hull and a ball of `radius` around it; none of others.
+/// For a body that is the hull of corners with a ball of `radius` around it: its corners. For
+/// others: none.
 inline std::vector<Vector3d> cornersOf(const PlacedShape& shape, double& radius) {
   std::vector<Vector3d> corners;
   radius = 0;
@@ -52,7 +53,7 @@ inline std::vector<Vector3d> cornersOf(const PlacedShape& shape, double& radius)
   return corners;
 }
 
-/// The largest m . x in the shape; infinity where there is none. m: unit.
+/// The largest m . x in the shape, or infinity if there is none. m: unit vector.
 inline double reachOf(const PlacedShape& shape, const Vector3d& m) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   double radius = 0, most = -kInfinity;
@@ -70,12 +71,12 @@ inline double reachOf(const PlacedShape& shape, const Vector3d& m) {
   return along ? u.dot(plane.point) + m.dot(shape.translation) : kInfinity;
 }
 
-/// How far the shapes are apart along m, from b towards a.
+/// The gap of the shapes along m, from b towards a.
 inline double apartAlong(const PlacedShape& a, const PlacedShape& b, const Vector3d& m) {
   return -reachOf(a, -m) - reachOf(b, m);
 }
 
-/// Directions among which are all in which two hulls of corners can first come apart.
+/// Directions that include all in which two hulls of corners can first separate.
 inline std::vector<Vector3d> facetDirections(const PlacedShape& a, const PlacedShape& b) {
   std::vector<Vector3d> edges, directions;
   double radius = 0;

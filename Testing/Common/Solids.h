@@ -16,8 +16,8 @@ struct Solid {
   std::vector<Tetrahedron> tetrahedra;
 };
 
-/// The unit cells of [0, n]³ for which `filled` holds, each in six tetrahedra about a diagonal,
-/// corners on integers; the tetrahedra in any order, and their corners.
+/// The unit cells of [0, n]³ for which `filled` holds, each as six tetrahedra around a diagonal.
+/// Corners have integer coordinates. The order of the tetrahedra and of their corners is random.
 template <class Filled>
 Solid cells(int n, Random& random, Filled&& filled) {
   Solid solid;

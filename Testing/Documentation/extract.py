@@ -4,6 +4,7 @@
 C++     all cpp blocks of a page form the body of one function. An HTML comment on the line before a block changes that:
         <!-- program -->            the block starts a new program
         <!-- file scope -->         the block stands outside the function
+        <!-- not run: ... -->       the block starts a new program, which is compiled only
         <!-- not compiled: ... -->  code of another library, or calls that no longer exist
         A block with `int main(` is a program alone. Hidden code is a comment that starts with a line `<!-- hidden` or
         `<!-- hidden, file scope` and ends with a line `-->`.
@@ -17,7 +18,7 @@ import re
 import subprocess
 import sys
 
-COMMENT = re.compile(r"\s*<!--\s*(program|file scope|output|not compiled: .+?)\s*-->\s*$")
+COMMENT = re.compile(r"\s*<!--\s*(program|file scope|output|(?:not compiled|not run): .+?)\s*-->\s*$")
 HIDDEN = re.compile(r"\s*<!--\s*hidden(, file scope)?\s*$")
 FENCE = re.compile(r"(\s*)```+\s*([A-Za-z{:}]*)")
 SHOWN_ONLY = {"", "text", "json", "bibtex"}
@@ -27,6 +28,7 @@ class Program:
     def __init__(self, page, number):
         self.name = re.sub(r"\W", "_", str(page.with_suffix(""))) + f"_{number}"
         self.head, self.body, self.whole, self.output = [], [], None, None
+        self.runs = True
 
     def add(self, code, where, file_scope):
         if "int main(" in code:
@@ -98,10 +100,11 @@ def main():
             if any(mark.startswith("not compiled") for mark in marks) or language.startswith("{"):
                 continue
             if language == "cpp":
-                alone = "int main(" in code
-                if program is None or "program" in marks or alone or program.whole is not None:
+                alone, runs = "int main(" in code, not any(mark.startswith("not run") for mark in marks)
+                if program is None or "program" in marks or alone or not runs or program.whole is not None:
                     number += 1
                     program = Program(page, number)
+                    program.runs = runs
                     programs.append(program)
                 program.add(code, (page, line), "file scope" in marks)
             elif language == "text" and "output" in marks:
@@ -133,8 +136,10 @@ def main():
         (folder / "CMakeLists.txt").write_text(head + code)
         for source in {"main.cpp", *re.findall(r"\b\w+\.cpp\b", code)}:
             (folder / source).write_text("#include <palpate/Palpate.h>\nint main() { palpate::OctreeBasedCD collisions; }\n")
-    (out / "names.cmake").write_text("set(programs " + " ".join(program.name for program in programs) + ")\n"
-                                     + "set(projects " + " ".join(name for name, _ in projects) + ")\n")
+    names = {"programs": [program.name for program in programs],
+             "notRun": [program.name for program in programs if not program.runs],
+             "projects": [name for name, _ in projects]}
+    (out / "names.cmake").write_text("".join(f"set({key} {' '.join(value)})\n" for key, value in names.items()))
     print(f"{len(programs)} programs, {len(projects)} CMake projects")
 
 

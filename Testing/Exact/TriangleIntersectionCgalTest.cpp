@@ -16,8 +16,7 @@ namespace {
 using Kernel = CGAL::Exact_predicates_exact_constructions_kernel;
 using Shape = std::variant<Kernel::Triangle_3, Kernel::Segment_3, Kernel::Point_3>;
 
-/// CGAL's triangles must have area: others are handed over as the segment or the point that they
-/// cover.
+/// CGAL's triangles must have area. Others are passed as the segment or the point that they cover.
 Shape shapeOf(const Corners& corners) {
   std::array<Kernel::Point_3, 3> p;
   for (int i = 0; i < 3; ++i) p[i] = {corners[i][0], corners[i][1], corners[i][2]};
@@ -54,7 +53,7 @@ TEST(TriangleIntersectionCgal, EveryDecisionAgrees) {
     ASSERT_EQ(ours, cgalIntersect(a, b)) << "pair " << i << " of kind " << i % kinds;
     intersecting[i % kinds] += ours;
   }
-  // Both answers occur often in every kind, or the comparison says little.
+  // Both results occur often in every category, so that the comparison is meaningful.
   for (int kind = 0; kind < kinds; ++kind) {
     EXPECT_GT(intersecting[kind], pairsToTest() / kinds / 100) << kind;
     const bool always = kind == static_cast<int>(Kind::SharedVertex) ||

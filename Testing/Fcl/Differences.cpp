@@ -10,26 +10,26 @@ namespace palpate::testing {
 
 namespace {
 
-AnalyticalGeometry shapeOf(Random& random, const std::string& kind, double size, bool aligned) {
+AnalyticalGeometry shapeOf(Random& random, const std::string& type, double size, bool aligned) {
   const auto length = [&] {
     const double any = uniform(random, 0.1, 0.5);
     return size * (aligned ? std::ceil(4 * any) / 4 : any);
   };
   const Vector3d zero = Vector3d::Zero();
-  if (kind == "sphere") return Sphere{zero, length()};
-  if (kind == "capsule") {
+  if (type == "sphere") return Sphere{zero, length()};
+  if (type == "capsule") {
     const double half = length();
     return Capsule{{0, 0, -half}, {0, 0, half}, length()};
   }
-  if (kind == "cylinder") {
+  if (type == "cylinder") {
     const double half = length();
     return Cylinder{{0, 0, -half}, {0, 0, half}, length()};
   }
-  if (kind == "box") {
+  if (type == "box") {
     const double x = length(), y = length();
     return Box{zero, {x, y, length()}};
   }
-  if (kind == "hull") {
+  if (type == "hull") {
     ConvexHull hull;
     for (int i = 0; i < 8; ++i) {
       Vector3d p = randomPoint(random, -0.5, 0.5);
@@ -39,10 +39,10 @@ AnalyticalGeometry shapeOf(Random& random, const std::string& kind, double size,
     return hull;
   }
   return Plane{zero, aligned ? Vector3d::UnitZ().eval() : randomPoint(random, -1, 1),
-               kind == "two-sided plane"};
+               type == "two-sided plane"};
 }
 
-/// In FCL, as FclEngine says.
+/// The shape in FCL, as FclEngine makes it.
 bool hasDistance(const std::string& a, const std::string& b) {
   if (a != "sphere" && b == "sphere") return hasDistance(b, a);
   if (a == "capsule") return b == "capsule";
@@ -74,10 +74,10 @@ Vector3d refined(const PlacedShape& a, const PlacedShape& b, Vector3d best) {
 
 }  // namespace
 
-const std::vector<std::string>& shapeKinds() {
-  static const std::vector<std::string> kinds{"sphere", "capsule",        "box", "cylinder", "hull",
+const std::vector<std::string>& shapeTypes() {
+  static const std::vector<std::string> types{"sphere", "capsule",        "box", "cylinder", "hull",
                                               "plane",  "two-sided plane"};
-  return kinds;
+  return types;
 }
 
 double searchedDistance(const PlacedShape& a, const PlacedShape& b,
@@ -111,7 +111,7 @@ double searchedDistance(const PlacedShape& a, const PlacedShape& b,
 
 namespace {
 
-/// A shape as libccd asks for it. About its frame's origin.
+/// A shape as libccd needs it, around the origin of its frame.
 void support(const void* shape, const ccd_vec3_t* direction, ccd_vec3_t* result) {
   const auto& placed = *static_cast<const PlacedShape*>(shape);
   const Vector3d along = Eigen::Map<const Vector3d>(direction->v).stableNormalized();
@@ -156,23 +156,23 @@ void compareLibccd(const PlacedShape& a, const PlacedShape& b, double size, doub
     wrong += error > kTolerance;
     worst = std::max(worst, error);
   };
-  count(ccdGJKPenetration, tally.epaMissed, tally.epaWrong, tally.worstEpa);
-  count(ccdMPRPenetration, tally.mprMissed, tally.mprWrong, tally.worstMpr);
+  count(ccdGJKPenetration, tally.epaWrongOverlap, tally.epaWrong, tally.worstEpa);
+  count(ccdMPRPenetration, tally.mprWrongOverlap, tally.mprWrong, tally.worstMpr);
 }
 
 }  // namespace
 
-Tally compare(const std::string& kindA, const std::string& kindB, Layout layout,
+Tally compare(const std::string& typeA, const std::string& typeB, Layout layout,
               int configurations) {
   const double size = layout == Layout::Small ? 1e-3 : 1, tolerance = kTolerance * size;
   const bool aligned = layout == Layout::Grid;
   Random random(7);
   Tally tally;
   while (tally.configurations < configurations) {
-    const AnalyticalGeometry shapeA = shapeOf(random, kindA, size, aligned),
-                             shapeB = shapeOf(random, kindB, size, aligned);
+    const AnalyticalGeometry shapeA = shapeOf(random, typeA, size, aligned),
+                             shapeB = shapeOf(random, typeB, size, aligned);
     ShapePair<OctreeBasedCD> palpate(shapeA, shapeB, 100 * size);
-    const double thickness = hasDistance(kindA, kindB) ? 100 * size : 0;
+    const double thickness = hasDistance(typeA, typeB) ? 100 * size : 0;
     ShapePair<FclEngine> fcl(shapeA, shapeB, thickness), exchanged(shapeB, shapeA, thickness);
     for (int i = 0; i < 20 && tally.configurations < configurations; ++i) {
       const PlacedShape a = placed(random, shapeA, size, aligned),

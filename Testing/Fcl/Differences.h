@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-/// FCL beside Palpate on the same shapes, and who is right where they differ.
+/// Compares FCL with Palpate on the same shapes, and decides which is right where they differ.
 namespace palpate::testing {
 
-/// Two shapes in one engine, moved from question to question.
+/// Two shapes in one engine, moved for each query.
 template <class Engine>
 class ShapePair {
  public:
@@ -34,31 +34,32 @@ class ShapePair {
   GeometryId m_a, m_b;
 };
 
-/// The signed distance as what it is: the most that any direction parts them. Searched over a
-/// thousand directions, those of all facets and edges of cornered bodies, and `hints`, the best of
-/// which are refined.
+/// The signed distance by its definition: the largest gap along any direction. The search covers a
+/// thousand directions, those of all facets and edges of polyhedra, and `hints`. It refines the
+/// best ones.
 double searchedDistance(const PlacedShape& a, const PlacedShape& b,
                         const std::vector<Vector3d>& hints);
 
-/// How random shapes lie: at random; along the axes, on a grid; at random, a thousandth as large.
+/// Layouts of random shapes: at random; along the axes, on a grid; at random and a thousandth as
+/// large.
 enum class Layout { Any, Grid, Small };
 
-/// What may be done wrong in how many configurations of a pair of kinds. Lengths are over the size
-/// of the shapes.
+/// Counts of wrong results over the configurations of one pair of shape types. Lengths are relative
+/// to the size of the shapes.
 struct Tally {
   int configurations = 0, overlaps = 0;
-  int differ = 0;                      ///< FCL's distance from Palpate's, by more than kTolerance
-  int fclWrong = 0, palpateWrong = 0;  ///< of those, by the search
-  int exchanged = 0;                   ///< FCL's distance of the exchanged pair is another
-  /// libccd is wrong on whether they overlap by more than kTolerance; and on how deep.
-  int epaMissed = 0, mprMissed = 0, epaWrong = 0, mprWrong = 0;
+  int differ = 0;  ///< FCL's and Palpate's distances differ by more than kTolerance
+  int fclWrong = 0, palpateWrong = 0;  ///< of those, wrong by the search
+  int exchanged = 0;                   ///< FCL's distance of the exchanged pair differs
+  /// libccd is wrong on overlaps deeper than kTolerance, and on the depth.
+  int epaWrongOverlap = 0, mprWrongOverlap = 0, epaWrong = 0, mprWrong = 0;
   double worstFcl = 0, worstPalpate = 0, worstEpa = 0, worstMpr = 0;
 };
 constexpr double kTolerance = 1e-5;
 
-Tally compare(const std::string& kindA, const std::string& kindB, Layout, int configurations);
+Tally compare(const std::string& typeA, const std::string& typeB, Layout, int configurations);
 
-/// The kinds that it knows.
-const std::vector<std::string>& shapeKinds();
+/// The shape types that compare() knows.
+const std::vector<std::string>& shapeTypes();
 
 }  // namespace palpate::testing

@@ -9,8 +9,9 @@
 #include <cstdlib>
 #include <iterator>
 
-// Random configurations of every pair that FCL and libccd know, in both engines. Where they differ,
-// triangles are decided by CGAL in rational arithmetic, and shapes by a search over directions.
+// Random configurations of every pair that FCL and libccd support, in both engines. Where they
+// differ, CGAL decides triangles in rational arithmetic, and a search over directions decides
+// shapes.
 
 namespace palpate::testing {
 namespace {
@@ -32,7 +33,8 @@ bool intersectExactly(const Mesh& a, std::uint32_t i, const Mesh& b, std::uint32
 }
 
 struct TriangleTally {
-  std::size_t pairs = 0, intersecting = 0, fclMissed = 0, fclInvented = 0, palpateWrong = 0;
+  std::size_t pairs = 0, intersecting = 0, fclFalseNegatives = 0, fclFalsePositives = 0,
+              palpateWrong = 0;
 };
 
 template <class Engine>
@@ -46,8 +48,8 @@ std::vector<ElementPair> intersecting(const Mesh& a, const Mesh& b) {
   return {pairs.begin(), pairs.end()};
 }
 
-/// Soups at random; on a grid, where much of what meets touches or lies in one plane; and such a
-/// grid turned, where rounding has it touch or not.
+/// Soups at random; on a grid, where much touches or lies in one plane; and a rotated grid, where
+/// rounding decides what touches.
 enum class Soups { Any, Grid, TurnedGrid };
 
 TriangleTally compareTriangles(Soups soups, int runs) {
@@ -78,26 +80,29 @@ TriangleTally compareTriangles(Soups soups, int runs) {
       const bool truth = intersectExactly(a, pair.a, b, pair.b);
       const bool weSay = std::binary_search(ours.begin(), ours.end(), pair);
       if (weSay != truth) ++tally.palpateWrong;
-      if (weSay == truth) ++(truth ? tally.fclMissed : tally.fclInvented);
+      if (weSay == truth) ++(truth ? tally.fclFalseNegatives : tally.fclFalsePositives);
     }
   }
   return tally;
 }
 
 TEST(FclDifferences, Triangles) {
-  std::printf("| triangles | pairs | intersecting | FCL missed | FCL invented | Palpate wrong |\n");
+  std::printf(
+      "| triangles | pairs | intersecting | FCL false negatives | FCL false positives | Palpate "
+      "wrong |\n");
   const std::pair<const char*, Soups> all[] = {
       {"at random", Soups::Any}, {"on a grid", Soups::Grid}, {"turned grid", Soups::TurnedGrid}};
   for (const auto& [name, soups] : all) {
     const TriangleTally tally = compareTriangles(soups, configurations());
     std::printf("| %s | %zu | %zu | %zu | %zu | %zu |\n", name, tally.pairs, tally.intersecting,
-                tally.fclMissed, tally.fclInvented, tally.palpateWrong);
+                tally.fclFalseNegatives, tally.fclFalsePositives, tally.palpateWrong);
     EXPECT_EQ(tally.palpateWrong, 0u);
     EXPECT_GT(tally.intersecting, tally.pairs / 1000);
   }
 }
 
-/// Of overlapping cylinders, as Docs/Shapes.md says: a thousandth of the largest difference.
+/// The tolerance. For overlapping cylinders Docs/Shapes.md states a thousandth of the largest
+/// difference.
 double mostOf(const std::string& a, const std::string& b) {
   return a == "cylinder" || b == "cylinder" ? 3e-3 : kTolerance;
 }
@@ -105,33 +110,33 @@ double mostOf(const std::string& a, const std::string& b) {
 void compareShapes(const char* name, Layout layout) {
   std::printf(
       "| %s | overlap | differ | FCL wrong | worst | Palpate wrong | worst | exchanged | "
-      "EPA missed | EPA wrong | worst | MPR missed | MPR wrong | worst |\n",
+      "EPA overlap wrong | EPA wrong | worst | MPR overlap wrong | MPR wrong | worst |\n",
       name);
-  const std::vector<std::string>& kinds = shapeKinds();
+  const std::vector<std::string>& types = shapeTypes();
   for (std::size_t i = 0; i < 5; ++i)
-    for (std::size_t j = i; j < kinds.size(); ++j) {
-      if (kinds[i] == "hull" && kinds[j] == "two-sided plane") continue;  // FCL has none
-      const Tally t = compare(kinds[i], kinds[j], layout, configurations());
+    for (std::size_t j = i; j < types.size(); ++j) {
+      if (types[i] == "hull" && types[j] == "two-sided plane") continue;  // FCL has none
+      const Tally t = compare(types[i], types[j], layout, configurations());
       std::printf(
           "| %s, %s | %d | %d | %d | %.1g | %d | %.1g | %d | %d | %d | %.1g | %d | %d | %.1g |\n",
-          kinds[i].c_str(), kinds[j].c_str(), t.overlaps, t.differ, t.fclWrong, t.worstFcl,
-          t.palpateWrong, t.worstPalpate, t.exchanged, t.epaMissed, t.epaWrong, t.worstEpa,
-          t.mprMissed, t.mprWrong, t.worstMpr);
-      SCOPED_TRACE(kinds[i] + ", " + kinds[j]);
-      EXPECT_LE(t.worstPalpate, mostOf(kinds[i], kinds[j]));
-      EXPECT_LE(t.mprMissed, t.configurations / 200);
+          types[i].c_str(), types[j].c_str(), t.overlaps, t.differ, t.fclWrong, t.worstFcl,
+          t.palpateWrong, t.worstPalpate, t.exchanged, t.epaWrongOverlap, t.epaWrong, t.worstEpa,
+          t.mprWrongOverlap, t.mprWrong, t.worstMpr);
+      SCOPED_TRACE(types[i] + ", " + types[j]);
+      EXPECT_LE(t.worstPalpate, mostOf(types[i], types[j]));
+      EXPECT_LE(t.mprWrongOverlap, t.configurations / 200);
       if (layout != Layout::Small) {
-        EXPECT_LE(t.epaMissed, t.configurations / 200);
+        EXPECT_LE(t.epaWrongOverlap, t.configurations / 200);
       } else if (j < 5) {
-        EXPECT_GT(t.epaMissed, t.overlaps * 9 / 10) << "libccd has learnt of small things";
+        EXPECT_GT(t.epaWrongOverlap, t.overlaps * 9 / 10) << "libccd now handles small bodies";
       }
       EXPECT_GT(t.overlaps, t.configurations / 10);
     }
 }
 
-TEST(FclDifferences, ShapesAtRandom) { compareShapes("at random", Layout::Any); }
+TEST(FclDifferences, RandomShapes) { compareShapes("at random", Layout::Any); }
 TEST(FclDifferences, ShapesOnAGrid) { compareShapes("on a grid", Layout::Grid); }
-TEST(FclDifferences, ShapesAThousandthAsLarge) { compareShapes("of 1e-3", Layout::Small); }
+TEST(FclDifferences, ShapesScaledByAThousandth) { compareShapes("of 1e-3", Layout::Small); }
 
 }  // namespace
 }  // namespace palpate::testing

@@ -39,14 +39,14 @@ class Both {
   FclEngine fcl;
 };
 
-TEST(FclEngine, MeshesIntersectAsInOctreeBasedCD) {
+TEST(FclEngine, MeshIntersectionsMatchOctreeBasedCD) {
   Random random(1);
   Both both;
   Mesh sheets[] = {sheet(12, 0.5, 0), soup(random, 60, 0.2)};
   const GeometryId a = both.add(sheets[0]), b = both.add(sheets[1]);
   both.each([&](auto& engine) { engine.addCollisionPair(a, b, {Method::Intersection}); });
   std::size_t found = both.expectSame(a, b);
-  for (int frame = 0; frame < 10; ++frame) {  // far, so that boxes must follow
+  for (int frame = 0; frame < 10; ++frame) {  // far, so that the boxes must follow
     for (Vector3d& p : sheets[0].positions) p += Vector3d(0.02, 0, 0.03 * (frame % 3));
     both.each([&](auto& engine) { engine.setPositions(a, sheets[0].positions); });
     found += both.expectSame(a, b);
@@ -63,7 +63,7 @@ TEST(FclEngine, MeshesIntersectAsInOctreeBasedCD) {
   EXPECT_GT(found, 300u);
 }
 
-TEST(FclEngine, MeshesWithoutTrianglesHaveNone) {
+TEST(FclEngine, MeshesWithoutTrianglesHaveNoContacts) {
   FclEngine engine;
   const std::vector<Vector3d> positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const GeometryId a = engine.addTriangleMesh(positions, {}),
@@ -78,7 +78,7 @@ TEST(FclEngine, MeshesWithoutTrianglesHaveNone) {
   EXPECT_FALSE(engine.collisionData(a, b).validity().trusted);
 }
 
-TEST(FclEngine, ShapesByHand) {
+TEST(FclEngine, ShapesMatchHandComputedValues) {
   const auto only = [](const AnalyticalGeometry& a, const AnalyticalGeometry& b, double thickness) {
     FclEngine engine;
     const GeometryId first = engine.addAnalyticalGeometry(a),
@@ -110,7 +110,7 @@ TEST(FclEngine, ShapesByHand) {
   EXPECT_TRUE(only(ball, Plane{}, 0).empty());
 }
 
-TEST(FclEngine, WhatFclCannotIsRefusedByName) {
+TEST(FclEngine, UnsupportedPairsThrowErrorsThatNameThem) {
   FclEngine engine;
   const std::vector<Vector3d> positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const std::vector<Triangle> triangles{{0, 1, 2}};
@@ -131,20 +131,22 @@ TEST(FclEngine, WhatFclCannotIsRefusedByName) {
     }
   };
   for (const Method method : {Method::Auto, Method::Proximity, Method::Continuous})
-    refuse(mesh, other, {method, 0.1}, "pair (0, 1): FCL answers triangle meshes by Method::Inter");
-  refuse(mesh, mesh, {Method::Intersection}, "pair (0, 0): FCL does not find what a mesh does to");
-  refuse(box, mesh, {Method::Proximity, 0.1}, "pair (2, 0): FCL is asked for two triangle meshes");
-  refuse(hull, twoSided, {Method::Proximity}, "pair (3, 5): FCL does not know a hull with a plane");
-  refuse(twoSided, hull, {Method::Proximity}, "pair (5, 3): FCL does not know a hull with a plane");
+    refuse(mesh, other, {method, 0.1},
+           "pair (0, 1): FCL supports triangle meshes by Method::Inter");
+  refuse(mesh, mesh, {Method::Intersection},
+         "pair (0, 0): FCL does not support a geometry with itself");
+  refuse(box, mesh, {Method::Proximity, 0.1}, "pair (2, 0): FCL supports two triangle meshes");
+  refuse(hull, twoSided, {Method::Proximity}, "pair (3, 5): FCL does not support a hull with");
+  refuse(twoSided, hull, {Method::Proximity}, "pair (5, 3): FCL does not support a hull with");
   refuse(box, plane, {Method::Proximity, 0.1}, "the thickness must be 0");
   refuse(box, hull, {Method::Proximity, 0.1}, "the thickness must be 0");
-  refuse(plane, twoSided, {Method::Proximity}, "two planes have no distance");
+  refuse(plane, twoSided, {Method::Proximity}, "a pair of two planes is not supported");
   for (const Method method : {Method::Auto, Method::Intersection, Method::Continuous})
-    refuse(box, hull, {method}, "pair (2, 3): FCL answers shapes by Method::Proximity only");
+    refuse(box, hull, {method}, "pair (2, 3): FCL supports shapes by Method::Proximity only");
   EXPECT_TRUE(engine.pairs().empty());
 }
 
-TEST(FclEngine, BadInputIsRefusedAsByOctreeBasedCD) {
+TEST(FclEngine, BadInputThrowsTheErrorsOfOctreeBasedCD) {
   FclEngine engine;
   const auto refusal = [](auto&& call) {
     try {

@@ -22,8 +22,8 @@
 #include <set>
 #include <utility>
 
-// What users of FCL have reported, each in a small case on FCL 0.7's own functions: confirmed or
-// refuted. Docs/Fcl.md tells of them.
+// Faults that users of FCL have reported, each as a small case on FCL 0.7's own functions:
+// confirmed or refuted. Docs/Fcl.md describes them.
 
 namespace palpate::testing {
 namespace {
@@ -55,7 +55,7 @@ fcl::Transform3d placeOf(Random& random) {
   return place;
 }
 
-// Confirmed, of meshes: their surfaces do not cross, and FCL has no inside.
+// Confirmed for meshes: their surfaces do not cross, and FCL has no inside.
 TEST(FclFaults, ContainedMeshesGiveNoContact) {
   const Mesh outer = sphere(12, 16, {0, 0, 0}, 1), inner = sphere(12, 16, {0.1, 0, 0}, 0.2);
   EXPECT_EQ(collide(*modelOf(outer), kHere, *modelOf(inner), kHere).numContacts(), 0u);
@@ -69,8 +69,8 @@ TEST(FclFaults, ContainedMeshesGiveNoContact) {
   EXPECT_EQ(testing::insideVertices(collisions, b, a).size(), inner.positions.size());
 }
 
-// Confirmed: contacts of neighbours at one place; and of triangles in one plane several for a pair.
-TEST(FclFaults, ContactsComeSeveralTimes) {
+// Confirmed: neighbours give contacts at one place, and coplanar triangles several for a pair.
+TEST(FclFaults, ContactsAreReportedSeveralTimes) {
   const auto count = [](const Mesh& first, const Mesh& second) {
     const fcl::CollisionResultd result = collide(*modelOf(first), kHere, *modelOf(second), kHere);
     std::set<std::pair<std::intptr_t, std::intptr_t>> pairs;
@@ -90,8 +90,8 @@ TEST(FclFaults, ContactsComeSeveralTimes) {
   EXPECT_GT(same[0], same[1] + 200);
 }
 
-// Refuted of the tree, confirmed of the model's own box, by which the broad phase goes.
-TEST(FclFaults, AModelsOwnBoxStaysWhereItWas) {
+// Refuted for the tree, confirmed for the model's own box, which the broad phase uses.
+TEST(FclFaults, BoxOfAReplacedModelIsNotUpdated) {
   Mesh mesh = sphere(8, 8, {0, 0, 0}, 1);
   const auto model = modelOf(mesh), still = modelOf(sphere(8, 8, {10.5, 0, 0}, 1));
   fcl::CollisionObjectd moved(model), other(still);
@@ -118,8 +118,8 @@ TEST(FclFaults, AModelsOwnBoxStaysWhereItWas) {
   EXPECT_TRUE(meet());
 }
 
-// Refuted of normals, but for one in a hundred; confirmed of depths.
-TEST(FclFaults, DepthsDependOnTheOrder) {
+// Refuted for normals, except one in a hundred. Confirmed for depths.
+TEST(FclFaults, DepthsDependOnTheOrderOfTheObjects) {
   Random random(3);
   const fcl::Capsuled a(0.2, 0.8), b(0.3, 0.5);
   int overlaps = 0, otherNormals = 0, otherDepths = 0;
@@ -138,7 +138,7 @@ TEST(FclFaults, DepthsDependOnTheOrder) {
   EXPECT_GT(otherDepths, overlaps / 2);
 }
 
-// Found here: the search for the depth of two spheres in one place does not end.
+// Found here: the search for the depth of two concentric spheres does not end.
 TEST(FclFaultsDeathTest, SignedDistanceOfConcentricSpheresNeverEnds) {
   const auto ask = [] {
     const itimerval soon{{0, 0}, {0, 300'000}};
@@ -150,8 +150,8 @@ TEST(FclFaultsDeathTest, SignedDistanceOfConcentricSpheresNeverEnds) {
   EXPECT_EXIT(ask(), ::testing::KilledBySignal(SIGALRM), "");
 }
 
-// Found here: on a grid an assertion of FCL's own ends the process.
-TEST(FclFaultsDeathTest, DistanceEndsTheProcessOnAGrid) {
+// Found here: on a grid, an assertion of FCL aborts the process.
+TEST(FclFaultsDeathTest, DistanceOnAGridAbortsTheProcess) {
   const auto ask = [] {
     Random random(1);
     for (int run = 0; run < 10000; ++run) {
@@ -169,8 +169,8 @@ TEST(FclFaultsDeathTest, DistanceEndsTheProcessOnAGrid) {
   EXPECT_DEATH(ask(), "Assertion");
 }
 
-// Found here: of a hull with a plane of two sides FCL calls a function that is not there.
-TEST(FclFaultsDeathTest, HullWithPlaneEndsTheProcess) {
+// Found here: for a hull with a two-sided plane, FCL calls a function that does not exist.
+TEST(FclFaultsDeathTest, HullAgainstPlaneAbortsTheProcess) {
   const auto ask = [] {
     const auto points = std::make_shared<std::vector<Vector3d>>(
         std::vector<Vector3d>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}});

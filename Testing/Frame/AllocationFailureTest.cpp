@@ -8,7 +8,7 @@
 #include "Common/FailingAllocation.h"
 #include "Common/PairRun.h"
 #include "Common/Solids.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 #include "Common/Sanitized.h"
 
 #include <Eigen/Geometry>
@@ -21,8 +21,8 @@
 #include <new>
 #include <string>
 
-// Every allocation of every public call fails once. A call that changes the object leaves it as it
-// was; a frame leaves it ready for the next one.
+// Makes every allocation of every public call fail once. A call that changes the object leaves it
+// unchanged. After a frame that failed, the next frame is correct.
 
 namespace palpate::testing {
 namespace {
@@ -36,7 +36,7 @@ void append(Words& words, const Positions& positions) {
     for (const double x : p) append(words, x);
 }
 
-/// All that a frame's answer depends on.
+/// Everything that a frame's contacts depend on.
 Words stateOf(const OctreeBasedCD& detection) {
   Words words;
   const CollisionProblem problem = detection.problem();
@@ -234,7 +234,7 @@ class AllocationFailure : public ::testing::TestWithParam<int> {
   Settings settings() const { return settingsOf(Engine::Octree, GetParam()); }
 };
 
-TEST_P(AllocationFailure, LeavesTheObjectAsItWas) {
+TEST_P(AllocationFailure, LeavesTheObjectUnchanged) {
   std::size_t failures = 0;
   for (const Call& call : calls()) {
     SCOPED_TRACE(call.name);
@@ -277,7 +277,7 @@ TEST_P(AllocationFailure, LeavesTheObjectAsItWas) {
 }
 
 /// The first and the second frame of two sheets of 800 triangles.
-TEST_P(AllocationFailure, LeavesTheNextFrameRight) {
+TEST_P(AllocationFailure, NextFrameIsCorrect) {
   for (const Method method :
        {Method::Proximity, Method::Continuous, Method::Intersection, Method::Auto})
     for (const bool first : {true, false}) {
@@ -315,7 +315,7 @@ TEST_P(AllocationFailure, LeavesTheNextFrameRight) {
           if (first) {
             EXPECT_THROW(run->data(), Error);
           } else {
-            ASSERT_EQ(run->data().hash(), hash);  // the last answer
+            ASSERT_EQ(run->data().hash(), hash);  // the contacts of the previous frame
           }
           EXPECT_TRUE(run->detection().octree().validate().empty());
           run->detect();
@@ -331,7 +331,7 @@ TEST_P(AllocationFailure, LeavesTheNextFrameRight) {
     }
 }
 
-TEST_P(AllocationFailure, LeavesTheStepOfAGuardAsItWas) {
+TEST_P(AllocationFailure, LeavesTheStepGuardUnchanged) {
   const Mesh body = sphere(5, 6, {0.51, 0.47, 0.53}, 0.4), floor = sheet(4, 0.5, 0.3);
   Random random(6);
   const Positions bodyNow = moved(random, body.positions, 0.3),
@@ -359,8 +359,7 @@ TEST_P(AllocationFailure, LeavesTheStepOfAGuardAsItWas) {
     if (!threw) break;
     ++failures;
     ASSERT_TRUE(guard.held().empty());
-    // The second geometry is not given: it is where it was added, not where the call that failed
-    // moved it.
+    // The second geometry is not set: it is where it was added, not where the failed call moved it.
     a = bodyNow;
     guard.hold(std::array{GuardedStep{ids[0], body.positions, a}});
     unfailed.hold(std::array{GuardedStep{ids[0], body.positions, sameA}});
@@ -371,8 +370,8 @@ TEST_P(AllocationFailure, LeavesTheStepOfAGuardAsItWas) {
 
 INSTANTIATE_TEST_SUITE_P(Threads, AllocationFailure, ::testing::Values(1, 2));
 
-/// What solvers append to keeps what it held.
-TEST(AllocationFailureOf, AppendedRowsAndMotions) {
+/// Vectors that appendRows() and appendMotions() extend keep their content.
+TEST(AllocationFailureWhileAppendingOrCapturing, AppendedRowsAndMotionsStayUnchanged) {
   const Mesh low = sheet(3, 0.0, 0.0), high = sheet(3, 0.0, 0.2);
   const CollisionData contacts = detectCollision(
       {low.positions, low.triangles}, {high.positions, high.triangles}, {Method::Proximity, 0.5});
@@ -405,7 +404,7 @@ TEST(AllocationFailureOf, AppendedRowsAndMotions) {
   expectKept(motions, [&] { appendMotions(contacts, {a}, {b}, motions); });
 }
 
-TEST(AllocationFailureOf, ACaptureLeavesNoPartOfAFile) {
+TEST(AllocationFailureWhileAppendingOrCapturing, CaptureLeavesNoPartialFile) {
   const Mesh mesh = sheet(2, 0.0, 0.0);
   OctreeBasedCD collisions;
   collisions.addTriangleMesh(mesh.positions, mesh.triangles);

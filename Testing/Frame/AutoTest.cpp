@@ -5,7 +5,7 @@
 #include <set>
 #include <tuple>
 
-// Method::Auto: by octrees as by brute force, and nothing missed that Method::Continuous finds.
+// Method::Auto: octrees match brute force, and it finds all that Method::Continuous finds.
 
 namespace palpate {
 namespace {
@@ -31,7 +31,7 @@ std::vector<Vector3d> shaken(Random& random, const std::vector<Vector3d>& positi
   return moved;
 }
 
-/// Soups, a ball over a sheet, two sheets; motion by `slow`, and of some vertices by `fast`.
+/// Soups, a ball over a sheet, two sheets. All vertices move by `slow`, some by `fast`.
 Case randomCase(Random& random, double slow, double fastShare, double fast) {
   Case c;
   switch (random() % 3) {
@@ -65,7 +65,7 @@ constexpr Motion kMotions[]{{"still", 0, 0, 0},
                             {"mixed", 0.0005, 0.1, 0.2},
                             {"fast", 0.1, 0, 0}};
 
-TEST(Auto, AnswersAsBruteForceDoes) {
+TEST(Auto, MatchesBruteForce) {
   Random random(11);
   std::set<MethodReason> reasons;
   for (int i = 0; i < 120; ++i) {
@@ -106,7 +106,7 @@ std::set<std::array<std::uint32_t, 5>> idsOf(const CollisionData& data) {
   return ids;
 }
 
-TEST(Auto, MissesNothingThatContinuousFinds) {
+TEST(Auto, FindsEverythingThatContinuousFinds) {
   Random random(12);
   std::size_t found = 0;
   for (int i = 0; i < 1500; ++i) {
@@ -131,7 +131,7 @@ TEST(Auto, MissesNothingThatContinuousFinds) {
       found += expected.size();
       EXPECT_TRUE(std::includes(answer.begin(), answer.end(), expected.begin(), expected.end()))
           << motion.name << ", case " << i;
-      if (!data.validity().startedApart) continue;  // Intersection's contacts reach further
+      if (!data.validity().startedApart) continue;  // Intersection's contacts are of more features
       for (const auto& contact : data.vertexTriangle()) EXPECT_LE(contact.distance, most);
       for (const auto& contact : data.edgeEdge()) EXPECT_LE(contact.distance, most);
     }
@@ -140,9 +140,9 @@ TEST(Auto, MissesNothingThatContinuousFinds) {
   EXPECT_GT(found, 20000u);
 }
 
-/// Distinct: what Continuous finds is there, or a contact of the same vertex (of a vertex of each
-/// edge) stands for it.
-TEST(Auto, DistinctContactsStandForAllThatContinuousFinds) {
+/// With Distinct, each contact of Continuous is present, or a contact of the same vertex (of one
+/// vertex of each edge) represents it.
+TEST(Auto, DistinctContactsRepresentAllThatContinuousFinds) {
   Random random(13);
   std::size_t found = 0;
   for (int i = 0; i < 1500; ++i) {

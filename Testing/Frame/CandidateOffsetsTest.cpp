@@ -1,12 +1,12 @@
 #include "Common/PairRun.h"
-#include "Common/Zoo.h"
+#include "Common/DegenerateCases.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-// Candidates wherever the scene is, as long as doubles tell its features apart: none missing, and
-// at most one in a hundred more than overlap.
+// Candidates at any position of the scene, as long as doubles resolve its features: no false
+// negatives, and at most one in a hundred candidates whose exact boxes do not overlap.
 
 namespace palpate {
 namespace {
@@ -24,7 +24,7 @@ Mesh shaken(Mesh mesh) {
   return mesh;
 }
 
-/// Of a frame in which both meshes have moved, and of each with itself.
+/// Candidates of a frame in which both meshes have moved, and of each mesh with itself.
 void count(const Mesh& a, const Mesh& b, const PairSettings& settings, const Vector3d& offset,
            Counts& counts) {
   const Mesh first = moved(a, offset), second = moved(b, offset);
@@ -54,11 +54,11 @@ void count(const Mesh& a, const Mesh& b, const PairSettings& settings, const Vec
 
 class CandidateOffsets : public ::testing::TestWithParam<MethodCase> {};
 
-TEST_P(CandidateOffsets, AreCompleteAndFewMoreUpToWhereFeaturesBlur) {
+TEST_P(CandidateOffsets, CandidatesAreCompleteAndFewAtEveryOffset) {
   Random random(1);
   const std::pair<Mesh, Mesh> scenes[]{
       {soup(random, 250, 0.05), soup(random, 200, 0.08)},
-      // Not symmetric: boxes that would touch but for a rounding are candidates.
+      // Not symmetric: boxes that touch but for a rounding error are candidates.
       {shaken(sphere(10, 14, {0.5, 0.5, 0.5}, 0.4)), shaken(sphere(9, 13, {0.6, 0.5, 0.9}, 0.3))},
       {sheet(12, 0, 0), sheet(11, 0.02, 1)}};
   // At 1e13 doubles are 0.002 apart, where edges are 0.05 to 0.1 long.

@@ -2,8 +2,8 @@
 
 #include "Common/PairRun.h"
 #include "Common/Solids.h"
-#include "Common/Things.h"
-#include "Common/Zoo.h"
+#include "Common/TestGeometry.h"
+#include "Common/DegenerateCases.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -16,8 +16,8 @@
 #include <vector>
 
 // The law of contacts: with the positions at a contact's timeOfImpact, the weighted sum of the
-// positions of its stencil is (distance + radii) * normal; of a ShapeContact this is point -
-// pointOnShape. Every method keeps it, for every kind of geometry.
+// positions of its stencil is (distance + radii) * normal. For a ShapeContact this sum is point -
+// pointOnShape. It holds for every method and every geometry type.
 
 namespace palpate::testing {
 namespace {
@@ -25,7 +25,7 @@ namespace {
 using Wide = long double;
 using WideVector = Eigen::Matrix<Wide, 3, 1>;
 
-/// A geometry's vertices in the world, in the solver's sense.
+/// A geometry's vertices in the world, as a solver has them.
 struct Side {
   Positions before, now;
   std::vector<double> radii;  ///< one for all, or one per vertex
@@ -41,7 +41,7 @@ struct Side {
   }
 };
 
-/// How many contacts were looked at, by what they are.
+/// How many contacts were tested, by their type.
 struct Seen {
   std::map<std::string, std::size_t> counts;
   void add(const std::string& name) { ++counts[name]; }
@@ -81,9 +81,9 @@ class Law {
     return m_asked == Method::Proximity || m_asked == Method::Intersection;
   }
 
-  /// L: the vector that the weighted sum may be off by. Distances and weights are within a few
-  /// units in the last place of the largest coordinate difference, Continuous speaks of a time up
-  /// to the tolerance before the impact.
+  /// L: the allowed error of the weighted sum. Distances and weights are within a few units in the
+  /// last place of the largest coordinate difference. Times of Continuous are early by up to the
+  /// tolerance.
   Wide error(const Stencil& stencil, const std::array<const Side*, 4>& sides, double time) const {
     const WideVector first = sides[0]->at(stencil.vertices[0], time);
     Wide largest = 0, motion = 0;
@@ -148,7 +148,7 @@ class Law {
     const WideVector u = at(1) - at(0), v = at(2) - at(0), winding = cross(u, v);
     const Wide sine = winding.norm();
     const WideVector normal = c.normal.cast<Wide>();
-    const bool slim = !(sine > 1e-6L);  // whose winding normal no plain arithmetic finds
+    const bool slim = !(sine > 1e-6L);  // plain arithmetic cannot find the winding normal
     if (m_method == Method::Intersection || isOfIntersection(c)) {
       m_seen.add("vertex of Intersection");
       if (slim) return;
@@ -168,13 +168,13 @@ class Law {
     }
   }
 
-  /// Auto: with a step that starts in intersection.
+  /// Auto, in a step that starts in intersection.
   bool isOfIntersection(const VertexTriangleContact& c) const {
     return c.distance < 0 && !hasRadii();
   }
   bool hasRadii() const { return m_a.radius(0) > 0 || m_b.radius(0) > 0; }
 
-  /// The closest point is a sum of the vertices of the feature that the contact names, of no fewer.
+  /// The closest point is a sum of exactly the vertices of the named feature.
   void expectFeature(const VertexTriangleContact& c) {
     const int feature = static_cast<int>(c.feature);
     std::map<std::uint32_t, double> weights;
@@ -242,7 +242,7 @@ class Law {
     m_seen.add("two shapes");
     expectTime(c.timeOfImpact);
     EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);
-    // A cylinder that overlaps is answered within 1e-3 of the size (Docs/Shapes.md).
+    // Contacts with overlapping cylinders are within 1e-3 of the size (Docs/Shapes.md).
     const double error = m_hasCylinder && c.distance < 0 ? 1e-3 : 0x1p-48;
     EXPECT_LE((c.pointA - c.pointB - c.distance * c.normal).norm(),
               error * (1 + c.pointA.norm() + c.pointB.norm()));
@@ -256,38 +256,38 @@ class Law {
   const bool m_hasCylinder;
 };
 
-/// Anything that OctreeBasedCD holds, with the step that it makes.
+/// Anything that an OctreeBasedCD holds, with its motion in the step.
 struct Body {
   std::string name;
   std::function<GeometryId(OctreeBasedCD&)> add;
-  Side side;  ///< empty: of a shape
+  Side side;  ///< empty for a shape
   std::function<void(OctreeBasedCD&, GeometryId)> move;
 };
 
-Body bodyOf(std::string name, const Thing& thing, Positions now) {
+Body bodyOf(std::string name, const TestGeometry& geometry, Positions now) {
   return {std::move(name),
-          [thing](OctreeBasedCD& collisions) { return thing.addTo(collisions); },
-          {thing.positions, now, thing.radii},
+          [geometry](OctreeBasedCD& collisions) { return geometry.addTo(collisions); },
+          {geometry.positions, now, geometry.radii},
           [=](OctreeBasedCD& collisions, GeometryId id) {
-            collisions.setPositions(id, thing.positions, now);
+            collisions.setPositions(id, geometry.positions, now);
           }};
 }
 
-/// The same placed: the body's frame is turned and shifted, and turns further in the step.
-Body placed(std::string name, const Thing& thing, double angle, const Vector3d& shift) {
+/// The same as a placed body: its frame is turned and shifted, and turns further in the step.
+Body placed(std::string name, const TestGeometry& geometry, double angle, const Vector3d& shift) {
   using Turn = Eigen::AngleAxisd;
   const Vector3d axis = Vector3d(1, 2, 3).normalized(), centre(0.5, 0.5, 0.5);
   const std::array<Eigen::Matrix3d, 2> turns{Turn(0.3, axis).toRotationMatrix(),
                                              Turn(0.3 + angle, axis).toRotationMatrix()};
   const std::array<Vector3d, 2> shifts{centre - turns[0] * centre,
                                        centre - turns[1] * centre + shift};
-  Side side{{}, {}, thing.radii};
-  for (const Vector3d& x : thing.positions) {
+  Side side{{}, {}, geometry.radii};
+  for (const Vector3d& x : geometry.positions) {
     side.before.push_back(turns[0] * x + shifts[0]);
     side.now.push_back(turns[1] * x + shifts[1]);
   }
-  return {std::move(name), [thing](OctreeBasedCD& collisions) { return thing.addTo(collisions); },
-          side,
+  return {std::move(name),
+          [geometry](OctreeBasedCD& collisions) { return geometry.addTo(collisions); }, side,
           [=](OctreeBasedCD& collisions, GeometryId id) {
             collisions.setTransform(id, turns[0], shifts[0], turns[1], shifts[1]);
           }};
@@ -303,12 +303,14 @@ Body shapeOf(std::string name, const AnalyticalGeometry& shape, const Vector3d& 
           }};
 }
 
-/// Every kind of geometry in the unit cube, with steps of about `motion`.
+/// Every geometry type in the unit cube, with steps of about `motion`.
 std::vector<Body> bodies(Random& random, double motion) {
-  const Thing triangles = things(soup(random, 60, 0.15)), sheets = things(sheet(6, 0.5, 0.3)),
-              line = thread(random, 40, 0.15, 0.02, false), points = particles(random, 50, 0.03);
-  const Thing taperedLine = tapered(random, line, 0.05),
-              taperedPoints = tapered(random, points, 0.05);
+  const TestGeometry triangles = testGeometry(soup(random, 60, 0.15)),
+                     sheets = testGeometry(sheet(6, 0.5, 0.3)),
+                     line = thread(random, 40, 0.15, 0.02, false),
+                     points = particles(random, 50, 0.03);
+  const TestGeometry taperedLine = tapered(random, line, 0.05),
+                     taperedPoints = tapered(random, points, 0.05);
   Solid block = cells(2, random);
   for (Vector3d& x : block.positions) x = 0.25 * x + Vector3d(0.3, 0.25, 0.27);
   const Positions blockNow = moved(random, block.positions, motion);
@@ -396,7 +398,7 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
         }
       }
   }
-  // Each method has met what it may answer.
+  // Each method had contacts of each type that it supports.
   for (const auto& [method, seen] : byMethod)
     for (const auto& [what, count] : seen.counts) RecordProperty(method + " " + what, int(count));
   const auto count = [&](Method asked, Method answered, const std::string& what) {
@@ -423,16 +425,15 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
   EXPECT_GT(count(Method::Auto, Method::Auto, "behind"), 10u);
 }
 
-/// Degenerate meshes, coordinates near the ends of what double holds, and self-collision.
+/// Degenerate meshes, coordinates near the ends of the range of double, and self-collision.
 TEST(ContactLaw, HoldsForDegenerateMeshes) {
   Seen seen;
-  for (const Specimen& specimen : zoo()) {
-    const auto aBefore = specimen.aBefore(), bBefore = specimen.bBefore();
-    const Side a{aBefore, specimen.a.positions, {}}, b{bBefore, specimen.b.positions, {}};
-    for (const MethodCase& method : methodCases(specimen.thickness)) {
-      SCOPED_TRACE(specimen.name + ", " + method.name);
-      PairRun run(settingsOf(Engine::Octree), specimen.a, specimen.b, method.settings,
-                  !specimen.large);
+  for (const DegenerateCase& input : degenerateCases()) {
+    const auto aBefore = input.aBefore(), bBefore = input.bBefore();
+    const Side a{aBefore, input.a.positions, {}}, b{bBefore, input.b.positions, {}};
+    for (const MethodCase& method : methodCases(input.thickness)) {
+      SCOPED_TRACE(input.name + ", " + method.name);
+      PairRun run(settingsOf(Engine::Octree), input.a, input.b, method.settings, !input.large);
       run.step(aBefore, a.now, bBefore, b.now);
       for (const CollisionPair& pair : run.detection().pairs())
         Law(run.detection().collisionData(pair.a, pair.b), pair.a == run.a() ? a : b,
@@ -445,7 +446,7 @@ TEST(ContactLaw, HoldsForDegenerateMeshes) {
   EXPECT_GT(seen.counts["edges"], 1000u);
 }
 
-/// The tip of a spike below a face: a solver that wants it 0.05 above brings it there.
+/// The tip of a spike below a face: a solver that corrects it to a gap of 0.05 brings it above.
 TEST(ContactLaw, ATipBehindAFaceHasANegativeDistance) {
   const Positions ground{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}};
   const Mesh tip = spike({1, 1, -0.1}, 0.5);

@@ -13,11 +13,12 @@
 
 namespace palpate::testing {
 
-/// Whether a scene, as its doubles are, has a contact by the method's definition: in rational
-/// arithmetic, by triangle and feature, from nothing of the library but its definitions.
+/// Whether a scene has a contact by the method's definition, for its positions in double. Computed
+/// in rational arithmetic, by triangle and feature. It uses nothing of the library but the
+/// definitions.
 class ExactContacts {
  public:
-  /// Either: within the method's stated error of the thickness.
+  /// Either: the thickness is within the method's stated error.
   enum class Answer { No, Yes, Either };
   using Ids = std::array<std::uint32_t, 5>;  ///< as in PlainContact
 
@@ -117,7 +118,7 @@ class ExactContacts {
 
   // ---- Intersection ----
 
-  /// How two triangles meet, in rationals: touching features, and edges that cross the other.
+  /// How two triangles intersect, in rationals: touching features, and edges that cross the other.
   struct Meeting {
     bool cornersOfA[3] = {}, cornersOfB[3] = {}, edges[3][3] = {};  ///< touch
     bool throughB[3] = {}, throughA[3] = {};
@@ -223,7 +224,7 @@ class ExactContacts {
   Answer impactOf(bool edges, const palpate::impact::Positions& p) const {
     if (m_settings.thickness == 0)
       return palpate::impact::Query(edges, p).firstTouch() ? Answer::Yes : Answer::No;
-    // The least distance over the step, from samples and then between them.
+    // The least distance over the step, first at samples and then between them.
     const auto distanceAt = [&](double t) {
       std::array<Vector3d, 4> x;
       for (int i = 0; i < 4; ++i) x[i] = (1 - t) * p[i] + t * p[4 + i];

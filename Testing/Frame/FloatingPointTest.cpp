@@ -1,5 +1,5 @@
 #include "Common/PairRun.h"
-#include "Common/Zoo.h"
+#include "Common/DegenerateCases.h"
 #include "Unit/Math/TrianglePairs.h"
 
 #include <palpate/ConstraintRows.h>
@@ -22,9 +22,9 @@
 #include <utility>
 #include <xmmintrin.h>
 
-// Answers do not depend on the calling thread's floating-point environment: how it rounds, whether
-// it flushes denormals to zero, as audio and graphics code often asks for, and whether exceptions
-// trap. The environment is left as it was, with its exception flags.
+// Results do not depend on the floating-point environment of the calling thread: rounding mode,
+// flushing denormals to zero as audio and graphics code often does, trapping exceptions. The
+// environment and its exception flags stay unchanged.
 
 namespace palpate {
 namespace {
@@ -51,7 +51,7 @@ const std::vector<Mode> kModes{{"trapping", FE_TONEAREST, 0, true},
                                {"trapping, upward", FE_UPWARD, 0, true},
                                {"all", FE_TOWARDZERO, kBoth, true}};
 
-/// This thread is in the mode while the object lives.
+/// Sets the mode of this thread while the object exists.
 class InMode {
  public:
   explicit InMode(const Mode& mode) {
@@ -69,7 +69,8 @@ class InMode {
   std::fenv_t m_before;
 };
 
-/// What a call answers; it must leave the environment and the exception flags as they were.
+/// Returns the results of a call, which must leave the environment and the exception flags
+/// unchanged.
 template <class F>
 auto unchanged(F&& call) {
   const unsigned before = _mm_getcsr();
@@ -78,15 +79,15 @@ auto unchanged(F&& call) {
   return result;
 }
 
-/// Answers of one frame, in a mode that is set before everything.
-std::vector<Rows> answers(const Specimen& specimen, const PairSettings& settings, int threads,
+/// Contacts of one frame, in a mode that is set before everything.
+std::vector<Rows> answers(const DegenerateCase& input, const PairSettings& settings, int threads,
                           const Mode& mode) {
-  const std::vector<Eigen::Vector3d> aBefore = specimen.aBefore(), bBefore = specimen.bBefore();
+  const std::vector<Eigen::Vector3d> aBefore = input.aBefore(), bBefore = input.bBefore();
   const InMode inMode(mode);
   const unsigned set = _mm_getcsr();
-  PairRun run(settingsOf(Engine::Octree, threads), specimen.a, specimen.b, settings);
-  run.detection().setPositions(run.a(), aBefore, specimen.a.positions);
-  run.detection().setPositions(run.b(), bBefore, specimen.b.positions);
+  PairRun run(settingsOf(Engine::Octree, threads), input.a, input.b, settings);
+  run.detection().setPositions(run.a(), aBefore, input.a.positions);
+  run.detection().setPositions(run.b(), bBefore, input.b.positions);
   run.detection().detectCollision();
   EXPECT_EQ(_mm_getcsr() & ~0x3fu, set & ~0x3fu);
   return run.answers();
@@ -94,26 +95,26 @@ std::vector<Rows> answers(const Specimen& specimen, const PairSettings& settings
 
 class FloatingPoint : public ::testing::TestWithParam<MethodCase> {};
 
-TEST_P(FloatingPoint, OfTheCallerChangesNoBit) {
+TEST_P(FloatingPoint, ModeOfTheCallerChangesNoBit) {
   const std::set<std::string> names{"denormal coordinates",   "among the smallest normals",
                                     "beyond float's range",   "slivers of 1e-12",
                                     "vertex exactly on face", "one vertex far away"};
   std::size_t seen = 0;
-  for (const Specimen& specimen : zoo()) {
-    if (!names.contains(specimen.name)) continue;
-    SCOPED_TRACE(specimen.name);
+  for (const DegenerateCase& input : degenerateCases()) {
+    if (!names.contains(input.name)) continue;
+    SCOPED_TRACE(input.name);
     ++seen;
     PairSettings settings = GetParam().settings;
-    settings.thickness *= specimen.thickness;
-    const std::vector<Rows> truth = answers(specimen, settings, 1, kStandard);
-    // A thickness that is denormal would be refused as zero where denormals are.
+    settings.thickness *= input.thickness;
+    const std::vector<Rows> truth = answers(input, settings, 1, kStandard);
+    // In a mode without denormals, a denormal thickness would be refused as zero.
     const bool denormal = settings.thickness < 0x1p-1022;
     const unsigned both = kFlushToZero | (denormal ? 0 : kDenormalsAreZero);
     for (const Mode& mode : {Mode{"upward", FE_UPWARD}, Mode{"flushing", FE_TONEAREST, both},
                              Mode{"flushing and downward", FE_DOWNWARD, both},
                              Mode{"trapping", FE_TONEAREST, 0, true}}) {
       SCOPED_TRACE(mode.name);
-      expectSame(answers(specimen, settings, 2, mode), truth);
+      expectSame(answers(input, settings, 2, mode), truth);
     }
   }
   EXPECT_EQ(seen, names.size());
@@ -134,7 +135,7 @@ void append(Bits& bits, const Value& value) {
     bits.push_back(static_cast<std::uint64_t>(value));
 }
 
-/// Bits of what the functions of single features answer, in a mode.
+/// Bits of the results of the functions of single features, in a mode.
 Bits featureAnswers(const test::CornersPair& pair, const Mode& mode) {
   const auto& [a, b] = pair;
   const auto both = [&, &a = a, &b = b](const TimeOfImpactSettings& settings) {
@@ -178,7 +179,7 @@ Bits featureAnswers(const test::CornersPair& pair, const Mode& mode) {
   return bits;
 }
 
-TEST(FloatingPointOfSingleFeatures, ChangesNoBit) {
+TEST(FloatingPointInSingleFunctions, ModeOfTheCallerChangesNoBit) {
   test::Random random(1);
   for (int repeat = 0; repeat < 3200; ++repeat) {
     const auto kind = static_cast<test::Kind>(repeat % static_cast<int>(test::Kind::Count));
@@ -194,10 +195,11 @@ struct TripletOfBits {
   double value;
 };
 
-/// Of detectCollision() on two meshes, and of what makes a solver's rows of its contacts.
-Bits meshAnswers(const Specimen& specimen, const PairSettings& settings, const Mode& mode) {
-  const Mesh &a = specimen.a, &b = specimen.b;
-  const std::vector<Eigen::Vector3d> aBefore = specimen.aBefore(), bBefore = specimen.bBefore();
+/// The results of detectCollision() on two meshes and of the functions that make a solver's rows
+/// from them.
+Bits meshAnswers(const DegenerateCase& input, const PairSettings& settings, const Mode& mode) {
+  const Mesh &a = input.a, &b = input.b;
+  const std::vector<Eigen::Vector3d> aBefore = input.aBefore(), bBefore = input.bBefore();
   const auto first = static_cast<std::uint32_t>(a.positions.size());
   std::vector<Eigen::Vector3d> all = a.positions;
   all.insert(all.end(), b.positions.begin(), b.positions.end());
@@ -225,19 +227,19 @@ Bits meshAnswers(const Specimen& specimen, const PairSettings& settings, const M
   return bits;
 }
 
-TEST(FloatingPointOfOneCall, ChangesNoBit) {
+TEST(FloatingPointInOneCall, ModeOfTheCallerChangesNoBit) {
   std::size_t rows = 0;
-  for (const Specimen& specimen : zoo()) {
+  for (const DegenerateCase& input : degenerateCases()) {
     PairSettings settings;
     settings.method = Method::Proximity;
-    settings.thickness = specimen.thickness;
-    // A thickness that is denormal would be refused as zero where denormals are.
-    if (specimen.large || settings.thickness < 0x1p-1022) continue;
-    SCOPED_TRACE(specimen.name);
-    const Bits truth = meshAnswers(specimen, settings, kStandard);
+    settings.thickness = input.thickness;
+    // In a mode without denormals, a denormal thickness would be refused as zero.
+    if (input.large || settings.thickness < 0x1p-1022) continue;
+    SCOPED_TRACE(input.name);
+    const Bits truth = meshAnswers(input, settings, kStandard);
     rows += truth.size();
     for (const Mode& mode : kModes)
-      ASSERT_EQ(meshAnswers(specimen, settings, mode), truth) << mode.name;
+      ASSERT_EQ(meshAnswers(input, settings, mode), truth) << mode.name;
   }
   EXPECT_GT(rows, 1000u);
 }
@@ -247,16 +249,16 @@ std::string contentOf(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-TEST(FloatingPointOfCaptures, ChangesNoByte) {
+TEST(FloatingPointInCaptures, ModeOfTheCallerChangesNoByte) {
   const std::filesystem::path folder = std::filesystem::temp_directory_path(),
                               path = folder / ("FloatingPoint" + std::to_string(getpid()));
-  for (const Specimen& specimen : zoo()) {
+  for (const DegenerateCase& input : degenerateCases()) {
     PairSettings settings;
     settings.method = Method::Continuous;
-    if (specimen.large) continue;
-    SCOPED_TRACE(specimen.name);
-    PairRun run({.threads = 1}, specimen.a, specimen.b, settings);
-    run.step(specimen.aBefore(), specimen.a.positions, specimen.bBefore(), specimen.b.positions);
+    if (input.large) continue;
+    SCOPED_TRACE(input.name);
+    PairRun run({.threads = 1}, input.a, input.b, settings);
+    run.step(input.aBefore(), input.a.positions, input.bBefore(), input.b.positions);
     capture(run.detection(), path);
     const std::string truth = contentOf(path);
     const std::uint64_t hash = run.data().hash();

@@ -1,11 +1,11 @@
 #include "Common/PairRun.h"
-#include "Common/Zoo.h"
+#include "Common/DegenerateCases.h"
 
 #include <gtest/gtest.h>
 
 #include <thread>
 
-// What a frame is of: positions before and now, ids, pairs, and calls that change nothing.
+// The input of a frame: positions before and now, ids, pairs. Some calls change nothing.
 
 namespace palpate {
 namespace {
@@ -18,7 +18,7 @@ const PairSettings kContinuous{Method::Continuous, 0, Contacts::All};
 /// A spike whose tip is at a height above a sheet at 0.
 std::vector<Vector3d> at(double height) { return spike({0.3, 0.2, height}).positions; }
 
-class SpikeAndSheet : public ::testing::Test {
+class FrameSemantics : public ::testing::Test {
  protected:
   OctreeBasedCD m_detection{settingsOf(Engine::Octree)};
   const Mesh m_sheet = flat(4, 0), m_spike = spike({0.3, 0.2, 1});
@@ -26,7 +26,7 @@ class SpikeAndSheet : public ::testing::Test {
   const GeometryId m_b = m_detection.addTriangleMesh(m_sheet.positions, m_sheet.triangles);
 
   void SetUp() override { m_detection.addCollisionPair(m_a, m_b, kContinuous); }
-  /// Of the step, which it ends.
+  /// Sets both ends of the step, detects, and ends the step.
   double time() {
     m_detection.detectCollision();
     m_detection.advance();
@@ -36,7 +36,7 @@ class SpikeAndSheet : public ::testing::Test {
 
 constexpr double kTolerance = 1e-6, kNever = std::numeric_limits<double>::infinity();
 
-TEST_F(SpikeAndSheet, BeforeIsTheNowOfTheLastStep) {
+TEST_F(FrameSemantics, BeforeIsNowOfThePreviousStep) {
   EXPECT_EQ(time(), kNever);
   m_detection.setPositions(m_a, at(-1));
   EXPECT_NEAR(time(), 0.5, kTolerance);
@@ -47,7 +47,7 @@ TEST_F(SpikeAndSheet, BeforeIsTheNowOfTheLastStep) {
   EXPECT_EQ(time(), kNever);
 }
 
-TEST_F(SpikeAndSheet, OfSeveralCallsTheLastCounts) {
+TEST_F(FrameSemantics, LastOfSeveralCallsCounts) {
   EXPECT_EQ(time(), kNever);
   m_detection.setPositions(m_a, at(-1));
   m_detection.setPositions(m_a, at(2));
@@ -57,14 +57,14 @@ TEST_F(SpikeAndSheet, OfSeveralCallsTheLastCounts) {
   EXPECT_NEAR(time(), 0.75, kTolerance);
 }
 
-TEST_F(SpikeAndSheet, AfterSetTrianglesNothingHasMoved) {
+TEST_F(FrameSemantics, NewTrianglesAreAtRest) {
   m_detection.setTriangles(m_a, at(-2), m_spike.triangles);
   EXPECT_EQ(time(), kNever);
   m_detection.setPositions(m_a, at(2));
   EXPECT_LT(time(), 1.0);
 }
 
-TEST_F(SpikeAndSheet, AnUnchangedFrameKeepsItsAnswerAndItsOctrees) {
+TEST_F(FrameSemantics, UnchangedFrameKeepsContactsAndOctrees) {
   m_detection.setPositions(m_a, at(1), at(-1));
   m_detection.detectCollision();
   const std::uint64_t hash = m_detection.collisionData(m_a, m_b).hash();
@@ -74,7 +74,7 @@ TEST_F(SpikeAndSheet, AnUnchangedFrameKeepsItsAnswerAndItsOctrees) {
   EXPECT_EQ(m_detection.statistics().unchangedOctrees, 2u);
 }
 
-TEST_F(SpikeAndSheet, RemovedIdsAreNotGivenOutAgain) {
+TEST_F(FrameSemantics, RemovedIdsAreNotReused) {
   m_detection.detectCollision();
   m_detection.removeGeometry(m_a);
   EXPECT_TRUE(m_detection.pairs().empty());
@@ -87,7 +87,7 @@ TEST_F(SpikeAndSheet, RemovedIdsAreNotGivenOutAgain) {
   EXPECT_EQ(m_detection.collisionData(next, m_b).vertexTriangle().size(), 1u);
 }
 
-TEST_F(SpikeAndSheet, EitherOrderNamesThePairButForItsData) {
+TEST_F(FrameSemantics, OnlyCollisionDataDependsOnTheOrderOfThePair) {
   EXPECT_THROW(m_detection.addCollisionPair(m_b, m_a, kContinuous), Error);
   m_detection.setPairSettings(m_b, m_a, {Method::Proximity, 0.1, Contacts::All});
   EXPECT_EQ(m_detection.pairs().front().settings.method, Method::Proximity);
@@ -99,7 +99,7 @@ TEST_F(SpikeAndSheet, EitherOrderNamesThePairButForItsData) {
   EXPECT_TRUE(m_detection.pairs().empty());
 }
 
-TEST_F(SpikeAndSheet, ConstQueriesFromManyThreads) {
+TEST_F(FrameSemantics, ConstQueriesWorkFromManyThreads) {
   m_detection.setPairSettings(m_a, m_b, {Method::Proximity, 2, Contacts::All});
   m_detection.collectCandidates();
   m_detection.detectCollision();
@@ -122,7 +122,7 @@ TEST_F(SpikeAndSheet, ConstQueriesFromManyThreads) {
   for (const bool each : good) EXPECT_TRUE(each);
 }
 
-TEST(OneCall, AnswersAsAFrameDoes) {
+TEST(OneCall, MatchesAFrame) {
   const Mesh a = spike({0.3, 0.2, 0.01}), b = flat(4, 0);
   for (const PairSettings& settings :
        {PairSettings{Method::Proximity, 0.1, Contacts::All},

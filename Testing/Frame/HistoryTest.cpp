@@ -6,14 +6,14 @@
 #include <cstdlib>
 #include <string>
 
-// Random lives against a model that keeps only the last values: see Common/History.h.
+// Random histories against a model that keeps only the last values: see Common/History.h.
 
 namespace palpate::testing {
 namespace {
 
-constexpr int kLives = casesOf(20), kFrames = 500;
+constexpr int kHistories = casesOf(20), kFrames = 500;
 
-std::size_t live(std::uint64_t seed, int frames) {
+std::size_t runHistory(std::uint64_t seed, int frames) {
   RandomHistory history(seed);
   for (int frame = 0; frame < frames; ++frame) {
     history.frame();
@@ -27,20 +27,20 @@ std::size_t live(std::uint64_t seed, int frames) {
 
 class History : public ::testing::TestWithParam<int> {};
 
-TEST_P(History, AnswersByTheLastValuesOnly) {
-  EXPECT_GT(live(static_cast<std::uint64_t>(GetParam()), kFrames),
+TEST_P(History, ContactsDependOnTheLastValuesOnly) {
+  EXPECT_GT(runHistory(static_cast<std::uint64_t>(GetParam()), kFrames),
             static_cast<std::size_t>(kFrames));
 }
 
-INSTANTIATE_TEST_SUITE_P(Lives, History, ::testing::Range(0, kLives));
+INSTANTIATE_TEST_SUITE_P(Seeds, History, ::testing::Range(0, kHistories));
 
-/// PALPATE_HISTORY_LIVES lives more, each of 1,000 frames; none unless it is set.
-TEST(LongHistory, AnswersByTheLastValuesOnly) {
-  const char* const lives = std::getenv("PALPATE_HISTORY_LIVES");
-  if (!lives) GTEST_SKIP() << "skipped: PALPATE_HISTORY_LIVES is not set";
+/// PALPATE_HISTORIES more histories of 1,000 frames each; none unless it is set.
+TEST(LongHistory, ContactsDependOnTheLastValuesOnly) {
+  const char* const histories = std::getenv("PALPATE_HISTORIES");
+  if (!histories) GTEST_SKIP() << "skipped: PALPATE_HISTORIES is not set";
   std::size_t contacts = 0;
-  for (int seed = 0; seed < std::stoi(lives) && !HasFailure(); ++seed)
-    contacts += live(1000 + static_cast<std::uint64_t>(seed), 1000);
+  for (int seed = 0; seed < std::stoi(histories) && !HasFailure(); ++seed)
+    contacts += runHistory(1000 + static_cast<std::uint64_t>(seed), 1000);
   EXPECT_GT(contacts, 0u);
 }
 

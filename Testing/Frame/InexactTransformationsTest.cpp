@@ -1,5 +1,5 @@
 #include "Common/PairRun.h"
-#include "Common/Zoo.h"
+#include "Common/DegenerateCases.h"
 #include "Frame/ExactContacts.h"
 #include "Frame/Placement.h"
 
@@ -8,8 +8,8 @@
 #include <cstdio>
 #include <string>
 
-// Transformations that round positions, as from metres to millimetres: the same contacts, except
-// those whose exact answer for the rounded positions is another one.
+// Transformations that round positions, for example from metres to millimetres. The contacts are
+// the same, except where the exact result for the rounded positions differs.
 
 namespace palpate {
 namespace {
@@ -48,7 +48,7 @@ std::vector<Transformation> transformations() {
 
 class InexactTransformations : public ::testing::TestWithParam<MethodCase> {
  protected:
-  /// Scenes at which contacts are compared, and what became of them.
+  /// The contacts of scenes at both places, and the counts of their comparison.
   std::size_t m_same = 0, m_different = 0;
 
   static bool distinct() {
@@ -67,13 +67,13 @@ class InexactTransformations : public ::testing::TestWithParam<MethodCase> {
   static std::vector<PlainContact> contacts(const Placement& placement, const PairRun& run,
                                             bool self, bool renumbered) {
     auto all = placement.contacts(run, self, GetParam().settings.contacts);
-    // By definition asked of one side only: the first mesh's, or the lower vertex.
+    // By definition one side only is tested: the first mesh's vertices, or the lower vertex.
     if (distinct() && renumbered)
       std::erase_if(all, [](const auto& c) { return c.ids[0] == PlainContact::VertexVertex; });
     return all;
   }
 
-  /// What one has and the other has not must be so in exact arithmetic.
+  /// A contact that one placement has and the other lacks must differ in exact arithmetic, too.
   template <class Item, class Check>
   void compare(const std::vector<Item>& own, const std::vector<Item>& other, Check&& check) {
     std::vector<Item> lost, gained;
@@ -109,14 +109,14 @@ class InexactTransformations : public ::testing::TestWithParam<MethodCase> {
               EXPECT_EQ(here.intersect(pair), wasFound);
               EXPECT_EQ(thereExactly.intersect(pair), !wasFound);
             });
-    // Early by up to the tolerance, and late or early by what rounding moves against the motion.
+    // Early by up to the tolerance, and early or late by the rounding error over the motion.
     if (GetParam().settings.method == Method::Continuous && scene.name != "lattice") {
       EXPECT_NEAR(otherRun.data().earliestTimeOfImpact(), run.data().earliestTimeOfImpact(), 2e-6);
     }
   }
 };
 
-TEST_P(InexactTransformations, ChangeOnlyWhatRoundingChanges) {
+TEST_P(InexactTransformations, ChangeContactsByRoundingOnly) {
   for (const StepScene& scene : scenes())
     for (const Transformation& how : transformations()) {
       SCOPED_TRACE(scene.name + ", " + how.name);
@@ -127,13 +127,13 @@ TEST_P(InexactTransformations, ChangeOnlyWhatRoundingChanges) {
   std::printf("%zu contacts alike, %zu on one side only\n", m_same, m_different);
   if (GetParam().settings.earliestTimeOnly) return;
   EXPECT_GT(m_same, 1000u);
-  // On the lattice everything touches. A minimum distance is kept with a tolerance above rounding.
+  // On the lattice everything touches. A minimum distance holds within a tolerance above rounding.
   EXPECT_EQ(m_different > 0u,
             GetParam().settings.method != Method::Continuous || GetParam().settings.thickness == 0);
 }
 
-/// The judge above, judged: over a sample of all there is, found or not.
-TEST_P(InexactTransformations, ExactAnswersAreThoseFound) {
+/// Tests the exact reference above: on a sample of all features, reported or not.
+TEST_P(InexactTransformations, ExactContactsMatchReportedOnes) {
   if (distinct() || GetParam().settings.earliestTimeOnly) return;
   std::size_t yes = 0, no = 0;
   for (const StepScene& scene : scenes()) {

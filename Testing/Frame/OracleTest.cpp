@@ -1,12 +1,12 @@
 #include "Common/ObjText.h"
 #include "Common/PairRun.h"
-#include "Common/Zoo.h"
+#include "Common/DegenerateCases.h"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
-// Whole sets of contacts, octree against brute force, by every method, frame after frame.
+// Whole sets of contacts, octrees against brute force, by every method, frame after frame.
 
 namespace palpate {
 namespace {
@@ -34,7 +34,7 @@ class Motion {
   double m_size;
 };
 
-/// Returns in how many frames a and b met.
+/// Returns the number of frames with contacts of a and b.
 std::size_t compare(const Pair& pair, const PairSettings& settings,
                     const std::vector<Settings>& octrees, double size, int frames,
                     bool withThemselves = true) {
@@ -102,7 +102,7 @@ std::vector<Pair> pairs() {
 
 class Oracle : public ::testing::TestWithParam<MethodCase> {
  protected:
-  /// As the method needs it, of a thickness of the scene's.
+  /// The settings of the method, with a thickness for the scene.
   static PairSettings settingsFor(double thickness) {
     PairSettings settings = GetParam().settings;
     settings.thickness *= thickness;
@@ -133,7 +133,7 @@ TEST_P(Oracle, AgreesAtEveryOffsetAndScale) {
       }
 }
 
-// ---- Meshes as users bring them ----
+// ---- Published meshes ----
 
 /// The triangles nearest to a position, with vertices of their own.
 Mesh patch(const Mesh& mesh, const Vector3d& centre, std::size_t count) {

@@ -12,8 +12,7 @@
 #include <utility>
 #include <vector>
 
-// Meshes moved to another place, size and numbering, and their contacts told in the numbers that
-// the meshes had before.
+// Meshes at another place, scale and numbering, and their contacts in the original ids.
 
 namespace palpate::testing {
 
@@ -43,12 +42,12 @@ struct PlainContact {
   enum Kind : std::uint32_t { VertexTriangle, TriangleVertex, VertexVertex, EdgeEdge };
   std::array<std::uint32_t, 5> ids{};  ///< kind first
   std::array<double, 3> weights{};     ///< of the corners or edges, in ascending order of vertices
-  Eigen::Vector3d normal;              ///< as the scene's own first geometry would have it
+  Eigen::Vector3d normal;              ///< for the pair in its original order
   double distance, time;
   friend bool operator<(const PlainContact& p, const PlainContact& q) { return p.ids < q.ids; }
 };
 
-/// The scene at its new place, its numbering as it was.
+/// The scene at its new place, with its original numbering.
 inline StepScene placed(StepScene scene, const Transformation& how) {
   for (auto* positions : {&scene.a.positions, &scene.b.positions, &scene.aBefore, &scene.bBefore})
     for (Eigen::Vector3d& p : *positions) p = how.place(p);
@@ -56,7 +55,7 @@ inline StepScene placed(StepScene scene, const Transformation& how) {
   return scene;
 }
 
-/// Triangles with area between few places of a coarse lattice: all kinds of touching.
+/// Triangles with area between few places of a coarse lattice, so that all ways of touching occur.
 inline Mesh onLattice(Random& random) {
   Mesh mesh;
   const auto coordinate = [&] { return static_cast<double>(random() % 4) * 0.25; };
@@ -73,7 +72,7 @@ inline Mesh onLattice(Random& random) {
   return mesh;
 }
 
-/// Two meshes that move towards each other, each vertex its own way.
+/// Two meshes that move towards each other; each vertex has its own motion.
 inline StepScene stepScene(const std::string& name, const Mesh& a, const Mesh& b,
                            double thickness) {
   StepScene scene{name, a, b, a.positions, b.positions, thickness};
@@ -190,7 +189,8 @@ class Placement {
     const auto kind = vertices == 0 ? PlainContact::VertexTriangle : PlainContact::TriangleVertex;
     out.ids = {kind, vertex, m_names[triangles].triangles[c.triangle]};
     if (how != Contacts::Distinct) return out;
-    // One for each feature, whose triangle is the lowest of its numbering: told by its corners.
+    // One contact for each feature, with the lowest triangle of its numbering: identified by
+    // corners.
     constexpr std::uint32_t kNone = ~0u;
     std::array<std::uint32_t, 3> holding{kNone, kNone, kNone};
     int count = 0;

@@ -1,7 +1,7 @@
 #include <palpate/TimeOfImpact.h>
 
 #include "Common/PairRun.h"
-#include "Common/Zoo.h"
+#include "Common/DegenerateCases.h"
 #include "Frame/Placement.h"
 
 #include <gtest/gtest.h>
@@ -51,7 +51,7 @@ std::vector<Transformation> exactTransformations() {
           {.name = "beyond squares", .scale = 0x1p900},
           {.name = "below squares", .scale = 0x1p-900},
           {.name = "the largest doubles", .scale = 0x1p1022},
-          // Positions keep all their bits down to 2^-1054, coordinates of contacts not.
+          // Positions keep all their bits down to 2^-1054; coordinates of contacts do not.
           {.name = "among denormals", .scale = 0x1p-1050},
           {.name = "moved", .translation = far},
           {.name = "corners", .corners = true},
@@ -91,16 +91,16 @@ class UnitIndependence : public ::testing::TestWithParam<MethodCase> {
                  " " + std::to_string(truth.ids[2]) + " " + std::to_string(truth.ids[3]) + " " +
                  std::to_string(truth.ids[4]));
     if (continuous()) {
-      // Of a time that may be up to the tolerance early, by as much as the search happened to be.
+      // A time may be early by up to the tolerance, by an amount that depends on the search.
       EXPECT_NEAR(found.time, truth.time, TimeOfImpactSettings{}.timeTolerance);
-      // The plane turns a little in that time; where features never left it, it has no side.
+      // The plane turns a little in that time. Features that never left it have no side.
       const bool turned = hasNoSide(truth) && found.normal.dot(truth.normal) < 0;
       const Vector3d expected = turned ? Vector3d(-truth.normal) : truth.normal;
       EXPECT_LT((found.normal - expected).norm(), 1e-3);
       return;
     }
     EXPECT_EQ(found.time, truth.time);
-    // Intersection's distance is negative behind the triangle as it is wound: it turns with it.
+    // Intersection's distance is negative behind the triangle by its winding, so it changes sign.
     const bool turned = hasNoSide(truth) && found.normal.dot(truth.normal) < 0;
     const double distance = turned ? -truth.distance : truth.distance;
     EXPECT_NEAR(found.distance, distance, 0x1p-53 * std::abs(distance) < unit ? unit : 0);
@@ -111,7 +111,7 @@ class UnitIndependence : public ::testing::TestWithParam<MethodCase> {
   }
 };
 
-TEST_P(UnitIndependence, ByTransformationsThatAreExact) {
+TEST_P(UnitIndependence, ExactTransformationsChangeNothing) {
   for (const StepScene& scene : scenes()) {
     SCOPED_TRACE(scene.name);
     const Placement own(scene, {});
@@ -128,7 +128,7 @@ TEST_P(UnitIndependence, ByTransformationsThatAreExact) {
         auto found = placement.contacts(run, self, settings().contacts);
         auto expected = own.contacts(truth, self, settings().contacts);
         if (distinct() && (how.swapped || how.vertices)) {
-          // By definition these are asked of one side only: the first mesh's, or the lower vertex.
+          // By definition one side only is tested: the first mesh's vertices, or the lower vertex.
           for (auto* contacts : {&found, &expected})
             std::erase_if(*contacts, [](const PlainContact& c) {
               return c.ids[0] == PlainContact::VertexVertex;

@@ -7,7 +7,7 @@
 #include <Eigen/Geometry>
 #include <iostream>
 
-// Validity::trusted: never true where an answer is wrong. Truth is exact: impacts of
+// Validity::trusted is never true for a wrong answer. The reference is exact: impacts of
 // Method::Continuous at thickness 0, and Method::Intersection of the positions at the step's start.
 
 namespace palpate {
@@ -19,7 +19,7 @@ using Positions = std::vector<Vector3d>;
 
 constexpr double kThickness = 0.02;
 
-/// What really happened in a step.
+/// The exact events of a step.
 struct Truth {
   bool startedApart, touched;
 };
@@ -33,8 +33,8 @@ Truth truthOf(const Mesh& a, const Mesh& b, const Positions& aBefore, const Posi
   return {start.data().intersectingTriangles().empty(), step.data().earliestTimeOfImpact() <= 1.0};
 }
 
-/// A ball over a sheet, whose vertices began above it. A contact that a vertex's projection inside
-/// a face holds shows on which side the method takes it to be.
+/// A ball over a sheet, whose vertices began above it. A contact in the interior of a face shows
+/// the side that the method assumes.
 struct BallAndSheet {
   Mesh ball = sphere(5, 7, {0.5, 0.5, 0.35}, 0.2), sheet = testing::sheet(5, 0, 1.0);
 
@@ -51,7 +51,7 @@ struct BallAndSheet {
   }
 };
 
-/// Frames in which an answer was wrong, and in which trust was refused though it was right.
+/// Frames with a wrong answer, and frames with a correct answer that was not trusted.
 struct Tally {
   std::size_t frames = 0, wrong = 0, silent = 0, refused = 0, refusedRight = 0;
   friend std::ostream& operator<<(std::ostream& out, const Tally& t) {
@@ -67,12 +67,12 @@ struct Tally {
   }
 };
 
-/// Lives of a ball that bobs over a sheet by `speed` thicknesses a frame, up to where they cross.
-Tally livesOf(const PairSettings& settings, double speed, std::uint64_t seed, std::size_t lives,
-              bool response) {
+/// Histories of a ball that bobs over a sheet by `speed` thicknesses per frame, up to crossing it.
+Tally historiesOf(const PairSettings& settings, double speed, std::uint64_t seed,
+                  std::size_t histories, bool response) {
   Random random(seed);
   Tally tally;
-  for (std::size_t life = 0; life < lives; ++life) {
+  for (std::size_t history = 0; history < histories; ++history) {
     const BallAndSheet scene;
     PairRun run(settingsOf(Engine::Octree), scene.ball, scene.sheet, settings, false);
     Positions ball = scene.ball.positions, sheet = scene.sheet.positions;
@@ -80,7 +80,7 @@ Tally livesOf(const PairSettings& settings, double speed, std::uint64_t seed, st
     for (Vector3d& p : ball) p.z() -= drop;
     run.step(ball, ball, sheet, sheet);
     const Positions start = ball;
-    bool crossed = false;  // so far: then nobody knows sides any more
+    bool crossed = false;  // until now; afterwards no side is defined
     double height = 0;
     for (int frame = 0; frame < 12 && !crossed; ++frame) {
       height += uniform(random, -1.2, 1.0) * speed * kThickness;
@@ -88,7 +88,7 @@ Tally livesOf(const PairSettings& settings, double speed, std::uint64_t seed, st
       for (Vector3d& p : ballNow)
         p += Vector3d(0, 0, height) + randomPoint(random, -0.1, 0.1) * speed * kThickness;
       for (Vector3d& p : sheetNow) p += randomPoint(random, -0.1, 0.1) * speed * kThickness;
-      if (response && frame % 3 == 2)  // corrected since, by a solver
+      if (response && frame % 3 == 2)  // corrected since by a solver
         for (Vector3d& p : ballBefore) p.z() += 0.2 * kThickness;
       const Truth truth = truthOf(scene.ball, scene.sheet, ballBefore, ballNow, sheet, sheetNow);
       if (response) {
@@ -106,7 +106,7 @@ Tally livesOf(const PairSettings& settings, double speed, std::uint64_t seed, st
         case Method::Intersection:
           wrong = truth.touched && run.data().intersectingTriangles().empty();
           break;
-        case Method::Proximity:  // it cannot see impacts at all
+        case Method::Proximity:  // the method cannot find impacts
           wrong = truth.touched || fromBelow;
           break;
         default:
@@ -114,7 +114,7 @@ Tally livesOf(const PairSettings& settings, double speed, std::uint64_t seed, st
       }
       if (validity.startedApart) {
         EXPECT_TRUE(truth.startedApart);
-        if (settings.method == Method::Auto) {  // then nothing is Intersection's
+        if (settings.method == Method::Auto) {  // then there are no contacts of Intersection
           EXPECT_TRUE(run.data().intersectingTriangles().empty());
         }
       }
@@ -129,13 +129,13 @@ Tally livesOf(const PairSettings& settings, double speed, std::uint64_t seed, st
   return tally;
 }
 
-struct MethodTest : ::testing::TestWithParam<MethodCase> {};
+struct ValidityOfMethod : ::testing::TestWithParam<MethodCase> {};
 
-TEST_P(MethodTest, FailsNeverSilently) {
+TEST_P(ValidityOfMethod, NeverFailsSilently) {
   for (const bool response : {false, true}) {
     Tally all;
     for (const double speed : {0.01, 0.1, 0.3, 0.7, 1.0, 1.5, 3.0, 10.0, 50.0}) {
-      const Tally tally = livesOf(GetParam().settings, speed, 5, 40, response);
+      const Tally tally = historiesOf(GetParam().settings, speed, 5, 40, response);
       EXPECT_EQ(tally.silent, 0u) << "speed " << speed;
       std::cout << (response ? "response, " : "") << "speed " << speed << ": " << tally << "\n";
       all.wrong += tally.wrong;
@@ -157,19 +157,19 @@ Mesh asOne(const BallAndSheet& scene) {
   return mesh;
 }
 
-/// Frames of lives that go through each other and back, by what was known of their start.
+/// Frames of histories of bodies that go through each other and back, by startedApart.
 struct Known {
   std::size_t frames = 0, apart = 0, foundApart = 0, looks = 0;
 };
 
-/// Uncorrected. place(frame, positions at rest, whether of the second mesh): where they are.
+/// Without correction. place(frame, positions at rest, is second mesh) gives the positions.
 template <class Place>
 Known livesThrough(const PairSettings& settings, const Mesh& a, const Mesh* b, int threads,
                    Place&& place) {
   Known known;
   OctreeBasedCD detection(settingsOf(Engine::Octree, threads));
   OctreeBasedCD truth(settingsOf(Engine::BruteForce));
-  OctreeBasedCD all(settingsOf(Engine::Octree, threads));  // impacts that Distinct leaves out
+  OctreeBasedCD all(settingsOf(Engine::Octree, threads));  // impacts that Distinct excludes
   const auto add = [&](OctreeBasedCD& to, const PairSettings& pair) {
     const GeometryId first = to.addTriangleMesh(a.positions, a.triangles);
     to.addCollisionPair(first, b ? to.addTriangleMesh(b->positions, b->triangles) : first, pair);
@@ -188,7 +188,7 @@ Known livesThrough(const PairSettings& settings, const Mesh& a, const Mesh* b, i
       each->setPositions(pair.a, nowA);
       if (b) each->setPositions(pair.b, nowB);
     }
-    // This frame's start is the last one's end.
+    // This step starts where the previous one ended.
     const bool apart = frame > 0 && dataOf(truth).intersectingTriangles().empty();
     for (OctreeBasedCD* each : {&detection, &truth, &all}) {
       each->detectCollision();
@@ -207,16 +207,16 @@ Known livesThrough(const PairSettings& settings, const Mesh& a, const Mesh* b, i
     known.looks += statistics.validityPairs > contacts + 32;
     EXPECT_LE(statistics.validityPairs, statistics.candidatePairs + contacts + 32);
   }
-  // What contacts do not tell is looked at once, and then now and then.
+  // If contacts do not tell, the initial intersection check runs once, and later now and then.
   if (settings.method != Method::Auto) {
     EXPECT_LE(known.looks, 4 + known.frames / 16);
   }
   return known;
 }
 
-TEST_P(MethodTest, KnowsTheStartFromImpactsOfTheStepBefore) {
+TEST_P(ValidityOfMethod, KnowsStartedApartFromImpactsOfThePreviousStep) {
   const PairSettings& settings = GetParam().settings;
-  if (settings.method == Method::Intersection) return;  // it does not ask
+  if (settings.method == Method::Intersection) return;  // the check does not run
   const BallAndSheet scene;
   const Mesh one = asOne(scene);
   Known all;
@@ -243,7 +243,7 @@ TEST_P(MethodTest, KnowsTheStartFromImpactsOfTheStepBefore) {
                              return now;
                            }));
       }
-  // Where one feature alone tells.
+  // Where a single feature decides.
   for (std::uint64_t seed = 0; seed < 300; ++seed) {
     SCOPED_TRACE("few triangles, seed " + std::to_string(seed));
     Random random(1000 + seed);
@@ -279,8 +279,8 @@ TEST_P(MethodTest, KnowsTheStartFromImpactsOfTheStepBefore) {
   }
 }
 
-/// Read as positions are copied, or later: of whichever step it is.
-TEST(Displacement, IsThatOfTheStep) {
+/// Read while positions are copied or later, it is the displacement of the same step.
+TEST(Displacement, IsTheRelativeMotionOfTheStep) {
   for (const int threads : {1, 2}) {
     Random random(3);
     const Mesh mesh = soup(random, 7000, 0.01);
@@ -297,7 +297,8 @@ TEST(Displacement, IsThatOfTheStep) {
     };
     for (int frame = 0; frame < 12; ++frame) {
       Positions before = last;
-      if (frame % 3 == 1) run.detection().setPositions(run.a(), moved(last));  // another's place
+      if (frame % 3 == 1)
+        run.detection().setPositions(run.a(), moved(last));  // the place of another one
       const Positions now = moved(last);
       if (frame % 4 == 3) before = moved(last);
       if (frame % 4 == 3)
@@ -316,7 +317,7 @@ TEST(Displacement, IsThatOfTheStep) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Validity, MethodTest,
+    Validity, ValidityOfMethod,
     ::testing::Values(MethodCase{"Intersection", {Method::Intersection}},
                       MethodCase{"ProximityDistinct", {Method::Proximity, kThickness}},
                       MethodCase{"ProximityAll", {Method::Proximity, kThickness, Contacts::All}},
@@ -328,8 +329,8 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return test.param.name; });
 
 /// A step without motion, with features within the thickness. Then a solver moves positions by less
-/// than that, so that the meshes intersect.
-TEST(StartedApart, IsNotSaidAfterACorrectionBeyondWhatWasLeft) {
+/// than the thickness, so that the meshes intersect.
+TEST(StartedApart, IsFalseAfterACorrectionBeyondTheRemainingDistance) {
   const Mesh low = sheet(4, 0.0, 0.0);
   std::vector<Eigen::Vector3d> high = low.positions;
   for (Eigen::Vector3d& p : high) p.z() += 0.02;

@@ -10,7 +10,7 @@ using Triangles = std::vector<Triangle>;
 const Triangles kTriangle{{0, 1, 2}};
 const Triangles kTetrahedron{{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
 const Positions kFloor{{-1, -1, 0}, {2, -1, 0}, {-1, 2, 0}};
-/// Its tip, vertex 3, is below kFloor, and inside its border.
+/// Its tip, vertex 3, is below kFloor and above its interior.
 const Positions kTip{{-0.25, -0.25, 1}, {0.25, -0.25, 1}, {0, 0.25, 1}, {0, 0, -0.25}};
 
 Positions scaled(Positions positions, double factor) {
@@ -31,7 +31,7 @@ CollisionProblem intersection(const Positions& a, const Triangles& trianglesA, c
   return problem;
 }
 
-/// The tip far from where everything was before the step.
+/// The tip is far from everything before the step.
 CollisionProblem outsideRoot() {
   CollisionProblem problem = intersection(kFloor, kTriangle, kTip, kTetrahedron);
   for (CollisionProblem::Geometry& mesh : problem.geometries)

@@ -9,15 +9,15 @@
 
 namespace palpate::testing {
 
-/// A small problem that an older octree answered wrongly, and its answer.
+/// A small problem that an older octree solved wrongly, and its counts of contacts.
 struct RegressionProblem {
   std::string name;  ///< of the file, without extension
   CollisionProblem problem;
-  /// Of the first pair: vertex-triangle, triangle-vertex, edge-edge, intersecting triangles.
+  /// Counts of the first pair: vertex-triangle, triangle-vertex, edge-edge, intersecting triangles.
   std::array<std::size_t, 4> counts;
 };
 
-/// Those of Data/Regression that are made here.
+/// The generated problems of Data/Regression.
 std::vector<RegressionProblem> regressionProblems();
 
 }  // namespace palpate::testing

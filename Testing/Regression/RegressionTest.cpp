@@ -41,7 +41,7 @@ void expectAsBruteForce(const CollisionProblem& problem) {
   }
 }
 
-TEST(Regression, EveryFileIsAnsweredAsByBruteForce) {
+TEST(Regression, EveryFileMatchesBruteForce) {
   std::size_t files = 0;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder())) {
     if (entry.path().extension() != ".capture") continue;
@@ -52,14 +52,14 @@ TEST(Regression, EveryFileIsAnsweredAsByBruteForce) {
   EXPECT_GE(files, testing::regressionProblems().size());
 }
 
-TEST(Regression, TheOldOctreesFailuresAreAnswered) {
+TEST(Regression, FailuresOfTheOldOctreeAreSolved) {
   for (const auto& [name, problem, counts] : testing::regressionProblems()) {
     SCOPED_TRACE(name);
     EXPECT_EQ(countsOf(dataOf(solve(problem, Engine::Octree), problem.pairs[0])), counts);
   }
 }
 
-TEST(Regression, FilesAreWhatIsMadeHere) {
+TEST(Regression, FilesMatchTheGeneratedProblems) {
   const auto textOf = [](const fs::path& path) {
     std::ifstream file(path, std::ios::binary);
     return std::string(std::istreambuf_iterator<char>(file), {});
@@ -73,7 +73,7 @@ TEST(Regression, FilesAreWhatIsMadeHere) {
 }
 
 /// The old octree reported pairs twice after bodies had left its root and come back.
-TEST(Regression, BodiesThatLeftAndCameBack) {
+TEST(Regression, BodiesMayLeaveAndComeBack) {
   CollisionProblem problem = testing::regressionProblems()[0].problem;
   OctreeBasedCD detection = setUp(problem);
   const std::vector<Eigen::Vector3d> home = problem.geometries[1].now;
@@ -97,7 +97,7 @@ TEST(Regression, BodiesThatLeftAndCameBack) {
 }
 
 /// The old octree hung after a triangle had grown to the root's size and shrunk again.
-TEST(Regression, ATriangleThatGrewAndShrank) {
+TEST(Regression, TriangleMayGrowAndShrink) {
   CollisionProblem problem = testing::regressionProblems()[0].problem;
   for (const OctreeUpdate update : {OctreeUpdate::Auto, OctreeUpdate::Rebuild}) {
     problem.settings.octree.update = update;
@@ -142,7 +142,7 @@ bool hasTriangleAt(const CollisionProblem& problem, GeometryId id, double x) {
 
 TEST(Shrink, KeepsOnlyWhatFails) {
   std::size_t calls = 0;
-  // Fails by one triangle each of meshes 0 and 2, where the pair (0, 2) is there.
+  // Fails if one triangle each of meshes 0 and 2 and the pair (0, 2) exist.
   const auto fails = [&](const CollisionProblem& problem) {
     ++calls;
     bool hasPair = false;

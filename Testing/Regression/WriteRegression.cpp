@@ -1,4 +1,4 @@
-// PalpateWriteRegression FOLDER: writes those files of Data/Regression that are made here.
+// PalpateWriteRegression FOLDER: writes the generated files of Data/Regression.
 #include "Problems.h"
 
 #include <palpate/Capture.h>

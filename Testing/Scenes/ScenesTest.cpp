@@ -62,7 +62,7 @@ std::size_t candidates(const Scene& scene, int frame, std::size_t a, std::size_t
   return count;
 }
 
-TEST(Meshes, CountsClosureAndWinding) {
+TEST(Meshes, HaveTheirCountsClosureAndWinding) {
   for (const SceneMesh& mesh : {sphere(1), sphere(2), sphere(11), gradedSphere(24, 1e-2)}) {
     EXPECT_TRUE(closedAndConsistentlyWound(mesh));
     EXPECT_EQ(mesh.positions.size(), mesh.triangles.size() / 2 + 2);
@@ -73,11 +73,12 @@ TEST(Meshes, CountsClosureAndWinding) {
   EXPECT_EQ(tube(5, 4).triangles.size(), 40u);
 }
 
-TEST(Meshes, GradedSphereSpansItsSizes) {
+TEST(Meshes, GradedSphereSpansItsRangeOfSizes) {
   const SceneMesh mesh = gradedSphere(119, 1e-4);
   double least = 1, most = 0;
   for (const auto& [a, b, c] :
-       std::span(mesh.triangles).first(mesh.triangles.size() - 2 * 119)) {  // less the fans
+       std::span(mesh.triangles)
+           .first(mesh.triangles.size() - 2 * 119)) {  // without the fans at the poles
     const Vector3d& corner = mesh.positions[a];
     const double size =
         std::sqrt((mesh.positions[b] - corner).cross(mesh.positions[c] - corner).norm());
@@ -87,7 +88,7 @@ TEST(Meshes, GradedSphereSpansItsSizes) {
   EXPECT_NEAR(most / least, 1e4, 2e3);
 }
 
-TEST(Organs, AreClosedOutwardAndOfTheirSize) {
+TEST(Organs, AreClosedWoundOutwardAndOfTheirSize) {
   for (const auto& [name, mesh] : organMeshes()) {
     EXPECT_TRUE(closedAndConsistentlyWound(mesh)) << name;
     EXPECT_GT(volume(mesh), 1.0) << name;
@@ -95,7 +96,7 @@ TEST(Organs, AreClosedOutwardAndOfTheirSize) {
   EXPECT_EQ(organs().triangleCount(), 10840u);
 }
 
-TEST(Organs, FilesAreWhatTheGeneratorMakes) {
+TEST(Organs, FilesMatchTheGenerator) {
   for (const Organ& organ : organMeshes()) {
     std::ifstream file(std::string(PALPATE_SOURCE_DIR) + "/Data/Organs/" + organ.name + ".obj");
     std::stringstream text;
@@ -104,7 +105,7 @@ TEST(Organs, FilesAreWhatTheGeneratorMakes) {
   }
 }
 
-TEST(Organs, EveryPairMeetsAndParts) {
+TEST(Organs, EveryPairTouchesAndSeparates) {
   const Scene scene = organs();
   ASSERT_EQ(scene.pairs.size(), 10u);
   std::size_t apart = 0, together = 0;
@@ -119,7 +120,7 @@ TEST(Organs, EveryPairMeetsAndParts) {
   EXPECT_LT(apart, 3'000u);
 }
 
-TEST(Scenes, AreTheSameEveryTimeAndRepeat) {
+TEST(Scenes, AreReproducibleAndPeriodic) {
   for (const auto make : {organs, unevenBodies, foldedCloth}) {
     const Scene first = make(), second = make();
     std::vector<Vector3d> one, other, later;
@@ -135,7 +136,7 @@ TEST(Scenes, AreTheSameEveryTimeAndRepeat) {
   }
 }
 
-TEST(Scenes, HaveTheirTriangles) {
+TEST(Scenes, HaveTheirTriangleCounts) {
   EXPECT_EQ(clothOnBall().meshes.front().triangles.size(), 112'338u);
   EXPECT_EQ(unevenBodies().triangleCount(), 103'292u);
   EXPECT_EQ(foldedCloth().triangleCount(), 18'050u);
@@ -147,9 +148,9 @@ TEST(Scenes, HaveTheirTriangles) {
   }
 }
 
-// Boxes, keys, octree and scratch together, also where every frame is rebuilt and each has needed
-// its most.
-TEST(Scenes, TakeLessThanAHundredBytesATriangle) {
+// Boxes, keys, octree and scratch together, also if every frame is rebuilt and each buffer has its
+// peak size.
+TEST(Scenes, NeedLessThanAHundredBytesPerTriangle) {
   for (const Scene& scene : {organs(), foldedCloth(), interleavedSheets(64'000)}) {
     Settings settings;
     settings.octree.update = OctreeUpdate::Rebuild;
@@ -170,7 +171,7 @@ TEST(Scenes, TakeLessThanAHundredBytesATriangle) {
   }
 }
 
-TEST(Scenes, HardOnesAreSmallRepeatAndTouch) {
+TEST(Scenes, HardScenesAreSmallPeriodicAndTouch) {
   const std::vector<Scene> scenes = hardScenes();
   ASSERT_EQ(scenes.size(), 8u);
   for (const Scene& scene : scenes) {

@@ -14,7 +14,7 @@ using Eigen::Vector3d;
 using testing::Random;
 using testing::uniform;
 
-/// L: of comfortable triangles about 1 in size.
+/// L: for triangles of size 1.
 constexpr double kThickness = 0.05;
 constexpr int kSteps = 25;
 
@@ -25,14 +25,14 @@ std::vector<double> powers(double from, double to) {
   return values;
 }
 
-/// What a case is made of. Triangle b lies still about its features' plane z = 0, a comes down on
-/// it along -z and somewhat sideways.
+/// Parameters of a case. Triangle b rests at the plane z = 0. Triangle a comes down along -z and
+/// sideways.
 struct Design {
-  bool edges = false;    ///< edge to edge, else a's corner on b's face
-  double start = 0.025;  ///< L: height of a's nearest point over b, before
-  double end = -0.025;   ///< now
-  double slant = 0.3;    ///< sideways, of the way down
-  double sliver = 1;     ///< b's height, of its base
+  bool edges = false;    ///< edge on edge; otherwise a's corner on b's face
+  double start = 0.025;  ///< L: height of a's nearest point over b at the start
+  double end = -0.025;   ///< L: the same at the end
+  double slant = 0.3;    ///< sideways motion / motion down
+  double sliver = 1;     ///< b's height / its base
   double angle = 1;      ///< radians between the edges
   double sizeOfB = 1;
 };
@@ -40,7 +40,7 @@ struct Design {
 Vector3d inPlane(double angle) { return {std::cos(angle), std::sin(angle), 0}; }
 
 Corners faceOf(const Design& design, Random& random) {
-  // The origin is well inside.
+  // The origin is inside the face.
   const double u = uniform(random, 0.2, 0.4), v = uniform(random, 0.2, 0.4), size = design.sizeOfB;
   Corners b{Vector3d(0, 0, 0), Vector3d(size, 0, 0),
             Vector3d(uniform(random, 0.3, 0.7) * size, 0.9 * size * design.sliver, 0)};
@@ -49,14 +49,14 @@ Corners faceOf(const Design& design, Random& random) {
   return b;
 }
 
-/// A corner at the origin, the other two above.
+/// A triangle with one corner at the origin and two above.
 Corners cornerDown(Random& random) {
   const double turn = uniform(random, 0, 2 * std::numbers::pi);
   return {Vector3d::Zero(), inPlane(turn) * 0.6 + Vector3d(0, 0, uniform(random, 0.5, 0.8)),
           inPlane(turn + uniform(random, 1, 2)) * 0.6 + Vector3d(0, 0, uniform(random, 0.5, 0.8))};
 }
 
-/// An edge through the origin, the third corner above (side 1) or below.
+/// A triangle with an edge through the origin. The third corner is above (side 1) or below.
 Corners edgeThrough(double along, double side, double size, Random& random) {
   const double share = uniform(random, 0.3, 0.7);
   return {-share * size * inPlane(along), (1 - share) * size * inPlane(along),
@@ -65,7 +65,7 @@ Corners edgeThrough(double along, double side, double size, Random& random) {
                   Vector3d(0, 0, side * uniform(random, 0.5, 0.8)))};
 }
 
-/// So that the normal of each is on the other's side.
+/// Orders the corners so that each normal points to the other triangle.
 void windTowardsEachOther(Case::Frame& frame) {
   const auto turn = [](Corners& t, const Vector3d& towards) {
     if ((t[1] - t[0]).cross(t[2] - t[0]).dot(towards) < 0) std::swap(t[1], t[2]);
@@ -95,7 +95,7 @@ Case build(const Design& design, Random& random, int frames = 1) {
   windTowardsEachOther(frame);
   const Vector3d sideways =
       design.slant * uniform(random, 0, 1) * inPlane(uniform(random, 0, 2 * std::numbers::pi));
-  // Where the way crosses b's plane, or where it would, the sideways part is zero.
+  // The sideways part is zero where the path meets b's plane.
   const auto at = [&](double height) -> Vector3d {
     return Vector3d(0, 0, height) + height * sideways;
   };
@@ -113,13 +113,13 @@ Case build(const Design& design, Random& random, int frames = 1) {
   return made;
 }
 
-/// Of a way down `length` long three quarters cross the plane, a quarter ends before it.
-Design onTheWay(double length, Random& random) {
+/// A path of this length down. Three quarters of the paths cross the plane; a quarter ends before.
+Design onAPath(double length, Random& random) {
   const double crossing =
       random() % 4 == 0 ? uniform(random, 1.05, 1.5) : uniform(random, 0.1, 0.9);
   return {.edges = random() % 2 == 0, .start = crossing * length, .end = (crossing - 1) * length};
 }
-Design comfortable(Random& random) { return onTheWay(0.5 * kThickness, random); }
+Design easy(Random& random) { return onAPath(0.5 * kThickness, random); }
 
 Case deep(double depth, Random& random) {
   Case made = build({.start = -depth + 0.1 * kThickness, .end = -depth}, random);
@@ -134,14 +134,14 @@ Case gapped(double gap, Random& random) {
 }
 
 Case farAway(double offset, Random& random) {
-  Case made = build(comfortable(random), random);
+  Case made = build(easy(random), random);
   const Vector3d by = offset * testing::randomPoint(random, 0.5, 1);
   transform(made, [&](const Vector3d& p) -> Vector3d { return p + by; });
   return made;
 }
 
 Case scaled(double scale, Random& random) {
-  Case made = build(comfortable(random), random);
+  Case made = build(easy(random), random);
   transform(made, [&](const Vector3d& p) -> Vector3d { return scale * p; });
   made.thickness *= scale;
   return made;
@@ -182,36 +182,36 @@ std::vector<Sweep> sweeps() {
   }
   subdivisions.insert(subdivisions.end(), {1.0 / 3, 1.0 / 2, 1.0});
   std::vector<Sweep> all{
-      {"speed", "way in a step / thickness", powers(-1, 3),
-       [](double x, Random& random) { return build(onTheWay(x * kThickness, random), random); }},
+      {"speed", "motion in a step / thickness", powers(-1, 3),
+       [](double x, Random& random) { return build(onAPath(x * kThickness, random), random); }},
       {"depth", "depth / thickness", powers(-1, 1.2),
        [](double x, Random& random) { return deep(x * kThickness, random); }, true},
       {"sliver", "height of a triangle / its base", powers(0, -16),
        [](double x, Random& random) {
-         Design design = comfortable(random);
+         Design design = easy(random);
          design.sliver = x;
          return build(design, random);
        }},
       {"parallel edges", "angle between edges (radians)", powers(0, -16),
        [](double x, Random& random) {
-         Design design = comfortable(random);
+         Design design = easy(random);
          design.edges = true;
          design.angle = x;
          return build(design, random);
        }},
       {"gap", "gap or depth at the end / size", powers(0, -16), gapped},
       {"offset", "distance from the origin / size", powers(0, 15), farAway},
-      {"small scale", "scale", powers(0, -150), scaled},
-      {"large scale", "scale", powers(0, 150), scaled},
+      {"small scale", "size of the triangles (L)", powers(0, -150), scaled},
+      {"large scale", "size of the triangles (L)", powers(0, 150), scaled},
       {"size ratio", "size of one / size of the other", powers(0, 12),
        [](double x, Random& random) {
-         Design design = comfortable(random);
+         Design design = easy(random);
          design.sizeOfB = x;
          return build(design, random);
        }},
-      {"time step", "step / whole way of 30 thicknesses", subdivisions,
+      {"time step", "motion in a step / whole motion of 30 thicknesses", subdivisions,
        [](double x, Random& random) {
-         return build(onTheWay(30 * kThickness, random), random,
+         return build(onAPath(30 * kThickness, random), random,
                       static_cast<int>(std::lround(1 / x)));
        }}};
   return all;

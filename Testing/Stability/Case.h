@@ -15,31 +15,32 @@ namespace palpate::stability {
 
 using Corners = std::array<Eigen::Vector3d, 3>;
 
-/// Two triangles and how they move: frame by frame, straight within each.
+/// Two triangles and their motion, which is straight within each frame.
 struct Case {
   struct Frame {
     Corners a, b;
   };
-  std::vector<Frame> frames;  ///< the first is where they start
+  std::vector<Frame> frames;  ///< the first has the start positions
   double thickness;
-  /// They start in each other: vertices are judged to belong on the side of the triangle's normal.
+  /// The triangles intersect at the start. The correct side of a vertex is that of the triangle's
+  /// normal.
   bool startsInside = false;
 };
 
-/// As the same scene's frames, which every method takes.
+/// The case as a scene, which every method accepts.
 scenes::Scene sceneOf(const Case&);
 std::vector<std::vector<Eigen::Vector3d>> positionsOf(const Case::Frame&);
 
-/// The same with every coordinate moved by up to `noise` of the extent of the triangle it is of.
+/// The same case with noise: each coordinate moves by up to `noise` times its triangle's extent.
 Case neighbourOf(const Case&, double noise, testing::Random&);
 
-/// From comfortable to hopeless along one line.
+/// Cases in which one property becomes more difficult from step to step.
 struct Sweep {
   std::string name;
-  std::string difficulty;      ///< what the values are, with unit
-  std::vector<double> values;  ///< comfortable first
+  std::string quantity;        ///< the quantity of the values, with unit or ratio
+  std::vector<double> values;  ///< easiest first
   std::function<Case(double value, testing::Random&)> make;
-  bool startsInside = false;  ///< which Continuous does not promise to tell
+  bool startsInside = false;  ///< intersections at the start, which Continuous does not report
 };
 
 std::vector<Sweep> sweeps();

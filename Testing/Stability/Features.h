@@ -10,7 +10,7 @@ namespace palpate::stability {
 
 using accuracy::FeaturePair;
 
-/// The fifteen pairs of features of two triangles, and the four vertices of each.
+/// The fifteen feature pairs of two triangles, and the four vertices of each.
 const std::vector<FeaturePair>& everyFeaturePair();
 std::array<Eigen::Vector3d, 4> positionsOf(const FeaturePair&, const Case::Frame&);
 

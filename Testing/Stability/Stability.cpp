@@ -1,11 +1,9 @@
-// Sweeps of two triangles that meet, from comfortable to hopeless: what each method gets wrong, and
-// where it starts to. Fails where a method is not finite, or is not what it is defined to be.
-#ifdef PALPATE_HAS_CHARTS
-#include "Chart.h"
-#endif
+// Sweeps of two triangles that meet. Each sweep makes one property more difficult, and the program
+// counts the errors of each method. It fails if a result is not finite or violates the definition
+// of its method. Docs/Figures/stability.py draws the chart from the CSV.
 #include "HtmlReport.h"
-#include "WriteFile.h"
 #include "Tally.h"
+#include "WriteFile.h"
 
 #include <CLI/CLI.hpp>
 
@@ -30,23 +28,23 @@ struct Options {
 };
 
 report::Figures emptyFigures() {
-  return {{"sweep", "method", "setting"},
-          {{"difficulty", "difficulty"},
-           {"failed", "missed or invented (%)"},
-           {"missed", "touching and not reported (%)"},
-           {"invented", "reported and not touching (%)"},
-           {"turned", "normal on the wrong side (%)"},
-           {"flipped", "normal turned by noise of 1e-7 (%)"},
+  return {{"sweep", "quantity", "method", "setting"},
+          {{"difficulty", "difficulty (value of the quantity)"},
+           {"failed", "false negatives and false positives (% of cases)"},
+           {"false_negatives", "false negatives (% of cases)"},
+           {"false_positives", "false positives (% of cases)"},
+           {"wrong_side", "normal on the wrong side (% of cases)"},
+           {"turned_by_noise", "normal turned by noise of 1e-7 (% of cases)"},
            {"not_finite", "contacts not finite"},
-           {"not_unit", "contacts whose normal is not unit"},
-           {"undefined", "features against the method's own definition"},
-           {"silent", "answers wrong and trusted"},
-           {"wrong", "answers wrong (%)"},
-           {"alarms", "answers right and not trusted (%)"},
+           {"not_unit", "contacts whose normal does not have unit length"},
+           {"against_definition", "feature pairs against the method's definition"},
+           {"wrong_trusted", "answers wrong and trusted"},
+           {"wrong", "impact missing or normal on the wrong side (% of answers)"},
+           {"right_untrusted", "answers right and not trusted (%)"},
            {"us", "microseconds a case"}}};
 }
 
-/// `most` of the values, evenly from first to last, or all.
+/// At most `most` of the values, evenly spaced from the first to the last.
 std::vector<double> chosen(const std::vector<double>& values, int most) {
   const std::size_t count = std::min(values.size(), static_cast<std::size_t>(most));
   std::vector<double> some;
@@ -68,16 +66,18 @@ double percentOfAnswers(std::size_t part, const Tally& tally) {
 report::Figures::Row rowOf(const Sweep& sweep, double value, const Subject& subject,
                            const Tally& tally) {
   const auto count = [](std::size_t n) { return static_cast<double>(n); };
-  return {{sweep.name, subject.contestant.family, subject.contestant.setting},
-          {value, percent(tally.missed + tally.invented, tally), percent(tally.missed, tally),
-           percent(tally.invented, tally), percent(tally.turned, tally),
-           percent(tally.flipped, tally), count(tally.notFinite), count(tally.notUnit),
-           count(tally.undefinedMissed + tally.undefinedInvented + tally.untimely),
-           count(tally.silent), percentOfAnswers(tally.wrong, tally),
-           percentOfAnswers(tally.alarms, tally), 1000 * tally.milliseconds / count(tally.cases)}};
+  return {
+      {sweep.name, sweep.quantity, subject.contestant.family, subject.contestant.setting},
+      {value, percent(tally.falseNegatives + tally.falsePositives, tally),
+       percent(tally.falseNegatives, tally), percent(tally.falsePositives, tally),
+       percent(tally.wrongSide, tally), percent(tally.turnedByNoise, tally), count(tally.notFinite),
+       count(tally.notUnit), count(tally.featuresMissing + tally.featuresExtra + tally.untimely),
+       count(tally.wrongTrusted), percentOfAnswers(tally.wrong, tally),
+       percentOfAnswers(tally.rightUntrusted, tally),
+       1000 * tally.milliseconds / count(tally.cases)}};
 }
 
-/// Prints and counts what must never be.
+/// Prints and counts faults, which must not occur.
 int faultsOf(const Sweep& sweep, double value, const Subject& subject, const Tally& tally) {
   int faults = 0;
   const auto expectNone = [&](std::size_t count, const char* what) {
@@ -87,16 +87,16 @@ int faultsOf(const Sweep& sweep, double value, const Subject& subject, const Tal
                 subject.contestant.family.c_str(), count, what);
   };
   if (subject.contestant.family == "FCL") return 0;
-  expectNone(tally.silent, "answers wrong and trusted");
+  expectNone(tally.wrongTrusted, "answers wrong and trusted");
   expectNone(tally.notFinite, "contacts not finite");
-  expectNone(tally.notUnit, "normals not unit");
-  expectNone(tally.undefinedMissed, "features missed");
-  expectNone(tally.undefinedInvented, "features invented");
+  expectNone(tally.notUnit, "normals without unit length");
+  expectNone(tally.featuresMissing, "feature pairs missing by the method's definition");
+  expectNone(tally.featuresExtra, "feature pairs beyond the method's definition");
   expectNone(tally.untimely, "times of impact late, or early by more than 1e-6");
   if (subject.definition != Definition::Continuous) return faults;
-  expectNone(tally.turned, "normals of Continuous on the wrong side");
+  expectNone(tally.wrongSide, "normals of Continuous on the wrong side");
   if (!sweep.startsInside)
-    expectNone(tally.missedApart + tally.invented, "cases failed by Continuous");
+    expectNone(tally.falseNegativesNew + tally.falsePositives, "false answers of Continuous");
   return faults;
 }
 
@@ -115,8 +115,8 @@ int measure(const Options& options, report::Figures& figures) {
       std::printf("%-10.3g", value);
       for (std::size_t s = 0; s < all.size(); ++s)
         std::printf(" %5.1f / %5.1f %7.1f us",
-                    percent(tallies[s].missed + tallies[s].invented, tallies[s]),
-                    percent(tallies[s].turned, tallies[s]),
+                    percent(tallies[s].falseNegatives + tallies[s].falsePositives, tallies[s]),
+                    percent(tallies[s].wrongSide, tallies[s]),
                     1000 * tallies[s].milliseconds / static_cast<double>(tallies[s].cases));
       std::printf("\n");
       for (std::size_t s = 0; s < all.size(); ++s) {
@@ -131,15 +131,19 @@ int measure(const Options& options, report::Figures& figures) {
 
 report::View view() {
   report::View view;
-  view.title = "Palpate: past the failing point";
+  view.title = "Palpate: where each method starts to fail";
   view.paragraphs = {
-      "Two triangles meet in a step, over and over, and one thing about them gets harder from step "
-      "to step of a sweep. Failed: "
-      "they touch and nothing is reported, or something is reported to touch and does not, or a "
-      "normal points to the side "
-      "that its features did not come from. What is true is decided in rational arithmetic that "
-      "shares no code with the "
-      "library."};
+      "Two triangles meet within a step, in many random cases. Each sweep makes one property of "
+      "the cases more difficult from step to step. The reference is decided in rational "
+      "arithmetic that shares no code with the library.",
+      "Cases: a case is a false negative if the two triangles touch at any time of the step, "
+      "also if they intersect throughout, and the method reports nothing. It is a false "
+      "positive if the triangles do not touch and the method reports that they do. A normal is "
+      "on the wrong side if it points to the side that its features did not come from.",
+      "Answers: an impact is a pair of features, vertex and triangle or two edges, that touch "
+      "within the step. An answer is wrong if an impact is missing or a normal is on the wrong "
+      "side. Triangles that intersect throughout the step have no impact. A method that reports "
+      "impacts only then has a false negative, and its answer is not wrong."};
   view.group = "sweep";
   view.series = "method";
   view.label = "setting";
@@ -153,49 +157,28 @@ void checkNames(const std::vector<std::string>& names) {
   const std::vector<Sweep> all = sweeps();
   for (const std::string& name : names)
     if (std::none_of(all.begin(), all.end(), [&](const Sweep& s) { return s.name == name; }))
-      throw std::invalid_argument("no sweep is called \"" + name + "\"");
+      throw std::invalid_argument("There is no sweep \"" + name + "\"");
 }
 
 void write(const Options& options, const report::Figures& figures) {
   std::filesystem::create_directories(options.out);
   scenes::writeWhole(options.out / "stability.csv", figures.csv());
   scenes::writeWhole(options.out / "report.html", toHtml(figures, view()));
-#ifdef PALPATE_HAS_CHARTS
-  // Pictures are drawn in floats, which 1e150 is not.
-  auto quantities = figures.quantities();
-  quantities.push_back({"exponent", "difficulty, powers of ten"});
-  report::Figures drawable(figures.textKeys(), quantities);
-  for (report::Figures::Row row : figures.rows()) {
-    row.values.push_back(std::log10(row.values.front()));
-    drawable.add(std::move(row));
-  }
-  report::Charts charts{.diagrams = {}, .columns = 3, .width = 440, .height = 330};
-  for (const Sweep& sweep : sweeps())
-    charts.diagrams.push_back({.title = sweep.name,
-                               .group = "sweep",
-                               .value = sweep.name,
-                               .series = "method",
-                               .x = "exponent",
-                               .y = "failed",
-                               .logX = false,
-                               .lines = true});
-  draw(drawable, charts, options.out / "stability");
-#endif
   std::printf("figures and page: %s\n", options.out.c_str());
 }
 
 }  // namespace
 
 int main(int count, char** arguments) {
-  CLI::App app("Where methods start to fail.", "palpate_stability");
+  CLI::App app("The difficulty at which each method starts to fail.", "palpate_stability");
   Options options;
-  app.add_option("--out", options.out, "folder for stability.csv, .png, .svg and report.html");
-  app.add_option("--sweep", options.sweeps, "only these")->delimiter(',');
-  app.add_option("--cases", options.cases, "random cases a step")->capture_default_str();
-  app.add_option("--steps", options.steps, "of each sweep")
+  app.add_option("--out", options.out, "folder for stability.csv and report.html");
+  app.add_option("--sweep", options.sweeps, "only these sweeps")->delimiter(',');
+  app.add_option("--cases", options.cases, "random cases for each step")->capture_default_str();
+  app.add_option("--steps", options.steps, "steps of each sweep")
       ->check(CLI::Range(2, 28))
       ->capture_default_str();
-  app.add_flag("--redraw", options.redraw, "page and pictures again, from --out's stability.csv");
+  app.add_flag("--redraw", options.redraw, "writes the page again, from stability.csv in --out");
   CLI11_PARSE(app, count, arguments);
   try {
     checkNames(options.sweeps);

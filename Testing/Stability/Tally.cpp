@@ -1,7 +1,7 @@
 #include "Tally.h"
 
-#include "RestTruth.h"
-#include "TouchTruth.h"
+#include "RestReference.h"
+#include "TouchReference.h"
 
 #include <palpate/Error.h>
 
@@ -21,10 +21,10 @@ using accuracy::Claims;
 using Eigen::Vector3d;
 using Kind = FeaturePair::Kind;
 
-/// A case, all that is true of it, and the same case in noise.
+/// A case with its reference, and the same case with noise.
 struct Judged {
-  Case posed, neighbour;
-  std::vector<std::vector<Touch>> touches;  ///< frame by frame
+  Case posed, noisy;
+  std::vector<std::vector<Touch>> touches;  ///< of each frame
   std::vector<Rest> rests;                  ///< at the end of each frame
   bool touchingAtStart = false, touching = false;
 };
@@ -33,7 +33,7 @@ Judged judge(const Sweep& sweep, double value, testing::Random& random) {
   Judged judged;
   judged.posed = sweep.make(value, random);
   constexpr double kNoise = 1e-7;
-  judged.neighbour = neighbourOf(judged.posed, kNoise, random);
+  judged.noisy = neighbourOf(judged.posed, kNoise, random);
   const auto& frames = judged.posed.frames;
   judged.touching = judged.touchingAtStart =
       restOf(frames.front(), judged.posed.thickness).intersect;
@@ -45,7 +45,7 @@ Judged judge(const Sweep& sweep, double value, testing::Random& random) {
   return judged;
 }
 
-/// What a method says of each frame.
+/// The answers of a method, one a frame.
 std::vector<Claims> answersOf(const accuracy::Contestant& contestant, const Case& posed,
                               double& milliseconds) {
   const auto run = contestant.run(sceneOf(posed), positionsOf(posed.frames.front()));
@@ -63,33 +63,35 @@ const Touch* find(const std::vector<Touch>& touches, const FeaturePair& features
   return found == touches.end() ? nullptr : &*found;
 }
 
-bool says(const Claims& claims, const FeaturePair& features) {
+bool reports(const Claims& claims, const FeaturePair& features) {
   return std::any_of(claims.claims.begin(), claims.claims.end(),
                      [&](const Claim& claim) { return claim.features == features; });
 }
 
-/// Of this touch, or where impacts of the same closest features are said once, for this touch.
-bool says(const Claims& claims, const Touch& touch) {
-  if (says(claims, touch.features)) return true;
+/// True if the claims have this touch, or its substitute where the answer reports only distinct
+/// impacts.
+bool reports(const Claims& claims, const Touch& touch) {
+  if (reports(claims, touch.features)) return true;
   const accuracy::Incidence one({{0, 1, 2}});
   const Claim* substitute = accuracy::Substitutes(claims).find(touch.features, one, one);
   return substitute && !touch.isBefore(substitute->time) &&
-         !touch.isTurned(substitute->normal, substitute->time);
+         !touch.isWrongSide(substitute->normal, substitute->time);
 }
 
-/// Where the features came from their touch in this frame decides; of triangles the kindest.
-bool isTurned(const Claim& claim, const std::vector<Touch>& touches) {
+/// Compares the normal with the side that the features came from. A claim about triangles is wrong
+/// only if all of their touches say so.
+bool isWrongSide(const Claim& claim, const std::vector<Touch>& touches) {
   if (claim.features.kind != Kind::Triangles) {
     const Touch* touch = find(touches, claim.features);
-    return touch != nullptr && touch->isTurned(claim.normal, claim.time);
+    return touch != nullptr && touch->isWrongSide(claim.normal, claim.time);
   }
   return !touches.empty() && std::all_of(touches.begin(), touches.end(), [&](const Touch& touch) {
-    return touch.isTurned(claim.normal, claim.time);
+    return touch.isWrongSide(claim.normal, claim.time);
   });
 }
 
-/// A corner that started inside belongs where the triangle's normal points; a's corners are those
-/// that came through.
+/// True if the normal pushes a's corner into b. The corner started behind b and belongs in front of
+/// it.
 bool isInwards(const Claim& claim, const Case::Frame& now) {
   const auto& b = now.b;
   const Vector3d outwards = (b[1] - b[0]).cross(b[2] - b[0]).normalized();
@@ -97,19 +99,19 @@ bool isInwards(const Claim& claim, const Case::Frame& now) {
   return (ofCorner || claim.features.kind == Kind::Triangles) && claim.normal.dot(outwards) < -0.1;
 }
 
-bool isAnyTurned(const Claims& claims, const Judged& judged, std::size_t frame) {
+bool hasWrongSide(const Claims& claims, const Judged& judged, std::size_t frame) {
   return std::any_of(claims.claims.begin(), claims.claims.end(), [&](const Claim& claim) {
     return judged.posed.startsInside ? isInwards(claim, judged.posed.frames[frame + 1])
-                                     : isTurned(claim, judged.touches[frame]);
+                                     : isWrongSide(claim, judged.touches[frame]);
   });
 }
 
 bool isWrong(const Claims& claims, const Judged& judged, std::size_t frame) {
   const std::vector<Touch>& touches = judged.touches[frame];
   if (claims.ofTriangles) return claims.triangles.empty() && !touches.empty();
-  return isAnyTurned(claims, judged, frame) ||
+  return hasWrongSide(claims, judged, frame) ||
          std::any_of(touches.begin(), touches.end(),
-                     [&](const Touch& touch) { return !says(claims, touch); });
+                     [&](const Touch& touch) { return !reports(claims, touch); });
 }
 
 void checkContacts(const Claims& claims, Tally& tally) {
@@ -127,37 +129,37 @@ bool isNear(const Rest& rest, const Claim& claim) {
                      [&](const Rest::Near& near) { return near.features == claim.features; });
 }
 
-/// Features one by one, against what the method is defined to report.
+/// Compares each feature pair with the definition of the method.
 void checkDefinition(Definition definition, const Claims& claims, const std::vector<Touch>& touches,
                      const Rest& rest, double thickness, Tally& tally) {
   if (definition == Definition::Intersection) {
-    tally.undefinedMissed += rest.intersect && claims.triangles.empty();
-    tally.undefinedInvented += !rest.intersect && !claims.triangles.empty();
+    tally.featuresMissing += rest.intersect && claims.triangles.empty();
+    tally.featuresExtra += !rest.intersect && !claims.triangles.empty();
   } else if (definition == Definition::Proximity) {
     for (const Rest::Near& near : rest.pairs) {
-      const bool said = says(claims, near.features);
-      tally.undefinedMissed += near.distance < thickness - near.error && !said;
-      tally.undefinedInvented += near.distance > thickness + near.error && said;
+      const bool isReported = reports(claims, near.features);
+      tally.featuresMissing += near.distance < thickness - near.error && !isReported;
+      tally.featuresExtra += near.distance > thickness + near.error && isReported;
     }
-    tally.undefinedInvented += static_cast<std::size_t>(
+    tally.featuresExtra += static_cast<std::size_t>(
         std::count_if(claims.claims.begin(), claims.claims.end(),
                       [&](const Claim& claim) { return !isNear(rest, claim); }));
   } else if (definition == Definition::Auto) {
-    for (const Touch& touch : touches) tally.undefinedMissed += !says(claims, touch);
+    for (const Touch& touch : touches) tally.featuresMissing += !reports(claims, touch);
   } else if (definition == Definition::Continuous) {
-    for (const Touch& touch : touches) tally.undefinedMissed += !says(claims, touch.features);
+    for (const Touch& touch : touches) tally.featuresMissing += !reports(claims, touch.features);
     for (const Claim& claim : claims.claims) {
       const Touch* touch = find(touches, claim.features);
-      tally.undefinedInvented += touch == nullptr;
+      tally.featuresExtra += touch == nullptr;
       tally.untimely += touch != nullptr && !touch->isTimely(claim.time);
     }
   }
 }
 
-bool flips(const Claims& claims, const Claims& inNoise) {
+bool turns(const Claims& claims, const Claims& withNoise) {
   std::map<FeaturePair, Vector3d> normals;
   for (const Claim& claim : claims.claims) normals.emplace(claim.features, claim.normal);
-  return std::any_of(inNoise.claims.begin(), inNoise.claims.end(), [&](const Claim& claim) {
+  return std::any_of(withNoise.claims.begin(), withNoise.claims.end(), [&](const Claim& claim) {
     const auto own = normals.find(claim.features);
     return own != normals.end() && own->second.dot(claim.normal) < 0;
   });
@@ -166,36 +168,36 @@ bool flips(const Claims& claims, const Claims& inNoise) {
 void add(const Judged& judged, const Subject& subject, Tally& tally) {
   double untimed = 0;
   const auto answers = answersOf(subject.contestant, judged.posed, tally.milliseconds);
-  const auto inNoise = answersOf(subject.contestant, judged.neighbour, untimed);
-  bool reported = false, touchReported = false, turned = false, flipped = false;
+  const auto withNoise = answersOf(subject.contestant, judged.noisy, untimed);
+  bool reported = false, reportsTouch = false, wrongSide = false, turnedByNoise = false;
   for (std::size_t f = 0; f < answers.size(); ++f) {
     const Claims& claims = answers[f];
     const bool any = !claims.claims.empty() || !claims.triangles.empty();
     reported |= any;
-    // Proximity and Auto say near, the others say touch.
-    touchReported |= any && (claims.ofTriangles || subject.definition == Definition::Continuous);
-    turned |= isAnyTurned(claims, judged, f);
-    flipped |= flips(claims, inNoise[f]);
+    // Proximity and Auto also report features that are near. The others report a touch.
+    reportsTouch |= any && (claims.ofTriangles || subject.definition == Definition::Continuous);
+    wrongSide |= hasWrongSide(claims, judged, f);
+    turnedByNoise |= turns(claims, withNoise[f]);
     checkContacts(claims, tally);
-    checkContacts(inNoise[f], tally);
+    checkContacts(withNoise[f], tally);
     if (claims.trusted) {
       const bool wrong = isWrong(claims, judged, f);
       ++tally.answers;
       tally.wrong += wrong;
-      tally.silent += wrong && *claims.trusted;
-      tally.alarms += !wrong && !*claims.trusted;
+      tally.wrongTrusted += wrong && *claims.trusted;
+      tally.rightUntrusted += !wrong && !*claims.trusted;
     }
     checkDefinition(subject.definition, claims, judged.touches[f], judged.rests[f],
                     judged.posed.thickness, tally);
   }
-  const bool missed = judged.touching && !reported, invented = !judged.touching && touchReported;
+  const bool falseNegative = judged.touching && !reported;
   ++tally.cases;
   tally.touching += judged.touching;
-  tally.missed += missed;
-  tally.missedApart += missed && !judged.touchingAtStart;
-  tally.invented += invented;
-  tally.turned += turned;
-  tally.flipped += flipped;
+  tally.falseNegatives += falseNegative;
+  tally.falseNegativesNew += falseNegative && !judged.touchingAtStart;
+  tally.falsePositives += !judged.touching && reportsTouch;
+  tally.wrongSide += wrongSide;
+  tally.turnedByNoise += turnedByNoise;
 }
 
 }  // namespace

@@ -10,13 +10,13 @@
 
 namespace palpate::stability {
 
-/// What a method promises to report, and is held to.
+/// What a method reports by definition. The program checks it.
 enum class Definition {
-  None,          ///< another's method, or one put together
+  None,          ///< no definition of the library: FCL, or Proximity in substeps
   Intersection,  ///< triangles that intersect at the end of a frame
   Proximity,     ///< features within the thickness at the end of a frame
-  Continuous,    ///< features that touch within a frame, and when
-  Auto           ///< no feature that touches within a frame is missing
+  Continuous,    ///< features that touch within a frame, with the time
+  Auto           ///< at least all features that touch within a frame
 };
 
 struct Subject {
@@ -24,32 +24,32 @@ struct Subject {
   Definition definition;
 };
 
-/// The methods of the chart that are swept.
+/// The methods that the sweeps test.
 std::vector<Subject> subjects();
 
-/// Counts cases, but for the contacts' own faults.
+/// Counts of one method, at one step of a sweep.
 struct Tally {
+  // Cases, about the two triangles as a whole:
   std::size_t cases = 0;
-  std::size_t touching = 0;  ///< the triangles touch, at any time
-  // Wrong about that:
-  std::size_t missed = 0;       ///< touch, and nothing is reported
-  std::size_t missedApart = 0;  ///< of these, those that do not touch from the start
-  std::size_t invented = 0;     ///< reported to touch, and do not
-  std::size_t turned = 0;       ///< a normal points to the side that the features did not come from
-  // Wrong by the method's own definition, features compared one by one:
-  std::size_t undefinedMissed = 0, undefinedInvented = 0, untimely = 0;
+  std::size_t touching = 0;           ///< the triangles touch at any time
+  std::size_t falseNegatives = 0;     ///< the triangles touch, and nothing is reported
+  std::size_t falseNegativesNew = 0;  ///< false negatives in which they do not touch at the start
+  std::size_t falsePositives = 0;     ///< a touch is reported, and the triangles do not touch
+  std::size_t wrongSide = 0;  ///< a normal points to the side that the features did not come from
+  std::size_t turnedByNoise = 0;  ///< noise of 1e-7 turns a normal by more than 90 degrees
+  // Feature pairs that differ from the method's own definition:
+  std::size_t featuresMissing = 0, featuresExtra = 0, untimely = 0;
   // Contacts:
   std::size_t contacts = 0, notFinite = 0, notUnit = 0;
-  std::size_t flipped = 0;  ///< cases with a normal that is turned by noise of 1e-7 of the size
   double milliseconds = 0;
-  // Answers, frame by frame. Wrong: features that touch in the frame are missing or a normal is on
-  // the wrong side; of a method that speaks of triangles, that they do not touch although they do.
+  // Answers, one a frame. An answer is wrong if it lacks an impact of the frame, or if a normal is
+  // on the wrong side. An answer of triangles is wrong if it has none although impacts exist.
   std::size_t answers = 0, wrong = 0;
-  std::size_t silent = 0;  ///< wrong and trusted
-  std::size_t alarms = 0;  ///< right and not trusted
+  std::size_t wrongTrusted = 0;    ///< wrong and trusted
+  std::size_t rightUntrusted = 0;  ///< right and not trusted
 };
 
-/// `count` random cases of one step of a sweep, by every subject.
+/// Runs `count` random cases of one step of a sweep with every subject.
 std::vector<Tally> runStep(const Sweep&, double value, std::size_t count,
                            const std::vector<Subject>&);
 

@@ -3,50 +3,62 @@
 
 usage: onsets.py stability.csv PAGE.md
 
-Each table stands in the page between the lines "<!-- table NAME -->" and "<!-- end -->"; what is
-between them is replaced, all else stays.
+Each table stands in the page between the lines "<!-- table NAME -->" and "<!-- end -->". The program
+replaces the lines between these marks only.
 """
 import csv
 import re
 import sys
 
 
+def share(value):
+    return f"{value:.0f} %" if value >= 1 else f"{value:.1g} %"
+
+
 def onset(rows, quantity):
-    """The first difficulty at which the quantity is not zero, comfortable first, and its worst."""
+    """The first difficulty at which the quantity is not zero, and its largest share. The easiest difficulty comes first."""
     values = [(float(row["difficulty"]), float(row[quantity])) for row in rows]
-    if not values:
-        return ""  # not in that run
     failing = [difficulty for difficulty, value in values if value > 0]
     if not failing:
         return "-"
     where = "from the start" if failing[0] == values[0][0] else f"{failing[0]:.2g}"
-    return f"{where} ({max(value for _, value in values):.0f} %)"
+    return f"{where} ({share(max(value for _, value in values))})"
 
 
-def onsets(quantity):
+def falseAnswers(rows):
+    negatives, positives = onset(rows, "false_negatives"), onset(rows, "false_positives")
+    if positives == "-":
+        return negatives
+    return ("" if negatives == "-" else negatives + "; ") + "false positives: " + positives
+
+
+def onsets(cell, withQuantity=False):
     def write(figures):
         methods = list(dict.fromkeys(row["method"] for row in figures))
-        lines = ["| | " + " | ".join(methods) + " |", "|---" * (len(methods) + 1) + "|"]
-        for sweep in dict.fromkeys(row["sweep"] for row in figures):
-            cells = [onset([r for r in figures if r["sweep"] == sweep and r["method"] == m], quantity) for m in methods]
-            lines.append(f"| {sweep} | " + " | ".join(cells) + " |")
+        heads = ["sweep"] + ["quantity"] * withQuantity + methods
+        lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
+        for sweep, quantity in dict.fromkeys((row["sweep"], row["quantity"]) for row in figures):
+            own = [[row for row in figures if row["sweep"] == sweep and row["method"] == method] for method in methods]
+            cells = [sweep] + [quantity] * withQuantity + [cell(rows) if rows else "" for rows in own]  # "": not in that run
+            lines.append("| " + " | ".join(cells) + " |")
         return lines
     return write
 
 
 def trust(figures):
-    lines = ["| | answers wrong | wrong and trusted | right and not trusted |", "|---|---|---|---|"]
+    lines = ["| | impact missing or normal on the wrong side | of these, trusted | other answers, not trusted |", "|---|---|---|---|"]
     for method in dict.fromkeys(row["method"] for row in figures):
         rows = [row for row in figures if row["method"] == method and row["wrong"] != "nan"]
         if not rows:
             continue
-        mean = {key: sum(float(row[key]) for row in rows) / len(rows) for key in ("wrong", "alarms")}
-        silent = sum(float(row["silent"]) for row in rows)
-        lines.append(f"| {method} | {mean['wrong']:.1f} % | {silent:.0f} | {mean['alarms']:.1f} % |")
+        mean = {key: sum(float(row[key]) for row in rows) / len(rows) for key in ("wrong", "right_untrusted")}
+        trusted = sum(float(row["wrong_trusted"]) for row in rows)
+        lines.append(f"| {method} | {mean['wrong']:.1f} % | {trusted:.0f} | {mean['right_untrusted']:.1f} % |")
     return lines
 
 
-TABLES = {"failed": onsets("failed"), "turned": onsets("turned"), "flipped": onsets("flipped"), "trust": trust}
+TABLES = {"failed": onsets(falseAnswers, withQuantity=True), "wrong_side": onsets(lambda rows: onset(rows, "wrong_side")),
+          "turned_by_noise": onsets(lambda rows: onset(rows, "turned_by_noise")), "trust": trust}
 
 
 def main(figures_path, page_path):

@@ -36,7 +36,7 @@ class MeshFiles : public testing::Test {
     return readTriangleMesh(write(name, content));
   }
 
-  /// The sentence with which it is refused; it must name the file. Empty: not refused.
+  /// The message of the error, which must name the file. Empty if the file is read.
   std::string refusal(const fs::path& path) const {
     try {
       readTriangleMesh(path);
@@ -55,7 +55,7 @@ class MeshFiles : public testing::Test {
   fs::path folder;
 };
 
-// A square of four vertices with a fifth that nothing uses: one polygon where the format has them.
+// A square of four vertices and a fifth unused one: one polygon if the format has polygons.
 const std::vector<Vector3d> kSquare{{0, 0, 0}, {1, 0, 0}, {1, 1, 0.5}, {0, 1, 0}, {7, 7, 7}};
 const std::vector<Triangle> kFan{{0, 1, 2}, {0, 2, 3}};
 
@@ -86,7 +86,7 @@ const std::string kVtp =
     "3</DataArray>"
     "<DataArray type=\"Int64\" Name=\"offsets\" "
     "format=\"ascii\">4</DataArray></Polys></Piece></PolyData></VTKFile>\n";
-// The same as VTK's own writer leaves it: compressed, appended.
+// The same file as VTK's own writer makes it: compressed, appended.
 const std::string kAppendedVtp =
     "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" "
     "byte_order=\"LittleEndian\" "
@@ -165,7 +165,7 @@ const std::vector<std::pair<std::string, std::string>> kGood{{"a.obj", kObj},
                                                              {"a.stl", kStl},
                                                              {"binary.stl", binaryStl()}};
 
-TEST_F(MeshFiles, EveryFormatGivesItsVerticesAndFans) {
+TEST_F(MeshFiles, EveryFormatGivesVerticesAndPolygonsAsFans) {
   for (const auto& [name, content] : kGood) {
     const MeshFile mesh = read(name, content);
     const bool hasUnused = name.find("stl") == std::string::npos;
@@ -176,8 +176,8 @@ TEST_F(MeshFiles, EveryFormatGivesItsVerticesAndFans) {
   }
 }
 
-TEST_F(MeshFiles, TruncatedAnywhereIsRefusedOrWhole) {
-  // In silence: VTK's own messages would come here.
+TEST_F(MeshFiles, TruncatedFilesAreRefusedOrComplete) {
+  // VTK must print no messages.
   testing::internal::CaptureStderr();
   testing::internal::CaptureStdout();
   std::vector<std::string> wrong;
@@ -192,12 +192,12 @@ TEST_F(MeshFiles, TruncatedAnywhereIsRefusedOrWhole) {
   }
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
   EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
-  // Of these formats, text that ends within its last line or number cannot be told from a shorter
+  // In these formats, a text that ends within its last line or number cannot be told from a shorter
   // one.
   for (const std::string& one : wrong) EXPECT_TRUE(one.starts_with("a.obj")) << one;
 }
 
-TEST_F(MeshFiles, AnyDamagedByteIsReadOrRefusedInSilence) {
+TEST_F(MeshFiles, DamagedFilesAreReadOrRefusedWithoutOutput) {
   testing::internal::CaptureStderr();
   testing::internal::CaptureStdout();
   for (const auto& [name, content] : kGood) {
@@ -224,7 +224,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
-TEST_F(MeshFiles, MissingEmptyFoldersAndUnknownKindsAreRefused) {
+TEST_F(MeshFiles, MissingFilesEmptyFilesFoldersAndUnknownFormatsAreRefused) {
   for (const char* kind : {".obj", ".ply", ".vtk", ".vtp", ".stl"}) {
     EXPECT_NE(refusal(folder / ("missing" + std::string(kind))).find("no such file"),
               std::string::npos);
@@ -237,7 +237,7 @@ TEST_F(MeshFiles, MissingEmptyFoldersAndUnknownKindsAreRefused) {
 }
 
 TEST_F(MeshFiles, IndicesOutOfRangeAreRefused) {
-  const std::string reason = "polygon 0 (from 0) names a vertex that is not among its 5";
+  const std::string reason = "polygon 0 (from 0) has a vertex index out of range; the file has 5";
   EXPECT_NE(refusal("high.obj", replaced(kObj, "4//1", "6//1")).find(reason), std::string::npos);
   EXPECT_NE(refusal("zero.obj", replaced(kObj, "4//1", "0//1")).find(reason), std::string::npos);
   EXPECT_NE(refusal("back.obj", replaced(kObj, "4//1", "-6")).find(reason), std::string::npos);
@@ -251,7 +251,7 @@ TEST_F(MeshFiles, IndicesOutOfRangeAreRefused) {
   EXPECT_NE(refusal("half.vtp", replaced(kVtp, "2 3<", "2 2.5<")).find(reason), std::string::npos);
 }
 
-TEST_F(MeshFiles, PiecesOfAVtpFileAreOneMeshAndKeepToTheirVertices) {
+TEST_F(MeshFiles, PiecesOfAVtpFileAreOneMeshAndUseTheirOwnVertices) {
   const std::size_t begin = kVtp.find("<Piece"), end = kVtp.find("</PolyData>");
   const std::string piece = kVtp.substr(begin, end - begin);
   const auto withFirst = [&](const std::string& first) {
@@ -282,7 +282,7 @@ TEST_F(MeshFiles, CoordinatesThatAreNotFiniteAreRefused) {
 }
 
 TEST_F(MeshFiles, CountsLargerThanTheFileAreRefused) {
-  const std::string reason = "shorter than its own counts say";
+  const std::string reason = "shorter than its counts require";
   EXPECT_NE(refusal("a.ply", replaced(kPly, "vertex 5", "vertex 4000000000")).find(reason),
             std::string::npos);
   EXPECT_NE(refusal("a.vtk", replaced(kVtk, "POINTS 5", "POINTS 400000000000")).find(reason),
@@ -305,7 +305,7 @@ TEST_F(MeshFiles, OtherDataSetsAreRefused) {
             std::string::npos);
   EXPECT_NE(refusal("short.obj", "v 0 0 0\nv 1 0\n").find("in line 2 a number is missing"),
             std::string::npos);
-  EXPECT_NE(refusal("half.obj", replaced(kObj, "4//1", "1.5")).find("no whole number"),
+  EXPECT_NE(refusal("half.obj", replaced(kObj, "4//1", "1.5")).find("not a whole number"),
             std::string::npos);
 }
 
@@ -320,7 +320,7 @@ TEST_F(MeshFiles, StlKeepsFacetsWithoutArea) {
   EXPECT_EQ(read("a.stl", flat).triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 2}}));
 }
 
-TEST(MeshFile, OrgansComeBackAsMade) {
+TEST(MeshFile, OrgansAreReadAsWritten) {
   for (const auto& [name, mesh] : scenes::organMeshes()) {
     const MeshFile read =
         readTriangleMesh(std::string(PALPATE_SOURCE_DIR) + "/Data/Organs/" + name + ".obj");

@@ -43,7 +43,7 @@ class ParaView : public testing::Test {
   World::BodyId mesh, thread, tool;
 };
 
-TEST_F(ParaView, ReadsBodiesAsTheyAre) {
+TEST_F(ParaView, ReadsBodies) {
   const vtkSmartPointer<vtkPolyData> data = read(bodiesVtp(world));
   const SceneMesh ball = sphere(2);
   ASSERT_EQ(data->GetNumberOfPoints(), static_cast<vtkIdType>(81 + 3 + ball.positions.size()));
@@ -81,7 +81,7 @@ TEST_F(ParaView, ReadsContactsWithTheirFields) {
   EXPECT_EQ(Vector3d(data->GetPoint(at)), Vector3d((contact.point + contact.pointOnShape) / 2));
 }
 
-TEST_F(ParaView, ReadsTheOctreesCells) {
+TEST_F(ParaView, ReadsOctreeCells) {
   const LooseOctree& octree = world.detection().octree();
   const vtkSmartPointer<vtkPolyData> data = read(octreeVtp(octree));
   std::vector<LooseOctree::Node> nodes;

@@ -56,7 +56,7 @@ class WindowOnOrgans : public testing::Test {
   std::vector<GeometryId> ids;
 };
 
-TEST_F(WindowOnOrgans, KeysSwitchWhatIsShown) {
+TEST_F(WindowOnOrgans, KeysToggleWhatIsShown) {
   Window window(detection, false, 320, 240);
   EXPECT_TRUE(window.show());
   const Image all = window.image();
@@ -83,7 +83,7 @@ TEST_F(WindowOnOrgans, KeysSwitchWhatIsShown) {
   EXPECT_EQ(window.image().rgb, bodies.rgb);
 }
 
-TEST_F(WindowOnOrgans, FiveLinesWithTimesOfEachFrame) {
+TEST_F(WindowOnOrgans, FiveLinesShowEachFrameWithItsTimes) {
   Window window(detection, true, 320, 240);
   int frames = 0;
   while (window.show()) {
@@ -139,7 +139,7 @@ TEST(Window, PickNamesTheElementUnderTheCursor) {
   EXPECT_EQ(window.pick(150, 150), "geometry 1, a shape");
 }
 
-TEST(Window, DrawsEveryKindWhereItIs) {
+TEST(Window, DrawsEveryGeometryTypeAtItsPlace) {
   // A thread, points and each shape, one at a time, about the middle of an open frame of specks.
   const std::vector<Vector3d> frame{{-1, -1, -1}, {1, 1, 1}};
   const std::vector<AnalyticalGeometry> shapes{
@@ -188,7 +188,7 @@ TEST(Window, ContactLiesBetweenItsFeatures) {
   EXPECT_FALSE(pixel(window.image(), 100, 100).isVivid());
 }
 
-TEST(Window, MarksWhatIsNotTrusted) {
+TEST(Window, MarksUntrustedContacts) {
   scenes::SceneMesh upper = scenes::sheet(4), lower = scenes::sheet(4);
   for (Vector3d& p : upper.positions) p.z() += 0.1;
   OctreeBasedCD detection;
@@ -211,7 +211,7 @@ TEST(Window, MarksWhatIsNotTrusted) {
   EXPECT_EQ(count(window.image(), &Pixel::isMagenta), 0u);
 }
 
-TEST(Window, OfNothingIsWhiteAndSizesAreRefused) {
+TEST(Window, EmptySceneIsWhiteAndBadSizesAreRefused) {
   const OctreeBasedCD nothing;
   Window window(nothing, false, 200, 100);
   window.show();
@@ -226,7 +226,7 @@ TEST(Window, OfNothingIsWhiteAndSizesAreRefused) {
   }
 }
 
-TEST_F(WindowOnOrgans, BecomesPng) {
+TEST_F(WindowOnOrgans, WritesPng) {
   Window window(detection, false, 320, 240);
   window.show();
   const std::string png = toPng(window.image());
@@ -235,7 +235,7 @@ TEST_F(WindowOnOrgans, BecomesPng) {
   EXPECT_GT(png.size(), 5'000u);
 }
 
-TEST(NoDisplay, IsSaidAndNotTheEnd) {
+TEST(NoDisplay, ThrowsAndTheProgramGoesOn) {
   ASSERT_EQ(std::getenv("DISPLAY"), nullptr);
   const OctreeBasedCD nothing;
   for (const char* name : {static_cast<const char*>(nullptr), "", ":no"}) {

@@ -17,7 +17,7 @@
 namespace palpate::vtk {
 namespace {
 
-// What VTK's own writers leave is read back, in every way in which they write it.
+// Reads files of VTK's own writers, in every mode of these writers.
 class WrittenByVtk : public testing::Test {
  protected:
   WrittenByVtk()

@@ -30,8 +30,8 @@ struct Body {
   Geometry geometry;
   fcl::Transform3d inFrame = fcl::Transform3d::Identity(), frame = fcl::Transform3d::Identity();
 
-  fcl::NODE_TYPE kind() const { return geometry->getNodeType(); }
-  bool isMesh() const { return kind() == fcl::BV_OBBRSS; }
+  fcl::NODE_TYPE nodeType() const { return geometry->getNodeType(); }
+  bool isMesh() const { return nodeType() == fcl::BV_OBBRSS; }
   fcl::Transform3d place() const { return frame * inFrame; }
 };
 
@@ -80,19 +80,24 @@ bool hasDistance(fcl::NODE_TYPE a, fcl::NODE_TYPE b) {
   return a == fcl::GEOM_CAPSULE && b == fcl::GEOM_CAPSULE;
 }
 
+std::string nameOf(GeometryId a, GeometryId b) {
+  return "pair (" + std::to_string(static_cast<std::uint32_t>(a)) + ", " +
+         std::to_string(static_cast<std::uint32_t>(b)) + ")";
+}
+
 /// Why FCL does not support a pair; empty if it does.
-std::string refusal(const Body& a, const Body& b, const PairSettings& settings) {
-  if (&a == &b) return "does not find what a mesh does to itself";
-  if (a.isMesh() != b.isMesh()) return "is asked for two triangle meshes or two shapes only";
+std::string unsupportedReason(const Body& a, const Body& b, const PairSettings& settings) {
+  if (&a == &b) return "does not support a geometry with itself";
+  if (a.isMesh() != b.isMesh()) return "supports two triangle meshes or two shapes only";
   if (a.isMesh() && settings.method != Method::Intersection)
-    return "answers triangle meshes by Method::Intersection only";
+    return "supports triangle meshes by Method::Intersection only";
   if (!a.isMesh() && settings.method != Method::Proximity)
-    return "answers shapes by Method::Proximity only";
-  const auto [lower, higher] = std::minmax({a.kind(), b.kind()});
+    return "supports shapes by Method::Proximity only";
+  const auto [lower, higher] = std::minmax({a.nodeType(), b.nodeType()});
   if (lower == fcl::GEOM_CONVEX && higher == fcl::GEOM_PLANE)
-    return "does not know a hull with a plane of two sides";
-  if (!a.isMesh() && settings.thickness > 0 && !hasDistance(a.kind(), b.kind()))
-    return "has no distance of these that can be relied on: the thickness must be 0";
+    return "does not support a hull with a two-sided plane";
+  if (!a.isMesh() && settings.thickness > 0 && !hasDistance(a.nodeType(), b.nodeType()))
+    return "has no reliable distance for these two shapes: the thickness must be 0";
   return "";
 }
 
@@ -194,11 +199,9 @@ void FclEngine::addCollisionPair(GeometryId a, GeometryId b, const PairSettings&
   const auto& bodies = m_implementation->bodies;
   const auto first = bodies.find(a), second = bodies.find(b);
   if (first != bodies.end() && second != bodies.end())  // for unknown ids the call below throws
-    if (const std::string reason = refusal(first->second, second->second, settings); reason != "")
-      throw Error(ErrorCode::UnsupportedMethod,
-                  "pair (" + std::to_string(static_cast<std::uint32_t>(a)) + ", " +
-                      std::to_string(static_cast<std::uint32_t>(b)) + "): FCL " + reason,
-                  a);
+    if (const std::string reason = unsupportedReason(first->second, second->second, settings);
+        reason != "")
+      throw Error(ErrorCode::UnsupportedMethod, nameOf(a, b) + ": FCL " + reason, a);
   m_implementation->input.addCollisionPair(a, b, settings);
 }
 
@@ -222,7 +225,7 @@ void FclEngine::detectCollision() {
       else
         addContact(x, y, settings.thickness, contents.shapeShape);
     } catch (const std::exception& fault) {
-      throw Error(ErrorCode::NotAvailable, std::string("FCL gives up: ") + fault.what(), a);
+      throw Error(ErrorCode::NotAvailable, nameOf(a, b) + ": FCL failed: " + fault.what(), a);
     }
     answers[{a, b}] = CollisionData(std::move(contents));
   }

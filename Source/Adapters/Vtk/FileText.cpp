@@ -41,7 +41,7 @@ NumberType typeNamed(std::string_view name) {
   const std::string word = std::string(1, ' ').append(name).append(1, ' ');
   for (const auto& [names, type] : kTypes)
     if (names.find(word) != names.npos) return type;
-  throw FileFault{"it names an unknown type of number \"" + std::string(name.substr(0, 40)) + "\""};
+  throw FileFault{"it has the unknown number type \"" + std::string(name.substr(0, 40)) + "\""};
 }
 
 double toNumber(std::string_view word) {
@@ -50,16 +50,16 @@ double toNumber(std::string_view word) {
   double value = 0;
   const auto [end, fault] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (fault == std::errc::invalid_argument || end != digits.data() + digits.size())
-    throw FileFault{"\"" + std::string(word.substr(0, 40)) + "\" stands where a number should"};
+    throw FileFault{"\"" + std::string(word.substr(0, 40)) + "\" is not a number"};
   // For numbers out of double's range from_chars does not set the value. Tiny ones count as zero.
   if (fault == std::errc::result_out_of_range) return digits.rfind('-') + 1 > 1 ? 0.0 : HUGE_VAL;
   return value;
 }
 
 std::size_t toCount(double number, std::size_t most) {  // refuses NaN
-  if (number > static_cast<double>(most)) throw FileFault{"it is shorter than its own counts say"};
+  if (number > static_cast<double>(most)) throw FileFault{"it is shorter than its counts require"};
   if (!(number >= 0 && number == std::floor(number)))
-    throw FileFault{"one of its counts is no whole number from 0 on"};
+    throw FileFault{"one of its counts is not a whole number, or is negative"};
   return static_cast<std::size_t>(number);
 }
 
@@ -79,7 +79,7 @@ std::string_view FileText::word() {
 }
 
 std::string_view FileText::take(std::size_t bytes) {
-  if (m_rest.size() < bytes) throw FileFault{"it ends too early"};
+  if (m_rest.size() < bytes) throw FileFault{"it is truncated"};
   const std::string_view taken = m_rest.substr(0, bytes);
   m_rest.remove_prefix(bytes);
   return taken;

@@ -24,7 +24,7 @@ class Reader {
     const std::string encoding = keyword();
     if (encoding == "BINARY") m_text.setEncoding(Encoding::BigEndian);
     if (encoding != "ASCII" && encoding != "BINARY")
-      throw FileFault{"it says neither ASCII nor BINARY"};
+      throw FileFault{"its third line is neither ASCII nor BINARY"};
     // The mesh ends where POINT_DATA or CELL_DATA begins.
     for (std::string section = keyword(); !section.empty() && !section.ends_with("_DATA");
          section = keyword())
@@ -41,8 +41,8 @@ class Reader {
 
   void readSection(const std::string& section) {
     if (section == "DATASET") {
-      const std::string kind = keyword();
-      if (kind != "POLYDATA") throw FileFault{"its data set is " + kind + ", not POLYDATA"};
+      const std::string dataSet = keyword();
+      if (dataSet != "POLYDATA") throw FileFault{"its data set is " + dataSet + ", not POLYDATA"};
     } else if (section == "POINTS") {
       const std::size_t count = m_text.count();
       m_polygons.positions.clear();
@@ -91,11 +91,11 @@ class Reader {
       left -= 1 + cell.size();
       strips ? polygons.addStrip(cell) : polygons.corners.push_back(std::move(cell));
     }
-    if (left > 0) throw FileFault{"its cells have fewer corners than it says"};
+    if (left > 0) throw FileFault{"its cells have fewer corners than their count"};
   }
 
   std::vector<double> readNamed(const std::string& name, std::size_t count) {
-    if (keyword() != name) throw FileFault{"it lacks the " + name + " of its cells"};
+    if (keyword() != name) throw FileFault{"it has no " + name + " for its cells"};
     return readArray(count);
   }
 

@@ -46,15 +46,15 @@ std::string contentOf(const std::filesystem::path& path) {
 }
 
 Polygons polygonsOf(const std::filesystem::path& path) {
-  std::string kind = path.extension().string();
-  std::transform(kind.begin(), kind.end(), kind.begin(),
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return std::tolower(c); });
   const std::string content = contentOf(path);
-  if (kind == ".obj") return readObj(content);
-  if (kind == ".ply") return readPly(content);
-  if (kind == ".vtk") return readLegacyVtk(content);
-  if (kind == ".stl") return readStl(content);
-  if (kind == ".vtp") return readVtp(content);
+  if (extension == ".obj") return readObj(content);
+  if (extension == ".ply") return readPly(content);
+  if (extension == ".vtk") return readLegacyVtk(content);
+  if (extension == ".stl") return readStl(content);
+  if (extension == ".vtp") return readVtp(content);
   throw FileFault{"its name does not end in .obj, .stl, .ply, .vtk or .vtp"};
 }
 
@@ -77,14 +77,15 @@ std::vector<Triangle> fans(const Polygons& polygons) {
     std::vector<std::uint32_t> corners;
     for (const double corner : polygons.corners[p]) {
       if (!(corner >= 0 && corner < static_cast<double>(count) && corner == std::floor(corner)))
-        throw fault("names a vertex that is not among its " + std::to_string(count));
+        throw fault("has a vertex index out of range; the file has " + std::to_string(count) +
+                    " vertices");
       corners.push_back(static_cast<std::uint32_t>(corner));
     }
     if (corners.size() < 3) throw fault("has fewer than three corners");
     for (std::size_t i = 2; i < corners.size(); ++i)
       triangles.push_back({corners[0], corners[i - 1], corners[i]});
   }
-  if (triangles.empty()) throw FileFault{"it holds no triangles, so it is not a triangle mesh"};
+  if (triangles.empty()) throw FileFault{"it has no triangles"};
   return triangles;
 }
 
@@ -103,7 +104,7 @@ MeshFile readTriangleMesh(const std::filesystem::path& path) {
   } catch (const FileFault& fault) {
     throw refuse(fault.reason);
   } catch (const std::bad_alloc&) {
-    throw refuse("it needs more memory than there is");
+    throw refuse("it needs more memory than is available");
   }
 }
 

@@ -13,7 +13,7 @@ namespace {
 /// count back from the newest vertex.
 double vertexOf(std::string_view corner, std::size_t vertexCount) {
   const double index = toNumber(corner.substr(0, corner.find('/')));
-  if (index != std::floor(index)) throw FileFault{"an index is no whole number"};
+  if (index != std::floor(index)) throw FileFault{"an index is not a whole number"};
   return index < 0 ? static_cast<double>(vertexCount) + index : index - 1;
 }
 

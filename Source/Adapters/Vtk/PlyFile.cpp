@@ -33,7 +33,7 @@ Encoding encodingNamed(std::string_view name) {
   if (name == "ascii") return Encoding::Ascii;
   if (name == "binary_little_endian") return Encoding::LittleEndian;
   if (name == "binary_big_endian") return Encoding::BigEndian;
-  throw FileFault{"its PLY header names an unknown format"};
+  throw FileFault{"its PLY header has an unknown format"};
 }
 
 std::vector<Element> readHeader(FileText& text) {
@@ -48,11 +48,12 @@ std::vector<Element> readHeader(FileText& text) {
       std::string name(line.word());
       elements.push_back({std::move(name), toCount(line.number(), text.left()), {}});
     } else if (keyword == "property") {
-      if (elements.empty()) throw FileFault{"its PLY header has a property of no element"};
+      if (elements.empty())
+        throw FileFault{"its PLY header has a property before the first element"};
       elements.back().properties.push_back(readProperty(line));
     }
   }
-  throw FileFault{"its PLY header ends too early"};
+  throw FileFault{"its PLY header is truncated"};
 }
 
 /// Adds the corners of a face, or triangle strips that are separated by -1.

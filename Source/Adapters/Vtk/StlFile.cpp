@@ -21,7 +21,7 @@ std::vector<double> readText(FileText text) {
     if (word != "vertex") continue;
     for (int i = 0; i < 3; ++i) coordinates.push_back(text.number());
   }
-  if (!ended) throw FileFault{"it ends too early"};
+  if (!ended) throw FileFault{"it is truncated"};
   return coordinates;
 }
 

@@ -39,8 +39,8 @@ std::string fromBase64(std::string_view text) {
 /// The text from an element's first tag to its last.
 std::string_view elementIn(std::string_view text, const std::string& name) {
   const std::size_t begin = text.find("<" + name), end = text.find("</" + name);
-  if (begin == text.npos) throw FileFault{"it holds no " + name};
-  if (end == text.npos || end < begin) throw FileFault{"it ends too early"};
+  if (begin == text.npos) throw FileFault{"it has no element " + name};
+  if (end == text.npos || end < begin) throw FileFault{"it is truncated"};
   return text.substr(begin, end - begin);
 }
 
@@ -59,7 +59,7 @@ vtkSmartPointer<vtkDataCompressor> compressorNamed(std::string_view name) {
   if (name == "vtkZLibDataCompressor") compressor = vtkSmartPointer<vtkZLibDataCompressor>::New();
   if (name == "vtkLZ4DataCompressor") compressor = vtkSmartPointer<vtkLZ4DataCompressor>::New();
   if (name == "vtkLZMADataCompressor") compressor = vtkSmartPointer<vtkLZMADataCompressor>::New();
-  if (compressor == nullptr) throw FileFault{"it is compressed in an unknown way"};
+  if (compressor == nullptr) throw FileFault{"its compressor is unknown"};
   compressor->AddObserver(vtkCommand::ErrorEvent, vtkNew<vtkCallbackCommand>());  // prints nothing
   return compressor;
 }
@@ -67,7 +67,7 @@ vtkSmartPointer<vtkDataCompressor> compressorNamed(std::string_view name) {
 class Reader {
  public:
   explicit Reader(std::string_view content)
-      : m_xml(content.substr(0, content.find("<AppendedData"))), m_most(1000 * content.size()) {
+      : m_xml(content.substr(0, content.find("<AppendedData"))), m_maxCount(1000 * content.size()) {
     // Appended data need not be XML. They follow the "_" after their tag.
     const std::string_view appended = content.substr(m_xml.size());
     const std::size_t start = appended.find('_', appended.find('>'));
@@ -94,7 +94,7 @@ class Reader {
  private:
   std::size_t count(std::string_view piece, const std::string& group) const {
     const std::string_view text = attributeOf(piece, "NumberOf" + group);
-    return text.empty() ? 0 : toCount(toNumber(text), m_most);
+    return text.empty() ? 0 : toCount(toNumber(text), m_maxCount);
   }
 
   void readCells(std::string_view piece, const std::string& group, std::size_t cells,
@@ -102,7 +102,7 @@ class Reader {
     std::vector<double> offsets = readArray(piece, group, "offsets", cells);
     offsets.insert(offsets.begin(), 0.0);
     std::vector<double> corners =
-        readArray(piece, group, "connectivity", toCount(offsets.back(), m_most));
+        readArray(piece, group, "connectivity", toCount(offsets.back(), m_maxCount));
     const double points = static_cast<double>(m_polygons.positions.size() - first);
     for (double& corner : corners)  // -1 is refused later: the corner is not in the piece
       corner = corner >= 0 && corner < points ? corner + static_cast<double>(first) : -1;
@@ -115,7 +115,7 @@ class Reader {
     std::string_view array = elementIn(piece, group);
     do {
       array = array.substr(std::min(array.find("<DataArray", 1), array.size()));
-      if (array.empty()) throw FileFault{"it lacks an array of its " + group};
+      if (array.empty()) throw FileFault{"its element " + group + " lacks an array"};
     } while (!name.empty() && attributeOf(array, "Name") != name);
 
     const NumberType type = typeNamed(attributeOf(array, "type"));
@@ -138,11 +138,12 @@ class Reader {
     FileText text(block, m_encoding);
     const auto length = [&] { return toCount(text.number(m_headerType), std::size_t{1} << 53); };
     if (m_compressor == nullptr) return std::string(text.take(length()));
-    const std::size_t blocks = length(), whole = length(), last = length();
+    const std::size_t blocks = length(), fullSize = length(), lastSize = length();
     const std::vector<double> lengths = text.numbers(m_headerType, blocks);
     std::string bytes;
     for (std::size_t i = 0; i < blocks; ++i) {
-      const std::size_t size = i + 1 == blocks && last > 0 ? last : whole, start = bytes.size();
+      const std::size_t size = i + 1 == blocks && lastSize > 0 ? lastSize : fullSize,
+                        start = bytes.size();
       if (size > expected - start) throw FileFault{"one of its compressed blocks has a wrong size"};
       const std::string_view compressed = text.take(toCount(lengths[i], text.left()));
       bytes.resize(start + size);
@@ -155,7 +156,8 @@ class Reader {
   }
 
   std::string_view m_xml, m_appended;
-  std::size_t m_most;  ///< limit of counts: compressed numbers hardly take less than 1/1000 byte
+  /// Limit of counts: compressed numbers hardly take less than 1/1000 byte.
+  std::size_t m_maxCount;
   bool m_raw = false;
   vtkSmartPointer<vtkDataCompressor> m_compressor;
   Encoding m_encoding = Encoding::LittleEndian;

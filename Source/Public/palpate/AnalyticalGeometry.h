@@ -15,8 +15,8 @@ namespace palpate {
 // magnitude, and may be as small as the smallest double. addAnalyticalGeometry() throws
 // InvalidShape for all other values.
 
-inline constexpr double kLargestMeasure = 1e300;                      ///< L
-inline constexpr std::size_t kMostHullPoints = std::size_t{1} << 17;  ///< of one ConvexHull
+inline constexpr double kLargestMeasure = 1e300;                     ///< L
+inline constexpr std::size_t kMaxHullPoints = std::size_t{1} << 17;  ///< of one ConvexHull
 
 /// A ball.
 struct Sphere {
@@ -54,11 +54,10 @@ struct Cylinder {
 /// plate, a segment or a point. Points near a plane span a thin body.
 ///
 /// Errors   addAnalyticalGeometry() throws InvalidShape for no points, and for more than
-///          kMostHullPoints.
-/// Cost     to add: n log n for n points, on average, in any order. 1,000, 8,000 and 64,000 points
-///          of a sphere take 3, 27 and 340 ms on one core of an Intel Xeon. A distance tests each
-///          triangle of the hull, and some of them several times: 0.06, 0.5 and 4 ms for a point
-///          beside these hulls. Points inside the hull cost nothing after it was added.
+///          kMaxHullPoints.
+/// Cost     to add: n log n for n points, on average, in any order. A distance tests each triangle
+///          of the hull, and some of them several times. Points inside the hull cost nothing after
+///          it was added.
 struct ConvexHull {
   std::vector<Eigen::Vector3d> points;  ///< finite
 };

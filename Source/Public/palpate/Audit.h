@@ -36,10 +36,10 @@ struct AuditFailure {
   GeometryId a, b;          ///< the pair, in the order in which it was added
   std::uint64_t frame = 0;  ///< number of the detectCollision() call, from 1
   Fault fault = Fault::FalseNegative;
-  List list = List::VertexTriangle;  ///< in which the contact is or should be.
-  Contact expected{}, found{};       ///< the contact; monostate: it does not exist.
-  std::filesystem::path file{};      ///< capture of the pair's frame; empty: not written.
-  std::string fileError{};           ///< why the capture was not written, with its name.
+  List list = List::VertexTriangle;  ///< The list in which the contact is or should be.
+  Contact expected{}, found{};       ///< The contact; monostate: it does not exist.
+  std::filesystem::path file{};      ///< Capture of the pair's frame; empty: not written.
+  std::string fileError{};           ///< Why the capture was not written, with its name.
 };
 
 }  // namespace palpate

@@ -31,7 +31,7 @@ namespace palpate {
 //          the front. The normal of Intersection's vertex-triangle contacts is the winding normal
 //          if the triangle's interior holds the closest point. If an edge or a corner holds it, the
 //          normal lies along the line through both closest points, on the winding normal's side.
-// Touching If the centres are at distance 0, the normal is the winding normal or the cross product
+// Touch    If the centres are at distance 0, the normal is the winding normal or the cross product
 //          of the edges, as <palpate/Distance.h> states. Method::Continuous without a thickness
 //          turns it to the side from which the features came.
 
@@ -71,15 +71,16 @@ enum class ShapeElement : std::uint32_t { Vertex, Edge, Face };
 /// timeOfImpact.
 struct ShapeContact {
   ShapeElement element;
-  std::uint32_t id;  ///< index of the vertex or triangle; for an edge its lower vertex.
-  /// {v, v, v} for a vertex, {p, q, q} with p < q for an edge, or the triangle's corners.
+  std::uint32_t id;  ///< Index of the vertex or triangle; for an edge its lower vertex.
+  /// Vertex indices: {v, v, v} for a vertex, {p, q, q} with p < q for an edge, or the corners of
+  /// the triangle.
   std::array<std::uint32_t, 3> vertices;
-  Eigen::Vector3d weights;       ///< of the vertices at `point`; sum 1.
-  Eigen::Vector3d point;         ///< L, on the element; for lines and points on the centre line.
-  Eigen::Vector3d pointOnShape;  ///< L, on the shape's surface.
-  Eigen::Vector3d normal;        ///< unit, out of the shape towards the element
-  double distance;               ///< L, less the element's radius; negative: the depth inside
-  double timeOfImpact = 1.0;     ///< [0, 1] of the step; 1 for Proximity
+  Eigen::Vector3d weights;       ///< Weights of the vertices at `point`; sum 1.
+  Eigen::Vector3d point;         ///< L: on the element; for lines and points on the centre line.
+  Eigen::Vector3d pointOnShape;  ///< L: on the shape's surface.
+  Eigen::Vector3d normal;        ///< Unit, out of the shape towards the element.
+  double distance;               ///< L: less the element's radius; negative: the depth inside.
+  double timeOfImpact = 1.0;     ///< [0, 1] of the step; 1 for Proximity.
   friend bool operator==(const ShapeContact&, const ShapeContact&) = default;
 };
 

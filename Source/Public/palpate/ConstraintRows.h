@@ -17,6 +17,7 @@ namespace palpate {
 ///
 /// Units    the gap is in L. A solver keeps it at least as large as the distance that it wants.
 /// Laws     (1) with the positions at the contact's timeOfImpact the gap is the contact's distance.
+///          If a shape moves on by d until the step's end, the gap is that less normal . d.
 ///          (2) the gap's gradient at vertex i is weights[i] normal. At these positions it is also
 ///          the gradient of the distance, because the motion of the closest points changes the
 ///          distance only in second order. There are two exceptions. Where radii differ along an
@@ -46,16 +47,30 @@ struct SolverVertices {
   std::span<const Eigen::Vector3d> before, now;  ///< L, in the world, one per vertex
 };
 
+/// The poses of an analytical shape at both ends of the step, as you passed them to setTransform().
+/// The default is a shape that setTransform() never placed.
+struct ShapeMotion {
+  Eigen::Matrix3d rotationBefore = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translationBefore = Eigen::Vector3d::Zero();  ///< L
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< L
+};
+
 /// Appends a row for each contact of a pair (a, b), linearised at its timeOfImpact, whatever method
 /// found it. For a pair with a shape, leave the shape's SolverVertices empty.
 ///
+/// shape    the motion of the pair's shape. Its rows then refer to the shape at the step's end: the
+///          point of the shape that the contact touches moves on to there. Without it, the shape
+///          counts as at rest from timeOfImpact on, so that gap(now) does not see where it went.
+/// Needs    a shape that turns by less than 90 degrees in the step.
 /// Order    vertexTriangle(), triangleVertex(), edgeEdge(), shape(). Contacts in shapeShape() have
 ///          no row.
 /// Errors   WrongPositionCount names the first vertex of a contact for which `before` or `now` has
 ///          no position. No row is added then.
 /// Cost     linear in the contacts.
 PALPATE_EXPORT void appendRows(const CollisionData& contacts, const SolverVertices& a,
-                               const SolverVertices& b, std::vector<ConstraintRow>& rows);
+                               const SolverVertices& b, std::vector<ConstraintRow>& rows,
+                               const ShapeMotion& shape = {});
 
 /// Calls entry(context, row, column, value) for each entry that is not 0 of the rows' Jacobian,
 /// that is of the gaps' derivatives by the positions. column: 3 vertex + axis. If a row has one
@@ -76,15 +91,6 @@ void appendTriplets(std::span<const ConstraintRow> rows, std::vector<Triplet>& t
       },
       &triplets);
 }
-
-/// The poses of an analytical shape at both ends of the step, as you passed them to setTransform().
-/// The default is a shape that setTransform() never placed.
-struct ShapeMotion {
-  Eigen::Matrix3d rotationBefore = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translationBefore = Eigen::Vector3d::Zero();  ///< L
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< L
-};
 
 /// One geometry of a pair, for appendMotions().
 struct ContactSide {
@@ -123,7 +129,8 @@ struct ContactMotion {
 /// Needs    shapes that turn by less than 90 degrees in the step.
 /// Errors   WrongPositionCount as appendRows(); InvalidRadius unless radii are none, one, or one
 ///          for each vertex. No motion is added then.
-/// Cost     linear in the contacts. The function allocates nothing if the vector has room.
+/// Cost     linear in the contacts. The function allocates nothing if the vector's capacity is
+///          large enough.
 PALPATE_EXPORT void appendMotions(const CollisionData& contacts, const ContactSide& a,
                                   const ContactSide& b, std::vector<ContactMotion>& motions);
 
@@ -131,7 +138,7 @@ PALPATE_EXPORT void appendMotions(const CollisionData& contacts, const ContactSi
 /// normal) is a right-handed system.
 using Tangents = std::array<Eigen::Vector3d, 2>;
 
-/// The tangents of a normal, by a rule that depends on the normal only: the shortest rotation from
+/// The tangents of a normal, by a rule that depends on the normal only. The shortest rotation from
 /// the z axis to the normal turns the x and the y axis into them.
 ///
 /// Laws     (1) the rule is continuous except at the normal -z; no rule is continuous everywhere.

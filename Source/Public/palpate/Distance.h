@@ -25,12 +25,12 @@ enum class EdgeFeature : std::uint8_t { Start, End, Interior };
 
 /// The result of vertexTriangleDistance().
 struct VertexTriangleDistance {
-  Eigen::Vector3d barycentric;  ///< weights of the closest point; at least 0, sum exactly 1
-  Eigen::Vector3d difference;   ///< L, from the closest point to the vertex
-  Eigen::Vector3d normal;       ///< unit, along the difference
-  double distance;              ///< L; infinity if it exceeds the largest double
-  TriangleFeature feature;      ///< holds the closest point
-  bool exact;                   ///< whether exact arithmetic was necessary
+  Eigen::Vector3d barycentric;  ///< Weights of the closest point: at least 0, sum exactly 1.
+  Eigen::Vector3d difference;   ///< L: from the closest point to the vertex.
+  Eigen::Vector3d normal;       ///< Unit, along the difference.
+  double distance;              ///< L; infinity if it exceeds the largest double.
+  TriangleFeature feature;      ///< The feature that holds the closest point.
+  bool exact;                   ///< Whether exact arithmetic was necessary.
 };
 
 /// The point of triangle (a, b, c) that is closest to a vertex p, and the distance.
@@ -50,6 +50,7 @@ struct VertexTriangleDistance {
 ///          bits.
 /// Errors   none. For a triangle without area the result is that of its longest edge, for one
 ///          without length that of its corner. NaN or infinity in gives NaN out.
+/// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
 /// Source   Gram-determinant signs certified by error bounds, else by integers; one compensated
 ///          Newton step in the feature's own coordinates. See Docs/Accuracy.md.
 PALPATE_EXPORT VertexTriangleDistance vertexTriangleDistance(const Eigen::Vector3d& p,
@@ -59,13 +60,13 @@ PALPATE_EXPORT VertexTriangleDistance vertexTriangleDistance(const Eigen::Vector
 
 /// The result of edgeEdgeDistance().
 struct EdgeEdgeDistance {
-  double weightA, weightB;     ///< closest points: p0 + weightA (p1 - p0), q0 + weightB (q1 - q0)
-  Eigen::Vector3d difference;  ///< L, from the point on edge q to the point on edge p
-  Eigen::Vector3d normal;      ///< unit, along the difference
-  double distance;             ///< L; infinity if it exceeds the largest double
-  EdgeFeature featureA, featureB;  ///< hold the closest points
-  bool parallel;  ///< whether the edges are exactly parallel, or an edge has no length
-  bool exact;     ///< whether exact arithmetic was necessary
+  double weightA, weightB;     ///< Closest points: p0 + weightA (p1 - p0), q0 + weightB (q1 - q0).
+  Eigen::Vector3d difference;  ///< L: from the point on edge q to the point on edge p.
+  Eigen::Vector3d normal;      ///< Unit, along the difference.
+  double distance;             ///< L; infinity if it exceeds the largest double.
+  EdgeFeature featureA, featureB;  ///< The features that hold the closest points.
+  bool parallel;  ///< Whether the edges are exactly parallel, or an edge has no length.
+  bool exact;     ///< Whether exact arithmetic was necessary.
 };
 
 /// The closest points of edges (p0, p1) and (q0, q1), and their distance.
@@ -79,6 +80,7 @@ struct EdgeEdgeDistance {
 ///          bits.
 ///          (2) swapping the edges swaps the weights and reverses difference and normal.
 /// Errors   none. NaN or infinity in gives NaN out.
+/// Floating point  as for vertexTriangleDistance().
 PALPATE_EXPORT EdgeEdgeDistance edgeEdgeDistance(const Eigen::Vector3d& p0,
                                                  const Eigen::Vector3d& p1,
                                                  const Eigen::Vector3d& q0,

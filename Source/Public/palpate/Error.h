@@ -10,28 +10,29 @@
 
 namespace palpate {
 
-/// The reason for an Error. Each function documents the codes that it throws.
+/// The reason for an Error. Each function documents the codes that it throws. Docs/Errors.md has
+/// the cause and the remedy of each code.
 enum class ErrorCode {
-  NonFinitePosition,   ///< a position is NaN or infinite, or beyond 2^1000 under setTransform()
-  WrongPositionCount,  ///< the number of positions differs from the number of vertices
-  /// an index names a vertex, element or octree node that does not exist; or a segment or
-  /// tetrahedron names one vertex twice
+  NonFinitePosition,   ///< A position is NaN or infinite, or beyond 2^1000 under setTransform().
+  WrongPositionCount,  ///< The number of positions differs from the number of vertices.
+  /// An index names a vertex, element or octree node that does not exist. Or a segment or
+  /// tetrahedron names one vertex twice.
   IndexOutOfRange,
-  UnknownGeometry,    ///< the geometry was never added, or was removed
-  UnknownPair,        ///< the pair was never added, was removed, or was added in the other order
-  DuplicatePair,      ///< the pair was added before, in this order or in the other
-  InvalidSettings,    ///< a setting or argument is outside its range
-  NotClosed,          ///< the geometry has no inside: see findMeshDefects()
-  UnsupportedMethod,  ///< the method or function does not exist for these geometries
-  TooLarge,           ///< more vertices, elements, geometries or vertex pairs than ids can name
-  NotAvailable,       ///< the answer was not computed or not kept, or a resource is missing
-  File,               ///< a file cannot be read or written, or has the wrong content
-  InvalidRadius,      ///< a radius is negative, NaN or infinite, or there is not one per vertex
-  InvalidShape,       ///< a shape has an invalid measure, direction or number of points
-  InvalidTransform,   ///< not a rotation, or not finite, or beyond 2^1000
-  SharedFace,         ///< a face belongs to more than two tetrahedra
-  InvalidCall,        ///< the object was moved from, is outdated, or is at work on another call
-  ImpactRemains,      ///< features touch within a step, and StepGuard may not move their vertices
+  UnknownGeometry,    ///< The geometry was never added, or was removed.
+  UnknownPair,        ///< The pair was never added, was removed, or was added in the other order.
+  DuplicatePair,      ///< The pair was added before, in this order or in the other.
+  InvalidSettings,    ///< A setting or argument is outside its range.
+  NotClosed,          ///< The geometry has no inside: see findMeshDefects().
+  UnsupportedMethod,  ///< The method or function does not exist for these geometries.
+  TooLarge,           ///< There are more vertices, elements, geometries or pairs than ids can name.
+  NotAvailable,       ///< The answer was not computed or not kept, or a resource is missing.
+  File,               ///< A file cannot be read or written, or has the wrong content.
+  InvalidRadius,      ///< A radius is negative, NaN or infinite, or there is not one per vertex.
+  InvalidShape,       ///< A shape has an invalid measure, direction or number of points.
+  InvalidTransform,   ///< The matrix is no rotation, or a value is not finite or beyond 2^1000.
+  SharedFace,         ///< A face belongs to more than two tetrahedra.
+  InvalidCall,        ///< The object was moved from, is outdated, or is at work on another call.
+  ImpactRemains,      ///< Features touch within a step, and StepGuard may not move their vertices.
 };
 
 /// The exception that the library throws for an invalid call. what() is a sentence that names the

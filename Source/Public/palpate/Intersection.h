@@ -12,7 +12,8 @@ namespace palpate {
 /// Shapes   three corners each, any winding. A triangle without area is the segment or the point
 ///          that it covers.
 /// Errors   none. If a position is NaN or infinite, the result has no meaning.
-/// Cost     about 0.1 µs where floating point decides, 1 µs where features touch, 100 µs at worst.
+/// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
+/// Cost     bounded: least where floating point decides, most where only exact sums do.
 PALPATE_EXPORT bool trianglesIntersect(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1,
                                        const Eigen::Vector3d& a2, const Eigen::Vector3d& b0,
                                        const Eigen::Vector3d& b1, const Eigen::Vector3d& b2);

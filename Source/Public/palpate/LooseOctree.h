@@ -70,12 +70,12 @@ class PALPATE_EXPORT LooseOctree {
   Update lastUpdate(GeometryId) const;  ///< what the last update did to its tree
   OctreeStatistics statistics() const;
 
-  /// Checks every invariant of the trees: each element is in exactly one node and within the fitted
-  /// boxes above it; fitted boxes are tight; links agree in both directions; free and used blocks
-  /// add up to those allocated. After a rebuild it also checks that each element is in the cell of
-  /// its centre and inside that cell's loose bounds.
+  /// Checks every invariant of the trees. Each element is in exactly one node and within the fitted
+  /// boxes above it. Fitted boxes are tight. Links agree in both directions. Free and used blocks
+  /// add up to those allocated. After a rebuild, each element is in the cell of its centre and
+  /// inside that cell's loose bounds.
   ///
-  /// Returns  one sentence for each violation; empty if there is none.
+  /// Returns  one sentence for each violation.
   /// Cost     linear in the elements.
   std::vector<std::string> validate() const;
 

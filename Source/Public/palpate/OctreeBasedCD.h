@@ -80,11 +80,11 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// branching, and consist of several parts. radius: L, of all vertices. radii: L, one per vertex,
   /// linear along each segment. Radii are finite and not negative. They never change.
   ///
-  /// Contacts edgeEdge() has its segments with edges of triangles and with segments of line meshes.
+  /// Lists    edgeEdge() has its segments with edges of triangles and with segments of line meshes.
   ///          vertexTriangle() or triangleVertex() has its vertices with triangles, and points with
   ///          its segments: segment {p, q} is the triangle {p, q, q} there. Features touch where
   ///          their centre lines come closest, if the distance there is at most the thickness and
-  ///          the radii there. Docs/Pairs.md has the contacts of each pair of geometry types.
+  ///          the radii there. Docs/SupportMatrix.md has the contacts of each pair of types.
   /// Errors   NonFinitePosition; IndexOutOfRange for a vertex index, or a segment that joins a
   ///          vertex with itself; InvalidRadius, also if there is not one per vertex; TooLarge for
   ///          more than 2^28 vertices or segments.
@@ -94,7 +94,7 @@ class PALPATE_EXPORT OctreeBasedCD {
                          std::span<const Segment> segments, std::span<const double> radii);
   /// Adds a point set. Point i is vertex i. Radii are as in addLineMesh().
   ///
-  /// Contacts vertexTriangle() or triangleVertex() has its points with triangles, segments and
+  /// Lists    vertexTriangle() or triangleVertex() has its points with triangles, segments and
   ///          other points: point p is the triangle {p, p, p} there. For two point sets the points
   ///          of the first set are the vertices. For a point set with itself the lower point is the
   ///          vertex.
@@ -103,9 +103,9 @@ class PALPATE_EXPORT OctreeBasedCD {
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, double radius = 0.0);
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
   /// Adds an analytical shape, such as a tool, a needle's tip or a table. setTransform() places it.
-  /// shape() of a pair's CollisionData has its contacts with triangles, lines and points,
-  /// shapeShape() its contacts with another shape. Method::Auto, Proximity and Continuous answer
-  /// such pairs, also with a thickness of 0.
+  /// CollisionData::shape() has its contacts with triangles, lines and points. Its contacts with
+  /// another shape are in CollisionData::shapeShape(). Method::Auto, Proximity and Continuous
+  /// answer such pairs, also with a thickness of 0.
   ///
   ///   const Capsule probe{{0, 0, 0}, {0, 0, 80}, 2.5};
   ///   const GeometryId tool = detection.addAnalyticalGeometry(probe);
@@ -208,9 +208,9 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// features with a common vertex are no contacts. The order of a and b determines the order of
   /// ids in all results.
   ///
-  /// Errors   UnsupportedMethod if the method does not exist for these geometries (Docs/Pairs.md),
-  ///          also for a geometry with itself that setTransform() has placed; InvalidSettings;
-  ///          DuplicatePair; TooLarge for PairSettings::restDistance.
+  /// Errors   UnsupportedMethod if the method does not exist for these geometries
+  ///          (Docs/SupportMatrix.md), also for a geometry with itself that setTransform() has
+  ///          placed; InvalidSettings; DuplicatePair; TooLarge for PairSettings::restDistance.
   void addCollisionPair(GeometryId a, GeometryId b, const PairSettings& = {});
   /// Replaces the settings of a pair. (a, b) may be in either order.
   ///
@@ -240,7 +240,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   void collectCandidates();
   /// Runs the broad phase and the narrow phase of every pair, and updates octrees if needed. Pairs
   /// for which nothing changed since the last detection keep their answer. A steady frame allocates
-  /// no memory.
+  /// no memory, except for integers of exact arithmetic (Docs/Guarantees.md, "Memory").
   ///
   /// Errors   whatever a predicate or executor throws; InvalidSettings if an executor's run()
   ///          returns too early; NotAvailable if a task called fork() (see makeThreadPool());

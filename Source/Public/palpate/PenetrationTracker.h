@@ -24,8 +24,8 @@ enum class DirectionChange {
   Jumped
 };
 
-/// A vertex inside a body with a penetration direction that is stable over time: from step to step
-/// it turns no further than motion explains, unless `change` is Jumped or Entered.
+/// A vertex inside a body with a penetration direction that is stable over time. From step to step
+/// the direction turns no further than motion explains, unless `change` is Jumped or Entered.
 struct TrackedVertex {
   /// Largest turn beyond what motion explains, as the length of the difference of the two unit
   /// vectors; 0.5 is about 29 degrees.

@@ -65,7 +65,8 @@ struct Settings {
   std::shared_ptr<Executor> executor{};
 };
 
-/// The definition of a contact. Docs/Pairs.md lists the methods of each pair of geometry types.
+/// The definition of a contact. Docs/SupportMatrix.md lists the methods of each pair of geometry
+/// types.
 enum class Method {
   /// The library chooses among the other methods in each frame, from the motion in the step. It
   /// answers every pair that any method answers. Wherever Continuous answers the pair, Auto misses
@@ -88,13 +89,13 @@ enum class Contacts {
   /// equally early impacts the first in the order vertexTriangle(), triangleVertex(), edgeEdge()
   /// remains. A dropped contact is therefore never the first impact of its features. Every vertex
   /// with a weight other than 0 keeps its earliest time, and earliestTimeOfImpact() is that of All.
-  /// Docs/Pairs.md has the reasons.
+  /// Docs/SupportMatrix.md has the reasons.
   Distinct,
   All  ///< every feature pair that the method's definition includes
 };
 
-/// How one pair is tested. Docs/Pairs.md lists which methods use which settings. A setting that a
-/// method refuses, or a value outside its range, throws InvalidSettings.
+/// How one pair is tested. Docs/SupportMatrix.md lists which methods use which settings. A setting
+/// that a method refuses, or a value outside its range, throws InvalidSettings.
 struct PairSettings {
   Method method = Method::Auto;
   /// L, finite, not negative. The contact distance, which IPC users know as d-hat: features at most

@@ -31,9 +31,9 @@ struct GuardedVertex {
 };
 
 /// Prevents geometries from passing through each other at the end of a solver's step. A solver
-/// meets constraints one after another, so that an impact may remain in its step. hold() finds
-/// features that touch within the step, and moves their vertices from `now` back to `before`, until
-/// no features touch.
+/// meets constraints one after another, so that an impact may remain in its step. The function
+/// hold() finds features that touch within the step. It moves their vertices from `now` back to
+/// `before`, until no features touch.
 ///
 ///   StepGuard guard;
 ///   const GeometryId organ = guard.addTriangleMesh(positions, triangles);
@@ -62,7 +62,8 @@ struct GuardedVertex {
 ///           both ends of the step.
 /// Cost      each round is one detection by Method::Continuous of the pairs whose positions changed
 ///           since the round before, with octrees that belong to the guard. A geometry that you do
-///           not pass to hold() costs nothing. Steady steps allocate nothing.
+///           not pass to hold() costs nothing. Steady steps allocate nothing, except for integers
+///           of exact arithmetic (Docs/Guarantees.md, "Memory").
 /// Order     results depend neither on the number of threads nor on the order of the steps.
 /// Errors    every function throws palpate::Error for invalid data, and then changes neither the
 ///           guard nor the caller's positions. Every function that takes a GeometryId throws
@@ -100,7 +101,7 @@ class PALPATE_EXPORT StepGuard {
   /// The two geometries must not pass through each other. a == b: the geometry must not pass
   /// through itself.
   ///
-  /// Errors   DuplicatePair; UnsupportedMethod.
+  /// Errors   DuplicatePair.
   void addCollisionPair(GeometryId a, GeometryId b);
   void removeCollisionPair(GeometryId a, GeometryId b);  ///< in either order; throws UnknownPair
   /// Disables these triangles, segments or points and enables all others. Other geometries may pass

@@ -10,8 +10,8 @@ namespace palpate {
 
 /// The definition of an impact and the accuracy of its time.
 struct TimeOfImpactSettings {
-  /// L, finite. An impact is a time at which the distance is at most this. 0 or negative: an impact
-  /// is a time at which the features touch, and whether there is one is decided exactly.
+  /// L, finite. An impact is a time at which the distance is at most this. If it is 0 or negative,
+  /// an impact is a time at which the features touch. Whether they touch is then decided exactly.
   double minimumDistance = 0.0;
   /// Fraction of the step, in [2^-50, 1]: the result may be this much too early. A value outside
   /// the range counts as the nearer end. A larger value is slightly cheaper.
@@ -37,9 +37,10 @@ struct TimeOfImpactSettings {
 ///          before and now.
 ///          (2) scaling all positions by a power of two does not either, where it is exact.
 /// Errors   none.
-/// Cost     bounded: 0.1 µs for most pairs without an impact, microseconds where floating point
-///          cannot decide. With a minimum distance at most 1 / timeTolerance search steps of 0.1
-///          µs; few unless the features pass each other at nearly that distance.
+/// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
+/// Cost     bounded: least for pairs without an impact, most where floating point cannot decide
+///          (Docs/Performance.md). With a minimum distance there are at most 1 / timeTolerance
+///          search steps; few unless the features pass each other at nearly that distance.
 PALPATE_EXPORT std::optional<double> vertexTriangleTimeOfImpact(
     const Eigen::Vector3d& vBefore, const Eigen::Vector3d& aBefore, const Eigen::Vector3d& bBefore,
     const Eigen::Vector3d& cBefore, const Eigen::Vector3d& vNow, const Eigen::Vector3d& aNow,

@@ -10,12 +10,12 @@ namespace palpate {
 
 /// Why the library answered a pair by Validity::method.
 enum class MethodReason {
-  Requested,  ///< the pair's settings name the method
+  Requested,  ///< The pair's settings name the method.
   // The reasons of Method::Auto. Motion is that of features in the step, relative to each other.
-  Still,  ///< nothing moves: Proximity, or Intersection for two meshes without a thickness
-  Slow,   ///< all features move at most PairSettings::motionTolerance: Proximity
-  Fast,   ///< all or most features move further: Continuous
-  Mixed,  ///< some features move further: Continuous for them, Proximity for the rest
+  Still,  ///< Nothing moves: Proximity, or Intersection for two meshes without a thickness.
+  Slow,   ///< All features move at most PairSettings::motionTolerance: Proximity.
+  Fast,   ///< All or most features move further: Continuous.
+  Mixed,  ///< Some features move further: Continuous for them, Proximity for the rest.
   /// Continuous costs least, whatever the motion: without a thickness, and with Contacts::All,
   /// where Proximity would report every feature pair within the enlarged thickness.
   Cheapest,
@@ -36,10 +36,10 @@ enum class MethodReason {
 ///          the answer is not empty.
 ///          (3) if not trusted, the library does not know. Pairs with lines, points or shapes, and
 ///          pairs that collision filters separate, are never trusted.
-/// Cost     at most 5 % of the frames' time, except in the first frame of a pair. That frame has an
-///          initial intersection check. If later motion may have brought the meshes together, and
-///          the step's impacts do not decide it, the library repeats the check: with Auto at once,
-///          with other methods at most once in 16 frames on average.
+/// Cost     a small part of the frames' time (Docs/Performance.md), except in the first frame of a
+///          pair. That frame has an initial intersection check. If later motion may have brought
+///          the meshes together, and the step's impacts do not decide it, the library repeats the
+///          check: with Auto at once, with other methods at most once in 16 frames on average.
 /// Source   Docs/Algorithms/Validity.md has the conditions and their proofs.
 struct Validity {
   bool trusted = false;
@@ -60,9 +60,9 @@ struct Validity {
 
   /// L: upper bound on the motion of any two features in the step, relative to each other.
   double displacement = 0;
-  /// L: the limit for `displacement`. Proximity: the thickness. Auto: the motion tolerance, which
-  /// only chooses the method. Intersection: the smallest height of a triangle, measured when the
-  /// topology was set. Continuous: infinity.
+  /// L: the largest `displacement` that meets the method's condition. Proximity: the thickness.
+  /// Auto: the motion tolerance, which only chooses the method. Intersection: the smallest height
+  /// of a triangle, measured when the topology was set. Continuous: infinity.
   double displacementLimit = 0;
   /// L: how far the straight motion of vertices is off the arcs of bodies that setTransform()
   /// turns. It bounds the distance of a vertex from its path if the body turned evenly about one
@@ -74,9 +74,9 @@ struct Validity {
   double effectiveThickness = 0;
 
   /// Vertices of the first and of the second mesh because of which the answer is not trusted,
-  /// ascending: vertices that moved further than `displacementLimit`, and vertices of features that
-  /// may have touched within the step although they are apart at its end. For a mesh with itself
-  /// all are in the first list.
+  /// ascending. They moved further than `displacementLimit`, or belong to features that may have
+  /// touched within the step although they are apart at its end. For a mesh with itself all are in
+  /// the first list.
   std::vector<std::uint32_t> untrustedVerticesA, untrustedVerticesB;
   /// Triangles without area that are in contacts, ascending. Their normals follow the rules of
   /// <palpate/Distance.h>.

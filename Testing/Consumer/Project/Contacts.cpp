@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <vector>
 
-// The statements between the marks are README's, and Testing/House checks that they are the same.
+// The statements between the marks are those of README. Testing/Conventions compares them.
 int main() {
   const std::vector<Eigen::Vector3d> organPositions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const std::vector<palpate::Triangle> organTriangles{{0, 1, 2}};
@@ -18,7 +18,6 @@ int main() {
     ++contacts;
   };
 
-  // README begins
   palpate::OctreeBasedCD collisions;
   const auto organ = collisions.addTriangleMesh(organPositions, organTriangles);
   const auto tool = collisions.addTriangleMesh(toolPositions, toolTriangles);
@@ -29,7 +28,6 @@ int main() {
   for (const auto& contact : collisions.collisionData(organ, tool).triangleVertex())
     respond(palpate::stencil(contact), contact);
   collisions.advance();
-  // README ends
 
   const std::vector<palpate::Segment> segments{{0, 1}, {1, 2}};
   const auto thread = collisions.addLineMesh(toolPositions, segments, 0.01);

@@ -1,4 +1,4 @@
-// A stranger's switch from one engine to the other.
+// A separate project that switches from one engine to the other.
 #include <palpate/FclEngine.h>
 
 #include <vector>

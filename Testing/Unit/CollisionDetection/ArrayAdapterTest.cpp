@@ -1,11 +1,12 @@
 #include <palpate/ArrayAdapter.h>
 
-#include "Common/Things.h"
+#include "Common/ExpectRefused.h"
+#include "Common/TestGeometry.h"
 
 namespace palpate::testing {
 namespace {
 
-/// As simulators keep them: contiguous vectors of N, behind a pointer.
+/// Like the arrays of simulators: a pointer to contiguous vectors of N numbers.
 template <class T, int N>
 class VecArray {
  public:
@@ -31,18 +32,19 @@ struct Arrays {
   VecArray<int, 3> triangles;
 };
 
-Arrays arraysOf(const Thing& thing) {
+Arrays arraysOf(const TestGeometry& geometry) {
   Arrays arrays;
-  for (const Vector3d& p : thing.positions) arrays.positions.push_back(p);
-  for (const auto& [a, b, c] : thing.triangles)
+  for (const Vector3d& p : geometry.positions) arrays.positions.push_back(p);
+  for (const auto& [a, b, c] : geometry.triangles)
     arrays.triangles.push_back(
         Eigen::Vector3i(static_cast<int>(a), static_cast<int>(b), static_cast<int>(c)));
   return arrays;
 }
 
-TEST(ArrayAdapter, GivesTheSameContactsAsSpansDo) {
+TEST(ArrayAdapter, GivesTheSameContactsAsSpans) {
   Random random(81);
-  const Thing first = things(sheet(6, 0.5, 0.3)), second = things(soup(random, 60, 0.1));
+  const TestGeometry first = testGeometry(sheet(6, 0.5, 0.3)),
+                     second = testGeometry(soup(random, 60, 0.1));
   const PairSettings settings{Method::Proximity, 0.1, Contacts::All};
   const CollisionData truth = answer(first, second, settings);
 
@@ -85,6 +87,46 @@ TEST(ArrayAdapter, GivesTheSameContactsAsSpansDo) {
   for (const auto& c : truth.edgeEdge()) {
     expectCell(cellsA[at], CellKind::Edge, {c.edgeA[0], c.edgeA[1]});
     expectCell(cellsB[at++], CellKind::Edge, {c.edgeB[0], c.edgeB[1]});
+  }
+}
+
+TEST(ArrayAdapter, FlatArraysAreTriplesAndElements) {
+  const std::vector<double> coordinates{0, 1, 2, 3, 4, 5};
+  const std::span<const Vector3d> positions = positionsOf(coordinates);
+  ASSERT_EQ(positions.size(), 2u);
+  EXPECT_EQ(positions[1], Vector3d(3, 4, 5));
+  EXPECT_EQ(static_cast<const void*>(positions.data()), coordinates.data());
+  const std::vector<int> indices{0, 1, 2, 3, 2, 1, 0, 3};
+  EXPECT_EQ(elementsOf<4>(indices), (std::vector<Tetrahedron>{{0, 1, 2, 3}, {2, 1, 0, 3}}));
+  EXPECT_EQ(elementsOf<2>(indices).size(), 4u);
+  expectRefused(ErrorCode::WrongPositionCount, "8 indices", [&] { elementsOf<3>(indices); });
+  expectRefused(ErrorCode::WrongPositionCount, "7 coordinates",
+                [] { positionsOf(std::vector<double>(7)); });
+}
+
+/// A segment is a cell of two vertices, a point a vertex.
+TEST(ArrayAdapter, CellsOfSegmentsAndPointsAreNotTriangles) {
+  Random random(82);
+  const TestGeometry points = particles(random, 200, 0.02),
+                     line = thread(random, 60, 0.1, 0.02, false);
+  const PairSettings settings{Method::Proximity, 0.1, Contacts::All};
+  const auto cells = [&](const CollisionData& contacts) {
+    std::vector<CellElement> a, b;
+    appendCells(contacts, CellTypes<CellKind>{CellKind::Vertex, CellKind::Edge, CellKind::Triangle},
+                a, b);
+    EXPECT_GT(b.size(), 10u);
+    return b;
+  };
+  for (const CellElement& cell : cells(answer(points, line, settings))) {
+    EXPECT_EQ(cell.cellType, CellKind::Edge);
+    EXPECT_EQ(cell.idCount, 2);
+    EXPECT_EQ(cell.ids[1] - cell.ids[0], 1);  // consecutive vertices of the thread
+  }
+  const CollisionData contacts = answer(points, points, settings);
+  const auto all = cells(contacts);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    EXPECT_EQ(all[i].cellType, CellKind::Vertex);
+    EXPECT_EQ(all[i].ids[0], static_cast<int>(contacts.vertexTriangle()[i].triangle));
   }
 }
 

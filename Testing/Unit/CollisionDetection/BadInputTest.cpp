@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-// Bad input by value, for each public function that takes data: refused with the right code, the
-// ids and a sentence that names them, and nothing changed: whatever can be read stays as it was,
-// and later frames are those of a twin that never saw the bad call.
+// Bad values for each public function that takes data. The call throws the right code, and the
+// message names the ids. The object is unchanged: everything that can be read is as before, and
+// later frames match a twin that never got the bad call.
 
 namespace palpate {
 namespace {
@@ -39,7 +39,7 @@ Positions moved(Positions positions, double z) {
   return positions;
 }
 
-/// Three meshes and two pairs; a fourth mesh was there and has been removed.
+/// Three meshes and two pairs. A fourth mesh was added and removed.
 struct Scene {
   OctreeBasedCD collisions{Settings{.threads = 1}};
   GeometryId removed = collisions.addTriangleMesh(kTool, kToolTriangles);
@@ -64,7 +64,7 @@ void bring(Scene& scene, Stage stage) {
   scene.collisions.setPositions(scene.tool, moved(kTool, -0.05));
 }
 
-/// All that can be read, as one value.
+/// Everything that can be read, as one value.
 std::vector<std::uint64_t> state(const Scene& scene) {
   std::vector<std::uint64_t> values;
   for (const CollisionPair& pair : scene.collisions.pairs()) {
@@ -86,7 +86,7 @@ std::vector<std::uint64_t> state(const Scene& scene) {
   return values;
 }
 
-/// What must be said of a bad call: the code, and what the sentence and the error name.
+/// The expected error of a bad call: its code, and what the message and the error name.
 struct Refusal {
   ErrorCode code;
   std::vector<std::string> named;
@@ -138,7 +138,7 @@ void expectRefused(const std::function<void(Scene&)>& badCall, const Refusal& re
 
 std::string text(GeometryId id) { return std::to_string(static_cast<std::uint32_t>(id)); }
 
-/// call(scene, positions) with each coordinate of each vertex in turn NaN and infinite.
+/// Calls call(scene, positions) with each coordinate of each vertex in turn NaN and infinite.
 template <class Call>
 void expectFinite(const Positions& good, std::optional<GeometryId> geometry, Call call) {
   for (std::size_t vertex = 0; vertex < good.size(); ++vertex) {
@@ -158,7 +158,7 @@ void expectFinite(const Positions& good, std::optional<GeometryId> geometry, Cal
   }
 }
 
-/// call(scene, triangles) with each corner of each triangle in turn out of range.
+/// Calls call(scene, triangles) with each corner of each triangle in turn out of range.
 template <class Call>
 void expectInRange(std::size_t vertexCount, const Triangles& good,
                    std::optional<GeometryId> geometry, Call call) {
@@ -177,7 +177,7 @@ void expectInRange(std::size_t vertexCount, const Triangles& good,
   }
 }
 
-/// call(scene, id) with ids that are not there: never added, and removed.
+/// Calls call(scene, id) with ids that do not exist: never added, and removed.
 template <class Call>
 void expectKnown(Call call) {
   const GeometryId removed = Scene().removed;
@@ -186,7 +186,7 @@ void expectKnown(Call call) {
                   {ErrorCode::UnknownGeometry, {text(id)}, id});
 }
 
-/// call(scene, settings) with every setting that is impossible or not there yet.
+/// Calls call(scene, settings) with every setting that is impossible or not supported yet.
 template <class Call>
 void expectPossible(Call call) {
   const auto refuse = [&](const PairSettings& settings, const Refusal& refusal) {
@@ -229,7 +229,7 @@ TEST(BadInput, SettingsOutOfRange) {
     refuse({.threads = threads}, "threads");
   refuse({.octree = {.update = static_cast<OctreeUpdate>(99)}}, "update");
   refuse({.engine = static_cast<Engine>(99)}, "engine");
-  // The ends of the ranges are inside.
+  // The ends of the ranges are valid.
   for (int depth : {1, 60})
     for (int most : {1, 1024})
       EXPECT_NO_THROW(OctreeBasedCD(
@@ -380,7 +380,7 @@ TEST(BadInput, CandidatePairs) {
   expectKnown([&](Scene& scene, GeometryId id) { ask(scene, id, scene.tool); });
   expectRefused([&](Scene& scene) { ask(scene, scene.tool, scene.other); },
                 {ErrorCode::UnknownPair, {}});
-  // Not kept by detectCollision() unless asked to.
+  // detectCollision() does not keep candidates by default.
   expectRefused([&](Scene& scene) { ask(scene, scene.organ, scene.tool); },
                 {ErrorCode::NotAvailable, {}});
 }

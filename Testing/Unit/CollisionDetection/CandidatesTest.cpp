@@ -29,7 +29,8 @@ PairSettings proximity(double thickness) {
   return settings;
 }
 
-/// True boxes in exact comparison of doubles: nothing missed; more only by outward rounding.
+/// Compares with exact boxes in double: no false negatives, and false positives by outward rounding
+/// only.
 void expectComplete(std::span<const ElementPair> found, std::span<const ElementPair> truth) {
   EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
   EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
@@ -37,7 +38,7 @@ void expectComplete(std::span<const ElementPair> found, std::span<const ElementP
   EXPECT_LE(found.size(), truth.size() + truth.size() / 100 + 2);
 }
 
-/// forEachCandidate(), of one pair and of all, hands on what candidatePairs() has.
+/// forEachCandidate(), of one pair and of all, gives the pairs of candidatePairs().
 void expectSameInBatches(OctreeBasedCD& octree,
                          const std::vector<std::array<GeometryId, 2>>& pairs) {
   std::map<std::pair<GeometryId, GeometryId>, std::vector<ElementPair>> ofAll;
@@ -59,8 +60,8 @@ void expectSameInBatches(OctreeBasedCD& octree,
   EXPECT_EQ(ofAll.size(), pairs.size());
 }
 
-/// The octree's candidates of a and b, and of a with itself, over frames in which both move,
-/// against brute force.
+/// Compares the octree's candidates of a and b, and of a with itself, with brute force, over frames
+/// in which both move.
 void compare(const Mesh& a, const Mesh& b, double thickness, const Eigen::Vector3d& offset,
              double scale, int threads, OctreeUpdate update) {
   OctreeBasedCD octree(settingsOf(Engine::Octree, threads, update)),
@@ -93,7 +94,7 @@ void compare(const Mesh& a, const Mesh& b, double thickness, const Eigen::Vector
   }
 }
 
-TEST(Candidates, AreThoseOfBruteForceOnSoups) {
+TEST(Candidates, MatchBruteForceOnSoups) {
   Random random(1);
   for (const double size : {0.003, 0.05, 0.5}) {
     const Mesh a = testing::soup(random, 400, size), b = testing::soup(random, 300, size * 2);
@@ -103,7 +104,7 @@ TEST(Candidates, AreThoseOfBruteForceOnSoups) {
   }
 }
 
-TEST(Candidates, AreThoseOfBruteForceOnSheetsAndBodies) {
+TEST(Candidates, MatchBruteForceOnSheetsAndBodies) {
   const Mesh a = testing::sheet(20, 0.0, 0.0), b = testing::sheet(17, 0.02, 1.0);
   const Mesh ball = testing::sphere(12, 16, {0.5, 0.5, 0.1}, 0.2);
   for (const OctreeUpdate update : {OctreeUpdate::Auto, OctreeUpdate::Rebuild}) {
@@ -112,7 +113,7 @@ TEST(Candidates, AreThoseOfBruteForceOnSheetsAndBodies) {
   }
 }
 
-TEST(Candidates, DoNotDependOnWhereAndHowLargeTheSceneIs) {
+TEST(Candidates, DoNotDependOnPositionAndScaleOfTheScene) {
   Random random(3);
   const Mesh a = testing::soup(random, 300, 0.05), b = testing::soup(random, 300, 0.05);
   for (const double offset : {0.0, 1e3, 1e6})
@@ -120,7 +121,7 @@ TEST(Candidates, DoNotDependOnWhereAndHowLargeTheSceneIs) {
       compare(a, b, 0.01, {offset, -offset, offset}, scale, 1, OctreeUpdate::Auto);
 }
 
-TEST(Candidates, SurviveOneTriangleFlungFarAway) {
+TEST(Candidates, MatchBruteForceWithOneTriangleFarAway) {
   Random random(4);
   Mesh a = testing::soup(random, 500, 0.03);
   const Mesh b = testing::soup(random, 500, 0.03);
@@ -130,7 +131,7 @@ TEST(Candidates, SurviveOneTriangleFlungFarAway) {
   }
 }
 
-TEST(Candidates, OfPointsThatAreAllTheSame) {
+TEST(Candidates, MatchBruteForceOnIdenticalPoints) {
   Mesh a;
   a.positions.assign(60, Eigen::Vector3d(1, 2, 3));
   for (std::uint32_t t = 0; t < 20; ++t) a.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});

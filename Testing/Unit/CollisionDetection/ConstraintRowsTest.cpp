@@ -1,8 +1,9 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/Distance.h>
 
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/SparseCore>
 
 #include <map>
@@ -10,8 +11,8 @@
 namespace palpate::testing {
 namespace {
 
-/// A pair at some positions: its contacts and their rows, the second geometry's vertices after the
-/// first's.
+/// A pair at some positions: its contacts and their rows. The second geometry's vertices are
+/// numbered after the first's.
 struct Rowed {
   CollisionData contacts;
   std::vector<ConstraintRow> rows;
@@ -47,8 +48,9 @@ void collect(Rowed& result, const SolverVertices& a, const SolverVertices& b) {
   });
 }
 
-/// all: the first thing's positions, then the second's, of which self-collision has none.
-Rowed rowed(const Thing& a, const Thing& b, const PairSettings& pair, const Positions& all) {
+/// all: the positions of the first geometry, then of the second. Self-collision has only the first.
+Rowed rowed(const TestGeometry& a, const TestGeometry& b, const PairSettings& pair,
+            const Positions& all) {
   const auto split = all.begin() + static_cast<std::ptrdiff_t>(a.positions.size());
   const Positions nowA(all.begin(), split), nowB(split, all.end());
   Rowed result{answer(settingsOf(Engine::Octree), a, b, pair, nowA, nowB), {}, {}, {}};
@@ -58,7 +60,7 @@ Rowed rowed(const Thing& a, const Thing& b, const PairSettings& pair, const Posi
   return result;
 }
 
-Rowed rowed(const Thing& a, const AnalyticalGeometry& shape, double thickness,
+Rowed rowed(const TestGeometry& a, const AnalyticalGeometry& shape, double thickness,
             const Positions& now) {
   OctreeBasedCD collisions;
   const GeometryId first = a.addTo(collisions), second = collisions.addAnalyticalGeometry(shape);
@@ -79,8 +81,8 @@ Eigen::SparseMatrix<double> jacobian(const Rowed& found, std::size_t vertices) {
   return matrix;
 }
 
-/// Gaps are distances, and the Jacobian is what distances do when all positions move a little in
-/// random directions. Returns how many contacts were compared.
+/// Compares gaps with distances, and the Jacobian with the change of distances when all positions
+/// move a little in random directions. Returns how many contacts were compared.
 template <class Find>  // Rowed of positions
 std::size_t expectDerivatives(Random& random, const Positions& at, Find&& find) {
   constexpr double kStep = 0x1p-18;
@@ -106,7 +108,7 @@ std::size_t expectDerivatives(Random& random, const Positions& at, Find&& find) 
     const auto one = ahead.find(found.keys[r]), other = behind.find(found.keys[r]);
     if (one == ahead.end() || other == behind.end()) continue;  // at the thickness
     const double quotient = (one->second - other->second) / (2 * kStep);
-    // A central difference errs by the square of the step over the distance.
+    // The error of a central difference is the square of the step over the distance.
     const double ratio = kStep / std::max(std::abs(found.distances[r]), 1e-4);
     EXPECT_NEAR(predicted[static_cast<Eigen::Index>(r)], quotient, 1e-6 + 30 * ratio * ratio) << r;
     ++compared;
@@ -115,10 +117,12 @@ std::size_t expectDerivatives(Random& random, const Positions& at, Find&& find) 
   return compared;
 }
 
-TEST(ConstraintRows, AreTheDerivativesOfDistancesOfEveryKind) {
+TEST(ConstraintRows, AreDerivativesOfDistancesForEveryGeometryType) {
   Random random(71);
-  const Thing sheets = things(sheet(6, 0.5, 0.3)), triangles = things(soup(random, 60, 0.1)),
-              line = thread(random, 60, 0.1, 0.01, false), points = particles(random, 60, 0.02);
+  const TestGeometry sheets = testGeometry(sheet(6, 0.5, 0.3)),
+                     triangles = testGeometry(soup(random, 60, 0.1)),
+                     line = thread(random, 60, 0.1, 0.01, false),
+                     points = particles(random, 60, 0.02);
   const Pairs pairs{{&sheets, &triangles}, {&triangles, &sheets}, {&triangles, &triangles},
                     {&sheets, &line},      {&line, &sheets},      {&line, &line},
                     {&line, &points},      {&points, &line},      {&points, &points},
@@ -132,34 +136,36 @@ TEST(ConstraintRows, AreTheDerivativesOfDistancesOfEveryKind) {
   }
 }
 
-TEST(ConstraintRows, AreTheDerivativesOfDistancesToShapes) {
+TEST(ConstraintRows, AreDerivativesOfDistancesToShapes) {
   Random random(72);
-  const Thing triangles = things(soup(random, 60, 0.1)),
-              line = thread(random, 60, 0.1, 0.01, false), points = particles(random, 60, 0.02);
+  const TestGeometry triangles = testGeometry(soup(random, 60, 0.1)),
+                     line = thread(random, 60, 0.1, 0.01, false),
+                     points = particles(random, 60, 0.02);
   const std::vector<AnalyticalGeometry> shapes{Sphere{{0.5, 0.5, 0.5}, 0.25},
                                                Capsule{{0.3, 0.4, 0.5}, {0.7, 0.5, 0.6}, 0.2},
                                                Plane{{0.5, 0.5, 0.5}, {0.3, 0.1, 1}}};
-  for (const Thing* thing : {&triangles, &line, &points}) {
+  for (const TestGeometry* geometry : {&triangles, &line, &points}) {
     for (const AnalyticalGeometry& shape : shapes)
-      EXPECT_GT(
-          expectDerivatives(random, thing->positions,
-                            [&](const Positions& now) { return rowed(*thing, shape, 0.1, now); }),
-          10u);
+      EXPECT_GT(expectDerivatives(
+                    random, geometry->positions,
+                    [&](const Positions& now) { return rowed(*geometry, shape, 0.1, now); }),
+                10u);
   }
 }
 
-/// Where radii differ along a line the row has the gradient of the distance between the centre
-/// lines. The distance itself also changes by the radius, as the closest point moves along.
-TEST(ConstraintRows, OfTaperedLinesAreTheDerivativesOfCentreLines) {
+/// If radii differ along a line, the row has the gradient of the distance between the centre lines.
+/// The distance itself also changes by the radius, because the closest point moves along.
+TEST(ConstraintRows, AreDerivativesOfCentreLineDistancesForTaperedLines) {
   Random random(75);
-  const Thing line = thread(random, 60, 0.1, 0.01, false);
-  const Thing taperedLine = tapered(random, line, 0.05), sheets = things(sheet(6, 0.5, 0.3));
+  const TestGeometry line = thread(random, 60, 0.1, 0.01, false);
+  const TestGeometry taperedLine = tapered(random, line, 0.05),
+                     sheets = testGeometry(sheet(6, 0.5, 0.3));
   constexpr double kStep = 0x1p-18;
   struct Lengths {
     double distance, ofCentres;
   };
   std::size_t compared = 0, changedByRadius = 0;
-  for (const Thing* other : {&sheets, &taperedLine}) {
+  for (const TestGeometry* other : {&sheets, &taperedLine}) {
     const bool self = other == &taperedLine;
     const Positions at =
         self ? taperedLine.positions : joined(taperedLine.positions, other->positions);
@@ -203,8 +209,8 @@ TEST(ConstraintRows, OfTaperedLinesAreTheDerivativesOfCentreLines) {
 }
 
 /// At distance 0 the row has the gradient of the signed distance along the normal.
-TEST(ConstraintRows, OfTouchingFeaturesMeasureAlongTheNormal) {
-  const Thing ground{
+TEST(ConstraintRows, MeasureTouchingFeaturesAlongTheNormal) {
+  const TestGeometry ground{
       GeometryType::Triangles, {{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}, {{0, 1, 2}}, {}, {}},
       tip{GeometryType::Triangles, {{1, 1, 0}, {1, 2, 3}, {2, 1, 3}}, {{0, 1, 2}}, {}, {}};
   const Positions at = joined(tip.positions, ground.positions);
@@ -219,7 +225,7 @@ TEST(ConstraintRows, OfTouchingFeaturesMeasureAlongTheNormal) {
   }
 }
 
-TEST(ConstraintRows, TooFewPositionsAreRefusedByVertex) {
+TEST(ConstraintRows, TooFewPositionsThrowAnErrorThatNamesTheVertex) {
   const Positions low{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, high{{0, 0, 0.1}, {1, 0, 0.1}, {0, 1, 0.1}};
   const std::vector<Triangle> triangle{{0, 1, 2}};
   const CollisionData contacts =
@@ -244,8 +250,9 @@ TEST(ConstraintRows, TooFewPositionsAreRefusedByVertex) {
   EXPECT_GT(rows.size(), 1u);
 }
 
-TEST(ConstraintRows, TooFewPositionsBesideAShapeAreRefusedByVertex) {
-  const Thing drops{GeometryType::Points, {{0, 0, 1}, {0, 0, 0.1}, {1, 0, 0.1}}, {}, {}, {0.0}};
+TEST(ConstraintRows, TooFewPositionsBesideAShapeThrowAnErrorThatNamesTheVertex) {
+  const TestGeometry drops{
+      GeometryType::Points, {{0, 0, 1}, {0, 0, 0.1}, {1, 0, 0.1}}, {}, {}, {0.0}};
   OctreeBasedCD collisions;
   const GeometryId points = drops.addTo(collisions),
                    plane = collisions.addAnalyticalGeometry(Plane{});
@@ -273,9 +280,10 @@ TEST(ConstraintRows, TooFewPositionsBesideAShapeAreRefusedByVertex) {
 }
 
 /// The third law of ConstraintRow, of triangles that intersect and of triangles that are near.
-TEST(ConstraintRows, AStepToAGapMakesTheSignedDistanceThat) {
+TEST(ConstraintRows, StepToAGapGivesThatSignedDistance) {
   Random random(74);
-  const Thing triangles = things(soup(random, 2000, 0.2)), sheets = things(sheet(3, 0.5, 0.3));
+  const TestGeometry triangles = testGeometry(soup(random, 2000, 0.2)),
+                     sheets = testGeometry(sheet(3, 0.5, 0.3));
   const Positions at = joined(triangles.positions, sheets.positions);
   std::size_t compared = 0, behind = 0, outOfEdges = 0;
   for (const Method method : {Method::Intersection, Method::Proximity}) {
@@ -335,9 +343,10 @@ TEST(ConstraintRows, AStepToAGapMakesTheSignedDistanceThat) {
   EXPECT_GE(outOfEdges, 20u);
 }
 
-TEST(ConstraintRows, OfImpactsHoldTheirGapWhereFeaturesTouch) {
+TEST(ConstraintRows, RowsOfImpactsHaveTheirGapWhereFeaturesTouch) {
   Random random(73);
-  const Thing triangles = things(soup(random, 80, 0.1)), sheets = things(sheet(6, 0.5, 0.3));
+  const TestGeometry triangles = testGeometry(soup(random, 80, 0.1)),
+                     sheets = testGeometry(sheet(6, 0.5, 0.3));
   for (const Method method : {Method::Continuous, Method::Auto}) {
     for (const double thickness : {0.0, 0.02}) {
       const Positions before = joined(triangles.positions, sheets.positions),
@@ -358,6 +367,49 @@ TEST(ConstraintRows, OfImpactsHoldTheirGapWhereFeaturesTouch) {
       }
     }
   }
+}
+
+/// The rows of a shape that moves refer to the shape at the step's end.
+TEST(ConstraintRows, RowsOfAMovingShapeFollowItToTheEndOfTheStep) {
+  Random random(76);
+  const TestGeometry triangles = testGeometry(soup(random, 80, 0.1));
+  const Positions before = triangles.positions, now = moved(random, before, 0.05);
+  std::size_t impacts = 0;
+  for (const double turn : {0.0, 0.7}) {
+    ShapeMotion motion;
+    motion.translationBefore = {-0.4, 0.1, 0};
+    motion.translation = {0.9, 0, 0.2};
+    motion.rotation = Eigen::AngleAxisd(turn, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+    OctreeBasedCD collisions(settingsOf(Engine::Octree));
+    const GeometryId mesh = triangles.addTo(collisions),
+                     tool = collisions.addAnalyticalGeometry(Sphere{{0.1, 0.4, 0.5}, 0.2});
+    collisions.addCollisionPair(mesh, tool, {Method::Continuous, 0.02, Contacts::All});
+    collisions.setPositions(mesh, before, now);
+    collisions.setTransform(tool, motion.rotationBefore, motion.translationBefore, motion.rotation,
+                            motion.translation);
+    collisions.detectCollision();
+    const CollisionData& contacts = collisions.collisionData(mesh, tool);
+    std::vector<ConstraintRow> rows, rowsAtRest;
+    appendRows(contacts, {0, before, now}, {}, rows, motion);
+    appendRows(contacts, {0, before, now}, {}, rowsAtRest);
+    ASSERT_EQ(rows.size(), contacts.shape().size());
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      const ShapeContact& c = contacts.shape()[r];
+      const double time = c.timeOfImpact;
+      impacts += time < 1.0;
+      Vector3d point = Vector3d::Zero();  // of the element, at the end
+      for (int i = 0; i < 3; ++i) point += c.weights[i] * now[c.vertices[i]];
+      // The point of the shape that the contact touches, at the end.
+      const Eigen::Matrix3d then = (1 - time) * motion.rotationBefore + time * motion.rotation;
+      const Vector3d body =
+          then.inverse() *
+          (c.pointOnShape - (1 - time) * motion.translationBefore - time * motion.translation);
+      const Vector3d opposite = motion.rotation * body + motion.translation;
+      EXPECT_NEAR(rows[r].gap(now), c.normal.dot(point - opposite), 1e-12);
+      EXPECT_NEAR(rowsAtRest[r].gap(now), c.normal.dot(point - c.pointOnShape), 1e-12);
+    }
+  }
+  EXPECT_GT(impacts, 20u);
 }
 
 }  // namespace

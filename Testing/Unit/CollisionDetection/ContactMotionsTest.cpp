@@ -1,6 +1,6 @@
 #include <palpate/ConstraintRows.h>
 
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <Eigen/Geometry>
 
@@ -23,15 +23,16 @@ std::vector<double> distancesOf(const CollisionData& contacts) {
   return distances;
 }
 
-/// One pair's step from the things' positions to those of now, with its rows and motions.
+/// One pair: its step from the positions before to the positions now, with its rows and motions.
 struct Moved {
   CollisionData contacts;
   std::vector<ConstraintRow> rows;
   std::vector<ContactMotion> motions;
-  Positions before, now;  ///< of both, as the rows number them
+  Positions before, now;  ///< positions of both, in the numbering of the rows
 };
 
-Moved step(Random& random, const Thing& a, const Thing& b, const PairSettings& pair, double most) {
+Moved step(Random& random, const TestGeometry& a, const TestGeometry& b, const PairSettings& pair,
+           double most) {
   const Positions nowA = moved(random, a.positions, most), nowB = moved(random, b.positions, most);
   Moved result{
       answer(settingsOf(Engine::Octree), a, b, pair, nowA, nowB), {}, {}, a.positions, nowA};
@@ -44,18 +45,21 @@ Moved step(Random& random, const Thing& a, const Thing& b, const PairSettings& p
   return result;
 }
 
-TEST(ContactMotions, PointsAreADistanceApartAndDisplacementsAreWhatGapsDo) {
+TEST(ContactMotions, PointsMatchDistancesAndDisplacementsMatchGapChanges) {
   Random random(191);
-  const Thing sheets = things(sheet(6, 0.5, 0.3)), triangles = things(soup(random, 60, 0.1)),
-              line = thread(random, 60, 0.1, 0.01, false), points = particles(random, 60, 0.02),
-              cone = tapered(random, thread(random, 60, 0.1, 0, false), 0.02);
+  const TestGeometry sheets = testGeometry(sheet(6, 0.5, 0.3)),
+                     triangles = testGeometry(soup(random, 60, 0.1)),
+                     line = thread(random, 60, 0.1, 0.01, false),
+                     points = particles(random, 60, 0.02),
+                     cone = tapered(random, thread(random, 60, 0.1, 0, false), 0.02);
   const Pairs pairs{{&sheets, &triangles}, {&triangles, &sheets}, {&sheets, &line},
                     {&line, &sheets},      {&line, &points},      {&points, &line},
                     {&points, &sheets},    {&cone, &sheets},      {&points, &cone}};
   for (const auto& [a, b] : pairs) {
     for (const Method method : {Method::Proximity, Method::Continuous}) {
       const bool isTapered = a == &cone || b == &cone;
-      if (isTapered && method == Method::Continuous) continue;  // its distances take largest radii
+      if (isTapered && method == Method::Continuous)
+        continue;  // its distances take the largest radii
       const Moved found = step(random, *a, *b, {method, 0.1, Contacts::All}, 0.05);
       ASSERT_EQ(found.motions.size(), found.rows.size());
       EXPECT_GT(found.motions.size(), 10u);
@@ -72,19 +76,20 @@ TEST(ContactMotions, PointsAreADistanceApartAndDisplacementsAreWhatGapsDo) {
 
 TEST(ContactMotions, TouchingFeaturesOfAStepWithoutThicknessMeetAtOnePoint) {
   Random random(192);
-  const Thing sheets = things(sheet(6, 0.5, 0.3)), triangles = things(soup(random, 80, 0.1));
+  const TestGeometry sheets = testGeometry(sheet(6, 0.5, 0.3)),
+                     triangles = testGeometry(soup(random, 80, 0.1));
   const Moved found = step(random, triangles, sheets, {Method::Continuous, 0.0}, 0.2);
   EXPECT_GT(found.motions.size(), 20u);
   for (const ContactMotion& motion : found.motions)
     EXPECT_LT((motion.point - motion.opposite).norm(), 1e-6) << "the time's tolerance of the way";
 }
 
-TEST(ContactMotions, OfADropOverATriangleAreExact) {
-  const Thing drop{GeometryType::Points, {{0.25, 0.25, 1}}, {}, {}, {0.25}},
+TEST(ContactMotions, AreExactForADropOverATriangle) {
+  const TestGeometry drop{GeometryType::Points, {{0.25, 0.25, 1}}, {}, {}, {0.25}},
       floor{GeometryType::Triangles, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, {}, {}};
   const Positions dropNow{{0.375, 0.25, 0.5}}, floorNow{{0, 1, 0}, {1, 1, 0}, {0, 2, 0}};
   for (const bool dropFirst : {true, false}) {
-    const Thing &a = dropFirst ? drop : floor, &b = dropFirst ? floor : drop;
+    const TestGeometry &a = dropFirst ? drop : floor, &b = dropFirst ? floor : drop;
     const Positions &nowA = dropFirst ? dropNow : floorNow, &nowB = dropFirst ? floorNow : dropNow;
     const CollisionData contacts =
         answer(settingsOf(Engine::Octree), a, b, {Method::Proximity, 2.0}, nowA, nowB);
@@ -109,19 +114,20 @@ const std::vector<AnalyticalGeometry> kShapes{
     Sphere{{0.1, 0, 0}, 0.3}, Capsule{{-0.2, 0, 0}, {0.2, 0.1, 0}, 0.2},
     Box{{0, 0, 0}, {0.3, 0.2, 0.25}}, Plane{{0, 0, 0}, {0.1, 0.2, 1}}};
 
-TEST(ContactMotions, OfShapesAreTheDerivativesOfDistances) {
+TEST(ContactMotions, AreDerivativesOfDistancesToShapes) {
   Random random(193);
-  const Thing drops = particles(random, 300, 0.02), line = thread(random, 200, 0.1, 0.01, false);
+  const TestGeometry drops = particles(random, 300, 0.02),
+                     line = thread(random, 200, 0.1, 0.01, false);
   constexpr double kStep = 0x1p-16;
-  for (const Thing* thing : {&drops, &line})
+  for (const TestGeometry* elements : {&drops, &line})
     for (const AnalyticalGeometry& geometry : kShapes)
       for (const bool shapeFirst : {true, false}) {
         const Vector3d middle(0.5, 0.5, 0.5), spin(0.3, -0.7, 0.5), slide(-0.6, 0.2, 0.4);
         const Eigen::Matrix3d tilt = turn({0.4, 0.3, -0.2});
         const ShapeMotion motion{tilt, middle, turn(kStep * spin) * tilt, middle + kStep * slide};
-        const Positions now = moved(random, thing->positions, kStep);
+        const Positions now = moved(random, elements->positions, kStep);
         OctreeBasedCD detection;
-        const GeometryId soft = thing->addTo(detection),
+        const GeometryId soft = elements->addTo(detection),
                          shape = detection.addAnalyticalGeometry(geometry);
         const GeometryId a = shapeFirst ? shape : soft, b = shapeFirst ? soft : shape;
         detection.addCollisionPair(a, b, {Method::Proximity, 0.1, Contacts::All});
@@ -132,10 +138,11 @@ TEST(ContactMotions, OfShapesAreTheDerivativesOfDistances) {
           detection.detectCollision();
           return detection.collisionData(a, b);
         };
-        const CollisionData start = detect(thing->positions, tilt, middle),
+        const CollisionData start = detect(elements->positions, tilt, middle),
                             end = detect(now, motion.rotation, motion.translation);
         std::vector<ContactMotion> motions;
-        const ContactSide mesh{{0, thing->positions, now}, thing->radii}, tool{{}, {}, motion};
+        const ContactSide mesh{{0, elements->positions, now}, elements->radii},
+            tool{{}, {}, motion};
         appendMotions(end, shapeFirst ? tool : mesh, shapeFirst ? mesh : tool, motions);
         ASSERT_EQ(motions.size(), end.shape().size());
         std::size_t compared = 0;
@@ -146,13 +153,13 @@ TEST(ContactMotions, OfShapesAreTheDerivativesOfDistances) {
               1e-13);
           // An edge is deepest in a box where two faces are equally near: the depth has a kink.
           if (std::holds_alternative<Box>(geometry) && contact.element == ShapeElement::Edge &&
-              contact.distance + thing->radii[0] < 0)
+              contact.distance + elements->radii[0] < 0)
             continue;
           for (const ShapeContact& other : start.shape()) {
             if (other.element != contact.element || other.vertices != contact.vertices) continue;
-            // Of the same features the normal turns by the step over their distance at most, and
+            // With the same features, the normal turns by at most the step over their distance, and
             // the closest points slide as little.
-            const double apart = std::abs(contact.distance + thing->radii[0]);
+            const double apart = std::abs(contact.distance + elements->radii[0]);
             if ((other.normal - contact.normal).norm() > 10 * kStep / apart ||
                 (other.weights - contact.weights).norm() > 1000 * kStep)
               continue;
@@ -165,7 +172,7 @@ TEST(ContactMotions, OfShapesAreTheDerivativesOfDistances) {
       }
 }
 
-TEST(ContactMotions, OfTwoShapesAreTheDerivativesOfDistances) {
+TEST(ContactMotions, AreDerivativesOfDistancesBetweenShapes) {
   constexpr double kStep = 0x1p-16;
   const Eigen::Matrix3d tilt = turn({0.4, 0.3, -0.2}), other = turn({-0.1, 0.5, 0.6});
   const ShapeMotion first{tilt,
@@ -201,9 +208,9 @@ TEST(ContactMotions, OfTwoShapesAreTheDerivativesOfDistances) {
     }
 }
 
-TEST(ContactMotions, OfImpactsWithShapesAreOfThePoseThen) {
+TEST(ContactMotions, UseThePoseAtTheImpactWithAShape) {
   Random random(194);
-  const Thing drops = particles(random, 300, 0.02);
+  const TestGeometry drops = particles(random, 300, 0.02);
   const ShapeMotion motion{
       turn({0.4, 0.3, -0.2}), {0.5, 0.5, 0.2}, turn({0.1, 0.6, 0.3}), {0.5, 0.5, 0.9}};
   for (std::size_t s = 0; s < 3; ++s) {
@@ -221,8 +228,8 @@ TEST(ContactMotions, OfImpactsWithShapesAreOfThePoseThen) {
     ASSERT_EQ(motions.size(), contacts.shape().size());
     EXPECT_GT(motions.size(), 20u);
     for (std::size_t i = 0; i < motions.size(); ++i) {
-      // The shape's point goes straight: back from the contact it comes to its place before, and
-      // ahead to that now. Both poses have it at one place of the body.
+      // The shape's point moves in a straight line: back from the contact to its place before, and
+      // ahead to its place now. In both poses it is the same point of the body.
       const double time = contacts.shape()[i].timeOfImpact;
       const Vector3d way = -motions[i].relativeDisplacement,
                      start = motions[i].opposite - time * way, end = start + way;
@@ -234,9 +241,10 @@ TEST(ContactMotions, OfImpactsWithShapesAreOfThePoseThen) {
   }
 }
 
-TEST(ContactMotions, BadSidesAreRefusedAndNothingIsAdded) {
+TEST(ContactMotions, BadVerticesThrowAndNothingIsAdded) {
   Random random(195);
-  const Thing line = thread(random, 40, 0.1, 0.01, false), sheets = things(sheet(6, 0.5, 0.3));
+  const TestGeometry line = thread(random, 40, 0.1, 0.01, false),
+                     sheets = testGeometry(sheet(6, 0.5, 0.3));
   const CollisionData contacts = answer(line, sheets, {Method::Proximity, 0.1, Contacts::All});
   OctreeBasedCD detection;
   const GeometryId thread = line.addTo(detection),
@@ -312,7 +320,7 @@ TEST(Tangents, AreRightHandedForEveryNormal) {
   EXPECT_EQ(tangentsOf(-Vector3d::UnitZ()), (Tangents{-Vector3d::UnitX(), Vector3d::UnitY()}));
 }
 
-TEST(Tangents, OfTheFixedRuleChangeAtMostAsTheirLawSays) {
+TEST(Tangents, FixedRuleBoundsTheirChange) {
   // Along circles of latitude, where they change most, along meridians, and at random.
   Random random(197);
   double sharpest = 0;
@@ -334,7 +342,7 @@ TEST(Tangents, OfTheFixedRuleChangeAtMostAsTheirLawSays) {
   EXPECT_GT(sharpest, 0.99) << "the bound is attained";
 }
 
-TEST(Tangents, CarriedOverChangeAtMostAsTheNormalDoes) {
+TEST(Tangents, CarriedOverTheyTurnAtMostAsTheNormalDoes) {
   // A spiral over all directions from z to -z and back, its speed uneven.
   Tangents tangents = tangentsOf(Vector3d::UnitZ());
   Vector3d normal = Vector3d::UnitZ();
@@ -378,7 +386,7 @@ TEST(Tangents, TurnByTheSolidAngleOfALoop) {
   EXPECT_LT((tangents[1] + Vector3d::UnitY()).norm(), 1e-13);
 }
 
-TEST(Tangents, WithoutPreviousOnesAreThoseOfTheRule) {
+TEST(Tangents, WithoutPreviousTangentsTheFixedRuleApplies) {
   const Vector3d normal = Vector3d(0.3, -0.5, 0.2).normalized();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const Vector3d& none : {Vector3d(0, 0, 0), Vector3d(nan, nan, nan)})

@@ -19,8 +19,8 @@
 #include <tuple>
 #include <vector>
 
-// Filters: groups, elements that are off, rest distance, predicates; each against brute force and
-// against a definition of its own here. SidednessTest.cpp has sides.
+// Filters: groups, disabled elements, rest distance, predicates. Each is compared with brute force
+// and with a definition that is written here. SidednessTest.cpp has sides.
 
 namespace palpate::testing {
 namespace {
@@ -28,7 +28,7 @@ namespace {
 using Eigen::Vector3d;
 using Positions = std::vector<Vector3d>;
 
-/// A pair of meshes, or one with itself, and what is filtered.
+/// A pair of meshes, or a mesh with itself, and its filters.
 struct Case {
   Mesh a, b;
   bool self = false;
@@ -64,7 +64,7 @@ Answer answer(Settings settings, const Case& c) {
           {candidates.begin(), candidates.end()}};
 }
 
-/// By brute force; octrees say the same.
+/// The contacts by brute force. Expects the same from octrees.
 Answer truth(const Case& c) {
   const Answer expected = answer(settingsOf(Engine::BruteForce), c);
   for (const Settings& settings : octreeSettings()) {
@@ -111,7 +111,7 @@ Case sheetsInContact(Random& random, bool self) {
   return c;
 }
 
-// ---- Elements that are off ----
+// ---- Disabled elements ----
 
 std::vector<std::uint32_t> some(Random& random, std::size_t size) {
   std::vector<std::uint32_t> ids;
@@ -120,7 +120,7 @@ std::vector<std::uint32_t> some(Random& random, std::size_t size) {
   return ids;
 }
 
-/// Takes the triangles out; returns the old ids of those left.
+/// Removes the triangles. Returns the old ids of the others.
 std::vector<std::uint32_t> takeOut(Mesh& mesh, const std::vector<std::uint32_t>& disabled) {
   std::vector<std::uint32_t> kept;
   std::vector<Triangle> triangles;
@@ -133,7 +133,7 @@ std::vector<std::uint32_t> takeOut(Mesh& mesh, const std::vector<std::uint32_t>&
   return kept;
 }
 
-TEST(Filters, WhatIsOffIsAsIfItWereNotThere) {
+TEST(Filters, DisabledElementsCountAsRemoved) {
   Random random(1);
   std::size_t contacts = 0;
   for (const bool self : {false, true})
@@ -160,7 +160,7 @@ TEST(Filters, WhatIsOffIsAsIfItWereNotThere) {
   EXPECT_GT(contacts, 500u);
 }
 
-TEST(Filters, SwitchingOffPassesVerticesAndEdgesOn) {
+TEST(Filters, DisablingATrianglePassesItsFeaturesToNeighbours) {
   // Two triangles at an edge, and a point over a corner of both.
   const Mesh roof{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {4, 4, 0}}, {{0, 1, 2}, {1, 3, 2}}};
   OctreeBasedCD detection(settingsOf(Engine::Octree));
@@ -194,7 +194,7 @@ bool hashed(const ContactFeatures& f) {
   return (f.a[0] * 7 + f.a[1] * 3 + f.b[0] * 5 + f.b[1] * 11 + static_cast<unsigned>(f.kind)) % 3;
 }
 
-TEST(Filters, PredicateLeavesOutWhatItRefuses) {
+TEST(Filters, PredicateExcludesWhatItRefuses) {
   Random random(2);
   std::size_t left = 0, out = 0;
   for (const bool self : {false, true})
@@ -222,7 +222,7 @@ TEST(Filters, PredicateLeavesOutWhatItRefuses) {
         const auto& rows = found.rows.*list;
         EXPECT_TRUE(std::all_of(rows.begin(), rows.end(), kept(kind)));
         if (pair.contacts != Contacts::All || pair.method == Method::Auto) continue;
-        std::vector<Row> expected;  // nothing hides anything
+        std::vector<Row> expected;  // no contact suppresses another
         std::copy_if((all.rows.*list).begin(), (all.rows.*list).end(), std::back_inserter(expected),
                      kept(kind));
         EXPECT_EQ(firstDifference(rows, expected), "");
@@ -234,7 +234,7 @@ TEST(Filters, PredicateLeavesOutWhatItRefuses) {
   EXPECT_GT(out, 100u);
 }
 
-TEST(Filters, WhatIsRefusedHidesNothing) {
+TEST(Filters, RefusedContactsSuppressNoOthers) {
   const Mesh roof{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {4, 4, 0}}, {{0, 1, 2}, {1, 3, 2}}};
   OctreeBasedCD detection(settingsOf(Engine::Octree));
   const GeometryId mesh = detection.addTriangleMesh(roof.positions, roof.triangles),
@@ -253,7 +253,7 @@ TEST(Filters, WhatIsRefusedHidesNothing) {
   asked = 0;
   detection.setPositions(probe, Positions{{2, 2, 0.75}});
   detection.detectCollision();
-  EXPECT_EQ(asked, 0);  // only what is near enough
+  EXPECT_EQ(asked, 0);  // only pairs within the thickness
   detection.setPositions(probe, Positions{{2, 2, 0.25}});
   detection.setContactPredicate(mesh, probe, {});
   detection.detectCollision();
@@ -276,7 +276,7 @@ std::vector<std::vector<double>> restDistances(const Mesh& mesh) {
   return d;
 }
 
-TEST(Filters, RestDistanceLeavesOutWhatIsNearAlongTheSurface) {
+TEST(Filters, RestDistanceExcludesNeighboursAlongTheSurface) {
   Random random(3);
   std::size_t left = 0, out = 0;
   for (const PairSettings& pair : everyMethod(0.15)) {
@@ -302,7 +302,7 @@ TEST(Filters, RestDistanceLeavesOutWhatIsNearAlongTheSurface) {
       if (pair.contacts != Contacts::All || pair.method == Method::Auto) return;
       std::vector<Row> expected;
       std::copy_if(unfiltered.begin(), unfiltered.end(), std::back_inserter(expected), keep);
-      // Intersection's contacts are of whole triangle pairs: fewer.
+      // Intersection's contacts belong to whole triangle pairs, so there are fewer.
       if (pair.method == Method::Intersection)
         EXPECT_TRUE(std::includes(expected.begin(), expected.end(), rows.begin(), rows.end()));
       else
@@ -323,7 +323,7 @@ TEST(Filters, RestDistanceLeavesOutWhatIsNearAlongTheSurface) {
   EXPECT_GT(out, 200u);
 }
 
-TEST(Filters, RestIsTheShapeOfTheTopology) {
+TEST(Filters, RestPositionsAreThoseGivenWithTheTopology) {
   const Positions flat{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 2, 0}, {1, 2, 0}};
   const std::vector<Triangle> strip{{0, 1, 2}, {1, 3, 2}, {2, 3, 4}, {3, 5, 4}};
   Positions folded = flat;  // the far end over the near one
@@ -356,7 +356,7 @@ TEST(Filters, RestIsTheShapeOfTheTopology) {
 
 // ---- Groups ----
 
-TEST(Filters, GroupsAndMasksChooseThePairs) {
+TEST(Filters, GroupsAndMasksSelectThePairs) {
   Random random(4);
   const Case c = sheetsInContact(random, false);
   for (const Settings& settings :
@@ -370,7 +370,7 @@ TEST(Filters, GroupsAndMasksChooseThePairs) {
       };
       const Rows all = detect();
       EXPECT_TRUE(all.anything());
-      // An asked for by b's mask, not the other way round; then neither; then both.
+      // First b's mask selects a, but not the other way round; then neither does; then both do.
       detection.setCollisionFilter(run.a(), {2, 1});
       detection.setCollisionFilter(run.b(), {4, 6});
       EXPECT_EQ(detect(), Rows());
@@ -391,8 +391,8 @@ TEST(Filters, GroupsAndMasksChooseThePairs) {
 
 // ---- From frame to frame, files, errors ----
 
-/// Whatever was filtered before, a frame says what a new engine would say.
-TEST(Filters, OnlyTheLastFiltersCount) {
+/// After any earlier filters, a frame gives the contacts of a new engine.
+TEST(Filters, LastFiltersCount) {
   Random random(5);
   for (const bool self : {false, true})
     for (const PairSettings& pair : everyMethod(0.04)) {
@@ -422,7 +422,7 @@ TEST(Filters, OnlyTheLastFiltersCount) {
     }
 }
 
-TEST(Filters, CapturesAndTheAuditHoldThem) {
+TEST(Filters, CapturesAndAuditIncludeThem) {
   Random random(6);
   const auto path = std::filesystem::temp_directory_path() / "palpate-filters.capture";
   Settings audited = settingsOf(Engine::Octree);
@@ -453,7 +453,7 @@ TEST(Filters, CapturesAndTheAuditHoldThem) {
     EXPECT_GT(detection.statistics().contacts + detection.statistics().intersectingTriangles +
                   (pair.earliestTimeOnly),
               0u);
-    // A predicate is not in the file, but said; the audit asks it.
+    // The file does not contain a predicate, but says that there was one. The audit calls it.
     detection.setContactPredicate(b, a, hashed);
     detection.detectCollision();
     EXPECT_TRUE(detection.auditFailures().empty());
@@ -466,18 +466,19 @@ TEST(Filters, CapturesAndTheAuditHoldThem) {
   std::filesystem::remove(path);
 }
 
-TEST(Filters, BadInputIsRefusedByName) {
+TEST(Filters, BadInputThrowsErrorsThatNameIt) {
   const Mesh one{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
   OctreeBasedCD detection(settingsOf(Engine::Octree));
   const GeometryId mesh = detection.addTriangleMesh(one.positions, one.triangles),
                    line = detection.addLineMesh(one.positions, std::vector<Segment>{{0, 1}});
   const std::vector<std::uint32_t> beyond{0, 1};
-  expectRefused(ErrorCode::IndexOutOfRange, "geometry 0: element 1 is out of range; it has 1",
+  expectRefused(ErrorCode::IndexOutOfRange,
+                "geometry 0: element 1 is out of range; the geometry has 1",
                 [&] { detection.setDisabledElements(mesh, beyond); });
   expectRefused(ErrorCode::InvalidSettings, "geometry 1 is a line mesh, which has no sides", [&] {
     detection.setCollisionFilter(line, {1, 1, Sidedness::Outer});
   });
-  expectRefused(ErrorCode::InvalidSettings, "sidedness must be Both or Outer", [&] {
+  expectRefused(ErrorCode::InvalidSettings, "it must be Both or Outer", [&] {
     detection.setCollisionFilter(mesh, {1, 1, static_cast<Sidedness>(7)});
   });
   expectRefused(ErrorCode::UnknownGeometry, "geometry 9 was never added",
@@ -520,8 +521,8 @@ struct ThreeSheets {
   }
 };
 
-/// Of a pair that does not collide, too: only a detection answers.
-TEST(Filters, CollectingCandidatesAnswersNothing) {
+/// This holds for pairs that do not collide, too: only a detection gives contacts.
+TEST(Filters, CollectingCandidatesLeavesContactsUnchanged) {
   for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
     ThreeSheets scene(engine);
     scene.detection.setCollisionFilter(scene.ids[0], {2, 2, Sidedness::Both});
@@ -540,7 +541,7 @@ TEST(Filters, CollectingCandidatesAnswersNothing) {
   }
 }
 
-TEST(Filters, AFrameThatThrowsReplacesNoAnswer) {
+TEST(Filters, FrameThatThrowsLeavesContactsUnchanged) {
   for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
     ThreeSheets scene(engine);
     scene.detection.detectCollision();

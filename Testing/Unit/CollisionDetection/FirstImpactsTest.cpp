@@ -3,7 +3,7 @@
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <gtest/gtest.h>
 
@@ -40,10 +40,10 @@ VertexSet verticesOf(const std::array<std::uint32_t, 2>& edge, double weight) {
   return vertices;
 }
 
-/// What the definition needs to know of a contact.
+/// The data of a contact that the definition needs.
 struct Impact {
   FeaturePair features;
-  std::uint32_t triangle;  ///< that holds a closest point in its interior, or none
+  std::uint32_t triangle;  ///< the triangle with a closest point in its interior, or none
   double time;
   int list;
   std::size_t index;
@@ -81,7 +81,7 @@ std::vector<Impact> impactsOf(const CollisionData& data) {
   return impacts;
 }
 
-/// The definition: every contact against every other.
+/// The definition: it compares every contact with every other.
 Rows reduced(const CollisionData& all, bool self) {
   const std::vector<Impact> impacts = impactsOf(all);
   const Rows rows(all);
@@ -100,9 +100,10 @@ Rows reduced(const CollisionData& all, bool self) {
   return kept;
 }
 
-using Side = std::pair<int, std::uint32_t>;  // of the pair's first or second geometry, and a vertex
+using Side =
+    std::pair<int, std::uint32_t>;  // the geometry of the pair, first or second, and a vertex
 
-/// By each vertex with a weight other than 0: its earliest time.
+/// The earliest time of each vertex with a weight other than 0.
 std::map<Side, double> earliestByVertex(const CollisionData& data, bool self) {
   std::map<Side, double> earliest;
   const auto note = [&](int side, const VertexSet& vertices, double time) {
@@ -118,9 +119,9 @@ std::map<Side, double> earliestByVertex(const CollisionData& data, bool self) {
   return earliest;
 }
 
-/// One step of a pair: answers of every engine against the definition, and what it promises.
-/// Returns how many contacts Distinct drops.
-std::size_t expectFirstImpacts(const Thing& a, const Thing& b, PairSettings pair,
+/// Compares one step of a pair in every engine with the definition and the guarantees. Returns how
+/// many contacts Distinct drops.
+std::size_t expectFirstImpacts(const TestGeometry& a, const TestGeometry& b, PairSettings pair,
                                const Positions& nowA, const Positions& nowB) {
   const bool self = &a == &b;
   pair.contacts = Contacts::All;
@@ -137,7 +138,7 @@ std::size_t expectFirstImpacts(const Thing& a, const Thing& b, PairSettings pair
   EXPECT_EQ(distinct.validity().trusted, all.validity().trusted);
   EXPECT_EQ(distinct.validity().startedApart, all.validity().startedApart);
   EXPECT_EQ(distinct.validity().atImpact, expected.contacts());
-  // Each pair of features that meets is reported once, with its first time.
+  // Each touching feature pair is reported once, with its first time.
   const std::vector<Impact> kept = impactsOf(distinct);
   for (const Impact& impact : impactsOf(all)) {
     std::size_t count = 0;
@@ -151,13 +152,13 @@ std::size_t expectFirstImpacts(const Thing& a, const Thing& b, PairSettings pair
   return Rows(all).contacts() - expected.contacts();
 }
 
-TEST(FirstImpacts, AreThoseOfTheDefinitionForEveryPairOfGeometries) {
+TEST(FirstImpacts, MatchTheDefinitionForEveryPairOfGeometryTypes) {
   Random random(1);
-  const Thing organ = things(sphere(6, 8, {0.5, 0.5, 0.5}, 0.35)),
-              cloth = things(sheet(7, 0.4, 1.0));
-  const Thing line = thread(random, 60, 0.12, 0.01, false),
-              loop = thread(random, 40, 0.15, 0, true);
-  const Thing smoke = particles(random, 60, 0.02), dust = particles(random, 80, 0);
+  const TestGeometry organ = testGeometry(sphere(6, 8, {0.5, 0.5, 0.5}, 0.35)),
+                     cloth = testGeometry(sheet(7, 0.4, 1.0));
+  const TestGeometry line = thread(random, 60, 0.12, 0.01, false),
+                     loop = thread(random, 40, 0.15, 0, true);
+  const TestGeometry smoke = particles(random, 60, 0.02), dust = particles(random, 80, 0);
   std::size_t dropped = 0;
   for (const auto& [a, b] : Pairs{{&organ, &cloth},
                                   {&cloth, &organ},
@@ -189,11 +190,11 @@ TEST(FirstImpacts, AreThoseOfTheDefinitionForEveryPairOfGeometries) {
   EXPECT_GT(dropped, 1000u);
 }
 
-/// Equal positions and equal times: everything is a tie.
-TEST(FirstImpacts, BreakTiesByOrder) {
-  Thing above = things(sheet(4, 0, 0)), below = above;
-  for (Thing* thing : {&above, &below})
-    for (Vector3d& p : thing->positions) p[2] = 0.0;
+/// With equal positions and equal times, all contacts are tied.
+TEST(FirstImpacts, TiesAreBrokenByOrder) {
+  TestGeometry above = testGeometry(sheet(4, 0, 0)), below = above;
+  for (TestGeometry* geometry : {&above, &below})
+    for (Vector3d& p : geometry->positions) p[2] = 0.0;
   for (Vector3d& p : above.positions) p[2] = 1.0;
   Positions landed = above.positions;
   for (Vector3d& p : landed) p[2] = -0.5;
@@ -207,17 +208,17 @@ TEST(FirstImpacts, BreakTiesByOrder) {
   EXPECT_GT(dropped, 1000u);
 }
 
-TEST(FirstImpacts, OfACornerOnACornerIsOne) {
+TEST(FirstImpacts, CornerOnCornerIsOneContact) {
   // The apexes of two pyramids of four triangles each meet at half time.
   const std::vector<Triangle> sides{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}};
-  const Thing up{GeometryType::Triangles,
-                 {{0, 0, 0}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, -1}, {1, -1, -1}},
-                 sides,
-                 {}};
-  const Thing down{GeometryType::Triangles,
-                   {{0, 0, 1}, {1, 0, 2}, {0, 1, 2}, {-1, 0, 2}, {0, -1, 2}},
-                   sides,
-                   {}};
+  const TestGeometry up{GeometryType::Triangles,
+                        {{0, 0, 0}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, -1}, {1, -1, -1}},
+                        sides,
+                        {}};
+  const TestGeometry down{GeometryType::Triangles,
+                          {{0, 0, 1}, {1, 0, 2}, {0, 1, 2}, {-1, 0, 2}, {0, -1, 2}},
+                          sides,
+                          {}};
   Positions landed = down.positions;
   for (Vector3d& p : landed) p[2] -= 1.5;
   PairSettings pair{Method::Continuous, 0.25, Contacts::All};
@@ -237,8 +238,8 @@ TEST(FirstImpacts, OfACornerOnACornerIsOne) {
   EXPECT_EQ(distinct.vertexTriangle()[0].triangle, 0u);
 }
 
-/// What a filter refuses is no contact, so it stands for none.
-TEST(FirstImpacts, AreOfWhatFiltersLeave) {
+/// A refused contact does not represent other contacts.
+TEST(FirstImpacts, FilteredContactsSuppressNoOthers) {
   Random random(3);
   const Mesh organ = sphere(8, 10, {0.5, 0.5, 0.55}, 0.35), cloth = sheet(9, 0, 0);
   Positions pressed = organ.positions;
@@ -261,7 +262,7 @@ TEST(FirstImpacts, AreOfWhatFiltersLeave) {
     expectSameRows(Rows(answerOf(settings, Contacts::Distinct)), expected);
 }
 
-/// A smooth body is pressed into another. How many contacts a solver is spared.
+/// A smooth body is pressed into another: how many contacts Distinct drops.
 TEST(FirstImpacts, AreFewOnSmoothBodies) {
   const Mesh cloth = sheet(52, 0, 0);
   const Mesh body = sphere(52, 50, {0.5, 0.5, 0.36}, 0.28);
@@ -281,8 +282,8 @@ TEST(FirstImpacts, AreFewOnSmoothBodies) {
   EXPECT_LT(3 * distinct, all);
 }
 
-/// Regular grids that fall onto each other touch where weights are 0 but for rounding.
-TEST(FirstImpacts, AlignedGridsHaveEachPairOfFeaturesOnce) {
+/// Regular grids that fall onto each other touch where weights are 0 up to rounding.
+TEST(FirstImpacts, AlignedGridsReportEachFeaturePairOnce) {
   Random random(18);
   std::size_t contacts = 0;
   for (std::uint32_t n = 2; n < 6; ++n)
@@ -298,7 +299,7 @@ TEST(FirstImpacts, AlignedGridsHaveEachPairOfFeaturesOnce) {
       collisions.addCollisionPair(a, b, {.method = Method::Continuous});
       collisions.setPositions(b, before, now);
       collisions.detectCollision();
-      // By the vertices with weights other than 0: those of a, then those of b.
+      // Grouped by the vertices with weights other than 0: those of a, then those of b.
       std::set<std::array<std::set<std::uint32_t>, 2>> seen;
       const auto add = [&](const auto& contact, std::array<std::size_t, 4> sides) {
         const Stencil of = stencil(contact);

@@ -4,7 +4,7 @@
 #include "Common/ExpectRefused.h"
 #include "Common/QueryCalls.h"
 #include "Common/RandomMeshes.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-// What a caller can ask of the geometries and pairs that an OctreeBasedCD has.
+// Functions that read the geometries and pairs of an OctreeBasedCD.
 
 namespace palpate::testing {
 namespace {
@@ -37,7 +37,7 @@ TEST(GeometryAccess, ContainsWhatWasAddedAndNotRemoved) {
                 [&] { (void)collisions.vertexCount(a); });
 }
 
-TEST(GeometryAccess, PositionsAreThoseOfNow) {
+TEST(GeometryAccess, PositionsAreTheCurrentOnes) {
   Random random(1);
   OctreeBasedCD collisions;
   const Mesh mesh = sheet(3, 0.5, 0.1);
@@ -48,7 +48,7 @@ TEST(GeometryAccess, PositionsAreThoseOfNow) {
   EXPECT_EQ(copyOf(collisions.positions(id)), next);
   collisions.setPositions(id, next, mesh.positions);
   EXPECT_EQ(copyOf(collisions.positions(id)), mesh.positions);
-  // A placed body's are in its own frame.
+  // Positions of a placed body are in its own frame.
   collisions.setTransform(id, Eigen::Matrix3d::Identity(), {1, 2, 3});
   EXPECT_EQ(copyOf(collisions.positions(id)), mesh.positions);
   EXPECT_EQ(collisions.vertexCount(id), mesh.positions.size());
@@ -60,15 +60,15 @@ TEST(GeometryAccess, PositionsAreThoseOfNow) {
   EXPECT_TRUE(collisions.positions(shape).empty());
 }
 
-TEST(GeometryAccess, BoundsHoldVerticesWithTheirRadii) {
+TEST(GeometryAccess, BoundsEncloseVerticesWithTheirRadii) {
   Random random(2);
-  const Thing line = thread(random, 20, 0.2, 0.0, false);
-  const Thing things[] = {testing::things(soup(random, 30, 0.3)), line, tapered(random, line, 0.1),
-                          particles(random, 20, 0.05)};
-  for (const Thing& thing : things) {
+  const TestGeometry line = thread(random, 20, 0.2, 0.0, false);
+  const TestGeometry geometries[] = {testing::testGeometry(soup(random, 30, 0.3)), line,
+                                     tapered(random, line, 0.1), particles(random, 20, 0.05)};
+  for (const TestGeometry& geometry : geometries) {
     OctreeBasedCD collisions;
-    const GeometryId id = thing.addTo(collisions);
-    const Positions now = moved(random, thing.positions, 0.3);
+    const GeometryId id = geometry.addTo(collisions);
+    const Positions now = moved(random, geometry.positions, 0.3);
     collisions.setPositions(id, now);
     for (const bool placed : {false, true}) {
       const Eigen::AngleAxisd turn(0.7, Vector3d(1, 2, 3).normalized());
@@ -77,8 +77,8 @@ TEST(GeometryAccess, BoundsHoldVerticesWithTheirRadii) {
       Eigen::AlignedBox3d truth;
       for (std::uint32_t v = 0; v < now.size(); ++v) {
         const Vector3d at = placed ? Vector3d(turn * now[v] + shift) : now[v];
-        truth.extend(at + Vector3d::Constant(thing.radius(v)));
-        truth.extend(at - Vector3d::Constant(thing.radius(v)));
+        truth.extend(at + Vector3d::Constant(geometry.radius(v)));
+        truth.extend(at - Vector3d::Constant(geometry.radius(v)));
       }
       const Eigen::AlignedBox3d found = collisions.bounds(id);
       EXPECT_LE((found.min() - truth.min()).norm(), 1e-14);
@@ -89,7 +89,7 @@ TEST(GeometryAccess, BoundsHoldVerticesWithTheirRadii) {
   EXPECT_TRUE(collisions.bounds(collisions.addPointSet({})).isEmpty());
 }
 
-/// Of each shape the furthest point along each axis, found from its definition.
+/// The furthest point of each shape along each axis, from its definition.
 TEST(GeometryAccess, BoundsOfShapesAreTight) {
   const Eigen::Matrix3d turn =
       Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
@@ -140,7 +140,7 @@ TEST(GeometryAccess, PairSettingsAreTheLastOnes) {
                 [&] { (void)collisions.pairSettings(b, a); });
 }
 
-/// Which elements are enabled decides what collides, not where the vertices are.
+/// Disabled elements do not collide, but vertices are found inside bodies anyway.
 TEST(GeometryAccess, VerticesOfDisabledElementsAreFoundInABody) {
   const Mesh inner = sphere(3, 4, {0.5, 0.5, 0.5}, 0.1), outer = sphere(6, 8, {0.5, 0.5, 0.5}, 0.4);
   OctreeBasedCD collisions;
@@ -154,13 +154,14 @@ TEST(GeometryAccess, VerticesOfDisabledElementsAreFoundInABody) {
   EXPECT_EQ(testing::insideVertices(collisions, vertices, body).size(), count);
 }
 
-TEST(GeometryAccess, AShapeHasNoVerticesToFind) {
+TEST(GeometryAccess, ShapesHaveNoVertices) {
   OctreeBasedCD collisions;
   const Mesh ball = sphere(6, 8, {0.5, 0.5, 0.5}, 0.4);
   const GeometryId shape = collisions.addAnalyticalGeometry(Box{{0.5, 0.5, 0.5}, {0.1, 0.1, 0.1}}),
                    body = collisions.addTriangleMesh(ball.positions, ball.triangles);
   const auto refuse = [&](auto&& call) {
-    expectRefused(ErrorCode::UnsupportedMethod, "geometry 0 is a shape: it has no vertices", call);
+    expectRefused(ErrorCode::UnsupportedMethod, "geometry 0 is a shape, which has no vertices",
+                  call);
   };
   refuse([&] { (void)testing::insideVertices(collisions, shape, body); });
   refuse([&] { (void)PenetrationTracker(shape, body).update(collisions.queries()); });

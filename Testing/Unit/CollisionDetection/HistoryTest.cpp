@@ -12,7 +12,8 @@
 #include <utility>
 #include <vector>
 
-// Many frames: whatever came before, a frame's answer is that of its positions and pairs alone.
+// Many frames: the contacts of a frame depend on its positions and pairs alone, not on earlier
+// frames.
 
 namespace palpate::testing {
 namespace {
@@ -24,14 +25,14 @@ Positions moved(Positions positions, const Eigen::Vector3d& by) {
   return positions;
 }
 
-/// The same calls to several engines: octrees of different settings, and brute force.
+/// Makes the same calls to several engines: octrees with different settings, and brute force.
 class Engines {
  public:
   Engines() {
     for (const Settings& settings : octreeSettings()) m_all.emplace_back(settings);
     m_all.emplace_back(settingsOf(Engine::BruteForce));
   }
-  /// call(engine) on each; all must return the same.
+  /// Calls call(engine) on each engine. All must return the same.
   template <class Call>
   auto onAll(Call call) {
     const auto first = call(m_all.front());
@@ -42,7 +43,8 @@ class Engines {
   void forAll(Call call) {
     for (OctreeBasedCD& engine : m_all) call(engine);
   }
-  /// A frame, and that all agree on every pair. Returns the number of contacts.
+  /// Runs a frame and expects the same contacts of every pair in all engines. Returns the number of
+  /// contacts.
   std::size_t expectEqualFrames() {
     forAll([](OctreeBasedCD& engine) { engine.detectCollision(); });
     for (const CollisionPair& pair : m_all.front().pairs()) {
@@ -60,7 +62,7 @@ class Engines {
   std::vector<OctreeBasedCD> m_all;
 };
 
-/// Two soups that meet, in several engines, with what their first frame gave.
+/// Two soups in contact, in several engines, with the contacts of their first frame.
 struct Meeting {
   Engines engines;
   Mesh a, b;
@@ -86,7 +88,7 @@ struct Meeting {
   }
 };
 
-TEST(History, BodiesThatLeaveAndComeBackMeetAsBefore) {
+TEST(History, BodiesThatLeaveAndComeBackGiveTheSameContacts) {
   Meeting meeting;
   ASSERT_GT(meeting.contacts, 50u);
   for (const double far : {3.0, 1e3, 1e9}) {
@@ -96,7 +98,7 @@ TEST(History, BodiesThatLeaveAndComeBackMeetAsBefore) {
   }
 }
 
-TEST(History, ATriangleThatGrowsPastTheSceneAndShrinksAgain) {
+TEST(History, TriangleMayGrowPastTheSceneAndShrink) {
   Meeting meeting;
   for (const double size : {1.0, 4.0, 1e3, 1e9, 10.0}) {
     Positions grown = meeting.b.positions;
@@ -107,13 +109,13 @@ TEST(History, ATriangleThatGrowsPastTheSceneAndShrinksAgain) {
   }
 }
 
-TEST(History, AFrameWithoutNewPositionsAnswersTheSame) {
+TEST(History, FrameWithoutNewPositionsGivesTheSameContacts) {
   Meeting meeting;
   for (int frame = 0; frame < 3; ++frame)
     EXPECT_EQ(meeting.engines.expectEqualFrames(), meeting.contacts);
 }
 
-TEST(History, ConstQueriesFromManyThreads) {
+TEST(History, ConstQueriesWorkFromManyThreads) {
   Random random(3);
   const Mesh a = soup(random, 300, 0.2), b = soup(random, 300, 0.2);
   Settings settings = settingsOf(Engine::Octree, 2);

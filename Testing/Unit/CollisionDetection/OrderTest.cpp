@@ -8,8 +8,9 @@
 namespace palpate {
 namespace {
 
-// Few and many pairs for the number of first triangles: both ways of sorting, one scratch.
-TEST(OrderPairs, IsThatOfSort) {
+// Few and many pairs for the number of first triangles, so that both ways of sorting run on one
+// scratch.
+TEST(OrderPairs, MatchesStdSort) {
   std::mt19937 random(3);
   PairOrderScratch scratch;
   for (const std::size_t firsts : {1u, 7u, 1000u}) {

@@ -1,13 +1,13 @@
 #include "Common/QueryCalls.h"
 #include "Common/Replayed.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <Eigen/Geometry>
 
 #include <functional>
 
-// Geometries that setTransform() moves: the truth is the same scene whose positions are given as
-// fl(R x + t), and brute force.
+// Geometries that setTransform() moves. The reference is the same scene with positions fl(R x + t),
+// and brute force.
 
 namespace palpate::testing {
 namespace {
@@ -28,7 +28,7 @@ struct Place {
     for (Vector3d& p : positions) p = (*this)(p);
     return positions;
   }
-  /// Then turned by the angle about an axis through a point, and moved.
+  /// Then turns by the angle about an axis through a point, and shifts.
   Place then(const Vector3d& axis, double angle, const Vector3d& through,
              const Vector3d& by) const {
     const Matrix3d turn = Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
@@ -41,7 +41,7 @@ Place somewhere(Random& random) {
                       randomPoint(random, -0.1, 0.1));
 }
 
-/// What the transforms of the frames are.
+/// The transforms of the frames.
 enum class Way { Still, Exact, Small, Large, Far };
 
 std::vector<Place> placesOf(Random& random, Way way) {
@@ -64,11 +64,11 @@ std::vector<Place> placesOf(Random& random, Way way) {
   return places;
 }
 
-/// A pair over some frames: the body is moved by transforms, or by the same positions.
-class Life {
+/// A pair over some frames. The body is moved by transforms, or by the same positions.
+class RigidRun {
  public:
-  Life(Settings settings, const Thing& body, const Thing& other, const PairSettings& pair,
-       bool bodyFirst, bool byTransform)
+  RigidRun(Settings settings, const TestGeometry& body, const TestGeometry& other,
+           const PairSettings& pair, bool bodyFirst, bool byTransform)
       : m_collisions((settings.keepCandidates = true, settings)),
         m_positions(body.positions),
         m_byTransform(byTransform),
@@ -107,13 +107,13 @@ class Life {
   bool m_hasFrame = false;
 };
 
-struct LifeCase {
+struct RigidCase {
   Way way = Way::Small;
   bool bodyFirst = true, bothRigid = false;
   std::function<void(OctreeBasedCD&, GeometryId body)> setUp = [](auto&, GeometryId) {};
 };
 
-/// size: L, of coordinates, of which motion is bounded with rounding to spare.
+/// size: L, the size of coordinates, from which motion is bounded with a reserve for rounding.
 void expectSameValidity(const Validity& found, const Validity& truth, double size) {
   EXPECT_NEAR(found.displacement, truth.displacement, 1e-13 * size);
   EXPECT_GE(found.displacement, truth.displacement);
@@ -127,18 +127,18 @@ void expectSameValidity(const Validity& found, const Validity& truth, double siz
   EXPECT_EQ(found.untrustedVerticesB, truth.untrustedVerticesB);
 }
 
-/// Every engine with transforms answers as the positions do; returns the contacts of all frames.
-std::size_t expectAsPositions(Random& random, const Thing& body, const Thing& other,
-                              const PairSettings& pair, const LifeCase& life) {
-  const std::vector<Place> places = placesOf(random, life.way);
-  std::vector<Life> rigid;
+/// Every engine with transforms has the contacts of the same positions. Returns the contacts of all
+/// frames.
+std::size_t expectAsPositions(Random& random, const TestGeometry& body, const TestGeometry& other,
+                              const PairSettings& pair, const RigidCase& run) {
+  const std::vector<Place> places = placesOf(random, run.way);
+  std::vector<RigidRun> rigid;
   for (const int threads : {1, 2})
-    rigid.emplace_back(settingsOf(Engine::Octree, threads), body, other, pair, life.bodyFirst,
-                       true);
-  rigid.emplace_back(settingsOf(Engine::BruteForce), body, other, pair, life.bodyFirst, true);
-  Life truth(settingsOf(Engine::Octree), body, other, pair, life.bodyFirst, false);
-  for (Life& one : rigid) life.setUp(one.collisions(), one.body());
-  life.setUp(truth.collisions(), truth.body());
+    rigid.emplace_back(settingsOf(Engine::Octree, threads), body, other, pair, run.bodyFirst, true);
+  rigid.emplace_back(settingsOf(Engine::BruteForce), body, other, pair, run.bodyFirst, true);
+  RigidRun truth(settingsOf(Engine::Octree), body, other, pair, run.bodyFirst, false);
+  for (RigidRun& one : rigid) run.setUp(one.collisions(), one.body());
+  run.setUp(truth.collisions(), truth.body());
   std::size_t contacts = 0;
   double largest = 0;
   for (const Vector3d& p : body.positions) largest = std::max(largest, p.norm());
@@ -146,14 +146,14 @@ std::size_t expectAsPositions(Random& random, const Thing& body, const Thing& ot
   for (const Place& place : places) {
     ofOther = ofOther.then({1, 2, 3}, 0.01, ofOther({0.5, 0.5, 0.5}), {0, 0, 0});
     Positions now =
-        life.bothRigid ? other.positions : places[0](moved(random, other.positions, 0.02));
-    for (Life& one : rigid) one.frame(place, life.bothRigid ? &ofOther : nullptr, now);
-    truth.frame(place, life.bothRigid ? &ofOther : nullptr, now);
+        run.bothRigid ? other.positions : places[0](moved(random, other.positions, 0.02));
+    for (RigidRun& one : rigid) one.frame(place, run.bothRigid ? &ofOther : nullptr, now);
+    truth.frame(place, run.bothRigid ? &ofOther : nullptr, now);
     const Rows expected(truth.data());
     contacts += expected.contacts() + expected.intersectingTriangles.size() +
                 (expected.earliestTimeOfImpact <= 1.0);
     const auto candidates = rigid.back().candidates();
-    for (const Life& one : rigid) {
+    for (const RigidRun& one : rigid) {
       expectSameRows(Rows(one.data()), expected);
       expectSameValidity(one.data().validity(), truth.data().validity(),
                          10 + place.translation.norm() + largest);
@@ -168,10 +168,10 @@ std::size_t expectAsPositions(Random& random, const Thing& body, const Thing& ot
 
 constexpr Way kWays[] = {Way::Still, Way::Exact, Way::Small, Way::Large, Way::Far};
 
-TEST(Rigid, TrianglesAnswerAsTheirPositionsDo) {
+TEST(Rigid, TrianglesMatchSetPositions) {
   Random random(1);
-  const Thing body = things(sphere(4, 5, {0.5, 0.5, 0.5}, 0.4)),
-              tissue = things(sheet(4, 0.5, 1.0));
+  const TestGeometry body = testGeometry(sphere(4, 5, {0.5, 0.5, 0.5}, 0.4)),
+                     tissue = testGeometry(sheet(4, 0.5, 1.0));
   std::vector<PairSettings> all = settingsFor(0.03);
   all.push_back({Method::Intersection, 0.0});
   all.push_back({Method::Auto, 0.0});
@@ -190,20 +190,22 @@ TEST(Rigid, TrianglesAnswerAsTheirPositionsDo) {
     }
 }
 
-TEST(Rigid, SoupsAnswerAsTheirPositionsDo) {
+TEST(Rigid, SoupsMatchSetPositions) {
   Random random(2);
-  const Thing body = things(soup(random, 40, 0.2)), other = things(soup(random, 40, 0.2));
+  const TestGeometry body = testGeometry(soup(random, 40, 0.2)),
+                     other = testGeometry(soup(random, 40, 0.2));
   for (const PairSettings& pair :
        {PairSettings{Method::Intersection, 0.0}, {Method::Proximity, 0.05}, {Method::Auto, 0.05}})
     for (const Way way : kWays)
       EXPECT_GT(expectAsPositions(random, body, other, pair, {way, way == Way::Far}), 20u);
 }
 
-TEST(Rigid, LinesAndPointsAnswerAsTheirPositionsDo) {
+TEST(Rigid, LinesAndPointsMatchSetPositions) {
   Random random(3);
-  const Thing tissue = things(sheet(4, 0.5, 1.0)), needle = thread(random, 20, 0.2, 0.02, false),
-              tapering = tapered(random, thread(random, 20, 0.2, 0, true), 0.05),
-              smoke = particles(random, 60, 0.02);
+  const TestGeometry tissue = testGeometry(sheet(4, 0.5, 1.0)),
+                     needle = thread(random, 20, 0.2, 0.02, false),
+                     tapering = tapered(random, thread(random, 20, 0.2, 0, true), 0.05),
+                     smoke = particles(random, 60, 0.02);
   for (const auto& [body, other] : Pairs{{&tissue, &needle},
                                          {&tissue, &smoke},
                                          {&needle, &tissue},
@@ -222,10 +224,10 @@ TEST(Rigid, LinesAndPointsAnswerAsTheirPositionsDo) {
       }
 }
 
-TEST(Rigid, FiltersHoldForThem) {
+TEST(Rigid, FiltersApply) {
   Random random(4);
-  const Thing body = things(sphere(7, 9, {0.5, 0.5, 0.5}, 0.4)),
-              tissue = things(sheet(7, 0.5, 1.0));
+  const TestGeometry body = testGeometry(sphere(7, 9, {0.5, 0.5, 0.5}, 0.4)),
+                     tissue = testGeometry(sheet(7, 0.5, 1.0));
   for (const Method method : {Method::Proximity, Method::Continuous, Method::Intersection}) {
     const auto filter = [](OctreeBasedCD& collisions, GeometryId id) {
       collisions.setCollisionFilter(id, {.sidedness = Sidedness::Outer});
@@ -238,21 +240,22 @@ TEST(Rigid, FiltersHoldForThem) {
   }
 }
 
-/// A vertex so far that floats are clamped, another that flattens the tree.
-TEST(Rigid, VerticesFarFlung) {
+/// A vertex so far away that floats are clamped, and another that makes the octree flat.
+TEST(Rigid, VerticesFarAwayMatchSetPositions) {
   Random random(5);
   for (const double far : {1e4, 1e30, 1e60}) {
-    Thing body = things(soup(random, 40, 0.2));
+    TestGeometry body = testGeometry(soup(random, 40, 0.2));
     body.positions[3] = {far, 0.5 * far, -far};
-    const Thing other = things(soup(random, 40, 0.2));
+    const TestGeometry other = testGeometry(soup(random, 40, 0.2));
     expectAsPositions(random, body, other, {Method::Proximity, 0.05, Contacts::All}, {Way::Small});
     expectAsPositions(random, body, other, {Method::Continuous, 0.0}, {Way::Small});
   }
 }
 
-TEST(Rigid, TheTreeIsNotTouched) {
+TEST(Rigid, OctreeIsNotUpdated) {
   Random random(6);
-  const Thing bone = things(sphere(40, 50, {0.5, 0.5, 0.5}, 0.4)), organ = things(sheet(6, 0.5, 1));
+  const TestGeometry bone = testGeometry(sphere(40, 50, {0.5, 0.5, 0.5}, 0.4)),
+                     organ = testGeometry(sheet(6, 0.5, 1));
   OctreeBasedCD collisions(settingsOf(Engine::Octree, 1, OctreeUpdate::Rebuild));
   const GeometryId body = bone.addTo(collisions), other = organ.addTo(collisions);
   collisions.addCollisionPair(body, other, {Method::Continuous, 0.0});
@@ -280,7 +283,7 @@ TEST(Rigid, TheTreeIsNotTouched) {
   EXPECT_EQ(collisions.statistics().rebuiltOctrees, 1u);
 }
 
-/// What a step's ends are, as Step does it in StepTest.cpp.
+/// The ends of a step, as the fixture Step of StepTest.cpp tests them.
 class RigidStep : public ::testing::Test {
  protected:
   static Positions at(double z) { return {{0, 0, z}, {1, 0, z}, {0, 1, z}}; }
@@ -316,11 +319,11 @@ TEST_F(RigidStep, BeginsWhereTheLastStepEnded) {
   moveTo(7);
   m_collisions.update();
   moveTo(5);
-  expectLast(2, 5);  // of several calls the last counts
+  expectLast(2, 5);  // the last of several calls counts
   expect(5, 5);      // without a call it is at rest
 }
 
-TEST_F(RigidStep, FollowsAMeshThatWasMovedByPositions) {
+TEST_F(RigidStep, BeginsWhereSetPositionsLeftTheMesh) {
   expectLast(0, 0);
   m_collisions.setPositions(m_id, at(3));
   expectLast(0, 3);
@@ -364,7 +367,7 @@ TEST_F(RigidStep, TwoPosesSetBothEnds) {
   expectLast(11, 22);
 }
 
-/// Of a new geometry's first step every order of calls gives the same.
+/// In the first step of a new geometry, every order of calls gives the same.
 TEST_F(RigidStep, DoesNotDependOnTheOrderOfCalls) {
   m_collisions.setPositions(m_id, at(5), at(6));
   moveTo(10);
@@ -392,9 +395,10 @@ TEST_F(RigidStep, NewTrianglesAreAtRest) {
   expect(6, 7);  // unless both poses are given
 }
 
-TEST(Rigid, PositionsThatChangeOnTheWay) {
+TEST(Rigid, PositionsMayChangeBetweenTransforms) {
   Random random(7);
-  const Thing body = things(soup(random, 40, 0.2)), other = things(soup(random, 40, 0.2));
+  const TestGeometry body = testGeometry(soup(random, 40, 0.2)),
+                     other = testGeometry(soup(random, 40, 0.2));
   for (const Method method : {Method::Continuous, Method::Proximity, Method::Auto}) {
     std::vector<OctreeBasedCD> rigid, world;
     for (auto* all : {&rigid, &world}) {
@@ -433,10 +437,10 @@ TEST(Rigid, PositionsThatChangeOnTheWay) {
   }
 }
 
-TEST(Rigid, InsideIsAsOfPositions) {
+TEST(Rigid, InsideVerticesMatchSetPositions) {
   Random random(8);
-  const Thing body = things(sphere(12, 14, {0.5, 0.5, 0.5}, 0.4)),
-              smoke = particles(random, 400, 0.0);
+  const TestGeometry body = testGeometry(sphere(12, 14, {0.5, 0.5, 0.5}, 0.4)),
+                     smoke = particles(random, 400, 0.0);
   for (const double far : {0.0, 1e7}) {
     Place place = somewhere(random);
     place.translation += Vector3d(far, -far, far);
@@ -469,9 +473,9 @@ TEST(Rigid, InsideIsAsOfPositions) {
   }
 }
 
-TEST(Rigid, ShapesMeetThemAsTheirPositions) {
+TEST(Rigid, ContactsWithShapesMatchSetPositions) {
   Random random(9);
-  const Thing body = things(sphere(8, 9, {0.5, 0.5, 0.5}, 0.4));
+  const TestGeometry body = testGeometry(sphere(8, 9, {0.5, 0.5, 0.5}, 0.4));
   std::size_t contacts = 0;
   for (const AnalyticalGeometry& shape : std::vector<AnalyticalGeometry>{
            Capsule{{0, 0, 0.5}, {1, 1, 0.5}, 0.1}, Box{{0.1, 0.5, 0.5}, {0.2, 0.3, 0.1}},
@@ -498,25 +502,26 @@ TEST(Rigid, ShapesMeetThemAsTheirPositions) {
   EXPECT_GT(contacts, 100u);
 }
 
-TEST(Rigid, CapturesReplayThem) {
+TEST(Rigid, CapturesIncludeTransforms) {
   Random random(10);
-  const Thing body = things(soup(random, 60, 0.2)), other = things(soup(random, 60, 0.2));
+  const TestGeometry body = testGeometry(soup(random, 60, 0.2)),
+                     other = testGeometry(soup(random, 60, 0.2));
   for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto}) {
     Settings settings = settingsOf(Engine::Octree);
     settings.audit.features = 100000;
-    Life life(settings, body, other, {method, 0.02}, true, true);
+    RigidRun run(settings, body, other, {method, 0.02}, true, true);
     Place place = somewhere(random);
     for (int frame = 0; frame < 2; ++frame) {
       place = place.then({1, 2, 3}, 0.1, {0.5, 0.5, 0.5}, {0, 0, 0.01});
-      life.frame(place, nullptr, other.positions);
+      run.frame(place, nullptr, other.positions);
     }
-    EXPECT_TRUE(life.collisions().auditFailures().empty());
-    replayed(life.collisions());
-    EXPECT_GT(life.collisions().statistics().contacts, 10u);
+    EXPECT_TRUE(run.collisions().auditFailures().empty());
+    replayed(run.collisions());
+    EXPECT_GT(run.collisions().statistics().contacts, 10u);
   }
 }
 
-/// The way of a body that turns evenly about an axis and slides along it, in a thousand parts.
+/// The path of a body that turns evenly about an axis and slides along it, in a thousand parts.
 double deviationInParts(const Positions& body, const Place& before, const Vector3d& axis,
                         double angle, const Vector3d& through, double slide) {
   constexpr int kParts = 1000;
@@ -532,9 +537,10 @@ double deviationInParts(const Positions& body, const Place& before, const Vector
   return most;
 }
 
-TEST(Rigid, ArcsAreMeasured) {
+TEST(Rigid, ArcDeviationIsMeasured) {
   Random random(11);
-  const Thing body = things(sphere(5, 6, {0.5, 0.5, 0.5}, 0.4)), far = things(sheet(2, 50, 0));
+  const TestGeometry body = testGeometry(sphere(5, 6, {0.5, 0.5, 0.5}, 0.4)),
+                     far = testGeometry(sheet(2, 50, 0));
   for (const double angle : {1e-3, 0.05, 0.7, 2.0, 3.1})
     for (const double slide : {0.0, 0.6}) {
       const Vector3d axis = randomPoint(random, -1, 1), through = randomPoint(random, -2, 2);
@@ -542,30 +548,30 @@ TEST(Rigid, ArcsAreMeasured) {
                   now = before.then(axis, angle, through, slide * axis.normalized());
       const double truth = deviationInParts(body.positions, before, axis, angle, through, slide);
       for (const double thickness : {truth * 1.001, truth * 0.999}) {
-        Life life(settingsOf(Engine::Octree), body, far, {Method::Continuous, thickness}, true,
-                  true);
-        life.frame(before, nullptr, far.positions);
-        EXPECT_EQ(life.data().validity().arcDeviation, 0.0);
-        EXPECT_TRUE(life.data().validity().trusted);
-        life.frame(now, nullptr, far.positions);
-        EXPECT_NEAR(life.data().validity().arcDeviation, truth, 1e-9 * truth + 1e-13);
-        EXPECT_EQ(life.data().validity().trusted, thickness > truth);
+        RigidRun run(settingsOf(Engine::Octree), body, far, {Method::Continuous, thickness}, true,
+                     true);
+        run.frame(before, nullptr, far.positions);
+        EXPECT_EQ(run.data().validity().arcDeviation, 0.0);
+        EXPECT_TRUE(run.data().validity().trusted);
+        run.frame(now, nullptr, far.positions);
+        EXPECT_NEAR(run.data().validity().arcDeviation, truth, 1e-9 * truth + 1e-13);
+        EXPECT_EQ(run.data().validity().trusted, thickness > truth);
       }
     }
   // Without a turn there is no arc.
-  Life life(settingsOf(Engine::Octree), body, far, {Method::Continuous, 0.0}, true, true);
+  RigidRun run(settingsOf(Engine::Octree), body, far, {Method::Continuous, 0.0}, true, true);
   Place place = somewhere(random);
   for (int frame = 0; frame < 2; ++frame, place.translation += Vector3d(1, 2, 3)) {
-    life.frame(place, nullptr, far.positions);
-    EXPECT_EQ(life.data().validity().arcDeviation, 0.0);
-    EXPECT_TRUE(life.data().validity().trusted);
+    run.frame(place, nullptr, far.positions);
+    EXPECT_EQ(run.data().validity().arcDeviation, 0.0);
+    EXPECT_TRUE(run.data().validity().trusted);
   }
 }
 
 TEST(Rigid, BadTransformsAreRefused) {
   using Code = ErrorCode;
   Random random(12);
-  const Thing body = things(soup(random, 5, 0.2));
+  const TestGeometry body = testGeometry(soup(random, 5, 0.2));
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
   const GeometryId id = body.addTo(collisions), huge = body.addTo(collisions);
   const auto expectRefused = [&](Code code, const std::string& reason, const auto& call) {

@@ -16,13 +16,13 @@
 #include <string>
 #include <vector>
 
-// Method::Continuous of two shapes, against bounds on their distance along the step: points of both
-// bound it from above, a direction that separates them from below.
+// Method::Continuous of two shapes, against bounds on their distance along the step. Points of both
+// shapes bound it from above, a separating direction from below.
 
 namespace palpate::testing {
 namespace {
 
-/// A shape at both ends of a step. What it is made of moves linearly.
+/// A shape at both ends of a step. The points that define it move linearly.
 struct Tool {
   AnalyticalGeometry geometry;
   std::array<PlacedShape, 2> ends;
@@ -40,7 +40,7 @@ struct Tool {
     };
     return (1 - t) * end(ends[0]) + t * end(ends[1]);
   }
-  /// The furthest point along a unit direction; of a plane any of its points.
+  /// The furthest point along a unit direction; for a plane, any of its points.
   Vector3d furthest(const Vector3d& m, double t) const {
     if (const auto* plane = std::get_if<Plane>(&geometry)) return at(plane->point, t);
     if (const auto* cylinder = std::get_if<Cylinder>(&geometry)) {
@@ -68,7 +68,7 @@ struct Tool {
         .cross(at(plane.point + across, t) - origin)
         .normalized();
   }
-  /// L: no point of it moves further.
+  /// L: a bound on the motion of every point.
   double motion() const {
     double most = 0;
     for (const Vector3d& p : {Vector3d(1, 1, 1), Vector3d(-1, -1, -1), Vector3d(1, -1, 1),
@@ -82,10 +82,11 @@ struct Bounds {
   double lower, upper;
 };
 
-/// Of the distance at a time, until they are on one side of `enough`, or near each other.
+/// Bounds on the distance at a time. They are refined until both are on one side of `enough`, or
+/// near each other.
 ///
 /// Source   pairwise Frank and Wolfe steps: Lacoste-Julien, Jaggi, On the global linear convergence
-///          of Frank-Wolfe optimization variants (2015).
+/// of Frank-Wolfe optimization variants (2015).
 Bounds distanceAt(const Tool& a, const Tool& b, double t, double enough) {
   if (b.isPlane()) return distanceAt(b, a, t, enough);
   if (const auto* plane = std::get_if<Plane>(&a.geometry)) {
@@ -162,7 +163,7 @@ std::optional<ShapeShapeContact> contactOf(const CollisionData& data) {
   return data.shapeShape()[0];
 }
 
-/// That a contact within the step is as near as it says, between points of both shapes.
+/// Expects that a contact within the step has its stated distance, between points of both shapes.
 void expectContact(const Tool& a, const Tool& b, const ShapeShapeContact& c,
                    const PairSettings& pair) {
   const double motion = a.motion() + b.motion(), early = pair.timeTolerance * motion + 1e-12;
@@ -206,7 +207,7 @@ void expectTrue(const Tool& a, const Tool& b, const PairSettings& pair, Tally& t
   }
   constexpr int kSamples = 25;
   for (int i = 0; i <= kSamples && time > 0; ++i) {
-    // Evenly over the step until then, and more and more closely.
+    // Samples are spread evenly over the step up to then, and denser towards it.
     for (const double t : {time * i / kSamples, time * (1 - std::exp2(-0.8 * i))})
       EXPECT_GT(distanceAt(a, b, t, pair.thickness - 1e-9).upper, pair.thickness - 1e-9)
           << "nearer before, at " << t << " of " << time;
@@ -254,7 +255,7 @@ std::vector<AnalyticalGeometry> kinds(Random& random) {
           ConvexHull{{{0.1, 0, 0}, {0.1, 0, 0}}}};
 }
 
-TEST(ShapePairSteps, AreNeverLateAndNoEarlierThanTheTolerance) {
+TEST(ShapePairSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
   Random random(1);
   Tally tally;
   for (int run = 0; run < 6; ++run) {
@@ -287,8 +288,8 @@ TEST(ShapePairSteps, AreNeverLateAndNoEarlierThanTheTolerance) {
   EXPECT_GT(tally.within, 100);
 }
 
-/// Everything parallel, in one plane or on one line, on a grid.
-TEST(ShapePairSteps, DegenerateOnesAreTrue) {
+/// Shapes that are parallel, in one plane or on one line, on a grid.
+TEST(ShapePairSteps, DegenerateShapesHaveCorrectTimes) {
   Random random(2);
   const std::vector<AnalyticalGeometry> all{
       Sphere{{0, 0, 0}, 1},
@@ -320,7 +321,7 @@ TEST(ShapePairSteps, DegenerateOnesAreTrue) {
         const double u = grid(4), v = grid(4), w = run < 2 ? 0 : grid(4);
         SCOPED_TRACE("kinds " + std::to_string(i) + " and " + std::to_string(j) + ", run " +
                      std::to_string(run));
-        // Half a turn leaves a plane without extent and a cylinder without length at half time.
+        // After half of a half turn, a plane has no extent and a cylinder no length.
         const Matrix3d& turn = turns[run == 3 ? random() % 2 : 0];
         expectTrue(Tool(all[i], {0, 0, 0}, {0, 0, 0}),
                    Tool(all[j], Matrix3d::Identity(), {x, y, z}, turn, {u, v, w}),
@@ -331,7 +332,7 @@ TEST(ShapePairSteps, DegenerateOnesAreTrue) {
   EXPECT_GT(tally.within, 30);
 }
 
-TEST(ShapePairSteps, ByHand) {
+TEST(ShapePairSteps, MatchHandComputedValues) {
   const auto only = [](const Tool& a, const Tool& b, double thickness) {
     const auto c = contactOf(answer(a, b, continuous(thickness)));
     EXPECT_TRUE(c);
@@ -339,7 +340,7 @@ TEST(ShapePairSteps, ByHand) {
   };
   const Tool ball(Sphere{{0, 0, 0}, 1}, {0, 0, 0}, {0, 0, 0});
   for (const double thickness : {0.0, 0.25}) {
-    // Fast, through it and out again.
+    // Fast, through the plate and out again.
     const double time = (500 - 2 - thickness) / 1000;
     const ShapeShapeContact c =
         only(Tool(Sphere{{0, 0, 0}, 1}, {0, 0, 500}, {0, 0, -500}), ball, thickness);
@@ -349,7 +350,7 @@ TEST(ShapePairSteps, ByHand) {
     EXPECT_NEAR(c.distance, thickness, 1e-3);
     EXPECT_NEAR((c.pointB - Vector3d::UnitZ()).norm(), 0, 1e-12);
   }
-  // Past each other at little more, and at little less, than the thickness.
+  // Past each other at a little more, and a little less, than the thickness.
   for (const double gap : {1e-5, -1e-5}) {
     const Tool past(Sphere{{0, 0, 0}, 1}, {-9, 0, 2.5 + gap}, {9, 0, 2.5 + gap});
     EXPECT_EQ(answer(past, ball, continuous(0.5)).shapeShape().size(), gap < 0) << gap;
@@ -370,7 +371,7 @@ TEST(ShapePairSteps, ByHand) {
       EXPECT_NEAR((c.normal - Vector3d::UnitZ()).norm(), 0, 1e-12);
     }
   }
-  // What begins near is a contact then, with all that Proximity says.
+  // Shapes within the thickness at the start are a contact at time 0, with all fields of Proximity.
   const Tool deep(Box{{0, 0, 0}, {1, 1, 1}}, {0.25, 0, 1.5}, {0, 0, 9});
   const ShapeShapeContact start = only(deep, ball, 0.125);
   EXPECT_EQ(start.timeOfImpact, 0);
@@ -388,7 +389,7 @@ TEST(ShapePairSteps, ByHand) {
             0u);
 }
 
-TEST(ShapePairSteps, CapturesAndAuditsHoldThem) {
+TEST(ShapePairSteps, CapturesAndAuditIncludeThem) {
   Random random(3);
   Settings audited = settingsOf(Engine::Octree, 2);
   audited.audit.features = 10;

@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-// Analytical shapes with each other. What parts them along a direction bounds their distance from
-// below; points of both bound it from above where they are apart, and every other direction where
-// they overlap.
+// Analytical shapes with each other. A separating direction bounds their distance from below.
+// Points of both shapes bound it from above where they are apart. Where they overlap, every other
+// direction does.
 
 namespace palpate::testing {
 namespace {
@@ -75,12 +75,12 @@ std::vector<Vector3d> someDirections(Random& random, int count) {
   return all;
 }
 
-/// scale: L, of the shapes and what is between them. rounding: relative to that, where cylinders
-/// overlap, how much longer than the shortest the way may be.
+/// scale: L, of the shapes and of the gap between them. rounding: how much longer than the shortest
+/// the penetration may be where cylinders overlap, relative to the scale.
 void expectDistance(Random& random, const PlacedShape& a, const PlacedShape& b,
                     const ShapeShapeContact& c, double scale, double rounding = 1e-6) {
   const double slack = 2e-13 * scale;
-  // With cylinders: as Docs/Shapes.md says.
+  // With cylinders as in Docs/Shapes.md.
   const bool isRound = !isPlane(a) && !isPlane(b) &&
                        (std::holds_alternative<Cylinder>(a.geometry) ||
                         std::holds_alternative<Cylinder>(b.geometry));
@@ -98,7 +98,7 @@ void expectDistance(Random& random, const PlacedShape& a, const PlacedShape& b,
   for (const std::vector<Vector3d>& directions : {facets, some}) {
     EXPECT_TRUE(holds(a, c.pointA, directions, slack));
     EXPECT_TRUE(holds(b, c.pointB, directions, slack));
-    if (c.distance > 0 && !isPlane(a) && !isPlane(b)) continue;  // the points bound it
+    if (c.distance > 0 && !isPlane(a) && !isPlane(b)) continue;  // the points are a bound
     for (const Vector3d& m : directions)
       EXPECT_LE(apartAlong(a, b, m), c.distance + most) << "another direction parts them sooner";
   }
@@ -117,7 +117,7 @@ void expectPair(Random& random, const PlacedShape& a, const PlacedShape& b, doub
   EXPECT_EQ(back->pointB, found->pointA);
 }
 
-TEST(ShapePairs, AnswerTheDefinition) {
+TEST(ShapePairs, MatchTheDefinition) {
   Random random(1);
   int apart = 0, overlapping = 0;
   for (int run = 0; run < 12; ++run) {
@@ -131,7 +131,7 @@ TEST(ShapePairs, AnswerTheDefinition) {
         expectPair(random, a, b, 1);
         const double distance = answer(a, b)->distance;
         ++(distance > 0 ? apart : overlapping);
-        // Moved by its depth and a little more, it is that little apart.
+        // After a shift by its depth and a little more, the distance is that little.
         const ShapeShapeContact c = *answer(a, b);
         PlacedShape moved = a;
         moved.translation += (0.01 - c.distance) * c.normal;
@@ -147,8 +147,8 @@ TEST(ShapePairs, AnswerTheDefinition) {
   EXPECT_GT(overlapping, 300);
 }
 
-/// Everything parallel, touching or in one plane.
-TEST(ShapePairs, DegenerateOnesAnswerTheDefinition) {
+/// Shapes that are parallel, touching or in one plane.
+TEST(ShapePairs, DegenerateShapesMatchTheDefinition) {
   Random random(2);
   const std::vector<AnalyticalGeometry> all{
       Sphere{{0, 0, 0}, 1},
@@ -178,7 +178,7 @@ TEST(ShapePairs, DegenerateOnesAnswerTheDefinition) {
         const PlacedShape a{all[i]},
             b{all[j], Matrix3d::Identity(), run == 0 ? Vector3d(0, 0, 0) : Vector3d(x, y, z)};
         if (isPlane(a) && isPlane(b)) continue;
-        if (i == j && b.translation.isZero()) continue;  // exchanged they are as they were
+        if (i == j && b.translation.isZero()) continue;  // exchanged, the contact is the same
         SCOPED_TRACE("kinds " + std::to_string(i) + " and " + std::to_string(j) + " at " +
                      std::to_string(x) + " " + std::to_string(y) + " " + std::to_string(z));
         expectPair(random, a, b, 4, 1e-3);
@@ -213,7 +213,7 @@ TEST(ShapePairs, DoNotDependOnScale) {
       }
 }
 
-TEST(ShapePairs, ByHand) {
+TEST(ShapePairs, MatchHandComputedValues) {
   const auto only = [](const AnalyticalGeometry& a, const AnalyticalGeometry& b) {
     return *answer({a}, {b});
   };
@@ -235,11 +235,12 @@ TEST(ShapePairs, ByHand) {
   c = only(Cylinder{{0, 0, 2}, {0, 0, 4}, 1}, Box{{0, 0, 0}, {2, 2, 1}});
   EXPECT_NEAR(c.distance, 1, 1e-15);
   EXPECT_EQ(c.normal, Vector3d::UnitZ());
-  c = only(Capsule{{0, 0, -2}, {0, 0, 1}, 0.25}, Box{{0, 0, 0}, {2, 2, 1}});  // out sideways or up
+  c = only(Capsule{{0, 0, -2}, {0, 0, 1}, 0.25},
+           Box{{0, 0, 0}, {2, 2, 1}});  // out sideways or upwards
   EXPECT_NEAR(c.distance, -2.25, 1e-14);
 }
 
-TEST(ShapePairs, BadInputIsRefusedByName) {
+TEST(ShapePairs, BadInputThrowsErrorsThatNameIt) {
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
   const GeometryId box = collisions.addAnalyticalGeometry(Box{{0, 0, 0}, {1, 1, 1}}),
                    plane = collisions.addAnalyticalGeometry(Plane{}),
@@ -253,13 +254,13 @@ TEST(ShapePairs, BadInputIsRefusedByName) {
       EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
     }
   };
-  refuse(box, box, Method::Proximity, "pair (0, 0): a shape does not meet itself");
-  refuse(plane, other, Method::Proximity, "pair (1, 2): two planes have no distance");
-  refuse(plane, other, Method::Continuous, "pair (1, 2): two planes have no distance");
+  refuse(box, box, Method::Proximity, "pair (0, 0): a shape cannot be tested against itself");
+  refuse(plane, other, Method::Proximity, "pair (1, 2): a pair of two planes is not supported");
+  refuse(plane, other, Method::Continuous, "pair (1, 2): a pair of two planes is not supported");
   refuse(box, plane, Method::Intersection, "a shape and a shape; Auto, Proximity and Continuous");
 }
 
-TEST(ShapePairs, CapturesHoldThem) {
+TEST(ShapePairs, CapturesIncludeThem) {
   Random random(4);
   Settings audited = settingsOf(Engine::Octree, 2);
   audited.audit.features = 10;
@@ -278,7 +279,7 @@ TEST(ShapePairs, CapturesHoldThem) {
   replayed(collisions);
 }
 
-/// What cannot be answered is refused; spheres, and two capsules, have any size.
+/// Unsupported shapes are refused. Spheres, and pairs of capsules, may have any size.
 TEST(ShapePairs, SizesThatDifferTooMuchAreRefused) {
   for (const double length : {1e14, 1e155, 1e300}) {
     OctreeBasedCD collisions;
@@ -293,7 +294,7 @@ TEST(ShapePairs, SizesThatDifferTooMuchAreRefused) {
         ADD_FAILURE() << "accepted";
       } catch (const Error& error) {
         EXPECT_EQ(error.code(), ErrorCode::UnsupportedMethod);
-        EXPECT_NE(std::string(error.what()).find("beyond a ratio of 2^40"), std::string::npos);
+        EXPECT_NE(std::string(error.what()).find("ratio must be at most 2^40"), std::string::npos);
       }
     }
     collisions.addCollisionPair(box, ball, {Method::Proximity, 1});
@@ -306,9 +307,9 @@ TEST(ShapePairs, SizesThatDifferTooMuchAreRefused) {
   }
 }
 
-/// With many directions almost equally short the points were those of a face far from the nearest
-/// one: off by up to the depth.
-TEST(ShapePairs, PointsOfOverlappingCylindersFitTheDistance) {
+/// A regression: among many directions of almost equal length, the points were those of a face far
+/// from the nearest one, and off by up to the depth.
+TEST(ShapePairs, PointsOfOverlappingCylindersMatchTheDistance) {
   Random random(7);
   int overlapping = 0;
   for (int run = 0; run < 60; ++run) {

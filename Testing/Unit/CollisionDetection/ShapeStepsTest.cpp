@@ -7,7 +7,7 @@
 #include "Common/RandomMeshes.h"
 #include "Common/Replayed.h"
 #include "Common/ShapeTruth.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-// Method::Continuous with shapes, against distances along the step that are written here.
+// Method::Continuous with shapes, against distances along the step that this file computes.
 
 namespace palpate::testing {
 namespace {
@@ -37,7 +37,7 @@ struct Tool {
   AnalyticalGeometry geometry;
   std::array<Transform, 2> ends;
 
-  /// A point of its frame at a time: it moves linearly.
+  /// A point of its frame at a time. It moves linearly.
   Vector3d at(const Vector3d& p, double t) const { return (1 - t) * ends[0](p) + t * ends[1](p); }
 };
 
@@ -46,7 +46,8 @@ Positions cornersOf(const AnalyticalGeometry& geometry) {
   return testing::cornersOf({geometry}, radius);
 }
 
-/// Of a hull of points in general position, or of a box: three corners with all others on one side.
+/// The faces of a hull of points in general position, or of a box: three corners with all others on
+/// one side.
 std::vector<Triangle> facesOf(const Positions& p) {
   std::vector<Triangle> faces;
   const auto n = static_cast<std::uint32_t>(p.size());
@@ -63,7 +64,7 @@ std::vector<Triangle> facesOf(const Positions& p) {
   return faces;
 }
 
-/// Of a plane by three of its points; of a cylinder a point, by the centres of its ends.
+/// For a plane, by three of its points. For a cylinder and a point, by the centres of its ends.
 double distanceAt(const Plane& plane, const Tool& tool, const std::array<Vector3d, 3>& x,
                   double t) {
   const Vector3d along = plane.normal.unitOrthogonal(), across = plane.normal.cross(along);
@@ -79,7 +80,7 @@ double distanceAt(const Plane& plane, const Tool& tool, const std::array<Vector3
   return std::max({0.0, least, plane.twoSided ? -most : 0.0});
 }
 
-/// Least of a convex function over [0, 1].
+/// The minimum of a convex function over [0, 1].
 template <class F>
 double least(F&& f) {
   double low = 0, high = 1;
@@ -101,7 +102,7 @@ double distanceAt(const Cylinder& cylinder, const Tool& tool, const Vector3d& x,
   return std::hypot(std::max(0.0, across), std::max(0.0, beyond));
 }
 
-/// Of an element.
+/// The faces of an element.
 double distanceAt(const Cylinder& cylinder, const Tool& tool, const std::array<Vector3d, 3>& x,
                   double t) {
   const auto onEdge = [&](const Vector3d& p, const Vector3d& q) {
@@ -112,7 +113,7 @@ double distanceAt(const Cylinder& cylinder, const Tool& tool, const std::array<V
       [&](double s) { return onEdge(x[0] + s * (x[1] - x[0]), x[0] + s * (x[2] - x[0])); });
 }
 
-/// How far an element, {p, p, p}, {p, q, q} or a triangle, is from the tool, at a time; 0 inside.
+/// The distance of an element, {p, p, p}, {p, q, q} or a triangle, to the tool at a time; 0 inside.
 double distanceAt(const Tool& tool, const std::vector<Triangle>& faces,
                   const std::array<Vector3d, 3>& x, double t) {
   if (const auto* plane = std::get_if<Plane>(&tool.geometry)) return distanceAt(*plane, tool, x, t);
@@ -141,20 +142,21 @@ double distanceAt(const Tool& tool, const std::vector<Triangle>& faces,
 }
 
 struct Moving {
-  Thing thing;
+  TestGeometry geometry;
   Positions now;
 
   std::array<Vector3d, 3> at(const Triangle& corners, double t) const {
     std::array<Vector3d, 3> x;
-    for (int i = 0; i < 3; ++i) x[i] = (1 - t) * thing.positions[corners[i]] + t * now[corners[i]];
+    for (int i = 0; i < 3; ++i)
+      x[i] = (1 - t) * geometry.positions[corners[i]] + t * now[corners[i]];
     return x;
   }
-  /// Vertices, edges and triangles, by what their contacts say: element, and vertices.
+  /// The vertices, edges and triangles as contacts name them: type, and vertices.
   std::vector<std::pair<ShapeElement, Triangle>> elements() const {
     std::vector<std::pair<ShapeElement, Triangle>> all;
     for (std::uint32_t v = 0; v < now.size(); ++v) all.push_back({ShapeElement::Vertex, {v, v, v}});
-    for (const auto& [p, q] : thing.edges()) all.push_back({ShapeElement::Edge, {p, q, q}});
-    for (const Triangle& t : thing.triangles) all.push_back({ShapeElement::Face, t});
+    for (const auto& [p, q] : geometry.edges()) all.push_back({ShapeElement::Edge, {p, q, q}});
+    for (const Triangle& t : geometry.triangles) all.push_back({ShapeElement::Face, t});
     return all;
   }
 };
@@ -162,12 +164,12 @@ struct Moving {
 CollisionData answer(const Settings& settings, const Moving& body, const Tool& tool,
                      const PairSettings& pair, bool toolFirst = false) {
   OctreeBasedCD collisions(settings);
-  const GeometryId mesh = body.thing.addTo(collisions),
+  const GeometryId mesh = body.geometry.addTo(collisions),
                    shape = collisions.addAnalyticalGeometry(tool.geometry);
   collisions.addCollisionPair(toolFirst ? shape : mesh, toolFirst ? mesh : shape, pair);
   collisions.setTransform(shape, tool.ends[0].rotation, tool.ends[0].translation,
                           tool.ends[1].rotation, tool.ends[1].translation);
-  collisions.setPositions(mesh, body.thing.positions, body.now);
+  collisions.setPositions(mesh, body.geometry.positions, body.now);
   collisions.detectCollision();
   return collisions.collisionData(toolFirst ? shape : mesh, toolFirst ? mesh : shape);
 }
@@ -188,18 +190,18 @@ struct Tally {
   std::size_t contacts = 0, within = 0;
 };
 
-/// Every contact is near then; of everything that comes near, it or something on its boundary is a
-/// contact, not later.
+/// At the time of every contact its element is near. For every element that comes near, it or a
+/// part of its boundary has a contact, and that is not later.
 Tally expectTrue(const CollisionData& data, const Moving& body, const Tool& tool,
                  const PairSettings& pair) {
   Tally tally;
   const std::vector<Triangle> faces = cornersOf(tool.geometry).size() > 2
                                           ? facesOf(cornersOf(tool.geometry))
                                           : std::vector<Triangle>{};
-  const double distance = pair.thickness + body.thing.radii[0];
+  const double distance = pair.thickness + body.geometry.radii[0];
   double motion = 0;
   for (std::size_t v = 0; v < body.now.size(); ++v)
-    motion = std::max(motion, (body.now[v] - body.thing.positions[v]).norm());
+    motion = std::max(motion, (body.now[v] - body.geometry.positions[v]).norm());
   for (const Vector3d& p : {Vector3d(-2, -2, -2), Vector3d(2, 2, 2), Vector3d(2, -2, 2)})
     motion += (tool.ends[1](p) - tool.ends[0](p)).norm();
   const double early = pair.timeTolerance * motion + 1e-9;
@@ -212,7 +214,7 @@ Tally expectTrue(const CollisionData& data, const Moving& body, const Tool& tool
     EXPECT_LE((point - c.point).norm(), 1e-12);
     EXPECT_NEAR(c.normal.norm(), 1, 1e-12);
     EXPECT_GT(c.weights.head(static_cast<int>(c.element) + 1).minCoeff(), 0);
-    const double centres = c.distance + body.thing.radii[0];
+    const double centres = c.distance + body.geometry.radii[0];
     EXPECT_LE((c.point - centres * c.normal - c.pointOnShape).norm(), 1e-12);
     EXPECT_LE(distanceAt(tool, faces, x, c.timeOfImpact), distance + early) << c.timeOfImpact;
     if (c.timeOfImpact == 0) continue;
@@ -221,7 +223,7 @@ Tally expectTrue(const CollisionData& data, const Moving& body, const Tool& tool
               centres + early);
   }
   for (const auto& [element, corners] : body.elements()) {
-    // Distances grow no faster than things move: up to there, or a small step further.
+    // Distances grow no faster than the geometries move: up to there, or a small step further.
     const auto gap = [&](double t) {
       return distanceAt(tool, faces, body.at(corners, t), t) - distance;
     };
@@ -263,11 +265,11 @@ std::vector<AnalyticalGeometry> geometries(Random& random) {
 
 Moving movingBody(Random& random, int type, double radius) {
   Moving body;
-  body.thing.type = static_cast<GeometryType>(type);
-  body.thing.radii = {radius};
+  body.geometry.type = static_cast<GeometryType>(type);
+  body.geometry.radii = {radius};
   Vector3d push;  // past the middle
   const auto add = [&](const Vector3d& p) {
-    body.thing.positions.push_back(p);
+    body.geometry.positions.push_back(p);
     body.now.push_back(p + push + randomPoint(random, -0.3, 0.3));
     return static_cast<std::uint32_t>(body.now.size() - 1);
   };
@@ -277,13 +279,13 @@ Moving movingBody(Random& random, int type, double radius) {
     const std::uint32_t a = add(p);
     if (type == 2) continue;
     const std::uint32_t b = add(p + randomPoint(random, -0.6, 0.6));
-    if (type == 1) body.thing.segments.push_back({a, b});
-    if (type == 0) body.thing.triangles.push_back({a, b, add(p + randomPoint(random, -.6, .6))});
+    if (type == 1) body.geometry.segments.push_back({a, b});
+    if (type == 0) body.geometry.triangles.push_back({a, b, add(p + randomPoint(random, -.6, .6))});
   }
   return body;
 }
 
-TEST(ShapeSteps, AreNeverLateAndNoEarlierThanTheTolerance) {
+TEST(ShapeSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
   Random random(1);
   std::size_t contacts = 0, within = 0;
   for (int run = 0; run < 4; ++run)
@@ -320,11 +322,11 @@ TEST(ShapeSteps, AreNeverLateAndNoEarlierThanTheTolerance) {
   EXPECT_GT(within, 25u);
 }
 
-// ---- By hand ----
+// ---- Hand-computed contacts ----
 
-Moving still(const Thing& thing) { return {thing, thing.positions}; }
+Moving still(const TestGeometry& geometry) { return {geometry, geometry.positions}; }
 
-Thing triangleAtZero() {
+TestGeometry triangleAtZero() {
   return {GeometryType::Triangles, {{-8, -8, 0}, {8, -8, 0}, {0, 8, 0}}, {{0, 1, 2}}, {}};
 }
 
@@ -340,7 +342,7 @@ ShapeContact only(const Moving& body, const Tool& tool, double thickness) {
   return data.shape().empty() ? ShapeContact{} : data.shape()[0];
 }
 
-TEST(ShapeSteps, NothingIsTooFast) {
+TEST(ShapeSteps, FastShapesDoNotTunnel) {
   const Moving sheet = still(triangleAtZero());
   const Vector3d above(0, -2, 10), below(0, -2, -10), up = Vector3d::UnitZ();
   for (const auto& [geometry, reach] : std::vector<std::pair<AnalyticalGeometry, double>>{
@@ -358,13 +360,13 @@ TEST(ShapeSteps, NothingIsTooFast) {
       EXPECT_NEAR((c.normal + up).norm(), 0, 1e-12);
       EXPECT_NEAR((c.point - Vector3d(0, -2, 0)).norm(), 0, 1e-12);
     }
-  // A box is flat on it: its corners meet the triangle, and which of them is not said.
+  // The flat face of a box meets the triangle. Any of its corners may be named.
   const ShapeContact flat = only(sheet, moving(Box{{0, 0, 0}, {1, 1, 0.5}}, above, below), 0);
   EXPECT_EQ(flat.element, ShapeElement::Face);
   EXPECT_NEAR(flat.timeOfImpact, 0.475, 1e-6);
 }
 
-TEST(ShapeSteps, StartsAndEndsCount) {
+TEST(ShapeSteps, TouchesAtTheStartAndTheEndCount) {
   const Moving sheet = still(triangleAtZero());
   const Sphere ball{{0, 0, 0}, 0.5};
   EXPECT_EQ(only(sheet, moving(ball, {0, -2, 0.25}, {0, -2, 9}), 0).timeOfImpact, 0);
@@ -384,7 +386,7 @@ Moving particle(const Vector3d& from, const Vector3d& to) {
   return {{GeometryType::Points, {from}, {}, {}}, {to}};
 }
 
-TEST(ShapeSteps, PlanesMeetWhatFallsThroughThem) {
+TEST(ShapeSteps, PlanesFindWhatFallsThroughThem) {
   const Tool floor = moving(Plane{}, {0, 0, -1}, {0, 0, 1}),
              sheet = moving(Plane{{0, 0, 0}, {0, 0, 1}, true}, {0, 0, -1}, {0, 0, 1});
   for (const double thickness : {0.0, 0.5})
@@ -402,8 +404,9 @@ TEST(ShapeSteps, PlanesMeetWhatFallsThroughThem) {
   EXPECT_NEAR(below.timeOfImpact, 0.5, 1e-6);
   EXPECT_EQ(below.normal, -Vector3d::UnitZ());
   EXPECT_EQ(only(particle({3, 4, -9}, {5, 4, 9}), floor, 0).timeOfImpact, 0);  // it was inside
-  // What a plane of two sides goes through before the step: two of a triangle's edges.
-  const Thing up{GeometryType::Triangles, {{0, 0, -2}, {1, 0, 2}, {0, 1, 2}}, {{0, 1, 2}}, {}};
+  // A two-sided plane through which two of a triangle's edges pass before the step.
+  const TestGeometry up{
+      GeometryType::Triangles, {{0, 0, -2}, {1, 0, 2}, {0, 1, 2}}, {{0, 1, 2}}, {}};
   const CollisionData data = answer(settingsOf(Engine::Octree), still(up), sheet, continuous(0));
   ASSERT_EQ(data.shape().size(), 2u);
   for (const ShapeContact& c : data.shape()) {
@@ -412,7 +415,7 @@ TEST(ShapeSteps, PlanesMeetWhatFallsThroughThem) {
   }
 }
 
-TEST(ShapeSteps, PlanesAndCylindersTouchAtTheEnds) {
+TEST(ShapeSteps, TouchesOfPlanesAndCylindersAtTheStartAndTheEndCount) {
   const auto touches = [](const AnalyticalGeometry& geometry, double thickness, const Vector3d& at,
                           const Vector3d& from) {
     const Tool still = moving(geometry, {0, 0, 0}, {0, 0, 0});
@@ -440,8 +443,8 @@ TEST(ShapeSteps, PlanesAndCylindersTouchAtTheEnds) {
   }
 }
 
-/// Past the rim at little more than the distance, and along a plane and a mantle.
-TEST(ShapeSteps, NothingNearIsNoContact) {
+/// Past the rim at little more than the distance, and along a plane and the side of a cylinder.
+TEST(ShapeSteps, NearMissesAreNoContacts) {
   const Tool can = moving(Cylinder{{0, 0, -2}, {0, 0, 2}, 1}, {0, 0, 0}, {0, 0, 0});
   const auto count = [](const Vector3d& from, const Vector3d& to, const Tool& tool,
                         double thickness) {
@@ -459,8 +462,8 @@ TEST(ShapeSteps, NothingNearIsNoContact) {
   }
 }
 
-/// A plane is what a face of a large box is, also where both turn.
-TEST(ShapeSteps, PlanesMoveAsFacesOfBoxes) {
+/// A plane acts like the face of a large box, also where both turn.
+TEST(ShapeSteps, MovingPlanesMatchFacesOfBoxes) {
   Random random(5);
   const double size = 64;
   for (int run = 0; run < 8; ++run) {
@@ -485,8 +488,8 @@ TEST(ShapeSteps, PlanesMoveAsFacesOfBoxes) {
   }
 }
 
-/// Turned over in one step what moves so has no extent at half time; nothing is late for that.
-TEST(ShapeSteps, TurnedOverNothingIsMissed) {
+/// A shape turned over in one step has no extent at half time. No impact is late because of that.
+TEST(ShapeSteps, HalfTurnsHaveNoFalseNegatives) {
   Tool over = moving(Plane{}, {0, 0, 0}, {0, 0, 0});
   over.ends[1].rotation = Eigen::DiagonalMatrix<double, 3>(1, -1, -1);
   const ShapeContact c = only(particle({0, 3, 1}, {0, 3, 1}), over, 0);
@@ -501,7 +504,7 @@ TEST(ShapeSteps, TurnedOverNothingIsMissed) {
   EXPECT_NEAR(only(particle({0, 0.75, 0}, {0, 0.25, 0}), can, 0).timeOfImpact, 0.5, 1e-6);
 }
 
-TEST(ShapeSteps, TurnsAreCountedAsArcs) {
+TEST(ShapeSteps, ArcDeviationIsThatOfTheRotation) {
   Tool rod = moving(Capsule{{1, 0, 0}, {2, 0, 0}, 0.1}, {0, 0, 0}, {0, 0, 0});
   rod.ends[1].rotation = Eigen::AngleAxisd(EIGEN_PI / 2, Vector3d::UnitZ()).toRotationMatrix();
   const CollisionData data =
@@ -509,13 +512,13 @@ TEST(ShapeSteps, TurnsAreCountedAsArcs) {
   EXPECT_NEAR(data.validity().arcDeviation, 2 * (1 - std::cos(EIGEN_PI / 4)), 1e-9);
 }
 
-TEST(ShapeSteps, CapturesAndAuditsHoldThem) {
+TEST(ShapeSteps, CapturesAndAuditIncludeThem) {
   Random random(3);
   const Moving body = movingBody(random, 0, 0);
   Settings audited = settingsOf(Engine::Octree);
   audited.audit.features = 1000;
   OctreeBasedCD collisions(audited);
-  const GeometryId mesh = body.thing.addTo(collisions);
+  const GeometryId mesh = body.geometry.addTo(collisions);
   std::vector<GeometryId> tools;
   for (const AnalyticalGeometry& geometry : geometries(random)) {
     tools.push_back(collisions.addAnalyticalGeometry(geometry));
@@ -526,7 +529,7 @@ TEST(ShapeSteps, CapturesAndAuditsHoldThem) {
   collisions.advance();
   for (const GeometryId tool : tools)
     collisions.setTransform(tool, randomTurn(random), randomPoint(random, -1, 1));
-  collisions.setPositions(mesh, body.thing.positions, body.now);
+  collisions.setPositions(mesh, body.geometry.positions, body.now);
   collisions.detectCollision();
   EXPECT_TRUE(collisions.auditFailures().empty());
   EXPECT_GT(collisions.statistics().contacts, 3u);

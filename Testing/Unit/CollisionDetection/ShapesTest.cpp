@@ -24,7 +24,7 @@
 #include <vector>
 
 // Analytical shapes against triangles, lines and points: brute force bit by bit, and the definition
-// by a signed distance and a search written here.
+// by a signed distance and a search that are written here.
 
 namespace palpate::testing {
 namespace {
@@ -34,7 +34,7 @@ using Eigen::Vector3d;
 using Positions = std::vector<Vector3d>;
 
 /// Triangles that cover a hull's surface, each with its plane: every three points with all others
-/// on one side. Of points in one plane: every three.
+/// on one side. If all points are in one plane: every three.
 struct Facets {
   struct Facet {
     std::array<Vector3d, 3> corners;
@@ -147,7 +147,7 @@ Matrix3d randomRotation(Random& random) {
       .toRotationMatrix();
 }
 
-/// One of each, about the unit cube's middle.
+/// One of each type, around the middle of the unit cube.
 std::vector<Placed> shapes(Random& random) {
   std::vector<Placed> all;
   const auto place = [&](const AnalyticalGeometry& geometry) {
@@ -208,7 +208,7 @@ std::map<Element, ShapeContact> byElement(const CollisionData& data) {
   return contacts;
 }
 
-TEST(Shapes, AnswerAsBruteForce) {
+TEST(Shapes, MatchBruteForce) {
   Random random(1);
   const std::vector<Body> bodies{organ(sphere(10, 14, {0.5, 0.5, 0.5}, 0.4)),
                                  organ(sheet(14, 0.5, 0)), organ(soup(random, 150, 0.2)),
@@ -240,7 +240,7 @@ TEST(Shapes, AnswerAsBruteForce) {
 
 // ---- The definition ----
 
-/// Written once more, from what each shape is.
+/// The distance of each shape, from its definition.
 double signedDistance(const Placed& placed, const Vector3d& world) {
   const Vector3d x = placed.rotation.transpose() * (world - placed.translation);
   const auto ofBox = [](std::initializer_list<double> beyond) {
@@ -270,7 +270,7 @@ double signedDistance(const Placed& placed, const Vector3d& world) {
       {u.cross(from).norm() - c.radius, std::abs(u.dot(from)) - 0.5 * (c.p1 - c.p0).norm()});
 }
 
-/// Least of a convex function over [0, 1].
+/// The minimum of a convex function over [0, 1].
 double least(const std::function<double(double)>& f) {
   double low = 0, high = 1;
   for (int i = 0; i < 45; ++i) {
@@ -289,13 +289,13 @@ double leastOn(const Placed& shape, const Vector3d& a, const Vector3d& b, const 
   return least([&](double t) { return leastOn(shape, a + t * (b - a), a + t * (c - a)); });
 }
 
-constexpr double kSearch = 1e-7;  ///< of the search above where distances are even
+constexpr double kSearch = 1e-7;  ///< error of the search above where distances are constant
 
-/// Every element with its least distance, and the least on its boundary.
+/// Every element with its least distance, and the least distance on its boundary.
 struct Truth {
   double own, boundary;
 };
-/// Of faces further than `reach` some distance beyond that.
+/// The least distance of a face beyond `reach` is a lower bound only.
 std::map<Element, Truth> truthOf(const Body& body, const Placed& shape, double reach) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   std::map<Element, Truth> truth;
@@ -338,7 +338,7 @@ void expectWellFormed(const ShapeContact& c, const Body& body, const Placed& sha
   EXPECT_GE(signedDistance(shape, c.point + 1e-3 * c.normal), centre + 1e-3 - 1e-10);
 }
 
-TEST(Shapes, AnswerTheDefinition) {
+TEST(Shapes, MatchTheDefinition) {
   Random random(2);
   const std::vector<Body> bodies{organ(soup(random, 60, 0.3)), organ(soup(random, 60, 0.8)),
                                  organ(sphere(8, 12, {.5, .5, .5}, .4)), thread(random, 60, 0.02),
@@ -393,7 +393,7 @@ TEST(Shapes, MoveWithTheirBodies) {
           moved, {shape.geometry, turn * shape.rotation, turn * shape.translation + shift}, pair));
       for (const auto& [element, c] : here) {
         const auto found = there.find(element);
-        if (found == there.end()) {  // on the border of being one
+        if (found == there.end()) {  // on the border of being a contact
           const double edge = std::min(c.weights.minCoeff(), 0.05 - c.distance);
           EXPECT_TRUE(element[0] > 0 || edge < 1e-12) << element[0] << ' ' << c.weights.transpose();
           continue;
@@ -409,7 +409,7 @@ TEST(Shapes, MoveWithTheirBodies) {
   }
 }
 
-TEST(Shapes, AgreeWithTheirTessellations) {
+TEST(Shapes, MatchTheirTessellations) {
   Random random(4);
   const Body body = organ(soup(random, 60, 0.15));
   const auto nearest = [](const CollisionData& data) {
@@ -453,14 +453,14 @@ TEST(Shapes, AgreeWithTheirTessellations) {
                    found = nearest(answer(body, shape, {Method::Proximity, 1.0}));
       if (!(truth > 0.01)) continue;
       ++apart;
-      // Chords of 6 degrees are this far inside at most.
+      // Chords of 6 degrees are at most this far inside.
       EXPECT_NEAR(found, truth, isBall ? 0.3 * 2 * (1 - std::cos(3.1415927 / 60)) : 1e-14);
     }
   }
   EXPECT_GT(apart, casesOf(20));
 }
 
-TEST(Shapes, HullsAgreeWithWhatTheyAreHullsOf) {
+TEST(Shapes, HullsMatchEqualBoxesAndCapsules) {
   Random random(7);
   const Body body = organ(soup(random, 100, 0.3));
   Positions corners, round;
@@ -496,7 +496,7 @@ TEST(Shapes, HullsAgreeWithWhatTheyAreHullsOf) {
   }
 }
 
-// ---- By hand ----
+// ---- Hand-computed contacts ----
 
 TEST(Shapes, CubeOnTableTouchesWithItsCorners) {
   Body cube = organ({{},
@@ -537,7 +537,7 @@ TEST(Shapes, CubeOnTableTouchesWithItsCorners) {
   }
 }
 
-TEST(Shapes, TriangleIsMetWhereItIsNearest) {
+TEST(Shapes, TriangleIsTouchedAtItsClosestPoint) {
   const Body triangle = organ({{{-8, -8, 0}, {8, -8, 0}, {0, 8, 0}}, {{0, 1, 2}}});
   const auto only = [&](const AnalyticalGeometry& shape) {
     const CollisionData data = answer(triangle, {shape}, {Method::Proximity, 1.0});
@@ -552,7 +552,7 @@ TEST(Shapes, TriangleIsMetWhereItIsNearest) {
   c = only(Sphere{{0, 0, -0.5}, 1.5});
   EXPECT_EQ(c.distance, -1);
   EXPECT_EQ(c.normal, Vector3d::UnitZ());
-  c = only(Capsule{{-1, 0, 2}, {1, 0, 2}, 1.5});  // parallel: in the middle
+  c = only(Capsule{{-1, 0, 2}, {1, 0, 2}, 1.5});  // parallel: in the middle of the overlap
   EXPECT_EQ(c.point, Vector3d::Zero());
   c = only(Capsule{{0, 0, 4}, {1, 0, 2}, 1.5});
   EXPECT_EQ(c.point, Vector3d(1, 0, 0));
@@ -563,7 +563,7 @@ TEST(Shapes, TriangleIsMetWhereItIsNearest) {
   c = only(Box{{0, 0, 2}, {1, 1, 1.5}});  // flat: in the middle
   EXPECT_EQ(c.point, Vector3d::Zero());
   EXPECT_EQ(c.distance, 0.5);
-  c = only(Box{{0, 0, 1}, {1, 1, 1.5}});  // the nearest way out is below
+  c = only(Box{{0, 0, 1}, {1, 1, 1.5}});  // the nearest surface point is below
   EXPECT_EQ(c.distance, -0.5);
   EXPECT_EQ(c.normal, -Vector3d::UnitZ());
   c = only(Cylinder{{0, 0, 0.5}, {0, 0, 4}, 1});
@@ -573,7 +573,7 @@ TEST(Shapes, TriangleIsMetWhereItIsNearest) {
   EXPECT_EQ(c.distance, 0.5);
 }
 
-TEST(Shapes, DegenerateElementsAnswerTheDefinition) {
+TEST(Shapes, DegenerateElementsMatchTheDefinition) {
   Random random(5);
   Positions unitCube{{1, 1, 1}};
   for (int v = 0; v < 8; ++v)
@@ -596,42 +596,43 @@ TEST(Shapes, DegenerateElementsAnswerTheDefinition) {
                           {ConvexHull{{{1, 1, 1}}}},
                           {ConvexHull{unitCube}}};
   for (int run = 0; run < casesOf(6); ++run) {
-    Body zoo{GeometryType::Triangles, {}, {}, 0};  // on a coarse grid
+    Body degenerate{GeometryType::Triangles, {}, {}, 0};  // on a coarse grid
     for (int v = 0; v < 12; ++v) {
       const auto at = [&] { return static_cast<double>(random() % 3); };
       const double x = at(), y = at(), z = at();
-      zoo.positions.push_back({x, y, z});
+      degenerate.positions.push_back({x, y, z});
     }
     const auto any = [&] { return static_cast<std::uint32_t>(random() % 12); };
     for (int t = 0; t < 14; ++t) {
       const std::uint32_t a = any(), b = any(), c = any();
-      zoo.elements.push_back({a, b, c});
+      degenerate.elements.push_back({a, b, c});
     }
     for (const Placed& shape : all) {
       if (shape.geometry.index() == 1 &&
           std::get<Capsule>(shape.geometry).p0 == std::get<Capsule>(shape.geometry).p1)
         continue;  // the test's own formula needs a length
       SCOPED_TRACE("shape " + std::to_string(shape.geometry.index()));
-      const auto found = byElement(answer(zoo, shape, {Method::Proximity, 0.75, Contacts::All}));
-      for (const auto& [element, truth] : truthOf(zoo, shape, 0.75)) {
+      const auto found =
+          byElement(answer(degenerate, shape, {Method::Proximity, 0.75, Contacts::All}));
+      for (const auto& [element, truth] : truthOf(degenerate, shape, 0.75)) {
         const auto c = found.find(element);
         if (c == found.end())
           EXPECT_GT(truth.own, 0.75 - kSearch);
         else
           EXPECT_NEAR(c->second.distance, truth.own, kSearch);
       }
-      for (const auto& [element, c] : found) expectWellFormed(c, zoo, shape);
+      for (const auto& [element, c] : found) expectWellFormed(c, degenerate, shape);
     }
     // A capsule without length is a sphere.
     const PairSettings pair{Method::Proximity, 0.5};
-    EXPECT_EQ(answer(zoo, {Capsule{{1, 1, 1}, {1, 1, 1}, 0.5}}, pair).hash(),
-              answer(zoo, {Sphere{{1, 1, 1}, 0.5}}, pair).hash());
+    EXPECT_EQ(answer(degenerate, {Capsule{{1, 1, 1}, {1, 1, 1}, 0.5}}, pair).hash(),
+              answer(degenerate, {Sphere{{1, 1, 1}, 0.5}}, pair).hash());
   }
 }
 
-// ---- Refused ----
+// ---- Refused calls ----
 
-TEST(Shapes, BadInputIsRefusedByName) {
+TEST(Shapes, BadInputThrowsErrorsThatNameIt) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN(),
                    kInfinity = std::numeric_limits<double>::infinity();
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
@@ -644,9 +645,9 @@ TEST(Shapes, BadInputIsRefusedByName) {
   refuse(Sphere{{0, kNan, 0}, 1}, "centre is (0, nan, 0); it must be finite");
   refuse(Capsule{{0, 0, 0}, {0, 0, kInfinity}, 1}, "p1 is (0, 0, inf); it must be finite");
   refuse(Capsule{{0, 0, 0}, {0, 0, 1}, kNan}, "radius is nan");
-  refuse(Plane{{0, 0, 0}, {0, 0, 0}}, "normal is (0, 0, 0); it must be of some length");
+  refuse(Plane{{0, 0, 0}, {0, 0, 0}}, "normal is (0, 0, 0); it must be longer than zero");
   refuse(Box{{0, 0, 0}, {1, -2, 1}}, "halfExtents is (1, -2, 1); it must be finite and not neg");
-  refuse(ConvexHull{}, "a hull needs at least one point");
+  refuse(ConvexHull{}, "the hull has no points; it needs at least one");
   refuse(ConvexHull{{{0, 0, 0}, {0, kNan, 1}, {kNan, 0, 0}}},
          "point 1 is (0, nan, 1); it must be finite");
   try {
@@ -655,12 +656,13 @@ TEST(Shapes, BadInputIsRefusedByName) {
   } catch (const Error& error) {
     EXPECT_EQ(error.element(), std::size_t{1});
   }
-  refuse(Cylinder{{1, 2, 3}, {1, 2, 3}, 1}, "p1 is (1, 2, 3); it must be another point than p0");
+  refuse(Cylinder{{1, 2, 3}, {1, 2, 3}, 1}, "p1 is (1, 2, 3); it must be different from p0");
 
   const GeometryId tool = collisions.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1}),
                    points = collisions.addPointSet(Positions{{0, 0, 0.5}});
-  EXPECT_EQ(tool, GeometryId{0});  // nothing refused took an id
-  expectRefused(Code::UnsupportedMethod, "a shape and a point set; Auto, Proximity and Continuous",
+  EXPECT_EQ(tool, GeometryId{0});  // refused calls used no id
+  expectRefused(Code::UnsupportedMethod,
+                "a shape and a point set; use Auto, Proximity or Continuous",
                 [&] { collisions.addCollisionPair(tool, points, {Method::Intersection}); });
   collisions.addCollisionPair(tool, points, {Method::Proximity, 0.0});
   collisions.detectCollision();
@@ -693,7 +695,7 @@ TEST(Shapes, BadInputIsRefusedByName) {
   expectRefused(Code::NotAvailable, "no candidate pairs", [&] {
     collisions.forEachCandidate(tool, points, [](std::span<const ElementPair>) {});
   });
-  expectRefused(Code::UnsupportedMethod, "no features to ask about", [&] {
+  expectRefused(Code::UnsupportedMethod, "one of the two is a shape", [&] {
     collisions.setContactPredicate(tool, points, [](const ContactFeatures&) { return true; });
   });
   turned(0, 1) = 1e-10;
@@ -705,9 +707,9 @@ TEST(Shapes, BadInputIsRefusedByName) {
   EXPECT_TRUE(collisions.pairs().empty());
 }
 
-// ---- Round the library ----
+// ---- Captures and audit ----
 
-TEST(Shapes, CapturesAndAuditsHoldThem) {
+TEST(Shapes, CapturesAndAuditIncludeThem) {
   Random random(6);
   const Body body = organ(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
   for (const int features : {20, 100000}) {

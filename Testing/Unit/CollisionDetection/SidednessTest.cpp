@@ -15,8 +15,8 @@
 #include <span>
 #include <vector>
 
-// Sidedness::Outer against the exact winding number of findInsideVertices(): a contact points
-// inward where a little way along its direction is inside the body.
+// Sidedness::Outer against the exact winding number of findInsideVertices(). A contact points
+// inward if a short way along its direction is inside the body.
 
 namespace palpate::testing {
 namespace {
@@ -31,7 +31,7 @@ Mesh burr(Random& random) {
   return body;
 }
 
-/// Which of the places are inside the body.
+/// Which of the positions are inside the body.
 std::vector<bool> areInside(const Mesh& body, const Positions& places) {
   OctreeBasedCD detection(settingsOf(Engine::Octree));
   const GeometryId probes = detection.addPointSet(places),
@@ -49,7 +49,7 @@ Vector3d normalOf(const Mesh& mesh, std::uint32_t t) {
       .normalized();
 }
 
-/// Whether a direction lies so near to the plane of a triangle there that a probe cannot tell.
+/// Whether a direction is so near to the plane of a triangle that a probe cannot decide.
 bool isAlongSurface(const Mesh& body, const std::set<std::uint32_t>& vertices, const Vector3d& d) {
   for (std::uint32_t t = 0; t < body.triangles.size(); ++t) {
     const auto& corners = body.triangles[t];
@@ -60,7 +60,7 @@ bool isAlongSurface(const Mesh& body, const std::set<std::uint32_t>& vertices, c
   return false;
 }
 
-/// What a contact says of the body: where, in which direction, and by which of its vertices.
+/// The part of a contact that belongs to the body: position, direction, and vertices.
 struct Touch {
   Row row;
   Vector3d place, direction;
@@ -85,7 +85,7 @@ Touch touchOf(const EdgeEdgeContact& c, const Mesh& body) {
   return touch;
 }
 
-/// Rows that point outward, as far as a probe tells; those that it cannot tell are as `found` says.
+/// The rows that point outward, where a probe can decide. The others are as in `found`.
 std::vector<Row> outward(const Mesh& body, const std::vector<Touch>& touches, bool corners,
                          const std::vector<Row>& found, std::size_t& told) {
   Positions probes;
@@ -122,7 +122,7 @@ CollisionData answer(const Settings& settings, const Mesh& body, const Tool& too
   return detection.collisionData(id, other);
 }
 
-/// corners: whether what a corner holds is near enough for its cone to be known by the definition.
+/// corners: whether the definition decides contacts whose closest point is a corner.
 void expectOutward(const Mesh& body, const Tool& tool, const PairSettings& pair, bool corners,
                    std::size_t& told) {
   const CollisionData all =
@@ -149,7 +149,7 @@ Tool toolOf(Random& random, std::uint32_t size, double step, bool lines) {
   return tool;
 }
 
-TEST(Sidedness, OuterIsWhatIsOutside) {
+TEST(Sidedness, OuterReportsContactsOutsideOnly) {
   Random random(1);
   std::size_t told = 0;
   for (int run = 0; run < 12; ++run) {
@@ -174,7 +174,7 @@ std::set<Row> idsOf(const Rows& rows) {
   return ids;
 }
 
-TEST(Sidedness, EveryMethodAnswersAsBruteForce) {
+TEST(Sidedness, EveryMethodMatchesBruteForce) {
   Random random(2);
   for (int run = 0; run < 6; ++run) {
     const Mesh a = burr(random);
@@ -210,7 +210,7 @@ TEST(Sidedness, EveryMethodAnswersAsBruteForce) {
         const std::set<Row> ofAll = idsOf(all[0]);
         EXPECT_TRUE(std::includes(ofAll.begin(), ofAll.end(), ids.begin(), ids.end()));
       }
-      // Automatic: nothing that comes from outside is missing.
+      // Auto: no contact from outside is missing.
       if (pair.method == Method::Auto) {
         EXPECT_TRUE(std::includes(ids.begin(), ids.end(), impacts.begin(), impacts.end()));
       }
@@ -220,7 +220,7 @@ TEST(Sidedness, EveryMethodAnswersAsBruteForce) {
 }
 
 TEST(Sidedness, ThinOrganIsTouchedFromOneSide) {
-  // A slab 0.1 thick, closed; a probe 0.05 over it, and one under it. Thickness 1.
+  // A closed slab 0.1 thick. One probe is 0.05 above it, one below. The thickness is 1.
   const Mesh slab{{{-4, -4, 0},
                    {4, -4, 0},
                    {4, 4, 0},
@@ -255,9 +255,9 @@ TEST(Sidedness, ThinOrganIsTouchedFromOneSide) {
               below = triangles({1, 0.5, -0.05}, Sidedness::Outer, contacts);
     EXPECT_TRUE(!above.empty() && *above.begin() >= 2 && *above.rbegin() <= 3);
     EXPECT_TRUE(!below.empty() && *below.rbegin() <= 1);
-    // Off the sharp corner, where no face looks straight at it.
+    // Beside the sharp corner, where no face points straight at it.
     EXPECT_FALSE(triangles({4.3, 4.3, 0.3}, Sidedness::Outer, contacts).empty());
-    // Touching points nowhere.
+    // Touching features have no direction.
     EXPECT_FALSE(triangles({1, 0.5, 0.1}, Sidedness::Outer, contacts).empty());
   }
   EXPECT_GT(triangles({1, 0.5, 0.15}, Sidedness::Both, Contacts::All).size(), 2u);

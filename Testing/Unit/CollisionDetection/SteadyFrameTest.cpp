@@ -22,7 +22,7 @@ namespace {
 std::atomic<std::size_t> allocations{0};
 }
 
-/// Counts every allocation of the process, whoever makes it.
+/// Counts every allocation of the process, from any caller.
 extern "C" void* malloc(std::size_t size) {
   ++allocations;
   return __libc_malloc(size);
@@ -35,7 +35,7 @@ extern "C" void* realloc(void* memory, std::size_t size) {
 namespace palpate {
 namespace {
 
-/// While it lives integers of any size do not count: what they decide is the exact fallback.
+/// While it exists, integers of any size do not count: they are the exact fallback.
 class IntegersApart {
  public:
   IntegersApart() {
@@ -55,7 +55,7 @@ class IntegersApart {
 
 struct LastPass {
   std::size_t allocations = 0;
-  std::set<MethodReason> reasons;  ///< of the frames that count
+  std::set<MethodReason> reasons;  ///< the frames that count
 };
 
 LastPass lastPass(const scenes::Scene& scene, const Settings& settings,
@@ -76,7 +76,7 @@ LastPass lastPass(const scenes::Scene& scene, const Settings& settings,
     detection.detectCollision();
     detection.advance();
     const std::size_t made = allocations - before;
-    // What starts a pass is of the pass before; and exact decisions are apart.
+    // The start of a pass belongs to the pass before. Exact decisions are counted apart.
     if (frame < 2 * scene.frames || detection.statistics().exactDecisions > 0) continue;
     result.allocations += made;
     for (const CollisionPair& pair : detection.pairs())
@@ -104,7 +104,8 @@ TEST(SteadyFrame, AllocatesNothingWithAuto) {
     if (scene.name == "far away") continue;  // slow pressing elsewhere
     for (const auto& [tolerance, thickness] :
          {std::pair{4.0, 0.0}, std::pair{0.5, 0.2}, std::pair{4.0, 0.2}}) {
-      // Many times the edges of its small triangles: each frame takes half a second and is exact.
+      // It has edges many times those of its small triangles. Each frame takes half a second and is
+      // exact.
       if (scene.name == "uneven triangles" && tolerance * thickness > 0.5) continue;
       const LastPass pass = lastPass(scene, {.threads = 1},
                                      {.thickness = thickness * scene.thickness,
@@ -186,7 +187,8 @@ TEST(SteadyFrame, AllocatesNothingWithShapes) {
   EXPECT_GT(contacts, 1000u);
 }
 
-/// Frames of every two shapes, and of cylinders with triangles and lines, by Method::Continuous.
+/// Frames of every pair of shapes, and of cylinders with triangles and lines, by
+/// Method::Continuous.
 TEST(SteadyFrame, AllocatesNothingWithStepsOfShapes) {
   using namespace testing;
   const IntegersApart integers;
@@ -226,9 +228,8 @@ TEST(SteadyFrame, AllocatesNothingWithStepsOfShapes) {
   EXPECT_GT(contacts, 100u);
 }
 
-/// Axes parallel to each other: exact arithmetic has its integers, and tells how often it was
-/// asked.
-TEST(SteadyFrame, CountsWhatExactArithmeticDecidesOfShapes) {
+/// Axes parallel to each other. Exact arithmetic keeps its integers, and counts its decisions.
+TEST(SteadyFrame, CountsExactDecisionsBetweenShapes) {
   OctreeBasedCD detection(Settings{.threads = 1});
   std::vector<GeometryId> tools;
   for (const AnalyticalGeometry& tool : std::vector<AnalyticalGeometry>{

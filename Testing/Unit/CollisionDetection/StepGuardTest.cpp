@@ -3,7 +3,7 @@
 #include <palpate/TimeOfImpact.h>
 
 #include "Common/Solids.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <cmath>
 #include <limits>
@@ -13,19 +13,19 @@ namespace {
 
 /// Geometries with their pairs, and a step.
 struct Guarding {
-  std::vector<Thing> bodies{};
+  std::vector<TestGeometry> bodies{};
   std::vector<std::array<std::size_t, 2>> pairs{};
   std::vector<Positions> before{}, now{};
 
-  void add(Thing body) {
+  void add(TestGeometry body) {
     before.push_back(body.positions);
     now.push_back(body.positions);
     bodies.push_back(std::move(body));
   }
-  /// Ids are the bodies' indices.
+  /// The ids are the indices of the bodies.
   StepGuard guard(const Settings& settings) const {
     StepGuard guard(settings);
-    for (const Thing& body : bodies) {
+    for (const TestGeometry& body : bodies) {
       if (body.type == GeometryType::Triangles)
         guard.addTriangleMesh(body.positions, body.triangles);
       else if (body.type == GeometryType::Lines)
@@ -44,7 +44,8 @@ struct Guarding {
   }
 };
 
-/// Whether vertices of a touch triangles of b, or, with edges, edges those of b; by the definition.
+/// Whether vertices of a touch triangles of b, or, with edges, edges those of b. Computed from the
+/// definition.
 std::size_t countTouches(const Guarding& all, std::size_t a, std::size_t b, bool edges,
                          const std::vector<Positions>& now) {
   const TimeOfImpactSettings coarse{.timeTolerance = 1.0};
@@ -81,10 +82,10 @@ std::size_t countTouches(const Guarding& all, const std::vector<Positions>& now)
 
 Guarding everything(Random& random) {
   Guarding all;
-  all.add(things(sphere(6, 8, {0.53, 0.46, 0.51}, 0.3)));
-  all.add(things(sheet(6, 0.5, 0.3)));
-  all.add(things(soup(random, 30, 0.1)));
-  Thing line = thread(random, 40, 0.1, 0.0, false);
+  all.add(testGeometry(sphere(6, 8, {0.53, 0.46, 0.51}, 0.3)));
+  all.add(testGeometry(sheet(6, 0.5, 0.3)));
+  all.add(testGeometry(soup(random, 30, 0.1)));
+  TestGeometry line = thread(random, 40, 0.1, 0.0, false);
   // The walk ends at the cube's faces, and segments that lie in one plane may touch at the start.
   line.positions = moved(random, line.positions, 0.01);
   all.add(line);
@@ -114,7 +115,7 @@ TEST(StepGuard, NoImpactRemainsBetweenGeometriesOfAllTypes) {
     for (int step = 0; step < 3; ++step) {
       std::vector<Positions> given = all.before;
       for (Positions& positions : given) positions = moved(random, positions, most);
-      if (step == 2) given[0] = all.before[0];  // at rest where it was held, and not given
+      if (step == 2) given[0] = all.before[0];  // at rest where it was held, and not set
       EXPECT_GT(countTouches(all, given), 0u);
       std::vector<std::vector<Positions>> ends(guards.size(), given);
       for (std::size_t i = 0; i < guards.size(); ++i) {
@@ -139,7 +140,7 @@ TEST(StepGuard, NoImpactRemainsBetweenGeometriesOfAllTypes) {
   }
 }
 
-TEST(StepGuard, SurfacesOfTetrahedralMeshesAreGuarded) {
+TEST(StepGuard, NoImpactRemainsOnSurfacesOfTetrahedralMeshes) {
   Random random(182);
   Solid cube = cells(2, random, [](const std::array<int, 3>&) { return true; });
   const Positions points{{0.9, 0.8, 2.5}};
@@ -158,7 +159,7 @@ TEST(StepGuard, SurfacesOfTetrahedralMeshesAreGuarded) {
     if (cube.positions[v] != Vector3d(1, 1, 1)) continue;
     EXPECT_EQ(raised[v], given[v]) << "no vertex of the surface";
   }
-  // After a cut that leaves one tetrahedron the point may fall where there is nothing.
+  // After a cut that leaves one tetrahedron, the point may fall through the removed part.
   guard.setTetrahedra(solid, raised, std::array<Tetrahedron, 1>{cube.tetrahedra.front()});
   Positions away{{0.9, 0.8, 2.25}};
   EXPECT_EQ(guard.hold(std::array{GuardedStep{drops, points, away}}), 0u);
@@ -171,7 +172,7 @@ TEST(StepGuard, RigidGroupsMoveBackAsAWhole) {
     Guarding all = everything(random);
     StepGuard guard = all.guard(settingsOf(Engine::Octree));
     guard.addRigidGroup(GeometryId{1});
-    // Two groups that share a vertex are one, over two geometries.
+    // Two groups that share a vertex are one group, over two geometries.
     const std::vector<GuardedVertex> one{{GeometryId{3}, 0}, {GeometryId{3}, 7}},
         other{{GeometryId{3}, 7}, {GeometryId{4}, 2}, {GeometryId{4}, 30}};
     guard.addRigidGroup(one);
@@ -192,10 +193,10 @@ TEST(StepGuard, RigidGroupsMoveBackAsAWhole) {
   }
 }
 
-/// Particles on a line, of which all but the last move further than to the next.
+/// Particles on a line. All but the last move further than the next one.
 Guarding chain(std::uint32_t count) {
   Guarding all;
-  Thing points{GeometryType::Points, {}, {}, {}, {0.0}};
+  TestGeometry points{GeometryType::Points, {}, {}, {}, {0.0}};
   for (std::uint32_t i = 0; i < count; ++i) points.positions.emplace_back(0, 0, i);
   all.add(points);
   all.pairs.push_back({0, 0});
@@ -203,7 +204,7 @@ Guarding chain(std::uint32_t count) {
   return all;
 }
 
-TEST(StepGuard, TakesOneRoundMoreThanVerticesAtMost) {
+TEST(StepGuard, NeedsAtMostOneRoundMoreThanVertices) {
   Guarding all = chain(20);
   StepGuard guard = all.guard(settingsOf(Engine::Octree));
   EXPECT_EQ(guard.hold(all.steps(all.now)), 19u);
@@ -221,7 +222,7 @@ Guarding vertexOverTriangle(double end) {
   return all;
 }
 
-TEST(StepGuard, DecidesTouchExactly) {
+TEST(StepGuard, TouchIsDecidedExactly) {
   const double tiny = std::numeric_limits<double>::denorm_min();
   for (const double end : {0.0, -0.0, -tiny, tiny, 0x1p-60}) {
     Guarding all = vertexOverTriangle(end);
@@ -239,7 +240,8 @@ TEST(StepGuard, DecidesTouchExactly) {
   EXPECT_EQ(all.now[1][0].z(), tiny);
 }
 
-/// hold() throws this, names the geometry and the vertex, and changes no position.
+/// Expects hold() to throw this error, to name the geometry and the vertex, and to change no
+/// position.
 void expectImpactRemains(StepGuard& guard, Guarding& all, const std::string& sentence) {
   const std::vector<Positions> given = all.now;
   try {
@@ -265,7 +267,7 @@ TEST(StepGuard, StepsThatStartWithATouchAreRefused) {
     EXPECT_EQ(guard.hold(all.steps(all.now)), 0u) << "a disabled triangle is not there";
     EXPECT_EQ(all.now[1][0].z(), end);
   }
-  // Edges are named by their vertices.
+  // Errors name edges by their vertices.
   Guarding edges;
   edges.add({GeometryType::Lines, {{-1, 0, 0}, {1, 0, 0}}, {}, {{0, 1}}, {}});
   edges.add({GeometryType::Lines, {{0, -1, 0}, {0, 1, 0}}, {}, {{0, 1}}, {}});
@@ -275,7 +277,7 @@ TEST(StepGuard, StepsThatStartWithATouchAreRefused) {
       guard, edges, "geometry 1, edge (0, 1), and geometry 0, edge (0, 1) touched before the step");
 }
 
-TEST(StepGuard, FixedVerticesStayAndTheRestGivesWay) {
+TEST(StepGuard, FixedVerticesStayAndOthersMoveBack) {
   const std::string fixed =
       "geometry 1, vertex 0, and geometry 0, triangle 0 touch within the step, and all their "
       "vertices that move are fixed";
@@ -283,7 +285,7 @@ TEST(StepGuard, FixedVerticesStayAndTheRestGivesWay) {
   StepGuard guard = all.guard(settingsOf(Engine::Octree));
   guard.setFixedVertices(GeometryId{1}, std::array{0u});
   expectImpactRemains(guard, all, fixed);
-  // The triangle moves and could go back, but this does not part them.
+  // The triangle moves and could go back, but this does not separate them.
   for (Vector3d& p : all.now[0]) p.z() = -0.5;
   expectImpactRemains(guard, all, fixed);
   // A triangle that moves into a vertex at rest goes back; as part of a fixed group it cannot.
@@ -351,7 +353,7 @@ TEST(StepGuard, BadInputIsRefusedAndChangesNothing) {
   expectRefused(ErrorCode::WrongPositionCount,
                 [](auto& steps) { steps[2].now = steps[2].now.first(3); });
   expectRefused(ErrorCode::NonFinitePosition, [&](auto& steps) { steps[4].now[5].y() = nan; });
-  // Particle 0 is before the step where particle 1 is, after vertices of others have gone back.
+  // Vertices of others have gone back. Then particle 0 is before the step where particle 1 is.
   Positions together = all.before[4];
   together[0] = together[1];
   expectRefused(ErrorCode::ImpactRemains, [&](auto& steps) { steps[4].before = together; });
@@ -374,7 +376,7 @@ TEST(StepGuard, BadInputIsRefusedAndChangesNothing) {
   expectError(ErrorCode::UnsupportedMethod,
               [&] { guard.setTriangles(GeometryId{4}, all.before[4], {}); });
 
-  // What is not given is where the last hold() that succeeded left it, not where a failed one
+  // A geometry that is not set is where the last successful hold() left it, not where a failed one
   // began or ended.
   for (StepGuard* each : {&guard, &unfailed}) {
     std::vector<Positions> ends = given;
@@ -392,7 +394,7 @@ TEST(StepGuard, BadInputIsRefusedAndChangesNothing) {
   EXPECT_EQ(other.hold({}), 0u);
 }
 
-TEST(StepGuard, GeometriesAndPairsComeAndGo) {
+TEST(StepGuard, GeometriesAndPairsCanBeAddedAndRemoved) {
   Guarding all = vertexOverTriangle(-1);
   StepGuard guard = all.guard(settingsOf(Engine::Octree));
   const std::vector<Positions> given = all.now;
@@ -400,7 +402,7 @@ TEST(StepGuard, GeometriesAndPairsComeAndGo) {
   EXPECT_EQ(guard.hold(all.steps(all.now)), 0u);
   guard.addCollisionPair(GeometryId{0}, GeometryId{1});
   EXPECT_EQ(guard.hold(all.steps(all.now)), 1u);
-  // A cut moves the triangle away, with a fourth vertex; later ones are free again.
+  // A cut moves the triangle and a fourth vertex away. The later vertices are free again.
   all.now = given;
   const Positions cut{{5, 0, 0}, {6, 0, 0}, {5, 1, 0}, {6, 1, 0}};
   guard.setFixedVertices(GeometryId{0}, std::array{0u, 2u});

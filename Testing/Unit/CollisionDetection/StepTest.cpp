@@ -25,7 +25,7 @@ class Step : public ::testing::Test {
     EXPECT_EQ(problem.geometries[0].before, at(before));
     EXPECT_EQ(problem.geometries[0].now, at(now));
   }
-  /// The same, and then the step ends.
+  /// Sets both ends of the step and ends it.
   void expectLast(double before, double now) {
     expect(before, now);
     m_detection.advance();
@@ -36,14 +36,14 @@ class Step : public ::testing::Test {
   GeometryId m_id = m_detection.addTriangleMesh(at(0), triangle());
 };
 
-TEST_F(Step, OfANewGeometryIsAtRest) {
+TEST_F(Step, NewGeometryIsAtRest) {
   m_detection.setPositions(m_id, at(1));
   expect(1, 1);
   m_detection.setPositions(m_id, at(2));
   expectLast(2, 2);
 }
 
-TEST_F(Step, OfANewGeometryMayBeGivenByBothEnds) {
+TEST_F(Step, NewGeometryMayHaveBothEndsGiven) {
   m_detection.setPositions(m_id, at(1), at(2));
   m_detection.setPositions(m_id, at(3));
   expectLast(1, 3);
@@ -90,8 +90,8 @@ TEST_F(Step, EndsByAdvanceOnly) {
   expect(1, 1);
 }
 
-/// With candidates alone `before` becomes the last `now`, as with every other call.
-TEST_F(Step, AdvancesForCandidatesInBatchesToo) {
+/// With candidates alone, `before` becomes the last `now`, as with every other call.
+TEST_F(Step, AdvanceAppliesToCandidatesInBatches) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.5), triangle());
   m_detection.addCollisionPair(m_id, other, {.method = Method::Continuous});
   m_detection.advance();
@@ -104,7 +104,7 @@ TEST_F(Step, AdvancesForCandidatesInBatchesToo) {
   }
 }
 
-TEST_F(Step, AnswersByTheLastValuesOnly) {
+TEST_F(Step, ContactsDependOnTheLastValuesOnly) {
   m_detection.advance();
   m_detection.setPositions(m_id, at(1));
   m_detection.update();
@@ -122,7 +122,7 @@ TEST_F(Step, AnswersByTheLastValuesOnly) {
   expectLast(5, 9);
 }
 
-TEST_F(Step, OfANewTopologyIsAtRest) {
+TEST_F(Step, NewTopologyIsAtRest) {
   m_detection.advance();
   m_detection.setTriangles(m_id, at(5), triangle());
   expect(5, 5);
@@ -136,8 +136,8 @@ TEST_F(Step, OfANewTopologyIsAtRest) {
   expectLast(2, 4);
 }
 
-/// A tool passes through z = 0 in one step and is not set again; a sheet is placed at z = 0 in the
-/// next one: nothing touched.
+/// A tool passes through z = 0 in one step and is not set again. A sheet is placed at z = 0 in the
+/// next step: nothing touches.
 TEST_F(Step, DoesNotRepeatMotionThatHasEnded) {
   const GeometryId sheet = m_detection.addTriangleMesh(at(50), triangle());
   m_detection.addCollisionPair(m_id, sheet, {.method = Method::Continuous});
@@ -151,8 +151,9 @@ TEST_F(Step, DoesNotRepeatMotionThatHasEnded) {
   EXPECT_EQ(m_detection.collisionData(m_id, sheet).validity().displacement, 0.0);
 }
 
-/// A loop that never ends its steps sweeps from where it began, and validity() says how far.
-TEST_F(Step, WithoutAdvanceGrowsAndSaysSo) {
+/// A loop without advance() sweeps from its first positions, and validity() reports the
+/// displacement.
+TEST_F(Step, WithoutAdvanceGrowsAndIsNotTrusted) {
   const GeometryId sheet = m_detection.addTriangleMesh(at(50), triangle());
   m_detection.addCollisionPair(m_id, sheet, {.method = Method::Proximity, .thickness = 1.5});
   m_detection.detectCollision();
@@ -167,8 +168,8 @@ TEST_F(Step, WithoutAdvanceGrowsAndSaysSo) {
   }
 }
 
-/// Intersection measures no distances: a thickness does not tell how far apart its meshes were.
-TEST_F(Step, OfIntersectionStartsApartOnlyWhereItEnded) {
+/// Intersection measures no distances, so a thickness does not bound the distance of its meshes.
+TEST_F(Step, StartedApartOfIntersectionNeedsTheSamePositions) {
   const std::vector<Eigen::Vector3d> wall{{0.2, 0.2, -1}, {0.2, 0.2, 1}, {0.3, 0.2, 1}};
   const GeometryId id = m_detection.addTriangleMesh(wall, triangle());
   m_detection.addCollisionPair(m_id, id, {.method = Method::Intersection, .thickness = 5});
@@ -181,8 +182,9 @@ TEST_F(Step, OfIntersectionStartsApartOnlyWhereItEnded) {
   EXPECT_FALSE(m_detection.collisionData(m_id, id).validity().startedApart);
 }
 
-/// A solver with rounds: the step's start stays known, and positions are corrected between rounds.
-TEST_F(Step, KeepsItsStartThroughRounds) {
+/// A solver with several detections in a step: `before` stays, and positions are corrected in
+/// between.
+TEST_F(Step, KeepsBeforeThroughSeveralDetections) {
   const GeometryId sheet = m_detection.addTriangleMesh(at(1), triangle());
   m_detection.addCollisionPair(m_id, sheet, {.method = Method::Continuous});
   m_detection.detectCollision();
@@ -200,7 +202,7 @@ TEST_F(Step, KeepsItsStartThroughRounds) {
   }
 }
 
-TEST_F(Step, WithTheSamePositionsLeavesOctreeAndStaticAnswersAlone) {
+TEST_F(Step, SamePositionsKeepOctreeAndStaticContacts) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.1), triangle());
   PairSettings settings;
   settings.method = Method::Proximity;
@@ -222,7 +224,7 @@ TEST_F(Step, WithTheSamePositionsLeavesOctreeAndStaticAnswersAlone) {
   EXPECT_EQ(hash(), first);
 }
 
-TEST_F(Step, WithTheSamePositionsIsANewOneForContinuous) {
+TEST_F(Step, SamePositionsAreANewStepForContinuous) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.5), triangle());
   m_detection.addCollisionPair(m_id, other, {.method = Method::Continuous});
   m_detection.advance();
@@ -235,7 +237,7 @@ TEST_F(Step, WithTheSamePositionsIsANewOneForContinuous) {
   EXPECT_TRUE(m_detection.collisionData(m_id, other).vertexTriangle().empty());
 }
 
-/// Statistics are those of the last frame, whatever is asked for since.
+/// Statistics are those of the last frame, whatever is called afterwards.
 TEST_F(Step, QueriesKeepStatistics) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.1), triangle());
   m_detection.addCollisionPair(m_id, other, {.method = Method::Proximity, .thickness = 0.5});
@@ -248,7 +250,7 @@ TEST_F(Step, QueriesKeepStatistics) {
   EXPECT_EQ(m_detection.statistics().contacts, before.contacts);
   EXPECT_EQ(m_detection.statistics().candidatePairs, before.candidatePairs);
   EXPECT_EQ(m_detection.statistics().rebuiltOctrees, before.rebuiltOctrees);
-  m_detection.detectCollision();  // which counts the octree that a query updated
+  m_detection.detectCollision();  // this counts the octree that a query updated
   EXPECT_EQ(m_detection.statistics().refittedOctrees + m_detection.statistics().rebuiltOctrees, 1u);
 }
 
@@ -262,7 +264,7 @@ ErrorCode codeOf(const std::function<void()>& call) {
   return {};
 }
 
-TEST_F(Step, HasNoAnswerBeforeADetection) {
+TEST_F(Step, HasNoContactsBeforeADetection) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.1), triangle());
   const auto ask = [&] { m_detection.collisionData(m_id, other); };
   m_detection.addCollisionPair(m_id, other, {.method = Method::Proximity, .thickness = 0.5});
@@ -279,7 +281,7 @@ TEST_F(Step, HasNoAnswerBeforeADetection) {
   EXPECT_EQ(codeOf(ask), ErrorCode::NotAvailable);
 }
 
-TEST_F(Step, OfAMovedFromObjectDoesNotExist) {
+TEST_F(Step, MovedFromObjectRefusesCalls) {
   OctreeBasedCD other = std::move(m_detection);
   EXPECT_EQ(codeOf([&] { m_detection.advance(); }), ErrorCode::InvalidCall);
   EXPECT_EQ(codeOf([&] { m_detection.setPositions(m_id, at(1)); }), ErrorCode::InvalidCall);
@@ -295,7 +297,7 @@ TEST_F(Step, OfAMovedFromObjectDoesNotExist) {
   expectLast(1, 1);
 }
 
-/// A predicate or callback that calls the object gets an error, and the object stays usable.
+/// A predicate or callback that calls the object gets an error. The object stays usable.
 TEST_F(Step, CannotBeChangedByCallbacks) {
   const GeometryId other = m_detection.addTriangleMesh(at(0.1), triangle());
   m_detection.addCollisionPair(m_id, other, {.method = Method::Proximity, .thickness = 0.5});
@@ -323,13 +325,14 @@ TEST_F(Step, CannotBeChangedByCallbacks) {
     m_detection.detectCollision();
     EXPECT_GT(refused, 0);
     EXPECT_EQ(m_detection.collisionData(m_id, other).hash(), hash);
-    // The error may also leave the predicate: then it ends the frame.
+    // The predicate may also let the error pass. Then the error ends the frame.
     m_detection.setContactPredicate(m_id, other, [&](const ContactFeatures&) {
       call();
       return true;
     });
     EXPECT_EQ(codeOf([&] { m_detection.detectCollision(); }), ErrorCode::InvalidCall);
-    EXPECT_EQ(m_detection.collisionData(m_id, other).hash(), hash);  // the last answer
+    EXPECT_EQ(m_detection.collisionData(m_id, other).hash(),
+              hash);  // the contacts of the previous frame
     EXPECT_EQ(codeOf([&] { m_detection.forEachCandidate(m_id, other, [&](auto) { call(); }); }),
               ErrorCode::InvalidCall);
     m_detection.setContactPredicate(m_id, other, {});

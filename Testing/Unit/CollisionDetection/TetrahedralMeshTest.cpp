@@ -1,6 +1,6 @@
 #include "Common/Replayed.h"
 #include "Common/Solids.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <palpate/Capture.h>
 #include <palpate/OctreeBasedCD.h>
@@ -51,7 +51,7 @@ Triangle sorted(Triangle t) {
   return t;
 }
 
-/// From the definition: which faces, of which, in which order, and which way they are wound.
+/// From the definition: the faces, their tetrahedra, their order, and their winding.
 void expectDefined(const Solid& solid, const Surface& surface) {
   std::map<Triangle, int> uses;
   const auto without = [&](const Tetrahedron& t, int corner) {
@@ -78,7 +78,7 @@ void expectDefined(const Solid& solid, const Surface& surface) {
   EXPECT_EQ(next, surface.tetrahedra.size());
 }
 
-TEST(TetrahedralMesh, SurfaceIsTheFacesOfOneWoundOutward) {
+TEST(TetrahedralMesh, SurfaceIsTheFacesOfOneTetrahedronWoundOutward) {
   Random random(1);
   for (int run = 0; run < 20; ++run) {
     Solid solid = cells(3, random, [&](const auto&) { return run == 0 || random() % 3 > 0; });
@@ -96,13 +96,13 @@ TEST(TetrahedralMesh, SurfaceIsTheFacesOfOneWoundOutward) {
   }
 }
 
-TEST(TetrahedralMesh, WithoutVolumeAreWoundAsTheirNeighbours) {
+TEST(TetrahedralMesh, TetrahedraWithoutVolumeAreWoundAsTheirNeighbours) {
   Random random(2);
   for (int run = 0; run < 40; ++run) {
     Solid solid = cells(3, random);
     const Surface whole = surfaceOf(solid);
-    // Flat ones on its surface: each covers two triangles of a square by the other two, the next
-    // the same back again.
+    // Flat tetrahedra on its surface: each covers two triangles of a square with the other two. The
+    // next one covers them back again.
     std::map<Segment, std::vector<Triangle>> byEdge;
     for (const Triangle& t : whole.triangles)
       for (int i = 0; i < 3; ++i) {
@@ -132,7 +132,8 @@ TEST(TetrahedralMesh, WithoutVolumeAreWoundAsTheirNeighbours) {
     EXPECT_EQ(surface.triangles.size(), whole.triangles.size());
     EXPECT_TRUE(findMeshDefects(surface.triangles).closed());
   }
-  // All flat: the first as given, the others by it, so that the surface has no flipped edges.
+  // All are flat. The first keeps its winding, and the others follow it, so that the surface has no
+  // flipped edges.
   Solid plate = cells(2, random);
   for (Vector3d& p : plate.positions) p[2] = 0;
   EXPECT_TRUE(findMeshDefects(surfaceOf(plate).triangles).closed());
@@ -141,9 +142,10 @@ TEST(TetrahedralMesh, WithoutVolumeAreWoundAsTheirNeighbours) {
   EXPECT_EQ(surfaceOf({}).triangles.size(), 0u);
 }
 
-/// Contacts of a pair over three frames, of which the solid's body is deformed, moved and cut.
-std::vector<Rows> life(const Settings& settings, const Solid& solid, const Solid& cut,
-                       bool asTriangles, const Thing& other, const PairSettings& pair) {
+/// Contacts of a pair over three frames, in which the solid is deformed, moved and cut.
+std::vector<Rows> contactsOver(const Settings& settings, const Solid& solid, const Solid& cut,
+                               bool asTriangles, const TestGeometry& other,
+                               const PairSettings& pair) {
   Random random(3);
   OctreeBasedCD detection(settings);
   const Surface before = surfaceOf(solid), after = surfaceOf(cut);
@@ -172,33 +174,33 @@ std::vector<Rows> life(const Settings& settings, const Solid& solid, const Solid
   return rows;
 }
 
-TEST(TetrahedralMesh, CollidesAsItsSurfaceWithEveryKindByEveryMethod) {
+TEST(TetrahedralMesh, CollidesAsItsSurfaceWithEveryGeometryTypeByEveryMethod) {
   Random random(4);
   Solid solid = cells(3, random), cut = solid;
   for (Vector3d& p : solid.positions) p = p / 3 + randomPoint(random, -0.02, 0.02);
   for (Vector3d& p : cut.positions) p /= 3;
   std::erase_if(cut.tetrahedra, [&](const Tetrahedron&) { return random() % 5 == 0; });
-  const Thing kinds[] = {things(sphere(8, 12, {0.9, 0.5, 0.5}, 0.4)),
-                         thread(random, 60, 0.3, 0.01, false), particles(random, 100, 0.02)};
+  const TestGeometry kinds[] = {testGeometry(sphere(8, 12, {0.9, 0.5, 0.5}, 0.4)),
+                                thread(random, 60, 0.3, 0.01, false), particles(random, 100, 0.02)};
   Settings audited = settingsOf(Engine::Octree, 2);
   audited.audit.features = 20;
   std::size_t contacts = 0;
-  for (const Thing& thing : kinds) {
+  for (const TestGeometry& geometry : kinds) {
     std::vector<PairSettings> settings = settingsFor(0.02);
-    if (thing.type == GeometryType::Triangles) {
+    if (geometry.type == GeometryType::Triangles) {
       settings.push_back({Method::Intersection, 0.0});
       settings.push_back({Method::Auto, 0.02});
     }
     for (const PairSettings& pair : settings) {
-      const auto rows = life(audited, solid, cut, false, thing, pair);
-      expectSame(rows, life(audited, solid, cut, true, thing, pair));
+      const auto rows = contactsOver(audited, solid, cut, false, geometry, pair);
+      expectSame(rows, contactsOver(audited, solid, cut, true, geometry, pair));
       for (const Rows& r : rows) contacts += r.contacts();
     }
   }
   EXPECT_GT(contacts, 1000u);
 }
 
-TEST(TetrahedralMesh, MeetsShapesAndItself) {
+TEST(TetrahedralMesh, CollidesWithShapesAndItself) {
   Random random(5);
   Solid solid = cells(3, random);
   for (Vector3d& p : solid.positions) p += randomPoint(random, -0.1, 0.1);
@@ -240,7 +242,7 @@ void expectRefused(ErrorCode code, std::optional<std::size_t> element, const std
   }
 }
 
-TEST(TetrahedralMesh, BadInputIsRefusedByName) {
+TEST(TetrahedralMesh, BadInputThrowsErrorsThatNameIt) {
   const Positions some{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}, {2, 1, 1}};
   using Tetrahedra = std::vector<Tetrahedron>;
   OctreeBasedCD detection(settingsOf(Engine::Octree));
@@ -259,13 +261,13 @@ TEST(TetrahedralMesh, BadInputIsRefusedByName) {
                   [&] {
                     give(some, {{0, 1, 2, 3}, {1, 2, 3, 6}});
                   });
-    expectRefused(ErrorCode::IndexOutOfRange, 0, name + ", tetrahedron 0: has vertex 3 twice", [&] {
+    expectRefused(ErrorCode::IndexOutOfRange, 0, name + ", tetrahedron 0 has vertex 3 twice", [&] {
       give(some, {{3, 1, 2, 3}});
     });
     expectRefused(ErrorCode::SharedFace, 3,
                   name +
-                      ", tetrahedron 3: its face of vertices 0, 1 and 2 is one of tetrahedra 0 "
-                      "and 1 already",
+                      ", tetrahedron 3: its face with vertices 0, 1 and 2 already belongs to "
+                      "tetrahedra 0 and 1",
                   [&] {
                     give(some, {{0, 1, 2, 3}, {4, 2, 1, 0}, {1, 2, 3, 5}, {5, 0, 1, 2}});
                   });
@@ -283,22 +285,22 @@ TEST(TetrahedralMesh, BadInputIsRefusedByName) {
                 "geometry 0 is a triangle mesh; setTetrahedra() is for tetrahedral meshes",
                 [&] { detection.setTetrahedra(mesh, some, {}); });
   expectRefused(ErrorCode::UnsupportedMethod, {},
-                "geometry 0 is a triangle mesh; surface() is of tetrahedral meshes",
+                "geometry 0 is a triangle mesh; surface() is for tetrahedral meshes",
                 [&] { detection.surface(mesh); });
   expectRefused(ErrorCode::WrongPositionCount, {},
                 "geometry 1: 5 positions given, but it has 6 vertices; setTetrahedra() changes "
                 "their number",
                 [&] { detection.setPositions(solid, Positions(5, Vector3d::Zero())); });
   EXPECT_EQ(detection.surface(solid).triangles.size(), 4u);
-  EXPECT_EQ(detection.addPointSet(some), GeometryId{2});  // nothing refused took an id
+  EXPECT_EQ(detection.addPointSet(some), GeometryId{2});  // refused calls used no id
 }
 
-TEST(TetrahedralMesh, CapturesHoldIt) {
+TEST(TetrahedralMesh, CapturesIncludeIt) {
   Random random(6);
   Solid solid = cells(3, random);
   OctreeBasedCD detection(settingsOf(Engine::Octree));
   const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
-                   other = things(sphere(8, 12, {3, 1.5, 1.5}, 1)).addTo(detection);
+                   other = testGeometry(sphere(8, 12, {3, 1.5, 1.5}, 1)).addTo(detection);
   detection.addCollisionPair(body, other, {Method::Proximity, 0.2});
   detection.setPositions(body, moved(random, solid.positions, 1.5));  // many inverted
   detection.detectCollision();

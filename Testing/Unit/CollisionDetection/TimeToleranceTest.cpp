@@ -57,8 +57,9 @@ std::vector<std::array<std::uint32_t, 4>> idsOf(const CollisionData& data) {
   return ids;
 }
 
-/// Whatever the tolerance, the same features touch; times are early by at most as much, not late.
-TEST(TimeTolerance, BoundsHowEarlyAndNothingElse) {
+/// With any tolerance, the same features touch. Times are early by at most the tolerance, and not
+/// late.
+TEST(TimeTolerance, BoundsHowEarlyTimesAreAndChangesNothingElse) {
   Random random(5);
   const Moving a = movingSoup(random), b = movingSoup(random);
   const auto truth = idsOf(runOf(testing::settingsOf(Engine::BruteForce),
@@ -90,9 +91,9 @@ TEST(TimeTolerance, BoundsHowEarlyAndNothingElse) {
   }
 }
 
-/// With a thickness: what comes within it is reported, and nothing that stays further away than it
-/// and the tolerance's part of the motion.
-TEST(TimeTolerance, WithThicknessBoundsTimeAndDistance) {
+/// With a thickness: features that come within it are reported. Features that stay farther apart
+/// than the thickness and the tolerance times the motion are not.
+TEST(TimeTolerance, BoundsTimeAndDistanceWithAThickness) {
   Random random(7);
   const Moving a = movingSoup(random), b = movingSoup(random);
   const auto idsAt = [&](double tolerance, double thickness) {
@@ -116,7 +117,7 @@ TEST(TimeTolerance, WithThicknessBoundsTimeAndDistance) {
   EXPECT_TRUE(std::includes(wider.begin(), wider.end(), coarse.begin(), coarse.end()));
 }
 
-/// Auto misses nothing that Continuous finds, whatever it may report early.
+/// Auto finds everything that Continuous finds. It may report more, earlier.
 TEST(TimeTolerance, AutoFindsWhatContinuousFinds) {
   Random random(6);
   const Moving a = movingSoup(random), b = movingSoup(random);
@@ -128,9 +129,9 @@ TEST(TimeTolerance, AutoFindsWhatContinuousFinds) {
   }
 }
 
-/// A thousand impacts at a fiftieth of the step, and one at a hundredth: boxes of features sweep
-/// the step's first part once that is short, and not a part of the part.
-TEST(Earliest, IsTheOneEarlierThanTheRest) {
+/// A thousand impacts at a fiftieth of the step, and one at a hundredth. Once the remaining time is
+/// short, boxes of features sweep the first part of the step only.
+TEST(EarliestTime, IsFoundAmongManyLaterImpacts) {
   testing::Mesh mesh;
   Positions now;
   const auto add = [&](const Eigen::Vector3d& at, double height, double fall) {
@@ -163,9 +164,9 @@ TEST(Earliest, IsTheOneEarlierThanTheRest) {
   }
 }
 
-/// Of many triangles, whatever was known when, the time is that of all contacts, and the octrees
-/// are of the whole step.
-TEST(Earliest, OfManyTrianglesIsThatOfAllContacts) {
+/// With many triangles, the time is that of all contacts, in any order of the search. The octrees
+/// sweep the whole step.
+TEST(EarliestTime, MatchesAllContactsOfManyTriangles) {
   Random random(9);
   testing::Mesh a = testing::soup(random, 4500, 0.02), b = testing::soup(random, 4500, 0.02);
   for (const double speed : {1e-3, 1e-2, 0.1}) {
@@ -211,8 +212,8 @@ TEST(Earliest, OfManyTrianglesIsThatOfAllContacts) {
   }
 }
 
-/// A shape's octree is empty, and its pair is left as it is.
-TEST(Earliest, OfAShapeBesideOtherPairs) {
+/// A shape's octree is empty. Its pair is unchanged.
+TEST(EarliestTime, MatchesAllContactsOfAShapeBesideOtherPairs) {
   Random random(12);
   const testing::Mesh a = testing::soup(random, 9000, 0.02), b = testing::soup(random, 9000, 0.02);
   Positions now = a.positions;
@@ -238,8 +239,8 @@ TEST(Earliest, OfAShapeBesideOtherPairs) {
   EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
 }
 
-/// A predicate that throws after boxes sweep less: the next frame sees the whole step.
-TEST(Earliest, AThrowLeavesTheOctreesWhole) {
+/// A predicate that throws after boxes sweep less: the next frame has boxes of the whole step.
+TEST(EarliestTime, PredicateThatThrowsLeavesTheOctreesCorrect) {
   Random random(13);
   const testing::Mesh a = testing::soup(random, 9000, 0.02);
   Positions now = a.positions;
@@ -254,7 +255,7 @@ TEST(Earliest, AThrowLeavesTheOctreesWhole) {
   });
   const auto frame = [&] {
     detection.setPositions(id, a.positions, now);
-    detection.setPairSettings(id, id, detection.pairs().front().settings);  // not answered yet
+    detection.setPairSettings(id, id, detection.pairs().front().settings);  // no contacts yet
     calls = 0;
     detection.detectCollision();
     return detection.collisionData(id, id).earliestTimeOfImpact();

@@ -22,7 +22,7 @@
 #include <utility>
 #include <vector>
 
-// Executors of the caller's: what they do with tasks changes no result.
+// Executors of the caller. Their way to run tasks changes no result.
 
 namespace palpate {
 namespace {
@@ -52,7 +52,7 @@ void backwards(std::size_t count, Executor::Task task, void* context) {
   while (count-- > 0) task(context, count);
 }
 
-/// A thread for each task, none of them the caller's.
+/// One thread for each task, other than the caller's.
 void onThreads(std::size_t count, Executor::Task task, void* context) {
   std::vector<std::thread> threads;
   for (std::size_t i = 0; i < count; ++i) threads.emplace_back([=] { task(context, i); });
@@ -149,7 +149,7 @@ TEST(Executor, IsSharedByObjectsInSeveralThreads) {
   }
 }
 
-TEST(Executor, CountIsItsConcurrencyOrLess) {
+TEST(Executor, ThreadCountIsAtMostItsConcurrency) {
   EXPECT_EQ(Threads(0, executorOf(5, backwards)).count(), 5);
   EXPECT_EQ(Threads(3, executorOf(5, backwards)).count(), 3);
   EXPECT_EQ(Threads(9, executorOf(5, backwards)).count(), 5);
@@ -158,7 +158,7 @@ TEST(Executor, CountIsItsConcurrencyOrLess) {
   EXPECT_GE(makeThreadPool()->concurrency(), 1);
 }
 
-TEST(Executor, NoMoreThreadsThanAskedFor) {
+TEST(Executor, NoMoreThreadsThanRequested) {
   for (const std::shared_ptr<Executor>& executor :
        {makeThreadPool(8), std::shared_ptr<Executor>(executorOf(8, onThreads))}) {
     const Threads threads(2, executor);
@@ -185,7 +185,7 @@ TEST(Executor, NestedLoopsAreComplete) {
   }
 }
 
-TEST(Executor, TheExceptionOfTheLowestIndexIsRethrown) {
+TEST(Executor, ExceptionOfTheLowestIndexIsRethrown) {
   for (const auto& [name, executor] : executors()) {
     for (const int count : {0, 2}) {
       const Threads threads(count, executor);
@@ -217,13 +217,13 @@ TEST(Executor, WithoutConcurrencyIsRefused) {
   for (const int threads : {-1, 1025}) EXPECT_THROW(makeThreadPool(threads), Error) << threads;
 }
 
-/// Tasks that a faulty executor has put off.
+/// Tasks that a faulty executor has postponed.
 struct Later {
   Executor::Task task;
   void* context;
 };
 
-TEST(Executor, ReturningEarlyIsAnErrorAndTasksThatComeLaterDoNothing) {
+TEST(Executor, ReturningEarlyIsAnErrorAndLaterTasksDoNothing) {
   std::vector<Later> later;
   bool faulty = true;
   const auto executor = executorOf(3, [&](std::size_t count, Executor::Task task, void* context) {
@@ -252,7 +252,7 @@ TEST(Executor, ReturningEarlyIsAnErrorAndTasksThatComeLaterDoNothing) {
     faulty = false;
     EXPECT_TRUE(allRun(threads));
     EXPECT_EQ(runs, 0);
-    // The last two come in the end, so that the memory of all loops is given back.
+    // The last two tasks run in the end, so that the memory of all loops is returned.
     for (std::size_t i = 7; i < later.size(); ++i) later[i].task(later[i].context, 0);
   }
 }
@@ -276,14 +276,14 @@ TEST(Executor, ReturningWhileTasksRunWaitsForThem) {
     } catch (const Error&) {
       complete = false;
     }
-    // No task is at work any more: reading is no race, and where there was no error all have run.
+    // No task runs any more: reading is no race, and without an error all have run.
     for (const int n : runs) EXPECT_TRUE(n == 1 || (n == 0 && !complete));
     for (std::thread& thread : running) thread.join();
     running.clear();
   }
 }
 
-TEST(Executor, ItsExceptionPassesOnAfterTheTasksThatHadBegun) {
+TEST(Executor, ItsExceptionIsRethrownAfterStartedTasksEnd) {
   std::thread running;
   bool faulty = true;
   const auto executor = executorOf(2, [&](std::size_t count, Executor::Task task, void* context) {
@@ -311,7 +311,7 @@ TEST(Executor, ItsExceptionPassesOnAfterTheTasksThatHadBegun) {
   EXPECT_TRUE(allRun(*threads));
 }
 
-TEST(Executor, IsNoPartOfAProblem) {
+TEST(Executor, IsNotPartOfACollisionProblem) {
   OctreeBasedCD detection(sharing(executorOf(2, backwards)));
   EXPECT_TRUE(detection.settings().executor);
   const CollisionProblem problem = detection.problem();
@@ -319,7 +319,7 @@ TEST(Executor, IsNoPartOfAProblem) {
   EXPECT_FALSE(setUp(problem).settings().executor);
 }
 
-TEST(Executor, ThePoolRunsTasksOfTheProgram) {
+TEST(Executor, PoolRunsTasksOfTheProgram) {
   const std::shared_ptr<Executor> pool = makeThreadPool(3);
   std::vector<int> runs(100, 0);
   pool->run(

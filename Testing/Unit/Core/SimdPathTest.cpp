@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-TEST(SimdPath, EachGivesTheSameCandidates) {
+TEST(SimdPath, EveryPathGivesTheSameCandidates) {
   testing::Random random(1);
   const testing::Mesh a = testing::soup(random, 3000, 0.02), b = testing::sheet(40, 0.5, 0.3);
   std::vector<ElementPair> first, self;

@@ -22,7 +22,7 @@
 #include <time.h>
 #include <vector>
 
-// What threads do when the system refuses them, in the child of a fork(), and under real-time
+// Behaviour of threads if the system refuses them, in the child of a fork(), and under real-time
 // scheduling.
 
 namespace palpate {
@@ -71,7 +71,7 @@ bool allRun(const Threads& threads, std::size_t size = 1000) {
 
 // --- The system refuses threads
 
-/// At most so much more address space than now.
+/// Limits the address space to this much more than now.
 void limitAddressSpace(std::size_t bytes) {
   std::size_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
@@ -83,12 +83,12 @@ void limitAddressSpace(std::size_t bytes) {
 constexpr int kAsked = 1024;
 #ifdef PALPATE_THREADS_TBB
 constexpr bool kStartsAsMany =
-    false;  // oneTBB starts no more than there are cores, and says nothing
+    false;  // oneTBB starts at most as many threads as there are cores, without a message
 #else
 constexpr bool kStartsAsMany = true;
 #endif
 
-TEST(ThreadFailures, WithTooLittleMemoryForThreadsFewerDoTheWork) {
+TEST(ThreadFailures, FewerThreadsDoTheWorkIfMemoryIsShort) {
   if (testing::kSanitized) GTEST_SKIP() << "sanitizers reserve address space of their own";
   for (const std::size_t bytes : {std::size_t{16} << 20, std::size_t{200} << 20})
     EXPECT_EQ(inChild([&] {
@@ -99,7 +99,7 @@ TEST(ThreadFailures, WithTooLittleMemoryForThreadsFewerDoTheWork) {
               "passed");
 }
 
-TEST(ThreadFailures, AFrameWithTooLittleMemoryForThreadsIsRight) {
+TEST(ThreadFailures, FrameIsCorrectIfMemoryForThreadsIsShort) {
   if (testing::kSanitized) GTEST_SKIP() << "sanitizers reserve address space of their own";
   const std::uint64_t truth = serialHash();
   EXPECT_EQ(inChild([&] {
@@ -117,7 +117,7 @@ void pauseFor(int repeat) {
   if (repeat % 4 != 0) std::this_thread::sleep_for(std::chrono::microseconds(5 * repeat));
 }
 
-TEST(ThreadFailures, AnObjectIsDestroyedInTheChildOfAFork) {
+TEST(ThreadFailures, ObjectCanBeDestroyedInTheChildOfAFork) {
   if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
   for (int repeat = 0; repeat < 50; ++repeat) {
     auto scene = std::make_unique<Scene>(Settings{.threads = 9});
@@ -132,7 +132,7 @@ TEST(ThreadFailures, AnObjectIsDestroyedInTheChildOfAFork) {
   }
 }
 
-TEST(ThreadFailures, AFrameInTheChildOfAForkIsRight) {
+TEST(ThreadFailures, FrameInTheChildOfAForkIsCorrect) {
   if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
   const std::uint64_t truth = serialHash();
   Scene scene({.threads = 3});
@@ -145,7 +145,7 @@ TEST(ThreadFailures, AFrameInTheChildOfAForkIsRight) {
   EXPECT_EQ(scene.hash(), truth);
 }
 
-TEST(ThreadFailures, AnObjectMadeInTheChildOfAForkHasThreads) {
+TEST(ThreadFailures, ObjectMadeInTheChildOfAForkHasThreads) {
   if (testing::kSanitized) GTEST_SKIP() << "sanitizers do not start threads after a fork()";
   const Threads before(3);
   ASSERT_TRUE(allRun(before));
@@ -153,7 +153,7 @@ TEST(ThreadFailures, AnObjectMadeInTheChildOfAForkHasThreads) {
               const Threads threads(3);
               if (!kStartsAsMany) return allRun(threads);  // oneTBB has no threads in the child
               std::atomic<int> met{0};
-              // Only returns where two threads are at work.
+              // This returns only if two threads run.
               threads.forEach(2, [&](std::size_t) {
                 ++met;
                 while (met < 2) std::this_thread::yield();
@@ -163,7 +163,7 @@ TEST(ThreadFailures, AnObjectMadeInTheChildOfAForkHasThreads) {
             "passed");
 }
 
-TEST(ThreadFailures, AForkWhileAnotherThreadUsesThePoolIsSafe) {
+TEST(ThreadFailures, ForkWhileAnotherThreadUsesThePoolIsSafe) {
   if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
   const std::shared_ptr<Executor> pool = makeThreadPool(3);
   std::atomic<bool> over{false};
@@ -184,7 +184,7 @@ TEST(ThreadFailures, AForkWhileAnotherThreadUsesThePoolIsSafe) {
 }
 
 #ifndef PALPATE_THREADS_TBB
-TEST(ThreadFailures, AForkInATaskThatOthersShareIsAnErrorInTheChild) {
+TEST(ThreadFailures, ForkInASharedTaskIsAnErrorInTheChild) {
   if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
   const Threads threads(2);
   std::atomic<bool> forked{false}, parent{true};
@@ -236,8 +236,9 @@ void work(std::chrono::nanoseconds time) {
 }
 
 /// A worker that the real-time caller has preempted holds the last index of a loop. On one core it
-/// goes on only once the caller blocks, or in what the kernel saves for others (a twentieth).
-TEST(ThreadFailures, ARealTimeCallerOnTheCoreOfItsWorkerDoesNotSpinForever) {
+/// goes on only if the caller blocks, or in the share that the kernel reserves for others (a
+/// twentieth).
+TEST(ThreadFailures, RealTimeCallerOnTheCoreOfItsWorkerDoesNotSpinForever) {
 #ifdef PALPATE_THREADS_TBB
   GTEST_SKIP() << "oneTBB's own rules hold";
 #endif
@@ -258,7 +259,7 @@ TEST(ThreadFailures, ARealTimeCallerOnTheCoreOfItsWorkerDoesNotSpinForever) {
           begun = true;
           work(std::chrono::milliseconds(2));
         } else {
-          // Gives the core to the worker until it has begun; is real-time again then.
+          // Gives the core to the worker until it has begun, then is real-time again.
           while (!begun) std::this_thread::sleep_for(std::chrono::microseconds(50));
         }
       });
@@ -269,8 +270,8 @@ TEST(ThreadFailures, ARealTimeCallerOnTheCoreOfItsWorkerDoesNotSpinForever) {
   EXPECT_EQ(outcome, "passed");
 }
 
-/// Many short loops, in which either may hold the pool's lock when the other one preempts it.
-TEST(ThreadFailures, ARealTimeCallerOnTheCoreOfItsWorkersRunsManyLoops) {
+/// Many short loops. Either thread may hold the pool's lock when the other one preempts it.
+TEST(ThreadFailures, RealTimeCallerOnTheCoreOfItsWorkersRunsManyLoops) {
   const std::string outcome = inChild(
       [] {
         cpu_set_t cores;

@@ -20,7 +20,7 @@ namespace {
 
 const std::vector<int> kCounts{1, 2, 3, 8};
 
-TEST(Threads, CountIsAsAskedAndNeverZero) {
+TEST(Threads, CountIsAsRequestedAndNeverZero) {
   for (int count : kCounts) EXPECT_EQ(Threads(count).count(), count);
   EXPECT_GE(Threads(0).count(), 1);
 }
@@ -44,7 +44,7 @@ TEST(Threads, ChunksDependOnSizeAndGrainOnly) {
   }
 }
 
-TEST(Threads, EachIndexRunsOnceAndItsWritesAreSeen) {
+TEST(Threads, EachIndexRunsOnceAndItsWritesAreVisible) {
   for (int count : kCounts) {
     const Threads threads(count);
     std::vector<int> runs(10'000, 0);
@@ -53,7 +53,7 @@ TEST(Threads, EachIndexRunsOnceAndItsWritesAreSeen) {
   }
 }
 
-TEST(Threads, ManySmallRunsOnOnePool) {
+TEST(Threads, OnePoolRunsManySmallLoops) {
   for (int count : kCounts) {
     const Threads threads(count);
     std::uint64_t sum = 0;
@@ -69,7 +69,7 @@ TEST(Threads, ManySmallRunsOnOnePool) {
   }
 }
 
-TEST(Threads, AnExceptionIsRethrownAndThePoolStaysUsable) {
+TEST(Threads, ExceptionIsRethrownAndThePoolStaysUsable) {
   for (int count : kCounts) {
     const Threads threads(count);
     for (int run = 0; run < 50; ++run) {
@@ -85,7 +85,7 @@ TEST(Threads, AnExceptionIsRethrownAndThePoolStaysUsable) {
   }
 }
 
-TEST(Threads, NestedRunsAreComplete) {
+TEST(Threads, NestedLoopsAreComplete) {
   for (int count : kCounts) {
     const Threads threads(count);
     for (int run = 0; run < 20; ++run) {
@@ -98,7 +98,7 @@ TEST(Threads, NestedRunsAreComplete) {
   }
 }
 
-TEST(Threads, RunsOfSeveralCallersAtOnceAreComplete) {
+TEST(Threads, LoopsOfConcurrentCallersAreComplete) {
   const Threads threads(3);
   std::vector<std::vector<int>> runs(4, std::vector<int>(500, 0));
   std::vector<std::thread> callers;
@@ -111,7 +111,7 @@ TEST(Threads, RunsOfSeveralCallersAtOnceAreComplete) {
   for (const auto& own : runs) EXPECT_EQ(own, std::vector<int>(500, 100));
 }
 
-TEST(Threads, ANestedExceptionIsRethrown) {
+TEST(Threads, NestedExceptionIsRethrown) {
   for (int count : kCounts) {
     const Threads threads(count);
     EXPECT_THROW(threads.forEach(4,
@@ -124,7 +124,7 @@ TEST(Threads, ANestedExceptionIsRethrown) {
   }
 }
 
-TEST(Threads, OfSeveralExceptionsTheLowestIndexIsRethrown) {
+TEST(Threads, ExceptionOfTheLowestIndexIsRethrown) {
   for (int count : kCounts) {
     const Threads threads(count);
     for (int run = 0; run < 100; ++run) {
@@ -166,7 +166,7 @@ TEST(Threads, NestedLoopsWithExceptionsLeaveThePoolUsable) {
   }
 }
 
-TEST(Threads, APoolIsDestroyedRightAfterAnException) {
+TEST(Threads, PoolMayBeDestroyedRightAfterAnException) {
   for (int count : kCounts)
     for (int run = 0; run < 50; ++run) {
       const Threads threads(count);
@@ -190,8 +190,8 @@ TEST(Threads, DeeplyNestedLoopsAreComplete) {
   }
 }
 
-/// Waiting is in vain first: the caller blocks, and must wake up to help with a newer loop.
-TEST(Threads, WhoWaitsForAnIndexHelpsWithTheLoopThatItRuns) {
+/// Its wait is in vain first: the caller blocks, and must wake up to help with a later loop.
+TEST(Threads, WaitingCallerHelpsWithALaterLoop) {
   const Threads threads(2);
   for (int run = 0; run < 5; ++run) {
     std::atomic<bool> begun{false};
@@ -203,7 +203,7 @@ TEST(Threads, WhoWaitsForAnIndexHelpsWithTheLoopThatItRuns) {
       }
       begun = true;
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
-      // Only returns where two threads are at work.
+      // This returns only if two threads run.
       threads.forEach(2, [&](std::size_t) {
         ++met;
         while (met < 2) std::this_thread::yield();

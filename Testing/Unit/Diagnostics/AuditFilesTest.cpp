@@ -11,7 +11,8 @@
 #include <string>
 #include <unistd.h>
 
-// Whole frames with a fault in them: what the audit says, and the files it keeps.
+// Whole frames with a planted fault: the failures that the audit lists, and the files that it
+// writes.
 
 namespace palpate {
 namespace {
@@ -19,8 +20,8 @@ namespace {
 namespace fs = std::filesystem;
 using testing::Mesh;
 
-/// Writes over triangle ids in the octree's memory, as a bug would: from then on the first of
-/// each node's triangles is taken for another.
+/// Overwrites triangle ids in the octree's memory, as a bug could: from then on, the first triangle
+/// of each node counts as another one.
 void corrupt(const OctreeBasedCD& detection, GeometryId geometry) {
   const LooseOctree& octree = detection.octree();
   for (const LooseOctree::NodeId id : octree.nodes(geometry)) {
@@ -54,7 +55,7 @@ class AuditFiles : public ::testing::Test {
     return detection;
   }
   AuditSettings everything() const { return {.features = 1 << 20, .folder = m_folder}; }
-  /// A frame of which the second mesh's octree is not true.
+  /// A frame in which the octree of the second mesh is wrong.
   void faultyFrame(OctreeBasedCD& detection) {
     m_meshes[1].positions[0].z() += 0.001;
     detection.setPositions(m_b, m_meshes[1].positions);
@@ -69,7 +70,7 @@ class AuditFiles : public ::testing::Test {
   }
 };
 
-TEST_F(AuditFiles, AFaultInAFrameIsListedAndKeptInAFileThatReplaysIt) {
+TEST_F(AuditFiles, FaultIsListedAndWrittenToAFileThatReplaysIt) {
   OctreeBasedCD faulty = detection(everything());
   faulty.detectCollision();
   EXPECT_TRUE(faulty.auditFailures().empty());
@@ -93,7 +94,7 @@ TEST_F(AuditFiles, AFaultInAFrameIsListedAndKeptInAFileThatReplaysIt) {
   EXPECT_EQ(lists.size(), 3u);
   EXPECT_EQ(fileCount(), 1u);
 
-  // Without the fault, the file's problem has exactly what was missing.
+  // Without the fault, the file's problem has exactly the missing contacts.
   const CollisionProblem problem = readCapture(file);
   ASSERT_EQ(problem.pairs.size(), 1u);
   OctreeBasedCD replay = setUp(problem);
@@ -105,13 +106,13 @@ TEST_F(AuditFiles, AFaultInAFrameIsListedAndKeptInAFileThatReplaysIt) {
     EXPECT_NE(std::find(expected.begin(), expected.end(), *contact), expected.end());
   }
 
-  // Made anew the octree is good again.
+  // A rebuild repairs the octree.
   faulty.setTriangles(m_b, m_meshes[1].positions, m_meshes[1].triangles);
   faulty.detectCollision();
   EXPECT_TRUE(faulty.auditFailures().empty());
 }
 
-TEST_F(AuditFiles, FilesThatAreThereStay) {
+TEST_F(AuditFiles, ExistingFilesAreKept) {
   const fs::path first = m_folder / "frame1-pair0-1.capture",
                  second = m_folder / "frame1-pair0-1-2.capture";
   std::ofstream(first) << "precious";
@@ -123,7 +124,7 @@ TEST_F(AuditFiles, FilesThatAreThereStay) {
   EXPECT_NO_THROW(readCapture(second));
 }
 
-TEST_F(AuditFiles, WithoutAFolderThereAreNone) {
+TEST_F(AuditFiles, WithoutAFolderNoFileIsWritten) {
   OctreeBasedCD faulty = detection({.features = 1 << 20});
   faultyFrame(faulty);
   ASSERT_FALSE(faulty.auditFailures().empty());
@@ -133,7 +134,7 @@ TEST_F(AuditFiles, WithoutAFolderThereAreNone) {
   }
 }
 
-TEST_F(AuditFiles, NoMoreThanAskedForAndAFolderThatIsGoneIsSaidByName) {
+TEST_F(AuditFiles, AtMostMaxFilesAreWrittenAndARemovedFolderIsNamed) {
   AuditSettings settings = everything();
   settings.maxFiles = 2;
   OctreeBasedCD faulty = detection(settings);
@@ -157,7 +158,7 @@ TEST_F(AuditFiles, NoMoreThanAskedForAndAFolderThatIsGoneIsSaidByName) {
   }
 }
 
-TEST_F(AuditFiles, AFolderThatIsNotThereIsRefusedByName) {
+TEST_F(AuditFiles, MissingFolderThrowsAnErrorThatNamesIt) {
   for (const fs::path& folder : {m_folder / "missing", fs::path("/dev/null")}) {
     try {
       detection({.features = 1, .folder = folder});

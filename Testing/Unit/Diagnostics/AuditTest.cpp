@@ -33,7 +33,8 @@ TriangleMesh movingMesh(Random& random, const Mesh& mesh) {
   return {MeshTopology(mesh.positions.size(), mesh.triangles), now, mesh.positions};
 }
 
-/// Two meshes in contact, what is found, and the internal way to audit other data than that.
+/// Two meshes in contact, their contacts, and the internal function that audits other contacts than
+/// these.
 struct Scene {
   Mesh first, second;
   TriangleMesh a, b;
@@ -94,16 +95,16 @@ void expectOne(const std::vector<AuditFailure>& failures, const Scene& scene, Fa
   EXPECT_TRUE(failures[0].found == found);
 }
 
-/// Values that no frame would give.
+/// Values that no frame gives.
 void falsify(VertexTriangleContact& c) { c.distance = std::nextafter(c.distance, 2.0); }
 void falsify(EdgeEdgeContact& c) { c.normal = -c.normal; }
-/// Ids that no frame would give: the last of those there are.
+/// Ids that no frame gives: the last ones.
 void rename(VertexTriangleContact& c) { c.vertex = c.triangle = 29; }
 void rename(EdgeEdgeContact& c) { c.edgeA = {0, 1}, c.edgeB = {88, 89}; }
 void rename(ElementPair& pair) { pair = {28, 29}; }
 
-/// Takes each contact of a list out in turn, or changes it, or puts another one beside it: it must
-/// be the one failure.
+/// Removes each contact of a list in turn, or changes it, or adds another one beside it. It must be
+/// the only failure.
 template <class Contact>
 void expectEachFault(const Scene& scene, List list,
                      std::vector<Contact> CollisionData::Contents::*member) {
@@ -133,7 +134,7 @@ void expectEachFault(const Scene& scene, List list,
   }
 }
 
-TEST(Audit, FiresForTwoShapes) {
+TEST(Audit, FindsFaultsBetweenTwoShapes) {
   const TriangleMesh none;
   const PlacedShape a(Box{{0, 0, 0}, {1, 1, 1}}), b(Box{{0, 0, 2.5}, {1, 1, 1}});
   const PairSettings settings{.method = Method::Proximity, .thickness = 1};
@@ -167,7 +168,7 @@ TEST(Audit, FiresForTwoShapes) {
   expectFault(faulty, Fault::FalsePositive);
 }
 
-TEST(Audit, FiresForEachContactTakenOutAddedOrChanged) {
+TEST(Audit, FindsEachRemovedAddedOrChangedContact) {
   std::size_t contacts = 0;
   forEachScene([&](const Scene& scene) {
     EXPECT_TRUE(scene.failures(scene.found()).empty());
@@ -183,7 +184,7 @@ TEST(Audit, FiresForEachContactTakenOutAddedOrChanged) {
   EXPECT_GT(contacts, 50u);
 }
 
-TEST(Audit, FiresForAnImpactBeforeTheEarliest) {
+TEST(Audit, FindsAnImpactBeforeTheEarliest) {
   Random random(4);
   const Scene scene(
       random, {.method = Method::Continuous, .thickness = 0.001, .earliestTimeOnly = true}, false);
@@ -207,7 +208,7 @@ TEST(Audit, FiresForAnImpactBeforeTheEarliest) {
   }
 }
 
-TEST(Audit, SmallSamplesFindAFaultInTime) {
+TEST(Audit, SmallSamplesFindAFaultWithinSomeFrames) {
   forEachScene([&](const Scene& scene) {
     CollisionData::Contents faulty = scene.found();
     faulty.edgeEdge.pop_back();
@@ -227,7 +228,7 @@ std::vector<std::size_t> sizesOf(const FeatureLists& lists) {
           lists.trianglesOfA.size()};
 }
 
-TEST(Audit, DrawsFeaturesEvenlyBySeedFrameAndPair) {
+TEST(Audit, DrawsFeaturesUniformlyBySeedFrameAndPair) {
   forEachScene([&](const Scene& scene) {
     const FeatureLists every = everyFeature(scene.meshes());
     std::size_t all = 0;
@@ -257,7 +258,8 @@ TEST(Audit, DrawsFeaturesEvenlyBySeedFrameAndPair) {
                   listsOf(drawFeatures(scene.meshes(), scene.pair, settings, frame)));
       }
     }
-    // Half of all in each of 50 frames: 25 times each on average; 8 is more than 4 sigma away.
+    // A sample is half of all, in each of 50 frames: 25 times each on average. 8 is more than 4
+    // sigma away.
     for (std::size_t list = 0; list < 4; ++list)
       for (const std::uint32_t id : allLists[list]) EXPECT_GT(times[list].count(id), 7u);
 
@@ -272,7 +274,7 @@ TEST(Audit, DrawsFeaturesEvenlyBySeedFrameAndPair) {
   });
 }
 
-TEST(Audit, FindsNothingInGoodFrames) {
+TEST(Audit, FindsNoFaultInCorrectFrames) {
   Random random(5);
   for (const int features : {0, 1, 20, 1 << 20}) {
     OctreeBasedCD detection({.threads = 2, .audit = {.features = features, .seed = 1}});
@@ -303,8 +305,8 @@ TEST(Audit, RefusesANegativeSample) {
   }
 }
 
-/// Of Intersection what several pairs of triangles find may be of one that is in the sample, and
-/// others that are not.
+/// Several triangle pairs may find the same contact of Intersection. One of them is in the sample,
+/// and others are not.
 TEST(Audit, SamplesConnectedMeshes) {
   for (const PairSettings& settings : kPairSettings) {
     Settings audited{.threads = 1};

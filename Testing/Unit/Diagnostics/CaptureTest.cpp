@@ -42,7 +42,7 @@ class Capture : public ::testing::Test {
     std::ofstream(file(), std::ios::binary | std::ios::trunc) << text;
   }
 
-  /// The file is refused, by its name and with `reason`.
+  /// Expects that the file is refused with its name and `reason`.
   void expectRefused(const std::string& reason) const {
     try {
       readCapture(file());
@@ -136,7 +136,7 @@ TEST_F(Capture, ReplaysTheLastFrame) {
             detection.collisionData(a, a).hash());
 }
 
-TEST_F(Capture, KeepsThePairOfAnAuditsFailure) {
+TEST_F(Capture, KeepsThePairOfAnAuditFailure) {
   const OctreeBasedCD detection = movedScene();
   const GeometryId a{1}, b{2};
   const CollisionData& whole = detection.collisionData(b, a);
@@ -179,7 +179,7 @@ CollisionProblem smallProblem() {
   return problem;
 }
 
-TEST_F(Capture, IsExact) {
+TEST_F(Capture, KeepsEveryBit) {
   writeCapture(smallProblem(), file());
   const CollisionProblem read = readCapture(file());
   expectSame(read, smallProblem());
@@ -188,7 +188,7 @@ TEST_F(Capture, IsExact) {
   expectSame(readCapture(file()), CollisionProblem());
 }
 
-TEST_F(Capture, RefusesEveryFileCutOff) {
+TEST_F(Capture, RefusesTruncatedFiles) {
   writeCapture(smallProblem(), file());
   const std::string whole = textOf(file());
   ASSERT_TRUE(whole.ends_with("end\n"));
@@ -199,12 +199,12 @@ TEST_F(Capture, RefusesEveryFileCutOff) {
   write(whole.substr(0, whole.size() / 2));
   expectRefused("line ");
   write(whole.substr(0, whole.size() - 5));
-  expectRefused("it is cut off");
+  expectRefused("the file is truncated");
   write("");
   expectRefused("it is not a capture");
 }
 
-TEST_F(Capture, RefusesWhatIsWrongByName) {
+TEST_F(Capture, ErrorsNameTheFault) {
   expectRefused("cannot be read");
   fs::create_directory(file());
   expectRefused("cannot be read");
@@ -222,7 +222,7 @@ TEST_F(Capture, RefusesWhatIsWrongByName) {
   };
   expectRefusedWith("palpate-capture 9", "solid 3", "it is not a capture");
   expectRefusedWith("palpate-capture 9", "palpate-capture 10",
-                    "it is of version 10; versions up to 9");
+                    "its version is 10; versions up to 9");
   expectRefusedWith("palpate-capture 9", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
@@ -231,12 +231,12 @@ TEST_F(Capture, RefusesWhatIsWrongByName) {
   expectRefusedWith("0 1 2\n", "0 1\n", "");
   expectRefusedWith("pair 0 1 ", "pair 0 7 ", "geometry 7 was never added");
   expectRefusedWith("pair 1 1 ", "pair 1 0 ", "was added before");
-  expectRefusedWith("pair 1 1 ", "twin 1 1 ", "\"twin\" where \"pair\" should be");
-  expectRefusedWith("Proximity", "Guess", "\"Guess\" is not a name known here");
-  expectRefusedWith("geometry 5 3 1", "geometry 5 333333 1", "it is cut off");
+  expectRefusedWith("pair 1 1 ", "twin 1 1 ", "found \"twin\", expected \"pair\"");
+  expectRefusedWith("Proximity", "Guess", "\"Guess\" is not a known name");
+  expectRefusedWith("geometry 5 3 1", "geometry 5 333333 1", "the file is truncated");
   expectRefusedWith("geometry 5 3 1", "geometry 5 4 1", "");
   expectRefusedWith("Octree 0 32", "Octree 0 61", "octree.maxDepth is 61");
-  expectRefusedWith("end\n", "end\nend\n", "more follows after its end");
+  expectRefusedWith("end\n", "end\nend\n", "there is text after the end");
   write(whole);
   EXPECT_NO_THROW(readCapture(file()));
 }
@@ -273,7 +273,7 @@ TEST_F(Capture, ReadsEarlierVersions) {
   EXPECT_EQ(asVersion(2).pairs[0].settings.method, smallProblem().pairs[0].settings.method);
   replaceAll(" -1p+0\n", "\n");  // tolerance
   const CollisionProblem read = asVersion(1);
-  EXPECT_EQ(read.pairs[0].settings.method, Method::Proximity);  // for which Auto stood
+  EXPECT_EQ(read.pairs[0].settings.method, Method::Proximity);  // methods that Auto chose
   EXPECT_EQ(read.pairs[0].settings.motionTolerance, PairSettings().motionTolerance);
 }
 
@@ -292,11 +292,11 @@ TEST_F(Capture, RefusesNanAndInfinity) {
   }
 }
 
-TEST_F(Capture, LeavesNothingHalfWritten) {
+TEST_F(Capture, LeavesNoPartialFile) {
   const fs::path nowhere = m_folder / "missing" / "file.capture";
   EXPECT_THROW(writeCapture(smallProblem(), nowhere), Error);
   EXPECT_EQ(fileCount(), 0u);
-  // A folder in the file's place: the rename fails.
+  // A folder has the file's name, so the rename fails.
   fs::create_directories(file() / "full");
   try {
     writeCapture(smallProblem(), file());
@@ -306,7 +306,7 @@ TEST_F(Capture, LeavesNothingHalfWritten) {
     EXPECT_NE(std::string(error.what()).find(file().string()), std::string::npos);
   }
   EXPECT_EQ(fileCount(), 1u);
-  // Part of it written, no more room: what was there stays.
+  // The disk is full after a part: the existing file stays.
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
   writeCapture(CollisionProblem(), file("kept.capture"));
   fs::create_symlink("/dev/full", file("kept.capture.part"));

@@ -12,7 +12,8 @@
 namespace palpate::test {
 namespace {
 
-/// The determinant expanded without differences, in integers: nothing shared with what it checks.
+/// The determinant, expanded without differences, in integers. It shares no code with the
+/// predicates.
 int volumeSign(const std::array<Eigen::Vector3d, 4>& p) {
   std::array<std::array<Integer, 3>, 4> q;
   for (int i = 0; i < 4; ++i)
@@ -33,7 +34,7 @@ int areaSign(int axis, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
   return sgn(Integer(cross(a, b) + cross(b, c) + cross(c, a)));
 }
 
-TEST(Predicates, EverySignIsThatOfTheIntegerDeterminant) {
+TEST(Predicates, EverySignMatchesTheIntegerDeterminant) {
   Random random(1);
   SignCounts counts;
   for (int k = 0; k < static_cast<int>(Kind::Count); ++k) {
@@ -56,7 +57,7 @@ Eigen::Vector3d nudged(Eigen::Vector3d p, int axis, Random& random) {
   return p;
 }
 
-TEST(Predicates, OneUlpOffThePlaneOrTheLineIsSeen) {
+TEST(Predicates, OneUlpOffThePlaneOrTheLineIsDetected) {
   Random random(2);
   SignCounts counts;
   for (int repeat = 0; repeat < 5000; ++repeat) {
@@ -70,8 +71,8 @@ TEST(Predicates, OneUlpOffThePlaneOrTheLineIsSeen) {
   }
 }
 
-/// Where products end among the denormals, and all around.
-TEST(Predicates, NoUnderflowTurnsAVolume) {
+/// Products that end among the denormals, and all around.
+TEST(Predicates, UnderflowDoesNotFlipAVolume) {
   Random random(5);
   SignCounts counts;
   for (int exponent = -1020; exponent <= 1000;
@@ -86,7 +87,7 @@ TEST(Predicates, NoUnderflowTurnsAVolume) {
   }
 }
 
-TEST(Predicates, NoUnderflowTurnsAnArea) {
+TEST(Predicates, UnderflowDoesNotFlipAnArea) {
   Random random(6);
   SignCounts counts;
   for (int exponent = -545; exponent <= -490; ++exponent) {
@@ -99,9 +100,9 @@ TEST(Predicates, NoUnderflowTurnsAnArea) {
   }
 }
 
-/// Where products round to multiples of the least double, of differences that were rounded
-/// themselves: the relative error alone says too little.
-TEST(Predicates, NoUnderflowTurnsAnAreaOfRoundedDifferences) {
+/// Products that round to multiples of the least double, of differences that are rounded
+/// themselves. The relative error alone is no bound.
+TEST(Predicates, UnderflowDoesNotFlipAnAreaOfRoundedDifferences) {
   Random random(7);
   SignCounts counts;
   const auto uneven = [&] {
@@ -118,7 +119,7 @@ TEST(Predicates, NoUnderflowTurnsAnAreaOfRoundedDifferences) {
   }
 }
 
-TEST(Predicates, SwappingTwoPositionsTurnsTheSign) {
+TEST(Predicates, SwappingTwoPositionsFlipsTheSign) {
   Random random(3);
   SignCounts counts;
   for (int repeat = 0; repeat < 20000; ++repeat) {
@@ -130,7 +131,7 @@ TEST(Predicates, SwappingTwoPositionsTurnsTheSign) {
   }
 }
 
-TEST(Predicates, FloatingPointDecidesWhatIsNotDegenerate) {
+TEST(Predicates, FloatingPointFilterDecidesNonDegenerateInput) {
   Random random(4);
   SignCounts counts;
   for (int repeat = 0; repeat < 100000; ++repeat) {
@@ -141,7 +142,7 @@ TEST(Predicates, FloatingPointDecidesWhatIsNotDegenerate) {
   EXPECT_EQ(counts.undecided, 0u);
 }
 
-/// Over all exponents, with carries through many words; back to zero in another order.
+/// All exponents, with carries through many words, and back to zero in another order.
 TEST(ExactSum, HasTheSignOfTheIntegerSum) {
   Random random(8);
   const double largest = std::numeric_limits<double>::max();

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <string>
 
-// Impacts with a minimum distance: distances are judged by rational arithmetic.
+// Impacts with a minimum distance. Rational arithmetic decides the distances.
 
 namespace palpate {
 namespace {
@@ -31,7 +31,7 @@ bool isWithin(const Rational& square, const Rational& distance) {
   return square <= distance * distance;
 }
 
-/// A distance that is hard for the query: far from it, or its own at some time, give or take.
+/// A distance that is hard for the query: far from it, or near its own distance at some time.
 double someDistance(const ImpactCase& query, test::Random& random) {
   double size = 1e-300;
   for (std::size_t i = 1; i < 8; ++i)
@@ -42,15 +42,16 @@ double someDistance(const ImpactCase& query, test::Random& random) {
   return std::clamp(own * factor, 1e-300, 1e300);
 }
 
-/// At a reported time the features are within the stated error; at times before it, and at any
-/// where none is reported, they are further apart than the distance.
+/// At a reported time, the features are within the stated error. At earlier times, and at any time
+/// if none is reported, they are farther apart than the distance.
 void expectTrue(const ImpactCase& query, const TimeOfImpactSettings& settings,
                 test::Random& random) {
   const std::optional<double> time = query.time(settings);
   if (time) {
     const Rational reach =
         Rational(settings.minimumDistance) + Rational(statedError(query, settings));
-    EXPECT_TRUE(isWithin(oracle::squareDistanceAt(query, *time), reach)) << "invented at " << *time;
+    EXPECT_TRUE(isWithin(oracle::squareDistanceAt(query, *time), reach))
+        << "false positive at " << *time;
   }
   const double end = time.value_or(1.0);
   for (int i = 0; i < 12; ++i) {
@@ -58,11 +59,11 @@ void expectTrue(const ImpactCase& query, const TimeOfImpactSettings& settings,
     if (i < 5) t = end * i / 4.0;
     if (time && t >= *time) continue;
     EXPECT_FALSE(isWithin(oracle::squareDistanceAt(query, t), Rational(settings.minimumDistance)))
-        << (time ? "late, or nearer at " : "missed at ") << t;
+        << (time ? "late, or nearer at " : "false negative at ") << t;
   }
 }
 
-TEST(Approach, IsNeitherLateNorMissedNorInvented) {
+TEST(Approach, HasNoLateTimesFalseNegativesOrFalsePositives) {
   const char* cases = std::getenv("PALPATE_IMPACT_CASES");
   const long count = cases ? std::atol(cases) : 3000;
   HardCases hard(21);
@@ -81,7 +82,7 @@ TEST(Approach, IsNeitherLateNorMissedNorInvented) {
   EXPECT_LT(impacts, count * 7 / 8);
 }
 
-/// Slivers, and distances far below the features' size: directions in plain doubles fail there.
+/// Slivers, and distances far below the features' size, where directions in plain doubles fail.
 TEST(Approach, HoldsForSliversAndSmallDistances) {
   test::Random random(23);
   int impacts = 0, misses = 0;

@@ -35,8 +35,8 @@ class Random {
   std::mt19937_64 m_engine;
 };
 
-/// One kind of configuration each: random; slivers; far from the origin; on a small grid; nearly
-/// touching; nearly parallel; nearly coincident; from the smallest to the largest doubles.
+/// One category of configurations each: random; slivers; far from the origin; on a small grid;
+/// nearly touching; nearly parallel; nearly coincident; from the smallest to the largest doubles.
 constexpr int kKinds = 8;
 
 Four configuration(int kind, Random& random) {
@@ -83,7 +83,8 @@ void expectWithin(const oracle::Errors& errors) {
   EXPECT_LE(errors.normal, kAllowedUlp);
 }
 
-/// Of features that touch: along the exact direction; sum of squares, root and quotient round.
+/// The normal of touching features: along the exact direction. The sum of squares, the root and the
+/// quotient round.
 void expectDirection(const Vector3d& normal, const oracle::Vector& along) {
   const mpf_class length = oracle::root(oracle::dot(along, along));
   if (length == 0) return;
@@ -151,7 +152,7 @@ oracle::Errors checkEdgeEdge(const Four& x) {
   return errors;
 }
 
-/// Of each kind. Long tests ask for more, and for others.
+/// The number of cases of each category. Long tests run more, and others.
 int pairsOfEachKind() {
   const char* asked = std::getenv("PALPATE_DISTANCE_PAIRS");
   return asked ? std::atoi(asked) / kKinds : 1500;
@@ -176,8 +177,8 @@ TEST(ClosestPoint, AgreesWithRationalArithmetic) {
   print("edge-edge", edgeEdge);
 }
 
-/// Each border between two regions lies where a weight or an offset is zero.
-TEST(ClosestPoint, EveryRegionOfATriangleIsCrossed) {
+/// Each border between two regions is where a weight or an offset is zero.
+TEST(ClosestPoint, EveryRegionBorderOfATriangleIsCrossed) {
   const std::vector<std::array<Vector3d, 3>> triangles{
       {Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(0, 1, 0)},
       {Vector3d(0.1, 0.2, 0.3), Vector3d(1.3, -0.4, 0.7), Vector3d(0.6, 1.1, -0.2)},
@@ -199,7 +200,7 @@ TEST(ClosestPoint, EveryRegionOfATriangleIsCrossed) {
   }
 }
 
-TEST(ClosestPoint, EveryRegionOfTwoEdgesIsCrossed) {
+TEST(ClosestPoint, EveryRegionBorderOfTwoEdgesIsCrossed) {
   for (const double tilt : {0.0, 1e-300, 1e-16, 1e-8, 0.3, 2.0})
     for (const double s : {-0.25, -1e-15, 0.0, 1e-15, 0.5, 1.0, 1.0 + 1e-15, 1.5})
       for (const double t : {-0.25, 0.0, 1e-15, 0.5, 1.0 - 1e-15, 1.0, 1.5})
@@ -213,7 +214,7 @@ TEST(ClosestPoint, EveryRegionOfTwoEdgesIsCrossed) {
         }
 }
 
-// ---- Laws ----
+// ---- Invariances ----
 
 using Bits = std::vector<std::uint64_t>;
 
@@ -261,7 +262,7 @@ TEST(ClosestPoint, PermutingCornersPermutesWeights) {
   }
 }
 
-TEST(ClosestPoint, SwappingEdgesOrEndsSwapsTheAnswer) {
+TEST(ClosestPoint, SwappingEdgesOrEndsSwapsTheResult) {
   Random random;
   for (int kind = 0; kind < kKinds; ++kind) {
     for (int i = 0; i < 500; ++i) {
@@ -312,7 +313,7 @@ TEST(ClosestPoint, MirroringKeepsTheBits) {
   }
 }
 
-/// From where distances of 1e-17 of the positions still have all their bits to where squared
+/// Scales from where distances of 1e-17 of the positions still have all their bits to where squared
 /// lengths have long overflowed.
 TEST(ClosestPoint, PowersOfTwoKeepTheBits) {
   Random random;
@@ -352,7 +353,7 @@ TEST(ClosestPoint, MovingOnAGridKeepsTheBits) {
   }
 }
 
-TEST(ClosestPoint, TrianglesThatShareAnEdgeAnswerAlikeForIt) {
+TEST(ClosestPoint, TrianglesThatShareAnEdgeAgreeOnIt) {
   Random random;
   int shared = 0;
   for (int i = 0; i < 3000; ++i) {
@@ -373,9 +374,9 @@ TEST(ClosestPoint, TrianglesThatShareAnEdgeAnswerAlikeForIt) {
   EXPECT_GT(shared, 100);
 }
 
-// ---- By value ----
+// ---- Single values ----
 
-TEST(ClosestPoint, TouchingFeaturesHaveTheirRulesNormal) {
+TEST(ClosestPoint, NormalsOfTouchingFeaturesFollowTheirRule) {
   const Vector3d a(0, 0, 0), b(2, 0, 0), c(0, 2, 0);
   for (const Vector3d& p : {a, Vector3d(1, 0, 0), Vector3d(0.5, 0.5, 0)}) {
     EXPECT_EQ(vertexTriangleDistance(p, a, b, c).distance, 0.0);
@@ -389,7 +390,7 @@ TEST(ClosestPoint, TouchingFeaturesHaveTheirRulesNormal) {
   EXPECT_EQ(crossed.normal, Vector3d(0, 0, 1));
 }
 
-TEST(ClosestPoint, DegenerateFeaturesAreAnsweredForWhatIsLeft) {
+TEST(ClosestPoint, DegenerateFeaturesCountAsSegmentsOrPoints) {
   const Vector3d point(1, 2, 3);
   const VertexTriangleDistance onPoint =
       vertexTriangleDistance(point + Vector3d(0, 3, 4), point, point, point);
@@ -411,7 +412,7 @@ TEST(ClosestPoint, DegenerateFeaturesAreAnsweredForWhatIsLeft) {
   EXPECT_EQ(points.normal, Vector3d(1, 0, 0));
 }
 
-TEST(ClosestPoint, ParallelEdgesMeetInTheMiddleOfTheirStretch) {
+TEST(ClosestPoint, ParallelEdgesAreClosestInTheMiddleOfTheirOverlap) {
   const EdgeEdgeDistance beside = edgeEdgeDistance({0, 0, 0}, {4, 0, 0}, {5, 1, 0}, {1, 1, 0});
   EXPECT_TRUE(beside.parallel);
   EXPECT_EQ(beside.weightA, 0.625);
@@ -424,7 +425,7 @@ TEST(ClosestPoint, ParallelEdgesMeetInTheMiddleOfTheirStretch) {
   EXPECT_EQ(beyond.distance, 5.0);
 }
 
-TEST(ClosestPoint, TheLargestDoublesAreAnswered) {
+TEST(ClosestPoint, LargestDoublesGiveFiniteResults) {
   const double most = std::numeric_limits<double>::max();
   const VertexTriangleDistance far = vertexTriangleDistance(
       {most, most, most}, {-most, -most, -most}, {-most, most, -most}, {-most, -most, most});
@@ -447,9 +448,10 @@ TEST(ClosestPoint, NaNGivesNaN) {
   }
 }
 
-/// Edges of grids that lie on each other, as computed coordinates make them: exactly parallel, or
-/// by a rounding not; far from the origin, and with what is left over of zero.
-TEST(ClosestPoint, TellsHowEdgesOfGridsCross) {
+/// Edges of grids that lie on each other. Their coordinates are computed, so that they are parallel
+/// exactly or up to a rounding. Some are far from the origin, and some have rounding errors instead
+/// of zeros.
+TEST(ClosestPoint, EdgesOfGridsAreClassifiedExactly) {
   std::mt19937 random(11);
   const auto below = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
   int parallel = 0, interior = 0, outside = 0, inIntegers = 0;

@@ -19,7 +19,7 @@ inline Rational squareDistanceAt(const ImpactCase& query, double time) {
                      : vertexTriangle(x[0], x[1], x[2], x[3]).square;
 }
 
-/// The least double whose square is not below; of what is not beyond double.
+/// The least double whose square is not below x, for values in the range of double.
 inline double rootAbove(const Rational& square) {
   double above = root(square).get_d();
   while (Rational(above) * Rational(above) < square) above = std::nextafter(above, INFINITY);

@@ -14,7 +14,7 @@
 
 namespace palpate {
 
-/// A query as the tests hold it.
+/// A query as the tests store it.
 struct ImpactCase {
   bool edges;
   impact::Positions positions;
@@ -29,7 +29,7 @@ struct ImpactCase {
     for (std::size_t i = 0; i < 4; ++i) result.vertices[i] = {positions[i], positions[4 + i]};
     return result;
   }
-  /// Vertex i is the old order[i].
+  /// Vertex i was vertex order[i] before.
   ImpactCase permuted(const std::array<int, 4>& order) const {
     ImpactCase result = *this;
     for (int i = 0; i < 4; ++i)
@@ -50,8 +50,8 @@ struct ImpactCase {
   }
 };
 
-/// Whole coordinates from -range to range, and often vertices that coincide, move together or not
-/// at all, and steps in one plane or on one line, so that degenerate queries are common.
+/// Integer coordinates from -range to range. Vertices often coincide, move together or rest, and
+/// steps are often in one plane or on one line, so that degenerate queries are common.
 inline ImpactCase randomGridCase(test::Random& random, bool edges, int range) {
   const auto pick = [&](int count) { return random.below(count); };
   ImpactCase result{edges, {}};
@@ -87,7 +87,7 @@ inline ImpactCase randomCase(test::Random& random, bool edges) {
   return result;
 }
 
-/// Kinds of queries that are hard to decide.
+/// Categories of queries that are hard to decide.
 enum class ImpactKind {
   Grid,
   FullDoubles,
@@ -109,7 +109,7 @@ enum class ImpactKind {
   Count
 };
 
-/// On grids small enough that all that is said of a case is true of its doubles.
+/// On grids so small that each stated property of a case holds for its doubles.
 class HardCases {
  public:
   explicit HardCases(std::uint64_t seed) : m_random(seed) {}

@@ -7,7 +7,7 @@
 
 #include <array>
 
-// What the filter leaves out is judged by rational arithmetic, on every SIMD path.
+// Rational arithmetic checks the pairs that the filter discards, on every SIMD path.
 
 namespace palpate {
 namespace {
@@ -32,7 +32,7 @@ Eight someOf(ImpactKind kind, HardCases& hard, test::Random& random, bool edges)
   return eight;
 }
 
-/// The lanes that some path leaves out.
+/// The lanes that some path discards.
 unsigned leftOut(const Eight& eight, const TimeOfImpactSettings& settings) {
   ImpactBlock block;
   for (int lane = 0; lane < ImpactBlock::kLanes; ++lane)
@@ -70,7 +70,7 @@ TEST(ImpactFilter, KeepsEveryQueryThatTouches) {
   EXPECT_GT(plainDropped, count / 4);
 }
 
-/// The distance that the features have at some time, exactly or a little above it.
+/// The distance of the features at some time, exactly or a little above it.
 TEST(ImpactFilter, KeepsEveryQueryThatComesWithinTheDistance) {
   HardCases hard(13);
   test::Random random(14);
@@ -87,9 +87,9 @@ TEST(ImpactFilter, KeepsEveryQueryThatComesWithinTheDistance) {
   }
 }
 
-/// As brute force does not ask the filter: with a distance, the search may report what does not
+/// Brute force does not use the filter. With a distance, the search may report pairs that do not
 /// quite come within it.
-TEST(ImpactFilter, KeepsWhatTheSearchReports) {
+TEST(ImpactFilter, KeepsEveryImpactThatTheSearchReports) {
   HardCases hard(15);
   test::Random random(16);
   int found = 0, dropped = 0;

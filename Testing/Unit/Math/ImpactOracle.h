@@ -9,9 +9,9 @@
 #include <optional>
 #include <vector>
 
-/// Continuous detection decided slowly and by other means than the library's: rational polynomials
-/// in the power basis, Sturm sequences, signs at roots by greatest common divisors and bisection,
-/// and formulas of degree four. Nothing here is shared with Source/.
+/// A slow decision of continuous detection by other methods than the library's: rational
+/// polynomials in the power basis, Sturm sequences, signs at roots by greatest common divisors and
+/// bisection, and formulas of degree four. It shares no code with Source/.
 namespace palpate::impact {
 
 using Rational = mpq_class;
@@ -62,7 +62,8 @@ inline Division divide(Polynomial p, const Polynomial& by) {
   }
   return {quotient, p};
 }
-/// Times a positive number: whole coefficients without a common divisor, which are quicker.
+/// Multiplies by a positive number, so that coefficients are integers without a common divisor,
+/// which are faster.
 inline Polynomial primitive(Polynomial p) {
   mpz_class denominator = 1, divisor = 0;
   for (const Rational& c : p) denominator = lcm(denominator, c.get_den());
@@ -111,8 +112,8 @@ struct Real {
   Polynomial p;
   Rational low, high;
 
-  /// Whether it is at most t, in (low, high]: p changes sign at its root, unless it has one at low,
-  /// too.
+  /// Whether it is at most t, in (low, high]. p changes its sign at the root, unless it has a root
+  /// at low, too.
   bool isAtMost(const Rational& t) const {
     const int start = sgn(valueAt(p, low)), there = sgn(valueAt(p, t));
     return start == 0 ? rootCount(p, low, t) == 1 : there != start;
@@ -130,7 +131,7 @@ struct Real {
     while (count(low, high) > 0 || valueAt(q, low) == 0) halve();
     return sgn(valueAt(q, high));
   }
-  /// Sign of this - t.
+  /// Sign of this root minus t.
   int compare(const Rational& t) {
     if (p.empty()) return cmp(low, t);
     if (t <= low) return 1;
@@ -144,7 +145,7 @@ struct Real {
   }
 };
 
-/// Of a polynomial that is not zero, in [0, 1], ascending.
+/// The roots of a polynomial that is not zero, in [0, 1], ascending.
 inline std::vector<Real> rootsInStep(const Polynomial& q) {
   std::vector<Real> roots;
   if (valueAt(q, 0) == 0) roots.push_back({{}, 0, 0});
@@ -213,7 +214,7 @@ class Query {
     if (!m_coplanarity.empty()) {
       times = rootsInStep(m_coplanarity);
     } else {
-      // Any polynomial that the test looks at may change sign at the first touch.
+      // Any polynomial that the test evaluates may change its sign at the first touch.
       times.push_back({{}, 0, 0});
       std::vector<Polynomial> all = m_notNegative;
       all.push_back(m_normalSquared);
@@ -231,7 +232,7 @@ class Query {
     return first;
   }
 
-  /// Of (v, a, b, c): det(a - v, b - v, c - v).
+  /// For (v, a, b, c): det(a - v, b - v, c - v).
   const Polynomial& coplanarity() const { return m_coplanarity; }
 
   bool touchAt(Real time) const {
@@ -251,7 +252,8 @@ class Query {
   static bool isBefore(Real l, Real r) {
     if (r.p.empty()) return l.compare(r.low) < 0;
     if (l.p.empty()) return r.compare(l.low) > 0;
-    // Equal if a common factor has a root where both are; else bisection tells them apart.
+    // Roots are equal if a common factor has a root in both intervals. Otherwise bisection
+    // separates them.
     const Polynomial common = commonDivisor(l.p, r.p);
     for (;;) {
       if (l.high <= r.low) return true;

@@ -17,7 +17,7 @@ ImpactCase crossing(double angle, double side, double length) {
   return {true, {p0 + up, p1 + up, q1, q0, p0 - up, p1 - up, q1, q0}};
 }
 
-TEST(ImpactSide, IsToldOfEdgesHoweverNearlyParallel) {
+TEST(ImpactSide, IsCorrectForNearlyParallelEdges) {
   for (const double side : {1.0, -1.0})
     for (int exponent = 0; exponent <= 300; ++exponent) {
       const ImpactCase query = crossing(std::pow(10.0, -exponent), side, 0.7);
@@ -26,7 +26,7 @@ TEST(ImpactSide, IsToldOfEdgesHoweverNearlyParallel) {
   EXPECT_EQ(sideBefore(crossing(0, 1, 0.7).query(), 0.5), 0);
 }
 
-TEST(ImpactSide, IsToldOfEdgesHoweverLong) {
+TEST(ImpactSide, IsCorrectForEdgesOfAnyLength) {
   for (const double side : {1.0, -1.0})
     for (double length = 1; length < 1e30; length *= 7)
       ASSERT_EQ(sideBefore(crossing(0.5, side, length).query(), 0.5), -side) << length;

@@ -3,25 +3,25 @@
 
 #include <gtest/gtest.h>
 
-// Searches that end before the step does, as those for the earliest impact: what they find does not
+// Searches that end before the step does, like those for the earliest impact. Their result does not
 // depend on where they end.
 
 namespace palpate {
 namespace {
 
-ImpactAnswer find(const ImpactCase& query, double distance, double upTo) {
+ImpactResult find(const ImpactCase& query, double distance, double upTo) {
   ImpactQuery q{query.edges ? ImpactQuery::Kind::EdgeEdge : ImpactQuery::Kind::VertexTriangle, {}};
   for (int i = 0; i < 4; ++i) q.vertices[i] = {query.positions[i], query.positions[4 + i]};
   return findImpact(q, {.minimumDistance = distance}, upTo);
 }
 
-/// Grids, small displacements between features that pass at about the distance, and plain ones.
+/// Grids, small displacements between features that pass at about the distance, and random queries.
 ImpactCase someCase(test::Random& random, double distance) {
   const bool edges = random.below(2);
   if (random.below(3) == 0) return randomGridCase(random, edges, 2);
   ImpactCase query = randomCase(random, edges);
   if (random.below(2)) return query;
-  // The first feature glides along at the distance, give or take what searches cannot tell.
+  // The first feature glides along at the distance, up to the error of the search.
   const int moving = edges ? 2 : 1;
   for (int i = 0; i < 4; ++i) {
     Eigen::Vector3d &before = query.positions[i], &now = query.positions[4 + i];
@@ -42,19 +42,20 @@ TEST(ImpactUpTo, FindsTheSameTimeWhereverTheSearchEnds) {
   for (int i = 0; i < 20000; ++i) {
     const double distance = i % 3 == 0 ? 0.0 : 0.1 * random.unit();
     const ImpactCase query = someCase(random, distance);
-    const ImpactAnswer whole = find(query, distance, 1.0);
+    const ImpactResult whole = find(query, distance, 1.0);
     for (int k = 0; k < 4; ++k) {
       const double upTo = k < 2           ? random.unit()
                           : !whole.impact ? 0x1p-5
                           : k == 2        ? whole.time
                                           : std::min(1.0, whole.time + 1e-6);
-      const ImpactAnswer part = find(query, distance, upTo);
+      const ImpactResult part = find(query, distance, upTo);
       if (part.impact) {
         ASSERT_TRUE(whole.impact) << i;
         ASSERT_EQ(part.time, whole.time) << i << ", up to " << upTo;
         ++found;
       } else if (whole.impact) {
-        // With a tolerance after it, an impact is not left out: it may be that late in truth.
+        // Within a tolerance after the end, an impact is reported, too: the exact time may be that
+        // late.
         ASSERT_TRUE(distance > 0.0 ? whole.time > upTo : whole.time + 1e-6 > upTo)
             << i << ", up to " << upTo;
         ++leftOut;

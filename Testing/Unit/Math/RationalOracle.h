@@ -8,8 +8,8 @@
 #include <array>
 #include <cmath>
 
-/// Distances in rational numbers, by trying every feature instead of deciding which one: no region
-/// logic to share a mistake with. Roots are taken to 400 bits.
+/// Distances in rational numbers. It tries every feature instead of deciding the region, so that it
+/// cannot share a mistake of the region logic. Roots have 400 bits.
 namespace palpate::oracle {
 
 using Rational = mpq_class;
@@ -136,8 +136,8 @@ inline double ulpOfLargestDifference(const std::array<Eigen::Vector3d, 4>& at) {
   return std::nextafter(most, INFINITY) - most;
 }
 
-/// Errors of an answer, in ulp of the largest coordinate difference; the normal's times the
-/// distance.
+/// Errors of a result, in ulp of the largest coordinate difference. The error of the normal is
+/// multiplied by the distance.
 struct Errors {
   double distance = 0, difference = 0, witness = 0, normal = 0;
   void keepLarger(const Errors& o) {
@@ -148,7 +148,7 @@ struct Errors {
   }
 };
 
-/// `difference`: of the two closest points that the answer's weights name, in real arithmetic.
+/// `difference`: of the two closest points that the result's weights name, in real arithmetic.
 inline Errors errorsOf(const Closest& truth, const Vector& difference,
                        const Eigen::Vector3d& answeredDifference, const Eigen::Vector3d& normal,
                        double distance, double ulp) {

@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 using oracle::Rational;
 using testing::Random;
 
-/// In rational numbers: none outside, and none without volume.
+/// The weights in rational numbers. None outside, and none without volume.
 std::optional<std::array<Rational, 4>> truth(const Vector3d& p,
                                              const std::array<Vector3d, 4>& corners) {
   std::array<Rational, 4> volumes;
@@ -57,7 +57,7 @@ void expectExact(const Vector3d& p, std::array<Vector3d, 4> corners, std::size_t
   } while (std::next_permutation(order.begin(), order.end()));
 }
 
-TEST(TetrahedronWeights, AreThoseOfRationalNumbersInAnyOrderOfCorners) {
+TEST(TetrahedronWeights, MatchRationalArithmeticInAnyOrderOfCorners) {
   Random random(1);
   std::size_t inside = 0, zeros = 0;
   for (int run = 0; run < 700; ++run) {
@@ -80,7 +80,7 @@ TEST(TetrahedronWeights, AreThoseOfRationalNumbersInAnyOrderOfCorners) {
   EXPECT_GT(zeros, 400u);
 }
 
-/// Coordinates that no grid of 60 bits holds, and volumes beyond the range of double.
+/// Coordinates that do not fit into a grid of 60 bits, and volumes beyond the range of double.
 TEST(TetrahedronWeights, AreExactForAnyDoubles) {
   Random random(2);
   std::size_t inside = 0, zeros = 0;

@@ -1,4 +1,4 @@
-// Published queries with exact truth, built to break continuous detection. (Erleben, Methodology
+// Published queries with exact labels, made to break continuous detection. (Erleben, Methodology
 // for assessing mesh-based contact point methods, 2018; Wang et al., A large-scale benchmark and an
 // inclusion-based algorithm for continuous collision detection, 2021.)
 #include "Common/PublishedQueries.h"
@@ -34,9 +34,9 @@ TEST(TimeOfImpactPublished, EveryLabelHoldsInEveryOrderAndDirection) {
   EXPECT_GT(impacts, 200u);
 }
 
-/// Every impact and some misses, as the oracle is slow: the truth, and a time that is not late and
-/// not early.
-TEST(TimeOfImpactPublished, TimesAreThoseOfTheOracle) {
+/// All impacts and some misses, because the oracle is slow: the decision, and a time that is
+/// neither late nor too early.
+TEST(TimeOfImpactPublished, TimesMatchTheOracle) {
   if (published().empty()) GTEST_SKIP() << "no ccd-queries in PALPATE_SHARED_DATA";
   for (const auto& set : published()) {
     for (std::size_t i = 0; i < set.queries.size(); ++i) {

@@ -26,13 +26,14 @@ std::string text(const ImpactCase& query) {
   return result;
 }
 
-ImpactAnswer exactly(const ImpactCase& query, double tolerance) {
+ImpactResult exactly(const ImpactCase& query, double tolerance) {
   ImpactQuery q{query.edges ? ImpactQuery::Kind::EdgeEdge : ImpactQuery::Kind::VertexTriangle, {}};
   for (int i = 0; i < 4; ++i) q.vertices[i] = {query.positions[i], query.positions[4 + i]};
   return findTouchExactly(q, tolerance);
 }
 
-/// Hit or none as the oracle has it; not late; early by at most the tolerance. For both paths.
+/// The oracle's decision; a time that is not late, and early by at most the tolerance. For both
+/// paths.
 void expectTrue(const ImpactCase& query, double tolerance, int& impacts) {
   std::optional<impact::Real> truth = impact::Query(query.edges, query.positions).firstTouch();
   const auto check = [&](bool impact, double time, const char* path) {
@@ -44,7 +45,7 @@ void expectTrue(const ImpactCase& query, double tolerance, int& impacts) {
   };
   const std::optional<double> time = query.time({0.0, tolerance});
   check(time.has_value(), time.value_or(0.0), "findTouch");
-  const ImpactAnswer exact = exactly(query, tolerance);
+  const ImpactResult exact = exactly(query, tolerance);
   check(exact.impact, exact.time, "findTouchExactly");
   impacts += truth.has_value();
 }
@@ -98,8 +99,8 @@ TEST(TimeOfImpact, AgreesWithOracleOnFullDoubles) {
   EXPECT_GT(impacts, 40);
 }
 
-/// Same decision, and times that are within a tolerance of each other, as both are within one of
-/// the truth.
+/// The same decision, and times within a tolerance of each other, because both are within one of
+/// the exact time.
 void expectSame(const ImpactCase& l, const ImpactCase& r) {
   const std::optional<double> left = l.time(), right = r.time();
   ASSERT_EQ(left.has_value(), right.has_value()) << text(l) << "\nand " << text(r);
@@ -115,8 +116,8 @@ std::vector<std::array<int, 4>> orders(bool edges) {
 }
 
 TEST(TimeOfImpact, IsNotEarlierThanTheToleranceWhereRoundingHidesTheRoot) {
-  // Large triangles against a vertex that moves little, as Testing/Stability met them: the brackets
-  // of their roots are as wide as they may be, and reached 1.02e-6 and 1.002e-6 before the impact.
+  // Large triangles against a vertex that moves little, from Testing/Stability. The brackets of
+  // their roots are as wide as possible. Times were 1.02e-6 and 1.002e-6 before the impact.
   const auto still = [](const Eigen::Vector3d& v, const Eigen::Vector3d& vNow,
                         const std::array<Eigen::Vector3d, 3>& t) {
     return ImpactCase{false, {v, t[0], t[1], t[2], vNow, t[0], t[1], t[2]}};
@@ -147,7 +148,7 @@ TEST(TimeOfImpact, DoesNotDependOnTheOrderOfCorners) {
   }
 }
 
-TEST(TimeOfImpact, IsTheSameDecisionBackwards) {
+TEST(TimeOfImpact, DecisionIsTheSameBackwards) {
   test::Random random(4);
   for (int i = 0; i < 6000; ++i) {
     const ImpactCase query =
@@ -166,7 +167,7 @@ TEST(TimeOfImpact, ScalesByPowersOfTwo) {
   }
 }
 
-TEST(TimeOfImpact, MovesWithTheOrigin) {
+TEST(TimeOfImpact, DoesNotDependOnTheOrigin) {
   test::Random random(6);
   for (int i = 0; i < 2000 && !testing::Test::HasFatalFailure(); ++i) {
     const ImpactCase query = randomGridCase(random, i % 2 == 0, 2);
@@ -215,7 +216,7 @@ TEST(TimeOfImpact, TakesAnyToleranceAndDistanceThatIsNotPositive) {
   }
 }
 
-TEST(TimeOfImpact, AnswersStepsWithoutMotion) {
+TEST(TimeOfImpact, HandlesStepsWithoutMotion) {
   const Eigen::Vector3d a(0, 0, 0), b(1, 0, 0), c(0, 1, 0);
   const auto still = [](const Eigen::Vector3d& v, const Eigen::Vector3d& p,
                         const Eigen::Vector3d& q, const Eigen::Vector3d& r) {
@@ -244,7 +245,7 @@ TEST(TimeOfImpact, TouchesAtTheEndsOfTheStep) {
   EXPECT_TRUE(vertexTriangleTimeOfImpact(above, a, b, c, {0.25, 0.25, -5e-324}, a, b, c));
 }
 
-/// Distance at a time, from the closest of all feature pairs; an independent, plain way to get it.
+/// Distance at a time, from the closest of all feature pairs, by independent plain code.
 double distanceAt(const ImpactCase& query, double t) {
   std::array<Eigen::Vector3d, 4> x;
   for (int i = 0; i < 4; ++i) x[i] = (1 - t) * query.positions[i] + t * query.positions[4 + i];
@@ -288,13 +289,13 @@ TEST(TimeOfImpact, KeepsTheMinimumDistance) {
     for (int j = 0; j < 4; ++j)
       displacement = std::max(displacement, (query.positions[4 + j] - query.positions[j]).norm());
     const std::optional<double> time = query.time({distance, tolerance});
-    // Never late, never missed: at no sampled time before is the distance below the minimum.
+    // No late time and no false negative: at no earlier sample is the distance below the minimum.
     for (int sample = 0; sample <= 200; ++sample) {
       const double t = time.value_or(1.0) * sample / 200;
       if (time && t >= *time) break;
       ASSERT_GT(distanceAt(query, t), distance - rounding) << text(query) << "\nat " << t;
     }
-    // Nothing invented: soon after, it is within the stated error of the minimum.
+    // No false positive: soon after, the distance is within the stated error of the minimum.
     if (time) {
       double least = std::numeric_limits<double>::infinity();
       for (int sample = 0; sample <= 10; ++sample)

@@ -16,8 +16,8 @@ namespace {
 
 constexpr int kKinds = static_cast<int>(Kind::Count);
 
-/// Bits moved to where they would be if corner i had been named corner order[i]: what
-/// intersectTriangles must answer for a and b with their corners so ordered.
+/// Moves the bits to their places if corner i had been named corner order[i]. This is the expected
+/// result of intersectTriangles for a and b with their corners in that order.
 struct Order {
   std::array<int, 3> corner;
   Corners operator()(const Corners& t) const { return {t[corner[0]], t[corner[1]], t[corner[2]]}; }
@@ -61,7 +61,7 @@ void expectSame(const TriangleIntersection& r, const TriangleIntersection& s, in
 const std::array<Order, 6> kOrders{
     {{{0, 1, 2}}, {{1, 2, 0}}, {{2, 0, 1}}, {{0, 2, 1}}, {{2, 1, 0}}, {{1, 0, 2}}}};
 
-TEST(TriangleIntersection, ReorderedCornersAndSwappedTrianglesMoveTheBits) {
+TEST(TriangleIntersection, ReorderingCornersOrTrianglesPermutesTheResult) {
   Random random(11);
   SignCounts counts;
   for (int repeat = 0; repeat < 300 * kKinds; ++repeat) {
@@ -94,7 +94,7 @@ TEST(TriangleIntersection, MirroringExchangingAxesAndPowersOfTwoChangeNothing) {
     expectSame(intersectTriangles(mirrored.first, mirrored.second, counts), result,
                repeat % kKinds);
     expectSame(intersectTriangles(turned.first, turned.second, counts), result, repeat % kKinds);
-    // Only where no bit is lost: grids may go to the denormals, others stay well above.
+    // Only where no bit is lost: grids may reach the denormals, others stay well above.
     if (kind == Kind::SmallGrid || kind == Kind::Random || kind == Kind::CoplanarTilted) {
       for (const int exponent : {-900, -400, 400, 900}) {
         const CornersPair other = scaled(pair, exponent);
@@ -105,8 +105,8 @@ TEST(TriangleIntersection, MirroringExchangingAxesAndPowersOfTwoChangeNothing) {
   }
 }
 
-/// What the features say must fit together, whatever the triangles.
-TEST(TriangleIntersection, WhatMeetsWithoutTouchingHasTwoCrossings) {
+/// The reported features must be consistent for any triangles.
+TEST(TriangleIntersection, IntersectionWithoutTouchHasTwoCrossings) {
   Random random(13);
   SignCounts counts;
   std::array<int, 3> seen{};
@@ -122,7 +122,7 @@ TEST(TriangleIntersection, WhatMeetsWithoutTouchingHasTwoCrossings) {
   for (const int count : seen) EXPECT_GT(count, 100);
 }
 
-/// Two independent decisions of the same thing. Distances under the smallest denormal round to
+/// Two independent decisions of the same question. Distances under the smallest denormal round to
 /// zero.
 TEST(TriangleIntersection, FeaturesTouchWhereTheirDistanceIsZero) {
   Random random(14);
@@ -178,8 +178,8 @@ TEST(TriangleIntersection, EachSimpleConfigurationHasItsFeatures) {
   EXPECT_EQ(same.touchingEdges, 0b111111111);
 }
 
-/// What the comparison with CGAL's exact kernel (Testing/Exact) goes through.
-TEST(TriangleIntersection, EveryKindOfPairIsWhatItsNameSays) {
+/// The categories that the comparison with CGAL's exact kernel (Testing/Exact) uses.
+TEST(TriangleIntersection, GeneratedPairsHaveTheirNamedProperty) {
   Random random(15);
   std::array<int, 16> cornersOn{};
   for (int k = 0; k < kKinds; ++k) {
@@ -215,14 +215,14 @@ TEST(TriangleIntersection, EveryKindOfPairIsWhatItsNameSays) {
     EXPECT_TRUE(byPoint || kind != Kind::Points);
     const bool extreme = kind == Kind::Huge || kind == Kind::Tiny || kind == Kind::Denormal;
     EXPECT_EQ(beyondProducts, extreme) << k;
-    // Beyond what floating point decides.
+    // Floating point cannot decide these.
     EXPECT_TRUE(counts.undecided > 100 || !(extreme || kind == Kind::MixedExponents)) << k;
   }
-  // In one plane: however many corners of one lie on the other, all and none included.
+  // In one plane, any number of corners of one may lie on the other, from none to all.
   for (int i = 0; i < 16; ++i) EXPECT_GT(cornersOn[i], 10) << i;
 }
 
-TEST(TriangleIntersection, SegmentsAndPointsAreWhatTheyCover) {
+TEST(TriangleIntersection, SegmentsAndPointsCountAsDegenerateTriangles) {
   const Eigen::Vector3d p(1, 1, 0), q(1, 1, 5), r(9, 9, 9), none(0, 0, 1);
   const Eigen::Vector3d a(0, 0, 0), b(4, 0, 0), c(0, 4, 0);
   EXPECT_TRUE(trianglesIntersect(a, b, c, p, p, p));

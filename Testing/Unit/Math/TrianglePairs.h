@@ -10,8 +10,8 @@
 
 namespace palpate::test {
 
-/// The same numbers from the same seed on every platform (the standard's distributions promise
-/// none).
+/// The same numbers from the same seed on every platform. The standard's distributions do not
+/// guarantee that.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : m_engine(seed) {}
@@ -29,7 +29,7 @@ class Random {
 
 using CornersPair = std::pair<Corners, Corners>;
 
-/// Kinds of pairs in which exact decisions are hard, and one in which they are not.
+/// Categories of pairs for which exact decisions are hard, and one for which they are not.
 enum class Kind {
   Random,
   SmallGrid,
@@ -65,7 +65,7 @@ inline CornersPair scaled(CornersPair pair, int exponent) {
 }
 
 /// A corner becomes another one, or the midpoint of the others (exact on even grids), or all become
-/// one.
+/// one point.
 inline void degenerate(Corners& t, Random& random) {
   const int i = random.below(3), j = (i + 1) % 3, k = (i + 2) % 3;
   switch (random.below(3)) {

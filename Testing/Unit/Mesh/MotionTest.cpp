@@ -25,7 +25,7 @@ MotionRange oneByOne(const std::vector<Vector3d>& before, const std::vector<Vect
 }
 
 /// Eight vertices at a time and the rest one by one, in any part of a mesh.
-TEST(Motion, RangeIsThatOfEachVertexOnEveryPath) {
+TEST(Motion, RangeMatchesEachVertexOnEverySimdPath) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
   std::vector<Vector3d> before, now;
@@ -48,8 +48,8 @@ TEST(Motion, RangeIsThatOfEachVertexOnEveryPath) {
   useSimdPath("");
 }
 
-/// Of a sample that is all of small meshes.
-TEST(Motion, MeanIsThatOfAllPairs) {
+/// The mean is of a sample, which contains all vertices of small meshes.
+TEST(Motion, MeanMatchesThatOfAllPairs) {
   std::mt19937 random(2);
   std::normal_distribution<double> normal;
   const auto mesh = [&](int vertices) {

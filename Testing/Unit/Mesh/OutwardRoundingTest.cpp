@@ -9,7 +9,7 @@
 #include <cmath>
 #include <limits>
 
-// Boxes in float hold the doubles that they were made of, at every exponent.
+// Boxes in float enclose the doubles from which they are made, at every exponent.
 
 namespace palpate {
 namespace {
@@ -17,15 +17,15 @@ namespace {
 using Eigen::Vector3d;
 using testing::Random;
 
-constexpr double kFloatMargin = 0x1p-20;  ///< relative: most that outward rounding may add
+constexpr double kFloatMargin = 0x1p-20;  ///< the most that outward rounding may add, relative
 
-/// (x - origin) * scale, exactly enough: long double has 64 bits, and where the difference needs
-/// more the origin is so far away that the last ones cannot matter to a bound of 2^-22.
+/// (x - origin) * scale with enough bits for the test. long double has 64 bits. If the difference
+/// needs more, the origin is so far away that the last bits cannot affect a bound of 2^-22.
 long double inFrame(double x, double origin, double scale) {
   return (static_cast<long double>(x) - origin) * scale;
 }
 
-/// The interval that the library makes of one coordinate holds it, and is not much wider.
+/// The library's interval of one coordinate encloses it, and is not much wider.
 void expectHeld(double x, double origin, double scale) {
   const Vector3d position(x, x, x);
   FloatFrame frame;
@@ -46,8 +46,8 @@ void expectHeld(double x, double origin, double scale) {
       << x << " " << origin << " " << scale;
 }
 
-/// Significands at which rounding to nearest turns: near 1 and 2, and around the halves of floats'
-/// ulps.
+/// Significands at which rounding to nearest changes direction: near 1 and 2, and around half ulps
+/// of float.
 std::vector<double> significands(Random& random) {
   std::vector<double> all{1.0, std::nextafter(1.0, 2.0), std::nextafter(2.0, 1.0), 1.5};
   for (int i = 0; i < 6; ++i) {
@@ -58,7 +58,7 @@ std::vector<double> significands(Random& random) {
   return all;
 }
 
-TEST(OutwardRounding, HoldsEveryExponentThatFloatsReach) {
+TEST(OutwardRounding, EnclosesEveryExponentOfFloats) {
   Random random(1);
   for (int exponent = -1074; exponent < 120; ++exponent)
     for (const double s : significands(random))
@@ -70,7 +70,7 @@ TEST(OutwardRounding, HoldsEveryExponentThatFloatsReach) {
   expectHeld(-0.0, 0, 1);
 }
 
-TEST(OutwardRounding, HoldsEveryExponentInItsOwnScale) {
+TEST(OutwardRounding, EnclosesEveryExponentInItsOwnScale) {
   Random random(2);
   for (int exponent = -1074; exponent < 1024; ++exponent) {
     const double size = std::ldexp(1.0, exponent), scale = frameScale(size);
@@ -80,14 +80,14 @@ TEST(OutwardRounding, HoldsEveryExponentInItsOwnScale) {
       if (std::isinf(x)) continue;
       expectHeld(x, 0, scale);
       expectHeld(-x, 0, scale);
-      // Within a hundred thousandth to a hundred thousand times the size.
+      // Within 1e-5 to 1e5 times the size.
       expectHeld(x * 0x1p-17, 0, scale);
       if (exponent < 1006) expectHeld(-x * 0x1p17, 0, scale);
     }
   }
 }
 
-TEST(OutwardRounding, HoldsDifferencesFromTheOrigin) {
+TEST(OutwardRounding, EnclosesDifferencesFromTheOrigin) {
   Random random(3);
   for (int exponent = -1060; exponent < 1000; exponent += 3) {
     const double origin = std::ldexp(testing::uniform(random, 1, 2), exponent);
@@ -122,9 +122,9 @@ TEST(OutwardRounding, IsMonotone) {
     }
 }
 
-/// What clamping does beyond the floats' range: bounds stay finite and in order, and two that
-/// overlap still do.
-TEST(OutwardRounding, BeyondTheRangeIsClampedAndFinite) {
+/// Clamping beyond the range of float: bounds stay finite and in order, and overlapping ones still
+/// overlap.
+TEST(OutwardRounding, ValuesBeyondTheRangeAreClampedAndFinite) {
   const std::vector<Vector3d> positions{{1e300, -1e300, 0x1p121}, {-1e300, 1e300, -0x1p121}};
   FloatPoint points[2];
   toFloats(positions, {}, points);
@@ -136,7 +136,7 @@ TEST(OutwardRounding, BeyondTheRangeIsClampedAndFinite) {
 }
 
 /// The boxes that the SIMD code makes are those of OutwardRounding, bit for bit.
-TEST(OutwardRounding, BoxesOfTrianglesAreThoseOfTheirCorners) {
+TEST(OutwardRounding, SimdTriangleBoxesMatchOutwardRounding) {
   Random random(4);
   const std::size_t count = 3000;
   std::vector<FloatPoint> points(3 * count);

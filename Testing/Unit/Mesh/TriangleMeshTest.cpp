@@ -21,7 +21,7 @@ Segment edgeOf(const Triangle& t, int i) {
   return {std::min(p, q), std::max(p, q)};
 }
 
-/// All of it again, from its definitions, with sets and maps and for each element apart.
+/// The whole topology again, from the definitions, with sets and maps, separately for each element.
 void expectTopology(std::size_t vertexCount, const Triangles& triangles) {
   const MeshTopology mesh(vertexCount, triangles);
   ASSERT_EQ(mesh.vertexCount, vertexCount);
@@ -47,7 +47,8 @@ void expectTopology(std::size_t vertexCount, const Triangles& triangles) {
   ASSERT_EQ(mesh.edges.size(), trianglesOfEdge.size());
   ASSERT_EQ(mesh.edgeTriangles.offsets.size(), mesh.edges.size() + 1);
   std::size_t e = 0;
-  for (const auto& [edge, holders] : trianglesOfEdge) {  // the map's order is the mesh's
+  for (const auto& [edge, holders] :
+       trianglesOfEdge) {  // the order of the map is the order of the mesh
     EXPECT_EQ(mesh.edges[e], edge);
     EXPECT_EQ(listed(mesh.edgeTriangles, e), Ids(holders.begin(), holders.end()));
     ++e;
@@ -97,7 +98,7 @@ TEST(TriangleMesh, NoTriangles) {
   }
 }
 
-TEST(TriangleMesh, OneTriangleOwnsAllOfItself) {
+TEST(TriangleMesh, OneTriangleOwnsAllItsFeatures) {
   const MeshTopology mesh(3, Triangles{{2, 0, 1}});
   EXPECT_EQ(mesh.owned, std::vector<std::uint8_t>{63});
   EXPECT_EQ(mesh.edges, (std::vector<Segment>{{0, 1}, {0, 2}, {1, 2}}));
@@ -114,7 +115,7 @@ TEST(TriangleMesh, TwoTrianglesOfEitherWindingShareAnEdge) {
   }
 }
 
-TEST(TriangleMesh, AnEdgeOfFiveTriangles) {
+TEST(TriangleMesh, EdgeOfFiveTriangles) {
   Triangles fan;
   for (std::uint32_t i = 0; i < 5; ++i)
     fan.push_back(i % 2 ? Triangle{1, 0, 2 + i} : Triangle{0, 1, 2 + i});
@@ -136,7 +137,7 @@ TEST(TriangleMesh, RepeatedIndices) {
   expectTopology(3, all);
 }
 
-TEST(TriangleMesh, TheSameTriangleAgainOwnsNothing) {
+TEST(TriangleMesh, DuplicateTriangleOwnsNothing) {
   const MeshTopology mesh(3, Triangles{{0, 1, 2}, {0, 1, 2}, {2, 1, 0}, {1, 2, 0}});
   EXPECT_EQ(mesh.owned, (std::vector<std::uint8_t>{63, 0, 0, 0}));
   expectTopology(3, mesh.triangles);
@@ -151,7 +152,7 @@ TEST(TriangleMesh, RandomSoups) {
   }
 }
 
-// One vertex more than 16 bits can name: an edge's key must not wrap.
+// One vertex more than 16 bits can number: an edge's key must not wrap.
 TEST(TriangleMesh, MoreVerticesThanSixteenBits) {
   constexpr std::uint32_t kVertexCount = 65'537;
   Triangles strip;
@@ -165,7 +166,7 @@ TEST(TriangleMesh, MoreVerticesThanSixteenBits) {
 
 // V - E + F = 2 on a closed surface of one piece: an octahedron, each triangle cut in four, four
 // times.
-TEST(TriangleMesh, ClosedSurfacesObeyEuler) {
+TEST(TriangleMesh, ClosedSurfacesSatisfyEulersFormula) {
   Triangles triangles{{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
                       {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
   std::uint32_t vertexCount = 6;

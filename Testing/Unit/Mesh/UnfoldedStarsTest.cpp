@@ -11,7 +11,7 @@
 #include <cmath>
 #include <limits>
 
-// Pairs that an unfolded star answers are judged by the exact times of impact of all their
+// Pairs that an unfolded star excludes are checked by the exact times of impact of all their
 // features, on every SIMD path.
 
 namespace palpate {
@@ -33,7 +33,7 @@ bool share(const Triangle& a, const Triangle& b) {
                      [&](std::uint32_t v) { return std::find(b.begin(), b.end(), v) != b.end(); });
 }
 
-/// Pairs of neighbours that need no test; the same on every path and by any number of threads.
+/// Pairs of neighbours that need no test: the same on every path and with any number of threads.
 std::vector<ElementPair> answered(const Step& step) {
   const SampledExtent extent = sampleExtent(step.now);
   const FloatFrame frame{extent.median, frameScale(extent.spread)};
@@ -81,7 +81,7 @@ bool touch(const Step& step, const ElementPair& pair) {
   return found;
 }
 
-/// Returns how many of the neighbours are answered.
+/// Returns how many of the neighbours are excluded.
 double expectRight(const Step& step) {
   const std::vector<ElementPair> pairs = answered(step);
   for (const ElementPair& pair : pairs)
@@ -100,7 +100,7 @@ Positions moved(const Positions& positions, testing::Random& random, double by) 
   return out;
 }
 
-TEST(UnfoldedStars, NoNeighboursThatTheyAnswerTouch) {
+TEST(UnfoldedStars, ExcludedNeighboursDoNotTouch) {
   testing::Random random(41);
   std::size_t touching = 0;
   for (int round = 0; round < 60; ++round) {
@@ -121,7 +121,7 @@ TEST(UnfoldedStars, NoNeighboursThatTheyAnswerTouch) {
   EXPECT_GT(touching, 100u);
 }
 
-TEST(UnfoldedStars, AnswerMostNeighboursOfASmoothMesh) {
+TEST(UnfoldedStars, ExcludeMostNeighboursOfASmoothMesh) {
   testing::Random random(43);
   const testing::Mesh mesh = testing::sheet(12, 0.0, 0.3);
   const auto turned = [&](const Vector3d& p) {
@@ -135,8 +135,8 @@ TEST(UnfoldedStars, AnswerMostNeighboursOfASmoothMesh) {
   }
 }
 
-/// Stars so small in their frame that floats are off by about their size.
-TEST(UnfoldedStars, KnowWhatFloatsDoNot) {
+/// Stars so small in their frame that the errors of floats are about their size.
+TEST(UnfoldedStars, AreCorrectWhereFloatsAreImprecise) {
   testing::Random random(47);
   for (int round = 0; round < 40; ++round) {
     testing::Mesh mesh = testing::sheet(5, 0.0, 0.3);
@@ -148,8 +148,8 @@ TEST(UnfoldedStars, KnowWhatFloatsDoNot) {
   }
 }
 
-/// Floats are clamped: a vertex nearly on the x axis looks as if it were halfway to the y axis.
-TEST(UnfoldedStars, AreWithinTheRangeOfFloats) {
+/// Floats are clamped, so that a vertex near the x axis seems to be halfway to the y axis.
+TEST(UnfoldedStars, AreCorrectBeyondTheRangeOfFloats) {
   testing::Mesh mesh{{Vector3d::Zero()}, {}};
   for (const Vector3d& p : {Vector3d(1, -1, 0), Vector3d(2, 1, 0), Vector3d(0x1p140, 0x1p125, 0),
                             Vector3d(-1, 1, 0), Vector3d(-1, -1, 0)})
@@ -161,7 +161,7 @@ TEST(UnfoldedStars, AreWithinTheRangeOfFloats) {
   EXPECT_TRUE(answered({mesh, mesh.positions}).empty());
 }
 
-/// n triangles around vertex 0, which their rim goes round `turns` times.
+/// n triangles around vertex 0. Their rim winds around it `turns` times.
 testing::Mesh fan(std::uint32_t n, int turns, double height) {
   testing::Mesh mesh{{Vector3d::Zero()}, {}};
   for (std::uint32_t i = 0; i < n; ++i) {
@@ -176,7 +176,7 @@ bool isAnswered(const testing::Mesh& mesh, const Positions& now) {
   return !answered({mesh, now}).empty();
 }
 
-TEST(UnfoldedStars, GoOnceAround) {
+TEST(UnfoldedStars, WindOnceAroundTheVertex) {
   for (const std::uint32_t n : {3u, 4u, 7u, 255u}) {
     const testing::Mesh once = fan(n, 1, 0.01), twice = fan(2 * n + 1, 2, 0.01);
     EXPECT_TRUE(isAnswered(once, once.positions)) << n;
@@ -184,7 +184,7 @@ TEST(UnfoldedStars, GoOnceAround) {
   }
   const testing::Mesh large = fan(1000, 1, 0.001);
   EXPECT_TRUE(isAnswered(large, large.positions));
-  // Two fans with one apex, one over the other.
+  // Two fans with one apex, one above the other.
   testing::Mesh both = fan(5, 1, 0.0);
   const testing::Mesh other = fan(6, 1, 0.0);
   for (std::size_t i = 1; i < other.positions.size(); ++i)
@@ -210,7 +210,7 @@ TEST(UnfoldedStars, StayUnfoldedThroughoutTheStep) {
   EXPECT_FALSE(isAnswered(mesh, over));
 }
 
-TEST(UnfoldedStars, AreClosedAndOfOneWinding) {
+TEST(UnfoldedStars, MustBeClosedAndOfOneWinding) {
   const testing::Mesh whole = fan(6, 1, 0.1);
   const auto closed = [](const testing::Mesh& mesh, std::vector<std::uint32_t> disabled = {}) {
     MeshTopology topology(mesh.positions.size(), mesh.triangles);

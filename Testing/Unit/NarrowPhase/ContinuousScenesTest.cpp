@@ -1,6 +1,6 @@
-// Two steps of published simulations, with symbolic truth for feature pairs that come close. (Wang
-// et al., Time of impact dataset for continuous collision detection and a scalable conservative
-// algorithm, 2021.)
+// Two steps of published simulations, with symbolic results for feature pairs that come close.
+// (Belgrod et al., Time of impact dataset for continuous collision detection and a scalable
+// conservative algorithm, 2021.)
 #include "NarrowPhase/Continuous.h"
 
 #include "PublishedFrames.h"
@@ -19,15 +19,15 @@ namespace {
 
 struct Step {
   const char *scene, *before, *now;
-  std::size_t vertexTriangle, edgeEdge;  ///< true pairs
+  std::size_t vertexTriangle, edgeEdge;  ///< labelled pairs
 };
 
 class ContinuousScenes : public ::testing::TestWithParam<Step> {};
 
 using Pairs = std::set<std::array<std::uint32_t, 2>>;
 
-/// Lists name vertices by index, edges from the number of vertices on, then triangles. Edges are in
-/// order of (larger vertex, smaller vertex).
+/// Vertices are numbered by their index, then edges, then triangles. Edges are ordered by (larger
+/// vertex, smaller vertex).
 struct PublishedIds {
   explicit PublishedIds(const MeshTopology& mesh)
       : edges(mesh.edges), triangles(static_cast<std::uint32_t>(mesh.vertexCount + edges.size())) {
@@ -47,7 +47,7 @@ struct PublishedIds {
   std::uint32_t firstEdge, triangles;
 };
 
-TEST_P(ContinuousScenes, FindsEveryTruePairAndInventsNone) {
+TEST_P(ContinuousScenes, HaveNoFalseNegativesAndNoFalsePositives) {
   const auto& [scene, before, now, vertexTriangle, edgeEdge] = GetParam();
   const std::filesystem::path folder = std::string(PALPATE_SHARED_DATA) + "/ccd-scenes/" + scene;
   if (!std::filesystem::is_directory(folder))
@@ -87,7 +87,7 @@ TEST_P(ContinuousScenes, FindsEveryTruePairAndInventsNone) {
   expectLabels("vf", vertices);
   expectLabels("ee", edges);
 
-  // The earliest time is that of the contacts, in one batch or in many, backwards too.
+  // The earliest time is that of the contacts, for one batch or many, and in reverse order.
   double earliest = std::numeric_limits<double>::infinity();
   for (const auto& contact : found.vertexTriangle)
     earliest = std::min(earliest, contact.timeOfImpact);

@@ -24,7 +24,7 @@ TriangleMesh meshOf(const std::vector<Vector3d>& before, const std::vector<Vecto
   return {MeshTopology(now.size(), triangles), now, before};
 }
 
-/// A soup in which each vertex moves its own way, in grid steps where `grid` is positive.
+/// A soup in which each vertex has its own motion, in grid steps if `grid` is positive.
 TriangleMesh movingSoup(testing::Random& random, std::size_t triangles, double size, double grid) {
   testing::Mesh mesh = testing::soup(random, triangles, size);
   // Some share vertices, so that triangles are neighbours too.
@@ -46,7 +46,7 @@ std::vector<ElementPair> everyPair(const TriangleMesh& a, const TriangleMesh& b)
   return pairs;
 }
 
-/// Everything of a contact but its weights' exact bits is in its ids, time, distance and normal.
+/// A contact without the exact bits of its weights: ids, time, distance and normal.
 std::vector<std::tuple<std::uint32_t, std::uint32_t, double, double>> sorted(
     const Buffer<VertexTriangleContact>& contacts) {
   std::vector<std::tuple<std::uint32_t, std::uint32_t, double, double>> keys;
@@ -113,7 +113,7 @@ void expectSameAsBruteForce(MeshPair pair) {
   EXPECT_EQ(findEarliestImpact(pair, candidates, kInfinity, counts), earliestOf(expected));
 }
 
-TEST(Continuous, EqualsBruteForce) {
+TEST(Continuous, MatchesBruteForce) {
   testing::Random random(1);
   for (int i = 0; i < 12; ++i) {
     const double grid = i % 3 == 0 ? 0.25 : 0.0, thickness = i % 4 == 3 ? 0.02 : 0.0;
@@ -124,7 +124,7 @@ TEST(Continuous, EqualsBruteForce) {
   }
 }
 
-TEST(Continuous, EarliestDoesNotDependOnOrderOrBatches) {
+TEST(Continuous, EarliestTimeDoesNotDependOnOrderOrBatches) {
   testing::Random random(2);
   for (int i = 0; i < 20; ++i) {
     const TriangleMesh a = movingSoup(random, 20, 0.3, i % 2 ? 0.25 : 0.0);
@@ -153,7 +153,7 @@ struct Crossing {
   std::vector<Triangle> triangle{{0, 1, 2}};
 };
 
-TEST(Continuous, VertexContactsSayWhereAndFromWhichSide) {
+TEST(Continuous, VertexContactsHaveTheirPointAndSide) {
   const Crossing target;
   for (const double side : {1.0, -1.0}) {
     // Only the first corner comes through, at (1, 0.5) and t = 0.75.
@@ -191,7 +191,7 @@ TEST(Continuous, VertexContactsSayWhereAndFromWhichSide) {
   }
 }
 
-TEST(Continuous, EdgeContactsSayWhereAndFromWhichSide) {
+TEST(Continuous, EdgeContactsHaveTheirPointAndSide) {
   // Edge (0, 1) of a, along x, comes down on edge (0, 1) of b, along y; the third corners are far
   // off.
   for (const double side : {1.0, -1.0}) {
@@ -222,9 +222,8 @@ TEST(Continuous, EdgeContactsSayWhereAndFromWhichSide) {
   }
 }
 
-/// Two triangles that share an edge and fold flat onto each other: the features they do not share
-/// meet.
-TEST(Continuous, NeighboursMeetInWhatTheyDoNotShare) {
+/// Two triangles that share an edge and fold flat onto each other: their unshared features touch.
+TEST(Continuous, NeighboursTouchOnlyInUnsharedFeatures) {
   const std::vector<Vector3d> before{{0, 0, 0}, {1, 0, 0}, {0.5, 1, 0}, {0.5, -0.5, 1}},
       now{{0, 0, 0}, {1, 0, 0}, {0.5, 1, 0}, {0.5, 0.5, -1}};
   const TriangleMesh mesh = meshOf(before, now, {{0, 1, 2}, {1, 0, 3}});

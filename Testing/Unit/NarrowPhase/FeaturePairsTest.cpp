@@ -46,9 +46,9 @@ struct Moving {
   }
 };
 
-/// Boxes over [0, upTo], exact but for rounding in double: all that overlap are kept, and few
+/// Boxes over [0, upTo], exact up to rounding in double: all overlapping pairs are kept, and few
 /// others.
-TEST(FeaturePairs, KeepWhatOverlapsUpToAnyTime) {
+TEST(FeaturePairs, KeepOverlappingPairsUpToAnyTime) {
   testing::Random random(1);
   for (const float upTo : {0.0f, 1e-6f, 0.01f, 0.3f, 0.999f, 1.0f}) {
     for (const double distance : {0.0, 1e4}) {
@@ -108,7 +108,7 @@ MeshTopology crowded(testing::Random& random, std::uint32_t vertices, std::size_
   return {vertices, list};
 }
 
-/// Without boxes: all that the definition allows, each once, in the same order on every SIMD path.
+/// Without boxes: all pairs of the definition, each once, in the same order on every SIMD path.
 TEST(FeaturePairs, AreEachTestedOnce) {
   testing::Random random(2);
   for (const std::size_t size : {1, 2, 7, 60, 300}) {
@@ -156,7 +156,7 @@ TEST(FeaturePairs, AreEachTestedOnce) {
   }
 }
 
-/// All that overlap by boxes in double, each once, and hardly more.
+/// All pairs with overlapping boxes in double, each once, and hardly more.
 void expectOverlapping(std::span<const FeaturePair> found, std::vector<Ids> exact) {
   const std::vector<Ids> ids = sorted(found);
   std::sort(exact.begin(), exact.end());
@@ -170,7 +170,7 @@ struct PublishedStep {
   std::size_t vertexTriangle, edgeEdge;
 };
 
-TEST(FeaturePairs, OfPublishedStepsAreThoseOfBoxesInDouble) {
+TEST(FeaturePairs, MatchBoxesInDoubleOnPublishedSteps) {
   const std::string folder = std::string(PALPATE_SHARED_DATA) + "/ccd-scenes/";
   if (!std::filesystem::is_directory(folder))
     GTEST_SKIP() << "no ccd-scenes in PALPATE_SHARED_DATA";
@@ -209,9 +209,9 @@ TEST(FeaturePairs, OfPublishedStepsAreThoseOfBoxesInDouble) {
   }
 }
 
-/// Of a mesh with itself, and of two in frames of their own, whose boxes are the thickness apart at
-/// the most.
-TEST(FeaturePairs, ReachAsFarAsTheThickness) {
+/// A mesh with itself, and two meshes in frames of their own, whose boxes are at most the thickness
+/// apart.
+TEST(FeaturePairs, IncludePairsWithinTheThickness) {
   testing::Random random(3);
   constexpr double kThickness = 0.02;
   testing::Mesh sheet = testing::sheet(20, 0, 0), soup = testing::soup(random, 300, 0.1);

@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Triangles that are to be tested pair by pair, each with corners of its own.
+/// Triangles for tests pair by pair, each with its own corners.
 struct Side {
   std::vector<Triangle> triangles;
   std::vector<Vector3d> positions;
@@ -29,7 +29,7 @@ struct Side {
   PlacedTriangles placed() const { return {triangles, positions}; }
 };
 
-/// What the filter says of each pair; the same on every SIMD path.
+/// The decisions of the filter for each pair, the same on every SIMD path.
 struct Answers {
   std::vector<bool> isKept;
   std::vector<TriangleIntersection> meetings;  ///< none: not known
@@ -57,7 +57,7 @@ Answers answersTo(const PlacedTriangles& a, const PlacedTriangles& b, bool self,
       const bool isKept =
           next < out.size() && out[next].triangles.a == pair.a && out[next].triangles.b == pair.b;
       answers.isKept.push_back(isKept);
-      answers.meetings.push_back(isKept ? out[next].meeting : TriangleIntersection());
+      answers.meetings.push_back(isKept ? out[next].intersection : TriangleIntersection());
       next += isKept;
     }
     EXPECT_EQ(next, out.size()) << path;
@@ -67,7 +67,7 @@ Answers answersTo(const PlacedTriangles& a, const PlacedTriangles& b, bool self,
   return ofPaths.front();
 }
 
-TEST(IntersectionFilter, KeepsWhateverIntersects) {
+TEST(IntersectionFilter, KeepsEveryIntersectingPair) {
   Random random(1);
   constexpr int kKinds = static_cast<int>(Kind::Count), kCount = 40000;
   // The largest, the smallest, and where products of three are denormal.
@@ -106,12 +106,12 @@ TEST(IntersectionFilter, KeepsWhateverIntersects) {
     unscaled += intersect && !isScaled[i];
   }
   for (int kind = 0; kind < kKinds; ++kind) EXPECT_GT(intersecting[kind], 20) << kind;
-  // Of random triangles, as large as what they lie in:
+  // For random triangles of the size of their scene:
   EXPECT_GT(leftOut, apart * 7 / 10);
   EXPECT_EQ(known, unscaled);
 }
 
-/// A corner within the last bits of the plane that it touches or not.
+/// A corner that touches a plane, or is off by the last bits.
 TEST(IntersectionFilter, KeepsCornersOnThePlane) {
   Random random(2);
   Side a, b;
@@ -137,7 +137,7 @@ TEST(IntersectionFilter, KeepsCornersOnThePlane) {
   EXPECT_EQ(std::count(isKept.begin(), isKept.end(), false), 0);
 }
 
-TEST(IntersectionFilter, OfOneMeshLeavesOutCornersInCommonAsTheDefinitionDoes) {
+TEST(IntersectionFilter, IgnoresCommonCornersOfOneMeshAsTheDefinitionDoes) {
   Random random(3);
   int found = 0, left = 0;
   for (int repeat = 0; repeat < 3000; ++repeat) {

@@ -38,7 +38,7 @@ void append(Row& row, const Vector3d& value) {
 }
 void append(Row& row, double value) { append(row, Vector3d(value, 0, 0)); }
 
-/// Contacts by their ids, each with the bits of its numbers. Of the same ids the same bits.
+/// Contacts by their ids, each with the bits of its numbers. Equal ids have equal bits.
 using Rows = std::map<Row, Row>;
 Rows rowsOf(const Buffer<VertexTriangleContact>& contacts) {
   Rows rows;
@@ -74,7 +74,7 @@ std::vector<Row> idsOf(const Rows& rows) {
   return ids;
 }
 
-/// Swapping the meshes exchanges vertex-triangle and triangle-vertex, bit for bit, and turns
+/// Swapping the meshes exchanges vertex-triangle and triangle-vertex, bit for bit, and reverses
 /// edge-edge.
 void expectSwaps(const ContactBuffers& ab, const ContactBuffers& ba) {
   EXPECT_EQ(rowsOf(ab.vertexTriangle), rowsOf(ba.triangleVertex));
@@ -83,7 +83,7 @@ void expectSwaps(const ContactBuffers& ab, const ContactBuffers& ba) {
   EXPECT_EQ(ab.intersectingTriangles.size(), ba.intersectingTriangles.size());
 }
 
-/// The contacts of two triangles, by their ids, whatever the order in which they are given.
+/// The contacts of two triangles by their ids, in any order of the triangles.
 void expectContacts(const Corners& first, const Corners& second,
                     const std::vector<Row>& vertexTriangle, const std::vector<Row>& triangleVertex,
                     const std::vector<Row>& edgeEdge) {
@@ -99,7 +99,7 @@ void expectContacts(const Corners& first, const Corners& second,
 const Corners kGround{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}};
 const Corners kPiercing{{{1, 1, -1}, {1, 1.5, 2}, {1.5, 1, 2}}};
 
-// ---- What the older octree answered with nothing ----
+// ---- Cases in which the old octree had no contacts ----
 
 TEST(IntersectionRegression, VertexOfTheSecondMeshPiercesAFaceOfTheFirst) {
   expectContacts(kGround, kPiercing, {}, {{0, 0}}, {});
@@ -137,7 +137,7 @@ TEST(IntersectionRegression, EdgesShorterThanTwentyMillionths) {
   expectContacts(piercing, ground, {{0, 0}}, {}, {});
 }
 
-// ---- What the design says ----
+// ---- Definitions ----
 
 TEST(Intersection, OneEdgeOfEachIsAnEdgeEdgeContact) {
   const Corners interlocked{{{1, 1, -1}, {1, 1, 1}, {1, -5, 0.5}}};
@@ -160,9 +160,9 @@ TEST(Intersection, NormalsOfFacesAreWindingNormalsAndDistancesBehindThemAreNegat
   EXPECT_EQ(above.vertexTriangle[0].distance, 1);
 }
 
-/// The tip is below the ground and beyond its edge y = 0: the nearest point of the ground is (1, 0,
-/// 0), the normal leads from the tip through that.
-TEST(Intersection, NormalsOfEdgesLeadToTheWindingNormalsSide) {
+/// The tip is below the ground and beyond its edge y = 0. The nearest point of the ground is (1, 0,
+/// 0). The normal is along the line from the tip to it.
+TEST(Intersection, NormalsOfEdgesPointToTheSideOfTheWindingNormal) {
   const Corners slanted{{{1, -3, -4}, {1, 3, 2}, {1.5, 3, 2}}};
   const ContactBuffers found = contactsOf(meshOf(slanted), meshOf(kGround));
   ASSERT_EQ(found.vertexTriangle.size(), 1u);
@@ -171,7 +171,7 @@ TEST(Intersection, NormalsOfEdgesLeadToTheWindingNormalsSide) {
   EXPECT_TRUE(found.vertexTriangle[0].normal.isApprox(Vector3d(0, 0.6, 0.8), 1e-15));
 }
 
-TEST(Intersection, EveryKindOfPairHasContactsWithUnitNormals) {
+TEST(Intersection, EveryTouchingPairHasContactsWithUnitNormals) {
   Random random(31);
   int seen = 0;
   for (int repeat = 0; repeat < 4000; ++repeat) {
@@ -198,14 +198,14 @@ TEST(Intersection, EveryKindOfPairHasContactsWithUnitNormals) {
   EXPECT_GT(seen, 1000);
 }
 
-TEST(Intersection, SpheresMeetInOneRingWithTheSameBitsFromEveryPair) {
+TEST(Intersection, SpheresIntersectInOneRingWithTheSameBitsFromEveryPair) {
   SceneMesh second = scenes::sphere(6);
   for (Vector3d& p : second.positions) p += Vector3d(0.9, 0.31, 0.17);
   const TriangleMesh a = meshOf(scenes::sphere(6)), b = meshOf(second);
   const ContactBuffers found = contactsOf(a, b);
   EXPECT_GT(found.intersectingTriangles.size(), 50u);
   expectSwaps(found, contactsOf(b, a));
-  // Every crossed face of either mesh has a neighbour across each edge that crosses: the ring
+  // Every crossed face of either mesh has a neighbour across each crossing edge, so the ring
   // closes.
   EXPECT_GT(rowsOf(found.edgeEdge).size(), 20u);
   EXPECT_LT(rowsOf(found.edgeEdge).size(), found.edgeEdge.size() + 1);
@@ -246,7 +246,7 @@ TEST(SelfIntersection, DuplicatedVerticesTouch) {
   EXPECT_EQ(found.intersectingTriangles.size(), 1u);
 }
 
-TEST(SelfIntersection, AFoldByAHalfTurnAboutAnEdgeIsFound) {
+TEST(SelfIntersection, FoldByAHalfTurnAboutAnEdgeIsFound) {
   const std::vector<Triangle> hinge{{0, 1, 2}, {1, 0, 3}};
   const auto folded = [&](const Vector3d& wing) {
     return selfContactsOf(meshOf({{0, 0, 0}, {4, 0, 0}, {1, 3, 1}, wing}, hinge));
@@ -258,7 +258,7 @@ TEST(SelfIntersection, AFoldByAHalfTurnAboutAnEdgeIsFound) {
   EXPECT_EQ(idsOf(rowsOf(found.vertexTriangle)), (std::vector<Row>{{3, 0}}));
 }
 
-TEST(SelfIntersection, AnEdgeThroughAFaceAtACommonVertexIsListed) {
+TEST(SelfIntersection, EdgeThroughAFaceAtACommonVertexIsListed) {
   const std::vector<Triangle> fan{{0, 1, 2}, {0, 3, 4}};
   const auto fanned = [&](const Vector3d& p, const Vector3d& q) {
     return selfContactsOf(meshOf({{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, p, q}, fan));
@@ -272,7 +272,7 @@ TEST(SelfIntersection, AnEdgeThroughAFaceAtACommonVertexIsListed) {
 }
 
 /// By definition: two edges of one must cross the other, or one of each.
-TEST(SelfIntersection, AnEdgeThroughAFaceHasAContactFromATriangleAcrossItThatSharesNoVertex) {
+TEST(SelfIntersection, EdgeThroughAFaceHasAContactWithATriangleThatSharesNoVertex) {
   const std::vector<Vector3d> positions{{0, 0, 0},  {4, 0, 0}, {0, 4, 0},
                                         {1, 1, -1}, {1, 1, 2}, {8, 8, 1}};
   const auto contactsWith = [&](const Triangle& across) {
@@ -287,13 +287,13 @@ TEST(SelfIntersection, AnEdgeThroughAFaceHasAContactFromATriangleAcrossItThatSha
   EXPECT_TRUE(sharing.vertexTriangle.empty() && sharing.edgeEdge.empty());
 }
 
-TEST(SelfIntersection, TheSameTriangleTwiceSharesEverything) {
+TEST(SelfIntersection, DuplicateTrianglesShareEverything) {
   const TriangleMesh mesh =
       meshOf({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {2, 0, 1}, {1, 1, 0}});
   EXPECT_TRUE(selfContactsOf(mesh).intersectingTriangles.empty());
 }
 
-/// By definition, feature pair by feature pair.
+/// By the definition, feature pair by feature pair.
 TEST(SelfIntersection, CommonVerticesExcludeTheirFeaturesAndNoOthers) {
   Random random(32);
   int listed = 0;

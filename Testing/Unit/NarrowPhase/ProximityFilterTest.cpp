@@ -24,16 +24,17 @@ using Possible = std::array<std::uint32_t, TrianglePairBatch::kSize>;
 
 constexpr std::uint32_t kAllTests = (1u << kTests) - 1;
 
-/// Distance of the features of a test; with distinct, none where edges do not cross inside.
+/// The distance of the features of a test. With `distinct`, edges that do not cross inside have
+/// none.
 std::optional<double> distanceOf(const Pair& x, int test, bool distinct) {
   const auto corner = [&](int triangle, int i) { return x[3 * triangle + i % 3]; };
   const auto distanceTo = [&](int triangle, const Vector3d& p) {
     return vertexTriangleDistance(p, corner(triangle, 0), corner(triangle, 1), corner(triangle, 2))
         .distance;
   };
-  if (isCorner(kOfA[test])) return distanceTo(1, corner(0, kOfA[test]));
-  if (isCorner(kOfB[test])) return distanceTo(0, corner(1, kOfB[test]));
-  const int i = edgeNumber(kOfA[test]), j = edgeNumber(kOfB[test]);
+  if (isCorner(kFeatureOfA[test])) return distanceTo(1, corner(0, kFeatureOfA[test]));
+  if (isCorner(kFeatureOfB[test])) return distanceTo(0, corner(1, kFeatureOfB[test]));
+  const int i = edgeNumber(kFeatureOfA[test]), j = edgeNumber(kFeatureOfB[test]);
   if (!distinct)
     return edgeEdgeDistance(corner(0, i), corner(0, i + 1), corner(1, j), corner(1, j + 1))
         .distance;
@@ -96,8 +97,8 @@ Pair pairOf(int kind, Random& random) {
   return x;
 }
 
-/// The thickness is exactly the distance of one of the feature pairs, which must not be left out.
-TEST(ProximityFilter, LeavesOutNothingWithinTheThickness) {
+/// The thickness is exactly the distance of one of the feature pairs, which must be kept.
+TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
   Random random;
   std::size_t within = 0;
   for (int round = 0; round < 1400; ++round) {
@@ -123,7 +124,7 @@ TEST(ProximityFilter, LeavesOutNothingWithinTheThickness) {
   EXPECT_GT(within, 5000u);
 }
 
-TEST(ProximityFilter, EveryPathLeavesOutTheSame) {
+TEST(ProximityFilter, EverySimdPathDropsTheSamePairs) {
   Random random;
   for (int round = 0; round < 300; ++round) {
     std::vector<Pair> pairs;
@@ -140,8 +141,8 @@ TEST(ProximityFilter, EveryPathLeavesOutTheSame) {
   useSimdPath("");
 }
 
-/// Of well-shaped triangles little is kept that is not within reach.
-TEST(ProximityFilter, LeavesOutNearlyAllThatIsBeyondTheThickness) {
+/// For well-shaped triangles, few pairs beyond the thickness are kept.
+TEST(ProximityFilter, DropsNearlyAllPairsBeyondTheThickness) {
   Random random;
   const double thickness = 0.03;
   int kept = 0, contacts = 0, all = 0;
@@ -162,7 +163,7 @@ TEST(ProximityFilter, LeavesOutNearlyAllThatIsBeyondTheThickness) {
   EXPECT_LT(kept, contacts + contacts / 10);
 }
 
-TEST(ProximityFilter, LeavesOutNothingWhereCoordinatesOverflow) {
+TEST(ProximityFilter, KeepsEveryPairWhereCoordinatesOverflow) {
   const double most = std::numeric_limits<double>::max();
   const Pair x{Vector3d(-most, -most, 0), Vector3d(most, -most, 0), Vector3d(0, most, 0),
                Vector3d(0, 0, 1),         Vector3d(1, 0, 1),        Vector3d(0, 1, 2)};

@@ -31,7 +31,8 @@ Eigen::AlignedBox3d boxOf(const TriangleMesh& mesh, std::uint32_t triangle) {
   return box;
 }
 
-/// Every triangle pair whose boxes, the first inflated by the thickness and a little, overlap.
+/// Every triangle pair with overlapping boxes, the first inflated by the thickness and a little
+/// more.
 std::vector<ElementPair> candidatesOf(const MeshPair& pair) {
   std::vector<ElementPair> candidates;
   const auto count = [](const TriangleMesh& mesh) {
@@ -95,7 +96,7 @@ Found find(const TriangleMesh& a, const TriangleMesh& b, double thickness, Conta
   const MeshPair pair{a, b, {Method::Proximity, thickness, contacts}};
   Found found;
   const std::vector<ElementPair> candidates = candidatesOf(pair);
-  // In batches of odd sizes: contacts must not depend on them.
+  // Batches have odd sizes, and contacts must not depend on them.
   for (std::size_t begin = 0; begin < candidates.size(); begin += 37)
     findContacts(
         pair,
@@ -105,7 +106,7 @@ Found find(const TriangleMesh& a, const TriangleMesh& b, double thickness, Conta
   return found;
 }
 
-/// Same sets, same bits, nothing twice. Returns how many contacts there are.
+/// Expects equal sets with equal bits and without duplicates. Returns how many contacts there are.
 std::size_t expectSame(const TriangleMesh& a, const TriangleMesh& b, double thickness) {
   std::size_t count = 0;
   for (const Contacts contacts : {Contacts::Distinct, Contacts::All}) {
@@ -148,7 +149,7 @@ class Random {
   std::mt19937_64 m_engine{11};
 };
 
-/// Triangles between random vertices, repeated corners and non-manifold edges included.
+/// Triangles between random vertices, with repeated corners and non-manifold edges.
 SceneMesh soup(std::uint32_t vertices, std::uint32_t triangles, double size, Random& random) {
   SceneMesh mesh;
   for (std::uint32_t i = 0; i < vertices; ++i) mesh.positions.push_back(size * random.vector());
@@ -243,14 +244,15 @@ TEST(Proximity, OffsetsAndScalesAgreeWithBruteForce) {
 
 TEST(Proximity, DegenerateMeshesAgreeWithBruteForce) {
   Random random;
-  SceneMesh zoo = scenes::sheet(4);
+  SceneMesh degenerate = scenes::sheet(4);
   // Duplicate triangles, zero areas by value and by index, a point, slivers, huge and tiny ones.
-  zoo.triangles.push_back(zoo.triangles[3]);
-  zoo.triangles.push_back({zoo.triangles[5][1], zoo.triangles[5][0], zoo.triangles[5][2]});
+  degenerate.triangles.push_back(degenerate.triangles[3]);
+  degenerate.triangles.push_back(
+      {degenerate.triangles[5][1], degenerate.triangles[5][0], degenerate.triangles[5][2]});
   const auto add = [&](const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-    const auto first = static_cast<std::uint32_t>(zoo.positions.size());
-    zoo.positions.insert(zoo.positions.end(), {a, b, c});
-    zoo.triangles.push_back({first, first + 1, first + 2});
+    const auto first = static_cast<std::uint32_t>(degenerate.positions.size());
+    degenerate.positions.insert(degenerate.positions.end(), {a, b, c});
+    degenerate.triangles.push_back({first, first + 1, first + 2});
   };
   add({0, 0, 0.01}, {0.5, 0.5, 0.01}, {1, 1, 0.01});
   add({0, 0, 0.01}, {1, 1, 0.01}, {0.25, 0.25, 0.01});
@@ -259,17 +261,17 @@ TEST(Proximity, DegenerateMeshesAgreeWithBruteForce) {
   add({-1e6, -1e6, 0.03}, {1e6, -1e6, 0.03}, {0, 1e6, 0.03});
   add({0.3, 0.3, 0.01}, {0.3 + 1e-9, 0.3, 0.01}, {0.3, 0.3 + 1e-9, 0.01});
   add({1e-310, 0, 0.01}, {0, 1e-310, 0.01}, {1e-310, 1e-310, 0.01});
-  zoo.triangles.push_back({0, 0, 1});
-  zoo.triangles.push_back({2, 3, 2});
-  zoo.triangles.push_back({4, 4, 4});
-  zoo.triangles.push_back({0, 12, 24});  // collinear, over vertices of others
-  zoo.triangles.push_back({0, 6, 12});
-  EXPECT_GT(expectSameWithItself(zoo, 0.05), 0u);
-  EXPECT_GT(expectSame(zoo, moved(zoo, {0.1, 0.1, 0.01}), 0.05), 0u);
-  EXPECT_GT(expectSame(zoo, zoo, 0.05), 0u);
+  degenerate.triangles.push_back({0, 0, 1});
+  degenerate.triangles.push_back({2, 3, 2});
+  degenerate.triangles.push_back({4, 4, 4});
+  degenerate.triangles.push_back({0, 12, 24});  // collinear, over vertices of others
+  degenerate.triangles.push_back({0, 6, 12});
+  EXPECT_GT(expectSameWithItself(degenerate, 0.05), 0u);
+  EXPECT_GT(expectSame(degenerate, moved(degenerate, {0.1, 0.1, 0.01}), 0.05), 0u);
+  EXPECT_GT(expectSame(degenerate, degenerate, 0.05), 0u);
   const SceneMesh empty;
-  EXPECT_EQ(expectSame(zoo, empty, 0.05), 0u);
-  EXPECT_EQ(expectSame(empty, zoo, 0.05), 0u);
+  EXPECT_EQ(expectSame(degenerate, empty, 0.05), 0u);
+  EXPECT_EQ(expectSame(empty, degenerate, 0.05), 0u);
 }
 
 TEST(Proximity, ThicknessLargerThanEverythingAgreesWithBruteForce) {
@@ -277,7 +279,7 @@ TEST(Proximity, ThicknessLargerThanEverythingAgreesWithBruteForce) {
   EXPECT_GT(expectSameWithItself(scenes::sphere(2), 10.0), 0u);
 }
 
-TEST(Proximity, TwoUnitCubesFaceToFaceMeetInFourContactsOrFive) {
+TEST(Proximity, TwoUnitCubesFaceToFaceHaveFourOrFiveContacts) {
   const TriangleMesh below = meshOf(cube(false));
   for (const bool otherDiagonals : {false, true}) {
     const TriangleMesh above = meshOf(moved(cube(otherDiagonals), {0, 0, 1.0625}));
@@ -301,13 +303,13 @@ TEST(Proximity, TwoUnitCubesFaceToFaceMeetInFourContactsOrFive) {
 
 // ---- Unit independence ----
 
-/// Touching features have a normal by rule, which winding and mirroring turn.
+/// Normals of touching features follow a rule, and change with winding and mirroring.
 Vector3d mappedNormal(const Vector3d& normal, double distance, bool mirrored) {
   if (distance == 0.0) return Vector3d::Zero();
   return mirrored ? Vector3d(-normal.x(), normal.y(), normal.z()) : normal;
 }
 
-/// Each corner's vertex with its weight, so that the order of corners does not matter.
+/// The vertex of each corner with its weight, so that the order of corners does not matter.
 Row unorderedRowOf(const VertexTriangleContact& c, bool mirrored, double scale) {
   Row row{c.vertex, c.triangle};
   std::array<std::pair<std::uint32_t, double>, 3> corners;
@@ -336,7 +338,7 @@ std::vector<Row> unorderedRows(const ContactBuffers& found, bool mirrored, doubl
   return rows;
 }
 
-/// On a grid, so that moving it is exact.
+/// On a grid, so that translations are exact.
 SceneMesh gridSheet(int cells, double phase) {
   SceneMesh mesh = wavySheet(cells, phase);
   for (Vector3d& p : mesh.positions)

@@ -31,8 +31,8 @@ inline Boxes randomBoxes(Random& random, std::size_t count, double size) {
   return boxes;
 }
 
-/// Boxes whose sizes halve from each to the next, about one point: nearly each level of the octree
-/// holds some of them, and passes all smaller ones on.
+/// Boxes around one point, each half the size of the one before. Nearly every level of the octree
+/// holds some of them and passes the smaller ones on.
 inline Boxes nestedBoxes(Random& random, std::size_t perLevel, int levels, std::size_t smallest) {
   Boxes boxes;
   const auto add = [&](std::size_t count, double size) {
@@ -48,12 +48,12 @@ inline Boxes nestedBoxes(Random& random, std::size_t perLevel, int levels, std::
   return boxes;
 }
 
-/// An octree of boxes, with what its owner does for it.
+/// An octree of boxes, with the calls that its owner makes.
 class BoxOctree {
  public:
   Octree octree;
 
-  /// Allocates nothing itself once prepare() was called.
+  /// It allocates nothing itself after prepare().
   void prepare(const Boxes& boxes) { m_keys.resize(boxes.size()); }
   void build(const Boxes& boxes, const OctreeSettings& settings, const Threads& threads) {
     prepare(boxes);
@@ -91,7 +91,7 @@ class BoxOctree {
   Buffer<std::uint64_t> m_keys;
 };
 
-/// The same nodes, boxes and order, bit by bit.
+/// Expects the same nodes, boxes and order, bit by bit.
 inline bool same(const Octree& a, const Octree& b) {
   const std::size_t blocks = a.pool().used();
   if (!std::ranges::equal(a.order(), b.order()) || !std::ranges::equal(a.groups(), b.groups()) ||

@@ -31,7 +31,7 @@ bool throwsNotAvailable(auto&& f) {
   return false;
 }
 
-/// Every search throws, and validation names the fault unless the tree has forgotten its size.
+/// Every search throws. Validation names the fault unless the octree has forgotten its size.
 void expectUnusable(const Octree& octree) {
   EXPECT_FALSE(octree.isBuilt());
   PointQueryStack stack;
@@ -58,8 +58,7 @@ struct Case {
   OctreeSettings settings;
 };
 
-/// Each way to sort a range: not at all, by one digit, by two and three, with second keys, and in
-/// tasks.
+/// Each way to sort a range: none, by one digit, by two and three, with second keys, and in tasks.
 std::vector<Case> cases() {
   Random random(21);
   OctreeSettings few, many;
@@ -72,8 +71,8 @@ std::vector<Case> cases() {
           {"tasks", testing::randomBoxes(random, 17'000, 0.001), many}};
 }
 
-/// Fails the n-th allocation of a build for every n. `smaller`: of a tree that was built before
-/// with fewer elements, and so has part of its memory.
+/// Fails the n-th allocation of a build, for every n. `smaller`: of an octree that was built before
+/// with fewer elements, so that it has a part of its memory.
 void failEach(const Case& c, const Threads& threads, bool smaller) {
   BoxOctree fresh;
   fresh.build(c.boxes, c.settings, threads);
@@ -111,7 +110,7 @@ void failEach(const Case& c, const Threads& threads, bool smaller) {
 
 class OctreeFailure : public ::testing::TestWithParam<int> {};
 
-TEST_P(OctreeFailure, OfAnyAllocationLeavesATreeThatCanBeBuilt) {
+TEST_P(OctreeFailure, FailedAllocationLeavesAnOctreeThatCanBeBuilt) {
   const Threads threads(GetParam());
   for (const Case& c : cases())
     for (const bool smaller : {false, true}) {
@@ -122,7 +121,7 @@ TEST_P(OctreeFailure, OfAnyAllocationLeavesATreeThatCanBeBuilt) {
 
 INSTANTIATE_TEST_SUITE_P(Threads, OctreeFailure, ::testing::Values(1, 2));
 
-TEST(OctreeFailure, StagesAreNotMixedUp) {
+TEST(OctreeFailure, StagesMustRunInTheirOrder) {
   Random random(22);
   const Boxes boxes = testing::randomBoxes(random, 500, 0.01);
   const Threads one(1);
@@ -137,9 +136,9 @@ TEST(OctreeFailure, StagesAreNotMixedUp) {
   expectUnusable(tree.octree);
 }
 
-/// A geometry whose update failed, or that was to be updated after one that failed, is updated by
-/// the next call.
-TEST_P(OctreeFailure, OfAnUpdateIsMadeUpForByTheNext) {
+/// If the update of a geometry fails, the next call updates it. The same holds for geometries after
+/// it.
+TEST_P(OctreeFailure, NextUpdateCompletesAFailedOne) {
   Random random(24);
   const testing::Mesh small = testing::soup(random, 300, 0.1),
                       other = testing::soup(random, 40, 0.1);
@@ -205,8 +204,8 @@ TEST_P(OctreeFailure, OfAnUpdateIsMadeUpForByTheNext) {
 static_assert(!std::is_copy_constructible_v<LooseOctree> &&
               !std::is_copy_assignable_v<LooseOctree>);
 
-/// What a query or traversal left behind when it ended early is not part of the next one's answer.
-TEST(OctreeFailure, OfAQueryLeavesNothingToTheNext) {
+/// State that a query or traversal left when it ended early does not affect the next one.
+TEST(OctreeFailure, FailedQueryDoesNotAffectTheNext) {
   Random random(23);
   const Boxes boxes = testing::randomBoxes(random, 3000, 0.15);
   BoxOctree tree;

@@ -23,7 +23,7 @@ constexpr std::size_t kStack = 512 << 10;  // frames are several times as large
 constexpr std::size_t kStack = 64 << 10;
 #endif
 
-/// Runs f in a thread with kStack bytes of stack. Returns how many of them were written to.
+/// Runs f in a thread with kStack bytes of stack. Returns how many of them were written.
 std::size_t stackOf(std::function<void()> f) {
   constexpr unsigned char kUntouched = 0xa5;
   void* memory = mmap(nullptr, kStack, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -48,7 +48,7 @@ std::size_t stackOf(std::function<void()> f) {
   return used;
 }
 
-/// Stacks of real-time threads are small. What is on them does not grow with the tree.
+/// Stacks of real-time threads are small. The use of the stack does not grow with the octree.
 TEST(OctreeStack, IsSmallForTheDeepestTree) {
 #ifdef __SANITIZE_THREAD__
   GTEST_SKIP() << "skipped: ThreadSanitizer keeps its own state on the stack";
@@ -87,7 +87,7 @@ TEST(OctreeStack, IsSmallForTheDeepestTree) {
   EXPECT_GE(deepest, 55);
   EXPECT_GT(found, boxes.size());
   EXPECT_EQ(queries.found.size(), boxes.size());
-  // Including what the thread itself needs, about 4 KB.
+  // This includes the use of the thread itself, about 4 KB.
   EXPECT_LE(build, kStack * 5 / 8);
   EXPECT_LE(traversal, kStack / 4);
   EXPECT_LE(points, kStack / 4);

@@ -24,8 +24,8 @@ Settings rebuilding(int threads = 1) {
   return settings;
 }
 
-/// Cells by their bounds, each with the elements it holds: what a tree is, whatever its nodes are
-/// called.
+/// Cells by their bounds, each with its elements: the content of an octree without its node
+/// indices.
 using Tree = std::set<std::pair<std::vector<double>, std::vector<std::uint32_t>>>;
 
 Tree treeOf(const OctreeBasedCD& detection, GeometryId geometry) {
@@ -95,7 +95,7 @@ TEST(Octree, IsTheSameForAnyNumberOfThreadsAndAnyHistory) {
   }
 }
 
-/// Ever more and smaller triangles towards a point: cells of many more levels than a key has.
+/// Ever more and smaller triangles towards a point: more levels of cells than a key has.
 TEST(Octree, HoldsSizesOfManyLevelsTheSameForAnyNumberOfThreads) {
   Random random(12);
   for (const std::size_t size : {255u, 256u, 1100u, 3000u, 30000u}) {
@@ -117,7 +117,7 @@ TEST(Octree, HoldsSizesOfManyLevelsTheSameForAnyNumberOfThreads) {
   }
 }
 
-TEST(Octree, KeepsItsLimits) {
+TEST(Octree, KeepsMaxDepthAndMaxElementsPerLeaf) {
   Random random(3);
   const Mesh mesh = testing::soup(random, 5000, 0.001);
   for (const int depth : {1, 2, 5, 9, 10, 20})
@@ -130,7 +130,7 @@ TEST(Octree, KeepsItsLimits) {
       detection.update();
       EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
       EXPECT_LE(detection.octree().statistics().deepestLevel, depth);
-      // A leaf may be fuller only at the maximum depth, or where all are as large as its cell.
+      // A leaf has more elements only at the maximum depth, or if all are as large as its cell.
       for (const auto node : detection.octree().nodes(id)) {
         const LooseOctree::Node n = detection.octree().node(node);
         if (n.leaf && n.depth < depth && n.elements.size() > static_cast<std::size_t>(leaf)) {
@@ -144,7 +144,7 @@ TEST(Octree, KeepsItsLimits) {
     }
 }
 
-TEST(Octree, OneFarTriangleDoesNotFlattenIt) {
+TEST(Octree, OneFarTriangleDoesNotCoarsenIt) {
   Random random(4);
   for (const std::size_t size : {200u, 3000u, 20000u})
     for (const int threads : {1, 2}) {
@@ -159,7 +159,7 @@ TEST(Octree, OneFarTriangleDoesNotFlattenIt) {
     }
 }
 
-TEST(Octree, FollowsItsGeometryAndSaysWhatRan) {
+TEST(Octree, UpdatesWithItsGeometryAndReportsHow) {
   using Update = LooseOctree::Update;
   Random random(5);
   const Mesh mesh = testing::sphere(20, 30, {0, 0, 0}, 1.0);
@@ -181,14 +181,14 @@ TEST(Octree, FollowsItsGeometryAndSaysWhatRan) {
   for (const Eigen::Vector3d& p : positions) EXPECT_TRUE(root.fittedBox.contains(p));
 }
 
-TEST(Octree, IsRebuiltWhenRefittingLoosensIt) {
+TEST(Octree, RebuildsWhenBoxesGrow) {
   Random random(7);
   const Mesh mesh = testing::soup(random, 2000, 0.01);
   std::vector<Eigen::Vector3d> positions = mesh.positions;
   OctreeBasedCD detection;
   const GeometryId id = detection.addTriangleMesh(positions, mesh.triangles);
   detection.update();
-  for (const Triangle& t : mesh.triangles) {  // neighbours part
+  for (const Triangle& t : mesh.triangles) {  // neighbours separate
     const Eigen::Vector3d away = testing::randomPoint(random, -1, 1);
     for (const std::uint32_t corner : t) positions[corner] += away;
   }
@@ -198,7 +198,7 @@ TEST(Octree, IsRebuiltWhenRefittingLoosensIt) {
   EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
 }
 
-TEST(Octree, IsRebuiltWhereFewLeap) {
+TEST(Octree, RebuildsWhereFewElementsJump) {
   Random random(9);
   std::vector<Eigen::Vector3d> positions(20'000);
   for (Eigen::Vector3d& p : positions) p = testing::randomPoint(random, -1, 1);
@@ -218,7 +218,7 @@ TEST(Octree, IsRebuiltWhereFewLeap) {
   }
 }
 
-TEST(Octree, PoolTakesBlocksBack) {
+TEST(Octree, PoolReusesFreedBlocks) {
   Random random(6);
   const Mesh large = testing::soup(random, 20000, 0.005), small = testing::soup(random, 50, 0.1);
   OctreeBasedCD detection(rebuilding());

@@ -20,7 +20,7 @@ using testing::Mesh;
 using testing::Random;
 using testing::uniform;
 
-/// A geometry's octree, and maps of its boxes: none, and one and two turns.
+/// A geometry's octree, and maps of its boxes: the identity, and one and two rotations.
 struct Case {
   GeometryTable table;
   const Octree* octree;
@@ -67,7 +67,7 @@ double squaredDistance(const FloatBox& a, const FloatBox& b) {
   return sum;
 }
 
-/// f(case, map, reach): with the largest coordinate of the case's boxes, on every path.
+/// Calls f(case, map, reach) on every SIMD path. reach: the largest coordinate of the case's boxes.
 template <class F>
 void forEachCase(F&& f) {
   Random random(7);
@@ -90,7 +90,7 @@ void forEachCase(F&& f) {
   useSimdPath("");
 }
 
-TEST(PointQueries, FindWhatOverlaps) {
+TEST(PointQueries, FindEveryOverlappingElement) {
   Random random(8);
   std::size_t all = 0, none = 0;
   forEachCase([&](const Case& c, const BoxMap& map, double reach) {
@@ -111,7 +111,7 @@ TEST(PointQueries, FindWhatOverlaps) {
   EXPECT_GT(none, 100u);
 }
 
-TEST(PointQueries, TryNoMoreThanTheNearest) {
+TEST(PointQueries, VisitNoElementFartherThanTheNearest) {
   Random random(9);
   forEachCase([&](const Case& c, const BoxMap& map, double reach) {
     PointQueryStack stack;
@@ -120,7 +120,7 @@ TEST(PointQueries, TryNoMoreThanTheNearest) {
       double nearest = std::numeric_limits<double>::infinity();
       for (std::uint32_t i = 0; i < c.size(); ++i)
         nearest = std::min(nearest, squaredDistance(map(c.octree->boxes()[i]), point));
-      // None, exactly as far as the nearest, and less.
+      // No limit, exactly the distance of the nearest, and less.
       for (const double limit : {std::numeric_limits<double>::infinity(), nearest, 0.5 * nearest}) {
         double best = limit;
         std::vector<int> times(c.size(), 0);

@@ -64,7 +64,7 @@ Mesh surfaceOf(int n, const std::function<bool(Cell)>& filled) {
   return mesh;
 }
 
-/// All points of the half-integer lattice in [-1, n + 1]³, in triangles of any kind.
+/// All points of the half-integer lattice in [-1, n + 1]³, as vertices of arbitrary triangles.
 Mesh lattice(int n) {
   Mesh mesh;
   for (int x = -2; x <= 2 * n + 2; ++x)
@@ -84,7 +84,7 @@ std::vector<InsideVertex> insideVertices(const Mesh& a, const Mesh& body,
   return {found.begin(), found.end()};
 }
 
-/// Strictly inside: every one of the cells that touch p is filled.
+/// Strictly inside: all cells that touch p are filled.
 bool isInside(const Eigen::Vector3d& p, int n, const std::function<bool(Cell)>& filled) {
   for (int corner = 0; corner < 8; ++corner) {
     Cell c;
@@ -98,7 +98,7 @@ bool isInside(const Eigen::Vector3d& p, int n, const std::function<bool(Cell)>& 
   return true;
 }
 
-/// Concave, with a hollow that is closed all around; no two cells meet in an edge or a corner only.
+/// Concave, with a closed hollow. No two cells meet in an edge or a corner only.
 const std::vector<std::function<bool(Cell)>> kBodies = {
     [](Cell) { return true; },
     [](Cell c) { return c[2] == 0 || c[0] == 0 || c[0] == 3; },
@@ -108,7 +108,7 @@ const std::vector<std::function<bool(Cell)>> kBodies = {
     },
 };
 
-TEST(InsideVertices, AreThoseOfTheCellsThoughRaysMeetEdgesAndCorners) {
+TEST(InsideVertices, MatchTheCellsWhereRaysHitEdgesAndCorners) {
   constexpr int n = 4;
   const Mesh points = lattice(n);
   for (const auto& filled : kBodies) {
@@ -141,10 +141,10 @@ TEST(InsideVertices, AreThoseOfTheCellsThoughRaysMeetEdgesAndCorners) {
   }
 }
 
-TEST(InsideVertices, AreAsByBruteForceForAnyThreads) {
+TEST(InsideVertices, MatchBruteForceForAnyNumberOfThreads) {
   testing::Random random(11);
   for (int trial = 0; trial < 6; ++trial) {
-    // From apart to one wholly within the other, far from the origin too.
+    // Positions from apart to wholly inside, far from the origin, too.
     const double gap = 0.25 * trial, far = trial % 2 ? 1e6 : 0;
     Mesh a = testing::sphere(24, 40, {far, 1.5 - gap, 0.1}, 0.5),
          b = testing::sphere(30, 50, {far, 0, 0}, 1);
@@ -177,9 +177,9 @@ TEST(InsideVertices, AreAsByBruteForceForAnyThreads) {
   }
 }
 
-/// Cells of 2^-1060: a caller that takes denormals for zero would find nothing.
-/// The search starts from what was nearest to the vertex before.
-TEST(InsideVertices, DoNotDependOnTheVertexBefore) {
+/// Cells of 2^-1060. A caller that flushes denormals to zero would find nothing.
+/// The search starts from the nearest element of the previous vertex.
+TEST(InsideVertices, DoNotDependOnThePreviousVertex) {
   Random random(11);
   for (int run = 0; run < 30; ++run) {
     const double scale = run % 3 == 0 ? 1e-6 : run % 3 == 1 ? 1.0 : 1e7;
@@ -189,7 +189,8 @@ TEST(InsideVertices, DoNotDependOnTheVertexBefore) {
     Mesh walk;
     Eigen::Vector3d at = Eigen::Vector3d::Zero();
     for (std::uint32_t i = 0; i < 300; ++i) {
-      // Steps of the depth's size, and out at times; some of them onto the surface's vertices.
+      // Steps of the depth's size, sometimes out of the body, and some of them onto vertices of the
+      // surface.
       at = (0.8 * at + std::pow(10.0, uniform(random, -4, 0)) * randomPoint(random, -1, 1))
                .cwiseMax(-0.8)
                .cwiseMin(0.8);
@@ -222,7 +223,7 @@ TEST(InsideVertices, DoNotDependOnTheCallersFloatingPoint) {
   EXPECT_EQ(std::vector<InsideVertex>(found.begin(), found.end()), expected);
 }
 
-TEST(InsideVertices, OfTheLastPositions) {
+TEST(InsideVertices, UseTheLastPositions) {
   const Mesh a = testing::sphere(8, 8, {0, 0, 0}, 0.5);
   Mesh b = testing::sphere(8, 8, {0, 0, 0}, 2);
   OctreeBasedCD detection;
@@ -256,10 +257,11 @@ TEST(InsideVertices, NeedAClosedBody) {
     EXPECT_EQ(error.code(), ErrorCode::NotClosed);
     EXPECT_EQ(error.geometry(), a);
     const Segment& edge = holes.open[0];
-    EXPECT_EQ(std::string(error.what()),
-              "geometry 0 has no inside: it is not closed and consistently oriented, 3 edges have "
-              "one triangle only, the first of vertices " +
-                  std::to_string(edge[0]) + " and " + std::to_string(edge[1]));
+    EXPECT_EQ(
+        std::string(error.what()),
+        "geometry 0 has no inside: it is not closed and consistently oriented; 3 edges belong "
+        "to one triangle only, the first is (" +
+            std::to_string(edge[0]) + ", " + std::to_string(edge[1]) + ")");
   }
   EXPECT_THROW(testing::insideVertices(detection, a, b), Error);
   EXPECT_THROW(testing::insideVertices(detection, a, a), Error);

@@ -1,6 +1,6 @@
 #include "Common/QueryCalls.h"
 #include "Common/Solids.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <palpate/OctreeBasedCD.h>
 
@@ -27,7 +27,7 @@ std::int64_t volume(const std::array<Vector3d, 4>& at) {
          e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
 }
 
-/// The lowest tetrahedron that holds p, from the definition, with its four volumes.
+/// The lowest tetrahedron that contains p, from the definition, with its four volumes.
 struct Held {
   std::uint32_t tetrahedron;
   std::array<std::int64_t, 4> volumes;
@@ -50,13 +50,13 @@ std::optional<Held> holder(const Vector3d& p, const Solid& solid) {
   return {};
 }
 
-/// All points of the integer lattice in [-1, n + 1]³, of each kind.
-std::vector<Thing> lattices(int n) {
-  Thing points{GeometryType::Points, {}, {}, {}, {0}};
+/// All points of the integer lattice in [-1, n + 1]³, as points, lines and triangles.
+std::vector<TestGeometry> lattices(int n) {
+  TestGeometry points{GeometryType::Points, {}, {}, {}, {0}};
   for (int x = -1; x <= n + 1; ++x)
     for (int y = -1; y <= n + 1; ++y)
       for (int z = -1; z <= n + 1; ++z) points.positions.emplace_back(x, y, z);
-  Thing line{GeometryType::Lines, points.positions, {}, {}, {0}},
+  TestGeometry line{GeometryType::Lines, points.positions, {}, {}, {0}},
       mesh{GeometryType::Triangles, points.positions, {}, {}, {0}};
   for (std::uint32_t v = 0; v + 1 < points.positions.size(); ++v)
     line.segments.push_back({v, v + 1});
@@ -65,7 +65,7 @@ std::vector<Thing> lattices(int n) {
   return {points, line, mesh};
 }
 
-std::vector<EmbeddedVertex> embedded(const Settings& settings, const Thing& probes,
+std::vector<EmbeddedVertex> embedded(const Settings& settings, const TestGeometry& probes,
                                      const Solid& solid) {
   OctreeBasedCD detection(settings);
   const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
@@ -77,18 +77,18 @@ std::vector<EmbeddedVertex> embedded(const Settings& settings, const Thing& prob
   return found;
 }
 
-TEST(EmbeddedVertices, AreThoseOfExactVolumesOnAGrid) {
+TEST(EmbeddedVertices, MatchExactVolumesOnAGrid) {
   Random random(1);
   std::size_t inside = 0, onBoundary = 0, inverted = 0;
   for (int run = 0; run < 12; ++run) {
     constexpr int n = 3;
     Solid solid = cells(n, random, [&](const auto&) { return random() % 4 > 0; });
-    // As it is, folded, anywhere: inverted and flat ones too.
+    // As given, folded, and at random positions, so that inverted and flat tetrahedra occur, too.
     for (Vector3d& p : solid.positions)
       for (int k = 0; k < 3 && run % 3 > 0; ++k)
         p[k] = run % 3 == 1 ? p[k] + static_cast<double>(random() % 3) - 1.0
                             : static_cast<double>(random() % (n + 1));
-    for (const Thing& probes : lattices(n)) {
+    for (const TestGeometry& probes : lattices(n)) {
       std::size_t next = 0;
       const auto found = embedded(settingsOf(Engine::Octree, 2), probes, solid);
       for (std::uint32_t v = 0; v < probes.positions.size(); ++v) {
@@ -117,9 +117,9 @@ TEST(EmbeddedVertices, AreThoseOfExactVolumesOnAGrid) {
   EXPECT_GT(inverted, 100u);
 }
 
-/// Lives of deforming solids: moved, inverted, cut, placed; any threads, rebuilt or refitted.
-TEST(EmbeddedVertices, AreAsByBruteForceForAnyThreads) {
-  const auto life = [](const Settings& settings, double scale, double far) {
+/// Histories of deforming solids: moved, inverted, cut, placed; any threads, rebuilt or refitted.
+TEST(EmbeddedVertices, MatchBruteForceForAnyNumberOfThreads) {
+  const auto resultsOf = [](const Settings& settings, double scale, double far) {
     Random random(2);
     OctreeBasedCD detection(settings);
     Solid solid = cells(4, random);
@@ -155,18 +155,19 @@ TEST(EmbeddedVertices, AreAsByBruteForceForAnyThreads) {
   };
   for (const auto& [scale, far] :
        {std::pair{1.0, 0.0}, std::pair{1.0, 1e6}, std::pair{0x1p-40, 0.0}, std::pair{1e9, 3.0}}) {
-    const auto truth = life(settingsOf(Engine::BruteForce), scale, far);
+    const auto truth = resultsOf(settingsOf(Engine::BruteForce), scale, far);
     for (std::size_t frame = 0; frame < truth.size(); ++frame)
       EXPECT_TRUE(truth[frame].size() > 40 || (far > 1 && frame >= 6)) << frame;
-    for (const Settings& settings : octreeSettings()) EXPECT_EQ(life(settings, scale, far), truth);
+    for (const Settings& settings : octreeSettings())
+      EXPECT_EQ(resultsOf(settings, scale, far), truth);
   }
 }
 
-/// One vertex moves at a time, so that nothing else tells that positions are new.
-TEST(EmbeddedVertices, AreOfTheLastPositions) {
+/// One vertex moves at a time, so that nothing else shows that positions are new.
+TEST(EmbeddedVertices, UseTheLastPositions) {
   Random random(8);
   const Solid solid = cells(4, random);
-  const Thing probes = particles(random, 150, 0);
+  const TestGeometry probes = particles(random, 150, 0);
   Positions places = probes.positions;
   for (Vector3d& p : places) p *= 4;
   std::set<std::size_t> sizes;
@@ -188,11 +189,11 @@ TEST(EmbeddedVertices, AreOfTheLastPositions) {
   EXPECT_GT(sizes.size(), 4u);
 }
 
-TEST(EmbeddedVertices, WeightsGiveThePointBack) {
+TEST(EmbeddedVertices, WeightsReproduceThePoint) {
   Random random(3);
   Solid solid = cells(3, random);
   for (Vector3d& p : solid.positions) p = 40.0 * p + randomPoint(random, -15, 15);
-  Thing probes = particles(random, 2000, 0);
+  TestGeometry probes = particles(random, 2000, 0);
   for (Vector3d& p : probes.positions) p *= 120;
   const auto found = embedded(settingsOf(Engine::Octree), probes, solid);
   EXPECT_GT(found.size(), 1000u);
@@ -213,7 +214,7 @@ TEST(EmbeddedVertices, DoNotDependOnTheOrderOfCorners) {
   Random random(4);
   Solid solid = cells(3, random), turned = solid;
   for (Tetrahedron& t : turned.tetrahedra) std::shuffle(t.begin(), t.end(), random);
-  const Thing probes = lattices(3)[0];
+  const TestGeometry probes = lattices(3)[0];
   const auto expected = embedded(settingsOf(Engine::Octree), probes, solid),
              found = embedded(settingsOf(Engine::Octree), probes, turned);
   ASSERT_EQ(found.size(), expected.size());
@@ -231,8 +232,8 @@ TEST(EmbeddedVertices, DoNotDependOnTheOrderOfCorners) {
 
 // ---- Inside, by tetrahedra ----
 
-std::vector<InsideVertex> inside(const Settings& settings, const Thing& probes, const Solid& solid,
-                                 bool asTriangles) {
+std::vector<InsideVertex> inside(const Settings& settings, const TestGeometry& probes,
+                                 const Solid& solid, bool asTriangles) {
   OctreeBasedCD detection(settings);
   const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
                    other = probes.addTo(detection);
@@ -246,7 +247,7 @@ std::vector<InsideVertex> inside(const Settings& settings, const Thing& probes, 
   return {found.begin(), found.end()};
 }
 
-TEST(EmbeddedVertices, InsideIsThatOfTheSurfaceAtRest) {
+TEST(EmbeddedVertices, InsideMatchesTheSurfaceAtRest) {
   Random random(5);
   constexpr int n = 3;
   const std::function<bool(const std::array<int, 3>&)> bodies[] = {
@@ -257,7 +258,7 @@ TEST(EmbeddedVertices, InsideIsThatOfTheSurfaceAtRest) {
   for (const auto& filled : bodies) {
     Solid solid = cells(n, random, filled);
     for (Vector3d& p : solid.positions) p *= 2;
-    for (const Thing& probes : lattices(2 * n)) {
+    for (const TestGeometry& probes : lattices(2 * n)) {
       const auto truth = inside(settingsOf(Engine::Octree), probes, solid, true);
       EXPECT_GT(truth.size(), 10u);
       EXPECT_EQ(inside(settingsOf(Engine::Octree, 2), probes, solid, false), truth);
@@ -267,7 +268,7 @@ TEST(EmbeddedVertices, InsideIsThatOfTheSurfaceAtRest) {
 }
 
 /// Where the surface is not closed and oriented, and where it is turned inside out.
-TEST(EmbeddedVertices, InsideIsInATetrahedronAndNotOnTheSurface) {
+TEST(EmbeddedVertices, InsideMeansInATetrahedronAndNotOnTheSurface) {
   Random random(6);
   std::size_t found = 0;
   for (int run = 0; run < 8; ++run) {
@@ -276,7 +277,7 @@ TEST(EmbeddedVertices, InsideIsInATetrahedronAndNotOnTheSurface) {
     for (Vector3d& p : solid.positions)
       for (int k = 0; k < 3; ++k)
         p[k] = run % 2 ? 2 * p[k] : static_cast<double>(random() % (2 * n + 1));
-    const Thing probes = lattices(2 * n)[0];
+    const TestGeometry probes = lattices(2 * n)[0];
     Settings settings = settingsOf(Engine::Octree);
     OctreeBasedCD detection(settings);
     const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
@@ -301,7 +302,7 @@ TEST(EmbeddedVertices, InsideIsInATetrahedronAndNotOnTheSurface) {
   EXPECT_GT(found, 50u);
 }
 
-TEST(EmbeddedVertices, WhatCannotBeAskedIsRefusedByName) {
+TEST(EmbeddedVertices, BadCallsThrowErrorsThatNameTheCause) {
   Random random(7);
   const Solid solid = cells(1, random);
   OctreeBasedCD detection(settingsOf(Engine::Octree));
@@ -322,16 +323,15 @@ TEST(EmbeddedVertices, WhatCannotBeAskedIsRefusedByName) {
   expectRefused(ErrorCode::UnsupportedMethod,
                 "geometry 1 is a point set; findTetrahedron() is for tetrahedral meshes",
                 [&] { detection.queries().findTetrahedron(points, Vector3d::Zero()); });
-  expectRefused(ErrorCode::InvalidSettings, "geometry 0: its own vertices lie on it",
+  expectRefused(ErrorCode::InvalidSettings, "geometry 0 is both the body and the owner",
                 [&] { testing::embeddedVertices(detection, body, body); });
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  expectRefused(ErrorCode::NonFinitePosition, "geometry 0: a point to be found is (nan, 0, 0)",
-                [&] {
-                  detection.queries().findTetrahedron(body, {nan, 0, 0});
-                });
+  expectRefused(ErrorCode::NonFinitePosition, "geometry 0: the point is (nan, 0, 0)", [&] {
+    detection.queries().findTetrahedron(body, {nan, 0, 0});
+  });
   EXPECT_FALSE(detection.queries().findTetrahedron(body, {2, 0, 0}));
   EXPECT_TRUE(detection.queries().findTetrahedron(body, {1, 1, 1}));
-  // Nothing at all, and nothing but surface that is on both sides.
+  // No tetrahedra at all, and only surface that is on both sides.
   const GeometryId empty = detection.addTetrahedralMesh(solid.positions, {});
   EXPECT_TRUE(testing::embeddedVertices(detection, points, empty).empty());
   EXPECT_TRUE(testing::insideVertices(detection, points, empty).empty());

@@ -1,6 +1,6 @@
 #include "Common/QueryCalls.h"
 #include "Common/Solids.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/PenetrationTracker.h>
@@ -33,7 +33,7 @@ Vector3d weighted(const Corners& c, const Vector3d& w) {
   return w[0] * c[0] + w[1] * c[1] + w[2] * c[2];
 }
 
-/// What takes a triangle's edge and normal from one frame to the next.
+/// The transform of a triangle's edge and normal from one frame to the next.
 Eigen::Matrix3d turn(const Corners& before, const Corners& now) {
   const auto axes = [](const Corners& c) {
     Eigen::Matrix3d m;
@@ -45,7 +45,8 @@ Eigen::Matrix3d turn(const Corners& before, const Corners& now) {
   return axes(now) * axes(before).transpose();
 }
 
-/// How far along a ray the surface is first met, by each triangle's plane; met: certainly.
+/// The distance along a ray at which the surface is first hit, by each triangle's plane. met:
+/// certainly.
 double firstMet(const Story& story, std::size_t frame, const Vector3d& p, const Vector3d& u,
                 bool certainly) {
   double first = std::numeric_limits<double>::infinity();
@@ -64,7 +65,7 @@ double firstMet(const Story& story, std::size_t frame, const Vector3d& p, const 
 
 struct Tally {
   std::map<DirectionChange, std::size_t> changes;
-  double largestTurn = 0;  ///< beyond what motion explains, not named
+  double largestTurn = 0;  ///< beyond the body's motion, but not reported
 };
 
 using Answers = std::vector<std::vector<TrackedVertex>>;
@@ -92,8 +93,8 @@ Answers answers(const Settings& settings, const Story& story) {
   return all;
 }
 
-/// Every change against the definition, and the promise: turns beyond what motion explains are
-/// named, and nothing else is.
+/// Compares every change with the definition and the guarantee: turns beyond the body's motion are
+/// reported, and nothing else is.
 Tally expectDefined(const Story& story, const Answers& all) {
   constexpr double kSlack = 1e-9;
   Tally tally;
@@ -170,7 +171,7 @@ std::vector<Mesh> bodies(Random& random) {
           sphere(8, 12, {1.5, 1.5, 1.5}, 1.4)};
 }
 
-TEST(PenetrationTracker, FlipNowhereUnnamedInPointsThatMoveThroughABodyAtRest) {
+TEST(PenetrationTracker, ReportsLargeChangesForPointsThatMoveThroughABodyAtRest) {
   Random random(1);
   std::map<DirectionChange, std::size_t> changes;
   for (const Mesh& mesh : bodies(random)) {
@@ -196,7 +197,7 @@ TEST(PenetrationTracker, FlipNowhereUnnamedInPointsThatMoveThroughABodyAtRest) {
   EXPECT_GT(changes[DirectionChange::Jumped], 20u);
 }
 
-TEST(PenetrationTracker, FlipNowhereUnnamedInBodiesThatTurnAndDeform) {
+TEST(PenetrationTracker, ReportsLargeChangesInBodiesThatTurnAndDeform) {
   Random random(2);
   std::map<DirectionChange, std::size_t> changes;
   for (const Mesh& mesh : bodies(random)) {
@@ -226,9 +227,9 @@ TEST(PenetrationTracker, FlipNowhereUnnamedInBodiesThatTurnAndDeform) {
   EXPECT_GT(changes[DirectionChange::Jumped], 10u);
 }
 
-/// A block pushed slowly through a slab, trembling: the way out is back where it came from until
-/// that is twice as far as on, then on; once for each vertex.
-TEST(PenetrationTracker, APushedBodyIsLetThroughOnce) {
+/// A block pushed slowly through a slab, trembling. The penetration direction leads back until that
+/// is twice as far as ahead, then ahead. It changes once for each vertex.
+TEST(PenetrationTracker, PushedBodyChangesSidesOnce) {
   Random random(3);
   const Mesh slab = blocks(1, random, [](const auto&) { return true; }),
              block = blocks(2, random, [](const auto&) { return true; });
@@ -259,8 +260,8 @@ TEST(PenetrationTracker, APushedBodyIsLetThroughOnce) {
   for (const auto& [vertex, count] : jumps) EXPECT_EQ(count, 1u);
 }
 
-/// A body by a transform, its probes by the same: nothing changes but all turns.
-TEST(PenetrationTracker, TurnWithTheBody) {
+/// A body moves by a transform, its probes by the same: nothing changes but the directions turn.
+TEST(PenetrationTracker, DirectionsTurnWithTheBody) {
   Random random(4);
   const Mesh mesh = blocks(3, random, [](const auto& c) { return c[2] == 0 || c[0] == 0; });
   Positions points;
@@ -289,7 +290,7 @@ TEST(PenetrationTracker, TurnWithTheBody) {
   }
 }
 
-TEST(PenetrationTracker, StartAnewWithTopology) {
+TEST(PenetrationTracker, RestartsWithNewTopology) {
   Random random(5);
   const Mesh mesh = sphere(6, 8, {0, 0, 0}, 1);
   const Positions points{{0.5, 0, 0}, {0, 0, 5}};
@@ -307,7 +308,7 @@ TEST(PenetrationTracker, StartAnewWithTopology) {
   };
   EXPECT_EQ(change(probes), DirectionChange::Entered);
   EXPECT_EQ(change(probes), DirectionChange::None);
-  EXPECT_EQ(change(others), DirectionChange::Entered);  // each tracker for itself
+  EXPECT_EQ(change(others), DirectionChange::Entered);  // each tracker by itself
   EXPECT_EQ(change(probes), DirectionChange::None);
   detection.setTriangles(body, mesh.positions, mesh.triangles);
   EXPECT_EQ(change(probes), DirectionChange::Entered);

@@ -16,8 +16,8 @@
 #include <utility>
 #include <vector>
 
-// How long SpatialQueries are valid, what they write, and from where they may be called. What they
-// answer is compared with brute force in the tests of each query.
+// Validity of SpatialQueries, their output, and the threads and callbacks that may call them. The
+// tests of each query compare its results with brute force.
 namespace palpate::testing {
 namespace {
 
@@ -70,7 +70,7 @@ void expectInvalid(const std::function<void()>& call, const std::string& words) 
   expectRefused(ErrorCode::InvalidCall, words, call);
 }
 
-TEST(SpatialQueries, LaterCallsLeaveEarlierResults) {
+TEST(SpatialQueries, LaterCallsDoNotChangeEarlierResults) {
   Scene scene;
   const SpatialQueries queries = scene.collisions.queries();
   std::vector<InsideVertex> first, second;
@@ -79,12 +79,12 @@ TEST(SpatialQueries, LaterCallsLeaveEarlierResults) {
   queries.findInsideVertices(scene.open, scene.ball, second);
   EXPECT_EQ(first, kept);
   EXPECT_NE(first, second);
-  // What throws leaves the vector, too.
+  // A call that throws leaves the vector unchanged, too.
   EXPECT_THROW(queries.findInsideVertices(scene.points, scene.open, first), Error);
   EXPECT_EQ(first, kept);
 }
 
-TEST(SpatialQueries, AreInvalidAfterAnyChangeOfWhatTheySearch) {
+TEST(SpatialQueries, AreInvalidAfterAnyChangeOfTheirGeometries) {
   const Eigen::Matrix3d unit = Eigen::Matrix3d::Identity();
   const std::vector<std::pair<std::string, std::function<void(Scene&)>>> changes{
       {"setPositions", [](Scene& s) { s.collisions.setPositions(s.ball, s.ballRest); }},
@@ -109,7 +109,7 @@ TEST(SpatialQueries, AreInvalidAfterAnyChangeOfWhatTheySearch) {
           (void)queries.findTetrahedron(scene.solid, {0, 0, 0});
         },
         "call queries() again");
-    // Those that are asked for now are valid; the earlier ones stay as they are.
+    // Queries that are requested now are valid. The earlier ones stay outdated.
     ask(scene, scene.collisions.queries());
     expectInvalid(
         [&] {
@@ -149,7 +149,7 @@ TEST(SpatialQueries, StayValidThroughDetectionsAndPairs) {
   EXPECT_EQ(ask(scene, copy), before);
 }
 
-/// A frame that an exception ends leaves queries as they were.
+/// A frame that an exception ends leaves queries valid.
 TEST(SpatialQueries, StayValidAfterAFrameThatThrows) {
   Scene scene;
   OctreeBasedCD& collisions = scene.collisions;
@@ -163,7 +163,7 @@ TEST(SpatialQueries, StayValidAfterAFrameThatThrows) {
   EXPECT_EQ(ask(scene, queries), before);
 }
 
-TEST(SpatialQueries, MayOutliveAndFollowTheirOwner) {
+TEST(SpatialQueries, MayOutliveAndMoveWithTheirOwner) {
   std::optional<Scene> scene(std::in_place);
   const SpatialQueries queries = scene->collisions.queries();
   const Answers before = ask(*scene, queries);
@@ -176,7 +176,7 @@ TEST(SpatialQueries, MayOutliveAndFollowTheirOwner) {
   expectInvalid([&] { (void)empty.findTetrahedron(scene->solid, {0, 0, 0}); }, "moved from");
 }
 
-TEST(SpatialQueries, AreRefusedWithinACallbackOfTheirOwner) {
+TEST(SpatialQueries, ThrowWithinACallbackOfTheirOwner) {
   Scene scene;
   OctreeBasedCD& collisions = scene.collisions;
   collisions.addCollisionPair(scene.points, scene.ball, {Method::Proximity, 0.2});
@@ -190,8 +190,8 @@ TEST(SpatialQueries, AreRefusedWithinACallbackOfTheirOwner) {
   ask(scene, queries);
 }
 
-/// Octrees, tetrahedra's octrees and winding numbers are made by whichever thread needs them first.
-TEST(SpatialQueries, ManyThreadsGetTheAnswersOfOne) {
+/// The thread that needs them first builds octrees, octrees of tetrahedra and winding numbers.
+TEST(SpatialQueries, ManyThreadsGetTheResultsOfOne) {
   for (const int threads : {1, 3}) {
     const Scene alone;
     const Answers expected = ask(alone, alone.collisions.queries());
@@ -210,8 +210,8 @@ TEST(SpatialQueries, ManyThreadsGetTheAnswersOfOne) {
   }
 }
 
-/// Outdated queries are refused, also while another thread brings the octrees up to date.
-TEST(SpatialQueries, OutdatedOnesAreRefusedBesideNewOnes) {
+/// Outdated queries throw, also while another thread updates the octrees.
+TEST(SpatialQueries, OutdatedOnesThrowBesideNewOnes) {
   Scene scene;
   for (int repeat = 0; repeat < 20; ++repeat) {
     const SpatialQueries old = scene.collisions.queries();
@@ -224,7 +224,7 @@ TEST(SpatialQueries, OutdatedOnesAreRefusedBesideNewOnes) {
   }
 }
 
-TEST(SpatialQueries, ChangeNoStatisticsAndNoAnswers) {
+TEST(SpatialQueries, ChangeNoStatisticsAndNoContacts) {
   Scene scene;
   OctreeBasedCD& collisions = scene.collisions;
   collisions.addCollisionPair(scene.points, scene.ball, {Method::Proximity, 0.1});
@@ -240,8 +240,8 @@ TEST(SpatialQueries, ChangeNoStatisticsAndNoAnswers) {
   EXPECT_EQ(collisions.collisionData(scene.points, scene.ball).hash(), hash);
 }
 
-/// What a tracker remembers is its own: of one object, and left by a call that throws.
-TEST(PenetrationTracker, RemembersByItself) {
+/// The state of a tracker belongs to one object, and a call that throws leaves it unchanged.
+TEST(PenetrationTracker, KeepsItsOwnState) {
   Scene first, second;
   PenetrationTracker one(first.points, first.ball), other(first.points, first.ball);
   const auto change = [](PenetrationTracker& tracker, Scene& scene) {

@@ -69,8 +69,8 @@ Positions pointsAround(Random& random, std::size_t count, double half) {
   return points;
 }
 
-/// Found, and decided, as the truth says, but where that is open to rounding; the same by brute
-/// force and any threads. Returns how many are found.
+/// The vertices and `decided` match the exact values, except within rounding. Brute force and any
+/// threads give the same. Returns how many are found.
 std::size_t expectTrue(const Positions& points, const Mesh& body, double margin = 0) {
   const std::vector<InsideVertex> found = find(points, body, byNumber(margin));
   EXPECT_EQ(find(points, body, byNumber(margin), settingsOf(Engine::BruteForce)), found);
@@ -98,7 +98,7 @@ Mesh lump(Random& random, std::uint32_t rings, std::uint32_t segments) {
   return mesh;
 }
 
-/// With another one turned inside out.
+/// With another body inside, turned inside out.
 void add(Mesh& mesh, const Mesh& hollow) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   mesh.positions.insert(mesh.positions.end(), hollow.positions.begin(), hollow.positions.end());
@@ -106,7 +106,7 @@ void add(Mesh& mesh, const Mesh& hollow) {
     mesh.triangles.push_back({first + a, first + c, first + b});
 }
 
-TEST(WindingNumber, OfClosedBodiesIsAsDecidedExactly) {
+TEST(WindingNumber, MatchesExactContainmentInClosedBodies) {
   Random random(1);
   for (int run = 0; run < 6; ++run) {
     Mesh body = lump(random, 12, 16);
@@ -128,7 +128,7 @@ TEST(WindingNumber, OfClosedBodiesIsAsDecidedExactly) {
   }
 }
 
-TEST(WindingNumber, SpansHolesAsTheyGrow) {
+TEST(WindingNumber, FewerPointsAreInsideAsHolesGrow) {
   Random random(2);
   const Mesh whole = lump(random, 24, 30);
   const Positions points = pointsAround(random, 150, 1.1);
@@ -148,7 +148,7 @@ TEST(WindingNumber, SpansHolesAsTheyGrow) {
   }
 }
 
-TEST(WindingNumber, OfDoubledAndFlippedTriangles) {
+TEST(WindingNumber, CountsDoubledAndFlippedTriangles) {
   Random random(3);
   const Positions points = pointsAround(random, 150, 1.1);
   Mesh doubled = lump(random, 20, 24), flipped = doubled;
@@ -161,7 +161,7 @@ TEST(WindingNumber, OfDoubledAndFlippedTriangles) {
   EXPECT_GT(expectTrue(points, flipped, 0.2), 30u);
 }
 
-TEST(WindingNumber, OfASoupOfASpheresTriangles) {
+TEST(WindingNumber, WorksOnATriangleSoup) {
   Random random(4);
   const Mesh whole = sphere(24, 30, {0, 0, 0}, 1);
   Mesh soup;
@@ -183,8 +183,8 @@ TEST(WindingNumber, OfASoupOfASpheresTriangles) {
     }
 }
 
-/// From the middle of an open face a cube takes exactly half of all directions.
-TEST(WindingNumber, OfOneHalfIsNotDecided) {
+/// From the middle of an open face, a cube covers exactly half of all directions.
+TEST(WindingNumber, NearOneHalfIsUndecided) {
   Mesh cube;
   for (int v = 0; v < 8; ++v) cube.positions.push_back(Vector3d(v & 1, v >> 1 & 1, v >> 2));
   const auto face = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d) {
@@ -229,7 +229,7 @@ TEST(WindingNumber, DoesNotDependOnTheOctree) {
   EXPECT_EQ(std::vector<InsideVertex>(found.begin(), found.end()), find(points, moved, byNumber()));
 }
 
-TEST(WindingNumber, OfAnySizeAndOfWhatHasNoArea) {
+TEST(WindingNumber, WorksAtAnySizeAndWithoutArea) {
   Random random(6);
   for (const double scale : {0x1p-1000, 0x1p-400, 0x1p-100, 0x1p100, 0x1p300}) {
     Mesh body = lump(random, 8, 10);
@@ -250,7 +250,7 @@ TEST(WindingNumber, OfAnySizeAndOfWhatHasNoArea) {
   EXPECT_TRUE(find({{0, 1, 0}, {3, 0, 0}, {0.5, 0, 0}}, flat, byNumber()).empty());
 }
 
-TEST(WindingNumber, RefusesWhatItCannot) {
+TEST(WindingNumber, BadCallsThrow) {
   const Mesh body = sphere(4, 5, {0, 0, 0}, 1);
   OctreeBasedCD detection;
   const GeometryId id = detection.addTriangleMesh(body.positions, body.triangles),

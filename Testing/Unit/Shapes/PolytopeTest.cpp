@@ -14,8 +14,8 @@
 #include <utility>
 #include <vector>
 
-// Hulls of clouds: closed, convex, and around every point, all by exact predicates; distances
-// against every triangle.
+// Hulls of point clouds are closed, convex and around every point, by exact predicates. Distances
+// are compared with every triangle.
 
 namespace palpate::testing {
 namespace {
@@ -23,7 +23,7 @@ namespace {
 using Eigen::Vector3d;
 using Positions = std::vector<Vector3d>;
 
-/// Whether the triangles are closed, turn outwards, and have every point behind them or on them.
+/// Whether the triangles are closed, wound outward, and have every point behind them or on them.
 void expectHullOf(const Polytope& hull, const Positions& cloud) {
   SignCounts counts;
   std::map<std::array<std::uint32_t, 2>, int> edges;
@@ -67,7 +67,8 @@ std::vector<Positions> clouds(Random& random) {
       grid.push_back((3 * randomPoint(random, 0, 1)).array().floor());
       thin.push_back(randomPoint(random, 0, 1).cwiseProduct(Vector3d(1, 1e-3, 1e-16)));
       far.push_back(randomPoint(random, 0, 1e-9) + Vector3d(1e6, -3e5, 7e5));
-      const Vector3d g = grid.back() / 3;  // nearly coplanar: rounding moves them off their planes
+      const Vector3d g =
+          grid.back() / 3;  // nearly coplanar: rounding moves the points off their planes
       turned.push_back({0.6 * g[0] - 0.8 * g[1], 0.8 * g[0] + 0.6 * g[1], g[2] + 0.1 * g[0]});
     }
     all.insert(all.end(), {inside, grid, thin, far, turned, onSphere(random, count)});
@@ -86,8 +87,8 @@ TEST(Polytope, IsTheHullOfItsPoints) {
   EXPECT_GT(count, 24);
 }
 
-/// Many points: in order of their places, as a mesh has them, all on the surface, mostly inside,
-/// near one plane, and about two apexes that many others see.
+/// Many points: in the order of their places as in a mesh, all on the surface, mostly inside, near
+/// one plane, and with two apexes that are visible from many faces.
 TEST(Polytope, IsTheHullOfManyPoints) {
   Random random(5);
   constexpr int kCount = 1500;
@@ -125,10 +126,9 @@ TEST(Polytope, IsTheHullOfManyPoints) {
   EXPECT_EQ(Polytope(doubled).points().size(), std::size_t{kCount / 3});
 }
 
-/// 64 times as many points take less than 64 * 64 / 8 times as long, of the
-/// processor's time: with n log n it is about 100,
-/// with n squared 4096.
-TEST(Polytope, OfManyPointsIsMadeInNLogN) {
+/// 64 times as many points take less than 64 * 64 / 8 times the CPU time. With n log n the factor
+/// is about 100, with n squared 4096.
+TEST(Polytope, HullOfManyPointsTakesNLogNTime) {
   Random random(6);
   const auto secondsFor = [&](int count) {
     const Positions cloud = onSphere(random, count);
@@ -144,7 +144,7 @@ TEST(Polytope, OfManyPointsIsMadeInNLogN) {
   EXPECT_LT(large, 512 * small) << small << " s and " << large << " s";
 }
 
-TEST(Polytope, GrowsPointByPoint) {
+TEST(Polytope, HullGrowsPointByPoint) {
   Random random(2);
   for (int run = 0; run < 30; ++run) {
     Positions cloud = onSphere(random, 20);
@@ -155,7 +155,7 @@ TEST(Polytope, GrowsPointByPoint) {
     for (const Vector3d& p : cloud) EXPECT_FALSE(hull.add(p));
     for (int i = 0; i < 20; ++i) {
       const Vector3d x = randomPoint(random, -1.5, 1.5);
-      EXPECT_NEAR(hull.at(x, 0).distance, whole.at(x, 0).distance, 1e-15);
+      EXPECT_NEAR(hull.signedDistance(x, 0).distance, whole.signedDistance(x, 0).distance, 1e-15);
     }
   }
 }
@@ -180,14 +180,14 @@ TEST(Polytope, PlatesHaveTwoSides) {
       ASSERT_NE(back, edges.end());
       EXPECT_EQ(number, back->second);
     }
-    for (const Vector3d& p : cloud) EXPECT_NEAR(plate.at(p, 1e-14).distance, 0, 1e-14);
+    for (const Vector3d& p : cloud) EXPECT_NEAR(plate.signedDistance(p, 1e-14).distance, 0, 1e-14);
     const Vector3d up = Vector3d(-2, 1, 1).normalized(), middle = (cloud[0] + cloud[1]) / 2;
     for (const double height : {0.5, -0.5})
-      EXPECT_NEAR(plate.at(middle + height * up, 1e-14).distance, 0.5, 1e-14);
+      EXPECT_NEAR(plate.signedDistance(middle + height * up, 1e-14).distance, 0.5, 1e-14);
   }
 }
 
-TEST(Polytope, DistanceIsThatOfTheNearestTriangle) {
+TEST(Polytope, DistanceMatchesTheNearestTriangle) {
   Random random(4);
   std::vector<Positions> all = clouds(random);
   Positions needle = onSphere(random, 100);
@@ -210,7 +210,7 @@ TEST(Polytope, DistanceIsThatOfTheNearestTriangle) {
         const auto flat = vertexTriangleDistance(points[a], points[a], points[b], points[c]);
         highest = std::max(highest, flat.normal.dot(x - points[a]));
       }
-      const SignedDistance found = hull.at(x, tie);
+      const SignedDistance found = hull.signedDistance(x, tie);
       EXPECT_NEAR(std::abs(found.distance), nearest, 8 * tie);
       EXPECT_NEAR(found.normal.norm(), 1, 1e-14);
       EXPECT_TRUE(std::abs(highest) <= 1e-6 * size || (found.distance < 0) == (highest < 0));

@@ -1,7 +1,7 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/ShapeTruth.h"
-#include "Common/Things.h"
+#include "Common/TestGeometry.h"
 #include "Shapes/Shape.h"
 
 #include <gtest/gtest.h>
@@ -14,14 +14,14 @@
 #include <vector>
 
 // Shapes of any size: a scene scaled by a power of two has the scaled contacts. Squares of its
-// measures leave the range of double at most of these scales.
+// lengths leave the range of double at most of these scales.
 
 namespace palpate::testing {
 namespace {
 
 constexpr double kDenormal = std::numeric_limits<double>::denorm_min();
-/// The largest measure of these scenes, about 1, is near the limit of 1e300 = 2^996.6, or its bits
-/// are near the end of what double holds.
+/// The largest length of these scenes is about 1. Scaled, it is near the limit of 1e300 = 2^996.6,
+/// or its last bits are near the end of the range of double.
 constexpr int kScales[] = {996, 900, 530, 512, 380, 250, -250, -380, -512, -530, -900, -1022};
 
 AnalyticalGeometry scaled(AnalyticalGeometry geometry, double by) {
@@ -41,13 +41,13 @@ struct Move {
   Vector3d shift;
 };
 
-/// A shape and a geometry with elements, or a second shape, in one step.
+/// A shape and a geometry with elements, or two shapes, in one step.
 struct Scene {
   AnalyticalGeometry shape;
   std::array<Move, 2> ends;
   std::optional<AnalyticalGeometry> other{};
   std::array<Move, 2> otherEnds{};
-  Thing thing{};
+  TestGeometry geometry{};
   Positions now{};
 
   Scene scaledBy(double by) const {
@@ -56,24 +56,24 @@ struct Scene {
     if (other) scene.other = scaled(*other, by);
     for (auto* moves : {&scene.ends, &scene.otherEnds})
       for (Move& move : *moves) move.shift *= by;
-    for (auto* list : {&scene.thing.positions, &scene.now})
+    for (auto* list : {&scene.geometry.positions, &scene.now})
       for (Vector3d& p : *list) p *= by;
-    for (double& radius : scene.thing.radii) radius *= by;
+    for (double& radius : scene.geometry.radii) radius *= by;
     return scene;
   }
 
   CollisionData answer(const PairSettings& pair) const {
     OctreeBasedCD collisions(settingsOf(Engine::Octree));
     const GeometryId first = collisions.addAnalyticalGeometry(shape),
-                     second =
-                         other ? collisions.addAnalyticalGeometry(*other) : thing.addTo(collisions);
+                     second = other ? collisions.addAnalyticalGeometry(*other)
+                                    : geometry.addTo(collisions);
     collisions.addCollisionPair(first, second, pair);
     for (const std::size_t end : {0, 1}) {
       collisions.setTransform(first, ends[end].turn, ends[end].shift);
       if (other)
         collisions.setTransform(second, otherEnds[end].turn, otherEnds[end].shift);
       else if (end == 1)
-        collisions.setPositions(second, thing.positions, now);
+        collisions.setPositions(second, geometry.positions, now);
       collisions.detectCollision();
     }
     return collisions.collisionData(first, second);
@@ -103,19 +103,19 @@ std::array<Move, 2> randomMoves(Random& random) {
   return ends;
 }
 
-Thing elements(Random& random, int type) {
-  Thing thing;
-  thing.type = static_cast<GeometryType>(type);
-  if (type > 0) thing.radii = {0.01};
+TestGeometry elements(Random& random, int type) {
+  TestGeometry geometry;
+  geometry.type = static_cast<GeometryType>(type);
+  if (type > 0) geometry.radii = {0.01};
   for (std::uint32_t i = 0; i < 12; ++i) {
     const Vector3d p = randomPoint(random, -0.7, 0.7);
-    thing.positions.push_back(p);
-    if (type < 2) thing.positions.push_back(p + randomPoint(random, -0.4, 0.4));
-    if (type == 0) thing.positions.push_back(p + randomPoint(random, -0.4, 0.4));
-    if (type == 0) thing.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
-    if (type == 1) thing.segments.push_back({2 * i, 2 * i + 1});
+    geometry.positions.push_back(p);
+    if (type < 2) geometry.positions.push_back(p + randomPoint(random, -0.4, 0.4));
+    if (type == 0) geometry.positions.push_back(p + randomPoint(random, -0.4, 0.4));
+    if (type == 0) geometry.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    if (type == 1) geometry.segments.push_back({2 * i, 2 * i + 1});
   }
-  return thing;
+  return geometry;
 }
 
 using Element = std::array<std::uint32_t, 3>;
@@ -126,7 +126,7 @@ std::map<Element, ShapeContact> byElement(const CollisionData& data) {
   return contacts;
 }
 
-/// What may be missing of one: what is almost no contact.
+/// The contacts that may be missing: those at the border of being one.
 bool isMarginal(const ShapeContact& c, const PairSettings& pair) {
   const double weight = c.weights.head(static_cast<int>(c.element) + 1).minCoeff();
   return weight < 1e-6 || c.timeOfImpact > 1 - 1e-5 ||
@@ -136,7 +136,7 @@ bool isMarginal(const ShapeContact& c, const PairSettings& pair) {
 /// Contacts of a scene and of its copy, `by` times as large.
 /// extent: L, of coordinates.
 std::size_t expectSame(const Scene& scene, const PairSettings& pair, double by, double extent = 1) {
-  // What the smaller one's doubles cannot say is not in either.
+  // Lengths below the resolution of the smaller scene are in neither.
   const Scene copy = scene.scaledBy(by), original = copy.scaledBy(1 / by);
   PairSettings there = pair;
   there.thickness *= by;
@@ -162,7 +162,8 @@ std::size_t expectSame(const Scene& scene, const PairSettings& pair, double by, 
     EXPECT_NEAR(f.distance / by, c.distance, slack);
     EXPECT_NEAR(f.timeOfImpact, c.timeOfImpact, 3e-6);
     EXPECT_NEAR(f.normal.norm(), 1, 1e-13);
-    // Inside several places of a triangle may be as deep, and of several ways out as short.
+    // Inside, several points of a triangle may be equally deep, and several directions equally
+    // short.
     if (c.distance < 1e-3) continue;
     EXPECT_NEAR((f.normal - c.normal).norm(), 0, 1e3 * slack);
     near(c.point, f.point);
@@ -182,17 +183,17 @@ PairSettings settingsWith(Method method, double thickness) {
   return {method, thickness, Contacts::Distinct};
 }
 
-TEST(ShapeScales, AnswerElementsAtAnySize) {
+TEST(ShapeScales, ContactsWithElementsAreCorrectAtAnySize) {
   Random random(1);
   std::array<std::size_t, 2> contacts{};
   const std::vector<AnalyticalGeometry> shapes = measuredShapes();
   for (std::size_t s = 0; s < shapes.size(); ++s)
     for (const int type : {0, 1, 2})
       for (const Method method : {Method::Proximity, Method::Continuous}) {
-        const Thing thing = elements(random, type);
+        const TestGeometry geometry = elements(random, type);
         Scene scene{shapes[s], randomMoves(random)};
-        scene.thing = thing;
-        scene.now = moved(random, thing.positions, 0.3);
+        scene.geometry = geometry;
+        scene.now = moved(random, geometry.positions, 0.3);
         for (const int scale : kScales) {
           SCOPED_TRACE("shape " + std::to_string(s) + " by 2^" + std::to_string(scale) +
                        ", method " + std::to_string(static_cast<int>(method)) + ", type " +
@@ -205,7 +206,7 @@ TEST(ShapeScales, AnswerElementsAtAnySize) {
   EXPECT_GT(contacts[1], 1000u);
 }
 
-TEST(ShapeScales, AnswerEachOtherAtAnySize) {
+TEST(ShapeScales, ContactsBetweenShapesAreCorrectAtAnySize) {
   Random random(2);
   const std::vector<AnalyticalGeometry> shapes = measuredShapes();
   std::size_t contacts = 0;
@@ -227,18 +228,18 @@ TEST(ShapeScales, AnswerEachOtherAtAnySize) {
 }
 
 /// Placed 2^1000 from the origin, where the last bit of a coordinate is 2^948.
-TEST(ShapeScales, AnswerFarFromTheOrigin) {
+TEST(ShapeScales, ContactsAreCorrectFarFromTheOrigin) {
   Random random(3);
   std::size_t contacts = 0;
   for (const AnalyticalGeometry& shape : measuredShapes())
     for (const int type : {0, 1, 2}) {
       Scene scene{shape, randomMoves(random)};
-      scene.thing = elements(random, type);
+      scene.geometry = elements(random, type);
       const Vector3d far(0x1p20, -0x1p19, 0x1p18);
       for (Move& end : scene.ends) end.shift += far;
-      for (Vector3d& p : scene.thing.positions) p += far;
-      scene.now = moved(random, scene.thing.positions, 0.3);
-      // Coordinates are rounded to 2^-32 of the measures here.
+      for (Vector3d& p : scene.geometry.positions) p += far;
+      scene.now = moved(random, scene.geometry.positions, 0.3);
+      // Coordinates are rounded to 2^-32 of the lengths here.
       contacts += expectSame(scene, settingsWith(Method::Proximity, 0.02), 0x1p979, 0x1p20);
     }
   EXPECT_GT(contacts, 50u);
@@ -259,8 +260,8 @@ TEST(ShapeScales, NormalsOfPlanesMayHaveAnyLength) {
   }
 }
 
-/// Just inside of the limit right answers are what the other tests here expect.
-TEST(ShapeScales, RefuseMeasuresBeyondTheLimit) {
+/// Just inside the limit, the other tests of this file expect correct contacts.
+TEST(ShapeScales, SizesBeyondTheLimitAreRefused) {
   const double most = 1e300, beyond = std::nextafter(most, 2 * most);
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
   const auto tryBoth = [&](const std::string& name, auto&& shapeOf) {
@@ -291,8 +292,8 @@ TEST(ShapeScales, RefuseMeasuresBeyondTheLimit) {
   EXPECT_NO_THROW(collisions.addAnalyticalGeometry(Plane{{0, 0, 0}, {0, 0, beyond}}));
 }
 
-TEST(ShapeScales, RefuseHullsOfTooManyPoints) {
-  ConvexHull hull{Positions(kMostHullPoints, Vector3d(1, 2, 3))};
+TEST(ShapeScales, HullsOfTooManyPointsAreRefused) {
+  ConvexHull hull{Positions(kMaxHullPoints, Vector3d(1, 2, 3))};
   hull.points.front() = {0, 0, 0};
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
   EXPECT_NO_THROW(collisions.addAnalyticalGeometry(hull));
@@ -302,14 +303,14 @@ TEST(ShapeScales, RefuseHullsOfTooManyPoints) {
     ADD_FAILURE() << "accepted";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::InvalidShape);
-    EXPECT_NE(std::string(error.what()).find("131073 points; a hull takes at most 131072"),
+    EXPECT_NE(std::string(error.what()).find("131073 points; it must have at most 131072"),
               std::string::npos)
         << error.what();
   }
 }
 
-/// The case of the issue: a capsule whose half-length overflows when squared.
-TEST(ShapeScales, LongCapsuleIsMet) {
+/// A regression: a capsule whose half-length overflows when squared.
+TEST(ShapeScales, LongCapsuleIsTouched) {
   for (const double half : {1e155, 1e160, 1e-160, 1e-300, 1e-308}) {
     OctreeBasedCD collisions(settingsOf(Engine::Octree));
     const GeometryId capsule =

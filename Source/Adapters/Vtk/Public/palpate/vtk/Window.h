@@ -19,7 +19,7 @@ struct Image {
 /// Encodes an image as the content of a PNG file.
 PALPATE_EXPORT std::string toPng(const Image&);
 
-/// Opens a connection to the X display and keeps it as long as the result lives. VTK ends the
+/// Opens a connection to the X display and keeps it as long as the result exists. VTK ends the
 /// program if it cannot open a display; a Window therefore calls this first. An X server such as
 /// Xvfb restarts when its last client leaves, and refuses connections for a moment; the call waits
 /// for it.
@@ -39,7 +39,7 @@ PALPATE_EXPORT std::shared_ptr<void> openDisplay();
 ///
 /// Keys     o: cells by depth, by occupancy, none; c: contacts; n: normals; u: untrusted elements;
 ///          t: times; r: all in view; space: waits until it is pressed again; q: closes.
-/// Needs    the OctreeBasedCD must stay at its address while the window lives. From show() to
+/// Needs    the OctreeBasedCD must stay at its address while the window exists. From show() to
 ///          press() and pick() only its positions and transforms may change.
 /// Errors   the constructor throws NotAvailable if there is no display, which it also needs to draw
 ///          off screen: run the program under xvfb-run. It throws InvalidSettings for a size

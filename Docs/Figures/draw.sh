@@ -1,0 +1,13 @@
+#!/bin/bash
+# Docs/Figures/draw.sh: draws all charts and diagrams of the documentation into Docs/Pictures, from the CSV files in Docs.
+# Needs the packages of `CMake/packages.sh figures`, and no network. The same CSV files give the same pictures.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")"
+
+python=/usr/bin/python3  # the interpreter of Debian's packages
+mkdir -p ../Pictures
+"$python" speedAccuracy.py ../SpeedAccuracy.csv ../Pictures/SpeedAccuracy
+"$python" stability.py ../Stability.csv ../Pictures/Stability
+if [[ -f diagrams.py ]]; then
+  "$python" diagrams.py
+fi

@@ -1,0 +1,186 @@
+#!/bin/bash
+# check.sh CHECK ROOT [ARGUMENT...]: checks one convention of the source tree, for example which module may include which.
+# Prints each line at fault. Exit code 0: no fault, 1: faults, 77: skipped. testChecks.sh shows that each check can fail.
+set -uo pipefail
+cd "$2"
+check=$1
+shift 2
+faults=0
+fault() { echo "$*"; faults=1; }
+sourceFiles() { find Source -name '*.h' -o -name '*.cpp' | sort; }
+
+# include lines of a file, one a line: <name> or "name
+includesOf() { sed -nE 's/^[[:space:]]*#[[:space:]]*include[[:space:]]+([<"][^>"]+).*/\1/p' "$1"; }
+
+# The module of a file: its folder in Source, or in Source/Adapters.
+moduleOf() {
+  local path=${1#Source/}
+  path=${path#Adapters/}
+  echo "${path%%/*}"
+}
+
+# What a module may include: folders, or files of them.
+allowedIn() {
+  case $1 in
+    Core) echo "Core/" ;;
+    Exact) echo "Exact/ Core/" ;;
+    Math) echo "Math/ Exact/ Core/" ;;
+    Mesh) echo "Mesh/ Math/ Exact/ Core/" ;;
+    Shapes) echo "Shapes/ Mesh/ Math/ Exact/ Core/" ;;
+    Octree) echo "Octree/ Math/Box Core/" ;;
+    NarrowPhase) echo "NarrowPhase/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
+    Queries) echo "Queries/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
+    Validity) echo "Validity/ NarrowPhase/ Mesh/ Math/ Core/" ;;
+    CollisionDetection) echo "CollisionDetection/ Validity/ Queries/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
+    Diagnostics) echo "Diagnostics/ CollisionDetection/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
+    Vtk | Fcl) echo "$1/" ;;
+  esac
+}
+
+# Includes go down the table only; Core sees no more of Public than its plain types.
+checkIncludes() {
+  local file module include allowed prefix
+  while read -r file; do
+    module=$(moduleOf "$file") allowed=$(allowedIn "$module")
+    while read -r include; do
+      case $include in
+        \"*)
+          for prefix in $allowed; do [[ ${include#\"} == "$prefix"* ]] && continue 2; done
+          fault "$file: $module may not include ${include#\"}"
+          ;;
+        "<palpate/"*)
+          [[ $module != Core || $include =~ ^.palpate/(Types|Error|Export|Executor|Settings|Platform)\.h$ ]] ||
+            fault "$file: Core may include Public's plain types only, not ${include#<}"
+          ;;
+      esac
+    done < <(includesOf "$file")
+  done < <(sourceFiles)
+}
+
+# Each library in its one place; besides them the standard library and Eigen's Core and Geometry only.
+checkPlaces() {
+  local file include place
+  while read -r file; do
+    while read -r include; do
+      case $include in
+        "<palpate/"* | "<Eigen/Core" | "<Eigen/Geometry") continue ;;
+        "<tbb/"* | "<oneapi/"* | "<thread" | "<condition_variable" | "<future" | "<execution" | "<pthread.h")
+          place=Source/Core/Threads.cpp ;;
+        "<hwy/"*) place=Source/Core/Simd.h ;;
+        "<gmp"*) place=Source/Exact/Exact.h ;;
+        "<vtk"* | "<X11/"*) place=Source/Adapters/Vtk/ ;;
+        "<fcl/"* | "<ccd/"*) place=Source/Adapters/Fcl/ ;;
+        *[./]*) place=nowhere ;;
+        *) continue ;;
+      esac
+      [[ $file == "$place"* ]] || fault "$file: ${include#<} may be included in $place only"
+    done < <(includesOf "$file" | grep '^<')
+  done < <(sourceFiles)
+}
+
+# Each public header compiles alone, includes nothing of Eigen but Core and Geometry, and reaches no file
+# that these and the standard library do not.
+# Arguments: the compiler, Eigen's folder.
+checkPublicHeaders() {
+  local compile=("$1" -std=c++20 -Wall -Wextra -Werror -x c++ -ISource/Public -ISource/Adapters/Vtk/Public
+    -ISource/Adapters/Fcl/Public -isystem "$2") header include
+  reached() { "${compile[@]}" -M "$@" | tr ' \\' '\n\n' | grep / | sort -u; }
+  local allowed
+  allowed=$(printf '#include <bits/stdc++.h>\n#include <Eigen/Core>\n#include <Eigen/Geometry>\n' |
+    reached -D_GLIBCXX_USE_TBB_PAR_BACKEND=0 -)
+  for header in $(find Source -path '*Public/palpate/*.h' | sort); do
+    "${compile[@]}" -fsyntax-only -include "$header" /dev/null || fault "$header does not compile alone"
+    while read -r include; do
+      [[ $include =~ ^.palpate/(vtk/|fcl/)?[A-Za-z]+\.h$|^\<Eigen/(Core|Geometry)$|^\<[a-z_]+$ ]] ||
+        fault "$header includes ${include:1}"
+    done < <(includesOf "$header")
+    while read -r include; do fault "$header reaches $include"; done < <(
+      comm -13 <(echo "$allowed") <(reached -include "$header" /dev/null) | grep -vE '^(Source/(Adapters/(Vtk|Fcl)/)?Public/palpate/|/dev/null)')
+  done
+}
+
+# A shared library exports nothing outside namespace palpate. Arguments: the libraries.
+checkSymbols() {
+  local library symbol
+  for library in "$@"; do
+    nm -D --defined-only "$library" | grep 7palpate >/dev/null || fault "$library exports nothing of palpate"
+    while read -r symbol; do fault "$library exports $symbol"; done < <(
+      nm -D --defined-only "$library" | awk '{print $3}' |
+        grep -vE '^_Z(T[ISVT]|G[VR]|Z)?N?[VKRO]*7palpate' | c++filt)
+  done
+}
+
+# No file of Source is compiled with -m flags of its own. Arguments: the compile commands, flags given for all.
+checkFlags() {
+  local commands=$1 line
+  [[ -s $commands ]] || fault "$commands is missing"
+  while read -r line; do fault "$line"; done < <(
+    grep '"command"' "$commands" | sed "s|${2:- }| |g" |
+      grep -oE ' -(m[a-z][^ ]*|ffast-math|Ofast) .* -c [^ ]*/Source/[^ ]*' | sed -E 's| .* -c | for |')
+}
+
+# Each *Test.cpp below the given folders of Testing is compiled; a test that no target lists never runs. Arguments: the
+# compile commands, then folders, and files or folders with a leading "-" that this configuration leaves out.
+checkTests() {
+  local commands=$1 argument folders=() without=() file left
+  shift
+  [[ -s $commands ]] || fault "$commands is missing"
+  for argument in "$@"; do
+    if [[ $argument == -* ]]; then without+=("${argument#-}"); else folders+=("$argument"); fi
+  done
+  while read -r file; do
+    for left in "${without[@]}"; do [[ $file == "Testing/$left"* ]] && continue 2; done
+    grep -qF -- "/$file\"" "$commands" || fault "$file is compiled into no test"
+  done < <(for argument in "${folders[@]}"; do find "Testing/$argument" -name '*Test.cpp'; done | sort)
+}
+
+# The given modules start no threads: they and their unit tests include none of the files that do.
+checkThreads() {
+  local module line
+  for module in "$@"; do
+    while read -r line; do fault "$module starts threads, so ThreadSanitizer has to run its tests: $line"; done < <(
+      grep -rnE '^[[:space:]]*#[[:space:]]*include[[:space:]]+("Core/Threads\.h"|<(thread|future|execution)>)' \
+        "Source/$module" "Testing/Unit/$module" 2>/dev/null)
+  done
+}
+
+checkFormat() {
+  local tool
+  tool=$(command -v clang-format-14) || {
+    echo "skipped: clang-format-14 is not installed"
+    exit 77
+  }
+  find Source Examples Testing -name '*.h' -o -name '*.cpp' | xargs "$tool" --dry-run -Werror --style=file || faults=1
+}
+
+# Names that say nothing. The size of Source is printed, and not judged.
+checkWords() {
+  local line lines
+  while read -r line; do fault "banned name: $line"; done < <(
+    grep -rnE --include='*.h' --include='*.cpp' '[A-Za-z](Manager|Helper|Utils)\b|\b(Manager|Helper|Utils)|\bdata2\b' \
+      Source Examples Testing
+    find Source Examples Testing -name '*Manager*' -o -name '*Helper*' -o -name '*Utils*')
+  lines=$(sourceFiles | xargs cat | grep -cvE '^[[:space:]]*(//.*)?$')
+  echo "Source has $lines lines of code, $(sourceFiles | xargs cat | wc -l) with comments and blanks"
+}
+
+# Nothing prints and nothing exits, but an assertion that fails.
+checkQuiet() {
+  local line
+  while read -r line; do fault "$line"; done < <(
+    sourceFiles | grep -v '^Source/Core/Assert.h$' |
+      xargs grep -nE '\b(cout|cerr|clog|printf|fprintf|puts|fputs|exit|abort|terminate)\b *(\(|<<|;)')
+}
+
+# README's statements are those that the consumer compiles and runs, and at most eight; links lead somewhere.
+checkLinks() {
+  local page link
+  while read -r page; do
+    while read -r link; do
+      [[ -e $(dirname "$page")/$link ]] || fault "$page: $link leads nowhere"
+    done < <(sed '/^ *```/,/^ *```/d' "$page" | grep -oE '\]\([^)#:]+\)' | tr -d '()]')
+  done < <(find README.md CHANGELOG.md Docs Data Examples Testing -name '*.md' 2>/dev/null)
+}
+
+"check$check" "$@"
+exit $faults

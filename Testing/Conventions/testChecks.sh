@@ -1,0 +1,101 @@
+#!/bin/bash
+# testChecks.sh ROOT COMPILER EIGEN: plants faults, one at a time, in a copy of the tree. check.sh must find each of them.
+set -uo pipefail
+root=$1 compiler=$2 eigen=$3
+check=$root/Testing/Conventions/check.sh
+tree=$(mktemp -d)
+trap 'rm -rf "$tree"' EXIT
+missed=0
+
+# A tree with every module, without faults.
+for module in Core Math Mesh Shapes Octree NarrowPhase CollisionDetection Adapters/Vtk Adapters/Fcl \
+  Public/palpate Adapters/Vtk/Public/palpate/vtk; do
+  mkdir -p "$tree/Source/$module"
+done
+mkdir -p "$tree/Examples" "$tree/Testing"
+cp "$root/.clang-format" "$tree"
+printf '#pragma once\n\n#include <Eigen/Core>\n' >"$tree/Source/Public/palpate/Types.h"
+
+# expect STATUS CHECK ARGUMENT...
+expect() {
+  local expected=$1 check_=$2 output
+  shift 2
+  output=$(bash "$check" "$check_" "$tree" "$@" 2>&1)
+  [[ $? -ne 0 ]] && set -- fails || set -- holds
+  [[ $1 == "$expected" ]] || { echo "$check_ should say: $expected. $planted"; echo "$output"; missed=1; }
+}
+# plant CHECK FILE TEXT [ARGUMENT...]: CHECK holds without FILE and fails with it.
+plant() {
+  local check_=$1 file=$tree/$2 text=$3
+  planted="$2: $text"
+  shift 3
+  expect holds "$check_" "$@"
+  printf "$text" >"$file"
+  expect fails "$check_" "$@"
+  rm "$file"
+}
+
+plant Includes Source/Core/A.h '#include "Octree/Pool.h"\n'
+plant Includes Source/Core/A.h '#include <palpate/OctreeBasedCD.h>\n'
+plant Includes Source/Math/A.h '#  include "Mesh/TriangleMesh.h"\n'
+plant Includes Source/Octree/A.cpp '#include "Mesh/TriangleMesh.h"\n'
+plant Includes Source/NarrowPhase/A.h '#include "Octree/Pool.h"\n'
+plant Includes Source/Mesh/A.h '#include "Shapes/Shape.h"\n'
+plant Includes Source/Shapes/A.h '#include "NarrowPhase/NarrowPhase.h"\n'
+plant Includes Source/Adapters/Vtk/A.cpp '#include "Core/Buffer.h"\n'
+plant Includes Source/Public/palpate/A.h '#include "Core/Buffer.h"\n'
+plant Places Source/Mesh/A.cpp '#include <tbb/parallel_for.h>\n'
+plant Places Source/Mesh/A.cpp '#include <thread>\n'
+plant Places Source/Octree/A.cpp '#include <hwy/highway.h>\n'
+plant Places Source/Octree/A.cpp '#include <immintrin.h>\n'
+plant Places Source/CollisionDetection/A.cpp '#include <gmp.h>\n'
+plant Places Source/CollisionDetection/A.cpp '#include <vtkPolyData.h>\n'
+plant Places Source/Adapters/Vtk/A.cpp '#include <fcl/fcl.h>\n'
+plant Places Source/Math/A.cpp '#include <Eigen/Dense>\n'
+plant PublicHeaders Source/Public/palpate/A.h '#pragma once\nstd::size_t a();\n' "$compiler" "$eigen"
+plant PublicHeaders Source/Public/palpate/A.h '#pragma once\n#include <Eigen/LU>\n' "$compiler" "$eigen"
+plant PublicHeaders Source/Public/palpate/A.h '#define LIBRARY <sys/mman.h>\n#include LIBRARY\n' "$compiler" "$eigen"
+plant PublicHeaders Source/Adapters/Vtk/Public/palpate/vtk/A.h '#pragma once\n#include <vtkPolyData.h>\n' "$compiler" "$eigen"
+plant Format Source/Core/A.h '#pragma once\nint  a;\n'
+plant Quiet Source/Math/A.cpp 'void f() { std::cerr << 1; }\n'
+plant Quiet Source/Math/A.cpp 'void f() { std::printf("1"); }\n'
+plant Quiet Source/Math/A.cpp 'void f() { std::exit(1); }\n'
+plant Words Source/Core/A.h 'class PoolManager;\n'
+plant Words Source/Core/A.h 'int data2;\n'
+plant Words Source/Core/IndexUtils.h '\n'
+plant Threads Source/Math/A.h '#include "Core/Threads.h"\n' NarrowPhase Math
+plant Threads Source/Math/A.cpp '#include <thread>\n' Math
+
+mkdir -p "$tree/Testing/Unit/Math"
+plant Threads Testing/Unit/Math/ATest.cpp '#include <thread>\n' Math
+commands=$tree/compile_commands.json
+printf '"file": "/p/Testing/Unit/Math/ATest.cpp"\n' >"$commands"
+printf '\n' >"$tree/Testing/Unit/Math/ATest.cpp"
+plant Tests Testing/Unit/Math/BTest.cpp '\n' "$commands" Unit
+plant Tests Testing/Unit/BTest.cpp '\n' "$commands" Unit -Unit/Math
+rm -r "$tree/Testing/Unit" "$commands"
+
+planted="a link that leads nowhere"
+printf '[b](b.md)\n' >"$tree/Examples/A.md"
+expect fails Links
+touch "$tree/Examples/b.md"
+expect holds Links
+planted="code that looks like a link"
+printf '```cpp\n[](double x) {}\n```\n' >"$tree/Examples/A.md"
+expect holds Links
+rm -r "$tree/Examples/A.md"
+
+planted="a stray symbol"
+printf 'namespace palpate { int a; }\n' | "$compiler" -shared -fPIC -x c++ -o "$tree/lib.so" -
+expect holds Symbols "$tree/lib.so"
+printf 'namespace palpate { int a; } int b;\n' | "$compiler" -shared -fPIC -x c++ -o "$tree/lib.so" -
+expect fails Symbols "$tree/lib.so"
+
+planted="flags of one file"
+commands=$tree/compile_commands.json
+printf '"command": "c++ -O2 -o a.o -c /p/Source/Math/a.cpp",\n' >"$commands"
+expect holds Flags "$commands"
+printf '"command": "c++ -O2 -march=native -o a.o -c /p/Source/Math/a.cpp",\n' >"$commands"
+expect fails Flags "$commands"
+expect holds Flags "$commands" -march=native
+exit $missed

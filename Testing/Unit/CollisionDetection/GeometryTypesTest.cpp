@@ -1,0 +1,666 @@
+#include <palpate/Capture.h>
+#include <palpate/Distance.h>
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/ExpectRefused.h"
+#include "Common/QueryCalls.h"
+#include "Common/ContactRows.h"
+#include "Common/PairRun.h"
+#include "Common/RandomMeshes.h"
+#include "Common/Replayed.h"
+#include "Common/TestGeometry.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <set>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+// Lines and points: every pair of geometry types against brute force and against the definition,
+// which is written here with <palpate/Distance.h>. Unsupported pairs are refused.
+
+namespace palpate::testing {
+namespace {
+
+TEST(GeometryTypes, MatchBruteForce) {
+  Random random(1);
+  const TestGeometry organ = testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
+  const TestGeometry line = thread(random, 150, 0.12, 0.01, false),
+                     loop = thread(random, 80, 0.15, 0, true);
+  const TestGeometry needle = tapered(random, thread(random, 60, 0.1, 0, false), 0.03);
+  const TestGeometry smoke = particles(random, 200, 0.02), dust = particles(random, 300, 0),
+                     drops = tapered(random, particles(random, 200, 0), 0.04);
+  std::size_t contacts = 0;
+  for (const auto& [a, b] : Pairs{{&organ, &line},
+                                  {&line, &organ},
+                                  {&organ, &smoke},
+                                  {&smoke, &organ},
+                                  {&line, &loop},
+                                  {&loop, &line},
+                                  {&line, &line},
+                                  {&loop, &loop},
+                                  {&smoke, &line},
+                                  {&line, &smoke},
+                                  {&loop, &dust},
+                                  {&smoke, &dust},
+                                  {&dust, &smoke},
+                                  {&smoke, &smoke}})
+    for (PairSettings pair : settingsFor(0.02)) {
+      contacts += expectOracle(random, *a, *b, pair);
+      pair.restDistance = a == b && a != &smoke ? 0.3 : 0.0;
+      contacts += expectOracle(random, *a, *b, pair);
+    }
+  for (const auto& [a, b] : Pairs{{&organ, &needle},
+                                  {&needle, &organ},
+                                  {&needle, &line},
+                                  {&needle, &needle},
+                                  {&drops, &organ},
+                                  {&organ, &drops},
+                                  {&drops, &needle},
+                                  {&needle, &smoke},
+                                  {&drops, &dust},
+                                  {&drops, &drops}})
+    for (const PairSettings& pair : settingsFor(0.005, false))
+      contacts += expectOracle(random, *a, *b, pair);
+  EXPECT_GT(contacts, 1000u);
+}
+
+using Ids = std::vector<std::uint32_t>;
+
+/// The definition of All with public functions: vertices of the other geometry against triangles,
+/// and points also against segments. For two point sets: points of the first against points of the
+/// second.
+std::set<Ids> expectedVertexTriangle(const TestGeometry& vertices, const TestGeometry& others,
+                                     double thickness, bool ofSecond) {
+  std::set<Ids> ids;
+  const bool points = vertices.type == GeometryType::Points;
+  if (others.type != GeometryType::Triangles &&
+      !(points && (others.type == GeometryType::Lines || !ofSecond)))
+    return ids;
+  std::vector<Triangle> elements = others.triangles;
+  for (const auto& [p, q] : others.segments) elements.push_back({p, q, q});
+  for (std::uint32_t i = 0; others.type == GeometryType::Points && i < others.positions.size(); ++i)
+    elements.push_back({i, i, i});
+  const auto at = [&](std::uint32_t i) { return others.positions[i]; };
+  for (std::uint32_t v = 0; v < vertices.positions.size(); ++v)
+    for (std::uint32_t t = 0; t < elements.size(); ++t) {
+      const auto& [i, j, k] = elements[t];
+      if (&vertices == &others && !(v < t)) continue;
+      const VertexTriangleDistance d =
+          vertexTriangleDistance(vertices.positions[v], at(i), at(j), at(k));
+      const double radius = d.barycentric[0] * others.radius(i) +
+                            d.barycentric[1] * others.radius(j) +
+                            d.barycentric[2] * others.radius(k);
+      if (d.distance - (vertices.radius(v) + radius) <= thickness)
+        ids.insert(ofSecond ? Ids{t, v} : Ids{v, t});
+    }
+  return ids;
+}
+
+std::set<Ids> expectedEdgeEdge(const TestGeometry& a, const TestGeometry& b, double thickness) {
+  std::set<Ids> ids;
+  for (const Segment& p : a.edges())
+    for (const Segment& q : b.edges()) {
+      if (&a == &b && (!(p < q) || p[0] == q[0] || p[0] == q[1] || p[1] == q[0] || p[1] == q[1]))
+        continue;
+      const EdgeEdgeDistance d = edgeEdgeDistance(a.positions[p[0]], a.positions[p[1]],
+                                                  b.positions[q[0]], b.positions[q[1]]);
+      const auto radius = [](const TestGeometry& geometry, const Segment& edge, double weight) {
+        return (1 - weight) * geometry.radius(edge[0]) + weight * geometry.radius(edge[1]);
+      };
+      if (d.distance - (radius(a, p, d.weightA) + radius(b, q, d.weightB)) <= thickness)
+        ids.insert({p[0], p[1], q[0], q[1]});
+    }
+  return ids;
+}
+
+std::set<Ids> idsOf(const std::vector<Row>& rows, std::size_t words) {
+  std::set<Ids> ids;
+  for (const Row& row : rows) ids.insert(Ids(row.begin(), row.begin() + words));
+  EXPECT_EQ(ids.size(), rows.size());
+  return ids;
+}
+
+TEST(GeometryTypes, AllMatchesTheDefinition) {
+  Random random(2);
+  const TestGeometry organ = testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
+  const TestGeometry line = tapered(random, thread(random, 120, 0.12, 0, false), 0.03);
+  const TestGeometry loop = thread(random, 80, 0.15, 0, true), drops = particles(random, 300, 0.03);
+  const TestGeometry smoke = tapered(random, particles(random, 250, 0), 0.04);
+  constexpr double kThickness = 0.02;
+  for (const auto& [a, b] : Pairs{{&organ, &line},
+                                  {&line, &organ},
+                                  {&drops, &organ},
+                                  {&organ, &drops},
+                                  {&line, &loop},
+                                  {&line, &line},
+                                  {&line, &smoke},
+                                  {&smoke, &line},
+                                  {&drops, &loop},
+                                  {&smoke, &drops},
+                                  {&smoke, &smoke}}) {
+    const Rows rows(answer(*a, *b, {Method::Proximity, kThickness, Contacts::All}));
+    EXPECT_EQ(idsOf(rows.vertexTriangle, 2), expectedVertexTriangle(*a, *b, kThickness, false));
+    EXPECT_EQ(idsOf(rows.triangleVertex, 2),
+              a == b ? std::set<Ids>() : expectedVertexTriangle(*b, *a, kThickness, true));
+    EXPECT_EQ(idsOf(rows.edgeEdge, 4), expectedEdgeEdge(*a, *b, kThickness));
+    EXPECT_GT(rows.contacts(), 5u);
+  }
+}
+
+/// Of every contact.
+double least(const CollisionData& data) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const auto& c : data.vertexTriangle()) least = std::min(least, c.distance);
+  for (const auto& c : data.triangleVertex()) least = std::min(least, c.distance);
+  for (const auto& c : data.edgeEdge()) least = std::min(least, c.distance);
+  return least;
+}
+
+TEST(GeometryTypes, DistinctHasFewerContactsAndKeepsTheNearest) {
+  Random random(3);
+  for (int run = 0; run < 40; ++run) {
+    const TestGeometry organ = testGeometry(soup(random, 30, 0.2));
+    const TestGeometry line = thread(random, 12, 0.3, 0.02, false),
+                       loop = thread(random, 9, 0.3, 0, true);
+    for (const auto& [a, b] :
+         Pairs{{&organ, &line}, {&line, &organ}, {&line, &loop}, {&loop, &line}, {&line, &line}}) {
+      const CollisionData all = answer(*a, *b, {Method::Proximity, 0.1, Contacts::All}),
+                          distinct = answer(*a, *b, {Method::Proximity, 0.1, Contacts::Distinct});
+      const auto ofAll = idsOf(Rows(all).edgeEdge, 4);
+      for (const Ids& ids : idsOf(Rows(distinct).edgeEdge, 4)) EXPECT_TRUE(ofAll.contains(ids));
+      EXPECT_DOUBLE_EQ(least(all), least(distinct));
+    }
+  }
+}
+
+// ---- Invariances ----
+
+/// The vertices of the two geometries are exchanged.
+CollisionData swapped(const CollisionData& data) {
+  CollisionData::Contents contents;
+  contents.earliestTimeOfImpact = data.earliestTimeOfImpact();
+  contents.vertexTriangle.assign(data.triangleVertex().begin(), data.triangleVertex().end());
+  contents.triangleVertex.assign(data.vertexTriangle().begin(), data.vertexTriangle().end());
+  for (EdgeEdgeContact c : data.edgeEdge()) {
+    std::swap(c.edgeA, c.edgeB);
+    std::swap(c.weightA, c.weightB);
+    std::swap(c.featureA, c.featureB);
+    c.normal = -c.normal;
+    contents.edgeEdge.push_back(c);
+  }
+  const auto sort = [](auto& list, auto key) {
+    std::sort(list.begin(), list.end(),
+              [&](const auto& l, const auto& r) { return key(l) < key(r); });
+  };
+  sort(contents.vertexTriangle, [](const auto& c) { return std::tuple(c.vertex, c.triangle); });
+  sort(contents.triangleVertex, [](const auto& c) { return std::tuple(c.triangle, c.vertex); });
+  sort(contents.edgeEdge, [](const auto& c) { return std::tuple(c.edgeA, c.edgeB); });
+  return CollisionData(contents);
+}
+
+TEST(GeometryTypes, SwappingGeometriesSwapsContacts) {
+  Random random(4);
+  const TestGeometry organ = testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
+  const TestGeometry line = thread(random, 120, 0.1, 0.02, false),
+                     loop = thread(random, 90, 0.1, 0.01, true);
+  const TestGeometry drops = particles(random, 300, 0.03);
+  for (const auto& [a, b] :
+       Pairs{{&organ, &line}, {&line, &loop}, {&drops, &organ}, {&drops, &line}, {&loop, &drops}})
+    for (const PairSettings& pair : settingsFor(0.02)) {
+      const Rows there(swapped(answer(*a, *b, pair))), back(answer(*b, *a, pair));
+      expectSameRows(there, back);
+    }
+}
+
+TEST(GeometryTypes, ExactTransformationsChangeNothing) {
+  Random random(5);
+  const auto onGrid = [](TestGeometry geometry) {
+    for (Vector3d& p : geometry.positions)
+      for (double& x : p) x = std::round(x * 1024) / 1024;
+    return geometry;
+  };
+  const TestGeometry organ = onGrid(testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4)));
+  const TestGeometry line = onGrid(thread(random, 150, 0.1, 0.0625, false));
+  const TestGeometry drops = onGrid(particles(random, 300, 0.0625));
+  const auto translated = [](TestGeometry geometry) {
+    for (Vector3d& p : geometry.positions) p += Vector3d(512, -64, 8192);
+    return geometry;
+  };
+  const auto turned = [](TestGeometry geometry) {  // x to y to z to x
+    for (Vector3d& p : geometry.positions) p = Vector3d(p[2], p[0], p[1]);
+    return geometry;
+  };
+  const TestGeometry* const pairs[][2] = {{&organ, &line}, {&organ, &drops}, {&line, &line},
+                                          {&line, &drops}, {&drops, &line},  {&drops, &drops}};
+  for (const auto& [a, b] : pairs)
+    for (const Contacts contacts : {Contacts::Distinct, Contacts::All}) {
+      const PairSettings pair{Method::Proximity, 0.03125, contacts};
+      const Rows rows(answer(*a, *b, pair));
+      const TestGeometry farA = translated(*a), farB = translated(*b);
+      expectSameRows(Rows(answer(farA, a == b ? farA : farB, pair)), rows);
+      const TestGeometry turnedA = turned(*a), turnedB = turned(*b);
+      const Rows other(answer(turnedA, a == b ? turnedA : turnedB, pair));
+      EXPECT_EQ(idsOf(other.edgeEdge, 4), idsOf(rows.edgeEdge, 4));
+      EXPECT_EQ(idsOf(other.triangleVertex, 2), idsOf(rows.triangleVertex, 2));
+      EXPECT_EQ(idsOf(other.vertexTriangle, 2), idsOf(rows.vertexTriangle, 2));
+      EXPECT_GT(rows.contacts(), 10u);
+    }
+}
+
+/// In a contact of two points neither is a triangle: the second point takes its place in the list.
+TEST(GeometryTypes, SwappingPointSetsReversesTheirContacts) {
+  Random random(8);
+  const TestGeometry drops = tapered(random, particles(random, 300, 0), 0.05),
+                     smoke = particles(random, 200, 0.02);
+  const CollisionData there = answer(drops, smoke, {Method::Proximity, 0.02}),
+                      back = answer(smoke, drops, {Method::Proximity, 0.02});
+  ASSERT_EQ(there.vertexTriangle().size(), back.vertexTriangle().size());
+  EXPECT_GT(back.vertexTriangle().size(), 20u);
+  EXPECT_TRUE(there.triangleVertex().empty() && there.edgeEdge().empty());
+  for (const auto& c : there.vertexTriangle()) {
+    const auto twin = std::find_if(
+        back.vertexTriangle().begin(), back.vertexTriangle().end(),
+        [&](const auto& o) { return o.vertex == c.triangle && o.triangle == c.vertex; });
+    ASSERT_NE(twin, back.vertexTriangle().end());
+    EXPECT_EQ(twin->distance, c.distance);
+    EXPECT_EQ(twin->normal, -c.normal);
+    EXPECT_EQ(c.barycentric, Vector3d(1, 0, 0));
+    EXPECT_EQ(c.corners, (Triangle{c.triangle, c.triangle, c.triangle}));
+  }
+}
+
+// ---- Hand-computed contacts ----
+
+TestGeometry lineOf(Positions positions, double radius = 0.0) {
+  TestGeometry line{GeometryType::Lines, std::move(positions), {}, {}, {radius}};
+  for (std::uint32_t i = 1; i < line.positions.size(); ++i) line.segments.push_back({i - 1, i});
+  return line;
+}
+
+constexpr PairSettings kNear{Method::Proximity, 0.25, Contacts::Distinct};
+
+TEST(GeometryTypes, VertexOverEdgeIsOneContactOfTheLowestEdge) {
+  // A thread's bend points down at the middle of a straight one.
+  const TestGeometry bend = lineOf({{-1, 0, 1}, {0, 0, 0.125}, {1, 0, 1}});
+  const TestGeometry straight = lineOf({{0, -4, 0}, {0, 4, 0}});
+  const CollisionData data = answer(bend, straight, kNear);
+  ASSERT_EQ(data.edgeEdge().size(), 1u);
+  const EdgeEdgeContact& c = data.edgeEdge()[0];
+  EXPECT_EQ(c.edgeA, (Segment{0, 1}));
+  EXPECT_EQ(c.weightA, 1.0);
+  EXPECT_EQ(c.weightB, 0.5);
+  EXPECT_EQ(c.distance, 0.125);
+  EXPECT_EQ(c.normal, Vector3d(0, 0, 1));
+}
+
+TEST(GeometryTypes, EndsOfTwoLinesGiveOneContact) {
+  const TestGeometry down = lineOf({{-1, 0, 1}, {0, 0, 0.125}, {1, 0, 1}});
+  const TestGeometry up = lineOf({{0, -1, -1}, {0, 0, 0}, {0, 1, -1}}, 0.125);
+  const CollisionData data = answer(down, up, kNear);
+  ASSERT_EQ(data.edgeEdge().size(), 1u);
+  EXPECT_EQ(data.edgeEdge()[0].weightA, 1.0);
+  EXPECT_EQ(data.edgeEdge()[0].weightB, 1.0);
+  EXPECT_EQ(data.edgeEdge()[0].distance, 0.0);  // 0.125 less the radius
+}
+
+TEST(GeometryTypes, ApexUnderAThreadIsAContact) {
+  const TestGeometry pyramid{GeometryType::Triangles,
+                             {{0, 0, 0}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, -1}, {1, -1, -1}},
+                             {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}},
+                             {}};
+  const TestGeometry straight = lineOf({{-8, 0, 0.25}, {8, 0, 0.25}}, 0.5);
+  const CollisionData data = answer(pyramid, straight, kNear);
+  EXPECT_TRUE(data.triangleVertex().empty());
+  ASSERT_EQ(data.edgeEdge().size(), 1u);
+  EXPECT_EQ(data.edgeEdge()[0].edgeA, (Segment{0, 1}));
+  EXPECT_EQ(data.edgeEdge()[0].weightA, 0.0);
+  EXPECT_EQ(data.edgeEdge()[0].distance, -0.25);  // overlap
+}
+
+TEST(GeometryTypes, ContactOfParallelEdgesIsInTheMiddle) {
+  const TestGeometry a = lineOf({{0, 0, 0}, {4, 0, 0}}), b = lineOf({{2, 0, 0.125}, {6, 0, 0.125}});
+  const CollisionData data = answer(a, b, kNear);
+  ASSERT_EQ(data.edgeEdge().size(), 1u);
+  EXPECT_EQ(data.edgeEdge()[0].weightA, 0.75);
+  EXPECT_EQ(data.edgeEdge()[0].weightB, 0.25);
+}
+
+TEST(GeometryTypes, ParticleOnAPlaneReportsItsDepth) {
+  const TestGeometry ground{
+      GeometryType::Triangles, {{-4, -4, 0}, {4, -4, 0}, {0, 4, 0}}, {{0, 1, 2}}, {}};
+  const TestGeometry drop{GeometryType::Points, {{0, 0, 0.25}, {0, 0, -3}}, {}, {}, {0.5, 1.0}};
+  const CollisionData data = answer(drop, ground, {Method::Proximity, 0.0, Contacts::Distinct});
+  ASSERT_EQ(data.vertexTriangle().size(), 1u);
+  EXPECT_EQ(data.vertexTriangle()[0].vertex, 0u);
+  EXPECT_EQ(data.vertexTriangle()[0].distance, -0.25);
+  EXPECT_EQ(data.vertexTriangle()[0].normal, Vector3d(0, 0, 1));
+}
+
+TEST(GeometryTypes, ParticlesTouchThreadsAndEachOther) {
+  const TestGeometry thread = lineOf({{0, 0, 0}, {4, 0, 0}, {4, 4, 0}}, 0.125);
+  const TestGeometry drops{GeometryType::Points,
+                           {{1, 0, 0.5}, {4.25, -0.25, 0}, {9, 9, 9}, {1, 0.25, 0.5}},
+                           {},
+                           {},
+                           {0.25}};
+  const PairSettings near{Method::Proximity, 0.25, Contacts::Distinct};
+  const CollisionData data = answer(drops, thread, near);
+  ASSERT_EQ(data.vertexTriangle().size(), 3u);
+  const VertexTriangleContact &over = data.vertexTriangle()[0], &corner = data.vertexTriangle()[1];
+  EXPECT_EQ(over.corners, (Triangle{0, 1, 1}));
+  EXPECT_EQ(over.barycentric, Vector3d(0.75, 0.25, 0));
+  EXPECT_EQ(over.distance, 0.125);  // 0.5 less both radii
+  EXPECT_EQ(over.normal, Vector3d(0, 0, 1));
+  EXPECT_EQ(corner.triangle,
+            0u);  // of the two segments at the corner, the one with the lower index
+  EXPECT_EQ(corner.barycentric[0], 0.0);
+  EXPECT_EQ(answer(drops, thread, {Method::Proximity, 0.25, Contacts::All}).vertexTriangle().size(),
+            4u);
+  const CollisionData self = answer(drops, drops, near);
+  ASSERT_EQ(self.vertexTriangle().size(), 1u);
+  EXPECT_EQ(self.vertexTriangle()[0].vertex, 0u);
+  EXPECT_EQ(self.vertexTriangle()[0].triangle, 3u);
+  EXPECT_EQ(self.vertexTriangle()[0].distance, -0.25);
+  EXPECT_EQ(self.vertexTriangle()[0].normal, Vector3d(0, -1, 0));
+}
+
+TEST(GeometryTypes, ThinEndOfATaperDoesNotSuppressItsThickEnd) {
+  // Both segments at the thick vertex are nearer to the particle at their thin ends.
+  TestGeometry spindle = lineOf({{-2, 0, 0.5}, {0, 0, 0}, {2, 0, 0.5}});
+  spindle.radii = {0, 1, 0};
+  const TestGeometry drop{GeometryType::Points, {{0, 0, 1.125}}, {}, {}, {0}};
+  const CollisionData data = answer(drop, spindle, {Method::Proximity, 0.5, Contacts::Distinct});
+  EXPECT_EQ(data.vertexTriangle().size(), 2u);
+  const TestGeometry far = lineOf({{-2, 0, 0.5}, {0, 0, 0}, {2, 0, 0.5}}, 0.625);
+  EXPECT_EQ(answer(drop, far, {Method::Proximity, 0.5, Contacts::Distinct}).vertexTriangle().size(),
+            2u);
+}
+
+TEST(GeometryTypes, ContinuousStopsAtTheRadius) {
+  const TestGeometry ground{
+      GeometryType::Triangles, {{-4, -4, 0}, {4, -4, 0}, {0, 4, 0}}, {{0, 1, 2}}, {}};
+  const TestGeometry drop{GeometryType::Points, {{0, 0, 2}}, {}, {}, {0.5}};
+  const CollisionData data = answer(settingsOf(Engine::Octree), drop, ground, {Method::Continuous},
+                                    {{0, 0, -2}}, ground.positions);
+  ASSERT_EQ(data.vertexTriangle().size(), 1u);
+  EXPECT_NEAR(data.vertexTriangle()[0].timeOfImpact, 1.5 / 4, 1e-6);
+  EXPECT_NEAR(data.vertexTriangle()[0].distance, 0.0, 1e-5);
+}
+
+std::set<Ids> pairsFoundIn(const TestGeometry& line, const PairSettings& pair) {
+  return idsOf(Rows(answer(line, line, pair)).edgeEdge, 4);
+}
+
+TEST(GeometryTypes, RestDistanceExcludesNeighboursAlongTheThread) {
+  // A hairpin with corners half a unit apart, ten units long: 0-1-2-3 and back at height 0.125.
+  const TestGeometry hairpin =
+      lineOf({{0, 0, 0}, {4, 0, 0}, {5, 0, 0.0625}, {4, 0, 0.125}, {0, 0, 0.125}});
+  PairSettings pair{Method::Proximity, 0.25, Contacts::All};
+  const auto pairsFound = [&] { return pairsFoundIn(hairpin, pair); };
+  EXPECT_EQ(pairsFound(), (std::set<Ids>{{0, 1, 2, 3}, {0, 1, 3, 4}, {1, 2, 3, 4}}));
+  pair.restDistance = 1.5;  // edges next but one are 1.002 apart
+  EXPECT_EQ(pairsFound(), (std::set<Ids>{{0, 1, 3, 4}}));
+  pair.restDistance = 2.5;
+  EXPECT_TRUE(pairsFound().empty());
+  // Only the positions given with the topology count as the rest positions.
+  Positions stretched = hairpin.positions;
+  stretched[2][0] = 400;
+  EXPECT_EQ(Rows(answer(settingsOf(Engine::Octree), hairpin, hairpin, pair, stretched, stretched))
+                .edgeEdge.size(),
+            0u);
+  // On a closed thread, the shorter way around counts.
+  TestGeometry ring = lineOf({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}});
+  ring.segments.push_back({3, 0});
+  pair = {Method::Proximity, 1.5, Contacts::All};
+  EXPECT_EQ(answer(ring, ring, pair).edgeEdge().size(), 2u);
+  pair.restDistance = 1.25;  // opposite edges are one apart, either way
+  EXPECT_EQ(answer(ring, ring, pair).edgeEdge().size(), 0u);
+  // The shortest way between branches counts, too.
+  TestGeometry branching = lineOf({{0, 0, 0}, {0, 0, 1}, {0, 0, 2}});
+  branching.positions.insert(branching.positions.end(), {{1, 0, 1}, {1, 0, 2}});
+  branching.segments.insert(branching.segments.end(), {{1, 3}, {3, 4}});
+  pair = {Method::Proximity, 1.0, Contacts::All};
+  EXPECT_EQ(pairsFoundIn(branching, pair), (std::set<Ids>{{0, 1, 3, 4}, {1, 2, 3, 4}}));
+  pair.restDistance = 1.0;
+  EXPECT_EQ(pairsFoundIn(branching, pair), (std::set<Ids>{{0, 1, 3, 4}, {1, 2, 3, 4}}));
+  pair.restDistance = 1.25;
+  EXPECT_TRUE(pairsFoundIn(branching, pair).empty());
+}
+
+// ---- Degenerate ----
+
+TEST(GeometryTypes, DegeneratePointsMatchBruteForce) {
+  Random random(9);
+  for (int run = 0; run < 20; ++run) {
+    const auto onGrid = [&](GeometryType type, std::size_t count, double radius) {
+      TestGeometry geometry{type, {}, {}, {}, {radius}};
+      for (std::size_t v = 0; v < count; ++v) {
+        const auto at = [&] { return static_cast<double>(random() % 3); };
+        const double x = at(), y = at(), z = at();
+        geometry.positions.push_back({x, y, z});
+      }
+      return geometry;
+    };
+    const TestGeometry drops = onGrid(GeometryType::Points, 20, run % 2 ? 0.25 : 0.0),
+                       others = onGrid(GeometryType::Points, 20, 0.0);
+    TestGeometry line = onGrid(GeometryType::Lines, 12, 0.25);  // some segments without length
+    for (std::uint32_t e = 0; e < 16; ++e) {
+      const auto p = static_cast<std::uint32_t>(random() % 12);
+      line.segments.push_back({p, static_cast<std::uint32_t>((p + 1 + random() % 11) % 12)});
+    }
+    for (const auto& [a, b] :
+         Pairs{{&drops, &line}, {&line, &drops}, {&drops, &others}, {&drops, &drops}})
+      for (PairSettings pair : settingsFor(0.5)) {
+        const Positions nowA = run % 4 < 2 ? a->positions : others.positions;
+        const Positions& now = nowA.size() == a->positions.size() ? nowA : a->positions;
+        const Rows truth(answer(settingsOf(Engine::BruteForce), *a, *b, pair, now, b->positions));
+        expectSameRows(Rows(answer(settingsOf(Engine::Octree), *a, *b, pair, now, b->positions)),
+                       truth);
+        const CollisionData data = answer(*a, *b, pair);
+        for (const auto& c : data.vertexTriangle()) {
+          EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);
+          EXPECT_EQ(c.barycentric.sum(), 1.0);
+          EXPECT_GE(c.barycentric.minCoeff(), 0.0);
+        }
+      }
+  }
+}
+
+TEST(GeometryTypes, DegenerateLinesMatchBruteForce) {
+  Random random(6);
+  const TestGeometry organ = testGeometry(sphere(4, 6, {1, 1, 1}, 1));
+  for (int run = 0; run < 30; ++run) {
+    TestGeometry degenerate{GeometryType::Lines, {}, {}, {}, {run % 2 ? 0.25 : 0.0}};
+    // On a coarse grid: coincident, parallel and collinear segments, and some without length.
+    for (int v = 0; v < 12; ++v) {
+      const auto at = [&] { return static_cast<double>(random() % 3); };
+      const double x = at(), y = at(), z = at();
+      degenerate.positions.push_back({x, y, z});
+    }
+    for (std::uint32_t e = 0; e < 16; ++e) {
+      const auto p = static_cast<std::uint32_t>(random() % 12);
+      degenerate.segments.push_back({p, static_cast<std::uint32_t>((p + 1 + random() % 11) % 12)});
+    }
+    for (const Contacts contacts : {Contacts::Distinct, Contacts::All})
+      for (const TestGeometry* other : std::vector<const TestGeometry*>{&organ, &degenerate})
+        for (const double thickness : {0.5, 1.0}) {
+          const PairSettings pair{Method::Proximity, thickness, contacts};
+          const Rows truth(answer(settingsOf(Engine::BruteForce), degenerate, *other, pair,
+                                  degenerate.positions, other->positions));
+          expectSameRows(Rows(answer(degenerate, *other, pair)), truth);
+          const CollisionData data = answer(degenerate, *other, pair);
+          for (const auto& c : data.edgeEdge()) expectWellFormed(c);
+        }
+  }
+}
+
+// ---- Refused calls ----
+
+/// The matrix in Docs/SupportMatrix.md is what the code accepts.
+TEST(GeometryTypes, DocumentedSupportMatchesTheCode) {
+  const Positions some{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  const std::pair<Method, std::string> methods[] = {{Method::Intersection, "Intersection"},
+                                                    {Method::Auto, "Auto"},
+                                                    {Method::Proximity, "Proximity"},
+                                                    {Method::Continuous, "Continuous"}};
+  const std::string names[] = {"triangles", "lines", "points", "tetrahedra", "shapes"};
+  const TestGeometry kinds[] = {{GeometryType::Triangles, some, {{0, 1, 2}}, {}},
+                                {GeometryType::Lines, some, {}, {{0, 1}}},
+                                {GeometryType::Points, some, {}, {}}};
+  const auto add = [&](OctreeBasedCD& detection, int kind) {
+    if (kind == 3) return detection.addTetrahedralMesh(some, std::vector<Tetrahedron>{});
+    return kind == 4 ? detection.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1.0})
+                     : kinds[kind].addTo(detection);
+  };
+  std::ifstream file(PALPATE_SOURCE_DIR "/Docs/SupportMatrix.md");
+  const std::string document{std::istreambuf_iterator<char>(file), {}};
+  for (int a = 0; a < 5; ++a) {
+    std::string row = "| **" + names[a] + "** |";
+    for (int b = 0; b < 5; ++b) {
+      std::string cell;
+      int accepted = 0;
+      for (const auto& [method, name] : methods) {
+        int ways = 0;
+        for (const bool self : {false, true}) {
+          if (self && a != b) continue;
+          OctreeBasedCD detection;
+          const GeometryId first = add(detection, a), second = add(detection, b);
+          try {
+            detection.addCollisionPair(first, self ? first : second, {method, 1.0});
+            ++ways;
+          } catch (const Error& error) {
+            EXPECT_EQ(error.code(), ErrorCode::UnsupportedMethod);
+          }
+        }
+        EXPECT_TRUE(ways == 0 ||
+                    ways == 1 + (a == b && a != 4));  // a shape does not collide with itself
+        if (ways == 0) continue;
+        ++accepted;
+        cell += (cell.empty() ? "`" : ", `") + name + "`";
+      }
+      row += ' ';
+      row += accepted == 4 ? "every method" : accepted == 0 ? "refused" : cell;
+      row += " |";
+    }
+    EXPECT_NE(document.find(row + "\n"), document.npos) << row;
+  }
+  const std::pair<AnalyticalGeometry, std::string> shapes[] = {
+      {Sphere{}, "sphere"},
+      {Capsule{}, "capsule"},
+      {Plane{}, "plane"},
+      {Box{{0, 0, 0}, {1, 1, 1}}, "box"},
+      {Cylinder{{0, 0, 0}, {0, 0, 1}, 1}, "cylinder"},
+      {ConvexHull{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, "hull"}};
+  for (const auto& [shape, name] : shapes) {
+    std::string row = "| **" + name + "** |";
+    for (const TestGeometry& kind : kinds) {
+      OctreeBasedCD detection;
+      const GeometryId mesh = kind.addTo(detection), tool = detection.addAnalyticalGeometry(shape);
+      detection.addCollisionPair(mesh, tool, {Method::Auto, 1.0});
+      detection.setPairSettings(mesh, tool, {Method::Proximity, 1.0});
+      detection.setPairSettings(tool, mesh, {Method::Continuous, 1.0});
+      row += " `Auto`, `Proximity`, `Continuous` |";
+    }
+    EXPECT_NE(document.find(row + "\n"), document.npos) << row;
+  }
+}
+
+TEST(GeometryTypes, BadInputThrowsErrorsThatNameIt) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  OctreeBasedCD collisions(settingsOf(Engine::Octree));
+  const Positions two{{0, 0, 0}, {1, 0, 0}};
+  const std::vector<Segment> one{{0, 1}};
+  using Code = ErrorCode;
+  expectRefused(Code::NonFinitePosition, "geometry 0, vertex 1", [&] {
+    collisions.addLineMesh(Positions{{0, 0, 0}, {kNan, 0, 0}}, one);
+  });
+  expectRefused(Code::NonFinitePosition, "geometry 0, vertex 0", [&] {
+    collisions.addPointSet(Positions{{kNan, 0, 0}});
+  });
+  expectRefused(Code::IndexOutOfRange, "geometry 0, segment 0: vertex index 2 is out of range",
+                [&] {
+                  collisions.addLineMesh(two, std::vector<Segment>{{0, 2}});
+                });
+  expectRefused(Code::IndexOutOfRange, "segment 1 joins vertex 1 with itself", [&] {
+    collisions.addLineMesh(two, std::vector<Segment>{{0, 1}, {1, 1}});
+  });
+  for (const double bad : {-1.0, kNan, std::numeric_limits<double>::infinity()}) {
+    expectRefused(Code::InvalidRadius, "radius is", [&] { collisions.addPointSet(two, bad); });
+    expectRefused(Code::InvalidRadius, "geometry 0, vertex 1: radius is", [&] {
+      collisions.addLineMesh(two, one, std::vector<double>{1, bad});
+    });
+  }
+  expectRefused(Code::InvalidRadius, "geometry 0: 1 radii given for 2 vertices",
+                [&] { collisions.addLineMesh(two, one, std::vector<double>{1}); });
+
+  const GeometryId line = collisions.addLineMesh(two, one),
+                   points = collisions.addPointSet(two, 1.0),
+                   thick = collisions.addLineMesh(two, one, std::vector<double>{1, 2}),
+                   mesh = collisions.addTriangleMesh(two, std::vector<Triangle>{{0, 1, 0}});
+  EXPECT_EQ(line, GeometryId{0});  // refused calls used no id
+  const PairSettings near{Method::Proximity, 1.0};
+  for (const GeometryId other : {mesh, line, points})
+    expectRefused(Code::UnsupportedMethod, "use Auto, Proximity or Continuous",
+                  [&] { collisions.addCollisionPair(line, other, {Method::Intersection}); });
+  expectRefused(Code::UnsupportedMethod, "one radius for all vertices", [&] {
+    collisions.addCollisionPair(thick, mesh, {Method::Continuous, 1.0});
+  });
+  expectRefused(Code::InvalidSettings, "needs a positive thickness", [&] {
+    collisions.addCollisionPair(line, mesh, {Method::Proximity, 0.0});
+  });
+  expectRefused(Code::NotClosed, "geometry 0 is a line mesh, which has no inside",
+                [&] { testing::insideVertices(collisions, points, line); });
+  expectRefused(Code::UnsupportedMethod, "geometry 0 is a line mesh",
+                [&] { collisions.setTriangles(line, two, {}); });
+  PairSettings rest = near;
+  for (const double bad : {-1.0, kNan}) {
+    rest.restDistance = bad;
+    expectRefused(Code::InvalidSettings, "restDistance is",
+                  [&] { collisions.addCollisionPair(line, line, rest); });
+  }
+  rest.restDistance = 1.0;
+  expectRefused(Code::InvalidSettings, "for a triangle or line mesh with itself",
+                [&] { collisions.addCollisionPair(line, thick, rest); });
+  EXPECT_TRUE(collisions.pairs().empty());
+  collisions.addCollisionPair(thick, mesh, {Method::Proximity, 0.0});  // the radii are not 0
+}
+
+// ---- Captures ----
+
+TEST(GeometryTypes, CapturesIncludeThem) {
+  Random random(7);
+  const TestGeometry organ = testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
+  const TestGeometry line = tapered(random, thread(random, 100, 0.1, 0, false), 0.02),
+                     drops = particles(random, 50, 0.03);
+  Settings audited = settingsOf(Engine::Octree);
+  audited.audit.features = 100000;
+  OctreeBasedCD collisions(audited);
+  const GeometryId a = organ.addTo(collisions), b = line.addTo(collisions),
+                   c = drops.addTo(collisions);
+  PairSettings self{Method::Proximity, 0.01};
+  self.restDistance = 0.2;
+  collisions.addCollisionPair(b, b, self);
+  collisions.addCollisionPair(a, b, {Method::Proximity, 0.02});
+  collisions.addCollisionPair(c, a, {Method::Continuous, 0.01});
+  collisions.setPositions(b, moved(random, line.positions, 0.05));
+  collisions.detectCollision();
+  EXPECT_TRUE(collisions.auditFailures().empty());
+  EXPECT_EQ(collisions.statistics().segments, 100u);
+  EXPECT_EQ(collisions.statistics().points, 50u);
+  EXPECT_EQ(collisions.statistics().triangles, organ.triangles.size());
+  replayed(collisions);
+  for (const CollisionPair& pair : collisions.pairs())
+    EXPECT_FALSE(collisions.collisionData(pair.a, pair.b).validity().trusted);
+  EXPECT_GT(collisions.statistics().contacts, 10u);
+}
+
+}  // namespace
+}  // namespace palpate::testing
