@@ -33,7 +33,7 @@ void findElementsNear(const SearchableGeometry& geometry, const Shape& before, c
       return step.mayComeNear({box.min() + origin, box.max() + origin}, maxDistance);
     if (wholeStep) return swept.intersects(box);
     const Vector3d centre = box.center() + origin;
-    const SignedDistance at = now.signedDistance(centre);
+    const PointShapeDistance at = now.signedDistance(centre);
     const double size = centre.cwiseAbs().maxCoeff() + box.sizes().sum();
     return !(at.distance - 0.5 * at.normal.cwiseAbs().dot(box.sizes()) >
              maxDistance + error + kShapeBoundError * size);  // NaN: it may

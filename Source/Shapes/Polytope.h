@@ -15,7 +15,7 @@
 namespace palpate {
 
 /// Signed distance from the surface of a convex body; negative inside.
-struct SignedDistance {
+struct PointShapeDistance {
   double distance;         ///< L
   Eigen::Vector3d normal;  ///< unit; the direction in which the distance grows fastest
 };
@@ -64,7 +64,7 @@ class Polytope {
   /// it reuses them.
   bool hasFace(std::uint32_t face) const { return m_planes[face].face == face; }
 
-  SignedDistance signedDistance(const Eigen::Vector3d& x, double tie) const;
+  PointShapeDistance signedDistance(const Eigen::Vector3d& x, double tie) const;
   /// The face nearest to x. For x inside, only the faces in the plane that signedDistance()
   /// measures from are considered.
   OnFace nearest(const Eigen::Vector3d& x, double tie) const;

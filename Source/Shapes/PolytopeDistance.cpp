@@ -155,7 +155,7 @@ const Vector3d& Polytope::normal(std::uint32_t face) const {
       ->normal;
 }
 
-SignedDistance Polytope::signedDistance(const Vector3d& x, double tie) const {
+PointShapeDistance Polytope::signedDistance(const Vector3d& x, double tie) const {
   const Plane& top = m_planes[highestPlane(x, tie)];
   const double height = top.height(x);
   if (!(height > tie)) return {height, top.normal};

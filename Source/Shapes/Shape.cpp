@@ -160,7 +160,7 @@ Shape::Components Shape::componentsOf(const Vector3d& v, double tie) const {
   return {{radius, std::abs(v[2])}, {outward, Vector3d(0, 0, v[2] < -tie ? -1 : 1)}};
 }
 
-SignedDistance Shape::atBody(const Vector3d& u, double tie) const {
+PointShapeDistance Shape::atBody(const Vector3d& u, double tie) const {
   if (m_hull) return m_hull->signedDistance(u, tie);
   if (isPlane()) {
     const bool below = m_type == Type::TwoSidedPlane && u[2] < 0;
@@ -169,7 +169,7 @@ SignedDistance Shape::atBody(const Vector3d& u, double tie) const {
   return atBody(u, tie, m_sizes);
 }
 
-SignedDistance Shape::atBody(const Vector3d& u, double tie,
+PointShapeDistance Shape::atBody(const Vector3d& u, double tie,
                              const std::array<double, 2>& sizes) const {
   const Components components = componentsOf(u, tie);
   const std::array<double, 2> beyond{components.lengths[0] - sizes[0],
@@ -183,16 +183,16 @@ SignedDistance Shape::atBody(const Vector3d& u, double tie,
   return {beyond[nearest], components.directions[nearest]};
 }
 
-SignedDistance Shape::distanceFromCylinder(const Vector3d& fromCentre, const Vector3d& axis) const {
+PointShapeDistance Shape::distanceFromCylinder(const Vector3d& fromCentre, const Vector3d& axis) const {
   const Eigen::Matrix3d axes = axis == Vector3d::Zero() ? m_axes : axesAlong(axis);
-  const SignedDistance inBodyFrame = atBody(axes.transpose() * fromCentre, kOnSurface * m_magnitude,
+  const PointShapeDistance inBodyFrame = atBody(axes.transpose() * fromCentre, kOnSurface * m_magnitude,
                                             {m_sizes[0], 0.5 * lengthOf(axis)});
   return {inBodyFrame.distance, axes * inBodyFrame.normal};
 }
 
-SignedDistance Shape::signedDistance(const Vector3d& x) const {
+PointShapeDistance Shape::signedDistance(const Vector3d& x) const {
   if (m_type != Type::Capsule) {
-    const SignedDistance inBodyFrame = atBody(inBody(x), kOnSurface * m_magnitude);
+    const PointShapeDistance inBodyFrame = atBody(inBody(x), kOnSurface * m_magnitude);
     return {inBodyFrame.distance, m_axes * inBodyFrame.normal};
   }
   const Vector3d along = m_p1 - m_p0, from = x - m_p0;
@@ -234,7 +234,7 @@ NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const 
   const Vector3d from = inBody(p), along = inBody(q) - from;
   const auto slope = [&](double t) { return atBody(from + t * along, 0).normal.dot(along); };
   const auto at = [&](double t, bool inInterior) {
-    const SignedDistance least = atBody(from + t * along, kOnSurface * m_magnitude);
+    const PointShapeDistance least = atBody(from + t * along, kOnSurface * m_magnitude);
     return NearestToShape{{1.0 - t, t, 0.0}, m_axes * least.normal, least.distance, inInterior};
   };
   if (m_hull) {
@@ -332,7 +332,7 @@ std::optional<NearestToShape> Shape::nearestInTriangle(const Vector3d& a, const 
   const Vector3d& weights = on.barycentric;
   if (on.distance > kOnSurface * m_magnitude)  // the point is the shape's nearest to the plane
     return NearestToShape{weights, normal, on.distance, true};
-  const SignedDistance least = signedDistance(weights[0] * a + weights[1] * b + weights[2] * c);
+  const PointShapeDistance least = signedDistance(weights[0] * a + weights[1] * b + weights[2] * c);
   return NearestToShape{weights, least.normal, least.distance, true};
 }
 
@@ -351,7 +351,7 @@ std::optional<NearestToShape> Shape::nearestToHull(const Vector3d& a, const Vect
   }
   const std::optional<Vector3d> weights = m_hull->leastInTriangle(a, b, c, tie);
   if (!weights) return {};
-  const SignedDistance least =
+  const PointShapeDistance least =
       m_hull->signedDistance((*weights)[0] * a + (*weights)[1] * b + (*weights)[2] * c, tie);
   return NearestToShape{*weights, m_axes * least.normal, least.distance, true};
 }

@@ -60,7 +60,7 @@ class Shape {
   /// linearly.
   void placeBetween(const Shape& before, const Shape& now, double time);
 
-  SignedDistance signedDistance(const Eigen::Vector3d& x) const;
+  PointShapeDistance signedDistance(const Eigen::Vector3d& x) const;
   NearestToShape nearestOfEdge(const Eigen::Vector3d& p, const Eigen::Vector3d& q) const;
   /// None if a point of the triangle's boundary is as near.
   std::optional<NearestToShape> nearestInTriangle(const Eigen::Vector3d& a,
@@ -106,7 +106,7 @@ class Shape {
   const Eigen::Matrix3d& axes() const { return m_axes; }  ///< a plane's normal is the last column
   /// Signed distance of a point from a cylinder that has this cylinder's radius and another axis.
   /// The point is relative to the centre.
-  SignedDistance distanceFromCylinder(const Eigen::Vector3d& fromCentre,
+  PointShapeDistance distanceFromCylinder(const Eigen::Vector3d& fromCentre,
                                       const Eigen::Vector3d& axis) const;
   /// A hull's faces, by corners. A capsule's axis counts as the triangle {p, q, q}.
   std::span<const Triangle> faces() const { return m_faces; }
@@ -136,9 +136,9 @@ class Shape {
   /// leads out. It is near the given one.
   Eigen::Vector3d directionFromAxis(const Eigen::Vector3d& normal) const;
   /// tie: L, if two faces are equally near within this, the first one counts.
-  SignedDistance atBody(const Eigen::Vector3d& u, double tie) const;
+  PointShapeDistance atBody(const Eigen::Vector3d& u, double tie) const;
   /// The same for a cylinder with other sizes.
-  SignedDistance atBody(const Eigen::Vector3d& u, double tie,
+  PointShapeDistance atBody(const Eigen::Vector3d& u, double tie,
                         const std::array<double, 2>& sizes) const;
   Eigen::Vector3d nearestOfPlane(const Eigen::Vector3d& normal, double height) const;
   std::optional<NearestToShape> nearestToHull(const Eigen::Vector3d& a, const Eigen::Vector3d& b,

@@ -105,7 +105,7 @@ class ShapeImpacts {
   std::optional<ShapeImpact> findOfVertex(std::uint32_t v) {
     const auto time = timeOfVertex(v);
     if (!time) return {};
-    const SignedDistance atTime =
+    const PointShapeDistance atTime =
         ShapeStep(m_before, m_now).signedDistanceAt({m_mesh.before[v], m_mesh.now[v]}, *time);
     return ShapeImpact{*time, {Vector3d::UnitX(), atTime.normal, atTime.distance, true}};
   }
@@ -270,7 +270,7 @@ class ShapeContactFinder {
  private:
   struct End {
     std::uint32_t vertex;
-    SignedDistance from;
+    PointShapeDistance from;
   };
 
   /// Whether a feature may be within reach. The distance is convex, so the slope at each end bounds

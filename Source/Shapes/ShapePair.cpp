@@ -175,7 +175,7 @@ ShapePairDistance Shape::minkowskiDistance(const Shape& other, ShapePairScratch&
   const Vector3d origin = Vector3d::Zero();
   const double gap = std::max(kShapePairGap * size, kSmallestShapePairGap), tie = kOnSurface * size;
   const bool isRound = m_type == Type::Cylinder || other.m_type == Type::Cylinder;
-  SignedDistance out;
+  PointShapeDistance out;
   for (;;) {
     out = polytope.signedDistance(origin, tie);
     const auto [difference, point] = minkowski.furthest(out.normal);
@@ -211,7 +211,7 @@ ShapePairDistance Shape::axisDistance(const Shape& body) const {
   if (body.m_type == Type::Capsule) {
     nearest = body.nearestOfEdge(m_p0, m_p1);
   } else {
-    const SignedDistance at = body.signedDistance(m_p0);
+    const PointShapeDistance at = body.signedDistance(m_p0);
     nearest.normal = at.normal;
     nearest.distance = at.distance;
   }

@@ -117,7 +117,7 @@ bool ShapeStep::staysFar(const Moment& a, const Moment& b, const ScaledLengths& 
   return middleDistance - motion > lengths.distance + lengths.error;
 }
 
-SignedDistance ShapeStep::distanceAt(const Moment& moment) const {
+PointShapeDistance ShapeStep::distanceAt(const Moment& moment) const {
   if (m_before.isPlane()) {
     const Vector3d normal = moment.u.cross(moment.v).stableNormalized();
     return {normal.dot(moment.from), normal};
@@ -219,9 +219,9 @@ ShapePairDistance ShapeStep::nearestAt(const MovingBody& body, double time) cons
   return {point - distance * normal, point, -normal, distance};
 }
 
-SignedDistance ShapeStep::signedDistanceAt(const Point& point, double time) const {
+PointShapeDistance ShapeStep::signedDistanceAt(const Point& point, double time) const {
   const Moment start = before(point[0]), atTime = between(start, now(point[1]), time);
-  SignedDistance nearest = distanceAt(atTime);
+  PointShapeDistance nearest = distanceAt(atTime);
   if (m_before.isPlane() && nearest.normal == Vector3d::Zero())
     nearest.normal = m_before.axes().col(2);
   if (m_before.isTwoSided() && distanceAt(start).distance < 0)

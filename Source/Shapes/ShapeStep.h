@@ -67,7 +67,7 @@ class ShapeStep {
   std::optional<double> firstTimeWithin(const Point&, double distance, double tolerance) const;
   /// Signed distance of the point at that time; for a two-sided plane, on the side from which the
   /// point came.
-  SignedDistance signedDistanceAt(const Point&, double time) const;
+  PointShapeDistance signedDistanceAt(const Point&, double time) const;
   /// For a plane: the same with a body in place of the point. A two-sided plane counts from the
   /// side on which the body was before the step.
   std::optional<double> firstTimeWithin(const MovingBody&, double distance, double tolerance) const;
@@ -94,7 +94,7 @@ class ShapeStep {
   Moment scaledBy(int exponent, const Moment&) const;
   static Moment at(const Shape&, const Eigen::Vector3d& point);
   static Moment between(const Moment&, const Moment&, double time);
-  SignedDistance distanceAt(const Moment&) const;
+  PointShapeDistance distanceAt(const Moment&) const;
   double sideOf(const MovingBody&) const;
   bool staysAbove(const Moment&, const Moment&, const ScaledLengths&) const;
   bool staysOutside(const Moment&, const Moment&, const ScaledLengths&) const;

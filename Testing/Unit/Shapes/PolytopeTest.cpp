@@ -210,7 +210,7 @@ TEST(Polytope, DistanceMatchesTheNearestTriangle) {
         const auto flat = vertexTriangleDistance(points[a], points[a], points[b], points[c]);
         highest = std::max(highest, flat.normal.dot(x - points[a]));
       }
-      const SignedDistance found = hull.signedDistance(x, tie);
+      const PointShapeDistance found = hull.signedDistance(x, tie);
       EXPECT_NEAR(std::abs(found.distance), nearest, 8 * tie);
       EXPECT_NEAR(found.normal.norm(), 1, 1e-14);
       EXPECT_TRUE(std::abs(highest) <= 1e-6 * size || (found.distance < 0) == (highest < 0));
