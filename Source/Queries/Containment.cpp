@@ -3,8 +3,8 @@
 #include <palpate/Error.h>
 
 #include "Queries/Embedding.h"
+#include "Queries/PointDistances.h"
 #include "Core/Text.h"
-#include "Math/ClosestPoint.h"
 #include "Math/RayCrossing.h"
 #include "Math/Tolerances.h"
 
@@ -18,21 +18,6 @@ namespace palpate {
 namespace {
 
 constexpr float kFloatInfinity = std::numeric_limits<float>::infinity();
-
-/// Whether a triangle is certainly further from p than `distance`, and so is its rounded distance.
-/// Along any direction, here towards the mean of the corners, no point of the triangle is nearer
-/// than its nearest corner. Errors: distances at most 2^-48 of the furthest corner's distance,
-/// u . w at most 2^-50 of |u| |w|.
-bool isBeyond(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-              const Eigen::Vector3d& c, double distance) {
-  const Eigen::Vector3d u = a - p, v = b - p, t = c - p, w = u + v + t;
-  const double most = std::max({u.squaredNorm(), v.squaredNorm(), t.squaredNorm()});
-  const double along = std::min({u.dot(w), v.dot(w), t.dot(w)}), square = w.squaredNorm();
-  return along > 0 &&
-         along * along * (1 - kNearestError) >
-             square * (distance * distance + 2 * kNearestSlack * distance * std::sqrt(most) +
-                       kNearestSlack * kNearestSlack * most);
-}
 
 /// Point queries for one body.
 class BodyQuery {
@@ -70,42 +55,16 @@ class BodyQuery {
 
   /// The nearest point of the surface. If several triangles are equally near, on the lowest.
   InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p) {
-    VertexTriangleDistance best{Eigen::Vector3d::Zero(),  Eigen::Vector3d::Zero(),
-                                Eigen::Vector3d::Zero(),  std::numeric_limits<double>::infinity(),
-                                TriangleFeature::CornerA, false};
-    std::uint32_t at = 0, id = 0xffffffffu;
-    const auto testOne = [&](std::uint32_t i) {
-      const auto& [a, b, c] = m_geometry.tree.ordered()[i];
-      const auto& now = m_geometry.mesh.now;
-      if (!m_bruteForce && isBeyond(p, now[a], now[b], now[c], best.distance)) return;
-      const VertexTriangleDistance distance =
-          finiteVertexTriangleDistance(p, now[a], now[b], now[c]);
-      const std::uint32_t own = m_geometry.tree.octree().order()[i];
-      if (distance.distance > best.distance || (distance.distance == best.distance && own > id))
-        return;
-      best = distance;
-      at = i;
-      id = own;
-    };
-    if (m_bruteForce) {
-      for (std::uint32_t i = 0; i < size(); ++i) testOne(i);
-    } else {
-      // A little more than the best distance squared: distances are rounded, and the search must
-      // also find equally near triangles.
-      const auto bound = [&] {
-        const double distance = best.distance * m_geometry.tree.frame().scale;
-        return distance * distance * (1 + kNearestError);
-      };
-      testOne(std::min(m_last, size() - 1));
-      forEachNearest(m_geometry.tree.octree(), m_frame.map(), m_frame.boxOf(p), bound(), m_stack,
-                     [&](std::uint32_t i) {
-                       testOne(i);
-                       return bound();
-                     });
-      m_last = at;
-    }
-    return {vertex,        id,  m_geometry.tree.ordered()[at], best.barycentric, -best.normal,
-            best.distance, true};
+    const PointDistances distances(m_geometry, p, m_bruteForce);
+    const auto near = distances.nearest(kInfinity, m_last);
+    m_last = near->place;
+    return {vertex,
+            near->element,
+            m_geometry.tree.ordered()[near->place],
+            near->closest.barycentric,
+            -near->closest.normal,
+            near->closest.distance,
+            true};
   }
 
   bool mayContain(const Eigen::Vector3d& p) const {
@@ -125,28 +84,56 @@ class BodyQuery {
   std::uint32_t m_last = 0;  ///< the triangle nearest to the last point: often near the next one
 };
 
+/// Whether points are inside a body, and their surface points.
+class InsideQuery {
+ public:
+  InsideQuery(const SearchableGeometry& body, const InsideSettings& settings, Engine engine,
+              PointQueryStack& stack)
+      : m_body(body),
+        m_settings(settings),
+        m_bruteForce(engine == Engine::BruteForce),
+        m_stack(stack),
+        m_surface(body, engine, stack),
+        m_solid(body, engine, stack) {}
+
+  WindingNumbers::Result evaluate(const Eigen::Vector3d& p) {
+    if (m_settings.rule == InsideRule::WindingNumber)
+      return m_body.windingNumbers.evaluate(m_body, p, m_settings.margin, m_bruteForce, m_stack);
+    if (m_body.solid) return {m_solid.lowest(p).has_value(), true};
+    return {m_surface.mayContain(p) && m_surface.windingNumber(p) != 0, true};
+  }
+  InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p) {
+    return m_surface.nearest(vertex, p);
+  }
+
+ private:
+  const SearchableGeometry& m_body;
+  const InsideSettings& m_settings;
+  const bool m_bruteForce;
+  PointQueryStack& m_stack;
+  BodyQuery m_surface;
+  SolidQuery m_solid;
+};
+
 }  // namespace
+
+bool isInside(const SearchableGeometry& body, const Eigen::Vector3d& point,
+              const InsideSettings& settings, Engine engine, PointQueryStack& stack) {
+  return body.tree.octree().size() > 0 &&
+         InsideQuery(body, settings, engine, stack).evaluate(point).inside;
+}
 
 void findInside(const SearchableGeometry& vertices, const SearchableGeometry& body,
                 const InsideSettings& settings, Engine engine, const Threads& threads,
                 VertexSearch<InsideVertex>& scratch, std::vector<InsideVertex>& out) {
   if (body.tree.octree().size() == 0) return out.clear();
-  const bool closed = settings.rule == InsideRule::Closed,
-             bruteForce = engine == Engine::BruteForce;
   searchVertices(vertices.mesh.topology, threads, scratch, out, [&](PointQueryStack& stack) {
-    return [&, bodyQuery = BodyQuery(body, engine, stack),
-            solidQuery = SolidQuery(body, engine, stack)](
+    return [&, query = InsideQuery(body, settings, engine, stack)](
                std::uint32_t v) mutable -> std::optional<InsideVertex> {
       const Eigen::Vector3d& p = vertices.mesh.now[v];
-      const auto isInside = [&] {
-        return body.solid ? solidQuery.lowest(p).has_value()
-                          : bodyQuery.mayContain(p) && bodyQuery.windingNumber(p) != 0;
-      };
-      const WindingNumbers::Result result =
-          closed ? WindingNumbers::Result{isInside(), true}
-                 : body.windingNumbers.evaluate(body, p, settings.margin, bruteForce, stack);
+      const WindingNumbers::Result result = query.evaluate(p);
       if (!result.inside) return {};
-      InsideVertex inside = bodyQuery.nearest(v, p);
+      InsideVertex inside = query.nearest(v, p);
       inside.decided = result.decided;
       if (!(inside.depth > 0)) return {};
       return inside;

@@ -20,6 +20,10 @@ void findInside(const SearchableGeometry& vertices, const SearchableGeometry& bo
                 const InsideSettings&, Engine, const Threads&, VertexSearch<InsideVertex>&,
                 std::vector<InsideVertex>& out);
 
+/// Whether a point is inside a body, with the same conditions.
+bool isInside(const SearchableGeometry& body, const Eigen::Vector3d& point, const InsideSettings&,
+              Engine, PointQueryStack&);
+
 /// Throws InvalidSettings for settings out of range. Throws NotClosed for a body without faces. For
 /// InsideRule::Closed it also throws NotClosed, with the first edge at fault, if the body is not
 /// closed.

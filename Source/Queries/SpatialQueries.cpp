@@ -119,6 +119,22 @@ std::optional<SurfacePoint> closestPointOf(const SearchableGeometry& geometry,
   return distances.surfacePoint(*near);
 }
 
+void checkSizes(std::size_t asked, std::size_t room, const char* name) {
+  if (asked != room)
+    throw Error(ErrorCode::InvalidSettings, std::to_string(asked) + " " + name + ", but room for " +
+                                                std::to_string(room) + " answers");
+}
+
+/// Calls f(begin, end) for parts of a batch, on all threads.
+template <class F>
+void forParts(SpatialQueries::Source& source, std::size_t size, F&& f) {
+  constexpr std::size_t kGrain = 64;
+  const SpatialQueries::Source::Workers workers(source);
+  const Threads& threads = workers;
+  threads.forChunks(size, kGrain,
+                    [&](std::size_t, std::size_t begin, std::size_t end) { f(begin, end); });
+}
+
 void checkRay(const Ray& ray) {
   if (!ray.origin.allFinite() || !ray.direction.allFinite())
     throw Error(ErrorCode::NonFinitePosition, "the ray has origin " + textOf(ray.origin) +
@@ -155,21 +171,17 @@ void SpatialQueries::firstHits(GeometryId id, std::span<const Ray> rays,
                                std::span<RayHit> out) const {
   Source& source = valid();
   const StandardFloatingPoint standard;
-  if (rays.size() != out.size())
-    throw Error(ErrorCode::InvalidSettings, std::to_string(rays.size()) + " rays, but room for " +
-                                                std::to_string(out.size()) + " answers");
+  checkSizes(rays.size(), out.size(), "rays");
   for (const Ray& ray : rays) checkRay(ray);
   const SearchableGeometry& geometry = source.at(id);
   checkHasElements(geometry);
   const bool bruteForce = source.engine() == Engine::BruteForce;
-  const SpatialQueries::Source::Workers workers(source);
-  static_cast<const Threads&>(workers).forChunks(
-      rays.size(), 64, [&](std::size_t, std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i)
-          out[i] = RayHits(geometry, rays[i], bruteForce)
-                       .first(rays[i].tMax)
-                       .value_or(RayHit{id, kNoElement, {}, {0, 0, 0}, kInfinity, false, false});
-      });
+  forParts(source, rays.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      out[i] = RayHits(geometry, rays[i], bruteForce)
+                   .first(rays[i].tMax)
+                   .value_or(RayHit{id, kNoElement, {}, {0, 0, 0}, kInfinity, false, false});
+  });
 }
 
 void SpatialQueries::allHits(GeometryId id, const Ray& ray, std::vector<RayHit>& out) const {
@@ -201,23 +213,59 @@ void SpatialQueries::closestPoints(GeometryId id, std::span<const Eigen::Vector3
                                    std::span<SurfacePoint> out, double maxDistance) const {
   Source& source = valid();
   const StandardFloatingPoint standard;
-  if (points.size() != out.size())
-    throw Error(ErrorCode::InvalidSettings, std::to_string(points.size()) +
-                                                " points, but room for " +
-                                                std::to_string(out.size()) + " answers");
+  checkSizes(points.size(), out.size(), "points");
   for (const Eigen::Vector3d& point : points) checkPoint(point);
   checkLength(maxDistance, "maxDistance", false);
   const SearchableGeometry& geometry = source.at(id);
   checkHasElements(geometry);
   const bool bruteForce = source.engine() == Engine::BruteForce;
-  const SpatialQueries::Source::Workers workers(source);
-  static_cast<const Threads&>(workers).forChunks(
-      points.size(), 64, [&](std::size_t, std::size_t begin, std::size_t end) {
-        std::uint32_t likely = kNoElement;
-        for (std::size_t i = begin; i < end; ++i)
-          out[i] = closestPointOf(geometry, points[i], maxDistance, bruteForce, likely)
-                       .value_or(SurfacePoint{id, kNoElement, {}, {0, 0, 0}, {0, 0, 0}, kInfinity});
-      });
+  forParts(source, points.size(), [&](std::size_t begin, std::size_t end) {
+    std::uint32_t likely = kNoElement;
+    for (std::size_t i = begin; i < end; ++i)
+      out[i] = closestPointOf(geometry, points[i], maxDistance, bruteForce, likely)
+                   .value_or(SurfacePoint{id, kNoElement, {}, {0, 0, 0}, {0, 0, 0}, kInfinity});
+  });
+}
+
+bool SpatialQueries::contains(GeometryId id, const Eigen::Vector3d& point,
+                              const InsideSettings& settings) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  checkPoint(point);
+  SearchableGeometry& body = source.at(id);
+  source.prepareInside(body, settings);
+  const Source::Loan scratch(source);
+  return isInside(body, point, settings, source.engine(), scratch->stack);
+}
+
+SignedDistance SpatialQueries::signedDistance(GeometryId id, const Eigen::Vector3d& point,
+                                              const InsideSettings& settings) const {
+  SignedDistance out;
+  signedDistances(id, {&point, 1}, {&out, 1}, settings);
+  return out;
+}
+
+void SpatialQueries::signedDistances(GeometryId id, std::span<const Eigen::Vector3d> points,
+                                     std::span<SignedDistance> out,
+                                     const InsideSettings& settings) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  checkSizes(points.size(), out.size(), "points");
+  for (const Eigen::Vector3d& point : points) checkPoint(point);
+  SearchableGeometry& body = source.at(id);
+  source.prepareInside(body, settings);
+  if (body.tree.ordered().empty())
+    throw Error(ErrorCode::NotClosed, nameOf(id) + " has no triangles and so no surface", id);
+  const bool bruteForce = source.engine() == Engine::BruteForce;
+  forParts(source, points.size(), [&](std::size_t begin, std::size_t end) {
+    const Source::Loan scratch(source);
+    std::uint32_t likely = kNoElement;
+    for (std::size_t i = begin; i < end; ++i) {
+      const SurfacePoint nearest = *closestPointOf(body, points[i], kInfinity, bruteForce, likely);
+      const bool inside = isInside(body, points[i], settings, source.engine(), scratch->stack);
+      out[i] = {nearest, inside ? -nearest.distance : nearest.distance};
+    }
+  });
 }
 
 void SpatialQueries::nearestElements(GeometryId id, const Eigen::Vector3d& point, int k,

@@ -32,6 +32,12 @@ struct SurfacePoint {
   double distance;
 };
 
+/// The distance of a point from the surface of a body, negative inside.
+struct SignedDistance {
+  SurfacePoint nearest;  ///< nearest.distance is not negative
+  double distance;       ///< L
+};
+
 /// The points origin + t direction with t in [tMin, tMax], both included.
 struct Ray {
   Eigen::Vector3d origin, direction;  ///< L; the direction has any length but 0
@@ -94,6 +100,23 @@ class PALPATE_EXPORT SpatialQueries {
   /// Errors   those of closestPoint(); InvalidSettings if k is below 1.
   void nearestElements(GeometryId, const Eigen::Vector3d& point, int k,
                        std::vector<SurfacePoint>& out, double maxDistance = kInfinity) const;
+  /// Whether a point is inside a body, by the rule in InsideSettings. With
+  /// InsideRule::WindingNumber a number that the margin or rounding leaves open counts as inside.
+  /// Points on the surface of a triangle mesh are not inside; points on the boundary of a
+  /// tetrahedron are.
+  ///
+  /// Errors   those of findInsideVertices(); NonFinitePosition.
+  bool contains(GeometryId body, const Eigen::Vector3d& point, const InsideSettings& = {}) const;
+  /// The distance from a body's surface, negative where contains() holds.
+  ///
+  /// Errors   those of contains(); NotClosed for a body without elements.
+  SignedDistance signedDistance(GeometryId body, const Eigen::Vector3d& point,
+                                const InsideSettings& = {}) const;
+  /// The same for many points, on all threads.
+  ///
+  /// Errors   InvalidSettings, too, if `out` has another size than `points`.
+  void signedDistances(GeometryId body, std::span<const Eigen::Vector3d> points,
+                       std::span<SignedDistance> out, const InsideSettings& = {}) const;
   /// Finds the elements with a point within a radius, decided exactly.
   ///
   /// Order    ascending.
