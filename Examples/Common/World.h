@@ -64,7 +64,7 @@ class World {
                    double inverseMass);
   BodyId addShape(std::string name, const AnalyticalGeometry&, SceneMesh drawn);
   /// Distances along each edge of a mesh and across it between the opposite corners; of a thread
-  /// along each segment and each two.
+  /// along each segment; a thread wants to be straight.
   void addStiffness(BodyId, double edgeCompliance, double bendingCompliance);
   void addVolume(BodyId, double compliance);
   /// Vertices of which this holds stay where they are, or are moved by hand.
