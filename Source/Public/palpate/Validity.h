@@ -98,7 +98,7 @@ struct Validity {
   /// for pairs with a shape. For a geometry with itself all are in the first list.
   std::vector<std::uint32_t> untrustedVerticesA, untrustedVerticesB;
   /// Triangles without area that are in contacts, ascending. Their normals follow the rules of
-  /// <palpate/Distance.h>.
+  /// <palpate/Distance.h>. No meaning for pairs with lines or points, where segments may be listed.
   std::vector<std::uint32_t> degenerateTrianglesA, degenerateTrianglesB;
 
   /// Maximum number of vertices of one mesh that are listed because they moved too far.
