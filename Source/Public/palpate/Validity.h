@@ -97,8 +97,8 @@ struct Validity {
   /// apart at its end. Both lists are empty for Method::Auto with two meshes, for Continuous, and
   /// for pairs with a shape. For a geometry with itself all are in the first list.
   std::vector<std::uint32_t> untrustedVerticesA, untrustedVerticesB;
-  /// Triangles without area that are in contacts, ascending. Their normals follow the rules of
-  /// <palpate/Distance.h>. No meaning for pairs with lines or points, where segments may be listed.
+  /// Triangles of meshes without area that are in contacts, ascending. Their normals follow the
+  /// rules of <palpate/Distance.h>. Empty for pairs with a shape.
   std::vector<std::uint32_t> degenerateTrianglesA, degenerateTrianglesB;
 
   /// Maximum number of vertices of one mesh that are listed because they moved too far.
