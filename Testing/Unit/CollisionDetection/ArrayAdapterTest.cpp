@@ -120,7 +120,7 @@ TEST(ArrayAdapter, CellsOfSegmentsAndPointsAreNotTriangles) {
   for (const CellElement& cell : cells(answer(points, line, settings))) {
     EXPECT_EQ(cell.cellType, CellKind::Edge);
     EXPECT_EQ(cell.idCount, 2);
-    EXPECT_EQ(cell.ids[1] - cell.ids[0], 1);  // consecutive vertices of the thread
+    EXPECT_EQ(std::abs(cell.ids[1] - cell.ids[0]), 1);  // consecutive vertices of the thread
   }
   const CollisionData contacts = answer(points, points, settings);
   const auto all = cells(contacts);

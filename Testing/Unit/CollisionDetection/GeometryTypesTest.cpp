@@ -465,6 +465,8 @@ TEST(GeometryTypes, DegeneratePointsMatchBruteForce) {
         expectSameRows(Rows(answer(settingsOf(Engine::Octree), *a, *b, pair, now, b->positions)),
                        truth);
         const CollisionData data = answer(*a, *b, pair);
+        EXPECT_TRUE(data.validity().degenerateTrianglesA.empty());
+        EXPECT_TRUE(data.validity().degenerateTrianglesB.empty());
         for (const auto& c : data.vertexTriangle()) {
           EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);
           EXPECT_EQ(c.barycentric.sum(), 1.0);
@@ -499,6 +501,25 @@ TEST(GeometryTypes, DegenerateLinesMatchBruteForce) {
           const CollisionData data = answer(degenerate, *other, pair);
           for (const auto& c : data.edgeEdge()) expectWellFormed(c);
         }
+  }
+}
+
+/// Triangles without area are named; segments have none to lack.
+TEST(GeometryTypes, OnlyTrianglesWithoutAreaAreDegenerate) {
+  TestGeometry flat;
+  flat.positions = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {0, 1, 0}};
+  flat.triangles = {{0, 1, 2}, {0, 1, 3}};
+  TestGeometry points{GeometryType::Points, {{1.5, 0, 0.1}, {0.2, 0.2, 0.1}}, {}, {}, {0.0}},
+      line{GeometryType::Lines,
+           {{1.5, -1, 0.1}, {1.5, 1, 0.1}, {1.5, 1, 0.1}},
+           {},
+           {{0, 1}, {1, 2}},
+           {0.0}};
+  for (const TestGeometry* other : {&points, &line}) {
+    const Validity validity =
+        answer(flat, *other, {Method::Proximity, 0.3, Contacts::All}).validity();
+    EXPECT_EQ(validity.degenerateTrianglesA, (std::vector<std::uint32_t>{0}));
+    EXPECT_TRUE(validity.degenerateTrianglesB.empty());
   }
 }
 
