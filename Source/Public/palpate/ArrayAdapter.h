@@ -23,8 +23,8 @@ static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double));
 /// The positions in an array of contiguous triples of doubles. Nothing is copied: the span is valid
 /// as long as the array.
 /// Needs    an array of doubles with data() and size(), such as std::vector<double>; or an array of
-///          triples with getPointer(), which returns the first of its triples, and size(), their
-///          number.
+///          triples with a const getPointer(), which returns the first of its triples, and size(),
+///          their number.
 /// Errors   WrongPositionCount for a number of doubles that is no multiple of 3.
 template <class Array>
 std::span<const Eigen::Vector3d> positionsOf(const Array& array) {
