@@ -1,4 +1,4 @@
-#include "Annotations.h"
+#include "Vtk/Annotations.h"
 
 #include <vtkCellArray.h>
 #include <vtkPolyData.h>

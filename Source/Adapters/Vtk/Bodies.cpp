@@ -1,4 +1,4 @@
-#include "Bodies.h"
+#include "Vtk/Bodies.h"
 
 #include <vtkActor.h>
 #include <vtkCellArray.h>

@@ -1,6 +1,6 @@
-#include "Contacts.h"
+#include "Vtk/Contacts.h"
 
-#include "Panel.h"
+#include "Vtk/Panel.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "Glyphs.h"
+#include "Vtk/Glyphs.h"
 
 #include <palpate/CollisionProblem.h>
 #include <palpate/OctreeBasedCD.h>

@@ -1,4 +1,4 @@
-#include "Glyphs.h"
+#include "Vtk/Glyphs.h"
 
 #include <vtkActor.h>
 #include <vtkAlgorithm.h>

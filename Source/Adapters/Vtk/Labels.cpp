@@ -1,6 +1,6 @@
-#include "Labels.h"
+#include "Vtk/Labels.h"
 
-#include "Annotations.h"
+#include "Vtk/Annotations.h"
 
 #include <vtkBillboardTextActor3D.h>
 #include <vtkCamera.h>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "Bodies.h"
+#include "Vtk/Bodies.h"
 
 #include <palpate/CollisionProblem.h>
 

@@ -1,4 +1,4 @@
-#include "Panel.h"
+#include "Vtk/Panel.h"
 
 #include <palpate/Error.h>
 

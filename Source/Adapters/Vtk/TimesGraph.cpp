@@ -1,4 +1,4 @@
-#include "TimesGraph.h"
+#include "Vtk/TimesGraph.h"
 
 #include <vtkContextActor.h>
 #include <vtkContextScene.h>

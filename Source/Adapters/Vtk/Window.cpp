@@ -1,12 +1,12 @@
 #include <palpate/vtk/Window.h>
 
-#include "Annotations.h"
-#include "Bodies.h"
-#include "Contacts.h"
-#include "Glyphs.h"
-#include "Labels.h"
-#include "Panel.h"
-#include "TimesGraph.h"
+#include "Vtk/Annotations.h"
+#include "Vtk/Bodies.h"
+#include "Vtk/Contacts.h"
+#include "Vtk/Glyphs.h"
+#include "Vtk/Labels.h"
+#include "Vtk/Panel.h"
+#include "Vtk/TimesGraph.h"
 
 #include <palpate/Error.h>
 
