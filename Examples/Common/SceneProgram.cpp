@@ -32,7 +32,7 @@ struct Options {
   int threads = 0;
   bool paraView = false;
   bool view = false;
-  bool pictures = false;
+  std::vector<int> pictures{};  // the first frame to draw, and the step from picture to picture
   std::array<int, 2> size{1600, 1000};
   std::string keys{};
 };
@@ -251,10 +251,10 @@ void run(const SceneProgram& program, Options options) {
   std::optional<vtk::Window> window;
   if (options.view) prepare(window.emplace(scene->world().detection()), *scene, program, options);
   std::optional<Painter> painter;
-  if (options.pictures) painter.emplace(*scene, program, options);
+  if (!options.pictures.empty()) painter.emplace(*scene, program, options);
 #endif
   makeFolder(options.out);
-  if (options.pictures) makeFolder(options.out / "pictures");
+  if (!options.pictures.empty()) makeFolder(options.out / "pictures");
   std::optional<ParaViewSeries> series;
   if (options.paraView) series.emplace(options.out / "paraview");
   RunLog log;
@@ -274,7 +274,8 @@ void run(const SceneProgram& program, Options options) {
 #ifdef PALPATE_HAS_VTK
     if (window) place(scene->world());
     if (window && !window->show()) options.frames = frame + 1;
-    if (painter) {
+    if (painter && frame >= options.pictures[0] &&
+        (frame - options.pictures[0]) % std::max(1, options.pictures[1]) == 0) {
       std::array<char, 32> name;
       std::snprintf(name.data(), name.size(), "%06d.png", frame);
       writeWhole(options.out / "pictures" / name.data(), painter->png());
@@ -321,7 +322,12 @@ int runScene(const SceneProgram& program, int count, char** arguments) {
                "shows each frame in a window; keys: o cells, b translucent bodies, c contacts, n "
                "normals, u untrusted, l names, p panel, t times, r all in view, space waits, q "
                "closes; a click names the element");
-  app.add_flag("--pictures", options.pictures, "also write OUT/pictures: a picture of each frame");
+  app.add_option("--pictures", options.pictures,
+                 "also write OUT/pictures: a picture of the frame FIRST, and of each STEP-th frame "
+                 "from there")
+      ->type_name("FIRST STEP")
+      ->expected(2)
+      ->check(CLI::Range(0, 1'000'000));
   app.add_option("--size", options.size, "width and height of pictures, in pixels")
       ->check(CLI::Range(1, 8192))
       ->capture_default_str();

@@ -254,7 +254,8 @@ void Window::Implementation::drawContacts() {
                  Vector3d(renderer->GetActiveCamera()->GetDirectionOfProjection()));
   nearest = glyphs.nearest;
   auto [low, high] = glyphs.spheres.range();
-  low = std::min(low, 0.0);
+  low = std::min(low, 0.0);  // the same range in most frames
+  for (const auto& pair : detection.pairs()) high = std::max(high, pair.settings.thickness);
   setDistanceColours(colours, {low, std::max(high, low + 1e-9 * size)});
   vtkNew<vtkSphereSource> ball;
   ball->SetThetaResolution(16);
@@ -271,7 +272,7 @@ void Window::Implementation::drawContacts() {
   vtkNew<vtkLookupTable> magenta;
   magenta->SetHueRange(0.85, 0.85);
   if (untrusted) glyphs.untrusted.show(renderer, ball, magenta);
-  if (!glyphs.spheres.empty() && (contacts || normals)) overlay->AddViewProp(colourBar);
+  if (!problem.pairs.empty() && (contacts || normals)) overlay->AddViewProp(colourBar);
 }
 
 void Window::Implementation::updateScale(vtkObject*, unsigned long, void*) {
