@@ -11,7 +11,7 @@ declare -A options=(
   [Suturing]="--frames 85"
   [Retraction]="--frames 75"
   [RobotArms]="--frames 170"
-  [BoneDrilling]="--frames 60 --particles 20000 --triangles 100000")
+  [BoneDrilling]="--frames 60 --particles 12000 --triangles 100000")
 [[ $# -gt 0 ]] || set -- "${!options[@]}"
 
 CMake/packages.sh build figures

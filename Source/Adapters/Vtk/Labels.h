@@ -30,9 +30,9 @@ class Projection {
   double m_scale, m_middleX, m_middleY;
 };
 
-/// Writes the label of each part of a geometry at a visible point, near the middle of what is
-/// visible of the part, or above a part that it would hide. Labels do not overlap where there is
-/// room. allTranslucent: no body hides another.
+/// Writes the label of each part of a geometry at a visible point near the middle of the part's
+/// visible points. A label that would hide a small part stands above it. Labels avoid each other
+/// while free points are left. allTranslucent: no body hides another.
 void showLabels(vtkRenderer*, const CollisionProblem&, const std::map<GeometryId, Parts>&,
                 const Projection&, int textSize, bool allTranslucent);
 

@@ -1,19 +1,35 @@
 #include "Vtk/TimesGraph.h"
 
+#include <vtkAxis.h>
+#include <vtkBrush.h>
+#include <vtkChartLegend.h>
 #include <vtkContextActor.h>
 #include <vtkContextScene.h>
 #include <vtkDoubleArray.h>
 #include <vtkPlot.h>
 #include <vtkRenderer.h>
+#include <vtkTextProperty.h>
 
 #include <array>
 #include <cstddef>
+#include <utility>
 
 namespace palpate::vtk {
 
-void TimesGraph::show(vtkRenderer* renderer) {
-  m_chart->SetTitle("ms");
+void TimesGraph::show(vtkRenderer* renderer, int textSize) {
   m_chart->SetShowLegend(true);
+  m_chart->GetLegend()->SetLabelSize(textSize);
+  for (const auto& [side, title] :
+       {std::pair(vtkAxis::BOTTOM, "frame"), {vtkAxis::LEFT, "time [ms]"}}) {
+    vtkAxis* axis = m_chart->GetAxis(side);
+    axis->SetTitle(title);
+    axis->GetTitleProperties()->SetFontSize(textSize);
+    axis->GetTitleProperties()->BoldOff();
+    axis->GetLabelProperties()->SetFontSize(textSize);
+  }
+  vtkNew<vtkBrush> background;
+  background->SetColorF(1, 1, 1, 0.75);
+  m_chart->SetBackgroundBrush(background);
   vtkNew<vtkContextActor> actor;
   actor->GetScene()->AddItem(m_chart);
   renderer->AddActor(actor);

@@ -13,7 +13,7 @@ namespace palpate::vtk {
 /// A graph of the times of each stage over the last frames.
 class TimesGraph {
  public:
-  void show(vtkRenderer*);
+  void show(vtkRenderer*, int textSize);  ///< textSize: pixels
   void add(const FrameStatistics::Stages&);
 
  private:

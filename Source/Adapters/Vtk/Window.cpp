@@ -298,7 +298,11 @@ void Window::Implementation::drawAnnotations() {
   }
   if (!panel) return;
   const auto name = [this](GeometryId id) { return nameOf(id); };
-  panelText->SetInput(vtk::panelText(detection, name, frames, framesPerSecond).c_str());
+  const auto isMesh = [this](GeometryId id) {
+    const Mesh& mesh = problem.geometries[indices.at(id)];
+    return mesh.type == GeometryType::Triangles && !mesh.analytical;
+  };
+  panelText->SetInput(vtk::panelText(detection, name, isMesh, frames, framesPerSecond).c_str());
   vtkTextProperty* look = panelText->GetTextProperty();
   setTextLook(look, text * 4 / 5);
   look->SetFontFamilyToCourier();
@@ -400,7 +404,7 @@ Window::Window(const OctreeBasedCD& detection, bool onScreen, int width, int hei
   own.graph->SetLayer(3);
   own.graph->InteractiveOff();
   own.graph->SetDraw(onScreen);
-  own.times.show(own.graph);
+  own.times.show(own.graph, std::max(8, height / 70));
   own.window->SetWindowName("Palpate");
   own.window->SetShowWindow(onScreen);
   own.window->SetOffScreenRendering(!onScreen);

@@ -3,6 +3,8 @@
 #include <palpate/Export.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include <Eigen/Core>
+
 #include <array>
 #include <cstdint>
 #include <memory>
