@@ -593,7 +593,7 @@ def stateMachine(page):
     page.arrow((177, 240), (383, 240), color=RED)
     page.text(280, 221, "Triangles are found to\nintersect at the end.", size=SMALL, ha="center")
     page.arrow((383, 258), (177, 258), color=GREEN)
-    page.text(280, 274, "Auto finds no intersection\nat the end.", size=SMALL, ha="center")
+    page.text(280, 274, "Auto finds no intersection\nat the end (no restDistance).", size=SMALL, ha="center")
     for middle, colour, label in ((96, GREEN, "The motion or the impacts\nexclude an intersection."),
                                   (464, RED, "Triangles still intersect.")):
         page.arrow((middle - 24, 273), (middle + 24, 273), color=colour, bend=0.9)
@@ -608,35 +608,36 @@ def conditions(page, y, rows):
 
 
 def validityStates():
-    page = Page(650, "Validity of an answer")
+    page = Page(698, "Validity of an answer")
     page.text(16, 48, "1. What is known of a step's start, carried from step to step", weight="bold")
     stateMachine(page)
     conditions(page, 348, [
         ("Initial check", "Auto runs it if the start is unknown. Proximity and Continuous run it at most once"),
-        ("", "in 16 frames on average. Intersection never runs it."),
-        ("Dashed arrows", "Proximity's features may have touched, or impacts come with earliestTimeOnly or"),
-        ("", "filters, or before is further from the last step's end than the bounds allow."),
+        ("", "in 16 frames on average. Intersection never runs it, nor does Proximity if displacement"),
+        ("", "exceeds the thickness."),
+        ("Dashed arrows", "Proximity's features may have touched or were not examined, or Intersection moved and"),
+        ("", "found nothing, or impacts come with earliestTimeOnly, a predicate, restDistance or"),
+        ("", "Sidedness::Outer, or before is further from the last step's end than the bounds allow."),
     ])
-    page.line((16, 412), (WIDTH - 16, 412), color=PALE)
-    page.text(16, 434, "2. Conditions of trusted = true", weight="bold")
-    conditions(page, 454, [
+    page.line((16, 444), (WIDTH - 16, 444), color=PALE)
+    page.text(16, 466, "2. Conditions of trusted = true", weight="bold")
+    conditions(page, 486, [
         ("Every method", "two triangle or tetrahedral meshes; not separated by groups; arcDeviation \u2264 thickness"),
         ("Continuous", "startedApart"),
         ("Proximity", "startedApart; displacement \u2264 thickness; no features may have touched in the step"),
-        ("Auto", "startedApart, or answered by Intersection at rest"),
+        ("Auto", "startedApart, or answered by Intersection at rest without a thickness"),
         ("Intersection", "nothing moved; or displacement \u2264 smallest height of a triangle, and triangles"),
-        ("", "intersect or no boxes were within displacement"),
+        ("", "intersect at the end, or no boxes of triangles are within displacement there"),
     ])
-    page.card(16, 550, 320, 84, fill=tint(GREEN), edge=GREEN)
-    page.text(28, 567, "trusted = true", weight="bold")
-    page.text(28, 583, "Normals are on the side from which features came. No\n"
-              "touch within the step is missing, save those that Distinct\n"
-              "or filters drop. Intersection: if the meshes touched\n"
-              "within the step, the answer is not empty.", size=SMALL)
-    page.card(352, 550, 192, 84, fill=tint(RED), edge=RED)
-    page.text(364, 567, "trusted = false", weight="bold")
-    page.text(364, 583, "The library does not know.\nNormals may be on the wrong\n"
-              "side, except with Intersection.", size=SMALL)
+    page.card(16, 582, 336, 100, fill=tint(GREEN), edge=GREEN)
+    page.text(28, 599, "trusted = true", weight="bold")
+    page.text(28, 615, "Proximity, Continuous, Auto: normals are on the side from\nwhich features came. "
+              "No touch within the step is missing,\nsave those that Distinct or filters drop.\n"
+              "Intersection: if the meshes touched within the step, the\nanswer is not empty. "
+              "Its normals are never certified.", size=SMALL)
+    page.card(368, 582, 176, 100, fill=tint(RED), edge=RED)
+    page.text(380, 599, "trusted = false", weight="bold")
+    page.text(380, 615, "The answer may be right or\nwrong: the library does not\nknow.", size=SMALL)
     return page
 
 

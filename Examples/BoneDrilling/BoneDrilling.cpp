@@ -55,6 +55,15 @@ class BoneDrilling : public LiveScene {
   }
 
   World& world() override { return m_world; }
+
+  std::vector<BodyLook> looks() override {
+    return {{m_rigid[0], "Bone", kBoneColour},
+            {m_rigid[1], "Liver", kLiverColour},
+            {m_rigid[2], "Stomach", kStomachColour},
+            {m_burr, "Burr", kSteelColour},
+            {m_particles, "", kBloodColour}};
+  }
+  PictureView view() override { return {.from = {0.5, -1, 0.9}}; }
   void computeFrame(int frame) override {
     double fastest = 0;
     for (const Vector3d& v : m_world.solver().velocities) fastest = std::max(fastest, v.norm());
@@ -192,6 +201,7 @@ int main(int count, char** arguments) {
            "A burr on a bone of half a million triangles, debris and blood sinking over it.",
        .frames = 300,
        .frameMilliseconds = 1000.0 / 60,
+       .keys = "n",
        .addOptions =
            [&](CLI::App& app) {
              app.add_option("--particles", size.particles)->check(CLI::Range(1, 10'000'000));

@@ -32,6 +32,9 @@ struct Options {
   int threads = 0;
   bool paraView = false;
   bool view = false;
+  std::vector<int> pictures{};  // the first frame to draw, and the step from picture to picture
+  std::array<int, 2> size{1600, 1000};
+  std::string keys{};
 };
 
 struct Column {
@@ -155,18 +158,61 @@ void place(World& world) {
 }
 #endif
 
+#ifdef PALPATE_HAS_VTK
+void prepare(vtk::Window& window, LiveScene& scene, const SceneProgram& program,
+             const Options& options) {
+  for (const BodyLook& look : scene.looks())
+    window.setAppearance(scene.world().bodies()[look.body].id,
+                         {look.label, look.colour, look.opacity, look.frontFaces},
+                         look.firstElement);
+  const PictureView view = scene.view();
+  window.setView({.from = view.from, .centre = view.centre, .height = view.height});
+  window.setLengthUnit(program.unit);
+  for (const char key : program.keys + options.keys) window.press(key);
+}
+
+/// An image of half the width and height: the mean of each four pixels.
+vtk::Image halved(const vtk::Image& image) {
+  vtk::Image half{image.width / 2, image.height / 2, {}};
+  half.rgb.resize(static_cast<std::size_t>(3) * half.width * half.height);
+  for (int y = 0; y < half.height; ++y) {
+    for (int i = 0; i < 3 * half.width; ++i) {
+      const std::size_t at = static_cast<std::size_t>(6) * y * image.width + 6 * (i / 3) + i % 3,
+                        above = at + static_cast<std::size_t>(3) * image.width;
+      const int sum = image.rgb[at] + image.rgb[at + 3] + image.rgb[above] + image.rgb[above + 3];
+      half.rgb[static_cast<std::size_t>(3) * y * half.width + i] =
+          static_cast<std::uint8_t>((sum + 2) / 4);
+    }
+  }
+  return half;
+}
+
+/// Draws pictures off screen, at twice their size, so that edges are smooth.
+class Painter {
+ public:
+  Painter(LiveScene& scene, const SceneProgram& program, const Options& options)
+      : m_scene(scene),
+        m_window(scene.world().detection(), false, 2 * options.size[0], 2 * options.size[1]) {
+    prepare(m_window, scene, program, options);
+  }
+  std::string png() {
+    place(m_scene.world());
+    m_window.show();
+    return vtk::toPng(halved(m_window.image()));
+  }
+
+ private:
+  LiveScene& m_scene;
+  vtk::Window m_window;
+};
+#endif
+
 /// Prints the reason if there is none.
-std::string picture([[maybe_unused]] World& world, [[maybe_unused]] const std::string& keys) {
+std::string picture([[maybe_unused]] LiveScene& scene, [[maybe_unused]] const SceneProgram& program,
+                    [[maybe_unused]] const Options& options) {
 #ifdef PALPATE_HAS_VTK
   try {
-    place(world);
-    vtk::Window window(world.detection(), false);
-    for (const char key : keys) window.press(key);
-    constexpr std::size_t kMostContacts = 5000;  // more would hide all else
-    if (world.times().contacts > kMostContacts)
-      for (const char key : {'c', 'n'}) window.press(key);
-    window.show();
-    return vtk::toPng(window.image());
+    return Painter(scene, program, options).png();
   } catch (const Error& error) {
     if (error.code() != ErrorCode::NotAvailable) throw;
     std::printf("no picture           %s\n", error.what());
@@ -203,10 +249,12 @@ void run(const SceneProgram& program, Options options) {
   const std::unique_ptr<LiveScene> scene = program.make(options.threads);
 #ifdef PALPATE_HAS_VTK
   std::optional<vtk::Window> window;
-  if (options.view) window.emplace(scene->world().detection());
-  for (std::size_t i = 0; window && i < program.keys.size(); ++i) window->press(program.keys[i]);
+  if (options.view) prepare(window.emplace(scene->world().detection()), *scene, program, options);
+  std::optional<Painter> painter;
+  if (!options.pictures.empty()) painter.emplace(*scene, program, options);
 #endif
   makeFolder(options.out);
+  if (!options.pictures.empty()) makeFolder(options.out / "pictures");
   std::optional<ParaViewSeries> series;
   if (options.paraView) series.emplace(options.out / "paraview");
   RunLog log;
@@ -226,6 +274,12 @@ void run(const SceneProgram& program, Options options) {
 #ifdef PALPATE_HAS_VTK
     if (window) place(scene->world());
     if (window && !window->show()) options.frames = frame + 1;
+    if (painter && frame >= options.pictures[0] &&
+        (frame - options.pictures[0]) % std::max(1, options.pictures[1]) == 0) {
+      std::array<char, 32> name;
+      std::snprintf(name.data(), name.size(), "%06d.png", frame);
+      writeWhole(options.out / "pictures" / name.data(), painter->png());
+    }
 #endif
   }
   const std::string settings = scene->settings();
@@ -238,7 +292,7 @@ void run(const SceneProgram& program, Options options) {
     still = program.make(options.threads);
     still->computeFrame(*frame);
   }
-  const std::string png = picture((still ? still : scene)->world(), program.keys);
+  const std::string png = picture(*(still ? still : scene), program, options);
   if (!png.empty()) {
     writeWhole(options.out / "scene.png", png);
     std::printf("%-20s %s\n", "picture", (options.out / "scene.png").c_str());
@@ -265,8 +319,19 @@ int runScene(const SceneProgram& program, int count, char** arguments) {
                "also write OUT/paraview: .vtp files of bodies, contacts and octree, and a .pvd");
 #ifdef PALPATE_HAS_VTK
   app.add_flag("--view", options.view,
-               "shows each frame in a window; keys: o cells, c contacts, n normals, u untrusted, t "
-               "times, r all in view, space waits, q closes; a click names the element");
+               "shows each frame in a window; keys: o cells, b translucent bodies, c contacts, n "
+               "normals, u untrusted, l names, p panel, t times, r all in view, space waits, q "
+               "closes; a click names the element");
+  app.add_option("--pictures", options.pictures,
+                 "also write OUT/pictures: a picture of the frame FIRST, and of each STEP-th frame "
+                 "from there")
+      ->type_name("FIRST STEP")
+      ->expected(2)
+      ->check(CLI::Range(0, 1'000'000));
+  app.add_option("--size", options.size, "width and height of pictures, in pixels")
+      ->check(CLI::Range(1, 8192))
+      ->capture_default_str();
+  app.add_option("--keys", options.keys, "keys of the window, pressed before it shows anything");
 #endif
   if (program.addOptions) program.addOptions(app);
   app.failure_message(

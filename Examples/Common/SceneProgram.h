@@ -2,6 +2,7 @@
 
 #include "World.h"
 
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -15,6 +16,32 @@ class App;
 }
 
 namespace palpate::scenes {
+
+using Colour = std::array<double, 3>;  ///< red, green and blue in [0, 1]
+
+/// Colours of pictures. Colour-blind readers can tell them apart by lightness.
+inline constexpr Colour kLiverColour{0.66, 0.33, 0.27}, kStomachColour{0.94, 0.76, 0.70},
+    kKidneyColour{0.80, 0.52, 0.42}, kSpleenColour{0.64, 0.49, 0.53},
+    kGallbladderColour{0.88, 0.82, 0.58}, kTissueColour{0.93, 0.80, 0.74},
+    kBoneColour{0.93, 0.89, 0.80}, kSteelColour{0.62, 0.66, 0.72}, kNeedleColour{0.35, 0.40, 0.48},
+    kThreadColour{0.10, 0.35, 0.75}, kBloodColour{0.70, 0.10, 0.12};
+
+/// How a picture shows a body, or its elements from `firstElement` on.
+struct BodyLook {
+  World::BodyId body;
+  std::string label;  ///< its name in the picture; empty: none
+  Colour colour;
+  double opacity = 1.0;
+  bool frontFaces = true;  ///< false: the picture shows a cavity from inside
+  std::uint32_t firstElement = 0;
+};
+
+/// What a picture shows.
+struct PictureView {
+  Eigen::Vector3d from{0.5, -1.0, 0.6};  ///< from the scene to the camera
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double height = 0;  ///< L, about the centre; 0: everything is in view
+};
 
 /// A scene that is computed frame by frame.
 class LiveScene {
@@ -31,6 +58,8 @@ class LiveScene {
   /// The best frame for a picture, if it needs no earlier frame. Otherwise the picture shows the
   /// last frame.
   virtual std::optional<int> frameToShow() { return {}; }
+  virtual std::vector<BodyLook> looks() { return {}; }
+  virtual PictureView view() { return {}; }
 };
 
 struct SceneProgram {
@@ -39,6 +68,7 @@ struct SceneProgram {
   double frameMilliseconds;          ///< budget of a frame with the solver
   double collisionMilliseconds = 0;  ///< budget of its collision detection; 0: none
   std::string keys{};                ///< of vtk::Window, pressed before it shows anything
+  std::string unit = "mm";           ///< of lengths
   std::function<void(CLI::App&)> addOptions{};
   std::function<std::unique_ptr<LiveScene>(int threads)> make{};
 };

@@ -85,7 +85,8 @@ void World::addStiffness(BodyId body, double edgeCompliance, double bendingCompl
   };
   for (std::uint32_t i = 0; i < m_bodies[body].segments.size(); ++i) {
     keep(i, i + 1, edgeCompliance);
-    if (i + 2 < m_bodies[body].count) keep(i, i + 2, bendingCompliance);
+    if (i + 2 < m_bodies[body].count)
+      m_solver.bends.push_back({first + i, first + i + 1, first + i + 2, bendingCompliance});
   }
   for (const auto& [edge, corners] : opposite) {
     keep(edge[0], edge[1], edgeCompliance);

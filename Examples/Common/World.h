@@ -64,7 +64,7 @@ class World {
                    double inverseMass);
   BodyId addShape(std::string name, const AnalyticalGeometry&, SceneMesh drawn);
   /// Keeps distances along each edge of a mesh and across it between the opposite corners. For a
-  /// thread: along each segment and each two.
+  /// thread: distances along each segment, and each vertex in the middle of its neighbours.
   void addStiffness(BodyId, double edgeCompliance, double bendingCompliance);
   void addVolume(BodyId, double compliance);
   /// Vertices for which this holds stay at their places, or are moved by hand.

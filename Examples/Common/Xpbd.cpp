@@ -19,6 +19,7 @@ std::uint32_t Xpbd::add(std::span<const Vector3d> positions, double inverseMass)
 
 void Xpbd::predict(double seconds, const Vector3d& acceleration, double damping) {
   m_distanceMultipliers.assign(distances.size(), 0.0);
+  m_bendMultipliers.assign(bends.size(), Vector3d::Zero());
   m_volumeMultipliers.assign(volumes.size(), 0.0);
   for (std::size_t i = 0; i < now.size(); ++i) {
     now[i] = before[i];
@@ -36,6 +37,8 @@ std::span<const double> Xpbd::solve(double seconds, std::span<const ConstraintRo
     const std::size_t count = distances.size();
     for (std::size_t i = 0; i < count; ++i)
       solveDistance(iteration % 2 == 0 ? i : count - 1 - i, seconds);
+    for (std::size_t i = 0; i < bends.size(); ++i)
+      solveBend(iteration % 2 == 0 ? i : bends.size() - 1 - i, seconds);
     for (std::size_t i = 0; i < volumes.size(); ++i) solveVolume(i, seconds);
     for (std::size_t i = 0; i < rows.size(); ++i) solveRow(rows[i], m_rowMultipliers[i]);
   }
@@ -59,6 +62,19 @@ void Xpbd::solveDistance(std::size_t index, double seconds) {
   const Vector3d push = along * (change / length);
   now[a] += inverseMasses[a] * push;
   now[b] -= inverseMasses[b] * push;
+}
+
+void Xpbd::solveBend(std::size_t index, double seconds) {
+  const auto& [a, middle, b, compliance] = bends[index];
+  const double mobility = inverseMasses[middle] + (inverseMasses[a] + inverseMasses[b]) / 4;
+  if (mobility == 0) return;
+  const double softness = compliance / (seconds * seconds);
+  const Vector3d error = now[middle] - (now[a] + now[b]) / 2;
+  const Vector3d change = -(error + softness * m_bendMultipliers[index]) / (mobility + softness);
+  m_bendMultipliers[index] += change;
+  now[middle] += inverseMasses[middle] * change;
+  now[a] -= inverseMasses[a] / 2 * change;
+  now[b] -= inverseMasses[b] / 2 * change;
 }
 
 void Xpbd::solveVolume(std::size_t index, double seconds) {

@@ -17,6 +17,13 @@ struct DistanceConstraint {
   double compliance;  ///< L / force; 0: stiff
 };
 
+/// Keeps a particle in the middle of two others, so that a thread straightens. It acts on small
+/// angles, too, which distances between second neighbours hardly resist.
+struct BendConstraint {
+  std::uint32_t a, middle, b;
+  double compliance;  ///< L / force; 0: stiff
+};
+
 /// Keeps the volume of a closed surface.
 struct VolumeConstraint {
   std::uint32_t first, count;       ///< the surface's particles
@@ -35,6 +42,7 @@ class Xpbd {
   std::vector<Eigen::Vector3d> before, now, velocities;
   std::vector<double> inverseMasses;  ///< 0: stays, or is moved by hand
   std::vector<DistanceConstraint> distances;
+  std::vector<BendConstraint> bends;
   std::vector<VolumeConstraint> volumes;
 
   /// Returns the number of the first particle.
@@ -50,11 +58,12 @@ class Xpbd {
 
  private:
   void solveDistance(std::size_t index, double seconds);
+  void solveBend(std::size_t index, double seconds);
   void solveVolume(std::size_t index, double seconds);
   void solveRow(const ConstraintRow& row, double& multiplier);
 
   std::vector<double> m_distanceMultipliers, m_volumeMultipliers, m_rowMultipliers;
-  std::vector<Eigen::Vector3d> m_gradients;
+  std::vector<Eigen::Vector3d> m_bendMultipliers, m_gradients;
 };
 
 double volumeOf(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles);

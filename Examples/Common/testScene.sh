@@ -50,6 +50,8 @@ grep -q "no picture" "$folder/text" || fail "nothing said about the picture"
 if [[ $hasVtk == 1 ]]; then
   refused --view
   grep -q display "$folder/messages" || fail "the display that is not there is not named"
+  refused --pictures 0 1
+  refused --size 0 100
 fi
 refused --frames 0
 refused --unknown

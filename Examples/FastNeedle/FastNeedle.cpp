@@ -45,6 +45,17 @@ class FastNeedle : public LiveScene {
 
   World& world() override { return m_world; }
 
+  std::vector<BodyLook> looks() override {
+    std::vector<BodyLook> looks;
+    for (const Lane& lane : m_lanes) {
+      looks.push_back({lane.needle, m_world.bodies()[lane.needle].name, kNeedleColour});
+      looks.push_back({lane.membrane, "", kStomachColour, 0.6});
+    }
+    return looks;
+  }
+
+  PictureView view() override { return {.from = {0.2, -1, 0.45}}; }
+
   void computeFrame(int frame) override {
     m_world.predict(kFrame, Vector3d::Zero(), 0.1);
     for (const Lane& lane : m_lanes) drive(lane, frame % kPeriod < kFramesDown ? kBelow : kAbove);

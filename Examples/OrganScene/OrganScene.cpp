@@ -38,8 +38,12 @@ class OrganScene : public LiveScene {
       : m_scene(sceneOf(options)), m_method(options.method), m_world(threads) {
     const bool touching = m_method == Method::Intersection || m_method == Method::Continuous;
     m_thickness = options.thickness.value_or(touching ? 0.0 : m_scene.thickness);
-    for (std::size_t m = 0; m < m_scene.meshes.size(); ++m)
-      m_world.addMesh("mesh " + std::to_string(m), m_scene.meshes[m], 0.0);
+    const std::vector<Organ> organs = organMeshes();
+    for (std::size_t m = 0; m < m_scene.meshes.size(); ++m) {
+      const std::string name =
+          options.meshes.empty() ? organs[m].name : "Mesh " + std::to_string(m + 1);
+      m_world.addMesh(name, m_scene.meshes[m], 0.0);
+    }
     for (const auto& [a, b] : m_scene.pairs)
       m_world.addPair(a, b, {.method = m_method, .thickness = m_thickness}, 0);
   }
@@ -54,6 +58,15 @@ class OrganScene : public LiveScene {
                   "%zu meshes, %zu triangles, %zu pairs, %s, thickness %g", m_scene.meshes.size(),
                   m_scene.triangleCount(), m_scene.pairs.size(), named->first.c_str(), m_thickness);
     return text.data();
+  }
+
+  std::vector<BodyLook> looks() override {
+    constexpr std::array kColours{kLiverColour, kStomachColour, kKidneyColour, kSpleenColour,
+                                  kGallbladderColour};
+    std::vector<BodyLook> looks;
+    for (World::BodyId m = 0; m < m_scene.meshes.size(); ++m)
+      looks.push_back({m, m_world.bodies()[m].name, kColours[m % kColours.size()]});
+    return looks;
   }
 
   void computeFrame(int frame) override {
@@ -115,6 +128,7 @@ int main(int count, char** arguments) {
        .frameMilliseconds = 1000.0 / 60,
        .collisionMilliseconds = 1,
        .keys = "o",
+       .unit = "L",
        .addOptions =
            [&](CLI::App& app) {
              app.add_option("--mesh", options.meshes,

@@ -59,7 +59,8 @@ class Palpation : public LiveScene {
     SceneMesh organ = organMesh(files.organ);
     m_box = boxOf(organ.positions);
     m_size = m_box.sizes().maxCoeff(), m_gap = 0.003 * m_size;
-    m_organ = m_world.addMesh("organ", organ, static_cast<double>(organ.positions.size()) / kMass);
+    m_organ = m_world.addMesh(files.organ.empty() ? "Liver" : "Organ", organ,
+                              static_cast<double>(organ.positions.size()) / kMass);
     const double foot = 0.25 * m_box.max().z();  // it grows on what is below
     m_world.pin(m_organ, [foot](const Vector3d& p) { return p.z() < foot; });
     m_world.addStiffness(m_organ, kCompliance, 3 * kCompliance);
@@ -68,6 +69,11 @@ class Palpation : public LiveScene {
   }
 
   World& world() override { return m_world; }
+
+  std::vector<BodyLook> looks() override {
+    return {{m_organ, m_world.bodies()[m_organ].name, kLiverColour},
+            {m_tool, m_world.bodies()[m_tool].name, kSteelColour}};
+  }
 
   void computeFrame(int frame) override {
     m_world.predict(kFrame, Vector3d::Zero(), 0.05);
@@ -116,7 +122,7 @@ class Palpation : public LiveScene {
         .method = Method::Proximity, .thickness = m_gap, .contacts = Contacts::All};
     if (path.empty()) {
       const Capsule shape{Vector3d::Zero(), m_length * m_axis, m_radius};
-      m_tool = m_world.addShape("probe", shape, capsule(shape.p0, shape.p1, shape.radius, 8));
+      m_tool = m_world.addShape("Probe", shape, capsule(shape.p0, shape.p1, shape.radius, 8));
       m_world.addPair(m_organ, m_tool, nearby, m_gap);
       return;
     }
@@ -128,7 +134,7 @@ class Palpation : public LiveScene {
     for (Vector3d& p : m_toolRest.positions) p -= foot;
     SceneMesh placed = m_toolRest;
     for (Vector3d& p : placed.positions) p += m_tip;
-    m_tool = m_world.addMesh("tool", placed, 0.0);
+    m_tool = m_world.addMesh("Tool", placed, 0.0);
     m_world.addPair(m_organ, m_tool, {.method = Method::Auto, .thickness = m_gap}, m_gap);
     m_world.addGuard(m_organ, m_tool);
     m_world.addRigid(m_tool, m_world.bodies()[m_tool].count);

@@ -77,6 +77,13 @@ class Retraction : public LiveScene {
 
   World& world() override { return m_world; }
 
+  std::vector<BodyLook> looks() override {
+    const auto [liver, stomach, membrane] = m_bodies;
+    return {{liver, "Liver", kLiverColour},
+            {stomach, "Stomach", kStomachColour},
+            {membrane, "Membrane", kGallbladderColour}};
+  }
+
   void computeFrame(int frame) override {
     for (int substep = 1; substep <= kSubsteps; ++substep) {
       m_world.predict(kStep, kGravity, 0.02);

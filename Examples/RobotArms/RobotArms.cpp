@@ -57,6 +57,21 @@ class RobotArms : public LiveScene {
   }
 
   World& world() override { return m_world; }
+
+  std::vector<BodyLook> looks() override {
+    std::vector<BodyLook> looks{
+        {.body = kCavity, .label = "", .colour = kTissueColour, .frontFaces = false},
+        {kLiver, "Liver", kLiverColour},
+        {kLiver + 1, "Stomach", kStomachColour},
+        {kLiver + 2, "Kidney", kKidneyColour}};
+    for (World::BodyId link = kFirstArm; link < m_world.bodies().size(); ++link) {
+      const bool isLeft = link < kSecondArm;
+      const char* label = link == kFirstArm ? "Left arm" : link == kSecondArm ? "Right arm" : "";
+      looks.push_back({link, label, isLeft ? kSteelColour : kNeedleColour});
+    }
+    return looks;
+  }
+  PictureView view() override { return {.from = {-0.1, -1, 1.0}}; }
   void computeFrame(int frame) override {
     const std::vector<InstrumentArm> arms = m_arms;
     const double breath = m_breath;

@@ -42,7 +42,7 @@ std::vector<Vector3d> needleAt(double time) {
   Vector3d place = end + up * (axis + Vector3d(7, 0, 9.5) - end);
   if (up == 1)
     place = axis + Vector3d(radius * std::cos(orbit), radius * std::sin(orbit), 9.5 - 2 * around);
-  place += away * Vector3d(14, 14, -2);
+  place += away * Vector3d(22, 22, -2);
   const Eigen::AngleAxisd turn(orbit - pi * up, Vector3d::UnitZ());
   std::vector<Vector3d> needle;
   for (std::uint32_t i = 0; i <= kNeedle; ++i)
@@ -75,7 +75,7 @@ class Suturing : public LiveScene {
     std::vector<double>& mobility = m_world.solver().inverseMasses;
     std::fill_n(mobility.begin(), kNeedle + 1, 0.0);
     mobility.back() = 0;
-    m_world.addStiffness(m_thread, 0, 1e-3);
+    m_world.addStiffness(m_thread, 0, 2e-5);
     m_world.addRigid(m_thread, kNeedle + 1);
     const PairSettings touching{
         .method = Method::Continuous, .thickness = kGap, .contacts = Contacts::All};
@@ -92,6 +92,13 @@ class Suturing : public LiveScene {
   }
 
   World& world() override { return m_world; }
+
+  std::vector<BodyLook> looks() override {
+    return {{m_thread, "Needle", kNeedleColour},
+            {.body = m_thread, .label = "Thread", .colour = kThreadColour, .firstElement = kNeedle},
+            {m_sheets[0], "Left sheet", kStomachColour},
+            {m_sheets[1], "Right sheet", kTissueColour}};
+  }
 
   void computeFrame(int) override {
     m_steps.clear();
@@ -137,8 +144,12 @@ class Suturing : public LiveScene {
     constexpr double kHalf = 5;
     for (Vector3d& p : mesh.positions) p = kHalf * p + Vector3d(side * (kHalf + 0.4), 0, 0);
     const World::BodyId body = m_world.addMesh(side < 0 ? "left" : "right", mesh, 0.05);
-    m_world.pin(body, [](const Vector3d& p) { return std::abs(p.x()) > 2 * kHalf; });
-    m_world.addStiffness(body, 1e-6, 1e-4);
+    // Clamped on three sides, as by the tissue around: only the wound's edges are free.
+    m_world.pin(body, [](const Vector3d& p) {
+      return std::abs(p.x()) > 2 * kHalf ||
+             (std::abs(p.y()) > 0.99 * kHalf && std::abs(p.x()) > kHalf);
+    });
+    m_world.addStiffness(body, 1e-6, 1e-6);
     m_world.addPair(m_thread, body, settings, kGap);
     m_world.addGuard(m_thread, body);
     m_sheets[side > 0] = body;

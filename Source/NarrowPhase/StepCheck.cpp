@@ -104,6 +104,7 @@ bool StepCheck::proximitySuffices(const Features<kind>& features, std::uint32_t 
 void StepCheck::recordTriangle(std::uint32_t triangle, bool isOfB, const Vector3d& a,
                                const Vector3d& b, const Vector3d& c) {
   const Vector3d u = b - a, v = c - a;
+  if (!(isOfB ? m_pair.b : m_pair.a).topology.hasFaces()) return;  // a segment or a point
   if (u.cross(v).squaredNorm() > kFlatSquare * u.squaredNorm() * v.squaredNorm() ||
       hasArea(a, b, c))
     return;
@@ -112,7 +113,7 @@ void StepCheck::recordTriangle(std::uint32_t triangle, bool isOfB, const Vector3
 
 void StepCheck::recordEdges(const Segment& p, const Segment& q) {
   const auto recordIfDegenerate = [](const TriangleMesh& mesh, const Segment& edge, auto& list) {
-    if (mesh.now[edge[0]] == mesh.now[edge[1]])
+    if (mesh.topology.hasFaces() && mesh.now[edge[0]] == mesh.now[edge[1]])
       list.push_back(mesh.topology.edgeTriangles[mesh.topology.edgeOf(edge)].front());
   };
   recordIfDegenerate(m_pair.a, p, m_out.facts.degenerateA);

@@ -30,8 +30,8 @@ struct PairPlan {
   double motion = 0;           ///< L: largest motion of two features relative to each other
   double arcDeviation = 0;     ///< L: of both geometries
   double motionTolerance = 0;  ///< L: Auto's
-  /// L: for Intersection the traversal finds boxes up to this far apart, because its validity
-  /// depends on whether anything was near.
+  /// L: for Intersection the traversal finds triangles whose boxes are up to this far apart. Where
+  /// there are any, but no intersections, the answer is not trusted.
   double searchDistance = 0;
   StepPlan step;
   bool runsIntersection = false;    ///< Auto: Intersection runs, too, if the start intersects
@@ -45,7 +45,7 @@ bool hasContinuous(const GeometryInStep& a, const GeometryInStep& b);
 /// Whether Method::Proximity supports a pair of these geometries.
 bool hasProximity(const GeometryInStep& a, const GeometryInStep& b, double thickness);
 /// Whether both geometries have triangles. Only for these do the bounds on motion hold, because
-/// they have no radius.
+/// they have no radius. Other pairs are never trusted.
 bool haveTriangles(const GeometryInStep& a, const GeometryInStep& b);
 
 /// Plans a pair's frame from valid settings and from how the geometries moved. moves: whether that

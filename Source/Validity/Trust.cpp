@@ -11,9 +11,10 @@ namespace palpate {
 
 namespace {
 
-/// An intersection check of all candidates at the step's start may take half a frame, with
-/// earliestTimeOnly two thirds. One check is allowed per kFramesPerCheck frames; up to four that
-/// were not needed are saved for later, with earliestTimeOnly one.
+/// The initial intersection check tests all candidates at the step's start. It may take half of a
+/// frame, with earliestTimeOnly two thirds. Methods other than Auto therefore run it once in
+/// kFramesPerCheck frames on average. Up to four checks that were not needed are saved for later,
+/// with earliestTimeOnly one. Auto runs it whenever the start is unknown.
 constexpr int kFramesPerCheck = 16, kMaxCheckCredit = 4 * kFramesPerCheck;
 
 /// Appends vertices that may have moved further than the limit relative to the other mesh, until
@@ -57,7 +58,7 @@ double displacementLimitOf(const PairSettings& settings, const GeometryInStep& a
 
 /// Whether the step met the method's conditions, if vertices move in straight lines. validity:
 /// startedApart and displacementLimit must be set. foundOrFar: triangles intersect at the end, or
-/// no boxes came near each other.
+/// no boxes of triangles are within the displacement of each other there.
 bool meetsConditions(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
                      const PairPlan& plan, const StepFacts& facts, const Validity& validity,
                      bool foundOrFar) {
@@ -180,7 +181,8 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
 void Trust::findEnd(const PairPlan& plan, const StepFacts& facts, const MeshPair& meshes,
                     const CollisionData::Contents& contents, ContactBuffers& counts) {
   m_atEnd.clearance = 0.0;
-  // Where Intersection ran, it has tested all pairs, and found none.
+  // Where Intersection ran, it has tested all pairs, and found none. With restDistance it has not
+  // tested pairs that are near at rest.
   if (plan.runsIntersection && facts.startsIntersecting) {
     if (!meshes.nearAtRest) m_atEnd.position = Position::Apart;
     return;

@@ -19,7 +19,8 @@ class Trust {
   /// Call before a detection. Decides whether the initial intersection check runs.
   void start(const PairSettings&, const GeometryInStep& a, const GeometryInStep& b, PairPlan&);
   /// Call after the detection, with the results of the narrow phase. Writes Contents::validity.
-  /// nearby: whether any boxes came near each other. counts: as for anyIntersecting().
+  /// nearby: whether any boxes overlap at the thickness of the traversal. counts: as for
+  /// anyIntersecting().
   void finish(const PairSettings&, const GeometryInStep& a, const GeometryInStep& b,
               const PairPlan&, const StepFacts&, bool nearby, const MeshPair&,
               CollisionData::Contents&, ContactBuffers& counts);

@@ -178,7 +178,7 @@ checkLinks() {
   while read -r page; do
     while read -r link; do
       [[ -e $(dirname "$page")/$link ]] || fault "$page: $link leads nowhere"
-    done < <(sed '/^ *```/,/^ *```/d' "$page" | grep -oE '\]\([^)#:]+\)' | tr -d '()]')
+    done < <(sed '/^ *```/,/^ *```/d; /^ *<!--/,/-->/d' "$page" | grep -oE '\]\([^)#:]+\)' | tr -d '()]')
   done < <(find README.md CHANGELOG.md Docs Data Examples Testing -name '*.md' 2>/dev/null)
 }
 

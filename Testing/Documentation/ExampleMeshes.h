@@ -71,10 +71,8 @@ struct Line {
 
 inline Line thread(const Eigen::Vector3d& from, const Eigen::Vector3d& to, int segments) {
   Line line;
-  for (int v = 0; v <= segments; ++v)
-    line.positions.push_back(from + (to - from) * v / segments);
-  for (std::uint32_t v = 0; v + 1 < line.positions.size(); ++v)
-    line.segments.push_back({v, v + 1});
+  for (int v = 0; v <= segments; ++v) line.positions.push_back(from + (to - from) * v / segments);
+  for (std::uint32_t v = 0; v + 1 < line.positions.size(); ++v) line.segments.push_back({v, v + 1});
   return line;
 }
 

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 
 namespace palpate::vtk {
@@ -18,9 +19,9 @@ struct Pixel {
   bool isWhite() const { return red == 255 && green == 255 && blue == 255; }
   bool isGreen() const { return green > red + 60 && green > blue + 60; }
   bool isMagenta() const { return red > green + 120 && blue > green + 120; }
-  /// Of a contact, which is near or far; bodies are paler.
+  /// The colour of a contact: violet to green to yellow. Bodies are reddish or pale.
   bool isVivid() const {
-    return std::max({red, green, blue}) > 180 && std::min({red, green, blue}) < 40;
+    return std::max(green, blue) > red + 25 || (std::min(red, green) > 140 && blue < 90);
   }
 };
 
@@ -29,10 +30,12 @@ Pixel pixel(const Image& image, int x, int y) {
   return {image.rgb[at], image.rgb[at + 1], image.rgb[at + 2]};
 }
 
-std::size_t count(const Image& image, bool (Pixel::*question)() const) {
+/// Of the pixels left of the colour bar, or of all.
+std::size_t count(const Image& image, bool (Pixel::*question)() const, bool all = true) {
   std::size_t found = 0;
   for (int y = 0; y < image.height; ++y) {
-    for (int x = 0; x < image.width; ++x) found += (pixel(image, x, y).*question)();
+    for (int x = 0; x < (all ? image.width : image.width * 5 / 6); ++x)
+      found += (pixel(image, x, y).*question)();
   }
   return found;
 }
@@ -73,7 +76,11 @@ TEST_F(WindowOnOrgans, KeysToggleWhatIsShown) {
   for (int x = 0; x < 320; ++x)  // nothing cut off
     for (const int y : {0, 239}) EXPECT_TRUE(pixel(bodies, x, y).isWhite());
   window.press('o');
+  const std::size_t cellsOfContact = count(window.image(), &Pixel::isGreen);
+  EXPECT_GT(cellsOfContact, 20u);
+  window.press('o');
   const Image byDepth = window.image();
+  EXPECT_GT(count(byDepth, &Pixel::isGreen), 2 * cellsOfContact);
   EXPECT_GT(count(byDepth, &Pixel::isGreen), 320u * 240 / 50);
   window.press('o');
   const Image byOccupancy = window.image();
@@ -104,15 +111,84 @@ TEST_F(WindowOnOrgans, FiveLinesShowEachFrameWithItsTimes) {
     for (int x = 0; x < 320; ++x) {
       const Pixel a = pixel(graph, x, y), b = pixel(without, x, y);
       const bool differs = a.red != b.red || a.green != b.green || a.blue != b.blue;
-      (x >= 190 && y < 86 ? inside : outside) += differs;
+      (x >= 198 && y < 77 ? inside : outside) += differs;
     }
   }
   EXPECT_GT(inside, 500u);
   EXPECT_EQ(outside, 0u);
 }
 
+TEST_F(WindowOnOrgans, PanelAndNamesAreShownOnDemand) {
+  Window window(detection, false, 640, 480);
+  window.show();
+  const Image without = window.image();
+  window.press('p');
+  const Image panel = window.image();
+  std::size_t inPanel = 0;
+  for (int y = 0; y < 480; ++y) {
+    for (int x = 0; x < 640; ++x) {
+      const Pixel a = pixel(panel, x, y), b = pixel(without, x, y);
+      if (a.red == b.red && a.green == b.green && a.blue == b.blue) continue;
+      ++inPanel;
+      EXPECT_TRUE(x < 320 && y > 240) << x << ", " << y;
+    }
+  }
+  EXPECT_GT(inPanel, 500u);
+  window.press('p');
+  EXPECT_EQ(window.image().rgb, without.rgb);
+  window.setAppearance(ids[0], {.label = "Liver"});
+  window.show();
+  const Image named = window.image();
+  window.press('l');
+  EXPECT_NE(window.image().rgb, named.rgb);
+}
+
+TEST(Window, AppearanceAndViewAreHonoured) {
+  const scenes::SceneMesh ball = scenes::sphere(6);
+  OctreeBasedCD detection;
+  const GeometryId id = detection.addTriangleMesh(ball.positions, ball.triangles);
+  Window window(detection, false, 200, 200);
+  window.setAppearance(id, {.colour = {0.1, 0.1, 0.9}});
+  window.setView({.from = {1, 0, 0}, .height = 4});
+  window.show();
+  Image image = window.image();  // a disc whose diameter is half the height
+  EXPECT_FALSE(pixel(image, 100, 145).isWhite());
+  EXPECT_TRUE(pixel(image, 100, 155).isWhite());
+  EXPECT_GT(pixel(image, 100, 100).blue, pixel(image, 100, 100).red + 60);
+  window.setAppearance(id, {.colour = {0.1, 0.9, 0.1}}, 1);  // all triangles but the first
+  window.show();
+  EXPECT_GT(pixel(window.image(), 100, 100).green, pixel(window.image(), 100, 100).blue + 60);
+  window.setAppearance(id, {.opacity = 0});
+  window.show();
+  EXPECT_TRUE(pixel(window.image(), 100, 100).isWhite());
+  EXPECT_EQ(window.pick(100, 100), "");
+}
+
+TEST(Window, RefusesAppearancesAndViewsOutOfRange) {
+  const OctreeBasedCD nothing;
+  Window window(nothing, false, 20, 20);
+  const auto isRefused = [](auto&& call) {
+    try {
+      call();
+    } catch (const Error& error) {
+      return error.code() == ErrorCode::InvalidSettings;
+    }
+    return false;
+  };
+  const double nan = std::nan("");
+  for (const double wrong : {-0.1, 1.1, nan}) {
+    EXPECT_TRUE(isRefused([&] { window.setAppearance({}, {.opacity = wrong}); }));
+    EXPECT_TRUE(isRefused([&] { window.setAppearance({}, {.colour = {0, wrong, 0}}); }));
+  }
+  for (const View& wrong : {View{.from = {0, 0, 0}}, View{.from = {0, 0, 2}},
+                            View{.from = {nan, 0, 1}}, View{.height = -1}, View{.height = nan}})
+    EXPECT_TRUE(isRefused([&] { window.setView(wrong); }));
+}
+
 /// Where the middle of the picture looks: from the front, somewhat to the right and above.
 const Vector3d kBack = Vector3d(0.5, -1.0, 0.6).normalized();
+/// The origin is in the middle.
+const View kCentred{.height = 4};
 
 TEST(Window, PickNamesTheElementUnderTheCursor) {
   const scenes::SceneMesh ball = scenes::sphere(6);
@@ -123,6 +199,7 @@ TEST(Window, PickNamesTheElementUnderTheCursor) {
   detection.addTriangleMesh(ball.positions, ball.triangles);
   {
     Window window(detection, true, 300, 300);
+    window.setView(kCentred);
     window.show();
     const std::string picked = window.pick(150, 150), start = "geometry 0, triangle ";
     ASSERT_TRUE(picked.starts_with(start)) << picked;
@@ -135,6 +212,7 @@ TEST(Window, PickNamesTheElementUnderTheCursor) {
   const GeometryId tool = detection.addAnalyticalGeometry(Sphere{Vector3d::Zero(), 1.2});
   detection.setTransform(tool, Eigen::Matrix3d::Identity(), Vector3d::Zero());
   Window window(detection, false, 300, 300);
+  window.setView(kCentred);
   window.show();
   EXPECT_EQ(window.pick(150, 150), "geometry 1, a shape");
 }
@@ -155,6 +233,7 @@ TEST(Window, DrawsEveryGeometryTypeAtItsPlace) {
     const GeometryId id = detection.addAnalyticalGeometry(shape);
     detection.setTransform(id, Eigen::Matrix3d::Identity(), {-5, 0, 0});
     Window window(detection, false, 200, 200);
+    window.setView(kCentred);
     window.show();
     EXPECT_EQ(window.pick(100, 100), "geometry 1, a shape") << shape.index();
     EXPECT_FALSE(pixel(window.image(), 100, 100).isWhite()) << shape.index();
@@ -180,10 +259,11 @@ TEST(Window, ContactLiesBetweenItsFeatures) {
   detection.addCollisionPair(a, b, {.thickness = 0.05});
   detection.detectCollision();
   Window window(detection, false, 200, 200);
+  window.setView({.height = 1});
   window.show();
   window.press('n');
   EXPECT_TRUE(pixel(window.image(), 100, 100).isVivid());
-  EXPECT_LT(count(window.image(), &Pixel::isVivid), 200u);
+  EXPECT_LT(count(window.image(), &Pixel::isVivid, false), 200u);
   window.press('c');
   EXPECT_FALSE(pixel(window.image(), 100, 100).isVivid());
 }

@@ -1,34 +1,35 @@
 #include <palpate/vtk/Window.h>
 
+#include "Vtk/Annotations.h"
+#include "Vtk/Bodies.h"
+#include "Vtk/Contacts.h"
+#include "Vtk/Glyphs.h"
+#include "Vtk/Labels.h"
+#include "Vtk/Panel.h"
+#include "Vtk/TimesGraph.h"
+
 #include <palpate/Error.h>
 
 #include <vtkActor.h>
 #include <vtkArrowSource.h>
 #include <vtkCamera.h>
-#include <vtkCellArray.h>
+#include <vtkCellData.h>
 #include <vtkCellPicker.h>
-#include <vtkChartXY.h>
-#include <vtkContextActor.h>
-#include <vtkContextScene.h>
+#include <vtkColorTransferFunction.h>
 #include <vtkCubeSource.h>
-#include <vtkDoubleArray.h>
-#include <vtkGlyph3DMapper.h>
+#include <vtkDataSet.h>
 #include <vtkImageData.h>
 #include <vtkInteractorStyleTrackballCamera.h>
+#include <vtkLightKit.h>
 #include <vtkLookupTable.h>
 #include <vtkNew.h>
 #include <vtkPNGWriter.h>
-#include <vtkPlot.h>
-#include <vtkPointData.h>
-#include <vtkPolyData.h>
-#include <vtkPolyDataMapper.h>
-#include <vtkPolyDataNormals.h>
 #include <vtkProperty.h>
 #include <vtkRenderWindow.h>
 #include <vtkRenderWindowInteractor.h>
 #include <vtkRenderer.h>
+#include <vtkScalarBarActor.h>
 #include <vtkSphereSource.h>
-#include <vtkTable.h>
 #include <vtkTextActor.h>
 #include <vtkTextProperty.h>
 #include <vtkUnsignedCharArray.h>
@@ -37,10 +38,13 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <ctime>
 #include <map>
+#include <optional>
+#include <utility>
 
 // X11's header defines these as macros.
 #undef None
@@ -53,141 +57,11 @@ namespace {
 
 using Eigen::Vector3d, Eigen::Quaterniond;
 using Mesh = CollisionProblem::Geometry;
+using Clock = std::chrono::steady_clock;
 
 constexpr timespec kPause{0, 20'000'000};  // 20 ms
-constexpr std::array<std::array<double, 3>, 6> kBodyColours{{{0.72, 0.25, 0.25},
-                                                             {0.85, 0.55, 0.55},
-                                                             {0.55, 0.30, 0.55},
-                                                             {0.35, 0.35, 0.65},
-                                                             {0.80, 0.65, 0.45},
-                                                             {0.60, 0.60, 0.65}}};
-
-/// Copies of one shape, each with its place, size, rotation, and a value that gives its colour.
-class Glyphs {
- public:
-  Glyphs() {
-    m_turns->SetNumberOfComponents(4);
-    m_turns->SetName("turn");
-    m_sizes->SetName("size");
-    m_points->SetDataTypeToDouble();
-  }
-  void add(const Vector3d& at, double value, double size, const Quaterniond& turn) {
-    m_points->InsertNextPoint(at.data());
-    m_values->InsertNextValue(value);
-    m_sizes->InsertNextValue(size);
-    m_turns->InsertNextTuple4(turn.w(), turn.x(), turn.y(), turn.z());
-  }
-  /// Adds the copies to the renderer. from, to: hues in [0, 1] of the least and the greatest value.
-  /// dark: the brightness of the least value.
-  vtkProperty* show(vtkRenderer* renderer, vtkAlgorithm* shape, double from, double to,
-                    double dark) const {
-    vtkNew<vtkPolyData> data;
-    data->SetPoints(m_points);
-    data->GetPointData()->SetScalars(m_values);
-    data->GetPointData()->AddArray(m_sizes);
-    data->GetPointData()->AddArray(m_turns);
-    vtkNew<vtkLookupTable> colours;
-    colours->SetHueRange(from, to);
-    colours->SetValueRange(dark, 1);
-    vtkNew<vtkGlyph3DMapper> mapper;
-    mapper->SetInputData(data);
-    mapper->SetSourceConnection(shape->GetOutputPort());
-    mapper->SetScaleArray("size");
-    mapper->SetScaleModeToScaleByMagnitude();
-    mapper->SetOrientationArray("turn");
-    mapper->SetOrientationModeToQuaternion();
-    mapper->SetLookupTable(colours);
-    mapper->SetScalarRange(m_values->GetRange());
-    vtkNew<vtkActor> actor;
-    actor->SetMapper(mapper);
-    actor->GetProperty()->SetAmbient(0.5);
-    renderer->AddActor(actor);
-    return actor->GetProperty();
-  }
-
- private:
-  vtkNew<vtkPoints> m_points;
-  vtkNew<vtkDoubleArray> m_values, m_sizes, m_turns;
-};
-
-/// The point of a shape that lies furthest along d, in the shape's frame. A plane counts as bounded
-/// by the distance `size` from its point.
-Vector3d furthest(const AnalyticalGeometry& shape, const Vector3d& d, double size) {
-  const auto across = [&](const Vector3d& n) {
-    return Vector3d(d - d.dot(n) / n.squaredNorm() * n);
-  };
-  if (const auto* s = std::get_if<Sphere>(&shape)) return s->centre + s->radius * d;
-  if (const auto* s = std::get_if<Plane>(&shape)) return s->point + size * across(s->normal);
-  if (const auto* s = std::get_if<Capsule>(&shape))
-    return (d.dot(s->p1 - s->p0) > 0 ? s->p1 : s->p0) + s->radius * d;
-  if (const auto* s = std::get_if<Cylinder>(&shape))
-    return (d.dot(s->p1 - s->p0) > 0 ? s->p1 : s->p0) +
-           s->radius * across(s->p1 - s->p0).normalized();
-  if (const auto* s = std::get_if<Box>(&shape))
-    return s->centre + s->halfExtents.cwiseProduct(d.cwiseSign());
-  const auto& points = std::get<ConvexHull>(shape).points;
-  return *std::max_element(points.begin(), points.end(), [&](const Vector3d& a, const Vector3d& b) {
-    return d.dot(a) < d.dot(b);
-  });
-}
-
-/// Gives a shape a mesh: the furthest points along directions all around.
-void tessellate(Mesh& shape, double size) {
-  vtkNew<vtkSphereSource> sphere;
-  sphere->SetThetaResolution(32);
-  sphere->SetPhiResolution(32);
-  sphere->Update();
-  vtkPolyData* all = sphere->GetOutput();
-  for (vtkIdType i = 0; i < all->GetNumberOfPoints(); ++i)
-    shape.now.push_back(shape.rotation *
-                            furthest(*shape.analytical, 2 * Vector3d(all->GetPoint(i)), size) +
-                        shape.translation);
-  vtkNew<vtkIdList> corners;
-  for (vtkIdType i = 0; i < all->GetNumberOfCells(); ++i) {
-    all->GetCellPoints(i, corners);
-    const auto corner = [&](int k) { return static_cast<std::uint32_t>(corners->GetId(k)); };
-    shape.triangles.push_back({corner(0), corner(1), corner(2)});
-  }
-}
-
-/// Adds a body to the renderer. The cells are the body's elements, in their order.
-vtkProp* addBody(vtkRenderer* renderer, const Mesh& mesh, std::size_t index) {
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  for (const Vector3d& p : mesh.now) points->InsertNextPoint(p.data());
-  vtkNew<vtkCellArray> cells;
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const std::array<vtkIdType, 3> corners{a, b, c};
-    cells->InsertNextCell(b == c ? 2 : 3, corners.data());
-  }
-  for (vtkIdType i = 0; mesh.type == GeometryType::Points && i < points->GetNumberOfPoints(); ++i)
-    cells->InsertNextCell(1, &i);
-  vtkNew<vtkPolyData> data;
-  data->SetPoints(points);
-  const bool thin = mesh.type == GeometryType::Lines || mesh.type == GeometryType::Points;
-  if (mesh.type == GeometryType::Points) data->SetVerts(cells);
-  if (mesh.type == GeometryType::Lines) data->SetLines(cells);
-  if (!thin) data->SetPolys(cells);
-  vtkNew<vtkPolyDataNormals> normals;
-  normals->SetInputData(data);
-  normals->SplittingOff();
-  normals->ConsistencyOff();
-  vtkNew<vtkPolyDataMapper> mapper;
-  thin ? mapper->SetInputData(data) : mapper->SetInputConnection(normals->GetOutputPort());
-  vtkNew<vtkActor> actor;
-  actor->SetMapper(mapper);
-  vtkProperty* look = actor->GetProperty();
-  const auto& colour = kBodyColours[index % kBodyColours.size()];
-  look->SetColor(colour[0], colour[1], colour[2]);
-  look->SetOpacity(thin ? 1 : 0.45);
-  look->SetSpecular(0.2);
-  look->SetPointSize(2);
-  look->SetLineWidth(4);
-  look->RenderLinesAsTubesOn();
-  actor->SetForceTranslucent(!thin);
-  renderer->AddActor(actor);
-  return actor;
-}
+/// The least radius with which lines are drawn, as a share of the diagonal of everything in view.
+constexpr double kThinnest = 0.0012;
 
 }  // namespace
 
@@ -203,22 +77,32 @@ std::shared_ptr<void> openDisplay() {
 }
 
 struct Window::Implementation {
+  enum class Cells { None, OfContact, ByDepth, ByOccupancy };
+
   const OctreeBasedCD& detection;
   std::shared_ptr<void> connection = openDisplay();
-  vtkNew<vtkRenderer> renderer{}, graph{};
+  vtkNew<vtkRenderer> renderer{}, overlay{}, labelLayer{}, graph{};
   vtkNew<vtkRenderWindow> window{};
   vtkNew<vtkRenderWindowInteractor> interactor{};
-  vtkNew<vtkTextActor> text{};
-  vtkNew<vtkTable> times{};
-  vtkNew<vtkChartXY> chart{};
+  vtkNew<vtkTextActor> pickedText{}, panelText{};
+  vtkNew<vtkScalarBarActor> colourBar{};
+  vtkNew<vtkColorTransferFunction> colours{};  // of distances
+  ScaleBar scaleBar{};
+  TimesGraph times{};
   CollisionProblem problem{};  // of the frame that is shown
   std::map<GeometryId, std::size_t> indices{};
+  std::map<GeometryId, Parts> parts{};
   std::map<vtkProp*, const Mesh*> bodies{};
-  std::string picked{};
+  std::string picked{}, unit{};
+  View view{};
+  std::optional<FeaturePair> nearest{};  // contact to the camera
   Eigen::AlignedBox3d box{};
-  int cells = 0, frames = 0;
-  bool contacts = true, normals = true, untrusted = true, isOpen = true, waits = false,
-       isNew = true;
+  Clock::time_point lastShow{};
+  double framesPerSecond = 0;
+  Cells cells = Cells::None;
+  int frames = 0;
+  bool contacts = true, normals = true, untrusted = true, names = true, panel = false,
+       translucent = false, isOpen = true, waits = false, isNew = true;
 
   void answer(vtkObject*, unsigned long event, void*) {
     const int* at = interactor->GetEventPosition();
@@ -228,10 +112,15 @@ struct Window::Implementation {
   }
 
   void press(char key) {
-    for (const auto& [name, flag] :
-         {std::pair('c', &contacts), {'n', &normals}, {'u', &untrusted}, {' ', &waits}})
+    for (const auto& [name, flag] : {std::pair('c', &contacts),
+                                     {'n', &normals},
+                                     {'u', &untrusted},
+                                     {'l', &names},
+                                     {'p', &panel},
+                                     {'b', &translucent},
+                                     {' ', &waits}})
       if (key == name) *flag = !*flag;
-    if (key == 'o') cells = (cells + 1) % 3;
+    if (key == 'o') cells = static_cast<Cells>((static_cast<int>(cells) + 1) % 4);
     if (key == 't') graph->SetDraw(!graph->GetDraw());
     isNew |= key == 'r';
     isOpen &= key != 'q';
@@ -250,20 +139,46 @@ struct Window::Implementation {
       picked = "geometry " + std::to_string(static_cast<std::uint32_t>(mesh.id));
       picked += mesh.analytical ? ", a shape"
                                 : kNames[static_cast<std::size_t>(mesh.type)] +
-                                      std::to_string(picker->GetCellId());
+                                      std::to_string(elementOf(picker));
     }
-    text->SetInput(picked.c_str());
+    pickedText->SetInput(picked.c_str());
     window->Render();
   }
 
+  static long elementOf(vtkCellPicker* picker) {
+    const double element = picker->GetDataSet()->GetCellData()->GetArray("element")->GetComponent(
+        picker->GetCellId(), 0);
+    return std::lround(element);
+  }
+
+  /// Of texts, in pixels. It grows with the window.
+  int textSize() const { return std::max(9, window->GetSize()[1] / 44); }
+  const Parts& partsOf(const Mesh& mesh);
+  std::string nameOf(GeometryId) const;
   void take();
-  void addTimes();
+  void measureFrameRate();
   void draw();
+  void drawBodies();
   void drawCells() const;
-  const CollisionData& answer(GeometryId a, GeometryId b) const;
-  void drawContacts() const;
+  void drawContacts();
+  void drawAnnotations();
+  void updateScale(vtkObject* = nullptr, unsigned long = 0, void* = nullptr);
   void aim();
 };
+
+const Parts& Window::Implementation::partsOf(const Mesh& mesh) {
+  Parts& own = parts[mesh.id];
+  own.try_emplace(0, usualAppearance(indices.at(mesh.id)));
+  return own;
+}
+
+/// The label of a geometry, or its number.
+std::string Window::Implementation::nameOf(GeometryId id) const {
+  const auto found = parts.find(id);
+  if (found != parts.end() && !found->second.begin()->second.label.empty())
+    return found->second.begin()->second.label;
+  return "geometry " + std::to_string(static_cast<std::uint32_t>(id));
+}
 
 /// Copies the frame. Keys that redraw it then show this frame, even after the user has moved
 /// geometries.
@@ -283,120 +198,170 @@ void Window::Implementation::take() {
   }
 }
 
+void Window::Implementation::measureFrameRate() {
+  constexpr double kShare = 0.1;  // of the newest frame in the mean
+  const Clock::time_point now = Clock::now();
+  const double seconds = std::chrono::duration<double>(now - lastShow).count();
+  if (frames == 1) framesPerSecond = 1 / seconds;
+  if (frames > 1) framesPerSecond += kShare * (1 / seconds - framesPerSecond);
+  lastShow = now;
+}
+
+void Window::Implementation::drawBodies() {
+  constexpr double kTranslucent = 0.4;
+  for (const Mesh& mesh : problem.geometries) {
+    Parts look = partsOf(mesh);
+    double& opacity = look.begin()->second.opacity;
+    const bool thin = mesh.type == GeometryType::Lines || mesh.type == GeometryType::Points;
+    if (translucent && !thin) opacity = std::min(opacity, kTranslucent);
+    if (vtkProp* body =
+            addBody(renderer, mesh, look, kThinnest * box.diagonal().norm(), window->GetSize()[1]))
+      bodies[body] = &mesh;
+  }
+}
+
 void Window::Implementation::drawCells() const {
   const LooseOctree& octree = detection.octree();
+  std::vector<LooseOctree::NodeId> chosen;
+  if (cells != Cells::OfContact)
+    chosen = cellsWithElements(octree);
+  else if (nearest)
+    chosen = cellsOf(octree, *nearest);
   Glyphs cubes;
-  for (const auto id : octree.nodes()) {
+  for (const auto id : chosen) {
     const LooseOctree::Node node = octree.node(id);
-    if (node.elements.empty()) continue;
     const Mesh& mesh = problem.geometries[indices.at(node.geometry)];
     cubes.add(mesh.rotation * node.bounds.center() + mesh.translation,
-              cells == 1 ? node.depth : static_cast<double>(node.elements.size()),
+              cells == Cells::ByOccupancy ? static_cast<double>(node.elements.size()) : node.depth,
               node.bounds.sizes().x(), Quaterniond(mesh.rotation));
   }
-  vtkProperty* look = cubes.show(renderer, vtkNew<vtkCubeSource>(), 0.33, 0.33, 0.3);
+  vtkNew<vtkLookupTable> green;
+  green->SetHueRange(0.36, 0.36);
+  green->SetSaturationRange(1, 1);
+  green->SetValueRange(0.4, 0.75);
+  green->SetTableRange(cubes.range().data());
+  vtkProperty* look = cubes.show(renderer, vtkNew<vtkCubeSource>(), green);
   look->SetRepresentationToWireframe();
   look->LightingOff();
-  look->SetOpacity(0.5);
+  look->SetOpacity(cells == Cells::OfContact ? 1 : 0.5);
+  if (cells == Cells::OfContact) look->SetLineWidth(static_cast<float>(textSize()) / 10);
 }
 
-/// The result of a pair; empty before the first detection.
-const CollisionData& Window::Implementation::answer(GeometryId a, GeometryId b) const {
-  static const CollisionData none;
-  try {
-    return detection.collisionData(a, b);
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::NotAvailable) throw;
-  }
-  return none;
-}
-
-void Window::Implementation::drawContacts() const {
-  Glyphs spheres, arrows, wrong;
+void Window::Implementation::drawContacts() {
   const double size = box.diagonal().norm();
-  for (const auto& [first, second, settings] : detection.pairs()) {
-    const Mesh &a = problem.geometries[indices.at(first)],
-               &b = problem.geometries[indices.at(second)];
-    const CollisionData& data = answer(first, second);
-    const auto add = [&](const auto& c, const Vector3d& at) {
-      spheres.add(at, c.distance, 0.008 * size, Quaterniond::Identity());
-      arrows.add(at, c.distance, 0.05 * size,
-                 Quaterniond::FromTwoVectors(Vector3d::UnitX(), c.normal));
-    };
-    const auto middle = [](const Stencil& c, const std::array<const Mesh*, 4>& meshes) {
-      Vector3d sum = Vector3d::Zero();
-      for (std::size_t i = 0; i < 4; ++i)
-        sum += std::abs(c.weights[i]) * meshes[i]->now[c.vertices[i]];
-      return Vector3d(sum / 2);  // the weights of each side sum to 1
-    };
-    for (const auto& c : data.vertexTriangle()) add(c, middle(stencil(c), {&a, &b, &b, &b}));
-    for (const auto& c : data.triangleVertex()) add(c, middle(stencil(c), {&b, &a, &a, &a}));
-    for (const auto& c : data.edgeEdge()) add(c, middle(stencil(c), {&a, &a, &b, &b}));
-    for (const auto& c : data.shape()) add(c, (c.point + c.pointOnShape) / 2);
-    for (const auto& c : data.shapeShape()) add(c, (c.pointA + c.pointB) / 2);
-    const auto mark = [&](const Mesh& mesh, std::uint32_t vertex) {
-      wrong.add(mesh.now[vertex], 0, 0.01 * size, Quaterniond::Identity());
-    };
-    const Validity& validity = data.validity();
-    for (const auto v : validity.untrustedVerticesA) mark(a, v);
-    for (const auto v : validity.untrustedVerticesB) mark(b, v);
-    for (const auto t : validity.degenerateTrianglesA) mark(a, a.triangles[t][0]);
-    for (const auto t : validity.degenerateTrianglesB) mark(b, b.triangles[t][0]);
+  ContactGlyphs glyphs;
+  glyphs.collect(detection, problem, indices, size,
+                 Vector3d(renderer->GetActiveCamera()->GetDirectionOfProjection()));
+  nearest = glyphs.nearest;
+  auto [low, high] = glyphs.spheres.range();
+  low = std::min(low, 0.0);  // the same range in most frames
+  for (const auto& pair : detection.pairs()) high = std::max(high, pair.settings.thickness);
+  setDistanceColours(colours, {low, std::max(high, low + 1e-9 * size)});
+  vtkNew<vtkSphereSource> ball;
+  ball->SetThetaResolution(16);
+  ball->SetPhiResolution(12);
+  vtkNew<vtkArrowSource> arrow;
+  arrow->SetTipResolution(16);
+  arrow->SetShaftResolution(12);
+  constexpr double kThroughBodies = 0.4;
+  for (vtkRenderer* layer : {renderer.Get(), overlay.Get()}) {
+    const double opacity = layer == overlay ? kThroughBodies : 1;
+    if (contacts) glyphs.spheres.show(layer, ball, colours)->SetOpacity(opacity);
+    if (normals && layer == renderer) glyphs.arrows.show(layer, arrow, colours);
   }
-  const vtkNew<vtkSphereSource> ball;
-  if (contacts) spheres.show(renderer, ball, 0, 0.67, 1);
-  if (normals) arrows.show(renderer, vtkNew<vtkArrowSource>(), 0, 0.67, 1);
-  if (untrusted) wrong.show(renderer, ball, 0.83, 0.83, 1);
+  vtkNew<vtkLookupTable> magenta;
+  magenta->SetHueRange(0.85, 0.85);
+  if (untrusted) glyphs.untrusted.show(renderer, ball, magenta);
+  if (!problem.pairs.empty() && (contacts || normals)) overlay->AddViewProp(colourBar);
 }
 
-/// Aims the camera from the front, somewhat to the right and above, with everything in view.
+void Window::Implementation::updateScale(vtkObject*, unsigned long, void*) {
+  const int* size = window->GetSize();
+  scaleBar.update(size[1] / (2 * renderer->GetActiveCamera()->GetParallelScale()), unit, size[0],
+                  size[1]);
+}
+
+void Window::Implementation::drawAnnotations() {
+  const int *size = window->GetSize(), text = textSize();
+  if (!problem.geometries.empty()) scaleBar.show(overlay, text);
+  if (names)
+    showLabels(labelLayer, problem, parts,
+               Projection(renderer->GetActiveCamera(), size[0], size[1]), text, translucent);
+  setTextLook(pickedText->GetTextProperty(), text);
+  pickedText->SetPosition(0.4 * size[0], 0.03 * size[1]);
+  overlay->AddViewProp(pickedText);
+  colourBar->SetTitle(unit.empty() ? "distance" : ("distance [" + unit + "]").c_str());
+  for (vtkTextProperty* look :
+       {colourBar->GetTitleTextProperty(), colourBar->GetLabelTextProperty()}) {
+    setTextLook(look, text);
+    look->BoldOff();
+  }
+  if (!panel) return;
+  const auto name = [this](GeometryId id) { return nameOf(id); };
+  const auto isMesh = [this](GeometryId id) {
+    const Mesh& mesh = problem.geometries[indices.at(id)];
+    return mesh.type == GeometryType::Triangles && !mesh.analytical;
+  };
+  panelText->SetInput(vtk::panelText(detection, name, isMesh, frames, framesPerSecond).c_str());
+  vtkTextProperty* look = panelText->GetTextProperty();
+  setTextLook(look, text * 4 / 5);
+  look->SetFontFamilyToCourier();
+  look->SetVerticalJustificationToTop();
+  look->SetBackgroundColor(1, 1, 1);
+  look->SetBackgroundOpacity(0.75);
+  panelText->SetPosition(0.015 * size[0], 0.985 * size[1]);
+  overlay->AddViewProp(panelText);
+}
+
+/// Aims the camera as the view says.
 void Window::Implementation::aim() {
-  const Vector3d focus = box.center(), position = focus + Vector3d(0.5, -1.0, 0.6);
+  // The share of the picture that bodies fill at most; the bar of colours is on the right.
+  constexpr double kShareOfWidth = 0.8, kShareOfHeight = 0.88, kMiddleX = 0.44;
+  const Vector3d from = view.from.normalized(), right = view.up.cross(from).normalized(),
+                 top = from.cross(right);
+  Vector3d focus = view.centre;
+  double height = view.height;
+  if (height == 0) {
+    Eigen::AlignedBox3d seen;  // in the camera's directions
+    Eigen::Matrix3d turn;
+    turn << right.transpose(), top.transpose(), from.transpose();
+    for (const Mesh& mesh : problem.geometries) {
+      const bool isPlane = mesh.analytical && std::holds_alternative<Plane>(*mesh.analytical);
+      if (!isPlane && partsOf(mesh).begin()->second.opacity > 0)
+        for (const Vector3d& p : mesh.now) seen.extend(Vector3d(turn * p));
+    }
+    if (seen.isEmpty()) seen.extend(Vector3d(turn * box.min())).extend(Vector3d(turn * box.max()));
+    focus = turn.transpose() * seen.center();
+    const int* size = window->GetSize();
+    const double aspect = static_cast<double>(size[0]) / size[1];
+    height = std::max(seen.sizes().y() / kShareOfHeight, seen.sizes().x() / kShareOfWidth / aspect);
+    focus += (0.5 - kMiddleX) * height * aspect * right;
+  }
+  if (height == 0) height = 1;  // a single point
   vtkCamera* camera = renderer->GetActiveCamera();
+  const Vector3d position = focus + (box.diagonal().norm() + height) * from;
+  camera->ParallelProjectionOn();
   camera->SetFocalPoint(focus.data());
   camera->SetPosition(position.data());
-  camera->SetViewUp(0, 0, 1);
-  renderer->ResetCamera();
-  camera->Zoom(1.3);
+  camera->SetViewUp(top.data());
+  camera->SetParallelScale(height / 2);
 }
 
 void Window::Implementation::draw() {
   renderer->RemoveAllViewProps();
-  renderer->AddViewProp(text);
+  overlay->RemoveAllViewProps();
+  labelLayer->RemoveAllViewProps();
   bodies.clear();
-  for (const Mesh& mesh : problem.geometries)
-    bodies[addBody(renderer, mesh, &mesh - problem.geometries.data())] = &mesh;
   if (isNew) aim();
   isNew = false;
-  if (cells > 0) drawCells();
+  drawBodies();
   drawContacts();
+  if (cells != Cells::None) drawCells();
+  drawAnnotations();
+  renderer->SetSSAORadius(0.06 * box.diagonal().norm());
+  renderer->SetSSAOBias(0.002 * box.diagonal().norm());
   renderer->ResetCameraClippingRange();
   window->Render();
-}
-
-void Window::Implementation::addTimes() {
-  constexpr std::array kNames{"frame", "boxes", "octree", "pairs", "narrow phase", "order"};
-  constexpr vtkIdType kMostFrames = 300;
-  const FrameStatistics::Stages& ms = detection.statistics().milliseconds;
-  const std::array values{
-      static_cast<double>(frames), ms.boxes, ms.octree, ms.pairs, ms.narrowPhase, ms.order};
-  for (std::size_t i = 0; frames == 0 && i < kNames.size(); ++i) {
-    vtkNew<vtkDoubleArray> column;
-    column->SetName(kNames[i]);
-    times->AddColumn(column);
-  }
-  times->InsertNextBlankRow();
-  for (std::size_t i = 0; i < kNames.size(); ++i) {
-    times->SetValue(times->GetNumberOfRows() - 1, static_cast<vtkIdType>(i), values[i]);
-    if (frames != 1 || i == 0) continue;  // a line needs two points
-    vtkPlot* line = chart->AddPlot(vtkChart::LINE);
-    line->SetInputData(times, 0, static_cast<vtkIdType>(i));
-    line->SetColor(kBodyColours[i][0], kBodyColours[i][1], kBodyColours[i][2]);
-  }
-  if (times->GetNumberOfRows() > kMostFrames) times->RemoveRow(0);
-  times->Modified();
-  chart->RecalculateBounds();
-  ++frames;
 }
 
 Window::Window(const OctreeBasedCD& detection, bool onScreen, int width, int height) {
@@ -406,28 +371,50 @@ Window::Window(const OctreeBasedCD& detection, bool onScreen, int width, int hei
                 "A window's width and height must be from 1 to 16384 pixels.");
   m_implementation.reset(new Implementation{detection});
   Implementation& own = *m_implementation;
+  own.panel = onScreen;
   own.renderer->SetBackground(1, 1, 1);
   own.renderer->SetUseDepthPeeling(true);
   own.renderer->SetMaximumNumberOfPeels(12);
-  own.graph->SetViewport(0.6, 0, 1, 0.35);
-  own.graph->SetLayer(1);
+  own.renderer->SetUseSSAO(true);
+  own.renderer->SetSSAOKernelSize(64);
+  own.renderer->SetSSAOBlur(true);
+  own.renderer->SetUseFXAA(true);
+  vtkNew<vtkLightKit> lights;
+  lights->SetKeyLightIntensity(0.72);
+  lights->SetKeyToFillRatio(1.7);
+  lights->SetKeyToHeadRatio(2.5);
+  lights->AddLightsToRenderer(own.renderer);
+  lights->AddLightsToRenderer(own.overlay);
+  for (vtkRenderer* layer : {own.overlay.Get(), own.labelLayer.Get()}) {
+    layer->SetLayer(layer == own.overlay ? 1 : 2);
+    layer->InteractiveOff();
+    layer->SetActiveCamera(own.renderer->GetActiveCamera());
+  }
+  own.renderer->AddObserver(vtkCommand::StartEvent, &own, &Implementation::updateScale);
+  own.colourBar->SetLookupTable(own.colours);
+  own.colourBar->UnconstrainedFontSizeOn();
+  own.colourBar->SetNumberOfLabels(5);
+  own.colourBar->SetLabelFormat("%.2g");
+  own.colourBar->SetBarRatio(0.25);
+  own.colourBar->SetVerticalTitleSeparation(std::max(4, height / 100));
+  own.colourBar->SetPosition(0.87, 0.52);
+  own.colourBar->SetWidth(0.1);
+  own.colourBar->SetHeight(0.44);
+  own.graph->SetViewport(0.62, 0, 1, 0.32);
+  own.graph->SetLayer(3);
   own.graph->InteractiveOff();
   own.graph->SetDraw(onScreen);
-  own.chart->SetTitle("ms");
-  own.chart->SetShowLegend(true);
-  vtkNew<vtkContextActor> actor;
-  actor->GetScene()->AddItem(own.chart);
-  own.graph->AddActor(actor);
-  own.text->GetTextProperty()->SetColor(0, 0, 0);
-  own.text->GetTextProperty()->SetFontSize(20);
+  own.times.show(own.graph, std::max(8, height / 70));
   own.window->SetWindowName("Palpate");
   own.window->SetShowWindow(onScreen);
   own.window->SetOffScreenRendering(!onScreen);
   own.window->SetAlphaBitPlanes(1);
   own.window->SetMultiSamples(0);
   own.window->SetSize(width, height);
-  own.window->SetNumberOfLayers(2);
+  own.window->SetNumberOfLayers(4);
   own.window->AddRenderer(own.renderer);
+  own.window->AddRenderer(own.overlay);
+  own.window->AddRenderer(own.labelLayer);
   own.window->AddRenderer(own.graph);
   own.interactor->SetRenderWindow(own.window);
   own.interactor->SetInteractorStyle(vtkNew<vtkInteractorStyleTrackballCamera>());
@@ -439,10 +426,36 @@ Window::Window(const OctreeBasedCD& detection, bool onScreen, int width, int hei
 
 Window::~Window() = default;
 
+void Window::setAppearance(GeometryId id, const Appearance& appearance,
+                           std::uint32_t firstElement) {
+  const auto isShare = [](double value) { return value >= 0 && value <= 1; };  // NaN is not
+  if (!isShare(appearance.opacity) ||
+      !std::all_of(appearance.colour.begin(), appearance.colour.end(), isShare))
+    throw Error(ErrorCode::InvalidSettings,
+                "An appearance's colour and opacity must be from 0 to 1.");
+  Implementation& own = *m_implementation;
+  own.parts[id].insert_or_assign(firstElement, appearance);
+}
+
+void Window::setView(const View& view) {
+  const auto& [from, up, centre, height] = view;
+  if (!from.allFinite() || !up.allFinite() || !centre.allFinite() || !(height >= 0) ||
+      !std::isfinite(height) || !(up.cross(from).norm() > 0))
+    throw Error(ErrorCode::InvalidSettings,
+                "A view needs finite values, a height of at least 0, and directions that are not "
+                "parallel.");
+  m_implementation->view = view;
+  m_implementation->isNew = true;
+}
+
+void Window::setLengthUnit(std::string unit) { m_implementation->unit = std::move(unit); }
+
 bool Window::show() {
   Implementation& own = *m_implementation;
   own.take();
-  own.addTimes();
+  own.measureFrameRate();
+  own.times.add(own.detection.statistics().milliseconds);
+  ++own.frames;
   own.draw();
   for (own.interactor->ProcessEvents(); own.waits && own.isOpen; own.interactor->ProcessEvents())
     nanosleep(&kPause, nullptr);

@@ -22,23 +22,24 @@ static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double));
 
 /// The positions in an array of contiguous triples of doubles. Nothing is copied: the span is valid
 /// as long as the array.
-/// Needs    an array of doubles with data() and size(), such as std::vector<double>; or an array of
-///          triples with getPointer(), which returns the first of its triples, and size(), their
-///          number.
+/// Needs    an array with size() and operator[]. Its items are contiguous doubles, three for each
+///          position, as in a std::vector<double>; or contiguous triples of doubles.
 /// Errors   WrongPositionCount for a number of doubles that is no multiple of 3.
 template <class Array>
 std::span<const Eigen::Vector3d> positionsOf(const Array& array) {
-  const auto size = static_cast<std::size_t>(array.size());
-  if constexpr (requires { array.getPointer(); }) {
-    static_assert(sizeof(*array.getPointer()) == sizeof(Eigen::Vector3d));
-    return {reinterpret_cast<const Eigen::Vector3d*>(array.getPointer()), size};
-  } else {
-    static_assert(std::is_same_v<std::remove_cvref_t<decltype(*array.data())>, double>);
+  using Item = std::remove_cvref_t<decltype(array[0])>;
+  auto size = static_cast<std::size_t>(array.size());
+  if constexpr (std::is_arithmetic_v<Item>) {
+    static_assert(std::is_same_v<Item, double>);
     if (size % 3 != 0)
       throw Error(ErrorCode::WrongPositionCount,
                   std::to_string(size) + " coordinates are no whole number of positions.");
-    return {reinterpret_cast<const Eigen::Vector3d*>(array.data()), size / 3};
+    size /= 3;
+  } else {
+    static_assert(sizeof(Item) == sizeof(Eigen::Vector3d));
   }
+  if (size == 0) return {};
+  return {reinterpret_cast<const Eigen::Vector3d*>(&array[0]), size};
 }
 
 /// A copy of the elements of an array, with N vertices each: 2 for a Segment, 3 for a Triangle, 4

@@ -34,6 +34,11 @@ namespace palpate {
 // Touch    If the centres are at distance 0, the normal is the winding normal or the cross product
 //          of the edges, as <palpate/Distance.h> states. Method::Continuous without a thickness
 //          turns it to the side from which the features came.
+// Side     A contact at the step's end, by Proximity or of two edges by Intersection, has the
+//          normal of the positions there. If the features have crossed, it is on the wrong side. An
+//          impact has the side from which its features came. If a step begins in intersection,
+//          features that leave a body come from its inside: their normals point back into it.
+//          Validity says whether sides are certified.
 
 /// A contact of a vertex with a triangle. A contact of a vertex with the segment {p, q} has the
 /// corners {p, q, q}. A contact of a vertex with the point p has the corners {p, p, p}.
@@ -57,8 +62,8 @@ struct EdgeEdgeContact {
   std::array<std::uint32_t, 2> edgeA, edgeB;  ///< vertex indices, lower first
   double weightA, weightB;                    ///< closest point = p0 + weight (p1 - p0)
   Eigen::Vector3d normal;                     ///< unit, from edge b to edge a
-  /// L and fraction of the step. The distance is negative only where radii overlap.
-  double distance, timeOfImpact;
+  double distance;      ///< L, at timeOfImpact; negative only where radii overlap
+  double timeOfImpact;  ///< [0, 1] of the step; 1 for methods that test the step's end
   /// The part that holds each closest point at that time: an end if the weight is 0 or 1.
   EdgeFeature featureA = EdgeFeature::Interior, featureB = EdgeFeature::Interior;
   friend bool operator==(const EdgeEdgeContact&, const EdgeEdgeContact&) = default;

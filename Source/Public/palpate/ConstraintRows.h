@@ -15,7 +15,12 @@ namespace palpate {
 
 /// A contact as a row of a solver: gap(x) = normal . sum of weights[i] x[vertices[i]] - offset.
 ///
-/// Units    the gap is in L. A solver keeps it at least as large as the distance that it wants.
+/// Units    the gap is in L. A solver keeps it at least as large as the distance h that it wants.
+///          The depth of the contact at the positions `now` is h - gap(now); the `distance` of the
+///          contact is that at timeOfImpact. Docs/HowTo/Solvers.md has the rule for h.
+/// Offset   of two geometries with vertices the sum of the radii at the closest points, within
+///          rounding. With a shape it is normal . p and the element's radius: p is the point of the
+///          shape's surface, as law (1) moves it.
 /// Laws     (1) with the positions at the contact's timeOfImpact the gap is the contact's distance.
 ///          If a shape moves on by d until the step's end, the gap is that less normal . d.
 ///          (2) the gap's gradient at vertex i is weights[i] normal. At these positions it is also

@@ -35,8 +35,9 @@ struct CollisionPair {
 /// Step     a step runs from the positions `before` to the positions `now`; each vertex moves in a
 ///          straight line. advance() ends the step: `now` becomes `before`, for positions and
 ///          transforms of all geometries. A geometry that is not set after advance() is at rest.
-///          Within a step you may make all calls any number of times and in any order. An answer
-///          depends only on the last values.
+///          Within a step you may make all calls any number of times and in any order. Contacts
+///          depend only on the last values. Validity may know less than in a new object
+///          (Docs/Guarantees.md, "Reproducibility").
 /// Units    L is the length unit of the positions. All lengths are in L.
 /// Errors   a function that takes data throws palpate::Error for invalid data and changes nothing.
 ///          Each function lists its error codes. In addition, every function that takes a
@@ -82,9 +83,9 @@ class PALPATE_EXPORT OctreeBasedCD {
   ///
   /// Lists    edgeEdge() has its segments with edges of triangles and with segments of line meshes.
   ///          vertexTriangle() or triangleVertex() has its vertices with triangles, and points with
-  ///          its segments: segment {p, q} is the triangle {p, q, q} there. Features touch where
-  ///          their centre lines come closest, if the distance there is at most the thickness and
-  ///          the radii there. Docs/SupportMatrix.md has the contacts of each pair of types.
+  ///          its segments: segment {p, q} is the triangle {p, q, q} there. Features are a contact
+  ///          where their centre lines come closest, if the distance there is at most the thickness
+  ///          and the radii there. Docs/SupportMatrix.md has the contacts of each pair of types.
   /// Errors   NonFinitePosition; IndexOutOfRange for a vertex index, or a segment that joins a
   ///          vertex with itself; InvalidRadius, also if there is not one per vertex; TooLarge for
   ///          more than 2^28 vertices or segments.
@@ -289,9 +290,10 @@ class PALPATE_EXPORT OctreeBasedCD {
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;
   /// The candidate pairs of the last collectCandidates(), or of the last detectCollision() with
   /// Settings::keepCandidates. They are all pairs of enabled elements whose boxes overlap, each box
-  /// inflated by half the thickness and by the largest radius of its geometry. If the method needs
-  /// the motion in the step, the boxes enclose the whole step. Outward rounding may add pairs.
-  /// (a, b) may be in either order.
+  /// inflated by half the thickness and by the largest radius of its geometry. Auto may add to the
+  /// thickness (Validity::effectiveThickness), and for Intersection it is 0. If the method needs
+  /// the motion in the step, the boxes enclose the whole step. Outward rounding may add pairs. (a,
+  /// b) may be in either order.
   ///
   /// Order    by (a, b), with `a` of the first geometry with which the pair was added. For a
   ///          geometry with itself each unordered pair once, a < b, and no pair with a common

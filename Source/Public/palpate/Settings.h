@@ -70,11 +70,15 @@ struct Settings {
 enum class Method {
   /// The library chooses among the other methods in each frame, from the motion in the step. It
   /// answers every pair that any method answers. Wherever Continuous answers the pair, Auto misses
-  /// no impact within the step. See <palpate/Validity.h>.
+  /// no impact within the step. It may miss one if radii are given per vertex, where it answers by
+  /// Proximity. See <palpate/Validity.h>.
   Auto,
   /// Triangles that intersect at the step's end, decided exactly. Touching counts.
   Intersection,
-  /// Features whose distance at the step's end is at most the thickness and their radii.
+  /// Features whose distance at the step's end is at most the thickness and their radii. It does
+  /// not know sides: once features have crossed, at any speed, the normal is on the wrong side. Two
+  /// meshes are trusted only if all features within the thickness are further apart than they
+  /// moved.
   Proximity,
   /// Features whose distance is at most the thickness and their radii at some time of the step,
   /// with the time of impact: continuous collision detection (CCD).

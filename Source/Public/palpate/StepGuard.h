@@ -47,8 +47,9 @@ struct GuardedVertex {
 ///
 /// Features  a vertex and a triangle, or two edges, as in Method::Continuous without a thickness;
 ///           for a geometry with itself those without a common vertex. Radii have no effect: lines
-///           are their centre lines, points are their centres. Features that touch only at the
-///           first or the last moment of the step touch.
+///           are their centre lines, points are their centres. The surfaces of lines and points may
+///           therefore overlap after hold(), by less than the sum of their radii. Features that
+///           touch only at the first or the last moment of the step touch.
 /// Laws      (1) after hold() no features of the given pairs touch within the step. This is decided
 ///           exactly on the given doubles.
 ///           (2) after hold() each vertex is exactly at `before` or exactly at the `now` that the
@@ -126,7 +127,8 @@ class PALPATE_EXPORT StepGuard {
   /// Moves vertices in the given `now` back to their `before`, until no features touch within the
   /// step. If features touch, all their vertices move back with their groups, except fixed ones. A
   /// geometry without a step in `steps` is at rest, where the last successful hold() left it or
-  /// where it was added or received a topology.
+  /// where it was added or received a topology. hold() changes your positions only: set them again
+  /// in the OctreeBasedCD before advance().
   ///
   /// Returns  the number of vertices that moved back; vertices at rest do not count.
   /// Errors   ImpactRemains if features touch and cannot move back: they touched before the step,

@@ -8,12 +8,15 @@
 
 namespace palpate {
 
-/// Why the library answered a pair by Validity::method.
+/// Why the library answered a pair by Validity::method. It names the main method only: if a step
+/// begins in intersection, Auto adds contacts of Intersection, whatever the reason is.
 enum class MethodReason {
-  Requested,  ///< The pair's settings name the method.
+  Requested,  ///< The pair's settings name the method. Also the value of a separated pair.
   // The reasons of Method::Auto. Motion is that of features in the step, relative to each other.
   Still,  ///< Nothing moves: Proximity, or Intersection for two meshes without a thickness.
-  Slow,   ///< All features move at most PairSettings::motionTolerance: Proximity.
+  /// All features move at most PairSettings::motionTolerance: Proximity. Features that may have
+  /// touched in the step are reported by their impact even so.
+  Slow,
   Fast,   ///< All or most features move further: Continuous.
   Mixed,  ///< Some features move further: Continuous for them, Proximity for the rest.
   /// Continuous costs least, whatever the motion: without a thickness, and with Contacts::All,
@@ -26,66 +29,85 @@ enum class MethodReason {
 };
 
 /// Whether the last answer for one pair can be trusted, and what the library knows about the step.
-/// Each method relies on conditions, and each detectCollision() checks them.
+/// Each method relies on conditions, and each detectCollision() checks them. Docs/HowTo/Validity.md
+/// says what to do in each case.
 ///
-/// Laws     (1) if trusted, and the method is Proximity, Continuous or Auto: every normal is on the
+/// Laws     (1) if trusted, and `method` is Proximity, Continuous or Auto: every normal is on the
 ///          side from which its features came, and no features that touched or crossed within the
 ///          step are missing. With Contacts::Distinct another contact may stand for them, and
-///          filters may refuse their contacts.
-///          (2) if trusted, and the method is Intersection: if the meshes touched within the step,
-///          the answer is not empty.
+///          filters may refuse their contacts. Disabled elements count as absent.
+///          (2) if trusted, and `method` is Intersection: if the meshes touched within the step,
+///          the answer is not empty. Normals are not certified, and the meshes may intersect. This
+///          also holds where Auto answers by Intersection: at rest, without a thickness.
 ///          (3) if not trusted, the library does not know. Pairs with lines, points or shapes, and
-///          pairs that collision filters separate, are never trusted.
-/// Cost     a small part of the frames' time (Docs/Performance.md), except in the first frame of a
-///          pair. That frame has an initial intersection check. If later motion may have brought
-///          the meshes together, and the step's impacts do not decide it, the library repeats the
-///          check: with Auto at once, with other methods at most once in 16 frames on average.
+///          pairs that collision filters separate, are never trusted: the proofs are for two
+///          triangle or tetrahedral meshes.
+/// Cost     a small part of the frames' time, and more in frames that run the initial intersection
+///          check (Docs/Algorithms/Validity.md, "Cost").
 /// Source   Docs/Algorithms/Validity.md has the conditions and their proofs.
 struct Validity {
+  /// Whether the conditions of `method` held in this step. The laws say what follows from it.
   bool trusted = false;
-  /// Whether the geometries are known not to intersect at the step's start. The library knows it
-  /// from an initial intersection check, or from earlier frames and bounds on the motion since. If
-  /// false, normals may be on the wrong side. Method::Intersection does not need it and runs no
-  /// check.
+  /// Whether the geometries are known not to intersect at the step's start, from an initial
+  /// intersection check, or from earlier frames and bounds on the motion since. If false, they
+  /// intersect, or the library does not know. Two meshes by Auto: they intersect, unless `method`
+  /// is Intersection. Always false for pairs with lines, points or shapes. No check runs for
+  /// Method::Intersection, which needs none, and in steps in which the `displacement` of
+  /// Method::Proximity exceeds its limit.
   bool startedApart = false;
-  /// Whether some normal may be on the wrong side. Never true for Method::Intersection.
+  /// Whether some normal may be on the wrong side, if `method` is Proximity, Continuous or Auto: it
+  /// is then the opposite of `trusted`. Intersection knows no sides, and the value is always false
+  /// there. Its normals are never certified: those of vertices point to the front of the triangle,
+  /// and those of edges are on the wrong side where the edges have crossed.
   bool sideMayBeWrong = true;
 
-  /// The method that answered. Auto stands for Proximity and Continuous, feature by feature.
+  /// The main method that answered. Auto stands for Proximity and Continuous, feature by feature.
+  /// Single contacts of Auto may come from another method: see `atImpact`, and MethodReason.
   Method method = Method::Auto;
+  /// Why `method` answered.
   MethodReason reason = MethodReason::Requested;
-  /// Number of contacts from the step's end, by distance or intersection; and number of contacts
-  /// from within the step, by impact.
-  std::size_t atEnd = 0, atImpact = 0;
+  /// Number of contacts that describe the step's end, by distance or by intersection.
+  std::size_t atEnd = 0;
+  /// Number of contacts that describe an impact. Both numbers are 0 with
+  /// PairSettings::earliestTimeOnly, which gives no contacts.
+  std::size_t atImpact = 0;
 
-  /// L: upper bound on the motion of any two features in the step, relative to each other.
+  /// L: upper bound on the motion of any two features in the step, relative to each other. 0 for
+  /// pairs with a shape by Method::Proximity, which does not read the motion: fast shapes are not
+  /// noticed there.
   double displacement = 0;
-  /// L: the largest `displacement` that meets the method's condition. Proximity: the thickness.
-  /// Auto: the motion tolerance, which only chooses the method. Intersection: the smallest height
-  /// of a triangle, measured when the topology was set. Continuous: infinity.
+  /// L: with Proximity and Intersection, the largest `displacement` that meets the method's
+  /// condition: the thickness; the smallest height of a triangle, measured when the topology was
+  /// set. Method::Auto with two meshes: the motion tolerance, which chooses the method and is no
+  /// condition. Continuous, also as chosen by Auto for other pairs: infinity.
   double displacementLimit = 0;
   /// L: how far the straight motion of vertices is off the arcs of bodies that setTransform()
   /// turns. It bounds the distance of a vertex from its path if the body turned evenly about one
   /// axis and slid along it. It is the sum over both bodies, and infinity for a plane that turns.
-  /// If it exceeds the thickness, the answer is not trusted.
+  /// If it exceeds the thickness, the answer is not trusted. 0 for pairs with a shape by
+  /// Method::Proximity, as for `displacement`.
   double arcDeviation = 0;
   /// L: feature pairs further apart at the step's end are contacts only by an impact. It is the
   /// thickness, with Auto up to the motion tolerance more; 0 for Intersection.
   double effectiveThickness = 0;
 
-  /// Vertices of the first and of the second mesh because of which the answer is not trusted,
-  /// ascending. They moved further than `displacementLimit`, or belong to features that may have
-  /// touched within the step although they are apart at its end. For a mesh with itself all are in
-  /// the first list.
+  /// Vertices of the first and of the second geometry because of which the answer is not trusted,
+  /// ascending. Proximity and Intersection: vertices that moved further than `displacementLimit`.
+  /// Proximity: also vertices of features that may have touched within the step although they are
+  /// apart at its end. Both lists are empty for Method::Auto with two meshes, for Continuous, and
+  /// for pairs with a shape. For a geometry with itself all are in the first list.
   std::vector<std::uint32_t> untrustedVerticesA, untrustedVerticesB;
-  /// Triangles without area that are in contacts, ascending. Their normals follow the rules of
-  /// <palpate/Distance.h>.
+  /// Triangles of meshes without area that are in contacts, ascending. Their normals follow the
+  /// rules of <palpate/Distance.h>. Empty for pairs with a shape.
   std::vector<std::uint32_t> degenerateTrianglesA, degenerateTrianglesB;
 
   /// Maximum number of vertices of one mesh that are listed because they moved too far.
   static constexpr std::size_t kMaxFastVertices = 128;
 
-  /// A value above 1 means that the motion violates the method's condition.
+  /// A value above 1 means that the motion violates the method's condition, if PairSettings::method
+  /// is Proximity or Intersection. For Method::Auto with two meshes it means only that Proximity
+  /// alone does not answer the step: trusted answers have values above 1, and infinity without a
+  /// thickness.
   double displacementOverLimit() const {
     return displacement > 0 ? displacement / displacementLimit : 0;
   }

@@ -465,6 +465,8 @@ TEST(GeometryTypes, DegeneratePointsMatchBruteForce) {
         expectSameRows(Rows(answer(settingsOf(Engine::Octree), *a, *b, pair, now, b->positions)),
                        truth);
         const CollisionData data = answer(*a, *b, pair);
+        EXPECT_TRUE(data.validity().degenerateTrianglesA.empty());
+        EXPECT_TRUE(data.validity().degenerateTrianglesB.empty());
         for (const auto& c : data.vertexTriangle()) {
           EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);
           EXPECT_EQ(c.barycentric.sum(), 1.0);
@@ -500,6 +502,18 @@ TEST(GeometryTypes, DegenerateLinesMatchBruteForce) {
           for (const auto& c : data.edgeEdge()) expectWellFormed(c);
         }
   }
+}
+
+/// Triangles without area are listed, segments and points are not.
+TEST(GeometryTypes, OnlyTrianglesWithoutAreaAreDegenerate) {
+  TestGeometry flat;
+  flat.positions = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {0, 1, 0}};
+  flat.triangles = {{0, 1, 2}, {0, 1, 3}};
+  const TestGeometry points{GeometryType::Points, {{1.5, 0, 0.1}, {0.2, 0.2, 0.1}}, {}, {}, {0.0}};
+  const Validity validity =
+      answer(flat, points, {Method::Proximity, 0.3, Contacts::All}).validity();
+  EXPECT_EQ(validity.degenerateTrianglesA, (std::vector<std::uint32_t>{0}));
+  EXPECT_TRUE(validity.degenerateTrianglesB.empty());
 }
 
 // ---- Refused calls ----

@@ -257,7 +257,8 @@ TEST(ShapePairs, BadInputThrowsErrorsThatNameIt) {
   refuse(box, box, Method::Proximity, "pair (0, 0): a shape cannot be tested against itself");
   refuse(plane, other, Method::Proximity, "pair (1, 2): a pair of two planes is not supported");
   refuse(plane, other, Method::Continuous, "pair (1, 2): a pair of two planes is not supported");
-  refuse(box, plane, Method::Intersection, "a shape and a shape; Auto, Proximity and Continuous");
+  refuse(box, plane, Method::Intersection,
+         "a shape and a shape; use Auto, Proximity or Continuous");
 }
 
 TEST(ShapePairs, CapturesIncludeThem) {

@@ -323,12 +323,14 @@ TEST(EmbeddedVertices, BadCallsThrowErrorsThatNameTheCause) {
   expectRefused(ErrorCode::UnsupportedMethod,
                 "geometry 1 is a point set; findTetrahedron() is for tetrahedral meshes",
                 [&] { detection.queries().findTetrahedron(points, Vector3d::Zero()); });
-  expectRefused(ErrorCode::InvalidSettings, "geometry 0 is both the body and the owner",
+  expectRefused(ErrorCode::InvalidSettings,
+                "geometry 0 is both the body and the owner of the vertices; these must differ",
                 [&] { testing::embeddedVertices(detection, body, body); });
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  expectRefused(ErrorCode::NonFinitePosition, "geometry 0: the point is (nan, 0, 0)", [&] {
-    detection.queries().findTetrahedron(body, {nan, 0, 0});
-  });
+  expectRefused(ErrorCode::NonFinitePosition,
+                "geometry 0: the point is (nan, 0, 0); it must be finite", [&] {
+                  detection.queries().findTetrahedron(body, {nan, 0, 0});
+                });
   EXPECT_FALSE(detection.queries().findTetrahedron(body, {2, 0, 0}));
   EXPECT_TRUE(detection.queries().findTetrahedron(body, {1, 1, 1}));
   // No tetrahedra at all, and only surface that is on both sides.

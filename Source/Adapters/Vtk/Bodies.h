@@ -1,0 +1,29 @@
+#pragma once
+
+#include <palpate/CollisionProblem.h>
+#include <palpate/vtk/Window.h>
+
+#include <cstdint>
+#include <map>
+
+class vtkProp;
+class vtkRenderer;
+
+namespace palpate::vtk {
+
+/// Appearances of the parts of a geometry, each by its first element.
+using Parts = std::map<std::uint32_t, Appearance>;
+
+/// The appearance of the geometry at this index in the problem, unless the user chose another.
+Appearance usualAppearance(std::size_t index);
+
+/// Gives a shape a mesh: the furthest points along directions all around. size: L, of a plane.
+void tessellate(CollisionProblem::Geometry& shape, double size);
+
+/// Adds a body to the renderer, or returns null for an invisible one. Each cell has the id of its
+/// element in the cell array "element". thinnest: L, the least radius with which lines are drawn.
+/// height: pixels of the picture.
+vtkProp* addBody(vtkRenderer*, const CollisionProblem::Geometry&, const Parts&, double thinnest,
+                 int height);
+
+}  // namespace palpate::vtk
