@@ -278,6 +278,10 @@ class OctreeBasedCD::Implementation::QuerySource : public SpatialQueries::Source
     return m_all->octreesState == now ? now : 0;
   }
   SearchableGeometry& at(GeometryId id) const override { return m_all->geometries.at(id); }
+  std::size_t geometryCount() const override { return m_all->geometries.all().size(); }
+  SearchableGeometry& geometry(std::size_t index) const override {
+    return *m_all->geometries.all()[index];
+  }
   std::uint64_t step() const override { return m_all->geometries.stepNumber(); }
   Engine engine() const override { return m_all->settings.engine; }
   const OctreeSettings& octreeSettings() const override { return m_all->settings.octree; }

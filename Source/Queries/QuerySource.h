@@ -5,6 +5,7 @@
 
 #include "Core/Threads.h"
 #include "Queries/PointDistances.h"
+#include "Queries/RayHits.h"
 #include "Queries/SearchableGeometry.h"
 #include "Queries/VertexSearch.h"
 
@@ -25,6 +26,8 @@ class SpatialQueries::Source {
     VertexSearch<InsideVertex> inside;
     VertexSearch<EmbeddedVertex> embedded;
     std::vector<PointDistances::Near> near;
+    std::vector<RayHits::Met> met;
+    std::vector<RayHit> hits;
     std::vector<std::uint32_t> elements;
   };
   /// Scratch lent to one call.
@@ -49,6 +52,9 @@ class SpatialQueries::Source {
   virtual std::uint64_t state() const = 0;
   /// Throws UnknownGeometry.
   virtual SearchableGeometry& at(GeometryId) const = 0;
+  /// All geometries, by ascending ids.
+  virtual std::size_t geometryCount() const = 0;
+  virtual SearchableGeometry& geometry(std::size_t index) const = 0;
   virtual std::uint64_t step() const = 0;  ///< counts advance()
   virtual Engine engine() const = 0;
   virtual const OctreeSettings& octreeSettings() const = 0;

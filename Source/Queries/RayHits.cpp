@@ -86,11 +86,13 @@ std::optional<ClippedRay> clip(const SearchableGeometry& geometry, const RaySegm
 
 }  // namespace
 
-RayHits::RayHits(const SearchableGeometry& geometry, const Ray& ray, bool bruteForce)
+RayHits::RayHits(const SearchableGeometry& geometry, const Ray& ray, bool bruteForce,
+                 std::vector<Met>& scratch)
     : m_geometry(geometry),
       m_ray{ray.origin, ray.direction, ray.tMin, ray.tMax},
       m_bruteForce(bruteForce),
-      m_isSolid(geometry.mesh.largestRadius > 0) {}
+      m_isSolid(geometry.mesh.largestRadius > 0),
+      m_met(scratch) {}
 
 template <class F>
 void RayHits::intersect(std::uint32_t place, F&& f) const {

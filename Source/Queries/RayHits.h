@@ -20,8 +20,14 @@ namespace palpate {
 /// are intervals, and each end of a connected part is a hit on their surface.
 class RayHits {
  public:
-  /// bruteForce: every element is tested.
-  RayHits(const SearchableGeometry&, const Ray&, bool bruteForce);
+  /// What the ray shares with an element.
+  struct Met {
+    RayInterval interval;
+    std::uint32_t place, element;
+  };
+
+  /// bruteForce: every element is tested. scratch: kept by the caller.
+  RayHits(const SearchableGeometry&, const Ray&, bool bruteForce, std::vector<Met>& scratch);
 
   /// t: the search ends where hits beyond it begin.
   std::optional<RayHit> first(double t);
@@ -30,11 +36,6 @@ class RayHits {
   void all(std::vector<RayHit>& out);
 
  private:
-  /// What the ray shares with an element.
-  struct Met {
-    RayInterval interval;
-    std::uint32_t place, element;
-  };
   enum class Wanted { First, Any, All };
 
   /// Fills m_met. First: with all elements of the part that begins first, if that part does not
@@ -55,7 +56,7 @@ class RayHits {
   const RaySegment m_ray;
   const bool m_bruteForce;
   const bool m_isSolid;  ///< lines and points with radii
-  std::vector<Met> m_met;
+  std::vector<Met>& m_met;
 };
 
 }  // namespace palpate

@@ -4,11 +4,13 @@
 
 #include "Core/FloatingPoint.h"
 #include "Core/Text.h"
+#include "Math/ClosestPoint.h"
 #include "Queries/Containment.h"
 #include "Queries/Embedding.h"
 #include "Queries/PointDistances.h"
 #include "Queries/QuerySource.h"
 #include "Queries/RayHits.h"
+#include "Queries/ShapeRays.h"
 
 #include <algorithm>
 #include <atomic>
@@ -111,6 +113,10 @@ void checkHasElements(const SearchableGeometry& geometry) {
 std::optional<SurfacePoint> closestPointOf(const SearchableGeometry& geometry,
                                            const Eigen::Vector3d& point, double maxDistance,
                                            bool bruteForce, std::uint32_t& likely) {
+  if (geometry.shape) {
+    const SurfacePoint nearest = closestPointOnShape(geometry.id, geometry.shape->now, point);
+    return nearest.distance <= maxDistance ? std::optional(nearest) : std::nullopt;
+  }
   if (geometry.tree.ordered().empty()) return {};
   const PointDistances distances(geometry, point, bruteForce);
   const auto near = distances.nearest(maxDistance, likely);
@@ -135,6 +141,28 @@ void forParts(SpatialQueries::Source& source, std::size_t size, F&& f) {
                     [&](std::size_t, std::size_t begin, std::size_t end) { f(begin, end); });
 }
 
+/// The vertex and the edge of the element that are nearest to where the ray hits it. Of equally
+/// near ones the first in the element's order.
+Pick pickOf(const RayHit& hit, const Ray& ray, const Positions& now) {
+  const Eigen::Vector3d point = ray.origin + hit.t * ray.direction;
+  Pick pick{hit, hit.vertices[0], {hit.vertices[0], hit.vertices[1]}};
+  double leastVertex = kInfinity, leastEdge = kInfinity;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::uint32_t p = hit.vertices[i], q = hit.vertices[(i + 1) % 3];
+    if (const double distance = (now[p] - point).squaredNorm(); distance < leastVertex) {
+      leastVertex = distance;
+      pick.vertex = p;
+    }
+    const Eigen::Vector3d a = now[p], b = now[q];
+    const double distance = finiteVertexTriangleDistance(point, a, b, b).distance;
+    if (p != q && distance < leastEdge) {
+      leastEdge = distance;
+      pick.edge = {std::min(p, q), std::max(p, q)};
+    }
+  }
+  return pick;
+}
+
 void checkRay(const Ray& ray) {
   if (!ray.origin.allFinite() || !ray.direction.allFinite())
     throw Error(ErrorCode::NonFinitePosition, "the ray has origin " + textOf(ray.origin) +
@@ -149,13 +177,78 @@ void checkRay(const Ray& ray) {
 
 }  // namespace
 
+namespace {
+
+/// The hits of rays, in scratch of one call.
+class RayQuery {
+ public:
+  explicit RayQuery(SpatialQueries::Source& source)
+      : m_scratch(source), m_bruteForce(source.engine() == Engine::BruteForce) {}
+
+  /// By ascending t; valid until the next call.
+  const std::vector<RayHit>& all(const SearchableGeometry& geometry, const Ray& ray) {
+    std::vector<RayHit>& hits = m_scratch->hits;
+    hits.clear();
+    if (geometry.shape)
+      addShapeHits(geometry.id, geometry.shape->now, ray, hits);
+    else
+      on(geometry, ray).all(hits);
+    return hits;
+  }
+  std::optional<RayHit> first(const SearchableGeometry& geometry, const Ray& ray) {
+    if (!geometry.shape) return on(geometry, ray).first(ray.tMax);
+    const std::vector<RayHit>& hits = all(geometry, ray);
+    return hits.empty() ? std::nullopt : std::optional(hits.front());
+  }
+  bool any(const SearchableGeometry& geometry, const Ray& ray) {
+    return geometry.shape ? !all(geometry, ray).empty() : on(geometry, ray).any();
+  }
+
+ private:
+  RayHits on(const SearchableGeometry& geometry, const Ray& ray) {
+    return {geometry, ray, m_bruteForce, m_scratch->met};
+  }
+
+  const SpatialQueries::Source::Loan m_scratch;
+  const bool m_bruteForce;
+};
+
+/// The first hit of all geometries. frontFacesOnly: other hits do not count.
+std::optional<RayHit> firstHitOfAll(SpatialQueries::Source& source, Ray ray, bool frontFacesOnly) {
+  RayQuery query(source);
+  std::optional<RayHit> best;
+  const auto take = [&](const RayHit& hit) {
+    if (best && !(hit.t < best->t)) return;
+    best = hit;
+    ray.tMax = hit.t;
+  };
+  for (std::size_t i = 0; i < source.geometryCount(); ++i) {
+    const SearchableGeometry& geometry = source.geometry(i);
+    if (!frontFacesOnly) {
+      if (const auto hit = query.first(geometry, ray)) take(*hit);
+      continue;
+    }
+    for (const RayHit& hit : query.all(geometry, ray))
+      if (hit.frontFace) take(hit);
+  }
+  return best;
+}
+
+}  // namespace
+
 std::optional<RayHit> SpatialQueries::firstHit(GeometryId id, const Ray& ray) const {
   Source& source = valid();
   const StandardFloatingPoint standard;
   checkRay(ray);
   const SearchableGeometry& geometry = source.at(id);
-  checkHasElements(geometry);
-  return RayHits(geometry, ray, source.engine() == Engine::BruteForce).first(ray.tMax);
+  return RayQuery(source).first(geometry, ray);
+}
+
+std::optional<RayHit> SpatialQueries::firstHit(const Ray& ray) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  checkRay(ray);
+  return firstHitOfAll(source, ray, false);
 }
 
 bool SpatialQueries::anyHit(GeometryId id, const Ray& ray) const {
@@ -163,8 +256,17 @@ bool SpatialQueries::anyHit(GeometryId id, const Ray& ray) const {
   const StandardFloatingPoint standard;
   checkRay(ray);
   const SearchableGeometry& geometry = source.at(id);
-  checkHasElements(geometry);
-  return RayHits(geometry, ray, source.engine() == Engine::BruteForce).any();
+  return RayQuery(source).any(geometry, ray);
+}
+
+std::optional<Pick> SpatialQueries::pick(const Ray& ray, bool frontFacesOnly) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  checkRay(ray);
+  const auto hit = firstHitOfAll(source, ray, frontFacesOnly);
+  if (!hit) return {};
+  if (hit->element == kNoElement) return Pick{*hit, kNoElement, {kNoElement, kNoElement}};
+  return pickOf(*hit, ray, source.at(hit->geometry).mesh.now);
 }
 
 void SpatialQueries::firstHits(GeometryId id, std::span<const Ray> rays,
@@ -174,12 +276,10 @@ void SpatialQueries::firstHits(GeometryId id, std::span<const Ray> rays,
   checkSizes(rays.size(), out.size(), "rays");
   for (const Ray& ray : rays) checkRay(ray);
   const SearchableGeometry& geometry = source.at(id);
-  checkHasElements(geometry);
-  const bool bruteForce = source.engine() == Engine::BruteForce;
   forParts(source, rays.size(), [&](std::size_t begin, std::size_t end) {
+    RayQuery query(source);
     for (std::size_t i = begin; i < end; ++i)
-      out[i] = RayHits(geometry, rays[i], bruteForce)
-                   .first(rays[i].tMax)
+      out[i] = query.first(geometry, rays[i])
                    .value_or(RayHit{id, kNoElement, {}, {0, 0, 0}, kInfinity, false, false});
   });
 }
@@ -189,10 +289,10 @@ void SpatialQueries::allHits(GeometryId id, const Ray& ray, std::vector<RayHit>&
   const StandardFloatingPoint standard;
   checkRay(ray);
   const SearchableGeometry& geometry = source.at(id);
-  checkHasElements(geometry);
-  std::vector<RayHit> hits;
-  RayHits(geometry, ray, source.engine() == Engine::BruteForce).all(hits);
-  out = std::move(hits);
+  RayQuery query(source);
+  const std::vector<RayHit>& hits = query.all(geometry, ray);
+  out.reserve(hits.size());  // nothing below throws
+  out.assign(hits.begin(), hits.end());
 }
 
 std::optional<SurfacePoint> SpatialQueries::closestPoint(GeometryId id,
@@ -203,7 +303,6 @@ std::optional<SurfacePoint> SpatialQueries::closestPoint(GeometryId id,
   checkPoint(point);
   checkLength(maxDistance, "maxDistance", false);
   const SearchableGeometry& geometry = source.at(id);
-  checkHasElements(geometry);
   std::uint32_t likely = kNoElement;
   return closestPointOf(geometry, point, maxDistance, source.engine() == Engine::BruteForce,
                         likely);
@@ -217,7 +316,6 @@ void SpatialQueries::closestPoints(GeometryId id, std::span<const Eigen::Vector3
   for (const Eigen::Vector3d& point : points) checkPoint(point);
   checkLength(maxDistance, "maxDistance", false);
   const SearchableGeometry& geometry = source.at(id);
-  checkHasElements(geometry);
   const bool bruteForce = source.engine() == Engine::BruteForce;
   forParts(source, points.size(), [&](std::size_t begin, std::size_t end) {
     std::uint32_t likely = kNoElement;

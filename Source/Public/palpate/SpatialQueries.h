@@ -46,8 +46,8 @@ struct Ray {
 
 /// One connected part of what a ray and a surface share: its smallest t, on the lowest element
 /// there. A ray along an edge, or in the plane of triangles, has one hit there. Lines and points
-/// with radii have a hit where the ray enters them and one where it leaves them; overlapping
-/// elements are one body.
+/// with radii, and analytical shapes, have a hit where the ray enters them and one where it leaves
+/// them; overlapping elements are one body.
 struct RayHit {
   GeometryId geometry;
   std::uint32_t element = kNoElement;
@@ -58,6 +58,14 @@ struct RayHit {
   /// Whether the ray changes from one side of the surface to the other. From inside a closed mesh
   /// the number of such hits is odd.
   bool crosses;
+};
+
+/// What a ray selects: its first hit, and the vertex and the edge of the element that are nearest
+/// to the hit. Both are kNoElement for a shape. A point has the edge {p, p}.
+struct Pick {
+  RayHit hit;
+  std::uint32_t vertex;
+  std::array<std::uint32_t, 2> edge;  ///< lower vertex first
 };
 
 /// Spatial queries over the geometries of one OctreeBasedCD, at their positions now. Get the object
@@ -131,6 +139,8 @@ class PALPATE_EXPORT SpatialQueries {
   ///          length 0, or if tMin is not finite or not at most tMax.
   /// Cost     about logarithmic in the elements.
   std::optional<RayHit> firstHit(GeometryId, const Ray&) const;
+  /// The first hit of all geometries. Of equally early hits, that on the lowest geometry.
+  std::optional<RayHit> firstHit(const Ray&) const;
   bool anyHit(GeometryId, const Ray&) const;  ///< whether there is a hit
   /// First hits of many rays, on all threads. Rays without a hit have element kNoElement.
   ///
@@ -140,6 +150,8 @@ class PALPATE_EXPORT SpatialQueries {
   ///
   /// Order    by ascending t.
   void allHits(GeometryId, const Ray&, std::vector<RayHit>& out) const;
+  /// What a ray selects among all geometries.
+  std::optional<Pick> pick(const Ray&, bool frontFacesOnly = false) const;
 
   /// Finds the vertices of one geometry that are inside another, the body. It finds them at any
   /// depth, also in concave bodies, and where no triangles intersect.
