@@ -8,6 +8,7 @@
 #include "Queries/RayHits.h"
 #include "Queries/SearchableGeometry.h"
 #include "Queries/VertexSearch.h"
+#include "Shapes/ShapeContacts.h"
 
 #include <cstdint>
 #include <memory>
@@ -29,6 +30,8 @@ class SpatialQueries::Source {
     std::vector<RayHits::Met> met;
     std::vector<RayHit> hits;
     std::vector<std::uint32_t> elements;
+    Buffer<std::uint32_t> nearShape;
+    ShapeContactBuffers shapeContacts;
   };
   /// Scratch lent to one call.
   class Loan {

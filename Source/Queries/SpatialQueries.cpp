@@ -10,11 +10,14 @@
 #include "Queries/PointDistances.h"
 #include "Queries/QuerySource.h"
 #include "Queries/RayHits.h"
+#include "Queries/ElementsNearShape.h"
+#include "Queries/ShapeOverlap.h"
 #include "Queries/ShapeRays.h"
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 namespace palpate {
@@ -403,6 +406,75 @@ void SpatialQueries::elementsWithin(GeometryId id, const Eigen::Vector3d& point,
   std::sort(found.begin(), found.end());
   elements.reserve(found.size());  // nothing below throws
   elements.assign(found.begin(), found.end());
+}
+
+namespace {
+
+/// Throws InvalidShape or InvalidTransform.
+RigidTransform checkedPose(const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
+                           const Eigen::Vector3d& translation) {
+  std::optional<std::size_t> element;
+  if (const std::string fault = faultOf(shape, element); !fault.empty())
+    throw Error(ErrorCode::InvalidShape, "the query's shape: " + fault, {}, element);
+  const RigidTransform pose{rotation, translation};
+  if (const std::string fault = faultOf(pose); !fault.empty())
+    throw Error(ErrorCode::InvalidTransform, "the query's shape: " + fault);
+  return pose;
+}
+
+}  // namespace
+
+void SpatialQueries::overlapping(GeometryId id, const AnalyticalGeometry& shape,
+                                 const Eigen::Matrix3d& rotation,
+                                 const Eigen::Vector3d& translation,
+                                 std::vector<std::uint32_t>& elements) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  const RigidTransform pose = checkedPose(shape, rotation, translation);
+  const SearchableGeometry& geometry = source.at(id);
+  checkHasElements(geometry);
+  const Source::Loan scratch(source);
+  std::vector<std::uint32_t>& found = scratch->elements;
+  found.clear();
+  if (!geometry.tree.ordered().empty())
+    findOverlapping(geometry, Shape(shape, pose), source.engine() == Engine::BruteForce,
+                    scratch->stack, scratch->nearShape, found);
+  std::sort(found.begin(), found.end());
+  elements.reserve(found.size());  // nothing below throws
+  elements.assign(found.begin(), found.end());
+}
+
+void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
+                              const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation,
+                              double thickness, std::vector<ShapeContact>& out) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  const RigidTransform pose = checkedPose(shape, rotation, translation);
+  checkLength(thickness, "thickness", true);
+  const SearchableGeometry& geometry = source.at(id);
+  checkHasElements(geometry);
+  const Source::Loan scratch(source);
+  Buffer<std::uint32_t>& near = scratch->nearShape;
+  Buffer<ShapeContact>& found = scratch->shapeContacts.shape;
+  near.clear();
+  found.clear();
+  if (!geometry.tree.ordered().empty()) {
+    PlacedShape placed(shape);
+    placed.now.place(shape, pose);
+    placed.before = placed.now;
+    if (source.engine() == Engine::BruteForce)
+      for (std::uint32_t i = 0; i < geometry.mesh.topology.triangles.size(); ++i) near.push_back(i);
+    else
+      findElementsNear(geometry, placed.now, placed.now, thickness + geometry.mesh.largestRadius,
+                       scratch->stack, near);
+    findShapeContacts(geometry.mesh, placed, {Method::Proximity, thickness}, near,
+                      scratch->shapeContacts);
+  }
+  std::sort(found.begin(), found.end(), [](const ShapeContact& a, const ShapeContact& b) {
+    return std::tie(a.element, a.vertices) < std::tie(b.element, b.vertices);
+  });
+  out.reserve(found.size());  // nothing below throws
+  out.assign(found.begin(), found.end());
 }
 
 void SpatialQueries::findInsideVertices(GeometryId vertices, GeometryId body,

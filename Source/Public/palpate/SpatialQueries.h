@@ -1,6 +1,8 @@
 #pragma once
 
+#include <palpate/AnalyticalGeometry.h>
 #include <palpate/ClosedMesh.h>
+#include <palpate/CollisionData.h>
 #include <palpate/Export.h>
 #include <palpate/TetrahedralMesh.h>
 #include <palpate/Types.h>
@@ -152,6 +154,23 @@ class PALPATE_EXPORT SpatialQueries {
   void allHits(GeometryId, const Ray&, std::vector<RayHit>& out) const;
   /// What a ray selects among all geometries.
   std::optional<Pick> pick(const Ray&, bool frontFacesOnly = false) const;
+
+  /// Finds the elements that have a point in a shape, interior included. The poses are those of
+  /// OctreeBasedCD::setTransform(). A frustum is a ConvexHull.
+  ///
+  /// Order    ascending.
+  /// Errors   InvalidShape, InvalidTransform; UnsupportedMethod if the geometry is a shape itself.
+  void overlapping(GeometryId, const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
+                   const Eigen::Vector3d& translation, std::vector<std::uint32_t>& elements) const;
+  /// Finds the contacts that a pair of the geometry and the shape would have with Method::Proximity
+  /// and Contacts::Distinct, with the shape at this pose. All have the time 1.
+  ///
+  /// Order    that of CollisionData::shape().
+  /// Errors   those of overlapping(); InvalidSettings if the thickness is negative or not finite.
+  /// Cost     follows the elements near the shape.
+  void contacts(GeometryId, const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
+                const Eigen::Vector3d& translation, double thickness,
+                std::vector<ShapeContact>& out) const;
 
   /// Finds the vertices of one geometry that are inside another, the body. It finds them at any
   /// depth, also in concave bodies, and where no triangles intersect.
