@@ -39,11 +39,11 @@ enum class MethodReason {
 ///          (2) if trusted, and `method` is Intersection: if the meshes touched within the step,
 ///          the answer is not empty. Normals are not certified, and the meshes may intersect. This
 ///          also holds where Auto answers by Intersection: at rest, without a thickness.
-///          (3) if not trusted, the answer may be right or wrong. Continuous and Auto miss no
-///          impact even so. Only sides are then not certified, and impacts on the arcs of bodies
-///          that turn. Pairs with lines, points or shapes, and pairs that collision filters
-///          separate, are never trusted: the proofs are for two triangle or tetrahedral meshes, and
-///          for such a mesh with itself.
+///          (3) if not trusted, the answer may be right or wrong. For two meshes, Continuous and
+///          Auto miss no impact of straight motion even so. Only sides are then not certified, and
+///          impacts on the arcs of bodies that turn. Pairs with lines, points or shapes, and pairs
+///          that collision filters separate, are never trusted: the proofs are for two triangle or
+///          tetrahedral meshes, and for such a mesh with itself.
 ///          (4) the laws are about one step. Features may have passed each other in an earlier
 ///          step, because its answer missed it or because the solver ignored an impact. The next
 ///          step may then be trusted, with startedApart, and its normals push further through.
@@ -73,7 +73,7 @@ struct Validity {
 
   /// The main method that answered. Auto stands for Proximity and Continuous, feature by feature.
   /// Single contacts of Auto may come from another method: see `atImpact`, and MethodReason. This
-  /// field decides what `trusted` promises. PairSettings::method, which you requested, decides which
+  /// field decides what `trusted` promises. PairSettings::method, the requested one, decides which
   /// fields name the cause of an answer that is not trusted.
   Method method = Method::Auto;
   /// Why `method` answered.
