@@ -23,10 +23,10 @@ RECOMMENDED = ("Auto", "Continuous")
 LONGEST = 40  # milliseconds; longer times stand at the edge of the chart, with their value
 CAPTION = """\
 Filled marks above the line: touching pairs of triangles that a method does not report. White marks below: reported pairs that do not touch.
-The best place is on the zero line, far to the left. Orange: the recommended methods. Bars: quartiles of the time over repetitions.
+The best place is on the zero line, far to the left. Orange: the recommended methods, both without a thickness. Bars: quartiles of the time over repetitions.
 Dashed: the best (Pareto) front of time and false negatives. No other method beats its methods in both. Times whose bars overlap count as equal.
 Proximity reports near features by definition, within 1/20, 1/5 or 4/5 of the mean edge. Substeps run Proximity 1/20 several times in each step.
-Continuous reports impacts within the step only. Triangles that intersect throughout the step count as its false negatives."""
+Continuous reports impacts within the step, and misses none. Triangles that intersect throughout the step count as its false negatives."""
 
 
 def frontOf(rows):

@@ -128,7 +128,7 @@ def main(source, picture):
     columns = [column for panel, _, _ in PANELS for column in panel]
     failing = {row["method"] for row in rows if any(row[column] > 0 for column in columns)}
     without = [method for method in distinct(row["method"] for row in rows) if method not in failing]
-    caption = CAPTION.format(none=f"No error in any sweep: {', '.join(without)}." if without else "")
+    caption = CAPTION.format(none=f"No such error at all: {', '.join(without)}." if without else "")
     figure.text(0.012, 1 - 0.42 / height, caption, fontsize=8, va="top", linespacing=1.35)
     for column, (_, title, _) in enumerate(PANELS):
         box = grid[0][column].get_position()

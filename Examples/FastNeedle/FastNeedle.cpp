@@ -98,7 +98,8 @@ class FastNeedle : public LiveScene {
       return (p - centre).head<2>().lpNorm<Eigen::Infinity>() > 0.999 * kHalfWidth;
     });
     m_world.addStiffness(lane.membrane, 1e-5, 1e-3);
-    // Contacts are found once in a step: rows for all of them.
+    // Rows for all contacts: within a step this long features slide after their first impact. With
+    // Contacts::Distinct the guard moves vertices back in more frames.
     m_world.addPair(lane.needle, lane.membrane,
                     {.method = method, .thickness = kThickness, .contacts = Contacts::All},
                     kThickness);

@@ -31,22 +31,26 @@ namespace palpate {
 ///          distance along the normal.
 ///          (3) let a step along this row alone bring the gap to g > 0. It moves each vertex by a
 ///          multiple of its inverse mass, its weight and the normal. Then the signed distance is g,
-///          up to (g + radii) (4 s / h)^2. Here s is the longest displacement of a vertex of a
-///          triangle or an edge; h is the triangle's least height, or the shorter edge times the
+///          up to (g + radii) (4 s / e)^2. Here s is the longest displacement of a vertex of a
+///          triangle or an edge; e is the triangle's least height, or the shorter edge times the
 ///          sine of the angle between the edges. One case is weaker: a vertex behind a triangle
 ///          (distance below 0 from Method::Intersection) whose closest point an edge or a corner
 ///          holds. It comes to the outer side, at a signed distance above 0 and at most g.
 struct ConstraintRow {
-  std::array<std::uint32_t, 4> vertices;  ///< numbers of the solver; one may occur several times
-  std::array<double, 4> weights;          ///< 0: this vertex does not count
-  Eigen::Vector3d normal;                 ///< unit
-  double offset;                          ///< L
+  /// Numbers of the solver; one may occur several times. Then only its first weight may differ from
+  /// 0, unless the mesh has a triangle that names a vertex twice.
+  std::array<std::uint32_t, 4> vertices;
+  std::array<double, 4> weights;  ///< 0: this vertex does not count
+  Eigen::Vector3d normal;         ///< unit
+  double offset;                  ///< L
 
   /// L, at these positions, one for each vertex number of the solver.
   PALPATE_EXPORT double gap(std::span<const Eigen::Vector3d> positions) const;
 };
 
-/// The place of one geometry's vertices among those of a solver. Leave it empty for a shape.
+/// The place of one geometry's vertices among those of a solver. Leave it empty for a shape. Both
+/// arrays are those of the step that was detected: `before` has the positions at the last
+/// advance(), or those that you passed with two arrays.
 struct SolverVertices {
   std::uint32_t first = 0;                       ///< the solver's number of vertex 0
   std::span<const Eigen::Vector3d> before, now;  ///< L, in the world, one per vertex

@@ -110,11 +110,10 @@ class PALPATE_EXPORT OctreeBasedCD {
   ///
   ///   const Capsule probe{{0, 0, 0}, {0, 0, 80}, 2.5};
   ///   const GeometryId tool = detection.addAnalyticalGeometry(probe);
-  ///   detection.addCollisionPair(organ, tool, {Method::Proximity, 0.5});
-  ///   detection.setTransform(tool, rotation, tip);
-  ///   detection.detectCollision();
-  ///   for (const ShapeContact& c : detection.collisionData(organ, tool).shape())
-  ///     push(c.vertices, c.weights, c.normal, 0.5 - c.distance);
+  ///   detection.addCollisionPair(organ, tool, {.thickness = 0.5});
+  ///   detection.setTransform(tool, rotationBefore, tipBefore, rotation, tip);  // in each step
+  ///
+  /// Docs/HowTo/RigidTools.md has the whole loop, with the rows of a solver.
   ///
   /// Errors   InvalidShape if a measure is out of the range that <palpate/AnalyticalGeometry.h>
   ///          states.
@@ -142,7 +141,8 @@ class PALPATE_EXPORT OctreeBasedCD {
 
   /// Sets the positions, one per vertex. One array sets `now`; two arrays set both ends of the
   /// step. Only the second form and advance() set `before`. In the step in which a geometry is
-  /// added, or its topology is set, `before` follows `now` unless you pass it.
+  /// added, or its topology is set, `before` follows `now` unless you pass it. Call advance() once
+  /// after you have added all geometries, so that the first step has motion.
   ///
   /// Errors   WrongPositionCount, also for a shape; NonFinitePosition, also for a coordinate beyond
   ///          2^1000 if setTransform() has placed the geometry.

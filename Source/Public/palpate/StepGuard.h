@@ -119,7 +119,9 @@ class PALPATE_EXPORT StepGuard {
   /// The same for all vertices of a geometry.
   void addRigidGroup(GeometryId);
   /// These vertices of a geometry never move back, and all its other vertices may. Use it for a
-  /// tool that nothing holds. A group with a fixed vertex never moves back.
+  /// tool that nothing holds. A group with a fixed vertex never moves back. If hold() throws
+  /// ImpactRemains, set the `now` of these vertices to `before` and call it again. Vertices that a
+  /// hand drives need not be fixed: hold() may then move them back, and the hand has to wait.
   ///
   /// Errors   IndexOutOfRange.
   void setFixedVertices(GeometryId, std::span<const std::uint32_t> vertices);

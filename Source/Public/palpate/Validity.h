@@ -39,30 +39,42 @@ enum class MethodReason {
 ///          (2) if trusted, and `method` is Intersection: if the meshes touched within the step,
 ///          the answer is not empty. Normals are not certified, and the meshes may intersect. This
 ///          also holds where Auto answers by Intersection: at rest, without a thickness.
-///          (3) if not trusted, the library does not know. Pairs with lines, points or shapes, and
-///          pairs that collision filters separate, are never trusted: the proofs are for two
-///          triangle or tetrahedral meshes.
+///          (3) if not trusted, the answer may be right or wrong. For two meshes, Continuous and
+///          Auto miss no impact of straight motion even so. Only sides are then not certified, and
+///          impacts on the arcs of bodies that turn. Pairs with lines, points or shapes, and pairs
+///          that collision filters separate, are never trusted: the proofs are for two triangle or
+///          tetrahedral meshes, and for such a mesh with itself.
+///          (4) the laws are about one step. Features may have passed each other in an earlier
+///          step, because its answer missed it or because the solver ignored an impact. The next
+///          step may then be trusted, with startedApart, and its normals push further through.
+///          Remember steps that were not trusted, or end steps with StepGuard.
+///          (5) the laws are about surfaces. A closed body wholly inside another intersects no
+///          surface: its answers may be trusted, and its normals push it deeper.
+///          SpatialQueries::findInsideVertices() finds such a body.
 /// Cost     a small part of the frames' time, and more in frames that run the initial intersection
 ///          check (Docs/Algorithms/Validity.md, "Cost").
 /// Source   Docs/Algorithms/Validity.md has the conditions and their proofs.
 struct Validity {
   /// Whether the conditions of `method` held in this step. The laws say what follows from it.
   bool trusted = false;
-  /// Whether the geometries are known not to intersect at the step's start, from an initial
-  /// intersection check, or from earlier frames and bounds on the motion since. If false, they
-  /// intersect, or the library does not know. Two meshes by Auto: they intersect, unless `method`
-  /// is Intersection. Always false for pairs with lines, points or shapes. No check runs for
-  /// Method::Intersection, which needs none, and in steps in which the `displacement` of
-  /// Method::Proximity exceeds its limit.
+  /// Whether the surfaces are known not to intersect at the step's start, from an initial
+  /// intersection check, or from earlier frames and bounds on the motion since. True also if one
+  /// body is wholly inside the other. If false, the surfaces intersect, or the library does not
+  /// know. Two meshes by Auto: they intersect, unless `method` is Intersection. Always false for
+  /// pairs with lines, points or shapes. No check runs for Method::Intersection, which needs none,
+  /// and in steps in which the `displacement` of Method::Proximity exceeds its limit.
   bool startedApart = false;
   /// Whether some normal may be on the wrong side, if `method` is Proximity, Continuous or Auto: it
   /// is then the opposite of `trusted`. Intersection knows no sides, and the value is always false
-  /// there. Its normals are never certified: those of vertices point to the front of the triangle,
-  /// and those of edges are on the wrong side where the edges have crossed.
+  /// there, which is no all-clear. Auto, too, answers by Intersection, at rest without a thickness.
+  /// The normals of Intersection are never certified: those of vertices point to the front of the
+  /// triangle, and those of edges are on the wrong side where the edges have crossed.
   bool sideMayBeWrong = true;
 
   /// The main method that answered. Auto stands for Proximity and Continuous, feature by feature.
-  /// Single contacts of Auto may come from another method: see `atImpact`, and MethodReason.
+  /// Single contacts of Auto may come from another method: see `atImpact`, and MethodReason. This
+  /// field decides what `trusted` promises. PairSettings::method, the requested one, decides which
+  /// fields name the cause of an answer that is not trusted.
   Method method = Method::Auto;
   /// Why `method` answered.
   MethodReason reason = MethodReason::Requested;
@@ -92,16 +104,18 @@ struct Validity {
   double effectiveThickness = 0;
 
   /// Vertices of the first and of the second geometry because of which the answer is not trusted,
-  /// ascending. Proximity and Intersection: vertices that moved further than `displacementLimit`.
-  /// Proximity: also vertices of features that may have touched within the step although they are
-  /// apart at its end. Both lists are empty for Method::Auto with two meshes, for Continuous, and
-  /// for pairs with a shape. For a geometry with itself all are in the first list.
+  /// ascending. Proximity and Intersection: vertices that moved further than `displacementLimit`,
+  /// at most kMaxFastVertices of each geometry, those with the lowest ids. Motion is relative to
+  /// the other geometry, so vertices of a geometry at rest are listed, too. Proximity: also
+  /// vertices of features that may have touched within the step although they are apart at its end.
+  /// Both lists are empty for Method::Auto with two meshes, for Continuous, and for pairs with a
+  /// shape. For a geometry with itself all are in the first list.
   std::vector<std::uint32_t> untrustedVerticesA, untrustedVerticesB;
   /// Triangles of meshes without area that are in contacts, ascending. Their normals follow the
   /// rules of <palpate/Distance.h>. Empty for pairs with a shape.
   std::vector<std::uint32_t> degenerateTrianglesA, degenerateTrianglesB;
 
-  /// Maximum number of vertices of one mesh that are listed because they moved too far.
+  /// Maximum number of vertices of one geometry that are listed because they moved too far.
   static constexpr std::size_t kMaxFastVertices = 128;
 
   /// A value above 1 means that the motion violates the method's condition, if PairSettings::method
