@@ -15,7 +15,7 @@ find README.md CHANGELOG.md CONTRIBUTING.md Docs Data Examples -name '*.md' 2>/d
   cp "$page" "$out/source/$page"
 done
 find Docs -maxdepth 1 -name '*.csv' | xargs cp --parents -t "$out/source"
-find Examples -name '*.cpp' | xargs cp --parents -t "$out/source"  # pages link to them
+find Examples -name '*.cpp' -o -name '*.h' | xargs cp --parents -t "$out/source"  # pages link to them
 [[ ! -d Docs/Pictures ]] || cp -r --parents -t "$out/source" Docs/Pictures
 sed 's#](../#](Docs/#g' Docs/Site/index.md >"$out/source/index.md"
 rm -r "$out/source/Docs/Site"
