@@ -43,16 +43,9 @@ bool reportsOnlyTouching(const PairRecord& record) {
 /// thickness: L, of the boxes. unfolded: UnfoldedStars::triangles(), or null.
 TreePair treesOf(const PairRecord& record, bool adjacentPairs, const Triangle* unfolded,
                  double thickness) {
-  const GeometryOctree &a = record.a->tree, &b = record.b->tree;
-  TreePair trees{&a.octree(), &b.octree()};
-  if (trees.self() && !adjacentPairs) trees.adjacency = a.ordered().data();
+  TreePair trees = treesOf(*record.a, *record.b, thickness, record.plan.swept());
+  if (trees.self() && !adjacentPairs) trees.adjacency = record.a->tree.ordered().data();
   if (unfolded) trees.adjacency = unfolded;
-  const double scale = a.frame().scale;
-  const Eigen::Vector3d origin = worldOrigin(*record.b),
-                        offset = (worldOrigin(*record.a) - origin) * scale;
-  setShift(trees, {offset[0], offset[1], offset[2]}, thickness * scale);
-  trees.mapA = worldMap(*record.a, origin, thickness * scale, record.plan.swept());
-  trees.mapB = worldMap(*record.b, origin, 0.0, record.plan.swept());
   return trees;
 }
 

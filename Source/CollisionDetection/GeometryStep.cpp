@@ -3,7 +3,6 @@
 #include <palpate/Error.h>
 
 #include "CollisionDetection/GeometryChecks.h"
-#include "Core/Assert.h"
 #include "Core/Text.h"
 #include "Math/Tolerances.h"
 
@@ -28,10 +27,10 @@ void GeometryStep::startShape(const Shape& shape) { m_spare = m_spareBefore = sh
 Positions::Body GeometryStep::checkedBody(std::span<const Eigen::Vector3d> positions, bool isPlaced,
                                           const char* which, const Threads& threads,
                                           const Eigen::Vector3d* from, MotionRange* moved) {
-  const auto free = std::find_if(m_bodies.begin(), m_bodies.end(),
-                                 [](const auto& body) { return body.use_count() <= 1; });
-  PALPATE_ASSERT(free != m_bodies.end());
-  if (!*free) *free = std::make_shared<std::vector<Eigen::Vector3d>>();
+  auto free = std::find_if(m_bodies.begin(), m_bodies.end(),
+                           [](const auto& body) { return body.use_count() == 1; });
+  if (free == m_bodies.end())
+    free = m_bodies.insert(free, std::make_shared<std::vector<Eigen::Vector3d>>());
   (*free)->resize(positions.size());
   checkPositions(m_id, positions, (*free)->data(), which, threads, from, moved);
   if (isPlaced) checkPlaceable(m_id, positions, ErrorCode::NonFinitePosition);

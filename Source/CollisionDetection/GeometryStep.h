@@ -9,7 +9,6 @@
 #include "Mesh/TriangleMesh.h"
 #include "Shapes/PlacedShape.h"
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -66,9 +65,9 @@ class GeometryStep {
   bool m_isNew = true;
   bool m_bodyGiven = false, m_transformGiven = false;  ///< `before` was given in this step
   RevisionCounter m_revisions;
-  /// Positions are checked while they are copied into one of these that no end uses: three ends
-  /// and two incoming arrays.
-  std::array<std::shared_ptr<std::vector<Eigen::Vector3d>>, 5> m_bodies;
+  /// Positions are checked while they are copied into one of these that nothing else uses. Three
+  /// ends, two incoming arrays and the copies of snapshots use them.
+  std::vector<std::shared_ptr<std::vector<Eigen::Vector3d>>> m_bodies;
   std::optional<Shape> m_spare, m_spareBefore;  ///< hold new placements until nothing can throw
 };
 

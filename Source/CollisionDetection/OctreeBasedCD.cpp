@@ -13,6 +13,7 @@
 #include "Core/Text.h"
 #include "Octree/Forest.h"
 #include "Queries/QuerySource.h"
+#include "Queries/SnapshotPool.h"
 
 #include <algorithm>
 #include <atomic>
@@ -65,6 +66,7 @@ struct OctreeBasedCD::Implementation {
   std::vector<PairRecord*> selectedPairs;
   AuditRecord audit;
   std::shared_ptr<QuerySource> querySource;
+  LatestSnapshot latestSnapshot;
   /// geometries.state() for which all octrees hold; 0: for none.
   std::atomic<std::uint64_t> octreesState = 0;
   std::mutex sorting;  ///< locked while candidatePairs(), a const call, sorts candidates
@@ -269,7 +271,7 @@ class OctreeBasedCD::Implementation::QuerySource : public SpatialQueries::Source
     const auto lock = lockOctrees();
     if (m_all->octreesState != m_all->geometries.state()) m_all->update();
   }
-  std::unique_lock<std::mutex> lockOctrees() { return std::unique_lock(m_preparationMutex); }
+  std::unique_lock<std::mutex> lockOctrees() { return std::unique_lock(m_octreesMutex); }
 
   std::uint64_t state() const override {
     if (!m_all) return 0;
@@ -289,6 +291,7 @@ class OctreeBasedCD::Implementation::QuerySource : public SpatialQueries::Source
 
  private:
   Implementation* m_all;
+  std::mutex m_octreesMutex;  ///< locked while octrees are updated
 };
 
 OctreeBasedCD::Implementation::Implementation(const Settings& newSettings)
@@ -517,6 +520,17 @@ SpatialQueries OctreeBasedCD::queries() const {
   const StandardFloatingPoint standard;
   m_implementation->querySource->updateOctrees();
   return SpatialQueries(m_implementation->querySource);
+}
+
+void OctreeBasedCD::publish(double time) {
+  const Implementation::ChangeGuard all(m_implementation);
+  all->querySource->updateOctrees();
+  all->latestSnapshot.publish(*all->querySource, time);
+}
+
+std::shared_ptr<const Snapshot> OctreeBasedCD::latestSnapshot() const {
+  if (!m_implementation) throwMovedFrom();
+  return m_implementation->latestSnapshot.get();
 }
 
 const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) const {

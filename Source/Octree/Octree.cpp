@@ -6,6 +6,7 @@
 #include "Octree/Fit.h"
 #include "Octree/OctreeBuilder.h"
 
+#include <algorithm>
 #include <numeric>
 
 namespace palpate {
@@ -28,6 +29,7 @@ Octree::~Octree() = default;
 
 void Octree::reset(std::size_t size) {
   m_stage = Stage::Empty;
+  ++m_layout;
   m_order.clear();
   m_nodes.groups.clear();
   m_nodes.groupNodes.clear();
@@ -38,10 +40,35 @@ void Octree::reset(std::size_t size) {
   std::iota(m_order.begin(), m_order.end(), 0u);
 }
 
+void Octree::copy(const Octree& other) {
+  const bool isSameLayout = isBuilt() && m_layout == other.m_layout;
+  m_stage = Stage::Empty;
+  const auto copyBuffer = [](auto& to, const auto& from) {
+    resizeSparingly(to, from.size());
+    std::copy(from.begin(), from.end(), to.begin());
+  };
+  if (!isSameLayout) {
+    m_order.clear();
+    m_order.reserve(other.size() + BoxArrays::kPadding);  // read in whole vectors
+    m_order.assign(other.m_order.begin(), other.m_order.end());
+    copyBuffer(m_nodes.parents, other.m_nodes.parents);
+    m_nodes.rootCube = other.m_nodes.rootCube;
+    m_nodes.pool.start(other.m_nodes.pool.used());
+  }
+  for (int k = 0; k < 3; ++k) {
+    copyBuffer(m_boxes.lower[k], other.m_boxes.lower[k]);
+    copyBuffer(m_boxes.upper[k], other.m_boxes.upper[k]);
+  }
+  std::copy_n(other.blocks(), other.m_nodes.pool.used(), m_nodes.pool.data());
+  m_layout = other.m_layout;
+  m_stage = other.m_stage;
+}
+
 void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& settings,
                    std::span<std::uint64_t> keys, const Threads& threads) {
   PALPATE_ASSERT(size() > 0 && keys.size() == size());
   m_stage = Stage::Empty;
+  ++m_layout;
   try {
     if (!m_builder) m_builder = std::make_unique<OctreeBuilder>();
     m_builder->build(m_boxes, bounds, bulk, settings, keys, m_order, m_nodes, threads);

@@ -131,6 +131,9 @@ class Octree {
 
   /// Forgets the tree; `order()` is then 0, 1, ..., size - 1.
   void reset(std::size_t size);
+  /// Becomes a copy of a built octree, for searches only. All copies in one object must be of one
+  /// octree. If that was only fitted since the last copy, its layout is not copied again.
+  void copy(const Octree& other);
 
   std::size_t size() const { return m_order.size(); }
   std::span<const std::uint32_t> order() const {
@@ -150,6 +153,7 @@ class Octree {
   void measureLooseness();  ///< of the fitted boxes
 
   bool isBuilt() const { return m_stage == Stage::Built; }
+  std::uint64_t layout() const { return m_layout; }  ///< changes with each reset() and build()
   /// Throws unless isBuilt(). Every search starts with this.
   void requireBuilt() const {
     if (!isBuilt()) throwNotBuilt();
@@ -192,6 +196,7 @@ class Octree {
   [[noreturn]] static void throwNotBuilt();
 
   Stage m_stage = Stage::Empty;
+  std::uint64_t m_layout = 0;
   Buffer<std::uint32_t> m_order;
   BoxArrays m_boxes;
   OctreeNodes m_nodes;

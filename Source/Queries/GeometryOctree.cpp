@@ -88,6 +88,24 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
   m_treeVersion.commit(now);
 }
 
+void GeometryOctree::copy(const GeometryOctree& other) {
+  if (isValid() && m_updates == other.m_updates) return;
+  const bool isSameLayout = isValid() && m_octree.layout() == other.m_octree.layout();
+  m_treeVersion.invalidate();
+  m_isBuilt = false;
+  m_frame = other.m_frame;
+  m_spread = other.m_spread;
+  resizeSparingly(m_floats, other.m_floats.size());
+  std::copy(other.m_floats.begin(), other.m_floats.end(), m_floats.begin());
+  m_octree.copy(other.m_octree);
+  if (!isSameLayout) {
+    startOrdered(other.m_ordered.size());
+    std::copy(other.m_ordered.begin(), other.m_ordered.end(), m_ordered.begin());
+  }
+  m_updates = other.m_updates;
+  m_treeVersion.commit(other.m_treeVersion.sources());
+}
+
 /// Computes the boxes of the triangles in m_ordered, and those of the groups. reordered: first
 /// brings m_ordered into the octree's order.
 void GeometryOctree::computeBoxes(const TriangleMesh& mesh, std::span<const std::uint32_t> groups,

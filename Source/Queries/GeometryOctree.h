@@ -36,6 +36,10 @@ class GeometryOctree {
   /// vertices and edges. Returns UnfoldedStars::triangles().
   const Triangle* findUnfoldedStars(const TriangleMesh&, const Threads&);
 
+  /// Becomes a copy of an octree that isValid(), for queries only. All copies in one object must be
+  /// of one octree; only what changed since the last copy is copied.
+  void copy(const GeometryOctree& other);
+
   /// Whether the boxes enclose the positions now, in the body's frame. They may enclose more.
   bool encloses(const TriangleMesh&, Revision topology) const;
   std::uint64_t updates() const { return m_updates; }       ///< counts update()

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <utility>
 #include <vector>
 
 namespace palpate {
@@ -33,25 +34,39 @@ class SpatialQueries::Source {
     Buffer<std::uint32_t> nearShape;
     ShapeContactBuffers shapeContacts;
   };
+  /// What all sources of one owner share: the scratch that no call uses.
+  class Pool {
+   public:
+    Pool();
+    std::uint64_t id() const { return m_id; }  ///< unique in the process
+    std::unique_ptr<Scratch> take();
+    void giveBack(std::unique_ptr<Scratch>);
+
+   private:
+    const std::uint64_t m_id;
+    std::mutex m_mutex;
+    std::vector<std::unique_ptr<Scratch>> m_free;
+  };
   /// Scratch lent to one call.
   class Loan {
    public:
-    explicit Loan(Source&);
-    ~Loan();
+    explicit Loan(Source& source) : m_pool(*source.m_pool), m_scratch(m_pool.take()) {}
+    ~Loan() { m_pool.giveBack(std::move(m_scratch)); }
     Loan(const Loan&) = delete;
     Loan& operator=(const Loan&) = delete;
     Scratch* operator->() const { return m_scratch.get(); }
 
    private:
-    Source& m_source;
+    Pool& m_pool;
     std::unique_ptr<Scratch> m_scratch;
   };
 
-  Source();
+  explicit Source(std::shared_ptr<Pool> pool = std::make_shared<Pool>())
+      : m_pool(std::move(pool)) {}
   virtual ~Source() = default;
 
   /// A number for the present state of all geometries. 0: the octrees are not up to date, or the
-  /// owner is gone.
+  /// owner or the snapshot is gone.
   virtual std::uint64_t state() const = 0;
   /// Throws UnknownGeometry.
   virtual SearchableGeometry& at(GeometryId) const = 0;
@@ -63,13 +78,13 @@ class SpatialQueries::Source {
   virtual const OctreeSettings& octreeSettings() const = 0;
   virtual const Threads& threads() const = 0;
 
-  std::uint64_t id() const { return m_id; }  ///< unique in the process
+  std::uint64_t id() const { return m_pool->id(); }  ///< of the owner; unique in the process
 
   /// The threads for one call: the pool, or a single thread while another call uses the pool.
   class Workers {
    public:
     explicit Workers(Source& source)
-        : m_lock(source.m_poolMutex, std::try_to_lock),
+        : m_lock(source.m_threadsMutex, std::try_to_lock),
           m_threads(m_lock ? source.threads() : source.m_singleThread) {}
     operator const Threads&() const { return m_threads; }
 
@@ -78,24 +93,25 @@ class SpatialQueries::Source {
     const Threads& m_threads;
   };
 
-  // Update the structures that are made when a query first needs them. Run by one thread at a time.
+  // Update the structures that are made when a query first needs them. Run by one thread at a time
+  // for each geometry.
   void prepareInside(SearchableGeometry& body, const InsideSettings&);
   void prepareTetrahedra(SearchableGeometry& solid);
 
- protected:
-  /// Locked while octrees, and the structures that queries add to them, are updated.
-  std::mutex m_preparationMutex;
-
  private:
-  const std::uint64_t m_id;
+  const std::shared_ptr<Pool> m_pool;
   Threads m_singleThread{1};
-  std::mutex m_poolMutex;
-  std::mutex m_scratchMutex;
-  std::vector<std::unique_ptr<Scratch>> m_freeScratch;
+  std::mutex m_threadsMutex;  ///< locked while a call uses threads()
 };
 
 /// Throws InvalidSettings if both geometries are the same, and UnsupportedMethod if `vertices` is a
 /// shape.
 void checkVertices(const SearchableGeometry& vertices, GeometryId body);
+/// Throws InvalidSettings for a length that is negative, NaN or, with `finite`, infinite.
+void checkLength(double length, const char* name, bool finite);
+/// Throws UnsupportedMethod for an analytical shape.
+void checkHasElements(const SearchableGeometry&);
+/// Throws InvalidTransform. what: the start of the message.
+void checkPose(const RigidTransform&, const char* what);
 
 }  // namespace palpate

@@ -39,6 +39,17 @@ BoxMap worldMap(const SearchableGeometry& geometry, const Vector3d& origin, doub
   return map;
 }
 
+TreePair treesOf(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
+                 bool wholeStep) {
+  TreePair trees{&a.tree.octree(), &b.tree.octree()};
+  const double scale = a.tree.frame().scale;
+  const Vector3d origin = worldOrigin(b), offset = (worldOrigin(a) - origin) * scale;
+  setShift(trees, {offset[0], offset[1], offset[2]}, thickness * scale);
+  trees.mapA = worldMap(a, origin, thickness * scale, wholeStep);
+  trees.mapB = worldMap(b, origin, 0.0, wholeStep);
+  return trees;
+}
+
 std::string nameOf(GeometryId id) {
   return "geometry " + std::to_string(static_cast<std::uint32_t>(id));
 }

@@ -6,6 +6,7 @@
 #include "Mesh/TetrahedralTopology.h"
 #include "Mesh/TriangleMesh.h"
 #include "Octree/BoxMap.h"
+#include "Octree/Traversal.h"
 #include "Queries/GeometryOctree.h"
 #include "Queries/TetrahedronTree.h"
 #include "Queries/WindingNumber.h"
@@ -15,6 +16,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -49,6 +51,9 @@ struct SearchableGeometry {
   GeometryOctree tree;
   std::unique_ptr<Solid> solid;  ///< of a tetrahedral mesh
   WindingNumbers windingNumbers;
+  /// Locked while a query updates what queries prepare: MeshTopology::closed, the tree of `solid`
+  /// and windingNumbers.
+  std::mutex preparation;
 
   /// Whether setTransform() has placed the geometry. Its octree is then in the body's frame.
   bool isPlaced() const { return mesh.now.isPlaced(); }
@@ -62,6 +67,10 @@ Eigen::Vector3d worldOrigin(const SearchableGeometry&);
 /// the whole step. For a geometry that is not placed, the map changes nothing.
 BoxMap worldMap(const SearchableGeometry&, const Eigen::Vector3d& origin, double thickness,
                 bool wholeStep);
+
+/// The octrees of two geometries, whose frames have one scale, for a traversal. thickness: L.
+TreePair treesOf(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
+                 bool wholeStep);
 
 std::string nameOf(GeometryId);    ///< "geometry 3"
 std::string nameOf(GeometryType);  ///< "a line mesh"

@@ -31,31 +31,31 @@ std::uint64_t nextSourceId() {
 
 }  // namespace
 
-SpatialQueries::Source::Source() : m_id(nextSourceId()) {}
+SpatialQueries::Source::Pool::Pool() : m_id(nextSourceId()) {}
 
-SpatialQueries::Source::Loan::Loan(Source& source) : m_source(source) {
+std::unique_ptr<SpatialQueries::Source::Scratch> SpatialQueries::Source::Pool::take() {
   {
-    const std::lock_guard lock(source.m_scratchMutex);
-    if (!source.m_freeScratch.empty()) {
-      m_scratch = std::move(source.m_freeScratch.back());
-      source.m_freeScratch.pop_back();
-      return;
+    const std::lock_guard lock(m_mutex);
+    if (!m_free.empty()) {
+      auto scratch = std::move(m_free.back());
+      m_free.pop_back();
+      return scratch;
     }
   }
-  m_scratch = std::make_unique<Scratch>();
+  return std::make_unique<Scratch>();
 }
 
-SpatialQueries::Source::Loan::~Loan() {
-  const std::lock_guard lock(m_source.m_scratchMutex);
+void SpatialQueries::Source::Pool::giveBack(std::unique_ptr<Scratch> scratch) {
+  const std::lock_guard lock(m_mutex);
   try {
-    m_source.m_freeScratch.push_back(std::move(m_scratch));
+    m_free.push_back(std::move(scratch));
   } catch (...) {  // no memory to keep it: the next call makes another
   }
 }
 
 void SpatialQueries::Source::prepareInside(SearchableGeometry& body,
                                            const InsideSettings& settings) {
-  const std::lock_guard lock(m_preparationMutex);
+  const std::lock_guard lock(body.preparation);
   checkInside(body, settings);
   if (settings.rule == InsideRule::WindingNumber && body.tree.octree().size() > 0)
     body.windingNumbers.update(body, Workers(*this));
@@ -64,7 +64,7 @@ void SpatialQueries::Source::prepareInside(SearchableGeometry& body,
 }
 
 void SpatialQueries::Source::prepareTetrahedra(SearchableGeometry& solid) {
-  const std::lock_guard lock(m_preparationMutex);
+  const std::lock_guard lock(solid.preparation);
   updateTetrahedra(solid, octreeSettings(), Workers(*this));
 }
 
@@ -87,16 +87,9 @@ SpatialQueries::Source& SpatialQueries::valid() const {
     throw Error(
         ErrorCode::InvalidCall,
         "this SpatialQueries object is outdated: positions, transforms, topology or geometries "
-        "changed, advance() was called, or the OctreeBasedCD was destroyed; call "
+        "changed, advance() was called, or the OctreeBasedCD or Snapshot was destroyed; call "
         "queries() again");
   return *m_source;
-}
-
-namespace {
-
-void checkPoint(const Eigen::Vector3d& point) {
-  if (!point.allFinite())
-    throw Error(ErrorCode::NonFinitePosition, "the query's point is " + textOf(point));
 }
 
 void checkLength(double length, const char* name, bool finite) {
@@ -106,11 +99,22 @@ void checkLength(double length, const char* name, bool finite) {
                                                 (finite ? " and must be finite" : ""));
 }
 
-/// Throws UnsupportedMethod for an analytical shape.
 void checkHasElements(const SearchableGeometry& geometry) {
   if (geometry.shape)
     throw Error(ErrorCode::UnsupportedMethod,
                 nameOf(geometry.id) + " is a shape: it has no elements", geometry.id);
+}
+
+void checkPose(const RigidTransform& pose, const char* what) {
+  if (const std::string fault = faultOf(pose); !fault.empty())
+    throw Error(ErrorCode::InvalidTransform, std::string(what) + ": " + fault);
+}
+
+namespace {
+
+void checkPoint(const Eigen::Vector3d& point) {
+  if (!point.allFinite())
+    throw Error(ErrorCode::NonFinitePosition, "the query's point is " + textOf(point));
 }
 
 std::optional<SurfacePoint> closestPointOf(const SearchableGeometry& geometry,
@@ -417,8 +421,7 @@ RigidTransform checkedPose(const AnalyticalGeometry& shape, const Eigen::Matrix3
   if (const std::string fault = faultOf(shape, element); !fault.empty())
     throw Error(ErrorCode::InvalidShape, "the query's shape: " + fault, {}, element);
   const RigidTransform pose{rotation, translation};
-  if (const std::string fault = faultOf(pose); !fault.empty())
-    throw Error(ErrorCode::InvalidTransform, "the query's shape: " + fault);
+  checkPose(pose, "the query's shape");
   return pose;
 }
 

@@ -9,6 +9,7 @@
 #include <palpate/FrameStatistics.h>
 #include <palpate/LooseOctree.h>
 #include <palpate/Settings.h>
+#include <palpate/Snapshot.h>
 #include <palpate/SpatialQueries.h>
 #include <palpate/TetrahedralMesh.h>
 #include <palpate/Types.h>
@@ -283,6 +284,24 @@ class PALPATE_EXPORT OctreeBasedCD {
   ///
   /// Cost     none but the update, which the next detection then does not repeat.
   SpatialQueries queries() const;
+
+  /// Makes the state now the latest snapshot, which other threads may query while this object
+  /// changes. Updates octrees if needed. Objects from queries() stay valid. time: yours, of any
+  /// unit; it comes back as Snapshot::time().
+  ///
+  /// Errors   those of queries(). If it throws, the last snapshot stays the latest.
+  /// Cost     copies the octrees and, after a change, the topology of geometries that changed since
+  ///          the last publication. Geometries that did not move are shared with it. Allocates
+  ///          nothing in a steady state: the memory of a snapshot returns when its last reader lets
+  ///          go.
+  void publish(double time = 0.0);
+  /// The last state that was published; null before the first. The snapshot may outlive this
+  /// object. Releasing it waits for nobody.
+  ///
+  /// Threads  safe from any thread at any time between construction and destruction, also while
+  ///          another function runs; not during a move. It locks a std::mutex to copy one
+  ///          shared_ptr. publish() locks the same mutex to swap one.
+  std::shared_ptr<const Snapshot> latestSnapshot() const;
 
   /// The answer of the last detectCollision(). (a, b) is in the order in which the pair was added.
   ///

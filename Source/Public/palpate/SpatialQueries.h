@@ -70,6 +70,26 @@ struct Pick {
   std::array<std::uint32_t, 2> edge;  ///< lower vertex first
 };
 
+/// A small rigid mesh, such as a tool, that SpatialQueries::contacts() places. It keeps the mesh's
+/// octree and the memory of the query.
+///
+/// Threads  one at a time. Threads that share a tool need a RigidMesh each.
+class PALPATE_EXPORT RigidMesh {
+ public:
+  /// positions: L, in the mesh's own frame.
+  ///
+  /// Errors   those of OctreeBasedCD::addTriangleMesh(). They name the mesh as geometry 0.
+  RigidMesh(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles);
+  RigidMesh(RigidMesh&&) noexcept;
+  RigidMesh& operator=(RigidMesh&&) noexcept;
+  ~RigidMesh();
+
+ private:
+  friend class SpatialQueries;
+  struct Implementation;
+  std::unique_ptr<Implementation> m_implementation;
+};
+
 /// Spatial queries over the geometries of one OctreeBasedCD, at their positions now. Get the object
 /// from OctreeBasedCD::queries(). Collision filters do not apply. Queries search disabled elements,
 /// too.
@@ -171,6 +191,20 @@ class PALPATE_EXPORT SpatialQueries {
   void contacts(GeometryId, const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
                 const Eigen::Vector3d& translation, double thickness,
                 std::vector<ShapeContact>& out) const;
+  /// Finds the contacts that a pair (a, b) of the geometry and the mesh would have with
+  /// Method::Proximity and Contacts::Distinct, with the mesh at this pose: vertices of the geometry
+  /// with triangles of the mesh are in vertexTriangle(), elements of the geometry with vertices of
+  /// the mesh in triangleVertex(), and the normals of edgeEdge() point from the mesh to the
+  /// geometry. Disabled elements have no contacts. Of the collision filter only Sidedness applies.
+  /// validity() has the method, the thickness and the number of contacts only.
+  ///
+  /// Order    that of CollisionData.
+  /// Errors   InvalidTransform; UnsupportedMethod if the geometry is a shape; InvalidSettings if the
+  ///          thickness is negative or not finite; InvalidCall if the mesh was moved from.
+  /// Cost     follows the elements near the mesh. The first call for a geometry of another size may
+  ///          build the mesh's octree again. A repeated call allocates nothing.
+  void contacts(GeometryId, RigidMesh& mesh, const Eigen::Matrix3d& rotation,
+                const Eigen::Vector3d& translation, double thickness, CollisionData& out) const;
 
   /// Finds the vertices of one geometry that are inside another, the body. It finds them at any
   /// depth, also in concave bodies, and where no triangles intersect.

@@ -187,6 +187,47 @@ TEST(SteadyFrame, AllocatesNothingWithShapes) {
   EXPECT_GT(contacts, 1000u);
 }
 
+/// Snapshots that a reader holds for two steps, and queries of them.
+TEST(SteadyFrame, AllocatesNothingWithSnapshots) {
+  using namespace testing;
+  const IntegersApart integers;
+  const Mesh ball = sphere(12, 16, {0, 0, 0}, 1), toolMesh = sphere(5, 6, {0, 0, 0}, 0.2);
+  OctreeBasedCD collisions(Settings{.threads = 1});
+  const GeometryId organ = collisions.addTriangleMesh(ball.positions, ball.triangles),
+                   still = collisions.addTriangleMesh(ball.positions, ball.triangles),
+                   rigid = collisions.addTriangleMesh(ball.positions, ball.triangles),
+                   shape = collisions.addAnalyticalGeometry(
+                       ConvexHull{{{-0.2, 0, -0.1}, {0.3, 0, -0.1}, {0, 0.3, 0}, {0, 0.1, 0.3}}});
+  RigidMesh tool(toolMesh.positions, toolMesh.triangles);
+  const Eigen::Matrix3d unit = Eigen::Matrix3d::Identity();
+  std::vector<Eigen::Vector3d> positions = ball.positions;
+  std::vector<std::shared_ptr<const Snapshot>> held(3);
+  std::vector<ShapeContact> shapeContacts;
+  CollisionData meshContacts;
+  std::size_t before = 0, contacts = 0;
+  for (int frame = 0; frame < 60; ++frame) {
+    if (frame == 30) before = allocations;
+    for (std::size_t v = 0; v < positions.size(); ++v)
+      positions[v] = (1 + 0.01 * (frame % 10)) * ball.positions[v];
+    collisions.setPositions(organ, positions);
+    collisions.setTransform(rigid, unit, {0.01 * (frame % 10), 0, 3});
+    collisions.setTransform(shape, unit, {0.01 * (frame % 10), 0, 2});
+    collisions.publish(frame);
+    collisions.advance();
+    held[frame % 3] = collisions.latestSnapshot();
+    const SpatialQueries& queries = held[frame % 3]->queries();
+    contacts += queries.contains(organ, {0, 0, 0});
+    contacts += queries.contains(organ, {0, 0, 0}, {.rule = InsideRule::WindingNumber});
+    contacts += queries.firstHit({{0, 0, -9}, {0.1, 0, 1}}).has_value();
+    queries.contacts(organ, Sphere{{0, 0, 0}, 0.2}, unit, {0, 0, 1}, 0.1, shapeContacts);
+    queries.contacts(organ, tool, unit, {0, 0, 1}, 0.1, meshContacts);
+    contacts += shapeContacts.size() + meshContacts.validity().atEnd;
+    EXPECT_TRUE(queries.closestPoint(still, {2, 0, 0}));
+  }
+  EXPECT_EQ(allocations - before, 0u);
+  EXPECT_GT(contacts, 1000u);
+}
+
 /// Frames of every pair of shapes, and of cylinders with triangles and lines, by
 /// Method::Continuous.
 TEST(SteadyFrame, AllocatesNothingWithStepsOfShapes) {

@@ -1,0 +1,276 @@
+#include "Queries/SnapshotPool.h"
+
+#include <palpate/Error.h>
+
+#include <algorithm>
+#include <atomic>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+DerivedFrom<2>::Sources topologyOf(const SearchableGeometry& geometry) {
+  return {geometry.revisions.topology, geometry.revisions.enabled};
+}
+
+DerivedFrom<7>::Sources stateOf(const SearchableGeometry& geometry) {
+  const Positions &now = geometry.mesh.now, &before = geometry.mesh.before;
+  return {geometry.revisions.topology, geometry.revisions.enabled, geometry.revisions.filter,
+          now.bodyRevision(),          now.transformRevision(),    before.bodyRevision(),
+          before.transformRevision()};
+}
+
+}  // namespace
+
+bool GeometryCopy::isCurrent(const SearchableGeometry& original) const {
+  return m_version.isCurrent(stateOf(original)) &&
+         geometry.tree.updates() == original.tree.updates();
+}
+
+int GeometryCopy::kept(const SearchableGeometry& original) const {
+  return (geometry.tree.updates() == original.tree.updates() ? 2 : 0) +
+         (m_topologyVersion.isCurrent(topologyOf(original)) ? 1 : 0);
+}
+
+void GeometryCopy::update(const SearchableGeometry& original) {
+  m_version.invalidate();
+  TriangleMesh& mesh = geometry.mesh;
+  if (const auto topology = topologyOf(original); !m_topologyVersion.isCurrent(topology)) {
+    const bool isSameMesh =
+        m_topologyVersion.isValid() && geometry.revisions.topology == original.revisions.topology;
+    m_topologyVersion.invalidate();
+    mesh.topology = original.mesh.topology;
+    mesh.radii = original.mesh.radii;
+    mesh.largestRadius = original.mesh.largestRadius;
+    if (original.solid && !isSameMesh) {
+      geometry.solid = std::make_unique<Solid>();
+      geometry.solid->topology = original.solid->topology;
+    }
+    geometry.revisions = original.revisions;
+    m_topologyVersion.commit(topology);
+  }
+  mesh.now = original.mesh.now;
+  mesh.before = original.mesh.before;
+  mesh.outerSideOnly = original.mesh.outerSideOnly;
+  geometry.shape = original.shape;
+  geometry.tree.copy(original.tree);
+  m_version.commit(stateOf(original));
+}
+
+/// What a snapshot shows: the source of its queries.
+class Snapshot::Contents : public SpatialQueries::Source {
+ public:
+  explicit Contents(std::shared_ptr<Pool> scratch) : Source(std::move(scratch)) {}
+
+  std::uint64_t state() const override { return m_state.load(std::memory_order_relaxed); }
+  SearchableGeometry& at(GeometryId id) const override {
+    if (GeometryCopy* const copy = find(id)) return copy->geometry;
+    throw Error(ErrorCode::UnknownGeometry, nameOf(id) + " is not in this snapshot", id);
+  }
+  std::size_t geometryCount() const override { return m_geometries.size(); }
+  SearchableGeometry& geometry(std::size_t index) const override {
+    return m_geometries[index]->geometry;
+  }
+  std::uint64_t step() const override { return m_step; }
+  Engine engine() const override { return m_engine; }
+  const OctreeSettings& octreeSettings() const override { return m_octreeSettings; }
+  const Threads& threads() const override { return m_thread; }
+
+  GeometryCopy* find(GeometryId id) const {  ///< null if there is none
+    const auto found =
+        std::lower_bound(m_geometries.begin(), m_geometries.end(), id,
+                         [](const GeometryCopy* c, GeometryId i) { return c->geometry.id < i; });
+    return found == m_geometries.end() || (*found)->geometry.id != id ? nullptr : *found;
+  }
+  const SpatialQueries& queries() const { return *m_queries; }
+  double time() const { return m_time; }
+
+ protected:
+  std::vector<GeometryCopy*> m_geometries;  ///< by ascending ids
+  std::optional<SpatialQueries> m_queries;  ///< holds the pool; empty while the slot is free
+  std::atomic<std::uint64_t> m_state = 0;   ///< the snapshot's number; 0: the slot is free
+  std::uint64_t m_step = 0;
+  Engine m_engine = Engine::Octree;
+  OctreeSettings m_octreeSettings;
+  double m_time = 0;
+
+ private:
+  const Threads m_thread{1};
+};
+
+/// One snapshot, with the memory of its shared_ptr's control block.
+class SnapshotPool::Slot : public Snapshot::Contents {
+ public:
+  explicit Slot(std::shared_ptr<Pool> scratch) : Contents(std::move(scratch)) {}
+
+  /// Acquires what readers did before release().
+  bool isFree() const { return m_state.load(std::memory_order_acquire) == 0; }
+  std::vector<GeometryCopy*>& geometries() { return m_geometries; }
+  /// `self` holds the pool.
+  void start(std::shared_ptr<Source> self, const Source& frame, std::uint64_t number, double time) {
+    m_step = frame.step();
+    m_engine = frame.engine();
+    m_octreeSettings = frame.octreeSettings();
+    m_time = time;
+    m_state.store(number, std::memory_order_relaxed);
+    m_queries.emplace(std::move(self));
+  }
+  void release() {
+    m_queries.reset();
+    m_state.store(0, std::memory_order_release);
+  }
+
+  const Snapshot snapshot{*this};
+  alignas(std::max_align_t) std::byte controlBlock[128];
+};
+
+/// Gives a shared_ptr the memory in a slot for its control block. The slot is free when this memory
+/// is given back, after the last reader.
+template <class T>
+class SnapshotPool::SlotAllocator {
+ public:
+  using value_type = T;
+
+  SlotAllocator(std::shared_ptr<SnapshotPool> pool, Slot& slot)
+      : m_pool(std::move(pool)), m_slot(&slot) {}
+  template <class U>
+  SlotAllocator(const SlotAllocator<U>& other) : m_pool(other.m_pool), m_slot(other.m_slot) {}
+
+  T* allocate(std::size_t) {
+    static_assert(sizeof(T) <= sizeof(Slot::controlBlock));
+    return reinterpret_cast<T*>(m_slot->controlBlock);
+  }
+  void deallocate(T*, std::size_t) { m_slot->release(); }
+  template <class U>
+  bool operator==(const SlotAllocator<U>& other) const {
+    return m_slot == other.m_slot;
+  }
+
+ private:
+  template <class U>
+  friend class SlotAllocator;
+
+  std::shared_ptr<SnapshotPool> m_pool;  ///< outlives deallocate()
+  Slot* m_slot;
+};
+
+SnapshotPool::SnapshotPool() : m_scratch(std::make_shared<SpatialQueries::Source::Pool>()) {}
+SnapshotPool::~SnapshotPool() = default;
+
+/// Takes back the copies of free slots, and forgets free copies of removed geometries.
+void SnapshotPool::reclaim(const SpatialQueries::Source& frame) {
+  for (const auto& slot : m_slots) {
+    if (!slot->isFree()) continue;
+    for (GeometryCopy* copy : slot->geometries()) --copy->users;
+    slot->geometries().clear();
+  }
+  std::size_t i = 0;
+  std::erase_if(m_copies, [&](const auto& copy) {
+    const GeometryId id = copy->geometry.id;
+    while (i < frame.geometryCount() && frame.geometry(i).id < id) ++i;
+    return copy->users == 0 && (i == frame.geometryCount() || frame.geometry(i).id != id);
+  });
+}
+
+SnapshotPool::Slot& SnapshotPool::freeSlot() {
+  for (const auto& slot : m_slots)
+    if (slot->isFree()) return *slot;
+  m_slots.push_back(std::make_unique<Slot>(m_scratch));
+  return *m_slots.back();
+}
+
+/// A copy that is current or, if there is none, a free one that has most of what it needs.
+GeometryCopy& SnapshotPool::copyOf(const SearchableGeometry& original) {
+  const auto begin =
+      std::lower_bound(m_copies.begin(), m_copies.end(), original.id,
+                       [](const auto& c, GeometryId id) { return c->geometry.id < id; });
+  GeometryCopy* best = nullptr;
+  auto end = begin;
+  for (; end != m_copies.end() && (*end)->geometry.id == original.id; ++end) {
+    GeometryCopy& copy = **end;
+    if (copy.isCurrent(original)) return copy;
+    if (copy.users == 0 && (!best || copy.kept(original) > best->kept(original))) best = &copy;
+  }
+  if (!best) best = m_copies.insert(end, std::make_unique<GeometryCopy>(original.id))->get();
+  best->update(original);
+  return *best;
+}
+
+std::shared_ptr<const Snapshot> SnapshotPool::take(SpatialQueries::Source& frame, double time) {
+  reclaim(frame);
+  Slot& slot = freeSlot();
+  slot.geometries().reserve(frame.geometryCount());
+  for (std::size_t i = 0; i < frame.geometryCount(); ++i) {
+    GeometryCopy& copy = copyOf(frame.geometry(i));
+    slot.geometries().push_back(&copy);
+    ++copy.users;
+  }
+  // Nothing below throws.
+  slot.start({shared_from_this(), &slot}, frame, ++m_last, time);
+  return {&slot.snapshot, [](const Snapshot*) {},
+          SlotAllocator<Snapshot>(shared_from_this(), slot)};
+}
+
+void LatestSnapshot::publish(SpatialQueries::Source& frame, double time) {
+  std::shared_ptr<const Snapshot> next = m_pool->take(frame, time);
+  const std::lock_guard lock(m_mutex);
+  m_latest.swap(next);
+}
+
+std::shared_ptr<const Snapshot> LatestSnapshot::get() const {
+  const std::lock_guard lock(m_mutex);
+  return m_latest;
+}
+
+const SpatialQueries& Snapshot::queries() const { return m_contents.queries(); }
+
+std::uint64_t Snapshot::number() const { return m_contents.state(); }
+
+double Snapshot::time() const { return m_contents.time(); }
+
+bool Snapshot::contains(GeometryId id) const { return m_contents.find(id) != nullptr; }
+
+namespace {
+
+std::span<const Eigen::Vector3d> positionsOf(const SearchableGeometry& geometry,
+                                             const Positions& end) {
+  if (geometry.shape) return {};
+  return end.body();
+}
+
+}  // namespace
+
+std::span<const Eigen::Vector3d> Snapshot::positions(GeometryId id) const {
+  const SearchableGeometry& geometry = m_contents.at(id);
+  return positionsOf(geometry, geometry.mesh.now);
+}
+
+std::span<const Eigen::Vector3d> Snapshot::positionsBefore(GeometryId id) const {
+  const SearchableGeometry& geometry = m_contents.at(id);
+  return positionsOf(geometry, geometry.mesh.before);
+}
+
+ShapeMotion Snapshot::motion(GeometryId id) const {
+  const TriangleMesh& mesh = m_contents.at(id).mesh;
+  const RigidTransform &before = mesh.before.transform(), &now = mesh.now.transform();
+  return {before.rotation, before.translation, now.rotation, now.translation};
+}
+
+Eigen::Vector3d Snapshot::position(GeometryId id, std::uint32_t vertex, double time) const {
+  const SearchableGeometry& geometry = m_contents.at(id);
+  const std::size_t size = positionsOf(geometry, geometry.mesh.now).size();
+  if (vertex >= size)
+    throw Error(ErrorCode::IndexOutOfRange,
+                nameOf(id) + ": vertex " + std::to_string(vertex) +
+                    " is out of range; the geometry has " + std::to_string(size) + " vertices",
+                id, vertex);
+  const Eigen::Vector3d now = geometry.mesh.now[vertex];
+  if (time == 1.0) return now;
+  const Eigen::Vector3d before = geometry.mesh.before[vertex];
+  return before + time * (now - before);
+}
+
+}  // namespace palpate

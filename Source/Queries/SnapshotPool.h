@@ -1,0 +1,82 @@
+#pragma once
+
+#include <palpate/Snapshot.h>
+
+#include "Mesh/Revision.h"
+#include "Queries/QuerySource.h"
+#include "Queries/SearchableGeometry.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+namespace palpate {
+
+/// A copy of one geometry for queries. Snapshots share it. It is updated when none of them uses it;
+/// only what changed since its last update is then copied.
+class GeometryCopy {
+ public:
+  explicit GeometryCopy(GeometryId id) : geometry(id) {}
+
+  bool isCurrent(const SearchableGeometry& original) const;
+  void update(const SearchableGeometry& original);
+  /// How much an update need not copy: 2 for the octree, 1 for the topology.
+  int kept(const SearchableGeometry& original) const;
+
+  SearchableGeometry geometry;
+  std::size_t users = 0;  ///< snapshots; only SnapshotPool::take() reads and writes it
+
+ private:
+  DerivedFrom<2> m_topologyVersion;  ///< topology and enabled elements
+  DerivedFrom<7> m_version;          ///< these, the filter, and body and transform of both ends
+};
+
+/// The memory of the snapshots of one OctreeBasedCD. The OctreeBasedCD and each snapshot hold it,
+/// so that snapshots may outlive their owner.
+///
+/// A snapshot's memory is free when its last reader lets go, which sets one atomic flag. The next
+/// take() reuses it. A steady publication therefore allocates nothing, and only the publishing
+/// thread changes copies and their counts.
+class SnapshotPool : public std::enable_shared_from_this<SnapshotPool> {
+ public:
+  SnapshotPool();
+  ~SnapshotPool();
+
+  /// A snapshot of all geometries of a source, whose octrees must be up to date. Called by one
+  /// thread at a time. If it throws, no snapshot has changed.
+  std::shared_ptr<const Snapshot> take(SpatialQueries::Source&, double time);
+
+ private:
+  class Slot;
+  template <class T>
+  class SlotAllocator;
+
+  void reclaim(const SpatialQueries::Source&);
+  Slot& freeSlot();
+  GeometryCopy& copyOf(const SearchableGeometry&);
+
+  const std::shared_ptr<SpatialQueries::Source::Pool> m_scratch;
+  std::vector<std::unique_ptr<GeometryCopy>> m_copies;  ///< by ascending ids
+  std::vector<std::unique_ptr<Slot>> m_slots;
+  std::uint64_t m_last = 0;  ///< number of the last snapshot
+};
+
+/// The latest snapshot of one OctreeBasedCD.
+///
+/// Threads  publish() on one thread at a time, latest() on any. A std::mutex is locked while one
+///          shared_ptr is copied or swapped, and for nothing else. A mutex, because
+///          std::atomic<std::shared_ptr> of this standard library is a spin lock.
+class LatestSnapshot {
+ public:
+  void publish(SpatialQueries::Source&, double time);
+  std::shared_ptr<const Snapshot> get() const;
+
+ private:
+  std::shared_ptr<SnapshotPool> m_pool = std::make_shared<SnapshotPool>();
+  mutable std::mutex m_mutex;
+  std::shared_ptr<const Snapshot> m_latest;
+};
+
+}  // namespace palpate

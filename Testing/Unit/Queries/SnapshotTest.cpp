@@ -1,0 +1,323 @@
+#include "Common/ExpectRefused.h"
+#include "Common/RandomMeshes.h"
+#include "Common/Solids.h"
+
+#include <palpate/OctreeBasedCD.h>
+#include <palpate/PenetrationTracker.h>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <bit>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+namespace palpate::testing {
+namespace {
+
+using Positions = std::vector<Eigen::Vector3d>;
+
+/// A ball that deforms, a cube of tetrahedra that deforms every third step, a body that
+/// setTransform() moves, a still sheet, points, and a capsule.
+struct Scene {
+  explicit Scene(const Settings& settings = {.threads = 1}) : collisions(settings) {
+    Random random(7);
+    const Mesh ballMesh = sphere(12, 16, {0.5, 0.5, 0.5}, 0.4), sheetMesh = sheet(8, 0.5, 0);
+    rest = ballMesh.positions;
+    ball = collisions.addTriangleMesh(ballMesh.positions, ballMesh.triangles);
+    sheetId = collisions.addTriangleMesh(sheetMesh.positions, sheetMesh.triangles);
+    testing::Solid cube = cells(2, random);
+    for (Eigen::Vector3d& p : cube.positions) p *= 0.4;
+    cubeRest = cube.positions;
+    solid = collisions.addTetrahedralMesh(cube.positions, cube.tetrahedra);
+    body = collisions.addTriangleMesh(ballMesh.positions, ballMesh.triangles);
+    for (int i = 0; i < 50; ++i) probes.push_back(randomPoint(random, 0, 1));
+    points = collisions.addPointSet(probes, 0.01);
+    capsule = collisions.addAnalyticalGeometry(Capsule{{0, 0, 0}, {0, 0, 0.3}, 0.1});
+    collisions.addCollisionPair(ball, sheetId, {Method::Continuous, 0.01});
+    collisions.advance();
+  }
+
+  void step(int i) {
+    Positions moved = rest;
+    for (Eigen::Vector3d& p : moved) p += 0.05 * std::sin(0.3 * i + 4 * p.x()) * (p - rest[0]);
+    collisions.setPositions(ball, moved);
+    if (i % 3 == 0) {
+      Positions cube = cubeRest;
+      for (Eigen::Vector3d& p : cube) p *= 1 + 0.01 * (i % 7);
+      collisions.setPositions(solid, cube);
+    }
+    const Eigen::Matrix3d turn =
+        Eigen::AngleAxisd(0.1 * i, Eigen::Vector3d(1, 2, 2) / 3).toRotationMatrix();
+    collisions.setTransform(body, turn, {0.1, 0.01 * i, 0});
+    collisions.setTransform(capsule, turn, {0.2, 0.3, 0.01 * i});
+    collisions.detectCollision();
+  }
+
+  OctreeBasedCD collisions;
+  GeometryId ball, sheetId, solid, body, points, capsule;
+  Positions rest, cubeRest, probes;
+};
+
+/// A hash of the answers of many queries.
+std::uint64_t hashOf(const Scene& scene, const SpatialQueries& queries) {
+  std::uint64_t hash = 14695981039346656037u;
+  const auto add = [&](double value) {
+    hash = (hash ^ std::bit_cast<std::uint64_t>(value)) * 1099511628211u;
+  };
+  std::vector<std::uint32_t> elements;
+  std::vector<ShapeContact> touches;
+  std::vector<EmbeddedVertex> embedded;
+  for (const Eigen::Vector3d& p : scene.probes) {
+    for (const GeometryId id :
+         {scene.ball, scene.sheetId, scene.solid, scene.body, scene.points, scene.capsule}) {
+      const SurfacePoint nearest = *queries.closestPoint(id, p);
+      for (const double x : nearest.position) add(x);
+      add(nearest.element);
+      if (const auto hit = queries.firstHit(id, {p, {1, 2, 3}})) add(hit->t);
+    }
+    add(queries.contains(scene.ball, p));
+    add(queries.contains(scene.body, p, {.rule = InsideRule::WindingNumber}));
+    if (const auto in = queries.findTetrahedron(scene.solid, p)) add(in->tetrahedron);
+    queries.elementsWithin(scene.ball, p, 0.2, elements);
+    for (const std::uint32_t element : elements) add(element);
+    queries.contacts(scene.ball, palpate::Sphere{{0, 0, 0}, 0.1}, Eigen::Matrix3d::Identity(), p,
+                     0.02, touches);
+    for (const ShapeContact& contact : touches) add(contact.distance);
+  }
+  queries.findEmbeddedVertices(scene.points, scene.solid, embedded);
+  for (const EmbeddedVertex& v : embedded) add(v.vertex);
+  return hash;
+}
+
+TEST(Snapshot, HasNumberAndTime) {
+  Scene scene;
+  EXPECT_EQ(scene.collisions.latestSnapshot(), nullptr);
+  scene.collisions.publish();
+  const auto first = scene.collisions.latestSnapshot();
+  scene.collisions.publish(0.25);
+  const auto second = scene.collisions.latestSnapshot();
+  EXPECT_EQ(first->number(), 1u);
+  EXPECT_EQ(first->time(), 0.0);
+  EXPECT_EQ(second->number(), 2u);
+  EXPECT_EQ(second->time(), 0.25);
+  EXPECT_EQ(scene.collisions.latestSnapshot(), second);
+}
+
+/// Snapshots keep the answers of their frame while the frame goes on, for both engines.
+TEST(Snapshot, AnswersAsItsFrameDid) {
+  for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
+    Scene scene({.threads = 1, .engine = engine});
+    std::vector<std::shared_ptr<const Snapshot>> kept;
+    std::vector<std::uint64_t> expected;
+    for (int i = 0; i < 8; ++i) {
+      scene.step(i);
+      const SpatialQueries queries = scene.collisions.queries();
+      expected.push_back(hashOf(scene, queries));
+      scene.collisions.publish(i);
+      EXPECT_EQ(hashOf(scene, queries), expected.back()) << "publish() leaves queries valid";
+      kept.push_back(scene.collisions.latestSnapshot());
+      if (i % 2 == 1) kept[i / 2].reset();
+      scene.collisions.advance();
+    }
+    EXPECT_NE(expected[6], expected[7]);
+    for (std::size_t i = 4; i < 8; ++i)
+      EXPECT_EQ(hashOf(scene, kept[i]->queries()), expected[i]) << i;
+  }
+}
+
+/// Readers compare each snapshot that they get with the answers of its frame.
+TEST(Snapshot, IsIsolatedFromTheSimulation) {
+  constexpr int kSteps = 60, kReaders = 2;
+  Scene scene;
+  std::mutex mutex;
+  std::map<std::uint64_t, std::uint64_t> expected;  // by number
+  std::atomic<bool> ends = false;
+  std::atomic<int> failures = 0, compared = 0;
+  std::vector<std::thread> readers;
+  for (int r = 0; r < kReaders; ++r)
+    readers.emplace_back([&] {
+      std::shared_ptr<const Snapshot> held;
+      while (!ends) {
+        auto latest = scene.collisions.latestSnapshot();
+        if (!latest || latest == held) {
+          std::this_thread::yield();
+          continue;
+        }
+        held = std::move(latest);
+        const std::uint64_t hash = hashOf(scene, held->queries());
+        const std::lock_guard lock(mutex);
+        failures += hash != expected.at(held->number());
+        ++compared;
+      }
+    });
+  for (int i = 0; i < kSteps; ++i) {
+    scene.step(i);
+    const std::uint64_t hash = hashOf(scene, scene.collisions.queries());
+    {
+      const std::lock_guard lock(mutex);
+      expected[static_cast<std::uint64_t>(i) + 1] = hash;
+    }
+    scene.collisions.publish();
+    scene.collisions.advance();
+  }
+  while (compared < kReaders) std::this_thread::yield();
+  ends = true;
+  for (std::thread& reader : readers) reader.join();
+  EXPECT_EQ(failures, 0);
+}
+
+/// Threads that need the same preparation of one copy, through two snapshots.
+TEST(Snapshot, PreparesOnceForManyThreads) {
+  Scene scene;
+  scene.step(1);
+  const std::uint64_t expected = hashOf(scene, scene.collisions.queries());
+  scene.collisions.publish();
+  const auto first = scene.collisions.latestSnapshot();
+  scene.collisions.publish();
+  const auto second = scene.collisions.latestSnapshot();
+  std::vector<std::uint64_t> hashes(4);
+  std::vector<std::thread> threads;
+  for (std::size_t t = 0; t < hashes.size(); ++t)
+    threads.emplace_back(
+        [&, t] { hashes[t] = hashOf(scene, (t % 2 ? first : second)->queries()); });
+  for (std::thread& thread : threads) thread.join();
+  for (const std::uint64_t hash : hashes) EXPECT_EQ(hash, expected);
+}
+
+TEST(Snapshot, SharesGeometriesThatDidNotMove) {
+  Scene scene;
+  std::vector<std::shared_ptr<const Snapshot>> kept;
+  for (int i = 1; i < 3; ++i) {
+    scene.step(i);
+    scene.collisions.publish();
+    kept.push_back(scene.collisions.latestSnapshot());
+    scene.collisions.advance();
+  }
+  const auto data = [&](int i, GeometryId id) { return kept[i]->positions(id).data(); };
+  EXPECT_EQ(data(0, scene.sheetId), data(1, scene.sheetId));
+  EXPECT_EQ(data(0, scene.body), data(1, scene.body));  // in the body's frame
+  EXPECT_NE(data(0, scene.ball), data(1, scene.ball));
+}
+
+TEST(Snapshot, HasTheMotionOfItsStep) {
+  Scene scene;
+  scene.step(1);
+  const Positions before(scene.collisions.positions(scene.ball).begin(),
+                         scene.collisions.positions(scene.ball).end());
+  scene.collisions.advance();
+  scene.step(2);
+  const Positions now(scene.collisions.positions(scene.ball).begin(),
+                      scene.collisions.positions(scene.ball).end());
+  scene.collisions.publish();
+  const auto snapshot = scene.collisions.latestSnapshot();
+  scene.collisions.advance();
+  scene.step(3);
+  const auto equal = [](std::span<const Eigen::Vector3d> a, const Positions& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end());
+  };
+  EXPECT_TRUE(equal(snapshot->positions(scene.ball), now));
+  EXPECT_TRUE(equal(snapshot->positionsBefore(scene.ball), before));
+  EXPECT_EQ(snapshot->position(scene.ball, 5), now[5]);
+  EXPECT_EQ(snapshot->position(scene.ball, 5, 0.0), before[5]);
+  EXPECT_EQ(snapshot->position(scene.ball, 5, 1.5), before[5] + 1.5 * (now[5] - before[5]));
+  EXPECT_TRUE(snapshot->positions(scene.capsule).empty());
+  const ShapeMotion capsule = snapshot->motion(scene.capsule);
+  EXPECT_EQ(capsule.translation, Eigen::Vector3d(0.2, 0.3, 0.02));
+  EXPECT_EQ(capsule.translationBefore, Eigen::Vector3d(0.2, 0.3, 0.01));
+  const ShapeMotion pose = snapshot->motion(scene.body);
+  EXPECT_LT(
+      (pose.rotation * scene.rest[3] + pose.translation - snapshot->position(scene.body, 3)).norm(),
+      1e-15);
+  expectRefused(ErrorCode::IndexOutOfRange, "vertex 9999",
+                [&] { (void)snapshot->position(scene.ball, 9999); });
+}
+
+TEST(Snapshot, MayOutliveItsOwner) {
+  std::optional<Scene> scene(std::in_place);
+  scene->step(1);
+  scene->collisions.publish();
+  auto snapshot = scene->collisions.latestSnapshot();
+  Scene other;
+  const std::uint64_t expected = hashOf(other, snapshot->queries());
+  OctreeBasedCD moved = std::move(scene->collisions);
+  EXPECT_EQ(moved.latestSnapshot(), snapshot);
+  moved.publish();
+  EXPECT_EQ(moved.latestSnapshot()->number(), 2u);
+  expectRefused(ErrorCode::InvalidCall, "moved from",
+                [&] { (void)scene->collisions.latestSnapshot(); });
+  expectRefused(ErrorCode::InvalidCall, "moved from", [&] { scene->collisions.publish(); });
+  { const OctreeBasedCD last = std::move(moved); }
+  scene.reset();
+  EXPECT_EQ(hashOf(other, snapshot->queries()), expected);
+  const SpatialQueries copy = snapshot->queries();
+  snapshot.reset();
+  expectRefused(ErrorCode::InvalidCall, "Snapshot was destroyed", [&] {
+    (void)copy.firstHit({{0, 0, 0}, {1, 0, 0}});
+  });
+}
+
+TEST(Snapshot, KeepsRemovedGeometriesAndOldTopology) {
+  Scene scene;
+  scene.collisions.publish();
+  const auto old = scene.collisions.latestSnapshot();
+  const std::uint64_t expected = hashOf(scene, old->queries());
+  scene.collisions.removeGeometry(scene.sheetId);
+  const Mesh coarse = sphere(5, 6, {0.5, 0.5, 0.5}, 0.4);
+  scene.collisions.setTriangles(scene.ball, coarse.positions, coarse.triangles);
+  const Mesh late = sheet(3, 0.1, 0);
+  const GeometryId added = scene.collisions.addTriangleMesh(late.positions, late.triangles);
+  for (int i = 0; i < 3; ++i) {
+    scene.collisions.publish();
+    const auto now = scene.collisions.latestSnapshot();
+    EXPECT_FALSE(now->contains(scene.sheetId));
+    EXPECT_TRUE(now->contains(added));
+    expectRefused(ErrorCode::UnknownGeometry, "geometry 1 is not in this snapshot", [&] {
+      (void)now->queries().closestPoint(scene.sheetId, {0, 0, 0});
+    });
+    EXPECT_EQ(now->positions(scene.ball).size(), coarse.positions.size());
+    EXPECT_EQ(now->queries().closestPoint(scene.ball, {2, 0, 0})->element,
+              scene.collisions.queries().closestPoint(scene.ball, {2, 0, 0})->element);
+  }
+  EXPECT_FALSE(old->contains(added));
+  EXPECT_EQ(hashOf(scene, old->queries()), expected);
+  expectRefused(ErrorCode::UnknownGeometry, "not in this snapshot",
+                [&] { (void)old->positions(added); });
+}
+
+/// A tracker follows vertices from snapshot to snapshot as from frame to frame.
+TEST(Snapshot, ServesPenetrationTrackers) {
+  Scene scene;
+  PenetrationTracker inFrames(scene.points, scene.ball), inSnapshots(scene.points, scene.ball);
+  for (int i = 0; i < 5; ++i) {
+    scene.step(i);
+    scene.collisions.publish();
+    const auto expected = inFrames.update(scene.collisions.queries());
+    const auto found = inSnapshots.update(scene.collisions.latestSnapshot()->queries());
+    ASSERT_GT(expected.size(), 3u);
+    EXPECT_TRUE(std::equal(expected.begin(), expected.end(), found.begin(), found.end()));
+    scene.collisions.advance();
+  }
+}
+
+/// The mutex is not held while a snapshot is released or published: a predicate may ask for it.
+TEST(Snapshot, IsAvailableWithinCallbacks) {
+  Scene scene;
+  scene.collisions.publish();
+  int calls = 0;
+  scene.collisions.addCollisionPair(scene.points, scene.ball, {Method::Proximity, 0.1});
+  scene.collisions.setContactPredicate(scene.points, scene.ball, [&](const ContactFeatures&) {
+    calls += scene.collisions.latestSnapshot()->number() == 1;
+    return true;
+  });
+  scene.collisions.detectCollision();
+  EXPECT_GT(calls, 0);
+}
+
+}  // namespace
+}  // namespace palpate::testing
