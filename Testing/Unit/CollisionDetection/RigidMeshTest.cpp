@@ -25,7 +25,7 @@ Matrix3d randomRotation(Random& random) {
 /// A ball, a sheet with its winding, the surface of a placed body, lines and points.
 struct Scene {
   explicit Scene(Engine engine = Engine::Octree)
-      : collisions({.threads = 1, .engine = engine}), tool(toolMesh.positions, toolMesh.triangles) {
+      : collisions({.engine = engine, .threads = 1}), tool(toolMesh.positions, toolMesh.triangles) {
     const Mesh ball = sphere(10, 12, {0.5, 0.5, 0.5}, 0.3), plain = sheet(10, 0.5, 0);
     bodies.push_back(collisions.addTriangleMesh(ball.positions, ball.triangles));
     bodies.push_back(collisions.addTriangleMesh(plain.positions, plain.triangles));

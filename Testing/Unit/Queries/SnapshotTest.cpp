@@ -112,7 +112,7 @@ TEST(Snapshot, HasNumberAndTime) {
 /// Snapshots keep the answers of their frame while the frame goes on, for both engines.
 TEST(Snapshot, AnswersAsItsFrameDid) {
   for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
-    Scene scene({.threads = 1, .engine = engine});
+    Scene scene({.engine = engine, .threads = 1});
     std::vector<std::shared_ptr<const Snapshot>> kept;
     std::vector<std::uint64_t> expected;
     for (int i = 0; i < 8; ++i) {
