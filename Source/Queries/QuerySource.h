@@ -8,11 +8,13 @@
 #include "Queries/RayHits.h"
 #include "Queries/SearchableGeometry.h"
 #include "Queries/VertexSearch.h"
+#include "Shapes/PlacedShape.h"
 #include "Shapes/ShapeContacts.h"
 
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -33,6 +35,8 @@ class SpatialQueries::Source {
     std::vector<std::uint32_t> elements;
     Buffer<std::uint32_t> nearShape;
     ShapeContactBuffers shapeContacts;
+    /// The shape of the last call. Placing it again allocates nothing.
+    std::optional<PlacedShape> shape;
   };
   /// What all sources of one owner share: the scratch that no call uses.
   class Pool {

@@ -47,6 +47,8 @@ class SnapshotPool : public std::enable_shared_from_this<SnapshotPool> {
   /// A snapshot of all geometries of a source, whose octrees must be up to date. Called by one
   /// thread at a time. If it throws, no snapshot has changed.
   std::shared_ptr<const Snapshot> take(SpatialQueries::Source&, double time);
+  std::size_t copyCount() const { return m_copies.size(); }
+  std::size_t slotCount() const { return m_slots.size(); }
 
  private:
   class Slot;

@@ -425,6 +425,15 @@ RigidTransform checkedPose(const AnalyticalGeometry& shape, const Eigen::Matrix3
   return pose;
 }
 
+/// The shape at rest at a pose, in scratch of one call.
+const PlacedShape& placed(const AnalyticalGeometry& geometry, const RigidTransform& pose,
+                          std::optional<PlacedShape>& shape) {
+  if (!shape || !(shape->analytical == geometry)) shape.emplace(geometry);
+  shape->now.place(geometry, pose);
+  shape->before = shape->now;
+  return *shape;
+}
+
 }  // namespace
 
 void SpatialQueries::overlapping(GeometryId id, const AnalyticalGeometry& shape,
@@ -440,8 +449,9 @@ void SpatialQueries::overlapping(GeometryId id, const AnalyticalGeometry& shape,
   std::vector<std::uint32_t>& found = scratch->elements;
   found.clear();
   if (!geometry.tree.ordered().empty())
-    findOverlapping(geometry, Shape(shape, pose), source.engine() == Engine::BruteForce,
-                    scratch->stack, scratch->nearShape, found);
+    findOverlapping(geometry, placed(shape, pose, scratch->shape).now,
+                    source.engine() == Engine::BruteForce, scratch->stack, scratch->nearShape,
+                    found);
   std::sort(found.begin(), found.end());
   elements.reserve(found.size());  // nothing below throws
   elements.assign(found.begin(), found.end());
@@ -462,15 +472,13 @@ void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
   near.clear();
   found.clear();
   if (!geometry.tree.ordered().empty()) {
-    PlacedShape placed(shape);
-    placed.now.place(shape, pose);
-    placed.before = placed.now;
+    const PlacedShape& tool = placed(shape, pose, scratch->shape);
     if (source.engine() == Engine::BruteForce)
       for (std::uint32_t i = 0; i < geometry.mesh.topology.triangles.size(); ++i) near.push_back(i);
     else
-      findElementsNear(geometry, placed.now, placed.now, thickness + geometry.mesh.largestRadius,
+      findElementsNear(geometry, tool.now, tool.now, thickness + geometry.mesh.largestRadius,
                        scratch->stack, near);
-    findShapeContacts(geometry.mesh, placed, {Method::Proximity, thickness}, near,
+    findShapeContacts(geometry.mesh, tool, {Method::Proximity, thickness}, near,
                       scratch->shapeContacts);
   }
   std::sort(found.begin(), found.end(), [](const ShapeContact& a, const ShapeContact& b) {

@@ -22,12 +22,14 @@ inline constexpr std::size_t kMaxHullPoints = std::size_t{1} << 17;  ///< of one
 struct Sphere {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double radius = 0.0;  ///< finite, not negative
+  friend bool operator==(const Sphere&, const Sphere&) = default;
 };
 
 /// All points whose distance from the segment p0 p1 is at most the radius.
 struct Capsule {
   Eigen::Vector3d p0 = Eigen::Vector3d::Zero(), p1 = Eigen::Vector3d::Zero();
   double radius = 0.0;  ///< finite, not negative
+  friend bool operator==(const Capsule&, const Capsule&) = default;
 };
 
 /// The half-space behind the plane. If two-sided, the plane alone, which has no inside.
@@ -35,18 +37,21 @@ struct Plane {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< out of the half-space; any length but 0
   bool twoSided = false;
+  friend bool operator==(const Plane&, const Plane&) = default;
 };
 
 /// A box whose edges are parallel to the axes of the body frame.
 struct Box {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   Eigen::Vector3d halfExtents = Eigen::Vector3d::Zero();  ///< finite, not negative
+  friend bool operator==(const Box&, const Box&) = default;
 };
 
 /// A cylinder with flat ends. Their centres p0 and p1 must differ.
 struct Cylinder {
   Eigen::Vector3d p0 = Eigen::Vector3d::Zero(), p1 = Eigen::Vector3d::UnitZ();
   double radius = 0.0;  ///< finite, not negative
+  friend bool operator==(const Cylinder&, const Cylinder&) = default;
 };
 
 /// The convex hull of at least one point, such as the tip of a tool. Points may be doubled or
@@ -60,6 +65,7 @@ struct Cylinder {
 ///          it was added.
 struct ConvexHull {
   std::vector<Eigen::Vector3d> points;  ///< finite
+  friend bool operator==(const ConvexHull&, const ConvexHull&) = default;
 };
 
 using AnalyticalGeometry = std::variant<Sphere, Capsule, Plane, Box, Cylinder, ConvexHull>;

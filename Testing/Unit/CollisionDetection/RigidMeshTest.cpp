@@ -86,7 +86,7 @@ TEST(RigidMesh, HeedsSidedness) {
                                                scene.toolMesh.positions, scene.toolMesh.triangles);
   scene.collisions.setCollisionFilter(body, {.sidedness = Sidedness::Outer});
   scene.collisions.addCollisionPair(body, tool, {Method::Proximity, 0.05});
-  const Vector3d inside(0.5, 0.5, 0.62);
+  const Vector3d inside(0.5, 0.5, 0.68);
   scene.collisions.setTransform(tool, Matrix3d::Identity(), inside);
   scene.collisions.detectCollision();
   scene.collisions.publish();

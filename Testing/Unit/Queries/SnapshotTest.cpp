@@ -2,6 +2,8 @@
 #include "Common/RandomMeshes.h"
 #include "Common/Solids.h"
 
+#include "Queries/SnapshotPool.h"
+
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/PenetrationTracker.h>
 
@@ -203,6 +205,73 @@ TEST(Snapshot, SharesGeometriesThatDidNotMove) {
   EXPECT_EQ(data(0, scene.sheetId), data(1, scene.sheetId));
   EXPECT_EQ(data(0, scene.body), data(1, scene.body));  // in the body's frame
   EXPECT_NE(data(0, scene.ball), data(1, scene.ball));
+}
+
+/// Geometries with positions and octrees, without an OctreeBasedCD.
+class TestSource : public SpatialQueries::Source {
+ public:
+  void add(const Mesh& mesh) {
+    auto added = std::make_unique<SearchableGeometry>(GeometryId(m_nextId++));
+    added->mesh.topology = MeshTopology(mesh.positions.size(), mesh.triangles);
+    added->revisions.topology = added->revisions.counter.next();
+    m_geometries.push_back(std::move(added));
+    move(m_geometries.size() - 1, mesh.positions);
+  }
+  void move(std::size_t i, const Positions& positions) {
+    SearchableGeometry& geometry = *m_geometries[i];
+    geometry.mesh.now.setBody(std::make_shared<const Positions>(positions), m_revisions.next());
+    geometry.mesh.before = geometry.mesh.now;
+    geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.topology);
+    geometry.tree.update(geometry.mesh, geometry.revisions.topology, 1.0, m_settings, m_thread);
+  }
+  void remove(std::size_t i) { m_geometries.erase(m_geometries.begin() + i); }
+
+  std::uint64_t state() const override { return 1; }
+  SearchableGeometry& at(GeometryId) const override { return *m_geometries.front(); }
+  std::size_t geometryCount() const override { return m_geometries.size(); }
+  SearchableGeometry& geometry(std::size_t i) const override { return *m_geometries[i]; }
+  std::uint64_t step() const override { return 1; }
+  Engine engine() const override { return Engine::Octree; }
+  const OctreeSettings& octreeSettings() const override { return m_settings; }
+  const Threads& threads() const override { return m_thread; }
+
+ private:
+  std::vector<std::unique_ptr<SearchableGeometry>> m_geometries;
+  RevisionCounter m_revisions;
+  std::uint32_t m_nextId = 0;
+  OctreeSettings m_settings;
+  Threads m_thread{1};
+};
+
+/// A still geometry has one copy, whatever is held. Memory returns with the last reader.
+TEST(Snapshot, SharesCopiesAndReusesMemory) {
+  const Mesh ball = sphere(6, 8, {0, 0, 0}, 1);
+  Positions moved = ball.positions;
+  TestSource source;
+  source.add(ball);
+  source.add(ball);
+  const auto pool = std::make_shared<SnapshotPool>();
+  std::vector<std::shared_ptr<const Snapshot>> held;
+  const auto take = [&](double at) {
+    moved[0].z() = at;
+    source.move(0, moved);
+    return pool->take(source, at);
+  };
+  for (int i = 0; i < 5; ++i) held.push_back(take(2 + i));
+  EXPECT_EQ(pool->copyCount(), 5u + 1u);
+  EXPECT_EQ(pool->slotCount(), 5u);
+  const auto same = pool->take(source, 0);
+  EXPECT_EQ(pool->copyCount(), 5u + 1u);
+  for (int i = 0; i < 5; ++i)
+    EXPECT_EQ(held[i]->queries().closestPoint(GeometryId{0}, {0, 0, 99})->distance, 97 - i);
+  held.clear();
+  for (int i = 0; i < 20; ++i) held = {take(i), take(i + 0.5)};
+  EXPECT_EQ(pool->copyCount(), 5u + 1u);
+  EXPECT_EQ(pool->slotCount(), 6u);
+  source.remove(1);
+  held = {take(1)};
+  EXPECT_EQ(pool->copyCount(), 5u + 1u);  // `same` has the removed geometry
+  EXPECT_TRUE(same->contains(GeometryId{1}));
 }
 
 TEST(Snapshot, HasTheMotionOfItsStep) {

@@ -1,0 +1,25 @@
+#!/bin/bash
+# test.sh PROGRAM: the forces of the haptic loop in lockstep, and that both threads run. Times are not tested.
+set -uo pipefail
+program=$1
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+fail() { echo "FAILED: $*"; exit 1; }
+
+"$program" --strokes 1 --lockstep --out "$folder/a" >"$folder/text" || fail "lockstep: $(cat "$folder/text")"
+hash=$(grep "result hash" "$folder/text")
+"$program" --strokes 1 --lockstep >"$folder/again" || fail "lockstep without files"
+[[ $(grep "result hash" "$folder/again") == "$hash" ]] || fail "another run has other forces"
+grep -qE "^[1-9][0-9]{2,} ticks in touch" "$folder/text" || fail "the tool does not touch: $(cat "$folder/text")"
+grep -q "^0 force jumps above their bound" "$folder/text" || fail "the force jumps: $(cat "$folder/text")"
+grep -q "^force jump,2000," "$folder/a/haptics.csv" || fail "haptics.csv: $(cat "$folder/a/haptics.csv")"
+grep -q "<polyline" "$folder/a/haptics.svg" || fail "haptics.svg has no lines"
+
+"$program" --strokes 1 --seconds 0.5 --out "$folder/b" >"$folder/text" || fail "threads: $(cat "$folder/text")"
+grep -q "^haptic step,500," "$folder/b/haptics.csv" || fail "not 500 steps: $(cat "$folder/b/haptics.csv")"
+grep -qE "snapshot ([2-9]|[1-9][0-9]+) was the last" "$folder/text" || fail "too few snapshots: $(cat "$folder/text")"
+
+"$program" --strokes 0 >"$folder/text" 2>"$folder/messages" && fail "--strokes 0 is not refused"
+touch "$folder/file"
+"$program" --strokes 1 --lockstep --seconds 0.1 --out "$folder/file/run" 2>"$folder/messages" && fail "a folder inside a file"
+echo passed
