@@ -29,7 +29,7 @@ constexpr double kFrame = 1.0 / 60, kTick = 1e-3;  // s
 /// at its end, so that its snapshot comes in time if it takes less than two frames.
 constexpr double kDelay = kFrame;
 constexpr double kOrganLength = 150;      // mm
-constexpr double kLift = 12, kPress = 4;  // mm, of the device above and below the surface
+constexpr double kLift = 30, kPress = 4;  // mm, of the device above and below the surface
 
 /// A liver that breathes and that a probe presses from a side.
 class Organ {
@@ -130,8 +130,9 @@ struct Record {
   Distribution emptyDone{"empty step, from its due time", {}};
   Distribution jump{"force jump", {}}, bound{"bound of the force jump", {}};
   Distribution publish{"publish()", {}};
-  double largestShare = 0;  // of a jump in its bound
-  double strongest = 0;     // N
+  double largestShare = 0;     // of a jump in its bound
+  double strongest = 0;        // N
+  double nearest = kInfinity;  // mm, of the blade's proxy from the surface
   std::size_t over = 0, touching = 0, contacts = 0;
   std::uint64_t snapshots = 0, hash = 14695981039346656037u;
 
@@ -149,42 +150,36 @@ class HapticLoop {
 
   void startStroke() {
     m_ticks = 0;
-    m_device = m_hand.at(0);
-    m_tool.start(m_device);
+    m_tool.start(m_hand.at(0));
     m_force = Vector3d::Zero();
   }
   /// time: s, of the simulation's clock.
   void tick(double time) {
     if (!m_player.advance(m_organ.collisions().latestSnapshot(), time, kTick)) return;
     const ToolPose device = m_hand.at(++m_ticks * kTick / m_hand.seconds());
-    const VirtualTool::Answer answer = m_tool.step(m_player.snapshot(), m_player.share(), device);
-    record(device, answer);
-    m_device = device;
+    const VirtualTool::Answer answer =
+        m_tool.step(m_player.snapshot(), m_player.share(), m_player.played(), device);
+    record(answer);
     m_force = answer.force;
   }
 
  private:
-  /// The bound: the stiffness times how far any point of the tool, and the surface at it, moved.
-  void record(const ToolPose& device, const VirtualTool::Answer& answer) {
-    const double tool =
-        (device.position - m_device.position).norm() +
-        m_tool.reach() * turnOf(device.rotation * m_device.rotation.transpose()).norm();
-    const double surface =
-        std::max(answer.surfaceSpeed, m_surfaceSpeed) * m_player.played() / kFrame;
+  /// The bound of a jump: the stiffness times how far the tool and the surface at it moved.
+  void record(const VirtualTool::Answer& answer) {
     const double jump = (answer.force - m_force).norm(),
-                 bound = VirtualTool::kStiffness * (tool + surface);
+                 bound = VirtualTool::kStiffness * answer.motion;
     m_record.jump.samples.push_back(1000 * jump);
     m_record.bound.samples.push_back(1000 * bound);
     m_record.largestShare = std::max(m_record.largestShare, jump / std::max(bound, 1e-9));
-    m_record.over += jump > bound;
+    m_record.over += jump > (1 + 1e-9) * bound;  // rounding
     m_record.touching += answer.force.norm() > 0.01;
     m_record.contacts = std::max(m_record.contacts, answer.contacts);
+    m_record.nearest = std::min(m_record.nearest, answer.distance);
     m_record.strongest = std::max(m_record.strongest, answer.force.norm());
     m_record.snapshots = m_player.snapshot().number();
     for (const Vector3d& part : {answer.force, answer.torque})
       for (const double x : part)
         m_record.hash = (m_record.hash ^ std::bit_cast<std::uint64_t>(x)) * 1099511628211u;
-    m_surfaceSpeed = answer.surfaceSpeed;
   }
 
   Organ& m_organ;
@@ -192,9 +187,7 @@ class HapticLoop {
   Record& m_record;
   VirtualTool m_tool;
   SurfacePlayer m_player{kDelay, kFrame};
-  ToolPose m_device;
   Vector3d m_force = Vector3d::Zero();
-  double m_surfaceSpeed = 0;
   int m_ticks = 0;
 };
 
@@ -298,6 +291,7 @@ void run(int strokes, double seconds, bool lockstep, const std::filesystem::path
   std::printf("%zu ticks in touch, at most %zu contacts and %.3f N; snapshot %llu was the last\n",
               record.touching, record.contacts, record.strongest,
               static_cast<unsigned long long>(record.snapshots));
+  std::printf("least distance of the proxy from the surface: %.3f mm\n", record.nearest);
   std::printf("%zu force jumps above their bound; the largest is %.3f of its bound\n", record.over,
               record.largestShare);
   if (lockstep) std::printf("result hash %016llx\n", static_cast<unsigned long long>(record.hash));

@@ -11,14 +11,23 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double kSkin = 0.3;      // mm, between the proxy and the surface
-constexpr double kMostMove = 0.5;  // mm, of the proxy towards the device in one tick
-constexpr double kLever = 10;      // mm, makes turns comparable to moves
+constexpr double kSkin = 0.3;       // mm, between the proxy and the surface
+constexpr double kMostMove = 0.25;  // mm, of the proxy towards the device in one tick
+constexpr double kLever = 10;       // mm, makes turns comparable to moves
 constexpr int kMostSweeps = 100;
 constexpr double kSolved = 1e-6;  // mm, by which no row changes the motion any more
 
 Vector3d shortened(const Vector3d& v, double most) {
   return v.norm() > most ? Vector3d(most / v.norm() * v) : v;
+}
+
+/// The largest part of a move, in [0, 1], for which |part * move - way| <= most, where |way| is at
+/// most `most`.
+double partWithin(const Vector3d& move, const Vector3d& way, double most) {
+  const double square = move.squaredNorm(), along = move.dot(way);
+  const double room = most * most - way.squaredNorm();
+  if (square == 0 || square - 2 * along <= room) return 1;
+  return (along + std::sqrt(along * along + square * room)) / square;
 }
 
 /// A point of the organ's surface at a share of the step.
@@ -60,8 +69,6 @@ VirtualTool::VirtualTool(GeometryId organ)
     : m_organ(organ),
       m_blade(Box{Vector3d::Zero(), {kHalfExtents[0], kHalfExtents[1], kHalfExtents[2]}}) {}
 
-double VirtualTool::reach() const { return Vector3d(kHalfExtents.data()).norm(); }
-
 Vector3d turnOf(const Matrix3d& rotation) {
   const Eigen::AngleAxisd turn(rotation);
   return turn.angle() * turn.axis();
@@ -77,7 +84,7 @@ void VirtualTool::addRows(const Snapshot& snapshot, double share) {
                               kSkin + 2 * kMostMove, m_contacts);
   m_rows.clear();
   m_speed = 0;
-  double least = kInfinity;
+  m_least = kInfinity;
   for (const ShapeContact& contact : m_contacts) {
     const Vector3d now = at(contact.vertices, contact.weights, share);
     const Vector3d back = now - at(contact.vertices, contact.weights, 1) + ahead;
@@ -87,8 +94,8 @@ void VirtualTool::addRows(const Snapshot& snapshot, double share) {
                                     .norm());
     m_rows.push_back(
         {contact.normal, (now - m_proxy.position).cross(contact.normal), distance - kSkin, 0});
-    if (distance >= least) continue;
-    least = distance;
+    if (distance >= m_least) continue;
+    m_least = distance;
     m_nearest = contact.vertices;
     m_weights = contact.weights;
   }
@@ -113,21 +120,29 @@ void VirtualTool::solve(Vector3d& move, Vector3d& turn) {
   }
 }
 
-VirtualTool::Answer VirtualTool::step(const Snapshot& snapshot, double share,
+VirtualTool::Answer VirtualTool::step(const Snapshot& snapshot, double share, double played,
                                       const ToolPose& device) {
+  const double lastSpeed = m_speed;
   addRows(snapshot, share);
+  const Vector3d way = device.position - m_device.position;
+  const double motion = way.norm() +
+                        Vector3d(kHalfExtents.data()).norm() *
+                            turnOf(device.rotation * m_device.rotation.transpose()).norm() +
+                        played * std::max(m_speed, lastSpeed);
+  m_device = device;
   Vector3d move = shortened(device.position - m_proxy.position, kMostMove);
   Vector3d turn =
       shortened(turnOf(device.rotation * m_proxy.rotation.transpose()), kMostMove / kLever);
   solve(move, turn);
-  m_proxy.position += move;
-  if (const double angle = turn.norm(); angle > 0) {
-    const Eigen::AngleAxisd by(angle, turn / angle);
+  const double part = partWithin(move, way, motion);
+  m_proxy.position += part * move;
+  if (const double angle = part * turn.norm(); angle > 0) {
+    const Eigen::AngleAxisd by(angle, turn.normalized());
     m_proxy.rotation = Eigen::Quaterniond(by * m_proxy.rotation).normalized().toRotationMatrix();
   }
   return {kStiffness * (m_proxy.position - device.position),
           kTurnStiffness * turnOf(m_proxy.rotation * device.rotation.transpose()), m_rows.size(),
-          m_speed};
+          m_least, motion};
 }
 
 }  // namespace palpate::scenes

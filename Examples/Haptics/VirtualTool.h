@@ -26,8 +26,8 @@ class SurfacePlayer {
   /// ends. Returns whether there is a snapshot.
   bool advance(std::shared_ptr<const Snapshot> latest, double time, double tick);
   const Snapshot& snapshot() const { return *m_held[0]; }
-  double share() const { return m_share; }    ///< of the step that was played: 0 at its start
-  double played() const { return m_played; }  ///< s: by the last advance()
+  double share() const { return m_share; }  ///< of the step that was played: 0 at its start
+  double played() const { return m_played / m_step; }  ///< share of a step, by advance()
 
  private:
   double m_delay, m_step, m_time = 0, m_share = 1, m_played = 0;
@@ -50,16 +50,18 @@ class VirtualTool {
   struct Answer {
     Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
     std::size_t contacts = 0;
-    double surfaceSpeed = 0;  ///< L / step: of the fastest point of the surface near the blade
+    double distance = kInfinity;  ///< L: of the proxy from the surface, before it moved
+    /// L: how far any point of the tool moved in the tick, plus how far the surface near it did.
+    double motion = 0;
   };
 
   explicit VirtualTool(GeometryId organ);
   /// The proxy starts at the device.
-  void start(const ToolPose& device) { m_proxy = device; }
-  /// One tick with the surface at `share` of the snapshot's step.
-  Answer step(const Snapshot&, double share, const ToolPose& device);
-
-  double reach() const;  ///< L: of the blade, from its centre
+  void start(const ToolPose& device) { m_proxy = m_device = device; }
+  /// One tick with the surface at `share` of the snapshot's step, of which this tick played
+  /// `played`. The spring changes by at most Answer::motion: where the proxy could jump further, as
+  /// off a ridge, it slides there in several ticks.
+  Answer step(const Snapshot&, double share, double played, const ToolPose& device);
 
   static constexpr double kStiffness = 0.5, kTurnStiffness = 200;   ///< N/mm, N mm
   static constexpr std::array<double, 3> kHalfExtents{14, 4, 1.5};  ///< mm
@@ -74,12 +76,13 @@ class VirtualTool {
 
   GeometryId m_organ;
   AnalyticalGeometry m_blade;
-  ToolPose m_proxy;
+  ToolPose m_proxy, m_device;
   std::vector<ShapeContact> m_contacts;
   std::vector<Row> m_rows;
   std::array<std::uint32_t, 3> m_nearest{};  ///< vertices of the nearest feature of the last tick
   Eigen::Vector3d m_weights = Eigen::Vector3d::Zero();
-  double m_speed = 0;
+  double m_speed = 0;  ///< L / step: of the fastest point of the surface near the blade
+  double m_least = kInfinity;
 };
 
 /// The rotation vector of a rotation.
