@@ -641,6 +641,49 @@ def validityStates():
     return page
 
 
+def snapshots():
+    page = Page(292, "A simulation at 60 Hz, a haptic loop at 1 kHz")
+    left, step, count = 96, 108, 4
+    simulation, shared, haptic = 66, 140, 214
+    colours = (BLUE, GREEN, ORANGE, PURPLE)
+
+    def at(frame):
+        return left + step * frame
+
+    for top, name, note in ((simulation, "Simulation", "computes a step"), (shared, "Snapshots", "immutable"),
+                            (haptic, "Haptic loop", "ticks of 1 ms")):
+        page.text(16, top + 12, name, weight="bold")
+        page.text(16, top + 26, note, size=SMALL, color=GREY)
+    for frame in range(count):
+        colour = colours[frame]
+        page.card(at(frame) + 2, simulation, 70, 30, fill=tint(colour), edge=colour)
+        page.text(at(frame) + 37, simulation + 19, f"step {frame + 1}", ha="center")
+        if frame == count - 1:
+            break
+        published = at(frame) + 84
+        page.line((at(frame) + 73, simulation + 15), (published, simulation + 15), color=colour)
+        end = min(published + 2 * step - 24, WIDTH - 16)
+        lane = shared + 22 * (frame % 2)
+        page.box(published - 8, lane, end - published + 8, 18, fill=tint(colour, 0.4), edge=colour, line=THIN)
+        page.text(published, lane + 13, f"snapshot {frame + 1}", size=SMALL)
+        page.arrow((published, simulation + 15), (published, lane - 1), color=colour)
+    page.text(at(0) + 90, simulation + 44, "publish()", size=SMALL, color=DARK_GREY)
+    for frame in range(3):
+        colour = colours[frame]
+        first = at(frame + 1) + 2
+        page.box(first, haptic, step - 2, 30, fill=tint(colour), edge="none", line=0, order=1)
+        for tick in range(16):
+            x = first + (tick + 0.5) * (step - 2) / 16
+            page.line((x, haptic + 4), (x, haptic + 26), color=colour)
+        page.text(first + (step - 2) / 2, haptic + 45, f"plays step {frame + 1}", size=SMALL, ha="center")
+        page.arrow((first + 8, shared + (18 if frame % 2 == 0 else 40) + 1), (first + 8, haptic - 1), color=colour,
+                   order=1)
+    page.text(at(1) + 18, haptic - 6, "latestSnapshot()", size=SMALL, color=DARK_GREY)
+    page.text(16, 282, "A snapshot lives as long as a reader holds it. Its memory then returns to a later publish().",
+              size=SMALL, color=GREY)
+    return page
+
+
 DIAGRAMS = {
     "VertexTriangle": vertexTriangle,
     "EdgeEdge": edgeEdge,
@@ -650,6 +693,7 @@ DIAGRAMS = {
     "FeatureOwnership": featureOwnership,
     "ContactDistance": contactDistance,
     "ValidityStates": validityStates,
+    "Snapshots": snapshots,
 }
 
 
