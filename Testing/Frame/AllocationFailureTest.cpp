@@ -157,6 +157,7 @@ std::vector<Call> calls() {
       {"forEachCandidate", [](Scene& s) { s.detection.forEachCandidate([](auto&&...) {}); }},
       {"update", [](Scene& s) { s.detection.update(); }},
       {"advance", [](Scene& s) { s.detection.advance(); }},
+      {"publish", [](Scene& s) { s.detection.publish(); }},
       {"findInsideVertices",
        [](Scene& s) { testing::insideVertices(s.detection, s.drops, s.organ); }},
       {"PenetrationTracker", [](Scene& s) { s.tracker->update(s.detection.queries()); }},
@@ -329,6 +330,41 @@ TEST_P(AllocationFailure, NextFrameIsCorrect) {
       }
       EXPECT_GT(failures, first ? 40u / kShareOfCases : 0u);
     }
+}
+
+/// A publication that fails leaves the last snapshot, and copies of the next one are whole.
+TEST_P(AllocationFailure, LastSnapshotStays) {
+  Scene scene(settings());
+  const auto answerOf = [&](const SpatialQueries& queries) {
+    Words words;
+    for (const GeometryId id : {scene.organ, scene.sheetId, scene.solid, scene.tool})
+      append(words, queries.closestPoint(id, {0.1, 0.2, 2})->distance);
+    append(words, queries.signedDistance(scene.organ, {0.4, 0.5, 0.6}).distance);
+    words.push_back(queries.findTetrahedron(scene.solid, {0.3, 0.3, 0.3}).has_value());
+    return words;
+  };
+  scene.detection.publish();
+  const Words first = answerOf(scene.detection.latestSnapshot()->queries());
+  scene.move();
+  const Words next = answerOf(scene.detection.queries());
+  ASSERT_NE(next, first);
+  std::size_t n = 1;
+  for (;; ++n) {
+    FailingAllocation::arm(n);
+    bool failed = false;
+    try {
+      scene.detection.publish();
+    } catch (const std::bad_alloc&) {
+      failed = true;
+    }
+    FailingAllocation::disarm();
+    if (!failed) break;
+    EXPECT_EQ(scene.detection.latestSnapshot()->number(), 1u) << n;
+    EXPECT_EQ(answerOf(scene.detection.latestSnapshot()->queries()), first) << n;
+  }
+  EXPECT_GT(n, 10u);
+  EXPECT_EQ(scene.detection.latestSnapshot()->number(), 2u);
+  EXPECT_EQ(answerOf(scene.detection.latestSnapshot()->queries()), next);
 }
 
 TEST_P(AllocationFailure, LeavesTheStepGuardUnchanged) {
