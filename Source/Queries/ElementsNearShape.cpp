@@ -31,7 +31,8 @@ void findElementsNear(const SearchableGeometry& geometry, const Shape& before, c
     box = {unit * box.min(), unit * box.max()};
     if (wholeStep && now.isPlane())
       return step.mayComeNear({box.min() + origin, box.max() + origin}, maxDistance);
-    if (wholeStep) return swept.intersects(box);
+    if (!now.isPlane() && !swept.intersects(box)) return false;  // costs less than a distance
+    if (wholeStep) return true;
     const Vector3d centre = box.center() + origin;
     const PointShapeDistance at = now.signedDistance(centre);
     const double size = centre.cwiseAbs().maxCoeff() + box.sizes().sum();
