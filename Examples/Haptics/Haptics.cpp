@@ -319,7 +319,7 @@ int main(int count, char** arguments) {
   CLI::App app("A haptic loop at 1 kHz beside a simulation at 60 Hz.");
   app.add_option("--strokes", strokes, "strokes of the tool over the organ")
       ->check(CLI::Range(1, 1000));
-  app.add_option("--seconds", seconds, "duration of a stroke")->check(CLI::Range(0.1, 60.0));
+  app.add_option("--seconds", seconds, "duration of a stroke")->check(CLI::Range(1.0, 60.0));
   app.add_flag("--lockstep", lockstep,
                "one thread on a clock of its own: the same forces each time");
   app.add_option("--out", folder, "the folder for haptics.csv and haptics.svg");

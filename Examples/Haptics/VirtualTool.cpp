@@ -11,9 +11,10 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double kSkin = 0.3;       // mm, between the proxy and the surface
-constexpr double kMostMove = 0.25;  // mm, of the proxy towards the device in one tick
-constexpr double kLever = 10;       // mm, makes turns comparable to moves
+constexpr double kSkin = 0.3;  // mm, between the proxy and the surface
+constexpr double kMostMove =
+    0.25;                      // mm, of the proxy in one tick: it follows hands of at most 250 mm/s
+constexpr double kLever = 10;  // mm, makes turns comparable to moves
 constexpr int kMostSweeps = 100;
 constexpr double kSolved = 1e-6;  // mm, by which no row changes the motion any more
 
