@@ -66,8 +66,9 @@ std::string panelOf(const Panel& panel, double top) {
     }
     svg += "'/>\n";
     svg +=
-        format("<text x='%g' y='%g' fill='%s' text-anchor='end'>%s</text>\n", kWidth - kRight - 4,
-               top + kTop + 14 + 16 * static_cast<double>(k), colour, line.name.c_str());
+        format("<text x='%g' y='%g' fill='%s'>%s</text>\n", kLeft + 8,
+               top + kHeight - kBottom - 8 - 16 * static_cast<double>(panel.lines.size() - 1 - k),
+               colour, line.name.c_str());
   }
   return svg;
 }
