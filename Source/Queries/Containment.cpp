@@ -141,6 +141,14 @@ void findInside(const SearchableGeometry& vertices, const SearchableGeometry& bo
   });
 }
 
+bool isClosed(SearchableGeometry& body) {
+  MeshTopology& topology = body.mesh.topology;
+  if (body.solid) return true;  // its tetrahedra define its inside
+  if (!topology.hasFaces()) return false;
+  if (!topology.closed) topology.closed = findMeshDefects(topology.triangles).closed();
+  return *topology.closed;
+}
+
 void checkInside(SearchableGeometry& body, const InsideSettings& settings) {
   if (settings.rule != InsideRule::Closed && settings.rule != InsideRule::WindingNumber)
     throw Error(ErrorCode::InvalidSettings,
@@ -158,9 +166,7 @@ void checkInside(SearchableGeometry& body, const InsideSettings& settings) {
                 nameOf(body.id) + " is " + nameOf(topology.type) + ", which has no inside",
                 body.id);
   if (settings.rule == InsideRule::WindingNumber) return;
-  if (body.solid) return;  // its tetrahedra define its inside
-  if (!topology.closed) topology.closed = findMeshDefects(topology.triangles).closed();
-  if (*topology.closed) return;
+  if (isClosed(body)) return;
   const MeshDefects defects = findMeshDefects(topology.triangles);
   const auto describe = [](const std::vector<Segment>& edges, const char* what) {
     if (edges.empty()) return std::string();

@@ -4,6 +4,7 @@
 #include <palpate/SpatialQueries.h>
 
 #include "Core/Threads.h"
+#include "Queries/PathIntervals.h"
 #include "Queries/PointDistances.h"
 #include "Queries/RayHits.h"
 #include "Queries/SearchableGeometry.h"
@@ -32,6 +33,7 @@ class SpatialQueries::Source {
     std::vector<std::uint32_t> elements;
     Buffer<std::uint32_t> nearShape;
     ShapeContactBuffers shapeContacts;
+    PathScratch path;
   };
   /// Scratch lent to one call.
   class Loan {
@@ -81,6 +83,8 @@ class SpatialQueries::Source {
   // Update the structures that are made when a query first needs them. Run by one thread at a time.
   void prepareInside(SearchableGeometry& body, const InsideSettings&);
   void prepareTetrahedra(SearchableGeometry& solid);
+  /// For InsideRule::Closed; returns false for a body without an inside.
+  bool prepareIfClosed(SearchableGeometry& body);
 
  protected:
   /// Locked while octrees, and the structures that queries add to them, are updated.

@@ -107,8 +107,7 @@ void RayHits::intersect(std::uint32_t place, F&& f) const {
     return;
   }
   if (mesh.topology.hasFaces()) {
-    if (const auto interval =
-            intersectRay(m_ray, mesh.now[a], mesh.now[b], mesh.now[c], m_radius))
+    if (const auto interval = intersectRay(m_ray, mesh.now[a], mesh.now[b], mesh.now[c], m_radius))
       f(*interval);
     return;
   }

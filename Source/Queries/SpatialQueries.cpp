@@ -7,6 +7,8 @@
 #include "Math/ClosestPoint.h"
 #include "Queries/Containment.h"
 #include "Queries/Embedding.h"
+#include "Queries/GeometryDistances.h"
+#include "Queries/PathIntervals.h"
 #include "Queries/PointDistances.h"
 #include "Queries/QuerySource.h"
 #include "Queries/RayHits.h"
@@ -61,6 +63,13 @@ void SpatialQueries::Source::prepareInside(SearchableGeometry& body,
     body.windingNumbers.update(body, Workers(*this));
   else if (settings.rule == InsideRule::Closed && body.solid)
     updateTetrahedra(body, octreeSettings(), Workers(*this));
+}
+
+bool SpatialQueries::Source::prepareIfClosed(SearchableGeometry& body) {
+  const std::lock_guard lock(m_preparationMutex);
+  if (!isClosed(body)) return false;
+  if (body.solid) updateTetrahedra(body, octreeSettings(), Workers(*this));
+  return true;
 }
 
 void SpatialQueries::Source::prepareTetrahedra(SearchableGeometry& solid) {
@@ -475,6 +484,81 @@ void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
   });
   out.reserve(found.size());  // nothing below throws
   out.assign(found.begin(), found.end());
+}
+
+GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  const SearchableGeometry &a = source.at(idA), &b = source.at(idB);
+  if (idA == idB)
+    throw Error(ErrorCode::InvalidSettings, "distance() was called for " + nameOf(idA) + " twice",
+                idA);
+  const bool bruteForce = source.engine() == Engine::BruteForce;
+  if (!a.shape && !b.shape) return distanceBetween(a, b, bruteForce);
+  if (!a.shape) return distanceBetween(a, idB, b.shape->now, bruteForce);
+  if (!b.shape) {
+    const GeometryDistance found = distanceBetween(b, idA, a.shape->now, bruteForce);
+    return {found.b, found.a, found.distance};
+  }
+  const Shape &first = a.shape->now, &second = b.shape->now;
+  if (first.isPlane() && second.isPlane())
+    throw Error(ErrorCode::UnsupportedMethod,
+                nameOf(idA) + " and " + nameOf(idB) + " are both planes", idA);
+  const Source::Loan scratch(source);
+  const ShapePairDistance found = first.distanceFrom(second, scratch->shapeContacts.shapePair);
+  const double distance = std::max(0.0, found.distance);
+  const Eigen::Vector3d pointB = found.distance > 0.0 ? found.pointB : found.pointA;
+  const auto at = [&](GeometryId id, const Eigen::Vector3d& point) {
+    return SurfacePoint{id, kNoElement, {}, Eigen::Vector3d::Zero(), point, distance};
+  };
+  return {at(idA, found.pointA), at(idB, pointB), distance};
+}
+
+void SpatialQueries::path(std::span<const Eigen::Vector3d> polyline, double radius,
+                          std::span<const GeometryId> bodies, std::vector<PathInterval>& inside,
+                          std::vector<PathClearance>& outside) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  checkLength(radius, "radius", true);
+  if (polyline.size() < 2)
+    throw Error(ErrorCode::InvalidSettings, "the path has " + std::to_string(polyline.size()) +
+                                                " points; it must have 2 or more");
+  for (std::size_t i = 0; i < polyline.size(); ++i)
+    if (!polyline[i].allFinite())
+      throw Error(ErrorCode::NonFinitePosition,
+                  "point " + std::to_string(i) + " of the path is " + textOf(polyline[i]));
+  const Source::Loan scratch(source);
+  PathScratch& found = scratch->path;
+  const PathLine path(polyline, found.lengths);
+  if (!std::isfinite(path.length()))
+    throw Error(ErrorCode::InvalidSettings, "the path's length is not finite");
+  const bool bruteForce = source.engine() == Engine::BruteForce;
+  const InsideSettings closed;
+  found.inside.clear();
+  found.outside.clear();
+  for (const GeometryId id : bodies) {
+    SearchableGeometry& body = source.at(id);
+    const bool isBody = !body.shape && source.prepareIfClosed(body);
+    if (body.shape)
+      findPathParts(body.shape->now, path, radius, found.parts);
+    else
+      findPathParts(body, path, radius, bruteForce, scratch->met, found.parts);
+    const std::size_t before = found.inside.size();
+    joinPathParts(
+        id, path, found.parts, radius > 0.0 || !isBody,
+        [&](const Eigen::Vector3d& point) {
+          return isBody && isInside(body, point, closed, source.engine(), scratch->stack);
+        },
+        found.inside);
+    if (found.inside.size() == before)
+      found.outside.push_back(clearanceOf(body, path, radius, bruteForce));
+  }
+  std::stable_sort(found.inside.begin(), found.inside.end(),
+                   [](const PathInterval& a, const PathInterval& b) { return a.enter < b.enter; });
+  inside.reserve(found.inside.size());
+  outside.reserve(found.outside.size());  // nothing below throws
+  inside.assign(found.inside.begin(), found.inside.end());
+  outside.assign(found.outside.begin(), found.outside.end());
 }
 
 void SpatialQueries::findInsideVertices(GeometryId vertices, GeometryId body,

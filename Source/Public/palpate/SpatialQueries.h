@@ -70,11 +70,28 @@ struct Pick {
   std::array<std::uint32_t, 2> edge;  ///< lower vertex first
 };
 
-/// The distance of two geometries, with their closest points. 0, and a point of both, if they have
-/// a common point.
+/// The least distance of two geometries, with their closest points. It is 0 if they have a common
+/// point, which a and b then are.
 struct GeometryDistance {
-  SurfacePoint a, b;
-  double distance;  ///< L
+  SurfacePoint a, b;  ///< both have this distance
+  double distance;    ///< L, less the radii of lines and points; never negative
+};
+
+/// A part of a path that is in a body. Its ends are arc lengths, in L.
+struct PathInterval {
+  GeometryId body;
+  double enter, leave;
+  /// Where the path enters and leaves. kNoElement for a shape, where the path starts or ends
+  /// inside, and of a tetrahedral mesh where the path meets no surface.
+  std::uint32_t entryElement, exitElement;
+};
+
+/// The least distance of a path to a body that it does not enter.
+struct PathClearance {
+  GeometryId body;
+  double distance;       ///< L, less the path's radius; 0: it touches the surface
+  double at;             ///< arc length, in L
+  SurfacePoint nearest;  ///< has this distance; kNoElement for a shape, or if there is no surface
 };
 
 /// Spatial queries over the geometries of one OctreeBasedCD, at their positions now. Get the object
@@ -178,6 +195,34 @@ class PALPATE_EXPORT SpatialQueries {
   void contacts(GeometryId, const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
                 const Eigen::Vector3d& translation, double thickness,
                 std::vector<ShapeContact>& out) const;
+
+  /// The least distance of two geometries. Meshes count as surfaces: a mesh inside another one has
+  /// the distance of their surfaces. Lines and points with radii, and shapes, are solid. Of equally
+  /// near elements, by computed distance, both are the lowest. If a mesh has no elements, the
+  /// distance is infinite and the element is kNoElement.
+  ///
+  /// Accuracy whether triangles, lines and points without radii have a common point is decided
+  ///          exactly. Distances have the accuracy of edgeEdgeDistance().
+  /// Errors   InvalidSettings if both geometries are the same; UnsupportedMethod for two planes.
+  GeometryDistance distance(GeometryId a, GeometryId b) const;
+  /// Follows a ball along a polyline, as a needle or a drill moves, and finds where it is in each
+  /// body. With radius 0 it is a point.
+  ///
+  /// A ball is in a body from where it first touches the surface until it touches it no more and is
+  /// outside by contains(). A point that only touches the surface of a body with an inside is not
+  /// in it. Bodies are closed triangle meshes, tetrahedral meshes and shapes. Other meshes have no
+  /// inside: the ball is in them while it touches them.
+  ///
+  /// inside   by ascending `enter`, then in the order of `bodies`.
+  /// outside  for each body without an interval, in the order of `bodies`.
+  /// Accuracy with radius 0, which triangles the path meets is decided exactly. Other arc lengths
+  ///          are within 2^-40 of the largest coordinate, divided by the sine of the angle between
+  ///          path and surface.
+  /// Errors   NonFinitePosition; InvalidSettings for fewer than two points, for a radius that is
+  ///          negative or not finite, or if the path's length is not finite.
+  void path(std::span<const Eigen::Vector3d> polyline, double radius,
+            std::span<const GeometryId> bodies, std::vector<PathInterval>& inside,
+            std::vector<PathClearance>& outside) const;
 
   /// Finds the vertices of one geometry that are inside another, the body. It finds them at any
   /// depth, also in concave bodies, and where no triangles intersect.
