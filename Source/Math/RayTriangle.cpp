@@ -1,7 +1,9 @@
 #include "Math/RayTriangle.h"
 
+#include "Exact/Compensated.h"
 #include "Exact/ErrorBounds.h"
 #include "Exact/Rational.h"
+#include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>
@@ -214,15 +216,44 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
   const double error =
       (height.error + std::abs(t) * facing.error) / std::abs(facing.value) * (1.0 + 0x1p-40) +
       std::abs(t) * 0x1p-52;
-  // Where the ray grazes the triangle, t is computed exactly and then rounded.
-  const double extent =
-      std::max({p.cwiseAbs().maxCoeff(), q.cwiseAbs().maxCoeff(), r.cwiseAbs().maxCoeff()});
-  const bool isAccurate =
-      facing.sign() == most && error * ray.direction.cwiseAbs().maxCoeff() <= kRayError * extent;
-  if (!isAccurate) return intersectRayExactly(ray, a, b, c);
+  if (facing.sign() != most) return intersectRayExactly(ray, a, b, c);
   if (t + error < ray.tMin || t - error > ray.tMax) return {};
   if (!(t - error >= ray.tMin && t + error <= ray.tMax)) return intersectRayExactly(ray, a, b, c);
   return RayInterval{t, t, error, static_cast<std::int8_t>(most), most < 0};
+}
+
+RayPoint firstPoint(const RaySegment& ray, const RayInterval& interval, const Eigen::Vector3d& a,
+                    const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+  const Eigen::Vector3d& d = ray.direction;
+  const Difference p = difference(a, ray.origin), u = difference(b, a), v = difference(c, a);
+  const double extent =
+      std::max({largest(p.high), largest(b - ray.origin), largest(c - ray.origin)});
+  const double most = kRayError * extent / largest(d), t = interval.first;
+  // The step from t to the triangle's plane, by the distance of the ray's point from a.
+  const Eigen::Vector3d normal = accurateCross(u, v);
+  Eigen::Vector3d left;
+  for (int i = 0; i < 3; ++i) {
+    const RoundedWithError along = exactProduct(d[i], t), rest = exactSum(p.high[i], -along.value);
+    left[i] = rest.value + (rest.error + (p.low[i] - along.error));
+  }
+  const double slope = dot(normal, d), step = dot(normal, left) / slope;
+  const Eigen::Vector3d sizes =
+      normal.cwiseAbs() + Eigen::Vector3d::Constant(kAccurateCrossLoss * sumOfMagnitudes(u.high) *
+                                                    sumOfMagnitudes(v.high));
+  const double error = kRefinedRayError *
+                       (dot(sizes, left.cwiseAbs()) + std::abs(step) * dot(sizes, d.cwiseAbs())) /
+                       std::abs(slope);
+  if (interval.error > 0 && isModerate(extent) && isModerate(largest(d)) &&
+      isModerate(largest(normal)) && error <= most) {
+    const Eigen::Vector3d onPlane = step * d - left;  // from a
+    const double square = dot(normal, normal),
+                 ofB = std::clamp(dot(onPlane.cross(v.high), normal) / square, 0.0, 1.0),
+                 ofC = std::clamp(dot(u.high.cross(onPlane), normal) / square, 0.0, 1.0 - ofB);
+    return {t + step, {(1.0 - ofB) - ofC, ofB, ofC}};
+  }
+  const auto exact = interval.error <= most ? interval : *intersectRayExactly(ray, a, b, c);
+  const Eigen::Vector3d point = ray.origin + exact.first * d;
+  return {exact.first, finiteVertexTriangleDistance(point, a, b, c).barycentric};
 }
 
 }  // namespace palpate

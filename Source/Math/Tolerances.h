@@ -128,8 +128,11 @@ constexpr double kNearestError = 0x1p-40;
 /// and a margin.
 constexpr double kNearestSlack = 0x1p-45;
 /// Error of a ray's point on a triangle, relative to the largest coordinate difference between the
-/// ray's origin and the triangle. Where floating point would err by more, integers compute it.
+/// ray's origin and the triangle.
 constexpr double kRayError = 0x1p-50;
+/// Error of a refined ray's parameter, relative to the terms of its last step: 2^-52 each from the
+/// normal and from the distance, some ten roundings, and a margin.
+constexpr double kRefinedRayError = 0x1p-48;
 /// Relative error of a quotient of integers that was rounded to double.
 constexpr double kRationalError = 0x1p-52;
 /// Error of a ray's interval inside a round segment, relative to the lengths that it comes from.

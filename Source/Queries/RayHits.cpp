@@ -1,5 +1,6 @@
 #include "Queries/RayHits.h"
 
+#include "Math/ClosestPoint.h"
 #include "Math/RoundSegment.h"
 #include "Math/Tolerances.h"
 
@@ -165,9 +166,13 @@ int RayHits::compare(const Met& one, bool lastOfFirst, const Met& two, bool last
 RayHit RayHits::hitOf(const Met& met, double t, bool frontFace, bool crosses) const {
   const Triangle& corners = m_geometry.tree.ordered()[met.place];
   const Positions& now = m_geometry.mesh.now;
+  const Vector3d a = now[corners[0]], b = now[corners[1]], c = now[corners[2]];
+  if (!m_isSolid) {
+    const RayPoint at = firstPoint(m_ray, met.interval, a, b, c);
+    return {m_geometry.id, met.element, corners, at.weights, at.t, frontFace, crosses};
+  }
   const Vector3d point = m_ray.origin + t * m_ray.direction;
-  const Vector3d weights =
-      vertexTriangleDistance(point, now[corners[0]], now[corners[1]], now[corners[2]]).barycentric;
+  const Vector3d weights = finiteVertexTriangleDistance(point, a, b, c).barycentric;
   return {m_geometry.id, met.element, corners, weights, t, frontFace, crosses};
 }
 
