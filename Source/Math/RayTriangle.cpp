@@ -230,22 +230,23 @@ RayPoint firstPoint(const RaySegment& ray, const RayInterval& interval, const Ei
       std::max({largest(p.high), largest(b - ray.origin), largest(c - ray.origin)});
   const double most = kRayError * extent / largest(d), t = interval.first;
   // The step from t to the triangle's plane, by the distance of the ray's point from a.
-  const Eigen::Vector3d normal = accurateCross(u, v);
-  Eigen::Vector3d left;
+  const Difference normals = cross(u, v);
+  const Eigen::Vector3d& normal = normals.high;
+  Difference left;
   for (int i = 0; i < 3; ++i) {
     const RoundedWithError along = exactProduct(d[i], t), rest = exactSum(p.high[i], -along.value);
-    left[i] = rest.value + (rest.error + (p.low[i] - along.error));
+    const RoundedWithError all = exactSum(rest.value, rest.error + (p.low[i] - along.error));
+    left.high[i] = all.value;
+    left.low[i] = all.error;
   }
-  const double slope = dot(normal, d), step = dot(normal, left) / slope;
-  const Eigen::Vector3d sizes =
-      normal.cwiseAbs() + Eigen::Vector3d::Constant(kAccurateCrossLoss * sumOfMagnitudes(u.high) *
-                                                    sumOfMagnitudes(v.high));
-  const double error = kRefinedRayError *
-                       (dot(sizes, left.cwiseAbs()) + std::abs(step) * dot(sizes, d.cwiseAbs())) /
+  const double slope = dot(normal, d), step = accurateDot(normals, left) / slope;
+  const double crossSize = sumOfMagnitudes(u.high) * sumOfMagnitudes(v.high);
+  const double error = (kRefinedRayLoss * crossSize * sumOfMagnitudes(left.high) +
+                        kRefinedRayError * std::abs(step) * crossSize * sumOfMagnitudes(d)) /
                        std::abs(slope);
   if (interval.error > 0 && isModerate(extent) && isModerate(largest(d)) &&
       isModerate(largest(normal)) && error <= most) {
-    const Eigen::Vector3d onPlane = step * d - left;  // from a
+    const Eigen::Vector3d onPlane = step * d - left.high;  // from a
     const double square = dot(normal, normal),
                  ofB = std::clamp(dot(onPlane.cross(v.high), normal) / square, 0.0, 1.0),
                  ofC = std::clamp(dot(u.high.cross(onPlane), normal) / square, 0.0, 1.0 - ofB);

@@ -130,8 +130,9 @@ constexpr double kNearestSlack = 0x1p-45;
 /// Error of a ray's point on a triangle, relative to the largest coordinate difference between the
 /// ray's origin and the triangle.
 constexpr double kRayError = 0x1p-50;
-/// Error of a refined ray's parameter, relative to the terms of its last step: 2^-52 each from the
-/// normal and from the distance, some ten roundings, and a margin.
+/// Errors of the last step of a refined ray's parameter: of the step's dividend, relative to the
+/// product of its factors' sums (2^-103 and 2^-98), and of its divisor.
+constexpr double kRefinedRayLoss = 0x1p-96;
 constexpr double kRefinedRayError = 0x1p-48;
 /// Relative error of a quotient of integers that was rounded to double.
 constexpr double kRationalError = 0x1p-52;
