@@ -11,6 +11,7 @@
 #include "Queries/VertexSearch.h"
 #include "Shapes/ShapeContacts.h"
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -50,7 +51,7 @@ class SpatialQueries::Source {
   };
 
   Source();
-  virtual ~Source() = default;
+  virtual ~Source();
 
   /// A number for the present state of all geometries. 0: the octrees are not up to date, or the
   /// owner is gone.
@@ -94,6 +95,7 @@ class SpatialQueries::Source {
   const std::uint64_t m_id;
   Threads m_singleThread{1};
   std::mutex m_poolMutex;
+  std::atomic<Scratch*> m_spareScratch = nullptr;  ///< the one that is likely to be lent next
   std::mutex m_scratchMutex;
   std::vector<std::unique_ptr<Scratch>> m_freeScratch;
 };

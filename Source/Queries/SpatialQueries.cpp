@@ -35,7 +35,11 @@ std::uint64_t nextSourceId() {
 
 SpatialQueries::Source::Source() : m_id(nextSourceId()) {}
 
-SpatialQueries::Source::Loan::Loan(Source& source) : m_source(source) {
+SpatialQueries::Source::~Source() { delete m_spareScratch.load(); }
+
+SpatialQueries::Source::Loan::Loan(Source& source)
+    : m_source(source), m_scratch(source.m_spareScratch.exchange(nullptr)) {
+  if (m_scratch) return;
   {
     const std::lock_guard lock(source.m_scratchMutex);
     if (!source.m_freeScratch.empty()) {
@@ -48,6 +52,11 @@ SpatialQueries::Source::Loan::Loan(Source& source) : m_source(source) {
 }
 
 SpatialQueries::Source::Loan::~Loan() {
+  Scratch* none = nullptr;
+  if (m_source.m_spareScratch.compare_exchange_strong(none, m_scratch.get())) {
+    m_scratch.release();
+    return;
+  }
   const std::lock_guard lock(m_source.m_scratchMutex);
   try {
     m_source.m_freeScratch.push_back(std::move(m_scratch));
