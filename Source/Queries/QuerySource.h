@@ -35,6 +35,10 @@ class SpatialQueries::Source {
     Buffer<std::uint32_t> nearShape;
     ShapeContactBuffers shapeContacts;
     PathScratch path;
+    std::vector<std::uint64_t> bits;
+
+    /// Sorts different numbers: as bits of a field if they lie close together.
+    void sort(std::vector<std::uint32_t>& numbers);
   };
   /// Scratch lent to one call.
   class Loan {

@@ -3,15 +3,21 @@
 #include "Core/Buffer.h"
 #include "Octree/PointQueries.h"
 #include "Queries/SearchableGeometry.h"
-#include "Shapes/Shape.h"
+
+#include <palpate/AnalyticalGeometry.h>
 
 #include <cstdint>
 #include <vector>
 
 namespace palpate {
 
-/// Appends the elements that meet a shape, in any order. bruteForce: every element is tested.
-void findOverlapping(const SearchableGeometry&, const Shape&, bool bruteForce, PointQueryStack&,
-                     Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out);
+/// Appends the elements that meet a shape at a pose, in any order. bruteForce: every element is
+/// tested, by the shape's distance alone.
+///
+/// Method   floats decide most nodes and elements for spheres, capsules, boxes and hulls. Polygons
+///          clipped in double decide most others. The shape's distance decides the rest.
+void findOverlapping(const SearchableGeometry&, const AnalyticalGeometry&, const RigidTransform&,
+                     bool bruteForce, PointQueryStack&, Buffer<std::uint32_t>& near,
+                     std::vector<std::uint32_t>& out);
 
 }  // namespace palpate

@@ -18,6 +18,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <tuple>
 #include <utility>
@@ -62,6 +63,23 @@ SpatialQueries::Source::Loan::~Loan() {
     m_source.m_freeScratch.push_back(std::move(m_scratch));
   } catch (...) {  // no memory to keep it: the next call makes another
   }
+}
+
+void SpatialQueries::Source::Scratch::sort(std::vector<std::uint32_t>& numbers) {
+  if (numbers.empty()) return;
+  const auto [least, most] = std::minmax_element(numbers.begin(), numbers.end());
+  const std::size_t first = *least / 64, words = *most / 64 - first + 1;
+  if (words > 8 * numbers.size()) {
+    std::sort(numbers.begin(), numbers.end());
+    return;
+  }
+  bits.assign(words, 0);
+  for (const std::uint32_t i : numbers) bits[i / 64 - first] |= std::uint64_t{1} << i % 64;
+  std::size_t count = 0;
+  for (std::size_t w = 0; w < words; ++w)
+    for (std::uint64_t word = bits[w]; word; word &= word - 1)
+      numbers[count++] = static_cast<std::uint32_t>((first + w) * 64) +
+                         static_cast<std::uint32_t>(std::countr_zero(word));
 }
 
 void SpatialQueries::Source::prepareInside(SearchableGeometry& body,
@@ -421,7 +439,7 @@ void SpatialQueries::elementsWithin(GeometryId id, const Eigen::Vector3d& point,
   found.clear();
   if (!geometry.tree.ordered().empty())
     PointDistances(geometry, point, source.engine() == Engine::BruteForce).within(radius, found);
-  std::sort(found.begin(), found.end());
+  scratch->sort(found);
   elements.reserve(found.size());  // nothing below throws
   elements.assign(found.begin(), found.end());
 }
@@ -455,9 +473,9 @@ void SpatialQueries::overlapping(GeometryId id, const AnalyticalGeometry& shape,
   std::vector<std::uint32_t>& found = scratch->elements;
   found.clear();
   if (!geometry.tree.ordered().empty())
-    findOverlapping(geometry, Shape(shape, pose), source.engine() == Engine::BruteForce,
-                    scratch->stack, scratch->nearShape, found);
-  std::sort(found.begin(), found.end());
+    findOverlapping(geometry, shape, pose, source.engine() == Engine::BruteForce, scratch->stack,
+                    scratch->nearShape, found);
+  scratch->sort(found);
   elements.reserve(found.size());  // nothing below throws
   elements.assign(found.begin(), found.end());
 }

@@ -20,15 +20,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The matrix with its columns made orthonormal to the precision of double.
-Eigen::Matrix3d orthonormal(const Eigen::Matrix3d& rotation) {
-  Eigen::Matrix3d axes;
-  const Vector3d x = rotation.col(0).normalized();
-  axes << x, (rotation.col(1) - x.dot(rotation.col(1)) * x).normalized(), Vector3d::Zero();
-  axes.col(2) = x.cross(axes.col(1));
-  return axes;
-}
-
 /// A rotation that turns z into the direction.
 Eigen::Matrix3d axesAlong(const Vector3d& direction) {
   const Vector3d z = directionOf(direction), x = z.unitOrthogonal();
@@ -49,6 +40,14 @@ std::vector<Vector3d> cornersOf(const AnalyticalGeometry& geometry) {
 }
 
 }  // namespace
+
+Eigen::Matrix3d orthonormal(const Eigen::Matrix3d& rotation) {
+  Eigen::Matrix3d axes;
+  const Vector3d x = rotation.col(0).normalized();
+  axes << x, (rotation.col(1) - x.dot(rotation.col(1)) * x).normalized(), Vector3d::Zero();
+  axes.col(2) = x.cross(axes.col(1));
+  return axes;
+}
 
 Shape::Shape(const AnalyticalGeometry& geometry, const RigidTransform& transform) {
   if (const std::vector<Vector3d> corners = cornersOf(geometry); !corners.empty()) {

@@ -44,6 +44,9 @@ struct ShapePairDistance {
   ShapePairDistance exchanged() const { return {pointB, pointA, -normal, distance}; }
 };
 
+/// The matrix with its columns made orthonormal to the precision of double.
+Eigen::Matrix3d orthonormal(const Eigen::Matrix3d& rotation);
+
 struct ShapePairScratch;
 
 /// An analytical shape in the world.
