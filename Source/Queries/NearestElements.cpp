@@ -172,10 +172,15 @@ class Search {
 
   /// Tests the pending elements.
   HWY_ATTR HWY_INLINE void test() {
-    const LeafTag d;
     alignas(64) float lowers[kSide], uppers[kSide];
-    for (std::size_t i = 0; i < m_pending; i += hn::Lanes(d))
-      boundDistances(d, m_corners, i, m_search.slack, lowers, uppers);
+    const auto bound = [&](auto d) HWY_ATTR {
+      for (std::size_t i = 0; i < m_pending; i += hn::Lanes(d))
+        boundDistances(d, m_corners, i, m_search.slack, lowers, uppers);
+    };
+    if (m_pending <= hn::Lanes(NodeTag()))
+      bound(NodeTag());
+    else
+      bound(LeafTag());
     for (std::size_t i = 0; m_count > 0 && i < m_pending; ++i) keepLeast(uppers[i]);
     for (std::size_t i = 0; i < m_pending; ++i) {
       if (lowers[i] > m_bound + m_search.tolerance) continue;
