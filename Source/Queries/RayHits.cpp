@@ -136,6 +136,15 @@ double RayHits::collect(Wanted wanted, double tMax, double atLeast) {
     if (wanted == Wanted::Any && !m_met.empty()) return -1.0f;
     return std::min(ray->ray.tMax, ray->floatOf(std::max(last + error, atLeast)));
   });
+  if (wanted != Wanted::First) return atLeast;
+  // Elements come in any order. Some were met before the part had grown as far as to them.
+  std::sort(m_met.begin(), m_met.end(),
+            [](const Met& a, const Met& b) { return a.interval.first < b.interval.first; });
+  for (const auto& [interval, place, element] : m_met) {
+    if (interval.first - interval.error > last + error) break;
+    last = std::max(last, interval.last);
+    error = std::max(error, interval.error);
+  }
   return std::min(tMax, last + error) > least ? std::min(tMax, last + error) : atLeast;
 }
 
