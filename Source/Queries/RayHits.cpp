@@ -44,11 +44,15 @@ std::optional<ClippedRay> clip(const SearchableGeometry& geometry, const RaySegm
   double extent = 0.0;
   for (std::size_t k = 0; k < 3; ++k)
     extent = std::max({extent, double{std::abs(root.lower[k])}, double{std::abs(root.upper[k])}});
-  // Within the root box every coordinate is at most `extent`, and t grows by at most three times
-  // that. Its floats err by at most 2^-20 of it; kFloatRayError has a margin. The rest are errors
-  // of the origin in double.
-  const double slack = kFloatRayError * extent + kPlacedPointError * origin.cwiseAbs().maxCoeff() +
-                       error * frame.scale + OutwardRounding::kAbsolute;
+  // Boxes enclose centre lines and points without their radii.
+  const double radius = geometry.mesh.largestRadius * frame.scale;
+  extent += radius;
+  // Within the grown root box every coordinate is at most `extent`, and t grows by at most three
+  // times that. Its floats err by at most 2^-20 of it; kFloatRayError has a margin. The rest are
+  // errors of the origin in double.
+  const double slack = radius + kFloatRayError * extent +
+                       kPlacedPointError * origin.cwiseAbs().maxCoeff() + error * frame.scale +
+                       OutwardRounding::kAbsolute;
   ClippedRay clipped{
       {{0, 0, 0}, {}, 0, OutwardRounding::up(static_cast<float>(slack))}, ray.tMin, perT};
   if (!(extent < kLargestFloat) || !(perT >= 0x1p-900) || !(perT <= 0x1p900) ||
