@@ -156,6 +156,15 @@ inline Rational facingOf(const Ray& ray, const Positions& positions, const Trian
              cross(toRational(positions[t[1]]) - a, toRational(positions[t[2]]) - a));
 }
 
+/// Whether the ray's line certainly misses an element, by a ball around it.
+inline bool certainlyMisses(const Ray& ray, const Positions& positions, const Triangle& t) {
+  const Vector3d centre = positions[t[0]], from = centre - ray.origin;
+  const double radius =
+      std::max((positions[t[1]] - centre).stableNorm(), (positions[t[2]] - centre).stableNorm());
+  const double apart = from.cross(ray.direction.stableNormalized()).stableNorm();
+  return apart > radius + 1e-3 * (radius + from.stableNorm());  // NaN: it may not
+}
+
 /// A connected part of what a ray and a surface share.
 struct RationalHit {
   Rational first, last;
@@ -169,6 +178,7 @@ inline std::vector<RationalHit> hitsOf(const Ray& ray, const Positions& position
                        direction = oracle::toRational(ray.direction);
   std::vector<RationalHit> ranges;
   for (std::uint32_t e = 0; e < elements.size(); ++e) {
+    if (certainlyMisses(ray, positions, elements[e])) continue;
     std::array<oracle::Vector, 3> corners;
     for (std::size_t i = 0; i < 3; ++i) corners[i] = oracle::toRational(positions[elements[e][i]]);
     auto range = rayOn(origin, direction, corners);
