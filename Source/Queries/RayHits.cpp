@@ -43,12 +43,13 @@ std::optional<ClippedRay> clip(const SearchableGeometry& geometry, const RaySegm
   origin = (origin - frame.origin) * frame.scale;
   direction /= direction.cwiseAbs().maxCoeff();
   const FloatBox root = geometry.tree.octree().box(0);
-  double extent = radius * frame.scale;
+  double extent = 0.0;
   for (std::size_t k = 0; k < 3; ++k)
     extent = std::max({extent, double{std::abs(root.lower[k])}, double{std::abs(root.upper[k])}});
-  // Within the root box every coordinate is at most `extent`, and t grows by at most three times
-  // that. Its floats err by at most 2^-20 of it; kFloatRayError has a margin. The rest are errors
-  // of the origin in double.
+  extent += radius * frame.scale;
+  // Within the grown root box every coordinate is at most `extent`, and t grows by at most three
+  // times that. Its floats err by at most 2^-20 of it; kFloatRayError has a margin. The rest are
+  // errors of the origin in double.
   const double slack = kFloatRayError * extent + kPlacedPointError * origin.cwiseAbs().maxCoeff() +
                        (error + radius * (1.0 + kNearestError)) * frame.scale +
                        OutwardRounding::kAbsolute;
@@ -145,6 +146,15 @@ double RayHits::collect(Wanted wanted, double tMax, double atLeast) {
     if (wanted == Wanted::Any && !m_met.empty()) return -1.0f;
     return std::min(ray->ray.tMax, ray->floatOf(std::max(last + error, atLeast)));
   });
+  if (wanted != Wanted::First) return atLeast;
+  // Elements come in any order. Some were met before the part had grown as far as to them.
+  std::sort(m_met.begin(), m_met.end(),
+            [](const Met& a, const Met& b) { return a.interval.first < b.interval.first; });
+  for (const auto& [interval, place, element] : m_met) {
+    if (interval.first - interval.error > last + error) break;
+    last = std::max(last, interval.last);
+    error = std::max(error, interval.error);
+  }
   return std::min(tMax, last + error) > least ? std::min(tMax, last + error) : atLeast;
 }
 

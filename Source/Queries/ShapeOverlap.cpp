@@ -2,6 +2,7 @@
 
 #include "Math/Tolerances.h"
 #include "Queries/ElementsNearShape.h"
+#include "Math/TriangleIntersection.h"
 #include "Queries/OverlapSearch.h"
 #include "Shapes/Shape.h"
 
@@ -19,9 +20,24 @@ namespace {
 
 using Eigen::Vector3d;
 
+/// Whether an element without radius has a point in a hull or a box, decided exactly on its placed
+/// corners.
+bool meetsHull(const Corners& element, const Shape& hull) {
+  SignCounts counts;
+  bool isInside = true;  // the first corner
+  for (const auto& [i, j, k] : hull.faces()) {
+    const Corners face{hull.corners()[i], hull.corners()[j], hull.corners()[k]};
+    if (intersectTriangles(face, element, counts).intersect()) return true;
+    isInside = isInside && OrientedPlane(face[0], face[1], face[2]).side(element[0], counts) < 0;
+  }
+  return isInside;
+}
+
 /// Whether an element has a point in the shape. Radii of lines and points enlarge it.
 bool meets(const TriangleMesh& mesh, const Triangle& corners, const Shape& shape) {
   const auto at = [&](std::size_t i) { return mesh.now[corners[i % 3]]; };
+  if (shape.hasCorners() && shape.faces().size() > 1 && mesh.largestRadius == 0.0)
+    return meetsHull({at(0), at(1), at(2)}, shape);
   if (corners[0] == corners[1])
     return shape.signedDistance(at(0)).distance <= mesh.radius(corners[0]);
   for (std::size_t i = 0; i < 3; ++i) {

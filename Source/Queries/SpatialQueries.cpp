@@ -507,7 +507,7 @@ void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
                       scratch->shapeContacts);
   }
   std::sort(found.begin(), found.end(), [](const ShapeContact& a, const ShapeContact& b) {
-    return std::tie(a.element, a.vertices) < std::tie(b.element, b.vertices);
+    return std::tie(a.element, a.id, a.vertices) < std::tie(b.element, b.id, b.vertices);
   });
   out.reserve(found.size());  // nothing below throws
   out.assign(found.begin(), found.end());
