@@ -93,13 +93,14 @@ class InsideQuery {
         m_settings(settings),
         m_bruteForce(engine == Engine::BruteForce),
         m_stack(stack),
-        m_surface(body, engine, stack),
-        m_solid(body, engine, stack) {}
+        m_surface(body, engine, stack) {
+    if (body.solid) m_solid.emplace(body, engine, stack);
+  }
 
   WindingNumbers::Result evaluate(const Eigen::Vector3d& p) {
     if (m_settings.rule == InsideRule::WindingNumber)
       return m_body.windingNumbers.evaluate(m_body, p, m_settings.margin, m_bruteForce, m_stack);
-    if (m_body.solid) return {m_solid.lowest(p).has_value(), true};
+    if (m_solid) return {m_solid->lowest(p).has_value(), true};
     return {m_surface.mayContain(p) && m_surface.windingNumber(p) != 0, true};
   }
   InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p) {
@@ -112,7 +113,7 @@ class InsideQuery {
   const bool m_bruteForce;
   PointQueryStack& m_stack;
   BodyQuery m_surface;
-  SolidQuery m_solid;
+  std::optional<SolidQuery> m_solid;
 };
 
 }  // namespace

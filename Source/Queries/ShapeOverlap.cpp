@@ -247,4 +247,18 @@ void findOverlapping(const SearchableGeometry& geometry, const AnalyticalGeometr
   }
 }
 
+bool findWithin(const SearchableGeometry& geometry, const Eigen::Vector3d& point, double distance,
+                std::vector<std::uint32_t>& elements, Buffer<std::uint32_t>& undecided) {
+  Convex ball;
+  ball.p = ball.q = point;
+  ball.radius = distance;
+  const auto floats = geometry.mesh.radii.empty() ? floatsOf(ball, geometry) : std::nullopt;
+  if (!floats) return false;
+  undecided.clear();
+  searchOverlapping(
+      {geometry.tree.octree(), geometry.tree.floats(), geometry.tree.ordered().data(), *floats},
+      elements, undecided);
+  return true;
+}
+
 }  // namespace palpate

@@ -20,4 +20,10 @@ void findOverlapping(const SearchableGeometry&, const AnalyticalGeometry&, const
                      bool bruteForce, PointQueryStack&, Buffer<std::uint32_t>& near,
                      std::vector<std::uint32_t>& out);
 
+/// Appends the elements whose distance from a point, less the radius, is certainly at most
+/// `distance`, and to `undecided` the places of those that may be. Returns false, without a result,
+/// where floats cannot tell.
+bool findWithin(const SearchableGeometry&, const Eigen::Vector3d& point, double distance,
+                std::vector<std::uint32_t>& elements, Buffer<std::uint32_t>& undecided);
+
 }  // namespace palpate
