@@ -117,16 +117,19 @@ class Search {
       if (begin < end) test();
       const OctreeNode child = octree.firstChild(entry.node);
       if (child == 0) continue;
-      const std::size_t first = count;
+      // The nearest one goes last, because the last entry is taken first. The others stay unsorted:
+      // once it has lowered the bound, most of them are skipped.
+      Entry nearest{std::numeric_limits<float>::infinity(), 0};
       for (std::uint32_t bits = near(NodeTag(), octree.blocks()[child >> 3], 0, 8, within); bits;
            bits &= bits - 1) {
         const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
-        // Sorted with the nearest last, because the last entry is taken first.
-        std::size_t place = count++;
-        for (; place > first && entries[place - 1].square < squares[slot]; --place)
-          entries[place] = entries[place - 1];
-        entries[place] = {squares[slot], child + slot};
+        const Entry next{squares[slot], child + slot};
+        const bool isNearer = next.square < nearest.square;
+        entries[count] = isNearer ? nearest : next;
+        nearest = isNearer ? next : nearest;
+        count += entries[count].node != 0;
       }
+      if (nearest.node != 0) entries[count++] = nearest;
     }
     if (m_candidates.size > 0) flush();
   }

@@ -85,6 +85,11 @@ class NearestToSegment {
   }
   HWY_ATTR HWY_INLINE void takeEdge(const Vector3<V>& p, const Vector3<V>& q) {
     const Vector3<V> u = setAll(d, m_shape.along), v = q - p;
+    if (m_shape.inverseSquare == 0.0f) {  // a ball
+      const V vv = dot(v, v), zero = hn::Zero(d);
+      const V t = hn::Min(hn::Max(hn::Neg(dot(v, p)) / vv, zero), hn::Set(d, 1.0f));
+      return take(p + hn::IfThenElseZero(hn::Gt(vv, zero), t) * v);
+    }
     const V uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), up = dot(u, p), vp = dot(v, p);
     const V one = hn::Set(d, 1.0f), zero = hn::Zero(d);
     const V determinant = uu * vv - uv * uv;
@@ -146,7 +151,7 @@ HWY_ATTR HWY_INLINE Verdict testTriangles(D d, const FloatConvex& shape,
     nearest.takeEdge(q, r);
     nearest.takeEdge(r, p);
     nearest.takeFace({zero, zero, zero}, p, q, r);
-    nearest.takeFace(u, p, q, r);
+    if (shape.inverseSquare > 0.0f) nearest.takeFace(u, p, q, r);
     const Vector3<V>& w = nearest.vector();
     const V length = hn::Sqrt(dot(w, w)), radius = hn::Set(d, shape.radius);
     const V gap = hn::Min(dot(w, p), hn::Min(dot(w, q), dot(w, r))) - hn::Max(dot(w, u), zero);
