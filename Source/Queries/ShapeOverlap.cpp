@@ -179,6 +179,7 @@ std::optional<FloatConvex> floatsOf(const Convex& convex, const SearchableGeomet
   }
   const double square = along.squaredNorm();
   floats.inverseSquare = square > 0x1p-100 ? static_cast<float>(1.0 / square) : 0.0f;
+  if (!(square > 0x1p-100)) floats.slack += 0x1p-50f;  // the segment counts as its first point
   floats.planeCount = convex.planeCount;
   for (std::size_t i = 0; i < convex.planeCount; ++i) {
     const auto& [normal, offset] = convex.planes[i];
