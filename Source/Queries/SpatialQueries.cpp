@@ -505,13 +505,7 @@ GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const 
     throw Error(ErrorCode::UnsupportedMethod,
                 nameOf(idA) + " and " + nameOf(idB) + " are both planes", idA);
   const Source::Loan scratch(source);
-  const ShapePairDistance found = first.distanceFrom(second, scratch->shapeContacts.shapePair);
-  const double distance = std::max(0.0, found.distance);
-  const Eigen::Vector3d pointB = found.distance > 0.0 ? found.pointB : found.pointA;
-  const auto at = [&](GeometryId id, const Eigen::Vector3d& point) {
-    return SurfacePoint{id, kNoElement, {}, Eigen::Vector3d::Zero(), point, distance};
-  };
-  return {at(idA, found.pointA), at(idB, pointB), distance};
+  return distanceBetween(idA, first, idB, second, scratch->shapeContacts.shapePair);
 }
 
 void SpatialQueries::path(std::span<const Eigen::Vector3d> polyline, double radius,
