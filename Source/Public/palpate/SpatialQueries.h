@@ -203,8 +203,9 @@ class PALPATE_EXPORT SpatialQueries {
   /// then with that of b. If a mesh has no elements, the distance is infinite and the element is
   /// kNoElement.
   ///
-  /// Where radii vary along a line, the distance is that of the centre lines less the radii at
-  /// their closest points, as in the contacts of Method::Proximity.
+  /// Where radii vary along a line, the distance is the least of all pairs of features: of an edge
+  /// and a vertex, or of two edges, it is that of their closest points less the radii there.
+  /// Elsewhere the surfaces may be slightly nearer.
   ///
   /// Accuracy whether triangles, lines and points without radii have a common point is decided
   ///          exactly. Distances have the accuracy of edgeEdgeDistance().
