@@ -139,7 +139,7 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d &p = *corners[i], &q = *corners[(i + 1) % 3];
     const RoundIntervals capsule = intersectRay(ray, p, q, radius, radius);
-    if (capsule.size > 0) add(capsule.intervals[0]);
+    for (std::size_t k = 0; k < capsule.size; ++k) add(capsule.intervals[k]);
   }
   const Eigen::Vector3d normal = (b - a).cross(c - a);
   const double twiceArea = normal.stableNorm();

@@ -1,275 +1,26 @@
 #include "Queries/GeometryDistances.h"
 
-#include <palpate/Intersection.h>
-
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
 #include "Octree/BoxMap.h"
+#include "Queries/ElementDistance.h"
+#include "Queries/PairTraversal.h"
 #include "Queries/PointDistances.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
-#include <type_traits>
+#include <optional>
 #include <utility>
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "Queries/GeometryDistances.cpp"
-#include "Core/Simd.h"
-#include "Octree/BoxLanes.h"
-
-#ifndef PALPATE_PAIR_SEARCH
-#define PALPATE_PAIR_SEARCH
 namespace palpate {
-
-/// A search for the pairs of elements of two octrees that are nearest to each other.
-struct PairSearch {
-  const Octree &a, &b;
-  BoxMap mapA, mapB;  ///< to common floats
-};
-/// Tests the elements at two places. Returns a bound in the common floats: pairs of boxes that are
-/// further apart are skipped.
-using TestPair = float (*)(void* context, std::uint32_t placeA, std::uint32_t placeB);
-
-}  // namespace palpate
-#endif
-
-HWY_BEFORE_NAMESPACE();
-namespace palpate::HWY_NAMESPACE {
-
-class PairDescent {
- public:
-  PairDescent(const PairSearch& search, void* context, TestPair test)
-      : m_search(search), m_context(context), m_test(test) {}
-
-  HWY_ATTR void run(float bound) {
-    setBound(bound);
-    push(0.0f, 0, 0);
-    while (m_count > 0) {
-      const Entry entry = m_entries[--m_count];
-      if (entry.square > m_limit) continue;
-      const FloatBox boxA = boxOf(m_search.a, m_search.mapA, entry.a),
-                     boxB = boxOf(m_search.b, m_search.mapB, entry.b);
-      const OctreeNode childA = childOf(m_search.a, entry.a), childB = childOf(m_search.b, entry.b);
-      if (childA != 0 && (childB == 0 || sizeOf(boxA) >= sizeOf(boxB)))
-        expand(m_search.a, m_search.mapA, entry.a, childA, boxB, entry.square,
-               [&](float square, OctreeNode node) { push(square, node, entry.b); });
-      else if (childB != 0)
-        expand(m_search.b, m_search.mapB, entry.b, childB, boxA, entry.square,
-               [&](float square, OctreeNode node) { push(square, entry.a, node); });
-      else
-        testElements(entry.a & ~kOwn, entry.b & ~kOwn);
-    }
-  }
-
- private:
-  /// The bit of a node of which only its own elements are left, without its children.
-  static constexpr OctreeNode kOwn = 0x80000000u;
-  struct Entry {
-    float square;
-    OctreeNode a, b;
-  };
-
-  void setBound(float bound) {
-    // Computed squares are off by less than 2^-20 of themselves.
-    m_limit = OutwardRounding::up(bound * bound * (1.0f + 0x1p-19f));
-    if (!(m_limit >= 0)) m_limit = std::numeric_limits<float>::infinity();
-  }
-  void push(float square, OctreeNode a, OctreeNode b) { m_entries[m_count++] = {square, a, b}; }
-  static OctreeNode childOf(const Octree& octree, OctreeNode node) {
-    return node & kOwn ? 0 : octree.firstChild(node);
-  }
-  HWY_ATTR static FloatBox boxOf(const Octree& octree, const BoxMap& map, OctreeNode node) {
-    return BoxLanes<BoxTag>::of(octree.box(node & ~kOwn)).mapped(map).first();
-  }
-  static float sizeOf(const FloatBox& box) {
-    return (box.upper[0] - box.lower[0]) + (box.upper[1] - box.lower[1]) +
-           (box.upper[2] - box.lower[2]);
-  }
-
-  /// Pushes the node's own elements and its children near the box, the nearest last.
-  template <class Push>
-  HWY_ATTR HWY_INLINE void expand(const Octree& octree, const BoxMap& map, OctreeNode node,
-                                  OctreeNode child, const FloatBox& other, float square,
-                                  Push&& push) {
-    const std::size_t first = m_count;
-    alignas(64) float squares[8];
-    std::uint32_t bits = 0;
-    const NodeTag d;
-    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-      const auto distances =
-          BoxLanes<NodeTag>::load(octree.blocks()[child >> 3], i).mapped(map).distanceFrom(other);
-      hn::Store(distances, d, squares + i);
-      bits |= bitsOf(d, hn::Le(distances, hn::Set(d, m_limit))) << i;
-    }
-    for (; bits; bits &= bits - 1) {
-      const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
-      if (octree.isEmpty(child + slot)) continue;
-      push(squares[slot], child + slot);
-      for (std::size_t i = m_count - 1; i > first && m_entries[i - 1].square < squares[slot]; --i)
-        std::swap(m_entries[i], m_entries[i - 1]);
-    }
-    const auto [begin, end] = octree.ownRange(node);
-    if (begin < end) push(square, node | kOwn);
-  }
-
-  HWY_ATTR void testElements(OctreeNode a, OctreeNode b) {
-    const LeafTag d;
-    constexpr std::size_t kSide = 16;
-    alignas(64) float squares[kSide];
-    const auto [beginA, endA] = m_search.a.ownRange(a);
-    const auto [beginB, endB] = m_search.b.ownRange(b);
-    for (std::uint32_t i = beginA; i < endA; ++i) {
-      const FloatBox box =
-          BoxLanes<BoxTag>::of(m_search.a.boxes()[i]).mapped(m_search.mapA).first();
-      for (std::uint32_t j = beginB; j < endB; j += kSide) {
-        const std::size_t size = std::min<std::size_t>(kSide, endB - j);
-        std::uint32_t bits = 0;
-        for (std::size_t k = 0; k < size; k += hn::Lanes(d)) {
-          const auto distances = BoxLanes<LeafTag>::load(m_search.b.boxes(), j + k)
-                                     .mapped(m_search.mapB)
-                                     .distanceFrom(box);
-          hn::Store(distances, d, squares + k);
-          bits |=
-              bitsOf(d, hn::And(hn::FirstN(d, size - k), hn::Le(distances, hn::Set(d, m_limit))))
-              << k;
-        }
-        for (; bits; bits &= bits - 1) {
-          const auto lane = static_cast<std::uint32_t>(std::countr_zero(bits));
-          if (squares[lane] <= m_limit) setBound(m_test(m_context, i, j + lane));
-        }
-      }
-    }
-  }
-
-  const PairSearch& m_search;
-  void* const m_context;
-  const TestPair m_test;
-  float m_limit = 0;  ///< of computed squared distances of boxes
-  std::size_t m_count = 0;
-  // Eight entries remain on each of at most 61 levels of each octree.
-  std::array<Entry, 1024> m_entries;
-};
-
-HWY_ATTR void searchPairsKernel(const PairSearch& search, float bound, void* context,
-                                TestPair test) {
-  PairDescent(search, context, test).run(bound);
-}
-
-}  // namespace palpate::HWY_NAMESPACE
-HWY_AFTER_NAMESPACE();
-
-#if HWY_ONCE
-namespace palpate {
-
-HWY_EXPORT(searchPairsKernel);
-
-namespace {
 
 using Eigen::Vector3d;
 
-/// The closest points of two elements.
-struct ElementDistance {
-  double distance = std::numeric_limits<double>::infinity();  ///< L, less the radii; never negative
-  Vector3d weightsA = Vector3d::Zero(), weightsB = Vector3d::Zero();
-};
-
-/// The corners of an element, whose positions are read once.
-class Element {
- public:
-  Element(const SearchableGeometry& geometry, std::uint32_t element)
-      : m_mesh(&geometry.mesh), m_vertices(geometry.mesh.topology.triangles[element]) {
-    for (std::size_t i = 0; i < 3; ++i) m_corners[i] = m_mesh->now[m_vertices[i]];
-  }
-  /// A segment without a radius.
-  Element(const Vector3d& p, const Vector3d& q) : m_vertices{0, 1, 1}, m_corners{p, q, q} {}
-
-  const Vector3d& operator[](std::size_t i) const { return m_corners[i % 3]; }
-  Vector3d point(const Vector3d& weights) const {
-    return weights[0] * m_corners[0] + weights[1] * m_corners[1] + weights[2] * m_corners[2];
-  }
-  double radius(const Vector3d& weights) const {
-    return m_mesh ? m_mesh->radius(m_vertices, weights) : 0.0;
-  }
-  double largestRadius() const { return m_mesh ? m_mesh->largestRadius : 0.0; }
-  bool isPoint() const { return m_vertices[0] == m_vertices[1] && m_vertices[1] == m_vertices[2]; }
-  /// Whether corner i repeats an earlier one, and edge i an earlier edge.
-  bool repeatsCorner(std::size_t i) const {
-    return (i > 0 && m_vertices[i] == m_vertices[0]) || (i > 1 && m_vertices[2] == m_vertices[1]);
-  }
-  bool hasEdge(std::size_t i) const {
-    return m_vertices[i] != m_vertices[(i + 1) % 3] &&
-           !(i == 2 && m_vertices[1] == m_vertices[2]);  // {p, q, q} has one edge
-  }
-
- private:
-  const TriangleMesh* m_mesh = nullptr;
-  Triangle m_vertices;
-  std::array<Vector3d, 3> m_corners;
-};
-
-Vector3d cornerWeights(std::size_t i) { return Vector3d::Unit(static_cast<Eigen::Index>(i)); }
-Vector3d edgeWeights(std::size_t i, double weight) {
-  Vector3d weights = Vector3d::Zero();
-  weights[static_cast<Eigen::Index>(i)] = 1.0 - weight;
-  weights[static_cast<Eigen::Index>((i + 1) % 3)] = weight;
-  return weights;
-}
-
-/// The nearest of all feature pairs. Features that cross meet in an edge and a face, which no
-/// feature pair is near to: then the exact test decides.
-ElementDistance elementDistance(const Element& a, const Element& b) {
-  ElementDistance best;
-  const auto take = [&](double distance, const Vector3d& weightsA, const Vector3d& weightsB) {
-    const double least = std::max(0.0, distance - a.radius(weightsA) - b.radius(weightsB));
-    if (least < best.distance) best = {least, weightsA, weightsB};
-  };
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (!a.repeatsCorner(i)) {
-      const auto found = finiteVertexTriangleDistance(a[i], b[0], b[1], b[2]);
-      take(found.distance, cornerWeights(i), found.barycentric);
-    }
-    if (!b.repeatsCorner(i)) {
-      const auto found = finiteVertexTriangleDistance(b[i], a[0], a[1], a[2]);
-      take(found.distance, found.barycentric, cornerWeights(i));
-    }
-    for (std::size_t j = 0; j < 3 && a.hasEdge(i); ++j) {
-      if (!b.hasEdge(j)) continue;
-      const auto found = finiteEdgeEdgeDistance(a[i], a[i + 1], b[j], b[j + 1]);
-      take(found.distance, edgeWeights(i, found.weightA), edgeWeights(j, found.weightB));
-    }
-  }
-  return best;
-}
-
-/// A common point of two triangles that intersect: where an edge of one crosses the other.
-std::optional<ElementDistance> crossing(const Element& a, const Element& b) {
-  if (!trianglesIntersect(a[0], a[1], a[2], b[0], b[1], b[2])) return {};
-  const auto edgeIn = [](const Element& edges, const Element& face, ElementDistance& found,
-                         bool exchanged) {
-    const Vector3d normal = (face[1] - face[0]).cross(face[2] - face[0]);
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (!trianglesIntersect(edges[i], edges[i + 1], edges[i + 1], face[0], face[1], face[2]))
-        continue;
-      const double from = normal.dot(edges[i] - face[0]), to = normal.dot(edges[i + 1] - face[0]);
-      const double weight = from == to ? 0.5 : std::clamp(from / (from - to), 0.0, 1.0);
-      const Vector3d point = edges[i] + weight * (edges[i + 1] - edges[i]);
-      const Vector3d onFace =
-          finiteVertexTriangleDistance(point, face[0], face[1], face[2]).barycentric;
-      found = {0.0, edgeWeights(i, weight), onFace};
-      if (exchanged) std::swap(found.weightsA, found.weightsB);
-      return true;
-    }
-    return false;
-  };
-  ElementDistance found;
-  if (edgeIn(a, b, found, false) || edgeIn(b, a, found, true)) return found;
-  return {};
-}
+namespace {
 
 SurfacePoint surfacePoint(const SearchableGeometry& geometry, std::uint32_t element,
                           const Vector3d& weights, double distance) {
@@ -298,6 +49,12 @@ BoxMap mapAbout(const SearchableGeometry& geometry, const Vector3d& origin) {
   return map;
 }
 
+double sizeOf(const FloatBox& box) {
+  double size = 0;
+  for (std::size_t k = 0; k < 3; ++k) size += double{box.upper[k]} - box.lower[k];
+  return size;
+}
+
 /// The nearest pair of elements that was found so far.
 class NearestPair {
  public:
@@ -310,16 +67,18 @@ class NearestPair {
     if (m_best.distance == 0.0 && !precedes()) return;
     const Element a(m_a, elementA), b(m_b, elementB);
     if (isFurther(a, b)) return;
-    ElementDistance found = elementDistance(a, b);
-    if (mayCross(a, b))
-      if (const auto common = crossing(a, b)) found = *common;
+    const ElementDistance found = elementDistance(a, b);
     if (!(found.distance < m_best.distance || (found.distance == m_best.distance && precedes())))
       return;
     m_best = found;
     m_elementA = elementA;
     m_elementB = elementB;
     m_direction = b.point(found.weightsB) - a.point(found.weightsA);
-    if (const double length = m_direction.stableNorm(); length > 0) m_direction /= length;
+    const double length = m_direction.stableNorm();
+    if (length > 0 && std::isfinite(length))
+      m_direction /= length;
+    else
+      m_direction.setZero();
   }
 
   /// L, between the elements' surfaces; infinite if there is none.
@@ -343,18 +102,11 @@ class NearestPair {
     return least - most - a.largestRadius() - b.largestRadius() >
            m_best.distance + kNearestError * size;
   }
-  static bool mayCross(const Element& a, const Element& b) {
-    for (int k = 0; k < 3; ++k)
-      if (std::min({a[0][k], a[1][k], a[2][k]}) > std::max({b[0][k], b[1][k], b[2][k]}) ||
-          std::min({b[0][k], b[1][k], b[2][k]}) > std::max({a[0][k], a[1][k], a[2][k]}))
-        return false;
-    return true;
-  }
 
   const SearchableGeometry &m_a, &m_b;
   ElementDistance m_best;
   std::uint32_t m_elementA = kNoElement, m_elementB = kNoElement;
-  Vector3d m_direction = Vector3d::Zero();  ///< from a to b: unit, or 0 if they touch
+  Vector3d m_direction = Vector3d::Zero();  ///< from a to b: unit, or 0
 };
 
 /// Two elements near each other: each geometry's element nearest to a point of the other one, in
@@ -366,7 +118,9 @@ void startNear(const SearchableGeometry& a, const SearchableGeometry& b, Nearest
   for (int round = 0; round < kRounds; ++round) {
     const auto onA = PointDistances(a, point, false).nearest(kInfinity, placeA);
     const auto onB =
-        PointDistances(b, point - onA->closest.difference, false).nearest(kInfinity, placeB);
+        onA ? PointDistances(b, point - onA->closest.difference, false).nearest(kInfinity, placeB)
+            : std::nullopt;
+    if (!onA || !onB) break;  // beyond double's range
     const bool isSame = round > 0 && placeA == onA->place && placeB == onB->place;
     point -= onA->closest.difference;
     point -= onB->closest.difference;
@@ -439,7 +193,9 @@ GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGe
   NearestPair nearest(a, b);
   const std::size_t sizeA = a.tree.ordered().size(), sizeB = b.tree.ordered().size();
   if (sizeA == 0 || sizeB == 0) return {noPoint(a.id), noPoint(b.id), kInfinity};
-  if (bruteForce) {
+  // Clamped boxes say nothing about positions in other floats.
+  if (bruteForce || a.tree.octree().box(0).mayBeClamped() ||
+      b.tree.octree().box(0).mayBeClamped()) {
     for (std::uint32_t i = 0; i < sizeA; ++i)
       for (std::uint32_t j = 0; j < sizeB; ++j) nearest.test(i, j);
     return nearest.result();
@@ -449,26 +205,21 @@ GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGe
   const PairSearch search{a.tree.octree(), b.tree.octree(), mapAbout(a, origin),
                           mapAbout(b, origin)};
   const double radii = a.mesh.largestRadius + b.mesh.largestRadius,
-               scale = a.tree.frame().scale * (1.0 + kNearestError);
+               scale = a.tree.frame().scale * (1.0 + kNearestError),
+               error = kNearestError * (sizeOf(search.a.box(0)) + sizeOf(search.b.box(0)));
   const auto boundOf = [&] {
-    return OutwardRounding::up(static_cast<float>((nearest.distance() + radii) * scale));
+    return OutwardRounding::up(static_cast<float>((nearest.distance() + radii) * scale + error));
   };
-  const auto test = [&](std::uint32_t placeA, std::uint32_t placeB) {
+  forNearPairs(search, boundOf(), [&](std::uint32_t placeA, std::uint32_t placeB) {
     nearest.test(search.a.order()[placeA], search.b.order()[placeB]);
     return boundOf();
-  };
-  const auto call = [](void* context, std::uint32_t placeA, std::uint32_t placeB) {
-    return (*static_cast<std::remove_const_t<decltype(test)>*>(context))(placeA, placeB);
-  };
-  search.a.requireBuilt();
-  search.b.requireBuilt();
-  auto context = test;
-  HWY_DYNAMIC_DISPATCH(searchPairsKernel)(search, boundOf(), &context, call);
+  });
   return nearest.result();
 }
 
 GeometryDistance distanceBetween(const SearchableGeometry& geometry, GeometryId id,
                                  const Shape& shape, bool bruteForce) {
+  if (geometry.tree.ordered().empty()) return {noPoint(geometry.id), noPoint(id), kInfinity};
   std::uint32_t best = kNoElement;
   NearestToShape nearest{Vector3d::Zero(), Vector3d::Zero(), kInfinity, false};
   descend(
@@ -504,7 +255,6 @@ GeometryDistance distanceBetween(const SearchableGeometry& geometry, GeometryId 
             take(*found, found->weights);
         return nearest.distance;
       });
-  if (best == kNoElement) return {noPoint(geometry.id), noPoint(id), kInfinity};
   GeometryDistance out{surfacePoint(geometry, best, nearest.weights, nearest.distance), noPoint(id),
                        nearest.distance};
   out.b.distance = nearest.distance;
@@ -512,6 +262,38 @@ GeometryDistance distanceBetween(const SearchableGeometry& geometry, GeometryId 
   const PointShapeDistance at = shape.signedDistance(out.a.position);
   out.b.position =
       at.distance > 0.0 ? Vector3d(out.a.position - at.distance * at.normal) : out.a.position;
+  return out;
+}
+
+namespace {
+
+/// A common point of two shapes that overlap: each in turn moves the point to its own nearest one.
+Vector3d commonPoint(const Shape& a, const Shape& b, Vector3d point) {
+  constexpr int kMostSteps = 1000;  // usually one
+  const double tolerance = kOnSurface * (a.magnitude() + b.magnitude());
+  bool isCommon = false;
+  for (int step = 0; step < kMostSteps && !isCommon; ++step) {
+    isCommon = true;
+    for (const Shape* shape : {&a, &b}) {
+      const PointShapeDistance at = shape->signedDistance(point);
+      if (!(at.distance > tolerance)) continue;
+      point -= at.distance * at.normal;
+      isCommon = false;
+    }
+  }
+  return point;
+}
+
+}  // namespace
+
+GeometryDistance distanceBetween(GeometryId idA, const Shape& a, GeometryId idB, const Shape& b,
+                                 ShapePairScratch& scratch) {
+  const ShapePairDistance found = a.distanceFrom(b, scratch);
+  GeometryDistance out{noPoint(idA), noPoint(idB), std::max(0.0, found.distance)};
+  out.a.distance = out.b.distance = out.distance;
+  out.a.position = found.pointA;
+  out.b.position = found.pointB;
+  if (found.distance <= 0.0) out.a.position = out.b.position = commonPoint(a, b, found.pointA);
   return out;
 }
 
@@ -525,12 +307,12 @@ SegmentDistance distanceFromSegment(const SearchableGeometry& geometry, const Ve
       geometry, bruteForce, maxDistance,
       [&](const Vector3d& centre, const Vector3d& half) {
         return finiteVertexTriangleDistance(centre, p, q, q).distance - half.norm() -
-               geometry.mesh.largestRadius;
+               geometry.mesh.largestRadius -
+               kNearestError * ((centre - p).cwiseAbs().sum() + (centre - q).cwiseAbs().sum());
       },
       [&](std::uint32_t element) {
         const Element other(geometry, element);
-        ElementDistance found = elementDistance(segment, other);
-        if (const auto common = crossing(segment, other)) found = *common;
+        const ElementDistance found = elementDistance(segment, other);
         if (found.distance < best.distance ||
             (found.distance == best.distance && element < nearest)) {
           best = found;
@@ -544,4 +326,3 @@ SegmentDistance distanceFromSegment(const SearchableGeometry& geometry, const Ve
 }
 
 }  // namespace palpate
-#endif

@@ -12,14 +12,17 @@ namespace palpate {
 /// they have a common point, which is decided exactly for elements without radii. Both points have
 /// element kNoElement, and the distance is infinite, if a mesh has no elements.
 ///
-/// Method   descent into both octrees, nearest pairs of nodes first. Of two nodes the larger one is
-///          replaced by its children. A pair is skipped if its boxes are further apart than the
-///          best pair of elements.
+/// Method   descent into both octrees, from a pair of elements that is likely near. A pair of nodes
+///          is skipped if its boxes are further apart than the best pair of elements.
 GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGeometry& b,
                                  bool bruteForce);
 /// The same for a geometry with elements and a shape with this id, which is solid.
 GeometryDistance distanceBetween(const SearchableGeometry&, GeometryId, const Shape&,
                                  bool bruteForce);
+
+/// The same for two shapes. At most one may be a plane.
+GeometryDistance distanceBetween(GeometryId, const Shape&, GeometryId, const Shape&,
+                                 ShapePairScratch&);
 
 /// The least distance from a segment or point pq. None within maxDistance: the element is
 /// kNoElement.

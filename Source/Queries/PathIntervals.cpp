@@ -1,5 +1,6 @@
 #include "Queries/PathIntervals.h"
 
+#include "Exact/Compensated.h"
 #include "Queries/GeometryDistances.h"
 #include "Queries/PointDistances.h"
 #include "Queries/ShapeRays.h"
@@ -51,7 +52,10 @@ double rootBetween(double from, double to, F&& f) {
 }  // namespace
 
 void findPathParts(const SearchableGeometry& body, const PathLine& path, double radius,
-                   bool bruteForce, std::vector<RayHits::Met>& met, std::vector<PathPart>& parts) {
+                   bool bruteForce, std::vector<RayHits::Met>& met, PathScratch& scratch) {
+  // Where a segment with a rounded direction is divided. No value is likely to be special.
+  constexpr double kDivision = 0.618;
+  std::vector<PathPart>& parts = scratch.parts;
   parts.clear();
   if (body.tree.ordered().empty()) return;
   if (path.length() == 0.0) {
@@ -60,11 +64,25 @@ void findPathParts(const SearchableGeometry& body, const PathLine& path, double 
     return;
   }
   for (std::size_t i = 0; i < path.segments(); ++i) {
-    const Ray ray{path.point(i), path.point(i + 1) - path.point(i), 0.0, 1.0};
-    if (ray.direction == Vector3d::Zero()) continue;
+    const Vector3d &p = path.point(i), &q = path.point(i + 1);
+    if (p == q) continue;
+    // Paths often turn on a surface. A ray with a rounded direction from one end may miss the other
+    // end. The far part of the segment is therefore followed backwards.
+    const auto [direction, lost] = difference(q, p);
+    const bool isDivided = radius == 0.0 && lost != Vector3d::Zero();
+    const Ray ray{p, direction, 0.0, isDivided ? kDivision : 1.0};
     RayHits(body, ray, bruteForce, met, radius).forAllParts([&](const RayHits::Part& part) {
       append({path.at(i, part.first), path.at(i, part.last), part.entry, part.exit}, parts);
     });
+    if (!isDivided) continue;
+    std::vector<PathPart>& backwards = scratch.backwards;
+    backwards.clear();
+    const Ray back{q, -direction, 0.0, 1.0 - kDivision};
+    RayHits(body, back, bruteForce, met, radius).forAllParts([&](const RayHits::Part& part) {
+      backwards.push_back(
+          {path.at(i, 1.0 - part.last), path.at(i, 1.0 - part.first), part.exit, part.entry});
+    });
+    for (; !backwards.empty(); backwards.pop_back()) append(backwards.back(), parts);
   }
 }
 

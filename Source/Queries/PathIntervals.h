@@ -45,15 +45,16 @@ struct PathPart {
 /// Scratch of one path query.
 struct PathScratch {
   std::vector<double> lengths;
-  std::vector<PathPart> parts;
+  std::vector<PathPart> parts, backwards;
   std::vector<PathInterval> inside;
   std::vector<PathClearance> outside;
+  std::vector<std::uint32_t> order;  ///< of `inside`
 };
 
 /// Finds the parts of the path in which its ball meets the surface of a body with elements, by
-/// ascending arc length. They do not touch each other.
+/// ascending arc length, into scratch.parts. They do not touch each other.
 void findPathParts(const SearchableGeometry& body, const PathLine&, double radius, bool bruteForce,
-                   std::vector<RayHits::Met>& met, std::vector<PathPart>& parts);
+                   std::vector<RayHits::Met>& met, PathScratch&);
 /// The same for a shape. Its inside belongs to the parts.
 void findPathParts(const Shape&, const PathLine&, double radius, std::vector<PathPart>& parts);
 

@@ -20,6 +20,7 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -541,13 +542,7 @@ GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const 
     throw Error(ErrorCode::UnsupportedMethod,
                 nameOf(idA) + " and " + nameOf(idB) + " are both planes", idA);
   const Source::Loan scratch(source);
-  const ShapePairDistance found = first.distanceFrom(second, scratch->shapeContacts.shapePair);
-  const double distance = std::max(0.0, found.distance);
-  const Eigen::Vector3d pointB = found.distance > 0.0 ? found.pointB : found.pointA;
-  const auto at = [&](GeometryId id, const Eigen::Vector3d& point) {
-    return SurfacePoint{id, kNoElement, {}, Eigen::Vector3d::Zero(), point, distance};
-  };
-  return {at(idA, found.pointA), at(idB, pointB), distance};
+  return distanceBetween(idA, first, idB, second, scratch->shapeContacts.shapePair);
 }
 
 void SpatialQueries::path(std::span<const Eigen::Vector3d> polyline, double radius,
@@ -578,7 +573,7 @@ void SpatialQueries::path(std::span<const Eigen::Vector3d> polyline, double radi
     if (body.shape)
       findPathParts(body.shape->now, path, radius, found.parts);
     else
-      findPathParts(body, path, radius, bruteForce, scratch->met, found.parts);
+      findPathParts(body, path, radius, bruteForce, scratch->met, found);
     const std::size_t before = found.inside.size();
     joinPathParts(
         id, path, found.parts, radius > 0.0 || !isBody,
@@ -589,11 +584,15 @@ void SpatialQueries::path(std::span<const Eigen::Vector3d> polyline, double radi
     if (found.inside.size() == before)
       found.outside.push_back(clearanceOf(body, path, radius, bruteForce));
   }
-  std::stable_sort(found.inside.begin(), found.inside.end(),
-                   [](const PathInterval& a, const PathInterval& b) { return a.enter < b.enter; });
+  found.order.resize(found.inside.size());
+  std::iota(found.order.begin(), found.order.end(), 0u);
+  std::sort(found.order.begin(), found.order.end(), [&](std::uint32_t i, std::uint32_t j) {
+    return std::pair(found.inside[i].enter, i) < std::pair(found.inside[j].enter, j);
+  });
   inside.reserve(found.inside.size());
   outside.reserve(found.outside.size());  // nothing below throws
-  inside.assign(found.inside.begin(), found.inside.end());
+  inside.clear();
+  for (const std::uint32_t i : found.order) inside.push_back(found.inside[i]);
   outside.assign(found.outside.begin(), found.outside.end());
 }
 

@@ -71,7 +71,8 @@ struct Pick {
 };
 
 /// The least distance of two geometries, with their closest points. It is 0 if they have a common
-/// point, which a and b then are.
+/// point. Both positions then are such a point, up to rounding; those of lines and points with
+/// radii are on their centre lines.
 struct GeometryDistance {
   SurfacePoint a, b;  ///< both have this distance
   double distance;    ///< L, less the radii of lines and points; never negative
@@ -198,8 +199,13 @@ class PALPATE_EXPORT SpatialQueries {
 
   /// The least distance of two geometries. Meshes count as surfaces: a mesh inside another one has
   /// the distance of their surfaces. Lines and points with radii, and shapes, are solid. Of equally
-  /// near elements, by computed distance, both are the lowest. If a mesh has no elements, the
-  /// distance is infinite and the element is kNoElement.
+  /// near pairs of elements, by computed distance, the one with the lowest element of a counts,
+  /// then with that of b. If a mesh has no elements, the distance is infinite and the element is
+  /// kNoElement.
+  ///
+  /// Where radii vary along a line, the distance is the least of all pairs of features: of an edge
+  /// and a vertex, or of two edges, it is that of their closest points less the radii there.
+  /// Elsewhere the surfaces may be slightly nearer.
   ///
   /// Accuracy whether triangles, lines and points without radii have a common point is decided
   ///          exactly. Distances have the accuracy of edgeEdgeDistance().

@@ -1,0 +1,62 @@
+#pragma once
+
+#include "Queries/SearchableGeometry.h"
+
+#include <Eigen/Core>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+namespace palpate {
+
+/// A triangle, segment or point, whose positions are read once.
+class Element {
+ public:
+  Element(const SearchableGeometry& geometry, std::uint32_t element)
+      : m_mesh(&geometry.mesh), m_vertices(geometry.mesh.topology.triangles[element]) {
+    for (std::size_t i = 0; i < 3; ++i) m_corners[i] = m_mesh->now[m_vertices[i]];
+  }
+  /// A segment without a radius.
+  Element(const Eigen::Vector3d& p, const Eigen::Vector3d& q)
+      : m_vertices{0, 1, 1}, m_corners{p, q, q} {}
+
+  const Eigen::Vector3d& operator[](std::size_t i) const { return m_corners[i % 3]; }
+  Eigen::Vector3d point(const Eigen::Vector3d& weights) const {
+    return weights[0] * m_corners[0] + weights[1] * m_corners[1] + weights[2] * m_corners[2];
+  }
+  double radius(const Eigen::Vector3d& weights) const {
+    return m_mesh ? m_mesh->radius(m_vertices, weights) : 0.0;
+  }
+  double largestRadius() const { return m_mesh ? m_mesh->largestRadius : 0.0; }
+  bool isPoint() const { return m_vertices[0] == m_vertices[1] && m_vertices[1] == m_vertices[2]; }
+  /// Whether corner i repeats an earlier one, and edge i an earlier edge.
+  bool repeatsCorner(std::size_t i) const {
+    return (i > 0 && m_vertices[i] == m_vertices[0]) || (i > 1 && m_vertices[2] == m_vertices[1]);
+  }
+  bool hasEdge(std::size_t i) const {
+    return m_vertices[i] != m_vertices[(i + 1) % 3] &&
+           !(i == 2 && m_vertices[1] == m_vertices[2]);  // {p, q, q} has one edge
+  }
+
+ private:
+  const TriangleMesh* m_mesh = nullptr;
+  Triangle m_vertices;
+  std::array<Eigen::Vector3d, 3> m_corners;
+};
+
+Eigen::Vector3d cornerWeights(std::size_t corner);
+Eigen::Vector3d edgeWeights(std::size_t edge, double weight);  ///< weight: of the edge's end
+
+/// The closest points of two elements.
+struct ElementDistance {
+  double distance = std::numeric_limits<double>::infinity();  ///< L, less the radii; never negative
+  Eigen::Vector3d weightsA = Eigen::Vector3d::UnitX(), weightsB = Eigen::Vector3d::UnitX();
+};
+
+/// The least distance of two elements. Whether it is 0 without radii is decided exactly. Exchanged
+/// elements have the same distance.
+ElementDistance elementDistance(const Element& a, const Element& b);
+
+}  // namespace palpate
