@@ -70,6 +70,13 @@ struct Pick {
   std::array<std::uint32_t, 2> edge;  ///< lower vertex first
 };
 
+/// The distance of two geometries, with their closest points. 0, and a point of both, if they have
+/// a common point.
+struct GeometryDistance {
+  SurfacePoint a, b;
+  double distance;  ///< L
+};
+
 /// Spatial queries over the geometries of one OctreeBasedCD, at their positions now. Get the object
 /// from OctreeBasedCD::queries(). Collision filters do not apply. Queries search disabled elements,
 /// too.
