@@ -146,12 +146,12 @@ int main(int count, char** arguments) {
   options.rows.sharedData = PALPATE_SHARED_DATA;
   options.tables = {"race",  "stages",     "frame",    "far",   "rest",   "tool",
                     "scale", "steady",     "features", "lines", "shapes", "inside",
-                    "rigid", "continuous", "validity", "simd"};
+                    "rigid", "continuous", "validity", "spatial", "simd"};
   MeasureOptions& measure = options.rows.measure;
   CLI::App app{"Times Palpate and the baselines (Embree, Bullet, FCL, CGAL) on the same frames"};
   app.add_option("--tables", options.tables,
                  "some of race, stages, frame, far, rest, tool, scale, "
-                 "steady, features, lines, shapes, inside, rigid, continuous, validity, simd")
+                 "steady, features, lines, shapes, inside, rigid, continuous, validity, spatial, simd")
       ->delimiter(',')
       ->check(CLI::IsMember(options.tables));
   app.add_option("--scenes", options.scenes, "scenes of the table race; default: all")
@@ -179,7 +179,7 @@ int main(int count, char** arguments) {
       {"rest", atRestRows},           {"tool", smallToolRows},    {"scale", scaleRows},
       {"steady", steadyRows},         {"features", featureRows},  {"lines", lineRows},
       {"shapes", shapeRows},          {"inside", insideRows},     {"rigid", rigidRows},
-      {"continuous", continuousRows}, {"validity", validityRows}, {"simd", simdRows}};
+      {"continuous", continuousRows}, {"validity", validityRows}, {"spatial", spatialRows}, {"simd", simdRows}};
   for (const std::string& table : options.tables) {
     if (table == "race")
       raceRows(report, options);

@@ -31,6 +31,7 @@ void insideRows(Report&, const RowOptions&);   ///< vertices inside a body, part
 void rigidRows(Report&, const RowOptions&);    ///< a large bone moved by its transform
 void continuousRows(Report&, const RowOptions&);  ///< times of impact of the published steps
 void validityRows(Report&, const RowOptions&);    ///< the share of validity() in a frame
+void spatialRows(Report&, const RowOptions&);     ///< spatial queries beside other libraries
 void simdRows(Report&, const RowOptions&);        ///< every path that this processor runs
 
 /// The number of feature candidates in the step from a workload's first frame to its second.
