@@ -9,6 +9,8 @@ namespace {
 
 class PalpateQueries : public SpatialEngine {
  public:
+  explicit PalpateQueries(bool isPointSet) : m_isPointSet(isPointSet) {}
+
   std::string name() const override { return "Palpate"; }
 
   void prepare(const std::vector<Triangle>& triangles,
@@ -16,7 +18,8 @@ class PalpateQueries : public SpatialEngine {
     Settings settings;
     settings.threads = 1;
     m_collisions = std::make_unique<OctreeBasedCD>(settings);
-    m_mesh = m_collisions->addTriangleMesh(positions, triangles);
+    m_mesh = m_isPointSet ? m_collisions->addPointSet(positions)
+                          : m_collisions->addTriangleMesh(positions, triangles);
     m_collisions->update();
   }
 
@@ -53,9 +56,8 @@ class PalpateQueries : public SpatialEngine {
           out.add(found.distance, found.nearest.element);
         });
       case SpatialQuery::Contains:
-        return all([&](const SpatialCase& c) {
-          out.values.push_back(queries.contains(m_mesh, c.point));
-        });
+        return all(
+            [&](const SpatialCase& c) { out.values.push_back(queries.contains(m_mesh, c.point)); });
       case SpatialQuery::FirstHit:
         return all([&](const SpatialCase& c) {
           const auto hit = queries.firstHit(m_mesh, {c.point, c.direction});
@@ -86,6 +88,7 @@ class PalpateQueries : public SpatialEngine {
     out.endCase();
   }
 
+  bool m_isPointSet;
   std::unique_ptr<OctreeBasedCD> m_collisions;
   GeometryId m_mesh{};
   std::vector<SurfacePoint> m_points;
@@ -94,6 +97,8 @@ class PalpateQueries : public SpatialEngine {
 
 }  // namespace
 
-std::unique_ptr<SpatialEngine> makePalpateQueries() { return std::make_unique<PalpateQueries>(); }
+std::unique_ptr<SpatialEngine> makePalpateQueries(bool isPointSet) {
+  return std::make_unique<PalpateQueries>(isPointSet);
+}
 
 }  // namespace palpate::benchmark

@@ -12,7 +12,13 @@ struct RowOptions {
   MeasureOptions measure;
   std::string sharedData;
   bool quick = false;  ///< a million triangles at most, a hundred steady frames
+  /// Parts of names, of which one must match; empty: all. Of the scenes of the tables race and
+  /// spatial, and of their engines.
+  std::vector<std::string> scenes, engines;
 };
+
+/// Whether one of the parts is in a name, or there are none.
+bool isWanted(const std::string& name, const std::vector<std::string>& parts);
 
 // Each prints a table of Palpate alone, or beside a baseline.
 

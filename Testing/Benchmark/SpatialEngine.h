@@ -24,16 +24,16 @@ enum class SpatialQuery {
 
 /// The arguments of one query. Its kind says which count.
 struct SpatialCase {
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< a ray's origin; a shape's centre
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();         ///< a ray's; a unit vector
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();       ///< a shape's; the capsule is on x
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();         ///< a ray's origin; a shape's centre
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();    ///< a ray's; a unit vector
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< a shape's; the capsule is on x
 };
 
 /// Sizes of the shapes, the same for all cases of a call.
 struct ShapeSizes {
-  double ball = 0;                                        ///< L: radius
-  double capsuleRadius = 0, capsuleLength = 0;            ///< L: length of its segment
-  Eigen::Vector3d boxHalf = Eigen::Vector3d::Zero();      ///< L
+  double ball = 0;                                    ///< L: radius
+  double capsuleRadius = 0, capsuleLength = 0;        ///< L: length of its segment
+  Eigen::Vector3d boxHalf = Eigen::Vector3d::Zero();  ///< L
 };
 
 /// Answers of all cases of a call, one after the other.
@@ -49,7 +49,8 @@ struct SpatialAnswers {
   void endCase() { ends.push_back(elements.size()); }
 };
 
-/// An engine of spatial queries on one deforming triangle mesh: Palpate or a baseline.
+/// An engine of spatial queries on one deforming geometry: Palpate or a baseline. The geometry is a
+/// triangle mesh or a point set, whose triangle i is {i, i, i}.
 class SpatialEngine {
  public:
   virtual ~SpatialEngine() = default;
@@ -63,11 +64,12 @@ class SpatialEngine {
                    SpatialAnswers&) = 0;
 };
 
-std::unique_ptr<SpatialEngine> makePalpateQueries();
+std::unique_ptr<SpatialEngine> makePalpateQueries(bool isPointSet);
 std::unique_ptr<SpatialEngine> makeEmbreeQueries(bool refit);
 std::unique_ptr<SpatialEngine> makeCgalQueries(bool exactPredicates);
 std::unique_ptr<SpatialEngine> makeBulletQueries();
 std::unique_ptr<SpatialEngine> makeFclQueries();
-std::unique_ptr<SpatialEngine> makeVtkQueries();
+std::unique_ptr<SpatialEngine> makeVtkQueries(bool isStatic);
+std::unique_ptr<SpatialEngine> makeNanoflannQueries();  ///< of point sets only
 
 }  // namespace palpate::benchmark

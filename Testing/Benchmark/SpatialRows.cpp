@@ -1,4 +1,4 @@
-// Spatial queries on a mesh that deforms in each frame: Palpate beside the libraries of Debian.
+// Spatial queries on a geometry that deforms in each frame: Palpate beside the libraries of Debian.
 #include "Rows.h"
 
 #include "SpatialEngine.h"
@@ -6,13 +6,19 @@
 
 #include "Common/RandomMeshes.h"
 
+#ifdef PALPATE_BENCHMARK_BASELINES
+#include "Baselines/FclDistance.h"
+#endif
+
+#include <palpate/OctreeBasedCD.h>
+
 #include <Meshes.h>
 
 #include <Eigen/Geometry>
 
 #include <cmath>
 #include <cstdio>
-#include <limits>
+#include <thread>
 
 namespace palpate::benchmark {
 namespace {
@@ -20,62 +26,130 @@ namespace {
 using Eigen::Vector3d;
 using Points = std::vector<Vector3d>;
 
-enum class Place { Near, Tenth, Anywhere, Inside, Rays, Surface };
+/// Where the points of a row's queries are.
+enum class Place { Near, Tenth, Anywhere, InBox, Rays, Surface };
 
-/// A row of the table. Times of the reference machine in microseconds a query, at 10,000, 100,000
-/// and 1,000,000 triangles: the target, and the fastest library there.
-struct QueryRow {
+/// A row of the table, for three sizes. In microseconds a query on the machine of the targets: the
+/// target, and the fastest library there. 0: there is no target.
+struct SpatialRow {
   const char* name;
   SpatialQuery query;
   Place place;
   std::array<std::size_t, 3> cases;
   std::array<double, 3> target, fastest;
 };
-constexpr QueryRow kRows[] = {
-    {"closest, near", SpatialQuery::Closest, Place::Near, {4000, 4000, 4000}, {0.5, 0.8, 1.5},
+constexpr SpatialRow kRows[] = {
+    {"closest near",
+     SpatialQuery::Closest,
+     Place::Near,
+     {4000, 4000, 4000},
+     {0.5, 0.8, 1.5},
      {0.61, 1.06, 1.9}},
-    {"closest, 10 %", SpatialQuery::Closest, Place::Tenth, {4000, 4000, 2000}, {0.8, 2.1, 8},
+    {"closest 10 %",
+     SpatialQuery::Closest,
+     Place::Tenth,
+     {4000, 4000, 2000},
+     {0.8, 2.1, 8},
      {0.99, 2.8, 10.8}},
-    {"closest, anywhere", SpatialQuery::Closest, Place::Anywhere, {4000, 2000, 1000},
-     {1.7, 4.5, 14}, {2.2, 5.8, 18}},
-    {"signed distance, near", SpatialQuery::SignedDistance, Place::Near, {4000, 4000, 4000},
-     {0.6, 1.0, 1.8}, {0.73, 1.6, 2.6}},
-    {"contains", SpatialQuery::Contains, Place::Inside, {4000, 4000, 4000}, {0.22, 0.33, 0.6},
+    {"closest anywhere",
+     SpatialQuery::Closest,
+     Place::Anywhere,
+     {4000, 2000, 1000},
+     {1.7, 4.5, 14},
+     {2.2, 5.8, 18}},
+    {"signed distance near",
+     SpatialQuery::SignedDistance,
+     Place::Near,
+     {4000, 4000, 4000},
+     {0.6, 1.0, 1.8},
+     {0.73, 1.6, 2.6}},
+    {"contains",
+     SpatialQuery::Contains,
+     Place::InBox,
+     {4000, 4000, 4000},
+     {0.22, 0.33, 0.6},
      {0.25, 0.38, 0.67}},
-    {"first hit", SpatialQuery::FirstHit, Place::Rays, {4000, 4000, 4000}, {0.22, 0.40, 0.75},
+    {"first hit",
+     SpatialQuery::FirstHit,
+     Place::Rays,
+     {4000, 4000, 4000},
+     {0.22, 0.40, 0.75},
      {0.20, 0.31, 0.56}},
-    {"8 nearest", SpatialQuery::EightNearest, Place::Near, {2000, 2000, 2000}, {1.5, 2.2, 3.3},
+    {"8 nearest",
+     SpatialQuery::EightNearest,
+     Place::Near,
+     {2000, 2000, 2000},
+     {1.5, 2.2, 3.3},
      {2.1, 3.0, 4.3}},
     {"ball", SpatialQuery::Ball, Place::Near, {2000, 2000, 2000}, {1.9, 2.7, 4.3}, {2.5, 3.5, 5.6}},
-    {"capsule", SpatialQuery::Capsule, Place::Surface, {500, 200, 40}, {4, 30, 220},
+    {"capsule",
+     SpatialQuery::Capsule,
+     Place::Surface,
+     {500, 200, 40},
+     {4, 30, 220},
      {22, 181, 1358}},
-    {"oriented box", SpatialQuery::Box, Place::Surface, {500, 200, 40}, {5, 45, 400},
+    {"oriented box",
+     SpatialQuery::Box,
+     Place::Surface,
+     {500, 200, 40},
+     {5, 45, 400},
      {20, 213, 1922}}};
+constexpr SpatialRow kPointRows[] = {
+    {"closest near", SpatialQuery::Closest, Place::Near, {4000, 4000, 4000}, {}, {}},
+    {"closest anywhere", SpatialQuery::Closest, Place::Anywhere, {4000, 2000, 1000}, {}, {}},
+    {"8 nearest", SpatialQuery::EightNearest, Place::Near, {2000, 2000, 2000}, {}, {}},
+    {"ball", SpatialQuery::Ball, Place::Near, {2000, 2000, 2000}, {}, {}}};
+/// Two meshes whose boxes are a tenth of the diagonal apart; of two sizes.
+constexpr double kDistanceTargets[] = {300, 1000}, kDistanceFastest[] = {600, 1000};
 
-/// A closed body that deforms, and what the rows need to know of it.
+constexpr const char* kSizes[] = {"10K", "100K", "1M"};
+constexpr std::size_t kFrames = 4;
+
+/// A closed body with bumps that deforms, or the set of its vertices.
 struct Body {
   std::string name;
-  std::size_t size;  ///< which of the three
-  std::vector<Triangle> triangles;
+  std::size_t size;  ///< index of its kSizes
+  bool isPointSet;
+  std::vector<Triangle> triangles;  ///< {i, i, i} of a point set
   std::vector<Points> frames;
   double diagonal, edge;  ///< L
   ShapeSizes sizes;
+
+  std::span<const SpatialRow> rows() const {
+    return isPointSet ? std::span<const SpatialRow>(kPointRows) : kRows;
+  }
 };
 
-constexpr int kFrames = 4;
+Eigen::AlignedBox3d boxOf(const Points& positions) {
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& p : positions) box.extend(p);
+  return box;
+}
 
-Body makeBody(const std::string& name, std::size_t size, int frequency) {
-  const scenes::SceneMesh sphere = scenes::sphere(frequency);
-  Body body{name, size, sphere.triangles, {}, 0, scenes::meanEdge({sphere}), {}};
-  for (int frame = 0; frame < kFrames; ++frame) {
+Body makeBody(std::size_t size, bool isPointSet) {
+  constexpr int kFrequencies[] = {22, 71, 224}, kPointFrequencies[] = {32, 100, 316};
+  const scenes::SceneMesh sphere =
+      scenes::sphere(isPointSet ? kPointFrequencies[size] : kFrequencies[size]);
+  Body body{kSizes[size] + std::string(isPointSet ? " points" : " triangles"),
+            size,
+            isPointSet,
+            sphere.triangles,
+            {},
+            0,
+            scenes::meanEdge({sphere}),
+            {}};
+  if (isPointSet) {
+    body.triangles.clear();
+    for (std::uint32_t i = 0; i < sphere.positions.size(); ++i) body.triangles.push_back({i, i, i});
+  }
+  for (std::size_t frame = 0; frame < kFrames; ++frame) {
     Points positions = sphere.positions;
     for (Vector3d& p : positions)
-      p *= 1 + 0.1 * std::sin(9 * p[0] + 0.1 * frame) * std::cos(11 * p[1] + 5 * p[2]);
-    body.frames.push_back(positions);
+      p *= 1 + 0.1 * std::sin(9 * p[0] + 0.1 * static_cast<double>(frame)) *
+                   std::cos(11 * p[1] + 5 * p[2]);
+    body.frames.push_back(std::move(positions));
   }
-  Eigen::AlignedBox3d box;
-  for (const Vector3d& p : body.frames[0]) box.extend(p);
-  body.diagonal = box.diagonal().norm();
+  body.diagonal = boxOf(body.frames[0]).diagonal().norm();
   body.sizes = {2 * body.edge, 0.01 * body.diagonal, 0.2 * body.diagonal,
                 body.diagonal * Vector3d(0.08, 0.03, 0.02)};
   return body;
@@ -90,8 +164,7 @@ Vector3d direction(testing::Random& random) {
 
 std::vector<SpatialCase> makeCases(const Body& body, const Points& positions, Place place,
                                    std::size_t count, testing::Random& random) {
-  Eigen::AlignedBox3d box;
-  for (const Vector3d& p : positions) box.extend(p);
+  const Eigen::AlignedBox3d box = boxOf(positions);
   const auto inBox = [&](double scale) -> Vector3d {
     return box.center() +
            testing::randomPoint(random, -scale / 2, scale / 2).cwiseProduct(box.sizes());
@@ -99,19 +172,27 @@ std::vector<SpatialCase> makeCases(const Body& body, const Points& positions, Pl
   std::vector<SpatialCase> cases(count);
   for (SpatialCase& c : cases) {
     const auto& [i, j, k] = body.triangles[random() % body.triangles.size()];
-    const Vector3d &p = positions[i], &q = positions[j], &r = positions[k];
-    double u = testing::uniform(random, 0, 1), v = testing::uniform(random, 0, 1);
-    if (u + v > 1) u = 1 - u, v = 1 - v;
-    const Vector3d surface = p + u * (q - p) + v * (r - p);
+    const Vector3d weights = testing::randomPoint(random, 0, 1);
+    const Vector3d surface =
+        (weights[0] * positions[i] + weights[1] * positions[j] + weights[2] * positions[k]) /
+        weights.sum();
     const auto offSurface = [&](double distance) -> Vector3d {
-      return surface + testing::uniform(random, -distance, distance) *
-                           (q - p).cross(r - p).normalized();
+      return surface +
+             testing::uniform(random, -distance, distance) * (surface - box.center()).normalized();
     };
     switch (place) {
-      case Place::Near: c.point = offSurface(body.edge); break;
-      case Place::Tenth: c.point = offSurface(0.1 * body.diagonal); break;
-      case Place::Anywhere: c.point = inBox(2); break;
-      case Place::Inside: c.point = inBox(1); break;
+      case Place::Near:
+        c.point = offSurface(body.edge);
+        break;
+      case Place::Tenth:
+        c.point = offSurface(0.1 * body.diagonal);
+        break;
+      case Place::Anywhere:
+        c.point = inBox(2);
+        break;
+      case Place::InBox:
+        c.point = inBox(1);
+        break;
       case Place::Rays:
         c.point = inBox(2);
         c.direction = (inBox(1) - c.point).normalized();
@@ -129,25 +210,40 @@ std::vector<SpatialCase> makeCases(const Body& body, const Points& positions, Pl
 
 using Engines = std::vector<std::unique_ptr<SpatialEngine>>;
 
-Engines makeEngines() {
+/// Palpate is the first.
+Engines makeEngines(bool isPointSet, const std::vector<std::string>& wanted) {
   Engines engines;
-  engines.push_back(makePalpateQueries());
+  engines.push_back(makePalpateQueries(isPointSet));
 #ifdef PALPATE_BENCHMARK_BASELINES
-  engines.push_back(makeEmbreeQueries(true));
-  engines.push_back(makeEmbreeQueries(false));
-  engines.push_back(makeCgalQueries(false));
-  engines.push_back(makeCgalQueries(true));
-  engines.push_back(makeBulletQueries());
+  if (isPointSet) {
+    engines.push_back(makeNanoflannQueries());
+  } else {
+    engines.push_back(makeEmbreeQueries(true));
+    engines.push_back(makeEmbreeQueries(false));
+    engines.push_back(makeCgalQueries(false));
+    engines.push_back(makeCgalQueries(true));
+    engines.push_back(makeBulletQueries());
+    engines.push_back(makeFclQueries());
+#ifdef PALPATE_BENCHMARK_VTK
+    engines.push_back(makeVtkQueries(true));
+    engines.push_back(makeVtkQueries(false));
 #endif
+  }
+#endif
+  std::erase_if(engines, [&](const auto& engine) {
+    return engine != engines[0] && !isWanted(engine->name(), wanted);
+  });
   return engines;
 }
 
-/// Times of one engine: of updates in milliseconds, of each row in microseconds a query.
+/// Times of one engine in each turn: of updates in milliseconds, of each row in microseconds a
+/// query.
 struct EngineTimes {
   std::vector<double> updates;
   std::array<std::vector<double>, std::size(kRows)> rows;
 };
 
+/// The median over the turns of both.
 double medianRatio(const std::vector<double>& a, const std::vector<double>& b) {
   std::vector<double> ratios;
   for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) ratios.push_back(a[i] / b[i]);
@@ -160,78 +256,245 @@ std::string number(double value) {
   return text;
 }
 
+template <class F>
+double millisecondsOf(F&& f) {
+  const double start = now();
+  f();
+  return now() - start;
+}
+
+/// In each repetition all engines update to the next frame and answer the same cases. A different
+/// engine begins each time.
 std::vector<EngineTimes> takeTurns(const Body& body, const Engines& engines,
                                    const RowOptions& options) {
   std::vector<EngineTimes> times(engines.size());
-  std::vector<double> spent(engines.size());
   SpatialAnswers answers;
   testing::Random random(1);
-  for (int repetition = 0; repetition < options.measure.repetitions; ++repetition) {
-    const Points& positions = body.frames[static_cast<std::size_t>((repetition + 1) % kFrames)];
-    const auto time = [&](std::size_t engine, auto&& f) {
-      const double start = now();
-      f();
-      const double taken = now() - start;
-      spent[engine] += taken;
-      return taken;
-    };
-    for (std::size_t e = 0; e < engines.size(); ++e)
-      times[e].updates.push_back(time(e, [&] { engines[e]->update(positions); }));
-    for (std::size_t row = 0; row < std::size(kRows); ++row) {
-      const QueryRow& r = kRows[row];
-      const auto cases = makeCases(body, positions, r.place, r.cases[body.size], random);
-      const auto few = std::span(cases).first(cases.size() / 8);
-      for (std::size_t turn = 0; turn < engines.size(); ++turn) {
-        const std::size_t e = (turn + static_cast<std::size_t>(repetition)) % engines.size();
-        if (!engines[e]->answers(r.query)) continue;
-        answers.clear();
-        engines[e]->ask(r.query, few, body.sizes, answers);  // warms the caches
-        answers.clear();
-        const double taken =
-            time(e, [&] { engines[e]->ask(r.query, cases, body.sizes, answers); });
-        times[e].rows[row].push_back(1000 * taken / static_cast<double>(cases.size()));
+  for (std::size_t turn = 0; turn < static_cast<std::size_t>(options.measure.repetitions); ++turn) {
+    const Points& positions = body.frames[(turn + 1) % kFrames];
+    for (std::size_t i = 0; i < engines.size(); ++i)
+      times[i].updates.push_back(millisecondsOf([&] { engines[i]->update(positions); }));
+    for (std::size_t r = 0; r < body.rows().size(); ++r) {
+      const SpatialRow& row = body.rows()[r];
+      if (!isWanted(body.name + ", " + row.name, options.scenes)) continue;
+      const auto cases = makeCases(body, positions, row.place, row.cases[body.size], random);
+      for (std::size_t i = 0; i < engines.size(); ++i) {
+        const std::size_t e = (i + turn) % engines.size();
+        if (!engines[e]->answers(row.query)) continue;
+        const auto ask = [&](std::span<const SpatialCase> some) {
+          answers.clear();
+          engines[e]->ask(row.query, some, body.sizes, answers);
+        };
+        ask(std::span(cases).first(cases.size() / 8));  // warms the caches
+        times[e].rows[r].push_back(1000 * millisecondsOf([&] { ask(cases); }) /
+                                   static_cast<double>(cases.size()));
       }
     }
   }
   return times;
 }
 
-}  // namespace
+/// A table of one body: each engine's times, and Palpate's ratio to the fastest of the others.
+void timeRows(Report& report, const Body& body, const Engines& engines, const RowOptions& options) {
+  const auto times = takeTurns(body, engines, options);
+  report.heading("Spatial queries, " + body.name + ", us a query; update in ms");
+  std::vector<std::string> header = {""}, updates = {"update"};
+  for (std::size_t e = 0; e < engines.size(); ++e) {
+    header.push_back(engines[e]->name().substr(0, 11));
+    updates.push_back(milliseconds(median(times[e].updates)));
+    report.row("spatial", body.name + ", update", 1, engines[e]->name(), "ms",
+               median(times[e].updates));
+  }
+  header.insert(header.end(), {"ratio", "allowed", ""});
+  report.line(header);
+  report.line(updates);
+  for (std::size_t r = 0; r < body.rows().size(); ++r) {
+    const SpatialRow& row = body.rows()[r];
+    const std::vector<double>& palpate = times[0].rows[r];
+    if (palpate.empty()) continue;
+    const std::string scene = body.name + ", " + row.name;
+    std::vector<std::string> cells = {row.name};
+    double ratio = 0;
+    for (std::size_t e = 0; e < engines.size(); ++e) {
+      const std::vector<double>& samples = times[e].rows[r];
+      cells.push_back(samples.empty() ? "-" : number(median(samples)));
+      if (samples.empty()) continue;
+      report.row("spatial", scene, 1, engines[e]->name(), "us", median(samples));
+      if (e > 0) ratio = std::max(ratio, medianRatio(palpate, samples));
+    }
+    cells.push_back(number(ratio));
+    report.row("spatial", scene, 1, "Palpate", "ratio to the fastest library", ratio);
+    if (const double target = row.target[body.size]; target > 0) {
+      const double allowed = target / row.fastest[body.size];
+      cells.insert(cells.end(), {number(allowed), ratio <= allowed ? "met" : "NOT MET"});
+      report.row("spatial", scene, 1, "Palpate", "allowed ratio", allowed);
+    }
+    report.line(cells);
+  }
+}
 
-void spatialRows(Report& report, const RowOptions& options) {
-  for (std::size_t size = 0; size < (options.quick ? 2 : 3); ++size) {
-    constexpr int kFrequencies[] = {22, 71, 224};
-    const char* kNames[] = {"10K", "100K", "1M"};
-    const Body body = makeBody(kNames[size], size, kFrequencies[size]);
-    const Engines engines = makeEngines();
-    for (const auto& engine : engines) engine->prepare(body.triangles, body.frames[0]);
-    const auto times = takeTurns(body, engines, options);
-    report.heading("Spatial queries, " + std::to_string(body.triangles.size()) +
-                   " triangles, us a query");
+/// Errors on a sample, for the body at the origin and 1,000 diagonals from it.
+void errorRows(Report& report, const Body& body, const Engines& engines,
+               const RowOptions& options) {
+  for (const bool isFar : {false, true}) {
+    Points positions = body.frames[1];
+    if (isFar)
+      for (Vector3d& p : positions) p += 1000 * body.diagonal * Vector3d(0.6, -0.64, 0.48);
+    const std::string where = isFar ? ", 1,000 diagonals away" : ", at the origin";
+    report.heading("Spatial queries, " + body.name + where +
+                   ": wrong of answers, largest error / diagonal");
     std::vector<std::string> header = {""};
-    for (const auto& engine : engines) header.push_back(engine->name().substr(0, 11));
+    for (const auto& engine : engines) {
+      engine->update(positions);
+      header.push_back(engine->name().substr(0, 11));
+      header.push_back("");
+    }
     report.line(header);
-    std::vector<std::string> updates = {"update, ms"};
-    for (const EngineTimes& t : times) updates.push_back(milliseconds(median(t.updates)));
-    report.line(updates);
-    for (std::size_t row = 0; row < std::size(kRows); ++row) {
-      const QueryRow& r = kRows[row];
-      std::vector<std::string> cells = {r.name};
-      double best = 0;
-      for (std::size_t e = 0; e < engines.size(); ++e) {
-        const auto& samples = times[e].rows[row];
-        cells.push_back(samples.empty() ? "-" : number(median(samples)));
-        if (e == 0 || samples.empty()) continue;
-        const double ratio = medianRatio(times[0].rows[row], samples);
-        best = std::max(best, ratio);
+    testing::Random random(2);
+    SpatialAnswers answers;
+    for (const SpatialRow& row : body.rows()) {
+      const std::string scene = body.name + ", " + row.name + where;
+      if (!isWanted(scene, options.scenes)) continue;
+      const bool isList = row.query == SpatialQuery::Capsule || row.query == SpatialQuery::Box;
+      const std::size_t count = (isList ? 10u : 100u) / (body.size == 2 ? 5u : 1u);
+      const auto cases = makeCases(body, positions, row.place, count, random);
+      std::vector<std::string> cells = {row.name};
+      for (const auto& engine : engines) {
+        if (!engine->answers(row.query)) {
+          cells.insert(cells.end(), {"-", "-"});
+          continue;
+        }
+        answers.clear();
+        engine->ask(row.query, cases, body.sizes, answers);
+        const SpatialErrors errors = errorsOf(row.query, cases, body.sizes, answers, body.triangles,
+                                              positions, (isFar ? 3e-13 : 1e-15) * body.diagonal);
+        cells.push_back(std::to_string(errors.wrong) + "/" + std::to_string(errors.of));
+        cells.push_back(number(errors.widest / body.diagonal));
+        const auto figure = [&](const char* metric, double value) {
+          report.row("spatial errors", scene, 1, engine->name(), metric, value);
+        };
+        figure("wrong", static_cast<double>(errors.wrong));
+        figure("of", static_cast<double>(errors.of));
+        figure("largest error of a distance / diagonal", errors.widest / body.diagonal);
       }
-      const double allowed = r.target[size] / r.fastest[size];
-      cells.push_back("ratio " + number(best));
-      cells.push_back("of " + number(allowed));
-      cells.push_back(best <= allowed ? "met" : "NOT MET");
       report.line(cells);
     }
   }
+}
+
+/// A loop that only computes.
+void compute() {
+  double x = 0.5;
+  for (int i = 0; i < 20'000'000; ++i) x = 3.9 * x * (1 - x);
+  volatile double sink = x;
+  static_cast<void>(sink);
+}
+
+/// Batches on one and two threads, beside compute() once on a thread and once on each of two.
+void batchRows(Report& report, const Body& body, const RowOptions& options) {
+  constexpr std::size_t kCases = 100'000;
+  std::array<std::unique_ptr<OctreeBasedCD>, 2> collisions;
+  GeometryId mesh{};
+  for (int threads : {1, 2}) {
+    Settings settings;
+    settings.threads = threads;
+    auto& made = collisions[static_cast<std::size_t>(threads - 1)];
+    made = std::make_unique<OctreeBasedCD>(settings);
+    mesh = made->addTriangleMesh(body.frames[0], body.triangles);
+    made->update();
+  }
+  testing::Random random(3);
+  Points near;
+  std::vector<Ray> rays;
+  for (const SpatialCase& c : makeCases(body, body.frames[0], Place::Near, kCases, random))
+    near.push_back(c.point);
+  for (const SpatialCase& c : makeCases(body, body.frames[0], Place::Rays, kCases, random))
+    rays.push_back({c.point, c.direction});
+  std::vector<SurfacePoint> points(kCases);
+  std::vector<SignedDistance> distances(kCases);
+  std::vector<RayHit> hits(kCases);
+  constexpr const char* kNames[] = {"closestPoints near", "signedDistances near", "firstHits"};
+  std::array<std::array<std::vector<double>, 2>, 4> taken;
+  for (int turn = 0; turn <= options.measure.repetitions; ++turn)
+    for (std::size_t thread = 0; thread < 2; ++thread) {
+      const SpatialQueries queries = collisions[thread]->queries();
+      const double each[] = {
+          millisecondsOf([&] { queries.closestPoints(mesh, near, points); }),
+          millisecondsOf([&] { queries.signedDistances(mesh, near, distances); }),
+          millisecondsOf([&] { queries.firstHits(mesh, rays, hits); }), millisecondsOf([&] {
+            std::jthread other(thread == 1 ? compute : [] {});
+            compute();
+          })};
+      if (turn > 0)  // the first prepares what queries keep
+        for (std::size_t i = 0; i < 4; ++i) taken[i][thread].push_back(each[i]);
+    }
+  report.heading("Batches of " + std::to_string(kCases) + " queries, " + body.name +
+                 ": us a query on 1 and 2 threads, speed-up, of that of a loop");
+  const double loop = 2 * medianRatio(taken[3][0], taken[3][1]);
+  report.row("spatial batches", "loop", 2, "compute-bound loop", "speed-up", loop);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double speedUp = medianRatio(taken[i][0], taken[i][1]);
+    report.line({kNames[i], number(1000 * median(taken[i][0]) / kCases),
+                 number(1000 * median(taken[i][1]) / kCases), times(speedUp), times(loop),
+                 number(speedUp / loop), speedUp >= 0.9 * loop ? "met" : "NOT MET"});
+    for (std::size_t thread = 0; thread < 2; ++thread)
+      report.row("spatial batches", kNames[i], static_cast<int>(thread) + 1, "Palpate", "us",
+                 1000 * median(taken[i][thread]) / kCases);
+    report.row("spatial batches", kNames[i], 2, "Palpate", "speed-up", speedUp);
+    report.row("spatial batches", kNames[i], 2, "Palpate", "share of the loop's", speedUp / loop);
+  }
+}
+
+#ifdef PALPATE_BENCHMARK_BASELINES
+/// The least distance of two bodies of which both deform.
+void distanceRow(Report& report, const Body& body, const RowOptions& options) {
+  const std::string scene = body.name + ", minimum distance";
+  if (!isWanted(scene, options.scenes)) return;
+  Eigen::AlignedBox3d box;
+  for (const Points& frame : body.frames) box.extend(boxOf(frame));
+  const Vector3d aside = (box.sizes()[0] + 0.1 * body.diagonal) * Vector3d::UnitX();
+  std::vector<Points> others = body.frames;
+  for (Points& frame : others)
+    for (Vector3d& p : frame) p += aside;
+  FclDistance fcl(body.triangles, body.frames[0], others[0]);
+  std::vector<double> updates, queries;
+  double least = 0;
+  for (std::size_t turn = 0; turn < static_cast<std::size_t>(options.measure.repetitions); ++turn) {
+    const std::size_t frame = (turn + 1) % kFrames;
+    updates.push_back(millisecondsOf([&] { fcl.update(body.frames[frame], others[frame]); }));
+    queries.push_back(1000 * millisecondsOf([&] { least = fcl.distance(); }));
+  }
+  report.line({scene + ", FCL: us, update ms", number(median(queries)),
+               milliseconds(median(updates)), "distance", number(least / body.diagonal),
+               "diagonals"});
+  report.row("spatial", scene, 1, "FCL 0.7 BVHModel<OBBRSS>, refit", "us", median(queries));
+  report.row("spatial", scene, 1, "FCL 0.7 BVHModel<OBBRSS>, refit", "update ms", median(updates));
+  report.row("spatial", scene, 1, "Palpate", "allowed ratio",
+             kDistanceTargets[body.size] / kDistanceFastest[body.size]);
+}
+#endif
+
+}  // namespace
+
+void spatialRows(Report& report, const RowOptions& options) {
+  const std::size_t sizes = options.quick ? 2 : 3;
+  for (const bool isPointSet : {false, true})
+    for (std::size_t size = 0; size < sizes; ++size) {
+      const Body body = makeBody(size, isPointSet);
+      if (std::ranges::none_of(body.rows(), [&](const SpatialRow& row) {
+            return isWanted(body.name + ", " + row.name, options.scenes);
+          }))
+        continue;
+      const Engines engines = makeEngines(isPointSet, options.engines);
+      for (const auto& engine : engines) engine->prepare(body.triangles, body.frames[0]);
+      timeRows(report, body, engines, options);
+      errorRows(report, body, engines, options);
+    }
+#ifdef PALPATE_BENCHMARK_BASELINES
+  for (std::size_t size = 0; size < std::size(kDistanceTargets); ++size)
+    distanceRow(report, makeBody(size, false), options);
+#endif
+  if (isWanted("batches", options.scenes)) batchRows(report, makeBody(1, false), options);
 }
 
 }  // namespace palpate::benchmark

@@ -133,17 +133,17 @@ SpatialErrors errorsOf(SpatialQuery query, std::span<const SpatialCase> cases,
       case SpatialQuery::Capsule: {
         const Real3 half = asked.rotation.col(0).cast<Real>() * Real(sizes.capsuleLength) / 2;
         check.list(found(), body.each([&](const Real3& a, const Real3& b, const Real3& c) {
-                     return std::sqrt(segmentTriangleDistanceSquared<Real>(p - half, p + half, a, b, c));
-                   }),
+          return std::sqrt(segmentTriangleDistanceSquared<Real>(p - half, p + half, a, b, c));
+        }),
                    sizes.capsuleRadius);
         break;
       }
       case SpatialQuery::Box: {
         const Eigen::Matrix<Real, 3, 3> toBox = asked.rotation.transpose().cast<Real>();
         check.list(found(), body.each([&](const Real3& a, const Real3& b, const Real3& c) {
-                     return boxGap<Real>(sizes.boxHalf.cast<Real>(), toBox * (a - p), toBox * (b - p),
-                                         toBox * (c - p), kNone);
-                   }),
+          return boxGap<Real>(sizes.boxHalf.cast<Real>(), toBox * (a - p), toBox * (b - p),
+                              toBox * (c - p), kNone);
+        }),
                    0);
         break;
       }

@@ -6,9 +6,10 @@ namespace palpate::benchmark {
 
 /// Errors of an engine's answers against brute force in long double.
 struct SpatialErrors {
-  double widest = 0;      ///< L: largest error of a distance
-  std::size_t wrong = 0;  ///< wrong triangles or sides, leaks; missing and needless elements of lists
-  std::size_t of = 0;     ///< answers compared
+  double widest = 0;  ///< L: largest error of a distance
+  std::size_t wrong =
+      0;               ///< wrong triangles or sides, leaks; missing and needless elements of lists
+  std::size_t of = 0;  ///< answers compared
 };
 
 /// tolerance: L. An element whose true distance is within it of the limit may be in or out, and of

@@ -91,11 +91,10 @@ S segmentTriangleDistanceSquared(const Vector<S>& p0, const Vector<S>& p1, const
                                  const Vector<S>& b, const Vector<S>& c) {
   const S t = lineHit<S>(p0, p1 - p0, a, b, c);
   if (t >= 0 && t <= 1) return 0;
-  return std::min({closestOnTriangle<S>(p0, a, b, c).distanceSquared,
-                   closestOnTriangle<S>(p1, a, b, c).distanceSquared,
-                   segmentsDistanceSquared<S>(p0, p1, a, b),
-                   segmentsDistanceSquared<S>(p0, p1, b, c),
-                   segmentsDistanceSquared<S>(p0, p1, c, a)});
+  return std::min(
+      {closestOnTriangle<S>(p0, a, b, c).distanceSquared,
+       closestOnTriangle<S>(p1, a, b, c).distanceSquared, segmentsDistanceSquared<S>(p0, p1, a, b),
+       segmentsDistanceSquared<S>(p0, p1, b, c), segmentsDistanceSquared<S>(p0, p1, c, a)});
 }
 
 /// The width of the widest gap along the axes that can separate a triangle from a box around the
@@ -103,8 +102,8 @@ S segmentTriangleDistanceSquared(const Vector<S>& p0, const Vector<S>& p1, const
 template <class S>
 S boxGap(const Vector<S>& half, const Vector<S>& a, const Vector<S>& b, const Vector<S>& c,
          S enough) {
-  S widest = ((a.cwiseMin(b).cwiseMin(c) - half).cwiseMax(-half - a.cwiseMax(b).cwiseMax(c)))
-                 .maxCoeff();
+  S widest =
+      ((a.cwiseMin(b).cwiseMin(c) - half).cwiseMax(-half - a.cwiseMax(b).cwiseMax(c))).maxCoeff();
   if (widest > enough) return widest;
   const Vector<S> edges[] = {b - a, c - b, a - c};
   const auto gap = [&](const Vector<S>& axis) {

@@ -1,6 +1,6 @@
-// Bullet 3: a btDbvt in floats, its volumes refitted bottom-up as in Bullet's soft bodies. collideTV
-// gives the triangles whose boxes meet a box, collideKDOP those that meet six planes, rayTestInternal
-// those that meet a ray; ours tests the triangles.
+// Bullet 3: a btDbvt in floats, its volumes refitted bottom-up as in Bullet's soft bodies.
+// collideTV gives the triangles whose boxes meet a box, collideKDOP those that meet six planes,
+// rayTestInternal those that meet a ray; ours tests the triangles.
 #include "BroadPhase.h"
 #include "SpatialEngine.h"
 #include "TriangleGeometry.h"
@@ -15,9 +15,7 @@ using Float3 = Vector<float>;
 template <class F>
 struct Visitor : btDbvt::ICollide {
   explicit Visitor(F& f) : visit(f) {}
-  void Process(const btDbvtNode* leaf) {
-    visit(static_cast<std::uint32_t>(leaf->dataAsInt));
-  }
+  void Process(const btDbvtNode* leaf) { visit(static_cast<std::uint32_t>(leaf->dataAsInt)); }
   F& visit;
 };
 

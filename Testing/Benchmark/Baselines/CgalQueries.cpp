@@ -1,7 +1,7 @@
 // CGAL 5.5: AABB_tree over triangles, rebuilt for each frame, with its search tree for distances.
-// Two kernels: plain doubles, and exact predicates with inexact constructions. Balls and boxes along
-// the axes are queries of the tree; the box of a capsule or an oriented box gives candidates, and
-// ours tests the triangles.
+// Two kernels: plain doubles, and exact predicates with inexact constructions. Balls and boxes
+// along the axes are queries of the tree; the box of a capsule or an oriented box gives candidates,
+// and ours tests the triangles.
 #include "SpatialEngine.h"
 #include "TriangleGeometry.h"
 

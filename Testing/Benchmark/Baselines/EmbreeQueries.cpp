@@ -1,7 +1,7 @@
 // Embree 3: a triangle geometry in floats. Point queries run a callback of ours for each triangle
-// that Embree finds near. Signs come from pseudonormals (Baerentzen, Aanaes 2005); contains() counts
-// the hits of a ray in robust mode. Capsules and boxes are asked by their enclosing balls, and ours
-// tests the triangles.
+// that Embree finds near. Signs come from pseudonormals (Baerentzen, Aanaes 2005); contains()
+// counts the hits of a ray in robust mode. Capsules and boxes are asked by their enclosing balls,
+// and ours tests the triangles.
 #include "SpatialEngine.h"
 #include "TriangleGeometry.h"
 
@@ -40,8 +40,8 @@ class EmbreeQueries : public SpatialEngine {
     m_device = rtcNewDevice("threads=1");
     rtcSetDeviceErrorFunction(m_device, throwError, nullptr);
     m_scene = rtcNewScene(m_device);
-    rtcSetSceneFlags(m_scene, RTC_SCENE_FLAG_ROBUST |
-                                  (m_refit ? RTC_SCENE_FLAG_DYNAMIC : RTC_SCENE_FLAG_NONE));
+    rtcSetSceneFlags(
+        m_scene, RTC_SCENE_FLAG_ROBUST | (m_refit ? RTC_SCENE_FLAG_DYNAMIC : RTC_SCENE_FLAG_NONE));
     if (m_refit) rtcSetSceneBuildQuality(m_scene, RTC_BUILD_QUALITY_LOW);  // or it is rebuilt
     m_geometry = rtcNewGeometry(m_device, RTC_GEOMETRY_TYPE_TRIANGLE);
     rtcSetSharedGeometryBuffer(m_geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
@@ -146,20 +146,27 @@ class EmbreeQueries : public SpatialEngine {
     const auto vertex = [&](std::size_t i) { return m_vertexNormals[m_triangles[triangle][i]]; };
     const auto edge = [&](std::size_t i) { return m_edgeNormals[m_edges[triangle][i]]; };
     switch (at.feature) {
-      case 1: return offset.dot(vertex(0)) < 0;
-      case 2: return offset.dot(vertex(1)) < 0;
-      case 4: return offset.dot(vertex(2)) < 0;
-      case 3: return offset.dot(edge(0)) < 0;
-      case 6: return offset.dot(edge(1)) < 0;
-      case 5: return offset.dot(edge(2)) < 0;
-      default: return offset.dot((t.b - t.a).cross(t.c - t.a)) < 0;
+      case 1:
+        return offset.dot(vertex(0)) < 0;
+      case 2:
+        return offset.dot(vertex(1)) < 0;
+      case 4:
+        return offset.dot(vertex(2)) < 0;
+      case 3:
+        return offset.dot(edge(0)) < 0;
+      case 6:
+        return offset.dot(edge(1)) < 0;
+      case 5:
+        return offset.dot(edge(2)) < 0;
+      default:
+        return offset.dot((t.b - t.a).cross(t.c - t.a)) < 0;
     }
   }
 
   RTCRay ray(const SpatialCase& c) const {
     const Float3 o = c.point.cast<float>(), d = c.direction.cast<float>();
     return {o[0], o[1], o[2], 0, d[0], d[1], d[2], 0, std::numeric_limits<float>::infinity(),
-            ~0u, 0, 0};
+            ~0u,  0,    0};
   }
 
   void firstHit(const SpatialCase& c, SpatialAnswers& out) const {
