@@ -89,8 +89,11 @@ class CgalQueries : public SpatialEngine {
           break;
         }
         case SpatialQuery::Ball: {
-          const typename Kernel::Sphere_3 sphere(p, sizes.ball * sizes.ball);
-          candidates(sphere, [&](std::uint32_t t) { out.elements.push_back(t); });
+          candidates(bounds(c.point, Eigen::Vector3d::Constant(sizes.ball)), [&](std::uint32_t t) {
+            if (closestOnTriangle<double>(c.point, corner(t, 0), corner(t, 1), corner(t, 2))
+                    .distanceSquared <= sizes.ball * sizes.ball)
+              out.elements.push_back(t);
+          });
           out.endCase();
           break;
         }

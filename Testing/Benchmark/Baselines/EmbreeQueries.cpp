@@ -30,7 +30,7 @@ class EmbreeQueries : public SpatialEngine {
   }
 
   std::string name() const override {
-    return m_refit ? "Embree 3.13, refit" : "Embree 3.13, SAH rebuild";
+    return m_refit ? "Embree 3.13, refit, robust rays" : "Embree 3.13, SAH rebuild";
   }
 
   void prepare(const std::vector<Triangle>& triangles,
@@ -40,8 +40,7 @@ class EmbreeQueries : public SpatialEngine {
     m_device = rtcNewDevice("threads=1");
     rtcSetDeviceErrorFunction(m_device, throwError, nullptr);
     m_scene = rtcNewScene(m_device);
-    rtcSetSceneFlags(
-        m_scene, RTC_SCENE_FLAG_ROBUST | (m_refit ? RTC_SCENE_FLAG_DYNAMIC : RTC_SCENE_FLAG_NONE));
+    if (m_refit) rtcSetSceneFlags(m_scene, RTC_SCENE_FLAG_DYNAMIC | RTC_SCENE_FLAG_ROBUST);
     if (m_refit) rtcSetSceneBuildQuality(m_scene, RTC_BUILD_QUALITY_LOW);  // or it is rebuilt
     m_geometry = rtcNewGeometry(m_device, RTC_GEOMETRY_TYPE_TRIANGLE);
     rtcSetSharedGeometryBuffer(m_geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
@@ -64,7 +63,9 @@ class EmbreeQueries : public SpatialEngine {
     m_normalsValid = false;
   }
 
-  bool answers(SpatialQuery) const override { return true; }
+  bool answers(SpatialQuery query) const override {
+    return m_refit || query != SpatialQuery::Contains;  // which needs robust rays
+  }
 
   void ask(SpatialQuery query, std::span<const SpatialCase> cases, const ShapeSizes& sizes,
            SpatialAnswers& out) override {
