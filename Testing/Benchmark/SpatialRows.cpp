@@ -264,30 +264,37 @@ double millisecondsOf(F&& f) {
 }
 
 /// In each repetition all engines update to the next frame and answer the same cases. A different
-/// engine begins each time.
+/// engine begins each time. An engine rests once its time is spent.
 std::vector<EngineTimes> takeTurns(const Body& body, const Engines& engines,
                                    const RowOptions& options) {
   std::vector<EngineTimes> times(engines.size());
+  std::vector<double> spent(engines.size());  // ms
   SpatialAnswers answers;
   testing::Random random(1);
   for (std::size_t turn = 0; turn < static_cast<std::size_t>(options.measure.repetitions); ++turn) {
     const Points& positions = body.frames[(turn + 1) % kFrames];
-    for (std::size_t i = 0; i < engines.size(); ++i)
+    std::vector<char> rests(engines.size());
+    for (std::size_t i = 0; i < engines.size(); ++i) {
+      rests[i] = spent[i] > 1000 * options.measure.secondsPerEngine;
+      if (rests[i]) continue;
       times[i].updates.push_back(millisecondsOf([&] { engines[i]->update(positions); }));
+      spent[i] += times[i].updates.back();
+    }
     for (std::size_t r = 0; r < body.rows().size(); ++r) {
       const SpatialRow& row = body.rows()[r];
-      if (!isWanted(body.name + ", " + row.name, options.scenes)) continue;
+      if (!isWanted(body.name + ": " + row.name, options.scenes)) continue;
       const auto cases = makeCases(body, positions, row.place, row.cases[body.size], random);
       for (std::size_t i = 0; i < engines.size(); ++i) {
         const std::size_t e = (i + turn) % engines.size();
-        if (!engines[e]->answers(row.query)) continue;
+        if (rests[e] || !engines[e]->answers(row.query)) continue;
         const auto ask = [&](std::span<const SpatialCase> some) {
           answers.clear();
           engines[e]->ask(row.query, some, body.sizes, answers);
         };
         ask(std::span(cases).first(cases.size() / 8));  // warms the caches
-        times[e].rows[r].push_back(1000 * millisecondsOf([&] { ask(cases); }) /
-                                   static_cast<double>(cases.size()));
+        const double taken = millisecondsOf([&] { ask(cases); });
+        spent[e] += taken;
+        times[e].rows[r].push_back(1000 * taken / static_cast<double>(cases.size()));
       }
     }
   }
@@ -302,7 +309,7 @@ void timeRows(Report& report, const Body& body, const Engines& engines, const Ro
   for (std::size_t e = 0; e < engines.size(); ++e) {
     header.push_back(engines[e]->name().substr(0, 11));
     updates.push_back(milliseconds(median(times[e].updates)));
-    report.row("spatial", body.name + ", update", 1, engines[e]->name(), "ms",
+    report.row("spatial", body.name + ": update", 1, engines[e]->name(), "ms",
                median(times[e].updates));
   }
   header.insert(header.end(), {"ratio", "allowed", ""});
@@ -312,7 +319,7 @@ void timeRows(Report& report, const Body& body, const Engines& engines, const Ro
     const SpatialRow& row = body.rows()[r];
     const std::vector<double>& palpate = times[0].rows[r];
     if (palpate.empty()) continue;
-    const std::string scene = body.name + ", " + row.name;
+    const std::string scene = body.name + ": " + row.name;
     std::vector<std::string> cells = {row.name};
     double ratio = 0;
     for (std::size_t e = 0; e < engines.size(); ++e) {
@@ -342,7 +349,7 @@ void errorRows(Report& report, const Body& body, const Engines& engines,
       for (Vector3d& p : positions) p += 1000 * body.diagonal * Vector3d(0.6, -0.64, 0.48);
     const std::string where = isFar ? ", 1,000 diagonals away" : ", at the origin";
     report.heading("Spatial queries, " + body.name + where +
-                   ": wrong of answers, largest error / diagonal");
+                   ": wrong elements, largest error / diagonal");
     std::vector<std::string> header = {""};
     for (const auto& engine : engines) {
       engine->update(positions);
@@ -351,31 +358,31 @@ void errorRows(Report& report, const Body& body, const Engines& engines,
     }
     report.line(header);
     testing::Random random(2);
-    SpatialAnswers answers;
     for (const SpatialRow& row : body.rows()) {
-      const std::string scene = body.name + ", " + row.name + where;
+      const std::string scene = body.name + ": " + row.name + where;
       if (!isWanted(scene, options.scenes)) continue;
-      const bool isList = row.query == SpatialQuery::Capsule || row.query == SpatialQuery::Box;
-      const std::size_t count = (isList ? 10u : 100u) / (body.size == 2 ? 5u : 1u);
-      const auto cases = makeCases(body, positions, row.place, count, random);
+      const bool isShape = row.query == SpatialQuery::Capsule || row.query == SpatialQuery::Box;
+      const auto cases = makeCases(body, positions, row.place,
+                                   (isShape ? 10u : 100u) / (body.size == 2 ? 5u : 1u), random);
+      std::vector<SpatialAnswers> answers(engines.size());
+      for (std::size_t e = 0; e < engines.size(); ++e)
+        if (engines[e]->answers(row.query))
+          engines[e]->ask(row.query, cases, body.sizes, answers[e]);
+      const auto errors = errorsOf(row.query, cases, body.sizes, answers, body.triangles, positions,
+                                   1e-15 * body.diagonal);
       std::vector<std::string> cells = {row.name};
-      for (const auto& engine : engines) {
-        if (!engine->answers(row.query)) {
-          cells.insert(cells.end(), {"-", "-"});
-          continue;
-        }
-        answers.clear();
-        engine->ask(row.query, cases, body.sizes, answers);
-        const SpatialErrors errors = errorsOf(row.query, cases, body.sizes, answers, body.triangles,
-                                              positions, (isFar ? 3e-13 : 1e-15) * body.diagonal);
-        cells.push_back(std::to_string(errors.wrong) + "/" + std::to_string(errors.of));
-        cells.push_back(number(errors.widest / body.diagonal));
+      for (std::size_t e = 0; e < engines.size(); ++e) {
+        const double widest = errors[e].widest / body.diagonal;
+        const bool answered = engines[e]->answers(row.query);
+        cells.push_back(answered ? std::to_string(errors[e].wrong) : "-");
+        cells.push_back(answered && widest > 0 ? number(widest) : "");
+        if (!answered) continue;
         const auto figure = [&](const char* metric, double value) {
-          report.row("spatial errors", scene, 1, engine->name(), metric, value);
+          report.row("spatial errors", scene, 1, engines[e]->name(), metric, value);
         };
-        figure("wrong", static_cast<double>(errors.wrong));
-        figure("of", static_cast<double>(errors.of));
-        figure("largest error of a distance / diagonal", errors.widest / body.diagonal);
+        figure("wrong", static_cast<double>(errors[e].wrong));
+        figure("of", static_cast<double>(errors[e].of));
+        figure("largest error / diagonal", widest);
       }
       report.line(cells);
     }
@@ -448,7 +455,7 @@ void batchRows(Report& report, const Body& body, const RowOptions& options) {
 #ifdef PALPATE_BENCHMARK_BASELINES
 /// The least distance of two bodies of which both deform.
 void distanceRow(Report& report, const Body& body, const RowOptions& options) {
-  const std::string scene = body.name + ", minimum distance";
+  const std::string scene = body.name + ": minimum distance";
   if (!isWanted(scene, options.scenes)) return;
   Eigen::AlignedBox3d box;
   for (const Points& frame : body.frames) box.extend(boxOf(frame));
@@ -482,7 +489,7 @@ void spatialRows(Report& report, const RowOptions& options) {
     for (std::size_t size = 0; size < sizes; ++size) {
       const Body body = makeBody(size, isPointSet);
       if (std::ranges::none_of(body.rows(), [&](const SpatialRow& row) {
-            return isWanted(body.name + ", " + row.name, options.scenes);
+            return isWanted(body.name + ": " + row.name, options.scenes);
           }))
         continue;
       const Engines engines = makeEngines(isPointSet, options.engines);

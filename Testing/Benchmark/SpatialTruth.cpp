@@ -44,108 +44,116 @@ bool isInside(const Body& body, const Real3& p) {
   return std::abs(sum) > 3;  // 2 pi inside, 0 outside
 }
 
-class Check {
- public:
-  Check(Real tolerance, SpatialErrors& errors) : m_tolerance(tolerance), m_errors(errors) {}
-
-  /// One nearest element: its value, and the true values of all elements. sign: -1 or 1.
-  void nearest(double value, std::uint32_t element, const std::vector<Real>& truth, Real best,
-               Real sign = 1) {
-    ++m_errors.of;
-    const bool none = best == kNone;
-    if (none || element >= truth.size()) {
-      m_errors.wrong += none != (element >= truth.size());
-      return;
-    }
-    m_errors.widest = std::max(m_errors.widest, static_cast<double>(std::abs(value - sign * best)));
-    m_errors.wrong += !(truth[element] <= best + m_tolerance);
-  }
-
-  /// The elements whose value is at most the limit.
-  void list(std::span<const std::uint32_t> found, const std::vector<Real>& truth, Real limit) {
-    std::vector<char> in(truth.size());
-    for (const std::uint32_t element : found) {
-      m_errors.wrong += in[element] != 0 || truth[element] > limit + m_tolerance;
-      in[element] = 1;
-    }
-    for (std::size_t i = 0; i < truth.size(); ++i) {
-      const bool should = truth[i] < limit - m_tolerance;
-      m_errors.of += should;
-      m_errors.wrong += should && !in[i];
-    }
-  }
-
- private:
-  Real m_tolerance;
-  SpatialErrors& m_errors;
+/// Of one case: the true value of each element, the limit of a list, and whether the point is
+/// inside.
+struct Truth {
+  std::vector<Real> values;
+  Real limit = 0;
+  bool inside = false;
 };
+
+Truth truthOf(SpatialQuery query, const SpatialCase& asked, const ShapeSizes& sizes,
+              const Body& body) {
+  const Real3 p = asked.point.cast<Real>();
+  switch (query) {
+    case SpatialQuery::Closest:
+    case SpatialQuery::EightNearest:
+      return {distancesTo(body, p)};
+    case SpatialQuery::SignedDistance:
+      return {distancesTo(body, p), 0, isInside(body, p)};
+    case SpatialQuery::Contains:
+      return {{}, 0, isInside(body, p)};
+    case SpatialQuery::FirstHit: {
+      const Real3 d = asked.direction.cast<Real>();
+      return {body.each([&](const Real3& a, const Real3& b, const Real3& c) {
+        const Real t = lineHit<Real>(p, d, a, b, c);
+        return t >= 0 ? t : kNone;
+      })};
+    }
+    case SpatialQuery::Ball:
+      return {distancesTo(body, p), sizes.ball};
+    case SpatialQuery::Capsule: {
+      const Real3 half = asked.rotation.col(0).cast<Real>() * Real(sizes.capsuleLength) / 2;
+      return {body.each([&](const Real3& a, const Real3& b, const Real3& c) {
+                return std::sqrt(segmentTriangleDistanceSquared<Real>(p - half, p + half, a, b, c));
+              }),
+              sizes.capsuleRadius};
+    }
+    case SpatialQuery::Box: {
+      const Eigen::Matrix<Real, 3, 3> toBox = asked.rotation.transpose().cast<Real>();
+      const Real3 half = sizes.boxHalf.cast<Real>();
+      return {body.each([&](const Real3& a, const Real3& b, const Real3& c) {
+        return boxGap<Real>(half, toBox * (a - p), toBox * (b - p), toBox * (c - p), kNone);
+      })};
+    }
+  }
+  return {};
+}
+
+/// The k nearest elements.
+void checkNearest(const SpatialAnswers& answers, std::size_t first, std::size_t k,
+                  const Truth& truth, Real tolerance, SpatialErrors& errors) {
+  std::vector<Real> sorted = truth.values;
+  std::partial_sort(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(k), sorted.end());
+  for (std::size_t i = 0; i < k; ++i) {
+    const std::uint32_t element = answers.elements[first + i];
+    ++errors.of;
+    if (sorted[i] == kNone || element >= sorted.size()) {
+      errors.wrong += (sorted[i] == kNone) != (element >= sorted.size());
+      continue;
+    }
+    const Real best = truth.inside ? -sorted[i] : sorted[i];
+    errors.widest =
+        std::max(errors.widest, static_cast<double>(std::abs(answers.values[first + i] - best)));
+    errors.wrong += !(truth.values[element] <= sorted[i] + tolerance);
+  }
+}
+
+void checkList(std::span<const std::uint32_t> found, const Truth& truth, Real tolerance,
+               SpatialErrors& errors) {
+  std::vector<char> in(truth.values.size());
+  for (const std::uint32_t element : found) {
+    errors.wrong += in[element] != 0 || truth.values[element] > truth.limit + tolerance;
+    in[element] = 1;
+  }
+  for (std::size_t i = 0; i < in.size(); ++i) {
+    const bool should = truth.values[i] < truth.limit - tolerance;
+    errors.of += should;
+    errors.wrong += should && !in[i];
+  }
+}
 
 }  // namespace
 
-SpatialErrors errorsOf(SpatialQuery query, std::span<const SpatialCase> cases,
-                       const ShapeSizes& sizes, const SpatialAnswers& answers,
-                       const std::vector<Triangle>& triangles,
-                       const std::vector<Eigen::Vector3d>& positions, double tolerance) {
-  const Body body{triangles, positions};
-  SpatialErrors errors;
-  Check check(tolerance, errors);
+std::vector<SpatialErrors> errorsOf(SpatialQuery query, std::span<const SpatialCase> cases,
+                                    const ShapeSizes& sizes,
+                                    std::span<const SpatialAnswers> ofEngines,
+                                    const std::vector<Triangle>& triangles,
+                                    const std::vector<Eigen::Vector3d>& positions,
+                                    double tolerance) {
+  std::vector<SpatialErrors> errors(ofEngines.size());
   for (std::size_t i = 0; i < cases.size(); ++i) {
-    const SpatialCase& asked = cases[i];
-    const Real3 p = asked.point.cast<Real>();
-    const auto found = [&] {
-      const std::size_t first = i ? answers.ends[i - 1] : 0;
-      return std::span(answers.elements).subspan(first, answers.ends[i] - first);
-    };
-    switch (query) {
-      case SpatialQuery::Closest:
-      case SpatialQuery::SignedDistance: {
-        const auto truth = distancesTo(body, p);
-        const bool inside = query == SpatialQuery::SignedDistance && isInside(body, p);
-        check.nearest(answers.values[i], answers.elements[i], truth,
-                      *std::min_element(truth.begin(), truth.end()), inside ? -1 : 1);
-        break;
-      }
-      case SpatialQuery::Contains:
-        ++errors.of;
-        errors.wrong += (answers.values[i] != 0) != isInside(body, p);
-        break;
-      case SpatialQuery::FirstHit: {
-        const Real3 d = asked.direction.cast<Real>();
-        const auto truth = body.each([&](const Real3& a, const Real3& b, const Real3& c) {
-          const Real t = lineHit<Real>(p, d, a, b, c);
-          return t >= 0 ? t : kNone;
-        });
-        check.nearest(answers.values[i], answers.elements[i], truth,
-                      *std::min_element(truth.begin(), truth.end()));
-        break;
-      }
-      case SpatialQuery::EightNearest: {
-        const auto truth = distancesTo(body, p);
-        auto sorted = truth;
-        std::partial_sort(sorted.begin(), sorted.begin() + 8, sorted.end());
-        for (std::size_t k = 0; k < 8; ++k)
-          check.nearest(answers.values[8 * i + k], answers.elements[8 * i + k], truth, sorted[k]);
-        break;
-      }
-      case SpatialQuery::Ball:
-        check.list(found(), distancesTo(body, p), sizes.ball);
-        break;
-      case SpatialQuery::Capsule: {
-        const Real3 half = asked.rotation.col(0).cast<Real>() * Real(sizes.capsuleLength) / 2;
-        check.list(found(), body.each([&](const Real3& a, const Real3& b, const Real3& c) {
-          return std::sqrt(segmentTriangleDistanceSquared<Real>(p - half, p + half, a, b, c));
-        }),
-                   sizes.capsuleRadius);
-        break;
-      }
-      case SpatialQuery::Box: {
-        const Eigen::Matrix<Real, 3, 3> toBox = asked.rotation.transpose().cast<Real>();
-        check.list(found(), body.each([&](const Real3& a, const Real3& b, const Real3& c) {
-          return boxGap<Real>(sizes.boxHalf.cast<Real>(), toBox * (a - p), toBox * (b - p),
-                              toBox * (c - p), kNone);
-        }),
-                   0);
-        break;
+    const Truth truth = truthOf(query, cases[i], sizes, {triangles, positions});
+    for (std::size_t e = 0; e < ofEngines.size(); ++e) {
+      const SpatialAnswers& answers = ofEngines[e];
+      if (answers.values.empty() && answers.ends.empty()) continue;
+      switch (query) {
+        case SpatialQuery::Contains:
+          ++errors[e].of;
+          errors[e].wrong += (answers.values[i] != 0) != truth.inside;
+          break;
+        case SpatialQuery::Ball:
+        case SpatialQuery::Capsule:
+        case SpatialQuery::Box: {
+          const std::size_t first = i > 0 ? answers.ends[i - 1] : 0;
+          checkList(std::span(answers.elements).subspan(first, answers.ends[i] - first), truth,
+                    tolerance, errors[e]);
+          break;
+        }
+        default: {
+          const std::size_t k = query == SpatialQuery::EightNearest ? 8 : 1;
+          checkNearest(answers, k * i, k, truth, tolerance, errors[e]);
+        }
       }
     }
   }

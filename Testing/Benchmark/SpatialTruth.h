@@ -12,10 +12,13 @@ struct SpatialErrors {
   std::size_t of = 0;  ///< answers compared
 };
 
-/// tolerance: L. An element whose true distance is within it of the limit may be in or out, and of
-/// triangles whose distances differ by less either is right.
-SpatialErrors errorsOf(SpatialQuery, std::span<const SpatialCase>, const ShapeSizes&,
-                       const SpatialAnswers&, const std::vector<Triangle>&,
-                       const std::vector<Eigen::Vector3d>& positions, double tolerance);
+/// The errors of each engine's answers; none where an engine has no answers. tolerance: L. An
+/// element whose true distance is within it of the limit may be in or out, and of triangles whose
+/// distances differ by less either is right.
+std::vector<SpatialErrors> errorsOf(SpatialQuery, std::span<const SpatialCase>, const ShapeSizes&,
+                                    std::span<const SpatialAnswers> ofEngines,
+                                    const std::vector<Triangle>&,
+                                    const std::vector<Eigen::Vector3d>& positions,
+                                    double tolerance);
 
 }  // namespace palpate::benchmark
