@@ -140,17 +140,17 @@ int main(int count, char** arguments) {
   options.rows.sharedData = PALPATE_SHARED_DATA;
   options.tables = {"race",  "stages",     "frame",    "far",     "rest",   "tool",
                     "scale", "steady",     "features", "lines",   "shapes", "inside",
-                    "rigid", "continuous", "validity", "spatial", "simd"};
+                    "rigid", "continuous", "validity", "queries", "simd"};
   MeasureOptions& measure = options.rows.measure;
   CLI::App app{"Times Palpate and the baselines (Embree, Bullet, FCL, CGAL) on the same frames"};
   app.add_option(
          "--tables", options.tables,
          "some of race, stages, frame, far, rest, tool, scale, "
-         "steady, features, lines, shapes, inside, rigid, continuous, validity, spatial, simd")
+         "steady, features, lines, shapes, inside, rigid, continuous, validity, queries, simd")
       ->delimiter(',')
       ->check(CLI::IsMember(options.tables));
   app.add_option("--scenes", options.rows.scenes,
-                 "scenes of the table race, parts of scenes of the table spatial; default: all")
+                 "scenes of the table race, parts of scenes of the table queries; default: all")
       ->delimiter(',');
   app.add_option("--engines", options.rows.engines, "parts of engines' names; default: all")
       ->delimiter(',');
@@ -184,7 +184,7 @@ int main(int count, char** arguments) {
       {"rigid", rigidRows},
       {"continuous", continuousRows},
       {"validity", validityRows},
-      {"spatial", spatialRows},
+      {"queries", spatialRows},
       {"simd", simdRows}};
   for (const std::string& table : options.tables) {
     if (table == "race")

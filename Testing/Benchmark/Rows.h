@@ -13,7 +13,7 @@ struct RowOptions {
   std::string sharedData;
   bool quick = false;  ///< a million triangles at most, a hundred steady frames
   /// Parts of names, of which one must match; empty: all. Of the scenes of the tables race and
-  /// spatial, and of their engines.
+  /// queries, and of their engines.
   std::vector<std::string> scenes, engines;
 };
 
