@@ -1,10 +1,8 @@
 // Spatial queries on a geometry that deforms in each frame: Palpate beside the libraries of Debian.
 #include "Rows.h"
 
-#include "SpatialEngine.h"
+#include "SpatialBody.h"
 #include "SpatialTruth.h"
-
-#include "Common/RandomMeshes.h"
 
 #ifdef PALPATE_BENCHMARK_BASELINES
 #include "Baselines/FclDistance.h"
@@ -12,11 +10,8 @@
 
 #include <palpate/OctreeBasedCD.h>
 
-#include <Meshes.h>
-
 #include <Eigen/Geometry>
 
-#include <cmath>
 #include <cstdio>
 #include <thread>
 
@@ -26,191 +21,8 @@ namespace {
 using Eigen::Vector3d;
 using Points = std::vector<Vector3d>;
 
-/// Where the points of a row's queries are.
-enum class Place { Near, Tenth, Anywhere, InBox, Rays, Surface };
-
-/// A row of the table, for three sizes. In microseconds a query on the machine of the targets: the
-/// target, and the fastest library there. 0: there is no target.
-struct SpatialRow {
-  const char* name;
-  SpatialQuery query;
-  Place place;
-  std::array<std::size_t, 3> cases;
-  std::array<double, 3> target, fastest;
-};
-constexpr SpatialRow kRows[] = {{"closest near",
-                                 SpatialQuery::Closest,
-                                 Place::Near,
-                                 {4000, 4000, 4000},
-                                 {0.5, 0.8, 1.5},
-                                 {0.61, 1.06, 1.9}},
-                                {"closest 10 %",
-                                 SpatialQuery::Closest,
-                                 Place::Tenth,
-                                 {4000, 4000, 2000},
-                                 {0.8, 2.1, 8},
-                                 {0.99, 2.8, 10.8}},
-                                {"closest anywhere",
-                                 SpatialQuery::Closest,
-                                 Place::Anywhere,
-                                 {4000, 2000, 1000},
-                                 {1.7, 4.5, 14},
-                                 {2.2, 5.8, 18}},
-                                {"signed distance near",
-                                 SpatialQuery::SignedDistance,
-                                 Place::Near,
-                                 {4000, 4000, 4000},
-                                 {0.6, 1.0, 1.8},
-                                 {0.73, 1.6, 2.6}},
-                                {"contains",
-                                 SpatialQuery::Contains,
-                                 Place::InBox,
-                                 {4000, 4000, 4000},
-                                 {0.22, 0.33, 0.6},
-                                 {0.25, 0.38, 0.67}},
-                                {"first hit",
-                                 SpatialQuery::FirstHit,
-                                 Place::Rays,
-                                 {4000, 4000, 4000},
-                                 {0.22, 0.40, 0.75},
-                                 {0.20, 0.31, 0.56}},
-                                {"8 nearest",
-                                 SpatialQuery::EightNearest,
-                                 Place::Near,
-                                 {2000, 2000, 2000},
-                                 {1.5, 2.2, 3.3},
-                                 {2.1, 3.0, 4.3}},
-                                {"ball",
-                                 SpatialQuery::Ball,
-                                 Place::Surface,
-                                 {2000, 2000, 2000},
-                                 {1.9, 2.7, 4.3},
-                                 {2.5, 3.5, 5.6}},
-                                {"capsule",
-                                 SpatialQuery::Capsule,
-                                 Place::Surface,
-                                 {500, 200, 40},
-                                 {4, 30, 220},
-                                 {22, 181, 1358}},
-                                {"oriented box",
-                                 SpatialQuery::Box,
-                                 Place::Surface,
-                                 {500, 200, 40},
-                                 {5, 45, 400},
-                                 {20, 213, 1922}}};
-constexpr SpatialRow kPointRows[] = {
-    {"closest near", SpatialQuery::Closest, Place::Near, {4000, 4000, 4000}, {}, {}},
-    {"closest anywhere", SpatialQuery::Closest, Place::Anywhere, {4000, 2000, 1000}, {}, {}},
-    {"8 nearest", SpatialQuery::EightNearest, Place::Near, {2000, 2000, 2000}, {}, {}},
-    {"ball", SpatialQuery::Ball, Place::Near, {2000, 2000, 2000}, {}, {}}};
 /// Two meshes whose boxes are a tenth of the diagonal apart; of two sizes.
 constexpr double kDistanceTargets[] = {300, 1000}, kDistanceFastest[] = {600, 1000};
-
-constexpr const char* kSizes[] = {"10K", "100K", "1M"};
-constexpr std::size_t kFrames = 4;
-
-/// A closed body with bumps that deforms, or the set of its vertices.
-struct Body {
-  std::string name;
-  std::size_t size;  ///< index of its kSizes
-  bool isPointSet;
-  std::vector<Triangle> triangles;  ///< {i, i, i} of a point set
-  std::vector<Points> frames;
-  double diagonal, edge;  ///< L
-  ShapeSizes sizes;
-
-  std::span<const SpatialRow> rows() const {
-    return isPointSet ? std::span<const SpatialRow>(kPointRows) : kRows;
-  }
-};
-
-Eigen::AlignedBox3d boxOf(const Points& positions) {
-  Eigen::AlignedBox3d box;
-  for (const Vector3d& p : positions) box.extend(p);
-  return box;
-}
-
-Body makeBody(std::size_t size, bool isPointSet) {
-  constexpr int kFrequencies[] = {22, 71, 224}, kPointFrequencies[] = {32, 100, 316};
-  const scenes::SceneMesh sphere =
-      scenes::sphere(isPointSet ? kPointFrequencies[size] : kFrequencies[size]);
-  Body body{kSizes[size] + std::string(isPointSet ? " points" : " triangles"),
-            size,
-            isPointSet,
-            sphere.triangles,
-            {},
-            0,
-            scenes::meanEdge({sphere}),
-            {}};
-  if (isPointSet) {
-    body.triangles.clear();
-    for (std::uint32_t i = 0; i < sphere.positions.size(); ++i) body.triangles.push_back({i, i, i});
-  }
-  for (std::size_t frame = 0; frame < kFrames; ++frame) {
-    Points positions = sphere.positions;
-    for (Vector3d& p : positions)
-      p *= 1 + 0.1 * std::sin(9 * p[0] + 0.1 * static_cast<double>(frame)) *
-                   std::cos(11 * p[1] + 5 * p[2]);
-    body.frames.push_back(std::move(positions));
-  }
-  body.diagonal = boxOf(body.frames[0]).diagonal().norm();
-  body.sizes = {2 * body.edge, 0.01 * body.diagonal, 0.2 * body.diagonal,
-                body.diagonal * Vector3d(0.08, 0.03, 0.02)};
-  return body;
-}
-
-Vector3d direction(testing::Random& random) {
-  for (;;) {
-    const Vector3d d = testing::randomPoint(random, -1, 1);
-    if (d.squaredNorm() > 0.01 && d.squaredNorm() < 1) return d.normalized();
-  }
-}
-
-std::vector<SpatialCase> makeCases(const Body& body, const Points& positions, Place place,
-                                   std::size_t count, testing::Random& random) {
-  const Eigen::AlignedBox3d box = boxOf(positions);
-  const auto inBox = [&](double scale) -> Vector3d {
-    return box.center() +
-           testing::randomPoint(random, -scale / 2, scale / 2).cwiseProduct(box.sizes());
-  };
-  std::vector<SpatialCase> cases(count);
-  for (SpatialCase& c : cases) {
-    const auto& [i, j, k] = body.triangles[random() % body.triangles.size()];
-    const Vector3d weights = testing::randomPoint(random, 0, 1);
-    const Vector3d surface =
-        (weights[0] * positions[i] + weights[1] * positions[j] + weights[2] * positions[k]) /
-        weights.sum();
-    const auto offSurface = [&](double distance) -> Vector3d {
-      return surface +
-             testing::uniform(random, -distance, distance) * (surface - box.center()).normalized();
-    };
-    switch (place) {
-      case Place::Near:
-        c.point = offSurface(body.edge);
-        break;
-      case Place::Tenth:
-        c.point = offSurface(0.1 * body.diagonal);
-        break;
-      case Place::Anywhere:
-        c.point = inBox(2);
-        break;
-      case Place::InBox:
-        c.point = inBox(1);
-        break;
-      case Place::Rays:
-        c.point = inBox(2);
-        c.direction = (inBox(1) - c.point).normalized();
-        break;
-      case Place::Surface:
-        c.point = surface;
-        c.rotation =
-            Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitX(), direction(random)).matrix() *
-            Eigen::AngleAxisd(testing::uniform(random, 0, 6), Vector3d::UnitX()).matrix();
-        break;
-    }
-  }
-  return cases;
-}
 
 using Engines = std::vector<std::unique_ptr<SpatialEngine>>;
 
@@ -244,7 +56,7 @@ Engines makeEngines(bool isPointSet, const std::vector<std::string>& wanted) {
 /// query.
 struct EngineTimes {
   std::vector<double> updates;
-  std::array<std::vector<double>, std::size(kRows)> rows;
+  std::vector<std::vector<double>> rows;
 };
 
 /// The median over the turns of both.
@@ -269,9 +81,10 @@ double millisecondsOf(F&& f) {
 
 /// In each repetition all engines update to the next frame and answer the same cases. A different
 /// engine begins each time. An engine rests once its time is spent.
-std::vector<EngineTimes> takeTurns(const Body& body, const Engines& engines,
+std::vector<EngineTimes> takeTurns(const SpatialBody& body, const Engines& engines,
                                    const RowOptions& options) {
-  std::vector<EngineTimes> times(engines.size());
+  const EngineTimes none{{}, std::vector<std::vector<double>>(body.rows().size())};
+  std::vector<EngineTimes> times(engines.size(), none);
   std::vector<double> spent(engines.size());  // ms
   SpatialAnswers answers;
   testing::Random random(1);
@@ -306,7 +119,8 @@ std::vector<EngineTimes> takeTurns(const Body& body, const Engines& engines,
 }
 
 /// The time of a first hit in Embree here over that on the machine of the targets. 0: not measured.
-double speedOf(const Body& body, const Engines& engines, const std::vector<EngineTimes>& times) {
+double speedOf(const SpatialBody& body, const Engines& engines,
+               const std::vector<EngineTimes>& times) {
   double least = 0;
   for (std::size_t r = 0; r < body.rows().size(); ++r)
     for (std::size_t e = 0; e < engines.size(); ++e) {
@@ -322,7 +136,8 @@ double speedOf(const Body& body, const Engines& engines, const std::vector<Engin
 
 /// A table of one body: each engine's times, Palpate's ratio to the fastest of the others beside
 /// the ratio that the targets allow, and the target in microseconds of this machine.
-void timeRows(Report& report, const Body& body, const Engines& engines, const RowOptions& options) {
+void timeRows(Report& report, const SpatialBody& body, const Engines& engines,
+              const RowOptions& options) {
   const auto times = takeTurns(body, engines, options);
   report.heading("Spatial queries, " + body.name + ", us a query; update in ms");
   std::vector<std::string> header = {""}, updates = {"update"};
@@ -371,7 +186,7 @@ void timeRows(Report& report, const Body& body, const Engines& engines, const Ro
 }
 
 /// Errors on a sample, for the body at the origin and 1,000 diagonals from it.
-void errorRows(Report& report, const Body& body, const Engines& engines,
+void errorRows(Report& report, const SpatialBody& body, const Engines& engines,
                const RowOptions& options) {
   for (const bool isFar : {false, true}) {
     Points positions = body.frames[1];
@@ -428,7 +243,7 @@ void compute() {
 }
 
 /// Batches on one and two threads, beside compute() once on a thread and once on each of two.
-void batchRows(Report& report, const Body& body, const RowOptions& options) {
+void batchRows(Report& report, const SpatialBody& body, const RowOptions& options) {
   constexpr std::size_t kCases = 100'000;
   std::array<std::unique_ptr<OctreeBasedCD>, 2> collisions;
   GeometryId mesh{};
@@ -484,11 +299,12 @@ void batchRows(Report& report, const Body& body, const RowOptions& options) {
 
 #ifdef PALPATE_BENCHMARK_BASELINES
 /// The least distance of two bodies of which both deform.
-void distanceRow(Report& report, const Body& body, const RowOptions& options) {
+void distanceRow(Report& report, const SpatialBody& body, const RowOptions& options) {
   const std::string scene = body.name + ": minimum distance";
   if (!isWanted(scene, options.scenes)) return;
   Eigen::AlignedBox3d box;
-  for (const Points& frame : body.frames) box.extend(boxOf(frame));
+  for (const Points& frame : body.frames)
+    for (const Vector3d& p : frame) box.extend(p);
   const Vector3d aside = (box.sizes()[0] + 0.1 * body.diagonal) * Vector3d::UnitX();
   std::vector<Points> others = body.frames;
   for (Points& frame : others)
@@ -517,7 +333,7 @@ void spatialRows(Report& report, const RowOptions& options) {
   const std::size_t sizes = options.quick ? 2 : 3;
   for (const bool isPointSet : {false, true})
     for (std::size_t size = 0; size < sizes; ++size) {
-      const Body body = makeBody(size, isPointSet);
+      const SpatialBody body = makeBody(size, isPointSet);
       if (std::ranges::none_of(body.rows(), [&](const SpatialRow& row) {
             return isWanted(body.name + ": " + row.name, options.scenes);
           }))
