@@ -98,6 +98,14 @@ def metrics(table, first):
     return write
 
 
+def cell(value):
+    return "-" if value is None else figure(value)
+
+
+def verdict(value, limit):
+    return "-" if value is None or limit is None else "met" if value <= limit else "NOT MET"
+
+
 def spatial(figures):
     """One row for each query: Palpate beside the fastest library."""
     rows = []
@@ -111,12 +119,13 @@ def spatial(figures):
         update = figures.value("spatial", scene.split(":")[0] + ": update", 1, fastest, "ms")
         if update is None:
             update = figures.value("spatial", scene, 1, fastest, "update ms")
-        row = [scene, "-" if own is None else figure(own), fastest, figure(times[fastest]), figure(update)]
-        for metric in ("ratio to the fastest library", "allowed ratio", "scaled target us"):
-            row.append(joined(figures, "spatial", scene, "Palpate", metric))
+        row = [scene, cell(own), fastest, cell(times[fastest]), cell(update)]
+        ratio, allowed, target = (figures.value("spatial", scene, 1, "Palpate", metric) for metric in
+                                  ("ratio to the fastest library", "allowed ratio", "scaled target us"))
+        row += [cell(ratio), cell(allowed), verdict(ratio, allowed), cell(target), verdict(own, target)]
         rows.append(row)
-    return markdown(["1 thread", "Palpate us", "fastest library", "its us", "its update ms", "ratio", "allowed ratio",
-                     "scaled target us"], rows)
+    return markdown(["1 thread", "Palpate us", "fastest library", "its us", "its update ms", "ratio", "allowed ratio", "",
+                     "scaled target us", ""], rows)
 
 
 def by_engine(table, cell):
