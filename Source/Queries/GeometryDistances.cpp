@@ -193,9 +193,7 @@ GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGe
   NearestPair nearest(a, b);
   const std::size_t sizeA = a.tree.ordered().size(), sizeB = b.tree.ordered().size();
   if (sizeA == 0 || sizeB == 0) return {noPoint(a.id), noPoint(b.id), kInfinity};
-  // Clamped boxes say nothing about positions in other floats.
-  if (bruteForce || a.tree.octree().box(0).mayBeClamped() ||
-      b.tree.octree().box(0).mayBeClamped()) {
+  if (bruteForce) {
     for (std::uint32_t i = 0; i < sizeA; ++i)
       for (std::uint32_t j = 0; j < sizeB; ++j) nearest.test(i, j);
     return nearest.result();
@@ -204,6 +202,8 @@ GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGe
   const Vector3d origin = worldOrigin(a);
   const PairSearch search{a.tree.octree(), b.tree.octree(), mapAbout(a, origin),
                           mapAbout(b, origin)};
+  // The error covers that of computed distances. If positions are clamped to the floats' range, it
+  // is so large that no pair of boxes is skipped.
   const double radii = a.mesh.largestRadius + b.mesh.largestRadius,
                scale = a.tree.frame().scale * (1.0 + kNearestError),
                error = kNearestError * (sizeOf(search.a.box(0)) + sizeOf(search.b.box(0)));

@@ -90,7 +90,7 @@ struct PathInterval {
 /// The least distance of a path to a body that it does not enter.
 struct PathClearance {
   GeometryId body;
-  double distance;       ///< L, less the path's radius; 0: it touches the surface
+  double distance;       ///< L, that of distance() less the path's radius; 0: it touches
   double at;             ///< arc length, in L
   SurfacePoint nearest;  ///< has this distance; kNoElement for a shape, or if there is no surface
 };
@@ -204,8 +204,8 @@ class PALPATE_EXPORT SpatialQueries {
   /// kNoElement.
   ///
   /// Where radii vary along a line, the distance is the least of all pairs of features: of an edge
-  /// and a vertex, or of two edges, it is that of their closest points less the radii there.
-  /// Elsewhere the surfaces may be slightly nearer.
+  /// and a vertex, or of two edges, it is that of their closest points less the radii there. The
+  /// surfaces' distance may differ slightly.
   ///
   /// Accuracy whether triangles, lines and points without radii have a common point is decided
   ///          exactly. Distances have the accuracy of edgeEdgeDistance().

@@ -178,6 +178,26 @@ TEST(GeometryDistances, VerticesBeyondFloatsDoNotHideOthers) {
   }
 }
 
+/// The nearest triangle of b is not the one that is nearest to b's middle.
+TEST(GeometryDistances, ClampedBoxesDoNotHideTheNearestPair) {
+  Random random(211);
+  for (const double far : {1e10, 1e36, 1e45}) {
+    TestGeometry a = testGeometry(soup(random, 60, 0.1)), b;
+    const auto first = static_cast<std::uint32_t>(a.positions.size());
+    a.positions.insert(a.positions.end(), {{0, 0, 0}, {far, 0, 0}, {far, 10, 0}});
+    a.triangles.push_back({first, first + 1, first + 2});
+    for (std::uint32_t i = 0; i < 40; ++i) {
+      const double y = i == 17 ? 10.0 : 0.0, z = i == 17 ? 0.5 : 1.0 + 0.01 * i;
+      b.positions.insert(b.positions.end(), {{far, y, z}, {far, y + 0.1, z}, {far, y, z + 0.1}});
+      b.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    const GeometryDistance found = expectSameAnswers(Both(a, b), 0.0, far);
+    EXPECT_EQ(found.distance, 0.5);
+    EXPECT_EQ(found.a.element, 60u);
+    EXPECT_EQ(found.b.element, 17u);
+  }
+}
+
 /// Distances of the elements of two small meshes in rational arithmetic.
 struct RationalDistance {
   Rational square = -1;  ///< of the least distance; 0 if the elements meet
