@@ -92,7 +92,7 @@ TEST(ShapeOverlap, SpheresAndCapsulesForEveryGeometryType) {
     Both both(geometry);
     const std::vector<Triangle> elements = elementsOf(geometry);
     std::size_t found = 0;
-    for (int i = 0; i < casesOf(10); ++i) {
+    for (int i = 0; i < casesOf(6); ++i) {
       const Vector3d p = randomPoint(random, 0, 1),
                      q = i % 2 ? p : Vector3d(p + randomPoint(random, -0.4, 0.4));
       const double radius = uniform(random, 0.0, 0.25);
