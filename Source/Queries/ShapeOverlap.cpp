@@ -1,6 +1,7 @@
 #include "Queries/ShapeOverlap.h"
 
 #include "Queries/ElementsNearShape.h"
+#include "Queries/PointDistances.h"
 #include "Math/TriangleIntersection.h"
 
 #include <algorithm>
@@ -47,6 +48,9 @@ bool meets(const TriangleMesh& mesh, const Triangle& corners, const Shape& shape
 void findOverlapping(const SearchableGeometry& geometry, const Shape& shape, bool bruteForce,
                      PointQueryStack& stack, Buffer<std::uint32_t>& near,
                      std::vector<std::uint32_t>& out) {
+  if (shape.hasCorners() && shape.faces().size() == 1 &&
+      shape.corners().front() == shape.corners().back())  // a ball
+    return PointDistances(geometry, shape.origin(), bruteForce).within(shape.radius(), out);
   const TriangleMesh& mesh = geometry.mesh;
   const auto test = [&](std::uint32_t element) {
     if (meets(mesh, mesh.topology.triangles[element], shape)) out.push_back(element);
