@@ -30,8 +30,8 @@ struct RayInterval {
   bool frontFace;  ///< direction . normal < 0
 };
 
-/// None if the ray misses the triangle. The ends' errors may be some 2^-47 of the largest coordinate
-/// difference, divided by the sine of the angle between ray and triangle.
+/// None if the ray misses the triangle. The ends' errors may be some 2^-47 of the largest
+/// coordinate difference, divided by the sine of the angle between ray and triangle.
 std::optional<RayInterval> intersectRay(const RaySegment&, const Eigen::Vector3d& a,
                                         const Eigen::Vector3d& b, const Eigen::Vector3d& c);
 

@@ -2,6 +2,7 @@
 
 #include "Math/Tolerances.h"
 #include "Queries/ElementsNearShape.h"
+#include "Queries/PointDistances.h"
 #include "Math/TriangleIntersection.h"
 #include "Queries/OverlapSearch.h"
 #include "Shapes/Shape.h"
@@ -193,9 +194,18 @@ std::optional<FloatConvex> floatsOf(const Convex& convex, const SearchableGeomet
 
 }  // namespace
 
+<<<<<<< HEAD
 void findOverlapping(const SearchableGeometry& geometry, const AnalyticalGeometry& analytical,
                      const RigidTransform& pose, bool bruteForce, PointQueryStack& stack,
                      Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out) {
+=======
+void findOverlapping(const SearchableGeometry& geometry, const Shape& shape, bool bruteForce,
+                     PointQueryStack& stack, Buffer<std::uint32_t>& near,
+                     std::vector<std::uint32_t>& out) {
+  if (shape.hasCorners() && shape.faces().size() == 1 &&
+      shape.corners().front() == shape.corners().back())  // a ball
+    return PointDistances(geometry, shape.origin(), bruteForce).within(shape.radius(), out);
+>>>>>>> querytests
   const TriangleMesh& mesh = geometry.mesh;
   std::optional<Shape> shape;  // built where needed, because a hull is costly
   const auto test = [&](std::uint32_t element) {

@@ -11,6 +11,7 @@
 
 namespace palpate {
 
+<<<<<<< HEAD
 /// Appends the elements that meet a shape at a pose, in any order. bruteForce: every element is
 /// tested, by the shape's distance alone.
 ///
@@ -25,5 +26,12 @@ void findOverlapping(const SearchableGeometry&, const AnalyticalGeometry&, const
 /// where floats cannot tell.
 bool findWithin(const SearchableGeometry&, const Eigen::Vector3d& point, double distance,
                 std::vector<std::uint32_t>& elements, Buffer<std::uint32_t>& undecided);
+=======
+/// Appends the elements that meet a shape, in any order. bruteForce: every element is tested. Balls
+/// are decided exactly, and so are hulls and boxes if elements have no radius; others in floating
+/// point.
+void findOverlapping(const SearchableGeometry&, const Shape&, bool bruteForce, PointQueryStack&,
+                     Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out);
+>>>>>>> querytests
 
 }  // namespace palpate

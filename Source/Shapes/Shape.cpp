@@ -169,7 +169,7 @@ PointShapeDistance Shape::atBody(const Vector3d& u, double tie) const {
 }
 
 PointShapeDistance Shape::atBody(const Vector3d& u, double tie,
-                             const std::array<double, 2>& sizes) const {
+                                 const std::array<double, 2>& sizes) const {
   const Components components = componentsOf(u, tie);
   const std::array<double, 2> beyond{components.lengths[0] - sizes[0],
                                      components.lengths[1] - sizes[1]};
@@ -182,10 +182,11 @@ PointShapeDistance Shape::atBody(const Vector3d& u, double tie,
   return {beyond[nearest], components.directions[nearest]};
 }
 
-PointShapeDistance Shape::distanceFromCylinder(const Vector3d& fromCentre, const Vector3d& axis) const {
+PointShapeDistance Shape::distanceFromCylinder(const Vector3d& fromCentre,
+                                               const Vector3d& axis) const {
   const Eigen::Matrix3d axes = axis == Vector3d::Zero() ? m_axes : axesAlong(axis);
-  const PointShapeDistance inBodyFrame = atBody(axes.transpose() * fromCentre, kOnSurface * m_magnitude,
-                                            {m_sizes[0], 0.5 * lengthOf(axis)});
+  const PointShapeDistance inBodyFrame = atBody(
+      axes.transpose() * fromCentre, kOnSurface * m_magnitude, {m_sizes[0], 0.5 * lengthOf(axis)});
   return {inBodyFrame.distance, axes * inBodyFrame.normal};
 }
 

@@ -162,17 +162,17 @@ TEST(PointDistances, OctreesAnswerAsBruteForceForEveryGeometryType) {
                                  tapered(random, particles(random, 300, 0.02), 0.1)};
   for (const TestGeometry& geometry : meshes) {
     Both both(geometry);
-    expectSameAnswers(both, pointsAround(random, geometry.positions, casesOf(150)));
+    expectSameAnswers(both, pointsAround(random, geometry.positions, casesOf(80)));
     expectTrueAnswers(both, geometry, geometry.positions,
-                      pointsAround(random, geometry.positions, casesOf(15)));
+                      pointsAround(random, geometry.positions, casesOf(10)));
     // Deformed: refitted trees; and over a whole step.
     const Positions now = moved(random, geometry.positions, 0.05);
     both.change([&](OctreeBasedCD& each) {
       each.addCollisionPair(both.id, both.id, {.thickness = 0.01});
       each.setPositions(both.id, geometry.positions, now);
     });
-    expectSameAnswers(both, pointsAround(random, now, casesOf(150)));
-    expectTrueAnswers(both, geometry, now, pointsAround(random, now, casesOf(10)));
+    expectSameAnswers(both, pointsAround(random, now, casesOf(80)));
+    expectTrueAnswers(both, geometry, now, pointsAround(random, now, casesOf(5)));
   }
 }
 
@@ -226,7 +226,7 @@ TEST(PointDistances, TiesGoToTheLowestElement) {
     for (const TestGeometry& geometry : geometries) {
       const Both both(geometry);
       Positions points;
-      for (int i = 0; i < casesOf(50); ++i) points.push_back(0.5 * onLattice(random, 2 * size + 1));
+      for (int i = 0; i < casesOf(30); ++i) points.push_back(0.5 * onLattice(random, 2 * size + 1));
       expectSameAnswers(both, points);
       expectTrueAnswers(both, geometry, geometry.positions, points);
       std::size_t ties = 0;

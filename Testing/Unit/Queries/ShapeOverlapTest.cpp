@@ -92,8 +92,9 @@ TEST(ShapeOverlap, SpheresAndCapsulesForEveryGeometryType) {
     Both both(geometry);
     const std::vector<Triangle> elements = elementsOf(geometry);
     std::size_t found = 0;
-    for (int i = 0; i < casesOf(10); ++i) {
-      const Vector3d p = randomPoint(random, 0, 1),
+    for (int i = 0; i < casesOf(6); ++i) {
+      const Vector3d p = geometry.positions[random() % geometry.positions.size()] +
+                         randomPoint(random, -0.15, 0.15),
                      q = i % 2 ? p : Vector3d(p + randomPoint(random, -0.4, 0.4));
       const double radius = uniform(random, 0.0, 0.25);
       const PlacedShape shape{i % 2 ? AnalyticalGeometry(Sphere{p, radius})
@@ -104,6 +105,28 @@ TEST(ShapeOverlap, SpheresAndCapsulesForEveryGeometryType) {
       });
     }
     EXPECT_GT(found, 30u);
+  }
+}
+
+/// Radii that differ from an element's distance by less than its rounding.
+TEST(ShapeOverlap, SpheresAreDecidedExactly) {
+  Random random(506);
+  for (const TestGeometry& geometry :
+       {testGeometry(soup(random, 80, 0.2)), thread(random, 80, 0.1, 0.0, true),
+        tapered(random, particles(random, 80, 0.0), 0.01)}) {
+    const Both both(geometry);
+    const std::vector<Triangle> elements = elementsOf(geometry);
+    for (std::uint32_t e = 0; e < elements.size(); ++e) {
+      const Vector3d centre = randomPoint(random, -1, 2);
+      const Rational square = squaredDistance(centre, geometry.positions, elements[e]),
+                     own = geometry.radius(elements[e][0]);
+      const double radius = mpf_class(oracle::root(square) - mpf_class(own, 400)).get_d();
+      for (const double each : {std::nextafter(radius, 0.0), radius, std::nextafter(radius, 9.0)}) {
+        const Rational reach = own + each;
+        const auto found = overlapping(both, {Sphere{centre, each}});
+        EXPECT_EQ(std::binary_search(found.begin(), found.end(), e), square <= reach * reach);
+      }
+    }
   }
 }
 

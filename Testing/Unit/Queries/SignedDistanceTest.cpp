@@ -148,13 +148,13 @@ TEST(SignedDistances, SignsAreThoseOfRationalRays) {
   for (const Mesh& mesh : closedMeshes(random)) {
     SCOPED_TRACE(number++);
     Both both(testGeometry(mesh));
-    const Positions points = probesOf(random, mesh.positions, mesh.triangles, 60);
+    const Positions points = probesOf(random, mesh.positions, mesh.triangles, 48);
     EXPECT_GT(expectSigns(both, mesh.positions, mesh.triangles, points), points.size() / 20);
     const Matrix3d turn = randomTurn(random);
     const Vector3d shift(1e3, 0.2, -30);
     both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, shift); });
     const Positions world = placed(mesh.positions, turn, shift);
-    expectSigns(both, world, mesh.triangles, probesOf(random, world, mesh.triangles, 30));
+    expectSigns(both, world, mesh.triangles, probesOf(random, world, mesh.triangles, 12));
     ASSERT_FALSE(HasFailure());
   }
 }
@@ -165,7 +165,7 @@ TEST(SignedDistances, NoWrongSignNearSelfCrossings) {
   const Mesh mesh = closedMeshes(random)[1];
   const Both both(testGeometry(mesh));
   Positions points;
-  for (int i = 0; i < casesOf(250); ++i)
+  for (int i = 0; i < casesOf(150); ++i)
     points.push_back(mesh.positions[random() % mesh.positions.size()] +
                      randomPoint(random, -0.05, 0.05));
   EXPECT_GT(expectSigns(both, mesh.positions, mesh.triangles, points), 50u);
