@@ -194,28 +194,36 @@ std::optional<FloatConvex> floatsOf(const Convex& convex, const SearchableGeomet
 
 }  // namespace
 
-<<<<<<< HEAD
+void findWithin(const SearchableGeometry& geometry, const Vector3d& point, double distance,
+                bool bruteForce, Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out) {
+  const PointDistances distances(geometry, point, bruteForce);
+  Convex ball;
+  ball.p = ball.q = point;
+  ball.radius = distance;
+  const auto floats =
+      bruteForce || !geometry.mesh.radii.empty() ? std::nullopt : floatsOf(ball, geometry);
+  if (!floats) return distances.within(distance, out);
+  near.clear();
+  searchOverlapping(
+      {geometry.tree.octree(), geometry.tree.floats(), geometry.tree.ordered().data(), *floats},
+      out, near);
+  for (const std::uint32_t place : near)
+    if (const auto at = distances.at(place); distances.isWithin(at, distance))
+      out.push_back(at.element);
+}
+
 void findOverlapping(const SearchableGeometry& geometry, const AnalyticalGeometry& analytical,
                      const RigidTransform& pose, bool bruteForce, PointQueryStack& stack,
                      Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out) {
-=======
-void findOverlapping(const SearchableGeometry& geometry, const Shape& shape, bool bruteForce,
-                     PointQueryStack& stack, Buffer<std::uint32_t>& near,
-                     std::vector<std::uint32_t>& out) {
-  if (shape.hasCorners() && shape.faces().size() == 1 &&
-      shape.corners().front() == shape.corners().back())  // a ball
-    return PointDistances(geometry, shape.origin(), bruteForce).within(shape.radius(), out);
->>>>>>> querytests
   const TriangleMesh& mesh = geometry.mesh;
   std::optional<Shape> shape;  // built where needed, because a hull is costly
-  const auto test = [&](std::uint32_t element) {
+  const auto build = [&] {
     if (!shape) shape.emplace(analytical, pose);
+  };
+  const auto test = [&](std::uint32_t element) {
+    build();
     if (meets(mesh, mesh.topology.triangles[element], *shape)) out.push_back(element);
   };
-  if (bruteForce) {
-    for (std::uint32_t i = 0; i < mesh.topology.triangles.size(); ++i) test(i);
-    return;
-  }
   std::optional<Convex> convex;
   if (const auto* sphere = std::get_if<Sphere>(&analytical)) {
     convex.emplace();
@@ -229,15 +237,25 @@ void findOverlapping(const SearchableGeometry& geometry, const Shape& shape, boo
   } else if (const auto* box = std::get_if<Box>(&analytical)) {
     convex = convexOf(*box, pose);
   } else if (std::holds_alternative<ConvexHull>(analytical)) {
-    shape.emplace(analytical, pose);
+    build();
     convex = convexOf(*shape);
   }
+  if (convex && convex->planeCount == 0 && convex->p == convex->q)
+    return findWithin(geometry, convex->p, convex->radius, bruteForce, near, out);
   near.clear();
   const bool hasRadii =
       convex && convex->planeCount > 0 ? mesh.largestRadius > 0 : !mesh.radii.empty();
-  const auto floats = convex && !hasRadii ? floatsOf(*convex, geometry) : std::nullopt;
+  const auto floats =
+      convex && !hasRadii && !bruteForce ? floatsOf(*convex, geometry) : std::nullopt;
   if (!floats) {
-    if (!shape) shape.emplace(analytical, pose);
+    build();
+    if (shape->hasCorners() && shape->faces().size() == 1 &&
+        shape->corners().front() == shape->corners().back())  // a point
+      return findWithin(geometry, shape->origin(), shape->radius(), bruteForce, near, out);
+    if (bruteForce) {
+      for (std::uint32_t i = 0; i < mesh.topology.triangles.size(); ++i) test(i);
+      return;
+    }
     findElementsNear(geometry, *shape, *shape, mesh.largestRadius, stack, near);
     for (const std::uint32_t element : near) test(element);
     return;
@@ -256,20 +274,6 @@ void findOverlapping(const SearchableGeometry& geometry, const Shape& shape, boo
     else if (*decided)
       out.push_back(element);
   }
-}
-
-bool findWithin(const SearchableGeometry& geometry, const Eigen::Vector3d& point, double distance,
-                std::vector<std::uint32_t>& elements, Buffer<std::uint32_t>& undecided) {
-  Convex ball;
-  ball.p = ball.q = point;
-  ball.radius = distance;
-  const auto floats = geometry.mesh.radii.empty() ? floatsOf(ball, geometry) : std::nullopt;
-  if (!floats) return false;
-  undecided.clear();
-  searchOverlapping(
-      {geometry.tree.octree(), geometry.tree.floats(), geometry.tree.ordered().data(), *floats},
-      elements, undecided);
-  return true;
 }
 
 }  // namespace palpate

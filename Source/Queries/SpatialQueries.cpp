@@ -438,17 +438,9 @@ void SpatialQueries::elementsWithin(GeometryId id, const Eigen::Vector3d& point,
   const Source::Loan scratch(source);
   std::vector<std::uint32_t>& found = scratch->elements;
   found.clear();
-  if (!geometry.tree.ordered().empty()) {
-    const bool bruteForce = source.engine() == Engine::BruteForce;
-    const PointDistances distances(geometry, point, bruteForce);
-    if (!bruteForce && findWithin(geometry, point, radius, found, scratch->nearShape)) {
-      for (const std::uint32_t place : scratch->nearShape)
-        if (const auto near = distances.at(place); distances.isWithin(near, radius))
-          found.push_back(near.element);
-    } else {
-      distances.within(radius, found);
-    }
-  }
+  if (!geometry.tree.ordered().empty())
+    findWithin(geometry, point, radius, source.engine() == Engine::BruteForce, scratch->nearShape,
+               found);
   scratch->sort(found);
   elements.reserve(found.size());  // nothing below throws
   elements.assign(found.begin(), found.end());
