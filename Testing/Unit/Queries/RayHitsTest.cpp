@@ -274,7 +274,7 @@ TEST(RayHits, CrossWhereTheRayChangesSide) {
       }
     }
   }
-  EXPECT_GT(crossing, 500u);
+  EXPECT_GT(crossing, 300u);
   EXPECT_GT(grazing, 50u);
 }
 
