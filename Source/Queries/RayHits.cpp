@@ -20,8 +20,10 @@ struct ClippedRay {
   FloatRay ray;
   double start, perT;  ///< t = start + ray's t / perT
 
+  /// Never negative, which would end the traversal: `start` is rounded.
   float floatOf(double t) const {
-    return OutwardRounding::up(static_cast<float>((t - start) * perT * (1.0 + kNearestError)));
+    const double along = (t - start) * perT * (1.0 + kNearestError);
+    return std::max(OutwardRounding::up(static_cast<float>(along)), 0.0f);
   }
 };
 
