@@ -184,6 +184,9 @@ class PALPATE_EXPORT SpatialQueries {
   /// OctreeBasedCD::setTransform(). A frustum is a ConvexHull.
   ///
   /// Order    ascending.
+  /// Accuracy decided exactly for spheres, and for boxes and hulls if elements have no radius, on
+  ///          the shape's corners as they are rounded when it is placed. Otherwise elements are
+  ///          found up to rounding errors of the distance.
   /// Errors   InvalidShape, InvalidTransform; UnsupportedMethod if the geometry is a shape itself.
   void overlapping(GeometryId, const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
                    const Eigen::Vector3d& translation, std::vector<std::uint32_t>& elements) const;
