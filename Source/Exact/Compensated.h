@@ -125,10 +125,9 @@ inline Eigen::Vector3d combination(const Difference& m, double s, const Differen
   return result;
 }
 
-/// u x v within 2^-52 of each component and 2^-103 of |u| |v|. Swapping u and v negates the result
-/// exactly.
-inline Eigen::Vector3d accurateCross(const Difference& u, const Difference& v) {
-  Eigen::Vector3d result;
+/// u x v within 2^-103 of |u| |v|. Swapping u and v negates the result exactly.
+inline Difference cross(const Difference& u, const Difference& v) {
+  Difference result;
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3, k = (i + 2) % 3;
     const RoundedWithError plus = exactProduct(u.high[j], v.high[k], splitInHalves(v.high[k]));
@@ -136,9 +135,30 @@ inline Eigen::Vector3d accurateCross(const Difference& u, const Difference& v) {
     const RoundedWithError high = exactSum(plus.value, -minus.value);
     const double mixed = (u.high[j] * v.low[k] + u.low[j] * v.high[k]) -
                          (u.high[k] * v.low[j] + u.low[k] * v.high[j]);
-    result[i] = high.value + (high.error + ((plus.error - minus.error) + mixed));
+    const RoundedWithError all =
+        exactSum(high.value, high.error + ((plus.error - minus.error) + mixed));
+    result.high[i] = all.value;
+    result.low[i] = all.error;
   }
   return result;
+}
+
+/// u x v within 2^-52 of each component and 2^-103 of |u| |v|. Swapping u and v negates the result
+/// exactly.
+inline Eigen::Vector3d accurateCross(const Difference& u, const Difference& v) {
+  return cross(u, v).high;
+}
+
+/// u . v within 2^-53 of the result and 2^-98 of the sum of its products' magnitudes.
+inline double accurateDot(const Difference& u, const Difference& v) {
+  RoundedWithError all{0, 0};
+  for (int i = 0; i < 3; ++i) {
+    const RoundedWithError product = exactProduct(u.high[i], v.high[i]);
+    const RoundedWithError sum = exactSum(all.value, product.value);
+    all = {sum.value, all.error + (sum.error + (product.error +
+                                                (u.high[i] * v.low[i] + u.low[i] * v.high[i])))};
+  }
+  return all.value + all.error;
 }
 
 }  // namespace palpate

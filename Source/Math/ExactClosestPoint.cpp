@@ -219,22 +219,53 @@ Rational squaredDistance(const Vector<Integer>& p, const Vector<Integer>* corner
   return {height * height, dot(normal, normal)};
 }
 
+/// The radius at the point of that feature that is closest to p. radii: of the corners.
+Rational radiusAt(const Vector<Integer>& p, const Vector<Integer>* corners, TriangleFeature feature,
+                  const Vector<Integer>& radii) {
+  const auto index = static_cast<std::size_t>(feature);
+  if (index > 5) return {0, 1};
+  if (index < 3) return {radii[index], 1};
+  const std::size_t i = index - 3, j = (index - 2) % 3;
+  const Vector<Integer> edge = corners[j] - corners[i];
+  const Integer square = dot(edge, edge), along = dot(p - corners[i], edge);
+  return {radii[i] * (square - along) + radii[j] * along, square};
+}
+
+Rational difference(const Rational& a, const Rational& b) {
+  return {a.numerator * b.denominator - b.numerator * a.denominator, a.denominator * b.denominator};
+}
+
+/// Sign of the root of a less the root of b, less c.
+int compareRoots(const Rational& a, const Rational& b, const Rational& c) {
+  if (c.numerator < 0) return -compareRoots(b, a, {-c.numerator, c.denominator});
+  // a - b - c² against 2 c times the root of b
+  const Integer cc = c.numerator * c.numerator, dd = c.denominator * c.denominator,
+                ab = a.denominator * b.denominator,
+                left = (a.numerator * b.denominator - b.numerator * a.denominator) * dd - cc * ab;
+  if (left < 0) return -1;
+  return sgn(Integer(left * left - 4 * cc * dd * ab * a.denominator * b.numerator));
+}
+
 }  // namespace
 
 int compareDistances(const Vector3d& p, const ClosestFeature& first, const ClosestFeature& second) {
-  const auto at = Integers(p, first.a, first.b, first.c, second.a, second.b, second.c).at;
+  // Radii take part as coordinates, so that they have the same unit.
+  const auto at = Integers(p, first.a, first.b, first.c, second.a, second.b, second.c, first.radii,
+                           second.radii)
+                      .at;
   const Rational one = squaredDistance(at[0], &at[1], first.feature),
                  two = squaredDistance(at[0], &at[4], second.feature);
-  return compare(one, two);
+  return compareRoots(one, two,
+                      difference(radiusAt(at[0], &at[1], first.feature, at[7]),
+                                 radiusAt(at[0], &at[4], second.feature, at[8])));
 }
 
-int compareDistance(const Vector3d& p, const ClosestFeature& feature, double length, double more) {
-  // The lengths take part as coordinates, so that they have the same unit.
-  const Vector3d lengths(length, more, 0.0);
-  const auto at = Integers(p, feature.a, feature.b, feature.c, lengths).at;
-  const Rational own = squaredDistance(at[0], &at[1], feature.feature);
-  const Integer sum = at[4][0] + at[4][1];
-  return sgn(Integer(own.numerator - sum * sum * own.denominator));
+int compareDistance(const Vector3d& p, const ClosestFeature& feature, double length) {
+  const Vector3d lengths(length, 0.0, 0.0);
+  const auto at = Integers(p, feature.a, feature.b, feature.c, feature.radii, lengths).at;
+  const Rational radius = radiusAt(at[0], &at[1], feature.feature, at[4]);
+  return compareRoots(squaredDistance(at[0], &at[1], feature.feature), {0, 1},
+                      difference({at[5][0], 1}, {-radius.numerator, radius.denominator}));
 }
 
 int nearestEnd(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0, const Vector3d& q1) {

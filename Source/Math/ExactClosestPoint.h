@@ -56,11 +56,14 @@ int nearestEnd(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1, const Eigen
 struct ClosestFeature {
   const Eigen::Vector3d &a, &b, &c;
   TriangleFeature feature;
+  /// Of the corners, linear along edges. A face has none. A distance is less the radius at the
+  /// closest point.
+  Eigen::Vector3d radii = Eigen::Vector3d::Zero();
 };
 /// Sign of p's distance from one triangle less its distance from another.
 int compareDistances(const Eigen::Vector3d& p, const ClosestFeature&, const ClosestFeature&);
-/// Sign of p's distance from a triangle less the sum of two lengths, which must not be negative.
-int compareDistance(const Eigen::Vector3d& p, const ClosestFeature&, double length, double more);
+/// Sign of p's distance from a triangle less a length.
+int compareDistance(const Eigen::Vector3d& p, const ClosestFeature&, double length);
 
 /// Unit vector along (b - a) x (d - c); zero if that product is zero.
 Eigen::Vector3d unitCross(const Eigen::Vector3d& a, const Eigen::Vector3d& b,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "Exact/Predicates.h"
+#include "Math/ExactClosestPoint.h"
 
 #include <cstdint>
 
@@ -17,25 +18,28 @@ enum class RayCrossing : std::int8_t {
 ///
 /// Exact for any finite doubles. The ray is moved aside by (0, e, e²) for a vanishing e > 0, so
 /// that it meets no edge and no corner. Over a closed mesh, the number of Leaving less that of
-/// Entering is therefore the winding number of p, whatever the ray would have hit. If p is on the
-/// boundary of a triangle, this call may return None, and another triangle or none may return
-/// OnTriangle.
+/// Entering is therefore the winding number of p, whatever the ray would have hit.
 /// Source   Simulation of simplicity (Edelsbrunner, Mücke, 1990), for the two coordinates of p.
 inline RayCrossing crossRay(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                             const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                             SignCounts& counts) {
+  bool isOnEdge = false;  // p, seen along x, is on the line of an edge
   const auto turn = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
     if (const int sign = orient2d(0, from, to, p, counts)) return sign;
+    isOnEdge = true;
     // The x component of (to - from) x (p - from) falls with p.y by to.z - from.z and grows with
     // p.z by to.y - from.y.
     if (to.z() != from.z()) return to.z() < from.z() ? 1 : -1;
     return (to.y() > from.y()) - (to.y() < from.y());
   };
   const int facing = turn(a, b);
-  if (facing == 0 || turn(b, c) != facing || turn(c, a) != facing) return RayCrossing::None;
+  const bool passes = facing != 0 && turn(b, c) == facing && turn(c, a) == facing;
+  if (!passes && !isOnEdge) return RayCrossing::None;
   const int side = orient3d(a, b, c, p, counts);
-  if (side == 0) return RayCrossing::OnTriangle;
-  if (side == facing) return RayCrossing::None;  // the triangle is behind the start
+  if (side == 0 && (!isOnEdge || exact::compareDistance(
+                                     p, {a, b, c, exact::closestFeature(p, a, b, c)}, 0.0) == 0))
+    return RayCrossing::OnTriangle;
+  if (!passes || side == facing) return RayCrossing::None;  // the triangle is behind the start
   return facing > 0 ? RayCrossing::Leaving : RayCrossing::Entering;
 }
 

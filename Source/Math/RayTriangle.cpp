@@ -1,7 +1,9 @@
 #include "Math/RayTriangle.h"
 
+#include "Exact/Compensated.h"
 #include "Exact/ErrorBounds.h"
 #include "Exact/Rational.h"
+#include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>
@@ -176,7 +178,7 @@ std::optional<RayInterval> intersectRayExactly(const RaySegment& ray, const Eige
   return exact::intervalOf(problem, *interval);
 }
 
-/// A determinant of three vectors, and a bound on its error.
+/// A product of vectors that were rounded once, and a bound on its error.
 struct Volume {
   double value, error;
 
@@ -184,45 +186,89 @@ struct Volume {
   int sign() const { return (value > error) - (value < -error); }
 };
 
-/// direction . (p x q), where p and q are differences that were rounded once.
-Volume volumeOf(const Eigen::Vector3d& direction, const Eigen::Vector3d& p,
-                const Eigen::Vector3d& q) {
-  double value = 0.0, magnitude = 0.0;
-  for (int i = 0; i < 3; ++i) {
-    const int j = (i + 1) % 3, k = (i + 2) % 3;
-    const double forward = p[j] * q[k], backward = p[k] * q[j];
-    value += direction[i] * (forward - backward);
-    magnitude += std::abs(direction[i]) * (std::abs(forward) + std::abs(backward));
+/// A cross product, and the sums of its products' magnitudes.
+struct CrossProduct {
+  Eigen::Vector3d value, magnitude;
+
+  CrossProduct(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, k = (i + 2) % 3;
+      const double forward = a[j] * b[k], backward = a[k] * b[j];
+      value[i] = forward - backward;
+      magnitude[i] = std::abs(forward) + std::abs(backward);
+    }
   }
-  return {value, kVolumeError * magnitude +
-                     kUnderflowGuard * (1.0 + direction.cwiseAbs().sum() + magnitude)};
-}
+  /// The determinant with a third vector.
+  Volume volume(const Eigen::Vector3d& c) const {
+    const double size = dot(magnitude, c.cwiseAbs());
+    return {dot(value, c),
+            kVolumeError * size + kUnderflowGuard * (1.0 + sumOfMagnitudes(c) + size)};
+  }
+};
 
 }  // namespace
 
 std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vector3d& a,
                                         const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d p = a - ray.origin, q = b - ray.origin, r = c - ray.origin;
-  const int sides[] = {volumeOf(ray.direction, p, q).sign(), volumeOf(ray.direction, q, r).sign(),
-                       volumeOf(ray.direction, r, p).sign()};
-  const auto [least, most] = std::minmax({sides[0], sides[1], sides[2]});
-  if (least < 0 && most > 0) return {};
-  if (least == 0 || most == 0 || least != most) return intersectRayExactly(ray, a, b, c);
-  const Eigen::Vector3d u = b - a, v = c - a;
-  const Volume height = volumeOf(p, u, v), facing = volumeOf(ray.direction, u, v);
-  const double t = height.value / facing.value;
+  // The volumes of the ray's direction with each edge, as seen from the origin.
+  const CrossProduct first(ray.direction, p);
+  const Volume ab = first.volume(q), ac = first.volume(r);
+  const int ofAb = ab.sign(), ofCa = -ac.sign();
+  if (ofAb * ofCa < 0) return {};
+  const Volume bc = CrossProduct(ray.direction, q).volume(r);
+  const int ofBc = bc.sign();
+  if (ofAb * ofBc < 0 || ofBc * ofCa < 0) return {};
+  if (ofAb == 0 || ofBc == 0 || ofCa == 0) return intersectRayExactly(ray, a, b, c);
+  // The direction's volume with the triangle is their sum.
+  const double facing = (ab.value - ac.value) + bc.value,
+               facingError =
+                   (ab.error + ac.error + bc.error) * (1.0 + 0x1p-40) +
+                   0x1p-51 * (std::abs(ab.value) + std::abs(ac.value) + std::abs(bc.value));
+  const Volume height = CrossProduct(b - a, c - a).volume(p);
+  const double t = height.value / facing;
   const double error =
-      (height.error + std::abs(t) * facing.error) / std::abs(facing.value) * (1.0 + 0x1p-40) +
+      (height.error + std::abs(t) * facingError) / std::abs(facing) * (1.0 + 0x1p-40) +
       std::abs(t) * 0x1p-52;
-  // Where the ray grazes the triangle, t is computed exactly and then rounded.
-  const double extent =
-      std::max({p.cwiseAbs().maxCoeff(), q.cwiseAbs().maxCoeff(), r.cwiseAbs().maxCoeff()});
-  const bool isAccurate =
-      facing.sign() == most && error * ray.direction.cwiseAbs().maxCoeff() <= kRayError * extent;
-  if (!isAccurate) return intersectRayExactly(ray, a, b, c);
+  if (!(std::abs(facing) > facingError)) return intersectRayExactly(ray, a, b, c);
   if (t + error < ray.tMin || t - error > ray.tMax) return {};
   if (!(t - error >= ray.tMin && t + error <= ray.tMax)) return intersectRayExactly(ray, a, b, c);
-  return RayInterval{t, t, error, static_cast<std::int8_t>(most), most < 0};
+  return RayInterval{t, t, error, static_cast<std::int8_t>(ofAb), ofAb < 0};
+}
+
+RayPoint firstPoint(const RaySegment& ray, const RayInterval& interval, const Eigen::Vector3d& a,
+                    const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+  const Eigen::Vector3d& d = ray.direction;
+  const Difference p = difference(a, ray.origin), u = difference(b, a), v = difference(c, a);
+  const double extent =
+      std::max({largest(p.high), largest(b - ray.origin), largest(c - ray.origin)});
+  const double most = kRayError * extent / largest(d), t = interval.first;
+  // The step from t to the triangle's plane, by the distance of the ray's point from a.
+  const Difference normals = cross(u, v);
+  const Eigen::Vector3d& normal = normals.high;
+  Difference left;
+  for (int i = 0; i < 3; ++i) {
+    const RoundedWithError along = exactProduct(d[i], t), rest = exactSum(p.high[i], -along.value);
+    const RoundedWithError all = exactSum(rest.value, rest.error + (p.low[i] - along.error));
+    left.high[i] = all.value;
+    left.low[i] = all.error;
+  }
+  const double slope = dot(normal, d), step = accurateDot(normals, left) / slope;
+  const double crossSize = sumOfMagnitudes(u.high) * sumOfMagnitudes(v.high);
+  const double error = (kRefinedRayLoss * crossSize * sumOfMagnitudes(left.high) +
+                        kRefinedRayError * std::abs(step) * crossSize * sumOfMagnitudes(d)) /
+                       std::abs(slope);
+  if (interval.error > 0 && isModerate(extent) && isModerate(largest(d)) &&
+      isModerate(largest(normal)) && error <= most) {
+    const Eigen::Vector3d onPlane = step * d - left.high;  // from a
+    const double square = dot(normal, normal),
+                 ofB = std::clamp(dot(onPlane.cross(v.high), normal) / square, 0.0, 1.0),
+                 ofC = std::clamp(dot(u.high.cross(onPlane), normal) / square, 0.0, 1.0 - ofB);
+    return {t + step, {(1.0 - ofB) - ofC, ofB, ofC}};
+  }
+  const auto exact = interval.error <= most ? interval : *intersectRayExactly(ray, a, b, c);
+  const Eigen::Vector3d point = ray.origin + exact.first * d;
+  return {exact.first, finiteVertexTriangleDistance(point, a, b, c).barycentric};
 }
 
 }  // namespace palpate

@@ -30,9 +30,19 @@ struct RayInterval {
   bool frontFace;  ///< direction . normal < 0
 };
 
-/// None if the ray misses the triangle.
+/// None if the ray misses the triangle. The ends' errors may be some 2^-47 of the largest
+/// coordinate difference, divided by the sine of the angle between ray and triangle.
 std::optional<RayInterval> intersectRay(const RaySegment&, const Eigen::Vector3d& a,
                                         const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+
+/// The point where a ray meets a triangle.
+struct RayPoint {
+  double t;                 ///< within kRayError
+  Eigen::Vector3d weights;  ///< of the triangle's corners; at least 0
+};
+/// The first point of an interval that intersectRay() returned for this triangle.
+RayPoint firstPoint(const RaySegment&, const RayInterval&, const Eigen::Vector3d& a,
+                    const Eigen::Vector3d& b, const Eigen::Vector3d& c);
 
 namespace exact {
 

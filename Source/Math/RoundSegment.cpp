@@ -114,4 +114,65 @@ RoundIntervals intersectRay(const RaySegment& ray, const Eigen::Vector3d& p,
   return result;
 }
 
+std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vector3d& a,
+                                        const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                                        double radius) {
+  // The body is convex: it is the union of three capsules and of the prism between the triangle's
+  // two copies at the radius from its plane.
+  std::optional<RayInterval> all;
+  const auto add = [&](const RayInterval& part) {
+    if (!all) {
+      all = part;
+      return;
+    }
+    if (part.first < all->first) {
+      all->first = part.first;
+      all->frontFace = part.frontFace;
+    }
+    if (part.last > all->last) {
+      all->last = part.last;
+      all->crossing = part.crossing;
+    }
+    all->error = std::max(all->error, part.error);
+  };
+  const Eigen::Vector3d* const corners[] = {&a, &b, &c};
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d &p = *corners[i], &q = *corners[(i + 1) % 3];
+    const RoundIntervals capsule = intersectRay(ray, p, q, radius, radius);
+    for (std::size_t k = 0; k < capsule.size; ++k) add(capsule.intervals[k]);
+  }
+  const Eigen::Vector3d normal = (b - a).cross(c - a);
+  const double twiceArea = normal.stableNorm();
+  if (!(twiceArea > 0.0)) return all;
+  const Eigen::Vector3d n = normal / twiceArea;
+  const double length = ray.direction.stableNorm();
+  const Eigen::Vector3d d = ray.direction / length;
+  const double shift = (a - ray.origin).dot(d);  // s = 0 where the ray is nearest to a
+  const Eigen::Vector3d from = ray.origin + shift * d - a;
+  Range inside{-kInfinite, kInfinite};
+  const auto clip = [&](double height, double slope, double most) {  // height + s slope <= most
+    if (slope > 0.0) {
+      inside.last = std::min(inside.last, (most - height) / slope);
+    } else if (slope < 0.0) {
+      inside.first = std::max(inside.first, (most - height) / slope);
+    } else if (height > most) {
+      inside.last = -kInfinite;
+    }
+  };
+  clip(from.dot(n), d.dot(n), radius);
+  clip(-from.dot(n), -d.dot(n), radius);
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d &p = *corners[i], &q = *corners[(i + 1) % 3];
+    const Eigen::Vector3d outward = (q - p).cross(n);
+    clip((from - (p - a)).dot(outward), d.dot(outward), 0.0);
+  }
+  const double first = (shift + inside.first) / length, last = (shift + inside.last) / length;
+  if (first <= last && last >= ray.tMin && first <= ray.tMax) {
+    const double size = std::abs(shift) + (b - a).norm() + (c - a).norm() + radius;
+    add({std::max(first, ray.tMin), std::min(last, ray.tMax), kRoundRayError * size / length,
+         std::int8_t{last <= ray.tMax}, first >= ray.tMin});
+  }
+  return all;
+}
+
 }  // namespace palpate

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 
 namespace palpate {
 
@@ -20,9 +21,14 @@ struct RoundIntervals {
 /// radius there. p == q: a sphere.
 ///
 /// Accuracy  floating point; each end within 2^-40 of the largest length, divided by the sine of
-/// the
-///           angle between ray and surface.
+///           the angle between ray and surface.
 RoundIntervals intersectRay(const RaySegment&, const Eigen::Vector3d& p, const Eigen::Vector3d& q,
                             double radiusP, double radiusQ);
+
+/// What a ray shares with all points within a positive radius of a triangle: one interval at most.
+/// Accuracy  that of the segment's.
+std::optional<RayInterval> intersectRay(const RaySegment&, const Eigen::Vector3d& a,
+                                        const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                                        double radius);
 
 }  // namespace palpate

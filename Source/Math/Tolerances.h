@@ -128,8 +128,12 @@ constexpr double kNearestError = 0x1p-40;
 /// and a margin.
 constexpr double kNearestSlack = 0x1p-45;
 /// Error of a ray's point on a triangle, relative to the largest coordinate difference between the
-/// ray's origin and the triangle. Where floating point would err by more, integers compute it.
+/// ray's origin and the triangle.
 constexpr double kRayError = 0x1p-50;
+/// Errors of the last step of a refined ray's parameter: of the step's dividend, relative to the
+/// product of its factors' sums (2^-103 and 2^-98), and of its divisor.
+constexpr double kRefinedRayLoss = 0x1p-96;
+constexpr double kRefinedRayError = 0x1p-48;
 /// Relative error of a quotient of integers that was rounded to double.
 constexpr double kRationalError = 0x1p-52;
 /// Error of a ray's interval inside a round segment, relative to the lengths that it comes from.
@@ -139,6 +143,14 @@ constexpr double kFloatRayError = 0x1p-18;
 /// Error of the distance between two points in a geometry's floats, relative to the largest
 /// coordinate: each of six coordinates is rounded by 2^-24.
 constexpr float kFloatPointError = 0x1p-21f;
+/// Error of a point's distance from a plane or a segment in a geometry's floats, relative to the
+/// largest coordinate of both: some twenty roundings of 2^-24, and a margin.
+constexpr double kFloatOverlapError = 0x1p-18;
+/// Error of a triangle that is clipped by planes, relative to the size of both: some hundred
+/// roundings, narrow corners of 1e-3, and a margin. kClipOrigin: part of it for the error of the
+/// planes' common point, relative to its coordinates.
+constexpr double kClipError = 0x1p-36;
+constexpr double kClipOrigin = 0x1p-10;
 /// Error of a point that was brought into a body's frame, relative to the magnitudes of the
 /// coordinates: under 2^-49 for the point and for a vertex, and a margin.
 constexpr double kPlacedPointError = 0x1p-46;

@@ -1,6 +1,7 @@
 #include "Octree/PointQueries.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 
 #undef HWY_TARGET_INCLUDE
@@ -81,9 +82,25 @@ HWY_ATTR void findOverlappingKernel(const Octree& octree, const BoxMap& map, con
                                HWY_ATTR { return boxes.overlapping(box); };
   stack.found.clear();
   if (!selectBoxes(BoxTag(), octree.blocks()[0], 0, 1, map, overlapping)) return;
-  constexpr float kNoSquares[kTestedTogether] = {};
-  descend(octree, map, stack, kNoSquares, 0.0f, overlapping,
-          [&](std::uint32_t place) { stack.found.push_back(place); });
+  std::array<OctreeNode, 512> nodes;  // seven siblings remain on each of at most 61 levels
+  std::size_t count = 0;
+  nodes[count++] = 0;
+  while (count > 0) {
+    const OctreeNode node = nodes[--count];
+    const auto [begin, end] = octree.ownRange(node);
+    for (std::uint32_t i = begin; i < end; i += kTestedTogether) {
+      const std::size_t size = std::min<std::size_t>(kTestedTogether, end - i);
+      std::uint32_t bits = selectBoxes(LeafTag(), octree.boxes(), i, size, map, overlapping);
+      for (; bits; bits &= bits - 1)
+        stack.found.push_back(i + static_cast<std::uint32_t>(std::countr_zero(bits)));
+    }
+    const OctreeNode child = octree.firstChild(node);
+    if (child == 0) continue;
+    std::uint32_t bits =
+        selectBoxes(NodeTag(), octree.blocks()[child >> 3], 0, 8, map, overlapping);
+    for (; bits; bits &= bits - 1)
+      nodes[count++] = child + static_cast<std::uint32_t>(std::countr_zero(bits));
+  }
 }
 
 HWY_ATTR void visitNearestKernel(const Octree& octree, const BoxMap& map, const FloatBox& point,

@@ -93,13 +93,14 @@ class InsideQuery {
         m_settings(settings),
         m_bruteForce(engine == Engine::BruteForce),
         m_stack(stack),
-        m_surface(body, engine, stack),
-        m_solid(body, engine, stack) {}
+        m_surface(body, engine, stack) {
+    if (body.solid) m_solid.emplace(body, engine, stack);
+  }
 
   WindingNumbers::Result evaluate(const Eigen::Vector3d& p) {
     if (m_settings.rule == InsideRule::WindingNumber)
       return m_body.windingNumbers.evaluate(m_body, p, m_settings.margin, m_bruteForce, m_stack);
-    if (m_body.solid) return {m_solid.lowest(p).has_value(), true};
+    if (m_solid) return {m_solid->lowest(p).has_value(), true};
     return {m_surface.mayContain(p) && m_surface.windingNumber(p) != 0, true};
   }
   InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p) {
@@ -112,7 +113,7 @@ class InsideQuery {
   const bool m_bruteForce;
   PointQueryStack& m_stack;
   BodyQuery m_surface;
-  SolidQuery m_solid;
+  std::optional<SolidQuery> m_solid;
 };
 
 }  // namespace
@@ -141,6 +142,14 @@ void findInside(const SearchableGeometry& vertices, const SearchableGeometry& bo
   });
 }
 
+bool isClosed(SearchableGeometry& body) {
+  MeshTopology& topology = body.mesh.topology;
+  if (body.solid) return true;  // its tetrahedra define its inside
+  if (!topology.hasFaces()) return false;
+  if (!topology.closed) topology.closed = findMeshDefects(topology.triangles).closed();
+  return *topology.closed;
+}
+
 void checkInside(SearchableGeometry& body, const InsideSettings& settings) {
   if (settings.rule != InsideRule::Closed && settings.rule != InsideRule::WindingNumber)
     throw Error(ErrorCode::InvalidSettings,
@@ -158,9 +167,7 @@ void checkInside(SearchableGeometry& body, const InsideSettings& settings) {
                 nameOf(body.id) + " is " + nameOf(topology.type) + ", which has no inside",
                 body.id);
   if (settings.rule == InsideRule::WindingNumber) return;
-  if (body.solid) return;  // its tetrahedra define its inside
-  if (!topology.closed) topology.closed = findMeshDefects(topology.triangles).closed();
-  if (*topology.closed) return;
+  if (isClosed(body)) return;
   const MeshDefects defects = findMeshDefects(topology.triangles);
   const auto describe = [](const std::vector<Segment>& edges, const char* what) {
     if (edges.empty()) return std::string();

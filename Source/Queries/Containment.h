@@ -28,5 +28,7 @@ bool isInside(const SearchableGeometry& body, const Eigen::Vector3d& point, cons
 /// InsideRule::Closed it also throws NotClosed, with the first edge at fault, if the body is not
 /// closed.
 void checkInside(SearchableGeometry& body, const InsideSettings&);
+/// Whether checkInside() accepts a body with elements for InsideRule::Closed.
+bool isClosed(SearchableGeometry& body);
 
 }  // namespace palpate

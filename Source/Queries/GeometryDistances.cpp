@@ -1,110 +1,27 @@
 #include "Queries/GeometryDistances.h"
 
-#include <palpate/Intersection.h>
-
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
+#include "Octree/BoxMap.h"
+#include "Queries/ElementDistance.h"
+#include "Queries/PairTraversal.h"
+#include "Queries/PointDistances.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
 
 namespace palpate {
 
-namespace {
-
 using Eigen::Vector3d;
 
-/// The closest points of two elements.
-struct ElementDistance {
-  double distance = std::numeric_limits<double>::infinity();  ///< L, less the radii; never negative
-  Vector3d weightsA = Vector3d::Zero(), weightsB = Vector3d::Zero();
-};
-
-class Elements {
- public:
-  Elements(const SearchableGeometry& geometry, std::uint32_t element)
-      : m_mesh(geometry.mesh), m_vertices(geometry.mesh.topology.triangles[element]) {
-    for (std::size_t i = 0; i < 3; ++i) m_corners[i] = m_mesh.now[m_vertices[i]];
-  }
-
-  const Vector3d& operator[](std::size_t i) const { return m_corners[i % 3]; }
-  double radius(const Vector3d& weights) const { return m_mesh.radius(m_vertices, weights); }
-  /// Whether corner i repeats an earlier one, and edge i an earlier edge.
-  bool repeatsCorner(std::size_t i) const {
-    return (i > 0 && m_vertices[i] == m_vertices[0]) || (i > 1 && m_vertices[2] == m_vertices[1]);
-  }
-  bool hasEdge(std::size_t i) const {
-    return m_vertices[i] != m_vertices[(i + 1) % 3] &&
-           !(i == 2 && m_vertices[1] == m_vertices[2]);  // {p, q, q} has one edge
-  }
-
- private:
-  const TriangleMesh& m_mesh;
-  Triangle m_vertices;
-  std::array<Vector3d, 3> m_corners;
-};
-
-Vector3d cornerWeights(std::size_t i) { return Vector3d::Unit(static_cast<Eigen::Index>(i)); }
-Vector3d edgeWeights(std::size_t i, double weight) {
-  Vector3d weights = Vector3d::Zero();
-  weights[static_cast<Eigen::Index>(i)] = 1.0 - weight;
-  weights[static_cast<Eigen::Index>((i + 1) % 3)] = weight;
-  return weights;
-}
-
-/// The nearest of all feature pairs. Features that cross meet in an edge and a face, which no
-/// feature pair is near to: then the exact test decides.
-ElementDistance elementDistance(const Elements& a, const Elements& b) {
-  ElementDistance best;
-  const auto take = [&](double distance, const Vector3d& weightsA, const Vector3d& weightsB) {
-    const double least = std::max(0.0, distance - a.radius(weightsA) - b.radius(weightsB));
-    if (least < best.distance) best = {least, weightsA, weightsB};
-  };
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (!a.repeatsCorner(i)) {
-      const auto found = finiteVertexTriangleDistance(a[i], b[0], b[1], b[2]);
-      take(found.distance, cornerWeights(i), found.barycentric);
-    }
-    if (!b.repeatsCorner(i)) {
-      const auto found = finiteVertexTriangleDistance(b[i], a[0], a[1], a[2]);
-      take(found.distance, found.barycentric, cornerWeights(i));
-    }
-    for (std::size_t j = 0; j < 3 && a.hasEdge(i); ++j) {
-      if (!b.hasEdge(j)) continue;
-      const auto found = finiteEdgeEdgeDistance(a[i], a[i + 1], b[j], b[j + 1]);
-      take(found.distance, edgeWeights(i, found.weightA), edgeWeights(j, found.weightB));
-    }
-  }
-  return best;
-}
-
-/// A common point of two triangles that intersect: where an edge of one crosses the other.
-std::optional<ElementDistance> crossing(const Elements& a, const Elements& b) {
-  if (!trianglesIntersect(a[0], a[1], a[2], b[0], b[1], b[2])) return {};
-  const auto edgeIn = [](const Elements& edges, const Elements& face, ElementDistance& found,
-                         bool exchanged) {
-    const Vector3d normal = (face[1] - face[0]).cross(face[2] - face[0]);
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (!trianglesIntersect(edges[i], edges[i + 1], edges[i + 1], face[0], face[1], face[2]))
-        continue;
-      const double from = normal.dot(edges[i] - face[0]), to = normal.dot(edges[i + 1] - face[0]);
-      const double weight = from == to ? 0.5 : std::clamp(from / (from - to), 0.0, 1.0);
-      const Vector3d point = edges[i] + weight * (edges[i + 1] - edges[i]);
-      const Vector3d onFace =
-          finiteVertexTriangleDistance(point, face[0], face[1], face[2]).barycentric;
-      found = {0.0, edgeWeights(i, weight), onFace};
-      if (exchanged) std::swap(found.weightsA, found.weightsB);
-      return true;
-    }
-    return false;
-  };
-  ElementDistance found;
-  if (edgeIn(a, b, found, false) || edgeIn(b, a, found, true)) return found;
-  return {};
-}
+namespace {
 
 SurfacePoint surfacePoint(const SearchableGeometry& geometry, std::uint32_t element,
                           const Vector3d& weights, double distance) {
@@ -115,6 +32,363 @@ SurfacePoint surfacePoint(const SearchableGeometry& geometry, std::uint32_t elem
   return {geometry.id, element, vertices, weights, position, distance};
 }
 
+SurfacePoint noPoint(GeometryId id) {
+  return {id, kNoElement, {}, Vector3d::Zero(), Vector3d::Zero(), kInfinity};
+}
+
+/// The map of a geometry's boxes to floats about an origin in the world.
+BoxMap mapAbout(const SearchableGeometry& geometry, const Vector3d& origin) {
+  if (geometry.isPlaced() || worldOrigin(geometry) == origin)
+    return worldMap(geometry, origin, 0.0, false);
+  const FloatFrame& frame = geometry.tree.frame();
+  const Vector3d offset = (frame.origin - origin) * frame.scale;
+  BoxMap map;
+  map.count = 1;
+  setEnd(map.ends[0], {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, {offset[0], offset[1], offset[2]}, 0.0,
+         kPlacedError * frame.scale *
+             (frame.origin.cwiseAbs().maxCoeff() + origin.cwiseAbs().maxCoeff()));
+  return map;
+}
+
+double sizeOf(const FloatBox& box) {
+  double size = 0;
+  for (std::size_t k = 0; k < 3; ++k) size += double{box.upper[k]} - box.lower[k];
+  return size;
+}
+
+/// The nearest pair of elements that was found so far.
+class NearestPair {
+ public:
+  NearestPair(const SearchableGeometry& a, const SearchableGeometry& b)
+      : m_a(a),
+        m_b(b),
+        m_origin(worldOrigin(a)),
+        m_radii(a.mesh.largestRadius + b.mesh.largestRadius) {}
+
+  /// Tests the elements at two places of the octrees' orders.
+  void test(std::uint32_t placeA, std::uint32_t placeB) {
+    test(placeA, elementOf(m_a, placeA), placeB, elementOf(m_b, placeB));
+  }
+  /// Tests elements after a plane across the direction of the nearest ones has excluded most.
+  void test(const NearElements& elements) {
+    std::array<Element, NearElements::kSide> all;
+    std::array<double, NearElements::kSide> lowest;
+    std::uint32_t read = 0;
+    Vector3d direction = m_direction;
+    for (std::uint32_t i = 0; i < NearElements::kSide; ++i) {
+      if (elements.near[i] == 0) continue;
+      const Element a = elementOf(m_a, elements.placeA + i);
+      double highest = -lowestAlong(-direction, a);
+      for (std::uint32_t bits = elements.near[i]; bits; bits &= bits - 1) {
+        const auto j = static_cast<std::uint32_t>(std::countr_zero(bits));
+        if (direction != m_direction) {
+          direction = m_direction;
+          highest = -lowestAlong(-direction, a);
+          read = 0;
+        }
+        if (!(read >> j & 1)) {
+          all[j] = elementOf(m_b, elements.placeB + j);
+          lowest[j] = lowestAlong(direction, all[j]);
+          read |= 1u << j;
+        }
+        if (lowest[j] - highest > m_best.distance + m_radii) continue;
+        test(elements.placeA + i, a, elements.placeB + j, all[j]);
+      }
+    }
+  }
+
+  /// L, between the elements' surfaces; infinite if there is none.
+  double distance() const { return m_best.distance; }
+  GeometryDistance result() const {
+    return {surfacePoint(m_a, m_elementA, m_best.weightsA, m_best.distance),
+            surfacePoint(m_b, m_elementB, m_best.weightsB, m_best.distance), m_best.distance};
+  }
+
+ private:
+  static Element elementOf(const SearchableGeometry& geometry, std::uint32_t place) {
+    return {geometry.mesh, geometry.tree.ordered()[place]};
+  }
+  /// A lower bound of an element's heights along a direction, above the origin.
+  double lowestAlong(const Vector3d& direction, const Element& element) const {
+    double lowest = kInfinity, size = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vector3d from = element[i] - m_origin;
+      lowest = std::min(lowest, direction.dot(from));
+      size = std::max(size, from.cwiseAbs().maxCoeff());
+    }
+    return lowest - kNearestError * size;
+  }
+  void test(std::uint32_t placeA, const Element& a, std::uint32_t placeB, const Element& b) {
+    const std::uint32_t elementA = m_a.tree.octree().order()[placeA],
+                        elementB = m_b.tree.octree().order()[placeB];
+    const auto precedes = [&] {
+      return std::pair(elementA, elementB) < std::pair(m_elementA, m_elementB);
+    };
+    if (m_best.distance == 0.0 && !precedes()) return;
+    if (isFurther(a, b)) return;
+    const ElementDistance found = elementDistance(a, b);
+    if (!(found.distance < m_best.distance || (found.distance == m_best.distance && precedes())))
+      return;
+    m_best = found;
+    m_elementA = elementA;
+    m_elementB = elementB;
+    m_direction = b.point(found.weightsB) - a.point(found.weightsA);
+    const double length = m_direction.stableNorm();
+    if (length > 0 && std::isfinite(length))
+      m_direction /= length;
+    else
+      m_direction.setZero();
+  }
+
+  /// Whether a plane between the elements shows that they are further apart than the nearest ones.
+  /// The first plane is across the direction of the nearest ones. Each further one is across a
+  /// shorter difference of the elements' points.
+  /// Source   Gilbert, An iterative procedure for computing the minimum of a quadratic form (1966).
+  bool isFurther(const Element& a, const Element& b) const {
+    constexpr int kMostPlanes = 5;
+    double size = 0;
+    for (std::size_t i = 0; i < 3; ++i)
+      size = std::max(
+          {size, (a[i] - a[0]).cwiseAbs().maxCoeff(), (b[i] - a[0]).cwiseAbs().maxCoeff()});
+    const double needed = m_best.distance + m_radii + kNearestError * size;
+    Vector3d normal = m_direction, difference = Vector3d::Zero();
+    for (int plane = 0; plane < kMostPlanes; ++plane) {
+      const Vector3d nearest = b.furthest(-normal) - a.furthest(normal);
+      const double length = normal.norm();
+      if (length > kShortestDirection && normal.dot(nearest) > needed * length) return true;
+      const Vector3d change = nearest - difference;
+      const double square = change.squaredNorm();
+      if (plane == 0)
+        difference = nearest;
+      else if (square > 0)
+        difference += std::clamp(-difference.dot(change) / square, 0.0, 1.0) * change;
+      normal = difference;
+    }
+    return false;
+  }
+
+  const SearchableGeometry &m_a, &m_b;
+  const Vector3d m_origin;
+  const double m_radii;  ///< L: the largest ones of both
+  ElementDistance m_best;
+  std::uint32_t m_elementA = kNoElement, m_elementB = kNoElement;
+  Vector3d m_direction = Vector3d::Zero();  ///< from a to b: unit, or 0
+};
+
+/// Two elements near each other: each geometry's element nearest to a point of the other one, in
+/// turn.
+void startNear(const SearchableGeometry& a, const SearchableGeometry& b, NearestPair& nearest) {
+  constexpr int kRounds = 4;
+  std::uint32_t placeA = 0, placeB = 0;
+  Vector3d point = worldOrigin(b);
+  for (int round = 0; round < kRounds; ++round) {
+    const auto onA = PointDistances(a, point, false).nearest(kInfinity, placeA);
+    const auto onB =
+        onA ? PointDistances(b, point - onA->closest.difference, false).nearest(kInfinity, placeB)
+            : std::nullopt;
+    if (!onA || !onB) break;  // beyond double's range
+    const bool isSame = round > 0 && placeA == onA->place && placeB == onB->place;
+    point -= onA->closest.difference;
+    point -= onB->closest.difference;
+    placeA = onA->place;
+    placeB = onB->place;
+    if (isSame) break;
+  }
+  nearest.test(placeA, placeB);
+}
+
+/// Visits the elements of a geometry, nearest boxes first. bound(centre, half): a lower bound of
+/// what test(element) would find in the box with this centre and these half extents, in L, in the
+/// world. test returns the least distance that was found so far.
+template <class Bound, class Test>
+void descend(const SearchableGeometry& geometry, bool bruteForce, double best, Bound&& bound,
+             Test&& test) {
+  const Octree& octree = geometry.tree.octree();
+  if (bruteForce) {
+    for (std::uint32_t i = 0; i < geometry.mesh.topology.triangles.size(); ++i) test(i);
+    return;
+  }
+  octree.requireBuilt();
+  const Vector3d origin = worldOrigin(geometry);
+  const BoxMap map = worldMap(geometry, origin, 0.0, false);
+  const double unit = 1.0 / geometry.tree.frame().scale;
+  const auto boundOf = [&](const FloatBox& stored) {
+    const FloatBox box = map(stored);
+    if (box.mayBeClamped()) return -kInfinity;
+    Vector3d lower, upper;
+    for (int k = 0; k < 3; ++k) {
+      lower[k] = box.lower[static_cast<std::size_t>(k)];
+      upper[k] = box.upper[static_cast<std::size_t>(k)];
+    }
+    const Vector3d half = 0.5 * unit * (upper - lower), middle = 0.5 * unit * (upper + lower);
+    const Vector3d centre = middle + origin;
+    return bound(centre, half) - kNearestError * (half.sum() + middle.cwiseAbs().sum()) -
+           kShapeBoundError * (centre.cwiseAbs().sum() + origin.cwiseAbs().sum());
+  };
+  struct Entry {
+    double bound;
+    OctreeNode node;
+  };
+  std::array<Entry, 512> entries;  // seven siblings remain on each of at most 61 levels
+  std::size_t count = 0;
+  entries[count++] = {-kInfinity, 0};
+  while (count > 0) {
+    const Entry entry = entries[--count];
+    if (entry.bound > best) continue;
+    const auto [begin, end] = octree.ownRange(entry.node);
+    for (std::uint32_t i = begin; i < end; ++i)
+      if (!(boundOf(octree.boxes()[i]) > best)) best = test(octree.order()[i]);
+    const OctreeNode child = octree.firstChild(entry.node);
+    const std::size_t first = count;
+    for (unsigned slot = 0; child != 0 && slot < 8; ++slot) {
+      if (octree.isEmpty(child + slot)) continue;
+      const double least = boundOf(octree.box(child + slot));
+      if (least > best) continue;
+      std::size_t place = count++;
+      for (; place > first && entries[place - 1].bound < least; --place)
+        entries[place] = entries[place - 1];
+      entries[place] = {least, child + slot};
+    }
+  }
+}
+
 }  // namespace
+
+GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGeometry& b,
+                                 bool bruteForce) {
+  NearestPair nearest(a, b);
+  const std::size_t sizeA = a.tree.ordered().size(), sizeB = b.tree.ordered().size();
+  if (sizeA == 0 || sizeB == 0) return {noPoint(a.id), noPoint(b.id), kInfinity};
+  if (bruteForce) {
+    for (std::uint32_t i = 0; i < sizeA; ++i)
+      for (std::uint32_t j = 0; j < sizeB; ++j) nearest.test(i, j);
+    return nearest.result();
+  }
+  startNear(a, b, nearest);
+  const Vector3d origin = worldOrigin(a);
+  const PairSearch search{a.tree.octree(), b.tree.octree(), mapAbout(a, origin),
+                          mapAbout(b, origin)};
+  // The error covers that of computed distances. If positions are clamped to the floats' range, it
+  // is so large that no pair of boxes is skipped.
+  const double radii = a.mesh.largestRadius + b.mesh.largestRadius,
+               scale = a.tree.frame().scale * (1.0 + kNearestError),
+               error = kNearestError * (sizeOf(search.a.box(0)) + sizeOf(search.b.box(0)));
+  const auto boundOf = [&] {
+    return OutwardRounding::up(static_cast<float>((nearest.distance() + radii) * scale + error));
+  };
+  forNearElements(search, boundOf(), [&](const NearElements& elements) {
+    nearest.test(elements);
+    return boundOf();
+  });
+  return nearest.result();
+}
+
+GeometryDistance distanceBetween(const SearchableGeometry& geometry, GeometryId id,
+                                 const Shape& shape, bool bruteForce) {
+  if (geometry.tree.ordered().empty()) return {noPoint(geometry.id), noPoint(id), kInfinity};
+  std::uint32_t best = kNoElement;
+  NearestToShape nearest{Vector3d::Zero(), Vector3d::Zero(), kInfinity, false};
+  descend(
+      geometry, bruteForce, kInfinity,
+      [&](const Vector3d& centre, const Vector3d& half) {
+        const PointShapeDistance at = shape.signedDistance(centre);
+        return std::max(0.0, at.distance - at.normal.cwiseAbs().dot(half) -
+                                 geometry.mesh.largestRadius -
+                                 kShapeBoundError * shape.magnitude());
+      },
+      [&](std::uint32_t element) {
+        const Element corners(geometry.mesh, geometry.mesh.topology.triangles[element]);
+        const auto take = [&](const NearestToShape& found, const Vector3d& weights) {
+          const double distance = std::max(0.0, found.distance - corners.radius(weights));
+          if (!(distance < nearest.distance || (distance == nearest.distance && element < best)))
+            return;
+          best = element;
+          nearest = found;
+          nearest.weights = weights;
+          nearest.distance = distance;
+        };
+        for (std::size_t i = 0; i < 3; ++i) {
+          if (!corners.hasEdge(i)) continue;
+          const NearestToShape found = shape.nearestOfEdge(corners[i], corners[i + 1]);
+          take(found, edgeWeights(i, found.weights[1]));
+        }
+        if (corners.isPoint()) {
+          const PointShapeDistance at = shape.signedDistance(corners[0]);
+          take({Vector3d::UnitX(), at.normal, at.distance, false}, cornerWeights(0));
+        }
+        if (geometry.mesh.topology.hasFaces())
+          if (const auto found = shape.nearestInTriangle(corners[0], corners[1], corners[2]))
+            take(*found, found->weights);
+        return nearest.distance;
+      });
+  GeometryDistance out{surfacePoint(geometry, best, nearest.weights, nearest.distance), noPoint(id),
+                       nearest.distance};
+  out.b.distance = nearest.distance;
+  // The witness of a common point is the element's point, which the shape holds.
+  const PointShapeDistance at = shape.signedDistance(out.a.position);
+  out.b.position =
+      at.distance > 0.0 ? Vector3d(out.a.position - at.distance * at.normal) : out.a.position;
+  return out;
+}
+
+namespace {
+
+/// A common point of two shapes that overlap: each in turn moves the point to its own nearest one.
+Vector3d commonPoint(const Shape& a, const Shape& b, Vector3d point) {
+  constexpr int kMostSteps = 1000;  // usually one
+  const double tolerance = kOnSurface * (a.magnitude() + b.magnitude());
+  bool isCommon = false;
+  for (int step = 0; step < kMostSteps && !isCommon; ++step) {
+    isCommon = true;
+    for (const Shape* shape : {&a, &b}) {
+      const PointShapeDistance at = shape->signedDistance(point);
+      if (!(at.distance > tolerance)) continue;
+      point -= at.distance * at.normal;
+      isCommon = false;
+    }
+  }
+  return point;
+}
+
+}  // namespace
+
+GeometryDistance distanceBetween(GeometryId idA, const Shape& a, GeometryId idB, const Shape& b,
+                                 ShapePairScratch& scratch) {
+  const ShapePairDistance found = a.distanceFrom(b, scratch);
+  GeometryDistance out{noPoint(idA), noPoint(idB), std::max(0.0, found.distance)};
+  out.a.distance = out.b.distance = out.distance;
+  out.a.position = found.pointA;
+  out.b.position = found.pointB;
+  if (found.distance <= 0.0) out.a.position = out.b.position = commonPoint(a, b, found.pointA);
+  return out;
+}
+
+SegmentDistance distanceFromSegment(const SearchableGeometry& geometry, const Vector3d& p,
+                                    const Vector3d& q, double maxDistance, bool bruteForce) {
+  ElementDistance best;
+  best.distance = maxDistance;
+  std::uint32_t nearest = kNoElement;
+  const Element segment(p, q);
+  descend(
+      geometry, bruteForce, maxDistance,
+      [&](const Vector3d& centre, const Vector3d& half) {
+        return finiteVertexTriangleDistance(centre, p, q, q).distance - half.norm() -
+               geometry.mesh.largestRadius -
+               kNearestError * ((centre - p).cwiseAbs().sum() + (centre - q).cwiseAbs().sum());
+      },
+      [&](std::uint32_t element) {
+        const Element other(geometry.mesh, geometry.mesh.topology.triangles[element]);
+        const ElementDistance found = elementDistance(segment, other);
+        if (found.distance < best.distance ||
+            (found.distance == best.distance && element < nearest)) {
+          best = found;
+          nearest = element;
+        }
+        return best.distance;
+      });
+  if (nearest == kNoElement) return {0.0, noPoint(geometry.id)};
+  return {best.weightsA[1] + best.weightsA[2],
+          surfacePoint(geometry, nearest, best.weightsB, best.distance)};
+}
 
 }  // namespace palpate

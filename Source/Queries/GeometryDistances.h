@@ -5,29 +5,32 @@
 #include "Queries/SearchableGeometry.h"
 #include "Shapes/Shape.h"
 
-#include <cstdint>
-#include <vector>
-
 namespace palpate {
 
-/// Scratch of distanceBetween(), which keeps its peak.
-struct DistanceScratch {
-  /// Two nodes, one of each octree, and a bound of the distance between their boxes.
-  struct NodePair {
-    float square;
-    std::uint32_t a, b;
-  };
-  std::vector<NodePair> heap;
-  ShapePairScratch shapes;
-};
-
-/// The least distance between two geometries that both have elements, with the closest points. Of
-/// equally near pairs, that of the lowest element of a, then of b. 0 if they have a common point.
+/// The least distance between two geometries, of which at least one has elements. Of equally near
+/// pairs of elements, by computed distance, that of the lowest element of a, then of b. 0 if
+/// they have a common point, which is decided exactly for elements without radii. Both points have
+/// element kNoElement, and the distance is infinite, if a mesh has no elements.
 ///
-/// Method   best-first descent of both octrees: the pair of nodes with the nearest boxes comes next,
-///          and the larger node is replaced by its children. Ends when no boxes are nearer than the
-///          best pair of elements.
+/// Method   descent into both octrees, from a pair of elements that is likely near. A pair of nodes
+///          is skipped if its boxes are further apart than the best pair of elements.
 GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGeometry& b,
-                                 bool bruteForce, DistanceScratch&);
+                                 bool bruteForce);
+/// The same for a geometry with elements and a shape with this id, which is solid.
+GeometryDistance distanceBetween(const SearchableGeometry&, GeometryId, const Shape&,
+                                 bool bruteForce);
+
+/// The same for two shapes. At most one may be a plane.
+GeometryDistance distanceBetween(GeometryId, const Shape&, GeometryId, const Shape&,
+                                 ShapePairScratch&);
+
+/// The least distance from a segment or point pq. None within maxDistance: the element is
+/// kNoElement.
+struct SegmentDistance {
+  double weight;  ///< of q
+  SurfacePoint nearest;
+};
+SegmentDistance distanceFromSegment(const SearchableGeometry&, const Eigen::Vector3d& p,
+                                    const Eigen::Vector3d& q, double maxDistance, bool bruteForce);
 
 }  // namespace palpate

@@ -117,16 +117,19 @@ class Search {
       if (begin < end) test();
       const OctreeNode child = octree.firstChild(entry.node);
       if (child == 0) continue;
-      const std::size_t first = count;
+      // The nearest one goes last, because the last entry is taken first. The others stay unsorted:
+      // once it has lowered the bound, most of them are skipped.
+      Entry nearest{std::numeric_limits<float>::infinity(), 0};
       for (std::uint32_t bits = near(NodeTag(), octree.blocks()[child >> 3], 0, 8, within); bits;
            bits &= bits - 1) {
         const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
-        // Sorted with the nearest last, because the last entry is taken first.
-        std::size_t place = count++;
-        for (; place > first && entries[place - 1].square < squares[slot]; --place)
-          entries[place] = entries[place - 1];
-        entries[place] = {squares[slot], child + slot};
+        const Entry next{squares[slot], child + slot};
+        const bool isNearer = next.square < nearest.square;
+        entries[count] = isNearer ? nearest : next;
+        nearest = isNearer ? next : nearest;
+        count += entries[count].node != 0;
       }
+      if (nearest.node != 0) entries[count++] = nearest;
     }
     if (m_candidates.size > 0) flush();
   }
@@ -172,10 +175,15 @@ class Search {
 
   /// Tests the pending elements.
   HWY_ATTR HWY_INLINE void test() {
-    const LeafTag d;
     alignas(64) float lowers[kSide], uppers[kSide];
-    for (std::size_t i = 0; i < m_pending; i += hn::Lanes(d))
-      boundDistances(d, m_corners, i, m_search.slack, lowers, uppers);
+    const auto bound = [&](auto d) HWY_ATTR {
+      for (std::size_t i = 0; i < m_pending; i += hn::Lanes(d))
+        boundDistances(d, m_corners, i, m_search.slack, lowers, uppers);
+    };
+    if (m_pending <= hn::Lanes(NodeTag()))
+      bound(NodeTag());
+    else
+      bound(LeafTag());
     for (std::size_t i = 0; m_count > 0 && i < m_pending; ++i) keepLeast(uppers[i]);
     for (std::size_t i = 0; i < m_pending; ++i) {
       if (lowers[i] > m_bound + m_search.tolerance) continue;

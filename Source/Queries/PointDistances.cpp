@@ -47,11 +47,11 @@ NearestSearch searchOf(const SearchableGeometry& geometry, const Eigen::Vector3d
   return search;
 }
 
-/// Bounds the error of a computed distance: see vertexTriangleDistance().
+/// Bounds the error of a computed distance less a radius: see vertexTriangleDistance().
 double errorOf(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-               const Eigen::Vector3d& c) {
+               const Eigen::Vector3d& c, double largestRadius) {
   const auto largest = [&](const Eigen::Vector3d& q) { return (q - p).cwiseAbs().maxCoeff(); };
-  return kNearestSlack * 2 * std::max({largest(a), largest(b), largest(c)});
+  return kNearestSlack * 2 * std::max({largest(a), largest(b), largest(c), largestRadius});
 }
 
 /// The vertices of the feature that holds a closest point, ascending; unused places hold the last.
@@ -74,8 +74,6 @@ PointDistances::PointDistances(const SearchableGeometry& geometry, const Eigen::
     : m_geometry(geometry),
       m_point(point),
       m_bruteForce(bruteForce),
-      m_variesAlongElement(geometry.mesh.topology.type == GeometryType::Lines &&
-                           !geometry.mesh.radii.empty()),
       m_search(searchOf(geometry, point)) {}
 
 PointDistances::Near PointDistances::at(std::uint32_t place) const {
@@ -93,17 +91,16 @@ bool PointDistances::isNearer(const Near& one, const Near& two) const {
   const Positions& now = m_geometry.mesh.now;
   const Eigen::Vector3d corners[] = {now[first[0]],  now[first[1]],  now[first[2]],
                                      now[second[0]], now[second[1]], now[second[2]]};
-  const double difference = one.distance - two.distance;
-  const double error = errorOf(m_point, corners[0], corners[1], corners[2]) +
-                       errorOf(m_point, corners[3], corners[4], corners[5]);
+  const double difference = one.distance - two.distance, radius = m_geometry.mesh.largestRadius;
+  const double error = errorOf(m_point, corners[0], corners[1], corners[2], radius) +
+                       errorOf(m_point, corners[3], corners[4], corners[5], radius);
   if (std::abs(difference) > error) return difference < 0;
-  int order = (difference > 0) - (difference < 0);
-  if (!m_variesAlongElement && m_geometry.mesh.radii.empty())
-    order = featureOf(first, one.closest.feature) == featureOf(second, two.closest.feature)
-                ? 0
-                : exact::compareDistances(
-                      m_point, {corners[0], corners[1], corners[2], one.closest.feature},
-                      {corners[3], corners[4], corners[5], two.closest.feature});
+  const int order =
+      featureOf(first, one.closest.feature) == featureOf(second, two.closest.feature)
+          ? 0
+          : exact::compareDistances(
+                m_point, {corners[0], corners[1], corners[2], one.closest.feature, radiiOf(first)},
+                {corners[3], corners[4], corners[5], two.closest.feature, radiiOf(second)});
   return order < 0 || (order == 0 && one.element < two.element);
 }
 
@@ -112,11 +109,17 @@ bool PointDistances::isWithin(const Near& near, double distance) const {
   const Positions& now = m_geometry.mesh.now;
   const Eigen::Vector3d a = now[corners[0]], b = now[corners[1]], c = now[corners[2]];
   const double difference = near.distance - distance;
-  if (std::abs(difference) > errorOf(m_point, a, b, c) + kNearestSlack * distance)
+  if (std::abs(difference) >
+      errorOf(m_point, a, b, c, m_geometry.mesh.largestRadius) + kNearestSlack * distance)
     return difference < 0;
-  if (m_variesAlongElement || std::isinf(distance)) return difference <= 0;
-  const double radius = m_geometry.mesh.radius(corners, near.closest.barycentric);
-  return exact::compareDistance(m_point, {a, b, c, near.closest.feature}, distance, radius) <= 0;
+  if (std::isinf(distance)) return true;
+  return exact::compareDistance(m_point, {a, b, c, near.closest.feature, radiiOf(corners)},
+                                distance) <= 0;
+}
+
+Eigen::Vector3d PointDistances::radiiOf(const Triangle& corners) const {
+  const TriangleMesh& mesh = m_geometry.mesh;
+  return {mesh.radius(corners[0]), mesh.radius(corners[1]), mesh.radius(corners[2])};
 }
 
 SurfacePoint PointDistances::surfacePoint(const Near& near) const {
@@ -129,8 +132,10 @@ SurfacePoint PointDistances::surfacePoint(const Near& near) const {
 }
 
 float PointDistances::boundOf(double distance) const {
-  // The search bounds distances to centre lines and points.
-  return up((distance + m_geometry.mesh.largestRadius) * m_geometry.tree.frame().scale *
+  // The search bounds distances to centre lines and points. Distances are rounded after the radius
+  // was subtracted.
+  const double radius = m_geometry.mesh.largestRadius;
+  return up((distance + radius + kNearestError * radius) * m_geometry.tree.frame().scale *
             (1 + kNearestError));
 }
 

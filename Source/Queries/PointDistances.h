@@ -30,10 +30,9 @@ class PointDistances {
   PointDistances(const SearchableGeometry&, const Eigen::Vector3d& point, bool bruteForce);
 
   Near at(std::uint32_t place) const;
-  /// Whether a is nearer than b, decided exactly, or as near with a lower element. If radii vary
-  /// along a line, its rounded distances decide.
+  /// Whether a is nearer than b, decided exactly, or as near with a lower element.
   bool isNearer(const Near& a, const Near& b) const;
-  bool isWithin(const Near&, double distance) const;  ///< decided exactly, with the same exception
+  bool isWithin(const Near&, double distance) const;  ///< decided exactly
   SurfacePoint surfacePoint(const Near&) const;
 
   /// The nearest element. None is further away than maxDistance. likely: the place of an element
@@ -51,11 +50,11 @@ class PointDistances {
   template <class F>
   void search(double most, std::size_t count, F&& f) const;
   float boundOf(double distance) const;  ///< in the octree's floats
+  Eigen::Vector3d radiiOf(const Triangle& corners) const;
 
   const SearchableGeometry& m_geometry;
   const Eigen::Vector3d m_point;
   const bool m_bruteForce;
-  bool m_variesAlongElement;  ///< a line mesh has different radii
   NearestSearch m_search;
 };
 

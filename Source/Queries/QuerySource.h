@@ -4,6 +4,7 @@
 #include <palpate/SpatialQueries.h>
 
 #include "Core/Threads.h"
+#include "Queries/PathIntervals.h"
 #include "Queries/PointDistances.h"
 #include "Queries/RayHits.h"
 #include "Queries/SearchableGeometry.h"
@@ -11,6 +12,7 @@
 #include "Shapes/PlacedShape.h"
 #include "Shapes/ShapeContacts.h"
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -37,17 +39,24 @@ class SpatialQueries::Source {
     ShapeContactBuffers shapeContacts;
     /// The shape of the last call. Placing it again allocates nothing.
     std::optional<PlacedShape> shape;
+    PathScratch path;
+    std::vector<std::uint64_t> bits;
+
+    /// Sorts different numbers: as bits of a field if they lie close together.
+    void sort(std::vector<std::uint32_t>& numbers);
   };
   /// What all sources of one owner share: the scratch that no call uses.
   class Pool {
    public:
     Pool();
     std::uint64_t id() const { return m_id; }  ///< unique in the process
+    ~Pool();
     std::unique_ptr<Scratch> take();
     void giveBack(std::unique_ptr<Scratch>);
 
    private:
     const std::uint64_t m_id;
+    std::atomic<Scratch*> m_spare = nullptr;  ///< the one that is likely to be lent next
     std::mutex m_mutex;
     std::vector<std::unique_ptr<Scratch>> m_free;
   };
@@ -101,6 +110,8 @@ class SpatialQueries::Source {
   // for each geometry.
   void prepareInside(SearchableGeometry& body, const InsideSettings&);
   void prepareTetrahedra(SearchableGeometry& solid);
+  /// For InsideRule::Closed; returns false for a body without an inside.
+  bool prepareIfClosed(SearchableGeometry& body);
 
  private:
   const std::shared_ptr<Pool> m_pool;

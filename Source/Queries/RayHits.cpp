@@ -1,5 +1,6 @@
 #include "Queries/RayHits.h"
 
+#include "Math/ClosestPoint.h"
 #include "Math/RoundSegment.h"
 #include "Math/Tolerances.h"
 
@@ -19,13 +20,16 @@ struct ClippedRay {
   FloatRay ray;
   double start, perT;  ///< t = start + ray's t / perT
 
+  /// Never negative, which would end the traversal: `start` is rounded.
   float floatOf(double t) const {
-    return OutwardRounding::up(static_cast<float>((t - start) * perT * (1.0 + kNearestError)));
+    const double along = (t - start) * perT * (1.0 + kNearestError);
+    return std::max(OutwardRounding::up(static_cast<float>(along)), 0.0f);
   }
 };
 
-/// None if the ray certainly misses all boxes.
-std::optional<ClippedRay> clip(const SearchableGeometry& geometry, const RaySegment& ray) {
+/// radius: L, by which boxes grow. None if the ray certainly misses all boxes.
+std::optional<ClippedRay> clip(const SearchableGeometry& geometry, const RaySegment& ray,
+                               double radius) {
   const FloatFrame& frame = geometry.tree.frame();
   const Positions& now = geometry.mesh.now;
   Vector3d origin = ray.origin, direction = ray.direction;
@@ -44,11 +48,13 @@ std::optional<ClippedRay> clip(const SearchableGeometry& geometry, const RaySegm
   double extent = 0.0;
   for (std::size_t k = 0; k < 3; ++k)
     extent = std::max({extent, double{std::abs(root.lower[k])}, double{std::abs(root.upper[k])}});
-  // Within the root box every coordinate is at most `extent`, and t grows by at most three times
-  // that. Its floats err by at most 2^-20 of it; kFloatRayError has a margin. The rest are errors
-  // of the origin in double.
+  extent += radius * frame.scale;
+  // Within the grown root box every coordinate is at most `extent`, and t grows by at most three
+  // times that. Its floats err by at most 2^-20 of it; kFloatRayError has a margin. The rest are
+  // errors of the origin in double.
   const double slack = kFloatRayError * extent + kPlacedPointError * origin.cwiseAbs().maxCoeff() +
-                       error * frame.scale + OutwardRounding::kAbsolute;
+                       (error + radius * (1.0 + kNearestError)) * frame.scale +
+                       OutwardRounding::kAbsolute;
   ClippedRay clipped{
       {{0, 0, 0}, {}, 0, OutwardRounding::up(static_cast<float>(slack))}, ray.tMin, perT};
   if (!(extent < kLargestFloat) || !(perT >= 0x1p-900) || !(perT <= 0x1p900) ||
@@ -87,11 +93,12 @@ std::optional<ClippedRay> clip(const SearchableGeometry& geometry, const RaySegm
 }  // namespace
 
 RayHits::RayHits(const SearchableGeometry& geometry, const Ray& ray, bool bruteForce,
-                 std::vector<Met>& scratch)
+                 std::vector<Met>& scratch, double radius)
     : m_geometry(geometry),
       m_ray{ray.origin, ray.direction, ray.tMin, ray.tMax},
       m_bruteForce(bruteForce),
-      m_isSolid(geometry.mesh.largestRadius > 0),
+      m_radius(radius),
+      m_isSolid(geometry.mesh.largestRadius + radius > 0),
       m_met(scratch) {}
 
 template <class F>
@@ -103,8 +110,13 @@ void RayHits::intersect(std::uint32_t place, F&& f) const {
       f(*interval);
     return;
   }
-  const RoundIntervals parts =
-      intersectRay(m_ray, mesh.now[a], mesh.now[b], mesh.radius(a), mesh.radius(b));
+  if (mesh.topology.hasFaces()) {
+    if (const auto interval = intersectRay(m_ray, mesh.now[a], mesh.now[b], mesh.now[c], m_radius))
+      f(*interval);
+    return;
+  }
+  const RoundIntervals parts = intersectRay(m_ray, mesh.now[a], mesh.now[b],
+                                            mesh.radius(a) + m_radius, mesh.radius(b) + m_radius);
   for (std::size_t i = 0; i < parts.size; ++i) f(parts.intervals[i]);
 }
 
@@ -129,13 +141,22 @@ double RayHits::collect(Wanted wanted, double tMax, double atLeast) {
     for (std::uint32_t place = 0; place < m_geometry.tree.ordered().size(); ++place) take(place);
     return atLeast;
   }
-  const auto ray = clip(m_geometry, m_ray);
+  const auto ray = clip(m_geometry, m_ray, m_geometry.mesh.largestRadius + m_radius);
   if (!ray) return atLeast;
   forEachOnRay(m_geometry.tree.octree(), ray->ray, [&](std::uint32_t place) {
     take(place);
     if (wanted == Wanted::Any && !m_met.empty()) return -1.0f;
     return std::min(ray->ray.tMax, ray->floatOf(std::max(last + error, atLeast)));
   });
+  if (wanted != Wanted::First) return atLeast;
+  // Elements come in any order. Some were met before the part had grown as far as to them.
+  std::sort(m_met.begin(), m_met.end(),
+            [](const Met& a, const Met& b) { return a.interval.first < b.interval.first; });
+  for (const auto& [interval, place, element] : m_met) {
+    if (interval.first - interval.error > last + error) break;
+    last = std::max(last, interval.last);
+    error = std::max(error, interval.error);
+  }
   return std::min(tMax, last + error) > least ? std::min(tMax, last + error) : atLeast;
 }
 
@@ -157,9 +178,13 @@ int RayHits::compare(const Met& one, bool lastOfFirst, const Met& two, bool last
 RayHit RayHits::hitOf(const Met& met, double t, bool frontFace, bool crosses) const {
   const Triangle& corners = m_geometry.tree.ordered()[met.place];
   const Positions& now = m_geometry.mesh.now;
+  const Vector3d a = now[corners[0]], b = now[corners[1]], c = now[corners[2]];
+  if (!m_isSolid) {
+    const RayPoint at = firstPoint(m_ray, met.interval, a, b, c);
+    return {m_geometry.id, met.element, corners, at.weights, at.t, frontFace, crosses};
+  }
   const Vector3d point = m_ray.origin + t * m_ray.direction;
-  const Vector3d weights =
-      vertexTriangleDistance(point, now[corners[0]], now[corners[1]], now[corners[2]]).barycentric;
+  const Vector3d weights = finiteVertexTriangleDistance(point, a, b, c).barycentric;
   return {m_geometry.id, met.element, corners, weights, t, frontFace, crosses};
 }
 
@@ -180,19 +205,18 @@ bool RayHits::hitsOfPart(std::size_t begin, std::size_t end, std::size_t furthes
   return last.interval.crossing == 0 || f(hitOf(last, last.interval.last, false, true));
 }
 
-template <class F>
-void RayHits::forEachHit(F&& f) {
+void RayHits::sort() {
   std::sort(m_met.begin(), m_met.end(), [&](const Met& a, const Met& b) {
     const int order = compare(a, false, b, false);
     return order < 0 || (order == 0 && a.element < b.element);
   });
-  for (std::size_t begin = 0; begin < m_met.size();) {
-    std::size_t furthest = begin, end = begin + 1;
-    for (; end < m_met.size() && compare(m_met[end], false, m_met[furthest], true) <= 0; ++end)
-      if (compare(m_met[end], true, m_met[furthest], true) > 0) furthest = end;
-    if (!hitsOfPart(begin, end, furthest, f)) return;
-    begin = end;
-  }
+}
+
+template <class F>
+void RayHits::forEachHit(F&& f) {
+  forEachPart([&](std::size_t begin, std::size_t end, std::size_t furthest) {
+    return hitsOfPart(begin, end, furthest, f);
+  });
 }
 
 std::optional<RayHit> RayHits::first(double t) {

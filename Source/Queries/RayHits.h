@@ -26,14 +26,32 @@ class RayHits {
     std::uint32_t place, element;
   };
 
-  /// bruteForce: every element is tested. scratch: kept by the caller.
-  RayHits(const SearchableGeometry&, const Ray&, bool bruteForce, std::vector<Met>& scratch);
+  /// A connected part of what the ray and the elements share.
+  struct Part {
+    double first, last;         ///< t
+    std::uint32_t entry, exit;  ///< elements where it begins and ends; the lowest ones there
+  };
+
+  /// bruteForce: every element is tested. scratch: kept by the caller. radius: L, of the ball whose
+  /// centre moves along the ray; if it is not 0, all elements are solid and larger by it.
+  RayHits(const SearchableGeometry&, const Ray&, bool bruteForce, std::vector<Met>& scratch,
+          double radius = 0.0);
 
   /// t: the search ends where hits beyond it begin.
   std::optional<RayHit> first(double t);
   bool any();
   /// All hits by ascending t. out: hits are appended.
   void all(std::vector<RayHit>& out);
+  /// Calls f(part) for all parts by ascending t.
+  template <class F>
+  void forAllParts(F&& f) {
+    collect(Wanted::All, m_ray.tMax, m_ray.tMin);
+    forEachPart([&](std::size_t begin, std::size_t, std::size_t furthest) {
+      const Met &first = m_met[begin], &last = m_met[furthest];
+      f(Part{first.interval.first, last.interval.last, first.element, last.element});
+      return true;
+    });
+  }
 
  private:
   enum class Wanted { First, Any, All };
@@ -46,6 +64,23 @@ class RayHits {
   void intersect(std::uint32_t place, F&& f) const;
   int compare(const Met&, bool lastOfFirst, const Met&, bool lastOfSecond) const;
   RayHit hitOf(const Met&, double t, bool frontFace, bool crosses) const;
+  void sort();
+  /// Sorts m_met and calls f(begin, end, furthest) for its parts by ascending t, until f returns
+  /// false. Entry `furthest` of a part [begin, end) ends last.
+  template <class F>
+  void forEachPart(F&& f) {
+    sort();
+    for (std::size_t begin = 0; begin < m_met.size();) {
+      std::size_t furthest = begin, end = begin + 1;
+      for (; end < m_met.size() && compare(m_met[end], false, m_met[furthest], true) <= 0; ++end) {
+        const int order = compare(m_met[end], true, m_met[furthest], true);
+        if (order > 0 || (order == 0 && m_met[end].element < m_met[furthest].element))
+          furthest = end;
+      }
+      if (!f(begin, end, furthest)) return;
+      begin = end;
+    }
+  }
   /// Calls f(hit) for the hits by ascending t, until f returns false.
   template <class F>
   void forEachHit(F&& f);
@@ -55,7 +90,8 @@ class RayHits {
   const SearchableGeometry& m_geometry;
   const RaySegment m_ray;
   const bool m_bruteForce;
-  const bool m_isSolid;  ///< lines and points with radii
+  const double m_radius;
+  const bool m_isSolid;  ///< elements with radii
   std::vector<Met>& m_met;
 };
 

@@ -1,8 +1,19 @@
 #include "Queries/ShapeOverlap.h"
 
+#include "Math/Tolerances.h"
 #include "Queries/ElementsNearShape.h"
+#include "Queries/PointDistances.h"
+#include "Math/TriangleIntersection.h"
+#include "Queries/OverlapSearch.h"
+#include "Shapes/Shape.h"
+
+#include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
 
 namespace palpate {
 
@@ -10,9 +21,24 @@ namespace {
 
 using Eigen::Vector3d;
 
+/// Whether an element without radius has a point in a hull or a box, decided exactly on its placed
+/// corners.
+bool meetsHull(const Corners& element, const Shape& hull) {
+  SignCounts counts;
+  bool isInside = true;  // the first corner
+  for (const auto& [i, j, k] : hull.faces()) {
+    const Corners face{hull.corners()[i], hull.corners()[j], hull.corners()[k]};
+    if (intersectTriangles(face, element, counts).intersect()) return true;
+    isInside = isInside && OrientedPlane(face[0], face[1], face[2]).side(element[0], counts) < 0;
+  }
+  return isInside;
+}
+
 /// Whether an element has a point in the shape. Radii of lines and points enlarge it.
 bool meets(const TriangleMesh& mesh, const Triangle& corners, const Shape& shape) {
   const auto at = [&](std::size_t i) { return mesh.now[corners[i % 3]]; };
+  if (shape.hasCorners() && shape.faces().size() > 1 && mesh.largestRadius == 0.0)
+    return meetsHull({at(0), at(1), at(2)}, shape);
   if (corners[0] == corners[1])
     return shape.signedDistance(at(0)).distance <= mesh.radius(corners[0]);
   for (std::size_t i = 0; i < 3; ++i) {
@@ -26,21 +52,229 @@ bool meets(const TriangleMesh& mesh, const Triangle& corners, const Shape& shape
   return inside && inside->distance <= 0.0;
 }
 
+/// A convex shape in the world: all points within `radius` of the segment pq, or, if there are
+/// planes, all points x with normal . (x - p) <= offset for every plane.
+struct Convex {
+  struct Plane {
+    Vector3d normal;
+    double offset;
+  };
+  Vector3d p, q;
+  double radius = 0;
+  std::array<Plane, FloatConvex::kMaxPlanes> planes;
+  std::size_t planeCount = 0;
+  double magnitude = 0;  ///< L: about the largest distance of its points from p
+};
+
+Convex convexOf(const Box& box, const RigidTransform& pose) {
+  Convex convex;
+  convex.p = convex.q = pose(box.centre);
+  const Eigen::Matrix3d axes = orthonormal(pose.rotation);
+  for (int k = 0; k < 3; ++k)
+    for (const double sign : {1.0, -1.0})
+      convex.planes[convex.planeCount++] = {sign * axes.col(k), box.halfExtents[k]};
+  convex.magnitude = box.halfExtents.sum();
+  return convex;
+}
+
+/// None for a hull with many or narrow faces, or without a volume.
+std::optional<Convex> convexOf(const Shape& hull) {
+  constexpr double kNarrow = 1e-3;
+  const auto corners = hull.corners();
+  if (!hull.hasCorners() || hull.faces().size() < 4 ||
+      hull.faces().size() > FloatConvex::kMaxPlanes)
+    return {};
+  Convex convex;
+  convex.p = convex.q = corners[0];
+  for (const Vector3d& corner : corners)
+    convex.magnitude = std::max(convex.magnitude, (corner - convex.p).stableNorm());
+  for (const auto& [a, b, c] : hull.faces()) {
+    const Vector3d u = corners[b] - corners[a], v = corners[c] - corners[a];
+    const Vector3d normal = u.cross(v);
+    const double longest = std::max({u.squaredNorm(), v.squaredNorm(), (v - u).squaredNorm()});
+    if (!(normal.norm() > kNarrow * longest)) return {};
+    const Vector3d unit = normal.normalized();
+    double most = -std::numeric_limits<double>::infinity(), least = -most;
+    for (const Vector3d& corner : corners) {
+      most = std::max(most, unit.dot(corner - convex.p));
+      least = std::min(least, unit.dot(corner - convex.p));
+    }
+    if (!(most - least > kNarrow * convex.magnitude)) return {};
+    convex.planes[convex.planeCount++] = {unit, most};
+  }
+  return convex;
+}
+
+/// Whether a triangle has a point in a shape with planes; none if rounding leaves it open.
+std::optional<bool> meetsPlanes(const Convex& convex, const std::array<Vector3d, 3>& corners) {
+  using Polygon = std::array<Vector3d, 3 + FloatConvex::kMaxPlanes>;
+  std::array<Vector3d, 3> from;
+  double size = convex.magnitude;
+  for (std::size_t i = 0; i < 3; ++i) {
+    from[i] = corners[i] - convex.p;
+    size = std::max(size, from[i].cwiseAbs().maxCoeff());
+  }
+  const double margin = kClipError * (size + kClipOrigin * convex.p.cwiseAbs().maxCoeff());
+  // Clips by the planes moved outward by the margin. The corners of what remains are off by less.
+  const auto remains = [&](double outward) {
+    Polygon polygon, next;
+    std::copy(from.begin(), from.end(), polygon.begin());
+    std::size_t count = 3;
+    for (std::size_t i = 0; i < convex.planeCount && count > 0; ++i) {
+      const auto& [normal, offset] = convex.planes[i];
+      std::array<double, 3 + FloatConvex::kMaxPlanes> heights;
+      bool cuts = false;
+      for (std::size_t k = 0; k < count; ++k) {
+        heights[k] = normal.dot(polygon[k]) - (offset + outward);
+        cuts |= heights[k] > 0;
+      }
+      if (!cuts) continue;
+      std::size_t kept = 0;
+      for (std::size_t k = 0; k < count; ++k) {
+        const std::size_t l = k + 1 == count ? 0 : k + 1;
+        if (heights[k] <= 0) next[kept++] = polygon[k];
+        if (kept < next.size() && (heights[k] <= 0) != (heights[l] <= 0))
+          next[kept++] =
+              polygon[k] + heights[k] / (heights[k] - heights[l]) * (polygon[l] - polygon[k]);
+      }
+      std::copy(next.begin(), next.begin() + static_cast<std::ptrdiff_t>(kept), polygon.begin());
+      count = kept;
+    }
+    return count > 0;
+  };
+  if (remains(-margin)) return true;
+  if (!remains(margin)) return false;
+  return {};
+}
+
+/// The shape in the floats of a geometry's octree; none beyond float's range.
+std::optional<FloatConvex> floatsOf(const Convex& convex, const SearchableGeometry& geometry) {
+  const FloatFrame& frame = geometry.tree.frame();
+  const Positions& now = geometry.mesh.now;
+  Vector3d p = convex.p, q = convex.q;
+  double error = 0.0;  // L
+  if (now.isPlaced()) {
+    const RigidTransform& pose = now.transform();
+    p = pose.rotation.transpose() * (p - pose.translation);
+    q = pose.rotation.transpose() * (q - pose.translation);
+    error = kPlacedPointError *
+            (convex.p.cwiseAbs().sum() + convex.q.cwiseAbs().sum() +
+             2 * pose.translation.cwiseAbs().sum() + p.cwiseAbs().sum() + q.cwiseAbs().sum());
+  }
+  p = (p - frame.origin) * frame.scale;
+  q = (q - frame.origin) * frame.scale;
+  const double radius = (convex.radius + geometry.mesh.largestRadius) * frame.scale;
+  double extent = p.cwiseAbs().sum() + q.cwiseAbs().sum() + radius + convex.magnitude * frame.scale;
+  const FloatBox root = geometry.tree.octree().box(0);
+  for (std::size_t k = 0; k < 3; ++k)
+    extent = std::max({extent, double{std::abs(root.lower[k])}, double{std::abs(root.upper[k])}});
+  const double slack = kFloatOverlapError * extent + error * frame.scale;
+  if (!(extent < kLargestFloat)) return {};
+  FloatConvex floats;
+  floats.slack = static_cast<float>(slack) + OutwardRounding::kAbsolute;
+  floats.radius = static_cast<float>(radius);
+  const Vector3d along = q - p;
+  for (int k = 0; k < 3; ++k) {
+    floats.start[k] = static_cast<float>(p[k]);
+    floats.along[k] = static_cast<float>(along[k]);
+  }
+  const double square = along.squaredNorm();
+  floats.inverseSquare = square > 0x1p-100 ? static_cast<float>(1.0 / square) : 0.0f;
+  if (!(square > 0x1p-100)) floats.slack += 0x1p-50f;  // the segment counts as its first point
+  floats.planeCount = convex.planeCount;
+  for (std::size_t i = 0; i < convex.planeCount; ++i) {
+    const auto& [normal, offset] = convex.planes[i];
+    const Vector3d n =
+        now.isPlaced() ? Vector3d(now.transform().rotation.transpose() * normal) : normal;
+    for (int k = 0; k < 3; ++k) floats.planes[i].normal[k] = static_cast<float>(n[k]);
+    floats.planes[i].offset = static_cast<float>(offset * frame.scale + n.dot(p));
+  }
+  return floats;
+}
+
 }  // namespace
 
-void findOverlapping(const SearchableGeometry& geometry, const Shape& shape, bool bruteForce,
+void findWithin(const SearchableGeometry& geometry, const Vector3d& point, double distance,
+                bool bruteForce, Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out) {
+  const PointDistances distances(geometry, point, bruteForce);
+  Convex ball;
+  ball.p = ball.q = point;
+  ball.radius = distance;
+  const auto floats =
+      bruteForce || !geometry.mesh.radii.empty() ? std::nullopt : floatsOf(ball, geometry);
+  if (!floats) return distances.within(distance, out);
+  near.clear();
+  searchOverlapping(
+      {geometry.tree.octree(), geometry.tree.floats(), geometry.tree.ordered().data(), *floats},
+      out, near);
+  for (const std::uint32_t place : near)
+    if (const auto at = distances.at(place); distances.isWithin(at, distance))
+      out.push_back(at.element);
+}
+
+void findOverlapping(const SearchableGeometry& geometry, const AnalyticalGeometry& analytical,
+                     const RigidTransform& pose, bool bruteForce, std::optional<PlacedShape>& kept,
                      PointQueryStack& stack, Buffer<std::uint32_t>& near,
                      std::vector<std::uint32_t>& out) {
   const TriangleMesh& mesh = geometry.mesh;
-  const auto test = [&](std::uint32_t element) {
-    if (meets(mesh, mesh.topology.triangles[element], shape)) out.push_back(element);
+  const Shape* shape = nullptr;  // placed where needed, because a hull is costly
+  const auto build = [&] {
+    if (!shape) shape = &placeAtRest(analytical, pose, kept).now;
   };
-  if (bruteForce) {
-    for (std::uint32_t i = 0; i < mesh.topology.triangles.size(); ++i) test(i);
+  const auto test = [&](std::uint32_t element) {
+    build();
+    if (meets(mesh, mesh.topology.triangles[element], *shape)) out.push_back(element);
+  };
+  std::optional<Convex> convex;
+  if (const auto* sphere = std::get_if<Sphere>(&analytical)) {
+    convex.emplace();
+    convex->p = convex->q = pose(sphere->centre);
+    convex->radius = sphere->radius;
+  } else if (const auto* capsule = std::get_if<Capsule>(&analytical)) {
+    convex.emplace();
+    convex->p = pose(capsule->p0);
+    convex->q = pose(capsule->p1);
+    convex->radius = capsule->radius;
+  } else if (const auto* box = std::get_if<Box>(&analytical)) {
+    convex = convexOf(*box, pose);
+  } else if (std::holds_alternative<ConvexHull>(analytical)) {
+    build();
+    convex = convexOf(*shape);
+  }
+  if (convex && convex->planeCount == 0 && convex->p == convex->q)
+    return findWithin(geometry, convex->p, convex->radius, bruteForce, near, out);
+  near.clear();
+  const bool hasRadii =
+      convex && convex->planeCount > 0 ? mesh.largestRadius > 0 : !mesh.radii.empty();
+  const auto floats =
+      convex && !hasRadii && !bruteForce ? floatsOf(*convex, geometry) : std::nullopt;
+  if (!floats) {
+    build();
+    if (shape->hasCorners() && shape->faces().size() == 1 &&
+        shape->corners().front() == shape->corners().back())  // a point
+      return findWithin(geometry, shape->origin(), shape->radius(), bruteForce, near, out);
+    if (bruteForce) {
+      for (std::uint32_t i = 0; i < mesh.topology.triangles.size(); ++i) test(i);
+      return;
+    }
+    findElementsNear(geometry, *shape, *shape, mesh.largestRadius, stack, near);
+    for (const std::uint32_t element : near) test(element);
     return;
   }
-  findElementsNear(geometry, shape, shape, mesh.largestRadius, stack, near);
-  for (const std::uint32_t element : near) test(element);
+  const auto& ordered = geometry.tree.ordered();
+  searchOverlapping({geometry.tree.octree(), geometry.tree.floats(), ordered.data(), *floats}, out,
+                    near);
+  for (const std::uint32_t place : near) {
+    const std::uint32_t element = geometry.tree.octree().order()[place];
+    const auto& [a, b, c] = ordered[place];
+    const auto decided = convex->planeCount > 0
+                             ? meetsPlanes(*convex, {mesh.now[a], mesh.now[b], mesh.now[c]})
+                             : std::nullopt;
+    if (!decided)
+      test(element);
+    else if (*decided)
+      out.push_back(element);
+  }
 }
 
 }  // namespace palpate

@@ -3,15 +3,29 @@
 #include "Core/Buffer.h"
 #include "Octree/PointQueries.h"
 #include "Queries/SearchableGeometry.h"
-#include "Shapes/Shape.h"
+#include "Shapes/PlacedShape.h"
+
+#include <palpate/AnalyticalGeometry.h>
 
 #include <cstdint>
 #include <vector>
 
 namespace palpate {
 
-/// Appends the elements that meet a shape, in any order. bruteForce: every element is tested.
-void findOverlapping(const SearchableGeometry&, const Shape&, bool bruteForce, PointQueryStack&,
+/// Appends the elements whose distance from a point, less the radius, is at most `distance`, in any
+/// order. Decided exactly, with the exception in PointDistances. near: scratch.
+void findWithin(const SearchableGeometry&, const Eigen::Vector3d& point, double distance,
+                bool bruteForce, Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out);
+
+/// Appends the elements that meet a shape at a pose, in any order. Balls are decided as by
+/// findWithin(). Hulls and boxes are decided exactly if elements have no radius, others in floating
+/// point. bruteForce: every element is tested so.
+///
+/// Method   floats decide most nodes and elements for balls, capsules, boxes and hulls. Polygons
+///          clipped in double decide most others.
+/// kept: memory of the shape.
+void findOverlapping(const SearchableGeometry&, const AnalyticalGeometry&, const RigidTransform&,
+                     bool bruteForce, std::optional<PlacedShape>& kept, PointQueryStack&,
                      Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out);
 
 }  // namespace palpate

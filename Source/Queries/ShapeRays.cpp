@@ -22,8 +22,9 @@ struct Inside {
 
 std::optional<Inside> clipped(double enter, double leave, const Ray& ray) {
   if (!(enter <= leave) || leave < ray.tMin || enter > ray.tMax) return {};
-  return Inside{std::max(enter, ray.tMin), std::min(leave, ray.tMax),
-                enter<ray.tMin, leave> ray.tMax};
+  const bool beginsInside = enter < ray.tMin;
+  const bool endsInside = leave > ray.tMax || std::isinf(leave);
+  return Inside{std::max(enter, ray.tMin), std::min(leave, ray.tMax), beginsInside, endsInside};
 }
 
 std::optional<Inside> insideCapsule(const Shape& shape, const Ray& ray) {

@@ -7,6 +7,8 @@
 #include "Math/ClosestPoint.h"
 #include "Queries/Containment.h"
 #include "Queries/Embedding.h"
+#include "Queries/GeometryDistances.h"
+#include "Queries/PathIntervals.h"
 #include "Queries/PointDistances.h"
 #include "Queries/QuerySource.h"
 #include "Queries/RayHits.h"
@@ -16,7 +18,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -33,7 +37,10 @@ std::uint64_t nextSourceId() {
 
 SpatialQueries::Source::Pool::Pool() : m_id(nextSourceId()) {}
 
+SpatialQueries::Source::Pool::~Pool() { delete m_spare.load(); }
+
 std::unique_ptr<SpatialQueries::Source::Scratch> SpatialQueries::Source::Pool::take() {
+  if (Scratch* const spare = m_spare.exchange(nullptr)) return std::unique_ptr<Scratch>(spare);
   {
     const std::lock_guard lock(m_mutex);
     if (!m_free.empty()) {
@@ -46,11 +53,33 @@ std::unique_ptr<SpatialQueries::Source::Scratch> SpatialQueries::Source::Pool::t
 }
 
 void SpatialQueries::Source::Pool::giveBack(std::unique_ptr<Scratch> scratch) {
+  Scratch* none = nullptr;
+  if (m_spare.compare_exchange_strong(none, scratch.get())) {
+    scratch.release();
+    return;
+  }
   const std::lock_guard lock(m_mutex);
   try {
     m_free.push_back(std::move(scratch));
   } catch (...) {  // no memory to keep it: the next call makes another
   }
+}
+
+void SpatialQueries::Source::Scratch::sort(std::vector<std::uint32_t>& numbers) {
+  if (numbers.empty()) return;
+  const auto [least, most] = std::minmax_element(numbers.begin(), numbers.end());
+  const std::size_t first = *least / 64, words = *most / 64 - first + 1;
+  if (words > 8 * numbers.size()) {
+    std::sort(numbers.begin(), numbers.end());
+    return;
+  }
+  bits.assign(words, 0);
+  for (const std::uint32_t i : numbers) bits[i / 64 - first] |= std::uint64_t{1} << i % 64;
+  std::size_t count = 0;
+  for (std::size_t w = 0; w < words; ++w)
+    for (std::uint64_t word = bits[w]; word; word &= word - 1)
+      numbers[count++] = static_cast<std::uint32_t>((first + w) * 64) +
+                         static_cast<std::uint32_t>(std::countr_zero(word));
 }
 
 void SpatialQueries::Source::prepareInside(SearchableGeometry& body,
@@ -61,6 +90,13 @@ void SpatialQueries::Source::prepareInside(SearchableGeometry& body,
     body.windingNumbers.update(body, Workers(*this));
   else if (settings.rule == InsideRule::Closed && body.solid)
     updateTetrahedra(body, octreeSettings(), Workers(*this));
+}
+
+bool SpatialQueries::Source::prepareIfClosed(SearchableGeometry& body) {
+  const std::lock_guard lock(body.preparation);
+  if (!isClosed(body)) return false;
+  if (body.solid) updateTetrahedra(body, octreeSettings(), Workers(*this));
+  return true;
 }
 
 void SpatialQueries::Source::prepareTetrahedra(SearchableGeometry& solid) {
@@ -406,8 +442,9 @@ void SpatialQueries::elementsWithin(GeometryId id, const Eigen::Vector3d& point,
   std::vector<std::uint32_t>& found = scratch->elements;
   found.clear();
   if (!geometry.tree.ordered().empty())
-    PointDistances(geometry, point, source.engine() == Engine::BruteForce).within(radius, found);
-  std::sort(found.begin(), found.end());
+    findWithin(geometry, point, radius, source.engine() == Engine::BruteForce, scratch->nearShape,
+               found);
+  scratch->sort(found);
   elements.reserve(found.size());  // nothing below throws
   elements.assign(found.begin(), found.end());
 }
@@ -425,15 +462,6 @@ RigidTransform checkedPose(const AnalyticalGeometry& shape, const Eigen::Matrix3
   return pose;
 }
 
-/// The shape at rest at a pose, in scratch of one call.
-const PlacedShape& placed(const AnalyticalGeometry& geometry, const RigidTransform& pose,
-                          std::optional<PlacedShape>& shape) {
-  if (!shape || !(shape->analytical == geometry)) shape.emplace(geometry);
-  shape->now.place(geometry, pose);
-  shape->before = shape->now;
-  return *shape;
-}
-
 }  // namespace
 
 void SpatialQueries::overlapping(GeometryId id, const AnalyticalGeometry& shape,
@@ -449,10 +477,9 @@ void SpatialQueries::overlapping(GeometryId id, const AnalyticalGeometry& shape,
   std::vector<std::uint32_t>& found = scratch->elements;
   found.clear();
   if (!geometry.tree.ordered().empty())
-    findOverlapping(geometry, placed(shape, pose, scratch->shape).now,
-                    source.engine() == Engine::BruteForce, scratch->stack, scratch->nearShape,
-                    found);
-  std::sort(found.begin(), found.end());
+    findOverlapping(geometry, shape, pose, source.engine() == Engine::BruteForce, scratch->shape,
+                    scratch->stack, scratch->nearShape, found);
+  scratch->sort(found);
   elements.reserve(found.size());  // nothing below throws
   elements.assign(found.begin(), found.end());
 }
@@ -472,7 +499,7 @@ void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
   near.clear();
   found.clear();
   if (!geometry.tree.ordered().empty()) {
-    const PlacedShape& tool = placed(shape, pose, scratch->shape);
+    const PlacedShape& tool = placeAtRest(shape, pose, scratch->shape);
     if (source.engine() == Engine::BruteForce)
       for (std::uint32_t i = 0; i < geometry.mesh.topology.triangles.size(); ++i) near.push_back(i);
     else
@@ -482,10 +509,83 @@ void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
                       scratch->shapeContacts);
   }
   std::sort(found.begin(), found.end(), [](const ShapeContact& a, const ShapeContact& b) {
-    return std::tie(a.element, a.vertices) < std::tie(b.element, b.vertices);
+    return std::tie(a.element, a.id, a.vertices) < std::tie(b.element, b.id, b.vertices);
   });
   out.reserve(found.size());  // nothing below throws
   out.assign(found.begin(), found.end());
+}
+
+GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  const SearchableGeometry &a = source.at(idA), &b = source.at(idB);
+  if (idA == idB)
+    throw Error(ErrorCode::InvalidSettings, "distance() was called for " + nameOf(idA) + " twice",
+                idA);
+  const bool bruteForce = source.engine() == Engine::BruteForce;
+  if (!a.shape && !b.shape) return distanceBetween(a, b, bruteForce);
+  if (!a.shape) return distanceBetween(a, idB, b.shape->now, bruteForce);
+  if (!b.shape) {
+    const GeometryDistance found = distanceBetween(b, idA, a.shape->now, bruteForce);
+    return {found.b, found.a, found.distance};
+  }
+  const Shape &first = a.shape->now, &second = b.shape->now;
+  if (first.isPlane() && second.isPlane())
+    throw Error(ErrorCode::UnsupportedMethod,
+                nameOf(idA) + " and " + nameOf(idB) + " are both planes", idA);
+  const Source::Loan scratch(source);
+  return distanceBetween(idA, first, idB, second, scratch->shapeContacts.shapePair);
+}
+
+void SpatialQueries::path(std::span<const Eigen::Vector3d> polyline, double radius,
+                          std::span<const GeometryId> bodies, std::vector<PathInterval>& inside,
+                          std::vector<PathClearance>& outside) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  checkLength(radius, "radius", true);
+  if (polyline.size() < 2)
+    throw Error(ErrorCode::InvalidSettings, "the path has " + std::to_string(polyline.size()) +
+                                                " points; it must have 2 or more");
+  for (std::size_t i = 0; i < polyline.size(); ++i)
+    if (!polyline[i].allFinite())
+      throw Error(ErrorCode::NonFinitePosition,
+                  "point " + std::to_string(i) + " of the path is " + textOf(polyline[i]));
+  const Source::Loan scratch(source);
+  PathScratch& found = scratch->path;
+  const PathLine path(polyline, found.lengths);
+  if (!std::isfinite(path.length()))
+    throw Error(ErrorCode::InvalidSettings, "the path's length is not finite");
+  const bool bruteForce = source.engine() == Engine::BruteForce;
+  const InsideSettings closed;
+  found.inside.clear();
+  found.outside.clear();
+  for (const GeometryId id : bodies) {
+    SearchableGeometry& body = source.at(id);
+    const bool isBody = !body.shape && source.prepareIfClosed(body);
+    if (body.shape)
+      findPathParts(body.shape->now, path, radius, found.parts);
+    else
+      findPathParts(body, path, radius, bruteForce, scratch->met, found);
+    const std::size_t before = found.inside.size();
+    joinPathParts(
+        id, path, found.parts, radius > 0.0 || !isBody,
+        [&](const Eigen::Vector3d& point) {
+          return isBody && isInside(body, point, closed, source.engine(), scratch->stack);
+        },
+        found.inside);
+    if (found.inside.size() == before)
+      found.outside.push_back(clearanceOf(body, path, radius, bruteForce));
+  }
+  found.order.resize(found.inside.size());
+  std::iota(found.order.begin(), found.order.end(), 0u);
+  std::sort(found.order.begin(), found.order.end(), [&](std::uint32_t i, std::uint32_t j) {
+    return std::pair(found.inside[i].enter, i) < std::pair(found.inside[j].enter, j);
+  });
+  inside.reserve(found.inside.size());
+  outside.reserve(found.outside.size());  // nothing below throws
+  inside.clear();
+  for (const std::uint32_t i : found.order) inside.push_back(found.inside[i]);
+  outside.assign(found.outside.begin(), found.outside.end());
 }
 
 void SpatialQueries::findInsideVertices(GeometryId vertices, GeometryId body,

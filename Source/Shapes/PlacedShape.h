@@ -2,6 +2,8 @@
 
 #include "Shapes/Shape.h"
 
+#include <optional>
+
 namespace palpate {
 
 /// An analytical geometry at both ends of a step, in the world.
@@ -12,5 +14,15 @@ struct PlacedShape {
   AnalyticalGeometry analytical;  ///< in the body's frame
   Shape now, before;
 };
+
+/// The shape at rest at a pose, in memory that is kept from call to call.
+inline const PlacedShape& placeAtRest(const AnalyticalGeometry& geometry,
+                                      const RigidTransform& pose,
+                                      std::optional<PlacedShape>& kept) {
+  if (!kept || !(kept->analytical == geometry)) kept.emplace(geometry);
+  kept->now.place(geometry, pose);
+  kept->before = kept->now;
+  return *kept;
+}
 
 }  // namespace palpate

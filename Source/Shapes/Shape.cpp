@@ -20,15 +20,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The matrix with its columns made orthonormal to the precision of double.
-Eigen::Matrix3d orthonormal(const Eigen::Matrix3d& rotation) {
-  Eigen::Matrix3d axes;
-  const Vector3d x = rotation.col(0).normalized();
-  axes << x, (rotation.col(1) - x.dot(rotation.col(1)) * x).normalized(), Vector3d::Zero();
-  axes.col(2) = x.cross(axes.col(1));
-  return axes;
-}
-
 /// A rotation that turns z into the direction.
 Eigen::Matrix3d axesAlong(const Vector3d& direction) {
   const Vector3d z = directionOf(direction), x = z.unitOrthogonal();
@@ -49,6 +40,14 @@ std::vector<Vector3d> cornersOf(const AnalyticalGeometry& geometry) {
 }
 
 }  // namespace
+
+Eigen::Matrix3d orthonormal(const Eigen::Matrix3d& rotation) {
+  Eigen::Matrix3d axes;
+  const Vector3d x = rotation.col(0).normalized();
+  axes << x, (rotation.col(1) - x.dot(rotation.col(1)) * x).normalized(), Vector3d::Zero();
+  axes.col(2) = x.cross(axes.col(1));
+  return axes;
+}
 
 Shape::Shape(const AnalyticalGeometry& geometry, const RigidTransform& transform) {
   if (const std::vector<Vector3d> corners = cornersOf(geometry); !corners.empty()) {
@@ -170,7 +169,7 @@ PointShapeDistance Shape::atBody(const Vector3d& u, double tie) const {
 }
 
 PointShapeDistance Shape::atBody(const Vector3d& u, double tie,
-                             const std::array<double, 2>& sizes) const {
+                                 const std::array<double, 2>& sizes) const {
   const Components components = componentsOf(u, tie);
   const std::array<double, 2> beyond{components.lengths[0] - sizes[0],
                                      components.lengths[1] - sizes[1]};
@@ -183,10 +182,11 @@ PointShapeDistance Shape::atBody(const Vector3d& u, double tie,
   return {beyond[nearest], components.directions[nearest]};
 }
 
-PointShapeDistance Shape::distanceFromCylinder(const Vector3d& fromCentre, const Vector3d& axis) const {
+PointShapeDistance Shape::distanceFromCylinder(const Vector3d& fromCentre,
+                                               const Vector3d& axis) const {
   const Eigen::Matrix3d axes = axis == Vector3d::Zero() ? m_axes : axesAlong(axis);
-  const PointShapeDistance inBodyFrame = atBody(axes.transpose() * fromCentre, kOnSurface * m_magnitude,
-                                            {m_sizes[0], 0.5 * lengthOf(axis)});
+  const PointShapeDistance inBodyFrame = atBody(
+      axes.transpose() * fromCentre, kOnSurface * m_magnitude, {m_sizes[0], 0.5 * lengthOf(axis)});
   return {inBodyFrame.distance, axes * inBodyFrame.normal};
 }
 

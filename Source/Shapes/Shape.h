@@ -44,6 +44,9 @@ struct ShapePairDistance {
   ShapePairDistance exchanged() const { return {pointB, pointA, -normal, distance}; }
 };
 
+/// The matrix with its columns made orthonormal to the precision of double.
+Eigen::Matrix3d orthonormal(const Eigen::Matrix3d& rotation);
+
 struct ShapePairScratch;
 
 /// An analytical shape in the world.
@@ -107,7 +110,7 @@ class Shape {
   /// Signed distance of a point from a cylinder that has this cylinder's radius and another axis.
   /// The point is relative to the centre.
   PointShapeDistance distanceFromCylinder(const Eigen::Vector3d& fromCentre,
-                                      const Eigen::Vector3d& axis) const;
+                                          const Eigen::Vector3d& axis) const;
   /// A hull's faces, by corners. A capsule's axis counts as the triangle {p, q, q}.
   std::span<const Triangle> faces() const { return m_faces; }
   std::span<const Segment> edges() const { return m_edges; }
@@ -139,7 +142,7 @@ class Shape {
   PointShapeDistance atBody(const Eigen::Vector3d& u, double tie) const;
   /// The same for a cylinder with other sizes.
   PointShapeDistance atBody(const Eigen::Vector3d& u, double tie,
-                        const std::array<double, 2>& sizes) const;
+                            const std::array<double, 2>& sizes) const;
   Eigen::Vector3d nearestOfPlane(const Eigen::Vector3d& normal, double height) const;
   std::optional<NearestToShape> nearestToHull(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                               const Eigen::Vector3d& c) const;

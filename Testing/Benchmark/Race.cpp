@@ -16,7 +16,7 @@ using namespace palpate::benchmark;
 namespace {
 
 struct Options {
-  std::vector<std::string> scenes, engines, tables;
+  std::vector<std::string> tables;
   std::string csv, commit = "unknown";
   RowOptions rows;
 };
@@ -32,15 +32,8 @@ Engines makeEngines(const std::vector<std::string>& wanted) {
   for (const auto make : {makeEmbreeRefit, makeEmbreeMorton, makeBullet, makeFcl, makeCgal})
     all.push_back(make());
 #endif
-  if (wanted.empty()) return all;
-  Engines chosen;
-  for (auto& engine : all) {
-    const std::string name = engine->name();
-    if (std::any_of(wanted.begin(), wanted.end(),
-                    [&](const auto& part) { return name.find(part) != std::string::npos; }))
-      chosen.push_back(std::move(engine));
-  }
-  return chosen;
+  std::erase_if(all, [&](const auto& engine) { return !isWanted(engine->name(), wanted); });
+  return all;
 }
 
 std::string setText(const SetCheck& check) {
@@ -98,7 +91,7 @@ void comparisons(Report& report, const Workload& workload, const Outcome& outcom
 
 void race(Report& report, const Options& options, Workload& workload, int threads) {
   workload.task.threads = threads;
-  const Engines engines = makeEngines(options.engines);
+  const Engines engines = makeEngines(options.rows.engines);
   const Outcome outcome = measure(workload, engines, options.rows.measure);
   char heading[200];
   std::snprintf(heading, sizeof heading,
@@ -133,7 +126,8 @@ void race(Report& report, const Options& options, Workload& workload, int thread
 }
 
 void raceRows(Report& report, const Options& options) {
-  for (const std::string& scene : options.scenes) {
+  const std::vector<std::string> all = workloadNames(options.rows.sharedData);
+  for (const std::string& scene : options.rows.scenes.empty() ? all : options.rows.scenes) {
     Workload workload = makeWorkload(scene, options.rows.frames, options.rows.sharedData);
     for (const int threads : options.rows.threads) race(report, options, workload, threads);
   }
@@ -144,19 +138,21 @@ void raceRows(Report& report, const Options& options) {
 int main(int count, char** arguments) {
   Options options;
   options.rows.sharedData = PALPATE_SHARED_DATA;
-  options.tables = {"race",  "stages",     "frame",    "far",   "rest",   "tool",
-                    "scale", "steady",     "features", "lines", "shapes", "inside",
-                    "rigid", "continuous", "validity", "simd"};
+  options.tables = {"race",  "stages",     "frame",    "far",     "rest",   "tool",
+                    "scale", "steady",     "features", "lines",   "shapes", "inside",
+                    "rigid", "continuous", "validity", "queries", "simd"};
   MeasureOptions& measure = options.rows.measure;
   CLI::App app{"Times Palpate and the baselines (Embree, Bullet, FCL, CGAL) on the same frames"};
-  app.add_option("--tables", options.tables,
-                 "some of race, stages, frame, far, rest, tool, scale, "
-                 "steady, features, lines, shapes, inside, rigid, continuous, validity, simd")
+  app.add_option(
+         "--tables", options.tables,
+         "some of race, stages, frame, far, rest, tool, scale, "
+         "steady, features, lines, shapes, inside, rigid, continuous, validity, queries, simd")
       ->delimiter(',')
       ->check(CLI::IsMember(options.tables));
-  app.add_option("--scenes", options.scenes, "scenes of the table race; default: all")
+  app.add_option("--scenes", options.rows.scenes,
+                 "scenes of the table race, parts of scenes of the table queries; default: all")
       ->delimiter(',');
-  app.add_option("--engines", options.engines, "parts of engines' names; default: all")
+  app.add_option("--engines", options.rows.engines, "parts of engines' names; default: all")
       ->delimiter(',');
   app.add_option("--threads", options.rows.threads, "thread counts")->delimiter(',');
   app.add_option("--frames", options.rows.frames, "frames of each scene; 0: by its size");
@@ -171,15 +167,25 @@ int main(int count, char** arguments) {
   app.add_option("--shared-data", options.rows.sharedData,
                  "folder of the published meshes and frames");
   CLI11_PARSE(app, count, arguments);
-  if (options.scenes.empty()) options.scenes = workloadNames(options.rows.sharedData);
 
   Report report(options.csv, options.commit, simdPath());
   const std::map<std::string, void (*)(Report&, const RowOptions&)> tables = {
-      {"stages", stageRows},          {"frame", wholeFrameRows},  {"far", farTriangleRows},
-      {"rest", atRestRows},           {"tool", smallToolRows},    {"scale", scaleRows},
-      {"steady", steadyRows},         {"features", featureRows},  {"lines", lineRows},
-      {"shapes", shapeRows},          {"inside", insideRows},     {"rigid", rigidRows},
-      {"continuous", continuousRows}, {"validity", validityRows}, {"simd", simdRows}};
+      {"stages", stageRows},
+      {"frame", wholeFrameRows},
+      {"far", farTriangleRows},
+      {"rest", atRestRows},
+      {"tool", smallToolRows},
+      {"scale", scaleRows},
+      {"steady", steadyRows},
+      {"features", featureRows},
+      {"lines", lineRows},
+      {"shapes", shapeRows},
+      {"inside", insideRows},
+      {"rigid", rigidRows},
+      {"continuous", continuousRows},
+      {"validity", validityRows},
+      {"queries", spatialRows},
+      {"simd", simdRows}};
   for (const std::string& table : options.tables) {
     if (table == "race")
       raceRows(report, options);

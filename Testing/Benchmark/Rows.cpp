@@ -107,6 +107,12 @@ std::unique_ptr<BroadPhase> rebuilding() {
 
 }  // namespace
 
+bool isWanted(const std::string& name, const std::vector<std::string>& parts) {
+  return parts.empty() || std::any_of(parts.begin(), parts.end(), [&](const std::string& part) {
+           return name.find(part) != std::string::npos;
+         });
+}
+
 void stageRows(Report& report, const RowOptions& options) {
   for (const int threads : options.threads) {
     report.heading("Stages, median ms, ns per triangle and ns per pair, " +

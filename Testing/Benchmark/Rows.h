@@ -12,7 +12,13 @@ struct RowOptions {
   MeasureOptions measure;
   std::string sharedData;
   bool quick = false;  ///< a million triangles at most, a hundred steady frames
+  /// Parts of names, of which one must match; empty: all. Of the scenes of the tables race and
+  /// queries, and of their engines.
+  std::vector<std::string> scenes, engines;
 };
+
+/// Whether one of the parts is in a name, or there are none.
+bool isWanted(const std::string& name, const std::vector<std::string>& parts);
 
 // Each prints a table of Palpate alone, or beside a baseline.
 
@@ -31,6 +37,7 @@ void insideRows(Report&, const RowOptions&);   ///< vertices inside a body, part
 void rigidRows(Report&, const RowOptions&);    ///< a large bone moved by its transform
 void continuousRows(Report&, const RowOptions&);  ///< times of impact of the published steps
 void validityRows(Report&, const RowOptions&);    ///< the share of validity() in a frame
+void spatialRows(Report&, const RowOptions&);     ///< spatial queries beside other libraries
 void simdRows(Report&, const RowOptions&);        ///< every path that this processor runs
 
 /// The number of feature candidates in the step from a workload's first frame to its second.

@@ -98,6 +98,58 @@ def metrics(table, first):
     return write
 
 
+def cell(value):
+    return "-" if value is None else figure(value)
+
+
+def verdict(value, limit):
+    return "-" if value is None or limit is None else "met" if value <= limit else "NOT MET"
+
+
+def spatial(figures):
+    """One row for each query: Palpate beside the fastest library."""
+    rows = []
+    for scene in figures.distinct("spatial", "scene"):
+        times = {r["engine"]: float(r["value"]) for r in figures.of("spatial")
+                 if r["scene"] == scene and r["metric"] == "us"}
+        own = times.pop("Palpate", None)
+        if not times:
+            continue
+        fastest = min(times, key=times.get)
+        update = figures.value("spatial", scene.split(":")[0] + ": update", 1, fastest, "ms")
+        if update is None:
+            update = figures.value("spatial", scene, 1, fastest, "update ms")
+        row = [scene, cell(own), fastest, cell(times[fastest]), cell(update)]
+        ratio, allowed, target = (figures.value("spatial", scene, 1, "Palpate", metric) for metric in
+                                  ("ratio to the fastest library", "allowed ratio", "scaled target us"))
+        row += [cell(ratio), cell(allowed), verdict(ratio, allowed), cell(target), verdict(own, target)]
+        rows.append(row)
+    return markdown(["1 thread", "Palpate us", "fastest library", "its us", "its update ms", "ratio", "allowed ratio", "",
+                     "scaled target us", ""], rows)
+
+
+def by_engine(table, cell):
+    """One row for each scene, one column for each engine."""
+    def write(figures):
+        engines = figures.distinct(table, "engine")
+        rows = [[scene] + [cell(figures, scene, engine) for engine in engines]
+                for scene in figures.distinct(table, "scene")]
+        return markdown(["1 thread"] + engines, rows)
+    return write
+
+
+def spatial_time(figures, scene, engine):
+    metric = "ms" if scene.endswith("update") else "us"
+    return joined(figures, "spatial", scene, engine, metric)
+
+
+def spatial_error(figures, scene, engine):
+    wrong, widest = (figures.value("spatial errors", scene, 1, engine, m) for m in ("wrong", "largest error / diagonal"))
+    if wrong is None:
+        return "-"
+    return f"{wrong:.0f}" + (f", {widest:.0e}" if widest else "")
+
+
 def provenance(figures):
     row = figures.rows[0]
     return [f"{row['machine']}, {row['compiler']}, SIMD path {row['simd']}, commit {row['commit']}."]
@@ -119,6 +171,10 @@ TABLES = {
     "continuous": metrics("continuous", "1 / 2 threads"),
     "validity": metrics("validity", "1 thread"),
     "queries": metrics("queries", "1 thread"),
+    "spatial": spatial,
+    "spatial-times": by_engine("spatial", spatial_time),
+    "spatial-errors": by_engine("spatial errors", spatial_error),
+    "spatial-batches": metrics("spatial batches", "1 / 2 threads"),
     "simd": metrics("simd", "1 thread"),
     "lines": metrics("lines", "1 / 2 threads"),
     "points": metrics("points", "1 / 2 threads"),

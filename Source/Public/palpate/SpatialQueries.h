@@ -90,6 +90,31 @@ class PALPATE_EXPORT RigidMesh {
   std::unique_ptr<Implementation> m_implementation;
 };
 
+/// The least distance of two geometries, with their closest points. It is 0 if they have a common
+/// point. Both positions then are such a point, up to rounding; those of lines and points with
+/// radii are on their centre lines.
+struct GeometryDistance {
+  SurfacePoint a, b;  ///< both have this distance
+  double distance;    ///< L, less the radii of lines and points; never negative
+};
+
+/// A part of a path that is in a body. Its ends are arc lengths, in L.
+struct PathInterval {
+  GeometryId body;
+  double enter, leave;
+  /// Where the path enters and leaves. kNoElement for a shape, where the path starts or ends
+  /// inside, and of a tetrahedral mesh where the path meets no surface.
+  std::uint32_t entryElement, exitElement;
+};
+
+/// The least distance of a path to a body that it does not enter.
+struct PathClearance {
+  GeometryId body;
+  double distance;       ///< L, that of distance() less the path's radius; 0: it touches
+  double at;             ///< arc length, in L
+  SurfacePoint nearest;  ///< has this distance; kNoElement for a shape, or if there is no surface
+};
+
 /// Spatial queries over the geometries of one OctreeBasedCD, at their positions now. Get the object
 /// from OctreeBasedCD::queries(). Collision filters do not apply. Queries search disabled elements,
 /// too.
@@ -179,6 +204,9 @@ class PALPATE_EXPORT SpatialQueries {
   /// OctreeBasedCD::setTransform(). A frustum is a ConvexHull.
   ///
   /// Order    ascending.
+  /// Accuracy decided exactly for spheres, and for boxes and hulls if elements have no radius, on
+  ///          the shape's corners as they are rounded when it is placed. Otherwise elements are
+  ///          found up to rounding errors of the distance.
   /// Errors   InvalidShape, InvalidTransform; UnsupportedMethod if the geometry is a shape itself.
   void overlapping(GeometryId, const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
                    const Eigen::Vector3d& translation, std::vector<std::uint32_t>& elements) const;
@@ -205,6 +233,39 @@ class PALPATE_EXPORT SpatialQueries {
   ///          build the mesh's octree again. A repeated call allocates nothing.
   void contacts(GeometryId, RigidMesh& mesh, const Eigen::Matrix3d& rotation,
                 const Eigen::Vector3d& translation, double thickness, CollisionData& out) const;
+
+  /// The least distance of two geometries. Meshes count as surfaces: a mesh inside another one has
+  /// the distance of their surfaces. Lines and points with radii, and shapes, are solid. Of equally
+  /// near pairs of elements, by computed distance, the one with the lowest element of a counts,
+  /// then with that of b. If a mesh has no elements, the distance is infinite and the element is
+  /// kNoElement.
+  ///
+  /// Where radii vary along a line, the distance is the least of all pairs of features: of an edge
+  /// and a vertex, or of two edges, it is that of their closest points less the radii there. The
+  /// surfaces' distance may differ slightly.
+  ///
+  /// Accuracy whether triangles, lines and points without radii have a common point is decided
+  ///          exactly. Distances have the accuracy of edgeEdgeDistance().
+  /// Errors   InvalidSettings if both geometries are the same; UnsupportedMethod for two planes.
+  GeometryDistance distance(GeometryId a, GeometryId b) const;
+  /// Follows a ball along a polyline, as a needle or a drill moves, and finds where it is in each
+  /// body. With radius 0 it is a point.
+  ///
+  /// A ball is in a body from where it first touches the surface until it touches it no more and is
+  /// outside by contains(). A point that only touches the surface of a body with an inside is not
+  /// in it. Bodies are closed triangle meshes, tetrahedral meshes and shapes. Other meshes have no
+  /// inside: the ball is in them while it touches them.
+  ///
+  /// inside   by ascending `enter`, then in the order of `bodies`.
+  /// outside  for each body without an interval, in the order of `bodies`.
+  /// Accuracy with radius 0, which triangles the path meets is decided exactly. Other arc lengths
+  ///          are within 2^-40 of the largest coordinate, divided by the sine of the angle between
+  ///          path and surface.
+  /// Errors   NonFinitePosition; InvalidSettings for fewer than two points, for a radius that is
+  ///          negative or not finite, or if the path's length is not finite.
+  void path(std::span<const Eigen::Vector3d> polyline, double radius,
+            std::span<const GeometryId> bodies, std::vector<PathInterval>& inside,
+            std::vector<PathClearance>& outside) const;
 
   /// Finds the vertices of one geometry that are inside another, the body. It finds them at any
   /// depth, also in concave bodies, and where no triangles intersect.

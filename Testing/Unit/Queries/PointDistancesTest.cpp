@@ -1,9 +1,6 @@
-#include "Common/ExpectRefused.h"
-#include "Common/Solids.h"
-#include "Common/TestGeometry.h"
-#include "Unit/Math/RationalOracle.h"
-
-#include <palpate/OctreeBasedCD.h>
+#include "Common/Sanitized.h"
+#include "Common/ShapeTruth.h"
+#include "Unit/Queries/QueryTruth.h"
 
 #include <gtest/gtest.h>
 
@@ -12,31 +9,10 @@
 #include <limits>
 #include <vector>
 
-// Closest points, nearest elements, elements within a radius and signed distances: the octree's
-// answers are those of brute force, bit by bit, and those of rational arithmetic.
+// Closest points, nearest elements and elements within a radius: octrees answer as brute force, bit
+// by bit, and both as rational arithmetic.
 namespace palpate::testing {
 namespace {
-
-using oracle::Rational;
-
-/// The same geometry searched by octrees, and by brute force.
-struct Both {
-  explicit Both(const TestGeometry& geometry) {
-    for (OctreeBasedCD* each : {&octree, &bruteForce}) id = geometry.addTo(*each);
-  }
-  template <class F>
-  void change(F&& f) {
-    for (OctreeBasedCD* each : {&octree, &bruteForce}) f(*each);
-  }
-
-  OctreeBasedCD octree{settingsOf(Engine::Octree)}, bruteForce{settingsOf(Engine::BruteForce)};
-  GeometryId id{};
-};
-
-bool isSame(const SurfacePoint& a, const SurfacePoint& b) {
-  return a.geometry == b.geometry && a.element == b.element && a.vertices == b.vertices &&
-         a.weights == b.weights && a.position == b.position && a.distance == b.distance;
-}
 
 /// Points near the geometry, around it and far away, and its own vertices and middles of edges.
 Positions pointsAround(Random& random, const Positions& vertices, std::size_t count) {
@@ -64,33 +40,115 @@ Positions pointsAround(Random& random, const Positions& vertices, std::size_t co
   return points;
 }
 
+/// Expects that all queries about the points agree with each other and with brute force.
 void expectSameAnswers(const Both& both, std::span<const Vector3d> points) {
   const SpatialQueries fast = both.octree.queries(), truth = both.bruteForce.queries();
-  std::vector<SurfacePoint> nearest, trueNearest;
+  std::vector<SurfacePoint> nearest, trueNearest, batch(points.size()), limitedBatch(points.size());
   std::vector<std::uint32_t> within, trueWithin;
-  for (const Vector3d& p : points) {
-    const auto a = fast.closestPoint(both.id, p), b = truth.closestPoint(both.id, p);
-    ASSERT_TRUE(a && b);
-    ASSERT_TRUE(isSame(*a, *b)) << a->element << ' ' << b->element;
-    const auto limited = fast.closestPoint(both.id, p, a->distance);
-    ASSERT_EQ(limited.has_value(), a->distance >= 0);
-    ASSERT_FALSE(a->distance > 0 &&
-                 fast.closestPoint(both.id, p, std::nextafter(a->distance, 0) * (1 - 1e-14)));
+  const double limit = 0.1;
+  fast.closestPoints(both.id, points, batch);
+  fast.closestPoints(both.id, points, limitedBatch, limit);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vector3d& p = points[i];
+    const auto a = fast.closestPoint(both.id, p);
+    ASSERT_TRUE(a);
+    ASSERT_TRUE(isSame(a, truth.closestPoint(both.id, p)));
+    ASSERT_TRUE(isSame(batch[i], *a));
+    const auto limited = fast.closestPoint(both.id, p, limit);
+    ASSERT_EQ(limited.has_value(), limitedBatch[i].element != kNoElement);
+    if (limited) {
+      ASSERT_TRUE(isSame(limitedBatch[i], *limited) && isSame(*limited, *a));
+    }
+    for (const double most : {a->distance, std::nextafter(a->distance, kInfinity)})
+      if (most >= 0) {
+        ASSERT_TRUE(
+            isSame(fast.closestPoint(both.id, p, most), truth.closestPoint(both.id, p, most)));
+      }
     fast.nearestElements(both.id, p, 7, nearest);
     truth.nearestElements(both.id, p, 7, trueNearest);
-    ASSERT_EQ(nearest.size(), trueNearest.size());
-    for (std::size_t i = 0; i < nearest.size(); ++i)
-      ASSERT_TRUE(isSame(nearest[i], trueNearest[i])) << i;
+    ASSERT_TRUE(isSame(nearest, trueNearest));
     ASSERT_TRUE(isSame(nearest[0], *a));
     const double radius = std::max(0.0, nearest.back().distance);
     fast.elementsWithin(both.id, p, radius, within);
     truth.elementsWithin(both.id, p, radius, trueWithin);
     ASSERT_EQ(within, trueWithin);
+    fast.nearestElements(both.id, p, 40, nearest, radius);
+    truth.nearestElements(both.id, p, 40, trueNearest, radius);
+    ASSERT_TRUE(isSame(nearest, trueNearest));
+    ASSERT_EQ(nearest.size(), std::min<std::size_t>(40, within.size()));
   }
-  std::vector<SurfacePoint> batch(points.size());
-  fast.closestPoints(both.id, points, batch);
-  for (std::size_t i = 0; i < points.size(); ++i)
-    ASSERT_TRUE(isSame(batch[i], *fast.closestPoint(both.id, points[i])));
+}
+
+/// An element's distance from a point in 400 bits, less the radius at the closest point. Elements
+/// without radius have the exact squares beside it.
+struct TrueDistance {
+  std::uint32_t element;
+  Rational square;
+  mpf_class distance;
+};
+
+/// Of all elements, by distance and then by element.
+std::vector<TrueDistance> trueDistances(const TestGeometry& geometry, const Positions& now,
+                                        const Vector3d& p) {
+  const std::vector<Triangle> elements = elementsOf(geometry);
+  std::vector<TrueDistance> all;
+  for (std::uint32_t e = 0; e < elements.size(); ++e) {
+    const auto& [a, b, c] = elements[e];
+    const oracle::Closest closest = oracle::vertexTriangle(p, now[a], now[b], now[c]);
+    Rational radius = closest.weights[0] * geometry.radius(a);
+    radius += closest.weights[1] * geometry.radius(b) + closest.weights[2] * geometry.radius(c);
+    all.push_back({e, closest.square, oracle::root(closest.square) - mpf_class(radius, 400)});
+  }
+  const bool sameRadius = geometry.radii.size() == 1;
+  std::stable_sort(all.begin(), all.end(), [&](const TrueDistance& l, const TrueDistance& r) {
+    return sameRadius ? l.square < r.square : l.distance < r.distance;
+  });
+  return all;
+}
+
+/// Expects the order and the values of exact arithmetic.
+void expectTrueAnswers(const Both& both, const TestGeometry& geometry, const Positions& now,
+                       std::span<const Vector3d> points) {
+  const SpatialQueries queries = both.octree.queries();
+  std::vector<SurfacePoint> nearest;
+  std::vector<std::uint32_t> within;
+  for (const Vector3d& p : points) {
+    const std::vector<TrueDistance> truth = trueDistances(geometry, now, p);
+    queries.nearestElements(both.id, p, 9, nearest);
+    ASSERT_EQ(nearest.size(), std::min<std::size_t>(9, truth.size()));
+    Eigen::AlignedBox3d box(p);
+    for (const Vector3d& q : now) box.extend(q);
+    for (std::size_t i = 0; i < nearest.size(); ++i) {
+      const SurfacePoint& found = nearest[i];
+      ASSERT_EQ(found.element, truth[i].element) << i;
+      const Triangle vertices = elementsOf(geometry)[found.element];
+      ASSERT_EQ(found.vertices, vertices);
+      const double size = box.sizes().maxCoeff();
+      // 1e-15 of the diagonal, and the rounding of coordinates.
+      const double error = 1e-15 * (size + p.norm());
+      ASSERT_NEAR(mpf_class(truth[i].distance - found.distance).get_d(), 0.0, error);
+      const auto& [a, b, c] = vertices;
+      ASSERT_LE((found.weights[0] * now[a] + found.weights[1] * now[b] + found.weights[2] * now[c] -
+                 found.position)
+                    .norm(),
+                4 * error);
+      ASSERT_NEAR(found.weights.sum(), 1.0, 1e-15);
+    }
+    const double radius = std::max(0.0, nearest[nearest.size() / 2].distance);
+    queries.elementsWithin(both.id, p, radius, within);
+    std::vector<std::uint32_t> expected;
+    for (const TrueDistance& each : truth)
+      if (each.distance <= radius) expected.push_back(each.element);
+    std::sort(expected.begin(), expected.end());
+    ASSERT_EQ(within, expected);
+    // The greatest distance is included, exactly.
+    const double least = nearest[0].distance;
+    for (const double most :
+         {std::nextafter(least, -kInfinity), least, std::nextafter(least, kInfinity)})
+      if (most >= 0) {
+        ASSERT_EQ(queries.closestPoint(both.id, p, most).has_value(), truth[0].distance <= most);
+      }
+  }
 }
 
 TEST(PointDistances, OctreesAnswerAsBruteForceForEveryGeometryType) {
@@ -104,156 +162,231 @@ TEST(PointDistances, OctreesAnswerAsBruteForceForEveryGeometryType) {
                                  tapered(random, particles(random, 300, 0.02), 0.1)};
   for (const TestGeometry& geometry : meshes) {
     Both both(geometry);
-    expectSameAnswers(both, pointsAround(random, geometry.positions, 150));
+    expectSameAnswers(both, pointsAround(random, geometry.positions, casesOf(80)));
+    expectTrueAnswers(both, geometry, geometry.positions,
+                      pointsAround(random, geometry.positions, casesOf(10)));
     // Deformed: refitted trees; and over a whole step.
     const Positions now = moved(random, geometry.positions, 0.05);
     both.change([&](OctreeBasedCD& each) {
       each.addCollisionPair(both.id, both.id, {.thickness = 0.01});
       each.setPositions(both.id, geometry.positions, now);
     });
-    expectSameAnswers(both, pointsAround(random, now, 150));
+    expectSameAnswers(both, pointsAround(random, now, casesOf(80)));
+    expectTrueAnswers(both, geometry, now, pointsAround(random, now, casesOf(5)));
   }
 }
 
-TEST(PointDistances, OctreesAnswerAsBruteForceForPlacedBodies) {
+TEST(PointDistances, PlacedBodiesNearAndFar) {
   Random random(102);
-  const TestGeometry ball = testGeometry(sphere(20, 30, {0.5, 0.5, 0.5}, 0.4));
+  TestGeometry ball = testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
   for (const double far : {0.0, 1e3, 1e12}) {
     Both both(ball);
-    const Eigen::Matrix3d turn =
-        Eigen::AngleAxisd(1.1, Vector3d(1, -2, 3).normalized()).toRotationMatrix();
+    const Matrix3d turn = randomTurn(random);
     const Vector3d shift(far, -2 * far, 0.3);
     both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, shift); });
-    Positions world;
-    for (const Vector3d& p : ball.positions) world.push_back(turn * p + shift);
-    Positions points = pointsAround(random, world, 150);
+    const Positions world = placed(ball.positions, turn, shift);
+    Positions points = pointsAround(random, world, casesOf(100));
     for (Vector3d& p : points)
       if (p.cwiseAbs().maxCoeff() < 3) p += shift;
     expectSameAnswers(both, points);
+    expectTrueAnswers(both, ball, world, std::span(points).first(20));
   }
+}
+
+TEST(PointDistances, SurfacesOfTetrahedralMeshes) {
+  Random random(105);
+  Solid solid = cells(3, random, [](const auto& c) { return c[0] != 1 || c[1] == 0; });
+  Both both([&](OctreeBasedCD& each) {
+    return each.addTetrahedralMesh(solid.positions, solid.tetrahedra);
+  });
+  const auto surface = both.octree.surface(both.id).triangles;
+  const TestGeometry triangles{
+      GeometryType::Triangles, solid.positions, {surface.begin(), surface.end()}, {}};
+  Positions points;
+  for (int i = 0; i < casesOf(60); ++i) points.push_back(0.5 * onLattice(random, 9));  // many ties
+  expectSameAnswers(both, points);
+  expectTrueAnswers(both, triangles, solid.positions, points);
+  const Positions now = moved(random, solid.positions, 0.2);
+  both.change([&](OctreeBasedCD& each) { each.setPositions(both.id, now); });
+  points = pointsAround(random, now, casesOf(60));
+  expectSameAnswers(both, points);
+  expectTrueAnswers(both, triangles, now, points);
 }
 
 /// Every coordinate is a small integer, so that many elements are equally near.
 TEST(PointDistances, TiesGoToTheLowestElement) {
   Random random(103);
-  TestGeometry grid;
-  for (int i = 0; i < 60; ++i) {
-    const auto first = static_cast<std::uint32_t>(grid.positions.size());
-    for (int corner = 0; corner < 3; ++corner)
-      grid.positions.push_back(Vector3d(static_cast<double>(random() % 4),
-                                        static_cast<double>(random() % 4),
-                                        static_cast<double>(random() % 4)));
-    grid.triangles.push_back({first, first + 1, first + 2});
-  }
-  Both both(grid);
-  Positions points;
-  for (int i = 0; i < 300; ++i)
-    points.push_back(0.5 * Vector3d(static_cast<double>(random() % 9),
-                                    static_cast<double>(random() % 9),
-                                    static_cast<double>(random() % 9)));
-  expectSameAnswers(both, points);
-  // Against rational arithmetic: no element is nearer, and no lower one is as near.
-  const SpatialQueries queries = both.octree.queries();
-  std::size_t ties = 0;
-  for (const Vector3d& p : points) {
-    const auto found = queries.closestPoint(both.id, p);
-    const auto squareOf = [&](std::uint32_t element) {
-      const auto& [a, b, c] = grid.triangles[element];
-      return oracle::vertexTriangle(p, grid.positions[a], grid.positions[b], grid.positions[c])
-          .square;
-    };
-    const Rational best = squareOf(found->element);
-    for (std::uint32_t e = 0; e < grid.triangles.size(); ++e) {
-      const Rational other = squareOf(e);
-      ASSERT_TRUE(other > best || (other == best && e >= found->element));
-      ties += other == best && e != found->element;
+  for (const unsigned size : {2u, 4u}) {
+    std::vector<TestGeometry> geometries(3, latticeSoup(random, 60, size));
+    for (std::uint32_t v = 0; v < 180; v += 2) geometries[1].segments.push_back({v, v + 1});
+    geometries[1].triangles.clear(), geometries[2].triangles.clear();
+    geometries[1].type = GeometryType::Lines, geometries[2].type = GeometryType::Points;
+    geometries.push_back(geometries[1]), geometries.push_back(geometries[2]);
+    geometries[3].radii = geometries[4].radii = {0.5};
+    for (const TestGeometry& geometry : geometries) {
+      const Both both(geometry);
+      Positions points;
+      for (int i = 0; i < casesOf(30); ++i) points.push_back(0.5 * onLattice(random, 2 * size + 1));
+      expectSameAnswers(both, points);
+      expectTrueAnswers(both, geometry, geometry.positions, points);
+      std::size_t ties = 0;
+      for (const Vector3d& p : points) {
+        const auto truth = trueDistances(geometry, geometry.positions, p);
+        ties += truth[0].square == truth[1].square;
+      }
+      EXPECT_GT(ties, points.size() / 4);
     }
   }
-  EXPECT_GT(ties, 100u);
+}
+
+/// Points with different radii that touch the same ball around the point asked for.
+TEST(PointDistances, TiesOfDifferentRadii) {
+  const TestGeometry points{GeometryType::Points,
+                            {{5, 0, 0}, {0, 4, 0}, {0, 0, -3}, {3, 4, 0}, {0, 3, 4}, {2, 0, 0}},
+                            {},
+                            {},
+                            {3, 2, 1, 3, 3, 0.5}};
+  const Both both(points);
+  const Vector3d centre(0, 0, 0);
+  expectSameAnswers(both, std::span(&centre, 1));
+  std::vector<SurfacePoint> nearest;
+  both.octree.queries().nearestElements(both.id, centre, 6, nearest);
+  ASSERT_EQ(nearest.size(), 6u);
+  const std::uint32_t expected[] = {5, 0, 1, 2, 3, 4};
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(nearest[i].element, expected[i]);
 }
 
 /// The centre of a ball is equally far from all of its triangles up to rounding.
 TEST(PointDistances, NearlyEqualDistancesAreDecidedExactly) {
-  const TestGeometry ball = testGeometry(sphere(16, 24, {0, 0, 0}, 1.0));
-  Both both(ball);
-  const Vector3d centre(0, 0, 0);
-  expectSameAnswers(both, std::span(&centre, 1));
-  const auto found = both.octree.queries().closestPoint(both.id, centre);
-  const auto squareOf = [&](std::uint32_t element) {
-    const auto& [a, b, c] = ball.triangles[element];
-    return oracle::vertexTriangle(centre, ball.positions[a], ball.positions[b], ball.positions[c])
-        .square;
-  };
-  const Rational best = squareOf(found->element);
-  for (std::uint32_t e = 0; e < ball.triangles.size(); ++e)
-    ASSERT_TRUE(squareOf(e) > best || (squareOf(e) == best && e >= found->element)) << e;
-}
-
-TEST(PointDistances, SignedDistancesAreNegativeInside) {
-  Random random(104);
-  const Mesh mesh = sphere(16, 24, {0.5, 0.5, 0.5}, 0.4);
-  Both both(testGeometry(mesh));
-  const SpatialQueries queries = both.octree.queries(), truth = both.bruteForce.queries();
-  Positions points;
-  for (int i = 0; i < 400; ++i) points.push_back(randomPoint(random, 0, 1));
-  std::vector<SignedDistance> batch(points.size());
-  queries.signedDistances(both.id, points, batch);
-  std::size_t inside = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const SignedDistance found = queries.signedDistance(both.id, points[i]);
-    EXPECT_EQ(found.distance, batch[i].distance);
-    EXPECT_EQ(found.distance, truth.signedDistance(both.id, points[i]).distance);
-    EXPECT_EQ(found.distance < 0, queries.contains(both.id, points[i]));
-    EXPECT_EQ(std::abs(found.distance), found.nearest.distance);
-    const double exact = (points[i] - Vector3d(0.5, 0.5, 0.5)).norm() - 0.4;
-    EXPECT_NEAR(found.distance, exact, 0.02);  // of the ball that the mesh is inscribed in
-    const double byNumber =
-        queries.signedDistance(both.id, points[i], {.rule = InsideRule::WindingNumber}).distance;
-    EXPECT_EQ(byNumber, found.distance);
-    inside += found.distance < 0;
+  Random random(106);
+  const TestGeometry ball = testGeometry(sphere(10, 14, {0, 0, 0}, 1.0));
+  std::vector<TestGeometry> geometries(5, ball);
+  for (std::size_t i = 1; i < 5; ++i) {
+    geometries[i].type = GeometryType::Points;
+    geometries[i].triangles.clear();
+    geometries[i].radii = {i == 4 ? 1e9 : 0.75};
   }
-  EXPECT_GT(inside, 50u);
+  for (const std::size_t i : {2, 3}) {  // different radii, the same distance up to rounding
+    geometries[i].radii.clear();
+    for (Vector3d& p : geometries[i].positions) {
+      const double size = uniform(random, 1, 2);
+      p *= size;
+      geometries[i].radii.push_back(size - 0.5);
+    }
+  }
+  geometries[3].type = GeometryType::Lines;  // away from the centre, with the radius of the ball
+  for (std::uint32_t v = 0; v < ball.positions.size(); ++v) {
+    geometries[3].positions.push_back(3 * geometries[3].positions[v]);
+    geometries[3].radii.push_back(0.25);
+    geometries[3].segments.push_back({v, v + static_cast<std::uint32_t>(ball.positions.size())});
+  }
+  for (const TestGeometry& geometry : geometries) {
+    const Both both(geometry);
+    const Vector3d centre(0, 0, 0);
+    expectSameAnswers(both, std::span(&centre, 1));
+    expectTrueAnswers(both, geometry, geometry.positions, std::span(&centre, 1));
+  }
 }
 
+TEST(PointDistances, TrianglesWithoutAreaAreWhatTheyAre) {
+  Random random(107);
+  TestGeometry geometry = testGeometry(soup(random, 40, 0.2));
+  for (std::size_t i = 0; i < 120; i += 3) {
+    Positions& p = geometry.positions;
+    if (i % 4 == 0) p[i + 1] = p[i];
+    if (i % 4 == 1) p[i + 2] = p[i + 1] = p[i];
+    if (i % 4 == 2) p[i + 2] = p[i] + 0.5 * (p[i + 1] - p[i]);
+    if (i % 4 == 3) p[i + 2] = p[i] + 3 * (p[i + 1] - p[i]);
+  }
+  geometry.triangles.push_back({0, 0, 5});  // repeated vertices
+  geometry.triangles.push_back({7, 7, 7});
+  const Both both(geometry);
+  const Positions points = pointsAround(random, geometry.positions, casesOf(60));
+  expectSameAnswers(both, points);
+  expectTrueAnswers(both, geometry, geometry.positions, points);
+}
+
+/// Outside, the plane through the closest point, across the way to it, has the shape behind it.
+/// Inside, such a plane has it, too, and no plane around the shape is nearer.
 TEST(PointDistances, ShapesHaveTheirClosestPoints) {
-  OctreeBasedCD collisions;
-  const GeometryId ball = collisions.addAnalyticalGeometry(Sphere{{1, 0, 0}, 0.5});
-  const SpatialQueries queries = collisions.queries();
-  const auto outside = queries.closestPoint(ball, {3, 0, 0}),
-             inside = queries.closestPoint(ball, {1.2, 0, 0});
-  ASSERT_TRUE(outside && inside);
-  EXPECT_EQ(outside->element, kNoElement);
-  EXPECT_NEAR(outside->distance, 1.5, 1e-15);
-  EXPECT_NEAR((outside->position - Vector3d(1.5, 0, 0)).norm(), 0, 1e-15);
-  EXPECT_NEAR(inside->distance, -0.3, 1e-15);
-  EXPECT_FALSE(queries.closestPoint(ball, {3, 0, 0}, 1.4));
+  Random random(108);
+  std::vector<Vector3d> cloud;
+  for (int i = 0; i < 8; ++i) cloud.push_back(randomPoint(random, -0.5, 0.5));
+  for (const AnalyticalGeometry& geometry :
+       {AnalyticalGeometry(Sphere{{0.1, 0, 0}, 0.5}),
+        AnalyticalGeometry(Capsule{{-0.3, 0.1, 0}, {0.4, 0, 0.2}, 0.3}),
+        AnalyticalGeometry(Plane{{0, 0.1, 0}, {1, 2, 3}, false}),
+        AnalyticalGeometry(Plane{{0, 0.1, 0}, {1, 2, 3}, true}),
+        AnalyticalGeometry(Box{{0, 0.1, 0}, {0.3, 0.4, 0.5}}),
+        AnalyticalGeometry(Cylinder{{-0.3, 0.1, 0}, {0.4, 0, 0.2}, 0.3}),
+        AnalyticalGeometry(ConvexHull{cloud})}) {
+    const PlacedShape shape{geometry, randomTurn(random), randomPoint(random, -1, 1)};
+    const Both both([&](OctreeBasedCD& each) {
+      const GeometryId id = each.addAnalyticalGeometry(geometry);
+      each.setTransform(id, shape.rotation, shape.translation);
+      return id;
+    });
+    const SpatialQueries queries = both.octree.queries();
+    std::size_t inside = 0;
+    Positions points;
+    for (int i = 0; i < casesOf(200); ++i)
+      points.push_back(shape.translation + randomPoint(random, -1, 1) * (i % 2 ? 0.3 : 3.0));
+    std::vector<SurfacePoint> batch(points.size());
+    queries.closestPoints(both.id, points, batch);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto found = queries.closestPoint(both.id, points[i]);
+      ASSERT_TRUE(found && isSame(*found, batch[i]));
+      ASSERT_TRUE(isSame(found, both.bruteForce.queries().closestPoint(both.id, points[i])));
+      EXPECT_EQ(found->element, kNoElement);
+      const Vector3d way = points[i] - found->position;
+      EXPECT_NEAR(way.norm(), std::abs(found->distance), 1e-14);
+      const Vector3d normal = (found->distance < 0 ? -1 : 1) * way.normalized();
+      inside += found->distance < 0;
+      const auto* plane = std::get_if<Plane>(&geometry);
+      if (plane && plane->twoSided) {
+        EXPECT_GE(found->distance, 0.0);
+      }
+      if (!plane || !plane->twoSided) {
+        EXPECT_NEAR(normal.dot(points[i]) - reachOf(shape, normal), found->distance, 1e-13);
+      }
+      for (int j = 0; j < 20 && found->distance < 0; ++j) {
+        const Vector3d m = randomPoint(random, -1, 1).normalized();
+        EXPECT_GE(reachOf(shape, m) - m.dot(points[i]), -found->distance - 1e-13);
+      }
+      const double most = found->distance;
+      if (most >= 0) {
+        EXPECT_TRUE(isSame(queries.closestPoint(both.id, points[i], most), found));
+      }
+      if (most > 0) {
+        EXPECT_FALSE(queries.closestPoint(both.id, points[i], std::nextafter(most, 0)));
+      }
+    }
+    if (!std::holds_alternative<Plane>(geometry)) {
+      EXPECT_GT(inside, 10u);
+    }
+  }
 }
 
-TEST(PointDistances, BadInputThrowsErrorsThatNameIt) {
-  OctreeBasedCD collisions;
-  const Mesh mesh = sphere(6, 8, {0, 0, 0}, 1);
-  const GeometryId ball = collisions.addTriangleMesh(mesh.positions, mesh.triangles),
-                   shape = collisions.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1});
-  const SpatialQueries queries = collisions.queries();
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const Vector3d zero(0, 0, 0), bad(nan, 0, 0);
-  std::vector<SurfacePoint> points;
-  std::vector<std::uint32_t> elements;
-  using enum ErrorCode;
-  expectRefused(NonFinitePosition, "(nan, 0, 0)", [&] { queries.closestPoint(ball, bad); });
-  expectRefused(NonFinitePosition, "(nan, 0, 0)", [&] { queries.contains(ball, bad); });
-  expectRefused(InvalidSettings, "maxDistance is -1",
-                [&] { queries.closestPoint(ball, zero, -1); });
-  expectRefused(InvalidSettings, "k is 0", [&] { queries.nearestElements(ball, zero, 0, points); });
-  expectRefused(InvalidSettings, "radius is -1",
-                [&] { queries.elementsWithin(ball, zero, -1, elements); });
-  expectRefused(UnsupportedMethod, "is a shape",
-                [&] { queries.elementsWithin(shape, zero, 1, elements); });
-  expectRefused(UnknownGeometry, "geometry 9", [&] { queries.closestPoint(GeometryId{9}, zero); });
-  expectRefused(InvalidSettings, "1 points, but room for 2 answers", [&] {
-    points.resize(2);
-    queries.closestPoints(ball, std::span(&zero, 1), points);
-  });
+TEST(PointDistances, EmptyGeometriesHaveNone) {
+  for (const GeometryType type :
+       {GeometryType::Triangles, GeometryType::Lines, GeometryType::Points}) {
+    TestGeometry empty;
+    empty.type = type;
+    const Both both(empty);
+    std::vector<SurfacePoint> points(2);
+    std::vector<std::uint32_t> elements(2);
+    for (const OctreeBasedCD* each : {&both.octree, &both.bruteForce}) {
+      const SpatialQueries queries = each->queries();
+      EXPECT_FALSE(queries.closestPoint(both.id, {0, 0, 0}));
+      queries.nearestElements(both.id, {0, 0, 0}, 3, points);
+      queries.elementsWithin(both.id, {0, 0, 0}, 1, elements);
+      EXPECT_TRUE(points.empty() && elements.empty());
+      points.resize(2), elements.resize(2);
+      const Positions asked(2, Vector3d(0, 0, 0));
+      queries.closestPoints(both.id, asked, points);
+      EXPECT_EQ(points[1].element, kNoElement);
+    }
+  }
 }
 
 }  // namespace

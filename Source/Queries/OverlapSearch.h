@@ -1,0 +1,42 @@
+#pragma once
+
+#include "Core/Buffer.h"
+#include "Mesh/FloatPositions.h"
+#include "Octree/Octree.h"
+
+#include <palpate/Types.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace palpate {
+
+/// A convex shape in an octree's floats: all points within `radius` of a segment, or, if there are
+/// planes, all points behind every plane.
+struct FloatConvex {
+  static constexpr std::size_t kMaxPlanes = 32;
+  struct Plane {
+    float normal[3], offset;  ///< behind: normal . x <= offset
+  };
+  std::array<Plane, kMaxPlanes> planes;
+  std::size_t planeCount = 0;
+  float start[3], along[3], inverseSquare, radius;
+  /// A bound on the error of any distance from a plane or from the segment.
+  float slack;
+};
+
+struct OverlapSearch {
+  const Octree& octree;
+  const FloatPoint* floats;  ///< per vertex
+  const Triangle* ordered;   ///< elements in the octree's order
+  const FloatConvex& shape;
+};
+
+/// Appends elements that certainly have a point in the shape to `elements`, by their ids, and those
+/// that floats do not decide to `undecided`, by their places in the octree's order.
+void searchOverlapping(const OverlapSearch&, std::vector<std::uint32_t>& elements,
+                       Buffer<std::uint32_t>& undecided);
+
+}  // namespace palpate

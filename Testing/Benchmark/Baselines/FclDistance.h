@@ -1,0 +1,25 @@
+#pragma once
+
+#include <palpate/Types.h>
+
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace palpate::benchmark {
+
+/// The least distance of two deforming meshes with the same triangles, in FCL.
+class FclDistance {
+ public:
+  FclDistance(std::span<const Triangle> triangles, std::span<const Eigen::Vector3d> a,
+              std::span<const Eigen::Vector3d> b);
+  ~FclDistance();
+  void update(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::Vector3d>& b);
+  double distance() const;  ///< L, with the closest points
+
+ private:
+  struct Models;
+  std::unique_ptr<Models> m_models;
+};
+
+}  // namespace palpate::benchmark

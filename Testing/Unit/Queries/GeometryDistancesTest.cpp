@@ -1,0 +1,509 @@
+#include "Common/ExpectRefused.h"
+#include "Common/ShapeTruth.h"
+#include "Common/Solids.h"
+#include "Common/TestGeometry.h"
+#include "Unit/Math/RationalOracle.h"
+
+#include <palpate/OctreeBasedCD.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+// The least distance of two geometries: the octrees' answers are those of brute force, bit by bit,
+// and those of rational arithmetic.
+namespace palpate::testing {
+namespace {
+
+using oracle::Rational;
+
+/// Two geometries searched by octrees, and by brute force.
+struct Both {
+  template <class A, class B>
+  Both(const A& geometryA, const B& geometryB) {
+    for (OctreeBasedCD* each : {&octree, &bruteForce}) {
+      a = addTo(*each, geometryA);
+      b = addTo(*each, geometryB);
+    }
+  }
+  template <class F>
+  void change(F&& f) {
+    for (OctreeBasedCD* each : {&octree, &bruteForce}) f(*each);
+  }
+
+  OctreeBasedCD octree{settingsOf(Engine::Octree)}, bruteForce{settingsOf(Engine::BruteForce)};
+  GeometryId a{}, b{};
+
+ private:
+  static GeometryId addTo(OctreeBasedCD& collisions, const TestGeometry& geometry) {
+    return geometry.addTo(collisions);
+  }
+  static GeometryId addTo(OctreeBasedCD& collisions, const Solid& solid) {
+    return collisions.addTetrahedralMesh(solid.positions, solid.tetrahedra);
+  }
+  static GeometryId addTo(OctreeBasedCD& collisions, const AnalyticalGeometry& shape) {
+    return collisions.addAnalyticalGeometry(shape);
+  }
+};
+
+bool isSame(const SurfacePoint& a, const SurfacePoint& b) {
+  return a.geometry == b.geometry && a.element == b.element && a.vertices == b.vertices &&
+         a.weights == b.weights && a.position == b.position && a.distance == b.distance;
+}
+bool isSame(const GeometryDistance& a, const GeometryDistance& b) {
+  return isSame(a.a, b.a) && isSame(a.b, b.b) && a.distance == b.distance;
+}
+
+/// Expects the answer of brute force, and witnesses at the distance. size: L, of the coordinates.
+GeometryDistance expectSameAnswers(const Both& both, double radii, double size) {
+  const SpatialQueries queries = both.octree.queries();
+  const GeometryDistance found = queries.distance(both.a, both.b),
+                         truth = both.bruteForce.queries().distance(both.a, both.b);
+  EXPECT_TRUE(isSame(found, truth))
+      << found.distance << " of " << found.a.element << ", " << found.b.element << "; "
+      << truth.distance << " of " << truth.a.element << ", " << truth.b.element;
+  EXPECT_EQ(found.a.distance, found.distance);
+  EXPECT_EQ(found.b.distance, found.distance);
+  const double apart = (found.a.position - found.b.position).norm();
+  EXPECT_LE(found.distance, apart + 1e-14 * size);
+  EXPECT_GE(found.distance, apart - radii - 1e-14 * size);
+  for (const SurfacePoint& point : {found.a, found.b})
+    if (point.element != kNoElement) {
+      EXPECT_NEAR(point.weights.sum(), 1.0, 1e-15);
+      EXPECT_GE(point.weights.minCoeff(), 0.0);
+    }
+  const GeometryDistance exchanged = queries.distance(both.b, both.a);
+  EXPECT_EQ(exchanged.distance, found.distance);
+  return found;
+}
+
+double largestRadius(const TestGeometry& geometry) {
+  return *std::max_element(geometry.radii.begin(), geometry.radii.end());
+}
+
+std::vector<TestGeometry> geometriesOfEveryType(Random& random) {
+  return {testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4)),
+          testGeometry(soup(random, 150, 0.1)),
+          testGeometry(sheet(8, 0.5, 0.0)),
+          thread(random, 120, 0.1, 0.0, false),
+          thread(random, 120, 0.1, 0.01, true),
+          tapered(random, thread(random, 120, 0.1, 0.01, false), 0.05),
+          particles(random, 150, 0.0),
+          particles(random, 150, 0.02),
+          tapered(random, particles(random, 150, 0.02), 0.1)};
+}
+
+TEST(GeometryDistances, OctreesAnswerAsBruteForceForEveryPairOfTypes) {
+  Random random(201);
+  const std::vector<TestGeometry> geometries = geometriesOfEveryType(random);
+  std::size_t apart = 0, touching = 0;
+  for (const TestGeometry& a : geometries)
+    for (const TestGeometry& b : geometries) {
+      Both both(a, b);
+      const double radii = largestRadius(a) + largestRadius(b);
+      for (const double most : {3.0, 1.2, 0.5, 0.1, 0.0}) {
+        const Vector3d shift = randomPoint(random, -most, most);
+        Positions now = moved(random, b.positions, 0.01);
+        for (Vector3d& p : now) p += shift;
+        both.change([&](OctreeBasedCD& each) { each.setPositions(both.b, now); });
+        const GeometryDistance found = expectSameAnswers(both, radii, 5.0);
+        (found.distance > 0 ? apart : touching) += 1;
+        if (::testing::Test::HasFailure()) return;
+      }
+    }
+  EXPECT_GT(apart, 150u);
+  EXPECT_GT(touching, 100u);
+}
+
+/// No coordinate is exact after a body was placed, or far from the origin.
+TEST(GeometryDistances, OctreesAnswerAsBruteForceForPlacedBodiesAndFarFromTheOrigin) {
+  Random random(202);
+  const TestGeometry a = testGeometry(sphere(10, 14, {0.5, 0.5, 0.5}, 0.4)),
+                     b = tapered(random, thread(random, 150, 0.1, 0.01, false), 0.05);
+  for (const double far : {0.0, 1.0, 1e3, 1e9, 1e14})
+    for (int placed = 0; placed < 4; ++placed) {
+      Both both(a, b);
+      const Vector3d away = far * Vector3d(1, -2, 0.3);
+      for (const double most : {2.0, 0.5, 0.0}) {
+        const auto put = [&](GeometryId id, const TestGeometry& geometry, bool isPlaced) {
+          const Matrix3d turn = randomTurn(random);
+          const Vector3d shift = away + randomPoint(random, -most, most);
+          Positions now = geometry.positions;
+          for (Vector3d& p : now) p = turn * p + shift;
+          both.change([&](OctreeBasedCD& each) {
+            if (isPlaced)
+              each.setTransform(id, turn, shift);
+            else
+              each.setPositions(id, now);
+          });
+        };
+        put(both.a, a, placed & 1);
+        put(both.b, b, placed & 2);
+        expectSameAnswers(both, 0.05, 5.0 + 10 * far);
+        ASSERT_FALSE(::testing::Test::HasFailure()) << far << ' ' << placed;
+      }
+    }
+}
+
+TEST(GeometryDistances, SurfacesOfTetrahedralMeshesAreMeshes) {
+  Random random(203);
+  const Solid a = cells(3, random), b = cells(2, random);
+  Both both(a, b);
+  for (const double at : {-5.0, -2.5, -2.0, -1.5, 0.5}) {
+    Positions now = b.positions;
+    for (Vector3d& p : now) p += Vector3d(at, 0.25, 0.25);
+    both.change([&](OctreeBasedCD& each) { each.setPositions(both.b, now); });
+    // b is [at, at + 2] wide, a is [0, 3]. Inside a, b's surface is apart from a's.
+    const double expected = at < -2 ? -2 - at : at < 0 ? 0.0 : 0.25;
+    EXPECT_EQ(expectSameAnswers(both, 0.0, 5.0).distance, expected) << at;
+  }
+}
+
+/// Positions beyond the floats' range are clamped there.
+TEST(GeometryDistances, VerticesBeyondFloatsDoNotHideOthers) {
+  Random random(204);
+  for (const double far : {1e20, 1e36, 1e45, 1e200}) {
+    TestGeometry a = testGeometry(soup(random, 60, 0.1)), b = testGeometry(soup(random, 60, 0.1));
+    for (const std::uint32_t corner : a.triangles[7]) a.positions[corner] *= far;
+    Positions now = b.positions;
+    for (Vector3d& p : now) p += a.positions[a.triangles[7][0]] + Vector3d(0, 3, 0);
+    Both both(a, b);
+    expectSameAnswers(both, 0.0, far);
+    both.change([&](OctreeBasedCD& each) { each.setPositions(both.b, now); });
+    const GeometryDistance found = expectSameAnswers(both, 0.0, far);
+    EXPECT_EQ(found.a.element, 7u);
+  }
+}
+
+/// The nearest triangle of b is not the one that is nearest to b's middle.
+TEST(GeometryDistances, ClampedBoxesDoNotHideTheNearestPair) {
+  Random random(211);
+  for (const double far : {1e10, 1e36, 1e45}) {
+    TestGeometry a = testGeometry(soup(random, 60, 0.1)), b;
+    const auto first = static_cast<std::uint32_t>(a.positions.size());
+    a.positions.insert(a.positions.end(), {{0, 0, 0}, {far, 0, 0}, {far, 10, 0}});
+    a.triangles.push_back({first, first + 1, first + 2});
+    for (std::uint32_t i = 0; i < 40; ++i) {
+      const double y = i == 17 ? 10.0 : 0.0, z = i == 17 ? 0.5 : 1.0 + 0.01 * i;
+      b.positions.insert(b.positions.end(), {{far, y, z}, {far, y + 0.1, z}, {far, y, z + 0.1}});
+      b.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    const GeometryDistance found = expectSameAnswers(Both(a, b), 0.0, far);
+    EXPECT_EQ(found.distance, 0.5);
+    EXPECT_EQ(found.a.element, 60u);
+    EXPECT_EQ(found.b.element, 17u);
+  }
+}
+
+/// Distances of the elements of two small meshes in rational arithmetic.
+struct RationalDistance {
+  Rational square = -1;  ///< of the least distance; 0 if the elements meet
+
+  RationalDistance(const TestGeometry& a, const Positions& nowA, const TestGeometry& b,
+                   const Positions& nowB) {
+    for (const Triangle& s : a.triangles)
+      for (const Triangle& t : b.triangles)
+        add({oracle::toRational(nowA[s[0]]), oracle::toRational(nowA[s[1]]),
+             oracle::toRational(nowA[s[2]])},
+            {oracle::toRational(nowB[t[0]]), oracle::toRational(nowB[t[1]]),
+             oracle::toRational(nowB[t[2]])});
+  }
+
+ private:
+  using Corners = std::array<oracle::Vector, 3>;
+  void take(const Rational& other) {
+    if (square < 0 || other < square) square = other;
+  }
+  void add(const Corners& a, const Corners& b) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      take(oracle::vertexTriangle(a[i], b[0], b[1], b[2]).square);
+      take(oracle::vertexTriangle(b[i], a[0], a[1], a[2]).square);
+      for (std::size_t j = 0; j < 3; ++j)
+        take(oracle::edgeEdge(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]).square);
+      if (crosses(a[i], a[(i + 1) % 3], b) || crosses(b[i], b[(i + 1) % 3], a)) take(0);
+    }
+  }
+  /// Whether a segment passes through a triangle's interior.
+  static bool crosses(const oracle::Vector& p, const oracle::Vector& q, const Corners& t) {
+    using oracle::operator-;
+    const oracle::Vector normal = oracle::cross(t[1] - t[0], t[2] - t[0]), along = q - p;
+    if (sgn(oracle::dot(normal, p - t[0])) * sgn(oracle::dot(normal, q - t[0])) >= 0) return false;
+    const auto side = [&](std::size_t i) {
+      return sgn(oracle::dot(along, oracle::cross(t[i] - p, t[(i + 1) % 3] - p)));
+    };
+    return side(0) != 0 && side(0) == side(1) && side(1) == side(2);
+  }
+};
+
+void expectRational(const Both& both, const RationalDistance& truth, double size) {
+  const GeometryDistance found = expectSameAnswers(both, 0.0, size);
+  EXPECT_EQ(found.distance == 0.0, truth.square == 0) << found.distance;
+  EXPECT_NEAR(found.distance, oracle::root(truth.square).get_d(), 4e-15 * size);
+}
+
+/// Few small integers, so that triangles often touch, overlap in a plane or have no area.
+TEST(GeometryDistances, AgreeWithRationalArithmeticOnGrids) {
+  Random random(205);
+  std::size_t meet = 0, apart = 0;
+  for (int round = 0; round < 400; ++round) {
+    const double size = round % 2 ? 3 : 6;
+    const auto onGrid = [&](const Vector3d& shift) {
+      TestGeometry mesh;
+      for (std::uint32_t t = 0; t < 3; ++t) {
+        for (int corner = 0; corner < 3; ++corner) {
+          const Vector3d p = randomPoint(random, 0, size) + shift;
+          mesh.positions.emplace_back(std::floor(p[0]), std::floor(p[1]), std::floor(p[2]));
+        }
+        mesh.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+      }
+      return mesh;
+    };
+    const TestGeometry a = onGrid(Vector3d::Zero()),
+                       b = onGrid(Vector3d(static_cast<double>(round % 5), 0, 0));
+    const RationalDistance truth(a, a.positions, b, b.positions);
+    const Both both(a, b);
+    expectRational(both, truth, 10.0);
+    (truth.square == 0 ? meet : apart) += 1;
+    ASSERT_FALSE(::testing::Test::HasFailure()) << round;
+  }
+  EXPECT_GT(meet, 80u);
+  EXPECT_GT(apart, 80u);
+}
+
+/// A corner of b lies on a face or edge of a up to rounding. Only exact arithmetic knows whether it
+/// touches, and the point where nearly parallel triangles cross is uncertain.
+TEST(GeometryDistances, AgreeWithRationalArithmeticWhereTrianglesNearlyTouch) {
+  Random random(206);
+  std::size_t meet = 0, apart = 0;
+  for (int round = 0; round < 600; ++round) {
+    const TestGeometry a = testGeometry(soup(random, 1, 1.0));
+    TestGeometry b = testGeometry(soup(random, 1, 1.0));
+    const double v = uniform(random, 0, 1), w = round % 3 ? uniform(random, 0, 1 - v) : 1 - v;
+    const Vector3d target = a.positions[0] + v * (a.positions[1] - a.positions[0]) +
+                            w * (a.positions[2] - a.positions[0]);
+    const Vector3d normal =
+        (a.positions[1] - a.positions[0]).cross(a.positions[2] - a.positions[0]).normalized();
+    if (round % 4 == 0) {  // nearly parallel, and across a's plane
+      const double tilt = std::pow(10.0, uniform(random, -17, -1));
+      for (Vector3d& p : b.positions) {
+        p -= normal.dot(p - a.positions[0]) * normal;
+        p += tilt * uniform(random, -1, 1) * normal;
+      }
+    } else {
+      const Vector3d shift = target - b.positions[0];
+      for (Vector3d& p : b.positions) p += shift;
+      if (round % 4 == 1)
+        for (int i : {1, 2})  // all of b on one side
+          b.positions[i] += (std::abs(normal.dot(b.positions[i] - target)) -
+                             normal.dot(b.positions[i] - target)) *
+                            normal;
+    }
+    const RationalDistance truth(a, a.positions, b, b.positions);
+    const Both both(a, b);
+    expectRational(both, truth, 4.0);
+    (truth.square == 0 ? meet : apart) += 1;
+    ASSERT_FALSE(::testing::Test::HasFailure()) << round;
+  }
+  EXPECT_GT(meet, 100u);
+  EXPECT_GT(apart, 100u);
+}
+
+/// A long edge in the plane of a small triangle meets it far from the edge's middle.
+TEST(GeometryDistances, WitnessesLieOnBothWherePlanesCoincide) {
+  TestGeometry a, b;
+  a.positions = {{0, 0, 0}, {100, 0, 0}, {100, 50, 0}};
+  b.positions = {{1, -1, 0}, {2, -1, 0}, {1.5, 1, 0}};
+  a.triangles = b.triangles = {{0, 1, 2}};
+  const GeometryDistance found = expectSameAnswers(Both(a, b), 0.0, 100.0);
+  EXPECT_EQ(found.distance, 0.0);
+  EXPECT_LE(found.a.position[0], 2.0);
+}
+
+TEST(GeometryDistances, TiesGoToTheLowestElements) {
+  Random random(207);
+  // Two parallel plates of unit cells: every cell is equally near to its opposite.
+  const auto plate = [](double z) {
+    TestGeometry mesh = testGeometry(sheet(6, 0.0, 0.0));
+    for (Vector3d& p : mesh.positions) p = {6 * p[0], 6 * p[1], z};
+    return mesh;
+  };
+  const TestGeometry below = plate(0.0);
+  TestGeometry above = plate(0.25);
+  std::shuffle(above.triangles.begin(), above.triangles.end(), random);
+  const Both both(below, above);
+  const GeometryDistance found = expectSameAnswers(both, 0.0, 6.0);
+  EXPECT_EQ(found.distance, 0.25);
+  EXPECT_EQ(found.a.element, 0u);
+  for (std::uint32_t e = 0; e < found.b.element; ++e) {
+    // No lower element of b touches the prism over element 0 of a, (0, 0), (1, 0), (1, 1).
+    TestGeometry one = above, zero = below;
+    one.triangles = {above.triangles[e]};
+    zero.triangles = {below.triangles[0]};
+    EXPECT_GT(Both(zero, one).octree.queries().distance(GeometryId{0}, GeometryId{1}).distance,
+              0.25);
+  }
+}
+
+TEST(GeometryDistances, ExchangedGeometriesGiveExchangedAnswers) {
+  Random random(208);
+  for (int round = 0; round < 40; ++round) {
+    const TestGeometry a = testGeometry(soup(random, 40, 0.1)),
+                       b = round % 2 ? testGeometry(soup(random, 40, 0.1))
+                                     : thread(random, 40, 0.1, 0.001, false);
+    Both both(a, b);
+    Positions now = b.positions;
+    for (Vector3d& p : now) p[0] += 1.5;
+    both.change([&](OctreeBasedCD& each) { each.setPositions(both.b, now); });
+    const SpatialQueries queries = both.octree.queries();
+    const GeometryDistance one = queries.distance(both.a, both.b),
+                           two = queries.distance(both.b, both.a);
+    EXPECT_GT(one.distance, 0.0);
+    EXPECT_TRUE(isSame(one, {two.b, two.a, two.distance}));
+  }
+}
+
+/// A box, ball and so on near the origin, each about 0.3 large.
+std::vector<AnalyticalGeometry> allShapes(Random& random) {
+  std::vector<Vector3d> points;
+  for (int i = 0; i < 12; ++i) points.push_back(randomPoint(random, -0.2, 0.2));
+  return {Sphere{{0.1, 0, 0}, 0.2},
+          Sphere{{0, 0, 0}, 0.0},
+          Capsule{{-0.2, 0, 0}, {0.1, 0.1, 0}, 0.05},
+          Plane{{0, 0, -0.3}, {0.1, 0.2, 1}},
+          Plane{{0, 0, -0.3}, {0.1, 0.2, 1}, true},
+          Box{{0, 0, 0}, {0.1, 0.2, 0.05}},
+          Box{{0, 0, 0}, {0.1, 0.2, 0.0}},
+          Cylinder{{-0.1, 0, 0}, {0.1, 0.1, 0}, 0.1},
+          ConvexHull{points}};
+}
+
+TEST(GeometryDistances, OctreesAnswerAsBruteForceForEveryShape) {
+  Random random(209);
+  std::size_t apart = 0, touching = 0;
+  for (const TestGeometry& geometry : geometriesOfEveryType(random))
+    for (const AnalyticalGeometry& shape : allShapes(random)) {
+      Both both(geometry, shape);
+      for (const double most : {3.0, 1.2, 0.5}) {
+        const Matrix3d turn = randomTurn(random);
+        const Vector3d shift = Vector3d(0.5, 0.5, 0.5) + randomPoint(random, -most, most);
+        both.change([&](OctreeBasedCD& each) { each.setTransform(both.b, turn, shift); });
+        const GeometryDistance found = expectSameAnswers(both, largestRadius(geometry), 5.0);
+        ASSERT_FALSE(::testing::Test::HasFailure())
+            << shape.index() << ' ' << static_cast<int>(geometry.type) << ' ' << most;
+        (found.distance > 0 ? apart : touching) += 1;
+        // The points are as near to the other geometry as claimed, and no sample is nearer.
+        const SpatialQueries queries = both.octree.queries();
+        const auto distanceAt = [&](const Vector3d& p) {
+          return queries.closestPoint(both.b, p)->distance;
+        };
+        const auto radiusAt = [&](const std::array<std::uint32_t, 3>& vertices, const Vector3d& w) {
+          double radius = 0;
+          for (int i = 0; i < 3; ++i) radius += w[i] * geometry.radius(vertices[i]);
+          return radius;
+        };
+        const double at =
+            distanceAt(found.a.position) - radiusAt(found.a.vertices, found.a.weights);
+        EXPECT_NEAR(std::max(0.0, at), found.distance, 1e-13);
+        EXPECT_LE(distanceAt(found.b.position), 1e-13);
+        EXPECT_EQ(found.b.element, kNoElement);
+        const auto sample = [&](const std::array<std::uint32_t, 3>& vertices) {
+          const double s = uniform(random, 0, 1), t = uniform(random, 0, 1 - s);
+          const Vector3d w(1 - s - t, s, t);
+          Vector3d p = Vector3d::Zero();
+          for (int i = 0; i < 3; ++i) p += w[i] * geometry.positions[vertices[i]];
+          // Radii vary along lines: see distance().
+          if (geometry.radii.size() > 1 && geometry.type == GeometryType::Lines) return;
+          EXPECT_GE(std::max(0.0, distanceAt(p) - radiusAt(vertices, w)), found.distance - 1e-13);
+        };
+        for (int i = 0; i < 3; ++i) {
+          for (const Triangle& t : geometry.triangles) sample(t);
+          for (const auto& [p, q] : geometry.segments) sample({p, q, q});
+          if (geometry.type == GeometryType::Points)
+            for (std::uint32_t p = 0; p < geometry.positions.size(); ++p) sample({p, p, p});
+        }
+        ASSERT_FALSE(::testing::Test::HasFailure())
+            << shape.index() << ' ' << static_cast<int>(geometry.type) << ' ' << most;
+      }
+    }
+  EXPECT_GT(apart, 100u);
+  EXPECT_GT(touching, 50u);
+}
+
+TEST(GeometryDistances, TwoShapes) {
+  Random random(210);
+  const std::vector<AnalyticalGeometry> shapes = allShapes(random);
+  for (const AnalyticalGeometry& a : shapes)
+    for (const AnalyticalGeometry& b : shapes) {
+      if (std::holds_alternative<Plane>(a) && std::holds_alternative<Plane>(b)) continue;
+      Both both(a, b);
+      for (const double most : {2.0, 0.2}) {
+        const PlacedShape placedA{a, randomTurn(random), randomPoint(random, -most, most)},
+            placedB{b, randomTurn(random), randomPoint(random, -most, most)};
+        both.change([&](OctreeBasedCD& each) {
+          each.setTransform(both.a, placedA.rotation, placedA.translation);
+          each.setTransform(both.b, placedB.rotation, placedB.translation);
+        });
+        const GeometryDistance found = expectSameAnswers(both, 0.0, 5.0);
+        const SpatialQueries queries = both.octree.queries();
+        EXPECT_LE(queries.closestPoint(both.a, found.a.position)->distance, 1e-13);
+        EXPECT_LE(queries.closestPoint(both.b, found.b.position)->distance, 1e-13);
+        if (found.distance == 0.0) continue;
+        // The shapes are apart along the points' direction by the distance.
+        const Vector3d along = (found.a.position - found.b.position).normalized();
+        EXPECT_NEAR(apartAlong(placedA, placedB, along), found.distance, 1e-12);
+      }
+    }
+}
+
+TEST(GeometryDistances, KnownPairs) {
+  OctreeBasedCD collisions;
+  const GeometryId points = collisions.addPointSet(Positions{{0, 0, 0}, {4, 0, 0}}, 0.5),
+                   line = collisions.addLineMesh(Positions{{1, 2, 0}, {1, 5, 0}},
+                                                 std::vector<Segment>{{0, 1}}, 0.25),
+                   crossing = collisions.addLineMesh(Positions{{0, 3, 0}, {2, 3, 0}},
+                                                     std::vector<Segment>{{0, 1}}, 0.0),
+                   ball = collisions.addAnalyticalGeometry(Sphere{{4, 3, 0}, 1.0}),
+                   big = collisions.addAnalyticalGeometry(Sphere{{0, 0, 0}, 50.0}),
+                   none = collisions.addPointSet(Positions{});
+  const SpatialQueries queries = collisions.queries();
+  EXPECT_DOUBLE_EQ(queries.distance(points, line).distance, std::sqrt(5.0) - 0.75);
+  EXPECT_EQ(queries.distance(line, crossing).distance, 0.0);
+  const GeometryDistance toBall = queries.distance(ball, points);
+  EXPECT_EQ(toBall.distance, 1.5);
+  EXPECT_EQ(toBall.b.element, 1u);
+  EXPECT_EQ(toBall.a.position, Vector3d(4, 2, 0));
+  // Shapes are solid.
+  EXPECT_EQ(queries.distance(big, ball).distance, 0.0);
+  const GeometryDistance inside = queries.distance(points, big);
+  EXPECT_EQ(inside.distance, 0.0);
+  EXPECT_EQ(inside.a.element, 0u);
+  EXPECT_EQ(inside.b.position, Vector3d(0, 0, 0));
+  for (const GeometryId other : {points, line, ball}) {
+    const GeometryDistance empty = queries.distance(other, none);
+    EXPECT_EQ(empty.distance, kInfinity);
+    EXPECT_EQ(empty.a.geometry, other);
+    EXPECT_EQ(empty.a.element, kNoElement);
+    EXPECT_EQ(empty.b.geometry, none);
+    EXPECT_EQ(queries.distance(none, other).distance, kInfinity);
+  }
+}
+
+TEST(GeometryDistances, BadCallsThrowErrorsThatNameThem) {
+  OctreeBasedCD collisions;
+  const GeometryId plane = collisions.addAnalyticalGeometry(Plane{}),
+                   other = collisions.addAnalyticalGeometry(Plane{{0, 0, 0}, {1, 0, 0}, true}),
+                   points = collisions.addPointSet(Positions{{0, 0, 0}});
+  const SpatialQueries queries = collisions.queries();
+  using enum ErrorCode;
+  expectRefused(InvalidSettings, "geometry 2 twice", [&] { queries.distance(points, points); });
+  expectRefused(UnsupportedMethod, "both planes", [&] { queries.distance(plane, other); });
+  expectRefused(UnknownGeometry, "geometry 9", [&] { queries.distance(points, GeometryId{9}); });
+  collisions.setPositions(points, Positions{{1, 0, 0}});
+  expectRefused(InvalidCall, "outdated", [&] { queries.distance(points, plane); });
+}
+
+}  // namespace
+}  // namespace palpate::testing

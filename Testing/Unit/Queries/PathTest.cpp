@@ -1,0 +1,596 @@
+#include "Common/ExpectRefused.h"
+#include "Common/ShapeTruth.h"
+#include "Common/Solids.h"
+#include "Common/TestGeometry.h"
+
+#include <palpate/Distance.h>
+#include <palpate/OctreeBasedCD.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+// Paths: the octrees' answers are those of brute force, bit by bit, and those of points sampled
+// along the path. Known cases have exact answers.
+namespace palpate::testing {
+namespace {
+
+struct Answer {
+  std::vector<PathInterval> inside;
+  std::vector<PathClearance> outside;
+};
+
+Answer follow(const SpatialQueries& queries, const Positions& path, double radius,
+              const std::vector<GeometryId>& bodies) {
+  Answer answer;
+  queries.path(path, radius, bodies, answer.inside, answer.outside);
+  return answer;
+}
+
+bool isSame(const PathInterval& a, const PathInterval& b) {
+  return a.body == b.body && a.enter == b.enter && a.leave == b.leave &&
+         a.entryElement == b.entryElement && a.exitElement == b.exitElement;
+}
+bool isSame(const PathClearance& a, const PathClearance& b) {
+  return a.body == b.body && a.distance == b.distance && a.at == b.at &&
+         a.nearest.geometry == b.nearest.geometry && a.nearest.element == b.nearest.element &&
+         a.nearest.vertices == b.nearest.vertices && a.nearest.weights == b.nearest.weights &&
+         a.nearest.position == b.nearest.position && a.nearest.distance == b.nearest.distance;
+}
+
+/// A path by its arc length.
+class Line {
+ public:
+  explicit Line(const Positions& points) : m_points(points) {
+    for (std::size_t i = 0; i + 1 < points.size(); ++i)
+      m_starts.push_back(m_starts.back() + (points[i + 1] - points[i]).norm());
+  }
+  double length() const { return m_starts.back(); }
+  Vector3d operator()(double s) const {
+    std::size_t i = 0;
+    while (i + 2 < m_points.size() && m_starts[i + 1] <= s) ++i;
+    const double length = m_starts[i + 1] - m_starts[i];
+    return m_points[i] +
+           (length > 0 ? (s - m_starts[i]) / length : 0.0) * (m_points[i + 1] - m_points[i]);
+  }
+
+ private:
+  const Positions& m_points;
+  std::vector<double> m_starts{0.0};
+};
+
+/// Geometries of one scene searched by octrees, and by brute force.
+struct Scene {
+  template <class F>
+  GeometryId addBy(F&& f) {
+    bodies.push_back(f(octree));
+    f(bruteForce);
+    return bodies.back();
+  }
+  GeometryId add(const TestGeometry& geometry) {
+    meshes.resize(bodies.size());
+    meshes.push_back(geometry);
+    return addBy([&](OctreeBasedCD& each) { return geometry.addTo(each); });
+  }
+  GeometryId add(const Mesh& mesh) { return add(testGeometry(mesh)); }
+  template <class F>
+  void change(F&& f) {
+    for (OctreeBasedCD* each : {&octree, &bruteForce}) f(*each);
+  }
+
+  OctreeBasedCD octree{settingsOf(Engine::Octree)}, bruteForce{settingsOf(Engine::BruteForce)};
+  std::vector<GeometryId> bodies;
+  std::vector<TestGeometry> meshes;  ///< of the first bodies, where added as such
+};
+
+/// Expects the answers of brute force, and those of points along the path. isBody: whether
+/// contains() answers. size: L, of all coordinates.
+Answer expectSamples(const Scene& scene, GeometryId body, bool isBody, const Positions& path,
+                     double radius, double size = 5.0) {
+  const SpatialQueries queries = scene.octree.queries(), truth = scene.bruteForce.queries();
+  const Answer found = follow(queries, path, radius, {body}),
+               expected = follow(truth, path, radius, {body});
+  EXPECT_TRUE(std::equal(found.inside.begin(), found.inside.end(), expected.inside.begin(),
+                         expected.inside.end(),
+                         [](const auto& a, const auto& b) { return isSame(a, b); }));
+  EXPECT_TRUE(std::equal(found.outside.begin(), found.outside.end(), expected.outside.begin(),
+                         expected.outside.end(),
+                         [](const auto& a, const auto& b) { return isSame(a, b); }));
+  EXPECT_NE(found.inside.empty(), found.outside.empty());
+
+  const Line line(path);
+  const double slack = 1e-6 * size;  // of grazing ends
+  for (std::size_t i = 0; i < found.inside.size(); ++i) {
+    const PathInterval& interval = found.inside[i];
+    EXPECT_LE(0.0, interval.enter);
+    EXPECT_LE(interval.enter, interval.leave);
+    EXPECT_LE(interval.leave, line.length() * (1 + 1e-15));
+    if (i > 0) {
+      EXPECT_LT(found.inside[i - 1].leave, interval.enter);
+    }
+  }
+  constexpr int kSamples = 400;
+  double least = kInfinity;
+  for (int i = 0; i <= kSamples; ++i) {
+    const double s = line.length() * i / kSamples;
+    const Vector3d p = line(s);
+    const double distance = queries.closestPoint(body, p)->distance;
+    least = std::min(least, distance - radius);
+    const bool isIn = (isBody && queries.contains(body, p)) ||
+                      (distance < 0 || (radius > 0 && distance <= radius));
+    bool isClaimed = false, isNearEnd = false;
+    for (const PathInterval& interval : found.inside) {
+      isClaimed |= interval.enter <= s && s <= interval.leave;
+      isNearEnd |= std::abs(s - interval.enter) < slack || std::abs(s - interval.leave) < slack;
+    }
+    // Samples that only just touch may fall between the ends' accuracy.
+    if (!isNearEnd && std::abs(distance - radius) > 1e-12 * size) {
+      EXPECT_EQ(isClaimed, isIn) << "at " << s << ", distance " << distance;
+    }
+  }
+  for (const PathClearance& clearance : found.outside) {
+    EXPECT_EQ(clearance.nearest.distance, clearance.distance);
+    EXPECT_EQ(clearance.body, body);
+    // Where radii vary along a line, other features than the closest may be nearer: see distance().
+    const bool varies = !scene.meshes.empty() && scene.meshes[0].type == GeometryType::Lines &&
+                        scene.meshes[0].radii.size() > 1;
+    const double there = queries.closestPoint(body, line(clearance.at))->distance;
+    if (!varies) {
+      EXPECT_GE(least, clearance.distance - 1e-13 * size);
+      EXPECT_NEAR(std::max(0.0, there - radius), clearance.distance, 1e-13 * size);
+    }
+    // The path as a line mesh.
+    OctreeBasedCD other;
+    if (body != scene.bodies.front() || scene.meshes.size() != 1) continue;
+    std::vector<Segment> segments;
+    for (std::uint32_t i = 0; i + 1 < path.size(); ++i) segments.push_back({i, i + 1});
+    const GeometryId mesh = scene.meshes[0].addTo(other),
+                     needle = other.addLineMesh(path, segments, 0.0);
+    EXPECT_NEAR(other.queries().distance(mesh, needle).distance - radius, clearance.distance,
+                1e-14 * size);
+  }
+  return found;
+}
+
+/// Expects that the ball touches the entry and exit elements at the ends.
+void expectEndsOnElements(const TestGeometry& geometry, const Positions& now, const Answer& found,
+                          const Positions& path, double radius, double size = 5.0) {
+  const Line line(path);
+  const auto expectTouch = [&](std::uint32_t element, double s) {
+    std::array<std::uint32_t, 3> vertices{element, element, element};
+    if (geometry.type == GeometryType::Triangles) vertices = geometry.triangles[element];
+    if (geometry.type == GeometryType::Lines)
+      vertices = {geometry.segments[element][0], geometry.segments[element][1],
+                  geometry.segments[element][1]};
+    const auto at =
+        vertexTriangleDistance(line(s), now[vertices[0]], now[vertices[1]], now[vertices[2]]);
+    double own = 0;
+    for (int i = 0; i < 3; ++i) own += at.barycentric[i] * geometry.radius(vertices[i]);
+    EXPECT_NEAR(at.distance - own, radius, 1e-11 * size) << element;
+  };
+  for (const PathInterval& interval : found.inside) {
+    if (interval.enter > 0) {
+      ASSERT_NE(interval.entryElement, kNoElement);
+      expectTouch(interval.entryElement, interval.enter);
+    }
+    if (interval.leave < line.length() * (1 - 1e-15)) {
+      ASSERT_NE(interval.exitElement, kNoElement);
+      expectTouch(interval.exitElement, interval.leave);
+    }
+  }
+}
+
+/// Triangles of a cube, wound outwards.
+Mesh cube(double low, double high) {
+  Mesh mesh;
+  for (int v = 0; v < 8; ++v)
+    mesh.positions.emplace_back(v & 1 ? high : low, v & 2 ? high : low, v & 4 ? high : low);
+  mesh.triangles = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
+                    {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
+  return mesh;
+}
+Mesh joined(Mesh a, const Mesh& b, bool turned) {
+  const auto first = static_cast<std::uint32_t>(a.positions.size());
+  a.positions.insert(a.positions.end(), b.positions.begin(), b.positions.end());
+  for (auto [p, q, r] : b.triangles) {
+    if (turned) std::swap(q, r);
+    a.triangles.push_back({first + p, first + q, first + r});
+  }
+  return a;
+}
+
+Positions randomPath(Random& random, double most, int points) {
+  Positions path;
+  for (int i = 0; i < points; ++i)
+    path.push_back(Vector3d(0.5, 0.5, 0.5) + randomPoint(random, -most, most));
+  if (points > 3) path[2] = path[1];
+  return path;
+}
+
+TEST(Path, AgreesWithSamplesForEveryGeometryType) {
+  Random random(301);
+  const Mesh ball = sphere(10, 14, {0.5, 0.5, 0.5}, 0.4);
+  struct Case {
+    TestGeometry geometry;
+    bool isBody;
+  };
+  const Case cases[] = {
+      {testGeometry(ball), true},
+      {testGeometry(joined(ball, sphere(7, 9, {0.5, 0.5, 0.5}, 0.2), true)), true},
+      {testGeometry(joined(ball, sphere(7, 9, {0.9, 0.5, 0.5}, 0.3), false)), true},
+      {testGeometry(joined(ball, sphere(7, 9, {0.5, 0.5, 0.5}, 0.3), false)), true},
+      {testGeometry(soup(random, 40, 0.2)), false},
+      {testGeometry(sheet(6, 0.5, 0.0)), false},
+      {thread(random, 30, 0.2, 0.0, false), false},
+      {thread(random, 30, 0.2, 0.05, true), false},
+      {tapered(random, thread(random, 30, 0.2, 0.01, false), 0.1), false},
+      {particles(random, 60, 0.0), false},
+      {particles(random, 60, 0.05), false},
+      {tapered(random, particles(random, 60, 0.02), 0.1), false}};
+  std::size_t intervals = 0, clearances = 0, index = 0;
+  for (const auto& [geometry, isBody] : cases) {
+    for (int round = 0; round < 40; ++round) {
+      Scene scene;
+      const GeometryId body = scene.add(geometry);
+      const double radius = round % 4 == 0 ? 0.0 : uniform(random, 0, 0.15);
+      const Positions path = randomPath(random, round % 3 ? 0.7 : 2.0, 2 + round % 4);
+      const Answer found = expectSamples(scene, body, isBody, path, radius);
+      expectEndsOnElements(geometry, geometry.positions, found, path, radius);
+      ASSERT_FALSE(::testing::Test::HasFailure()) << "case " << index << ", round " << round;
+      intervals += found.inside.size();
+      clearances += found.outside.size();
+    }
+    ++index;
+  }
+  EXPECT_GT(intervals, 200u);
+  EXPECT_GT(clearances, 100u);
+}
+
+TEST(Path, AgreesWithSamplesForTetrahedralMeshes) {
+  Random random(302);
+  const Solid solid = cells(3, random, [](const auto& at) { return at[0] + at[1] + at[2] != 3; });
+  Scene scene;
+  const GeometryId body = scene.addBy([&](OctreeBasedCD& each) {
+    return each.addTetrahedralMesh(solid.positions, solid.tetrahedra);
+  });
+  for (int round = 0; round < 60; ++round) {
+    Positions path;
+    for (int i = 0; i < 2 + round % 3; ++i) path.push_back(randomPoint(random, -1, 4));
+    expectSamples(scene, body, true, path, round % 2 ? 0.0 : uniform(random, 0, 0.4));
+    ASSERT_FALSE(::testing::Test::HasFailure()) << round;
+  }
+}
+
+TEST(Path, AgreesWithSamplesForPlacedBodiesAndFarFromTheOrigin) {
+  Random random(303);
+  const TestGeometry ball = testGeometry(sphere(10, 14, {0.5, 0.5, 0.5}, 0.4));
+  for (const double far : {0.0, 1e3, 1e7})
+    for (int round = 0; round < 30; ++round) {
+      Scene scene;
+      const GeometryId body = scene.add(ball);
+      const Matrix3d turn = randomTurn(random);
+      const Vector3d shift = far * Vector3d(1, -2, 0.3) + randomPoint(random, -1, 1);
+      Positions now = ball.positions, path = randomPath(random, 0.7, 2 + round % 4);
+      for (Vector3d& p : now) p = turn * p + shift;
+      for (Vector3d& p : path) p = turn * p + shift;
+      scene.meshes[0].positions = now;
+      const bool isPlaced = round % 2;
+      scene.change([&](OctreeBasedCD& each) {
+        if (isPlaced)
+          each.setTransform(body, turn, shift);
+        else
+          each.setPositions(body, now);
+      });
+      const double radius = round % 3 ? uniform(random, 0, 0.1) : 0.0, size = 5.0 + 10 * far;
+      const Answer found = expectSamples(scene, body, true, path, radius, size);
+      expectEndsOnElements(ball, now, found, path, radius, size);
+      ASSERT_FALSE(::testing::Test::HasFailure()) << far << ' ' << round;
+    }
+}
+
+TEST(Path, AgreesWithSamplesForEveryShape) {
+  Random random(304);
+  std::vector<Vector3d> points;
+  for (int i = 0; i < 12; ++i) points.push_back(randomPoint(random, -0.3, 0.3));
+  const AnalyticalGeometry shapes[] = {Sphere{{0.1, 0, 0}, 0.3},
+                                       Capsule{{-0.3, 0, 0}, {0.1, 0.1, 0}, 0.1},
+                                       Plane{{0, 0, 0}, {0.1, 0.2, 1}},
+                                       Plane{{0, 0, 0}, {0.1, 0.2, 1}, true},
+                                       Box{{0, 0, 0}, {0.2, 0.3, 0.1}},
+                                       Cylinder{{-0.2, 0, 0}, {0.2, 0.2, 0}, 0.2},
+                                       ConvexHull{points}};
+  std::size_t intervals = 0, clearances = 0;
+  for (const AnalyticalGeometry& shape : shapes)
+    for (int round = 0; round < 40; ++round) {
+      Scene scene;
+      const GeometryId body =
+          scene.addBy([&](OctreeBasedCD& each) { return each.addAnalyticalGeometry(shape); });
+      const Matrix3d turn = randomTurn(random);
+      const Vector3d shift = randomPoint(random, 0, 1);
+      scene.change([&](OctreeBasedCD& each) { each.setTransform(body, turn, shift); });
+      const double radius = round % 4 == 0 ? 0.0 : uniform(random, 0, 0.2);
+      const Positions path = randomPath(random, round % 3 ? 0.7 : 2.0, 2 + round % 4);
+      const Answer found = expectSamples(scene, body, false, path, radius);
+      for (const PathInterval& interval : found.inside) {
+        EXPECT_EQ(interval.entryElement, kNoElement);
+        EXPECT_EQ(interval.exitElement, kNoElement);
+      }
+      intervals += found.inside.size();
+      clearances += found.outside.size();
+      ASSERT_FALSE(::testing::Test::HasFailure()) << shape.index() << ", round " << round;
+    }
+  EXPECT_GT(intervals, 100u);
+  EXPECT_GT(clearances, 50u);
+}
+
+/// A case with an exact answer.
+struct Known {
+  Positions path;
+  double radius;
+  std::vector<std::pair<double, double>> intervals;
+};
+
+void expectKnown(const SpatialQueries& queries, GeometryId body, const Known& known,
+                 double error = 0.0) {
+  const Answer found = follow(queries, known.path, known.radius, {body});
+  ASSERT_EQ(found.inside.size(), known.intervals.size());
+  ASSERT_EQ(found.outside.size(), known.intervals.empty() ? 1u : 0u);
+  for (std::size_t i = 0; i < found.inside.size(); ++i) {
+    EXPECT_NEAR(found.inside[i].enter, known.intervals[i].first, error);
+    EXPECT_NEAR(found.inside[i].leave, known.intervals[i].second, error);
+  }
+}
+
+/// A mesh and the surface of a tetrahedral mesh, [0, 2]³ each. All coordinates are exact.
+TEST(Path, KnownPathsThroughACube) {
+  Random random(305);
+  const Known cases[] = {
+      {{{-1, 1, 1}, {3, 1, 1}}, 0.0, {{1, 3}}},
+      {{{-1, 0.5, 1}, {3, 0.5, 1}}, 0.0, {{1, 3}}},
+      {{{1, 1, 1}, {3, 1, 1}}, 0.0, {{0, 1}}},
+      {{{-1, 1, 1}, {1, 1, 1}}, 0.0, {{1, 2}}},
+      {{{1, 1, 1}, {1.5, 1, 1}}, 0.0, {{0, 0.5}}},
+      // Starting and ending on the surface.
+      {{{0, 1, 1}, {1, 1, 1}}, 0.0, {{0, 1}}},
+      {{{0, 1, 1}, {2, 1, 1}}, 0.0, {{0, 2}}},
+      {{{-1, 1, 1}, {0, 1, 1}}, 0.0, {}},
+      {{{-1, 1, 1}, {0, 1, 1}, {-1, 1, 1}}, 0.0, {}},
+      {{{-1, 1, 1}, {0, 1, 1}, {1, 1, 1}}, 0.0, {{1, 2}}},
+      {{{1, 1, 1}, {2, 1, 1}, {1, 1, 1}}, 0.0, {{0, 2}}},
+      // An edge touched from outside; along a face, along an edge.
+      {{{-3, 3, 1}, {3, -3, 1}}, 0.0, {}},
+      {{{-1, 1, 0}, {3, 1, 0}}, 0.0, {}},
+      {{{-1, 0, 0}, {3, 0, 0}}, 0.0, {}},
+      {{{-1, 1, 0}, {1, 1, 0}, {1, 1, 1}}, 0.0, {{2, 3}}},
+      {{{1, 1, 1}, {1, 1, 0}, {1.5, 1, 0}, {1.5, 1, 1}}, 0.0, {{0, 2.5}}},
+      {{{1, 1, 1}, {1, 1, 0}, {1.5, 1, 0}, {1.5, 1, -1}}, 0.0, {{0, 1}}},
+      // Repeated points.
+      {{{-1, 1, 1}, {-1, 1, 1}, {1, 1, 1}, {1, 1, 1}, {3, 1, 1}, {3, 1, 1}}, 0.0, {{1, 3}}},
+      {{{1, 1, 1}, {1, 1, 1}}, 0.0, {{0, 0}}},
+      {{{3, 1, 1}, {3, 1, 1}}, 0.0, {}},
+      {{{0, 1, 1}, {0, 1, 1}}, 0.0, {}},
+      // A ball.
+      {{{-1, 1, 1}, {3, 1, 1}}, 0.5, {{0.5, 3.5}}},
+      {{{1, 1, 1}, {3, 1, 1}}, 0.5, {{0, 1.5}}},
+      {{{1, 1, 1}, {1.25, 1, 1}}, 0.5, {{0, 0.25}}},
+      {{{1, 1, 1}, {1.25, 1, 1}}, 5.0, {{0, 0.25}}},
+      {{{-2, 1, 1}, {-1, 1, 1}, {-2, 1, 1}}, 0.5, {}},
+      {{{-2, 1, 1}, {-0.25, 1, 1}, {-2, 1, 1}}, 0.5, {{1.5, 2.0}}},
+      {{{2.25, 1, 1}, {2.25, 1, 1}}, 0.5, {{0, 0}}},
+      {{{1, 1, 1}, {1, 1, 1}}, 0.5, {{0, 0}}},
+      {{{3, 1, 1}, {3, 1, 1}}, 0.5, {}}};
+  const Mesh mesh = cube(0, 2);
+  const Solid solid = cells(2, random);
+  for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
+    OctreeBasedCD collisions(settingsOf(engine));
+    const GeometryId surface = collisions.addTriangleMesh(mesh.positions, mesh.triangles),
+                     body = collisions.addTetrahedralMesh(solid.positions, solid.tetrahedra);
+    const SpatialQueries queries = collisions.queries();
+    for (std::size_t i = 0; i < std::size(cases); ++i) {
+      SCOPED_TRACE(i);
+      expectKnown(queries, surface, cases[i]);
+      expectKnown(queries, body, cases[i]);
+    }
+    const double diagonal = std::sqrt(3.0);
+    for (const GeometryId id : {surface, body})
+      expectKnown(queries, id, {{{-1, -1, -1}, {3, 3, 3}}, 0.0, {{diagonal, 3 * diagonal}}}, 1e-15);
+  }
+}
+
+TEST(Path, EntryAndExitElementsAreThoseThatThePathMeets) {
+  OctreeBasedCD collisions;
+  const Mesh mesh = cube(0, 2);
+  const GeometryId body = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+  const SpatialQueries queries = collisions.queries();
+  const auto elements = [&](const Positions& path, double radius) {
+    const Answer found = follow(queries, path, radius, {body});
+    EXPECT_EQ(found.inside.size(), 1u);
+    return std::pair(found.inside[0].entryElement, found.inside[0].exitElement);
+  };
+  const auto none = kNoElement;
+  EXPECT_EQ(elements({{-1, 0.5, 1}, {3, 0.5, 1.25}}, 0.0), std::pair(0u, 3u));
+  EXPECT_EQ(elements({{-1, 1, 1}, {3, 1, 1}}, 0.0), std::pair(0u, 2u));  // lowest of two
+  EXPECT_EQ(elements({{1, 0.5, 1}, {3, 0.5, 1.25}}, 0.0), std::pair(none, 3u));
+  EXPECT_EQ(elements({{-1, 0.5, 1}, {1, 0.5, 1}}, 0.0), std::pair(0u, none));
+  EXPECT_EQ(elements({{1, 1, 1}, {1.5, 1, 1}}, 0.0), std::pair(none, none));
+  EXPECT_EQ(elements({{0, 0.5, 1}, {1, 0.5, 1}}, 0.0), std::pair(0u, none));
+  EXPECT_EQ(elements({{-1, 0.5, 1}, {3, 0.5, 1.25}}, 0.125), std::pair(0u, 3u));
+  EXPECT_EQ(elements({{1, 1, 1}, {1.5, 1, 1}}, 0.25), std::pair(none, none));
+  EXPECT_EQ(elements({{-0.125, 0.5, 1}, {1, 0.5, 1}}, 0.25), std::pair(none, none));
+}
+
+TEST(Path, KnownPathsThroughNestedAndOverlappingBodies) {
+  OctreeBasedCD collisions;
+  const auto add = [&](const Mesh& mesh) {
+    return collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+  };
+  const GeometryId hollow = add(joined(cube(0, 4), cube(1, 3), true)),
+                   twice = add(joined(cube(0, 4), cube(1, 3), false)),
+                   overlapping = add(joined(cube(0, 2), cube(1, 3), false)),
+                   glued = add(joined(
+                       cube(0, 2),
+                       [] {
+                         Mesh other = cube(0, 2);
+                         for (Vector3d& p : other.positions) p[0] += 2;
+                         return other;
+                       }(),
+                       false));
+  const SpatialQueries queries = collisions.queries();
+  expectKnown(queries, hollow, {{{-1, 2, 2}, {5, 2, 2}}, 0.0, {{1, 2}, {4, 5}}});
+  expectKnown(queries, hollow, {{{-1, 2, 2}, {5, 2, 2}}, 0.25, {{0.75, 2.25}, {3.75, 5.25}}});
+  expectKnown(queries, hollow, {{{2, 2, 2}, {2.5, 2, 2}}, 0.0, {}});
+  expectKnown(queries, hollow, {{{2, 2, 2}, {2.5, 2, 2}}, 0.25, {}});
+  expectKnown(queries, twice, {{{-1, 2, 2}, {5, 2, 2}}, 0.0, {{1, 5}}});
+  expectKnown(queries, twice, {{{-1, 2, 2}, {5, 2, 2}}, 0.25, {{0.75, 5.25}}});
+  expectKnown(queries, overlapping, {{{-1, 1.5, 1.5}, {4, 1.5, 1.5}}, 0.0, {{1, 4}}});
+  expectKnown(queries, overlapping, {{{-1, 1.5, 1.5}, {4, 1.5, 1.5}}, 0.25, {{0.75, 4.25}}});
+  // Two faces lie on each other at x = 2.
+  expectKnown(queries, glued, {{{-1, 1, 1}, {5, 1, 1}}, 0.0, {{1, 5}}});
+  expectKnown(queries, glued, {{{1, 1, 1}, {2, 1, 1}, {2, 1, 1.5}, {3, 1, 1.5}}, 0.0, {{0, 2.5}}});
+}
+
+TEST(Path, MeshesWithoutInsideHoldThePathWhereItTouchesThem) {
+  OctreeBasedCD collisions;
+  const Positions triangle{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}};
+  const GeometryId open = collisions.addTriangleMesh(triangle, std::vector<Triangle>{{0, 1, 2}}),
+                   line = collisions.addLineMesh(Positions{{0, 0, 0}, {4, 0, 0}},
+                                                 std::vector<Segment>{{0, 1}}, 0.5),
+                   points = collisions.addPointSet(Positions{{1, 0, 0}, {3, 0, 0}}, 0.0);
+  const SpatialQueries queries = collisions.queries();
+  expectKnown(queries, open, {{{1, 1, 3}, {1, 1, -3}}, 0.0, {{3, 3}}});
+  expectKnown(queries, open, {{{1, 1, 3}, {1, 1, -3}}, 0.5, {{2.5, 3.5}}});
+  expectKnown(queries, open, {{{1, 1, 3}, {1, 1, 0}, {1, 1, 3}}, 0.0, {{3, 3}}});
+  expectKnown(queries, open, {{{-1, 1, 0}, {5, 1, 0}}, 0.0, {{1, 4}}});
+  expectKnown(queries, open, {{{1, 1, 3}, {1, 1, 1}}, 0.0, {}});
+  expectKnown(queries, line, {{{1, 3, 0}, {1, -3, 0}}, 0.0, {{2.5, 3.5}}});
+  expectKnown(queries, line, {{{1, 3, 0}, {1, -3, 0}}, 0.5, {{2, 4}}});
+  expectKnown(queries, line, {{{-2, 0, 0}, {6, 0, 0}}, 0.0, {{1.5, 6.5}}});
+  expectKnown(queries, points, {{{-2, 0, 0}, {6, 0, 0}}, 0.0, {{3, 3}, {5, 5}}});
+  expectKnown(queries, points, {{{-2, 0, 0}, {6, 0, 0}}, 0.5, {{2.5, 3.5}, {4.5, 5.5}}});
+  expectKnown(queries, points, {{{-2, 0, 0}, {6, 0, 0}}, 1.0, {{2, 6}}});
+}
+
+/// A needle that is planned to a point on the surface, as closestPoint() or firstHit() give it,
+/// turns there. Its direction is rounded, so that a ray along it may end before the surface.
+TEST(Path, PathsThatTurnOnTheSurfaceEnterThere) {
+  Random random(306);
+  const Mesh ball = sphere(10, 14, {0.5, 0.5, 0.5}, 0.4);
+  TestGeometry open = testGeometry(ball);
+  open.triangles.erase(open.triangles.begin());
+  Scene scene;
+  const GeometryId closed = scene.add(ball), holed = scene.add(open);
+  const SpatialQueries queries = scene.octree.queries();
+  for (int round = 0; round < 500; ++round) {
+    const double far = std::pow(10.0, uniform(random, 0, 6));
+    const Vector3d inner(0.5, 0.5, 0.5);
+    const Vector3d side = inner + randomPoint(random, -1, 1).normalized();
+    const auto nearest = queries.closestPoint(holed, side);
+    if (nearest->weights.minCoeff() < 1e-3) continue;  // it may be beside the hole
+    const Vector3d on = nearest->position;
+    const Positions path{on + far * (side - inner), on, inner};
+    const double length = (path[0] - on).norm();
+    for (const auto& [body, leave] :
+         {std::pair(closed, length + (on - inner).norm()), std::pair(holed, length)}) {
+      const Answer found = follow(queries, path, 0.0, {body});
+      ASSERT_EQ(found.inside.size(), 1u) << round;
+      EXPECT_NEAR(found.inside[0].enter, length, 1e-12 * far) << round;
+      EXPECT_NEAR(found.inside[0].leave, leave, 1e-12 * far) << round;
+      EXPECT_NE(found.inside[0].entryElement, kNoElement) << round;
+    }
+  }
+}
+
+TEST(Path, OrdersIntervalsByEntryAndClearancesByBody) {
+  OctreeBasedCD collisions;
+  const auto add = [&](double low, double high) {
+    const Mesh mesh = cube(low, high);
+    return collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+  };
+  const GeometryId far = add(10, 11), right = add(1, 3), left = add(0, 2), same = add(0, 2),
+                   ball = collisions.addAnalyticalGeometry(Sphere{{-1, 4, 1}, 1}),
+                   none = collisions.addPointSet(Positions{});
+  const SpatialQueries queries = collisions.queries();
+  const Answer found =
+      follow(queries, {{-1, 1.5, 1.5}, {4, 1.5, 1.5}}, 0.0, {far, right, left, same, ball, none});
+  ASSERT_EQ(found.inside.size(), 3u);
+  EXPECT_EQ(found.inside[0].body, left);
+  EXPECT_EQ(found.inside[1].body, same);
+  EXPECT_EQ(found.inside[2].body, right);
+  ASSERT_EQ(found.outside.size(), 3u);
+  EXPECT_EQ(found.outside[0].body, far);
+  EXPECT_DOUBLE_EQ(found.outside[0].distance, std::sqrt(36 + 2 * 8.5 * 8.5));
+  EXPECT_EQ(found.outside[0].at, 5.0);
+  EXPECT_EQ(found.outside[1].body, ball);
+  EXPECT_DOUBLE_EQ(found.outside[1].distance, std::sqrt(2.5 * 2.5 + 0.25) - 1);
+  EXPECT_EQ(found.outside[1].at, 0.0);
+  EXPECT_EQ(found.outside[1].nearest.element, kNoElement);
+  EXPECT_EQ(found.outside[2].body, none);
+  EXPECT_EQ(found.outside[2].distance, kInfinity);
+  EXPECT_EQ(found.outside[2].nearest.element, kNoElement);
+  const Answer again = follow(queries, {{-1, 1.5, 1.5}, {4, 1.5, 1.5}}, 0.0, {same, left});
+  EXPECT_EQ(again.inside[0].body, same);
+}
+
+TEST(Path, LongPathsAgreeWithBruteForce) {
+  Random random(307);
+  Scene scene;
+  for (const TestGeometry& geometry :
+       {testGeometry(sphere(14, 20, {0.5, 0.5, 0.5}, 0.4)), testGeometry(sheet(10, 0.5, 0.0)),
+        tapered(random, thread(random, 80, 0.1, 0.01, false), 0.03)})
+    scene.add(geometry);
+  for (const double radius : {0.0, 0.001, 0.05}) {
+    Positions path{{0.5, 0.5, 0.5}};
+    for (int i = 0; i < 300; ++i) path.push_back(randomPoint(random, 0, 1));
+    const Answer found = follow(scene.octree.queries(), path, radius, scene.bodies),
+                 truth = follow(scene.bruteForce.queries(), path, radius, scene.bodies);
+    EXPECT_GT(found.inside.size(), 5u);
+    ASSERT_EQ(found.inside.size(), truth.inside.size());
+    for (std::size_t i = 0; i < found.inside.size(); ++i)
+      EXPECT_TRUE(isSame(found.inside[i], truth.inside[i])) << i;
+    ASSERT_EQ(found.outside.size(), truth.outside.size());
+  }
+}
+
+TEST(Path, BadCallsThrowErrorsThatNameThemAndChangeNothing) {
+  OctreeBasedCD collisions;
+  const Mesh mesh = cube(0, 2);
+  const GeometryId body = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+  const SpatialQueries queries = collisions.queries();
+  const Positions path{{-1, 1, 1}, {3, 1, 1}}, point{{0, 0, 0}};
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  Answer answer = follow(queries, path, 0.0, {body});
+  const Answer missed = follow(queries, {{-1, 1, 1}, {-2, 1, 1}}, 0.0, {body});
+  answer.outside = missed.outside;
+  const Answer before = answer;
+  const auto refused = [&](ErrorCode code, const char* words, const Positions& along, double radius,
+                           std::vector<GeometryId> bodies) {
+    expectRefused(code, words,
+                  [&] { queries.path(along, radius, bodies, answer.inside, answer.outside); });
+    ASSERT_EQ(answer.inside.size(), 1u);
+    ASSERT_EQ(answer.outside.size(), 1u);
+    EXPECT_TRUE(isSame(answer.inside[0], before.inside[0]));
+    EXPECT_TRUE(isSame(answer.outside[0], before.outside[0]));
+  };
+  using enum ErrorCode;
+  refused(InvalidSettings, "radius is -1", path, -1.0, {body});
+  refused(InvalidSettings, "radius is nan", path, nan, {body});
+  refused(InvalidSettings, "radius is inf", path, kInfinity, {body});
+  refused(InvalidSettings, "the path has 1 points", point, 0.0, {body});
+  refused(InvalidSettings, "the path has 0 points", {}, 0.0, {body});
+  refused(NonFinitePosition, "point 1 of the path is (nan, 0, 0)", {{0, 0, 0}, {nan, 0, 0}}, 0.0,
+          {body});
+  refused(InvalidSettings, "length is not finite", {{-1e308, 0, 0}, {1e308, 0, 0}}, 0.0, {body});
+  refused(UnknownGeometry, "geometry 7", path, 0.0, {body, GeometryId{7}});
+  queries.path(path, 0.0, {}, answer.inside, answer.outside);
+  EXPECT_TRUE(answer.inside.empty());
+  EXPECT_TRUE(answer.outside.empty());
+  collisions.setPositions(body, mesh.positions);
+  expectRefused(InvalidCall, "outdated",
+                [&] { queries.path(path, 0.0, {}, answer.inside, answer.outside); });
+}
+
+}  // namespace
+}  // namespace palpate::testing

@@ -1,0 +1,138 @@
+#include "Common/Sanitized.h"
+#include "Common/ShapeTruth.h"
+#include "Unit/Queries/QueryTruth.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+// What a ray selects among several geometries of all types: the first of all their hits.
+namespace palpate::testing {
+namespace {
+
+struct Scene {
+  explicit Scene(Engine engine) : collisions(settingsOf(engine)) {
+    Random random(601);
+    geometries = {testGeometry(sphere(10, 14, {0.3, 0.3, 0.5}, 0.25)),
+                  thread(random, 60, 0.1, 0.02, false), particles(random, 60, 0.03),
+                  testGeometry(sheet(6, 0.4, 0.0)), thread(random, 40, 0.1, 0.0, false)};
+    for (const TestGeometry& each : geometries) ids.push_back(each.addTo(collisions));
+    for (const AnalyticalGeometry& shape :
+         {AnalyticalGeometry(Sphere{{0.8, 0.8, 0.8}, 0.15}),
+          AnalyticalGeometry(Box{{0.8, 0.2, 0.3}, {0.1, 0.1, 0.1}}),
+          AnalyticalGeometry(Cylinder{{0.1, 0.9, 0}, {0.1, 0.9, 1}, 0.1})})
+      ids.push_back(collisions.addAnalyticalGeometry(shape));
+    collisions.removeGeometry(collisions.addAnalyticalGeometry(Sphere{{0.5, 0.5, 0.5}, 3.0}));
+  }
+  bool isShape(GeometryId id) const { return id >= ids[geometries.size()]; }
+  const TestGeometry& at(GeometryId id) const {
+    return geometries[static_cast<std::size_t>(std::find(ids.begin(), ids.end(), id) -
+                                               ids.begin())];
+  }
+
+  OctreeBasedCD collisions;
+  std::vector<TestGeometry> geometries;
+  std::vector<GeometryId> ids;
+};
+
+/// Of the element's vertices and edges the one that is nearest to the hit.
+void expectNearestFeatures(const Pick& pick, const TestGeometry& geometry, const Ray& ray) {
+  const Positions& p = geometry.positions;
+  const Vector3d at = ray.origin + pick.hit.t * ray.direction;
+  const Triangle& t = pick.hit.vertices;
+  EXPECT_NE(std::find(t.begin(), t.end(), pick.vertex), t.end());
+  for (const std::uint32_t v : t)
+    EXPECT_LE((p[pick.vertex] - at).norm(), (p[v] - at).norm() + 1e-12);
+  const auto toEdge = [&](std::uint32_t a, std::uint32_t b) {
+    const Vector3d edge = p[b] - p[a];
+    const double square = edge.squaredNorm(),
+                 s = square > 0 ? std::clamp((at - p[a]).dot(edge) / square, 0.0, 1.0) : 0.0;
+    return (at - p[a] - s * edge).norm();
+  };
+  const auto [a, b] = pick.edge;
+  if (geometry.type == GeometryType::Points) {
+    EXPECT_TRUE(a == pick.vertex && b == pick.vertex);
+    return;
+  }
+  EXPECT_LT(a, b);
+  EXPECT_NE(std::find(t.begin(), t.end(), a), t.end());
+  EXPECT_NE(std::find(t.begin(), t.end(), b), t.end());
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (t[i] == t[(i + 1) % 3]) continue;
+    EXPECT_LE(toEdge(a, b), toEdge(t[i], t[(i + 1) % 3]) + 1e-12);
+  }
+}
+
+TEST(Pick, IsTheFirstHitOfAllGeometries) {
+  const Scene scene(Engine::Octree), bruteForce(Engine::BruteForce);
+  const SpatialQueries queries = scene.collisions.queries(),
+                       truth = bruteForce.collisions.queries();
+  Random random(602);
+  std::vector<std::size_t> picked(scene.ids.size());
+  std::vector<RayHit> hits;
+  for (int i = 0; i < casesOf(3000); ++i) {
+    Ray ray{randomPoint(random, -0.5, 1.5), randomPoint(random, -1, 1)};
+    if (i % 4 == 1) ray.tMin = 0.3, ray.tMax = 0.8;
+    for (const bool frontFacesOnly : {false, true}) {
+      const auto found = queries.pick(ray, frontFacesOnly);
+      ASSERT_TRUE(isSame(found, truth.pick(ray, frontFacesOnly)));
+      std::optional<RayHit> first;
+      for (const GeometryId id : scene.ids) {
+        queries.allHits(id, ray, hits);
+        for (const RayHit& hit : hits)
+          if ((hit.frontFace || !frontFacesOnly) && (!first || hit.t < first->t)) first = hit;
+      }
+      ASSERT_EQ(found.has_value(), first.has_value());
+      if (!frontFacesOnly) {
+        ASSERT_TRUE(isSame(queries.firstHit(ray), first));
+        ASSERT_TRUE(isSame(truth.firstHit(ray), first));
+      }
+      if (!found) continue;
+      ASSERT_TRUE(isSame(found->hit, *first));
+      ++picked[static_cast<std::size_t>(found->hit.geometry)];
+      if (scene.isShape(found->hit.geometry)) {
+        EXPECT_EQ(found->vertex, kNoElement);
+        EXPECT_EQ(found->edge, (std::array{kNoElement, kNoElement}));
+      } else {
+        expectNearestFeatures(*found, scene.at(found->hit.geometry), ray);
+      }
+    }
+  }
+  for (std::size_t i = 0; i < picked.size(); ++i)
+    if (i != 4) {  // a line without radius is met by no random ray
+      EXPECT_GT(picked[i], 10u) << i;
+    }
+}
+
+TEST(Pick, LinesAndPointsWithoutRadius) {
+  const Scene scene(Engine::Octree);
+  const SpatialQueries queries = scene.collisions.queries();
+  const TestGeometry& line = scene.geometries[4];
+  const auto& [p, q] = line.segments[7];
+  const Vector3d at = 0.75 * line.positions[p] + 0.25 * line.positions[q];
+  const auto found = queries.pick({line.positions[p], at - line.positions[p], 0.0, 1e-9});
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->hit.t, 0.0);
+}
+
+/// Of equally early hits that on the lowest geometry counts.
+TEST(Pick, TiesGoToTheLowestGeometry) {
+  OctreeBasedCD collisions;
+  const Mesh mesh = sheet(2, 0.0, 0.0);
+  Positions flat = mesh.positions;
+  for (Vector3d& p : flat) p.z() = 0.0;
+  const GeometryId first = collisions.addAnalyticalGeometry(Plane{{0, 0, -1}, {0, 0, 1}, false}),
+                   second = collisions.addTriangleMesh(flat, mesh.triangles);
+  collisions.addTriangleMesh(flat, mesh.triangles);
+  const SpatialQueries queries = collisions.queries();
+  EXPECT_EQ(queries.pick({{0.3, 0.2, 1}, {0, 0, -1}})->hit.geometry, second);
+  EXPECT_EQ(queries.pick({{0.3, 0.2, -0.5}, {0, 0, -1}})->hit.geometry, first);
+  EXPECT_EQ(queries.pick({{0.3, 0.2, -0.5}, {0, 0, 1}})->hit.geometry, second);
+  EXPECT_FALSE(queries.pick({{0.3, 0.2, -0.5}, {0, 0, 1}}, true));  // from behind
+  EXPECT_FALSE(OctreeBasedCD().queries().pick({{0, 0, 0}, {0, 0, 1}}));
+}
+
+}  // namespace
+}  // namespace palpate::testing

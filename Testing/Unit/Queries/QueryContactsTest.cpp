@@ -1,0 +1,115 @@
+#include "Common/Sanitized.h"
+#include "Common/ShapeTruth.h"
+#include "Unit/Queries/QueryTruth.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+// contacts(): the frame's contacts with the same shape, bit by bit.
+namespace palpate::testing {
+namespace {
+
+/// The contacts of a frame whose shape is at this pose.
+std::vector<ShapeContact> frameContacts(const Both::Add& add, const PlacedShape& shape,
+                                        double thickness, Engine engine) {
+  OctreeBasedCD collisions(settingsOf(engine));
+  const GeometryId body = add(collisions), tool = collisions.addAnalyticalGeometry(shape.geometry);
+  collisions.setTransform(tool, shape.rotation, shape.translation);
+  collisions.addCollisionPair(body, tool, {Method::Proximity, thickness, Contacts::Distinct});
+  collisions.detectCollision();
+  const auto contacts = collisions.collisionData(body, tool).shape();
+  return {contacts.begin(), contacts.end()};
+}
+
+std::vector<PlacedShape> shapes(Random& random) {
+  std::vector<Vector3d> cloud;
+  for (int i = 0; i < 7; ++i) cloud.push_back(randomPoint(random, -0.3, 0.3));
+  std::vector<PlacedShape> all;
+  for (const AnalyticalGeometry& geometry :
+       {AnalyticalGeometry(Sphere{{0.1, 0, 0}, 0.2}),
+        AnalyticalGeometry(Capsule{{-0.3, 0, 0}, {0.2, 0.1, 0}, 0.1}),
+        AnalyticalGeometry(Plane{{0, 0.1, 0}, {1, 2, 3}, false}),
+        AnalyticalGeometry(Plane{{0, 0.1, 0}, {1, 2, 3}, true}),
+        AnalyticalGeometry(Box{{0, 0.1, 0}, {0.3, 0.2, 0.1}}),
+        AnalyticalGeometry(Cylinder{{-0.2, 0, 0}, {0.3, 0.1, 0}, 0.15}),
+        AnalyticalGeometry(ConvexHull{cloud}), AnalyticalGeometry(Sphere{{0, 0, 0}, 0.0})})
+    all.push_back({geometry, randomTurn(random), randomPoint(random, 0.3, 0.7)});
+  return all;
+}
+
+void expectFrame(const Both::Add& add, const Both& both, Random& random, std::size_t& count) {
+  const SpatialQueries fast = both.octree.queries(), truth = both.bruteForce.queries();
+  std::vector<ShapeContact> found(1), expected;
+  for (const PlacedShape& shape : shapes(random))
+    for (const double thickness : {0.0, 0.04}) {
+      fast.contacts(both.id, shape.geometry, shape.rotation, shape.translation, thickness, found);
+      truth.contacts(both.id, shape.geometry, shape.rotation, shape.translation, thickness,
+                     expected);
+      EXPECT_TRUE(found == expected) << shape.geometry.index();
+      EXPECT_TRUE(found == frameContacts(add, shape, thickness, Engine::Octree));
+      EXPECT_TRUE(found == frameContacts(add, shape, thickness, Engine::BruteForce));
+      for (const ShapeContact& contact : found) EXPECT_EQ(contact.timeOfImpact, 1.0);
+      count += found.size();
+    }
+}
+
+TEST(QueryContacts, AreThoseOfTheFrame) {
+  Random random(701);
+  const TestGeometry geometries[] = {testGeometry(sphere(12, 16, {0.5, 0.5, 0.5}, 0.4)),
+                                     testGeometry(soup(random, 150, 0.15)),
+                                     thread(random, 120, 0.1, 0.02, true),
+                                     particles(random, 200, 0.01),
+                                     tapered(random, thread(random, 120, 0.1, 0.0, false), 0.04),
+                                     tapered(random, particles(random, 200, 0.0), 0.05)};
+  for (const TestGeometry& geometry : geometries) {
+    std::size_t count = 0;
+    const Positions now = moved(random, geometry.positions, 0.03);
+    const Matrix3d turn = randomTurn(random);
+    const Vector3d centre(0.5, 0.5, 0.5), shift = centre - turn * centre;
+    const Both::Add still = [&](OctreeBasedCD&each) { return geometry.addTo(each); },
+                    deformed =
+                        [&](OctreeBasedCD&each) {
+                          const GeometryId id = geometry.addTo(each);
+                          each.update();
+                          each.setPositions(id, now);
+                          return id;
+                        },
+                    turned = [&](OctreeBasedCD&each) {
+                      const GeometryId id = deformed(each);
+                      each.setTransform(id, turn, shift);
+                      return id;
+                    };
+    for (const Both::Add& add : {still, deformed, turned})
+      expectFrame(add, Both(add), random, count);
+    EXPECT_GT(count, 300u);
+  }
+}
+
+TEST(QueryContacts, OfTetrahedralMeshes) {
+  Random random(702);
+  Solid solid = cells(3, random);
+  for (Vector3d& p : solid.positions) p /= 3;
+  std::size_t count = 0;
+  const Both::Add add = [&](OctreeBasedCD& each) {
+    return each.addTetrahedralMesh(solid.positions, solid.tetrahedra);
+  };
+  expectFrame(add, Both(add), random, count);
+  EXPECT_GT(count, 100u);
+}
+
+TEST(QueryContacts, EmptyGeometriesHaveNone) {
+  for (const GeometryType type :
+       {GeometryType::Triangles, GeometryType::Lines, GeometryType::Points}) {
+    TestGeometry empty;
+    empty.type = type;
+    const Both both(empty);
+    std::vector<ShapeContact> found(1);
+    both.octree.queries().contacts(both.id, Sphere{{0, 0, 0}, 1}, Matrix3d::Identity(), {0, 0, 0},
+                                   1.0, found);
+    EXPECT_TRUE(found.empty());
+  }
+}
+
+}  // namespace
+}  // namespace palpate::testing

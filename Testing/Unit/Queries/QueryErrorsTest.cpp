@@ -1,0 +1,306 @@
+#include "Common/ExpectRefused.h"
+#include "Unit/Queries/QueryTruth.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+// Invalid calls of queries throw the documented error, name what is wrong, and leave the caller's
+// vectors unchanged.
+namespace palpate::testing {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// All queries of one geometry, with valid arguments.
+class AllQueries {
+ public:
+  /// A call, and whether shapes answer it.
+  struct Call {
+    std::string name;
+    bool takesShapes;
+    std::function<void(const SpatialQueries&, GeometryId)> call;
+  };
+
+  AllQueries() {
+    const Vector3d p(0.1, 0.2, 0.3);
+    const Ray ray{{0, 0, 3}, {0, 0, -1}};
+    const Matrix3d unit = Matrix3d::Identity();
+    const Sphere ball{{0, 0, 0}, 0.5};
+    using Queries = const SpatialQueries&;
+    m_calls = {
+        {"closestPoint", true, [=](Queries q, GeometryId id) { q.closestPoint(id, p); }},
+        {"closestPoints", true,
+         [=](Queries q, GeometryId id) {
+           std::vector<SurfacePoint> out(1);
+           kept(out, [&] { q.closestPoints(id, std::span(&p, 1), out); });
+         }},
+        {"nearestElements", false,
+         [=](Queries q, GeometryId id) {
+           std::vector<SurfacePoint> out(2);
+           kept(out, [&] { q.nearestElements(id, p, 3, out); });
+         }},
+        {"elementsWithin", false,
+         [=](Queries q, GeometryId id) {
+           std::vector<std::uint32_t> out{7, 8};
+           kept(out, [&] { q.elementsWithin(id, p, 1.0, out); });
+         }},
+        {"contains", false, [=](Queries q, GeometryId id) { (void)q.contains(id, p); }},
+        {"signedDistance", false, [=](Queries q, GeometryId id) { q.signedDistance(id, p); }},
+        {"signedDistances", false,
+         [=](Queries q, GeometryId id) {
+           std::vector<SignedDistance> out(1);
+           kept(out, [&] { q.signedDistances(id, std::span(&p, 1), out); });
+         }},
+        {"firstHit", true, [=](Queries q, GeometryId id) { q.firstHit(id, ray); }},
+        {"anyHit", true, [=](Queries q, GeometryId id) { (void)q.anyHit(id, ray); }},
+        {"firstHits", true,
+         [=](Queries q, GeometryId id) {
+           std::vector<RayHit> out(1);
+           kept(out, [&] { q.firstHits(id, std::span(&ray, 1), out); });
+         }},
+        {"allHits", true,
+         [=](Queries q, GeometryId id) {
+           std::vector<RayHit> out(2);
+           kept(out, [&] { q.allHits(id, ray, out); });
+         }},
+        {"overlapping", false,
+         [=](Queries q, GeometryId id) {
+           std::vector<std::uint32_t> out{7, 8};
+           kept(out, [&] { q.overlapping(id, ball, unit, p, out); });
+         }},
+        {"contacts", false, [=](Queries q, GeometryId id) {
+           std::vector<ShapeContact> out(2);
+           kept(out, [&] { q.contacts(id, ball, unit, p, 0.1, out); });
+         }}};
+  }
+  const std::vector<Call>& calls() const { return m_calls; }
+
+ private:
+  /// Makes the call. If it throws, expects that the vector is as it was, byte by byte.
+  template <class T, class F>
+  static void kept(std::vector<T>& out, F&& call) {
+    std::memset(static_cast<void*>(out.data()), 7, out.size() * sizeof(T));
+    const T* data = out.data();
+    const std::size_t size = out.size();
+    try {
+      call();
+    } catch (...) {
+      EXPECT_TRUE(out.data() == data && out.size() == size);
+      const auto bytes = std::as_bytes(std::span(out));
+      EXPECT_TRUE(std::all_of(bytes.begin(), bytes.end(),
+                              [](std::byte each) { return each == std::byte{7}; }));
+      throw;
+    }
+  }
+  std::vector<Call> m_calls;
+};
+
+/// A closed ball, a shape, a line mesh and an open sheet.
+struct Scene {
+  Scene() {
+    const Mesh whole = sphere(6, 8, {0, 0, 0}, 1), open = sheet(2, 0, 0);
+    rest = whole.positions;
+    ball = collisions.addTriangleMesh(whole.positions, whole.triangles);
+    shape = collisions.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1});
+    line = collisions.addLineMesh(open.positions, std::vector<Segment>{{0, 1}, {1, 2}}, 0.1);
+    sheetMesh = collisions.addTriangleMesh(open.positions, open.triangles);
+    removed = collisions.addPointSet(open.positions);
+    collisions.removeGeometry(removed);
+  }
+  OctreeBasedCD collisions;
+  GeometryId ball, shape, line, sheetMesh, removed;
+  Positions rest;
+};
+
+using enum ErrorCode;
+
+TEST(QueryErrors, ValidCallsThrowNothing) {
+  const Scene scene;
+  const AllQueries all;
+  const SpatialQueries queries = scene.collisions.queries();
+  for (const auto& [name, takesShapes, call] : all.calls()) {
+    SCOPED_TRACE(name);
+    EXPECT_NO_THROW(call(queries, scene.ball));
+    if (takesShapes) {
+      EXPECT_NO_THROW(call(queries, scene.shape));
+    }
+  }
+}
+
+TEST(QueryErrors, UnknownAndRemovedGeometries) {
+  const Scene scene;
+  const AllQueries all;
+  const SpatialQueries queries = scene.collisions.queries();
+  for (const auto& [name, takesShapes, call] : all.calls()) {
+    SCOPED_TRACE(name);
+    expectRefused(UnknownGeometry, "geometry 99", [&] { call(queries, GeometryId{99}); });
+    expectRefused(UnknownGeometry, "geometry 4", [&] { call(queries, scene.removed); });
+  }
+}
+
+TEST(QueryErrors, ShapesAndBodiesWithoutInside) {
+  const Scene scene;
+  const AllQueries all;
+  const SpatialQueries queries = scene.collisions.queries();
+  for (const auto& [name, takesShapes, call] : all.calls()) {
+    SCOPED_TRACE(name);
+    const bool needsInside = name == "contains" || name.starts_with("signed");
+    if (!takesShapes)
+      expectRefused(needsInside ? NotClosed : UnsupportedMethod, "geometry 1 is a shape",
+                    [&] { call(queries, scene.shape); });
+    if (!needsInside) continue;
+    expectRefused(NotClosed, "geometry 2 is a line mesh", [&] { call(queries, scene.line); });
+    expectRefused(NotClosed, "geometry 3 has no inside", [&] { call(queries, scene.sheetMesh); });
+  }
+  const TestGeometry empty;
+  OctreeBasedCD other;
+  const GeometryId none = empty.addTo(other);
+  EXPECT_FALSE(other.queries().contains(none, {0, 0, 0}));
+  expectRefused(NotClosed, "geometry 0 has no triangles", [&] {
+    other.queries().signedDistance(none, {0, 0, 0});
+  });
+}
+
+TEST(QueryErrors, OutdatedQueries) {
+  Scene scene;
+  const AllQueries all;
+  const SpatialQueries queries = scene.collisions.queries();
+  scene.collisions.setPositions(scene.ball, scene.rest);
+  for (const auto& [name, takesShapes, call] : all.calls()) {
+    SCOPED_TRACE(name);
+    expectRefused(InvalidCall, "call queries() again", [&] { call(queries, scene.ball); });
+  }
+  const Ray ray{{0, 0, 3}, {0, 0, -1}};
+  expectRefused(InvalidCall, "call queries() again", [&] { queries.firstHit(ray); });
+  expectRefused(InvalidCall, "call queries() again", [&] { queries.pick(ray); });
+}
+
+TEST(QueryErrors, Points) {
+  const Scene scene;
+  const SpatialQueries queries = scene.collisions.queries();
+  const Vector3d good(0, 0, 0);
+  std::vector<SurfacePoint> points(2);
+  std::vector<SignedDistance> distances(2);
+  std::vector<std::uint32_t> elements(2);
+  for (const double x : {kNan, kInfinity, -kInfinity})
+    for (int axis = 0; axis < 3; ++axis) {
+      Vector3d bad = good;
+      bad[axis] = x;
+      const Positions both{good, bad};
+      const auto refused = [&](auto&& call) {
+        expectRefused(NonFinitePosition, "the query's point is (", call);
+      };
+      refused([&] { queries.closestPoint(scene.ball, bad); });
+      refused([&] { queries.closestPoints(scene.ball, both, points); });
+      refused([&] { queries.nearestElements(scene.ball, bad, 1, points); });
+      refused([&] { queries.elementsWithin(scene.ball, bad, 1, elements); });
+      refused([&] { (void)queries.contains(scene.ball, bad); });
+      refused([&] { queries.signedDistance(scene.ball, bad); });
+      refused([&] { queries.signedDistances(scene.ball, both, distances); });
+    }
+  for (const double length : {-1.0, -5e-324, kNan}) {
+    const auto refused = [&](const char* name, auto&& call) {
+      expectRefused(InvalidSettings, std::string(name) + " is ", call);
+    };
+    refused("maxDistance", [&] { queries.closestPoint(scene.ball, good, length); });
+    refused("maxDistance",
+            [&] { queries.closestPoints(scene.ball, Positions(2, good), points, length); });
+    refused("maxDistance", [&] { queries.nearestElements(scene.ball, good, 1, points, length); });
+    refused("radius", [&] { queries.elementsWithin(scene.ball, good, length, elements); });
+  }
+  expectRefused(InvalidSettings, "radius is inf",
+                [&] { queries.elementsWithin(scene.ball, good, kInfinity, elements); });
+  for (const int k : {0, -1, std::numeric_limits<int>::min()})
+    expectRefused(InvalidSettings, "k is " + std::to_string(k),
+                  [&] { queries.nearestElements(scene.ball, good, k, points); });
+  for (const double margin : {-0.1, 0.5, kNan})
+    expectRefused(InvalidSettings, "margin is", [&] {
+      (void)queries.contains(scene.ball, good, {InsideRule::WindingNumber, margin});
+    });
+  expectRefused(InvalidSettings, "rule is 9", [&] {
+    queries.signedDistance(scene.ball, good, {static_cast<InsideRule>(9), 0.0});
+  });
+  EXPECT_TRUE(points.size() == 2 && elements.size() == 2);
+}
+
+TEST(QueryErrors, Rays) {
+  const Scene scene;
+  const SpatialQueries queries = scene.collisions.queries();
+  std::vector<RayHit> hits(1);
+  const auto refused = [&](ErrorCode code, const std::string& words, const Ray& ray) {
+    expectRefused(code, words, [&] { queries.firstHit(scene.ball, ray); });
+    expectRefused(code, words, [&] { queries.firstHit(scene.shape, ray); });
+    expectRefused(code, words, [&] { queries.firstHit(ray); });
+    expectRefused(code, words, [&] { (void)queries.anyHit(scene.ball, ray); });
+    expectRefused(code, words, [&] { queries.firstHits(scene.ball, std::span(&ray, 1), hits); });
+    expectRefused(code, words, [&] { queries.allHits(scene.ball, ray, hits); });
+    expectRefused(code, words, [&] { queries.pick(ray); });
+    expectRefused(code, words, [&] { queries.pick(ray, true); });
+  };
+  for (const double x : {kNan, kInfinity}) {
+    refused(NonFinitePosition, "the ray has origin (", {{0, x, 0}, {1, 0, 0}});
+    refused(NonFinitePosition, "the ray has origin (", {{0, 0, 0}, {1, 0, x}});
+    refused(InvalidSettings, "the ray has tMin", {{0, 0, 0}, {1, 0, 0}, x});
+    refused(InvalidSettings, "the ray has tMin", {{0, 0, 0}, {1, 0, 0}, -x});
+  }
+  refused(InvalidSettings, "tMax nan", {{0, 0, 0}, {1, 0, 0}, 0, kNan});
+  refused(InvalidSettings, "tMin 2 and tMax 1", {{0, 0, 0}, {1, 0, 0}, 2, 1});
+  refused(InvalidSettings, "length 0", {{0, 0, 0}, {0, 0, 0}});
+  refused(InvalidSettings, "length 0", {{0, 0, 0}, {-0.0, 0, 0}});
+  EXPECT_EQ(hits.size(), 1u);
+}
+
+TEST(QueryErrors, Shapes) {
+  const Scene scene;
+  const SpatialQueries queries = scene.collisions.queries();
+  std::vector<std::uint32_t> elements{7};
+  std::vector<ShapeContact> contacts(1);
+  const Matrix3d unit = Matrix3d::Identity();
+  const Vector3d zero(0, 0, 0);
+  const auto refused = [&](ErrorCode code, const std::string& words, const AnalyticalGeometry& s,
+                           const Matrix3d& r, const Vector3d& t) {
+    expectRefused(code, words, [&] { queries.overlapping(scene.ball, s, r, t, elements); });
+    expectRefused(code, words, [&] { queries.contacts(scene.ball, s, r, t, 0.1, contacts); });
+  };
+  const std::string place = "the query's shape: ";
+  const Sphere ball{zero, 1};
+  refused(InvalidShape, place + "radius is -1", Sphere{zero, -1}, unit, zero);
+  refused(InvalidShape, place + "centre is", Sphere{{0, kNan, 0}, 1}, unit, zero);
+  refused(InvalidShape, place + "halfExtents", Box{zero, {1, -1, 1}}, unit, zero);
+  refused(InvalidShape, place + "p1", Cylinder{zero, zero, 1}, unit, zero);
+  refused(InvalidShape, place + "normal", Plane{zero, zero}, unit, zero);
+  refused(InvalidShape, place + "the hull has no points", ConvexHull{}, unit, zero);
+  refused(InvalidTransform, place + "rotation", ball, 2 * unit, zero);
+  refused(InvalidTransform, place + "rotation", ball, -unit, zero);
+  refused(InvalidTransform, place + "translation", ball, unit, {0, 0, kInfinity});
+  for (const double thickness : {-1.0, kNan, kInfinity})
+    expectRefused(InvalidSettings, "thickness is",
+                  [&] { queries.contacts(scene.ball, ball, unit, zero, thickness, contacts); });
+  EXPECT_TRUE(elements == std::vector<std::uint32_t>{7} && contacts.size() == 1);
+}
+
+TEST(QueryErrors, Batches) {
+  const Scene scene;
+  const SpatialQueries queries = scene.collisions.queries();
+  std::vector<SurfacePoint> points(2);
+  std::vector<SignedDistance> distances(2);
+  std::vector<RayHit> hits(2);
+  const Positions three(3, Vector3d(0, 0, 0));
+  const std::vector<Ray> rays(3, Ray{{0, 0, 0}, {1, 0, 0}});
+  const std::string words = "3 points, but room for 2 answers";
+  expectRefused(InvalidSettings, words, [&] { queries.closestPoints(scene.ball, three, points); });
+  expectRefused(InvalidSettings, words,
+                [&] { queries.signedDistances(scene.ball, three, distances); });
+  expectRefused(InvalidSettings, "3 rays, but room for 2 answers",
+                [&] { queries.firstHits(scene.ball, rays, hits); });
+}
+
+}  // namespace
+}  // namespace palpate::testing

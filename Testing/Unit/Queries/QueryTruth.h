@@ -1,0 +1,201 @@
+#pragma once
+
+#include "Common/Solids.h"
+#include "Common/TestGeometry.h"
+#include "Unit/Math/RationalOracle.h"
+
+#include <palpate/OctreeBasedCD.h>
+
+#include <Eigen/Geometry>
+
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+/// What the tests of queries share: one geometry in both engines, and what queries answer in
+/// rational arithmetic.
+namespace palpate::testing {
+
+using Eigen::Matrix3d;
+using oracle::Rational;
+
+/// The same geometries searched by octrees, and by brute force.
+class Both {
+ public:
+  using Add = std::function<GeometryId(OctreeBasedCD&)>;
+
+  explicit Both(const Add& add) {
+    change([&](OctreeBasedCD& each) { id = add(each); });
+  }
+  explicit Both(const TestGeometry& geometry)
+      : Both([&](OctreeBasedCD& each) { return geometry.addTo(each); }) {}
+  template <class F>
+  void change(F&& f) {
+    for (OctreeBasedCD* each : {&octree, &bruteForce}) f(*each);
+  }
+
+  OctreeBasedCD octree{settingsOf(Engine::Octree)}, bruteForce{settingsOf(Engine::BruteForce)};
+  GeometryId id{};
+};
+
+inline bool isSame(const SurfacePoint& a, const SurfacePoint& b) {
+  return a.geometry == b.geometry && a.element == b.element && a.vertices == b.vertices &&
+         a.weights == b.weights && a.position == b.position && a.distance == b.distance;
+}
+inline bool isSame(const SignedDistance& a, const SignedDistance& b) {
+  return isSame(a.nearest, b.nearest) && a.distance == b.distance;
+}
+inline bool isSame(const RayHit& a, const RayHit& b) {
+  return a.geometry == b.geometry && a.element == b.element && a.vertices == b.vertices &&
+         a.weights == b.weights && a.t == b.t && a.frontFace == b.frontFace &&
+         a.crosses == b.crosses;
+}
+inline bool isSame(const Pick& a, const Pick& b) {
+  return isSame(a.hit, b.hit) && a.vertex == b.vertex && a.edge == b.edge;
+}
+template <class T>
+bool isSame(const std::optional<T>& a, const std::optional<T>& b) {
+  return a.has_value() == b.has_value() && (!a || isSame(*a, *b));
+}
+template <class T>
+bool isSame(const std::vector<T>& a, const std::vector<T>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const T& one, const T& two) { return isSame(one, two); });
+}
+
+/// Elements as queries name their vertices: {p, q, q} for a segment and {p, p, p} for a point.
+inline std::vector<Triangle> elementsOf(const TestGeometry& geometry) {
+  std::vector<Triangle> elements = geometry.triangles;
+  for (const auto& [p, q] : geometry.segments) elements.push_back({p, q, q});
+  if (geometry.type == GeometryType::Points)
+    for (std::uint32_t p = 0; p < geometry.positions.size(); ++p) elements.push_back({p, p, p});
+  return elements;
+}
+
+/// Positions of a placed body in the world, rounded as the library documents it.
+inline Positions placed(const Positions& body, const Matrix3d& r, const Vector3d& t) {
+  Positions world;
+  for (const Vector3d& p : body)
+    world.push_back((r.col(0) * p[0] + r.col(1) * p[1]) + r.col(2) * p[2] + t);
+  return world;
+}
+
+inline Vector3d onLattice(Random& random, unsigned size) {
+  const auto coordinate = [&] { return static_cast<double>(random() % size); };
+  const double x = coordinate(), y = coordinate(), z = coordinate();
+  return {x, y, z};
+}
+
+/// Triangles with small integer coordinates: many are equally far, coplanar, or without area.
+inline TestGeometry latticeSoup(Random& random, std::uint32_t triangles, unsigned size) {
+  TestGeometry soup;
+  for (std::uint32_t i = 0; i < 3 * triangles; ++i)
+    soup.positions.push_back(onLattice(random, size));
+  for (std::uint32_t t = 0; t < triangles; ++t)
+    soup.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+  return soup;
+}
+
+/// The squared distance of a point from an element.
+inline Rational squaredDistance(const Vector3d& p, const Positions& positions, const Triangle& t) {
+  return oracle::vertexTriangle(p, positions[t[0]], positions[t[1]], positions[t[2]]).square;
+}
+
+/// What a ray shares with an element: an interval of its parameter.
+struct RationalRange {
+  Rational first, last;
+};
+
+/// Every common point is an end of the interval, or between two ends. Ends are where the ray passes
+/// the triangle's plane, or where it meets an edge.
+inline std::optional<RationalRange> rayOn(const oracle::Vector& origin,
+                                          const oracle::Vector& direction,
+                                          const std::array<oracle::Vector, 3>& corners) {
+  using namespace oracle;
+  std::optional<RationalRange> range;
+  const auto takeIfOn = [&](const Rational& t, const oracle::Vector& p, const oracle::Vector& q,
+                            const oracle::Vector& r) {
+    if (vertexTriangle(origin + t * direction, p, q, r).square != 0) return;
+    if (!range) range = {t, t};
+    if (t < range->first) range->first = t;
+    if (t > range->last) range->last = t;
+  };
+  const auto& [a, b, c] = corners;
+  const oracle::Vector normal = cross(b - a, c - a);
+  const Rational slope = dot(direction, normal), height = dot(a - origin, normal);
+  if (slope != 0) {
+    takeIfOn(height / slope, a, b, c);
+    return range;
+  }
+  if (height != 0) return range;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const oracle::Vector &p = corners[i], &q = corners[(i + 1) % 3];
+    for (const oracle::Vector& end : {p, q})
+      takeIfOn(dot(end - origin, direction) / dot(direction, direction), p, q, q);
+    const oracle::Vector across = cross(q - p, direction);
+    if (const Rational square = dot(across, across); square != 0)
+      takeIfOn(dot(cross(q - p, p - origin), across) / square, p, q, q);
+  }
+  return range;
+}
+
+inline oracle::Vector pointOf(const Ray& ray, const Rational& t) {
+  using namespace oracle;
+  return toRational(ray.origin) + t * toRational(ray.direction);
+}
+
+/// The direction's product with the winding normal.
+inline Rational facingOf(const Ray& ray, const Positions& positions, const Triangle& t) {
+  using namespace oracle;
+  const oracle::Vector a = toRational(positions[t[0]]);
+  return dot(toRational(ray.direction),
+             cross(toRational(positions[t[1]]) - a, toRational(positions[t[2]]) - a));
+}
+
+/// Whether the ray's line certainly misses an element, by a ball around it.
+inline bool certainlyMisses(const Ray& ray, const Positions& positions, const Triangle& t) {
+  const Vector3d centre = positions[t[0]], from = centre - ray.origin;
+  const double radius =
+      std::max((positions[t[1]] - centre).stableNorm(), (positions[t[2]] - centre).stableNorm());
+  const double apart = from.cross(ray.direction.stableNormalized()).stableNorm();
+  return apart > radius + 1e-3 * (radius + from.stableNorm());  // NaN: it may not
+}
+
+/// A connected part of what a ray and a surface share.
+struct RationalHit {
+  Rational first, last;
+  std::uint32_t element;  ///< the lowest of those that begin first
+};
+
+/// The parts by ascending parameter.
+inline std::vector<RationalHit> hitsOf(const Ray& ray, const Positions& positions,
+                                       std::span<const Triangle> elements) {
+  const oracle::Vector origin = oracle::toRational(ray.origin),
+                       direction = oracle::toRational(ray.direction);
+  std::vector<RationalHit> ranges;
+  for (std::uint32_t e = 0; e < elements.size(); ++e) {
+    if (certainlyMisses(ray, positions, elements[e])) continue;
+    std::array<oracle::Vector, 3> corners;
+    for (std::size_t i = 0; i < 3; ++i) corners[i] = oracle::toRational(positions[elements[e][i]]);
+    auto range = rayOn(origin, direction, corners);
+    if (!range) continue;
+    if (range->first < ray.tMin) range->first = ray.tMin;
+    if (ray.tMax < kInfinity && range->last > ray.tMax) range->last = ray.tMax;
+    if (range->first <= range->last) ranges.push_back({range->first, range->last, e});
+  }
+  std::stable_sort(ranges.begin(), ranges.end(),
+                   [](const RationalHit& a, const RationalHit& b) { return a.first < b.first; });
+  std::vector<RationalHit> parts;
+  for (const RationalHit& range : ranges)
+    if (parts.empty() || range.first > parts.back().last)
+      parts.push_back(range);
+    else if (range.last > parts.back().last)
+      parts.back().last = range.last;
+  return parts;
+}
+
+}  // namespace palpate::testing

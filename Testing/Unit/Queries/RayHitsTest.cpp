@@ -1,0 +1,448 @@
+#include "Common/ObjText.h"
+#include "Common/Sanitized.h"
+#include "Unit/Queries/QueryTruth.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <set>
+#include <vector>
+
+// Rays against triangles, lines and points without radius: every hit is that of rational
+// arithmetic, octrees answer as brute force bit by bit, and no ray leaks out of a closed mesh.
+namespace palpate::testing {
+namespace {
+
+/// Expects that all queries of one ray agree with each other and with brute force. Returns all
+/// hits.
+std::vector<RayHit> consistentHits(const Both& both, const Ray& ray) {
+  const SpatialQueries fast = both.octree.queries(), truth = both.bruteForce.queries();
+  std::vector<RayHit> hits, expected;
+  fast.allHits(both.id, ray, hits);
+  truth.allHits(both.id, ray, expected);
+  EXPECT_TRUE(isSame(hits, expected));
+  const auto first = fast.firstHit(both.id, ray);
+  EXPECT_EQ(first.has_value(), !hits.empty());
+  if (first && !hits.empty()) {
+    EXPECT_TRUE(isSame(*first, hits[0]));
+  }
+  EXPECT_TRUE(isSame(first, truth.firstHit(both.id, ray)));
+  EXPECT_TRUE(isSame(first, fast.firstHit(ray)));  // of all geometries
+  EXPECT_EQ(fast.anyHit(both.id, ray), !hits.empty());
+  EXPECT_EQ(truth.anyHit(both.id, ray), !hits.empty());
+  for (std::size_t i = 1; i < hits.size(); ++i) EXPECT_LE(hits[i - 1].t, hits[i].t);
+  return hits;
+}
+
+/// Expects the hits of rational arithmetic. `elements` at `positions` are those of the geometry.
+std::size_t expectExact(const Both& both, const Positions& positions,
+                        std::span<const Triangle> elements, const Ray& ray) {
+  const std::vector<RayHit> hits = consistentHits(both, ray);
+  const std::vector<RationalHit> truth = hitsOf(ray, positions, elements);
+  EXPECT_EQ(hits.size(), truth.size());
+  for (std::size_t i = 0; i < std::min(hits.size(), truth.size()); ++i) {
+    const RayHit& hit = hits[i];
+    EXPECT_EQ(hit.geometry, both.id);
+    EXPECT_EQ(hit.element, truth[i].element);
+    if (hit.element >= elements.size()) continue;
+    const Triangle& vertices = elements[hit.element];
+    EXPECT_EQ(hit.vertices, vertices);
+    const auto& [a, b, c] = vertices;
+    double extent = 0.0;
+    for (const std::uint32_t v : vertices)
+      extent = std::max(extent, (positions[v] - ray.origin).cwiseAbs().maxCoeff());
+    const double most = ray.direction.cwiseAbs().maxCoeff();
+    const double error = Rational(hit.t - truth[i].first).get_d();
+    EXPECT_LE(std::abs(error) * most, 1e-15 * extent + 2.3e-16 * std::abs(hit.t) * most);
+    EXPECT_EQ(hit.frontFace, facingOf(ray, positions, vertices) < 0);
+    EXPECT_NEAR(hit.weights.sum(), 1.0, 1e-15);
+    EXPECT_GE(hit.weights.minCoeff(), 0.0);
+    const Vector3d at = hit.weights[0] * positions[a] + hit.weights[1] * positions[b] +
+                        hit.weights[2] * positions[c];
+    EXPECT_LE((at - ray.origin - hit.t * ray.direction).norm(),
+              1e-14 * (extent + ray.origin.norm()));
+  }
+  return hits.size();
+}
+
+/// The same ray with its range cut at hits, between them and beyond.
+std::vector<Ray> withRanges(const Both& both, Ray ray) {
+  std::vector<Ray> rays{ray};
+  ray.tMin = -kInfinity;
+  std::vector<RayHit> hits;
+  for (const double tMin : {-1e3, 0.0}) {
+    ray.tMin = tMin;
+    rays.push_back(ray);
+  }
+  both.bruteForce.queries().allHits(both.id, ray, hits);
+  if (hits.empty()) return rays;
+  const double first = hits.front().t, last = hits.back().t;
+  for (const auto& [tMin, tMax] : {std::pair{first, kInfinity},
+                                   {first, last},
+                                   {-1e3, first},
+                                   {first, first},
+                                   {last, last},
+                                   {0.5 * (first + last), kInfinity},
+                                   {-1e3, 0.5 * (first + last)},
+                                   {last, 2 * last + 1},
+                                   {std::nextafter(first, kInfinity), kInfinity},
+                                   {-1e3, std::nextafter(first, -kInfinity)}})
+    if (tMin <= tMax) rays.push_back({ray.origin, ray.direction, tMin, tMax});
+  return rays;
+}
+
+/// Rays through vertices, middles of edges, along edges, in planes of triangles, and others.
+Ray hardRay(Random& random, const Positions& positions, std::span<const Triangle> elements) {
+  const auto corner = [&] { return positions[elements[random() % elements.size()][random() % 3]]; };
+  const Triangle& t = elements[random() % elements.size()];
+  const Vector3d p = positions[t[0]], q = positions[t[1]], r = positions[t[2]];
+  Ray ray{randomPoint(random, -1, 2), randomPoint(random, -1, 1)};
+  switch (random() % 7) {
+    case 0:
+      ray.direction = corner() - ray.origin;
+      break;
+    case 1:
+      ray.direction = 0.5 * (p + q) - ray.origin;
+      break;
+    case 2:  // along an edge
+      ray = {p - 2 * (q - p), q - p};
+      break;
+    case 3:  // in the plane of a triangle
+      ray = {p + (p - q) + 0.5 * (p - r), (q - p) + 0.5 * (r - q)};
+      break;
+    case 4:  // from one vertex to another
+      ray.origin = corner();
+      ray.direction = corner() - ray.origin;
+      break;
+    case 5:  // parallel to an axis
+      ray.direction = Vector3d::Unit(static_cast<Eigen::Index>(random() % 3));
+      ray.origin = 0.5 * (corner() + corner());
+      break;
+    default:
+      break;
+  }
+  if (ray.direction == Vector3d::Zero()) ray.direction = {1, 0, 0};
+  return ray;
+}
+
+TEST(RayHits, AreThoseOfRationalArithmeticOnALattice) {
+  Random random(201);
+  std::size_t hits = 0;
+  for (int round = 0; round < casesOf(8); ++round) {
+    const TestGeometry soup = latticeSoup(random, 40, 3 + round % 3);
+    const Both both(soup);
+    for (int i = 0; i < 12; ++i) {
+      Ray ray{onLattice(random, 5), onLattice(random, 5) - onLattice(random, 5)};
+      if (i % 3 == 0) ray = hardRay(random, soup.positions, soup.triangles);
+      if (i % 3 == 1) ray.origin *= 0.5;
+      if (ray.direction == Vector3d::Zero()) ray.direction = {0, 0, 1};
+      for (const Ray& each : withRanges(both, ray))
+        hits += expectExact(both, soup.positions, soup.triangles, each);
+      ASSERT_FALSE(HasFailure()) << round << ' ' << i;
+    }
+  }
+  EXPECT_GT(hits, 1000u);
+}
+
+TEST(RayHits, AreThoseOfRationalArithmeticForEveryGeometryType) {
+  Random random(202);
+  std::vector<TestGeometry> geometries{
+      testGeometry(sphere(8, 10, {0.5, 0.5, 0.5}, 0.4)), testGeometry(soup(random, 100, 0.2)),
+      testGeometry(sheet(8, 0.5, 0.0)), thread(random, 80, 0.1, 0.0, true),
+      particles(random, 60, 0.0)};
+  geometries.push_back(geometries[0]);  // far from the origin
+  for (Vector3d& p : geometries.back().positions) p += Vector3d(1e3, -2e3, 5e2);
+  geometries.push_back(geometries[1]);  // with triangles without area
+  for (std::size_t i = 0; i < 300; i += 9) {
+    Positions& p = geometries.back().positions;
+    p[i + 2] = i % 2 ? p[i] : Vector3d(2 * p[i + 1] - p[i]);
+  }
+  for (const TestGeometry& geometry : geometries) {
+    const Vector3d shift =
+        &geometry == &geometries[5] ? Vector3d(1e3, -2e3, 5e2) : Vector3d(0, 0, 0);
+    Both both(geometry);
+    const std::vector<Triangle> elements = elementsOf(geometry);
+    std::size_t hits = 0;
+    const auto test = [&](const Positions& now, int count) {
+      for (int i = 0; i < count; ++i) {
+        Ray ray = hardRay(random, now, elements);
+        if (ray.origin.norm() < 10) ray.origin += shift;
+        for (const Ray& each : withRanges(both, ray))
+          hits += expectExact(both, now, elements, each);
+        ASSERT_FALSE(HasFailure()) << i;
+      }
+    };
+    test(geometry.positions, casesOf(10));
+    const Positions now = moved(random, geometry.positions, 0.05);
+    both.change([&](OctreeBasedCD& each) { each.setPositions(both.id, now); });
+    test(now, casesOf(4));
+    const Matrix3d turn = Eigen::AngleAxisd(1.1, Vector3d(1, -2, 3).normalized()).matrix();
+    const Vector3d t(0.3, 0.2, -0.7);
+    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, t); });
+    test(placed(now, turn, t), casesOf(4));
+    EXPECT_GT(hits, 50u);
+  }
+}
+
+/// A ray along an edge, or in the plane of triangles, has one hit where it enters them.
+TEST(RayHits, OneHitAlongEdgesAndInPlanes) {
+  const TestGeometry quad{GeometryType::Triangles,
+                          {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}},
+                          {{0, 1, 2}, {0, 2, 3}},
+                          {}};
+  const Both both(quad);
+  for (const auto& [ray, t, element] : {
+           std::tuple{Ray{{-1, 0, 0}, {1, 0, 0}}, 1.0, 0u},          // along an edge
+           std::tuple{Ray{{-1, -1, 0}, {1, 1, 0}}, 1.0, 0u},         // along the common edge
+           std::tuple{Ray{{2, 2, 0}, {-1, -1, 0}}, 1.0, 0u},         // backwards
+           std::tuple{Ray{{-1, 0.75, 0}, {1, 0, 0}}, 1.0, 1u},       // in the plane of both
+           std::tuple{Ray{{0.25, 0.5, 0}, {1, 0, 0}}, 0.0, 1u},      // from within
+           std::tuple{Ray{{0.5, 0.5, 1}, {0, 0, -2}}, 0.5, 0u},      // through the common edge
+           std::tuple{Ray{{1, 1, 1}, {0, 0, -1}}, 1.0, 0u},          // through a common corner
+           std::tuple{Ray{{0, 2.5, 0}, {1, -1, 0}}, kInfinity, 0u},  // past a corner, in the plane
+       }) {
+    const std::vector<RayHit> hits = consistentHits(both, ray);
+    if (t == kInfinity) {
+      EXPECT_EQ(hits.size(), 0u);
+      continue;
+    }
+    ASSERT_EQ(hits.size(), 1u);
+    EXPECT_EQ(hits[0].t, t);
+    EXPECT_EQ(hits[0].element, element);
+    EXPECT_EQ(hits[0].crosses, ray.direction.z() != 0 && ray.origin.x() < 1);
+    EXPECT_EQ(hits[0].frontFace, ray.direction.z() < 0);
+  }
+}
+
+// ---- Closed meshes ----
+
+/// Bodies of unit cells: points inside are known without a ray. Rays go along faces, through edges
+/// and corners.
+TEST(RayHits, CrossWhereTheRayChangesSide) {
+  Random random(203);
+  constexpr int n = 4;
+  std::size_t crossing = 0, grazing = 0;
+  for (int round = 0; round < casesOf(6); ++round) {
+    std::set<std::array<int, 3>> full;
+    const Solid solid = cells(n, random, [&](const std::array<int, 3>& c) {
+      const bool filled =
+          round == 0 || c[round % 3] == 0 || c[(round + 1) % 3] == 3 || (round > 3 && c[2] == 2);
+      if (filled) full.insert(c);
+      return filled;
+    });
+    const Both both([&](OctreeBasedCD& each) {
+      return each.addTetrahedralMesh(solid.positions, solid.tetrahedra);
+    });
+    const auto surface = both.octree.surface(both.id);
+    const std::vector<Triangle> triangles(surface.triangles.begin(), surface.triangles.end());
+    const auto isInside = [&](const oracle::Vector& p) {  // p is not on the surface
+      std::array<int, 3> cell;
+      for (std::size_t k = 0; k < 3; ++k) {
+        mpz_class floor;
+        mpz_fdiv_q(floor.get_mpz_t(), p[k].get_num_mpz_t(), p[k].get_den_mpz_t());
+        cell[k] = static_cast<int>(floor.get_si());
+      }
+      return full.contains(cell);
+    };
+    for (int i = 0; i < casesOf(150); ++i) {
+      Ray ray{0.5 * onLattice(random, 2 * n + 5) - Vector3d(1, 1, 1),
+              onLattice(random, 5) - onLattice(random, 5)};
+      if (ray.direction == Vector3d::Zero()) continue;
+      const std::vector<RayHit> hits = consistentHits(both, ray);
+      const std::vector<RationalHit> parts = hitsOf(ray, solid.positions, triangles);
+      ASSERT_EQ(hits.size(), parts.size());
+      std::size_t crossings = 0;
+      for (std::size_t h = 0; h < hits.size(); ++h) {
+        ASSERT_EQ(hits[h].element, parts[h].element);
+        crossings += hits[h].crosses;
+        (hits[h].crosses ? crossing : grazing)++;
+        if (parts[h].first == 0) continue;  // it begins on the surface
+        const Rational before = h == 0 ? Rational(0) : parts[h - 1].last;
+        const Rational after = h + 1 < parts.size() ? parts[h + 1].first : parts[h].last + 2;
+        const bool inBefore = isInside(pointOf(ray, (before + parts[h].first) / 2)),
+                   inAfter = isInside(pointOf(ray, (parts[h].last + after) / 2));
+        ASSERT_EQ(hits[h].crosses, inBefore != inAfter) << i << ' ' << h;
+        if (inBefore != inAfter && parts[h].first == parts[h].last) {
+          EXPECT_EQ(hits[h].frontFace, inAfter);
+        }
+      }
+      if (parts.empty() || parts[0].first > 0) {
+        EXPECT_EQ(crossings % 2, isInside(pointOf(ray, 0)) ? 1u : 0u);
+      }
+    }
+  }
+  EXPECT_GT(crossing, 300u);
+  EXPECT_GT(grazing, 50u);
+}
+
+/// Rays from a point inside a closed mesh through all of its vertices and the middles of all edges.
+/// Returns their number.
+std::size_t expectNoLeak(const Mesh& mesh, const Vector3d& inside) {
+  const TestGeometry geometry = testGeometry(mesh);
+  OctreeBasedCD collisions(settingsOf(Engine::Octree));
+  const GeometryId id = geometry.addTo(collisions);
+  const SpatialQueries queries = collisions.queries();
+  EXPECT_TRUE(queries.contains(id, inside));
+  Positions targets = mesh.positions;
+  for (const auto& [p, q] : geometry.edges())
+    targets.push_back(0.5 * (mesh.positions[p] + mesh.positions[q]));
+  std::vector<Ray> rays;
+  for (const Vector3d& target : targets) rays.push_back({inside, target - inside});
+  std::vector<RayHit> firsts(rays.size()), hits;
+  queries.firstHits(id, rays, firsts);
+  std::size_t leaks = 0, even = 0, wrong = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    queries.allHits(id, rays[i], hits);
+    leaks += hits.empty();
+    even +=
+        std::count_if(hits.begin(), hits.end(), [](const RayHit& h) { return h.crosses; }) % 2 == 0;
+    wrong += hits.empty() || !isSame(hits[0], firsts[i]);
+  }
+  EXPECT_EQ(leaks, 0u);
+  EXPECT_EQ(even, 0u);
+  EXPECT_EQ(wrong, 0u);
+  return rays.size();
+}
+
+/// A ball with hills and valleys, so that rays have several hits. bits: of its coordinates, so that
+/// rays pass exactly through vertices and middles of edges.
+Mesh hilly(std::uint32_t rings, std::uint32_t segments, int bits) {
+  Mesh mesh = sphere(rings, segments, {0, 0, 0}, 1.0);
+  for (Vector3d& p : mesh.positions) {
+    p *= 1.0 + 0.3 * std::sin(7 * p.x() + 2) * std::cos(9 * p.y()) + 0.2 * std::sin(11 * p.z());
+    p.x() += 0.4 * std::sin(3 * p.z());
+    for (double& x : p) x = std::ldexp(std::round(std::ldexp(x, bits)), -bits);
+  }
+  return mesh;
+}
+
+TEST(RayHits, NoRayLeaksThroughVerticesAndEdges) {
+  EXPECT_EQ(expectNoLeak(hilly(28, 36, 20), {0, 0, 0}), 3890u);
+  EXPECT_EQ(expectNoLeak(hilly(28, 36, 50), {0.01, 0.02, 0.03}), 3890u);
+  EXPECT_EQ(expectNoLeak(hilly(28, 36, 12), {0.125, 0.25, -0.125}), 3890u);
+}
+
+/// PALPATE_LEAK_RAYS=198746: as many rays as in the published comparison of libraries.
+TEST(RayHits, NoRayLeaksOutOfALargeMesh) {
+  if (std::getenv("PALPATE_LEAK_RAYS"))
+    EXPECT_EQ(expectNoLeak(hilly(183, 273, 30), {0, 0, 0}), 198746u);
+  else
+    EXPECT_EQ(expectNoLeak(hilly(60, 80, 30), {0, 0, 0}), 18882u);
+}
+
+TEST(RayHits, NoRayLeaksOutOfPublishedMeshes) {
+  const std::filesystem::path file =
+      std::filesystem::path(PALPATE_SHARED_DATA) / "meshes" / "aneurysm.obj";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is absent";
+  const Mesh mesh = readObj(file);
+  if (!findMeshDefects(mesh.triangles).closed()) GTEST_SKIP() << "the mesh is not closed";
+  OctreeBasedCD collisions;
+  const GeometryId id = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+  Random random(204);
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& p : mesh.positions) box.extend(p);
+  Vector3d inside = box.center();
+  for (int i = 0; i < 10000 && !collisions.queries().contains(id, inside); ++i)
+    inside = box.min() + randomPoint(random, 0, 1).cwiseProduct(box.sizes());
+  EXPECT_EQ(expectNoLeak(mesh, inside), 28374u);
+}
+
+// ---- Directions, batches ----
+
+/// A power of two times the direction divides every parameter by it.
+TEST(RayHits, DirectionsOfAnyLength) {
+  Random random(205);
+  const TestGeometry ball = testGeometry(sphere(8, 10, {0.5, 0.5, 0.5}, 0.4));
+  const Both both(ball);
+  std::size_t hits = 0;
+  for (int i = 0; i < 40; ++i) {
+    Ray ray{randomPoint(random, 0, 1), Vector3d::Zero()};
+    for (double& x : ray.direction) x = std::round(uniform(random, -64, 64)) / 64;
+    if (ray.direction == Vector3d::Zero()) continue;
+    const std::vector<RayHit> expected = consistentHits(both, ray);
+    hits += expected.size();
+    for (const int exponent : {-1020, -600, -40, 40, 600, 1000}) {
+      const Ray scaled{ray.origin, std::ldexp(1.0, exponent) * ray.direction};
+      const std::vector<RayHit> found = consistentHits(both, scaled);
+      ASSERT_EQ(found.size(), expected.size()) << exponent;
+      for (std::size_t h = 0; h < found.size(); ++h) {
+        EXPECT_EQ(found[h].element, expected[h].element);
+        EXPECT_EQ(found[h].frontFace, expected[h].frontFace);
+        EXPECT_EQ(found[h].crosses, expected[h].crosses);
+        EXPECT_NEAR(std::ldexp(found[h].t, exponent), expected[h].t, 1e-14);
+      }
+    }
+  }
+  EXPECT_GT(hits, 10u);
+}
+
+/// Meshes and directions in denormal numbers, and in huge ones.
+TEST(RayHits, AnyMagnitude) {
+  Random random(206);
+  for (const int exponent : {-1060, -500, 500, 900}) {
+    TestGeometry mesh = latticeSoup(random, 40, 4);
+    for (Vector3d& p : mesh.positions) p *= std::ldexp(1.0, exponent);
+    const Both both(mesh);
+    std::size_t hits = 0;
+    for (int i = 0; i < 40; ++i) {
+      Ray ray{std::ldexp(1.0, exponent) * onLattice(random, 4),
+              onLattice(random, 4) - onLattice(random, 4)};
+      if (ray.direction == Vector3d::Zero()) continue;
+      for (const bool isScaled : {false, true}) {
+        if (isScaled) ray.direction *= std::ldexp(1.0, exponent);
+        const std::vector<RayHit> found = consistentHits(both, ray);
+        const std::vector<RationalHit> truth = hitsOf(ray, mesh.positions, mesh.triangles);
+        ASSERT_EQ(found.size(), truth.size()) << exponent << ' ' << i << ' ' << isScaled;
+        hits += found.size();
+        for (std::size_t h = 0; h < found.size(); ++h) {
+          EXPECT_EQ(found[h].element, truth[h].element);
+          const double t = truth[h].first.get_d();
+          EXPECT_NEAR(found[h].t, t, 1e-15 * std::abs(t) + 5e-324);
+          EXPECT_TRUE(found[h].weights.allFinite());
+        }
+      }
+    }
+    EXPECT_GT(hits, 10u);
+  }
+}
+
+TEST(RayHits, BatchesEqualSingleCalls) {
+  Random random(207);
+  const TestGeometry geometry = testGeometry(sphere(20, 30, {0.5, 0.5, 0.5}, 0.4));
+  const std::vector<Triangle> elements = elementsOf(geometry);
+  for (const int threads : {1, 3}) {
+    OctreeBasedCD collisions(settingsOf(Engine::Octree, threads));
+    const GeometryId id = geometry.addTo(collisions);
+    const SpatialQueries queries = collisions.queries();
+    std::vector<Ray> rays;
+    for (int i = 0; i < 500; ++i) rays.push_back(hardRay(random, geometry.positions, elements));
+    std::vector<RayHit> out(rays.size());
+    queries.firstHits(id, rays, out);
+    std::size_t missed = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const auto hit = queries.firstHit(id, rays[i]);
+      missed += !hit;
+      if (hit)
+        EXPECT_TRUE(isSame(out[i], *hit));
+      else
+        EXPECT_EQ(out[i].element, kNoElement);
+    }
+    EXPECT_GT(missed, 10u);
+    queries.firstHits(id, {}, {});
+  }
+}
+
+TEST(RayHits, EmptyGeometriesHaveNone) {
+  for (const GeometryType type :
+       {GeometryType::Triangles, GeometryType::Lines, GeometryType::Points}) {
+    TestGeometry empty;
+    empty.type = type;
+    EXPECT_TRUE(consistentHits(Both(empty), {{0, 0, 0}, {1, 0, 0}}).empty());
+  }
+}
+
+}  // namespace
+}  // namespace palpate::testing

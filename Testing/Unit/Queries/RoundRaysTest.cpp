@@ -1,0 +1,292 @@
+#include "Common/Sanitized.h"
+#include "Common/ShapeTruth.h"
+#include "Unit/Queries/QueryTruth.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+// Rays against solid bodies: lines and points with radii, and analytical shapes. The truth is a
+// function that is negative inside, written here, in long double. Along the ray it must be negative
+// between a hit that enters and the next one that leaves, and positive elsewhere.
+namespace palpate::testing {
+namespace {
+
+using Wide = Eigen::Matrix<long double, 3, 1>;
+using Depth = std::function<long double(const Wide&)>;
+
+Wide wide(const Vector3d& p) { return p.cast<long double>(); }
+
+/// The distance to the nearest point of a segment, less the radius there.
+long double roundDistance(const Wide& x, const Wide& p, const Wide& q, long double radiusP,
+                          long double radiusQ) {
+  const Wide along = q - p;
+  const long double square = along.squaredNorm();
+  const long double t = square > 0 ? std::clamp((x - p).dot(along) / square, 0.0L, 1.0L) : 0.0L;
+  return (x - p - t * along).norm() - (radiusP + t * (radiusQ - radiusP));
+}
+
+/// Of lines and points with radii.
+Depth depthOf(const TestGeometry& geometry, const Positions& positions) {
+  return [&geometry, positions, elements = elementsOf(geometry)](const Wide& x) {
+    long double least = INFINITY;
+    for (const auto& [p, q, _] : elements)
+      least = std::min(least, roundDistance(x, wide(positions[p]), wide(positions[q]),
+                                            geometry.radius(p), geometry.radius(q)));
+    return least;
+  };
+}
+
+/// Of a shape in its body's frame: the sign is right, and the magnitude tells how certain it is.
+long double depthOf(const AnalyticalGeometry& shape, const Wide& x) {
+  if (const auto* s = std::get_if<Sphere>(&shape)) return (x - wide(s->centre)).norm() - s->radius;
+  if (const auto* c = std::get_if<Capsule>(&shape))
+    return roundDistance(x, wide(c->p0), wide(c->p1), c->radius, c->radius);
+  if (const auto* b = std::get_if<Box>(&shape))
+    return ((x - wide(b->centre)).cwiseAbs() - wide(b->halfExtents)).maxCoeff();
+  if (const auto* p = std::get_if<Plane>(&shape)) {
+    const long double height = wide(p->normal).normalized().dot(x - wide(p->point));
+    return p->twoSided ? std::abs(height) : height;
+  }
+  if (const auto* c = std::get_if<Cylinder>(&shape)) {
+    const Wide u = (wide(c->p1) - wide(c->p0)).normalized(),
+               from = x - (wide(c->p0) + wide(c->p1)) / 2;
+    return std::max(u.cross(from).norm() - c->radius,
+                    std::abs(u.dot(from)) - (wide(c->p1) - wide(c->p0)).norm() / 2);
+  }
+  // Each three points of a hull with all others on one side span a face.
+  const auto& points = std::get<ConvexHull>(shape).points;
+  long double most = -INFINITY;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      for (std::size_t k = 0; k < j; ++k) {
+        Wide normal = (wide(points[j]) - wide(points[i])).cross(wide(points[k]) - wide(points[i]));
+        if (normal.norm() < 1e-12L) continue;
+        normal.normalize();
+        long double above = 0, below = 0;
+        for (const Vector3d& p : points) {
+          const long double height = normal.dot(wide(p) - wide(points[i]));
+          above = std::max(above, height);
+          below = std::min(below, height);
+        }
+        if (std::min(above, -below) > 1e-12L) continue;
+        most = std::max(most, (above > -below ? -1 : 1) * normal.dot(x - wide(points[i])));
+      }
+  return most;
+}
+
+Depth depthOf(const PlacedShape& shape) {
+  return [&](const Wide& x) {
+    const Wide from = x - wide(shape.translation);
+    return depthOf(shape.geometry, shape.rotation.cast<long double>().transpose() * from);
+  };
+}
+
+/// The hits of a ray, consistent in all calls and both engines.
+std::vector<RayHit> consistentHits(const Both& both, const Ray& ray) {
+  const SpatialQueries fast = both.octree.queries(), truth = both.bruteForce.queries();
+  std::vector<RayHit> hits, expected;
+  fast.allHits(both.id, ray, hits);
+  truth.allHits(both.id, ray, expected);
+  EXPECT_TRUE(isSame(hits, expected));
+  std::optional<RayHit> first;
+  if (!hits.empty()) first = hits[0];
+  EXPECT_TRUE(isSame(fast.firstHit(both.id, ray), first));
+  EXPECT_TRUE(isSame(truth.firstHit(both.id, ray), first));
+  EXPECT_TRUE(isSame(fast.firstHit(ray), first));
+  EXPECT_EQ(fast.anyHit(both.id, ray), !hits.empty());
+  EXPECT_EQ(truth.anyHit(both.id, ray), !hits.empty());
+  return hits;
+}
+
+/// Expects hits on the surface, and the body between them. error: L.
+std::size_t expectBodyBetween(const Both& both, const Ray& ray, const Depth& depth, double length,
+                              double error = 1e-9) {
+  const std::vector<RayHit> hits = consistentHits(both, ray);
+  const auto at = [&](double t) -> Wide {
+    return wide(ray.origin) + static_cast<long double>(t) * wide(ray.direction);
+  };
+  const double speed = ray.direction.stableNorm();
+  const double begin = ray.tMin, end = std::min(ray.tMax, ray.tMin + length / speed);
+  for (const RayHit& hit : hits) {
+    EXPECT_GE(hit.t, ray.tMin);
+    EXPECT_LE(hit.t, ray.tMax);
+    EXPECT_LT(std::abs(static_cast<double>(depth(at(hit.t)))), error) << hit.t;
+  }
+  for (std::size_t i = 1; i < hits.size(); ++i) {
+    EXPECT_LE(hits[i - 1].t, hits[i].t);
+    EXPECT_NE(hits[i - 1].frontFace, hits[i].frontFace);  // in and out in turn
+  }
+  const bool beginsInside = depth(at(begin)) < 0;
+  if (!hits.empty() && std::abs(static_cast<double>(depth(at(begin)))) > error) {
+    EXPECT_EQ(hits[0].frontFace, !beginsInside);
+  }
+  std::size_t next = 0;
+  bool inside = hits.empty() ? beginsInside : !hits[0].frontFace;
+  for (int i = 0; i <= 400; ++i) {
+    const double t = begin + (end - begin) * i / 400;
+    for (; next < hits.size() && hits[next].t <= t; ++next) inside = hits[next].frontFace;
+    const auto found = static_cast<double>(depth(at(t)));
+    if (std::abs(found) <= error) continue;
+    EXPECT_EQ(inside, found < 0) << t << ' ' << found;
+  }
+  return hits.size();
+}
+
+Ray randomRay(Random& random) {
+  const Vector3d origin = randomPoint(random, -1, 2), target = randomPoint(random, 0, 1);
+  return {origin, std::ldexp(1.0, static_cast<int>(random() % 9) - 4) * (target - origin)};
+}
+
+TEST(RoundRays, EnterAndLeaveLinesAndPoints) {
+  Random random(301);
+  std::vector<TestGeometry> geometries{thread(random, 60, 0.2, 0.05, true),
+                                       particles(random, 80, 0.08),
+                                       tapered(random, thread(random, 60, 0.2, 0.05, false), 0.1),
+                                       tapered(random, particles(random, 80, 0.02), 0.15)};
+  geometries.push_back(geometries[0]);  // segments without length
+  for (std::size_t i = 5; i < 60; i += 10)
+    geometries.back().positions[i] = geometries.back().positions[i - 1];
+  for (const TestGeometry& geometry : geometries) {
+    Both both(geometry);
+    std::size_t hits = 0;
+    const auto test = [&](const Positions& now, int count) {
+      const Depth depth = depthOf(geometry, now);
+      for (int i = 0; i < casesOf(count); ++i) {
+        Ray ray = randomRay(random);
+        if (i % 4 == 1) ray.origin = now[random() % now.size()];  // from inside
+        if (i % 4 == 2) ray.tMin = 0.5, ray.tMax = 0.9;
+        if (i % 4 == 3) ray.tMin = -1.0;
+        hits += expectBodyBetween(both, ray, depth, 4.0);
+        ASSERT_FALSE(HasFailure()) << i;
+      }
+    };
+    test(geometry.positions, 40);
+    const Positions now = moved(random, geometry.positions, 0.05);
+    both.change([&](OctreeBasedCD& each) { each.setPositions(both.id, now); });
+    test(now, 20);
+    const Matrix3d turn = randomTurn(random);
+    const Vector3d shift(0.1, 0.05, -0.1);
+    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, shift); });
+    test(placed(now, turn, shift), 20);
+    EXPECT_GT(hits, 30u);
+  }
+}
+
+/// Overlapping and touching elements are one body.
+TEST(RoundRays, OverlappingElementsAreOneBody) {
+  const TestGeometry row{
+      GeometryType::Points, {{0, 0, 0}, {1.5, 0, 0}, {3, 0, 0}, {10, 0, 0}}, {}, {}, {1.0}};
+  const Both both(row);
+  const auto hits = consistentHits(both, {{-3, 0, 0}, {1, 0, 0}});
+  ASSERT_EQ(hits.size(), 4u);
+  const double expected[] = {2, 7, 12, 14};
+  const std::uint32_t elements[] = {0, 2, 3, 3};
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(hits[i].t, expected[i]);
+    EXPECT_EQ(hits[i].element, elements[i]);
+    EXPECT_EQ(hits[i].frontFace, i % 2 == 0);
+    EXPECT_TRUE(hits[i].crosses);
+  }
+  // From inside, with ends inside, between two bodies.
+  EXPECT_EQ(consistentHits(both, {{0, 0, 0}, {1, 0, 0}, 0, 5}).size(), 1u);
+  EXPECT_EQ(consistentHits(both, {{0, 0, 0}, {1, 0, 0}, 0, 3}).size(), 0u);
+  EXPECT_EQ(consistentHits(both, {{0, 0, 0}, {1, 0, 0}, 5, 8}).size(), 0u);
+  EXPECT_EQ(consistentHits(both, {{0, 0, 0}, {1, 0, 0}, 4, 9}).size(), 2u);  // both ends included
+  EXPECT_EQ(consistentHits(both, {{0, 5, 0}, {1, 0, 0}}).size(), 0u);
+}
+
+std::vector<PlacedShape> shapes(Random& random) {
+  std::vector<PlacedShape> all;
+  const auto add = [&](const AnalyticalGeometry& geometry) {
+    all.push_back({geometry});
+    all.push_back({geometry, randomTurn(random), randomPoint(random, 0.2, 0.8)});
+  };
+  add(Sphere{{0.4, 0.5, 0.5}, 0.4});
+  add(Capsule{{0.1, 0.2, 0.3}, {0.8, 0.7, 0.6}, 0.25});
+  add(Box{{0.5, 0.4, 0.5}, {0.4, 0.3, 0.2}});
+  add(Cylinder{{0.1, 0.2, 0.3}, {0.8, 0.7, 0.6}, 0.25});
+  add(Plane{{0, 0, 0.5}, {1, 2, 3}, false});
+  std::vector<Vector3d> frustum;
+  for (const double x : {-1, 1})
+    for (const double y : {-1, 1}) {
+      frustum.push_back({0.5 + 0.2 * x, 0.5 + 0.1 * y, 0.2});
+      frustum.push_back({0.5 + 0.5 * x, 0.5 + 0.3 * y, 0.9});
+    }
+  add(ConvexHull{frustum});
+  std::vector<Vector3d> cloud;
+  for (int i = 0; i < 9; ++i) cloud.push_back(randomPoint(random, 0, 1));
+  add(ConvexHull{cloud});
+  return all;
+}
+
+TEST(RoundRays, EnterAndLeaveShapes) {
+  Random random(302);
+  for (const PlacedShape& shape : shapes(random)) {
+    const Both both([&](OctreeBasedCD& each) {
+      const GeometryId id = each.addAnalyticalGeometry(shape.geometry);
+      each.setTransform(id, shape.rotation, shape.translation);
+      return id;
+    });
+    const Depth depth = depthOf(shape);
+    std::size_t hits = 0;
+    for (int i = 0; i < casesOf(60); ++i) {
+      Ray ray = randomRay(random);
+      if (i % 4 == 1) ray.origin = shape.rotation * Vector3d(0.5, 0.5, 0.5) + shape.translation;
+      if (i % 4 == 2) ray.tMin = 0.5, ray.tMax = 0.9;
+      if (i % 4 == 3) ray.tMin = -1.0;
+      if (i % 5 == 0) ray.direction = Vector3d::Unit(i % 3);
+      hits += expectBodyBetween(both, ray, depth, 4.0);
+      for (const RayHit& hit : consistentHits(both, ray)) {
+        EXPECT_EQ(hit.element, kNoElement);
+        EXPECT_TRUE(hit.crosses);
+      }
+      ASSERT_FALSE(HasFailure()) << i << ' ' << shape.geometry.index();
+    }
+    EXPECT_GT(hits, 5u) << shape.geometry.index();
+  }
+}
+
+TEST(RoundRays, PlanesWithTwoSidesHaveOneHit) {
+  const Both both([](OctreeBasedCD& each) {
+    return each.addAnalyticalGeometry(Plane{{0, 0, 1}, {0, 0, 2}, true});
+  });
+  const auto down = consistentHits(both, {{0, 0, 3}, {0, 0, -1}}),
+             up = consistentHits(both, {{0, 0, 0}, {0, 0, 4}}),
+             along = consistentHits(both, {{0, 0, 1}, {1, 0, 0}}),
+             away = consistentHits(both, {{0, 0, 3}, {1, 0, 0}});
+  ASSERT_TRUE(down.size() == 1 && up.size() == 1 && along.size() == 1);
+  EXPECT_TRUE(down[0].t == 2 && down[0].frontFace && down[0].crosses);
+  EXPECT_TRUE(up[0].t == 0.25 && !up[0].frontFace && up[0].crosses);
+  EXPECT_TRUE(along[0].t == 0 && !along[0].crosses);
+  EXPECT_TRUE(away.empty());
+}
+
+/// Small bodies far away, and rays of extreme lengths, keep the accuracy of their coordinates.
+TEST(RoundRays, FarAwayAndOfAnyLength) {
+  Random random(303);
+  const TestGeometry ball{GeometryType::Points, {{0, 0, 0}}, {}, {}, {0.5}};
+  const Both both(ball);
+  const Depth depth = depthOf(ball, ball.positions);
+  for (int i = 0; i < 100; ++i) {
+    const double far = std::pow(10.0, uniform(random, 0, 6));
+    const Vector3d origin = far * randomPoint(random, -1, 1);
+    const Vector3d target = 0.4 * randomPoint(random, -0.5, 0.5);
+    for (const int exponent : {-900, 0, 300}) {
+      const Ray ray{origin, std::ldexp(1.0, exponent) * (target - origin)};
+      const std::vector<RayHit> hits = consistentHits(both, ray);
+      ASSERT_EQ(hits.size(), depth(wide(origin)) < 0 ? 1u : 2u);
+      for (const RayHit& hit : hits) {
+        const Vector3d at = std::ldexp(hit.t, exponent) * (target - origin) + origin;
+        EXPECT_NEAR(at.norm(), 0.5, 1e-12 * (1 + far));
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate::testing

@@ -1,0 +1,381 @@
+#include "Common/Sanitized.h"
+#include "Common/ShapeTruth.h"
+#include "Unit/Queries/QueryTruth.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+// Elements in shapes. Spheres and capsules are compared with rational distances, polytopes with the
+// separating axes of both bodies, and all shapes with a search for the least distance.
+namespace palpate::testing {
+namespace {
+
+using Wide = Eigen::Matrix<long double, 3, 1>;
+
+std::vector<std::uint32_t> overlapping(const Both& both, const PlacedShape& shape) {
+  std::vector<std::uint32_t> found{7}, truth;
+  both.octree.queries().overlapping(both.id, shape.geometry, shape.rotation, shape.translation,
+                                    found);
+  both.bruteForce.queries().overlapping(both.id, shape.geometry, shape.rotation, shape.translation,
+                                        truth);
+  EXPECT_EQ(found, truth);
+  EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
+  return found;
+}
+
+/// Expects that the elements found are those with a gap of at most 0. Gaps below `error` in
+/// magnitude are not judged.
+std::size_t expectGaps(const Both& both, const PlacedShape& shape,
+                       const std::vector<Triangle>& elements, double error,
+                       const std::function<long double(const Triangle&)>& gapOf) {
+  const std::vector<std::uint32_t> found = overlapping(both, shape);
+  for (std::uint32_t e = 0; e < elements.size(); ++e) {
+    const auto gap = static_cast<double>(gapOf(elements[e]));
+    if (error > 0 && std::abs(gap) <= error) continue;
+    EXPECT_EQ(std::binary_search(found.begin(), found.end(), e), gap <= 0) << e << ' ' << gap;
+  }
+  return found.size();
+}
+
+// ---- Spheres and capsules: rational distances ----
+
+/// The squared distance of a segment from an element, where an element with a face may hold a part
+/// of the segment.
+Rational squaredFromSegment(const Vector3d& p, const Vector3d& q, const Positions& at,
+                            const Triangle& t) {
+  Rational least = std::min(squaredDistance(p, at, t), squaredDistance(q, at, t));
+  for (std::size_t i = 0; i < 3; ++i)
+    least = std::min(least, oracle::edgeEdge(p, q, at[t[i]], at[t[(i + 1) % 3]]).square);
+  std::array<oracle::Vector, 3> corners;
+  for (std::size_t i = 0; i < 3; ++i) corners[i] = oracle::toRational(at[t[i]]);
+  std::vector<RationalHit> hits;
+  if (p != q) hits = hitsOf({p, q - p, 0.0, 1.0}, at, std::span(&t, 1));
+  return hits.empty() ? least : Rational(0);
+}
+
+/// On a lattice shapes touch elements exactly: these are in the shape.
+TEST(ShapeOverlap, SpheresAndCapsulesOnALattice) {
+  Random random(501);
+  std::size_t found = 0, touching = 0;
+  for (int round = 0; round < casesOf(12); ++round) {
+    const TestGeometry soup = latticeSoup(random, 60, 8);
+    const Both both(soup);
+    for (int i = 0; i < 12; ++i) {
+      const Vector3d p = onLattice(random, 8), q = i % 2 ? p : onLattice(random, 8);
+      const double radius = static_cast<double>(random() % 4);
+      const PlacedShape shape{i % 2 ? AnalyticalGeometry(Sphere{p, radius})
+                                    : AnalyticalGeometry(Capsule{p, q, radius})};
+      found += expectGaps(both, shape, soup.triangles, 0.0, [&](const Triangle& t) {
+        const Rational square = squaredFromSegment(p, q, soup.positions, t);
+        touching += square == Rational(radius * radius);
+        return sgn(Rational(square - radius * radius));
+      });
+    }
+  }
+  EXPECT_GT(found, 500u);
+  EXPECT_GT(touching, 50u);
+}
+
+TEST(ShapeOverlap, SpheresAndCapsulesForEveryGeometryType) {
+  Random random(502);
+  const TestGeometry geometries[] = {testGeometry(sphere(12, 16, {0.5, 0.5, 0.5}, 0.4)),
+                                     testGeometry(soup(random, 200, 0.1)),
+                                     thread(random, 150, 0.1, 0.0, true),
+                                     thread(random, 150, 0.1, 0.03, false),
+                                     particles(random, 200, 0.04),
+                                     tapered(random, particles(random, 200, 0.0), 0.1)};
+  for (const TestGeometry& geometry : geometries) {
+    Both both(geometry);
+    const std::vector<Triangle> elements = elementsOf(geometry);
+    std::size_t found = 0;
+    for (int i = 0; i < casesOf(6); ++i) {
+      const Vector3d p = geometry.positions[random() % geometry.positions.size()] +
+                         randomPoint(random, -0.15, 0.15),
+                     q = i % 2 ? p : Vector3d(p + randomPoint(random, -0.4, 0.4));
+      const double radius = uniform(random, 0.0, 0.25);
+      const PlacedShape shape{i % 2 ? AnalyticalGeometry(Sphere{p, radius})
+                                    : AnalyticalGeometry(Capsule{p, q, radius})};
+      found += expectGaps(both, shape, elements, 1e-13, [&](const Triangle& t) {
+        const Rational square = squaredFromSegment(p, q, geometry.positions, t);
+        return oracle::root(square).get_d() - radius - geometry.radius(t[0]);
+      });
+    }
+    EXPECT_GT(found, 10u);
+  }
+}
+
+/// Radii that differ from an element's distance by less than its rounding.
+TEST(ShapeOverlap, SpheresAreDecidedExactly) {
+  Random random(506);
+  for (const TestGeometry& geometry :
+       {testGeometry(soup(random, 80, 0.2)), thread(random, 80, 0.1, 0.0, true),
+        tapered(random, particles(random, 80, 0.0), 0.01)}) {
+    const Both both(geometry);
+    const std::vector<Triangle> elements = elementsOf(geometry);
+    for (std::uint32_t e = 0; e < elements.size(); ++e) {
+      const Vector3d centre = randomPoint(random, -1, 2);
+      const Rational square = squaredDistance(centre, geometry.positions, elements[e]),
+                     own = geometry.radius(elements[e][0]);
+      const double radius = mpf_class(oracle::root(square) - mpf_class(own, 400)).get_d();
+      for (const double each : {std::nextafter(radius, 0.0), radius, std::nextafter(radius, 9.0)}) {
+        const Rational reach = own + each;
+        const auto found = overlapping(both, {Sphere{centre, each}});
+        EXPECT_EQ(std::binary_search(found.begin(), found.end(), e), square <= reach * reach);
+      }
+    }
+  }
+}
+
+// ---- Boxes and hulls: separating axes ----
+
+std::vector<Wide> wideCorners(const PlacedShape& shape) {
+  std::vector<Wide> corners;
+  if (const auto* box = std::get_if<Box>(&shape.geometry))
+    for (int v = 0; v < 8; ++v)
+      corners.push_back(
+          (box->centre +
+           Vector3d(v & 1 ? 1 : -1, v & 2 ? 1 : -1, v & 4 ? 1 : -1).cwiseProduct(box->halfExtents))
+              .cast<long double>());
+  else
+    for (const Vector3d& p : std::get<ConvexHull>(shape.geometry).points)
+      corners.push_back(p.cast<long double>());
+  for (Wide& p : corners)
+    p = shape.rotation.cast<long double>() * p + shape.translation.cast<long double>();
+  return corners;
+}
+
+/// Directions in which the corners' hull may be separated from a triangle: normals of all faces and
+/// products of all edges; and those within planes, for flat bodies.
+std::vector<Wide> axesOf(const std::vector<Wide>& hull, const std::vector<Wide>& triangle) {
+  const auto edgesOf = [](const std::vector<Wide>& corners) {
+    std::vector<Wide> edges;
+    for (std::size_t i = 0; i < corners.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j) edges.push_back(corners[i] - corners[j]);
+    return edges;
+  };
+  const std::vector<Wide> u = edgesOf(hull), v = edgesOf(triangle);
+  std::vector<Wide> axes;
+  const auto addProducts = [&](const std::vector<Wide>& as, const std::vector<Wide>& bs) {
+    for (const Wide& a : as)
+      for (const Wide& b : bs) axes.push_back(a.cross(b));
+  };
+  addProducts(u, v);
+  addProducts(v, v);
+  for (std::size_t i = 0; i < hull.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      for (std::size_t k = 0; k < j; ++k)
+        axes.push_back((hull[j] - hull[i]).cross(hull[k] - hull[i]));
+  for (const Wide& normal : {Wide(v[0].cross(v[1]))})
+    for (const Wide& edge : v) axes.push_back(normal.cross(edge));
+  for (const Wide& a : u)  // segments in one plane, and points on the line of a segment
+    for (const Wide& b : v) {
+      axes.push_back(a.cross(a.cross(b)));
+      axes.push_back(b.cross(a.cross(b)));
+    }
+  const Wide between = hull[0] - triangle[0];
+  axes.push_back(between);
+  for (const auto* edges : {&u, &v})
+    for (const Wide& edge : *edges) axes.push_back(edge.cross(between.cross(edge)));
+  axes.insert(axes.end(), u.begin(), u.end());
+  axes.insert(axes.end(), v.begin(), v.end());
+  return axes;
+}
+
+/// The largest gap along an axis: bodies overlap if none is positive. isUnit: as a length.
+long double separation(const std::vector<Wide>& hull, const std::vector<Wide>& triangle,
+                       bool isUnit) {
+  long double most = -INFINITY;
+  for (Wide axis : axesOf(hull, triangle)) {
+    const long double length = axis.norm();
+    if (isUnit ? length < 1e-9L : axis == Wide::Zero()) continue;
+    if (isUnit) axis /= length;
+    const auto range = [&](const std::vector<Wide>& corners) {
+      long double low = INFINITY, high = -INFINITY;
+      for (const Wide& p : corners) {
+        low = std::min(low, axis.dot(p));
+        high = std::max(high, axis.dot(p));
+      }
+      return std::pair{low, high};
+    };
+    const auto [a, b] = range(hull);
+    const auto [c, d] = range(triangle);
+    most = std::max({most, c - b, a - d});
+  }
+  return most;
+}
+
+std::vector<Wide> wideCorners(const Positions& at, const Triangle& t) {
+  std::vector<Wide> corners;
+  for (const std::uint32_t v : t) corners.push_back(at[v].cast<long double>());
+  return corners;
+}
+
+Positions frustum() {
+  Positions corners;
+  for (const double x : {-1, 1})
+    for (const double y : {-1, 1}) {
+      corners.push_back({0.1 * x, 0.08 * y, -0.1});
+      corners.push_back({0.4 * x, 0.3 * y, 0.5});
+    }
+  return corners;
+}
+
+/// Small integers are exact in long double, without a square root: elements that just touch a shape
+/// are in it. Boxes and hulls may be flat.
+TEST(ShapeOverlap, BoxesAndHullsOnALattice) {
+  Random random(503);
+  std::size_t found = 0, touching = 0;
+  for (int round = 0; round < casesOf(8); ++round) {
+    const TestGeometry soup = latticeSoup(random, 50, 7);
+    const Both both(soup);
+    for (int i = 0; i < 8; ++i) {
+      AnalyticalGeometry geometry = Box{onLattice(random, 7), onLattice(random, 3)};
+      if (i % 2) {
+        ConvexHull hull;
+        for (int k = 0; k < 3 + i; ++k) hull.points.push_back(onLattice(random, 7));
+        geometry = hull;
+      }
+      const PlacedShape shape{geometry};
+      const std::vector<Wide> corners = wideCorners(shape);
+      found += expectGaps(both, shape, soup.triangles, 0.0, [&](const Triangle& t) {
+        const long double gap = separation(corners, wideCorners(soup.positions, t), false);
+        touching += gap == 0;
+        return gap;
+      });
+    }
+  }
+  EXPECT_GT(found, 300u);
+  EXPECT_GT(touching, 30u);
+}
+
+TEST(ShapeOverlap, BoxesHullsAndFrustumsPlacedAnywhere) {
+  Random random(504);
+  const TestGeometry geometries[] = {
+      testGeometry(sphere(10, 14, {0.5, 0.5, 0.5}, 0.4)), testGeometry(soup(random, 150, 0.1)),
+      thread(random, 100, 0.1, 0.0, true), particles(random, 150, 0.0)};
+  for (const TestGeometry& geometry : geometries) {
+    Both both(geometry);
+    const std::vector<Triangle> elements = elementsOf(geometry);
+    std::size_t found = 0;
+    const auto test = [&](const Positions& now, const Vector3d& offset, double error) {
+      for (int i = 0; i < casesOf(6); ++i) {
+        AnalyticalGeometry tool = Box{{0.02, 0, 0}, {0.3, 0.15, 0.05}};
+        if (i % 3 == 1) tool = ConvexHull{frustum()};
+        if (i % 3 == 2) {
+          ConvexHull hull;
+          for (int k = 0; k < 6; ++k) hull.points.push_back(randomPoint(random, -0.3, 0.3));
+          tool = hull;
+        }
+        const PlacedShape shape{tool, randomTurn(random), randomPoint(random, 0.1, 0.9) + offset};
+        const std::vector<Wide> corners = wideCorners(shape);
+        found += expectGaps(both, shape, elements, error, [&](const Triangle& t) {
+          return separation(corners, wideCorners(now, t), true);
+        });
+      }
+    };
+    test(geometry.positions, {0, 0, 0}, 1e-13);
+    const Positions now = moved(random, geometry.positions, 0.05);
+    both.change([&](OctreeBasedCD& each) { each.setPositions(both.id, now); });
+    test(now, {0, 0, 0}, 1e-13);
+    const Matrix3d turn = Eigen::AngleAxisd(0.4, Vector3d(1, -2, 3).normalized()).matrix();
+    const Vector3d shift(1e3, 0, -1e3);
+    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, shift); });
+    test(placed(now, turn, shift), shift, 1e-11);
+    EXPECT_GT(found, 10u);
+  }
+}
+
+/// Elements wholly inside, and a shape wholly between elements.
+TEST(ShapeOverlap, InsideAndBetween) {
+  const TestGeometry ball = testGeometry(sphere(10, 14, {0, 0, 0}, 1.0));
+  const Both both(ball);
+  for (const AnalyticalGeometry& shape :
+       {AnalyticalGeometry(Sphere{{0, 0, 0}, 0.8}),
+        AnalyticalGeometry(Box{{0, 0, 0}, {.5, .5, .5}}),
+        AnalyticalGeometry(Capsule{{-0.5, 0, 0}, {0.5, 0, 0}, 0.3}),
+        AnalyticalGeometry(ConvexHull{frustum()})})
+    EXPECT_EQ(overlapping(both, {shape}).size(), 0u);
+  for (const AnalyticalGeometry& shape :
+       {AnalyticalGeometry(Sphere{{0, 0, 0}, 1.2}), AnalyticalGeometry(Box{{0, 0, 0}, {2, 2, 2}}),
+        AnalyticalGeometry(Capsule{{-0.5, 0, 0}, {0.5, 0, 0}, 1.5}),
+        AnalyticalGeometry(Plane{{0, 0, 2}, {0, 0, 1}, false}),
+        AnalyticalGeometry(Cylinder{{0, 0, -2}, {0, 0, 2}, 2})})
+    EXPECT_EQ(overlapping(both, {shape}).size(), ball.triangles.size());
+}
+
+// ---- Planes and cylinders: a search for the least distance ----
+
+/// The least value of a convex function over [0, 1].
+template <class F>
+double least(F&& f) {
+  double low = 0, high = 1;
+  for (int i = 0; i < 50; ++i) {
+    const double third = (high - low) / 3;
+    if (f(low + third) <= f(high - third))
+      high -= third;
+    else
+      low += third;
+  }
+  return std::min({f(0.0), f(1.0), f(0.5 * (low + high))});
+}
+
+TEST(ShapeOverlap, PlanesAndCylinders) {
+  Random random(505);
+  const TestGeometry geometries[] = {testGeometry(soup(random, 40, 0.15)),
+                                     thread(random, 60, 0.1, 0.0, true),
+                                     particles(random, 80, 0.0)};
+  for (const TestGeometry& geometry : geometries) {
+    const Both both(geometry);
+    std::size_t found = 0;
+    for (int i = 0; i < 6; ++i) {
+      const Vector3d p0 = randomPoint(random, -0.3, 0.3), p1 = randomPoint(random, -0.3, 0.3),
+                     axis = (p1 - p0).normalized(), centre = 0.5 * (p0 + p1);
+      const bool twoSided = i == 2;
+      const PlacedShape shape{i < 3 ? AnalyticalGeometry(Plane{p0, p1, twoSided})
+                                    : AnalyticalGeometry(Cylinder{p0, p1, 0.2}),
+                              randomTurn(random), randomPoint(random, 0.3, 0.7)};
+      const auto depth = [&](const Vector3d& world) {
+        const Vector3d x = shape.rotation.transpose() * (world - shape.translation);
+        if (i < 3) {
+          const double height = p1.normalized().dot(x - p0);
+          return twoSided ? std::abs(height) : height;
+        }
+        return std::max(axis.cross(x - centre).norm() - 0.2,
+                        std::abs(axis.dot(x - centre)) - 0.5 * (p1 - p0).norm());
+      };
+      found += expectGaps(both, shape, elementsOf(geometry), 1e-6, [&](const Triangle& t) {
+        const Vector3d a = geometry.positions[t[0]], b = geometry.positions[t[1]],
+                       c = geometry.positions[t[2]];
+        if (twoSided) {  // zero where the corners are on both sides
+          const auto height = [&](const Vector3d& world) {
+            return p1.dot(shape.rotation.transpose() * (world - shape.translation) - p0);
+          };
+          const auto [low, high] = std::minmax({height(a), height(b), height(c)});
+          if (low < 0 && high > 0) return -1.0;
+        }
+        return least([&](double s) {
+          return least([&](double r) {
+            return depth(a + s * (b - a) + r * (a + s * (c - a) - a - s * (b - a)));
+          });
+        });
+      });
+    }
+    EXPECT_GT(found, 20u);
+  }
+}
+
+TEST(ShapeOverlap, EmptyGeometriesHaveNone) {
+  for (const GeometryType type :
+       {GeometryType::Triangles, GeometryType::Lines, GeometryType::Points}) {
+    TestGeometry empty;
+    empty.type = type;
+    EXPECT_TRUE(overlapping(Both(empty), {Sphere{{0, 0, 0}, 10}}).empty());
+  }
+}
+
+}  // namespace
+}  // namespace palpate::testing

@@ -1,0 +1,279 @@
+#include "Common/Sanitized.h"
+#include "Common/ShapeTruth.h"
+#include "Unit/Queries/QueryTruth.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+// Signs of distances: the winding number by rational rays, for meshes that cross themselves, too;
+// tetrahedra by rational volumes; solid angles in long double for meshes with holes.
+namespace palpate::testing {
+namespace {
+
+/// The winding number about a point that is not on the surface, by a rational ray that meets no
+/// edge.
+int windingNumber(Random& random, const Positions& positions, std::span<const Triangle> triangles,
+                  const Vector3d& p) {
+  for (;;) {
+    const Ray ray{p, 16 * onLattice(random, 1 << 20) / (1 << 20) - Vector3d(8, 8, 8)};
+    const oracle::Vector direction = oracle::toRational(ray.direction);
+    int number = 0;
+    bool isGeneric = true;
+    for (const auto& t : triangles) {
+      if (certainlyMisses(ray, positions, t)) continue;
+      std::array<Rational, 3> sides;
+      std::array<oracle::Vector, 3> corners;
+      for (std::size_t i = 0; i < 3; ++i) {
+        corners[i] = oracle::toRational(positions[t[i]]);
+        for (std::size_t k = 0; k < 3; ++k) corners[i][k] -= p[static_cast<int>(k)];
+      }
+      for (std::size_t i = 0; i < 3; ++i)
+        sides[i] = oracle::dot(direction, oracle::cross(corners[i], corners[(i + 1) % 3]));
+      const int a = sgn(sides[0]), b = sgn(sides[1]), c = sgn(sides[2]);
+      if ((a > 0 || b > 0 || c > 0) && (a < 0 || b < 0 || c < 0)) continue;
+      if (a == 0 || b == 0 || c == 0) {
+        isGeneric = false;
+        break;
+      }
+      // The line passes through the inside. The ray does if the plane is ahead.
+      const Rational height = oracle::dot(corners[0], oracle::cross(corners[1], corners[2]));
+      if (sgn(height) == a) number += a;
+    }
+    if (isGeneric) return number;
+  }
+}
+
+bool isOnSurface(const Positions& positions, std::span<const Triangle> triangles,
+                 const Vector3d& p) {
+  return std::any_of(triangles.begin(), triangles.end(),
+                     [&](const Triangle& t) { return squaredDistance(p, positions, t) == 0; });
+}
+
+/// Expects the signs of rational rays, and the distances of closestPoint(). Returns how many points
+/// are inside.
+std::size_t expectSigns(const Both& both, const Positions& positions,
+                        std::span<const Triangle> triangles, std::span<const Vector3d> points) {
+  Random random(401);
+  const SpatialQueries fast = both.octree.queries(), truth = both.bruteForce.queries();
+  std::vector<SignedDistance> batch(points.size());
+  fast.signedDistances(both.id, points, batch);
+  std::size_t inside = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vector3d& p = points[i];
+    const SignedDistance found = fast.signedDistance(both.id, p);
+    EXPECT_TRUE(isSame(found, batch[i]));
+    EXPECT_TRUE(isSame(found, truth.signedDistance(both.id, p)));
+    EXPECT_TRUE(isSame(found.nearest, *fast.closestPoint(both.id, p)));
+    EXPECT_EQ(std::abs(found.distance), found.nearest.distance);
+    const bool contained = fast.contains(both.id, p);
+    EXPECT_EQ(truth.contains(both.id, p), contained);
+    EXPECT_EQ(std::signbit(found.distance), contained);
+    const bool expected = !isOnSurface(positions, triangles, p) &&
+                          windingNumber(random, positions, triangles, p) != 0;
+    EXPECT_EQ(contained, expected) << i;
+    inside += contained;
+  }
+  return inside;
+}
+
+/// Points around the mesh, near its surface, and on its vertices, edges and faces.
+Positions probesOf(Random& random, const Positions& positions, std::span<const Triangle> triangles,
+                   int count) {
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& p : positions) box.extend(p);
+  Positions points;
+  for (int i = 0; i < casesOf(count); ++i) {
+    const Triangle& t = triangles[random() % triangles.size()];
+    const Vector3d a = positions[t[0]], b = positions[t[1]], c = positions[t[2]];
+    const double size = 1e-3 * box.sizes().maxCoeff();
+    switch (i % 6) {
+      case 0:
+        points.push_back(a);
+        break;
+      case 1:
+        points.push_back(0.5 * (a + b));
+        break;
+      case 2:
+        points.push_back(0.25 * a + 0.25 * b + 0.5 * c);
+        break;
+      case 3:
+        points.push_back(0.3 * a + 0.5 * b + 0.2 * c + size * randomPoint(random, -1, 1));
+        break;
+      default:
+        points.push_back(box.min() + randomPoint(random, -0.1, 1.1).cwiseProduct(box.sizes()));
+    }
+  }
+  return points;
+}
+
+Mesh joined(const Mesh& a, const Mesh& b) {
+  Mesh both = a;
+  const auto first = static_cast<std::uint32_t>(a.positions.size());
+  both.positions.insert(both.positions.end(), b.positions.begin(), b.positions.end());
+  for (const auto& [p, q, r] : b.triangles)
+    both.triangles.push_back({p + first, q + first, r + first});
+  return both;
+}
+
+std::vector<Mesh> closedMeshes(Random& random) {
+  std::vector<Mesh> all{sphere(8, 12, {0, 0, 0}, 1.0)};
+  // Pushed through itself: a part has the winding number -1.
+  all.push_back(sphere(10, 14, {0, 0, 0}, 1.0));
+  for (Vector3d& p : all.back().positions)
+    if (p.z() > 0.3) p.z() = 0.6 - 1.8 * p.z();
+  // Crumpled.
+  all.push_back(sphere(8, 12, {0, 0, 0}, 1.0));
+  for (Vector3d& p : all.back().positions) p += randomPoint(random, -0.5, 0.5);
+  // Two bodies that cross: numbers of 2. A body in a body, and the hollow in it.
+  all.push_back(joined(sphere(8, 10, {0, 0, 0}, 1), sphere(8, 10, {0.7, 0.2, 0.1}, 0.8)));
+  all.push_back(joined(sphere(8, 10, {0, 0, 0}, 1), sphere(8, 10, {0, 0, 0}, 0.5)));
+  Mesh hollow = sphere(8, 10, {0, 0, 0}, 0.5);
+  for (Triangle& t : hollow.triangles) std::swap(t[0], t[1]);
+  all.push_back(joined(sphere(8, 10, {0, 0, 0}, 1), hollow));
+  // Inside out.
+  all.push_back(hollow);
+  // On a lattice, with triangles in one plane, upon each other and without area.
+  all.push_back(sphere(8, 12, {0, 0, 0}, 3.0));
+  for (Vector3d& p : all.back().positions)
+    for (double& x : p) x = std::round(x);
+  return all;
+}
+
+TEST(SignedDistances, SignsAreThoseOfRationalRays) {
+  Random random(402);
+  std::size_t number = 0;
+  for (const Mesh& mesh : closedMeshes(random)) {
+    SCOPED_TRACE(number++);
+    Both both(testGeometry(mesh));
+    const Positions points = probesOf(random, mesh.positions, mesh.triangles, 48);
+    EXPECT_GT(expectSigns(both, mesh.positions, mesh.triangles, points), points.size() / 20);
+    const Matrix3d turn = randomTurn(random);
+    const Vector3d shift(1e3, 0.2, -30);
+    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, shift); });
+    const Positions world = placed(mesh.positions, turn, shift);
+    expectSigns(both, world, mesh.triangles, probesOf(random, world, mesh.triangles, 12));
+    ASSERT_FALSE(HasFailure());
+  }
+}
+
+/// Points near the crossings: pseudonormals give wrong signs there.
+TEST(SignedDistances, NoWrongSignNearSelfCrossings) {
+  Random random(403);
+  const Mesh mesh = closedMeshes(random)[1];
+  const Both both(testGeometry(mesh));
+  Positions points;
+  for (int i = 0; i < casesOf(150); ++i)
+    points.push_back(mesh.positions[random() % mesh.positions.size()] +
+                     randomPoint(random, -0.05, 0.05));
+  EXPECT_GT(expectSigns(both, mesh.positions, mesh.triangles, points), 50u);
+}
+
+/// The rules agree on closed bodies, except on the surface.
+TEST(SignedDistances, RulesAgreeOnClosedBodies) {
+  Random random(404);
+  for (const Mesh& mesh : closedMeshes(random)) {
+    const Both both(testGeometry(mesh));
+    const SpatialQueries queries = both.octree.queries();
+    for (const Vector3d& p : probesOf(random, mesh.positions, mesh.triangles, 200)) {
+      const InsideSettings byNumber{.rule = InsideRule::WindingNumber};
+      const SignedDistance closed = queries.signedDistance(both.id, p),
+                           open = queries.signedDistance(both.id, p, byNumber);
+      EXPECT_TRUE(isSame(open, both.bruteForce.queries().signedDistance(both.id, p, byNumber)));
+      EXPECT_TRUE(isSame(closed.nearest, open.nearest));
+      if (closed.nearest.distance > 1e-9) {
+        EXPECT_EQ(closed.distance, open.distance);
+      }
+    }
+  }
+}
+
+using Wide = Eigen::Matrix<long double, 3, 1>;
+
+/// The sum of solid angles, over 4 pi.
+double solidAngle(const Mesh& mesh, const Vector3d& p) {
+  long double sum = 0;
+  for (const auto& t : mesh.triangles) {
+    std::array<Wide, 3> u;
+    for (std::size_t i = 0; i < 3; ++i)
+      u[i] = (mesh.positions[t[i]].cast<long double>() - p.cast<long double>()).normalized();
+    const long double volume = u[0].dot(u[1].cross(u[2])),
+                      rest = 1 + u[0].dot(u[1]) + u[1].dot(u[2]) + u[2].dot(u[0]);
+    sum += 2 * std::atan2(volume, rest);
+  }
+  return static_cast<double>(std::abs(sum) / (4 * std::numbers::pi_v<long double>));
+}
+
+TEST(SignedDistances, OpenBodiesByWindingNumber) {
+  Random random(405);
+  Mesh open = sphere(16, 20, {0, 0, 0}, 1.0);
+  open.triangles.erase(open.triangles.begin(), open.triangles.begin() + 60);
+  for (std::size_t t = 0; t < open.triangles.size(); t += 11)
+    std::swap(open.triangles[t][0], open.triangles[t][1]);
+  const Both both(testGeometry(open));
+  const SpatialQueries queries = both.octree.queries();
+  EXPECT_THROW(queries.signedDistance(both.id, {0, 0, 0}), Error);
+  std::size_t inside = 0;
+  for (int i = 0; i < casesOf(400); ++i) {
+    const Vector3d p = randomPoint(random, -1.1, 1.1);
+    for (const double margin : {0.0, 0.2}) {
+      const InsideSettings settings{InsideRule::WindingNumber, margin};
+      const SignedDistance found = queries.signedDistance(both.id, p, settings);
+      EXPECT_TRUE(isSame(found, both.bruteForce.queries().signedDistance(both.id, p, settings)));
+      const double number = solidAngle(open, p);
+      if (std::abs(number - 0.5 + margin) < 1e-9) continue;
+      EXPECT_EQ(found.distance<0, number> 0.5 - margin);
+      inside += found.distance < 0;
+    }
+  }
+  EXPECT_GT(inside, 100u);
+}
+
+/// Inside, boundary included: in a tetrahedron, of any winding.
+TEST(SignedDistances, TetrahedralMeshes) {
+  Random random(406);
+  Solid solid = cells(3, random, [](const auto& c) { return c[0] != 1 || c[1] == 0; });
+  Both both([&](OctreeBasedCD& each) {
+    return each.addTetrahedralMesh(solid.positions, solid.tetrahedra);
+  });
+  for (const double by : {0.0, 0.05, 0.6}) {  // 0.6: tetrahedra are inverted and overlap
+    const Positions now = moved(random, solid.positions, by);
+    both.change([&](OctreeBasedCD& each) { each.setPositions(both.id, now); });
+    const SpatialQueries queries = both.octree.queries();
+    std::size_t inside = 0;
+    for (int i = 0; i < casesOf(150); ++i) {
+      Vector3d p = randomPoint(random, -0.2, 3.2);
+      if (i % 3 == 0) p = 0.5 * onLattice(random, 7);
+      if (i % 3 == 1) p = now[random() % now.size()];
+      const bool expected =
+          std::any_of(solid.tetrahedra.begin(), solid.tetrahedra.end(), [&](const Tetrahedron& t) {
+            std::array<oracle::Vector, 4> corners;
+            for (std::size_t k = 0; k < 4; ++k) {
+              corners[k] = oracle::toRational(now[t[k]]);
+              for (int x = 0; x < 3; ++x) corners[k][static_cast<std::size_t>(x)] -= p[x];
+            }
+            const auto volume = [&](int a, int b, int c) {
+              return sgn(oracle::dot(corners[a], oracle::cross(corners[b], corners[c])));
+            };
+            // Signs of the point's weights; their sum has the sign of the volume.
+            const int w[] = {volume(1, 2, 3), -volume(0, 2, 3), volume(0, 1, 3), -volume(0, 1, 2)};
+            const bool positive = std::any_of(w, w + 4, [](int s) { return s > 0; }),
+                       negative = std::any_of(w, w + 4, [](int s) { return s < 0; });
+            return positive != negative;
+          });
+      EXPECT_EQ(queries.contains(both.id, p), expected) << i;
+      EXPECT_EQ(both.bruteForce.queries().contains(both.id, p), expected);
+      const SignedDistance found = queries.signedDistance(both.id, p);
+      EXPECT_TRUE(isSame(found, both.bruteForce.queries().signedDistance(both.id, p)));
+      EXPECT_EQ(std::signbit(found.distance), expected);
+      EXPECT_TRUE(isSame(found.nearest, *queries.closestPoint(both.id, p)));
+      inside += expected;
+    }
+    EXPECT_GT(inside, 20u);
+  }
+}
+
+}  // namespace
+}  // namespace palpate::testing
