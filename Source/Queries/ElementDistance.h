@@ -26,6 +26,13 @@ class Element {
   Eigen::Vector3d point(const Eigen::Vector3d& weights) const {
     return weights[0] * m_corners[0] + weights[1] * m_corners[1] + weights[2] * m_corners[2];
   }
+  /// The corner that is furthest along a direction.
+  const Eigen::Vector3d& furthest(const Eigen::Vector3d& direction) const {
+    const double heights[] = {direction.dot(m_corners[0]), direction.dot(m_corners[1]),
+                              direction.dot(m_corners[2])};
+    const std::size_t last = heights[2] > heights[1] ? 2 : 1;
+    return m_corners[heights[last] > heights[0] ? last : 0];
+  }
   double radius(const Eigen::Vector3d& weights) const {
     return m_mesh ? m_mesh->radius(m_vertices, weights) : 0.0;
   }

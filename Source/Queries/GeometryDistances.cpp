@@ -89,18 +89,32 @@ class NearestPair {
   }
 
  private:
-  /// Whether a plane across the direction between the nearest elements shows that these ones are
-  /// further apart.
+  /// Whether a plane between the elements shows that they are further apart than the nearest ones.
+  /// The first plane is across the direction of the nearest ones. Each further one is across a
+  /// shorter difference of the elements' points.
+  /// Source   Gilbert, An iterative procedure for computing the minimum of a quadratic form (1966).
   bool isFurther(const Element& a, const Element& b) const {
-    double most = -std::numeric_limits<double>::infinity(), least = -most, size = 0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const Vector3d fromA = a[i] - a[0], fromB = b[i] - a[0];
-      most = std::max(most, m_direction.dot(fromA));
-      least = std::min(least, m_direction.dot(fromB));
-      size = std::max({size, fromA.cwiseAbs().maxCoeff(), fromB.cwiseAbs().maxCoeff()});
+    constexpr int kMostPlanes = 5;
+    double size = 0;
+    for (std::size_t i = 0; i < 3; ++i)
+      size = std::max(
+          {size, (a[i] - a[0]).cwiseAbs().maxCoeff(), (b[i] - a[0]).cwiseAbs().maxCoeff()});
+    const double needed =
+        m_best.distance + a.largestRadius() + b.largestRadius() + kNearestError * size;
+    Vector3d normal = m_direction, difference = Vector3d::Zero();
+    for (int plane = 0; plane < kMostPlanes; ++plane) {
+      const Vector3d nearest = b.furthest(-normal) - a.furthest(normal);
+      const double length = normal.norm();
+      if (length > kShortestDirection && normal.dot(nearest) > needed * length) return true;
+      const Vector3d change = nearest - difference;
+      const double square = change.squaredNorm();
+      if (plane == 0)
+        difference = nearest;
+      else if (square > 0)
+        difference += std::clamp(-difference.dot(change) / square, 0.0, 1.0) * change;
+      normal = difference;
     }
-    return least - most - a.largestRadius() - b.largestRadius() >
-           m_best.distance + kNearestError * size;
+    return false;
   }
 
   const SearchableGeometry &m_a, &m_b;

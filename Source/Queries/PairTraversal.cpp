@@ -35,7 +35,7 @@ class PairDescent {
         expand(m_search.b, m_search.mapB, entry.b, childB, boxA, entry.square,
                [&](float square, OctreeNode node) { push(square, entry.a, node); });
       else
-        testElements(entry.a & ~kOwn, entry.b & ~kOwn);
+        testElements(entry.a & ~kOwn, entry.b & ~kOwn, boxB);
     }
   }
 
@@ -90,30 +90,59 @@ class PairDescent {
     if (begin < end) push(square, node | kOwn);
   }
 
-  HWY_ATTR void testElements(OctreeNode a, OctreeNode b) {
-    const LeafTag d;
-    constexpr std::size_t kSide = 16;
-    alignas(64) float squares[kSide];
+  /// Boxes of elements, in the common floats.
+  struct Leaf {
+    static constexpr std::size_t kSize = 16;
+    alignas(64) float lower[3][kSize], upper[3][kSize];
+
+    HWY_ATTR HWY_INLINE void load(const Octree& octree, const BoxMap& map, std::uint32_t first) {
+      const LeafTag d;
+      for (std::size_t i = 0; i < kSize; i += hn::Lanes(d)) {
+        const auto boxes = BoxLanes<LeafTag>::load(octree.boxes(), first + i).mapped(map);
+        for (int k = 0; k < 3; ++k) {
+          hn::Store(boxes.lower[k], d, lower[k] + i);
+          hn::Store(boxes.upper[k], d, upper[k] + i);
+        }
+      }
+    }
+    FloatBox box(std::size_t i) const {
+      return {{lower[0][i], lower[1][i], lower[2][i], 0},
+              {upper[0][i], upper[1][i], upper[2][i], 0}};
+    }
+    /// Bits of the first `size` boxes that are near enough to another box.
+    HWY_ATTR HWY_INLINE std::uint32_t near(const FloatBox& other, std::size_t size, float limit,
+                                           float* squares) const {
+      const LeafTag d;
+      std::uint32_t bits = 0;
+      for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
+        const auto distances = BoxLanes<LeafTag>::load(*this, i).distanceFrom(other);
+        hn::Store(distances, d, squares + i);
+        bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), hn::Le(distances, hn::Set(d, limit))))
+                << i;
+      }
+      return bits;
+    }
+  };
+
+  HWY_ATTR void testElements(OctreeNode a, OctreeNode b, const FloatBox& boxB) {
+    alignas(64) float squares[Leaf::kSize];
+    Leaf leafA, leafB;
     const auto [beginA, endA] = m_search.a.ownRange(a);
     const auto [beginB, endB] = m_search.b.ownRange(b);
-    for (std::uint32_t i = beginA; i < endA; ++i) {
-      const FloatBox box =
-          BoxLanes<BoxTag>::of(m_search.a.boxes()[i]).mapped(m_search.mapA).first();
-      for (std::uint32_t j = beginB; j < endB; j += kSide) {
-        const std::size_t size = std::min<std::size_t>(kSide, endB - j);
-        std::uint32_t bits = 0;
-        for (std::size_t k = 0; k < size; k += hn::Lanes(d)) {
-          const auto distances = BoxLanes<LeafTag>::load(m_search.b.boxes(), j + k)
-                                     .mapped(m_search.mapB)
-                                     .distanceFrom(box);
-          hn::Store(distances, d, squares + k);
-          bits |=
-              bitsOf(d, hn::And(hn::FirstN(d, size - k), hn::Le(distances, hn::Set(d, m_limit))))
-              << k;
-        }
-        for (; bits; bits &= bits - 1) {
-          const auto lane = static_cast<std::uint32_t>(std::countr_zero(bits));
-          if (squares[lane] <= m_limit) setBound(m_test(m_context, i, j + lane));
+    for (std::uint32_t i = beginA; i < endA; i += Leaf::kSize) {
+      leafA.load(m_search.a, m_search.mapA, i);
+      const std::uint32_t nearA =
+          leafA.near(boxB, std::min<std::size_t>(Leaf::kSize, endA - i), m_limit, squares);
+      for (std::uint32_t j = beginB; nearA && j < endB; j += Leaf::kSize) {
+        leafB.load(m_search.b, m_search.mapB, j);
+        const std::size_t size = std::min<std::size_t>(Leaf::kSize, endB - j);
+        for (std::uint32_t rows = nearA; rows; rows &= rows - 1) {
+          const auto row = static_cast<std::uint32_t>(std::countr_zero(rows));
+          for (std::uint32_t bits = leafB.near(leafA.box(row), size, m_limit, squares); bits;
+               bits &= bits - 1) {
+            const auto lane = static_cast<std::uint32_t>(std::countr_zero(bits));
+            if (squares[lane] <= m_limit) setBound(m_test(m_context, i + row, j + lane));
+          }
         }
       }
     }
