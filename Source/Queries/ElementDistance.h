@@ -1,6 +1,6 @@
 #pragma once
 
-#include "Queries/SearchableGeometry.h"
+#include "Mesh/TriangleMesh.h"
 
 #include <Eigen/Core>
 
@@ -14,9 +14,10 @@ namespace palpate {
 /// A triangle, segment or point, whose positions are read once.
 class Element {
  public:
-  Element(const SearchableGeometry& geometry, std::uint32_t element)
-      : m_mesh(&geometry.mesh), m_vertices(geometry.mesh.topology.triangles[element]) {
-    for (std::size_t i = 0; i < 3; ++i) m_corners[i] = m_mesh->now[m_vertices[i]];
+  Element() = default;
+  Element(const TriangleMesh& mesh, const Triangle& vertices)
+      : m_mesh(&mesh), m_vertices(vertices) {
+    for (std::size_t i = 0; i < 3; ++i) m_corners[i] = mesh.now[vertices[i]];
   }
   /// A segment without a radius.
   Element(const Eigen::Vector3d& p, const Eigen::Vector3d& q)
@@ -36,7 +37,6 @@ class Element {
   double radius(const Eigen::Vector3d& weights) const {
     return m_mesh ? m_mesh->radius(m_vertices, weights) : 0.0;
   }
-  double largestRadius() const { return m_mesh ? m_mesh->largestRadius : 0.0; }
   bool isPoint() const { return m_vertices[0] == m_vertices[1] && m_vertices[1] == m_vertices[2]; }
   /// Whether corner i repeats an earlier one, and edge i an earlier edge.
   bool repeatsCorner(std::size_t i) const {
@@ -49,7 +49,7 @@ class Element {
 
  private:
   const TriangleMesh* m_mesh = nullptr;
-  Triangle m_vertices;
+  Triangle m_vertices{};
   std::array<Eigen::Vector3d, 3> m_corners;
 };
 

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -58,14 +59,72 @@ double sizeOf(const FloatBox& box) {
 /// The nearest pair of elements that was found so far.
 class NearestPair {
  public:
-  NearestPair(const SearchableGeometry& a, const SearchableGeometry& b) : m_a(a), m_b(b) {}
+  NearestPair(const SearchableGeometry& a, const SearchableGeometry& b)
+      : m_a(a),
+        m_b(b),
+        m_origin(worldOrigin(a)),
+        m_radii(a.mesh.largestRadius + b.mesh.largestRadius) {}
 
-  void test(std::uint32_t elementA, std::uint32_t elementB) {
+  /// Tests the elements at two places of the octrees' orders.
+  void test(std::uint32_t placeA, std::uint32_t placeB) {
+    test(placeA, elementOf(m_a, placeA), placeB, elementOf(m_b, placeB));
+  }
+  /// Tests elements after a plane across the direction of the nearest ones has excluded most.
+  void test(const NearElements& elements) {
+    std::array<Element, NearElements::kSide> all;
+    std::array<double, NearElements::kSide> lowest;
+    std::uint32_t read = 0;
+    Vector3d direction = m_direction;
+    for (std::uint32_t i = 0; i < NearElements::kSide; ++i) {
+      if (elements.near[i] == 0) continue;
+      const Element a = elementOf(m_a, elements.placeA + i);
+      double highest = -lowestAlong(-direction, a);
+      for (std::uint32_t bits = elements.near[i]; bits; bits &= bits - 1) {
+        const auto j = static_cast<std::uint32_t>(std::countr_zero(bits));
+        if (direction != m_direction) {
+          direction = m_direction;
+          highest = -lowestAlong(-direction, a);
+          read = 0;
+        }
+        if (!(read >> j & 1)) {
+          all[j] = elementOf(m_b, elements.placeB + j);
+          lowest[j] = lowestAlong(direction, all[j]);
+          read |= 1u << j;
+        }
+        if (lowest[j] - highest > m_best.distance + m_radii) continue;
+        test(elements.placeA + i, a, elements.placeB + j, all[j]);
+      }
+    }
+  }
+
+  /// L, between the elements' surfaces; infinite if there is none.
+  double distance() const { return m_best.distance; }
+  GeometryDistance result() const {
+    return {surfacePoint(m_a, m_elementA, m_best.weightsA, m_best.distance),
+            surfacePoint(m_b, m_elementB, m_best.weightsB, m_best.distance), m_best.distance};
+  }
+
+ private:
+  static Element elementOf(const SearchableGeometry& geometry, std::uint32_t place) {
+    return {geometry.mesh, geometry.tree.ordered()[place]};
+  }
+  /// A lower bound of an element's heights along a direction, above the origin.
+  double lowestAlong(const Vector3d& direction, const Element& element) const {
+    double lowest = kInfinity, size = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vector3d from = element[i] - m_origin;
+      lowest = std::min(lowest, direction.dot(from));
+      size = std::max(size, from.cwiseAbs().maxCoeff());
+    }
+    return lowest - kNearestError * size;
+  }
+  void test(std::uint32_t placeA, const Element& a, std::uint32_t placeB, const Element& b) {
+    const std::uint32_t elementA = m_a.tree.octree().order()[placeA],
+                        elementB = m_b.tree.octree().order()[placeB];
     const auto precedes = [&] {
       return std::pair(elementA, elementB) < std::pair(m_elementA, m_elementB);
     };
     if (m_best.distance == 0.0 && !precedes()) return;
-    const Element a(m_a, elementA), b(m_b, elementB);
     if (isFurther(a, b)) return;
     const ElementDistance found = elementDistance(a, b);
     if (!(found.distance < m_best.distance || (found.distance == m_best.distance && precedes())))
@@ -81,14 +140,6 @@ class NearestPair {
       m_direction.setZero();
   }
 
-  /// L, between the elements' surfaces; infinite if there is none.
-  double distance() const { return m_best.distance; }
-  GeometryDistance result() const {
-    return {surfacePoint(m_a, m_elementA, m_best.weightsA, m_best.distance),
-            surfacePoint(m_b, m_elementB, m_best.weightsB, m_best.distance), m_best.distance};
-  }
-
- private:
   /// Whether a plane between the elements shows that they are further apart than the nearest ones.
   /// The first plane is across the direction of the nearest ones. Each further one is across a
   /// shorter difference of the elements' points.
@@ -99,8 +150,7 @@ class NearestPair {
     for (std::size_t i = 0; i < 3; ++i)
       size = std::max(
           {size, (a[i] - a[0]).cwiseAbs().maxCoeff(), (b[i] - a[0]).cwiseAbs().maxCoeff()});
-    const double needed =
-        m_best.distance + a.largestRadius() + b.largestRadius() + kNearestError * size;
+    const double needed = m_best.distance + m_radii + kNearestError * size;
     Vector3d normal = m_direction, difference = Vector3d::Zero();
     for (int plane = 0; plane < kMostPlanes; ++plane) {
       const Vector3d nearest = b.furthest(-normal) - a.furthest(normal);
@@ -118,6 +168,8 @@ class NearestPair {
   }
 
   const SearchableGeometry &m_a, &m_b;
+  const Vector3d m_origin;
+  const double m_radii;  ///< L: the largest ones of both
   ElementDistance m_best;
   std::uint32_t m_elementA = kNoElement, m_elementB = kNoElement;
   Vector3d m_direction = Vector3d::Zero();  ///< from a to b: unit, or 0
@@ -142,7 +194,7 @@ void startNear(const SearchableGeometry& a, const SearchableGeometry& b, Nearest
     placeB = onB->place;
     if (isSame) break;
   }
-  nearest.test(a.tree.octree().order()[placeA], b.tree.octree().order()[placeB]);
+  nearest.test(placeA, placeB);
 }
 
 /// Visits the elements of a geometry, nearest boxes first. bound(centre, half): a lower bound of
@@ -224,8 +276,8 @@ GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGe
   const auto boundOf = [&] {
     return OutwardRounding::up(static_cast<float>((nearest.distance() + radii) * scale + error));
   };
-  forNearPairs(search, boundOf(), [&](std::uint32_t placeA, std::uint32_t placeB) {
-    nearest.test(search.a.order()[placeA], search.b.order()[placeB]);
+  forNearElements(search, boundOf(), [&](const NearElements& elements) {
+    nearest.test(elements);
     return boundOf();
   });
   return nearest.result();
@@ -245,7 +297,7 @@ GeometryDistance distanceBetween(const SearchableGeometry& geometry, GeometryId 
                                  kShapeBoundError * shape.magnitude());
       },
       [&](std::uint32_t element) {
-        const Element corners(geometry, element);
+        const Element corners(geometry.mesh, geometry.mesh.topology.triangles[element]);
         const auto take = [&](const NearestToShape& found, const Vector3d& weights) {
           const double distance = std::max(0.0, found.distance - corners.radius(weights));
           if (!(distance < nearest.distance || (distance == nearest.distance && element < best)))
@@ -325,7 +377,7 @@ SegmentDistance distanceFromSegment(const SearchableGeometry& geometry, const Ve
                kNearestError * ((centre - p).cwiseAbs().sum() + (centre - q).cwiseAbs().sum());
       },
       [&](std::uint32_t element) {
-        const Element other(geometry, element);
+        const Element other(geometry.mesh, geometry.mesh.topology.triangles[element]);
         const ElementDistance found = elementDistance(segment, other);
         if (found.distance < best.distance ||
             (found.distance == best.distance && element < nearest)) {

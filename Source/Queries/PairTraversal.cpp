@@ -40,6 +40,7 @@ class PairDescent {
   }
 
  private:
+  static constexpr std::size_t kSide = NearElements::kSide;
   /// The bit of a node of which only its own elements are left, without its children.
   static constexpr OctreeNode kOwn = 0x80000000u;
   struct Entry {
@@ -91,13 +92,12 @@ class PairDescent {
   }
 
   /// Boxes of elements, in the common floats.
-  struct Leaf {
-    static constexpr std::size_t kSize = 16;
-    alignas(64) float lower[3][kSize], upper[3][kSize];
+  struct Boxes {
+    alignas(64) float lower[3][kSide], upper[3][kSide];
 
     HWY_ATTR HWY_INLINE void load(const Octree& octree, const BoxMap& map, std::uint32_t first) {
       const LeafTag d;
-      for (std::size_t i = 0; i < kSize; i += hn::Lanes(d)) {
+      for (std::size_t i = 0; i < kSide; i += hn::Lanes(d)) {
         const auto boxes = BoxLanes<LeafTag>::load(octree.boxes(), first + i).mapped(map);
         for (int k = 0; k < 3; ++k) {
           hn::Store(boxes.lower[k], d, lower[k] + i);
@@ -105,45 +105,44 @@ class PairDescent {
         }
       }
     }
-    FloatBox box(std::size_t i) const {
+    FloatBox operator[](std::size_t i) const {
       return {{lower[0][i], lower[1][i], lower[2][i], 0},
               {upper[0][i], upper[1][i], upper[2][i], 0}};
     }
-    /// Bits of the first `size` boxes that are near enough to another box.
-    HWY_ATTR HWY_INLINE std::uint32_t near(const FloatBox& other, std::size_t size, float limit,
-                                           float* squares) const {
+    /// Bits of the first `size` boxes that are near another box.
+    HWY_ATTR HWY_INLINE std::uint32_t near(const FloatBox& other, std::size_t size,
+                                           float limit) const {
       const LeafTag d;
       std::uint32_t bits = 0;
       for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
-        const auto distances = BoxLanes<LeafTag>::load(*this, i).distanceFrom(other);
-        hn::Store(distances, d, squares + i);
-        bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), hn::Le(distances, hn::Set(d, limit))))
-                << i;
+        const auto isNear =
+            hn::Le(BoxLanes<LeafTag>::load(*this, i).distanceFrom(other), hn::Set(d, limit));
+        bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), isNear)) << i;
       }
       return bits;
     }
   };
 
   HWY_ATTR void testElements(OctreeNode a, OctreeNode b, const FloatBox& boxB) {
-    alignas(64) float squares[Leaf::kSize];
-    Leaf leafA, leafB;
+    NearElements found;
+    Boxes boxesA, boxesB;
     const auto [beginA, endA] = m_search.a.ownRange(a);
     const auto [beginB, endB] = m_search.b.ownRange(b);
-    for (std::uint32_t i = beginA; i < endA; i += Leaf::kSize) {
-      leafA.load(m_search.a, m_search.mapA, i);
-      const std::uint32_t nearA =
-          leafA.near(boxB, std::min<std::size_t>(Leaf::kSize, endA - i), m_limit, squares);
-      for (std::uint32_t j = beginB; nearA && j < endB; j += Leaf::kSize) {
-        leafB.load(m_search.b, m_search.mapB, j);
-        const std::size_t size = std::min<std::size_t>(Leaf::kSize, endB - j);
-        for (std::uint32_t rows = nearA; rows; rows &= rows - 1) {
-          const auto row = static_cast<std::uint32_t>(std::countr_zero(rows));
-          for (std::uint32_t bits = leafB.near(leafA.box(row), size, m_limit, squares); bits;
-               bits &= bits - 1) {
-            const auto lane = static_cast<std::uint32_t>(std::countr_zero(bits));
-            if (squares[lane] <= m_limit) setBound(m_test(m_context, i + row, j + lane));
-          }
+    for (found.placeA = beginA; found.placeA < endA; found.placeA += kSide) {
+      boxesA.load(m_search.a, m_search.mapA, found.placeA);
+      const std::uint32_t rows =
+          boxesA.near(boxB, std::min<std::size_t>(kSide, endA - found.placeA), m_limit);
+      if (rows == 0) continue;
+      for (found.placeB = beginB; found.placeB < endB; found.placeB += kSide) {
+        boxesB.load(m_search.b, m_search.mapB, found.placeB);
+        const std::size_t size = std::min<std::size_t>(kSide, endB - found.placeB);
+        std::uint32_t any = 0;
+        found.near.fill(0);
+        for (std::uint32_t bits = rows; bits; bits &= bits - 1) {
+          const auto row = static_cast<std::uint32_t>(std::countr_zero(bits));
+          any |= found.near[row] = boxesB.near(boxesA[row], size, m_limit);
         }
+        if (any) setBound(m_test(m_context, found));
       }
     }
   }

@@ -3,6 +3,8 @@
 #include "Octree/BoxMap.h"
 #include "Octree/Octree.h"
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <type_traits>
 
@@ -13,19 +15,26 @@ struct PairSearch {
   const Octree &a, &b;
   BoxMap mapA, mapB;  ///< to common floats
 };
-/// Tests the elements at two places. Returns a bound in the common floats: pairs of boxes that are
-/// further apart are skipped.
-using TestElements = float (*)(void* context, std::uint32_t placeA, std::uint32_t placeB);
+/// Elements of both octrees whose boxes are near each other. Places are those of the orders.
+struct NearElements {
+  static constexpr std::size_t kSide = 16;
+  std::uint32_t placeA, placeB;
+  /// Bit j of near[i]: the elements at placeA + i and placeB + j are near each other.
+  std::array<std::uint32_t, kSide> near;
+};
+/// Tests elements. Returns a bound in the common floats: pairs of boxes that are further apart are
+/// skipped.
+using TestElements = float (*)(void* context, const NearElements&);
 
 /// Visits pairs of elements, nearest pairs of nodes first. Of two nodes the larger one is replaced
 /// by its children.
 void searchPairs(const PairSearch&, float bound, void* context, TestElements);
 
-/// searchPairs() with f(placeA, placeB) in place of the function pointer.
+/// searchPairs() with f(elements) in place of the function pointer.
 template <class F>
-void forNearPairs(const PairSearch& search, float bound, F&& f) {
-  const auto call = [](void* context, std::uint32_t placeA, std::uint32_t placeB) {
-    return (*static_cast<std::remove_reference_t<F>*>(context))(placeA, placeB);
+void forNearElements(const PairSearch& search, float bound, F&& f) {
+  const auto call = [](void* context, const NearElements& elements) {
+    return (*static_cast<std::remove_reference_t<F>*>(context))(elements);
   };
   searchPairs(search, bound, &f, call);
 }
