@@ -29,8 +29,9 @@ class Element {
   }
   /// The corner that is furthest along a direction.
   const Eigen::Vector3d& furthest(const Eigen::Vector3d& direction) const {
-    const double heights[] = {direction.dot(m_corners[0]), direction.dot(m_corners[1]),
-                              direction.dot(m_corners[2])};
+    // Relative to the first corner, as the element may be far from the origin.
+    const double heights[] = {0.0, direction.dot(m_corners[1] - m_corners[0]),
+                              direction.dot(m_corners[2] - m_corners[0])};
     const std::size_t last = heights[2] > heights[1] ? 2 : 1;
     return m_corners[heights[last] > heights[0] ? last : 0];
   }

@@ -127,7 +127,7 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForPlacedBodiesAndFarFromTheOri
     for (int placed = 0; placed < 4; ++placed) {
       Both both(a, b);
       const Vector3d away = far * Vector3d(1, -2, 0.3);
-      for (const double most : {2.0, 0.5, 0.0}) {
+      for (const double most : {2.0, 1.5, 1.2, 1.0, 0.5, 0.0}) {
         const auto put = [&](GeometryId id, const TestGeometry& geometry, bool isPlaced) {
           const Matrix3d turn = randomTurn(random);
           const Vector3d shift = away + randomPoint(random, -most, most);
