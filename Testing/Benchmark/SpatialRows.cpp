@@ -172,6 +172,10 @@ void timeRows(Report& report, const SpatialBody& body, const Engines& engines,
       figure(engines[e]->name(), "first query us", median(times[e].first[r]));
       if (e > 0) ratio = std::max(ratio, medianRatio(palpate, samples));
     }
+    if (ratio == 0) {  // Palpate alone
+      report.line(cells);
+      continue;
+    }
     cells.push_back(number(ratio));
     figure("Palpate", "ratio to the fastest library", ratio);
     const double target = row.target[body.size];
