@@ -116,16 +116,16 @@ def spatial(figures):
         if not times:
             continue
         fastest = min(times, key=times.get)
-        update = figures.value("spatial", scene.split(":")[0] + ": update", 1, fastest, "ms")
+        update = figures.value("spatial", scene, 1, fastest, "update ms")
         if update is None:
-            update = figures.value("spatial", scene, 1, fastest, "update ms")
+            update = figures.value("spatial", scene.split(":")[0] + ": update", 1, fastest, "ms")
         row = [scene, cell(own), fastest, cell(times[fastest]), cell(update)]
         ratio, allowed, target = (figures.value("spatial", scene, 1, "Palpate", metric) for metric in
                                   ("ratio to the fastest library", "allowed ratio", "scaled target us"))
         row += [cell(ratio), cell(allowed), verdict(ratio, allowed), cell(target), verdict(own, target)]
         rows.append(row)
-    return markdown(["1 thread", "Palpate us", "fastest library", "its us", "its update ms", "ratio", "allowed ratio", "",
-                     "scaled target us", ""], rows)
+    return markdown(["1 thread", "Palpate us", "fastest library", "its us", "its update ms", "ratio", "allowed ratio",
+                     "verdict", "scaled target us", "verdict"], rows)
 
 
 def by_engine(table, cell):
