@@ -159,7 +159,9 @@ SolverVertices World::vertices(BodyId body) const {
 
 void World::predict(double seconds, const Vector3d& acceleration, double damping) {
   const Timed timed(m_times.solver);
-  if (m_seconds == 0.0) m_detection.advance();  // the first step begins at the added positions
+  // A geometry is at rest in the step in which it is added. The first step begins after that.
+  if (!m_hasStarted) m_detection.advance();
+  m_hasStarted = true;
   m_seconds = seconds;
   m_forces.assign(m_bodies.size(), Vector3d::Zero());
   m_solver.predict(seconds, acceleration, damping);

@@ -128,6 +128,7 @@ class World {
   std::vector<std::size_t> m_rowPairs;
   std::vector<Eigen::Vector3d> m_forces;  ///< by body
   double m_seconds = 0;
+  bool m_hasStarted = false;  ///< predict() was called
   Times m_times;
 };
 

@@ -13,7 +13,7 @@
 namespace palpate {
 
 /// Appends the elements whose distance from a point, less the radius, is at most `distance`, in any
-/// order. Decided exactly, with the exception in PointDistances. near: scratch.
+/// order. Decided exactly. near: scratch.
 void findWithin(const SearchableGeometry&, const Eigen::Vector3d& point, double distance,
                 bool bruteForce, Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out);
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 namespace palpate::testing {
 
 /// Sanitizers make tests ten times slower. In such a build, a test with many random cases may run a
@@ -11,5 +13,8 @@ inline constexpr int kShareOfCases = 1;
 #endif
 
 constexpr int casesOf(int all) { return (all + kShareOfCases - 1) / kShareOfCases; }
+
+/// The least number that a test of all cases must find; 0 if the build runs a part of them.
+constexpr std::size_t leastOf(std::size_t all) { return kShareOfCases == 1 ? all : 0; }
 
 }  // namespace palpate::testing

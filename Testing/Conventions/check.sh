@@ -150,6 +150,9 @@ checkFormat() {
     echo "skipped: clang-format-14 is not installed"
     exit 77
   }
+  local marker
+  while read -r marker; do fault "conflict marker: $marker"; done < <(
+    grep -rnE '^(<<<<<<<|>>>>>>>) ' --exclude-dir=build --exclude-dir=out --exclude-dir=.git .)
   find Source Examples Testing -name '*.h' -o -name '*.cpp' | xargs "$tool" --dry-run -Werror --style=file || faults=1
 }
 

@@ -57,6 +57,7 @@ plant PublicHeaders Source/Public/palpate/A.h '#pragma once\n#include <Eigen/LU>
 plant PublicHeaders Source/Public/palpate/A.h '#define LIBRARY <sys/mman.h>\n#include LIBRARY\n' "$compiler" "$eigen"
 plant PublicHeaders Source/Adapters/Vtk/Public/palpate/vtk/A.h '#pragma once\n#include <vtkPolyData.h>\n' "$compiler" "$eigen"
 plant Format Source/Core/A.h '#pragma once\nint  a;\n'
+plant Format Source/A.md '<<<<<<< HEAD\n'
 plant Quiet Source/Math/A.cpp 'void f() { std::cerr << 1; }\n'
 plant Quiet Source/Math/A.cpp 'void f() { std::printf("1"); }\n'
 plant Quiet Source/Math/A.cpp 'void f() { std::exit(1); }\n'

@@ -1,4 +1,5 @@
 #include "Scenes.h"
+#include "World.h"
 
 #include <palpate/OctreeBasedCD.h>
 
@@ -194,6 +195,19 @@ TEST(Scenes, OneMeshGlidesThroughItsCopy) {
   ASSERT_EQ(scene.meshes.size(), 2u);
   EXPECT_EQ(candidates(scene, 0, 0, 1), 0u);
   EXPECT_GT(candidates(scene, 26, 0, 1), 0u);
+}
+
+/// A body that passes through another within the first step has impacts there.
+TEST(World, FirstStepHasMotion) {
+  World world(1);
+  const SceneMesh floor{{{-5, -5, 0}, {5, -5, 0}, {0, 5, 0}}, {{0, 1, 2}}};
+  const SceneMesh thrown{{{-1, -1, 1}, {1, -1, 1}, {0, 1, 1}}, {{0, 1, 2}}};
+  const World::BodyId below = world.addMesh("floor", floor, 0),
+                      above = world.addMesh("thrown", thrown, 1);
+  world.addPair(above, below, {.method = Method::Continuous}, 0);
+  world.predict(1.0, {0, 0, -2}, 0);  // from z = 1 to z = -1
+  world.detectOnly();
+  EXPECT_EQ(world.contacts(above, below).vertexTriangle().size(), 3u);
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ struct RayHit {
   double t;
   bool frontFace;  ///< whether the ray comes against the winding normal
   /// Whether the ray changes from one side of the surface to the other. From inside a closed mesh
-  /// the number of such hits is odd.
+  /// the number of such hits is odd, if the winding number there is odd.
   bool crosses;
 };
 
@@ -140,7 +140,8 @@ class PALPATE_EXPORT SpatialQueries {
   ///
   /// Units    point, maxDistance: L; both are in the world.
   /// Errors   NonFinitePosition; InvalidSettings if maxDistance is negative or NaN.
-  /// Cost     about logarithmic in the elements. Allocates nothing.
+  /// Cost     about logarithmic in the elements. Allocates nothing but the integers that compare
+  ///          almost equal distances.
   std::optional<SurfacePoint> closestPoint(GeometryId, const Eigen::Vector3d& point,
                                            double maxDistance = kInfinity) const;
   /// The same for many points, on all threads. Points without an answer have element kNoElement.
@@ -157,8 +158,8 @@ class PALPATE_EXPORT SpatialQueries {
                        std::vector<SurfacePoint>& out, double maxDistance = kInfinity) const;
   /// Whether a point is inside a body, by the rule in InsideSettings. With
   /// InsideRule::WindingNumber a number that the margin or rounding leaves open counts as inside.
-  /// Points on the surface of a triangle mesh are not inside; points on the boundary of a
-  /// tetrahedron are.
+  /// With InsideRule::Closed, points on the surface of a triangle mesh are not inside; points on
+  /// the boundary of a tetrahedron are.
   ///
   /// Errors   those of findInsideVertices(); NonFinitePosition.
   bool contains(GeometryId body, const Eigen::Vector3d& point, const InsideSettings& = {}) const;

@@ -173,7 +173,7 @@ TEST(RoundRays, EnterAndLeaveLinesAndPoints) {
     const Vector3d shift(0.1, 0.05, -0.1);
     both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, shift); });
     test(placed(now, turn, shift), 20);
-    EXPECT_GT(hits, 30u);
+    EXPECT_GE(hits, leastOf(30));
   }
 }
 
@@ -247,7 +247,7 @@ TEST(RoundRays, EnterAndLeaveShapes) {
       }
       ASSERT_FALSE(HasFailure()) << i << ' ' << shape.geometry.index();
     }
-    EXPECT_GT(hits, 5u) << shape.geometry.index();
+    EXPECT_GE(hits, leastOf(5)) << shape.geometry.index();
   }
 }
 
