@@ -38,19 +38,19 @@ template <class V>
 struct Vector3 {
   V x, y, z;
 
-  friend HWY_INLINE Vector3 operator+(const Vector3& a, const Vector3& b) {
+  friend HWY_ATTR HWY_INLINE Vector3 operator+(const Vector3& a, const Vector3& b) {
     return {a.x + b.x, a.y + b.y, a.z + b.z};
   }
-  friend HWY_INLINE Vector3 operator-(const Vector3& a, const Vector3& b) {
+  friend HWY_ATTR HWY_INLINE Vector3 operator-(const Vector3& a, const Vector3& b) {
     return {a.x - b.x, a.y - b.y, a.z - b.z};
   }
-  friend HWY_INLINE Vector3 operator*(const V& factor, const Vector3& a) {
+  friend HWY_ATTR HWY_INLINE Vector3 operator*(const V& factor, const Vector3& a) {
     return {factor * a.x, factor * a.y, factor * a.z};
   }
-  friend HWY_INLINE V dot(const Vector3& a, const Vector3& b) {
+  friend HWY_ATTR HWY_INLINE V dot(const Vector3& a, const Vector3& b) {
     return a.x * b.x + a.y * b.y + a.z * b.z;
   }
-  friend HWY_INLINE Vector3 cross(const Vector3& a, const Vector3& b) {
+  friend HWY_ATTR HWY_INLINE Vector3 cross(const Vector3& a, const Vector3& b) {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
   }
 };
