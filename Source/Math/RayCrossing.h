@@ -14,23 +14,25 @@ enum class RayCrossing : std::int8_t {
   OnTriangle    ///< the ray starts on it
 };
 
-/// How the ray from p along +x crosses triangle (a, b, c).
+/// How the ray from p along an axis (0, 1, 2), or against it, crosses triangle (a, b, c).
 ///
-/// Exact for any finite doubles. The ray is moved aside by (0, e, e²) for a vanishing e > 0, so
-/// that it meets no edge and no corner. Over a closed mesh, the number of Leaving less that of
-/// Entering is therefore the winding number of p, whatever the ray would have hit.
-/// Source   Simulation of simplicity (Edelsbrunner, Mücke, 1990), for the two coordinates of p.
-inline RayCrossing crossRay(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
-                            const Eigen::Vector3d& b, const Eigen::Vector3d& c,
-                            SignCounts& counts) {
-  bool isOnEdge = false;  // p, seen along x, is on the line of an edge
+/// Exact for any finite doubles. The ray is moved aside by (e, e²) along the next two axes, in
+/// cyclic order, for a vanishing e > 0, so that it meets no edge and no corner. Over a closed mesh,
+/// the number of Leaving less that of Entering is therefore the winding number of p, whatever the
+/// ray would have hit.
+/// Source   Simulation of simplicity (Edelsbrunner, Mücke, 1990), for two coordinates of p.
+inline RayCrossing crossRay(int axis, bool against, const Eigen::Vector3d& p,
+                            const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                            const Eigen::Vector3d& c, SignCounts& counts) {
+  const int y = axis == 2 ? 0 : axis + 1, z = axis == 0 ? 2 : axis - 1;
+  bool isOnEdge = false;  // p, seen along the axis, is on the line of an edge
   const auto turn = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
-    if (const int sign = orient2d(0, from, to, p, counts)) return sign;
+    if (const int sign = orient2d(axis, from, to, p, counts)) return sign;
     isOnEdge = true;
-    // The x component of (to - from) x (p - from) falls with p.y by to.z - from.z and grows with
-    // p.z by to.y - from.y.
-    if (to.z() != from.z()) return to.z() < from.z() ? 1 : -1;
-    return (to.y() > from.y()) - (to.y() < from.y());
+    // The component along the axis of (to - from) x (p - from) falls with p[y] by to[z] - from[z]
+    // and grows with p[z] by to[y] - from[y].
+    if (to[z] != from[z]) return to[z] < from[z] ? 1 : -1;
+    return (to[y] > from[y]) - (to[y] < from[y]);
   };
   const int facing = turn(a, b);
   const bool passes = facing != 0 && turn(b, c) == facing && turn(c, a) == facing;
@@ -39,8 +41,8 @@ inline RayCrossing crossRay(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
   if (side == 0 && (!isOnEdge || exact::compareDistance(
                                      p, {a, b, c, exact::closestFeature(p, a, b, c)}, 0.0) == 0))
     return RayCrossing::OnTriangle;
-  if (!passes || side == facing) return RayCrossing::None;  // the triangle is behind the start
-  return facing > 0 ? RayCrossing::Leaving : RayCrossing::Entering;
+  if (!passes || (side == facing) != against) return RayCrossing::None;  // it is behind the start
+  return (facing > 0) != against ? RayCrossing::Leaving : RayCrossing::Entering;
 }
 
 }  // namespace palpate

@@ -9,6 +9,7 @@
 #include "Math/Tolerances.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -28,15 +29,35 @@ class BodyQuery {
         m_stack(stack),
         m_frame(geometry) {}
 
-  /// The winding number of the surface about p; 0 on the surface.
+  /// The winding number of the surface about p; 0 on the surface. Counted along the axis, or
+  /// against it, that leaves the octree first.
   int windingNumber(const Eigen::Vector3d& p) {
+    FloatBox ray = m_frame.boxOf(p);
+    int axis = 0;
+    bool against = false;
+    if (!m_bruteForce) {
+      const FloatBox root = m_frame.map()(m_geometry.tree.octree().box(0));
+      if (!ray.overlaps(root)) return 0;
+      // The bits of floats that are not negative have the order of the floats.
+      std::uint32_t least = ~0u;
+      for (std::uint32_t k = 0; k < 3; ++k) {
+        const auto key = [](float way, std::uint32_t direction) {
+          return (std::bit_cast<std::uint32_t>(std::max(way, 0.0f)) & ~7u) | direction;
+        };
+        least = std::min({least, key(root.upper[k] - ray.upper[k], k),
+                          key(ray.lower[k] - root.lower[k], k + 4)});
+      }
+      axis = static_cast<int>(least & 3);
+      against = (least & 4) != 0;
+      (against ? ray.lower : ray.upper)[axis] = against ? -kFloatInfinity : kFloatInfinity;
+    }
     int number = 0;
     bool on = false;
     SignCounts counts;
     const auto count = [&](std::uint32_t i) {
       const auto& [a, b, c] = m_geometry.tree.ordered()[i];
       const auto& now = m_geometry.mesh.now;
-      const RayCrossing crossing = crossRay(p, now[a], now[b], now[c], counts);
+      const RayCrossing crossing = crossRay(axis, against, p, now[a], now[b], now[c], counts);
       if (crossing == RayCrossing::OnTriangle)
         on = true;
       else
@@ -45,8 +66,6 @@ class BodyQuery {
     if (m_bruteForce) {
       for (std::uint32_t i = 0; i < size(); ++i) count(i);
     } else {
-      FloatBox ray = m_frame.boxOf(p);
-      ray.upper[0] = kFloatInfinity;
       findOverlapping(m_geometry.tree.octree(), m_frame.map(), ray, m_stack);
       for (const std::uint32_t i : m_stack.found) count(i);
     }
@@ -65,11 +84,6 @@ class BodyQuery {
             -near->closest.normal,
             near->closest.distance,
             true};
-  }
-
-  bool mayContain(const Eigen::Vector3d& p) const {
-    return m_bruteForce ||
-           m_frame.boxOf(p).overlaps(m_frame.map()(m_geometry.tree.octree().box(0)));
   }
 
  private:
@@ -101,7 +115,7 @@ class InsideQuery {
     if (m_settings.rule == InsideRule::WindingNumber)
       return m_body.windingNumbers.evaluate(m_body, p, m_settings.margin, m_bruteForce, m_stack);
     if (m_solid) return {m_solid->lowest(p).has_value(), true};
-    return {m_surface.mayContain(p) && m_surface.windingNumber(p) != 0, true};
+    return {m_surface.windingNumber(p) != 0, true};
   }
   InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p) {
     return m_surface.nearest(vertex, p);
@@ -150,7 +164,7 @@ bool isClosed(SearchableGeometry& body) {
   return *topology.closed;
 }
 
-void checkInside(SearchableGeometry& body, const InsideSettings& settings) {
+void checkSettings(const SearchableGeometry& body, const InsideSettings& settings) {
   if (settings.rule != InsideRule::Closed && settings.rule != InsideRule::WindingNumber)
     throw Error(ErrorCode::InvalidSettings,
                 nameOf(body.id) + ": rule is " + std::to_string(static_cast<int>(settings.rule)) +
@@ -161,13 +175,15 @@ void checkInside(SearchableGeometry& body, const InsideSettings& settings) {
                 nameOf(body.id) + ": margin is " + textOf(settings.margin) +
                     "; it must be at least 0 and below 0.5",
                 body.id);
-  MeshTopology& topology = body.mesh.topology;
+}
+
+void checkInside(SearchableGeometry& body, InsideRule rule) {
+  const MeshTopology& topology = body.mesh.topology;
   if (!topology.hasFaces())
     throw Error(ErrorCode::NotClosed,
                 nameOf(body.id) + " is " + nameOf(topology.type) + ", which has no inside",
                 body.id);
-  if (settings.rule == InsideRule::WindingNumber) return;
-  if (isClosed(body)) return;
+  if (rule == InsideRule::WindingNumber || isClosed(body)) return;
   const MeshDefects defects = findMeshDefects(topology.triangles);
   const auto describe = [](const std::vector<Segment>& edges, const char* what) {
     if (edges.empty()) return std::string();

@@ -24,10 +24,11 @@ void findInside(const SearchableGeometry& vertices, const SearchableGeometry& bo
 bool isInside(const SearchableGeometry& body, const Eigen::Vector3d& point, const InsideSettings&,
               Engine, PointQueryStack&);
 
-/// Throws InvalidSettings for settings out of range. Throws NotClosed for a body without faces. For
-/// InsideRule::Closed it also throws NotClosed, with the first edge at fault, if the body is not
-/// closed.
-void checkInside(SearchableGeometry& body, const InsideSettings&);
+/// Throws InvalidSettings for settings out of range.
+void checkSettings(const SearchableGeometry& body, const InsideSettings&);
+/// Throws NotClosed for a body without faces. For InsideRule::Closed it also throws NotClosed, with
+/// the first edge at fault, if the body is not closed.
+void checkInside(SearchableGeometry& body, InsideRule);
 /// Whether checkInside() accepts a body with elements for InsideRule::Closed.
 bool isClosed(SearchableGeometry& body);
 

@@ -14,6 +14,8 @@
 
 #include <Eigen/Core>
 
+#include <array>
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -40,6 +42,22 @@ struct Solid {
   FloatFrame treeFrame;
 };
 
+/// SpatialQueries::Source::state() and GeometryOctree::updates() at the end of a preparation.
+class PreparedState {
+ public:
+  bool isCurrent(std::uint64_t state, std::uint64_t updates) const {
+    return m_state.load(std::memory_order_acquire) == state &&
+           m_updates.load(std::memory_order_relaxed) == updates;
+  }
+  void commit(std::uint64_t state, std::uint64_t updates) {
+    m_updates.store(updates, std::memory_order_relaxed);
+    m_state.store(state, std::memory_order_release);
+  }
+
+ private:
+  std::atomic<std::uint64_t> m_state = 0, m_updates = 0;
+};
+
 /// A geometry with the octree over its elements, and all other data that queries need.
 struct SearchableGeometry {
   explicit SearchableGeometry(GeometryId newId) : id(newId) {}
@@ -54,6 +72,9 @@ struct SearchableGeometry {
   /// Locked while a query updates what queries prepare: MeshTopology::closed, the tree of `solid`
   /// and windingNumbers.
   std::mutex preparation;
+  /// The state for which checkInside() accepted the geometry and all of this was updated, for each
+  /// InsideRule. Read without the lock.
+  std::array<PreparedState, 2> preparedFor;
 
   /// Whether setTransform() has placed the geometry. Its octree is then in the body's frame.
   bool isPlaced() const { return mesh.now.isPlaced(); }

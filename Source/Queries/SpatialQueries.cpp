@@ -84,12 +84,17 @@ void SpatialQueries::Source::Scratch::sort(std::vector<std::uint32_t>& numbers) 
 
 void SpatialQueries::Source::prepareInside(SearchableGeometry& body,
                                            const InsideSettings& settings) {
+  checkSettings(body, settings);
+  PreparedState& prepared = body.preparedFor[settings.rule == InsideRule::WindingNumber];
+  const std::uint64_t now = state(), updates = body.tree.updates();
+  if (prepared.isCurrent(now, updates)) return;
   const std::lock_guard lock(body.preparation);
-  checkInside(body, settings);
+  checkInside(body, settings.rule);
   if (settings.rule == InsideRule::WindingNumber && body.tree.octree().size() > 0)
     body.windingNumbers.update(body, Workers(*this));
   else if (settings.rule == InsideRule::Closed && body.solid)
     updateTetrahedra(body, octreeSettings(), Workers(*this));
+  prepared.commit(now, updates);
 }
 
 bool SpatialQueries::Source::prepareIfClosed(SearchableGeometry& body) {
