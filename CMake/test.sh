@@ -1,7 +1,7 @@
 #!/bin/bash
-# From nothing to tested: packages, the documentation site, every configuration that CI builds, their tests. Every configuration runs, also
-# after another one failed. The script fails if any stage failed or did not run. The release tests run last, so that
-# ctest's summary of them is the last thing printed.
+# From nothing to tested: packages, the documentation site, every configuration that CI builds, their tests. Every
+# configuration runs, also after another one failed. The script fails if any stage failed or did not run. The release
+# tests run last, so that ctest's summary of them is the last thing printed.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
