@@ -1,8 +1,13 @@
 #pragma once
 
+#include "Exact/ErrorBounds.h"
+
 #include <Eigen/Core>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 // What a ray shares with a triangle. Every decision is exact for the given doubles.
@@ -34,6 +39,44 @@ struct RayInterval {
 /// coordinate difference, divided by the sine of the angle between ray and triangle.
 std::optional<RayInterval> intersectRay(const RaySegment&, const Eigen::Vector3d& a,
                                         const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+
+/// Finds quickly that a line misses a triangle.
+///
+/// Corners are projected along the line onto the plane of two axes, with the line at 0. The line
+/// misses the triangle if 0 is to the left of one edge and to the right of another. Let e be the
+/// error of a projected corner and m the largest coordinate of the three, at most 2^48 e. The cross
+/// product of two corners errs by at most 4 e m + 2 e² for the corners, and by 6 m² 2^-53 < e m for
+/// its roundings.
+class LineFilter {
+ public:
+  /// A filter that finds nothing.
+  LineFilter() = default;
+  /// error: L, a bound on the error of a corner less the origin, and at least 2^-46 of each of its
+  /// coordinates.
+  LineFilter(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double error);
+
+  /// Whether the line certainly misses the triangle.
+  bool misses(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) const {
+    const Eigen::Vector3d* const corners[3] = {&a, &b, &c};
+    double x[3], y[3], most = m_error;
+    for (int i = 0; i < 3; ++i) {
+      const Eigen::Vector3d& at = *corners[i];
+      const double z = at[m_axes[2]] - m_origin[2];
+      x[i] = (at[m_axes[0]] - m_origin[0]) - m_slope[0] * z;
+      y[i] = (at[m_axes[1]] - m_origin[1]) - m_slope[1] * z;
+      most = std::max({most, std::abs(x[i]), std::abs(y[i])});
+    }
+    const double ab = x[0] * y[1] - x[1] * y[0], bc = x[1] * y[2] - x[2] * y[1],
+                 ca = x[2] * y[0] - x[0] * y[2];
+    const double error = 8 * m_error * most + kUnderflowGuard;
+    // Comparisons with NaN are false.
+    return std::min({ab, bc, ca}) < -error && std::max({ab, bc, ca}) > error;
+  }
+
+ private:
+  int m_axes[3] = {0, 1, 2};
+  double m_origin[3] = {}, m_slope[2] = {}, m_error = std::numeric_limits<double>::infinity();
+};
 
 /// The point where a ray meets a triangle.
 struct RayPoint {

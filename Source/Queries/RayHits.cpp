@@ -19,6 +19,7 @@ using Eigen::Vector3d;
 struct ClippedRay {
   FloatRay ray;
   double start, perT;  ///< t = start + ray's t / perT
+  LineFilter line;     ///< for positions in the body's frame
 
   /// Never negative, which would end the traversal: `start` is rounded.
   float floatOf(double t) const {
@@ -41,6 +42,7 @@ std::optional<ClippedRay> clip(const SearchableGeometry& geometry, const RaySegm
     error = kPlacedPointError * (ray.origin.cwiseAbs().sum() + pose.translation.cwiseAbs().sum() +
                                  origin.cwiseAbs().sum());
   }
+  const Vector3d bodyOrigin = origin;
   const double perT = direction.cwiseAbs().maxCoeff() * frame.scale;
   origin = (origin - frame.origin) * frame.scale;
   direction /= direction.cwiseAbs().maxCoeff();
@@ -56,7 +58,7 @@ std::optional<ClippedRay> clip(const SearchableGeometry& geometry, const RaySegm
                        (error + radius * (1.0 + kNearestError)) * frame.scale +
                        OutwardRounding::kAbsolute;
   ClippedRay clipped{
-      {{0, 0, 0}, {}, 0, OutwardRounding::up(static_cast<float>(slack))}, ray.tMin, perT};
+      {{0, 0, 0}, {}, 0, OutwardRounding::up(static_cast<float>(slack))}, ray.tMin, perT, {}};
   if (!(extent < kLargestFloat) || !(perT >= 0x1p-900) || !(perT <= 0x1p900) ||
       !(slack < kLargestFloat)) {  // every box is entered at once
     clipped.ray.slack = clipped.ray.tMax = std::numeric_limits<float>::infinity();
@@ -64,6 +66,10 @@ std::optional<ClippedRay> clip(const SearchableGeometry& geometry, const RaySegm
     clipped.perT = 0.0;
     return clipped;
   }
+  if (radius == 0)
+    clipped.line = LineFilter(
+        bodyOrigin, direction,
+        error + kPlacedPointError * (origin.cwiseAbs().maxCoeff() + extent) / frame.scale);
   double enter = ray.tMin * perT, leave = ray.tMax * perT;
   for (int k = 0; k < 3; ++k) {
     const auto at = static_cast<std::size_t>(k);
@@ -143,10 +149,15 @@ double RayHits::collect(Wanted wanted, double tMax, double atLeast) {
   }
   const auto ray = clip(m_geometry, m_ray, m_geometry.mesh.largestRadius + m_radius);
   if (!ray) return atLeast;
+  const std::span<const Vector3d> body = m_geometry.mesh.now.body();
+  float tWanted = ray->ray.tMax;
   forEachOnRay(m_geometry.tree.octree(), ray->ray, [&](std::uint32_t place) {
+    const auto& [a, b, c] = m_geometry.tree.ordered()[place];
+    if (ray->line.misses(body[a], body[b], body[c])) return tWanted;
     take(place);
     if (wanted == Wanted::Any && !m_met.empty()) return -1.0f;
-    return std::min(ray->ray.tMax, ray->floatOf(std::max(last + error, atLeast)));
+    tWanted = std::min(ray->ray.tMax, ray->floatOf(std::max(last + error, atLeast)));
+    return tWanted;
   });
   if (wanted != Wanted::First) return atLeast;
   // Elements come in any order. Some were met before the part had grown as far as to them.

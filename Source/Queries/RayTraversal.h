@@ -8,8 +8,7 @@
 
 namespace palpate {
 
-/// A ray in an octree's floats: points origin + t direction with t in [0, tMax]. The largest
-/// component of the direction has magnitude 1.
+/// A ray in an octree's floats: points origin + t direction with t in [0, tMax].
 struct FloatRay {
   std::array<float, 3> origin;
   /// 1 / direction; a very large number for a component of zero.
@@ -24,12 +23,12 @@ struct FloatRay {
 /// a negative number ends the traversal.
 using TestElement = float (*)(void* context, std::uint32_t place);
 
-/// Visits the elements whose boxes the ray meets. Nodes come in the order in which the ray enters
-/// them. A node or element is skipped if the ray enters its box beyond the t that was returned
-/// last.
+/// Visits the elements whose boxes the ray meets. Siblings come in the order in which the ray
+/// passes their octants. A node or element is skipped if the ray enters its box beyond the t that
+/// was returned last.
 /// Source   Revelles, Urena, Lastra, An efficient parametric algorithm for octree traversal (2000),
-///          for the order. Difference: cells overlap, so that each node sorts its children by their
-///          fitted boxes.
+///          for the order. Difference: cells overlap, so that the ray may meet more than four of
+///          eight siblings, and each is tested by its fitted box.
 void traverseRay(const Octree&, const FloatRay&, void* context, TestElement);
 
 /// traverseRay() with f(place) in place of the function pointer.
