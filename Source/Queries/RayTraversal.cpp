@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
+#include <cstddef>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Queries/RayTraversal.cpp"
@@ -14,104 +16,147 @@ namespace palpate::HWY_NAMESPACE {
 
 constexpr std::size_t kSide = 16;  ///< elements tested together
 
-/// A ray in each lane, for boxes in arrays: six for the lower and the upper bounds of each axis.
+/// A ray in each lane, for boxes whose bounds are in arrays.
 template <class D>
-struct RayLanes {
+class RayLanes {
+ public:
   using V = hn::Vec<D>;
-  V nearOrigin[3], farOrigin[3], inverse[3];
-  bool isBackward[3];  ///< the ray enters at the upper bound
 
   HWY_ATTR HWY_INLINE explicit RayLanes(const FloatRay& ray) {
     const D d;
     for (std::size_t k = 0; k < 3; ++k) {
-      isBackward[k] = ray.inverse[k] < 0;
-      const float grow = isBackward[k] ? -ray.slack : ray.slack;
-      nearOrigin[k] = hn::Set(d, ray.origin[k] + grow);
-      farOrigin[k] = hn::Set(d, ray.origin[k] - grow);
-      inverse[k] = hn::Set(d, ray.inverse[k]);
+      const float grow = std::copysign(ray.slack, ray.inverse[k]);
+      m_nearOrigin[k] = hn::Set(d, ray.origin[k] + grow);
+      m_farOrigin[k] = hn::Set(d, ray.origin[k] - grow);
+      m_inverse[k] = hn::Set(d, ray.inverse[k]);
     }
   }
 
-  /// The ray is in boxes from the i-th on for t in [enter, leave], or misses them if enter > leave.
-  template <class Boxes>
-  HWY_ATTR HWY_INLINE void intersect(const Boxes& boxes, std::size_t i, V& enter, V& leave) const {
+  /// Boxes that the ray is in for t in [enter, leave], or misses if enter > leave. near, far: for
+  /// each axis, the bounds at which the ray enters and leaves.
+  HWY_ATTR HWY_INLINE void intersect(const float* const (&near)[3], const float* const (&far)[3],
+                                     std::size_t i, float tMax, V& enter, V& leave) const {
     const D d;
+    enter = hn::Zero(d);
+    leave = hn::Set(d, tMax);
     for (std::size_t k = 0; k < 3; ++k) {
-      const float *lower = &boxes.lower[k][i], *upper = &boxes.upper[k][i];
-      const V first = hn::LoadU(d, isBackward[k] ? upper : lower),
-              last = hn::LoadU(d, isBackward[k] ? lower : upper);
-      enter = hn::Max(enter, (first - nearOrigin[k]) * inverse[k]);
-      leave = hn::Min(leave, (last - farOrigin[k]) * inverse[k]);
+      enter = hn::Max(enter, (hn::LoadU(d, near[k] + i) - m_nearOrigin[k]) * m_inverse[k]);
+      leave = hn::Min(leave, (hn::LoadU(d, far[k] + i) - m_farOrigin[k]) * m_inverse[k]);
     }
   }
+
+ private:
+  V m_nearOrigin[3], m_farOrigin[3], m_inverse[3];
+};
+
+/// One traversal.
+class RaySearch {
+ public:
+  HWY_ATTR RaySearch(const Octree& octree, const FloatRay& ray, void* context, TestElement test)
+      : m_blocks(octree.blocks()),
+        m_nodeRay(ray),
+        m_leafRay(ray),
+        m_tMax(ray.tMax),
+        m_context(context),
+        m_test(test) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const bool isBackward = ray.inverse[k] < 0;
+      if (isBackward) m_lastOctant ^= std::size_t{1} << k;
+      const OctreeBlock& first = m_blocks[0];
+      const float *const lower = octree.boxes().lower[k].data(), *const upper =
+                                                                     octree.boxes().upper[k].data();
+      m_near[k] = isBackward ? upper : lower;
+      m_far[k] = isBackward ? lower : upper;
+      m_nearRow[k] = (isBackward ? first.upper[k] : first.lower[k]) - first.lower[0];
+      m_farRow[k] = (isBackward ? first.lower[k] : first.upper[k]) - first.lower[0];
+    }
+  }
+
+  HWY_ATTR void run() {
+    using D = NodeTag;
+    const D d;
+    const hn::RebindToUnsigned<D> du;
+    constexpr std::size_t kLanes = hn::MaxLanes(d);
+    // Seven siblings remain on each of at most 61 levels, and whole vectors are stored.
+    constexpr std::size_t kStack = 7 * 61 + 8;
+    float enters[kStack];
+    std::uint32_t begins[kStack], links[kStack];  // as in OctreeBlock
+    enters[0] = 0;
+    begins[0] = m_blocks[0].begin[0];
+    links[0] = m_blocks[0].child[0];
+    // Siblings are stored in the order of octants in which the ray passes them, the nearest last,
+    // because the last entry is taken first.
+    const std::size_t withinVector = m_lastOctant & (kLanes - 1),
+                      ofVector = m_lastOctant & ~(kLanes - 1);
+    const auto octants =
+        hn::Xor(hn::Iota(du, 0), hn::Set(du, static_cast<std::uint32_t>(withinVector)));
+    const auto order = hn::IndicesFromVec(d, octants);
+    const auto inOrder = [&](const auto& values)
+                             HWY_ATTR { return hn::TableLookupLanes(values, order); };
+    for (std::size_t count = 1; count-- > 0;) {
+      if (enters[count] > m_tMax) continue;
+      const std::uint32_t begin = begins[count], link = links[count];
+      if (link & OctreeBlock::kLeaf) {
+        if (!testElements(begin, begin + (link & ~OctreeBlock::kLeaf))) return;
+        continue;
+      }
+      const OctreeBlock& block = m_blocks[link];
+      if (begin < block.begin[0] && !testElements(begin, block.begin[0])) return;
+      const float* const rows = block.lower[0];
+      const float* const near[3] = {rows + m_nearRow[0], rows + m_nearRow[1], rows + m_nearRow[2]};
+      const float* const far[3] = {rows + m_farRow[0], rows + m_farRow[1], rows + m_farRow[2]};
+      for (std::size_t i = 0; i < 8; i += kLanes) {
+        const std::size_t slot = i ^ ofVector;
+        hn::Vec<D> enter, leave;
+        m_nodeRay.intersect(near, far, slot, m_tMax, enter, leave);
+        enter = inOrder(enter);
+        const auto entered = hn::Le(enter, inOrder(leave));
+        const auto push = [&](const std::uint32_t* from, std::uint32_t* to) HWY_ATTR {
+          const auto values = inOrder(hn::BitCast(d, hn::LoadU(du, from + slot)));
+          hn::StoreU(hn::BitCast(du, hn::Compress(values, entered)), du, to + count);
+        };
+        hn::StoreU(hn::Compress(enter, entered), d, enters + count);
+        push(block.begin, begins);
+        push(block.child, links);
+        count += hn::CountTrue(d, entered);
+      }
+    }
+  }
+
+ private:
+  /// Returns false if the traversal ends.
+  HWY_ATTR HWY_NOINLINE bool testElements(std::uint32_t begin, std::uint32_t end) {
+    const LeafTag d;
+    for (std::uint32_t first = begin; first < end; first += kSide) {
+      const std::size_t size = std::min<std::size_t>(kSide, end - first);
+      std::uint32_t bits = 0;
+      for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
+        hn::Vec<LeafTag> enter, leave;
+        m_leafRay.intersect(m_near, m_far, first + i, m_tMax, enter, leave);
+        bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), hn::Le(enter, leave))) << i;
+      }
+      for (; bits; bits &= bits - 1) {
+        m_tMax = m_test(m_context, first + static_cast<std::uint32_t>(std::countr_zero(bits)));
+        if (m_tMax < 0) return false;
+      }
+    }
+    return true;
+  }
+
+  const OctreeBlock* const m_blocks;
+  const RayLanes<NodeTag> m_nodeRay;
+  const RayLanes<LeafTag> m_leafRay;
+  const float *m_near[3], *m_far[3];         ///< bounds of elements at which the ray enters, leaves
+  std::ptrdiff_t m_nearRow[3], m_farRow[3];  ///< the same in a block, from its first bound
+  std::size_t m_lastOctant = 7;              ///< the octant that the ray passes last
+  float m_tMax;
+  void* const m_context;
+  const TestElement m_test;
 };
 
 HWY_ATTR void traverseRayKernel(const Octree& octree, const FloatRay& ray, void* context,
                                 TestElement test) {
-  using D = NodeTag;
-  const D d;
-  const hn::RebindToUnsigned<D> du;
-  constexpr std::size_t kLanes = hn::MaxLanes(d);
-  // Seven siblings remain on each of at most 61 levels, and whole vectors are stored.
-  constexpr std::size_t kStack = 7 * 61 + 8;
-  float entries[kStack];
-  std::uint32_t begins[kStack], links[kStack];  // as in OctreeBlock
-  const OctreeBlock* const blocks = octree.blocks();
-  entries[0] = 0;
-  begins[0] = blocks[0].begin[0];
-  links[0] = blocks[0].child[0];
-  std::size_t count = 1;
-
-  const RayLanes<D> nodeRay(ray);
-  const RayLanes<LeafTag> leafRay(ray);
-  // The i-th sibling to be stored is that in octant i ^ last: the nearest goes last, because the
-  // last entry is taken first.
-  std::size_t last = 7;
-  for (std::size_t k = 0; k < 3; ++k) last ^= std::size_t{nodeRay.isBackward[k]} << k;
-  const auto order = hn::IndicesFromVec(
-      d, hn::Xor(hn::Iota(du, 0), hn::Set(du, static_cast<std::uint32_t>(last & (kLanes - 1)))));
-
-  float tMax = ray.tMax;
-  while (count > 0) {
-    --count;
-    if (entries[count] > tMax) continue;
-    const std::uint32_t begin = begins[count], link = links[count];
-    const bool isLeaf = link & OctreeBlock::kLeaf;
-    const OctreeBlock& block = blocks[isLeaf ? 0 : link];
-    const std::uint32_t end = isLeaf ? begin + (link & ~OctreeBlock::kLeaf) : block.begin[0];
-    for (std::uint32_t first = begin; first < end; first += kSide) {
-      const std::size_t size = std::min<std::size_t>(kSide, end - first);
-      const LeafTag leaf;
-      std::uint32_t bits = 0;
-      for (std::size_t i = 0; i < size; i += hn::Lanes(leaf)) {
-        auto enter = hn::Zero(leaf), leave = hn::Set(leaf, tMax);
-        leafRay.intersect(octree.boxes(), first + i, enter, leave);
-        bits |= bitsOf(leaf, hn::And(hn::FirstN(leaf, size - i), hn::Le(enter, leave))) << i;
-      }
-      for (; bits; bits &= bits - 1) {
-        tMax = test(context, first + static_cast<std::uint32_t>(std::countr_zero(bits)));
-        if (tMax < 0) return;
-      }
-    }
-    if (isLeaf) continue;
-    for (std::size_t i = 0; i < 8; i += kLanes) {
-      const std::size_t slot = i ^ (last & ~(kLanes - 1));
-      auto enter = hn::Zero(d), leave = hn::Set(d, tMax);
-      nodeRay.intersect(block, slot, enter, leave);
-      const auto inOrder = [&](const auto& values)
-                               HWY_ATTR { return hn::TableLookupLanes(values, order); };
-      enter = inOrder(enter);
-      const auto entered = hn::Le(enter, inOrder(leave));
-      const auto push = [&](const std::uint32_t* from, std::uint32_t* to) HWY_ATTR {
-        const auto values = inOrder(hn::BitCast(d, hn::LoadU(du, from + slot)));
-        hn::StoreU(hn::BitCast(du, hn::Compress(values, entered)), du, to + count);
-      };
-      hn::StoreU(hn::Compress(enter, entered), d, entries + count);
-      push(block.begin, begins);
-      push(block.child, links);
-      count += hn::CountTrue(d, entered);
-    }
-  }
+  RaySearch(octree, ray, context, test).run();
 }
 
 }  // namespace palpate::HWY_NAMESPACE
