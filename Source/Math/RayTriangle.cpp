@@ -236,18 +236,6 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
   return RayInterval{t, t, error, static_cast<std::int8_t>(ofAb), ofAb < 0};
 }
 
-LineFilter::LineFilter(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                       double error) {
-  direction.cwiseAbs().maxCoeff(&m_axes[2]);
-  m_axes[0] = (m_axes[2] + 1) % 3;
-  m_axes[1] = (m_axes[2] + 2) % 3;
-  for (int k = 0; k < 3; ++k) m_origin[k] = origin[m_axes[k]];
-  for (int k = 0; k < 2; ++k) m_slope[k] = direction[m_axes[k]] / direction[m_axes[2]];
-  // A corner's projection has the errors of two of its coordinates, and four roundings of them.
-  // Squares of larger coordinates might overflow.
-  if (error < kLargestModerate) m_error = 4.0 * error;
-}
-
 RayPoint firstPoint(const RaySegment& ray, const RayInterval& interval, const Eigen::Vector3d& a,
                     const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d& d = ray.direction;

@@ -37,12 +37,13 @@ class RayLanes {
   HWY_ATTR HWY_INLINE void intersect(const float* const (&near)[3], const float* const (&far)[3],
                                      std::size_t i, float tMax, V& enter, V& leave) const {
     const D d;
-    enter = hn::Zero(d);
-    leave = hn::Set(d, tMax);
+    V first[3], last[3];
     for (std::size_t k = 0; k < 3; ++k) {
-      enter = hn::Max(enter, (hn::LoadU(d, near[k] + i) - m_nearOrigin[k]) * m_inverse[k]);
-      leave = hn::Min(leave, (hn::LoadU(d, far[k] + i) - m_farOrigin[k]) * m_inverse[k]);
+      first[k] = (hn::LoadU(d, near[k] + i) - m_nearOrigin[k]) * m_inverse[k];
+      last[k] = (hn::LoadU(d, far[k] + i) - m_farOrigin[k]) * m_inverse[k];
     }
+    enter = hn::Max(hn::Max(hn::Zero(d), first[0]), hn::Max(first[1], first[2]));
+    leave = hn::Min(hn::Min(hn::Set(d, tMax), last[0]), hn::Min(last[1], last[2]));
   }
 
  private:
@@ -52,8 +53,10 @@ class RayLanes {
 /// One traversal.
 class RaySearch {
  public:
-  HWY_ATTR RaySearch(const Octree& octree, const FloatRay& ray, void* context, TestElement test)
+  HWY_ATTR RaySearch(const Octree& octree, const RayElements& elements, const FloatRay& ray,
+                     void* context, TestElement test)
       : m_blocks(octree.blocks()),
+        m_elements(elements),
         m_nodeRay(ray),
         m_leafRay(ray),
         m_tMax(ray.tMax),
@@ -127,7 +130,9 @@ class RaySearch {
   /// Returns false if the traversal ends.
   HWY_ATTR HWY_NOINLINE bool testElements(std::uint32_t begin, std::uint32_t end) {
     const LeafTag d;
+    std::uint32_t places[kSide];
     for (std::uint32_t first = begin; first < end; first += kSide) {
+      for (std::size_t i = 0; i < 3; ++i) hwy::Prefetch(m_elements.ordered + first + 5 * i);
       const std::size_t size = std::min<std::size_t>(kSide, end - first);
       std::uint32_t bits = 0;
       for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
@@ -135,8 +140,16 @@ class RaySearch {
         m_leafRay.intersect(m_near, m_far, first + i, m_tMax, enter, leave);
         bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), hn::Le(enter, leave))) << i;
       }
+      // Without a branch for each, the tests overlap.
+      const auto& [ordered, positions, line] = m_elements;
+      std::size_t count = 0;
       for (; bits; bits &= bits - 1) {
-        m_tMax = m_test(m_context, first + static_cast<std::uint32_t>(std::countr_zero(bits)));
+        places[count] = first + static_cast<std::uint32_t>(std::countr_zero(bits));
+        const auto& [a, b, c] = ordered[places[count]];
+        count += !line.misses(positions[a], positions[b], positions[c]);
+      }
+      for (std::size_t i = 0; i < count; ++i) {
+        m_tMax = m_test(m_context, places[i]);
         if (m_tMax < 0) return false;
       }
     }
@@ -144,6 +157,7 @@ class RaySearch {
   }
 
   const OctreeBlock* const m_blocks;
+  const RayElements& m_elements;
   const RayLanes<NodeTag> m_nodeRay;
   const RayLanes<LeafTag> m_leafRay;
   const float *m_near[3], *m_far[3];         ///< bounds of elements at which the ray enters, leaves
@@ -154,9 +168,9 @@ class RaySearch {
   const TestElement m_test;
 };
 
-HWY_ATTR void traverseRayKernel(const Octree& octree, const FloatRay& ray, void* context,
-                                TestElement test) {
-  RaySearch(octree, ray, context, test).run();
+HWY_ATTR void traverseRayKernel(const Octree& octree, const RayElements& elements,
+                                const FloatRay& ray, void* context, TestElement test) {
+  RaySearch(octree, elements, ray, context, test).run();
 }
 
 }  // namespace palpate::HWY_NAMESPACE
@@ -167,9 +181,10 @@ namespace palpate {
 
 HWY_EXPORT(traverseRayKernel);
 
-void traverseRay(const Octree& octree, const FloatRay& ray, void* context, TestElement test) {
+void traverseRay(const Octree& octree, const RayElements& elements, const FloatRay& ray,
+                 void* context, TestElement test) {
   octree.requireBuilt();
-  HWY_DYNAMIC_DISPATCH(traverseRayKernel)(octree, ray, context, test);
+  HWY_DYNAMIC_DISPATCH(traverseRayKernel)(octree, elements, ray, context, test);
 }
 
 }  // namespace palpate
