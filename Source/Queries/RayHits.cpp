@@ -52,12 +52,17 @@ bool clip(const SearchableGeometry& geometry, const RaySegment& ray, double radi
   origin = (origin - frame.origin) * frame.scale;
   direction /= length;
   extent += radius * frame.scale;
-  // Within the grown root box every coordinate is at most `extent`, and t grows by at most three
+  // A ray from far away begins where it enters the grown root box.
+  double enter = ray.tMin * perT, leave = ray.tMax * perT;
+  const double far = origin.cwiseAbs().maxCoeff(), reach = far + std::abs(enter);
+  const bool isNear = reach <= 4.0 * extent;
+  // With S the extent and the reach, all coordinates are at most S, and t grows by at most three
   // times that. Its floats err by at most 2^-20 of it; kFloatRayError has a margin. The rest are
   // errors of the origin in double.
-  const double doubleError = kPlacedPointError * origin.cwiseAbs().maxCoeff() +
-                             (error + radius * (1.0 + kNearestError)) * frame.scale;
-  const double slack = kFloatRayError * extent + doubleError + OutwardRounding::kAbsolute;
+  const double doubleError =
+      kPlacedPointError * far + (error + radius * (1.0 + kNearestError)) * frame.scale;
+  const double slack =
+      kFloatRayError * (extent + (isNear ? reach : 0.0)) + doubleError + OutwardRounding::kAbsolute;
   clipped.ray.slack = OutwardRounding::up(static_cast<float>(slack));
   clipped.perT = perT;
   if (!(extent < kLargestFloat) || !(perT >= 0x1p-900) || !(perT <= 0x1p900) ||
@@ -68,15 +73,19 @@ bool clip(const SearchableGeometry& geometry, const RaySegment& ray, double radi
     clipped.perT = clipped.start = 0.0;
     return true;
   }
-  double enter = ray.tMin * perT, leave = ray.tMax * perT;
-  Vector3d inverse;
   for (int k = 0; k < 3; ++k) {
-    const auto at = static_cast<std::size_t>(k);
     // A smaller component moves the ray by less than the slack.
-    inverse[k] = 1.0 / std::copysign(std::max(std::abs(direction[k]), 0x1p-100), direction[k]);
-    clipped.ray.inverse[at] = static_cast<float>(inverse[k]);
-    const double s = (root.lower[at] - slack - origin[k]) * inverse[k],
-                 t = (root.upper[at] + slack - origin[k]) * inverse[k];
+    const double least = std::copysign(std::max(std::abs(direction[k]), 0x1p-100), direction[k]);
+    clipped.ray.inverse[static_cast<std::size_t>(k)] = 1.0f / static_cast<float>(least);
+  }
+  for (int k = 0; k < 3 && !isNear; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    const double lower = root.lower[at] - slack, upper = root.upper[at] + slack;
+    if (direction[k] == 0.0) {
+      if (origin[k] < lower || origin[k] > upper) return false;
+      continue;
+    }
+    const double s = (lower - origin[k]) / direction[k], t = (upper - origin[k]) / direction[k];
     const double margin = kNearestError * std::max(std::abs(s), std::abs(t));
     enter = std::max(enter, std::min(s, t) - margin);
     leave = std::min(leave, std::max(s, t) + margin);
@@ -89,11 +98,11 @@ bool clip(const SearchableGeometry& geometry, const RaySegment& ray, double radi
   for (int k = 0; k < 3; ++k)
     clipped.ray.origin[static_cast<std::size_t>(k)] = static_cast<float>(origin[k]);
   if (radius == 0) {
-    const double most = extent + origin.cwiseAbs().maxCoeff();
-    clipped.line = LineFilter(origin / frame.scale + frame.origin, direction,
-                              static_cast<int>(axis), most / frame.scale,
-                              (doubleError + kPlacedPointError * most) / frame.scale +
-                                  kPlacedPointError * frame.origin.cwiseAbs().maxCoeff());
+    const double unit = 1.0 / frame.scale, most = extent + origin.cwiseAbs().maxCoeff();
+    clipped.line =
+        LineFilter(unit * origin + frame.origin, direction, static_cast<int>(axis), unit * most,
+                   unit * (doubleError + kPlacedPointError * most) +
+                       kPlacedPointError * frame.origin.cwiseAbs().maxCoeff());
   }
   return true;
 }
