@@ -132,7 +132,13 @@ class RaySearch {
     const LeafTag d;
     std::uint32_t places[kSide];
     for (std::uint32_t first = begin; first < end; first += kSide) {
+      // Their corners, and the boxes that are next.
       for (std::size_t i = 0; i < 3; ++i) hwy::Prefetch(m_elements.ordered + first + 5 * i);
+      const std::size_t next = std::min<std::size_t>(first + 2 * kSide - 1, end);
+      for (std::size_t k = 0; k < 3; ++k) {
+        hwy::Prefetch(m_near[k] + next);
+        hwy::Prefetch(m_far[k] + next);
+      }
       const std::size_t size = std::min<std::size_t>(kSide, end - first);
       std::uint32_t bits = 0;
       for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
