@@ -16,6 +16,7 @@
 #endif
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include <hwy/cache_control.h>
 
 #include <cstdint>
 #include <cstring>

@@ -1,8 +1,12 @@
 #pragma once
 
+#include "Exact/ErrorBounds.h"
+
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 // What a ray shares with a triangle. Every decision is exact for the given doubles.
@@ -34,6 +38,50 @@ struct RayInterval {
 /// coordinate difference, divided by the sine of the angle between ray and triangle.
 std::optional<RayInterval> intersectRay(const RaySegment&, const Eigen::Vector3d& a,
                                         const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+
+/// Finds quickly that a line misses a triangle.
+///
+/// Corners are projected along the line onto the plane of two axes, with the line at 0. The line
+/// misses the triangle if 0 is to the left of one edge and to the right of another.
+///
+/// Let each coordinate of a corner less the origin be at most m, with an error of at most e. The
+/// direction's largest component is 1 or -1. A projected coordinate is then at most 2 m, with an
+/// error of 2 e and of 4 roundings, together at most 3 e as e is at least 2^-46 m. The cross
+/// product of two such corners errs by at most 4 (2 m) (3 e) + 2 (3 e)² for that, and by 6 (2 m)²
+/// 2^-53 < e m for its own roundings: together by less than 26 e m.
+class LineFilter {
+ public:
+  /// A filter that finds nothing.
+  LineFilter() = default;
+  /// extent, error: L, bounds m and e.
+  LineFilter(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, int largestComponent,
+             double extent, double error)
+      : m_axes{(largestComponent + 1) % 3, (largestComponent + 2) % 3, largestComponent} {
+    for (int k = 0; k < 3; ++k) m_origin[k] = origin[m_axes[k]];
+    for (int k = 0; k < 2; ++k) m_slope[k] = direction[m_axes[k]] * direction[largestComponent];
+    // Products of larger coordinates might overflow.
+    if (extent < kLargestModerate) m_error = 32.0 * extent * error + kUnderflowGuard;
+  }
+
+  /// Whether the line certainly misses the triangle.
+  bool misses(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) const {
+    const Eigen::Vector3d* const corners[3] = {&a, &b, &c};
+    double x[3], y[3];
+    for (int i = 0; i < 3; ++i) {
+      const Eigen::Vector3d& at = *corners[i];
+      const double z = at[m_axes[2]] - m_origin[2];
+      x[i] = (at[m_axes[0]] - m_origin[0]) - m_slope[0] * z;
+      y[i] = (at[m_axes[1]] - m_origin[1]) - m_slope[1] * z;
+    }
+    const double ab = x[0] * y[1] - x[1] * y[0], bc = x[1] * y[2] - x[2] * y[1],
+                 ca = x[2] * y[0] - x[0] * y[2];
+    return std::min(std::max(ab, std::max(bc, ca)), -std::min(ab, std::min(bc, ca))) > m_error;
+  }
+
+ private:
+  int m_axes[3] = {0, 1, 2};
+  double m_origin[3] = {}, m_slope[2] = {}, m_error = std::numeric_limits<double>::infinity();
+};
 
 /// The point where a ray meets a triangle.
 struct RayPoint {

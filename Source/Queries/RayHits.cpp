@@ -15,61 +15,74 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A ray in a geometry's floats.
+/// A ray in a geometry's floats, and in the frame of its positions.
 struct ClippedRay {
   FloatRay ray;
-  double start, perT;  ///< t = start + ray's t / perT
+  double start, perT;  ///< the ray's t is perT t - start
+  LineFilter line;
 
   /// Never negative, which would end the traversal: `start` is rounded.
   float floatOf(double t) const {
-    const double along = (t - start) * perT * (1.0 + kNearestError);
+    const double along = (t * perT - start) * (1.0 + kNearestError);
     return std::max(OutwardRounding::up(static_cast<float>(along)), 0.0f);
   }
 };
 
-/// radius: L, by which boxes grow. None if the ray certainly misses all boxes.
-std::optional<ClippedRay> clip(const SearchableGeometry& geometry, const RaySegment& ray,
-                               double radius) {
+/// radius: L, by which boxes grow. Returns false if the ray certainly misses all boxes.
+bool clip(const SearchableGeometry& geometry, const RaySegment& ray, double radius,
+          ClippedRay& clipped) {
   const FloatFrame& frame = geometry.tree.frame();
   const Positions& now = geometry.mesh.now;
   Vector3d origin = ray.origin, direction = ray.direction;
+  const FloatBox root = geometry.tree.octree().box(0);
+  double extent = 0.0;
+  for (std::size_t k = 0; k < 3; ++k)
+    extent = std::max({extent, double{std::abs(root.lower[k])}, double{std::abs(root.upper[k])}});
   double error = 0.0;  // L
   if (now.isPlaced()) {
     const RigidTransform& pose = now.transform();
     origin = pose.rotation.transpose() * (origin - pose.translation);
     direction = pose.rotation.transpose() * direction;
     error = kPlacedPointError * (ray.origin.cwiseAbs().sum() + pose.translation.cwiseAbs().sum() +
-                                 origin.cwiseAbs().sum());
+                                 origin.cwiseAbs().sum()) +
+            4.0 * kOrthonormal * (frame.origin.cwiseAbs().maxCoeff() + extent / frame.scale);
   }
-  const double perT = direction.cwiseAbs().maxCoeff() * frame.scale;
+  Eigen::Index axis;
+  const double length = direction.cwiseAbs().maxCoeff(&axis), perT = length * frame.scale;
   origin = (origin - frame.origin) * frame.scale;
-  direction /= direction.cwiseAbs().maxCoeff();
-  const FloatBox root = geometry.tree.octree().box(0);
-  double extent = 0.0;
-  for (std::size_t k = 0; k < 3; ++k)
-    extent = std::max({extent, double{std::abs(root.lower[k])}, double{std::abs(root.upper[k])}});
+  direction /= length;
   extent += radius * frame.scale;
-  // Within the grown root box every coordinate is at most `extent`, and t grows by at most three
+  // A ray from far away begins where it enters the grown root box.
+  double enter = ray.tMin * perT, leave = ray.tMax * perT;
+  const double far = origin.cwiseAbs().maxCoeff(), reach = far + std::abs(enter);
+  const bool isNear = reach <= 4.0 * extent;
+  // With S the extent and the reach, all coordinates are at most S, and t grows by at most three
   // times that. Its floats err by at most 2^-20 of it; kFloatRayError has a margin. The rest are
   // errors of the origin in double.
-  const double slack = kFloatRayError * extent + kPlacedPointError * origin.cwiseAbs().maxCoeff() +
-                       (error + radius * (1.0 + kNearestError)) * frame.scale +
-                       OutwardRounding::kAbsolute;
-  ClippedRay clipped{
-      {{0, 0, 0}, {}, 0, OutwardRounding::up(static_cast<float>(slack))}, ray.tMin, perT};
+  const double doubleError =
+      kPlacedPointError * far + (error + radius * (1.0 + kNearestError)) * frame.scale;
+  const double slack =
+      kFloatRayError * (extent + (isNear ? reach : 0.0)) + doubleError + OutwardRounding::kAbsolute;
+  clipped.ray.slack = OutwardRounding::up(static_cast<float>(slack));
+  clipped.perT = perT;
   if (!(extent < kLargestFloat) || !(perT >= 0x1p-900) || !(perT <= 0x1p900) ||
       !(slack < kLargestFloat)) {  // every box is entered at once
-    clipped.ray.slack = clipped.ray.tMax = std::numeric_limits<float>::infinity();
+    clipped.ray.origin = {};
     clipped.ray.inverse = {1, 1, 1};
-    clipped.perT = 0.0;
-    return clipped;
+    clipped.ray.slack = clipped.ray.tMax = std::numeric_limits<float>::infinity();
+    clipped.perT = clipped.start = 0.0;
+    return true;
   }
-  double enter = ray.tMin * perT, leave = ray.tMax * perT;
   for (int k = 0; k < 3; ++k) {
+    // A smaller component moves the ray by less than the slack.
+    const double least = std::copysign(std::max(std::abs(direction[k]), 0x1p-100), direction[k]);
+    clipped.ray.inverse[static_cast<std::size_t>(k)] = 1.0f / static_cast<float>(least);
+  }
+  for (int k = 0; k < 3 && !isNear; ++k) {
     const auto at = static_cast<std::size_t>(k);
     const double lower = root.lower[at] - slack, upper = root.upper[at] + slack;
     if (direction[k] == 0.0) {
-      if (origin[k] < lower || origin[k] > upper) return {};
+      if (origin[k] < lower || origin[k] > upper) return false;
       continue;
     }
     const double s = (lower - origin[k]) / direction[k], t = (upper - origin[k]) / direction[k];
@@ -77,17 +90,21 @@ std::optional<ClippedRay> clip(const SearchableGeometry& geometry, const RaySegm
     enter = std::max(enter, std::min(s, t) - margin);
     leave = std::min(leave, std::max(s, t) + margin);
   }
-  if (!(enter <= leave)) return {};
-  clipped.start = enter / perT;
+  if (!(enter <= leave)) return false;
+  clipped.start = enter;
   clipped.ray.tMax =
       OutwardRounding::up(static_cast<float>((leave - enter) * (1.0 + kNearestError)));
-  for (int k = 0; k < 3; ++k) {
-    const auto at = static_cast<std::size_t>(k);
-    clipped.ray.origin[at] = static_cast<float>(origin[k] + enter * direction[k]);
-    const double least = std::copysign(std::max(std::abs(direction[k]), 0x1p-100), direction[k]);
-    clipped.ray.inverse[at] = static_cast<float>(1.0 / least);
+  origin += enter * direction;
+  for (int k = 0; k < 3; ++k)
+    clipped.ray.origin[static_cast<std::size_t>(k)] = static_cast<float>(origin[k]);
+  if (radius == 0) {
+    const double unit = 1.0 / frame.scale, most = extent + origin.cwiseAbs().maxCoeff();
+    clipped.line =
+        LineFilter(unit * origin + frame.origin, direction, static_cast<int>(axis), unit * most,
+                   unit * (doubleError + kPlacedPointError * most) +
+                       kPlacedPointError * frame.origin.cwiseAbs().maxCoeff());
   }
-  return clipped;
+  return true;
 }
 
 }  // namespace
@@ -141,12 +158,14 @@ double RayHits::collect(Wanted wanted, double tMax, double atLeast) {
     for (std::uint32_t place = 0; place < m_geometry.tree.ordered().size(); ++place) take(place);
     return atLeast;
   }
-  const auto ray = clip(m_geometry, m_ray, m_geometry.mesh.largestRadius + m_radius);
-  if (!ray) return atLeast;
-  forEachOnRay(m_geometry.tree.octree(), ray->ray, [&](std::uint32_t place) {
+  ClippedRay ray;
+  if (!clip(m_geometry, m_ray, m_geometry.mesh.largestRadius + m_radius, ray)) return atLeast;
+  const RayElements elements{m_geometry.tree.ordered().data(), m_geometry.mesh.now.body().data(),
+                             ray.line};
+  forEachOnRay(m_geometry.tree.octree(), elements, ray.ray, [&](std::uint32_t place) {
     take(place);
     if (wanted == Wanted::Any && !m_met.empty()) return -1.0f;
-    return std::min(ray->ray.tMax, ray->floatOf(std::max(last + error, atLeast)));
+    return std::min(ray.ray.tMax, ray.floatOf(std::max(last + error, atLeast)));
   });
   if (wanted != Wanted::First) return atLeast;
   // Elements come in any order. Some were met before the part had grown as far as to them.

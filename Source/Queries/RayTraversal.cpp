@@ -1,7 +1,10 @@
 #include "Queries/RayTraversal.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
+#include <cstddef>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Queries/RayTraversal.cpp"
@@ -13,86 +16,167 @@ namespace palpate::HWY_NAMESPACE {
 
 constexpr std::size_t kSide = 16;  ///< elements tested together
 
-/// A ray in each lane.
+/// A ray in each lane, for boxes whose bounds are in arrays.
 template <class D>
-struct RayLanes {
-  hn::Vec<D> origin[3], inverse[3], slack;
+class RayLanes {
+ public:
+  using V = hn::Vec<D>;
 
   HWY_ATTR HWY_INLINE explicit RayLanes(const FloatRay& ray) {
     const D d;
-    for (int k = 0; k < 3; ++k) {
-      origin[k] = hn::Set(d, ray.origin[static_cast<std::size_t>(k)]);
-      inverse[k] = hn::Set(d, ray.inverse[static_cast<std::size_t>(k)]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const float grow = std::copysign(ray.slack, ray.inverse[k]);
+      m_nearOrigin[k] = hn::Set(d, ray.origin[k] + grow);
+      m_farOrigin[k] = hn::Set(d, ray.origin[k] - grow);
+      m_inverse[k] = hn::Set(d, ray.inverse[k]);
     }
-    slack = hn::Set(d, ray.slack);
   }
 
-  /// Bits of the boxes that the ray enters at tMax or before. entries: where.
-  template <class Boxes>
-  HWY_ATTR HWY_INLINE std::uint32_t entered(const Boxes& boxes, std::size_t first, std::size_t size,
-                                            float tMax, float* entries) const {
+  /// Boxes that the ray is in for t in [enter, leave], or misses if enter > leave. near, far: for
+  /// each axis, the bounds at which the ray enters and leaves.
+  HWY_ATTR HWY_INLINE void intersect(const float* const (&near)[3], const float* const (&far)[3],
+                                     std::size_t i, float tMax, V& enter, V& leave) const {
     const D d;
-    std::uint32_t bits = 0;
-    for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
-      // The slot of an empty box has bounds in the wrong order.
-      const auto used = hn::Le(hn::LoadU(d, &boxes.lower[0][first + i]),
-                               hn::LoadU(d, &boxes.upper[0][first + i]));
-      auto enter = hn::Zero(d), leave = hn::Set(d, tMax);
-      for (int k = 0; k < 3; ++k) {
-        const auto lower = hn::LoadU(d, &boxes.lower[k][first + i]) - slack,
-                   upper = hn::LoadU(d, &boxes.upper[k][first + i]) + slack;
-        const auto s = (lower - origin[k]) * inverse[k], t = (upper - origin[k]) * inverse[k];
-        enter = hn::Max(enter, hn::Min(s, t));
-        leave = hn::Min(leave, hn::Max(s, t));
-      }
-      hn::StoreU(enter, d, entries + i);
-      bits |= bitsOf(d, hn::And(hn::And(hn::FirstN(d, size - i), used), hn::Le(enter, leave))) << i;
+    V first[3], last[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      first[k] = (hn::LoadU(d, near[k] + i) - m_nearOrigin[k]) * m_inverse[k];
+      last[k] = (hn::LoadU(d, far[k] + i) - m_farOrigin[k]) * m_inverse[k];
     }
-    return bits;
+    enter = hn::Max(hn::Max(hn::Zero(d), first[0]), hn::Max(first[1], first[2]));
+    leave = hn::Min(hn::Min(hn::Set(d, tMax), last[0]), hn::Min(last[1], last[2]));
   }
+
+ private:
+  V m_nearOrigin[3], m_farOrigin[3], m_inverse[3];
 };
 
-HWY_ATTR void traverseRayKernel(const Octree& octree, const FloatRay& ray, void* context,
-                                TestElement test) {
-  struct Entry {
-    float t;
-    OctreeNode node;
-  };
-  std::array<Entry, 512> entries;  // seven siblings remain on each of at most 61 levels
-  std::size_t count = 0;
-  alignas(64) float t[kSide];
-  const RayLanes<NodeTag> nodeRay(ray);
-  const RayLanes<LeafTag> leafRay(ray);
-  float tMax = ray.tMax;
-  if (RayLanes<BoxTag>(ray).entered(octree.blocks()[0], 0, 1, tMax, t))
-    entries[count++] = {t[0], 0};
-  while (count > 0) {
-    const Entry entry = entries[--count];
-    if (entry.t > tMax) continue;
-    const auto [begin, end] = octree.ownRange(entry.node);
-    for (std::uint32_t i = begin; i < end; i += kSide) {
-      const std::size_t size = std::min<std::size_t>(kSide, end - i);
-      for (std::uint32_t bits = leafRay.entered(octree.boxes(), i, size, tMax, t); bits;
-           bits &= bits - 1) {
-        const auto lane = static_cast<std::uint32_t>(std::countr_zero(bits));
-        if (t[lane] > tMax) continue;
-        tMax = test(context, i + lane);
-        if (tMax < 0) return;
-      }
-    }
-    const OctreeNode child = octree.firstChild(entry.node);
-    if (child == 0) continue;
-    const std::size_t first = count;
-    for (std::uint32_t bits = nodeRay.entered(octree.blocks()[child >> 3], 0, 8, tMax, t); bits;
-         bits &= bits - 1) {
-      const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
-      // Sorted with the nearest last, because the last entry is taken first.
-      std::size_t place = count++;
-      for (; place > first && entries[place - 1].t < t[slot]; --place)
-        entries[place] = entries[place - 1];
-      entries[place] = {t[slot], child + slot};
+/// One traversal.
+class RaySearch {
+ public:
+  HWY_ATTR RaySearch(const Octree& octree, const RayElements& elements, const FloatRay& ray,
+                     void* context, TestElement test)
+      : m_blocks(octree.blocks()),
+        m_elements(elements),
+        m_nodeRay(ray),
+        m_leafRay(ray),
+        m_tMax(ray.tMax),
+        m_context(context),
+        m_test(test) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const bool isBackward = ray.inverse[k] < 0;
+      if (isBackward) m_lastOctant ^= std::size_t{1} << k;
+      const OctreeBlock& first = m_blocks[0];
+      const float *const lower = octree.boxes().lower[k].data(), *const upper =
+                                                                     octree.boxes().upper[k].data();
+      m_near[k] = isBackward ? upper : lower;
+      m_far[k] = isBackward ? lower : upper;
+      m_nearRow[k] = (isBackward ? first.upper[k] : first.lower[k]) - first.lower[0];
+      m_farRow[k] = (isBackward ? first.lower[k] : first.upper[k]) - first.lower[0];
     }
   }
+
+  HWY_ATTR void run() {
+    using D = NodeTag;
+    const D d;
+    const hn::RebindToUnsigned<D> du;
+    constexpr std::size_t kLanes = hn::MaxLanes(d);
+    // Seven siblings remain on each of at most 61 levels, and whole vectors are stored.
+    constexpr std::size_t kStack = 7 * 61 + 8;
+    float enters[kStack];
+    std::uint32_t begins[kStack], links[kStack];  // as in OctreeBlock
+    enters[0] = 0;
+    begins[0] = m_blocks[0].begin[0];
+    links[0] = m_blocks[0].child[0];
+    // Siblings are stored in the order of octants in which the ray passes them, the nearest last,
+    // because the last entry is taken first.
+    const std::size_t withinVector = m_lastOctant & (kLanes - 1),
+                      ofVector = m_lastOctant & ~(kLanes - 1);
+    const auto octants =
+        hn::Xor(hn::Iota(du, 0), hn::Set(du, static_cast<std::uint32_t>(withinVector)));
+    const auto order = hn::IndicesFromVec(d, octants);
+    const auto inOrder = [&](const auto& values)
+                             HWY_ATTR { return hn::TableLookupLanes(values, order); };
+    for (std::size_t count = 1; count-- > 0;) {
+      if (enters[count] > m_tMax) continue;
+      const std::uint32_t begin = begins[count], link = links[count];
+      if (link & OctreeBlock::kLeaf) {
+        if (!testElements(begin, begin + (link & ~OctreeBlock::kLeaf))) return;
+        continue;
+      }
+      const OctreeBlock& block = m_blocks[link];
+      if (begin < block.begin[0] && !testElements(begin, block.begin[0])) return;
+      const float* const rows = block.lower[0];
+      const float* const near[3] = {rows + m_nearRow[0], rows + m_nearRow[1], rows + m_nearRow[2]};
+      const float* const far[3] = {rows + m_farRow[0], rows + m_farRow[1], rows + m_farRow[2]};
+      for (std::size_t i = 0; i < 8; i += kLanes) {
+        const std::size_t slot = i ^ ofVector;
+        hn::Vec<D> enter, leave;
+        m_nodeRay.intersect(near, far, slot, m_tMax, enter, leave);
+        enter = inOrder(enter);
+        const auto entered = hn::Le(enter, inOrder(leave));
+        const auto push = [&](const std::uint32_t* from, std::uint32_t* to) HWY_ATTR {
+          const auto values = inOrder(hn::BitCast(d, hn::LoadU(du, from + slot)));
+          hn::StoreU(hn::BitCast(du, hn::Compress(values, entered)), du, to + count);
+        };
+        hn::StoreU(hn::Compress(enter, entered), d, enters + count);
+        push(block.begin, begins);
+        push(block.child, links);
+        count += hn::CountTrue(d, entered);
+      }
+    }
+  }
+
+ private:
+  /// Returns false if the traversal ends.
+  HWY_ATTR HWY_NOINLINE bool testElements(std::uint32_t begin, std::uint32_t end) {
+    const LeafTag d;
+    std::uint32_t places[kSide];
+    for (std::uint32_t first = begin; first < end; first += kSide) {
+      // Their corners, and the boxes that are next.
+      for (std::size_t i = 0; i < 3; ++i) hwy::Prefetch(m_elements.ordered + first + 5 * i);
+      const std::size_t next = std::min<std::size_t>(first + 2 * kSide - 1, end);
+      for (std::size_t k = 0; k < 3; ++k) {
+        hwy::Prefetch(m_near[k] + next);
+        hwy::Prefetch(m_far[k] + next);
+      }
+      const std::size_t size = std::min<std::size_t>(kSide, end - first);
+      std::uint32_t bits = 0;
+      for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
+        hn::Vec<LeafTag> enter, leave;
+        m_leafRay.intersect(m_near, m_far, first + i, m_tMax, enter, leave);
+        bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), hn::Le(enter, leave))) << i;
+      }
+      // Without a branch for each, the tests overlap.
+      const auto& [ordered, positions, line] = m_elements;
+      std::size_t count = 0;
+      for (; bits; bits &= bits - 1) {
+        places[count] = first + static_cast<std::uint32_t>(std::countr_zero(bits));
+        const auto& [a, b, c] = ordered[places[count]];
+        count += !line.misses(positions[a], positions[b], positions[c]);
+      }
+      for (std::size_t i = 0; i < count; ++i) {
+        m_tMax = m_test(m_context, places[i]);
+        if (m_tMax < 0) return false;
+      }
+    }
+    return true;
+  }
+
+  const OctreeBlock* const m_blocks;
+  const RayElements& m_elements;
+  const RayLanes<NodeTag> m_nodeRay;
+  const RayLanes<LeafTag> m_leafRay;
+  const float *m_near[3], *m_far[3];         ///< bounds of elements at which the ray enters, leaves
+  std::ptrdiff_t m_nearRow[3], m_farRow[3];  ///< the same in a block, from its first bound
+  std::size_t m_lastOctant = 7;              ///< the octant that the ray passes last
+  float m_tMax;
+  void* const m_context;
+  const TestElement m_test;
+};
+
+HWY_ATTR void traverseRayKernel(const Octree& octree, const RayElements& elements,
+                                const FloatRay& ray, void* context, TestElement test) {
+  RaySearch(octree, elements, ray, context, test).run();
 }
 
 }  // namespace palpate::HWY_NAMESPACE
@@ -103,9 +187,10 @@ namespace palpate {
 
 HWY_EXPORT(traverseRayKernel);
 
-void traverseRay(const Octree& octree, const FloatRay& ray, void* context, TestElement test) {
+void traverseRay(const Octree& octree, const RayElements& elements, const FloatRay& ray,
+                 void* context, TestElement test) {
   octree.requireBuilt();
-  HWY_DYNAMIC_DISPATCH(traverseRayKernel)(octree, ray, context, test);
+  HWY_DYNAMIC_DISPATCH(traverseRayKernel)(octree, elements, ray, context, test);
 }
 
 }  // namespace palpate

@@ -1,6 +1,10 @@
 #pragma once
 
+#include "Math/RayTriangle.h"
+#include "Mesh/TriangleMesh.h"
 #include "Octree/Octree.h"
+
+#include <Eigen/Core>
 
 #include <array>
 #include <cstdint>
@@ -8,8 +12,7 @@
 
 namespace palpate {
 
-/// A ray in an octree's floats: points origin + t direction with t in [0, tMax]. The largest
-/// component of the direction has magnitude 1.
+/// A ray in an octree's floats: points origin + t direction with t in [0, tMax].
 struct FloatRay {
   std::array<float, 3> origin;
   /// 1 / direction; a very large number for a component of zero.
@@ -20,25 +23,33 @@ struct FloatRay {
   float slack;
 };
 
+/// The elements of an octree, and the ray as their positions see it.
+struct RayElements {
+  const Triangle* ordered;  ///< elements in the octree's order
+  const Eigen::Vector3d*
+      positions;  ///< per vertex, in the octree's frame but for a shift and scale
+  LineFilter line;
+};
+
 /// Tests the element at a place of the octree's order. Returns the largest t that is still wanted;
 /// a negative number ends the traversal.
 using TestElement = float (*)(void* context, std::uint32_t place);
 
-/// Visits the elements whose boxes the ray meets. Nodes come in the order in which the ray enters
-/// them. A node or element is skipped if the ray enters its box beyond the t that was returned
-/// last.
+/// Visits the elements whose boxes the ray meets and that its line may meet. Siblings come in the
+/// order in which the ray passes their octants. A node or element is skipped if the ray enters its
+/// box beyond the t that was returned last.
 /// Source   Revelles, Urena, Lastra, An efficient parametric algorithm for octree traversal (2000),
-///          for the order. Difference: cells overlap, so that each node sorts its children by their
-///          fitted boxes.
-void traverseRay(const Octree&, const FloatRay&, void* context, TestElement);
+///          for the order. Difference: cells overlap, so that the ray may meet more than four of
+///          eight siblings, and each is tested by its fitted box.
+void traverseRay(const Octree&, const RayElements&, const FloatRay&, void* context, TestElement);
 
 /// traverseRay() with f(place) in place of the function pointer.
 template <class F>
-void forEachOnRay(const Octree& octree, const FloatRay& ray, F&& f) {
+void forEachOnRay(const Octree& octree, const RayElements& elements, const FloatRay& ray, F&& f) {
   const auto call = [](void* context, std::uint32_t place) {
     return (*static_cast<std::remove_reference_t<F>*>(context))(place);
   };
-  traverseRay(octree, ray, &f, call);
+  traverseRay(octree, elements, ray, &f, call);
 }
 
 }  // namespace palpate
