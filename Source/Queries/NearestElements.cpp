@@ -88,63 +88,81 @@ class Search {
   }
 
   HWY_ATTR void run() {
-    const Octree& octree = m_search.octree;
-    const FloatBox point = m_search.point.box();
-    struct Entry {
-      float square;
-      OctreeNode node;
-    };
-    // Seven siblings remain on each of at most 61 levels.
-    std::array<Entry, 512> entries;
-    std::size_t count = 0;
-    alignas(64) float squares[kSide];
-    const auto within = [&](auto d, const auto& boxes, std::size_t i) HWY_ATTR {
-      const auto distances = boxes.distanceFrom(point);
-      hn::Store(distances, d, squares + i);
-      return hn::Le(distances, hn::Set(d, m_limit));
-    };
-    entries[count++] = {0, 0};
-    while (count > 0) {
-      const Entry entry = entries[--count];
-      if (entry.square > m_limit) continue;
-      const auto [begin, end] = octree.ownRange(entry.node);
-      for (std::uint32_t i = begin; i < end; i += kSide) {
-        const std::size_t size = std::min<std::size_t>(kSide, end - i);
-        for (std::uint32_t bits = near(LeafTag(), octree.boxes(), i, size, within); bits;
-             bits &= bits - 1)
-          add(i + static_cast<std::uint32_t>(std::countr_zero(bits)));
+    const OctreeBlock* const blocks = m_search.octree.blocks();
+    // One block on each of at most 61 levels.
+    std::array<Siblings, 64> path;
+    std::size_t depth = 0;
+    const OctreeBlock* block = blocks;
+    std::uint32_t slot = 0;
+    for (;;) {
+      const std::uint32_t begin = block->begin[slot];
+      if (block->isLeaf(slot)) {
+        addElements(begin, begin + block->count(slot));
+      } else {
+        const OctreeBlock& children = blocks[block->child[slot]];
+        addElements(begin, children.begin[0]);
+        setOrder(children, path[depth++]);
       }
-      if (begin < end) test();
-      const OctreeNode child = octree.firstChild(entry.node);
-      if (child == 0) continue;
-      // The nearest one goes last, because the last entry is taken first. The others stay unsorted:
-      // once it has lowered the bound, most of them are skipped.
-      Entry nearest{std::numeric_limits<float>::infinity(), 0};
-      for (std::uint32_t bits = near(NodeTag(), octree.blocks()[child >> 3], 0, 8, within); bits;
-           bits &= bits - 1) {
-        const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
-        const Entry next{squares[slot], child + slot};
-        const bool isNearer = next.square < nearest.square;
-        entries[count] = isNearer ? nearest : next;
-        nearest = isNearer ? next : nearest;
-        count += entries[count].node != 0;
-      }
-      if (nearest.node != 0) entries[count++] = nearest;
+      // The nearest sibling that was not visited, on the lowest level that has one within the
+      // bound.
+      std::uint32_t key = kVisited;
+      while (depth > 0 && (key = leastKey(path[depth - 1])) > m_limitKey) --depth;
+      if (depth == 0) break;
+      Siblings& siblings = path[depth - 1];
+      block = siblings.block;
+      slot = key % 8;
+      siblings.keys[slot] = kVisited;
     }
     if (m_candidates.size > 0) flush();
   }
 
  private:
-  /// The bits of boxes that `within` accepts, of at most `size` boxes from `first` on.
-  template <class D, class Boxes, class Within>
-  HWY_ATTR HWY_INLINE static std::uint32_t near(D d, const Boxes& from, std::size_t first,
-                                                std::size_t size, Within&& within) {
-    std::uint32_t bits = 0;
-    for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
-      const auto boxes = BoxLanes<D>::load(from, first + i);
-      bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), within(d, boxes, i))) << i;
+  /// Eight siblings. A key is the bits of the squared distance of a box from the point, rounded
+  /// down, with the slot in the lowest three bits.
+  struct Siblings {
+    alignas(32) std::uint32_t keys[8];
+    const OctreeBlock* block;
+  };
+  static constexpr std::uint32_t kVisited = 0xffffffff;  ///< or empty
+
+  HWY_ATTR HWY_INLINE void setOrder(const OctreeBlock& block, Siblings& siblings) const {
+    const NodeTag d;
+    const hn::RebindToUnsigned<NodeTag> du;
+    const FloatBox point = m_search.point.box();
+    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+      const auto boxes = BoxLanes<NodeTag>::load(block, i);
+      const auto bits = hn::BitCast(du, boxes.distanceFrom(point));
+      const auto key =
+          hn::Or(hn::AndNot(hn::Set(du, 7), bits), hn::Iota(du, static_cast<std::uint32_t>(i)));
+      const auto used = hn::RebindMask(du, hn::Le(boxes.lower[0], boxes.upper[0]));
+      hn::Store(hn::IfThenElse(used, key, hn::Set(du, kVisited)), du, siblings.keys + i);
     }
-    return bits;
+    siblings.block = &block;
+  }
+  HWY_ATTR HWY_INLINE static std::uint32_t leastKey(const Siblings& siblings) {
+    const hn::RebindToUnsigned<NodeTag> du;
+    auto least = hn::Load(du, siblings.keys);
+    for (std::size_t i = hn::Lanes(du); i < 8; i += hn::Lanes(du))
+      least = hn::Min(least, hn::Load(du, siblings.keys + i));
+    return hn::GetLane(hn::MinOfLanes(du, least));
+  }
+
+  /// Tests elements whose boxes are within the bound.
+  HWY_ATTR HWY_INLINE void addElements(std::uint32_t begin, std::uint32_t end) {
+    const LeafTag d;
+    const FloatBox point = m_search.point.box();
+    for (std::uint32_t first = begin; first < end; first += kSide) {
+      const std::size_t size = std::min<std::size_t>(kSide, end - first);
+      std::uint32_t bits = 0;
+      for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
+        const auto boxes = BoxLanes<LeafTag>::load(m_search.octree.boxes(), first + i);
+        const auto within = hn::Le(boxes.distanceFrom(point), hn::Set(d, m_limit));
+        bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), within)) << i;
+      }
+      for (; bits; bits &= bits - 1)
+        add(first + static_cast<std::uint32_t>(std::countr_zero(bits)));
+    }
+    if (begin < end) test();
   }
 
   /// A box at a squared distance above m_limit holds nothing that the bound allows. Computed
@@ -153,6 +171,7 @@ class Search {
     const float reach = m_bound + m_search.tolerance + m_search.slack;
     m_limit = OutwardRounding::up(reach * reach * (1.0f + 0x1p-19f));
     if (!(m_limit >= 0)) m_limit = std::numeric_limits<float>::infinity();
+    m_limitKey = std::bit_cast<std::uint32_t>(m_limit) | 7;
   }
   void lower(float bound) {
     if (!(bound < m_bound)) return;
@@ -228,6 +247,7 @@ class Search {
   const TakeCandidates m_take;
   float m_bound;  ///< of distances
   float m_limit;  ///< of computed squared distances of boxes
+  std::uint32_t m_limitKey;
   std::size_t m_kept = 0;
   float m_uppers[kMaxCount];
   std::size_t m_pending = 0;
