@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Queries/NearestElements.cpp"
@@ -14,6 +15,12 @@ namespace palpate::HWY_NAMESPACE {
 
 constexpr std::size_t kSide = 16;  ///< elements tested together
 
+HWY_ATTR HWY_INLINE void leaveLanes() {
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
+  _mm256_zeroupper();
+#endif
+}
+
 /// The quotient clamped to [0, 1]; 0 if the divisor is not positive.
 template <class D, class V>
 HWY_ATTR HWY_INLINE V clampedQuotient(D d, V dividend, V divisor) {
@@ -22,19 +29,21 @@ HWY_ATTR HWY_INLINE V clampedQuotient(D d, V dividend, V divisor) {
   return hn::IfThenElseZero(hn::Gt(divisor, hn::Zero(d)), clamped);
 }
 
-/// Bounds of the distances of up to sixteen triangles from the origin.
+/// Bounds of the distances of up to sixteen triangles from p.
 ///
-/// q is a point of the triangle near the closest one, however rounded. |q| is an upper bound. No
-/// point of the triangle is nearer than its least corner along q, which gives the lower bound. Both
-/// hold for any q. With R the distance of the furthest corner, all roundings together are less than
-/// 2^-20 R.
+/// q is a point of the triangle near the closest one, less p, however rounded. |q| is an upper
+/// bound. No point of the triangle is nearer than its least corner along q, which gives the lower
+/// bound. Both hold for any q. With R the distance of the furthest corner, all roundings together
+/// are less than 2^-20 R.
 template <class D>
-HWY_ATTR HWY_INLINE void boundDistances(D d, const float (*corners)[3][kSide], std::size_t i,
+HWY_ATTR HWY_INLINE void boundDistances(D d, const FloatPoint& p,
+                                        const FloatPoint (&corners)[3][kSide], std::size_t i,
                                         float slack, float* lower, float* upper) {
   using V = hn::Vec<D>;
   const auto load = [&](int corner) HWY_ATTR {
-    return Vector3<V>{hn::Load(d, &corners[corner][0][i]), hn::Load(d, &corners[corner][1][i]),
-                      hn::Load(d, &corners[corner][2][i])};
+    V x, y, z, unused;
+    hn::LoadInterleaved4(d, &corners[corner][i].x, x, y, z, unused);
+    return Vector3<V>{x - hn::Set(d, p.x), y - hn::Set(d, p.y), z - hn::Set(d, p.z)};
   };
   const Vector3<V> a = load(0), b = load(1), c = load(2);
   const Vector3<V> ab = b - a, ac = c - a, bc = c - b;
@@ -68,10 +77,10 @@ HWY_ATTR HWY_INLINE void boundDistances(D d, const float (*corners)[3][kSide], s
   const V along = hn::Min(dot(a, q), hn::Min(dot(b, q), dot(c, q))) / length;
   // Comparisons with NaN are false: the lower bound is then 0, and the upper one infinite.
   const V low = along - error, high = length + error;
-  hn::Store(hn::IfThenElseZero(hn::Gt(low, zero), low), d, lower + i);
+  hn::Store(hn::IfThenElseZero(hn::Gt(low, zero), low), d, lower);
   hn::Store(
       hn::IfThenElse(hn::Ge(high, zero), high, hn::Set(d, std::numeric_limits<float>::infinity())),
-      d, upper + i);
+      d, upper);
 }
 
 /// One search.
@@ -114,6 +123,7 @@ class Search {
       siblings.keys[slot] = kVisited;
     }
     if (m_candidates.size > 0) flush();
+    leaveLanes();
   }
 
  private:
@@ -153,10 +163,19 @@ class Search {
     const FloatBox point = m_search.point.box();
     for (std::uint32_t first = begin; first < end; first += kSide) {
       const std::size_t size = std::min<std::size_t>(kSide, end - first);
-      std::uint32_t bits = 0;
+      alignas(64) float squares[kSide];
+      auto furthest = hn::Set(d, std::numeric_limits<float>::infinity());
       for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
         const auto boxes = BoxLanes<LeafTag>::load(m_search.octree.boxes(), first + i);
-        const auto within = hn::Le(boxes.distanceFrom(point), hn::Set(d, m_limit));
+        hn::Store(boxes.distanceFrom(point), d, squares + i);
+        if (m_count == 1)
+          furthest = hn::IfThenElse(hn::FirstN(d, size - i),
+                                    hn::Min(furthest, furthestSquare(boxes)), furthest);
+      }
+      if (m_count == 1) lowerToBoxes(hn::GetLane(hn::MinOfLanes(d, furthest)));
+      std::uint32_t bits = 0;
+      for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
+        const auto within = hn::Le(hn::Load(d, squares + i), hn::Set(d, m_limit));
         bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), within)) << i;
       }
       for (; bits; bits &= bits - 1)
@@ -179,37 +198,59 @@ class Search {
     setLimit();
   }
 
+  /// The squared distance of each box's furthest corner.
+  template <class D>
+  HWY_ATTR HWY_INLINE hn::Vec<D> furthestSquare(const BoxLanes<D>& boxes) const {
+    const D d;
+    const float p[] = {m_search.point.x, m_search.point.y, m_search.point.z};
+    auto sum = hn::Zero(d);
+    for (int k = 0; k < 3; ++k) {
+      const auto at = hn::Set(d, p[k]);
+      const auto extent = hn::Max(boxes.upper[k] - at, at - boxes.lower[k]);
+      sum = sum + extent * extent;
+    }
+    return sum;
+  }
+  /// An element is in its box, and so no further away than the box's furthest corner.
+  void lowerToBoxes(float square) { lower(std::sqrt(square) * (1.0f + 0x1p-19f) + m_search.slack); }
+
   HWY_ATTR HWY_INLINE void add(std::uint32_t place) {
     const Triangle& corners = m_search.ordered[place];
-    const FloatPoint& p = m_search.point;
-    for (int k = 0; k < 3; ++k) {
-      const FloatPoint& corner = m_search.floats[corners[static_cast<std::size_t>(k)]];
-      m_corners[k][0][m_pending] = corner.x - p.x;
-      m_corners[k][1][m_pending] = corner.y - p.y;
-      m_corners[k][2][m_pending] = corner.z - p.z;
-    }
+    for (std::size_t k = 0; k < 3; ++k) m_corners[k][m_pending] = m_search.floats[corners[k]];
     m_places[m_pending] = place;
     if (++m_pending == kSide) test();
   }
 
   /// Tests the pending elements.
   HWY_ATTR HWY_INLINE void test() {
-    alignas(64) float lowers[kSide], uppers[kSide];
-    const auto bound = [&](auto d) HWY_ATTR {
-      for (std::size_t i = 0; i < m_pending; i += hn::Lanes(d))
-        boundDistances(d, m_corners, i, m_search.slack, lowers, uppers);
-    };
     if (m_pending <= hn::Lanes(NodeTag()))
-      bound(NodeTag());
+      test(NodeTag());
     else
-      bound(LeafTag());
-    for (std::size_t i = 0; m_count > 0 && i < m_pending; ++i) keepLeast(uppers[i]);
-    for (std::size_t i = 0; i < m_pending; ++i) {
-      if (lowers[i] > m_bound + m_search.tolerance) continue;
+      test(LeafTag());
+    m_pending = 0;
+  }
+  template <class D>
+  HWY_ATTR void test(D d) {
+    alignas(64) float lowers[kSide], uppers[kSide];
+    for (std::size_t i = 0; i < m_pending; i += hn::Lanes(d))
+      boundDistances(d, m_search.point, m_corners, i, m_search.slack, lowers + i, uppers + i);
+    const auto bitsBelow = [&](const float* values, float most) HWY_ATTR {
+      std::uint32_t bits = 0;
+      for (std::size_t i = 0; i < m_pending; i += hn::Lanes(d))
+        bits |= bitsOf(d, hn::And(hn::FirstN(d, m_pending - i),
+                                  hn::Le(hn::Load(d, values + i), hn::Set(d, most))))
+                << i;
+      return bits;
+    };
+    if (m_count > 0)
+      for (std::uint32_t bits = bitsBelow(uppers, m_bound); bits; bits &= bits - 1)
+        keepLeast(uppers[std::countr_zero(bits)]);
+    for (std::uint32_t bits = bitsBelow(lowers, m_bound + m_search.tolerance); bits;
+         bits &= bits - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(bits));
       if (m_candidates.size == NearCandidates::kCapacity) makeRoom();
       m_candidates.at[m_candidates.size++] = {m_places[i], lowers[i], uppers[i]};
     }
-    m_pending = 0;
   }
 
   /// Keeps the least upper bounds, ascending.
@@ -231,12 +272,16 @@ class Search {
   }
   void prune() {
     const float most = m_bound + m_search.tolerance;
-    const auto end = std::remove_if(m_candidates.at, m_candidates.at + m_candidates.size,
-                                    [&](const NearCandidate& c) { return c.lower > most; });
-    m_candidates.size = static_cast<std::size_t>(end - m_candidates.at);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < m_candidates.size; ++i) {
+      m_candidates.at[kept] = m_candidates.at[i];
+      kept += !(m_candidates.at[i].lower > most);
+    }
+    m_candidates.size = kept;
   }
   void flush() {
     prune();
+    leaveLanes();
     lower(m_take(m_context, m_candidates.at, m_candidates.size));
     m_candidates.size = 0;
   }
@@ -252,7 +297,7 @@ class Search {
   float m_uppers[kMaxCount];
   std::size_t m_pending = 0;
   std::uint32_t m_places[kSide];
-  alignas(64) float m_corners[3][3][kSide] = {};
+  alignas(64) FloatPoint m_corners[3][kSide] = {};
   NearCandidates m_candidates;
 };
 

@@ -93,6 +93,10 @@ PointDistances::Near PointDistances::at(std::uint32_t place) const {
 
 template <class F>
 void PointDistances::forEach(std::span<const std::uint32_t> places, F&& f) const {
+  if (places.size() <= 2) {
+    for (const std::uint32_t place : places) f(at(place));
+    return;
+  }
   const Positions& now = m_geometry.mesh.now;
   TriangleBatch batch;
   for (std::size_t i = 0; i < places.size(); ++i) {
