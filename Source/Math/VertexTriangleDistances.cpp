@@ -338,20 +338,12 @@ class Feet {
   Mask m_isCorner[3], m_isEdge[3], m_isFace;
 };
 
-template <class D>
-HWY_ATTR HWY_INLINE void findFeet(D d, const double (&p)[3], const TriangleBatch& batch,
-                                  std::size_t count, VertexTriangleDistances::Lanes& lanes) {
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) Feet<D>(p, batch, i).store(lanes, i);
-}
-
 HWY_ATTR void vertexTriangleDistancesKernel(const double (&p)[3], const TriangleBatch& batch,
                                             std::size_t count,
                                             VertexTriangleDistances::Lanes& lanes) {
-  // Division takes longer in wide lanes.
-  if (count <= 2)
-    findFeet(hn::CappedTag<double, 2>(), p, batch, count, lanes);
-  else
-    findFeet(hn::CappedTag<double, TriangleBatch::kSize>(), p, batch, count, lanes);
+  const hn::CappedTag<double, TriangleBatch::kSize> d;
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d))
+    Feet<hn::CappedTag<double, TriangleBatch::kSize>>(p, batch, i).store(lanes, i);
 }
 
 }  // namespace palpate::HWY_NAMESPACE

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Queries/NearestElements.cpp"
@@ -122,6 +121,7 @@ class Search {
       slot = key % 8;
       siblings.keys[slot] = kVisited;
     }
+    test();
     if (m_candidates.size > 0) flush();
     leaveLanes();
   }
@@ -163,25 +163,16 @@ class Search {
     const FloatBox point = m_search.point.box();
     for (std::uint32_t first = begin; first < end; first += kSide) {
       const std::size_t size = std::min<std::size_t>(kSide, end - first);
-      alignas(64) float squares[kSide];
-      auto furthest = hn::Set(d, std::numeric_limits<float>::infinity());
-      for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
-        const auto boxes = BoxLanes<LeafTag>::load(m_search.octree.boxes(), first + i);
-        hn::Store(boxes.distanceFrom(point), d, squares + i);
-        if (m_count == 1)
-          furthest = hn::IfThenElse(hn::FirstN(d, size - i),
-                                    hn::Min(furthest, furthestSquare(boxes)), furthest);
-      }
-      if (m_count == 1) lowerToBoxes(hn::GetLane(hn::MinOfLanes(d, furthest)));
       std::uint32_t bits = 0;
       for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
-        const auto within = hn::Le(hn::Load(d, squares + i), hn::Set(d, m_limit));
+        const auto boxes = BoxLanes<LeafTag>::load(m_search.octree.boxes(), first + i);
+        const auto within = hn::Le(boxes.distanceFrom(point), hn::Set(d, m_limit));
         bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), within)) << i;
       }
       for (; bits; bits &= bits - 1)
         add(first + static_cast<std::uint32_t>(std::countr_zero(bits)));
     }
-    if (begin < end) test();
+    if (m_pending >= 8 || (m_kept < m_count && begin < end)) test();
   }
 
   /// A box at a squared distance above m_limit holds nothing that the bound allows. Computed
@@ -198,22 +189,6 @@ class Search {
     setLimit();
   }
 
-  /// The squared distance of each box's furthest corner.
-  template <class D>
-  HWY_ATTR HWY_INLINE hn::Vec<D> furthestSquare(const BoxLanes<D>& boxes) const {
-    const D d;
-    const float p[] = {m_search.point.x, m_search.point.y, m_search.point.z};
-    auto sum = hn::Zero(d);
-    for (int k = 0; k < 3; ++k) {
-      const auto at = hn::Set(d, p[k]);
-      const auto extent = hn::Max(boxes.upper[k] - at, at - boxes.lower[k]);
-      sum = sum + extent * extent;
-    }
-    return sum;
-  }
-  /// An element is in its box, and so no further away than the box's furthest corner.
-  void lowerToBoxes(float square) { lower(std::sqrt(square) * (1.0f + 0x1p-19f) + m_search.slack); }
-
   HWY_ATTR HWY_INLINE void add(std::uint32_t place) {
     const Triangle& corners = m_search.ordered[place];
     for (std::size_t k = 0; k < 3; ++k) m_corners[k][m_pending] = m_search.floats[corners[k]];
@@ -222,15 +197,8 @@ class Search {
   }
 
   /// Tests the pending elements.
-  HWY_ATTR HWY_INLINE void test() {
-    if (m_pending <= hn::Lanes(NodeTag()))
-      test(NodeTag());
-    else
-      test(LeafTag());
-    m_pending = 0;
-  }
-  template <class D>
-  HWY_ATTR void test(D d) {
+  HWY_ATTR void test() {
+    const NodeTag d;  // division takes longer in wider lanes
     alignas(64) float lowers[kSide], uppers[kSide];
     for (std::size_t i = 0; i < m_pending; i += hn::Lanes(d))
       boundDistances(d, m_search.point, m_corners, i, m_search.slack, lowers + i, uppers + i);
@@ -251,6 +219,7 @@ class Search {
       if (m_candidates.size == NearCandidates::kCapacity) makeRoom();
       m_candidates.at[m_candidates.size++] = {m_places[i], lowers[i], uppers[i]};
     }
+    m_pending = 0;
   }
 
   /// Keeps the least upper bounds, ascending.
