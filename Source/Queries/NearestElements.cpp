@@ -210,9 +210,7 @@ class Search {
                 << i;
       return bits;
     };
-    if (m_count > 0)
-      for (std::uint32_t bits = bitsBelow(uppers, m_bound); bits; bits &= bits - 1)
-        keepLeast(uppers[std::countr_zero(bits)]);
+    if (m_count > 0) keepLeast(uppers, bitsBelow(uppers, m_bound));
     for (std::uint32_t bits = bitsBelow(lowers, m_bound + m_search.tolerance); bits;
          bits &= bits - 1) {
       const auto i = static_cast<std::size_t>(std::countr_zero(bits));
@@ -222,16 +220,27 @@ class Search {
     m_pending = 0;
   }
 
-  /// Keeps the least upper bounds, ascending.
-  HWY_INLINE void keepLeast(float upper) {
-    if (m_kept == m_count) {
-      if (!(upper < m_uppers[m_kept - 1])) return;
-      --m_kept;
+  /// Keeps the least upper bounds, ascending: those that it has, and new ones. Their lowest bits,
+  /// rounded up, number them, so that all differ. The number of lower ones is then the new place.
+  HWY_ATTR HWY_INLINE void keepLeast(const float* uppers, std::uint32_t bits) {
+    if (bits == 0) return;
+    const hn::RebindToSigned<NodeTag> d;
+    std::size_t size = m_kept;
+    for (; bits; bits &= bits - 1, ++size)
+      m_uppers[size] = (std::bit_cast<std::int32_t>(uppers[std::countr_zero(bits)]) & ~kNumber) +
+                       kNumber + 1 + static_cast<std::int32_t>(size);
+    hn::StoreU(hn::Set(d, std::numeric_limits<std::int32_t>::max()), d, m_uppers + size);
+    alignas(32) std::int32_t sorted[kMaxCount + kSide];
+    for (std::size_t i = 0; i < size; ++i) {
+      const auto upper = hn::Set(d, m_uppers[i]);
+      std::size_t place = 0;
+      for (std::size_t k = 0; k < size; k += hn::Lanes(d))
+        place += hn::CountTrue(d, hn::Lt(hn::Load(d, m_uppers + k), upper));
+      sorted[place] = (m_uppers[i] & ~kNumber) + static_cast<std::int32_t>(place);
     }
-    std::size_t place = m_kept++;
-    for (; place > 0 && m_uppers[place - 1] > upper; --place) m_uppers[place] = m_uppers[place - 1];
-    m_uppers[place] = upper;
-    if (m_kept == m_count) lower(m_uppers[m_kept - 1]);
+    m_kept = std::min(size, m_count);
+    std::copy_n(sorted, m_kept, m_uppers);
+    if (m_kept == m_count) lower(std::bit_cast<float>(m_uppers[m_kept - 1] | kNumber));
   }
 
   /// Drops candidates beyond the bound. If most remain, they are taken.
@@ -263,7 +272,8 @@ class Search {
   float m_limit;  ///< of computed squared distances of boxes
   std::uint32_t m_limitKey;
   std::size_t m_kept = 0;
-  float m_uppers[kMaxCount];
+  static constexpr std::int32_t kNumber = 63;
+  alignas(32) std::int32_t m_uppers[kMaxCount + kSide + 8];  ///< bits of floats; see keepLeast()
   std::size_t m_pending = 0;
   std::uint32_t m_places[kSide];
   alignas(64) FloatPoint m_corners[3][kSide] = {};

@@ -197,18 +197,18 @@ void PointDistances::nearest(std::size_t k, double maxDistance, std::vector<Near
   out.clear();
   const auto isNearerThan = [&](const Near& a, const Near& b) { return isNearer(a, b); };
   search(maxDistance, k, [&](const Near& near, double most) {
-    if (out.size() == k) {
-      if (!isNearer(near, out.front())) return most;
+    if (out.size() < k) {
+      if (isWithin(near, maxDistance)) out.push_back(near);
+      if (out.size() < k) return most;
+      std::make_heap(out.begin(), out.end(), isNearerThan);
+    } else if (isNearer(near, out.front())) {
       std::pop_heap(out.begin(), out.end(), isNearerThan);
-      out.pop_back();
-    } else if (!isWithin(near, maxDistance)) {
-      return most;
+      out.back() = near;
+      std::push_heap(out.begin(), out.end(), isNearerThan);
     }
-    out.push_back(near);
-    std::push_heap(out.begin(), out.end(), isNearerThan);
-    return out.size() == k ? std::min(most, out.front().distance) : most;
+    return std::min(most, out.front().distance);
   });
-  std::sort_heap(out.begin(), out.end(), isNearerThan);
+  std::sort(out.begin(), out.end(), isNearerThan);
 }
 
 void PointDistances::within(double distance, std::vector<std::uint32_t>& elements) const {
