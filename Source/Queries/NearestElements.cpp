@@ -14,6 +14,12 @@ namespace palpate::HWY_NAMESPACE {
 
 constexpr std::size_t kSide = 16;  ///< elements tested together
 
+HWY_ATTR HWY_INLINE void leaveLanes() {
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
+  _mm256_zeroupper();
+#endif
+}
+
 /// The quotient clamped to [0, 1]; 0 if the divisor is not positive.
 template <class D, class V>
 HWY_ATTR HWY_INLINE V clampedQuotient(D d, V dividend, V divisor) {
@@ -22,19 +28,21 @@ HWY_ATTR HWY_INLINE V clampedQuotient(D d, V dividend, V divisor) {
   return hn::IfThenElseZero(hn::Gt(divisor, hn::Zero(d)), clamped);
 }
 
-/// Bounds of the distances of up to sixteen triangles from the origin.
+/// Bounds of the distances of up to sixteen triangles from p.
 ///
-/// q is a point of the triangle near the closest one, however rounded. |q| is an upper bound. No
-/// point of the triangle is nearer than its least corner along q, which gives the lower bound. Both
-/// hold for any q. With R the distance of the furthest corner, all roundings together are less than
-/// 2^-20 R.
+/// q is a point of the triangle near the closest one, less p, however rounded. |q| is an upper
+/// bound. No point of the triangle is nearer than its least corner along q, which gives the lower
+/// bound. Both hold for any q. With R the distance of the furthest corner, all roundings together
+/// are less than 2^-20 R.
 template <class D>
-HWY_ATTR HWY_INLINE void boundDistances(D d, const float (*corners)[3][kSide], std::size_t i,
+HWY_ATTR HWY_INLINE void boundDistances(D d, const FloatPoint& p,
+                                        const FloatPoint (&corners)[3][kSide], std::size_t i,
                                         float slack, float* lower, float* upper) {
   using V = hn::Vec<D>;
   const auto load = [&](int corner) HWY_ATTR {
-    return Vector3<V>{hn::Load(d, &corners[corner][0][i]), hn::Load(d, &corners[corner][1][i]),
-                      hn::Load(d, &corners[corner][2][i])};
+    V x, y, z, unused;
+    hn::LoadInterleaved4(d, &corners[corner][i].x, x, y, z, unused);
+    return Vector3<V>{x - hn::Set(d, p.x), y - hn::Set(d, p.y), z - hn::Set(d, p.z)};
   };
   const Vector3<V> a = load(0), b = load(1), c = load(2);
   const Vector3<V> ab = b - a, ac = c - a, bc = c - b;
@@ -68,10 +76,10 @@ HWY_ATTR HWY_INLINE void boundDistances(D d, const float (*corners)[3][kSide], s
   const V along = hn::Min(dot(a, q), hn::Min(dot(b, q), dot(c, q))) / length;
   // Comparisons with NaN are false: the lower bound is then 0, and the upper one infinite.
   const V low = along - error, high = length + error;
-  hn::Store(hn::IfThenElseZero(hn::Gt(low, zero), low), d, lower + i);
+  hn::Store(hn::IfThenElseZero(hn::Gt(low, zero), low), d, lower);
   hn::Store(
       hn::IfThenElse(hn::Ge(high, zero), high, hn::Set(d, std::numeric_limits<float>::infinity())),
-      d, upper + i);
+      d, upper);
 }
 
 /// One search.
@@ -88,63 +96,83 @@ class Search {
   }
 
   HWY_ATTR void run() {
-    const Octree& octree = m_search.octree;
-    const FloatBox point = m_search.point.box();
-    struct Entry {
-      float square;
-      OctreeNode node;
-    };
-    // Seven siblings remain on each of at most 61 levels.
-    std::array<Entry, 512> entries;
-    std::size_t count = 0;
-    alignas(64) float squares[kSide];
-    const auto within = [&](auto d, const auto& boxes, std::size_t i) HWY_ATTR {
-      const auto distances = boxes.distanceFrom(point);
-      hn::Store(distances, d, squares + i);
-      return hn::Le(distances, hn::Set(d, m_limit));
-    };
-    entries[count++] = {0, 0};
-    while (count > 0) {
-      const Entry entry = entries[--count];
-      if (entry.square > m_limit) continue;
-      const auto [begin, end] = octree.ownRange(entry.node);
-      for (std::uint32_t i = begin; i < end; i += kSide) {
-        const std::size_t size = std::min<std::size_t>(kSide, end - i);
-        for (std::uint32_t bits = near(LeafTag(), octree.boxes(), i, size, within); bits;
-             bits &= bits - 1)
-          add(i + static_cast<std::uint32_t>(std::countr_zero(bits)));
+    const OctreeBlock* const blocks = m_search.octree.blocks();
+    // One block on each of at most 61 levels.
+    std::array<Siblings, 64> path;
+    std::size_t depth = 0;
+    const OctreeBlock* block = blocks;
+    std::uint32_t slot = 0;
+    for (;;) {
+      const std::uint32_t begin = block->begin[slot];
+      if (block->isLeaf(slot)) {
+        addElements(begin, begin + block->count(slot));
+      } else {
+        const OctreeBlock& children = blocks[block->child[slot]];
+        addElements(begin, children.begin[0]);
+        setOrder(children, path[depth++]);
       }
-      if (begin < end) test();
-      const OctreeNode child = octree.firstChild(entry.node);
-      if (child == 0) continue;
-      // The nearest one goes last, because the last entry is taken first. The others stay unsorted:
-      // once it has lowered the bound, most of them are skipped.
-      Entry nearest{std::numeric_limits<float>::infinity(), 0};
-      for (std::uint32_t bits = near(NodeTag(), octree.blocks()[child >> 3], 0, 8, within); bits;
-           bits &= bits - 1) {
-        const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
-        const Entry next{squares[slot], child + slot};
-        const bool isNearer = next.square < nearest.square;
-        entries[count] = isNearer ? nearest : next;
-        nearest = isNearer ? next : nearest;
-        count += entries[count].node != 0;
-      }
-      if (nearest.node != 0) entries[count++] = nearest;
+      // The nearest sibling that was not visited, on the lowest level that has one within the
+      // bound.
+      std::uint32_t key = kVisited;
+      while (depth > 0 && (key = leastKey(path[depth - 1])) > m_limitKey) --depth;
+      if (depth == 0) break;
+      Siblings& siblings = path[depth - 1];
+      block = siblings.block;
+      slot = key % 8;
+      siblings.keys[slot] = kVisited;
     }
+    test();
     if (m_candidates.size > 0) flush();
+    leaveLanes();
   }
 
  private:
-  /// The bits of boxes that `within` accepts, of at most `size` boxes from `first` on.
-  template <class D, class Boxes, class Within>
-  HWY_ATTR HWY_INLINE static std::uint32_t near(D d, const Boxes& from, std::size_t first,
-                                                std::size_t size, Within&& within) {
-    std::uint32_t bits = 0;
-    for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
-      const auto boxes = BoxLanes<D>::load(from, first + i);
-      bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), within(d, boxes, i))) << i;
+  /// Eight siblings. A key is the bits of the squared distance of a box from the point, rounded
+  /// down, with the slot in the lowest three bits.
+  struct Siblings {
+    alignas(32) std::uint32_t keys[8];
+    const OctreeBlock* block;
+  };
+  static constexpr std::uint32_t kVisited = 0xffffffff;  ///< or empty
+
+  HWY_ATTR HWY_INLINE void setOrder(const OctreeBlock& block, Siblings& siblings) const {
+    const NodeTag d;
+    const hn::RebindToUnsigned<NodeTag> du;
+    const FloatBox point = m_search.point.box();
+    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+      const auto boxes = BoxLanes<NodeTag>::load(block, i);
+      const auto bits = hn::BitCast(du, boxes.distanceFrom(point));
+      const auto key =
+          hn::Or(hn::AndNot(hn::Set(du, 7), bits), hn::Iota(du, static_cast<std::uint32_t>(i)));
+      const auto used = hn::RebindMask(du, hn::Le(boxes.lower[0], boxes.upper[0]));
+      hn::Store(hn::IfThenElse(used, key, hn::Set(du, kVisited)), du, siblings.keys + i);
     }
-    return bits;
+    siblings.block = &block;
+  }
+  HWY_ATTR HWY_INLINE static std::uint32_t leastKey(const Siblings& siblings) {
+    const hn::RebindToUnsigned<NodeTag> du;
+    auto least = hn::Load(du, siblings.keys);
+    for (std::size_t i = hn::Lanes(du); i < 8; i += hn::Lanes(du))
+      least = hn::Min(least, hn::Load(du, siblings.keys + i));
+    return hn::GetLane(hn::MinOfLanes(du, least));
+  }
+
+  /// Tests elements whose boxes are within the bound.
+  HWY_ATTR HWY_INLINE void addElements(std::uint32_t begin, std::uint32_t end) {
+    const LeafTag d;
+    const FloatBox point = m_search.point.box();
+    for (std::uint32_t first = begin; first < end; first += kSide) {
+      const std::size_t size = std::min<std::size_t>(kSide, end - first);
+      std::uint32_t bits = 0;
+      for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
+        const auto boxes = BoxLanes<LeafTag>::load(m_search.octree.boxes(), first + i);
+        const auto within = hn::Le(boxes.distanceFrom(point), hn::Set(d, m_limit));
+        bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), within)) << i;
+      }
+      for (; bits; bits &= bits - 1)
+        add(first + static_cast<std::uint32_t>(std::countr_zero(bits)));
+    }
+    if (m_pending >= 8 || (m_kept < m_count && begin < end)) test();
   }
 
   /// A box at a squared distance above m_limit holds nothing that the bound allows. Computed
@@ -153,6 +181,7 @@ class Search {
     const float reach = m_bound + m_search.tolerance + m_search.slack;
     m_limit = OutwardRounding::up(reach * reach * (1.0f + 0x1p-19f));
     if (!(m_limit >= 0)) m_limit = std::numeric_limits<float>::infinity();
+    m_limitKey = std::bit_cast<std::uint32_t>(m_limit) | 7;
   }
   void lower(float bound) {
     if (!(bound < m_bound)) return;
@@ -162,47 +191,56 @@ class Search {
 
   HWY_ATTR HWY_INLINE void add(std::uint32_t place) {
     const Triangle& corners = m_search.ordered[place];
-    const FloatPoint& p = m_search.point;
-    for (int k = 0; k < 3; ++k) {
-      const FloatPoint& corner = m_search.floats[corners[static_cast<std::size_t>(k)]];
-      m_corners[k][0][m_pending] = corner.x - p.x;
-      m_corners[k][1][m_pending] = corner.y - p.y;
-      m_corners[k][2][m_pending] = corner.z - p.z;
-    }
+    for (std::size_t k = 0; k < 3; ++k) m_corners[k][m_pending] = m_search.floats[corners[k]];
     m_places[m_pending] = place;
     if (++m_pending == kSide) test();
   }
 
   /// Tests the pending elements.
-  HWY_ATTR HWY_INLINE void test() {
+  HWY_ATTR void test() {
+    const NodeTag d;  // division takes longer in wider lanes
     alignas(64) float lowers[kSide], uppers[kSide];
-    const auto bound = [&](auto d) HWY_ATTR {
+    for (std::size_t i = 0; i < m_pending; i += hn::Lanes(d))
+      boundDistances(d, m_search.point, m_corners, i, m_search.slack, lowers + i, uppers + i);
+    const auto bitsBelow = [&](const float* values, float most) HWY_ATTR {
+      std::uint32_t bits = 0;
       for (std::size_t i = 0; i < m_pending; i += hn::Lanes(d))
-        boundDistances(d, m_corners, i, m_search.slack, lowers, uppers);
+        bits |= bitsOf(d, hn::And(hn::FirstN(d, m_pending - i),
+                                  hn::Le(hn::Load(d, values + i), hn::Set(d, most))))
+                << i;
+      return bits;
     };
-    if (m_pending <= hn::Lanes(NodeTag()))
-      bound(NodeTag());
-    else
-      bound(LeafTag());
-    for (std::size_t i = 0; m_count > 0 && i < m_pending; ++i) keepLeast(uppers[i]);
-    for (std::size_t i = 0; i < m_pending; ++i) {
-      if (lowers[i] > m_bound + m_search.tolerance) continue;
+    if (m_count > 0) keepLeast(uppers, bitsBelow(uppers, m_bound));
+    for (std::uint32_t bits = bitsBelow(lowers, m_bound + m_search.tolerance); bits;
+         bits &= bits - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(bits));
       if (m_candidates.size == NearCandidates::kCapacity) makeRoom();
       m_candidates.at[m_candidates.size++] = {m_places[i], lowers[i], uppers[i]};
     }
     m_pending = 0;
   }
 
-  /// Keeps the least upper bounds, ascending.
-  HWY_INLINE void keepLeast(float upper) {
-    if (m_kept == m_count) {
-      if (!(upper < m_uppers[m_kept - 1])) return;
-      --m_kept;
+  /// Keeps the least upper bounds, ascending: those that it has, and new ones. Their lowest bits,
+  /// rounded up, number them, so that all differ. The number of lower ones is then the new place.
+  HWY_ATTR HWY_INLINE void keepLeast(const float* uppers, std::uint32_t bits) {
+    if (bits == 0) return;
+    const hn::RebindToSigned<NodeTag> d;
+    std::size_t size = m_kept;
+    for (; bits; bits &= bits - 1, ++size)
+      m_uppers[size] = (std::bit_cast<std::int32_t>(uppers[std::countr_zero(bits)]) & ~kNumber) +
+                       kNumber + 1 + static_cast<std::int32_t>(size);
+    hn::StoreU(hn::Set(d, std::numeric_limits<std::int32_t>::max()), d, m_uppers + size);
+    alignas(32) std::int32_t sorted[kMaxCount + kSide];
+    for (std::size_t i = 0; i < size; ++i) {
+      const auto upper = hn::Set(d, m_uppers[i]);
+      std::size_t place = 0;
+      for (std::size_t k = 0; k < size; k += hn::Lanes(d))
+        place += hn::CountTrue(d, hn::Lt(hn::Load(d, m_uppers + k), upper));
+      sorted[place] = (m_uppers[i] & ~kNumber) + static_cast<std::int32_t>(place);
     }
-    std::size_t place = m_kept++;
-    for (; place > 0 && m_uppers[place - 1] > upper; --place) m_uppers[place] = m_uppers[place - 1];
-    m_uppers[place] = upper;
-    if (m_kept == m_count) lower(m_uppers[m_kept - 1]);
+    m_kept = std::min(size, m_count);
+    std::copy_n(sorted, m_kept, m_uppers);
+    if (m_kept == m_count) lower(std::bit_cast<float>(m_uppers[m_kept - 1] | kNumber));
   }
 
   /// Drops candidates beyond the bound. If most remain, they are taken.
@@ -212,12 +250,16 @@ class Search {
   }
   void prune() {
     const float most = m_bound + m_search.tolerance;
-    const auto end = std::remove_if(m_candidates.at, m_candidates.at + m_candidates.size,
-                                    [&](const NearCandidate& c) { return c.lower > most; });
-    m_candidates.size = static_cast<std::size_t>(end - m_candidates.at);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < m_candidates.size; ++i) {
+      m_candidates.at[kept] = m_candidates.at[i];
+      kept += !(m_candidates.at[i].lower > most);
+    }
+    m_candidates.size = kept;
   }
   void flush() {
     prune();
+    leaveLanes();
     lower(m_take(m_context, m_candidates.at, m_candidates.size));
     m_candidates.size = 0;
   }
@@ -228,11 +270,13 @@ class Search {
   const TakeCandidates m_take;
   float m_bound;  ///< of distances
   float m_limit;  ///< of computed squared distances of boxes
+  std::uint32_t m_limitKey;
   std::size_t m_kept = 0;
-  float m_uppers[kMaxCount];
+  static constexpr std::int32_t kNumber = 63;
+  alignas(32) std::int32_t m_uppers[kMaxCount + kSide + 8];  ///< bits of floats; see keepLeast()
   std::size_t m_pending = 0;
   std::uint32_t m_places[kSide];
-  alignas(64) float m_corners[3][3][kSide] = {};
+  alignas(64) FloatPoint m_corners[3][kSide] = {};
   NearCandidates m_candidates;
 };
 

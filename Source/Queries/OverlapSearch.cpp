@@ -25,6 +25,12 @@ HWY_ATTR HWY_INLINE Verdict verdictOf(D d, hn::Mask<D> outside, hn::Mask<D> meet
   return {bitsOf(d, outside), bitsOf(d, meeting)};
 }
 
+inline bool isBall(const FloatConvex& shape) {
+  return shape.planeCount == 0 && shape.inverseSquare == 0.0f;
+}
+/// 0 for a negative length: nothing is nearer.
+inline float squareOf(float length) { return length > 0.0f ? length * length : 0.0f; }
+
 /// The parameter of the segment's point closest to a point.
 template <class D>
 HWY_ATTR HWY_INLINE hn::Vec<D> along(D d, const FloatConvex& shape,
@@ -43,6 +49,20 @@ HWY_ATTR HWY_INLINE Vector3<hn::Vec<D>> setAll(D d, const float (&v)[3]) {
 template <class D>
 HWY_ATTR HWY_INLINE Verdict testBoxes(D d, const FloatConvex& shape, const BoxLanes<D>& boxes) {
   using V = hn::Vec<D>;
+  if (isBall(shape)) {
+    const V zero = hn::Zero(d);
+    V nearest = zero, furthest = zero;  // squares
+    for (int k = 0; k < 3; ++k) {
+      const V centre = hn::Set(d, shape.start[k]);
+      const V below = boxes.lower[k] - centre, above = centre - boxes.upper[k];
+      const V outside = hn::Max(hn::Max(below, above), zero);
+      const V across = hn::Max(hn::Neg(below), hn::Neg(above));
+      nearest = nearest + outside * outside;
+      furthest = furthest + across * across;
+    }
+    return verdictOf(d, hn::Gt(nearest, hn::Set(d, squareOf(shape.radius + shape.slack))),
+                     hn::Lt(furthest, hn::Set(d, squareOf(shape.radius - shape.slack))));
+  }
   const V middle = hn::Set(d, 0.5f), slack = hn::Set(d, shape.slack);
   const Vector3<V> centre{middle * (boxes.lower[0] + boxes.upper[0]),
                           middle * (boxes.lower[1] + boxes.upper[1]),
@@ -130,15 +150,41 @@ class NearestToSegment {
   Vector3<V> m_vector{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
 };
 
+/// Elements that are tested together.
+struct Elements {
+  alignas(64) FloatPoint corners[3][kSide] = {};
+  std::uint32_t places[kSide];
+  std::size_t size = 0;
+
+  template <class D>
+  HWY_ATTR HWY_INLINE Vector3<hn::Vec<D>> corner(D d, int number, std::size_t i) const {
+    Vector3<hn::Vec<D>> p;
+    hn::Vec<D> unused;
+    hn::LoadInterleaved4(d, &corners[number][i].x, p.x, p.y, p.z, unused);
+    return p;
+  }
+};
+
+/// Whether a corner is certainly inside a shape without planes.
 template <class D>
-HWY_ATTR HWY_INLINE Verdict testTriangles(D d, const FloatConvex& shape,
-                                          const float (*corners)[3][kSide], std::size_t i) {
+HWY_ATTR HWY_INLINE hn::Mask<D> hasCornerInside(D d, const FloatConvex& shape,
+                                                const Elements& elements, std::size_t i) {
   using V = hn::Vec<D>;
-  const auto load = [&](int corner) HWY_ATTR {
-    return Vector3<V>{hn::Load(d, &corners[corner][0][i]), hn::Load(d, &corners[corner][1][i]),
-                      hn::Load(d, &corners[corner][2][i])};
-  };
-  const Vector3<V> a = load(0), b = load(1), c = load(2);
+  V least = hn::Set(d, std::numeric_limits<float>::infinity());
+  for (int k = 0; k < 3; ++k) {
+    const Vector3<V> from = elements.corner(d, k, i) - setAll(d, shape.start);
+    const Vector3<V> w = from - along(d, shape, from) * setAll(d, shape.along);
+    least = hn::Min(least, dot(w, w));
+  }
+  return hn::Lt(least, hn::Set(d, squareOf(shape.radius - shape.slack)));
+}
+
+template <class D>
+HWY_ATTR HWY_INLINE Verdict testTriangles(D d, const FloatConvex& shape, const Elements& elements,
+                                          std::size_t i) {
+  using V = hn::Vec<D>;
+  const Vector3<V> a = elements.corner(d, 0, i), b = elements.corner(d, 1, i),
+                   c = elements.corner(d, 2, i);
   const V slack = hn::Set(d, shape.slack), zero = hn::Zero(d);
   if (shape.planeCount == 0) {
     const Vector3<V> start = setAll(d, shape.start), u = setAll(d, shape.along);
@@ -210,6 +256,10 @@ class OverlapDescent {
       }
     }
     testPending();
+    decide(m_open);
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
+    _mm256_zeroupper();
+#endif
   }
 
  private:
@@ -237,38 +287,50 @@ class OverlapDescent {
   }
   HWY_ATTR HWY_INLINE void addPending(std::uint32_t place) {
     const Triangle& corners = m_search.ordered[place];
-    for (std::size_t k = 0; k < 3; ++k) {
-      const FloatPoint& corner = m_search.floats[corners[k]];
-      m_corners[k][0][m_pending] = corner.x;
-      m_corners[k][1][m_pending] = corner.y;
-      m_corners[k][2][m_pending] = corner.z;
-    }
-    m_places[m_pending] = place;
-    if (++m_pending == kSide) testPending();
+    for (std::size_t k = 0; k < 3; ++k)
+      m_pending.corners[k][m_pending.size] = m_search.floats[corners[k]];
+    m_pending.places[m_pending.size] = place;
+    if (++m_pending.size == kSide) testPending();
   }
-  HWY_ATTR HWY_INLINE void testPending() {
+  HWY_ATTR void testPending() {
     const LeafTag d;
-    for (std::size_t i = 0; i < m_pending; i += hn::Lanes(d)) {
-      const Verdict verdict = testTriangles(d, m_search.shape, m_corners, i);
-      const std::size_t size = std::min(hn::Lanes(d), m_pending - i);
+    if (m_search.shape.planeCount > 0) return decide(m_pending);
+    std::uint32_t inside = 0;
+    for (std::size_t i = 0; i < m_pending.size; i += hn::Lanes(d))
+      inside |= bitsOf(d, hasCornerInside(d, m_search.shape, m_pending, i)) << i;
+    for (std::size_t i = 0; i < m_pending.size; ++i) {
+      if (inside >> i & 1) {
+        m_elements.push_back(m_search.octree.order()[m_pending.places[i]]);
+        continue;
+      }
+      for (std::size_t k = 0; k < 3; ++k) m_open.corners[k][m_open.size] = m_pending.corners[k][i];
+      m_open.places[m_open.size] = m_pending.places[i];
+      if (++m_open.size == kSide) decide(m_open);
+    }
+    m_pending.size = 0;
+  }
+  HWY_ATTR void decide(Elements& elements) {
+    const LeafTag d;
+    for (std::size_t i = 0; i < elements.size; i += hn::Lanes(d)) {
+      const Verdict verdict = testTriangles(d, m_search.shape, elements, i);
+      const std::size_t size = std::min(hn::Lanes(d), elements.size - i);
       for (std::uint32_t bits = ~verdict.outside & ((1u << size) - 1); bits; bits &= bits - 1) {
         const auto lane = static_cast<std::size_t>(std::countr_zero(bits));
-        const std::uint32_t place = m_places[i + lane];
+        const std::uint32_t place = elements.places[i + lane];
         if (verdict.meeting >> lane & 1)
           m_elements.push_back(m_search.octree.order()[place]);
         else
           m_undecided.push_back(place);
       }
     }
-    m_pending = 0;
+    elements.size = 0;
   }
 
   const OverlapSearch& m_search;
   std::vector<std::uint32_t>& m_elements;
   Buffer<std::uint32_t>& m_undecided;
-  std::size_t m_pending = 0;
-  std::uint32_t m_places[kSide];
-  alignas(64) float m_corners[3][3][kSide] = {};
+  Elements m_pending;
+  Elements m_open;  ///< without a corner inside a shape without planes
 };
 
 HWY_ATTR void searchOverlappingKernel(const OverlapSearch& search,

@@ -3,8 +3,10 @@
 #include "Math/ClosestPoint.h"
 #include "Math/ExactClosestPoint.h"
 #include "Math/Tolerances.h"
+#include "Math/VertexTriangleDistances.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace palpate {
@@ -47,13 +49,6 @@ NearestSearch searchOf(const SearchableGeometry& geometry, const Eigen::Vector3d
   return search;
 }
 
-/// Bounds the error of a computed distance less a radius: see vertexTriangleDistance().
-double errorOf(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-               const Eigen::Vector3d& c, double largestRadius) {
-  const auto largest = [&](const Eigen::Vector3d& q) { return (q - p).cwiseAbs().maxCoeff(); };
-  return kNearestSlack * 2 * std::max({largest(a), largest(b), largest(c), largestRadius});
-}
-
 /// The vertices of the feature that holds a closest point, ascending; unused places hold the last.
 std::array<std::uint32_t, 3> featureOf(const Triangle& corners, TriangleFeature feature) {
   const auto index = static_cast<std::size_t>(feature);
@@ -76,43 +71,66 @@ PointDistances::PointDistances(const SearchableGeometry& geometry, const Eigen::
       m_bruteForce(bruteForce),
       m_search(searchOf(geometry, point)) {}
 
+PointDistances::Near PointDistances::nearOf(std::uint32_t place,
+                                            const VertexTriangleDistance& closest,
+                                            double reach) const {
+  const TriangleMesh& mesh = m_geometry.mesh;
+  return {place, m_geometry.tree.octree().order()[place], closest,
+          closest.distance - mesh.radius(m_geometry.tree.ordered()[place], closest.barycentric),
+          kNearestSlack * 2 * std::max(reach, mesh.largestRadius)};
+}
+
 PointDistances::Near PointDistances::at(std::uint32_t place) const {
   const Triangle& corners = m_geometry.tree.ordered()[place];
   const Positions& now = m_geometry.mesh.now;
-  const VertexTriangleDistance closest =
-      finiteVertexTriangleDistance(m_point, now[corners[0]], now[corners[1]], now[corners[2]]);
-  return {place, m_geometry.tree.octree().order()[place], closest,
-          closest.distance - m_geometry.mesh.radius(corners, closest.barycentric)};
+  const Eigen::Vector3d a = now[corners[0]], b = now[corners[1]], c = now[corners[2]];
+  const auto largest = [&](const Eigen::Vector3d& q) {
+    return (q - m_point).cwiseAbs().maxCoeff();
+  };
+  return nearOf(place, finiteVertexTriangleDistance(m_point, a, b, c),
+                std::max({largest(a), largest(b), largest(c)}));
+}
+
+template <class F>
+void PointDistances::forEach(std::span<const std::uint32_t> places, F&& f) const {
+  if (places.size() <= 2) {
+    for (const std::uint32_t place : places) f(at(place));
+    return;
+  }
+  const Positions& now = m_geometry.mesh.now;
+  TriangleBatch batch;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const Triangle& corners = m_geometry.tree.ordered()[places[i]];
+    batch.set(i, now[corners[0]], now[corners[1]], now[corners[2]]);
+  }
+  const VertexTriangleDistances distances(m_point, batch, places.size());
+  for (std::size_t i = 0; i < places.size(); ++i)
+    f(nearOf(places[i], distances[i], distances.reach(i)));
 }
 
 bool PointDistances::isNearer(const Near& one, const Near& two) const {
+  const double difference = one.distance - two.distance;
+  if (std::abs(difference) > one.error + two.error) return difference < 0;
   const Triangle &first = m_geometry.tree.ordered()[one.place],
                  &second = m_geometry.tree.ordered()[two.place];
+  if (featureOf(first, one.closest.feature) == featureOf(second, two.closest.feature))
+    return one.element < two.element;
   const Positions& now = m_geometry.mesh.now;
   const Eigen::Vector3d corners[] = {now[first[0]],  now[first[1]],  now[first[2]],
                                      now[second[0]], now[second[1]], now[second[2]]};
-  const double difference = one.distance - two.distance, radius = m_geometry.mesh.largestRadius;
-  const double error = errorOf(m_point, corners[0], corners[1], corners[2], radius) +
-                       errorOf(m_point, corners[3], corners[4], corners[5], radius);
-  if (std::abs(difference) > error) return difference < 0;
-  const int order =
-      featureOf(first, one.closest.feature) == featureOf(second, two.closest.feature)
-          ? 0
-          : exact::compareDistances(
-                m_point, {corners[0], corners[1], corners[2], one.closest.feature, radiiOf(first)},
-                {corners[3], corners[4], corners[5], two.closest.feature, radiiOf(second)});
+  const int order = exact::compareDistances(
+      m_point, {corners[0], corners[1], corners[2], one.closest.feature, radiiOf(first)},
+      {corners[3], corners[4], corners[5], two.closest.feature, radiiOf(second)});
   return order < 0 || (order == 0 && one.element < two.element);
 }
 
 bool PointDistances::isWithin(const Near& near, double distance) const {
+  const double difference = near.distance - distance;
+  if (std::abs(difference) > near.error + kNearestSlack * distance) return difference < 0;
+  if (std::isinf(distance)) return true;
   const Triangle& corners = m_geometry.tree.ordered()[near.place];
   const Positions& now = m_geometry.mesh.now;
   const Eigen::Vector3d a = now[corners[0]], b = now[corners[1]], c = now[corners[2]];
-  const double difference = near.distance - distance;
-  if (std::abs(difference) >
-      errorOf(m_point, a, b, c, m_geometry.mesh.largestRadius) + kNearestSlack * distance)
-    return difference < 0;
-  if (std::isinf(distance)) return true;
   return exact::compareDistance(m_point, {a, b, c, near.closest.feature, radiiOf(corners)},
                                 distance) <= 0;
 }
@@ -141,34 +159,36 @@ float PointDistances::boundOf(double distance) const {
 
 template <class F>
 void PointDistances::search(double most, std::size_t count, F&& f) const {
+  const auto take = [&](const Near& near) { most = f(near, most); };
   if (!m_bruteForce) {
     forNearCandidates(m_search, boundOf(most), count,
                       [&](const NearCandidate* all, std::size_t size) {
-                        float bound = boundOf(most);
-                        for (std::size_t i = 0; i < size; ++i) {
-                          if (all[i].lower > bound + m_search.tolerance) continue;
-                          most = f(all[i].place, most);
-                          bound = boundOf(most);
+                        std::array<std::uint32_t, TriangleBatch::kSize> places;
+                        for (std::size_t i = 0; i < size;) {
+                          const float bound = boundOf(most) + m_search.tolerance;
+                          std::size_t some = 0;
+                          for (; i < size && some < places.size(); ++i)
+                            if (!(all[i].lower > bound)) places[some++] = all[i].place;
+                          forEach(std::span(places).first(some), take);
                         }
-                        return bound;
+                        return boundOf(most);
                       });
     return;
   }
-  for (std::uint32_t place = 0; place < m_geometry.tree.ordered().size(); ++place)
-    most = f(place, most);
+  for (std::uint32_t place = 0; place < m_geometry.tree.ordered().size(); ++place) take(at(place));
 }
 
 std::optional<PointDistances::Near> PointDistances::nearest(double maxDistance,
                                                             std::uint32_t likely) const {
   std::optional<Near> best;
-  const auto take = [&](std::uint32_t place, double most) {
-    if (best && place == best->place) return most;
-    const Near near = at(place);
-    if (best ? isNearer(near, *best) : isWithin(near, maxDistance)) best = near;
+  const auto take = [&](const Near& near, double most) {
+    if (best ? near.place != best->place && isNearer(near, *best) : isWithin(near, maxDistance))
+      best = near;
     return best ? std::min(most, best->distance) : most;
   };
   double most = maxDistance;
-  if (likely < m_geometry.tree.ordered().size()) most = take(likely, most);
+  if (likely < m_geometry.tree.ordered().size())
+    forEach({&likely, 1}, [&](const Near& near) { most = take(near, most); });
   search(most, 1, take);
   return best;
 }
@@ -176,25 +196,23 @@ std::optional<PointDistances::Near> PointDistances::nearest(double maxDistance,
 void PointDistances::nearest(std::size_t k, double maxDistance, std::vector<Near>& out) const {
   out.clear();
   const auto isNearerThan = [&](const Near& a, const Near& b) { return isNearer(a, b); };
-  search(maxDistance, k, [&](std::uint32_t place, double most) {
-    const Near near = at(place);
-    if (out.size() == k) {
-      if (!isNearer(near, out.front())) return most;
+  search(maxDistance, k, [&](const Near& near, double most) {
+    if (out.size() < k) {
+      if (isWithin(near, maxDistance)) out.push_back(near);
+      if (out.size() < k) return most;
+      std::make_heap(out.begin(), out.end(), isNearerThan);
+    } else if (isNearer(near, out.front())) {
       std::pop_heap(out.begin(), out.end(), isNearerThan);
-      out.pop_back();
-    } else if (!isWithin(near, maxDistance)) {
-      return most;
+      out.back() = near;
+      std::push_heap(out.begin(), out.end(), isNearerThan);
     }
-    out.push_back(near);
-    std::push_heap(out.begin(), out.end(), isNearerThan);
-    return out.size() == k ? std::min(most, out.front().distance) : most;
+    return std::min(most, out.front().distance);
   });
-  std::sort_heap(out.begin(), out.end(), isNearerThan);
+  std::sort(out.begin(), out.end(), isNearerThan);
 }
 
 void PointDistances::within(double distance, std::vector<std::uint32_t>& elements) const {
-  search(distance, 0, [&](std::uint32_t place, double most) {
-    const Near near = at(place);
+  search(distance, 0, [&](const Near& near, double most) {
     if (isWithin(near, distance)) elements.push_back(near.element);
     return most;
   });

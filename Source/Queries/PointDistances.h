@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace palpate {
@@ -24,6 +25,7 @@ class PointDistances {
     std::uint32_t place, element;  ///< in the octree's order, and its id
     VertexTriangleDistance closest;
     double distance;  ///< L, less the radius
+    double error;     ///< L: bounds that of the distance
   };
 
   /// bruteForce: searches test every element.
@@ -45,10 +47,14 @@ class PointDistances {
   void within(double distance, std::vector<std::uint32_t>& elements) const;
 
  private:
-  /// Calls f(candidates, size) for elements whose distance, less the radius, may be at most `most`.
-  /// f returns such a bound. count: how many nearest elements are wanted; 0 for all.
+  /// Calls f(near, most) for elements whose distance, less the radius, may be at most `most`. f
+  /// returns such a bound. count: how many nearest elements are wanted; 0 for all.
   template <class F>
   void search(double most, std::size_t count, F&& f) const;
+  /// Up to TriangleBatch::kSize elements, side by side. f(near): see at().
+  template <class F>
+  void forEach(std::span<const std::uint32_t> places, F&& f) const;
+  Near nearOf(std::uint32_t place, const VertexTriangleDistance&, double reach) const;
   float boundOf(double distance) const;  ///< in the octree's floats
   Eigen::Vector3d radiiOf(const Triangle& corners) const;
 
