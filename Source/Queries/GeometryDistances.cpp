@@ -50,6 +50,36 @@ BoxMap mapAbout(const SearchableGeometry& geometry, const Vector3d& origin) {
   return map;
 }
 
+float up(double value) { return OutwardRounding::up(static_cast<float>(value)); }
+
+PairSide sideOf(const SearchableGeometry& geometry, const Vector3d& origin) {
+  return {geometry.tree.octree(), geometry.tree.floats(), geometry.tree.ordered().data(),
+          mapAbout(geometry, origin)};
+}
+
+/// A direction in the frame of a geometry's floats.
+std::array<float, 3> inFloats(const SearchableGeometry& geometry, const Vector3d& direction) {
+  const Vector3d inBody =
+      geometry.isPlaced() ? Vector3d(geometry.mesh.now.transform().rotation.transpose() * direction)
+                          : direction;
+  return {static_cast<float>(inBody[0]), static_cast<float>(inBody[1]),
+          static_cast<float>(inBody[2])};
+}
+
+/// Bounds the error of heights in a geometry's floats, and of their offset. Positions and direction
+/// are off by 2^-24 along each axis, and there are four more roundings.
+double heightsErrorOf(const SearchableGeometry& geometry) {
+  const FloatBox root = geometry.tree.octree().box(0);
+  if (root.mayBeClamped()) return kInfinity;
+  float largest = 0;
+  for (std::size_t k = 0; k < 3; ++k)
+    largest = std::max({largest, std::abs(root.lower[k]), std::abs(root.upper[k])});
+  const FloatFrame& frame = geometry.tree.frame();
+  return 2.0 * kFloatPointError * largest + OutwardRounding::kAbsolute +
+         kNearestError * frame.scale *
+             (worldOrigin(geometry).cwiseAbs().sum() + frame.origin.cwiseAbs().sum());
+}
+
 double sizeOf(const FloatBox& box) {
   double size = 0;
   for (std::size_t k = 0; k < 3; ++k) size += double{box.upper[k]} - box.lower[k];
@@ -60,45 +90,29 @@ double sizeOf(const FloatBox& box) {
 class NearestPair {
  public:
   NearestPair(const SearchableGeometry& a, const SearchableGeometry& b)
-      : m_a(a),
-        m_b(b),
-        m_origin(worldOrigin(a)),
-        m_radii(a.mesh.largestRadius + b.mesh.largestRadius) {}
+      : m_a(a), m_b(b), m_radii(a.mesh.largestRadius + b.mesh.largestRadius) {}
 
   /// Tests the elements at two places of the octrees' orders.
   void test(std::uint32_t placeA, std::uint32_t placeB) {
     test(placeA, elementOf(m_a, placeA), placeB, elementOf(m_b, placeB));
   }
-  /// Tests elements after a plane across the direction of the nearest ones has excluded most.
+  /// Tests pairs of elements.
   void test(const NearElements& elements) {
-    std::array<Element, NearElements::kSide> all;
-    std::array<double, NearElements::kSide> lowest;
-    std::uint32_t read = 0;
-    Vector3d direction = m_direction;
     for (std::uint32_t i = 0; i < NearElements::kSide; ++i) {
       if (elements.near[i] == 0) continue;
       const Element a = elementOf(m_a, elements.placeA + i);
-      double highest = -lowestAlong(-direction, a);
       for (std::uint32_t bits = elements.near[i]; bits; bits &= bits - 1) {
-        const auto j = static_cast<std::uint32_t>(std::countr_zero(bits));
-        if (direction != m_direction) {
-          direction = m_direction;
-          highest = -lowestAlong(-direction, a);
-          read = 0;
-        }
-        if (!(read >> j & 1)) {
-          all[j] = elementOf(m_b, elements.placeB + j);
-          lowest[j] = lowestAlong(direction, all[j]);
-          read |= 1u << j;
-        }
-        if (lowest[j] - highest > m_best.distance + m_radii) continue;
-        test(elements.placeA + i, a, elements.placeB + j, all[j]);
+        const std::uint32_t j =
+            elements.placeB + static_cast<std::uint32_t>(std::countr_zero(bits));
+        test(elements.placeA + i, a, j, elementOf(m_b, j));
       }
     }
   }
 
   /// L, between the elements' surfaces; infinite if there is none.
   double distance() const { return m_best.distance; }
+  /// From a to b: unit, or 0.
+  const Vector3d& direction() const { return m_direction; }
   GeometryDistance result() const {
     return {surfacePoint(m_a, m_elementA, m_best.weightsA, m_best.distance),
             surfacePoint(m_b, m_elementB, m_best.weightsB, m_best.distance), m_best.distance};
@@ -107,16 +121,6 @@ class NearestPair {
  private:
   static Element elementOf(const SearchableGeometry& geometry, std::uint32_t place) {
     return {geometry.mesh, geometry.tree.ordered()[place]};
-  }
-  /// A lower bound of an element's heights along a direction, above the origin.
-  double lowestAlong(const Vector3d& direction, const Element& element) const {
-    double lowest = kInfinity, size = 0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const Vector3d from = element[i] - m_origin;
-      lowest = std::min(lowest, direction.dot(from));
-      size = std::max(size, from.cwiseAbs().maxCoeff());
-    }
-    return lowest - kNearestError * size;
   }
   void test(std::uint32_t placeA, const Element& a, std::uint32_t placeB, const Element& b) {
     const std::uint32_t elementA = m_a.tree.octree().order()[placeA],
@@ -168,7 +172,6 @@ class NearestPair {
   }
 
   const SearchableGeometry &m_a, &m_b;
-  const Vector3d m_origin;
   const double m_radii;  ///< L: the largest ones of both
   ElementDistance m_best;
   std::uint32_t m_elementA = kNoElement, m_elementB = kNoElement;
@@ -265,18 +268,24 @@ GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGe
     return nearest.result();
   }
   startNear(a, b, nearest);
-  const Vector3d origin = worldOrigin(a);
-  const PairSearch search{a.tree.octree(), b.tree.octree(), mapAbout(a, origin),
-                          mapAbout(b, origin)};
+  const Vector3d origin = worldOrigin(a), offset = worldOrigin(b) - origin;
+  const PairSide sideA = sideOf(a, origin), sideB = sideOf(b, origin);
   // The error covers that of computed distances. If positions are clamped to the floats' range, it
   // is so large that no pair of boxes is skipped.
-  const double radii = a.mesh.largestRadius + b.mesh.largestRadius,
-               scale = a.tree.frame().scale * (1.0 + kNearestError),
-               error = kNearestError * (sizeOf(search.a.box(0)) + sizeOf(search.b.box(0)));
+  const double radii = a.mesh.largestRadius + b.mesh.largestRadius, scale = a.tree.frame().scale,
+               error = kNearestError * (sizeOf(sideA.octree.box(0)) + sizeOf(sideB.octree.box(0))),
+               heightsError = heightsErrorOf(a) + heightsErrorOf(b);
   const auto boundOf = [&] {
-    return OutwardRounding::up(static_cast<float>((nearest.distance() + radii) * scale + error));
+    const double distance = (nearest.distance() + radii) * scale * (1.0 + kNearestError) + error;
+    PairBound bound{up(distance)};
+    const Vector3d& direction = nearest.direction();
+    if (direction == Vector3d::Zero()) return bound;
+    bound.heights = up(distance - direction.dot(offset) * scale + heightsError);
+    bound.alongA = inFloats(a, -direction);
+    bound.alongB = inFloats(b, direction);
+    return bound;
   };
-  forNearElements(search, boundOf(), [&](const NearElements& elements) {
+  forNearElements(sideA, sideB, boundOf(), [&](const NearElements& elements) {
     nearest.test(elements);
     return boundOf();
   });
