@@ -98,13 +98,16 @@ class NearestPair {
   }
   /// Tests pairs of elements.
   void test(const NearElements& elements) {
+    std::array<Element, NearElements::kSide> all;
+    std::uint32_t read = 0;
     for (std::uint32_t i = 0; i < NearElements::kSide; ++i) {
       if (elements.near[i] == 0) continue;
       const Element a = elementOf(m_a, elements.placeA + i);
       for (std::uint32_t bits = elements.near[i]; bits; bits &= bits - 1) {
-        const std::uint32_t j =
-            elements.placeB + static_cast<std::uint32_t>(std::countr_zero(bits));
-        test(elements.placeA + i, a, j, elementOf(m_b, j));
+        const auto j = static_cast<std::uint32_t>(std::countr_zero(bits));
+        if (!(read >> j & 1)) all[j] = elementOf(m_b, elements.placeB + j);
+        read |= 1u << j;
+        test(elements.placeA + i, a, elements.placeB + j, all[j]);
       }
     }
   }

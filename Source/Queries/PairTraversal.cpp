@@ -19,6 +19,7 @@ namespace palpate::HWY_NAMESPACE {
 class ElementHeights {
  public:
   explicit ElementHeights(const PairSide& side) : m_side(side) { m_blocks.fill(kNone); }
+  const PairSide& side() const { return m_side; }
 
   void setDirection(const std::array<float, 3>& direction) {
     if (direction == m_direction) return;
@@ -39,6 +40,16 @@ class ElementHeights {
       begin += count;
     }
     return hn::GetLane(hn::MinOfLanes(d, least));
+  }
+  /// Lower bounds for what boxes hold. Products and sums are rounded monotonically, so that none is
+  /// above the computed height of an element in the box.
+  template <class D>
+  HWY_ATTR HWY_INLINE hn::Vec<D> lowest(D d, const BoxLanes<D>& boxes) const {
+    const auto along = [&](int k) {
+      const auto direction = hn::Set(d, m_direction[static_cast<std::size_t>(k)]);
+      return hn::Min(direction * boxes.lower[k], direction * boxes.upper[k]);
+    };
+    return along(0) + along(1) + along(2);
   }
   float operator[](std::uint32_t place) { return at(place)[0]; }
   /// Those of `count` elements from a place on, at most NearElements::kSide.
@@ -82,22 +93,24 @@ class ElementHeights {
 class PairDescent {
  public:
   PairDescent(const PairSide& a, const PairSide& b, void* context, TestElements test)
-      : m_a(a), m_b(b), m_heightsA(a), m_heightsB(b), m_context(context), m_test(test) {}
+      : m_a(a), m_b(b), m_context(context), m_test(test) {}
 
   HWY_ATTR void run(const PairBound& bound) {
     setBound(bound);
-    push(0.0f, {0, static_cast<std::uint32_t>(m_a.octree.size())},
-         {0, static_cast<std::uint32_t>(m_b.octree.size())});
+    push(0.0f, {0, static_cast<std::uint32_t>(m_a.side().octree.size())},
+         {0, static_cast<std::uint32_t>(m_b.side().octree.size())});
     while (m_count > 0) {
       const Entry entry = m_entries[--m_count];
-      if (entry.square > m_limit || areFurther(entry.a, entry.b)) continue;
-      const FloatBox boxA = boxOf(m_a, entry.a), boxB = boxOf(m_b, entry.b);
-      const OctreeNode childA = childOf(m_a, entry.a), childB = childOf(m_b, entry.b);
+      if (entry.square > m_limit) continue;
+      const float lowestA = lowestOf(m_a, entry.a), lowestB = lowestOf(m_b, entry.b);
+      if (lowestA + lowestB > m_lowest) continue;
+      const FloatBox boxA = boxOf(m_a.side(), entry.a), boxB = boxOf(m_b.side(), entry.b);
+      const OctreeNode childA = childOf(m_a.side(), entry.a), childB = childOf(m_b.side(), entry.b);
       if (childA != 0 && (childB == 0 || sizeOf(boxA) >= sizeOf(boxB)))
-        expand(m_a, entry.a, childA, boxB, entry.square,
+        expand(m_a, entry.a, childA, boxB, lowestB, entry.square,
                [&](float square, const Subtree& part) { push(square, part, entry.b); });
       else if (childB != 0)
-        expand(m_b, entry.b, childB, boxA, entry.square,
+        expand(m_b, entry.b, childB, boxA, lowestA, entry.square,
                [&](float square, const Subtree& part) { push(square, entry.a, part); });
       else
         testElements(entry.a, entry.b, boxB);
@@ -124,19 +137,21 @@ class PairDescent {
     // Computed squares are off by less than 2^-20 of themselves.
     m_limit = OutwardRounding::up(bound.distance * bound.distance * (1.0f + 0x1p-19f));
     if (!(m_limit >= 0)) m_limit = std::numeric_limits<float>::infinity();
-    m_heightsLimit = bound.heights;
-    m_heightsA.setDirection(bound.alongA);
-    m_heightsB.setDirection(bound.alongB);
+    m_lowest = bound.heights;
+    m_a.setDirection(bound.alongA);
+    m_b.setDirection(bound.alongB);
   }
   void push(float square, const Subtree& a, const Subtree& b) {
     m_entries[m_count++] = {square, a, b};
   }
-  /// Whether heights exclude all elements of small subtrees.
-  HWY_ATTR bool areFurther(const Subtree& a, const Subtree& b) {
-    const std::uint32_t beginA = beginOf(m_a, a), beginB = beginOf(m_b, b);
-    return a.end - beginA <= kFew && b.end - beginB <= kFew &&
-           m_heightsLimit < std::numeric_limits<float>::infinity() &&
-           m_heightsA.lowest(beginA, a.end) + m_heightsB.lowest(beginB, b.end) > m_heightsLimit;
+  /// A lower bound for the heights of a subtree's elements: the lowest one of few elements.
+  HWY_ATTR float lowestOf(ElementHeights& heights, const Subtree& part) const {
+    if (!(m_lowest < std::numeric_limits<float>::infinity())) return 0.0f;
+    const std::uint32_t begin = beginOf(heights.side(), part);
+    if (part.end - begin <= kFew) return heights.lowest(begin, part.end);
+    const BoxTag d;
+    return hn::GetLane(
+        heights.lowest(d, BoxLanes<BoxTag>::of(heights.side().octree.box(part.node & ~kOwn))));
   }
   static std::uint32_t beginOf(const PairSide& side, const Subtree& part) {
     const OctreeNode node = part.node & ~kOwn;
@@ -155,17 +170,22 @@ class PairDescent {
 
   /// Pushes the node's own elements and its children near the box, the nearest last.
   template <class Push>
-  HWY_ATTR HWY_INLINE void expand(const PairSide& side, const Subtree& part, OctreeNode child,
-                                  const FloatBox& other, float square, Push&& push) {
+  HWY_ATTR HWY_INLINE void expand(const ElementHeights& heights, const Subtree& part,
+                                  OctreeNode child, const FloatBox& other, float lowest,
+                                  float square, Push&& push) {
+    const PairSide& side = heights.side();
     const std::size_t first = m_count;
     const OctreeBlock& block = side.octree.blocks()[child >> 3];
     alignas(64) float squares[8];
     std::uint32_t bits = 0;
     const NodeTag d;
     for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-      const auto distances = BoxLanes<NodeTag>::load(block, i).mapped(side.map).distanceFrom(other);
+      const auto boxes = BoxLanes<NodeTag>::load(block, i);
+      const auto low = hn::Le(heights.lowest(d, boxes) + hn::Set(d, lowest), hn::Set(d, m_lowest));
+      if (hn::AllFalse(d, low)) continue;
+      const auto distances = boxes.mapped(side.map).distanceFrom(other);
       hn::Store(distances, d, squares + i);
-      bits |= bitsOf(d, hn::Le(distances, hn::Set(d, m_limit))) << i;
+      bits |= bitsOf(d, hn::And(low, hn::Le(distances, hn::Set(d, m_limit)))) << i;
     }
     for (; bits; bits &= bits - 1) {
       const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
@@ -222,34 +242,33 @@ class PairDescent {
   HWY_ATTR void testElements(const Subtree& a, const Subtree& b, const FloatBox& boxB) {
     NearElements found;
     Boxes boxesA, boxesB;
-    const std::uint32_t beginB = beginOf(m_b, b);
-    for (found.placeA = beginOf(m_a, a); found.placeA < a.end; found.placeA += kSide) {
+    const std::uint32_t beginB = beginOf(m_b.side(), b);
+    for (found.placeA = beginOf(m_a.side(), a); found.placeA < a.end; found.placeA += kSide) {
       const std::uint32_t sizeA = std::min<std::uint32_t>(kSide, a.end - found.placeA);
-      boxesA.load(m_a, found.placeA);
+      boxesA.load(m_a.side(), found.placeA);
       const std::uint32_t rows = boxesA.near(boxB, sizeA, m_limit);
       if (rows == 0) continue;
       for (found.placeB = beginB; found.placeB < b.end; found.placeB += kSide) {
         const std::uint32_t sizeB = std::min<std::uint32_t>(kSide, b.end - found.placeB);
-        boxesB.load(m_b, found.placeB);
-        m_heightsB.copy(found.placeB, sizeB, boxesB.heights);
+        boxesB.load(m_b.side(), found.placeB);
+        m_b.copy(found.placeB, sizeB, boxesB.heights);
         std::uint32_t any = 0;
         found.near.fill(0);
         for (std::uint32_t bits = rows; bits; bits &= bits - 1) {
           const auto row = static_cast<std::uint32_t>(std::countr_zero(bits));
           any |= found.near[row] = boxesB.near(boxesA[row], sizeB, m_limit) &
-                                   boxesB.below(m_heightsLimit, m_heightsA[found.placeA + row]);
+                                   boxesB.below(m_lowest, m_a[found.placeA + row]);
         }
         if (any) setBound(m_test(m_context, found));
       }
     }
   }
 
-  const PairSide &m_a, &m_b;
-  ElementHeights m_heightsA, m_heightsB;
+  ElementHeights m_a, m_b;
   void* const m_context;
   const TestElements m_test;
-  float m_limit = 0;         ///< of computed squared distances of boxes
-  float m_heightsLimit = 0;  ///< of computed sums of heights
+  float m_limit = 0;   ///< of computed squared distances of boxes
+  float m_lowest = 0;  ///< of computed sums of heights
   std::size_t m_count = 0;
   // Eight entries remain on each of at most 61 levels of each octree.
   std::array<Entry, 1024> m_entries;
