@@ -158,7 +158,7 @@ class NearestPair {
       size = std::max(
           {size, (a[i] - a[0]).cwiseAbs().maxCoeff(), (b[i] - a[0]).cwiseAbs().maxCoeff()});
     const double needed = m_best.distance + m_radii + kNearestError * size;
-    Vector3d normal = m_direction, difference = Vector3d::Zero();
+    Vector3d normal = ((b[0] - a[0]) + (b[1] - a[1])) + (b[2] - a[2]), difference = Vector3d::Zero();
     for (int plane = 0; plane < kMostPlanes; ++plane) {
       const Vector3d nearest = b.furthest(-normal) - a.furthest(normal);
       const double length = normal.norm();
