@@ -36,32 +36,41 @@ SurfacePoint noPoint(GeometryId id) {
   return {id, kNoElement, {}, Vector3d::Zero(), Vector3d::Zero(), kInfinity};
 }
 
-/// The map of a geometry's boxes to floats about an origin in the world.
-BoxMap mapAbout(const SearchableGeometry& geometry, const Vector3d& origin) {
-  if (geometry.isPlaced() || worldOrigin(geometry) == origin)
-    return worldMap(geometry, origin, 0.0, false);
-  const FloatFrame& frame = geometry.tree.frame();
-  const Vector3d offset = (frame.origin - origin) * frame.scale;
+Eigen::Matrix3d rotationOf(const SearchableGeometry& geometry) {
+  return geometry.isPlaced() ? geometry.mesh.now.transform().rotation
+                             : Eigen::Matrix3d::Identity().eval();
+}
+
+/// The sum of the coordinates that positions in the world come from.
+double magnitudeOf(const SearchableGeometry& geometry) {
+  return worldOrigin(geometry).cwiseAbs().sum() + geometry.tree.frame().origin.cwiseAbs().sum();
+}
+
+/// The map of b's boxes to a's floats. a's rotation leaves distances from a's origin as they are
+/// within kOrthonormal.
+BoxMap mapBetween(const SearchableGeometry& a, const SearchableGeometry& b) {
   BoxMap map;
+  const double scale = a.tree.frame().scale;
+  const Eigen::Matrix3d toA = rotationOf(a).transpose(), rotation = toA * rotationOf(b);
+  const Vector3d offset = toA * (worldOrigin(b) - worldOrigin(a)) * scale;
+  std::array<std::array<double, 3>, 3> matrix;
+  for (int k = 0; k < 3; ++k)
+    for (int j = 0; j < 3; ++j) matrix[k][j] = rotation(k, j);
+  setEnd(map.ends[0], matrix, {offset[0], offset[1], offset[2]}, 0.0,
+         4 * kPlacedError * scale * (magnitudeOf(a) + magnitudeOf(b)));
   map.count = 1;
-  setEnd(map.ends[0], {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, {offset[0], offset[1], offset[2]}, 0.0,
-         kPlacedError * frame.scale *
-             (frame.origin.cwiseAbs().maxCoeff() + origin.cwiseAbs().maxCoeff()));
   return map;
 }
 
 float up(double value) { return OutwardRounding::up(static_cast<float>(value)); }
 
-PairSide sideOf(const SearchableGeometry& geometry, const Vector3d& origin) {
-  return {geometry.tree.octree(), geometry.tree.floats(), geometry.tree.ordered().data(),
-          mapAbout(geometry, origin)};
+PairSide sideOf(const SearchableGeometry& geometry, const BoxMap& map) {
+  return {geometry.tree.octree(), geometry.tree.floats(), geometry.tree.ordered().data(), map};
 }
 
 /// A direction in the frame of a geometry's floats.
 std::array<float, 3> inFloats(const SearchableGeometry& geometry, const Vector3d& direction) {
-  const Vector3d inBody =
-      geometry.isPlaced() ? Vector3d(geometry.mesh.now.transform().rotation.transpose() * direction)
-                          : direction;
+  const Vector3d inBody = rotationOf(geometry).transpose() * direction;
   return {static_cast<float>(inBody[0]), static_cast<float>(inBody[1]),
           static_cast<float>(inBody[2])};
 }
@@ -74,10 +83,8 @@ double heightsErrorOf(const SearchableGeometry& geometry) {
   float largest = 0;
   for (std::size_t k = 0; k < 3; ++k)
     largest = std::max({largest, std::abs(root.lower[k]), std::abs(root.upper[k])});
-  const FloatFrame& frame = geometry.tree.frame();
   return 2.0 * kFloatPointError * largest + OutwardRounding::kAbsolute +
-         kNearestError * frame.scale *
-             (worldOrigin(geometry).cwiseAbs().sum() + frame.origin.cwiseAbs().sum());
+         kNearestError * geometry.tree.frame().scale * magnitudeOf(geometry);
 }
 
 double sizeOf(const FloatBox& box) {
@@ -158,7 +165,8 @@ class NearestPair {
       size = std::max(
           {size, (a[i] - a[0]).cwiseAbs().maxCoeff(), (b[i] - a[0]).cwiseAbs().maxCoeff()});
     const double needed = m_best.distance + m_radii + kNearestError * size;
-    Vector3d normal = ((b[0] - a[0]) + (b[1] - a[1])) + (b[2] - a[2]), difference = Vector3d::Zero();
+    Vector3d normal = ((b[0] - a[0]) + (b[1] - a[1])) + (b[2] - a[2]),
+             difference = Vector3d::Zero();
     for (int plane = 0; plane < kMostPlanes; ++plane) {
       const Vector3d nearest = b.furthest(-normal) - a.furthest(normal);
       const double length = normal.norm();
@@ -271,15 +279,16 @@ GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGe
     return nearest.result();
   }
   startNear(a, b, nearest);
-  const Vector3d origin = worldOrigin(a), offset = worldOrigin(b) - origin;
-  const PairSide sideA = sideOf(a, origin), sideB = sideOf(b, origin);
+  const PairSide sideA = sideOf(a, {}), sideB = sideOf(b, mapBetween(a, b));
+  const Vector3d offset = worldOrigin(b) - worldOrigin(a);
   // The error covers that of computed distances. If positions are clamped to the floats' range, it
   // is so large that no pair of boxes is skipped.
   const double radii = a.mesh.largestRadius + b.mesh.largestRadius, scale = a.tree.frame().scale,
-               error = kNearestError * (sizeOf(sideA.octree.box(0)) + sizeOf(sideB.octree.box(0))),
+               error =
+                   4 * kOrthonormal * (sizeOf(sideA.octree.box(0)) + sizeOf(sideB.octree.box(0))),
                heightsError = heightsErrorOf(a) + heightsErrorOf(b);
   const auto boundOf = [&] {
-    const double distance = (nearest.distance() + radii) * scale * (1.0 + kNearestError) + error;
+    const double distance = (nearest.distance() + radii) * scale * (1.0 + 4 * kOrthonormal) + error;
     PairBound bound{up(distance)};
     const Vector3d& direction = nearest.direction();
     if (direction == Vector3d::Zero()) return bound;
