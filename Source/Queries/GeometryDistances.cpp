@@ -14,6 +14,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -269,7 +270,7 @@ void descend(const SearchableGeometry& geometry, bool bruteForce, double best, B
 }  // namespace
 
 GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGeometry& b,
-                                 bool bruteForce) {
+                                 bool bruteForce, std::unique_ptr<PairScratch>& scratch) {
   NearestPair nearest(a, b);
   const std::size_t sizeA = a.tree.ordered().size(), sizeB = b.tree.ordered().size();
   if (sizeA == 0 || sizeB == 0) return {noPoint(a.id), noPoint(b.id), kInfinity};
@@ -297,7 +298,8 @@ GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGe
     bound.alongB = inFloats(b, direction);
     return bound;
   };
-  forNearElements(sideA, sideB, boundOf(), [&](const NearElements& elements) {
+  if (!scratch) scratch = std::make_unique<PairScratch>();
+  forNearElements(sideA, sideB, boundOf(), *scratch, [&](const NearElements& elements) {
     nearest.test(elements);
     return boundOf();
   });

@@ -18,13 +18,16 @@ namespace palpate::HWY_NAMESPACE {
 /// the octree's order when a block is first needed.
 class ElementHeights {
  public:
-  explicit ElementHeights(const PairSide& side) : m_side(side) { m_blocks.fill(kNone); }
+  ElementHeights(const PairSide& side, PairScratch::Heights& scratch)
+      : m_side(side), m_scratch(scratch) {
+    m_scratch.blocks.fill(kNone);
+  }
   const PairSide& side() const { return m_side; }
 
   void setDirection(const std::array<float, 3>& direction) {
     if (direction == m_direction) return;
     m_direction = direction;
-    m_blocks.fill(kNone);
+    m_scratch.blocks.fill(kNone);
   }
   /// The lowest of the elements at places [begin, end).
   HWY_ATTR float lowest(std::uint32_t begin, std::uint32_t end) {
@@ -59,16 +62,18 @@ class ElementHeights {
   }
 
  private:
-  static constexpr std::uint32_t kBlock = 64, kSlots = 64, kNone = 0xffffffff;
+  static constexpr std::uint32_t kBlock = PairScratch::Heights::kBlock,
+                                 kSlots = PairScratch::Heights::kSlots,
+                                 kNone = PairScratch::Heights::kNone;
 
   /// The height of the element at a place, and of those behind it in its block.
   const float* at(std::uint32_t place) {
     const std::uint32_t block = place / kBlock, slot = block % kSlots;
-    if (m_blocks[slot] != block) {
-      compute(block, m_heights[slot]);
-      m_blocks[slot] = block;
+    if (m_scratch.blocks[slot] != block) {
+      compute(block, m_scratch.heights[slot]);
+      m_scratch.blocks[slot] = block;
     }
-    return m_heights[slot] + place % kBlock;
+    return m_scratch.heights[slot] + place % kBlock;
   }
   void compute(std::uint32_t block, float* heights) const {
     const std::uint32_t first = block * kBlock,
@@ -85,15 +90,18 @@ class ElementHeights {
 
   const PairSide& m_side;
   std::array<float, 3> m_direction{};
-  std::array<std::uint32_t, kSlots> m_blocks;
-  /// The last vector may be read beyond the block.
-  alignas(64) float m_heights[kSlots][kBlock + BoxArrays::kPadding];
+  PairScratch::Heights& m_scratch;
 };
 
 class PairDescent {
  public:
-  PairDescent(const PairSide& a, const PairSide& b, void* context, TestElements test)
-      : m_a(a), m_b(b), m_context(context), m_test(test) {}
+  PairDescent(const PairSide& a, const PairSide& b, PairScratch& scratch, void* context,
+              TestElements test)
+      : m_a(a, scratch.a),
+        m_b(b, scratch.b),
+        m_context(context),
+        m_test(test),
+        m_entries(scratch.entries) {}
 
   HWY_ATTR void run(const PairBound& bound) {
     setBound(bound);
@@ -123,15 +131,8 @@ class PairDescent {
   static constexpr OctreeNode kOwn = 0x80000000u;
   /// Heights are compared for subtrees of at most so many elements.
   static constexpr std::uint32_t kFew = 128;
-  /// A node, and the end of its subtree's range of elements.
-  struct Subtree {
-    OctreeNode node;
-    std::uint32_t end;
-  };
-  struct Entry {
-    float square;
-    Subtree a, b;
-  };
+  using Subtree = PairScratch::Subtree;
+  using Entry = PairScratch::Entry;
 
   void setBound(const PairBound& bound) {
     // Computed squares are off by less than 2^-20 of themselves.
@@ -270,13 +271,12 @@ class PairDescent {
   float m_limit = 0;   ///< of computed squared distances of boxes
   float m_lowest = 0;  ///< of computed sums of heights
   std::size_t m_count = 0;
-  // Eight entries remain on each of at most 61 levels of each octree.
-  std::array<Entry, 1024> m_entries;
+  std::array<Entry, 1024>& m_entries;
 };
 
 HWY_ATTR void searchPairsKernel(const PairSide& a, const PairSide& b, const PairBound& bound,
-                                void* context, TestElements test) {
-  PairDescent(a, b, context, test).run(bound);
+                                PairScratch& scratch, void* context, TestElements test) {
+  PairDescent(a, b, scratch, context, test).run(bound);
 }
 
 }  // namespace palpate::HWY_NAMESPACE
@@ -287,11 +287,11 @@ namespace palpate {
 
 HWY_EXPORT(searchPairsKernel);
 
-void searchPairs(const PairSide& a, const PairSide& b, const PairBound& bound, void* context,
-                 TestElements test) {
+void searchPairs(const PairSide& a, const PairSide& b, const PairBound& bound, PairScratch& scratch,
+                 void* context, TestElements test) {
   a.octree.requireBuilt();
   b.octree.requireBuilt();
-  HWY_DYNAMIC_DISPATCH(searchPairsKernel)(a, b, bound, context, test);
+  HWY_DYNAMIC_DISPATCH(searchPairsKernel)(a, b, bound, scratch, context, test);
 }
 
 }  // namespace palpate

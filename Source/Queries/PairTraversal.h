@@ -34,21 +34,45 @@ struct NearElements {
   /// Bit j of near[i]: the elements at placeA + i and placeB + j are near each other.
   std::array<std::uint32_t, kSide> near;
 };
+/// Scratch of a search. It is too large for a small stack.
+struct PairScratch {
+  /// Heights of elements, in blocks of the octree's order. Block i is in slot i % kSlots.
+  struct Heights {
+    static constexpr std::uint32_t kBlock = 64, kSlots = 64, kNone = 0xffffffff;
+
+    std::array<std::uint32_t, kSlots> blocks;
+    float heights[kSlots][kBlock + BoxArrays::kPadding];
+  };
+  /// A node, and the end of its subtree's range of elements.
+  struct Subtree {
+    OctreeNode node;
+    std::uint32_t end;
+  };
+  struct Entry {
+    float square;
+    Subtree a, b;
+  };
+
+  Heights a, b;
+  std::array<Entry, 1024> entries;  ///< eight remain on each of at most 61 levels of each octree
+};
+
 /// Tests elements. Returns the bound for those that follow.
 using TestElements = PairBound (*)(void* context, const NearElements&);
 
 /// Visits pairs of elements, nearest pairs of nodes first. Of two nodes the larger one is replaced
 /// by its children.
-void searchPairs(const PairSide& a, const PairSide& b, const PairBound&, void* context,
-                 TestElements);
+void searchPairs(const PairSide& a, const PairSide& b, const PairBound&, PairScratch&,
+                 void* context, TestElements);
 
 /// searchPairs() with f(elements) in place of the function pointer.
 template <class F>
-void forNearElements(const PairSide& a, const PairSide& b, const PairBound& bound, F&& f) {
+void forNearElements(const PairSide& a, const PairSide& b, const PairBound& bound,
+                     PairScratch& scratch, F&& f) {
   const auto call = [](void* context, const NearElements& elements) {
     return (*static_cast<std::remove_reference_t<F>*>(context))(elements);
   };
-  searchPairs(a, b, bound, &f, call);
+  searchPairs(a, b, bound, scratch, &f, call);
 }
 
 }  // namespace palpate
