@@ -14,6 +14,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -36,18 +37,55 @@ SurfacePoint noPoint(GeometryId id) {
   return {id, kNoElement, {}, Vector3d::Zero(), Vector3d::Zero(), kInfinity};
 }
 
-/// The map of a geometry's boxes to floats about an origin in the world.
-BoxMap mapAbout(const SearchableGeometry& geometry, const Vector3d& origin) {
-  if (geometry.isPlaced() || worldOrigin(geometry) == origin)
-    return worldMap(geometry, origin, 0.0, false);
-  const FloatFrame& frame = geometry.tree.frame();
-  const Vector3d offset = (frame.origin - origin) * frame.scale;
+Eigen::Matrix3d rotationOf(const SearchableGeometry& geometry) {
+  return geometry.isPlaced() ? geometry.mesh.now.transform().rotation
+                             : Eigen::Matrix3d::Identity().eval();
+}
+
+/// The sum of the coordinates that positions in the world come from.
+double magnitudeOf(const SearchableGeometry& geometry) {
+  return worldOrigin(geometry).cwiseAbs().sum() + geometry.tree.frame().origin.cwiseAbs().sum();
+}
+
+/// The map of b's boxes to a's floats. a's rotation leaves distances from a's origin as they are
+/// within kOrthonormal.
+BoxMap mapBetween(const SearchableGeometry& a, const SearchableGeometry& b) {
   BoxMap map;
+  const double scale = a.tree.frame().scale;
+  const Eigen::Matrix3d toA = rotationOf(a).transpose(), rotation = toA * rotationOf(b);
+  const Vector3d offset = toA * (worldOrigin(b) - worldOrigin(a)) * scale;
+  std::array<std::array<double, 3>, 3> matrix;
+  for (int k = 0; k < 3; ++k)
+    for (int j = 0; j < 3; ++j) matrix[k][j] = rotation(k, j);
+  setEnd(map.ends[0], matrix, {offset[0], offset[1], offset[2]}, 0.0,
+         4 * kPlacedError * scale * (magnitudeOf(a) + magnitudeOf(b)));
   map.count = 1;
-  setEnd(map.ends[0], {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, {offset[0], offset[1], offset[2]}, 0.0,
-         kPlacedError * frame.scale *
-             (frame.origin.cwiseAbs().maxCoeff() + origin.cwiseAbs().maxCoeff()));
   return map;
+}
+
+float up(double value) { return OutwardRounding::up(static_cast<float>(value)); }
+
+PairSide sideOf(const SearchableGeometry& geometry, const BoxMap& map) {
+  return {geometry.tree.octree(), geometry.tree.floats(), geometry.tree.ordered().data(), map};
+}
+
+/// A direction in the frame of a geometry's floats.
+std::array<float, 3> inFloats(const SearchableGeometry& geometry, const Vector3d& direction) {
+  const Vector3d inBody = rotationOf(geometry).transpose() * direction;
+  return {static_cast<float>(inBody[0]), static_cast<float>(inBody[1]),
+          static_cast<float>(inBody[2])};
+}
+
+/// Bounds the error of heights in a geometry's floats, and of their offset. Positions and direction
+/// are off by 2^-24 along each axis, and there are four more roundings.
+double heightsErrorOf(const SearchableGeometry& geometry) {
+  const FloatBox root = geometry.tree.octree().box(0);
+  if (root.mayBeClamped()) return kInfinity;
+  float largest = 0;
+  for (std::size_t k = 0; k < 3; ++k)
+    largest = std::max({largest, std::abs(root.lower[k]), std::abs(root.upper[k])});
+  return 2.0 * kFloatPointError * largest + OutwardRounding::kAbsolute +
+         kNearestError * geometry.tree.frame().scale * magnitudeOf(geometry);
 }
 
 double sizeOf(const FloatBox& box) {
@@ -60,38 +98,23 @@ double sizeOf(const FloatBox& box) {
 class NearestPair {
  public:
   NearestPair(const SearchableGeometry& a, const SearchableGeometry& b)
-      : m_a(a),
-        m_b(b),
-        m_origin(worldOrigin(a)),
-        m_radii(a.mesh.largestRadius + b.mesh.largestRadius) {}
+      : m_a(a), m_b(b), m_radii(a.mesh.largestRadius + b.mesh.largestRadius) {}
 
   /// Tests the elements at two places of the octrees' orders.
   void test(std::uint32_t placeA, std::uint32_t placeB) {
     test(placeA, elementOf(m_a, placeA), placeB, elementOf(m_b, placeB));
   }
-  /// Tests elements after a plane across the direction of the nearest ones has excluded most.
+  /// Tests pairs of elements.
   void test(const NearElements& elements) {
     std::array<Element, NearElements::kSide> all;
-    std::array<double, NearElements::kSide> lowest;
     std::uint32_t read = 0;
-    Vector3d direction = m_direction;
     for (std::uint32_t i = 0; i < NearElements::kSide; ++i) {
       if (elements.near[i] == 0) continue;
       const Element a = elementOf(m_a, elements.placeA + i);
-      double highest = -lowestAlong(-direction, a);
       for (std::uint32_t bits = elements.near[i]; bits; bits &= bits - 1) {
         const auto j = static_cast<std::uint32_t>(std::countr_zero(bits));
-        if (direction != m_direction) {
-          direction = m_direction;
-          highest = -lowestAlong(-direction, a);
-          read = 0;
-        }
-        if (!(read >> j & 1)) {
-          all[j] = elementOf(m_b, elements.placeB + j);
-          lowest[j] = lowestAlong(direction, all[j]);
-          read |= 1u << j;
-        }
-        if (lowest[j] - highest > m_best.distance + m_radii) continue;
+        if (!(read >> j & 1)) all[j] = elementOf(m_b, elements.placeB + j);
+        read |= 1u << j;
         test(elements.placeA + i, a, elements.placeB + j, all[j]);
       }
     }
@@ -99,6 +122,8 @@ class NearestPair {
 
   /// L, between the elements' surfaces; infinite if there is none.
   double distance() const { return m_best.distance; }
+  /// From a to b: unit, or 0.
+  const Vector3d& direction() const { return m_direction; }
   GeometryDistance result() const {
     return {surfacePoint(m_a, m_elementA, m_best.weightsA, m_best.distance),
             surfacePoint(m_b, m_elementB, m_best.weightsB, m_best.distance), m_best.distance};
@@ -107,16 +132,6 @@ class NearestPair {
  private:
   static Element elementOf(const SearchableGeometry& geometry, std::uint32_t place) {
     return {geometry.mesh, geometry.tree.ordered()[place]};
-  }
-  /// A lower bound of an element's heights along a direction, above the origin.
-  double lowestAlong(const Vector3d& direction, const Element& element) const {
-    double lowest = kInfinity, size = 0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const Vector3d from = element[i] - m_origin;
-      lowest = std::min(lowest, direction.dot(from));
-      size = std::max(size, from.cwiseAbs().maxCoeff());
-    }
-    return lowest - kNearestError * size;
   }
   void test(std::uint32_t placeA, const Element& a, std::uint32_t placeB, const Element& b) {
     const std::uint32_t elementA = m_a.tree.octree().order()[placeA],
@@ -151,7 +166,8 @@ class NearestPair {
       size = std::max(
           {size, (a[i] - a[0]).cwiseAbs().maxCoeff(), (b[i] - a[0]).cwiseAbs().maxCoeff()});
     const double needed = m_best.distance + m_radii + kNearestError * size;
-    Vector3d normal = m_direction, difference = Vector3d::Zero();
+    Vector3d normal = ((b[0] - a[0]) + (b[1] - a[1])) + (b[2] - a[2]),
+             difference = Vector3d::Zero();
     for (int plane = 0; plane < kMostPlanes; ++plane) {
       const Vector3d nearest = b.furthest(-normal) - a.furthest(normal);
       const double length = normal.norm();
@@ -168,7 +184,6 @@ class NearestPair {
   }
 
   const SearchableGeometry &m_a, &m_b;
-  const Vector3d m_origin;
   const double m_radii;  ///< L: the largest ones of both
   ElementDistance m_best;
   std::uint32_t m_elementA = kNoElement, m_elementB = kNoElement;
@@ -255,7 +270,7 @@ void descend(const SearchableGeometry& geometry, bool bruteForce, double best, B
 }  // namespace
 
 GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGeometry& b,
-                                 bool bruteForce) {
+                                 bool bruteForce, std::unique_ptr<PairScratch>& scratch) {
   NearestPair nearest(a, b);
   const std::size_t sizeA = a.tree.ordered().size(), sizeB = b.tree.ordered().size();
   if (sizeA == 0 || sizeB == 0) return {noPoint(a.id), noPoint(b.id), kInfinity};
@@ -265,18 +280,26 @@ GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGe
     return nearest.result();
   }
   startNear(a, b, nearest);
-  const Vector3d origin = worldOrigin(a);
-  const PairSearch search{a.tree.octree(), b.tree.octree(), mapAbout(a, origin),
-                          mapAbout(b, origin)};
+  const PairSide sideA = sideOf(a, {}), sideB = sideOf(b, mapBetween(a, b));
+  const Vector3d offset = worldOrigin(b) - worldOrigin(a);
   // The error covers that of computed distances. If positions are clamped to the floats' range, it
   // is so large that no pair of boxes is skipped.
-  const double radii = a.mesh.largestRadius + b.mesh.largestRadius,
-               scale = a.tree.frame().scale * (1.0 + kNearestError),
-               error = kNearestError * (sizeOf(search.a.box(0)) + sizeOf(search.b.box(0)));
+  const double radii = a.mesh.largestRadius + b.mesh.largestRadius, scale = a.tree.frame().scale,
+               error =
+                   4 * kOrthonormal * (sizeOf(sideA.octree.box(0)) + sizeOf(sideB.octree.box(0))),
+               heightsError = heightsErrorOf(a) + heightsErrorOf(b);
   const auto boundOf = [&] {
-    return OutwardRounding::up(static_cast<float>((nearest.distance() + radii) * scale + error));
+    const double distance = (nearest.distance() + radii) * scale * (1.0 + 4 * kOrthonormal) + error;
+    PairBound bound{up(distance)};
+    const Vector3d& direction = nearest.direction();
+    if (direction == Vector3d::Zero()) return bound;
+    bound.heights = up(distance - direction.dot(offset) * scale + heightsError);
+    bound.alongA = inFloats(a, -direction);
+    bound.alongB = inFloats(b, direction);
+    return bound;
   };
-  forNearElements(search, boundOf(), [&](const NearElements& elements) {
+  if (!scratch) scratch = std::make_unique<PairScratch>();
+  forNearElements(sideA, sideB, boundOf(), *scratch, [&](const NearElements& elements) {
     nearest.test(elements);
     return boundOf();
   });

@@ -2,8 +2,11 @@
 
 #include <palpate/SpatialQueries.h>
 
+#include "Queries/PairTraversal.h"
 #include "Queries/SearchableGeometry.h"
 #include "Shapes/Shape.h"
+
+#include <memory>
 
 namespace palpate {
 
@@ -13,9 +16,11 @@ namespace palpate {
 /// element kNoElement, and the distance is infinite, if a mesh has no elements.
 ///
 /// Method   descent into both octrees, from a pair of elements that is likely near. A pair of nodes
-///          is skipped if its boxes are further apart than the best pair of elements.
+///          is skipped if its boxes, in the frame of a, are further apart than the best pair of
+///          elements, or if their heights along the direction of that pair are. scratch: null
+///          before the first call.
 GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGeometry& b,
-                                 bool bruteForce);
+                                 bool bruteForce, std::unique_ptr<PairScratch>& scratch);
 /// The same for a geometry with elements and a shape with this id, which is solid.
 GeometryDistance distanceBetween(const SearchableGeometry&, GeometryId, const Shape&,
                                  bool bruteForce);

@@ -14,28 +14,114 @@
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
 
+/// The lowest heights of a geometry's elements along a direction. They are computed in blocks of
+/// the octree's order when a block is first needed.
+class ElementHeights {
+ public:
+  ElementHeights(const PairSide& side, PairScratch::Heights& scratch)
+      : m_side(side), m_scratch(scratch) {
+    m_scratch.blocks.fill(kNone);
+  }
+  const PairSide& side() const { return m_side; }
+
+  void setDirection(const std::array<float, 3>& direction) {
+    if (direction == m_direction) return;
+    m_direction = direction;
+    m_scratch.blocks.fill(kNone);
+  }
+  /// The lowest of the elements at places [begin, end).
+  HWY_ATTR float lowest(std::uint32_t begin, std::uint32_t end) {
+    const LeafTag d;
+    const auto none = hn::Set(d, std::numeric_limits<float>::infinity());
+    auto least = none;
+    while (begin < end) {
+      const float* const heights = at(begin);
+      const std::uint32_t count = std::min(end - begin, kBlock - begin % kBlock);
+      for (std::size_t i = 0; i < count; i += hn::Lanes(d))
+        least = hn::Min(least,
+                        hn::IfThenElse(hn::FirstN(d, count - i), hn::LoadU(d, heights + i), none));
+      begin += count;
+    }
+    return hn::GetLane(hn::MinOfLanes(d, least));
+  }
+  /// Lower bounds for what boxes hold. Products and sums are rounded monotonically, so that none is
+  /// above the computed height of an element in the box.
+  template <class D>
+  HWY_ATTR HWY_INLINE hn::Vec<D> lowest(D d, const BoxLanes<D>& boxes) const {
+    const auto along = [&](int k) {
+      const auto direction = hn::Set(d, m_direction[static_cast<std::size_t>(k)]);
+      return hn::Min(direction * boxes.lower[k], direction * boxes.upper[k]);
+    };
+    return along(0) + along(1) + along(2);
+  }
+  float operator[](std::uint32_t place) { return at(place)[0]; }
+  /// Those of `count` elements from a place on, at most NearElements::kSide.
+  void copy(std::uint32_t place, std::uint32_t count, float* out) {
+    for (std::uint32_t i = 0; i < NearElements::kSide; ++i)
+      out[i] = i < count ? (*this)[place + i] : std::numeric_limits<float>::infinity();
+  }
+
+ private:
+  static constexpr std::uint32_t kBlock = PairScratch::Heights::kBlock,
+                                 kSlots = PairScratch::Heights::kSlots,
+                                 kNone = PairScratch::Heights::kNone;
+
+  /// The height of the element at a place, and of those behind it in its block.
+  const float* at(std::uint32_t place) {
+    const std::uint32_t block = place / kBlock, slot = block % kSlots;
+    if (m_scratch.blocks[slot] != block) {
+      compute(block, m_scratch.heights[slot]);
+      m_scratch.blocks[slot] = block;
+    }
+    return m_scratch.heights[slot] + place % kBlock;
+  }
+  void compute(std::uint32_t block, float* heights) const {
+    const std::uint32_t first = block * kBlock,
+                        end = std::min(first + kBlock,
+                                       static_cast<std::uint32_t>(m_side.octree.size()));
+    for (std::uint32_t i = first; i < end; ++i) {
+      const auto height = [&](std::size_t corner) {
+        const FloatPoint& p = m_side.floats[m_side.ordered[i][corner]];
+        return m_direction[0] * p.x + m_direction[1] * p.y + m_direction[2] * p.z;
+      };
+      heights[i - first] = std::min({height(0), height(1), height(2)});
+    }
+  }
+
+  const PairSide& m_side;
+  std::array<float, 3> m_direction{};
+  PairScratch::Heights& m_scratch;
+};
+
 class PairDescent {
  public:
-  PairDescent(const PairSearch& search, void* context, TestElements test)
-      : m_search(search), m_context(context), m_test(test) {}
+  PairDescent(const PairSide& a, const PairSide& b, PairScratch& scratch, void* context,
+              TestElements test)
+      : m_a(a, scratch.a),
+        m_b(b, scratch.b),
+        m_context(context),
+        m_test(test),
+        m_entries(scratch.entries) {}
 
-  HWY_ATTR void run(float bound) {
+  HWY_ATTR void run(const PairBound& bound) {
     setBound(bound);
-    push(0.0f, 0, 0);
+    push(0.0f, {0, static_cast<std::uint32_t>(m_a.side().octree.size())},
+         {0, static_cast<std::uint32_t>(m_b.side().octree.size())});
     while (m_count > 0) {
       const Entry entry = m_entries[--m_count];
       if (entry.square > m_limit) continue;
-      const FloatBox boxA = boxOf(m_search.a, m_search.mapA, entry.a),
-                     boxB = boxOf(m_search.b, m_search.mapB, entry.b);
-      const OctreeNode childA = childOf(m_search.a, entry.a), childB = childOf(m_search.b, entry.b);
+      const float lowestA = lowestOf(m_a, entry.a), lowestB = lowestOf(m_b, entry.b);
+      if (lowestA + lowestB > m_lowest) continue;
+      const FloatBox boxA = boxOf(m_a.side(), entry.a), boxB = boxOf(m_b.side(), entry.b);
+      const OctreeNode childA = childOf(m_a.side(), entry.a), childB = childOf(m_b.side(), entry.b);
       if (childA != 0 && (childB == 0 || sizeOf(boxA) >= sizeOf(boxB)))
-        expand(m_search.a, m_search.mapA, entry.a, childA, boxB, entry.square,
-               [&](float square, OctreeNode node) { push(square, node, entry.b); });
+        expand(m_a, entry.a, childA, boxB, lowestB, entry.square,
+               [&](float square, const Subtree& part) { push(square, part, entry.b); });
       else if (childB != 0)
-        expand(m_search.b, m_search.mapB, entry.b, childB, boxA, entry.square,
-               [&](float square, OctreeNode node) { push(square, entry.a, node); });
+        expand(m_b, entry.b, childB, boxA, lowestA, entry.square,
+               [&](float square, const Subtree& part) { push(square, entry.a, part); });
       else
-        testElements(entry.a & ~kOwn, entry.b & ~kOwn, boxB);
+        testElements(entry.a, entry.b, boxB);
     }
   }
 
@@ -43,22 +129,40 @@ class PairDescent {
   static constexpr std::size_t kSide = NearElements::kSide;
   /// The bit of a node of which only its own elements are left, without its children.
   static constexpr OctreeNode kOwn = 0x80000000u;
-  struct Entry {
-    float square;
-    OctreeNode a, b;
-  };
+  /// Heights are compared for subtrees of at most so many elements.
+  static constexpr std::uint32_t kFew = 128;
+  using Subtree = PairScratch::Subtree;
+  using Entry = PairScratch::Entry;
 
-  void setBound(float bound) {
+  void setBound(const PairBound& bound) {
     // Computed squares are off by less than 2^-20 of themselves.
-    m_limit = OutwardRounding::up(bound * bound * (1.0f + 0x1p-19f));
+    m_limit = OutwardRounding::up(bound.distance * bound.distance * (1.0f + 0x1p-19f));
     if (!(m_limit >= 0)) m_limit = std::numeric_limits<float>::infinity();
+    m_lowest = bound.heights;
+    m_a.setDirection(bound.alongA);
+    m_b.setDirection(bound.alongB);
   }
-  void push(float square, OctreeNode a, OctreeNode b) { m_entries[m_count++] = {square, a, b}; }
-  static OctreeNode childOf(const Octree& octree, OctreeNode node) {
-    return node & kOwn ? 0 : octree.firstChild(node);
+  void push(float square, const Subtree& a, const Subtree& b) {
+    m_entries[m_count++] = {square, a, b};
   }
-  HWY_ATTR static FloatBox boxOf(const Octree& octree, const BoxMap& map, OctreeNode node) {
-    return BoxLanes<BoxTag>::of(octree.box(node & ~kOwn)).mapped(map).first();
+  /// A lower bound for the heights of a subtree's elements: the lowest one of few elements.
+  HWY_ATTR float lowestOf(ElementHeights& heights, const Subtree& part) const {
+    if (!(m_lowest < std::numeric_limits<float>::infinity())) return 0.0f;
+    const std::uint32_t begin = beginOf(heights.side(), part);
+    if (part.end - begin <= kFew) return heights.lowest(begin, part.end);
+    const BoxTag d;
+    return hn::GetLane(
+        heights.lowest(d, BoxLanes<BoxTag>::of(heights.side().octree.box(part.node & ~kOwn))));
+  }
+  static std::uint32_t beginOf(const PairSide& side, const Subtree& part) {
+    const OctreeNode node = part.node & ~kOwn;
+    return side.octree.blocks()[node >> 3].begin[node & 7];
+  }
+  static OctreeNode childOf(const PairSide& side, const Subtree& part) {
+    return part.node & kOwn ? 0 : side.octree.firstChild(part.node);
+  }
+  HWY_ATTR static FloatBox boxOf(const PairSide& side, const Subtree& part) {
+    return BoxLanes<BoxTag>::of(side.octree.box(part.node & ~kOwn)).mapped(side.map).first();
   }
   static float sizeOf(const FloatBox& box) {
     return (box.upper[0] - box.lower[0]) + (box.upper[1] - box.lower[1]) +
@@ -67,38 +171,42 @@ class PairDescent {
 
   /// Pushes the node's own elements and its children near the box, the nearest last.
   template <class Push>
-  HWY_ATTR HWY_INLINE void expand(const Octree& octree, const BoxMap& map, OctreeNode node,
-                                  OctreeNode child, const FloatBox& other, float square,
-                                  Push&& push) {
+  HWY_ATTR HWY_INLINE void expand(const ElementHeights& heights, const Subtree& part,
+                                  OctreeNode child, const FloatBox& other, float lowest,
+                                  float square, Push&& push) {
+    const PairSide& side = heights.side();
     const std::size_t first = m_count;
+    const OctreeBlock& block = side.octree.blocks()[child >> 3];
     alignas(64) float squares[8];
     std::uint32_t bits = 0;
     const NodeTag d;
     for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-      const auto distances =
-          BoxLanes<NodeTag>::load(octree.blocks()[child >> 3], i).mapped(map).distanceFrom(other);
+      const auto boxes = BoxLanes<NodeTag>::load(block, i);
+      const auto low = hn::Le(heights.lowest(d, boxes) + hn::Set(d, lowest), hn::Set(d, m_lowest));
+      if (hn::AllFalse(d, low)) continue;
+      const auto distances = boxes.mapped(side.map).distanceFrom(other);
       hn::Store(distances, d, squares + i);
-      bits |= bitsOf(d, hn::Le(distances, hn::Set(d, m_limit))) << i;
+      bits |= bitsOf(d, hn::And(low, hn::Le(distances, hn::Set(d, m_limit)))) << i;
     }
     for (; bits; bits &= bits - 1) {
       const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
-      if (octree.isEmpty(child + slot)) continue;
-      push(squares[slot], child + slot);
+      if (block.isEmpty(slot)) continue;
+      push(squares[slot], Subtree{child + slot, slot < 7 ? block.begin[slot + 1] : part.end});
       for (std::size_t i = m_count - 1; i > first && m_entries[i - 1].square < squares[slot]; --i)
         std::swap(m_entries[i], m_entries[i - 1]);
     }
-    const auto [begin, end] = octree.ownRange(node);
-    if (begin < end) push(square, node | kOwn);
+    const auto [begin, end] = side.octree.ownRange(part.node);
+    if (begin < end) push(square, Subtree{part.node | kOwn, end});
   }
 
   /// Boxes of elements, in the common floats.
   struct Boxes {
-    alignas(64) float lower[3][kSide], upper[3][kSide];
+    alignas(64) float lower[3][kSide], upper[3][kSide], heights[kSide];
 
-    HWY_ATTR HWY_INLINE void load(const Octree& octree, const BoxMap& map, std::uint32_t first) {
+    HWY_ATTR HWY_INLINE void load(const PairSide& side, std::uint32_t first) {
       const LeafTag d;
       for (std::size_t i = 0; i < kSide; i += hn::Lanes(d)) {
-        const auto boxes = BoxLanes<LeafTag>::load(octree.boxes(), first + i).mapped(map);
+        const auto boxes = BoxLanes<LeafTag>::load(side.octree.boxes(), first + i).mapped(side.map);
         for (int k = 0; k < 3; ++k) {
           hn::Store(boxes.lower[k], d, lower[k] + i);
           hn::Store(boxes.upper[k], d, upper[k] + i);
@@ -121,44 +229,54 @@ class PairDescent {
       }
       return bits;
     }
+    /// Bits of the heights whose sums with another are not above a limit.
+    HWY_ATTR HWY_INLINE std::uint32_t below(float limit, float other) const {
+      const LeafTag d;
+      std::uint32_t bits = 0;
+      for (std::size_t i = 0; i < kSide; i += hn::Lanes(d))
+        bits |= bitsOf(d, hn::Le(hn::Load(d, heights + i) + hn::Set(d, other), hn::Set(d, limit)))
+                << i;
+      return bits;
+    }
   };
 
-  HWY_ATTR void testElements(OctreeNode a, OctreeNode b, const FloatBox& boxB) {
+  HWY_ATTR void testElements(const Subtree& a, const Subtree& b, const FloatBox& boxB) {
     NearElements found;
     Boxes boxesA, boxesB;
-    const auto [beginA, endA] = m_search.a.ownRange(a);
-    const auto [beginB, endB] = m_search.b.ownRange(b);
-    for (found.placeA = beginA; found.placeA < endA; found.placeA += kSide) {
-      boxesA.load(m_search.a, m_search.mapA, found.placeA);
-      const std::uint32_t rows =
-          boxesA.near(boxB, std::min<std::size_t>(kSide, endA - found.placeA), m_limit);
+    const std::uint32_t beginB = beginOf(m_b.side(), b);
+    for (found.placeA = beginOf(m_a.side(), a); found.placeA < a.end; found.placeA += kSide) {
+      const std::uint32_t sizeA = std::min<std::uint32_t>(kSide, a.end - found.placeA);
+      boxesA.load(m_a.side(), found.placeA);
+      const std::uint32_t rows = boxesA.near(boxB, sizeA, m_limit);
       if (rows == 0) continue;
-      for (found.placeB = beginB; found.placeB < endB; found.placeB += kSide) {
-        boxesB.load(m_search.b, m_search.mapB, found.placeB);
-        const std::size_t size = std::min<std::size_t>(kSide, endB - found.placeB);
+      for (found.placeB = beginB; found.placeB < b.end; found.placeB += kSide) {
+        const std::uint32_t sizeB = std::min<std::uint32_t>(kSide, b.end - found.placeB);
+        boxesB.load(m_b.side(), found.placeB);
+        m_b.copy(found.placeB, sizeB, boxesB.heights);
         std::uint32_t any = 0;
         found.near.fill(0);
         for (std::uint32_t bits = rows; bits; bits &= bits - 1) {
           const auto row = static_cast<std::uint32_t>(std::countr_zero(bits));
-          any |= found.near[row] = boxesB.near(boxesA[row], size, m_limit);
+          any |= found.near[row] = boxesB.near(boxesA[row], sizeB, m_limit) &
+                                   boxesB.below(m_lowest, m_a[found.placeA + row]);
         }
         if (any) setBound(m_test(m_context, found));
       }
     }
   }
 
-  const PairSearch& m_search;
+  ElementHeights m_a, m_b;
   void* const m_context;
   const TestElements m_test;
-  float m_limit = 0;  ///< of computed squared distances of boxes
+  float m_limit = 0;   ///< of computed squared distances of boxes
+  float m_lowest = 0;  ///< of computed sums of heights
   std::size_t m_count = 0;
-  // Eight entries remain on each of at most 61 levels of each octree.
-  std::array<Entry, 1024> m_entries;
+  std::array<Entry, 1024>& m_entries;
 };
 
-HWY_ATTR void searchPairsKernel(const PairSearch& search, float bound, void* context,
-                                TestElements test) {
-  PairDescent(search, context, test).run(bound);
+HWY_ATTR void searchPairsKernel(const PairSide& a, const PairSide& b, const PairBound& bound,
+                                PairScratch& scratch, void* context, TestElements test) {
+  PairDescent(a, b, scratch, context, test).run(bound);
 }
 
 }  // namespace palpate::HWY_NAMESPACE
@@ -169,10 +287,11 @@ namespace palpate {
 
 HWY_EXPORT(searchPairsKernel);
 
-void searchPairs(const PairSearch& search, float bound, void* context, TestElements test) {
-  search.a.requireBuilt();
-  search.b.requireBuilt();
-  HWY_DYNAMIC_DISPATCH(searchPairsKernel)(search, bound, context, test);
+void searchPairs(const PairSide& a, const PairSide& b, const PairBound& bound, PairScratch& scratch,
+                 void* context, TestElements test) {
+  a.octree.requireBuilt();
+  b.octree.requireBuilt();
+  HWY_DYNAMIC_DISPATCH(searchPairsKernel)(a, b, bound, scratch, context, test);
 }
 
 }  // namespace palpate

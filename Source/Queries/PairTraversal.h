@@ -1,19 +1,31 @@
 #pragma once
 
+#include "Mesh/FloatPositions.h"
+#include "Mesh/TriangleMesh.h"
 #include "Octree/BoxMap.h"
 #include "Octree/Octree.h"
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 namespace palpate {
 
-/// A search for the pairs of elements of two octrees that are nearest to each other.
-struct PairSearch {
-  const Octree &a, &b;
-  BoxMap mapA, mapB;  ///< to common floats
+/// One of two geometries, of which the nearest pair of elements is searched.
+struct PairSide {
+  const Octree& octree;
+  const FloatPoint* floats;  ///< of the vertices, in the octree's frame
+  const Triangle* ordered;   ///< elements in the octree's order
+  BoxMap map;                ///< to common floats
+};
+/// Pairs of elements are skipped if their boxes are further apart than `distance`, or if their
+/// lowest heights along one direction for each geometry have a sum above `heights`.
+struct PairBound {
+  float distance = std::numeric_limits<float>::infinity();  ///< in the common floats
+  float heights = std::numeric_limits<float>::infinity();
+  std::array<float, 3> alongA{}, alongB{};  ///< in the floats of each octree
 };
 /// Elements of both octrees whose boxes are near each other. Places are those of the orders.
 struct NearElements {
@@ -22,21 +34,45 @@ struct NearElements {
   /// Bit j of near[i]: the elements at placeA + i and placeB + j are near each other.
   std::array<std::uint32_t, kSide> near;
 };
-/// Tests elements. Returns a bound in the common floats: pairs of boxes that are further apart are
-/// skipped.
-using TestElements = float (*)(void* context, const NearElements&);
+/// Scratch of a search. It is too large for a small stack.
+struct PairScratch {
+  /// Heights of elements, in blocks of the octree's order. Block i is in slot i % kSlots.
+  struct Heights {
+    static constexpr std::uint32_t kBlock = 64, kSlots = 64, kNone = 0xffffffff;
+
+    std::array<std::uint32_t, kSlots> blocks;
+    float heights[kSlots][kBlock + BoxArrays::kPadding];
+  };
+  /// A node, and the end of its subtree's range of elements.
+  struct Subtree {
+    OctreeNode node;
+    std::uint32_t end;
+  };
+  struct Entry {
+    float square;
+    Subtree a, b;
+  };
+
+  Heights a, b;
+  std::array<Entry, 1024> entries;  ///< eight remain on each of at most 61 levels of each octree
+};
+
+/// Tests elements. Returns the bound for those that follow.
+using TestElements = PairBound (*)(void* context, const NearElements&);
 
 /// Visits pairs of elements, nearest pairs of nodes first. Of two nodes the larger one is replaced
 /// by its children.
-void searchPairs(const PairSearch&, float bound, void* context, TestElements);
+void searchPairs(const PairSide& a, const PairSide& b, const PairBound&, PairScratch&,
+                 void* context, TestElements);
 
 /// searchPairs() with f(elements) in place of the function pointer.
 template <class F>
-void forNearElements(const PairSearch& search, float bound, F&& f) {
+void forNearElements(const PairSide& a, const PairSide& b, const PairBound& bound,
+                     PairScratch& scratch, F&& f) {
   const auto call = [](void* context, const NearElements& elements) {
     return (*static_cast<std::remove_reference_t<F>*>(context))(elements);
   };
-  searchPairs(search, bound, &f, call);
+  searchPairs(a, b, bound, scratch, &f, call);
 }
 
 }  // namespace palpate

@@ -4,6 +4,7 @@
 #include <palpate/SpatialQueries.h>
 
 #include "Core/Threads.h"
+#include "Queries/PairTraversal.h"
 #include "Queries/PathIntervals.h"
 #include "Queries/PointDistances.h"
 #include "Queries/RayHits.h"
@@ -40,6 +41,7 @@ class SpatialQueries::Source {
     /// The shape of the last call. Placing it again allocates nothing.
     std::optional<PlacedShape> shape;
     PathScratch path;
+    std::unique_ptr<PairScratch> pairs;  ///< null before distance() first needs it
     std::vector<std::uint64_t> bits;
 
     /// Sorts different numbers: as bits of a field if they lie close together.

@@ -528,7 +528,8 @@ GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const 
     throw Error(ErrorCode::InvalidSettings, "distance() was called for " + nameOf(idA) + " twice",
                 idA);
   const bool bruteForce = source.engine() == Engine::BruteForce;
-  if (!a.shape && !b.shape) return distanceBetween(a, b, bruteForce);
+  const Source::Loan scratch(source);
+  if (!a.shape && !b.shape) return distanceBetween(a, b, bruteForce, scratch->pairs);
   if (!a.shape) return distanceBetween(a, idB, b.shape->now, bruteForce);
   if (!b.shape) {
     const GeometryDistance found = distanceBetween(b, idA, a.shape->now, bruteForce);
@@ -538,7 +539,6 @@ GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const 
   if (first.isPlane() && second.isPlane())
     throw Error(ErrorCode::UnsupportedMethod,
                 nameOf(idA) + " and " + nameOf(idB) + " are both planes", idA);
-  const Source::Loan scratch(source);
   return distanceBetween(idA, first, idB, second, scratch->shapeContacts.shapePair);
 }
 

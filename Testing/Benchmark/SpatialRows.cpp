@@ -12,6 +12,7 @@
 
 #include <Eigen/Geometry>
 
+#include <chrono>
 #include <cstdio>
 #include <thread>
 
@@ -250,6 +251,15 @@ void compute() {
   static_cast<void>(sink);
 }
 
+/// Milliseconds on the wall, as the CPU clock adds up those of both threads.
+template <class F>
+double wallMillisecondsOf(F&& f) {
+  const auto start = std::chrono::steady_clock::now();
+  f();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
+}
+
 /// Batches on one and two threads, beside compute() once on a thread and once on each of two.
 void batchRows(Report& report, const SpatialBody& body, const RowOptions& options) {
   constexpr std::size_t kCases = 100'000;
@@ -279,9 +289,9 @@ void batchRows(Report& report, const SpatialBody& body, const RowOptions& option
     for (std::size_t thread = 0; thread < 2; ++thread) {
       const SpatialQueries queries = collisions[thread]->queries();
       const double each[] = {
-          millisecondsOf([&] { queries.closestPoints(mesh, near, points); }),
-          millisecondsOf([&] { queries.signedDistances(mesh, near, distances); }),
-          millisecondsOf([&] { queries.firstHits(mesh, rays, hits); }), millisecondsOf([&] {
+          wallMillisecondsOf([&] { queries.closestPoints(mesh, near, points); }),
+          wallMillisecondsOf([&] { queries.signedDistances(mesh, near, distances); }),
+          wallMillisecondsOf([&] { queries.firstHits(mesh, rays, hits); }), wallMillisecondsOf([&] {
             std::jthread other(thread == 1 ? compute : [] {});
             compute();
           })};
@@ -306,32 +316,78 @@ void batchRows(Report& report, const SpatialBody& body, const RowOptions& option
 }
 
 #ifdef PALPATE_BENCHMARK_BASELINES
-/// The least distance of two bodies of which both deform.
-void distanceRow(Report& report, const SpatialBody& body, const RowOptions& options) {
-  const std::string scene = body.name + ": minimum distance";
+/// The least distance of two bodies of which both deform. placed: both are also turned by
+/// setTransform().
+void distanceRow(Report& report, const SpatialBody& body, bool placed, const RowOptions& options) {
+  const std::string scene = body.name + ": minimum distance" + (placed ? ", placed" : "");
   if (!isWanted(scene, options.scenes)) return;
-  Eigen::AlignedBox3d box;
+  using Eigen::Isometry3d;
+  Isometry3d poseA = Isometry3d::Identity(), poseB = poseA;
+  if (placed) {
+    poseA.rotate(Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()));
+    poseB.rotate(Eigen::AngleAxisd(1.9, Vector3d(-2, 1, 2).normalized()));
+  }
+  Eigen::AlignedBox3d boxA, boxB;
   for (const Points& frame : body.frames)
-    for (const Vector3d& p : frame) box.extend(p);
-  const Vector3d aside = (box.sizes()[0] + 0.1 * body.diagonal) * Vector3d::UnitX();
+    for (const Vector3d& p : frame) {
+      boxA.extend(poseA * p);
+      boxB.extend(poseB * p);
+    }
+  const double aside = boxA.max()[0] - boxB.min()[0] + 0.1 * body.diagonal;
   std::vector<Points> others = body.frames;
-  for (Points& frame : others)
-    for (Vector3d& p : frame) p += aside;
+  if (placed)
+    poseB.pretranslate(aside * Vector3d::UnitX());
+  else
+    for (Points& frame : others)
+      for (Vector3d& p : frame) p[0] += aside;
+
+  Settings settings;
+  settings.threads = 1;
+  OctreeBasedCD collisions(settings);
+  const GeometryId a = collisions.addTriangleMesh(body.frames[0], body.triangles),
+                   b = collisions.addTriangleMesh(others[0], body.triangles);
+  if (placed) {
+    collisions.setTransform(a, poseA.linear(), poseA.translation());
+    collisions.setTransform(b, poseB.linear(), poseB.translation());
+  }
   FclDistance fcl(body.triangles, body.frames[0], others[0]);
-  std::vector<double> updates, queries;
-  double least = 0;
+  std::array<std::vector<double>, 2> updates, queries;
+  std::array<double, 2> least;
   for (std::size_t turn = 0; turn < static_cast<std::size_t>(options.measure.repetitions); ++turn) {
     const std::size_t frame = (turn + 1) % kFrames;
-    updates.push_back(millisecondsOf([&] { fcl.update(body.frames[frame], others[frame]); }));
-    queries.push_back(1000 * millisecondsOf([&] { least = fcl.distance(); }));
+    updates[0].push_back(millisecondsOf([&] {
+      collisions.advance();
+      collisions.setPositions(a, body.frames[frame]);
+      collisions.setPositions(b, others[frame]);
+      collisions.update();
+    }));
+    updates[1].push_back(millisecondsOf([&] { fcl.update(body.frames[frame], others[frame]); }));
+    for (std::size_t i = 0; i < 2; ++i) {
+      const std::size_t engine = (i + turn) % 2;
+      const auto ask = [&] {
+        least[engine] =
+            engine == 0 ? collisions.queries().distance(a, b).distance : fcl.distance(poseA, poseB);
+      };
+      ask();  // warms the caches
+      queries[engine].push_back(1000 * millisecondsOf(ask));
+    }
   }
-  report.line({scene + ", FCL: us, update ms", number(median(queries)),
-               milliseconds(median(updates)), "distance", number(least / body.diagonal),
-               "diagonals"});
-  report.row("spatial", scene, 1, "FCL 0.7 BVHModel<OBBRSS>, refit", "us", median(queries));
-  report.row("spatial", scene, 1, "FCL 0.7 BVHModel<OBBRSS>, refit", "update ms", median(updates));
-  report.row("spatial", scene, 1, "Palpate", "allowed ratio",
-             kDistanceTargets[body.size] / kDistanceFastest[body.size]);
+  constexpr const char* kNames[] = {"Palpate", "FCL 0.7 BVHModel<OBBRSS>, refit"};
+  const double ratio = medianRatio(queries[0], queries[1]),
+               allowed = kDistanceTargets[body.size] / kDistanceFastest[body.size];
+  report.heading("Spatial queries, " + scene + ", " + number(least[0] / body.diagonal) +
+                 " diagonals, Palpate and FCL; update in ms, query in us, ratio, allowed ratio, "
+                 "difference / diagonal");
+  report.line({"update", milliseconds(median(updates[0])), milliseconds(median(updates[1]))});
+  report.line({"minimum distance", number(median(queries[0])), number(median(queries[1])),
+               number(ratio), number(allowed), ratio <= allowed ? "met" : "NOT MET",
+               number((least[0] - least[1]) / body.diagonal)});
+  for (std::size_t engine = 0; engine < 2; ++engine) {
+    report.row("spatial", scene, 1, kNames[engine], "us", median(queries[engine]));
+    report.row("spatial", scene, 1, kNames[engine], "update ms", median(updates[engine]));
+  }
+  report.row("spatial", scene, 1, "Palpate", "ratio to the fastest library", ratio);
+  report.row("spatial", scene, 1, "Palpate", "allowed ratio", allowed);
 }
 #endif
 
@@ -353,7 +409,8 @@ void spatialRows(Report& report, const RowOptions& options) {
     }
 #ifdef PALPATE_BENCHMARK_BASELINES
   for (std::size_t size = 0; size < std::size(kDistanceTargets); ++size)
-    distanceRow(report, makeBody(size, false), options);
+    for (const bool placed : {false, true})
+      distanceRow(report, makeBody(size, false), placed, options);
 #endif
   if (isWanted("batches", options.scenes)) batchRows(report, makeBody(1, false), options);
 }

@@ -2,6 +2,8 @@
 
 #include <palpate/Types.h>
 
+#include <Eigen/Geometry>
+
 #include <memory>
 #include <span>
 #include <vector>
@@ -15,7 +17,8 @@ class FclDistance {
               std::span<const Eigen::Vector3d> b);
   ~FclDistance();
   void update(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::Vector3d>& b);
-  double distance() const;  ///< L, with the closest points
+  /// L, with the closest points, of the meshes at two poses.
+  double distance(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const;
 
  private:
   struct Models;

@@ -98,11 +98,10 @@ void FclDistance::update(const std::vector<Eigen::Vector3d>& a,
   refit(m_models->b, b);
 }
 
-double FclDistance::distance() const {
+double FclDistance::distance(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const {
   const fcl::DistanceRequest<double> request(true);
   fcl::DistanceResult<double> result;
-  return fcl::distance(&m_models->a, fcl::Transform3d::Identity(), &m_models->b,
-                       fcl::Transform3d::Identity(), request, result);
+  return fcl::distance(&m_models->a, a, &m_models->b, b, request, result);
 }
 
 std::unique_ptr<SpatialEngine> makeFclQueries() { return std::make_unique<FclQueries>(); }

@@ -148,6 +148,45 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForPlacedBodiesAndFarFromTheOri
     }
 }
 
+/// Each mesh has more elements than subtrees whose elements' heights are compared. The nearest
+/// points are often vertices, which several triangles share.
+TEST(GeometryDistances, OctreesAnswerAsBruteForceForMeshesOfManyElements) {
+  Random random(212);
+  const auto bumpy = [](std::uint32_t rings, double height) {
+    Mesh mesh = sphere(rings, 24, Vector3d::Zero(), 1.0);
+    for (Vector3d& p : mesh.positions)
+      p *= 1 + height * std::sin(5 * p[0]) * std::cos(4 * p[1]) * std::sin(3 * p[2] + 1);
+    return testGeometry(std::move(mesh));
+  };
+  const TestGeometry a = bumpy(22, 0.15), b = bumpy(18, 0.2);
+  std::size_t apart = 0, touching = 0;
+  for (int placed = 0; placed < 4; ++placed) {
+    Both both(a, b);
+    for (const double most : {3.0, 2.6, 2.3, 2.2, 2.1, 2.0, 1.9, 1.8, 0.2}) {
+      const Vector3d aside = most * randomPoint(random, -1, 1).normalized();
+      const auto put = [&](GeometryId id, const TestGeometry& geometry, const Vector3d& shift,
+                           bool isPlaced) {
+        const Matrix3d turn = randomTurn(random);
+        Positions now = geometry.positions;
+        for (Vector3d& p : now) p = turn * p + shift;
+        both.change([&](OctreeBasedCD& each) {
+          if (isPlaced)
+            each.setTransform(id, turn, shift);
+          else
+            each.setPositions(id, now);
+        });
+      };
+      put(both.a, a, Vector3d(0.3, -5, 7), placed & 1);
+      put(both.b, b, Vector3d(0.3, -5, 7) + aside, placed & 2);
+      const GeometryDistance found = expectSameAnswers(both, 0.0, 10.0);
+      (found.distance > 0 ? apart : touching) += 1;
+      ASSERT_FALSE(::testing::Test::HasFailure()) << most << ' ' << placed;
+    }
+  }
+  EXPECT_GT(apart, 15u);
+  EXPECT_GT(touching, 4u);
+}
+
 TEST(GeometryDistances, SurfacesOfTetrahedralMeshesAreMeshes) {
   Random random(203);
   const Solid a = cells(3, random), b = cells(2, random);
