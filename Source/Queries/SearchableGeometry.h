@@ -68,9 +68,18 @@ Eigen::Vector3d worldOrigin(const SearchableGeometry&);
 BoxMap worldMap(const SearchableGeometry&, const Eigen::Vector3d& origin, double thickness,
                 bool wholeStep);
 
+/// The frame in which a traversal compares boxes of two geometries.
+enum class BoxFrame {
+  World,  ///< candidates are defined there
+  /// That of b's body, if b is placed and does not turn while the boxes enclose the step; else the
+  /// world. Elements within the thickness are found in either frame. Here fewer others are, and
+  /// faster, because only a's boxes are mapped.
+  BodyOfB
+};
+
 /// The octrees of two geometries, whose frames have one scale, for a traversal. thickness: L.
 TreePair treesOf(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
-                 bool wholeStep);
+                 bool wholeStep, BoxFrame frame = BoxFrame::World);
 
 std::string nameOf(GeometryId);    ///< "geometry 3"
 std::string nameOf(GeometryType);  ///< "a line mesh"
