@@ -58,7 +58,7 @@ double approachSlack(const PairRecord& record) {
 /// thickness: L, of the boxes. unfolded: UnfoldedStars::triangles(), or null.
 TreePair treesOf(const PairRecord& record, bool adjacentPairs, const Triangle* unfolded,
                  double thickness, BoxFrame frame) {
-  if (frame == BoxFrame::BodyOfB) thickness += approachSlack(record);
+  if (frame == BoxFrame::Body) thickness += approachSlack(record);
   TreePair trees = treesOf(*record.a, *record.b, thickness, record.plan.swept(), frame);
   if (trees.self() && !adjacentPairs) trees.adjacency = record.a->tree.ordered().data();
   if (unfolded) trees.adjacency = unfolded;
@@ -381,7 +381,7 @@ void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads
 void Frame::detect(std::span<PairRecord* const> records, const Settings& settings,
                    const Threads& threads, FrameStatistics& statistics) {
   Stopwatch watch;
-  start(records, threads, true, settings.keepCandidates ? BoxFrame::World : BoxFrame::BodyOfB);
+  start(records, threads, true, settings.keepCandidates ? BoxFrame::World : BoxFrame::Body);
   threads.forEach(m_jobCount, [&](std::size_t i) {
     Stopwatch job;
     m_jobs[i]->keepCandidates = settings.keepCandidates;

@@ -100,8 +100,12 @@ BoxMap worldMap(const SearchableGeometry& geometry, const Vector3d& origin, doub
 TreePair treesOf(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
                  bool wholeStep, BoxFrame frame) {
   TreePair trees{&a.tree.octree(), &b.tree.octree()};
-  if (frame == BoxFrame::BodyOfB && hasBodyMap(b, wholeStep)) {
+  if (frame == BoxFrame::Body && hasBodyMap(b, wholeStep)) {
     trees.mapA = bodyMap(a, b, thickness, wholeStep);
+    return trees;
+  }
+  if (frame == BoxFrame::Body && b.isPlaced() && hasBodyMap(a, wholeStep)) {
+    trees.mapB = bodyMap(b, a, thickness, wholeStep);
     return trees;
   }
   const double scale = a.tree.frame().scale;

@@ -71,10 +71,10 @@ BoxMap worldMap(const SearchableGeometry&, const Eigen::Vector3d& origin, double
 /// The frame in which a traversal compares boxes of two geometries.
 enum class BoxFrame {
   World,  ///< candidates are defined there
-  /// That of b's body, if b is placed and does not turn while the boxes enclose the step; else the
-  /// world. Elements within the thickness are found in either frame. Here fewer others are, and
-  /// faster, because only a's boxes are mapped.
-  BodyOfB
+  /// If both geometries are placed, or b alone: that of a body which is placed and does not turn
+  /// while the boxes enclose the step, b's if possible. Elements within the thickness are found in
+  /// any frame. Here fewer others are, and faster, because only one geometry's boxes are mapped.
+  Body
 };
 
 /// The octrees of two geometries, whose frames have one scale, for a traversal. thickness: L.

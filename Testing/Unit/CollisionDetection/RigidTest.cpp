@@ -133,7 +133,7 @@ void expectSameValidity(const Validity& found, const Validity& truth, double siz
 std::size_t expectAsPositions(Random& random, const TestGeometry& body, const TestGeometry& other,
                               const PairSettings& pair, const RigidCase& run) {
   const std::vector<Place> places = placesOf(random, run.way);
-  // Boxes are compared in the world if candidates are kept, else in the second body's frame.
+  // Boxes are compared in the world if candidates are kept, else in the frame of a body.
   const auto runOf = [&](Settings settings, bool keepsCandidates, bool byTransform) {
     settings.keepCandidates = keepsCandidates;
     return RigidRun(settings, body, other, pair, run.bodyFirst, byTransform);
