@@ -3,6 +3,7 @@
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "Core/Stopwatch.h"
 #include "Core/Spin.h"
+#include "Math/Tolerances.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/ElementBoxes.h"
 #include "NarrowPhase/FeaturePairs.h"
@@ -40,10 +41,25 @@ bool reportsOnlyTouching(const PairRecord& record) {
          record.a->mesh.topology.hasFaces() && record.meshes().maxFeatureDistance() == 0.0;
 }
 
+double boxThickness(const PairRecord& record) {
+  return record.plan.method == Method::Intersection ? 0.0 : record.meshes().maxFeatureDistance();
+}
+
+/// L: by how much more than the thickness Continuous may report features (TimeOfImpactSettings).
+/// Their boxes in the world overlap at the thickness, but those in another frame may not.
+double approachSlack(const PairRecord& record) {
+  if (!record.plan.swept()) return 0.0;
+  const double motion = record.plan.motion,
+               largestDifference = record.a->inStep().extent + record.b->inStep().extent + motion;
+  return record.pair.settings.timeTolerance * motion +
+         kApproachError * (largestDifference + 2.0 * boxThickness(record));
+}
+
 /// thickness: L, of the boxes. unfolded: UnfoldedStars::triangles(), or null.
 TreePair treesOf(const PairRecord& record, bool adjacentPairs, const Triangle* unfolded,
-                 double thickness) {
-  TreePair trees = treesOf(*record.a, *record.b, thickness, record.plan.swept());
+                 double thickness, BoxFrame frame) {
+  if (frame == BoxFrame::Body) thickness += approachSlack(record);
+  TreePair trees = treesOf(*record.a, *record.b, thickness, record.plan.swept(), frame);
   if (trees.self() && !adjacentPairs) trees.adjacency = record.a->tree.ordered().data();
   if (unfolded) trees.adjacency = unfolded;
   return trees;
@@ -51,10 +67,6 @@ TreePair treesOf(const PairRecord& record, bool adjacentPairs, const Triangle* u
 
 std::size_t trianglesOf(const PairRecord& record) {
   return record.a->tree.octree().size() + record.b->tree.octree().size();
-}
-
-double boxThickness(const PairRecord& record) {
-  return record.plan.method == Method::Intersection ? 0.0 : record.meshes().maxFeatureDistance();
 }
 
 FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
@@ -267,8 +279,8 @@ Frame::Job& Frame::newJob(PairRecord& record) {
   return job;
 }
 
-void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
-                  bool adjacentPairs) {
+void Frame::start(std::span<PairRecord* const> records, const Threads& threads, bool adjacentPairs,
+                  BoxFrame frame) {
   m_jobCount = 0;
   m_nodePairs.clear();
   for (PairRecord* record : records) {
@@ -284,10 +296,13 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
             ? record->a->tree.findUnfoldedStars(record->a->mesh, threads)
             : nullptr;
     const double thickness = boxThickness(*record);
-    const TreePair own = treesOf(*record, adjacentPairs, unfolded, thickness);
+    const TreePair own = treesOf(*record, adjacentPairs, unfolded, thickness, BoxFrame::World);
+    // A search at the searchDistance is for boxes in the world.
+    const bool searches = adjacentPairs && record->plan.searchDistance > 0.0;
     const TreePair trees =
         treesOf(*record, adjacentPairs, unfolded,
-                adjacentPairs ? std::max(thickness, record->plan.searchDistance) : thickness);
+                searches ? std::max(thickness, record->plan.searchDistance) : thickness,
+                searches || !record->b->isPlaced() ? BoxFrame::World : frame);
     const bool shared = threads.count() > 1 && trianglesOf(*record) >= kSharedSize;
     startPairs(trees, shared ? kNodePairsWanted : 1, m_stack);
     const std::size_t first = m_nodePairs.size(), count = m_stack.pairs.size();
@@ -314,7 +329,7 @@ void Frame::run(Job& job) const {
 void Frame::collect(std::span<PairRecord* const> records, const Threads& threads,
                     FrameStatistics& statistics) {
   Stopwatch watch;
-  start(records, threads, false);
+  start(records, threads, false, BoxFrame::World);
   threads.forEach(m_jobCount, [&](std::size_t i) {
     const PairRecord& record = *m_jobs[i]->record;
     m_jobs[i]->start(record.hasWiderBoxes() || m_jobs[i]->isFiltered() ? &Job::keep : nullptr);
@@ -351,7 +366,7 @@ void Frame::collect(std::span<PairRecord* const> records, const Threads& threads
 
 void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads,
                     BatchFunction function, void* context) {
-  start(records, threads, false);
+  start(records, threads, false, BoxFrame::World);
   GuardedFunction guarded{{}, function, context};
   threads.forEach(m_jobCount, [&](std::size_t i) {
     m_jobs[i]->guarded = &guarded;
@@ -366,7 +381,7 @@ void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads
 void Frame::detect(std::span<PairRecord* const> records, const Settings& settings,
                    const Threads& threads, FrameStatistics& statistics) {
   Stopwatch watch;
-  start(records, threads, true);
+  start(records, threads, true, settings.keepCandidates ? BoxFrame::World : BoxFrame::Body);
   threads.forEach(m_jobCount, [&](std::size_t i) {
     Stopwatch job;
     m_jobs[i]->keepCandidates = settings.keepCandidates;

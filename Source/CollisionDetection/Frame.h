@@ -36,7 +36,7 @@ class Frame {
 
  private:
   struct Job;
-  void start(std::span<PairRecord* const>, const Threads&, bool adjacentPairs);
+  void start(std::span<PairRecord* const>, const Threads&, bool adjacentPairs, BoxFrame);
   void run(Job&) const;
   void finish(PairRecord&, bool nearby, bool candidatesSorted, const Settings&, FrameStatistics&);
   void findMissedIntersections(const Threads&);

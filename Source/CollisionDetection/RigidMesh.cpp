@@ -42,7 +42,7 @@ struct RigidMesh::Implementation {
     return mesh;
   }
   void findByOctree(const SearchableGeometry& a, const SearchableGeometry& b, Job& job) {
-    const TreePair trees = treesOf(a, b, job.pair.maxFeatureDistance(), false);
+    const TreePair trees = treesOf(a, b, job.pair.maxFeatureDistance(), false, BoxFrame::Body);
     startPairs(trees, 1, stack);
     startNodes.assign(stack.pairs.begin(), stack.pairs.end());
     sink.start(&Job::receive, &job);

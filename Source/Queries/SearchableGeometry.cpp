@@ -4,12 +4,73 @@
 
 #include "Math/Tolerances.h"
 
+#include <Eigen/LU>
+
 #include <array>
 #include <cstddef>
 
 namespace palpate {
 
+using Eigen::Matrix3d;
 using Eigen::Vector3d;
+
+namespace {
+
+/// error: of the offset and of the positions in the boxes. All are in units of the floats.
+void addEnd(BoxMap& map, const Matrix3d& rotation, const Vector3d& offset, double thickness,
+            double error) {
+  std::array<std::array<double, 3>, 3> matrix;
+  for (int k = 0; k < 3; ++k)
+    for (int j = 0; j < 3; ++j) matrix[k][j] = rotation(k, j);
+  setEnd(map.ends[map.count++], matrix, {offset[0], offset[1], offset[2]}, thickness, error);
+}
+
+/// Whether bodyMap() can be used. If b turns in the step, positions move on curves in its body. If
+/// a position of b is clamped, b's boxes may not enclose it, and only a map makes them infinite.
+bool hasBodyMap(const SearchableGeometry& b, bool wholeStep) {
+  return b.isPlaced() && b.tree.octree().isBuilt() && !b.tree.octree().box(0).mayBeClamped() &&
+         (!wholeStep || b.mesh.now.transform().rotation == b.mesh.before.transform().rotation);
+}
+
+/// The map from boxes of a's octree into the frame of b's octree. A position p of the world is at
+/// inverse (p - t) in b's body, where t is b's translation.
+///
+/// All positions move in straight lines, and the inverse does not change in the step. Positions of
+/// a therefore move in straight lines in b's body, too, and the boxes of both ends enclose them.
+///
+/// Rounding. Let u be 2^-53, and |x| the largest coordinate of x. A and B are the origins of the
+/// two float frames, s and t the translations of a and b. The magnitudes in a row of a rotation sum
+/// up to sqrt(3) at most. In b's body
+///   vertices of a are off by at most 7 u (sqrt(3) |A| + |s|): 4 u of the same sum in the world;
+///   vertices of b are off by at most 7 u (sqrt(3) |B| + |t|);
+///   the offset is off by at most 40 u (sqrt(3) |A| + |s| + |t|) + u |B|.
+/// Together this is less than 128 u = 4 kPlacedError times 2 |A| + 2 |B| + |s| + |t|. The errors of
+/// vertices also grow with their coordinates in the float frames, by 2^-49 of these. For that,
+/// OutwardRounding and BoxMap have room. The length of a row of the inverse exceeds 1 by less than
+/// kOrthonormal. So does the thickness along an axis of b's body.
+BoxMap bodyMap(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
+               bool wholeStep) {
+  const FloatFrame &from = a.tree.frame(), &to = b.tree.frame();
+  const Matrix3d inverse = b.mesh.now.transform().rotation.inverse();
+  BoxMap map;
+  const auto add = [&](const RigidTransform& ofA, const RigidTransform& ofB) {
+    const auto largest = [](const Vector3d& v) { return v.cwiseAbs().maxCoeff(); };
+    const double size = 2.0 * (largest(from.origin) + largest(to.origin)) +
+                        largest(ofA.translation) + largest(ofB.translation);
+    addEnd(map, inverse * ofA.rotation,
+           (inverse * (ofA(from.origin) - ofB.translation) - to.origin) * to.scale,
+           thickness * (1.0 + kOrthonormal) * to.scale, 4.0 * kPlacedError * size * to.scale);
+  };
+  const Positions &nowA = a.mesh.now, &nowB = b.mesh.now, &beforeA = a.mesh.before,
+                  &beforeB = b.mesh.before;
+  add(nowA.transform(), nowB.transform());
+  if (wholeStep &&
+      !(nowA.transform() == beforeA.transform() && nowB.transform() == beforeB.transform()))
+    add(beforeA.transform(), beforeB.transform());
+  return map;
+}
+
+}  // namespace
 
 Vector3d worldOrigin(const SearchableGeometry& geometry) {
   const Vector3d& origin = geometry.tree.frame().origin;
@@ -21,27 +82,32 @@ BoxMap worldMap(const SearchableGeometry& geometry, const Vector3d& origin, doub
   BoxMap map;
   if (!geometry.isPlaced()) return map;
   const FloatFrame& frame = geometry.tree.frame();
-  const auto addEnd = [&](const RigidTransform& transform) {
-    std::array<std::array<double, 3>, 3> matrix;
-    for (int k = 0; k < 3; ++k)
-      for (int j = 0; j < 3; ++j) matrix[k][j] = transform.rotation(k, j);
-    const Vector3d offset = (transform(frame.origin) - origin) * frame.scale;
+  const auto add = [&](const RigidTransform& transform) {
     const double error =
         kPlacedError * frame.scale *
         (2.0 * frame.origin.cwiseAbs().maxCoeff() + transform.translation.cwiseAbs().maxCoeff() +
          origin.cwiseAbs().maxCoeff());
-    setEnd(map.ends[map.count++], matrix, {offset[0], offset[1], offset[2]}, thickness, error);
+    addEnd(map, transform.rotation, (transform(frame.origin) - origin) * frame.scale, thickness,
+           error);
   };
   const RigidTransform &now = geometry.mesh.now.transform(),
                        &before = geometry.mesh.before.transform();
-  addEnd(now);
-  if (wholeStep && !(now == before)) addEnd(before);
+  add(now);
+  if (wholeStep && !(now == before)) add(before);
   return map;
 }
 
 TreePair treesOf(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
-                 bool wholeStep) {
+                 bool wholeStep, BoxFrame frame) {
   TreePair trees{&a.tree.octree(), &b.tree.octree()};
+  if (frame == BoxFrame::Body && hasBodyMap(b, wholeStep)) {
+    trees.mapA = bodyMap(a, b, thickness, wholeStep);
+    return trees;
+  }
+  if (frame == BoxFrame::Body && b.isPlaced() && hasBodyMap(a, wholeStep)) {
+    trees.mapB = bodyMap(b, a, thickness, wholeStep);
+    return trees;
+  }
   const double scale = a.tree.frame().scale;
   const Vector3d origin = worldOrigin(b), offset = (worldOrigin(a) - origin) * scale;
   setShift(trees, {offset[0], offset[1], offset[2]}, thickness * scale);

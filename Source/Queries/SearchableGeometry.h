@@ -89,9 +89,18 @@ Eigen::Vector3d worldOrigin(const SearchableGeometry&);
 BoxMap worldMap(const SearchableGeometry&, const Eigen::Vector3d& origin, double thickness,
                 bool wholeStep);
 
+/// The frame in which a traversal compares boxes of two geometries.
+enum class BoxFrame {
+  World,  ///< candidates are defined there
+  /// If both geometries are placed, or b alone: that of a body which is placed and does not turn
+  /// while the boxes enclose the step, b's if possible. Elements within the thickness are found in
+  /// any frame. Here fewer others are, and faster, because only one geometry's boxes are mapped.
+  Body
+};
+
 /// The octrees of two geometries, whose frames have one scale, for a traversal. thickness: L.
 TreePair treesOf(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
-                 bool wholeStep);
+                 bool wholeStep, BoxFrame frame = BoxFrame::World);
 
 std::string nameOf(GeometryId);    ///< "geometry 3"
 std::string nameOf(GeometryType);  ///< "a line mesh"
