@@ -434,7 +434,7 @@ TEST(RayHits, RotationsThatStretch) {
   const Vector3d far(4e6, 1e6, -2e6);
   Mesh ball = sphere(40, 80, {0, 0, 0}, 1);
   for (Vector3d& p : ball.positions) p += far;
-  const Both both(testGeometry(ball));
+  Both both(testGeometry(ball));
   Matrix3d stretch;
   stretch << 3, 1, 0, 1, -3, 1, 0, 1, 3;
   const Matrix3d turn = Eigen::AngleAxisd(1.3, Vector3d(1, 2, 2) / 3).matrix() *
