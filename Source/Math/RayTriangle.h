@@ -46,9 +46,10 @@ std::optional<RayInterval> intersectRay(const RaySegment&, const Eigen::Vector3d
 ///
 /// Let each coordinate of a corner less the origin be at most m, with an error of at most e. The
 /// direction's largest component is 1 or -1. A projected coordinate is then at most 2 m, with an
-/// error of 2 e and of 4 roundings, together at most 3 e as e is at least 2^-46 m. The cross
+/// error of 2 e and of 5 roundings, together at most 3 e as e is at least 2^-46 m. The cross
 /// product of two such corners errs by at most 4 (2 m) (3 e) + 2 (3 e)² for that, and by 6 (2 m)²
-/// 2^-53 < e m for its own roundings: together by less than 26 e m.
+/// 2^-53 < e m for its own roundings: together by less than 32 e m if e is at most m / 4. Otherwise
+/// no product is that large.
 class LineFilter {
  public:
   /// A filter that finds nothing.

@@ -16,38 +16,36 @@ namespace palpate::HWY_NAMESPACE {
 
 constexpr std::size_t kSide = 16;  ///< elements tested together
 
-/// A ray in each lane, for boxes whose bounds are in arrays.
-template <class D>
-class RayLanes {
+/// A ray, for boxes whose bounds are in arrays.
+class BoxTest {
  public:
-  using V = hn::Vec<D>;
-
-  HWY_ATTR HWY_INLINE explicit RayLanes(const FloatRay& ray) {
-    const D d;
+  explicit BoxTest(const FloatRay& ray) {
     for (std::size_t k = 0; k < 3; ++k) {
       const float grow = std::copysign(ray.slack, ray.inverse[k]);
-      m_nearOrigin[k] = hn::Set(d, ray.origin[k] + grow);
-      m_farOrigin[k] = hn::Set(d, ray.origin[k] - grow);
-      m_inverse[k] = hn::Set(d, ray.inverse[k]);
+      m_nearOrigin[k] = ray.origin[k] + grow;
+      m_farOrigin[k] = ray.origin[k] - grow;
+      m_inverse[k] = ray.inverse[k];
     }
   }
 
-  /// Boxes that the ray is in for t in [enter, leave], or misses if enter > leave. near, far: for
-  /// each axis, the bounds at which the ray enters and leaves.
-  HWY_ATTR HWY_INLINE void intersect(const float* const (&near)[3], const float* const (&far)[3],
-                                     std::size_t i, float tMax, V& enter, V& leave) const {
-    const D d;
+  /// The ray is in the boxes from the i-th on for t in [enter, leave], or misses them if enter >
+  /// leave. near, far: for each axis, the bounds at which the ray enters and leaves.
+  template <class D, class V = hn::Vec<D>>
+  HWY_ATTR HWY_INLINE void intersect(D d, const float* const (&near)[3],
+                                     const float* const (&far)[3], std::size_t i, float tMax,
+                                     V& enter, V& leave) const {
     V first[3], last[3];
     for (std::size_t k = 0; k < 3; ++k) {
-      first[k] = (hn::LoadU(d, near[k] + i) - m_nearOrigin[k]) * m_inverse[k];
-      last[k] = (hn::LoadU(d, far[k] + i) - m_farOrigin[k]) * m_inverse[k];
+      const V inverse = hn::Set(d, m_inverse[k]);
+      first[k] = (hn::LoadU(d, near[k] + i) - hn::Set(d, m_nearOrigin[k])) * inverse;
+      last[k] = (hn::LoadU(d, far[k] + i) - hn::Set(d, m_farOrigin[k])) * inverse;
     }
     enter = hn::Max(hn::Max(hn::Zero(d), first[0]), hn::Max(first[1], first[2]));
     leave = hn::Min(hn::Min(hn::Set(d, tMax), last[0]), hn::Min(last[1], last[2]));
   }
 
  private:
-  V m_nearOrigin[3], m_farOrigin[3], m_inverse[3];
+  float m_nearOrigin[3], m_farOrigin[3], m_inverse[3];
 };
 
 /// One traversal.
@@ -57,8 +55,7 @@ class RaySearch {
                      void* context, TestElement test)
       : m_blocks(octree.blocks()),
         m_elements(elements),
-        m_nodeRay(ray),
-        m_leafRay(ray),
+        m_boxTest(ray),
         m_tMax(ray.tMax),
         m_context(context),
         m_test(test) {
@@ -111,7 +108,7 @@ class RaySearch {
       for (std::size_t i = 0; i < 8; i += kLanes) {
         const std::size_t slot = i ^ ofVector;
         hn::Vec<D> enter, leave;
-        m_nodeRay.intersect(near, far, slot, m_tMax, enter, leave);
+        m_boxTest.intersect(d, near, far, slot, m_tMax, enter, leave);
         enter = inOrder(enter);
         const auto entered = hn::Le(enter, inOrder(leave));
         const auto push = [&](const std::uint32_t* from, std::uint32_t* to) HWY_ATTR {
@@ -143,7 +140,7 @@ class RaySearch {
       std::uint32_t bits = 0;
       for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
         hn::Vec<LeafTag> enter, leave;
-        m_leafRay.intersect(m_near, m_far, first + i, m_tMax, enter, leave);
+        m_boxTest.intersect(d, m_near, m_far, first + i, m_tMax, enter, leave);
         bits |= bitsOf(d, hn::And(hn::FirstN(d, size - i), hn::Le(enter, leave))) << i;
       }
       // Without a branch for each, the tests overlap.
@@ -164,8 +161,7 @@ class RaySearch {
 
   const OctreeBlock* const m_blocks;
   const RayElements& m_elements;
-  const RayLanes<NodeTag> m_nodeRay;
-  const RayLanes<LeafTag> m_leafRay;
+  const BoxTest m_boxTest;
   const float *m_near[3], *m_far[3];         ///< bounds of elements at which the ray enters, leaves
   std::ptrdiff_t m_nearRow[3], m_farRow[3];  ///< the same in a block, from its first bound
   std::size_t m_lastOctant = 7;              ///< the octant that the ray passes last
