@@ -93,7 +93,7 @@ PointDistances::Near PointDistances::at(std::uint32_t place) const {
 
 template <class F>
 void PointDistances::forEach(std::span<const std::uint32_t> places, F&& f) const {
-  if (places.size() <= 2) {
+  if (places.size() <= 2) {  // a few are faster one by one
     for (const std::uint32_t place : places) f(at(place));
     return;
   }
