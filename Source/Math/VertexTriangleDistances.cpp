@@ -344,6 +344,7 @@ HWY_ATTR void vertexTriangleDistancesKernel(const double (&p)[3], const Triangle
   const hn::CappedTag<double, TriangleBatch::kSize> d;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d))
     Feet<hn::CappedTag<double, TriangleBatch::kSize>>(p, batch, i).store(lanes, i);
+  leaveLanes();
 }
 
 }  // namespace palpate::HWY_NAMESPACE

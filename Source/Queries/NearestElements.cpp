@@ -14,12 +14,6 @@ namespace palpate::HWY_NAMESPACE {
 
 constexpr std::size_t kSide = 16;  ///< elements tested together
 
-HWY_ATTR HWY_INLINE void leaveLanes() {
-#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
-  _mm256_zeroupper();
-#endif
-}
-
 /// The quotient clamped to [0, 1]; 0 if the divisor is not positive.
 template <class D, class V>
 HWY_ATTR HWY_INLINE V clampedQuotient(D d, V dividend, V divisor) {
@@ -161,6 +155,7 @@ class Search {
   HWY_ATTR HWY_INLINE void addElements(std::uint32_t begin, std::uint32_t end) {
     const LeafTag d;
     const FloatBox point = m_search.point.box();
+    __builtin_prefetch(m_search.ordered + begin);
     for (std::uint32_t first = begin; first < end; first += kSide) {
       const std::size_t size = std::min<std::size_t>(kSide, end - first);
       std::uint32_t bits = 0;

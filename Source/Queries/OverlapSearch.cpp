@@ -238,6 +238,7 @@ class OverlapDescent {
       if (entry & kInside) {
         for (std::uint32_t i = begin; i < end; ++i) m_elements.push_back(octree.order()[i]);
       } else {
+        __builtin_prefetch(m_search.ordered + begin);
         for (std::uint32_t i = begin; i < end; i += kSide)
           addElements(i, std::min<std::size_t>(kSide, end - i));
       }
@@ -257,9 +258,7 @@ class OverlapDescent {
     }
     testPending();
     decide(m_open);
-#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
-    _mm256_zeroupper();
-#endif
+    leaveLanes();
   }
 
  private:

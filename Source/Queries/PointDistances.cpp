@@ -93,7 +93,7 @@ PointDistances::Near PointDistances::at(std::uint32_t place) const {
 
 template <class F>
 void PointDistances::forEach(std::span<const std::uint32_t> places, F&& f) const {
-  if (places.size() <= 2) {
+  if (places.size() <= 2) {  // a few are faster one by one
     for (const std::uint32_t place : places) f(at(place));
     return;
   }
@@ -195,13 +195,19 @@ std::optional<PointDistances::Near> PointDistances::nearest(double maxDistance,
 
 void PointDistances::nearest(std::size_t k, double maxDistance, std::vector<Near>& out) const {
   out.clear();
+  bool isHeap = false;  // made when more than k elements come
   const auto isNearerThan = [&](const Near& a, const Near& b) { return isNearer(a, b); };
   search(maxDistance, k, [&](const Near& near, double most) {
     if (out.size() < k) {
       if (isWithin(near, maxDistance)) out.push_back(near);
       if (out.size() < k) return most;
-      std::make_heap(out.begin(), out.end(), isNearerThan);
-    } else if (isNearer(near, out.front())) {
+      double furthest = -kInfinity;
+      for (const Near& each : out) furthest = std::max(furthest, each.distance);
+      return std::min(most, furthest);
+    }
+    if (!isHeap) std::make_heap(out.begin(), out.end(), isNearerThan);
+    isHeap = true;
+    if (isNearer(near, out.front())) {
       std::pop_heap(out.begin(), out.end(), isNearerThan);
       out.back() = near;
       std::push_heap(out.begin(), out.end(), isNearerThan);
