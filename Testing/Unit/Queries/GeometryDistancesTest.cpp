@@ -2,6 +2,7 @@
 #include "Common/ShapeTruth.h"
 #include "Common/Solids.h"
 #include "Common/TestGeometry.h"
+#include "Core/SimdPath.h"
 #include "Unit/Math/RationalOracle.h"
 
 #include <palpate/OctreeBasedCD.h>
@@ -11,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <vector>
 
 // The least distance of two geometries: the octrees' answers are those of brute force, bit by bit,
@@ -149,7 +151,7 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForPlacedBodiesAndFarFromTheOri
 }
 
 /// Each mesh has more elements than subtrees whose elements' heights are compared. The nearest
-/// points are often vertices, which several triangles share.
+/// points are often vertices, which several triangles share. Every SIMD path gives the same answer.
 TEST(GeometryDistances, OctreesAnswerAsBruteForceForMeshesOfManyElements) {
   Random random(212);
   const auto bumpy = [](std::uint32_t rings, double height) {
@@ -180,6 +182,11 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForMeshesOfManyElements) {
       put(both.b, b, Vector3d(0.3, -5, 7) + aside, placed & 2);
       const GeometryDistance found = expectSameAnswers(both, 0.0, 10.0);
       (found.distance > 0 ? apart : touching) += 1;
+      for (const std::string& path : simdPaths()) {
+        useSimdPath(path);
+        EXPECT_TRUE(isSame(both.octree.queries().distance(both.a, both.b), found)) << path;
+      }
+      useSimdPath("");
       ASSERT_FALSE(::testing::Test::HasFailure()) << most << ' ' << placed;
     }
   }
