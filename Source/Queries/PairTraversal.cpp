@@ -145,9 +145,11 @@ class PairDescent {
   void push(float square, const Subtree& a, const Subtree& b) {
     m_entries[m_count++] = {square, a, b};
   }
+  /// Whether heights exclude any elements.
+  bool hasHeights() const { return m_lowest < std::numeric_limits<float>::infinity(); }
   /// A lower bound for the heights of a subtree's elements: the lowest one of few elements.
   HWY_ATTR float lowestOf(ElementHeights& heights, const Subtree& part) const {
-    if (!(m_lowest < std::numeric_limits<float>::infinity())) return 0.0f;
+    if (!hasHeights()) return 0.0f;
     const std::uint32_t begin = beginOf(heights.side(), part);
     if (part.end - begin <= kFew) return heights.lowest(begin, part.end);
     const BoxTag d;
@@ -252,13 +254,15 @@ class PairDescent {
       for (found.placeB = beginB; found.placeB < b.end; found.placeB += kSide) {
         const std::uint32_t sizeB = std::min<std::uint32_t>(kSide, b.end - found.placeB);
         boxesB.load(m_b.side(), found.placeB);
-        m_b.copy(found.placeB, sizeB, boxesB.heights);
+        if (hasHeights()) m_b.copy(found.placeB, sizeB, boxesB.heights);
         std::uint32_t any = 0;
         found.near.fill(0);
         for (std::uint32_t bits = rows; bits; bits &= bits - 1) {
           const auto row = static_cast<std::uint32_t>(std::countr_zero(bits));
-          any |= found.near[row] = boxesB.near(boxesA[row], sizeB, m_limit) &
-                                   boxesB.below(m_lowest, m_a[found.placeA + row]);
+          found.near[row] = boxesB.near(boxesA[row], sizeB, m_limit);
+          if (hasHeights() && found.near[row])
+            found.near[row] &= boxesB.below(m_lowest, m_a[found.placeA + row]);
+          any |= found.near[row];
         }
         if (any) setBound(m_test(m_context, found));
       }
