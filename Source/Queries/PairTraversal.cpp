@@ -163,7 +163,7 @@ class PairDescent {
   static OctreeNode childOf(const PairSide& side, const Subtree& part) {
     return part.node & kOwn ? 0 : side.octree.firstChild(part.node);
   }
-  HWY_ATTR static FloatBox boxOf(const PairSide& side, const Subtree& part) {
+  HWY_ATTR HWY_INLINE static FloatBox boxOf(const PairSide& side, const Subtree& part) {
     return BoxLanes<BoxTag>::of(side.octree.box(part.node & ~kOwn)).mapped(side.map).first();
   }
   static float sizeOf(const FloatBox& box) {
@@ -184,11 +184,15 @@ class PairDescent {
     const NodeTag d;
     for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
       const auto boxes = BoxLanes<NodeTag>::load(block, i);
-      const auto low = hn::Le(heights.lowest(d, boxes) + hn::Set(d, lowest), hn::Set(d, m_lowest));
-      if (hn::AllFalse(d, low)) continue;
+      std::uint32_t low = 0xff;
+      if (hasHeights()) {
+        low =
+            bitsOf(d, hn::Le(heights.lowest(d, boxes) + hn::Set(d, lowest), hn::Set(d, m_lowest)));
+        if (low == 0) continue;
+      }
       const auto distances = boxes.mapped(side.map).distanceFrom(other);
       hn::Store(distances, d, squares + i);
-      bits |= bitsOf(d, hn::And(low, hn::Le(distances, hn::Set(d, m_limit)))) << i;
+      bits |= (bitsOf(d, hn::Le(distances, hn::Set(d, m_limit))) & low) << i;
     }
     for (; bits; bits &= bits - 1) {
       const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
