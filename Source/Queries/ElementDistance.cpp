@@ -63,7 +63,7 @@ bool boxesMeet(const Element& a, const Element& b) {
 /// Moves the points of two elements that meet to where an edge of one crosses the other, if they
 /// are nearer to each other there.
 void moveToCrossing(const Element& a, const Element& b, ElementDistance& found) {
-  double least = (a.point(found.weightsA) - b.point(found.weightsB)).norm();
+  double least = (a.point(found.weightsA) - b.point(found.weightsB)).stableNorm();
   const auto follow = [&](const Element& edges, const Element& face, bool exchanged) {
     for (std::size_t i = 0; i < 3; ++i) {
       const Vector3d along = edges[i + 1] - edges[i];

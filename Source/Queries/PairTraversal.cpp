@@ -145,9 +145,11 @@ class PairDescent {
   void push(float square, const Subtree& a, const Subtree& b) {
     m_entries[m_count++] = {square, a, b};
   }
+  /// Whether heights exclude any elements.
+  bool hasHeights() const { return m_lowest < std::numeric_limits<float>::infinity(); }
   /// A lower bound for the heights of a subtree's elements: the lowest one of few elements.
   HWY_ATTR float lowestOf(ElementHeights& heights, const Subtree& part) const {
-    if (!(m_lowest < std::numeric_limits<float>::infinity())) return 0.0f;
+    if (!hasHeights()) return 0.0f;
     const std::uint32_t begin = beginOf(heights.side(), part);
     if (part.end - begin <= kFew) return heights.lowest(begin, part.end);
     const BoxTag d;
@@ -161,7 +163,7 @@ class PairDescent {
   static OctreeNode childOf(const PairSide& side, const Subtree& part) {
     return part.node & kOwn ? 0 : side.octree.firstChild(part.node);
   }
-  HWY_ATTR static FloatBox boxOf(const PairSide& side, const Subtree& part) {
+  HWY_ATTR HWY_INLINE static FloatBox boxOf(const PairSide& side, const Subtree& part) {
     return BoxLanes<BoxTag>::of(side.octree.box(part.node & ~kOwn)).mapped(side.map).first();
   }
   static float sizeOf(const FloatBox& box) {
@@ -182,11 +184,15 @@ class PairDescent {
     const NodeTag d;
     for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
       const auto boxes = BoxLanes<NodeTag>::load(block, i);
-      const auto low = hn::Le(heights.lowest(d, boxes) + hn::Set(d, lowest), hn::Set(d, m_lowest));
-      if (hn::AllFalse(d, low)) continue;
+      std::uint32_t low = 0xff;
+      if (hasHeights()) {
+        low =
+            bitsOf(d, hn::Le(heights.lowest(d, boxes) + hn::Set(d, lowest), hn::Set(d, m_lowest)));
+        if (low == 0) continue;
+      }
       const auto distances = boxes.mapped(side.map).distanceFrom(other);
       hn::Store(distances, d, squares + i);
-      bits |= bitsOf(d, hn::And(low, hn::Le(distances, hn::Set(d, m_limit)))) << i;
+      bits |= (bitsOf(d, hn::Le(distances, hn::Set(d, m_limit))) & low) << i;
     }
     for (; bits; bits &= bits - 1) {
       const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
@@ -252,13 +258,15 @@ class PairDescent {
       for (found.placeB = beginB; found.placeB < b.end; found.placeB += kSide) {
         const std::uint32_t sizeB = std::min<std::uint32_t>(kSide, b.end - found.placeB);
         boxesB.load(m_b.side(), found.placeB);
-        m_b.copy(found.placeB, sizeB, boxesB.heights);
+        if (hasHeights()) m_b.copy(found.placeB, sizeB, boxesB.heights);
         std::uint32_t any = 0;
         found.near.fill(0);
         for (std::uint32_t bits = rows; bits; bits &= bits - 1) {
           const auto row = static_cast<std::uint32_t>(std::countr_zero(bits));
-          any |= found.near[row] = boxesB.near(boxesA[row], sizeB, m_limit) &
-                                   boxesB.below(m_lowest, m_a[found.placeA + row]);
+          found.near[row] = boxesB.near(boxesA[row], sizeB, m_limit);
+          if (hasHeights() && found.near[row])
+            found.near[row] &= boxesB.below(m_lowest, m_a[found.placeA + row]);
+          any |= found.near[row];
         }
         if (any) setBound(m_test(m_context, found));
       }

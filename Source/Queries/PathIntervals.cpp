@@ -1,12 +1,14 @@
 #include "Queries/PathIntervals.h"
 
 #include "Exact/Compensated.h"
+#include "Exact/Predicates.h"
 #include "Queries/GeometryDistances.h"
 #include "Queries/PointDistances.h"
 #include "Queries/ShapeRays.h"
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace palpate {
 
@@ -84,6 +86,46 @@ void findPathParts(const SearchableGeometry& body, const PathLine& path, double 
     });
     for (; !backwards.empty(); backwards.pop_back()) append(backwards.back(), parts);
   }
+}
+
+void addInvertedFaces(const SearchableGeometry& solid, const PathLine& path, bool bruteForce,
+                      PointQueryStack& stack, PathScratch& scratch) {
+  const Positions& now = solid.mesh.now;
+  const TetrahedronTree& tree = solid.solid->tree;
+  const PointFrame frame(solid);
+  std::vector<PathPart>& inner = scratch.inner;
+  inner.clear();
+  SignCounts counts;
+  for (std::size_t i = 0; i < path.segments(); ++i) {
+    const Vector3d &p = path.point(i), &q = path.point(i + 1);
+    if (p == q) continue;
+    const RaySegment segment{p, q - p, 0.0, 1.0};
+    const auto addFaces = [&](const Tetrahedron& t) {
+      const Vector3d corners[] = {now[t[0]], now[t[1]], now[t[2]], now[t[3]]};
+      if (orient3d(corners[0], corners[1], corners[2], corners[3], counts) > 0) return;
+      for (const auto& [a, b, c] : {Triangle{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}})
+        if (const auto met = intersectRay(segment, corners[a], corners[b], corners[c]))
+          for (const double t : {met->first, met->last})
+            inner.push_back({path.at(i, t), path.at(i, t), kNoElement, kNoElement, false});
+    };
+    if (bruteForce) {
+      for (const Tetrahedron& t : solid.solid->topology.tetrahedra) addFaces(t);
+    } else if (tree.octree().size() > 0) {
+      FloatBox box = frame.boxOf(p);
+      box.add(frame.boxOf(q));
+      findOverlapping(tree.octree(), frame.map(), box, stack);
+      for (const std::uint32_t at : stack.found) addFaces(tree.ordered()[at]);
+    }
+  }
+  if (inner.empty()) return;
+  inner.insert(inner.end(), scratch.parts.begin(), scratch.parts.end());
+  std::sort(inner.begin(), inner.end(), [](const PathPart& a, const PathPart& b) {
+    return std::pair(a.enter, !a.isSurface) < std::pair(b.enter, !b.isSurface);
+  });
+  scratch.parts.clear();
+  for (const PathPart& part : inner)
+    if (part.isSurface || scratch.parts.empty() || part.enter > scratch.parts.back().leave)
+      scratch.parts.push_back(part);
 }
 
 void findPathParts(const Shape& shape, const PathLine& path, double radius,

@@ -36,16 +36,18 @@ class PathLine {
   std::vector<double>& m_lengths;
 };
 
-/// A part of a path in which the ball meets a body's surface. Arc lengths in L.
+/// A part of a path in which the ball meets a body's surface, or a place where the path may enter
+/// or leave the body without meeting its surface. Arc lengths in L.
 struct PathPart {
   double enter, leave;
   std::uint32_t entry, exit;  ///< elements
+  bool isSurface = true;
 };
 
 /// Scratch of one path query.
 struct PathScratch {
   std::vector<double> lengths;
-  std::vector<PathPart> parts, backwards;
+  std::vector<PathPart> parts, backwards, inner;
   std::vector<PathInterval> inside;
   std::vector<PathClearance> outside;
   std::vector<std::uint32_t> order;  ///< of `inside`
@@ -58,9 +60,17 @@ void findPathParts(const SearchableGeometry& body, const PathLine&, double radiu
 /// The same for a shape. Its inside belongs to the parts.
 void findPathParts(const Shape&, const PathLine&, double radius, std::vector<PathPart>& parts);
 
+/// Adds the places where the path meets faces of tetrahedra whose volume is not positive to
+/// scratch.parts. The union of the tetrahedra may end at a face within the mesh where both its
+/// neighbours lie on one side of it. The signs of their volumes then differ. The octree over the
+/// tetrahedra must be up to date.
+void addInvertedFaces(const SearchableGeometry& solid, const PathLine&, bool bruteForce,
+                      PointQueryStack&, PathScratch&);
+
 /// Joins parts to the intervals in which the ball is in the body, and appends them.
 ///
-/// surfaceIsInside: parts belong to the intervals, else only what lies between them does. contains:
+/// surfaceIsInside: parts of the surface belong to the intervals, else only what lies between parts
+/// does. contains:
 /// whether a point of the path between two parts is in the body.
 template <class Contains>
 void joinPathParts(GeometryId body, const PathLine& path, std::span<const PathPart> parts,
@@ -82,7 +92,7 @@ void joinPathParts(GeometryId body, const PathLine& path, std::span<const PathPa
       add(from, to, isFirst ? kNoElement : parts[i - 1].exit, isLast ? kNoElement : parts[i].entry);
     else if (from < to || !surfaceIsInside)
       isOpen = false;
-    if (!isLast && surfaceIsInside)
+    if (!isLast && surfaceIsInside && parts[i].isSurface)
       add(parts[i].enter, parts[i].leave, parts[i].enter > 0.0 ? parts[i].entry : kNoElement,
           parts[i].leave < path.length() ? parts[i].exit : kNoElement);
   }

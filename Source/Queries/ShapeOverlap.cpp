@@ -39,7 +39,7 @@ bool meets(const TriangleMesh& mesh, const Triangle& corners, const Shape& shape
   const auto at = [&](std::size_t i) { return mesh.now[corners[i % 3]]; };
   if (shape.hasCorners() && shape.faces().size() > 1 && mesh.largestRadius == 0.0)
     return meetsHull({at(0), at(1), at(2)}, shape);
-  if (corners[0] == corners[1])
+  if (corners[0] == corners[1] && corners[1] == corners[2])
     return shape.signedDistance(at(0)).distance <= mesh.radius(corners[0]);
   for (std::size_t i = 0; i < 3; ++i) {
     if (corners[i] == corners[(i + 1) % 3]) continue;  // {p, q, q} is a segment

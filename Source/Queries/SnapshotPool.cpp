@@ -2,8 +2,12 @@
 
 #include <palpate/Error.h>
 
+#include "Core/FloatingPoint.h"
+#include "Core/Text.h"
+
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
@@ -176,8 +180,9 @@ void SnapshotPool::reclaim(const SpatialQueries::Source& frame) {
 }
 
 SnapshotPool::Slot& SnapshotPool::freeSlot() {
+  // A slot that became free after reclaim() still has its copies.
   for (const auto& slot : m_slots)
-    if (slot->isFree()) return *slot;
+    if (slot->isFree() && slot->geometries().empty()) return *slot;
   m_slots.push_back(std::make_unique<Slot>(m_scratch));
   return *m_slots.back();
 }
@@ -267,10 +272,15 @@ Eigen::Vector3d Snapshot::position(GeometryId id, std::uint32_t vertex, double t
                 nameOf(id) + ": vertex " + std::to_string(vertex) +
                     " is out of range; the geometry has " + std::to_string(size) + " vertices",
                 id, vertex);
-  const Eigen::Vector3d now = geometry.mesh.now[vertex];
-  if (time == 1.0) return now;
-  const Eigen::Vector3d before = geometry.mesh.before[vertex];
-  return before + time * (now - before);
+  if (!std::isfinite(time))
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(id) + ": time is " + textOf(time) + "; it must be finite", id);
+  const StandardFloatingPoint standard;
+  const Eigen::Vector3d now = geometry.mesh.now[vertex], before = geometry.mesh.before[vertex];
+  if (time == 0.0 || time == 1.0) return time == 0.0 ? before : now;
+  const Eigen::Vector3d motion = now - before;
+  if (motion.allFinite()) return before + time * motion;
+  return (1.0 - time) * before + time * now;
 }
 
 }  // namespace palpate

@@ -571,6 +571,7 @@ void SpatialQueries::path(std::span<const Eigen::Vector3d> polyline, double radi
       findPathParts(body.shape->now, path, radius, found.parts);
     else
       findPathParts(body, path, radius, bruteForce, scratch->met, found);
+    if (isBody && body.solid) addInvertedFaces(body, path, bruteForce, scratch->stack, found);
     const std::size_t before = found.inside.size();
     joinPathParts(
         id, path, found.parts, radius > 0.0 || !isBody,

@@ -46,9 +46,9 @@ class PALPATE_EXPORT Snapshot {
   /// The poses at both ends of the step, as setTransform() set them.
   ShapeMotion motion(GeometryId) const;
   /// L, in the world: where a vertex is on the straight line of its step. time: 0 for the start of
-  /// the step, 1 for its end; larger times extrapolate.
+  /// the step, 1 for its end; other times extrapolate.
   ///
-  /// Errors   IndexOutOfRange.
+  /// Errors   IndexOutOfRange; InvalidSettings for a time that is not finite.
   Eigen::Vector3d position(GeometryId, std::uint32_t vertex, double time = 1.0) const;
 
   /// For OctreeBasedCD::publish() only.

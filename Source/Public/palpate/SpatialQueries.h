@@ -58,7 +58,9 @@ struct RayHit {
   double t;
   bool frontFace;  ///< whether the ray comes against the winding normal
   /// Whether the ray changes from one side of the surface to the other. From inside a closed mesh
-  /// the number of such hits is odd, if the winding number there is odd.
+  /// the number of such hits is odd, if the winding number there is odd. A hit at tMin or tMax
+  /// crosses if the endless ray does. If tMin or tMax cuts a part in which the ray lies in the
+  /// surface, only the elements within the range count.
   bool crosses;
 };
 

@@ -2,6 +2,7 @@
 #include "Common/ShapeTruth.h"
 #include "Common/Solids.h"
 #include "Common/TestGeometry.h"
+#include "Core/SimdPath.h"
 #include "Unit/Math/RationalOracle.h"
 
 #include <palpate/OctreeBasedCD.h>
@@ -11,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <vector>
 
 // The least distance of two geometries: the octrees' answers are those of brute force, bit by bit,
@@ -149,7 +151,7 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForPlacedBodiesAndFarFromTheOri
 }
 
 /// Each mesh has more elements than subtrees whose elements' heights are compared. The nearest
-/// points are often vertices, which several triangles share.
+/// points are often vertices, which several triangles share. Every SIMD path gives the same answer.
 TEST(GeometryDistances, OctreesAnswerAsBruteForceForMeshesOfManyElements) {
   Random random(212);
   const auto bumpy = [](std::uint32_t rings, double height) {
@@ -180,6 +182,11 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForMeshesOfManyElements) {
       put(both.b, b, Vector3d(0.3, -5, 7) + aside, placed & 2);
       const GeometryDistance found = expectSameAnswers(both, 0.0, 10.0);
       (found.distance > 0 ? apart : touching) += 1;
+      for (const std::string& path : simdPaths()) {
+        useSimdPath(path);
+        EXPECT_TRUE(isSame(both.octree.queries().distance(both.a, both.b), found)) << path;
+      }
+      useSimdPath("");
       ASSERT_FALSE(::testing::Test::HasFailure()) << most << ' ' << placed;
     }
   }
@@ -359,6 +366,20 @@ TEST(GeometryDistances, WitnessesLieOnBothWherePlanesCoincide) {
   const GeometryDistance found = expectSameAnswers(Both(a, b), 0.0, 100.0);
   EXPECT_EQ(found.distance, 0.0);
   EXPECT_LE(found.a.position[0], 2.0);
+}
+
+TEST(GeometryDistances, WitnessesMeetAtAnyScale) {
+  for (const double scale : {1e-305, 1e-200, 1e-163, 1.0, 1e150, 1e300}) {
+    OctreeBasedCD collisions({.threads = 1});
+    const Triangle triangle{0, 1, 2};
+    const std::vector<Vector3d> a{{0, 0, 0}, {4 * scale, 0, 0}, {0, 4 * scale, 0}},
+        b{{scale, scale, -scale}, {scale, scale, 2 * scale}, {3 * scale, 3 * scale, 2 * scale}};
+    const GeometryId first = collisions.addTriangleMesh(a, {&triangle, 1}),
+                     second = collisions.addTriangleMesh(b, {&triangle, 1});
+    const GeometryDistance found = collisions.queries().distance(first, second);
+    EXPECT_EQ(found.distance, 0.0) << scale;
+    EXPECT_LT((found.a.position - found.b.position).cwiseAbs().maxCoeff(), 1e-12 * scale) << scale;
+  }
 }
 
 TEST(GeometryDistances, TiesGoToTheLowestElements) {

@@ -264,6 +264,33 @@ TEST(Path, AgreesWithSamplesForTetrahedralMeshes) {
   }
 }
 
+/// Inverted tetrahedra, where bodies also end at faces within the mesh.
+TEST(Path, AgreesWithSamplesForFoldedTetrahedralMeshes) {
+  Random random(303);
+  const Solid solid = cells(2, random, [](const auto&) { return true; });
+  std::size_t withoutElement = 0;
+  for (int round = 0; round < 60; ++round) {
+    Scene scene;
+    const GeometryId body = scene.addBy([&](OctreeBasedCD& each) {
+      return each.addTetrahedralMesh(solid.positions, solid.tetrahedra);
+    });
+    Positions folded = solid.positions;
+    for (Vector3d& p : folded)
+      if (uniform(random, 0, 1) < 0.4) p += randomPoint(random, -1.5, 1.5);
+    scene.change([&](OctreeBasedCD& each) { each.setPositions(body, folded); });
+    for (int i = 0; i < 4; ++i) {
+      const Positions path{randomPoint(random, -2, 4), randomPoint(random, 0, 2),
+                           randomPoint(random, -2, 4)};
+      const Answer found =
+          expectSamples(scene, body, true, path, i % 2 ? 0.0 : uniform(random, 0, 0.05));
+      for (const PathInterval& interval : found.inside)
+        withoutElement += interval.enter > 0 && interval.entryElement == kNoElement;
+    }
+    ASSERT_FALSE(::testing::Test::HasFailure()) << round;
+  }
+  EXPECT_GT(withoutElement, 0u);
+}
+
 TEST(Path, AgreesWithSamplesForPlacedBodiesAndFarFromTheOrigin) {
   Random random(303);
   const TestGeometry ball = testGeometry(sphere(10, 14, {0.5, 0.5, 0.5}, 0.4));

@@ -381,6 +381,40 @@ TEST(RayHits, DirectionsOfAnyLength) {
   EXPECT_GE(hits, leastOf(10));
 }
 
+/// Rays through a cube with exact parameters, cut at each hit: on faces, edges and corners. No ray
+/// lies in a face.
+TEST(RayHits, CrossAtTheEndsOfTheRangeAsTheEndlessRay) {
+  TestGeometry cube;
+  for (int i = 0; i < 8; ++i) cube.positions.emplace_back(4 * (i & 1), 2 * (i & 2), i & 4);
+  cube.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  const Both both(cube);
+  std::size_t crossing = 0, touching = 0;
+  const Vector3d directions[] = {{1, 0, 0},  {0, -1, 0}, {0, 1, 1},
+                                 {1, 0, -1}, {1, 1, 1},  {-1, 1, 1}};
+  for (const Vector3d& direction : directions)
+    for (int i = 0; i < 125; ++i) {
+      const Vector3d through(i % 5, i / 5 % 5, i / 25);
+      bool isInFace = false;
+      for (int k = 0; k < 3; ++k)
+        isInFace |= direction[k] == 0 && (through[k] == 0 || through[k] == 4);
+      if (isInFace) continue;
+      const std::vector<RayHit> all = consistentHits(both, {through, direction, -8.0});
+      for (const RayHit& hit : all) {
+        (hit.crosses ? crossing : touching) += 1;
+        const std::vector<RayHit> from = consistentHits(both, {through, direction, hit.t}),
+                                  to = consistentHits(both, {through, direction, -8.0, hit.t});
+        ASSERT_FALSE(from.empty() || to.empty());
+        for (const RayHit& cut : {from.front(), to.back()}) {
+          EXPECT_EQ(cut.t, hit.t);
+          EXPECT_EQ(cut.crosses, hit.crosses) << through << '\n' << direction;
+        }
+      }
+    }
+  EXPECT_GT(crossing, 400u);
+  EXPECT_GT(touching, 20u);
+}
+
 /// Meshes and directions in denormal numbers, and in huge ones.
 TEST(RayHits, AnyMagnitude) {
   Random random(206);

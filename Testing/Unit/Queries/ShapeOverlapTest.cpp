@@ -323,6 +323,31 @@ double least(F&& f) {
   return std::min({f(0.0), f(1.0), f(0.5 * (low + high))});
 }
 
+/// Triangles with a vertex twice are segments, whichever vertex it is.
+TEST(ShapeOverlap, TrianglesWithAVertexTwiceAreSegments) {
+  const std::vector<Vector3d> ends{{0, 0, 0}, {10, 0, 0}};
+  const AnalyticalGeometry shapes[] = {Sphere{{5, 0, 0}, 1},
+                                       Capsule{{5, -3, 0}, {5, 3, 0}, 0.5},
+                                       Plane{{5, 0, 0}, {1, 0, 0}, true},
+                                       Box{{5, 0, 0}, {1, 1, 1}},
+                                       Box{{5, 0, 0}, {0, 1, 0}},
+                                       Cylinder{{5, -3, 0}, {5, 3, 0}, 0.5},
+                                       ConvexHull{{{5, -1, 0}, {5, 1, 0}}}};
+  for (const Engine engine : {Engine::Octree, Engine::BruteForce})
+    for (const Triangle& triangle :
+         {Triangle{0, 0, 1}, {0, 1, 0}, {1, 0, 0}, {0, 1, 1}, {1, 0, 1}, {1, 1, 0}}) {
+      OctreeBasedCD collisions({.engine = engine, .threads = 1});
+      const GeometryId mesh = collisions.addTriangleMesh(ends, {&triangle, 1});
+      for (const AnalyticalGeometry& shape : shapes) {
+        std::vector<std::uint32_t> found;
+        collisions.queries().overlapping(mesh, shape, Eigen::Matrix3d::Identity(), Vector3d::Zero(),
+                                         found);
+        EXPECT_EQ(found.size(), 1u)
+            << shape.index() << ": " << triangle[0] << triangle[1] << triangle[2];
+      }
+    }
+}
+
 TEST(ShapeOverlap, PlanesAndCylinders) {
   Random random(505);
   const TestGeometry geometries[] = {testGeometry(soup(random, 40, 0.15)),

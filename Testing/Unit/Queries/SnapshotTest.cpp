@@ -12,7 +12,9 @@
 
 #include <atomic>
 #include <bit>
+#include <cfenv>
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -219,9 +221,14 @@ class TestSource : public SpatialQueries::Source {
   }
   void remove(std::size_t i) { m_geometries.erase(m_geometries.begin() + i); }
 
+  mutable std::function<void()> onCount;  ///< called once, by geometryCount()
+
   std::uint64_t state() const override { return 1; }
   SearchableGeometry& at(GeometryId) const override { return *m_geometries.front(); }
-  std::size_t geometryCount() const override { return m_geometries.size(); }
+  std::size_t geometryCount() const override {
+    if (onCount) std::exchange(onCount, nullptr)();
+    return m_geometries.size();
+  }
   SearchableGeometry& geometry(std::size_t i) const override { return *m_geometries[i]; }
   std::uint64_t step() const override { return 1; }
   Engine engine() const override { return Engine::Octree; }
@@ -265,6 +272,44 @@ TEST(Snapshot, SharesCopiesAndReusesMemory) {
   held = {take(1)};
   EXPECT_EQ(pool->copyCount(), 5u + 1u);  // `same` has the removed geometry
   EXPECT_TRUE(same->contains(GeometryId{1}));
+}
+
+/// The last reader of a snapshot lets go while the next snapshot is made.
+TEST(Snapshot, TakesNoSlotThatBecomesFreeMeanwhile) {
+  const Mesh ball = sphere(6, 8, {0, 0, 0}, 1);
+  TestSource source;
+  source.add(ball);
+  const auto pool = std::make_shared<SnapshotPool>();
+  auto old = pool->take(source, 0);
+  Positions moved = ball.positions;
+  moved[0].z() = 2;
+  source.move(0, moved);
+  source.onCount = [&] { old.reset(); };
+  const auto next = pool->take(source, 1);
+  ASSERT_EQ(old, nullptr);
+  EXPECT_EQ(next->positions(GeometryId{0})[0].z(), 2);
+  EXPECT_EQ(pool->slotCount(), 2u);
+  EXPECT_EQ(pool->take(source, 2)->positions(GeometryId{0})[0].z(), 2);
+  EXPECT_EQ(pool->slotCount(), 2u);
+}
+
+TEST(Snapshot, PositionsStayFiniteAndInAnyRoundingMode) {
+  OctreeBasedCD collisions;
+  const std::vector<Eigen::Vector3d> before{{-1e308, 0, 0}}, now{{1e308, 0.7, 0}};
+  const GeometryId points = collisions.addPointSet(before);
+  collisions.advance();
+  collisions.setPositions(points, now);
+  collisions.publish();
+  const auto snapshot = collisions.latestSnapshot();
+  EXPECT_EQ(snapshot->position(points, 0, 0.0), before[0]);
+  EXPECT_EQ(snapshot->position(points, 0, 0.5), Eigen::Vector3d(0, 0.35, 0));
+  const Eigen::Vector3d nearest = snapshot->position(points, 0, 0.3);
+  std::fesetround(FE_UPWARD);
+  const Eigen::Vector3d upward = snapshot->position(points, 0, 0.3);
+  std::fesetround(FE_TONEAREST);
+  EXPECT_EQ(upward, nearest);
+  expectRefused(ErrorCode::InvalidSettings, "time is inf",
+                [&] { (void)snapshot->position(points, 0, kInfinity); });
 }
 
 TEST(Snapshot, HasTheMotionOfItsStep) {
