@@ -185,6 +185,8 @@ TEST(Rigid, TrianglesMatchSetPositions) {
   all.push_back({Method::Auto, 0.0});
   all.push_back({Method::Auto, 0.03});
   all.push_back({Method::Auto, 0.2, Contacts::Distinct, 0.4});
+  // Features that pass at more than the thickness are contacts, too.
+  all.push_back({.method = Method::Continuous, .thickness = 0.03, .timeTolerance = 0.5});
   for (const PairSettings& pair : all)
     for (const Way way : kWays) {
       SCOPED_TRACE(::testing::Message() << "method " << int(pair.method) << " way " << int(way)
@@ -259,6 +261,31 @@ TEST(Rigid, VerticesFarAwayMatchSetPositions) {
     expectAsPositions(random, body, other, {Method::Proximity, 0.05, Contacts::All}, {Way::Small});
     expectAsPositions(random, body, other, {Method::Continuous, 0.0}, {Way::Small});
   }
+}
+
+/// Two bodies in one frame, with all vertices in one of its planes. The product of their rotations
+/// is the identity but for rounding, which moves vertices out of the plane by more than their boxes
+/// are thick.
+TEST(Rigid, FlatBodiesTouchInOneFrame) {
+  Random random(8);
+  TestGeometry body = testGeometry(sheet(4, 0.0, 0.0));
+  for (Vector3d& p : body.positions) p = {0, 1000 * p[1] - 500, 1000 * p[0] - 500};
+  for (const Method method : {Method::Intersection, Method::Continuous})
+    for (int repeat = 0; repeat < 20; ++repeat) {
+      const Place place = somewhere(random);
+      std::vector<Rows> rows;
+      for (const Engine engine : {Engine::BruteForce, Engine::Octree}) {
+        OctreeBasedCD collisions(settingsOf(engine));
+        const GeometryId a = body.addTo(collisions), b = body.addTo(collisions);
+        collisions.addCollisionPair(a, b, {method, 0.0});
+        for (const GeometryId id : {a, b})
+          collisions.setTransform(id, place.rotation, 0 * place.translation);
+        collisions.detectCollision();
+        rows.emplace_back(collisions.collisionData(a, b));
+      }
+      EXPECT_GT(rows[0].contacts(), 0u);
+      expectSameRows(rows[1], rows[0]);
+    }
 }
 
 TEST(Rigid, OctreeIsNotUpdated) {
