@@ -41,6 +41,8 @@ bool reportsOnlyTouching(const PairRecord& record) {
          record.a->mesh.topology.hasFaces() && record.meshes().maxFeatureDistance() == 0.0;
 }
 
+bool arePlaced(const PairRecord& record) { return record.a->isPlaced() && record.b->isPlaced(); }
+
 double boxThickness(const PairRecord& record) {
   return record.plan.method == Method::Intersection ? 0.0 : record.meshes().maxFeatureDistance();
 }
@@ -302,7 +304,7 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads, 
     const TreePair trees =
         treesOf(*record, adjacentPairs, unfolded,
                 searches ? std::max(thickness, record->plan.searchDistance) : thickness,
-                searches || !record->b->isPlaced() ? BoxFrame::World : frame);
+                searches || !arePlaced(*record) ? BoxFrame::World : frame);
     const bool shared = threads.count() > 1 && trianglesOf(*record) >= kSharedSize;
     startPairs(trees, shared ? kNodePairsWanted : 1, m_stack);
     const std::size_t first = m_nodePairs.size(), count = m_stack.pairs.size();

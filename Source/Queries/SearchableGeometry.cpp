@@ -6,6 +6,7 @@
 
 #include <Eigen/LU>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 
@@ -25,11 +26,26 @@ void addEnd(BoxMap& map, const Matrix3d& rotation, const Vector3d& offset, doubl
   setEnd(map.ends[map.count++], matrix, {offset[0], offset[1], offset[2]}, thickness, error);
 }
 
-/// Whether bodyMap() can be used. If b turns in the step, positions move on curves in its body. If
-/// a position of b is clamped, b's boxes may not enclose it, and only a map makes them infinite.
-bool hasBodyMap(const SearchableGeometry& b, bool wholeStep) {
-  return b.isPlaced() && b.tree.octree().isBuilt() && !b.tree.octree().box(0).mayBeClamped() &&
-         (!wholeStep || b.mesh.now.transform().rotation == b.mesh.before.transform().rotation);
+/// L: the largest coordinate of an octree's boxes about the origin of its frame.
+double reachOf(const GeometryOctree& tree) {
+  const FloatBox box = tree.octree().box(0);
+  float reach = 0;
+  for (int k = 0; k < 3; ++k) reach = std::max({reach, -box.lower[k], box.upper[k]});
+  return reach / tree.frame().scale;
+}
+
+/// Whether rounding errors of the furthest vertices are much smaller than most boxes. It implies
+/// that no position is clamped to the range of floats.
+bool isCompact(const GeometryOctree& tree) {
+  return tree.octree().isBuilt() && reachOf(tree) <= 0x1p20 * tree.spread();
+}
+
+/// Whether bodyMap() can be used. If b turns in the step, positions move on curves in its body.
+bool hasBodyMap(const SearchableGeometry& a, const SearchableGeometry& b, bool wholeStep) {
+  const Positions &now = b.mesh.now, &before = b.mesh.before;
+  return a.isPlaced() && b.isPlaced() &&
+         (!wholeStep || now.transform().rotation == before.transform().rotation) &&
+         isCompact(a.tree) && isCompact(b.tree);
 }
 
 /// The map from boxes of a's octree into the frame of b's octree. A position p of the world is at
@@ -39,24 +55,26 @@ bool hasBodyMap(const SearchableGeometry& b, bool wholeStep) {
 /// a therefore move in straight lines in b's body, too, and the boxes of both ends enclose them.
 ///
 /// Rounding. Let u be 2^-53, and |x| the largest coordinate of x. A and B are the origins of the
-/// two float frames, s and t the translations of a and b. The magnitudes in a row of a rotation sum
-/// up to sqrt(3) at most. In b's body
-///   vertices of a are off by at most 7 u (sqrt(3) |A| + |s|): 4 u of the same sum in the world;
-///   vertices of b are off by at most 7 u (sqrt(3) |B| + |t|);
-///   the offset is off by at most 40 u (sqrt(3) |A| + |s| + |t|) + u |B|.
-/// Together this is less than 128 u = 4 kPlacedError times 2 |A| + 2 |B| + |s| + |t|. The errors of
-/// vertices also grow with their coordinates in the float frames, by 2^-49 of these. For that,
-/// OutwardRounding and BoxMap have room. The length of a row of the inverse exceeds 1 by less than
-/// kOrthonormal. So does the thickness along an axis of b's body.
+/// two float frames, and the reaches r and q of the boxes are about them. s and t are the
+/// translations of a and b. The magnitudes in a row of a rotation sum up to sqrt(3) at most. In b's
+/// body, errors are at most
+///   7 u (sqrt(3) (|A| + r) + |s|)        of a's vertices, 4 u of the same in the world;
+///   7 u (sqrt(3) (|B| + q) + |t|)        of b's vertices;
+///   75 u r                               of the product of both rotations, 25 u an entry;
+///   50 u (sqrt(3) |A| + |s| + |t|) + u |B|   of the offset.
+/// Together they are less than 128 u = 4 kPlacedError times 2 (|A| + r + |B| + q) + |s| + |t|. The
+/// length of a row of the inverse exceeds 1 by less than kOrthonormal. So does the thickness along
+/// an axis of b's body.
 BoxMap bodyMap(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
                bool wholeStep) {
   const FloatFrame &from = a.tree.frame(), &to = b.tree.frame();
+  const auto largest = [](const Vector3d& v) { return v.cwiseAbs().maxCoeff(); };
+  const double sizes =
+      2.0 * (largest(from.origin) + reachOf(a.tree) + largest(to.origin) + reachOf(b.tree));
   const Matrix3d inverse = b.mesh.now.transform().rotation.inverse();
   BoxMap map;
   const auto add = [&](const RigidTransform& ofA, const RigidTransform& ofB) {
-    const auto largest = [](const Vector3d& v) { return v.cwiseAbs().maxCoeff(); };
-    const double size = 2.0 * (largest(from.origin) + largest(to.origin)) +
-                        largest(ofA.translation) + largest(ofB.translation);
+    const double size = sizes + largest(ofA.translation) + largest(ofB.translation);
     addEnd(map, inverse * ofA.rotation,
            (inverse * (ofA(from.origin) - ofB.translation) - to.origin) * to.scale,
            thickness * (1.0 + kOrthonormal) * to.scale, 4.0 * kPlacedError * size * to.scale);
@@ -100,11 +118,11 @@ BoxMap worldMap(const SearchableGeometry& geometry, const Vector3d& origin, doub
 TreePair treesOf(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
                  bool wholeStep, BoxFrame frame) {
   TreePair trees{&a.tree.octree(), &b.tree.octree()};
-  if (frame == BoxFrame::Body && hasBodyMap(b, wholeStep)) {
+  if (frame == BoxFrame::Body && hasBodyMap(a, b, wholeStep)) {
     trees.mapA = bodyMap(a, b, thickness, wholeStep);
     return trees;
   }
-  if (frame == BoxFrame::Body && b.isPlaced() && hasBodyMap(a, wholeStep)) {
+  if (frame == BoxFrame::Body && hasBodyMap(b, a, wholeStep)) {
     trees.mapB = bodyMap(b, a, thickness, wholeStep);
     return trees;
   }

@@ -92,9 +92,9 @@ BoxMap worldMap(const SearchableGeometry&, const Eigen::Vector3d& origin, double
 /// The frame in which a traversal compares boxes of two geometries.
 enum class BoxFrame {
   World,  ///< candidates are defined there
-  /// If both geometries are placed, or b alone: that of a body which is placed and does not turn
-  /// while the boxes enclose the step, b's if possible. Elements within the thickness are found in
-  /// any frame. Here fewer others are, and faster, because only one geometry's boxes are mapped.
+  /// If both are placed: that of a body which does not turn while boxes enclose the step, b's if
+  /// possible; else the world. Elements within the thickness are found in any frame. Here fewer
+  /// others are, and faster, because only one geometry's boxes are mapped.
   Body
 };
 

@@ -261,6 +261,68 @@ TEST(Rigid, VerticesFarAwayMatchSetPositions) {
   }
 }
 
+/// Two bodies in one frame, with all vertices in one of its planes. The product of their rotations
+/// is the identity but for rounding, which moves vertices out of the plane by more than their boxes
+/// are thick.
+TEST(Rigid, FlatBodiesTouchInOneFrame) {
+  Random random(8);
+  TestGeometry body = testGeometry(sheet(4, 0.0, 0.0));
+  for (Vector3d& p : body.positions) p = {0, 1000 * p[1] - 500, 1000 * p[0] - 500};
+  for (const Method method : {Method::Intersection, Method::Continuous})
+    for (int repeat = 0; repeat < 20; ++repeat) {
+      const Place place = somewhere(random);
+      std::vector<Rows> rows;
+      for (const Engine engine : {Engine::BruteForce, Engine::Octree}) {
+        OctreeBasedCD collisions(settingsOf(engine));
+        const GeometryId a = body.addTo(collisions), b = body.addTo(collisions);
+        collisions.addCollisionPair(a, b, {method, 0.0});
+        for (const GeometryId id : {a, b})
+          collisions.setTransform(id, place.rotation, 0 * place.translation);
+        collisions.detectCollision();
+        rows.emplace_back(collisions.collisionData(a, b));
+      }
+      EXPECT_GT(rows[0].contacts(), 0u);
+      expectSameRows(rows[1], rows[0]);
+    }
+}
+
+/// With a large time tolerance, Continuous also reports features that pass at more than the
+/// thickness. Whether it does must not depend on the frame in which boxes are compared.
+TEST(Rigid, NearMissesMatchBruteForce) {
+  Random random(9);
+  PairSettings pair{Method::Continuous, 0.01, Contacts::All};
+  pair.timeTolerance = 0.5;
+  std::size_t contacts = 0;
+  for (int repeat = 0; repeat < 150; ++repeat) {
+    const TestGeometry first = testGeometry(soup(random, 60, 0.3)),
+                       second = testGeometry(soup(random, 60, 0.3));
+    const Place still = somewhere(random), before = somewhere(random),
+                now = before.then(randomPoint(random, -1, 1), uniform(random, 0, 1),
+                                  before({0.5, 0.5, 0.5}), randomPoint(random, -0.3, 0.3));
+    for (const bool secondMoves : {true, false}) {
+      std::vector<Rows> rows;
+      for (const Engine engine : {Engine::BruteForce, Engine::Octree}) {
+        OctreeBasedCD collisions(settingsOf(engine));
+        const GeometryId a = first.addTo(collisions), b = second.addTo(collisions);
+        collisions.addCollisionPair(a, b, pair);
+        const Place atStart[] = {secondMoves ? still : before, secondMoves ? before : still},
+                    atEnd[] = {secondMoves ? still : now, secondMoves ? now : still};
+        for (const GeometryId id : {a, b}) {
+          const std::size_t i = id == b;
+          collisions.setTransform(id, atStart[i].rotation, atStart[i].translation,
+                                  atEnd[i].rotation, atEnd[i].translation);
+        }
+        collisions.detectCollision();
+        rows.emplace_back(collisions.collisionData(a, b));
+      }
+      contacts += rows[0].contacts();
+      expectSameRows(rows[1], rows[0]);
+      if (HasFailure()) return;
+    }
+  }
+  EXPECT_GT(contacts, 10000u);
+}
+
 TEST(Rigid, OctreeIsNotUpdated) {
   Random random(6);
   const TestGeometry bone = testGeometry(sphere(40, 50, {0.5, 0.5, 0.5}, 0.4)),
