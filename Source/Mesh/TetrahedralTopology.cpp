@@ -93,13 +93,13 @@ TetrahedralTopology topologyOf(std::span<const Eigen::Vector3d> rest,
                                std::span<const Tetrahedron> tetrahedra,
                                std::optional<OverusedFace>& fault) {
   const std::vector<std::uint32_t> beyond = opposites(tetrahedra, fault);
-  TetrahedralTopology topology{{tetrahedra.begin(), tetrahedra.end()}, {}, {}};
+  TetrahedralTopology topology{{tetrahedra.begin(), tetrahedra.end()}, {}, {}, {}};
   if (fault) return topology;
-  const std::vector<bool> positive = findOrientations(rest, tetrahedra, beyond);
+  topology.isPositive = findOrientations(rest, tetrahedra, beyond);
   for (std::uint32_t side = 0; side < beyond.size(); ++side) {
     if (beyond[side] != kNone) continue;
     Triangle& face = topology.surface.emplace_back(faceOf(tetrahedra[side / 4], side % 4));
-    if (!positive[side / 4]) std::swap(face[1], face[2]);
+    if (!topology.isPositive[side / 4]) std::swap(face[1], face[2]);
     topology.surfaceOwner.push_back(side / 4);
   }
   return topology;

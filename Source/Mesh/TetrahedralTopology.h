@@ -25,6 +25,9 @@ struct TetrahedralTopology {
   std::vector<Tetrahedron> tetrahedra;      ///< as given
   std::vector<Triangle> surface;            ///< see TetrahedralSurface
   std::vector<std::uint32_t> surfaceOwner;  ///< the tetrahedron of each surface triangle, ascending
+  /// For each tetrahedron, whether its volume at rest is positive. One without volume has the sign
+  /// that fits its neighbours.
+  std::vector<bool> isPositive;
 };
 
 /// A face that more than two tetrahedra share: its vertices, ascending, and the first three

@@ -5,6 +5,7 @@
 #include "Queries/GeometryDistances.h"
 #include "Queries/PointDistances.h"
 #include "Queries/ShapeRays.h"
+#include "Queries/VertexSearch.h"
 
 #include <algorithm>
 #include <cmath>
@@ -91,6 +92,7 @@ void findPathParts(const SearchableGeometry& body, const PathLine& path, double 
 void addInvertedFaces(const SearchableGeometry& solid, const PathLine& path, bool bruteForce,
                       PointQueryStack& stack, PathScratch& scratch) {
   const Positions& now = solid.mesh.now;
+  const TetrahedralTopology& topology = solid.solid->topology;
   const TetrahedronTree& tree = solid.solid->tree;
   const PointFrame frame(solid);
   std::vector<PathPart>& inner = scratch.inner;
@@ -100,21 +102,23 @@ void addInvertedFaces(const SearchableGeometry& solid, const PathLine& path, boo
     const Vector3d &p = path.point(i), &q = path.point(i + 1);
     if (p == q) continue;
     const RaySegment segment{p, q - p, 0.0, 1.0};
-    const auto addFaces = [&](const Tetrahedron& t) {
+    const auto addFaces = [&](std::size_t tetrahedron) {
+      const Tetrahedron& t = topology.tetrahedra[tetrahedron];
       const Vector3d corners[] = {now[t[0]], now[t[1]], now[t[2]], now[t[3]]};
-      if (orient3d(corners[0], corners[1], corners[2], corners[3], counts) > 0) return;
+      const int sign = orient3d(corners[0], corners[1], corners[2], corners[3], counts);
+      if (sign == (topology.isPositive[tetrahedron] ? 1 : -1)) return;
       for (const auto& [a, b, c] : {Triangle{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}})
         if (const auto met = intersectRay(segment, corners[a], corners[b], corners[c]))
-          for (const double t : {met->first, met->last})
-            inner.push_back({path.at(i, t), path.at(i, t), kNoElement, kNoElement, false});
+          for (const double at : {path.at(i, met->first), path.at(i, met->last)})
+            inner.push_back({at, at, kNoElement, kNoElement, false});
     };
     if (bruteForce) {
-      for (const Tetrahedron& t : solid.solid->topology.tetrahedra) addFaces(t);
+      for (std::size_t t = 0; t < topology.tetrahedra.size(); ++t) addFaces(t);
     } else if (tree.octree().size() > 0) {
       FloatBox box = frame.boxOf(p);
       box.add(frame.boxOf(q));
       findOverlapping(tree.octree(), frame.map(), box, stack);
-      for (const std::uint32_t at : stack.found) addFaces(tree.ordered()[at]);
+      for (const std::uint32_t place : stack.found) addFaces(tree.octree().order()[place]);
     }
   }
   if (inner.empty()) return;

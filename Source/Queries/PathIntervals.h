@@ -60,10 +60,9 @@ void findPathParts(const SearchableGeometry& body, const PathLine&, double radiu
 /// The same for a shape. Its inside belongs to the parts.
 void findPathParts(const Shape&, const PathLine&, double radius, std::vector<PathPart>& parts);
 
-/// Adds the places where the path meets faces of tetrahedra whose volume is not positive to
-/// scratch.parts. The union of the tetrahedra may end at a face within the mesh where both its
-/// neighbours lie on one side of it. The signs of their volumes then differ. The octree over the
-/// tetrahedra must be up to date.
+/// Adds the places where the path meets faces of inverted tetrahedra to scratch.parts. The union of
+/// the tetrahedra may end at a face within the mesh where both its neighbours lie on one side of
+/// it: one of them is inverted. The octree over the tetrahedra must be up to date.
 void addInvertedFaces(const SearchableGeometry& solid, const PathLine&, bool bruteForce,
                       PointQueryStack&, PathScratch&);
 
