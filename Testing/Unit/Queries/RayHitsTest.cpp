@@ -409,6 +409,30 @@ TEST(RayHits, AnyMagnitude) {
   }
 }
 
+/// Triangles that the ray meets almost at the same place, so that roundings of t exceed their gaps.
+TEST(RayHits, AscendAtAnyMagnitude) {
+  Random random(207);
+  for (const int exponent : {-300, -120, 0, 120, 300}) {
+    const double scale = std::ldexp(1.0, exponent);
+    for (int i = 0; i < casesOf(20); ++i) {
+      const Vector3d target = randomPoint(random, -1, 1), origin = randomPoint(random, -9, 9);
+      TestGeometry mesh;
+      for (std::uint32_t k = 0; k < 60; k += 3) {
+        const Vector3d a = randomPoint(random, -3, 3), b = randomPoint(random, -3, 3);
+        for (const Vector3d& p : {a, b, Vector3d(3 * target - a - b)})
+          mesh.positions.push_back(scale * p);
+        mesh.triangles.push_back({k, k + 1, k + 2});
+      }
+      Both both(mesh);
+      both.change([&](OctreeBasedCD& each) {
+        each.setTransform(both.id, Matrix3d::Identity(), scale * Vector3d(0.1, 0.7, 0.3));
+      });
+      const Vector3d from = scale * (origin + Vector3d(0.1, 0.7, 0.3));
+      EXPECT_GE(consistentHits(both, {from, scale * (target - origin)}).size(), 1u);
+    }
+  }
+}
+
 TEST(RayHits, BatchesEqualSingleCalls) {
   Random random(207);
   const TestGeometry geometry = testGeometry(sphere(20, 30, {0.5, 0.5, 0.5}, 0.4));
