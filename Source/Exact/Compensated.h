@@ -63,6 +63,12 @@ inline int exponentTowardsOne(double extent) {
   return extent <= std::numeric_limits<double>::max() ? -std::clamp(std::ilogb(extent), -1074, 1023)
                                                       : -1023;
 }
+/// A power of two that brings an extent near 1 if products might leave the range of double, else 1.
+/// Its inverse is a double, too.
+inline double scaleTowardsOne(double extent) {
+  return isModerate(extent) ? 1.0
+                            : std::ldexp(1.0, std::clamp(exponentTowardsOne(extent), -1000, 1000));
+}
 inline Eigen::Vector3d scaled(const Eigen::Vector3d& a, int exponent) {
   return {std::ldexp(a[0], exponent), std::ldexp(a[1], exponent), std::ldexp(a[2], exponent)};
 }

@@ -1,5 +1,6 @@
 #include "Math/RoundSegment.h"
 
+#include "Exact/Compensated.h"
 #include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>
@@ -57,12 +58,19 @@ RoundIntervals intersectRay(const RaySegment& ray, const Eigen::Vector3d& p,
   const Eigen::Vector3d d = ray.direction / length, middle = 0.5 * p + 0.5 * q;
   const double shift = (middle - ray.origin).dot(d);
   const Eigen::Vector3d nearest = ray.origin + shift * d;
-  const Eigen::Vector3d m = nearest - p, n = nearest - q, u = q - p;
+  const double scale = scaleTowardsOne(
+                   std::max({largest(nearest - p), largest(nearest - q), radiusP, radiusQ})),
+               unit = 1.0 / scale;
+  const Eigen::Vector3d m = scale * (nearest - p), n = scale * (nearest - q), u = scale * (q - p);
+  radiusP *= scale;
+  radiusQ *= scale;
   const double square = u.squaredNorm();
 
   std::array<Range, 6> parts;
   std::size_t count = 0;
-  const auto add = [&](const Range& part) { parts[count++] = part; };
+  const auto add = [&](const Range& part) {
+    parts[count++] = {unit * part.first, unit * part.last};
+  };
   const auto addBall = [&](const Eigen::Vector3d& from, double radius, const Range& within) {
     const double along = from.dot(d);
     // |from|² - along² without cancellation
@@ -99,7 +107,8 @@ RoundIntervals intersectRay(const RaySegment& ray, const Eigen::Vector3d& p,
     for (std::size_t at = i; at > 0 && parts[at].first < parts[at - 1].first; --at)
       std::swap(parts[at], parts[at - 1]);
   RoundIntervals result;
-  const double size = std::abs(shift) + std::sqrt(square) + std::max(radiusP, radiusQ);
+  const double size =
+      std::abs(shift) + unit * std::sqrt(square) + unit * std::max(radiusP, radiusQ);
   const double slack = kRoundRayError * size;
   for (std::size_t i = 0; i < count;) {
     Range part = parts[i++];
@@ -125,14 +134,11 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
       all = part;
       return;
     }
-    if (part.first < all->first) {
-      all->first = part.first;
-      all->frontFace = part.frontFace;
-    }
-    if (part.last > all->last) {
-      all->last = part.last;
-      all->crossing = part.crossing;
-    }
+    // A part that holds the ray's own begin or end is the first or last one.
+    all->first = std::min(all->first, part.first);
+    all->frontFace = all->frontFace && part.frontFace;
+    all->last = std::max(all->last, part.last);
+    all->crossing = std::min(all->crossing, part.crossing);
     all->error = std::max(all->error, part.error);
   };
   const Eigen::Vector3d* const corners[] = {&a, &b, &c};
@@ -141,14 +147,17 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
     const RoundIntervals capsule = intersectRay(ray, p, q, radius, radius);
     for (std::size_t k = 0; k < capsule.size; ++k) add(capsule.intervals[k]);
   }
-  const Eigen::Vector3d normal = (b - a).cross(c - a);
-  const double twiceArea = normal.stableNorm();
-  if (!(twiceArea > 0.0)) return all;
-  const Eigen::Vector3d n = normal / twiceArea;
   const double length = ray.direction.stableNorm();
   const Eigen::Vector3d d = ray.direction / length;
   const double shift = (a - ray.origin).dot(d);  // s = 0 where the ray is nearest to a
-  const Eigen::Vector3d from = ray.origin + shift * d - a;
+  const Eigen::Vector3d nearest = ray.origin + shift * d - a;
+  const double scale = scaleTowardsOne(
+                   std::max({largest(nearest), largest(b - a), largest(c - a), radius})),
+               unit = 1.0 / scale;
+  const Eigen::Vector3d normal = (scale * (b - a)).cross(scale * (c - a)), from = scale * nearest;
+  const double twiceArea = normal.stableNorm();
+  if (!(twiceArea > 0.0)) return all;
+  const Eigen::Vector3d n = normal / twiceArea;
   Range inside{-kInfinite, kInfinite};
   const auto clip = [&](double height, double slope, double most) {  // height + s slope <= most
     if (slope > 0.0) {
@@ -159,14 +168,15 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
       inside.last = -kInfinite;
     }
   };
-  clip(from.dot(n), d.dot(n), radius);
-  clip(-from.dot(n), -d.dot(n), radius);
+  clip(from.dot(n), d.dot(n), scale * radius);
+  clip(-from.dot(n), -d.dot(n), scale * radius);
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d &p = *corners[i], &q = *corners[(i + 1) % 3];
-    const Eigen::Vector3d outward = (q - p).cross(n);
-    clip((from - (p - a)).dot(outward), d.dot(outward), 0.0);
+    const Eigen::Vector3d outward = (scale * (q - p)).cross(n);
+    clip((from - scale * (p - a)).dot(outward), d.dot(outward), 0.0);
   }
-  const double first = (shift + inside.first) / length, last = (shift + inside.last) / length;
+  const double first = (shift + unit * inside.first) / length,
+               last = (shift + unit * inside.last) / length;
   if (first <= last && last >= ray.tMin && first <= ray.tMax) {
     const double size = std::abs(shift) + (b - a).norm() + (c - a).norm() + radius;
     add({std::max(first, ray.tMin), std::min(last, ray.tMax), kRoundRayError * size / length,

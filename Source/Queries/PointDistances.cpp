@@ -71,12 +71,19 @@ PointDistances::PointDistances(const SearchableGeometry& geometry, const Eigen::
       m_bruteForce(bruteForce),
       m_search(searchOf(geometry, point)) {}
 
-PointDistances::Near PointDistances::nearOf(std::uint32_t place,
-                                            const VertexTriangleDistance& closest,
+PointDistances::Near PointDistances::nearOf(std::uint32_t place, VertexTriangleDistance closest,
                                             double reach) const {
   const TriangleMesh& mesh = m_geometry.mesh;
+  const Triangle& corners = m_geometry.tree.ordered()[place];
+  const auto [p, q, _] = corners;
+  // A segment without length is a ball of its larger radius.
+  if (!mesh.radii.empty() && mesh.radii[p] != mesh.radii[q] && mesh.now[p] == mesh.now[q]) {
+    const bool isAtP = mesh.radii[p] > mesh.radii[q];
+    closest.feature = isAtP ? TriangleFeature::CornerA : TriangleFeature::CornerB;
+    closest.barycentric = Eigen::Vector3d::Unit(isAtP ? 0 : 1);
+  }
   return {place, m_geometry.tree.octree().order()[place], closest,
-          closest.distance - mesh.radius(m_geometry.tree.ordered()[place], closest.barycentric),
+          closest.distance - mesh.radius(corners, closest.barycentric),
           kNearestSlack * 2 * std::max(reach, mesh.largestRadius)};
 }
 

@@ -54,7 +54,7 @@ class PointDistances {
   /// Up to TriangleBatch::kSize elements, side by side. f(near): see at().
   template <class F>
   void forEach(std::span<const std::uint32_t> places, F&& f) const;
-  Near nearOf(std::uint32_t place, const VertexTriangleDistance&, double reach) const;
+  Near nearOf(std::uint32_t place, VertexTriangleDistance, double reach) const;
   float boundOf(double distance) const;  ///< in the octree's floats
   Eigen::Vector3d radiiOf(const Triangle& corners) const;
 

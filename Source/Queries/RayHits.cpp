@@ -137,12 +137,12 @@ void RayHits::intersect(std::uint32_t place, F&& f) const {
   for (std::size_t i = 0; i < parts.size; ++i) f(parts.intervals[i]);
 }
 
-double RayHits::collect(Wanted wanted, double tMax, double atLeast) {
+double RayHits::collect(Wanted wanted, double bound, double atLeast) {
   m_met.clear();
   if (m_geometry.tree.ordered().empty()) return atLeast;
   // The part that begins first, as far as it is known, with the error of its ends. Until an element
   // is met, it has no end before tMax.
-  double first = kInfinity, last = tMax, error = 0.0, least = tMax;
+  double first = kInfinity, last = m_ray.tMax, error = 0.0, least = std::max(bound, atLeast);
   const auto take = [&](std::uint32_t place) {
     intersect(place, [&](const RayInterval& interval) {
       m_met.push_back({interval, place, m_geometry.tree.octree().order()[place]});
@@ -162,12 +162,15 @@ double RayHits::collect(Wanted wanted, double tMax, double atLeast) {
   if (!clip(m_geometry, m_ray, m_geometry.mesh.largestRadius + m_radius, ray)) return atLeast;
   const RayElements elements{m_geometry.tree.ordered().data(), m_geometry.mesh.now.body().data(),
                              ray.line};
-  forEachOnRay(m_geometry.tree.octree(), elements, ray.ray, [&](std::uint32_t place) {
+  FloatRay bounded = ray.ray;
+  bounded.tMax = std::min(ray.ray.tMax, ray.floatOf(least));
+  forEachOnRay(m_geometry.tree.octree(), elements, bounded, [&](std::uint32_t place) {
     take(place);
     if (wanted == Wanted::Any && !m_met.empty()) return -1.0f;
+    if (first == kInfinity) return bounded.tMax;
     return std::min(ray.ray.tMax, ray.floatOf(std::max(last + error, atLeast)));
   });
-  if (wanted != Wanted::First) return atLeast;
+  if (first == kInfinity) return atLeast;
   // Elements come in any order. Some were met before the part had grown as far as to them.
   std::sort(m_met.begin(), m_met.end(),
             [](const Met& a, const Met& b) { return a.interval.first < b.interval.first; });
@@ -176,7 +179,8 @@ double RayHits::collect(Wanted wanted, double tMax, double atLeast) {
     last = std::max(last, interval.last);
     error = std::max(error, interval.error);
   }
-  return std::min(tMax, last + error) > least ? std::min(tMax, last + error) : atLeast;
+  const double needed = std::min(m_ray.tMax, last + error);
+  return needed > least ? needed : atLeast;
 }
 
 int RayHits::compare(const Met& one, bool lastOfFirst, const Met& two, bool lastOfSecond) const {
@@ -216,12 +220,17 @@ bool RayHits::hitsOfPart(std::size_t begin, std::size_t end, std::size_t furthes
     for (std::size_t i = begin; i < end; ++i) crossing += m_met[i].interval.crossing;
     return f(hitOf(first, first.interval.first, first.interval.frontFace, crossing % 2 != 0));
   }
-  // The ends of a solid part are hits, except where the ray itself begins or ends.
+  // The ends of a solid part are hits, except where an element holds the ray's own begin or end.
   const Met& last = m_met[furthest];
-  const bool isPoint = first.interval.first == last.interval.last;
-  if (isPoint) return f(hitOf(first, first.interval.first, true, false));
-  if (first.interval.frontFace && !f(hitOf(first, first.interval.first, true, true))) return false;
-  return last.interval.crossing == 0 || f(hitOf(last, last.interval.last, false, true));
+  bool enters = true, leaves = true;
+  for (std::size_t i = begin; i < end; ++i) {
+    enters = enters && m_met[i].interval.frontFace;
+    leaves = leaves && m_met[i].interval.crossing != 0;
+  }
+  if (enters && leaves && first.interval.first == last.interval.last)  // they touch
+    return f(hitOf(first, first.interval.first, true, false));
+  if (enters && !f(hitOf(first, first.interval.first, true, true))) return false;
+  return !leaves || f(hitOf(last, last.interval.last, false, true));
 }
 
 void RayHits::sort() {
@@ -238,12 +247,12 @@ void RayHits::forEachHit(F&& f) {
   });
 }
 
-std::optional<RayHit> RayHits::first(double t) {
+std::optional<RayHit> RayHits::first(double bound) {
   const Wanted wanted = m_isSolid ? Wanted::All : Wanted::First;
   // Elements beyond a part's end may have been skipped before the part grew. The search is then
   // repeated as far as the part is known.
   for (double atLeast = m_ray.tMin;;) {
-    const double needed = collect(wanted, t, atLeast);
+    const double needed = collect(wanted, bound, atLeast);
     if (!(needed > atLeast)) break;
     atLeast = needed;
   }
@@ -264,7 +273,9 @@ bool RayHits::any() {
 
 void RayHits::all(std::vector<RayHit>& out) {
   collect(Wanted::All, m_ray.tMax, m_ray.tMin);
-  forEachHit([&](const RayHit& hit) {
+  double least = -kInfinity;  // hits are in order, but each t is rounded
+  forEachHit([&](RayHit hit) {
+    hit.t = least = std::max(least, hit.t);
     out.push_back(hit);
     return true;
   });

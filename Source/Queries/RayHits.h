@@ -37,8 +37,9 @@ class RayHits {
   RayHits(const SearchableGeometry&, const Ray&, bool bruteForce, std::vector<Met>& scratch,
           double radius = 0.0);
 
-  /// t: the search ends where hits beyond it begin.
-  std::optional<RayHit> first(double t);
+  /// bound: t; if the first hit is not before it, the result is no hit or one that is not before
+  /// it.
+  std::optional<RayHit> first(double bound);
   bool any();
   /// All hits by ascending t. out: hits are appended.
   void all(std::vector<RayHit>& out);
@@ -56,9 +57,10 @@ class RayHits {
  private:
   enum class Wanted { First, Any, All };
 
-  /// Fills m_met. First: with all elements of the part that begins first, if that part does not
-  /// reach beyond `atLeast` or the result. Returns how far it reaches, or atLeast.
-  double collect(Wanted, double tMax, double atLeast);
+  /// Fills m_met. Elements that begin beyond both `bound` and `atLeast` may be missing. First: with
+  /// all elements of the part that begins first, if that part does not reach beyond `atLeast` or
+  /// the result. Returns how far it reaches, or atLeast.
+  double collect(Wanted, double bound, double atLeast);
   /// Calls f(interval) for what the ray shares with an element.
   template <class F>
   void intersect(std::uint32_t place, F&& f) const;

@@ -45,7 +45,10 @@ bool meets(const TriangleMesh& mesh, const Triangle& corners, const Shape& shape
     if (corners[i] == corners[(i + 1) % 3]) continue;  // {p, q, q} is a segment
     const NearestToShape edge = shape.nearestOfEdge(at(i), at(i + 1));
     const Segment ends{corners[i], corners[(i + 1) % 3]};
-    if (edge.distance <= mesh.radius(ends, edge.weights[1])) return true;
+    // A segment without length is a ball of its larger radius.
+    const double radius = at(i) == at(i + 1) ? std::max(mesh.radius(ends[0]), mesh.radius(ends[1]))
+                                             : mesh.radius(ends, edge.weights[1]);
+    if (edge.distance <= radius) return true;
   }
   if (corners[1] == corners[2]) return false;
   const auto inside = shape.nearestInTriangle(at(0), at(1), at(2));

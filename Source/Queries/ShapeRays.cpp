@@ -1,5 +1,6 @@
 #include "Queries/ShapeRays.h"
 
+#include "Exact/Compensated.h"
 #include "Math/RayTriangle.h"
 #include "Math/RoundSegment.h"
 
@@ -39,12 +40,16 @@ std::optional<Inside> insideCapsule(const Shape& shape, const Ray& ray) {
 /// A cylinder is the common part of a slab and an infinite cylinder.
 std::optional<Inside> insideCylinder(const Shape& shape, const Ray& ray) {
   const Vector3d p = shape.corners()[0], q = shape.corners()[1], axis = shape.axes().col(2);
-  const double half = 0.5 * (q - p).norm();
   const double length = ray.direction.stableNorm();
   const Vector3d d = ray.direction / length;
   // s = 0 where the ray is nearest to the centre
   const double shift = (shape.origin() - ray.origin).dot(d);
-  const Vector3d from = ray.origin + shift * d - shape.origin();
+  const Vector3d nearest = ray.origin + shift * d - shape.origin();
+  const double scale =
+                   scaleTowardsOne(std::max({largest(nearest), largest(q - p), shape.radius()})),
+               unit = 1.0 / scale, half = 0.5 * (scale * (q - p)).norm(),
+               radius = scale * shape.radius();
+  const Vector3d from = scale * nearest;
   double enter = -kInfinity, leave = kInfinity;
   const double slope = d.dot(axis), height = from.dot(axis);
   if (slope != 0.0) {
@@ -56,7 +61,7 @@ std::optional<Inside> insideCylinder(const Shape& shape, const Ray& ray) {
   }
   const Vector3d across = d - slope * axis, radial = from - height * axis;
   const double a = across.squaredNorm(), b = across.dot(radial),
-               c = radial.squaredNorm() - shape.radius() * shape.radius();
+               c = radial.squaredNorm() - radius * radius;
   if (a > 0.0) {
     const double discriminant = b * b - a * c;
     if (discriminant < 0.0) return {};
@@ -66,7 +71,7 @@ std::optional<Inside> insideCylinder(const Shape& shape, const Ray& ray) {
   } else if (c > 0.0) {
     return {};
   }
-  return clipped((shift + enter) / length, (shift + leave) / length, ray);
+  return clipped((shift + unit * enter) / length, (shift + unit * leave) / length, ray);
 }
 
 std::optional<Inside> insideHull(const Shape& shape, const Ray& ray) {
@@ -104,15 +109,18 @@ void addShapeHits(GeometryId id, const Shape& shape, const Ray& ray, std::vector
                                                  : insideCapsule(shape, ray);
   if (!inside) return;
   const auto add = [&](double t, bool frontFace, bool crosses) {
-    out.push_back({id, kNoElement, {}, Vector3d::Zero(), t, frontFace, crosses});
+    // Not -0.
+    out.push_back({id, kNoElement, {}, Vector3d::Zero(), t + 0.0, frontFace, crosses});
   };
   if (shape.isTwoSided()) {
-    const bool lies = inside->enter != inside->leave;  // the ray lies in the plane
-    return add(inside->enter, ray.direction.dot(shape.axes().col(2)) < 0.0, !lies);
+    const double slope = ray.direction.dot(shape.axes().col(2));
+    return add(inside->enter, slope < 0.0, slope != 0.0);
   }
-  if (inside->enter == inside->leave) return add(inside->enter, true, false);
-  if (!inside->beginsInside) add(inside->enter, true, true);
-  if (!inside->endsInside) add(inside->leave, false, true);
+  const bool enters = !inside->beginsInside, leaves = !inside->endsInside;
+  if (enters && leaves && inside->enter == inside->leave)  // they touch
+    return add(inside->enter, true, false);
+  if (enters) add(inside->enter, true, true);
+  if (leaves) add(inside->leave, false, true);
 }
 
 SurfacePoint closestPointOnShape(GeometryId id, const Shape& shape, const Vector3d& point) {

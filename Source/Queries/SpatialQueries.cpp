@@ -136,7 +136,7 @@ SpatialQueries::Source& SpatialQueries::valid() const {
 void checkLength(double length, const char* name, bool finite) {
   if (!(length >= 0) || (finite && std::isinf(length)))
     throw Error(ErrorCode::InvalidSettings, std::string(name) + " is " + textOf(length) +
-                                                "; it must not be negative" +
+                                                "; it must be a number of at least 0" +
                                                 (finite ? " and must be finite" : ""));
 }
 
@@ -153,9 +153,16 @@ void checkPose(const RigidTransform& pose, const char* what) {
 
 namespace {
 
-void checkPoint(const Eigen::Vector3d& point) {
+/// index: of a batch.
+void checkPoint(const Eigen::Vector3d& point, std::optional<std::size_t> index = {}) {
   if (!point.allFinite())
-    throw Error(ErrorCode::NonFinitePosition, "the query's point is " + textOf(point));
+    throw Error(
+        ErrorCode::NonFinitePosition,
+        (index ? "point " + std::to_string(*index) : "the query's point") + " is " + textOf(point));
+}
+
+void checkPoints(std::span<const Eigen::Vector3d> points) {
+  for (std::size_t i = 0; i < points.size(); ++i) checkPoint(points[i], i);
 }
 
 std::optional<SurfacePoint> closestPointOf(const SearchableGeometry& geometry,
@@ -197,7 +204,7 @@ Pick pickOf(const RayHit& hit, const Ray& ray, const Positions& now) {
   double leastVertex = kInfinity, leastEdge = kInfinity;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::uint32_t p = hit.vertices[i], q = hit.vertices[(i + 1) % 3];
-    if (const double distance = (now[p] - point).squaredNorm(); distance < leastVertex) {
+    if (const double distance = (now[p] - point).stableNorm(); distance < leastVertex) {
       leastVertex = distance;
       pick.vertex = p;
     }
@@ -211,16 +218,20 @@ Pick pickOf(const RayHit& hit, const Ray& ray, const Positions& now) {
   return pick;
 }
 
-void checkRay(const Ray& ray) {
+/// index: of a batch.
+void checkRay(const Ray& ray, std::optional<std::size_t> index = {}) {
+  const auto refuse = [&](ErrorCode code, const std::string& fault) {
+    throw Error(code, (index ? "ray " + std::to_string(*index) : "the ray") + " has " + fault);
+  };
   if (!ray.origin.allFinite() || !ray.direction.allFinite())
-    throw Error(ErrorCode::NonFinitePosition, "the ray has origin " + textOf(ray.origin) +
-                                                  " and direction " + textOf(ray.direction));
+    refuse(ErrorCode::NonFinitePosition,
+           "origin " + textOf(ray.origin) + " and direction " + textOf(ray.direction));
   if (ray.direction == Eigen::Vector3d::Zero())
-    throw Error(ErrorCode::InvalidSettings, "the ray's direction has length 0");
+    refuse(ErrorCode::InvalidSettings, "a direction of length 0");
   if (!std::isfinite(ray.tMin) || !(ray.tMin <= ray.tMax))
-    throw Error(ErrorCode::InvalidSettings, "the ray has tMin " + textOf(ray.tMin) + " and tMax " +
-                                                textOf(ray.tMax) +
-                                                "; tMin must be finite and at most tMax");
+    refuse(ErrorCode::InvalidSettings, "tMin " + textOf(ray.tMin) + " and tMax " +
+                                           textOf(ray.tMax) +
+                                           "; tMin must be finite and at most tMax");
 }
 
 }  // namespace
@@ -243,8 +254,9 @@ class RayQuery {
       on(geometry, ray).all(hits);
     return hits;
   }
-  std::optional<RayHit> first(const SearchableGeometry& geometry, const Ray& ray) {
-    if (!geometry.shape) return on(geometry, ray).first(ray.tMax);
+  /// bound: as in RayHits::first().
+  std::optional<RayHit> first(const SearchableGeometry& geometry, const Ray& ray, double bound) {
+    if (!geometry.shape) return on(geometry, ray).first(bound);
     const std::vector<RayHit>& hits = all(geometry, ray);
     return hits.empty() ? std::nullopt : std::optional(hits.front());
   }
@@ -262,18 +274,20 @@ class RayQuery {
 };
 
 /// The first hit of all geometries. frontFacesOnly: other hits do not count.
-std::optional<RayHit> firstHitOfAll(SpatialQueries::Source& source, Ray ray, bool frontFacesOnly) {
+std::optional<RayHit> firstHitOfAll(SpatialQueries::Source& source, const Ray& ray,
+                                    bool frontFacesOnly) {
   RayQuery query(source);
   std::optional<RayHit> best;
   const auto take = [&](const RayHit& hit) {
-    if (best && !(hit.t < best->t)) return;
-    best = hit;
-    ray.tMax = hit.t;
+    if (!best || hit.t < best->t) best = hit;
   };
   for (std::size_t i = 0; i < source.geometryCount(); ++i) {
     const SearchableGeometry& geometry = source.geometry(i);
+    // The ray itself is not cut at the best hit, as this would change other hits.
+    const auto first = query.first(geometry, ray, best ? best->t : ray.tMax);
+    if (!first || (best && !(first->t < best->t))) continue;
     if (!frontFacesOnly) {
-      if (const auto hit = query.first(geometry, ray)) take(*hit);
+      take(*first);
       continue;
     }
     for (const RayHit& hit : query.all(geometry, ray))
@@ -289,7 +303,7 @@ std::optional<RayHit> SpatialQueries::firstHit(GeometryId id, const Ray& ray) co
   const StandardFloatingPoint standard;
   checkRay(ray);
   const SearchableGeometry& geometry = source.at(id);
-  return RayQuery(source).first(geometry, ray);
+  return RayQuery(source).first(geometry, ray, ray.tMax);
 }
 
 std::optional<RayHit> SpatialQueries::firstHit(const Ray& ray) const {
@@ -322,12 +336,12 @@ void SpatialQueries::firstHits(GeometryId id, std::span<const Ray> rays,
   Source& source = valid();
   const StandardFloatingPoint standard;
   checkSizes(rays.size(), out.size(), "rays");
-  for (const Ray& ray : rays) checkRay(ray);
+  for (std::size_t i = 0; i < rays.size(); ++i) checkRay(rays[i], i);
   const SearchableGeometry& geometry = source.at(id);
   forParts(source, rays.size(), [&](std::size_t begin, std::size_t end) {
     RayQuery query(source);
     for (std::size_t i = begin; i < end; ++i)
-      out[i] = query.first(geometry, rays[i])
+      out[i] = query.first(geometry, rays[i], rays[i].tMax)
                    .value_or(RayHit{id, kNoElement, {}, {0, 0, 0}, kInfinity, false, false});
   });
 }
@@ -361,7 +375,7 @@ void SpatialQueries::closestPoints(GeometryId id, std::span<const Eigen::Vector3
   Source& source = valid();
   const StandardFloatingPoint standard;
   checkSizes(points.size(), out.size(), "points");
-  for (const Eigen::Vector3d& point : points) checkPoint(point);
+  checkPoints(points);
   checkLength(maxDistance, "maxDistance", false);
   const SearchableGeometry& geometry = source.at(id);
   const bool bruteForce = source.engine() == Engine::BruteForce;
@@ -386,6 +400,8 @@ bool SpatialQueries::contains(GeometryId id, const Eigen::Vector3d& point,
 
 SignedDistance SpatialQueries::signedDistance(GeometryId id, const Eigen::Vector3d& point,
                                               const InsideSettings& settings) const {
+  valid();
+  checkPoint(point);
   SignedDistance out;
   signedDistances(id, {&point, 1}, {&out, 1}, settings);
   return out;
@@ -397,7 +413,7 @@ void SpatialQueries::signedDistances(GeometryId id, std::span<const Eigen::Vecto
   Source& source = valid();
   const StandardFloatingPoint standard;
   checkSizes(points.size(), out.size(), "points");
-  for (const Eigen::Vector3d& point : points) checkPoint(point);
+  checkPoints(points);
   SearchableGeometry& body = source.at(id);
   source.prepareInside(body, settings);
   if (body.tree.ordered().empty())

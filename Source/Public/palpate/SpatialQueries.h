@@ -49,7 +49,8 @@ struct Ray {
 /// One connected part of what a ray and a surface share: its smallest t, on the lowest element
 /// there. A ray along an edge, or in the plane of triangles, has one hit there. Lines and points
 /// with radii, and analytical shapes, have a hit where the ray enters them and one where it leaves
-/// them; overlapping elements are one body.
+/// them; overlapping elements are one body. A ray that starts on their surface and goes outward
+/// leaves them there. A ray that only touches them has one hit that does not cross.
 struct RayHit {
   GeometryId geometry;
   std::uint32_t element = kNoElement;
@@ -146,9 +147,11 @@ class PALPATE_EXPORT SpatialQueries {
   ///          almost equal distances.
   std::optional<SurfacePoint> closestPoint(GeometryId, const Eigen::Vector3d& point,
                                            double maxDistance = kInfinity) const;
-  /// The same for many points, on all threads. Points without an answer have element kNoElement.
+  /// The same for many points, on all threads. Points without an answer have an infinite distance
+  /// and element kNoElement. As every answer for a shape has that element, only the distance tells.
   ///
-  /// Errors   InvalidSettings, too, if `out` has another size than `points`.
+  /// Errors   InvalidSettings, too, if `out` has another size than `points`. Messages name the
+  ///          point, such as "point 3".
   void closestPoints(GeometryId, std::span<const Eigen::Vector3d> points,
                      std::span<SurfacePoint> out, double maxDistance = kInfinity) const;
   /// Finds the k elements that are nearest to a point, or all if there are fewer, with their
@@ -172,7 +175,8 @@ class PALPATE_EXPORT SpatialQueries {
                                 const InsideSettings& = {}) const;
   /// The same for many points, on all threads.
   ///
-  /// Errors   InvalidSettings, too, if `out` has another size than `points`.
+  /// Errors   InvalidSettings, too, if `out` has another size than `points`. Messages name the
+  ///          point, such as "point 3".
   void signedDistances(GeometryId body, std::span<const Eigen::Vector3d> points,
                        std::span<SignedDistance> out, const InsideSettings& = {}) const;
   /// Finds the elements with a point within a radius, decided exactly.
@@ -192,15 +196,18 @@ class PALPATE_EXPORT SpatialQueries {
   /// The first hit of all geometries. Of equally early hits, that on the lowest geometry.
   std::optional<RayHit> firstHit(const Ray&) const;
   bool anyHit(GeometryId, const Ray&) const;  ///< whether there is a hit
-  /// First hits of many rays, on all threads. Rays without a hit have element kNoElement.
+  /// First hits of many rays, on all threads. Rays without a hit have an infinite t and element
+  /// kNoElement. As every hit on a shape has that element, only t tells.
   ///
-  /// Errors   InvalidSettings, too, if `out` has another size than `rays`.
+  /// Errors   InvalidSettings, too, if `out` has another size than `rays`. Messages name the ray,
+  ///          such as "ray 3".
   void firstHits(GeometryId, std::span<const Ray> rays, std::span<RayHit> out) const;
   /// All hits.
   ///
   /// Order    by ascending t.
   void allHits(GeometryId, const Ray&, std::vector<RayHit>& out) const;
-  /// What a ray selects among all geometries.
+  /// What a ray selects among all geometries. frontFacesOnly: other hits do not count, and so it
+  /// selects no line or point without a radius.
   std::optional<Pick> pick(const Ray&, bool frontFacesOnly = false) const;
 
   /// Finds the elements that have a point in a shape, interior included. The poses are those of
@@ -218,7 +225,8 @@ class PALPATE_EXPORT SpatialQueries {
   ///
   /// Order    that of CollisionData::shape().
   /// Errors   those of overlapping(); InvalidSettings if the thickness is negative or not finite.
-  /// Cost     follows the elements near the shape.
+  /// Cost     follows the elements near the shape. A repeated call with the same shape allocates
+  ///          nothing.
   void contacts(GeometryId, const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
                 const Eigen::Vector3d& translation, double thickness,
                 std::vector<ShapeContact>& out) const;

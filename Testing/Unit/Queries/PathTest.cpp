@@ -2,6 +2,7 @@
 #include "Common/ShapeTruth.h"
 #include "Common/Solids.h"
 #include "Common/TestGeometry.h"
+#include "Unit/Queries/Cube.h"
 
 #include <palpate/Distance.h>
 #include <palpate/OctreeBasedCD.h>
@@ -183,15 +184,6 @@ void expectEndsOnElements(const TestGeometry& geometry, const Positions& now, co
   }
 }
 
-/// Triangles of a cube, wound outwards.
-Mesh cube(double low, double high) {
-  Mesh mesh;
-  for (int v = 0; v < 8; ++v)
-    mesh.positions.emplace_back(v & 1 ? high : low, v & 2 ? high : low, v & 4 ? high : low);
-  mesh.triangles = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
-                    {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
-  return mesh;
-}
 Mesh joined(Mesh a, const Mesh& b, bool turned) {
   const auto first = static_cast<std::uint32_t>(a.positions.size());
   a.positions.insert(a.positions.end(), b.positions.begin(), b.positions.end());

@@ -1,5 +1,6 @@
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
+#include "Unit/Queries/Cube.h"
 #include "Unit/Queries/QueryTruth.h"
 
 #include <gtest/gtest.h>
@@ -132,6 +133,71 @@ TEST(Pick, TiesGoToTheLowestGeometry) {
   EXPECT_EQ(queries.pick({{0.3, 0.2, -0.5}, {0, 0, 1}})->hit.geometry, second);
   EXPECT_FALSE(queries.pick({{0.3, 0.2, -0.5}, {0, 0, 1}}, true));  // from behind
   EXPECT_FALSE(OctreeBasedCD().queries().pick({{0, 0, 0}, {0, 0, 1}}));
+}
+
+/// A hit on one geometry does not change those on others, whatever their scale and order.
+TEST(Pick, IsTheFirstOfTheSeparateFirstHits) {
+  Random random(603);
+  for (const int exponent : {-80, -50, -40, 0, 45, 60, 110, -110}) {
+    for (int i = 0; i < casesOf(20); ++i) {
+      Positions wall;
+      for (int k = 0; k < 3; ++k)
+        wall.push_back(std::ldexp(1.0, exponent) * randomPoint(random, -10, 10));
+      const std::vector<Triangle> triangle{{0, 1, 2}};
+      OctreeBasedCD collisions;
+      const GeometryId first = collisions.addTriangleMesh(wall, triangle),
+                       second = collisions.addTriangleMesh(wall, triangle);
+      const SpatialQueries queries = collisions.queries();
+      for (int k = 0; k < 50; ++k) {
+        const Vector3d target = 0.3 * wall[0] + 0.3 * wall[1] + 0.4 * wall[2],
+                       origin = std::ldexp(1.0, exponent) * randomPoint(random, -10, 10);
+        const Ray ray{origin, uniform(random, 0.1, 10) * (target - origin)};
+        const auto expected = queries.firstHit(first, ray);
+        ASSERT_TRUE(expected);
+        EXPECT_EQ(expected->t, queries.firstHit(second, ray)->t);
+        EXPECT_TRUE(isSame(queries.firstHit(ray), expected));
+        EXPECT_TRUE(isSame(queries.pick(ray)->hit, *expected));
+      }
+    }
+  }
+}
+
+/// A hit in the middle of another geometry's part does not change whether the ray crosses there.
+TEST(Pick, PartsAreNotCutByHitsOfOtherGeometries) {
+  Mesh step = cube(-1.0, 1.0);
+  const Mesh high = cube(-2.0, 2.0);
+  for (const Triangle& t : high.triangles) step.triangles.push_back({t[0] + 8, t[1] + 8, t[2] + 8});
+  for (const Vector3d& p : high.positions) step.positions.push_back(p + Vector3d(3, 0, 0));
+  for (const bool isBallFirst : {false, true}) {
+    OctreeBasedCD collisions;
+    GeometryId body{};
+    const auto addBody = [&] { body = collisions.addTriangleMesh(step.positions, step.triangles); };
+    if (!isBallFirst) addBody();
+    collisions.addPointSet(Positions{{0.5, 0.3, 1}}, 0.5);
+    if (isBallFirst) addBody();
+    const SpatialQueries queries = collisions.queries();
+    const Ray ray{{-5, 0.3, 1}, {1, 0, 0}};  // along the low box's top, into the high box
+    const auto expected = queries.firstHit(body, ray);
+    ASSERT_TRUE(expected && expected->crosses);
+    EXPECT_TRUE(isSame(queries.firstHit(ray), expected));
+    EXPECT_TRUE(isSame(queries.pick(ray)->hit, *expected));
+    std::vector<RayHit> hits;
+    queries.allHits(body, ray, hits);
+    EXPECT_TRUE(isSame(hits[0], *expected));
+  }
+}
+
+TEST(Pick, NearestVertexAtAnyScale) {
+  for (const int exponent : {-1000, -600, 0, 600, 1000}) {
+    const double s = std::ldexp(1.0, exponent);
+    OctreeBasedCD collisions;
+    collisions.addTriangleMesh(Positions{{-8 * s, -8 * s, 0}, {8 * s, -8 * s, 0}, {0, 8 * s, 0}},
+                               std::vector<Triangle>{{0, 1, 2}});
+    const auto found = collisions.queries().pick({{0, 7 * s, 4 * s}, {0, 0, -s}});
+    ASSERT_TRUE(found);
+    EXPECT_EQ(found->vertex, 2u);
+    EXPECT_EQ(found->hit.t, 4.0);
+  }
 }
 
 }  // namespace

@@ -308,6 +308,34 @@ TEST(PointDistances, TrianglesWithoutAreaAreWhatTheyAre) {
 
 /// Outside, the plane through the closest point, across the way to it, has the shape behind it.
 /// Inside, such a plane has it, too, and no plane around the shape is nearer.
+/// A segment without length is a ball of its larger radius, in every query.
+TEST(PointDistances, SegmentsWithoutLengthHaveTheirLargerRadius) {
+  for (const Segment& segment : {Segment{0, 1}, Segment{1, 0}}) {
+    const Both both(
+        TestGeometry{GeometryType::Lines, {{0, 0, 0}, {0, 0, 0}}, {}, {segment}, {0.5, 2.0}});
+    for (const OctreeBasedCD* each : {&both.octree, &both.bruteForce}) {
+      const SpatialQueries queries = each->queries();
+      const auto nearest = queries.closestPoint(both.id, {0, 0, 10});
+      ASSERT_TRUE(nearest);
+      EXPECT_EQ(nearest->distance, 8.0);
+      EXPECT_EQ(nearest->vertices[nearest->weights[1] == 1.0], 1u);
+      EXPECT_EQ(queries.firstHit(both.id, {{0, 0, 10}, {0, 0, -1}})->t, 8.0);
+      std::vector<std::uint32_t> elements;
+      queries.elementsWithin(both.id, {0, 0, 10}, 8.0, elements);
+      EXPECT_EQ(elements.size(), 1u);
+      queries.elementsWithin(both.id, {0, 0, 10}, 7.9, elements);
+      EXPECT_EQ(elements.size(), 0u);
+      for (const AnalyticalGeometry& shape :
+           {AnalyticalGeometry(Sphere{{0, 0, 1.5}, 0.1}),
+            AnalyticalGeometry(Box{{0, 0, 1.5}, {0.1, 0.1, 0.1}}),
+            AnalyticalGeometry(Capsule{{0, 0, 1.5}, {0, 1, 1.5}, 0.1})}) {
+        queries.overlapping(both.id, shape, Matrix3d::Identity(), {0, 0, 0}, elements);
+        EXPECT_EQ(elements.size(), 1u) << shape.index();
+      }
+    }
+  }
+}
+
 TEST(PointDistances, ShapesHaveTheirClosestPoints) {
   Random random(108);
   std::vector<Vector3d> cloud;

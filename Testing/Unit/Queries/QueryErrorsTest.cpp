@@ -197,13 +197,16 @@ TEST(QueryErrors, Points) {
       const auto refused = [&](auto&& call) {
         expectRefused(NonFinitePosition, "the query's point is (", call);
       };
+      const auto refusedAt1 = [&](auto&& call) {
+        expectRefused(NonFinitePosition, "point 1 is (", call);
+      };
       refused([&] { queries.closestPoint(scene.ball, bad); });
-      refused([&] { queries.closestPoints(scene.ball, both, points); });
+      refusedAt1([&] { queries.closestPoints(scene.ball, both, points); });
       refused([&] { queries.nearestElements(scene.ball, bad, 1, points); });
       refused([&] { queries.elementsWithin(scene.ball, bad, 1, elements); });
       refused([&] { (void)queries.contains(scene.ball, bad); });
       refused([&] { queries.signedDistance(scene.ball, bad); });
-      refused([&] { queries.signedDistances(scene.ball, both, distances); });
+      refusedAt1([&] { queries.signedDistances(scene.ball, both, distances); });
     }
   for (const double length : {-1.0, -5e-324, kNan}) {
     const auto refused = [&](const char* name, auto&& call) {
@@ -215,6 +218,8 @@ TEST(QueryErrors, Points) {
     refused("maxDistance", [&] { queries.nearestElements(scene.ball, good, 1, points, length); });
     refused("radius", [&] { queries.elementsWithin(scene.ball, good, length, elements); });
   }
+  expectRefused(InvalidSettings, "maxDistance is nan; it must be a number of at least 0",
+                [&] { queries.closestPoint(scene.ball, good, kNan); });
   expectRefused(InvalidSettings, "radius is inf",
                 [&] { queries.elementsWithin(scene.ball, good, kInfinity, elements); });
   for (const int k : {0, -1, std::numeric_limits<int>::min()})
@@ -233,27 +238,28 @@ TEST(QueryErrors, Points) {
 TEST(QueryErrors, Rays) {
   const Scene scene;
   const SpatialQueries queries = scene.collisions.queries();
-  std::vector<RayHit> hits(1);
+  std::vector<RayHit> hits(1), both(2);
   const auto refused = [&](ErrorCode code, const std::string& words, const Ray& ray) {
-    expectRefused(code, words, [&] { queries.firstHit(scene.ball, ray); });
+    expectRefused(code, "the ray has " + words, [&] { queries.firstHit(scene.ball, ray); });
     expectRefused(code, words, [&] { queries.firstHit(scene.shape, ray); });
     expectRefused(code, words, [&] { queries.firstHit(ray); });
     expectRefused(code, words, [&] { (void)queries.anyHit(scene.ball, ray); });
-    expectRefused(code, words, [&] { queries.firstHits(scene.ball, std::span(&ray, 1), hits); });
+    const Ray rays[] = {{{0, 0, 0}, {1, 0, 0}}, ray};
+    expectRefused(code, "ray 1 has " + words, [&] { queries.firstHits(scene.ball, rays, both); });
     expectRefused(code, words, [&] { queries.allHits(scene.ball, ray, hits); });
     expectRefused(code, words, [&] { queries.pick(ray); });
     expectRefused(code, words, [&] { queries.pick(ray, true); });
   };
   for (const double x : {kNan, kInfinity}) {
-    refused(NonFinitePosition, "the ray has origin (", {{0, x, 0}, {1, 0, 0}});
-    refused(NonFinitePosition, "the ray has origin (", {{0, 0, 0}, {1, 0, x}});
-    refused(InvalidSettings, "the ray has tMin", {{0, 0, 0}, {1, 0, 0}, x});
-    refused(InvalidSettings, "the ray has tMin", {{0, 0, 0}, {1, 0, 0}, -x});
+    refused(NonFinitePosition, "origin (", {{0, x, 0}, {1, 0, 0}});
+    refused(NonFinitePosition, "origin (", {{0, 0, 0}, {1, 0, x}});
+    refused(InvalidSettings, "tMin", {{0, 0, 0}, {1, 0, 0}, x});
+    refused(InvalidSettings, "tMin", {{0, 0, 0}, {1, 0, 0}, -x});
   }
-  refused(InvalidSettings, "tMax nan", {{0, 0, 0}, {1, 0, 0}, 0, kNan});
+  refused(InvalidSettings, "tMin 0 and tMax nan", {{0, 0, 0}, {1, 0, 0}, 0, kNan});
   refused(InvalidSettings, "tMin 2 and tMax 1", {{0, 0, 0}, {1, 0, 0}, 2, 1});
-  refused(InvalidSettings, "length 0", {{0, 0, 0}, {0, 0, 0}});
-  refused(InvalidSettings, "length 0", {{0, 0, 0}, {-0.0, 0, 0}});
+  refused(InvalidSettings, "a direction of length 0", {{0, 0, 0}, {0, 0, 0}});
+  refused(InvalidSettings, "a direction of length 0", {{0, 0, 0}, {-0.0, 0, 0}});
   EXPECT_EQ(hits.size(), 1u);
 }
 

@@ -1,5 +1,6 @@
 #include "Common/ObjText.h"
 #include "Common/Sanitized.h"
+#include "Common/ShapeTruth.h"
 #include "Core/SimdPath.h"
 #include "Unit/Queries/QueryTruth.h"
 
@@ -480,6 +481,30 @@ TEST(RayHits, RotationsThatStretch) {
     hits +=
         consistentHits(both, {randomPoint(random, -1.5, 1.5), randomPoint(random, -1, 1)}).size();
   EXPECT_GE(hits, leastOf(500));
+}
+
+/// Rays through placed vertices that triangles share, where roundings of t exceed the gaps of hits.
+TEST(RayHits, AscendAtAnyMagnitude) {
+  Random random(207);
+  for (const double scale : {1e-66, 1.0, 1e66}) {
+    for (int i = 0; i < casesOf(40); ++i) {
+      TestGeometry mesh;
+      for (int k = 0; k < 30; ++k) mesh.positions.push_back(scale * onLattice(random, 4));
+      const auto vertex = [&] { return static_cast<std::uint32_t>(random() % 30); };
+      for (int k = 0; k < 100; ++k) mesh.triangles.push_back({vertex(), vertex(), vertex()});
+      Both both(mesh);
+      const Matrix3d turn = randomTurn(random);
+      const Vector3d shift = scale * randomPoint(random, -1, 1);
+      both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, shift); });
+      for (int k = 0; k < 40; ++k) {
+        const Vector3d origin = scale * randomPoint(random, -3, 7);
+        const Positions now = placed(mesh.positions, turn, shift);
+        const Vector3d target =
+            k % 2 ? now[vertex()] : Vector3d(scale * randomPoint(random, -3, 7));
+        consistentHits(both, {origin, 3 * (target - origin), -100});
+      }
+    }
+  }
 }
 
 TEST(RayHits, BatchesEqualSingleCalls) {

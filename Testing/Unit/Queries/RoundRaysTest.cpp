@@ -1,5 +1,6 @@
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
+#include "Unit/Queries/Cube.h"
 #include "Unit/Queries/QueryTruth.h"
 
 #include <gtest/gtest.h>
@@ -264,6 +265,14 @@ TEST(RoundRays, PlanesWithTwoSidesHaveOneHit) {
   EXPECT_TRUE(up[0].t == 0.25 && !up[0].frontFace && up[0].crosses);
   EXPECT_TRUE(along[0].t == 0 && !along[0].crosses);
   EXPECT_TRUE(away.empty());
+  const auto point = consistentHits(both, {{0, 0, 1}, {1, 0, 0}, 1, 1});
+  ASSERT_EQ(point.size(), 1u);
+  EXPECT_TRUE(point[0].t == 1 && !point[0].crosses);
+  for (const double z : {-1, 1}) {  // from the plane: t is not -0
+    const auto from = consistentHits(both, {{0, 0, 1}, {0, 0, z}});
+    ASSERT_EQ(from.size(), 1u);
+    EXPECT_TRUE(from[0].t == 0 && !std::signbit(from[0].t) && from[0].crosses);
+  }
 }
 
 /// Small bodies far away, and rays of extreme lengths, keep the accuracy of their coordinates.
@@ -285,6 +294,100 @@ TEST(RoundRays, FarAwayAndOfAnyLength) {
         EXPECT_NEAR(at.norm(), 0.5, 1e-12 * (1 + far));
       }
     }
+  }
+}
+
+/// A ray that starts on the surface of one element, but inside another one, is inside.
+TEST(RoundRays, StartsAndEndsOnSurfacesInsideOtherElements) {
+  const Positions centres{{0, 0, 1}, {0, 0, 0}};
+  for (const bool isSwapped : {false, true}) {
+    TestGeometry balls{GeometryType::Points, centres, {}, {}, {1.0, 5.0}};
+    if (isSwapped) {
+      std::swap(balls.positions[0], balls.positions[1]);
+      std::swap(balls.radii[0], balls.radii[1]);
+    }
+    const Both both(balls);
+    const auto hits = consistentHits(both, {{0, 0, 0}, {0, 0, 1}});
+    ASSERT_EQ(hits.size(), 1u);
+    EXPECT_TRUE(hits[0].t == 5 && !hits[0].frontFace && hits[0].crosses);
+    EXPECT_TRUE(consistentHits(both, {{0, 0, 1}, {0, 0, 1}, 0, 1}).empty());
+    EXPECT_TRUE(consistentHits(both, {{0, 0, 1}, {0, 0, 1}, 1, 1}).empty());
+    EXPECT_TRUE(consistentHits(both, {{0, 0, 0}, {0, 0, 1}, 1, 1}).empty());
+  }
+}
+
+/// As of a closed mesh: the hit where a ray starts or ends enters or leaves.
+TEST(RoundRays, StartsAndEndsOnSurfaces) {
+  const Mesh mesh = cube(-1.0, 1.0);
+  const auto addShape = [](const AnalyticalGeometry& shape) {
+    return [=](OctreeBasedCD& each) { return each.addAnalyticalGeometry(shape); };
+  };
+  const Both bodies[] = {
+      Both(addShape(Sphere{{0, 0, 0}, 1})),
+      Both(addShape(Capsule{{-1, 0, 0}, {1, 0, 0}, 1})),
+      Both(addShape(Box{{0, 0, 0}, {1, 1, 1}})),
+      Both(addShape(Cylinder{{0, 0, -1}, {0, 0, 1}, 1})),
+      Both(addShape(Plane{{0, 0, 1}, {0, 0, 1}, false})),
+      Both(TestGeometry{GeometryType::Points, {{0, 0, 0}}, {}, {}, {1.0}}),
+      Both(TestGeometry{GeometryType::Lines, {{-1, 0, 0}, {1, 0, 0}}, {}, {{0, 1}}, {1.0}}),
+      Both([&](OctreeBasedCD& each) {
+        return each.addTriangleMesh(mesh.positions, mesh.triangles);
+      })};
+  for (std::size_t i = 0; i < std::size(bodies); ++i) {
+    SCOPED_TRACE(i);
+    const auto expectOne = [&](const Ray& ray, double t, bool frontFace) {
+      const auto hits = consistentHits(bodies[i], ray);
+      ASSERT_EQ(hits.size(), 1u);
+      EXPECT_TRUE(hits[0].t == t && hits[0].frontFace == frontFace && hits[0].crosses);
+      EXPECT_EQ(bodies[i].octree.queries().pick(ray, true).has_value(), frontFace);
+    };
+    expectOne({{0, 0, 1}, {0, 0, 1}}, 0, false);          // starts outward
+    expectOne({{0, 0, 1}, {0, 0, -1}, 0, 0.5}, 0, true);  // starts inward
+    expectOne({{0, 0, 3}, {0, 0, -1}, 0, 2}, 2, true);    // ends where it enters
+    expectOne({{0, 0, 0}, {0, 0, 1}, 0, 1}, 1, false);    // ends where it leaves
+    expectOne({{0, 0, 3}, {0, 0, -1}, 2, 2}, 2, true);
+    expectOne({{0, 0, 0}, {0, 0, 1}, 1, 1}, 1, false);
+    if (i != 0 && i != 5) continue;
+    const auto touch = consistentHits(bodies[i], {{1, 0, 5}, {0, 0, -1}});
+    ASSERT_EQ(touch.size(), 1u);
+    EXPECT_TRUE(touch[0].t == 5 && !touch[0].crosses);
+  }
+}
+
+/// Scaled by a power of two, a body and a ray have the same hits.
+TEST(RoundRays, AnyMagnitude) {
+  const auto scaledBodies = [](double s) {
+    const auto add = [](const AnalyticalGeometry& shape) {
+      return Both([=](OctreeBasedCD& each) { return each.addAnalyticalGeometry(shape); });
+    };
+    std::vector<Both> bodies;
+    bodies.push_back(add(Sphere{{0, 0, 0}, 2 * s}));
+    bodies.push_back(add(Capsule{{-s, 0, 0}, {s, 0, 0}, 2 * s}));
+    bodies.push_back(add(Cylinder{{-s, 0, -2 * s}, {0, s, 2 * s}, 3 * s}));
+    const Positions ends{{-s, 0, 0}, {s, s, 0}};
+    bodies.emplace_back(TestGeometry{GeometryType::Points, ends, {}, {}, {2 * s}});
+    bodies.emplace_back(TestGeometry{GeometryType::Lines, ends, {}, {{0, 1}}, {2 * s}});
+    bodies.emplace_back(TestGeometry{GeometryType::Lines, ends, {}, {{0, 1}}, {2 * s, s}});
+    return bodies;
+  };
+  Random random(304);
+  std::vector<Ray> rays;
+  for (int i = 0; i < 20; ++i) {
+    const Vector3d origin = randomPoint(random, -9, 9);
+    rays.push_back({origin, randomPoint(random, -1, 1) - origin});
+  }
+  const std::vector<Both> unscaled = scaledBodies(1.0);
+  for (const int exponent : {-1000, -800, -540, -520, 505, 520, 800, 980}) {
+    const double s = std::ldexp(1.0, exponent);
+    const std::vector<Both> bodies = scaledBodies(s);
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+      for (const Ray& ray : rays) {
+        const auto expected = consistentHits(unscaled[i], ray),
+                   hits = consistentHits(bodies[i], {s * ray.origin, s * ray.direction});
+        ASSERT_EQ(hits.size(), expected.size()) << exponent << ' ' << i;
+        for (std::size_t k = 0; k < hits.size(); ++k)
+          EXPECT_NEAR(hits[k].t, expected[k].t, 1e-14) << exponent << ' ' << i;
+      }
   }
 }
 
