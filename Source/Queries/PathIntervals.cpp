@@ -38,7 +38,7 @@ void append(const PathPart& part, std::vector<PathPart>& parts) {
   PathPart& last = parts.back();
   if (part.leave > last.leave) {
     last.leave = part.leave;
-    last.exit = part.exit;
+    last.exitElement = part.exitElement;
   }
 }
 
@@ -75,15 +75,16 @@ void findPathParts(const SearchableGeometry& body, const PathLine& path, double 
     const bool isDivided = radius == 0.0 && lost != Vector3d::Zero();
     const Ray ray{p, direction, 0.0, isDivided ? kDivision : 1.0};
     RayHits(body, ray, bruteForce, met, radius).forAllParts([&](const RayHits::Part& part) {
-      append({path.at(i, part.first), path.at(i, part.last), part.entry, part.exit}, parts);
+      append({path.at(i, part.first), path.at(i, part.last), part.entryElement, part.exitElement},
+             parts);
     });
     if (!isDivided) continue;
     std::vector<PathPart>& backwards = scratch.backwards;
     backwards.clear();
     const Ray back{q, -direction, 0.0, 1.0 - kDivision};
     RayHits(body, back, bruteForce, met, radius).forAllParts([&](const RayHits::Part& part) {
-      backwards.push_back(
-          {path.at(i, 1.0 - part.last), path.at(i, 1.0 - part.first), part.exit, part.entry});
+      backwards.push_back({path.at(i, 1.0 - part.last), path.at(i, 1.0 - part.first),
+                           part.exitElement, part.entryElement});
     });
     for (; !backwards.empty(); backwards.pop_back()) append(backwards.back(), parts);
   }

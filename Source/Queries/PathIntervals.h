@@ -40,7 +40,7 @@ class PathLine {
 /// or leave the body without meeting its surface. Arc lengths in L.
 struct PathPart {
   double enter, leave;
-  std::uint32_t entry, exit;  ///< elements
+  std::uint32_t entryElement, exitElement;  ///< elements
   bool isSurface = true;
 };
 
@@ -75,11 +75,12 @@ template <class Contains>
 void joinPathParts(GeometryId body, const PathLine& path, std::span<const PathPart> parts,
                    bool surfaceIsInside, Contains&& contains, std::vector<PathInterval>& out) {
   bool isOpen = false;  // out.back() goes on
-  const auto add = [&](double enter, double leave, std::uint32_t entry, std::uint32_t exit) {
-    if (!isOpen) out.push_back({body, enter, leave, entry, exit});
+  const auto add = [&](double enter, double leave, std::uint32_t entryElement,
+                       std::uint32_t exitElement) {
+    if (!isOpen) out.push_back({body, enter, leave, entryElement, exitElement});
     isOpen = true;
     out.back().leave = leave;
-    out.back().exitElement = exit;
+    out.back().exitElement = exitElement;
   };
   for (std::size_t i = 0; i <= parts.size(); ++i) {
     const bool isFirst = i == 0, isLast = i == parts.size();
@@ -88,12 +89,13 @@ void joinPathParts(GeometryId body, const PathLine& path, std::span<const PathPa
     // The path between two parts, with the elements that it comes from and goes to.
     if ((from < to || (parts.empty() && path.length() == 0.0)) &&
         contains(path(from + 0.5 * (to - from))))
-      add(from, to, isFirst ? kNoElement : parts[i - 1].exit, isLast ? kNoElement : parts[i].entry);
+      add(from, to, isFirst ? kNoElement : parts[i - 1].exitElement,
+          isLast ? kNoElement : parts[i].entryElement);
     else if (from < to || !surfaceIsInside)
       isOpen = false;
     if (!isLast && surfaceIsInside && parts[i].isSurface)
-      add(parts[i].enter, parts[i].leave, parts[i].enter > 0.0 ? parts[i].entry : kNoElement,
-          parts[i].leave < path.length() ? parts[i].exit : kNoElement);
+      add(parts[i].enter, parts[i].leave, parts[i].enter > 0.0 ? parts[i].entryElement : kNoElement,
+          parts[i].leave < path.length() ? parts[i].exitElement : kNoElement);
   }
 }
 

@@ -28,8 +28,9 @@ class RayHits {
 
   /// A connected part of what the ray and the elements share.
   struct Part {
-    double first, last;         ///< t
-    std::uint32_t entry, exit;  ///< elements where it begins and ends; the lowest ones there
+    double first, last;  ///< t
+    std::uint32_t entryElement,
+        exitElement;  ///< elements where it begins and ends; the lowest ones there
   };
 
   /// bruteForce: every element is tested. scratch: kept by the caller. radius: L, of the ball whose

@@ -4,7 +4,7 @@
 
 #include "Math/Tolerances.h"
 
-#include <Eigen/LU>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <array>
@@ -48,6 +48,14 @@ bool hasBodyMap(const SearchableGeometry& a, const SearchableGeometry& b, bool w
          isCompact(a.tree) && isCompact(b.tree);
 }
 
+Matrix3d inverseOf(const Matrix3d& m) {
+  const Vector3d x = m.col(1).cross(m.col(2)), y = m.col(2).cross(m.col(0)),
+                 z = m.col(0).cross(m.col(1));
+  Matrix3d inverse;
+  inverse << x.transpose(), y.transpose(), z.transpose();
+  return inverse / m.col(0).dot(x);
+}
+
 /// The map from boxes of a's octree into the frame of b's octree. A position p of the world is at
 /// inverse (p - t) in b's body, where t is b's translation.
 ///
@@ -71,7 +79,7 @@ BoxMap bodyMap(const SearchableGeometry& a, const SearchableGeometry& b, double 
   const auto largest = [](const Vector3d& v) { return v.cwiseAbs().maxCoeff(); };
   const double sizes =
       2.0 * (largest(from.origin) + reachOf(a.tree) + largest(to.origin) + reachOf(b.tree));
-  const Matrix3d inverse = b.mesh.now.transform().rotation.inverse();
+  const Matrix3d inverse = inverseOf(b.mesh.now.transform().rotation);
   BoxMap map;
   const auto add = [&](const RigidTransform& ofA, const RigidTransform& ofB) {
     const double size = sizes + largest(ofA.translation) + largest(ofB.translation);
