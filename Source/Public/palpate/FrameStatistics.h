@@ -24,7 +24,9 @@ struct FrameStatistics {
   /// vertices that belong to no enabled element, so that no pair tests them
   std::size_t untestedVertices = 0;
   std::size_t rebuiltOctrees = 0, refittedOctrees = 0, unchangedOctrees = 0;
-  std::size_t candidatePairs = 0;  ///< element pairs that the narrow phase received
+  /// Element pairs that the narrow phase received. Fewer for two placed bodies whose candidates are
+  /// not kept: their boxes are compared in the frame of one body.
+  std::size_t candidatePairs = 0;
   /// vertex-triangle and edge-edge pairs that the candidates own. Intersection decides each
   /// triangle pair as a whole and counts none.
   std::size_t featurePairs = 0;

@@ -231,11 +231,13 @@ class PALPATE_EXPORT SpatialQueries {
                 const Eigen::Vector3d& translation, double thickness,
                 std::vector<ShapeContact>& out) const;
   /// Finds the contacts that a pair (a, b) of the geometry and the mesh would have with
-  /// Method::Proximity and Contacts::Distinct, with the mesh at this pose: vertices of the geometry
-  /// with triangles of the mesh are in vertexTriangle(), elements of the geometry with vertices of
-  /// the mesh in triangleVertex(), and the normals of edgeEdge() point from the mesh to the
-  /// geometry. Disabled elements have no contacts. Of the collision filter only Sidedness applies.
-  /// validity() has the method, the thickness and the number of contacts only.
+  /// Method::Proximity and Contacts::Distinct, with the mesh at this pose. A thickness of 0 finds
+  /// what touches. Disabled elements have no contacts. Of the collision filter only Sidedness
+  /// applies. validity() has the method, the thickness and the number of contacts only.
+  ///
+  /// Lists    vertexTriangle() has vertices of the geometry with triangles of the mesh.
+  ///          triangleVertex() has elements of the geometry with vertices of the mesh. The normals
+  ///          of edgeEdge() point from the mesh to the geometry.
   ///
   /// Order    that of CollisionData.
   /// Errors   InvalidTransform; UnsupportedMethod if the geometry is a shape; InvalidSettings if the
@@ -251,9 +253,9 @@ class PALPATE_EXPORT SpatialQueries {
   /// then with that of b. If a mesh has no elements, the distance is infinite and the element is
   /// kNoElement.
   ///
-  /// Where radii vary along a line, the distance is the least of all pairs of features: of an edge
-  /// and a vertex, or of two edges, it is that of their closest points less the radii there. The
-  /// surfaces' distance may differ slightly.
+  /// Where radii vary along a line, the distance is the least of all pairs of features. That of an
+  /// edge and a vertex, or of two edges, is the distance of their closest points less the radii
+  /// there. The surfaces' distance may differ slightly.
   ///
   /// Accuracy whether triangles, lines and points without radii have a common point is decided
   ///          exactly. Distances have the accuracy of edgeEdgeDistance().
