@@ -26,8 +26,8 @@ struct FloatRay {
 /// The elements of an octree, and the ray as their positions see it.
 struct RayElements {
   const Triangle* ordered;  ///< elements in the octree's order
-  const Eigen::Vector3d*
-      positions;  ///< per vertex, in the octree's frame but for a shift and scale
+  /// Of the vertices: those of the octree's frame before its shift and scale.
+  const Eigen::Vector3d* positions;
   LineFilter line;
 };
 

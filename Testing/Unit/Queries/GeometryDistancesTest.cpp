@@ -35,6 +35,18 @@ struct Both {
   void change(F&& f) {
     for (OctreeBasedCD* each : {&octree, &bruteForce}) f(*each);
   }
+  /// Moves a geometry to a pose, by setTransform() or by its positions.
+  void put(GeometryId id, const TestGeometry& geometry, const Matrix3d& turn, const Vector3d& shift,
+           bool isPlaced) {
+    Positions now = geometry.positions;
+    for (Vector3d& p : now) p = turn * p + shift;
+    change([&](OctreeBasedCD& each) {
+      if (isPlaced)
+        each.setTransform(id, turn, shift);
+      else
+        each.setPositions(id, now);
+    });
+  }
 
   OctreeBasedCD octree{settingsOf(Engine::Octree)}, bruteForce{settingsOf(Engine::BruteForce)};
   GeometryId a{}, b{};
@@ -133,14 +145,7 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForPlacedBodiesAndFarFromTheOri
         const auto put = [&](GeometryId id, const TestGeometry& geometry, bool isPlaced) {
           const Matrix3d turn = randomTurn(random);
           const Vector3d shift = away + randomPoint(random, -most, most);
-          Positions now = geometry.positions;
-          for (Vector3d& p : now) p = turn * p + shift;
-          both.change([&](OctreeBasedCD& each) {
-            if (isPlaced)
-              each.setTransform(id, turn, shift);
-            else
-              each.setPositions(id, now);
-          });
+          both.put(id, geometry, turn, shift, isPlaced);
         };
         put(both.a, a, placed & 1);
         put(both.b, b, placed & 2);
@@ -169,14 +174,7 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForMeshesOfManyElements) {
       const auto put = [&](GeometryId id, const TestGeometry& geometry, const Vector3d& shift,
                            bool isPlaced) {
         const Matrix3d turn = randomTurn(random);
-        Positions now = geometry.positions;
-        for (Vector3d& p : now) p = turn * p + shift;
-        both.change([&](OctreeBasedCD& each) {
-          if (isPlaced)
-            each.setTransform(id, turn, shift);
-          else
-            each.setPositions(id, now);
-        });
+        both.put(id, geometry, turn, shift, isPlaced);
       };
       put(both.a, a, Vector3d(0.3, -5, 7), placed & 1);
       put(both.b, b, Vector3d(0.3, -5, 7) + aside, placed & 2);
