@@ -26,7 +26,7 @@ HWY_ATTR HWY_INLINE Verdict verdictOf(D d, hn::Mask<D> outside, hn::Mask<D> meet
 }
 
 inline bool isBall(const FloatConvex& shape) {
-  return shape.planeCount == 0 && shape.inverseSquare == 0.0f;
+  return shape.slabCount == 0 && shape.inverseSquare == 0.0f;
 }
 /// 0 for a negative length: nothing is nearer.
 inline float squareOf(float length) { return length > 0.0f ? length * length : 0.0f; }
@@ -70,7 +70,7 @@ HWY_ATTR HWY_INLINE Verdict testBoxes(D d, const FloatConvex& shape, const BoxLa
   const Vector3<V> half{middle * (boxes.upper[0] - boxes.lower[0]),
                         middle * (boxes.upper[1] - boxes.lower[1]),
                         middle * (boxes.upper[2] - boxes.lower[2])};
-  if (shape.planeCount == 0) {
+  if (shape.slabCount == 0) {
     const Vector3<V> u = setAll(d, shape.along), from = centre - setAll(d, shape.start);
     const Vector3<V> w = from - along(d, shape, from) * u;
     const V length = hn::Sqrt(dot(w, w)), radius = hn::Set(d, shape.radius);
@@ -81,13 +81,14 @@ HWY_ATTR HWY_INLINE Verdict testBoxes(D d, const FloatConvex& shape, const BoxLa
                      hn::Lt(length + extent, radius - slack));
   }
   auto outside = hn::Lt(slack, hn::Zero(d)), inside = hn::Ge(slack, hn::Zero(d));
-  for (std::size_t i = 0; i < shape.planeCount; ++i) {
-    const auto& plane = shape.planes[i];
-    const Vector3<V> n = setAll(d, plane.normal);
-    const V height = dot(n, centre) - hn::Set(d, plane.offset);
+  for (std::size_t i = 0; i < shape.slabCount; ++i) {
+    const auto& slab = shape.slabs[i];
+    const Vector3<V> n = setAll(d, slab.normal);
+    const V height = hn::Abs(dot(n, centre) - hn::Set(d, slab.middle));
     const V reach = hn::Abs(n.x) * half.x + hn::Abs(n.y) * half.y + hn::Abs(n.z) * half.z;
-    outside = hn::Or(outside, hn::Gt(height - reach, slack));
-    inside = hn::And(inside, hn::Lt(height + reach, hn::Neg(slack)));
+    const V halfWidth = hn::Set(d, slab.halfWidth);
+    outside = hn::Or(outside, hn::Gt(height - reach, halfWidth + slack));
+    inside = hn::And(inside, hn::Lt(height + reach, halfWidth - slack));
   }
   return verdictOf(d, outside, inside);
 }
@@ -165,7 +166,7 @@ struct Elements {
   }
 };
 
-/// Whether a corner is certainly inside a shape without planes.
+/// Whether a corner is certainly inside a shape without slabs.
 template <class D>
 HWY_ATTR HWY_INLINE hn::Mask<D> hasCornerInside(D d, const FloatConvex& shape,
                                                 const Elements& elements, std::size_t i) {
@@ -186,7 +187,7 @@ HWY_ATTR HWY_INLINE Verdict testTriangles(D d, const FloatConvex& shape, const E
   const Vector3<V> a = elements.corner(d, 0, i), b = elements.corner(d, 1, i),
                    c = elements.corner(d, 2, i);
   const V slack = hn::Set(d, shape.slack), zero = hn::Zero(d);
-  if (shape.planeCount == 0) {
+  if (shape.slabCount == 0) {
     const Vector3<V> start = setAll(d, shape.start), u = setAll(d, shape.along);
     const Vector3<V> p = a - start, q = b - start, r = c - start;
     NearestToSegment<D> nearest(d, shape);
@@ -205,15 +206,17 @@ HWY_ATTR HWY_INLINE Verdict testTriangles(D d, const FloatConvex& shape, const E
   }
   const auto all = hn::Ge(slack, zero);
   auto outside = hn::Lt(slack, zero), ofA = all, ofB = all, ofC = all;
-  for (std::size_t k = 0; k < shape.planeCount; ++k) {
-    const auto& plane = shape.planes[k];
-    const Vector3<V> n = setAll(d, plane.normal);
-    const V offset = hn::Set(d, plane.offset);
-    const V atA = dot(n, a) - offset, atB = dot(n, b) - offset, atC = dot(n, c) - offset;
-    outside = hn::Or(outside, hn::Gt(hn::Min(atA, hn::Min(atB, atC)), slack));
-    ofA = hn::And(ofA, hn::Lt(atA, hn::Neg(slack)));
-    ofB = hn::And(ofB, hn::Lt(atB, hn::Neg(slack)));
-    ofC = hn::And(ofC, hn::Lt(atC, hn::Neg(slack)));
+  for (std::size_t k = 0; k < shape.slabCount; ++k) {
+    const auto& slab = shape.slabs[k];
+    const Vector3<V> n = setAll(d, slab.normal);
+    const V middle = hn::Set(d, slab.middle), halfWidth = hn::Set(d, slab.halfWidth);
+    const V atA = dot(n, a) - middle, atB = dot(n, b) - middle, atC = dot(n, c) - middle;
+    const V least = hn::Min(atA, hn::Min(atB, atC)), most = hn::Max(atA, hn::Max(atB, atC));
+    outside = hn::Or(outside, hn::Gt(hn::Max(least, hn::Neg(most)), halfWidth + slack));
+    const V within = halfWidth - slack;
+    ofA = hn::And(ofA, hn::Lt(hn::Abs(atA), within));
+    ofB = hn::And(ofB, hn::Lt(hn::Abs(atB), within));
+    ofC = hn::And(ofC, hn::Lt(hn::Abs(atC), within));
   }
   return verdictOf(d, outside, hn::Or(ofA, hn::Or(ofB, ofC)));
 }
@@ -235,13 +238,7 @@ class OverlapDescent {
       const std::uint32_t entry = nodes[--count];
       const OctreeNode node = entry & ~kInside;
       const auto [begin, end] = octree.ownRange(node);
-      if (entry & kInside) {
-        for (std::uint32_t i = begin; i < end; ++i) m_elements.push_back(octree.order()[i]);
-      } else {
-        __builtin_prefetch(m_search.ordered + begin);
-        for (std::uint32_t i = begin; i < end; i += kSide)
-          addElements(i, std::min<std::size_t>(kSide, end - i));
-      }
+      addRange(begin, end, entry & kInside);
       const OctreeNode child = octree.firstChild(node);
       if (child == 0) continue;
       const OctreeBlock& block = octree.blocks()[child >> 3];
@@ -252,8 +249,11 @@ class OverlapDescent {
         verdict = test(NodeTag(), block, 0, 8);
       for (std::uint32_t bits = ~verdict.outside & 0xff; bits; bits &= bits - 1) {
         const auto slot = static_cast<unsigned>(std::countr_zero(bits));
-        if (block.isEmpty(slot)) continue;
-        nodes[count++] = (child + slot) | (verdict.meeting >> slot & 1 ? kInside : 0);
+        const bool isInside = verdict.meeting >> slot & 1;
+        if (block.isLeaf(slot))
+          addRange(block.begin[slot], block.begin[slot] + block.count(slot), isInside);
+        else
+          nodes[count++] = (child + slot) | (isInside ? kInside : 0);
       }
     }
     testPending();
@@ -274,6 +274,15 @@ class OverlapDescent {
     return all;
   }
 
+  HWY_ATTR HWY_INLINE void addRange(std::uint32_t begin, std::uint32_t end, bool isInside) {
+    const auto order = m_search.octree.order();
+    if (isInside) {
+      m_elements.insert(m_elements.end(), order.begin() + begin, order.begin() + end);
+      return;
+    }
+    for (std::uint32_t i = begin; i < end; i += kSide)
+      addElements(i, std::min<std::size_t>(kSide, end - i));
+  }
   HWY_ATTR HWY_INLINE void addElements(std::uint32_t first, std::size_t size) {
     const Verdict verdict = test(LeafTag(), m_search.octree.boxes(), first, size);
     for (std::uint32_t bits = ~verdict.outside & ((1u << size) - 1); bits; bits &= bits - 1) {
@@ -293,7 +302,7 @@ class OverlapDescent {
   }
   HWY_ATTR void testPending() {
     const LeafTag d;
-    if (m_search.shape.planeCount > 0) return decide(m_pending);
+    if (m_search.shape.slabCount > 0) return decide(m_pending);
     std::uint32_t inside = 0;
     for (std::size_t i = 0; i < m_pending.size; i += hn::Lanes(d))
       inside |= bitsOf(d, hasCornerInside(d, m_search.shape, m_pending, i)) << i;
@@ -329,7 +338,7 @@ class OverlapDescent {
   std::vector<std::uint32_t>& m_elements;
   Buffer<std::uint32_t>& m_undecided;
   Elements m_pending;
-  Elements m_open;  ///< without a corner inside a shape without planes
+  Elements m_open;  ///< without a corner inside a shape without slabs
 };
 
 HWY_ATTR void searchOverlappingKernel(const OverlapSearch& search,

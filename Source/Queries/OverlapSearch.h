@@ -14,14 +14,14 @@
 namespace palpate {
 
 /// A convex shape in an octree's floats: all points within `radius` of a segment, or, if there are
-/// planes, all points behind every plane.
+/// slabs, all points between both planes of every slab.
 struct FloatConvex {
-  static constexpr std::size_t kMaxPlanes = 32;
-  struct Plane {
-    float normal[3], offset;  ///< behind: normal . x <= offset
+  static constexpr std::size_t kMaxSlabs = 32;
+  struct Slab {
+    float normal[3], middle, halfWidth;  ///< between: |normal . x - middle| <= halfWidth
   };
-  std::array<Plane, kMaxPlanes> planes;
-  std::size_t planeCount = 0;
+  std::array<Slab, kMaxSlabs> slabs;
+  std::size_t slabCount = 0;
   float start[3], along[3], inverseSquare, radius;
   /// A bound on the error of any distance from a plane or from the segment.
   float slack;

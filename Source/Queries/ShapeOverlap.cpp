@@ -14,6 +14,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 
 namespace palpate {
 
@@ -56,16 +57,17 @@ bool meets(const TriangleMesh& mesh, const Triangle& corners, const Shape& shape
 }
 
 /// A convex shape in the world: all points within `radius` of the segment pq, or, if there are
-/// planes, all points x with normal . (x - p) <= offset for every plane.
+/// slabs, all points x with least <= normal . (x - p) <= most for every slab.
 struct Convex {
-  struct Plane {
+  struct Slab {
     Vector3d normal;
-    double offset;
+    double least, most;
+    bool isTwoSided;  ///< otherwise the other slabs and `most` alone bound the shape
   };
   Vector3d p, q;
   double radius = 0;
-  std::array<Plane, FloatConvex::kMaxPlanes> planes;
-  std::size_t planeCount = 0;
+  std::array<Slab, FloatConvex::kMaxSlabs> slabs;
+  std::size_t slabCount = 0;
   double magnitude = 0;  ///< L: about the largest distance of its points from p
 };
 
@@ -74,18 +76,16 @@ Convex convexOf(const Box& box, const RigidTransform& pose) {
   convex.p = convex.q = pose(box.centre);
   const Eigen::Matrix3d axes = orthonormal(pose.rotation);
   for (int k = 0; k < 3; ++k)
-    for (const double sign : {1.0, -1.0})
-      convex.planes[convex.planeCount++] = {sign * axes.col(k), box.halfExtents[k]};
+    convex.slabs[convex.slabCount++] = {axes.col(k), -box.halfExtents[k], box.halfExtents[k], true};
   convex.magnitude = box.halfExtents.sum();
   return convex;
 }
 
 /// None for a hull with many or narrow faces, or without a volume.
 std::optional<Convex> convexOf(const Shape& hull) {
-  constexpr double kNarrow = 1e-3;
+  constexpr double kNarrow = 1e-3, kParallel = 0x1p-46;
   const auto corners = hull.corners();
-  if (!hull.hasCorners() || hull.faces().size() < 4 ||
-      hull.faces().size() > FloatConvex::kMaxPlanes)
+  if (!hull.hasCorners() || hull.faces().size() < 4 || hull.faces().size() > FloatConvex::kMaxSlabs)
     return {};
   Convex convex;
   convex.p = convex.q = corners[0];
@@ -103,14 +103,22 @@ std::optional<Convex> convexOf(const Shape& hull) {
       least = std::min(least, unit.dot(corner - convex.p));
     }
     if (!(most - least > kNarrow * convex.magnitude)) return {};
-    convex.planes[convex.planeCount++] = {unit, most};
+    // Coplanar and opposite faces share a slab.
+    const auto slabs = std::span(convex.slabs).first(convex.slabCount);
+    const auto shared = std::find_if(slabs.begin(), slabs.end(), [&](const Convex::Slab& slab) {
+      return slab.normal.cross(unit).squaredNorm() <= kParallel * kParallel;
+    });
+    if (shared == slabs.end())
+      convex.slabs[convex.slabCount++] = {unit, least, most, false};
+    else if (shared->normal.dot(unit) < 0)
+      shared->isTwoSided = true;
   }
   return convex;
 }
 
-/// Whether a triangle has a point in a shape with planes; none if rounding leaves it open.
-std::optional<bool> meetsPlanes(const Convex& convex, const std::array<Vector3d, 3>& corners) {
-  using Polygon = std::array<Vector3d, 3 + FloatConvex::kMaxPlanes>;
+/// Whether a triangle has a point in a shape with slabs; none if rounding leaves it open.
+std::optional<bool> meetsSlabs(const Convex& convex, const std::array<Vector3d, 3>& corners) {
+  using Polygon = std::array<Vector3d, 3 + FloatConvex::kMaxSlabs>;
   std::array<Vector3d, 3> from;
   double size = convex.magnitude;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -123,15 +131,14 @@ std::optional<bool> meetsPlanes(const Convex& convex, const std::array<Vector3d,
     Polygon polygon, next;
     std::copy(from.begin(), from.end(), polygon.begin());
     std::size_t count = 3;
-    for (std::size_t i = 0; i < convex.planeCount && count > 0; ++i) {
-      const auto& [normal, offset] = convex.planes[i];
-      std::array<double, 3 + FloatConvex::kMaxPlanes> heights;
+    const auto clip = [&](const Vector3d& normal, double offset) {
+      std::array<double, 3 + FloatConvex::kMaxSlabs> heights;
       bool cuts = false;
       for (std::size_t k = 0; k < count; ++k) {
         heights[k] = normal.dot(polygon[k]) - (offset + outward);
         cuts |= heights[k] > 0;
       }
-      if (!cuts) continue;
+      if (!cuts) return;
       std::size_t kept = 0;
       for (std::size_t k = 0; k < count; ++k) {
         const std::size_t l = k + 1 == count ? 0 : k + 1;
@@ -142,6 +149,11 @@ std::optional<bool> meetsPlanes(const Convex& convex, const std::array<Vector3d,
       }
       std::copy(next.begin(), next.begin() + static_cast<std::ptrdiff_t>(kept), polygon.begin());
       count = kept;
+    };
+    for (std::size_t i = 0; i < convex.slabCount && count > 0; ++i) {
+      const auto& [normal, least, most, isTwoSided] = convex.slabs[i];
+      clip(normal, most);
+      if (isTwoSided) clip(-normal, -least);
     }
     return count > 0;
   };
@@ -184,13 +196,14 @@ std::optional<FloatConvex> floatsOf(const Convex& convex, const SearchableGeomet
   const double square = along.squaredNorm();
   floats.inverseSquare = square > 0x1p-100 ? static_cast<float>(1.0 / square) : 0.0f;
   if (!(square > 0x1p-100)) floats.slack += 0x1p-50f;  // the segment counts as its first point
-  floats.planeCount = convex.planeCount;
-  for (std::size_t i = 0; i < convex.planeCount; ++i) {
-    const auto& [normal, offset] = convex.planes[i];
+  floats.slabCount = convex.slabCount;
+  for (std::size_t i = 0; i < convex.slabCount; ++i) {
+    const auto& [normal, least, most, isTwoSided] = convex.slabs[i];
     const Vector3d n =
         now.isPlaced() ? Vector3d(now.transform().rotation.transpose() * normal) : normal;
-    for (int k = 0; k < 3; ++k) floats.planes[i].normal[k] = static_cast<float>(n[k]);
-    floats.planes[i].offset = static_cast<float>(offset * frame.scale + n.dot(p));
+    for (int k = 0; k < 3; ++k) floats.slabs[i].normal[k] = static_cast<float>(n[k]);
+    floats.slabs[i].middle = static_cast<float>(0.5 * (least + most) * frame.scale + n.dot(p));
+    floats.slabs[i].halfWidth = static_cast<float>(0.5 * (most - least) * frame.scale);
   }
   return floats;
 }
@@ -244,11 +257,11 @@ void findOverlapping(const SearchableGeometry& geometry, const AnalyticalGeometr
     build();
     convex = convexOf(*shape);
   }
-  if (convex && convex->planeCount == 0 && convex->p == convex->q)
+  if (convex && convex->slabCount == 0 && convex->p == convex->q)
     return findWithin(geometry, convex->p, convex->radius, bruteForce, near, out);
   near.clear();
   const bool hasRadii =
-      convex && convex->planeCount > 0 ? mesh.largestRadius > 0 : !mesh.radii.empty();
+      convex && convex->slabCount > 0 ? mesh.largestRadius > 0 : !mesh.radii.empty();
   const auto floats =
       convex && !hasRadii && !bruteForce ? floatsOf(*convex, geometry) : std::nullopt;
   if (!floats) {
@@ -270,8 +283,8 @@ void findOverlapping(const SearchableGeometry& geometry, const AnalyticalGeometr
   for (const std::uint32_t place : near) {
     const std::uint32_t element = geometry.tree.octree().order()[place];
     const auto& [a, b, c] = ordered[place];
-    const auto decided = convex->planeCount > 0
-                             ? meetsPlanes(*convex, {mesh.now[a], mesh.now[b], mesh.now[c]})
+    const auto decided = convex->slabCount > 0
+                             ? meetsSlabs(*convex, {mesh.now[a], mesh.now[b], mesh.now[c]})
                              : std::nullopt;
     if (!decided)
       test(element);
