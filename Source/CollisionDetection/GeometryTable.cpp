@@ -237,35 +237,12 @@ void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> el
   geometry.revisions.enabled = geometry.revisions.counter.next();
 }
 
-/// The scale of all float frames. Boxes of two geometries are compared after a shift by the
-/// difference of their origins. Both the floats of most vertices and that shift must be far below
-/// kLargestFloat, because clamped numbers do not add up to the true difference.
-double GeometryTable::chooseScale() {
-  constexpr double kOriginShare = 0x1p-64;  // of 2^120 / 2^16, with a margin
-  double extent = 0;
-  for (const auto& geometry : m_geometries) {
-    extent =
-        std::max(extent, geometry->tree.sampleFrame(geometry->mesh, geometry->revisions.topology));
-    const TriangleMesh& mesh = geometry->mesh;
-    const Eigen::Vector3d& origin = geometry->tree.frame().origin;
-    double magnitude = origin.cwiseAbs().maxCoeff();
-    for (const Positions* positions : {&mesh.now, &mesh.before})
-      if (positions->isPlaced())
-        magnitude = std::max(magnitude, positions->transform().translation.cwiseAbs().maxCoeff());
-    extent = std::max(extent, kOriginShare * magnitude);
-  }
-  return frameScale(extent);
-}
-
 void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads& threads) {
-  const double scale = chooseScale();
-  updateOctrees(scale, settings, threads);
-  // If floats were clamped, their geometry's reach() gives another scale.
-  if (const double next = chooseScale(); next != scale) updateOctrees(next, settings, threads);
-}
-
-void GeometryTable::updateOctrees(double scale, const OctreeSettings& settings,
-                                  const Threads& threads) {
+  double spread = 0;
+  for (const auto& geometry : m_geometries)
+    spread =
+        std::max(spread, geometry->tree.sampleFrame(geometry->mesh, geometry->revisions.topology));
+  const double scale = frameScale(spread);
   m_changed.clear();
   for (const auto& geometry : m_geometries)
     if (!geometry->tree.isCurrent(geometry->mesh, geometry->revisions.topology, scale))

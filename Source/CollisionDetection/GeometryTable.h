@@ -55,9 +55,6 @@ class GeometryTable {
   GeometryId nextId() const;  ///< of what is added next; throws if there are no more
 
  private:
-  double chooseScale();
-  void updateOctrees(double scale, const OctreeSettings&, const Threads&);
-
   /// A geometry with its topology, and positions at both ends of the step; not yet in the table.
   std::unique_ptr<Geometry> make(std::vector<Eigen::Vector3d> rest, MeshTopology) const;
   GeometryId add(std::unique_ptr<Geometry>);

@@ -45,20 +45,8 @@ double GeometryOctree::sampleFrame(const TriangleMesh& mesh, Revision topology) 
     const SampledExtent extent = sampleExtent(mesh.now.body());
     m_frame.origin = extent.median;
     m_spread = extent.spread;
-    m_reach = 0;
   }
-  return std::max(m_spread, m_reach);
-}
-
-double GeometryOctree::reachOf(const TriangleMesh& mesh) const {
-  double reach = 0;
-  const auto add = [&](std::span<const Eigen::Vector3d> positions) {
-    for (const Eigen::Vector3d& p : positions)
-      reach = std::max(reach, (p - m_frame.origin).cwiseAbs().maxCoeff());
-  };
-  add(mesh.now.body());
-  if (m_treeSwept) add(mesh.before.body());
-  return reach;
+  return m_spread;
 }
 
 void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double scale,
@@ -95,7 +83,6 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
       lastUpdate = LooseOctree::Update::Rebuilt;
     }
     m_isBuilt = true;
-    if (m_octree.box(0).mayBeClamped()) m_reach = reachOf(mesh);
   }
   ++m_updates;
   m_treeVersion.commit(now);
@@ -108,7 +95,6 @@ void GeometryOctree::copy(const GeometryOctree& other) {
   m_isBuilt = false;
   m_frame = other.m_frame;
   m_spread = other.m_spread;
-  m_reach = other.m_reach;
   resizeSparingly(m_floats, other.m_floats.size());
   std::copy(other.m_floats.begin(), other.m_floats.end(), m_floats.begin());
   m_octree.copy(other.m_octree);

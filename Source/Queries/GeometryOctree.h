@@ -26,7 +26,7 @@ class GeometryOctree {
   void setSwept(bool swept) { m_swept = swept; }
   bool isSwept() const { return m_swept; }
   /// Call before update(). Chooses the float frame's origin for the positions now, if the tree is
-  /// outdated. Returns the largest of spread() and reach().
+  /// outdated. Returns spread().
   double sampleFrame(const TriangleMesh&, Revision topology);
   bool isCurrent(const TriangleMesh&, Revision topology, double scale) const;
   /// scale: the scale of the float frames, common to all geometries.
@@ -47,9 +47,6 @@ class GeometryOctree {
   const Octree& octree() const { return m_octree; }
   const FloatFrame& frame() const { return m_frame; }
   double spread() const { return m_spread; }  ///< L: extent of most positions
-  /// L: the largest distance from the frame's origin along an axis, if the last update clamped
-  /// floats; otherwise 0.
-  double reach() const { return m_reach; }
   const FloatPoint* floats() const { return m_floats.data(); }
   /// The floats at the step's start if the boxes enclose the step, else those of the positions now.
   const FloatPoint* floatsAtStart() const {
@@ -69,13 +66,12 @@ class GeometryOctree {
   void computeBoxes(const TriangleMesh&, std::span<const std::uint32_t> groups,
                     FloatBox* groupBoxes, std::size_t grain, const Threads&, bool reordered);
   FloatBox bounds(const TriangleMesh&, const Threads&);
-  double reachOf(const TriangleMesh&) const;
   void startOrdered(std::size_t size);
   void rebuild(const TriangleMesh&, const OctreeSettings&, const Threads&);
   void fitBoxes(const TriangleMesh&, const OctreeSettings&, const Threads&, bool rebuilt);
 
   FloatFrame m_frame;
-  double m_spread = 0, m_reach = 0;
+  double m_spread = 0;
   bool m_swept = false, m_treeSwept = false;
   Buffer<FloatPoint> m_floats, m_floatsBefore;
   std::span<Triangle> m_ordered;  ///< empty during a build
