@@ -36,7 +36,13 @@ constexpr std::array<std::string_view, 3> kContactsBefore9{"Distinct", "All", "E
 constexpr std::array<std::string_view, 2> kEngines{"Octree", "BruteForce"};
 constexpr std::array<std::string_view, 2> kUpdates{"Auto", "Rebuild"};
 
-std::string quoted(std::string_view text) { return std::string("\"").append(text).append("\""); }
+/// For messages: long words are cut.
+std::string quoted(std::string_view text) {
+  constexpr std::size_t kMost = 40;
+  return std::string("\"")
+      .append(text.substr(0, kMost))
+      .append(text.size() > kMost ? "...\"" : "\"");
+}
 
 /// Writes a text of words. Line breaks are for human readers only.
 class Writer {
@@ -57,7 +63,7 @@ class Writer {
     word({text, static_cast<std::size_t>(end - text)});
   }
   void expect(std::string_view text) { word(text); }
-  void count(std::size_t value) { integer(value); }
+  void count(std::size_t value, std::size_t = 0) { integer(value); }
   void endLine() { m_text.back() = '\n'; }
   const std::string& text() const { return m_text; }
 
@@ -107,10 +113,11 @@ class Reader {
         end != found.end() || fault != std::errc())
       fail(quoted(found) + " is not a number");
   }
-  /// Reads the number of items that follow. Refuses more than the file has characters left.
-  void count(std::size_t& value) {
+  /// Reads the number of items that follow. Refuses more than the rest of the file can hold if each
+  /// takes at least so many characters, the space after it included.
+  void count(std::size_t& value, std::size_t least) {
     integer(value);
-    if (value > m_rest.size())
+    if (value > (m_rest.size() + 1) / least)
       fail("the file is truncated: too few lines for " + std::to_string(value));
   }
   void endLine() {}
@@ -161,17 +168,23 @@ void fieldOf(File& file, auto& value) {
   }
 }
 
-/// The size of a list. A Reader resizes the list to it.
+// Least numbers of characters of items: a digit and a space for each number.
+constexpr std::size_t kNumberText = 2, kPointText = 3 * kNumberText, kVertexText = 2 * kPointText,
+                      kTriangleText = 3 * kNumberText, kTetrahedronText = 4 * kNumberText,
+                      kGeometryText = std::string_view("geometry 0 0 0 ").size(),
+                      kPairText = std::string_view("pair 0 0 Auto Auto 0 All ").size();
+
+/// The size of a list. A Reader resizes the list to it. least: characters of an item.
 template <class File>
-void sizeOf(File& file, auto& list) {
+void sizeOf(File& file, auto& list, std::size_t least) {
   std::size_t size = list.size();
-  file.count(size);
+  file.count(size, least);
   if constexpr (kReads<File>) list.resize(size);
 }
 
 template <class File>
 void listOf(File& file, auto& list) {
-  sizeOf(file, list);
+  sizeOf(file, list, kNumberText);
   fieldOf(file, list);
 }
 
@@ -212,7 +225,7 @@ void filterOf(File& file, FilterType& filter) {
 template <class File, class MeshType>
 void shapeOf(File& file, MeshType& mesh, int version) {
   forEachField(*mesh.analytical, [&](std::string_view, auto& field) {
-    if constexpr (requires { field.capacity(); }) sizeOf(file, field);
+    if constexpr (requires { field.capacity(); }) sizeOf(file, field, kPointText);
     fieldOf(file, field);
   });
   const auto transform = [&](auto& rotation, auto& translation) {
@@ -242,8 +255,8 @@ void meshLines(File& file, MeshType& mesh, int version) {
   file.expect("geometry");
   auto id = static_cast<std::uint32_t>(mesh.id);
   file.integer(id);
-  sizeOf(file, mesh.now);
-  sizeOf(file, mesh.triangles);
+  sizeOf(file, mesh.now, kVertexText);
+  sizeOf(file, mesh.triangles, kTriangleText);
   if (version >= 3) {
     file.word(mesh.type, kGeometryTypes);
     listOf(file, mesh.radii);
@@ -259,9 +272,9 @@ void meshLines(File& file, MeshType& mesh, int version) {
   if (version >= 4) {
     filterOf(file, mesh.filter);
     listOf(file, mesh.disabled);
-    file.count(rest);
+    file.count(rest, kNumberText);
   }
-  if (version >= 8) sizeOf(file, mesh.tetrahedra);
+  if (version >= 8) sizeOf(file, mesh.tetrahedra, kTetrahedronText);
   file.endLine();
   if constexpr (kReads<File>) {
     mesh.id = GeometryId{id};
@@ -289,8 +302,8 @@ template <class File, class ProblemType>
 void problemLines(File& file, ProblemType& problem, int version) {
   settingsLine(file, problem.settings);
   file.endLine();
-  sizeOf(file, problem.geometries);
-  sizeOf(file, problem.pairs);
+  sizeOf(file, problem.geometries, kGeometryText);
+  sizeOf(file, problem.pairs, kPairText);
   file.endLine();
   for (auto& mesh : problem.geometries) meshLines(file, mesh, version);
   for (auto& pair : problem.pairs) {

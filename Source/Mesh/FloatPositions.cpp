@@ -21,12 +21,14 @@ HWY_ATTR void toFloatsKernel(const Eigen::Vector3d* positions, std::size_t size,
   // Each load has a point and the next point's x, which is scaled to zero.
   const hn::FixedTag<double, 4> d;
   const hn::FixedTag<float, 4> df;
-  alignas(32) const double corner[4] = {frame.origin[0], frame.origin[1], frame.origin[2], 0.0},
-                           scales[4] = {frame.scale, frame.scale, frame.scale, 0.0};
-  const auto origin = hn::Load(d, corner), scale = hn::Load(d, scales);
+  const double down = frame.shrinking(), up = frame.growing();
+  alignas(32) const double corner[4] = {frame.origin[0] * down, frame.origin[1] * down,
+                                        frame.origin[2] * down, 0.0},
+                           downs[4] = {down, down, down, 0.0};
+  const auto origin = hn::Load(d, corner), shrinking = hn::Load(d, downs), growing = hn::Set(d, up);
   const auto most = hn::Set(d, kLargestFloat), least = hn::Neg(most);
   for (; i + 1 < size; ++i) {
-    const auto point = (hn::LoadU(d, positions[i].data()) - origin) * scale;
+    const auto point = (hn::LoadU(d, positions[i].data()) * shrinking - origin) * growing;
     hn::Store(hn::DemoteTo(df, hn::Min(hn::Max(point, least), most)), df, &out[i].x);
   }
 #endif

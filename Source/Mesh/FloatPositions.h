@@ -25,12 +25,19 @@ struct FloatFrame {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   double scale = 1.0;
 
+  /// (to - from) scale, also where the difference is beyond the range of doubles.
+  Eigen::Vector3d scaled(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
+    return (to * shrinking() - from * shrinking()) * growing();
+  }
+  double shrinking() const { return std::min(scale, 1.0); }
+  double growing() const { return std::max(scale, 1.0); }
+
   /// Rounds to nearest and clamps to kLargestFloat. Clamping brings no two points further apart.
   FloatPoint operator()(const Eigen::Vector3d& position) const {
+    const Eigen::Vector3d v = scaled(origin, position);
     const auto of = [&](int k) {
       constexpr double kMax = kLargestFloat;
-      const double v = (position[k] - origin[k]) * scale;
-      return static_cast<float>(std::min(std::max(v, -kMax), kMax));
+      return static_cast<float>(std::min(std::max(v[k], -kMax), kMax));
     };
     return {of(0), of(1), of(2), 0.0f};
   }

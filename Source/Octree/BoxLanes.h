@@ -54,6 +54,18 @@ struct BoxLanes {
     }
     return lanes;
   }
+  /// Bounds that were clamped to float's range may be anywhere beyond it.
+  HWY_ATTR HWY_INLINE BoxLanes unclamped() const {
+    const D d;
+    const auto most = hn::Set(d, kLargestFloat), least = hn::Neg(most),
+               infinity = hn::Set(d, std::numeric_limits<float>::infinity());
+    BoxLanes lanes;
+    for (int k = 0; k < 3; ++k) {
+      lanes.lower[k] = hn::IfThenElse(hn::Le(lower[k], least), hn::Neg(infinity), lower[k]);
+      lanes.upper[k] = hn::IfThenElse(hn::Ge(upper[k], most), infinity, upper[k]);
+    }
+    return lanes;
+  }
   /// Maps the boxes by one end of a BoxMap, whose comment derives the rounding.
   HWY_ATTR HWY_INLINE BoxLanes mapped(const BoxMap::End& end) const {
     const D d;

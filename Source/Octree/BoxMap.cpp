@@ -27,12 +27,15 @@ HWY_EXPORT(mapKernel);
 
 void setShift(std::array<float, 4>& lower, std::array<float, 4>& upper,
               const std::array<double, 3>& offset, double thickness) {
-  constexpr double kMax = 0x1p125;  // boxes of kLargestFloat stay finite
-  const auto clamped = [&](double v) { return std::min(std::max(v, -kMax), kMax); };
+  constexpr double kMax = 0x1p125;      // boxes of kLargestFloat stay finite
+  constexpr double kFinite = 0x1p1000;  // so is each sum; the error covers what is cut off
+  const auto clamped = [](double v, double most) { return std::min(std::max(v, -most), most); };
+  const double widened = clamped(thickness, kFinite);
   for (int k = 0; k < 3; ++k) {
-    const double error = (std::abs(offset[k]) + thickness) * OutwardRounding::kRelative;
-    lower[k] = static_cast<float>(clamped(offset[k] - thickness - error));
-    upper[k] = static_cast<float>(clamped(offset[k] + thickness + error));
+    const double moved = clamped(offset[k], kFinite);
+    const double error = (std::abs(moved) + widened) * OutwardRounding::kRelative;
+    lower[k] = static_cast<float>(clamped(moved - widened - error, kMax));
+    upper[k] = static_cast<float>(clamped(moved + widened + error, kMax));
   }
 }
 

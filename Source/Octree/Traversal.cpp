@@ -77,12 +77,15 @@ class Walk {
   template <class D>
   HWY_ATTR HWY_INLINE BoxLanes<D> placedA(const BoxLanes<D>& boxes) const {
     if (placement == Placement::None) return boxes;
-    if (placement == Placement::Mapped && m_trees.mapA.count > 0) return boxes.mapped(m_trees.mapA);
-    return boxes.shifted(m_trees.shiftLower, m_trees.shiftUpper);
+    if (placement == Placement::Shifted)
+      return boxes.shifted(m_trees.shiftLower, m_trees.shiftUpper);
+    if (m_trees.mapA.count > 0) return boxes.mapped(m_trees.mapA);
+    return boxes.unclamped().shifted(m_trees.shiftLower, m_trees.shiftUpper);
   }
   template <class D>
   HWY_ATTR HWY_INLINE BoxLanes<D> placedB(const BoxLanes<D>& boxes) const {
-    return placement == Placement::Mapped ? boxes.mapped(m_trees.mapB) : boxes;
+    if (placement != Placement::Mapped) return boxes;
+    return m_trees.mapB.count > 0 ? boxes.mapped(m_trees.mapB) : boxes.unclamped();
   }
 
   /// The box of one node of a, in the frame in which boxes are compared.

@@ -86,7 +86,11 @@ struct TreePair {
   BoxMap mapA{}, mapB{};
 
   bool self() const { return a == b; }
-  bool isMapped() const { return mapA.count > 0 || mapB.count > 0; }
+  /// Whether a box of either tree was clamped to float's range. Clamped bounds in two frames are
+  /// not comparable. Not used for one tree with itself.
+  bool isClamped = false;
+
+  bool isMapped() const { return mapA.count > 0 || mapB.count > 0 || isClamped; }
   bool isShifted() const {
     const std::array<float, 4> none{};
     return shiftLower != none || shiftUpper != none;

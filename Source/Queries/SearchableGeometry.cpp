@@ -34,6 +34,10 @@ double reachOf(const GeometryOctree& tree) {
   return reach / tree.frame().scale;
 }
 
+bool mayBeClamped(const GeometryOctree& tree) {
+  return tree.octree().isBuilt() && tree.octree().box(0).mayBeClamped();
+}
+
 /// Whether rounding errors of the furthest vertices are much smaller than most boxes. It implies
 /// that no position is clamped to the range of floats.
 bool isCompact(const GeometryOctree& tree) {
@@ -126,6 +130,7 @@ BoxMap worldMap(const SearchableGeometry& geometry, const Vector3d& origin, doub
 TreePair treesOf(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
                  bool wholeStep, BoxFrame frame) {
   TreePair trees{&a.tree.octree(), &b.tree.octree()};
+  trees.isClamped = mayBeClamped(a.tree) || mayBeClamped(b.tree);
   if (frame == BoxFrame::Body && hasBodyMap(a, b, wholeStep)) {
     trees.mapA = bodyMap(a, b, thickness, wholeStep);
     return trees;
@@ -135,7 +140,7 @@ TreePair treesOf(const SearchableGeometry& a, const SearchableGeometry& b, doubl
     return trees;
   }
   const double scale = a.tree.frame().scale;
-  const Vector3d origin = worldOrigin(b), offset = (worldOrigin(a) - origin) * scale;
+  const Vector3d origin = worldOrigin(b), offset = a.tree.frame().scaled(origin, worldOrigin(a));
   setShift(trees, {offset[0], offset[1], offset[2]}, thickness * scale);
   trees.mapA = worldMap(a, origin, thickness * scale, wholeStep);
   trees.mapB = worldMap(b, origin, 0.0, wholeStep);

@@ -25,6 +25,9 @@ class FailingAllocation {
   static std::size_t count();
   /// Whether an allocation failed since the last arm().
   static bool failed();
+  /// The largest number of bytes that were allocated at once between the last arm() and the
+  /// disarm() after it, or until now, less those that were allocated before.
+  static std::size_t peakBytes();
 };
 
 }  // namespace palpate::testing

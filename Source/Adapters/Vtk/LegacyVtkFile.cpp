@@ -42,16 +42,16 @@ class Reader {
   void readSection(const std::string& section) {
     if (section == "DATASET") {
       const std::string dataSet = keyword();
-      if (dataSet != "POLYDATA") throw FileFault{"its data set is " + dataSet + ", not POLYDATA"};
+      if (dataSet != "POLYDATA")
+        throw FileFault{"its data set is " + dataSet.substr(0, 40) + ", not POLYDATA"};
     } else if (section == "POINTS") {
       const std::size_t count = m_text.count();
-      m_polygons.positions.clear();
+      m_polygons.clearPositions();
       m_polygons.addPositions(readArray(3 * count));
     } else if (section == "POLYGONS" || section == "TRIANGLE_STRIPS") {
-      readCells(m_polygons, section == "TRIANGLE_STRIPS");
+      readCells(&m_polygons, section == "TRIANGLE_STRIPS");
     } else if (section == "VERTICES" || section == "LINES") {
-      Polygons ignored;
-      readCells(ignored, false);
+      readCells(nullptr, false);
     } else if (section == "FIELD") {  // arrays of data about the whole mesh
       m_text.word();
       for (std::size_t arrays = m_text.count(); arrays > 0; --arrays) {
@@ -74,11 +74,14 @@ class Reader {
     return m_text.numbers(type, count);
   }
 
-  void readCells(Polygons& polygons, bool strips) {
+  /// Without polygons, the cells are skipped.
+  void readCells(Polygons* polygons, bool strips) {
     const std::size_t first = m_text.count(), second = m_text.count();
     if (m_offsets) {  // the start of each cell and the end of the last; then all corners
       const std::vector<double> offsets = readNamed("OFFSETS", first);
-      return polygons.addCells(offsets, readNamed("CONNECTIVITY", second), strips);
+      const std::vector<double> corners = readNamed("CONNECTIVITY", second);
+      if (polygons) polygons->addCells(offsets, corners, strips);
+      return;
     }
     m_text.line();
     const NumberType type = typeNamed("int");
@@ -87,9 +90,13 @@ class Reader {
       const double length = left > 0 ? m_text.number(type) : -1;
       if (length < 0 || length >= static_cast<double>(left) || length != std::floor(length))
         throw FileFault{"cell " + std::to_string(i) + " (from 0) has a wrong number of corners"};
-      std::vector<double> cell = m_text.numbers(type, static_cast<std::size_t>(length));
-      left -= 1 + cell.size();
-      strips ? polygons.addStrip(cell) : polygons.corners.push_back(std::move(cell));
+      const auto corners = static_cast<std::size_t>(length);
+      for (std::size_t k = 0; k < corners; ++k) {
+        const double corner = m_text.number(type);
+        if (polygons) polygons->addCorner(corner);
+      }
+      left -= 1 + corners;
+      if (polygons) polygons->endCell(strips);
     }
     if (left > 0) throw FileFault{"its cells have fewer corners than their count"};
   }

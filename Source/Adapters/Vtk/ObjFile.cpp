@@ -21,11 +21,13 @@ void readStatement(std::string_view line, Polygons& polygons) {
   FileText text(line.substr(0, line.find('#')));
   const std::string_view keyword = text.word();
   if (keyword == "v") {
-    for (double& x : polygons.positions.emplace_back()) x = text.number();
+    Eigen::Vector3d position;
+    for (double& x : position) x = text.number();
+    polygons.addPosition(position);
   } else if (keyword == "f") {
-    std::vector<double>& corners = polygons.corners.emplace_back();
     for (std::string_view corner = text.word(); !corner.empty(); corner = text.word())
-      corners.push_back(vertexOf(corner, polygons.positions.size()));
+      polygons.addCorner(vertexOf(corner, polygons.positionCount()));
+    polygons.endCell(false);
   }
 }
 

@@ -1,7 +1,8 @@
 #include "Vtk/MeshFile.h"
 
-#include <algorithm>
 #include <optional>
+#include <string>
+#include <vector>
 
 namespace palpate::vtk {
 
@@ -56,14 +57,46 @@ std::vector<Element> readHeader(FileText& text) {
   throw FileFault{"its PLY header is truncated"};
 }
 
-/// Adds the corners of a face, or triangle strips that are separated by -1.
-void addList(const std::string& element, const std::vector<double>& list, Polygons& polygons) {
-  if (element == "face") polygons.corners.push_back(list);
-  for (auto begin = list.begin(); element == "tristrips" && begin != list.end();) {
-    const auto end = std::find(begin, list.end(), -1.0);
-    polygons.addStrip({begin, end});
-    begin = end + (end != list.end());
+/// The axis of a coordinate's property; none of any other.
+std::optional<int> axisOf(const Property& property) {
+  const bool isAxis = !property.countType && property.name.size() == 1 && property.name >= "x" &&
+                      property.name <= "z";
+  return isAxis ? std::optional(property.name[0] - 'x') : std::nullopt;
+}
+
+/// The least number of bytes that an item of the element takes.
+std::size_t leastSize(const Element& element, Encoding encoding) {
+  std::size_t size = 0;
+  for (const Property& property : element.properties)
+    size += encoding == Encoding::Ascii ? 2 : property.countType.value_or(property.type).size;
+  return size;
+}
+
+void checkElement(const Element& element, const FileText& text) {
+  std::size_t axes = 0;
+  for (const Property& property : element.properties) axes += axisOf(property).has_value();
+  if (element.name == "vertex" && element.count > 0 && axes < 3)
+    throw FileFault{"its vertices lack a coordinate"};
+  // The last item need not end with white space.
+  if (element.count > 0 && (element.count - 1) * leastSize(element, text.encoding()) > text.left())
+    throw FileFault{"it is shorter than its counts require"};
+}
+
+/// Reads the corners of a face, or of triangle strips that are separated by -1, or skips a list.
+void readList(FileText& text, const Property& property, std::string_view element,
+              Polygons& polygons) {
+  const bool isCorners = property.name.starts_with("vertex_ind");
+  const bool isFace = isCorners && element == "face",
+             isStrips = isCorners && element == "tristrips";
+  for (std::size_t left = toCount(text.number(*property.countType), text.left()); left > 0;
+       --left) {
+    const double corner = text.number(property.type);
+    if (isStrips && corner == -1.0)
+      polygons.endCell(true);
+    else if (isFace || isStrips)
+      polygons.addCorner(corner);
   }
+  if (isFace || (isStrips && polygons.hasOpenCell())) polygons.endCell(isStrips);
 }
 
 }  // namespace
@@ -72,19 +105,20 @@ Polygons readPly(std::string_view content) {
   FileText text(content);
   Polygons polygons;
   for (const Element& element : readHeader(text)) {
-    for (std::size_t i = 0; i < element.count; ++i) {
+    checkElement(element, text);
+    const bool isVertex = element.name == "vertex";
+    if (isVertex) polygons.reservePositions(element.count);
+    for (std::size_t i = element.properties.empty() ? element.count : 0; i < element.count; ++i) {
       Eigen::Vector3d position = Eigen::Vector3d::Zero();
-      for (const auto& [name, type, countType] : element.properties) {
-        if (countType) {
-          const std::size_t length = toCount(text.number(*countType), text.left());
-          const std::vector<double> list = text.numbers(type, length);
-          if (name.starts_with("vertex_ind")) addList(element.name, list, polygons);
+      for (const Property& property : element.properties) {
+        if (property.countType) {
+          readList(text, property, element.name, polygons);
           continue;
         }
-        const double value = text.number(type);
-        if (name.size() == 1 && name >= "x" && name <= "z") position[name[0] - 'x'] = value;
+        const double value = text.number(property.type);
+        if (const auto axis = axisOf(property)) position[*axis] = value;
       }
-      if (element.name == "vertex") polygons.positions.push_back(position);
+      if (isVertex) polygons.addPosition(position);
     }
   }
   return polygons;

@@ -19,10 +19,12 @@ namespace palpate::vtk {
 
 namespace {
 
-/// Decodes the text up to the first group that is not Base64. Padding ends a group, not the text.
-std::string fromBase64(std::string_view text) {
+/// Decodes at least `most` bytes of the text, or all up to the first group that is not Base64.
+/// Padding ends a group, not the text.
+std::string fromBase64(std::string_view text, std::size_t most) {
   std::string bytes, group;
   for (const char c : text) {
+    if (bytes.size() >= most) break;
     if (std::isspace(static_cast<unsigned char>(c))) continue;
     if ((group += c).size() < 4) continue;
     unsigned char decoded[3];
@@ -46,7 +48,7 @@ std::string_view elementIn(std::string_view text, const std::string& name) {
 
 /// The value of an attribute in an element's tag; empty if there is none.
 std::string_view attributeOf(std::string_view element, const std::string& name) {
-  const std::string_view tag = element.substr(0, element.find('>'));
+  const std::string_view tag = element.substr(0, element.find_first_of("<>", 1));
   const std::size_t begin = tag.find(" " + name + "=\"");
   if (begin == tag.npos) return "";
   const std::string_view value = tag.substr(begin + name.size() + 3);
@@ -67,7 +69,7 @@ vtkSmartPointer<vtkDataCompressor> compressorNamed(std::string_view name) {
 class Reader {
  public:
   explicit Reader(std::string_view content)
-      : m_xml(content.substr(0, content.find("<AppendedData"))), m_maxCount(1000 * content.size()) {
+      : m_xml(content.substr(0, content.find("<AppendedData"))), m_storedLeft(2 * content.size()) {
     // Appended data need not be XML. They follow the "_" after their tag.
     const std::string_view appended = content.substr(m_xml.size());
     const std::size_t start = appended.find('_', appended.find('>'));
@@ -77,13 +79,15 @@ class Reader {
     if (attributeOf(file, "byte_order") == "BigEndian") m_encoding = Encoding::BigEndian;
     if (attributeOf(file, "header_type") == "UInt64") m_headerType = typeNamed("UInt64");
     m_compressor = compressorNamed(attributeOf(file, "compressor"));
+    m_decodedLeft = (m_compressor ? kMostCompression : 1) * content.size();
   }
 
   Polygons read() {
     const std::string_view data = elementIn(m_xml, "PolyData");
-    for (std::size_t at = data.find("<Piece"); at != data.npos; at = data.find("<Piece", at + 1)) {
+    for (std::size_t at = data.find("<Piece"); at != data.npos; at = data.find("<Piece", at)) {
       const std::string_view piece = elementIn(data.substr(at), "Piece");
-      const std::size_t first = m_polygons.positions.size(), points = count(piece, "Points");
+      at += piece.size();
+      const std::size_t first = m_polygons.positionCount(), points = count(piece, "Points");
       if (points > 0) m_polygons.addPositions(readArray(piece, "Points", "", 3 * points));
       for (const std::string group : {"Polys", "Strips"})
         if (const std::size_t cells = count(piece, group)) readCells(piece, group, cells, first);
@@ -94,24 +98,22 @@ class Reader {
  private:
   std::size_t count(std::string_view piece, const std::string& group) const {
     const std::string_view text = attributeOf(piece, "NumberOf" + group);
-    return text.empty() ? 0 : toCount(toNumber(text), m_maxCount);
+    return text.empty() ? 0 : toCount(toNumber(text), m_decodedLeft);
   }
 
   void readCells(std::string_view piece, const std::string& group, std::size_t cells,
                  std::size_t first) {
     std::vector<double> offsets = readArray(piece, group, "offsets", cells);
     offsets.insert(offsets.begin(), 0.0);
-    std::vector<double> corners =
-        readArray(piece, group, "connectivity", toCount(offsets.back(), m_maxCount));
-    const double points = static_cast<double>(m_polygons.positions.size() - first);
-    for (double& corner : corners)  // -1 is refused later: the corner is not in the piece
-      corner = corner >= 0 && corner < points ? corner + static_cast<double>(first) : -1;
-    m_polygons.addCells(offsets, corners, group == "Strips");
+    const std::vector<double> corners =
+        readArray(piece, group, "connectivity", toCount(offsets.back(), m_decodedLeft));
+    m_polygons.addCells(offsets, corners, group == "Strips", first,
+                        m_polygons.positionCount() - first);
   }
 
   /// The array of that name in a group of the piece; the first one if the name is empty.
   std::vector<double> readArray(std::string_view piece, const std::string& group,
-                                std::string_view name, std::size_t size) const {
+                                std::string_view name, std::size_t size) {
     std::string_view array = elementIn(piece, group);
     do {
       array = array.substr(std::min(array.find("<DataArray", 1), array.size()));
@@ -126,29 +128,57 @@ class Reader {
       text = m_appended.substr(toCount(toNumber(attributeOf(array, "offset")), m_appended.size()));
     else if (format != "binary")
       return FileText(text).numbers(type, size);
-    const bool raw = m_raw && format == "appended";
-    const std::string bytes = uncompressed(raw ? text : fromBase64(text), size * type.size);
+    const std::size_t expected = toCount(static_cast<double>(size * type.size), m_decodedLeft);
+    m_decodedLeft -= expected;
+    const std::string bytes = arrayBytes(text, m_raw && format == "appended", expected);
     return FileText(bytes, m_encoding).numbers(type, size);
   }
 
-  /// The bytes that follow a block's header, decompressed. Without compression the header is the
+  /// The first bytes of a text, or all that it has, in Base64 or not. All calls together read no
+  /// more than the file has, so that arrays that share their bytes do not take quadratic time.
+  std::string stored(std::string_view text, bool raw, std::size_t size) {
+    if (size > m_storedLeft) throw FileFault{"its arrays are longer than the file"};
+    m_storedLeft -= size;
+    return raw ? std::string(text.substr(0, size)) : fromBase64(text, size);
+  }
+
+  /// The bytes that follow an array's header, decompressed. Without compression the header is the
   /// length. Otherwise it is the number of compressed blocks, their length before compression, that
   /// of the last one (0: as the others), and all lengths after compression.
-  std::string uncompressed(std::string_view block, std::size_t expected) const {
-    FileText text(block, m_encoding);
-    const auto length = [&] { return toCount(text.number(m_headerType), std::size_t{1} << 53); };
-    if (m_compressor == nullptr) return std::string(text.take(length()));
-    const std::size_t blocks = length(), fullSize = length(), lastSize = length();
-    const std::vector<double> lengths = text.numbers(m_headerType, blocks);
+  std::string arrayBytes(std::string_view text, bool raw, std::size_t expected) {
+    const auto length = [&](FileText& header) {
+      return toCount(header.number(m_headerType), std::size_t{1} << 53);
+    };
+    const std::size_t word = m_headerType.size;
+    if (m_compressor == nullptr) {
+      const std::string bytes = stored(text, raw, word + expected);
+      FileText array(bytes, m_encoding);
+      const std::size_t declared = length(array);
+      if (declared < expected) throw FileFault{"one of its arrays is shorter than its count"};
+      return std::string(array.take(expected));
+    }
+    const std::string sizes = stored(text, raw, 3 * word);
+    FileText fixed(sizes, m_encoding);
+    const std::size_t blocks = length(fixed), fullSize = length(fixed), lastSize = length(fixed);
+    const std::size_t headerSize = (3 + toCount(static_cast<double>(blocks), m_storedLeft)) * word;
+    const std::string header = stored(text, raw, headerSize);
+    FileText variable(header, m_encoding);
+    variable.take(3 * word);
+    const std::vector<double> lengths = variable.numbers(m_headerType, blocks);
+    std::size_t total = headerSize;
+    for (const double compressed : lengths) total += toCount(compressed, m_storedLeft);
+    const std::string block = stored(text, raw, total);
+    FileText compressed(block, m_encoding);
+    compressed.take(headerSize);
     std::string bytes;
     for (std::size_t i = 0; i < blocks; ++i) {
       const std::size_t size = i + 1 == blocks && lastSize > 0 ? lastSize : fullSize,
                         start = bytes.size();
       if (size > expected - start) throw FileFault{"one of its compressed blocks has a wrong size"};
-      const std::string_view compressed = text.take(toCount(lengths[i], text.left()));
+      const std::string_view packed = compressed.take(static_cast<std::size_t>(lengths[i]));
       bytes.resize(start + size);
       const std::size_t got = m_compressor->Uncompress(
-          reinterpret_cast<const unsigned char*>(compressed.data()), compressed.size(),
+          reinterpret_cast<const unsigned char*>(packed.data()), packed.size(),
           reinterpret_cast<unsigned char*>(bytes.data() + start), size);
       if (got != size) throw FileFault{"one of its compressed blocks is damaged"};
     }
@@ -156,8 +186,10 @@ class Reader {
   }
 
   std::string_view m_xml, m_appended;
-  /// Limit of counts: compressed numbers hardly take less than 1/1000 byte.
-  std::size_t m_maxCount;
+  /// Bytes of arrays that may still be read, as they are stored and when they are decoded. Zlib
+  /// stores at most this many bytes in one.
+  static constexpr std::size_t kMostCompression = 1032;
+  std::size_t m_storedLeft, m_decodedLeft;
   bool m_raw = false;
   vtkSmartPointer<vtkDataCompressor> m_compressor;
   Encoding m_encoding = Encoding::LittleEndian;

@@ -131,6 +131,20 @@ TEST(Candidates, MatchBruteForceWithOneTriangleFarAway) {
   }
 }
 
+/// Beyond the range of floats, both meshes have a triangle at the same place, in different frames.
+TEST(Candidates, MatchBruteForceWithOneTriangleOfBothFarAway) {
+  Random random(5);
+  Mesh a = testing::soup(random, 100, 0.03), b = testing::soup(random, 100, 0.03);
+  for (Eigen::Vector3d& p : b.positions) p += Eigen::Vector3d(3e30, -2e33, 1e36);
+  for (const double far : {1e37, 1e60, 1e200, 1.7e308})
+    for (const Eigen::Vector3d& sign : {Eigen::Vector3d(1, -1, 1), Eigen::Vector3d(-1, 1, 0)}) {
+      for (std::size_t i = 0; i < 3; ++i)
+        a.positions[a.triangles[0][i]] = b.positions[b.triangles[0][i]] =
+            (1.0 - 0.01 * static_cast<double>(i)) * far * sign;
+      compare(a, b, 0.01, {0, 0, 0}, 1, 1, OctreeUpdate::Rebuild);
+    }
+}
+
 TEST(Candidates, MatchBruteForceOnIdenticalPoints) {
   Mesh a;
   a.positions.assign(60, Eigen::Vector3d(1, 2, 3));

@@ -1,5 +1,6 @@
 #include <palpate/Capture.h>
 
+#include "Common/FailingAllocation.h"
 #include "Common/RandomMeshes.h"
 
 #include <gtest/gtest.h>
@@ -15,6 +16,7 @@ namespace palpate {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::FailingAllocation;
 using testing::Mesh;
 using testing::Random;
 
@@ -239,6 +241,30 @@ TEST_F(Capture, ErrorsNameTheFault) {
   expectRefusedWith("end\n", "end\nend\n", "there is text after the end");
   write(whole);
   EXPECT_NO_THROW(readCapture(file()));
+}
+
+/// Counts are checked against the characters that follow, before memory is taken for them.
+TEST_F(Capture, RefusesCountsThatDoNotFitIntoTheFile) {
+  constexpr std::size_t kSize = 1'000'000;
+  const std::string start = "palpate-capture 9\nOctree 0 32 8 Auto\n", filling(kSize, ' ');
+  const std::string mesh = "geometry 0 ";
+  for (const std::string& counts :
+       {std::string("999999 0"), std::string("0 999999"), "1 0 " + mesh + "999999 0 Triangles",
+        "1 0 " + mesh + "0 999999 Triangles", "1 0 " + mesh + "0 0 Lines 999999",
+        "1 0 " + mesh + "0 0 Shape 0 ConvexHull 999999"}) {
+    write(start + counts + " " + filling);
+    FailingAllocation::arm(0);
+    EXPECT_THROW(readCapture(file()), Error) << counts;
+    FailingAllocation::disarm();
+    EXPECT_LE(FailingAllocation::peakBytes(), 20 * kSize) << counts;
+  }
+  write(start + std::string(kSize, 'x'));
+  try {
+    readCapture(file());
+    ADD_FAILURE();
+  } catch (const Error& error) {
+    EXPECT_LT(std::string(error.what()).size(), 500u);
+  }
 }
 
 TEST_F(Capture, ReadsEarlierVersions) {

@@ -1,0 +1,183 @@
+// Files that are made to take much memory or time.
+#include "Common/FailingAllocation.h"
+
+#include <palpate/Error.h>
+#include <palpate/vtk/MeshFile.h>
+
+#include <gtest/gtest.h>
+
+#include <vtkBase64Utilities.h>
+#include <vtkNew.h>
+#include <vtkZLibDataCompressor.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace palpate::vtk {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::FailingAllocation;
+
+std::string repeated(const std::string& text, std::size_t bytes) {
+  std::string all;
+  while (all.size() < bytes) all += text;
+  return all;
+}
+
+template <class T>
+std::string bytes(T value) {
+  std::string text(sizeof value, '\0');
+  std::memcpy(text.data(), &value, sizeof value);
+  return text;
+}
+
+struct Outcome {
+  std::size_t size;     ///< of the file
+  std::size_t peak;     ///< bytes that reading it took at once
+  std::string refusal;  ///< empty if it was read
+};
+
+Outcome readFile(const std::string& name, const std::string& content) {
+  const fs::path path = fs::path(::testing::TempDir()) / ("hostile-" + name);
+  std::ofstream(path, std::ios::binary) << content;
+  Outcome outcome{content.size(), 0, ""};
+  FailingAllocation::arm(0);
+  try {
+    readTriangleMesh(path);
+  } catch (const Error& error) {
+    FailingAllocation::disarm();
+    outcome.refusal = error.what();
+  }
+  FailingAllocation::disarm();
+  outcome.peak = FailingAllocation::peakBytes();
+  fs::remove(path);
+  return outcome;
+}
+
+constexpr std::size_t kSize = 400'000;
+
+std::string ply(const std::string& header, const std::string& body) {
+  return "ply\nformat binary_little_endian 1.0\n" + header + "end_header\n" + body;
+}
+std::string vtkFile(const std::string& version, const std::string& body) {
+  return "# vtk DataFile Version " + version + "\nx\nBINARY\nDATASET POLYDATA\n" + body;
+}
+std::string vtp(const std::string& attributes, const std::string& pieces,
+                const std::string& appended = "") {
+  return "<VTKFile type=\"PolyData\" byte_order=\"LittleEndian\"" + attributes + "><PolyData>" +
+         pieces + "</PolyData>" + appended + "</VTKFile>";
+}
+const std::string kXyz = "property uchar x\nproperty uchar y\nproperty uchar z\n";
+const std::string kThree = "element vertex 3\n" + kXyz;
+
+/// Files without compression, each by a name that ends in its format.
+std::vector<std::pair<std::string, std::string>> hostileFiles() {
+  const std::string n = std::to_string(kSize), third = std::to_string(kSize / 3);
+  const std::string points(9, '\1');
+  std::vector<std::pair<std::string, std::string>> files{
+      {"no-properties.ply", ply(repeated("element vertex 100\n", kSize), "")},
+      {"nothing.ply", ply(repeated("element x 100\n", kSize), "")},
+      {"elements.ply", ply(repeated("element x 0\n", kSize), "")},
+      {"properties.ply", ply("element x 0\n" + repeated("property char a\n", kSize), "")},
+      {"vertices.ply", ply("element vertex " + third + "\n" + kXyz, std::string(kSize, '\1'))},
+      {"faces.ply", ply(kThree + "element face " + std::to_string(kSize / 4) +
+                            "\nproperty list uchar uchar vertex_index\n",
+                        points + repeated(std::string("\3\0\1\2", 4), kSize))},
+      {"empty-faces.ply",
+       ply(kThree + "element face " + n + "\nproperty list uchar uchar vertex_index\n",
+           points + std::string(kSize, '\0'))},
+      {"strip.ply",
+       ply(kThree + "element tristrips 1\nproperty list uint uchar vertex_index\n",
+           points + bytes(static_cast<std::uint32_t>(kSize)) + std::string(kSize, '\1'))},
+      {"corners.obj", "v 0 0 0\n" + repeated("f 1 1 1\n", kSize)},
+      {"vertices.obj", repeated("v 1 2 3\n", kSize) + "f 1 2 3\n"},
+      {"empty.obj", repeated("f\n", kSize)},
+      {"lines.obj", "v 0 0 0\nf 1 1 " + repeated("1\\\n ", kSize)},
+      {"text.stl", "solid facet\n" + repeated("vertex 1 2 3 ", kSize) + "\nendsolid"},
+      {"points.vtk", vtkFile("3.0", "POINTS " + third + " char\n" + std::string(kSize, '\1'))},
+      {"strips.vtk",
+       vtkFile("5.1", "POINTS 3 char\n" + points + "TRIANGLE_STRIPS 2 " + n + "\nOFFSETS int\n" +
+                          std::string(4, '\0') + std::string{'\0', '\6', '\32', char(0x80)} +
+                          "CONNECTIVITY char\n" + std::string(kSize, '\1'))},
+      {"offsets.vtk",
+       vtkFile("5.1", "POINTS 3 char\n" + points + "POLYGONS " + n + " 0\nOFFSETS char\n" +
+                          std::string(kSize, '\0') + "CONNECTIVITY char\n")},
+      {"set.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET " + std::string(kSize, 'x')},
+      {"pieces.vtp", vtp("", repeated("<Piece ", kSize) + "</Piece>")},
+      {"arrays.vtp",
+       vtp("", "<Piece NumberOfPoints=\"1\"><Points>" +
+                   repeated("<DataArray Name=\"offsets\" ", kSize) + "</Points></Piece>")}};
+
+  // Pieces that share an appended array, and a piece whose arrays have one byte for each number.
+  const auto array = [](const char* name, std::size_t offset) {
+    return "<DataArray type=\"UInt8\" Name=\"" + std::string(name) +
+           "\" format=\"appended\" offset=\"" + std::to_string(offset) + "\"/>";
+  };
+  const std::string shared =
+      "<Piece NumberOfPoints=\"" + third + "\"><Points>" + array("Points", 0) + "</Points></Piece>";
+  const std::string block = bytes(static_cast<std::uint32_t>(kSize)) + std::string(kSize, '\1');
+  const std::string raw = "<AppendedData encoding=\"raw\">_" + block + "</AppendedData>";
+  files.emplace_back("one-array.vtp", vtp("", shared, raw));
+  files.emplace_back("shared.vtp", vtp("", repeated(shared, kSize), raw));
+  files.emplace_back("strip.vtp",
+                     vtp("",
+                         "<Piece NumberOfPoints=\"3\" NumberOfStrips=\"1\"><Points>" +
+                             array("Points", 0) + "</Points><Strips>" + array("connectivity", 0) +
+                             "<DataArray type=\"UInt32\" Name=\"offsets\" format=\"ascii\">" + n +
+                             "</DataArray></Strips></Piece>",
+                         raw));
+  // Each of many pieces reads a few numbers at the start of a long Base64 text.
+  const std::string few =
+      "<Piece NumberOfPoints=\"1\"><Points>" + array("Points", 0) + "</Points></Piece>";
+  files.emplace_back("base64.vtp", vtp("", repeated(few, kSize),
+                                       "<AppendedData encoding=\"base64\">_AwAAAAEBAQ" +
+                                           std::string(kSize, 'A') + "</AppendedData>"));
+  return files;
+}
+
+TEST(HostileFiles, TakeAtMostTwentyTimesTheirSize) {
+  for (const auto& [name, content] : hostileFiles()) {
+    const Outcome outcome = readFile(name, content);
+    EXPECT_LE(outcome.peak, 20 * outcome.size + 1'000'000) << name << " " << outcome.refusal;
+    EXPECT_LT(outcome.refusal.size(), 500u) << name;
+    if (::testing::Test::HasFailure() || std::getenv("PALPATE_SHOW"))
+      std::printf("%s: %.1f times, %s\n", name.c_str(),
+                  static_cast<double>(outcome.peak) / static_cast<double>(outcome.size),
+                  outcome.refusal.c_str());
+  }
+}
+
+/// Compressed pieces may not decode to more in all than Zlib can store in the file.
+TEST(HostileFiles, CompressedPiecesThatShareABlockAreRefused) {
+  constexpr std::size_t kDecoded = 3'000'000;
+  vtkNew<vtkZLibDataCompressor> compressor;
+  const std::vector<unsigned char> plain(kDecoded, 1);
+  std::vector<unsigned char> packed(compressor->GetMaximumCompressionSpace(kDecoded));
+  packed.resize(compressor->Compress(plain.data(), kDecoded, packed.data(), packed.size()));
+  const std::string block = bytes(std::uint32_t{1}) + bytes(static_cast<std::uint32_t>(kDecoded)) +
+                            bytes(std::uint32_t{0}) +
+                            bytes(static_cast<std::uint32_t>(packed.size())) +
+                            std::string(packed.begin(), packed.end());
+  const std::string piece =
+      "<Piece NumberOfPoints=\"1000000\" NumberOfPolys=\"1\"><Points><DataArray type=\"UInt8\" "
+      "format=\"appended\" offset=\"0\"/></Points><Polys><DataArray type=\"UInt8\" "
+      "Name=\"connectivity\" format=\"ascii\">0 1 2</DataArray><DataArray type=\"UInt8\" "
+      "Name=\"offsets\" format=\"ascii\">3</DataArray></Polys></Piece>";
+  const std::string raw = "<AppendedData encoding=\"raw\">_" + block + "</AppendedData>";
+  const std::string zlib = " compressor=\"vtkZLibDataCompressor\"";
+  EXPECT_EQ(readFile("one.vtp", vtp(zlib, piece, raw)).refusal, "");
+  const std::string many = vtp(zlib, repeated(piece, 60 * piece.size()), raw);
+  const Outcome outcome = readFile("many.vtp", many);
+  EXPECT_NE(outcome.refusal, "");
+  EXPECT_LE(outcome.peak, 20 * 1032 * many.size() + 1'000'000);
+}
+
+}  // namespace
+}  // namespace palpate::vtk
