@@ -260,6 +260,14 @@ class RayQuery {
     const std::vector<RayHit>& hits = all(geometry, ray);
     return hits.empty() ? std::nullopt : std::optional(hits.front());
   }
+  /// out: element kNoElement where there is none.
+  void first(const SearchableGeometry& geometry, std::span<const Ray> rays, std::span<RayHit> out) {
+    const RayHit none{geometry.id, kNoElement, {}, {0, 0, 0}, kInfinity, false, false};
+    if (!geometry.shape)
+      return RayHits::first(geometry, rays, m_bruteForce, m_scratch->metInFlight, none, out);
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      out[i] = first(geometry, rays[i], kInfinity).value_or(none);
+  }
   bool any(const SearchableGeometry& geometry, const Ray& ray) {
     return geometry.shape ? !all(geometry, ray).empty() : on(geometry, ray).any();
   }
@@ -339,10 +347,7 @@ void SpatialQueries::firstHits(GeometryId id, std::span<const Ray> rays,
   for (std::size_t i = 0; i < rays.size(); ++i) checkRay(rays[i], i);
   const SearchableGeometry& geometry = source.at(id);
   forParts(source, rays.size(), [&](std::size_t begin, std::size_t end) {
-    RayQuery query(source);
-    for (std::size_t i = begin; i < end; ++i)
-      out[i] = query.first(geometry, rays[i], rays[i].tMax)
-                   .value_or(RayHit{id, kNoElement, {}, {0, 0, 0}, kInfinity, false, false});
+    RayQuery(source).first(geometry, rays.subspan(begin, end - begin), out.subspan(begin));
   });
 }
 
