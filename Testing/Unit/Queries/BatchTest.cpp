@@ -43,16 +43,18 @@ std::vector<Ray> raysFor(Random& random, const TestGeometry& geometry, std::size
   return rays;
 }
 
-/// Some are vertices, far away, or equally far from many elements.
+/// Some are vertices, far away, equally far from many elements, or near the point before.
 Positions pointsFor(Random& random, const TestGeometry& geometry, std::size_t count) {
   Positions points;
   for (std::size_t i = 0; i < count; ++i) {
     const Vector3d p = geometry.positions[random() % geometry.positions.size()];
-    if (i % 5 == 0) points.push_back(p);
-    if (i % 5 == 1) points.push_back(p + randomPoint(random, -0.01, 0.01));
-    if (i % 5 == 2) points.push_back(randomPoint(random, 0, 1));
-    if (i % 5 == 3) points.push_back(randomPoint(random, -100, 100));
-    if (i % 5 == 4) points.push_back({0.5, 0.5, uniform(random, 0, 1)});  // on the sphere's axis
+    if (i % 6 == 0) points.push_back(p);
+    if (i % 6 == 1) points.push_back(p + randomPoint(random, -0.01, 0.01));
+    if (i % 6 == 2) points.push_back(randomPoint(random, 0, 1));
+    if (i % 6 == 3) points.push_back(randomPoint(random, -100, 100));
+    if (i % 6 == 4) points.push_back({0.5, 0.5, uniform(random, 0, 1)});  // on the sphere's axis
+    if (i % 6 == 5)
+      points.push_back(points.back() + (i % 4 == 1 ? 0.0 : 1.0) * Vector3d(1e-9, 0, 1e-3));
   }
   return points;
 }
