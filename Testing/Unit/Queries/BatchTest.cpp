@@ -128,7 +128,9 @@ TEST(Batch, SignedDistancesAreThoseOfSingleCalls) {
         for (const InsideRule rule : {InsideRule::Closed, InsideRule::WindingNumber}) {
           if (rule == InsideRule::Closed && !isClosed) continue;
           for (const std::size_t size : {0, 1, 9, 200}) {
-            const Positions points = pointsFor(random, geometry, size);
+            Positions points = pointsFor(random, geometry, size);
+            for (std::size_t i = size / 2; i + 1 < size; ++i)  // a path through the surface
+              points[i + 1] = points[i] + randomPoint(random, -0.1, 0.1);
             std::vector<SignedDistance> out(size);
             queries.signedDistances(id, points, out, {rule});
             for (std::size_t i = 0; i < size; ++i)
