@@ -186,18 +186,38 @@ void PointDistances::search(double most, std::size_t count, F&& f) const {
 }
 
 std::optional<PointDistances::Near> PointDistances::nearest(double maxDistance,
-                                                            std::uint32_t likely) const {
+                                                            std::uint32_t likely,
+                                                            double bound) const {
   std::optional<Near> best;
   const auto take = [&](const Near& near, double most) {
     if (best ? near.place != best->place && isNearer(near, *best) : isWithin(near, maxDistance))
       best = near;
     return best ? std::min(most, best->distance) : most;
   };
-  double most = maxDistance;
+  double most = std::min(maxDistance, bound);
   if (likely < m_geometry.tree.ordered().size())
     forEach({&likely, 1}, [&](const Near& near) { most = take(near, most); });
   search(most, 1, take);
   return best;
+}
+
+// Sums of magnitudes are lengths or more, and do not underflow.
+double PointDistances::Last::boundAt(const Eigen::Vector3d& point) const {
+  return (m_distance + m_error + (point - m_point).cwiseAbs().sum()) * (1.0 + kNearestError);
+}
+
+bool PointDistances::Last::isOnSideOf(const PointDistances& distances, const Near& nearest) const {
+  // Infinity less infinity is NaN, with which the comparison is false.
+  return (distances.m_point - m_point).cwiseAbs().sum() * (1.0 + kNearestError) <
+         (m_distance - m_error) + (nearest.distance - nearest.error);
+}
+
+void PointDistances::Last::set(const PointDistances& distances, const Near& nearest) {
+  // A radius that changes along a segment changes with the closest point, which may move further.
+  if (distances.m_geometry.mesh.largestRadius > 0) return;
+  m_point = distances.m_point;
+  m_distance = nearest.distance;
+  m_error = nearest.error;
 }
 
 void PointDistances::nearest(std::size_t k, double maxDistance, std::vector<Near>& out) const {

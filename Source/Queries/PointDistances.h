@@ -38,13 +38,31 @@ class PointDistances {
   SurfacePoint surfacePoint(const Near&) const;
 
   /// The nearest element. None is further away than maxDistance. likely: the place of an element
-  /// that is likely near; any place is valid.
-  std::optional<Near> nearest(double maxDistance, std::uint32_t likely) const;
+  /// that is likely near; any place is valid. bound: L; some element is at most that far away.
+  std::optional<Near> nearest(double maxDistance, std::uint32_t likely,
+                              double bound = kInfinity) const;
   /// The k nearest elements, or fewer, in the order of isNearer(). None is further away than
   /// maxDistance. out: replaced.
   void nearest(std::size_t k, double maxDistance, std::vector<Near>& out) const;
   /// Calls f(element) for each element within a distance, in any order.
   void within(double distance, std::vector<std::uint32_t>& elements) const;
+
+  /// The last of several points, about which all is known that helps with the next one. A distance
+  /// changes by at most as much as the point moves.
+  class Last {
+   public:
+    /// L: at least the distance of a point from the nearest element.
+    double boundAt(const Eigen::Vector3d& point) const;
+    /// Whether certainly no element lies between the last point and this one, as the balls up to
+    /// their nearest elements overlap. Both are then on the same side of a closed surface.
+    bool isOnSideOf(const PointDistances&, const Near& nearest) const;
+    /// nearest: of all elements.
+    void set(const PointDistances&, const Near& nearest);
+
+   private:
+    Eigen::Vector3d m_point = Eigen::Vector3d::Zero();
+    double m_distance = kInfinity, m_error = kInfinity;  ///< L
+  };
 
  private:
   /// Calls f(near, most) for elements whose distance, less the radius, may be at most `most`. f

@@ -13,6 +13,7 @@
 #include "Shapes/PlacedShape.h"
 #include "Shapes/ShapeContacts.h"
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -34,6 +35,7 @@ class SpatialQueries::Source {
     VertexSearch<EmbeddedVertex> embedded;
     std::vector<PointDistances::Near> near;
     std::vector<RayHits::Met> met;
+    std::array<std::vector<RayHits::Met>, kRaysInFlight> metInFlight;
     std::vector<RayHit> hits;
     std::vector<std::uint32_t> elements;
     Buffer<std::uint32_t> nearShape;

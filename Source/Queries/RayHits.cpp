@@ -8,33 +8,35 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 namespace palpate {
 
-namespace {
-
 using Eigen::Vector3d;
 
-/// A ray in a geometry's floats, and in the frame of its positions.
-struct ClippedRay {
-  FloatRay ray;
-  double start, perT;  ///< the ray's t is perT t - start
-  LineFilter line;
+RayHits::RayHits(const SearchableGeometry& geometry, const Ray& ray, bool bruteForce,
+                 std::vector<Met>& scratch, double radius)
+    : m_geometry(geometry),
+      m_ray{ray.origin, ray.direction, ray.tMin, ray.tMax},
+      m_bruteForce(bruteForce),
+      m_radius(radius),
+      m_isSolid(geometry.mesh.largestRadius + radius > 0),
+      m_met(scratch) {}
 
-  /// Never negative, which would end the traversal: `start` is rounded.
-  float floatOf(double t) const {
-    const double along = (t * perT - start) * (1.0 + kNearestError);
-    return std::max(OutwardRounding::up(static_cast<float>(along)), 0.0f);
-  }
-};
+/// Never negative, which would end the traversal: m_start is rounded.
+float RayHits::floatOf(double t) const {
+  const double along = (t * m_perT - m_start) * (1.0 + kNearestError);
+  return std::max(OutwardRounding::up(static_cast<float>(along)), 0.0f);
+}
 
-/// radius: L, by which boxes grow. Returns false if the ray certainly misses all boxes.
-bool clip(const SearchableGeometry& geometry, const RaySegment& ray, double radius,
-          ClippedRay& clipped) {
-  const FloatFrame& frame = geometry.tree.frame();
-  const Positions& now = geometry.mesh.now;
+bool RayHits::clip(FloatRay& clipped, LineFilter& line) {
+  std::construct_at(&line);  // in place here and below, as a copy would wait for each part
+  const RaySegment& ray = m_ray;
+  const double radius = m_geometry.mesh.largestRadius + m_radius;  // by which boxes grow
+  const FloatFrame& frame = m_geometry.tree.frame();
+  const Positions& now = m_geometry.mesh.now;
   Vector3d origin = ray.origin, direction = ray.direction;
-  const FloatBox root = geometry.tree.octree().box(0);
+  const FloatBox root = m_geometry.tree.octree().box(0);
   double extent = 0.0;
   for (std::size_t k = 0; k < 3; ++k)
     extent = std::max({extent, double{std::abs(root.lower[k])}, double{std::abs(root.upper[k])}});
@@ -63,20 +65,20 @@ bool clip(const SearchableGeometry& geometry, const RaySegment& ray, double radi
       kPlacedPointError * far + (error + radius * (1.0 + kNearestError)) * frame.scale;
   const double slack =
       kFloatRayError * (extent + (isNear ? reach : 0.0)) + doubleError + OutwardRounding::kAbsolute;
-  clipped.ray.slack = OutwardRounding::up(static_cast<float>(slack));
-  clipped.perT = perT;
+  clipped.slack = OutwardRounding::up(static_cast<float>(slack));
+  m_perT = perT;
   if (!(extent < kLargestFloat) || !(perT >= 0x1p-900) || !(perT <= 0x1p900) ||
       !(slack < kLargestFloat)) {  // every box is entered at once
-    clipped.ray.origin = {};
-    clipped.ray.inverse = {1, 1, 1};
-    clipped.ray.slack = clipped.ray.tMax = std::numeric_limits<float>::infinity();
-    clipped.perT = clipped.start = 0.0;
+    clipped.origin = {};
+    clipped.inverse = {1, 1, 1};
+    clipped.slack = clipped.tMax = std::numeric_limits<float>::infinity();
+    m_perT = m_start = 0.0;
     return true;
   }
   for (int k = 0; k < 3; ++k) {
     // A smaller component moves the ray by less than the slack.
     const double least = std::copysign(std::max(std::abs(direction[k]), 0x1p-100), direction[k]);
-    clipped.ray.inverse[static_cast<std::size_t>(k)] = 1.0f / static_cast<float>(least);
+    clipped.inverse[static_cast<std::size_t>(k)] = 1.0f / static_cast<float>(least);
   }
   for (int k = 0; k < 3 && !isNear; ++k) {
     const auto at = static_cast<std::size_t>(k);
@@ -91,32 +93,20 @@ bool clip(const SearchableGeometry& geometry, const RaySegment& ray, double radi
     leave = std::min(leave, std::max(s, t) + margin);
   }
   if (!(enter <= leave)) return false;
-  clipped.start = enter;
-  clipped.ray.tMax =
-      OutwardRounding::up(static_cast<float>((leave - enter) * (1.0 + kNearestError)));
+  m_start = enter;
+  clipped.tMax = OutwardRounding::up(static_cast<float>((leave - enter) * (1.0 + kNearestError)));
   origin += enter * direction;
   for (int k = 0; k < 3; ++k)
-    clipped.ray.origin[static_cast<std::size_t>(k)] = static_cast<float>(origin[k]);
+    clipped.origin[static_cast<std::size_t>(k)] = static_cast<float>(origin[k]);
   if (radius == 0) {
     const double unit = 1.0 / frame.scale, most = extent + origin.cwiseAbs().maxCoeff();
-    clipped.line =
-        LineFilter(unit * origin + frame.origin, direction, static_cast<int>(axis), unit * most,
-                   unit * (doubleError + kPlacedPointError * most) +
-                       kPlacedPointError * frame.origin.cwiseAbs().maxCoeff());
+    std::construct_at(&line, unit * origin + frame.origin, direction, static_cast<int>(axis),
+                      unit * most,
+                      unit * (doubleError + kPlacedPointError * most) +
+                          kPlacedPointError * frame.origin.cwiseAbs().maxCoeff());
   }
   return true;
 }
-
-}  // namespace
-
-RayHits::RayHits(const SearchableGeometry& geometry, const Ray& ray, bool bruteForce,
-                 std::vector<Met>& scratch, double radius)
-    : m_geometry(geometry),
-      m_ray{ray.origin, ray.direction, ray.tMin, ray.tMax},
-      m_bruteForce(bruteForce),
-      m_radius(radius),
-      m_isSolid(geometry.mesh.largestRadius + radius > 0),
-      m_met(scratch) {}
 
 template <class F>
 void RayHits::intersect(std::uint32_t place, F&& f) const {
@@ -137,50 +127,65 @@ void RayHits::intersect(std::uint32_t place, F&& f) const {
   for (std::size_t i = 0; i < parts.size; ++i) f(parts.intervals[i]);
 }
 
-double RayHits::collect(Wanted wanted, double bound, double atLeast) {
-  m_met.clear();
-  if (m_geometry.tree.ordered().empty()) return atLeast;
-  // The part that begins first, as far as it is known, with the error of its ends. Until an element
-  // is met, it has no end before tMax.
-  double first = kInfinity, last = m_ray.tMax, error = 0.0, least = std::max(bound, atLeast);
-  const auto take = [&](std::uint32_t place) {
-    intersect(place, [&](const RayInterval& interval) {
-      m_met.push_back({interval, place, m_geometry.tree.octree().order()[place]});
-      if (wanted != Wanted::First || interval.first - interval.error > last + error) return;
-      const bool isApart = first == kInfinity || interval.last + interval.error < first - error;
-      first = std::min(first, interval.first);
-      last = isApart ? interval.last : std::max(last, interval.last);
-      error = std::max(error, interval.error);
-      least = std::min(least, std::max(last + error, atLeast));
-    });
-  };
-  if (m_bruteForce) {
-    for (std::uint32_t place = 0; place < m_geometry.tree.ordered().size(); ++place) take(place);
-    return atLeast;
-  }
-  ClippedRay ray;
-  if (!clip(m_geometry, m_ray, m_geometry.mesh.largestRadius + m_radius, ray)) return atLeast;
-  const RayElements elements{m_geometry.tree.ordered().data(), m_geometry.mesh.now.body().data(),
-                             ray.line};
-  FloatRay bounded = ray.ray;
-  bounded.tMax = std::min(ray.ray.tMax, ray.floatOf(least));
-  forEachOnRay(m_geometry.tree.octree(), elements, bounded, [&](std::uint32_t place) {
-    take(place);
-    if (wanted == Wanted::Any && !m_met.empty()) return -1.0f;
-    if (first == kInfinity) return bounded.tMax;
-    return std::min(ray.ray.tMax, ray.floatOf(std::max(last + error, atLeast)));
+void RayHits::add(std::uint32_t place) {
+  intersect(place, [&](const RayInterval& interval) {
+    m_met.push_back({interval, place, m_geometry.tree.octree().order()[place]});
+    if (m_wanted != Wanted::First || interval.first - interval.error > m_last + m_error) return;
+    const bool isApart = m_first == kInfinity || interval.last + interval.error < m_first - m_error;
+    m_first = std::min(m_first, interval.first);
+    m_last = isApart ? interval.last : std::max(m_last, interval.last);
+    m_error = std::max(m_error, interval.error);
+    m_least = std::min(m_least, std::max(m_last + m_error, m_atLeast));
   });
-  if (first == kInfinity) return atLeast;
+}
+
+bool RayHits::start(Wanted wanted, double bound, double atLeast, RayTask& task) {
+  m_met.clear();
+  m_wanted = wanted;
+  m_atLeast = atLeast;
+  m_first = kInfinity;
+  m_last = m_ray.tMax;
+  m_error = 0.0;
+  m_least = std::max(bound, atLeast);
+  if (m_geometry.tree.ordered().empty()) return false;
+  if (m_bruteForce) {
+    for (std::uint32_t place = 0; place < m_geometry.tree.ordered().size(); ++place) add(place);
+    return false;
+  }
+  task = {
+      {m_geometry.tree.ordered().data(), m_geometry.mesh.now.body().data(), {}}, {}, this, take};
+  if (!clip(task.ray, task.elements.line)) return false;
+  m_end = task.ray.tMax;
+  m_tMax = task.ray.tMax = std::min(m_end, floatOf(m_least));
+  return true;
+}
+
+float RayHits::take(void* context, std::uint32_t place) {
+  RayHits& hits = *static_cast<RayHits*>(context);
+  hits.add(place);
+  if (hits.m_wanted == Wanted::Any && !hits.m_met.empty()) return -1.0f;
+  if (hits.m_first == kInfinity) return hits.m_tMax;
+  return std::min(hits.m_end, hits.floatOf(std::max(hits.m_last + hits.m_error, hits.m_atLeast)));
+}
+
+double RayHits::end() {
+  if (m_first == kInfinity || m_bruteForce) return m_atLeast;
   // Elements come in any order. Some were met before the part had grown as far as to them.
   std::sort(m_met.begin(), m_met.end(),
             [](const Met& a, const Met& b) { return a.interval.first < b.interval.first; });
   for (const auto& [interval, place, element] : m_met) {
-    if (interval.first - interval.error > last + error) break;
-    last = std::max(last, interval.last);
-    error = std::max(error, interval.error);
+    if (interval.first - interval.error > m_last + m_error) break;
+    m_last = std::max(m_last, interval.last);
+    m_error = std::max(m_error, interval.error);
   }
-  const double needed = std::min(m_ray.tMax, last + error);
-  return needed > least ? needed : atLeast;
+  const double needed = std::min(m_ray.tMax, m_last + m_error);
+  return needed > m_least ? needed : m_atLeast;
+}
+
+double RayHits::collect(Wanted wanted, double bound, double atLeast) {
+  RayTask task;
+  if (start(wanted, bound, atLeast, task)) traverseRay(m_geometry.tree.octree(), task);
+  return end();
 }
 
 int RayHits::compare(const Met& one, bool lastOfFirst, const Met& two, bool lastOfSecond) const {
@@ -247,21 +252,62 @@ void RayHits::forEachHit(F&& f) {
   });
 }
 
-std::optional<RayHit> RayHits::first(double bound) {
-  const Wanted wanted = m_isSolid ? Wanted::All : Wanted::First;
+bool RayHits::startFirst(double bound, RayTask& task) {
+  return start(m_isSolid ? Wanted::All : Wanted::First, bound, m_ray.tMin, task);
+}
+
+std::optional<RayHit> RayHits::endFirst(double bound) {
   // Elements beyond a part's end may have been skipped before the part grew. The search is then
   // repeated as far as the part is known.
-  for (double atLeast = m_ray.tMin;;) {
-    const double needed = collect(wanted, bound, atLeast);
-    if (!(needed > atLeast)) break;
+  double atLeast = m_atLeast;
+  for (double needed = end(); needed > atLeast; needed = collect(m_wanted, bound, atLeast))
     atLeast = needed;
-  }
   std::optional<RayHit> hit;
   forEachHit([&](const RayHit& first) {
     hit = first;
     return false;
   });
   return hit;
+}
+
+std::optional<RayHit> RayHits::first(double bound) {
+  RayTask task;
+  if (startFirst(bound, task)) traverseRay(m_geometry.tree.octree(), task);
+  return endFirst(bound);
+}
+
+void RayHits::first(const SearchableGeometry& geometry, std::span<const Ray> rays, bool bruteForce,
+                    std::array<std::vector<Met>, kRaysInFlight>& scratch, const RayHit& none,
+                    std::span<RayHit> out) {
+  // The processor's caches hold a small octree, and turns then cost more than they save.
+  constexpr std::size_t kLeastForTurns = 30'000;
+  if (bruteForce || geometry.tree.ordered().size() < kLeastForTurns) {
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      out[i] =
+          RayHits(geometry, rays[i], bruteForce, scratch[0]).first(rays[i].tMax).value_or(none);
+    return;
+  }
+  struct InFlight {
+    std::optional<RayHits> hits;
+    std::size_t ray;
+  };
+  std::array<InFlight, kRaysInFlight> inFlight;
+  std::array<RayTask, kRaysInFlight> tasks;
+  std::size_t begun = 0;
+  const auto end = [&](InFlight& one) {
+    out[one.ray] = one.hits->endFirst(rays[one.ray].tMax).value_or(none);
+  };
+  auto next = [&](std::size_t i) {
+    InFlight& one = inFlight[i];
+    if (one.hits) end(one);
+    for (; begun < rays.size(); end(one)) {
+      one.ray = begun++;
+      one.hits.emplace(geometry, rays[one.ray], bruteForce, scratch[i]);
+      if (one.hits->startFirst(rays[one.ray].tMax, tasks[i])) return true;
+    }
+    return false;
+  };
+  traverseRays(geometry.tree.octree(), tasks, next);
 }
 
 bool RayHits::any() {

@@ -6,9 +6,11 @@
 #include "Queries/RayTraversal.h"
 #include "Queries/SearchableGeometry.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace palpate {
@@ -41,6 +43,10 @@ class RayHits {
   /// bound: t; if the first hit is not before it, the result is no hit or one that is not before
   /// it.
   std::optional<RayHit> first(double bound);
+  /// The first hits of many rays, each as first(tMax); `none` where there is none.
+  static void first(const SearchableGeometry&, std::span<const Ray>, bool bruteForce,
+                    std::array<std::vector<Met>, kRaysInFlight>& scratch, const RayHit& none,
+                    std::span<RayHit> out);
   bool any();
   /// All hits by ascending t. out: hits are appended.
   void all(std::vector<RayHit>& out);
@@ -62,6 +68,18 @@ class RayHits {
   /// all elements of the part that begins first, if that part does not reach beyond `atLeast` or
   /// the result. Returns how far it reaches, or atLeast.
   double collect(Wanted, double bound, double atLeast);
+  // collect() in three parts: start(), a traversal, whose context is this object, and end().
+  // start() returns false if there is nothing to traverse.
+  bool start(Wanted, double bound, double atLeast, RayTask&);
+  static float take(void* context, std::uint32_t place);  ///< TestElement
+  double end();
+  // first() in the same three parts.
+  bool startFirst(double bound, RayTask&);
+  std::optional<RayHit> endFirst(double bound);
+  /// Returns false if the ray certainly misses all boxes.
+  bool clip(FloatRay&, LineFilter&);
+  float floatOf(double t) const;
+  void add(std::uint32_t place);
   /// Calls f(interval) for what the ray shares with an element.
   template <class F>
   void intersect(std::uint32_t place, F&& f) const;
@@ -96,6 +114,16 @@ class RayHits {
   const double m_radius;
   const bool m_isSolid;  ///< elements with radii
   std::vector<Met>& m_met;
+
+  // Of collect():
+  Wanted m_wanted;
+  double m_atLeast;
+  /// The part that begins first, as far as it is known, with the error of its ends. Until an
+  /// element is met, it has no end before tMax.
+  double m_first, m_last, m_error;
+  double m_least;          ///< no element beyond this t is wanted
+  double m_start, m_perT;  ///< the ray's t, in the octree's floats, is t m_perT - m_start
+  float m_end, m_tMax;     ///< in floats: where the ray ends, and where the traversal ends
 };
 
 }  // namespace palpate

@@ -7,7 +7,9 @@
 #include <Eigen/Core>
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <type_traits>
 
 namespace palpate {
@@ -35,21 +37,39 @@ struct RayElements {
 /// a negative number ends the traversal.
 using TestElement = float (*)(void* context, std::uint32_t place);
 
+/// A traversal by one ray.
+struct RayTask {
+  RayElements elements;
+  FloatRay ray;
+  void* context;
+  TestElement test;
+};
+
 /// Visits the elements whose boxes the ray meets and that its line may meet. Siblings come in the
 /// order in which the ray passes their octants. A node or element is skipped if the ray enters its
 /// box beyond the t that was returned last.
 /// Source   Revelles, Urena, Lastra, An efficient parametric algorithm for octree traversal (2000),
 ///          for the order. Difference: cells overlap, so that the ray may meet more than four of
 ///          eight siblings, and each is tested by its fitted box.
-void traverseRay(const Octree&, const RayElements&, const FloatRay&, void* context, TestElement);
+void traverseRay(const Octree&, const RayTask&);
 
-/// traverseRay() with f(place) in place of the function pointer.
+constexpr std::size_t kRaysInFlight = 16;  ///< most tasks of traverseRays()
+
+/// Ends the traversal of tasks[i], if there was one, and makes it the next one. Returns false if
+/// there are no more rays.
+using NextRay = bool (*)(void* context, std::size_t i);
+
+/// Traverses the octree by many rays, each as traverseRay() does. Several rays take turns, so that
+/// the processor loads nodes and elements of some while it tests those of others.
+void traverseRays(const Octree&, std::span<const RayTask> tasks, void* context, NextRay);
+
+/// traverseRays() with next(i) in place of the function pointer.
 template <class F>
-void forEachOnRay(const Octree& octree, const RayElements& elements, const FloatRay& ray, F&& f) {
-  const auto call = [](void* context, std::uint32_t place) {
-    return (*static_cast<std::remove_reference_t<F>*>(context))(place);
+void traverseRays(const Octree& octree, std::span<const RayTask> tasks, F&& next) {
+  const auto call = [](void* context, std::size_t i) {
+    return (*static_cast<std::remove_reference_t<F>*>(context))(i);
   };
-  traverseRay(octree, elements, ray, &f, call);
+  traverseRays(octree, tasks, &next, call);
 }
 
 }  // namespace palpate

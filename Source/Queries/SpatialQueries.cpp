@@ -167,16 +167,16 @@ void checkPoints(std::span<const Eigen::Vector3d> points) {
 
 std::optional<SurfacePoint> closestPointOf(const SearchableGeometry& geometry,
                                            const Eigen::Vector3d& point, double maxDistance,
-                                           bool bruteForce, std::uint32_t& likely) {
+                                           bool bruteForce, PointDistances::Last& last) {
   if (geometry.shape) {
     const SurfacePoint nearest = closestPointOnShape(geometry.id, geometry.shape->now, point);
     return nearest.distance <= maxDistance ? std::optional(nearest) : std::nullopt;
   }
   if (geometry.tree.ordered().empty()) return {};
   const PointDistances distances(geometry, point, bruteForce);
-  const auto near = distances.nearest(maxDistance, likely);
+  const auto near = distances.nearest(maxDistance, kNoElement, last.boundAt(point));
   if (!near) return {};
-  likely = near->place;
+  last.set(distances, *near);
   return distances.surfacePoint(*near);
 }
 
@@ -260,6 +260,14 @@ class RayQuery {
     const std::vector<RayHit>& hits = all(geometry, ray);
     return hits.empty() ? std::nullopt : std::optional(hits.front());
   }
+  /// out: element kNoElement where there is none.
+  void first(const SearchableGeometry& geometry, std::span<const Ray> rays, std::span<RayHit> out) {
+    const RayHit none{geometry.id, kNoElement, {}, {0, 0, 0}, kInfinity, false, false};
+    if (!geometry.shape)
+      return RayHits::first(geometry, rays, m_bruteForce, m_scratch->metInFlight, none, out);
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      out[i] = first(geometry, rays[i], kInfinity).value_or(none);
+  }
   bool any(const SearchableGeometry& geometry, const Ray& ray) {
     return geometry.shape ? !all(geometry, ray).empty() : on(geometry, ray).any();
   }
@@ -339,10 +347,7 @@ void SpatialQueries::firstHits(GeometryId id, std::span<const Ray> rays,
   for (std::size_t i = 0; i < rays.size(); ++i) checkRay(rays[i], i);
   const SearchableGeometry& geometry = source.at(id);
   forParts(source, rays.size(), [&](std::size_t begin, std::size_t end) {
-    RayQuery query(source);
-    for (std::size_t i = begin; i < end; ++i)
-      out[i] = query.first(geometry, rays[i], rays[i].tMax)
-                   .value_or(RayHit{id, kNoElement, {}, {0, 0, 0}, kInfinity, false, false});
+    RayQuery(source).first(geometry, rays.subspan(begin, end - begin), out.subspan(begin));
   });
 }
 
@@ -365,9 +370,8 @@ std::optional<SurfacePoint> SpatialQueries::closestPoint(GeometryId id,
   checkPoint(point);
   checkLength(maxDistance, "maxDistance", false);
   const SearchableGeometry& geometry = source.at(id);
-  std::uint32_t likely = kNoElement;
-  return closestPointOf(geometry, point, maxDistance, source.engine() == Engine::BruteForce,
-                        likely);
+  PointDistances::Last last;
+  return closestPointOf(geometry, point, maxDistance, source.engine() == Engine::BruteForce, last);
 }
 
 void SpatialQueries::closestPoints(GeometryId id, std::span<const Eigen::Vector3d> points,
@@ -380,9 +384,9 @@ void SpatialQueries::closestPoints(GeometryId id, std::span<const Eigen::Vector3
   const SearchableGeometry& geometry = source.at(id);
   const bool bruteForce = source.engine() == Engine::BruteForce;
   forParts(source, points.size(), [&](std::size_t begin, std::size_t end) {
-    std::uint32_t likely = kNoElement;
+    PointDistances::Last last;
     for (std::size_t i = begin; i < end; ++i)
-      out[i] = closestPointOf(geometry, points[i], maxDistance, bruteForce, likely)
+      out[i] = closestPointOf(geometry, points[i], maxDistance, bruteForce, last)
                    .value_or(SurfacePoint{id, kNoElement, {}, {0, 0, 0}, {0, 0, 0}, kInfinity});
   });
 }
@@ -419,13 +423,20 @@ void SpatialQueries::signedDistances(GeometryId id, std::span<const Eigen::Vecto
   if (body.tree.ordered().empty())
     throw Error(ErrorCode::NotClosed, nameOf(id) + " has no triangles and so no surface", id);
   const bool bruteForce = source.engine() == Engine::BruteForce;
+  // Only these sides never change but at the surface: the winding number of an open mesh changes
+  // everywhere, and inverted tetrahedra end inside.
+  const bool sidesAreBySurface = settings.rule == InsideRule::Closed && !body.solid && !bruteForce;
   forParts(source, points.size(), [&](std::size_t begin, std::size_t end) {
     const Source::Loan scratch(source);
-    std::uint32_t likely = kNoElement;
+    PointDistances::Last last;
+    bool inside = false;
     for (std::size_t i = begin; i < end; ++i) {
-      const SurfacePoint nearest = *closestPointOf(body, points[i], kInfinity, bruteForce, likely);
-      const bool inside = isInside(body, points[i], settings, source.engine(), scratch->stack);
-      out[i] = {nearest, inside ? -nearest.distance : nearest.distance};
+      const PointDistances distances(body, points[i], bruteForce);
+      const auto near = *distances.nearest(kInfinity, kNoElement, last.boundAt(points[i]));
+      if (!sidesAreBySurface || !last.isOnSideOf(distances, near))
+        inside = isInside(body, points[i], settings, source.engine(), scratch->stack);
+      last.set(distances, near);
+      out[i] = {distances.surfacePoint(near), inside ? -near.distance : near.distance};
     }
   });
 }

@@ -82,6 +82,37 @@ class PalpateQueries : public SpatialEngine {
     }
   }
 
+  void askTogether(SpatialQuery query, std::span<const SpatialCase> cases, const ShapeSizes& sizes,
+                   SpatialAnswers& out) override {
+    const SpatialQueries queries = m_collisions->queries();
+    m_together.clear();
+    m_rays.clear();
+    for (const SpatialCase& c : cases) {
+      m_together.push_back(c.point);
+      m_rays.push_back({c.point, c.direction});
+    }
+    switch (query) {
+      case SpatialQuery::Closest:
+        m_points.resize(cases.size());
+        queries.closestPoints(m_mesh, m_together, m_points);
+        for (const SurfacePoint& found : m_points) out.add(found.distance, found.element);
+        return;
+      case SpatialQuery::SignedDistance:
+        m_distances.resize(cases.size());
+        queries.signedDistances(m_mesh, m_together, m_distances);
+        for (const SignedDistance& found : m_distances)
+          out.add(found.distance, found.nearest.element);
+        return;
+      case SpatialQuery::FirstHit:
+        m_hits.resize(cases.size());
+        queries.firstHits(m_mesh, m_rays, m_hits);
+        for (const RayHit& hit : m_hits) out.add(hit.t, hit.element);
+        return;
+      default:
+        return ask(query, cases, sizes, out);
+    }
+  }
+
  private:
   void addElements(SpatialAnswers& out) const {
     out.elements.insert(out.elements.end(), m_elements.begin(), m_elements.end());
@@ -91,7 +122,11 @@ class PalpateQueries : public SpatialEngine {
   bool m_isPointSet;
   std::unique_ptr<OctreeBasedCD> m_collisions;
   GeometryId m_mesh{};
+  std::vector<Eigen::Vector3d> m_together;
+  std::vector<Ray> m_rays;
   std::vector<SurfacePoint> m_points;
+  std::vector<SignedDistance> m_distances;
+  std::vector<RayHit> m_hits;
   std::vector<std::uint32_t> m_elements;
 };
 

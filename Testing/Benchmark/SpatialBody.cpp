@@ -23,6 +23,17 @@ constexpr auto kRows = [] {
       SpatialRow{"closest anywhere", Closest, Anywhere, kFar, {1.7, 4.5, 14}, {2.2, 5.8, 18}},
       SpatialRow{
           "signed distance near", SignedDistance, Near, kMany, {0.6, 1.0, 1.8}, {0.73, 1.6, 2.6}},
+      SpatialRow{
+          "closest near, batch", Closest, Near, kMany, {0.5, 0.8, 1.5}, {0.61, 1.06, 1.9}, true},
+      SpatialRow{"signed distance near, batch",
+                 SignedDistance,
+                 Near,
+                 kMany,
+                 {0.6, 1.0, 1.8},
+                 {0.73, 1.6, 2.6},
+                 true},
+      SpatialRow{
+          "first hits, batch", FirstHit, Rays, kMany, {0.22, 0.40, 0.75}, {0.20, 0.31, 0.56}, true},
       SpatialRow{"contains", Contains, InBox, kMany, {0.22, 0.33, 0.6}, {0.25, 0.38, 0.67}},
       SpatialRow{"first hit", FirstHit, Rays, kMany, {0.22, 0.40, 0.75}, {0.20, 0.31, 0.56}},
       SpatialRow{"8 nearest", EightNearest, Near, kLists, {1.5, 2.2, 3.3}, {2.1, 3.0, 4.3}},

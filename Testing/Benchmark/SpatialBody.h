@@ -23,6 +23,7 @@ struct SpatialRow {
   Place place;
   std::array<std::size_t, 3> cases;
   std::array<double, 3> target, fastest;
+  bool isBatch = false;  ///< asked by SpatialEngine::askTogether()
 };
 
 inline constexpr std::size_t kFrames = 4;

@@ -62,6 +62,11 @@ class SpatialEngine {
   /// Appends the answers to the cases.
   virtual void ask(SpatialQuery, std::span<const SpatialCase>, const ShapeSizes&,
                    SpatialAnswers&) = 0;
+  /// The same by the engine's calls for many cases, where it has some.
+  virtual void askTogether(SpatialQuery query, std::span<const SpatialCase> cases,
+                           const ShapeSizes& sizes, SpatialAnswers& out) {
+    ask(query, cases, sizes, out);
+  }
 };
 
 std::unique_ptr<SpatialEngine> makePalpateQueries(bool isPointSet);

@@ -80,6 +80,14 @@ double millisecondsOf(F&& f) {
   return now() - start;
 }
 
+void askRow(SpatialEngine& engine, const SpatialRow& row, std::span<const SpatialCase> cases,
+            const ShapeSizes& sizes, SpatialAnswers& out) {
+  if (row.isBatch)
+    engine.askTogether(row.query, cases, sizes, out);
+  else
+    engine.ask(row.query, cases, sizes, out);
+}
+
 /// In each repetition all engines update to the next frame and answer the same cases. A different
 /// engine begins each time. An engine rests once its time is spent.
 std::vector<EngineTimes> takeTurns(const SpatialBody& body, const Engines& engines,
@@ -108,7 +116,7 @@ std::vector<EngineTimes> takeTurns(const SpatialBody& body, const Engines& engin
         if (rests[e] || !engines[e]->answers(row.query)) continue;
         const auto ask = [&](std::span<const SpatialCase> some) {
           answers.clear();
-          engines[e]->ask(row.query, some, body.sizes, answers);
+          askRow(*engines[e], row, some, body.sizes, answers);
         };
         // The first query after an update makes what an engine keeps for its frame.
         times[e].first[r].push_back(1000 * millisecondsOf([&] { ask(std::span(cases).first(1)); }));
@@ -129,7 +137,7 @@ double speedOf(const SpatialBody& body, const Engines& engines,
   for (std::size_t r = 0; r < body.rows().size(); ++r)
     for (std::size_t e = 0; e < engines.size(); ++e) {
       const SpatialRow& row = body.rows()[r];
-      if (row.query != SpatialQuery::FirstHit || times[e].rows[r].empty() ||
+      if (row.query != SpatialQuery::FirstHit || row.isBatch || times[e].rows[r].empty() ||
           !engines[e]->name().starts_with("Embree"))
         continue;
       const double speed = median(times[e].rows[r]) / row.fastest[body.size];
@@ -220,8 +228,7 @@ void errorRows(Report& report, const SpatialBody& body, const Engines& engines,
                                    (isShape ? 10u : 100u) / (body.size == 2 ? 5u : 1u), random);
       std::vector<SpatialAnswers> answers(engines.size());
       for (std::size_t e = 0; e < engines.size(); ++e)
-        if (engines[e]->answers(row.query))
-          engines[e]->ask(row.query, cases, body.sizes, answers[e]);
+        if (engines[e]->answers(row.query)) askRow(*engines[e], row, cases, body.sizes, answers[e]);
       const auto errors = errorsOf(row.query, cases, body.sizes, answers, body.triangles, positions,
                                    1e-15 * body.diagonal);
       std::vector<std::string> cells = {row.name};
