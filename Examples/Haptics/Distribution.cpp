@@ -9,7 +9,7 @@ namespace palpate::scenes {
 
 namespace {
 
-constexpr double kWidth = 560, kHeight = 300, kLeft = 64, kRight = 24, kTop = 36, kBottom = 48;
+constexpr double kWidth = 560, kHeight = 300, kLeft = 64, kRight = 32, kTop = 36, kBottom = 48;
 constexpr int kLeastShare = -5;  // 10^-5
 constexpr std::array<const char*, 4> kColours{"#0b5394", "#b45f06", "#38761d", "#741b47"};
 /// The shares of samples that stay at or below a row's value.

@@ -13,8 +13,7 @@ namespace {
 
 constexpr double kSkin = 0.3;  // mm, between the proxy and the surface
 constexpr double kMostMove =
-    0.25;                      // mm, of the proxy in one tick: it follows hands of at most 250 mm/s
-constexpr double kLever = 10;  // mm, makes turns comparable to moves
+    0.25;  // mm, of the proxy in one tick: it follows hands of at most 250 mm/s
 constexpr int kMostSweeps = 100;
 constexpr double kSolved = 1e-6;  // mm, by which no row changes the motion any more
 
@@ -126,16 +125,15 @@ VirtualTool::Answer VirtualTool::step(const Snapshot& snapshot, double share, do
   const double lastSpeed = m_speed;
   addRows(snapshot, share);
   const Vector3d way = device.position - m_device.position;
-  const double motion = way.norm() +
-                        Vector3d(kHalfExtents.data()).norm() *
-                            turnOf(device.rotation * m_device.rotation.transpose()).norm() +
-                        played * std::max(m_speed, lastSpeed);
+  const double motion =
+      way.norm() + Vector3d(kHalfExtents.data()).norm() *
+                       turnOf(device.rotation * m_device.rotation.transpose()).norm();
   m_device = device;
   Vector3d move = shortened(device.position - m_proxy.position, kMostMove);
   Vector3d turn =
       shortened(turnOf(device.rotation * m_proxy.rotation.transpose()), kMostMove / kLever);
   solve(move, turn);
-  const double part = partWithin(move, way, motion);
+  const double part = partWithin(move, way, motion + played * std::max(m_speed, lastSpeed));
   m_proxy.position += part * move;
   if (const double angle = part * turn.norm(); angle > 0) {
     const Eigen::AngleAxisd by(angle, turn.normalized());

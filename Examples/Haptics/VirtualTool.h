@@ -51,19 +51,19 @@ class VirtualTool {
     Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
     std::size_t contacts = 0;
     double distance = kInfinity;  ///< L: of the proxy from the surface, before it moved
-    /// L: how far any point of the tool moved in the tick, plus how far the surface near it did.
-    double motion = 0;
+    double motion = 0;            ///< L: bounds how far any point of the device's tool moved
   };
 
   explicit VirtualTool(GeometryId organ);
   /// The proxy starts at the device.
   void start(const ToolPose& device) { m_proxy = m_device = device; }
   /// One tick with the surface at `share` of the snapshot's step, of which this tick played
-  /// `played`. The spring changes by at most Answer::motion: where the proxy could jump further, as
-  /// off a ridge, it slides there in several ticks.
+  /// `played`. The spring's length changes by at most the motion of the tool and of the surface
+  /// near it: where the proxy could jump further, as off a ridge, it slides there in several ticks.
   Answer step(const Snapshot&, double share, double played, const ToolPose& device);
 
-  static constexpr double kStiffness = 0.5, kTurnStiffness = 200;   ///< N/mm, N mm
+  static constexpr double kStiffness = 0.5, kTurnStiffness = 200;  ///< N/mm, N mm
+  static constexpr double kLever = 10;  ///< mm, makes turns comparable to moves
   static constexpr std::array<double, 3> kHalfExtents{14, 4, 1.5};  ///< mm
 
  private:

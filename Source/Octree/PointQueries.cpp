@@ -28,54 +28,6 @@ HWY_ATTR HWY_INLINE std::uint32_t selectBoxes(D d, const Boxes& from, std::size_
   return bits;
 }
 
-/// An upper bound on the computed squared distance of a box that is no further than the given one.
-/// A computed squared distance is off by less than 2^-20 of itself. If its squares are denormal,
-/// outward rounding covers its error.
-float boundOf(double distanceSquared) {
-  return OutwardRounding::up(static_cast<float>(distanceSquared) * (1.0f + 0x1p-19f));
-}
-
-/// Descends depth first from the root, nearest siblings first. select() tests boxes and writes
-/// their squared distances to `squares`. A selected node or element is skipped if its distance
-/// exceeds `bound` when its turn comes. element(place) is called for each remaining element, and
-/// may lower the bound.
-template <class Select, class Element>
-HWY_ATTR HWY_INLINE void descend(const Octree& octree, const BoxMap& map, PointQueryStack& stack,
-                                 const float* squares, const float& bound, Select&& select,
-                                 Element&& element) {
-  using Entry = PointQueryStack::Entry;
-  stack.entries.assign(1, {0, 0});
-  while (!stack.entries.empty()) {
-    const Entry entry = stack.entries.back();
-    stack.entries.pop_back();
-    if (entry.distanceSquared > bound) continue;
-    const auto [begin, end] = octree.ownRange(entry.node);
-    for (std::uint32_t i = begin; i < end; i += kTestedTogether) {
-      const std::size_t size = std::min<std::size_t>(kTestedTogether, end - i);
-      std::uint32_t bits = selectBoxes(LeafTag(), octree.boxes(), i, size, map, select);
-      for (; bits; bits &= bits - 1) {
-        const auto lane = static_cast<std::uint32_t>(std::countr_zero(bits));
-        if (squares[lane] <= bound) element(i + lane);
-      }
-    }
-    const OctreeNode child = octree.firstChild(entry.node);
-    if (child == 0) continue;
-    const std::size_t first = stack.entries.size();
-    std::uint32_t bits = selectBoxes(NodeTag(), octree.blocks()[child >> 3], 0, 8, map, select);
-    for (; bits; bits &= bits - 1) {
-      const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
-      const Entry next{squares[slot], child + slot};
-      // Sorted with the nearest last, because the last entry is taken first.
-      std::size_t place = stack.entries.size();
-      stack.entries.push_back(next);
-      for (; place > first && stack.entries[place - 1].distanceSquared < next.distanceSquared;
-           --place)
-        stack.entries[place] = stack.entries[place - 1];
-      stack.entries[place] = next;
-    }
-  }
-}
-
 HWY_ATTR void findOverlappingKernel(const Octree& octree, const BoxMap& map, const FloatBox& box,
                                     PointQueryStack& stack) {
   const auto overlapping = [&](auto, const auto& boxes, std::size_t)
@@ -103,20 +55,6 @@ HWY_ATTR void findOverlappingKernel(const Octree& octree, const BoxMap& map, con
   }
 }
 
-HWY_ATTR void visitNearestKernel(const Octree& octree, const BoxMap& map, const FloatBox& point,
-                                 double distanceSquared, PointQueryStack& stack, void* context,
-                                 VisitElement visitElement) {
-  float bound = boundOf(distanceSquared);
-  alignas(64) float squares[kTestedTogether];
-  const auto within = [&](auto d, const auto& boxes, std::size_t i) HWY_ATTR {
-    const auto distances = boxes.distanceFrom(point);
-    hn::Store(distances, d, squares + i);
-    return hn::Le(distances, hn::Set(d, bound));
-  };
-  descend(octree, map, stack, squares, bound, within,
-          [&](std::uint32_t place) { bound = boundOf(visitElement(context, place)); });
-}
-
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -124,20 +62,11 @@ HWY_AFTER_NAMESPACE();
 namespace palpate {
 
 HWY_EXPORT(findOverlappingKernel);
-HWY_EXPORT(visitNearestKernel);
 
 void findOverlapping(const Octree& octree, const BoxMap& map, const FloatBox& box,
                      PointQueryStack& stack) {
   octree.requireBuilt();
   HWY_DYNAMIC_DISPATCH(findOverlappingKernel)(octree, map, box, stack);
-}
-
-void visitNearest(const Octree& octree, const BoxMap& map, const FloatBox& point,
-                  double distanceSquared, PointQueryStack& stack, void* context,
-                  VisitElement visitElement) {
-  octree.requireBuilt();
-  HWY_DYNAMIC_DISPATCH(visitNearestKernel)
-  (octree, map, point, distanceSquared, stack, context, visitElement);
 }
 
 }  // namespace palpate

@@ -292,7 +292,8 @@ GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGe
     const double distance = (nearest.distance() + radii) * scale * (1.0 + 4 * kOrthonormal) + error;
     PairBound bound{up(distance)};
     const Vector3d& direction = nearest.direction();
-    if (direction == Vector3d::Zero()) return bound;
+    // Without radii, the direction between two points that meet is no more than rounding.
+    if (direction == Vector3d::Zero() || nearest.distance() + radii == 0.0) return bound;
     bound.heights = up(distance - direction.dot(offset) * scale + heightsError);
     bound.alongA = inFloats(a, -direction);
     bound.alongB = inFloats(b, direction);

@@ -23,7 +23,8 @@ NearestSearch searchOf(const SearchableGeometry& geometry, const Eigen::Vector3d
   double error = 0.0;  // L
   if (now.isPlaced()) {
     const RigidTransform& pose = now.transform();
-    inBody = pose.rotation.transpose() * (point - pose.translation);
+    // By the frame's origin, because an inexact rotation changes lengths.
+    inBody = frame.origin + pose.rotation.transpose() * (point - worldOrigin(geometry));
     // Roundings of this transform and of the vertices' transform.
     error = kPlacedPointError *
             (point.cwiseAbs().sum() + pose.translation.cwiseAbs().sum() + inBody.cwiseAbs().sum());
@@ -33,8 +34,9 @@ NearestSearch searchOf(const SearchableGeometry& geometry, const Eigen::Vector3d
   float largest = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
   for (int k = 0; k < 3; ++k)
     largest = std::max({largest, std::abs(root.lower[k]), std::abs(root.upper[k])});
-  // Both points are off by at most 2^-24 of `largest` along each axis, and by kOrthonormal of their
-  // distance. kFloatPointError has a margin. Clamped floats say nothing about a distance.
+  // Both points are off by at most 2^-24 of `largest` along each axis, and by 2 kOrthonormal of
+  // their distances from the frame's origin. kFloatPointError has a margin. Clamped floats say
+  // nothing about a distance.
   const float slack =
       largest >= kLargestFloat
           ? std::numeric_limits<float>::infinity()

@@ -40,8 +40,7 @@ class SpatialQueries::Source {
     std::vector<std::uint32_t> elements;
     Buffer<std::uint32_t> nearShape;
     ShapeContactBuffers shapeContacts;
-    /// The shape of the last call. Placing it again allocates nothing.
-    std::optional<PlacedShape> shape;
+    KeptShapes shapes;
     PathScratch path;
     std::unique_ptr<PairScratch> pairs;  ///< null before distance() first needs it
     std::vector<std::uint64_t> bits;

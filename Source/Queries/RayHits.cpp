@@ -211,6 +211,10 @@ RayHit RayHits::hitOf(const Met& met, double t, bool frontFace, bool crosses) co
     const RayPoint at = firstPoint(m_ray, met.interval, a, b, c);
     return {m_geometry.id, met.element, corners, at.weights, at.t, frontFace, crosses};
   }
+  // A segment without length is a ball of its larger radius.
+  const TriangleMesh& mesh = m_geometry.mesh;
+  if (a == b && b == c && mesh.radius(corners[0]) < mesh.radius(corners[1]))
+    return {m_geometry.id, met.element, corners, Vector3d::UnitY(), t, frontFace, crosses};
   const Vector3d point = m_ray.origin + t * m_ray.direction;
   const Vector3d weights = finiteVertexTriangleDistance(point, a, b, c).barycentric;
   return {m_geometry.id, met.element, corners, weights, t, frontFace, crosses};

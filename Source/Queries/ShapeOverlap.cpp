@@ -35,6 +35,40 @@ bool meetsHull(const Corners& element, const Shape& hull) {
   return isInside;
 }
 
+/// Whether the radii of lines may differ between their ends.
+bool isTapered(const TriangleMesh& mesh) {
+  return mesh.topology.type == GeometryType::Lines && !mesh.radii.empty();
+}
+
+/// Whether the hull of the balls at a segment's ends has a point in the shape. The hull is the
+/// union of the balls along the segment, with radii in proportion. A ball meets a shape if its
+/// centre's distance is at most its radius. This distance less the radius is convex along the
+/// segment, so that its tangents bound it from below.
+bool meetsTapered(const Shape& shape, const std::array<Vector3d, 2>& ends,
+                  const std::array<double, 2>& radii) {
+  const Vector3d along = ends[1] - ends[0];
+  const double taper = radii[1] - radii[0];
+  struct Tangent {
+    double at, gap, slope;
+    double operator()(double t) const { return gap + (t - at) * slope; }
+  };
+  const auto tangent = [&](double t) {
+    const PointShapeDistance centre = shape.signedDistance((1.0 - t) * ends[0] + t * ends[1]);
+    return Tangent{t, centre.distance - ((1.0 - t) * radii[0] + t * radii[1]),
+                   centre.normal.dot(along) - taper};
+  };
+  Tangent low = tangent(0.0), high = tangent(1.0);
+  if (low.gap <= 0.0 || high.gap <= 0.0) return true;
+  while (low.slope < 0.0 && high.slope > 0.0 && high.at - low.at > kEdgeWeight) {
+    const double crossing = (high(0.0) - low(0.0)) / (low.slope - high.slope);
+    if (low(crossing) > 0.0) return false;
+    const Tangent middle = tangent(0.5 * (low.at + high.at));
+    if (middle.gap <= 0.0) return true;
+    (middle.slope < 0.0 ? low : high) = middle;
+  }
+  return false;
+}
+
 /// Whether an element has a point in the shape. Radii of lines and points enlarge it.
 bool meets(const TriangleMesh& mesh, const Triangle& corners, const Shape& shape) {
   const auto at = [&](std::size_t i) { return mesh.now[corners[i % 3]]; };
@@ -44,12 +78,9 @@ bool meets(const TriangleMesh& mesh, const Triangle& corners, const Shape& shape
     return shape.signedDistance(at(0)).distance <= mesh.radius(corners[0]);
   for (std::size_t i = 0; i < 3; ++i) {
     if (corners[i] == corners[(i + 1) % 3]) continue;  // {p, q, q} is a segment
-    const NearestToShape edge = shape.nearestOfEdge(at(i), at(i + 1));
-    const Segment ends{corners[i], corners[(i + 1) % 3]};
-    // A segment without length is a ball of its larger radius.
-    const double radius = at(i) == at(i + 1) ? std::max(mesh.radius(ends[0]), mesh.radius(ends[1]))
-                                             : mesh.radius(ends, edge.weights[1]);
-    if (edge.distance <= radius) return true;
+    const double first = mesh.radius(corners[i]), last = mesh.radius(corners[(i + 1) % 3]);
+    if (first != last) return meetsTapered(shape, {at(i), at(i + 1)}, {first, last});
+    if (shape.nearestOfEdge(at(i), at(i + 1)).distance <= first) return true;
   }
   if (corners[1] == corners[2]) return false;
   const auto inside = shape.nearestInTriangle(at(0), at(1), at(2));
@@ -169,9 +200,12 @@ std::optional<FloatConvex> floatsOf(const Convex& convex, const SearchableGeomet
   Vector3d p = convex.p, q = convex.q;
   double error = 0.0;  // L
   if (now.isPlaced()) {
+    // By the frame's origin. A rotation within kOrthonormal changes heights and distances in the
+    // frame by less than 2^-27 of the extent below, which kFloatOverlapError covers.
     const RigidTransform& pose = now.transform();
-    p = pose.rotation.transpose() * (p - pose.translation);
-    q = pose.rotation.transpose() * (q - pose.translation);
+    const Vector3d origin = worldOrigin(geometry);
+    p = frame.origin + pose.rotation.transpose() * (p - origin);
+    q = frame.origin + pose.rotation.transpose() * (q - origin);
     error = kPlacedPointError *
             (convex.p.cwiseAbs().sum() + convex.q.cwiseAbs().sum() +
              2 * pose.translation.cwiseAbs().sum() + p.cwiseAbs().sum() + q.cwiseAbs().sum());
@@ -229,7 +263,7 @@ void findWithin(const SearchableGeometry& geometry, const Vector3d& point, doubl
 }
 
 void findOverlapping(const SearchableGeometry& geometry, const AnalyticalGeometry& analytical,
-                     const RigidTransform& pose, bool bruteForce, std::optional<PlacedShape>& kept,
+                     const RigidTransform& pose, bool bruteForce, KeptShapes& kept,
                      PointQueryStack& stack, Buffer<std::uint32_t>& near,
                      std::vector<std::uint32_t>& out) {
   const TriangleMesh& mesh = geometry.mesh;
@@ -257,7 +291,7 @@ void findOverlapping(const SearchableGeometry& geometry, const AnalyticalGeometr
     build();
     convex = convexOf(*shape);
   }
-  if (convex && convex->slabCount == 0 && convex->p == convex->q)
+  if (convex && convex->slabCount == 0 && convex->p == convex->q && !isTapered(mesh))
     return findWithin(geometry, convex->p, convex->radius, bruteForce, near, out);
   near.clear();
   const bool hasRadii =
@@ -267,7 +301,7 @@ void findOverlapping(const SearchableGeometry& geometry, const AnalyticalGeometr
   if (!floats) {
     build();
     if (shape->hasCorners() && shape->faces().size() == 1 &&
-        shape->corners().front() == shape->corners().back())  // a point
+        shape->corners().front() == shape->corners().back() && !isTapered(mesh))  // a point
       return findWithin(geometry, shape->origin(), shape->radius(), bruteForce, near, out);
     if (bruteForce) {
       for (std::uint32_t i = 0; i < mesh.topology.triangles.size(); ++i) test(i);

@@ -17,15 +17,16 @@ namespace palpate {
 void findWithin(const SearchableGeometry&, const Eigen::Vector3d& point, double distance,
                 bool bruteForce, Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out);
 
-/// Appends the elements that meet a shape at a pose, in any order. Balls are decided as by
+/// Appends the elements that meet a shape at a pose, in any order. A line whose radii differ
+/// between its ends is the hull of the balls there. Of other elements balls are decided as by
 /// findWithin(). Hulls and boxes are decided exactly if elements have no radius, others in floating
 /// point. bruteForce: every element is tested so.
 ///
 /// Method   floats decide most nodes and elements for balls, capsules, boxes and hulls. Polygons
 ///          clipped in double decide most others.
-/// kept: memory of the shape.
+/// kept: memory of shapes.
 void findOverlapping(const SearchableGeometry&, const AnalyticalGeometry&, const RigidTransform&,
-                     bool bruteForce, std::optional<PlacedShape>& kept, PointQueryStack&,
+                     bool bruteForce, KeptShapes& kept, PointQueryStack&,
                      Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out);
 
 }  // namespace palpate

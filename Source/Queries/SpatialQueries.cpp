@@ -249,7 +249,7 @@ class RayQuery {
     std::vector<RayHit>& hits = m_scratch->hits;
     hits.clear();
     if (geometry.shape)
-      addShapeHits(geometry.id, geometry.shape->now, ray, hits);
+      addShapeHits(geometry.id, geometry.shape->now, bounded(ray), hits);
     else
       on(geometry, ray).all(hits);
     return hits;
@@ -274,7 +274,12 @@ class RayQuery {
 
  private:
   RayHits on(const SearchableGeometry& geometry, const Ray& ray) {
-    return {geometry, ray, m_bruteForce, m_scratch->met};
+    return {geometry, bounded(ray), m_bruteForce, m_scratch->met};
+  }
+  /// A hit beyond double's range is none.
+  static Ray bounded(Ray ray) {
+    ray.tMax = std::min(ray.tMax, std::numeric_limits<double>::max());
+    return ray;
   }
 
   const SpatialQueries::Source::Loan m_scratch;
@@ -509,7 +514,7 @@ void SpatialQueries::overlapping(GeometryId id, const AnalyticalGeometry& shape,
   std::vector<std::uint32_t>& found = scratch->elements;
   found.clear();
   if (!geometry.tree.ordered().empty())
-    findOverlapping(geometry, shape, pose, source.engine() == Engine::BruteForce, scratch->shape,
+    findOverlapping(geometry, shape, pose, source.engine() == Engine::BruteForce, scratch->shapes,
                     scratch->stack, scratch->nearShape, found);
   scratch->sort(found);
   elements.reserve(found.size());  // nothing below throws
@@ -531,7 +536,7 @@ void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
   near.clear();
   found.clear();
   if (!geometry.tree.ordered().empty()) {
-    const PlacedShape& tool = placeAtRest(shape, pose, scratch->shape);
+    const PlacedShape& tool = placeAtRest(shape, pose, scratch->shapes);
     if (source.engine() == Engine::BruteForce)
       for (std::uint32_t i = 0; i < geometry.mesh.topology.triangles.size(); ++i) near.push_back(i);
     else

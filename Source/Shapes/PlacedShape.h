@@ -2,7 +2,9 @@
 
 #include "Shapes/Shape.h"
 
+#include <array>
 #include <optional>
+#include <variant>
 
 namespace palpate {
 
@@ -15,11 +17,20 @@ struct PlacedShape {
   Shape now, before;
 };
 
-/// The shape at rest at a pose, in memory that is kept from call to call.
+/// The memory of the last shape of each type.
+using KeptShapes = std::array<std::optional<PlacedShape>, std::variant_size_v<AnalyticalGeometry>>;
+
+/// The shape at rest at a pose, in memory that is kept from call to call. Only a box or hull that
+/// differs from the last one, or the first shape of a type, allocates.
 inline const PlacedShape& placeAtRest(const AnalyticalGeometry& geometry,
-                                      const RigidTransform& pose,
-                                      std::optional<PlacedShape>& kept) {
-  if (!kept || !(kept->analytical == geometry)) kept.emplace(geometry);
+                                      const RigidTransform& pose, KeptShapes& shapes) {
+  std::optional<PlacedShape>& kept = shapes[geometry.index()];
+  const bool hasHull =
+      std::holds_alternative<Box>(geometry) || std::holds_alternative<ConvexHull>(geometry);
+  if (!kept || (hasHull && !(kept->analytical == geometry)))
+    kept.emplace(geometry);
+  else if (!hasHull)
+    kept->analytical = geometry;
   kept->now.place(geometry, pose);
   kept->before = kept->now;
   return *kept;

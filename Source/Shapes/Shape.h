@@ -57,7 +57,8 @@ struct ShapePairScratch;
 class Shape {
  public:
   Shape(const AnalyticalGeometry&, const RigidTransform&);
-  /// Places the shape elsewhere. The geometry must be the constructor's.
+  /// Places the shape elsewhere. A box or a hull must be the constructor's; another shape must have
+  /// the type of the constructor's.
   void place(const AnalyticalGeometry&, const RigidTransform&);
   /// Places a cylinder at a time of a step: a right cylinder between its end centres, which move
   /// linearly.

@@ -4,6 +4,7 @@
 
 #include "Common/ContactRows.h"
 #include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
 
 #include <algorithm>
 #include <string>
@@ -20,8 +21,11 @@ inline Settings settingsOf(Engine engine, int threads = 1,
   return settings;
 }
 
-/// Octrees with 1, 2 and 8 threads, refitted or always rebuilt.
+/// Octrees with 1, 2 and 8 threads, refitted or always rebuilt. With sanitizers, one of each
+/// update.
 inline std::vector<Settings> octreeSettings() {
+  if (kShareOfCases > 1)
+    return {settingsOf(Engine::Octree, 8), settingsOf(Engine::Octree, 2, OctreeUpdate::Rebuild)};
   std::vector<Settings> all;
   for (const OctreeUpdate update : {OctreeUpdate::Auto, OctreeUpdate::Rebuild})
     for (const int threads : {1, 2, 8}) all.push_back(settingsOf(Engine::Octree, threads, update));

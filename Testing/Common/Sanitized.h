@@ -12,6 +12,9 @@ inline constexpr int kShareOfCases = 5;
 inline constexpr int kShareOfCases = 1;
 #endif
 
+/// Whether a test leaves out a case. Cases are counted from 0.
+constexpr bool isLeftOut(std::size_t number) { return number % kShareOfCases != 0; }
+
 constexpr int casesOf(int all) { return (all + kShareOfCases - 1) / kShareOfCases; }
 
 /// The least number that a test of all cases must find; 0 if the build runs a part of them.

@@ -1,6 +1,7 @@
 #include <palpate/ConstraintRows.h>
 
 #include "Common/PairRun.h"
+#include "Common/Sanitized.h"
 #include "Common/Solids.h"
 #include "Common/TestGeometry.h"
 #include "Common/DegenerateCases.h"
@@ -362,6 +363,7 @@ std::vector<PairSettings> everySetting(double thickness) {
 /// Steps that start in intersection, as random triangles do.
 TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
   std::map<std::string, Seen> byMethod;
+  std::size_t number = 0;
   for (const double motion : {0.0, 0.01, 0.2}) {
     Random random(181);
     const std::vector<Body> all = bodies(random, motion);
@@ -372,6 +374,7 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
           if (turned && i == j) continue;
           const Body &a = turned ? second : first, &b = turned ? first : second;
           for (const PairSettings& settings : everySetting(0.05)) {
+            if (isLeftOut(number++)) continue;
             OctreeBasedCD collisions;
             const GeometryId idA = a.add(collisions), idB = i == j ? idA : b.add(collisions);
             try {
@@ -407,22 +410,22 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
         .counts[what];
   };
   for (const char* what : {"behind", "in front", "edges"})
-    EXPECT_GT(count(Method::Intersection, Method::Intersection, what), 100u) << what;
+    EXPECT_GT(count(Method::Intersection, Method::Intersection, what), leastOf(100)) << what;
   for (const Method method : {Method::Proximity, Method::Continuous}) {
-    EXPECT_GT(count(method, method, "edges"), 1000u);
-    EXPECT_GT(count(method, method, "shape"), 1000u);
-    EXPECT_GT(count(method, method, "two shapes"), 50u);
+    EXPECT_GT(count(method, method, "edges"), leastOf(1000));
+    EXPECT_GT(count(method, method, "shape"), leastOf(1000));
+    EXPECT_GT(count(method, method, "two shapes"), leastOf(50));
     for (const char* what : {"at a corner", "at an edge", "at a face", "of a segment"})
-      EXPECT_GT(count(method, method, what), 100u) << what;
+      EXPECT_GT(count(method, method, what), leastOf(100)) << what;
     for (const char* what : {"within an edge", "at an edge's end"})
-      EXPECT_GT(count(method, method, what), 100u) << what;
+      EXPECT_GT(count(method, method, what), leastOf(100)) << what;
   }
   for (const Method method :
        {Method::Intersection, Method::Proximity, Method::Continuous, Method::Auto})
-    EXPECT_GT(count(Method::Auto, method, "edges"), 100u) << static_cast<int>(method);
-  EXPECT_GT(count(Method::Auto, Method::Intersection, "behind"), 30u);
-  EXPECT_GT(count(Method::Auto, Method::Continuous, "behind"), 10u);
-  EXPECT_GT(count(Method::Auto, Method::Auto, "behind"), 10u);
+    EXPECT_GT(count(Method::Auto, method, "edges"), leastOf(100)) << static_cast<int>(method);
+  EXPECT_GT(count(Method::Auto, Method::Intersection, "behind"), leastOf(30));
+  EXPECT_GT(count(Method::Auto, Method::Continuous, "behind"), leastOf(10));
+  EXPECT_GT(count(Method::Auto, Method::Auto, "behind"), leastOf(10));
 }
 
 /// Degenerate meshes, coordinates near the ends of the range of double, and self-collision.

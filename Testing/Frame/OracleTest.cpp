@@ -1,5 +1,6 @@
 #include "Common/ObjText.h"
 #include "Common/PairRun.h"
+#include "Common/Sanitized.h"
 #include "Common/DegenerateCases.h"
 
 #include <gtest/gtest.h>
@@ -119,11 +120,13 @@ TEST_P(Oracle, AgreesOnSoupsBodiesSheetsSliversCoplanarAndFoldedMeshes) {
 
 TEST_P(Oracle, AgreesAtEveryOffsetAndScale) {
   const std::vector<Settings> octrees{settingsOf(Engine::Octree)};
+  std::size_t number = 0;
   for (const double offset : {1.0, 1e3, 1e6})
     for (const double scale : {1e-3, 1.0, 1e3})
       for (Pair pair : pairs()) {
         if (pair.name != "coarse soups" && pair.name != "sheets" && pair.name != "coplanar")
           continue;
+        if (isLeftOut(number++)) continue;
         SCOPED_TRACE(pair.name + " at " + std::to_string(offset) + ", scale " +
                      std::to_string(scale));
         const Vector3d to = Vector3d(offset, -offset, 0.3 * offset) * scale;

@@ -40,7 +40,8 @@ struct SignedDistance {
   double distance;       ///< L
 };
 
-/// The points origin + t direction with t in [tMin, tMax], both included.
+/// The points origin + t direction with a finite t in [tMin, tMax], both included. What the ray
+/// meets only beyond the largest double is no hit.
 struct Ray {
   Eigen::Vector3d origin, direction;  ///< L; the direction has any length but 0
   double tMin = 0.0, tMax = kInfinity;
@@ -50,13 +51,15 @@ struct Ray {
 /// there. A ray along an edge, or in the plane of triangles, has one hit there. Lines and points
 /// with radii, and analytical shapes, have a hit where the ray enters them and one where it leaves
 /// them; overlapping elements are one body. A ray that starts on their surface and goes outward
-/// leaves them there. A ray that only touches them has one hit that does not cross.
+/// leaves them there. A ray that only touches them has one hit that does not cross. A ray that lies
+/// in a face of a box or a hull enters and leaves it, while a mesh of the same faces has one hit.
 struct RayHit {
   GeometryId geometry;
   std::uint32_t element = kNoElement;
   std::array<std::uint32_t, 3> vertices;  ///< as in SurfacePoint
+  /// As in SurfacePoint, also where vertices have the same position; 0 for a shape.
   Eigen::Vector3d weights;
-  double t;
+  double t;        ///< finite, unless firstHits() finds no hit
   bool frontFace;  ///< whether the ray comes against the winding normal
   /// Whether the ray changes from one side of the surface to the other. From inside a closed mesh
   /// the number of such hits is odd, if the winding number there is odd. A hit at tMin or tMax
@@ -213,10 +216,14 @@ class PALPATE_EXPORT SpatialQueries {
   /// Finds the elements that have a point in a shape, interior included. The poses are those of
   /// OctreeBasedCD::setTransform(). A frustum is a ConvexHull.
   ///
+  /// A line whose radii differ between its ends is the hull of the balls there. It may reach
+  /// further than the radius at the closest point of its centre line, by which elementsWithin()
+  /// decides.
+  ///
   /// Order    ascending.
-  /// Accuracy decided exactly for spheres, and for boxes and hulls if elements have no radius, on
-  ///          the shape's corners as they are rounded when it is placed. Otherwise elements are
-  ///          found up to rounding errors of the distance.
+  /// Accuracy decided exactly for spheres, unless radii differ along lines, and for boxes and hulls
+  ///          if elements have no radius, on the shape's corners as they are rounded when it is
+  ///          placed. Otherwise elements are found up to rounding errors of the distance.
   /// Errors   InvalidShape, InvalidTransform; UnsupportedMethod if the geometry is a shape itself.
   void overlapping(GeometryId, const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
                    const Eigen::Vector3d& translation, std::vector<std::uint32_t>& elements) const;
@@ -225,20 +232,20 @@ class PALPATE_EXPORT SpatialQueries {
   ///
   /// Order    that of CollisionData::shape().
   /// Errors   those of overlapping(); InvalidSettings if the thickness is negative or not finite.
-  /// Cost     follows the elements near the shape. A repeated call with the same shape allocates
-  ///          nothing.
+  /// Cost     follows the elements near the shape. A repeated call allocates nothing, unless a box or
+  ///          a hull differs from the last one.
   void contacts(GeometryId, const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
                 const Eigen::Vector3d& translation, double thickness,
                 std::vector<ShapeContact>& out) const;
   /// Finds the contacts that a pair (a, b) of the geometry and the mesh would have with
   /// Method::Proximity and Contacts::Distinct, with the mesh at this pose. A thickness of 0 finds
-  /// what touches. Disabled elements have no contacts. Of the collision filter only Sidedness
-  /// applies. validity() has the method, the thickness and the number of contacts only.
+  /// features that touch; an edge that only passes through a triangle's inside has no contact.
+  /// Disabled elements have no contacts. Of the collision filter only Sidedness applies. validity()
+  /// has the method, the thickness and the number of contacts only.
   ///
   /// Lists    vertexTriangle() has vertices of the geometry with triangles of the mesh.
   ///          triangleVertex() has elements of the geometry with vertices of the mesh. The normals
   ///          of edgeEdge() point from the mesh to the geometry.
-  ///
   /// Order    that of CollisionData.
   /// Errors   InvalidTransform; UnsupportedMethod if the geometry is a shape; InvalidSettings if the
   ///          thickness is negative or not finite; InvalidCall if the mesh was moved from.

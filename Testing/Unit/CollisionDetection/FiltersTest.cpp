@@ -5,6 +5,7 @@
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
 
 #include <gtest/gtest.h>
 
@@ -401,7 +402,7 @@ TEST(Filters, LastFiltersCount) {
       const GeometryId a = detection.addTriangleMesh(c.a.positions, c.a.triangles),
                        b = self ? a : detection.addTriangleMesh(c.b.positions, c.b.triangles);
       detection.addCollisionPair(a, b, pair);
-      for (int frame = 0; frame < 8; ++frame) {
+      for (int frame = 0; frame < casesOf(8); ++frame) {
         c.pair = pair;
         c.pair.restDistance = self && random() % 2 ? 0.2 : 0.0;
         c.disabledA =

@@ -3,6 +3,7 @@
 
 #include "Common/PairRun.h"
 #include "Common/Replayed.h"
+#include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
 
 #include <Eigen/Geometry>
@@ -258,12 +259,14 @@ std::vector<AnalyticalGeometry> kinds(Random& random) {
 TEST(ShapePairSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
   Random random(1);
   Tally tally;
+  std::size_t number = 0;
   for (int run = 0; run < 6; ++run) {
     const std::vector<AnalyticalGeometry> all = kinds(random);
     for (std::size_t i = 0; i < all.size(); ++i)
       for (std::size_t j = 0; j <= i; ++j) {
         if (std::holds_alternative<Plane>(all[i]) && std::holds_alternative<Plane>(all[j]))
           continue;
+        if (isLeftOut(number++)) continue;
         SCOPED_TRACE("run " + std::to_string(run) + ", kinds " + std::to_string(i) + " and " +
                      std::to_string(j));
         const auto toolOf = [&](const AnalyticalGeometry& shape, double from) {
@@ -283,9 +286,10 @@ TEST(ShapePairSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
                    continuous(run % 3 ? 0.03 : 0.0, run == 4 ? 1e-3 : 1e-6), tally);
       }
   }
-  EXPECT_GT(tally.none, 100);
-  EXPECT_GT(tally.before, 100);
-  EXPECT_GT(tally.within, 100);
+  const auto least = static_cast<int>(leastOf(100));
+  EXPECT_GT(tally.none, least);
+  EXPECT_GT(tally.before, least);
+  EXPECT_GT(tally.within, least);
 }
 
 /// Shapes that are parallel, in one plane or on one line, on a grid.

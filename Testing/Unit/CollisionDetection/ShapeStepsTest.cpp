@@ -6,6 +6,7 @@
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Replayed.h"
+#include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
 #include "Common/TestGeometry.h"
 
@@ -287,11 +288,12 @@ Moving movingBody(Random& random, int type, double radius) {
 
 TEST(ShapeSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
   Random random(1);
-  std::size_t contacts = 0, within = 0;
+  std::size_t number = 0, contacts = 0, within = 0;
   for (int run = 0; run < 4; ++run)
     for (const int kind : {0, 1, 2}) {
       const Moving body = movingBody(random, kind, kind == 0 || run % 2 ? 0.0 : 0.02);
       for (const AnalyticalGeometry& geometry : geometries(random)) {
+        if (isLeftOut(number++)) continue;
         Tool tool{geometry, {}};
         tool.ends[0] = {randomTurn(random), randomPoint(random, -0.3, 0.3)};
         tool.ends[1] = tool.ends[0];
@@ -318,8 +320,8 @@ TEST(ShapeSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
         EXPECT_EQ(only.earliestTimeOfImpact(), data.earliestTimeOfImpact());
       }
     }
-  EXPECT_GT(contacts, 50u);
-  EXPECT_GT(within, 25u);
+  EXPECT_GT(contacts, leastOf(50));
+  EXPECT_GT(within, leastOf(25));
 }
 
 // ---- Hand-computed contacts ----

@@ -344,8 +344,11 @@ TEST(Shapes, MatchTheDefinition) {
                                  organ(sphere(8, 12, {.5, .5, .5}, .4)), thread(random, 60, 0.02),
                                  particles(random, 100, 0.01)};
   std::array<std::size_t, 3> distinct{}, inside{};
-  for (const Body& body : bodies)
+  for (std::size_t bodyIndex = 0; bodyIndex < bodies.size(); ++bodyIndex) {
+    const Body& body = bodies[bodyIndex];
+    std::size_t number = bodyIndex;
     for (const Placed& shape : shapes(random)) {
+      if (isLeftOut(number++)) continue;
       SCOPED_TRACE("shape " + std::to_string(shape.geometry.index()));
       const double thickness = 0.05;
       const auto all =
@@ -372,9 +375,10 @@ TEST(Shapes, MatchTheDefinition) {
       }
       for (const auto& [element, c] : own) EXPECT_TRUE(all.contains(element));
     }
+  }
   for (int kind = 0; kind < 3; ++kind) {
-    EXPECT_GT(distinct[kind], 50u) << kind;
-    EXPECT_GT(inside[kind], 30u) << kind;
+    EXPECT_GT(distinct[kind], leastOf(50)) << kind;
+    EXPECT_GT(inside[kind], leastOf(30)) << kind;
   }
 }
 

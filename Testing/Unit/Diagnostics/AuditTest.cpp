@@ -3,6 +3,7 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
 
 #include <gtest/gtest.h>
 
@@ -110,6 +111,7 @@ void expectEachFault(const Scene& scene, List list,
                      std::vector<Contact> CollisionData::Contents::*member) {
   const CollisionData::Contents good = scene.found();
   for (std::size_t i = 0; i < (good.*member).size(); ++i) {
+    if (testing::isLeftOut(i)) continue;
     const Contact& contact = (good.*member)[i];
     CollisionData::Contents faulty = good;
     (faulty.*member).erase((faulty.*member).begin() + static_cast<std::ptrdiff_t>(i));

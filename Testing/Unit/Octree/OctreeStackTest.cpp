@@ -77,8 +77,6 @@ TEST(OctreeStack, IsSmallForTheDeepestTree) {
   const std::size_t points = stackOf([&] {
     const FloatBox all = testing::boxAbout({0, 0, 0}, 0x1p22);
     findOverlapping(tree.octree, {}, all, queries);
-    forEachNearest(tree.octree, {}, testing::boxAbout({0, 0, 0}, 0), 1e30, queries,
-                   [](std::uint32_t) { return 1e30; });
   });
   EXPECT_EQ(validate(tree.octree, true), std::vector<std::string>{});
   int deepest = 0;

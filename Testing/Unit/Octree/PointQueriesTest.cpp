@@ -57,16 +57,6 @@ FloatBox randomBox(Random& random, double reach, double size) {
   return box;
 }
 
-double squaredDistance(const FloatBox& a, const FloatBox& b) {
-  double sum = 0;
-  for (int k = 0; k < 3; ++k) {
-    const double gap =
-        std::max({double{a.lower[k]} - b.upper[k], double{b.lower[k]} - a.upper[k], 0.0});
-    sum += gap * gap;
-  }
-  return sum;
-}
-
 /// Calls f(case, map, reach) on every SIMD path. reach: the largest coordinate of the case's boxes.
 template <class F>
 void forEachCase(F&& f) {
@@ -109,32 +99,6 @@ TEST(PointQueries, FindEveryOverlappingElement) {
   });
   EXPECT_GT(all, 100u);
   EXPECT_GT(none, 100u);
-}
-
-TEST(PointQueries, VisitNoElementFartherThanTheNearest) {
-  Random random(9);
-  forEachCase([&](const Case& c, const BoxMap& map, double reach) {
-    PointQueryStack stack;
-    for (int query = 0; query < 40; ++query) {
-      const FloatBox point = randomBox(random, 1.5 * reach, query % 3 ? 0.0 : 0.01 * reach);
-      double nearest = std::numeric_limits<double>::infinity();
-      for (std::uint32_t i = 0; i < c.size(); ++i)
-        nearest = std::min(nearest, squaredDistance(map(c.octree->boxes()[i]), point));
-      // No limit, exactly the distance of the nearest, and less.
-      for (const double limit : {std::numeric_limits<double>::infinity(), nearest, 0.5 * nearest}) {
-        double best = limit;
-        std::vector<int> times(c.size(), 0);
-        forEachNearest(*c.octree, map, point, limit, stack, [&](std::uint32_t place) {
-          ++times[place];
-          const double distance = squaredDistance(map(c.octree->boxes()[place]), point);
-          EXPECT_LE(distance, best * (1 + 1e-5) + 1e-30);
-          return best = std::min(best, distance);
-        });
-        EXPECT_EQ(best, std::min(limit, nearest));
-        EXPECT_LE(*std::max_element(times.begin(), times.end()), 1);
-      }
-    }
-  });
 }
 
 }  // namespace

@@ -193,6 +193,21 @@ TEST(PointDistances, PlacedBodiesNearAndFar) {
   }
 }
 
+/// A rotation that is orthonormal only within the tolerance, of a body far from its own origin.
+TEST(PointDistances, InexactRotationsFarFromTheBodysOrigin) {
+  Random random(106);
+  TestGeometry soupFarAway = testGeometry(soup(random, 300, 0.05));
+  const Vector3d far(2e6, -1e6, 3e6);
+  for (Vector3d& p : soupFarAway.positions) p += far;
+  for (const double stretch : {1 - 4e-10, 1 + 4e-10}) {
+    Both both(soupFarAway);
+    const Matrix3d turn = stretch * randomTurn(random);
+    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, -(turn * far)); });
+    const Positions world = placed(soupFarAway.positions, turn, -(turn * far));
+    expectSameAnswers(both, pointsAround(random, world, casesOf(300)));
+  }
+}
+
 TEST(PointDistances, SurfacesOfTetrahedralMeshes) {
   Random random(105);
   Solid solid = cells(3, random, [](const auto& c) { return c[0] != 1 || c[1] == 0; });

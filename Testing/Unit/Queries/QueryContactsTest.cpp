@@ -111,5 +111,49 @@ TEST(QueryContacts, EmptyGeometriesHaveNone) {
   }
 }
 
+// ---- Contacts of a RigidMesh at thickness 0 ----
+
+/// Whether a corner of one triangle is on the other, or two edges meet, exactly.
+bool featuresTouch(const Positions& a, const Positions& b) {
+  bool touch = false;
+  for (std::size_t i = 0; i < 3; ++i) {
+    touch = touch || oracle::vertexTriangle(a[i], b[0], b[1], b[2]).square == 0 ||
+            oracle::vertexTriangle(b[i], a[0], a[1], a[2]).square == 0;
+    for (std::size_t j = 0; j < 3; ++j)
+      touch = touch || oracle::edgeEdge(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]).square == 0;
+  }
+  return touch;
+}
+
+/// Triangles on a lattice, moved by whole numbers and turned by quarters, touch exactly or not.
+TEST(QueryContacts, RigidMeshesAtThicknessZeroTouch) {
+  Random random(703);
+  Matrix3d quarter;
+  quarter << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  std::size_t touching = 0, apart = 0;
+  CollisionData found, truth;
+  for (int i = 0; i < casesOf(1500); ++i) {
+    const TestGeometry body = latticeSoup(random, 1, 4), tool = latticeSoup(random, 1, 4);
+    const Both both(body);
+    RigidMesh mesh(tool.positions, tool.triangles);
+    const Matrix3d turn = i % 2 ? quarter : Matrix3d(Matrix3d::Identity());
+    const Vector3d shift = onLattice(random, 3) - onLattice(random, 3);
+    both.octree.queries().contacts(both.id, mesh, turn, shift, 0.0, found);
+    both.bruteForce.queries().contacts(both.id, mesh, turn, shift, 0.0, truth);
+    EXPECT_EQ(found.hash(), truth.hash());
+    const bool touch = featuresTouch(body.positions, placed(tool.positions, turn, shift));
+    EXPECT_EQ(found.validity().atEnd > 0, touch) << i;
+    const auto expectZero = [](const auto& contacts) {
+      for (const auto& contact : contacts) EXPECT_EQ(contact.distance, 0.0);
+    };
+    expectZero(found.vertexTriangle());
+    expectZero(found.triangleVertex());
+    expectZero(found.edgeEdge());
+    (touch ? touching : apart) += 1;
+  }
+  EXPECT_GE(touching, leastOf(100));
+  EXPECT_GE(apart, leastOf(100));
+}
+
 }  // namespace
 }  // namespace palpate::testing

@@ -146,6 +146,17 @@ TEST(QueryAllocations, RepeatedSingleCallsAllocateNothing) {
   std::vector<SurfacePoint> points;
   std::vector<RayHit> hits;
   std::vector<std::uint32_t> elements;
+  std::vector<ShapeContact> contacts;
+  const std::vector<AnalyticalGeometry> shapes{
+      Sphere{{0, 0, 0}, 0.2},
+      Sphere{{0, 0, 0}, 0.1},
+      Capsule{{-0.1, 0, 0}, {0.1, 0, 0}, 0.1},
+      Capsule{{-0.2, 0, 0}, {0.1, 0, 0}, 0.05},
+      Plane{{0, 0, 0}, {0, 0, 1}, false},
+      Box{{0, 0, 0}, {0.1, 0.2, 0.1}},
+      Cylinder{{-0.1, 0, 0}, {0.1, 0, 0}, 0.1},
+      Cylinder{{-0.1, 0, 0}, {0.1, 0, 0}, 0.0},
+      ConvexHull{{{0, 0, 0}, {0.2, 0, 0}, {0, 0.2, 0}, {0, 0, 0.2}}}};
   const std::vector<GeometryId> ids = scene.withElements();
   using Call = std::function<void(GeometryId, const Vector3d&, const Ray&)>;
   const std::vector<std::pair<std::string, Call>> calls{
@@ -160,6 +171,13 @@ TEST(QueryAllocations, RepeatedSingleCallsAllocateNothing) {
       {"allHits", [&](auto id, auto&, auto& ray) { queries.allHits(id, ray, hits); }},
       {"pick", [&](auto, auto&, auto& ray) { queries.pick(ray); }},
       {"pick front faces", [&](auto, auto&, auto& ray) { queries.pick(ray, true); }},
+      {"contacts and overlapping of shapes in turn",
+       [&](auto id, auto& p, auto&) {
+         for (const AnalyticalGeometry& shape : shapes) {
+           queries.contacts(id, shape, Eigen::Matrix3d::Identity(), p, 0.05, contacts);
+           queries.overlapping(id, shape, Eigen::Matrix3d::Identity(), p, elements);
+         }
+       }},
       {"contains",
        [&](auto id, auto& p, auto&) {
          if (id == scene.closed || id == scene.solid) (void)queries.contains(id, p);

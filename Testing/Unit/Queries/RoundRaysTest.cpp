@@ -316,23 +316,47 @@ TEST(RoundRays, StartsAndEndsOnSurfacesInsideOtherElements) {
   }
 }
 
+/// Bodies of any type whose surface is at height 1 over the origin, which is inside.
+std::vector<Both> bodiesAboutTheOrigin() {
+  std::vector<Both> bodies;
+  for (const AnalyticalGeometry& shape : {AnalyticalGeometry(Sphere{{0, 0, 0}, 1}),
+                                          AnalyticalGeometry(Capsule{{-1, 0, 0}, {1, 0, 0}, 1}),
+                                          AnalyticalGeometry(Box{{0, 0, 0}, {1, 1, 1}}),
+                                          AnalyticalGeometry(Cylinder{{0, 0, -1}, {0, 0, 1}, 1}),
+                                          AnalyticalGeometry(Plane{{0, 0, 1}, {0, 0, 1}, false})})
+    bodies.emplace_back([=](OctreeBasedCD& each) { return each.addAnalyticalGeometry(shape); });
+  bodies.emplace_back(TestGeometry{GeometryType::Points, {{0, 0, 0}}, {}, {}, {1.0}});
+  bodies.emplace_back(
+      TestGeometry{GeometryType::Lines, {{-1, 0, 0}, {1, 0, 0}}, {}, {{0, 1}}, {1.0}});
+  bodies.emplace_back([](OctreeBasedCD& each) {
+    const Mesh mesh = cube(-1.0, 1.0);
+    return each.addTriangleMesh(mesh.positions, mesh.triangles);
+  });
+  return bodies;
+}
+
+/// A parameter is finite: what a ray meets beyond the largest double is no hit.
+TEST(RoundRays, NoHitsBeyondTheLargestDouble) {
+  for (const Both& body : bodiesAboutTheOrigin()) {
+    const auto hits = [&](const Vector3d& origin, double length) {
+      return consistentHits(body, {origin, {0, 0, -length}});
+    };
+    const Vector3d above(0, 0, 1e10), inside(0, 0, 0);
+    EXPECT_EQ(hits(above, 1e-290).size(), hits(above, 1).size());
+    EXPECT_EQ(hits(inside, 1e-300).size(), hits(inside, 1).size());
+    for (const RayHit& hit : hits(above, 1e-290)) EXPECT_TRUE(std::isfinite(hit.t));
+    EXPECT_TRUE(hits(above, 1e-300).empty());
+    EXPECT_TRUE(hits(inside, 1e-310).empty());
+    EXPECT_FALSE(body.octree.queries().pick({above, {0, 0, -1e-300}}));
+    RayHit batch[1];
+    body.octree.queries().firstHits(body.id, std::vector<Ray>{{above, {0, 0, -1e-300}}}, batch);
+    EXPECT_TRUE(std::isinf(batch[0].t));
+  }
+}
+
 /// As of a closed mesh: the hit where a ray starts or ends enters or leaves.
 TEST(RoundRays, StartsAndEndsOnSurfaces) {
-  const Mesh mesh = cube(-1.0, 1.0);
-  const auto addShape = [](const AnalyticalGeometry& shape) {
-    return [=](OctreeBasedCD& each) { return each.addAnalyticalGeometry(shape); };
-  };
-  const Both bodies[] = {
-      Both(addShape(Sphere{{0, 0, 0}, 1})),
-      Both(addShape(Capsule{{-1, 0, 0}, {1, 0, 0}, 1})),
-      Both(addShape(Box{{0, 0, 0}, {1, 1, 1}})),
-      Both(addShape(Cylinder{{0, 0, -1}, {0, 0, 1}, 1})),
-      Both(addShape(Plane{{0, 0, 1}, {0, 0, 1}, false})),
-      Both(TestGeometry{GeometryType::Points, {{0, 0, 0}}, {}, {}, {1.0}}),
-      Both(TestGeometry{GeometryType::Lines, {{-1, 0, 0}, {1, 0, 0}}, {}, {{0, 1}}, {1.0}}),
-      Both([&](OctreeBasedCD& each) {
-        return each.addTriangleMesh(mesh.positions, mesh.triangles);
-      })};
+  const std::vector<Both> bodies = bodiesAboutTheOrigin();
   for (std::size_t i = 0; i < std::size(bodies); ++i) {
     SCOPED_TRACE(i);
     const auto expectOne = [&](const Ray& ray, double t, bool frontFace) {

@@ -289,6 +289,26 @@ TEST(ShapeOverlap, BoxesHullsAndFrustumsPlacedAnywhere) {
   }
 }
 
+/// A rotation that is orthonormal only within the tolerance, of a body far from its own origin.
+TEST(ShapeOverlap, InexactRotationsFarFromTheBodysOrigin) {
+  Random random(508);
+  TestGeometry soupFarAway = testGeometry(soup(random, 500, 0.02));
+  const Vector3d far(2e6, -1e6, 3e6);
+  for (Vector3d& p : soupFarAway.positions) p += far;
+  Both both(soupFarAway);
+  const Matrix3d turn = (1 + 4e-10) * randomTurn(random);
+  both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, -(turn * far)); });
+  std::size_t found = 0;
+  for (int i = 0; i < casesOf(30); ++i) {
+    const Vector3d p = randomPoint(random, 0, 1), q = randomPoint(random, 0, 1);
+    for (const AnalyticalGeometry& shape :
+         {AnalyticalGeometry(Sphere{p, 0.2}), AnalyticalGeometry(Capsule{p, q, 0.1}),
+          AnalyticalGeometry(Box{p, 0.3 * q})})
+      found += overlapping(both, {shape, turn / 1.0000000004, {0, 0, 0}}).size();
+  }
+  EXPECT_GE(found, leastOf(1000));
+}
+
 /// Elements wholly inside, and a shape wholly between elements.
 TEST(ShapeOverlap, InsideAndBetween) {
   const TestGeometry ball = testGeometry(sphere(10, 14, {0, 0, 0}, 1.0));
@@ -391,6 +411,61 @@ TEST(ShapeOverlap, PlanesAndCylinders) {
     }
     EXPECT_GE(found, leastOf(20));
   }
+}
+
+// ---- Lines whose radii differ between their ends: the hulls of two balls ----
+
+/// The least gap between a shape and the balls along a segment. The distance from the shape is that
+/// of its own closest point.
+double gapOfBalls(const SpatialQueries& queries, GeometryId shape, const TestGeometry& line,
+                  const Triangle& t) {
+  return least([&](double s) {
+    const Vector3d centre = (1 - s) * line.positions[t[0]] + s * line.positions[t[1]];
+    return queries.closestPoint(shape, centre)->distance -
+           ((1 - s) * line.radius(t[0]) + s * line.radius(t[1]));
+  });
+}
+
+TEST(ShapeOverlap, TaperedLinesAreHullsOfBalls) {
+  Random random(507);
+  TestGeometry line = tapered(random, thread(random, 80, 0.25, 0.0, false), 0.2);
+  for (std::size_t v = 0; v < line.radii.size(); v += 2) line.radii[v] *= 0.05;
+  for (const std::size_t v : {10u, 30u, 50u}) line.positions[v] = line.positions[v - 1];
+  const Both both(line);
+  const std::vector<Triangle> elements = elementsOf(line);
+  std::vector<Vector3d> cloud;
+  for (int i = 0; i < 7; ++i) cloud.push_back(randomPoint(random, -0.2, 0.2));
+  std::size_t found = 0, beyondClosest = 0;
+  for (const AnalyticalGeometry& geometry :
+       {AnalyticalGeometry(Sphere{{0, 0, 0}, 0.02}), AnalyticalGeometry(Sphere{{0, 0, 0}, 0.0}),
+        AnalyticalGeometry(Capsule{{-0.2, 0, 0}, {0.2, 0.1, 0}, 0.03}),
+        AnalyticalGeometry(Plane{{0, 0, 0}, {1, 2, 3}, false}),
+        AnalyticalGeometry(Plane{{0, 0, 0}, {1, 2, 3}, true}),
+        AnalyticalGeometry(Box{{0, 0, 0}, {0.2, 0.1, 0.05}}),
+        AnalyticalGeometry(Cylinder{{-0.2, 0, 0}, {0.2, 0.1, 0}, 0.08}),
+        AnalyticalGeometry(ConvexHull{cloud}), AnalyticalGeometry(ConvexHull{{{0, 0, 0}}})})
+    for (int i = 0; i < casesOf(12); ++i) {
+      const Vector3d& near = line.positions[random() % line.positions.size()];
+      const PlacedShape shape{geometry, randomTurn(random), near + randomPoint(random, -0.2, 0.2)};
+      OctreeBasedCD alone;
+      const GeometryId id = alone.addAnalyticalGeometry(shape.geometry);
+      alone.setTransform(id, shape.rotation, shape.translation);
+      const SpatialQueries queries = alone.queries();
+      found += expectGaps(both, shape, elements, 1e-9, [&](const Triangle& t) -> long double {
+        const double gap = gapOfBalls(queries, id, line, t);
+        const auto* sphere = std::get_if<Sphere>(&geometry);
+        if (sphere && gap < -1e-9) {
+          const auto onLine = oracle::vertexTriangle(shape.translation, line.positions[t[0]],
+                                                     line.positions[t[1]], line.positions[t[1]]);
+          const double weight = onLine.weights[1].get_d() + onLine.weights[2].get_d();
+          beyondClosest += oracle::root(onLine.square).get_d() - sphere->radius >
+                           (1 - weight) * line.radius(t[0]) + weight * line.radius(t[1]) + 1e-9;
+        }
+        return gap;
+      });
+    }
+  EXPECT_GE(found, leastOf(300));
+  EXPECT_GE(beyondClosest, leastOf(3));
 }
 
 TEST(ShapeOverlap, EmptyGeometriesHaveNone) {
