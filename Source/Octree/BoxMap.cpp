@@ -25,15 +25,17 @@ namespace palpate {
 
 HWY_EXPORT(mapKernel);
 
-void setShift(std::array<float, 4>& lower, std::array<float, 4>& upper,
-              const std::array<double, 3>& offset, double thickness) {
+void setShift(float& lower, float& upper, double offset, double thickness) {
   constexpr double kMax = 0x1p125;  // boxes of kLargestFloat stay finite
   const auto clamped = [&](double v) { return std::min(std::max(v, -kMax), kMax); };
-  for (int k = 0; k < 3; ++k) {
-    const double error = (std::abs(offset[k]) + thickness) * OutwardRounding::kRelative;
-    lower[k] = static_cast<float>(clamped(offset[k] - thickness - error));
-    upper[k] = static_cast<float>(clamped(offset[k] + thickness + error));
-  }
+  const double error = (std::abs(offset) + thickness) * OutwardRounding::kRelative;
+  lower = static_cast<float>(clamped(offset - thickness - error));
+  upper = static_cast<float>(clamped(offset + thickness + error));
+}
+
+void setShift(std::array<float, 4>& lower, std::array<float, 4>& upper,
+              const std::array<double, 3>& offset, double thickness) {
+  for (int k = 0; k < 3; ++k) setShift(lower[k], upper[k], offset[k], thickness);
 }
 
 void setEnd(BoxMap::End& end, const std::array<std::array<double, 3>, 3>& matrix,
