@@ -55,7 +55,7 @@ struct DopMap {
   int directions = 3;  ///< rows of an end
 };
 
-/// Sets one end's map: takes for each direction the combination that is least for the mean half
+/// Sets one end's map. It takes for each direction the combination that is least for the mean half
 /// widths of the tree's leaves. thickness: along any unit vector. error: along an axis, as
 /// forEachBodyEnd() in Queries/SearchableGeometry.cpp derives it.
 ///

@@ -420,12 +420,20 @@ class Walk {
   PairSink& m_sink;
 };
 
+/// A function of its own, so that the compiler inlines the others as before.
+template <class F>
+HWY_NOINLINE HWY_ATTR void withDops(const TreePair& trees, TraversalStack& stack, PairSink& sink,
+                                    F&& f) {
+  if (trees.dops.directions == 7)
+    f(Walk<Placement::Mapped, 7>(trees, stack, sink));
+  else
+    f(Walk<Placement::Mapped, 9>(trees, stack, sink));
+}
+
 template <class F>
 HWY_ATTR void withWalk(const TreePair& trees, TraversalStack& stack, PairSink& sink, F&& f) {
-  if (trees.dops.count > 0 && trees.dops.directions == 7)
-    f(Walk<Placement::Mapped, 7>(trees, stack, sink));
-  else if (trees.dops.count > 0)
-    f(Walk<Placement::Mapped, 9>(trees, stack, sink));
+  if (trees.dops.count > 0)
+    withDops(trees, stack, sink, f);
   else if (trees.isMapped())
     f(Walk<Placement::Mapped>(trees, stack, sink));
   else if (trees.isShifted())
