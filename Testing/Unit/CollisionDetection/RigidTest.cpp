@@ -451,6 +451,27 @@ TEST(Rigid, BoundsReduceCandidates) {
   }
 }
 
+TEST(Rigid, BoundsDoNotChangeContactsOfQueries) {
+  Random random(11);
+  const TestGeometry leaf = testGeometry(sheet(20, 0.5, 1.0)),
+                     ball = testGeometry(sphere(15, 18, {0.5, 0.5, 0.5}, 0.4));
+  RigidMesh probe(ball.positions, ball.triangles);
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    const Place place = somewhere(random), pose = somewhere(random);
+    std::vector<Rows> rows;
+    for (const Settings& settings : boundsSettings()) {
+      OctreeBasedCD collisions(settings);
+      const GeometryId id = leaf.addTo(collisions);
+      collisions.setTransform(id, place.rotation, place.translation);
+      CollisionData found;
+      collisions.queries().contacts(id, probe, pose.rotation, pose.translation, 0.03, found);
+      rows.emplace_back(found);
+    }
+    EXPECT_GT(rows[0].contacts(), 0u);
+    for (const Rows& row : rows) expectSameRows(row, rows[0]);
+  }
+}
+
 TEST(Rigid, OctreeIsNotUpdated) {
   Random random(6);
   const TestGeometry bone = testGeometry(sphere(40, 50, {0.5, 0.5, 0.5}, 0.4)),
