@@ -245,7 +245,8 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   const double scale = frameScale(spread);
   m_changed.clear();
   for (const auto& geometry : m_geometries)
-    if (!geometry->tree.isCurrent(geometry->mesh, geometry->revisions.topology, scale))
+    if (!geometry->tree.isCurrent(geometry->mesh, geometry->revisions.topology, scale) ||
+        geometry->tree.needsDops(geometry->mesh, settings.bounds))
       m_changed.push_back(geometry.get());
   // Geometries are updated in parallel, the largest first, and large ones use several threads each.
   // The serial parts of one update thus run beside the work on other geometries.
@@ -262,8 +263,10 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   m_wasUpdatedByOneThread = settings.update == OctreeUpdate::Auto && total < kSmallRefit;
   (m_wasUpdatedByOneThread ? one : threads).forEach(m_changed.size(), [&](std::size_t i) {
     Geometry& geometry = *m_changed[i];
-    geometry.tree.update(geometry.mesh, geometry.revisions.topology, scale, settings,
-                         size(&geometry) < kSmall ? one : threads);
+    const Threads& shared = size(&geometry) < kSmall ? one : threads;
+    if (!geometry.tree.isCurrent(geometry.mesh, geometry.revisions.topology, scale))
+      geometry.tree.update(geometry.mesh, geometry.revisions.topology, scale, settings, shared);
+    geometry.tree.updateDops(geometry.mesh, settings.bounds, shared);
   });
 }
 

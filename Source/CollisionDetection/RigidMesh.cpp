@@ -39,6 +39,7 @@ struct RigidMesh::Implementation {
       mesh.tree.sampleFrame(mesh.mesh, mesh.revisions.topology);
       mesh.tree.update(mesh.mesh, mesh.revisions.topology, scale, settings, one);
     }
+    mesh.tree.updateDops(mesh.mesh, settings.bounds, one);
     return mesh;
   }
   void findByOctree(const SearchableGeometry& a, const SearchableGeometry& b, Job& job) {

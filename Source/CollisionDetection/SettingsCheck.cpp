@@ -21,6 +21,7 @@ const Settings& checked(const Settings& settings) {
   check("octree.maxDepth", octree.maxDepth, 1, 60, "in [1, 60]");
   check("octree.maxElementsPerLeaf", octree.maxElementsPerLeaf, 1, 1024, "in [1, 1024]");
   check("octree.update", octree.update, 0, 1, "Auto or Rebuild");
+  check("octree.bounds", octree.bounds, 0, 2, "Box, Dop14 or Dop18");
   check("engine", settings.engine, 0, 1, "Octree or BruteForce");
   check("threads", settings.threads, 0, 1024, "in [0, 1024]");
   check("audit.features", settings.audit.features, 0, kAny, "at least 0");

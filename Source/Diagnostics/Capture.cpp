@@ -20,7 +20,7 @@ namespace palpate {
 namespace {
 
 constexpr std::string_view kTitle = "palpate-capture";
-constexpr int kVersion = 9;
+constexpr int kVersion = 10;
 
 // Enumerators are written by name. The names are in the order of the declarations.
 constexpr std::array<std::string_view, 4> kMethods{"Auto", "Intersection", "Proximity",
@@ -35,6 +35,7 @@ enum class ContactsBefore9 { Distinct, All, Earliest };
 constexpr std::array<std::string_view, 3> kContactsBefore9{"Distinct", "All", "Earliest"};
 constexpr std::array<std::string_view, 2> kEngines{"Octree", "BruteForce"};
 constexpr std::array<std::string_view, 2> kUpdates{"Auto", "Rebuild"};
+constexpr std::array<std::string_view, 3> kBounds{"Box", "Dop14", "Dop18"};
 
 /// For messages: long words are cut.
 std::string quoted(std::string_view text) {
@@ -144,12 +145,13 @@ template <class File>
 constexpr bool kReads = std::is_same_v<File, Reader>;
 
 template <class File, class SettingsType>
-void settingsLine(File& file, SettingsType& settings) {
+void settingsLine(File& file, SettingsType& settings, int version) {
   file.word(settings.engine, kEngines);
   file.integer(settings.threads);
   file.integer(settings.octree.maxDepth);
   file.integer(settings.octree.maxElementsPerLeaf);
   file.word(settings.octree.update, kUpdates);
+  if (version >= 10) file.word(settings.octree.bounds, kBounds);
 }
 
 template <class File>
@@ -300,7 +302,7 @@ void meshLines(File& file, MeshType& mesh, int version) {
 /// All lines except the title.
 template <class File, class ProblemType>
 void problemLines(File& file, ProblemType& problem, int version) {
-  settingsLine(file, problem.settings);
+  settingsLine(file, problem.settings, version);
   file.endLine();
   sizeOf(file, problem.geometries, kGeometryText);
   sizeOf(file, problem.pairs, kPairText);

@@ -25,18 +25,19 @@ namespace palpate {
 
 HWY_EXPORT(mapKernel);
 
-void setShift(std::array<float, 4>& lower, std::array<float, 4>& upper,
-              const std::array<double, 3>& offset, double thickness) {
+void setShift(float& lower, float& upper, double offset, double thickness) {
   constexpr double kMax = 0x1p125;      // boxes of kLargestFloat stay finite
   constexpr double kFinite = 0x1p1000;  // so is each sum; the error covers what is cut off
   const auto clamped = [](double v, double most) { return std::min(std::max(v, -most), most); };
-  const double widened = clamped(thickness, kFinite);
-  for (int k = 0; k < 3; ++k) {
-    const double moved = clamped(offset[k], kFinite);
-    const double error = (std::abs(moved) + widened) * OutwardRounding::kRelative;
-    lower[k] = static_cast<float>(clamped(moved - widened - error, kMax));
-    upper[k] = static_cast<float>(clamped(moved + widened + error, kMax));
-  }
+  const double moved = clamped(offset, kFinite), widened = clamped(thickness, kFinite);
+  const double error = (std::abs(moved) + widened) * OutwardRounding::kRelative;
+  lower = static_cast<float>(clamped(moved - widened - error, kMax));
+  upper = static_cast<float>(clamped(moved + widened + error, kMax));
+}
+
+void setShift(std::array<float, 4>& lower, std::array<float, 4>& upper,
+              const std::array<double, 3>& offset, double thickness) {
+  for (int k = 0; k < 3; ++k) setShift(lower[k], upper[k], offset[k], thickness);
 }
 
 void setEnd(BoxMap::End& end, const std::array<std::array<double, 3>, 3>& matrix,

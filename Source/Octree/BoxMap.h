@@ -6,12 +6,14 @@
 
 namespace palpate {
 
-/// Computes the shifts that bring bounds of boxes into a frame whose origin is `offset` away (in
-/// units of the frame), and widen them by a thickness.
+/// Computes the shifts that bring bounds into a frame whose origin is `offset` away (in units of
+/// the frame), and widen them by a thickness.
 ///
 /// Rounding: a bound is moved by fl(lower + shift) and then outward by OutwardRounding. The shift's
 /// own error is at most 2^-24 of |offset| + thickness, which is added to it here. The sum's error
 /// is at most 2^-24 of the sum, which the outward step covers.
+void setShift(float& lower, float& upper, double offset, double thickness);
+/// The same for the three axes of boxes.
 void setShift(std::array<float, 4>& lower, std::array<float, 4>& upper,
               const std::array<double, 3>& offset, double thickness);
 

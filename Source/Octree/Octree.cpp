@@ -29,6 +29,7 @@ Octree::~Octree() = default;
 
 void Octree::reset(std::size_t size) {
   m_stage = Stage::Empty;
+  m_dops.directions = 3;
   ++m_layout;
   m_order.clear();
   m_nodes.groups.clear();
@@ -68,6 +69,7 @@ void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& se
                    std::span<std::uint64_t> keys, const Threads& threads) {
   PALPATE_ASSERT(size() > 0 && keys.size() == size());
   m_stage = Stage::Empty;
+  m_dops.directions = 3;
   ++m_layout;
   try {
     if (!m_builder) m_builder = std::make_unique<OctreeBuilder>();
@@ -84,6 +86,7 @@ void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& se
 void Octree::fit(const Threads& threads) {
   PALPATE_ASSERT(m_stage != Stage::Empty);
   m_stage = Stage::LaidOut;
+  m_dops.directions = 3;
   OctreeNodes& nodes = m_nodes;
   m_groupAreas.resize((nodes.groupNodes.size() + kGroupsPerTask - 1) / kGroupsPerTask);
   threads.forChunks(nodes.groupNodes.size(), kGroupsPerTask,
@@ -104,6 +107,54 @@ void Octree::fit(const Threads& threads) {
   });
   fitBlocks(nodes.pool.data(), nodes.parents.data(), 1, nodes.partBlocks[1]);
   m_stage = Stage::Built;
+}
+
+OctreeDops& Octree::startDops(int directions) {
+  PALPATE_ASSERT(isBuilt());
+  m_dops.directions = 3;
+  for (int k = 3; k < directions; ++k)
+    for (Buffer<float>* bounds : {&m_dops.lower[k], &m_dops.upper[k]})
+      resizeSparingly(*bounds, size() + BoxArrays::kPadding);
+  resizeSparingly(m_dops.blocks, m_nodes.pool.used() * static_cast<std::size_t>(directions - 3));
+  return m_dops;
+}
+
+void Octree::fitDops(int directions) {
+  constexpr float kInfinity = FloatBox::kEmptyLower;
+  OctreeDops& dops = m_dops;
+  const auto further = static_cast<std::size_t>(directions - 3);
+  double leaves = 0;
+  dops.halfWidths.fill(0);
+  // Children come after their parents.
+  for (std::size_t block = m_nodes.pool.used(); block-- > 0;)
+    for (unsigned slot = 0; slot < 8; ++slot) {
+      const auto node = static_cast<OctreeNode>(block * 8 + slot);
+      const bool isUsed = (block > 0 || slot == 0) && !isEmpty(node);
+      const auto [begin, end] = isUsed ? ownRange(node) : std::pair(0u, 0u);
+      const std::size_t child = isUsed ? firstChild(node) >> 3 : 0;
+      const bool isLeaf = isUsed && child == 0;
+      leaves += isLeaf;
+      for (int k = 0; k < 3 && isLeaf; ++k) {
+        const FloatBox fitted = box(node);
+        dops.halfWidths[k] += 0.5 * (double{fitted.upper[k]} - fitted.lower[k]);
+      }
+      for (std::size_t k = 0; k < further; ++k) {
+        float lower = kInfinity, upper = -kInfinity;
+        for (std::uint32_t i = begin; i < end; ++i) {
+          lower = std::min(lower, dops.lower[k + 3][i]);
+          upper = std::max(upper, dops.upper[k + 3][i]);
+        }
+        for (unsigned s = 0; child != 0 && s < 8; ++s) {
+          lower = std::min(lower, dops.blocks[child * further + k].lower[s]);
+          upper = std::max(upper, dops.blocks[child * further + k].upper[s]);
+        }
+        dops.blocks[block * further + k].lower[slot] = lower;
+        dops.blocks[block * further + k].upper[slot] = upper;
+        if (isLeaf) dops.halfWidths[k + 3] += 0.5 * (double{upper} - lower);
+      }
+    }
+  for (double& width : dops.halfWidths) width /= leaves;
+  dops.directions = directions;
 }
 
 void Octree::throwNotBuilt() {
@@ -129,10 +180,10 @@ void Octree::measureLooseness() {
 
 std::size_t Octree::bytes() const {
   const auto of = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
-  std::size_t bytes = of(m_order) + of(m_nodes.groups) + of(m_nodes.groupNodes) +
-                      of(m_nodes.parents) + of(m_nodes.partBlocks) + of(m_groupBoxes) +
-                      of(m_groupAreas) + m_nodes.pool.allocated() * sizeof(OctreeBlock) +
-                      (m_builder ? m_builder->bytes() : 0);
+  std::size_t bytes =
+      of(m_order) + of(m_nodes.groups) + of(m_nodes.groupNodes) + of(m_nodes.parents) +
+      of(m_nodes.partBlocks) + of(m_groupBoxes) + of(m_groupAreas) + m_dops.bytes() +
+      m_nodes.pool.allocated() * sizeof(OctreeBlock) + (m_builder ? m_builder->bytes() : 0);
   for (int k = 0; k < 3; ++k) bytes += of(m_boxes.lower[k]) + of(m_boxes.upper[k]);
   return bytes;
 }

@@ -7,6 +7,7 @@
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
 #include "Math/Box.h"
+#include "Octree/Dops.h"
 #include "Octree/Keys.h"
 
 #include <algorithm>
@@ -151,6 +152,11 @@ class Octree {
   /// Computes the boxes of all nodes from the groups' boxes.
   void fit(const Threads&);
   void measureLooseness();  ///< of the fitted boxes
+  /// Of a built octree: makes room for the elements' bounds along the directions after the axes.
+  /// The caller writes them in the order() and calls fitDops(), which computes those of all nodes.
+  /// Until then, and after any change of the octree, there are none.
+  OctreeDops& startDops(int directions);
+  void fitDops(int directions);
 
   bool isBuilt() const { return m_stage == Stage::Built; }
   std::uint64_t layout() const { return m_layout; }  ///< changes with each reset() and build()
@@ -167,6 +173,7 @@ class Octree {
   /// build. Otherwise the tree should be built again.
   bool isTight() const { return m_looseness <= kMaxLoosening * m_leastLooseness; }
 
+  const OctreeDops& dops() const { return m_dops; }
   const OctreeBlock* blocks() const { return m_nodes.pool.data(); }
   const BlockPool& pool() const { return m_nodes.pool; }
   const Cube& rootCube() const { return m_nodes.rootCube; }
@@ -199,6 +206,7 @@ class Octree {
   std::uint64_t m_layout = 0;
   Buffer<std::uint32_t> m_order;
   BoxArrays m_boxes;
+  OctreeDops m_dops;
   OctreeNodes m_nodes;
   std::unique_ptr<OctreeBuilder> m_builder;  ///< keeps its scratch; null before the first build
   Buffer<FloatBox> m_groupBoxes;

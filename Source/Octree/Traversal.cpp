@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Octree/Traversal.cpp"
@@ -19,24 +20,70 @@ struct LeafRange {
 };
 
 /// How boxes are transformed: not at all, a's boxes are shifted, or the boxes of at least one tree
-/// are mapped by a BoxMap.
+/// are mapped by a BoxMap. a's k-DOPs are mapped by a DopMap.
 enum class Placement { None, Shifted, Mapped };
 
-template <Placement placement>
+/// k-DOPs in the form of OctreeBlock and BoxArrays.
+template <int K>
+struct DopArrays {
+  const float *lower[K], *upper[K];
+
+  DopArrays(const OctreeBlock& block, const OctreeDops::Siblings* further) {
+    for (int k = 0; k < 3; ++k) {
+      lower[k] = block.lower[k];
+      upper[k] = block.upper[k];
+    }
+    for (int k = 3; k < K; ++k) {
+      lower[k] = further[k - 3].lower;
+      upper[k] = further[k - 3].upper;
+    }
+  }
+  DopArrays(const BoxArrays& boxes, const OctreeDops& dops) {
+    for (int k = 0; k < K; ++k) {
+      lower[k] = (k < 3 ? boxes.lower[k] : dops.lower[k]).data();
+      upper[k] = (k < 3 ? boxes.upper[k] : dops.upper[k]).data();
+    }
+  }
+};
+
+/// The boxes of a tree, or its k-DOPs.
+template <int K>
+struct TreeBounds {
+  explicit TreeBounds(const Octree& tree)
+      : blocks(tree.blocks()), dops(tree.dops()), elements(tree.boxes(), tree.dops()) {}
+  HWY_INLINE DopArrays<K> siblings(OctreeNode block) const {
+    return {blocks[block], dops.block(block)};
+  }
+
+  const OctreeBlock* blocks;
+  const OctreeDops& dops;
+  const DopArrays<K> elements;
+};
+template <>
+struct TreeBounds<3> {
+  explicit TreeBounds(const Octree& tree) : blocks(tree.blocks()), elements(tree.boxes()) {}
+  HWY_INLINE const OctreeBlock& siblings(OctreeNode block) const { return blocks[block]; }
+
+  const OctreeBlock* blocks;
+  const BoxArrays& elements;
+};
+
+/// K: the number of directions of the bounds.
+template <Placement placement, int K = 3>
 class Walk {
  public:
   Walk(const TreePair& trees, TraversalStack& stack, PairSink& sink)
       : m_trees(trees),
         m_a(trees.a->blocks()),
         m_b(trees.b->blocks()),
-        m_boxesA(trees.a->boxes()),
-        m_boxesB(trees.b->boxes()),
+        m_boundsA(*trees.a),
+        m_boundsB(*trees.b),
         m_idsA(trees.a->order().data()),
         m_idsB(trees.b->order().data()),
         m_stack(stack.pairs),
         m_sink(sink) {}
 
-  HWY_ATTR bool rootsOverlap() const { return overlaps(m_b[0], boxOfA(m_a[0], 0)) & 1; }
+  HWY_ATTR bool rootsOverlap() const { return overlaps(0, boundsOfA(0)) & 1; }
 
   HWY_ATTR void all(std::size_t bottom) {
     while (m_stack.size() > bottom) {
@@ -53,9 +100,11 @@ class Walk {
   /// elements.
   HWY_ATTR void step(NodePair pair) {
     const bool leafA = isLeaf(m_a, pair.a), leafB = isLeaf(m_b, pair.b);
-    if (m_trees.self() && pair.a == pair.b)
-      leafA ? compareWithinLeaf(range(*m_trees.a, pair.a)) : descendWithinNode(pair.a);
-    else if (leafA && leafB)
+    if constexpr (K == 3) {
+      if (m_trees.self() && pair.a == pair.b)
+        return leafA ? compareWithinLeaf(range(*m_trees.a, pair.a)) : descendWithinNode(pair.a);
+    }
+    if (leafA && leafB)
       compareLeaves(pair);
     else if (leafA)
       descendB(pair);
@@ -74,59 +123,86 @@ class Walk {
     return {begin, end};
   }
 
+  using Bounds = BoundsOf<K>;
+
   template <class D>
-  HWY_ATTR HWY_INLINE BoxLanes<D> placedA(const BoxLanes<D>& boxes) const {
-    if (placement == Placement::None) return boxes;
-    if (placement == Placement::Shifted)
-      return boxes.shifted(m_trees.shiftLower, m_trees.shiftUpper);
-    if (m_trees.mapA.count > 0) return boxes.mapped(m_trees.mapA);
-    return boxes.unclamped().shifted(m_trees.shiftLower, m_trees.shiftUpper);
+  HWY_ATTR HWY_INLINE BoxLanes<D, K> placedA(const BoxLanes<D, K>& boxes) const {
+    if constexpr (K > 3) {
+      return boxes.mapped(m_trees.dops);
+    } else {
+      if (placement == Placement::None) return boxes;
+      if (placement == Placement::Shifted)
+        return boxes.shifted(m_trees.shiftLower, m_trees.shiftUpper);
+      if (m_trees.mapA.count > 0) return boxes.mapped(m_trees.mapA);
+      return boxes.unclamped().shifted(m_trees.shiftLower, m_trees.shiftUpper);
+    }
   }
   template <class D>
-  HWY_ATTR HWY_INLINE BoxLanes<D> placedB(const BoxLanes<D>& boxes) const {
-    if (placement != Placement::Mapped) return boxes;
-    return m_trees.mapB.count > 0 ? boxes.mapped(m_trees.mapB) : boxes.unclamped();
+  HWY_ATTR HWY_INLINE BoxLanes<D, K> placedB(const BoxLanes<D, K>& boxes) const {
+    if constexpr (K == 3 && placement == Placement::Mapped)
+      return m_trees.mapB.count > 0 ? boxes.mapped(m_trees.mapB) : boxes.unclamped();
+    return boxes;
   }
 
-  /// The box of one node of a, in the frame in which boxes are compared.
-  HWY_ATTR HWY_INLINE FloatBox boxOfA(const OctreeBlock& block, unsigned slot) const {
-    return placedA(BoxLanes<BoxTag>::load(block, slot)).first();
+  /// The bounds of one node of a, in the frame in which they are compared.
+  HWY_ATTR HWY_INLINE Bounds boundsOfA(OctreeNode node) const {
+    return placedA(BoxLanes<BoxTag, K>::load(m_boundsA.siblings(node >> 3), node & 7)).first();
   }
-  HWY_ATTR HWY_INLINE FloatBox boxOfB(const OctreeBlock& block, unsigned slot) const {
-    return placedB(BoxLanes<BoxTag>::load(block, slot)).first();
+  HWY_ATTR HWY_INLINE Bounds boundsOfB(OctreeNode node) const {
+    return placedB(BoxLanes<BoxTag, K>::load(m_boundsB.siblings(node >> 3), node & 7)).first();
   }
 
-  /// Bit i: child i of b's block overlaps the box.
-  HWY_ATTR HWY_INLINE std::uint32_t overlaps(const OctreeBlock& block, const FloatBox& box) const {
+  /// Bit i: child i of b's block overlaps the bounds.
+  HWY_ATTR HWY_INLINE std::uint32_t overlaps(OctreeNode block, const Bounds& bounds) const {
     const NodeTag d;
+    const auto& siblings = m_boundsB.siblings(block);
     std::uint32_t bits = 0;
-    for (std::size_t i = 0; i < 8; i += hn::Lanes(d))
-      bits |= bitsOf(d, placedB(BoxLanes<NodeTag>::load(block, i)).overlapping(box)) << i;
+    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+      if constexpr (K == 3) {
+        bits |= bitsOf(d, placedB(BoxLanes<NodeTag>::load(siblings, i)).overlapping(bounds)) << i;
+      } else {
+        auto mask = hn::FirstN(d, 8);
+        const auto compare = [&](int k) HWY_ATTR {
+          mask = hn::And(mask,
+                         hn::Le(hn::Load(d, siblings.lower[k] + i), hn::Set(d, bounds.upper[k])));
+          mask = hn::And(mask,
+                         hn::Ge(hn::Load(d, siblings.upper[k] + i), hn::Set(d, bounds.lower[k])));
+        };
+        for (int k = 0; k < 3; ++k) compare(k);
+        if (hn::AllFalse(d, mask)) continue;
+        for (int k = 3; k < K; ++k) compare(k);
+        bits |= bitsOf(d, mask) << i;
+      }
+    }
     return bits;
   }
 
-  struct ShiftedBlock {
-    alignas(32) float lower[3][8];
-    alignas(32) float upper[3][8];
-    FloatBox box(unsigned slot) const {
-      return {{lower[0][slot], lower[1][slot], lower[2][slot], 0},
-              {upper[0][slot], upper[1][slot], upper[2][slot], 0}};
+  struct PlacedBlock {
+    alignas(32) float lower[K][8];
+    alignas(32) float upper[K][8];
+    Bounds bounds(unsigned slot) const {
+      Bounds bounds;
+      for (int k = 0; k < K; ++k) {
+        bounds.lower[k] = lower[k][slot];
+        bounds.upper[k] = upper[k][slot];
+      }
+      return bounds;
     }
   };
 
-  /// Places the boxes of a's eight children. Returns which of them overlap b's node.
-  HWY_ATTR std::uint32_t shiftBlock(const OctreeBlock& a, const OctreeBlock& b, unsigned slotB,
-                                    ShiftedBlock& out) const {
+  /// Places the bounds of the eight children in a's block. Returns which of them overlap b's node.
+  HWY_ATTR std::uint32_t placeBlock(OctreeNode block, OctreeNode nodeB, PlacedBlock& out) const {
     const NodeTag d;
-    const FloatBox box = boxOfB(b, slotB);
+    const Bounds bounds = boundsOfB(nodeB);
+    const auto& siblings = m_boundsA.siblings(block);
     std::uint32_t bits = 0;
     for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-      const auto boxes = placedA(BoxLanes<NodeTag>::load(a, i));
-      for (int k = 0; k < 3; ++k) {
+      const auto boxes = placedA(BoxLanes<NodeTag, K>::load(siblings, i));
+      for (int k = 0; k < K; ++k) {
         hn::Store(boxes.lower[k], d, out.lower[k] + i);
         hn::Store(boxes.upper[k], d, out.upper[k] + i);
       }
-      bits |= bitsOf(d, boxes.overlapping(box)) << i;
+      bits |= bitsOf(d, boxes.overlapping(bounds)) << i;
     }
     return bits;
   }
@@ -168,15 +244,15 @@ class Walk {
     const OctreeNode nodeA = pair.a & ~NodePair::kOwn;
     const OctreeNode child = m_b[pair.b >> 3].child[pair.b & 7];
     if (hasOwn(m_b, pair.b)) push(pair.a, pair.b | NodePair::kOwn);
-    pushChildrenOfB(pair.a, child, overlaps(m_b[child], boxOfA(m_a[nodeA >> 3], nodeA & 7)));
+    pushChildrenOfB(pair.a, child, overlaps(child, boundsOfA(nodeA)));
   }
 
   HWY_ATTR void descendA(NodePair pair) {
     const OctreeNode nodeB = pair.b & ~NodePair::kOwn;
     const OctreeNode child = m_a[pair.a >> 3].child[pair.a & 7];
     if (hasOwn(m_a, pair.a)) push(pair.a | NodePair::kOwn, pair.b);
-    ShiftedBlock block;
-    std::uint32_t bits = shiftBlock(m_a[child], m_b[nodeB >> 3], nodeB & 7, block);
+    PlacedBlock block;
+    std::uint32_t bits = placeBlock(child, nodeB, block);
     for (; bits; bits &= bits - 1)
       push(child * 8 + static_cast<unsigned>(std::countr_zero(bits)), pair.b);
   }
@@ -186,48 +262,46 @@ class Walk {
                      childB = m_b[pair.b >> 3].child[pair.b & 7];
     const bool ownB = hasOwn(m_b, pair.b);
     if (hasOwn(m_a, pair.a)) push(pair.a | NodePair::kOwn, pair.b);
-    ShiftedBlock block;
-    std::uint32_t bits = shiftBlock(m_a[childA], m_b[pair.b >> 3], pair.b & 7, block);
+    PlacedBlock block;
+    std::uint32_t bits = placeBlock(childA, pair.b, block);
     for (; bits; bits &= bits - 1) {
       const auto slot = static_cast<unsigned>(std::countr_zero(bits));
       const OctreeNode a = childA * 8 + slot;
       if (ownB) push(a, pair.b | NodePair::kOwn);
-      pushChildrenOfB(a, childB, overlaps(m_b[childB], block.box(slot)));
+      pushChildrenOfB(a, childB, overlaps(childB, block.bounds(slot)));
     }
   }
 
   HWY_ATTR void descendWithinNode(OctreeNode node) {
     const OctreeNode child = m_a[node >> 3].child[node & 7];
-    const OctreeBlock& siblings = m_a[child];
     const bool own = hasOwn(m_a, node);
     if (own) push(node | NodePair::kOwn, node | NodePair::kOwn);
-    ShiftedBlock block;
-    std::uint32_t bits = shiftBlock(siblings, m_b[node >> 3], node & 7, block);
+    PlacedBlock block;
+    std::uint32_t bits = placeBlock(child, node, block);
     for (; bits; bits &= bits - 1) {
       const auto slot = static_cast<unsigned>(std::countr_zero(bits));
       const OctreeNode a = child * 8 + slot;
       if (own) push(node | NodePair::kOwn, a);
       push(a, a);
-      pushChildrenOfB(a, child, overlaps(siblings, block.box(slot)) & ~((2u << slot) - 1));
+      pushChildrenOfB(a, child, overlaps(child, block.bounds(slot)) & ~((2u << slot) - 1));
     }
   }
 
-  /// Up to kMost elements of a, their boxes in b's frame.
+  /// Up to kMost elements of a, their bounds in b's frame.
   struct Rows {
     static constexpr std::size_t kMost = 16;
-    alignas(64) float placed[2][3][kMost];
-    const float *lower[3], *upper[3];  ///< in `placed`, or in the tree's boxes
+    alignas(64) float placed[2][K][kMost];
+    const float *lower[K], *upper[K];  ///< in `placed`, or in the tree's boxes
     std::size_t first;                 ///< in a's order
     std::uint32_t bits;                ///< elements that may overlap the other leaf
   };
 
   HWY_ATTR HWY_INLINE void compareLeaves(NodePair pair) {
     const LeafRange a = range(*m_trees.a, pair.a), b = range(*m_trees.b, pair.b);
-    const OctreeNode nodeB = pair.b & ~NodePair::kOwn;
-    const FloatBox box = boxOfB(m_b[nodeB >> 3], nodeB & 7);
+    const Bounds bounds = boundsOfB(pair.b & ~NodePair::kOwn);
     Rows rows;
     for (std::size_t i = a.begin; i < a.end; i += Rows::kMost) {
-      load(rows, i, a.end, box);
+      load(rows, i, a.end, bounds);
       if (rows.bits) compare<false>(rows, b);
     }
   }
@@ -243,25 +317,25 @@ class Walk {
     }
   }
 
-  /// Loads the elements from `first` on. Their bit is set if they overlap the box.
+  /// Loads the elements from `first` on. Their bit is set if they overlap the bounds.
   HWY_ATTR HWY_INLINE void load(Rows& rows, std::size_t first, std::size_t end,
-                                const FloatBox& box) const {
+                                const Bounds& bounds) const {
     const LeafTag d;
     rows.first = first;
     rows.bits = 0;
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < K; ++k) {
       const bool usesTreeBoxes = placement == Placement::None;
-      rows.lower[k] = usesTreeBoxes ? m_boxesA.lower[k].data() + first : rows.placed[0][k];
-      rows.upper[k] = usesTreeBoxes ? m_boxesA.upper[k].data() + first : rows.placed[1][k];
+      rows.lower[k] = usesTreeBoxes ? &m_boundsA.elements.lower[k][first] : rows.placed[0][k];
+      rows.upper[k] = usesTreeBoxes ? &m_boundsA.elements.upper[k][first] : rows.placed[1][k];
     }
     for (std::size_t lane = 0; lane < Rows::kMost && first + lane < end; lane += hn::Lanes(d)) {
       const std::size_t i = first + lane;
-      const auto boxes = placedA(BoxLanes<LeafTag>::load(m_boxesA, i));
-      for (int k = 0; k < 3 && placement != Placement::None; ++k) {
+      const auto boxes = placedA(BoxLanes<LeafTag, K>::load(m_boundsA.elements, i));
+      for (int k = 0; k < K && placement != Placement::None; ++k) {
         hn::Store(boxes.lower[k], d, rows.placed[0][k] + lane);
         hn::Store(boxes.upper[k], d, rows.placed[1][k] + lane);
       }
-      rows.bits |= bitsOf(d, hn::And(hn::FirstN(d, end - i), boxes.overlapping(box))) << lane;
+      rows.bits |= bitsOf(d, hn::And(hn::FirstN(d, end - i), boxes.overlapping(bounds))) << lane;
     }
   }
 
@@ -272,7 +346,8 @@ class Walk {
     const LeafTag d;
     const hn::RebindToUnsigned<LeafTag> du;
     for (std::size_t j = b.begin; j < b.end; j += hn::Lanes(d)) {
-      const auto boxes = placedB(BoxLanes<LeafTag>::load(m_boxesB, j));
+      BoxLanes<LeafTag> boxes = BoxLanes<LeafTag>::load(m_boundsB.elements, j);
+      if constexpr (K == 3) boxes = placedB(boxes);
       const auto ids = hn::LoadU(du, m_idsB + j);
       hn::Vec<decltype(du)> corners[3];
       if (m_trees.adjacency)
@@ -290,6 +365,15 @@ class Walk {
           mask = hn::And(mask, hn::Ge(boxes.upper[k], hn::Set(d, rows.lower[k][lane])));
         }
         if (hn::AllFalse(d, mask)) continue;
+        if constexpr (K > 3) {
+          for (int k = 3; k < K; ++k) {
+            mask = hn::And(mask, hn::Le(hn::LoadU(d, m_boundsB.elements.lower[k] + j),
+                                        hn::Set(d, rows.upper[k][lane])));
+            mask = hn::And(mask, hn::Ge(hn::LoadU(d, m_boundsB.elements.upper[k] + j),
+                                        hn::Set(d, rows.lower[k][lane])));
+          }
+          if (hn::AllFalse(d, mask)) continue;
+        }
         auto found = hn::RebindMask(du, mask);
         if (m_trees.adjacency)
           for (const std::uint32_t corner : m_trees.adjacency[i])
@@ -304,6 +388,7 @@ class Walk {
   HWY_ATTR HWY_INLINE void emit(V a, V b, M found) {
     const hn::DFromV<V> du;
     ElementPair* const out = m_sink.reserveSpace();
+    if (K > 3 && m_trees.swapped) std::swap(a, b);
     if (m_trees.self()) {
       const V lower = hn::Min(a, b);
       b = hn::Max(a, b);
@@ -320,7 +405,8 @@ class Walk {
       }
       m_sink.advance(count);
     } else {
-      if (m_trees.self()) a = hn::Compress(a, found);  // otherwise all lanes are equal
+      if (m_trees.self() || (K > 3 && m_trees.swapped))
+        a = hn::Compress(a, found);  // otherwise all lanes are equal
       hn::StoreInterleaved2(a, hn::Compress(b, found), du, reinterpret_cast<std::uint32_t*>(out));
       m_sink.advance(hn::CountTrue(du, found));
     }
@@ -329,17 +415,28 @@ class Walk {
   const TreePair& m_trees;
   const OctreeBlock* m_a;
   const OctreeBlock* m_b;
-  const BoxArrays& m_boxesA;
-  const BoxArrays& m_boxesB;
+  const TreeBounds<K> m_boundsA, m_boundsB;
   const std::uint32_t* m_idsA;
   const std::uint32_t* m_idsB;
   Buffer<NodePair>& m_stack;
   PairSink& m_sink;
 };
 
+/// A function of its own, so that the compiler inlines the others as before.
+template <class F>
+HWY_NOINLINE HWY_ATTR void withDops(const TreePair& trees, TraversalStack& stack, PairSink& sink,
+                                    F&& f) {
+  if (trees.dops.directions == 7)
+    f(Walk<Placement::Mapped, 7>(trees, stack, sink));
+  else
+    f(Walk<Placement::Mapped, 9>(trees, stack, sink));
+}
+
 template <class F>
 HWY_ATTR void withWalk(const TreePair& trees, TraversalStack& stack, PairSink& sink, F&& f) {
-  if (trees.isMapped())
+  if (trees.dops.count > 0)
+    withDops(trees, stack, sink, f);
+  else if (trees.isMapped())
     f(Walk<Placement::Mapped>(trees, stack, sink));
   else if (trees.isShifted())
     f(Walk<Placement::Shifted>(trees, stack, sink));

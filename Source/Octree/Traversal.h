@@ -5,6 +5,7 @@
 #include "Core/Buffer.h"
 #include "Math/Box.h"
 #include "Octree/BoxMap.h"
+#include "Octree/Dops.h"
 #include "Octree/Octree.h"
 
 #include <algorithm>
@@ -84,13 +85,17 @@ struct TreePair {
   /// For a rigid body that was moved, the map that brings the tree's boxes into the world. mapA
   /// then replaces the shift. Not used for one tree with itself.
   BoxMap mapA{}, mapB{};
+  /// If it has ends: the map of a's k-DOPs into the frame of b's, which are compared instead of
+  /// boxes. mapA and mapB are then not used. Not used for one tree with itself.
+  DopMap dops{};
+  bool swapped = false;  ///< with `dops`: each element pair names b's element first
 
   bool self() const { return a == b; }
   /// Whether a box of either tree was clamped to float's range. Clamped bounds in two frames are
   /// not comparable. Not used for one tree with itself.
   bool isClamped = false;
 
-  bool isMapped() const { return mapA.count > 0 || mapB.count > 0 || isClamped; }
+  bool isMapped() const { return mapA.count > 0 || mapB.count > 0 || dops.count > 0 || isClamped; }
   bool isShifted() const {
     const std::array<float, 4> none{};
     return shiftLower != none || shiftUpper != none;

@@ -1,5 +1,6 @@
 #include "Octree/Forest.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace palpate {
@@ -83,7 +84,27 @@ class Validation {
     const FloatBox fitted = block.box(slot);
     if (fitted.lower != box.lower || fitted.upper != box.upper)
       fail(node, "its fitted box differs from the bounds of its elements and children");
+    checkDops(node);
     return box;
+  }
+
+  void checkDops(OctreeNode node) {
+    const OctreeDops& dops = m_octree.dops();
+    const auto [begin, end] = m_octree.ownRange(node);
+    const OctreeNode child = m_octree.firstChild(node) >> 3;
+    for (int k = 3; k < dops.directions; ++k) {
+      float lower = FloatBox::kEmptyLower, upper = -lower;
+      const auto add = [&](float from, float to) {
+        lower = std::min(lower, from);
+        upper = std::max(upper, to);
+      };
+      for (std::uint32_t i = begin; i < end; ++i) add(dops.lower[k][i], dops.upper[k][i]);
+      for (unsigned slot = 0; child != 0 && slot < 8; ++slot)
+        add(dops.block(child)[k - 3].lower[slot], dops.block(child)[k - 3].upper[slot]);
+      const OctreeDops::Siblings& fitted = dops.block(node >> 3)[k - 3];
+      if (fitted.lower[node & 7] != lower || fitted.upper[node & 7] != upper)
+        fail(node, "its k-DOP differs from the bounds of its elements and children");
+    }
   }
 
   void checkCell(OctreeNode node, const Cube& cube, std::uint32_t i, bool leaf) {

@@ -4,6 +4,7 @@
 #include "Mesh/TriangleBoxes.h"
 
 #include <algorithm>
+#include <array>
 
 namespace palpate {
 
@@ -86,6 +87,52 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
   }
   ++m_updates;
   m_treeVersion.commit(now);
+}
+
+double GeometryOctree::reach() const {
+  const FloatBox box = m_octree.box(0);
+  float reach = 0;
+  for (int k = 0; k < 3; ++k) reach = std::max({reach, -box.lower[k], box.upper[k]});
+  return reach / m_frame.scale;
+}
+
+bool GeometryOctree::isCompact() const {
+  return m_octree.isBuilt() && reach() <= 0x1p20 * m_spread;
+}
+
+bool GeometryOctree::needsDops(const TriangleMesh& mesh, OctreeBounds bounds) const {
+  return bounds != OctreeBounds::Box && mesh.now.isPlaced() && mesh.now.hasSameBody(mesh.before) &&
+         m_octree.dops().directions != directionCount(bounds) && isCompact();
+}
+
+/// A bound is rounded outward twice. Each coordinate of a vertex has an error of 2^-53 of it, and
+/// the sum of three has two roundings more: together less than 2^-51 of the coordinates' sum, which
+/// is doubled. OutwardRounding covers the conversion to float.
+void GeometryOctree::updateDops(const TriangleMesh& mesh, OctreeBounds bounds,
+                                const Threads& threads) {
+  if (!needsDops(mesh, bounds)) return;
+  const int count = directionCount(bounds);
+  const auto directions = dopDirections(count);
+  OctreeDops& dops = m_octree.startDops(count);
+  threads.forChunks(m_ordered.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      std::array<Eigen::Vector3d, 3> corners;
+      double size = 0;
+      for (int c = 0; c < 3; ++c) {
+        corners[c] = (mesh.now.body()[m_ordered[i][c]] - m_frame.origin) * m_frame.scale;
+        size = std::max(size, corners[c].cwiseAbs().sum());
+      }
+      for (int k = 3; k < count; ++k) {
+        const Eigen::Map<const Eigen::Vector3d> direction(directions[k].data());
+        const auto [lower, upper] = std::minmax(
+            {direction.dot(corners[0]), direction.dot(corners[1]), direction.dot(corners[2])});
+        const double error = 0x1p-50 * size;
+        dops.lower[k][i] = OutwardRounding::down(static_cast<float>(lower - error));
+        dops.upper[k][i] = OutwardRounding::up(static_cast<float>(upper + error));
+      }
+    }
+  });
+  m_octree.fitDops(count);
 }
 
 void GeometryOctree::copy(const GeometryOctree& other) {

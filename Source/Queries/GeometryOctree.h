@@ -32,6 +32,11 @@ class GeometryOctree {
   /// scale: the scale of the float frames, common to all geometries.
   void update(const TriangleMesh&, Revision topology, double scale, const OctreeSettings&,
               const Threads&);
+  /// Whether the octree lacks the further bounds of these settings. Only a placed body has them,
+  /// and only if it does not deform in the step.
+  bool needsDops(const TriangleMesh&, OctreeBounds) const;
+  /// Call after update(). Makes the further bounds if needsDops().
+  void updateDops(const TriangleMesh&, OctreeBounds, const Threads&);
   /// For self-collision: finds neighbouring triangles that certainly meet nowhere but in common
   /// vertices and edges. Returns UnfoldedStars::triangles().
   const Triangle* findUnfoldedStars(const TriangleMesh&, const Threads&);
@@ -47,6 +52,10 @@ class GeometryOctree {
   const Octree& octree() const { return m_octree; }
   const FloatFrame& frame() const { return m_frame; }
   double spread() const { return m_spread; }  ///< L: extent of most positions
+  double reach() const;  ///< L: the largest coordinate of the octree's boxes about frame().origin
+  /// Whether rounding errors of the furthest vertices are much smaller than most boxes. It implies
+  /// that no position is clamped to the range of floats.
+  bool isCompact() const;
   const FloatPoint* floats() const { return m_floats.data(); }
   /// The floats at the step's start if the boxes enclose the step, else those of the positions now.
   const FloatPoint* floatsAtStart() const {

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <utility>
 
 namespace palpate {
 
@@ -17,39 +18,37 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// error: of the offset and of the positions in the boxes. All are in units of the floats.
-void addEnd(BoxMap& map, const Matrix3d& rotation, const Vector3d& offset, double thickness,
-            double error) {
+/// One end of a map. error: of the offset and of the positions in the boxes. All are in units of
+/// the floats.
+struct MapEnd {
   std::array<std::array<double, 3>, 3> matrix;
-  for (int k = 0; k < 3; ++k)
-    for (int j = 0; j < 3; ++j) matrix[k][j] = rotation(k, j);
-  setEnd(map.ends[map.count++], matrix, {offset[0], offset[1], offset[2]}, thickness, error);
-}
+  std::array<double, 3> offset;
+  double thickness, error;
 
-/// L: the largest coordinate of an octree's boxes about the origin of its frame.
-double reachOf(const GeometryOctree& tree) {
-  const FloatBox box = tree.octree().box(0);
-  float reach = 0;
-  for (int k = 0; k < 3; ++k) reach = std::max({reach, -box.lower[k], box.upper[k]});
-  return reach / tree.frame().scale;
-}
+  MapEnd(const Matrix3d& rotation, const Vector3d& by, double newThickness, double newError)
+      : offset{by[0], by[1], by[2]}, thickness(newThickness), error(newError) {
+    for (int k = 0; k < 3; ++k)
+      for (int j = 0; j < 3; ++j) matrix[k][j] = rotation(k, j);
+  }
+  void addTo(BoxMap& map) const { setEnd(map.ends[map.count++], matrix, offset, thickness, error); }
+  /// dops: of the boxes that are mapped.
+  void addTo(DopMap& map, const OctreeDops& dops) const {
+    map.directions = dops.directions;
+    setEnd(map.ends[map.count++], dops, matrix, offset, thickness, error);
+  }
+};
 
 bool mayBeClamped(const GeometryOctree& tree) {
   return tree.octree().isBuilt() && tree.octree().box(0).mayBeClamped();
 }
 
-/// Whether rounding errors of the furthest vertices are much smaller than most boxes. It implies
-/// that no position is clamped to the range of floats.
-bool isCompact(const GeometryOctree& tree) {
-  return tree.octree().isBuilt() && reachOf(tree) <= 0x1p20 * tree.spread();
-}
-
-/// Whether bodyMap() can be used. If b turns in the step, positions move on curves in its body.
+/// Whether forEachBodyEnd() can be used. If b turns in the step, positions move on curves in its
+/// body.
 bool hasBodyMap(const SearchableGeometry& a, const SearchableGeometry& b, bool wholeStep) {
   const Positions &now = b.mesh.now, &before = b.mesh.before;
   return a.isPlaced() && b.isPlaced() &&
          (!wholeStep || now.transform().rotation == before.transform().rotation) &&
-         isCompact(a.tree) && isCompact(b.tree);
+         a.tree.isCompact() && b.tree.isCompact();
 }
 
 Matrix3d inverseOf(const Matrix3d& m) {
@@ -60,8 +59,8 @@ Matrix3d inverseOf(const Matrix3d& m) {
   return inverse / m.col(0).dot(x);
 }
 
-/// The map from boxes of a's octree into the frame of b's octree. A position p of the world is at
-/// inverse (p - t) in b's body, where t is b's translation.
+/// Calls f with each end of the map from boxes of a's octree into the frame of b's octree. A
+/// position p of the world is at inverse (p - t) in b's body, where t is b's translation.
 ///
 /// All positions move in straight lines, and the inverse does not change in the step. Positions of
 /// a therefore move in straight lines in b's body, too, and the boxes of both ends enclose them.
@@ -75,21 +74,22 @@ Matrix3d inverseOf(const Matrix3d& m) {
 ///   75 u r                               of the product of both rotations, 25 u an entry;
 ///   50 u (sqrt(3) |A| + |s| + |t|) + u |B|   of the offset.
 /// Together they are less than 128 u = 4 kPlacedError times 2 (|A| + r + |B| + q) + |s| + |t|. The
-/// length of a row of the inverse exceeds 1 by less than kOrthonormal. So does the thickness along
-/// an axis of b's body.
-BoxMap bodyMap(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
-               bool wholeStep) {
+/// length of the inverse's product with a unit vector exceeds 1 by less than 2 kOrthonormal. So
+/// does the thickness along a direction of b's body.
+template <class F>
+void forEachBodyEnd(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
+                    bool wholeStep, F&& f) {
   const FloatFrame &from = a.tree.frame(), &to = b.tree.frame();
   const auto largest = [](const Vector3d& v) { return v.cwiseAbs().maxCoeff(); };
   const double sizes =
-      2.0 * (largest(from.origin) + reachOf(a.tree) + largest(to.origin) + reachOf(b.tree));
+      2.0 * (largest(from.origin) + a.tree.reach() + largest(to.origin) + b.tree.reach());
   const Matrix3d inverse = inverseOf(b.mesh.now.transform().rotation);
-  BoxMap map;
   const auto add = [&](const RigidTransform& ofA, const RigidTransform& ofB) {
     const double size = sizes + largest(ofA.translation) + largest(ofB.translation);
-    addEnd(map, inverse * ofA.rotation,
-           (inverse * (ofA(from.origin) - ofB.translation) - to.origin) * to.scale,
-           thickness * (1.0 + kOrthonormal) * to.scale, 4.0 * kPlacedError * size * to.scale);
+    f(MapEnd(inverse * ofA.rotation,
+             (inverse * (ofA(from.origin) - ofB.translation) - to.origin) * to.scale,
+             thickness * (1.0 + 2.0 * kOrthonormal) * to.scale,
+             4.0 * kPlacedError * size * to.scale));
   };
   const Positions &nowA = a.mesh.now, &nowB = b.mesh.now, &beforeA = a.mesh.before,
                   &beforeB = b.mesh.before;
@@ -97,7 +97,19 @@ BoxMap bodyMap(const SearchableGeometry& a, const SearchableGeometry& b, double 
   if (wholeStep &&
       !(nowA.transform() == beforeA.transform() && nowB.transform() == beforeB.transform()))
     add(beforeA.transform(), beforeB.transform());
-  return map;
+}
+
+/// Sets the map of boxes, and that of k-DOPs if both octrees have them. The boxes of the roots
+/// decide first, because the map of k-DOPs takes longer.
+void setBodyMap(TreePair& trees, BoxMap& map, const SearchableGeometry& a,
+                const SearchableGeometry& b, double thickness, bool wholeStep) {
+  forEachBodyEnd(a, b, thickness, wholeStep, [&](const MapEnd& end) { end.addTo(map); });
+  const Octree &ofA = a.tree.octree(), &ofB = b.tree.octree();
+  if (&a == &b || ofA.dops().directions == 3 || ofA.dops().directions != ofB.dops().directions ||
+      !map(ofA.box(0)).overlaps(ofB.box(0)))
+    return;
+  forEachBodyEnd(a, b, thickness, wholeStep,
+                 [&](const MapEnd& end) { end.addTo(trees.dops, ofA.dops()); });
 }
 
 }  // namespace
@@ -117,8 +129,8 @@ BoxMap worldMap(const SearchableGeometry& geometry, const Vector3d& origin, doub
         kPlacedError * frame.scale *
         (2.0 * frame.origin.cwiseAbs().maxCoeff() + transform.translation.cwiseAbs().maxCoeff() +
          origin.cwiseAbs().maxCoeff());
-    addEnd(map, transform.rotation, (transform(frame.origin) - origin) * frame.scale, thickness,
-           error);
+    MapEnd(transform.rotation, (transform(frame.origin) - origin) * frame.scale, thickness, error)
+        .addTo(map);
   };
   const RigidTransform &now = geometry.mesh.now.transform(),
                        &before = geometry.mesh.before.transform();
@@ -132,11 +144,13 @@ TreePair treesOf(const SearchableGeometry& a, const SearchableGeometry& b, doubl
   TreePair trees{&a.tree.octree(), &b.tree.octree()};
   trees.isClamped = mayBeClamped(a.tree) || mayBeClamped(b.tree);
   if (frame == BoxFrame::Body && hasBodyMap(a, b, wholeStep)) {
-    trees.mapA = bodyMap(a, b, thickness, wholeStep);
+    setBodyMap(trees, trees.mapA, a, b, thickness, wholeStep);
     return trees;
   }
   if (frame == BoxFrame::Body && hasBodyMap(b, a, wholeStep)) {
-    trees.mapB = bodyMap(b, a, thickness, wholeStep);
+    setBodyMap(trees, trees.mapB, b, a, thickness, wholeStep);
+    trees.swapped = trees.dops.count > 0;
+    if (trees.swapped) std::swap(trees.a, trees.b);
     return trees;
   }
   const double scale = a.tree.frame().scale;

@@ -12,8 +12,8 @@ struct RowOptions {
   MeasureOptions measure;
   std::string sharedData;
   bool quick = false;  ///< a million triangles at most, a hundred steady frames
-  /// Parts of names, of which one must match; empty: all. Of the scenes of the tables race and
-  /// queries, and of their engines.
+  /// Parts of names, of which one must match; empty: all. Of the scenes of the tables race,
+  /// bounds and queries, and of engines.
   std::vector<std::string> scenes, engines;
 };
 
@@ -35,6 +35,7 @@ void lineRows(Report&, const RowOptions&);     ///< a suture with itself and wit
 void shapeRows(Report&, const RowOptions&);    ///< a capsule in a sheet, and in points
 void insideRows(Report&, const RowOptions&);   ///< vertices inside a body, particles around it
 void rigidRows(Report&, const RowOptions&);    ///< a large bone moved by its transform
+void boundsRows(Report&, const RowOptions&);   ///< placed bodies with each kind of bounds
 void continuousRows(Report&, const RowOptions&);  ///< times of impact of the published steps
 void validityRows(Report&, const RowOptions&);    ///< the share of validity() in a frame
 void spatialRows(Report&, const RowOptions&);     ///< spatial queries beside other libraries

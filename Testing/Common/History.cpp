@@ -13,10 +13,11 @@ namespace {
 constexpr std::size_t kMostBodies = 6, kMostPairs = 6;
 constexpr int kTypes = 8;  ///< see randomGeometry() and add()
 
-Settings settingsOfLife(Random& random) {
+Settings settingsOfLife(Random& random, OctreeBounds bounds) {
   Settings settings = settingsOf(Engine::Octree, random() % 4 == 0 ? 2 : 1,
                                  random() % 3 ? OctreeUpdate::Auto : OctreeUpdate::Rebuild);
   settings.octree.maxElementsPerLeaf = random() % 2 ? 32 : 2;
+  settings.octree.bounds = bounds;
   return settings;
 }
 
@@ -56,7 +57,7 @@ std::size_t RandomHistory::Body::elements() const {
 
 RandomHistory::RandomHistory(std::uint64_t seed)
     : m_random(seed),
-      m_collisions(settingsOfLife(m_random)),
+      m_collisions(settingsOfLife(m_random, static_cast<OctreeBounds>(seed % 3))),
       m_committed(settingsOf(Engine::Octree)) {}
 
 template <class F>

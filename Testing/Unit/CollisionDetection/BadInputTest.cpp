@@ -228,6 +228,7 @@ TEST(BadInput, SettingsOutOfRange) {
   for (int threads : {-1, 1025, std::numeric_limits<int>::max()})
     refuse({.threads = threads}, "threads");
   refuse({.octree = {.update = static_cast<OctreeUpdate>(99)}}, "update");
+  refuse({.octree = {.bounds = static_cast<OctreeBounds>(3)}}, "octree.bounds");
   refuse({.engine = static_cast<Engine>(99)}, "engine");
   // The ends of the ranges are valid.
   for (int depth : {1, 60})

@@ -1,9 +1,11 @@
 #include "Common/QueryCalls.h"
 #include "Common/Replayed.h"
 #include "Common/TestGeometry.h"
+#include "Core/SimdPath.h"
 
 #include <Eigen/Geometry>
 
+#include <array>
 #include <functional>
 
 // Geometries that setTransform() moves. The reference is the same scene with positions fl(R x + t),
@@ -128,6 +130,18 @@ void expectSameValidity(const Validity& found, const Validity& truth, double siz
   EXPECT_EQ(found.untrustedVerticesB, truth.untrustedVerticesB);
 }
 
+/// Brute force, then the octree with each kind of bounds. Leaves are small, so that there are
+/// nodes.
+std::vector<Settings> boundsSettings(int threads = 1) {
+  std::vector<Settings> all{settingsOf(Engine::BruteForce)};
+  for (const OctreeBounds bounds : {OctreeBounds::Box, OctreeBounds::Dop14, OctreeBounds::Dop18}) {
+    all.push_back(settingsOf(Engine::Octree, threads));
+    all.back().octree.bounds = bounds;
+    all.back().octree.maxElementsPerLeaf = 3;
+  }
+  return all;
+}
+
 /// Every engine with transforms has the contacts of the same positions. Returns the contacts of all
 /// frames.
 std::size_t expectAsPositions(Random& random, const TestGeometry& body, const TestGeometry& other,
@@ -142,6 +156,10 @@ std::size_t expectAsPositions(Random& random, const TestGeometry& body, const Te
   for (const bool keepsCandidates : {true, false})
     for (const int threads : {1, 2})
       rigid.push_back(runOf(settingsOf(Engine::Octree, threads), keepsCandidates, true));
+  if (run.bothRigid)
+    for (const int threads : {1, 2})
+      for (const Settings& settings : boundsSettings(threads))
+        rigid.push_back(runOf(settings, false, true));
   rigid.push_back(runOf(settingsOf(Engine::BruteForce), true, true));
   RigidRun truth = runOf(settingsOf(Engine::Octree), true, false);
   for (RigidRun& one : rigid) run.setUp(one.collisions(), one.body());
@@ -266,24 +284,30 @@ TEST(Rigid, VerticesFarAwayMatchSetPositions) {
 /// are thick.
 TEST(Rigid, FlatBodiesTouchInOneFrame) {
   Random random(8);
-  TestGeometry body = testGeometry(sheet(4, 0.0, 0.0));
-  for (Vector3d& p : body.positions) p = {0, 1000 * p[1] - 500, 1000 * p[0] - 500};
-  for (const Method method : {Method::Intersection, Method::Continuous})
-    for (int repeat = 0; repeat < 20; ++repeat) {
-      const Place place = somewhere(random);
-      std::vector<Rows> rows;
-      for (const Engine engine : {Engine::BruteForce, Engine::Octree}) {
-        OctreeBasedCD collisions(settingsOf(engine));
-        const GeometryId a = body.addTo(collisions), b = body.addTo(collisions);
-        collisions.addCollisionPair(a, b, {method, 0.0});
-        for (const GeometryId id : {a, b})
-          collisions.setTransform(id, place.rotation, 0 * place.translation);
-        collisions.detectCollision();
-        rows.emplace_back(collisions.collisionData(a, b));
+  const TestGeometry flat = testGeometry(sheet(4, 0.0, 0.0));
+  // Planes across directions of boxes and of k-DOPs. Their positions are exact.
+  const std::array<std::array<Vector3d, 2>, 3> planes{
+      {{{{0, 0, 1}, {0, 1, 0}}}, {{{0, 0, 1}, {1, -1, 0}}}, {{{1, -1, 0}, {0, 1, -1}}}}};
+  for (const auto& [right, up] : planes)
+    for (const Method method : {Method::Intersection, Method::Continuous})
+      for (int repeat = 0; repeat < 20; ++repeat) {
+        TestGeometry body = flat;
+        for (Vector3d& p : body.positions)
+          p = (1000 * p[0] - 500) * right + (1000 * p[1] - 500) * up;
+        const Place place = somewhere(random);
+        std::vector<Rows> rows;
+        for (const Settings& settings : boundsSettings()) {
+          OctreeBasedCD collisions(settings);
+          const GeometryId a = body.addTo(collisions), b = body.addTo(collisions);
+          collisions.addCollisionPair(a, b, {method, 0.0});
+          for (const GeometryId id : {a, b})
+            collisions.setTransform(id, place.rotation, 0 * place.translation);
+          collisions.detectCollision();
+          rows.emplace_back(collisions.collisionData(a, b));
+        }
+        EXPECT_GT(rows[0].contacts(), 0u);
+        for (const Rows& row : rows) expectSameRows(row, rows[0]);
       }
-      EXPECT_GT(rows[0].contacts(), 0u);
-      expectSameRows(rows[1], rows[0]);
-    }
 }
 
 /// With a large time tolerance, Continuous also reports features that pass at more than the
@@ -301,8 +325,8 @@ TEST(Rigid, NearMissesMatchBruteForce) {
                                   before({0.5, 0.5, 0.5}), randomPoint(random, -0.3, 0.3));
     for (const bool secondMoves : {true, false}) {
       std::vector<Rows> rows;
-      for (const Engine engine : {Engine::BruteForce, Engine::Octree}) {
-        OctreeBasedCD collisions(settingsOf(engine));
+      for (const Settings& settings : boundsSettings()) {
+        OctreeBasedCD collisions(settings);
         const GeometryId a = first.addTo(collisions), b = second.addTo(collisions);
         collisions.addCollisionPair(a, b, pair);
         const Place atStart[] = {secondMoves ? still : before, secondMoves ? before : still},
@@ -316,11 +340,136 @@ TEST(Rigid, NearMissesMatchBruteForce) {
         rows.emplace_back(collisions.collisionData(a, b));
       }
       contacts += rows[0].contacts();
-      expectSameRows(rows[1], rows[0]);
+      for (const Rows& row : rows) expectSameRows(row, rows[0]);
       if (HasFailure()) return;
     }
   }
   EXPECT_GT(contacts, 10000u);
+}
+
+/// Two bodies in generic places, near each other or touching, that move and turn in the step.
+TEST(Rigid, BoundsDoNotChangeContacts) {
+  Random random(10);
+  const TestGeometry ball = testGeometry(sphere(9, 12, {0.5, 0.5, 0.5}, 0.4)),
+                     leaf = testGeometry(sheet(8, 0.5, 1.0)),
+                     mess = testGeometry(soup(random, 90, 0.1)),
+                     needle = thread(random, 60, 0.1, 0.02, false),
+                     tapering = tapered(random, thread(random, 60, 0.1, 0, true), 0.05),
+                     smoke = tapered(random, particles(random, 120, 0.0), 0.05);
+  struct BoundsCase {
+    const TestGeometry *a, *b;
+    bool continuous = true;
+  };
+  const BoundsCase cases[] = {
+      {&ball, &leaf},         {&mess, &ball},           {&leaf, &needle},
+      {&needle, &mess},       {&smoke, &leaf, false},   {&tapering, &ball, false},
+      {&mess, &smoke, false}, {&needle, &smoke, false}, {&mess, &mess}};
+  std::size_t contacts = 0;
+  for (const std::string& path : simdPaths()) {
+    useSimdPath(path);
+    for (const BoundsCase& one : cases) {
+      std::vector<PairSettings> methods = settingsFor(0.01, one.continuous);
+      if (one.continuous && one.a->type == GeometryType::Triangles &&
+          one.b->type == GeometryType::Triangles)
+        methods.insert(methods.end(), {{Method::Intersection, 0.0}, {Method::Auto, 0.0}});
+      if (one.continuous) methods.push_back({Method::Auto, 0.02});
+      for (const PairSettings& pair : methods)
+        for (const double distance : {0.0, 1e5})
+          for (int repeat = 0; repeat < 3; ++repeat) {
+            // Neither turns in the step, one, or both.
+            Place before[2], now[2];
+            for (int i : {0, 1}) {
+              before[i] = somewhere(random);
+              before[i].translation += Vector3d(distance, -2 * distance, distance);
+              now[i] = before[i].then(randomPoint(random, -1, 1), i < repeat ? 0.05 : 0.0,
+                                      before[i]({0.5, 0.5, 0.5}), randomPoint(random, -0.1, 0.1));
+            }
+            std::vector<Rows> rows;
+            for (const Settings& settings : boundsSettings(1 + repeat % 2)) {
+              OctreeBasedCD collisions(settings);
+              const GeometryId ids[] = {one.a->addTo(collisions), one.b->addTo(collisions)};
+              collisions.addCollisionPair(ids[0], ids[1], pair);
+              for (int i : {0, 1})
+                collisions.setTransform(ids[i], before[i].rotation, before[i].translation,
+                                        now[i].rotation, now[i].translation);
+              collisions.detectCollision();
+              EXPECT_EQ(collisions.octree().validate(), std::vector<std::string>{});
+              rows.emplace_back(collisions.collisionData(ids[0], ids[1]));
+            }
+            contacts += rows[0].contacts();
+            for (const Rows& row : rows) expectSameRows(row, rows[0]);
+            if (HasFailure()) {
+              useSimdPath("");
+              return;
+            }
+          }
+    }
+  }
+  useSimdPath("");
+  EXPECT_GT(contacts, 50000u);
+}
+
+/// Two rods of 9,600 triangles, so that threads share the pair. Further bounds find fewer pairs.
+TEST(Rigid, BoundsReduceCandidates) {
+  TestGeometry rod = testGeometry(sphere(61, 40, {0, 0, 0}, 1));
+  const Matrix3d skew = Eigen::AngleAxisd(0.9, Vector3d(1, 2, 0.5).normalized()).toRotationMatrix();
+  for (Vector3d& p : rod.positions) p = skew * Vector3d(p[0], p[1], 20 * p[2]);
+  std::vector<Rows> rows;
+  std::vector<std::size_t> candidates, bytes;
+  for (const int threads : {1, 2})
+    for (Settings settings : boundsSettings(threads)) {
+      if (settings.engine == Engine::BruteForce) continue;
+      settings.octree.maxElementsPerLeaf = 32;
+      OctreeBasedCD collisions(settings);
+      const GeometryId a = rod.addTo(collisions), b = rod.addTo(collisions);
+      collisions.addCollisionPair(a, b, {Method::Proximity, 0.05});
+      // The octrees exist before the bodies are placed.
+      collisions.detectCollision();
+      collisions.setTransform(a, Matrix3d::Identity(), Vector3d::Zero());
+      collisions.setTransform(b, Matrix3d::Identity(), skew * Vector3d(2.01, 0, 0.3));
+      collisions.detectCollision();
+      rows.emplace_back(collisions.collisionData(a, b));
+      candidates.push_back(collisions.statistics().candidatePairs);
+      bytes.push_back(collisions.octree().statistics().bytes);
+      // A body that deforms has boxes.
+      collisions.advance();
+      Positions deformed = rod.positions;
+      deformed[5] *= 1.01;
+      collisions.setPositions(a, deformed);
+      collisions.detectCollision();
+      EXPECT_EQ(collisions.octree().validate(), std::vector<std::string>{});
+      rows.emplace_back(collisions.collisionData(a, b));
+      expectSameRows(rows[rows.size() - 2], rows[0]);
+      expectSameRows(rows.back(), rows[1]);
+    }
+  EXPECT_GT(rows[0].contacts(), 10u);
+  for (const std::size_t first : {0, 3}) {
+    EXPECT_LT(candidates[first + 1], 0.7 * static_cast<double>(candidates[first]));
+    EXPECT_LT(candidates[first + 2], 0.7 * static_cast<double>(candidates[first]));
+    EXPECT_LT(bytes[first], bytes[first + 1]);
+    EXPECT_LT(bytes[first + 1], bytes[first + 2]);
+  }
+}
+
+TEST(Rigid, BoundsDoNotChangeContactsOfQueries) {
+  Random random(11);
+  const TestGeometry leaf = testGeometry(sheet(20, 0.5, 1.0)),
+                     ball = testGeometry(sphere(15, 18, {0.5, 0.5, 0.5}, 0.4));
+  RigidMesh probe(ball.positions, ball.triangles);
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    const Place place = somewhere(random), pose = somewhere(random);
+    std::vector<Rows> rows;
+    for (const Settings& settings : boundsSettings()) {
+      OctreeBasedCD collisions(settings);
+      const GeometryId id = leaf.addTo(collisions);
+      collisions.setTransform(id, place.rotation, place.translation);
+      CollisionData found;
+      collisions.queries().contacts(id, probe, pose.rotation, pose.translation, 0.03, found);
+      rows.emplace_back(found);
+    }
+    EXPECT_GT(rows[0].contacts(), 0u);
+    for (const Rows& row : rows) expectSameRows(row, rows[0]);
+  }
 }
 
 TEST(Rigid, OctreeIsNotUpdated) {

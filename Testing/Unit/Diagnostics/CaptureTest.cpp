@@ -71,6 +71,7 @@ void expectSame(const CollisionProblem& l, const CollisionProblem& r) {
   EXPECT_EQ(l.settings.octree.maxDepth, r.settings.octree.maxDepth);
   EXPECT_EQ(l.settings.octree.maxElementsPerLeaf, r.settings.octree.maxElementsPerLeaf);
   EXPECT_EQ(l.settings.octree.update, r.settings.octree.update);
+  EXPECT_EQ(l.settings.octree.bounds, r.settings.octree.bounds);
   ASSERT_EQ(l.geometries.size(), r.geometries.size());
   for (std::size_t i = 0; i < l.geometries.size(); ++i) {
     EXPECT_EQ(l.geometries[i].id, r.geometries[i].id);
@@ -95,9 +96,11 @@ void expectSame(const CollisionProblem& l, const CollisionProblem& r) {
 OctreeBasedCD movedScene() {
   Random random(3);
   const Mesh first = testing::soup(random, 20, 0.3), second = testing::sphere(4, 5, {0, 0, 0}, 1);
-  OctreeBasedCD detection(
-      {.octree = {.maxDepth = 9, .maxElementsPerLeaf = 4, .update = OctreeUpdate::Rebuild},
-       .threads = 2});
+  OctreeBasedCD detection({.octree = {.maxDepth = 9,
+                                      .maxElementsPerLeaf = 4,
+                                      .update = OctreeUpdate::Rebuild,
+                                      .bounds = OctreeBounds::Dop18},
+                           .threads = 2});
   const GeometryId removed = detection.addTriangleMesh(first.positions, first.triangles);
   const GeometryId a = detection.addTriangleMesh(first.positions, first.triangles);
   const GeometryId b = detection.addTriangleMesh(second.positions, second.triangles);
@@ -222,10 +225,10 @@ TEST_F(Capture, ErrorsNameTheFault) {
     write(text.replace(place, from.size(), to));
     expectRefused(reason);
   };
-  expectRefusedWith("palpate-capture 9", "solid 3", "it is not a capture");
-  expectRefusedWith("palpate-capture 9", "palpate-capture 10",
-                    "its version is 10; versions up to 9");
-  expectRefusedWith("palpate-capture 9", "palpate-capture x", "line 1: \"x\" is not an integer");
+  expectRefusedWith("palpate-capture 10", "solid 3", "it is not a capture");
+  expectRefusedWith("palpate-capture 10", "palpate-capture 11",
+                    "its version is 11; versions up to 10");
+  expectRefusedWith("palpate-capture 10", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 99999999999\n", "is not an integer in range");
@@ -276,10 +279,12 @@ TEST_F(Capture, ReadsEarlierVersions) {
       text.replace(at, words.size(), with);
   };
   const auto asVersion = [&](int version) {
-    text.replace(text.find("palpate-capture "), 17, "palpate-capture " + std::to_string(version));
+    text.replace(0, text.find('\n'), "palpate-capture " + std::to_string(version));
     write(text);
     return readCapture(file());
   };
+  replaceAll(" Auto Box\n", " Auto\n");  // bounds
+  EXPECT_EQ(asVersion(9).settings.octree.bounds, OctreeBounds::Box);
   replaceAll(" 1.0c6f7a0b5ed8dp-20 0\n", " 1.0c6f7a0b5ed8dp-20\n");  // earliestTimeOnly
   const std::string version8 = text;
   EXPECT_FALSE(asVersion(8).pairs[0].settings.earliestTimeOnly);
