@@ -28,6 +28,17 @@ struct TriangleSet {
   }
 };
 
+struct PointSet {
+  std::array<Vector3d, 6> points;
+  std::size_t size = 0;
+
+  double along(const Vector3d& w) const {
+    double most = -kInfinity;
+    for (std::size_t i = 0; i < size; ++i) most = std::max(most, w.dot(points[i]));
+    return most;
+  }
+};
+
 struct BoxSet {
   Vector3d middle, halfSides;
 
@@ -70,19 +81,48 @@ struct AffineCell {
     if (isFar(side, triangle, wayFrom(side, triangle.centre()))) return true;
     const auto& [a, b, c] = triangle.corners;
     const Vector3d normal = (b - a).cross(c - a).stableNormalized();
-    if (isFar(side, triangle, normal.dot(a) < 0 ? normal : Vector3d(-normal))) return true;
+    if (isFar(side, triangle, normal) || isFar(side, triangle, -normal)) return true;
     const Vector3d nearest = -finiteVertexTriangleDistance(Vector3d::Zero(), a, b, c).difference;
     return isFar(side, triangle, wayFrom(side, nearest));
   }
-  /// Whether the set is beside the cell's shadow along the normal.
+  /// Whether the set is beside the cell's shadow along the normal: separated by a direction across
+  /// the normal.
   template <class Set>
-  bool isBeside(const Side& side, const Set& set) const {
-    for (int k = 0; k < 3; ++k) {
-      const Vector3d across = side.normal.cross(Vector3d::Unit(k));
-      const double most = halfSide * across.cwiseAbs().sum() + error;
-      if (-set.along(-across) > most || set.along(across) < -most) return true;
-    }
+  bool isBeside(const Set& set, const Vector3d& across) const {
+    const double most = halfSide * across.cwiseAbs().sum() + error;
+    return -set.along(-across) > most || set.along(across) < -most;
+  }
+  template <class Set>
+  bool isBesideFaces(const Side& side, const Set& set) const {
+    for (int k = 0; k < 3; ++k)
+      if (isBeside(set, side.normal.cross(Vector3d::Unit(k)))) return true;
     return false;
+  }
+  bool isBeside(const Side& side, const BoxSet& box) const { return isBesideFaces(side, box); }
+  /// Only the part of a triangle near the plane H = level counts: a thin polygon.
+  bool isBeside(const Side& side, const TriangleSet& triangle) const {
+    PointSet part;
+    for (int i = 0; i < 3; ++i) {
+      const Vector3d &p = triangle.corners[i], &q = triangle.corners[(i + 1) % 3];
+      const double start = side.normal.dot(p) + side.atCentre - level,
+                   rise = side.normal.dot(q) + side.atCentre - level - start;
+      // The edge's points p + t (q - p) with |start + t rise| <= error.
+      double first = 0, last = 1;
+      if (rise != 0) {
+        const double one = (-error - start) / rise, two = (error - start) / rise;
+        first = std::max(first, std::min(one, two));
+        last = std::min(last, std::max(one, two));
+      } else if (std::abs(start) > error) {
+        continue;
+      }
+      if (!(first <= last)) continue;
+      part.points[part.size++] = p + first * (q - p);
+      part.points[part.size++] = p + last * (q - p);
+    }
+    if (part.size == 0 || isBesideFaces(side, part)) return true;
+    const auto& [a, b, c] = triangle.corners;
+    const Vector3d normal = (b - a).cross(c - a).stableNormalized();
+    return isBeside(part, normal - side.normal.dot(normal) * side.normal);
   }
   /// Whether the triangles in the set do not disprove the claims.
   template <class Set>

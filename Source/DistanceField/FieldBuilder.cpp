@@ -334,16 +334,36 @@ class FieldBuilder {
     for (const std::vector<std::uint32_t>& corners : byLevel)
       for (const std::uint32_t i : corners)
         m_values[i] = static_cast<float>(interpolate(m_cells[owners[i]], m_corners[i]));
-    const double allowed = (1.0 - kShareOfCells) * m_bound / m_unit;
+    std::vector<std::uint8_t> isOff(m_cells.size());
+    m_threads.forChunks(isOff.size(), 256, [&](std::size_t, std::size_t from, std::size_t to) {
+      PointQueryStack stack;
+      for (std::size_t i = from; i < to; ++i) isOff[i] = !isAllowed(m_cells[i], stack);
+    });
     std::vector<std::uint32_t> tooLarge;
-    for (const Cell& cell : m_cells) {
-      if (cell.state != State::Certified) continue;
-      for (const std::uint32_t i : cell.corners)
-        if (std::abs(double{m_values[i]} - m_distances[i]) > allowed) tooLarge.push_back(owners[i]);
-    }
+    for (std::size_t i = 0; i < isOff.size(); ++i)
+      for (const std::uint32_t corner : m_cells[i].corners)
+        if (isOff[i] && deviationOf(corner) > 0.5 * deviationOf(m_cells[i]))
+          tooLarge.push_back(owners[corner]);
     std::sort(tooLarge.begin(), tooLarge.end());
     tooLarge.erase(std::unique(tooLarge.begin(), tooLarge.end()), tooLarge.end());
     return tooLarge;
+  }
+  /// L: how far what hangs is off.
+  double deviationOf(std::uint32_t corner) const {
+    return std::abs(double{m_values[corner]} - m_distances[corner]) * m_unit;
+  }
+  double deviationOf(const Cell& cell) const {
+    double most = 0.0;
+    for (const std::uint32_t corner : cell.corners) most = std::max(most, deviationOf(corner));
+    return most;
+  }
+  /// Whether a cell's error and the deviation of its values are together within the bound.
+  bool isAllowed(const Cell& cell, PointQueryStack& stack) const {
+    if (cell.state != State::Certified) return true;
+    const double deviation = deviationOf(cell);
+    return deviation <= (1.0 - kShareOfCells) * m_bound ||
+           (deviation < m_bound &&
+            m_certifier.isWithin(interpolatedCell(cell), m_bound - deviation, stack));
   }
   /// Gives values to cells beyond the band that touch a larger cell with values, so that both agree
   /// where they meet.
