@@ -53,7 +53,7 @@ void checkMesh(const TriangleMeshView& mesh, GeometryId id) {
                     " triangles; at most 2^28 of each are supported",
                 id);
   for (std::size_t v = 0; v < mesh.positions.size(); ++v)
-    if (!(mesh.positions[v].cwiseAbs().maxCoeff() <= 0x1p1000))
+    if (!(mesh.positions[v].cwiseAbs().array() <= 0x1p1000).all())
       throw Error(ErrorCode::NonFinitePosition,
                   nameOf(id) + ", vertex " + std::to_string(v) + " is " +
                       textOf(mesh.positions[v]) + "; it must be finite and at most 2^1000",
