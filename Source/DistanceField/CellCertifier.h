@@ -35,7 +35,7 @@ class CellCertifier {
   explicit CellCertifier(const SearchableGeometry&);
 
   /// Whether the interpolated distance is certainly within `bound` of the exact one in the whole
-  /// cell. The values may be rounded to float; `bound` must leave room for that.
+  /// cell. The values may be rounded to float; `bound` must not include that rounding.
   bool isWithin(const InterpolatedCell&, double bound, PointQueryStack&) const;
   /// Whether all points of the cell have certainly at least this distance from the surface.
   static bool isBeyond(const InterpolatedCell&, double distance);
