@@ -130,6 +130,7 @@ std::string contentOf(const fs::path& path) {
 }
 
 void write(const fs::path& path, const std::string& content) {
+  fs::remove(path);  // some file systems wait for the disk when a file is overwritten
   std::ofstream(path, std::ios::binary) << content;
 }
 
@@ -157,7 +158,9 @@ TEST(DistanceField, IsWithinItsBoundEverywhere) {
   Random random(1);
   for (const auto& [name, mesh] : fieldMeshes(random)) {
     SCOPED_TRACE(name);
-    for (const auto& [errorBound, band] : {std::pair(0.02, 0.1), {0.006, 0.02}, {0.05, 0.3}}) {
+    constexpr std::pair<double, double> kBounds[] = {{0.04, 0.1}, {0.008, 0.02}, {0.05, 0.3}};
+    for (int i = 0; i < casesOf(3); ++i) {
+      const auto [errorBound, band] = kBounds[i];
       SCOPED_TRACE(errorBound);
       const DistanceField field = fieldOf(mesh, errorBound, band);
       EXPECT_GT(field.cells(), 0u);
@@ -172,7 +175,7 @@ TEST(DistanceField, HoldsOnRandomStars) {
     Mesh mesh = starMesh(random);
     const Eigen::Vector3d shift = randomPoint(random, -100, 100);
     for (Eigen::Vector3d& p : mesh.positions) p += shift;
-    expectWithinBound(random, mesh, fieldOf(mesh, uniform(random, 0.01, 0.1), 0.05), 3000);
+    expectWithinBound(random, mesh, fieldOf(mesh, uniform(random, 0.02, 0.1), 0.05), 3000);
   }
 }
 
@@ -181,7 +184,7 @@ TEST(DistanceField, IsContinuousAcrossCells) {
   for (const auto& [name, mesh] : fieldMeshes(random)) {
     if (name == "far") continue;  // a step of one double is larger than the jump
     SCOPED_TRACE(name);
-    const DistanceField field = fieldOf(mesh, 0.01, 0.05);
+    const DistanceField field = fieldOf(mesh, 0.04, 0.1);
     const double unit = unitOf(mesh, field);
     for (const Eigen::Vector3d& point : adversarialPoints(random, mesh, field, casesOf(20000))) {
       Eigen::Vector3d p = point;
@@ -198,7 +201,7 @@ TEST(DistanceField, IsContinuousAcrossCells) {
 TEST(DistanceField, GradientIsThatOfTheValue) {
   Random random(4);
   const Mesh mesh = torusMesh(24, 12);
-  const DistanceField field = fieldOf(mesh, 0.01, 0.1);
+  const DistanceField field = fieldOf(mesh, 0.03, 0.1);
   const double step = 1e-7;
   int compared = 0;
   for (const Eigen::Vector3d& p : adversarialPoints(random, mesh, field, casesOf(5000))) {
@@ -219,7 +222,7 @@ TEST(DistanceField, GradientIsThatOfTheValue) {
 
 TEST(DistanceField, IsALowerBoundFarAway) {
   const Mesh mesh = boxMesh({-1, -1, -1}, {1, 1, 1});
-  const DistanceField field = fieldOf(mesh, 0.01, 0.05);
+  const DistanceField field = fieldOf(mesh, 0.05, 0.05);
   EXPECT_LE(field.value({1e6, 0, 0}), 1e6 - 1);
   EXPECT_GT(field.value({1e6, 0, 0}), 1e6 - 2);
   EXPECT_LE(field.value({1e300, 1e300, 0}), std::sqrt(2.0) * 1e300);
@@ -229,12 +232,12 @@ TEST(DistanceField, IsALowerBoundFarAway) {
 TEST(DistanceField, DoesNotDependOnThreadsOrInstructions) {
   Random random(5);
   const Mesh mesh = starMesh(random);
-  const std::string expected = bytesOf(fieldOf(mesh, 0.02, 0.1, 1));
+  const std::string expected = bytesOf(fieldOf(mesh, 0.05, 0.1, 1));
   for (const int threads : {2, 3, 8})
-    EXPECT_EQ(bytesOf(fieldOf(mesh, 0.02, 0.1, threads)), expected);
+    EXPECT_EQ(bytesOf(fieldOf(mesh, 0.05, 0.1, threads)), expected);
   for (const std::string& path : simdPaths()) {
     useSimdPath(path);
-    EXPECT_EQ(bytesOf(fieldOf(mesh, 0.02, 0.1)), expected) << path;
+    EXPECT_EQ(bytesOf(fieldOf(mesh, 0.05, 0.1)), expected) << path;
   }
   useSimdPath("");
 }
@@ -319,7 +322,7 @@ TEST(DistanceFieldFile, HoldsTheField) {
   Random random(6);
   const Folder folder;
   const Mesh mesh = starMesh(random);
-  const DistanceField field = fieldOf(mesh, 0.02, 0.1);
+  const DistanceField field = fieldOf(mesh, 0.05, 0.1);
   field.save(folder / "field");
   const DistanceField loaded = DistanceField::load(folder / "field");
   EXPECT_EQ(loaded.errorBound(), field.errorBound());
