@@ -155,6 +155,14 @@ constexpr double kClipOrigin = 0x1p-10;
 /// coordinates: under 2^-49 for the point and for a vertex, and a margin.
 constexpr double kPlacedPointError = 0x1p-46;
 
+// ---- Distance fields (DistanceField) ----
+
+/// Error of coordinates and distances in the proof of a cell's bound, relative to the largest
+/// coordinate: some hundred roundings, and a margin.
+constexpr double kFieldError = 0x1p-42;
+/// Relative to a stored distance: its rounding to float, and that of interpolation.
+constexpr double kStoredError = 0x1p-23;
+
 // ---- Winding numbers (SolidAngle.h, Queries/WindingNumber.cpp) ----
 
 /// Error of both parts of a triangle's half solid angle, from unit vectors within 3 u each: 9 u and

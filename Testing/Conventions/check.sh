@@ -30,6 +30,7 @@ allowedIn() {
     Octree) echo "Octree/ Math/Box Core/" ;;
     NarrowPhase) echo "NarrowPhase/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
     Queries) echo "Queries/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
+    DistanceField) echo "DistanceField/ Queries/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
     Validity) echo "Validity/ NarrowPhase/ Mesh/ Math/ Core/" ;;
     CollisionDetection) echo "CollisionDetection/ Validity/ Queries/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
     Diagnostics) echo "Diagnostics/ CollisionDetection/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;

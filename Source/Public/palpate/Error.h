@@ -33,6 +33,8 @@ enum class ErrorCode {
   SharedFace,         ///< A face belongs to more than two tetrahedra.
   InvalidCall,        ///< The object was moved from, is outdated, or is at work on another call.
   ImpactRemains,      ///< Features touch within a step, and StepGuard may not move their vertices.
+  MemoryLimit,        ///< The answer needs more memory than the limit that you set.
+  Cancelled,          ///< A progress callback returned false.
 };
 
 /// The exception that the library throws for an invalid call. what() is a sentence that names the

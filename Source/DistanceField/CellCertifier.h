@@ -1,0 +1,50 @@
+#pragma once
+
+#include "Octree/PointQueries.h"
+#include "Queries/SearchableGeometry.h"
+
+#include <Eigen/Core>
+
+#include <array>
+#include <cstdint>
+
+namespace palpate {
+
+/// The corner of a cube in an octant (bit 0: x, 1: y, 2: z), from its centre.
+inline Eigen::Vector3d cornerOf(std::size_t octant, double halfSide) {
+  return {octant & 1 ? halfSide : -halfSide, octant & 2 ? halfSide : -halfSide,
+          octant & 4 ? halfSide : -halfSide};
+}
+
+/// A cube with values at its corners, between which a field interpolates.
+struct InterpolatedCell {
+  Eigen::Vector3d centre;        ///< L
+  double halfSide;               ///< L
+  std::array<double, 8> values;  ///< L: signed distances from the surface
+  /// A triangle that is near the cell, by its place in the octree's order. Any place is valid.
+  std::uint32_t nearTriangle;
+
+  double halfDiagonal() const;  ///< L
+};
+
+/// Proves bounds on the error of trilinear interpolation of the signed distance from a closed mesh.
+/// Docs/DistanceFields.md has the theorems and their proofs.
+class CellCertifier {
+ public:
+  /// The geometry's octree must be up to date.
+  explicit CellCertifier(const SearchableGeometry&);
+
+  /// Whether the interpolated distance is certainly within `bound` of the exact one in the whole
+  /// cell. The values may be rounded to float; `bound` must not include that rounding.
+  bool isWithin(const InterpolatedCell&, double bound, PointQueryStack&) const;
+  /// Whether all points of the cell have certainly at least this distance from the surface.
+  static bool isBeyond(const InterpolatedCell&, double distance);
+
+ private:
+  bool isNearTriangle(const InterpolatedCell&, double bound) const;
+
+  const SearchableGeometry& m_geometry;
+  double m_reach;  ///< in the octree's floats: the largest coordinate
+};
+
+}  // namespace palpate

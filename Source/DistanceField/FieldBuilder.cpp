@@ -1,0 +1,444 @@
+#include "DistanceField/FieldBuilder.h"
+
+#include <palpate/Error.h>
+
+#include "Core/Text.h"
+#include "DistanceField/CellCertifier.h"
+#include "Math/Tolerances.h"
+#include "Queries/Containment.h"
+#include "Queries/PointDistances.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace palpate {
+
+using Eigen::Vector3d;
+
+namespace {
+
+/// Coordinates of a corner from the domain's origin, in sides of the smallest possible cell.
+using Corner = std::array<std::uint32_t, 3>;
+
+constexpr std::uint32_t kNone = 0xffffffff;
+/// The part of the error bound that a cell's own interpolation may use. The rest is for corners
+/// that hang.
+constexpr double kShareOfCells = 0.9;
+constexpr std::size_t kSlice = 1 << 14;  ///< points or cells between two calls of `progress`
+constexpr std::size_t kGrain = 64;
+
+constexpr std::uint32_t sideOf(int level) { return 1u << (kMostLevels - level); }
+
+/// The corners of all cells, numbered in the order in which they are added.
+class CornerTable {
+ public:
+  std::size_t size() const { return m_corners.size(); }
+  const Corner& operator[](std::size_t i) const { return m_corners[i]; }
+  /// The number of a corner, which is added if it is new.
+  std::uint32_t find(const Corner& corner) {
+    if (2 * m_corners.size() >= m_slots.size()) grow();
+    std::uint32_t& slot = slotOf(corner);
+    if (slot == kNone) {
+      slot = static_cast<std::uint32_t>(m_corners.size());
+      m_corners.push_back(corner);
+    }
+    return slot;
+  }
+  std::size_t bytes() const {
+    return m_corners.capacity() * sizeof(Corner) + m_slots.capacity() * sizeof(std::uint32_t);
+  }
+
+ private:
+  std::uint32_t& slotOf(const Corner& corner) {
+    const std::uint64_t key =
+        corner[0] | std::uint64_t{corner[1]} << 21 | std::uint64_t{corner[2]} << 42;
+    const std::size_t mask = m_slots.size() - 1;
+    std::size_t i = key * 0x9e3779b97f4a7c15u >> (64 - std::bit_width(mask));
+    while (m_slots[i] != kNone && m_corners[m_slots[i]] != corner) i = (i + 1) & mask;
+    return m_slots[i];
+  }
+  void grow() {
+    m_slots.assign(std::max<std::size_t>(1 << 12, 2 * m_slots.size()), kNone);
+    for (std::uint32_t i = 0; i < m_corners.size(); ++i) slotOf(m_corners[i]) = i;
+  }
+
+  std::vector<Corner> m_corners;
+  std::vector<std::uint32_t> m_slots;  ///< a power of two
+};
+
+class FieldBuilder {
+ public:
+  FieldBuilder(const SearchableGeometry& geometry, const DistanceFieldSettings& settings,
+               const Threads& threads)
+      : m_geometry(geometry), m_settings(settings), m_threads(threads), m_certifier(geometry) {
+    chooseDomain();
+  }
+
+  FieldCells build() {
+    addRoots();
+    refine(0);
+    for (std::vector<std::uint32_t> tooLarge = joinCells(); !tooLarge.empty();
+         tooLarge = joinCells()) {
+      const auto first = static_cast<std::uint32_t>(m_cells.size());
+      for (const std::uint32_t cell : tooLarge) split(cell);
+      refine(first);
+    }
+    report(1.0);
+    return assemble();
+  }
+
+ private:
+  enum class State : std::uint8_t {
+    Split,
+    Certified,
+    Beyond,   ///< the band
+    Adjusted  ///< beyond the band, with corner values, because it touches a larger cell with such
+  };
+  struct Cell {
+    Corner corner;  ///< the lowest
+    std::array<std::uint32_t, 8> corners;
+    std::uint32_t children = kNone;  ///< the first of eight
+    std::uint8_t level = 0;
+    State state = State::Split;
+
+    bool hasValues() const { return state == State::Certified || state == State::Adjusted; }
+  };
+
+  void chooseDomain() {
+    Eigen::AlignedBox3d box;
+    for (const Triangle& triangle : m_geometry.mesh.topology.triangles)
+      for (const std::uint32_t vertex : triangle) box.extend(m_geometry.mesh.now[vertex]);
+    const double largest =
+        std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+    // Room for the rounding of distances: values at the domain's border are beyond the band.
+    const double margin = m_settings.band * (1.0 + 0x1p-16);
+    const Vector3d low = box.min().array() - margin, high = box.max().array() + margin;
+    const double longest = (high - low).maxCoeff();
+    if (!(m_settings.errorBound >= 0x1p-18 * longest &&
+          std::min(m_settings.errorBound, m_settings.band) >= 0x1p-36 * largest &&
+          longest > 0x1p-900 && longest < 0x1p1000))
+      throw Error(ErrorCode::InvalidSettings,
+                  "errorBound is " + textOf(m_settings.errorBound) + " and band is " +
+                      textOf(m_settings.band) + "; errorBound must be at least 2^-18 of " +
+                      textOf(longest) +
+                      ", the longest side of the box around the band, and both at least 2^-36 of " +
+                      textOf(largest) + ", the largest coordinate");
+    m_field.errorBound = m_settings.errorBound;
+    m_field.band = m_settings.band;
+    m_field.exponent = std::ilogb(longest) - 3;
+    m_unit = std::ldexp(1.0, m_field.exponent);
+    for (int k = 0; k < 3; ++k) {
+      const double first = std::floor(low[k] / m_unit);
+      m_field.origin[k] = static_cast<std::int64_t>(first);
+      m_field.size[k] = static_cast<std::uint32_t>(std::ceil(high[k] / m_unit) - first);
+      m_origin[k] = first * m_unit;
+    }
+    m_bound = m_settings.errorBound - kStoredError * (m_settings.band + 4.0 * m_unit) -
+              kFieldError * (largest + longest);
+  }
+
+  Vector3d positionOf(const Corner& corner) const {
+    return m_origin + std::ldexp(m_unit, -kMostLevels) * Vector3d(corner[0], corner[1], corner[2]);
+  }
+  double halfSideOf(const Cell& cell) const { return std::ldexp(0.5 * m_unit, -cell.level); }
+  InterpolatedCell interpolatedCell(const Cell& cell) const {
+    InterpolatedCell result;
+    result.halfSide = halfSideOf(cell);
+    result.centre = positionOf(cell.corner) + Vector3d::Constant(result.halfSide);
+    std::size_t nearest = 0;
+    for (std::size_t i = 0; i < 8; ++i) {
+      result.values[i] = m_distances[cell.corners[i]] * m_unit;
+      if (std::abs(result.values[i]) < std::abs(result.values[nearest])) nearest = i;
+    }
+    result.nearTriangle = m_nearest[cell.corners[nearest]];
+    return result;
+  }
+
+  // ---- Refinement ----
+
+  void addRoots() {
+    for (std::uint32_t z = 0; z < m_field.size[2]; ++z)
+      for (std::uint32_t y = 0; y < m_field.size[1]; ++y)
+        for (std::uint32_t x = 0; x < m_field.size[0]; ++x)
+          addCell({x * sideOf(0), y * sideOf(0), z * sideOf(0)}, 0, kNone);
+  }
+  /// known: a corner near the cell whose distance was evaluated before, or kNone.
+  void addCell(const Corner& corner, int level, std::uint32_t known) {
+    Cell cell{corner, {}};
+    cell.level = static_cast<std::uint8_t>(level);
+    for (std::uint32_t i = 0; i < 8; ++i) {
+      Corner at = corner;
+      for (int k = 0; k < 3; ++k) at[k] += (i >> k & 1) * sideOf(level);
+      cell.corners[i] = m_corners.find(at);
+    }
+    m_known.resize(m_corners.size(), known);
+    m_cells.push_back(cell);
+  }
+  void split(std::uint32_t index) {
+    const Cell cell = m_cells[index];
+    m_cells[index].state = State::Split;
+    m_cells[index].children = static_cast<std::uint32_t>(m_cells.size());
+    for (std::uint32_t i = 0; i < 8; ++i) {
+      Corner at = cell.corner;
+      for (int k = 0; k < 3; ++k) at[k] += (i >> k & 1) * sideOf(cell.level + 1);
+      addCell(at, cell.level + 1, cell.corners[i]);
+    }
+  }
+  /// Evaluates, tests and splits the cells from `first` on.
+  void refine(std::size_t first) {
+    while (first < m_cells.size()) {
+      checkMemory();
+      ++m_rounds;
+      evaluateCorners();
+      const std::size_t end = m_cells.size();
+      inSlices(first, end, 0.5, [&](std::size_t from, std::size_t to) {
+        PointQueryStack stack;
+        for (std::size_t i = from; i < to; ++i) m_cells[i].state = test(m_cells[i], stack);
+      });
+      for (std::size_t i = first; i < end; ++i)
+        if (m_cells[i].state == State::Split) split(static_cast<std::uint32_t>(i));
+      first = end;
+    }
+  }
+  State test(const Cell& cell, PointQueryStack& stack) const {
+    const InterpolatedCell interpolated = interpolatedCell(cell);
+    if (CellCertifier::isBeyond(interpolated, m_settings.band)) return State::Beyond;
+    const bool isWithin = m_certifier.isWithin(interpolated, kShareOfCells * m_bound, stack);
+    return isWithin ? State::Certified : State::Split;
+  }
+  /// Of all corners that are new.
+  void evaluateCorners() {
+    const std::size_t first = m_distances.size();
+    m_distances.resize(m_corners.size());
+    m_nearest.resize(m_corners.size());
+    inSlices(first, m_corners.size(), 0.0, [&](std::size_t from, std::size_t to) {
+      PointQueryStack stack;
+      for (std::size_t i = from; i < to; ++i) evaluate(i, stack);
+    });
+  }
+  void evaluate(std::size_t i, PointQueryStack& stack) {
+    const Vector3d point = positionOf(m_corners[i]);
+    const std::uint32_t known = m_known[i];
+    const auto near = PointDistances(m_geometry, point, false)
+                          .nearest(kInfinity, known == kNone ? 0 : m_nearest[known]);
+    bool inside;
+    // The sign changes only at the surface.
+    const double distance = known == kNone ? 0.0 : std::abs(m_distances[known]) * m_unit;
+    if (distance > 0.0 && (point - positionOf(m_corners[known])).norm() < 0.999 * distance)
+      inside = m_distances[known] < 0.0;
+    else
+      inside = isInside(m_geometry, point, {}, Engine::Octree, stack);
+    m_distances[i] = static_cast<float>((inside ? -near->distance : near->distance) / m_unit);
+    m_nearest[i] = near->place;
+  }
+  /// Calls f(from, to) for parts of [first, end), on all threads, and reports the progress. done:
+  /// share of this round before the call; the call does half of it.
+  template <class F>
+  void inSlices(std::size_t first, std::size_t end, double done, F&& f) {
+    for (std::size_t at = first; at < end; at += kSlice) {
+      // An estimate: half of the work that is left is done in a round.
+      const double inRound =
+          done + 0.5 * static_cast<double>(at - first) / static_cast<double>(end - first);
+      report(1.0 - std::ldexp(1.0 - 0.5 * inRound, 1 - m_rounds));
+      const std::size_t size = std::min(kSlice, end - at);
+      m_threads.forChunks(size, kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+        f(at + from, at + to);
+      });
+    }
+  }
+  void report(double fraction) const {
+    if (m_settings.progress && !m_settings.progress(fraction))
+      throw Error(ErrorCode::Cancelled, "the build of the distance field was cancelled");
+  }
+  /// Before corners are evaluated.
+  void checkMemory() const {
+    constexpr std::size_t kPerCorner = 2 * sizeof(float) + 2 * sizeof(std::uint32_t);
+    const std::size_t needed = m_cells.capacity() * sizeof(Cell) + m_corners.bytes() +
+                               m_corners.size() * kPerCorner + assembledBytes();
+    if (m_settings.memoryLimit == 0 || needed <= m_settings.memoryLimit) return;
+    throw Error(ErrorCode::MemoryLimit, "memoryLimit is " + std::to_string(m_settings.memoryLimit) +
+                                            " bytes; the distance field needs at least " +
+                                            std::to_string(needed) + " bytes");
+  }
+  std::size_t assembledBytes() const {
+    std::size_t leaves = 0, blocks = 0;
+    for (const Cell& cell : m_cells) leaves += cell.hasValues(), blocks += cell.children != kNone;
+    return leaves * sizeof(FieldCells::Leaf) + blocks * sizeof(FieldCells::Block) +
+           m_field.size[0] * m_field.size[1] * m_field.size[2] * sizeof(CellEntry);
+  }
+
+  // ---- Continuity ----
+
+  /// The leaf that a corner touches in an octant; kNone beyond the domain.
+  std::uint32_t leafAround(const Corner& corner, std::uint32_t octant) const {
+    Corner at = corner;
+    std::uint32_t index = 0;
+    for (int k = 2; k >= 0; --k) {
+      if (!(octant >> k & 1) && at[k]-- == 0) return kNone;
+      const std::uint32_t root = at[k] / sideOf(0);
+      if (root >= m_field.size[k]) return kNone;
+      index = index * m_field.size[k] + root;
+    }
+    for (int level = 1; m_cells[index].children != kNone; ++level) {
+      std::uint32_t child = 0;
+      for (int k = 0; k < 3; ++k) child |= (at[k] / sideOf(level) & 1) << k;
+      index = m_cells[index].children + child;
+    }
+    return index;
+  }
+  /// The largest cell with values that the corner touches other than with a corner, or kNone. The
+  /// corner hangs on it.
+  std::uint32_t largestAround(const Corner& corner) const {
+    std::uint32_t largest = kNone;
+    for (std::uint32_t octant = 0; octant < 8; ++octant) {
+      const std::uint32_t index = leafAround(corner, octant);
+      if (index == kNone) continue;
+      const Cell& cell = m_cells[index];
+      const std::uint32_t within = sideOf(cell.level) - 1;
+      if (!cell.hasValues() || ((corner[0] | corner[1] | corner[2]) & within) == 0) continue;
+      if (largest == kNone || cell.level < m_cells[largest].level) largest = index;
+    }
+    return largest;
+  }
+  double interpolate(const Cell& cell, const Corner& corner) const {
+    std::array<double, 3> t;
+    for (int k = 0; k < 3; ++k)
+      t[k] = static_cast<double>(corner[k] - cell.corner[k]) / sideOf(cell.level);
+    double sum = 0.0;
+    for (std::uint32_t i = 0; i < 8; ++i) {
+      double weight = 1.0;
+      for (int k = 0; k < 3; ++k) weight *= i >> k & 1 ? t[k] : 1.0 - t[k];
+      sum += weight * m_values[cell.corners[i]];
+    }
+    return sum;
+  }
+
+  /// Computes m_values. Returns the cells that have to be split, because values that hang on them
+  /// are too far off.
+  std::vector<std::uint32_t> joinCells() {
+    adjustCellsBeyond();
+    std::vector<std::uint32_t> owners(m_corners.size());
+    m_threads.forChunks(owners.size(), 1024, [&](std::size_t, std::size_t from, std::size_t to) {
+      for (std::size_t i = from; i < to; ++i) owners[i] = largestAround(m_corners[i]);
+    });
+    // A corner of a larger cell hangs on still larger ones only.
+    std::array<std::vector<std::uint32_t>, kMostLevels + 1> byLevel;
+    for (std::uint32_t i = 0; i < owners.size(); ++i)
+      if (owners[i] != kNone) byLevel[m_cells[owners[i]].level].push_back(i);
+    m_values = m_distances;
+    for (const std::vector<std::uint32_t>& corners : byLevel)
+      for (const std::uint32_t i : corners)
+        m_values[i] = static_cast<float>(interpolate(m_cells[owners[i]], m_corners[i]));
+    std::vector<std::uint8_t> isOff(m_cells.size());
+    m_threads.forChunks(isOff.size(), 256, [&](std::size_t, std::size_t from, std::size_t to) {
+      PointQueryStack stack;
+      for (std::size_t i = from; i < to; ++i) isOff[i] = !isAllowed(m_cells[i], stack);
+    });
+    std::vector<std::uint32_t> tooLarge;
+    for (std::size_t i = 0; i < isOff.size(); ++i)
+      for (const std::uint32_t corner : m_cells[i].corners)
+        if (isOff[i] && deviationOf(corner) > 0.5 * deviationOf(m_cells[i]))
+          tooLarge.push_back(owners[corner]);
+    std::sort(tooLarge.begin(), tooLarge.end());
+    tooLarge.erase(std::unique(tooLarge.begin(), tooLarge.end()), tooLarge.end());
+    return tooLarge;
+  }
+  /// L: how far what hangs is off.
+  double deviationOf(std::uint32_t corner) const {
+    return std::abs(double{m_values[corner]} - m_distances[corner]) * m_unit;
+  }
+  double deviationOf(const Cell& cell) const {
+    double most = 0.0;
+    for (const std::uint32_t corner : cell.corners) most = std::max(most, deviationOf(corner));
+    return most;
+  }
+  /// Whether a cell's error and the deviation of its values are together within the bound.
+  bool isAllowed(const Cell& cell, PointQueryStack& stack) const {
+    if (cell.state != State::Certified) return true;
+    const double deviation = deviationOf(cell);
+    return deviation <= (1.0 - kShareOfCells) * m_bound ||
+           (deviation < m_bound &&
+            m_certifier.isWithin(interpolatedCell(cell), m_bound - deviation, stack));
+  }
+  /// Gives values to cells beyond the band that touch a larger cell with values, so that both agree
+  /// where they meet.
+  void adjustCellsBeyond() {
+    std::array<std::vector<std::uint32_t>, kMostLevels + 1> byLevel;
+    for (std::uint32_t i = 0; i < m_cells.size(); ++i) {
+      if (m_cells[i].state == State::Adjusted) m_cells[i].state = State::Beyond;
+      if (m_cells[i].state == State::Beyond) byLevel[m_cells[i].level].push_back(i);
+    }
+    for (const std::vector<std::uint32_t>& cells : byLevel)
+      for (const std::uint32_t i : cells) {
+        const auto& corners = m_cells[i].corners;
+        if (std::any_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
+              const std::uint32_t largest = largestAround(m_corners[corner]);
+              return largest != kNone && m_cells[largest].level < m_cells[i].level;
+            }))
+          m_cells[i].state = State::Adjusted;
+      }
+  }
+
+  // ---- Numbering ----
+
+  FieldCells assemble() {
+    std::size_t leaves = 0, blocks = 0;
+    for (const Cell& cell : m_cells) leaves += cell.hasValues(), blocks += cell.children != kNone;
+    if (std::max(leaves, blocks) >= CellEntry::kMostIndices)
+      throw Error(ErrorCode::TooLarge, "the distance field has " + std::to_string(leaves) +
+                                           " cells; at most 2^30 are supported");
+    const std::size_t roots = std::size_t{m_field.size[0]} * m_field.size[1] * m_field.size[2];
+    m_field.leaves.reserve(leaves);
+    m_field.blocks.reserve(blocks);
+    m_field.roots.resize(roots);
+    for (std::uint32_t i = 0; i < roots; ++i) m_field.roots[i] = number(m_cells[i]);
+    return std::move(m_field);
+  }
+  CellEntry number(const Cell& cell) {
+    if (cell.children != kNone) {
+      const auto block = static_cast<std::uint32_t>(m_field.blocks.size());
+      m_field.blocks.emplace_back();
+      for (std::uint32_t i = 0; i < 8; ++i) {
+        const CellEntry child = number(m_cells[cell.children + i]);
+        m_field.blocks[block][i] = child;
+      }
+      return CellEntry::of(CellKind::Block, block);
+    }
+    if (cell.state == State::Beyond)
+      return CellEntry::of(m_distances[cell.corners[0]] < 0 ? CellKind::Inside : CellKind::Outside);
+    FieldCells::Leaf& leaf = m_field.leaves.emplace_back();
+    for (std::uint32_t i = 0; i < 8; ++i) leaf[i] = m_values[cell.corners[i]];
+    return CellEntry::of(CellKind::Leaf, static_cast<std::uint32_t>(m_field.leaves.size() - 1));
+  }
+
+  const SearchableGeometry& m_geometry;
+  const DistanceFieldSettings& m_settings;
+  const Threads& m_threads;
+  const CellCertifier m_certifier;
+  FieldCells m_field;
+  Vector3d m_origin;
+  double m_unit = 1.0;   ///< L
+  double m_bound = 0.0;  ///< L: the error bound without what rounding may add
+  int m_rounds = 0;
+  std::vector<Cell> m_cells;  ///< the roots come first
+  CornerTable m_corners;
+  // Of each corner:
+  std::vector<std::uint32_t> m_known;    ///< a corner that was evaluated before, or kNone
+  std::vector<float> m_distances;        ///< units
+  std::vector<std::uint32_t> m_nearest;  ///< the nearest triangle, by its place in the octree
+  std::vector<float> m_values;           ///< units: what the cells interpolate
+};
+
+}  // namespace
+
+FieldCells buildField(const SearchableGeometry& geometry, const DistanceFieldSettings& settings,
+                      const Threads& threads) {
+  return FieldBuilder(geometry, settings, threads).build();
+}
+
+}  // namespace palpate

@@ -1,0 +1,163 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace palpate {
+
+/// What a cell of a field is: the two upper bits of its entry.
+enum class CellKind : std::uint32_t {
+  Block,    ///< it has eight children; the entry's index is that of their block
+  Leaf,     ///< it has corner values; the index is that of the leaf
+  Outside,  ///< every point of it has at least the distance `band`, outside
+  Inside,   ///< the same inside
+};
+
+/// A cell: its kind, and the index of its block or leaf.
+struct CellEntry {
+  static constexpr std::uint32_t kIndexBits = 30, kMostIndices = 1u << kIndexBits;
+
+  std::uint32_t bits = 0;
+
+  static CellEntry of(CellKind kind, std::uint32_t index = 0) {
+    return {static_cast<std::uint32_t>(kind) << kIndexBits | index};
+  }
+  CellKind kind() const { return static_cast<CellKind>(bits >> kIndexBits); }
+  std::uint32_t index() const { return bits & (kMostIndices - 1); }
+};
+
+/// Most halvings of a root cell.
+constexpr int kMostLevels = 16;
+/// Most root cells along an axis. Integer coordinates of corners on the finest level have 21 bits.
+constexpr std::uint32_t kMostRoots = 31;
+/// Units: the largest coordinate of a domain's origin.
+constexpr std::int64_t kMostOrigin = std::int64_t{1} << 48;
+
+/// The cells of a field: a grid of root cells, which are octrees. Corners and children are numbered
+/// by octant (bit 0: x, 1: y, 2: z).
+///
+/// Lengths are in units: the side of a root cell, which is a power of two. Corners are multiples of
+/// a cell's side. Their coordinates and those of points are therefore exact, except for the one
+/// rounding of `point - origin`.
+struct FieldCells {
+  using Leaf = std::array<float, 8>;       ///< units: the values at the corners
+  using Block = std::array<CellEntry, 8>;  ///< the children
+
+  double errorBound = 0.0, band = 0.0;         ///< L
+  int exponent = 0;                            ///< a unit is 2^exponent L
+  std::array<std::int64_t, 3> origin{};        ///< units
+  std::array<std::uint32_t, 3> size{1, 1, 1};  ///< root cells along each axis
+  std::vector<CellEntry> roots;                ///< x runs fastest
+  std::vector<Block> blocks;                   ///< the children of a block come after it
+  std::vector<Leaf> leaves;
+
+  std::size_t bytes() const {
+    return roots.capacity() * sizeof(CellEntry) + blocks.capacity() * sizeof(Block) +
+           leaves.capacity() * sizeof(Leaf);
+  }
+};
+
+/// Finds cells of a field and interpolates in them.
+class FieldLookup {
+ public:
+  explicit FieldLookup(const FieldCells& cells)
+      : m_cells(cells),
+        m_toUnits(std::ldexp(1.0, -cells.exponent)),
+        m_unit(std::ldexp(1.0, cells.exponent)),
+        m_band(cells.band * m_toUnits) {
+    for (int k = 0; k < 3; ++k) {
+      m_origin[k] = static_cast<double>(cells.origin[k]) * m_unit;
+      m_size[k] = cells.size[k];
+    }
+  }
+
+  /// L. The point must be finite.
+  double value(const Eigen::Vector3d& point) const {
+    const Place place = at(point);
+    const double inDomain = m_unit * clamped(interpolate(place));
+    return place.isOutside ? inDomain + outsideOf(point).stableNorm() : inDomain;
+  }
+  Eigen::Vector3d gradient(const Eigen::Vector3d& point) const {
+    const Place place = at(point);
+    if (place.isOutside) return outsideOf(point).stableNormalized();
+    if (place.entry.kind() != CellKind::Leaf) return Eigen::Vector3d::Zero();
+    const double value = interpolate(place);
+    if (clamped(value) != value) return Eigen::Vector3d::Zero();
+    const FieldCells::Leaf& v = m_cells.leaves[place.entry.index()];
+    Eigen::Vector3d gradient;
+    for (int k = 0; k < 3; ++k) {  // the bilinear interpolation of the differences along axis k
+      const int i = 1 << (k + 1) % 3, j = 1 << (k + 2) % 3, step = 1 << k;
+      const auto difference = [&](int corner) {
+        return double{v[corner + step]} - double{v[corner]};
+      };
+      const double s = place.t[(k + 1) % 3], t = place.t[(k + 2) % 3];
+      gradient[k] = place.perSide * mix(mix(difference(0), difference(i), s),
+                                        mix(difference(j), difference(i + j), s), t);
+    }
+    return gradient;
+  }
+
+ private:
+  struct Place {
+    CellEntry entry;
+    std::array<double, 3> t;  ///< in [0, 1]: where the point is in the cell
+    double perSide;           ///< sides of this cell in a unit
+    bool isOutside;           ///< of the domain; the rest is of the nearest point of the domain
+  };
+
+  Place at(const Eigen::Vector3d& point) const {
+    Place place{{}, {}, 1.0, false};
+    std::array<std::uint32_t, 3> root;
+    for (int k = 0; k < 3; ++k) {
+      const double u = (point[k] - m_origin[k]) * m_toUnits;
+      const double in = std::fmin(std::fmax(u, 0.0), m_size[k]);
+      place.isOutside |= u != in;
+      root[k] = std::min(static_cast<std::uint32_t>(in), m_cells.size[k] - 1);
+      place.t[k] = in - root[k];
+    }
+    place.entry = m_cells.roots[(root[2] * m_cells.size[1] + root[1]) * m_cells.size[0] + root[0]];
+    while (place.entry.kind() == CellKind::Block) {
+      std::uint32_t octant = 0;
+      for (int k = 0; k < 3; ++k) {
+        const double doubled = 2.0 * place.t[k];
+        const bool upper = doubled >= 1.0;
+        octant |= std::uint32_t{upper} << k;
+        place.t[k] = doubled - (upper ? 1.0 : 0.0);
+      }
+      place.perSide *= 2.0;
+      place.entry = m_cells.blocks[place.entry.index()][octant];
+    }
+    return place;
+  }
+  static double mix(double a, double b, double t) { return a + t * (b - a); }
+  double interpolate(const Place& place) const {  // units
+    if (place.entry.kind() != CellKind::Leaf)
+      return place.entry.kind() == CellKind::Inside ? -m_band : m_band;
+    const FieldCells::Leaf& v = m_cells.leaves[place.entry.index()];
+    const auto [x, y, z] = place.t;
+    return mix(mix(mix(v[0], v[1], x), mix(v[2], v[3], x), y),
+               mix(mix(v[4], v[5], x), mix(v[6], v[7], x), y), z);
+  }
+  double clamped(double value) const { return std::fmin(std::fmax(value, -m_band), m_band); }
+  /// From the nearest point of the domain.
+  Eigen::Vector3d outsideOf(const Eigen::Vector3d& point) const {
+    Eigen::Vector3d out;
+    for (int k = 0; k < 3; ++k) {
+      const double end = m_origin[k] + m_size[k] * m_unit;
+      out[k] = point[k] < m_origin[k] ? point[k] - m_origin[k] : std::fmax(point[k] - end, 0.0);
+    }
+    return out;
+  }
+
+  const FieldCells& m_cells;
+  double m_toUnits, m_unit, m_band;
+  std::array<double, 3> m_origin, m_size;
+};
+
+}  // namespace palpate

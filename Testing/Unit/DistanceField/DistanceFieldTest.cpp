@@ -1,0 +1,385 @@
+#include <palpate/DistanceField.h>
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/ExpectRefused.h"
+#include "Common/Sanitized.h"
+#include "Core/SimdPath.h"
+#include "FieldMeshes.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+
+namespace palpate::testing {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Extent {
+  Eigen::AlignedBox3d box;
+  double diagonal;
+};
+
+Extent extentOf(const Mesh& mesh) {
+  Extent extent;
+  for (const Eigen::Vector3d& p : mesh.positions) extent.box.extend(p);
+  extent.diagonal = extent.box.diagonal().norm();
+  return extent;
+}
+
+DistanceField fieldOf(const Mesh& mesh, double errorBound, double band, int threads = 2) {
+  const double diagonal = extentOf(mesh).diagonal;
+  return DistanceField::build(
+      {mesh.positions, mesh.triangles},
+      {.errorBound = errorBound * diagonal, .band = band * diagonal, .threads = threads});
+}
+
+/// The side of a root cell.
+double unitOf(const Mesh& mesh, const DistanceField& field) {
+  const Eigen::Vector3d sizes = extentOf(mesh).box.sizes();
+  return std::ldexp(1.0, std::ilogb(sizes.maxCoeff() + 2 * field.band()) - 3);
+}
+
+/// A coordinate at or beside a border of cells of a random level.
+double nearBorder(Random& random, double coordinate, double unit) {
+  const double side = std::ldexp(unit, -static_cast<int>(random() % 7));
+  const double at = std::round(coordinate / side) * side;
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  switch (random() % 3) {
+    case 0:
+      return at;
+    case 1:
+      return std::nextafter(at, kInfinite);
+    default:
+      return std::nextafter(at, -kInfinite);
+  }
+}
+
+/// Points on vertices, edges and triangles, near them, in and beyond the band, and on the borders
+/// and corners of cells.
+std::vector<Eigen::Vector3d> adversarialPoints(Random& random, const Mesh& mesh,
+                                               const DistanceField& field, std::size_t count) {
+  const Extent extent = extentOf(mesh);
+  const double unit = unitOf(mesh, field), wide = 1.5 * field.band();
+  std::vector<Eigen::Vector3d> points(count);
+  for (Eigen::Vector3d& p : points) {
+    const auto& [a, b, c] = mesh.triangles[random() % mesh.triangles.size()];
+    const std::uint64_t kind = random() % 8;
+    double s = uniform(random, 0, 1), t = uniform(random, 0, 1 - s);
+    if (kind == 0) s = t = 0;
+    if (kind == 1) t = 0;
+    p = mesh.positions[a] + s * (mesh.positions[b] - mesh.positions[a]) +
+        t * (mesh.positions[c] - mesh.positions[a]);
+    if (kind == 3) p += randomPoint(random, -1, 1) * field.errorBound();
+    if (kind >= 4) p += randomPoint(random, -1, 1) * wide;
+    if (kind == 7)
+      for (int k = 0; k < 3; ++k)
+        p[k] = uniform(random, extent.box.min()[k] - wide, extent.box.max()[k] + wide);
+    if (kind >= 5)
+      for (int k = 0; k < 3; ++k)
+        if (random() % 2) p[k] = nearBorder(random, p[k], unit);
+  }
+  return points;
+}
+
+/// Compares with exact distances.
+void expectWithinBound(Random& random, const Mesh& mesh, const DistanceField& field,
+                       std::size_t count) {
+  OctreeBasedCD collisions;
+  const GeometryId body = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+  const std::vector<Eigen::Vector3d> points = adversarialPoints(random, mesh, field, count);
+  std::vector<SignedDistance> exact(count);
+  collisions.queries().signedDistances(body, points, exact);
+  std::vector<double> values(count);
+  field.values(points, values);
+  std::size_t inBand = 0, faults = 0;
+  for (std::size_t i = 0; i < count && faults < 5; ++i) {
+    const double d = exact[i].distance, value = values[i];
+    const bool isInBand = std::abs(d) <= field.band();
+    const bool holds = isInBand ? std::abs(value - d) <= field.errorBound()
+                                : (value > 0) == (d > 0) && std::abs(value) <= std::abs(d) &&
+                                      std::abs(value) >= field.band() - field.errorBound();
+    inBand += isInBand;
+    faults += !holds;
+    EXPECT_TRUE(holds) << "at " << points[i].transpose() << ": " << value << ", exact " << d
+                       << ", bound " << field.errorBound() << ", band " << field.band();
+    EXPECT_EQ(value, field.value(points[i]));
+  }
+  EXPECT_GT(inBand, count / 4);
+}
+
+class Folder {
+ public:
+  Folder() { fs::create_directory(m_path); }
+  ~Folder() { fs::remove_all(m_path); }
+  fs::path operator/(const char* name) const { return m_path / name; }
+
+ private:
+  fs::path m_path = fs::temp_directory_path() / ("palpate-fields" + std::to_string(::getpid()));
+};
+
+std::string contentOf(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void write(const fs::path& path, const std::string& content) {
+  fs::remove(path);  // some file systems wait for the disk when a file is overwritten
+  std::ofstream(path, std::ios::binary) << content;
+}
+
+std::string bytesOf(const DistanceField& field, const Folder& folder) {
+  field.save(folder / "bytes");
+  return contentOf(folder / "bytes");
+}
+std::string bytesOf(const DistanceField& field) { return bytesOf(field, Folder()); }
+
+void setChecksum(std::string& content) {
+  std::uint64_t sum = 0xcbf29ce484222325u;
+  for (std::size_t i = 0; i + 8 < content.size(); ++i)
+    sum = (sum ^ static_cast<unsigned char>(content[i])) * 0x100000001b3u;
+  for (int i = 0; i < 8; ++i)
+    content[content.size() - 8 + i] = static_cast<char>(sum >> 8 * i & 0xff);
+}
+
+/// A field with blocks and leaves whose file is small.
+Mesh needle() { return boxMesh({0, 0, 0}, {1, 0.05, 0.05}); }
+DistanceField smallField() { return fieldOf(needle(), 0.1, 0.01); }
+
+}  // namespace
+
+TEST(DistanceField, IsWithinItsBoundEverywhere) {
+  Random random(1);
+  for (const auto& [name, mesh] : fieldMeshes(random)) {
+    SCOPED_TRACE(name);
+    constexpr std::pair<double, double> kBounds[] = {{0.04, 0.1}, {0.008, 0.02}, {0.05, 0.3}};
+    for (int i = 0; i < casesOf(3); ++i) {
+      const auto [errorBound, band] = kBounds[i];
+      SCOPED_TRACE(errorBound);
+      const DistanceField field = fieldOf(mesh, errorBound, band);
+      EXPECT_GT(field.cells(), 0u);
+      expectWithinBound(random, mesh, field, casesOf(10000));
+    }
+  }
+}
+
+TEST(DistanceField, HoldsOnRandomStars) {
+  Random random(2);
+  for (int i = 0; i < casesOf(20); ++i) {
+    Mesh mesh = starMesh(random);
+    const Eigen::Vector3d shift = randomPoint(random, -100, 100);
+    for (Eigen::Vector3d& p : mesh.positions) p += shift;
+    expectWithinBound(random, mesh, fieldOf(mesh, uniform(random, 0.02, 0.1), 0.05), 3000);
+  }
+}
+
+TEST(DistanceField, IsContinuousAcrossCells) {
+  Random random(3);
+  for (const auto& [name, mesh] : fieldMeshes(random)) {
+    if (name == "far") continue;  // a step of one double is larger than the jump
+    SCOPED_TRACE(name);
+    const DistanceField field = fieldOf(mesh, 0.04, 0.1);
+    const double unit = unitOf(mesh, field);
+    for (const Eigen::Vector3d& point : adversarialPoints(random, mesh, field, casesOf(20000))) {
+      Eigen::Vector3d p = point;
+      const int axis = static_cast<int>(random() % 3);
+      const double side = std::ldexp(unit, -static_cast<int>(random() % 7));
+      p[axis] = std::round(p[axis] / side) * side;
+      Eigen::Vector3d below = p;
+      below[axis] = std::nextafter(p[axis], -std::numeric_limits<double>::infinity());
+      ASSERT_NEAR(field.value(p), field.value(below), 0x1p-20 * field.band()) << p.transpose();
+    }
+  }
+}
+
+TEST(DistanceField, GradientIsThatOfTheValue) {
+  Random random(4);
+  const Mesh mesh = torusMesh(24, 12);
+  const DistanceField field = fieldOf(mesh, 0.03, 0.1);
+  const double step = 1e-7;
+  int compared = 0;
+  for (const Eigen::Vector3d& p : adversarialPoints(random, mesh, field, casesOf(5000))) {
+    Eigen::Vector3d forward, backward;
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d h = step * Eigen::Vector3d::Unit(k);
+      forward[k] = (field.value(p + h) - field.value(p)) / step;
+      backward[k] = (field.value(p) - field.value(p - h)) / step;
+    }
+    if ((forward - backward).norm() > 1e-6) continue;  // it jumps here
+    ++compared;
+    ASSERT_LT((field.gradient(p) - forward).norm(), 1e-5) << p.transpose();
+  }
+  EXPECT_GT(compared, casesOf(2000));
+  const Eigen::Vector3d away = field.gradient({100, 0, 0});
+  EXPECT_EQ(away, Eigen::Vector3d(1, 0, 0));
+}
+
+TEST(DistanceField, IsALowerBoundFarAway) {
+  const Mesh mesh = boxMesh({-1, -1, -1}, {1, 1, 1});
+  const DistanceField field = fieldOf(mesh, 0.05, 0.05);
+  EXPECT_LE(field.value({1e6, 0, 0}), 1e6 - 1);
+  EXPECT_GT(field.value({1e6, 0, 0}), 1e6 - 2);
+  EXPECT_LE(field.value({1e300, 1e300, 0}), std::sqrt(2.0) * 1e300);
+  EXPECT_EQ(field.value({0, 0, 0}), -field.band());
+}
+
+TEST(DistanceField, DoesNotDependOnThreadsOrInstructions) {
+  Random random(5);
+  const Mesh mesh = starMesh(random);
+  const std::string expected = bytesOf(fieldOf(mesh, 0.05, 0.1, 1));
+  for (const int threads : {2, 3, 8})
+    EXPECT_EQ(bytesOf(fieldOf(mesh, 0.05, 0.1, threads)), expected);
+  for (const std::string& path : simdPaths()) {
+    useSimdPath(path);
+    EXPECT_EQ(bytesOf(fieldOf(mesh, 0.05, 0.1)), expected) << path;
+  }
+  useSimdPath("");
+}
+
+TEST(DistanceField, ReportsProgressAndIsCancelled) {
+  const Mesh mesh = sphere(20, 30, {0, 0, 0}, 1.0);
+  std::vector<double> fractions;
+  DistanceFieldSettings settings{.errorBound = 0.02, .band = 0.2};
+  settings.progress = [&](double fraction) {
+    fractions.push_back(fraction);
+    return true;
+  };
+  DistanceField::build({mesh.positions, mesh.triangles}, settings);
+  ASSERT_GT(fractions.size(), 3u);
+  EXPECT_TRUE(std::is_sorted(fractions.begin(), fractions.end()));
+  EXPECT_GE(fractions.front(), 0.0);
+  EXPECT_EQ(fractions.back(), 1.0);
+  for (const std::size_t calls : {std::size_t{0}, fractions.size() / 2, fractions.size() - 1}) {
+    std::size_t count = 0;
+    settings.progress = [&](double) { return count++ < calls; };
+    expectRefused(ErrorCode::Cancelled, "cancelled", [&] {
+      DistanceField::build({mesh.positions, mesh.triangles}, settings);
+    });
+    EXPECT_EQ(count, calls + 1);
+  }
+}
+
+TEST(DistanceField, KeepsItsMemoryLimit) {
+  const Mesh mesh = sphere(20, 30, {0, 0, 0}, 1.0);
+  DistanceFieldSettings settings{.errorBound = 0.005, .band = 0.2, .memoryLimit = 100000};
+  expectRefused(ErrorCode::MemoryLimit, "needs at least", [&] {
+    DistanceField::build({mesh.positions, mesh.triangles}, settings);
+  });
+  settings.memoryLimit = 100000000;
+  EXPECT_LT(DistanceField::build({mesh.positions, mesh.triangles}, settings).bytes(),
+            settings.memoryLimit);
+}
+
+TEST(DistanceField, RefusesInvalidInput) {
+  const Mesh good = boxMesh({0, 0, 0}, {1, 1, 1});
+  const auto build = [](const Mesh& mesh, const DistanceFieldSettings& settings) {
+    return [&mesh, settings] { DistanceField::build({mesh.positions, mesh.triangles}, settings); };
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double value : {0.0, -1.0, nan, std::numeric_limits<double>::infinity()}) {
+    expectRefused(ErrorCode::InvalidSettings, "errorBound", build(good, {value, 0.1}));
+    expectRefused(ErrorCode::InvalidSettings, "band", build(good, {0.1, value}));
+  }
+  expectRefused(ErrorCode::InvalidSettings, "2^-18", build(good, {1e-7, 0.1}));
+  expectRefused(ErrorCode::InvalidSettings, "threads",
+                build(good, {.errorBound = 0.1, .band = 0.1, .threads = -1}));
+  const DistanceFieldSettings settings{.errorBound = 0.1, .band = 0.1};
+  Mesh bad = good;
+  bad.positions[3][1] = nan;
+  expectRefused(ErrorCode::NonFinitePosition, "vertex 3", build(bad, settings));
+  bad = good;
+  bad.triangles[2][1] = 8;
+  expectRefused(ErrorCode::IndexOutOfRange, "triangle 2", build(bad, settings));
+  bad = good;
+  bad.triangles.pop_back();
+  expectRefused(ErrorCode::NotClosed, "belong to one triangle only", build(bad, settings));
+  bad.triangles.clear();
+  expectRefused(ErrorCode::NotClosed, "no triangles", build(bad, settings));
+  bad = good;
+  for (Eigen::Vector3d& p : bad.positions) p[0] += 1e13;
+  expectRefused(ErrorCode::InvalidSettings, "largest coordinate", build(bad, settings));
+
+  const DistanceField field = fieldOf(good, 0.1, 0.1);
+  const std::vector<Eigen::Vector3d> points{{0, 0, 0}, {0, nan, 0}};
+  std::vector<double> out(2);
+  expectRefused(ErrorCode::NonFinitePosition, "the point", [&] { field.value(points[1]); });
+  expectRefused(ErrorCode::NonFinitePosition, "the point", [&] { field.gradient(points[1]); });
+  expectRefused(ErrorCode::NonFinitePosition, "point 1", [&] { field.values(points, out); });
+  out.resize(1);
+  expectRefused(ErrorCode::InvalidSettings, "room for 1", [&] { field.values(points, out); });
+  DistanceField moved = field;
+  const DistanceField taken = std::move(moved);
+  expectRefused(ErrorCode::InvalidCall, "moved from", [&] { moved.value(points[0]); });
+}
+
+TEST(DistanceFieldFile, HoldsTheField) {
+  Random random(6);
+  const Folder folder;
+  const Mesh mesh = starMesh(random);
+  const DistanceField field = fieldOf(mesh, 0.05, 0.1);
+  field.save(folder / "field");
+  const DistanceField loaded = DistanceField::load(folder / "field");
+  EXPECT_EQ(loaded.errorBound(), field.errorBound());
+  EXPECT_EQ(loaded.band(), field.band());
+  EXPECT_EQ(loaded.cells(), field.cells());
+  for (const Eigen::Vector3d& p : adversarialPoints(random, mesh, field, 2000)) {
+    EXPECT_EQ(loaded.value(p), field.value(p));
+    EXPECT_EQ(loaded.gradient(p), field.gradient(p));
+  }
+  EXPECT_EQ(bytesOf(loaded, folder), bytesOf(field, folder));
+  expectRefused(ErrorCode::File, "cannot be read", [&] { DistanceField::load(folder / "none"); });
+  expectRefused(ErrorCode::File, "cannot be written",
+                [&] { field.save(folder / "none" / "field"); });
+}
+
+TEST(DistanceFieldFile, RefusesEveryTruncationAndChangedByte) {
+  const Folder folder;
+  const std::string content = bytesOf(smallField(), folder);
+  const std::size_t step = kShareOfCases;
+  for (std::size_t size = 0; size < content.size(); size += step) {
+    write(folder / "field", content.substr(0, size));
+    expectRefused(ErrorCode::File, ", byte ", [&] { DistanceField::load(folder / "field"); });
+  }
+  for (std::size_t i = 0; i < content.size(); i += step) {
+    std::string changed = content;
+    changed[i] = static_cast<char>(changed[i] ^ (1 << i % 8));
+    write(folder / "field", changed);
+    expectRefused(ErrorCode::File, ", byte ", [&] { DistanceField::load(folder / "field"); });
+  }
+}
+
+TEST(DistanceFieldFile, SurvivesAnyContentWithAValidChecksum) {
+  Random random(7);
+  const Folder folder;
+  const std::string content = bytesOf(smallField(), folder);
+  int accepted = 0;
+  for (int i = 0; i < casesOf(3000); ++i) {
+    std::string changed = content;
+    // Half of the changes are in the header, which has the counts.
+    const std::size_t range = i % 2 ? 96 : content.size() - 8;
+    for (std::uint64_t n = random() % 4 + 1; n > 0; --n)
+      changed[random() % range] = static_cast<char>(random());
+    setChecksum(changed);
+    write(folder / "field", changed);
+    try {
+      const DistanceField field = DistanceField::load(folder / "field");
+      ++accepted;
+      for (int p = 0; p < 10; ++p) {
+        const Eigen::Vector3d point = randomPoint(random, -0.2, 1.2);
+        EXPECT_FALSE(std::isnan(field.value(point)));
+        field.gradient(point);
+      }
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::File);
+    }
+  }
+  EXPECT_GT(accepted, 0);
+}
+
+}  // namespace palpate::testing
