@@ -93,7 +93,7 @@ struct Convex {
   struct Slab {
     Vector3d normal;
     double least, most;
-    bool isTwoSided;  ///< otherwise the other slabs and `most` alone bound the shape
+    bool isTwoSided = false;  ///< otherwise the other slabs and `most` alone bound the shape
   };
   Vector3d p, q;
   double radius = 0;
