@@ -3,6 +3,7 @@
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "Core/Stopwatch.h"
 #include "Core/Spin.h"
+#include "DistanceField/PlacedProxy.h"
 #include "Math/Tolerances.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/ElementBoxes.h"
@@ -33,6 +34,8 @@ constexpr std::size_t kNodePairsWanted = 256;
 constexpr std::size_t kJobsPerPair = 32;
 /// Below this many triangles, splitting a pair among threads costs more than it saves.
 constexpr std::size_t kSharedSize = 8192;
+/// Particles of a job with Method::Proxy.
+constexpr std::size_t kParticlesPerJob = 16384;
 
 /// Whether the traversal may skip neighbours that UnfoldedStars proves not to touch. It may if the
 /// method reports nothing but touching features: Continuous, without a thickness.
@@ -146,7 +149,10 @@ struct Frame::Job {
   ContactBuffers intersections;  ///< Auto: Intersection's, where the step starts intersecting
   bool intersectionsMissed;      ///< detectIntersections() did not run for every batch
   Buffer<ElementPair> candidates;
-  Buffer<ElementPair> kept;  ///< pairs of the present batch that passed the filters so far
+  Buffer<ElementPair> kept;          ///< pairs of the present batch that passed the filters so far
+  std::optional<PlacedProxy> proxy;  ///< with Method::Proxy; begin and end are of particles
+  ProxyHits hits;
+  ShapeContact* firstContact;  ///< where those of `hits` are written
   double milliseconds = 0, narrowMilliseconds = 0;
 
   /// Batches are passed to `use`. If it is null, they stay in the sink.
@@ -252,6 +258,14 @@ struct Frame::Job {
     narrowMilliseconds += watch.lap();
   }
 
+  /// Finds the contacts of the job's particles with a proxy.
+  void detectProxy(bool byBruteForce) {
+    Stopwatch watch;
+    proxy->find(record->a->mesh, begin, end, byBruteForce, hits);
+    contacts.featurePairs += hits.answered;
+    narrowMilliseconds += watch.lap();
+  }
+
   /// Auto: finds intersections at the step's end.
   static void detectIntersections(Job& job, std::span<const ElementPair> pairs) {
     findIntersections(job.record->meshes(), pairs, job.intersections);
@@ -292,6 +306,10 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads, 
         newJob(*record);
       continue;
     }
+    if (record->usesProxy()) {
+      if (adjacentPairs) startProxy(*record, kParticlesPerJob);
+      continue;
+    }
     if (record->a->tree.octree().size() == 0 || record->b->tree.octree().size() == 0) continue;
     const Triangle* const unfolded =
         adjacentPairs && reportsOnlyTouching(*record)
@@ -320,6 +338,43 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads, 
       job.end = first + std::min(count, begin + grain);
     }
   }
+}
+
+void Frame::startProxy(PairRecord& record, std::size_t grain) {
+  const std::size_t size = record.a->mesh.now.size();
+  for (std::size_t begin = 0; begin < size; begin += grain) {
+    Job& job = newJob(record);
+    job.proxy.emplace(*record.proxy, record.b->mesh, record.pair.settings.thickness);
+    job.begin = begin;
+    job.end = std::min(size, begin + grain);
+  }
+}
+
+void Frame::writeProxyContacts(std::span<const std::unique_ptr<Job>> jobs, const Threads& threads,
+                               PairRecord& record) {
+  CollisionData::Contents& contents = record.next.contents();
+  contents.vertexTriangle.clear();
+  contents.triangleVertex.clear();
+  contents.edgeEdge.clear();
+  contents.intersectingTriangles.clear();
+  contents.shapeShape.clear();
+  std::size_t size = 0;
+  double error = 0;
+  for (const auto& job : jobs) {
+    size += job->hits.count;
+    error = std::max(error, job->hits.error);
+  }
+  contents.shape.resize(size);
+  ShapeContact* place = contents.shape.data();
+  for (const auto& job : jobs) {
+    job->firstContact = place;
+    place += job->hits.count;
+  }
+  threads.forEach(jobs.size(), [&](std::size_t i) {
+    jobs[i]->proxy->write(record.a->mesh, jobs[i]->hits, jobs[i]->firstContact);
+  });
+  contents.validity.proxyDepth = record.proxy->depth();
+  contents.validity.proxyError = jobs.empty() ? 0.0 : jobs.front()->proxy->totalError(error);
 }
 
 void Frame::run(Job& job) const {
@@ -388,7 +443,10 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
     Stopwatch job;
     m_jobs[i]->keepCandidates = settings.keepCandidates;
     m_jobs[i]->start(&Job::detect);
-    m_jobs[i]->record->hasShape() ? m_jobs[i]->detectShape() : run(*m_jobs[i]);
+    if (m_jobs[i]->record->usesProxy())
+      m_jobs[i]->detectProxy(false);
+    else
+      m_jobs[i]->record->hasShape() ? m_jobs[i]->detectShape() : run(*m_jobs[i]);
     m_jobs[i]->milliseconds = job.lap();
   });
   findMissedIntersections(threads);
@@ -413,6 +471,7 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
     m_buffers.clear();
     m_intersections.clear();
     bool nearby = false;
+    const std::size_t first = i;
     if (settings.keepCandidates) record->candidates.clear();
     for (; i < m_jobCount && m_jobs[i]->record == record; ++i) {
       Job& job = *m_jobs[i];
@@ -423,6 +482,8 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
         record->candidates.insert(record->candidates.end(), job.candidates.begin(),
                                   job.candidates.end());
     }
+    if (record->usesProxy())
+      writeProxyContacts(std::span(m_jobs).subspan(first, i - first), threads, *record);
     finish(*record, nearby, false, settings, statistics);
   }
   statistics.milliseconds.order = watch.lap();
@@ -475,8 +536,11 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   // A feature pair that Intersection reports is not reported by distance or impact as well: where
   // the step starts intersecting only Intersection knows the side.
   CollisionData::Contents& contents = record.next.contents();
-  const std::size_t intersectionCount =
-      orderContacts(m_buffers, preferredBuffers, m_orderScratch, contents);
+  std::size_t intersectionCount = 0;
+  if (!record.usesProxy()) {
+    intersectionCount = orderContacts(m_buffers, preferredBuffers, m_orderScratch, contents);
+    contents.validity.proxyError = contents.validity.proxyDepth = 0.0;
+  }
   contents.earliestTimeOfImpact = record.earliest.load();
   if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
   record.trust.finish(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan,
@@ -500,10 +564,22 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Setti
   for (PairRecord* record : records) {
     Stopwatch watch;
     ContactBuffers contacts, intersections;
-    detectPairByBruteForce(*record, contacts, intersections);
+    if (record->usesProxy()) {
+      m_jobCount = 0;
+      startProxy(*record, std::max<std::size_t>(1, record->a->mesh.now.size()));
+      const auto jobs = std::span(m_jobs).first(m_jobCount);
+      for (const auto& job : jobs) job->detectProxy(true);
+      writeProxyContacts(jobs, Threads(1), *record);
+      for (const auto& job : jobs) contacts.featurePairs += job->contacts.featurePairs;
+    } else {
+      detectPairByBruteForce(*record, contacts, intersections);
+    }
     record->earliest = std::numeric_limits<double>::infinity();
     if (record->pair.settings.earliestTimeOnly) takeEarliest(*record, contacts);
-    if (settings.keepCandidates) findCandidatesByBruteForce(record->meshes(), record->candidates);
+    if (settings.keepCandidates && record->hasCandidates())
+      findCandidatesByBruteForce(record->meshes(), record->candidates);
+    else
+      record->candidates.clear();
     statistics.featurePairs += contacts.featurePairs;
     statistics.exactDecisions += contacts.exactDecisions + intersections.exactDecisions;
     statistics.validityPairs += intersections.validityPairs;

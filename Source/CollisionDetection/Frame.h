@@ -38,6 +38,8 @@ class Frame {
   struct Job;
   void start(std::span<PairRecord* const>, const Threads&, bool adjacentPairs, BoxFrame);
   void run(Job&) const;
+  void startProxy(PairRecord&, std::size_t grain);
+  void writeProxyContacts(std::span<const std::unique_ptr<Job>>, const Threads&, PairRecord&);
   void finish(PairRecord&, bool nearby, bool candidatesSorted, const Settings&, FrameStatistics&);
   void findMissedIntersections(const Threads&);
   Job& newJob(PairRecord&);

@@ -53,6 +53,7 @@ struct Geometry : SearchableGeometry {
   GeometryStep step;          ///< writes the positions of both ends
   double smallestHeight = 0;  ///< L: of all triangles with area, in the shape at rest
   GeometryMotion motion;
+  bool skipsOctree = false;  ///< the update that runs, or ran last, leaves the octree outdated
 
   /// The data for the choice of a method. extent is 0 before the first update of the octree.
   GeometryInStep inStep() const;

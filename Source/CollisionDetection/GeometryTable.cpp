@@ -245,8 +245,9 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   const double scale = frameScale(spread);
   m_changed.clear();
   for (const auto& geometry : m_geometries)
-    if (!geometry->tree.isCurrent(geometry->mesh, geometry->revisions.topology, scale) ||
-        geometry->tree.needsDops(geometry->mesh, settings.bounds))
+    if (!geometry->skipsOctree &&
+        (!geometry->tree.isCurrent(geometry->mesh, geometry->revisions.topology, scale) ||
+         geometry->tree.needsDops(geometry->mesh, settings.bounds)))
       m_changed.push_back(geometry.get());
   // Geometries are updated in parallel, the largest first, and large ones use several threads each.
   // The serial parts of one update thus run beside the work on other geometries.

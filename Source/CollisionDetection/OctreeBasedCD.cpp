@@ -40,11 +40,12 @@ Eigen::AlignedBox3d boundsOf(const Geometry& geometry) {
 }  // namespace
 
 void checkCandidates(const PairRecord& record) {
-  if (record.hasShape())
-    throw Error(
-        ErrorCode::NotAvailable,
-        nameOf(record.pair.a, record.pair.b) + " includes a shape and has no candidate pairs",
-        record.pair.a);
+  if (!record.hasCandidates())
+    throw Error(ErrorCode::NotAvailable,
+                nameOf(record.pair.a, record.pair.b) +
+                    (record.hasShape() ? " includes a shape" : " is answered by Method::Proxy") +
+                    " and has no candidate pairs",
+                record.pair.a);
 }
 
 struct OctreeBasedCD::Implementation {
@@ -94,6 +95,7 @@ struct OctreeBasedCD::Implementation {
   /// which candidates depend.
   void update(bool explicitly = false, bool detecting = false) {
     using Update = LooseOctree::Update;
+    const bool skips = markSkippedOctrees(detecting && octreesState != geometries.state());
     octreesState = 0;
     state->trees.clear();  // they are invalid until the update is complete
     if (!hasUpdates) updates = {};
@@ -107,7 +109,7 @@ struct OctreeBasedCD::Implementation {
     for (const auto& record : pairs.records()) {
       const Method method = record->pair.settings.method;
       const bool moves =
-          (detecting || method == Method::Auto) &&
+          (detecting || method == Method::Auto) && method != Method::Proxy &&
           (method == Method::Continuous || method == Method::Auto || !record->hasShape());
       if (moves)
         for (Geometry* geometry : {record->a, record->b}) geometry->motion.update(*geometry);
@@ -135,11 +137,24 @@ struct OctreeBasedCD::Implementation {
     updates.milliseconds.boxes += wall * share;
     updates.milliseconds.octree += wall * (1 - share);
     updateOctreeView();
-    octreesState = geometries.state();
+    if (!skips) octreesState = geometries.state();
 #ifdef PALPATE_VALIDATE
     PALPATE_ASSERT(octree->validate().empty());
 #endif
     if (explicitly) publish(updates);
+  }
+
+  /// A detection does not need the octrees of point sets of which all pairs use proxies. Queries
+  /// update them later. Returns whether there are any.
+  bool markSkippedOctrees(bool maySkip) {
+    for (const auto& geometry : geometries.all()) geometry->skipsOctree = false;
+    if (!maySkip) return false;
+    for (const auto& record : pairs.records())
+      if (record->usesProxy()) record->a->skipsOctree = true;
+    for (const auto& record : pairs.records())
+      if (!record->usesProxy()) record->a->skipsOctree = record->b->skipsOctree = false;
+    return std::any_of(geometries.all().begin(), geometries.all().end(),
+                       [](const auto& geometry) { return geometry->skipsOctree; });
   }
 
   void updateOctreeView() {
@@ -151,7 +166,7 @@ struct OctreeBasedCD::Implementation {
     std::uint32_t firstNode = 0;
     for (const auto& geometry : geometries.all()) {
       const GeometryOctree& tree = geometry->tree;
-      if (!tree.isValid() || tree.octree().size() == 0) continue;
+      if (geometry->skipsOctree || !tree.isValid() || tree.octree().size() == 0) continue;
       state->trees.push_back({geometry->id, &tree.octree(), tree.frame().origin, tree.frame().scale,
                               tree.lastUpdate, tree.bytesBesidesOctree(), firstNode});
       firstNode += static_cast<std::uint32_t>(tree.octree().pool().used() * 8);
@@ -186,7 +201,10 @@ struct OctreeBasedCD::Implementation {
       frame.collect(records, threadsFor(records), next);
     } else {
       for (PairRecord* record : records) {
-        findCandidatesByBruteForce(record->meshes(), record->candidates);
+        if (record->hasCandidates())
+          findCandidatesByBruteForce(record->meshes(), record->candidates);
+        else
+          record->candidates.clear();
         record->candidatesSorted = true;
         record->candidatesVersion.commit(record->state());
       }
@@ -206,6 +224,11 @@ struct OctreeBasedCD::Implementation {
     for (PairRecord* record : records)
       record->trust.start(record->pair.settings, record->a->inStep(), record->b->inStep(),
                           record->plan);
+    Stopwatch watch;
+    bool built = false;
+    for (PairRecord* record : records)
+      if (record->usesProxy()) built |= record->updateProxy(pairs.records(), threads);
+    if (built) next.milliseconds.octree += watch.lap();
     if (settings.engine == Engine::Octree)
       frame.detect(records, settings, threads, next);
     else
@@ -510,6 +533,7 @@ void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFuncti
     return all->frame.forEach(selectedPairs, all->threadsFor(selectedPairs), function, context);
   Buffer<ElementPair> candidates;
   for (const PairRecord* record : selectedPairs) {
+    if (!record->hasCandidates()) continue;
     findCandidatesByBruteForce(record->meshes(), candidates);
     if (!candidates.empty()) function(context, record->pair, candidates);
   }

@@ -23,6 +23,34 @@ void PairRecord::updateNearAtRest() {
   nearAtRestVersion.commit({a->revisions.topology});
 }
 
+bool PairRecord::updateProxy(std::span<const std::unique_ptr<PairRecord>> others,
+                             const Threads& threads) {
+  const DerivedFrom<3>::Sources sources{b->revisions.topology, b->revisions.enabled,
+                                        b->mesh.now.bodyRevision()};
+  const ProxySettings wanted{pair.settings.thickness + a->mesh.largestRadius,
+                             pair.settings.allowedError, pair.settings.widestNormalCone};
+  const auto isCurrent = [&](const PairRecord& record) {
+    return record.proxy && record.b == b && record.proxySettings == wanted &&
+           record.proxyVersion.isCurrent(sources);
+  };
+  if (isCurrent(*this)) return false;
+  if (proxyVersion.isValid() && proxyVersion.sources()[0] == sources[0] &&
+      proxyVersion.sources()[2] != sources[2])
+    throw Error(ErrorCode::UnsupportedMethod,
+                nameOf(pair.a, pair.b) +
+                    ": Method::Proxy is for a rigid body, and the positions of " + nameOf(b->id) +
+                    " were changed; move it by setTransform(), or set its elements again",
+                b->id);
+  const auto shared = std::find_if(others.begin(), others.end(),
+                                   [&](const auto& record) { return isCurrent(*record); });
+  const bool builds = shared == others.end();
+  proxy =
+      builds ? std::make_shared<const SurfaceProxy>(b->mesh, wanted, threads) : (*shared)->proxy;
+  proxySettings = wanted;
+  proxyVersion.commit(sources);
+  return builds;
+}
+
 void PairRecord::commit() noexcept {
   std::swap(data, next);
   hasData = true;
@@ -62,8 +90,15 @@ const char* nameOf(Method method) {
       return "Proximity";
     case Method::Continuous:
       return "Continuous";
+    case Method::Proxy:
+      return "Proxy";
   }
   return "?";
+}
+
+[[noreturn]] void throwPredicate(GeometryId a, GeometryId b) {
+  throw Error(ErrorCode::UnsupportedMethod,
+              nameOf(a, b) + ": contact predicates are not for Method::Proxy", a);
 }
 
 /// Checks the settings of a pair. Throws an Error that describes the fault.
@@ -74,8 +109,8 @@ class Check {
     range(a.mesh, b.mesh, settings);
     types(a, b);
     const bool proximity = hasProximity(a.inStep(), b.inStep(), settings.thickness);
-    need(m_method != Method::Proximity || proximity,
-         "Method::Proximity needs a positive thickness; it is 0");
+    need((m_method != Method::Proximity && m_method != Method::Proxy) || proximity,
+         std::string("Method::") + nameOf(m_method) + " needs a positive thickness; it is 0");
     need(m_method != Method::Auto || proximity || hasContinuous(a.inStep(), b.inStep()),
          "Method::Auto needs a positive thickness if radii differ between vertices; it is 0");
   }
@@ -93,8 +128,8 @@ class Check {
   }
 
   void range(const TriangleMesh& a, const TriangleMesh& b, const PairSettings& settings) {
-    const auto [method, thickness, contacts, motionTolerance, rest, timeTolerance,
-                earliestTimeOnly] = settings;
+    const auto [method, thickness, contacts, motionTolerance, rest, timeTolerance, earliestTimeOnly,
+                allowedError, normalCone] = settings;
     constexpr const char* kNotNegative = "finite and not negative";
     finite("restDistance", rest, rest >= 0.0, kNotNegative);
     need(rest == 0.0 || (&a == &b && a.topology.type != GeometryType::Points),
@@ -107,9 +142,14 @@ class Check {
          "contacts must be Distinct or All");
     need(!earliestTimeOnly || method == Method::Continuous,
          "earliestTimeOnly is for Method::Continuous only");
-    need(method >= Method::Auto && method <= Method::Continuous,
+    need(method >= Method::Auto && method <= Method::Proxy,
          "method is " + std::to_string(static_cast<int>(method)) +
-             "; it must be Auto, Intersection, Proximity or Continuous");
+             "; it must be Auto, Intersection, Proximity, Continuous or Proxy");
+    finite("allowedError", allowedError, allowedError >= 0.0, kNotNegative);
+    need(method != Method::Proxy || allowedError > 0.0,
+         "Method::Proxy needs a positive allowedError; it is 0");
+    need(normalCone > 0.0 && normalCone <= kWidestNormalCone,
+         "widestNormalCone is " + textOf(normalCone) + "; it must be above 0 and at most 1.5");
     need(method == Method::Auto || motionTolerance < 0.0,
          "motionTolerance is " + textOf(motionTolerance) +
              "; only Method::Auto uses it, so it must be negative for Method::" + nameOf(method));
@@ -135,6 +175,10 @@ class Check {
     support(meshes || continuous || any,
             "Method::Intersection is for two triangle meshes, not for " + nameOf(ofA.type) +
                 " and " + nameOf(ofB.type) + "; use Auto, Proximity or Continuous");
+    support(m_method != Method::Proxy ||
+                (ofA.type == GeometryType::Points && ofB.type == GeometryType::Triangles),
+            "Method::Proxy is for a point set and a triangle mesh in this order, not for " +
+                nameOf(ofA.type) + " and " + nameOf(ofB.type));
     support(!continuous || hasContinuous(a.inStep(), b.inStep()),
             "Method::Continuous needs one radius for all vertices; Proximity and Auto do not");
   }
@@ -200,7 +244,12 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
     record.nearAtRest = std::move(newNearAtRest);
     record.nearAtRestVersion.commit({record.a->revisions.topology});
   }
+  if (settings.method == Method::Proxy && record.predicate) throwPredicate(a, b);
   // Nothing below throws.
+  if (settings.method != Method::Proxy) {
+    record.proxy.reset();
+    record.proxyVersion.invalidate();
+  }
   record.pair.settings = m_pairs[record.index].settings = settings;
   record.plan = planOf(settings, record.a->inStep(), record.b->inStep());
   record.settingsRevision = m_revisions.next();
@@ -216,6 +265,7 @@ void PairTable::checkRigid(GeometryId geometry) const {
 void PairTable::setPredicate(const GeometryTable& geometries, GeometryId a, GeometryId b,
                              ContactPredicate predicate) {
   PairRecord& record = inOrder(geometries, a, b);
+  if (predicate && record.usesProxy()) throwPredicate(a, b);
   if (predicate && record.hasShape())
     throw Error(ErrorCode::UnsupportedMethod,
                 nameOf(a, b) +

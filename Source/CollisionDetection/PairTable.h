@@ -4,6 +4,7 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "CollisionDetection/GeometryTable.h"
+#include "DistanceField/SurfaceProxy.h"
 #include "Validity/Trust.h"
 #include "Core/Buffer.h"
 #include "NarrowPhase/NarrowPhase.h"
@@ -63,6 +64,12 @@ struct PairRecord {
   void commitNoCandidates() noexcept;  ///< for a pair that does not collide
 
   bool hasShape() const { return a->shape || b->shape; }
+  bool usesProxy() const { return pair.settings.method == Method::Proxy; }
+  /// Whether the pair is answered by element pairs of two octrees.
+  bool hasCandidates() const { return !hasShape() && !usesProxy(); }
+  /// Makes `proxy` for the body and the settings if it is another one, or takes that of `others`.
+  /// Returns whether leaves were built.
+  bool updateProxy(std::span<const std::unique_ptr<PairRecord>> others, const Threads&);
   const Geometry& mesh() const { return a->shape ? *b : *a; }  ///< for a pair with a shape
 
   /// Whether stored boxes may enclose the whole step though this pair's method needs only its end.
@@ -82,6 +89,9 @@ struct PairRecord {
   ContactPredicate predicate;
   IndexLists nearAtRest;  ///< per vertex: later ones within settings.restDistance at rest
   DerivedFrom<1> nearAtRestVersion;
+  std::shared_ptr<const SurfaceProxy> proxy;  ///< of b, if usesProxy(); pairs may share it
+  ProxySettings proxySettings;
+  DerivedFrom<3> proxyVersion;  ///< topology, enabled elements and positions of b
 };
 
 /// Collision pairs, found by their geometries in either order.

@@ -334,7 +334,8 @@ void auditFrame(const Settings& settings, const GeometryTable& geometries, const
   ++record.frame;
   if (settings.audit.features == 0) return;
   for (const auto& pair : pairs.records()) {
-    if (!pair->collides()) continue;
+    // Brute force over features does not reproduce proxies, whose contacts have an error.
+    if (!pair->collides() || pair->usesProxy()) continue;
     const std::size_t first = failures.size();
     audit(pair->meshes(), pair->pair, pair->data, settings.audit, record.frame, failures);
     const auto own = std::span(failures).subspan(first);

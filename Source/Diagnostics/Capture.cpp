@@ -20,11 +20,11 @@ namespace palpate {
 namespace {
 
 constexpr std::string_view kTitle = "palpate-capture";
-constexpr int kVersion = 10;
+constexpr int kVersion = 11;
 
 // Enumerators are written by name. The names are in the order of the declarations.
-constexpr std::array<std::string_view, 4> kMethods{"Auto", "Intersection", "Proximity",
-                                                   "Continuous"};
+constexpr std::array<std::string_view, 5> kMethods{"Auto", "Intersection", "Proximity",
+                                                   "Continuous", "Proxy"};
 constexpr std::array<std::string_view, 4> kGeometryTypes{"Triangles", "Lines", "Points", "Shape"};
 constexpr std::array<std::string_view, 2> kSides{"Both", "Outer"};
 constexpr std::array<std::string_view, 6> kShapes{"Sphere", "Capsule",  "Plane",
@@ -214,6 +214,8 @@ void pairLine(File& file, PairType& pair, int version) {
   if (version >= 4) fieldOf(file, pair.predicate);
   if (version >= 6) file.real(pair.settings.timeTolerance);
   if (version >= 9) fieldOf(file, pair.settings.earliestTimeOnly);
+  if (version >= 11) file.real(pair.settings.allowedError);
+  if (version >= 11) file.real(pair.settings.widestNormalCone);
 }
 
 template <class File, class FilterType>

@@ -215,4 +215,16 @@ constexpr double kSlowSlack = 0x1p-20;
 /// L²: squares above this lose nothing significant to underflow.
 constexpr double kSmallestSlowSquare = 0x1p-900;
 
+// ---- Surface proxies (DistanceField) ----
+
+/// Relative: more than all roundings of a distance, a height or a bound along the way of a proof,
+/// each of which has fewer than 32 operations.
+constexpr double kProxySlack = 0x1p-40;
+/// Relative to the largest coordinate of the cells, and of the translation of the body. A point is
+/// taken into the body's frame with 16 roundings, its height above a plane has 6, and placing the
+/// body's vertices in the world 6. The factors of a rotation are at most 1 + 2^-20.
+constexpr double kProxyRounding = 64 * 0x1p-53;
+/// rad. Planes stand for triangles on their front only.
+constexpr double kWidestNormalCone = 1.5;
+
 }  // namespace palpate

@@ -72,8 +72,10 @@ struct EdgeEdgeContact {
 /// The type of feature that touches an analytical shape.
 enum class ShapeElement : std::uint32_t { Vertex, Edge, Face };
 
-/// A contact of a vertex, edge or triangle with an analytical shape. All values are those at
-/// timeOfImpact.
+/// A contact of a vertex, edge or triangle with an analytical shape, or of a particle with a body
+/// by Method::Proxy. All values are those at timeOfImpact. With Method::Proxy the surface is the
+/// plane or the triangle that answers, and `distance` is within Validity::proxyError of the exact
+/// one.
 struct ShapeContact {
   ShapeElement element;
   std::uint32_t id;  ///< Index of the vertex or triangle; for an edge its lower vertex.
@@ -164,7 +166,8 @@ class PALPATE_EXPORT CollisionData {
   std::span<const ElementPair> intersectingTriangles() const {
     return m_contents.intersectingTriangles;
   }
-  /// Vertices, edges and triangles with an analytical shape. Such a pair has no other contacts.
+  /// Vertices, edges and triangles with an analytical shape, and particles with a body by
+  /// Method::Proxy. Such a pair has no other contacts.
   std::span<const ShapeContact> shape() const { return m_contents.shape; }
   /// Two analytical shapes with each other: one contact if they are at most the thickness apart,
   /// with Method::Continuous at some time of the step.

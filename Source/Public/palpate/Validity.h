@@ -102,6 +102,15 @@ struct Validity {
   /// L: feature pairs further apart at the step's end are contacts only by an impact. It is the
   /// thickness, with Auto up to the motion tolerance more; 0 for Intersection.
   double effectiveThickness = 0;
+  /// L: with Proxy, the largest proven distance between the planes that answered and the surface,
+  /// and what rounding adds. Each contact's distance is off by at most this. A particle is missing
+  /// or reported in excess only if its distance is within this of the limit. 0 for other methods.
+  double proxyError = 0;
+  /// L: with Proxy, particles deeper than this behind the surface of a closed mesh are not
+  /// reported. It is at least the thickness and the largest radius, and the edge of the smallest
+  /// leaf. Meshes that are not closed have no inside: particles within the thickness are reported
+  /// on both sides. 0 for other methods.
+  double proxyDepth = 0;
 
   /// Vertices of the first and of the second geometry because of which the answer is not trusted,
   /// ascending. Proximity and Intersection: vertices that moved further than `displacementLimit`,

@@ -1,0 +1,105 @@
+#pragma once
+
+#include "Core/Buffer.h"
+#include "Core/Threads.h"
+#include "Mesh/TriangleMesh.h"
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace palpate {
+
+struct ProxySettings {
+  double reach = 0;         ///< L: distance to which points are answered, positive
+  double allowedError = 0;  ///< L: largest proven error of a leaf's plane
+  double normalCone = 0;    ///< rad: PairSettings::widestNormalCone
+  friend bool operator==(const ProxySettings&, const ProxySettings&) = default;
+};
+
+/// The index of a point's cell: of its brick of 4 x 4 x 4 cells, and of the cell in the brick.
+struct ProxyPlace {
+  static constexpr std::uint32_t kOutside = 0xffffffffu;
+  std::uint32_t brick, cell;
+};
+
+/// An octree around a body's surface, in the body's frame. Its leaves have a plane or a list of
+/// triangles; leaves further away than the reach have neither.
+///
+/// Laws     (1) for every point p of a leaf with a plane: the plane's distance from p and the
+///          surface's differ by at most `error`. If the former exceeds `error`, p is on the side of
+///          the surface that the sign of the plane's distance says.
+///          (2) the list of a leaf with triangles has the triangle that is nearest to p.
+///          (3) points in leaves without either are further from the surface than the reach.
+///          Docs/SurfaceProxies.md has the proofs.
+/// Errors   TooLarge if the reach is so large that the leaves would need more than kMostWork.
+/// Threads  the same leaves for any number of threads.
+class SurfaceProxy {
+ public:
+  struct alignas(64) Leaf {
+    std::array<double, 3> normal;  ///< unit, on the side of the winding normals
+    double offset;                 ///< L: a point is normal . point - offset in front of the plane
+    double error;                  ///< L: see law 1; 0 for triangles
+    std::uint32_t firstTriangle, triangleCount;  ///< count 0: a plane
+    std::array<std::uint16_t, 3> lower;          ///< of its cells; both ends are for brute force
+    std::uint16_t size;                          ///< in cells, along each axis
+
+    bool hasPlane() const { return triangleCount == 0; }
+    double distance(double x, double y, double z) const {
+      return (normal[0] * x + normal[1] * y + normal[2] * z) - offset;
+    }
+  };
+  static constexpr std::uint32_t kNoLeaf = 0xffffffffu;
+
+  SurfaceProxy(const TriangleMesh& body, const ProxySettings&, const Threads&);
+
+  /// The leaf of a place; kNoLeaf if there is none.
+  std::uint32_t leafAt(const ProxyPlace& place) const {
+    if (place.brick == ProxyPlace::kOutside) return kNoLeaf;
+    const std::uint32_t entry = m_bricks[place.brick];
+    if (entry == kNoLeaf || !(entry & kBlock)) return entry;
+    return m_blocks[entry & ~kBlock][place.cell];
+  }
+  /// The same, found among all leaves.
+  std::uint32_t leafAtByBruteForce(const ProxyPlace&) const;
+
+  std::span<const Leaf> leaves() const { return m_leaves; }
+  std::span<const std::uint32_t> trianglesOf(const Leaf& leaf) const {
+    return std::span(m_triangles).subspan(leaf.firstTriangle, leaf.triangleCount);
+  }
+  /// Whether the mesh is closed and consistently oriented, so that distances have a sign.
+  bool isClosed() const { return m_isClosed; }
+  double depth() const { return m_reach; }          ///< L: Validity::proxyDepth
+  double magnitude() const { return m_magnitude; }  ///< L: largest coordinate of the cells
+  const Eigen::Vector3d& lower() const { return m_lower; }
+  double cellSize() const { return m_cellSize; }       ///< L
+  std::uint32_t cellCount() const { return m_cells; }  ///< along each axis; 0 without triangles
+  std::size_t bytes() const;
+
+  // For a look-up in steps, so that memory is fetched ahead.
+  const std::uint32_t* brick(std::uint32_t index) const { return &m_bricks[index]; }
+  /// Where the leaf of a place is written; null if `entry` is that of the whole brick.
+  const std::uint32_t* cellOf(std::uint32_t entry, std::uint32_t cell) const {
+    return entry == kNoLeaf || !(entry & kBlock) ? nullptr : &m_blocks[entry & ~kBlock][cell];
+  }
+
+  /// Most triangles that are compared with nodes while the leaves are built, and most in lists.
+  static constexpr std::uint64_t kMostWork = std::uint64_t{1} << 34, kMostListed = 1u << 28;
+
+ private:
+  friend class SurfaceProxyBuilder;
+  using Block = std::array<std::uint32_t, 64>;
+  static constexpr std::uint32_t kBlock = 0x80000000u;  ///< marks the index of a block
+
+  std::vector<std::uint32_t> m_bricks;
+  std::vector<Block> m_blocks;
+  std::vector<Leaf> m_leaves;
+  std::vector<std::uint32_t> m_triangles;
+  Eigen::Vector3d m_lower = Eigen::Vector3d::Zero();
+  double m_cellSize = 1, m_reach = 0, m_magnitude = 0;
+  std::uint32_t m_cells = 0;
+  bool m_isClosed = false;
+};
+
+}  // namespace palpate
