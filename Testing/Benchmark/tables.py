@@ -180,6 +180,7 @@ TABLES = {
     "points": metrics("points", "1 / 2 threads"),
     "shapes": metrics("shapes", "1 thread"),
     "rigid": metrics("rigid", "1 / 2 threads"),
+    "proxy": metrics("proxy", "1 / 2 threads"),
     "bounds": metrics("bounds", "1 thread"),
     "inside": metrics("inside", "1 / 2 threads"),
 }

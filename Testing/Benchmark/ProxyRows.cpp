@@ -1,0 +1,120 @@
+// A million particles near a placed bone of half a million triangles, by Method::Proxy and by
+// Method::Proximity in turns. Both move. The time is that of whole frames: from positions and a
+// transform to contacts.
+#include "Rows.h"
+
+#include "Common/RandomMeshes.h"
+
+#include <palpate/OctreeBasedCD.h>
+
+#include <Eigen/Geometry>
+
+#include <cmath>
+
+namespace palpate::benchmark {
+namespace {
+
+constexpr int kFrames = 12;
+constexpr std::size_t kParticles = 1000000;
+constexpr double kRadius = 0.001, kThickness = 0.001, kAllowedError = 1e-4;
+
+/// Closed, with bumps: 502,000 triangles.
+testing::Mesh bone() {
+  testing::Mesh body = testing::sphere(501, 502, Eigen::Vector3d::Zero(), 0.4);
+  for (Eigen::Vector3d& p : body.positions)
+    p *= 0.95 + 0.05 * std::sin(19 * p[0]) * std::cos(23 * p[1] + 11 * p[2]);
+  return body;
+}
+
+struct Placement {
+  Eigen::Matrix3d rotation;
+  Eigen::Vector3d translation;
+};
+
+Placement placement(int frame) {
+  const double angle = 0.01 * frame;
+  return {Eigen::AngleAxisd(angle, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix(),
+          {0.5 + 0.1 * std::sin(angle), 0.5, 0.42}};
+}
+
+/// Particles in front of random triangles, up to twice the contact distance away, in the body's
+/// frame and in random order.
+std::vector<Eigen::Vector3d> particlesAt(const testing::Mesh& body) {
+  testing::Random random(1);
+  std::vector<Eigen::Vector3d> points(kParticles);
+  for (Eigen::Vector3d& p : points) {
+    const auto& [i, j, k] = body.triangles[random() % body.triangles.size()];
+    const Eigen::Vector3d &a = body.positions[i], u = body.positions[j] - a,
+                          v = body.positions[k] - a;
+    const double s = testing::uniform(random, 0, 1), t = testing::uniform(random, 0, 1 - s);
+    p = a + s * u + t * v +
+        testing::uniform(random, 0, 2) * (kRadius + kThickness) * u.cross(v).normalized();
+  }
+  return points;
+}
+
+struct Run {
+  Run(const testing::Mesh& mesh, const std::vector<Eigen::Vector3d>& points,
+      const PairSettings& pair, int threads)
+      : detection(Settings{.threads = threads}),
+        smoke(detection.addPointSet(points, kRadius)),
+        body(detection.addTriangleMesh(mesh.positions, mesh.triangles)) {
+    detection.addCollisionPair(smoke, body, pair);
+  }
+
+  void step(const std::vector<Eigen::Vector3d>& world, const Placement& at, bool isCounted) {
+    const double begin = now();
+    detection.setPositions(smoke, world);
+    detection.setTransform(body, at.rotation, at.translation);
+    detection.detectCollision();
+    detection.advance();
+    (isCounted ? samples : first).push_back(now() - begin);
+  }
+  const CollisionData& data() const { return detection.collisionData(smoke, body); }
+
+  OctreeBasedCD detection;
+  GeometryId smoke, body;
+  std::vector<double> samples, first;
+};
+
+}  // namespace
+
+void proxyRows(Report& report, const RowOptions& options) {
+  report.heading("A million particles near a bone of 502,000 triangles: ms per frame");
+  report.line({"", "frame", "worst", "first frame", "ns each and thread", "contacts"});
+  const testing::Mesh body = bone();
+  const std::vector<Eigen::Vector3d> points = particlesAt(body);
+  std::vector<Eigen::Vector3d> world = points;
+  for (const int threads : options.threads) {
+    Run proxy(body, points,
+              {.method = Method::Proxy, .thickness = kThickness, .allowedError = kAllowedError},
+              threads),
+        proximity(body, points, {.method = Method::Proximity, .thickness = kThickness}, threads);
+    for (int frame = 0; frame < kFrames; ++frame) {
+      const Placement at = placement(frame);
+      for (std::size_t i = 0; i < points.size(); ++i)
+        world[i] = at.rotation * (1.0 + 1e-4 * (frame % 5)) * points[i] + at.translation;
+      for (Run* run : {&proxy, &proximity}) run->step(world, at, frame > 2);
+    }
+    const double each = 1e6 * threads / static_cast<double>(kParticles);
+    for (const auto& [run, name] : {std::pair{&proxy, "Proxy"}, {&proximity, "Proximity"}}) {
+      const double frame = median(run->samples);
+      report.line({std::string(name) + ", " + std::to_string(threads) + " threads",
+                   milliseconds(frame), milliseconds(quantile(run->samples, 1)),
+                   milliseconds(run->first.front()), milliseconds(frame * each),
+                   std::to_string(run->detection.statistics().contacts)});
+      report.row("proxy", "particles-bone", threads, name, "frame ms", frame, run->data().hash());
+      report.row("proxy", "particles-bone", threads, name, "ns per particle and thread",
+                 frame * each);
+    }
+    const double ratio = median(proximity.samples) / median(proxy.samples);
+    report.line({"Proximity over Proxy", times(ratio)});
+    report.row("proxy", "particles-bone", threads, "Proximity over Proxy", "ratio", ratio);
+    report.line({"stated error, in thicknesses",
+                 milliseconds(proxy.data().validity().proxyError / kThickness)});
+    report.row("proxy", "particles-bone", threads, "Proxy", "stated error in thicknesses",
+               proxy.data().validity().proxyError / kThickness);
+  }
+}
+
+}  // namespace palpate::benchmark

@@ -1,0 +1,488 @@
+// Method::Proxy: its contacts beside exact distances, with the error that the result states.
+#include <palpate/Capture.h>
+#include <palpate/Distance.h>
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/ExpectRefused.h"
+#include "Common/FailingAllocation.h"
+#include "Common/PairRun.h"
+#include "Core/SimdPath.h"
+#include "../Unit/DistanceField/FieldMeshes.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <map>
+
+namespace palpate::testing {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Points = std::vector<Vector3d>;
+
+struct Scene {
+  std::string name;
+  Mesh body;
+  bool isClosed;
+  double thickness, allowedError;
+  Matrix3d rotation = Matrix3d::Identity();
+  Vector3d translation = Vector3d::Zero();
+  bool isPlaced = false;
+};
+
+/// A box with n x n quads on each side.
+Mesh finePlate(std::uint32_t n, const Vector3d& half) {
+  Mesh mesh;
+  const auto addSide = [&](int axis, double sign) {
+    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+    for (std::uint32_t j = 0; j <= n; ++j)
+      for (std::uint32_t i = 0; i <= n; ++i) {
+        Vector3d p;
+        p[axis] = sign * half[axis];
+        p[(axis + 1) % 3] = half[(axis + 1) % 3] * (2.0 * i / n - 1);
+        p[(axis + 2) % 3] = half[(axis + 2) % 3] * (2.0 * j / n - 1);
+        mesh.positions.push_back(p);
+      }
+    for (std::uint32_t j = 0; j < n; ++j)
+      for (std::uint32_t i = 0; i < n; ++i) {
+        std::uint32_t v = first + j * (n + 1) + i, a = v + 1, b = v + n + 1;
+        if (sign < 0) std::swap(a, b);
+        mesh.triangles.push_back({v, a, v + n + 2});
+        mesh.triangles.push_back({v, v + n + 2, b});
+      }
+  };
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double sign : {-1.0, 1.0}) addSide(axis, sign);
+  // Joins the sides.
+  std::map<std::array<double, 3>, std::uint32_t> places;
+  Mesh joined;
+  std::vector<std::uint32_t> names;
+  for (const Vector3d& p : mesh.positions) {
+    const auto [place, isNew] =
+        places.try_emplace({p[0], p[1], p[2]}, static_cast<std::uint32_t>(joined.positions.size()));
+    if (isNew) joined.positions.push_back(p);
+    names.push_back(place->second);
+  }
+  for (const auto& [a, b, c] : mesh.triangles)
+    joined.triangles.push_back({names[a], names[b], names[c]});
+  return joined;
+}
+
+Mesh organ(Random& random) {
+  Mesh mesh = sphere(48, 64, Vector3d::Zero(), 1.0);
+  const Vector3d phase = randomPoint(random, 0, 6);
+  for (Vector3d& p : mesh.positions)
+    p *= 1.0 + 0.12 * std::sin(3 * p[0] + phase[0]) * std::cos(4 * p[1] + phase[1]) +
+         0.03 * std::sin(9 * p[2] + phase[2]);
+  return mesh;
+}
+
+std::vector<Scene> scenes() {
+  Random random(5);
+  std::vector<Scene> all{
+      {"sphere", sphere(40, 60, {0.1, 0.2, 0.3}, 1.0), true, 0.05, 0.01},
+      {"torus", torusMesh(60, 30), true, 0.04, 0.01},
+      {"box", boxMesh({-1, -0.5, -0.25}, {1, 0.5, 0.25}), true, 0.03, 1e-3},
+      {"fine box", finePlate(12, {1, 0.7, 0.5}), true, 0.05, 1e-4},
+      {"thin plate", finePlate(16, {1, 1, 0.004}), true, 0.05, 1e-3},
+      {"open sheet", sheet(40, 0.0, 0.4), false, 0.03, 2e-3},
+      {"organ", organ(random), true, 0.05, 0.01},
+      {"star", starMesh(random), true, 0.05, 0.01},
+      {"soup", soup(random, 60, 0.1), false, 0.03, 0.01},
+      {"wide thickness", sphere(40, 60, Vector3d::Zero(), 1.0), true, 0.4, 0.02},
+  };
+  const std::size_t unplaced = all.size();
+  for (std::size_t i = 0; i < unplaced; i += 2) {
+    Scene scene = all[i];
+    scene.name += ", placed";
+    scene.isPlaced = true;
+    scene.rotation =
+        Eigen::AngleAxisd(uniform(random, 0, 6), randomPoint(random, -1, 1).normalized())
+            .toRotationMatrix();
+    // As inexact as setTransform() accepts.
+    if (i % 4 == 0) scene.rotation(0, 1) += 3e-10;
+    scene.translation = randomPoint(random, -50, 50);
+    all.push_back(scene);
+  }
+  return all;
+}
+
+Points worldOf(const Scene& scene) {
+  Points world = scene.body.positions;
+  for (Vector3d& p : world) p = scene.rotation * p + scene.translation;
+  return world;
+}
+
+/// Points on the body, near it, far from it, and in its bounding box.
+Points particlesAround(Random& random, const Scene& scene, std::size_t count) {
+  const Points world = worldOf(scene);
+  Points points;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto& [a, b, c] = scene.body.triangles[random() % scene.body.triangles.size()];
+    const double s = random() % 5 ? uniform(random, 0, 1) : 0.0,
+                 t = random() % 5 ? uniform(random, 0, 1 - s) : 0.0;
+    Vector3d p = world[a] + s * (world[b] - world[a]) + t * (world[c] - world[a]);
+    const std::uint64_t kind = random() % 8;
+    if (kind > 0) p += randomPoint(random, -1, 1) * scene.thickness * (kind > 5 ? 4.0 : 1.0);
+    points.push_back(p);
+  }
+  return points;
+}
+
+struct Detection {
+  Detection(const Scene& scene, const Points& points, std::span<const double> radii,
+            const Settings& settings)
+      : detection(settings) {
+    smoke = detection.addPointSet(points, radii);
+    body = detection.addTriangleMesh(scene.body.positions, scene.body.triangles);
+    if (scene.isPlaced) detection.setTransform(body, scene.rotation, scene.translation);
+    detection.addCollisionPair(smoke, body,
+                               {.method = Method::Proxy,
+                                .thickness = scene.thickness,
+                                .allowedError = scene.allowedError});
+    detection.detectCollision();
+  }
+  const CollisionData& data() const { return detection.collisionData(smoke, body); }
+
+  OctreeBasedCD detection;
+  GeometryId smoke, body;
+};
+
+/// The exact distance of a point from triangles; negative inside the body.
+double exactDistance(const SpatialQueries& queries, GeometryId body, const Vector3d& p,
+                     bool isClosed) {
+  if (isClosed) return queries.signedDistance(body, p).distance;
+  return queries.closestPoint(body, p)->distance;
+}
+
+void expectWithinError(const Scene& scene, const Points& points, std::span<const double> radii,
+                       const Detection& run, std::size_t& contacts) {
+  const Validity& validity = run.data().validity();
+  EXPECT_EQ(validity.method, Method::Proxy);
+  EXPECT_FALSE(validity.trusted);
+  EXPECT_LE(validity.proxyError, scene.allowedError * (1 + 1e-6) + 1e-8);
+  EXPECT_GE(validity.proxyDepth, scene.thickness);
+  const double error = validity.proxyError + 1e-14;
+  const SpatialQueries queries = run.detection.queries();
+  auto next = run.data().shape().begin();
+  const auto end = run.data().shape().end();
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const double exact = exactDistance(queries, run.body, points[i], scene.isClosed),
+                 limit = scene.thickness + radii[i];
+    if (next == end || next->id != i) {
+      EXPECT_FALSE(exact < limit - error && exact > error - validity.proxyDepth)
+          << "particle " << i << " at " << exact << " is missing";
+      continue;
+    }
+    const ShapeContact& c = *next++;
+    ++contacts;
+    EXPECT_LE(exact, limit + error) << "particle " << i;
+    EXPECT_GE(exact, -validity.proxyDepth - error);
+    const double found = c.distance + radii[i];
+    EXPECT_NEAR(found, exact, error) << "particle " << i;
+    EXPECT_LE(found, limit);
+    EXPECT_NEAR(c.normal.norm(), 1.0, 1e-12);
+    EXPECT_LT((c.point - c.pointOnShape - found * c.normal).norm(), 1e-12);
+    EXPECT_EQ(c.point, points[i]);
+    EXPECT_EQ(c.element, ShapeElement::Vertex);
+    EXPECT_EQ(c.vertices, (std::array{i, i, i}));
+    // The point on the surface is near it, too.
+    EXPECT_LE(queries.closestPoint(run.body, c.pointOnShape)->distance, error + 1e-12);
+  }
+  EXPECT_EQ(next, end) << "contacts are not in ascending order of particles";
+}
+
+std::vector<double> radiiOf(Random& random, std::size_t count, double most) {
+  std::vector<double> radii(count);
+  for (double& radius : radii) radius = uniform(random, 0, most);
+  return radii;
+}
+
+TEST(Proxy, EachContactIsWithinTheStatedErrorAndNoneIsMissing) {
+  Random random(1);
+  std::size_t number = 0;
+  for (const Scene& scene : scenes()) {
+    SCOPED_TRACE(scene.name);
+    if (isLeftOut(number++)) continue;
+    const Points points = particlesAround(random, scene, 1500);
+    const std::vector<double> radii = radiiOf(random, points.size(), 0.3 * scene.thickness);
+    const Detection run(scene, points, radii, settingsOf(Engine::Octree, 2));
+    std::size_t contacts = 0;
+    expectWithinError(scene, points, radii, run, contacts);
+    EXPECT_GT(contacts, 200u);
+  }
+}
+
+TEST(Proxy, BruteForceThreadsAndSimdPathsGiveTheSameBits) {
+  Random random(2);
+  std::size_t number = 0;
+  for (const Scene& scene : scenes()) {
+    SCOPED_TRACE(scene.name);
+    if (isLeftOut(number++)) continue;
+    const Points points = particlesAround(random, scene, 301);
+    const std::vector<double> radii = radiiOf(random, points.size(), 0.3 * scene.thickness);
+    const Detection expected(scene, points, radii, settingsOf(Engine::Octree, 1));
+    const auto expectSame = [&](const Settings& settings) {
+      const Detection run(scene, points, radii, settings);
+      EXPECT_EQ(run.data().hash(), expected.data().hash());
+      EXPECT_EQ(run.data().validity(), expected.data().validity());
+    };
+    expectSame(settingsOf(Engine::BruteForce));
+    expectSame(settingsOf(Engine::Octree, 3));
+    for (const std::string& path : simdPaths()) {
+      useSimdPath(path);
+      expectSame(settingsOf(Engine::Octree));
+    }
+    useSimdPath("");
+  }
+}
+
+TEST(Proxy, ParticlesMayBePlacedOrDisabled) {
+  Random random(3);
+  const Scene scene = scenes()[0];
+  const Points points = particlesAround(random, scene, 1000);
+  const Matrix3d turn = Eigen::AngleAxisd(1, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  const Vector3d shift(3, 4, 5);
+  OctreeBasedCD detection(settingsOf(Engine::Octree));
+  const GeometryId smoke = detection.addPointSet(points, 0.01),
+                   body = detection.addTriangleMesh(scene.body.positions, scene.body.triangles);
+  const PairSettings pair{.method = Method::Proxy, .thickness = 0.05, .allowedError = 0.01};
+  detection.addCollisionPair(smoke, body, pair);
+  detection.detectCollision();
+  const std::vector<ShapeContact> before(detection.collisionData(smoke, body).shape().begin(),
+                                         detection.collisionData(smoke, body).shape().end());
+  ASSERT_GT(before.size(), 100u);
+  detection.setTransform(smoke, turn, shift);
+  detection.setTransform(body, turn, shift);
+  detection.detectCollision();
+  const auto after = detection.collisionData(smoke, body).shape();
+  ASSERT_EQ(after.size(), before.size());
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    EXPECT_EQ(after[i].id, before[i].id);
+    EXPECT_NEAR(after[i].distance, before[i].distance, 1e-13);
+    EXPECT_LT((after[i].normal - turn * before[i].normal).norm(), 1e-13);
+  }
+  const std::vector<std::uint32_t> disabled{before[0].id, before[3].id};
+  detection.setDisabledElements(smoke, disabled);
+  detection.detectCollision();
+  const auto fewer = detection.collisionData(smoke, body).shape();
+  ASSERT_EQ(fewer.size(), before.size() - 2);
+  EXPECT_EQ(fewer[0].id, before[1].id);
+  // Without its elements the body has no surface.
+  std::vector<std::uint32_t> all(scene.body.triangles.size());
+  for (std::uint32_t t = 0; t < all.size(); ++t) all[t] = t;
+  detection.setDisabledElements(body, all);
+  detection.detectCollision();
+  EXPECT_TRUE(detection.collisionData(smoke, body).shape().empty());
+}
+
+TEST(Proxy, AnOpenMeshWithAnOuterSideHasContactsInFrontOnly) {
+  Random random(4);
+  const Scene scene = scenes()[5];
+  const Points points = particlesAround(random, scene, 1000);
+  OctreeBasedCD detection(settingsOf(Engine::Octree));
+  const GeometryId smoke = detection.addPointSet(points),
+                   body = detection.addTriangleMesh(scene.body.positions, scene.body.triangles);
+  detection.addCollisionPair(smoke, body,
+                             {.method = Method::Proxy, .thickness = 0.03, .allowedError = 2e-3});
+  const auto countBelow = [&] {
+    detection.detectCollision();
+    std::size_t below = 0;
+    for (const ShapeContact& c : detection.collisionData(smoke, body).shape())
+      below += c.normal[2] < 0;
+    return below;
+  };
+  EXPECT_GT(countBelow(), 100u);
+  const std::size_t all = detection.collisionData(smoke, body).shape().size();
+  detection.setCollisionFilter(body, {.sidedness = Sidedness::Outer});
+  // Beside the border, normals may lean over the edge.
+  EXPECT_LT(countBelow(), 40u);
+  EXPECT_LT(detection.collisionData(smoke, body).shape().size(), all - 100);
+}
+
+TEST(Proxy, SetTrianglesAndSettingsBuildNewLeaves) {
+  Random random(6);
+  const std::vector<Scene> all = scenes();
+  const Points points = particlesAround(random, all[1], 800);
+  const std::vector<double> radii(points.size(), 0.0);
+  Detection run(all[0], points, radii, settingsOf(Engine::Octree));
+  run.detection.setTriangles(run.body, all[1].body.positions, all[1].body.triangles);
+  PairSettings pair{.method = Method::Proxy, .thickness = 0.04, .allowedError = 0.01};
+  run.detection.setPairSettings(run.smoke, run.body, pair);
+  run.detection.detectCollision();
+  const Detection fresh(all[1], points, radii, settingsOf(Engine::Octree));
+  EXPECT_EQ(run.data().hash(), fresh.data().hash());
+  // A smaller error, and then exact answers by triangles where cones are narrow.
+  double before = run.data().validity().proxyError;
+  EXPECT_GT(before, 1e-3);
+  pair.allowedError = 1e-3;
+  run.detection.setPairSettings(run.smoke, run.body, pair);
+  run.detection.detectCollision();
+  EXPECT_LT(run.data().validity().proxyError, 1.001e-3);
+  pair.allowedError = 1;
+  pair.widestNormalCone = 1e-6;
+  run.detection.setPairSettings(run.smoke, run.body, pair);
+  run.detection.detectCollision();
+  EXPECT_LT(run.data().validity().proxyError, 1e-12);
+  // Another method, and this one again.
+  run.detection.setPairSettings(run.smoke, run.body, {Method::Proximity, 0.04});
+  run.detection.detectCollision();
+  EXPECT_EQ(run.data().validity().proxyError, 0.0);
+  EXPECT_TRUE(run.data().shape().empty());
+  EXPECT_FALSE(run.data().vertexTriangle().empty());
+  run.detection.setPairSettings(run.smoke, run.body,
+                                {.method = Method::Proxy, .thickness = 0.04, .allowedError = 0.01});
+  run.detection.detectCollision();
+  EXPECT_EQ(run.data().hash(), fresh.data().hash());
+}
+
+TEST(Proxy, SteadyFramesAllocateNothingAndBuildNoOctreeOfTheParticles) {
+  Random random(7);
+  Scene scene = scenes()[6];
+  scene.isPlaced = true;
+  const Points start = particlesAround(random, scene, 5000);
+  const std::vector<double> radii(start.size(), 0.0);
+  for (const int threads : {1, 2}) {
+    Detection run(scene, start, radii, settingsOf(Engine::Octree, threads));
+    Points points = start;
+    std::size_t contacts = 0;
+    for (int frame = 0; frame < 24; ++frame) {
+      if (frame == 12) FailingAllocation::arm(0);
+      for (std::size_t i = 0; i < points.size(); ++i)
+        points[i] = start[i] + 0.01 * (frame % 4) * Vector3d(1, 1, 1);
+      run.detection.setPositions(run.smoke, points);
+      run.detection.setTransform(run.body, scene.rotation, Vector3d(0.01 * (frame % 4), 0, 0));
+      run.detection.detectCollision();
+      run.detection.advance();
+      contacts += run.data().shape().size();
+      EXPECT_EQ(run.detection.statistics().candidatePairs, 0u);
+      EXPECT_EQ(
+          run.detection.statistics().rebuiltOctrees + run.detection.statistics().refittedOctrees,
+          0u)
+          << "frame " << frame;
+    }
+    FailingAllocation::disarm();
+    EXPECT_EQ(FailingAllocation::count(), 0u);
+    EXPECT_GT(contacts, 10000u);
+  }
+}
+
+TEST(Proxy, QueriesFindParticlesAfterADetectionWithoutTheirOctree) {
+  Random random(8);
+  const Scene scene = scenes()[0];
+  Points points = particlesAround(random, scene, 500);
+  const std::vector<double> radii(points.size(), 0.0);
+  Detection run(scene, points, radii, settingsOf(Engine::Octree));
+  for (Vector3d& p : points) p += Vector3d(0.01, 0, 0);
+  run.detection.setPositions(run.smoke, points);
+  run.detection.detectCollision();
+  EXPECT_EQ(run.detection.octree().validate(), std::vector<std::string>{});
+  const SpatialQueries queries = run.detection.queries();
+  EXPECT_EQ(queries.closestPoint(run.smoke, points[7])->distance, 0.0);
+  const std::uint64_t hash = run.data().hash();
+  run.detection.detectCollision();  // leaves the queries valid
+  EXPECT_EQ(queries.closestPoint(run.smoke, points[9])->distance, 0.0);
+  EXPECT_EQ(run.data().hash(), hash);
+}
+
+TEST(Proxy, PairsOfOneBodyShareLeaves) {
+  Random random(9);
+  const Scene scene = scenes()[6];
+  const Points first = particlesAround(random, scene, 300), second = {first[5], first[7]};
+  const std::vector<double> radii(first.size(), 0.0);
+  Detection run(scene, first, radii, settingsOf(Engine::Octree));
+  const PairSettings pair{
+      .method = Method::Proxy, .thickness = scene.thickness, .allowedError = scene.allowedError};
+  const GeometryId debris = run.detection.addPointSet(second);
+  run.detection.addCollisionPair(debris, run.body, pair);
+  FailingAllocation::arm(0);
+  run.detection.detectCollision();
+  FailingAllocation::disarm();
+  EXPECT_LT(FailingAllocation::peakBytes(), 100000u);  // the leaves need more
+  run.detection.setPositions(run.smoke, first);
+  for (const ShapeContact& c : run.detection.collisionData(debris, run.body).shape()) {
+    bool found = false;
+    for (const ShapeContact& other : run.data().shape())
+      found |= other.point == c.point && other.distance == c.distance;
+    EXPECT_TRUE(found);
+  }
+}
+
+TEST(Proxy, IsRefusedWhereItHasNoMeaning) {
+  OctreeBasedCD detection(settingsOf(Engine::Octree));
+  const Mesh ball = sphere(8, 12, Vector3d::Zero(), 1.0);
+  const std::vector<Segment> segments{{0, 1}};
+  const GeometryId body = detection.addTriangleMesh(ball.positions, ball.triangles),
+                   points = detection.addPointSet(ball.positions, 0.01),
+                   lines = detection.addLineMesh(ball.positions, segments, 0.01),
+                   shape = detection.addAnalyticalGeometry(Sphere{});
+  PairSettings pair{.method = Method::Proxy, .thickness = 0.05, .allowedError = 0.01};
+  const auto refuse = [&](GeometryId a, GeometryId b, ErrorCode code, const char* words) {
+    expectRefused(code, words, [&] { detection.addCollisionPair(a, b, pair); });
+  };
+  constexpr auto kType = ErrorCode::UnsupportedMethod;
+  refuse(body, points, kType, "for a point set and a triangle mesh in this order");
+  refuse(body, body, kType, "for a point set and a triangle mesh in this order");
+  refuse(lines, body, kType, "not for a line mesh and a triangle mesh");
+  refuse(points, lines, kType, "for a point set and a triangle mesh in this order");
+  refuse(points, shape, kType, "for a point set and a triangle mesh in this order");
+  constexpr auto kSettings = ErrorCode::InvalidSettings;
+  pair.allowedError = 0;
+  refuse(points, body, kSettings, "needs a positive allowedError");
+  pair.allowedError = std::numeric_limits<double>::infinity();
+  refuse(points, body, kSettings, "allowedError is inf");
+  pair.allowedError = -1;
+  refuse(points, body, kSettings, "allowedError is -1");
+  pair.allowedError = 0.01;
+  for (const double cone : {0.0, 1.6, -1.0, std::nan("")}) {
+    pair.widestNormalCone = cone;
+    refuse(points, body, kSettings, "widestNormalCone is");
+  }
+  pair.widestNormalCone = 0.2;
+  detection.addCollisionPair(points, body, pair);
+  expectRefused(kType, "contact predicates are not for Method::Proxy", [&] {
+    detection.setContactPredicate(points, body, [](const ContactFeatures&) { return true; });
+  });
+  detection.detectCollision();
+  expectRefused(ErrorCode::NotAvailable, "answered by Method::Proxy and has no candidate pairs",
+                [&] { detection.candidatePairs(points, body); });
+  Points moved = ball.positions;
+  moved[3] += Vector3d(0.1, 0, 0);
+  detection.setPositions(body, moved);
+  expectRefused(kType, "is for a rigid body", [&] { detection.detectCollision(); });
+  detection.setTriangles(body, moved, ball.triangles);
+  detection.detectCollision();
+  EXPECT_FALSE(detection.collisionData(points, body).shape().empty());
+}
+
+TEST(Proxy, CapturesKeepTheSettings) {
+  Random random(10);
+  const Scene scene = scenes()[0];
+  const Points points = particlesAround(random, scene, 200);
+  const std::vector<double> radii(points.size(), 0.002);
+  Detection run(scene, points, radii, settingsOf(Engine::Octree));
+  run.detection.setPairSettings(run.smoke, run.body,
+                                {.method = Method::Proxy,
+                                 .thickness = 0.04,
+                                 .allowedError = 0.0123,
+                                 .widestNormalCone = 0.21});
+  run.detection.detectCollision();
+  const auto path = std::filesystem::path(::testing::TempDir()) / "Proxy.capture";
+  capture(run.detection, path);
+  OctreeBasedCD again = setUp(readCapture(path));
+  std::filesystem::remove(path);
+  const CollisionPair pair = again.pairs()[0];
+  EXPECT_EQ(pair.settings.allowedError, 0.0123);
+  EXPECT_EQ(pair.settings.widestNormalCone, 0.21);
+  again.detectCollision();
+  EXPECT_EQ(again.collisionData(pair.a, pair.b).hash(), run.data().hash());
+}
+
+}  // namespace
+
+}  // namespace palpate::testing
