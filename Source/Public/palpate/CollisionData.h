@@ -69,11 +69,15 @@ struct EdgeEdgeContact {
   friend bool operator==(const EdgeEdgeContact&, const EdgeEdgeContact&) = default;
 };
 
-/// The type of feature that touches an analytical shape.
+/// The type of feature that touches an analytical shape or a distance field.
 enum class ShapeElement : std::uint32_t { Vertex, Edge, Face };
 
-/// A contact of a vertex, edge or triangle with an analytical shape. All values are those at
-/// timeOfImpact.
+/// A contact of a vertex, edge or triangle with an analytical shape, or with a body that has a
+/// distance field. All values are those at timeOfImpact.
+///
+/// Field    `distance` is the field's value at `point` less the radius. `normal` has the direction
+///          of the field's gradient there; where that is 0, it is the last axis of the field's
+///          frame. pointOnShape follows from both.
 struct ShapeContact {
   ShapeElement element;
   std::uint32_t id;  ///< Index of the vertex or triangle; for an edge its lower vertex.
@@ -85,7 +89,7 @@ struct ShapeContact {
   Eigen::Vector3d pointOnShape;  ///< L: on the shape's surface.
   Eigen::Vector3d normal;        ///< Unit, out of the shape towards the element.
   double distance;               ///< L: less the element's radius; negative: the depth inside.
-  double timeOfImpact = 1.0;     ///< [0, 1] of the step; 1 for Proximity.
+  double timeOfImpact = 1.0;     ///< [0, 1] of the step; 1 for Proximity and DistanceField.
   friend bool operator==(const ShapeContact&, const ShapeContact&) = default;
 };
 
@@ -140,6 +144,7 @@ class PALPATE_EXPORT CollisionData {
     std::vector<ShapeShapeContact> shapeShape;
     double earliestTimeOfImpact =
         std::numeric_limits<double>::infinity();  ///< only with PairSettings::earliestTimeOnly
+    double errorBound = 0.0;
     Validity validity;
   };
 
@@ -164,7 +169,8 @@ class PALPATE_EXPORT CollisionData {
   std::span<const ElementPair> intersectingTriangles() const {
     return m_contents.intersectingTriangles;
   }
-  /// Vertices, edges and triangles with an analytical shape. Such a pair has no other contacts.
+  /// Vertices, edges and triangles with an analytical shape, or by Method::DistanceField with a
+  /// body that has a field. Such an answer has no other contacts.
   std::span<const ShapeContact> shape() const { return m_contents.shape; }
   /// Two analytical shapes with each other: one contact if they are at most the thickness apart,
   /// with Method::Continuous at some time of the step.
@@ -174,6 +180,13 @@ class PALPATE_EXPORT CollisionData {
   /// PairSettings::earliestTimeOnly it is the time of the first contact, although no list has it.
   /// Cost     linear in the contacts.
   double earliestTimeOfImpact() const;
+
+  /// L: by how much the distances may be off. DistanceField::errorBound() if a field answered, else
+  /// 0: the other methods are exact up to rounding. It bounds the distance of each contact's point
+  /// from the body, in the field's band. The least distance of an edge or a triangle may be lower
+  /// by another half of it, and features between the thickness and that far below it may be
+  /// missing.
+  double errorBound() const { return m_contents.errorBound; }
 
   /// Whether this answer can be trusted, and why not.
   const Validity& validity() const { return m_contents.validity; }

@@ -95,7 +95,12 @@ enum class Method {
   Proximity,
   /// Features whose distance is at most the thickness and their radii at some time of the step,
   /// with the time of impact: continuous collision detection (CCD).
-  Continuous
+  Continuous,
+  /// Vertices, edges and triangles within the thickness and their radii of a body that has a
+  /// DistanceField, at the step's end. The distances are the field's, within its error bound
+  /// (CollisionData::errorBound()). The contacts are in CollisionData::shape(). Impacts within the
+  /// step may be missing.
+  DistanceField
 };
 
 /// Which of several contacts at the same features the library reports.
@@ -143,6 +148,10 @@ struct PairSettings {
   /// CollisionData::earliestTimeOfImpact(), which is that of all contacts. This is much cheaper.
   /// `contacts` has no effect then.
   bool earliestTimeOnly = false;
+  /// L, finite, not negative. Only Auto accepts a value other than 0. Auto then answers by an
+  /// attached DistanceField whose error bound is at most this, while nothing moves in the step. 0:
+  /// exact methods only.
+  double allowedError = 0.0;
 };
 
 /// From which sides other geometries can touch a triangle mesh.

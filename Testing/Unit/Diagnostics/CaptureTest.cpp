@@ -225,10 +225,10 @@ TEST_F(Capture, ErrorsNameTheFault) {
     write(text.replace(place, from.size(), to));
     expectRefused(reason);
   };
-  expectRefusedWith("palpate-capture 10", "solid 3", "it is not a capture");
-  expectRefusedWith("palpate-capture 10", "palpate-capture 11",
-                    "its version is 11; versions up to 10");
-  expectRefusedWith("palpate-capture 10", "palpate-capture x", "line 1: \"x\" is not an integer");
+  expectRefusedWith("palpate-capture 11", "solid 3", "it is not a capture");
+  expectRefusedWith("palpate-capture 11", "palpate-capture 12",
+                    "its version is 12; versions up to 11");
+  expectRefusedWith("palpate-capture 11", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 99999999999\n", "is not an integer in range");
