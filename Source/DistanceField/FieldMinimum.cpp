@@ -176,7 +176,7 @@ class DeepPointSearch {
 
   void searchLeaf(const Part& part, const FieldCells::Leaf& leaf) {
     const auto least = static_cast<double>(*std::min_element(leaf.begin(), leaf.end()));
-    if (bounded(least - m_largestRadius) > m_limit) return;
+    if (bounded(least - m_largestRadius, m_largestRadius) > m_limit) return;
     if (part.size == 2) return searchSegment(leaf, part.corners[0], part.corners[1]);
     for (std::size_t i = 2; i < part.size; ++i)
       searchTriangle(leaf, part.corners[0], part.corners[i - 1], part.corners[i]);
@@ -207,10 +207,15 @@ class DeepPointSearch {
            (2.0 * a.radius + b.radius) / 3.0;
   }
   /// A lower bound of interpolated values is also one of the field's, which end at the band.
-  double bounded(double lower) const { return std::max(lower, -m_band - m_largestRadius); }
-  double valueAt(const FieldCells::Leaf& leaf, const Corner& c) const {
-    const double value = interpolate(leaf, c.at[0], c.at[1], c.at[2]);
-    return std::min(std::max(value, -m_band), m_band) - c.radius;
+  /// radius: the largest of the part.
+  double bounded(double lower, double radius) const { return std::max(lower, -m_band - radius); }
+  /// The ordinate of a corner: the interpolated value, less the radius.
+  static double ordinate(const FieldCells::Leaf& leaf, const Corner& c) {
+    return interpolate(leaf, c.at[0], c.at[1], c.at[2]) - c.radius;
+  }
+  /// The field's value, less the radius, where the ordinate is that of the corner.
+  double valueOf(double ordinate, const Corner& c) const {
+    return std::min(std::max(ordinate, -m_band - c.radius), m_band - c.radius);
   }
 
   void sample(const Corner& corner, double value) {
@@ -227,10 +232,12 @@ class DeepPointSearch {
   }
 
   void searchSegment(const FieldCells::Leaf& leaf, const Corner& a, const Corner& b) {
-    const double atA = valueAt(leaf, a), atB = valueAt(leaf, b);
+    const double ofA = ordinate(leaf, a), ofB = ordinate(leaf, b);
+    const double atA = valueOf(ofA, a), atB = valueOf(ofB, b);
     sample(a, atA), sample(b, atB);
     const double ends = std::min(atA, atB);
-    const double lowest = bounded(std::min({ends, ordinate(leaf, a, b), ordinate(leaf, b, a)}));
+    const double lowest = bounded(std::min({ofA, ofB, ordinate(leaf, a, b), ordinate(leaf, b, a)}),
+                                  std::max(a.radius, b.radius));
     if (!isOpen(lowest, ends)) return;
     const Corner middle = between(a, b, 0.5);
     searchSegment(leaf, a, middle);
@@ -239,13 +246,15 @@ class DeepPointSearch {
 
   void searchTriangle(const FieldCells::Leaf& leaf, const Corner& a, const Corner& b,
                       const Corner& c) {
-    const double atA = valueAt(leaf, a), atB = valueAt(leaf, b), atC = valueAt(leaf, c);
+    const double ofA = ordinate(leaf, a), ofB = ordinate(leaf, b), ofC = ordinate(leaf, c);
+    const double atA = valueOf(ofA, a), atB = valueOf(ofB, b), atC = valueOf(ofC, c);
     sample(a, atA), sample(b, atB), sample(c, atC);
     const double ends = std::min({atA, atB, atC});
     const double lowest =
-        bounded(std::min({ends, ordinate(leaf, a, b), ordinate(leaf, b, a), ordinate(leaf, b, c),
-                          ordinate(leaf, c, b), ordinate(leaf, c, a), ordinate(leaf, a, c),
-                          ordinate(leaf, a, b, c)}));
+        bounded(std::min({ofA, ofB, ofC, ordinate(leaf, a, b), ordinate(leaf, b, a),
+                          ordinate(leaf, b, c), ordinate(leaf, c, b), ordinate(leaf, c, a),
+                          ordinate(leaf, a, c), ordinate(leaf, a, b, c)}),
+                std::max({a.radius, b.radius, c.radius}));
     if (!isOpen(lowest, ends)) return;
     const Corner ab = between(a, b, 0.5), bc = between(b, c, 0.5), ca = between(c, a, 0.5);
     searchTriangle(leaf, ab, bc, ca);

@@ -197,7 +197,9 @@ TEST(FieldContacts, AreWithinTheErrorBound) {
     for (std::uint32_t i = 0; i < data.shape().size(); ++i) {
       const ShapeContact& c = data.shape()[i];
       const double exact = exactAt(c.point);
-      if (std::abs(exact) <= kBand) EXPECT_NEAR(c.distance, exact, kErrorBound * (1 + 1e-9));
+      if (std::abs(exact) <= kBand) {
+        EXPECT_NEAR(c.distance, exact, kErrorBound * (1 + 1e-9));
+      }
       EXPECT_LE(c.distance, kThickness);
       EXPECT_NEAR(c.normal.norm(), 1.0, 1e-12);
       EXPECT_NEAR((c.point - c.pointOnShape - c.distance * c.normal).norm(), 0.0, 1e-12);
@@ -213,8 +215,12 @@ TEST(FieldContacts, AreWithinTheErrorBound) {
     EXPECT_EQ(data.validity().nearThreshold, near);
     for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
       const double exact = exactAt(mesh.positions[v]);
-      if (exact < kThickness - kErrorBound) EXPECT_TRUE(isContact[v]) << v;
-      if (exact > kThickness + kErrorBound) EXPECT_FALSE(isContact[v]) << v;
+      if (exact < kThickness - kErrorBound) {
+        EXPECT_TRUE(isContact[v]) << v;
+      }
+      if (exact > kThickness + kErrorBound) {
+        EXPECT_FALSE(isContact[v]) << v;
+      }
     }
     // Each point of a triangle that is deeper than the tolerance has a contact of the triangle, its
     // edges or its vertices that is as deep, to within the tolerance.
@@ -235,7 +241,9 @@ TEST(FieldContacts, AreWithinTheErrorBound) {
           sampled = std::min(sampled, valueAt(mesh.positions[a] +
                                               i / 20.0 * (mesh.positions[b] - mesh.positions[a]) +
                                               j / 20.0 * (mesh.positions[c] - mesh.positions[a])));
-      if (sampled <= kThickness - tolerance) EXPECT_LE(deepest, sampled + tolerance + 1e-9) << t;
+      if (sampled <= kThickness - tolerance) {
+        EXPECT_LE(deepest, sampled + tolerance + 1e-9) << t;
+      }
     }
   }
 }
@@ -281,7 +289,10 @@ TEST(FieldContacts, FollowTheBody) {
   for (std::size_t i = 0; i < now.size(); ++i) {
     EXPECT_EQ(now[i].vertices, before.shape()[i].vertices);
     EXPECT_NEAR(now[i].distance, before.shape()[i].distance, 1e-9);
-    EXPECT_NEAR((now[i].normal - rotation * before.shape()[i].normal).norm(), 0.0, 1e-6);
+    // The deepest points of edges and triangles often lie on faces of cells, where gradients jump.
+    if (now[i].element == ShapeElement::Vertex) {
+      EXPECT_NEAR((now[i].normal - rotation * before.shape()[i].normal).norm(), 0.0, 1e-6);
+    }
   }
   detection.advance();
   detection.setTransform(field, Eigen::Matrix3d::Identity(), {100, 0, 0});
@@ -291,9 +302,9 @@ TEST(FieldContacts, FollowTheBody) {
 
 /// Beyond the band inside, the field is constant: the normal is the last axis of its frame.
 TEST(FieldContacts, HaveTheLastAxisWhereTheFieldIsConstant) {
-  const Mesh box = boxMesh({-2, -2, -2}, {2, 2, 2});
+  const Mesh box = boxMesh({-1, -1, -1}, {1, 1, 1});
   OctreeBasedCD detection(Settings{.threads = 1});
-  const GeometryId field = detection.addDistanceField(fieldOf(box)),
+  const GeometryId field = detection.addDistanceField(fieldOf(box, 0.05)),
                    point = detection.addPointSet(std::array{Vector3d(0.1, 0.2, 0.3)});
   Eigen::Matrix3d rotation;
   rotation << 0, 0, 1, 1, 0, 0, 0, 1, 0;

@@ -5,6 +5,7 @@
 #include "Common/Sanitized.h"
 #include "FieldMeshes.h"
 
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -47,7 +48,8 @@ void checkDeepPoint(const DistanceField& field, const Feature& feature, double t
                     double tolerance, std::size_t& found) {
   const auto deep =
       findDeepPoint(field.lookup(), feature.corners, feature.radii, target, tolerance);
-  const double rounding = 1e-9 * field.band();
+  const double rounding = 0x1p-19 * field.band();  // neighbouring cells differ by half of it
+
   if (deep) {
     ++found;
     ASSERT_GE(deep->weights.minCoeff(), 0.0);
@@ -75,8 +77,8 @@ TEST(FieldMinimum, FindsTheDeepestPoint) {
     const double size = box.diagonal().norm();
     const DistanceField field =
         DistanceField::build({mesh.positions, mesh.triangles},
-                             {.errorBound = 0.004 * size, .band = 0.1 * size, .threads = 1});
-    for (int i = 0; i < casesOf(400); ++i) {
+                             {.errorBound = 0.01 * size, .band = 0.1 * size, .threads = 1});
+    for (int i = 0; i < casesOf(120); ++i) {
       Feature feature;
       const std::size_t corners = 2 + random() % 2;
       const double reach = size * std::array{0.01, 0.1, 0.5}[random() % 3];
@@ -94,7 +96,7 @@ TEST(FieldMinimum, FindsTheDeepestPoint) {
       if (HasFatalFailure()) return;
     }
   }
-  EXPECT_GE(found, leastOf(500));
+  EXPECT_GE(found, leastOf(150));
 }
 
 /// Corners on the borders of cells, and features within the planes between them.
