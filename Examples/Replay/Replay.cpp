@@ -87,7 +87,8 @@ void printDifferences(const char* list, std::span<const Contact> found,
 
 /// Prints the contacts of every pair. Returns whether any differ from brute force.
 bool report(const CollisionProblem& problem) {
-  constexpr const char* kMethods[]{"Auto", "Intersection", "Proximity", "Continuous"};
+  constexpr const char* kMethods[]{"Auto", "Intersection", "Proximity", "Continuous",
+                                   "DistanceField"};
   const OctreeBasedCD octree = solve(problem, Engine::Octree),
                       oracle = solve(problem, Engine::BruteForce);
   std::size_t different = 0;

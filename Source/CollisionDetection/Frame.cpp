@@ -3,6 +3,7 @@
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "Core/Stopwatch.h"
 #include "Core/Spin.h"
+#include "DistanceField/FieldContacts.h"
 #include "DistanceField/PlacedProxy.h"
 #include "Math/Tolerances.h"
 #include "NarrowPhase/Continuous.h"
@@ -36,6 +37,8 @@ constexpr std::size_t kJobsPerPair = 32;
 constexpr std::size_t kSharedSize = 8192;
 /// Particles of a job with Method::Proxy.
 constexpr std::size_t kParticlesPerJob = 16384;
+/// The same for elements near a distance field.
+constexpr std::size_t kSharedFieldSize = 512;
 
 /// Whether the traversal may skip neighbours that UnfoldedStars proves not to touch. It may if the
 /// method reports nothing but touching features: Continuous, without a thickness.
@@ -117,6 +120,26 @@ void takeEarliest(PairRecord& record, ContactBuffers& contacts) {
       record.earliest = std::min(record.earliest.load(), contact.timeOfImpact);
     list.clear();
   });
+}
+
+/// Validity's lists for Method::DistanceField, and the error bound. That of Proxy is there already.
+void describeField(const PairRecord& record, CollisionData::Contents& contents) {
+  Validity& validity = contents.validity;
+  validity.outsideBand.clear();
+  validity.nearThreshold.clear();
+  if (record.usesProxy()) return;
+  validity.proxyDepth = contents.errorBound = 0.0;
+  if (!record.usesField()) return;
+  const DistanceField& field = *record.body().field;
+  contents.errorBound = field.errorBound();
+  const double thickness = record.pair.settings.thickness;
+  for (std::uint32_t i = 0; i < contents.shape.size(); ++i) {
+    const ShapeContact& contact = contents.shape[i];
+    const double value =
+        contact.distance + record.mesh().mesh.radius(contact.vertices, contact.weights);
+    if (value <= -reachOf(field)) validity.outsideBand.push_back(i);
+    if (thickness - contact.distance < field.errorBound()) validity.nearThreshold.push_back(i);
+  }
 }
 
 bool sharesVertex(const Triangle& s, const Triangle& t) {
@@ -266,6 +289,31 @@ struct Frame::Job {
     narrowMilliseconds += watch.lap();
   }
 
+  // Method::DistanceField: the job's share of the elements near the field, in three phases.
+
+  std::size_t vertexBegin, vertexEnd;  ///< of FieldScratch::vertices
+
+  template <class F>
+  void inField(F&& f) {
+    Stopwatch watch;
+    const MeshPair meshes = record->meshes();
+    const PlacedField placed(*meshes.field, meshes.fieldMesh->now);
+    FieldContacts found(meshes.mesh(), placed, meshes.settings, *record->fieldScratch);
+    f(found);
+    const double spent = watch.lap();
+    milliseconds += spent;
+    narrowMilliseconds += spent;
+  }
+  void findFieldValues() {
+    inField([&](FieldContacts& found) { found.findValues(vertexBegin, vertexEnd); });
+  }
+  void findFieldEdges() {
+    inField([&](FieldContacts& found) { found.findEdges(begin, end, contacts); });
+  }
+  void findFieldFaces() {
+    inField([&](FieldContacts& found) { found.findFaces(begin, end, contacts); });
+  }
+
   /// Auto: finds intersections at the step's end.
   static void detectIntersections(Job& job, std::span<const ElementPair> pairs) {
     findIntersections(job.record->meshes(), pairs, job.intersections);
@@ -298,9 +346,14 @@ Frame::Job& Frame::newJob(PairRecord& record) {
 void Frame::start(std::span<PairRecord* const> records, const Threads& threads, bool adjacentPairs,
                   BoxFrame frame) {
   m_jobCount = 0;
+  m_usesFields = false;
   m_nodePairs.clear();
   for (PairRecord* record : records) {
     record->earliest = std::numeric_limits<double>::infinity();
+    if (record->pair.settings.method == Method::DistanceField || record->usesField()) {
+      if (adjacentPairs) startField(*record, threads);
+      continue;
+    }
     if (record->hasShape()) {
       if (adjacentPairs && (record->mesh().shape || record->mesh().tree.octree().size() > 0))
         newJob(*record);
@@ -374,7 +427,33 @@ void Frame::writeProxyContacts(std::span<const std::unique_ptr<Job>> jobs, const
     jobs[i]->proxy->write(record.a->mesh, jobs[i]->hits, jobs[i]->firstContact);
   });
   contents.validity.proxyDepth = record.proxy->depth();
-  contents.validity.proxyError = jobs.empty() ? 0.0 : jobs.front()->proxy->totalError(error);
+  contents.errorBound = jobs.empty() ? 0.0 : jobs.front()->proxy->totalError(error);
+}
+
+void Frame::startField(PairRecord& record, const Threads& threads) {
+  if (!record.fieldScratch) record.fieldScratch = std::make_unique<FieldScratch>();
+  FieldScratch& scratch = *record.fieldScratch;
+  const MeshPair meshes = record.meshes();
+  const PlacedField placed(*meshes.field, meshes.fieldMesh->now);
+  FieldContacts(meshes.mesh(), placed, meshes.settings, scratch).start(record.mesh());
+  const std::size_t elements = scratch.elements.size(), vertices = scratch.vertices.size();
+  const bool shared = threads.count() > 1 && elements >= kSharedFieldSize;
+  const std::size_t jobs = elements == 0 ? 0 : shared ? kJobsPerPair : 1;
+  for (std::size_t i = 0; i < jobs; ++i) {
+    Job& job = newJob(record);
+    job.begin = elements * i / jobs, job.end = elements * (i + 1) / jobs;
+    job.vertexBegin = vertices * i / jobs, job.vertexEnd = vertices * (i + 1) / jobs;
+  }
+  m_usesFields |= jobs > 0;
+}
+
+/// The phases of Method::DistanceField that come before the last one.
+void Frame::prepareFields(const Threads& threads) {
+  if (!m_usesFields) return;
+  for (const auto phase : {&Job::findFieldValues, &Job::findFieldEdges})
+    threads.forEach(m_jobCount, [&](std::size_t i) {
+      if (m_jobs[i]->record->usesField()) ((*m_jobs[i]).*phase)();
+    });
 }
 
 void Frame::run(Job& job) const {
@@ -439,7 +518,12 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
                    const Threads& threads, FrameStatistics& statistics) {
   Stopwatch watch;
   start(records, threads, true, settings.keepCandidates ? BoxFrame::World : BoxFrame::Body);
+  prepareFields(threads);
   threads.forEach(m_jobCount, [&](std::size_t i) {
+    if (m_jobs[i]->record->usesField()) {
+      m_jobs[i]->start(&Job::detect);
+      return m_jobs[i]->findFieldFaces();
+    }
     Stopwatch job;
     m_jobs[i]->keepCandidates = settings.keepCandidates;
     m_jobs[i]->start(&Job::detect);
@@ -536,11 +620,9 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   // A feature pair that Intersection reports is not reported by distance or impact as well: where
   // the step starts intersecting only Intersection knows the side.
   CollisionData::Contents& contents = record.next.contents();
-  std::size_t intersectionCount = 0;
-  if (!record.usesProxy()) {
-    intersectionCount = orderContacts(m_buffers, preferredBuffers, m_orderScratch, contents);
-    contents.validity.proxyError = contents.validity.proxyDepth = 0.0;
-  }
+  const std::size_t intersectionCount =
+      record.usesProxy() ? 0 : orderContacts(m_buffers, preferredBuffers, m_orderScratch, contents);
+  describeField(record, contents);
   contents.earliestTimeOfImpact = record.earliest.load();
   if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
   record.trust.finish(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan,

@@ -37,6 +37,8 @@ class Frame {
  private:
   struct Job;
   void start(std::span<PairRecord* const>, const Threads&, bool adjacentPairs, BoxFrame);
+  void startField(PairRecord&, const Threads&);
+  void prepareFields(const Threads&);
   void run(Job&) const;
   void startProxy(PairRecord&, std::size_t grain);
   void writeProxyContacts(std::span<const std::unique_ptr<Job>>, const Threads&, PairRecord&);
@@ -47,6 +49,7 @@ class Frame {
   std::vector<std::unique_ptr<Job>>
       m_jobs;  ///< the first m_jobCount are in use, those of a pair together
   std::size_t m_jobCount = 0;
+  bool m_usesFields = false;
   Buffer<NodePair> m_nodePairs;
   TraversalStack m_stack;
   std::vector<ContactBuffers*> m_buffers, m_intersections;  ///< of the pair that finish() handles

@@ -61,14 +61,10 @@ struct Geometry : SearchableGeometry {
     return (filter.groups & other.filter.mask) && (other.filter.groups & filter.mask);
   }
   /// The revisions on which all results for the geometry depend.
-  std::array<Revision, 7> state() const {
-    return {revisions.topology,
-            revisions.enabled,
-            revisions.filter,
-            mesh.before.bodyRevision(),
-            mesh.before.transformRevision(),
-            mesh.now.bodyRevision(),
-            mesh.now.transformRevision()};
+  std::array<Revision, 8> state() const {
+    return {revisions.topology,      revisions.enabled,           revisions.filter,
+            revisions.field,         mesh.before.bodyRevision(),  mesh.before.transformRevision(),
+            mesh.now.bodyRevision(), mesh.now.transformRevision()};
   }
 };
 

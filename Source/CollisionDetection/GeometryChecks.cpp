@@ -138,12 +138,50 @@ void checkOnePerVertex(GeometryId id, std::span<const Eigen::Vector3d> positions
                 id);
 }
 
+void checkAttachable(const Geometry& geometry, const DistanceField& field) {
+  const MeshTopology& topology = geometry.mesh.topology;
+  const auto refuse = [&](const std::string& reason, ErrorCode code,
+                          std::optional<std::size_t> element = {}) {
+    throw Error(code, nameOf(geometry.id) + reason, geometry.id, element);
+  };
+  if (!topology.hasFaces())
+    refuse(" is " + nameOf(topology.type) +
+               "; attachDistanceField() is for triangle and tetrahedral meshes",
+           ErrorCode::UnsupportedMethod);
+  if (!topology.disabled.empty())
+    refuse(" has disabled elements, and a distance field is of all elements",
+           ErrorCode::UnsupportedMethod);
+  const std::span<const Eigen::Vector3d> body = geometry.mesh.now.body();
+  for (std::size_t v = 0; v < body.size(); ++v) {
+    if (!topology.isUsed[v]) continue;
+    const double value = field.value(body[v]);
+    if (!(std::abs(value) <= field.errorBound()))
+      refuse(": the distance field is not of this mesh; it has the value " + textOf(value) +
+                 " at vertex " + std::to_string(v) + ", and its error bound is " +
+                 textOf(field.errorBound()),
+             ErrorCode::InvalidSettings, v);
+  }
+}
+
+void checkShapeMayChange(const Geometry& geometry, const char* call) {
+  if (geometry.field && !geometry.isField())
+    throw Error(ErrorCode::UnsupportedMethod,
+                nameOf(geometry.id) + " has a distance field attached, so that " + call +
+                    " may not change it; detach the field by attachDistanceField() with null",
+                geometry.id);
+}
+
 void checkPositionCount(const Geometry& geometry, std::size_t count) {
   if (geometry.shape)
     throw Error(
         ErrorCode::WrongPositionCount,
         nameOf(geometry.id) + " is a shape, which has no positions; setTransform() moves it",
         geometry.id);
+  if (geometry.isField())
+    throw Error(ErrorCode::WrongPositionCount,
+                nameOf(geometry.id) +
+                    " is a distance field, which has no positions; setTransform() moves it",
+                geometry.id);
   if (count != geometry.mesh.topology.vertexCount)
     throw Error(ErrorCode::WrongPositionCount,
                 nameOf(geometry.id) + ": " + std::to_string(count) +

@@ -25,6 +25,11 @@ TetrahedralTopology checkedTopology(GeometryId, std::span<const Eigen::Vector3d>
                                     std::span<const Tetrahedron>);
 void checkRadii(GeometryId, std::span<const double>);
 void checkOnePerVertex(GeometryId, std::span<const Eigen::Vector3d>, std::span<const double> radii);
+/// Throws unless the field is of this mesh, which may have one.
+void checkAttachable(const Geometry&, const DistanceField&);
+/// Throws if the geometry has a distance field attached, which is of its shape. call: for the
+/// message.
+void checkShapeMayChange(const Geometry&, const char* call);
 void checkPositionCount(const Geometry&, std::size_t count);
 /// Checks that positions in a body's frame are small enough for setTransform().
 void checkPlaceable(GeometryId, std::span<const Eigen::Vector3d> body, ErrorCode);

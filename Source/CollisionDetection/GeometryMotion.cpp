@@ -33,7 +33,8 @@ GeometryInStep Geometry::inStep() const {
           tree.isValid() ? extentOf(*this) : 0.0,
           revisions.topology,
           revisions.enabled,
-          step.detected()};
+          step.detected(),
+          field.get()};
 }
 
 void GeometryMotion::set(const TriangleMesh& mesh, const MotionRange& motion) {

@@ -122,6 +122,25 @@ GeometryId GeometryTable::add(const AnalyticalGeometry& analytical) {
   return add(std::move(geometry));
 }
 
+GeometryId GeometryTable::add(std::shared_ptr<const DistanceField> field) {
+  const GeometryId id = nextId();
+  if (!field) throw Error(ErrorCode::InvalidSettings, nameOf(id) + ": the field is null", id);
+  field->lookup();  // throws if it was moved from
+  MeshTopology topology;
+  topology.type = GeometryType::Field;
+  auto geometry = make({}, std::move(topology));
+  geometry->field = std::move(field);
+  return add(std::move(geometry));
+}
+
+void GeometryTable::attach(GeometryId id, std::shared_ptr<const DistanceField> field) {
+  Geometry& geometry = at(id);
+  if (field) checkAttachable(geometry, *field);
+  geometry.field = std::move(field);
+  geometry.revisions.field = geometry.revisions.counter.next();
+  ++m_state;
+}
+
 void GeometryTable::setTransform(GeometryId id, const std::optional<RigidTransform>& before,
                                  const RigidTransform& now) {
   Geometry& geometry = at(id);
@@ -162,6 +181,7 @@ void GeometryTable::setPositions(GeometryId id,
                                  std::optional<std::span<const Eigen::Vector3d>> before,
                                  std::span<const Eigen::Vector3d> now, const Threads& threads) {
   Geometry& geometry = at(id);
+  checkShapeMayChange(geometry, "setPositions()");
   if (before) checkPositionCount(geometry, before->size());
   checkPositionCount(geometry, now.size());
   std::optional<MotionRange> moved;
@@ -174,6 +194,7 @@ void GeometryTable::setPositions(GeometryId id,
 void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles) {
   Geometry& geometry = at(id);
+  checkShapeMayChange(geometry, "setTriangles()");
   checkMeshType(geometry, false, "setTriangles() is for triangle meshes");
   checkCounts(id, positions, triangles, GeometryType::Triangles);
   setTopology(geometry, checkedRest(id, positions), {positions.size(), triangles}, {});
@@ -183,6 +204,7 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
 void GeometryTable::setTetrahedra(GeometryId id, std::span<const Eigen::Vector3d> positions,
                                   std::span<const Tetrahedron> tetrahedra) {
   Geometry& geometry = at(id);
+  checkShapeMayChange(geometry, "setTetrahedra()");
   checkMeshType(geometry, true, "setTetrahedra() is for tetrahedral meshes");
   std::vector<Eigen::Vector3d> rest = checkedRest(id, positions);
   auto solid = std::make_unique<Solid>();
@@ -225,6 +247,7 @@ void GeometryTable::setFilter(GeometryId id, const CollisionFilter& filter) {
 
 void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> elements) {
   Geometry& geometry = at(id);
+  checkShapeMayChange(geometry, "setDisabledElements()");
   MeshTopology& topology = geometry.mesh.topology;
   for (const std::uint32_t element : elements)
     if (element >= topology.triangles.size())

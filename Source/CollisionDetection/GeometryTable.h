@@ -26,6 +26,8 @@ class GeometryTable {
   GeometryId addPoints(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
   GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Tetrahedron>);
   GeometryId add(const AnalyticalGeometry&);
+  GeometryId add(std::shared_ptr<const DistanceField>);
+  void attach(GeometryId, std::shared_ptr<const DistanceField>);  ///< null: detaches
   void remove(GeometryId);
   void setPositions(GeometryId, std::optional<std::span<const Eigen::Vector3d>> before,
                     std::span<const Eigen::Vector3d> now, const Threads&);

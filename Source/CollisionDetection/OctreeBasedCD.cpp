@@ -11,6 +11,7 @@
 #include "Core/Assert.h"
 #include "Core/FloatingPoint.h"
 #include "Core/Text.h"
+#include "DistanceField/FieldContacts.h"
 #include "Octree/Forest.h"
 #include "Queries/QuerySource.h"
 #include "Queries/SnapshotPool.h"
@@ -28,6 +29,7 @@ namespace {
 
 Eigen::AlignedBox3d boundsOf(const Geometry& geometry) {
   if (geometry.shape) return geometry.shape->now.bounds();
+  if (geometry.isField()) return PlacedField(*geometry.field, geometry.mesh.now).domain();
   const TriangleMesh& mesh = geometry.mesh;
   Eigen::AlignedBox3d box;
   for (std::uint32_t v = 0; v < mesh.now.size(); ++v) {
@@ -43,7 +45,9 @@ void checkCandidates(const PairRecord& record) {
   if (!record.hasCandidates())
     throw Error(ErrorCode::NotAvailable,
                 nameOf(record.pair.a, record.pair.b) +
-                    (record.hasShape() ? " includes a shape" : " is answered by Method::Proxy") +
+                    (record.hasShape()    ? " includes a shape"
+                     : record.usesProxy() ? " uses Method::Proxy"
+                                          : " uses Method::DistanceField") +
                     " and has no candidate pairs",
                 record.pair.a);
 }
@@ -110,10 +114,13 @@ struct OctreeBasedCD::Implementation {
       const Method method = record->pair.settings.method;
       const bool moves =
           (detecting || method == Method::Auto) && method != Method::Proxy &&
-          (method == Method::Continuous || method == Method::Auto || !record->hasShape());
+          (method == Method::Continuous || method == Method::Auto ||
+           (method != Method::DistanceField && !record->hasShape()));
       if (moves)
         for (Geometry* geometry : {record->a, record->b}) geometry->motion.update(*geometry);
       record->plan = planOf(record->pair.settings, record->a->inStep(), record->b->inStep(), moves);
+      if (detecting && !settings.keepCandidates && !record->predicate)
+        useField(record->pair.settings, record->a->inStep(), record->b->inStep(), record->plan);
       record->updateNearAtRest();
       if (record->plan.swept())
         for (Geometry* geometry : {record->a, record->b}) geometry->tree.setSwept(true);
@@ -302,7 +309,9 @@ class OctreeBasedCD::Implementation::QuerySource : public SpatialQueries::Source
     const std::uint64_t now = m_all->geometries.state();
     return m_all->octreesState == now ? now : 0;
   }
-  SearchableGeometry& at(GeometryId id) const override { return m_all->geometries.at(id); }
+  SearchableGeometry& at(GeometryId id) const override {
+    return searchable(m_all->geometries.at(id));
+  }
   std::size_t geometryCount() const override { return m_all->geometries.all().size(); }
   SearchableGeometry& geometry(std::size_t index) const override {
     return *m_all->geometries.all()[index];
@@ -379,6 +388,19 @@ GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions
 GeometryId OctreeBasedCD::addAnalyticalGeometry(const AnalyticalGeometry& geometry) {
   const Implementation::ChangeGuard all(m_implementation);
   return all->geometries.add(geometry);
+}
+
+GeometryId OctreeBasedCD::addDistanceField(std::shared_ptr<const DistanceField> field) {
+  const Implementation::ChangeGuard all(m_implementation);
+  return all->geometries.add(std::move(field));
+}
+
+void OctreeBasedCD::attachDistanceField(GeometryId mesh,
+                                        std::shared_ptr<const DistanceField> field) {
+  const Implementation::ChangeGuard all(m_implementation);
+  all->geometries.at(mesh);
+  all->pairs.checkFieldChange(mesh, field.get());
+  all->geometries.attach(mesh, std::move(field));
 }
 
 void OctreeBasedCD::removeGeometry(GeometryId geometry) {

@@ -80,6 +80,8 @@ std::uint64_t keyOf(GeometryId a, GeometryId b) {
 constexpr const char* kRigidWithItself =
     "a geometry that setTransform() moves cannot be tested against itself";
 
+constexpr const char* kNoPredicate = "Method::DistanceField does not use contact predicates";
+
 const char* nameOf(Method method) {
   switch (method) {
     case Method::Auto:
@@ -90,6 +92,8 @@ const char* nameOf(Method method) {
       return "Proximity";
     case Method::Continuous:
       return "Continuous";
+    case Method::DistanceField:
+      return "DistanceField";
     case Method::Proxy:
       return "Proxy";
   }
@@ -101,6 +105,19 @@ const char* nameOf(Method method) {
               nameOf(a, b) + ": contact predicates are not for Method::Proxy", a);
 }
 
+/// What a pair by Method::DistanceField lacks; empty if nothing. field: of its body, or null.
+std::string faultOf(const DistanceField* field, const PairSettings& settings, double radius,
+                    ErrorCode& code) {
+  code = ErrorCode::UnsupportedMethod;
+  if (!field)
+    return "Method::DistanceField needs a field: addDistanceField() or attachDistanceField()";
+  code = ErrorCode::InvalidSettings;
+  if (isWithinBand(*field, settings.thickness, radius)) return "";
+  return "the thickness and the largest radius are " + textOf(settings.thickness + radius) +
+         "; Method::DistanceField needs less than the band less the error bound, which is " +
+         textOf(field->band() - field->errorBound());
+}
+
 /// Checks the settings of a pair. Throws an Error that describes the fault.
 class Check {
  public:
@@ -108,6 +125,10 @@ class Check {
       : m_id(a.id), m_name(nameOf(a.id, b.id)), m_method(settings.method) {
     range(a.mesh, b.mesh, settings);
     types(a, b);
+    if (m_method == Method::DistanceField || a.isField() || b.isField()) {
+      field(a, b, settings);
+      return;
+    }
     const bool proximity = hasProximity(a.inStep(), b.inStep(), settings.thickness);
     need((m_method != Method::Proximity && m_method != Method::Proxy) || proximity,
          std::string("Method::") + nameOf(m_method) + " needs a positive thickness; it is 0");
@@ -144,15 +165,32 @@ class Check {
          "earliestTimeOnly is for Method::Continuous only");
     need(method >= Method::Auto && method <= Method::Proxy,
          "method is " + std::to_string(static_cast<int>(method)) +
-             "; it must be Auto, Intersection, Proximity, Continuous or Proxy");
+             "; it must be Auto, Intersection, Proximity, Continuous, DistanceField or Proxy");
     finite("allowedError", allowedError, allowedError >= 0.0, kNotNegative);
     need(method != Method::Proxy || allowedError > 0.0,
          "Method::Proxy needs a positive allowedError; it is 0");
+    need(method == Method::Auto || method == Method::Proxy || allowedError == 0.0,
+         "allowedError is " + textOf(allowedError) +
+             "; only Auto and Proxy use it, so it must be 0 for Method::" + nameOf(method));
     need(normalCone > 0.0 && normalCone <= kWidestNormalCone,
          "widestNormalCone is " + textOf(normalCone) + "; it must be above 0 and at most 1.5");
     need(method == Method::Auto || motionTolerance < 0.0,
          "motionTolerance is " + textOf(motionTolerance) +
              "; only Method::Auto uses it, so it must be negative for Method::" + nameOf(method));
+  }
+
+  void field(const Geometry& a, const Geometry& b, const PairSettings& settings) {
+    support(m_method == Method::DistanceField,
+            std::string("a distance field accepts only Method::DistanceField, not ") +
+                nameOf(m_method));
+    support(&a != &b, "Method::DistanceField is not for a geometry with itself");
+    support(!a.isField() || !b.isField(), "a pair of two distance fields is not supported");
+    support(!a.shape && !b.shape, "a distance field with a shape is not supported");
+    const Geometry& body = bodyWithField(a, b);
+    ErrorCode code;
+    const std::string fault =
+        faultOf(body.field.get(), settings, (&body == &a ? b : a).mesh.largestRadius, code);
+    need(fault.empty(), fault, code);
   }
 
   void types(const Geometry& a, const Geometry& b) {
@@ -172,7 +210,7 @@ class Check {
                   "; their ratio must be at most 2^40");
     }
     const bool any = m_method == Method::Auto || m_method == Method::Proximity;
-    support(meshes || continuous || any,
+    support(meshes || continuous || any || m_method == Method::DistanceField,
             "Method::Intersection is for two triangle meshes, not for " + nameOf(ofA.type) +
                 " and " + nameOf(ofB.type) + "; use Auto, Proximity or Continuous");
     support(m_method != Method::Proxy ||
@@ -238,6 +276,8 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
                     const PairSettings& settings) {
   PairRecord& record = at(geometries, a, b);
   Check(*record.a, *record.b, settings);
+  if (record.predicate && settings.method == Method::DistanceField)
+    throw Error(ErrorCode::UnsupportedMethod, nameOf(a, b) + ": " + kNoPredicate, a);
   if (record.pair.settings.restDistance != settings.restDistance && settings.restDistance > 0.0) {
     IndexLists newNearAtRest =
         verticesWithin(record.a->mesh.topology, record.a->mesh.rest, settings.restDistance);
@@ -262,6 +302,20 @@ void PairTable::checkRigid(GeometryId geometry) const {
                 geometry);
 }
 
+void PairTable::checkFieldChange(GeometryId geometry, const DistanceField* field) const {
+  for (const auto& record : m_records) {
+    const auto& [a, b, settings] = record->pair;
+    if (settings.method != Method::DistanceField || (a != geometry && b != geometry)) continue;
+    if (record->a->isField() || record->b->isField()) continue;
+    const DistanceField* const ofA = a == geometry ? field : record->a->field.get();
+    const DistanceField* const ofB = b == geometry ? field : record->b->field.get();
+    ErrorCode code;
+    const std::string fault = faultOf(ofB ? ofB : ofA, settings, 0.0,
+                                      code);  // both are meshes, or the other has no field
+    if (!fault.empty()) throw Error(code, nameOf(a, b) + ": " + fault, geometry);
+  }
+}
+
 void PairTable::setPredicate(const GeometryTable& geometries, GeometryId a, GeometryId b,
                              ContactPredicate predicate) {
   PairRecord& record = inOrder(geometries, a, b);
@@ -271,6 +325,8 @@ void PairTable::setPredicate(const GeometryTable& geometries, GeometryId a, Geom
                 nameOf(a, b) +
                     ": contact predicates are for pairs of meshes, and one of the two is a shape",
                 a);
+  if (predicate && record.pair.settings.method == Method::DistanceField)
+    throw Error(ErrorCode::UnsupportedMethod, nameOf(a, b) + ": " + kNoPredicate, a);
   record.predicate = std::move(predicate);
   record.settingsRevision = m_revisions.next();
 }

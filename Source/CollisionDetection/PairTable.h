@@ -7,6 +7,7 @@
 #include "DistanceField/SurfaceProxy.h"
 #include "Validity/Trust.h"
 #include "Core/Buffer.h"
+#include "DistanceField/FieldContacts.h"
 #include "NarrowPhase/NarrowPhase.h"
 
 #include <algorithm>
@@ -29,7 +30,7 @@ struct PairRecord {
   Trust trust;
 
   /// The states of both geometries, and of the pair's settings and predicate.
-  using Derived = DerivedFrom<15>;
+  using Derived = DerivedFrom<17>;
   Derived::Sources state() const {
     Derived::Sources sources;
     const auto ofA = a->state(), ofB = b->state();
@@ -49,8 +50,13 @@ struct PairRecord {
             settings.restDistance > 0.0 ? &nearAtRest : nullptr,
             predicate ? &predicate : nullptr,
             a->shape ? &*a->shape : nullptr,
-            b->shape ? &*b->shape : nullptr};
+            b->shape ? &*b->shape : nullptr,
+            usesField() ? body().field.get() : nullptr,
+            usesField() ? &body().mesh : nullptr};
   }
+  /// Whether a distance field answers in this frame.
+  bool usesField() const { return plan.method == Method::DistanceField; }
+  const Geometry& body() const { return bodyWithField(*a, *b); }  ///< if usesField()
   bool collides() const { return a->meets(*b); }
   bool anyDisabled() const {
     return !a->mesh.topology.disabled.empty() || !b->mesh.topology.disabled.empty();
@@ -65,12 +71,16 @@ struct PairRecord {
 
   bool hasShape() const { return a->shape || b->shape; }
   bool usesProxy() const { return pair.settings.method == Method::Proxy; }
-  /// Whether the pair is answered by element pairs of two octrees.
-  bool hasCandidates() const { return !hasShape() && !usesProxy(); }
+  /// Whether the pair is answered by element pairs of two octrees. Auto's always is, for those who
+  /// ask for candidates.
+  bool hasCandidates() const {
+    return !hasShape() && !usesProxy() && pair.settings.method != Method::DistanceField;
+  }
   /// Makes `proxy` for the body and the settings if it is another one, or takes that of `others`.
   /// Returns whether leaves were built.
   bool updateProxy(std::span<const std::unique_ptr<PairRecord>> others, const Threads&);
-  const Geometry& mesh() const { return a->shape ? *b : *a; }  ///< for a pair with a shape
+  /// For a pair with a shape, or if usesField(): the geometry with elements.
+  const Geometry& mesh() const { return a->shape || (usesField() && &body() == a) ? *b : *a; }
 
   /// Whether stored boxes may enclose the whole step though this pair's method needs only its end.
   bool hasWiderBoxes() const { return !plan.swept() && (a->tree.isSwept() || b->tree.isSwept()); }
@@ -83,6 +93,7 @@ struct PairRecord {
   CollisionData next;              ///< of the detection that runs
   std::atomic<double> earliest;    ///< PairSettings::earliestTimeOnly: found so far in this frame
   std::size_t candidateCount = 0;  ///< number of candidates when last found
+  std::unique_ptr<FieldScratch> fieldScratch;
   Buffer<ElementPair> candidates;  ///< unsorted until candidatePairs() is called
   Derived candidatesVersion;
   bool candidatesSorted = false;
@@ -102,6 +113,9 @@ class PairTable {
   void setPredicate(const GeometryTable&, GeometryId a, GeometryId b, ContactPredicate);
   /// Throws if there is a pair of the geometry with itself.
   void checkRigid(GeometryId) const;
+  /// Throws if a pair by Method::DistanceField cannot do with this field of the geometry, or
+  /// without one.
+  void checkFieldChange(GeometryId, const DistanceField*) const;
   void remove(GeometryTable&, GeometryId a, GeometryId b);
   void removeAllOf(GeometryId) noexcept;
 

@@ -23,9 +23,10 @@ constexpr std::string_view kTitle = "palpate-capture";
 constexpr int kVersion = 11;
 
 // Enumerators are written by name. The names are in the order of the declarations.
-constexpr std::array<std::string_view, 5> kMethods{"Auto", "Intersection", "Proximity",
-                                                   "Continuous", "Proxy"};
-constexpr std::array<std::string_view, 4> kGeometryTypes{"Triangles", "Lines", "Points", "Shape"};
+constexpr std::array<std::string_view, 6> kMethods{"Auto", "Intersection", "Proximity",
+                                                   "Continuous", "DistanceField", "Proxy"};
+constexpr std::array<std::string_view, 5> kGeometryTypes{"Triangles", "Lines", "Points", "Shape",
+                                                         "Field"};
 constexpr std::array<std::string_view, 2> kSides{"Both", "Outer"};
 constexpr std::array<std::string_view, 6> kShapes{"Sphere", "Capsule",  "Plane",
                                                   "Box",    "Cylinder", "ConvexHull"};
@@ -329,6 +330,7 @@ std::string textOf(const CollisionProblem& problem) {
 }
 
 GeometryId add(OctreeBasedCD& detection, const CollisionProblem::Geometry& mesh) {
+  if (mesh.type == GeometryType::Field) return detection.addDistanceField(mesh.field);
   if (mesh.analytical) return detection.addAnalyticalGeometry(*mesh.analytical);
   const std::vector<Eigen::Vector3d>& rest = mesh.rest.empty() ? mesh.now : mesh.rest;
   if (!mesh.tetrahedra.empty()) return detection.addTetrahedralMesh(rest, mesh.tetrahedra);
@@ -356,6 +358,13 @@ std::string contentOf(const std::filesystem::path& path) {
 
 void writeCapture(const CollisionProblem& problem, const std::filesystem::path& path) {
   const StandardFloatingPoint standard;
+  for (const CollisionProblem::Geometry& geometry : problem.geometries)
+    if (geometry.field)
+      throw Error(ErrorCode::NotAvailable,
+                  "geometry " + std::to_string(static_cast<std::uint32_t>(geometry.id)) +
+                      " has a distance field, which a capture cannot hold; "
+                      "CollisionProblem holds it",
+                  geometry.id);
   const std::string text = textOf(problem);
   std::filesystem::path partial = path;
   partial += ".part";
@@ -412,13 +421,14 @@ OctreeBasedCD setUp(const CollisionProblem& problem) {
   OctreeBasedCD detection(problem.settings);
   for (const CollisionProblem::Geometry& mesh : problem.geometries) {
     const GeometryId id = add(detection, mesh);
-    if (mesh.analytical)
+    const bool isField = mesh.type == GeometryType::Field;
+    if (!mesh.analytical && !isField) detection.setPositions(id, mesh.before, mesh.now);
+    if (mesh.analytical || mesh.field)
       detection.setTransform(id, mesh.rotationBefore, mesh.translationBefore, mesh.rotation,
                              mesh.translation);
-    else
-      detection.setPositions(id, mesh.before, mesh.now);
     detection.setCollisionFilter(id, mesh.filter);
     detection.setDisabledElements(id, mesh.disabled);
+    if (mesh.field && !isField) detection.attachDistanceField(id, mesh.field);
   }
   for (const CollisionProblem::Pair& pair : problem.pairs)
     detection.addCollisionPair(GeometryId{pair.a}, GeometryId{pair.b}, pair.settings);

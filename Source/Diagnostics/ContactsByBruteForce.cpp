@@ -1,5 +1,6 @@
 #include "Diagnostics/ContactsByBruteForce.h"
 
+#include "DistanceField/FieldContacts.h"
 #include "Math/ClosestPoint.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Filters.h"
@@ -301,8 +302,9 @@ FeatureLists everyFeature(const MeshPair& pair) {
     fill(list, topology.vertexCount);
     std::erase_if(list, [&](std::uint32_t v) { return topology.vertexTriangles[v].empty(); });
   };
-  if (pair.settings.method == Method::Intersection || pair.hasShape()) {
-    const MeshTopology& mesh = pair.hasShape() ? pair.mesh().topology : pair.a.topology;
+  if (pair.settings.method == Method::Intersection || pair.hasShape() || pair.field) {
+    const MeshTopology& mesh =
+        pair.hasShape() || pair.field ? pair.mesh().topology : pair.a.topology;
     fill(every.trianglesOfA, mesh.triangles.size());
     std::erase_if(every.trianglesOfA, [&](std::uint32_t t) { return !mesh.isEnabled(t); });
     return every;
@@ -321,6 +323,10 @@ void findContactsByBruteForce(const MeshPair& pair, const FeatureLists& features
   if (pair.isShapePair()) return findShapePair(*pair.shapeOfA, *pair.shapeOfB, pair.settings, out);
   if (pair.hasShape())
     return findShapeContacts(pair.mesh(), pair.shape(), pair.settings, features.trianglesOfA, out);
+  if (pair.field)
+    return FieldContacts::findByBruteForce(pair.mesh(),
+                                           PlacedField(*pair.field, pair.fieldMesh->now),
+                                           pair.settings, features.trianglesOfA, out);
   const Method method = pair.settings.method;
   if (method == Method::Intersection) return findIntersections(pair, features, out);
   if (method == Method::Continuous) return findImpacts(pair, features, out);

@@ -15,7 +15,12 @@ CollisionProblem::Geometry meshOf(const Geometry& geometry) {
   copy.filter = geometry.filter;
   copy.disabled = mesh.topology.disabled;
   if (geometry.shape) copy.analytical = geometry.shape->analytical;
-  if (!geometry.shape) copy.before = mesh.before.all(), copy.now = mesh.now.all();
+  copy.field = geometry.field;
+  if (geometry.field && !geometry.isField()) {
+    copy.before.assign(mesh.before.body().begin(), mesh.before.body().end());
+    copy.now.assign(mesh.now.body().begin(), mesh.now.body().end());
+  } else if (!geometry.shape)
+    copy.before = mesh.before.all(), copy.now = mesh.now.all();
   const RigidTransform &before = mesh.before.transform(), &now = mesh.now.transform();
   copy.rotation = now.rotation, copy.translation = now.translation;
   copy.rotationBefore = before.rotation, copy.translationBefore = before.translation;

@@ -135,6 +135,8 @@ void DistanceField::values(std::span<const Eigen::Vector3d> points, std::span<do
   for (std::size_t i = 0; i < points.size(); ++i) out[i] = field.lookup.value(points[i]);
 }
 
+const FieldLookup& DistanceField::lookup() const { return valid().lookup; }
+
 void DistanceField::save(const std::filesystem::path& path) const {
   const Implementation& field = valid();
   const StandardFloatingPoint standard;

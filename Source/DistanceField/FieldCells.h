@@ -77,6 +77,8 @@ class FieldLookup {
     }
   }
 
+  const FieldCells& cells() const { return m_cells; }
+
   /// L. The point must be finite.
   double value(const Eigen::Vector3d& point) const {
     const Place place = at(point);

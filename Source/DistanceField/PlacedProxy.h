@@ -52,7 +52,7 @@ class PlacedProxy {
   /// Writes a contact for each hit.
   void write(const TriangleMesh& points, const ProxyHits&, ShapeContact* out) const;
 
-  /// L: Validity::proxyError, where `error` is that of the leaves that answered.
+  /// L: CollisionData::errorBound(), where `error` is that of the leaves that answered.
   double totalError(double error) const;
 
  private:

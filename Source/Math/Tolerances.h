@@ -226,5 +226,19 @@ constexpr double kProxySlack = 0x1p-40;
 constexpr double kProxyRounding = 64 * 0x1p-53;
 /// rad. Planes stand for triangles on their front only.
 constexpr double kWidestNormalCone = 1.5;
+// ---- Contacts with distance fields (DistanceField/FieldContacts.cpp) ----
+
+/// Share of a field's error bound: by how much a contact of an edge or a triangle may be less deep
+/// than its deepest point. Any share will do; a smaller one takes longer.
+constexpr double kDepthShare = 0.5;
+/// Of the field's band: the least such depth. Rounding to float moves the field by about as much.
+constexpr double kLeastDepthTolerance = 0x1p-20;
+/// Relative error of lengths in the bounds that pass over features: some roundings of each
+/// coordinate difference. Any value well above u will do, as the field's error bound covers the
+/// rounding of coordinates.
+constexpr double kFieldLengthError = 0x1p-40;
+/// 1/sqrt(3), rounded up: a triangle's points are at most this share of its longest side from a
+/// corner.
+constexpr double kRootOfThird = 0.57735026918962585;
 
 }  // namespace palpate

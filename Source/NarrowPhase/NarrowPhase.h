@@ -1,6 +1,7 @@
 #pragma once
 
 #include <palpate/CollisionData.h>
+#include <palpate/DistanceField.h>
 #include <palpate/Settings.h>
 
 #include "Core/Buffer.h"
@@ -47,6 +48,9 @@ struct MeshPair {
   const ContactPredicate* predicate = nullptr;
   /// The shape of an analytical geometry, whose mesh has no elements. Null for all others.
   const PlacedShape *shapeOfA = nullptr, *shapeOfB = nullptr;
+  /// Method::DistanceField: the field, and the mesh of its geometry, whose transform places it.
+  const DistanceField* field = nullptr;
+  const TriangleMesh* fieldMesh = nullptr;
   double thicknessAtEnd() const { return settings.thickness + step.extraThickness; }
   /// L: features whose distance without radii is larger than this are no contacts.
   double maxFeatureDistance() const {
@@ -63,8 +67,8 @@ struct MeshPair {
   bool hasFilters() const { return nearAtRest || predicate || a.outerSideOnly || b.outerSideOnly; }
   bool hasShape() const { return shapeOfA || shapeOfB; }
   bool isShapePair() const { return shapeOfA && shapeOfB; }
-  /// For a pair with a shape: the mesh of the other geometry, and the shape.
-  const TriangleMesh& mesh() const { return shapeOfA ? b : a; }
+  /// For a pair with a shape or a field: the mesh of the other geometry; and the shape.
+  const TriangleMesh& mesh() const { return shapeOfA || fieldMesh == &a ? b : a; }
   const PlacedShape& shape() const { return *(shapeOfA ? shapeOfA : shapeOfB); }
   bool hasLines() const {
     return a.topology.type == GeometryType::Lines || b.topology.type == GeometryType::Lines;

@@ -165,8 +165,17 @@ std::string nameOf(GeometryId id) {
   return "geometry " + std::to_string(static_cast<std::uint32_t>(id));
 }
 
+SearchableGeometry& searchable(SearchableGeometry& geometry) {
+  if (!geometry.isField()) return geometry;
+  throw Error(ErrorCode::UnsupportedMethod,
+              nameOf(geometry.id) +
+                  " is a distance field, which queries do not support; use DistanceField::value()",
+              geometry.id);
+}
+
 std::string nameOf(GeometryType type) {
-  constexpr const char* kNames[] = {"a triangle mesh", "a line mesh", "a point set", "a shape"};
+  constexpr const char* kNames[] = {"a triangle mesh", "a line mesh", "a point set", "a shape",
+                                    "a distance field"};
   return kNames[static_cast<std::size_t>(type)];
 }
 

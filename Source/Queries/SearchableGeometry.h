@@ -1,5 +1,6 @@
 #pragma once
 
+#include <palpate/DistanceField.h>
 #include <palpate/Types.h>
 
 #include "Mesh/Revision.h"
@@ -30,6 +31,7 @@ struct GeometryRevisions {
   Revision topology;  ///< elements, and the shape at rest
   Revision enabled;   ///< which elements are enabled
   Revision filter;
+  Revision field;
 };
 
 /// The tetrahedra of a geometry that is the surface of a tetrahedral mesh, and an octree over them.
@@ -66,6 +68,8 @@ struct SearchableGeometry {
   GeometryRevisions revisions;
   TriangleMesh mesh;                 ///< of a shape: no elements, and its corners as positions
   std::optional<PlacedShape> shape;  ///< of an analytical geometry
+  /// Of a geometry that is a distance field, or a mesh to which one is attached.
+  std::shared_ptr<const DistanceField> field;
   GeometryOctree tree;
   std::unique_ptr<Solid> solid;  ///< of a tetrahedral mesh
   WindingNumbers windingNumbers;
@@ -78,7 +82,11 @@ struct SearchableGeometry {
 
   /// Whether setTransform() has placed the geometry. Its octree is then in the body's frame.
   bool isPlaced() const { return mesh.now.isPlaced(); }
+  bool isField() const { return mesh.topology.type == GeometryType::Field; }
 };
+
+/// The geometry, for queries. Throws UnsupportedMethod for a distance field that is a geometry.
+SearchableGeometry& searchable(SearchableGeometry&);
 
 /// The origin of a geometry's float frame in the world.
 Eigen::Vector3d worldOrigin(const SearchableGeometry&);

@@ -71,7 +71,7 @@ class Snapshot::Contents : public SpatialQueries::Source {
 
   std::uint64_t state() const override { return m_state.load(std::memory_order_relaxed); }
   SearchableGeometry& at(GeometryId id) const override {
-    if (GeometryCopy* const copy = find(id)) return copy->geometry;
+    if (GeometryCopy* const copy = find(id)) return searchable(copy->geometry);
     throw Error(ErrorCode::UnknownGeometry, nameOf(id) + " is not in this snapshot", id);
   }
   std::size_t geometryCount() const override { return m_geometries.size(); }

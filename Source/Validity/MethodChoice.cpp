@@ -39,6 +39,7 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
     plan.motion = largestMotion(a.range, b.range);
     plan.arcDeviation = a.arcDeviation + b.arcDeviation;
   }
+  if (settings.method == Method::DistanceField) return plan;
   if (!haveTriangles(a, b)) {
     if (settings.method == Method::Auto) chooseMethod(settings, a, b, plan);
     return plan;
@@ -74,6 +75,25 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
     step.motion = 0.0;  // the result cannot be trusted, so the step need not be examined
   }
   return plan;
+}
+
+bool isWithinBand(const DistanceField& field, double thickness, double largestRadius) {
+  return thickness + largestRadius < field.band() - field.errorBound();
+}
+
+void useField(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
+              PairPlan& plan) {
+  const GeometryInStep& body = bodyWithField(a, b);
+  const GeometryInStep& other = &body == &b ? a : b;
+  const bool allowed = settings.method == Method::Auto && plan.method == Method::Proximity &&
+                       plan.motion == 0.0 && settings.allowedError > 0.0 && body.field &&
+                       &a.mesh != &b.mesh && !other.isShape;
+  if (!allowed || !(body.field->errorBound() <= settings.allowedError) ||
+      !isWithinBand(*body.field, settings.thickness, other.mesh.largestRadius))
+    return;
+  plan = {};
+  plan.method = Method::DistanceField;
+  plan.reason = MethodReason::AllowedError;
 }
 
 }  // namespace palpate

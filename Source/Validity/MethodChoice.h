@@ -1,5 +1,6 @@
 #pragma once
 
+#include <palpate/DistanceField.h>
 #include <palpate/Settings.h>
 #include <palpate/Validity.h>
 
@@ -21,6 +22,7 @@ struct GeometryInStep {
   double extent;               ///< L: of the geometry, along any axis of the world
   Revision topology, enabled;  ///< GeometryRevisions
   const Positions& detected;   ///< the end `now` of the last detection
+  const DistanceField* field;  ///< null if there is none
 };
 
 /// The method of a pair in this frame, and what the narrow phase must find out for it.
@@ -48,9 +50,21 @@ bool hasProximity(const GeometryInStep& a, const GeometryInStep& b, double thick
 /// they have no radius. Other pairs are never trusted.
 bool haveTriangles(const GeometryInStep& a, const GeometryInStep& b);
 
+/// The geometry whose field answers a pair by Method::DistanceField: an added field, else the
+/// second mesh if both have one.
+template <class Any>
+Any& bodyWithField(Any& a, Any& b) {
+  return b.field && a.mesh.topology.type != GeometryType::Field ? b : a;
+}
+
 /// Plans a pair's frame from valid settings and from how the geometries moved. moves: whether that
 /// motion is used; otherwise it counts as 0.
 PairPlan planOf(const PairSettings&, const GeometryInStep& a, const GeometryInStep& b,
                 bool moves = true);
+
+/// Whether the field can answer at this thickness: all contacts outside the body are in its band.
+bool isWithinBand(const DistanceField&, double thickness, double largestRadius);
+/// Auto: answers by an attached field instead, where that is allowed and misses no impact.
+void useField(const PairSettings&, const GeometryInStep& a, const GeometryInStep& b, PairPlan&);
 
 }  // namespace palpate

@@ -51,9 +51,10 @@ bool usesMotionTolerance(const PairSettings& settings, const GeometryInStep& a,
 double displacementLimitOf(const PairSettings& settings, const GeometryInStep& a,
                            const GeometryInStep& b, const PairPlan& plan) {
   if (usesMotionTolerance(settings, a, b)) return plan.motionTolerance;
-  if (plan.method == Method::Continuous) return std::numeric_limits<double>::infinity();
-  return plan.method == Method::Intersection ? std::min(a.smallestHeight, b.smallestHeight)
-                                             : settings.thickness;
+  if (plan.method == Method::Continuous || plan.method == Method::DistanceField)
+    return std::numeric_limits<double>::infinity();
+  return plan.method == Method::Proximity ? settings.thickness
+                                          : std::min(a.smallestHeight, b.smallestHeight);
 }
 
 /// Whether the step met the method's conditions, if vertices move in straight lines. validity:
@@ -62,7 +63,7 @@ double displacementLimitOf(const PairSettings& settings, const GeometryInStep& a
 bool meetsConditions(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
                      const PairPlan& plan, const StepFacts& facts, const Validity& validity,
                      bool foundOrFar) {
-  if (!haveTriangles(a, b)) return false;
+  if (!haveTriangles(a, b) || plan.method == Method::DistanceField) return false;
   if (settings.method == Method::Auto)
     return plan.method == Method::Intersection || validity.startedApart;
   const bool isWithinLimit = plan.motion <= validity.displacementLimit;
@@ -110,6 +111,7 @@ void Trust::start(const PairSettings& settings, const GeometryInStep& a, const G
   m_checkCredit = m_topologies.isCurrent(topologies) ? std::min(m_checkCredit + 1, most) : most;
   m_topologies.commit(topologies);
   if (!haveTriangles(a, b) || startsApart || plan.method == Method::Intersection ||
+      plan.method == Method::DistanceField ||
       (plan.method == Method::Proximity && plan.motion > 0.0 && plan.step.motion == 0.0))
     return;
   plan.runsIntersection = settings.method == Method::Auto;
@@ -168,6 +170,9 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   if (!contents.intersectingTriangles.empty()) {
     m_atEnd.position = Position::Intersecting;
     m_atEnd.witness = contents.intersectingTriangles.front();
+  } else if (plan.reason == MethodReason::AllowedError) {  // nothing moves
+    m_atEnd = m_atStart;
+    m_atEnd.clearance = 0.0;
   } else if (plan.method == Method::Intersection) {
     if (plan.motion == 0.0 && facts.clearance > 0.0) m_atEnd.position = Position::Apart;
   } else if (trustedIfStraight && (facts.clearance > 0.0 || plan.motion == 0.0)) {

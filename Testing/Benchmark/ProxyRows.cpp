@@ -111,9 +111,9 @@ void proxyRows(Report& report, const RowOptions& options) {
     report.line({"Proximity over Proxy", times(ratio)});
     report.row("proxy", "particles-bone", threads, "Proximity over Proxy", "ratio", ratio);
     report.line({"stated error, in thicknesses",
-                 milliseconds(proxy.data().validity().proxyError / kThickness)});
+                 milliseconds(proxy.data().errorBound() / kThickness)});
     report.row("proxy", "particles-bone", threads, "Proxy", "stated error in thicknesses",
-               proxy.data().validity().proxyError / kThickness);
+               proxy.data().errorBound() / kThickness);
   }
 }
 

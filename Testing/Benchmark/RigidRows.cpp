@@ -8,11 +8,17 @@
 #include "Baselines/FclBody.h"
 #endif
 
+#include <palpate/DistanceField.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include <Eigen/Geometry>
 
 #include <cmath>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace palpate::benchmark {
 namespace {
@@ -32,8 +38,8 @@ Placement placement(int frame) {
 }
 
 /// Closed, with bumps.
-testing::Mesh bone() {
-  testing::Mesh body = testing::sphere(501, 502, Eigen::Vector3d::Zero(), 0.4);
+testing::Mesh bone(std::uint32_t rings = 501, std::uint32_t segments = 502) {
+  testing::Mesh body = testing::sphere(rings, segments, Eigen::Vector3d::Zero(), 0.4);
   for (Eigen::Vector3d& p : body.positions)
     p *= 0.95 + 0.05 * std::sin(19 * p[0]) * std::cos(23 * p[1] + 11 * p[2]);
   return body;
@@ -124,6 +130,79 @@ void rigidRows(Report& report, const RowOptions& options) {
   report.row("rigid", "bone-tissue", 1, "FCL 0.7 BVHModel<OBBRSS>, transform", "frame ms",
              median(samples));
 #endif
+}
+
+namespace {
+
+/// A bone of a million triangles in deforming ones, in turns by its triangles and by its field.
+class FieldRace {
+ public:
+  FieldRace(const testing::Mesh& body, std::shared_ptr<const DistanceField> field, int threads)
+      : m_byTriangles(Settings{.threads = threads}), m_byField(Settings{.threads = threads}) {
+    const testing::Mesh start = tissue(0);
+    for (OctreeBasedCD* detection : {&m_byTriangles, &m_byField}) {
+      m_organ = detection->addTriangleMesh(start.positions, start.triangles);
+      m_bone = detection->addTriangleMesh(body.positions, body.triangles);
+    }
+    m_byField.attachDistanceField(m_bone, std::move(field));
+    m_byTriangles.addCollisionPair(m_organ, m_bone, {Method::Proximity, kThickness});
+    m_byField.addCollisionPair(m_organ, m_bone, {Method::DistanceField, kThickness});
+  }
+
+  void run() {
+    for (int frame = 0; frame < kFrames; ++frame) {
+      const std::vector<Eigen::Vector3d> positions = tissue(frame).positions;
+      step(m_byTriangles, positions, frame, triangles);
+      step(m_byField, positions, frame, field);
+    }
+  }
+
+  Moved triangles, field;
+
+ private:
+  /// Milliseconds from a transform and positions to contacts.
+  void step(OctreeBasedCD& detection, std::span<const Eigen::Vector3d> positions, int frame,
+            Moved& result) {
+    const Placement at = placement(frame);
+    const double begin = now();
+    detection.setPositions(m_organ, positions);
+    detection.setTransform(m_bone, at.rotation, at.translation);
+    detection.detectCollision();
+    detection.advance();
+    if (frame > 1) result.samples.push_back(now() - begin);
+    result.contacts += detection.statistics().contacts;
+    result.hash ^= detection.collisionData(m_organ, m_bone).hash() * (2 * frame + 1u);
+  }
+
+  OctreeBasedCD m_byTriangles, m_byField;
+  GeometryId m_organ, m_bone;
+};
+
+}  // namespace
+
+void fieldFrameRows(Report& report, const RowOptions& options) {
+  const testing::Mesh body = options.quick ? bone() : bone(708, 708);
+  const double begin = now();
+  const auto field = std::make_shared<const DistanceField>(DistanceField::build(
+      {body.positions, body.triangles}, {.errorBound = kThickness / 4, .band = 4 * kThickness}));
+  report.heading("A bone of " + std::to_string(body.triangles.size()) +
+                 " triangles in 10,952 deforming ones, in turns: ms per frame");
+  report.line({"", "frame", "worst", "contacts of all frames", "ratio"});
+  report.row("fieldframe", "bone-tissue", 0, "build", "ms", now() - begin);
+  for (const int threads : options.threads) {
+    FieldRace race(body, field, threads);
+    race.run();
+    const double proximity = median(race.triangles.samples);
+    for (const auto& [name, moved] :
+         {std::pair<std::string, const Moved&>{"Proximity", race.triangles},
+          std::pair<std::string, const Moved&>{"DistanceField", race.field}}) {
+      const double frame = median(moved.samples);
+      report.line({name + ", " + std::to_string(threads) + " threads", milliseconds(frame),
+                   milliseconds(quantile(moved.samples, 1)), std::to_string(moved.contacts),
+                   times(frame / proximity)});
+      report.row("fieldframe", "bone-tissue", threads, name, "frame ms", frame, moved.hash);
+    }
+  }
 }
 
 }  // namespace palpate::benchmark

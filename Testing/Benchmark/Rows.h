@@ -35,8 +35,9 @@ void lineRows(Report&, const RowOptions&);     ///< a suture with itself and wit
 void shapeRows(Report&, const RowOptions&);    ///< a capsule in a sheet, and in points
 void insideRows(Report&, const RowOptions&);   ///< vertices inside a body, particles around it
 void rigidRows(Report&, const RowOptions&);    ///< a large bone moved by its transform
-void proxyRows(Report&, const RowOptions&);    ///< a million particles near a large bone
-void boundsRows(Report&, const RowOptions&);   ///< placed bodies with each kind of bounds
+void fieldFrameRows(Report&, const RowOptions&);  ///< its distance field beside its triangles
+void proxyRows(Report&, const RowOptions&);       ///< a million particles near a large bone
+void boundsRows(Report&, const RowOptions&);      ///< placed bodies with each kind of bounds
 void continuousRows(Report&, const RowOptions&);  ///< times of impact of the published steps
 void validityRows(Report&, const RowOptions&);    ///< the share of validity() in a frame
 void spatialRows(Report&, const RowOptions&);     ///< spatial queries beside other libraries

@@ -39,6 +39,7 @@ struct TestGeometry {
         return radii.size() == 1 ? collisions.addPointSet(positions, radii[0])
                                  : collisions.addPointSet(positions, radii);
       case GeometryType::Shape:
+      case GeometryType::Field:
         break;
     }
     return {};

@@ -165,9 +165,9 @@ void expectWithinError(const Scene& scene, const Points& points, std::span<const
   const Validity& validity = run.data().validity();
   EXPECT_EQ(validity.method, Method::Proxy);
   EXPECT_FALSE(validity.trusted);
-  EXPECT_LE(validity.proxyError, scene.allowedError * (1 + 1e-6) + 1e-8);
+  EXPECT_LE(run.data().errorBound(), scene.allowedError * (1 + 1e-6) + 1e-8);
   EXPECT_GE(validity.proxyDepth, scene.thickness);
-  const double error = validity.proxyError + 1e-14;
+  const double error = run.data().errorBound() + 1e-14;
   const SpatialQueries queries = run.detection.queries();
   auto next = run.data().shape().begin();
   const auto end = run.data().shape().end();
@@ -318,21 +318,21 @@ TEST(Proxy, SetTrianglesAndSettingsBuildNewLeaves) {
   const Detection fresh(all[1], points, radii, settingsOf(Engine::Octree));
   EXPECT_EQ(run.data().hash(), fresh.data().hash());
   // A smaller error, and then exact answers by triangles where cones are narrow.
-  double before = run.data().validity().proxyError;
+  double before = run.data().errorBound();
   EXPECT_GT(before, 1e-3);
   pair.allowedError = 1e-3;
   run.detection.setPairSettings(run.smoke, run.body, pair);
   run.detection.detectCollision();
-  EXPECT_LT(run.data().validity().proxyError, 1.001e-3);
+  EXPECT_LT(run.data().errorBound(), 1.001e-3);
   pair.allowedError = 1;
   pair.widestNormalCone = 1e-6;
   run.detection.setPairSettings(run.smoke, run.body, pair);
   run.detection.detectCollision();
-  EXPECT_LT(run.data().validity().proxyError, 1e-12);
+  EXPECT_LT(run.data().errorBound(), 1e-12);
   // Another method, and this one again.
   run.detection.setPairSettings(run.smoke, run.body, {Method::Proximity, 0.04});
   run.detection.detectCollision();
-  EXPECT_EQ(run.data().validity().proxyError, 0.0);
+  EXPECT_EQ(run.data().errorBound(), 0.0);
   EXPECT_TRUE(run.data().shape().empty());
   EXPECT_FALSE(run.data().vertexTriangle().empty());
   run.detection.setPairSettings(run.smoke, run.body,

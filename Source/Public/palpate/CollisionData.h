@@ -69,13 +69,17 @@ struct EdgeEdgeContact {
   friend bool operator==(const EdgeEdgeContact&, const EdgeEdgeContact&) = default;
 };
 
-/// The type of feature that touches an analytical shape.
+/// The type of feature that touches an analytical shape or a distance field.
 enum class ShapeElement : std::uint32_t { Vertex, Edge, Face };
 
-/// A contact of a vertex, edge or triangle with an analytical shape, or of a particle with a body
-/// by Method::Proxy. All values are those at timeOfImpact. With Method::Proxy the surface is the
-/// plane or the triangle that answers, and `distance` is within Validity::proxyError of the exact
-/// one.
+/// A contact of a vertex, edge or triangle with an analytical shape, or with a body by
+/// Method::DistanceField or Method::Proxy. All values are those at timeOfImpact.
+///
+/// Field    `distance` is the field's value at `point` less the radius. `normal` has the direction
+///          of the field's gradient there; where that is 0, it is the last axis of the field's
+///          frame. pointOnShape follows from both.
+/// Proxy    the surface is the plane or the triangle that answers. `distance` is within
+///          CollisionData::errorBound() of the exact one.
 struct ShapeContact {
   ShapeElement element;
   std::uint32_t id;  ///< Index of the vertex or triangle; for an edge its lower vertex.
@@ -87,7 +91,7 @@ struct ShapeContact {
   Eigen::Vector3d pointOnShape;  ///< L: on the shape's surface.
   Eigen::Vector3d normal;        ///< Unit, out of the shape towards the element.
   double distance;               ///< L: less the element's radius; negative: the depth inside.
-  double timeOfImpact = 1.0;     ///< [0, 1] of the step; 1 for Proximity.
+  double timeOfImpact = 1.0;     ///< [0, 1] of the step; 1 for Proximity and DistanceField.
   friend bool operator==(const ShapeContact&, const ShapeContact&) = default;
 };
 
@@ -142,6 +146,7 @@ class PALPATE_EXPORT CollisionData {
     std::vector<ShapeShapeContact> shapeShape;
     double earliestTimeOfImpact =
         std::numeric_limits<double>::infinity();  ///< only with PairSettings::earliestTimeOnly
+    double errorBound = 0.0;
     Validity validity;
   };
 
@@ -166,8 +171,8 @@ class PALPATE_EXPORT CollisionData {
   std::span<const ElementPair> intersectingTriangles() const {
     return m_contents.intersectingTriangles;
   }
-  /// Vertices, edges and triangles with an analytical shape, and particles with a body by
-  /// Method::Proxy. Such a pair has no other contacts.
+  /// Vertices, edges and triangles with an analytical shape, or with a body by
+  /// Method::DistanceField or Method::Proxy. Such an answer has no other contacts.
   std::span<const ShapeContact> shape() const { return m_contents.shape; }
   /// Two analytical shapes with each other: one contact if they are at most the thickness apart,
   /// with Method::Continuous at some time of the step.
@@ -177,6 +182,17 @@ class PALPATE_EXPORT CollisionData {
   /// PairSettings::earliestTimeOnly it is the time of the first contact, although no list has it.
   /// Cost     linear in the contacts.
   double earliestTimeOfImpact() const;
+
+  /// L: by how much the distances may be off; 0 for methods that are exact up to rounding.
+  ///
+  /// DistanceField  that of the field. It bounds the distance of each contact's point from the
+  ///                body, in the field's band. The least distance of an edge or a triangle may be
+  ///                lower by another half of it, and features between the thickness and that far
+  ///                below it may be missing.
+  /// Proxy          the largest proven distance between the planes that answered and the surface,
+  ///                and what rounding adds. A particle is missing or reported in excess only if its
+  ///                distance is within this of the limit.
+  double errorBound() const { return m_contents.errorBound; }
 
   /// Whether this answer can be trusted, and why not.
   const Validity& validity() const { return m_contents.validity; }

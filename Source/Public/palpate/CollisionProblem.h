@@ -1,10 +1,12 @@
 #pragma once
 
 #include <palpate/AnalyticalGeometry.h>
+#include <palpate/DistanceField.h>
 #include <palpate/Settings.h>
 #include <palpate/Types.h>
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -17,7 +19,8 @@ struct CollisionProblem {
   /// A geometry of any type.
   struct Geometry {
     GeometryId id;  ///< in the original OctreeBasedCD; no answer depends on it
-    /// L, in the world, also if setTransform() placed the geometry.
+    /// L, in the world, also if setTransform() placed the geometry; of a mesh with a distance field
+    /// in the body's frame.
     std::vector<Eigen::Vector3d> before, now;
     std::vector<Triangle> triangles;  ///< segment {p, q} is {p, q, q}; empty for points
     GeometryType type = GeometryType::Triangles;
@@ -33,6 +36,8 @@ struct CollisionProblem {
     Eigen::Matrix3d rotationBefore = Eigen::Matrix3d::Identity();  ///< for a shape only
     Eigen::Vector3d translationBefore = Eigen::Vector3d::Zero();
     std::vector<Tetrahedron> tetrahedra{};  ///< `triangles` is their surface; empty: no tetrahedra
+    /// The field of an added distance field, or of a mesh that has one; the poses above place it.
+    std::shared_ptr<const DistanceField> field{};
   };
   /// A collision pair.
   struct Pair {

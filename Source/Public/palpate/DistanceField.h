@@ -13,6 +13,8 @@
 
 namespace palpate {
 
+class FieldLookup;
+
 /// Settings of DistanceField::build(). A value out of range throws InvalidSettings.
 struct DistanceFieldSettings {
   /// L, positive: what value() may be off by, in the band. At least 2^-18 of the longest side of
@@ -90,6 +92,9 @@ class PALPATE_EXPORT DistanceField {
   /// Reads a file of save(). Any content is safe: a file with a fault throws File, and the message
   /// names the file and the byte.
   static DistanceField load(const std::filesystem::path&);
+
+  /// For the library: the cells.
+  const FieldLookup& lookup() const;
 
  private:
   struct Implementation;

@@ -4,6 +4,7 @@
 #include <palpate/Audit.h>
 #include <palpate/CollisionData.h>
 #include <palpate/CollisionProblem.h>
+#include <palpate/DistanceField.h>
 #include <palpate/Error.h>
 #include <palpate/Export.h>
 #include <palpate/FrameStatistics.h>
@@ -119,6 +120,24 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Errors   InvalidShape if a measure is out of the range that <palpate/AnalyticalGeometry.h>
   ///          states.
   GeometryId addAnalyticalGeometry(const AnalyticalGeometry&);
+  /// Adds the surface of a distance field. setTransform() places it. Its pairs with triangle,
+  /// tetrahedral and line meshes and with point sets need Method::DistanceField, which is the only
+  /// one that accepts it. The geometry has no vertices and no elements. Queries refuse it.
+  ///
+  /// Errors   InvalidSettings for null.
+  GeometryId addDistanceField(std::shared_ptr<const DistanceField>);
+  /// Attaches a distance field to a triangle or tetrahedral mesh that is rigid. Pairs of the mesh
+  /// may then use Method::DistanceField, and Auto may (PairSettings::allowedError). The field is in
+  /// the body's frame. Null detaches it. A body with a field keeps its shape: setPositions(),
+  /// setTriangles(), setTetrahedra() and setDisabledElements() throw UnsupportedMethod.
+  ///
+  /// Errors   UnsupportedMethod for another geometry type, for a mesh with disabled elements, or if
+  ///          a pair by Method::DistanceField still needs the field that this call replaces by
+  ///          null or by one with a smaller band; InvalidSettings if the field is not of this mesh:
+  ///          if its value at a vertex of a triangle exceeds the error bound. The message names the
+  ///          vertex.
+  /// Cost     one look-up for each vertex.
+  void attachDistanceField(GeometryId mesh, std::shared_ptr<const DistanceField>);
   /// Removes a geometry and all its pairs.
   void removeGeometry(GeometryId);
 

@@ -96,11 +96,16 @@ enum class Method {
   /// Features whose distance is at most the thickness and their radii at some time of the step,
   /// with the time of impact: continuous collision detection (CCD).
   Continuous,
+  /// Vertices, edges and triangles within the thickness and their radii of a body that has a
+  /// DistanceField, at the step's end. The distances are the field's, within its error bound
+  /// (CollisionData::errorBound()). The contacts are in CollisionData::shape(). Impacts within the
+  /// step may be missing.
+  DistanceField,
   /// Particles against a rigid body, for a point set and a triangle or tetrahedral mesh in this
   /// order. In the leaves of an octree of the body, planes stand for its surface where their error
   /// is proven to be at most PairSettings::allowedError; elsewhere triangles answer. A particle
   /// whose distance at the step's end is at most the thickness and its radius is a ShapeContact,
-  /// up to Validity::proxyError. Around a closed mesh distances have a sign, and particles up to
+  /// up to CollisionData::errorBound(). Around a closed mesh distances have a sign, and particles up to
   /// Validity::proxyDepth behind the surface are contacts, too.
   /// Cost     the leaves are built once for the body's topology and the pair's settings, by the
   ///          first detection: about a second for 500,000 triangles. A frame makes no octree of the
@@ -156,8 +161,10 @@ struct PairSettings {
   /// CollisionData::earliestTimeOfImpact(), which is that of all contacts. This is much cheaper.
   /// `contacts` has no effect then.
   bool earliestTimeOnly = false;
-  /// L, finite, not negative. What an answer may be off by. Only Proxy uses it, and needs a
-  /// positive value. A larger value gives fewer and larger leaves, and fewer that triangles answer.
+  /// L, finite, not negative. What an answer may be off by. Proxy needs a positive value: a larger
+  /// one gives fewer and larger leaves, and fewer that triangles answer. Auto answers by an attached
+  /// DistanceField whose error bound is at most this, while nothing moves in the step. Other methods
+  /// accept 0 only.
   double allowedError = 0.0;
   /// rad, in (0, 1.5]. Proxy: the largest angle between the normal of a leaf's plane and those of
   /// the triangles that the plane stands for. Other leaves are divided or answered by triangles.

@@ -13,8 +13,9 @@ namespace palpate {
 enum class GeometryId : std::uint32_t {};
 
 /// The geometry type: what the elements of a geometry are. The surface of a tetrahedral mesh
-/// consists of Triangles. A Shape is an analytical shape and has no elements.
-enum class GeometryType : std::uint8_t { Triangles, Lines, Points, Shape };
+/// consists of Triangles. A Shape is an analytical shape, a Field a distance field; these have no
+/// elements.
+enum class GeometryType : std::uint8_t { Triangles, Lines, Points, Shape, Field };
 
 /// Three vertex indices. The winding gives the normal: (b - a) x (c - a) for the corners a, b, c.
 using Triangle = std::array<std::uint32_t, 3>;

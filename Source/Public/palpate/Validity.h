@@ -25,7 +25,9 @@ enum class MethodReason {
   /// The pair has lines, points or shapes, and no other method answers it as well. Continuous, if
   /// features move, or if Proximity would need a thickness or a radius. Proximity, if Continuous
   /// does not answer the pair: then impacts within the step may be missing.
-  NoAlternative
+  NoAlternative,
+  /// Nothing moves, and an attached field is within PairSettings::allowedError: DistanceField.
+  AllowedError
 };
 
 /// Whether the last answer for one pair can be trusted, and what the library knows about the step.
@@ -41,9 +43,9 @@ enum class MethodReason {
 ///          also holds where Auto answers by Intersection: at rest, without a thickness.
 ///          (3) if not trusted, the answer may be right or wrong. For two meshes, Continuous and
 ///          Auto miss no impact of straight motion even so. Only sides are then not certified, and
-///          impacts on the arcs of bodies that turn. Pairs with lines, points or shapes, and pairs
-///          that collision filters separate, are never trusted: the proofs are for two triangle or
-///          tetrahedral meshes, and for such a mesh with itself.
+///          impacts on the arcs of bodies that turn. Pairs with lines, points or shapes, pairs that
+///          collision filters separate, and answers of DistanceField are never trusted: the proofs
+///          are for two triangle or tetrahedral meshes, and for such a mesh with itself.
 ///          (4) the laws are about one step. Features may have passed each other in an earlier
 ///          step, because its answer missed it or because the solver ignored an impact. The next
 ///          step may then be trusted, with startedApart, and its normals push further through.
@@ -102,10 +104,6 @@ struct Validity {
   /// L: feature pairs further apart at the step's end are contacts only by an impact. It is the
   /// thickness, with Auto up to the motion tolerance more; 0 for Intersection.
   double effectiveThickness = 0;
-  /// L: with Proxy, the largest proven distance between the planes that answered and the surface,
-  /// and what rounding adds. Each contact's distance is off by at most this. A particle is missing
-  /// or reported in excess only if its distance is within this of the limit. 0 for other methods.
-  double proxyError = 0;
   /// L: with Proxy, particles deeper than this behind the surface of a closed mesh are not
   /// reported. It is at least the thickness and the largest radius, and the edge of the smallest
   /// leaf. Meshes that are not closed have no inside: particles within the thickness are reported
@@ -123,6 +121,13 @@ struct Validity {
   /// Triangles of meshes without area that are in contacts, ascending. Their normals follow the
   /// rules of <palpate/Distance.h>. Empty for pairs with a shape.
   std::vector<std::uint32_t> degenerateTrianglesA, degenerateTrianglesB;
+
+  /// Indices of contacts in CollisionData::shape(), ascending, if `method` is DistanceField. The
+  /// first are beyond the field's band, or may be: deeper inside than the band less the error
+  /// bound. The error bound does not hold for them; they are at least as deep as their distance
+  /// says, less that bound. The second are nearer to the thickness than the error bound: their
+  /// exact distance may be larger than it.
+  std::vector<std::uint32_t> outsideBand, nearThreshold;
 
   /// Maximum number of vertices of one geometry that are listed because they moved too far.
   static constexpr std::size_t kMaxFastVertices = 128;

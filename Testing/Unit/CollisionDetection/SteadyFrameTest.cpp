@@ -1,3 +1,4 @@
+#include <palpate/DistanceField.h>
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/PenetrationTracker.h>
 #include <palpate/StepGuard.h>
@@ -179,6 +180,29 @@ TEST(SteadyFrame, AllocatesNothingWithShapes) {
     for (const GeometryId tool : tools)
       detection.setTransform(tool, turns[static_cast<std::size_t>(tool) % 2],
                              {0.02 * (frame % 10), 0, 0.05});
+    detection.detectCollision();
+    detection.advance();
+    contacts += detection.statistics().contacts;
+  }
+  EXPECT_EQ(allocations - before, 0u);
+  EXPECT_GT(contacts, 1000u);
+}
+
+TEST(SteadyFrame, AllocatesNothingWithDistanceFields) {
+  const testing::Mesh body = testing::sphere(20, 30, {0, 0, 0}, 0.5);
+  scenes::SceneMesh sheet = scenes::sheet(40);
+  const auto field = std::make_shared<const DistanceField>(DistanceField::build(
+      {body.positions, body.triangles}, {.errorBound = 0.01, .band = 0.1, .threads = 1}));
+  OctreeBasedCD detection(Settings{.threads = 1});
+  const GeometryId tissue = detection.addTriangleMesh(sheet.positions, sheet.triangles),
+                   bone = detection.addDistanceField(field);
+  detection.addCollisionPair(tissue, bone, {Method::DistanceField, 0.02});
+  std::size_t before = 0, contacts = 0;
+  for (int frame = 0; frame < 20; ++frame) {
+    if (frame == 10) before = allocations;
+    for (Eigen::Vector3d& p : sheet.positions) p.z() += frame % 10 == 0 ? -0.09 : 0.01;
+    detection.setPositions(tissue, sheet.positions);
+    detection.setTransform(bone, Eigen::Matrix3d::Identity(), {0.02 * (frame % 10), 0, 0.05});
     detection.detectCollision();
     detection.advance();
     contacts += detection.statistics().contacts;

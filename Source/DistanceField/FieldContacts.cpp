@@ -1,0 +1,323 @@
+#include "DistanceField/FieldContacts.h"
+
+#include "DistanceField/FieldCells.h"
+#include "DistanceField/FieldMinimum.h"
+#include "Math/Tolerances.h"
+#include "Shapes/Shape.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+namespace palpate {
+
+using Eigen::Vector3d;
+
+PlacedField::PlacedField(const DistanceField& field, const Positions& body)
+    : m_field(field), m_lookup(field.lookup()) {
+  if (!body.isPlaced()) return;
+  m_pose = {orthonormal(body.transform().rotation), body.transform().translation};
+}
+
+Vector3d PlacedField::inField(const Vector3d& world) const {
+  const Vector3d from = world - m_pose.translation;
+  const Eigen::Matrix3d& r = m_pose.rotation;
+  const auto along = [&](int k) {
+    return r(0, k) * from[0] + r(1, k) * from[1] + r(2, k) * from[2];
+  };
+  return {along(0), along(1), along(2)};
+}
+
+Vector3d PlacedField::normalAt(const Vector3d& inField) const {
+  const Vector3d gradient = m_lookup.gradient(inField);
+  if (gradient == Vector3d::Zero()) return m_pose.rotation.col(2);
+  const Eigen::Matrix3d& r = m_pose.rotation;
+  const auto along = [&](int k) {
+    return r(k, 0) * gradient[0] + r(k, 1) * gradient[1] + r(k, 2) * gradient[2];
+  };
+  return Vector3d(along(0), along(1), along(2)).stableNormalized();
+}
+
+Eigen::AlignedBox3d PlacedField::domain() const {
+  const FieldCells& cells = m_lookup.cells();
+  Eigen::AlignedBox3d box;
+  for (int corner = 0; corner < 8; ++corner) {
+    Vector3d at;
+    for (int k = 0; k < 3; ++k)
+      at[k] = std::ldexp(static_cast<double>(cells.origin[k] +
+                                             (corner >> k & 1 ? std::int64_t{cells.size[k]} : 0)),
+                         cells.exponent);
+    box.extend(m_pose(at));
+  }
+  const double error =
+      kShapeBoundError * (box.min().cwiseAbs().maxCoeff() + box.max().cwiseAbs().maxCoeff() +
+                          m_pose.translation.cwiseAbs().maxCoeff());
+  return {box.min() - Vector3d::Constant(error), box.max() + Vector3d::Constant(error)};
+}
+
+double reachOf(const DistanceField& field) { return field.band() - field.errorBound(); }
+
+double depthToleranceOf(const DistanceField& field) {
+  return std::max(kDepthShare * field.errorBound(), kLeastDepthTolerance * field.band());
+}
+
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::infinity();
+
+/// Decides which features of a mesh are contacts, and at which points.
+class FeaturesNearField {
+ public:
+  /// skips: passes over edges and triangles that bounds exclude.
+  FeaturesNearField(const TriangleMesh& mesh, const PlacedField& field,
+                    const PairSettings& settings, bool skips, ShapeContactBuffers& out)
+      : m_mesh(mesh),
+        m_field(field),
+        m_thickness(settings.thickness),
+        m_reportsAll(settings.contacts == Contacts::All),
+        m_skips(skips),
+        m_reach(reachOf(field.field())),
+        m_tolerance(depthToleranceOf(field.field())),
+        m_error(2.0 * field.field().errorBound()),
+        m_out(out) {}
+
+  double valueAt(std::uint32_t vertex) const {
+    return m_field.lookup().value(m_field.inField(m_mesh.now[vertex]));
+  }
+
+  /// value: L, of the field, here and below.
+  void findVertex(std::uint32_t v, double value) {
+    ++m_out.featurePairs;
+    if (value - m_mesh.radius(v) <= m_thickness)
+      add(ShapeElement::Vertex, v, {v, v, v}, Vector3d::UnitX());
+  }
+
+  /// Returns the value, less the radius, of a point that is deeper than both ends; infinity if
+  /// there is none. isOwn: whether a contact is reported.
+  double findEdge(const Segment& edge, const std::array<double, 2>& values, bool isOwn) {
+    ++m_out.featurePairs;
+    const auto& [p, q] = edge;
+    const std::array<double, 2> radii{m_mesh.radius(p), m_mesh.radius(q)};
+    const std::array<double, 2> ends{values[0] - radii[0], values[1] - radii[1]};
+    const double boundary = std::min(ends[0], ends[1]), target = targetBelow(boundary);
+    std::optional<DeepPoint> deep;
+    if (!excludes(values, std::array{p, q}, target))
+      deep = findDeepPoint(m_field.lookup(), std::array{inField(p), inField(q)}, radii, target,
+                           m_tolerance);
+    const Triangle vertices{p, q, q};
+    if (isOwn && deep) add(ShapeElement::Edge, p, vertices, deep->weights);
+    if (isOwn && !deep && m_reportsAll && boundary <= m_thickness)
+      add(ShapeElement::Edge, p, vertices,
+          ends[0] <= ends[1] ? Vector3d::UnitX() : Vector3d::UnitY());
+    return deep ? deep->value : kNone;
+  }
+
+  /// least: what findEdge() returned for each edge; edge i joins corners i and i + 1.
+  void findFace(std::uint32_t triangle, const std::array<double, 3>& values,
+                const std::array<double, 3>& least) {
+    ++m_out.featurePairs;
+    const Triangle& corners = m_mesh.topology.triangles[triangle];
+    const double boundary =
+                     std::min({values[0], values[1], values[2], least[0], least[1], least[2]}),
+                 target = targetBelow(boundary);
+    std::optional<DeepPoint> deep;
+    if (!excludes(values, corners, target))
+      deep =
+          findDeepPoint(m_field.lookup(),
+                        std::array{inField(corners[0]), inField(corners[1]), inField(corners[2])},
+                        std::array{0.0, 0.0, 0.0}, target, m_tolerance);
+    if (deep) return add(ShapeElement::Face, triangle, corners, deep->weights);
+    if (!m_reportsAll || !(boundary <= m_thickness)) return;
+    for (int i = 0; i < 3; ++i) {
+      if (values[i] == boundary)
+        return add(ShapeElement::Face, triangle, corners, Vector3d::Unit(i));
+      if (least[i] != boundary) continue;
+      const Segment edge{std::min(corners[i], corners[(i + 1) % 3]),
+                         std::max(corners[i], corners[(i + 1) % 3])};
+      const bool turned = edge[0] != corners[i];
+      const auto onEdge = findDeepPoint(
+          m_field.lookup(), std::array{inField(edge[0]), inField(edge[1])}, std::array{0.0, 0.0},
+          targetBelow(std::min(values[i], values[(i + 1) % 3])), m_tolerance);
+      Vector3d weights = Vector3d::Zero();
+      weights[turned ? (i + 1) % 3 : i] = onEdge->weights[0];
+      weights[turned ? i : (i + 1) % 3] = onEdge->weights[1];
+      return add(ShapeElement::Face, triangle, corners, weights);
+    }
+  }
+
+ private:
+  Vector3d inField(std::uint32_t vertex) const { return m_field.inField(m_mesh.now[vertex]); }
+
+  double targetBelow(double boundary) const {
+    return std::min(boundary - m_tolerance, m_thickness);
+  }
+
+  /// Whether the field, less the radius, is certainly above the target on the whole feature.
+  ///
+  /// Let v be a corner and x another point of the feature, with the value g(x) <= target, which is
+  /// below the reach. Then g(x) >= d(x) - e. If g(v) is above -reach, then g(v) <= d(v) + e. The
+  /// distance d changes by at most |x - v|. So g(x) >= g(v) - 2 e - |x - v|. Each point of a
+  /// segment is at most half its length from an end, and each point of a triangle at most its
+  /// longest side over the root of 3 from a corner.
+  template <std::size_t size>
+  bool excludes(const std::array<double, size>& values,
+                const std::array<std::uint32_t, size>& vertices, double target) const {
+    if (!m_skips) return false;
+    const auto [lowest, highest] = std::minmax_element(values.begin(), values.end());
+    if (!(*lowest > -m_reach)) return false;
+    double square = 0.0;
+    for (std::size_t i = 0; i < size; ++i)
+      square = std::max(
+          square, (m_mesh.now[vertices[(i + 1) % size]] - m_mesh.now[vertices[i]]).squaredNorm());
+    const double length = (1.0 + kFieldLengthError) * std::sqrt(square);
+    const double bound = size == 2 ? 0.5 * (values[0] + values[1] - length)
+                                   : std::max(*lowest - kRootOfThird * length, *highest - length);
+    return bound - m_error - m_mesh.largestRadius > target;
+  }
+
+  /// Adds the contact if the value at its point, as the field has it, is within the thickness.
+  void add(ShapeElement element, std::uint32_t id, const Triangle& vertices,
+           const Vector3d& weights) {
+    Vector3d point = m_mesh.now[vertices[0]];
+    if (element != ShapeElement::Vertex)
+      point = (weights[0] * point + weights[1] * m_mesh.now[vertices[1]]) +
+              weights[2] * m_mesh.now[vertices[2]];
+    const Vector3d inField = m_field.inField(point);
+    const double value = m_field.lookup().value(inField),
+                 distance = value - m_mesh.radius(vertices, weights);
+    if (!(distance <= m_thickness)) return;
+    const Vector3d normal = m_field.normalAt(inField);
+    m_out.shape.push_back(
+        {element, id, vertices, weights, point, point - value * normal, normal, distance, 1.0});
+  }
+
+  const TriangleMesh& m_mesh;
+  const PlacedField& m_field;
+  const double m_thickness;
+  const bool m_reportsAll, m_skips;
+  const double m_reach, m_tolerance, m_error;
+  ShapeContactBuffers& m_out;
+};
+
+/// Finds the elements whose boxes overlap a box in the world.
+void findElementsIn(const SearchableGeometry& geometry, const Eigen::AlignedBox3d& region,
+                    PointQueryStack& stack, Buffer<std::uint32_t>& out) {
+  out.clear();
+  const Octree& octree = geometry.tree.octree();
+  if (octree.size() == 0) return;
+  const Vector3d origin = worldOrigin(geometry);
+  const BoxMap map = worldMap(geometry, origin, 0.0, false);
+  const double unit = 1.0 / geometry.tree.frame().scale;
+  const Vector3d error = Vector3d::Constant(
+      kShapeBoundError * (region.min().cwiseAbs().maxCoeff() + region.max().cwiseAbs().maxCoeff() +
+                          2.0 * origin.cwiseAbs().maxCoeff()));
+  const Vector3d lower = region.min() - origin - error, upper = region.max() - origin + error;
+  const auto mayBeNear = [&](const FloatBox& stored) {
+    if (stored.empty()) return false;
+    const FloatBox floats = map(stored);
+    if (floats.mayBeClamped()) return true;
+    for (int k = 0; k < 3; ++k)
+      if (unit * double{floats.lower[k]} > upper[k] || unit * double{floats.upper[k]} < lower[k])
+        return false;
+    return true;
+  };
+  forEachOverlapping(octree, mayBeNear, stack, [&](std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t i = begin; i < end; ++i)
+      if (mayBeNear(octree.boxes()[i])) out.push_back(octree.order()[i]);
+  });
+}
+
+}  // namespace
+
+FieldContacts::FieldContacts(const TriangleMesh& mesh, const PlacedField& field,
+                             const PairSettings& settings, FieldScratch& scratch)
+    : m_mesh(mesh), m_field(field), m_settings(settings), m_scratch(scratch) {}
+
+void FieldContacts::start(const SearchableGeometry& geometry) {
+  const MeshTopology& topology = m_mesh.topology;
+  FieldScratch& scratch = m_scratch;
+  findElementsIn(geometry, m_field.domain(), scratch.stack, scratch.elements);
+  std::erase_if(scratch.elements, [&](std::uint32_t t) { return !topology.isEnabled(t); });
+  if (++scratch.stamp == 0) scratch.stamp = 1, scratch.stamps.clear();
+  if (scratch.stamps.size() < topology.vertexCount) scratch.stamps.resize(topology.vertexCount, 0u);
+  if (scratch.values.size() < topology.vertexCount) scratch.values.resize(topology.vertexCount);
+  if (scratch.least.size() < topology.edges.size()) scratch.least.resize(topology.edges.size());
+  scratch.vertices.clear();
+  for (const std::uint32_t t : scratch.elements) {
+    for (const std::uint32_t v : topology.triangles[t]) {
+      if (scratch.stamps[v] == scratch.stamp) continue;
+      scratch.stamps[v] = scratch.stamp;
+      scratch.vertices.push_back(v);
+    }
+    // An edge whose owner is not among the elements is outside the domain.
+    for (const std::uint32_t edge : topology.triangleEdges[t])
+      if (edge != kNoEdge) scratch.least[edge] = kNone;
+  }
+}
+
+void FieldContacts::findValues(std::size_t begin, std::size_t end) {
+  for (std::size_t i = begin; i < end; ++i) {
+    const std::uint32_t v = m_scratch.vertices[i];
+    m_scratch.values[v] = m_field.lookup().value(m_field.inField(m_mesh.now[v]));
+  }
+}
+
+void FieldContacts::findEdges(std::size_t begin, std::size_t end, ShapeContactBuffers& out) {
+  const MeshTopology& topology = m_mesh.topology;
+  const Buffer<double>& values = m_scratch.values;
+  FeaturesNearField features(m_mesh, m_field, m_settings, true, out);
+  for (std::size_t n = begin; n < end; ++n) {
+    const std::uint32_t t = m_scratch.elements[n];
+    for (int i = 0; i < 3; ++i) {
+      const std::uint32_t v = topology.triangles[t][i], edge = topology.triangleEdges[t][i];
+      if (topology.ownsCorner(t, i)) features.findVertex(v, values[v]);
+      if (!topology.ownsEdge(t, i)) continue;
+      const auto& [p, q] = topology.edges[edge];
+      m_scratch.least[edge] = features.findEdge({p, q}, {values[p], values[q]}, true);
+    }
+  }
+}
+
+void FieldContacts::findFaces(std::size_t begin, std::size_t end, ShapeContactBuffers& out) {
+  const MeshTopology& topology = m_mesh.topology;
+  if (!topology.hasFaces()) return;
+  FeaturesNearField features(m_mesh, m_field, m_settings, true, out);
+  for (std::size_t n = begin; n < end; ++n) {
+    const std::uint32_t t = m_scratch.elements[n];
+    std::array<double, 3> values, least;
+    for (int i = 0; i < 3; ++i) {
+      const std::uint32_t edge = topology.triangleEdges[t][i];
+      values[i] = m_scratch.values[topology.triangles[t][i]];
+      least[i] = edge == kNoEdge ? kNone : m_scratch.least[edge];
+    }
+    features.findFace(t, values, least);
+  }
+}
+
+void FieldContacts::findByBruteForce(const TriangleMesh& mesh, const PlacedField& field,
+                                     const PairSettings& settings,
+                                     std::span<const std::uint32_t> elements,
+                                     ShapeContactBuffers& out) {
+  const MeshTopology& topology = mesh.topology;
+  FeaturesNearField features(mesh, field, settings, false, out);
+  for (const std::uint32_t t : elements) {
+    if (!topology.isEnabled(t)) continue;
+    std::array<double, 3> values, least;
+    for (int i = 0; i < 3; ++i) values[i] = features.valueAt(topology.triangles[t][i]);
+    for (int i = 0; i < 3; ++i) {
+      least[i] = kNone;
+      if (topology.ownsCorner(t, i)) features.findVertex(topology.triangles[t][i], values[i]);
+      if (topology.triangleEdges[t][i] == kNoEdge) continue;
+      const Segment& edge = topology.edges[topology.triangleEdges[t][i]];
+      least[i] = features.findEdge(edge, {features.valueAt(edge[0]), features.valueAt(edge[1])},
+                                   topology.ownsEdge(t, i));
+    }
+    if (topology.hasFaces()) features.findFace(t, values, least);
+  }
+}
+
+}  // namespace palpate
