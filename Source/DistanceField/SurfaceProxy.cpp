@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 namespace {
 
 /// Levels of the octree down to cells.
-constexpr int kFewestLevels = 6, kMostLevels = 9;
+constexpr int kFewestLevels = 5, kMostLevels = 9;
 /// Sizes of nodes, in units.
 constexpr std::uint32_t kCell = 4, kBrick = 16;
 /// Most nodes below cells that are expected: a number, or as many as twice the triangles. It bounds
