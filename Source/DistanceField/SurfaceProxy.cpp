@@ -25,7 +25,7 @@ constexpr int kFewestLevels = 5, kMostLevels = 9;
 constexpr std::uint32_t kCell = 4, kBrick = 16;
 /// Most nodes below cells that are expected: a number, or as many as twice the triangles. It bounds
 /// memory and time where planes are rare.
-constexpr std::size_t kMostSmall = std::size_t{1} << 17, kSmallPerTriangle = 2;
+constexpr std::size_t kMostSmall = std::size_t{1} << 15, kSmallPerTriangle = 2;
 /// Cells without a plane that one task divides.
 constexpr std::size_t kCellsPerTask = 64;
 /// Nodes down to this level are visited level by level, the others below each of them in one task.

@@ -134,6 +134,13 @@ Points particlesAround(Random& random, const Scene& scene, std::size_t count) {
   return points;
 }
 
+PairSettings pairOf(const Scene& scene) {
+  PairSettings pair{.method = Method::Proxy, .thickness = scene.thickness};
+  pair.allowedError = scene.allowedError;
+  pair.widestNormalCone = 0.6;  // the meshes are coarse
+  return pair;
+}
+
 struct Detection {
   Detection(const Scene& scene, const Points& points, std::span<const double> radii,
             const Settings& settings)
@@ -141,10 +148,7 @@ struct Detection {
     smoke = detection.addPointSet(points, radii);
     body = detection.addTriangleMesh(scene.body.positions, scene.body.triangles);
     if (scene.isPlaced) detection.setTransform(body, scene.rotation, scene.translation);
-    detection.addCollisionPair(smoke, body,
-                               {.method = Method::Proxy,
-                                .thickness = scene.thickness,
-                                .allowedError = scene.allowedError});
+    detection.addCollisionPair(smoke, body, pairOf(scene));
     detection.detectCollision();
   }
   const CollisionData& data() const { return detection.collisionData(smoke, body); }
@@ -215,6 +219,10 @@ TEST(Proxy, EachContactIsWithinTheStatedErrorAndNoneIsMissing) {
     std::size_t contacts = 0;
     expectWithinError(scene, points, radii, run, contacts);
     EXPECT_GT(contacts, 200u);
+    // On curved meshes planes answered.
+    const std::string first = scene.name.substr(0, 5);
+    if (first == "spher" || first == "torus" || first == "organ" || first == "open ")
+      EXPECT_GT(run.data().validity().proxyError, 0.2 * scene.allowedError);
   }
 }
 
@@ -323,7 +331,7 @@ TEST(Proxy, SetTrianglesAndSettingsBuildNewLeaves) {
   const std::vector<double> radii(points.size(), 0.0);
   Detection run(all[0], points, radii, settingsOf(Engine::Octree));
   run.detection.setTriangles(run.body, all[1].body.positions, all[1].body.triangles);
-  PairSettings pair{.method = Method::Proxy, .thickness = 0.04, .allowedError = 0.02};
+  PairSettings pair = pairOf(all[1]);
   run.detection.setPairSettings(run.smoke, run.body, pair);
   run.detection.detectCollision();
   const Detection fresh(all[1], points, radii, settingsOf(Engine::Octree));
@@ -346,8 +354,7 @@ TEST(Proxy, SetTrianglesAndSettingsBuildNewLeaves) {
   EXPECT_EQ(run.data().validity().proxyError, 0.0);
   EXPECT_TRUE(run.data().shape().empty());
   EXPECT_FALSE(run.data().vertexTriangle().empty());
-  run.detection.setPairSettings(run.smoke, run.body,
-                                {.method = Method::Proxy, .thickness = 0.04, .allowedError = 0.02});
+  run.detection.setPairSettings(run.smoke, run.body, pairOf(all[1]));
   run.detection.detectCollision();
   EXPECT_EQ(run.data().hash(), fresh.data().hash());
 }
@@ -407,10 +414,8 @@ TEST(Proxy, PairsOfOneBodyShareLeaves) {
   const Points first = particlesAround(random, scene, 300), second = {first[5], first[7]};
   const std::vector<double> radii(first.size(), 0.0);
   Detection run(scene, first, radii, settingsOf(Engine::Octree));
-  const PairSettings pair{
-      .method = Method::Proxy, .thickness = scene.thickness, .allowedError = scene.allowedError};
   const GeometryId debris = run.detection.addPointSet(second);
-  run.detection.addCollisionPair(debris, run.body, pair);
+  run.detection.addCollisionPair(debris, run.body, pairOf(scene));
   FailingAllocation::arm(0);
   run.detection.detectCollision();
   FailingAllocation::disarm();
