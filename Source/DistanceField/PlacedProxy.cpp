@@ -261,14 +261,30 @@ bool PlacedProxy::isInFront(std::uint32_t triangle, TriangleFeature feature,
 void PlacedProxy::findAmong(const SurfaceProxy::Leaf& leaf, const Vector3d& p, std::uint32_t point,
                             double limit, ProxyHits& out) const {
   const auto positions = m_body->now.body();
+  const auto triangles = m_proxy->trianglesOf(leaf);
+  const auto squareFrom = [&](const SurfaceProxy::Listed& t) {
+    const double dx = p[0] - t.x, dy = p[1] - t.y, dz = p[2] - t.z;
+    return dx * dx + dy * dy + dz * dz;
+  };
   VertexTriangleDistance nearest{};
   nearest.distance = std::numeric_limits<double>::infinity();
   std::uint32_t triangle = 0;
-  for (const std::uint32_t t : m_proxy->trianglesOf(leaf)) {
+  const auto test = [&](std::uint32_t t) {
     const auto& [a, b, c] = m_body->topology.triangles[t];
     const VertexTriangleDistance found =
         finiteVertexTriangleDistance(p, positions[a], positions[b], positions[c]);
-    if (found.distance < nearest.distance) nearest = found, triangle = t;
+    if (found.distance < nearest.distance || (found.distance == nearest.distance && t < triangle))
+      nearest = found, triangle = t;
+  };
+  // The triangle whose sphere is nearest comes first. It lets most others be left out.
+  const auto first =
+      std::min_element(triangles.begin(), triangles.end(),
+                       [&](const auto& l, const auto& r) { return squareFrom(l) < squareFrom(r); });
+  test(first->triangle);
+  for (const SurfaceProxy::Listed& other : triangles) {
+    const double reach = (nearest.distance + other.radius) * (1.0 + kProxySlack);
+    if (other.triangle != first->triangle && squareFrom(other) <= reach * reach)
+      test(other.triangle);
   }
   double distance = nearest.distance;
   if (m_proxy->isClosed() || m_outerSideOnly) {

@@ -64,7 +64,7 @@ struct Part {
     bool isBlock;
   };
   std::vector<SurfaceProxy::Leaf> leaves;
-  std::vector<std::uint32_t> triangles;
+  std::vector<SurfaceProxy::Listed> triangles;
   std::vector<std::array<std::uint32_t, 64>> blocks;
   std::vector<Entry> entries;
   /// A cell without a plane, and the triangles that may be nearest to its points.
@@ -321,7 +321,7 @@ class SurfaceProxyBuilder {
       count(kept.size(), m_listed, SurfaceProxy::kMostListed);
       leaf.firstTriangle = static_cast<std::uint32_t>(out.triangles.size());
       leaf.triangleCount = static_cast<std::uint32_t>(kept.size());
-      for (const Item& item : kept) out.triangles.push_back(item.triangle);
+      for (const Item& item : kept) out.triangles.push_back(listed(item.triangle));
     }
     addLeaf(node, leaf, out);
   }
@@ -510,6 +510,17 @@ class SurfaceProxyBuilder {
           out.blocks.back()[(z * 4 + y) * 4 + x] = index;
   }
 
+  SurfaceProxy::Listed listed(std::uint32_t triangle) const {
+    const auto& [i, j, k] = m_topology.triangles[triangle];
+    const Vector3d &a = m_positions[i], &b = m_positions[j], &c = m_positions[k];
+    const Eigen::Vector3f rounded = ((a + b + c) / 3.0).cast<float>();
+    const Vector3d centre = rounded.cast<double>();
+    const double radius = std::max({(a - centre).norm(), (b - centre).norm(), (c - centre).norm()});
+    const auto outward = static_cast<float>(radius * (1.0 + 0x1p-20) + m_rounding);
+    return {rounded[0], rounded[1], rounded[2],
+            std::nextafter(outward, std::numeric_limits<float>::infinity()), triangle};
+  }
+
   void count(std::size_t size, std::atomic<std::uint64_t>& total, std::uint64_t most) const {
     if (total.fetch_add(size, std::memory_order_relaxed) + size > most)
       throw Error(ErrorCode::TooLarge,
@@ -591,7 +602,7 @@ std::uint32_t SurfaceProxy::leafAtByBruteForce(const ProxyPlace& place) const {
 
 std::size_t SurfaceProxy::bytes() const {
   return m_bricks.capacity() * sizeof(std::uint32_t) + m_blocks.capacity() * sizeof(Block) +
-         m_leaves.capacity() * sizeof(Leaf) + m_triangles.capacity() * sizeof(std::uint32_t);
+         m_leaves.capacity() * sizeof(Leaf) + m_triangles.capacity() * sizeof(Listed);
 }
 
 }  // namespace palpate

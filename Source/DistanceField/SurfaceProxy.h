@@ -52,6 +52,11 @@ class SurfaceProxy {
       return (normal[0] * x + normal[1] * y + normal[2] * z) - offset;
     }
   };
+  /// A triangle of a list, in a sphere. Floats: the radius is that about the rounded centre.
+  struct Listed {
+    float x, y, z, radius;
+    std::uint32_t triangle;
+  };
   static constexpr std::uint32_t kNoLeaf = 0xffffffffu;
 
   SurfaceProxy(const TriangleMesh& body, const ProxySettings&, const Threads&);
@@ -68,7 +73,7 @@ class SurfaceProxy {
   std::uint32_t leafAtByBruteForce(const ProxyPlace&) const;
 
   std::span<const Leaf> leaves() const { return m_leaves; }
-  std::span<const std::uint32_t> trianglesOf(const Leaf& leaf) const {
+  std::span<const Listed> trianglesOf(const Leaf& leaf) const {
     return std::span(m_triangles).subspan(leaf.firstTriangle, leaf.triangleCount);
   }
   /// Whether the mesh is closed and consistently oriented, so that distances have a sign.
@@ -99,7 +104,7 @@ class SurfaceProxy {
   std::vector<std::uint32_t> m_bricks;
   std::vector<Block> m_blocks;
   std::vector<Leaf> m_leaves;
-  std::vector<std::uint32_t> m_triangles;
+  std::vector<Listed> m_triangles;
   Eigen::Vector3d m_lower = Eigen::Vector3d::Zero();
   double m_unit = 1, m_reach = 0, m_magnitude = 0;
   std::uint32_t m_units = 0;
