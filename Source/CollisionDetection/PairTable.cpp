@@ -209,8 +209,7 @@ class Check {
               "the sizes of the shapes are " + textOf(p) + " and " + textOf(q) +
                   "; their ratio must be at most 2^40");
     }
-    const bool any = m_method == Method::Auto || m_method == Method::Proximity;
-    support(meshes || continuous || any || m_method == Method::DistanceField,
+    support(meshes || m_method != Method::Intersection,
             "Method::Intersection is for two triangle meshes, not for " + nameOf(ofA.type) +
                 " and " + nameOf(ofB.type) + "; use Auto, Proximity or Continuous");
     support(m_method != Method::Proxy ||

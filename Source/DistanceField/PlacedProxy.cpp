@@ -34,8 +34,12 @@ HWY_ATTR void locateKernel(const Eigen::Vector3d* points, std::size_t size, cons
                       hn::Set(d, map.rotation[k][2])};
   };
   const Vector3<V> row0 = row(0), row1 = row(1), row2 = row(2);
-  const auto zero = hn::Zero(d), end = hn::Set(d, map.cells), perLength = hn::Set(d, map.perLength);
+  const auto zero = hn::Zero(d), end = hn::Set(d, map.units), perLength = hn::Set(d, map.perLength);
   const auto perRow = hn::Set(di, map.bricks), three = hn::Set(di, 3);
+  const auto indexOf = [&](auto x, auto y, auto z) HWY_ATTR {
+    return hn::ShiftLeft<4>(hn::And(z, three)) + hn::ShiftLeft<2>(hn::And(y, three)) +
+           hn::And(x, three);
+  };
   for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
     Vector3<V> p;
     hn::LoadInterleaved3(d, points[i].data(), p.x, p.y, p.z);
@@ -52,11 +56,10 @@ HWY_ATTR void locateKernel(const Eigen::Vector3d* points, std::size_t size, cons
                y = hn::DemoteTo(di, hn::IfThenElseZero(inside, at.y)),
                z = hn::DemoteTo(di, hn::IfThenElseZero(inside, at.z));
     const auto brick =
-        (hn::ShiftRight<2>(z) * perRow + hn::ShiftRight<2>(y)) * perRow + hn::ShiftRight<2>(x);
+        (hn::ShiftRight<4>(z) * perRow + hn::ShiftRight<4>(y)) * perRow + hn::ShiftRight<4>(x);
     hn::StoreU(hn::Or(brick, hn::ShiftRight<31>(x)), di, bricks + i);
-    const auto cell = hn::ShiftLeft<4>(hn::And(z, three)) + hn::ShiftLeft<2>(hn::And(y, three)) +
-                      hn::And(x, three);
-    hn::StoreU(cell, di, cells + i);
+    const auto cell = indexOf(hn::ShiftRight<2>(x), hn::ShiftRight<2>(y), hn::ShiftRight<2>(z));
+    hn::StoreU(hn::Or(cell, hn::ShiftLeft<6>(indexOf(x, y, z))), di, cells + i);
   }
   leaveLanes();
 }
@@ -128,9 +131,9 @@ PlacedProxy::PlacedProxy(const SurfaceProxy& proxy, const TriangleMesh& body, do
     m_map.translation[k] = translation[k];
     m_map.lower[k] = proxy.lower()[k];
   }
-  m_map.perLength = 1.0 / proxy.cellSize();
-  m_map.cells = proxy.cellCount();
-  m_map.bricks = static_cast<std::int32_t>(proxy.cellCount() / 4);
+  m_map.perLength = 1.0 / proxy.unit();
+  m_map.units = proxy.unitCount();
+  m_map.bricks = static_cast<std::int32_t>(proxy.unitCount() / 16);
 }
 
 double PlacedProxy::totalError(double error) const {
@@ -162,12 +165,17 @@ void PlacedProxy::findLeaves(std::size_t size, bool byBruteForce, Block& block) 
   }
   for (std::size_t i = 0; i < size; ++i)
     if (block.bricks[i] >= 0) hwy::Prefetch(m_proxy->brick(placeOf(i).brick));
-  for (std::size_t i = 0; i < size; ++i) {
-    if (block.bricks[i] < 0) continue;
+  const auto cellOf = [&](std::size_t i) -> const std::uint32_t* {
+    if (block.bricks[i] < 0) return nullptr;
     const ProxyPlace place = placeOf(i);
-    if (const auto* cell = m_proxy->cellOf(*m_proxy->brick(place.brick), place.cell))
-      hwy::Prefetch(cell);
-  }
+    return m_proxy->within(*m_proxy->brick(place.brick), place.cell);
+  };
+  for (std::size_t i = 0; i < size; ++i)
+    if (const std::uint32_t* cell = cellOf(i)) hwy::Prefetch(cell);
+  for (std::size_t i = 0; i < size; ++i)
+    if (const std::uint32_t* cell = cellOf(i))
+      if (const std::uint32_t* unit = m_proxy->within(*cell, placeOf(i).cell >> 6))
+        hwy::Prefetch(unit);
   const SurfaceProxy::Leaf* const leaves = m_proxy->leaves().data();
   for (std::size_t i = 0; i < size; ++i) {
     block.leaves[i] = m_proxy->leafAt(placeOf(i));
@@ -253,14 +261,30 @@ bool PlacedProxy::isInFront(std::uint32_t triangle, TriangleFeature feature,
 void PlacedProxy::findAmong(const SurfaceProxy::Leaf& leaf, const Vector3d& p, std::uint32_t point,
                             double limit, ProxyHits& out) const {
   const auto positions = m_body->now.body();
+  const auto triangles = m_proxy->trianglesOf(leaf);
+  const auto squareFrom = [&](const SurfaceProxy::Listed& t) {
+    const double dx = p[0] - t.x, dy = p[1] - t.y, dz = p[2] - t.z;
+    return dx * dx + dy * dy + dz * dz;
+  };
   VertexTriangleDistance nearest{};
   nearest.distance = std::numeric_limits<double>::infinity();
   std::uint32_t triangle = 0;
-  for (const std::uint32_t t : m_proxy->trianglesOf(leaf)) {
+  const auto test = [&](std::uint32_t t) {
     const auto& [a, b, c] = m_body->topology.triangles[t];
     const VertexTriangleDistance found =
         finiteVertexTriangleDistance(p, positions[a], positions[b], positions[c]);
-    if (found.distance < nearest.distance) nearest = found, triangle = t;
+    if (found.distance < nearest.distance || (found.distance == nearest.distance && t < triangle))
+      nearest = found, triangle = t;
+  };
+  // The triangle whose sphere is nearest comes first. It lets most others be left out.
+  const auto first =
+      std::min_element(triangles.begin(), triangles.end(),
+                       [&](const auto& l, const auto& r) { return squareFrom(l) < squareFrom(r); });
+  test(first->triangle);
+  for (const SurfaceProxy::Listed& other : triangles) {
+    const double reach = (nearest.distance + other.radius) * (1.0 + kProxySlack);
+    if (other.triangle != first->triangle && squareFrom(other) <= reach * reach)
+      test(other.triangle);
   }
   double distance = nearest.distance;
   if (m_proxy->isClosed() || m_outerSideOnly) {

@@ -35,7 +35,7 @@ struct ProxyMap {
   std::array<std::array<double, 3>, 3> rotation;  ///< rows: from the world to the body
   std::array<double, 3> translation;              ///< of the body
   std::array<double, 3> lower;                    ///< of the cells
-  double perLength, cells;                        ///< cells per L, and along each axis
+  double perLength, units;                        ///< units per L, and along each axis
   std::int32_t bricks;                            ///< along each axis
 };
 

@@ -18,7 +18,9 @@ struct ProxySettings {
   friend bool operator==(const ProxySettings&, const ProxySettings&) = default;
 };
 
-/// The index of a point's cell: of its brick of 4 x 4 x 4 cells, and of the cell in the brick.
+/// The smallest nodes have an edge of 1 unit. A cell has 4 x 4 x 4 of them, a brick 4 x 4 x 4
+/// cells. A point's place is its brick, the cell in the brick (the 6 lowest bits of `cell`) and the
+/// unit in the cell (the next 6 bits).
 struct ProxyPlace {
   static constexpr std::uint32_t kOutside = 0xffffffffu;
   std::uint32_t brick, cell;
@@ -42,13 +44,18 @@ class SurfaceProxy {
     double offset;                 ///< L: a point is normal . point - offset in front of the plane
     double error;                  ///< L: see law 1; 0 for triangles
     std::uint32_t firstTriangle, triangleCount;  ///< count 0: a plane
-    std::array<std::uint16_t, 3> lower;          ///< of its cells; both ends are for brute force
-    std::uint16_t size;                          ///< in cells, along each axis
+    std::array<std::uint16_t, 3> lower;          ///< in units; this and the size: for brute force
+    std::uint16_t size;                          ///< in units, along each axis
 
     bool hasPlane() const { return triangleCount == 0; }
     double distance(double x, double y, double z) const {
       return (normal[0] * x + normal[1] * y + normal[2] * z) - offset;
     }
+  };
+  /// A triangle of a list, in a sphere. Floats: the radius is that about the rounded centre.
+  struct Listed {
+    float x, y, z, radius;
+    std::uint32_t triangle;
   };
   static constexpr std::uint32_t kNoLeaf = 0xffffffffu;
 
@@ -57,15 +64,16 @@ class SurfaceProxy {
   /// The leaf of a place; kNoLeaf if there is none.
   std::uint32_t leafAt(const ProxyPlace& place) const {
     if (place.brick == ProxyPlace::kOutside) return kNoLeaf;
-    const std::uint32_t entry = m_bricks[place.brick];
-    if (entry == kNoLeaf || !(entry & kBlock)) return entry;
-    return m_blocks[entry & ~kBlock][place.cell];
+    std::uint32_t entry = m_bricks[place.brick];
+    if (const std::uint32_t* cell = within(entry, place.cell)) entry = *cell;
+    if (const std::uint32_t* unit = within(entry, place.cell >> 6)) entry = *unit;
+    return entry;
   }
   /// The same, found among all leaves.
   std::uint32_t leafAtByBruteForce(const ProxyPlace&) const;
 
   std::span<const Leaf> leaves() const { return m_leaves; }
-  std::span<const std::uint32_t> trianglesOf(const Leaf& leaf) const {
+  std::span<const Listed> trianglesOf(const Leaf& leaf) const {
     return std::span(m_triangles).subspan(leaf.firstTriangle, leaf.triangleCount);
   }
   /// Whether the mesh is closed and consistently oriented, so that distances have a sign.
@@ -73,15 +81,16 @@ class SurfaceProxy {
   double depth() const { return m_reach; }          ///< L: Validity::proxyDepth
   double magnitude() const { return m_magnitude; }  ///< L: largest coordinate of the cells
   const Eigen::Vector3d& lower() const { return m_lower; }
-  double cellSize() const { return m_cellSize; }       ///< L
-  std::uint32_t cellCount() const { return m_cells; }  ///< along each axis; 0 without triangles
+  double unit() const { return m_unit; }               ///< L
+  std::uint32_t unitCount() const { return m_units; }  ///< along each axis; 0 without triangles
   std::size_t bytes() const;
 
   // For a look-up in steps, so that memory is fetched ahead.
   const std::uint32_t* brick(std::uint32_t index) const { return &m_bricks[index]; }
-  /// Where the leaf of a place is written; null if `entry` is that of the whole brick.
-  const std::uint32_t* cellOf(std::uint32_t entry, std::uint32_t cell) const {
-    return entry == kNoLeaf || !(entry & kBlock) ? nullptr : &m_blocks[entry & ~kBlock][cell];
+  /// The entry of a cell in its brick, or of a unit in its cell. Null if `entry` holds for all.
+  const std::uint32_t* within(std::uint32_t entry, std::uint32_t index) const {
+    if (entry == kNoLeaf || !(entry & kBlock)) return nullptr;
+    return &m_blocks[entry & ~kBlock][index & 63];
   }
 
   /// Most triangles that are compared with nodes while the leaves are built, and most in lists.
@@ -95,10 +104,10 @@ class SurfaceProxy {
   std::vector<std::uint32_t> m_bricks;
   std::vector<Block> m_blocks;
   std::vector<Leaf> m_leaves;
-  std::vector<std::uint32_t> m_triangles;
+  std::vector<Listed> m_triangles;
   Eigen::Vector3d m_lower = Eigen::Vector3d::Zero();
-  double m_cellSize = 1, m_reach = 0, m_magnitude = 0;
-  std::uint32_t m_cells = 0;
+  double m_unit = 1, m_reach = 0, m_magnitude = 0;
+  std::uint32_t m_units = 0;
   bool m_isClosed = false;
 };
 

@@ -74,7 +74,7 @@ Mesh finePlate(std::uint32_t n, const Vector3d& half) {
 }
 
 Mesh organ(Random& random) {
-  Mesh mesh = sphere(48, 64, Vector3d::Zero(), 1.0);
+  Mesh mesh = sphere(28, 40, Vector3d::Zero(), 1.0);
   const Vector3d phase = randomPoint(random, 0, 6);
   for (Vector3d& p : mesh.positions)
     p *= 1.0 + 0.12 * std::sin(3 * p[0] + phase[0]) * std::cos(4 * p[1] + phase[1]) +
@@ -85,16 +85,16 @@ Mesh organ(Random& random) {
 std::vector<Scene> scenes() {
   Random random(5);
   std::vector<Scene> all{
-      {"sphere", sphere(40, 60, {0.1, 0.2, 0.3}, 1.0), true, 0.05, 0.01},
-      {"torus", torusMesh(60, 30), true, 0.04, 0.01},
+      {"sphere", sphere(24, 36, {0.1, 0.2, 0.3}, 1.0), true, 0.05, 0.02},
+      {"torus", torusMesh(40, 20), true, 0.04, 0.02},
       {"box", boxMesh({-1, -0.5, -0.25}, {1, 0.5, 0.25}), true, 0.03, 1e-3},
-      {"fine box", finePlate(12, {1, 0.7, 0.5}), true, 0.05, 1e-4},
-      {"thin plate", finePlate(16, {1, 1, 0.004}), true, 0.05, 1e-3},
-      {"open sheet", sheet(40, 0.0, 0.4), false, 0.03, 2e-3},
-      {"organ", organ(random), true, 0.05, 0.01},
+      {"fine box", finePlate(6, {1, 0.7, 0.5}), true, 0.05, 1e-4},
+      {"thin plate", finePlate(8, {1, 1, 0.004}), true, 0.05, 1e-3},
+      {"open sheet", sheet(24, 0.0, 0.4), false, 0.03, 4e-3},
+      {"organ", organ(random), true, 0.05, 0.02},
       {"star", starMesh(random), true, 0.05, 0.01},
       {"soup", soup(random, 60, 0.1), false, 0.03, 0.01},
-      {"wide thickness", sphere(40, 60, Vector3d::Zero(), 1.0), true, 0.4, 0.02},
+      {"wide thickness", sphere(24, 36, Vector3d::Zero(), 1.0), true, 0.3, 0.05},
   };
   const std::size_t unplaced = all.size();
   for (std::size_t i = 0; i < unplaced; i += 2) {
@@ -134,6 +134,13 @@ Points particlesAround(Random& random, const Scene& scene, std::size_t count) {
   return points;
 }
 
+PairSettings pairOf(const Scene& scene) {
+  PairSettings pair{.method = Method::Proxy, .thickness = scene.thickness};
+  pair.allowedError = scene.allowedError;
+  pair.widestNormalCone = 0.6;  // the meshes are coarse
+  return pair;
+}
+
 struct Detection {
   Detection(const Scene& scene, const Points& points, std::span<const double> radii,
             const Settings& settings)
@@ -141,10 +148,7 @@ struct Detection {
     smoke = detection.addPointSet(points, radii);
     body = detection.addTriangleMesh(scene.body.positions, scene.body.triangles);
     if (scene.isPlaced) detection.setTransform(body, scene.rotation, scene.translation);
-    detection.addCollisionPair(smoke, body,
-                               {.method = Method::Proxy,
-                                .thickness = scene.thickness,
-                                .allowedError = scene.allowedError});
+    detection.addCollisionPair(smoke, body, pairOf(scene));
     detection.detectCollision();
   }
   const CollisionData& data() const { return detection.collisionData(smoke, body); }
@@ -215,28 +219,38 @@ TEST(Proxy, EachContactIsWithinTheStatedErrorAndNoneIsMissing) {
     std::size_t contacts = 0;
     expectWithinError(scene, points, radii, run, contacts);
     EXPECT_GT(contacts, 200u);
+    // On curved meshes planes answered.
+    const std::string first = scene.name.substr(0, 5);
+    if (first == "spher" || first == "torus" || first == "organ" || first == "open ")
+      EXPECT_GT(run.data().validity().proxyError, 0.2 * scene.allowedError);
   }
 }
 
 TEST(Proxy, BruteForceThreadsAndSimdPathsGiveTheSameBits) {
   Random random(2);
-  std::size_t number = 0;
-  for (const Scene& scene : scenes()) {
+  const std::vector<Scene> all = scenes();
+  for (std::size_t i = 2; i<all.size(); i += kShareOfCases> 1 ? 12 : 3) {
+    const Scene& scene = all[i];
     SCOPED_TRACE(scene.name);
-    if (isLeftOut(number++)) continue;
     const Points points = particlesAround(random, scene, 301);
     const std::vector<double> radii = radiiOf(random, points.size(), 0.3 * scene.thickness);
     const Detection expected(scene, points, radii, settingsOf(Engine::Octree, 1));
-    const auto expectSame = [&](const Settings& settings) {
-      const Detection run(scene, points, radii, settings);
+    const auto expectSame = [&](const Detection& run) {
       EXPECT_EQ(run.data().hash(), expected.data().hash());
       EXPECT_EQ(run.data().validity(), expected.data().validity());
     };
-    expectSame(settingsOf(Engine::BruteForce));
-    expectSame(settingsOf(Engine::Octree, 3));
+    expectSame(Detection(scene, points, radii, settingsOf(Engine::BruteForce)));
+    Detection run(scene, points, radii, settingsOf(Engine::Octree, 3));
+    expectSame(run);
+    const Points elsewhere(points.size(), scene.translation);
     for (const std::string& path : simdPaths()) {
       useSimdPath(path);
-      expectSame(settingsOf(Engine::Octree));
+      run.detection.setPositions(run.smoke, elsewhere);
+      run.detection.detectCollision();
+      EXPECT_NE(run.data().hash(), expected.data().hash());
+      run.detection.setPositions(run.smoke, points);
+      run.detection.detectCollision();
+      expectSame(run);
     }
     useSimdPath("");
   }
@@ -261,12 +275,17 @@ TEST(Proxy, ParticlesMayBePlacedOrDisabled) {
   detection.setTransform(body, turn, shift);
   detection.detectCollision();
   const auto after = detection.collisionData(smoke, body).shape();
+  const double error = detection.collisionData(smoke, body).validity().proxyError;
   ASSERT_EQ(after.size(), before.size());
+  std::size_t same = 0;
   for (std::size_t i = 0; i < after.size(); ++i) {
+    // On the border of two leaves, rounding decides which of them answers.
     EXPECT_EQ(after[i].id, before[i].id);
-    EXPECT_NEAR(after[i].distance, before[i].distance, 1e-13);
-    EXPECT_LT((after[i].normal - turn * before[i].normal).norm(), 1e-13);
+    EXPECT_NEAR(after[i].distance, before[i].distance, 2 * error);
+    same += std::abs(after[i].distance - before[i].distance) < 1e-13 &&
+            (after[i].normal - turn * before[i].normal).norm() < 1e-13;
   }
+  EXPECT_GT(same, after.size() - after.size() / 50);
   const std::vector<std::uint32_t> disabled{before[0].id, before[3].id};
   detection.setDisabledElements(smoke, disabled);
   detection.detectCollision();
@@ -312,7 +331,7 @@ TEST(Proxy, SetTrianglesAndSettingsBuildNewLeaves) {
   const std::vector<double> radii(points.size(), 0.0);
   Detection run(all[0], points, radii, settingsOf(Engine::Octree));
   run.detection.setTriangles(run.body, all[1].body.positions, all[1].body.triangles);
-  PairSettings pair{.method = Method::Proxy, .thickness = 0.04, .allowedError = 0.01};
+  PairSettings pair = pairOf(all[1]);
   run.detection.setPairSettings(run.smoke, run.body, pair);
   run.detection.detectCollision();
   const Detection fresh(all[1], points, radii, settingsOf(Engine::Octree));
@@ -335,8 +354,7 @@ TEST(Proxy, SetTrianglesAndSettingsBuildNewLeaves) {
   EXPECT_EQ(run.data().errorBound(), 0.0);
   EXPECT_TRUE(run.data().shape().empty());
   EXPECT_FALSE(run.data().vertexTriangle().empty());
-  run.detection.setPairSettings(run.smoke, run.body,
-                                {.method = Method::Proxy, .thickness = 0.04, .allowedError = 0.01});
+  run.detection.setPairSettings(run.smoke, run.body, pairOf(all[1]));
   run.detection.detectCollision();
   EXPECT_EQ(run.data().hash(), fresh.data().hash());
 }
@@ -396,10 +414,8 @@ TEST(Proxy, PairsOfOneBodyShareLeaves) {
   const Points first = particlesAround(random, scene, 300), second = {first[5], first[7]};
   const std::vector<double> radii(first.size(), 0.0);
   Detection run(scene, first, radii, settingsOf(Engine::Octree));
-  const PairSettings pair{
-      .method = Method::Proxy, .thickness = scene.thickness, .allowedError = scene.allowedError};
   const GeometryId debris = run.detection.addPointSet(second);
-  run.detection.addCollisionPair(debris, run.body, pair);
+  run.detection.addCollisionPair(debris, run.body, pairOf(scene));
   FailingAllocation::arm(0);
   run.detection.detectCollision();
   FailingAllocation::disarm();
