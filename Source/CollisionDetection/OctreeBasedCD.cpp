@@ -192,7 +192,10 @@ struct OctreeBasedCD::Implementation {
       frame.collect(records, threadsFor(records), next);
     } else {
       for (PairRecord* record : records) {
-        findCandidatesByBruteForce(record->meshes(), record->candidates);
+        if (record->usesField())
+          record->candidates.clear();
+        else
+          findCandidatesByBruteForce(record->meshes(), record->candidates);
         record->candidatesSorted = true;
         record->candidatesVersion.commit(record->state());
       }
