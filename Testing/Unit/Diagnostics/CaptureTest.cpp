@@ -283,6 +283,8 @@ TEST_F(Capture, ReadsEarlierVersions) {
     write(text);
     return readCapture(file());
   };
+  replaceAll(" 1.0c6f7a0b5ed8dp-20 0 0p+0\n", " 1.0c6f7a0b5ed8dp-20 0\n");  // allowedError
+  EXPECT_EQ(asVersion(10).pairs[0].settings.allowedError, 0.0);
   replaceAll(" Auto Box\n", " Auto\n");  // bounds
   EXPECT_EQ(asVersion(9).settings.octree.bounds, OctreeBounds::Box);
   replaceAll(" 1.0c6f7a0b5ed8dp-20 0\n", " 1.0c6f7a0b5ed8dp-20\n");  // earliestTimeOnly
