@@ -454,6 +454,15 @@ TEST(FieldContacts, RefuseWhatTheyDoNotSupport) {
   expectRefused(unsupported, "which queries do not support", [&] {
     (void)detection.queries().closestPoint(field, {0, 0, 0}, 1.0);
   });
+  const GeometryId thread =
+      detection.addLineMesh(mesh.positions, std::vector<Segment>{{0, 1}}, 0.25);
+  detection.addCollisionPair(thread, body, byField());
+  const auto narrow = std::make_shared<const DistanceField>(DistanceField::build(
+      {same.positions, same.triangles}, {.errorBound = kErrorBound, .band = 0.3, .threads = 1}));
+  expectRefused(invalid, "less than the band",
+                [&] { detection.attachDistanceField(body, narrow); });
+  detection.removeCollisionPair(thread, body);
+  detection.attachDistanceField(body, narrow);
   detection.setPairSettings(other, body, {.thickness = 0.1});
   detection.attachDistanceField(body, nullptr);
   detection.setPositions(body, same.positions);
