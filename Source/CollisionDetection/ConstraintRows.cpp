@@ -53,6 +53,11 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
     for (const auto& contact : contacts.vertexTriangle()) add(contact, {&a, &b, &b, &b});
     for (const auto& contact : contacts.triangleVertex()) add(contact, {&b, &a, &a, &a});
     for (const auto& contact : contacts.edgeEdge()) add(contact, {&a, &a, &b, &b});
+    if (!contacts.shape().empty() && !(a.before.empty() && a.now.empty()) &&
+        !(b.before.empty() && b.now.empty()))
+      throw Error(ErrorCode::WrongPositionCount,
+                  "appendRows(): both sides have positions, but one of them is a shape, or a body "
+                  "whose distance field answered; leave that one empty");
     const SolverVertices& mesh = a.before.empty() && a.now.empty() ? b : a;  // the other: the shape
     for (const ShapeContact& contact : contacts.shape()) {
       const auto& [i, j, k] = contact.vertices;

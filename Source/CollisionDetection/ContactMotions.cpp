@@ -88,6 +88,10 @@ void appendMotions(const CollisionData& contacts, const ContactSide& a, const Co
     for (const auto& contact : contacts.vertexTriangle()) add(contact, a, b, 1);
     for (const auto& contact : contacts.triangleVertex()) add(contact, b, a, 1);
     for (const auto& contact : contacts.edgeEdge()) add(contact, a, b, 2);
+    if (!contacts.shape().empty() && !a.vertices.now.empty() && !b.vertices.now.empty())
+      throw Error(ErrorCode::WrongPositionCount,
+                  "appendMotions(): both sides have positions, but one of them is a shape, or a "
+                  "body whose distance field answered; leave that one empty");
     const ContactSide& mesh = a.vertices.now.empty() ? b : a;
     const ContactSide& shape = &mesh == &a ? b : a;
     for (const ShapeContact& contact : contacts.shape()) {

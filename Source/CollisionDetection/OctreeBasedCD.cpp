@@ -208,7 +208,7 @@ struct OctreeBasedCD::Implementation {
       frame.collect(records, threadsFor(records), next);
     } else {
       for (PairRecord* record : records) {
-        if (record->hasCandidates())
+        if (record->hasCandidates() && !record->usesField())
           findCandidatesByBruteForce(record->meshes(), record->candidates);
         else
           record->candidates.clear();

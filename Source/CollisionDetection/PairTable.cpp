@@ -309,8 +309,8 @@ void PairTable::checkFieldChange(GeometryId geometry, const DistanceField* field
     const DistanceField* const ofA = a == geometry ? field : record->a->field.get();
     const DistanceField* const ofB = b == geometry ? field : record->b->field.get();
     ErrorCode code;
-    const std::string fault = faultOf(ofB ? ofB : ofA, settings, 0.0,
-                                      code);  // both are meshes, or the other has no field
+    const std::string fault =
+        faultOf(ofB ? ofB : ofA, settings, (ofB ? record->a : record->b)->mesh.largestRadius, code);
     if (!fault.empty()) throw Error(code, nameOf(a, b) + ": " + fault, geometry);
   }
 }

@@ -81,6 +81,7 @@ class FeaturesNearField {
         m_reportsAll(settings.contacts == Contacts::All),
         m_skips(skips),
         m_reach(reachOf(field.field())),
+        m_band(field.field().band()),
         m_tolerance(depthToleranceOf(field.field())),
         m_error(2.0 * field.field().errorBound()),
         m_out(out) {}
@@ -167,6 +168,7 @@ class FeaturesNearField {
   bool excludes(const std::array<double, size>& values,
                 const std::array<std::uint32_t, size>& vertices, double target) const {
     if (!m_skips) return false;
+    if (target < -m_band - m_mesh.largestRadius) return true;  // no value is below
     const auto [lowest, highest] = std::minmax_element(values.begin(), values.end());
     if (!(*lowest > -m_reach)) return false;
     double square = 0.0;
@@ -199,35 +201,58 @@ class FeaturesNearField {
   const PlacedField& m_field;
   const double m_thickness;
   const bool m_reportsAll, m_skips;
-  const double m_reach, m_tolerance, m_error;
+  const double m_reach, m_band, m_tolerance, m_error;
   ShapeContactBuffers& m_out;
 };
 
-/// Finds the elements whose boxes overlap a box in the world.
-void findElementsIn(const SearchableGeometry& geometry, const Eigen::AlignedBox3d& region,
-                    PointQueryStack& stack, Buffer<std::uint32_t>& out) {
+/// Finds the elements of nodes that may have a point with a value of at most `limit`, which is
+/// below the reach, and some more.
+///
+/// The bound is that of FeaturesNearField::excludes(), from the centre of a node's box.
+void findElementsNear(const SearchableGeometry& geometry, const PlacedField& placed, double limit,
+                      PointQueryStack& stack, Buffer<std::uint32_t>& out) {
   out.clear();
   const Octree& octree = geometry.tree.octree();
   if (octree.size() == 0) return;
+  const Eigen::AlignedBox3d region = placed.domain();
   const Vector3d origin = worldOrigin(geometry);
   const BoxMap map = worldMap(geometry, origin, 0.0, false);
-  const double unit = 1.0 / geometry.tree.frame().scale;
-  const Vector3d error = Vector3d::Constant(
-      kShapeBoundError * (region.min().cwiseAbs().maxCoeff() + region.max().cwiseAbs().maxCoeff() +
-                          2.0 * origin.cwiseAbs().maxCoeff()));
-  const Vector3d lower = region.min() - origin - error, upper = region.max() - origin + error;
+  const double unit = 1.0 / geometry.tree.frame().scale,
+               error = kShapeBoundError *
+                       (region.min().cwiseAbs().maxCoeff() + region.max().cwiseAbs().maxCoeff() +
+                        2.0 * origin.cwiseAbs().maxCoeff()),
+               reach = reachOf(placed.field()),
+               above = limit + 2.0 * placed.field().errorBound() + error;
+  const Vector3d margin = Vector3d::Constant(error), lower = region.min() - origin - margin,
+                 upper = region.max() - origin + margin;
+  const auto isOutside = [&](const FloatBox& box) {
+    for (int k = 0; k < 3; ++k)
+      if (unit * double{box.lower[k]} > upper[k] || unit * double{box.upper[k]} < lower[k])
+        return true;
+    return false;
+  };
   const auto mayBeNear = [&](const FloatBox& stored) {
     if (stored.empty()) return false;
-    const FloatBox floats = map(stored);
-    if (floats.mayBeClamped()) return true;
-    for (int k = 0; k < 3; ++k)
-      if (unit * double{floats.lower[k]} > upper[k] || unit * double{floats.upper[k]} < lower[k])
-        return false;
-    return true;
+    const FloatBox box = map(stored);
+    if (box.mayBeClamped()) return true;
+    if (isOutside(box)) return false;
+    Vector3d centre, half;
+    for (int k = 0; k < 3; ++k) {
+      const double low = unit * double{box.lower[k]}, high = unit * double{box.upper[k]};
+      centre[k] = 0.5 * (low + high), half[k] = 0.5 * (high - low);
+    }
+    const double value = placed.lookup().value(placed.inField(centre + origin)),
+                 bound = value - (1.0 + kFieldLengthError) * half.norm();
+    return !(value > -reach && bound > above);
+  };
+  const auto mayBeInDomain = [&](const FloatBox& stored) {
+    if (stored.empty()) return false;
+    const FloatBox box = map(stored);
+    return box.mayBeClamped() || !isOutside(box);
   };
   forEachOverlapping(octree, mayBeNear, stack, [&](std::uint32_t begin, std::uint32_t end) {
     for (std::uint32_t i = begin; i < end; ++i)
-      if (mayBeNear(octree.boxes()[i])) out.push_back(octree.order()[i]);
+      if (mayBeInDomain(octree.boxes()[i])) out.push_back(octree.order()[i]);
   });
 }
 
@@ -240,7 +265,8 @@ FieldContacts::FieldContacts(const TriangleMesh& mesh, const PlacedField& field,
 void FieldContacts::start(const SearchableGeometry& geometry) {
   const MeshTopology& topology = m_mesh.topology;
   FieldScratch& scratch = m_scratch;
-  findElementsIn(geometry, m_field.domain(), scratch.stack, scratch.elements);
+  findElementsNear(geometry, m_field, m_settings.thickness + m_mesh.largestRadius, scratch.stack,
+                   scratch.elements);
   std::erase_if(scratch.elements, [&](std::uint32_t t) { return !topology.isEnabled(t); });
   if (++scratch.stamp == 0) scratch.stamp = 1, scratch.stamps.clear();
   if (scratch.stamps.size() < topology.vertexCount) scratch.stamps.resize(topology.vertexCount, 0u);
@@ -253,7 +279,7 @@ void FieldContacts::start(const SearchableGeometry& geometry) {
       scratch.stamps[v] = scratch.stamp;
       scratch.vertices.push_back(v);
     }
-    // An edge whose owner is not among the elements is outside the domain.
+    // An edge whose owner is not among the elements has no point within the thickness.
     for (const std::uint32_t edge : topology.triangleEdges[t])
       if (edge != kNoEdge) scratch.least[edge] = kNone;
   }

@@ -85,6 +85,7 @@ class DeepPointSearch {
       m_largestRadius = std::max(m_largestRadius, corner.radius);
       part.add(corner);
     }
+    if (m_limit < -m_band - m_largestRadius) return;  // no value is below
     searchRoots(part, 0, {});
   }
 
@@ -103,9 +104,13 @@ class DeepPointSearch {
     if (axis == 3) {
       const CellEntry entry =
           m_cells.roots[(root[2] * m_cells.size[1] + root[1]) * m_cells.size[0] + root[0]];
-      Part inCell = part;
-      for (std::size_t i = 0; i < inCell.size; ++i)
+      if (entry.kind() == CellKind::Outside) return;
+      Part inCell;
+      inCell.size = part.size;
+      for (std::size_t i = 0; i < part.size; ++i) {
+        inCell.corners[i] = part.corners[i];
         for (int k = 0; k < 3; ++k) inCell.corners[i].at[k] -= root[k];
+      }
       return searchCell(inCell, entry);
     }
     double lower = std::numeric_limits<double>::infinity(), upper = -lower;
@@ -151,6 +156,7 @@ class DeepPointSearch {
   void searchBlock(const Part& part, const FieldCells::Block& children, int axis, unsigned octant) {
     if (part.size == 0) return;
     if (axis == 3) {
+      if (children[octant].kind() == CellKind::Outside) return;  // as searchCell() does
       Part inChild;
       inChild.size = part.size;
       for (std::size_t i = 0; i < part.size; ++i) {

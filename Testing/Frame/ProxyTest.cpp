@@ -222,7 +222,7 @@ TEST(Proxy, EachContactIsWithinTheStatedErrorAndNoneIsMissing) {
     // On curved meshes planes answered.
     const std::string first = scene.name.substr(0, 5);
     if (first == "spher" || first == "torus" || first == "organ" || first == "open ")
-      EXPECT_GT(run.data().validity().proxyError, 0.2 * scene.allowedError);
+      EXPECT_GT(run.data().errorBound(), 0.2 * scene.allowedError);
   }
 }
 
@@ -275,7 +275,7 @@ TEST(Proxy, ParticlesMayBePlacedOrDisabled) {
   detection.setTransform(body, turn, shift);
   detection.detectCollision();
   const auto after = detection.collisionData(smoke, body).shape();
-  const double error = detection.collisionData(smoke, body).validity().proxyError;
+  const double error = detection.collisionData(smoke, body).errorBound();
   ASSERT_EQ(after.size(), before.size());
   std::size_t same = 0;
   for (std::size_t i = 0; i < after.size(); ++i) {

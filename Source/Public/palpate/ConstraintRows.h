@@ -48,9 +48,9 @@ struct ConstraintRow {
   PALPATE_EXPORT double gap(std::span<const Eigen::Vector3d> positions) const;
 };
 
-/// The place of one geometry's vertices among those of a solver. Leave it empty for a shape. Both
-/// arrays are those of the step that was detected: `before` has the positions at the last
-/// advance(), or those that you passed with two arrays.
+/// The place of one geometry's vertices among those of a solver. Leave it empty for a shape, and
+/// for the body whose distance field answered. Both arrays are those of the step that was detected:
+/// `before` has the positions at the last advance(), or those that you passed with two arrays.
 struct SolverVertices {
   std::uint32_t first = 0;                       ///< the solver's number of vertex 0
   std::span<const Eigen::Vector3d> before, now;  ///< L, in the world, one per vertex
@@ -66,7 +66,8 @@ struct ShapeMotion {
 };
 
 /// Appends a row for each contact of a pair (a, b), linearised at its timeOfImpact, whatever method
-/// found it. For a pair with a shape, leave the shape's SolverVertices empty.
+/// found it. For a pair with a shape or a distance field, leave the SolverVertices of the shape or
+/// of the field's body empty. The motion of that body is passed as that of a shape.
 ///
 /// shape    the motion of the pair's shape. Its rows then refer to the shape at the step's end: the
 ///          point of the shape that the contact touches moves on to there. Without it, the shape
@@ -75,7 +76,8 @@ struct ShapeMotion {
 /// Order    vertexTriangle(), triangleVertex(), edgeEdge(), shape(). Contacts in shapeShape() have
 ///          no row.
 /// Errors   WrongPositionCount names the first vertex of a contact for which `before` or `now` has
-///          no position. No row is added then.
+///          no position. WrongPositionCount also if both sides have positions, and contacts are in
+///          shape(). No row is added then.
 /// Cost     linear in the contacts.
 PALPATE_EXPORT void appendRows(const CollisionData& contacts, const SolverVertices& a,
                                const SolverVertices& b, std::vector<ConstraintRow>& rows,

@@ -1,4 +1,5 @@
 #include <palpate/Capture.h>
+#include <palpate/ConstraintRows.h>
 #include <palpate/DistanceField.h>
 #include <palpate/OctreeBasedCD.h>
 
@@ -300,6 +301,31 @@ TEST(FieldContacts, FollowTheBody) {
   EXPECT_TRUE(detection.collisionData(other, field).shape().empty());
 }
 
+/// A row's gap is the distance at the step's end. The body's side is left empty.
+TEST(FieldContacts, MakeRows) {
+  const Mesh mesh = sphere(12, 16, {1.0, 0, 0.6}, 0.35);
+  OctreeBasedCD detection(Settings{.threads = 1});
+  const GeometryId body = detection.addTriangleMesh(bodyMesh().positions, bodyMesh().triangles),
+                   other = detection.addTriangleMesh(mesh.positions, mesh.triangles);
+  detection.attachDistanceField(body, bodyField());
+  detection.addCollisionPair(body, other, byField());
+  detection.detectCollision();
+  const CollisionData& data = detection.collisionData(body, other);
+  const SolverVertices ofMesh{0, mesh.positions, mesh.positions},
+      ofBody{0, bodyMesh().positions, bodyMesh().positions};
+  std::vector<ConstraintRow> rows;
+  appendRows(data, {}, ofMesh, rows);
+  ASSERT_EQ(rows.size(), data.shape().size());
+  ASSERT_FALSE(rows.empty());
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    EXPECT_NEAR(rows[i].gap(mesh.positions), data.shape()[i].distance, 1e-12);
+  expectRefused(ErrorCode::WrongPositionCount, "both sides have positions",
+                [&] { appendRows(data, ofBody, ofMesh, rows); });
+  std::vector<ContactMotion> motions;
+  expectRefused(ErrorCode::WrongPositionCount, "both sides have positions",
+                [&] { appendMotions(data, {.vertices = ofBody}, {.vertices = ofMesh}, motions); });
+}
+
 /// Beyond the band inside, the field is constant: the normal is the last axis of its frame.
 TEST(FieldContacts, HaveTheLastAxisWhereTheFieldIsConstant) {
   const Mesh box = boxMesh({-1, -1, -1}, {1, 1, 1});
@@ -428,6 +454,15 @@ TEST(FieldContacts, RefuseWhatTheyDoNotSupport) {
   expectRefused(unsupported, "which queries do not support", [&] {
     (void)detection.queries().closestPoint(field, {0, 0, 0}, 1.0);
   });
+  const GeometryId thread =
+      detection.addLineMesh(mesh.positions, std::vector<Segment>{{0, 1}}, 0.25);
+  detection.addCollisionPair(thread, body, byField());
+  const auto narrow = std::make_shared<const DistanceField>(DistanceField::build(
+      {same.positions, same.triangles}, {.errorBound = kErrorBound, .band = 0.3, .threads = 1}));
+  expectRefused(invalid, "less than the band",
+                [&] { detection.attachDistanceField(body, narrow); });
+  detection.removeCollisionPair(thread, body);
+  detection.attachDistanceField(body, narrow);
   detection.setPairSettings(other, body, {.thickness = 0.1});
   detection.attachDistanceField(body, nullptr);
   detection.setPositions(body, same.positions);
