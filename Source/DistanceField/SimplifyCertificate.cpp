@@ -17,8 +17,9 @@ namespace {
 
 /// Most halvings of a triangle's edges.
 constexpr int kMostDepth = 7;
-/// Relative to the largest coordinate. A corner of a part of a triangle is off by at most kMostDepth
-/// roundings of each coordinate, 2^-53 each; any point of the part by at most those of its corners.
+/// Relative to the largest coordinate. A corner of a part of a triangle is off by at most
+/// kMostDepth roundings of each coordinate, 2^-53 each; any point of the part by at most those of
+/// its corners.
 constexpr double kPartError = 0x1p-48;
 /// Relative error of a length that is computed from rounded differences, with a margin.
 constexpr double kLengthError = 0x1p-48;

@@ -17,7 +17,8 @@ namespace palpate {
 /// theorems and their proofs.
 class SimplifyCertificate {
  public:
-  /// largest: L, of all coordinates of triangles and mesh. The geometry's octree must be up to date.
+  /// largest: L, of all coordinates of triangles and mesh. The geometry's octree must be up to
+  /// date.
   SimplifyCertificate(const SearchableGeometry&, double maxDistance, double largest);
 
   /// Writes the triangles of the mesh with which this one has a point in common, by their places in
@@ -27,8 +28,8 @@ class SimplifyCertificate {
   bool touches(const Corners&, PointQueryStack&) const;
   bool isInside(const Eigen::Vector3d&, PointQueryStack&) const;
   /// A bound on the distance of all points of the triangle from the mesh's surface, at most the
-  /// maxDistance; none if there is no proof. The triangle must not touch the mesh, and not be inside
-  /// it.
+  /// maxDistance; none if there is no proof. The triangle must not touch the mesh, and not be
+  /// inside it.
   std::optional<double> distanceBound(const Corners&, PointQueryStack&) const;
 
  private:

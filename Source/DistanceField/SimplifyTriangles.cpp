@@ -35,8 +35,8 @@ std::vector<Triangle> simplifyTriangles(std::span<const Eigen::Vector3d> positio
   std::vector<unsigned int> simplified(indices.size());
   simplified.resize(meshopt_simplify(simplified.data(), indices.data(), indices.size(),
                                      floats[0].data(), floats.size(), sizeof(floats[0]), 0,
-                                     static_cast<float>(error / extent),
-                                     meshopt_SimplifyLockBorder, nullptr));
+                                     static_cast<float>(error / extent), meshopt_SimplifyLockBorder,
+                                     nullptr));
   std::vector<Triangle> result(simplified.size() / 3);
   for (std::size_t i = 0; i < simplified.size(); ++i)
     result[i / 3][i % 3] = vertices[simplified[i]];
