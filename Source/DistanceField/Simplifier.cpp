@@ -23,11 +23,12 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr int kMostRounds = 12;
+/// In kVerbatimRound, the whole mesh gets level kVerbatim.
+constexpr int kMostRounds = 24, kVerbatimRound = 14;
 /// From this level on, the mesh keeps its triangles. Finer levels only move them less.
 constexpr std::uint8_t kVerbatim = 2, kFinest = 9;
 /// Of maxDistance: the error at level 0, which each level divides by four.
-constexpr double kFirstError = 0.3;
+constexpr double kFirstError = 0.25;
 /// Of the error: the least offset.
 constexpr double kOffsetShare = 1.0 / 16.0;
 /// Of maxDistance: the longest way of a vertex.
@@ -54,6 +55,8 @@ Simplifier::Simplifier(const SearchableGeometry& body, const SimplifySettings& s
 SimplifiedMesh Simplifier::run() {
   findSides();
   for (m_round = 1; m_round <= kMostRounds; ++m_round) {
+    if (m_round == kVerbatimRound)
+      for (std::uint8_t& level : m_levels) level = std::max(level, kVerbatim);
     collapse();
     numberVertices();
     measureProtrusions();
@@ -61,11 +64,9 @@ SimplifiedMesh Simplifier::run() {
     liftTouching();
     boundDistances();
     checkComponents();
-    const std::size_t failed = refineFailed();
-    if (failed == 0) {
-      const double distance = *std::max_element(m_bounds.begin(), m_bounds.end());
-      return {std::move(m_moved), std::move(m_triangles), distance, m_round};
-    }
+    if (refineFailed() > 0) continue;
+    const double distance = *std::max_element(m_bounds.begin(), m_bounds.end());
+    return {std::move(m_moved), std::move(m_triangles), distance, m_round};
   }
   giveUp(m_lastFailure);
 }
@@ -121,6 +122,7 @@ Simplifier::Components Simplifier::componentsOf(std::size_t vertices,
 /// certificate then fails.
 void Simplifier::findSides() {
   const auto positions = m_body.mesh.now.body();
+  m_normals.assign(positions.size(), Vector3d::Zero());
   std::vector<std::uint32_t> largest(positions.size(), kNone);
   std::vector<double> areas(positions.size(), 0.0);
   Eigen::AlignedBox3d box;
@@ -128,7 +130,11 @@ void Simplifier::findSides() {
     const auto& [a, b, c] = m_input[t];
     const double area = (positions[b] - positions[a]).cross(positions[c] - positions[a]).norm();
     const std::uint32_t component = m_components[a];
-    for (const std::uint32_t v : m_input[t]) box.extend(positions[v]);
+    const Vector3d normal = unitNormal(positions, m_input[t]);
+    for (const std::uint32_t v : m_input[t]) {
+      box.extend(positions[v]);
+      m_normals[v] += normal;
+    }
     if (largest[component] != kNone && !(area > areas[component])) continue;
     largest[component] = t;
     areas[component] = area;
@@ -176,11 +182,15 @@ void Simplifier::collapseLevel(std::uint8_t level) {
 void Simplifier::markOpenEdges() {
   const MeshDefects defects = findMeshDefects(m_triangles);
   if (defects.closed()) return;
-  std::vector<std::uint8_t> isAt(m_body.mesh.now.size(), 0);
-  for (const auto* edges : {&defects.open, &defects.flipped, &defects.shared})
-    for (const auto& [p, q] : *edges) isAt[p] = isAt[q] = 1;
+  std::vector<Segment> edges;
+  for (const auto* list : {&defects.open, &defects.flipped, &defects.shared})
+    edges.insert(edges.end(), list->begin(), list->end());
+  std::sort(edges.begin(), edges.end());
   for (std::size_t t = 0; t < m_triangles.size(); ++t)
-    for (const std::uint32_t v : m_triangles[t]) m_failed[t] |= isAt[v];
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto [p, q] = std::minmax(m_triangles[t][i], m_triangles[t][(i + 1) % 3]);
+      m_failed[t] |= std::binary_search(edges.begin(), edges.end(), Segment{p, q});
+    }
 }
 
 /// A component that is as small as the error may collapse to nothing.
@@ -206,8 +216,16 @@ void Simplifier::numberVertices() {
     m_origin.push_back(v);
     m_start.push_back(positions[v]);
   }
-  for (Triangle& triangle : m_triangles)
-    for (std::uint32_t& v : triangle) v = numbers[v];
+  // Collapses may leave folds. A folded triangle has to move with the others, against its normal.
+  for (std::size_t t = 0; t < m_triangles.size(); ++t) {
+    Vector3d normal = Vector3d::Zero();
+    for (std::uint32_t& v : m_triangles[t]) {
+      normal += m_normals[v];
+      v = numbers[v];
+    }
+    if (m_levelOf[t] < kVerbatim && normal.dot(unitNormal(m_start, m_triangles[t])) < 0.0)
+      m_sideOf[t] = static_cast<std::int8_t>(-m_sideOf[t]);
+  }
 }
 
 /// How far the mesh's vertices are outside the simplified surface, at the triangles nearest to
@@ -367,10 +385,49 @@ std::size_t Simplifier::refineFailed() {
 }
 
 void Simplifier::giveUp(const Vector3d& place) const {
+  if (const auto pair = findCrossing())
+    throw Error(ErrorCode::UnsupportedMethod,
+                nameOf(m_body.id) + " crosses or touches itself: triangles " +
+                    std::to_string(pair->a) + " and " + std::to_string(pair->b) +
+                    " have a common point, and there is no certified simplification near " +
+                    textOf(place),
+                m_body.id, pair->a);
   throw Error(ErrorCode::NotAvailable,
               nameOf(m_body.id) + " has no certified simplification within maxDistance " +
                   textOf(m_settings.maxDistance) + ": the proof fails near " + textOf(place),
               m_body.id);
+}
+
+/// The first two triangles of the mesh that have a common point and no common vertex.
+std::optional<ElementPair> Simplifier::findCrossing() const {
+  struct Search {
+    const SearchableGeometry& body;
+    std::optional<ElementPair> first{};
+    void test(const ElementPair& pair) {
+      const auto& triangles = body.mesh.topology.triangles;
+      const auto& now = body.mesh.now;
+      const auto& [a, b, c] = triangles[pair.a];
+      const auto& [d, e, f] = triangles[pair.b];
+      SignCounts counts;
+      if ((!first || pair < *first) &&
+          intersectTriangles({now[a], now[b], now[c]}, {now[d], now[e], now[f]}, counts)
+              .intersect())
+        first = pair;
+    }
+  } search{m_body};
+  const Octree& octree = m_body.tree.octree();
+  const TreePair trees{&octree, &octree, m_body.tree.ordered().data()};
+  TraversalStack starts, stack;
+  PairSink sink;
+  sink.start(
+      [](void* context, std::span<const ElementPair> pairs) {
+        for (const ElementPair& pair : pairs) static_cast<Search*>(context)->test(pair);
+      },
+      &search);
+  startPairs(trees, 1, starts);
+  traverse(trees, starts.pairs, stack, sink);
+  sink.flush();
+  return search.first;
 }
 
 }  // namespace palpate

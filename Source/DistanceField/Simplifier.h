@@ -11,6 +11,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -48,6 +49,7 @@ class Simplifier {
   void checkComponents();
   std::size_t refineFailed();
   [[noreturn]] void giveUp(const Eigen::Vector3d& place) const;
+  std::optional<ElementPair> findCrossing() const;
 
   Corners cornersOf(const Triangle&) const;
   double errorOf(std::uint8_t level) const;   ///< L: for simplifyTriangles()
@@ -65,8 +67,9 @@ class Simplifier {
   Components m_components;           ///< of the mesh
   std::vector<std::int8_t> m_sides;  ///< per component's lowest vertex: as for outwardWays(), or 0
                                      ///< for a shell inside the mesh
-  std::vector<std::uint8_t> m_levels;  ///< of the mesh's triangles
-  std::vector<std::uint8_t> m_isBad;   ///< per component's lowest vertex: all of it failed
+  std::vector<Eigen::Vector3d> m_normals;  ///< of the mesh's vertices, of any length
+  std::vector<std::uint8_t> m_levels;      ///< of the mesh's triangles
+  std::vector<std::uint8_t> m_isBad;       ///< per component's lowest vertex: all of it failed
   int m_round = 0;
   Eigen::Vector3d m_lastFailure = Eigen::Vector3d::Zero();  ///< L: a place
   double m_reported = 0.0;

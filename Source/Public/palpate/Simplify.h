@@ -31,7 +31,7 @@ struct SimplifiedMesh {
   /// maxDistance. This is a proven bound, not the largest distance itself.
   double distance = 0.0;
   /// How often the mesh was simplified; each time after the first, more finely where the proof had
-  /// failed. At most 12.
+  /// failed. At most 24.
   int rounds = 0;
 };
 
