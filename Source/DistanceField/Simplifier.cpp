@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <optional>
@@ -33,6 +34,9 @@ constexpr double kFirstError = 0.25;
 constexpr double kOffsetShare = 1.0 / 16.0;
 /// Of maxDistance: the longest way of a vertex.
 constexpr double kLongestWay = 0.95;
+/// If a greater share of a level fails, all of it gets the next level. Levels do not meet without
+/// many small triangles.
+constexpr double kMostFailures = 0.1;
 /// How often triangles that touch the mesh are moved further.
 constexpr int kMostLifts = 4;
 /// Of the longest side: how far from a triangle its sides are looked at.
@@ -362,9 +366,12 @@ void Simplifier::checkComponents() {
 std::size_t Simplifier::refineFailed() {
   std::vector<std::uint8_t> next(m_components.size(), 0);  // per vertex of the mesh: least level
   std::size_t failed = 0;
+  std::array<std::size_t, kFinest + 1> ofLevel{}, failedOfLevel{};
   for (std::size_t t = 0; t < m_triangles.size(); ++t) {
+    ++ofLevel[m_levelOf[t]];
     if (!m_failed[t]) continue;
     ++failed;
+    ++failedOfLevel[m_levelOf[t]];
     m_lastFailure = m_start[m_triangles[t][0]];
     if (m_levelOf[t] == kFinest) giveUp(m_lastFailure);
     for (const std::uint32_t v : m_triangles[t])
@@ -374,6 +381,10 @@ std::size_t Simplifier::refineFailed() {
     if (m_owner[v] != kNone && m_failed[m_owner[v]])
       next[v] = static_cast<std::uint8_t>(m_levelOf[m_owner[v]] + 1);
   for (std::size_t t = 0; t < m_input.size(); ++t) {
+    const std::uint8_t level = m_levels[t];
+    if (level<kVerbatim&& static_cast<double>(failedOfLevel[level])> kMostFailures *
+        static_cast<double>(ofLevel[level]))
+      ++m_levels[t];
     if (m_isBad[m_components[m_input[t][0]]]) {
       ++failed;
       m_lastFailure = m_body.mesh.now[m_input[t][0]];
