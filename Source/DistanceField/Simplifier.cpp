@@ -37,6 +37,10 @@ constexpr double kLongestWay = 0.95;
 /// If a greater share of a level fails, all of it gets the next level. Levels do not meet without
 /// many small triangles.
 constexpr double kMostFailures = 0.1;
+/// If the parts of finer levels make the result so much larger, all of it is simplified anew with
+/// half of the error.
+constexpr std::size_t kMostGrowth = 3;
+constexpr int kMostRestarts = 2;
 /// How often triangles that touch the mesh are moved further.
 constexpr int kMostLifts = 4;
 /// Of the longest side: how far from a triangle its sides are looked at.
@@ -62,6 +66,8 @@ SimplifiedMesh Simplifier::run() {
     if (m_round == kVerbatimRound)
       for (std::uint8_t& level : m_levels) level = std::max(level, kVerbatim);
     collapse();
+    if (m_round == 1) m_firstCount = m_triangles.size();
+    if (m_restarts < kMostRestarts && m_triangles.size() > kMostGrowth * m_firstCount) restart();
     numberVertices();
     measureProtrusions();
     moveOutward();
@@ -75,8 +81,15 @@ SimplifiedMesh Simplifier::run() {
   giveUp(m_lastFailure);
 }
 
+void Simplifier::restart() {
+  ++m_restarts;
+  std::fill(m_levels.begin(), m_levels.end(), std::uint8_t{0});
+  collapse();
+  m_firstCount = m_triangles.size();
+}
+
 double Simplifier::errorOf(std::uint8_t level) const {
-  return std::ldexp(kFirstError * m_settings.maxDistance, -2 * level);
+  return std::ldexp(kFirstError * m_settings.maxDistance, -2 * level - m_restarts);
 }
 double Simplifier::offsetOf(std::uint8_t level) const { return kOffsetShare * errorOf(level); }
 

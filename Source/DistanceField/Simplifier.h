@@ -37,6 +37,7 @@ class Simplifier {
 
   // ---- In each round ----
   void collapse();
+  void restart();
   void collapseLevel(std::uint8_t level);
   void markOpenEdges();
   void markLostComponents();
@@ -70,7 +71,8 @@ class Simplifier {
   std::vector<Eigen::Vector3d> m_normals;  ///< of the mesh's vertices, of any length
   std::vector<std::uint8_t> m_levels;      ///< of the mesh's triangles
   std::vector<std::uint8_t> m_isBad;       ///< per component's lowest vertex: all of it failed
-  int m_round = 0;
+  int m_round = 0, m_restarts = 0;
+  std::size_t m_firstCount = 0;  ///< of triangles, before any part had a finer level
   Eigen::Vector3d m_lastFailure = Eigen::Vector3d::Zero();  ///< L: a place
   double m_reported = 0.0;
 

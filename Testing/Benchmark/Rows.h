@@ -35,6 +35,7 @@ void lineRows(Report&, const RowOptions&);     ///< a suture with itself and wit
 void shapeRows(Report&, const RowOptions&);    ///< a capsule in a sheet, and in points
 void insideRows(Report&, const RowOptions&);   ///< vertices inside a body, particles around it
 void rigidRows(Report&, const RowOptions&);    ///< a large bone moved by its transform
+void coarseRows(Report&, const RowOptions&);   ///< a bone behind its certified simplification
 void boundsRows(Report&, const RowOptions&);   ///< placed bodies with each kind of bounds
 void continuousRows(Report&, const RowOptions&);  ///< times of impact of the published steps
 void validityRows(Report&, const RowOptions&);    ///< the share of validity() in a frame

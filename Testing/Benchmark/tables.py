@@ -180,6 +180,7 @@ TABLES = {
     "points": metrics("points", "1 / 2 threads"),
     "shapes": metrics("shapes", "1 thread"),
     "rigid": metrics("rigid", "1 / 2 threads"),
+    "coarse": by_engine("coarse", "frame ms"),
     "bounds": metrics("bounds", "1 thread"),
     "inside": metrics("inside", "1 / 2 threads"),
 }
