@@ -17,6 +17,7 @@
 #include <numeric>
 #include <optional>
 #include <string>
+#include <utility>
 
 namespace palpate {
 
@@ -169,6 +170,9 @@ void Simplifier::findSides() {
     else if (!m_certificate.isInside(centre - step, stack))
       side = -1;
   }
+  // Not all shells are inside others.
+  if (std::all_of(m_sides.begin(), m_sides.end(), [](std::int8_t side) { return side == 0; }))
+    std::fill(m_sides.begin(), m_sides.end(), std::int8_t{1});
 }
 
 // ---- In each round ----
@@ -369,9 +373,11 @@ void Simplifier::checkComponents() {
   makeBody(m_moved, m_triangles, m_threads, surface);
   const SimplifyCertificate inside(surface, m_settings.maxDistance, 0.0);
   const auto positions = m_body.mesh.now.body();
+  std::vector<std::uint8_t> isChecked(m_components.size(), 0);
   for (const Triangle& triangle : m_input) {
-    const std::uint32_t v = triangle[0];
-    if (m_components[v] == v && !inside.isInside(positions[v], stack)) m_isBad[v] = 1;
+    const std::uint32_t component = m_components[triangle[0]];
+    if (std::exchange(isChecked[component], std::uint8_t{1})) continue;
+    if (!inside.isInside(positions[component], stack)) m_isBad[component] = 1;
   }
 }
 

@@ -208,10 +208,26 @@ TEST(Simplify, RefusesMeshesThatTouchThemselves) {
       expectRefused(ErrorCode::NotAvailable, "the proof fails near ",
                     [&] { simplified(mesh, 0.01); });
   }
+  Mesh spindle = torusMesh(24, 16);
+  for (Eigen::Vector3d& p : spindle.positions) {
+    const double length = std::hypot(p[0], p[1]), shorter = (length - 0.9) / length;
+    p = {shorter * p[0], shorter * p[1], p[2]};
+  }
+  expectRefused(ErrorCode::UnsupportedMethod, "crosses or touches itself: triangles ",
+                [&] { simplified(spindle, 0.01); });
   Mesh touching = boxMesh({0, 0, 0}, {1, 1, 1});
   append(touching, boxMesh({1, 0.2, 0.3}, {2, 0.7, 0.8}));
   expectRefused(ErrorCode::UnsupportedMethod, "crosses or touches itself: triangles ",
                 [&] { simplified(touching, 0.01); });
+}
+
+TEST(Simplify, ExtremeDistances) {
+  Random random(4);
+  const Mesh organ = organMesh(random, 12, 16);
+  for (const double share : {1e-8, 1e-6, 1.0, 100.0}) {
+    SCOPED_TRACE(share);
+    check(random, organ, simplified(organ, share), share * diagonalOf(organ));
+  }
 }
 
 TEST(Simplify, NarrowGapsNeedSmallOffsets) {
