@@ -79,7 +79,7 @@ SimplifiedMesh Simplifier::run() {
     const double distance = *std::max_element(m_bounds.begin(), m_bounds.end());
     return {std::move(m_moved), std::move(m_triangles), distance, m_round};
   }
-  giveUp(m_lastFailure);
+  giveUp();
 }
 
 void Simplifier::restart() {
@@ -391,8 +391,10 @@ std::size_t Simplifier::refineFailed() {
     if (!m_failed[t]) continue;
     ++failed;
     ++failedOfLevel[m_levelOf[t]];
-    m_lastFailure = m_start[m_triangles[t][0]];
-    if (m_levelOf[t] == kFinest) giveUp(m_lastFailure);
+    m_failure = {m_start[m_triangles[t][0]], {}};
+    for (const std::uint32_t v : m_triangles[t])
+      if (std::isinf(m_ways[v].lengthPerOffset)) m_failure.stuck = m_origin[v];
+    if (m_levelOf[t] == kFinest) giveUp();
     for (const std::uint32_t v : m_triangles[t])
       next[m_origin[v]] = std::max(next[m_origin[v]], static_cast<std::uint8_t>(m_levelOf[t] + 1));
   }
@@ -406,26 +408,30 @@ std::size_t Simplifier::refineFailed() {
       ++m_levels[t];
     if (m_isBad[m_components[m_input[t][0]]]) {
       ++failed;
-      m_lastFailure = m_body.mesh.now[m_input[t][0]];
-      if (m_levels[t]++ == kFinest) giveUp(m_lastFailure);
+      m_failure = {m_body.mesh.now[m_input[t][0]], {}};
+      if (m_levels[t]++ == kFinest) giveUp();
     }
     for (const std::uint32_t v : m_input[t]) m_levels[t] = std::max(m_levels[t], next[v]);
   }
   return failed;
 }
 
-void Simplifier::giveUp(const Vector3d& place) const {
+void Simplifier::giveUp() const {
+  const std::string place = textOf(m_failure.place);
   if (const auto pair = findCrossing())
     throw Error(ErrorCode::UnsupportedMethod,
                 nameOf(m_body.id) + " crosses or touches itself: triangles " +
                     std::to_string(pair->a) + " and " + std::to_string(pair->b) +
-                    " have a common point, and there is no certified simplification near " +
-                    textOf(place),
+                    " have a common point, and there is no certified simplification near " + place,
                 m_body.id, pair->a);
-  throw Error(ErrorCode::NotAvailable,
-              nameOf(m_body.id) + " has no certified simplification within maxDistance " +
-                  textOf(m_settings.maxDistance) + ": the proof fails near " + textOf(place),
-              m_body.id);
+  throw Error(
+      ErrorCode::NotAvailable,
+      nameOf(m_body.id) + " has no certified simplification within maxDistance " +
+          textOf(m_settings.maxDistance) + ": the proof fails near " + place +
+          (m_failure.stuck ? "; no displacement of vertex " + std::to_string(*m_failure.stuck) +
+                                 " moves all of its triangles outward"
+                           : ""),
+      m_body.id, m_failure.stuck);
 }
 
 /// The first two triangles of the mesh that have a common point and no common vertex.

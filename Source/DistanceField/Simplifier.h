@@ -49,7 +49,7 @@ class Simplifier {
   void boundDistances();
   void checkComponents();
   std::size_t refineFailed();
-  [[noreturn]] void giveUp(const Eigen::Vector3d& place) const;
+  [[noreturn]] void giveUp() const;
   std::optional<ElementPair> findCrossing() const;
 
   Corners cornersOf(const Triangle&) const;
@@ -73,7 +73,10 @@ class Simplifier {
   std::vector<std::uint8_t> m_isBad;       ///< per component's lowest vertex: all of it failed
   int m_round = 0, m_restarts = 0;
   std::size_t m_firstCount = 0;  ///< of triangles, before any part had a finer level
-  Eigen::Vector3d m_lastFailure = Eigen::Vector3d::Zero();  ///< L: a place
+  struct Failure {
+    Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< L
+    std::optional<std::uint32_t> stuck{};             ///< a vertex of the mesh without a way
+  } m_failure;                                        ///< one of the last round
   double m_reported = 0.0;
 
   // The result of this round. Vertices are numbered anew, ascending by those of the mesh.
