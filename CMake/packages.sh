@@ -3,7 +3,7 @@
 # as root or through sudo. Returns at once when all are there.
 set -euo pipefail
 
-build="cmake ninja-build g++ pkg-config libeigen3-dev libtbb-dev libhwy-dev libgmp-dev
+build="cmake ninja-build g++ pkg-config libeigen3-dev libtbb-dev libhwy-dev libgmp-dev libmeshoptimizer-dev
   libvtk9-dev libfcl-dev libccd-dev libcli11-dev nlohmann-json3-dev xvfb xauth libgl1-mesa-dri"
 test="python3 libgtest-dev libcgal-dev libmpfr-dev clang-format-14 qemu-user"
 docs="doxygen python3-sphinx furo python3-myst-parser python3-breathe"

@@ -5,17 +5,14 @@
 #include "Core/FloatingPoint.h"
 #include "Core/Text.h"
 #include "Core/Threads.h"
+#include "DistanceField/ClosedBody.h"
 #include "DistanceField/FieldBuilder.h"
 #include "DistanceField/FieldCells.h"
 #include "DistanceField/FieldFile.h"
-#include "Mesh/FloatPositions.h"
-#include "Queries/Containment.h"
 #include "Queries/SearchableGeometry.h"
 
-#include <cmath>
 #include <string>
 #include <utility>
-#include <vector>
 
 namespace palpate {
 
@@ -29,44 +26,6 @@ struct DistanceField::Implementation {
 };
 
 namespace {
-
-constexpr std::size_t kMostElements = std::size_t{1} << 28;
-
-void checkSettings(const DistanceFieldSettings& settings) {
-  const auto check = [](double length, const char* name) {
-    if (!(length > 0.0) || std::isinf(length))
-      throw Error(ErrorCode::InvalidSettings,
-                  std::string(name) + " is " + textOf(length) + "; it must be positive and finite");
-  };
-  check(settings.errorBound, "errorBound");
-  check(settings.band, "band");
-  if (settings.threads < 0 || settings.threads > 1024)
-    throw Error(ErrorCode::InvalidSettings,
-                "threads is " + std::to_string(settings.threads) + "; it must be in [0, 1024]");
-}
-
-void checkMesh(const TriangleMeshView& mesh, GeometryId id) {
-  if (std::max(mesh.positions.size(), mesh.triangles.size()) > kMostElements)
-    throw Error(ErrorCode::TooLarge,
-                nameOf(id) + ": " + std::to_string(mesh.positions.size()) + " vertices and " +
-                    std::to_string(mesh.triangles.size()) +
-                    " triangles; at most 2^28 of each are supported",
-                id);
-  for (std::size_t v = 0; v < mesh.positions.size(); ++v)
-    if (!(mesh.positions[v].cwiseAbs().array() <= 0x1p1000).all())
-      throw Error(ErrorCode::NonFinitePosition,
-                  nameOf(id) + ", vertex " + std::to_string(v) + " is " +
-                      textOf(mesh.positions[v]) + "; it must be finite and at most 2^1000",
-                  id, v);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    for (const std::uint32_t vertex : mesh.triangles[t])
-      if (vertex >= mesh.positions.size())
-        throw Error(ErrorCode::IndexOutOfRange,
-                    nameOf(id) + ", triangle " + std::to_string(t) + ": vertex index " +
-                        std::to_string(vertex) + " is out of range; the mesh has " +
-                        std::to_string(mesh.positions.size()) + " vertices",
-                    id, t);
-}
 
 void checkPoint(const Eigen::Vector3d& point, const char* name) {
   if (!point.allFinite())
@@ -87,20 +46,12 @@ const DistanceField::Implementation& DistanceField::valid() const {
 DistanceField DistanceField::build(const TriangleMeshView& mesh,
                                    const DistanceFieldSettings& settings) {
   const StandardFloatingPoint standard;
-  checkSettings(settings);
-  SearchableGeometry body(GeometryId{0});
-  checkMesh(mesh, body.id);
-  body.mesh.now = Positions(std::vector(mesh.positions.begin(), mesh.positions.end()));
-  body.mesh.before = body.mesh.now;
-  body.mesh.topology.vertexCount = mesh.positions.size();
-  body.mesh.topology.triangles.assign(mesh.triangles.begin(), mesh.triangles.end());
-  checkInside(body, InsideRule::Closed);
-  if (mesh.triangles.empty())
-    throw Error(ErrorCode::NotClosed, nameOf(body.id) + " has no triangles", body.id);
+  checkPositive(settings.errorBound, "errorBound");
+  checkPositive(settings.band, "band");
+  checkThreads(settings.threads);
   const Threads threads(settings.threads);
-  body.revisions.topology = body.revisions.counter.next();
-  const double spread = body.tree.sampleFrame(body.mesh, body.revisions.topology);
-  body.tree.update(body.mesh, body.revisions.topology, frameScale(spread), {}, threads);
+  SearchableGeometry body(GeometryId{0});
+  makeClosedBody(mesh, threads, body);
   return DistanceField(std::make_shared<const Implementation>(buildField(body, settings, threads)));
 }
 

@@ -138,16 +138,15 @@ void raceRows(Report& report, const Options& options) {
 int main(int count, char** arguments) {
   Options options;
   options.rows.sharedData = PALPATE_SHARED_DATA;
-  options.tables = {"race",   "stages",     "frame",    "far",        "rest",
-                    "tool",   "scale",      "steady",   "features",   "lines",
-                    "shapes", "inside",     "rigid",    "fieldframe", "proxy",
-                    "bounds", "continuous", "validity", "queries",    "simd"};
+  options.tables = {"race",       "stages",   "frame",  "far",    "rest",     "tool",  "scale",
+                    "steady",     "features", "lines",  "shapes", "inside",   "rigid", "fieldframe",
+                    "proxy",      "coarse",   "bounds", "continuous", "validity", "queries", "simd"};
   MeasureOptions& measure = options.rows.measure;
   CLI::App app{"Times Palpate and the baselines (Embree, Bullet, FCL, CGAL) on the same frames"};
   app.add_option("--tables", options.tables,
                  "some of race, stages, frame, far, rest, tool, scale, "
-                 "steady, features, lines, shapes, inside, rigid, fieldframe, proxy, bounds, "
-                 "continuous, validity, queries, simd")
+                 "steady, features, lines, shapes, inside, rigid, fieldframe, proxy, coarse, "
+                 "bounds, continuous, validity, queries, simd")
       ->delimiter(',')
       ->check(CLI::IsMember(options.tables));
   app.add_option(
@@ -186,6 +185,7 @@ int main(int count, char** arguments) {
       {"rigid", rigidRows},
       {"fieldframe", fieldFrameRows},
       {"proxy", proxyRows},
+      {"coarse", coarseRows},
       {"bounds", boundsRows},
       {"continuous", continuousRows},
       {"validity", validityRows},

@@ -37,6 +37,7 @@ void insideRows(Report&, const RowOptions&);   ///< vertices inside a body, part
 void rigidRows(Report&, const RowOptions&);    ///< a large bone moved by its transform
 void fieldFrameRows(Report&, const RowOptions&);  ///< its distance field beside its triangles
 void proxyRows(Report&, const RowOptions&);       ///< a million particles near a large bone
+void coarseRows(Report&, const RowOptions&);      ///< a bone behind its certified simplification
 void boundsRows(Report&, const RowOptions&);      ///< placed bodies with each kind of bounds
 void continuousRows(Report&, const RowOptions&);  ///< times of impact of the published steps
 void validityRows(Report&, const RowOptions&);    ///< the share of validity() in a frame

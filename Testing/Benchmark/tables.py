@@ -138,6 +138,16 @@ def by_engine(table, cell):
     return write
 
 
+def coarse(figures):
+    """One row for each scene: the frames with each mesh, and what the simplification decides."""
+    engines = figures.distinct("coarse", "engine")
+    counts = ["frames decided", "contacts", "contacts lost"]
+    rows = [[scene] + [joined(figures, "coarse", scene, engine, "frame ms") for engine in engines] +
+            [cell(figures.value("coarse", scene, 1, engines[-1], count)) for count in counts]
+            for scene in figures.distinct("coarse", "scene")]
+    return markdown(["1 thread"] + [engine + ", ms" for engine in engines] + counts, rows)
+
+
 def spatial_time(figures, scene, engine):
     metric = "ms" if scene.endswith("update") else "us"
     return joined(figures, "spatial", scene, engine, metric)
@@ -181,6 +191,8 @@ TABLES = {
     "shapes": metrics("shapes", "1 thread"),
     "rigid": metrics("rigid", "1 / 2 threads"),
     "proxy": metrics("proxy", "1 / 2 threads"),
+    "simplify": metrics("simplify", "1 thread"),
+    "coarse": coarse,
     "bounds": metrics("bounds", "1 thread"),
     "inside": metrics("inside", "1 / 2 threads"),
 }

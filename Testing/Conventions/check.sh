@@ -68,6 +68,7 @@ checkPlaces() {
         "<tbb/"* | "<oneapi/"* | "<thread" | "<condition_variable" | "<future" | "<execution" | "<pthread.h")
           place=Source/Core/Threads.cpp ;;
         "<hwy/"*) place=Source/Core/Simd.h ;;
+        "<meshoptimizer.h") place=Source/DistanceField/SimplifyTriangles.cpp ;;
         "<gmp"*) place=Source/Exact/Exact.h ;;
         "<vtk"* | "<X11/"*) place=Source/Adapters/Vtk/ ;;
         "<fcl/"* | "<ccd/"*) place=Source/Adapters/Fcl/ ;;

@@ -1,0 +1,86 @@
+#include "DistanceField/ClosedBody.h"
+
+#include <palpate/Error.h>
+
+#include "Core/Text.h"
+#include "Mesh/FloatPositions.h"
+#include "Queries/Containment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace palpate {
+
+namespace {
+
+constexpr std::size_t kMostElements = std::size_t{1} << 28;
+
+void checkMesh(const TriangleMeshView& mesh, GeometryId id) {
+  if (std::max(mesh.positions.size(), mesh.triangles.size()) > kMostElements)
+    throw Error(ErrorCode::TooLarge,
+                nameOf(id) + ": " + std::to_string(mesh.positions.size()) + " vertices and " +
+                    std::to_string(mesh.triangles.size()) +
+                    " triangles; at most 2^28 of each are supported",
+                id);
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+    if (!(mesh.positions[v].cwiseAbs().array() <= 0x1p1000).all())
+      throw Error(ErrorCode::NonFinitePosition,
+                  nameOf(id) + ", vertex " + std::to_string(v) + " is " +
+                      textOf(mesh.positions[v]) + "; it must be finite and at most 2^1000",
+                  id, v);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (const std::uint32_t vertex : mesh.triangles[t])
+      if (vertex >= mesh.positions.size())
+        throw Error(ErrorCode::IndexOutOfRange,
+                    nameOf(id) + ", triangle " + std::to_string(t) + ": vertex index " +
+                        std::to_string(vertex) + " is out of range; the mesh has " +
+                        std::to_string(mesh.positions.size()) + " vertices",
+                    id, t);
+}
+
+void buildTree(const Threads& threads, SearchableGeometry& out) {
+  out.revisions.topology = out.revisions.counter.next();
+  const double spread = out.tree.sampleFrame(out.mesh, out.revisions.topology);
+  out.tree.update(out.mesh, out.revisions.topology, frameScale(spread), {}, threads);
+}
+
+void setMesh(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles,
+             SearchableGeometry& out) {
+  out.mesh.now = Positions(std::vector(positions.begin(), positions.end()));
+  out.mesh.before = out.mesh.now;
+  out.mesh.topology.vertexCount = positions.size();
+  out.mesh.topology.triangles.assign(triangles.begin(), triangles.end());
+}
+
+}  // namespace
+
+void makeClosedBody(const TriangleMeshView& mesh, const Threads& threads, SearchableGeometry& out) {
+  checkMesh(mesh, out.id);
+  setMesh(mesh.positions, mesh.triangles, out);
+  checkInside(out, InsideRule::Closed);
+  if (mesh.triangles.empty())
+    throw Error(ErrorCode::NotClosed, nameOf(out.id) + " has no triangles", out.id);
+  buildTree(threads, out);
+}
+
+void makeBody(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles,
+              const Threads& threads, SearchableGeometry& out) {
+  setMesh(positions, triangles, out);
+  buildTree(threads, out);
+}
+
+void checkPositive(double length, const char* name) {
+  if (!(length > 0.0) || std::isinf(length))
+    throw Error(ErrorCode::InvalidSettings,
+                std::string(name) + " is " + textOf(length) + "; it must be positive and finite");
+}
+
+void checkThreads(int threads) {
+  if (threads < 0 || threads > 1024)
+    throw Error(ErrorCode::InvalidSettings,
+                "threads is " + std::to_string(threads) + "; it must be in [0, 1024]");
+}
+
+}  // namespace palpate

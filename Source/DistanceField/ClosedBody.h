@@ -1,0 +1,24 @@
+#pragma once
+
+#include <palpate/Types.h>
+
+#include "Core/Threads.h"
+#include "Queries/SearchableGeometry.h"
+
+namespace palpate {
+
+/// Makes a geometry of a mesh that has an inside, with its octree.
+///
+/// Errors   NonFinitePosition, also for a coordinate beyond 2^1000; IndexOutOfRange; TooLarge for
+///          more than 2^28 vertices or triangles; NotClosed, also without triangles.
+void makeClosedBody(const TriangleMeshView&, const Threads&, SearchableGeometry& out);
+/// The same without the checks, for a mesh that may be open.
+void makeBody(std::span<const Eigen::Vector3d>, std::span<const Triangle>, const Threads&,
+              SearchableGeometry& out);
+
+/// Throws InvalidSettings unless a setting is positive and finite.
+void checkPositive(double length, const char* name);
+/// Throws InvalidSettings for a number of threads out of range.
+void checkThreads(int threads);
+
+}  // namespace palpate
