@@ -1,0 +1,416 @@
+#include "DistanceField/AffineClaim.h"
+
+#include <palpate/SpatialQueries.h>
+
+#include "Math/Tolerances.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "DistanceField/AffineClaim.cpp"
+#include "Core/Simd.h"
+
+#ifndef PALPATE_AFFINE_CLAIM_CPP
+#define PALPATE_AFFINE_CLAIM_CPP
+namespace palpate {
+
+/// What a search needs besides the claim.
+struct ClaimSearch {
+  const Octree& octree;
+  const Triangle* ordered;
+  const Eigen::Vector3d* positions;
+  const FloatFrame& frame;
+  /// Whether a triangle, by its place in the octree's order, is beside the shadow of a side.
+  bool (*isBeside)(const AffineClaim&, const ClaimSearch&, const AffineClaim::Side&,
+                   std::uint32_t place);
+};
+
+}  // namespace palpate
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using SetTag = hn::CappedTag<double, 8>;  ///< up to eight boxes or triangles
+using V = hn::Vec<SetTag>;
+using Vectors = Vector3<V>;
+using Mask = hn::Mask<SetTag>;
+
+HWY_ATTR HWY_INLINE Vectors absolute(const Vectors& a) {
+  return {hn::Abs(a.x), hn::Abs(a.y), hn::Abs(a.z)};
+}
+HWY_ATTR HWY_INLINE V sumOfMagnitudes(const Vectors& a) {
+  return (hn::Abs(a.x) + hn::Abs(a.y)) + hn::Abs(a.z);
+}
+HWY_ATTR HWY_INLINE Vectors spread(const std::array<double, 3>& a) {
+  const SetTag d;
+  return {hn::Set(d, a[0]), hn::Set(d, a[1]), hn::Set(d, a[2])};
+}
+/// Of length 1. NaN for a vector without a direction; comparisons with it are false.
+HWY_ATTR HWY_INLINE Vectors normalized(const Vectors& a) {
+  const SetTag d;
+  const V square = dot(a, a);
+  const V length =
+      hn::IfThenElseZero(hn::Gt(square, hn::Set(d, kShortestDirection)), hn::Sqrt(square));
+  const V nan = hn::Zero(d) / hn::Zero(d);
+  const V inverse = hn::IfThenElse(hn::Gt(length, hn::Zero(d)), hn::Set(d, 1.0) / length, nan);
+  return inverse * a;
+}
+
+// Convex sets relative to the centre of the cell. along(w): the largest component along w.
+
+struct BoxesInLanes {
+  Vectors middle, halfSides;
+
+  HWY_ATTR HWY_INLINE V along(const Vectors& w) const {
+    return dot(w, middle) + dot(absolute(w), halfSides);
+  }
+};
+
+struct TrianglesInLanes {
+  Vectors a, b, c;
+
+  HWY_ATTR HWY_INLINE V along(const Vectors& w) const {
+    return hn::Max(dot(w, a), hn::Max(dot(w, b), dot(w, c)));
+  }
+  /// A point near the closest one to the centre.
+  HWY_ATTR HWY_INLINE Vectors nearest() const {
+    const SetTag d;
+    const V zero = hn::Zero(d), one = hn::Set(d, 1.0);
+    const auto clamped = [&](V dividend, V divisor) HWY_ATTR {
+      return hn::IfThenElseZero(hn::Gt(divisor, zero),
+                                hn::Min(hn::Max(dividend / divisor, zero), one));
+    };
+    const Vectors ab = b - a, ac = c - a, bc = c - b;
+    const V ba = hn::Neg(dot(a, ab)), ca = hn::Neg(dot(a, ac)), cb = hn::Neg(dot(b, bc));
+    const V bb = dot(ab, ab), cc = dot(ac, ac), both = dot(ab, ac);
+    Vectors q = a + clamped(ba, bb) * ab;
+    V square = dot(q, q);
+    const auto take = [&](const Vectors& other, const Mask& valid) HWY_ATTR {
+      const V otherSquare = dot(other, other);
+      const Mask nearer = hn::And(valid, hn::Lt(otherSquare, square));
+      square = hn::IfThenElse(nearer, otherSquare, square);
+      q = {hn::IfThenElse(nearer, other.x, q.x), hn::IfThenElse(nearer, other.y, q.y),
+           hn::IfThenElse(nearer, other.z, q.z)};
+    };
+    const Mask all = hn::Ge(bb, zero);
+    take(a + clamped(ca, cc) * ac, all);
+    take(b + clamped(cb, dot(bc, bc)) * bc, all);
+    const V determinant = bb * cc - both * both;
+    const V s = cc * ba - both * ca, t = bb * ca - both * ba;
+    const V inverse = one / determinant;
+    take(a + (s * inverse) * ab + (t * inverse) * ac,
+         hn::And(hn::And(hn::Gt(s, zero), hn::Gt(t, zero)), hn::Lt(s + t, determinant)));
+    return q;
+  }
+};
+
+/// A side of the claim, the same in each lane.
+class SideInLanes {
+ public:
+  HWY_ATTR HWY_INLINE SideInLanes(const AffineClaim& claim, const AffineClaim::Side& side)
+      : m_side(side),
+        m_normal(spread(side.normal)),
+        m_halfSide(hn::Set(d, claim.halfSide)),
+        m_atCentre(hn::Set(d, side.atCentre)),
+        m_level(hn::Set(d, claim.level)),
+        m_error(hn::Set(d, claim.error)) {}
+
+  /// Whether the set is where the claim needs nothing of it: H is below the level.
+  template <class Set>
+  HWY_ATTR HWY_INLINE Mask isBelow(const Set& set) const {
+    return hn::Lt(set.along(m_normal) + m_atCentre, m_level - m_error);
+  }
+  template <class Set>
+  HWY_ATTR HWY_INLINE Mask meetsLevel(const Set& set) const {
+    const Vectors down{hn::Neg(m_normal.x), hn::Neg(m_normal.y), hn::Neg(m_normal.z)};
+    return hn::Le(m_atCentre - set.along(down), m_level + m_error);
+  }
+  /// Whether all points of the set have a distance of at least H(x) - level from each point x of
+  /// the cell. For any unit vector w the distance of x and y is at least w (x - y). The best w
+  /// leads from y to the point of the cell where the distance less H is least.
+  template <class Set>
+  HWY_ATTR HWY_INLINE Mask isFar(const Set& set, const Vectors& w) const {
+    const V least = hn::Neg(m_halfSide * sumOfMagnitudes(w - m_normal)) - m_atCentre - set.along(w);
+    return hn::Ge(least, m_error - m_level);
+  }
+  HWY_ATTR HWY_INLINE Vectors wayFrom(const Vectors& point) const {
+    const Vectors above = point - dot(m_normal, point) * m_normal;
+    const V low = hn::Neg(m_halfSide);
+    const Vectors nearest{hn::Min(hn::Max(above.x, low), m_halfSide),
+                          hn::Min(hn::Max(above.y, low), m_halfSide),
+                          hn::Min(hn::Max(above.z, low), m_halfSide)};
+    return normalized(nearest - point);
+  }
+  /// Whether the set is beside the cell's shadow along the normal: separated by a direction across
+  /// the normal and an axis.
+  HWY_ATTR HWY_INLINE Mask isBeside(const BoxesInLanes& set) const {
+    const V zero = hn::Zero(d);
+    const auto [x, y, z] = m_normal;
+    return hn::Or(
+        isBeside(set, {zero, z, hn::Neg(y)}),
+        hn::Or(isBeside(set, {hn::Neg(z), zero, x}), isBeside(set, {y, hn::Neg(x), zero})));
+  }
+
+ private:
+  HWY_ATTR HWY_INLINE Mask isBeside(const BoxesInLanes& set, const Vectors& across) const {
+    const V most = m_halfSide * sumOfMagnitudes(across) + m_error;
+    const V middle = dot(across, set.middle), half = dot(absolute(across), set.halfSides);
+    return hn::Gt(hn::Abs(middle) - half, most);
+  }
+
+  static constexpr SetTag d{};
+  const AffineClaim::Side& m_side;
+  const Vectors m_normal;
+  const V m_halfSide, m_atCentre, m_level, m_error;
+};
+
+/// One descent of the octree.
+class ClaimProof {
+ public:
+  HWY_ATTR ClaimProof(const AffineClaim& claim, const ClaimSearch& search)
+      : m_claim(claim), m_search(search) {}
+
+  HWY_ATTR bool run() {
+    const OctreeBlock* const blocks = m_search.octree.blocks();
+    // Each block on at most 61 levels adds its siblings at most.
+    std::array<std::uint32_t, 512> stack;
+    std::size_t depth = 0;
+    stack[depth++] = 0;
+    while (depth > 0) {
+      const std::uint32_t index = stack[--depth];
+      const OctreeBlock& block = blocks[index];
+      // The root is alone in block 0.
+      for (std::uint32_t bits = entered(block, 0, index == 0 ? 1 : 8); bits != 0;
+           bits &= bits - 1) {
+        const auto slot = static_cast<unsigned>(std::countr_zero(bits));
+        const std::uint32_t begin = block.begin[slot];
+        std::uint32_t end = begin + block.count(slot);
+        if (!block.isLeaf(slot)) {
+          end = blocks[block.child[slot]].begin[0];
+          stack[depth++] = block.child[slot];
+        }
+        if (!addElements(begin, end)) return false;
+      }
+    }
+    return m_count == 0 || test();
+  }
+
+ private:
+  static constexpr std::size_t kBatch = 8;
+
+  HWY_ATTR bool addElements(std::uint32_t begin, std::uint32_t end) {
+    const BoxArrays& boxes = m_search.octree.boxes();
+    for (std::uint32_t i = begin; i < end; i += 8)
+      for (std::uint32_t bits = entered(boxes, i, std::min(end - i, 8u)); bits != 0;
+           bits &= bits - 1) {
+        const auto lane = static_cast<std::uint32_t>(std::countr_zero(bits));
+        add(i + lane);
+        if (m_count == kBatch && !test()) return false;
+      }
+    return true;
+  }
+  HWY_ATTR HWY_INLINE void add(std::uint32_t place) {
+    const Triangle& triangle = m_search.ordered[place];
+    const FloatFrame& frame = m_search.frame;
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const double* const position = m_search.positions[triangle[corner]].data();
+      for (int k = 0; k < 3; ++k)
+        m_corners[corner][k][m_count] =
+            (position[k] - frame.origin.data()[k]) * frame.scale - m_claim.centre[k];
+    }
+    m_places[m_count++] = place;
+  }
+
+  /// The boxes from the i-th on that may hold triangles that do not allow the claim, as bits.
+  template <class Boxes>
+  HWY_ATTR HWY_INLINE std::uint32_t entered(const Boxes& boxes, std::size_t i,
+                                            std::uint32_t count) const {
+    std::uint32_t bits = 0;
+    for (std::uint32_t lane = 0; lane < count; lane += static_cast<std::uint32_t>(hn::Lanes(d)))
+      bits |= enteredLanes(boxes, i + lane) << lane;
+    return bits & ((1u << count) - 1);
+  }
+  template <class Boxes>
+  HWY_ATTR HWY_INLINE std::uint32_t enteredLanes(const Boxes& boxes, std::size_t i) const {
+    const hn::Rebind<float, SetTag> df;
+    const V half = hn::Set(d, 0.5), largest = hn::Set(d, double{kLargestFloat}), zero = hn::Zero(d);
+    BoxesInLanes set;
+    V square = zero;
+    Mask isMoved = hn::Lt(zero, zero), isFilled = isMoved;
+    const auto take = [&](int k, V& middle, V& halfSide) HWY_ATTR {
+      const V low = hn::PromoteTo(d, hn::LoadU(df, &boxes.lower[k][i])),
+              high = hn::PromoteTo(d, hn::LoadU(df, &boxes.upper[k][i]));
+      if (k == 0) isFilled = hn::Le(low, high);
+      isMoved = hn::Or(isMoved, hn::Or(hn::Le(low, hn::Neg(largest)), hn::Ge(high, largest)));
+      const V centre = hn::Set(d, m_claim.centre[k]);
+      const V lower = low - centre, upper = high - centre;
+      middle = half * (lower + upper);
+      halfSide = half * (upper - lower);
+      const V outside = hn::Max(hn::Max(lower, hn::Neg(upper)), zero);
+      square = square + outside * outside;
+    };
+    take(0, set.middle.x, set.halfSides.x);
+    take(1, set.middle.y, set.halfSides.y);
+    take(2, set.middle.z, set.halfSides.z);
+    const Mask isNear = hn::Le(square, hn::Set(d, m_claim.reach * m_claim.reach));
+    Mask isEntered = hn::Lt(zero, zero);
+    if (!hn::AllFalse(d, isNear))
+      for (const AffineClaim::Side& side : m_claim.sides) {
+        if (!side.isWanted) continue;
+        const SideInLanes lanes(m_claim, side);
+        Mask isAllowed = hn::Le(zero, zero);
+        if (side.needsDistance) isAllowed = lanes.isFar(set, lanes.wayFrom(set.middle));
+        if (side.needsCrossing)
+          isAllowed =
+              hn::And(isAllowed, hn::Or(hn::Not(lanes.meetsLevel(set)), lanes.isBeside(set)));
+        isEntered = hn::Or(isEntered, hn::Not(hn::Or(isAllowed, lanes.isBelow(set))));
+      }
+    // Boxes with coordinates that were clamped say nothing.
+    isEntered = hn::And(isFilled, hn::Or(hn::And(isEntered, isNear), isMoved));
+    return bitsOf(d, isEntered);
+  }
+
+  /// Whether the triangles of the batch allow the claim. Empties it.
+  HWY_ATTR bool test() {
+    const std::size_t count = m_count;
+    m_count = 0;
+    for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+      const auto load = [&](int corner) HWY_ATTR {
+        return Vectors{hn::Load(d, &m_corners[corner][0][i]), hn::Load(d, &m_corners[corner][1][i]),
+                       hn::Load(d, &m_corners[corner][2][i])};
+      };
+      const TrianglesInLanes set{load(0), load(1), load(2)};
+      const Mask isUsed = hn::FirstN(d, count - i);
+      for (const AffineClaim::Side& side : m_claim.sides)
+        if (side.isWanted && !isAllowed(set, isUsed, side, &m_places[i])) return false;
+    }
+    return true;
+  }
+  HWY_ATTR bool isAllowed(const TrianglesInLanes& set, const Mask& isUsed,
+                          const AffineClaim::Side& side, const std::uint32_t* places) const {
+    const SideInLanes lanes(m_claim, side);
+    const Mask isBelow = lanes.isBelow(set);
+    if (side.needsDistance) {
+      Mask open = hn::AndNot(isBelow, isUsed);
+      const auto closes = [&](const Vectors& w) HWY_ATTR {
+        open = hn::AndNot(lanes.isFar(set, w), open);
+        return hn::AllFalse(d, open);
+      };
+      const auto isFar = [&]() HWY_ATTR {
+        if (hn::AllFalse(d, open)) return true;
+        const V third = hn::Set(d, 1.0 / 3.0);
+        if (closes(lanes.wayFrom(third * (set.a + set.b + set.c)))) return true;
+        const Vectors normal = normalized(cross(set.b - set.a, set.c - set.a));
+        if (closes(normal) || closes({hn::Neg(normal.x), hn::Neg(normal.y), hn::Neg(normal.z)}))
+          return true;
+        return closes(lanes.wayFrom(set.nearest()));
+      };
+      if (!isFar()) return false;
+    }
+    if (!side.needsCrossing) return true;
+    std::uint32_t bits = bitsOf(d, hn::AndNot(isBelow, hn::And(isUsed, lanes.meetsLevel(set))));
+    if (bits == 0) return true;
+    leaveLanes();
+    for (; bits != 0; bits &= bits - 1)
+      if (!m_search.isBeside(m_claim, m_search, side, places[std::countr_zero(bits)])) return false;
+    return true;
+  }
+
+  static constexpr SetTag d{};
+  const AffineClaim& m_claim;
+  const ClaimSearch& m_search;
+  std::size_t m_count = 0;
+  std::uint32_t m_places[kBatch];
+  alignas(64) double m_corners[3][3][kBatch] = {};  ///< corner, axis, triangle
+};
+
+HWY_ATTR bool proveClaimKernel(const AffineClaim& claim, const ClaimSearch& search) {
+  ClaimProof proof(claim, search);
+  const bool holds = proof.run();
+  leaveLanes();
+  return holds;
+}
+
+}  // namespace palpate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace palpate {
+
+using Eigen::Vector3d;
+
+HWY_EXPORT(proveClaimKernel);
+
+namespace {
+
+/// The part of a triangle near a plane: a thin polygon.
+struct PointSet {
+  std::array<Vector3d, 6> points;
+  std::size_t size = 0;
+
+  double along(const Vector3d& w) const {
+    double most = -kInfinity;
+    for (std::size_t i = 0; i < size; ++i) most = std::max(most, w.dot(points[i]));
+    return most;
+  }
+};
+
+/// Only the part of a triangle near the plane H = level counts.
+bool isBesideShadow(const AffineClaim& claim, const ClaimSearch& search,
+                    const AffineClaim::Side& side, std::uint32_t place) {
+  const Vector3d normal(side.normal[0], side.normal[1], side.normal[2]),
+      centre(claim.centre[0], claim.centre[1], claim.centre[2]);
+  std::array<Vector3d, 3> corners;
+  for (std::size_t i = 0; i < 3; ++i)
+    corners[i] =
+        (search.positions[search.ordered[place][i]] - search.frame.origin) * search.frame.scale -
+        centre;
+  PointSet part;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vector3d &p = corners[i], &q = corners[(i + 1) % 3];
+    const double start = normal.dot(p) + side.atCentre - claim.level,
+                 rise = normal.dot(q) + side.atCentre - claim.level - start;
+    // The edge's points p + t (q - p) with |start + t rise| <= error.
+    double first = 0, last = 1;
+    if (rise != 0) {
+      const double one = (-claim.error - start) / rise, two = (claim.error - start) / rise;
+      first = std::max(first, std::min(one, two));
+      last = std::min(last, std::max(one, two));
+    } else if (std::abs(start) > claim.error) {
+      continue;
+    }
+    if (!(first <= last)) continue;
+    part.points[part.size++] = p + first * (q - p);
+    part.points[part.size++] = p + last * (q - p);
+  }
+  const auto isBeside = [&](const Vector3d& across) {
+    const double most = claim.halfSide * across.cwiseAbs().sum() + claim.error;
+    return -part.along(-across) > most || part.along(across) < -most;
+  };
+  if (part.size == 0) return true;
+  for (int k = 0; k < 3; ++k)
+    if (isBeside(normal.cross(Vector3d::Unit(k)))) return true;
+  const auto& [a, b, c] = corners;
+  const Vector3d up = (b - a).cross(c - a).stableNormalized();
+  return isBeside(up - normal.dot(up) * normal);
+}
+
+}  // namespace
+
+bool AffineClaim::holds(const SearchableGeometry& geometry) const {
+  const Octree& octree = geometry.tree.octree();
+  octree.requireBuilt();
+  const ClaimSearch search{octree, geometry.tree.ordered().data(), geometry.mesh.now.body().data(),
+                           geometry.tree.frame(), isBesideShadow};
+  return HWY_DYNAMIC_DISPATCH(proveClaimKernel)(*this, search);
+}
+
+}  // namespace palpate
+#endif
