@@ -1,14 +1,10 @@
 #include "DistanceField/AffineClaim.h"
 
-#include <palpate/SpatialQueries.h>
-
 #include "Math/Tolerances.h"
-
-#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
+#include <limits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "DistanceField/AffineClaim.cpp"
@@ -24,9 +20,6 @@ struct ClaimSearch {
   const Triangle* ordered;
   const Eigen::Vector3d* positions;
   const FloatFrame& frame;
-  /// Whether a triangle, by its place in the octree's order, is beside the shadow of a side.
-  bool (*isBeside)(const AffineClaim&, const ClaimSearch&, const AffineClaim::Side&,
-                   std::uint32_t place);
 };
 
 }  // namespace palpate
@@ -157,6 +150,44 @@ class SideInLanes {
         isBeside(set, {zero, z, hn::Neg(y)}),
         hn::Or(isBeside(set, {hn::Neg(z), zero, x}), isBeside(set, {y, hn::Neg(x), zero})));
   }
+  /// Only the part of a triangle near the plane H = level counts: a thin polygon.
+  HWY_ATTR HWY_INLINE Mask isBeside(const TrianglesInLanes& set) const {
+    const V zero = hn::Zero(d), one = hn::Set(d, 1.0);
+    const Vectors corners[3] = {set.a, set.b, set.c};
+    Vectors points[6];
+    Mask isPart[3];
+    for (int i = 0; i < 3; ++i) {
+      const Vectors &p = corners[i], edge = corners[(i + 1) % 3] - p;
+      const V start = dot(m_normal, p) + m_atCentre - m_level,
+              rise = dot(m_normal, corners[(i + 1) % 3]) + m_atCentre - m_level - start;
+      // The edge's points p + t edge with |start + t rise| <= error.
+      const Mask isFlat = hn::Eq(rise, zero);
+      const V first = (hn::Neg(m_error) - start) / rise, second = (m_error - start) / rise;
+      const V low = hn::IfThenElse(isFlat, zero, hn::Max(zero, hn::Min(first, second)));
+      const V high = hn::IfThenElse(isFlat, one, hn::Min(one, hn::Max(first, second)));
+      isPart[i] =
+          hn::And(hn::Le(low, high), hn::Or(hn::Not(isFlat), hn::Le(hn::Abs(start), m_error)));
+      points[2 * i] = p + low * edge;
+      points[2 * i + 1] = p + high * edge;
+    }
+    const auto isApart = [&](const Vectors& across) HWY_ATTR {
+      const V infinite = hn::Set(d, std::numeric_limits<double>::infinity());
+      V least = infinite, most = hn::Neg(infinite);
+      for (int i = 0; i < 6; ++i) {
+        const V along = dot(across, points[i]);
+        least = hn::IfThenElse(isPart[i / 2], hn::Min(least, along), least);
+        most = hn::IfThenElse(isPart[i / 2], hn::Max(most, along), most);
+      }
+      const V reach = m_halfSide * sumOfMagnitudes(across) + m_error;
+      return hn::Or(hn::Gt(least, reach), hn::Lt(most, hn::Neg(reach)));
+    };
+    const auto [x, y, z] = m_normal;
+    const Mask faces =
+        hn::Or(isApart({zero, z, hn::Neg(y)}),
+               hn::Or(isApart({hn::Neg(z), zero, x}), isApart({y, hn::Neg(x), zero})));
+    const Vectors up = normalized(cross(set.b - set.a, set.c - set.a));
+    return hn::Or(faces, isApart(up - dot(m_normal, up) * m_normal));
+  }
 
  private:
   HWY_ATTR HWY_INLINE Mask isBeside(const BoxesInLanes& set, const Vectors& across) const {
@@ -225,7 +256,7 @@ class ClaimProof {
         m_corners[corner][k][m_count] =
             (position[k] - frame.origin.data()[k]) * frame.scale - m_claim.centre[k];
     }
-    m_places[m_count++] = place;
+    ++m_count;
   }
 
   /// The boxes from the i-th on that may hold triangles that do not allow the claim, as bits.
@@ -289,12 +320,12 @@ class ClaimProof {
       const TrianglesInLanes set{load(0), load(1), load(2)};
       const Mask isUsed = hn::FirstN(d, count - i);
       for (const AffineClaim::Side& side : m_claim.sides)
-        if (side.isWanted && !isAllowed(set, isUsed, side, &m_places[i])) return false;
+        if (side.isWanted && !isAllowed(set, isUsed, side)) return false;
     }
     return true;
   }
   HWY_ATTR bool isAllowed(const TrianglesInLanes& set, const Mask& isUsed,
-                          const AffineClaim::Side& side, const std::uint32_t* places) const {
+                          const AffineClaim::Side& side) const {
     const SideInLanes lanes(m_claim, side);
     const Mask isBelow = lanes.isBelow(set);
     if (side.needsDistance) {
@@ -315,19 +346,14 @@ class ClaimProof {
       if (!isFar()) return false;
     }
     if (!side.needsCrossing) return true;
-    std::uint32_t bits = bitsOf(d, hn::AndNot(isBelow, hn::And(isUsed, lanes.meetsLevel(set))));
-    if (bits == 0) return true;
-    leaveLanes();
-    for (; bits != 0; bits &= bits - 1)
-      if (!m_search.isBeside(m_claim, m_search, side, places[std::countr_zero(bits)])) return false;
-    return true;
+    const Mask meets = hn::AndNot(isBelow, hn::And(isUsed, lanes.meetsLevel(set)));
+    return hn::AllFalse(d, meets) || hn::AllFalse(d, hn::AndNot(lanes.isBeside(set), meets));
   }
 
   static constexpr SetTag d{};
   const AffineClaim& m_claim;
   const ClaimSearch& m_search;
   std::size_t m_count = 0;
-  std::uint32_t m_places[kBatch];
   alignas(64) double m_corners[3][3][kBatch] = {};  ///< corner, axis, triangle
 };
 
@@ -344,71 +370,13 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace palpate {
 
-using Eigen::Vector3d;
-
 HWY_EXPORT(proveClaimKernel);
-
-namespace {
-
-/// The part of a triangle near a plane: a thin polygon.
-struct PointSet {
-  std::array<Vector3d, 6> points;
-  std::size_t size = 0;
-
-  double along(const Vector3d& w) const {
-    double most = -kInfinity;
-    for (std::size_t i = 0; i < size; ++i) most = std::max(most, w.dot(points[i]));
-    return most;
-  }
-};
-
-/// Only the part of a triangle near the plane H = level counts.
-bool isBesideShadow(const AffineClaim& claim, const ClaimSearch& search,
-                    const AffineClaim::Side& side, std::uint32_t place) {
-  const Vector3d normal(side.normal[0], side.normal[1], side.normal[2]),
-      centre(claim.centre[0], claim.centre[1], claim.centre[2]);
-  std::array<Vector3d, 3> corners;
-  for (std::size_t i = 0; i < 3; ++i)
-    corners[i] =
-        (search.positions[search.ordered[place][i]] - search.frame.origin) * search.frame.scale -
-        centre;
-  PointSet part;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const Vector3d &p = corners[i], &q = corners[(i + 1) % 3];
-    const double start = normal.dot(p) + side.atCentre - claim.level,
-                 rise = normal.dot(q) + side.atCentre - claim.level - start;
-    // The edge's points p + t (q - p) with |start + t rise| <= error.
-    double first = 0, last = 1;
-    if (rise != 0) {
-      const double one = (-claim.error - start) / rise, two = (claim.error - start) / rise;
-      first = std::max(first, std::min(one, two));
-      last = std::min(last, std::max(one, two));
-    } else if (std::abs(start) > claim.error) {
-      continue;
-    }
-    if (!(first <= last)) continue;
-    part.points[part.size++] = p + first * (q - p);
-    part.points[part.size++] = p + last * (q - p);
-  }
-  const auto isBeside = [&](const Vector3d& across) {
-    const double most = claim.halfSide * across.cwiseAbs().sum() + claim.error;
-    return -part.along(-across) > most || part.along(across) < -most;
-  };
-  if (part.size == 0) return true;
-  for (int k = 0; k < 3; ++k)
-    if (isBeside(normal.cross(Vector3d::Unit(k)))) return true;
-  const auto& [a, b, c] = corners;
-  const Vector3d up = (b - a).cross(c - a).stableNormalized();
-  return isBeside(up - normal.dot(up) * normal);
-}
-
-}  // namespace
 
 bool AffineClaim::holds(const SearchableGeometry& geometry) const {
   const Octree& octree = geometry.tree.octree();
   octree.requireBuilt();
   const ClaimSearch search{octree, geometry.tree.ordered().data(), geometry.mesh.now.body().data(),
-                           geometry.tree.frame(), isBesideShadow};
+                           geometry.tree.frame()};
   return HWY_DYNAMIC_DISPATCH(proveClaimKernel)(*this, search);
 }
 

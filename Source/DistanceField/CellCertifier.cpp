@@ -58,6 +58,19 @@ bool CellCertifier::isNearTriangle(const InterpolatedCell& cell, double bound) c
   return true;
 }
 
+/// Whether f is positive, for side 0, in a point of the plane H = level in the cell's shadow.
+bool CellCertifier::isPositiveInPlane(const InterpolatedCell& cell, const Vector3d& normal,
+                                      double middle, double level, double error,
+                                      PointQueryStack& stack) const {
+  // The surface is not between a corner and the plane if the plane is nearer.
+  for (std::size_t i = 0; i < 8; ++i) {
+    const double height = middle + normal.dot(cornerOf(i, cell.halfSide)) - level;
+    if (std::abs(height) + error < std::abs(cell.values[i]) * (1.0 - kStoredError))
+      return cell.values[i] > 0;
+  }
+  return !isInside(m_geometry, cell.centre + (level - middle) * normal, {}, Engine::Octree, stack);
+}
+
 bool CellCertifier::isWithin(const InterpolatedCell& cell, double bound,
                              PointQueryStack& stack) const {
   const double radius = cell.halfDiagonal() * (1.0 + kFieldError);
@@ -109,10 +122,10 @@ bool CellCertifier::isWithin(const InterpolatedCell& cell, double bound,
     reach = std::max(
         {reach, std::abs(affine.level - side.atCentre), side.atCentre + rise - affine.level});
     if (!side.needsCrossing) continue;
-    // The sign in the plane H = level, which has no surface in the shadow.
-    const Vector3d inPlane =
-        frame.origin + (centre + (affine.level - side.atCentre) * sign * normal) / frame.scale;
-    if (isInside(m_geometry, inPlane, {}, Engine::Octree, stack) != (i == 1)) return false;
+    const bool isPositive =
+        isPositiveInPlane(cell, normal, 0.5 * (low + high), sign * affine.level / frame.scale,
+                          affine.error / frame.scale, stack);
+    if (isPositive != (i == 0)) return false;
   }
   affine.reach = reach + std::numbers::sqrt3 * affine.halfSide + affine.error;
   return affine.holds(m_geometry);

@@ -42,6 +42,8 @@ class CellCertifier {
 
  private:
   bool isNearTriangle(const InterpolatedCell&, double bound) const;
+  bool isPositiveInPlane(const InterpolatedCell&, const Eigen::Vector3d& normal, double atCentre,
+                         double level, double error, PointQueryStack&) const;
 
   const SearchableGeometry& m_geometry;
   double m_reach;  ///< in the octree's floats: the largest coordinate
