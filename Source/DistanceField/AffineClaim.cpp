@@ -9,6 +9,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "DistanceField/AffineClaim.cpp"
 #include "Core/Simd.h"
+#include "DistanceField/TriangleLanes.h"
 
 #ifndef PALPATE_AFFINE_CLAIM_CPP
 #define PALPATE_AFFINE_CLAIM_CPP
@@ -27,13 +28,6 @@ struct ClaimSearch {
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-
-namespace hn = hwy::HWY_NAMESPACE;
-
-using SetTag = hn::CappedTag<double, 8>;  ///< up to eight boxes or triangles
-using V = hn::Vec<SetTag>;
-using Vectors = Vector3<V>;
-using Mask = hn::Mask<SetTag>;
 
 HWY_ATTR HWY_INLINE Vectors absolute(const Vectors& a) {
   return {hn::Abs(a.x), hn::Abs(a.y), hn::Abs(a.z)};
@@ -63,44 +57,6 @@ struct BoxesInLanes {
 
   HWY_ATTR HWY_INLINE V along(const Vectors& w) const {
     return dot(w, middle) + dot(absolute(w), halfSides);
-  }
-};
-
-struct TrianglesInLanes {
-  Vectors a, b, c;
-
-  HWY_ATTR HWY_INLINE V along(const Vectors& w) const {
-    return hn::Max(dot(w, a), hn::Max(dot(w, b), dot(w, c)));
-  }
-  /// A point near the closest one to the centre.
-  HWY_ATTR HWY_INLINE Vectors nearest() const {
-    const SetTag d;
-    const V zero = hn::Zero(d), one = hn::Set(d, 1.0);
-    const auto clamped = [&](V dividend, V divisor) HWY_ATTR {
-      return hn::IfThenElseZero(hn::Gt(divisor, zero),
-                                hn::Min(hn::Max(dividend / divisor, zero), one));
-    };
-    const Vectors ab = b - a, ac = c - a, bc = c - b;
-    const V ba = hn::Neg(dot(a, ab)), ca = hn::Neg(dot(a, ac)), cb = hn::Neg(dot(b, bc));
-    const V bb = dot(ab, ab), cc = dot(ac, ac), both = dot(ab, ac);
-    Vectors q = a + clamped(ba, bb) * ab;
-    V square = dot(q, q);
-    const auto take = [&](const Vectors& other, const Mask& valid) HWY_ATTR {
-      const V otherSquare = dot(other, other);
-      const Mask nearer = hn::And(valid, hn::Lt(otherSquare, square));
-      square = hn::IfThenElse(nearer, otherSquare, square);
-      q = {hn::IfThenElse(nearer, other.x, q.x), hn::IfThenElse(nearer, other.y, q.y),
-           hn::IfThenElse(nearer, other.z, q.z)};
-    };
-    const Mask all = hn::Ge(bb, zero);
-    take(a + clamped(ca, cc) * ac, all);
-    take(b + clamped(cb, dot(bc, bc)) * bc, all);
-    const V determinant = bb * cc - both * both;
-    const V s = cc * ba - both * ca, t = bb * ca - both * ba;
-    const V inverse = one / determinant;
-    take(a + (s * inverse) * ab + (t * inverse) * ac,
-         hn::And(hn::And(hn::Gt(s, zero), hn::Gt(t, zero)), hn::Lt(s + t, determinant)));
-    return q;
   }
 };
 
@@ -313,11 +269,7 @@ class ClaimProof {
     const std::size_t count = m_count;
     m_count = 0;
     for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-      const auto load = [&](int corner) HWY_ATTR {
-        return Vectors{hn::Load(d, &m_corners[corner][0][i]), hn::Load(d, &m_corners[corner][1][i]),
-                       hn::Load(d, &m_corners[corner][2][i])};
-      };
-      const TrianglesInLanes set{load(0), load(1), load(2)};
+      const TrianglesInLanes set = TrianglesInLanes::load(m_corners, i);
       const Mask isUsed = hn::FirstN(d, count - i);
       for (const AffineClaim::Side& side : m_claim.sides)
         if (side.isWanted && !isAllowed(set, isUsed, side)) return false;

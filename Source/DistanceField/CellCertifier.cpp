@@ -3,7 +3,7 @@
 #include <palpate/SpatialQueries.h>
 
 #include "DistanceField/AffineClaim.h"
-#include "Math/ClosestPoint.h"
+#include "DistanceField/NearestTriangle.h"
 #include "Math/Tolerances.h"
 #include "Queries/Containment.h"
 
@@ -16,30 +16,27 @@ namespace palpate {
 
 using Eigen::Vector3d;
 
-namespace {
-
-/// Lower bounds of the least and the largest distance of the corners.
-std::pair<double, double> magnitudesOf(const InterpolatedCell& cell) {
-  double least = kInfinity, most = 0;
-  for (const double value : cell.values) {
-    least = std::min(least, std::abs(value));
-    most = std::max(most, std::abs(value));
-  }
-  return {least * (1.0 - kStoredError), most * (1.0 - kStoredError)};
-}
-
-}  // namespace
-
 double InterpolatedCell::halfDiagonal() const { return std::numbers::sqrt3 * halfSide; }
 
-CellCertifier::CellCertifier(const SearchableGeometry& geometry) : m_geometry(geometry) {
+CellCertifier::CellCertifier(const SearchableGeometry& geometry, double tolerance)
+    : m_geometry(geometry), m_tolerance(tolerance) {
   const FloatBox box = geometry.tree.octree().box(0);
   float reach = 0;
   for (int k = 0; k < 3; ++k) reach = std::max({reach, -box.lower[k], box.upper[k]});
   m_reach = reach;
 }
 
-bool CellCertifier::isBeyond(const InterpolatedCell& cell, double distance) {
+/// Lower bounds of the least and the largest distance of the corners.
+std::pair<double, double> CellCertifier::magnitudesOf(const InterpolatedCell& cell) const {
+  double least = kInfinity, most = 0;
+  for (const double value : cell.values) {
+    least = std::min(least, std::abs(value));
+    most = std::max(most, std::abs(value));
+  }
+  return {least * (1.0 - kStoredError) - m_tolerance, most * (1.0 - kStoredError) - m_tolerance};
+}
+
+bool CellCertifier::isBeyond(const InterpolatedCell& cell, double distance) const {
   const auto [least, most] = magnitudesOf(cell);
   // All points are within half a diagonal of a corner, and within a diagonal of each.
   const double radius = cell.halfDiagonal() * (1.0 + kFieldError);
@@ -51,10 +48,14 @@ bool CellCertifier::isNearTriangle(const InterpolatedCell& cell, double bound) c
   const Triangle& corners = m_geometry.tree.ordered()[cell.nearTriangle];
   const Positions& now = m_geometry.mesh.now;
   const Vector3d a = now[corners[0]], b = now[corners[1]], c = now[corners[2]];
+  TriangleBatch batch;
+  for (std::size_t i = 0; i < 8; ++i) {
+    const Vector3d corner = cell.centre + cornerOf(i, cell.halfSide);
+    batch.set(i, a - corner, b - corner, c - corner);
+  }
+  const DistanceBounds bounds(Vector3d::Zero(), batch, 8);
   for (std::size_t i = 0; i < 8; ++i)
-    if (finiteVertexTriangleDistance(cell.centre + cornerOf(i, cell.halfSide), a, b, c).distance >
-        std::abs(cell.values[i]) + bound)
-      return false;
+    if (!(bounds.distance[i] + bounds.error[i] <= std::abs(cell.values[i]) + bound)) return false;
   return true;
 }
 
@@ -65,7 +66,7 @@ bool CellCertifier::isPositiveInPlane(const InterpolatedCell& cell, const Vector
   // The surface is not between a corner and the plane if the plane is nearer.
   for (std::size_t i = 0; i < 8; ++i) {
     const double height = middle + normal.dot(cornerOf(i, cell.halfSide)) - level;
-    if (std::abs(height) + error < std::abs(cell.values[i]) * (1.0 - kStoredError))
+    if (std::abs(height) + error < std::abs(cell.values[i]) * (1.0 - kStoredError) - m_tolerance)
       return cell.values[i] > 0;
   }
   return !isInside(m_geometry, cell.centre + (level - middle) * normal, {}, Engine::Octree, stack);

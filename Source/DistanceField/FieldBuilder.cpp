@@ -5,15 +5,16 @@
 #include "Core/Text.h"
 #include "DistanceField/CellCertifier.h"
 #include "DistanceField/CornerTable.h"
+#include "DistanceField/NearestTriangle.h"
 #include "Math/Tolerances.h"
 #include "Queries/Containment.h"
-#include "Queries/PointDistances.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -36,7 +37,12 @@ class FieldBuilder {
  public:
   FieldBuilder(const SearchableGeometry& geometry, const DistanceFieldSettings& settings,
                const Threads& threads)
-      : m_geometry(geometry), m_settings(settings), m_threads(threads), m_certifier(geometry) {
+      : m_geometry(geometry),
+        m_settings(settings),
+        m_threads(threads),
+        m_tolerance(kCornerError * std::min(settings.errorBound, settings.band)),
+        m_nearestTriangle(geometry, m_tolerance),
+        m_certifier(geometry, m_tolerance) {
     chooseDomain();
   }
 
@@ -101,7 +107,7 @@ class FieldBuilder {
       m_origin[k] = first * m_unit;
     }
     m_bound = m_settings.errorBound - kStoredError * (m_settings.band + 4.0 * m_unit) -
-              kFieldError * (largest + longest);
+              kFieldError * (largest + longest) - m_tolerance;
     m_allowed =
         static_cast<float>((1.0 - kShareOfCells) * (1.0 - kStoredError) * (m_bound / m_unit));
   }
@@ -138,11 +144,11 @@ class FieldBuilder {
           addCell(corners, 0);
         }
   }
-  /// known: a corner near this one whose distance was evaluated before, or kNone.
-  std::uint32_t cornerAt(const Corner& corner, std::uint32_t known) {
+  /// parent: the cell that is split, or kNone.
+  std::uint32_t cornerAt(const Corner& corner, std::uint32_t parent) {
     const std::uint32_t number = m_corners.find(corner);
-    if (number == m_known.size()) {
-      m_known.push_back(known);
+    if (number == m_parents.size()) {
+      m_parents.push_back(parent);
       m_covered.push_back(0);
     }
     return number;
@@ -164,12 +170,11 @@ class FieldBuilder {
     std::array<std::uint32_t, 27> corners;  // of the children: x runs fastest
     for (std::uint32_t i = 0; i < 27; ++i) {
       const Corner at{i % 3, i / 3 % 3, i / 9};
-      const std::uint32_t nearest = cell.corners[at[0] / 2 | (at[1] / 2) << 1 | (at[2] / 2) << 2];
       corners[i] =
           ((at[0] | at[1] | at[2]) & 1) == 0
-              ? nearest
+              ? cell.corners[at[0] / 2 | (at[1] / 2) << 1 | (at[2] / 2) << 2]
               : cornerAt({low[0] + at[0] * half, low[1] + at[1] * half, low[2] + at[2] * half},
-                         nearest);
+                         index);
     }
     for (std::uint32_t child = 0; child < 8; ++child) {
       std::array<std::uint32_t, 8> ofChild;
@@ -202,7 +207,7 @@ class FieldBuilder {
   }
   State test(const Cell& cell, PointQueryStack& stack) const {
     const InterpolatedCell interpolated = interpolatedCell(cell);
-    if (CellCertifier::isBeyond(interpolated, m_settings.band)) return State::Beyond;
+    if (m_certifier.isBeyond(interpolated, m_settings.band)) return State::Beyond;
     const bool isWithin = m_certifier.isWithin(interpolated, kShareOfCells * m_bound, stack);
     return isWithin ? State::Certified : State::Split;
   }
@@ -218,18 +223,22 @@ class FieldBuilder {
   }
   void evaluate(std::size_t i, PointQueryStack& stack) {
     const Vector3d point = positionOf(m_corners[i]);
-    const std::uint32_t known = m_known[i];
-    const auto near = PointDistances(m_geometry, point, false)
-                          .nearest(kInfinity, known == kNone ? 0 : m_nearest[known]);
-    bool inside;
+    std::array<std::uint32_t, 8> likely{};
     // The sign changes only at the surface.
-    const double distance = known == kNone ? 0.0 : std::abs(m_distances[known]) * m_unit;
-    if (distance > 0.0 && (point - positionOf(m_corners[known])).norm() < 0.999 * distance)
-      inside = m_distances[known] < 0.0;
-    else
-      inside = isInside(m_geometry, point, {}, Engine::Octree, stack);
-    m_distances[i] = static_cast<float>((inside ? -near->distance : near->distance) / m_unit);
-    m_nearest[i] = near->place;
+    int sign = 0;
+    if (const std::uint32_t parent = m_parents[i]; parent != kNone)
+      for (std::size_t k = 0; k < 8; ++k) {
+        const std::uint32_t corner = m_cells[parent].corners[k];
+        likely[k] = m_nearest[corner];
+        const double distance = std::abs(m_distances[corner]) * m_unit;
+        if ((point - positionOf(m_corners[corner])).norm() < 0.999 * distance - m_tolerance)
+          sign = m_distances[corner] < 0.0f ? -1 : 1;
+      }
+    const auto near =
+        m_nearestTriangle.at(point, std::span(likely).first(m_parents[i] == kNone ? 1 : 8));
+    if (sign == 0) sign = isInside(m_geometry, point, {}, Engine::Octree, stack) ? -1 : 1;
+    m_distances[i] = static_cast<float>(sign * near.distance / m_unit);
+    m_nearest[i] = near.place;
   }
   /// Calls f(from, to) for parts of [first, end), on all threads, and reports the progress. done:
   /// share of this round before the call; the call does half of it.
@@ -263,7 +272,7 @@ class FieldBuilder {
     // Each vector's old memory is held until its new one is filled.
     checkMemory(m_corners.bytesToGrow() + 2 * m_corners.capacity() * kBytesPerCorner);
     m_corners.grow();
-    m_known.reserve(m_corners.capacity());
+    m_parents.reserve(m_corners.capacity());
     m_covered.reserve(m_corners.capacity());
     m_distances.reserve(m_corners.capacity());
     m_nearest.reserve(m_corners.capacity());
@@ -465,6 +474,8 @@ class FieldBuilder {
   const SearchableGeometry& m_geometry;
   const DistanceFieldSettings& m_settings;
   const Threads& m_threads;
+  const double m_tolerance;  ///< L: the error of distances at corners
+  const NearestTriangle m_nearestTriangle;
   const CellCertifier m_certifier;
   FieldCells m_field;
   Vector3d m_origin;
@@ -475,7 +486,7 @@ class FieldBuilder {
   std::vector<Cell> m_cells;  ///< the roots come first
   CornerTable m_corners;
   // Of each corner:
-  std::vector<std::uint32_t> m_known;    ///< a corner that was evaluated before, or kNone
+  std::vector<std::uint32_t> m_parents;  ///< the cell whose split made it, or kNone
   std::vector<std::uint8_t> m_covered;   ///< octants in which it is the corner of a cell, as bits
   std::vector<float> m_distances;        ///< units
   std::vector<std::uint32_t> m_nearest;  ///< the nearest triangle, by its place in the octree
