@@ -27,7 +27,7 @@ namespace {
 constexpr std::uint32_t kNone = 0xffffffff;
 /// The part of the error bound that a cell's own interpolation may use. The rest is for corners
 /// that hang.
-constexpr double kShareOfCells = 0.9;
+constexpr double kShareOfCells = 0.96;
 constexpr std::size_t kSlice = 1 << 14;  ///< points or cells between two calls of `progress`
 constexpr std::size_t kGrain = 64;
 
