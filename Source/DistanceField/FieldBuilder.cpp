@@ -493,7 +493,8 @@ class FieldBuilder {
   std::vector<float> m_values;           ///< units: what the cells interpolate
   std::vector<std::uint32_t> m_owners;   ///< the cell on which it hangs, or kNone
   static constexpr std::size_t kBytesPerCorner =
-      2 * sizeof(float) + 3 * sizeof(std::uint32_t) + 2 * sizeof(std::uint8_t);
+      2 * sizeof(float) + 3 * sizeof(std::uint32_t) + 2 * sizeof(std::uint8_t) +
+      2 * sizeof(std::uint32_t);  // of lists in computeValues()
 };
 
 }  // namespace
