@@ -2,6 +2,7 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/ExpectRefused.h"
+#include "Common/FailingAllocation.h"
 #include "Common/Sanitized.h"
 #include "Core/SimdPath.h"
 #include "FieldMeshes.h"
@@ -303,7 +304,7 @@ TEST(DistanceField, ReportsProgressAndIsCancelled) {
 
 TEST(DistanceField, KeepsItsMemoryLimit) {
   const Mesh mesh = sphere(20, 30, {0, 0, 0}, 1.0);
-  DistanceFieldSettings settings{.errorBound = 0.005, .band = 0.2, .memoryLimit = 100000};
+  DistanceFieldSettings settings{.errorBound = 0.02, .band = 0.2, .memoryLimit = 100000};
   // Each refusal states what is needed next. The last one states what is enough.
   for (int refusals = 0;; ++refusals) {
     ASSERT_LT(refusals, 100);
@@ -320,10 +321,23 @@ TEST(DistanceField, KeepsItsMemoryLimit) {
       settings.memoryLimit = needed;
     }
   }
-  --settings.memoryLimit;
-  expectRefused(ErrorCode::MemoryLimit, "needs at least", [&] {
-    DistanceField::build({mesh.positions, mesh.triangles}, settings);
-  });
+  // The queries' copy of the mesh is there when the first cells are refused.
+  const auto peakOf = [&](std::size_t limit) {
+    settings.memoryLimit = limit;
+    FailingAllocation::arm(0);
+    try {
+      DistanceField::build({mesh.positions, mesh.triangles}, settings);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::MemoryLimit);
+    }
+    FailingAllocation::disarm();
+    return FailingAllocation::peakBytes();
+  };
+  const std::size_t enough = settings.memoryLimit, ofMesh = peakOf(1);
+  for (const std::size_t limit : {enough, enough - 1, enough / 2, enough / 7}) {
+    EXPECT_LE(peakOf(limit), limit + ofMesh);
+    EXPECT_GT(peakOf(limit), limit / 4);
+  }
 }
 
 TEST(DistanceField, RefusesInvalidInput) {
