@@ -14,8 +14,9 @@ PANELS = (("build ms", "build time (ms of one thread)"), ("MB", "memory (MB)"))
 COLOUR = {"Palpate": VERMILLION, "OpenVDB 10": BLACK}
 MARKS = "osD^v"
 CAPTION = """\
-Distance fields in a band of three error bounds, for each body. The bound is a share of the diagonal of the body's box.
-OpenVDB's voxels are as large as the bound. Its error is not bounded by proof. Both axes are logarithmic."""
+Distance fields in a band of three error bounds, for each body. The bound is a share
+of the diagonal of the body's box. OpenVDB's voxels are as large as the bound.
+Its error is not bounded by proof. Both axes are logarithmic."""
 
 
 def seriesOf(rows, engine, metric):
