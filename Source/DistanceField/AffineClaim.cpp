@@ -83,11 +83,15 @@ class SideInLanes {
   }
   /// Whether all points of the set have a distance of at least H(x) - level from each point x of
   /// the cell. For any unit vector w the distance of x and y is at least w (x - y). The best w
-  /// leads from y to the point of the cell where the distance less H is least.
+  /// leads from y to the point of the cell where the distance less H is least. way: w times any
+  /// length, by which both sides are multiplied.
   template <class Set>
-  HWY_ATTR HWY_INLINE Mask isFar(const Set& set, const Vectors& w) const {
-    const V least = hn::Neg(m_halfSide * sumOfMagnitudes(w - m_normal)) - m_atCentre - set.along(w);
-    return hn::Ge(least, m_error - m_level);
+  HWY_ATTR HWY_INLINE Mask isFar(const Set& set, const Vectors& way) const {
+    const V square = dot(way, way), length = hn::Sqrt(square);
+    const V least = hn::Neg(m_halfSide * sumOfMagnitudes(way - length * m_normal)) -
+                    m_atCentre * length - set.along(way);
+    return hn::And(hn::Gt(square, hn::Set(d, kShortestDirection)),
+                   hn::Ge(least, (m_error - m_level) * length));
   }
   HWY_ATTR HWY_INLINE Vectors wayFrom(const Vectors& point) const {
     const Vectors above = point - dot(m_normal, point) * m_normal;
@@ -95,7 +99,7 @@ class SideInLanes {
     const Vectors nearest{hn::Min(hn::Max(above.x, low), m_halfSide),
                           hn::Min(hn::Max(above.y, low), m_halfSide),
                           hn::Min(hn::Max(above.z, low), m_halfSide)};
-    return normalized(nearest - point);
+    return nearest - point;
   }
   /// Whether the set is beside the cell's shadow along the normal: separated by a direction across
   /// the normal and an axis.
@@ -248,19 +252,22 @@ class ClaimProof {
     take(2, set.middle.z, set.halfSides.z);
     const Mask isNear = hn::Le(square, hn::Set(d, m_claim.reach * m_claim.reach));
     Mask isEntered = hn::Lt(zero, zero);
-    if (!hn::AllFalse(d, isNear))
-      for (const AffineClaim::Side& side : m_claim.sides) {
-        if (!side.isWanted) continue;
-        const SideInLanes lanes(m_claim, side);
-        Mask isAllowed = hn::Le(zero, zero);
-        if (side.needsDistance) isAllowed = lanes.isFar(set, lanes.wayFrom(set.middle));
-        if (side.needsCrossing)
-          isAllowed =
-              hn::And(isAllowed, hn::Or(hn::Not(lanes.meetsLevel(set)), lanes.isBeside(set)));
-        isEntered = hn::Or(isEntered, hn::Not(hn::Or(isAllowed, lanes.isBelow(set))));
+    for (const AffineClaim::Side& side : m_claim.sides) {
+      if (!side.isWanted || hn::AllFalse(d, isNear)) continue;
+      const SideInLanes lanes(m_claim, side);
+      const Mask isOpen = hn::AndNot(lanes.isBelow(set), isNear);
+      if (hn::AllFalse(d, isOpen)) continue;
+      if (side.needsCrossing) {
+        const Mask meets = hn::And(isOpen, lanes.meetsLevel(set));
+        if (!hn::AllFalse(d, meets))
+          isEntered = hn::Or(isEntered, hn::AndNot(lanes.isBeside(set), meets));
       }
+      if (side.needsDistance)
+        isEntered =
+            hn::Or(isEntered, hn::AndNot(lanes.isFar(set, lanes.wayFrom(set.middle)), isOpen));
+    }
     // Boxes with coordinates that were clamped say nothing.
-    isEntered = hn::And(isFilled, hn::Or(hn::And(isEntered, isNear), isMoved));
+    isEntered = hn::And(isFilled, hn::Or(isEntered, isMoved));
     return bitsOf(d, isEntered);
   }
 
@@ -290,7 +297,7 @@ class ClaimProof {
         if (hn::AllFalse(d, open)) return true;
         const V third = hn::Set(d, 1.0 / 3.0);
         if (closes(lanes.wayFrom(third * (set.a + set.b + set.c)))) return true;
-        const Vectors normal = normalized(cross(set.b - set.a, set.c - set.a));
+        const Vectors normal = cross(set.b - set.a, set.c - set.a);
         if (closes(normal) || closes({hn::Neg(normal.x), hn::Neg(normal.y), hn::Neg(normal.z)}))
           return true;
         return closes(lanes.wayFrom(set.nearest()));
