@@ -265,7 +265,7 @@ class FieldBuilder {
   void makeRoom() {
     if (m_cells.size() + 8 > m_cells.capacity()) {
       const std::size_t size = std::max<std::size_t>(1 << 10, 2 * m_cells.capacity());
-      checkMemory(size * sizeof(Cell));
+      checkMemory(size * kBytesPerCell);
       m_cells.reserve(size);
     }
     if (m_corners.hasRoom(27)) return;
@@ -281,7 +281,7 @@ class FieldBuilder {
   }
   /// Throws if the build may not allocate so many bytes.
   void checkMemory(std::size_t more) const {
-    const std::size_t needed = m_cells.capacity() * sizeof(Cell) + m_corners.bytes() +
+    const std::size_t needed = m_cells.capacity() * kBytesPerCell + m_corners.bytes() +
                                m_corners.capacity() * kBytesPerCorner + more;
     if (m_settings.memoryLimit == 0 || needed <= m_settings.memoryLimit) return;
     throw Error(ErrorCode::MemoryLimit, "memoryLimit is " + std::to_string(m_settings.memoryLimit) +
@@ -484,6 +484,8 @@ class FieldBuilder {
   float m_allowed = 0;   ///< units: the part of it that is for corners that hang
   int m_rounds = 0;
   std::vector<Cell> m_cells;  ///< the roots come first
+  static constexpr std::size_t kBytesPerCell =
+      sizeof(Cell) + 2 * sizeof(std::uint32_t);  // of lists in adjustCellsBeyond()
   CornerTable m_corners;
   // Of each corner:
   std::vector<std::uint32_t> m_parents;  ///< the cell whose split made it, or kNone
