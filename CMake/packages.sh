@@ -8,7 +8,8 @@ build="cmake ninja-build g++ pkg-config libeigen3-dev libtbb-dev libhwy-dev libg
 test="python3 libgtest-dev libcgal-dev libmpfr-dev clang-format-14 qemu-user"
 docs="doxygen python3-sphinx furo python3-myst-parser python3-breathe"
 figures="python3 python3-matplotlib python3-pil"
-benchmark="python3 libbenchmark-dev libembree-dev libbullet-dev libcgal-dev libnanoflann-dev"
+benchmark="python3 libbenchmark-dev libembree-dev libbullet-dev libcgal-dev libnanoflann-dev
+  libopenvdb-dev"
 
 missing=()
 for set in "$@"; do

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstdint>
+#include <utility>
 
 namespace palpate {
 
@@ -31,20 +32,25 @@ struct InterpolatedCell {
 /// Docs/DistanceFields.md has the theorems and their proofs.
 class CellCertifier {
  public:
-  /// The geometry's octree must be up to date.
-  explicit CellCertifier(const SearchableGeometry&);
+  /// The geometry's octree must be up to date. tolerance: L; the error of distances at corners.
+  CellCertifier(const SearchableGeometry&, double tolerance);
 
   /// Whether the interpolated distance is certainly within `bound` of the exact one in the whole
-  /// cell. The values may be rounded to float; `bound` must not include that rounding.
+  /// cell. The values may be rounded to float; `bound` must include neither that rounding nor the
+  /// tolerance.
   bool isWithin(const InterpolatedCell&, double bound, PointQueryStack&) const;
   /// Whether all points of the cell have certainly at least this distance from the surface.
-  static bool isBeyond(const InterpolatedCell&, double distance);
+  bool isBeyond(const InterpolatedCell&, double distance) const;
 
  private:
+  std::pair<double, double> magnitudesOf(const InterpolatedCell&) const;
   bool isNearTriangle(const InterpolatedCell&, double bound) const;
+  bool isPositiveInPlane(const InterpolatedCell&, const Eigen::Vector3d& normal, double atCentre,
+                         double level, double error, PointQueryStack&) const;
 
   const SearchableGeometry& m_geometry;
-  double m_reach;  ///< in the octree's floats: the largest coordinate
+  const double m_tolerance;  ///< L
+  double m_reach;            ///< in the octree's floats: the largest coordinate
 };
 
 }  // namespace palpate

@@ -83,7 +83,7 @@ void DistanceField::values(std::span<const Eigen::Vector3d> points, std::span<do
                                                 std::to_string(out.size()) + " answers");
   for (std::size_t i = 0; i < points.size(); ++i)
     if (!points[i].allFinite()) checkPoint(points[i], ("point " + std::to_string(i)).c_str());
-  for (std::size_t i = 0; i < points.size(); ++i) out[i] = field.lookup.value(points[i]);
+  field.lookup.values(points, out.data());
 }
 
 const FieldLookup& DistanceField::lookup() const { return valid().lookup; }

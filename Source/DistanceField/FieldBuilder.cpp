@@ -4,15 +4,17 @@
 
 #include "Core/Text.h"
 #include "DistanceField/CellCertifier.h"
+#include "DistanceField/CornerTable.h"
+#include "DistanceField/NearestTriangle.h"
 #include "Math/Tolerances.h"
 #include "Queries/Containment.h"
-#include "Queries/PointDistances.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
+#include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,71 +24,36 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// Coordinates of a corner from the domain's origin, in sides of the smallest possible cell.
-using Corner = std::array<std::uint32_t, 3>;
-
 constexpr std::uint32_t kNone = 0xffffffff;
 /// The part of the error bound that a cell's own interpolation may use. The rest is for corners
 /// that hang.
-constexpr double kShareOfCells = 0.9;
+constexpr double kShareOfCells = 0.96;
 constexpr std::size_t kSlice = 1 << 14;  ///< points or cells between two calls of `progress`
 constexpr std::size_t kGrain = 64;
 
 constexpr std::uint32_t sideOf(int level) { return 1u << (kMostLevels - level); }
 
-/// The corners of all cells, numbered in the order in which they are added.
-class CornerTable {
- public:
-  std::size_t size() const { return m_corners.size(); }
-  const Corner& operator[](std::size_t i) const { return m_corners[i]; }
-  /// The number of a corner, which is added if it is new.
-  std::uint32_t find(const Corner& corner) {
-    if (2 * m_corners.size() >= m_slots.size()) grow();
-    std::uint32_t& slot = slotOf(corner);
-    if (slot == kNone) {
-      slot = static_cast<std::uint32_t>(m_corners.size());
-      m_corners.push_back(corner);
-    }
-    return slot;
-  }
-  std::size_t bytes() const {
-    return m_corners.capacity() * sizeof(Corner) + m_slots.capacity() * sizeof(std::uint32_t);
-  }
-
- private:
-  std::uint32_t& slotOf(const Corner& corner) {
-    const std::uint64_t key =
-        corner[0] | std::uint64_t{corner[1]} << 21 | std::uint64_t{corner[2]} << 42;
-    const std::size_t mask = m_slots.size() - 1;
-    std::size_t i = key * 0x9e3779b97f4a7c15u >> (64 - std::bit_width(mask));
-    while (m_slots[i] != kNone && m_corners[m_slots[i]] != corner) i = (i + 1) & mask;
-    return m_slots[i];
-  }
-  void grow() {
-    m_slots.assign(std::max<std::size_t>(1 << 12, 2 * m_slots.size()), kNone);
-    for (std::uint32_t i = 0; i < m_corners.size(); ++i) slotOf(m_corners[i]) = i;
-  }
-
-  std::vector<Corner> m_corners;
-  std::vector<std::uint32_t> m_slots;  ///< a power of two
-};
-
 class FieldBuilder {
  public:
   FieldBuilder(const SearchableGeometry& geometry, const DistanceFieldSettings& settings,
                const Threads& threads)
-      : m_geometry(geometry), m_settings(settings), m_threads(threads), m_certifier(geometry) {
+      : m_geometry(geometry),
+        m_settings(settings),
+        m_threads(threads),
+        m_tolerance(kCornerError * std::min(settings.errorBound, settings.band)),
+        m_nearestTriangle(geometry, m_tolerance),
+        m_certifier(geometry, m_tolerance) {
     chooseDomain();
   }
 
   FieldCells build() {
     addRoots();
     refine(0);
-    for (std::vector<std::uint32_t> tooLarge = joinCells(); !tooLarge.empty();
-         tooLarge = joinCells()) {
-      const auto first = static_cast<std::uint32_t>(m_cells.size());
+    for (std::vector<std::uint32_t> tooLarge = joinCells(0); !tooLarge.empty();) {
+      const std::size_t first = m_cells.size();
       for (const std::uint32_t cell : tooLarge) split(cell);
       refine(first);
+      tooLarge = joinCells(first);
     }
     report(1.0);
     return assemble();
@@ -100,11 +67,12 @@ class FieldBuilder {
     Adjusted  ///< beyond the band, with corner values, because it touches a larger cell with such
   };
   struct Cell {
-    Corner corner;  ///< the lowest
     std::array<std::uint32_t, 8> corners;
     std::uint32_t children = kNone;  ///< the first of eight
+    float allowed = 0;  ///< units: the deviation of corners up to which the bound is proven
     std::uint8_t level = 0;
     State state = State::Split;
+    bool isOff = false;  ///< the deviation of its corners is larger than allowed
 
     bool hasValues() const { return state == State::Certified || state == State::Adjusted; }
   };
@@ -139,7 +107,9 @@ class FieldBuilder {
       m_origin[k] = first * m_unit;
     }
     m_bound = m_settings.errorBound - kStoredError * (m_settings.band + 4.0 * m_unit) -
-              kFieldError * (largest + longest);
+              kFieldError * (largest + longest) - m_tolerance;
+    m_allowed =
+        static_cast<float>((1.0 - kShareOfCells) * (1.0 - kStoredError) * (m_bound / m_unit));
   }
 
   Vector3d positionOf(const Corner& corner) const {
@@ -149,7 +119,7 @@ class FieldBuilder {
   InterpolatedCell interpolatedCell(const Cell& cell) const {
     InterpolatedCell result;
     result.halfSide = halfSideOf(cell);
-    result.centre = positionOf(cell.corner) + Vector3d::Constant(result.halfSide);
+    result.centre = positionOf(m_corners[cell.corners[0]]) + Vector3d::Constant(result.halfSide);
     std::size_t nearest = 0;
     for (std::size_t i = 0; i < 8; ++i) {
       result.values[i] = m_distances[cell.corners[i]] * m_unit;
@@ -164,41 +134,71 @@ class FieldBuilder {
   void addRoots() {
     for (std::uint32_t z = 0; z < m_field.size[2]; ++z)
       for (std::uint32_t y = 0; y < m_field.size[1]; ++y)
-        for (std::uint32_t x = 0; x < m_field.size[0]; ++x)
-          addCell({x * sideOf(0), y * sideOf(0), z * sideOf(0)}, 0, kNone);
+        for (std::uint32_t x = 0; x < m_field.size[0]; ++x) {
+          makeRoom();
+          std::array<std::uint32_t, 8> corners;
+          for (std::uint32_t i = 0; i < 8; ++i)
+            corners[i] = cornerAt({(x + (i & 1)) * sideOf(0), (y + (i >> 1 & 1)) * sideOf(0),
+                                   (z + (i >> 2)) * sideOf(0)},
+                                  kNone);
+          addCell(corners, 0);
+        }
   }
-  /// known: a corner near the cell whose distance was evaluated before, or kNone.
-  void addCell(const Corner& corner, int level, std::uint32_t known) {
-    Cell cell{corner, {}};
-    cell.level = static_cast<std::uint8_t>(level);
-    for (std::uint32_t i = 0; i < 8; ++i) {
-      Corner at = corner;
-      for (int k = 0; k < 3; ++k) at[k] += (i >> k & 1) * sideOf(level);
-      cell.corners[i] = m_corners.find(at);
+  /// parent: the cell that is split, or kNone.
+  std::uint32_t cornerAt(const Corner& corner, std::uint32_t parent) {
+    const std::uint32_t number = m_corners.find(corner);
+    if (number == m_parents.size()) {
+      m_parents.push_back(parent);
+      m_covered.push_back(0);
     }
-    m_known.resize(m_corners.size(), known);
+    return number;
+  }
+  void addCell(const std::array<std::uint32_t, 8>& corners, int level) {
+    Cell cell{corners};
+    cell.level = static_cast<std::uint8_t>(level);
+    for (unsigned i = 0; i < 8; ++i)
+      m_covered[corners[i]] = static_cast<std::uint8_t>(m_covered[corners[i]] | 1u << (7 - i));
     m_cells.push_back(cell);
   }
   void split(std::uint32_t index) {
+    makeRoom();
     const Cell cell = m_cells[index];
     m_cells[index].state = State::Split;
     m_cells[index].children = static_cast<std::uint32_t>(m_cells.size());
-    for (std::uint32_t i = 0; i < 8; ++i) {
-      Corner at = cell.corner;
-      for (int k = 0; k < 3; ++k) at[k] += (i >> k & 1) * sideOf(cell.level + 1);
-      addCell(at, cell.level + 1, cell.corners[i]);
+    const Corner low = m_corners[cell.corners[0]];
+    const std::uint32_t half = sideOf(cell.level + 1);
+    std::array<std::uint32_t, 27> corners;  // of the children: x runs fastest
+    for (std::uint32_t i = 0; i < 27; ++i) {
+      const Corner at{i % 3, i / 3 % 3, i / 9};
+      corners[i] =
+          ((at[0] | at[1] | at[2]) & 1) == 0
+              ? cell.corners[at[0] / 2 | (at[1] / 2) << 1 | (at[2] / 2) << 2]
+              : cornerAt({low[0] + at[0] * half, low[1] + at[1] * half, low[2] + at[2] * half},
+                         index);
+    }
+    for (std::uint32_t child = 0; child < 8; ++child) {
+      std::array<std::uint32_t, 8> ofChild;
+      for (std::uint32_t i = 0; i < 8; ++i) {
+        std::uint32_t at = 0;
+        for (std::uint32_t k = 0, step = 1; k < 3; ++k, step *= 3)
+          at += ((child >> k & 1) + (i >> k & 1)) * step;
+        ofChild[i] = corners[at];
+      }
+      addCell(ofChild, cell.level + 1);
     }
   }
   /// Evaluates, tests and splits the cells from `first` on.
   void refine(std::size_t first) {
     while (first < m_cells.size()) {
-      checkMemory();
       ++m_rounds;
       evaluateCorners();
       const std::size_t end = m_cells.size();
       inSlices(first, end, 0.5, [&](std::size_t from, std::size_t to) {
         PointQueryStack stack;
-        for (std::size_t i = from; i < to; ++i) m_cells[i].state = test(m_cells[i], stack);
+        for (std::size_t i = from; i < to; ++i) {
+          m_cells[i].state = test(m_cells[i], stack);
+          m_cells[i].allowed = m_allowed;
+        }
       });
       for (std::size_t i = first; i < end; ++i)
         if (m_cells[i].state == State::Split) split(static_cast<std::uint32_t>(i));
@@ -207,7 +207,7 @@ class FieldBuilder {
   }
   State test(const Cell& cell, PointQueryStack& stack) const {
     const InterpolatedCell interpolated = interpolatedCell(cell);
-    if (CellCertifier::isBeyond(interpolated, m_settings.band)) return State::Beyond;
+    if (m_certifier.isBeyond(interpolated, m_settings.band)) return State::Beyond;
     const bool isWithin = m_certifier.isWithin(interpolated, kShareOfCells * m_bound, stack);
     return isWithin ? State::Certified : State::Split;
   }
@@ -223,18 +223,22 @@ class FieldBuilder {
   }
   void evaluate(std::size_t i, PointQueryStack& stack) {
     const Vector3d point = positionOf(m_corners[i]);
-    const std::uint32_t known = m_known[i];
-    const auto near = PointDistances(m_geometry, point, false)
-                          .nearest(kInfinity, known == kNone ? 0 : m_nearest[known]);
-    bool inside;
+    std::array<std::uint32_t, 8> likely{};
     // The sign changes only at the surface.
-    const double distance = known == kNone ? 0.0 : std::abs(m_distances[known]) * m_unit;
-    if (distance > 0.0 && (point - positionOf(m_corners[known])).norm() < 0.999 * distance)
-      inside = m_distances[known] < 0.0;
-    else
-      inside = isInside(m_geometry, point, {}, Engine::Octree, stack);
-    m_distances[i] = static_cast<float>((inside ? -near->distance : near->distance) / m_unit);
-    m_nearest[i] = near->place;
+    int sign = 0;
+    if (const std::uint32_t parent = m_parents[i]; parent != kNone)
+      for (std::size_t k = 0; k < 8; ++k) {
+        const std::uint32_t corner = m_cells[parent].corners[k];
+        likely[k] = m_nearest[corner];
+        const double distance = std::abs(m_distances[corner]) * m_unit;
+        if ((point - positionOf(m_corners[corner])).norm() < 0.999 * distance - m_tolerance)
+          sign = m_distances[corner] < 0.0f ? -1 : 1;
+      }
+    const auto near =
+        m_nearestTriangle.at(point, std::span(likely).first(m_parents[i] == kNone ? 1 : 8));
+    if (sign == 0) sign = isInside(m_geometry, point, {}, Engine::Octree, stack) ? -1 : 1;
+    m_distances[i] = static_cast<float>(sign * near.distance / m_unit);
+    m_nearest[i] = near.place;
   }
   /// Calls f(from, to) for parts of [first, end), on all threads, and reports the progress. done:
   /// share of this round before the call; the call does half of it.
@@ -255,21 +259,34 @@ class FieldBuilder {
     if (m_settings.progress && !m_settings.progress(fraction))
       throw Error(ErrorCode::Cancelled, "the build of the distance field was cancelled");
   }
-  /// Before corners are evaluated.
-  void checkMemory() const {
-    constexpr std::size_t kPerCorner = 2 * sizeof(float) + 2 * sizeof(std::uint32_t);
-    const std::size_t needed = m_cells.capacity() * sizeof(Cell) + m_corners.bytes() +
-                               m_corners.size() * kPerCorner + assembledBytes();
+  // ---- Memory ----
+
+  /// For the eight cells of a split.
+  void makeRoom() {
+    if (m_cells.size() + 8 > m_cells.capacity()) {
+      const std::size_t size = std::max<std::size_t>(1 << 10, 2 * m_cells.capacity());
+      checkMemory(size * kBytesPerCell);
+      m_cells.reserve(size);
+    }
+    if (m_corners.hasRoom(27)) return;
+    // Each vector's old memory is held until its new one is filled.
+    checkMemory(m_corners.bytesToGrow() + 2 * m_corners.capacity() * kBytesPerCorner);
+    m_corners.grow();
+    m_parents.reserve(m_corners.capacity());
+    m_covered.reserve(m_corners.capacity());
+    m_distances.reserve(m_corners.capacity());
+    m_nearest.reserve(m_corners.capacity());
+    m_values.reserve(m_corners.capacity());
+    m_owners.reserve(m_corners.capacity());
+  }
+  /// Throws if the build may not allocate so many bytes.
+  void checkMemory(std::size_t more) const {
+    const std::size_t needed = m_cells.capacity() * kBytesPerCell + m_corners.bytes() +
+                               m_corners.capacity() * kBytesPerCorner + more;
     if (m_settings.memoryLimit == 0 || needed <= m_settings.memoryLimit) return;
     throw Error(ErrorCode::MemoryLimit, "memoryLimit is " + std::to_string(m_settings.memoryLimit) +
                                             " bytes; the distance field needs at least " +
                                             std::to_string(needed) + " bytes");
-  }
-  std::size_t assembledBytes() const {
-    std::size_t leaves = 0, blocks = 0;
-    for (const Cell& cell : m_cells) leaves += cell.hasValues(), blocks += cell.children != kNone;
-    return leaves * sizeof(FieldCells::Leaf) + blocks * sizeof(FieldCells::Block) +
-           m_field.size[0] * m_field.size[1] * m_field.size[2] * sizeof(CellEntry);
   }
 
   // ---- Continuity ----
@@ -293,22 +310,22 @@ class FieldBuilder {
   }
   /// The largest cell with values that the corner touches other than with a corner, or kNone. The
   /// corner hangs on it.
-  std::uint32_t largestAround(const Corner& corner) const {
+  std::uint32_t largestAround(std::uint32_t number) const {
     std::uint32_t largest = kNone;
+    if (m_covered[number] == 0xff) return largest;
+    const Corner corner = m_corners[number];
     for (std::uint32_t octant = 0; octant < 8; ++octant) {
+      if (m_covered[number] >> octant & 1) continue;
       const std::uint32_t index = leafAround(corner, octant);
-      if (index == kNone) continue;
-      const Cell& cell = m_cells[index];
-      const std::uint32_t within = sideOf(cell.level) - 1;
-      if (!cell.hasValues() || ((corner[0] | corner[1] | corner[2]) & within) == 0) continue;
-      if (largest == kNone || cell.level < m_cells[largest].level) largest = index;
+      if (index == kNone || !m_cells[index].hasValues()) continue;
+      if (largest == kNone || m_cells[index].level < m_cells[largest].level) largest = index;
     }
     return largest;
   }
   double interpolate(const Cell& cell, const Corner& corner) const {
+    const Corner low = m_corners[cell.corners[0]];
     std::array<double, 3> t;
-    for (int k = 0; k < 3; ++k)
-      t[k] = static_cast<double>(corner[k] - cell.corner[k]) / sideOf(cell.level);
+    for (int k = 0; k < 3; ++k) t[k] = static_cast<double>(corner[k] - low[k]) / sideOf(cell.level);
     double sum = 0.0;
     for (std::uint32_t i = 0; i < 8; ++i) {
       double weight = 1.0;
@@ -318,39 +335,71 @@ class FieldBuilder {
     return sum;
   }
 
-  /// Computes m_values. Returns the cells that have to be split, because values that hang on them
-  /// are too far off.
-  std::vector<std::uint32_t> joinCells() {
-    adjustCellsBeyond();
-    std::vector<std::uint32_t> owners(m_corners.size());
-    m_threads.forChunks(owners.size(), 1024, [&](std::size_t, std::size_t from, std::size_t to) {
-      for (std::size_t i = from; i < to; ++i) owners[i] = largestAround(m_corners[i]);
-    });
-    // A corner of a larger cell hangs on still larger ones only.
-    std::array<std::vector<std::uint32_t>, kMostLevels + 1> byLevel;
-    for (std::uint32_t i = 0; i < owners.size(); ++i)
-      if (owners[i] != kNone) byLevel[m_cells[owners[i]].level].push_back(i);
-    m_values = m_distances;
-    for (const std::vector<std::uint32_t>& corners : byLevel)
-      for (const std::uint32_t i : corners)
-        m_values[i] = static_cast<float>(interpolate(m_cells[owners[i]], m_corners[i]));
-    std::vector<std::uint8_t> isOff(m_cells.size());
-    m_threads.forChunks(isOff.size(), 256, [&](std::size_t, std::size_t from, std::size_t to) {
-      PointQueryStack stack;
-      for (std::size_t i = from; i < to; ++i) isOff[i] = !isAllowed(m_cells[i], stack);
-    });
+  /// Computes m_values, after cells from `first` on were added. Returns the cells that have to be
+  /// split, because values that hang on them are too far off.
+  std::vector<std::uint32_t> joinCells(std::size_t first) {
+    adjustCellsBeyond(first);
+    findOwners();
+    const std::vector<std::uint8_t> hasChanged = computeValues();
     std::vector<std::uint32_t> tooLarge;
-    for (std::size_t i = 0; i < isOff.size(); ++i)
-      for (const std::uint32_t corner : m_cells[i].corners)
-        if (isOff[i] && deviationOf(corner) > 0.5 * deviationOf(m_cells[i]))
-          tooLarge.push_back(owners[corner]);
+    m_threads.forChunks(m_cells.size(), 256, [&](std::size_t, std::size_t from, std::size_t to) {
+      PointQueryStack stack;
+      for (std::size_t i = from; i < to; ++i) {
+        Cell& cell = m_cells[i];
+        if (i >= first || cell.isOff ||
+            std::any_of(cell.corners.begin(), cell.corners.end(),
+                        [&](std::uint32_t corner) { return hasChanged[corner] != 0; }))
+          cell.isOff = !isAllowed(cell, stack);
+      }
+    });
+    for (const Cell& cell : m_cells)
+      for (const std::uint32_t corner : cell.corners)
+        if (cell.isOff && deviationOf(corner) > 0.5 * deviationOf(cell))
+          tooLarge.push_back(m_owners[corner]);
     std::sort(tooLarge.begin(), tooLarge.end());
     tooLarge.erase(std::unique(tooLarge.begin(), tooLarge.end()), tooLarge.end());
     return tooLarge;
   }
-  /// L: how far what hangs is off.
+  /// The largest cell around a corner stays the largest until it is split.
+  void findOwners() {
+    const std::size_t known = m_owners.size();
+    m_owners.resize(m_corners.size(), kNone);
+    m_threads.forChunks(m_owners.size(), 1024, [&](std::size_t, std::size_t from, std::size_t to) {
+      for (std::size_t i = from; i < to; ++i)
+        if (i >= known || (m_owners[i] != kNone && m_cells[m_owners[i]].children != kNone))
+          m_owners[i] = largestAround(static_cast<std::uint32_t>(i));
+    });
+  }
+  /// Returns for each corner whether its value is another one than before.
+  std::vector<std::uint8_t> computeValues() {
+    const std::size_t known = m_values.size();
+    m_values.insert(m_values.end(), m_distances.begin() + static_cast<std::ptrdiff_t>(known),
+                    m_distances.end());
+    std::vector<std::uint8_t> hasChanged(m_corners.size());
+    // A corner of a larger cell hangs on still larger ones only.
+    std::array<std::vector<std::uint32_t>, kMostLevels + 1> byLevel;
+    for (std::uint32_t i = 0; i < m_owners.size(); ++i) {
+      if (m_owners[i] != kNone) {
+        byLevel[m_cells[m_owners[i]].level].push_back(i);
+      } else if (m_values[i] != m_distances[i]) {
+        m_values[i] = m_distances[i];
+        hasChanged[i] = 1;
+      }
+    }
+    for (const std::vector<std::uint32_t>& corners : byLevel)
+      m_threads.forChunks(corners.size(), 1024, [&](std::size_t, std::size_t from, std::size_t to) {
+        for (std::size_t j = from; j < to; ++j) {
+          const std::uint32_t i = corners[j];
+          const auto value = static_cast<float>(interpolate(m_cells[m_owners[i]], m_corners[i]));
+          hasChanged[i] = value != m_values[i];
+          m_values[i] = value;
+        }
+      });
+    return hasChanged;
+  }
+  /// Units: how far what hangs is off.
   double deviationOf(std::uint32_t corner) const {
-    return std::abs(double{m_values[corner]} - m_distances[corner]) * m_unit;
+    return std::abs(double{m_values[corner]} - m_distances[corner]);
   }
   double deviationOf(const Cell& cell) const {
     double most = 0.0;
@@ -358,26 +407,30 @@ class FieldBuilder {
     return most;
   }
   /// Whether a cell's error and the deviation of its values are together within the bound.
-  bool isAllowed(const Cell& cell, PointQueryStack& stack) const {
+  bool isAllowed(Cell& cell, PointQueryStack& stack) const {
     if (cell.state != State::Certified) return true;
     const double deviation = deviationOf(cell);
-    return deviation <= (1.0 - kShareOfCells) * m_bound ||
-           (deviation < m_bound &&
-            m_certifier.isWithin(interpolatedCell(cell), m_bound - deviation, stack));
+    if (deviation <= cell.allowed) return true;
+    auto share = static_cast<float>(deviation);
+    if (share < deviation) share = std::nextafter(share, std::numeric_limits<float>::infinity());
+    const double left = m_bound - share * m_unit;
+    if (!(left > 0) || !m_certifier.isWithin(interpolatedCell(cell), left, stack)) return false;
+    cell.allowed = share;
+    return true;
   }
-  /// Gives values to cells beyond the band that touch a larger cell with values, so that both agree
-  /// where they meet.
-  void adjustCellsBeyond() {
+  /// Gives values to cells from `first` on that are beyond the band and touch a larger cell with
+  /// values, so that both agree where they meet. Older cells need none: what they touch was not
+  /// smaller before.
+  void adjustCellsBeyond(std::size_t first) {
     std::array<std::vector<std::uint32_t>, kMostLevels + 1> byLevel;
-    for (std::uint32_t i = 0; i < m_cells.size(); ++i) {
-      if (m_cells[i].state == State::Adjusted) m_cells[i].state = State::Beyond;
-      if (m_cells[i].state == State::Beyond) byLevel[m_cells[i].level].push_back(i);
-    }
+    for (std::size_t i = first; i < m_cells.size(); ++i)
+      if (m_cells[i].state == State::Beyond)
+        byLevel[m_cells[i].level].push_back(static_cast<std::uint32_t>(i));
     for (const std::vector<std::uint32_t>& cells : byLevel)
       for (const std::uint32_t i : cells) {
         const auto& corners = m_cells[i].corners;
         if (std::any_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
-              const std::uint32_t largest = largestAround(m_corners[corner]);
+              const std::uint32_t largest = largestAround(corner);
               return largest != kNone && m_cells[largest].level < m_cells[i].level;
             }))
           m_cells[i].state = State::Adjusted;
@@ -393,6 +446,8 @@ class FieldBuilder {
       throw Error(ErrorCode::TooLarge, "the distance field has " + std::to_string(leaves) +
                                            " cells; at most 2^30 are supported");
     const std::size_t roots = std::size_t{m_field.size[0]} * m_field.size[1] * m_field.size[2];
+    checkMemory(leaves * sizeof(FieldCells::Leaf) + blocks * sizeof(FieldCells::Block) +
+                roots * sizeof(CellEntry));
     m_field.leaves.reserve(leaves);
     m_field.blocks.reserve(blocks);
     m_field.roots.resize(roots);
@@ -419,19 +474,29 @@ class FieldBuilder {
   const SearchableGeometry& m_geometry;
   const DistanceFieldSettings& m_settings;
   const Threads& m_threads;
+  const double m_tolerance;  ///< L: the error of distances at corners
+  const NearestTriangle m_nearestTriangle;
   const CellCertifier m_certifier;
   FieldCells m_field;
   Vector3d m_origin;
   double m_unit = 1.0;   ///< L
   double m_bound = 0.0;  ///< L: the error bound without what rounding may add
+  float m_allowed = 0;   ///< units: the part of it that is for corners that hang
   int m_rounds = 0;
   std::vector<Cell> m_cells;  ///< the roots come first
+  static constexpr std::size_t kBytesPerCell =
+      sizeof(Cell) + 2 * sizeof(std::uint32_t);  // of lists in adjustCellsBeyond()
   CornerTable m_corners;
   // Of each corner:
-  std::vector<std::uint32_t> m_known;    ///< a corner that was evaluated before, or kNone
+  std::vector<std::uint32_t> m_parents;  ///< the cell whose split made it, or kNone
+  std::vector<std::uint8_t> m_covered;   ///< octants in which it is the corner of a cell, as bits
   std::vector<float> m_distances;        ///< units
   std::vector<std::uint32_t> m_nearest;  ///< the nearest triangle, by its place in the octree
   std::vector<float> m_values;           ///< units: what the cells interpolate
+  std::vector<std::uint32_t> m_owners;   ///< the cell on which it hangs, or kNone
+  static constexpr std::size_t kBytesPerCorner =
+      2 * sizeof(float) + 3 * sizeof(std::uint32_t) + 2 * sizeof(std::uint8_t) +
+      2 * sizeof(std::uint32_t);  // of lists in computeValues()
 };
 
 }  // namespace

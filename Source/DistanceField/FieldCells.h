@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace palpate {
@@ -63,26 +64,38 @@ struct FieldCells {
   }
 };
 
+/// Where a field is.
+struct FieldFrame {
+  double toUnits, unit;          ///< units of a length L, and L of a unit
+  double band;                   ///< units
+  std::array<double, 3> origin;  ///< L
+  std::array<double, 3> size;    ///< units
+
+  explicit FieldFrame(const FieldCells& cells)
+      : toUnits(std::ldexp(1.0, -cells.exponent)),
+        unit(std::ldexp(1.0, cells.exponent)),
+        band(cells.band * toUnits) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      origin[k] = static_cast<double>(cells.origin[k]) * unit;
+      size[k] = cells.size[k];
+    }
+  }
+};
+
 /// Finds cells of a field and interpolates in them.
 class FieldLookup {
  public:
-  explicit FieldLookup(const FieldCells& cells)
-      : m_cells(cells),
-        m_toUnits(std::ldexp(1.0, -cells.exponent)),
-        m_unit(std::ldexp(1.0, cells.exponent)),
-        m_band(cells.band * m_toUnits) {
-    for (int k = 0; k < 3; ++k) {
-      m_origin[k] = static_cast<double>(cells.origin[k]) * m_unit;
-      m_size[k] = cells.size[k];
-    }
-  }
+  explicit FieldLookup(const FieldCells& cells) : m_cells(cells), m_frame(cells) {}
+
+  /// value() of many points, with the same bits. All must be finite.
+  void values(std::span<const Eigen::Vector3d> points, double* out) const;
 
   const FieldCells& cells() const { return m_cells; }
 
   /// L. The point must be finite.
   double value(const Eigen::Vector3d& point) const {
     const Place place = at(point);
-    const double inDomain = m_unit * clamped(interpolate(place));
+    const double inDomain = m_frame.unit * clamped(interpolate(place));
     return place.isOutside ? inDomain + outsideOf(point).stableNorm() : inDomain;
   }
   Eigen::Vector3d gradient(const Eigen::Vector3d& point) const {
@@ -117,8 +130,8 @@ class FieldLookup {
     Place place{{}, {}, 1.0, false};
     std::array<std::uint32_t, 3> root;
     for (int k = 0; k < 3; ++k) {
-      const double u = (point[k] - m_origin[k]) * m_toUnits;
-      const double in = std::fmin(std::fmax(u, 0.0), m_size[k]);
+      const double u = (point[k] - m_frame.origin[k]) * m_frame.toUnits;
+      const double in = std::fmin(std::fmax(u, 0.0), m_frame.size[k]);
       place.isOutside |= u != in;
       root[k] = std::min(static_cast<std::uint32_t>(in), m_cells.size[k] - 1);
       place.t[k] = in - root[k];
@@ -140,26 +153,28 @@ class FieldLookup {
   static double mix(double a, double b, double t) { return a + t * (b - a); }
   double interpolate(const Place& place) const {  // units
     if (place.entry.kind() != CellKind::Leaf)
-      return place.entry.kind() == CellKind::Inside ? -m_band : m_band;
+      return place.entry.kind() == CellKind::Inside ? -m_frame.band : m_frame.band;
     const FieldCells::Leaf& v = m_cells.leaves[place.entry.index()];
     const auto [x, y, z] = place.t;
     return mix(mix(mix(v[0], v[1], x), mix(v[2], v[3], x), y),
                mix(mix(v[4], v[5], x), mix(v[6], v[7], x), y), z);
   }
-  double clamped(double value) const { return std::fmin(std::fmax(value, -m_band), m_band); }
+  double clamped(double value) const {
+    return std::fmin(std::fmax(value, -m_frame.band), m_frame.band);
+  }
   /// From the nearest point of the domain.
   Eigen::Vector3d outsideOf(const Eigen::Vector3d& point) const {
     Eigen::Vector3d out;
     for (int k = 0; k < 3; ++k) {
-      const double end = m_origin[k] + m_size[k] * m_unit;
-      out[k] = point[k] < m_origin[k] ? point[k] - m_origin[k] : std::fmax(point[k] - end, 0.0);
+      const double end = m_frame.origin[k] + m_frame.size[k] * m_frame.unit;
+      out[k] = point[k] < m_frame.origin[k] ? point[k] - m_frame.origin[k]
+                                            : std::fmax(point[k] - end, 0.0);
     }
     return out;
   }
 
   const FieldCells& m_cells;
-  double m_toUnits, m_unit, m_band;
-  std::array<double, 3> m_origin, m_size;
+  FieldFrame m_frame;
 };
 
 }  // namespace palpate

@@ -163,6 +163,11 @@ constexpr double kFieldError = 0x1p-42;
 /// Relative to a stored distance: its rounding to float, and that of interpolation.
 constexpr double kStoredError = 0x1p-23;
 
+/// Relative to the error bound or the band, whichever is less: the error of a corner's distance. It
+/// is subtracted from the error bound. Any value far below 1 will do; a smaller one takes more
+/// exact distances.
+constexpr double kCornerError = 0x1p-20;
+
 // ---- Winding numbers (SolidAngle.h, Queries/WindingNumber.cpp) ----
 
 /// Error of both parts of a triangle's half solid angle, from unit vectors within 3 u each: 9 u and

@@ -110,8 +110,8 @@ void proxyRows(Report& report, const RowOptions& options) {
     const double ratio = median(proximity.samples) / median(proxy.samples);
     report.line({"Proximity over Proxy", times(ratio)});
     report.row("proxy", "particles-bone", threads, "Proximity over Proxy", "ratio", ratio);
-    report.line({"stated error, in thicknesses",
-                 milliseconds(proxy.data().errorBound() / kThickness)});
+    report.line(
+        {"stated error, in thicknesses", milliseconds(proxy.data().errorBound() / kThickness)});
     report.row("proxy", "particles-bone", threads, "Proxy", "stated error in thicknesses",
                proxy.data().errorBound() / kThickness);
   }

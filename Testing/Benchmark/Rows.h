@@ -13,7 +13,7 @@ struct RowOptions {
   std::string sharedData;
   bool quick = false;  ///< a million triangles at most, a hundred steady frames
   /// Parts of names, of which one must match; empty: all. Of the scenes of the tables race,
-  /// bounds and queries, and of engines.
+  /// bounds, queries and fields, and of engines.
   std::vector<std::string> scenes, engines;
 };
 
@@ -42,6 +42,7 @@ void boundsRows(Report&, const RowOptions&);      ///< placed bodies with each k
 void continuousRows(Report&, const RowOptions&);  ///< times of impact of the published steps
 void validityRows(Report&, const RowOptions&);    ///< the share of validity() in a frame
 void spatialRows(Report&, const RowOptions&);     ///< spatial queries beside other libraries
+void fieldRows(Report&, const RowOptions&);       ///< distance fields beside OpenVDB
 void simdRows(Report&, const RowOptions&);        ///< every path that this processor runs
 
 /// The number of feature candidates in the step from a workload's first frame to its second.

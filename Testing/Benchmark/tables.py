@@ -181,6 +181,7 @@ TABLES = {
     "continuous": metrics("continuous", "1 / 2 threads"),
     "validity": metrics("validity", "1 thread"),
     "queries": metrics("queries", "1 thread"),
+    "fields": metrics("fields", "1 thread"),
     "spatial": spatial,
     "spatial-times": by_engine("spatial", spatial_time),
     "spatial-errors": by_engine("spatial errors", spatial_error),

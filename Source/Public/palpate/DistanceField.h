@@ -23,7 +23,8 @@ struct DistanceFieldSettings {
   /// L, positive: the distance from the surface up to which the error bound holds.
   double band = 0.0;
   /// Bytes that the field and the build may hold, without the queries' copy of the mesh. 0: no
-  /// limit. A build that needs more throws MemoryLimit, with the number of bytes.
+  /// limit. A build that needs more throws MemoryLimit, with the number of bytes, before it
+  /// allocates them.
   std::size_t memoryLimit = 0;
   /// Number of threads of the build, in [0, 1024]; 0: one per core. The field does not depend on
   /// it.
@@ -79,7 +80,7 @@ class PALPATE_EXPORT DistanceField {
   ///
   /// Errors   NonFinitePosition.
   Eigen::Vector3d gradient(const Eigen::Vector3d&) const;
-  /// value() of many points, on the calling thread, with the same bits.
+  /// value() of many points, on the calling thread in SIMD lanes, with the same bits.
   ///
   /// Errors   NonFinitePosition, which names the point, such as "point 3"; InvalidSettings if `out`
   ///          has another size than `points`. Nothing is written then.

@@ -2,6 +2,7 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/ExpectRefused.h"
+#include "Common/FailingAllocation.h"
 #include "Common/Sanitized.h"
 #include "Core/SimdPath.h"
 #include "FieldMeshes.h"
@@ -61,8 +62,22 @@ double nearBorder(Random& random, double coordinate, double unit) {
   }
 }
 
-/// Points on vertices, edges and triangles, near them, in and beyond the band, and on the borders
-/// and corners of cells.
+/// A point on the normal of a surface point where, by the field, another part of the surface is
+/// about as near: near the medial axis. Or one 1.5 bands away.
+Eigen::Vector3d nearMedialAxis(const DistanceField& field, const Eigen::Vector3d& onSurface,
+                               const Eigen::Vector3d& normal) {
+  double low = 0, high = 1.5 * field.band();
+  for (int i = 0; i < 20; ++i) {
+    const double middle = 0.5 * (low + high);
+    const bool isNearest =
+        std::abs(field.value(onSurface + middle * normal)) >= middle - field.errorBound();
+    (isNearest ? low : high) = middle;
+  }
+  return onSurface + low * normal;
+}
+
+/// Points on vertices, edges and triangles, near them, in and beyond the band, near the medial
+/// axis, and on the borders and corners of cells.
 std::vector<Eigen::Vector3d> adversarialPoints(Random& random, const Mesh& mesh,
                                                const DistanceField& field, std::size_t count) {
   const Extent extent = extentOf(mesh);
@@ -70,18 +85,24 @@ std::vector<Eigen::Vector3d> adversarialPoints(Random& random, const Mesh& mesh,
   std::vector<Eigen::Vector3d> points(count);
   for (Eigen::Vector3d& p : points) {
     const auto& [a, b, c] = mesh.triangles[random() % mesh.triangles.size()];
-    const std::uint64_t kind = random() % 8;
+    const std::uint64_t kind = random() % 9;
     double s = uniform(random, 0, 1), t = uniform(random, 0, 1 - s);
     if (kind == 0) s = t = 0;
     if (kind == 1) t = 0;
     p = mesh.positions[a] + s * (mesh.positions[b] - mesh.positions[a]) +
         t * (mesh.positions[c] - mesh.positions[a]);
     if (kind == 3) p += randomPoint(random, -1, 1) * field.errorBound();
-    if (kind >= 4) p += randomPoint(random, -1, 1) * wide;
+    if (kind >= 4 && kind < 8) p += randomPoint(random, -1, 1) * wide;
     if (kind == 7)
       for (int k = 0; k < 3; ++k)
         p[k] = uniform(random, extent.box.min()[k] - wide, extent.box.max()[k] + wide);
-    if (kind >= 5)
+    if (kind == 8) {
+      const Eigen::Vector3d normal = (mesh.positions[b] - mesh.positions[a])
+                                         .cross(mesh.positions[c] - mesh.positions[a])
+                                         .stableNormalized();
+      p = nearMedialAxis(field, p, random() % 2 ? normal : Eigen::Vector3d(-normal));
+    }
+    if (kind >= 5 && kind < 8)
       for (int k = 0; k < 3; ++k)
         if (random() % 2) p[k] = nearBorder(random, p[k], unit);
   }
@@ -169,6 +190,16 @@ TEST(DistanceField, IsWithinItsBoundEverywhere) {
   }
 }
 
+TEST(DistanceField, HoldsAtAMillionPoints) {
+  Random random(8);
+  const std::pair<Mesh, double> cases[] = {{torusMesh(24, 12), 0.01},
+                                           {boxMesh({-1, -0.5, -0.25}, {1, 0.5, 0.25}), 0.005},
+                                           {sphere(20, 30, {0.1, 0.2, 0.3}, 1.0), 0.005},
+                                           {starMesh(random), 0.02}};
+  for (const auto& [mesh, bound] : cases)
+    expectWithinBound(random, mesh, fieldOf(mesh, bound, 3 * bound), casesOf(250000));
+}
+
 TEST(DistanceField, HoldsOnRandomStars) {
   Random random(2);
   for (int i = 0; i < casesOf(20); ++i) {
@@ -235,9 +266,15 @@ TEST(DistanceField, DoesNotDependOnThreadsOrInstructions) {
   const std::string expected = bytesOf(fieldOf(mesh, 0.05, 0.1, 1));
   for (const int threads : {2, 3, 8})
     EXPECT_EQ(bytesOf(fieldOf(mesh, 0.05, 0.1, threads)), expected);
+  const DistanceField field = fieldOf(mesh, 0.05, 0.1);
+  const auto points = adversarialPoints(random, mesh, field, 1001);
   for (const std::string& path : simdPaths()) {
     useSimdPath(path);
     EXPECT_EQ(bytesOf(fieldOf(mesh, 0.05, 0.1)), expected) << path;
+    std::vector<double> values(points.size());
+    field.values(points, values);
+    for (std::size_t i = 0; i < points.size(); ++i)
+      ASSERT_EQ(values[i], field.value(points[i])) << path << ", point " << points[i].transpose();
   }
   useSimdPath("");
 }
@@ -267,13 +304,40 @@ TEST(DistanceField, ReportsProgressAndIsCancelled) {
 
 TEST(DistanceField, KeepsItsMemoryLimit) {
   const Mesh mesh = sphere(20, 30, {0, 0, 0}, 1.0);
-  DistanceFieldSettings settings{.errorBound = 0.005, .band = 0.2, .memoryLimit = 100000};
-  expectRefused(ErrorCode::MemoryLimit, "needs at least", [&] {
-    DistanceField::build({mesh.positions, mesh.triangles}, settings);
-  });
-  settings.memoryLimit = 100000000;
-  EXPECT_LT(DistanceField::build({mesh.positions, mesh.triangles}, settings).bytes(),
-            settings.memoryLimit);
+  DistanceFieldSettings settings{.errorBound = 0.02, .band = 0.2, .memoryLimit = 100000};
+  // Each refusal states what is needed next. The last one states what is enough.
+  for (int refusals = 0;; ++refusals) {
+    ASSERT_LT(refusals, 100);
+    try {
+      const DistanceField field = DistanceField::build({mesh.positions, mesh.triangles}, settings);
+      EXPECT_LT(field.bytes(), settings.memoryLimit);
+      EXPECT_GT(refusals, 0);
+      break;
+    } catch (const Error& error) {
+      ASSERT_EQ(error.code(), ErrorCode::MemoryLimit) << error.what();
+      const std::string message = error.what(), start = "needs at least ";
+      const std::size_t needed = std::stoull(message.substr(message.find(start) + start.size()));
+      ASSERT_GT(needed, settings.memoryLimit) << message;
+      settings.memoryLimit = needed;
+    }
+  }
+  // The queries' copy of the mesh is there when the first cells are refused.
+  const auto peakOf = [&](std::size_t limit) {
+    settings.memoryLimit = limit;
+    FailingAllocation::arm(0);
+    try {
+      DistanceField::build({mesh.positions, mesh.triangles}, settings);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::MemoryLimit);
+    }
+    FailingAllocation::disarm();
+    return FailingAllocation::peakBytes();
+  };
+  const std::size_t enough = settings.memoryLimit, ofMesh = peakOf(1);
+  for (const std::size_t limit : {enough, enough - 1, enough / 2, enough / 7}) {
+    EXPECT_LE(peakOf(limit), limit + ofMesh);
+    EXPECT_GT(peakOf(limit), limit / 4);
+  }
 }
 
 TEST(DistanceField, RefusesInvalidInput) {
