@@ -103,7 +103,10 @@ void RigidScore::add(const RigidScene& scene, const RigidRun& run, std::span<con
     const double error = std::abs(claim->distance - (hasSign ? distance : std::abs(distance)));
     distanceWorst = std::max(distanceWorst, error);
     distanceSquares += error * error;
-    if (error > bound) silent += isSilent(claim->isDoubtful);
+    if (error > bound) {
+      ++beyondStated;
+      silent += isSilent(claim->isDoubtful);
+    }
     if (std::abs(distance) > 1e-9 * scene.thickness) {
       const Vector3d outwards = (now[v] - truth[v].nearest.position) / distance;
       const double cosine = std::clamp(outwards.dot(claim->normal), -1.0, 1.0);

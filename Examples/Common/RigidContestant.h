@@ -67,12 +67,13 @@ class RigidRun {
 
 /// Errors of a method over all steps that were added.
 struct RigidScore {
-  std::size_t within = 0;      ///< vertices that are contacts
-  std::size_t missing = 0;     ///< of these, not reported
-  std::size_t claims = 0;      ///< reported
-  std::size_t extra = 0;       ///< of these, not contacts
-  std::size_t wrongSide = 0;   ///< reported with a normal that points into the body
-  std::size_t doubtful = 0;    ///< reported, and validity() doubts them
+  std::size_t within = 0;        ///< vertices that are contacts
+  std::size_t missing = 0;       ///< of these, not reported
+  std::size_t claims = 0;        ///< reported
+  std::size_t extra = 0;         ///< of these, not contacts
+  std::size_t wrongSide = 0;     ///< reported with a normal that points into the body
+  std::size_t doubtful = 0;      ///< reported, and validity() doubts them
+  std::size_t beyondStated = 0;  ///< reported, with an error beyond the stated one
   std::size_t silent = 0;      ///< errors beyond the stated bound of which validity() says nothing
   double distanceWorst = 0;    ///< L
   double distanceSquares = 0;  ///< L²

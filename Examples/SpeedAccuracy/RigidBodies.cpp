@@ -193,7 +193,7 @@ void measureRigidBodies(const RigidOptions& options,
   std::optional<SceneMesh> body;
   std::optional<RigidTruth> truthOfBody;
   for (const Moving& moving : {burr(), organ(), particles(options.particles)}) {
-    const double diagonal = 2 * std::numbers::sqrt3 * kSkull;
+    const double diagonal = 2 * std::numbers::sqrt3 * kSkull;  // about that of the bone's box
     std::vector<RigidContestant> missing;
     for (const RigidContestant& contestant :
          rigidContestants(moving.tool.triangles.empty(), diagonal))
