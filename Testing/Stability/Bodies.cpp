@@ -58,7 +58,7 @@ SceneMesh prism(const std::vector<Vector3d>& polygon) {
     const std::uint32_t j = (i + 1) % n;
     mesh.triangles.push_back({i, j, n + j});
     mesh.triangles.push_back({i, n + j, n + i});
-    if (i < 2 || i + 1 > n) continue;
+    if (i < 2) continue;
     mesh.triangles.push_back({0, i, i - 1});
     mesh.triangles.push_back({n, n + i - 1, n + i});
   }
