@@ -14,9 +14,10 @@ RECOMMENDED = VERMILLION  # the colour of the recommended methods, in every char
 
 # Each method has one colour and one mark in every chart.
 COLOUR = {"Auto": RECOMMENDED, "Auto: distinct": RECOMMENDED, "Continuous": RECOMMENDED, "Intersection": SKY, "Proximity": BLUE,
-          "Proximity in substeps": GREEN, "FCL": BLACK}
+          "Proximity in substeps": GREEN, "FCL": BLACK,
+          "DistanceField": RECOMMENDED, "Proxy": GREEN}
 MARK = {"Auto": "o", "Auto: distinct": "h", "Continuous": "D", "Intersection": "v", "Proximity": "s", "Proximity in substeps": "^",
-        "FCL": "X"}
+        "FCL": "X", "DistanceField": "o", "Proxy": "P"}
 
 plt.rcParams.update({
     "font.family": "DejaVu Sans", "font.size": 9, "axes.titlesize": 11, "axes.titleweight": "bold", "axes.spines.top": False,

@@ -1,9 +1,11 @@
-// Measures the cost and the errors of each method on eight scenes. Writes a CSV and an interactive
-// page. Docs/Figures/speedAccuracy.py draws the printed chart from the CSV.
+// Measures the cost and the errors of each method on eight scenes, and of the methods for rigid
+// bodies on three. Writes CSV files and interactive pages. Docs/Figures/speedAccuracy.py draws the
+// printed chart from the CSV.
 #include "CommandLine.h"
 #include "Contestant.h"
 #include "HtmlReport.h"
 #include "Reference.h"
+#include "RigidBodies.h"
 #include "Score.h"
 #include "WriteFile.h"
 
@@ -29,6 +31,7 @@ struct Options {
   int frames = 24;
   int repetitions = 9;
   bool again = false;
+  RigidOptions rigid;
 };
 
 /// Times of each step at which the reference is checked.
@@ -222,6 +225,40 @@ void checkTrust(const Figures& figures) {
                                                row.texts[2] + ": answers wrong and trusted.");
 }
 
+report::View rigidView() {
+  report::View view;
+  view.title = "Palpate: speed against accuracy at a rigid body";
+  view.paragraphs = {
+      "A tool, a deforming organ and particles touch a generated bone at rest. Each mark is a "
+      "method with one setting. The reference is the exact signed distance of every vertex. A "
+      "vertex inside the bone or within the thickness is a contact.",
+      "The stated error is what the method says that its distances may be off by, the worst error "
+      "is the largest that was seen. Proximity reports distances without a sign."};
+  view.group = "scene";
+  view.series = "method";
+  view.label = "setting";
+  view.x = "ms";
+  view.y = "distance_worst";
+  return view;
+}
+
+/// The same for the methods that replace the triangles of rigid bodies.
+void runRigid(const Options& options) {
+  const std::filesystem::path csv = options.out / "rigid-bodies.csv",
+                              page = options.out / "rigid-bodies.html";
+  Figures figures = emptyRigidFigures();
+  if (!options.again) figures.addFrom(csv);
+  measureRigidBodies(
+      options.rigid,
+      [&](const std::string& scene, const std::string& method) {
+        return isChosen(options.scenes, scene) && isChosen(options.methods, method);
+      },
+      figures, [&] { scenes::writeWhole(csv, figures.csv()); });
+  if (figures.rows().empty()) return;
+  scenes::writeWhole(page, toHtml(figures, rigidView()));
+  std::printf("figures   %s\npage      %s\n", csv.c_str(), page.c_str());
+}
+
 void run(const Options& options) {
   std::filesystem::create_directories(options.out);
   const std::filesystem::path csv = options.out / "speed-accuracy.csv",
@@ -232,6 +269,7 @@ void run(const Options& options) {
   scenes::writeWhole(page, toHtml(figures, view()));
   checkTrust(figures);
   std::printf("figures   %s\npage      %s\n", csv.c_str(), page.c_str());
+  runRigid(options);
 }
 
 Options parse(CLI::App& app, int count, char** arguments) {
@@ -247,6 +285,12 @@ Options parse(CLI::App& app, int count, char** arguments) {
       ->capture_default_str();
   app.add_option("--repetitions", options.repetitions, "timed passes through the 24 frames")
       ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  app.add_option("--bone", options.rigid.triangles, "triangles of the bone, about")
+      ->check(CLI::Range(1000, 10'000'000))
+      ->capture_default_str();
+  app.add_option("--particles", options.rigid.particles, "particles at the bone")
+      ->check(CLI::Range(1, 10'000'000))
       ->capture_default_str();
   app.add_flag("--again", options.again, "measure also rows that the CSV already has");
   app.parse(count, arguments);

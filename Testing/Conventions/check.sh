@@ -33,7 +33,7 @@ allowedIn() {
     DistanceField) echo "DistanceField/ Queries/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
     Validity) echo "Validity/ NarrowPhase/ Mesh/ Math/ Core/" ;;
     CollisionDetection) echo "CollisionDetection/ Validity/ DistanceField/ Queries/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
-    Diagnostics) echo "Diagnostics/ CollisionDetection/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
+    Diagnostics) echo "Diagnostics/ CollisionDetection/ DistanceField/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
     Vtk | Fcl) echo "$1/" ;;
   esac
 }
