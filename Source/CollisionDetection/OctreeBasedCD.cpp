@@ -112,10 +112,9 @@ struct OctreeBasedCD::Implementation {
     Stopwatch watch;
     for (const auto& record : pairs.records()) {
       const Method method = record->pair.settings.method;
-      const bool moves =
-          (detecting || method == Method::Auto) && method != Method::Proxy &&
-          (method == Method::Continuous || method == Method::Auto ||
-           (method != Method::DistanceField && !record->hasShape()));
+      const bool moves = (detecting || method == Method::Auto) && method != Method::Proxy &&
+                         (method == Method::Continuous || method == Method::Auto ||
+                          (method != Method::DistanceField && !record->hasShape()));
       if (moves)
         for (Geometry* geometry : {record->a, record->b}) geometry->motion.update(*geometry);
       record->plan = planOf(record->pair.settings, record->a->inStep(), record->b->inStep(), moves);

@@ -23,7 +23,7 @@ constexpr std::string_view kTitle = "palpate-capture";
 constexpr int kVersion = 11;
 
 // Enumerators are written by name. The names are in the order of the declarations.
-constexpr std::array<std::string_view, 6> kMethods{"Auto", "Intersection", "Proximity",
+constexpr std::array<std::string_view, 6> kMethods{"Auto",       "Intersection",  "Proximity",
                                                    "Continuous", "DistanceField", "Proxy"};
 constexpr std::array<std::string_view, 5> kGeometryTypes{"Triangles", "Lines", "Points", "Shape",
                                                          "Field"};

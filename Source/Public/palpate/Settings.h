@@ -105,7 +105,8 @@ enum class Method {
   /// order. In the leaves of an octree of the body, planes stand for its surface where their error
   /// is proven to be at most PairSettings::allowedError; elsewhere triangles answer. A particle
   /// whose distance at the step's end is at most the thickness and its radius is a ShapeContact,
-  /// up to CollisionData::errorBound(). Around a closed mesh distances have a sign, and particles up to
+  /// up to CollisionData::errorBound(). Around a closed mesh distances have a sign, and particles
+  /// up to
   /// Validity::proxyDepth behind the surface are contacts, too.
   /// Cost     the leaves are built once for the body's topology and the pair's settings, by the
   ///          first detection: about a second for 500,000 triangles. A frame makes no octree of the
@@ -162,9 +163,9 @@ struct PairSettings {
   /// `contacts` has no effect then.
   bool earliestTimeOnly = false;
   /// L, finite, not negative. What an answer may be off by. Proxy needs a positive value: a larger
-  /// one gives fewer and larger leaves, and fewer that triangles answer. Auto answers by an attached
-  /// DistanceField whose error bound is at most this, while nothing moves in the step. Other methods
-  /// accept 0 only.
+  /// one gives fewer and larger leaves, and fewer that triangles answer. Auto answers by an
+  /// attached DistanceField whose error bound is at most this, while nothing moves in the step.
+  /// Other methods accept 0 only.
   double allowedError = 0.0;
   /// rad, in (0, 1.5]. Proxy: the largest angle between the normal of a leaf's plane and those of
   /// the triangles that the plane stands for. Other leaves are divided or answered by triangles.
