@@ -197,7 +197,7 @@ TEST(DistanceField, HoldsAtAMillionPoints) {
                                            {sphere(20, 30, {0.1, 0.2, 0.3}, 1.0), 0.005},
                                            {starMesh(random), 0.02}};
   for (const auto& [mesh, bound] : cases)
-    expectWithinBound(random, mesh, fieldOf(mesh, bound, 3 * bound), casesOf(250000));
+    expectWithinBound(random, mesh, fieldOf(mesh, bound, 3 * bound), casesOf(casesOf(250000)));
 }
 
 TEST(DistanceField, HoldsOnRandomStars) {
