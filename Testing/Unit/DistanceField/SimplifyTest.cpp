@@ -230,6 +230,24 @@ TEST(Simplify, ExtremeDistances) {
   }
 }
 
+/// Where the sides of a surface are mistaken for each other, the result would lie inside the body.
+/// The tests of components then refuse it.
+TEST(Simplify, VeryThinPlates) {
+  Random random(6);
+  for (const double thickness : {1e-6, 1e-8, 4e-8})
+    for (const bool isInverted : {false, true}) {
+      SCOPED_TRACE(thickness);
+      Mesh plate = boxMesh({-1, -1, 0}, {1, 1, thickness});
+      if (isInverted) plate = reversed(plate);
+      try {
+        check(random, plate, simplified(plate, 0.01), 0.01 * diagonalOf(plate));
+      } catch (const Error& error) {
+        EXPECT_TRUE(isInverted) << error.what();
+        EXPECT_EQ(error.code(), ErrorCode::NotAvailable) << error.what();
+      }
+    }
+}
+
 TEST(Simplify, NarrowGapsNeedSmallOffsets) {
   Random random(3);
   for (const double gap : {1e-2, 1e-4, 1e-6}) {
