@@ -25,7 +25,7 @@ constexpr double kPartError = 0x1p-48;
 constexpr double kLengthError = 0x1p-48;
 /// Triangles below are tried at this share of the largest distance, so that roundings do not exceed
 /// it.
-constexpr double kDepthShare = 1.0 - 0x1p-16;
+constexpr double kBelowShare = 1.0 - 0x1p-16;
 
 }  // namespace
 
@@ -96,7 +96,7 @@ std::optional<double> SimplifyCertificate::boundOf(const Corners& triangle,
                                                    const std::array<Foot, 3>& feet,
                                                    PointQueryStack& stack) const {
   const double furthest = std::max({feet[0].distance, feet[1].distance, feet[2].distance});
-  const double deepest = kDepthShare * m_maxDistance - m_slack;
+  const double deepest = kBelowShare * m_maxDistance - m_slack;
   const Vector3d normal =
       (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).stableNormalized();
   for (const double depth : {std::min(1.5 * furthest, deepest), deepest}) {
