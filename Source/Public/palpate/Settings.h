@@ -109,8 +109,8 @@ enum class Method {
   /// up to
   /// Validity::proxyDepth behind the surface are contacts, too.
   /// Cost     the leaves are built once for the body's topology and the pair's settings, by the
-  ///          first detection: tens of seconds of processor time for 500,000 triangles. A frame makes
-  ///          no octree of the particles.
+  ///          first detection: tens of seconds of processor time for 500,000 triangles. A frame
+  ///          makes no octree of the particles.
   /// Errors   detectCollision() throws UnsupportedMethod if the body's positions change after the
   ///          leaves were built. setTransform() moves the body, setTriangles() builds new leaves.
   /// Source   octree proxies: Fan et al. (2013). The proof of the error: Docs/SurfaceProxies.md.
