@@ -91,14 +91,14 @@ void RigidScore::add(const RigidScene& scene, const RigidRun& run, std::span<con
   auto claim = reported.begin();
   for (std::uint32_t v = 0; v < now.size(); ++v) {
     const double distance = truth[v].distance;
-    const bool isContact = distance <= scene.thickness;
-    within += isContact;
+    within += distance <= scene.thickness;
     if (claim == reported.end() || claim->vertex != v) {
-      missing += isContact;
-      if (distance < scene.thickness - bound) silent += isSilent(-distance > run.depth() - bound);
+      if (distance > scene.thickness - bound) continue;
+      ++missing;
+      silent += isSilent(-distance > run.depth() - bound);
       continue;
     }
-    extra += !isContact;
+    extra += distance > scene.thickness + bound;
     doubtful += claim->isDoubtful;
     const double error = std::abs(claim->distance - (hasSign ? distance : std::abs(distance)));
     distanceWorst = std::max(distanceWorst, error);

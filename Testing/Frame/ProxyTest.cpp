@@ -465,7 +465,7 @@ TEST(Proxy, IsRefusedWhereItHasNoMeaning) {
     detection.setContactPredicate(points, body, [](const ContactFeatures&) { return true; });
   });
   detection.detectCollision();
-  expectRefused(ErrorCode::NotAvailable, "answered by Method::Proxy and has no candidate pairs",
+  expectRefused(ErrorCode::NotAvailable, "uses Method::Proxy and has no candidate pairs",
                 [&] { detection.candidatePairs(points, body); });
   Points moved = ball.positions;
   moved[3] += Vector3d(0.1, 0, 0);

@@ -420,7 +420,7 @@ TEST(FieldContacts, RefuseWhatTheyDoNotSupport) {
   expectRefused(invalid, "less than the band", add(points, field, byField()));
   PairSettings settings = byField();
   settings.allowedError = 0.1;
-  expectRefused(invalid, "only Method::Auto uses it", add(other, field, settings));
+  expectRefused(invalid, "only Auto and Proxy use it", add(other, field, settings));
   settings = {.allowedError = -1.0};
   expectRefused(invalid, "allowedError is -1", add(other, body, settings));
 
