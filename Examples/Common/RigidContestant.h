@@ -68,9 +68,9 @@ class RigidRun {
 /// Errors of a method over all steps that were added.
 struct RigidScore {
   std::size_t within = 0;        ///< vertices that are contacts
-  std::size_t missing = 0;       ///< of these, not reported
+  std::size_t missing = 0;       ///< of these, not reported, although nearer by the stated error
   std::size_t claims = 0;        ///< reported
-  std::size_t extra = 0;         ///< of these, not contacts
+  std::size_t extra = 0;         ///< of these, not contacts by more than the stated error
   std::size_t wrongSide = 0;     ///< reported with a normal that points into the body
   std::size_t doubtful = 0;      ///< reported, and validity() doubts them
   std::size_t beyondStated = 0;  ///< reported, with an error beyond the stated one

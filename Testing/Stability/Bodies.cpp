@@ -129,17 +129,19 @@ std::vector<RigidContestant> contestants() {
 }
 
 report::Figures emptyFigures() {
-  return {{"sweep", "quantity", "method", "setting"},
-          {{"difficulty", "difficulty (value of the quantity)"},
-           {"refused", "bodies refused by an error (%)"},
-           {"missing", "particles missing (% of those inside or within the thickness)"},
-           {"extra", "particles beyond the thickness (% of the reported)"},
-           {"beyond_stated", "errors beyond the stated one (% of the reported)"},
-           {"wrong_side", "normals into the body (% of the reported)"},
-           {"doubtful", "contacts that validity() doubts (% of the reported)"},
-           {"silent", "errors beyond the stated one, not named by validity()"},
-           {"distance_worst", "distance: worst error / thickness"},
-           {"stated", "stated error / thickness"}}};
+  return {
+      {"sweep", "quantity", "method", "setting"},
+      {{"difficulty", "difficulty (value of the quantity)"},
+       {"refused", "bodies refused by an error (%)"},
+       {"missing",
+        "particles missing beyond the stated error (% of those inside or within the thickness)"},
+       {"extra", "particles beyond the thickness and the stated error (% of the reported)"},
+       {"beyond_stated", "errors beyond the stated one (% of the reported)"},
+       {"wrong_side", "normals into the body (% of the reported)"},
+       {"doubtful", "contacts that validity() doubts (% of the reported)"},
+       {"silent", "errors beyond the stated one, not named by validity()"},
+       {"distance_worst", "distance: worst error / thickness"},
+       {"stated", "stated error / thickness"}}};
 }
 
 double percent(std::size_t part, std::size_t whole) {
