@@ -31,7 +31,9 @@ RigidRun::RigidRun(const RigidScene& scene, const RigidContestant& contestant)
   if (m_method == Method::DistanceField)
     m_body = m_detection.addDistanceField(std::make_shared<const DistanceField>(
         DistanceField::build({body.positions, body.triangles},
-                             {.errorBound = contestant.error, .band = scene.band, .threads = 1})));
+                             {.errorBound = contestant.error,
+                              .band = std::max(scene.band, scene.thickness + 2 * contestant.error),
+                              .threads = 1})));
   else
     m_body = m_detection.addTriangleMesh(body.positions, body.triangles);
   PairSettings settings{.method = m_method, .thickness = scene.thickness};

@@ -20,7 +20,7 @@ struct RigidScene {
   const scenes::SceneMesh& body;
   const scenes::SceneMesh& tool;  ///< particles if it has no triangles
   double thickness;               ///< L: vertices within it, or inside the body, are contacts
-  double band;                    ///< L: of distance fields
+  double band;                    ///< L: of distance fields, at least; it exceeds their errors
 };
 
 /// A method for vertices against a rigid body.

@@ -98,6 +98,16 @@ class FieldLookup {
     const double inDomain = m_frame.unit * clamped(interpolate(place));
     return place.isOutside ? inDomain + outsideOf(point).stableNorm() : inDomain;
   }
+  /// L: value(), but in a cell beyond the band, outside, the band and the distance from the cell's
+  /// faces. The surface is at least that far away, as all points of the cell are beyond the band.
+  double distanceBound(const Eigen::Vector3d& point) const {
+    const Place place = at(point);
+    if (place.entry.kind() != CellKind::Outside) return value(point);
+    double inside = 1.0;
+    for (const double t : place.t) inside = std::fmin(inside, std::fmin(t, 1.0 - t));
+    const double beyond = place.isOutside ? outsideOf(point).stableNorm() : 0.0;
+    return m_frame.unit * (m_frame.band + inside / place.perSide) + beyond;
+  }
   Eigen::Vector3d gradient(const Eigen::Vector3d& point) const {
     const Place place = at(point);
     if (place.isOutside) return outsideOf(point).stableNormalized();

@@ -17,6 +17,13 @@ namespace palpate {
 
 using Eigen::Vector3d;
 
+namespace {
+
+/// Points whose values are found at once: enough for SIMD lanes, and few enough for the stack.
+constexpr std::size_t kValuesAtOnce = 128;
+
+}  // namespace
+
 PlacedField::PlacedField(const DistanceField& field, const Positions& body)
     : m_field(field), m_lookup(field.lookup()) {
   if (!body.isPlaced()) return;
@@ -241,7 +248,7 @@ void findElementsNear(const SearchableGeometry& geometry, const PlacedField& pla
       const double low = unit * double{box.lower[k]}, high = unit * double{box.upper[k]};
       centre[k] = 0.5 * (low + high), half[k] = 0.5 * (high - low);
     }
-    const double value = placed.lookup().value(placed.inField(centre + origin)),
+    const double value = placed.lookup().distanceBound(placed.inField(centre + origin)),
                  bound = value - (1.0 + kFieldLengthError) * half.norm();
     return !(value > -reach && bound > above);
   };
@@ -286,9 +293,14 @@ void FieldContacts::start(const SearchableGeometry& geometry) {
 }
 
 void FieldContacts::findValues(std::size_t begin, std::size_t end) {
-  for (std::size_t i = begin; i < end; ++i) {
-    const std::uint32_t v = m_scratch.vertices[i];
-    m_scratch.values[v] = m_field.lookup().value(m_field.inField(m_mesh.now[v]));
+  std::array<Vector3d, kValuesAtOnce> points;
+  std::array<double, kValuesAtOnce> values;
+  for (std::size_t first = begin; first < end; first += kValuesAtOnce) {
+    const std::size_t size = std::min(kValuesAtOnce, end - first);
+    const std::uint32_t* const vertices = m_scratch.vertices.data() + first;
+    for (std::size_t i = 0; i < size; ++i) points[i] = m_field.inField(m_mesh.now[vertices[i]]);
+    m_field.lookup().values({points.data(), size}, values.data());
+    for (std::size_t i = 0; i < size; ++i) m_scratch.values[vertices[i]] = values[i];
   }
 }
 

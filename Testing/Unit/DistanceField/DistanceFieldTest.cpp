@@ -5,6 +5,7 @@
 #include "Common/FailingAllocation.h"
 #include "Common/Sanitized.h"
 #include "Core/SimdPath.h"
+#include "DistanceField/FieldCells.h"
 #include "FieldMeshes.h"
 
 #include <gtest/gtest.h>
@@ -109,9 +110,9 @@ std::vector<Eigen::Vector3d> adversarialPoints(Random& random, const Mesh& mesh,
   return points;
 }
 
-/// Compares with exact distances.
-void expectWithinBound(Random& random, const Mesh& mesh, const DistanceField& field,
-                       std::size_t count) {
+/// Compares with exact distances. Returns how often distanceBound() exceeds the value.
+std::size_t expectWithinBound(Random& random, const Mesh& mesh, const DistanceField& field,
+                              std::size_t count) {
   OctreeBasedCD collisions;
   const GeometryId body = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
   const std::vector<Eigen::Vector3d> points = adversarialPoints(random, mesh, field, count);
@@ -119,7 +120,7 @@ void expectWithinBound(Random& random, const Mesh& mesh, const DistanceField& fi
   collisions.queries().signedDistances(body, points, exact);
   std::vector<double> values(count);
   field.values(points, values);
-  std::size_t inBand = 0, faults = 0;
+  std::size_t inBand = 0, faults = 0, furtherThanBand = 0;
   for (std::size_t i = 0; i < count && faults < 5; ++i) {
     const double d = exact[i].distance, value = values[i];
     const bool isInBand = std::abs(d) <= field.band();
@@ -131,8 +132,15 @@ void expectWithinBound(Random& random, const Mesh& mesh, const DistanceField& fi
     EXPECT_TRUE(holds) << "at " << points[i].transpose() << ": " << value << ", exact " << d
                        << ", bound " << field.errorBound() << ", band " << field.band();
     EXPECT_EQ(value, field.value(points[i]));
+    const double bound = field.lookup().distanceBound(points[i]);
+    EXPECT_GE(bound, value);
+    if (d > 0) {
+      EXPECT_LE(bound, isInBand ? d + field.errorBound() : d);
+    }
+    furtherThanBand += bound > value;
   }
   EXPECT_GT(inBand, count / 4);
+  return furtherThanBand;
 }
 
 class Folder {
@@ -202,12 +210,15 @@ TEST(DistanceField, HoldsAtAMillionPoints) {
 
 TEST(DistanceField, HoldsOnRandomStars) {
   Random random(2);
+  std::size_t furtherThanBand = 0;
   for (int i = 0; i < casesOf(20); ++i) {
     Mesh mesh = starMesh(random);
     const Eigen::Vector3d shift = randomPoint(random, -100, 100);
     for (Eigen::Vector3d& p : mesh.positions) p += shift;
-    expectWithinBound(random, mesh, fieldOf(mesh, uniform(random, 0.02, 0.1), 0.05), 3000);
+    furtherThanBand +=
+        expectWithinBound(random, mesh, fieldOf(mesh, uniform(random, 0.02, 0.1), 0.05), 3000);
   }
+  EXPECT_GT(furtherThanBand, 0);
 }
 
 TEST(DistanceField, IsContinuousAcrossCells) {
