@@ -11,4 +11,5 @@ cmake --build build/demo --parallel "$(nproc)" --target SpeedAccuracy
 out=out/speed-accuracy
 build/demo/Examples/SpeedAccuracy/SpeedAccuracy "$@" --out "$out"
 /usr/bin/python3 Docs/Figures/speedAccuracy.py "$out/speed-accuracy.csv" "$out/speed-accuracy"
-echo "chart     $out/speed-accuracy.svg, .png"
+[[ ! -f $out/rigid-bodies.csv ]] || /usr/bin/python3 Docs/Figures/rigidBodies.py "$out/rigid-bodies.csv" "$out/rigid-bodies"
+echo "charts    $out/speed-accuracy.svg, .png, $out/rigid-bodies.svg, .png"

@@ -8,7 +8,7 @@ python=/usr/bin/python3  # the interpreter of Debian's packages
 mkdir -p ../Pictures
 "$python" speedAccuracy.py ../SpeedAccuracy.csv ../Pictures/SpeedAccuracy
 "$python" distanceFields.py ../DistanceFields.csv ../Pictures/DistanceFields
-[[ ! -f ../RigidBodies.csv ]] || "$python" rigidBodies.py ../RigidBodies.csv ../Pictures/RigidBodies
+"$python" rigidBodies.py ../RigidBodies.csv ../Pictures/RigidBodies
 "$python" stability.py ../Stability.csv ../Pictures/Stability
 if [[ -f diagrams.py ]]; then
   "$python" diagrams.py

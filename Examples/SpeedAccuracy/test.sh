@@ -37,6 +37,11 @@ run >"$folder/text" 2>"$folder/messages" || fail "the second run: $(cat "$folder
 (($(wc -l <"$csv") == rows + 1)) || fail "the lost row is not back"
 (($(grep -c '% false negatives' "$folder/text") == 1)) || fail "more than the lost row was measured"
 
+# Fields and proxies at a small bone: no error beyond the stated one.
+"$program" --out "$folder/rigid" --scenes bone --bone 5000 --particles 500 >"$folder/text" 2>"$folder/messages" ||
+  fail "rigid bodies: $(cat "$folder/messages")"
+[[ $(wc -l <"$folder/rigid/rigid-bodies.csv") -eq 20 ]] || fail "rows are missing: $(cat "$folder/text")"
+
 "$program" --frames 0 >"$folder/text" 2>&1 && fail "not refused: --frames 0"
 [[ $(wc -l <"$folder/text") -le 2 ]] || fail "a long refusal: $(cat "$folder/text")"
 echo passed

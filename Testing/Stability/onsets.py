@@ -68,8 +68,8 @@ def bodyOnsets(quantity):
             cells = []
             for sweep, _ in sweeps:
                 own = [row for row in figures if (row["sweep"], row["method"], row["setting"]) == (sweep, method, setting)]
-                refused = all(float(row["refused"]) > 0 for row in own)
-                cells.append("refused" if refused else onset(own, quantity))
+                refused = [float(row["difficulty"]) for row in own if float(row["refused"]) > 0]
+                cells.append(f"refused from {refused[0]:.2g}" if refused else onset(own, quantity))
             lines.append(f"| {method}, {setting} | " + " | ".join(cells) + " |")
         return lines
     return write
