@@ -1,5 +1,6 @@
 // A spherical burr on a large bone under flowing water: debris and blood sink over bone and organs.
-// Bone and organs stay where setTransform() put them, so only the particles' octree changes.
+// Bone and organs stay where setTransform() put them, so only the particles' octree changes. The
+// particles meet the bone by a distance field, which is built before the first frame.
 #include "SceneProgram.h"
 #include "Scenes.h"
 
@@ -8,6 +9,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <array>
+#include <map>
+#include <memory>
 #include <numbers>
 #include <random>
 
@@ -49,7 +53,12 @@ class BoneDrilling : public LiveScene {
     }
     m_particles = m_world.addPoints("particles", positions, kParticle, 1.0);
     PairSettings nearby{.method = Method::Proximity, .thickness = kReach};
-    for (const World::BodyId id : m_rigid) m_world.addPair(m_particles, id, nearby, kGap);
+    for (const World::BodyId id : {m_rigid[1], m_rigid[2]})
+      m_world.addPair(m_particles, id, nearby, kGap);
+    // Of the bone a particle needs no more than a plane, which may be off by half its radius.
+    attachField(m_world.bodies()[m_rigid[0]]);
+    m_world.addPair(m_particles, m_rigid[0], {.method = Method::DistanceField, .thickness = kReach},
+                    kGap);
     nearby.contacts = Contacts::All;
     m_world.addPair(m_rigid[0], m_burr, nearby, 0);
   }
@@ -118,6 +127,24 @@ class BoneDrilling : public LiveScene {
     m_world.place(m_rigid.back(), Eigen::Matrix3d::Identity(), at);
   }
 
+  /// The mesh has each vertex between the sides of its cube once for each side. A field needs a
+  /// closed mesh.
+  void attachField(const World::Body& body) {
+    std::map<std::array<long long, 3>, std::uint32_t> first;  // by coordinates in nm
+    std::vector<std::uint32_t> same;
+    for (const Vector3d& p : body.rest) {
+      const std::array key{std::llround(1e6 * p[0]), std::llround(1e6 * p[1]),
+                           std::llround(1e6 * p[2])};
+      same.push_back(first.emplace(key, static_cast<std::uint32_t>(same.size())).first->second);
+    }
+    std::vector<Triangle> triangles;
+    for (const auto& [a, b, c] : body.triangles) triangles.push_back({same[a], same[b], same[c]});
+    m_world.detection().attachDistanceField(
+        body.id, std::make_shared<const DistanceField>(DistanceField::build(
+                     {body.rest, triangles},
+                     {.errorBound = kParticle / 2, .band = kReach + 4 * kParticle})));
+  }
+
   /// The hand presses 1 mm deep, along an eight.
   static Vector3d burrTarget(double frame) {
     const double phase = 2 * pi * frame / 300, y = 0.15 * std::sin(2 * phase) - 0.3;
@@ -153,13 +180,16 @@ class BoneDrilling : public LiveScene {
       now[i] =
           before[i] + std::min(1.0, kReach / (now[i] - before[i]).norm()) * (now[i] - before[i]);
     m_touching = 0;
+    const auto keep = [&](std::uint32_t vertex, const auto& c) {
+      const Vector3d way = now[vertex] - before[vertex];
+      const double room = std::max(0.0, c.distance), towards = -way.dot(c.normal);
+      if (towards > room) now[vertex] = before[vertex] + room / towards * way;
+      m_touching += c.distance < 2 * kGap;
+    };
     for (const World::BodyId body : m_rigid) {
-      for (const VertexTriangleContact& c : m_world.contacts(m_particles, body).vertexTriangle()) {
-        const Vector3d way = now[c.vertex] - before[c.vertex];
-        const double room = std::max(0.0, c.distance), towards = -way.dot(c.normal);
-        if (towards > room) now[c.vertex] = before[c.vertex] + room / towards * way;
-        m_touching += c.distance < 2 * kGap;
-      }
+      const CollisionData& contacts = m_world.contacts(m_particles, body);
+      for (const VertexTriangleContact& c : contacts.vertexTriangle()) keep(c.vertex, c);
+      for (const ShapeContact& c : contacts.shape()) keep(c.id, c);
     }
   }
 

@@ -193,7 +193,9 @@ void World::detect() {
   m_rowPairs.clear();
   for (std::size_t p = 0; p < m_pairs.size(); ++p) {
     const auto& [a, b, gap] = m_pairs[p];
-    appendRows(contacts(a, b), vertices(a), vertices(b), m_rows);
+    const CollisionData& data = contacts(a, b);
+    const bool byField = data.validity().method == Method::DistanceField;  // of b, which is rigid
+    appendRows(data, vertices(a), byField ? SolverVertices{} : vertices(b), m_rows);
     for (std::size_t row = m_rowPairs.size(); row < m_rows.size(); ++row) m_rows[row].offset += gap;
     m_rowPairs.resize(m_rows.size(), p);
   }
