@@ -385,7 +385,9 @@ TEST(Proxy, SteadyFramesAllocateNothingAndBuildNoOctreeOfTheParticles) {
           << "frame " << frame;
     }
     FailingAllocation::disarm();
+#ifndef PALPATE_VALIDATE  // validation itself allocates
     EXPECT_EQ(FailingAllocation::count(), 0u);
+#endif
     EXPECT_GT(contacts, 10000u);
   }
 }
