@@ -35,10 +35,10 @@ constexpr std::size_t kNodePairsWanted = 256;
 constexpr std::size_t kJobsPerPair = 32;
 /// Below this many triangles, splitting a pair among threads costs more than it saves.
 constexpr std::size_t kSharedSize = 8192;
-/// Particles of a job with Method::Proxy.
-constexpr std::size_t kParticlesPerJob = 16384;
 /// The same for elements near a distance field.
 constexpr std::size_t kSharedFieldSize = 512;
+/// Particles of a job with Method::Proxy.
+constexpr std::size_t kParticlesPerJob = 16384;
 
 /// Whether the traversal may skip neighbours that UnfoldedStars proves not to touch. It may if the
 /// method reports nothing but touching features: Continuous, without a thickness.

@@ -36,9 +36,11 @@ SimplifyCertificate::SimplifyCertificate(const SearchableGeometry& geometry, dou
       m_maxDistance(maxDistance),
       m_slack(kPartError * (largest + maxDistance)) {}
 
-void SimplifyCertificate::findTouched(const Corners& triangle, PointQueryStack& stack,
-                                      std::vector<std::uint32_t>& places) const {
-  places.clear();
+/// Calls f with the place of each triangle that has a point in common with this one, until f
+/// returns false.
+template <class F>
+void SimplifyCertificate::forEachTouched(const Corners& triangle, PointQueryStack& stack,
+                                         F&& f) const {
   FloatBox box = m_frame.boxOf(triangle[0]);
   box.add(m_frame.boxOf(triangle[1]));
   box.add(m_frame.boxOf(triangle[2]));
@@ -47,22 +49,27 @@ void SimplifyCertificate::findTouched(const Corners& triangle, PointQueryStack& 
   SignCounts counts;
   for (const std::uint32_t place : stack.found) {
     const auto& [a, b, c] = m_geometry.tree.ordered()[place];
-    if (intersectTriangles(triangle, {now[a], now[b], now[c]}, counts).intersect())
-      places.push_back(place);
+    if (intersectTriangles(triangle, {now[a], now[b], now[c]}, counts).intersect() && !f(place))
+      return;
   }
 }
 
-bool SimplifyCertificate::touches(const Corners& triangle, PointQueryStack& stack) const {
-  FloatBox box = m_frame.boxOf(triangle[0]);
-  box.add(m_frame.boxOf(triangle[1]));
-  box.add(m_frame.boxOf(triangle[2]));
-  findOverlapping(m_geometry.tree.octree(), m_frame.map(), box, stack);
-  const Positions& now = m_geometry.mesh.now;
-  SignCounts counts;
-  return std::any_of(stack.found.begin(), stack.found.end(), [&](std::uint32_t place) {
-    const auto& [a, b, c] = m_geometry.tree.ordered()[place];
-    return intersectTriangles(triangle, {now[a], now[b], now[c]}, counts).intersect();
+void SimplifyCertificate::findTouched(const Corners& triangle, PointQueryStack& stack,
+                                      std::vector<std::uint32_t>& places) const {
+  places.clear();
+  forEachTouched(triangle, stack, [&](std::uint32_t place) {
+    places.push_back(place);
+    return true;
   });
+}
+
+bool SimplifyCertificate::touches(const Corners& triangle, PointQueryStack& stack) const {
+  bool isAny = false;
+  forEachTouched(triangle, stack, [&](std::uint32_t) {
+    isAny = true;
+    return false;
+  });
+  return isAny;
 }
 
 bool SimplifyCertificate::isInside(const Vector3d& point, PointQueryStack& stack) const {

@@ -38,6 +38,8 @@ class SimplifyCertificate {
     double distance;  ///< L, at least that of the corner
     std::uint32_t place;
   };
+  template <class F>
+  void forEachTouched(const Corners&, PointQueryStack&, F&&) const;
   Foot footOf(const Eigen::Vector3d&, std::uint32_t likely) const;
   std::optional<double> boundBelow(const Corners&, const Corners& below, PointQueryStack&) const;
   std::optional<double> boundOf(const Corners&, const std::array<Foot, 3>&, PointQueryStack&) const;

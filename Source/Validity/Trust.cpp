@@ -53,8 +53,8 @@ double displacementLimitOf(const PairSettings& settings, const GeometryInStep& a
   if (usesMotionTolerance(settings, a, b)) return plan.motionTolerance;
   if (plan.method == Method::Continuous || plan.method == Method::DistanceField)
     return std::numeric_limits<double>::infinity();
-  return plan.method == Method::Proximity ? settings.thickness
-                                          : std::min(a.smallestHeight, b.smallestHeight);
+  return plan.method == Method::Intersection ? std::min(a.smallestHeight, b.smallestHeight)
+                                             : settings.thickness;
 }
 
 /// Whether the step met the method's conditions, if vertices move in straight lines. validity:

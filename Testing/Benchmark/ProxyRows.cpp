@@ -1,6 +1,7 @@
 // A million particles near a placed bone of half a million triangles, by Method::Proxy and by
 // Method::Proximity in turns. Both move. The time is that of whole frames: from positions and a
 // transform to contacts.
+#include "Bone.h"
 #include "Rows.h"
 
 #include "Common/RandomMeshes.h"
@@ -17,14 +18,6 @@ namespace {
 constexpr int kFrames = 12;
 constexpr std::size_t kParticles = 1000000;
 constexpr double kRadius = 0.001, kThickness = 0.001, kAllowedError = 1e-4;
-
-/// Closed, with bumps: 502,000 triangles.
-testing::Mesh bone() {
-  testing::Mesh body = testing::sphere(501, 502, Eigen::Vector3d::Zero(), 0.4);
-  for (Eigen::Vector3d& p : body.positions)
-    p *= 0.95 + 0.05 * std::sin(19 * p[0]) * std::cos(23 * p[1] + 11 * p[2]);
-  return body;
-}
 
 struct Placement {
   Eigen::Matrix3d rotation;

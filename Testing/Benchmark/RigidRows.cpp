@@ -1,5 +1,6 @@
 // A bone of half a million triangles that turns and presses into 10,952 deforming ones. It is moved
 // by its transform, or by the same positions. The baseline is FCL with its transform.
+#include "Bone.h"
 #include "Rows.h"
 
 #include "Common/RandomMeshes.h"
@@ -35,14 +36,6 @@ Placement placement(int frame) {
   const double angle = 0.01 * frame;
   return {Eigen::AngleAxisd(angle, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix(),
           {0.5 + 0.1 * std::sin(angle), 0.5, 0.42 - 0.02 * std::sin(5 * angle)}};
-}
-
-/// Closed, with bumps.
-testing::Mesh bone(std::uint32_t rings = 501, std::uint32_t segments = 502) {
-  testing::Mesh body = testing::sphere(rings, segments, Eigen::Vector3d::Zero(), 0.4);
-  for (Eigen::Vector3d& p : body.positions)
-    p *= 0.95 + 0.05 * std::sin(19 * p[0]) * std::cos(23 * p[1] + 11 * p[2]);
-  return body;
 }
 
 testing::Mesh tissue(int frame) { return testing::sheet(74, 0.0, 0.05 * frame); }

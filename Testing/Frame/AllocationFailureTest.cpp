@@ -66,7 +66,7 @@ Words stateOf(const OctreeBasedCD& detection) {
   return words;
 }
 
-/// Geometries of every type, and pairs of every method.
+/// Geometries of every type, and pairs of every method but Proxy, which has a test of its own.
 struct Scene {
   explicit Scene(const Settings& settings) : detection(settings) {
     Random random(4);
@@ -82,6 +82,10 @@ struct Scene {
     Positions corners;
     for (int i = 0; i < 12; ++i) corners.push_back(randomPoint(random, 0.2, 0.8));
     block = detection.addAnalyticalGeometry(ConvexHull{corners});
+    const Mesh stone = sphere(3, 4, {0.5, 0.5, 0.1}, 0.2);
+    static const auto built = std::make_shared<const DistanceField>(DistanceField::build(
+        {stone.positions, stone.triangles}, {.errorBound = 0.05, .band = 0.2, .threads = 1}));
+    field = detection.addDistanceField(built);
     organRest = body.positions;
     tracker.emplace(drops, organ);
     detection.addCollisionPair(organ, sheetId, {Method::Auto, 0.05});
@@ -91,6 +95,7 @@ struct Scene {
     detection.addCollisionPair(solid, sheetId, {Method::Intersection});
     detection.addCollisionPair(organ, tool, {Method::Continuous, 0.0});
     detection.addCollisionPair(tool, block, {Method::Proximity, 1.0});
+    detection.addCollisionPair(organ, field, {Method::DistanceField, 0.05});
     PairSettings apart{Method::Proximity, 0.05};
     apart.restDistance = 0.3;
     detection.addCollisionPair(line, line, apart);
@@ -123,13 +128,13 @@ struct Scene {
     EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
     detection.collectCandidates();
     for (const CollisionPair& pair : detection.pairs())
-      if (pair.b != tool && pair.b != block)
+      if (pair.b != tool && pair.b != block && pair.b != field)
         words.push_back(detection.candidatePairs(pair.a, pair.b).size());
     return words;
   }
 
   OctreeBasedCD detection;
-  GeometryId organ, sheetId, line, drops, solid, tool, block;
+  GeometryId organ, sheetId, line, drops, solid, tool, block, field;
   std::optional<PenetrationTracker> tracker;
   Positions organRest;
 };

@@ -171,6 +171,7 @@ void expectWithinError(const Scene& scene, const Points& points, std::span<const
   EXPECT_FALSE(validity.trusted);
   EXPECT_LE(run.data().errorBound(), scene.allowedError * (1 + 1e-6) + 1e-8);
   EXPECT_GE(validity.proxyDepth, scene.thickness);
+  EXPECT_EQ(validity.displacementLimit, scene.thickness);
   const double error = run.data().errorBound() + 1e-14;
   const SpatialQueries queries = run.detection.queries();
   auto next = run.data().shape().begin();
@@ -390,6 +391,35 @@ TEST(Proxy, SteadyFramesAllocateNothingAndBuildNoOctreeOfTheParticles) {
 #endif
     EXPECT_GT(contacts, 10000u);
   }
+}
+
+TEST(Proxy, FailedAllocationLeavesTheNextDetectionRight) {
+  Random random(9);
+  const Scene scene = scenes()[0];
+  const Points points = particlesAround(random, scene, 300);
+  const std::vector<double> radii(points.size(), 0.0);
+  const std::uint64_t expected =
+      Detection(scene, points, radii, settingsOf(Engine::Octree)).data().hash();
+  Detection run(scene, points, radii, settingsOf(Engine::Octree));
+  std::size_t failures = 0;
+  for (std::size_t n = 1; n < 4000; n = 2 * n + 1) {
+    // Another thickness and back: the leaves are built anew.
+    PairSettings other = pairOf(scene);
+    other.thickness *= 1.5;
+    run.detection.setPairSettings(run.smoke, run.body, other);
+    run.detection.detectCollision();
+    run.detection.setPairSettings(run.smoke, run.body, pairOf(scene));
+    FailingAllocation::arm(n);
+    try {
+      run.detection.detectCollision();
+    } catch (const std::bad_alloc&) {
+      ++failures;
+    }
+    FailingAllocation::disarm();
+    run.detection.detectCollision();
+    EXPECT_EQ(run.data().hash(), expected) << "allocation " << n;
+  }
+  EXPECT_GT(failures, 2u);
 }
 
 TEST(Proxy, QueriesFindParticlesAfterADetectionWithoutTheirOctree) {
