@@ -3,10 +3,21 @@ add_library(PalpateOptions INTERFACE)
 # No fused multiply-add: a contracted a*b+c rounds once instead of twice, and results would then
 # depend on the instruction set that run-time dispatch happens to choose.
 target_compile_options(PalpateOptions INTERFACE -ffp-contract=off -Wall -Wextra -Wshadow -Wnon-virtual-dtor)
+# On 64-bit ARM Eigen would multiply and add with one rounding. Without packets at all it would add in another order.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+  target_compile_options(PalpateOptions INTERFACE -U__ARM_FEATURE_FMA)
+endif()
 if(PALPATE_SANITIZE)
   target_compile_options(PalpateOptions INTERFACE -fsanitize=${PALPATE_SANITIZE} -fno-omit-frame-pointer
                                                   -fno-sanitize-recover=all)
+  # Instrumented SIMD code compiles for minutes. All paths come from the same source; SSE2 and AVX2 stand for them.
+  target_compile_definitions(PalpateOptions INTERFACE
+    "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_SSE4|HWY_AVX3|HWY_AVX3_DL)")
   target_link_options(PalpateOptions INTERFACE -fsanitize=${PALPATE_SANITIZE})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL Clang)
+    # With this check clang 14 compiles some files for more than two minutes.
+    target_compile_options(PalpateOptions INTERFACE -fno-sanitize=pointer-overflow)
+  endif()
 endif()
 
 # A shared library of ours exports what is ours.
@@ -18,7 +29,7 @@ function(palpate_export_own_symbols target)
 endfunction()
 
 # palpate_precompile_headers(TARGET HEADER...): TARGET is compiled with these headers precompiled, if the build asks for it.
-# The release build does not ask: it shows that every file includes what it uses.
+# The scalar build does not ask: it shows that every file includes what it uses.
 function(palpate_precompile_headers target)
   if(PALPATE_PRECOMPILED_HEADERS)
     target_precompile_headers(${target} PRIVATE ${ARGN})

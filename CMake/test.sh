@@ -66,8 +66,12 @@ stage documentation CMake/docs.sh
 build release
 # The core as a static library, without SIMD, VTK and FCL, with oneTBB's threads.
 configuration scalar -DBUILD_SHARED_LIBS=OFF
+# Compiled by clang, with the fuzz targets.
 configuration asan-ubsan
+# Without SIMD: the scalar code of the modules with threads.
 configuration tsan
+# Hashes of answers on 64-bit ARM, in the emulator.
+stage "arm64: golden hashes" Testing/Golden/matrix.sh arm64
 
 printf '%-22s %-7s %7s %9s\n' stage result seconds "CPU time"
 printf '%s\n' "${report[@]}"

@@ -1,6 +1,6 @@
 // A spherical burr on a large bone under flowing water: debris and blood sink over bone and organs.
 // Bone and organs stay where setTransform() put them, so only the particles' octree changes. The
-// particles meet the bone by a distance field, which is built before the first frame.
+// particles meet the bone by planes in an octree's leaves, built before the first frame.
 #include "SceneProgram.h"
 #include "Scenes.h"
 
@@ -9,11 +9,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <array>
-#include <map>
 #include <memory>
 #include <numbers>
 #include <random>
+#include <tuple>
 
 namespace palpate::scenes {
 namespace {
@@ -22,7 +21,7 @@ using Eigen::Vector3d, std::numbers::pi;
 // Lengths in mm, times in s. Nothing moves further than kReach in a substep, which is what
 // contacts are found within: so each knows its side, and Proximity is enough.
 constexpr double kFrame = 1.0 / 60, kReach = 0.4, kSpeed = 48, kParticle = 0.1, kBurr = 4,
-                 kGap = 0.02;
+                 kGap = 0.02, kBrick = 5;
 constexpr double kBone = 120, kFloor = -180;
 const Vector3d kMiddle(0, 0, 0), kGravity(0, 0, -600);  // less what water carries
 
@@ -51,16 +50,22 @@ class BoneDrilling : public LiveScene {
       do p = {between(-130, 130), between(-150, 120), between(kFloor, kBone + 180)};
       while (p.norm() < 1.2 * kBone || (p.z() < 0 && p.y() < 0));
     }
+    // Neighbours have near indices, as solvers of particles arrange them: they share cache lines.
+    std::sort(positions.begin(), positions.end(), [](const Vector3d& a, const Vector3d& b) {
+      const Vector3d s = (a / kBrick).array().floor(), t = (b / kBrick).array().floor();
+      return std::tuple(s.x(), s.y(), a.z()) < std::tuple(t.x(), t.y(), b.z());
+    });
     m_particles = m_world.addPoints("particles", positions, kParticle, 1.0);
     PairSettings nearby{.method = Method::Proximity, .thickness = kReach};
     for (const World::BodyId id : {m_rigid[1], m_rigid[2]})
       m_world.addPair(m_particles, id, nearby, kGap);
     // Of the bone a particle needs no more than a plane, which may be off by half its radius.
-    attachField(m_world.bodies()[m_rigid[0]]);
-    m_world.addPair(m_particles, m_rigid[0], {.method = Method::DistanceField, .thickness = kReach},
+    m_world.addPair(m_particles, m_rigid[0],
+                    {.method = Method::Proxy, .thickness = kReach, .allowedError = kParticle / 2},
                     kGap);
     nearby.contacts = Contacts::All;
     m_world.addPair(m_rigid[0], m_burr, nearby, 0);
+    m_world.detectOnly();  // builds the leaves
   }
 
   World& world() override { return m_world; }
@@ -125,24 +130,6 @@ class BoneDrilling : public LiveScene {
     for (Vector3d& p : mesh.positions) p *= scale;
     m_rigid.push_back(m_world.addRigidMesh(name, mesh));
     m_world.place(m_rigid.back(), Eigen::Matrix3d::Identity(), at);
-  }
-
-  /// The mesh has each vertex between the sides of its cube once for each side. A field needs a
-  /// closed mesh.
-  void attachField(const World::Body& body) {
-    std::map<std::array<long long, 3>, std::uint32_t> first;  // by coordinates in nm
-    std::vector<std::uint32_t> same;
-    for (const Vector3d& p : body.rest) {
-      const std::array key{std::llround(1e6 * p[0]), std::llround(1e6 * p[1]),
-                           std::llround(1e6 * p[2])};
-      same.push_back(first.emplace(key, static_cast<std::uint32_t>(same.size())).first->second);
-    }
-    std::vector<Triangle> triangles;
-    for (const auto& [a, b, c] : body.triangles) triangles.push_back({same[a], same[b], same[c]});
-    m_world.detection().attachDistanceField(
-        body.id, std::make_shared<const DistanceField>(DistanceField::build(
-                     {body.rest, triangles},
-                     {.errorBound = kParticle / 2, .band = kReach + 4 * kParticle})));
   }
 
   /// The hand presses 1 mm deep, along an eight.

@@ -1,12 +1,10 @@
 #include "RigidContestant.h"
 
 #include <palpate/ClosedMesh.h>
-#include <palpate/DistanceField.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <memory>
 #include <numbers>
 
 namespace palpate::accuracy {
@@ -23,19 +21,21 @@ double millisecondsSince(std::chrono::steady_clock::time_point start) {
 }  // namespace
 
 RigidRun::RigidRun(const RigidScene& scene, const RigidContestant& contestant)
-    : m_method(contestant.method) {
+    : m_method(contestant.method), m_isClosed(findMeshDefects(scene.body.triangles).closed()) {
   const auto start = std::chrono::steady_clock::now();
   const scenes::SceneMesh &body = scene.body, &tool = scene.tool;
   m_tool = tool.triangles.empty() ? m_detection.addPointSet(tool.positions)
                                   : m_detection.addTriangleMesh(tool.positions, tool.triangles);
-  if (m_method == Method::DistanceField)
-    m_body = m_detection.addDistanceField(std::make_shared<const DistanceField>(
+  if (m_method == Method::DistanceField) {
+    m_field = std::make_shared<const DistanceField>(
         DistanceField::build({body.positions, body.triangles},
                              {.errorBound = contestant.error,
                               .band = std::max(scene.band, scene.thickness + 2 * contestant.error),
-                              .threads = 1})));
-  else
+                              .threads = 1}));
+    m_body = m_detection.addDistanceField(m_field);
+  } else {
     m_body = m_detection.addTriangleMesh(body.positions, body.triangles);
+  }
   PairSettings settings{.method = m_method, .thickness = scene.thickness};
   if (m_method == Method::Proxy)
     settings.allowedError = contestant.error;
@@ -63,12 +63,14 @@ std::vector<VertexClaim> RigidRun::claims() const {
   const CollisionData& answer = data();
   for (const VertexTriangleContact& contact : answer.vertexTriangle())
     claims.push_back({contact.vertex, contact.normal, contact.distance, false});
-  const std::vector<std::uint32_t>& beyond = answer.validity().outsideBand;
+  const std::vector<std::uint32_t>&beyond = answer.validity().outsideBand,
+        &unsure = answer.validity().unreliableSign;
   std::uint32_t index = 0;
   for (const ShapeContact& contact : answer.shape()) {
     if (contact.element == ShapeElement::Vertex)
       claims.push_back({contact.id, contact.normal, contact.distance,
-                        std::binary_search(beyond.begin(), beyond.end(), index)});
+                        std::binary_search(beyond.begin(), beyond.end(), index) ||
+                            std::binary_search(unsure.begin(), unsure.end(), index)});
     ++index;
   }
   std::sort(claims.begin(), claims.end(), [](const VertexClaim& a, const VertexClaim& b) {
@@ -92,7 +94,7 @@ void RigidScore::add(const RigidScene& scene, const RigidRun& run, std::span<con
   claims += reported.size();
   auto claim = reported.begin();
   for (std::uint32_t v = 0; v < now.size(); ++v) {
-    const double distance = truth[v].distance;
+    const double distance = run.knowsSide(now[v]) ? truth[v].distance : std::abs(truth[v].distance);
     within += distance <= scene.thickness;
     if (claim == reported.end() || claim->vertex != v) {
       if (distance > scene.thickness - bound) continue;
@@ -123,21 +125,14 @@ double RigidScore::distanceRms() const {
   return claims == 0 ? 0 : std::sqrt(distanceSquares / static_cast<double>(claims));
 }
 
-RigidTruth::RigidTruth(const scenes::SceneMesh& body)
-    : m_isClosed(findMeshDefects(body.triangles).closed()) {
+RigidTruth::RigidTruth(const scenes::SceneMesh& body) {
+  if (!findMeshDefects(body.triangles).closed()) m_inside.rule = InsideRule::WindingNumber;
   m_body = m_detection.addTriangleMesh(body.positions, body.triangles);
 }
 
 std::vector<SignedDistance> RigidTruth::of(std::span<const Vector3d> points) {
   std::vector<SignedDistance> truth(points.size());
-  const SpatialQueries queries = m_detection.queries();
-  if (m_isClosed) {
-    queries.signedDistances(m_body, points, truth);
-  } else {
-    std::vector<SurfacePoint> nearest(points.size());
-    queries.closestPoints(m_body, points, nearest);
-    for (std::size_t i = 0; i < points.size(); ++i) truth[i] = {nearest[i], nearest[i].distance};
-  }
+  m_detection.queries().signedDistances(m_body, points, truth, m_inside);
   return truth;
 }
 

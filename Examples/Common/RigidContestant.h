@@ -2,12 +2,14 @@
 
 #include "Meshes.h"
 
+#include <palpate/DistanceField.h>
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/SpatialQueries.h>
 
 #include <Eigen/Core>
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -52,6 +54,10 @@ class RigidRun {
   /// L: vertices deeper than this may be missing; the last answer says so.
   double depth() const;
   Method method() const { return m_method; }
+  /// Whether distances from the body have a sign at the point.
+  bool knowsSide(const Eigen::Vector3d& point) const {
+    return m_field ? m_field->signIsReliable(point) : m_isClosed;
+  }
   bool isTrusted() const { return data().validity().trusted; }
   /// The time that the method needed before its first frame.
   double buildMilliseconds() const { return m_buildMilliseconds; }
@@ -62,6 +68,8 @@ class RigidRun {
   OctreeBasedCD m_detection{Settings{.threads = 1}};
   GeometryId m_tool{}, m_body{};
   Method m_method;
+  bool m_isClosed;                               ///< the body
+  std::shared_ptr<const DistanceField> m_field;  ///< Method::DistanceField
   double m_buildMilliseconds = 0;
 };
 
@@ -86,7 +94,8 @@ struct RigidScore {
   double distanceRms() const;
 };
 
-/// The exact distances of points from a body. Unsigned for a body that is not closed.
+/// The exact distances of points from a body. Inside a body that is not closed is where its
+/// generalised winding number is at least 1/2 in magnitude.
 class RigidTruth {
  public:
   explicit RigidTruth(const scenes::SceneMesh& body);
@@ -95,7 +104,7 @@ class RigidTruth {
  private:
   OctreeBasedCD m_detection{Settings{.threads = 1}};
   GeometryId m_body{};
-  bool m_isClosed;
+  InsideSettings m_inside;
 };
 
 }  // namespace palpate::accuracy

@@ -194,8 +194,10 @@ void World::detect() {
   for (std::size_t p = 0; p < m_pairs.size(); ++p) {
     const auto& [a, b, gap] = m_pairs[p];
     const CollisionData& data = contacts(a, b);
-    const bool byField = data.validity().method == Method::DistanceField;  // of b, which is rigid
-    appendRows(data, vertices(a), byField ? SolverVertices{} : vertices(b), m_rows);
+    // A field or proxy of b, which is rigid, has no vertices.
+    const Method method = data.validity().method;
+    const bool withoutVertices = method == Method::DistanceField || method == Method::Proxy;
+    appendRows(data, vertices(a), withoutVertices ? SolverVertices{} : vertices(b), m_rows);
     for (std::size_t row = m_rowPairs.size(); row < m_rows.size(); ++row) m_rows[row].offset += gap;
     m_rowPairs.resize(m_rows.size(), p);
   }

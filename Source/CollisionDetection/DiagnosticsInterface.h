@@ -10,6 +10,7 @@
 #include "NarrowPhase/NarrowPhase.h"
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 // Functions that this module calls and the module Diagnostics defines. Diagnostics includes this
@@ -25,6 +26,10 @@ void findCandidatesByBruteForce(const MeshPair&, Buffer<ElementPair>& out);
 /// intersections: receives the contacts that Auto takes from Intersection.
 void detectPairByBruteForce(const PairRecord&, ContactBuffers& contacts,
                             ContactBuffers& intersections);
+
+/// Finds the contacts of these vertices of the pair's first geometry, by the method of its plan.
+void detectVerticesByBruteForce(const PairRecord&, std::span<const std::uint32_t> vertices,
+                                ContactBuffers& contacts);
 
 /// The complete input of a detection at this moment.
 CollisionProblem problemOf(const Settings&, const GeometryTable&, const PairTable&);

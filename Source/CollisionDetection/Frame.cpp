@@ -1,8 +1,10 @@
 #include "CollisionDetection/Frame.h"
 
 #include "CollisionDetection/DiagnosticsInterface.h"
+#include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
 #include "Core/Spin.h"
+#include "DistanceField/FieldCells.h"
 #include "DistanceField/FieldContacts.h"
 #include "DistanceField/PlacedProxy.h"
 #include "Math/Tolerances.h"
@@ -102,7 +104,9 @@ std::size_t sizeOf(const CollisionData::Contents& contents) {
 void countContacts(const PairPlan& plan, std::size_t intersectionCount,
                    CollisionData::Contents& contents) {
   std::size_t atImpact = 0;
-  if (plan.step.reportsImpacts) {
+  if (plan.byProxy) {
+    if (plan.method == Method::Continuous) atImpact = contents.vertexTriangle.size();
+  } else if (plan.step.reportsImpacts) {
     forEachTimed(contents, [&](const auto& contacts) {
       for (const auto& contact : contacts) atImpact += contact.timeOfImpact < 1.0;
     });
@@ -127,19 +131,52 @@ void describeField(const PairRecord& record, CollisionData::Contents& contents) 
   Validity& validity = contents.validity;
   validity.outsideBand.clear();
   validity.nearThreshold.clear();
-  if (record.usesProxy()) return;
+  validity.unreliableSign.clear();
+  if (record.usesProxy() || record.plan.byProxy) return;
   validity.proxyDepth = contents.errorBound = 0.0;
   if (!record.usesField()) return;
   const DistanceField& field = *record.body().field;
   contents.errorBound = field.errorBound();
-  const double thickness = record.pair.settings.thickness;
+  const PlacedField placed = record.placedField();
+  const double thickness = record.meshes().thicknessAtEnd();
   for (std::uint32_t i = 0; i < contents.shape.size(); ++i) {
     const ShapeContact& contact = contents.shape[i];
+    if (!placed.lookup().signIsReliable(placed.inField(contact.point)))
+      validity.unreliableSign.push_back(i);
     const double value =
         contact.distance + record.mesh().mesh.radius(contact.vertices, contact.weights);
     if (value <= -reachOf(field)) validity.outsideBand.push_back(i);
     if (thickness - contact.distance < field.errorBound()) validity.nearThreshold.push_back(i);
   }
+}
+
+/// Auto by an attached proxy: makes the contacts of the exact method such of a body, too. Both
+/// lists are in the order of particles.
+void describeAsShape(const TriangleMesh& points, CollisionData::Contents& contents) {
+  auto& exact = contents.vertexTriangle;
+  auto& all = contents.shape;
+  std::size_t byProxy = all.size(), left = exact.size();
+  all.resize(byProxy + left);
+  for (std::size_t place = all.size(); left > 0;) {
+    if (byProxy > 0 && all[byProxy - 1].id > exact[left - 1].vertex) {
+      all[--place] = all[--byProxy];
+      continue;
+    }
+    const VertexTriangleContact& contact = exact[--left];
+    const std::uint32_t v = contact.vertex;
+    const double time = contact.timeOfImpact;
+    const Eigen::Vector3d point = (1.0 - time) * points.before[v] + time * points.now[v];
+    all[--place] = {ShapeElement::Vertex,
+                    v,
+                    {v, v, v},
+                    Eigen::Vector3d::UnitX(),
+                    point,
+                    point - (contact.distance + points.radius(v)) * contact.normal,
+                    contact.normal,
+                    contact.distance,
+                    time};
+  }
+  exact.clear();
 }
 
 bool sharesVertex(const Triangle& s, const Triangle& t) {
@@ -150,7 +187,7 @@ bool sharesVertex(const Triangle& s, const Triangle& t) {
 }  // namespace
 
 /// A part of one pair's traversal, and its results.
-struct Frame::Job {
+struct Frame::Job : CountedObject {
   using Use = void (*)(Job&, std::span<const ElementPair>);
 
   PairRecord* record;
@@ -172,8 +209,9 @@ struct Frame::Job {
   ContactBuffers intersections;  ///< Auto: Intersection's, where the step starts intersecting
   bool intersectionsMissed;      ///< detectIntersections() did not run for every batch
   Buffer<ElementPair> candidates;
-  Buffer<ElementPair> kept;          ///< pairs of the present batch that passed the filters so far
-  std::optional<PlacedProxy> proxy;  ///< with Method::Proxy; begin and end are of particles
+  Buffer<ElementPair> kept;  ///< pairs of the present batch that passed the filters so far
+  /// With Method::Proxy, and Auto by a proxy; begin and end are of particles.
+  std::optional<PlacedProxy> proxy;
   ProxyHits hits;
   ShapeContact* firstContact;  ///< where those of `hits` are written
   double milliseconds = 0, narrowMilliseconds = 0;
@@ -243,25 +281,30 @@ struct Frame::Job {
   }
 
   static void detect(Job& job, std::span<const ElementPair> pairs) {
-    Stopwatch watch;
     const MeshPair meshes = job.record->meshes(job.trees.isMapped() ? nullptr : &job.floats);
-    bool& intersecting = job.contacts.facts.startsIntersecting;
-    if (meshes.step.checksStart && !intersecting)
-      intersecting = anyIntersecting(meshes, true, pairs, job.intersections).has_value();
-    if (job.record->plan.runsIntersection && (intersecting || job.record->plan.startsIntersecting))
-      detectIntersections(job, pairs);
-    else
-      job.intersectionsMissed = true;
-    if (meshes.settings.earliestTimeOnly)
-      job.findEarliest(meshes, pairs);
-    else
-      findContacts(meshes, pairs, job.contacts);
-    job.narrowMilliseconds += watch.lap();
+    job.findAll(meshes, pairs);
     if (!job.keepCandidates) return;
-    const std::vector<Triangle>& triangles = meshes.a.topology.triangles;
+    const CountedVector<Triangle>& triangles = meshes.a.topology.triangles;
     for (const ElementPair pair : pairs)
       if (!meshes.self() || !sharesVertex(triangles[pair.a], triangles[pair.b]))
         job.candidates.push_back(pair);
+  }
+
+  void findAll(const MeshPair& meshes, std::span<const ElementPair> pairs) {
+    const MemoryScope memory(MemoryStage::NarrowPhase);
+    Stopwatch watch;
+    bool& intersecting = contacts.facts.startsIntersecting;
+    if (meshes.step.checksStart && !intersecting)
+      intersecting = anyIntersecting(meshes, true, pairs, intersections).has_value();
+    if (record->plan.runsIntersection && (intersecting || record->plan.startsIntersecting))
+      detectIntersections(*this, pairs);
+    else
+      intersectionsMissed = true;
+    if (meshes.settings.earliestTimeOnly)
+      findEarliest(meshes, pairs);
+    else
+      findContacts(meshes, pairs, contacts);
+    narrowMilliseconds += watch.lap();
   }
 
   /// Detects the contacts of a pair with a shape, without a traversal.
@@ -275,6 +318,7 @@ struct Frame::Job {
     const auto& [analytical, now, before] = meshes.shape();
     findElementsNear(record->mesh(), record->plan.swept() ? before : now, now,
                      meshes.maxFeatureDistance(), queries, elements);
+    const MemoryScope memory(MemoryStage::NarrowPhase);
     Stopwatch watch;
     findShapeContacts(meshes.mesh(), meshes.shape(), meshes.settings, elements, contacts);
     if (meshes.settings.earliestTimeOnly) takeEarliest(*record, contacts);
@@ -283,10 +327,50 @@ struct Frame::Job {
 
   /// Finds the contacts of the job's particles with a proxy.
   void detectProxy(bool byBruteForce) {
+    const MemoryScope memory(MemoryStage::NarrowPhase);
     Stopwatch watch;
-    proxy->find(record->a->mesh, begin, end, byBruteForce, hits);
+    proxy->find(record->a->mesh, begin, end, byBruteForce, nullptr, hits);
     contacts.featurePairs += hits.answered;
     narrowMilliseconds += watch.lap();
+  }
+
+  /// Auto by a proxy: finds the contacts of the job's particles. The exact method finds those of
+  /// particles that may have an impact in the step.
+  void detectParticles(bool byBruteForce) {
+    const MemoryScope memory(MemoryStage::NarrowPhase);
+    Stopwatch watch;
+    const TriangleMesh& points = record->a->mesh;
+    const PairPlan& plan = record->plan;
+    const ParticleStep step{record->b->motion.range(), record->pair.settings.thickness,
+                            plan.motionTolerance};
+    proxy->find(points, begin, end, byBruteForce, plan.motion > 0.0 ? &step : nullptr, hits);
+    contacts.featurePairs += hits.answered;
+    contacts.shape.resize(hits.count);
+    proxy->write(points, hits, contacts.shape.data());
+    if (byBruteForce)
+      detectVerticesByBruteForce(*record, hits.others, contacts);
+    else
+      detectOthers();
+    narrowMilliseconds += watch.lap();
+  }
+  void detectOthers() {
+    const TriangleMesh& points = record->a->mesh;
+    const MeshPair meshes = record->meshes();
+    const bool swept = record->plan.swept();
+    const auto isDisabled = [&](const ElementPair& p) {
+      return !record->b->mesh.topology.isEnabled(p.b);
+    };
+    for (const std::uint32_t point : hits.others) {
+      Eigen::AlignedBox3d box(points.now[point]);
+      if (swept) box.extend(points.before[point]);
+      const Eigen::Vector3d margin = Eigen::Vector3d::Constant(meshes.maxFeatureDistance());
+      findElementsNear(*record->b, {box.min() - margin, box.max() + margin}, swept, queries,
+                       elements);
+      kept.clear();
+      for (const std::uint32_t element : elements) kept.push_back({point, element});
+      std::erase_if(kept, isDisabled);
+      if (!kept.empty()) findContacts(meshes, kept, contacts);
+    }
   }
 
   // Method::DistanceField: the job's share of the elements near the field, in three phases.
@@ -295,10 +379,10 @@ struct Frame::Job {
 
   template <class F>
   void inField(F&& f) {
+    const MemoryScope memory(MemoryStage::NarrowPhase);
     Stopwatch watch;
-    const MeshPair meshes = record->meshes();
-    const PlacedField placed(*meshes.field, meshes.fieldMesh->now);
-    FieldContacts found(meshes.mesh(), placed, meshes.settings, *record->fieldScratch);
+    const PlacedField placed = record->placedField();
+    FieldContacts found = record->fieldContacts(placed);
     f(found);
     const double spent = watch.lap();
     milliseconds += spent;
@@ -316,6 +400,7 @@ struct Frame::Job {
 
   /// Auto: finds intersections at the step's end.
   static void detectIntersections(Job& job, std::span<const ElementPair> pairs) {
+    const MemoryScope memory(MemoryStage::NarrowPhase);
     findIntersections(job.record->meshes(), pairs, job.intersections);
   }
 
@@ -329,6 +414,7 @@ struct Frame::Job {
 
 Frame::Frame() = default;
 Frame::~Frame() = default;
+Frame& Frame::operator=(Frame&&) noexcept = default;
 
 Frame::Job& Frame::newJob(PairRecord& record) {
   if (m_jobCount == m_jobs.size()) m_jobs.push_back(std::make_unique<Job>());
@@ -345,6 +431,7 @@ Frame::Job& Frame::newJob(PairRecord& record) {
 
 void Frame::start(std::span<PairRecord* const> records, const Threads& threads, bool adjacentPairs,
                   BoxFrame frame) {
+  const MemoryScope memory(MemoryStage::Pairs);
   m_jobCount = 0;
   m_usesFields = false;
   m_nodePairs.clear();
@@ -359,7 +446,7 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads, 
         newJob(*record);
       continue;
     }
-    if (record->usesProxy()) {
+    if (record->usesProxy() || (adjacentPairs && record->plan.byProxy)) {
       if (adjacentPairs) startProxy(*record, kParticlesPerJob);
       continue;
     }
@@ -395,16 +482,28 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads, 
 
 void Frame::startProxy(PairRecord& record, std::size_t grain) {
   const std::size_t size = record.a->mesh.now.size();
+  const bool isAuto = record.plan.byProxy;
   for (std::size_t begin = 0; begin < size; begin += grain) {
     Job& job = newJob(record);
-    job.proxy.emplace(*record.proxy, record.b->mesh, record.pair.settings.thickness);
+    job.proxy.emplace(isAuto ? *record.b->proxy : *record.proxy, record.b->mesh,
+                      isAuto ? record.plan.proxyThickness : record.pair.settings.thickness);
     job.begin = begin;
     job.end = std::min(size, begin + grain);
   }
 }
 
+/// Auto by a proxy: the error and the depth of its answer.
+void Frame::describeProxy(std::span<const std::unique_ptr<Job>> jobs, PairRecord& record) {
+  CollisionData::Contents& contents = record.next.contents();
+  double error = 0;
+  for (const auto& job : jobs) error = std::max(error, job->hits.error);
+  contents.validity.proxyDepth = record.b->proxy->depth();
+  contents.errorBound = jobs.empty() ? 0.0 : jobs.front()->proxy->totalError(error);
+}
+
 void Frame::writeProxyContacts(std::span<const std::unique_ptr<Job>> jobs, const Threads& threads,
                                PairRecord& record) {
+  const MemoryScope memory(MemoryStage::Results);
   CollisionData::Contents& contents = record.next.contents();
   contents.vertexTriangle.clear();
   contents.triangleVertex.clear();
@@ -431,11 +530,9 @@ void Frame::writeProxyContacts(std::span<const std::unique_ptr<Job>> jobs, const
 }
 
 void Frame::startField(PairRecord& record, const Threads& threads) {
-  if (!record.fieldScratch) record.fieldScratch = std::make_unique<FieldScratch>();
-  FieldScratch& scratch = *record.fieldScratch;
-  const MeshPair meshes = record.meshes();
-  const PlacedField placed(*meshes.field, meshes.fieldMesh->now);
-  FieldContacts(meshes.mesh(), placed, meshes.settings, scratch).start(record.mesh());
+  const PlacedField placed = record.placedField();
+  record.fieldContacts(placed).start(record.mesh());
+  const FieldScratch& scratch = *record.fieldScratch;
   const std::size_t elements = scratch.elements.size(), vertices = scratch.vertices.size();
   const bool shared = threads.count() > 1 && elements >= kSharedFieldSize;
   const std::size_t jobs = elements == 0 ? 0 : shared ? kJobsPerPair : 1;
@@ -529,6 +626,8 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
     m_jobs[i]->start(&Job::detect);
     if (m_jobs[i]->record->usesProxy())
       m_jobs[i]->detectProxy(false);
+    else if (m_jobs[i]->record->plan.byProxy)
+      m_jobs[i]->detectParticles(false);
     else
       m_jobs[i]->record->hasShape() ? m_jobs[i]->detectShape() : run(*m_jobs[i]);
     m_jobs[i]->milliseconds = job.lap();
@@ -566,8 +665,9 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
         record->candidates.insert(record->candidates.end(), job.candidates.begin(),
                                   job.candidates.end());
     }
-    if (record->usesProxy())
-      writeProxyContacts(std::span(m_jobs).subspan(first, i - first), threads, *record);
+    const auto jobs = std::span(m_jobs).subspan(first, i - first);
+    if (record->usesProxy()) writeProxyContacts(jobs, threads, *record);
+    if (record->plan.byProxy) describeProxy(jobs, *record);
     finish(*record, nearby, false, settings, statistics);
   }
   statistics.milliseconds.order = watch.lap();
@@ -599,6 +699,7 @@ void Frame::findMissedIntersections(const Threads& threads) {
 
 void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const Settings& settings,
                    FrameStatistics& statistics) {
+  const MemoryScope memory(MemoryStage::Results);
   m_facts.clear();
   m_impacts.clear();
   for (const auto* buffers : {&m_buffers, &m_intersections})
@@ -637,6 +738,7 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
         record.plan.step.reportsImpacts ? 1.0 : std::numeric_limits<double>::infinity(),
         m_orderScratch, contents);
   countContacts(record.plan, intersectionCount, contents);
+  if (record.plan.byProxy) describeAsShape(record.a->mesh, contents);
   record.candidatesSorted = candidatesSorted;
   if (settings.keepCandidates) record.candidatesVersion.commit(record.state());
 }
@@ -646,10 +748,20 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Setti
   for (PairRecord* record : records) {
     Stopwatch watch;
     ContactBuffers contacts, intersections;
-    if (record->usesProxy()) {
-      m_jobCount = 0;
+    m_buffers = {&contacts};
+    m_jobCount = 0;
+    if (record->usesProxy() || record->plan.byProxy)
       startProxy(*record, std::max<std::size_t>(1, record->a->mesh.now.size()));
-      const auto jobs = std::span(m_jobs).first(m_jobCount);
+    const auto jobs = std::span(m_jobs).first(m_jobCount);
+    if (record->plan.byProxy) {
+      for (const auto& job : jobs) {
+        job->detectParticles(true);
+        m_buffers.push_back(&job->contacts);
+        statistics.featurePairs += job->contacts.featurePairs;
+        statistics.exactDecisions += job->contacts.exactDecisions;
+      }
+      describeProxy(jobs, *record);
+    } else if (record->usesProxy()) {
       for (const auto& job : jobs) job->detectProxy(true);
       writeProxyContacts(jobs, Threads(1), *record);
       for (const auto& job : jobs) contacts.featurePairs += job->contacts.featurePairs;
@@ -666,7 +778,6 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Setti
     statistics.exactDecisions += contacts.exactDecisions + intersections.exactDecisions;
     statistics.validityPairs += intersections.validityPairs;
     statistics.milliseconds.narrowPhase += watch.lap();
-    m_buffers = {&contacts};
     m_intersections = {&intersections};
     finish(*record, true, true, settings, statistics);
     statistics.milliseconds.order += watch.lap();

@@ -22,6 +22,7 @@ class Frame {
  public:
   Frame();
   ~Frame();
+  Frame& operator=(Frame&&) noexcept;
 
   /// Writes the candidates of each pair, unsorted, to its record.
   void collect(std::span<PairRecord* const>, const Threads&, FrameStatistics&);
@@ -41,6 +42,7 @@ class Frame {
   void prepareFields(const Threads&);
   void run(Job&) const;
   void startProxy(PairRecord&, std::size_t grain);
+  void describeProxy(std::span<const std::unique_ptr<Job>>, PairRecord&);
   void writeProxyContacts(std::span<const std::unique_ptr<Job>>, const Threads&, PairRecord&);
   void finish(PairRecord&, bool nearby, bool candidatesSorted, const Settings&, FrameStatistics&);
   void findMissedIntersections(const Threads&);

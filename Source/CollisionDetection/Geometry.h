@@ -5,6 +5,7 @@
 
 #include "CollisionDetection/GeometryStep.h"
 #include "CollisionDetection/RigidBody.h"
+#include "DistanceField/SurfaceProxy.h"
 #include "Mesh/Motion.h"
 #include "Mesh/Revision.h"
 #include "Octree/PointQueries.h"
@@ -13,6 +14,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <utility>
 
 namespace palpate {
@@ -53,6 +55,8 @@ struct Geometry : SearchableGeometry {
   GeometryStep step;          ///< writes the positions of both ends
   double smallestHeight = 0;  ///< L: of all triangles with area, in the shape at rest
   GeometryMotion motion;
+  std::shared_ptr<const SurfaceProxy> proxy;  ///< attached, or null
+  SurfaceProxySettings proxySettings;         ///< if there is one
   bool skipsOctree = false;  ///< the update that runs, or ran last, leaves the octree outdated
 
   /// The data for the choice of a method. extent is 0 before the first update of the octree.
@@ -60,6 +64,8 @@ struct Geometry : SearchableGeometry {
   bool meets(const Geometry& other) const {
     return (filter.groups & other.filter.mask) && (other.filter.groups & filter.mask);
   }
+  /// Whether data of the shape are attached, so that it must not change.
+  bool isShapeFixed() const { return proxy || (field && !isField()); }
   /// The revisions on which all results for the geometry depend.
   std::array<Revision, 8> state() const {
     return {revisions.topology,      revisions.enabled,           revisions.filter,

@@ -1,6 +1,7 @@
 #include "CollisionDetection/GeometryChecks.h"
 
 #include "Core/Text.h"
+#include "Math/Range.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
@@ -58,13 +59,13 @@ void checkPositions(GeometryId id, std::span<const Eigen::Vector3d> positions, E
   if (bad == positions.size()) return;
   throw Error(ErrorCode::NonFinitePosition,
               nameOf(id) + ", vertex " + std::to_string(bad) + ": position" + which + " is " +
-                  textOf(positions[bad]) + "; positions must be finite",
+                  textOf(positions[bad]) + "; positions must be " + kRangeRule,
               id, bad);
 }
 
-std::vector<Eigen::Vector3d> checkedRest(GeometryId id,
-                                         std::span<const Eigen::Vector3d> positions) {
-  std::vector<Eigen::Vector3d> rest(positions.size());
+CountedVector<Eigen::Vector3d> checkedRest(GeometryId id,
+                                           std::span<const Eigen::Vector3d> positions) {
+  CountedVector<Eigen::Vector3d> rest(positions.size());
   checkPositions(id, positions, rest.data(), "", Threads(1));
   return rest;
 }
@@ -122,10 +123,10 @@ TetrahedralTopology checkedTopology(GeometryId id, std::span<const Eigen::Vector
 
 void checkRadii(GeometryId id, std::span<const double> radii) {
   for (std::size_t v = 0; v < radii.size(); ++v)
-    if (!(radii[v] >= 0.0) || std::isinf(radii[v]))
+    if (!(radii[v] >= 0.0) || !isWithinRange(radii[v]))
       throw Error(ErrorCode::InvalidRadius,
                   nameOf(id) + ", vertex " + std::to_string(v) + ": radius is " + textOf(radii[v]) +
-                      "; it must be finite and not negative",
+                      "; it must be " + kLengthRule,
                   id, v);
 }
 
@@ -163,12 +164,35 @@ void checkAttachable(const Geometry& geometry, const DistanceField& field) {
   }
 }
 
-void checkShapeMayChange(const Geometry& geometry, const char* call) {
-  if (geometry.field && !geometry.isField())
+void checkProxy(const Geometry& geometry, const SurfaceProxySettings& settings) {
+  const MeshTopology& topology = geometry.mesh.topology;
+  if (!topology.hasFaces())
     throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(geometry.id) + " has a distance field attached, so that " + call +
-                    " may not change it; detach the field by attachDistanceField() with null",
+                nameOf(geometry.id) + " is " + nameOf(topology.type) +
+                    "; attachSurfaceProxy() is for triangle and tetrahedral meshes",
                 geometry.id);
+  const auto need = [&](const char* which, double value, double most, const std::string& rule) {
+    if (!(value > 0.0 && value <= most))
+      throw Error(
+          ErrorCode::InvalidSettings,
+          nameOf(geometry.id) + ": " + which + " is " + textOf(value) + "; it must be " + rule,
+          geometry.id);
+  };
+  need("reach", settings.reach, kLargestMeasure, "positive and finite");
+  need("errorBound", settings.errorBound, kLargestMeasure, "positive and finite");
+  need("widestNormalCone", settings.widestNormalCone, kWidestNormalCone, "above 0 and at most 1.5");
+}
+
+void checkShapeMayChange(const Geometry& geometry, const char* call) {
+  if (!geometry.isShapeFixed()) return;
+  const bool hasField = geometry.field != nullptr;
+  throw Error(ErrorCode::UnsupportedMethod,
+              nameOf(geometry.id) + " has " +
+                  (hasField ? "a distance field" : "the leaves of a proxy") +
+                  " attached, so that " + call + " may not change it; detach " +
+                  (hasField ? "the field by attachDistanceField() with null"
+                            : "them by attachSurfaceProxy() with none"),
+              geometry.id);
 }
 
 void checkPositionCount(const Geometry& geometry, std::size_t count) {
@@ -191,16 +215,6 @@ void checkPositionCount(const Geometry& geometry, std::size_t count) {
                      : geometry.mesh.topology.hasFaces() ? "; setTriangles() changes their number"
                                                          : ""),
                 geometry.id);
-}
-
-void checkPlaceable(GeometryId id, std::span<const Eigen::Vector3d> body, ErrorCode code) {
-  for (std::size_t v = 0; v < body.size(); ++v)
-    if (!(body[v].cwiseAbs().maxCoeff() <= kLargestPlaced))
-      throw Error(code,
-                  nameOf(id) + ", vertex " + std::to_string(v) +
-                      ": position in the body's frame is " + textOf(body[v]) +
-                      "; it must be at most 2^1000 in magnitude",
-                  id, v);
 }
 
 }  // namespace palpate

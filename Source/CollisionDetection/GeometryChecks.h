@@ -18,7 +18,7 @@ void checkPositions(GeometryId, std::span<const Eigen::Vector3d>, Eigen::Vector3
                     const char* which, const Threads&, const Eigen::Vector3d* before = nullptr,
                     MotionRange* moved = nullptr);
 /// Returns a copy of the positions of a new topology.
-std::vector<Eigen::Vector3d> checkedRest(GeometryId, std::span<const Eigen::Vector3d>);
+CountedVector<Eigen::Vector3d> checkedRest(GeometryId, std::span<const Eigen::Vector3d>);
 void checkCounts(GeometryId, std::span<const Eigen::Vector3d>, std::span<const Triangle>,
                  GeometryType);
 TetrahedralTopology checkedTopology(GeometryId, std::span<const Eigen::Vector3d> rest,
@@ -27,11 +27,10 @@ void checkRadii(GeometryId, std::span<const double>);
 void checkOnePerVertex(GeometryId, std::span<const Eigen::Vector3d>, std::span<const double> radii);
 /// Throws unless the field is of this mesh, which may have one.
 void checkAttachable(const Geometry&, const DistanceField&);
-/// Throws if the geometry has a distance field attached, which is of its shape. call: for the
-/// message.
+void checkProxy(const Geometry&, const SurfaceProxySettings&);
+/// Throws if a distance field or leaves, which are of its shape, are attached to the geometry.
+/// call: for the message.
 void checkShapeMayChange(const Geometry&, const char* call);
 void checkPositionCount(const Geometry&, std::size_t count);
-/// Checks that positions in a body's frame are small enough for setTransform().
-void checkPlaceable(GeometryId, std::span<const Eigen::Vector3d> body, ErrorCode);
 
 }  // namespace palpate

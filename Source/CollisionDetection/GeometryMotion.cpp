@@ -1,5 +1,7 @@
 #include "CollisionDetection/Geometry.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 
 namespace palpate {
@@ -10,15 +12,25 @@ std::array<Revision, 4> ends(const Positions& from, const Positions& to) {
   return {from.bodyRevision(), from.transformRevision(), to.bodyRevision(), to.transformRevision()};
 }
 
+/// L: the longest side of the box of both ends, in the body's frame.
+double extentOfPositions(const TriangleMesh& mesh) {
+  Eigen::AlignedBox3d box;
+  for (const Positions* end : {&mesh.now, &mesh.before})
+    for (const Eigen::Vector3d& p : end->body()) box.extend(p);
+  return box.sizes().maxCoeff();
+}
+
 /// L: an upper bound of the extent along any axis of the world. A placed body may be turned, so the
 /// longest side of its box is doubled.
 double extentOf(const Geometry& geometry) {
   if (geometry.tree.octree().size() == 0) return 0.0;
   const FloatBox box = geometry.tree.octree().blocks()[0].box(0);
+  const double turned = geometry.isPlaced() ? 2.0 : 1.0;
+  if (box.mayBeClamped()) return turned * extentOfPositions(geometry.mesh);
   double longest = 0.0;
   for (int k = 0; k < 3; ++k)
     longest = std::max(longest, double{box.upper[k]} - double{box.lower[k]});
-  return (geometry.isPlaced() ? 2.0 : 1.0) * longest / geometry.tree.frame().scale;
+  return turned * longest / geometry.tree.frame().scale;
 }
 
 }  // namespace

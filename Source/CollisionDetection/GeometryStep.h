@@ -47,6 +47,8 @@ class GeometryStep {
   /// The end `now` becomes `before`.
   void advance(TriangleMesh&, PlacedShape* shape) noexcept;
 
+  void releaseMemory();  ///< frees arrays that only the next calls need
+
   /// A detection has used the end `now`.
   void recordDetection(const TriangleMesh& mesh) noexcept { m_detected = mesh.now; }
   /// The end `now` of the last detection; a solver may have corrected it since.
@@ -54,9 +56,8 @@ class GeometryStep {
   bool isNew() const { return m_isNew; }
 
  private:
-  Positions::Body checkedBody(std::span<const Eigen::Vector3d>, bool isPlaced, const char* which,
-                              const Threads&, const Eigen::Vector3d* from = nullptr,
-                              MotionRange* moved = nullptr);
+  Positions::Body checkedBody(std::span<const Eigen::Vector3d>, const char* which, const Threads&,
+                              const Eigen::Vector3d* from = nullptr, MotionRange* moved = nullptr);
   void setBody(TriangleMesh&, Positions& end, Positions::Body) noexcept;
   void place(TriangleMesh&, Positions& end, const RigidTransform&) noexcept;
 
@@ -67,7 +68,7 @@ class GeometryStep {
   RevisionCounter m_revisions;
   /// Positions are checked while they are copied into one of these that nothing else uses. Three
   /// ends, two incoming arrays and the copies of snapshots use them.
-  std::vector<std::shared_ptr<std::vector<Eigen::Vector3d>>> m_bodies;
+  CountedVector<std::shared_ptr<CountedVector<Eigen::Vector3d>>> m_bodies;
   std::optional<Shape> m_spare, m_spareBefore;  ///< hold new placements until nothing can throw
 };
 

@@ -39,10 +39,10 @@ GeometryId GeometryTable::nextId() const {
   return GeometryId{m_nextId};
 }
 
-std::unique_ptr<Geometry> GeometryTable::make(std::vector<Eigen::Vector3d> rest,
+std::unique_ptr<Geometry> GeometryTable::make(CountedVector<Eigen::Vector3d> rest,
                                               MeshTopology topology) const {
   auto geometry = std::make_unique<Geometry>(nextId());
-  auto body = std::make_shared<const std::vector<Eigen::Vector3d>>(rest);
+  auto body = std::make_shared<const CountedVector<Eigen::Vector3d>>(rest);
   TriangleMesh& mesh = geometry->mesh;
   mesh.rest = std::move(rest);
   mesh.topology = std::move(topology);
@@ -81,7 +81,7 @@ GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
 GeometryId GeometryTable::addLines(std::span<const Eigen::Vector3d> positions,
                                    std::span<const Segment> segments,
                                    std::span<const double> radii) {
-  std::vector<Triangle> triangles;
+  CountedVector<Triangle> triangles;
   triangles.reserve(segments.size());
   for (const auto& [p, q] : segments) triangles.push_back({p, q, q});
   return add(positions, triangles, GeometryType::Lines, radii);
@@ -89,7 +89,7 @@ GeometryId GeometryTable::addLines(std::span<const Eigen::Vector3d> positions,
 
 GeometryId GeometryTable::addPoints(std::span<const Eigen::Vector3d> positions,
                                     std::span<const double> radii) {
-  std::vector<Triangle> triangles(positions.size());
+  CountedVector<Triangle> triangles(positions.size());
   for (std::uint32_t i = 0; i < triangles.size(); ++i) triangles[i] = {i, i, i};
   return add(positions, triangles, GeometryType::Points, radii);
 }
@@ -97,7 +97,7 @@ GeometryId GeometryTable::addPoints(std::span<const Eigen::Vector3d> positions,
 GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
                               std::span<const Tetrahedron> tetrahedra) {
   const GeometryId id = nextId();
-  std::vector<Eigen::Vector3d> rest = checkedRest(id, positions);
+  CountedVector<Eigen::Vector3d> rest = checkedRest(id, positions);
   TetrahedralTopology solid = checkedTopology(id, rest, tetrahedra);
   MeshTopology topology(positions.size(), solid.surface);
   auto geometry = make(std::move(rest), std::move(topology));
@@ -137,6 +137,22 @@ void GeometryTable::attach(GeometryId id, std::shared_ptr<const DistanceField> f
   Geometry& geometry = at(id);
   if (field) checkAttachable(geometry, *field);
   geometry.field = std::move(field);
+  geometry.revisions.field = geometry.revisions.counter.next();
+  ++m_state;
+}
+
+void GeometryTable::attach(GeometryId id, const std::optional<SurfaceProxySettings>& settings,
+                           const Threads& threads) {
+  Geometry& geometry = at(id);
+  std::shared_ptr<const SurfaceProxy> proxy;
+  if (settings) {
+    checkProxy(geometry, *settings);
+    const auto& [reach, errorBound, cone] = *settings;
+    proxy = std::make_shared<const SurfaceProxy>(geometry.mesh,
+                                                 ProxySettings{reach, errorBound, cone}, threads);
+  }
+  geometry.proxy = std::move(proxy);
+  geometry.proxySettings = settings.value_or(SurfaceProxySettings());
   geometry.revisions.field = geometry.revisions.counter.next();
   ++m_state;
 }
@@ -192,32 +208,34 @@ void GeometryTable::setPositions(GeometryId id,
 }
 
 void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions,
-                                 std::span<const Triangle> triangles) {
+                                 std::span<const Triangle> triangles, const Preparation& prepare) {
   Geometry& geometry = at(id);
   checkShapeMayChange(geometry, "setTriangles()");
   checkMeshType(geometry, false, "setTriangles() is for triangle meshes");
   checkCounts(id, positions, triangles, GeometryType::Triangles);
-  setTopology(geometry, checkedRest(id, positions), {positions.size(), triangles}, {});
+  setTopology(geometry, checkedRest(id, positions), {positions.size(), triangles}, {}, prepare);
   ++m_state;
 }
 
 void GeometryTable::setTetrahedra(GeometryId id, std::span<const Eigen::Vector3d> positions,
-                                  std::span<const Tetrahedron> tetrahedra) {
+                                  std::span<const Tetrahedron> tetrahedra,
+                                  const Preparation& prepare) {
   Geometry& geometry = at(id);
   checkShapeMayChange(geometry, "setTetrahedra()");
   checkMeshType(geometry, true, "setTetrahedra() is for tetrahedral meshes");
-  std::vector<Eigen::Vector3d> rest = checkedRest(id, positions);
+  CountedVector<Eigen::Vector3d> rest = checkedRest(id, positions);
   auto solid = std::make_unique<Solid>();
   solid->topology = checkedTopology(id, rest, tetrahedra);
   MeshTopology topology(positions.size(), solid->topology.surface);
-  setTopology(geometry, std::move(rest), std::move(topology), std::move(solid));
+  setTopology(geometry, std::move(rest), std::move(topology), std::move(solid), prepare);
   ++m_state;
 }
 
-void GeometryTable::setTopology(Geometry& geometry, std::vector<Eigen::Vector3d> rest,
-                                MeshTopology topology, std::unique_ptr<Solid> solid) {
-  if (geometry.isPlaced()) checkPlaceable(geometry.id, rest, ErrorCode::NonFinitePosition);
-  auto body = std::make_shared<const std::vector<Eigen::Vector3d>>(rest);
+void GeometryTable::setTopology(Geometry& geometry, CountedVector<Eigen::Vector3d> rest,
+                                MeshTopology topology, std::unique_ptr<Solid> solid,
+                                const Preparation& prepare) {
+  auto body = std::make_shared<const CountedVector<Eigen::Vector3d>>(rest);
+  prepare(topology, rest);
   // Nothing below throws.
   geometry.mesh.rest = std::move(rest);
   geometry.mesh.topology = std::move(topology);

@@ -7,6 +7,7 @@
 #include "Core/Threads.h"
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -28,13 +29,17 @@ class GeometryTable {
   GeometryId add(const AnalyticalGeometry&);
   GeometryId add(std::shared_ptr<const DistanceField>);
   void attach(GeometryId, std::shared_ptr<const DistanceField>);  ///< null: detaches
+  void attach(GeometryId, const std::optional<SurfaceProxySettings>&, const Threads&);
   void remove(GeometryId);
   void setPositions(GeometryId, std::optional<std::span<const Eigen::Vector3d>> before,
                     std::span<const Eigen::Vector3d> now, const Threads&);
+  /// Receives a new topology and its positions at rest before they are set. What it throws leaves
+  /// the geometry as it was.
+  using Preparation = std::function<void(const MeshTopology&, std::span<const Eigen::Vector3d>)>;
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
-                    std::span<const Triangle>);
+                    std::span<const Triangle>, const Preparation&);
   void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
-                     std::span<const Tetrahedron>);
+                     std::span<const Tetrahedron>, const Preparation&);
   void setFilter(GeometryId, const CollisionFilter&);
   void setDisabled(GeometryId, std::span<const std::uint32_t> elements);
 
@@ -58,14 +63,14 @@ class GeometryTable {
 
  private:
   /// A geometry with its topology, and positions at both ends of the step; not yet in the table.
-  std::unique_ptr<Geometry> make(std::vector<Eigen::Vector3d> rest, MeshTopology) const;
+  std::unique_ptr<Geometry> make(CountedVector<Eigen::Vector3d> rest, MeshTopology) const;
   GeometryId add(std::unique_ptr<Geometry>);
-  static void setTopology(Geometry&, std::vector<Eigen::Vector3d> rest, MeshTopology,
-                          std::unique_ptr<Solid>);
+  static void setTopology(Geometry&, CountedVector<Eigen::Vector3d> rest, MeshTopology,
+                          std::unique_ptr<Solid>, const Preparation&);
 
-  std::vector<std::unique_ptr<Geometry>> m_geometries;  ///< ascending ids
+  CountedVector<std::unique_ptr<Geometry>> m_geometries;  ///< ascending ids
   std::uint32_t m_nextId = 0;
-  std::vector<Geometry*> m_changed;
+  CountedVector<Geometry*> m_changed;
   bool m_wasUpdatedByOneThread = false;
   std::uint64_t m_stepNumber = 0, m_state = 1;
 };

@@ -10,6 +10,7 @@
 #include "Core/Stopwatch.h"
 #include "Core/Assert.h"
 #include "Core/FloatingPoint.h"
+#include "Core/MemoryBudget.h"
 #include "Core/Text.h"
 #include "DistanceField/FieldContacts.h"
 #include "Octree/Forest.h"
@@ -60,6 +61,7 @@ struct OctreeBasedCD::Implementation {
   ~Implementation();
 
   Settings settings;
+  const std::shared_ptr<MemoryBudget> budget;
   Threads threads, singleThread{1};
   GeometryTable geometries;
   PairTable pairs;
@@ -76,6 +78,7 @@ struct OctreeBasedCD::Implementation {
   std::atomic<std::uint64_t> octreesState = 0;
   std::mutex sorting;  ///< locked while candidatePairs(), a const call, sorts candidates
   PairOrderScratch sortingScratch;
+  bool holdsSpare = false;           ///< there was a call since the last releaseMemory()
   std::atomic<bool> isBusy = false;  ///< a call that changes the object has not returned
 
   /// Adds the counts of geometries to the statistics, and makes them visible.
@@ -89,7 +92,27 @@ struct OctreeBasedCD::Implementation {
                                               : next.points) += topology.triangles.size();
       next.untestedVertices += topology.untestedVertices;
     }
+    next.memory = budget->now();
+    next.peakMemory = budget->peak();
     statistics = next;
+  }
+
+  void releaseMemory();
+
+  /// Calls a function that changes nothing if it throws. If it exceeds Settings::memoryLimit while
+  /// memory is held that only earlier calls needed, that is given back, and it is called again.
+  template <class F>
+  auto withinLimit(F&& call) {
+    for (;;) {
+      const bool heldSpare = std::exchange(holdsSpare, true);
+      try {
+        return call();
+      } catch (const Error& error) {
+        if (error.code() != ErrorCode::MemoryLimit) throw;
+        releaseMemory();
+        if (!heldSpare) throw;
+      }
+    }
   }
 
   /// Updates the octrees. The next frame's statistics include updates for queries.
@@ -98,6 +121,7 @@ struct OctreeBasedCD::Implementation {
   /// detecting: plans include the motion of all pairs. Otherwise they include only the motion on
   /// which candidates depend.
   void update(bool explicitly = false, bool detecting = false) {
+    const MemoryScope memory(MemoryStage::Octrees);
     using Update = LooseOctree::Update;
     const bool skips = markSkippedOctrees(detecting && octreesState != geometries.state());
     octreesState = 0;
@@ -118,9 +142,8 @@ struct OctreeBasedCD::Implementation {
       if (moves)
         for (Geometry* geometry : {record->a, record->b}) geometry->motion.update(*geometry);
       record->plan = planOf(record->pair.settings, record->a->inStep(), record->b->inStep(), moves);
-      if (detecting && !settings.keepCandidates && !record->predicate)
-        useField(record->pair.settings, record->a->inStep(), record->b->inStep(), record->plan);
-      record->updateNearAtRest();
+      if (detecting && mayUseProxy(*record))
+        record->plan = planByProxy(record->pair.settings, record->plan);
       if (record->plan.swept())
         for (Geometry* geometry : {record->a, record->b}) geometry->tree.setSwept(true);
     }
@@ -150,15 +173,24 @@ struct OctreeBasedCD::Implementation {
     if (explicitly) publish(updates);
   }
 
+  bool mayUseProxy(const PairRecord& record) const {
+    return !settings.keepCandidates && record.mayUseProxy();
+  }
+  bool needsNoOctree(const PairRecord& record) const {
+    return record.usesProxy() || mayUseProxy(record);
+  }
+
   /// A detection does not need the octrees of point sets of which all pairs use proxies. Queries
   /// update them later. Returns whether there are any.
   bool markSkippedOctrees(bool maySkip) {
     for (const auto& geometry : geometries.all()) geometry->skipsOctree = false;
     if (!maySkip) return false;
     for (const auto& record : pairs.records())
-      if (record->usesProxy()) record->a->skipsOctree = true;
-    for (const auto& record : pairs.records())
-      if (!record->usesProxy()) record->a->skipsOctree = record->b->skipsOctree = false;
+      if (needsNoOctree(*record)) record->a->skipsOctree = true;
+    for (const auto& record : pairs.records()) {
+      if (!needsNoOctree(*record)) record->a->skipsOctree = false;
+      if (!record->usesProxy()) record->b->skipsOctree = false;
+    }
     return std::any_of(geometries.all().begin(), geometries.all().end(),
                        [](const auto& geometry) { return geometry->skipsOctree; });
   }
@@ -200,6 +232,7 @@ struct OctreeBasedCD::Implementation {
   }
 
   void collect() {
+    const MemoryScope memory(MemoryStage::Pairs);
     update();
     FrameStatistics next = updates;
     const auto records = outdatedPairs(&PairRecord::candidatesVersion);
@@ -223,17 +256,26 @@ struct OctreeBasedCD::Implementation {
     hasUpdates = false;
   }
 
+  bool updateProxies(std::span<PairRecord* const> records) {
+    const MemoryScope memory(MemoryStage::Octrees);
+    bool built = false;
+    for (PairRecord* record : records)
+      if (record->usesProxy()) built |= record->updateProxy(pairs.records(), threads);
+    return built;
+  }
+
   void detect() {
+    const MemoryScope memory(MemoryStage::Pairs);
     update(false, true);
+    for (const auto& record : pairs.records())
+      if (!settings.keepCandidates) record->useField(settings.engine);
     FrameStatistics next = updates;
     const auto records = outdatedPairs(&PairRecord::dataVersion);
     for (PairRecord* record : records)
       record->trust.start(record->pair.settings, record->a->inStep(), record->b->inStep(),
                           record->plan);
     Stopwatch watch;
-    bool built = false;
-    for (PairRecord* record : records)
-      if (record->usesProxy()) built |= record->updateProxy(pairs.records(), threads);
+    const bool built = updateProxies(records);
     if (built) next.milliseconds.octree += watch.lap();
     if (settings.engine == Engine::Octree)
       frame.detect(records, settings, threads, next);
@@ -274,7 +316,8 @@ namespace {
 /// needs.
 class OctreeBasedCD::Implementation::ChangeGuard {
  public:
-  explicit ChangeGuard(const std::unique_ptr<Implementation>& all) : m_all(all.get()) {
+  explicit ChangeGuard(const std::unique_ptr<Implementation>& all)
+      : m_all(all.get()), m_memory(m_all ? m_all->budget : nullptr, MemoryStage::Geometries) {
     if (!m_all) throwMovedFrom();
     if (m_all->isBusy.exchange(true, std::memory_order_relaxed)) throwBusy();
   }
@@ -287,17 +330,20 @@ class OctreeBasedCD::Implementation::ChangeGuard {
  private:
   StandardFloatingPoint m_standard;
   Implementation* m_all;
+  MemoryScope m_memory;
 };
 
 /// The geometries of an OctreeBasedCD, for queries that may outlive it.
 class OctreeBasedCD::Implementation::QuerySource : public SpatialQueries::Source {
  public:
-  explicit QuerySource(Implementation& all) : m_all(&all) {}
+  explicit QuerySource(Implementation& all)
+      : Source(std::make_shared<Pool>(all.budget)), m_all(&all) {}
 
   void close() { m_all = nullptr; }  ///< called when the OctreeBasedCD is destroyed
   /// Updates the octrees unless they are up to date with the positions now.
   void updateOctrees() {
     const auto lock = lockOctrees();
+    const MemoryScope memory(budget(), MemoryStage::Octrees);
     if (m_all->octreesState != m_all->geometries.state()) m_all->update();
   }
   std::unique_lock<std::mutex> lockOctrees() { return std::unique_lock(m_octreesMutex); }
@@ -327,12 +373,27 @@ class OctreeBasedCD::Implementation::QuerySource : public SpatialQueries::Source
 
 OctreeBasedCD::Implementation::Implementation(const Settings& newSettings)
     : settings(checked(newSettings)),
+      budget(MemoryBudget::make(settings.memoryLimit)),
       threads(newSettings.threads, newSettings.executor),
-      querySource(std::make_shared<QuerySource>(*this)) {
+      querySource(std::make_shared<QuerySource>(*this)),
+      latestSnapshot(budget) {
   updateOctreeView();
 }
 
 OctreeBasedCD::Implementation::~Implementation() { querySource->close(); }
+
+void OctreeBasedCD::Implementation::releaseMemory() {
+  frame = Frame();
+  sortingScratch = {};
+  for (const auto& geometry : geometries.all()) {
+    geometry->tree.releaseMemory();
+    geometry->step.releaseMemory();
+  }
+  for (const auto& record : pairs.records()) record->releaseMemory();
+  querySource->releaseScratch();
+  latestSnapshot.releaseMemory();
+  holdsSpare = false;
+}
 
 const OctreeBasedCD::Implementation& OctreeBasedCD::read() const {
   if (!m_implementation) throwMovedFrom();
@@ -349,19 +410,21 @@ OctreeBasedCD::~OctreeBasedCD() = default;
 GeometryId OctreeBasedCD::addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                                           std::span<const Triangle> triangles) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->geometries.add(positions, triangles);
+  return all->withinLimit([&] { return all->geometries.add(positions, triangles); });
 }
 
 GeometryId OctreeBasedCD::addTetrahedralMesh(std::span<const Eigen::Vector3d> positions,
                                              std::span<const Tetrahedron> tetrahedra) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->geometries.add(positions, tetrahedra);
+  return all->withinLimit([&] { return all->geometries.add(positions, tetrahedra); });
 }
 
 GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
                                       std::span<const Segment> segments, double radius) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->geometries.addLines(positions, segments, {&radius, 1});
+  return all->withinLimit([&] {
+    return all->geometries.addLines(positions, segments, {&radius, 1});
+  });
 }
 
 GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
@@ -369,24 +432,24 @@ GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions
                                       std::span<const double> radii) {
   const Implementation::ChangeGuard all(m_implementation);
   checkOnePerVertex(all->geometries.nextId(), positions, radii);
-  return all->geometries.addLines(positions, segments, radii);
+  return all->withinLimit([&] { return all->geometries.addLines(positions, segments, radii); });
 }
 
 GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions, double radius) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->geometries.addPoints(positions, {&radius, 1});
+  return all->withinLimit([&] { return all->geometries.addPoints(positions, {&radius, 1}); });
 }
 
 GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions,
                                       std::span<const double> radii) {
   const Implementation::ChangeGuard all(m_implementation);
   checkOnePerVertex(all->geometries.nextId(), positions, radii);
-  return all->geometries.addPoints(positions, radii);
+  return all->withinLimit([&] { return all->geometries.addPoints(positions, radii); });
 }
 
 GeometryId OctreeBasedCD::addAnalyticalGeometry(const AnalyticalGeometry& geometry) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->geometries.add(geometry);
+  return all->withinLimit([&] { return all->geometries.add(geometry); });
 }
 
 GeometryId OctreeBasedCD::addDistanceField(std::shared_ptr<const DistanceField> field) {
@@ -400,6 +463,12 @@ void OctreeBasedCD::attachDistanceField(GeometryId mesh,
   all->geometries.at(mesh);
   all->pairs.checkFieldChange(mesh, field.get());
   all->geometries.attach(mesh, std::move(field));
+}
+
+void OctreeBasedCD::attachSurfaceProxy(GeometryId mesh,
+                                       const std::optional<SurfaceProxySettings>& settings) {
+  const Implementation::ChangeGuard all(m_implementation);
+  all->withinLimit([&] { all->geometries.attach(mesh, settings, all->threads); });
 }
 
 void OctreeBasedCD::removeGeometry(GeometryId geometry) {
@@ -418,13 +487,13 @@ void OctreeBasedCD::advance() {
 
 void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vector3d> now) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->geometries.setPositions(geometry, {}, now, all->threads);
+  all->withinLimit([&] { all->geometries.setPositions(geometry, {}, now, all->threads); });
 }
 
 void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vector3d> before,
                                  std::span<const Eigen::Vector3d> now) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->geometries.setPositions(geometry, before, now, all->threads);
+  all->withinLimit([&] { all->geometries.setPositions(geometry, before, now, all->threads); });
 }
 
 void OctreeBasedCD::setTransform(GeometryId geometry, const Eigen::Matrix3d& rotation,
@@ -449,13 +518,27 @@ void OctreeBasedCD::setTransform(GeometryId geometry, const Eigen::Matrix3d& rot
 void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->geometries.setTriangles(geometry, positions, triangles);
+  IndexLists near;
+  all->withinLimit([&] {
+    all->geometries.setTriangles(
+        geometry, positions, triangles, [&](const MeshTopology& topology, auto rest) {
+          near = all->pairs.nearAtRest(geometry, topology, rest, all->threads);
+        });
+  });
+  all->pairs.setNearAtRest(geometry, std::move(near));
 }
 
 void OctreeBasedCD::setTetrahedra(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
                                   std::span<const Tetrahedron> tetrahedra) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->geometries.setTetrahedra(geometry, positions, tetrahedra);
+  IndexLists near;
+  all->withinLimit([&] {
+    all->geometries.setTetrahedra(
+        geometry, positions, tetrahedra, [&](const MeshTopology& topology, auto rest) {
+          near = all->pairs.nearAtRest(geometry, topology, rest, all->threads);
+        });
+  });
+  all->pairs.setNearAtRest(geometry, std::move(near));
 }
 
 TetrahedralSurface OctreeBasedCD::surface(GeometryId geometry) const {
@@ -472,7 +555,7 @@ void OctreeBasedCD::setCollisionFilter(GeometryId geometry, const CollisionFilte
 void OctreeBasedCD::setDisabledElements(GeometryId geometry,
                                         std::span<const std::uint32_t> elements) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->geometries.setDisabled(geometry, elements);
+  all->withinLimit([&] { all->geometries.setDisabled(geometry, elements); });
 }
 
 void OctreeBasedCD::setContactPredicate(GeometryId a, GeometryId b, ContactPredicate predicate) {
@@ -482,12 +565,12 @@ void OctreeBasedCD::setContactPredicate(GeometryId a, GeometryId b, ContactPredi
 
 void OctreeBasedCD::addCollisionPair(GeometryId a, GeometryId b, const PairSettings& settings) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->pairs.add(all->geometries, a, b, settings);
+  all->withinLimit([&] { all->pairs.add(all->geometries, a, b, settings, all->threads); });
 }
 
 void OctreeBasedCD::setPairSettings(GeometryId a, GeometryId b, const PairSettings& settings) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->pairs.set(all->geometries, a, b, settings);
+  all->withinLimit([&] { all->pairs.set(all->geometries, a, b, settings, all->threads); });
 }
 
 void OctreeBasedCD::removeCollisionPair(GeometryId a, GeometryId b) {
@@ -524,22 +607,23 @@ Eigen::AlignedBox3d OctreeBasedCD::bounds(GeometryId geometry) const {
 
 void OctreeBasedCD::update() {
   const Implementation::ChangeGuard all(m_implementation);
-  all->update(true);
+  all->withinLimit([&] { all->update(true); });
 }
 
 void OctreeBasedCD::collectCandidates() {
   const Implementation::ChangeGuard all(m_implementation);
-  all->collect();
+  all->withinLimit([&] { all->collect(); });
 }
 
 void OctreeBasedCD::detectCollision() {
   const Implementation::ChangeGuard all(m_implementation);
-  all->detect();
+  all->withinLimit([&] { all->detect(); });
 }
 
 void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFunction function,
                                           void* context) {
   const Implementation::ChangeGuard all(m_implementation);
+  const MemoryScope memory(MemoryStage::Pairs);
   std::vector<PairRecord*>& selectedPairs = all->selectedPairs;
   selectedPairs.clear();
   if (only) {
@@ -548,7 +632,7 @@ void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFuncti
   } else {
     for (const auto& record : all->pairs.records()) selectedPairs.push_back(record.get());
   }
-  all->update();
+  all->withinLimit([&] { all->update(); });
   std::erase_if(selectedPairs, [](const PairRecord* record) { return !record->collides(); });
   if (all->settings.engine == Engine::Octree)
     return all->frame.forEach(selectedPairs, all->threadsFor(selectedPairs), function, context);
@@ -569,8 +653,11 @@ SpatialQueries OctreeBasedCD::queries() const {
 
 void OctreeBasedCD::publish(double time) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->querySource->updateOctrees();
-  all->latestSnapshot.publish(*all->querySource, time);
+  all->withinLimit([&] {
+    all->querySource->updateOctrees();
+    const MemoryScope memory(MemoryStage::Snapshots);
+    all->latestSnapshot.publish(*all->querySource, time);
+  });
 }
 
 std::shared_ptr<const Snapshot> OctreeBasedCD::latestSnapshot() const {
@@ -599,6 +686,7 @@ std::span<const ElementPair> OctreeBasedCD::candidatePairs(GeometryId a, Geometr
                     "Settings::keepCandidates before detectCollision()",
                 a);
   const std::lock_guard lock(all.sorting);
+  const MemoryScope memory(all.budget, MemoryStage::Pairs);
   if (!record.candidatesSorted)
     orderPairs(record.candidates, record.a->mesh.topology.triangles.size(), all.sortingScratch);
   record.candidatesSorted = true;
@@ -608,6 +696,17 @@ std::span<const ElementPair> OctreeBasedCD::candidatePairs(GeometryId a, Geometr
 const LooseOctree& OctreeBasedCD::octree() const { return *read().octree; }
 
 const FrameStatistics& OctreeBasedCD::statistics() const { return read().statistics; }
+
+MemoryUse OctreeBasedCD::memoryUse() const {
+  if (!m_implementation) throwMovedFrom();
+  return m_implementation->budget->now();
+}
+
+void OctreeBasedCD::releaseMemory() {
+  const Implementation::ChangeGuard all(m_implementation);
+  all->releaseMemory();
+  all->budget->startPeak();
+}
 
 const Settings& OctreeBasedCD::settings() const { return read().settings; }
 

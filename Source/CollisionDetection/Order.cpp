@@ -26,9 +26,12 @@ Ids byElement(const ShapeContact& c) {
 /// from the first `preferred` buffers. flags: if not null, receives which contacts these are.
 template <class Contact, class Buffers, class Entries, class IdsOf>
 std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferred,
-                  Buffer<Contact> Buffers::*member, Entries& entries, std::vector<Contact>& out,
+                  Buffer<Contact> Buffers::*member, Entries& entries, CountedVector<Contact>& out,
                   IdsOf&& idsOf, Buffer<std::uint8_t>* flags) {
+  std::size_t size = 0;
+  for (const ContactBuffers* found : buffers) size += (found->*member).size();
   entries.clear();
+  if (size > entries.capacity()) entries.reserve(size + size / 8);
   for (std::size_t i = 0; i < buffers.size(); ++i)
     for (const Contact& contact : buffers[i]->*member) {
       const Ids ids = idsOf(contact);

@@ -2,11 +2,14 @@
 
 #include "Core/Text.h"
 #include "Mesh/RestDistance.h"
+#include "Math/Range.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
 
 namespace palpate {
 
@@ -15,12 +18,36 @@ std::string nameOf(GeometryId a, GeometryId b) {
          std::to_string(static_cast<std::uint32_t>(b)) + ")";
 }
 
-void PairRecord::updateNearAtRest() {
-  const double distance = pair.settings.restDistance;
-  if (distance == 0.0 || nearAtRestVersion.isCurrent({a->revisions.topology})) return;
-  nearAtRestVersion.invalidate();
-  nearAtRest = verticesWithin(a->mesh.topology, a->mesh.rest, distance);
-  nearAtRestVersion.commit({a->revisions.topology});
+bool PairRecord::mayUseProxy() const {
+  const PairSettings& settings = pair.settings;
+  const double reach = settings.thickness + a->mesh.largestRadius;
+  return settings.method == Method::Auto && a->mesh.topology.type == GeometryType::Points &&
+         b->proxy && b->proxySettings.errorBound <= settings.allowedError && !predicate &&
+         reach > 0.0 && reach <= b->proxySettings.reach;
+}
+
+FieldContacts PairRecord::fieldContacts(const PlacedField& placed) {
+  if (!fieldScratch) fieldScratch = std::make_unique<FieldScratch>();
+  const MeshPair both = meshes();
+  return {both.mesh(), placed, both.settings.contacts, both.thicknessAtEnd(), *fieldScratch};
+}
+
+void PairRecord::useField(Engine engine) {
+  if (predicate || plan.byProxy || !collides()) return;
+  const std::optional<PairPlan> byField =
+      planByField(pair.settings, a->inStep(), b->inStep(), plan);
+  if (!byField) return;
+  const PairPlan exact = std::exchange(plan, *byField);
+  if (plan.motion == 0.0) return;
+  const auto isProven = [&] {
+    if (hasData && dataVersion.isCurrent(state()))  // decided before
+      return data.validity().reason == MethodReason::AllowedError;
+    const PlacedField placed = placedField();
+    FieldContacts contacts = fieldContacts(placed);
+    return engine == Engine::BruteForce ? contacts.isFurtherByBruteForce(plan.motion)
+                                        : contacts.isFurther(mesh(), plan.motion);
+  };
+  if (!isProven()) plan = exact;
 }
 
 bool PairRecord::updateProxy(std::span<const std::unique_ptr<PairRecord>> others,
@@ -55,6 +82,16 @@ void PairRecord::commit() noexcept {
   std::swap(data, next);
   hasData = true;
   dataVersion.commit(state());
+}
+
+void PairRecord::releaseMemory() {
+  next = {};
+  fieldScratch.reset();
+  if (!candidatesVersion.isValid()) candidates.clear();
+  releaseSpare(candidates);
+  CollisionData::Contents& kept = data.contents();
+  forEachTimed(kept, [](auto& list) { releaseSpare(list); });
+  releaseSpare(kept.intersectingTriangles);
 }
 
 void PairRecord::commitEmpty(bool keepsCandidates) noexcept {
@@ -144,19 +181,19 @@ class Check {
     need(supported, reason, ErrorCode::UnsupportedMethod);
   }
   void finite(const char* which, double value, bool good, const char* rule) {
-    need(good && value <= std::numeric_limits<double>::max(),
+    need(good && value <= kLargestMeasure,
          std::string(which) + " is " + textOf(value) + "; it must be " + rule);
   }
 
   void range(const TriangleMesh& a, const TriangleMesh& b, const PairSettings& settings) {
     const auto [method, thickness, contacts, motionTolerance, rest, timeTolerance, earliestTimeOnly,
                 allowedError, normalCone] = settings;
-    constexpr const char* kNotNegative = "finite and not negative";
-    finite("restDistance", rest, rest >= 0.0, kNotNegative);
+    finite("restDistance", rest, rest >= 0.0, kLengthRule);
     need(rest == 0.0 || (&a == &b && a.topology.type != GeometryType::Points),
          "restDistance is for a triangle or line mesh with itself");
-    finite("thickness", thickness, thickness >= 0.0, kNotNegative);
-    finite("motionTolerance", motionTolerance, true, "finite, or negative for half the thickness");
+    finite("thickness", thickness, thickness >= 0.0, kLengthRule);
+    finite("motionTolerance", motionTolerance, true,
+           "at most 1e+300, or negative for half the thickness");
     finite("timeTolerance", timeTolerance,
            timeTolerance >= kSmallestTimeTolerance && timeTolerance <= 1.0, "from 2^-50 to 1");
     need(contacts >= Contacts::Distinct && contacts <= Contacts::All,
@@ -166,7 +203,7 @@ class Check {
     need(method >= Method::Auto && method <= Method::Proxy,
          "method is " + std::to_string(static_cast<int>(method)) +
              "; it must be Auto, Intersection, Proximity, Continuous, DistanceField or Proxy");
-    finite("allowedError", allowedError, allowedError >= 0.0, kNotNegative);
+    finite("allowedError", allowedError, allowedError >= 0.0, kLengthRule);
     need(method != Method::Proxy || allowedError > 0.0,
          "Method::Proxy needs a positive allowedError; it is 0");
     need(method == Method::Auto || method == Method::Proxy || allowedError == 0.0,
@@ -227,8 +264,21 @@ class Check {
 
 }  // namespace
 
+IndexLists PairTable::nearAtRest(GeometryId id, const MeshTopology& topology,
+                                 std::span<const Eigen::Vector3d> rest,
+                                 const Threads& threads) const {
+  const auto found = m_byIds.find(keyOf(id, id));
+  const double distance = found == m_byIds.end() ? 0.0 : found->second->pair.settings.restDistance;
+  return distance > 0.0 ? verticesWithin(topology, rest, distance, threads) : IndexLists();
+}
+
+void PairTable::setNearAtRest(GeometryId id, IndexLists lists) noexcept {
+  if (const auto found = m_byIds.find(keyOf(id, id)); found != m_byIds.end())
+    found->second->nearAtRest = std::move(lists);
+}
+
 void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
-                    const PairSettings& settings) {
+                    const PairSettings& settings, const Threads& threads) {
   Geometry& first = geometries.at(a);
   Geometry& second = geometries.at(b);
   Check(first, second, settings);
@@ -241,7 +291,9 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
   record->b = &second;
   record->plan = planOf(settings, first.inStep(), second.inStep());
   record->settingsRevision = m_revisions.next();
-  record->updateNearAtRest();
+  if (settings.restDistance > 0.0)
+    record->nearAtRest =
+        verticesWithin(first.mesh.topology, first.mesh.rest, settings.restDistance, threads);
   record->index = m_records.size();
   const auto reserve = [](auto& vector) {
     if (vector.size() == vector.capacity()) vector.reserve(2 * vector.size() + 1);
@@ -272,18 +324,15 @@ PairRecord& PairTable::inOrder(const GeometryTable& geometries, GeometryId a, Ge
 }
 
 void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
-                    const PairSettings& settings) {
+                    const PairSettings& settings, const Threads& threads) {
   PairRecord& record = at(geometries, a, b);
   Check(*record.a, *record.b, settings);
   if (record.predicate && settings.method == Method::DistanceField)
     throw Error(ErrorCode::UnsupportedMethod, nameOf(a, b) + ": " + kNoPredicate, a);
-  if (record.pair.settings.restDistance != settings.restDistance && settings.restDistance > 0.0) {
-    IndexLists newNearAtRest =
-        verticesWithin(record.a->mesh.topology, record.a->mesh.rest, settings.restDistance);
-    record.nearAtRest = std::move(newNearAtRest);
-    record.nearAtRestVersion.commit({record.a->revisions.topology});
-  }
   if (settings.method == Method::Proxy && record.predicate) throwPredicate(a, b);
+  if (record.pair.settings.restDistance != settings.restDistance && settings.restDistance > 0.0)
+    record.nearAtRest = verticesWithin(record.a->mesh.topology, record.a->mesh.rest,
+                                       settings.restDistance, threads);
   // Nothing below throws.
   if (settings.method != Method::Proxy) {
     record.proxy.reset();

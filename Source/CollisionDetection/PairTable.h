@@ -7,12 +7,14 @@
 #include "DistanceField/SurfaceProxy.h"
 #include "Validity/Trust.h"
 #include "Core/Buffer.h"
+#include "Core/MemoryBudget.h"
 #include "DistanceField/FieldContacts.h"
 #include "NarrowPhase/NarrowPhase.h"
 
 #include <algorithm>
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -22,7 +24,7 @@
 namespace palpate {
 
 /// One collision pair, with its results and the states for which they hold.
-struct PairRecord {
+struct PairRecord : CountedObject {
   CollisionPair pair;
   Geometry* a;
   Geometry* b;
@@ -56,21 +58,29 @@ struct PairRecord {
   }
   /// Whether a distance field answers in this frame.
   bool usesField() const { return plan.method == Method::DistanceField; }
-  const Geometry& body() const { return bodyWithField(*a, *b); }  ///< if usesField()
+  const Geometry& body() const { return bodyWithField(*a, *b); }                ///< if usesField()
+  PlacedField placedField() const { return {*body().field, body().mesh.now}; }  ///< if usesField()
+  /// If usesField(): for the contacts with the field. Allocates fieldScratch when first called.
+  FieldContacts fieldContacts(const PlacedField&);
+  /// Auto: plans that an attached field answers, if that is allowed, and if the field proves that
+  /// nothing touched in the step. The octrees must be updated.
+  void useField(Engine);
   bool collides() const { return a->meets(*b); }
   bool anyDisabled() const {
     return !a->mesh.topology.disabled.empty() || !b->mesh.topology.disabled.empty();
   }
-  /// Updates `nearAtRest` if settings.restDistance is set and the topology has changed.
-  void updateNearAtRest();
   /// Makes `next` the pair's result.
   void commit() noexcept;
   /// Commits an empty result, for a pair that does not collide.
   void commitEmpty(bool keepsCandidates) noexcept;
   void commitNoCandidates() noexcept;  ///< for a pair that does not collide
 
+  void releaseMemory();  ///< keeps the result, and candidates that are valid
+
   bool hasShape() const { return a->shape || b->shape; }
   bool usesProxy() const { return pair.settings.method == Method::Proxy; }
+  /// Auto: whether the settings allow the leaves that are attached to b.
+  bool mayUseProxy() const;
   /// Whether the pair is answered by element pairs of two octrees. Auto's always is, for those who
   /// ask for candidates.
   bool hasCandidates() const {
@@ -99,7 +109,6 @@ struct PairRecord {
   bool candidatesSorted = false;
   ContactPredicate predicate;
   IndexLists nearAtRest;  ///< per vertex: later ones within settings.restDistance at rest
-  DerivedFrom<1> nearAtRestVersion;
   std::shared_ptr<const SurfaceProxy> proxy;  ///< of b, if usesProxy(); pairs may share it
   ProxySettings proxySettings;
   DerivedFrom<3> proxyVersion;  ///< topology, enabled elements and positions of b
@@ -108,8 +117,13 @@ struct PairRecord {
 /// Collision pairs, found by their geometries in either order.
 class PairTable {
  public:
-  void add(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&);
-  void set(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&);
+  void add(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&, const Threads&);
+  void set(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&, const Threads&);
+  /// PairSettings::restDistance: the vertices that are near at rest, in a new topology of a
+  /// geometry. Empty if no pair needs them. Throws TooLarge.
+  IndexLists nearAtRest(GeometryId, const MeshTopology&, std::span<const Eigen::Vector3d> rest,
+                        const Threads&) const;
+  void setNearAtRest(GeometryId, IndexLists) noexcept;
   void setPredicate(const GeometryTable&, GeometryId a, GeometryId b, ContactPredicate);
   /// Throws if there is a pair of the geometry with itself.
   void checkRigid(GeometryId) const;
@@ -129,10 +143,12 @@ class PairTable {
   template <class Predicate>
   void removeIf(Predicate&&) noexcept;
 
-  std::vector<std::unique_ptr<PairRecord>> m_records;  ///< in the order added
-  std::vector<CollisionPair> m_pairs;                  ///< copies of those in m_records
+  CountedVector<std::unique_ptr<PairRecord>> m_records;  ///< in the order added
+  CountedVector<CollisionPair> m_pairs;                  ///< copies of those in m_records
   RevisionCounter m_revisions;
-  std::unordered_map<std::uint64_t, PairRecord*> m_byIds;
+  std::unordered_map<std::uint64_t, PairRecord*, std::hash<std::uint64_t>, std::equal_to<>,
+                     CountedAllocator<std::pair<const std::uint64_t, PairRecord*>>>
+      m_byIds;
 };
 
 std::string nameOf(GeometryId a, GeometryId b);  ///< "pair (3, 4)"

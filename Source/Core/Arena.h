@@ -1,11 +1,15 @@
 #pragma once
 
+#include <palpate/CountedVector.h>
+
+#include <algorithm>
 #include <cstddef>
+#include <exception>
 #include <limits>
-#include <memory>
 #include <new>
 #include <span>
 #include <type_traits>
+#include <utility>
 
 namespace palpate {
 
@@ -22,15 +26,36 @@ class Arena {
   Arena(const Arena&) = delete;
   Arena& operator=(const Arena&) = delete;
 
+  ~Arena() { release(); }
+
   std::size_t bytes() const { return m_bytes; }
+  /// Keeps the elements that start() returned last, and no more memory than they need. Returns
+  /// where they are now. Without memory for a smaller copy they stay where they are.
+  template <class T>
+  std::span<T> shrink(std::span<T> elements) {
+    if (elements.size_bytes() == m_bytes) return elements;
+    Arena smaller;
+    try {
+      const std::span<T> copy = smaller.start<T>(elements.size());
+      std::copy(elements.begin(), elements.end(), copy.begin());
+      std::swap(m_memory, smaller.m_memory);
+      std::swap(m_bytes, smaller.m_bytes);
+      return copy;
+    } catch (const std::exception&) {
+      return elements;
+    }
+  }
+  /// All elements are lost.
+  void release() {
+    freeCounted(std::exchange(m_memory, nullptr), std::exchange(m_bytes, 0), kAlignment);
+  }
 
   /// Reserves so many bytes. If the memory has to grow, all elements are lost, even if this
   /// throws.
   void reserve(std::size_t bytes) {
     if (bytes <= m_bytes) return;
-    m_bytes = 0;
-    m_memory.reset();  // first, so that old and new memory do not exist at the same time
-    m_memory.reset(static_cast<std::byte*>(::operator new (bytes, std::align_val_t{kAlignment})));
+    release();  // first, so that old and new memory do not exist at the same time
+    m_memory = static_cast<std::byte*>(allocateCounted(bytes, kAlignment));
     m_bytes = bytes;
   }
 
@@ -43,17 +68,11 @@ class Arena {
     if (count == 0) return {};
     if (count > std::numeric_limits<std::size_t>::max() / sizeof(T)) throw std::bad_alloc();
     reserve(count * sizeof(T));
-    return {::new (static_cast<void*>(m_memory.get())) T[count], count};
+    return {::new (static_cast<void*>(m_memory)) T[count], count};
   }
 
  private:
-  struct Free {
-    void operator()(std::byte* memory) const {
-      ::operator delete (memory, std::align_val_t{kAlignment});
-    }
-  };
-
-  std::unique_ptr<std::byte, Free> m_memory;
+  std::byte* m_memory = nullptr;
   std::size_t m_bytes = 0;
 };
 

@@ -1,7 +1,8 @@
 #pragma once
 
+#include <palpate/CountedVector.h>
+
 #include <cstddef>
-#include <memory>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -10,7 +11,10 @@ namespace palpate {
 
 /// Leaves new elements uninitialised, so that resize() before overwriting costs nothing.
 template <class T>
-struct UninitializedAllocator : std::allocator<T> {
+struct UninitializedAllocator : CountedAllocator<T> {
+  UninitializedAllocator() = default;
+  template <class U>
+  UninitializedAllocator(const UninitializedAllocator<U>&) {}
   template <class U>
   struct rebind {
     using other = UninitializedAllocator<U>;
@@ -38,6 +42,13 @@ void resizeSparingly(Buffer<T>& buffer, std::size_t size) {
     buffer.reserve(size + size / 8);
   }
   buffer.resize(size);
+}
+
+/// Gives back most of the memory beyond the contents. Without memory for a smaller copy it does
+/// nothing.
+template <class T, class Allocator>
+void releaseSpare(std::vector<T, Allocator>& vector) {
+  if (vector.capacity() > vector.size() + vector.size() / 8) vector.shrink_to_fit();
 }
 
 }  // namespace palpate

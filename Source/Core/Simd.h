@@ -14,6 +14,11 @@
 // Paths: scalar, SSE4, AVX2, AVX-512. SSSE3 and the later AVX-512 sets would not differ here.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
 #endif
+#if defined(__aarch64__) && !defined(TOOLCHAIN_MISS_SYS_AUXV_H)
+// The path is NEON, which every processor has. Without a choice at run time Highway does not ask
+// for the instructions for AES. Vectors of SVE have no size, so that Vector3 cannot hold them.
+#define TOOLCHAIN_MISS_SYS_AUXV_H
+#endif
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 #include <hwy/cache_control.h>

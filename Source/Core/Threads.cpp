@@ -3,6 +3,7 @@
 #include <palpate/Error.h>
 
 #include "Core/FloatingPoint.h"
+#include "Core/MemoryBudget.h"
 #include "Core/Spin.h"
 
 #include <algorithm>
@@ -298,11 +299,13 @@ class ThreadPool final : public Executor {
 /// A loop's function, and the exception of the lowest index that threw one.
 class LoopBody {
  public:
-  LoopBody(void (*call)(void*, std::size_t), void* function) : m_call(call), m_function(function) {}
+  LoopBody(void (*call)(void*, std::size_t), void* function)
+      : m_call(call), m_function(function), m_memory(MemoryScope::current()) {}
 
   void runOne(std::size_t i) noexcept {
     if (i > m_lowestFailed.load(std::memory_order_relaxed)) return;
     const StandardFloatingPoint standard;
+    const MemoryScope memory(m_memory);
     try {
       m_call(m_function, i);
     } catch (...) {
@@ -322,6 +325,7 @@ class LoopBody {
  private:
   void (*m_call)(void*, std::size_t);
   void* m_function;
+  const MemoryScope::Place m_memory;
   std::atomic<std::size_t> m_lowestFailed{std::numeric_limits<std::size_t>::max()};
   std::mutex m_lock;
   std::exception_ptr m_exception;

@@ -19,7 +19,7 @@ void findCandidatesByBruteForce(const MeshPair& meshes, Buffer<ElementPair>& out
       meshes.settings.method == Method::Continuous || meshes.settings.method == Method::Auto;
   const std::vector<Eigen::AlignedBox3d> boxesA = boxesOf(meshes.a, swept),
                                          boxesB = boxesOf(meshes.b, swept);
-  const std::vector<Triangle>& triangles = meshes.a.topology.triangles;
+  const CountedVector<Triangle>& triangles = meshes.a.topology.triangles;
   const auto adjacent = [&](std::uint32_t s, std::uint32_t t) {
     return std::any_of(triangles[s].begin(), triangles[s].end(), [&](std::uint32_t v) {
       return std::find(triangles[t].begin(), triangles[t].end(), v) != triangles[t].end();

@@ -1,5 +1,6 @@
 #include <palpate/Capture.h>
 
+#include "CollisionDetection/SettingsCheck.h"
 #include "Diagnostics/Audit.h"
 #include "Core/FloatingPoint.h"
 #include "Shapes/Shape.h"
@@ -346,6 +347,33 @@ GeometryId add(OctreeBasedCD& detection, const CollisionProblem::Geometry& mesh)
              : detection.addLineMesh(rest, segments, mesh.radii);
 }
 
+void fill(OctreeBasedCD& detection, const CollisionProblem& problem) {
+  for (const CollisionProblem::Geometry& mesh : problem.geometries) {
+    const GeometryId id = add(detection, mesh);
+    const bool isField = mesh.type == GeometryType::Field;
+    if (!mesh.analytical && !isField) detection.setPositions(id, mesh.before, mesh.now);
+    if (mesh.analytical || mesh.field || mesh.proxy)
+      detection.setTransform(id, mesh.rotationBefore, mesh.translationBefore, mesh.rotation,
+                             mesh.translation);
+    detection.setCollisionFilter(id, mesh.filter);
+    detection.setDisabledElements(id, mesh.disabled);
+    if (mesh.field && !isField) detection.attachDistanceField(id, mesh.field);
+    if (mesh.proxy) detection.attachSurfaceProxy(id, mesh.proxy);
+  }
+  for (const CollisionProblem::Pair& pair : problem.pairs)
+    detection.addCollisionPair(GeometryId{pair.a}, GeometryId{pair.b}, pair.settings);
+}
+
+/// Throws what readCapture() would throw.
+void checkReadable(const CollisionProblem& problem) {
+  Settings written;  // those that a capture holds
+  written.engine = problem.settings.engine;
+  written.threads = problem.settings.threads;
+  written.octree = problem.settings.octree;
+  OctreeBasedCD detection(written);
+  fill(detection, problem);
+}
+
 std::string contentOf(const std::filesystem::path& path) {
   std::error_code fault;
   std::ifstream file(path, std::ios::binary);
@@ -359,12 +387,13 @@ std::string contentOf(const std::filesystem::path& path) {
 void writeCapture(const CollisionProblem& problem, const std::filesystem::path& path) {
   const StandardFloatingPoint standard;
   for (const CollisionProblem::Geometry& geometry : problem.geometries)
-    if (geometry.field)
+    if (geometry.field || geometry.proxy)
       throw Error(ErrorCode::NotAvailable,
-                  "geometry " + std::to_string(static_cast<std::uint32_t>(geometry.id)) +
-                      " has a distance field, which a capture cannot hold; "
-                      "CollisionProblem holds it",
+                  "geometry " + std::to_string(static_cast<std::uint32_t>(geometry.id)) + " has " +
+                      (geometry.field ? "a distance field" : "the leaves of a proxy") +
+                      ", which a capture cannot hold; CollisionProblem holds it",
                   geometry.id);
+  checkReadable(problem);
   const std::string text = textOf(problem);
   std::filesystem::path partial = path;
   partial += ".part";
@@ -409,7 +438,11 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
     for (CollisionProblem::Pair& pair : problem.pairs) pair.settings.method = pair.method;
   file.expectEnd();
   try {
+    // The check does not start the threads that the file asks for.
+    checked(problem.settings);
+    const int threads = std::exchange(problem.settings.threads, 1);
     setUp(problem);
+    problem.settings.threads = threads;
   } catch (const Error& error) {
     file.failWhole(error.what());
   }
@@ -419,19 +452,7 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
 OctreeBasedCD setUp(const CollisionProblem& problem) {
   const StandardFloatingPoint standard;
   OctreeBasedCD detection(problem.settings);
-  for (const CollisionProblem::Geometry& mesh : problem.geometries) {
-    const GeometryId id = add(detection, mesh);
-    const bool isField = mesh.type == GeometryType::Field;
-    if (!mesh.analytical && !isField) detection.setPositions(id, mesh.before, mesh.now);
-    if (mesh.analytical || mesh.field)
-      detection.setTransform(id, mesh.rotationBefore, mesh.translationBefore, mesh.rotation,
-                             mesh.translation);
-    detection.setCollisionFilter(id, mesh.filter);
-    detection.setDisabledElements(id, mesh.disabled);
-    if (mesh.field && !isField) detection.attachDistanceField(id, mesh.field);
-  }
-  for (const CollisionProblem::Pair& pair : problem.pairs)
-    detection.addCollisionPair(GeometryId{pair.a}, GeometryId{pair.b}, pair.settings);
+  fill(detection, problem);
   return detection;
 }
 

@@ -29,7 +29,7 @@ class VertexAgainstMesh {
 
   void measure(const MeshPair& pair, const Vector3d& p, std::uint32_t vertex, ContactBuffers& out) {
     m_position = p;
-    const std::vector<Triangle>& triangles = m_mesh.topology.triangles;
+    const CountedVector<Triangle>& triangles = m_mesh.topology.triangles;
     m_answers.assign(triangles.size(), {});
     for (std::uint32_t t = 0; t < triangles.size(); ++t) {
       if (!m_mesh.topology.isEnabled(t) || pair.excludesVertex(vertex, t)) continue;
@@ -150,7 +150,7 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
 
 void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
                   ContactBuffers& out) {
-  const std::vector<Segment>&a = pair.a.topology.edges, &b = pair.b.topology.edges;
+  const CountedVector<Segment>&a = pair.a.topology.edges, &b = pair.b.topology.edges;
   const Features<ImpactQuery::Kind::EdgeEdge> features{pair.a, pair.b};
   StepCheck check(pair, out);
   for (const std::uint32_t i : sample) {
@@ -212,7 +212,7 @@ bool isDistinctOfLines(const MeshPair& pair, const std::array<std::uint32_t, 2>&
 
 void findLineEdges(const MeshPair& pair, std::span<const std::uint32_t> sample,
                    ContactBuffers& out) {
-  const std::vector<Segment>&a = pair.a.topology.edges, &b = pair.b.topology.edges;
+  const CountedVector<Segment>&a = pair.a.topology.edges, &b = pair.b.topology.edges;
   for (const std::uint32_t i : sample)
     for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
       if (pair.b.topology.edgeTriangles[j].empty()) continue;
@@ -246,7 +246,7 @@ void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, Contact
   for (const bool swapped : {false, true}) {
     const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? pair.b : pair.a,
                                                                swapped ? pair.a : pair.b};
-    const std::vector<Triangle>& triangles = features.second.topology.triangles;
+    const CountedVector<Triangle>& triangles = features.second.topology.triangles;
     for (const std::uint32_t v : swapped ? lists.verticesOfB : lists.verticesOfA) {
       for (std::uint32_t t = 0; t < triangles.size(); ++t) {
         if (!features.second.topology.isEnabled(t) || pair.excludesVertex(v, t)) continue;
@@ -324,9 +324,9 @@ void findContactsByBruteForce(const MeshPair& pair, const FeatureLists& features
   if (pair.hasShape())
     return findShapeContacts(pair.mesh(), pair.shape(), pair.settings, features.trianglesOfA, out);
   if (pair.field)
-    return FieldContacts::findByBruteForce(pair.mesh(),
-                                           PlacedField(*pair.field, pair.fieldMesh->now),
-                                           pair.settings, features.trianglesOfA, out);
+    return FieldContacts::findByBruteForce(
+        pair.mesh(), PlacedField(*pair.field, pair.fieldMesh->now), pair.settings.contacts,
+        pair.thicknessAtEnd(), features.trianglesOfA, out);
   const Method method = pair.settings.method;
   if (method == Method::Intersection) return findIntersections(pair, features, out);
   if (method == Method::Continuous) return findImpacts(pair, features, out);

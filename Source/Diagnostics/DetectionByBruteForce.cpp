@@ -22,4 +22,11 @@ void detectPairByBruteForce(const PairRecord& record, ContactBuffers& contacts,
   findContactsByBruteForce(meshes, intersections);
 }
 
+void detectVerticesByBruteForce(const PairRecord& record, std::span<const std::uint32_t> vertices,
+                                ContactBuffers& contacts) {
+  FeatureLists features;
+  features.verticesOfA.assign(vertices.begin(), vertices.end());
+  findContactsByBruteForce(record.meshes(), features, contacts);
+}
+
 }  // namespace palpate

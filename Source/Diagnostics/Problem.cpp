@@ -1,32 +1,43 @@
 #include "CollisionDetection/DiagnosticsInterface.h"
 
+#include <span>
 #include <unordered_map>
+#include <vector>
 
 namespace palpate {
 
 namespace {
+
+template <class T>
+void copyTo(std::vector<T>& out, std::span<const T> from) {
+  out.assign(from.begin(), from.end());
+}
 
 CollisionProblem::Geometry meshOf(const Geometry& geometry) {
   const TriangleMesh& mesh = geometry.mesh;
   CollisionProblem::Geometry copy;
   copy.id = geometry.id;
   copy.type = mesh.topology.type;
-  copy.radii = mesh.radii;
+  copyTo<double>(copy.radii, mesh.radii);
   copy.filter = geometry.filter;
-  copy.disabled = mesh.topology.disabled;
+  copyTo<std::uint32_t>(copy.disabled, mesh.topology.disabled);
   if (geometry.shape) copy.analytical = geometry.shape->analytical;
   copy.field = geometry.field;
-  if (geometry.field && !geometry.isField()) {
-    copy.before.assign(mesh.before.body().begin(), mesh.before.body().end());
-    copy.now.assign(mesh.now.body().begin(), mesh.now.body().end());
+  if (geometry.proxy) copy.proxy = geometry.proxySettings;
+  if (geometry.isShapeFixed()) {
+    copyTo(copy.before, mesh.before.body());
+    copyTo(copy.now, mesh.now.body());
   } else if (!geometry.shape)
     copy.before = mesh.before.all(), copy.now = mesh.now.all();
   const RigidTransform &before = mesh.before.transform(), &now = mesh.now.transform();
   copy.rotation = now.rotation, copy.translation = now.translation;
   copy.rotationBefore = before.rotation, copy.translationBefore = before.translation;
-  if (copy.type != GeometryType::Points) copy.triangles = mesh.topology.triangles;
+  if (copy.type != GeometryType::Points) copyTo<Triangle>(copy.triangles, mesh.topology.triangles);
   if (copy.radii.empty() && mesh.largestRadius > 0.0) copy.radii = {mesh.largestRadius};
-  if (geometry.solid) copy.tetrahedra = geometry.solid->topology.tetrahedra, copy.rest = mesh.rest;
+  if (geometry.solid) {
+    copyTo<Tetrahedron>(copy.tetrahedra, geometry.solid->topology.tetrahedra);
+    copyTo<Eigen::Vector3d>(copy.rest, mesh.rest);
+  }
   return copy;
 }
 
@@ -36,6 +47,7 @@ CollisionProblem problemOf(const Settings& settings, const GeometryTable& geomet
                            const PairTable& pairs) {
   CollisionProblem problem{settings, {}, {}};
   problem.settings.executor = nullptr;
+  problem.settings.memoryLimit = 0;
   std::unordered_map<const Geometry*, std::uint32_t> indices;
   for (const auto& geometry : geometries.all()) {
     indices.emplace(geometry.get(), static_cast<std::uint32_t>(indices.size()));
@@ -43,9 +55,11 @@ CollisionProblem problemOf(const Settings& settings, const GeometryTable& geomet
   }
   for (const auto& record : pairs.records()) {
     problem.pairs.push_back({indices.at(record->a), indices.at(record->b), record->pair.settings,
-                             record->plan.method, static_cast<bool>(record->predicate)});
+                             record->plan.byProxy ? Method::Proxy : record->plan.method,
+                             static_cast<bool>(record->predicate)});
     if (record->pair.settings.restDistance > 0.0)
-      problem.geometries[problem.pairs.back().a].rest = record->a->mesh.rest;
+      copyTo<Eigen::Vector3d>(problem.geometries[problem.pairs.back().a].rest,
+                              record->a->mesh.rest);
   }
   return problem;
 }

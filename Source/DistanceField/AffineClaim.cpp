@@ -64,8 +64,7 @@ struct BoxesInLanes {
 class SideInLanes {
  public:
   HWY_ATTR HWY_INLINE SideInLanes(const AffineClaim& claim, const AffineClaim::Side& side)
-      : m_side(side),
-        m_normal(spread(side.normal)),
+      : m_normal(spread(side.normal)),
         m_halfSide(hn::Set(d, claim.halfSide)),
         m_atCentre(hn::Set(d, side.atCentre)),
         m_level(hn::Set(d, claim.level)),
@@ -157,7 +156,6 @@ class SideInLanes {
   }
 
   static constexpr SetTag d{};
-  const AffineClaim::Side& m_side;
   const Vectors m_normal;
   const V m_halfSide, m_atCentre, m_level, m_error;
 };

@@ -5,7 +5,6 @@
 #include "DistanceField/AffineClaim.h"
 #include "DistanceField/NearestTriangle.h"
 #include "Math/Tolerances.h"
-#include "Queries/Containment.h"
 
 #include <algorithm>
 #include <cmath>
@@ -18,8 +17,9 @@ using Eigen::Vector3d;
 
 double InterpolatedCell::halfDiagonal() const { return std::numbers::sqrt3 * halfSide; }
 
-CellCertifier::CellCertifier(const SearchableGeometry& geometry, double tolerance)
-    : m_geometry(geometry), m_tolerance(tolerance) {
+CellCertifier::CellCertifier(const SearchableGeometry& geometry, const SurfaceSign& sign,
+                             double tolerance)
+    : m_geometry(geometry), m_sign(sign), m_tolerance(tolerance) {
   const FloatBox box = geometry.tree.octree().box(0);
   float reach = 0;
   for (int k = 0; k < 3; ++k) reach = std::max({reach, -box.lower[k], box.upper[k]});
@@ -69,7 +69,7 @@ bool CellCertifier::isPositiveInPlane(const InterpolatedCell& cell, const Vector
     if (std::abs(height) + error < std::abs(cell.values[i]) * (1.0 - kStoredError) - m_tolerance)
       return cell.values[i] > 0;
   }
-  return !isInside(m_geometry, cell.centre + (level - middle) * normal, {}, Engine::Octree, stack);
+  return !m_sign.isInside(cell.centre + (level - middle) * normal, stack);
 }
 
 bool CellCertifier::isWithin(const InterpolatedCell& cell, double bound,
@@ -78,12 +78,16 @@ bool CellCertifier::isWithin(const InterpolatedCell& cell, double bound,
   if (radius <= bound) return true;
   const auto [least, most] = magnitudesOf(cell);
   const bool isFree = least > radius;  // of the surface
-  const bool isOutside = cell.values[0] > 0;
+  const bool isOutside = cell.values[0] > 0 || !cell.isSigned;
   AffineClaim affine;
   affine.sides[0].isWanted = affine.sides[1].isWanted = true;
+  if (!cell.isSigned) {
+    if (!isNearTriangle(cell, bound)) return false;
+    affine.sides[1].isWanted = false;
+  }
   if (const double distance = most - radius; distance > radius) {
     if (radius * radius <= 2.0 * distance * bound) affine.sides[isOutside ? 0 : 1].isWanted = false;
-    if (radius * radius <= 4.0 * distance * bound && isNearTriangle(cell, bound))
+    if (cell.isSigned && radius * radius <= 4.0 * distance * bound && isNearTriangle(cell, bound))
       affine.sides[isOutside ? 1 : 0].isWanted = false;
     if (!affine.sides[0].isWanted && !affine.sides[1].isWanted) return true;
   }
@@ -118,11 +122,15 @@ bool CellCertifier::isWithin(const InterpolatedCell& cell, double bound,
     for (int k = 0; k < 3; ++k) side.normal[k] = sign * normal[k];
     side.atCentre = sign * middle;
     side.needsDistance = side.atCentre + rise + affine.error > affine.level;
-    side.needsCrossing = !(isFree && isOutside == (i == 0));
+    side.needsCrossing = cell.isSigned && !(isFree && isOutside == (i == 0));
     if (!side.isWanted) continue;
     reach = std::max(
         {reach, std::abs(affine.level - side.atCentre), side.atCentre + rise - affine.level});
     if (!side.needsCrossing) continue;
+    const double toPlane = std::abs(affine.level - side.atCentre) + affine.error;
+    if (m_sign.in(cell.centre, radius + toPlane / frame.scale, stack) !=
+        SurfaceSign::Reliability::Reliable)
+      return false;
     const bool isPositive =
         isPositiveInPlane(cell, normal, 0.5 * (low + high), sign * affine.level / frame.scale,
                           affine.error / frame.scale, stack);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "DistanceField/SurfaceSign.h"
 #include "Octree/PointQueries.h"
 #include "Queries/SearchableGeometry.h"
 
@@ -21,19 +22,22 @@ inline Eigen::Vector3d cornerOf(std::size_t octant, double halfSide) {
 struct InterpolatedCell {
   Eigen::Vector3d centre;        ///< L
   double halfSide;               ///< L
-  std::array<double, 8> values;  ///< L: signed distances from the surface
+  std::array<double, 8> values;  ///< L: distances from the surface
+  /// Whether the values are negative inside, and the sign changes in the cell at triangles only.
+  /// Otherwise they have no sign.
+  bool isSigned;
   /// A triangle that is near the cell, by its place in the octree's order. Any place is valid.
   std::uint32_t nearTriangle;
 
   double halfDiagonal() const;  ///< L
 };
 
-/// Proves bounds on the error of trilinear interpolation of the signed distance from a closed mesh.
+/// Proves bounds on the error of trilinear interpolation of the distance from a mesh.
 /// Docs/DistanceFields.md has the theorems and their proofs.
 class CellCertifier {
  public:
   /// The geometry's octree must be up to date. tolerance: L; the error of distances at corners.
-  CellCertifier(const SearchableGeometry&, double tolerance);
+  CellCertifier(const SearchableGeometry&, const SurfaceSign&, double tolerance);
 
   /// Whether the interpolated distance is certainly within `bound` of the exact one in the whole
   /// cell. The values may be rounded to float; `bound` must include neither that rounding nor the
@@ -49,6 +53,7 @@ class CellCertifier {
                          double level, double error, PointQueryStack&) const;
 
   const SearchableGeometry& m_geometry;
+  const SurfaceSign& m_sign;
   const double m_tolerance;  ///< L
   double m_reach;            ///< in the octree's floats: the largest coordinate
 };

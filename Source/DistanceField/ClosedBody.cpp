@@ -3,6 +3,7 @@
 #include <palpate/Error.h>
 
 #include "Core/Text.h"
+#include "Math/Range.h"
 #include "Mesh/FloatPositions.h"
 #include "Queries/Containment.h"
 
@@ -25,10 +26,10 @@ void checkMesh(const TriangleMeshView& mesh, GeometryId id) {
                     " triangles; at most 2^28 of each are supported",
                 id);
   for (std::size_t v = 0; v < mesh.positions.size(); ++v)
-    if (!(mesh.positions[v].cwiseAbs().array() <= 0x1p1000).all())
+    if (!isWithinRange(mesh.positions[v]))
       throw Error(ErrorCode::NonFinitePosition,
                   nameOf(id) + ", vertex " + std::to_string(v) + " is " +
-                      textOf(mesh.positions[v]) + "; it must be finite and at most 2^1000",
+                      textOf(mesh.positions[v]) + "; it must be " + kRangeRule,
                   id, v);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     for (const std::uint32_t vertex : mesh.triangles[t])
@@ -57,12 +58,16 @@ void setMesh(std::span<const Eigen::Vector3d> positions, std::span<const Triangl
 }  // namespace
 
 void makeClosedBody(const TriangleMeshView& mesh, const Threads& threads, SearchableGeometry& out) {
-  checkMesh(mesh, out.id);
-  setMesh(mesh.positions, mesh.triangles, out);
+  makeCheckedBody(mesh, threads, out);
   checkInside(out, InsideRule::Closed);
+}
+
+void makeCheckedBody(const TriangleMeshView& mesh, const Threads& threads,
+                     SearchableGeometry& out) {
+  checkMesh(mesh, out.id);
   if (mesh.triangles.empty())
     throw Error(ErrorCode::NotClosed, nameOf(out.id) + " has no triangles", out.id);
-  buildTree(threads, out);
+  makeBody(mesh.positions, mesh.triangles, threads, out);
 }
 
 void makeBody(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles,
@@ -72,9 +77,9 @@ void makeBody(std::span<const Eigen::Vector3d> positions, std::span<const Triang
 }
 
 void checkPositive(double length, const char* name) {
-  if (!(length > 0.0) || std::isinf(length))
-    throw Error(ErrorCode::InvalidSettings,
-                std::string(name) + " is " + textOf(length) + "; it must be positive and finite");
+  if (!(length > 0.0) || !isWithinRange(length))
+    throw Error(ErrorCode::InvalidSettings, std::string(name) + " is " + textOf(length) +
+                                                "; it must be positive and at most 1e+300");
 }
 
 void checkThreads(int threads) {

@@ -9,14 +9,16 @@ namespace palpate {
 
 /// Makes a geometry of a mesh that has an inside, with its octree.
 ///
-/// Errors   NonFinitePosition, also for a coordinate beyond 2^1000; IndexOutOfRange; TooLarge for
+/// Errors   NonFinitePosition, also for one beyond kLargestMeasure; IndexOutOfRange; TooLarge for
 ///          more than 2^28 vertices or triangles; NotClosed, also without triangles.
 void makeClosedBody(const TriangleMeshView&, const Threads&, SearchableGeometry& out);
-/// The same without the checks, for a mesh that may be open.
+/// The same for a mesh that may be open. Throws NotClosed only for one without triangles.
+void makeCheckedBody(const TriangleMeshView&, const Threads&, SearchableGeometry& out);
+/// The same without checks.
 void makeBody(std::span<const Eigen::Vector3d>, std::span<const Triangle>, const Threads&,
               SearchableGeometry& out);
 
-/// Throws InvalidSettings unless a setting is positive and finite.
+/// Throws InvalidSettings unless a setting is positive and at most kLargestMeasure.
 void checkPositive(double length, const char* name);
 /// Throws InvalidSettings for a number of threads out of range.
 void checkThreads(int threads);

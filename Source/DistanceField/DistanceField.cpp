@@ -4,11 +4,13 @@
 
 #include "Core/FloatingPoint.h"
 #include "Core/Text.h"
+#include "Math/Range.h"
 #include "Core/Threads.h"
 #include "DistanceField/ClosedBody.h"
 #include "DistanceField/FieldBuilder.h"
 #include "DistanceField/FieldCells.h"
 #include "DistanceField/FieldFile.h"
+#include "Queries/Containment.h"
 #include "Queries/SearchableGeometry.h"
 
 #include <string>
@@ -28,8 +30,9 @@ struct DistanceField::Implementation {
 namespace {
 
 void checkPoint(const Eigen::Vector3d& point, const char* name) {
-  if (!point.allFinite())
-    throw Error(ErrorCode::NonFinitePosition, std::string(name) + " is " + textOf(point));
+  if (!isWithinRange(point))
+    throw Error(ErrorCode::NonFinitePosition,
+                std::string(name) + " is " + textOf(point) + "; it must be " + kRangeRule);
 }
 
 }  // namespace
@@ -51,10 +54,14 @@ DistanceField DistanceField::build(const TriangleMeshView& mesh,
   checkThreads(settings.threads);
   const Threads threads(settings.threads);
   SearchableGeometry body(GeometryId{0});
-  makeClosedBody(mesh, threads, body);
-  return DistanceField(std::make_shared<const Implementation>(buildField(body, settings, threads)));
+  makeCheckedBody(mesh, threads, body);
+  const bool closed = palpate::isClosed(body);
+  if (!closed) body.windingNumbers.update(body, threads);
+  return DistanceField(
+      std::make_shared<const Implementation>(buildField(body, closed, settings, threads)));
 }
 
+bool DistanceField::isClosed() const { return valid().cells.isClosed; }
 double DistanceField::errorBound() const { return valid().cells.errorBound; }
 double DistanceField::band() const { return valid().cells.band; }
 std::size_t DistanceField::cells() const { return valid().cells.leaves.size(); }
@@ -65,6 +72,13 @@ double DistanceField::value(const Eigen::Vector3d& point) const {
   const StandardFloatingPoint standard;
   checkPoint(point, "the point");
   return StandardFloatingPoint::evaluated(field.lookup.value(point));
+}
+
+bool DistanceField::signIsReliable(const Eigen::Vector3d& point) const {
+  const Implementation& field = valid();
+  const StandardFloatingPoint standard;
+  checkPoint(point, "the point");
+  return field.lookup.signIsReliable(point);
 }
 
 Eigen::Vector3d DistanceField::gradient(const Eigen::Vector3d& point) const {
@@ -82,7 +96,7 @@ void DistanceField::values(std::span<const Eigen::Vector3d> points, std::span<do
                                                 " points, but room for " +
                                                 std::to_string(out.size()) + " answers");
   for (std::size_t i = 0; i < points.size(); ++i)
-    if (!points[i].allFinite()) checkPoint(points[i], ("point " + std::to_string(i)).c_str());
+    if (!isWithinRange(points[i])) checkPoint(points[i], ("point " + std::to_string(i)).c_str());
   field.lookup.values(points, out.data());
 }
 

@@ -6,14 +6,15 @@
 #include "DistanceField/CellCertifier.h"
 #include "DistanceField/CornerTable.h"
 #include "DistanceField/NearestTriangle.h"
+#include "DistanceField/SurfaceSign.h"
 #include "Math/Tolerances.h"
-#include "Queries/Containment.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <span>
 #include <string>
 #include <vector>
@@ -30,19 +31,22 @@ constexpr std::uint32_t kNone = 0xffffffff;
 constexpr double kShareOfCells = 0.96;
 constexpr std::size_t kSlice = 1 << 14;  ///< points or cells between two calls of `progress`
 constexpr std::size_t kGrain = 64;
+/// Cells on lower levels are split where only some of their points may have a reliable sign.
+constexpr int kSignLevel = 2;
 
 constexpr std::uint32_t sideOf(int level) { return 1u << (kMostLevels - level); }
 
 class FieldBuilder {
  public:
-  FieldBuilder(const SearchableGeometry& geometry, const DistanceFieldSettings& settings,
-               const Threads& threads)
+  FieldBuilder(const SearchableGeometry& geometry, bool isClosed,
+               const DistanceFieldSettings& settings, const Threads& threads)
       : m_geometry(geometry),
         m_settings(settings),
         m_threads(threads),
         m_tolerance(kCornerError * std::min(settings.errorBound, settings.band)),
+        m_sign(geometry, isClosed),
         m_nearestTriangle(geometry, m_tolerance),
-        m_certifier(geometry, m_tolerance) {
+        m_certifier(geometry, m_sign, m_tolerance) {
     chooseDomain();
   }
 
@@ -72,9 +76,12 @@ class FieldBuilder {
     float allowed = 0;  ///< units: the deviation of corners up to which the bound is proven
     std::uint8_t level = 0;
     State state = State::Split;
-    bool isOff = false;  ///< the deviation of its corners is larger than allowed
+    bool isOff = false;       ///< the deviation of its corners is larger than allowed
+    bool isReliable = false;  ///< the sign in all of it; otherwise its values have none
 
-    bool hasValues() const { return state == State::Certified || state == State::Adjusted; }
+    bool isLeaf() const { return state == State::Certified || state == State::Adjusted; }
+    /// Whether its neighbours have the same values where they meet.
+    bool isJoined() const { return isLeaf() && isReliable; }
   };
 
   void chooseDomain() {
@@ -98,6 +105,8 @@ class FieldBuilder {
                       textOf(largest) + ", the largest coordinate");
     m_field.errorBound = m_settings.errorBound;
     m_field.band = m_settings.band;
+    m_field.isClosed = m_sign.isClosed();
+    m_field.unreliableMargin = std::max(0.0, m_sign.reach() - m_settings.band);
     m_field.exponent = std::ilogb(longest) - 3;
     m_unit = std::ldexp(1.0, m_field.exponent);
     for (int k = 0; k < 3; ++k) {
@@ -116,13 +125,19 @@ class FieldBuilder {
     return m_origin + std::ldexp(m_unit, -kMostLevels) * Vector3d(corner[0], corner[1], corner[2]);
   }
   double halfSideOf(const Cell& cell) const { return std::ldexp(0.5 * m_unit, -cell.level); }
+  /// values: of all corners, with signs.
+  static float valueAt(const Cell& cell, std::size_t corner, const std::vector<float>& values) {
+    const float value = values[cell.corners[corner]];
+    return cell.isReliable ? value : std::abs(value);
+  }
   InterpolatedCell interpolatedCell(const Cell& cell) const {
     InterpolatedCell result;
+    result.isSigned = cell.isReliable;
     result.halfSide = halfSideOf(cell);
     result.centre = positionOf(m_corners[cell.corners[0]]) + Vector3d::Constant(result.halfSide);
     std::size_t nearest = 0;
     for (std::size_t i = 0; i < 8; ++i) {
-      result.values[i] = m_distances[cell.corners[i]] * m_unit;
+      result.values[i] = valueAt(cell, i, m_distances) * m_unit;
       if (std::abs(result.values[i]) < std::abs(result.values[nearest])) nearest = i;
     }
     result.nearTriangle = m_nearest[cell.corners[nearest]];
@@ -141,7 +156,7 @@ class FieldBuilder {
             corners[i] = cornerAt({(x + (i & 1)) * sideOf(0), (y + (i >> 1 & 1)) * sideOf(0),
                                    (z + (i >> 2)) * sideOf(0)},
                                   kNone);
-          addCell(corners, 0);
+          addCell(corners, 0, m_sign.isClosed());
         }
   }
   /// parent: the cell that is split, or kNone.
@@ -153,8 +168,9 @@ class FieldBuilder {
     }
     return number;
   }
-  void addCell(const std::array<std::uint32_t, 8>& corners, int level) {
+  void addCell(const std::array<std::uint32_t, 8>& corners, int level, bool isReliable) {
     Cell cell{corners};
+    cell.isReliable = isReliable;
     cell.level = static_cast<std::uint8_t>(level);
     for (unsigned i = 0; i < 8; ++i)
       m_covered[corners[i]] = static_cast<std::uint8_t>(m_covered[corners[i]] | 1u << (7 - i));
@@ -184,7 +200,7 @@ class FieldBuilder {
           at += ((child >> k & 1) + (i >> k & 1)) * step;
         ofChild[i] = corners[at];
       }
-      addCell(ofChild, cell.level + 1);
+      addCell(ofChild, cell.level + 1, cell.isReliable);
     }
   }
   /// Evaluates, tests and splits the cells from `first` on.
@@ -205,11 +221,22 @@ class FieldBuilder {
       first = end;
     }
   }
-  State test(const Cell& cell, PointQueryStack& stack) const {
+  State test(Cell& cell, PointQueryStack& stack) const {
+    if (!findSign(cell, stack)) return State::Split;
     const InterpolatedCell interpolated = interpolatedCell(cell);
     if (m_certifier.isBeyond(interpolated, m_settings.band)) return State::Beyond;
     const bool isWithin = m_certifier.isWithin(interpolated, kShareOfCells * m_bound, stack);
     return isWithin ? State::Certified : State::Split;
+  }
+  /// Finds whether the cell has a reliable sign. Returns false if it has to be split to know more.
+  bool findSign(Cell& cell, PointQueryStack& stack) const {
+    if (cell.isReliable) return true;
+    const double half = halfSideOf(cell);
+    const Vector3d centre = positionOf(m_corners[cell.corners[0]]) + Vector3d::Constant(half);
+    const auto reliability =
+        m_sign.in(centre, std::numbers::sqrt3 * half * (1.0 + kFieldError), stack);
+    cell.isReliable = reliability == SurfaceSign::Reliability::Reliable;
+    return cell.level >= kSignLevel || reliability != SurfaceSign::Reliability::Unknown;
   }
   /// Of all corners that are new.
   void evaluateCorners() {
@@ -224,19 +251,20 @@ class FieldBuilder {
   void evaluate(std::size_t i, PointQueryStack& stack) {
     const Vector3d point = positionOf(m_corners[i]);
     std::array<std::uint32_t, 8> likely{};
-    // The sign changes only at the surface.
+    // Where it is reliable, the sign changes only at the surface.
     int sign = 0;
     if (const std::uint32_t parent = m_parents[i]; parent != kNone)
       for (std::size_t k = 0; k < 8; ++k) {
         const std::uint32_t corner = m_cells[parent].corners[k];
         likely[k] = m_nearest[corner];
+        if (!m_cells[parent].isReliable) continue;
         const double distance = std::abs(m_distances[corner]) * m_unit;
         if ((point - positionOf(m_corners[corner])).norm() < 0.999 * distance - m_tolerance)
           sign = m_distances[corner] < 0.0f ? -1 : 1;
       }
     const auto near =
         m_nearestTriangle.at(point, std::span(likely).first(m_parents[i] == kNone ? 1 : 8));
-    if (sign == 0) sign = isInside(m_geometry, point, {}, Engine::Octree, stack) ? -1 : 1;
+    if (sign == 0) sign = m_sign.isInside(point, stack) ? -1 : 1;
     m_distances[i] = static_cast<float>(sign * near.distance / m_unit);
     m_nearest[i] = near.place;
   }
@@ -309,7 +337,7 @@ class FieldBuilder {
     return index;
   }
   /// The largest cell with values that the corner touches other than with a corner, or kNone. The
-  /// corner hangs on it.
+  /// corner hangs on it, unless its values have no sign.
   std::uint32_t largestAround(std::uint32_t number) const {
     std::uint32_t largest = kNone;
     if (m_covered[number] == 0xff) return largest;
@@ -317,7 +345,7 @@ class FieldBuilder {
     for (std::uint32_t octant = 0; octant < 8; ++octant) {
       if (m_covered[number] >> octant & 1) continue;
       const std::uint32_t index = leafAround(corner, octant);
-      if (index == kNone || !m_cells[index].hasValues()) continue;
+      if (index == kNone || !m_cells[index].isJoined()) continue;
       if (largest == kNone || m_cells[index].level < m_cells[largest].level) largest = index;
     }
     return largest;
@@ -408,7 +436,7 @@ class FieldBuilder {
   }
   /// Whether a cell's error and the deviation of its values are together within the bound.
   bool isAllowed(Cell& cell, PointQueryStack& stack) const {
-    if (cell.state != State::Certified) return true;
+    if (cell.state != State::Certified || !cell.isReliable) return true;
     const double deviation = deviationOf(cell);
     if (deviation <= cell.allowed) return true;
     auto share = static_cast<float>(deviation);
@@ -424,7 +452,7 @@ class FieldBuilder {
   void adjustCellsBeyond(std::size_t first) {
     std::array<std::vector<std::uint32_t>, kMostLevels + 1> byLevel;
     for (std::size_t i = first; i < m_cells.size(); ++i)
-      if (m_cells[i].state == State::Beyond)
+      if (m_cells[i].state == State::Beyond && m_cells[i].isReliable)
         byLevel[m_cells[i].level].push_back(static_cast<std::uint32_t>(i));
     for (const std::vector<std::uint32_t>& cells : byLevel)
       for (const std::uint32_t i : cells) {
@@ -441,10 +469,10 @@ class FieldBuilder {
 
   FieldCells assemble() {
     std::size_t leaves = 0, blocks = 0;
-    for (const Cell& cell : m_cells) leaves += cell.hasValues(), blocks += cell.children != kNone;
+    for (const Cell& cell : m_cells) leaves += cell.isLeaf(), blocks += cell.children != kNone;
     if (std::max(leaves, blocks) >= CellEntry::kMostIndices)
       throw Error(ErrorCode::TooLarge, "the distance field has " + std::to_string(leaves) +
-                                           " cells; at most 2^30 are supported");
+                                           " cells; at most 2^29 are supported");
     const std::size_t roots = std::size_t{m_field.size[0]} * m_field.size[1] * m_field.size[2];
     checkMemory(leaves * sizeof(FieldCells::Leaf) + blocks * sizeof(FieldCells::Block) +
                 roots * sizeof(CellEntry));
@@ -462,19 +490,23 @@ class FieldBuilder {
         const CellEntry child = number(m_cells[cell.children + i]);
         m_field.blocks[block][i] = child;
       }
-      return CellEntry::of(CellKind::Block, block);
+      return CellEntry::of(CellKind::Block, true, block);
     }
     if (cell.state == State::Beyond)
-      return CellEntry::of(m_distances[cell.corners[0]] < 0 ? CellKind::Inside : CellKind::Outside);
+      return CellEntry::of(valueAt(cell, 0, m_distances) < 0 ? CellKind::Inside : CellKind::Outside,
+                           cell.isReliable);
     FieldCells::Leaf& leaf = m_field.leaves.emplace_back();
-    for (std::uint32_t i = 0; i < 8; ++i) leaf[i] = m_values[cell.corners[i]];
-    return CellEntry::of(CellKind::Leaf, static_cast<std::uint32_t>(m_field.leaves.size() - 1));
+    const std::vector<float>& values = cell.isReliable ? m_values : m_distances;
+    for (std::uint32_t i = 0; i < 8; ++i) leaf[i] = valueAt(cell, i, values);
+    return CellEntry::of(CellKind::Leaf, cell.isReliable,
+                         static_cast<std::uint32_t>(m_field.leaves.size() - 1));
   }
 
   const SearchableGeometry& m_geometry;
   const DistanceFieldSettings& m_settings;
   const Threads& m_threads;
   const double m_tolerance;  ///< L: the error of distances at corners
+  const SurfaceSign m_sign;
   const NearestTriangle m_nearestTriangle;
   const CellCertifier m_certifier;
   FieldCells m_field;
@@ -501,9 +533,9 @@ class FieldBuilder {
 
 }  // namespace
 
-FieldCells buildField(const SearchableGeometry& geometry, const DistanceFieldSettings& settings,
-                      const Threads& threads) {
-  return FieldBuilder(geometry, settings, threads).build();
+FieldCells buildField(const SearchableGeometry& geometry, bool isClosed,
+                      const DistanceFieldSettings& settings, const Threads& threads) {
+  return FieldBuilder(geometry, isClosed, settings, threads).build();
 }
 
 }  // namespace palpate

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "Math/StableLength.h"
+
 #include <Eigen/Core>
 
 #include <algorithm>
@@ -12,7 +14,7 @@
 
 namespace palpate {
 
-/// What a cell of a field is: the two upper bits of its entry.
+/// What a cell of a field is: the upper two bits of its entry.
 enum class CellKind : std::uint32_t {
   Block,    ///< it has eight children; the entry's index is that of their block
   Leaf,     ///< it has corner values; the index is that of the leaf
@@ -20,16 +22,19 @@ enum class CellKind : std::uint32_t {
   Inside,   ///< the same inside
 };
 
-/// A cell: its kind, and the index of its block or leaf.
+/// A cell: its kind, whether its sign is unreliable, and the index of its block or leaf.
 struct CellEntry {
-  static constexpr std::uint32_t kIndexBits = 30, kMostIndices = 1u << kIndexBits;
+  static constexpr std::uint32_t kKindShift = 30, kUnreliable = 1u << 29, kMostIndices = 1u << 29;
 
   std::uint32_t bits = 0;
 
-  static CellEntry of(CellKind kind, std::uint32_t index = 0) {
-    return {static_cast<std::uint32_t>(kind) << kIndexBits | index};
+  static CellEntry of(CellKind kind, bool isReliable = true, std::uint32_t index = 0) {
+    return {static_cast<std::uint32_t>(kind) << kKindShift | (isReliable ? 0 : kUnreliable) |
+            index};
   }
-  CellKind kind() const { return static_cast<CellKind>(bits >> kIndexBits); }
+  CellKind kind() const { return static_cast<CellKind>(bits >> kKindShift); }
+  /// False only in a leaf without negative values, or in a cell outside.
+  bool isReliable() const { return (bits & kUnreliable) == 0; }
   std::uint32_t index() const { return bits & (kMostIndices - 1); }
 };
 
@@ -54,8 +59,10 @@ struct FieldCells {
   int exponent = 0;                            ///< a unit is 2^exponent L
   std::array<std::int64_t, 3> origin{};        ///< units
   std::array<std::uint32_t, 3> size{1, 1, 1};  ///< root cells along each axis
-  std::vector<CellEntry> roots;                ///< x runs fastest
-  std::vector<Block> blocks;                   ///< the children of a block come after it
+  bool isClosed = true;                        ///< whether all signs are reliable
+  double unreliableMargin = 0.0;  ///< L: around the domain; the sign is reliable further away
+  std::vector<CellEntry> roots;   ///< x runs fastest
+  std::vector<Block> blocks;      ///< the children of a block come after it
   std::vector<Leaf> leaves;
 
   std::size_t bytes() const {
@@ -96,7 +103,7 @@ class FieldLookup {
   double value(const Eigen::Vector3d& point) const {
     const Place place = at(point);
     const double inDomain = m_frame.unit * clamped(interpolate(place));
-    return place.isOutside ? inDomain + outsideOf(point).stableNorm() : inDomain;
+    return place.isOutside ? inDomain + stableLength(outsideOf(point)) : inDomain;
   }
   /// L: value(), but in a cell beyond the band, outside, the band and the distance from the cell's
   /// faces. The surface is at least that far away, as all points of the cell are beyond the band.
@@ -105,8 +112,14 @@ class FieldLookup {
     if (place.entry.kind() != CellKind::Outside) return value(point);
     double inside = 1.0;
     for (const double t : place.t) inside = std::fmin(inside, std::fmin(t, 1.0 - t));
-    const double beyond = place.isOutside ? outsideOf(point).stableNorm() : 0.0;
+    const double beyond = place.isOutside ? stableLength(outsideOf(point)) : 0.0;
     return m_frame.unit * (m_frame.band + inside / place.perSide) + beyond;
+  }
+  bool signIsReliable(const Eigen::Vector3d& point) const {
+    if (m_cells.isClosed) return true;
+    const Place place = at(point);
+    return place.isOutside ? stableLength(outsideOf(point)) > m_cells.unreliableMargin
+                           : place.entry.isReliable();
   }
   Eigen::Vector3d gradient(const Eigen::Vector3d& point) const {
     const Place place = at(point);

@@ -28,6 +28,7 @@ PlacedField::PlacedField(const DistanceField& field, const Positions& body)
     : m_field(field), m_lookup(field.lookup()) {
   if (!body.isPlaced()) return;
   m_pose = {orthonormal(body.transform().rotation), body.transform().translation};
+  m_turned = (body.transform().rotation - m_pose.rotation).norm();
 }
 
 Vector3d PlacedField::inField(const Vector3d& world) const {
@@ -66,6 +67,17 @@ Eigen::AlignedBox3d PlacedField::domain() const {
   return {box.min() - Vector3d::Constant(error), box.max() + Vector3d::Constant(error)};
 }
 
+double PlacedField::placementError() const {
+  const FieldCells& cells = m_lookup.cells();
+  Vector3d furthest;  // a corner of the domain, which holds the mesh
+  for (int k = 0; k < 3; ++k) {
+    const auto lower = static_cast<double>(cells.origin[k]), upper = lower + cells.size[k];
+    furthest[k] = std::ldexp(std::max(std::abs(lower), std::abs(upper)), cells.exponent);
+  }
+  const double size = furthest.norm();
+  return m_turned * size + kShapeBoundError * (size + m_pose.translation.cwiseAbs().maxCoeff());
+}
+
 double reachOf(const DistanceField& field) { return field.band() - field.errorBound(); }
 
 double depthToleranceOf(const DistanceField& field) {
@@ -80,13 +92,13 @@ constexpr double kNone = std::numeric_limits<double>::infinity();
 class FeaturesNearField {
  public:
   /// skips: passes over edges and triangles that bounds exclude.
-  FeaturesNearField(const TriangleMesh& mesh, const PlacedField& field,
-                    const PairSettings& settings, bool skips, ShapeContactBuffers& out)
+  FeaturesNearField(const TriangleMesh& mesh, const PlacedField& field, Contacts contacts,
+                    double thickness, bool skips, ShapeContactBuffers& out)
       : m_mesh(mesh),
         m_field(field),
-        m_thickness(settings.thickness),
-        m_reportsAll(settings.contacts == Contacts::All),
-        m_skips(skips),
+        m_thickness(thickness),
+        m_reportsAll(contacts == Contacts::All),
+        m_skips(skips && field.field().isClosed()),
         m_reach(reachOf(field.field())),
         m_band(field.field().band()),
         m_tolerance(depthToleranceOf(field.field())),
@@ -117,7 +129,7 @@ class FeaturesNearField {
       deep = findDeepPoint(m_field.lookup(), std::array{inField(p), inField(q)}, radii, target,
                            m_tolerance);
     const Triangle vertices{p, q, q};
-    if (isOwn && deep) add(ShapeElement::Edge, p, vertices, deep->weights);
+    if (isOwn && deep) add(ShapeElement::Edge, p, vertices, deep->weights, &*deep);
     if (isOwn && !deep && m_reportsAll && boundary <= m_thickness)
       add(ShapeElement::Edge, p, vertices,
           ends[0] <= ends[1] ? Vector3d::UnitX() : Vector3d::UnitY());
@@ -138,7 +150,7 @@ class FeaturesNearField {
           findDeepPoint(m_field.lookup(),
                         std::array{inField(corners[0]), inField(corners[1]), inField(corners[2])},
                         std::array{0.0, 0.0, 0.0}, target, m_tolerance);
-    if (deep) return add(ShapeElement::Face, triangle, corners, deep->weights);
+    if (deep) return add(ShapeElement::Face, triangle, corners, deep->weights, &*deep);
     if (!m_reportsAll || !(boundary <= m_thickness)) return;
     for (int i = 0; i < 3; ++i) {
       if (values[i] == boundary)
@@ -153,8 +165,17 @@ class FeaturesNearField {
       Vector3d weights = Vector3d::Zero();
       weights[turned ? (i + 1) % 3 : i] = onEdge->weights[0];
       weights[turned ? i : (i + 1) % 3] = onEdge->weights[1];
-      return add(ShapeElement::Face, triangle, corners, weights);
+      return add(ShapeElement::Face, triangle, corners, weights, &*onEdge);
     }
+  }
+
+  /// Whether the field, less the radius, is certainly above `target` less the tolerance, on a whole
+  /// element. valueOf(vertex): L, of the field.
+  template <class ValueOf>
+  bool isAbove(std::uint32_t element, double target, ValueOf&& valueOf) const {
+    const Triangle& corners = m_mesh.topology.triangles[element];
+    if (m_mesh.topology.hasFaces()) return isAbove(corners, target, valueOf);
+    return isAbove(Segment{corners[0], corners[1]}, target, valueOf);
   }
 
  private:
@@ -171,6 +192,8 @@ class FeaturesNearField {
   /// distance d changes by at most |x - v|. So g(x) >= g(v) - 2 e - |x - v|. Each point of a
   /// segment is at most half its length from an end, and each point of a triangle at most its
   /// longest side over the root of 3 from a corner.
+  ///
+  /// All this is of a closed mesh, where d changes so little. Of others nothing is passed over.
   template <std::size_t size>
   bool excludes(const std::array<double, size>& values,
                 const std::array<std::uint32_t, size>& vertices, double target) const {
@@ -188,16 +211,34 @@ class FeaturesNearField {
     return bound - m_error - m_mesh.largestRadius > target;
   }
 
-  /// Adds the contact if the value at its point, as the field has it, is within the thickness.
+  template <std::size_t size, class ValueOf>
+  bool isAbove(const std::array<std::uint32_t, size>& vertices, double target,
+               ValueOf& valueOf) const {
+    std::array<double, size> values, radii;
+    std::array<Vector3d, size> corners;
+    for (std::size_t i = 0; i < size; ++i) {
+      values[i] = valueOf(vertices[i]), radii[i] = m_mesh.radius(vertices[i]);
+      if (!(values[i] - radii[i] > target)) return false;
+    }
+    const bool isPoint = size == 2 && vertices.front() == vertices.back();
+    if (isPoint || excludes(values, vertices, target)) return true;
+    for (std::size_t i = 0; i < size; ++i) corners[i] = inField(vertices[i]);
+    return !findDeepPoint(m_field.lookup(), corners, radii, target, m_tolerance);
+  }
+
+  /// Adds the contact if the value at its point, as the field has it, is within the thickness. The
+  /// value of an open mesh may jump there: that of `deep` is the lower one.
   void add(ShapeElement element, std::uint32_t id, const Triangle& vertices,
-           const Vector3d& weights) {
+           const Vector3d& weights, const DeepPoint* deep = nullptr) {
     Vector3d point = m_mesh.now[vertices[0]];
     if (element != ShapeElement::Vertex)
       point = (weights[0] * point + weights[1] * m_mesh.now[vertices[1]]) +
               weights[2] * m_mesh.now[vertices[2]];
     const Vector3d inField = m_field.inField(point);
-    const double value = m_field.lookup().value(inField),
-                 distance = value - m_mesh.radius(vertices, weights);
+    const double radius = m_mesh.radius(vertices, weights);
+    double value = m_field.lookup().value(inField), distance = value - radius;
+    if (deep && !(distance <= m_thickness) && !m_field.field().isClosed())
+      distance = deep->value, value = distance + radius;
     if (!(distance <= m_thickness)) return;
     const Vector3d normal = m_field.normalAt(inField);
     m_out.shape.push_back(
@@ -212,13 +253,19 @@ class FeaturesNearField {
   ShapeContactBuffers& m_out;
 };
 
-/// Finds the elements of nodes that may have a point with a value of at most `limit`, which is
-/// below the reach, and some more.
+/// L: the value, less the radius, that all points of a mesh must exceed for isFurther().
+double valueBeyond(const PlacedField& placed, double distance) {
+  return distance * (1.0 + kFieldLengthError) + placed.field().errorBound() +
+         placed.placementError() + depthToleranceOf(placed.field());
+}
+
+/// Calls visit(element), until it returns false, for the elements of nodes that may have a point
+/// with a value of at most `limit`, which is below the reach, and for some more.
 ///
 /// The bound is that of FeaturesNearField::excludes(), from the centre of a node's box.
-void findElementsNear(const SearchableGeometry& geometry, const PlacedField& placed, double limit,
-                      PointQueryStack& stack, Buffer<std::uint32_t>& out) {
-  out.clear();
+template <class Visit>
+void forEachElementNear(const SearchableGeometry& geometry, const PlacedField& placed, double limit,
+                        PointQueryStack& stack, Visit&& visit) {
   const Octree& octree = geometry.tree.octree();
   if (octree.size() == 0) return;
   const Eigen::AlignedBox3d region = placed.domain();
@@ -243,6 +290,7 @@ void findElementsNear(const SearchableGeometry& geometry, const PlacedField& pla
     const FloatBox box = map(stored);
     if (box.mayBeClamped()) return true;
     if (isOutside(box)) return false;
+    if (!placed.field().isClosed()) return true;  // the sign may change between two points
     Vector3d centre, half;
     for (int k = 0; k < 3; ++k) {
       const double low = unit * double{box.lower[k]}, high = unit * double{box.upper[k]};
@@ -257,27 +305,83 @@ void findElementsNear(const SearchableGeometry& geometry, const PlacedField& pla
     const FloatBox box = map(stored);
     return box.mayBeClamped() || !isOutside(box);
   };
-  forEachOverlapping(octree, mayBeNear, stack, [&](std::uint32_t begin, std::uint32_t end) {
-    for (std::uint32_t i = begin; i < end; ++i)
-      if (mayBeInDomain(octree.boxes()[i])) out.push_back(octree.order()[i]);
-  });
+  bool goesOn = true;
+  forEachOverlapping(
+      octree, [&](const FloatBox& box) { return goesOn && mayBeNear(box); }, stack,
+      [&](std::uint32_t begin, std::uint32_t end) {
+        for (std::uint32_t i = begin; i < end && goesOn; ++i)
+          if (mayBeInDomain(octree.boxes()[i])) goesOn = visit(octree.order()[i]);
+      });
 }
 
 }  // namespace
 
-FieldContacts::FieldContacts(const TriangleMesh& mesh, const PlacedField& field,
-                             const PairSettings& settings, FieldScratch& scratch)
-    : m_mesh(mesh), m_field(field), m_settings(settings), m_scratch(scratch) {}
+FieldContacts::FieldContacts(const TriangleMesh& mesh, const PlacedField& field, Contacts contacts,
+                             double thickness, FieldScratch& scratch)
+    : m_mesh(mesh),
+      m_field(field),
+      m_contacts(contacts),
+      m_thickness(thickness),
+      m_scratch(scratch) {}
+
+void FieldContacts::startValues() {
+  FieldScratch& scratch = m_scratch;
+  const std::size_t count = m_mesh.topology.vertexCount;
+  if (++scratch.stamp == 0) scratch.stamp = 1, scratch.stamps.clear();
+  if (scratch.stamps.size() < count) scratch.stamps.resize(count, 0u);
+  if (scratch.values.size() < count) scratch.values.resize(count);
+}
+
+bool FieldContacts::isFurther(const SearchableGeometry& geometry, double distance) {
+  const MeshTopology& topology = m_mesh.topology;
+  const double target = valueBeyond(m_field, distance);
+  if (!(target + m_mesh.largestRadius < reachOf(m_field.field()))) return false;
+  startValues();
+  ShapeContactBuffers none;
+  const FeaturesNearField features(m_mesh, m_field, m_contacts, m_thickness, true, none);
+  const auto isAbove = [&](std::uint32_t element) {
+    return !topology.isEnabled(element) || features.isAbove(element, target, [&](std::uint32_t v) {
+      double& value = m_scratch.values[v];
+      if (m_scratch.stamps[v] != m_scratch.stamp) value = features.valueAt(v);
+      m_scratch.stamps[v] = m_scratch.stamp;
+      return value;
+    });
+  };
+  std::uint32_t& nearest = m_scratch.nearest;
+  if (nearest < topology.triangles.size() && !isAbove(nearest)) return false;
+  bool isFurther = true;
+  forEachElementNear(geometry, m_field, target + m_mesh.largestRadius, m_scratch.stack,
+                     [&](std::uint32_t element) {
+                       isFurther = isAbove(element);
+                       if (!isFurther) nearest = element;
+                       return isFurther;
+                     });
+  return isFurther;
+}
+
+bool FieldContacts::isFurtherByBruteForce(double distance) const {
+  const double target = valueBeyond(m_field, distance);
+  if (!(target + m_mesh.largestRadius < reachOf(m_field.field()))) return false;
+  ShapeContactBuffers none;
+  const FeaturesNearField features(m_mesh, m_field, m_contacts, m_thickness, false, none);
+  const auto size = static_cast<std::uint32_t>(m_mesh.topology.triangles.size());
+  for (std::uint32_t t = 0; t < size; ++t)
+    if (m_mesh.topology.isEnabled(t) &&
+        !features.isAbove(t, target, [&](std::uint32_t v) { return features.valueAt(v); }))
+      return false;
+  return true;
+}
 
 void FieldContacts::start(const SearchableGeometry& geometry) {
   const MeshTopology& topology = m_mesh.topology;
   FieldScratch& scratch = m_scratch;
-  findElementsNear(geometry, m_field, m_settings.thickness + m_mesh.largestRadius, scratch.stack,
-                   scratch.elements);
-  std::erase_if(scratch.elements, [&](std::uint32_t t) { return !topology.isEnabled(t); });
-  if (++scratch.stamp == 0) scratch.stamp = 1, scratch.stamps.clear();
-  if (scratch.stamps.size() < topology.vertexCount) scratch.stamps.resize(topology.vertexCount, 0u);
-  if (scratch.values.size() < topology.vertexCount) scratch.values.resize(topology.vertexCount);
+  scratch.elements.clear();
+  forEachElementNear(geometry, m_field, m_thickness + m_mesh.largestRadius, scratch.stack,
+                     [&](std::uint32_t t) {
+                       if (topology.isEnabled(t)) scratch.elements.push_back(t);
+                       return true;
+                     });
+  startValues();
   if (scratch.least.size() < topology.edges.size()) scratch.least.resize(topology.edges.size());
   scratch.vertices.clear();
   for (const std::uint32_t t : scratch.elements) {
@@ -307,7 +411,7 @@ void FieldContacts::findValues(std::size_t begin, std::size_t end) {
 void FieldContacts::findEdges(std::size_t begin, std::size_t end, ShapeContactBuffers& out) {
   const MeshTopology& topology = m_mesh.topology;
   const Buffer<double>& values = m_scratch.values;
-  FeaturesNearField features(m_mesh, m_field, m_settings, true, out);
+  FeaturesNearField features(m_mesh, m_field, m_contacts, m_thickness, true, out);
   for (std::size_t n = begin; n < end; ++n) {
     const std::uint32_t t = m_scratch.elements[n];
     for (int i = 0; i < 3; ++i) {
@@ -323,7 +427,7 @@ void FieldContacts::findEdges(std::size_t begin, std::size_t end, ShapeContactBu
 void FieldContacts::findFaces(std::size_t begin, std::size_t end, ShapeContactBuffers& out) {
   const MeshTopology& topology = m_mesh.topology;
   if (!topology.hasFaces()) return;
-  FeaturesNearField features(m_mesh, m_field, m_settings, true, out);
+  FeaturesNearField features(m_mesh, m_field, m_contacts, m_thickness, true, out);
   for (std::size_t n = begin; n < end; ++n) {
     const std::uint32_t t = m_scratch.elements[n];
     std::array<double, 3> values, least;
@@ -337,11 +441,11 @@ void FieldContacts::findFaces(std::size_t begin, std::size_t end, ShapeContactBu
 }
 
 void FieldContacts::findByBruteForce(const TriangleMesh& mesh, const PlacedField& field,
-                                     const PairSettings& settings,
+                                     Contacts contacts, double thickness,
                                      std::span<const std::uint32_t> elements,
                                      ShapeContactBuffers& out) {
   const MeshTopology& topology = mesh.topology;
-  FeaturesNearField features(mesh, field, settings, false, out);
+  FeaturesNearField features(mesh, field, contacts, thickness, false, out);
   for (const std::uint32_t t : elements) {
     if (!topology.isEnabled(t)) continue;
     std::array<double, 3> values, least;

@@ -32,11 +32,15 @@ class PlacedField {
   Eigen::Vector3d normalAt(const Eigen::Vector3d& inField) const;
   /// L: a box in the world that holds the field's domain.
   Eigen::AlignedBox3d domain() const;
+  /// L: by how much at most a distance in the field's frame is off that from the body's mesh in the
+  /// world. It has two parts: the mesh's rotation is not exactly orthonormal, and rounding.
+  double placementError() const;
 
  private:
   const DistanceField& m_field;
   const FieldLookup& m_lookup;
   RigidTransform m_pose;  ///< with an orthonormal rotation
+  double m_turned = 0;    ///< the norm of its difference from the rotation of the mesh
 };
 
 /// L: distances above this are beyond the band, or may be.
@@ -53,11 +57,13 @@ struct FieldScratch {
   std::uint32_t stamp = 0;
   Buffer<double> values;  ///< L, per vertex: of the field, for `vertices`
   Buffer<double> least;   ///< L, per edge of `elements`: of a contact inside it, or infinity
+  /// The element because of which isFurther() was false last. It is tested first.
+  std::uint32_t nearest = 0;
 };
 
 /// Finds the contacts of a mesh with a field: vertices, edges and triangles with a value of the
 /// field, less the radius, of at most the thickness. Edges and triangles are contacts at their
-/// deepest point, to within depthToleranceOf().
+/// deepest point, to within depthToleranceOf(). thickness: L.
 ///
 /// Distinct: an edge is a contact if it is deeper than its ends by more than the tolerance, and a
 /// triangle if it is deeper than its vertices and edges by more than that. All: every edge and
@@ -67,7 +73,19 @@ struct FieldScratch {
 /// by any number of threads.
 class FieldContacts {
  public:
-  FieldContacts(const TriangleMesh&, const PlacedField&, const PairSettings&, FieldScratch&);
+  FieldContacts(const TriangleMesh&, const PlacedField&, Contacts, double thickness, FieldScratch&);
+
+  /// Whether the field proves that all points of the mesh are outside the body, and that each is
+  /// further from its surface than `distance` and its radius. False also where the band is too
+  /// narrow to prove it.
+  ///
+  /// Law      true if all values, less the radius, exceed the distance by more than the field's
+  ///          error bound, depthToleranceOf() and the placement's error.
+  /// Cost     that of the elements with smaller values, or near them. False is mostly found at the
+  ///          first element.
+  bool isFurther(const SearchableGeometry&, double distance);
+  /// The same, by the values in every element. Bounds exclude none.
+  bool isFurtherByBruteForce(double distance) const;
 
   /// Finds the elements near the field, and their vertices.
   void start(const SearchableGeometry&);
@@ -80,13 +98,16 @@ class FieldContacts {
 
   /// The reference: the same contacts of the features that the given elements own, without what
   /// start() finds, and without passing over edges and triangles by bounds.
-  static void findByBruteForce(const TriangleMesh&, const PlacedField&, const PairSettings&,
+  static void findByBruteForce(const TriangleMesh&, const PlacedField&, Contacts, double thickness,
                                std::span<const std::uint32_t> elements, ShapeContactBuffers& out);
 
  private:
+  void startValues();
+
   const TriangleMesh& m_mesh;
   const PlacedField& m_field;
-  const PairSettings& m_settings;
+  const Contacts m_contacts;
+  const double m_thickness;
   FieldScratch& m_scratch;
 };
 

@@ -1,5 +1,6 @@
 #include "DistanceField/FieldFile.h"
 
+#include <palpate/AnalyticalGeometry.h>
 #include <palpate/Error.h>
 
 #include <algorithm>
@@ -12,14 +13,18 @@
 #include <system_error>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 namespace palpate {
 
 namespace {
 
 constexpr std::string_view kTitle("palpate-field\0\0\0", 16);
-constexpr std::uint32_t kVersion = 1;
-constexpr std::size_t kHeader = 96, kChecksum = 8;
+constexpr std::uint32_t kVersion = 2;
+constexpr std::size_t kHeader = 104, kChecksum = 8;
+/// L: no build makes a domain with larger coordinates. The surface and its band are within
+/// 2 kLargestMeasure, and the units add less than half of it.
+constexpr double kLargestDomain = 4.0 * kLargestMeasure;
 
 std::uint64_t checksumOf(std::string_view bytes) {
   std::uint64_t sum = 0xcbf29ce484222325u;
@@ -108,7 +113,8 @@ std::string contentOf(const std::filesystem::path& path) {
 
 /// An entry in block `block`, or among the roots (-1). Children come after their parent, so that
 /// no cell contains itself.
-CellEntry entryOf(Reader& file, std::size_t blocks, std::size_t leaves, std::int64_t block) {
+CellEntry entryOf(Reader& file, bool isClosed, std::size_t blocks, std::size_t leaves,
+                  std::int64_t block) {
   const CellEntry entry{file.integer<std::uint32_t>()};
   const auto index = static_cast<std::int64_t>(entry.index());
   const CellKind kind = entry.kind();
@@ -116,6 +122,8 @@ CellEntry entryOf(Reader& file, std::size_t blocks, std::size_t leaves, std::int
     file.refuse("block " + std::to_string(index) + " is out of range");
   if (kind == CellKind::Leaf && entry.index() >= leaves)
     file.refuse("leaf " + std::to_string(index) + " is out of range");
+  if (!entry.isReliable() && (isClosed || (kind != CellKind::Leaf && kind != CellKind::Outside)))
+    file.refuse("the sign of a cell cannot be unreliable");
   if (kind != CellKind::Block && kind != CellKind::Leaf && index != 0)
     file.refuse("a cell without values has an index");
   return entry;
@@ -132,7 +140,8 @@ void writeField(const FieldCells& cells, const std::filesystem::path& path) {
   file.real(cells.band);
   for (const std::int64_t origin : cells.origin) file.integer(origin);
   for (const std::uint32_t size : cells.size) file.integer(size);
-  file.integer(std::uint32_t{0});
+  file.integer(std::uint32_t{cells.isClosed ? 0u : 1u});
+  file.real(cells.unreliableMargin);
   file.integer(std::uint64_t{cells.blocks.size()});
   file.integer(std::uint64_t{cells.leaves.size()});
   for (const CellEntry entry : cells.roots) file.integer(entry.bits);
@@ -168,6 +177,7 @@ FieldCells readField(const std::filesystem::path& path) {
   if (!(cells.errorBound > 0)) file.refuse("the error bound is not positive");
   cells.band = file.real();
   if (!(cells.band > 0)) file.refuse("the band is not positive");
+  if (std::ldexp(cells.band, -cells.exponent) > kMostRoots) file.refuse("the band is too wide");
   for (std::int64_t& origin : cells.origin) {
     origin = file.integer<std::int64_t>();
     if (origin < -kMostOrigin || origin > kMostOrigin) file.refuse("the origin is out of range");
@@ -178,19 +188,36 @@ FieldCells readField(const std::filesystem::path& path) {
     if (size < 1 || size > kMostRoots) file.refuse("the number of cells is out of range");
     roots *= size;
   }
-  if (file.integer<std::uint32_t>() != 0) file.refuse("the number is not 0");
+  for (std::size_t k = 0; k < 3; ++k)
+    for (const std::int64_t end : {cells.origin[k], cells.origin[k] + cells.size[k]})
+      if (!(std::abs(std::ldexp(static_cast<double>(end), cells.exponent)) <= kLargestDomain))
+        file.refuse("the domain is out of range");
+  const auto isOpen = file.integer<std::uint32_t>();
+  if (isOpen > 1) file.refuse("the number is not 0 or 1");
+  cells.isClosed = isOpen == 0;
+  cells.unreliableMargin = file.real();
+  if (!(cells.unreliableMargin >= 0)) file.refuse("the margin is negative");
   const auto blocks = file.integer<std::uint64_t>(), leaves = file.integer<std::uint64_t>();
   // The counts are compared with the bytes that are there before any memory is allocated.
   const std::size_t most = file.left() / sizeof(FieldCells::Leaf);
   if (blocks > most || leaves > most || std::max(blocks, leaves) >= CellEntry::kMostIndices ||
       roots * sizeof(CellEntry) + (blocks + leaves) * sizeof(FieldCells::Leaf) != file.left())
     file.refuse("the numbers of cells do not match the size of the file");
-  const auto entry = [&](std::int64_t block) { return entryOf(file, blocks, leaves, block); };
+  const auto entry = [&](std::int64_t block) {
+    return entryOf(file, cells.isClosed, blocks, leaves, block);
+  };
   cells.roots.resize(roots);
   for (CellEntry& root : cells.roots) root = entry(-1);
   cells.blocks.resize(blocks);
+  std::vector<std::uint8_t> levels(blocks);  // of the cells that have the block
   for (std::size_t i = 0; i < blocks; ++i)
-    for (CellEntry& child : cells.blocks[i]) child = entry(static_cast<std::int64_t>(i));
+    for (CellEntry& child : cells.blocks[i]) {
+      child = entry(static_cast<std::int64_t>(i));
+      if (child.kind() != CellKind::Block) continue;
+      std::uint8_t& level = levels[child.index()];
+      level = std::max<std::uint8_t>(level, levels[i] + 1);
+      if (level >= kMostLevels) file.refuse("the cells are too deep");
+    }
   cells.leaves.resize(leaves);
   for (FieldCells::Leaf& leaf : cells.leaves)
     for (float& value : leaf) value = file.shortReal();

@@ -85,7 +85,7 @@ class ValuesInLanes {
 
   HWY_ATTR HWY_INLINE static Entries kindOf(Entries entry) {
     const hn::RebindToUnsigned<Integers> du;
-    return hn::BitCast(di, hn::ShiftRight<CellEntry::kIndexBits>(hn::BitCast(du, entry)));
+    return hn::BitCast(di, hn::ShiftRight<CellEntry::kKindShift>(hn::BitCast(du, entry)));
   }
   HWY_ATTR HWY_INLINE static Entries indexOf(Entries entry) {
     return hn::And(entry, hn::Set(di, CellEntry::kMostIndices - 1));

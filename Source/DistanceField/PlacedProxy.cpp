@@ -184,8 +184,9 @@ void PlacedProxy::findLeaves(std::size_t size, bool byBruteForce, Block& block) 
 }
 
 void PlacedProxy::find(const TriangleMesh& points, std::size_t begin, std::size_t end,
-                       bool byBruteForce, ProxyHits& out) const {
+                       bool byBruteForce, const ParticleStep* step, ProxyHits& out) const {
   out.normals.clear();
+  out.others.clear();
   out.error = 0;
   out.answered = out.count = 0;
   out.hits.resize(end - begin);
@@ -194,6 +195,15 @@ void PlacedProxy::find(const TriangleMesh& points, std::size_t begin, std::size_
                          : m_outerSideOnly ? 0.0
                                            : -std::numeric_limits<double>::infinity();
   const SurfaceProxy::Leaf* const leaves = m_proxy->leaves().data();
+  /// distance: L, a lower bound. isFar: whether no leaf answers.
+  const auto mayHaveImpact = [&](std::uint32_t point, double distance, bool isFar) {
+    if (!step) return false;
+    const Vector3d moved = points.now[point] - points.before[point];
+    const double motion = largestMotion({moved, moved, false}, step->body);
+    const bool isSlow = !isFar && motion <= step->slowMotion;
+    return motion > 0.0 &&
+           !(distance - points.radius(point) > motion + (isSlow ? 0.0 : step->thickness));
+  };
   Block block;
   for (std::size_t first = begin; first < end; first += kBlockSize) {
     const std::size_t size = std::min(kBlockSize, end - first);
@@ -208,16 +218,34 @@ void PlacedProxy::find(const TriangleMesh& points, std::size_t begin, std::size_
     for (std::size_t i = 0; i < size; ++i) {
       const auto point = static_cast<std::uint32_t>(first + i);
       const std::uint32_t index = block.leaves[i];
-      if (index == SurfaceProxy::kNoLeaf || !points.topology.isEnabled(point)) continue;
+      if (!points.topology.isEnabled(point)) continue;
+      if (index == SurfaceProxy::kNoLeaf) {
+        if (mayHaveImpact(point, m_proxy->depth() - totalError(0.0), true))
+          out.others.push_back(point);
+        continue;
+      }
       const SurfaceProxy::Leaf& leaf = leaves[index];
       const double limit = m_thickness + points.radius(point);
       ++out.answered;
       if (!leaf.hasPlane()) {
-        findAmong(leaf, {block.x[i], block.y[i], block.z[i]}, point, limit, out);
+        const Nearest nearest = nearestAmong(leaf, {block.x[i], block.y[i], block.z[i]});
+        if (mayHaveImpact(point, std::abs(nearest.distance) - totalError(0.0), false)) {
+          out.others.push_back(point);
+        } else if (!nearest.isHidden && nearest.distance <= limit &&
+                   nearest.distance >= -m_proxy->depth()) {
+          out.hits[out.count++] = {
+              point, ProxyHits::kListed | static_cast<std::uint32_t>(out.normals.size()),
+              nearest.distance};
+          out.normals.push_back(nearest.normal);
+        }
+        continue;
+      }
+      const double distance = leaf.distance(block.x[i], block.y[i], block.z[i]);
+      if (mayHaveImpact(point, std::abs(distance) - totalError(leaf.error), false)) {
+        out.others.push_back(point);
         continue;
       }
       out.error = std::max(out.error, leaf.error);
-      const double distance = leaf.distance(block.x[i], block.y[i], block.z[i]);
       out.hits[out.count] = {point, index, distance};
       out.count += ((isSigned ? distance : std::abs(distance)) <= limit) & (distance >= deepest);
     }
@@ -258,8 +286,8 @@ bool PlacedProxy::isInFront(std::uint32_t triangle, TriangleFeature feature,
   return side >= 0.0;
 }
 
-void PlacedProxy::findAmong(const SurfaceProxy::Leaf& leaf, const Vector3d& p, std::uint32_t point,
-                            double limit, ProxyHits& out) const {
+PlacedProxy::Nearest PlacedProxy::nearestAmong(const SurfaceProxy::Leaf& leaf,
+                                               const Vector3d& p) const {
   const auto positions = m_body->now.body();
   const auto triangles = m_proxy->trianglesOf(leaf);
   const auto squareFrom = [&](const SurfaceProxy::Listed& t) {
@@ -286,18 +314,10 @@ void PlacedProxy::findAmong(const SurfaceProxy::Leaf& leaf, const Vector3d& p, s
     if (other.triangle != first->triangle && squareFrom(other) <= reach * reach)
       test(other.triangle);
   }
-  double distance = nearest.distance;
-  if (m_proxy->isClosed() || m_outerSideOnly) {
-    if (!isInFront(triangle, nearest.feature, nearest.difference)) {
-      if (m_outerSideOnly) return;
-      distance = -distance;
-      nearest.normal = -nearest.normal;
-    }
-  }
-  if (!(distance <= limit && distance >= -m_proxy->depth())) return;
-  out.hits[out.count++] = {
-      point, ProxyHits::kListed | static_cast<std::uint32_t>(out.normals.size()), distance};
-  out.normals.push_back(nearest.normal);
+  const bool isBehind = (m_proxy->isClosed() || m_outerSideOnly) &&
+                        !isInFront(triangle, nearest.feature, nearest.difference);
+  if (isBehind) return {-nearest.normal, -nearest.distance, m_outerSideOnly};
+  return {nearest.normal, nearest.distance, false};
 }
 
 void PlacedProxy::write(const TriangleMesh& points, const ProxyHits& found,

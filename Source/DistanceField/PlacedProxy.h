@@ -4,6 +4,7 @@
 
 #include "Core/Buffer.h"
 #include "DistanceField/SurfaceProxy.h"
+#include "Mesh/Motion.h"
 #include "Mesh/TriangleMesh.h"
 
 #include <array>
@@ -28,6 +29,14 @@ struct ProxyHits {
   Buffer<Eigen::Vector3d> world;    ///< scratch: placed particles
   double error = 0;                 ///< L: of all leaves that answered
   std::size_t answered = 0;         ///< particles in leaves that are not far from the surface
+  Buffer<std::uint32_t> others;     ///< particles that may have an impact in the step
+};
+
+/// A step, for a proxy that answers particles without an impact.
+struct ParticleStep {
+  MotionRange body;   ///< of the body's vertices
+  double thickness;   ///< L: that of the pair
+  double slowMotion;  ///< L: particles that move further are answered only if they stay far away
 };
 
 /// From the world to the cells of a proxy.
@@ -47,8 +56,11 @@ class PlacedProxy {
 
   /// Finds the particles within the thickness and their radii, of those in [begin, end).
   /// byBruteForce: finds each particle's leaf among all leaves.
+  /// step: null, or particles that may have an impact in it are listed and no hits. A particle has
+  /// none if its distance at the end, less the error, exceeds its motion relative to the body and
+  /// its radius. A fast one must in addition be apart by the thickness.
   void find(const TriangleMesh& points, std::size_t begin, std::size_t end, bool byBruteForce,
-            ProxyHits& out) const;
+            const ParticleStep* step, ProxyHits& out) const;
   /// Writes a contact for each hit.
   void write(const TriangleMesh& points, const ProxyHits&, ShapeContact* out) const;
 
@@ -59,8 +71,12 @@ class PlacedProxy {
   struct Block;
   void locate(const Eigen::Vector3d* points, std::size_t size, Block&) const;
   void findLeaves(std::size_t size, bool byBruteForce, Block&) const;
-  void findAmong(const SurfaceProxy::Leaf&, const Eigen::Vector3d& p, std::uint32_t point,
-                 double limit, ProxyHits& out) const;
+  struct Nearest {
+    Eigen::Vector3d normal;  ///< in the body's frame
+    double distance;         ///< L, signed where sides count
+    bool isHidden;           ///< by Sidedness::Outer
+  };
+  Nearest nearestAmong(const SurfaceProxy::Leaf&, const Eigen::Vector3d& p) const;
   bool isInFront(std::uint32_t triangle, TriangleFeature, const Eigen::Vector3d& difference) const;
 
   const SurfaceProxy* m_proxy;

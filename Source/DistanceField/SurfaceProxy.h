@@ -15,6 +15,8 @@ struct ProxySettings {
   double reach = 0;         ///< L: distance to which points are answered, positive
   double allowedError = 0;  ///< L: largest proven error of a leaf's plane
   double normalCone = 0;    ///< rad: PairSettings::widestNormalCone
+  /// Most triangles that are compared with nodes while the leaves are built, and most in lists.
+  std::uint64_t mostWork = std::uint64_t{1} << 34, mostListed = 1u << 28;
   friend bool operator==(const ProxySettings&, const ProxySettings&) = default;
 };
 
@@ -35,7 +37,8 @@ struct ProxyPlace {
 ///          (2) the list of a leaf with triangles has the triangle that is nearest to p.
 ///          (3) points in leaves without either are further from the surface than the reach.
 ///          Docs/SurfaceProxies.md has the proofs.
-/// Errors   TooLarge if the reach is so large that the leaves would need more than kMostWork.
+/// Errors   TooLarge if the reach is so large that the leaves would need more than mostWork
+///          or mostListed; or if the extent is not from 2^-400 to 2^400.
 /// Threads  the same leaves for any number of threads.
 class SurfaceProxy {
  public:
@@ -93,18 +96,15 @@ class SurfaceProxy {
     return &m_blocks[entry & ~kBlock][index & 63];
   }
 
-  /// Most triangles that are compared with nodes while the leaves are built, and most in lists.
-  static constexpr std::uint64_t kMostWork = std::uint64_t{1} << 34, kMostListed = 1u << 28;
-
  private:
   friend class SurfaceProxyBuilder;
   using Block = std::array<std::uint32_t, 64>;
   static constexpr std::uint32_t kBlock = 0x80000000u;  ///< marks the index of a block
 
-  std::vector<std::uint32_t> m_bricks;
-  std::vector<Block> m_blocks;
-  std::vector<Leaf> m_leaves;
-  std::vector<Listed> m_triangles;
+  CountedVector<std::uint32_t> m_bricks;
+  CountedVector<Block> m_blocks;
+  CountedVector<Leaf> m_leaves;
+  CountedVector<Listed> m_triangles;
   Eigen::Vector3d m_lower = Eigen::Vector3d::Zero();
   double m_unit = 1, m_reach = 0, m_magnitude = 0;
   std::uint32_t m_units = 0;

@@ -19,8 +19,8 @@ struct Int256 {
 
   int sign() const { return static_cast<Int128>(high) < 0 ? -1 : (high | low) != 0; }
   friend Int256 operator+(const Int256& a, const Int256& b) {
-    const UnsignedInt128 low = a.low + b.low;
-    return {a.high + b.high + (low < a.low), low};
+    const UnsignedInt128 sum = a.low + b.low;
+    return {a.high + b.high + (sum < a.low), sum};
   }
   friend Int256 operator-(const Int256& a, const Int256& b) {
     return {a.high - b.high - (a.low < b.low), a.low - b.low};

@@ -54,6 +54,12 @@ struct BoxArrays {
       upper[k].resize(size + kPadding);
     }
   }
+  void releaseMemory() {
+    for (int k = 0; k < 3; ++k) {
+      releaseSpare(lower[k]);
+      releaseSpare(upper[k]);
+    }
+  }
   FloatBox operator[](std::size_t i) const {
     return {{lower[0][i], lower[1][i], lower[2][i], 0}, {upper[0][i], upper[1][i], upper[2][i], 0}};
   }

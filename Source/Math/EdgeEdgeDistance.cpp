@@ -181,6 +181,14 @@ class EndFeet {
     return nearest;
   }
 
+  /// Whether an end is also an end of the other edge. If it is the nearest end, no end before it is
+  /// equally near: the distance of an end on the other edge is always computed as 0.
+  bool isCommon(int i) const {
+    const auto& [p0, p1, q0, q1, m, u, v] = m_edges;
+    const Vector3d& end = i == 0 ? p0 : i == 1 ? p1 : i == 2 ? q0 : q1;
+    return i < 2 ? end == q0 || end == q1 : end == p0 || end == p1;
+  }
+
   EdgeEdgeDistance answer(int i) const {
     const auto& [foot, feature] = m_ends[i];
     const double turn = i < 2 ? 1.0 : -1.0;
@@ -197,12 +205,16 @@ class EndFeet {
             foot.exact};
   }
 
+  /// Whether the foot of each end is on the other edge. Parallel edges share the interval between
+  /// such ends, which are all equally near.
+  std::array<bool, 4> beside() const {
+    const auto& [p0, p1, q0, q1, m, u, v] = m_edges;
+    return {isBeside(p0, q0, q1), isBeside(p1, q0, q1), isBeside(q0, p0, p1), isBeside(q1, p0, p1)};
+  }
+
   /// Moves the closest points of parallel edges to the middle of the interval that the edges share,
   /// which runs from one end to another.
-  void moveToMiddle(EdgeEdgeDistance& answer) const {
-    const auto& [p0, p1, q0, q1, m, u, v] = m_edges;
-    const std::array<bool, 4> beside{isBeside(p0, q0, q1), isBeside(p1, q0, q1),
-                                     isBeside(q0, p0, p1), isBeside(q1, p0, p1)};
+  void moveToMiddle(EdgeEdgeDistance& answer, const std::array<bool, 4>& beside) const {
     // Both weights are compared: if one edge has no length, the weights on the other are equal.
     const auto before = [&](int i, int j) {
       return std::pair(weightA(i), weightB(i)) < std::pair(weightA(j), weightB(j));
@@ -232,12 +244,16 @@ EdgeEdgeDistance endDistance(const EdgePair& edges, bool parallel, bool decidedE
   const EndFeet ends(edges);
   bool tied = false;
   int nearest = ends.nearest(tied);
-  tied = tied && !parallel;  // for parallel edges, any pair within the shared interval will do
+  const std::array<bool, 4> beside = parallel ? ends.beside() : std::array<bool, 4>{};
+  // For parallel edges, any pair within the shared interval will do, but no other.
+  for (int i = 0; i < 4 && !beside[nearest]; ++i)
+    if (beside[i]) nearest = i;
+  tied = tied && !beside[nearest] && !ends.isCommon(nearest);
   if (tied) nearest = exact::nearestEnd(edges.p0, edges.p1, edges.q0, edges.q1);
   EdgeEdgeDistance answer = ends.answer(nearest);
   answer.exact = answer.exact || decidedExactly || tied;
   answer.parallel = parallel;
-  if (parallel) ends.moveToMiddle(answer);
+  if (parallel) ends.moveToMiddle(answer, beside);
   return answer;
 }
 

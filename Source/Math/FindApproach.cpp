@@ -88,8 +88,8 @@ Separation accurateSeparation(const RelativeMotion<kind>& motion, double t) {
 /// turn as they pass each other at little more than the distance need most. There the turning
 /// direction and the plane reach further.) The value of upTo does not change the steps before it.
 template <Kind kind>
-ImpactResult find(const ImpactQuery& query, double distance, double tolerance, double upTo) {
-  const RelativeMotion<kind> motion(query);
+ImpactResult find(const RelativeMotion<kind>& motion, double distance, double tolerance,
+                  double upTo) {
   double t = boxesSeparateUntil(motion, distance);
   if (t > upTo || t == 1.0) return {};
   const Vector3d largest = motion.largestDifference();
@@ -132,29 +132,38 @@ ImpactResult find(const ImpactQuery& query, double distance, double tolerance, d
   }
 }
 
-/// A power of two that brings the largest coordinate near 1 if products of differences would
-/// otherwise leave the range of doubles, else 1.
-double scaleFor(const ImpactQuery& query) {
-  double largest = 0.0;
-  for (const auto& vertex : query.vertices)
-    for (int end = 0; end < 2; ++end)
-      largest = std::max(largest, vertex.at(end).cwiseAbs().maxCoeff());
+/// A power of two that brings the largest difference near 1 if products of differences would
+/// otherwise leave the range of doubles, else 1. Coordinates may be much larger than differences.
+double scaleFor(double largest) {
   if (largest == 0.0 || (largest > kSmallestModerate && largest < kLargestModerate)) return 1.0;
   return std::ldexp(1.0, -std::clamp(std::ilogb(largest), -1000, 1000));
+}
+
+/// Differences of larger ones, such as displacements of the features, might overflow.
+constexpr double kLargestDifference = 0x1p1020;
+
+template <Kind kind>
+ImpactResult findScaled(const ImpactQuery& query, double distance, double tolerance, double upTo) {
+  RelativeMotion<kind> motion(query);
+  const double largest = motion.largestDifference().maxCoeff();
+  if (largest > kLargestDifference) {
+    ImpactQuery smaller = query;
+    for (ImpactQuery::Step& vertex : smaller.vertices)
+      vertex = {0.25 * vertex.before, 0.25 * vertex.now};
+    return findScaled<kind>(smaller, 0.25 * distance, tolerance, upTo);
+  }
+  const double scale = scaleFor(largest);
+  if (scale != 1.0) motion.scale(scale);
+  return find(motion, distance * scale, tolerance, upTo);
 }
 
 }  // namespace
 
 ImpactResult findApproach(const ImpactQuery& query, double distance, double tolerance,
                           double upTo) {
-  const double scale = scaleFor(query);
-  ImpactQuery scaled = query;
-  if (scale != 1.0)
-    for (ImpactQuery::Step& vertex : scaled.vertices)
-      vertex = {scale * vertex.before, scale * vertex.now};
   return query.kind == Kind::VertexTriangle
-             ? find<Kind::VertexTriangle>(scaled, distance * scale, tolerance, upTo)
-             : find<Kind::EdgeEdge>(scaled, distance * scale, tolerance, upTo);
+             ? findScaled<Kind::VertexTriangle>(query, distance, tolerance, upTo)
+             : findScaled<Kind::EdgeEdge>(query, distance, tolerance, upTo);
 }
 
 }  // namespace palpate

@@ -87,6 +87,7 @@ std::optional<Foot> footOnPlane(const Difference& m, const Difference& u, const 
   };
   if (!(normalSquare > kNarrowAngleSquare * square)) makeAccurate();
   if (!(normalSquare > kSliverAngleSquare * square)) return {};
+  if (!(normalSquare > kUnderflowGuardOfProducts)) return {};  // the normal of edges this short
 
   const auto sOf = [&](const Vector3d& from) {
     return -dot(from.cross(v.high), normal) / normalSquare;
@@ -125,6 +126,11 @@ std::optional<Foot> footOnPlane(const Difference& m, const Difference& u, const 
 bool hasRightDistance(const Foot& foot, const Vector3d& a, const Vector3d& b, const Vector3d& c,
                       const Vector3d& d) {
   return foot.distance > 0.0 || exact::areCoplanar(a, b, c, d);
+}
+
+/// Whether two vectors are exactly equal, or one is the other's opposite.
+bool areEqualOrOpposite(const Difference& u, const Difference& v) {
+  return (u.high == v.high && u.low == v.low) || (u.high == -v.high && u.low == -v.low);
 }
 
 }  // namespace
@@ -197,13 +203,17 @@ Foot footBetweenEdges(const EdgePair& edges) {
 
 Vector3d unitCross(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d,
                    std::size_t* exactDecisions) {
+  const Difference first = difference(b, a), second = difference(d, c);
+  if (areEqualOrOpposite(first, second) || largest(first.high) == 0.0 ||
+      largest(second.high) == 0.0)
+    return Vector3d::Zero();
   const auto moderate = [](const Difference& edge) -> Difference {
     const double extent = largest(edge.high);
     if (isModerate(extent)) return edge;
     const int exponent = exponentTowardsOne(extent);
     return {scaled(edge.high, exponent), scaled(edge.low, exponent)};
   };
-  const Difference u = moderate(difference(b, a)), v = moderate(difference(d, c));
+  const Difference u = moderate(first), v = moderate(second);
   if (isModerate(largest(u.high)) && isModerate(largest(v.high))) {
     const Vector3d normal = accurateCross(u, v);
     const double square = dot(normal, normal);

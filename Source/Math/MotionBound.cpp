@@ -1,5 +1,6 @@
 #include "Math/MotionBound.h"
 
+#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
@@ -28,7 +29,7 @@ double motionBound(const ImpactQuery& query) {
   for (const ImpactQuery::Difference& d : ImpactQuery::corners(kind)) {
     const Vector3d now = query.vertices[d[0]].at(1) - query.vertices[d[1]].at(1),
                    before = query.vertices[d[0]].at(0) - query.vertices[d[1]].at(0);
-    motion = std::max(motion, (now - before).stableNorm());
+    motion = std::max(motion, stableLength(now - before));
   }
   return motion + kMotionError * (motion + sizeAtEnd<kind>(query));
 }

@@ -57,6 +57,13 @@ struct RelativeMotion {
     }
   }
 
+  /// Multiplies all by a power of two.
+  void scale(double by) {
+    const auto scaleEnds = [=](Ends& ends) { ends = {ends[0] * by, ends[1] * by}; };
+    for (Ends* ends : {&a, &b, &c}) scaleEnds(*ends);
+    for (Ends& ends : corner) scaleEnds(ends);
+  }
+
   /// Whether some coordinate has the same strict sign at every corner and both ends, and therefore
   /// throughout the step. Exact.
   bool boxesSeparate() const {

@@ -1,6 +1,8 @@
 #include "Math/RoundSegment.h"
 
 #include "Exact/Compensated.h"
+#include "Math/Foot.h"
+#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>
@@ -54,7 +56,7 @@ void forEachBelow(double a, double b, double c, const Range& within, F&& f) {
 RoundIntervals intersectRay(const RaySegment& ray, const Eigen::Vector3d& p,
                             const Eigen::Vector3d& q, double radiusP, double radiusQ) {
   // The direction has length 1 here, and s = 0 where the ray is nearest to the segment's middle.
-  const double length = ray.direction.stableNorm();
+  const double length = stableLength(ray.direction);
   const Eigen::Vector3d d = ray.direction / length, middle = 0.5 * p + 0.5 * q;
   const double shift = (middle - ray.origin).dot(d);
   const Eigen::Vector3d nearest = ray.origin + shift * d;
@@ -147,17 +149,15 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
     const RoundIntervals capsule = intersectRay(ray, p, q, radius, radius);
     for (std::size_t k = 0; k < capsule.size; ++k) add(capsule.intervals[k]);
   }
-  const double length = ray.direction.stableNorm();
+  const double length = stableLength(ray.direction);
   const Eigen::Vector3d d = ray.direction / length;
   const double shift = (a - ray.origin).dot(d);  // s = 0 where the ray is nearest to a
   const Eigen::Vector3d nearest = ray.origin + shift * d - a;
   const double scale = scaleTowardsOne(
                    std::max({largest(nearest), largest(b - a), largest(c - a), radius})),
                unit = 1.0 / scale;
-  const Eigen::Vector3d normal = (scale * (b - a)).cross(scale * (c - a)), from = scale * nearest;
-  const double twiceArea = normal.stableNorm();
-  if (!(twiceArea > 0.0)) return all;
-  const Eigen::Vector3d n = normal / twiceArea;
+  const Eigen::Vector3d n = unitCross(a, b, a, c), from = scale * nearest;
+  if (n.isZero(0.0)) return all;
   Range inside{-kInfinite, kInfinite};
   const auto clip = [&](double height, double slope, double most) {  // height + s slope <= most
     if (slope > 0.0) {
@@ -175,6 +175,17 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
     const Eigen::Vector3d outward = (scale * (q - p)).cross(n);
     clip((from - scale * (p - a)).dot(outward), d.dot(outward), 0.0);
   }
+  // The sides of a thin triangle are nearly parallel, so that rounding moves their common points
+  // far along them. The triangle does not reach beyond the ends of its longest side.
+  int longest = 0;
+  const auto along = [&](int i) -> Eigen::Vector3d {
+    return scale * (*corners[(i + 1) % 3] - *corners[i]);
+  };
+  for (int i = 1; i < 3; ++i)
+    if (along(i).squaredNorm() > along(longest).squaredNorm()) longest = i;
+  const Eigen::Vector3d side = along(longest), start = scale * (*corners[longest] - a);
+  clip((start - from).dot(side), -d.dot(side), 0.0);
+  clip((from - start - side).dot(side), d.dot(side), 0.0);
   const double first = (shift + unit * inside.first) / length,
                last = (shift + unit * inside.last) / length;
   if (first <= last && last >= ray.tMin && first <= ray.tMax) {

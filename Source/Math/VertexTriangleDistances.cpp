@@ -279,6 +279,7 @@ class Feet {
     V normalSquare = dot(normal, normal);
     Mask decided = hn::And(hn::Or(isA, hn::Or(isB, isC)), isModerate(extent));
     decided = hn::And(decided, hn::Gt(normalSquare, hn::Set(d, kNarrowAngleSquare) * square));
+    decided = hn::And(decided, hn::Gt(normalSquare, hn::Set(d, kUnderflowGuardOfProducts)));
     const auto sOf = [&](const Vectors& from) HWY_ATTR {
       return hn::Neg(dot(cross(from, v.high), normal)) / normalSquare;
     };

@@ -1,5 +1,7 @@
 #include "Mesh/FloatPositions.h"
 
+#include "Math/Range.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -35,27 +37,27 @@ HWY_ATTR void toFloatsKernel(const Eigen::Vector3d* positions, std::size_t size,
   for (; i < size; ++i) out[i] = frame(positions[i]);
 }
 
-/// Copies the values. Returns whether all are finite.
-HWY_ATTR bool copyFiniteKernel(const double* from, std::size_t size, double* to) {
+/// Copies the values. Returns whether all are in range.
+HWY_ATTR bool copyInRangeKernel(const double* from, std::size_t size, double* to) {
   const hn::ScalableTag<double> d;
   const std::size_t lanes = hn::Lanes(d);
-  // x * 0 is 0 for finite x and NaN otherwise, and NaN survives any sum. Four independent sums
-  // avoid waiting for each other.
-  const auto zero = hn::Zero(d);
-  hn::Vec<decltype(d)> sums[4] = {zero, zero, zero, zero};
+  // NaN is not at most anything. Four independent masks avoid waiting for each other.
+  const auto most = hn::Set(d, kLargestMeasure);
+  const auto all = hn::Eq(most, most);
+  hn::Mask<decltype(d)> good[4] = {all, all, all, all};
   std::size_t i = 0;
   for (; i + 4 * lanes <= size; i += 4 * lanes)
     for (std::size_t k = 0; k < 4; ++k) {
       const auto v = hn::LoadU(d, from + i + k * lanes);
       hn::StoreU(v, d, to + i + k * lanes);
-      sums[k] = sums[k] + v * zero;
+      good[k] = hn::And(good[k], hn::Le(hn::Abs(v), most));
     }
-  double rest = hn::GetLane(hn::SumOfLanes(d, (sums[0] + sums[1]) + (sums[2] + sums[3])));
+  bool rest = hn::AllTrue(d, hn::And(hn::And(good[0], good[1]), hn::And(good[2], good[3])));
   for (; i < size; ++i) {
     to[i] = from[i];
-    rest += from[i] * 0.0;
+    rest &= isWithinRange(from[i]);
   }
-  return rest == 0.0;
+  return rest;
 }
 
 /// Writes each value at its rank. Infinities must fill the last vector.
@@ -115,14 +117,14 @@ void toFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& fram
   HWY_DYNAMIC_DISPATCH(toFloatsKernel)(positions.data(), positions.size(), frame, out);
 }
 
-HWY_EXPORT(copyFiniteKernel);
+HWY_EXPORT(copyInRangeKernel);
 
 std::size_t copyFinite(std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out) {
-  if (positions.empty() || HWY_DYNAMIC_DISPATCH(copyFiniteKernel)(
+  if (positions.empty() || HWY_DYNAMIC_DISPATCH(copyInRangeKernel)(
                                positions[0].data(), 3 * positions.size(), out->data()))
     return positions.size();
   std::size_t i = 0;
-  while (positions[i].allFinite()) ++i;
+  while (isWithinRange(positions[i])) ++i;
   return i;
 }
 

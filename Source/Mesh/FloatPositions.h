@@ -62,8 +62,8 @@ double frameScale(double spread);
 /// Converts positions to floats of the frame. `out` is as long as `positions`.
 void toFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame&, FloatPoint* out);
 
-/// Copies positions. Returns the index of the first vertex that is not finite, or the size if all
-/// are finite.
+/// Copies positions. Returns the index of the first vertex that is not finite or has a coordinate
+/// beyond kLargestMeasure, or the size if there is none.
 std::size_t copyFinite(std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out);
 
 }  // namespace palpate

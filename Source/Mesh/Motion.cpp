@@ -1,5 +1,6 @@
 #include "Mesh/Motion.h"
 
+#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
@@ -91,13 +92,13 @@ MotionRange motionRange(const Positions& before, const Positions& now) {
 
 double largestMotion(const MotionRange& a, const MotionRange& b) {
   const Vector3d most = (a.upper - b.lower).cwiseAbs().cwiseMax((b.upper - a.lower).cwiseAbs());
-  const double motion = most.stableNorm() * (1.0 + kMotionError);
+  const double motion = stableLength(most) * (1.0 + kMotionError);
   return motion >= 0.0 ? motion : std::numeric_limits<double>::infinity();  // for NaN, too
 }
 
 double smallestMotion(const MotionRange& a, const MotionRange& b) {
   const Vector3d least = (a.lower - b.upper).cwiseMax(b.lower - a.upper).cwiseMax(0.0);
-  return least.stableNorm() * (1.0 - kMotionError);
+  return stableLength(least) * (1.0 - kMotionError);
 }
 
 double meanMotion(const TriangleMesh& a, const TriangleMesh& b) {

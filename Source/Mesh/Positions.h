@@ -1,5 +1,7 @@
 #pragma once
 
+#include <palpate/CountedVector.h>
+
 #include "Mesh/Revision.h"
 
 #include <Eigen/Core>
@@ -36,11 +38,12 @@ struct RigidTransform {
 /// Two ends of one geometry with equal revisions have the same positions.
 class Positions {
  public:
-  using Body = std::shared_ptr<const std::vector<Eigen::Vector3d>>;
+  using Body = std::shared_ptr<const CountedVector<Eigen::Vector3d>>;
 
-  Positions() : Positions(std::vector<Eigen::Vector3d>()) {}
-  Positions(std::vector<Eigen::Vector3d> world)
-      : Positions(std::make_shared<const std::vector<Eigen::Vector3d>>(std::move(world))) {}
+  Positions() : Positions(std::make_shared<const CountedVector<Eigen::Vector3d>>()) {}
+  Positions(const std::vector<Eigen::Vector3d>& world)
+      : Positions(
+            std::make_shared<const CountedVector<Eigen::Vector3d>>(world.begin(), world.end())) {}
   explicit Positions(Body body) { setBody(std::move(body)); }
 
   std::size_t size() const { return m_body->size(); }

@@ -2,11 +2,13 @@
 
 #include <palpate/Error.h>
 
+#include "Math/StableLength.h"
+#include "Math/Tolerances.h"
+
 #include <algorithm>
-#include <functional>
+#include <atomic>
+#include <cmath>
 #include <limits>
-#include <queue>
-#include <utility>
 
 namespace palpate {
 
@@ -14,73 +16,151 @@ namespace {
 
 constexpr double kUnreached = std::numeric_limits<double>::infinity();
 constexpr std::size_t kMaxPairs = std::size_t{1} << 28;
+constexpr std::size_t kGrain = 64;  ///< vertices of one task
+/// Rings are half a mean edge wide, but the longest edge crosses at most so many.
+constexpr double kMostRings = 256.0;
 
-/// Shortest paths from one vertex after another. (Dijkstra, A note on two problems in connexion
-/// with graphs, Numerische Mathematik 1, 1959.)
+/// Where squares leave the range of doubles, lengths are scaled first.
+double lengthOf(const Eigen::Vector3d& edge) {
+  const double square = edge.squaredNorm();
+  return square > kSmallestSlowSquare && square < 1 / kSmallestSlowSquare ? std::sqrt(square)
+                                                                          : stableLength(edge);
+}
+
+/// The edges shorter than the distance, in lists for each vertex.
+struct EdgeLists {
+  struct Edge {
+    std::uint32_t neighbour;
+    double length;
+  };
+  CountedVector<std::uint32_t> offsets;
+  CountedVector<Edge> edges;
+  double longest = 0.0, mean = 0.0;
+
+  EdgeLists(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest, double distance)
+      : offsets(topology.vertexCount + 1, 0) {
+    CountedVector<double> lengths(topology.edges.size());
+    const auto forEachShort = [&](auto&& f) {
+      for (std::size_t e = 0; e < lengths.size(); ++e)
+        if (lengths[e] < distance) f(topology.edges[e], lengths[e]);
+    };
+    for (std::size_t e = 0; e < lengths.size(); ++e)
+      lengths[e] = lengthOf(rest[topology.edges[e][0]] - rest[topology.edges[e][1]]);
+    forEachShort([&](const Segment& edge, double length) {
+      for (const std::uint32_t end : edge) ++offsets[end + 1];
+      longest = std::max(longest, length);
+    });
+    for (std::size_t v = 0; v < topology.vertexCount; ++v) offsets[v + 1] += offsets[v];
+    edges.resize(offsets.back());
+    CountedVector<std::uint32_t> next(offsets.begin(), offsets.end() - 1);
+    forEachShort([&](const Segment& edge, double length) {
+      edges[next[edge[0]]++] = {edge[1], length};
+      edges[next[edge[1]]++] = {edge[0], length};
+      mean += length / static_cast<double>(edges.size()) * 2.0;
+    });
+  }
+  std::span<const Edge> operator[](std::uint32_t vertex) const {
+    return std::span(edges).subspan(offsets[vertex], offsets[vertex + 1] - offsets[vertex]);
+  }
+};
+
+/// Shortest paths from one vertex after another. Vertices are visited in rings of path lengths, and
+/// again where a shorter path is found. Sums of lengths are monotone, so that the least lengths do
+/// not depend on the order.
+/// Source   Meyer and Sanders, Delta-stepping: a parallelizable shortest path algorithm, Journal of
+///          Algorithms 49 (2003). Difference: one thread for each search, and no distinction of
+///          short and long edges.
 class ShortestPaths {
  public:
-  ShortestPaths(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest,
-                double distance)
-      : m_edges(topology.edges),
-        m_rest(rest),
+  ShortestPaths(const EdgeLists& edges, double distance)
+      : m_edges(edges),
         m_distance(distance),
-        m_edgesAt(listsByKey(topology.vertexCount,
-                             [&](auto&& incidence) {
-                               for (std::uint32_t e = 0; e < m_edges.size(); ++e)
-                                 for (const std::uint32_t vertex : m_edges[e]) incidence(vertex, e);
-                             })),
-        m_pathLength(topology.vertexCount, kUnreached) {}
+        m_ringWidth(std::max(edges.mean / 2, edges.longest / kMostRings)),
+        m_rings(m_ringWidth > 0.0 ? static_cast<std::size_t>(edges.longest / m_ringWidth) + 3 : 1),
+        m_pathLength(edges.offsets.size() - 1, kUnreached) {}
 
-  /// The vertices within the distance, ascending, including `from`. Valid until the next call.
-  std::span<const std::uint32_t> reachedFrom(std::uint32_t from) {
-    for (const std::uint32_t vertex : m_reached) m_pathLength[vertex] = kUnreached;
-    m_reached.clear();
-    relax(from, 0.0);
-    while (!m_next.empty()) {
-      const auto [length, vertex] = m_next.top();
-      m_next.pop();
-      if (length > m_pathLength[vertex]) continue;
-      for (const std::uint32_t edge : m_edgesAt[vertex]) {
-        const auto [p, q] = m_edges[edge];
-        relax(p == vertex ? q : p, length + (m_rest[p] - m_rest[q]).norm());
-      }
+  /// Appends the vertices behind `from` that are within the distance, ascending.
+  void addReached(std::uint32_t from, CountedVector<std::uint32_t>& out) {
+    search(from);
+    const std::size_t begin = out.size(), all = m_pathLength.size();
+    if (m_reached.size() > all / 16) {  // sorting would take longer
+      for (std::uint32_t v = from + 1; v < all; ++v)
+        if (m_pathLength[v] != kUnreached) out.push_back(v);
+    } else {
+      for (const std::uint32_t v : m_reached)
+        if (v > from) out.push_back(v);
+      std::sort(out.begin() + static_cast<std::ptrdiff_t>(begin), out.end());
     }
-    std::sort(m_reached.begin(), m_reached.end());
-    return m_reached;
+    for (const std::uint32_t v : m_reached) m_pathLength[v] = kUnreached;
+    m_reached.clear();
   }
 
  private:
+  void search(std::uint32_t from) {
+    relax(from, 0.0);
+    for (std::size_t ring = 0; m_waiting > 0; ++ring) {
+      CountedVector<Entry>& entries = m_rings[ring % m_rings.size()];
+      for (std::size_t i = 0; i < entries.size(); ++i) {  // the ring may grow
+        const auto [length, vertex] = entries[i];
+        if (length != m_pathLength[vertex]) continue;  // a shorter path was found
+        for (const EdgeLists::Edge& edge : m_edges[vertex])
+          relax(edge.neighbour, length + edge.length);
+      }
+      m_waiting -= entries.size();
+      entries.clear();
+    }
+  }
   void relax(std::uint32_t vertex, double length) {
     if (!(length < m_distance && length < m_pathLength[vertex])) return;
     if (m_pathLength[vertex] == kUnreached) m_reached.push_back(vertex);
     m_pathLength[vertex] = length;
-    m_next.push({length, vertex});
+    const std::size_t ring = m_ringWidth > 0.0 ? static_cast<std::size_t>(length / m_ringWidth) : 0;
+    m_rings[ring % m_rings.size()].push_back({length, vertex});
+    ++m_waiting;
   }
 
-  using Entry = std::pair<double, std::uint32_t>;
-  std::span<const Segment> m_edges;
-  std::span<const Eigen::Vector3d> m_rest;
-  double m_distance;
-  IndexLists m_edgesAt;
-  std::vector<double> m_pathLength;
-  std::vector<std::uint32_t> m_reached;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> m_next;
+  struct Entry {
+    double length;
+    std::uint32_t vertex;
+  };
+  const EdgeLists& m_edges;
+  double m_distance, m_ringWidth;
+  CountedVector<CountedVector<Entry>> m_rings;  ///< of path lengths, used in turn
+  CountedVector<double> m_pathLength;
+  CountedVector<std::uint32_t> m_reached;
+  std::size_t m_waiting = 0;  ///< entries of all rings
 };
 
 }  // namespace
 
 IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest,
-                          double distance) {
-  ShortestPaths paths(topology, rest, distance);
+                          double distance, const Threads& threads) {
+  const EdgeLists edges(topology, rest, distance);
+  const std::size_t count = topology.vertexCount, tasks = (count + kGrain - 1) / kGrain;
   IndexLists lists;
-  for (std::uint32_t vertex = 0; vertex < topology.vertexCount; ++vertex) {
-    const auto reached = paths.reachedFrom(vertex);
-    lists.items.insert(lists.items.end(), std::upper_bound(reached.begin(), reached.end(), vertex),
-                       reached.end());
-    lists.offsets.push_back(static_cast<std::uint32_t>(lists.items.size()));
-    if (lists.items.size() > kMaxPairs)
-      throw Error(ErrorCode::TooLarge,
-                  "restDistance: more than 2^28 pairs of vertices are nearer than this distance");
+  lists.offsets.resize(count + 1);
+  CountedVector<CountedVector<std::uint32_t>> found(tasks);
+  std::atomic<std::size_t> nextTask = 0, pairs = 0;
+  threads.forEach(std::min(tasks, static_cast<std::size_t>(threads.count())), [&](std::size_t) {
+    ShortestPaths paths(edges, distance);
+    for (std::size_t task; pairs <= kMaxPairs && (task = nextTask++) < tasks;) {
+      const std::size_t end = std::min(count, (task + 1) * kGrain);
+      for (std::size_t v = task * kGrain; v < end; ++v) {
+        const std::size_t before = found[task].size();
+        paths.addReached(static_cast<std::uint32_t>(v), found[task]);
+        lists.offsets[v + 1] = static_cast<std::uint32_t>(found[task].size() - before);
+      }
+      pairs += found[task].size();
+    }
+  });
+  if (pairs > kMaxPairs)
+    throw Error(ErrorCode::TooLarge,
+                "restDistance: more than 2^28 pairs of vertices are nearer than this distance");
+  for (std::size_t v = 0; v < count; ++v) lists.offsets[v + 1] += lists.offsets[v];
+  lists.items.reserve(pairs);
+  for (CountedVector<std::uint32_t>& part : found) {
+    lists.items.insert(lists.items.end(), part.begin(), part.end());
+    part = {};
   }
   return lists;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "Core/Threads.h"
 #include "Mesh/TriangleMesh.h"
 
 #include <span>
@@ -9,10 +10,10 @@ namespace palpate {
 /// For each vertex, the vertices with a higher index that are nearer than `distance` (L, positive)
 /// along the edges, ascending. Edges of disabled triangles count, too.
 ///
-/// Cost     one search for each vertex: about as many steps as there are vertices within the
-///          distance, times the logarithm of that number.
+/// Cost     one search for each vertex, on all threads. A search takes about as many steps as there
+///          are edges within the distance.
 /// Errors   TooLarge, if more than 2^28 pairs of vertices are that near.
 IndexLists verticesWithin(const MeshTopology&, std::span<const Eigen::Vector3d> rest,
-                          double distance);
+                          double distance, const Threads&);
 
 }  // namespace palpate

@@ -24,9 +24,9 @@ bool ascends(const Tetrahedron& tetrahedron, std::uint32_t side) {
 }
 
 /// For each side, the side of the tetrahedron beyond it; kNone: the outside.
-std::vector<std::uint32_t> opposites(std::span<const Tetrahedron> tetrahedra,
-                                     std::optional<OverusedFace>& fault) {
-  std::vector<Face> faces;
+CountedVector<std::uint32_t> opposites(std::span<const Tetrahedron> tetrahedra,
+                                       std::optional<OverusedFace>& fault) {
+  CountedVector<Face> faces;
   faces.reserve(4 * tetrahedra.size());
   for (std::uint32_t side = 0; side < 4 * tetrahedra.size(); ++side) {
     faces.push_back({faceOf(tetrahedra[side / 4], side % 4), side});
@@ -35,7 +35,7 @@ std::vector<std::uint32_t> opposites(std::span<const Tetrahedron> tetrahedra,
   std::sort(faces.begin(), faces.end(), [](const Face& l, const Face& r) {
     return l.vertices != r.vertices ? l.vertices < r.vertices : l.side < r.side;
   });
-  std::vector<std::uint32_t> beyond(faces.size(), kNone);
+  CountedVector<std::uint32_t> beyond(faces.size(), kNone);
   for (std::size_t i = 0; i + 1 < faces.size(); ++i) {
     if (faces[i].vertices != faces[i + 1].vertices) continue;
     if (i + 2 < faces.size() && faces[i + 2].vertices == faces[i].vertices) {
@@ -50,11 +50,11 @@ std::vector<std::uint32_t> opposites(std::span<const Tetrahedron> tetrahedra,
 }
 
 /// For each tetrahedron, whether its corners as given are wound as if its volume were positive.
-std::vector<bool> findOrientations(std::span<const Eigen::Vector3d> rest,
-                                   std::span<const Tetrahedron> tetrahedra,
-                                   std::span<const std::uint32_t> beyond) {
-  std::vector<bool> positive(tetrahedra.size()), known(tetrahedra.size());
-  std::vector<std::uint32_t> queue;
+CountedVector<bool> findOrientations(std::span<const Eigen::Vector3d> rest,
+                                     std::span<const Tetrahedron> tetrahedra,
+                                     std::span<const std::uint32_t> beyond) {
+  CountedVector<bool> positive(tetrahedra.size()), known(tetrahedra.size());
+  CountedVector<std::uint32_t> queue;
   SignCounts counts;
   for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
     const auto& [a, b, c, d] = tetrahedra[t];
@@ -92,7 +92,7 @@ std::vector<bool> findOrientations(std::span<const Eigen::Vector3d> rest,
 TetrahedralTopology topologyOf(std::span<const Eigen::Vector3d> rest,
                                std::span<const Tetrahedron> tetrahedra,
                                std::optional<OverusedFace>& fault) {
-  const std::vector<std::uint32_t> beyond = opposites(tetrahedra, fault);
+  const CountedVector<std::uint32_t> beyond = opposites(tetrahedra, fault);
   TetrahedralTopology topology{{tetrahedra.begin(), tetrahedra.end()}, {}, {}, {}};
   if (fault) return topology;
   topology.isPositive = findOrientations(rest, tetrahedra, beyond);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <palpate/CountedVector.h>
 #include <palpate/TetrahedralMesh.h>
 
 #include <Eigen/Core>
@@ -8,7 +9,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <vector>
 
 namespace palpate {
 
@@ -22,12 +22,13 @@ inline Triangle faceOf(const Tetrahedron& t, unsigned i) {
 
 /// Tetrahedra, and the surface triangles between them and the outside.
 struct TetrahedralTopology {
-  std::vector<Tetrahedron> tetrahedra;      ///< as given
-  std::vector<Triangle> surface;            ///< see TetrahedralSurface
-  std::vector<std::uint32_t> surfaceOwner;  ///< the tetrahedron of each surface triangle, ascending
+  CountedVector<Tetrahedron> tetrahedra;  ///< as given
+  CountedVector<Triangle> surface;        ///< see TetrahedralSurface
+  CountedVector<std::uint32_t>
+      surfaceOwner;  ///< the tetrahedron of each surface triangle, ascending
   /// For each tetrahedron, whether its volume at rest is positive. One without volume has the sign
   /// that fits its neighbours.
-  std::vector<bool> isPositive;
+  CountedVector<bool> isPositive;
 };
 
 /// A face that more than two tetrahedra share: its vertices, ascending, and the first three

@@ -15,7 +15,7 @@ MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle>
     Segment edge;
     std::uint32_t triangle, side;
   };
-  std::vector<Side> sides;
+  CountedVector<Side> sides;
   sides.reserve(3 * triangles.size());
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
     for (std::uint32_t i = 0; i < 3; ++i) {
@@ -37,9 +37,9 @@ MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle>
 }
 
 void MeshTopology::disable(std::span<const std::uint32_t> newDisabled) {
-  std::vector<bool> newIsDisabled(newDisabled.empty() ? 0 : triangles.size(), false);
+  CountedVector<bool> newIsDisabled(newDisabled.empty() ? 0 : triangles.size(), false);
   for (const std::uint32_t triangle : newDisabled) newIsDisabled[triangle] = true;
-  std::vector<std::uint32_t> sorted;
+  CountedVector<std::uint32_t> sorted;
   for (std::uint32_t t = 0; t < newIsDisabled.size(); ++t)
     if (newIsDisabled[t]) sorted.push_back(t);
   findOwners(newIsDisabled);
@@ -49,7 +49,7 @@ void MeshTopology::disable(std::span<const std::uint32_t> newDisabled) {
 }
 
 /// Changes nothing if it throws.
-void MeshTopology::findOwners(const std::vector<bool>& newIsDisabled) {
+void MeshTopology::findOwners(const CountedVector<bool>& newIsDisabled) {
   // A vertex or edge that a triangle contains twice counts once.
   const auto listsOf = [&](std::size_t count, const auto& heldBy) {
     return listsByKey(count, [&](auto&& incidence) {
@@ -65,7 +65,7 @@ void MeshTopology::findOwners(const std::vector<bool>& newIsDisabled) {
   IndexLists atVertices = listsOf(vertexCount, triangles);
   IndexLists atEdges = listsOf(edges.size(), triangleEdges);
 
-  std::vector<std::uint8_t> owners(triangles.size(), 0);
+  CountedVector<std::uint8_t> owners(triangles.size(), 0);
   const auto assignOwner = [&](std::uint32_t item, std::uint32_t owner, const auto& held,
                                auto&& bitOf) {
     const auto place = std::find(held.begin(), held.end(), item) - held.begin();
@@ -79,7 +79,7 @@ void MeshTopology::findOwners(const std::vector<bool>& newIsDisabled) {
     else
       assignOwner(v, incident.front(), triangles[incident.front()], cornerBit);
   }
-  std::vector<std::uint8_t> closedStars(vertexCount, 1);
+  CountedVector<std::uint8_t> closedStars(vertexCount, 1);
   const auto isForward = [&](std::uint32_t e, std::uint32_t triangle) {
     const auto side = std::find(triangleEdges[triangle].begin(), triangleEdges[triangle].end(), e);
     return triangles[triangle][side - triangleEdges[triangle].begin()] == edges[e][0];

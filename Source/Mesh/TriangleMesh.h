@@ -16,8 +16,8 @@ constexpr std::uint32_t kNoEdge = 0xffffffffu;
 
 /// Lists of different lengths in one array: list i is items[offsets[i]] to items[offsets[i + 1]].
 struct IndexLists {
-  std::vector<std::uint32_t> offsets{0};
-  std::vector<std::uint32_t> items;
+  CountedVector<std::uint32_t> offsets{0};
+  CountedVector<std::uint32_t> items;
   std::span<const std::uint32_t> operator[](std::size_t i) const {
     return std::span(items).subspan(offsets[i], offsets[i + 1] - offsets[i]);
   }
@@ -31,7 +31,7 @@ IndexLists listsByKey(std::size_t keyCount, ForEach&& forEachIncidence) {
   forEachIncidence([&](std::uint32_t key, std::uint32_t) { ++lists.offsets[key + 1]; });
   for (std::size_t i = 0; i < keyCount; ++i) lists.offsets[i + 1] += lists.offsets[i];
   lists.items.resize(lists.offsets.back());
-  std::vector<std::uint32_t> next(lists.offsets.begin(), lists.offsets.end() - 1);
+  CountedVector<std::uint32_t> next(lists.offsets.begin(), lists.offsets.end() - 1);
   forEachIncidence([&](std::uint32_t key, std::uint32_t item) { lists.items[next[key]++] = item; });
   return lists;
 }
@@ -48,20 +48,20 @@ struct MeshTopology {
 
   GeometryType type = GeometryType::Triangles;
   std::size_t vertexCount = 0;
-  std::vector<Triangle> triangles;
-  std::vector<Segment> edges;  ///< unique, lower vertex first, sorted
+  CountedVector<Triangle> triangles;
+  CountedVector<Segment> edges;  ///< unique, lower vertex first, sorted
   /// Edge i joins corners i and i + 1 mod 3; kNoEdge if both are the same vertex.
-  std::vector<std::array<std::uint32_t, 3>> triangleEdges;
-  std::vector<std::uint8_t> owned;   ///< per triangle: its cornerBit()s and edgeBit()s
-  IndexLists vertexTriangles;        ///< enabled triangles only: ascending ids, each once
-  IndexLists edgeTriangles;          ///< the same; an empty list: the edge is disabled
-  std::size_t untestedVertices = 0;  ///< number of vertices in no enabled triangle
-  std::vector<bool> isUsed;          ///< per vertex: in a triangle, enabled or not
+  CountedVector<std::array<std::uint32_t, 3>> triangleEdges;
+  CountedVector<std::uint8_t> owned;  ///< per triangle: its cornerBit()s and edgeBit()s
+  IndexLists vertexTriangles;         ///< enabled triangles only: ascending ids, each once
+  IndexLists edgeTriangles;           ///< the same; an empty list: the edge is disabled
+  std::size_t untestedVertices = 0;   ///< number of vertices in no enabled triangle
+  CountedVector<bool> isUsed;         ///< per vertex: in a triangle, enabled or not
   /// Per vertex: each of its edges is in exactly two enabled triangles, in opposite directions.
-  std::vector<std::uint8_t> hasClosedStar;
-  std::vector<std::uint32_t> disabled{};  ///< disabled triangles, ascending
-  std::vector<bool> isDisabled{};         ///< per triangle; empty if none is disabled
-  std::optional<bool> closed;             ///< and consistently oriented; set when first needed
+  CountedVector<std::uint8_t> hasClosedStar;
+  CountedVector<std::uint32_t> disabled{};  ///< disabled triangles, ascending
+  CountedVector<bool> isDisabled{};         ///< per triangle; empty if none is disabled
+  std::optional<bool> closed;               ///< and consistently oriented; set when first needed
 
   /// Disables these triangles and enables all others. Changes nothing if it throws.
   /// Cost     linear: about a tenth of the constructor's.
@@ -83,7 +83,7 @@ struct MeshTopology {
   bool ownsEdge(std::uint32_t triangle, int edge) const { return owned[triangle] & edgeBit(edge); }
 
  private:
-  void findOwners(const std::vector<bool>& isDisabled);
+  void findOwners(const CountedVector<bool>& isDisabled);
 };
 
 /// Whether the vertices of one mesh of a pair are tested against the other mesh's elements.
@@ -103,10 +103,10 @@ struct TriangleMesh {
   MeshTopology topology;
   Positions now;
   Positions before;
-  std::vector<double> radii{};          ///< L, per vertex; empty: all have the largest radius
-  double largestRadius = 0.0;           ///< L
-  std::vector<Eigen::Vector3d> rest{};  ///< positions when the topology was set
-  bool outerSideOnly = false;           ///< Sidedness::Outer
+  CountedVector<double> radii{};          ///< L, per vertex; empty: all have the largest radius
+  double largestRadius = 0.0;             ///< L
+  CountedVector<Eigen::Vector3d> rest{};  ///< positions when the topology was set
+  bool outerSideOnly = false;             ///< Sidedness::Outer
 
   double radius(std::uint32_t vertex) const {
     return radii.empty() ? largestRadius : radii[vertex];

@@ -122,7 +122,7 @@ bool isUnfolded(const MeshTopology& topology, const Buffer<std::uint32_t>& views
 
 void UnfoldedStars::find(const MeshTopology& topology, std::span<const Triangle> ordered,
                          const FloatPoint* before, const FloatPoint* now, const Threads& threads) {
-  const std::vector<Triangle>& triangles = topology.triangles;
+  const CountedVector<Triangle>& triangles = topology.triangles;
   m_views.resize(triangles.size());
   threads.forChunks(triangles.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
     HWY_DYNAMIC_DISPATCH(viewsKernel)

@@ -24,12 +24,13 @@ struct DisplacementBounds {
   }
 };
 
-/// Whether features of two triangles may move further than `slow` relative to each other. Rounding,
-/// and squares out of range, make it true for some slower triangles.
+/// Whether motionBound() of features of two triangles may exceed `slow` plus the rounding of the
+/// pair's motions. Rounding, and squares out of range, make it true for some slower triangles.
 bool mayBeFast(const DisplacementBounds& a, const DisplacementBounds& b, double slow) {
   const Eigen::Array3d most = (a.upper - b.lower).abs().max((b.upper - a.lower).abs());
   const double square = slow * slow;
-  return !(square > kSmallestSlowSquare && most.square().sum() < square * (1 - kSlowSlack));
+  return !(slow > 0.0 && square > kSmallestSlowSquare &&
+           most.square().sum() < square * (1 - kSlowSlack));
 }
 
 }  // namespace
@@ -43,8 +44,10 @@ void findAuto(const MeshPair& pair, std::span<const ElementPair> candidates, Con
   }
   findProximity(pair, out.part, out);
   out.part.clear();
+  const StepPlan& step = pair.step;
+  const double slow = step.slowMotion - (step.motionWithRounding - step.motion);
   for (const ElementPair& candidate : candidates)
-    if (mayBeFast({pair.a, candidate.a}, {pair.b, candidate.b}, pair.step.slowMotion))
+    if (mayBeFast({pair.a, candidate.a}, {pair.b, candidate.b}, slow))
       out.part.push_back(candidate);
   findFastImpacts(pair, out.part, out);
 }

@@ -1,5 +1,6 @@
 #include "NarrowPhase/Continuous.h"
 
+#include "NarrowPhase/ElementBoxes.h"
 #include "NarrowPhase/Filters.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
@@ -26,6 +27,19 @@ TimeOfImpactSettings settingsOf(const MeshPair& pair) {
       pair.settings.thickness + (pair.a.largestRadius + pair.b.largestRadius);
   settings.timeTolerance = pair.settings.timeTolerance;
   return settings;
+}
+
+/// Whether the boxes of both features over the step come within the distance. An impact may be
+/// reported a little early (kApproachError), also where the features never come within the
+/// distance. Such features are contacts only if their boxes do. The contacts then do not depend on
+/// which boxes an octree compared.
+bool boxesMeet(const ImpactQuery& query, double distance) {
+  std::array<Eigen::AlignedBox3d, 2> boxes;
+  for (int i = 0; i < 4; ++i) {
+    const bool second = i >= (query.kind == Kind::VertexTriangle ? 1 : 2);
+    for (const int end : {0, 1}) boxes[second].extend(query.vertices[i].at(end));
+  }
+  return overlap(boxes[0], boxes[1], distance);
 }
 
 /// Calls f(features, firstId, secondId, swapped) for the pairs that may have an impact, after a
@@ -92,7 +106,8 @@ class ContactFinder {
     const ImpactQuery query = features.query(firstId, secondId);
     const ImpactResult answer = findImpact(query, m_settings);
     m_out.exactDecisions += answer.exact;
-    return answer.impact && add(features, firstId, secondId, swapped, query, answer.time, true);
+    return answer.impact && boxesMeet(query, m_settings.minimumDistance) &&
+           add(features, firstId, secondId, swapped, query, answer.time, true);
   }
 
   /// Makes the contact of an impact and returns whether it passes all filters. store: the impact is
@@ -214,7 +229,7 @@ double findEarliestImpact(const MeshPair& pair, std::span<const ElementPair> can
     const ImpactQuery query = features.query(firstId, secondId);
     const ImpactResult answer = findImpact(query, settings, end());
     counts.exactDecisions += answer.exact;
-    if (answer.impact && answer.time < earliest &&
+    if (answer.impact && answer.time < earliest && boxesMeet(query, settings.minimumDistance) &&
         (!pair.hasFilters() ||
          finder.add(features, firstId, secondId, swapped, query, answer.time, false)))
       earliest = answer.time;

@@ -4,6 +4,7 @@
 #include "NarrowPhase/Filters.h"
 #include "NarrowPhase/LineEdges.h"
 #include "NarrowPhase/ProximityFilter.h"
+#include "NarrowPhase/SharedVertex.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
@@ -202,7 +203,8 @@ std::size_t countOf(std::uint32_t bits) {
 /// findPossibleProximity() keeps.
 class ProximityFinder {
  public:
-  ProximityFinder(const MeshPair& pair, ContactBuffers& out)
+  ProximityFinder(const MeshPair& pair, std::span<const ElementPair> candidates,
+                  ContactBuffers& out)
       : m_pair(pair),
         m_out(out),
         m_check(pair, out),
@@ -212,6 +214,7 @@ class ProximityFinder {
                       : pair.b.topology.hasFaces() ? Corners::None
                                                    : Corners::All,
                       out),
+        m_sharedVertex(pair.a.topology, pair.self() ? pair.floats : nullptr, candidates),
         m_allowed(allowedTests(pair.a.topology, pair.b.topology)),
         m_distinct(pair.settings.contacts == Contacts::Distinct && !pair.hasLines()) {}
 
@@ -228,7 +231,14 @@ class ProximityFinder {
     std::uint32_t tests =
         kOwnedByA[a.owned[candidate.a]] & kOwnedByB[b.owned[candidate.b]] & m_allowed;
     const Triangle &s = a.triangles[candidate.a], &t = b.triangles[candidate.b];
-    if (m_pair.self()) tests &= ~kSharingTests[sameCorners(s, t)];
+    if (m_pair.self()) {
+      const unsigned same = sameCorners(s, t);
+      tests &= ~kSharingTests[same];
+      if (m_sharedVertex.isAlone(s, t, same)) {
+        m_out.featurePairs += countOf(tests);
+        return;
+      }
+    }
     if (tests == 0) return;
     m_tests[m_size] = tests;
     m_candidates[m_size] = candidate;
@@ -271,6 +281,7 @@ class ProximityFinder {
   ContactBuffers& m_out;
   StepCheck m_check;
   VertexTriangleFinder m_verticesOfA, m_verticesOfB;
+  const SharedVertex m_sharedVertex;
   const std::uint32_t m_allowed;  ///< tests that apply to the meshes' geometry types
   const bool m_distinct;          ///< edges whose closest points are ends are no contacts
   int m_size = 0;
@@ -283,7 +294,7 @@ class ProximityFinder {
 
 void findProximity(const MeshPair& pair, std::span<const ElementPair> candidates,
                    ContactBuffers& out) {
-  ProximityFinder(pair, out).find(candidates);
+  ProximityFinder(pair, candidates, out).find(candidates);
 }
 
 }  // namespace palpate

@@ -119,6 +119,23 @@ HWY_INLINE auto isTooFar(const TriangleFrame<V>& triangle, const Vector3<V>& fro
   return hn::Or(isOut, hn::Lt(along<kOpposite>(triangle.inward[2], from2), triangle.beyond[2]));
 }
 
+/// Triangle pairs whose boxes are further apart than `distance`.
+template <class V>
+HWY_INLINE auto areBoxesApart(const TriangleFrame<V>& a, const TriangleFrame<V>& b, V distance) {
+  auto isApart = hn::FirstN(hn::DFromV<V>(), 0);
+  for (const auto axis : {&Vector3<V>::x, &Vector3<V>::y, &Vector3<V>::z}) {
+    const auto lower = [axis](const TriangleFrame<V>& of) HWY_ATTR {
+      return hn::Min(hn::Min(of.corner[0].*axis, of.corner[1].*axis), of.corner[2].*axis);
+    };
+    const auto upper = [axis](const TriangleFrame<V>& of) HWY_ATTR {
+      return hn::Max(hn::Max(of.corner[0].*axis, of.corner[1].*axis), of.corner[2].*axis);
+    };
+    const V gap = hn::Max(lower(a) - upper(b), lower(b) - upper(a));
+    isApart = hn::Or(isApart, hn::Gt(gap, distance));
+  }
+  return isApart;
+}
+
 /// kKeepsNearEdges: keeps edge pairs within checkedEdgeDistance even if their closest points are
 /// not inside both edges.
 template <bool kDistinct, bool kKeepsNearEdges>
@@ -139,6 +156,20 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
     a.corner[0] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     a.set(d, thickness);
     b.set(d, thickness);
+    // A triangle much smaller than the other one has no directions in floats, so that no other test
+    // drops its features.
+    constexpr float kTiny = 0x1p-10f;
+    auto isApart = hn::Lt(hn::Min(a.length, b.length), hn::Set(d, kTiny));
+    if (!hn::AllFalse(d, isApart)) {
+      const V distance = hn::Max(thickness, hn::Load(d, scaled.checkedEdgeDistance + lane));
+      // A coordinate difference is off by e. The rest covers the rounding of distance and sum.
+      const V error = (hn::Set(d, 1.0f) + distance) * hn::Set(d, 0x1p-21f);
+      isApart = hn::And(isApart, areBoxesApart(a, b, distance + error));
+      if (hn::AllTrue(d, isApart)) {
+        hn::StoreU(hn::Zero(hn::RebindToUnsigned<D>()), hn::RebindToUnsigned<D>(), possible + lane);
+        continue;
+      }
+    }
     Vector3<V> from[3][3];  // from b's corner j to a's corner i
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) from[i][j] = a.corner[i] - b.corner[j];
@@ -190,6 +221,7 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
         tests = withTest(tests, edgeTest(i, j), isOut);
       }
     }
+    tests = hn::IfThenZeroElse(hn::RebindMask(hn::RebindToUnsigned<D>(), isApart), tests);
     hn::StoreU(tests, hn::RebindToUnsigned<D>(), possible + lane);
   }
 }

@@ -19,8 +19,10 @@ class StepCheck {
   /// because they may have touched in the step.
   double checkedEdgeDistance() const {
     const StepPlan& step = m_pair.step;
-    return std::min(step.motion,
-                    step.reportsImpacts ? step.extraThickness : m_pair.settings.thickness);
+    if (step.motion == 0.0) return 0.0;
+    const double rounding = step.motionWithRounding - step.motion;
+    return std::min(step.motionWithRounding, step.reportsImpacts ? step.extraThickness + rounding
+                                                                 : m_pair.settings.thickness);
   }
 
   /// Records a feature pair that is at most thicknessAtEnd() apart.

@@ -65,6 +65,16 @@ void Octree::copy(const Octree& other) {
   m_stage = other.m_stage;
 }
 
+void Octree::releaseMemory() {
+  m_builder.reset();
+  if (m_dops.directions == 3) m_dops = {};
+  m_boxes.releaseMemory();
+  for (auto* buffer : {&m_nodes.parents, &m_nodes.groups, &m_nodes.groupNodes, &m_nodes.partBlocks})
+    releaseSpare(*buffer);
+  releaseSpare(m_groupBoxes);
+  m_nodes.pool.releaseMemory();
+}
+
 void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& settings,
                    std::span<std::uint64_t> keys, const Threads& threads) {
   PALPATE_ASSERT(size() > 0 && keys.size() == size());

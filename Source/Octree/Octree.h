@@ -71,6 +71,7 @@ class BlockPool {
     reserve(blocks);
     m_blocks = m_memory.start<OctreeBlock>(blocks);
   }
+  void releaseMemory() { m_blocks = m_memory.shrink(m_blocks); }  ///< keeps the blocks
   std::size_t used() const { return m_blocks.size(); }
   std::size_t free() const { return allocated() - used(); }
   std::size_t allocated() const { return m_memory.bytes() / sizeof(OctreeBlock); }
@@ -157,6 +158,8 @@ class Octree {
   /// Until then, and after any change of the octree, there are none.
   OctreeDops& startDops(int directions);
   void fitDops(int directions);
+
+  void releaseMemory();  ///< gives back scratch and free blocks
 
   bool isBuilt() const { return m_stage == Stage::Built; }
   std::uint64_t layout() const { return m_layout; }  ///< changes with each reset() and build()

@@ -17,11 +17,8 @@ class Validation {
       fail(0, "the tree is not built");
       return m_failures;
     }
-    const BlockPool& pool = m_octree.pool();
-    if (pool.used() + pool.free() != pool.allocated())
-      fail(0, "the numbers of used and free blocks do not sum to that of allocated blocks");
     m_holders.assign(m_octree.size(), 0);
-    m_blockVisited.assign(pool.used(), false);
+    m_blockVisited.assign(m_octree.pool().used(), false);
     m_blockVisited[0] = true;
     const FloatBox all = visit(0, m_octree.rootCube());
     if (all.empty()) fail(0, "the root is empty");
@@ -53,8 +50,13 @@ class Validation {
   FloatBox visit(OctreeNode node, const Cube& cube) {
     const OctreeBlock& block = m_octree.blocks()[node >> 3];
     const unsigned slot = node & 7;
-    const auto [begin, end] = m_octree.ownRange(node);
+    const std::uint32_t child = block.child[slot];
     FloatBox box;
+    if (!block.isLeaf(slot) && (child >= m_blockVisited.size() || m_blockVisited[child])) {
+      fail(node, "its child block is shared or out of bounds");
+      return box;
+    }
+    const auto [begin, end] = m_octree.ownRange(node);
     if (begin > end || end > m_octree.size()) {
       fail(node, "its range of elements is out of bounds");
       return box;
@@ -65,11 +67,6 @@ class Validation {
       if (m_cells) checkCell(node, cube, i, block.isLeaf(slot));
     }
     if (!block.isLeaf(slot)) {
-      const std::uint32_t child = block.child[slot];
-      if (child >= m_blockVisited.size() || m_blockVisited[child]) {
-        fail(node, "its child block is shared or out of bounds");
-        return box;
-      }
       m_blockVisited[child] = true;
       if (m_octree.parent(child) != node) fail(node, "its child block refers to another parent");
       for (unsigned octant = 0; octant < 8; ++octant) {

@@ -4,6 +4,7 @@
 
 #include "Math/ClosestPoint.h"
 #include "Math/RayTriangle.h"
+#include "Math/StableLength.h"
 
 #include <algorithm>
 #include <cmath>
@@ -63,7 +64,7 @@ bool boxesMeet(const Element& a, const Element& b) {
 /// Moves the points of two elements that meet to where an edge of one crosses the other, if they
 /// are nearer to each other there.
 void moveToCrossing(const Element& a, const Element& b, ElementDistance& found) {
-  double least = (a.point(found.weightsA) - b.point(found.weightsB)).stableNorm();
+  double least = stableLength(a.point(found.weightsA) - b.point(found.weightsB));
   const auto follow = [&](const Element& edges, const Element& face, bool exchanged) {
     for (std::size_t i = 0; i < 3; ++i) {
       const Vector3d along = edges[i + 1] - edges[i];

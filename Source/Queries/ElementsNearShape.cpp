@@ -48,4 +48,33 @@ void findElementsNear(const SearchableGeometry& geometry, const Shape& before, c
                      });
 }
 
+void findElementsNear(const SearchableGeometry& geometry, const Eigen::AlignedBox3d& box,
+                      bool wholeStep, PointQueryStack& stack, Buffer<std::uint32_t>& out) {
+  const Eigen::Vector3d origin = worldOrigin(geometry);
+  const BoxMap map = worldMap(geometry, origin, 0.0, wholeStep);
+  const double unit = 1.0 / geometry.tree.frame().scale,
+               error = kShapeBoundError *
+                       (box.min().cwiseAbs().maxCoeff() + box.max().cwiseAbs().maxCoeff() +
+                        2.0 * origin.cwiseAbs().maxCoeff());
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(error),
+                        lower = box.min() - origin - margin, upper = box.max() - origin + margin;
+  const auto mayBeNear = [&](const FloatBox& stored) {
+    if (stored.empty()) return false;
+    const FloatBox floats = map(stored);
+    if (floats.mayBeClamped()) return true;
+    for (int k = 0; k < 3; ++k)
+      if (unit * double{floats.lower[k]} > upper[k] || unit * double{floats.upper[k]} < lower[k])
+        return false;
+    return true;
+  };
+  out.clear();
+  if (geometry.tree.octree().size() == 0) return;
+  forEachOverlapping(geometry.tree.octree(), mayBeNear, stack,
+                     [&](std::uint32_t begin, std::uint32_t end) {
+                       for (std::uint32_t i = begin; i < end; ++i)
+                         if (mayBeNear(geometry.tree.octree().boxes()[i]))
+                           out.push_back(geometry.tree.octree().order()[i]);
+                     });
+}
+
 }  // namespace palpate

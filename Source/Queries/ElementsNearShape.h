@@ -13,5 +13,8 @@ namespace palpate {
 ///          distance at the centre minus what the gradient there takes away up to a corner.
 void findElementsNear(const SearchableGeometry&, const Shape& before, const Shape& now,
                       double maxDistance, PointQueryStack&, Buffer<std::uint32_t>& out);
+/// The same for a box in the world, which encloses the whole step or the step's end.
+void findElementsNear(const SearchableGeometry&, const Eigen::AlignedBox3d& box, bool wholeStep,
+                      PointQueryStack&, Buffer<std::uint32_t>& out);
 
 }  // namespace palpate

@@ -18,7 +18,7 @@ void updateTetrahedra(SearchableGeometry& solid, const OctreeSettings& settings,
 }
 
 std::optional<TetrahedronPoint> SolidQuery::lowest(const Eigen::Vector3d& p) {
-  const std::vector<Tetrahedron>& tetrahedra = m_solid.solid->topology.tetrahedra;
+  const CountedVector<Tetrahedron>& tetrahedra = m_solid.solid->topology.tetrahedra;
   const Positions& now = m_solid.mesh.now;
   std::optional<TetrahedronPoint> best;
   SignCounts counts;

@@ -1,6 +1,7 @@
 #include "Queries/GeometryDistances.h"
 
 #include "Math/ClosestPoint.h"
+#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Octree/BoxMap.h"
 #include "Queries/ElementDistance.h"
@@ -148,7 +149,7 @@ class NearestPair {
     m_elementA = elementA;
     m_elementB = elementB;
     m_direction = b.point(found.weightsB) - a.point(found.weightsA);
-    const double length = m_direction.stableNorm();
+    const double length = stableLength(m_direction);
     if (length > 0 && std::isfinite(length))
       m_direction /= length;
     else

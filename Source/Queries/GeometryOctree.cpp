@@ -1,5 +1,6 @@
 #include "Queries/GeometryOctree.h"
 
+#include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
 #include "Mesh/TriangleBoxes.h"
 
@@ -153,12 +154,28 @@ void GeometryOctree::copy(const GeometryOctree& other) {
   m_treeVersion.commit(other.m_treeVersion.sources());
 }
 
+void GeometryOctree::releaseMemory() {
+  m_stars = {};
+  m_boundsGroups = Buffer<std::uint32_t>();
+  m_boundsBoxes = Buffer<FloatBox>();
+  if (!m_treeSwept) m_floatsBefore.clear();
+  releaseSpare(m_floats);
+  releaseSpare(m_floatsBefore);
+  if (m_ordered.empty())
+    m_orderedMemory.release();
+  else
+    m_ordered =
+        m_orderedMemory.shrink(std::span(m_ordered.data(), m_ordered.size() + BoxArrays::kPadding))
+            .first(m_ordered.size());
+  m_octree.releaseMemory();
+}
+
 /// Computes the boxes of the triangles in m_ordered, and those of the groups. reordered: first
 /// brings m_ordered into the octree's order.
 void GeometryOctree::computeBoxes(const TriangleMesh& mesh, std::span<const std::uint32_t> groups,
                                   FloatBox* groupBoxes, std::size_t grain, const Threads& threads,
                                   bool reordered) {
-  const std::vector<Triangle>& triangles = mesh.topology.triangles;
+  const CountedVector<Triangle>& triangles = mesh.topology.triangles;
   threads.forChunks(groups.size() - 1, grain, [&](std::size_t, std::size_t from, std::size_t to) {
     for (std::size_t i = groups[from]; reordered && i < groups[to]; ++i)
       m_ordered[i] = triangles[m_octree.order()[i]];
@@ -213,6 +230,7 @@ void GeometryOctree::fitBoxes(const TriangleMesh& mesh, const OctreeSettings& se
 
 const Triangle* GeometryOctree::findUnfoldedStars(const TriangleMesh& mesh,
                                                   const Threads& threads) {
+  const MemoryScope memory(MemoryStage::Octrees);
   m_stars.find(mesh.topology, m_ordered, floatsAtStart(), m_floats.data(), threads);
   return m_stars.triangles();
 }

@@ -45,6 +45,8 @@ class GeometryOctree {
   /// of one octree; only what changed since the last copy is copied.
   void copy(const GeometryOctree& other);
 
+  void releaseMemory();  ///< gives back what only the next updates need
+
   /// Whether the boxes enclose the positions now, in the body's frame. They may enclose more.
   bool encloses(const TriangleMesh&, Revision topology) const;
   std::uint64_t updates() const { return m_updates; }       ///< counts update()

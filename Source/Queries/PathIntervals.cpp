@@ -2,6 +2,7 @@
 
 #include "Exact/Compensated.h"
 #include "Exact/Predicates.h"
+#include "Math/StableLength.h"
 #include "Queries/GeometryDistances.h"
 #include "Queries/PointDistances.h"
 #include "Queries/ShapeRays.h"
@@ -19,7 +20,7 @@ PathLine::PathLine(std::span<const Vector3d> points, std::vector<double>& scratc
     : m_points(points), m_lengths(scratch) {
   m_lengths.assign(1, 0.0);
   for (std::size_t i = 0; i + 1 < points.size(); ++i)
-    m_lengths.push_back(m_lengths.back() + (points[i + 1] - points[i]).stableNorm());
+    m_lengths.push_back(m_lengths.back() + stableLength(points[i + 1] - points[i]));
 }
 
 Vector3d PathLine::operator()(double arcLength) const {

@@ -3,6 +3,7 @@
 #include <palpate/Settings.h>
 #include <palpate/SpatialQueries.h>
 
+#include "Core/MemoryBudget.h"
 #include "Core/Threads.h"
 #include "Queries/PairTraversal.h"
 #include "Queries/PathIntervals.h"
@@ -29,7 +30,7 @@ namespace palpate {
 class SpatialQueries::Source {
  public:
   /// Scratch of one call, which remembers its peak.
-  struct Scratch {
+  struct Scratch : CountedObject {
     PointQueryStack stack;
     VertexSearch<InsideVertex> inside;
     VertexSearch<EmbeddedVertex> embedded;
@@ -51,28 +52,36 @@ class SpatialQueries::Source {
   /// What all sources of one owner share: the scratch that no call uses.
   class Pool {
    public:
-    Pool();
+    /// budget: null for none.
+    explicit Pool(std::shared_ptr<MemoryBudget> budget = nullptr);
     std::uint64_t id() const { return m_id; }  ///< unique in the process
     ~Pool();
     std::unique_ptr<Scratch> take();
     void giveBack(std::unique_ptr<Scratch>);
+    void release();  ///< frees all scratch that no call uses
+    const std::shared_ptr<MemoryBudget>& budget() const { return m_budget; }
 
    private:
     const std::uint64_t m_id;
+    const std::shared_ptr<MemoryBudget> m_budget;
     std::atomic<Scratch*> m_spare = nullptr;  ///< the one that is likely to be lent next
     std::mutex m_mutex;
     std::vector<std::unique_ptr<Scratch>> m_free;
   };
-  /// Scratch lent to one call.
+  /// Scratch lent to one call. While it is, memory counts toward the owner's budget.
   class Loan {
    public:
-    explicit Loan(Source& source) : m_pool(*source.m_pool), m_scratch(m_pool.take()) {}
+    explicit Loan(Source& source)
+        : m_memory(source.m_pool->budget(), MemoryStage::Queries),
+          m_pool(*source.m_pool),
+          m_scratch(m_pool.take()) {}
     ~Loan() { m_pool.giveBack(std::move(m_scratch)); }
     Loan(const Loan&) = delete;
     Loan& operator=(const Loan&) = delete;
     Scratch* operator->() const { return m_scratch.get(); }
 
    private:
+    const MemoryScope m_memory;
     Pool& m_pool;
     std::unique_ptr<Scratch> m_scratch;
   };
@@ -94,6 +103,8 @@ class SpatialQueries::Source {
   virtual const OctreeSettings& octreeSettings() const = 0;
   virtual const Threads& threads() const = 0;
 
+  const std::shared_ptr<MemoryBudget>& budget() const { return m_pool->budget(); }
+  void releaseScratch() { m_pool->release(); }
   std::uint64_t id() const { return m_pool->id(); }  ///< of the owner; unique in the process
 
   /// The threads for one call: the pool, or a single thread while another call uses the pool.
@@ -125,7 +136,7 @@ class SpatialQueries::Source {
 /// Throws InvalidSettings if both geometries are the same, and UnsupportedMethod if `vertices` is a
 /// shape.
 void checkVertices(const SearchableGeometry& vertices, GeometryId body);
-/// Throws InvalidSettings for a length that is negative, NaN or, with `finite`, infinite.
+/// Throws InvalidSettings for a length that is negative, NaN or, if `finite`, out of range.
 void checkLength(double length, const char* name, bool finite);
 /// Throws UnsupportedMethod for an analytical shape.
 void checkHasElements(const SearchableGeometry&);

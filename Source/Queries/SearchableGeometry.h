@@ -3,6 +3,7 @@
 #include <palpate/DistanceField.h>
 #include <palpate/Types.h>
 
+#include "Core/MemoryBudget.h"
 #include "Mesh/Revision.h"
 #include "Mesh/TetrahedralTopology.h"
 #include "Mesh/TriangleMesh.h"
@@ -36,7 +37,7 @@ struct GeometryRevisions {
 
 /// The tetrahedra of a geometry that is the surface of a tetrahedral mesh, and an octree over them.
 /// The octree is built when a query first needs it.
-struct Solid {
+struct Solid : CountedObject {
   TetrahedralTopology topology;
   TetrahedronTree tree;
   /// The topology and positions for which `tree` was updated, and the geometry's float frame then.
@@ -61,7 +62,7 @@ class PreparedState {
 };
 
 /// A geometry with the octree over its elements, and all other data that queries need.
-struct SearchableGeometry {
+struct SearchableGeometry : CountedObject {
   explicit SearchableGeometry(GeometryId newId) : id(newId) {}
 
   GeometryId id;

@@ -1,5 +1,6 @@
 #include "Queries/ShapeOverlap.h"
 
+#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Queries/ElementsNearShape.h"
 #include "Queries/PointDistances.h"
@@ -121,7 +122,7 @@ std::optional<Convex> convexOf(const Shape& hull) {
   Convex convex;
   convex.p = convex.q = corners[0];
   for (const Vector3d& corner : corners)
-    convex.magnitude = std::max(convex.magnitude, (corner - convex.p).stableNorm());
+    convex.magnitude = std::max(convex.magnitude, stableLength(corner - convex.p));
   for (const auto& [a, b, c] : hull.faces()) {
     const Vector3d u = corners[b] - corners[a], v = corners[c] - corners[a];
     const Vector3d normal = u.cross(v);

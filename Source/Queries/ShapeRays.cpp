@@ -3,6 +3,7 @@
 #include "Exact/Compensated.h"
 #include "Math/RayTriangle.h"
 #include "Math/RoundSegment.h"
+#include "Math/StableLength.h"
 
 #include <Eigen/Geometry>
 
@@ -40,7 +41,7 @@ std::optional<Inside> insideCapsule(const Shape& shape, const Ray& ray) {
 /// A cylinder is the common part of a slab and an infinite cylinder.
 std::optional<Inside> insideCylinder(const Shape& shape, const Ray& ray) {
   const Vector3d p = shape.corners()[0], q = shape.corners()[1], axis = shape.axes().col(2);
-  const double length = ray.direction.stableNorm();
+  const double length = stableLength(ray.direction);
   const Vector3d d = ray.direction / length;
   // s = 0 where the ray is nearest to the centre
   const double shift = (shape.origin() - ray.origin).dot(d);

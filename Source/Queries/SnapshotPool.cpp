@@ -106,7 +106,7 @@ class Snapshot::Contents : public SpatialQueries::Source {
 };
 
 /// One snapshot, with the memory of its shared_ptr's control block.
-class SnapshotPool::Slot : public Snapshot::Contents {
+class SnapshotPool::Slot : public Snapshot::Contents, public CountedObject {
  public:
   explicit Slot(std::shared_ptr<Pool> scratch) : Contents(std::move(scratch)) {}
 
@@ -161,16 +161,29 @@ class SnapshotPool::SlotAllocator {
   Slot* m_slot;
 };
 
-SnapshotPool::SnapshotPool() : m_scratch(std::make_shared<SpatialQueries::Source::Pool>()) {}
+SnapshotPool::SnapshotPool(std::shared_ptr<MemoryBudget> budget)
+    : m_scratch(std::make_shared<SpatialQueries::Source::Pool>(std::move(budget))) {}
 SnapshotPool::~SnapshotPool() = default;
 
-/// Takes back the copies of free slots, and forgets free copies of removed geometries.
-void SnapshotPool::reclaim(const SpatialQueries::Source& frame) {
+/// Takes back the copies of free slots.
+void SnapshotPool::reclaim() {
   for (const auto& slot : m_slots) {
     if (!slot->isFree()) continue;
     for (GeometryCopy* copy : slot->geometries()) --copy->users;
     slot->geometries().clear();
   }
+}
+
+void SnapshotPool::releaseMemory() {
+  reclaim();
+  std::erase_if(m_slots,
+                [](const auto& slot) { return slot->isFree() && slot->geometries().empty(); });
+  std::erase_if(m_copies, [](const auto& copy) { return copy->users == 0; });
+  m_scratch->release();
+}
+
+/// Forgets free copies of removed geometries.
+void SnapshotPool::forgetRemoved(const SpatialQueries::Source& frame) {
   std::size_t i = 0;
   std::erase_if(m_copies, [&](const auto& copy) {
     const GeometryId id = copy->geometry.id;
@@ -205,7 +218,8 @@ GeometryCopy& SnapshotPool::copyOf(const SearchableGeometry& original) {
 }
 
 std::shared_ptr<const Snapshot> SnapshotPool::take(SpatialQueries::Source& frame, double time) {
-  reclaim(frame);
+  reclaim();
+  forgetRemoved(frame);
   Slot& slot = freeSlot();
   slot.geometries().reserve(frame.geometryCount());
   for (std::size_t i = 0; i < frame.geometryCount(); ++i) {
@@ -278,9 +292,7 @@ Eigen::Vector3d Snapshot::position(GeometryId id, std::uint32_t vertex, double t
   const StandardFloatingPoint standard;
   const Eigen::Vector3d now = geometry.mesh.now[vertex], before = geometry.mesh.before[vertex];
   if (time == 0.0 || time == 1.0) return time == 0.0 ? before : now;
-  const Eigen::Vector3d motion = now - before;
-  if (motion.allFinite()) return before + time * motion;
-  return (1.0 - time) * before + time * now;
+  return before + time * (now - before);
 }
 
 }  // namespace palpate

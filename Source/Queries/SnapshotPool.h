@@ -10,13 +10,14 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <utility>
 #include <vector>
 
 namespace palpate {
 
 /// A copy of one geometry for queries. Snapshots share it. It is updated when none of them uses it;
 /// only what changed since its last update is then copied.
-class GeometryCopy {
+class GeometryCopy : public CountedObject {
  public:
   explicit GeometryCopy(GeometryId id) : geometry(id) {}
 
@@ -41,12 +42,15 @@ class GeometryCopy {
 /// thread changes copies and their counts.
 class SnapshotPool : public std::enable_shared_from_this<SnapshotPool> {
  public:
-  SnapshotPool();
+  /// budget: null for none.
+  explicit SnapshotPool(std::shared_ptr<MemoryBudget> budget = nullptr);
   ~SnapshotPool();
 
   /// A snapshot of all geometries of a source, whose octrees must be up to date. Called by one
   /// thread at a time. If it throws, no snapshot has changed.
   std::shared_ptr<const Snapshot> take(SpatialQueries::Source&, double time);
+  /// Gives back the memory of snapshots that nobody holds, and what queries keep.
+  void releaseMemory();
   std::size_t copyCount() const { return m_copies.size(); }
   std::size_t slotCount() const { return m_slots.size(); }
 
@@ -55,7 +59,8 @@ class SnapshotPool : public std::enable_shared_from_this<SnapshotPool> {
   template <class T>
   class SlotAllocator;
 
-  void reclaim(const SpatialQueries::Source&);
+  void reclaim();
+  void forgetRemoved(const SpatialQueries::Source&);
   Slot& freeSlot();
   GeometryCopy& copyOf(const SearchableGeometry&);
 
@@ -72,11 +77,16 @@ class SnapshotPool : public std::enable_shared_from_this<SnapshotPool> {
 ///          std::atomic<std::shared_ptr> of this standard library is a spin lock.
 class LatestSnapshot {
  public:
+  /// budget: of all snapshots; null for none.
+  explicit LatestSnapshot(std::shared_ptr<MemoryBudget> budget)
+      : m_pool(std::make_shared<SnapshotPool>(std::move(budget))) {}
+
+  void releaseMemory() { m_pool->releaseMemory(); }
   void publish(SpatialQueries::Source&, double time);
   std::shared_ptr<const Snapshot> get() const;
 
  private:
-  std::shared_ptr<SnapshotPool> m_pool = std::make_shared<SnapshotPool>();
+  std::shared_ptr<SnapshotPool> m_pool;
   mutable std::mutex m_mutex;
   std::shared_ptr<const Snapshot> m_latest;
 };

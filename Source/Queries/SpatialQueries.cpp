@@ -4,7 +4,9 @@
 
 #include "Core/FloatingPoint.h"
 #include "Core/Text.h"
+#include "Math/Range.h"
 #include "Math/ClosestPoint.h"
+#include "Math/StableLength.h"
 #include "Queries/Containment.h"
 #include "Queries/Embedding.h"
 #include "Queries/GeometryDistances.h"
@@ -35,7 +37,8 @@ std::uint64_t nextSourceId() {
 
 }  // namespace
 
-SpatialQueries::Source::Pool::Pool() : m_id(nextSourceId()) {}
+SpatialQueries::Source::Pool::Pool(std::shared_ptr<MemoryBudget> budget)
+    : m_id(nextSourceId()), m_budget(std::move(budget)) {}
 
 SpatialQueries::Source::Pool::~Pool() { delete m_spare.load(); }
 
@@ -65,6 +68,12 @@ void SpatialQueries::Source::Pool::giveBack(std::unique_ptr<Scratch> scratch) {
   }
 }
 
+void SpatialQueries::Source::Pool::release() {
+  delete m_spare.exchange(nullptr);
+  const std::lock_guard lock(m_mutex);
+  m_free.clear();
+}
+
 void SpatialQueries::Source::Scratch::sort(std::vector<std::uint32_t>& numbers) {
   if (numbers.empty()) return;
   const auto [least, most] = std::minmax_element(numbers.begin(), numbers.end());
@@ -89,6 +98,7 @@ void SpatialQueries::Source::prepareInside(SearchableGeometry& body,
   const std::uint64_t now = state(), updates = body.tree.updates();
   if (prepared.isCurrent(now, updates)) return;
   const std::lock_guard lock(body.preparation);
+  const MemoryScope memory(budget(), MemoryStage::Queries);
   checkInside(body, settings.rule);
   if (settings.rule == InsideRule::WindingNumber && body.tree.octree().size() > 0)
     body.windingNumbers.update(body, Workers(*this));
@@ -99,6 +109,7 @@ void SpatialQueries::Source::prepareInside(SearchableGeometry& body,
 
 bool SpatialQueries::Source::prepareIfClosed(SearchableGeometry& body) {
   const std::lock_guard lock(body.preparation);
+  const MemoryScope memory(budget(), MemoryStage::Queries);
   if (!isClosed(body)) return false;
   if (body.solid) updateTetrahedra(body, octreeSettings(), Workers(*this));
   return true;
@@ -106,6 +117,7 @@ bool SpatialQueries::Source::prepareIfClosed(SearchableGeometry& body) {
 
 void SpatialQueries::Source::prepareTetrahedra(SearchableGeometry& solid) {
   const std::lock_guard lock(solid.preparation);
+  const MemoryScope memory(budget(), MemoryStage::Queries);
   updateTetrahedra(solid, octreeSettings(), Workers(*this));
 }
 
@@ -134,10 +146,10 @@ SpatialQueries::Source& SpatialQueries::valid() const {
 }
 
 void checkLength(double length, const char* name, bool finite) {
-  if (!(length >= 0) || (finite && std::isinf(length)))
+  if (!(length >= 0) || (finite && !isWithinRange(length)))
     throw Error(ErrorCode::InvalidSettings, std::string(name) + " is " + textOf(length) +
-                                                "; it must be a number of at least 0" +
-                                                (finite ? " and must be finite" : ""));
+                                                "; it must be " +
+                                                (finite ? kLengthRule : "a number of at least 0"));
 }
 
 void checkHasElements(const SearchableGeometry& geometry) {
@@ -155,10 +167,10 @@ namespace {
 
 /// index: of a batch.
 void checkPoint(const Eigen::Vector3d& point, std::optional<std::size_t> index = {}) {
-  if (!point.allFinite())
-    throw Error(
-        ErrorCode::NonFinitePosition,
-        (index ? "point " + std::to_string(*index) : "the query's point") + " is " + textOf(point));
+  if (!isWithinRange(point))
+    throw Error(ErrorCode::NonFinitePosition,
+                (index ? "point " + std::to_string(*index) : "the query's point") + " is " +
+                    textOf(point) + "; it must be " + kRangeRule);
 }
 
 void checkPoints(std::span<const Eigen::Vector3d> points) {
@@ -204,7 +216,7 @@ Pick pickOf(const RayHit& hit, const Ray& ray, const Positions& now) {
   double leastVertex = kInfinity, leastEdge = kInfinity;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::uint32_t p = hit.vertices[i], q = hit.vertices[(i + 1) % 3];
-    if (const double distance = (now[p] - point).stableNorm(); distance < leastVertex) {
+    if (const double distance = stableLength(now[p] - point); distance < leastVertex) {
       leastVertex = distance;
       pick.vertex = p;
     }
@@ -223,9 +235,10 @@ void checkRay(const Ray& ray, std::optional<std::size_t> index = {}) {
   const auto refuse = [&](ErrorCode code, const std::string& fault) {
     throw Error(code, (index ? "ray " + std::to_string(*index) : "the ray") + " has " + fault);
   };
-  if (!ray.origin.allFinite() || !ray.direction.allFinite())
-    refuse(ErrorCode::NonFinitePosition,
-           "origin " + textOf(ray.origin) + " and direction " + textOf(ray.direction));
+  if (!isWithinRange(ray.origin) || !isWithinRange(ray.direction))
+    refuse(ErrorCode::NonFinitePosition, "origin " + textOf(ray.origin) + " and direction " +
+                                             textOf(ray.direction) + "; both must be " +
+                                             kRangeRule);
   if (ray.direction == Eigen::Vector3d::Zero())
     refuse(ErrorCode::InvalidSettings, "a direction of length 0");
   if (!std::isfinite(ray.tMin) || !(ray.tMin <= ray.tMax))
@@ -584,9 +597,10 @@ void SpatialQueries::path(std::span<const Eigen::Vector3d> polyline, double radi
     throw Error(ErrorCode::InvalidSettings, "the path has " + std::to_string(polyline.size()) +
                                                 " points; it must have 2 or more");
   for (std::size_t i = 0; i < polyline.size(); ++i)
-    if (!polyline[i].allFinite())
-      throw Error(ErrorCode::NonFinitePosition,
-                  "point " + std::to_string(i) + " of the path is " + textOf(polyline[i]));
+    if (!isWithinRange(polyline[i]))
+      throw Error(ErrorCode::NonFinitePosition, "point " + std::to_string(i) + " of the path is " +
+                                                    textOf(polyline[i]) + "; it must be " +
+                                                    kRangeRule);
   const Source::Loan scratch(source);
   PathScratch& found = scratch->path;
   const PathLine path(polyline, found.lengths);
@@ -659,9 +673,10 @@ std::optional<TetrahedronPoint> SpatialQueries::findTetrahedron(
   const StandardFloatingPoint standard;
   SearchableGeometry& solid = source.at(body);
   checkMeshType(solid, true, "findTetrahedron() is for tetrahedral meshes");
-  if (!point.allFinite())
+  if (!isWithinRange(point))
     throw Error(ErrorCode::NonFinitePosition,
-                nameOf(body) + ": the point is " + textOf(point) + "; it must be finite", body);
+                nameOf(body) + ": the point is " + textOf(point) + "; it must be " + kRangeRule,
+                body);
   source.prepareTetrahedra(solid);
   const Source::Loan scratch(source);
   return SolidQuery(solid, source.engine(), scratch->stack).lowest(point);

@@ -31,7 +31,7 @@ class TetrahedronTree {
   void fit(const FloatPoint* floats, const Threads&);
 
   Octree m_octree;
-  std::vector<Tetrahedron> m_ordered;
+  CountedVector<Tetrahedron> m_ordered;
   Buffer<std::uint64_t> m_keys;  ///< scratch
   bool m_isBuilt = false;        ///< the tree is built, and the last update did not throw
 };

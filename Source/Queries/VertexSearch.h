@@ -33,9 +33,9 @@ template <class Result>
 struct VertexSearch {
   struct Part {
     PointQueryStack stack;
-    std::vector<Result> found;
+    CountedVector<Result> found;
   };
-  std::vector<Part> parts;
+  CountedVector<Part> parts;
 };
 
 /// Calls query(vertex) for each vertex of a geometry that is in an element, enabled or not, and

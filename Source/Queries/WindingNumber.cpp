@@ -123,9 +123,9 @@ static SolidAngleShare sumOfAll(const TriangleMesh& mesh, const Vector3d& p) {
   return sum;
 }
 
-WindingNumbers::Result WindingNumbers::evaluate(const SearchableGeometry& body, const Vector3d& p,
-                                                double margin, bool bruteForce,
-                                                PointQueryStack& stack) const {
+template <class F>
+SolidAngleShare WindingNumbers::sum(const SearchableGeometry& body, const Vector3d& p,
+                                    bool bruteForce, PointQueryStack& stack, F&& isEnough) const {
   const Octree& octree = body.tree.octree();
   const Positions& now = body.mesh.now;
   for (const double farRadii : kFarRadii) {
@@ -144,14 +144,27 @@ WindingNumbers::Result WindingNumbers::evaluate(const SearchableGeometry& body, 
         nearSum.add(solidAngleShare(p, now[a], now[b], now[c]));
       }
     });
-    // Decided only if the sum over all triangles, within its own error bound, certainly gives the
-    // same decision.
+    // The error bound encloses the sum over all triangles, within its own error bound.
     const SolidAngleShare sum{
         farSum.value + nearSum.value,
         farSum.error + 2 * nearSum.error + kWindingSlack * static_cast<double>(octree.size())};
-    if (const Result found = decide(sum, margin); found.decided) return found;
+    if (isEnough(sum)) return sum;
   }
-  return decide(sumOfAll(body.mesh, p), margin);
+  return sumOfAll(body.mesh, p);
+}
+
+WindingNumbers::Result WindingNumbers::evaluate(const SearchableGeometry& body, const Vector3d& p,
+                                                double margin, bool bruteForce,
+                                                PointQueryStack& stack) const {
+  return decide(sum(body, p, bruteForce, stack,
+                    [&](const SolidAngleShare& found) { return decide(found, margin).decided; }),
+                margin);
+}
+
+SolidAngleShare WindingNumbers::value(const SearchableGeometry& body, const Vector3d& p,
+                                      double error, PointQueryStack& stack) const {
+  return sum(body, p, false, stack,
+             [&](const SolidAngleShare& found) { return found.error <= error; });
 }
 
 }  // namespace palpate

@@ -38,6 +38,10 @@ class WindingNumbers {
   /// that of the sum over all triangles, and does not depend on the octree.
   Result evaluate(const SearchableGeometry& body, const Eigen::Vector3d&, double margin,
                   bool bruteForce, PointQueryStack&) const;
+  /// Call after update(). The winding number, which may have either sign, with an error bound. The
+  /// bound is at most `error`, unless rounding errors are larger.
+  SolidAngleShare value(const SearchableGeometry& body, const Eigen::Vector3d&, double error,
+                        PointQueryStack&) const;
 
  private:
   /// Moments of a set of triangles about their centre of mass, for points far away.
@@ -50,6 +54,11 @@ class WindingNumbers {
   };
   void computeOwnCluster(const SearchableGeometry& body, OctreeNode);
   SolidAngleShare clusterShare(const Cluster&, const Eigen::Vector3d& p, double distance) const;
+  /// The sum of clusters and triangles for which isEnough(sum) is true, or else that of all
+  /// triangles.
+  template <class F>
+  SolidAngleShare sum(const SearchableGeometry& body, const Eigen::Vector3d&, bool bruteForce,
+                      PointQueryStack&, F&& isEnough) const;
 
   DerivedFrom<2> m_clustersVersion;  ///< positions in the body's frame, and the transform
   std::uint64_t m_treeUpdates = 0;   ///< GeometryOctree::updates() for which m_clusters hold

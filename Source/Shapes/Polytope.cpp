@@ -69,19 +69,19 @@ std::vector<Vector3d> spanOf(std::span<const Vector3d> points) {
   const auto before = [](const Vector3d& p, const Vector3d& q) {
     return std::lexicographical_compare(p.begin(), p.end(), q.begin(), q.end());
   };
-  const auto [first, last] = std::minmax_element(points.begin(), points.end(), before);
-  std::vector<Vector3d> span{*first};
-  if (*first == *last) return span;
-  span.push_back(*last);
-  const Vector3d &a = *first, along = *last - a;
+  const auto ends = std::minmax_element(points.begin(), points.end(), before);
+  const Vector3d &a = *ends.first, &b = *ends.second, along = b - a;
+  std::vector<Vector3d> span{a};
+  if (a == b) return span;
+  span.push_back(b);
   const Vector3d* third = furthest(
-      points, [&](const Vector3d& p) { return spanPlane(a, *last, p); },
+      points, [&](const Vector3d& p) { return spanPlane(a, b, p); },
       [&](const Vector3d& p) { return along.cross(p - a).squaredNorm(); });
   if (!third) return span;
   span.push_back(*third);
   const Vector3d across = along.cross(*third - a);
   if (const Vector3d* fourth = furthest(
-          points, [&](const Vector3d& p) { return volumeSign(a, *last, *third, p) != 0; },
+          points, [&](const Vector3d& p) { return volumeSign(a, b, *third, p) != 0; },
           [&](const Vector3d& p) { return std::abs(across.dot(p - a)); }))
     span.push_back(*fourth);
   return span;

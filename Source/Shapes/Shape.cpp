@@ -6,6 +6,7 @@
 #include "Exact/Compensated.h"
 #include "Math/Foot.h"
 #include "Exact/Predicates.h"
+#include "Math/Range.h"
 #include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>
@@ -395,8 +396,8 @@ std::string faultOf(const RigidTransform& transform) {
   if (!r.allFinite() || !(off <= kOrthonormal) || !(r.determinant() > 0))
     return "rotation is not a rotation matrix: R^T R differs from the identity by " + textOf(off) +
            ", and its determinant is " + textOf(r.determinant());
-  if (transform.translation.allFinite()) return {};
-  return "translation is " + textOf(transform.translation) + "; it must be finite";
+  if (isWithinRange(transform.translation)) return {};
+  return "translation is " + textOf(transform.translation) + "; it must be " + kRangeRule;
 }
 
 }  // namespace palpate

@@ -253,9 +253,10 @@ class ShapeContactFinder {
     for (int i = 0; i < 3; ++i) {
       const auto& [vertex, from] = m_ends[i];
       if (topology.ownsCorner(element, i))
-        find(ShapeElement::Vertex, vertex, {vertex, vertex, vertex}, std::array{m_ends[i]}, [&] {
-          return NearestToShape{Vector3d::UnitX(), from.normal, from.distance, true};
-        });
+        find(ShapeElement::Vertex, vertex, {vertex, vertex, vertex}, std::array{m_ends[i]},
+             [&, &from = from] {
+               return NearestToShape{Vector3d::UnitX(), from.normal, from.distance, true};
+             });
       if (!topology.ownsEdge(element, i)) continue;
       const Segment& edge = topology.edges[topology.triangleEdges[element][i]];
       find(ShapeElement::Edge, edge[0], {edge[0], edge[1], edge[1]},

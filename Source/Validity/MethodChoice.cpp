@@ -29,6 +29,16 @@ static void chooseMethod(const PairSettings& settings, const GeometryInStep& a,
   plan.reason = still ? MethodReason::Still : MethodReason::NoAlternative;
 }
 
+static double motionToleranceOf(const PairSettings& settings) {
+  return settings.motionTolerance < 0 ? settings.thickness / 2 : settings.motionTolerance;
+}
+
+/// L: features that come within the thickness in a step in which they move this far are at its end
+/// at most this much further apart.
+static double extraThicknessOf(const PairSettings& settings, double motion) {
+  return motion * (1.0 + kMotionSlack * settings.timeTolerance);
+}
+
 PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
                 bool moves) {
   PairPlan plan;
@@ -46,8 +56,7 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
   }
   step.motion = plan.motion;
   if (settings.method == Method::Auto) {
-    plan.motionTolerance = step.slowMotion =
-        settings.motionTolerance < 0 ? thickness / 2 : settings.motionTolerance;
+    plan.motionTolerance = step.slowMotion = motionToleranceOf(settings);
     if (plan.motion == 0.0) {
       plan.method = thickness > 0.0 ? Method::Proximity : Method::Intersection;
       plan.reason = MethodReason::Still;
@@ -66,8 +75,7 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
     }
     step.reportsImpacts = plan.method == Method::Proximity || plan.method == Method::Auto;
     if (step.reportsImpacts)
-      step.extraThickness = std::min(plan.motion, plan.motionTolerance) *
-                            (1.0 + kMotionSlack * settings.timeTolerance);
+      step.extraThickness = extraThicknessOf(settings, std::min(plan.motion, plan.motionTolerance));
   } else if (settings.method == Method::Intersection) {
     plan.searchDistance =
         plan.motion <= std::min(a.smallestHeight, b.smallestHeight) ? plan.motion : 0.0;
@@ -81,19 +89,38 @@ bool isWithinBand(const DistanceField& field, double thickness, double largestRa
   return thickness + largestRadius < field.band() - field.errorBound();
 }
 
-void useField(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
-              PairPlan& plan) {
+std::optional<PairPlan> planByField(const PairSettings& settings, const GeometryInStep& a,
+                                    const GeometryInStep& b, const PairPlan& exact) {
   const GeometryInStep& body = bodyWithField(a, b);
   const GeometryInStep& other = &body == &b ? a : b;
-  const bool allowed = settings.method == Method::Auto && plan.method == Method::Proximity &&
-                       plan.motion == 0.0 && settings.allowedError > 0.0 && body.field &&
-                       &a.mesh != &b.mesh && !other.isShape;
-  if (!allowed || !(body.field->errorBound() <= settings.allowedError) ||
-      !isWithinBand(*body.field, settings.thickness, other.mesh.largestRadius))
-    return;
-  plan = {};
+  if (settings.method != Method::Auto || !body.field || &a.mesh == &b.mesh || other.isShape ||
+      !(settings.allowedError > 0.0 && body.field->errorBound() <= settings.allowedError))
+    return {};
+  // A field knows only sides of its own.
+  if (other.mesh.outerSideOnly || (body.mesh.outerSideOnly && !body.field->isClosed())) return {};
+  const double tolerance = motionToleranceOf(settings);
+  const bool isAnswered = exact.motion == 0.0
+                              ? exact.method == Method::Proximity
+                              : hasProximity(a, b, settings.thickness) && exact.motion <= tolerance;
+  PairPlan plan;
   plan.method = Method::DistanceField;
   plan.reason = MethodReason::AllowedError;
+  plan.motion = exact.motion;
+  plan.arcDeviation = exact.arcDeviation;
+  plan.motionTolerance = tolerance;
+  plan.step.extraThickness = extraThicknessOf(settings, exact.motion);
+  if (!isAnswered || !isWithinBand(*body.field, settings.thickness + plan.step.extraThickness,
+                                   other.mesh.largestRadius))
+    return {};
+  return plan;
+}
+
+PairPlan planByProxy(const PairSettings& settings, PairPlan exact) {
+  exact.byProxy = true;
+  exact.motionTolerance = motionToleranceOf(settings);
+  exact.proxyThickness = settings.thickness +
+                         extraThicknessOf(settings, std::min(exact.motion, exact.motionTolerance));
+  return exact;
 }
 
 }  // namespace palpate

@@ -9,6 +9,8 @@
 #include "Mesh/TriangleMesh.h"
 #include "NarrowPhase/NarrowPhase.h"
 
+#include <optional>
+
 namespace palpate {
 
 /// The data of one geometry from which a method is chosen and Validity::trusted is decided.
@@ -36,7 +38,11 @@ struct PairPlan {
   /// there are any, but no intersections, the answer is not trusted.
   double searchDistance = 0;
   StepPlan step;
-  bool runsIntersection = false;    ///< Auto: Intersection runs, too, if the start intersects
+  bool runsIntersection = false;  ///< Auto: Intersection runs, too, if the start intersects
+  /// Auto: an attached proxy answers all particles but those that may have an impact in the step.
+  /// The method above answers the others.
+  bool byProxy = false;
+  double proxyThickness = 0;        ///< L: up to which it reports contacts
   bool startsIntersecting = false;  ///< triangles are known to intersect at the step's start
   /// Whether the boxes enclose the motion over the whole step.
   bool swept() const { return method == Method::Continuous || method == Method::Auto; }
@@ -64,7 +70,12 @@ PairPlan planOf(const PairSettings&, const GeometryInStep& a, const GeometryInSt
 
 /// Whether the field can answer at this thickness: all contacts outside the body are in its band.
 bool isWithinBand(const DistanceField&, double thickness, double largestRadius);
-/// Auto: answers by an attached field instead, where that is allowed and misses no impact.
-void useField(const PairSettings&, const GeometryInStep& a, const GeometryInStep& b, PairPlan&);
+/// Auto: the plan by which an attached field may answer instead of the plan `exact`, at rest or in
+/// a slow step. In a step that moves, no impact may be missed: the geometries must be known to be
+/// further apart at its end than PairPlan::motion. None where the settings do not allow it.
+std::optional<PairPlan> planByField(const PairSettings&, const GeometryInStep& a,
+                                    const GeometryInStep& b, const PairPlan& exact);
+/// The same for the leaves of an attached proxy, which the settings allow.
+PairPlan planByProxy(const PairSettings&, PairPlan exact);
 
 }  // namespace palpate

@@ -128,11 +128,13 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
                    const MeshPair& meshes, CollisionData::Contents& contents,
                    ContactBuffers& counts) {
   Validity& validity = contents.validity;
-  validity.method = plan.method;
-  validity.reason = plan.reason;
+  validity.method = plan.byProxy ? Method::Proxy : plan.method;
+  validity.reason = plan.byProxy ? MethodReason::AllowedError : plan.reason;
   validity.displacement = plan.motion;
-  validity.effectiveThickness =
-      plan.method == Method::Intersection ? 0.0 : settings.thickness + plan.step.extraThickness;
+  validity.effectiveThickness = plan.byProxy ? plan.proxyThickness
+                                : plan.method == Method::Intersection
+                                    ? 0.0
+                                    : settings.thickness + plan.step.extraThickness;
   const auto take = [](std::vector<std::uint32_t>& out, const Buffer<std::uint32_t>& ids) {
     out.assign(ids.begin(), ids.end());
   };
@@ -147,6 +149,13 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   if (plan.step.checksStart) {
     m_atStart = {};
     m_atStart.position = facts.startsIntersecting ? Position::Intersecting : Position::Apart;
+    m_atStart.version.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
+  }
+  const bool byField = plan.reason == MethodReason::AllowedError;
+  const bool provenApart = byField && plan.motion > 0.0 && haveTriangles(a, b);
+  if (provenApart) {
+    m_atStart = {};
+    m_atStart.position = Position::Apart;
     m_atStart.version.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
   }
   validity.startedApart = m_atStart.position == Position::Apart;
@@ -170,9 +179,9 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   if (!contents.intersectingTriangles.empty()) {
     m_atEnd.position = Position::Intersecting;
     m_atEnd.witness = contents.intersectingTriangles.front();
-  } else if (plan.reason == MethodReason::AllowedError) {  // nothing moves
+  } else if (byField) {
     m_atEnd = m_atStart;
-    m_atEnd.clearance = 0.0;
+    m_atEnd.clearance = provenApart ? plan.motion : 0.0;
   } else if (plan.method == Method::Intersection) {
     if (plan.motion == 0.0 && facts.clearance > 0.0) m_atEnd.position = Position::Apart;
   } else if (trustedIfStraight && (facts.clearance > 0.0 || plan.motion == 0.0)) {

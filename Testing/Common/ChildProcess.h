@@ -1,5 +1,7 @@
 #pragma once
 
+#include "Common/Sanitized.h"
+
 #include <csignal>
 #include <cstdlib>
 #include <functional>
@@ -7,29 +9,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define PALPATE_SANITIZED
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define PALPATE_SANITIZED
-#endif
-#endif
-
 namespace palpate::testing {
-
-#ifdef PALPATE_SANITIZED
-inline constexpr bool kSanitized = true;
-#else
-inline constexpr bool kSanitized = false;
-#endif
 
 /// AddressSanitizer does not lock its allocator around fork(). If another thread of the parent
 /// allocates at that moment, the child finds the allocator locked for ever.
-#if defined(__SANITIZE_ADDRESS__)
-inline constexpr bool kForksBesideThreads = false;
-#else
-inline constexpr bool kForksBesideThreads = true;
-#endif
+inline constexpr bool kForksBesideThreads = !kAddressSanitizer;
 
 /// The result of a child: "passed", "failed", "exit 3", or "signal 14" (SIGALRM: it hung). The
 /// child runs `body` and exits without running the exit handlers of the process.

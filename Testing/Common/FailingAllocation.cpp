@@ -12,7 +12,7 @@ namespace {
 
 std::atomic<bool> armed{false}, anyFailed{false}, allFail{false};
 std::atomic<std::size_t> allocations{0}, failing{0};
-std::atomic<std::ptrdiff_t> bytes{0}, peak{0};  // since arm()
+std::atomic<std::ptrdiff_t> inUse{0}, peak{0};  // since arm()
 
 bool fails() {
   if (!armed.load(std::memory_order_relaxed)) return false;
@@ -25,7 +25,7 @@ bool fails() {
 void* counted(void* memory) {
   if (!memory || !armed.load(std::memory_order_relaxed)) return memory;
   const auto size = static_cast<std::ptrdiff_t>(malloc_usable_size(memory));
-  const std::ptrdiff_t now = bytes.fetch_add(size) + size;
+  const std::ptrdiff_t now = inUse.fetch_add(size) + size;
   for (std::ptrdiff_t most = peak; now > most && !peak.compare_exchange_weak(most, now);) {
   }
   return memory;
@@ -33,7 +33,7 @@ void* counted(void* memory) {
 
 void release(void* memory) {
   if (memory && armed.load(std::memory_order_relaxed))
-    bytes -= static_cast<std::ptrdiff_t>(malloc_usable_size(memory));
+    inUse -= static_cast<std::ptrdiff_t>(malloc_usable_size(memory));
   std::free(memory);
 }
 
@@ -62,7 +62,7 @@ void FailingAllocation::arm(std::size_t n, Failures failures) {
   failing = n;
   allFail = failures == Failures::All;
   anyFailed = false;
-  bytes = peak = 0;
+  inUse = peak = 0;
   armed = true;
 }
 
@@ -70,6 +70,7 @@ void FailingAllocation::disarm() { armed = false; }
 std::size_t FailingAllocation::count() { return allocations; }
 bool FailingAllocation::failed() { return anyFailed; }
 std::size_t FailingAllocation::peakBytes() { return static_cast<std::size_t>(peak.load()); }
+std::size_t FailingAllocation::bytes() { return static_cast<std::size_t>(inUse.load()); }
 
 }  // namespace palpate::testing
 

@@ -28,6 +28,8 @@ class FailingAllocation {
   /// The largest number of bytes that were allocated at once between the last arm() and the
   /// disarm() after it, or until now, less those that were allocated before.
   static std::size_t peakBytes();
+  /// The bytes that are allocated now, less those that were allocated at the last arm().
+  static std::size_t bytes();
 };
 
 }  // namespace palpate::testing

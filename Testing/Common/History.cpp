@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace palpate::testing {
 
@@ -12,6 +13,9 @@ namespace {
 
 constexpr std::size_t kMostBodies = 6, kMostPairs = 6;
 constexpr int kTypes = 8;  ///< see randomGeometry() and add()
+/// Of lengths in histories that a fuzzer decides: the exponents of the unit, and of sizes and
+/// coordinates in units.
+constexpr int kMostExponent = 300, kMostSpread = 0;
 
 Settings settingsOfLife(Random& random, OctreeBounds bounds) {
   Settings settings = settingsOf(Engine::Octree, random() % 4 == 0 ? 2 : 1,
@@ -55,10 +59,20 @@ std::size_t RandomHistory::Body::elements() const {
                                                 : geometry.triangles.size();
 }
 
-RandomHistory::RandomHistory(std::uint64_t seed)
-    : m_random(seed),
-      m_collisions(settingsOfLife(m_random, static_cast<OctreeBounds>(seed % 3))),
+RandomHistory::RandomHistory(Random random, OctreeBounds bounds)
+    : m_random(random),
+      m_collisions(settingsOfLife(m_random, bounds)),
       m_committed(settingsOf(Engine::Octree)) {}
+
+RandomHistory::RandomHistory(std::uint64_t seed)
+    : RandomHistory(Random(seed), static_cast<OctreeBounds>(seed % 3)) {}
+
+RandomHistory::RandomHistory(std::span<const std::uint8_t> decisions)
+    : RandomHistory(Random(decisions.subspan(std::min<std::size_t>(decisions.size(), 2))),
+                    static_cast<OctreeBounds>(decisions.empty() ? 0 : decisions[0] % 3)) {
+  if (decisions.size() > 1 && decisions[1] >= 128)
+    m_unit = std::ldexp(1.0, (decisions[1] - 192) * kMostExponent / 64);
+}
 
 template <class F>
 bool RandomHistory::accepts(F&& call) {
@@ -83,7 +97,7 @@ Eigen::Matrix3d RandomHistory::randomTurn() {
 
 Positions RandomHistory::randomMotion(const Positions& from) {
   constexpr std::array<double, 5> kSizes{0.0, 1e-3, 0.02, 0.1, 0.5};
-  const double size = kSizes[m_random() % 5], drift = kSizes[m_random() % 4];
+  const double size = m_unit * kSizes[m_random() % 5], drift = m_unit * kSizes[m_random() % 4];
   const Vector3d by = randomPoint(m_random, -drift, drift);
   Positions to = moved(m_random, from, size);
   for (Vector3d& p : to) p += by;
@@ -111,11 +125,27 @@ TestGeometry RandomHistory::randomGeometry(int type) {
   }
 }
 
+/// In L. A fuzzer may make a geometry smaller than others, and move a coordinate far away.
+TestGeometry RandomHistory::stretched(TestGeometry geometry) {
+  const int decision = m_random.isDecided() ? static_cast<int>(m_random() % 256) : 0;
+  const double size =
+      m_unit * (decision < 192 ? 1.0 : std::ldexp(1.0, (192 - decision) * kMostSpread / 64));
+  for (Vector3d& p : geometry.positions) p *= size;
+  for (double& radius : geometry.radii) radius *= size;
+  if (decision % 8 == 7 && !geometry.positions.empty()) {
+    Vector3d& p = geometry.positions[m_random() % geometry.positions.size()];
+    const auto axis = static_cast<int>(m_random() % 3);
+    const int exponent = (static_cast<int>(m_random() % 256) - 128) * kMostSpread / 128;
+    p[axis] = m_unit * std::ldexp(uniform(m_random, -1, 1), exponent);
+  }
+  return geometry;
+}
+
 Solid RandomHistory::randomSolid() {
   Solid solid = cells(1, m_random);
   const double size = uniform(m_random, 0.2, 0.8);
   const Vector3d at = randomPoint(m_random, 0, 0.5);
-  for (Vector3d& p : solid.positions) p = size * p + at;
+  for (Vector3d& p : solid.positions) p = m_unit * (size * p + at);
   return solid;
 }
 
@@ -136,12 +166,14 @@ void RandomHistory::add() {
     body.tetrahedra = solid.tetrahedra;
   } else if (type == 7) {
     const std::array<AnalyticalGeometry, 5> shapes{
-        Sphere{{0.1, 0, 0}, 0.2}, Capsule{{0, 0, 0}, {0.3, 0.3, 0.3}, 0.05},
-        Box{{0, 0, 0}, {0.2, 0.1, 0.3}}, Plane{{0.5, 0.5, 0.5}, {1, 2, 3}},
-        ConvexHull{soup(m_random, 2, 0.3).positions}};
+        Sphere{{0.1 * m_unit, 0, 0}, 0.2 * m_unit},
+        Capsule{{0, 0, 0}, m_unit * Vector3d(0.3, 0.3, 0.3), 0.05 * m_unit},
+        Box{{0, 0, 0}, m_unit * Vector3d(0.2, 0.1, 0.3)},
+        Plane{m_unit * Vector3d(0.5, 0.5, 0.5), {1, 2, 3}},
+        ConvexHull{stretched(testGeometry(soup(m_random, 2, 0.3))).positions}};
     body.shape = shapes[m_random() % 5];
   } else {
-    body.geometry = randomGeometry(type);
+    body.geometry = stretched(randomGeometry(type));
   }
   const GeometryId id = addTo(m_collisions, body);
   ASSERT_EQ(addTo(m_committed, body), id);
@@ -180,10 +212,11 @@ void RandomHistory::setTransform(GeometryId id) {
   Body& body = m_bodies.at(id);
   const Eigen::Matrix3d rotation =
       m_random() % 4 ? Eigen::Matrix3d(randomTurn() * body.rotation) : Eigen::Matrix3d::Identity();
-  const Vector3d translation = body.translation + randomPoint(m_random, -0.1, 0.1);
+  const Vector3d translation = body.translation + m_unit * randomPoint(m_random, -0.1, 0.1);
   if (m_random() % 4 == 0) {
     const Eigen::Matrix3d rotationBefore = randomTurn() * body.rotationBefore;
-    const Vector3d translationBefore = body.translationBefore + randomPoint(m_random, -0.1, 0.1);
+    const Vector3d translationBefore =
+        body.translationBefore + m_unit * randomPoint(m_random, -0.1, 0.1);
     if (!accepts([&] {
           m_collisions.setTransform(id, rotationBefore, translationBefore, rotation, translation);
         }))
@@ -206,7 +239,7 @@ void RandomHistory::setTopology(GeometryId id) {
   Body& body = m_bodies.at(id);
   Body next = body;
   if (body.tetrahedra.empty()) {
-    next.geometry = randomGeometry(static_cast<int>(m_random() % 4));
+    next.geometry = stretched(randomGeometry(static_cast<int>(m_random() % 4)));
     for (OctreeBasedCD* each : {&m_collisions, &m_committed})
       if (!accepts(
               [&] { each->setTriangles(id, next.geometry.positions, next.geometry.triangles); }))
@@ -255,11 +288,11 @@ PairSettings RandomHistory::randomSettings() {
                                            Method::Proximity, Method::Continuous};
   PairSettings settings;
   settings.method = kMethods[m_random() % 5];
-  settings.thickness = m_random() % 2 ? uniform(m_random, 0.001, 0.1) : 0.0;
+  settings.thickness = m_random() % 2 ? m_unit * uniform(m_random, 0.001, 0.1) : 0.0;
   settings.contacts = m_random() % 2 ? Contacts::Distinct : Contacts::All;
   if (settings.method == Method::Continuous && m_random() % 4 == 0)
     settings.earliestTimeOnly = true;
-  if (m_random() % 8 == 0) settings.restDistance = 0.2;
+  if (m_random() % 8 == 0) settings.restDistance = 0.2 * m_unit;
   if (m_random() % 4 == 0) settings.timeTolerance = 1e-3;
   return settings;
 }
@@ -408,12 +441,12 @@ void RandomHistory::compareContacts(const OctreeBasedCD& other,
     EXPECT_EQ(v.reason, t.reason);
     EXPECT_EQ(v.atEnd, t.atEnd);
     EXPECT_EQ(v.atImpact, t.atImpact);
-    EXPECT_NEAR(v.displacement, t.displacement, 1e-12);
+    EXPECT_NEAR(v.displacement, t.displacement, 1e-12 * m_unit);
     EXPECT_EQ(v.displacementLimit, t.displacementLimit);
     if (std::isinf(t.arcDeviation))
       EXPECT_EQ(v.arcDeviation, t.arcDeviation);
     else
-      EXPECT_NEAR(v.arcDeviation, t.arcDeviation, 1e-12);
+      EXPECT_NEAR(v.arcDeviation, t.arcDeviation, 1e-12 * m_unit);
     // A new object always knows startedApart. One with a history may not know it, but is never
     // wrong.
     if (!isBruteForce) {  // without boxes, Intersection does not know distances
@@ -441,7 +474,7 @@ void RandomHistory::compareCandidates(OctreeBasedCD& bruteForce,
 void RandomHistory::compareQueries(OctreeBasedCD& other,
                                    const std::map<GeometryId, GeometryId>& ids) {
   const GeometryId a = anyBody(), b = anyBody();
-  const Vector3d point = randomPoint(m_random, 0, 1);
+  const Vector3d point = m_unit * randomPoint(m_random, 0, 1);
   const auto ask = [&](OctreeBasedCD& collisions, GeometryId vertices, GeometryId body) {
     std::vector<std::uint64_t> all;
     for (const InsideRule rule : {InsideRule::Closed, InsideRule::WindingNumber}) {

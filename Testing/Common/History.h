@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,12 +30,19 @@ namespace palpate::testing {
 class RandomHistory {
  public:
   explicit RandomHistory(std::uint64_t seed);
+  /// The history that these bytes decide, in a length unit of any size and with coordinates of very
+  /// different sizes.
+  explicit RandomHistory(std::span<const std::uint8_t> decisions);
 
   /// Makes some random calls and a detection, and compares everything. Failures are GoogleTest's.
   void frame();
   std::size_t contacts() const { return m_contacts; }  ///< of all frames
+  bool isOver() const { return m_random.isOver(); }    ///< whether nothing is left to decide
+  CollisionProblem problem() const { return m_collisions.problem(); }
 
  private:
+  RandomHistory(Random, OctreeBounds);
+
   struct Body {
     TestGeometry geometry;                ///< of the last topology; its positions at rest
     std::vector<Tetrahedron> tetrahedra;  ///< of a tetrahedral mesh
@@ -69,7 +77,8 @@ class RandomHistory {
   void query();
 
   GeometryId anyBody();
-  TestGeometry randomGeometry(int type);
+  TestGeometry randomGeometry(int type);  ///< in units
+  TestGeometry stretched(TestGeometry);
   Solid randomSolid();
   PairSettings randomSettings();
   Positions randomMotion(const Positions&);
@@ -93,6 +102,7 @@ class RandomHistory {
 
   Random m_random;
   OctreeBasedCD m_collisions;
+  double m_unit = 1.0;  ///< of all lengths, a power of two
   /// An object that is given only the last values of each step.
   OctreeBasedCD m_committed;
   std::map<GeometryId, Body> m_bodies;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <random>
+#include <span>
 #include <vector>
 
 namespace palpate::testing {
@@ -14,7 +15,32 @@ struct Mesh {
   std::vector<Triangle> triangles;
 };
 
-using Random = std::mt19937_64;
+/// Random numbers, the same on every machine. Or decisions that a fuzzer makes, one byte for each
+/// number, in which that byte is repeated; random numbers after the last one.
+class Random {
+ public:
+  using result_type = std::uint64_t;
+  static constexpr result_type min() { return 0; }
+  static constexpr result_type max() { return ~result_type{0}; }
+
+  explicit Random(std::uint64_t seed) : m_engine(seed) {}
+  explicit Random(std::span<const std::uint8_t> decisions)
+      : m_isDecided(true), m_decisions(decisions) {}
+
+  result_type operator()() {
+    if (m_decisions.empty()) return m_engine();
+    const std::uint8_t decision = m_decisions.front();
+    m_decisions = m_decisions.subspan(1);
+    return decision * 0x0101010101010101u;
+  }
+  bool isDecided() const { return m_isDecided; }
+  bool isOver() const { return m_isDecided && m_decisions.empty(); }
+
+ private:
+  std::mt19937_64 m_engine;
+  bool m_isDecided = false;
+  std::span<const std::uint8_t> m_decisions;
+};
 
 /// Uniform in [low, high), the same on every machine.
 inline double uniform(Random& random, double low, double high) {

@@ -4,13 +4,37 @@
 
 namespace palpate::testing {
 
-/// Sanitizers make tests ten times slower. In such a build, a test with many random cases may run a
-/// part of them. The ordinary builds run all.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-inline constexpr int kShareOfCases = 5;
-#else
-inline constexpr int kShareOfCases = 1;
+#if defined(__has_feature)  // clang
+#if __has_feature(address_sanitizer)
+#define PALPATE_ADDRESS_SANITIZER
 #endif
+#if __has_feature(thread_sanitizer)
+#define PALPATE_THREAD_SANITIZER
+#endif
+#endif
+#ifdef __SANITIZE_ADDRESS__
+#define PALPATE_ADDRESS_SANITIZER
+#endif
+#ifdef __SANITIZE_THREAD__
+#define PALPATE_THREAD_SANITIZER
+#endif
+
+#ifdef PALPATE_ADDRESS_SANITIZER
+inline constexpr bool kAddressSanitizer = true;
+#else
+inline constexpr bool kAddressSanitizer = false;
+#endif
+#ifdef PALPATE_THREAD_SANITIZER
+inline constexpr bool kThreadSanitizer = true;
+#else
+inline constexpr bool kThreadSanitizer = false;
+#endif
+inline constexpr bool kSanitized = kAddressSanitizer || kThreadSanitizer;
+
+/// Sanitizers make tests ten times slower. In such a build, a test with many random cases may run a
+/// part of them: one of a prime number, so that loops over few kinds of case keep all kinds. The
+/// ordinary builds run all.
+inline constexpr int kShareOfCases = kSanitized ? 7 : 1;
 
 /// Whether a test leaves out a case. Cases are counted from 0.
 constexpr bool isLeftOut(std::size_t number) { return number % kShareOfCases != 0; }

@@ -62,6 +62,7 @@ plant Quiet Source/Math/A.cpp 'void f() { std::cerr << 1; }\n'
 plant Quiet Source/Math/A.cpp 'void f() { std::printf("1"); }\n'
 plant Quiet Source/Math/A.cpp 'void f() { std::exit(1); }\n'
 plant Words Source/Core/A.h 'class PoolManager;\n'
+plant Words Source/Mesh/A.cpp 'double a = v.stableNorm();\n'
 plant Words Source/Core/A.h 'int data2;\n'
 plant Words Source/Core/IndexUtils.h '\n'
 plant Threads Source/Math/A.h '#include "Core/Threads.h"\n' NarrowPhase Math

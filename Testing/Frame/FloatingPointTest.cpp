@@ -137,8 +137,8 @@ void append(Bits& bits, const Value& value) {
 
 /// Bits of the results of the functions of single features, in a mode.
 Bits featureAnswers(const test::CornersPair& pair, const Mode& mode) {
-  const auto& [a, b] = pair;
-  const auto both = [&, &a = a, &b = b](const TimeOfImpactSettings& settings) {
+  const Corners &a = pair.first, &b = pair.second;
+  const auto both = [&](const TimeOfImpactSettings& settings) {
     const auto vertex = unchanged([&] {
       return vertexTriangleTimeOfImpact(a[0], b[0], b[1], b[2], a[1], b[1], b[2], b[0], settings);
     });
@@ -191,6 +191,7 @@ TEST(FloatingPointInSingleFunctions, ModeOfTheCallerChangesNoBit) {
 }
 
 struct TripletOfBits {
+  TripletOfBits(int r, int c, double v) : row(r), column(c), value(v) {}
   int row, column;
   double value;
 };

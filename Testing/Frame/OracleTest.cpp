@@ -187,7 +187,9 @@ TEST_P(Oracle, AgreesOnPublishedMeshes) {
     if (entry.path().extension() == ".obj") files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   ASSERT_FALSE(files.empty());
-  for (const std::filesystem::path& file : files) {
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (isLeftOut(i)) continue;
+    const std::filesystem::path& file = files[i];
     SCOPED_TRACE(file.filename());
     const Mesh mesh = readObj(file);
     const Vector3d centre = mesh.positions[mesh.positions.size() / 3];

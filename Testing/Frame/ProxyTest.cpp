@@ -222,8 +222,9 @@ TEST(Proxy, EachContactIsWithinTheStatedErrorAndNoneIsMissing) {
     EXPECT_GT(contacts, 200u);
     // On curved meshes planes answered.
     const std::string first = scene.name.substr(0, 5);
-    if (first == "spher" || first == "torus" || first == "organ" || first == "open ")
+    if (first == "spher" || first == "torus" || first == "organ" || first == "open ") {
       EXPECT_GT(run.data().errorBound(), 0.2 * scene.allowedError);
+    }
   }
 }
 

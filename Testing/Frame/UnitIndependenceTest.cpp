@@ -50,7 +50,7 @@ std::vector<Transformation> exactTransformations() {
           {.name = "much smaller", .scale = 0x1p-90},
           {.name = "beyond squares", .scale = 0x1p900},
           {.name = "below squares", .scale = 0x1p-900},
-          {.name = "the largest doubles", .scale = 0x1p1022},
+          {.name = "the end of the range", .scale = 0x1p995},
           // Positions keep all their bits down to 2^-1054; coordinates of contacts do not.
           {.name = "among denormals", .scale = 0x1p-1050},
           {.name = "moved", .translation = far},

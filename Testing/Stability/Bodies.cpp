@@ -6,8 +6,6 @@
 #include "RigidContestant.h"
 #include "WriteFile.h"
 
-#include <palpate/Error.h>
-
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -132,7 +130,6 @@ report::Figures emptyFigures() {
   return {
       {"sweep", "quantity", "method", "setting"},
       {{"difficulty", "difficulty (value of the quantity)"},
-       {"refused", "bodies refused by an error (%)"},
        {"missing",
         "particles missing beyond the stated error (% of those inside or within the thickness)"},
        {"extra", "particles beyond the thickness and the stated error (% of the reported)"},
@@ -159,25 +156,17 @@ bool measure(const BodySweep& sweep, double value, const Options& options,
   bool isSilent = false;
   for (const RigidContestant& contestant : contestants()) {
     RigidScore score;
-    bool refused = false;
-    try {
-      RigidRun run(scene, contestant);
-      run.step(made.particles);
-      score.add(scene, run, made.particles, truth);
-    } catch (const Error& error) {
-      if (error.code() != ErrorCode::NotClosed) throw;
-      refused = true;
-    }
+    RigidRun run(scene, contestant);
+    run.step(made.particles);
+    score.add(scene, run, made.particles, truth);
     figures.add({{sweep.name, sweep.quantity, contestant.family, contestant.setting},
-                 {value, refused ? 100.0 : 0.0, percent(score.missing, score.within),
-                  percent(score.extra, score.claims), percent(score.beyondStated, score.claims),
-                  percent(score.wrongSide, score.claims), percent(score.doubtful, score.claims),
-                  static_cast<double>(score.silent), score.distanceWorst / kThickness,
-                  score.statedWorst / kThickness}});
-    std::printf("%-6s %9.3g  %-14s %-15s %s %5.1f %% missing  %5.1f %% beyond the stated error\n",
+                 {value, percent(score.missing, score.within), percent(score.extra, score.claims),
+                  percent(score.beyondStated, score.claims), percent(score.wrongSide, score.claims),
+                  percent(score.doubtful, score.claims), static_cast<double>(score.silent),
+                  score.distanceWorst / kThickness, score.statedWorst / kThickness}});
+    std::printf("%-6s %9.3g  %-14s %-15s %5.1f %% missing  %5.1f %% beyond the stated error\n",
                 sweep.name.c_str(), value, contestant.family.c_str(), contestant.setting.c_str(),
-                refused ? "refused" : "       ", percent(score.missing, score.within),
-                percent(score.beyondStated, score.claims));
+                percent(score.missing, score.within), percent(score.beyondStated, score.claims));
     if (score.silent == 0) continue;
     isSilent = true;
     std::printf("FAULT: %zu errors beyond the stated one are not named by validity()\n",

@@ -48,33 +48,27 @@ bool neverInOnePlane(const impact::Positions& p) {
   return *low > error || *high < -error;
 }
 
-impact::Vector movingPoint(const impact::Positions& p, int vertex) {
-  impact::Vector moving;
-  for (int axis = 0; axis < 3; ++axis) {
-    const impact::Rational before(p[vertex][axis]), now(p[4 + vertex][axis]);
-    moving[axis] = impact::trimmed({before, now - before});
-  }
-  return moving;
-}
-
-std::array<impact::Vector, 2> planeSpan(bool edges, const impact::Positions& p) {
-  const auto at = [&](int vertex) { return movingPoint(p, vertex); };
-  if (edges) return {at(1) - at(0), at(3) - at(2)};
-  return {at(2) - at(1), at(3) - at(1)};
+std::array<impact::Vector, 2> planeSpan(bool edges, const impact::Query& query) {
+  const auto& [a, b, c, d] = query.vertices();
+  if (edges) return {b - a, d - c};
+  return {c - b, d - b};
 }
 
 /// Height of the vertex over the plane, or of edge a over edge b.
 impact::Polynomial heightOf(bool edges, const impact::Query& query) {
   impact::Polynomial height = query.coplanarity();
   if (!edges)
-    for (impact::Rational& coefficient : height) coefficient = -coefficient;
+    for (impact::Integer& coefficient : height) coefficient = -coefficient;
   return height;
 }
 
-int sideJustBefore(const impact::Polynomial& height, impact::Real time) {
-  if (time.p.empty()) return 0;  // touches from the start
-  while (impact::valueAt(height, time.low) == 0) time.halve();
-  return sgn(impact::valueAt(height, time.low));
+int sideJustBefore(impact::Polynomial height, impact::Real time) {
+  if (time.compare(0) == 0) return 0;  // touches from the start
+  for (int side = 1; !height.empty(); side = -side) {
+    if (const int sign = time.sign(height)) return side * sign;
+    height = impact::derivative(height);
+  }
+  return 0;
 }
 
 }  // namespace
@@ -131,7 +125,7 @@ std::vector<Touch> touchesWithin(const Case::Frame& before, const Case::Frame& n
     if (!time) continue;
     const impact::Polynomial height = heightOf(edges, query);
     touches.push_back(
-        {pair, *time, sideJustBefore(height, *time), height, planeSpan(edges, positions)});
+        {pair, *time, sideJustBefore(height, *time), height, planeSpan(edges, query)});
   }
   return touches;
 }

@@ -16,7 +16,8 @@ struct Touch {
   /// Side of the common plane just before the touch; 0 if the features touch from the start.
   int side = 0;
   impact::Polynomial height;  ///< height over the common plane, times an area
-  /// Vectors that span the common plane over time: two sides of the triangle, or both edges.
+  /// Vectors that span the common plane over time, times a positive number: two sides of the
+  /// triangle, or both edges.
   std::array<impact::Vector, 2> span;
 
   /// True if the touch is earlier than the reported time.

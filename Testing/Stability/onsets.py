@@ -59,7 +59,7 @@ def trust(figures):
 
 
 def bodyOnsets(quantity):
-    """Like onsets(), for sweeps of bodies: each setting is a row, and bodies that a method refuses have no answer."""
+    """Like onsets(), for sweeps of bodies: each setting is a row."""
     def write(figures):
         rows = list(dict.fromkeys((row["method"], row["setting"]) for row in figures))
         sweeps = list(dict.fromkeys((row["sweep"], row["quantity"]) for row in figures))
@@ -68,8 +68,7 @@ def bodyOnsets(quantity):
             cells = []
             for sweep, _ in sweeps:
                 own = [row for row in figures if (row["sweep"], row["method"], row["setting"]) == (sweep, method, setting)]
-                refused = [float(row["difficulty"]) for row in own if float(row["refused"]) > 0]
-                cells.append(f"refused from {refused[0]:.2g}" if refused else onset(own, quantity))
+                cells.append(onset(own, quantity))
             lines.append(f"| {method}, {setting} | " + " | ".join(cells) + " |")
         return lines
     return write

@@ -101,7 +101,7 @@ std::string unsupportedReason(const Body& a, const Body& b, const PairSettings& 
   return "";
 }
 
-void addTriangles(const Body& a, const Body& b, std::vector<ElementPair>& pairs) {
+void addTriangles(const Body& a, const Body& b, CountedVector<ElementPair>& pairs) {
   for (const Body* body : {&a, &b})
     if (static_cast<const Model&>(*body->geometry).num_tris == 0) return;
   // Without enable_contact (false) FCL reports each pair of triangles once, else several times.
@@ -119,7 +119,7 @@ void addTriangles(const Body& a, const Body& b, std::vector<ElementPair>& pairs)
 
 /// Appends the deepest contact of collide() if the bodies overlap, else that of distance().
 void addContact(const Body& a, const Body& b, double thickness,
-                std::vector<ShapeShapeContact>& contacts) {
+                CountedVector<ShapeShapeContact>& contacts) {
   fcl::CollisionResultd overlap;
   fcl::collide(a.geometry.get(), a.place(), b.geometry.get(), b.place(),
                fcl::CollisionRequestd(100, true), overlap);

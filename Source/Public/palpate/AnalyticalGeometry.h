@@ -12,8 +12,8 @@ namespace palpate {
 // measures are in L. All shapes are solid and convex, except a two-sided plane, which has no
 // inside. A measure of 0 is valid: a sphere without radius is a point, a capsule without length a
 // sphere, a box without height a plate. Each coordinate and each size is at most kLargestMeasure in
-// magnitude, and may be as small as the smallest double. addAnalyticalGeometry() throws
-// InvalidShape for all other values.
+// magnitude. All calls take lengths in this range (Docs/Settings.md), down to the smallest double.
+// addAnalyticalGeometry() throws InvalidShape for all other values.
 
 inline constexpr double kLargestMeasure = 1e300;                     ///< L
 inline constexpr std::size_t kMaxHullPoints = std::size_t{1} << 17;  ///< of one ConvexHull

@@ -15,15 +15,15 @@ namespace palpate {
 /// Writes OctreeBasedCD::problem() to a file. Call it after a frame and before positions change:
 /// the capture then replays that frame.
 ///
-/// Errors   File if the file cannot be written. Then there is no partial file, and a file that
-///          existed before is unchanged.
+/// Errors   File if it cannot be written; an existing file is then unchanged. NonFinitePosition for
+///          a body that is placed beyond kLargestMeasure: captures hold positions in the world.
 PALPATE_EXPORT void capture(const OctreeBasedCD&, const std::filesystem::path&);
 
 /// The same for the pair of an audit's failure alone. Call it before positions change, too.
 PALPATE_EXPORT void capture(const OctreeBasedCD&, const AuditFailure&,
                             const std::filesystem::path&);
 
-/// Writes a problem to a file, with the errors of capture().
+/// Writes a problem to a file, with the errors of capture() and setUp().
 PALPATE_EXPORT void writeCapture(const CollisionProblem&, const std::filesystem::path&);
 
 /// Reads a capture.

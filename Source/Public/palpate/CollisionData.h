@@ -1,5 +1,6 @@
 #pragma once
 
+#include <palpate/CountedVector.h>
 #include <palpate/Distance.h>
 #include <palpate/Export.h>
 #include <palpate/Types.h>
@@ -11,7 +12,6 @@
 #include <cstdint>
 #include <limits>
 #include <span>
-#include <vector>
 
 namespace palpate {
 
@@ -79,7 +79,8 @@ enum class ShapeElement : std::uint32_t { Vertex, Edge, Face };
 ///          of the field's gradient there; where that is 0, it is the last axis of the field's
 ///          frame. pointOnShape follows from both.
 /// Proxy    the surface is the plane or the triangle that answers. `distance` is within
-///          CollisionData::errorBound() of the exact one.
+///          CollisionData::errorBound() of the exact one. By Auto, particles that may touch the
+///          body within the step have the contacts of the exact method, at their timeOfImpact.
 struct ShapeContact {
   ShapeElement element;
   std::uint32_t id;  ///< Index of the vertex or triangle; for an edge its lower vertex.
@@ -91,7 +92,8 @@ struct ShapeContact {
   Eigen::Vector3d pointOnShape;  ///< L: on the shape's surface.
   Eigen::Vector3d normal;        ///< Unit, out of the shape towards the element.
   double distance;               ///< L: less the element's radius; negative: the depth inside.
-  double timeOfImpact = 1.0;     ///< [0, 1] of the step; 1 for Proximity and DistanceField.
+  /// [0, 1] of the step; 1 for methods that test the step's end.
+  double timeOfImpact = 1.0;
   friend bool operator==(const ShapeContact&, const ShapeContact&) = default;
 };
 
@@ -139,11 +141,11 @@ PALPATE_EXPORT Stencil stencil(const EdgeEdgeContact& contact);
 class PALPATE_EXPORT CollisionData {
  public:
   struct Contents {
-    std::vector<VertexTriangleContact> vertexTriangle, triangleVertex;
-    std::vector<EdgeEdgeContact> edgeEdge;
-    std::vector<ElementPair> intersectingTriangles;
-    std::vector<ShapeContact> shape;
-    std::vector<ShapeShapeContact> shapeShape;
+    CountedVector<VertexTriangleContact> vertexTriangle, triangleVertex;
+    CountedVector<EdgeEdgeContact> edgeEdge;
+    CountedVector<ElementPair> intersectingTriangles;
+    CountedVector<ShapeContact> shape;
+    CountedVector<ShapeShapeContact> shapeShape;
     double earliestTimeOfImpact =
         std::numeric_limits<double>::infinity();  ///< only with PairSettings::earliestTimeOnly
     double errorBound = 0.0;
@@ -172,7 +174,8 @@ class PALPATE_EXPORT CollisionData {
     return m_contents.intersectingTriangles;
   }
   /// Vertices, edges and triangles with an analytical shape, or with a body by
-  /// Method::DistanceField or Method::Proxy. Such an answer has no other contacts.
+  /// Method::DistanceField or Method::Proxy. Such an answer has no other contacts. If Auto answers
+  /// by Proxy, a particle that touches several triangles in the step may have several contacts.
   std::span<const ShapeContact> shape() const { return m_contents.shape; }
   /// Two analytical shapes with each other: one contact if they are at most the thickness apart,
   /// with Method::Continuous at some time of the step.

@@ -20,7 +20,7 @@ struct CollisionProblem {
   struct Geometry {
     GeometryId id;  ///< in the original OctreeBasedCD; no answer depends on it
     /// L, in the world, also if setTransform() placed the geometry; of a mesh with a distance field
-    /// in the body's frame.
+    /// or leaves in the body's frame.
     std::vector<Eigen::Vector3d> before, now;
     std::vector<Triangle> triangles;  ///< segment {p, q} is {p, q, q}; empty for points
     GeometryType type = GeometryType::Triangles;
@@ -38,6 +38,7 @@ struct CollisionProblem {
     std::vector<Tetrahedron> tetrahedra{};  ///< `triangles` is their surface; empty: no tetrahedra
     /// The field of an added distance field, or of a mesh that has one; the poses above place it.
     std::shared_ptr<const DistanceField> field{};
+    std::optional<SurfaceProxySettings> proxy{};  ///< of the leaves that are attached to a mesh
   };
   /// A collision pair.
   struct Pair {

@@ -34,9 +34,9 @@ struct DistanceFieldSettings {
   std::function<bool(double fraction)> progress{};
 };
 
-/// The signed distance from the surface of a closed triangle mesh, tabulated in an octree and
-/// interpolated trilinearly. Its error has a bound that is proven, not sampled
-/// (Docs/DistanceFields.md). Cells are as large as the proof allows.
+/// The signed distance from the surface of a triangle mesh, tabulated in an octree and interpolated
+/// trilinearly. Its error has a bound that is proven, not sampled (Docs/DistanceFields.md). Cells
+/// are as large as the proof allows.
 ///
 ///   const DistanceField field = DistanceField::build({positions, triangles},
 ///                                                    {.errorBound = 0.1, .band = 5.0});
@@ -46,15 +46,19 @@ struct DistanceFieldSettings {
 /// Copies   are cheap and share the memory. A field never changes.
 class PALPATE_EXPORT DistanceField {
  public:
-  /// Builds the field of a closed, consistently oriented mesh. Inside is where the winding number,
-  /// decided exactly, is not 0. The field keeps no reference to the mesh.
+  /// Builds the field of a mesh. Of a closed, consistently oriented mesh, inside is where the
+  /// winding number, decided exactly, is not 0. Of any other mesh, inside is where the magnitude of
+  /// the generalised winding number is more than 1/2, and signIsReliable() says where that holds
+  /// for certain. The field keeps no reference to the mesh.
   ///
-  /// Errors   NonFinitePosition, also for a coordinate beyond 2^1000; IndexOutOfRange for a vertex
-  ///          index; TooLarge for more than 2^28 vertices or triangles; NotClosed, also for a mesh
+  /// Errors   NonFinitePosition, also for one beyond kLargestMeasure; IndexOutOfRange for a vertex
+  ///          index; TooLarge for more than 2^28 vertices or triangles; NotClosed for a mesh
   ///          without triangles; InvalidSettings; MemoryLimit; Cancelled. Messages name the mesh
   ///          geometry 0. Exceptions of `progress` end the build.
   static DistanceField build(const TriangleMeshView&, const DistanceFieldSettings&);
 
+  /// Whether the mesh was closed and consistently oriented: all signs are reliable.
+  bool isClosed() const;
   double errorBound() const;  ///< L
   double band() const;        ///< L
   std::size_t bytes() const;  ///< of memory that the field holds
@@ -69,11 +73,20 @@ class PALPATE_EXPORT DistanceField {
   ///                 band - errorBound(). In the domain, a box around the mesh and its band, it is
   ///                 at most the band. Outside the domain it is the band and the distance from the
   ///                 domain.
+  /// Where signIsReliable() is false, all of this holds for the distance without its sign. The
+  /// value is then not negative, and it jumps at faces of cells.
   ///
   /// Units    L.
   /// Errors   NonFinitePosition.
   /// Cost     some tens of nanoseconds. Allocates nothing.
   double value(const Eigen::Vector3d&) const;
+  /// Whether the sign of value() is reliable. It is, of a closed mesh, everywhere. Of an open one
+  /// it is in cells in which the winding number is certainly within 3/8 of an integer. Every patch
+  /// that closes the mesh, and whose own winding number about the point is less than 5/8 in
+  /// magnitude, gives the same sign.
+  ///
+  /// Errors   NonFinitePosition.
+  bool signIsReliable(const Eigen::Vector3d&) const;
   /// The gradient of value(). It jumps at the faces of cells, where it is that of the cell with the
   /// larger coordinates, and at the end of the band. 0 where the value is the constant band;
   /// outside the domain the unit vector away from it. In the band it is not exactly of length 1.

@@ -13,7 +13,7 @@ namespace palpate {
 /// The reason for an Error. Each function documents the codes that it throws. Docs/Errors.md has
 /// the cause and the remedy of each code.
 enum class ErrorCode {
-  NonFinitePosition,   ///< A position is NaN or infinite, or beyond 2^1000 under setTransform().
+  NonFinitePosition,   ///< A position is NaN, infinite or beyond kLargestMeasure.
   WrongPositionCount,  ///< The number of positions differs from the number of vertices.
   /// An index names a vertex, element or octree node that does not exist. Or a segment or
   /// tetrahedron names one vertex twice.
@@ -27,9 +27,9 @@ enum class ErrorCode {
   TooLarge,           ///< There are more vertices, elements, geometries or pairs than ids can name.
   NotAvailable,       ///< The answer was not computed or not kept, or a resource is missing.
   File,               ///< A file cannot be read or written, or has the wrong content.
-  InvalidRadius,      ///< A radius is negative, NaN or infinite, or there is not one per vertex.
+  InvalidRadius,      ///< A radius is not in [0, kLargestMeasure], or not one per vertex.
   InvalidShape,       ///< A shape has an invalid measure, direction or number of points.
-  InvalidTransform,   ///< The matrix is no rotation, or a value is not finite or beyond 2^1000.
+  InvalidTransform,   ///< No rotation, or a translation that is beyond kLargestMeasure.
   SharedFace,         ///< A face belongs to more than two tetrahedra.
   InvalidCall,        ///< The object was moved from, is outdated, or is at work on another call.
   ImpactRemains,      ///< Features touch within a step, and StepGuard may not move their vertices.

@@ -4,6 +4,18 @@
 
 namespace palpate {
 
+/// Bytes that an OctreeBasedCD holds, by what they are for. Settings::memoryLimit limits `total`.
+struct MemoryUse {
+  std::size_t geometries = 0;  ///< topologies, positions, pairs
+  std::size_t octrees = 0;     ///< with the floats from which their boxes come, and leaves of Proxy
+  std::size_t pairs = 0;       ///< the search for candidate pairs, and candidatePairs()
+  std::size_t narrowPhase = 0;  ///< from candidates to unsorted contacts
+  std::size_t results = 0;      ///< the results of all pairs, and what sorts them
+  std::size_t queries = 0;      ///< of SpatialQueries, also those of snapshots
+  std::size_t snapshots = 0;    ///< published ones that somebody holds, and memory for the next
+  std::size_t total = 0;
+};
+
 /// Times and counts of one frame, over all geometries and pairs. A frame is one detectCollision()
 /// or collectCandidates() with the updates before it.
 struct FrameStatistics {
@@ -37,6 +49,10 @@ struct FrameStatistics {
   /// triangle pairs that were tested for Validity::startedApart only: the candidates of initial
   /// intersection checks, and the triangles around contacts
   std::size_t validityPairs = 0;
+  MemoryUse memory;  ///< at the frame's end
+  /// The most of each since the object was made, or since releaseMemory(). They may be of different
+  /// times: their sum may exceed `total`.
+  MemoryUse peakMemory;
 };
 
 }  // namespace palpate

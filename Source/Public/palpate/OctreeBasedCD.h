@@ -19,6 +19,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 #include <type_traits>
 
@@ -50,6 +51,9 @@ struct CollisionPair {
 ///          executors. Exact arithmetic may use GMP, which ends the process if it gets no memory.
 ///          After a move every function except assignment and destruction throws InvalidCall. A
 ///          call from a predicate or callback to the object that calls it throws InvalidCall, too.
+/// Memory   with Settings::memoryLimit, every function that needs memory throws MemoryLimit where
+/// it
+///          would need more than that.
 /// Valid    spans and references that functions return are valid until the next call that is not
 ///          const, unless a function says more.
 /// Threads  const functions are safe from any number of threads while no other function runs. Two
@@ -81,7 +85,7 @@ class PALPATE_EXPORT OctreeBasedCD {
                                 std::span<const Tetrahedron> tetrahedra);
   /// Adds a line mesh, such as a suture, a needle or a centre line. It may be open, closed or
   /// branching, and consist of several parts. radius: L, of all vertices. radii: L, one per vertex,
-  /// linear along each segment. Radii are finite and not negative. They never change.
+  /// linear along each segment. Radii are in [0, kLargestMeasure]. They never change.
   ///
   /// Lists    edgeEdge() has its segments with edges of triangles and with segments of line meshes.
   ///          vertexTriangle() or triangleVertex() has its vertices with triangles, and points with
@@ -138,6 +142,15 @@ class PALPATE_EXPORT OctreeBasedCD {
   ///          vertex.
   /// Cost     one look-up for each vertex.
   void attachDistanceField(GeometryId mesh, std::shared_ptr<const DistanceField>);
+  /// Builds the leaves of Method::Proxy for a triangle or tetrahedral mesh that is rigid, and
+  /// attaches them. Pairs by Auto of a point set, first, and the mesh may then use them
+  /// (PairSettings::allowedError). None detaches them. A body with leaves keeps its shape, as with
+  /// attachDistanceField().
+  ///
+  /// Errors   UnsupportedMethod for another geometry type; InvalidSettings; TooLarge as
+  ///          Method::Proxy.
+  /// Cost     some seconds of processor time for half a million triangles, shared by the threads.
+  void attachSurfaceProxy(GeometryId mesh, const std::optional<SurfaceProxySettings>&);
   /// Removes a geometry and all its pairs.
   void removeGeometry(GeometryId);
 
@@ -165,7 +178,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// after you have added all geometries, so that the first step has motion.
   ///
   /// Errors   WrongPositionCount, also for a shape; NonFinitePosition, also for a coordinate beyond
-  ///          2^1000 if setTransform() has placed the geometry.
+  ///          kLargestMeasure, as all functions that take positions.
   /// Cost     linear in the vertices.
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> now);
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> before,
@@ -174,13 +187,13 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// step. All elements are enabled afterwards.
   ///
   /// Errors   UnsupportedMethod for another geometry type; IndexOutOfRange and TooLarge as in
-  ///          addTriangleMesh(); NonFinitePosition as in setPositions().
+  ///          addTriangleMesh(), TooLarge for restDistance, too; NonFinitePosition.
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
   /// The same for a tetrahedral mesh.
   ///
   /// Errors   UnsupportedMethod for another geometry type; IndexOutOfRange, SharedFace and TooLarge
-  ///          as in addTetrahedralMesh(); NonFinitePosition as in setPositions().
+  ///          as in addTetrahedralMesh(), TooLarge for restDistance, too; NonFinitePosition.
   void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
                      std::span<const Tetrahedron>);
   /// The triangles with which a tetrahedral mesh collides. The spans are valid until
@@ -200,10 +213,10 @@ class PALPATE_EXPORT OctreeBasedCD {
   ///
   /// Errors   InvalidTransform if `rotation` is no rotation: an entry of R^T R is off the identity
   ///          by more than 1e-9, or the determinant is not positive. InvalidTransform also if an
-  ///          entry is not finite, or if a translation or position is beyond 2^1000.
+  ///          entry is not finite, or if the translation is beyond kLargestMeasure.
   ///          UnsupportedMethod if the geometry has a pair with itself.
-  /// Cost     does not grow with the size of the geometry, with two exceptions: the first call
-  ///          reads all positions, and each call for a ConvexHull turns its corners.
+  /// Cost     does not grow with the size of the geometry, with one exception: each call
+  ///          for a ConvexHull turns its corners.
   void setTransform(GeometryId, const Eigen::Matrix3d& rotation,
                     const Eigen::Vector3d& translation);
   void setTransform(GeometryId, const Eigen::Matrix3d& rotationBefore,
@@ -264,9 +277,9 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// no memory, except for integers of exact arithmetic (Docs/Guarantees.md, "Memory").
   ///
   /// Errors   whatever a predicate or executor throws; InvalidSettings if an executor's run()
-  ///          returns too early; NotAvailable if a task called fork() (see makeThreadPool());
-  ///          TooLarge for PairSettings::restDistance after a change of topology. Predicates apart,
-  ///          update(), collectCandidates(), forEachCandidate() and queries() throw the same.
+  ///          returns too early; NotAvailable if a task called fork() (see makeThreadPool()).
+  ///          Predicates apart, update(), collectCandidates(), forEachCandidate() and queries()
+  ///          throw the same.
   void detectCollision();
 
   /// Passes the candidate pairs of (a, b) to f(std::span<const ElementPair>) in batches. The
@@ -342,6 +355,14 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// The octrees of all geometries, as of the last update. The reference is valid as long as this
   /// object; each update changes what it shows.
   const LooseOctree& octree() const;
+  /// The memory that the object holds now, also after queries(), publish() and releaseMemory().
+  MemoryUse memoryUse() const;
+  /// Gives back memory that the object only keeps for the next frames. They allocate what they need
+  /// again. Results, candidate pairs and the snapshots that somebody holds stay as they are.
+  /// FrameStatistics::peakMemory starts again.
+  ///
+  /// Errors   none for lack of memory: what needs a smaller copy then stays as it is.
+  void releaseMemory();
   /// Times and counts of the last detectCollision() or collectCandidates() with the updates before
   /// it, or of a later update(). queries() does not change them.
   const FrameStatistics& statistics() const;

@@ -3,6 +3,7 @@
 #include <palpate/Executor.h>
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -76,6 +77,12 @@ struct Settings {
   /// executor. Null: the object makes its own thread pool. Results do not depend on it. A
   /// CollisionProblem and a capture do not contain it.
   std::shared_ptr<Executor> executor{};
+  /// Bytes, at least 0; 0: no limit. Limits what the object allocates: geometries, octrees,
+  /// candidates, results, scratch, and snapshots as long as somebody holds them
+  /// (Docs/Memory.md says what does not count). A call that needs more throws MemoryLimit. It
+  /// leaves the last answers readable and the object ready for the next frame. A CollisionProblem
+  /// and a capture do not contain it.
+  std::size_t memoryLimit = 0;
 };
 
 /// The definition of a contact. Docs/SupportMatrix.md lists the methods of each pair of geometry
@@ -105,11 +112,11 @@ enum class Method {
   /// order. In the leaves of an octree of the body, planes stand for its surface where their error
   /// is proven to be at most PairSettings::allowedError; elsewhere triangles answer. A particle
   /// whose distance at the step's end is at most the thickness and its radius is a ShapeContact,
-  /// up to CollisionData::errorBound(). Around a closed mesh distances have a sign, and particles
-  /// up to
-  /// Validity::proxyDepth behind the surface are contacts, too.
+  /// up to CollisionData::errorBound().
+  /// Around a closed mesh distances have a sign, and particles up to Validity::proxyDepth behind
+  /// the surface are contacts, too.
   /// Cost     the leaves are built once for the body's topology and the pair's settings, by the
-  ///          first detection: tens of seconds of processor time for 500,000 triangles. A frame
+  ///          first detection: some seconds of processor time for 500,000 triangles. A frame
   ///          makes no octree of the particles.
   /// Errors   detectCollision() throws UnsupportedMethod if the body's positions change after the
   ///          leaves were built. setTransform() moves the body, setTriangles() builds new leaves.
@@ -134,19 +141,20 @@ enum class Contacts {
 /// that a method refuses, or a value outside its range, throws InvalidSettings.
 struct PairSettings {
   Method method = Method::Auto;
-  /// L, finite, not negative. The contact distance, which IPC users know as d-hat: features at most
+  /// L, 0 to kLargestMeasure. The contact distance, which IPC users know as d-hat: features at most
   /// this far apart are contacts. Radii of lines and points add to it. Proximity needs a positive
   /// thickness, or radii, or an analytical shape. The contacts of Intersection do not depend on it.
   double thickness = 0.0;
   /// Intersection reports all contacts in either case.
   Contacts contacts = Contacts::Distinct;
-  /// L, finite. Only Auto accepts a value that is not negative. Negative: half the thickness. It
+  /// L, to 1e300. Only Auto accepts a value that is not negative. Negative: half the thickness. It
   /// has an effect for two triangle or tetrahedral meshes with Distinct and a positive thickness.
   /// Auto tests features that move at most this far, relative to each other, at the step's end. The
   /// thickness is up to this much larger there. Auto tests other features for impacts. A larger
-  /// value is faster and gives more contacts of features that are further apart.
+  /// value is faster and gives more contacts of features that are further apart. For all geometries
+  /// it also limits the motion with which an attached DistanceField or proxy answers.
   double motionTolerance = -1.0;
-  /// L, finite, not negative. Only a triangle, tetrahedral or line mesh with itself accepts a value
+  /// L, 0 to kLargestMeasure. Only a triangle, tetrahedral or line mesh with itself accepts a value
   /// other than 0. Features that are nearer to each other than this along the mesh's edges are no
   /// contacts. These distances are measured once, at the positions with which the mesh was added or
   /// its topology was set. More than 2^28 pairs of vertices that are so near throw TooLarge. 0:
@@ -162,14 +170,29 @@ struct PairSettings {
   /// CollisionData::earliestTimeOfImpact(), which is that of all contacts. This is much cheaper.
   /// `contacts` has no effect then.
   bool earliestTimeOnly = false;
-  /// L, finite, not negative. What an answer may be off by. Proxy needs a positive value: a larger
+  /// L, 0 to kLargestMeasure. What an answer may be off by. Proxy needs a positive value: a larger
   /// one gives fewer and larger leaves, and fewer that triangles answer. Auto answers by an
-  /// attached DistanceField whose error bound is at most this, while nothing moves in the step.
-  /// Other methods accept 0 only.
+  /// attached DistanceField or by the leaves of attachSurfaceProxy() if their error bound is at
+  /// most this, but only where they prove that nothing touches in the step. Other methods accept 0
+  /// only.
   double allowedError = 0.0;
   /// rad, in (0, 1.5]. Proxy: the largest angle between the normal of a leaf's plane and those of
   /// the triangles that the plane stands for. Other leaves are divided or answered by triangles.
   double widestNormalCone = 0.25;
+};
+
+/// The leaves that OctreeBasedCD::attachSurfaceProxy() builds for a rigid body.
+struct SurfaceProxySettings {
+  /// L, positive. The distance from the surface to which the leaves answer. At least the thickness
+  /// and the largest radius of the particles. A particle that is further away and moves further
+  /// than the difference is tested by exact methods.
+  double reach = 0.0;
+  /// L, positive. The largest proven error of a leaf's plane. A larger one gives fewer and larger
+  /// leaves.
+  double errorBound = 0.0;
+  /// rad, in (0, 1.5]. As PairSettings::widestNormalCone.
+  double widestNormalCone = 0.25;
+  friend bool operator==(const SurfaceProxySettings&, const SurfaceProxySettings&) = default;
 };
 
 /// From which sides other geometries can touch a triangle mesh.

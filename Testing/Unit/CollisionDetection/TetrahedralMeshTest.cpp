@@ -274,7 +274,10 @@ TEST(TetrahedralMesh, BadInputThrowsErrorsThatNameIt) {
     Positions bad = some;
     bad[4][1] = std::numeric_limits<double>::quiet_NaN();
     expectRefused(ErrorCode::NonFinitePosition, 4,
-                  name + ", vertex 4: position is (1, nan, 1); positions must be finite", [&] {
+                  name +
+                      ", vertex 4: position is (1, nan, 1); positions must be finite and at most "
+                      "1e+300 in magnitude",
+                  [&] {
                     give(bad, {{0, 1, 2, 3}});
                   });
   }

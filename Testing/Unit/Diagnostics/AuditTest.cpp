@@ -108,7 +108,7 @@ void rename(ElementPair& pair) { pair = {28, 29}; }
 /// the only failure.
 template <class Contact>
 void expectEachFault(const Scene& scene, List list,
-                     std::vector<Contact> CollisionData::Contents::*member) {
+                     CountedVector<Contact> CollisionData::Contents::*member) {
   const CollisionData::Contents good = scene.found();
   for (std::size_t i = 0; i < (good.*member).size(); ++i) {
     if (testing::isLeftOut(i)) continue;

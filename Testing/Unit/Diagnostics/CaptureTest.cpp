@@ -167,8 +167,7 @@ TEST_F(Capture, KeepsThePairOfAnAuditFailure) {
 }
 
 CollisionProblem smallProblem() {
-  constexpr double kMin = std::numeric_limits<double>::denorm_min(),
-                   kMax = std::numeric_limits<double>::max();
+  constexpr double kMin = std::numeric_limits<double>::denorm_min(), kMax = kLargestMeasure;
   CollisionProblem problem;
   problem.geometries = {{GeometryId{5},
                          {{0, 0, 0}, {1, 0, 0}, {0, 1, -0.0}},
@@ -312,19 +311,52 @@ TEST_F(Capture, ReadsEarlierVersions) {
   EXPECT_EQ(read.pairs[0].settings.motionTolerance, PairSettings().motionTolerance);
 }
 
-TEST_F(Capture, RefusesNanAndInfinity) {
-  CollisionProblem problem = smallProblem();
+/// Nothing is written that cannot be read.
+TEST_F(Capture, RefusesWhatIsOutsideTheRange) {
+  const auto expectNotWritten = [&](const CollisionProblem& problem, ErrorCode code) {
+    try {
+      writeCapture(problem, file());
+      ADD_FAILURE() << "written";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), code) << error.what();
+    }
+    EXPECT_EQ(fileCount(), 0u);
+  };
+  CollisionProblem problem;
   for (const double bad :
-       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e301}) {
     problem = smallProblem();
     problem.geometries[1].now[2][0] = bad;
-    writeCapture(problem, file());
-    expectRefused("geometry 1, vertex 2: position is");
+    expectNotWritten(problem, ErrorCode::NonFinitePosition);
     problem = smallProblem();
     problem.pairs[0].settings.thickness = bad;
-    writeCapture(problem, file());
-    expectRefused("thickness is");
+    expectNotWritten(problem, ErrorCode::InvalidSettings);
   }
+  problem = smallProblem();
+  problem.geometries[1].now[2][0] = 0x1.8p-7;
+  problem.pairs[0].settings.thickness = 0x1.8p-9;
+  writeCapture(problem, file());
+  const std::string whole = textOf(file());
+  for (const std::string bad : {"nan", "inf", "1p+997"})
+    for (const auto& [from, reason] : {std::pair("1.8p-7", "geometry 1, vertex 2: position is"),
+                                       std::pair("1.8p-9", "thickness is")}) {
+      std::string text = whole;
+      write(text.replace(text.find(from), std::string(from).size(), bad));
+      expectRefused(reason);
+    }
+}
+
+/// Captures hold positions in the world.
+TEST_F(Capture, RefusesBodiesPlacedOutsideTheRange) {
+  OctreeBasedCD detection;
+  const GeometryId point =
+      detection.addPointSet(std::vector<Eigen::Vector3d>{{kLargestMeasure, 0, 0}});
+  detection.setTransform(point, Eigen::Matrix3d::Identity(), {kLargestMeasure, 0, 0});
+  EXPECT_THROW(capture(detection, file()), Error);
+  detection.setTransform(point, Eigen::Matrix3d::Identity(), {-kLargestMeasure, 0, 0});
+  detection.advance();
+  capture(detection, file());
+  EXPECT_EQ(readCapture(file()).geometries[0].now[0], Eigen::Vector3d(0, 0, 0));
 }
 
 TEST_F(Capture, LeavesNoPartialFile) {

@@ -6,11 +6,12 @@
 #include "Common/Sanitized.h"
 #include "Core/SimdPath.h"
 #include "DistanceField/FieldCells.h"
-#include "FieldMeshes.h"
+#include "FieldPoints.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -22,93 +23,6 @@ namespace palpate::testing {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Extent {
-  Eigen::AlignedBox3d box;
-  double diagonal;
-};
-
-Extent extentOf(const Mesh& mesh) {
-  Extent extent;
-  for (const Eigen::Vector3d& p : mesh.positions) extent.box.extend(p);
-  extent.diagonal = extent.box.diagonal().norm();
-  return extent;
-}
-
-DistanceField fieldOf(const Mesh& mesh, double errorBound, double band, int threads = 2) {
-  const double diagonal = extentOf(mesh).diagonal;
-  return DistanceField::build(
-      {mesh.positions, mesh.triangles},
-      {.errorBound = errorBound * diagonal, .band = band * diagonal, .threads = threads});
-}
-
-/// The side of a root cell.
-double unitOf(const Mesh& mesh, const DistanceField& field) {
-  const Eigen::Vector3d sizes = extentOf(mesh).box.sizes();
-  return std::ldexp(1.0, std::ilogb(sizes.maxCoeff() + 2 * field.band()) - 3);
-}
-
-/// A coordinate at or beside a border of cells of a random level.
-double nearBorder(Random& random, double coordinate, double unit) {
-  const double side = std::ldexp(unit, -static_cast<int>(random() % 7));
-  const double at = std::round(coordinate / side) * side;
-  constexpr double kInfinite = std::numeric_limits<double>::infinity();
-  switch (random() % 3) {
-    case 0:
-      return at;
-    case 1:
-      return std::nextafter(at, kInfinite);
-    default:
-      return std::nextafter(at, -kInfinite);
-  }
-}
-
-/// A point on the normal of a surface point where, by the field, another part of the surface is
-/// about as near: near the medial axis. Or one 1.5 bands away.
-Eigen::Vector3d nearMedialAxis(const DistanceField& field, const Eigen::Vector3d& onSurface,
-                               const Eigen::Vector3d& normal) {
-  double low = 0, high = 1.5 * field.band();
-  for (int i = 0; i < 20; ++i) {
-    const double middle = 0.5 * (low + high);
-    const bool isNearest =
-        std::abs(field.value(onSurface + middle * normal)) >= middle - field.errorBound();
-    (isNearest ? low : high) = middle;
-  }
-  return onSurface + low * normal;
-}
-
-/// Points on vertices, edges and triangles, near them, in and beyond the band, near the medial
-/// axis, and on the borders and corners of cells.
-std::vector<Eigen::Vector3d> adversarialPoints(Random& random, const Mesh& mesh,
-                                               const DistanceField& field, std::size_t count) {
-  const Extent extent = extentOf(mesh);
-  const double unit = unitOf(mesh, field), wide = 1.5 * field.band();
-  std::vector<Eigen::Vector3d> points(count);
-  for (Eigen::Vector3d& p : points) {
-    const auto& [a, b, c] = mesh.triangles[random() % mesh.triangles.size()];
-    const std::uint64_t kind = random() % 9;
-    double s = uniform(random, 0, 1), t = uniform(random, 0, 1 - s);
-    if (kind == 0) s = t = 0;
-    if (kind == 1) t = 0;
-    p = mesh.positions[a] + s * (mesh.positions[b] - mesh.positions[a]) +
-        t * (mesh.positions[c] - mesh.positions[a]);
-    if (kind == 3) p += randomPoint(random, -1, 1) * field.errorBound();
-    if (kind >= 4 && kind < 8) p += randomPoint(random, -1, 1) * wide;
-    if (kind == 7)
-      for (int k = 0; k < 3; ++k)
-        p[k] = uniform(random, extent.box.min()[k] - wide, extent.box.max()[k] + wide);
-    if (kind == 8) {
-      const Eigen::Vector3d normal = (mesh.positions[b] - mesh.positions[a])
-                                         .cross(mesh.positions[c] - mesh.positions[a])
-                                         .stableNormalized();
-      p = nearMedialAxis(field, p, random() % 2 ? normal : Eigen::Vector3d(-normal));
-    }
-    if (kind >= 5 && kind < 8)
-      for (int k = 0; k < 3; ++k)
-        if (random() % 2) p[k] = nearBorder(random, p[k], unit);
-  }
-  return points;
-}
 
 /// Compares with exact distances. Returns how often distanceBound() exceeds the value.
 std::size_t expectWithinBound(Random& random, const Mesh& mesh, const DistanceField& field,
@@ -180,6 +94,10 @@ void setChecksum(std::string& content) {
 /// A field with blocks and leaves whose file is small.
 Mesh needle() { return boxMesh({0, 0, 0}, {1, 0.05, 0.05}); }
 DistanceField smallField() { return fieldOf(needle(), 0.1, 0.01); }
+Mesh without(Mesh mesh, std::size_t triangle) {
+  mesh.triangles.erase(mesh.triangles.begin() + static_cast<std::ptrdiff_t>(triangle));
+  return mesh;
+}
 
 }  // namespace
 
@@ -273,21 +191,23 @@ TEST(DistanceField, IsALowerBoundFarAway) {
 
 TEST(DistanceField, DoesNotDependOnThreadsOrInstructions) {
   Random random(5);
-  const Mesh mesh = starMesh(random);
-  const std::string expected = bytesOf(fieldOf(mesh, 0.05, 0.1, 1));
-  for (const int threads : {2, 3, 8})
-    EXPECT_EQ(bytesOf(fieldOf(mesh, 0.05, 0.1, threads)), expected);
-  const DistanceField field = fieldOf(mesh, 0.05, 0.1);
-  const auto points = adversarialPoints(random, mesh, field, 1001);
-  for (const std::string& path : simdPaths()) {
-    useSimdPath(path);
-    EXPECT_EQ(bytesOf(fieldOf(mesh, 0.05, 0.1)), expected) << path;
-    std::vector<double> values(points.size());
-    field.values(points, values);
-    for (std::size_t i = 0; i < points.size(); ++i)
-      ASSERT_EQ(values[i], field.value(points[i])) << path << ", point " << points[i].transpose();
+  const Mesh star = starMesh(random);
+  for (const Mesh& mesh : {star, without(star, 20)}) {
+    const std::string expected = bytesOf(fieldOf(mesh, 0.05, 0.1, 1));
+    for (const int threads : {2, 3, 8})
+      EXPECT_EQ(bytesOf(fieldOf(mesh, 0.05, 0.1, threads)), expected);
+    const DistanceField field = fieldOf(mesh, 0.05, 0.1);
+    const auto points = adversarialPoints(random, mesh, field, 1001);
+    for (const std::string& path : simdPaths()) {
+      useSimdPath(path);
+      EXPECT_EQ(bytesOf(fieldOf(mesh, 0.05, 0.1)), expected) << path;
+      std::vector<double> values(points.size());
+      field.values(points, values);
+      for (std::size_t i = 0; i < points.size(); ++i)
+        ASSERT_EQ(values[i], field.value(points[i])) << path << ", point " << points[i].transpose();
+    }
+    useSimdPath("");
   }
-  useSimdPath("");
 }
 
 TEST(DistanceField, ReportsProgressAndIsCancelled) {
@@ -372,8 +292,6 @@ TEST(DistanceField, RefusesInvalidInput) {
   bad.triangles[2][1] = 8;
   expectRefused(ErrorCode::IndexOutOfRange, "triangle 2", build(bad, settings));
   bad = good;
-  bad.triangles.pop_back();
-  expectRefused(ErrorCode::NotClosed, "belong to one triangle only", build(bad, settings));
   bad.triangles.clear();
   expectRefused(ErrorCode::NotClosed, "no triangles", build(bad, settings));
   bad = good;
@@ -396,18 +314,28 @@ TEST(DistanceField, RefusesInvalidInput) {
 TEST(DistanceFieldFile, HoldsTheField) {
   Random random(6);
   const Folder folder;
-  const Mesh mesh = starMesh(random);
-  const DistanceField field = fieldOf(mesh, 0.05, 0.1);
-  field.save(folder / "field");
-  const DistanceField loaded = DistanceField::load(folder / "field");
-  EXPECT_EQ(loaded.errorBound(), field.errorBound());
-  EXPECT_EQ(loaded.band(), field.band());
-  EXPECT_EQ(loaded.cells(), field.cells());
-  for (const Eigen::Vector3d& p : adversarialPoints(random, mesh, field, 2000)) {
-    EXPECT_EQ(loaded.value(p), field.value(p));
-    EXPECT_EQ(loaded.gradient(p), field.gradient(p));
+  const Mesh star = starMesh(random);
+  for (const Mesh& mesh : {without(star, 20), star}) {
+    const DistanceField field = fieldOf(mesh, 0.05, 0.1);
+    field.save(folder / "field");
+    const DistanceField loaded = DistanceField::load(folder / "field");
+    EXPECT_EQ(loaded.isClosed(), field.isClosed());
+    EXPECT_EQ(loaded.errorBound(), field.errorBound());
+    EXPECT_EQ(loaded.band(), field.band());
+    EXPECT_EQ(loaded.cells(), field.cells());
+    std::size_t reliable = 0, unreliable = 0;
+    for (Eigen::Vector3d p : adversarialPoints(random, mesh, field, 2000)) {
+      if (random() % 4 == 0) p *= 2;  // often outside the domain
+      EXPECT_EQ(loaded.value(p), field.value(p));
+      EXPECT_EQ(loaded.gradient(p), field.gradient(p));
+      EXPECT_EQ(loaded.signIsReliable(p), field.signIsReliable(p));
+      ++(field.signIsReliable(p) ? reliable : unreliable);
+    }
+    EXPECT_GT(reliable, 0u);
+    EXPECT_EQ(unreliable == 0, field.isClosed());
+    EXPECT_EQ(bytesOf(loaded, folder), bytesOf(field, folder));
   }
-  EXPECT_EQ(bytesOf(loaded, folder), bytesOf(field, folder));
+  const DistanceField field = smallField();
   expectRefused(ErrorCode::File, "cannot be read", [&] { DistanceField::load(folder / "none"); });
   expectRefused(ErrorCode::File, "cannot be written",
                 [&] { field.save(folder / "none" / "field"); });
@@ -432,12 +360,14 @@ TEST(DistanceFieldFile, RefusesEveryTruncationAndChangedByte) {
 TEST(DistanceFieldFile, SurvivesAnyContentWithAValidChecksum) {
   Random random(7);
   const Folder folder;
-  const std::string content = bytesOf(smallField(), folder);
+  const std::array contents{bytesOf(smallField(), folder),
+                            bytesOf(fieldOf(without(needle(), 0), 0.1, 0.01), folder)};
   int accepted = 0;
-  for (int i = 0; i < casesOf(3000); ++i) {
+  for (int i = 0; i < casesOf(6000); ++i) {
+    const std::string& content = contents[random() % 2];
     std::string changed = content;
     // Half of the changes are in the header, which has the counts.
-    const std::size_t range = i % 2 ? 96 : content.size() - 8;
+    const std::size_t range = i % 2 ? 104 : content.size() - 8;
     for (std::uint64_t n = random() % 4 + 1; n > 0; --n)
       changed[random() % range] = static_cast<char>(random());
     setChecksum(changed);
@@ -449,12 +379,27 @@ TEST(DistanceFieldFile, SurvivesAnyContentWithAValidChecksum) {
         const Eigen::Vector3d point = randomPoint(random, -0.2, 1.2);
         EXPECT_FALSE(std::isnan(field.value(point)));
         field.gradient(point);
+        if (!field.signIsReliable(point)) {
+          EXPECT_FALSE(field.isClosed());
+        }
       }
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ErrorCode::File);
     }
   }
   EXPECT_GT(accepted, 0);
+}
+
+TEST(DistanceField, FilesThatNoBuildWritesAreRefused) {
+  const auto load = [](const char* name) {
+    return [=] {
+      DistanceField::load(std::filesystem::path(PALPATE_SOURCE_DIR) / "Data/Fuzz/Field" / name);
+    };
+  };
+  expectRefused(ErrorCode::File, "too deep", load("seed-deep"));
+  expectRefused(ErrorCode::File, "too wide", load("seed-wide-band"));
+  expectRefused(ErrorCode::File, "domain is out of range", load("seed-far"));
+  EXPECT_NO_THROW(load("seed-block")());
 }
 
 }  // namespace palpate::testing

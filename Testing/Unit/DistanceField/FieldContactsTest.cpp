@@ -230,7 +230,9 @@ TEST(FieldContacts, AreWithinTheErrorBound) {
     };
     for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
       const auto& [a, b, c] = mesh.triangles[t];
-      const auto holds = [&](std::uint32_t v) { return v == a || v == b || v == c; };
+      const auto holds = [&, &corners = mesh.triangles[t]](std::uint32_t v) {
+        return std::find(corners.begin(), corners.end(), v) != corners.end();
+      };
       double deepest = 1.0, sampled = 1.0;
       for (const ShapeContact& contact : data.shape())
         if (contact.element == ShapeElement::Face

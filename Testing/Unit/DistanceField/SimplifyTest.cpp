@@ -201,12 +201,12 @@ TEST(Simplify, RefusesMeshesThatTouchThemselves) {
   Random random(1);
   for (const auto& [name, mesh] : fieldMeshes(random)) {
     SCOPED_TRACE(name);
+    const auto simplify = [&mesh = mesh] { simplified(mesh, 0.01); };
     if (name == "crossing")
       expectRefused(ErrorCode::UnsupportedMethod, "crosses or touches itself: triangles ",
-                    [&] { simplified(mesh, 0.01); });
+                    simplify);
     if (name == "flat")  // without a volume, there is no way outward
-      expectRefused(ErrorCode::NotAvailable, "no displacement of vertex ",
-                    [&] { simplified(mesh, 0.01); });
+      expectRefused(ErrorCode::NotAvailable, "no displacement of vertex ", simplify);
   }
   Mesh spindle = torusMesh(24, 16);
   for (Eigen::Vector3d& p : spindle.positions) {

@@ -142,6 +142,33 @@ TEST(Predicates, FloatingPointFilterDecidesNonDegenerateInput) {
   EXPECT_EQ(counts.undecided, 0u);
 }
 
+/// Positions that are equal or flat along an axis: no arithmetic is needed, so that exact
+/// arithmetic is not counted.
+TEST(Predicates, TrivialZerosAreNotCounted) {
+  Random random(9);
+  SignCounts counts;
+  for (int repeat = 0; repeat < 500; ++repeat) {
+    std::array<Eigen::Vector3d, 4> p{random.inCube(), random.inCube(), random.inCube(),
+                                     random.inCube()};
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < i; ++j) {
+        std::array<Eigen::Vector3d, 4> q = p;
+        q[i] = q[j];
+        ASSERT_EQ(orient3d(q[0], q[1], q[2], q[3], counts), 0);
+      }
+    for (int axis = 0; axis < 3; ++axis) {
+      std::array<Eigen::Vector3d, 4> q = p;
+      for (Eigen::Vector3d& at : q) at[axis] = 0.25;
+      ASSERT_EQ(orient3d(q[0], q[1], q[2], q[3], counts), 0);
+      for (int other = 0; other < 3; ++other)
+        if (other != axis) {
+          ASSERT_EQ(orient2d(other, q[0], q[1], q[2], counts), 0);
+        }
+    }
+  }
+  EXPECT_EQ(counts.undecided, 0u);
+}
+
 /// All exponents, with carries through many words, and back to zero in another order.
 TEST(ExactSum, HasTheSignOfTheIntegerSum) {
   Random random(8);

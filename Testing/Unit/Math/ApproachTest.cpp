@@ -27,10 +27,6 @@ double statedError(const ImpactCase& query, const TimeOfImpactSettings& settings
          (1.0 + 0x1p-40);
 }
 
-bool isWithin(const Rational& square, const Rational& distance) {
-  return square <= distance * distance;
-}
-
 /// A distance that is hard for the query: far from it, or near its own distance at some time.
 double someDistance(const ImpactCase& query, test::Random& random) {
   double size = 1e-300;
@@ -50,15 +46,16 @@ void expectTrue(const ImpactCase& query, const TimeOfImpactSettings& settings,
   if (time) {
     const Rational reach =
         Rational(settings.minimumDistance) + Rational(statedError(query, settings));
-    EXPECT_TRUE(isWithin(oracle::squareDistanceAt(query, *time), reach))
+    EXPECT_TRUE(oracle::FeaturesAtTime(query, *time).isAtMost(reach * reach))
         << "false positive at " << *time;
   }
   const double end = time.value_or(1.0);
+  const Rational distance(settings.minimumDistance);
   for (int i = 0; i < 12; ++i) {
     double t = end * (1.0 - std::ldexp(random.unit(), -random.below(30)));
     if (i < 5) t = end * i / 4.0;
     if (time && t >= *time) continue;
-    EXPECT_FALSE(isWithin(oracle::squareDistanceAt(query, t), Rational(settings.minimumDistance)))
+    EXPECT_TRUE(oracle::FeaturesAtTime(query, t).isAbove(distance * distance))
         << (time ? "late, or nearer at " : "false negative at ") << t;
   }
 }
@@ -80,6 +77,32 @@ TEST(Approach, HasNoLateTimesFalseNegativesOrFalsePositives) {
   }
   EXPECT_GT(impacts, count / 8);
   EXPECT_LT(impacts, count * 7 / 8);
+}
+
+/// Positions whose differences or displacements overflow have the times of the same query in
+/// smaller units, within the tolerance.
+TEST(Approach, DifferencesMayOverflow) {
+  test::Random random(27);
+  int impacts = 0, overflows = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const ImpactCase query = randomCase(random, i % 2);
+    const auto scaled = [&](double by) {
+      return query.mapped([by](const Eigen::Vector3d& p) -> Eigen::Vector3d { return by * p; });
+    };
+    const double size = i % 4 < 2 ? 0x1.8p1023 : 0x1.8p1022;
+    const ImpactCase large = scaled(size);
+    for (const Eigen::Vector3d& p : large.positions)
+      overflows += std::isinf((p - large.positions[0]).cwiseAbs().maxCoeff());
+    const double distance = 0.5 * random.unit();
+    const std::optional<double> time = large.time({distance * size, 1e-6});
+    const std::optional<double> other = query.time({distance, 1e-6});
+    ASSERT_EQ(time.has_value(), other.has_value()) << i;
+    if (!time) continue;
+    EXPECT_NEAR(*time, *other, 1.001e-6) << i;
+    ++impacts;
+  }
+  EXPECT_GT(overflows, 500);
+  EXPECT_GT(impacts, 500);
 }
 
 /// Slivers, and distances far below the features' size, where directions in plain doubles fail.

@@ -1,7 +1,7 @@
 #include "Math/ClosestPoint.h"
 
 #include "Math/ExactClosestPoint.h"
-#include "RationalOracle.h"
+#include "DistanceCheck.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -18,9 +18,7 @@ namespace palpate {
 namespace {
 
 using Eigen::Vector3d;
-using Four = std::array<Vector3d, 4>;  // p a b c, or p0 p1 q0 q1
-
-constexpr double kAllowedUlp = 8.0;
+using oracle::checkEdgeEdge, oracle::checkVertexTriangle, oracle::Four, oracle::isDegenerate;
 
 class Random {
  public:
@@ -67,89 +65,6 @@ Four configuration(int kind, Random& random) {
       break;
   }
   return x;
-}
-
-bool isDegenerate(const Four& x) {
-  using namespace oracle;
-  const Vector a = toRational(x[1]);
-  const Vector normal = cross(toRational(x[2]) - a, toRational(x[3]) - a);
-  return dot(normal, normal) == 0;
-}
-
-void expectWithin(const oracle::Errors& errors) {
-  EXPECT_LE(errors.distance, kAllowedUlp);
-  EXPECT_LE(errors.difference, kAllowedUlp);
-  EXPECT_LE(errors.witness, kAllowedUlp);
-  EXPECT_LE(errors.normal, kAllowedUlp);
-}
-
-/// The normal of touching features: along the exact direction. The sum of squares, the root and the
-/// quotient round.
-void expectDirection(const Vector3d& normal, const oracle::Vector& along) {
-  const mpf_class length = oracle::root(oracle::dot(along, along));
-  if (length == 0) return;
-  for (int i = 0; i < 3; ++i)
-    EXPECT_LE(std::abs(mpf_class(normal[i] - mpf_class(along[i], 400) / length).get_d()), 0x1p-51);
-}
-
-bool hasUlp(double ulp) { return std::isfinite(ulp) && ulp > 0.0; }
-
-oracle::Errors checkVertexTriangle(const Four& x) {
-  using namespace oracle;
-  const VertexTriangleDistance answer = vertexTriangleDistance(x[0], x[1], x[2], x[3]);
-  const Closest truth = oracle::vertexTriangle(x[0], x[1], x[2], x[3]);
-  Vector difference = toRational(x[0]);
-  Rational sum = 0;
-  for (int i = 0; i < 3; ++i) {
-    const Rational weight(answer.barycentric[i]);
-    EXPECT_TRUE(weight >= 0);
-    sum += weight;
-    difference = difference - weight * toRational(x[i + 1]);
-  }
-  EXPECT_TRUE(sum == 1);
-  EXPECT_NEAR(answer.normal.norm(), 1.0, 1e-15);
-  const int feature = static_cast<int>(answer.feature);
-  EXPECT_EQ(feature == 6, truth.interior);
-  if (!truth.interior && !isDegenerate(x)) {
-    for (int i = 0; i < 3; ++i) {
-      const bool holds = feature < 3 ? feature == i : feature - 3 == i || (feature - 2) % 3 == i;
-      EXPECT_EQ(truth.weights[i] != 0, holds) << "corner " << i << " of feature " << feature;
-    }
-  }
-  if (truth.square == 0) {
-    const Vector a = toRational(x[1]);
-    expectDirection(answer.normal, cross(toRational(x[2]) - a, toRational(x[3]) - a));
-  }
-  const double ulp = ulpOfLargestDifference(x);
-  if (!hasUlp(ulp)) return {};
-  const Errors errors =
-      errorsOf(truth, difference, answer.difference, answer.normal, answer.distance, ulp);
-  expectWithin(errors);
-  return errors;
-}
-
-oracle::Errors checkEdgeEdge(const Four& x) {
-  using namespace oracle;
-  const EdgeEdgeDistance answer = edgeEdgeDistance(x[0], x[1], x[2], x[3]);
-  const Closest truth = oracle::edgeEdge(x[0], x[1], x[2], x[3]);
-  const Vector p0 = toRational(x[0]), q0 = toRational(x[2]);
-  const Vector difference = p0 + Rational(answer.weightA) * (toRational(x[1]) - p0) - q0 -
-                            Rational(answer.weightB) * (toRational(x[3]) - q0);
-  EXPECT_GE(std::min(answer.weightA, answer.weightB), 0.0);
-  EXPECT_LE(std::max(answer.weightA, answer.weightB), 1.0);
-  EXPECT_NEAR(answer.normal.norm(), 1.0, 1e-15);
-  const bool interior = !answer.parallel && answer.featureA == EdgeFeature::Interior &&
-                        answer.featureB == EdgeFeature::Interior;
-  EXPECT_EQ(interior, truth.interior);
-  EXPECT_EQ(crossingEdgesDistance(x[0], x[1], x[2], x[3]).has_value(), truth.interior);
-  if (truth.square == 0)
-    expectDirection(answer.normal, cross(toRational(x[1]) - p0, toRational(x[3]) - q0));
-  const double ulp = ulpOfLargestDifference(x);
-  if (!hasUlp(ulp)) return {};
-  const Errors errors =
-      errorsOf(truth, difference, answer.difference, answer.normal, answer.distance, ulp);
-  expectWithin(errors);
-  return errors;
 }
 
 /// The number of cases of each category. Long tests run more, and others.
@@ -212,6 +127,26 @@ TEST(ClosestPoint, EveryRegionBorderOfTwoEdgesIsCrossed) {
                          q0 = p0 + s * p - t * q + height * Vector3d(0, 0, 1);
           checkEdgeEdge({p0, p0 + p, q0, q0 + q});
         }
+}
+
+/// Found by fuzzing: the ends of one edge are equally far from the other within rounding, but the
+/// vectors to them differ by much more.
+TEST(ClosestPoint, NearlyTiedEndsOfParallelEdgesAreDecidedExactly) {
+  const Vector3d none = Vector3d::Zero();
+  checkEdgeEdge({Vector3d(13697, 0x1.ep45, 1), Vector3d(81, 0x1.ep45, 3), none, none});
+  checkEdgeEdge(
+      {Vector3d(1, -3848290697215, 1), Vector3d(-0x1p-414, -3848290697215, 1), none, none});
+  checkEdgeEdge(
+      {Vector3d(9000, 0x1p45, 0), Vector3d(1, 0x1p45, 0), Vector3d(-3, 0, 0), Vector3d(-2, 0, 0)});
+}
+
+/// Found by fuzzing: the square of the normal is denormal, though the extent is moderate.
+TEST(ClosestPoint, NormalIsUnitWhereItsSquareUnderflows) {
+  checkEdgeEdge(
+      {Vector3d(-2.8468967807917267e-267, -1.2114454386347773e-268, 6.0572271931738892e-269),
+       Vector3d(0, 0, 1.3435752215134178e-138),
+       Vector3d(0, -8.6172813846470428e-19, 1.817168157952166e-268),
+       Vector3d(1.2126554232481092e-34, 5.0274985703343258e-267, 1.3435752215134175e-138)});
 }
 
 // ---- Invariances ----

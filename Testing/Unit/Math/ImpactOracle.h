@@ -9,14 +9,16 @@
 #include <optional>
 #include <vector>
 
-/// A slow decision of continuous detection by other methods than the library's: rational
-/// polynomials in the power basis, Sturm sequences, signs at roots by greatest common divisors and
-/// bisection, and formulas of degree four. It shares no code with Source/.
+/// A slow decision of continuous detection by other methods than the library's: polynomials with
+/// whole coefficients in the power basis, roots by Descartes' rule of signs and Sturm sequences,
+/// signs at roots by greatest common divisors and bisection, and formulas of degree four. It shares
+/// no code with Source/.
 namespace palpate::impact {
 
+using Integer = mpz_class;
 using Rational = mpq_class;
 /// Coefficients of 1, t, t², …; no trailing zeros; zero is empty.
-using Polynomial = std::vector<Rational>;
+using Polynomial = std::vector<Integer>;
 
 inline Polynomial trimmed(Polynomial p) {
   while (!p.empty() && p.back() == 0) p.pop_back();
@@ -36,12 +38,21 @@ inline Polynomial operator*(const Polynomial& l, const Polynomial& r) {
   return trimmed(product);
 }
 inline Polynomial operator-(const Polynomial& l, const Polynomial& r) {
-  return l + Polynomial{Rational(-1)} * r;
+  return l + Polynomial{Integer(-1)} * r;
 }
 inline Rational valueAt(const Polynomial& p, const Rational& t) {
   Rational value = 0;
   for (auto c = p.rbegin(); c != p.rend(); ++c) value = value * t + *c;
   return value;
+}
+/// Of the value at t, without fractions.
+inline int signAt(const Polynomial& p, const Rational& t) {
+  Integer value = 0, power = 1;
+  for (auto c = p.rbegin(); c != p.rend(); ++c) {
+    value = value * t.get_num() + *c * power;
+    power *= t.get_den();
+  }
+  return sgn(value);
 }
 inline Polynomial derivative(const Polynomial& p) {
   Polynomial d;
@@ -51,30 +62,71 @@ inline Polynomial derivative(const Polynomial& p) {
 struct Division {
   Polynomial quotient, remainder;
 };
+/// Of a positive multiple of p.
 inline Division divide(Polynomial p, const Polynomial& by) {
   Polynomial quotient(p.size() >= by.size() ? p.size() - by.size() + 1 : 0);
+  const Integer scale = abs(by.back());
   while (p.size() >= by.size()) {
     const std::size_t shift = p.size() - by.size();
-    const Rational factor = p.back() / by.back();
-    quotient[shift] = factor;
+    const Integer factor = p.back() * sgn(by.back());
+    for (Integer& c : p) c *= scale;
+    for (Integer& c : quotient) c *= scale;
+    quotient[shift] += factor;
     for (std::size_t i = 0; i < by.size(); ++i) p[shift + i] -= factor * by[i];
     p = trimmed(p);
   }
   return {quotient, p};
 }
-/// Multiplies by a positive number, so that coefficients are integers without a common divisor,
-/// which are faster.
+/// Divides by the coefficients' greatest common divisor.
 inline Polynomial primitive(Polynomial p) {
-  mpz_class denominator = 1, divisor = 0;
-  for (const Rational& c : p) denominator = lcm(denominator, c.get_den());
-  for (const Rational& c : p)
-    divisor = gcd(divisor, mpz_class(c.get_num() * denominator / c.get_den()));
-  for (Rational& c : p) c *= Rational(denominator) / divisor;
+  Integer divisor = 0;
+  for (const Integer& c : p) divisor = gcd(divisor, c);
+  for (Integer& c : p) mpz_divexact(c.get_mpz_t(), c.get_mpz_t(), divisor.get_mpz_t());
   return p;
 }
 inline Polynomial commonDivisor(Polynomial l, Polynomial r) {
   while (!r.empty()) l = std::exchange(r, primitive(divide(l, r).remainder));
   return l;
+}
+
+/// Bernstein coefficients of a polynomial on [low, high], times a positive number. In (low, high)
+/// it has as many roots, counted with their multiplicities, as the coefficients have changes of
+/// sign, or an even number less.
+inline Polynomial bernstein(Polynomial p, const Rational& low, const Rational& high) {
+  const std::size_t count = p.size();
+  const Integer denominator = lcm(low.get_den(), high.get_den());
+  const Integer start = low.get_num() * (denominator / low.get_den());
+  const Integer width = high.get_num() * (denominator / high.get_den()) - start;
+  Integer power = 1;
+  for (std::size_t i = count; i-- > 0; power *= denominator) p[i] *= power;
+  for (std::size_t i = 0; start != 0 && i + 1 < count; ++i)
+    for (std::size_t j = count - 1; j-- > i;) p[j] += start * p[j + 1];
+  power = 1;
+  for (std::size_t i = 0; i < count; ++i, power *= width) {
+    p[i] *= power;
+    for (std::size_t k = 2; k <= i; ++k) p[i] *= static_cast<unsigned>(k);  // i! (n - i)!
+    for (std::size_t k = 2; k < count - i; ++k) p[i] *= static_cast<unsigned>(k);
+  }
+  for (std::size_t i = 1; i < count; ++i)
+    for (std::size_t j = count - 1; j >= i; --j) p[j] += p[j - 1];
+  return p;
+}
+/// 1 or -1 if all are positive or all negative; else 0.
+inline int commonSign(const Polynomial& all) {
+  const int sign = sgn(all.front());
+  const bool same =
+      std::all_of(all.begin(), all.end(), [&](const Integer& x) { return sgn(x) == sign; });
+  return same ? sign : 0;
+}
+template <class Signs>
+int signChanges(const Signs& all) {
+  int count = 0, last = 0;
+  for (const auto& x : all) {
+    const int sign = sgn(x);
+    if (sign != 0 && last != 0 && sign != last) ++count;
+    if (sign != 0) last = sign;
+  }
+  return count;
 }
 
 /// Counts the roots of a polynomial in (low, high], by Sturm's theorem.
@@ -83,7 +135,7 @@ class RootCounter {
   explicit RootCounter(const Polynomial& p) : m_sequence{p, derivative(p)} {
     while (!m_sequence.back().empty())
       m_sequence.push_back(
-          primitive(Polynomial{Rational(-1)} *
+          primitive(Polynomial{Integer(-1)} *
                     divide(m_sequence[m_sequence.size() - 2], m_sequence.back()).remainder));
   }
   int operator()(const Rational& low, const Rational& high) const {
@@ -92,13 +144,9 @@ class RootCounter {
 
  private:
   int changes(const Rational& t) const {
-    int count = 0, last = 0;
-    for (const Polynomial& q : m_sequence) {
-      const int sign = sgn(valueAt(q, t));
-      if (sign != 0 && last != 0 && sign != last) ++count;
-      if (sign != 0) last = sign;
-    }
-    return count;
+    std::vector<Integer> signs;
+    for (const Polynomial& q : m_sequence) signs.push_back(signAt(q, t));
+    return signChanges(signs);
   }
   std::vector<Polynomial> m_sequence;
 };
@@ -106,8 +154,7 @@ inline int rootCount(const Polynomial& p, const Rational& low, const Rational& h
   return RootCounter(p)(low, high);
 }
 
-/// A real number: the only root of `p`, which has no multiple ones, in (low, high]; or low where p
-/// is empty.
+/// A real number: the only root of `p` in (low, high], a simple one; or low where p is empty.
 struct Real {
   Polynomial p;
   Rational low, high;
@@ -115,7 +162,7 @@ struct Real {
   /// Whether it is at most t, in (low, high]. p changes its sign at the root, unless it has a root
   /// at low, too.
   bool isAtMost(const Rational& t) const {
-    const int start = sgn(valueAt(p, low)), there = sgn(valueAt(p, t));
+    const int start = signAt(p, low), there = signAt(p, t);
     return start == 0 ? rootCount(p, low, t) == 1 : there != start;
   }
   void halve() {
@@ -123,13 +170,18 @@ struct Real {
     (isAtMost(middle) ? high : low) = middle;
   }
   int sign(const Polynomial& q) {
-    if (p.empty()) return sgn(valueAt(q, low));
+    if (p.empty()) return signAt(q, low);
     if (q.empty()) return 0;
+    for (int i = 0; i < 12; ++i) {
+      if (const int sign = i % 4 == 0 ? commonSign(bernstein(q, low, high)) : 0) return sign;
+      halve();
+    }
     const Polynomial common = commonDivisor(p, q);
     if (common.size() > 1 && rootCount(common, low, high) == 1) return 0;
-    const RootCounter count(q);
-    while (count(low, high) > 0 || valueAt(q, low) == 0) halve();
-    return sgn(valueAt(q, high));
+    for (;;) {
+      halve();
+      if (const int sign = commonSign(bernstein(q, low, high))) return sign;
+    }
   }
   /// Sign of this root minus t.
   int compare(const Rational& t) {
@@ -141,26 +193,40 @@ struct Real {
       return 1;
     }
     high = t;
-    return valueAt(p, t) == 0 ? 0 : -1;
+    return signAt(p, t) == 0 ? 0 : -1;
   }
 };
 
 /// The roots of a polynomial that is not zero, in [0, 1], ascending.
-inline std::vector<Real> rootsInStep(const Polynomial& q) {
+inline std::vector<Real> rootsInStep(Polynomial q) {
+  const auto divideOut = [&q](const Rational& root) {
+    const Polynomial factor{-root.get_num(), root.get_den()};
+    bool isRoot = false;
+    for (; signAt(q, root) == 0; isRoot = true) q = primitive(divide(q, factor).quotient);
+    return isRoot;
+  };
   std::vector<Real> roots;
-  if (valueAt(q, 0) == 0) roots.push_back({{}, 0, 0});
-  const Polynomial p = primitive(divide(q, commonDivisor(q, derivative(q))).quotient);
-  std::vector<std::array<Rational, 2>> pieces{{0, 1}};
-  while (!pieces.empty()) {
-    const auto [low, high] = pieces.back();
-    pieces.pop_back();
-    const int count = rootCount(p, low, high);
-    if (count == 1) roots.push_back({p, low, high});
-    if (count < 2) continue;
+  if (divideOut(0)) roots.push_back({{}, 0, 0});
+  const bool isAtEnd = divideOut(1);
+  std::vector<std::array<Rational, 2>> parts{{0, 1}};
+  for (int i = 0; !parts.empty(); ++i) {
+    // Around a double root there are always two changes of sign.
+    if (i == 16) q = primitive(divide(q, commonDivisor(q, derivative(q))).quotient);
+    const auto [low, high] = parts.back();
+    parts.pop_back();
+    if (low == high) {
+      roots.push_back({{}, low, low});
+      continue;
+    }
+    const int changes = signChanges(bernstein(q, low, high));
+    if (changes == 1) roots.push_back({q, low, high});
+    if (changes < 2) continue;
     const Rational middle = (low + high) / 2;
-    pieces.push_back({middle, high});
-    pieces.push_back({low, middle});
+    parts.push_back({middle, high});
+    if (divideOut(middle)) parts.push_back({middle, middle});
+    parts.push_back({low, middle});
   }
+  if (isAtEnd) roots.push_back({{}, 1, 1});
   return roots;
 }
 
@@ -180,16 +246,17 @@ using Positions = std::array<Eigen::Vector3d, 8>;
 
 class Query {
  public:
-  Query(bool edges, const Positions& positions) : m_edges(edges) {
+  Query(bool edges, const Positions& positions)
+      : m_edges(edges), m_separated(axisSeparates(positions, edges ? 2 : 1)) {
     // Whole numbers, times one power of two.
-    mpz_class scale = 1;
+    Integer scale = 1;
     for (const Eigen::Vector3d& p : positions)
       for (const double x : p) scale = lcm(scale, Rational(x).get_den());
     for (int i = 0; i < 4; ++i)
       for (int k = 0; k < 3; ++k) {
         const Rational before = scale * Rational(positions[i][k]),
                        now = scale * Rational(positions[4 + i][k]);
-        m_vertices[i][k] = trimmed({before, now - before});
+        m_vertices[i][k] = trimmed({before.get_num(), now.get_num() - before.get_num()});
       }
     const auto& [v, a, b, c] = m_vertices;
     m_coplanarity = dot(a - v, cross(b - v, c - v));
@@ -210,6 +277,7 @@ class Query {
 
   /// The first time in [0, 1] at which the features touch.
   std::optional<Real> firstTouch() const {
+    if (m_separated) return std::nullopt;
     std::vector<Real> times;
     if (!m_coplanarity.empty()) {
       times = rootsInStep(m_coplanarity);
@@ -228,15 +296,34 @@ class Query {
     }
     std::optional<Real> first;
     for (Real& time : times)
-      if ((!first || isBefore(time, *first)) && touchAt(time)) first = time;
+      if ((!first || isBefore(time, *first)) && touchesInPlaneAt(time)) first = time;
     return first;
   }
 
   /// For (v, a, b, c): det(a - v, b - v, c - v).
   const Polynomial& coplanarity() const { return m_coplanarity; }
 
-  bool touchAt(Real time) const {
-    if (time.sign(m_coplanarity) != 0) return false;
+  /// Positions over time, times a positive number.
+  const std::array<Vector, 4>& vertices() const { return m_vertices; }
+
+ private:
+  /// Whether all corners of one feature are on one side of all of the other along an axis, before
+  /// and now. They move linearly, and so are always.
+  static bool axisSeparates(const Positions& x, std::size_t ofFirst) {
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double side : {1.0, -1.0}) {
+        bool apart = true;
+        for (std::size_t i = 0; i < ofFirst; ++i)
+          for (std::size_t j = ofFirst; j < 4; ++j)
+            for (const std::size_t end : {0, 4})
+              apart &= side * x[end + i][axis] > side * x[end + j][axis];
+        if (apart) return true;
+      }
+    return false;
+  }
+
+  /// Whether the features touch at a time at which their corners are in one plane.
+  bool touchesInPlaneAt(Real time) const {
     if (time.sign(m_normalSquared) != 0)
       return std::all_of(m_notNegative.begin(), m_notNegative.end(),
                          [&](const Polynomial& p) { return time.sign(p) >= 0; });
@@ -248,16 +335,16 @@ class Query {
     });
   }
 
- private:
   static bool isBefore(Real l, Real r) {
     if (r.p.empty()) return l.compare(r.low) < 0;
     if (l.p.empty()) return r.compare(l.low) > 0;
     // Roots are equal if a common factor has a root in both intervals. Otherwise bisection
     // separates them.
-    const Polynomial common = commonDivisor(l.p, r.p);
-    for (;;) {
+    Polynomial common;
+    for (int i = 0;; ++i) {
       if (l.high <= r.low) return true;
       if (r.high <= l.low) return false;
+      if (i == 8) common = commonDivisor(l.p, r.p);
       if (common.size() > 1) {
         const Rational low = std::max(l.low, r.low), high = std::min(l.high, r.high);
         if (low < high && rootCount(common, low, high) > 0) return false;
@@ -267,7 +354,7 @@ class Query {
     }
   }
 
-  bool m_edges;
+  bool m_edges, m_separated;
   std::array<Vector, 4> m_vertices;
   Polynomial m_coplanarity, m_normalSquared;
   std::vector<Polynomial> m_notNegative;          ///< of touching features that are not degenerate

@@ -1,6 +1,6 @@
 #include <palpate/TimeOfImpact.h>
 
-#include "ImpactCases.h"
+#include "ImpactCheck.h"
 #include "Common/Sanitized.h"
 #include "Math/ImpactQuery.h"
 
@@ -16,40 +16,6 @@
 namespace palpate {
 
 namespace {
-
-std::string text(const ImpactCase& query) {
-  std::string result = query.edges ? "edges" : "vertex and triangle";
-  for (const Eigen::Vector3d& p : query.positions) {
-    char line[100];
-    std::snprintf(line, sizeof line, "\n  %a %a %a", p[0], p[1], p[2]);
-    result += line;
-  }
-  return result;
-}
-
-ImpactResult exactly(const ImpactCase& query, double tolerance) {
-  ImpactQuery q{query.edges ? ImpactQuery::Kind::EdgeEdge : ImpactQuery::Kind::VertexTriangle, {}};
-  for (int i = 0; i < 4; ++i) q.vertices[i] = {query.positions[i], query.positions[4 + i]};
-  return findTouchExactly(q, tolerance);
-}
-
-/// The oracle's decision; a time that is not late, and early by at most the tolerance. For both
-/// paths.
-void expectTrue(const ImpactCase& query, double tolerance, int& impacts) {
-  std::optional<impact::Real> truth = impact::Query(query.edges, query.positions).firstTouch();
-  const auto check = [&](bool impact, double time, const char* path) {
-    ASSERT_EQ(impact, truth.has_value()) << path << ", " << text(query);
-    if (!impact) return;
-    EXPECT_GE(truth->compare(time), 0) << path << " late at " << time << ", " << text(query);
-    EXPECT_LE(truth->compare(impact::Rational(time) + impact::Rational(tolerance)), 0)
-        << path << " early at " << time << ", " << text(query);
-  };
-  const std::optional<double> time = query.time({0.0, tolerance});
-  check(time.has_value(), time.value_or(0.0), "findTouch");
-  const ImpactResult exact = exactly(query, tolerance);
-  check(exact.impact, exact.time, "findTouchExactly");
-  impacts += truth.has_value();
-}
 
 /// Cases and seed from the environment: the long run of `ctest -L long` has millions.
 long fromEnvironment(const char* name, long otherwise) {

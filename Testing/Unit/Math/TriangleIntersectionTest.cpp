@@ -1,7 +1,9 @@
 #include <palpate/Distance.h>
 #include <palpate/Intersection.h>
 
+#include "Common/Sanitized.h"
 #include "Math/TriangleIntersection.h"
+#include "Unit/Math/IntersectionOracle.h"
 #include "Unit/Math/TrianglePairs.h"
 
 #include <Eigen/Geometry>
@@ -149,6 +151,18 @@ TEST(TriangleIntersection, FeaturesTouchWhereTheirDistanceIsZero) {
     }
   }
   for (const int count : touching) EXPECT_GT(count, 1000);
+}
+
+TEST(TriangleIntersection, AgreesWithRationalArithmetic) {
+  Random random(16);
+  std::array<int, 2> found{};
+  for (int repeat = 0; repeat < palpate::testing::casesOf(500) * kKinds; ++repeat) {
+    const auto [a, b] = makePair(static_cast<Kind>(repeat % kKinds), random);
+    const bool truth = intersection::trianglesIntersect({a[0], a[1], a[2], b[0], b[1], b[2]});
+    ASSERT_EQ(trianglesIntersect(a[0], a[1], a[2], b[0], b[1], b[2]), truth) << repeat % kKinds;
+    ++found[truth];
+  }
+  for (const int count : found) EXPECT_GT(count, palpate::testing::casesOf(1000));
 }
 
 TEST(TriangleIntersection, EachSimpleConfigurationHasItsFeatures) {

@@ -217,7 +217,7 @@ TEST(UnfoldedStars, MustBeClosedAndOfOneWinding) {
     topology.disable(disabled);
     return topology.hasClosedStar;
   };
-  EXPECT_EQ(closed(whole), (std::vector<std::uint8_t>{1, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(closed(whole), (CountedVector<std::uint8_t>{1, 0, 0, 0, 0, 0, 0}));
   EXPECT_EQ(closed(whole, {3})[0], 0);
   testing::Mesh open = whole, twice = whole, turned = whole;
   open.triangles.pop_back();

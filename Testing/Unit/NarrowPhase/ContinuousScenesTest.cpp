@@ -30,7 +30,8 @@ using Pairs = std::set<std::array<std::uint32_t, 2>>;
 /// vertex, smaller vertex).
 struct PublishedIds {
   explicit PublishedIds(const MeshTopology& mesh)
-      : edges(mesh.edges), triangles(static_cast<std::uint32_t>(mesh.vertexCount + edges.size())) {
+      : edges(mesh.edges.begin(), mesh.edges.end()),
+        triangles(static_cast<std::uint32_t>(mesh.vertexCount + edges.size())) {
     std::sort(edges.begin(), edges.end(), [](const Segment& l, const Segment& r) {
       return std::pair(l[1], l[0]) < std::pair(r[1], r[0]);
     });
@@ -72,7 +73,7 @@ TEST_P(ContinuousScenes, HaveNoFalseNegativesAndNoFalsePositives) {
   EXPECT_EQ(found.vertexTriangle.size(), vertexTriangle);
   EXPECT_EQ(found.edgeEdge.size(), edgeEdge);
 
-  const auto expectLabels = [&](const char* kind, const Pairs& contacts) {
+  const auto expectLabels = [&, &before = before](const char* kind, const Pairs& contacts) {
     const std::string name = std::string(before) + kind;
     const auto pairs = testing::readPairs(folder / "boxes" / (name + ".json"));
     const auto truth = testing::readTruth(folder / "mma_bool" / (name + "_mma_bool.json"));

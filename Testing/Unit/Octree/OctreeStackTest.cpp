@@ -1,4 +1,5 @@
 #include "BoxOctree.h"
+#include "Common/Sanitized.h"
 #include "Octree/PointQueries.h"
 #include "Octree/Traversal.h"
 
@@ -17,7 +18,7 @@ using testing::Boxes;
 using testing::BoxOctree;
 using testing::Random;
 
-#if defined(__SANITIZE_ADDRESS__) || !defined(NDEBUG)
+#if defined(PALPATE_ADDRESS_SANITIZER) || !defined(NDEBUG)
 constexpr std::size_t kStack = 512 << 10;  // frames are several times as large
 #else
 constexpr std::size_t kStack = 64 << 10;
@@ -50,9 +51,7 @@ std::size_t stackOf(std::function<void()> f) {
 
 /// Stacks of real-time threads are small. The use of the stack does not grow with the octree.
 TEST(OctreeStack, IsSmallForTheDeepestTree) {
-#ifdef __SANITIZE_THREAD__
-  GTEST_SKIP() << "skipped: ThreadSanitizer keeps its own state on the stack";
-#endif
+  if (testing::kThreadSanitizer) GTEST_SKIP() << "ThreadSanitizer keeps its own state on the stack";
   Random random(31);
   // Each third level is sorted by three digits while those above it are still open.
   const Boxes boxes = testing::nestedBoxes(random, 40, 58, 3000);

@@ -328,7 +328,9 @@ TEST(EmbeddedVertices, BadCallsThrowErrorsThatNameTheCause) {
                 [&] { testing::embeddedVertices(detection, body, body); });
   const double nan = std::numeric_limits<double>::quiet_NaN();
   expectRefused(ErrorCode::NonFinitePosition,
-                "geometry 0: the point is (nan, 0, 0); it must be finite", [&] {
+                "geometry 0: the point is (nan, 0, 0); it must be finite and at most 1e+300 in "
+                "magnitude",
+                [&] {
                   detection.queries().findTetrahedron(body, {nan, 0, 0});
                 });
   EXPECT_FALSE(detection.queries().findTetrahedron(body, {2, 0, 0}));

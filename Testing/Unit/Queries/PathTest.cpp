@@ -601,7 +601,9 @@ TEST(Path, BadCallsThrowErrorsThatNameThemAndChangeNothing) {
   refused(InvalidSettings, "the path has 0 points", {}, 0.0, {body});
   refused(NonFinitePosition, "point 1 of the path is (nan, 0, 0)", {{0, 0, 0}, {nan, 0, 0}}, 0.0,
           {body});
-  refused(InvalidSettings, "length is not finite", {{-1e308, 0, 0}, {1e308, 0, 0}}, 0.0, {body});
+  refused(NonFinitePosition, "point 0 of the path is (-1e+308", {{-1e308, 0, 0}, {1, 0, 0}}, 0.0,
+          {body});
+  refused(InvalidSettings, "radius is 1e+308", path, 1e308, {body});
   refused(UnknownGeometry, "geometry 7", path, 0.0, {body, GeometryId{7}});
   queries.path(path, 0.0, {}, answer.inside, answer.outside);
   EXPECT_TRUE(answer.inside.empty());

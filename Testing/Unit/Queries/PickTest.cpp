@@ -188,7 +188,7 @@ TEST(Pick, PartsAreNotCutByHitsOfOtherGeometries) {
 }
 
 TEST(Pick, NearestVertexAtAnyScale) {
-  for (const int exponent : {-1000, -600, 0, 600, 1000}) {
+  for (const int exponent : {-1000, -600, 0, 600, 990}) {
     const double s = std::ldexp(1.0, exponent);
     OctreeBasedCD collisions;
     collisions.addTriangleMesh(Positions{{-8 * s, -8 * s, 0}, {8 * s, -8 * s, 0}, {0, 8 * s, 0}},

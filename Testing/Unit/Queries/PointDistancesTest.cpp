@@ -189,7 +189,8 @@ TEST(PointDistances, PlacedBodiesNearAndFar) {
     for (Vector3d& p : points)
       if (p.cwiseAbs().maxCoeff() < 3) p += shift;
     expectSameAnswers(both, points);
-    expectTrueAnswers(both, ball, world, std::span(points).first(20));
+    points.resize(static_cast<std::size_t>(casesOf(100) / 5));
+    expectTrueAnswers(both, ball, world, points);
   }
 }
 

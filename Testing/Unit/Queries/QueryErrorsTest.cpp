@@ -140,8 +140,10 @@ TEST(QueryErrors, UnknownAndRemovedGeometries) {
   const SpatialQueries queries = scene.collisions.queries();
   for (const auto& [name, takesShapes, call] : all.calls()) {
     SCOPED_TRACE(name);
-    expectRefused(UnknownGeometry, "geometry 99", [&] { call(queries, GeometryId{99}); });
-    expectRefused(UnknownGeometry, "geometry 4", [&] { call(queries, scene.removed); });
+    expectRefused(UnknownGeometry, "geometry 99",
+                  [&, &call = call] { call(queries, GeometryId{99}); });
+    expectRefused(UnknownGeometry, "geometry 4",
+                  [&, &call = call] { call(queries, scene.removed); });
   }
 }
 
@@ -154,10 +156,12 @@ TEST(QueryErrors, ShapesAndBodiesWithoutInside) {
     const bool needsInside = name == "contains" || name.starts_with("signed");
     if (!takesShapes)
       expectRefused(needsInside ? NotClosed : UnsupportedMethod, "geometry 1 is a shape",
-                    [&] { call(queries, scene.shape); });
+                    [&, &call = call] { call(queries, scene.shape); });
     if (!needsInside) continue;
-    expectRefused(NotClosed, "geometry 2 is a line mesh", [&] { call(queries, scene.line); });
-    expectRefused(NotClosed, "geometry 3 has no inside", [&] { call(queries, scene.sheetMesh); });
+    expectRefused(NotClosed, "geometry 2 is a line mesh",
+                  [&, &call = call] { call(queries, scene.line); });
+    expectRefused(NotClosed, "geometry 3 has no inside",
+                  [&, &call = call] { call(queries, scene.sheetMesh); });
   }
   const TestGeometry empty;
   OctreeBasedCD other;
@@ -175,7 +179,8 @@ TEST(QueryErrors, OutdatedQueries) {
   scene.collisions.setPositions(scene.ball, scene.rest);
   for (const auto& [name, takesShapes, call] : all.calls()) {
     SCOPED_TRACE(name);
-    expectRefused(InvalidCall, "call queries() again", [&] { call(queries, scene.ball); });
+    expectRefused(InvalidCall, "call queries() again",
+                  [&, &call = call] { call(queries, scene.ball); });
   }
   const Ray ray{{0, 0, 3}, {0, 0, -1}};
   expectRefused(InvalidCall, "call queries() again", [&] { queries.firstHit(ray); });

@@ -187,7 +187,7 @@ TEST(QueryAllocations, RepeatedSingleCallsAllocateNothing) {
          if (id == scene.open) queries.signedDistance(id, p, kByNumber);
        }}};
   for (const auto& [name, call] : calls) {
-    const auto run = [&] {
+    const auto run = [&, &call = call] {
       for (std::size_t i = 0; i < scene.probes.size(); ++i)
         for (const GeometryId id : ids) call(id, scene.probes[i], scene.rays[i]);
     };

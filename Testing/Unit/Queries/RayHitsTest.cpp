@@ -368,7 +368,7 @@ TEST(RayHits, DirectionsOfAnyLength) {
     if (ray.direction == Vector3d::Zero()) continue;
     const std::vector<RayHit> expected = consistentHits(both, ray);
     hits += expected.size();
-    for (const int exponent : {-1020, -600, -40, 40, 600, 1000}) {
+    for (const int exponent : {-1020, -600, -40, 40, 600, 990}) {
       const Ray scaled{ray.origin, std::ldexp(1.0, exponent) * ray.direction};
       const std::vector<RayHit> found = consistentHits(both, scaled);
       ASSERT_EQ(found.size(), expected.size()) << exponent;

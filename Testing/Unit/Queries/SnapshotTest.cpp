@@ -214,7 +214,9 @@ class TestSource : public SpatialQueries::Source {
   }
   void move(std::size_t i, const Positions& positions) {
     SearchableGeometry& geometry = *m_geometries[i];
-    geometry.mesh.now.setBody(std::make_shared<const Positions>(positions), m_revisions.next());
+    geometry.mesh.now.setBody(
+        std::make_shared<const CountedVector<Eigen::Vector3d>>(positions.begin(), positions.end()),
+        m_revisions.next());
     geometry.mesh.before = geometry.mesh.now;
     geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.topology);
     geometry.tree.update(geometry.mesh, geometry.revisions.topology, 1.0, m_settings, m_thread);
@@ -295,7 +297,7 @@ TEST(Snapshot, TakesNoSlotThatBecomesFreeMeanwhile) {
 
 TEST(Snapshot, PositionsStayFiniteAndInAnyRoundingMode) {
   OctreeBasedCD collisions;
-  const std::vector<Eigen::Vector3d> before{{-1e308, 0, 0}}, now{{1e308, 0.7, 0}};
+  const std::vector<Eigen::Vector3d> before{{-1e300, 0, 0}}, now{{1e300, 0.7, 0}};
   const GeometryId points = collisions.addPointSet(before);
   collisions.advance();
   collisions.setPositions(points, now);

@@ -1,0 +1,16 @@
+# Cross-compiles for 64-bit ARM with Debian's compiler. CMake/arm64.sh puts the packages of that architecture into
+# PALPATE_ARM64_ROOT. Tests run in the emulator.
+set(CMAKE_SYSTEM_NAME Linux)
+set(CMAKE_SYSTEM_PROCESSOR aarch64)
+set(CMAKE_C_COMPILER aarch64-linux-gnu-gcc)
+set(CMAKE_CXX_COMPILER aarch64-linux-gnu-g++)
+set(CMAKE_LIBRARY_ARCHITECTURE aarch64-linux-gnu)
+set(PALPATE_ARM64_ROOT ${CMAKE_CURRENT_LIST_DIR}/../build/arm64-packages CACHE PATH "Packages for 64-bit ARM, unpacked")
+set(CMAKE_FIND_ROOT_PATH ${PALPATE_ARM64_ROOT})
+set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
+set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_PACKAGE ONLY)
+set(ENV{PKG_CONFIG_SYSROOT_DIR} ${PALPATE_ARM64_ROOT})
+set(ENV{PKG_CONFIG_LIBDIR} ${PALPATE_ARM64_ROOT}/usr/lib/aarch64-linux-gnu/pkgconfig:${PALPATE_ARM64_ROOT}/usr/share/pkgconfig)
+set(CMAKE_CROSSCOMPILING_EMULATOR qemu-aarch64;-L;/usr/aarch64-linux-gnu)

@@ -1,0 +1,47 @@
+#pragma once
+
+#include "Mesh/TriangleMesh.h"
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <vector>
+
+namespace palpate {
+
+/// The boundary of a set of triangles: the edges that triangles pass more often in one direction
+/// than in the other. Vertices at one place count as one vertex. A closed and consistently oriented
+/// mesh has no boundary.
+///
+/// The generalised winding number w of the triangles is the sum of an integer, which changes at the
+/// triangles, and a part that changes smoothly. Off the boundary, the gradient of this part is the
+/// integral of r x dl / 4 pi r³ along the boundary (the law of Biot and Savart).
+class BoundaryCurve {
+ public:
+  explicit BoundaryCurve(const TriangleMesh&);
+
+  bool isEmpty() const { return m_edges.empty(); }
+  double length() const { return m_nodes.empty() ? 0.0 : m_nodes[0].length; }  ///< L
+
+  /// 1/L: an upper bound of that gradient in the ball; infinity if the boundary may meet it.
+  double steepness(const Eigen::Vector3d& centre, double radius) const;
+
+ private:
+  struct Edge {
+    Eigen::Vector3d start, end;
+    double count;  ///< of passages in one direction, less those in the other
+  };
+  struct Node {
+    Eigen::Vector3d centre;
+    double radius, length;     ///< L: of a ball around the edges; their length, times counts
+    std::uint32_t begin, end;  ///< edges
+    std::uint32_t second = 0;  ///< the second child; the first one comes next; 0: a leaf
+  };
+  void addNode(std::uint32_t begin, std::uint32_t end);
+
+  std::vector<Edge> m_edges;
+  std::vector<Node> m_nodes;
+  double m_largest = 0.0;  ///< L: coordinate
+};
+
+}  // namespace palpate

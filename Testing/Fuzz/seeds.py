@@ -1,0 +1,151 @@
+#!/usr/bin/env python3
+"""seeds.py FOLDER: writes the seeds of Data/Fuzz, one folder for each target of Targets.h.
+
+Small valid files of every kind that a reader accepts, files that once took much memory or time, and
+random decisions. Findings that the fuzzer kept are not made here.
+"""
+import base64
+import lzma
+import random
+import struct
+import sys
+import zlib
+from pathlib import Path
+
+TEN = 10_000  # bytes of a file that repeats itself
+
+
+def repeated(text, size=TEN):
+    return text * (size // len(text) + 1)
+
+
+def obj():
+    yield "quad", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1 4//1\n"
+    yield "relative", "# x\nv 0 0 0\r\nv 1e-3 +0 0\r\nv 1 1 .5\r\nvt 0 0\r\nf -3/1/1 -2/1/1 \\\n -1/1/1\r\n"
+    yield "corners", "v 0 0 0\n" + repeated("f 1 1 1\n")
+    yield "continued", "v 0 0 0\nf 1 1 " + repeated("1\\\n ")
+
+
+def stl():
+    facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex {} 1 0\nendloop\nendfacet\n"
+    yield "text", "solid x\n" + facet.format(0) + facet.format(1) + "endsolid x\n"
+    triangle = struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)
+    yield "binary", bytes(80) + struct.pack("<I", 2) + triangle * 2
+    yield "many", bytes(80) + struct.pack("<I", 4_000_000_000) + triangle
+
+
+def ply():
+    head = "ply\nformat {} 1.0\nelement vertex 3\nproperty float x\nproperty double y\nproperty uchar z\n" \
+           "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    yield "ascii", head.format("ascii") + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    for name, order in (("little", "<"), ("big", ">")):
+        points = b"".join(struct.pack(order + "fdB", *p) for p in ((0, 0, 0), (1, 0, 0), (0, 1, 1)))
+        yield name, head.format(f"binary_{name}_endian").encode() + points + struct.pack(order + "B3i", 3, 0, 1, 2)
+    start = "ply\nformat binary_little_endian 1.0\n"
+    xyz = "property uchar x\nproperty uchar y\nproperty uchar z\n"
+    yield "strips", start + "element vertex 4\n" + xyz + "element tristrips 1\nproperty list int int vertex_indices\nend_header\n" \
+        + bytes(range(12)).decode() + struct.pack("<6i", 5, 0, 1, 2, -1, 3).decode("latin1")
+    yield "no-properties", start + repeated("element vertex 100\n") + "end_header\n"
+    yield "properties", start + "element x 0\n" + repeated("property char a\n") + "end_header\n"
+    yield "short", start + "element vertex 4000000000\n" + xyz + "end_header\n" + "x" * 20
+
+
+def vtk():
+    head = "# vtk DataFile Version {}\nx\n{}\nDATASET POLYDATA\n"
+    points = "POINTS 4 double\n0 0 0 1 0 0 1 1 0 0 1 0\n"
+    yield "ascii", head.format("3.0", "ASCII") + points + "POLYGONS 1 5\n4 0 1 2 3\nTRIANGLE_STRIPS 1 5\n4 0 1 3 2\n"
+    yield "binary", (head.format("3.0", "BINARY") + "POINTS 3 float\n").encode() + struct.pack(">9f", 0, 0, 0, 1, 0, 0, 0, 1, 0) \
+        + b"\nPOLYGONS 1 4\n" + struct.pack(">4i", 3, 0, 1, 2)
+    yield "offsets", head.format("5.1", "ASCII") + points \
+        + "POLYGONS 2 4\nOFFSETS vtktypeint64\n0 4\nCONNECTIVITY vtktypeint64\n0 1 2 3\n"
+    yield "long-name", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET " + "x" * TEN
+
+
+def vtp():
+    def file(pieces, attributes="", appended=""):
+        return f'<VTKFile type="PolyData" byte_order="LittleEndian"{attributes}><PolyData>{pieces}</PolyData>{appended}</VTKFile>'
+
+    def array(name, kind, form, text="", offset=None):
+        at = "" if offset is None else f' offset="{offset}"'
+        return f'<DataArray type="{kind}" Name="{name}" format="{form}"{at}>{text}</DataArray>'
+
+    def piece(points, connectivity, offsets, count=3):
+        return f'<Piece NumberOfPoints="{count}" NumberOfPolys="1"><Points>{points}</Points><Polys>{connectivity}{offsets}</Polys></Piece>'
+
+    cells = array("connectivity", "Int32", "ascii", "0 1 2"), array("offsets", "Int32", "ascii", "3")
+    coordinates = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0)
+    yield "ascii", file(piece(array("Points", "Float32", "ascii", "0 0 0 1 0 0 0 1 0"), *cells))
+    block = struct.pack("<I", 36) + coordinates
+    yield "base64", file(piece(array("Points", "Float32", "binary", base64.b64encode(block).decode()), *cells))
+    appended = piece(array("Points", "Float32", "appended", "", 0), *cells)
+    raw = '<AppendedData encoding="raw">_{}</AppendedData>'
+    yield "raw", file(appended, "", raw.format(block.decode("latin1")))
+    lz4 = bytes([0xF0, 36 - 15]) + coordinates  # literals only
+    for name, packed in (("ZLib", zlib.compress(coordinates)), ("LZMA", lzma.compress(coordinates)), ("LZ4", lz4)):
+        block = struct.pack("<4I", 1, 36, 0, len(packed)) + packed
+        yield name.lower(), file(appended, f' compressor="vtk{name}DataCompressor"', raw.format(block.decode("latin1")))
+    packed = zlib.compress(bytes(300_000))
+    block = struct.pack("<4I", 1, 300_000, 0, len(packed)) + packed
+    share = piece(array("Points", "UInt8", "appended", "", 0), *cells, count=100_000)
+    yield "shared-block", file(share * 12, ' compressor="vtkZLibDataCompressor"', raw.format(block.decode("latin1")))
+    yield "pieces", file(repeated("<Piece ") + "</Piece>")
+
+
+def capture():
+    for path in sorted(Path(__file__).parents[2].glob("Data/Regression/*.capture")):
+        yield path.stem, path.read_bytes()
+    for name, shape in (("sphere", "Sphere 0p+0 0p+0 0p+0 1p+0"), ("plane", "Plane 0p+0 0p+0 0p+0 0p+0 0p+0 1p+0"),
+                        ("hull", "ConvexHull 4 0p+0 0p+0 0p+0 1p+0 0p+0 0p+0 0p+0 1p+0 0p+0 0p+0 0p+0 1p+0")):
+        pose = "1p+0 0p+0 0p+0 0p+0 0p+0 1p+0 0p+0 0p+0 0p+0 0p+0 1p+0 0p+0 "
+        yield name, f"palpate-capture 11\nOctree 1 32 32 Auto Box\n1 0\ngeometry 0 0 0 Shape 0 {shape} {pose}{pose}" \
+                    "1 4294967295 Both 0 0 0\nend\n"
+    yield "geometries", "palpate-capture 11\nOctree 1 32 32 Auto Box\n666 0\n" + repeated("geometry 0 0 0 ") + "\n"
+    yield "many-points", "palpate-capture 11\nOctree 1 32 32 Auto Box\n666 0\n" \
+        + repeated("geometry 0 0 0 Points 0 1 1 Both 0 0 0\n") + "end\n"
+    yield "long-word", "palpate-capture 11\n" + "x" * TEN
+
+
+def field():
+    def file(roots, blocks, leaves, exponent=0, band=1.0, size=(1, 1, 1), origin=(0, 0, 0), is_open=0):
+        data = b"palpate-field\0\0\0" + struct.pack("<Iidd3q3IIdQQ", 2, exponent, 0.1, band, *origin, *size, is_open, 0.5 * is_open,
+                                                    len(blocks), len(leaves))
+        data += b"".join(struct.pack("<I", entry) for entry in roots)
+        data += b"".join(struct.pack("<8I", *block) for block in blocks) + b"".join(struct.pack("<8f", *leaf) for leaf in leaves)
+        total = 0xcbf29ce484222325
+        for byte in data:
+            total = (total ^ byte) * 0x100000001b3 % 2**64
+        return data + struct.pack("<Q", total)
+
+    leaf, outside, inside = 1 << 30, 2 << 30, 3 << 30
+    values = (-0.5, 0.5, -0.5, 0.5, -0.25, 0.25, -1, 1)
+    yield "leaf", file([leaf], [], [values])
+    yield "grid", file([leaf, outside, inside, leaf + 1], [], [values, values], -3, 0.25, (2, 2, 1), (-5, 7, 2**40))
+    yield "block", file([0], [(leaf, outside, inside, leaf + 1, 1, leaf, leaf, leaf), (leaf,) * 8], [values, values])
+    unsigned = leaf | 1 << 29
+    yield "open", file([leaf, outside, inside, unsigned + 1], [], [values, (0.5,) * 8], -3, 0.25, (2, 2, 1), is_open=1)
+    yield "deep", file([0], [(block + 1,) * 8 for block in range(39)] + [(leaf,) * 8], [values])
+    yield "wide-band", file([outside], [], [values], -1000, 1e300)
+    yield "far", file([leaf], [], [values], 1000, 1e300)
+
+
+def decisions(sizes, count):
+    def seeds():
+        generator = random.Random(count)
+        for i in range(count):
+            yield f"random{i}", generator.randbytes(generator.randint(*sizes))
+    return seeds
+
+
+def main():
+    targets = {"Obj": obj, "Stl": stl, "Ply": ply, "Vtk": vtk, "Vtp": vtp, "Capture": capture, "Field": field,
+               "Distance": decisions((100, 114), 8), "Intersection": decisions((150, 169), 8),
+               "TimeOfImpact": decisions((200, 227), 8), "History": decisions((200, 900), 12)}
+    for name, seeds in targets.items():
+        folder = Path(sys.argv[1]) / name
+        folder.mkdir(parents=True, exist_ok=True)
+        for seed, content in seeds():
+            data = content if isinstance(content, bytes) else content.encode("latin1")
+            (folder / f"seed-{seed}").write_bytes(data)
+
+
+main()

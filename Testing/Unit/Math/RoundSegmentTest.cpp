@@ -1,0 +1,154 @@
+#include "Math/RoundSegment.h"
+
+#include <palpate/Distance.h>
+
+#include "Unit/Math/TrianglePairs.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace palpate::test {
+namespace {
+
+using Eigen::Vector3d;
+
+/// How far a point is outside a segment with radii; negative inside.
+double outside(const Vector3d& at, const Vector3d& p, const Vector3d& q, double radiusP,
+               double radiusQ) {
+  const Vector3d u = q - p;
+  if (u.squaredNorm() == 0.0) return (at - p).norm() - std::max(radiusP, radiusQ);
+  const double w = std::clamp((at - p).dot(u) / u.squaredNorm(), 0.0, 1.0);
+  return (at - p - w * u).norm() - ((1 - w) * radiusP + w * radiusQ);
+}
+
+struct Case {
+  RaySegment ray;
+  Vector3d p, q;
+  double radiusP, radiusQ;
+};
+
+/// Rays in every relation to the segment: any, parallel, perpendicular, along its line; with and
+/// without a taper, of which some are wider than the segment is long; at sizes that are scaled.
+Case makeCase(int kind, Random& random) {
+  Case c;
+  c.p = random.inCube();
+  c.q = kind % 5 == 4 ? c.p : Vector3d(random.inCube());
+  c.radiusP = 0.7 * random.unit();
+  c.radiusQ = random.below(2) ? c.radiusP : random.below(3) == 0 ? 0.0 : 1.5 * random.unit();
+  Vector3d direction = random.inCube();
+  const Vector3d u = c.q - c.p;
+  if (kind % 5 == 1) direction = (random.below(2) ? 1.7 : -0.6) * u;
+  if (kind % 5 == 2) direction = u.cross(direction);
+  if (kind % 5 == 3) {
+    const int axis = random.below(3);
+    c.q = c.p + Vector3d::Unit(axis);
+    direction = Vector3d::Unit(random.below(2) ? axis : (axis + 1) % 3);
+  }
+  const Vector3d through = c.p + random.unit() * (c.q - c.p) + 0.7 * random.inCube();
+  c.ray = {through - direction, direction, -3.0 + 4.0 * random.unit(), 1.0 + 3.0 * random.unit()};
+  return c;
+}
+
+void scale(Case& c, int exponent) {
+  for (Vector3d* v : {&c.p, &c.q, &c.ray.origin, &c.ray.direction}) *v = scaled(*v, exponent);
+  c.radiusP = std::ldexp(c.radiusP, exponent);
+  c.radiusQ = std::ldexp(c.radiusQ, exponent);
+}
+
+bool isIn(const std::vector<RayInterval>& intervals, double t) {
+  return std::any_of(intervals.begin(), intervals.end(),
+                     [&](const RayInterval& i) { return i.first <= t && t <= i.last; });
+}
+
+/// Compares the intervals with the distance of points of the ray. `size`: the unit of lengths.
+template <class Outside>
+void checkIntervals(const std::vector<RayInterval>& intervals, const RaySegment& ray, double size,
+                    Outside&& distanceOutside) {
+  const double margin = 1e-9 * size;
+  for (int i = 0; i <= 200; ++i) {
+    const double t = ray.tMin + (ray.tMax - ray.tMin) * (i + 0.5) / 201;
+    const double distance = distanceOutside(ray.origin + t * ray.direction);
+    if (std::abs(distance) > margin) {
+      ASSERT_EQ(isIn(intervals, t), distance < 0.0) << t << ' ' << distance;
+    }
+  }
+  for (std::size_t i = 0; i < intervals.size(); ++i) {
+    const RayInterval& interval = intervals[i];
+    ASSERT_LE(interval.first, interval.last);
+    ASSERT_GE(interval.first, ray.tMin);
+    ASSERT_LE(interval.last, ray.tMax);
+    ASSERT_GT(interval.error, 0.0);
+    ASSERT_LT(interval.error, 1e-9 * (1 + size / ray.direction.norm()));
+    if (i > 0) {
+      ASSERT_GT(interval.first, intervals[i - 1].last);
+    }
+    // Ends on the surface, or the ray's own. Grazing ends have the root of the rounding error.
+    const auto at = [&](double t) {
+      return std::abs(distanceOutside(ray.origin + t * ray.direction));
+    };
+    if (interval.first > ray.tMin) {
+      ASSERT_LT(at(interval.first), margin);
+    }
+    if (interval.last < ray.tMax) {
+      ASSERT_LT(at(interval.last), margin);
+    }
+    ASSERT_EQ(interval.frontFace, interval.first > ray.tMin);
+    ASSERT_EQ(interval.crossing, interval.last < ray.tMax ? 1 : 0);
+  }
+}
+
+TEST(RoundSegment, IntervalsHoldThePointsWithinTheRadius) {
+  Random random(1);
+  std::size_t none = 0;
+  for (int repeat = 0; repeat < 6000; ++repeat) {
+    Case c = makeCase(repeat, random);
+    const int exponent = repeat % 7 == 0 ? random.between(-300, 300) : 0;
+    scale(c, exponent);
+    const RoundIntervals found = intersectRay(c.ray, c.p, c.q, c.radiusP, c.radiusQ);
+    const std::vector<RayInterval> intervals(
+        found.intervals.begin(), found.intervals.begin() + static_cast<long>(found.size));
+    none += found.size == 0;
+    // Distances without overflow: the case at its own size.
+    Case unit = c;
+    scale(unit, -exponent);
+    ASSERT_NO_FATAL_FAILURE(checkIntervals(intervals, unit.ray, 1.0, [&](const Vector3d& at) {
+      return outside(at, unit.p, unit.q, unit.radiusP, unit.radiusQ);
+    })) << repeat;
+  }
+  EXPECT_GT(none, 100u);
+}
+
+TEST(RoundSegment, AnIntervalHoldsThePointsWithinTheRadiusOfATriangle) {
+  Random random(2);
+  int found = 0;
+  for (int repeat = 0; repeat < 6000; ++repeat) {
+    Vector3d a = random.inCube(), b = random.inCube(), c = random.inCube();
+    Vector3d direction = random.inCube();
+    if (repeat % 5 == 1) direction = (b - a).cross(c - a);
+    if (repeat % 5 == 2) direction = 0.7 * (b - a) + 0.9 * (c - a);
+    if (repeat % 5 == 3) {
+      a[2] = b[2] = c[2] = 0.25;
+      direction = Vector3d::Unit(random.below(3));
+    }
+    // Thin triangles, of which some have no area but for rounding.
+    if (repeat % 6 == 4) c = a + random.unit() * (b - a);
+    if (repeat % 12 == 4) c += std::ldexp(1.0, random.between(-50, -5)) * random.inCube();
+    const double radius = 0.01 + 0.5 * random.unit();
+    const Vector3d through = pointOn({a, b, c}, random) + 0.5 * random.inCube();
+    const RaySegment ray{through - direction, direction, -3.0 + 4.0 * random.unit(),
+                         1.0 + 3.0 * random.unit()};
+    const std::optional<RayInterval> interval = intersectRay(ray, a, b, c, radius);
+    found += interval.has_value();
+    const std::vector<RayInterval> intervals(interval ? 1 : 0, interval.value_or(RayInterval{}));
+    ASSERT_NO_FATAL_FAILURE(checkIntervals(intervals, ray, 1.0, [&](const Vector3d& at) {
+      return vertexTriangleDistance(at, a, b, c).distance - radius;
+    })) << repeat;
+  }
+  EXPECT_GT(found, 1000);
+}
+
+}  // namespace
+}  // namespace palpate::test

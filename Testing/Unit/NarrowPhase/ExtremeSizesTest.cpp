@@ -1,0 +1,152 @@
+// Triangles at one point, around one vertex, and of sizes and distances of very different orders:
+// the contacts of octrees and of brute force, and the work that the octree's need.
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/DegenerateCases.h"
+#include "Common/PairRun.h"
+#include "NarrowPhase/FeatureTests.h"
+#include "NarrowPhase/ProximityFilter.h"
+#include "NarrowPhase/SharedVertex.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+namespace palpate::testing {
+namespace {
+
+using Eigen::Vector3d;
+
+Mesh atOnePoint(std::uint32_t n) {
+  Mesh mesh;
+  const Vector3d p(0.25, 0.5, 0.75);
+  for (std::uint32_t i = 0; i < n; ++i) addTriangle(mesh, p, p, p);
+  return mesh;
+}
+
+Mesh identical(std::uint32_t n) {
+  Mesh mesh;
+  for (std::uint32_t i = 0; i < n; ++i) addTriangle(mesh, {0, 0, 0}, {1, 0, 0.3}, {0.1, 1, 0});
+  return mesh;
+}
+
+/// Triangle i is about `width` 2^e wide and `distance` 2^e from the origin; e is evenly spaced.
+Mesh spaced(std::uint32_t n, double first, double last, double width, double distance) {
+  Mesh mesh;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const double unit = std::exp2(first + (last - first) * i / n);
+    const Vector3d out(std::cos(2.4 * i), std::sin(2.4 * i), 0.3),
+        u(-std::sin(2.4 * i), std::cos(2.4 * i), 0), v = out.cross(u);
+    addTriangle(mesh, unit * (distance * out + width * u),
+                unit * (distance * out + width * (0.8 * v - 0.5 * u)),
+                unit * (distance * out - width * (0.8 * v + 0.5 * u)));
+  }
+  return mesh;
+}
+
+/// A cone of n triangles around vertex 0.
+Mesh star(std::uint32_t n) {
+  Mesh mesh;
+  mesh.positions.push_back({0, 0, 0.5});
+  for (std::uint32_t i = 0; i < n; ++i) {
+    mesh.positions.push_back({std::cos(6.283185307 * i / n), std::sin(6.283185307 * i / n), 0});
+    mesh.triangles.push_back({0, 1 + i, 1 + (i + 1) % n});
+  }
+  return mesh;
+}
+
+std::vector<Vector3d> scaled(std::vector<Vector3d> positions, double factor) {
+  for (Vector3d& p : positions) p *= factor;
+  return positions;
+}
+
+/// Compares both engines for two meshes and each with itself. The first one is scaled by `scale`
+/// before the step. Returns the octrees' exact decisions.
+std::size_t compare(const Mesh& a, const Mesh& b, double thickness, double scale = 1.001) {
+  std::size_t exact = 0;
+  for (const Method method :
+       {Method::Intersection, Method::Proximity, Method::Continuous, Method::Auto})
+    for (const Contacts contacts : {Contacts::Distinct, Contacts::All}) {
+      SCOPED_TRACE(static_cast<int>(method));
+      PairSettings settings{method, thickness};
+      settings.contacts = contacts;
+      PairRun octree(settingsOf(Engine::Octree), a, b, settings),
+          oracle(settingsOf(Engine::BruteForce), a, b, settings);
+      for (PairRun* run : {&octree, &oracle})
+        run->step(scaled(a.positions, scale), a.positions, b.positions, b.positions);
+      expectSame(octree.answers(), oracle.answers());
+      EXPECT_EQ(octree.detection().statistics().contacts, oracle.detection().statistics().contacts);
+      exact += octree.detection().statistics().exactDecisions;
+    }
+  return exact;
+}
+
+TEST(ExtremeSizes, TrianglesAtOnePointNeedNoExactArithmetic) {
+  EXPECT_EQ(compare(atOnePoint(14), atOnePoint(9), 0.125, 1.0), 0u);
+  compare(atOnePoint(14), atOnePoint(9), 0.125);
+}
+
+TEST(ExtremeSizes, IdenticalTriangles) { compare(identical(8), identical(5), 0.125); }
+
+TEST(ExtremeSizes, SizesAndDistancesInPowersOfTwo) {
+  for (const auto& [first, last] : {std::pair(-1074.0, 996.0), {-400.0, 0.0}, {-20.0, 0.0}}) {
+    const Mesh sizes = spaced(9, first, last, 1, 0), distances = spaced(12, first, last, 0.02, 1);
+    const double middle = std::exp2(0.5 * (first + last));
+    compare(sizes, distances, middle);
+    compare(distances, moved(distances, Vector3d::Zero(), -0.5), 0.5 * middle);
+  }
+}
+
+TEST(ExtremeSizes, TrianglesAroundOneVertex) {
+  for (const double thickness : {1e-4, 0.05, 0.4}) compare(star(80), star(7), thickness);
+}
+
+/// The number of pairs of a star's triangles that are near each other only at its vertex.
+TEST(ExtremeSizes, FewPairsAroundAVertexAreMeasured) {
+  const std::uint32_t n = 200;
+  const Mesh mesh = star(n);
+  std::vector<FloatPoint> floats;
+  for (const Vector3d& p : mesh.positions) floats.push_back(FloatFrame()(p));
+  FloatPair pair{floats.data(), floats.data()};
+  const MeshTopology topology(mesh.positions.size(), mesh.triangles);
+  pair.shiftLower.fill(-1e-4f);
+  pair.shiftUpper.fill(1e-4f);
+  const std::vector<ElementPair> first{{0, 1}};
+  const SharedVertex sharedVertex(topology, &pair, first);
+  std::size_t measured = 0;
+  for (std::uint32_t i = 0; i < n; ++i)
+    for (std::uint32_t j = i + 1; j < n; ++j) {
+      const Triangle &s = mesh.triangles[i], &t = mesh.triangles[j];
+      const bool areNeighbours = j == i + 1 || (i == 0 && j == n - 1);
+      const bool isAlone = sharedVertex.isAlone(s, t, sameCorners(s, t));
+      EXPECT_FALSE(areNeighbours && isAlone);
+      measured += !isAlone;
+    }
+  EXPECT_LT(measured, 4 * n);
+}
+
+/// Of a large and a tiny triangle, a feature pair is measured only if they may be near.
+TEST(ExtremeSizes, TinyTrianglesAreDroppedByTheirBoxes) {
+  TrianglePairBatch batch{};
+  const Mesh large = spaced(1, 0, 0, 0.02, 1);
+  for (int lane = 0; lane < TrianglePairBatch::kSize; ++lane) {
+    // The tiny triangle is near the origin, or, in odd lanes, at a corner of the large one.
+    const Mesh tiny = moved(spaced(1, 0, 0, 1, 0), lane % 2 ? large.positions[1] : Vector3d::Zero(),
+                            std::exp2(-12 - 3 * lane));
+    for (int corner = 0; corner < 3; ++corner)
+      for (int axis = 0; axis < 3; ++axis) {
+        batch.coordinates[TrianglePairBatch::rowOfA(corner, axis)][lane] =
+            large.positions[static_cast<std::size_t>(corner)][axis];
+        batch.coordinates[TrianglePairBatch::rowOfB(corner, axis)][lane] =
+            tiny.positions[static_cast<std::size_t>(corner)][axis];
+      }
+  }
+  std::uint32_t possible[TrianglePairBatch::kSize];
+  findPossibleProximity(batch, 1e-3, true, 0.0, possible);
+  for (int lane = 0; lane < TrianglePairBatch::kSize; ++lane)
+    EXPECT_EQ(possible[lane] != 0, lane % 2 == 1) << lane;
+}
+
+}  // namespace
+}  // namespace palpate::testing
