@@ -154,7 +154,7 @@ class FieldLookup {
     std::array<std::uint32_t, 3> root;
     for (int k = 0; k < 3; ++k) {
       const double u = (point[k] - m_frame.origin[k]) * m_frame.toUnits;
-      const double in = std::fmin(std::fmax(u, 0.0), m_frame.size[k]);
+      const double in = u > 0.0 ? std::fmin(u, m_frame.size[k]) : 0.0;  // never -0
       place.isOutside |= u != in;
       root[k] = std::min(static_cast<std::uint32_t>(in), m_cells.size[k] - 1);
       place.t[k] = in - root[k];
@@ -182,8 +182,11 @@ class FieldLookup {
     return mix(mix(mix(v[0], v[1], x), mix(v[2], v[3], x), y),
                mix(mix(v[4], v[5], x), mix(v[6], v[7], x), y), z);
   }
+  /// Comparisons, as the sign of a minimum or maximum of 0 and -0 is not defined: a band that is
+  /// far smaller than a unit is 0.
   double clamped(double value) const {
-    return std::fmin(std::fmax(value, -m_frame.band), m_frame.band);
+    if (value < -m_frame.band) return -m_frame.band;
+    return value > m_frame.band ? m_frame.band : value;
   }
   /// From the nearest point of the domain.
   Eigen::Vector3d outsideOf(const Eigen::Vector3d& point) const {
@@ -191,7 +194,8 @@ class FieldLookup {
     for (int k = 0; k < 3; ++k) {
       const double end = m_frame.origin[k] + m_frame.size[k] * m_frame.unit;
       out[k] = point[k] < m_frame.origin[k] ? point[k] - m_frame.origin[k]
-                                            : std::fmax(point[k] - end, 0.0);
+               : point[k] > end             ? point[k] - end
+                                            : 0.0;
     }
     return out;
   }

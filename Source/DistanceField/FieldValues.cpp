@@ -35,7 +35,7 @@ class ValuesInLanes {
       const V size = hn::Set(d, m_frame.size[k]);
       const V u = (hn::Load(d, coordinates[k]) - hn::Set(d, m_frame.origin[k])) *
                   hn::Set(d, m_frame.toUnits);
-      const V in = hn::Min(hn::Max(u, zero), size);
+      const V in = hn::Min(hn::IfThenElseZero(hn::Gt(u, zero), u), size);
       isOutside = hn::Or(isOutside, hn::Ne(u, in));
       const auto cells = hn::DemoteTo(di, size);
       const auto root = hn::Min(hn::DemoteTo(di, in), cells - hn::Set(di, 1));
@@ -71,10 +71,12 @@ class ValuesInLanes {
     const auto mix = [](V a, V b, V s) HWY_ATTR { return a + s * (b - a); };
     const V lower = mix(mix(corner(0), corner(1), t[0]), mix(corner(2), corner(3), t[0]), t[1]);
     const V upper = mix(mix(corner(4), corner(5), t[0]), mix(corner(6), corner(7), t[0]), t[1]);
-    const V band = hn::Set(d, m_frame.band);
-    const V beyond = hn::IfThenElse(hn::Gt(kinds, hn::Set(d, 2.0)), hn::Neg(band), band);
+    const V band = hn::Set(d, m_frame.band), inside = hn::Neg(band);
+    const V beyond = hn::IfThenElse(hn::Gt(kinds, hn::Set(d, 2.0)), inside, band);
     const V value = hn::IfThenElse(hn::Eq(kinds, one), mix(lower, upper, t[2]), beyond);
-    hn::Store(hn::Set(d, m_frame.unit) * hn::Min(hn::Max(value, hn::Neg(band)), band), d, out);
+    const V atMost = hn::IfThenElse(hn::Gt(value, band), band, value);
+    const V clamped = hn::IfThenElse(hn::Lt(value, inside), inside, atMost);
+    hn::Store(hn::Set(d, m_frame.unit) * clamped, d, out);
     return bitsOf(d, isOutside);
   }
 

@@ -181,12 +181,12 @@ class EndFeet {
     return nearest;
   }
 
-  /// Whether an end is also an end of the other edge. If it is the nearest end, no end before it is
-  /// equally near: the distance of an end on the other edge is always computed as 0.
+  /// Whether the nearest end is also an end of the other edge. No end before it is then equally
+  /// near, and it is of p: the distance of an end on the other edge is always computed as 0.
   bool isCommon(int i) const {
     const auto& [p0, p1, q0, q1, m, u, v] = m_edges;
-    const Vector3d& end = i == 0 ? p0 : i == 1 ? p1 : i == 2 ? q0 : q1;
-    return i < 2 ? end == q0 || end == q1 : end == p0 || end == p1;
+    const Vector3d& end = i == 0 ? p0 : p1;
+    return i < 2 && (end == q0 || end == q1);
   }
 
   EdgeEdgeDistance answer(int i) const {

@@ -53,11 +53,9 @@ int signAfterOnlyRoot(const CubicBernstein& b, double error) {
   int signs[4];
   for (int i = 0; i < 4; ++i) signs[i] = b[i] > error ? 1 : b[i] < -error ? -1 : 0;
   if (signs[0] * signs[3] >= 0) return 0;
-  const bool first = signs[1] == signs[0] || (signs[1] == 0 && signs[2] == signs[3]) ||
-                     (signs[1] == signs[3] && signs[2] == signs[3]);
-  const bool second = signs[2] == signs[3] || (signs[2] == 0 && signs[1] == signs[0]) ||
-                      (signs[2] == signs[0] && signs[1] == signs[0]);
-  return first && second ? signs[3] : 0;
+  const bool changesOnce = signs[1] == signs[0] || (signs[1] == 0 && signs[2] == signs[3]) ||
+                           (signs[1] == signs[3] && signs[2] == signs[3]);
+  return changesOnce ? signs[3] : 0;
 }
 
 template <Kind kind>

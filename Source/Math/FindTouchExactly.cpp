@@ -1,3 +1,4 @@
+#include "Core/Assert.h"
 #include "Exact/AlgebraicTime.h"
 #include "Math/ImpactQuery.h"
 
@@ -75,19 +76,19 @@ struct PointAndSegment {
   std::optional<double> firstTouchAfterStart() const;
 };
 
-/// The first time after the start at which a moving point is at the origin, if there is one.
+/// The first time after the start at which a moving point is at the origin, if there is one. It may
+/// not be there all the time.
 std::optional<double> firstZeroAfterStart(const Linear& point) {
-  for (int k = 0; k < 3; ++k) {
-    if (isZero(point[k])) continue;
-    const auto vanishes = [&](const auto& moment) {
-      return moment.sign(point[0]) == 0 && moment.sign(point[1]) == 0 && moment.sign(point[2]) == 0;
-    };
-    for (const QuadraticTime& root : rootsInside(point[k]))
-      if (vanishes(root)) return root.timeLowerBound();
-    if (vanishes(EndOfStep{})) return 1.0;
-    return {};
-  }
-  return 0.0;
+  int k = 0;
+  while (isZero(point[k])) ++k;
+  PALPATE_ASSERT(k < 3);
+  const auto vanishes = [&](const auto& moment) {
+    return moment.sign(point[0]) == 0 && moment.sign(point[1]) == 0 && moment.sign(point[2]) == 0;
+  };
+  for (const QuadraticTime& root : rootsInside(point[k]))
+    if (vanishes(root)) return root.timeLowerBound();
+  if (vanishes(EndOfStep{})) return 1.0;
+  return {};
 }
 
 /// Finds times after the start only. At the start, point and segment must be apart or about to

@@ -83,12 +83,13 @@ Interval RelativeMotion<kind>::separatedAround(double t, const Vector3d& largest
 }
 
 /// A corner's coordinate along n(t) is a quadratic, and not below its least Bernstein coefficient.
-/// |n(t)| is at most the larger length at the ends.
+/// |n(t)| is at most the larger length at the ends. The first direction separates at t0, and so is
+/// not zero.
 template <ImpactQuery::Kind kind>
 bool RelativeMotion<kind>::separatedBetween(double t0, const Separation& first, double t1,
                                             const Separation& last, const Vector3d& largest,
                                             double distance) const {
-  if (!(first.length > 0.0 && last.length > 0.0)) return false;
+  if (!(last.length > 0.0)) return false;
   const Vector3d m = first.direction / first.length, n = last.direction / last.length;
   const double needed = distance * (1.0 + kAlongError) +
                         kAlongError * m.cwiseAbs().cwiseMax(n.cwiseAbs()).dot(largest) +

@@ -379,7 +379,7 @@ HWY_ATTR void findFeaturePairsKernel(const MeshTopology& a, const MeshTopology& 
     for (float& shift : sideA.shift.upper) shift /= 2;
     sideB.shift = sideA.shift;
   }
-  if (!floats.beforeA && !floats.beforeB)
+  if (!floats.beforeA)
     findFeaturePairsOf<Sweep::None>(sideA, sideB, pairs, out);
   else if (floats.upTo >= 1.0f)
     findFeaturePairsOf<Sweep::Step>(sideA, sideB, pairs, out);

@@ -18,8 +18,8 @@ namespace palpate {
 struct FloatPair {
   const FloatPoint* a = nullptr;
   const FloatPoint* b = nullptr;
-  const FloatPoint* beforeA = nullptr;  ///< at the step's start; null: boxes do not sweep the step
-  const FloatPoint* beforeB = nullptr;
+  /// At the step's start, of both or of neither: then boxes do not sweep the step.
+  const FloatPoint *beforeA = nullptr, *beforeB = nullptr;
   std::array<float, 4> shiftLower{}, shiftUpper{};
   float upTo = 1.0f;  ///< fraction of the step: boxes sweep [0, upTo]
 };

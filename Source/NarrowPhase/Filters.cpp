@@ -4,6 +4,8 @@
 
 #include <Eigen/Geometry>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace palpate {
@@ -40,7 +42,8 @@ class Surface {
       case MeshFeature::Kind::Vertex: {
         Vector3d sum = Vector3d::Zero();
         for (const std::uint32_t t : m_mesh.topology.vertexTriangles[feature.id])
-          sum += angleAt(t, feature.id) * normalOf(t);
+          if (const Vector3d normal = normalOf(t); !normal.isZero(0.0))
+            sum += angleAt(t, feature.id) * normal;
         return direction.dot(sum) < 0.0;
       }
       case MeshFeature::Kind::Edge:
@@ -68,21 +71,28 @@ class Surface {
     return angleBetween((at(corners[1]) - p).stableNormalized(),
                         (at(corners[2]) - p).stableNormalized());
   }
+  /// Triangles without area do not count.
   bool isBelowEdge(std::uint32_t edge, const Vector3d& direction) const {
-    const auto triangles = m_mesh.topology.edgeTriangles[edge];
-    const auto isBelowFace = [&](std::uint32_t t) { return direction.dot(normalOf(t)) < 0.0; };
-    return isConvexEdge(edge) ? std::all_of(triangles.begin(), triangles.end(), isBelowFace)
-                              : std::any_of(triangles.begin(), triangles.end(), isBelowFace);
+    std::array<std::uint32_t, 2> triangles{};
+    std::size_t count = 0, below = 0;
+    for (const std::uint32_t t : m_mesh.topology.edgeTriangles[edge]) {
+      const Vector3d normal = normalOf(t);
+      if (normal.isZero(0.0)) continue;
+      if (count < 2) triangles[count] = t;
+      ++count;
+      below += direction.dot(normal) < 0.0;
+    }
+    const bool isConvex = count != 2 || isSecondBelowFirst(edge, triangles);
+    return isConvex ? count > 0 && below == count : below > 0;
   }
-  /// Whether the second of the two triangles at an edge is below the first. True if the edge does
-  /// not have two triangles.
-  bool isConvexEdge(std::uint32_t edge) const {
-    const auto triangles = m_mesh.topology.edgeTriangles[edge];
-    if (triangles.size() != 2) return true;
-    const auto [p, q] = m_mesh.topology.edges[edge];
-    for (const std::uint32_t corner : m_mesh.topology.triangles[triangles[1]])
-      if (corner != p && corner != q) return (at(corner) - at(p)).dot(normalOf(triangles[0])) < 0.0;
-    return true;
+  /// For the two triangles with area at an edge.
+  bool isSecondBelowFirst(std::uint32_t edge, const std::array<std::uint32_t, 2>& triangles) const {
+    const Segment& ends = m_mesh.topology.edges[edge];
+    const Triangle& corners = m_mesh.topology.triangles[triangles[1]];
+    const std::uint32_t across = *std::find_if(corners.begin(), corners.end(), [&](auto corner) {
+      return corner != ends[0] && corner != ends[1];
+    });
+    return (at(across) - at(ends[0])).dot(normalOf(triangles[0])) < 0.0;
   }
 
   const TriangleMesh& m_mesh;

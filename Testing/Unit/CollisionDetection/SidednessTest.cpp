@@ -104,12 +104,12 @@ std::vector<Row> outward(const Mesh& body, const std::vector<Touch>& touches, bo
   return rows;
 }
 
-struct Tool {
+struct SidedTool {
   Positions before, now;
   std::vector<Segment> segments;  ///< none: points
 };
 
-CollisionData answer(const Settings& settings, const Mesh& body, const Tool& tool,
+CollisionData answer(const Settings& settings, const Mesh& body, const SidedTool& tool,
                      const PairSettings& pair, Sidedness sidedness) {
   OctreeBasedCD detection(settings);
   const GeometryId id = detection.addTriangleMesh(body.positions, body.triangles),
@@ -124,7 +124,7 @@ CollisionData answer(const Settings& settings, const Mesh& body, const Tool& too
 }
 
 /// corners: whether the definition decides contacts whose closest point is a corner.
-void expectOutward(const Mesh& body, const Tool& tool, const PairSettings& pair, bool corners,
+void expectOutward(const Mesh& body, const SidedTool& tool, const PairSettings& pair, bool corners,
                    std::size_t& told) {
   const CollisionData all =
       answer(settingsOf(Engine::BruteForce), body, tool, pair, Sidedness::Both);
@@ -140,8 +140,8 @@ void expectOutward(const Mesh& body, const Tool& tool, const PairSettings& pair,
     expectSameRows(Rows(answer(settings, body, tool, pair, Sidedness::Outer)), truth);
 }
 
-Tool toolOf(Random& random, std::uint32_t size, double step, bool lines) {
-  Tool tool;
+SidedTool toolOf(Random& random, std::uint32_t size, double step, bool lines) {
+  SidedTool tool;
   for (std::uint32_t i = 0; i < size; ++i) {
     tool.before.push_back(randomPoint(random, -1, 1));
     tool.now.push_back(tool.before.back() + randomPoint(random, -step, step));
@@ -156,7 +156,8 @@ TEST(Sidedness, OuterReportsContactsOutsideOnly) {
   for (int run = 0; run < casesOf(12); ++run) {
     const Mesh body = burr(random);
     for (const bool lines : {false, true}) {
-      const Tool still = toolOf(random, 150, 0.0, lines), moving = toolOf(random, 60, 0.4, lines);
+      const SidedTool still = toolOf(random, 150, 0.0, lines),
+                      moving = toolOf(random, 60, 0.4, lines);
       expectOutward(body, still, {Method::Proximity, 0.1, Contacts::Distinct}, true, told);
       expectOutward(body, still, {Method::Proximity, 0.1, Contacts::All}, false, told);
       expectOutward(body, moving, {Method::Continuous, 0.0, Contacts::All}, false, told);
@@ -218,6 +219,42 @@ TEST(Sidedness, EveryMethodMatchesBruteForce) {
     }
     EXPECT_GT(impacts.size(), 5u);
   }
+}
+
+/// With triangles added that have no area, the contacts of the others stay.
+TEST(Sidedness, TrianglesWithoutAreaHaveNoSides) {
+  Random random(5);
+  std::size_t contacts = 0;
+  for (int run = 0; run < casesOf(8); ++run) {
+    const Mesh body = burr(random);
+    const auto count = static_cast<std::uint32_t>(body.triangles.size());
+    Mesh more = body;
+    for (std::uint32_t t = 0; t < count; ++t) {
+      const auto& [a, b, c] = body.triangles[t];
+      if (t % 2) more.triangles.push_back({a, b, b});
+      if (t % 3 == 0) more.triangles.push_back({c, b, c});
+      if (t % 5 == 0) more.triangles.push_back({a, a, a});
+    }
+    for (const bool lines : {false, true}) {
+      const SidedTool tool = toolOf(random, 100, 0.3, lines);
+      for (const PairSettings& pair : {PairSettings{Method::Proximity, 0.1, Contacts::All},
+                                       PairSettings{Method::Continuous, 0.02, Contacts::All}}) {
+        const auto idsOfBody = [&](const Mesh& mesh) {
+          std::set<Row> ids;
+          const Rows rows(answer(settingsOf(Engine::Octree), mesh, tool, pair, Sidedness::Outer));
+          for (const Row& id : idsOf(rows)) {
+            const bool isOfBody = id[0] == 1 ? id[1] < count : id[1] != id[2];
+            if (isOfBody) ids.insert(id);
+          }
+          return ids;
+        };
+        const std::set<Row> expected = idsOfBody(body);
+        EXPECT_EQ(idsOfBody(more), expected);
+        contacts += expected.size();
+      }
+    }
+  }
+  EXPECT_GT(contacts, leastOf(500));
 }
 
 TEST(Sidedness, ThinOrganIsTouchedFromOneSide) {

@@ -32,6 +32,23 @@ TEST(ImpactSide, IsCorrectForEdgesOfAnyLength) {
       ASSERT_EQ(sideBefore(crossing(0.5, side, length).query(), 0.5), -side) << length;
 }
 
+/// Edges and distances between them are longer than the largest double.
+TEST(ImpactSide, IsCorrectAtTheEndOfTheRange) {
+  constexpr double kLarge = 0x1.fp1023;
+  for (const double side : {1.0, -1.0}) {
+    const ImpactCase small = crossing(0.5, side, 0.7);
+    ImpactCase large = small;
+    for (Eigen::Vector3d& p : large.positions) p = p / 0.8 * kLarge;
+    EXPECT_EQ(sideBefore(large.query(), 0.5), -side);
+    const auto found = positionsAt(large.query(), 0.25),
+               expected = positionsAt(small.query(), 0.25);
+    for (int i = 1; i < 4; ++i) {
+      const Eigen::Vector3d difference = (found[i] / kLarge - found[0] / kLarge) * 0.8;
+      EXPECT_LT((difference - (expected[i] - expected[0])).norm(), 1e-15) << i;
+    }
+  }
+}
+
 }  // namespace
 
 }  // namespace palpate
