@@ -1,7 +1,7 @@
 #!/bin/bash
 # From nothing to tested: packages, the documentation site, every configuration that CI builds, their tests. Every
 # configuration runs, also after another one failed. The script fails if any stage failed or did not run. The release
-# tests run last, so that ctest's summary of them is the last thing printed.
+# tests run last, so that ctest's summary of them is the last thing printed; after a failure, what failed follows it.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -73,9 +73,18 @@ configuration tsan
 # Hashes of answers on 64-bit ARM, in the emulator.
 stage "arm64: golden hashes" Testing/Golden/matrix.sh arm64
 
-printf '%-22s %-7s %7s %9s\n' stage result seconds "CPU time"
-printf '%s\n' "${report[@]}"
-((failed)) && echo "--- a stage before the release tests FAILED or did not run, see above"
+table() { printf '%-22s %-7s %7s %9s\n' stage result seconds "CPU time"; printf '%s\n' "${report[@]}"; }
+table
 echo "--- release: test, after $SECONDS s"
 ctest --preset release --parallel "$jobs" || failed=1
-exit $failed
+((failed)) || exit 0
+
+# What failed, last, as logs are read from their end.
+echo "--- FAILED"
+table
+for log in build/*/Testing/Temporary/LastTestsFailed.log; do
+  [[ -s $log ]] && echo "$log:" && cat "$log"
+done
+cat build/*/Testing/Temporary/LastTest.log |
+  grep -E -A 8 ': Failure$|ERROR: |runtime error: |WARNING: ThreadSanitizer|: FAILED$' | head -n 100 | cut -c 1-300
+exit 1

@@ -137,6 +137,8 @@ def decisions(sizes, count):
 
 
 def main():
+    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
+        sys.exit(__doc__)
     targets = {"Obj": obj, "Stl": stl, "Ply": ply, "Vtk": vtk, "Vtp": vtp, "Capture": capture, "Field": field,
                "Distance": decisions((100, 114), 8), "Intersection": decisions((150, 169), 8),
                "TimeOfImpact": decisions((200, 227), 8), "History": decisions((200, 900), 12)}

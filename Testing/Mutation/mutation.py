@@ -7,6 +7,7 @@ of its module run until one fails; the quickest run first. Outcomes are appended
 after them.
 """
 import argparse
+import concurrent.futures
 import csv
 import hashlib
 import json
@@ -285,6 +286,17 @@ def batches(times):
     return [batch for batch in result if batch]
 
 
+def outcome(fault, build, times):
+    """Whether a test notices the fault, which one, and after how long. `times`: of the tests of its module."""
+    begin, noticed, test = time.time(), False, ''
+    for batch in batches(times):
+        noticed, test = run(build / f"Unit{fault['module']}", fault['id'], batch, 10 + 5 * sum(times[t] for t in batch))
+        if noticed:
+            break
+    return {'key': fault['key'], 'noticed': 'yes' if noticed else 'no', 'test': test,
+            'seconds': f'{time.time() - begin:.2f}'}
+
+
 def table(faults, outcomes):
     known = [f for f in faults if f['key'] in outcomes]
     print('\n| module | planted | noticed | share |\n|---|---:|---:|---:|')
@@ -336,18 +348,11 @@ def main():
         writer = csv.DictWriter(file, ['key', 'noticed', 'test', 'seconds'])
         if file.tell() == 0:
             writer.writeheader()
-        for fault in open_faults:
-            own, begin, noticed, test = times[fault['module']], time.time(), False, ''
-            binary = build / f"Unit{fault['module']}"
-            for batch in batches(own):
-                noticed, test = run(binary, fault['id'], batch, 10 + 5 * sum(own[t] for t in batch))
-                if noticed:
-                    break
-            row = {'key': fault['key'], 'noticed': 'yes' if noticed else 'no', 'test': test,
-                   'seconds': f'{time.time() - begin:.2f}'}
-            outcomes[fault['key']] = row
-            writer.writerow(row)
-            file.flush()
+        with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
+            for row in pool.map(lambda fault: outcome(fault, build, times[fault['module']]), open_faults):
+                outcomes[row['key']] = row
+                writer.writerow(row)
+                file.flush()
     table(faults, outcomes)
     return 0
 
