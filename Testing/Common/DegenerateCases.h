@@ -37,13 +37,6 @@ inline void addTriangle(Mesh& mesh, const Eigen::Vector3d& a, const Eigen::Vecto
   mesh.triangles.push_back({first, first + 1, first + 2});
 }
 
-inline void append(Mesh& mesh, const Mesh& other) {
-  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-  mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());
-  for (const auto& [a, b, c] : other.triangles)
-    mesh.triangles.push_back({a + first, b + first, c + first});
-}
-
 inline Mesh moved(Mesh mesh, const Eigen::Vector3d& by, double scale = 1.0) {
   for (Eigen::Vector3d& p : mesh.positions) p = scale * p + by;
   return mesh;

@@ -15,6 +15,13 @@ struct Mesh {
   std::vector<Triangle> triangles;
 };
 
+inline void append(Mesh& mesh, const Mesh& other) {
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());
+  for (const auto& [a, b, c] : other.triangles)
+    mesh.triangles.push_back({first + a, first + b, first + c});
+}
+
 /// Random numbers, the same on every machine. Or decisions that a fuzzer makes, one byte for each
 /// number, in which that byte is repeated; random numbers after the last one.
 class Random {

@@ -33,8 +33,12 @@ inline constexpr bool kSanitized = kAddressSanitizer || kThreadSanitizer;
 
 /// Sanitizers make tests ten times slower. In such a build, a test with many random cases may run a
 /// part of them: one of a prime number, so that loops over few kinds of case keep all kinds. The
-/// ordinary builds run all.
+/// ordinary builds run all. -DPALPATE_SHARE_OF_CASES=1 makes a sanitizer run all, too.
+#ifdef PALPATE_SHARE_OF_CASES
+inline constexpr int kShareOfCases = PALPATE_SHARE_OF_CASES;
+#else
 inline constexpr int kShareOfCases = kSanitized ? 7 : 1;
+#endif
 
 /// Whether a test leaves out a case. Cases are counted from 0.
 constexpr bool isLeftOut(std::size_t number) { return number % kShareOfCases != 0; }

@@ -122,18 +122,20 @@ checkFlags() {
       grep -oE ' -(m[a-z][^ ]*|ffast-math|Ofast) .* -c [^ ]*/Source/[^ ]*' | sed -E 's| .* -c | for |')
 }
 
-# Each *Test.cpp below the given folders of Testing is compiled; a test that no target lists never runs. Arguments: the
-# compile commands, then folders, and files or folders with a leading "-" that this configuration leaves out.
+# Each *Test.cpp below the given folders of Testing is compiled, by itself or in a batch; a test that no target lists never
+# runs. Arguments: the compile commands, then folders, and files or folders with a leading "-" that this configuration
+# leaves out.
 checkTests() {
-  local commands=$1 argument folders=() without=() file left
+  local commands=$1 argument folders=() without=() file left compiled
   shift
   [[ -s $commands ]] || fault "$commands is missing"
+  compiled=$(cat "$commands" $(grep -oE '"file": "[^"]*/unity_[0-9]+_cxx\.cxx"' "$commands" | cut -d '"' -f 4))
   for argument in "$@"; do
     if [[ $argument == -* ]]; then without+=("${argument#-}"); else folders+=("$argument"); fi
   done
   while read -r file; do
     for left in "${without[@]}"; do [[ $file == "Testing/$left"* ]] && continue 2; done
-    grep -qF -- "/$file\"" "$commands" || fault "$file is compiled into no test"
+    grep -qF -- "/$file\"" <<<"$compiled" || fault "$file is compiled into no test"
   done < <(for argument in "${folders[@]}"; do find "Testing/$argument" -name '*Test.cpp'; done | sort)
 }
 

@@ -72,10 +72,10 @@ struct End {
   Vector3d translation = Vector3d::Zero();
 };
 
-class Scene {
+class BodyScene {
  public:
-  Scene(Kind kind, const Body& body, const End& start, const PairSettings& pair,
-        const Settings& settings, bool isBodyFirst = false)
+  BodyScene(Kind kind, const Body& body, const End& start, const PairSettings& pair,
+            const Settings& settings, bool isBodyFirst = false)
       : m_detection(settings) {
     const Mesh& shape = ball(kind);
     std::vector<Segment> segments;
@@ -271,15 +271,16 @@ TEST(AllowedError, FieldsMissNoImpactAndTrianglesAnswerTheOtherSteps) {
         const Contacts filter = seed % 3 == 2 ? Contacts::All : Contacts::Distinct;
         Walk walk(100 * seed + static_cast<std::uint64_t>(kind), kind);
         const auto sceneOf = [&](const PairSettings& pair) {
-          return Scene(kind, body, walk.now(), pair, settingsOf(Engine::Octree));
+          return BodyScene(kind, body, walk.now(), pair, settingsOf(Engine::Octree));
         };
-        Scene allowed = sceneOf(pairOf(kErrorBound, filter)), exact = sceneOf(pairOf(0, filter));
+        BodyScene allowed = sceneOf(pairOf(kErrorBound, filter)),
+                  exact = sceneOf(pairOf(0, filter));
         PairSettings touches{Method::Continuous, 0.0, Contacts::All},
             approaches{Method::Continuous, kThickness - 1.5 * kErrorBound - 1e-6, Contacts::All};
         const bool hasContinuous = kind != Kind::Radii;
         if (!hasContinuous) touches.method = approaches.method = Method::Proximity;
         if (!hasContinuous) touches.thickness = 1e-9;
-        Scene touching = sceneOf(touches), approaching = sceneOf(approaches);
+        BodyScene touching = sceneOf(touches), approaching = sceneOf(approaches);
         for (int i = 0; i < casesOf(40); ++i) {
           SCOPED_TRACE("seed " + std::to_string(seed) + ", kind " +
                        std::to_string(static_cast<int>(kind)) + (isOpen ? ", open" : "") +
@@ -339,18 +340,19 @@ TEST(AllowedError, FieldsAnswerTheSameStepsByBruteForceAndByThreads) {
         Walk walk(7000 + 10 * seed + static_cast<std::uint64_t>(kind), kind);
         const bool isBodyFirst = seed % 2 == 1;
         const auto sceneOf = [&](const Settings& settings) {
-          return Scene(kind, ring(isOpen), walk.now(), pairOf(kErrorBound), settings, isBodyFirst);
+          return BodyScene(kind, ring(isOpen), walk.now(), pairOf(kErrorBound), settings,
+                           isBodyFirst);
         };
         Settings audited = settingsOf(Engine::Octree);
         audited.audit.features = 20;
-        Scene octree = sceneOf(audited), brute = sceneOf(settingsOf(Engine::BruteForce)),
-              threads = sceneOf(settingsOf(Engine::Octree, 3, OctreeUpdate::Rebuild));
+        BodyScene octree = sceneOf(audited), brute = sceneOf(settingsOf(Engine::BruteForce)),
+                  threads = sceneOf(settingsOf(Engine::Octree, 3, OctreeUpdate::Rebuild));
         for (int i = 0; i < casesOf(12); ++i) {
           walk.step();
           const CollisionData& answer = octree.step(walk.before(), walk.now());
           (answer.validity().reason == MethodReason::AllowedError ? byField : exactly) += 1;
           EXPECT_TRUE(octree.detection().auditFailures().empty());
-          for (Scene* other : {&brute, &threads}) {
+          for (BodyScene* other : {&brute, &threads}) {
             const CollisionData& same = other->step(walk.before(), walk.now());
             EXPECT_EQ(same.hash(), answer.hash());
             EXPECT_EQ(same.validity(), answer.validity());
@@ -439,8 +441,8 @@ TEST(AllowedError, SteadyFramesThatAFieldAnswersAllocateNothing) {
   for (const int threads : {1, 2}) {
     Walk walk(3, Kind::Fine);
     const End at = walk.now();
-    Scene scene(Kind::Fine, ring(false), at, pairOf(kErrorBound),
-                settingsOf(Engine::Octree, threads));
+    BodyScene scene(Kind::Fine, ring(false), at, pairOf(kErrorBound),
+                    settingsOf(Engine::Octree, threads));
     std::size_t byField = 0, exactly = 0;
     End before = at, now = at;
     // The ball comes near enough to touch, and goes away again.
@@ -466,8 +468,8 @@ TEST(AllowedError, AFailedAllocationLeavesTheNextDetectionRight) {
   std::size_t failures = 0;
   for (std::size_t n = 1; n < 400; n = n + 1 + n / 4) {
     Walk walk(5, Kind::Fine), same(5, Kind::Fine);
-    Scene scene(Kind::Fine, ring(false), walk.now(), pairOf(kErrorBound),
-                settingsOf(Engine::Octree)),
+    BodyScene scene(Kind::Fine, ring(false), walk.now(), pairOf(kErrorBound),
+                    settingsOf(Engine::Octree)),
         expected(Kind::Fine, ring(false), walk.now(), pairOf(kErrorBound),
                  settingsOf(Engine::Octree));
     for (int i = 0; i < 6; ++i) {

@@ -258,14 +258,14 @@ class Law {
 };
 
 /// Anything that an OctreeBasedCD holds, with its motion in the step.
-struct Body {
+struct PlacedBody {
   std::string name;
   std::function<GeometryId(OctreeBasedCD&)> add;
   Side side;  ///< empty for a shape
   std::function<void(OctreeBasedCD&, GeometryId)> move;
 };
 
-Body bodyOf(std::string name, const TestGeometry& geometry, Positions now) {
+PlacedBody bodyOf(std::string name, const TestGeometry& geometry, Positions now) {
   return {std::move(name),
           [geometry](OctreeBasedCD& collisions) { return geometry.addTo(collisions); },
           {geometry.positions, now, geometry.radii},
@@ -275,7 +275,8 @@ Body bodyOf(std::string name, const TestGeometry& geometry, Positions now) {
 }
 
 /// The same as a placed body: its frame is turned and shifted, and turns further in the step.
-Body placed(std::string name, const TestGeometry& geometry, double angle, const Vector3d& shift) {
+PlacedBody placed(std::string name, const TestGeometry& geometry, double angle,
+                  const Vector3d& shift) {
   using Turn = Eigen::AngleAxisd;
   const Vector3d axis = Vector3d(1, 2, 3).normalized(), centre(0.5, 0.5, 0.5);
   const std::array<Eigen::Matrix3d, 2> turns{Turn(0.3, axis).toRotationMatrix(),
@@ -294,7 +295,7 @@ Body placed(std::string name, const TestGeometry& geometry, double angle, const 
           }};
 }
 
-Body shapeOf(std::string name, const AnalyticalGeometry& shape, const Vector3d& motion) {
+PlacedBody shapeOf(std::string name, const AnalyticalGeometry& shape, const Vector3d& motion) {
   return {std::move(name),
           [=](OctreeBasedCD& collisions) { return collisions.addAnalyticalGeometry(shape); },
           {},
@@ -305,7 +306,7 @@ Body shapeOf(std::string name, const AnalyticalGeometry& shape, const Vector3d& 
 }
 
 /// Every geometry type in the unit cube, with steps of about `motion`.
-std::vector<Body> bodies(Random& random, double motion) {
+std::vector<PlacedBody> bodies(Random& random, double motion) {
   const TestGeometry triangles = testGeometry(soup(random, 60, 0.15)),
                      sheets = testGeometry(sheet(6, 0.5, 0.3)),
                      line = thread(random, 40, 0.15, 0.02, false),
@@ -315,7 +316,7 @@ std::vector<Body> bodies(Random& random, double motion) {
   Solid block = cells(2, random);
   for (Vector3d& x : block.positions) x = 0.25 * x + Vector3d(0.3, 0.25, 0.27);
   const Positions blockNow = moved(random, block.positions, motion);
-  std::vector<Body> all;
+  std::vector<PlacedBody> all;
   all.push_back(bodyOf("triangles", triangles, moved(random, triangles.positions, motion)));
   all.push_back(bodyOf("sheet", sheets, moved(random, sheets.positions, motion)));
   all.push_back(placed("placed triangles", triangles, motion, Vector3d::Constant(motion)));
@@ -366,13 +367,13 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
   std::size_t number = 0;
   for (const double motion : {0.0, 0.01, 0.2}) {
     Random random(181);
-    const std::vector<Body> all = bodies(random, motion);
+    const std::vector<PlacedBody> all = bodies(random, motion);
     for (std::size_t i = 0; i < all.size(); ++i)
       for (std::size_t j = i; j < all.size(); ++j) {
-        const Body &first = all[i], &second = all[j];
+        const PlacedBody &first = all[i], &second = all[j];
         for (const bool turned : {false, true}) {
           if (turned && i == j) continue;
-          const Body &a = turned ? second : first, &b = turned ? first : second;
+          const PlacedBody &a = turned ? second : first, &b = turned ? first : second;
           for (const PairSettings& settings : everySetting(0.05)) {
             if (isLeftOut(number++)) continue;
             OctreeBasedCD collisions;

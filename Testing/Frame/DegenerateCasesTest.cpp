@@ -1,4 +1,5 @@
 #include "Common/PairRun.h"
+#include "Common/Sanitized.h"
 #include "Common/DegenerateCases.h"
 
 #include <gtest/gtest.h>
@@ -53,13 +54,14 @@ class DegenerateCases : public ::testing::TestWithParam<MethodCase> {
 };
 
 TEST_P(DegenerateCases, EachCaseMatchesBruteForce) {
-  std::size_t met = 0;
+  std::size_t met = 0, number = 0;
   for (const DegenerateCase& input : degenerateCases()) {
     SCOPED_TRACE(input.name);
     const PairSettings settings = settingsFor(input);
     const Truth truth = truthOf(input, settings);
     met += truth.there.front().anything();
     for (const Settings& octree : octreeSettings()) {
+      if (isLeftOut(number++)) continue;
       SCOPED_TRACE(nameOf(octree));
       PairRun run(octree, input.a, input.b, settings, !input.large);
       expectTruth(run, input, truth);

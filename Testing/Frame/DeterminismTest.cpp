@@ -17,14 +17,14 @@ using namespace testing;
 using Eigen::Vector3d;
 
 /// Positions from exact arithmetic only, so that no compiler or mathematics library changes them.
-struct Scene {
+struct HashedScene {
   Mesh a, b;
   std::vector<Vector3d> aBefore, bBefore;
 };
 
-Scene scene() {
+HashedScene scene() {
   Random random(99);
-  Scene scene;
+  HashedScene scene;
   scene.a = flat(24, 0);
   for (Vector3d& p : scene.a.positions)
     p.z() = 0.3 * p.x() * (1 - p.x()) + uniform(random, -0.01, 0.01);
@@ -40,7 +40,7 @@ Scene scene() {
 
 /// Refits the octrees to the step, then detects.
 std::vector<std::uint64_t> hashes(const Settings& settings, const PairSettings& pair) {
-  const Scene s = scene();
+  const HashedScene s = scene();
   PairRun run(settings, s.a, s.b, pair);
   run.step(s.aBefore, s.aBefore, s.bBefore, s.bBefore);
   run.step(s.aBefore, s.a.positions, s.bBefore, s.b.positions);

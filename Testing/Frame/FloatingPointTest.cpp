@@ -126,11 +126,11 @@ INSTANTIATE_TEST_SUITE_P(EveryMethod, FloatingPoint, ::testing::ValuesIn(methodC
 using Bits = std::vector<std::uint64_t>;
 
 template <class Value>
-void append(Bits& bits, const Value& value) {
+void appendBits(Bits& bits, const Value& value) {
   if constexpr (std::is_same_v<Value, double>)
     bits.push_back(std::bit_cast<std::uint64_t>(value));
   else if constexpr (std::is_same_v<Value, Eigen::Vector3d>)
-    for (const double x : value) append(bits, x);
+    for (const double x : value) appendBits(bits, x);
   else
     bits.push_back(static_cast<std::uint64_t>(value));
 }
@@ -169,13 +169,13 @@ Bits featureAnswers(const test::CornersPair& pair, const Mode& mode) {
             edges.parallel};
   for (const Eigen::Vector3d& v :
        {vertex.barycentric, vertex.difference, vertex.normal, edges.difference, edges.normal})
-    append(bits, v);
+    appendBits(bits, v);
   for (const double x : {vertex.distance, edges.distance, edges.weightA, edges.weightB})
-    append(bits, x);
+    appendBits(bits, x);
   for (const auto& time : {vertexTime, edgeTime, vertexNear, edgeNear})
-    append(bits, time.value_or(2.0));
+    appendBits(bits, time.value_or(2.0));
   for (const Stencil& each : stencils)
-    for (const double weight : each.weights) append(bits, weight);
+    for (const double weight : each.weights) appendBits(bits, weight);
   return bits;
 }
 
@@ -216,14 +216,14 @@ Bits meshAnswers(const DegenerateCase& input, const PairSettings& settings, cons
   EXPECT_EQ(_mm_getcsr(), before);
   Bits bits{data.hash()};
   for (const ConstraintRow& row : rows) {
-    append(bits, row.normal);
-    append(bits, row.offset);
-    append(bits, unchanged([&] { return row.gap(all); }));
+    appendBits(bits, row.normal);
+    appendBits(bits, row.offset);
+    appendBits(bits, unchanged([&] { return row.gap(all); }));
   }
   for (const TripletOfBits& triplet : triplets) {
-    append(bits, triplet.row);
-    append(bits, triplet.column);
-    append(bits, triplet.value);
+    appendBits(bits, triplet.row);
+    appendBits(bits, triplet.column);
+    appendBits(bits, triplet.value);
   }
   return bits;
 }

@@ -18,7 +18,7 @@ using namespace testing;
 using Eigen::Vector3d;
 using Answer = ExactContacts::Answer;
 
-std::vector<StepScene> scenes() {
+std::vector<StepScene> scenesOfSteps() {
   Random random(13);
   const Mesh first = soup(random, 30, 0.3), second = soup(random, 30, 0.3);
   const StepScene touching = latticeScene(random);
@@ -117,7 +117,7 @@ class InexactTransformations : public ::testing::TestWithParam<MethodCase> {
 };
 
 TEST_P(InexactTransformations, ChangeContactsByRoundingOnly) {
-  for (const StepScene& scene : scenes())
+  for (const StepScene& scene : scenesOfSteps())
     for (const Transformation& how : transformations()) {
       SCOPED_TRACE(scene.name + ", " + how.name);
       compare(scene, how);
@@ -136,7 +136,7 @@ TEST_P(InexactTransformations, ChangeContactsByRoundingOnly) {
 TEST_P(InexactTransformations, ExactContactsMatchReportedOnes) {
   if (distinct() || GetParam().settings.earliestTimeOnly) return;
   std::size_t yes = 0, no = 0;
-  for (const StepScene& scene : scenes()) {
+  for (const StepScene& scene : scenesOfSteps()) {
     if (scene.name != "lattice" && scene.name != "soups") continue;
     SCOPED_TRACE(scene.name);
     const Placement own(scene, {});

@@ -30,7 +30,7 @@ StepScene gridScene(const std::string& name, const Mesh& a, const Mesh& b, doubl
   return scene;
 }
 
-std::vector<StepScene> scenes() {
+std::vector<StepScene> scenesToScale() {
   Random random(12);
   const Mesh first = soup(random, 40, 0.3), second = soup(random, 40, 0.3);
   const StepScene touching = latticeScene(random);
@@ -112,7 +112,7 @@ class UnitIndependence : public ::testing::TestWithParam<MethodCase> {
 };
 
 TEST_P(UnitIndependence, ExactTransformationsChangeNothing) {
-  for (const StepScene& scene : scenes()) {
+  for (const StepScene& scene : scenesToScale()) {
     SCOPED_TRACE(scene.name);
     const Placement own(scene, {});
     const PairRun truth = own.run(settings());

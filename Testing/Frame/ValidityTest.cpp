@@ -132,16 +132,18 @@ Tally historiesOf(const PairSettings& settings, double speed, std::uint64_t seed
 struct ValidityOfMethod : ::testing::TestWithParam<MethodCase> {};
 
 TEST_P(ValidityOfMethod, NeverFailsSilently) {
+  std::size_t number = 0;
   for (const bool response : {false, true}) {
     Tally all;
     for (const double speed : {0.01, 0.1, 0.3, 0.7, 1.0, 1.5, 3.0, 10.0, 50.0}) {
+      if (isLeftOut(number++)) continue;
       const Tally tally = historiesOf(GetParam().settings, speed, 5, 40, response);
       EXPECT_EQ(tally.silent, 0u) << "speed " << speed;
       std::cout << (response ? "response, " : "") << "speed " << speed << ": " << tally << "\n";
       all.wrong += tally.wrong;
     }
     if (GetParam().settings.method == Method::Proximity) {
-      EXPECT_GT(all.wrong, 100u);
+      EXPECT_GE(all.wrong, leastOf(101));
     }
   }
 }
@@ -244,7 +246,7 @@ TEST_P(ValidityOfMethod, KnowsStartedApartFromImpactsOfThePreviousStep) {
                            }));
       }
   // Where a single feature decides.
-  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+  for (std::uint64_t seed = 0; seed < static_cast<std::uint64_t>(casesOf(300)); ++seed) {
     SCOPED_TRACE("few triangles, seed " + std::to_string(seed));
     Random random(1000 + seed);
     Mesh few[2];
@@ -270,8 +272,8 @@ TEST_P(ValidityOfMethod, KnowsStartedApartFromImpactsOfThePreviousStep) {
   }
   std::cout << all.frames << " frames, " << all.apart << " started apart, known of "
             << all.foundApart << "\n";
-  EXPECT_GT(all.apart, 500u);
-  EXPECT_LT(all.apart, all.frames - 500);
+  EXPECT_GT(all.apart, 500u / kShareOfCases);
+  EXPECT_LT(all.apart, all.frames - 500 / kShareOfCases);
   if (settings.method == Method::Auto) {
     EXPECT_EQ(all.foundApart, all.apart);
   } else if (settings.method == Method::Continuous) {

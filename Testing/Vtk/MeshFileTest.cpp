@@ -17,11 +17,11 @@ namespace {
 using Eigen::Vector3d;
 namespace fs = std::filesystem;
 
-class MeshFiles : public testing::Test {
+class MeshFiles : public ::testing::Test {
  protected:
   MeshFiles()
-      : folder(fs::path(testing::TempDir()) /
-               testing::UnitTest::GetInstance()->current_test_info()->name()) {
+      : folder(fs::path(::testing::TempDir()) /
+               ::testing::UnitTest::GetInstance()->current_test_info()->name()) {
     fs::create_directories(folder);
   }
   ~MeshFiles() override { fs::remove_all(folder); }
@@ -178,8 +178,8 @@ TEST_F(MeshFiles, EveryFormatGivesVerticesAndPolygonsAsFans) {
 
 TEST_F(MeshFiles, TruncatedFilesAreRefusedOrComplete) {
   // VTK must print no messages.
-  testing::internal::CaptureStderr();
-  testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStdout();
   std::vector<std::string> wrong;
   for (const auto& [name, content] : kGood) {
     for (std::size_t length = 0; length < content.size(); ++length) {
@@ -190,16 +190,16 @@ TEST_F(MeshFiles, TruncatedFilesAreRefusedOrComplete) {
       }
     }
   }
-  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
-  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
   // In these formats, a text that ends within its last line or number cannot be told from a shorter
   // one.
   for (const std::string& one : wrong) EXPECT_TRUE(one.starts_with("a.obj")) << one;
 }
 
 TEST_F(MeshFiles, DamagedFilesAreReadOrRefusedWithoutOutput) {
-  testing::internal::CaptureStderr();
-  testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStdout();
   for (const auto& [name, content] : kGood) {
     for (std::size_t at = 0; at < content.size(); ++at) {
       for (const char damage : {'\0', '9', '-', '\xff'}) {
@@ -214,8 +214,8 @@ TEST_F(MeshFiles, DamagedFilesAreReadOrRefusedWithoutOutput) {
       }
     }
   }
-  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
-  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
 }
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {

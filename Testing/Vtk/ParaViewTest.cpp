@@ -24,7 +24,7 @@ vtkSmartPointer<vtkPolyData> read(const VtpText& file) {
 }
 
 /// A thread and a capsule on a sheet, in contact with it.
-class ParaView : public testing::Test {
+class ParaView : public ::testing::Test {
  protected:
   ParaView() : world(1) {
     mesh = world.addMesh("sheet", sheet(8), 1);

@@ -41,7 +41,7 @@ std::size_t count(const Image& image, bool (Pixel::*question)() const, bool all 
 }
 
 /// The organs at a frame in which they touch.
-class WindowOnOrgans : public testing::Test {
+class WindowOnOrgans : public ::testing::Test {
  protected:
   WindowOnOrgans() : scene(scenes::organs()) {
     for (std::size_t m = 0; m < scene.meshes.size(); ++m) {

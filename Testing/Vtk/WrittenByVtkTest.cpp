@@ -18,11 +18,11 @@ namespace palpate::vtk {
 namespace {
 
 // Reads files of VTK's own writers, in every mode of these writers.
-class WrittenByVtk : public testing::Test {
+class WrittenByVtk : public ::testing::Test {
  protected:
   WrittenByVtk()
-      : path(std::filesystem::path(testing::TempDir()) /
-             testing::UnitTest::GetInstance()->current_test_info()->name()) {
+      : path(std::filesystem::path(::testing::TempDir()) /
+             ::testing::UnitTest::GetInstance()->current_test_info()->name()) {
     std::mt19937 random(1);
     std::uniform_int_distribution<int> coordinate(-4096, 4096);
     vtkNew<vtkPoints> points;
@@ -72,7 +72,7 @@ TEST_F(WrittenByVtk, Xml) {
       for (const int compressor : {Writer::NONE, Writer::ZLIB, Writer::LZ4, Writer::LZMA})
         for (const int header : {Writer::UInt32, Writer::UInt64})
           for (const int order : {Writer::LittleEndian, Writer::BigEndian}) {
-            SCOPED_TRACE(testing::Message() << mode << encoded << compressor << header << order);
+            SCOPED_TRACE(::testing::Message() << mode << encoded << compressor << header << order);
             vtkNew<Writer> writer;
             writer->SetDataMode(mode);
             writer->SetEncodeAppendedData(encoded);
@@ -87,7 +87,7 @@ TEST_F(WrittenByVtk, Legacy) {
   for (const int version :
        {vtkDataWriter::VTK_LEGACY_READER_VERSION_4_2, vtkDataWriter::VTK_LEGACY_READER_VERSION_5_1})
     for (const int type : {VTK_ASCII, VTK_BINARY}) {
-      SCOPED_TRACE(testing::Message() << version << type);
+      SCOPED_TRACE(::testing::Message() << version << type);
       vtkNew<vtkPolyDataWriter> writer;
       writer->SetFileVersion(version);
       writer->SetFileType(type);

@@ -3,6 +3,7 @@
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
 #include "Common/TestGeometry.h"
 
 #include <gtest/gtest.h>
@@ -176,7 +177,8 @@ TEST(AutoGeometryTypes, AutoIsAcceptedWhereAnyOtherMethodIs) {
 }
 
 TEST(AutoGeometryTypes, ContactsMatchTheReportedMethod) {
-  std::size_t contacts = 0, continuous = 0, proximity = 0;  // the last two: pairs with contacts
+  std::size_t number = 0, contacts = 0, continuous = 0,
+              proximity = 0;  // the last two: pairs with contacts
   forEachPair([&](const Body& a, const Body& b) {
     if (isOfTriangles(a) && isOfTriangles(b)) return;  // AutoTest.cpp
     for (const double thickness : {0.0, 0.05})
@@ -184,6 +186,7 @@ TEST(AutoGeometryTypes, ContactsMatchTheReportedMethod) {
         const PairSettings automatic{Method::Auto, thickness, which};
         if (!accepts(a, b, automatic)) continue;
         for (const bool moves : {false, true}) {
+          if (isLeftOut(number++)) continue;
           Pair pair(a, b, automatic);
           const CollisionData found = pair.detect(moves);
           const Validity& validity = found.validity();
@@ -209,9 +212,9 @@ TEST(AutoGeometryTypes, ContactsMatchTheReportedMethod) {
         }
       }
   });
-  EXPECT_GT(contacts, 5000u);
-  EXPECT_GT(continuous, 50u);
-  EXPECT_GT(proximity, 50u);
+  EXPECT_GE(contacts, leastOf(5000));
+  EXPECT_GE(continuous, leastOf(50));
+  EXPECT_GE(proximity, leastOf(50));
 }
 
 /// The method changes from frame to frame, and with it the boxes of the octrees.

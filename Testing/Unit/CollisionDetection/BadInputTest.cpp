@@ -34,7 +34,7 @@ const Triangles kOrganTriangles{{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
 const Positions kTool{{-1, -1, 1.1}, {1, -1, 1.1}, {1, 1, 1.1}, {-1, 1, 1.1}};
 const Triangles kToolTriangles{{0, 1, 2}, {0, 2, 3}};
 
-Positions moved(Positions positions, double z) {
+Positions raised(Positions positions, double z) {
   for (Eigen::Vector3d& p : positions) p += Eigen::Vector3d(0.01 * z, 0, z);
   return positions;
 }
@@ -45,7 +45,7 @@ struct Scene {
   GeometryId removed = collisions.addTriangleMesh(kTool, kToolTriangles);
   GeometryId organ = collisions.addTriangleMesh(kOrgan, kOrganTriangles);
   GeometryId tool = collisions.addTriangleMesh(kTool, kToolTriangles);
-  GeometryId other = collisions.addTriangleMesh(moved(kTool, 0.02), kToolTriangles);
+  GeometryId other = collisions.addTriangleMesh(raised(kTool, 0.02), kToolTriangles);
 
   Scene() {
     collisions.addCollisionPair(organ, tool, {.thickness = kThickness});
@@ -61,7 +61,7 @@ void bring(Scene& scene, Stage stage) {
   if (stage == Stage::NoFrameYet) return;
   scene.collisions.detectCollision();
   if (stage == Stage::AfterFrame) return;
-  scene.collisions.setPositions(scene.tool, moved(kTool, -0.05));
+  scene.collisions.setPositions(scene.tool, raised(kTool, -0.05));
 }
 
 /// Everything that can be read, as one value.
@@ -124,7 +124,7 @@ void expectRefused(const std::function<void(Scene&)>& badCall, const Refusal& re
 
     for (double z : {0.0, -0.03}) {  // first what was already set, then a new frame
       for (Scene* each : {&scene, &twin}) {
-        if (z != 0) each->collisions.setPositions(each->organ, moved(kOrgan, z));
+        if (z != 0) each->collisions.setPositions(each->organ, raised(kOrgan, z));
         each->collisions.detectCollision();
       }
       EXPECT_EQ(state(scene), state(twin));
@@ -132,7 +132,7 @@ void expectRefused(const std::function<void(Scene&)>& badCall, const Refusal& re
     }
     EXPECT_EQ(scene.collisions.addTriangleMesh(kTool, kToolTriangles),
               twin.collisions.addTriangleMesh(kTool, kToolTriangles));
-    if (testing::Test::HasFailure()) FAIL() << "in stage " << static_cast<int>(stage);
+    if (::testing::Test::HasFailure()) FAIL() << "in stage " << static_cast<int>(stage);
   }
 }
 
@@ -152,7 +152,7 @@ void expectFinite(const Positions& good, std::optional<GeometryId> geometry, Cal
                                                                 : "inf"};
         if (geometry) refusal.named.push_back(text(*geometry));
         expectRefused([&](Scene& scene) { call(scene, bad); }, refusal);
-        if (testing::Test::HasFailure()) FAIL() << "vertex " << vertex << ", " << value;
+        if (::testing::Test::HasFailure()) FAIL() << "vertex " << vertex << ", " << value;
       }
     }
   }
@@ -171,7 +171,7 @@ void expectInRange(std::size_t vertexCount, const Triangles& good,
         Refusal refusal{ErrorCode::IndexOutOfRange, {}, geometry, triangle};
         refusal.named = {std::to_string(triangle), std::to_string(index)};
         expectRefused([&](Scene& scene) { call(scene, bad); }, refusal);
-        if (testing::Test::HasFailure()) FAIL() << "triangle " << triangle << ", index " << index;
+        if (::testing::Test::HasFailure()) FAIL() << "triangle " << triangle << ", index " << index;
       }
     }
   }
@@ -276,10 +276,10 @@ TEST(BadInput, SetPositionsBeforeAndNow) {
   const GeometryId organ = Scene().organ;
   expectKnown([](Scene& scene, GeometryId id) { scene.collisions.setPositions(id, kTool, kTool); });
   expectFinite(kOrgan, organ, [](Scene& scene, const Positions& positions) {
-    scene.collisions.setPositions(scene.organ, positions, moved(kOrgan, 0.3));
+    scene.collisions.setPositions(scene.organ, positions, raised(kOrgan, 0.3));
   });
   expectFinite(kOrgan, organ, [](Scene& scene, const Positions& positions) {
-    scene.collisions.setPositions(scene.organ, moved(kOrgan, 0.3), positions);
+    scene.collisions.setPositions(scene.organ, raised(kOrgan, 0.3), positions);
   });
 }
 

@@ -90,7 +90,7 @@ std::vector<PairSettings> everyMethod(double thickness) {
   return all;
 }
 
-Positions moved(Random& random, Positions positions, double most) {
+Positions movedRandomly(Random& random, Positions positions, double most) {
   for (Vector3d& p : positions) p += randomPoint(random, -most, most);
   return positions;
 }
@@ -107,8 +107,8 @@ Case sheetsInContact(Random& random, bool self) {
     c.a.positions.insert(c.a.positions.end(), c.b.positions.begin(), c.b.positions.end());
   }
   c.self = self;
-  c.nowA = moved(random, c.a.positions, 0.03);
-  c.nowB = moved(random, c.b.positions, 0.03);
+  c.nowA = movedRandomly(random, c.a.positions, 0.03);
+  c.nowB = movedRandomly(random, c.b.positions, 0.03);
   return c;
 }
 

@@ -24,15 +24,15 @@ namespace palpate::testing {
 namespace {
 
 /// A shape at both ends of a step. The points that define it move linearly.
-struct Tool {
+struct MovingShape {
   AnalyticalGeometry geometry;
   std::array<PlacedShape, 2> ends;
 
-  Tool(const AnalyticalGeometry& shape, const Matrix3d& turnBefore, const Vector3d& before,
-       const Matrix3d& turn, const Vector3d& now)
+  MovingShape(const AnalyticalGeometry& shape, const Matrix3d& turnBefore, const Vector3d& before,
+              const Matrix3d& turn, const Vector3d& now)
       : geometry(shape), ends{{{shape, turnBefore, before}, {shape, turn, now}}} {}
-  Tool(const AnalyticalGeometry& shape, const Vector3d& before, const Vector3d& now)
-      : Tool(shape, Matrix3d::Identity(), before, Matrix3d::Identity(), now) {}
+  MovingShape(const AnalyticalGeometry& shape, const Vector3d& before, const Vector3d& now)
+      : MovingShape(shape, Matrix3d::Identity(), before, Matrix3d::Identity(), now) {}
 
   bool isPlane() const { return std::holds_alternative<Plane>(geometry); }
   Vector3d at(const Vector3d& p, double t) const {
@@ -88,7 +88,7 @@ struct Bounds {
 ///
 /// Source   pairwise Frank and Wolfe steps: Lacoste-Julien, Jaggi, On the global linear convergence
 /// of Frank-Wolfe optimization variants (2015).
-Bounds distanceAt(const Tool& a, const Tool& b, double t, double enough) {
+Bounds distanceAt(const MovingShape& a, const MovingShape& b, double t, double enough) {
   if (b.isPlane()) return distanceAt(b, a, t, enough);
   if (const auto* plane = std::get_if<Plane>(&a.geometry)) {
     const Vector3d n = a.normalAt(t), origin = a.at(plane->point, t);
@@ -133,18 +133,18 @@ Bounds distanceAt(const Tool& a, const Tool& b, double t, double enough) {
   return bounds;
 }
 
-PairSettings continuous(double thickness, double timeTolerance = 1e-6) {
+PairSettings continuousPair(double thickness, double timeTolerance = 1e-6) {
   PairSettings pair{Method::Continuous, thickness};
   pair.timeTolerance = timeTolerance;
   return pair;
 }
 
-void place(OctreeBasedCD& collisions, GeometryId id, const Tool& tool) {
+void place(OctreeBasedCD& collisions, GeometryId id, const MovingShape& tool) {
   const auto& [before, now] = tool.ends;
   collisions.setTransform(id, before.rotation, before.translation, now.rotation, now.translation);
 }
 
-CollisionData answer(const Tool& a, const Tool& b, const PairSettings& pair,
+CollisionData answer(const MovingShape& a, const MovingShape& b, const PairSettings& pair,
                      Engine engine = Engine::Octree) {
   OctreeBasedCD collisions(settingsOf(engine));
   const GeometryId first = collisions.addAnalyticalGeometry(a.geometry),
@@ -165,7 +165,7 @@ std::optional<ShapeShapeContact> contactOf(const CollisionData& data) {
 }
 
 /// Expects that a contact within the step has its stated distance, between points of both shapes.
-void expectContact(const Tool& a, const Tool& b, const ShapeShapeContact& c,
+void expectContact(const MovingShape& a, const MovingShape& b, const ShapeShapeContact& c,
                    const PairSettings& pair) {
   const double motion = a.motion() + b.motion(), early = pair.timeTolerance * motion + 1e-12;
   EXPECT_NEAR(c.normal.norm(), 1, 1e-13);
@@ -192,11 +192,12 @@ void expectContact(const Tool& a, const Tool& b, const ShapeShapeContact& c,
   }
 }
 
-struct Tally {
+struct PairTally {
   int none = 0, before = 0, within = 0;
 };
 
-void expectTrue(const Tool& a, const Tool& b, const PairSettings& pair, Tally& tally) {
+void expectTrueContacts(const MovingShape& a, const MovingShape& b, const PairSettings& pair,
+                        PairTally& tally) {
   const CollisionData data = answer(a, b, pair);
   const auto c = contactOf(data);
   ++(!c ? tally.none : c->timeOfImpact > 0 ? tally.within : tally.before);
@@ -233,7 +234,7 @@ void expectTrue(const Tool& a, const Tool& b, const PairSettings& pair, Tally& t
   }
 }
 
-std::vector<AnalyticalGeometry> kinds(Random& random) {
+std::vector<AnalyticalGeometry> kindsOfShape(Random& random) {
   std::vector<Vector3d> cloud, plate;
   for (int i = 0; i < 8; ++i) cloud.push_back(randomPoint(random, -0.3, 0.3));
   for (int i = 0; i < 5; ++i)
@@ -258,10 +259,10 @@ std::vector<AnalyticalGeometry> kinds(Random& random) {
 
 TEST(ShapePairSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
   Random random(1);
-  Tally tally;
+  PairTally tally;
   std::size_t number = 0;
   for (int run = 0; run < 6; ++run) {
-    const std::vector<AnalyticalGeometry> all = kinds(random);
+    const std::vector<AnalyticalGeometry> all = kindsOfShape(random);
     for (std::size_t i = 0; i < all.size(); ++i)
       for (std::size_t j = 0; j <= i; ++j) {
         if (std::holds_alternative<Plane>(all[i]) && std::holds_alternative<Plane>(all[j]))
@@ -279,11 +280,11 @@ TEST(ShapePairSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
                                      .toRotationMatrix() *
                                  turn)
                       : turn;
-          return Tool(shape, turn, at, further, past);
+          return MovingShape(shape, turn, at, further, past);
         };
         const double from = run == 5 ? 0.1 : 0.8;
-        expectTrue(toolOf(all[i], from), toolOf(all[j], from),
-                   continuous(run % 3 ? 0.03 : 0.0, run == 4 ? 1e-3 : 1e-6), tally);
+        expectTrueContacts(toolOf(all[i], from), toolOf(all[j], from),
+                           continuousPair(run % 3 ? 0.03 : 0.0, run == 4 ? 1e-3 : 1e-6), tally);
       }
   }
   const auto least = static_cast<int>(leastOf(100));
@@ -309,7 +310,7 @@ TEST(ShapePairSteps, DegenerateShapesHaveCorrectTimes) {
       Cylinder{{0, -1, 0}, {0, 1, 0}, 0.5},
       ConvexHull{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}}},
       ConvexHull{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 2}}}};
-  Tally tally;
+  PairTally tally;
   const Matrix3d turns[] = {Matrix3d::Identity(),
                             Eigen::AngleAxisd(EIGEN_PI / 2, Vector3d::UnitZ()).toRotationMatrix(),
                             Eigen::DiagonalMatrix<double, 3>(1, -1, -1) * Matrix3d::Identity()};
@@ -327,9 +328,9 @@ TEST(ShapePairSteps, DegenerateShapesHaveCorrectTimes) {
                      std::to_string(run));
         // After half of a half turn, a plane has no extent and a cylinder no length.
         const Matrix3d& turn = turns[run == 3 ? random() % 2 : 0];
-        expectTrue(Tool(all[i], {0, 0, 0}, {0, 0, 0}),
-                   Tool(all[j], Matrix3d::Identity(), {x, y, z}, turn, {u, v, w}),
-                   continuous(run % 2 ? 0.5 : 0), tally);
+        expectTrueContacts(MovingShape(all[i], {0, 0, 0}, {0, 0, 0}),
+                           MovingShape(all[j], Matrix3d::Identity(), {x, y, z}, turn, {u, v, w}),
+                           continuousPair(run % 2 ? 0.5 : 0), tally);
       }
   EXPECT_GT(tally.none, 30);
   EXPECT_GT(tally.before, 30);
@@ -337,17 +338,17 @@ TEST(ShapePairSteps, DegenerateShapesHaveCorrectTimes) {
 }
 
 TEST(ShapePairSteps, MatchHandComputedValues) {
-  const auto only = [](const Tool& a, const Tool& b, double thickness) {
-    const auto c = contactOf(answer(a, b, continuous(thickness)));
+  const auto only = [](const MovingShape& a, const MovingShape& b, double thickness) {
+    const auto c = contactOf(answer(a, b, continuousPair(thickness)));
     EXPECT_TRUE(c);
     return c ? *c : ShapeShapeContact{};
   };
-  const Tool ball(Sphere{{0, 0, 0}, 1}, {0, 0, 0}, {0, 0, 0});
+  const MovingShape ball(Sphere{{0, 0, 0}, 1}, {0, 0, 0}, {0, 0, 0});
   for (const double thickness : {0.0, 0.25}) {
     // Fast, through the plate and out again.
     const double time = (500 - 2 - thickness) / 1000;
     const ShapeShapeContact c =
-        only(Tool(Sphere{{0, 0, 0}, 1}, {0, 0, 500}, {0, 0, -500}), ball, thickness);
+        only(MovingShape(Sphere{{0, 0, 0}, 1}, {0, 0, 500}, {0, 0, -500}), ball, thickness);
     EXPECT_LE(c.timeOfImpact, time);
     EXPECT_NEAR(c.timeOfImpact, time, 1e-6);
     EXPECT_NEAR((c.normal - Vector3d::UnitZ()).norm(), 0, 1e-12);
@@ -356,19 +357,21 @@ TEST(ShapePairSteps, MatchHandComputedValues) {
   }
   // Past each other at a little more, and a little less, than the thickness.
   for (const double gap : {1e-5, -1e-5}) {
-    const Tool past(Sphere{{0, 0, 0}, 1}, {-9, 0, 2.5 + gap}, {9, 0, 2.5 + gap});
-    EXPECT_EQ(answer(past, ball, continuous(0.5)).shapeShape().size(), gap < 0) << gap;
+    const MovingShape past(Sphere{{0, 0, 0}, 1}, {-9, 0, 2.5 + gap}, {9, 0, 2.5 + gap});
+    EXPECT_EQ(answer(past, ball, continuousPair(0.5)).shapeShape().size(), gap < 0) << gap;
   }
   // A box that lands flat on another, a cylinder on a floor on its end and on its side.
-  const Tool floor(Plane{}, {0, 0, 0}, {0, 0, 0}),
+  const MovingShape floor(Plane{}, {0, 0, 0}, {0, 0, 0}),
       table(Box{{0, 0, -1}, {5, 5, 1}}, {0, 0, 0}, {0, 0, 0});
-  for (const Tool& ground : {floor, table}) {
+  for (const MovingShape& ground : {floor, table}) {
     const Vector3d from(0, 0, 5), to(0, 0, -5);
-    const ShapeShapeContact flat = only(Tool(Box{{0, 0, 0}, {1, 1, 1}}, from, to), ground, 0),
-                            onEnd = only(Tool(Cylinder{{0, 0, -1}, {0, 0, 1}, 0.5}, from, to),
-                                         ground, 0),
-                            onSide =
-                                only(Tool(Cylinder{{-1, 0, 0}, {1, 0, 0}, 1}, from, to), ground, 0);
+    const ShapeShapeContact flat =
+                                only(MovingShape(Box{{0, 0, 0}, {1, 1, 1}}, from, to), ground, 0),
+                            onEnd =
+                                only(MovingShape(Cylinder{{0, 0, -1}, {0, 0, 1}, 0.5}, from, to),
+                                     ground, 0),
+                            onSide = only(MovingShape(Cylinder{{-1, 0, 0}, {1, 0, 0}, 1}, from, to),
+                                          ground, 0);
     for (const ShapeShapeContact& c : {flat, onEnd, onSide}) {
       EXPECT_NEAR(c.timeOfImpact, 0.4, 1e-6);
       EXPECT_LE(c.timeOfImpact, 0.4);
@@ -376,18 +379,19 @@ TEST(ShapePairSteps, MatchHandComputedValues) {
     }
   }
   // Shapes within the thickness at the start are a contact at time 0, with all fields of Proximity.
-  const Tool deep(Box{{0, 0, 0}, {1, 1, 1}}, {0.25, 0, 1.5}, {0, 0, 9});
+  const MovingShape deep(Box{{0, 0, 0}, {1, 1, 1}}, {0.25, 0, 1.5}, {0, 0, 9});
   const ShapeShapeContact start = only(deep, ball, 0.125);
   EXPECT_EQ(start.timeOfImpact, 0);
   EXPECT_NEAR(start.distance, -0.5, 1e-13);
   // Through a sheet, from below.
-  const Tool sheet(Plane{{0, 0, 0}, {0, 0, 1}, true}, {0, 0, 1}, {0, 0, -1});
+  const MovingShape sheet(Plane{{0, 0, 0}, {0, 0, 1}, true}, {0, 0, 1}, {0, 0, -1});
   const ShapeShapeContact below =
-      only(Tool(Sphere{{0, 0, 0}, 0.5}, {0, 0, -3}, {0, 0, 3}), sheet, 0);
+      only(MovingShape(Sphere{{0, 0, 0}, 0.5}, {0, 0, -3}, {0, 0, 3}), sheet, 0);
   EXPECT_NEAR(below.timeOfImpact, 3.5 / 8, 1e-6);
   EXPECT_EQ(below.normal, -Vector3d::UnitZ());
-  EXPECT_EQ(answer(Tool(Sphere{{0, 0, 0}, 0.5}, {0, 0, -3}, {0, 0, -1.75}),
-                   Tool(Plane{{0, 0, 0}, {0, 0, 1}, true}, {0, 0, 0}, {0, 0, -1}), continuous(0))
+  EXPECT_EQ(answer(MovingShape(Sphere{{0, 0, 0}, 0.5}, {0, 0, -3}, {0, 0, -1.75}),
+                   MovingShape(Plane{{0, 0, 0}, {0, 0, 1}, true}, {0, 0, 0}, {0, 0, -1}),
+                   continuousPair(0))
                 .shapeShape()
                 .size(),
             0u);
@@ -399,12 +403,12 @@ TEST(ShapePairSteps, CapturesAndAuditIncludeThem) {
   audited.audit.features = 10;
   OctreeBasedCD collisions(audited);
   std::vector<GeometryId> ids;
-  for (const AnalyticalGeometry& shape : kinds(random)) {
+  for (const AnalyticalGeometry& shape : kindsOfShape(random)) {
     ids.push_back(collisions.addAnalyticalGeometry(shape));
     collisions.setTransform(ids.back(), randomTurn(random), 2 * randomPoint(random, -1, 1));
     for (const GeometryId id : ids)
       if (id != ids.back() && !std::holds_alternative<Plane>(shape))
-        collisions.addCollisionPair(id, ids.back(), continuous(0.05));
+        collisions.addCollisionPair(id, ids.back(), continuousPair(0.05));
   }
   collisions.detectCollision();
   collisions.advance();

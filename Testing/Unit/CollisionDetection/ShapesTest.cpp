@@ -131,7 +131,7 @@ Body thread(Random& random, std::uint32_t segments, double radius) {
   return line;
 }
 
-Body particles(Random& random, std::uint32_t count, double radius) {
+Body particlesInCube(Random& random, std::uint32_t count, double radius) {
   Body points{GeometryType::Points, {}, {}, radius};
   for (std::uint32_t i = 0; i < count; ++i) {
     points.positions.push_back(randomPoint(random, 0, 1));
@@ -212,7 +212,7 @@ TEST(Shapes, MatchBruteForce) {
   Random random(1);
   const std::vector<Body> bodies{organ(sphere(10, 14, {0.5, 0.5, 0.5}, 0.4)),
                                  organ(sheet(14, 0.5, 0)), organ(soup(random, 150, 0.2)),
-                                 thread(random, 120, 0.02), particles(random, 300, 0.01)};
+                                 thread(random, 120, 0.02), particlesInCube(random, 300, 0.01)};
   std::size_t contacts = 0;
   for (const Body& body : bodies)
     for (const Placed& shape : shapes(random))
@@ -271,7 +271,7 @@ double signedDistance(const Placed& placed, const Vector3d& world) {
 }
 
 /// The minimum of a convex function over [0, 1].
-double least(const std::function<double(double)>& f) {
+double leastOn(const std::function<double(double)>& f) {
   double low = 0, high = 1;
   for (int i = 0; i < 45; ++i) {
     const double third = (high - low) / 3;
@@ -283,10 +283,10 @@ double least(const std::function<double(double)>& f) {
   return std::min({f(0), f(1), f(0.5 * (low + high))});
 }
 double leastOn(const Placed& shape, const Vector3d& p, const Vector3d& q) {
-  return least([&](double t) { return signedDistance(shape, p + t * (q - p)); });
+  return leastOn([&](double t) { return signedDistance(shape, p + t * (q - p)); });
 }
 double leastOn(const Placed& shape, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-  return least([&](double t) { return leastOn(shape, a + t * (b - a), a + t * (c - a)); });
+  return leastOn([&](double t) { return leastOn(shape, a + t * (b - a), a + t * (c - a)); });
 }
 
 constexpr double kSearch = 1e-7;  ///< error of the search above where distances are constant
@@ -342,7 +342,7 @@ TEST(Shapes, MatchTheDefinition) {
   Random random(2);
   const std::vector<Body> bodies{organ(soup(random, 60, 0.3)), organ(soup(random, 60, 0.8)),
                                  organ(sphere(8, 12, {.5, .5, .5}, .4)), thread(random, 60, 0.02),
-                                 particles(random, 100, 0.01)};
+                                 particlesInCube(random, 100, 0.01)};
   std::array<std::size_t, 3> distinct{}, inside{};
   for (std::size_t bodyIndex = 0; bodyIndex < bodies.size(); ++bodyIndex) {
     const Body& body = bodies[bodyIndex];
@@ -638,7 +638,7 @@ TEST(Shapes, DegenerateElementsMatchTheDefinition) {
 
 TEST(Shapes, BadInputThrowsErrorsThatNameIt) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN(),
-                   kInfinity = std::numeric_limits<double>::infinity();
+                   kEndless = std::numeric_limits<double>::infinity();
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
   using Code = ErrorCode;
   const auto refuse = [&](const AnalyticalGeometry& shape, const std::string& words) {
@@ -647,7 +647,7 @@ TEST(Shapes, BadInputThrowsErrorsThatNameIt) {
   };
   refuse(Sphere{{0, 0, 0}, -1}, "radius is -1; it must be finite and not negative");
   refuse(Sphere{{0, kNan, 0}, 1}, "centre is (0, nan, 0); it must be finite");
-  refuse(Capsule{{0, 0, 0}, {0, 0, kInfinity}, 1}, "p1 is (0, 0, inf); it must be finite");
+  refuse(Capsule{{0, 0, 0}, {0, 0, kEndless}, 1}, "p1 is (0, 0, inf); it must be finite");
   refuse(Capsule{{0, 0, 0}, {0, 0, 1}, kNan}, "radius is nan");
   refuse(Plane{{0, 0, 0}, {0, 0, 0}}, "normal is (0, 0, 0); it must be longer than zero");
   refuse(Box{{0, 0, 0}, {1, -2, 1}}, "halfExtents is (1, -2, 1); it must be finite and not neg");
@@ -655,7 +655,7 @@ TEST(Shapes, BadInputThrowsErrorsThatNameIt) {
   refuse(ConvexHull{{{0, 0, 0}, {0, kNan, 1}, {kNan, 0, 0}}},
          "point 1 is (0, nan, 1); it must be finite");
   try {
-    collisions.addAnalyticalGeometry(ConvexHull{{{0, 0, 0}, {0, kInfinity, 1}}});
+    collisions.addAnalyticalGeometry(ConvexHull{{{0, 0, 0}, {0, kEndless, 1}}});
     ADD_FAILURE();
   } catch (const Error& error) {
     EXPECT_EQ(error.element(), std::size_t{1});

@@ -63,7 +63,7 @@ std::uint64_t serialHash() {
   return hash;
 }
 
-bool allRun(const Threads& threads, std::size_t size = 1000) {
+bool everyIndexRuns(const Threads& threads, std::size_t size = 1000) {
   std::vector<int> runs(size, 0);
   threads.forEach(size, [&](std::size_t i) { ++runs[i]; });
   return std::all_of(runs.begin(), runs.end(), [](int n) { return n == 1; });
@@ -94,7 +94,7 @@ TEST(ThreadFailures, FewerThreadsDoTheWorkIfMemoryIsShort) {
     EXPECT_EQ(inChild([&] {
                 limitAddressSpace(bytes);
                 const Threads threads(kAsked);
-                return (threads.count() < kAsked || !kStartsAsMany) && allRun(threads);
+                return (threads.count() < kAsked || !kStartsAsMany) && everyIndexRuns(threads);
               }),
               "passed");
 }
@@ -148,17 +148,19 @@ TEST(ThreadFailures, FrameInTheChildOfAForkIsCorrect) {
 TEST(ThreadFailures, ObjectMadeInTheChildOfAForkHasThreads) {
   if (testing::kSanitized) GTEST_SKIP() << "sanitizers do not start threads after a fork()";
   const Threads before(3);
-  ASSERT_TRUE(allRun(before));
+  ASSERT_TRUE(everyIndexRuns(before));
   EXPECT_EQ(inChild([&] {
               const Threads threads(3);
-              if (!kStartsAsMany) return allRun(threads);  // oneTBB has no threads in the child
+              if (!kStartsAsMany)
+                return everyIndexRuns(threads);  // oneTBB has no threads in the child
               std::atomic<int> met{0};
               // This returns only if two threads run.
               threads.forEach(2, [&](std::size_t) {
                 ++met;
                 while (met < 2) std::this_thread::yield();
               });
-              return inChild([&] { return allRun(before) && allRun(threads); }) == "passed";
+              return inChild([&] { return everyIndexRuns(before) && everyIndexRuns(threads); }) ==
+                     "passed";
             }),
             "passed");
 }
@@ -174,7 +176,7 @@ TEST(ThreadFailures, ForkWhileAnotherThreadUsesThePoolIsSafe) {
   auto threads = std::make_unique<Threads>(0, pool);
   for (int repeat = 0; repeat < 100; ++repeat)
     EXPECT_EQ(inChild([&] {
-                const bool right = allRun(*threads);
+                const bool right = everyIndexRuns(*threads);
                 threads.reset();
                 return right;
               }),
@@ -218,7 +220,7 @@ TEST(ThreadFailures, ForkInASharedTaskIsAnErrorInTheChild) {
   if (!parent) _exit(isError ? 0 : 1);
   EXPECT_FALSE(isError);
   EXPECT_EQ(outcome, "exit 0");
-  EXPECT_TRUE(allRun(threads));
+  EXPECT_TRUE(everyIndexRuns(threads));
 }
 #endif
 
@@ -248,7 +250,7 @@ TEST(ThreadFailures, RealTimeCallerOnTheCoreOfItsWorkerDoesNotSpinForever) {
     CPU_SET(sched_getcpu(), &cores);
     if (sched_setaffinity(0, sizeof cores, &cores) != 0) _exit(77);
     const Threads threads(2);  // the worker is not real-time
-    if (!allRun(threads)) return false;
+    if (!everyIndexRuns(threads)) return false;
     const sched_param priority{1};
     if (sched_setscheduler(0, SCHED_FIFO, &priority) != 0) _exit(77);
     const auto start = cpuTime();
@@ -282,7 +284,7 @@ TEST(ThreadFailures, RealTimeCallerOnTheCoreOfItsWorkersRunsManyLoops) {
         const sched_param priority{1};
         if (sched_setscheduler(0, SCHED_FIFO, &priority) != 0) _exit(77);
         for (int loop = 0; loop < 2000; ++loop) {
-          if (!allRun(threads, 8)) return false;
+          if (!everyIndexRuns(threads, 8)) return false;
           if (loop % 10 == 0) std::this_thread::sleep_for(std::chrono::microseconds(20));
         }
         return true;

@@ -215,9 +215,9 @@ TEST(Threads, WaitingCallerHelpsWithALaterLoop) {
 
 // oneTBB warns on stderr when it is asked for more workers than there are cores.
 TEST(Threads, MoreThreadsThanCoresPrintNothing) {
-  testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStderr();
   Threads(500).forEach(1000, [](std::size_t) {});
-  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
 }
 
 TEST(Threads, MovedPoolsWork) {

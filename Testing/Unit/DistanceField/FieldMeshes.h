@@ -27,13 +27,6 @@ inline Mesh boxMesh(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
   return mesh;
 }
 
-inline void append(Mesh& mesh, const Mesh& other) {
-  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-  mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());
-  for (const auto& [a, b, c] : other.triangles)
-    mesh.triangles.push_back({first + a, first + b, first + c});
-}
-
 inline Mesh torusMesh(std::uint32_t around, std::uint32_t across) {
   Mesh mesh;
   constexpr double kTurn = 2 * 3.14159265358979323846;

@@ -143,8 +143,10 @@ void check(Random& random, const Mesh& mesh, const SimplifiedMesh& result, doubl
 
 TEST(Simplify, EnclosesTheMeshAndIsNear) {
   Random random(1);
+  std::size_t number = 0;
   for (const double share : {0.002, 0.02, 0.1})
     for (const auto& [name, mesh] : simplifyMeshes(random)) {
+      if (isLeftOut(number++)) continue;
       SCOPED_TRACE(name + " " + std::to_string(share));
       check(random, mesh, simplified(mesh, share), share * diagonalOf(mesh));
     }

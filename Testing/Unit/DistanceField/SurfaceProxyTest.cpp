@@ -105,7 +105,7 @@ TEST(SurfaceProxy, EachLeafIsAsItsLawsSay) {
     const SurfaceProxy proxy(meshOf(scene.body), scene.settings, Threads(2));
     const double rounding = 1e-14 * proxy.magnitude();
     std::size_t planes = 0, lists = 0;
-    const std::size_t step = 1 + proxy.leaves().size() / 6000;
+    const std::size_t step = 1 + proxy.leaves().size() / (6000 / kShareOfCases);
     for (std::size_t i = random() % step; i < proxy.leaves().size(); i += step) {
       const SurfaceProxy::Leaf& leaf = proxy.leaves()[i];
       ++(leaf.hasPlane() ? planes : lists);
@@ -128,11 +128,11 @@ TEST(SurfaceProxy, EachLeafIsAsItsLawsSay) {
         ASSERT_EQ(height < 0, queries.signedDistance(exact.id, p).distance < 0);
       }
     }
-    EXPECT_GT(planes + lists, 500u);
+    EXPECT_GT(planes + lists, 500u / kShareOfCases);
     // Where two sides are nearer than a cell, and where borders are everywhere, there are none.
     const bool hasPlanes =
         scene.name != "soup" && scene.name != "thin box" && scene.name != "pillow";
-    EXPECT_EQ(planes > 100, hasPlanes);
+    EXPECT_EQ(planes > 100 / kShareOfCases, hasPlanes);
   }
 }
 
@@ -145,7 +145,7 @@ TEST(SurfaceProxy, PlacesWithoutALeafAreBeyondTheReach) {
     const SurfaceProxy proxy(meshOf(scene.body), scene.settings, Threads(1));
     std::size_t far = 0;
     const double units = proxy.unitCount();
-    for (int i = 0; i < 4000; ++i) {
+    for (int i = 0; i < casesOf(4000); ++i) {
       const Vector3d at = randomPoint(random, 0, units - 1e-6);
       std::array<std::uint32_t, 3> unit;
       for (int k = 0; k < 3; ++k) unit[k] = static_cast<std::uint32_t>(at[k]);
@@ -162,7 +162,7 @@ TEST(SurfaceProxy, PlacesWithoutALeafAreBeyondTheReach) {
       const Vector3d p = proxy.lower() + proxy.unit() * at;
       ASSERT_GT(queries.closestPoint(exact.id, p)->distance, scene.settings.reach);
     }
-    EXPECT_GT(far, 200u);
+    EXPECT_GT(far, 200u / kShareOfCases);
   }
 }
 

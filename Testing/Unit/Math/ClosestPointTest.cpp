@@ -1,6 +1,8 @@
 #include "Math/ClosestPoint.h"
 
 #include "Math/ExactClosestPoint.h"
+#include "Math/Foot.h"
+
 #include "DistanceCheck.h"
 
 #include <Eigen/Geometry>
@@ -20,9 +22,9 @@ namespace {
 using Eigen::Vector3d;
 using oracle::checkEdgeEdge, oracle::checkVertexTriangle, oracle::Four, oracle::isDegenerate;
 
-class Random {
+class RandomFeatures {
  public:
-  explicit Random(std::uint64_t seed = 7) : m_engine(seed) {}
+  explicit RandomFeatures(std::uint64_t seed = 7) : m_engine(seed) {}
   double real() { return std::uniform_real_distribution<double>(-1, 1)(m_engine); }
   int below(int n) { return static_cast<int>(m_engine() % static_cast<unsigned>(n)); }
   double smallPower() { return std::pow(10.0, -below(18)); }
@@ -35,9 +37,9 @@ class Random {
 
 /// One category of configurations each: random; slivers; far from the origin; on a small grid;
 /// nearly touching; nearly parallel; nearly coincident; from the smallest to the largest doubles.
-constexpr int kKinds = 8;
+constexpr int kKindsOfPoints = 8;
 
-Four configuration(int kind, Random& random) {
+Four configuration(int kind, RandomFeatures& random) {
   Four x = random.four();
   switch (kind) {
     case 1:
@@ -70,13 +72,13 @@ Four configuration(int kind, Random& random) {
 /// The number of cases of each category. Long tests run more, and others.
 int pairsOfEachKind() {
   const char* asked = std::getenv("PALPATE_DISTANCE_PAIRS");
-  return asked ? std::atoi(asked) / kKinds : 1500;
+  return asked ? std::atoi(asked) / kKindsOfPoints : 1500;
 }
 
 TEST(ClosestPoint, AgreesWithRationalArithmetic) {
-  Random random(std::getenv("PALPATE_DISTANCE_PAIRS") ? 8 : 7);
+  RandomFeatures random(std::getenv("PALPATE_DISTANCE_PAIRS") ? 8 : 7);
   oracle::Errors vertexTriangle, edgeEdge;
-  for (int kind = 0; kind < kKinds; ++kind) {
+  for (int kind = 0; kind < kKindsOfPoints; ++kind) {
     for (int i = 0; i < pairsOfEachKind() && !HasFailure(); ++i) {
       SCOPED_TRACE("kind " + std::to_string(kind) + ", number " + std::to_string(i));
       const Four x = configuration(kind, random);
@@ -140,6 +142,20 @@ TEST(ClosestPoint, NearlyTiedEndsOfParallelEdgesAreDecidedExactly) {
       {Vector3d(9000, 0x1p45, 0), Vector3d(1, 0x1p45, 0), Vector3d(-3, 0, 0), Vector3d(-2, 0, 0)});
 }
 
+/// Their differences are moderate, but not their coordinates, whose error compensation would carry.
+TEST(ClosestPoint, NearlyParallelEdgesFarFromTheOriginAreDecidedExactly) {
+  RandomFeatures random;
+  const auto onGrid = [&](int size) {
+    return Vector3d(random.below(size), random.below(size), random.below(size)) * 0x1p50;
+  };
+  for (int i = 0; i < 2000 && !HasFailure(); ++i) {
+    const Vector3d origin = Vector3d(1.1, -1.3, 1.7) * 0x1p99, edge = onGrid(1000);
+    Four x{origin, origin + edge, origin + onGrid(100), origin};
+    x[3] = x[2] + (1 + random.below(3)) * edge + onGrid(2);
+    checkEdgeEdge(x);
+  }
+}
+
 /// Found by fuzzing: the square of the normal is denormal, though the extent is moderate.
 TEST(ClosestPoint, NormalIsUnitWhereItsSquareUnderflows) {
   checkEdgeEdge(
@@ -179,8 +195,8 @@ Bits bitsOf(const EdgeEdgeDistance& d) {
 }
 
 TEST(ClosestPoint, PermutingCornersPermutesWeights) {
-  Random random;
-  for (int kind = 0; kind < kKinds; ++kind) {
+  RandomFeatures random;
+  for (int kind = 0; kind < kKindsOfPoints; ++kind) {
     for (int i = 0; i < 300; ++i) {
       const Four x = configuration(kind, random);
       if (isDegenerate(x)) continue;
@@ -198,8 +214,8 @@ TEST(ClosestPoint, PermutingCornersPermutesWeights) {
 }
 
 TEST(ClosestPoint, SwappingEdgesOrEndsSwapsTheResult) {
-  Random random;
-  for (int kind = 0; kind < kKinds; ++kind) {
+  RandomFeatures random;
+  for (int kind = 0; kind < kKindsOfPoints; ++kind) {
     for (int i = 0; i < 500; ++i) {
       const auto [p0, p1, q0, q1] = configuration(kind, random);
       const EdgeEdgeDistance answer = edgeEdgeDistance(p0, p1, q0, q1);
@@ -231,7 +247,7 @@ Bits scaledBits(Answer answer, int exponent) {
 }
 
 TEST(ClosestPoint, MirroringKeepsTheBits) {
-  Random random;
+  RandomFeatures random;
   for (int kind = 0; kind < 7; ++kind) {
     for (int i = 0; i < 500; ++i) {
       const Four x = configuration(kind, random);
@@ -251,7 +267,7 @@ TEST(ClosestPoint, MirroringKeepsTheBits) {
 /// Scales from where distances of 1e-17 of the positions still have all their bits to where squared
 /// lengths have long overflowed.
 TEST(ClosestPoint, PowersOfTwoKeepTheBits) {
-  Random random;
+  RandomFeatures random;
   for (int kind = 0; kind < 7; ++kind) {
     for (int i = 0; i < 200; ++i) {
       const Four x = configuration(kind, random);
@@ -272,7 +288,7 @@ TEST(ClosestPoint, PowersOfTwoKeepTheBits) {
 }
 
 TEST(ClosestPoint, MovingOnAGridKeepsTheBits) {
-  Random random;
+  RandomFeatures random;
   for (int i = 0; i < 2000; ++i) {
     Four x, moved;
     const Vector3d offset(1e6, -3e6, 5e5);
@@ -289,7 +305,7 @@ TEST(ClosestPoint, MovingOnAGridKeepsTheBits) {
 }
 
 TEST(ClosestPoint, TrianglesThatShareAnEdgeAgreeOnIt) {
-  Random random;
+  RandomFeatures random;
   int shared = 0;
   for (int i = 0; i < 3000; ++i) {
     const auto [p, a, b, c] = configuration(i % 7, random);
@@ -358,6 +374,49 @@ TEST(ClosestPoint, ParallelEdgesAreClosestInTheMiddleOfTheirOverlap) {
   EXPECT_EQ(beyond.weightA, 1.0);
   EXPECT_EQ(beyond.weightB, 0.0);
   EXPECT_EQ(beyond.distance, 5.0);
+}
+
+/// Differences beyond the range of double, the smallest ones, and angles too narrow for floating
+/// point.
+TEST(UnitCross, IsExactInTheWholeRange) {
+  const Vector3d zero = Vector3d::Zero(), large = Vector3d(1, 0.5, -0.25) * 0x1.8p1023,
+                 small = Vector3d(3, -2, 1) * 0x1p-1074, one(1, 2, 3);
+  const std::array<std::array<Vector3d, 2>, 6> edges{
+      {{-large, large},
+       {Vector3d(-large[1], -large[0], large[2]), Vector3d(large[1], large[0], -large[2])},
+       {zero, small},
+       {zero, one},
+       {zero, one + Vector3d(0, 0x1p-30, 0)},
+       {zero, one + Vector3d(0x1p-52, 0, 0)}}};
+  for (std::size_t i = 0; i < edges.size(); ++i)
+    for (std::size_t j = 0; j < edges.size(); ++j) {
+      SCOPED_TRACE(std::to_string(i) + ' ' + std::to_string(j));
+      const auto& [a, b] = edges[i];
+      const auto& [c, d] = edges[j];
+      std::size_t decisions = 0;
+      const Vector3d normal = unitCross(a, b, c, d, &decisions),
+                     exact = exact::unitCross(a, b, c, d);
+      EXPECT_LE((normal - exact).norm(), 1e-15);
+      EXPECT_NEAR(normal.norm(), i == j ? 0.0 : 1.0, 1e-15);
+      EXPECT_LE(decisions, 1u);
+    }
+}
+
+/// Sign of a distance less a radius, from another distance less another radius.
+TEST(CompareDistances, TakesRadiiIntoAccount) {
+  const Vector3d p(0, 0, 5), x(1, 0, 0), y(0, 1, 0);
+  for (const double height : {0.0, 1.0, 2.0, 9.0})
+    for (const double radius : {0.0, 0.5, 1.0, 3.0, 7.0})
+      for (const double otherHeight : {0.0, 1.0, 3.0})
+        for (const double otherRadius : {0.0, 0.5, 1.0, 2.0}) {
+          const Vector3d a(0, 0, height), b(0, 0, otherHeight);
+          const exact::ClosestFeature one{a, x, y, TriangleFeature::CornerA, {radius, 0, 0}},
+              two{b, x, y, TriangleFeature::CornerA, {otherRadius, 0, 0}};
+          const double distance = std::abs(5 - height) - radius,
+                       other = std::abs(5 - otherHeight) - otherRadius;
+          EXPECT_EQ(exact::compareDistances(p, one, two), distance < other ? -1 : distance > other)
+              << height << ' ' << radius << ' ' << otherHeight << ' ' << otherRadius;
+        }
 }
 
 TEST(ClosestPoint, LargestDoublesGiveFiniteResults) {

@@ -6,7 +6,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
 
 /// A slow decision of continuous detection by other methods than the library's: polynomials with
@@ -249,44 +252,36 @@ class Query {
   Query(bool edges, const Positions& positions)
       : m_edges(edges), m_separated(axisSeparates(positions, edges ? 2 : 1)) {
     // Whole numbers, times one power of two.
-    Integer scale = 1;
+    int unit = std::numeric_limits<int>::max();
     for (const Eigen::Vector3d& p : positions)
-      for (const double x : p) scale = lcm(scale, Rational(x).get_den());
+      for (const double x : p)
+        if (x != 0) unit = std::min(unit, std::ilogb(x) - 52);
+    const auto whole = [unit](double x) {
+      const int exponent = x == 0 ? unit : std::ilogb(x) - 52;
+      return Integer(Integer(std::ldexp(x, -exponent)) << (exponent - unit));
+    };
     for (int i = 0; i < 4; ++i)
       for (int k = 0; k < 3; ++k) {
-        const Rational before = scale * Rational(positions[i][k]),
-                       now = scale * Rational(positions[4 + i][k]);
-        m_vertices[i][k] = trimmed({before.get_num(), now.get_num() - before.get_num()});
+        const Integer before = whole(positions[i][k]);
+        m_vertices[i][k] = trimmed({before, whole(positions[4 + i][k]) - before});
       }
     const auto& [v, a, b, c] = m_vertices;
     m_coplanarity = dot(a - v, cross(b - v, c - v));
-    if (m_edges) {
-      const Vector normal = cross(a - v, c - b);
-      m_normalSquared = dot(normal, normal);
-      const Polynomial s = dot(cross(b - v, c - b), normal), r = dot(cross(b - v, a - v), normal);
-      m_notNegative = {s, m_normalSquared - s, r, m_normalSquared - r};
-      m_segments = {{v, b, c}, {a, b, c}, {b, v, a}, {c, v, a}};
-    } else {
-      const Vector normal = cross(b - a, c - a);
-      m_normalSquared = dot(normal, normal);
-      m_notNegative = {dot(cross(b - a, v - a), normal), dot(cross(c - b, v - b), normal),
-                       dot(cross(a - c, v - c), normal)};
-      m_segments = {{v, a, b}, {v, b, c}, {v, c, a}};
-    }
   }
 
   /// The first time in [0, 1] at which the features touch.
   std::optional<Real> firstTouch() const {
     if (m_separated) return std::nullopt;
     std::vector<Real> times;
-    if (!m_coplanarity.empty()) {
-      times = rootsInStep(m_coplanarity);
-    } else {
+    if (!m_coplanarity.empty()) times = rootsInStep(m_coplanarity);
+    if (!m_coplanarity.empty() && times.empty()) return std::nullopt;
+    const Features features = featuresOf(m_edges, m_vertices);
+    if (m_coplanarity.empty()) {
       // Any polynomial that the test evaluates may change its sign at the first touch.
       times.push_back({{}, 0, 0});
-      std::vector<Polynomial> all = m_notNegative;
-      all.push_back(m_normalSquared);
-      for (const auto& [p, q, r] : m_segments) {
+      std::vector<Polynomial> all = features.notNegative;
+      all.push_back(features.normalSquared);
+      for (const auto& [p, q, r] : features.segments) {
         for (const Polynomial& component : cross(q - p, r - p)) all.push_back(component);
         all.push_back(dot(q - p, r - p));
       }
@@ -296,7 +291,7 @@ class Query {
     }
     std::optional<Real> first;
     for (Real& time : times)
-      if ((!first || isBefore(time, *first)) && touchesInPlaneAt(time)) first = time;
+      if ((!first || isBefore(time, *first)) && touchesInPlaneAt(features, time)) first = time;
     return first;
   }
 
@@ -322,12 +317,35 @@ class Query {
     return false;
   }
 
+  /// What decides whether features in one plane touch.
+  struct Features {
+    Polynomial normalSquared;
+    std::vector<Polynomial> notNegative;          ///< of touching features that are not degenerate
+    std::vector<std::array<Vector, 3>> segments;  ///< a point and a segment's ends
+  };
+  static Features featuresOf(bool edges, const std::array<Vector, 4>& vertices) {
+    const auto& [v, a, b, c] = vertices;
+    if (edges) {
+      const Vector normal = cross(a - v, c - b);
+      const Polynomial square = dot(normal, normal), s = dot(cross(b - v, c - b), normal),
+                       r = dot(cross(b - v, a - v), normal);
+      return {square, {s, square - s, r, square - r}, {{v, b, c}, {a, b, c}, {b, v, a}, {c, v, a}}};
+    }
+    const Vector normal = cross(b - a, c - a);
+    return {dot(normal, normal),
+            {dot(cross(b - a, v - a), normal), dot(cross(c - b, v - b), normal),
+             dot(cross(a - c, v - c), normal)},
+            {{v, a, b}, {v, b, c}, {v, c, a}}};
+  }
+
   /// Whether the features touch at a time at which their corners are in one plane.
-  bool touchesInPlaneAt(Real time) const {
-    if (time.sign(m_normalSquared) != 0)
-      return std::all_of(m_notNegative.begin(), m_notNegative.end(),
+  static bool touchesInPlaneAt(const Features& features, Real time) {
+    const std::vector<Polynomial>& signs = features.notNegative;
+    if (time.sign(features.normalSquared) != 0)
+      return std::all_of(signs.begin(), signs.end(),
                          [&](const Polynomial& p) { return time.sign(p) >= 0; });
-    return std::any_of(m_segments.begin(), m_segments.end(), [&](const auto& segment) {
+    const auto& segments = features.segments;
+    return std::any_of(segments.begin(), segments.end(), [&](const auto& segment) {
       const auto& [p, q, r] = segment;
       for (const Polynomial& component : cross(q - p, r - p))
         if (time.sign(component) != 0) return false;
@@ -356,9 +374,7 @@ class Query {
 
   bool m_edges, m_separated;
   std::array<Vector, 4> m_vertices;
-  Polynomial m_coplanarity, m_normalSquared;
-  std::vector<Polynomial> m_notNegative;          ///< of touching features that are not degenerate
-  std::vector<std::array<Vector, 3>> m_segments;  ///< a point and a segment's ends
+  Polynomial m_coplanarity;
 };
 
 }  // namespace palpate::impact

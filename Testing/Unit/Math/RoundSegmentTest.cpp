@@ -121,6 +121,37 @@ TEST(RoundSegment, IntervalsHoldThePointsWithinTheRadius) {
   EXPECT_GT(none, 100u);
 }
 
+/// Rays along lines of a cone's surface, where the quadratic has no square, and through its apex.
+TEST(RoundSegment, IntervalsOfRaysAlongACone) {
+  Random random(3);
+  const Vector3d p(0, 0, 0);
+  for (const double narrow : {0.0, 0.25})
+    for (const double length : {1.0, 2.0, 0.5})
+      for (const Vector3d& along : {Vector3d(1, 1, 0), Vector3d(-1, -1, 0), Vector3d(1, 0, -1),
+                                    Vector3d(1, 0.125, 0), Vector3d(1, 3, 0)})
+        for (int repeat = 0; repeat < 60; ++repeat) {
+          const Vector3d q(length, 0, 0);
+          const double wide = narrow + length;  // an angle of 45 degrees
+          Vector3d through = repeat % 3 == 0 ? Vector3d(-narrow, 0, 0) : Vector3d(narrow, 0, 0);
+          if (repeat % 3 == 2)
+            for (double& x : through) x = 0.25 * random.between(-8, 8);
+          const Vector3d direction =
+              repeat % 2 ? along : Vector3d(1, 0.4 * random.unit(), 0.4 * random.unit());
+          const RaySegment ray{through - 2.5 * direction, direction, 0.0, 7.25};
+          const RoundIntervals found = intersectRay(ray, p, q, narrow, wide);
+          const std::vector<RayInterval> intervals(
+              found.intervals.begin(), found.intervals.begin() + static_cast<long>(found.size));
+          for (int i = 0; i <= 200; ++i) {
+            const double t = ray.tMax * (i + 0.37) / 201,
+                         distance = outside(ray.origin + t * direction, p, q, narrow, wide);
+            // Near the surface, rounding decides.
+            if (std::abs(distance) > 1e-7) {
+              ASSERT_EQ(isIn(intervals, t), distance < 0.0) << t << ' ' << distance;
+            }
+          }
+        }
+}
+
 TEST(RoundSegment, AnIntervalHoldsThePointsWithinTheRadiusOfATriangle) {
   Random random(2);
   int found = 0;
@@ -136,6 +167,7 @@ TEST(RoundSegment, AnIntervalHoldsThePointsWithinTheRadiusOfATriangle) {
     // Thin triangles, of which some have no area but for rounding.
     if (repeat % 6 == 4) c = a + random.unit() * (b - a);
     if (repeat % 12 == 4) c += std::ldexp(1.0, random.between(-50, -5)) * random.inCube();
+    if (repeat % 12 == 10) c = random.below(2) ? a : b;
     const double radius = 0.01 + 0.5 * random.unit();
     const Vector3d through = pointOn({a, b, c}, random) + 0.5 * random.inCube();
     const RaySegment ray{through - direction, direction, -3.0 + 4.0 * random.unit(),

@@ -37,7 +37,9 @@ TEST(TimeOfImpact, AgreesWithOracleOnHardCases) {
   }
   for (int kind = 0; kind < kKinds; ++kind) {
     RecordProperty("impactsOfKind" + std::to_string(kind), impacts[kind]);
-    EXPECT_GT(impacts[kind], cases / kKinds / 100) << kind;
+    if (testing::kShareOfCases == 1) {
+      EXPECT_GT(impacts[kind], cases / kKinds / 100) << kind;
+    }
   }
 }
 

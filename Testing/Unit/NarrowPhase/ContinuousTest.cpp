@@ -17,7 +17,7 @@ namespace palpate {
 namespace {
 
 using Eigen::Vector3d;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 TriangleMesh meshOf(const std::vector<Vector3d>& before, const std::vector<Vector3d>& now,
                     const std::vector<Triangle>& triangles) {
@@ -64,7 +64,7 @@ std::vector<std::tuple<Segment, Segment, double, double>> sorted(
 }
 
 double earliestOf(const ContactBuffers& contacts) {
-  double earliest = kInfinity;
+  double earliest = kUnbounded;
   for (const auto* list : {&contacts.vertexTriangle, &contacts.triangleVertex})
     for (const auto& contact : *list) earliest = std::min(earliest, contact.timeOfImpact);
   for (const auto& contact : contacts.edgeEdge) earliest = std::min(earliest, contact.timeOfImpact);
@@ -92,7 +92,7 @@ void expectSameAsBruteForce(MeshPair pair) {
   EXPECT_GT(expected.edgeEdge.size(), 0u);
   findContinuous(pair, candidates, found);
   expectSame(found, expected);
-  EXPECT_EQ(findEarliestImpact(pair, candidates, kInfinity, counts), earliestOf(expected));
+  EXPECT_EQ(findEarliestImpact(pair, candidates, kUnbounded, counts), earliestOf(expected));
   EXPECT_EQ(findEarliestImpact(pair, candidates, 0.0, counts), 0.0);
 
   // With boxes over the step, inflated outward.
@@ -110,7 +110,7 @@ void expectSameAsBruteForce(MeshPair pair) {
   expectSame(boxed, expected);
   EXPECT_LT(boxed.features.vertexTriangle.size() + boxed.features.edgeEdge.size(),
             found.features.vertexTriangle.size() + found.features.edgeEdge.size());
-  EXPECT_EQ(findEarliestImpact(pair, candidates, kInfinity, counts), earliestOf(expected));
+  EXPECT_EQ(findEarliestImpact(pair, candidates, kUnbounded, counts), earliestOf(expected));
 }
 
 TEST(Continuous, MatchesBruteForce) {
@@ -133,7 +133,7 @@ TEST(Continuous, EarliestTimeDoesNotDependOnOrderOrBatches) {
     ContactBuffers counts{}, all{};
     findContinuous(pair, candidates, all);
     for (int repeat = 0; repeat < 4; ++repeat) {
-      double earliest = kInfinity;
+      double earliest = kUnbounded;
       for (std::size_t begin = 0; begin < candidates.size(); begin += 1 + 37 * repeat)
         earliest = findEarliestImpact(
             pair,

@@ -52,7 +52,7 @@ Possible filter(const std::vector<Pair>& pairs, double thickness, bool distinct)
   return std::to_array(possible);
 }
 
-class Random {
+class RandomPoints {
  public:
   double real() { return std::uniform_real_distribution<double>(-1, 1)(m_engine); }
   int below(int n) { return static_cast<int>(m_engine() % static_cast<unsigned>(n)); }
@@ -65,7 +65,7 @@ class Random {
 
 constexpr int kKinds = 7;
 
-Pair pairOf(int kind, Random& random) {
+Pair pairOf(int kind, RandomPoints& random) {
   Pair x;
   for (Vector3d& v : x) v = random.vector();
   switch (kind) {
@@ -99,7 +99,7 @@ Pair pairOf(int kind, Random& random) {
 
 /// The thickness is exactly the distance of one of the feature pairs, which must be kept.
 TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
-  Random random;
+  RandomPoints random;
   std::size_t within = 0;
   for (int round = 0; round < 1400; ++round) {
     const int kind = round % kKinds;
@@ -125,7 +125,7 @@ TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
 }
 
 TEST(ProximityFilter, EverySimdPathDropsTheSamePairs) {
-  Random random;
+  RandomPoints random;
   for (int round = 0; round < 300; ++round) {
     std::vector<Pair> pairs;
     for (int i = 0; i < TrianglePairBatch::kSize; ++i)
@@ -143,7 +143,7 @@ TEST(ProximityFilter, EverySimdPathDropsTheSamePairs) {
 
 /// For well-shaped triangles, few pairs beyond the thickness are kept.
 TEST(ProximityFilter, DropsNearlyAllPairsBeyondTheThickness) {
-  Random random;
+  RandomPoints random;
   const double thickness = 0.03;
   int kept = 0, contacts = 0, all = 0;
   for (int round = 0; round < 300; ++round) {

@@ -1,4 +1,5 @@
 #include "BoxOctree.h"
+#include "Octree/BoxMap.h"
 #include "Octree/Keys.h"
 
 #include <gtest/gtest.h>
@@ -63,6 +64,57 @@ TEST(OctreeBuild, FollowsTheWorkedExample) {
   EXPECT_EQ(octree.parent(1), 0u);
   EXPECT_EQ(octree.parent(2), 8u);
   EXPECT_EQ(validate(octree, true), std::vector<std::string>{});
+}
+
+/// Boxes without a size at one point: cells end at the smallest, and no measure divides by 0.
+TEST(OctreeBuild, HoldsPointsAtOnePlace) {
+  for (const double at : {0.0, 1.0, -3e30}) {
+    OctreeSettings settings;
+    settings.maxElementsPerLeaf = 4;
+    BoxOctree tree;
+    tree.build(Boxes(100, boxAbout({at, at, at}, 0.0)), settings, Threads(1));
+    EXPECT_EQ(validate(tree.octree, true), std::vector<std::string>{}) << at;
+    EXPECT_EQ(tree.octree.looseness(), 1.0);
+    EXPECT_GT(tree.octree.bytes(), 100u * sizeof(FloatBox));
+  }
+}
+
+TEST(OctreeBuild, ReleasesMemoryAndIsBuiltAgain) {
+  testing::Random random(3);
+  const Boxes many = testing::randomBoxes(random, 5000, 0.01);
+  for (const std::size_t size : {5000u, 300u}) {
+    const Boxes boxes(many.begin(), many.begin() + static_cast<long>(size));
+    BoxOctree tree, fresh;
+    tree.build(many, {}, Threads(2));
+    tree.build(boxes, {}, Threads(1));
+    fresh.build(boxes, {}, Threads(1));
+    const std::size_t before = tree.octree.bytes();
+    tree.octree.releaseMemory();
+    EXPECT_LT(tree.octree.bytes(), before);
+    EXPECT_TRUE(testing::same(tree.octree, fresh.octree));
+    EXPECT_EQ(validate(tree.octree, true), std::vector<std::string>{});
+    tree.build(many, {}, Threads(1));
+    fresh.build(many, {}, Threads(1));
+    EXPECT_TRUE(testing::same(tree.octree, fresh.octree));
+  }
+}
+
+TEST(BoxMap, KeepsEmptyBoxesAndAllBoxesWithoutEnds) {
+  const FloatBox box = boxAbout({1, 2, 3}, 0.5);
+  BoxMap map;
+  EXPECT_EQ(map(box).lower, box.lower);
+  EXPECT_EQ(map(box).upper, box.upper);
+  map.count = 1;
+  setEnd(map.ends[0], {{{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}}, {10, 20, 30}, 0.0, 0.0);
+  EXPECT_TRUE(map(FloatBox()).empty());
+  const FloatBox turned = map(box);
+  const double expected[] = {8, 21, 33};
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_NEAR(turned.lower[k], expected[k] - 0.25, 1e-3);
+    EXPECT_NEAR(turned.upper[k], expected[k] + 0.25, 1e-3);
+    EXPECT_LE(turned.lower[k], expected[k] - 0.25);
+    EXPECT_GE(turned.upper[k], expected[k] + 0.25);
+  }
 }
 
 }  // namespace

@@ -26,10 +26,10 @@ Settings rebuilding(int threads = 1) {
 
 /// Cells by their bounds, each with its elements: the content of an octree without its node
 /// indices.
-using Tree = std::set<std::pair<std::vector<double>, std::vector<std::uint32_t>>>;
+using TreeContents = std::set<std::pair<std::vector<double>, std::vector<std::uint32_t>>>;
 
-Tree treeOf(const OctreeBasedCD& detection, GeometryId geometry) {
-  Tree tree;
+TreeContents treeOf(const OctreeBasedCD& detection, GeometryId geometry) {
+  TreeContents tree;
   for (const LooseOctree::NodeId id : detection.octree().nodes(geometry)) {
     const LooseOctree::Node node = detection.octree().node(id);
     std::vector<std::uint32_t> elements(node.elements.begin(), node.elements.end());
@@ -79,7 +79,7 @@ TEST(Octree, IsTheSameForAnyNumberOfThreadsAndAnyHistory) {
   const Mesh mesh = testing::soup(random, 40000, 0.01);
   std::vector<Eigen::Vector3d> elsewhere = mesh.positions;
   for (Eigen::Vector3d& p : elsewhere) p += testing::randomPoint(random, -0.3, 0.3);
-  Tree expected;
+  TreeContents expected;
   for (const int threads : {1, 2, 8}) {
     OctreeBasedCD detection(rebuilding(threads));
     const GeometryId id = detection.addTriangleMesh(mesh.positions, mesh.triangles);
@@ -104,7 +104,7 @@ TEST(Octree, HoldsSizesOfManyLevelsTheSameForAnyNumberOfThreads) {
       const double scale = std::exp2(-testing::randomPoint(random, 0, 24).x());
       for (const std::uint32_t corner : mesh.triangles[t]) mesh.positions[corner] *= scale;
     }
-    Tree expected;
+    TreeContents expected;
     for (const int threads : {1, 2, 3}) {
       OctreeBasedCD detection(rebuilding(threads));
       const GeometryId id = detection.addTriangleMesh(mesh.positions, mesh.triangles);

@@ -21,12 +21,12 @@ using testing::Random;
 using testing::uniform;
 
 /// A geometry's octree, and maps of its boxes: the identity, and one and two rotations.
-struct Case {
+struct QueryCase {
   GeometryTable table;
   const Octree* octree;
   std::vector<BoxMap> maps{BoxMap{}};
 
-  Case(Random& random, std::size_t size, double extent) {
+  QueryCase(Random& random, std::size_t size, double extent) {
     const Mesh mesh = testing::soup(random, size, extent);
     const GeometryId id = table.add(mesh.positions, mesh.triangles);
     table.updateOctrees({}, Threads(1));
@@ -63,7 +63,7 @@ void forEachCase(F&& f) {
   Random random(7);
   for (const std::size_t size : {1u, 5u, 33u, 2000u})
     for (const double extent : {0.02, 0.5}) {
-      const Case c(random, size, extent);
+      const QueryCase c(random, size, extent);
       double reach = 0;
       const FloatBox root = c.octree->blocks()[0].box(0);
       for (int k = 0; k < 3; ++k)
@@ -83,7 +83,7 @@ void forEachCase(F&& f) {
 TEST(PointQueries, FindEveryOverlappingElement) {
   Random random(8);
   std::size_t all = 0, none = 0;
-  forEachCase([&](const Case& c, const BoxMap& map, double reach) {
+  forEachCase([&](const QueryCase& c, const BoxMap& map, double reach) {
     PointQueryStack stack;
     for (int query = 0; query < 40; ++query) {
       const FloatBox box = query == 0 ? FloatBox() : randomBox(random, 1.5 * reach, 0.5 * reach);

@@ -1,4 +1,5 @@
 #include "Common/ExpectRefused.h"
+#include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
 #include "Common/Solids.h"
 #include "Common/TestGeometry.h"
@@ -23,9 +24,9 @@ namespace {
 using oracle::Rational;
 
 /// Two geometries searched by octrees, and by brute force.
-struct Both {
+struct TwoBodies {
   template <class A, class B>
-  Both(const A& geometryA, const B& geometryB) {
+  TwoBodies(const A& geometryA, const B& geometryB) {
     for (OctreeBasedCD* each : {&octree, &bruteForce}) {
       a = addTo(*each, geometryA);
       b = addTo(*each, geometryB);
@@ -63,20 +64,20 @@ struct Both {
   }
 };
 
-bool isSame(const SurfacePoint& a, const SurfacePoint& b) {
+bool haveSameBits(const SurfacePoint& a, const SurfacePoint& b) {
   return a.geometry == b.geometry && a.element == b.element && a.vertices == b.vertices &&
          a.weights == b.weights && a.position == b.position && a.distance == b.distance;
 }
-bool isSame(const GeometryDistance& a, const GeometryDistance& b) {
-  return isSame(a.a, b.a) && isSame(a.b, b.b) && a.distance == b.distance;
+bool haveSameBits(const GeometryDistance& a, const GeometryDistance& b) {
+  return haveSameBits(a.a, b.a) && haveSameBits(a.b, b.b) && a.distance == b.distance;
 }
 
 /// Expects the answer of brute force, and witnesses at the distance. size: L, of the coordinates.
-GeometryDistance expectSameAnswers(const Both& both, double radii, double size) {
+GeometryDistance expectSameAnswers(const TwoBodies& both, double radii, double size) {
   const SpatialQueries queries = both.octree.queries();
   const GeometryDistance found = queries.distance(both.a, both.b),
                          truth = both.bruteForce.queries().distance(both.a, both.b);
-  EXPECT_TRUE(isSame(found, truth))
+  EXPECT_TRUE(haveSameBits(found, truth))
       << found.distance << " of " << found.a.element << ", " << found.b.element << "; "
       << truth.distance << " of " << truth.a.element << ", " << truth.b.element;
   EXPECT_EQ(found.a.distance, found.distance);
@@ -116,7 +117,7 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForEveryPairOfTypes) {
   std::size_t apart = 0, touching = 0;
   for (const TestGeometry& a : geometries)
     for (const TestGeometry& b : geometries) {
-      Both both(a, b);
+      TwoBodies both(a, b);
       const double radii = largestRadius(a) + largestRadius(b);
       for (const double most : {3.0, 1.2, 0.5, 0.1, 0.0}) {
         const Vector3d shift = randomPoint(random, -most, most);
@@ -139,7 +140,7 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForPlacedBodiesAndFarFromTheOri
                      b = tapered(random, thread(random, 150, 0.1, 0.01, false), 0.05);
   for (const double far : {0.0, 1.0, 1e3, 1e9, 1e14})
     for (int placed = 0; placed < 4; ++placed) {
-      Both both(a, b);
+      TwoBodies both(a, b);
       const Vector3d away = far * Vector3d(1, -2, 0.3);
       for (const double most : {2.0, 1.5, 1.2, 1.0, 0.5, 0.0}) {
         const auto put = [&](GeometryId id, const TestGeometry& geometry, bool isPlaced) {
@@ -168,7 +169,8 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForMeshesOfManyElements) {
   const TestGeometry a = bumpy(22, 0.15), b = bumpy(18, 0.2);
   std::size_t apart = 0, touching = 0;
   for (int placed = 0; placed < 4; ++placed) {
-    Both both(a, b);
+    if (isLeftOut(static_cast<std::size_t>(placed) + 4)) continue;  // all but the last
+    TwoBodies both(a, b);
     for (const double most : {3.0, 2.6, 2.3, 2.2, 2.1, 2.0, 1.9, 1.8, 0.2}) {
       const Vector3d aside = most * randomPoint(random, -1, 1).normalized();
       const auto put = [&](GeometryId id, const TestGeometry& geometry, const Vector3d& shift,
@@ -182,20 +184,20 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForMeshesOfManyElements) {
       (found.distance > 0 ? apart : touching) += 1;
       for (const std::string& path : simdPaths()) {
         useSimdPath(path);
-        EXPECT_TRUE(isSame(both.octree.queries().distance(both.a, both.b), found)) << path;
+        EXPECT_TRUE(haveSameBits(both.octree.queries().distance(both.a, both.b), found)) << path;
       }
       useSimdPath("");
       ASSERT_FALSE(::testing::Test::HasFailure()) << most << ' ' << placed;
     }
   }
-  EXPECT_GT(apart, 15u);
-  EXPECT_GT(touching, 4u);
+  EXPECT_GT(apart, leastOf(15));
+  EXPECT_GT(touching, leastOf(4));
 }
 
 TEST(GeometryDistances, SurfacesOfTetrahedralMeshesAreMeshes) {
   Random random(203);
   const Solid a = cells(3, random), b = cells(2, random);
-  Both both(a, b);
+  TwoBodies both(a, b);
   for (const double at : {-5.0, -2.5, -2.0, -1.5, 0.5}) {
     Positions now = b.positions;
     for (Vector3d& p : now) p += Vector3d(at, 0.25, 0.25);
@@ -214,7 +216,7 @@ TEST(GeometryDistances, VerticesBeyondFloatsDoNotHideOthers) {
     for (const std::uint32_t corner : a.triangles[7]) a.positions[corner] *= far;
     Positions now = b.positions;
     for (Vector3d& p : now) p += a.positions[a.triangles[7][0]] + Vector3d(0, 3, 0);
-    Both both(a, b);
+    TwoBodies both(a, b);
     expectSameAnswers(both, 0.0, far);
     both.change([&](OctreeBasedCD& each) { each.setPositions(both.b, now); });
     const GeometryDistance found = expectSameAnswers(both, 0.0, far);
@@ -235,7 +237,7 @@ TEST(GeometryDistances, ClampedBoxesDoNotHideTheNearestPair) {
       b.positions.insert(b.positions.end(), {{far, y, z}, {far, y + 0.1, z}, {far, y, z + 0.1}});
       b.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
     }
-    const GeometryDistance found = expectSameAnswers(Both(a, b), 0.0, far);
+    const GeometryDistance found = expectSameAnswers(TwoBodies(a, b), 0.0, far);
     EXPECT_EQ(found.distance, 0.5);
     EXPECT_EQ(found.a.element, 60u);
     EXPECT_EQ(found.b.element, 17u);
@@ -282,7 +284,7 @@ struct RationalDistance {
   }
 };
 
-void expectRational(const Both& both, const RationalDistance& truth, double size) {
+void expectRational(const TwoBodies& both, const RationalDistance& truth, double size) {
   const GeometryDistance found = expectSameAnswers(both, 0.0, size);
   EXPECT_EQ(found.distance == 0.0, truth.square == 0) << found.distance;
   EXPECT_NEAR(found.distance, oracle::root(truth.square).get_d(), 4e-15 * size);
@@ -308,7 +310,7 @@ TEST(GeometryDistances, AgreeWithRationalArithmeticOnGrids) {
     const TestGeometry a = onGrid(Vector3d::Zero()),
                        b = onGrid(Vector3d(static_cast<double>(round % 5), 0, 0));
     const RationalDistance truth(a, a.positions, b, b.positions);
-    const Both both(a, b);
+    const TwoBodies both(a, b);
     expectRational(both, truth, 10.0);
     (truth.square == 0 ? meet : apart) += 1;
     ASSERT_FALSE(::testing::Test::HasFailure()) << round;
@@ -346,7 +348,7 @@ TEST(GeometryDistances, AgreeWithRationalArithmeticWhereTrianglesNearlyTouch) {
                             normal;
     }
     const RationalDistance truth(a, a.positions, b, b.positions);
-    const Both both(a, b);
+    const TwoBodies both(a, b);
     expectRational(both, truth, 4.0);
     (truth.square == 0 ? meet : apart) += 1;
     ASSERT_FALSE(::testing::Test::HasFailure()) << round;
@@ -361,7 +363,7 @@ TEST(GeometryDistances, WitnessesLieOnBothWherePlanesCoincide) {
   a.positions = {{0, 0, 0}, {100, 0, 0}, {100, 50, 0}};
   b.positions = {{1, -1, 0}, {2, -1, 0}, {1.5, 1, 0}};
   a.triangles = b.triangles = {{0, 1, 2}};
-  const GeometryDistance found = expectSameAnswers(Both(a, b), 0.0, 100.0);
+  const GeometryDistance found = expectSameAnswers(TwoBodies(a, b), 0.0, 100.0);
   EXPECT_EQ(found.distance, 0.0);
   EXPECT_LE(found.a.position[0], 2.0);
 }
@@ -391,7 +393,7 @@ TEST(GeometryDistances, TiesGoToTheLowestElements) {
   const TestGeometry below = plate(0.0);
   TestGeometry above = plate(0.25);
   std::shuffle(above.triangles.begin(), above.triangles.end(), random);
-  const Both both(below, above);
+  const TwoBodies both(below, above);
   const GeometryDistance found = expectSameAnswers(both, 0.0, 6.0);
   EXPECT_EQ(found.distance, 0.25);
   EXPECT_EQ(found.a.element, 0u);
@@ -400,7 +402,7 @@ TEST(GeometryDistances, TiesGoToTheLowestElements) {
     TestGeometry one = above, zero = below;
     one.triangles = {above.triangles[e]};
     zero.triangles = {below.triangles[0]};
-    EXPECT_GT(Both(zero, one).octree.queries().distance(GeometryId{0}, GeometryId{1}).distance,
+    EXPECT_GT(TwoBodies(zero, one).octree.queries().distance(GeometryId{0}, GeometryId{1}).distance,
               0.25);
   }
 }
@@ -411,7 +413,7 @@ TEST(GeometryDistances, ExchangedGeometriesGiveExchangedAnswers) {
     const TestGeometry a = testGeometry(soup(random, 40, 0.1)),
                        b = round % 2 ? testGeometry(soup(random, 40, 0.1))
                                      : thread(random, 40, 0.1, 0.001, false);
-    Both both(a, b);
+    TwoBodies both(a, b);
     Positions now = b.positions;
     for (Vector3d& p : now) p[0] += 1.5;
     both.change([&](OctreeBasedCD& each) { each.setPositions(both.b, now); });
@@ -419,7 +421,7 @@ TEST(GeometryDistances, ExchangedGeometriesGiveExchangedAnswers) {
     const GeometryDistance one = queries.distance(both.a, both.b),
                            two = queries.distance(both.b, both.a);
     EXPECT_GT(one.distance, 0.0);
-    EXPECT_TRUE(isSame(one, {two.b, two.a, two.distance}));
+    EXPECT_TRUE(haveSameBits(one, {two.b, two.a, two.distance}));
   }
 }
 
@@ -443,7 +445,7 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForEveryShape) {
   std::size_t apart = 0, touching = 0;
   for (const TestGeometry& geometry : geometriesOfEveryType(random))
     for (const AnalyticalGeometry& shape : allShapes(random)) {
-      Both both(geometry, shape);
+      TwoBodies both(geometry, shape);
       for (const double most : {3.0, 1.2, 0.5}) {
         const Matrix3d turn = randomTurn(random);
         const Vector3d shift = Vector3d(0.5, 0.5, 0.5) + randomPoint(random, -most, most);
@@ -496,7 +498,7 @@ TEST(GeometryDistances, TwoShapes) {
   for (const AnalyticalGeometry& a : shapes)
     for (const AnalyticalGeometry& b : shapes) {
       if (std::holds_alternative<Plane>(a) && std::holds_alternative<Plane>(b)) continue;
-      Both both(a, b);
+      TwoBodies both(a, b);
       for (const double most : {2.0, 0.2}) {
         const PlacedShape placedA{a, randomTurn(random), randomPoint(random, -most, most)},
             placedB{b, randomTurn(random), randomPoint(random, -most, most)};

@@ -31,11 +31,11 @@ Answer follow(const SpatialQueries& queries, const Positions& path, double radiu
   return answer;
 }
 
-bool isSame(const PathInterval& a, const PathInterval& b) {
+bool isSamePart(const PathInterval& a, const PathInterval& b) {
   return a.body == b.body && a.enter == b.enter && a.leave == b.leave &&
          a.entryElement == b.entryElement && a.exitElement == b.exitElement;
 }
-bool isSame(const PathClearance& a, const PathClearance& b) {
+bool isSamePart(const PathClearance& a, const PathClearance& b) {
   return a.body == b.body && a.distance == b.distance && a.at == b.at &&
          a.nearest.geometry == b.nearest.geometry && a.nearest.element == b.nearest.element &&
          a.nearest.vertices == b.nearest.vertices && a.nearest.weights == b.nearest.weights &&
@@ -64,7 +64,7 @@ class Line {
 };
 
 /// Geometries of one scene searched by octrees, and by brute force.
-struct Scene {
+struct PathScene {
   template <class F>
   GeometryId addBy(F&& f) {
     bodies.push_back(f(octree));
@@ -89,17 +89,17 @@ struct Scene {
 
 /// Expects the answers of brute force, and those of points along the path. isBody: whether
 /// contains() answers. size: L, of all coordinates.
-Answer expectSamples(const Scene& scene, GeometryId body, bool isBody, const Positions& path,
+Answer expectSamples(const PathScene& scene, GeometryId body, bool isBody, const Positions& path,
                      double radius, double size = 5.0) {
   const SpatialQueries queries = scene.octree.queries(), truth = scene.bruteForce.queries();
   const Answer found = follow(queries, path, radius, {body}),
                expected = follow(truth, path, radius, {body});
   EXPECT_TRUE(std::equal(found.inside.begin(), found.inside.end(), expected.inside.begin(),
                          expected.inside.end(),
-                         [](const auto& a, const auto& b) { return isSame(a, b); }));
+                         [](const auto& a, const auto& b) { return isSamePart(a, b); }));
   EXPECT_TRUE(std::equal(found.outside.begin(), found.outside.end(), expected.outside.begin(),
                          expected.outside.end(),
-                         [](const auto& a, const auto& b) { return isSame(a, b); }));
+                         [](const auto& a, const auto& b) { return isSamePart(a, b); }));
   EXPECT_NE(found.inside.empty(), found.outside.empty());
 
   const Line line(path);
@@ -225,7 +225,7 @@ TEST(Path, AgreesWithSamplesForEveryGeometryType) {
   std::size_t intervals = 0, clearances = 0, index = 0;
   for (const auto& [geometry, isBody] : cases) {
     for (int round = 0; round < 40; ++round) {
-      Scene scene;
+      PathScene scene;
       const GeometryId body = scene.add(geometry);
       const double radius = round % 4 == 0 ? 0.0 : uniform(random, 0, 0.15);
       const Positions path = randomPath(random, round % 3 ? 0.7 : 2.0, 2 + round % 4);
@@ -244,7 +244,7 @@ TEST(Path, AgreesWithSamplesForEveryGeometryType) {
 TEST(Path, AgreesWithSamplesForTetrahedralMeshes) {
   Random random(302);
   const Solid solid = cells(3, random, [](const auto& at) { return at[0] + at[1] + at[2] != 3; });
-  Scene scene;
+  PathScene scene;
   const GeometryId body = scene.addBy([&](OctreeBasedCD& each) {
     return each.addTetrahedralMesh(solid.positions, solid.tetrahedra);
   });
@@ -262,7 +262,7 @@ TEST(Path, AgreesWithSamplesForFoldedTetrahedralMeshes) {
   const Solid solid = cells(2, random, [](const auto&) { return true; });
   std::size_t withoutElement = 0;
   for (int round = 0; round < 60; ++round) {
-    Scene scene;
+    PathScene scene;
     const GeometryId body = scene.addBy([&](OctreeBasedCD& each) {
       return each.addTetrahedralMesh(solid.positions, solid.tetrahedra);
     });
@@ -288,7 +288,7 @@ TEST(Path, AgreesWithSamplesForPlacedBodiesAndFarFromTheOrigin) {
   const TestGeometry ball = testGeometry(sphere(10, 14, {0.5, 0.5, 0.5}, 0.4));
   for (const double far : {0.0, 1e3, 1e7})
     for (int round = 0; round < 30; ++round) {
-      Scene scene;
+      PathScene scene;
       const GeometryId body = scene.add(ball);
       const Matrix3d turn = randomTurn(random);
       const Vector3d shift = far * Vector3d(1, -2, 0.3) + randomPoint(random, -1, 1);
@@ -324,7 +324,7 @@ TEST(Path, AgreesWithSamplesForEveryShape) {
   std::size_t intervals = 0, clearances = 0;
   for (const AnalyticalGeometry& shape : shapes)
     for (int round = 0; round < 40; ++round) {
-      Scene scene;
+      PathScene scene;
       const GeometryId body =
           scene.addBy([&](OctreeBasedCD& each) { return each.addAnalyticalGeometry(shape); });
       const Matrix3d turn = randomTurn(random);
@@ -499,7 +499,7 @@ TEST(Path, PathsThatTurnOnTheSurfaceEnterThere) {
   const Mesh ball = sphere(10, 14, {0.5, 0.5, 0.5}, 0.4);
   TestGeometry open = testGeometry(ball);
   open.triangles.erase(open.triangles.begin());
-  Scene scene;
+  PathScene scene;
   const GeometryId closed = scene.add(ball), holed = scene.add(open);
   const SpatialQueries queries = scene.octree.queries();
   for (int round = 0; round < 500; ++round) {
@@ -555,7 +555,7 @@ TEST(Path, OrdersIntervalsByEntryAndClearancesByBody) {
 
 TEST(Path, LongPathsAgreeWithBruteForce) {
   Random random(307);
-  Scene scene;
+  PathScene scene;
   for (const TestGeometry& geometry :
        {testGeometry(sphere(14, 20, {0.5, 0.5, 0.5}, 0.4)), testGeometry(sheet(10, 0.5, 0.0)),
         tapered(random, thread(random, 80, 0.1, 0.01, false), 0.03)})
@@ -568,7 +568,7 @@ TEST(Path, LongPathsAgreeWithBruteForce) {
     EXPECT_GT(found.inside.size(), 5u);
     ASSERT_EQ(found.inside.size(), truth.inside.size());
     for (std::size_t i = 0; i < found.inside.size(); ++i)
-      EXPECT_TRUE(isSame(found.inside[i], truth.inside[i])) << i;
+      EXPECT_TRUE(isSamePart(found.inside[i], truth.inside[i])) << i;
     ASSERT_EQ(found.outside.size(), truth.outside.size());
   }
 }
@@ -590,8 +590,8 @@ TEST(Path, BadCallsThrowErrorsThatNameThemAndChangeNothing) {
                   [&] { queries.path(along, radius, bodies, answer.inside, answer.outside); });
     ASSERT_EQ(answer.inside.size(), 1u);
     ASSERT_EQ(answer.outside.size(), 1u);
-    EXPECT_TRUE(isSame(answer.inside[0], before.inside[0]));
-    EXPECT_TRUE(isSame(answer.outside[0], before.outside[0]));
+    EXPECT_TRUE(isSamePart(answer.inside[0], before.inside[0]));
+    EXPECT_TRUE(isSamePart(answer.outside[0], before.outside[0]));
   };
   using enum ErrorCode;
   refused(InvalidSettings, "radius is -1", path, -1.0, {body});

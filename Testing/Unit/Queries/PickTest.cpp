@@ -13,8 +13,8 @@
 namespace palpate::testing {
 namespace {
 
-struct Scene {
-  explicit Scene(Engine engine) : collisions(settingsOf(engine)) {
+struct PickScene {
+  explicit PickScene(Engine engine) : collisions(settingsOf(engine)) {
     Random random(601);
     geometries = {testGeometry(sphere(10, 14, {0.3, 0.3, 0.5}, 0.25)),
                   thread(random, 60, 0.1, 0.02, false), particles(random, 60, 0.03),
@@ -67,7 +67,7 @@ void expectNearestFeatures(const Pick& pick, const TestGeometry& geometry, const
 }
 
 TEST(Pick, IsTheFirstHitOfAllGeometries) {
-  const Scene scene(Engine::Octree), bruteForce(Engine::BruteForce);
+  const PickScene scene(Engine::Octree), bruteForce(Engine::BruteForce);
   const SpatialQueries queries = scene.collisions.queries(),
                        truth = bruteForce.collisions.queries();
   Random random(602);
@@ -108,7 +108,7 @@ TEST(Pick, IsTheFirstHitOfAllGeometries) {
 }
 
 TEST(Pick, LinesAndPointsWithoutRadius) {
-  const Scene scene(Engine::Octree);
+  const PickScene scene(Engine::Octree);
   const SpatialQueries queries = scene.collisions.queries();
   const TestGeometry& line = scene.geometries[4];
   const auto& [p, q] = line.segments[7];

@@ -103,8 +103,8 @@ class AllQueries {
 };
 
 /// A closed ball, a shape, a line mesh and an open sheet.
-struct Scene {
-  Scene() {
+struct ErrorScene {
+  ErrorScene() {
     const Mesh whole = sphere(6, 8, {0, 0, 0}, 1), open = sheet(2, 0, 0);
     rest = whole.positions;
     ball = collisions.addTriangleMesh(whole.positions, whole.triangles);
@@ -122,7 +122,7 @@ struct Scene {
 using enum ErrorCode;
 
 TEST(QueryErrors, ValidCallsThrowNothing) {
-  const Scene scene;
+  const ErrorScene scene;
   const AllQueries all;
   const SpatialQueries queries = scene.collisions.queries();
   for (const auto& [name, takesShapes, call] : all.calls()) {
@@ -135,7 +135,7 @@ TEST(QueryErrors, ValidCallsThrowNothing) {
 }
 
 TEST(QueryErrors, UnknownAndRemovedGeometries) {
-  const Scene scene;
+  const ErrorScene scene;
   const AllQueries all;
   const SpatialQueries queries = scene.collisions.queries();
   for (const auto& [name, takesShapes, call] : all.calls()) {
@@ -148,7 +148,7 @@ TEST(QueryErrors, UnknownAndRemovedGeometries) {
 }
 
 TEST(QueryErrors, ShapesAndBodiesWithoutInside) {
-  const Scene scene;
+  const ErrorScene scene;
   const AllQueries all;
   const SpatialQueries queries = scene.collisions.queries();
   for (const auto& [name, takesShapes, call] : all.calls()) {
@@ -173,7 +173,7 @@ TEST(QueryErrors, ShapesAndBodiesWithoutInside) {
 }
 
 TEST(QueryErrors, OutdatedQueries) {
-  Scene scene;
+  ErrorScene scene;
   const AllQueries all;
   const SpatialQueries queries = scene.collisions.queries();
   scene.collisions.setPositions(scene.ball, scene.rest);
@@ -188,7 +188,7 @@ TEST(QueryErrors, OutdatedQueries) {
 }
 
 TEST(QueryErrors, Points) {
-  const Scene scene;
+  const ErrorScene scene;
   const SpatialQueries queries = scene.collisions.queries();
   const Vector3d good(0, 0, 0);
   std::vector<SurfacePoint> points(2);
@@ -241,7 +241,7 @@ TEST(QueryErrors, Points) {
 }
 
 TEST(QueryErrors, Rays) {
-  const Scene scene;
+  const ErrorScene scene;
   const SpatialQueries queries = scene.collisions.queries();
   std::vector<RayHit> hits(1), both(2);
   const auto refused = [&](ErrorCode code, const std::string& words, const Ray& ray) {
@@ -269,7 +269,7 @@ TEST(QueryErrors, Rays) {
 }
 
 TEST(QueryErrors, Shapes) {
-  const Scene scene;
+  const ErrorScene scene;
   const SpatialQueries queries = scene.collisions.queries();
   std::vector<std::uint32_t> elements{7};
   std::vector<ShapeContact> contacts(1);
@@ -298,7 +298,7 @@ TEST(QueryErrors, Shapes) {
 }
 
 TEST(QueryErrors, Batches) {
-  const Scene scene;
+  const ErrorScene scene;
   const SpatialQueries queries = scene.collisions.queries();
   std::vector<SurfacePoint> points(2);
   std::vector<SignedDistance> distances(2);

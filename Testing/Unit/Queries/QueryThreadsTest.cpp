@@ -16,8 +16,8 @@
 namespace palpate::testing {
 namespace {
 
-struct Scene {
-  explicit Scene(int threads) : collisions(settingsOf(Engine::Octree, threads)) {
+struct SharedScene {
+  explicit SharedScene(int threads) : collisions(settingsOf(Engine::Octree, threads)) {
     Random random(801);
     const Mesh ball = sphere(16, 24, {0.5, 0.5, 0.5}, 0.4), cloth = sheet(10, 0.5, 0);
     rest = ball.positions;
@@ -67,7 +67,7 @@ void append(std::vector<T>& all, const std::vector<T>& more) {
   all.insert(all.end(), more.begin(), more.end());
 }
 
-Answers ask(const Scene& scene, const SpatialQueries& queries) {
+Answers ask(const SharedScene& scene, const SpatialQueries& queries) {
   Answers all;
   std::vector<SurfacePoint> points;
   std::vector<RayHit> hits;
@@ -118,13 +118,13 @@ Answers ask(const Scene& scene, const SpatialQueries& queries) {
 }
 
 TEST(QueryThreads, ManyThreadsGetTheAnswersOfOne) {
-  const Scene alone(1);
+  const SharedScene alone(1);
   const Answers expected = ask(alone, alone.collisions.queries());
   EXPECT_GT(expected.hits.size(), alone.probes.size());
   EXPECT_GT(expected.elements.size(), alone.probes.size());
   EXPECT_GT(expected.contacts.size(), alone.probes.size());
   for (const int threads : {1, 3}) {
-    Scene scene(threads);
+    SharedScene scene(threads);
     for (int repeat = 0; repeat < 3; ++repeat) {
       std::vector<Answers> answers(4);
       {
@@ -141,7 +141,7 @@ TEST(QueryThreads, ManyThreadsGetTheAnswersOfOne) {
 
 /// Scratch and the caller's vectors keep their capacity.
 TEST(QueryAllocations, RepeatedSingleCallsAllocateNothing) {
-  const Scene scene(1);
+  const SharedScene scene(1);
   const SpatialQueries queries = scene.collisions.queries();
   std::vector<SurfacePoint> points;
   std::vector<RayHit> hits;

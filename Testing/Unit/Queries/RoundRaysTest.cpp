@@ -88,7 +88,7 @@ Depth depthOf(const PlacedShape& shape) {
 }
 
 /// The hits of a ray, consistent in all calls and both engines.
-std::vector<RayHit> consistentHits(const Both& both, const Ray& ray) {
+std::vector<RayHit> consistentHitsOfBalls(const Both& both, const Ray& ray) {
   const SpatialQueries fast = both.octree.queries(), truth = both.bruteForce.queries();
   std::vector<RayHit> hits, expected;
   fast.allHits(both.id, ray, hits);
@@ -107,7 +107,7 @@ std::vector<RayHit> consistentHits(const Both& both, const Ray& ray) {
 /// Expects hits on the surface, and the body between them. error: L.
 std::size_t expectBodyBetween(const Both& both, const Ray& ray, const Depth& depth, double length,
                               double error = 1e-9) {
-  const std::vector<RayHit> hits = consistentHits(both, ray);
+  const std::vector<RayHit> hits = consistentHitsOfBalls(both, ray);
   const auto at = [&](double t) -> Wide {
     return wide(ray.origin) + static_cast<long double>(t) * wide(ray.direction);
   };
@@ -183,7 +183,7 @@ TEST(RoundRays, OverlappingElementsAreOneBody) {
   const TestGeometry row{
       GeometryType::Points, {{0, 0, 0}, {1.5, 0, 0}, {3, 0, 0}, {10, 0, 0}}, {}, {}, {1.0}};
   const Both both(row);
-  const auto hits = consistentHits(both, {{-3, 0, 0}, {1, 0, 0}});
+  const auto hits = consistentHitsOfBalls(both, {{-3, 0, 0}, {1, 0, 0}});
   ASSERT_EQ(hits.size(), 4u);
   const double expected[] = {2, 7, 12, 14};
   const std::uint32_t elements[] = {0, 2, 3, 3};
@@ -194,14 +194,15 @@ TEST(RoundRays, OverlappingElementsAreOneBody) {
     EXPECT_TRUE(hits[i].crosses);
   }
   // From inside, with ends inside, between two bodies.
-  EXPECT_EQ(consistentHits(both, {{0, 0, 0}, {1, 0, 0}, 0, 5}).size(), 1u);
-  EXPECT_EQ(consistentHits(both, {{0, 0, 0}, {1, 0, 0}, 0, 3}).size(), 0u);
-  EXPECT_EQ(consistentHits(both, {{0, 0, 0}, {1, 0, 0}, 5, 8}).size(), 0u);
-  EXPECT_EQ(consistentHits(both, {{0, 0, 0}, {1, 0, 0}, 4, 9}).size(), 2u);  // both ends included
-  EXPECT_EQ(consistentHits(both, {{0, 5, 0}, {1, 0, 0}}).size(), 0u);
+  EXPECT_EQ(consistentHitsOfBalls(both, {{0, 0, 0}, {1, 0, 0}, 0, 5}).size(), 1u);
+  EXPECT_EQ(consistentHitsOfBalls(both, {{0, 0, 0}, {1, 0, 0}, 0, 3}).size(), 0u);
+  EXPECT_EQ(consistentHitsOfBalls(both, {{0, 0, 0}, {1, 0, 0}, 5, 8}).size(), 0u);
+  EXPECT_EQ(consistentHitsOfBalls(both, {{0, 0, 0}, {1, 0, 0}, 4, 9}).size(),
+            2u);  // both ends included
+  EXPECT_EQ(consistentHitsOfBalls(both, {{0, 5, 0}, {1, 0, 0}}).size(), 0u);
 }
 
-std::vector<PlacedShape> shapes(Random& random) {
+std::vector<PlacedShape> roundShapes(Random& random) {
   std::vector<PlacedShape> all;
   const auto add = [&](const AnalyticalGeometry& geometry) {
     all.push_back({geometry});
@@ -227,7 +228,7 @@ std::vector<PlacedShape> shapes(Random& random) {
 
 TEST(RoundRays, EnterAndLeaveShapes) {
   Random random(302);
-  for (const PlacedShape& shape : shapes(random)) {
+  for (const PlacedShape& shape : roundShapes(random)) {
     const Both both([&](OctreeBasedCD& each) {
       const GeometryId id = each.addAnalyticalGeometry(shape.geometry);
       each.setTransform(id, shape.rotation, shape.translation);
@@ -242,7 +243,7 @@ TEST(RoundRays, EnterAndLeaveShapes) {
       if (i % 4 == 3) ray.tMin = -1.0;
       if (i % 5 == 0) ray.direction = Vector3d::Unit(i % 3);
       hits += expectBodyBetween(both, ray, depth, 4.0);
-      for (const RayHit& hit : consistentHits(both, ray)) {
+      for (const RayHit& hit : consistentHitsOfBalls(both, ray)) {
         EXPECT_EQ(hit.element, kNoElement);
         EXPECT_TRUE(hit.crosses);
       }
@@ -256,20 +257,20 @@ TEST(RoundRays, PlanesWithTwoSidesHaveOneHit) {
   const Both both([](OctreeBasedCD& each) {
     return each.addAnalyticalGeometry(Plane{{0, 0, 1}, {0, 0, 2}, true});
   });
-  const auto down = consistentHits(both, {{0, 0, 3}, {0, 0, -1}}),
-             up = consistentHits(both, {{0, 0, 0}, {0, 0, 4}}),
-             along = consistentHits(both, {{0, 0, 1}, {1, 0, 0}}),
-             away = consistentHits(both, {{0, 0, 3}, {1, 0, 0}});
+  const auto down = consistentHitsOfBalls(both, {{0, 0, 3}, {0, 0, -1}}),
+             up = consistentHitsOfBalls(both, {{0, 0, 0}, {0, 0, 4}}),
+             along = consistentHitsOfBalls(both, {{0, 0, 1}, {1, 0, 0}}),
+             away = consistentHitsOfBalls(both, {{0, 0, 3}, {1, 0, 0}});
   ASSERT_TRUE(down.size() == 1 && up.size() == 1 && along.size() == 1);
   EXPECT_TRUE(down[0].t == 2 && down[0].frontFace && down[0].crosses);
   EXPECT_TRUE(up[0].t == 0.25 && !up[0].frontFace && up[0].crosses);
   EXPECT_TRUE(along[0].t == 0 && !along[0].crosses);
   EXPECT_TRUE(away.empty());
-  const auto point = consistentHits(both, {{0, 0, 1}, {1, 0, 0}, 1, 1});
+  const auto point = consistentHitsOfBalls(both, {{0, 0, 1}, {1, 0, 0}, 1, 1});
   ASSERT_EQ(point.size(), 1u);
   EXPECT_TRUE(point[0].t == 1 && !point[0].crosses);
   for (const double z : {-1, 1}) {  // from the plane: t is not -0
-    const auto from = consistentHits(both, {{0, 0, 1}, {0, 0, z}});
+    const auto from = consistentHitsOfBalls(both, {{0, 0, 1}, {0, 0, z}});
     ASSERT_EQ(from.size(), 1u);
     EXPECT_TRUE(from[0].t == 0 && !std::signbit(from[0].t) && from[0].crosses);
   }
@@ -287,7 +288,7 @@ TEST(RoundRays, FarAwayAndOfAnyLength) {
     const Vector3d target = 0.4 * randomPoint(random, -0.5, 0.5);
     for (const int exponent : {-900, 0, 300}) {
       const Ray ray{origin, std::ldexp(1.0, exponent) * (target - origin)};
-      const std::vector<RayHit> hits = consistentHits(both, ray);
+      const std::vector<RayHit> hits = consistentHitsOfBalls(both, ray);
       ASSERT_EQ(hits.size(), depth(wide(origin)) < 0 ? 1u : 2u);
       for (const RayHit& hit : hits) {
         const Vector3d at = std::ldexp(hit.t, exponent) * (target - origin) + origin;
@@ -307,12 +308,12 @@ TEST(RoundRays, StartsAndEndsOnSurfacesInsideOtherElements) {
       std::swap(balls.radii[0], balls.radii[1]);
     }
     const Both both(balls);
-    const auto hits = consistentHits(both, {{0, 0, 0}, {0, 0, 1}});
+    const auto hits = consistentHitsOfBalls(both, {{0, 0, 0}, {0, 0, 1}});
     ASSERT_EQ(hits.size(), 1u);
     EXPECT_TRUE(hits[0].t == 5 && !hits[0].frontFace && hits[0].crosses);
-    EXPECT_TRUE(consistentHits(both, {{0, 0, 1}, {0, 0, 1}, 0, 1}).empty());
-    EXPECT_TRUE(consistentHits(both, {{0, 0, 1}, {0, 0, 1}, 1, 1}).empty());
-    EXPECT_TRUE(consistentHits(both, {{0, 0, 0}, {0, 0, 1}, 1, 1}).empty());
+    EXPECT_TRUE(consistentHitsOfBalls(both, {{0, 0, 1}, {0, 0, 1}, 0, 1}).empty());
+    EXPECT_TRUE(consistentHitsOfBalls(both, {{0, 0, 1}, {0, 0, 1}, 1, 1}).empty());
+    EXPECT_TRUE(consistentHitsOfBalls(both, {{0, 0, 0}, {0, 0, 1}, 1, 1}).empty());
   }
 }
 
@@ -339,7 +340,7 @@ std::vector<Both> bodiesAboutTheOrigin() {
 TEST(RoundRays, NoHitsBeyondTheLargestDouble) {
   for (const Both& body : bodiesAboutTheOrigin()) {
     const auto hits = [&](const Vector3d& origin, double length) {
-      return consistentHits(body, {origin, {0, 0, -length}});
+      return consistentHitsOfBalls(body, {origin, {0, 0, -length}});
     };
     const Vector3d above(0, 0, 1e10), inside(0, 0, 0);
     EXPECT_EQ(hits(above, 1e-290).size(), hits(above, 1).size());
@@ -360,7 +361,7 @@ TEST(RoundRays, StartsAndEndsOnSurfaces) {
   for (std::size_t i = 0; i < std::size(bodies); ++i) {
     SCOPED_TRACE(i);
     const auto expectOne = [&](const Ray& ray, double t, bool frontFace) {
-      const auto hits = consistentHits(bodies[i], ray);
+      const auto hits = consistentHitsOfBalls(bodies[i], ray);
       ASSERT_EQ(hits.size(), 1u);
       EXPECT_TRUE(hits[0].t == t && hits[0].frontFace == frontFace && hits[0].crosses);
       EXPECT_EQ(bodies[i].octree.queries().pick(ray, true).has_value(), frontFace);
@@ -372,7 +373,7 @@ TEST(RoundRays, StartsAndEndsOnSurfaces) {
     expectOne({{0, 0, 3}, {0, 0, -1}, 2, 2}, 2, true);
     expectOne({{0, 0, 0}, {0, 0, 1}, 1, 1}, 1, false);
     if (i != 0 && i != 5) continue;
-    const auto touch = consistentHits(bodies[i], {{1, 0, 5}, {0, 0, -1}});
+    const auto touch = consistentHitsOfBalls(bodies[i], {{1, 0, 5}, {0, 0, -1}});
     ASSERT_EQ(touch.size(), 1u);
     EXPECT_TRUE(touch[0].t == 5 && !touch[0].crosses);
   }
@@ -406,8 +407,8 @@ TEST(RoundRays, AnyMagnitude) {
     const std::vector<Both> bodies = scaledBodies(s);
     for (std::size_t i = 0; i < bodies.size(); ++i)
       for (const Ray& ray : rays) {
-        const auto expected = consistentHits(unscaled[i], ray),
-                   hits = consistentHits(bodies[i], {s * ray.origin, s * ray.direction});
+        const auto expected = consistentHitsOfBalls(unscaled[i], ray),
+                   hits = consistentHitsOfBalls(bodies[i], {s * ray.origin, s * ray.direction});
         ASSERT_EQ(hits.size(), expected.size()) << exponent << ' ' << i;
         for (std::size_t k = 0; k < hits.size(); ++k)
           EXPECT_NEAR(hits[k].t, expected[k].t, 1e-14) << exponent << ' ' << i;
