@@ -75,7 +75,13 @@ printf '"file": "/p/Testing/Unit/Math/ATest.cpp"\n' >"$commands"
 printf '\n' >"$tree/Testing/Unit/Math/ATest.cpp"
 plant Tests Testing/Unit/Math/BTest.cpp '\n' "$commands" Unit
 plant Tests Testing/Unit/BTest.cpp '\n' "$commands" Unit -Unit/Math
-rm -r "$tree/Testing/Unit" "$commands"
+planted="a test in no batch"
+printf '"file": "%s/unity_0_cxx.cxx"\n' "$tree" >"$commands"
+printf '#include "/p/Testing/Unit/Math/ATest.cpp"\n' >"$tree/unity_0_cxx.cxx"
+expect holds Tests "$commands" Unit
+printf '\n' >"$tree/Testing/Unit/Math/BTest.cpp"
+expect fails Tests "$commands" Unit
+rm -r "$tree/Testing/Unit" "$commands" "$tree/unity_0_cxx.cxx"
 
 planted="a link that leads nowhere"
 printf '[b](b.md)\n' >"$tree/Examples/A.md"
