@@ -182,8 +182,8 @@ class FieldLookup {
     return mix(mix(mix(v[0], v[1], x), mix(v[2], v[3], x), y),
                mix(mix(v[4], v[5], x), mix(v[6], v[7], x), y), z);
   }
-  /// Comparisons, as the sign of a minimum or maximum of 0 and -0 is not defined: a band that is
-  /// far smaller than a unit is 0.
+  /// By comparisons: the sign of the minimum or maximum of 0 and -0 is not defined, and a band that
+  /// is far smaller than a unit is 0.
   double clamped(double value) const {
     if (value < -m_frame.band) return -m_frame.band;
     return value > m_frame.band ? m_frame.band : value;

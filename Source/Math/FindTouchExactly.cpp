@@ -80,8 +80,8 @@ struct PointAndSegment {
 /// not be there all the time.
 std::optional<double> firstZeroAfterStart(const Linear& point) {
   int k = 0;
-  while (isZero(point[k])) ++k;
-  PALPATE_ASSERT(k < 3);
+  while (k < 2 && isZero(point[k])) ++k;
+  PALPATE_ASSERT(!isZero(point[k]));
   const auto vanishes = [&](const auto& moment) {
     return moment.sign(point[0]) == 0 && moment.sign(point[1]) == 0 && moment.sign(point[2]) == 0;
   };
