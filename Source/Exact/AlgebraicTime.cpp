@@ -177,8 +177,8 @@ int CubicTime::sign(const Form<2>& form) const {
   const double error = kFormError;
   const double low = blossom(b, m_low, m_low), middle = blossom(b, m_low, m_high),
                high = blossom(b, m_high, m_high);
-  if (low > error && middle > error && high > error) return 1;
-  if (low < -error && middle < -error && high < -error) return -1;
+  if (std::min({low, middle, high}) > error) return 1;
+  if (std::max({low, middle, high}) < -error) return -1;
 
   int result = signs[2] != 0 ? signs[2] : signs[1];  // the sign beyond the last root
   const std::vector<QuadraticTime> roots = rootsInside(form);

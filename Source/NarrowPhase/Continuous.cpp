@@ -118,10 +118,10 @@ class ContactFinder {
     const std::array<Vector3d, 4> p = positionsAt(query, time);
     std::array<MeshFeature, 2> closestFeatures;
     if (m_pair.settings.earliestTimeOnly) m_out.facts.clearance = 0.0;
-    const auto isSuppressed = [&](const auto& closest, const Vector3d& normal, bool rejected) {
+    const auto isSuppressed = [&](const auto& closest, const Vector3d& direction, bool rejected) {
       if (store) m_check.recordImpact(features, firstId, secondId, time, closest.distance);
       return rejected || ((m_pair.a.outerSideOnly || m_pair.b.outerSideOnly) &&
-                          pointsInward(m_pair, closestFeatures, swapped ? -normal : normal, time));
+                          pointsInward(m_pair, closestFeatures, direction, time));
     };
     if constexpr (kind == Kind::VertexTriangle) {
       const MeshTopology& topology = features.second.topology;
@@ -132,7 +132,8 @@ class ContactFinder {
       complete(contact, query, time, p);
       closestFeatures[swapped] = {MeshFeature::Kind::Vertex, firstId};
       closestFeatures[!swapped] = featureOf(topology, secondId, closest.feature);
-      if (isSuppressed(closest, contact.normal, rejectsVertex(m_pair, firstId, secondId, swapped)))
+      const Vector3d direction = swapped ? -contact.normal : contact.normal;
+      if (isSuppressed(closest, direction, rejectsVertex(m_pair, firstId, secondId, swapped)))
         return false;
       if (!store) return true;
       (swapped && !m_pair.self() ? m_out.triangleVertex : m_out.vertexTriangle).push_back(contact);

@@ -140,7 +140,6 @@ class IntersectionContacts {
 
 TriangleIntersection intersectionOf(const MeshPair& pair, const MeshTriangle& a,
                                     const MeshTriangle& b, SignCounts& counts) {
-  if (pair.self() && a.id == b.id) return {};
   return intersectTriangles(a.positions, b.positions, counts,
                             pair.self() ? featuresInCommon(a, b) : ExcludedFeatures());
 }

@@ -95,10 +95,8 @@ bool StepCheck::proximitySuffices(const Features<kind>& features, std::uint32_t 
   else
     distance = finiteEdgeEdgeDistance(at(0), at(1), at(2), at(3)).distance;
   if (distance > m_pair.thicknessAtEnd()) return false;
-  // With Distinct, edges whose closest points are ends were measured only up to
-  // checkedEdgeDistance().
-  return distance > motion || kind == Kind::VertexTriangle ||
-         m_pair.settings.contacts != Contacts::Distinct;
+  // Edges whose closest points are ends were measured only up to checkedEdgeDistance().
+  return distance > motion || kind == Kind::VertexTriangle;
 }
 
 void StepCheck::recordTriangle(std::uint32_t triangle, bool isOfB, const Vector3d& a,

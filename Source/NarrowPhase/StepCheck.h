@@ -37,8 +37,8 @@ class StepCheck {
   bool addImpactIfTouched(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId,
                           bool swapped, double distance);
 
-  /// Auto: whether proximity at the step's end suffices for a feature pair, so that no impact has
-  /// to be computed.
+  /// Auto with Contacts::Distinct: whether proximity at the step's end suffices for a feature pair,
+  /// so that no impact has to be computed.
   template <ImpactQuery::Kind kind>
   bool proximitySuffices(const Features<kind>&, std::uint32_t firstId,
                          std::uint32_t secondId) const;

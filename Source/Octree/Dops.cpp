@@ -75,9 +75,7 @@ static_assert(areHalvesOrOnes(kTriples14.span()) && areHalvesOrOnes(kTriples18.s
 
 }  // namespace
 
-int directionCount(OctreeBounds bounds) {
-  return bounds == OctreeBounds::Dop14 ? 7 : bounds == OctreeBounds::Dop18 ? 9 : 3;
-}
+int directionCount(OctreeBounds bounds) { return bounds == OctreeBounds::Dop14 ? 7 : 9; }
 
 std::span<const DopDirection> dopDirections(int count) {
   return count == 7 ? std::span<const DopDirection>(kDop14)

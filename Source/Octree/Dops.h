@@ -19,7 +19,7 @@ namespace palpate {
 using DopDirection = std::array<double, 3>;
 constexpr int kMostDirections = 9;
 
-int directionCount(OctreeBounds);                        ///< 3, 7 or 9
+int directionCount(OctreeBounds);                        ///< of k-DOPs: 7 or 9
 std::span<const DopDirection> dopDirections(int count);  ///< count: 3, 7 or 9
 
 /// The bounds of an octree's elements and nodes along the directions after the axes, beside its

@@ -21,7 +21,7 @@ struct LooseOctree::State {
     std::size_t otherBytes;       ///< memory of the geometry's floats
     std::uint32_t firstNode = 0;  ///< node ids of this tree start here
   };
-  CountedVector<Tree> trees;  ///< by ascending geometry id; only trees with elements
+  CountedVector<Tree> trees;  ///< by ascending geometry id; only built trees with elements
 };
 
 /// Describes each invariant that does not hold in a sentence. cells: also check that elements are

@@ -21,13 +21,6 @@ const Tree* treeOf(const LooseOctree::State& state, GeometryId geometry) {
   return found == state.trees.end() ? nullptr : &*found;
 }
 
-/// Calls f(tree) for each tree with nodes. A tree whose last update failed has none.
-template <class F>
-void forEachTree(const LooseOctree::State& state, F&& f) {
-  for (const Tree& tree : state.trees)
-    if (tree.octree->isBuilt()) f(tree);
-}
-
 /// Calls f(node, depth) for each node in use, parents before children.
 template <class F>
 void forEachNode(const Octree& octree, OctreeNode node, int depth, F&& f) {
@@ -61,7 +54,7 @@ CellOfNode cellOf(const Octree& octree, OctreeNode node) {
 
 std::vector<LooseOctree::NodeId> LooseOctree::nodes(GeometryId geometry) const {
   std::vector<NodeId> ids;
-  if (const Tree* tree = treeOf(*m_state, geometry); tree && tree->octree->isBuilt())
+  if (const Tree* tree = treeOf(*m_state, geometry))
     forEachNode(*tree->octree, 0, 0,
                 [&](OctreeNode node, int) { ids.push_back(NodeId{tree->firstNode + node}); });
   return ids;
@@ -76,7 +69,7 @@ std::vector<LooseOctree::NodeId> LooseOctree::nodes() const {
 
 std::optional<LooseOctree::NodeId> LooseOctree::root(GeometryId geometry) const {
   const Tree* tree = treeOf(*m_state, geometry);
-  return tree && tree->octree->isBuilt() ? std::optional(NodeId{tree->firstNode}) : std::nullopt;
+  return tree ? std::optional(NodeId{tree->firstNode}) : std::nullopt;
 }
 
 LooseOctree::Node LooseOctree::node(NodeId id) const {
@@ -91,7 +84,7 @@ LooseOctree::Node LooseOctree::node(NodeId id) const {
   const Tree& tree = *std::prev(next);
   const Octree& octree = *tree.octree;
   const OctreeNode node = index - tree.firstNode;
-  if (!octree.isBuilt() || node >= octree.pool().used() * 8 || octree.isEmpty(node))
+  if (node >= octree.pool().used() * 8 || octree.isEmpty(node))
     throw Error(ErrorCode::IndexOutOfRange,
                 "octree node " + std::to_string(index) + " does not exist or is empty");
   const auto [cube, depth] = cellOf(octree, node);
@@ -127,7 +120,7 @@ LooseOctree::Update LooseOctree::lastUpdate(GeometryId geometry) const {
 
 OctreeStatistics LooseOctree::statistics() const {
   OctreeStatistics statistics;
-  forEachTree(*m_state, [&](const Tree& tree) {
+  for (const Tree& tree : m_state->trees) {
     const Octree& octree = *tree.octree;
     statistics.blocksInUse += octree.pool().used();
     statistics.blocksFree += octree.pool().free();
@@ -148,7 +141,7 @@ OctreeStatistics LooseOctree::statistics() const {
       statistics.maxElementsInNode =
           std::max<std::size_t>(statistics.maxElementsInNode, end - begin);
     });
-  });
+  }
   statistics.nodesAllocated = 8 * statistics.blocksAllocated;
   return statistics;
 }

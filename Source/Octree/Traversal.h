@@ -85,8 +85,8 @@ struct TreePair {
   /// For a rigid body that was moved, the map that brings the tree's boxes into the world. mapA
   /// then replaces the shift. Not used for one tree with itself.
   BoxMap mapA{}, mapB{};
-  /// If it has ends: the map of a's k-DOPs into the frame of b's, which are compared instead of
-  /// boxes. mapA and mapB are then not used. Not used for one tree with itself.
+  /// If it has ends, as mapA or mapB then has: the map of a's k-DOPs into the frame of b's, which
+  /// are compared instead of boxes. Not used for one tree with itself.
   DopMap dops{};
   bool swapped = false;  ///< with `dops`: each element pair names b's element first
 
@@ -95,7 +95,7 @@ struct TreePair {
   /// not comparable. Not used for one tree with itself.
   bool isClamped = false;
 
-  bool isMapped() const { return mapA.count > 0 || mapB.count > 0 || dops.count > 0 || isClamped; }
+  bool isMapped() const { return mapA.count > 0 || mapB.count > 0 || isClamped; }
   bool isShifted() const {
     const std::array<float, 4> none{};
     return shiftLower != none || shiftUpper != none;

@@ -107,6 +107,31 @@ std::set<std::array<std::uint32_t, 5>> idsOf(const CollisionData& data) {
   return ids;
 }
 
+/// Squares of motions have no normal double there.
+TEST(Auto, HasTheSameContactsAtATinyScale) {
+  constexpr double kScale = 0x1p-480;
+  Random random(14);
+  std::size_t found = 0, mixed = 0;
+  for (int i = 0; i < casesOf(60); ++i) {
+    Case c = randomCase(random, 0.0005, 0.03, 0.1);
+    const auto detect = [&](double thickness) {
+      const PairSettings settings{
+          .method = Method::Auto, .thickness = thickness, .motionTolerance = 2 * thickness};
+      PairRun run(settingsOf(Engine::Octree), c.a, c.b, settings, false);
+      run.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
+      mixed += run.data().validity().reason == MethodReason::Mixed;
+      return idsOf(run.data());
+    };
+    const auto ids = detect(kThickness);
+    for (auto* positions : {&c.a.positions, &c.aNow, &c.b.positions, &c.bNow})
+      for (Vector3d& p : *positions) p *= kScale;
+    EXPECT_EQ(detect(kThickness * kScale), ids) << i;
+    found += ids.size();
+  }
+  EXPECT_GT(found, 1000u / kShareOfCases);
+  EXPECT_GT(mixed, 40u / kShareOfCases);
+}
+
 TEST(Auto, FindsEverythingThatContinuousFinds) {
   Random random(12);
   std::size_t found = 0;

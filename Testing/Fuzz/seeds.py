@@ -84,9 +84,9 @@ def vtp():
     for name, packed in (("ZLib", zlib.compress(coordinates)), ("LZMA", lzma.compress(coordinates)), ("LZ4", lz4)):
         block = struct.pack("<4I", 1, 36, 0, len(packed)) + packed
         yield name.lower(), file(appended, f' compressor="vtk{name}DataCompressor"', raw.format(block.decode("latin1")))
-    packed = zlib.compress(bytes(300_000))
-    block = struct.pack("<4I", 1, 300_000, 0, len(packed)) + packed
-    share = piece(array("Points", "UInt8", "appended", "", 0), *cells, count=100_000)
+    packed = zlib.compress(bytes(300))
+    block = struct.pack("<4I", 1, 300, 0, len(packed)) + packed
+    share = piece(array("Points", "UInt8", "appended", "", 0), *cells, count=100)
     yield "shared-block", file(share * 12, ' compressor="vtkZLibDataCompressor"', raw.format(block.decode("latin1")))
     yield "pieces", file(repeated("<Piece ") + "</Piece>")
 

@@ -133,7 +133,7 @@ def configure(tree, build, library):
     headers.write_text(''.join(f'#include <{h}>\n' for h in [
         'gtest/gtest.h', 'Eigen/Core', 'Eigen/Geometry', 'algorithm', 'array', 'cmath', 'functional', 'map', 'memory',
         'random', 'set', 'span', 'string', 'vector']))
-    text = f"""flags = {FLAGS} -I{tree}/Source -I{tree}/Source/Public -I{testing} {packages} $
+    text = f"""flags = {FLAGS} -I{tree}/Source -I{tree}/Source/Public -I{testing} -I{ROOT}/Examples/Common {packages} $
   -DPALPATE_SHARED_DATA='"{data}"' -DPALPATE_SOURCE_DIR='"{ROOT}"'
 rule precompile
   command = c++ $flags -x c++-header -c $in -o $out

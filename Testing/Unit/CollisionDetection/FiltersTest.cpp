@@ -280,12 +280,16 @@ std::vector<std::vector<double>> restDistances(const Mesh& mesh) {
 TEST(Filters, RestDistanceExcludesNeighboursAlongTheSurface) {
   Random random(3);
   std::size_t left = 0, out = 0;
-  for (const PairSettings& pair : everyMethod(0.15)) {
+  std::vector<PairSettings> pairs = everyMethod(0.15);
+  pairs.push_back({.method = Method::Intersection, .restDistance = 0.01});
+  for (const PairSettings& pair : pairs) {
     Case c = sheetsInContact(random, true);
     for (Vector3d& p : c.nowA) p[0] = 0.5 * p[0] + 0.2 * p[1] * p[1];  // crumpled
+    if (pair.method == Method::Intersection) c.nowA = movedRandomly(random, c.nowA, 0.3);
     c.pair = pair;
+    c.pair.restDistance = 0.0;
     const Answer all = answer(settingsOf(Engine::Octree), c);
-    const double restDistance = c.pair.restDistance = 0.31;
+    const double restDistance = c.pair.restDistance = pair.restDistance > 0 ? 0.01 : 0.31;
     const Answer found = truth(c);
     EXPECT_TRUE(all.validity.trusted || !found.validity.trusted);
     const auto d = restDistances(c.a);
@@ -319,6 +323,9 @@ TEST(Filters, RestDistanceExcludesNeighboursAlongTheSurface) {
       if (isFar({s[0], s[1], s[2]}, {t[0], t[1], t[2]})) expected.push_back(p);
     }
     EXPECT_EQ(found.rows.intersectingTriangles, expected);
+    if (pair.method == Method::Intersection) {
+      EXPECT_TRUE(!expected.empty() && expected.size() < all.rows.intersectingTriangles.size());
+    }
   }
   EXPECT_GT(left, 200u);
   EXPECT_GT(out, 200u);

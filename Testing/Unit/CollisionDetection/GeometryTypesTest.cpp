@@ -379,6 +379,13 @@ TEST(GeometryTypes, ThinEndOfATaperDoesNotSuppressItsThickEnd) {
   const TestGeometry drop{GeometryType::Points, {{0, 0, 1.125}}, {}, {}, {0}};
   const CollisionData data = answer(drop, spindle, {Method::Proximity, 0.5, Contacts::Distinct});
   EXPECT_EQ(data.vertexTriangle().size(), 2u);
+  // The first segment falls away, and the second is nearer only where it is thin.
+  spindle.positions[0][2] = -0.5;
+  const CollisionData onVertex =
+      answer(drop, spindle, {Method::Proximity, 0.2, Contacts::Distinct});
+  ASSERT_EQ(onVertex.vertexTriangle().size(), 1u);
+  EXPECT_EQ(onVertex.vertexTriangle()[0].triangle, 0u);
+  EXPECT_EQ(onVertex.vertexTriangle()[0].distance, 0.125);
   const TestGeometry far = lineOf({{-2, 0, 0.5}, {0, 0, 0}, {2, 0, 0.5}}, 0.625);
   EXPECT_EQ(answer(drop, far, {Method::Proximity, 0.5, Contacts::Distinct}).vertexTriangle().size(),
             2u);

@@ -189,6 +189,7 @@ std::size_t expectAsPositions(Random& random, const TestGeometry& body, const Te
     }
     EXPECT_TRUE(std::includes(truth.candidates().begin(), truth.candidates().end(),
                               candidates.begin(), candidates.end()));
+    for (std::size_t i = 0; i < rigid.size(); i += 2) rigid[i].collisions().releaseMemory();
   }
   return contacts;
 }

@@ -257,6 +257,43 @@ TEST(Sidedness, TrianglesWithoutAreaHaveNoSides) {
   EXPECT_GT(contacts, leastOf(500));
 }
 
+/// One edge with any number of triangles, and a segment across a direction from it.
+TEST(Sidedness, EdgesOfOneOrThreeTrianglesAreBelowIfAllAre) {
+  Random random(6);
+  int kept[4] = {}, suppressed[4] = {};
+  for (int run = 0; run < 400; ++run) {
+    const int count = std::array{0, 1, 3}[static_cast<std::size_t>(run % 3)];
+    Mesh fan{{{0, 0, -1}, {0, 0, 1}}, {{0, 1, 1}}};  // without area
+    for (int t = 0; t < count; ++t) {
+      const double angle = uniform(random, 0, 6.28);
+      const auto corner = static_cast<std::uint32_t>(fan.positions.size());
+      fan.positions.push_back({std::cos(angle), std::sin(angle), 0});
+      fan.triangles.push_back(random() % 2 ? Triangle{0, 1, corner} : Triangle{1, 0, corner});
+    }
+    const double angle = uniform(random, 0, 6.28);
+    const Vector3d direction(std::cos(angle), std::sin(angle), 0),
+        across(-direction.y(), direction.x(), 0);
+    const auto hasContact = [&](const Vector3d& middle, const Vector3d& end) {
+      const Positions ends{middle - end, middle + end};
+      const CollisionData data =
+          answer(settingsOf(Engine::Octree), fan, {ends, ends, {{0, 1}}},
+                 {Method::Proximity, 0.125, Contacts::All}, Sidedness::Outer);
+      return std::ranges::any_of(data.edgeEdge(), [](const EdgeEdgeContact& c) {
+        return c.edgeA == Segment{0, 1};
+      });
+    };
+    int below = 0;
+    for (std::uint32_t t = 1; t < fan.triangles.size(); ++t)
+      below += normalOf(fan, t).dot(direction) < 0;
+    const bool expected = count == 0 || below < count;
+    EXPECT_EQ(hasContact(0.1 * direction, 0.01 * across), expected) << run;
+    ++(expected ? kept : suppressed)[count];
+    EXPECT_TRUE(hasContact({0, 0, 0}, {0.25, 0, 0}));  // touching edges have no direction
+  }
+  EXPECT_TRUE(kept[0] > 50 && kept[1] > 50 && suppressed[1] > 50);
+  EXPECT_TRUE(kept[3] > 50 && suppressed[3] > 10);
+}
+
 TEST(Sidedness, ThinOrganIsTouchedFromOneSide) {
   // A closed slab 0.1 thick. One probe is 0.05 above it, one below. The thickness is 1.
   const Mesh slab{{{-4, -4, 0},

@@ -171,6 +171,23 @@ TEST(AlgebraicTime, LowerBoundsOfTimesAreWithinTheTolerance) {
   }
 }
 
+/// A root next to 1, whose time is next to a half: beside it by less than a double resolves.
+TEST(AlgebraicTime, LowerBoundsAreNotLateNextToADouble) {
+  for (int exponent = 60; exponent < 120; exponent += 5) {
+    const Integer p = Integer(1) << exponent;
+    // x² - 2p x + 2p - 2 has the lower root p - √((p - 1)² + 1) < 1.
+    const std::vector<QuadraticTime> below = rootsInside(Form<2>{2 * p - 2, -2 * p, 1});
+    ASSERT_EQ(below.size(), 2u);
+    EXPECT_LT(below[0].timeLowerBound(), 0.5);
+    EXPECT_GE(below[0].timeLowerBound(), 0.5 - 0x1p-51);
+    // x² + 2p x - 2p - 2 has the root √((p + 1)² + 1) - p > 1.
+    const std::vector<QuadraticTime> above = rootsInside(Form<2>{-2 * p - 2, 2 * p, 1});
+    ASSERT_EQ(above.size(), 1u);
+    EXPECT_LE(above[0].timeLowerBound(), 0.5);
+    EXPECT_GE(above[0].timeLowerBound(), 0.5 - 0x1p-51);
+  }
+}
+
 /// A quadratic that vanishes at the cubic's root, beside one that differs from it by one part in
 /// 2^160, far below what floating point resolves.
 TEST(AlgebraicTime, SignsNextToACubicRootAreExact) {

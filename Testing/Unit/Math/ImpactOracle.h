@@ -14,8 +14,8 @@
 
 /// A slow decision of continuous detection by other methods than the library's: polynomials with
 /// whole coefficients in the power basis, roots by Descartes' rule of signs and Sturm sequences,
-/// signs at roots by greatest common divisors and bisection, and formulas of degree four. It shares
-/// no code with Source/.
+/// signs at roots by greatest common divisors and quadratic interval refinement, and formulas of
+/// degree four. It shares no code with Source/.
 namespace palpate::impact {
 
 using Integer = mpz_class;
@@ -161,6 +161,7 @@ inline int rootCount(const Polynomial& p, const Rational& low, const Rational& h
 struct Real {
   Polynomial p;
   Rational low, high;
+  int partBits = 2;
 
   /// Whether it is at most t, in (low, high]. p changes its sign at the root, unless it has a root
   /// at low, too.
@@ -168,21 +169,36 @@ struct Real {
     const int start = signAt(p, low), there = signAt(p, t);
     return start == 0 ? rootCount(p, low, t) == 1 : there != start;
   }
-  void halve() {
+  /// Shortens the interval, by quadratic interval refinement: a secant names one of 2^partBits
+  /// parts, and partBits doubles as long as the root is in it.
+  void refine() {
+    const Rational start = valueAt(p, low), end = valueAt(p, high);
+    if (start != 0) {
+      const Rational at = (start / (start - end)) << partBits;
+      const Integer part = (at.get_num() - 1) / at.get_den();  // the root may be its upper end
+      const Rational width = (high - low) >> partBits, from = low + width * part;
+      if (!isAtMost(from) && isAtMost(from + width)) {
+        low = from;
+        high = from + width;
+        partBits *= 2;
+        return;
+      }
+    }
+    partBits = std::max(partBits / 2, 2);
     const Rational middle = (low + high) / 2;
     (isAtMost(middle) ? high : low) = middle;
   }
   int sign(const Polynomial& q) {
     if (p.empty()) return signAt(q, low);
     if (q.empty()) return 0;
-    for (int i = 0; i < 12; ++i) {
-      if (const int sign = i % 4 == 0 ? commonSign(bernstein(q, low, high)) : 0) return sign;
-      halve();
+    for (;; refine()) {
+      if (const int sign = commonSign(bernstein(q, low, high))) return sign;
+      if (partBits > 16) break;  // a short interval: q may be 0 there
     }
     const Polynomial common = commonDivisor(p, q);
     if (common.size() > 1 && rootCount(common, low, high) == 1) return 0;
     for (;;) {
-      halve();
+      refine();
       if (const int sign = commonSign(bernstein(q, low, high))) return sign;
     }
   }
@@ -356,19 +372,20 @@ class Query {
   static bool isBefore(Real l, Real r) {
     if (r.p.empty()) return l.compare(r.low) < 0;
     if (l.p.empty()) return r.compare(l.low) > 0;
-    // Roots are equal if a common factor has a root in both intervals. Otherwise bisection
-    // separates them.
+    // Roots are equal if a common factor has a root in both intervals. Others are separated.
     Polynomial common;
-    for (int i = 0;; ++i) {
+    for (bool isKnown = false;;) {
       if (l.high <= r.low) return true;
       if (r.high <= l.low) return false;
-      if (i == 8) common = commonDivisor(l.p, r.p);
+      if (!isKnown && std::max(l.partBits, r.partBits) > 16) {
+        common = commonDivisor(l.p, r.p);
+        isKnown = true;
+      }
       if (common.size() > 1) {
         const Rational low = std::max(l.low, r.low), high = std::min(l.high, r.high);
         if (low < high && rootCount(common, low, high) > 0) return false;
       }
-      l.halve();
-      r.halve();
+      (l.high - l.low > r.high - r.low ? l : r).refine();
     }
   }
 

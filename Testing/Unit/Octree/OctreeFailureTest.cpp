@@ -202,41 +202,49 @@ TEST_P(OctreeFailure, NextUpdateCompletesAFailedOne) {
   }
 }
 
-/// An octree whose update failed has no nodes. Those of other geometries are as before.
+/// An octree whose first update, or first update of new triangles, failed has no nodes. Those of
+/// other geometries are as before.
 TEST_P(OctreeFailure, OctreesWithoutNodesAreListedAsEmpty) {
   Random random(25);
   const testing::Mesh first = testing::soup(random, 200, 0.1),
                       second = testing::soup(random, 60, 0.1);
-  std::size_t without = 0;
-  for (std::size_t n = 1;; ++n) {
-    SCOPED_TRACE(n);
-    OctreeBasedCD detection(Settings{.threads = GetParam()});
-    const GeometryId ids[] = {detection.addTriangleMesh(first.positions, first.triangles),
-                              detection.addTriangleMesh(second.positions, second.triangles)};
-    FailingAllocation::arm(n);
-    bool threw = false;
-    try {
-      detection.update();
-    } catch (const std::bad_alloc&) {
-      threw = true;
+  for (const bool wasUpdated : {false, true}) {
+    std::size_t without = 0;
+    for (std::size_t n = 1;; ++n) {
+      SCOPED_TRACE(n);
+      OctreeBasedCD detection(Settings{.threads = GetParam()});
+      const GeometryId ids[] = {detection.addTriangleMesh(first.positions, first.triangles),
+                                detection.addTriangleMesh(second.positions, second.triangles)};
+      if (wasUpdated) {
+        detection.update();
+        detection.setTriangles(ids[0], second.positions, second.triangles);
+        detection.setTriangles(ids[1], first.positions, first.triangles);
+      }
+      FailingAllocation::arm(n);
+      bool threw = false;
+      try {
+        detection.update();
+      } catch (const std::bad_alloc&) {
+        threw = true;
+      }
+      FailingAllocation::disarm();
+      const LooseOctree& octree = detection.octree();
+      std::size_t nodes = 0;
+      for (const GeometryId id : ids) {
+        const std::size_t own = octree.nodes(id).size();
+        EXPECT_EQ(octree.root(id).has_value(), own > 0);
+        without += own == 0;
+        nodes += own;
+      }
+      EXPECT_EQ(octree.nodes().size(), nodes);
+      EXPECT_TRUE(octree.validate().empty());
+      if (nodes == 0) {
+        EXPECT_THROW(octree.node(LooseOctree::NodeId{0}), Error);
+      }
+      if (!threw) break;
     }
-    FailingAllocation::disarm();
-    const LooseOctree& octree = detection.octree();
-    std::size_t nodes = 0;
-    for (const GeometryId id : ids) {
-      const std::size_t own = octree.nodes(id).size();
-      EXPECT_EQ(octree.root(id).has_value(), own > 0);
-      without += own == 0;
-      nodes += own;
-    }
-    EXPECT_EQ(octree.nodes().size(), nodes);
-    EXPECT_TRUE(octree.validate().empty());
-    if (nodes == 0) {
-      EXPECT_THROW(octree.node(LooseOctree::NodeId{0}), Error);
-    }
-    if (!threw) break;
+    EXPECT_GT(without, 0u);
   }
-  EXPECT_GT(without, 0u);
 }
 
 static_assert(!std::is_copy_constructible_v<LooseOctree> &&
