@@ -82,6 +82,7 @@ struct FieldFrame {
       : toUnits(std::ldexp(1.0, -cells.exponent)),
         unit(std::ldexp(1.0, cells.exponent)),
         band(cells.band * toUnits) {
+    if (band * unit > cells.band) band = std::nextafter(band, 0.0);  // a denormal, rounded up
     for (std::size_t k = 0; k < 3; ++k) {
       origin[k] = static_cast<double>(cells.origin[k]) * unit;
       size[k] = cells.size[k];

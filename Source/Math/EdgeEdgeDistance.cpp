@@ -167,15 +167,20 @@ class EndFeet {
 
   double weightA(int i) const { return i < 2 ? static_cast<double>(i) : m_ends[i].foot.s; }
   double weightB(int i) const { return i < 2 ? m_ends[i].foot.s : static_cast<double>(i - 2); }
+  std::array<EdgeFeature, 2> features(int i) const {
+    const EdgeFeature own = static_cast<EdgeFeature>(i % 2), other = m_ends[i].feature;
+    return i < 2 ? std::array{own, other} : std::array{other, own};
+  }
 
   /// The index of the nearest end. tied: set if another pair of points is equally near, within
-  /// rounding.
+  /// rounding. Pairs are compared by their features, because the weight of a point inside an edge
+  /// may round to that of an end.
   int nearest(bool& tied) const {
     int nearest = 0;
     for (int i = 1; i < 4; ++i)
       if (distance(i) < distance(nearest)) nearest = i;
     for (int i = 0; i < 4; ++i) {
-      const bool samePair = weightA(i) == weightA(nearest) && weightB(i) == weightB(nearest);
+      const bool samePair = features(i) == features(nearest);
       tied = tied || (!samePair && distance(i) <= kTie * distance(nearest));
     }
     return nearest;
@@ -190,19 +195,14 @@ class EndFeet {
   }
 
   EdgeEdgeDistance answer(int i) const {
-    const auto& [foot, feature] = m_ends[i];
+    const Foot& foot = m_ends[i].foot;
+    const auto [featureA, featureB] = features(i);
     const double turn = i < 2 ? 1.0 : -1.0;
     const Vector3d normal =
         foot.distance == 0.0 ? crossingNormal(m_edges) : Vector3d(turn * foot.direction);
-    return {weightA(i),
-            weightB(i),
-            turn * foot.difference,
-            normal,
-            foot.distance,
-            i < 2 ? static_cast<EdgeFeature>(i) : feature,
-            i < 2 ? feature : static_cast<EdgeFeature>(i - 2),
-            false,
-            foot.exact};
+    return {weightA(i), weightB(i),    turn * foot.difference,
+            normal,     foot.distance, featureA,
+            featureB,   false,         foot.exact};
   }
 
   /// Whether the foot of each end is on the other edge. Parallel edges share the interval between

@@ -10,6 +10,7 @@
 
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <limits>
@@ -140,6 +141,37 @@ TEST(ClosestPoint, NearlyTiedEndsOfParallelEdgesAreDecidedExactly) {
       {Vector3d(1, -3848290697215, 1), Vector3d(-0x1p-414, -3848290697215, 1), none, none});
   checkEdgeEdge(
       {Vector3d(9000, 0x1p45, 0), Vector3d(1, 0x1p45, 0), Vector3d(-3, 0, 0), Vector3d(-2, 0, 0)});
+}
+
+/// Found by fuzzing: the foot of q's end is inside p, but so near to p's end that its weight rounds
+/// to 1, and the distances to both are equal within rounding. The difference is to the foot: it is
+/// right to 2^-50 of its length, also across the direction to the end.
+TEST(ClosestPoint, FeetNextToAnEndHaveTheirOwnDifference) {
+  for (int exponent = 20; exponent < 45; ++exponent) {
+    const double height = std::ldexp(1.0, -exponent);
+    const Vector3d p0 = Vector3d::Zero(), p1(0, 1.75, 1.25 * height), q0(0, 1.75, 0),
+                   q1(0, 1.75, height);
+    const EdgeEdgeDistance forward = edgeEdgeDistance(p0, p1, q0, q1),
+                           swapped = edgeEdgeDistance(q0, q1, p0, p1);
+    // (0, -1.25 h, 1.75) is perpendicular to p, and h / 4 is the height of p1 over q1.
+    const double along = 1.75 * (height / 4) / (1.75 * 1.75 + 1.5625 * height * height);
+    const Vector3d expected = along * Vector3d(0, -1.25 * height, 1.75);
+    EXPECT_LE((forward.difference - expected).norm(), 0x1p-50 * expected.norm()) << exponent;
+    EXPECT_LE((swapped.difference + expected).norm(), 0x1p-50 * expected.norm()) << exponent;
+    EXPECT_LT(std::abs(forward.difference[1] / expected[1] - 1.0), 0x1p-20) << exponent;
+    checkEdgeEdge({p0, p1, q0, q1});
+  }
+}
+
+/// Edges that share an end are so nearly parallel that another end's distance is computed as 0.
+TEST(ClosestPoint, CommonEndsAreNearest) {
+  constexpr double kLeast = std::numeric_limits<double>::denorm_min();
+  const Vector3d common = Vector3d::Zero(), p(1, kLeast, 0), q(4, 3 * kLeast, 0);
+  for (const Four& x :
+       {Four{common, p, common, q}, Four{common, p, q, common}, Four{p, common, q, common}}) {
+    checkEdgeEdge(x);
+    EXPECT_EQ(edgeEdgeDistance(x[0], x[1], x[2], x[3]).distance, 0.0);
+  }
 }
 
 /// Their differences are moderate, but not their coordinates, whose error compensation would carry.

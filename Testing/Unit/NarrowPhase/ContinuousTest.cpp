@@ -146,6 +146,31 @@ TEST(Continuous, EarliestTimeDoesNotDependOnOrderOrBatches) {
   }
 }
 
+/// A time of impact may be reported where features only nearly come within the distance. It is no
+/// contact, and no earliest time, if their boxes stay apart.
+TEST(Continuous, FeaturesThatStopBeforeTheDistanceHaveNoImpact) {
+  constexpr double kDistance = 0.125;
+  const TriangleMesh ground = meshOf({{-4, -4, 0}, {4, -4, 0}, {0, 4, 0}},
+                                     {{-4, -4, 0}, {4, -4, 0}, {0, 4, 0}}, {{0, 1, 2}});
+  int reported = 0;
+  for (int exponent = -52; exponent < -20; ++exponent) {
+    const double end = kDistance + std::ldexp(1.0, exponent);
+    const TriangleMesh falling =
+        meshOf({{0, 0, 1}, {1, 0, 3}, {0, 1, 3}}, {{0, 0, end}, {1, 0, 2 + end}, {0, 1, 2 + end}},
+               {{0, 1, 2}});
+    const MeshPair pair{falling, ground, {Method::Continuous, kDistance, Contacts::All}};
+    ContactBuffers counts{}, found{};
+    EXPECT_EQ(findEarliestImpact(pair, everyPair(falling, ground), kUnbounded, counts), kUnbounded);
+    findContinuous(pair, everyPair(falling, ground), found);
+    EXPECT_TRUE(found.vertexTriangle.empty());
+    reported += vertexTriangleTimeOfImpact(falling.before[0], ground.before[0], ground.before[1],
+                                           ground.before[2], falling.now[0], ground.now[0],
+                                           ground.now[1], ground.now[2], {kDistance})
+                    .has_value();
+  }
+  EXPECT_GT(reported, 0);
+}
+
 /// A triangle in z = 0 whose winding normal is +z, and another well above or below it that comes
 /// through it.
 struct Crossing {

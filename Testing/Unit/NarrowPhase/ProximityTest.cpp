@@ -1,5 +1,6 @@
 #include "Diagnostics/ContactsByBruteForce.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "NarrowPhase/Proximity.h"
 
 #include "Meshes.h"
 
@@ -11,6 +12,7 @@
 #include <bit>
 #include <cmath>
 #include <random>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -272,6 +274,27 @@ TEST(Proximity, DegenerateMeshesAgreeWithBruteForce) {
   const SceneMesh empty;
   EXPECT_EQ(expectSame(degenerate, empty, 0.05), 0u);
   EXPECT_EQ(expectSame(empty, degenerate, 0.05), 0u);
+}
+
+/// Of the features with the same vertices, the first.
+TEST(Proximity, FeaturesOfSegmentsAndPointsHaveTheirFirstName) {
+  const std::vector<int> cornersOf[] = {{0}, {1}, {2}, {0, 1}, {1, 2}, {2, 0}, {0, 1, 2}};
+  for (const Triangle& corners : {Triangle{7, 8, 9}, {7, 8, 8}, {7, 7, 7}})
+    for (int bits = 1; bits < 8; ++bits) {
+      const Vector3d weights(bits & 1, bits >> 1 & 1, bits >> 2);
+      std::set<std::uint32_t> spanned;
+      for (std::size_t i = 0; i < 3; ++i)
+        if (weights[static_cast<int>(i)] != 0) spanned.insert(corners[i]);
+      const auto first =
+          std::find_if(std::begin(cornersOf), std::end(cornersOf), [&](const auto& f) {
+            std::set<std::uint32_t> own;
+            for (const int i : f) own.insert(corners[static_cast<std::size_t>(i)]);
+            return own == spanned;
+          });
+      EXPECT_EQ(static_cast<std::ptrdiff_t>(spannedFeature(corners, weights)),
+                first - std::begin(cornersOf))
+          << corners[0] << corners[1] << corners[2] << ", " << bits;
+    }
 }
 
 TEST(Proximity, ThicknessLargerThanEverythingAgreesWithBruteForce) {

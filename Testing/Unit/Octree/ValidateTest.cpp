@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <string>
 
@@ -176,6 +177,29 @@ TEST(Validate, ReportsAtMostTwentyFailures) {
   ASSERT_GT(tree.octree.groups().size(), 21u);
   tree.octree.boxes().lower[0].assign(tree.octree.boxes().lower[0].size(), -2);
   EXPECT_EQ(validate(tree.octree, true).size(), 20u);
+}
+
+/// The cells of centres are computed in float arithmetic, which may move a centre over a border.
+TEST(Validate, AcceptsCentresThatRoundToTheBorderOfTheirCell) {
+  Random random(42);
+  constexpr float kHalf = 0x1p-9f;
+  Boxes boxes{testing::boxAbout({0, 0, 0}, 0), testing::boxAbout({1, 1, 1}, 0)};
+  for (int i = 0; i < 3000; ++i) {
+    FloatBox box;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const float border = static_cast<float>(1 + random() % 63) / 64;
+      // Away from the border by half of float's resolution, up or down.
+      box.lower[k] = border - kHalf;
+      box.upper[k] = border + kHalf;
+      if (random() % 2) box.lower[k] = std::nextafter(box.lower[k], random() % 2 ? 0.0f : 1.0f);
+    }
+    boxes.push_back(box);
+  }
+  OctreeSettings settings;
+  settings.maxElementsPerLeaf = 2;
+  BoxOctree tree;
+  tree.build(boxes, settings, Threads(1));
+  EXPECT_EQ(validate(tree.octree, true), std::vector<std::string>{});
 }
 
 }  // namespace
