@@ -20,7 +20,7 @@ namespace {
 using testing::casesOf;
 using testing::Random;
 using testing::uniform;
-using Matrix = std::array<std::array<double, 3>, 3>;
+using TurnMatrix = std::array<std::array<double, 3>, 3>;
 
 /// Of any magnitude between two powers of two, and either sign.
 double ofAnySize(Random& random, int least, int most) {
@@ -29,13 +29,13 @@ double ofAnySize(Random& random, int least, int most) {
 }
 
 /// Rotations about any axis, or of the axes.
-Matrix anyRotation(Random& random) {
+TurnMatrix anyRotation(Random& random) {
   const double angle = random() % 4 == 0 ? static_cast<double>(random() % 4) * std::acos(0.0)
                                          : uniform(random, 0, 6);
   const Eigen::Vector3d axis = random() % 2 ? testing::randomPoint(random, -1, 1).normalized()
                                             : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
   const Eigen::Matrix3d rotation = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
-  Matrix matrix;
+  TurnMatrix matrix;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
       matrix[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] = rotation(i, j);
@@ -63,15 +63,15 @@ TEST(BoxMap, ShiftsEncloseTheExactBounds) {
                     high = mpq_class(bound) + mpq_class(offset) + mpq_class(thickness);
     const float down = OutwardRounding::down(bound + lower),
                 up = OutwardRounding::up(bound + upper);
-    EXPECT_LE(mpq_class(down), low) << offset << ' ' << thickness << ' ' << bound;
-    EXPECT_GE(mpq_class(up), high) << offset << ' ' << thickness << ' ' << bound;
+    EXPECT_TRUE(mpq_class(down) <= low) << offset << ' ' << thickness << ' ' << bound;
+    EXPECT_TRUE(mpq_class(up) >= high) << offset << ' ' << thickness << ' ' << bound;
     // Not by rounding to nearest alone: the shift itself has a margin.
-    EXPECT_LT(mpq_class(lower), mpq_class(offset) - mpq_class(thickness));
-    EXPECT_GT(mpq_class(upper), mpq_class(offset) + mpq_class(thickness));
+    EXPECT_TRUE(mpq_class(lower) < mpq_class(offset) - mpq_class(thickness));
+    EXPECT_TRUE(mpq_class(upper) > mpq_class(offset) + mpq_class(thickness));
     const mpq_class margin = mpq_class(0x1p-20) * mpq_class(std::abs(offset) + thickness +
                                                             std::abs(double{bound}) + 0x1p-100);
-    EXPECT_LE(low - mpq_class(down), margin);
-    EXPECT_LE(mpq_class(up) - high, margin);
+    EXPECT_TRUE(low - mpq_class(down) <= margin);
+    EXPECT_TRUE(mpq_class(up) - high <= margin);
   }
 }
 
@@ -80,7 +80,7 @@ TEST(BoxMap, ShiftsEncloseTheExactBounds) {
 TEST(BoxMap, MappedBoxesEncloseTheirCorners) {
   Random random(72);
   for (int i = 0; i < casesOf(6000); ++i) {
-    const Matrix matrix = anyRotation(random);
+    const TurnMatrix matrix = anyRotation(random);
     const bool isTiny = i % 5 == 0;
     const int scale = isTiny ? -135 : static_cast<int>(random() % 40) - 20;
     FloatBox box;
@@ -114,11 +114,11 @@ TEST(BoxMap, MappedBoxesEncloseTheirCorners) {
       low += mpq_class(offset[k]) - around;
       high += mpq_class(offset[k]) + around;
       size += abs(mpq_class(offset[k])) + around;
-      EXPECT_LE(mpq_class(mapped.lower[k]), low) << i << ", axis " << k;
-      EXPECT_GE(mpq_class(mapped.upper[k]), high) << i << ", axis " << k;
+      EXPECT_TRUE(mpq_class(mapped.lower[k]) <= low) << i << ", axis " << k;
+      EXPECT_TRUE(mpq_class(mapped.upper[k]) >= high) << i << ", axis " << k;
       const mpq_class margin = mpq_class(0x1p-17) * size + mpq_class(0x1p-101);
-      EXPECT_LE(low - mpq_class(mapped.lower[k]), margin) << i;
-      EXPECT_LE(mpq_class(mapped.upper[k]) - high, margin) << i;
+      EXPECT_TRUE(low - mpq_class(mapped.lower[k]) <= margin) << i;
+      EXPECT_TRUE(mpq_class(mapped.upper[k]) - high <= margin) << i;
     }
   }
 }

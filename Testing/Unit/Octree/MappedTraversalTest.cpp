@@ -21,38 +21,38 @@ namespace {
 using testing::Boxes;
 using testing::BoxOctree;
 using testing::Random;
-using Corner = std::array<double, 3>;
-using Corners = std::array<Corner, 3>;
-using Rows = std::array<Corner, 3>;
+using Point3 = std::array<double, 3>;
+using Three = std::array<Point3, 3>;
+using TurnRows = std::array<Point3, 3>;
 
 /// Rotations by 0, 90 and 180 degrees about an axis, and about a diagonal.
-constexpr Rows kRotations[] = {{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
-                               {{{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}},
-                               {{{-1, 0, 0}, {0, 1, 0}, {0, 0, -1}}},
-                               {{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}}};
+constexpr TurnRows kRotations[] = {{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+                                   {{{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}},
+                                   {{{-1, 0, 0}, {0, 1, 0}, {0, 0, -1}}},
+                                   {{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}}};
 
-Corner imageOf(const Rows& rotation, const Corner& offset, const Corner& p) {
-  Corner image = offset;
+Point3 imageOf(const TurnRows& rotation, const Point3& offset, const Point3& p) {
+  Point3 image = offset;
   for (std::size_t k = 0; k < 3; ++k)
     for (std::size_t j = 0; j < 3; ++j) image[k] += rotation[k][j] * p[j];
   return image;
 }
 
-std::vector<Corners> gridTriangles(Random& random, std::size_t count) {
-  std::vector<Corners> triangles(count);
-  for (Corners& corners : triangles) {
-    Corner start;
+std::vector<Three> gridTriangles(Random& random, std::size_t count) {
+  std::vector<Three> triangles(count);
+  for (Three& corners : triangles) {
+    Point3 start;
     for (double& x : start) x = static_cast<double>(random() % 64) / 64;
-    for (Corner& corner : corners)
+    for (Point3& corner : corners)
       for (std::size_t k = 0; k < 3; ++k)
         corner[k] = start[k] + static_cast<double>(random() % 12) / 64;
   }
   return triangles;
 }
 
-FloatBox boxOf(const Corners& corners) {
+FloatBox boxOf(const Three& corners) {
   FloatBox box;
-  for (const Corner& p : corners) {
+  for (const Point3& p : corners) {
     FloatBox point;
     for (std::size_t k = 0; k < 3; ++k) point.lower[k] = point.upper[k] = static_cast<float>(p[k]);
     box.add(point);
@@ -60,9 +60,9 @@ FloatBox boxOf(const Corners& corners) {
   return box;
 }
 
-Boxes boxesOf(const std::vector<Corners>& triangles) {
+Boxes boxesOf(const std::vector<Three>& triangles) {
   Boxes boxes;
-  for (const Corners& corners : triangles) boxes.push_back(boxOf(corners));
+  for (const Three& corners : triangles) boxes.push_back(boxOf(corners));
   return boxes;
 }
 
@@ -100,8 +100,8 @@ std::vector<ElementPair> expectedPairs(std::size_t countA, std::size_t countB, O
   return pairs;
 }
 
-Corner gridPoint(Random& random) {
-  Corner p;
+Point3 gridPoint(Random& random) {
+  Point3 p;
   for (double& x : p) x = (static_cast<double>(random() % 129) - 64) / 64;
   return p;
 }
@@ -182,9 +182,9 @@ TEST(MappedTraversal, ClampedBoxesOverlapWhatIsBeyondTheRange) {
   EXPECT_GT(expected.size(), 10u);
 }
 
-std::array<double, 2> extentAlong(const DopDirection& direction, const Corners& corners) {
+std::array<double, 2> extentAlong(const DopDirection& direction, const Three& corners) {
   std::array<double, 2> extent{1e9, -1e9};
-  for (const Corner& p : corners) {
+  for (const Point3& p : corners) {
     const double at = direction[0] * p[0] + direction[1] * p[1] + direction[2] * p[2];
     extent = {std::min(extent[0], at), std::max(extent[1], at)};
   }
@@ -192,7 +192,7 @@ std::array<double, 2> extentAlong(const DopDirection& direction, const Corners& 
 }
 
 /// An octree of triangles with k-DOPs.
-void buildWithDops(BoxOctree& tree, const std::vector<Corners>& triangles, int count) {
+void buildWithDops(BoxOctree& tree, const std::vector<Three>& triangles, int count) {
   tree.build(boxesOf(triangles), smallLeaves(), Threads(1));
   OctreeDops& dops = tree.octree.startDops(count);
   for (std::size_t i = 0; i < triangles.size(); ++i)
@@ -212,14 +212,13 @@ TEST(MappedTraversal, FindsThePairsWhoseDopsOverlap) {
   std::size_t pairs = 0, ofBoxes = 0;
   for (int run = 0; run < testing::casesOf(32); ++run) {
     const int count = run % 2 ? 9 : 7;
-    const Rows& rotation = kRotations[run / 2 % 4];
-    const std::vector<Corners> first = gridTriangles(random, 120),
-                               second = gridTriangles(random, 90);
+    const TurnRows& rotation = kRotations[run / 2 % 4];
+    const std::vector<Three> first = gridTriangles(random, 120), second = gridTriangles(random, 90);
     BoxOctree a, b;
     buildWithDops(a, first, count);
     buildWithDops(b, second, count);
     TreePair trees{&a.octree, &b.octree};
-    std::vector<Corner> offsets;
+    std::vector<Point3> offsets;
     for (int end = 0; end <= run / 8 % 2; ++end) offsets.push_back(gridPoint(random));
     trees.dops.directions = count;
     trees.dops.count = trees.mapA.count = static_cast<int>(offsets.size());
@@ -230,9 +229,9 @@ TEST(MappedTraversal, FindsThePairsWhoseDopsOverlap) {
     trees.swapped = run / 16 % 2;
     const auto overlapAlong = [&](const DopDirection& d, std::uint32_t i, std::uint32_t j) {
       std::array<double, 2> ofA{1e9, -1e9};
-      for (const Corner& offset : offsets) {
-        Corners turned = first[i];
-        for (Corner& p : turned) p = imageOf(rotation, offset, p);
+      for (const Point3& offset : offsets) {
+        Three turned = first[i];
+        for (Point3& p : turned) p = imageOf(rotation, offset, p);
         const auto [lower, upper] = extentAlong(d, turned);
         ofA = {std::min(ofA[0], lower), std::max(ofA[1], upper)};
       }
