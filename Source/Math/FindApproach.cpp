@@ -14,26 +14,25 @@ namespace {
 using Eigen::Vector3d;
 using Kind = ImpactQuery::Kind;
 
-/// The time until which some coordinate certainly keeps the features further apart than the
-/// distance. No impact is reported before it, even if features come almost as near. Callers that
-/// compare boxes over part of the step may have filtered such pairs.
+/// The time until which coordinate k certainly keeps the features further apart than the distance.
+/// No impact is reported before it, even if features come almost as near. Callers that compare
+/// boxes over part of the step may have filtered such pairs.
 template <Kind kind>
-double boxesSeparateUntil(const RelativeMotion<kind>& motion, double distance) {
+double boxesSeparateUntil(const RelativeMotion<kind>& motion, int k, double distance) {
   double latest = 0.0;
-  for (int k = 0; k < 3; ++k)
-    for (const double side : {1.0, -1.0}) {
-      double until = 1.0;
-      for (const auto& ends : motion.corner) {
-        const double first = side * ends[0][k], last = side * ends[1][k];
-        const double needed =
-            distance + kApproachBoxError * (std::max(std::abs(first), std::abs(last)) + distance);
-        if (!(first > needed))
-          until = 0.0;
-        else if (!(last > needed))
-          until = std::min(until, (first - needed) / (first - last) * (1.0 - kQuotientError));
-      }
-      latest = std::max(latest, until);
+  for (const double side : {1.0, -1.0}) {
+    double until = 1.0;
+    for (const auto& ends : motion.corner) {
+      const double first = side * ends[0][k], last = side * ends[1][k];
+      const double needed =
+          distance + kApproachBoxError * (std::max(std::abs(first), std::abs(last)) + distance);
+      if (!(first > needed))
+        until = 0.0;
+      else if (!(last > needed))
+        until = std::min(until, (first - needed) / (first - last) * (1.0 - kQuotientError));
     }
+    latest = std::max(latest, until);
+  }
   return latest;
 }
 
@@ -69,8 +68,8 @@ Separation accurateSeparation(const RelativeMotion<kind>& motion, double t) {
   return separation;
 }
 
-/// Advances through times at which the features are certainly further apart than the distance, and
-/// reports an impact where it cannot advance.
+/// Advances from time t through times at which the features are certainly further apart than the
+/// distance, and reports an impact where it cannot advance.
 ///
 /// No false negative, never late: an interval is passed only if all corners stay beyond the
 /// distance along a direction, fixed or turning, or if the plane does. All errors are bounded
@@ -88,10 +87,8 @@ Separation accurateSeparation(const RelativeMotion<kind>& motion, double t) {
 /// turn as they pass each other at little more than the distance need most. There the turning
 /// direction and the plane reach further.) The value of upTo does not change the steps before it.
 template <Kind kind>
-ImpactResult find(const RelativeMotion<kind>& motion, double distance, double tolerance,
+ImpactResult find(const RelativeMotion<kind>& motion, double distance, double tolerance, double t,
                   double upTo) {
-  double t = boxesSeparateUntil(motion, distance);
-  if (t > upTo || t == 1.0) return {};
   const Vector3d largest = motion.largestDifference();
   double displacement = 0.0;
   for (const auto& ends : motion.corner)
@@ -139,22 +136,33 @@ double scaleFor(double largest) {
   return std::ldexp(1.0, -std::clamp(std::ilogb(largest), -1000, 1000));
 }
 
-/// Differences of larger ones, such as displacements of the features, might overflow.
+/// Differences of larger ones, such as displacements of the features, might overflow. Positions
+/// times kSmaller have no larger ones.
 constexpr double kLargestDifference = 0x1p1020;
+constexpr double kSmaller = 0x1p-5;
 
 template <Kind kind>
 ImpactResult findScaled(const ImpactQuery& query, double distance, double tolerance, double upTo) {
   RelativeMotion<kind> motion(query);
-  const double largest = motion.largestDifference().maxCoeff();
-  if (largest > kLargestDifference) {
+  const Vector3d largest = motion.largestDifference();
+  const auto isModerate = [&largest](int k) { return largest[k] <= kLargestDifference; };
+  // Before scaling, which may lose the smallest coordinates.
+  double from = 0.0;
+  for (int k = 0; k < 3; ++k)
+    if (isModerate(k)) from = std::max(from, boxesSeparateUntil(motion, k, distance));
+  if (!(largest.maxCoeff() <= kLargestDifference)) {
     ImpactQuery smaller = query;
     for (ImpactQuery::Step& vertex : smaller.vertices)
-      vertex = {0.25 * vertex.before, 0.25 * vertex.now};
-    return findScaled<kind>(smaller, 0.25 * distance, tolerance, upTo);
+      vertex = {kSmaller * vertex.before, kSmaller * vertex.now};
+    motion = RelativeMotion<kind>(smaller);
+    distance *= kSmaller;
+    for (int k = 0; k < 3; ++k)
+      if (!isModerate(k)) from = std::max(from, boxesSeparateUntil(motion, k, distance));
   }
-  const double scale = scaleFor(largest);
+  if (from > upTo || from == 1.0) return {};
+  const double scale = scaleFor(motion.largestDifference().maxCoeff());
   if (scale != 1.0) motion.scale(scale);
-  return find(motion, distance * scale, tolerance, upTo);
+  return find(motion, distance * scale, tolerance, from, upTo);
 }
 
 }  // namespace

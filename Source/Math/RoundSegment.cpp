@@ -189,7 +189,8 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
   const double first = (shift + unit * inside.first) / length,
                last = (shift + unit * inside.last) / length;
   if (first <= last && last >= ray.tMin && first <= ray.tMax) {
-    const double size = std::abs(shift) + (b - a).norm() + (c - a).norm() + radius;
+    const double size =
+        std::abs(shift) + 2.0 * (largest(b - a) + largest(c - a)) + radius;  // without overflow
     add({std::max(first, ray.tMin), std::min(last, ray.tMax), kRoundRayError * size / length,
          std::int8_t{last <= ray.tMax}, first >= ray.tMin});
   }

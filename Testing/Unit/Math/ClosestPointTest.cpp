@@ -132,6 +132,38 @@ TEST(ClosestPoint, EveryRegionBorderOfTwoEdgesIsCrossed) {
         }
 }
 
+/// Edges far apart for their length. Their common perpendicular passes exactly through an end, and
+/// products with the vector between the edges round.
+TEST(ClosestPoint, FarEdgesAreClassifiedExactly) {
+  RandomFeatures random;
+  const auto whole = [&] {
+    return Vector3d(random.below(1 << 20), random.below(1 << 20), random.below(1 << 20));
+  };
+  for (int i = 0; i < 1000 && !HasFailure(); ++i) {
+    const Vector3d p = 4 * (whole() - whole()), q = 4 * (whole() - whole()), p0 = whole();
+    const double s = random.below(2), t = 0.25 * random.below(5);
+    const Vector3d q0 = p0 + s * p - t * q + (1 + random.below(3)) * p.cross(q);
+    checkEdgeEdge({p0, p0 + p, q0, q0 + q});
+    checkEdgeEdge({q0, q0 + q, p0, p0 + p});
+  }
+}
+
+/// The interval that two parallel edges share is so short on one of them that its weight is 0 or 1.
+TEST(ClosestPoint, MiddlesOfShortSharedIntervalsAreEnds) {
+  const Vector3d zero = Vector3d::Zero(), x = Vector3d::UnitX(), beyond(0x1p-60, 1, 0),
+                 before(0x1p-60 - 0x1p-50, 1, 0);
+  const EdgeEdgeDistance start = edgeEdgeDistance(zero, x, beyond, before),
+                         end = edgeEdgeDistance(x, zero, beyond, before),
+                         swapped = edgeEdgeDistance(before, beyond, zero, x);
+  EXPECT_TRUE(start.parallel && end.parallel && swapped.parallel);
+  EXPECT_EQ(start.featureA, EdgeFeature::Start);
+  EXPECT_EQ(start.featureB, EdgeFeature::Interior);
+  EXPECT_EQ(end.featureA, EdgeFeature::End);
+  EXPECT_EQ(end.featureB, EdgeFeature::Interior);
+  EXPECT_EQ(swapped.featureA, EdgeFeature::Interior);
+  EXPECT_EQ(swapped.featureB, EdgeFeature::Start);
+}
+
 /// Found by fuzzing: the ends of one edge are equally far from the other within rounding, but the
 /// vectors to them differ by much more.
 TEST(ClosestPoint, NearlyTiedEndsOfParallelEdgesAreDecidedExactly) {
@@ -357,6 +389,23 @@ TEST(ClosestPoint, TrianglesThatShareAnEdgeAgreeOnIt) {
   EXPECT_GT(shared, 100);
 }
 
+// ---- Sides ----
+
+TEST(ClosestPoint, SidesAreExact) {
+  RandomFeatures random;
+  int inwards = 0, nearer = 0;
+  constexpr int kCases = 8000;
+  for (int i = 0; i < kCases; ++i) {
+    const auto [p, a, b, c] = configuration(i % kKindsOfPoints, random);
+    ASSERT_EQ(liesInwards(p, a, b, c), exact::side(p, a, b, c) > 0) << i;
+    ASSERT_EQ(comesNearer(p, a, b), exact::along(p, a, b) > 0) << i;
+    inwards += liesInwards(p, a, b, c);
+    nearer += comesNearer(p, a, b);
+  }
+  EXPECT_GT(std::min(inwards, nearer), kCases / 8);
+  EXPECT_LT(std::max(inwards, nearer), kCases * 7 / 8);
+}
+
 // ---- Single values ----
 
 TEST(ClosestPoint, NormalsOfTouchingFeaturesFollowTheirRule) {
@@ -431,6 +480,10 @@ TEST(UnitCross, IsExactInTheWholeRange) {
       EXPECT_LE((normal - exact).norm(), 1e-15);
       EXPECT_NEAR(normal.norm(), i == j ? 0.0 : 1.0, 1e-15);
       EXPECT_LE(decisions, 1u);
+      if (i == j && i > 1) {  // without overflow
+        EXPECT_EQ(unitCross(a, b, d, c, &decisions), Vector3d::Zero());
+        EXPECT_EQ(decisions, 0u) << "equal and opposite edges need no integers";
+      }
     }
 }
 

@@ -104,6 +104,7 @@ enum class ImpactKind {
   Degenerate,
   Identical,
   FarAway,
+  ScaledAxes,
   MixedSizes,
   Denormal,
   Count
@@ -238,6 +239,17 @@ class HardCases {
     }
   }
 
+  /// Scales each axis by a power of two, some of which leave the range of normal doubles. Touching
+  /// features on a grid still touch.
+  void scaleAxes(ImpactCase& query) {
+    constexpr int kExponents[] = {-1074, -1070, -1000, -600, -540, -530, -345,
+                                  -100,  0,     60,    190,  400,  900};
+    for (int k = 0; k < 3; ++k) {
+      const int exponent = kExponents[m_random.below(static_cast<int>(std::size(kExponents)))];
+      for (Vector& p : query.positions) p[k] = std::ldexp(p[k], exponent);
+    }
+  }
+
   /// Out of the axes, on the grid.
   void shear(ImpactCase& query) {
     Eigen::Matrix3d matrix;
@@ -259,6 +271,7 @@ class HardCases {
                                 : Vector(1e6 * m_random.inCube());
       for (Vector& p : query.positions) p += offset;
     }
+    if (kind == ImpactKind::ScaledAxes) scaleAxes(query);
     if (kind == ImpactKind::MixedSizes)
       for (Vector& p : query.positions)
         for (double& x : p)

@@ -1,5 +1,7 @@
 #include "ImpactCases.h"
 
+#include "RationalOracle.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -30,6 +32,57 @@ TEST(ImpactSide, IsCorrectForEdgesOfAnyLength) {
   for (const double side : {1.0, -1.0})
     for (double length = 1; length < 1e30; length *= 7)
       ASSERT_EQ(sideBefore(crossing(0.5, side, length).query(), 0.5), -side) << length;
+}
+
+/// Features nearly in one plane at any time: the sign of rounded volumes is wrong. They rest, or
+/// grow a lot.
+TEST(ImpactSide, IsExactForFeaturesNearlyInOnePlane) {
+  test::Random random(3);
+  int signs[3] = {};
+  for (int i = 0; i < 3000; ++i) {
+    ImpactCase query{i % 2 == 0, {}};
+    auto& p = query.positions;
+    const Eigen::Vector3d u = random.inCube(), v = random.inCube(), origin = random.inCube(),
+                          none = Eigen::Vector3d::Zero();
+    const auto nearPlane = [&] {
+      const Eigen::Vector3d aside =
+          std::ldexp(random.unit(), -random.between(30, 60)) * random.inCube();
+      return Eigen::Vector3d(random.unit() * u + random.unit() * v + aside);
+    };
+    // The end of an edge, or a corner, from which the others differ by A and B.
+    const std::size_t first = query.edges ? 0 : 1;
+    const Eigen::Vector3d a = nearPlane(), b = nearPlane(), c = nearPlane();
+    for (std::size_t end = 0; end < 2; ++end) {
+      const double grown = end == 0 && i % 3 == 0 ? std::ldexp(1.0, -random.between(1, 60)) : 1.0;
+      const Eigen::Vector3d at = i % 3 == 0 ? none : origin;
+      Eigen::Vector3d* const ofEnd = &p[4 * end];
+      if (query.edges) {
+        ofEnd[0] = at;
+        ofEnd[1] = at + grown * a;
+        ofEnd[2] = at + grown * c;
+        ofEnd[3] = at + grown * (c + b);
+      } else {
+        ofEnd[first] = at;
+        ofEnd[2] = at + grown * a;
+        ofEnd[3] = at + grown * b;
+        ofEnd[0] = at + grown * c;
+      }
+    }
+    const auto signAtEnd = [&](std::size_t end) {
+      using oracle::operator-;
+      const auto axes = ImpactQuery::axes(query.query().kind);
+      std::array<oracle::Vector, 3> rows;
+      for (std::size_t k = 0; k < 3; ++k)
+        rows[k] = oracle::toRational(p[4 * end + static_cast<std::size_t>(axes[k][0])]) -
+                  oracle::toRational(p[4 * end + static_cast<std::size_t>(axes[k][1])]);
+      return sgn(oracle::dot(oracle::cross(rows[0], rows[1]), rows[2]));
+    };
+    const int expected = signAtEnd(1);
+    if (signAtEnd(0) != expected) continue;  // rounding of the sums made the side change
+    ASSERT_EQ(sideBefore(query.query(), 0.5), expected) << i;
+    ++signs[1 + expected];
+  }
+  EXPECT_GT(std::min(signs[0], signs[2]), 500);
 }
 
 /// Edges and distances between them are longer than the largest double.

@@ -4,6 +4,7 @@
 
 #include "Unit/Math/TrianglePairs.h"
 
+#include <gmpxx.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -121,6 +122,34 @@ TEST(RoundSegment, IntervalsHoldThePointsWithinTheRadius) {
   EXPECT_GT(none, 100u);
 }
 
+/// The ends are within the stated error where one end's ball holds the rest, however small that is.
+TEST(RoundSegment, ErrorsCoverTheLargerRadius) {
+  Random random(5);
+  for (int repeat = 0; repeat < 3000; ++repeat) {
+    const Vector3d q = random.inCube(), u = random.inCube().normalized(),
+                   p = q - std::ldexp(0.2, -random.below(40)) * u;
+    const double radius = 0.5 + random.unit();
+    // The ray stays beyond q along the segment.
+    const Vector3d direction = u + 0.5 * random.inCube();
+    const RaySegment ray{repeat % 4 < 2 ? q : Vector3d(q + 0.2 * u), direction, 0.0, 100.0};
+    const RoundIntervals found =
+        repeat % 2 ? intersectRay(ray, p, q, 0.0, radius) : intersectRay(ray, q, p, radius, 0.0);
+    ASSERT_EQ(found.size, 1u) << repeat;
+    // |o + t d - q| = r
+    mpf_class a(0, 300), b(0, 300), c(0, 300);
+    c = -mpf_class(radius, 300) * radius;
+    for (int k = 0; k < 3; ++k) {
+      const mpf_class from = mpf_class(ray.origin[k], 300) - q[k], along(direction[k], 300);
+      a += along * along;
+      b += along * from;
+      c += from * from;
+    }
+    const mpf_class last = (sqrt(mpf_class(b * b - a * c)) - b) / a;
+    ASSERT_LE(std::abs(mpf_class(last - found.intervals[0].last).get_d()), found.intervals[0].error)
+        << repeat;
+  }
+}
+
 /// Rays along lines of a cone's surface, where the quadratic has no square, and through its apex.
 TEST(RoundSegment, IntervalsOfRaysAlongACone) {
   Random random(3);
@@ -169,10 +198,16 @@ TEST(RoundSegment, AnIntervalHoldsThePointsWithinTheRadiusOfATriangle) {
     if (repeat % 12 == 4) c += std::ldexp(1.0, random.between(-50, -5)) * random.inCube();
     if (repeat % 12 == 10) c = random.below(2) ? a : b;
     const double radius = 0.01 + 0.5 * random.unit();
-    const Vector3d through = pointOn({a, b, c}, random) + 0.5 * random.inCube();
+    const Vector3d through =
+        repeat % 7 == 0 ? a : pointOn({a, b, c}, random) + 0.5 * random.inCube();
     const RaySegment ray{through - direction, direction, -3.0 + 4.0 * random.unit(),
                          1.0 + 3.0 * random.unit()};
-    const std::optional<RayInterval> interval = intersectRay(ray, a, b, c, radius);
+    // Sizes whose squares leave the range of double.
+    const int exponent = repeat % 3 == 0 ? random.between(-900, 900) : 0;
+    const auto sized = [&](const Vector3d& at) { return scaled(at, exponent); };
+    const RaySegment sizedRay{sized(ray.origin), sized(direction), ray.tMin, ray.tMax};
+    const std::optional<RayInterval> interval =
+        intersectRay(sizedRay, sized(a), sized(b), sized(c), std::ldexp(radius, exponent));
     found += interval.has_value();
     const std::vector<RayInterval> intervals(interval ? 1 : 0, interval.value_or(RayInterval{}));
     ASSERT_NO_FATAL_FAILURE(checkIntervals(intervals, ray, 1.0, [&](const Vector3d& at) {

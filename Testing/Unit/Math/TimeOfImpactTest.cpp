@@ -68,6 +68,103 @@ TEST(TimeOfImpact, AgreesWithOracleOnFullDoubles) {
   EXPECT_GT(impacts, 40);
 }
 
+/// At some time the features touch, up to rounding, at the border of one or at a corner of both.
+/// Many coordinates are zero at one end of the step.
+TEST(TimeOfImpact, AgreesWithOracleAtTheBordersOfFeatures) {
+  test::Random random(15);
+  int impacts = 0;
+  const int cases = testing::casesOf(3000);
+  for (int i = 0; i < cases; ++i) {
+    ImpactCase query = randomCase(random, i % 2);
+    auto& p = query.positions;
+    for (Eigen::Vector3d& at : p)
+      for (double& x : at)
+        if (random.below(3) == 0) x = 0.0;
+    const double time = random.unit(), s = random.below(4) ? random.unit() : random.below(2);
+    const auto at = [&](std::size_t vertex) -> Eigen::Vector3d {
+      return (1.0 - time) * p[vertex] + time * p[4 + vertex];
+    };
+    const std::size_t moved = query.edges ? random.below(2) : 0,
+                      from = query.edges ? 2 : 1 + random.below(2);
+    const Eigen::Vector3d border = at(from) + s * (at(from + 1) - at(from));
+    p[4 + moved] = (border - (1.0 - time) * p[moved]) / time;
+    expectTrue(query, 1e-6, impacts);
+    if (HasFailure()) FAIL() << "case " << i;
+  }
+  EXPECT_GT(impacts, cases / 5);
+  EXPECT_LT(impacts, cases * 4 / 5);
+}
+
+/// The vertex, or an edge's end, stays above an edge, up to rounding. Along it, both are near the
+/// edge's other end at one end of the step, and far away at the other.
+TEST(TimeOfImpact, AgreesWithOracleAboveAnEdge) {
+  test::Random random(17);
+  int impacts = 0;
+  const int cases = testing::casesOf(3000);
+  for (int i = 0; i < cases; ++i) {
+    ImpactCase query = randomCase(random, i % 2);
+    auto& p = query.positions;
+    const Eigen::Vector3d edge = random.inCube().cwiseProduct(Eigen::Vector3d(1, 1, 0));
+    const std::size_t first = query.edges ? 0 : 1, passing = query.edges ? 2 : 0;
+    for (std::size_t end = 0; end < 8; end += 4) {
+      for (std::size_t k = 0; k < 4; ++k) p[end + k].z() = 0.0;
+      p[end + first].setZero();
+      p[end + first + 1] = std::ldexp(0.5 + random.unit(), random.between(-15, 15)) * edge;
+      p[end + passing] = std::ldexp(0.5 + random.unit(), random.between(-15, 15)) * edge;
+      p[end + passing].z() = end == 0 ? random.unit() : -random.unit();
+      if (query.edges) p[end + 3].z() = p[end + 2].z();
+    }
+    expectTrue(query, 1e-6, impacts);
+    if (HasFailure()) FAIL() << "case " << i;
+  }
+  EXPECT_GT(impacts, cases / 10);
+  EXPECT_LT(impacts, cases * 9 / 10);
+}
+
+/// On a grid whose steps along one axis are about the smallest double.
+TEST(TimeOfImpact, FindsEveryTouchOfFeaturesThatAreNearlyFlat) {
+  HardCases hard(18);
+  test::Random random(18);
+  for (int i = 0; i < 20000; ++i) {
+    constexpr ImpactKind kKinds[] = {ImpactKind::TouchAtStart, ImpactKind::TouchAtEnd,
+                                     ImpactKind::TouchHalfway};
+    const int axis = random.below(3), exponent = random.between(-1074, -1060),
+              across = -random.below(12);
+    const ImpactCase query = hard.next(kKinds[i % 3]).mapped([&](Eigen::Vector3d p) {
+      for (int k = 0; k < 3; ++k) p[k] = std::ldexp(p[k], k == axis ? exponent : across);
+      return p;
+    });
+    ASSERT_TRUE(query.time()) << text(query);
+  }
+}
+
+/// A vertex passes a corner or an edge's end within a few of the smallest doubles.
+TEST(TimeOfImpact, AgreesWithOracleWhereCoordinatesAreDenormal) {
+  test::Random random(16);
+  int impacts = 0;
+  const int cases = testing::casesOf(3000);
+  for (int i = 0; i < cases; ++i) {
+    ImpactCase query = randomCase(random, i % 2);
+    auto& p = query.positions;
+    for (Eigen::Vector3d& at : p) at.z() = 0.0;
+    // Vertex 1 is the corner, or vertex 2 the end of an edge, and stays at the origin.
+    const std::size_t corner = query.edges ? 2 : 1;
+    p[corner] = p[4 + corner] = Eigen::Vector3d::Zero();
+    const auto near = [&] { return std::ldexp(random.between(-4, 4), -1074); };
+    p[0] = {near(), near(), random.unit()};
+    p[4] = {near(), near(), -random.unit()};
+    if (query.edges) {
+      // The other end of the edge that passes by.
+      p[1].z() = p[0].z();
+      p[5].z() = p[4].z();
+    }
+    expectTrue(query, 1e-6, impacts);
+    if (HasFailure()) FAIL() << "case " << i;
+  }
+  EXPECT_GT(impacts, cases / 10);
+  EXPECT_LT(impacts, cases * 9 / 10);
+}
+
 /// The same decision, and times within a tolerance of each other, because both are within one of
 /// the exact time.
 void expectSame(const ImpactCase& l, const ImpactCase& r) {

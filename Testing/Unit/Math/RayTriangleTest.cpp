@@ -1,0 +1,150 @@
+#include "Math/RayTriangle.h"
+
+#include "Common/Sanitized.h"
+#include "RationalOracle.h"
+#include "TrianglePairs.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+// Intersections of rays and triangles in rational numbers. A ray in the triangle's plane is cut at
+// the lines of its edges.
+
+namespace palpate::test {
+namespace {
+
+using oracle::Rational, oracle::Vector, oracle::operator-, oracle::cross, oracle::dot;
+
+struct Shared {
+  Rational first, last;
+};
+
+/// What the ray shares with the half space in which t * slope + height >= 0.
+bool cut(Shared& shared, const Rational& height, const Rational& slope) {
+  if (slope == 0) return height >= 0;
+  const Rational zero = -height / slope;
+  if (slope > 0)
+    shared.first = std::max(shared.first, zero);
+  else
+    shared.last = std::min(shared.last, zero);
+  return shared.first <= shared.last;
+}
+
+/// The ray is cut by the planes through the edges, across the triangle, and meets its plane at one
+/// parameter or everywhere. A triangle without area is cut by the planes at the ends of its longest
+/// edge, and by two that hold it.
+std::optional<Shared> sharedByRay(const RaySegment& ray, const Corners& corners) {
+  const Vector o = oracle::toRational(ray.origin), d = oracle::toRational(ray.direction);
+  const std::array<Vector, 3> c{oracle::toRational(corners[0]), oracle::toRational(corners[1]),
+                                oracle::toRational(corners[2])};
+  const Vector normal = cross(c[1] - c[0], c[2] - c[0]);
+  Shared shared{Rational(ray.tMin), Rational(ray.tMax)};
+  const auto onPlane = [&](const Vector& of) {
+    const Rational height = dot(o - c[0], of), slope = dot(d, of);
+    return cut(shared, height, slope) && cut(shared, -height, -slope);
+  };
+  if (dot(normal, normal) != 0) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vector inwards = cross(normal, c[(i + 1) % 3] - c[i]);
+      if (!cut(shared, dot(o - c[i], inwards), dot(d, inwards))) return {};
+    }
+    if (!onPlane(normal)) return {};
+    return shared;
+  }
+  std::size_t longest = 0;
+  const auto edge = [&](std::size_t i) { return c[(i + 1) % 3] - c[i]; };
+  for (std::size_t i = 1; i < 3; ++i)
+    if (dot(edge(i), edge(i)) > dot(edge(longest), edge(longest))) longest = i;
+  const Vector along = edge(longest);
+  if (dot(along, along) == 0) {
+    for (int k = 0; k < 3; ++k) {
+      Vector axis;
+      axis[static_cast<std::size_t>(k)] = 1;
+      if (!onPlane(axis)) return {};
+    }
+    return shared;
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    Vector axis;
+    axis[k] = 1;
+    if (!onPlane(cross(along, axis))) return {};
+  }
+  const Vector &p = c[longest], &q = c[(longest + 1) % 3];
+  if (!cut(shared, dot(o - p, along), dot(d, along))) return {};
+  if (!cut(shared, dot(q - o, along), -dot(d, along))) return {};
+  return shared;
+}
+
+void expectShared(const RaySegment& ray, const Corners& t, int& hits) {
+  const std::optional<Shared> truth = sharedByRay(ray, t);
+  const std::optional<RayInterval> found = intersectRay(ray, t[0], t[1], t[2]);
+  ASSERT_EQ(found.has_value(), truth.has_value());
+  if (!truth) return;
+  ++hits;
+  const Rational error(found->error);
+  EXPECT_TRUE(abs(truth->first - Rational(found->first)) <= error);
+  EXPECT_TRUE(abs(truth->last - Rational(found->last)) <= error);
+}
+
+/// Small integers: many rays lie in the triangle's plane or along its edges, and many triangles
+/// have no area.
+TEST(RayTriangle, AgreesWithRationalArithmeticOnSmallGrids) {
+  Random random(31);
+  int hits = 0;
+  for (int i = 0; i < testing::casesOf(20000) && !::testing::Test::HasFailure(); ++i) {
+    const int size = 2 + i % 3;
+    Corners t = cornersOf([&] { return random.onGrid(size); });
+    Eigen::Vector3d origin = random.onGrid(size),
+                    direction = random.onGrid(size) - random.onGrid(size);
+    if (i % 2)
+      for (Eigen::Vector3d* v : {&t[0], &t[1], &t[2], &origin}) v->z() = 1.0;
+    if (i % 2) direction.z() = 0.0;
+    if (direction.isZero(0.0)) continue;
+    const RaySegment ray{origin, direction, 0.25 * random.between(-6, 4),
+                         0.25 * random.between(4, 8)};
+    SCOPED_TRACE(i);
+    expectShared(ray, t, hits);
+  }
+  EXPECT_GT(hits, static_cast<int>(testing::leastOf(2000)));
+}
+
+/// Rays through edges and corners, and rays that begin or end on the triangle, up to rounding.
+TEST(RayTriangle, AgreesWithRationalArithmeticNearBorders) {
+  Random random(32);
+  int hits = 0;
+  const int cases = testing::casesOf(6000);
+  for (int i = 0; i < cases && !::testing::Test::HasFailure(); ++i) {
+    Corners t = cornersOf([&] { return random.inCube(); });
+    if (i % 5 == 0)
+      for (Eigen::Vector3d& corner : t) corner += Eigen::Vector3d(1e4, -2e5, 3e3);
+    const int from = random.below(3);
+    const Eigen::Vector3d &a = t[static_cast<std::size_t>(from)],
+                          &b = t[static_cast<std::size_t>((from + 1) % 3)];
+    const Eigen::Vector3d through =
+        i % 4 < 2
+            ? Eigen::Vector3d(a + (random.below(4) ? random.unit() : random.below(2)) * (b - a))
+            : pointOn(t, random);
+    const Eigen::Vector3d origin = through + random.inCube();
+    RaySegment ray{origin, through - origin, -10.0, 10.0};
+    if (i % 4 >= 2) {
+      const std::optional<RayInterval> whole = intersectRay(ray, t[0], t[1], t[2]);
+      if (!whole) continue;
+      double end = whole->first;
+      for (int k = random.below(3); k > 0; --k)
+        end = std::nextafter(end, random.below(2) ? 10.0 : -10.0);
+      (random.below(2) ? ray.tMin : ray.tMax) = end;
+    }
+    SCOPED_TRACE(i);
+    expectShared(ray, t, hits);
+  }
+  EXPECT_GT(hits, cases / 4);
+  EXPECT_LT(hits, cases * 3 / 4);
+}
+
+}  // namespace
+}  // namespace palpate::test
