@@ -323,7 +323,7 @@ class Feet {
     // The weights of b and c, of which the larger one gives way if the sum exceeds 1.
     const V one = hn::Set(d, 1.0);
     V wb = toUnit(s + toGrid(sFine)), wc = toUnit(t + toGrid(tFine));
-    const V excess = hn::Max(hn::Zero(d), wb + wc - one);
+    const V excess = hn::Max(hn::Zero(d), wb - (one - wc));
     const Mask ofB = hn::Gt(wb, wc);
     wb = hn::IfThenElse(ofB, wb - excess, wb);
     wc = hn::IfThenElse(ofB, wc, wc - excess);

@@ -19,6 +19,10 @@
 // The thresholds below are these errors, rounded up, times 1 + thickness. The factor covers the
 // effect of the same errors on |n| and |u| in products with the thickness. A comparison with NaN is
 // false, and drops no feature pair.
+//
+// The thresholds also cover underflow. A value of degree d in the edges is at most 14 |u|^d, and its
+// threshold at least 2^-15 |u|^(d - 1). Where the value is larger, edges are longer than 2^-19, and
+// what their products lose (2^-149 each) is far below the threshold.
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "NarrowPhase/ProximityFilter.cpp"
@@ -86,9 +90,8 @@ struct TriangleFrame {
     normal = cross(edge[0], edge[1]);
     const V normalSquare = dot(normal, normal);
     const V slack = (hn::Set(d, 1.0f) + thickness) * hn::Set(d, 0x1p-22f);
-    const V tiny = hn::Set(d, 1e-37f);
-    height = thickness * hn::Sqrt(normalSquare) + hn::Set(d, 128.0f) * slack * length + tiny;
-    const V side = hn::Set(d, 192.0f) * slack * (length * length) + tiny;
+    height = thickness * hn::Sqrt(normalSquare) + hn::Set(d, 128.0f) * slack * length;
+    const V side = hn::Set(d, 192.0f) * slack * (length * length);
     for (int i = 0; i < 3; ++i) {
       inward[i] = cross(normal, edge[i]);
       beyond[i] = hn::Neg(thickness * hn::Sqrt(normalSquare * square[i]) + side);
@@ -183,10 +186,10 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
     }
 
     const V slack = (hn::Set(d, 1.0f) + thickness) * hn::Set(d, 0x1p-22f);
-    const V longest = hn::Max(a.length, b.length) * slack, tiny = hn::Set(d, 1e-37f);
-    const V heightError = hn::Set(d, 128.0f) * longest + tiny;
-    const V sError = hn::Set(d, 640.0f) * longest * b.length + tiny;
-    const V tError = hn::Set(d, 640.0f) * longest * a.length + tiny;
+    const V longest = hn::Max(a.length, b.length) * slack;
+    const V heightError = hn::Set(d, 128.0f) * longest;
+    const V sError = hn::Set(d, 640.0f) * longest * b.length;
+    const V tError = hn::Set(d, 640.0f) * longest * a.length;
     const V thicknessSquare = thickness * thickness;
     V distanceA[3], distanceB[3];  // edges' lengths times checkedEdgeDistance
     for (int i = 0; i < 3 && kKeepsNearEdges; ++i) {
@@ -200,7 +203,7 @@ HWY_ATTR void filterScaled(const ScaledBatch& scaled, std::uint32_t (&possible)[
         const Vector3<V> n = cross(u, v);
         const V normalSquare = dot(n, n);
         const V height = hn::Max(hn::Abs(dot(n, r)) - heightError, hn::Zero(d));
-        auto isOut = hn::Gt(height * height, thicknessSquare * normalSquare + tiny);
+        auto isOut = hn::Gt(height * height, thicknessSquare * normalSquare);
         if constexpr (kDistinct) {
           const V uv = dot(u, v), ur = dot(u, r), vr = dot(v, r);
           const V s = uv * vr - b.square[j] * ur;

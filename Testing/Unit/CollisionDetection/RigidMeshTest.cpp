@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 
 bool sameContacts(const CollisionData& a, const CollisionData& b) { return a.hash() == b.hash(); }
 
-Matrix3d randomRotation(Random& random) {
+Matrix3d anyRotation(Random& random) {
   return Eigen::AngleAxisd(uniform(random, -3, 3), randomPoint(random, -1, 1).normalized())
       .toRotationMatrix();
 }
@@ -58,7 +58,7 @@ TEST(RigidMesh, HasTheContactsOfAPair) {
     std::size_t found = 0;
     CollisionData contacts;
     for (int i = 0; i < (engine == Engine::Octree ? 100 : 20); ++i) {
-      const Matrix3d rotation = randomRotation(random);
+      const Matrix3d rotation = anyRotation(random);
       const Vector3d translation = randomPoint(random, 0.1, 0.9);
       collisions.setTransform(tool, rotation, translation);
       collisions.detectCollision();

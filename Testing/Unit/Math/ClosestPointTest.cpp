@@ -132,6 +132,23 @@ TEST(ClosestPoint, EveryRegionBorderOfTwoEdgesIsCrossed) {
         }
 }
 
+/// Found by fuzzing: the weights of b and c are 1/2 and 2^-53 more, whose sum is rounded to 1.
+TEST(ClosestPoint, WeightsNextToTheLongestEdgeAreNotNegative) {
+  checkVertexTriangle({Vector3d(0x1.0000000000003p-66, 0x1.78p+34, 0x1.78p+34),
+                       Vector3d(0x1.78p+34, 0x1.78p+35, 0x1.7800000000001p+34),
+                       Vector3d(0, 0x1.68p+19, 0x1.aef94p-72), Vector3d(0, 0, 0)});
+  RandomFeatures random;
+  for (int i = 0; i < 4000 && !HasFailure(); ++i) {
+    const Vector3d b = random.vector(), c = random.vector(),
+                   a = 0.5 * (b + c) + 0.3 * random.vector(),
+                   normal = (b - a).cross(c - a).normalized();
+    const double s = 0.5 + 0.1 * random.smallPower() * random.real();
+    const Vector3d p = b + s * (c - b) + random.real() * random.smallPower() * normal +
+                       0x1p-53 * random.below(3) * (a - b);
+    checkVertexTriangle({p, a, b, c});
+  }
+}
+
 /// Edges far apart for their length. Their common perpendicular passes exactly through an end, and
 /// products with the vector between the edges round.
 TEST(ClosestPoint, FarEdgesAreClassifiedExactly) {

@@ -3,6 +3,7 @@
 #include "Core/SimdPath.h"
 #include "Math/ClosestPoint.h"
 
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -20,7 +21,7 @@ using Four = std::array<Vector3d, 4>;  // p a b c
 
 class Cases {
  public:
-  static constexpr int kKinds = 10;
+  static constexpr int kKinds = 11;
 
   Four next(int kind) {
     Four x = {vector(), vector(), vector(), vector()};
@@ -54,6 +55,12 @@ class Cases {
         x[0] = x[1 + below(3)];
         if (below(2) == 0) x[0] += smallPower() * vector();
         break;
+      case 10: {  // next to the middle of the longest edge, where two weights are 1/2
+        x[1] = 0.5 * (x[2] + x[3]) + 0.3 * x[1];
+        const Vector3d normal = (x[2] - x[1]).cross(x[3] - x[1]);
+        x[0] = 0.5 * (x[2] + x[3]) + 0x1p-53 * vector() + real() * smallPower() * normal;
+        break;
+      }
     }
     return x;
   }

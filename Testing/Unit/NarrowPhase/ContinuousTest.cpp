@@ -1,5 +1,8 @@
 #include "Diagnostics/ContactsByBruteForce.h"
+#include "Math/MotionBound.h"
+#include "Mesh/RestDistance.h"
 #include "NarrowPhase/Continuous.h"
+#include "NarrowPhase/StepCheck.h"
 
 #include "Common/RandomMeshes.h"
 #include "Mesh/FloatPositions.h"
@@ -122,6 +125,104 @@ TEST(Continuous, MatchesBruteForce) {
     expectSameAsBruteForce({a, b, {Method::Continuous, thickness, Contacts::All}});
     expectSameAsBruteForce({a, a, {Method::Continuous, thickness, Contacts::All}});
   }
+}
+
+/// What the rest of the step may leave of the distance at an impact.
+template <ImpactQuery::Kind kind>
+double leftOf(const Features<kind>& features, std::uint32_t first, std::uint32_t second,
+              double time, double distance, const StepPlan& step) {
+  const double rounding = step.motionWithRounding - step.motion,
+               most = (1.0 - time) * step.motion + rounding,
+               own = (1.0 - time) * motionBound<kind>(features.query(first, second)) + rounding;
+  return std::max(0.0, distance - (distance <= most ? own : most));
+}
+
+/// The clearance from its definition, of all contacts that were found.
+double clearanceOf(const MeshPair& pair, const ContactBuffers& found) {
+  using Kind = ImpactQuery::Kind;
+  double least = kUnbounded;
+  const auto add = [&](const auto& features, std::uint32_t first, std::uint32_t second,
+                       const auto& contact) {
+    least = std::min(
+        least, leftOf(features, first, second, contact.timeOfImpact, contact.distance, pair.step));
+  };
+  for (const auto& c : found.vertexTriangle)
+    add(Features<Kind::VertexTriangle>{pair.a, pair.b}, c.vertex, c.triangle, c);
+  for (const auto& c : found.triangleVertex)
+    add(Features<Kind::VertexTriangle>{pair.b, pair.a}, c.vertex, c.triangle, c);
+  for (const auto& c : found.edgeEdge)
+    add(Features<Kind::EdgeEdge>{pair.a, pair.b}, pair.a.topology.edgeOf(c.edgeA),
+        pair.b.topology.edgeOf(c.edgeB), c);
+  return least;
+}
+
+/// Features that are near at rest are no contacts, but count for the clearance.
+TEST(Continuous, ClearanceIsThatOfAllImpactsWhetherFilteredOrNot) {
+  testing::Random random(5);
+  int positive = 0, zero = 0, filtered = 0;
+  for (int i = 0; i < 60; ++i) {
+    TriangleMesh mesh = movingSoup(random, 20, 0.3, 0.0);
+    const double speed = std::exp2(testing::uniform(random, -12, 0)), thickness = 0.1;
+    std::vector<Vector3d> now(mesh.before.size());
+    double motion = 0.0;
+    for (std::uint32_t v = 0; v < now.size(); ++v) {
+      now[v] = mesh.before[v] + speed * (mesh.now[v] - mesh.before[v]);
+      motion = std::max(motion, 2.0 * (now[v] - mesh.before[v]).norm());
+    }
+    mesh.now = now;
+    MeshPair pair{mesh, mesh, {Method::Continuous, thickness, Contacts::All}};
+    pair.step.motion = motion;
+    pair.step.motionWithRounding = motion * (1.0 + 1e-12);
+    ContactBuffers all{}, some{};
+    findContinuous(pair, everyPair(mesh, mesh), all);
+    const double clearance = clearanceOf(pair, all);
+    EXPECT_EQ(all.facts.clearance, clearance) << i;
+    const IndexLists near = verticesWithin(mesh.topology, mesh.before.body(), 0.4, Threads(1));
+    pair.nearAtRest = &near;
+    findContinuous(pair, everyPair(mesh, mesh), some);
+    EXPECT_EQ(some.facts.clearance, clearance) << i;
+    positive += clearance > 0.0 && clearance < kUnbounded;
+    zero += clearance == 0.0;
+    filtered += some.edgeEdge.size() < all.edgeEdge.size();
+  }
+  EXPECT_GT(positive, 5);
+  EXPECT_GT(zero, 5);
+  EXPECT_GT(filtered, 20);
+}
+
+/// A vertex passes through a triangle. The triangle's corner is known to have been touched; the
+/// vertex is not.
+TEST(Continuous, ContactsBesideATouchAreReplacedByTheirImpacts) {
+  const std::vector<Vector3d> ground{{-4, -4, 0}, {4, -4, 0}, {0, 4, 0}};
+  const TriangleMesh a = meshOf({{0, 0, 1}, {1, 0, 3}, {0, 1, 3}},
+                                {{0, 0, -0.25}, {1, 0, 2}, {0, 1, 2}}, {{0, 1, 2}}),
+                     b = meshOf(ground, ground, {{0, 1, 2}});
+  const VertexTriangleContact atEnd{.vertex = 0,
+                                    .triangle = 0,
+                                    .corners = {0, 1, 2},
+                                    .normal = {0, 0, -1},
+                                    .distance = 0.25,
+                                    .timeOfImpact = 1.0};
+  for (const bool swapped : {false, true})
+    for (const bool ofVertex : {false, true})
+      for (const bool ofCorner : {false, true}) {
+        const MeshPair pair{swapped ? b : a, swapped ? a : b, {Method::Auto, 0.5}};
+        StepFacts touched;
+        auto &vertices = swapped ? touched.verticesB : touched.verticesA,
+             &corners = swapped ? touched.verticesA : touched.verticesB;
+        if (ofVertex) vertices.push_back(0);
+        if (ofCorner) corners.push_back(2);
+        ContactBuffers found{}, out{};
+        (swapped ? found.triangleVertex : found.vertexTriangle).push_back(atEnd);
+        replaceByImpacts(pair, touched, found, out);
+        const std::size_t replaced = ofVertex || ofCorner;
+        EXPECT_EQ(found.vertexTriangle.size() + found.triangleVertex.size(), 1 - replaced);
+        const auto& impacts = swapped ? out.triangleVertex : out.vertexTriangle;
+        ASSERT_EQ(impacts.size(), replaced);
+        if (replaced) {
+          EXPECT_LT(impacts[0].timeOfImpact, 1.0);
+        }
+      }
 }
 
 TEST(Continuous, EarliestTimeDoesNotDependOnOrderOrBatches) {

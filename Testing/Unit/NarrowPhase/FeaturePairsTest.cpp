@@ -11,6 +11,8 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <set>
 #include <string>
 
@@ -82,6 +84,70 @@ TEST(FeaturePairs, KeepOverlappingPairsUpToAnyTime) {
       EXPECT_LE(corners.size() + edges.size(), overlapping + 2 + overlapping / 100) << upTo;
     }
   }
+}
+
+/// Triangles that reach, up to rounding, to the same coordinate at upTo: one comes from either
+/// side, and all their other coordinates overlap. At rest, they are the thickness apart.
+TEST(FeaturePairs, KeepBoxesThatTouch) {
+  testing::Random random(4);
+  const std::vector<Triangle> triangle{{0, 1, 2}};
+  const MeshTopology topology(3, triangle), copy = topology;
+  std::size_t kept = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const bool atRest = i % 2;
+    const float upTo = static_cast<float>(testing::uniform(random, 0.01, 0.99));
+    const int axis = i / 2 % 3;
+    const double size = i % 5 ? std::exp2(testing::uniform(random, -20, 20))
+                              : std::exp2(testing::uniform(random, -148, -100)),
+                 thickness =
+                     atRest && i % 7 ? size * std::exp2(testing::uniform(random, -20, 1)) : 0.0;
+    std::vector<Vector3d> before(3), now(3), other(3);
+    for (auto* positions : {&before, &now, &other})
+      for (Vector3d& p : *positions) p = size * testing::randomPoint(random, -1, 1);
+    // The vertices that reach furthest up, and down.
+    const double u = upTo;
+    double reach = -std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (atRest) before[k] = now[k];
+      reach = std::max({reach, before[k][axis], (1 - u) * before[k][axis] + u * now[k][axis]});
+    }
+    double lowest = std::numeric_limits<double>::infinity();
+    for (const Vector3d& p : other) lowest = std::min(lowest, p[axis]);
+    for (Vector3d& p : other) p[axis] += reach + thickness - lowest;
+    for (Vector3d& p : other)
+      p[axis] = std::nextafter(std::nextafter(p[axis], -HUGE_VAL), -HUGE_VAL);
+    // All other coordinates overlap at the step's start.
+    for (int k = 0; k < 3; ++k)
+      if (k != axis) {
+        before[0][k] = now[0][k] = -2 * size;
+        before[1][k] = now[1][k] = 2 * size;
+      }
+    if (i % 3 == 0)  // reaching down
+      for (auto* positions : {&before, &now, &other})
+        for (Vector3d& p : *positions) p = -p;
+    std::vector<FloatPoint> a(3), b(3), aBefore(3);
+    toFloats(now, {}, a.data());
+    toFloats(before, {}, aBefore.data());
+    toFloats(other, {}, b.data());
+    TreePair shift{};
+    setShift(shift, {}, thickness);
+    FloatPair floats{a.data(), b.data(), nullptr, nullptr, shift.shiftLower, shift.shiftUpper};
+    if (!atRest) {
+      floats.beforeA = aBefore.data();
+      floats.beforeB = b.data();
+      floats.upTo = upTo;
+    }
+    Buffer<ElementPair> candidates{{0, 0}};
+    FeaturePairs pairs;
+    findFeaturePairs(topology, copy, &floats, candidates, pairs);
+    kept += pairs.triangleVertex.size();
+    if (atRest) {
+      keepOverlapping(topology, copy, floats, candidates);
+      ASSERT_EQ(candidates.size(), 1u) << i;
+    }
+    ASSERT_FALSE(pairs.triangleVertex.empty()) << i;
+  }
+  EXPECT_LT(kept, 3 * 4000u / 2);
 }
 
 using Ids = std::array<std::uint32_t, 2>;

@@ -137,6 +137,41 @@ TEST(IntersectionFilter, KeepsCornersOnThePlane) {
   EXPECT_EQ(std::count(isKept.begin(), isKept.end(), false), 0);
 }
 
+/// A sliver, and a triangle that touches the middle of its side. Along one axis only that corner is
+/// far from the sliver's first corner, and only there do products round.
+TEST(IntersectionFilter, KeepsCornersThatBoundTheErrorAlone) {
+  Random random(4);
+  Side a, b;
+  std::vector<ElementPair> pairs;
+  for (std::uint32_t i = 0; i < 20000; ++i) {
+    const int x = random.below(3), y = (x + 1) % 3, z = (x + 2) % 3;
+    const auto whole = [&] { return std::floor(0x1p31 * random.unit()) + 1.0; };
+    Corners triangle = cornersOf([] { return Vector3d(0, 0, 0); });
+    const double across = whole(), up = whole();
+    triangle[1][x] = across;
+    triangle[1][z] = up;
+    triangle[2][x] = 2 * random.between(1, 9) - across;
+    triangle[2][z] = 2 * random.between(1, 9) - up;
+    triangle[1][y] = 2 * whole();
+    triangle[2][y] = 2 * whole();
+    if (random.below(2)) triangle[2][x] += 1.0, triangle[1][x] += 1.0;
+    const Vector3d normal = triangle[1].cross(triangle[2]);
+    const double side = random.below(2) ? 1.0 : -1.0;
+    Corners other = cornersOf([&] {
+      Vector3d corner(0, 0, 0);
+      corner[x] = std::copysign(whole(), side * normal[x]);
+      corner[z] = std::copysign(whole(), side * normal[z]);
+      return corner;
+    });
+    other[random.below(3)] = (triangle[1] + triangle[2]) / 2;
+    a.add(triangle);
+    b.add(other);
+    pairs.push_back({i, i});
+  }
+  const std::vector<bool> isKept = answersTo(a.placed(), b.placed(), false, pairs).isKept;
+  EXPECT_EQ(std::count(isKept.begin(), isKept.end(), false), 0);
+}
+
 TEST(IntersectionFilter, IgnoresCommonCornersOfOneMeshAsTheDefinitionDoes) {
   Random random(3);
   int found = 0, left = 0;

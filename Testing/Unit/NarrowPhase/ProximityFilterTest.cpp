@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -43,12 +44,13 @@ std::optional<double> distanceOf(const Pair& x, int test, bool distinct) {
   return answer ? std::optional(answer->distance) : std::nullopt;
 }
 
-Possible filter(const std::vector<Pair>& pairs, double thickness, bool distinct) {
+Possible filter(const std::vector<Pair>& pairs, double thickness, bool distinct,
+                double checkedEdgeDistance = 0.0) {
   TrianglePairBatch batch{};
   for (std::size_t n = 0; n < pairs.size(); ++n)
     for (int row = 0; row < 18; ++row) batch.coordinates[row][n] = pairs[n][row / 3][row % 3];
   std::uint32_t possible[TrianglePairBatch::kSize];
-  findPossibleProximity(batch, thickness, distinct, 0.0, possible);
+  findPossibleProximity(batch, thickness, distinct, checkedEdgeDistance, possible);
   return std::to_array(possible);
 }
 
@@ -63,7 +65,7 @@ class RandomPoints {
   std::mt19937_64 m_engine{3};
 };
 
-constexpr int kKinds = 7;
+constexpr int kKinds = 11;
 
 Pair pairOf(int kind, RandomPoints& random) {
   Pair x;
@@ -88,6 +90,40 @@ Pair pairOf(int kind, RandomPoints& random) {
       for (int i = 3; i < 6; ++i)
         x[i] = x[i - 3] + 0.1 * Vector3d::Ones() + random.smallPower() * x[i];
       break;
+    case 7: {  // a tiny one beyond the other's outermost corner
+      const int axis = random.below(3);
+      const auto before = [axis](const Vector3d& l, const Vector3d& r) {
+        return l[axis] < r[axis];
+      };
+      const Vector3d corner = *std::max_element(x.begin(), x.begin() + 3, before);
+      const double size = std::ldexp(1.0, -12 - random.below(30));
+      for (int i = 3; i < 6; ++i) {
+        x[i] = corner + size * x[i].cwiseAbs();
+        x[i][axis] += std::ldexp(1.0, -3 - random.below(14));
+      }
+      break;
+    }
+    case 8: {  // edges that cross near an end of one of them
+      const double s = random.real(), t = random.smallPower();
+      const Vector3d v = x[4] - x[3], normal = (x[1] - x[0]).cross(v);
+      x[3] = x[0] + 0.5 * (1 + s) * (x[1] - x[0]) - t * v + random.real() * normal;
+      x[4] = x[3] + v;
+      if (random.below(2)) std::swap(x[3], x[4]);
+      if (random.below(2))
+        for (int i = 0; i < 3; ++i) std::swap(x[i], x[i + 3]);
+      break;
+    }
+    case 9: {  // one smaller than the other, in line with it
+      const double size = std::ldexp(1.0, -random.below(15));
+      for (int i = 3; i < 6; ++i) x[i] = x[0] + 0.4 * (x[1] - x[0]) + size * x[i];
+      break;
+    }
+    case 10: {  // flat along one axis
+      const double size = std::ldexp(1.0, -random.below(140));
+      const int axis = random.below(3);
+      for (Vector3d& v : x) v[axis] *= size;
+      break;
+    }
     case 6: {  // any scale
       const double scale = std::ldexp(1.0, random.below(2000) - 1000);
       for (Vector3d& v : x) v *= scale;
@@ -97,19 +133,24 @@ Pair pairOf(int kind, RandomPoints& random) {
   return x;
 }
 
-/// The thickness is exactly the distance of one of the feature pairs, which must be kept.
+/// The thickness is exactly the distance of one of the feature pairs, which must be kept, or a
+/// little more.
 TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
   RandomPoints random;
   std::size_t within = 0;
-  for (int round = 0; round < 1400; ++round) {
+  for (int round = 0; round < 4400; ++round) {
     const int kind = round % kKinds;
     std::vector<Pair> pairs;
     for (int i = 0; i < TrianglePairBatch::kSize; ++i) pairs.push_back(pairOf(kind, random));
     const bool distinct = random.below(2) == 0;
     const Pair& chosen = pairs[random.below(TrianglePairBatch::kSize)];
     const int corner = random.below(6);
-    const int test = corner < 3 ? cornerTestOfA(corner) : cornerTestOfB(corner - 3);
-    const double thickness = distanceOf(chosen, test, distinct).value();
+    const int ofCorner = corner < 3 ? cornerTestOfA(corner) : cornerTestOfB(corner - 3);
+    const std::optional<double> ofEdges =
+        distanceOf(chosen, edgeTest(random.below(3), random.below(3)), distinct);
+    const double thickness = ofEdges && random.below(3)
+                                 ? *ofEdges * (random.below(2) ? 1.0 : 1.0 + random.smallPower())
+                                 : distanceOf(chosen, ofCorner, distinct).value();
     const Possible possible = filter(pairs, thickness, distinct);
     for (std::size_t n = 0; n < pairs.size(); ++n) {
       for (int other = 0; other < kTests; ++other) {
@@ -122,6 +163,36 @@ TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
     }
   }
   EXPECT_GT(within, 5000u);
+}
+
+/// Edges whose closest points are ends are kept as well, up to a distance of their own.
+TEST(ProximityFilter, KeepsEdgesWithinTheCheckedDistance) {
+  RandomPoints random;
+  std::size_t ends = 0;
+  for (int round = 0; round < 2200; ++round) {
+    const int kind = round % kKinds;
+    std::vector<Pair> pairs;
+    for (int i = 0; i < TrianglePairBatch::kSize; ++i) {
+      pairs.push_back(pairOf(kind, random));
+      if (random.below(2))  // in one plane
+        for (Vector3d& v : pairs.back()) v.z() = 0.25 * v.x();
+    }
+    const Pair& chosen = pairs[random.below(TrianglePairBatch::kSize)];
+    const double checked =
+        distanceOf(chosen, edgeTest(random.below(3), random.below(3)), false).value();
+    if (checked == 0.0) continue;
+    const Possible possible = filter(pairs, checked * (random.below(2) ? 1.0 : 1.5), true, checked);
+    for (std::size_t n = 0; n < pairs.size(); ++n)
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+          const int test = edgeTest(i, j);
+          if (!(distanceOf(pairs[n], test, false).value() <= checked)) continue;
+          ends += !distanceOf(pairs[n], test, true);
+          ASSERT_TRUE(possible[n] >> test & 1)
+              << "kind " << kind << ", round " << round << ", test " << test;
+        }
+  }
+  EXPECT_GT(ends, 5000u);
 }
 
 TEST(ProximityFilter, EverySimdPathDropsTheSamePairs) {

@@ -1,6 +1,7 @@
 #include "Diagnostics/ContactsByBruteForce.h"
 #include "NarrowPhase/NarrowPhase.h"
 #include "NarrowPhase/Proximity.h"
+#include "Octree/Traversal.h"
 
 #include "Meshes.h"
 
@@ -295,6 +296,57 @@ TEST(Proximity, FeaturesOfSegmentsAndPointsHaveTheirFirstName) {
                 first - std::begin(cornersOf))
           << corners[0] << corners[1] << corners[2] << ", " << bits;
     }
+}
+
+/// A crumpled fan of long and short triangles around one vertex, in floats.
+TEST(Proximity, TrianglesAroundOneVertexAgreeWithBruteForce) {
+  Random random;
+  std::size_t contacts = 0;
+  for (int i = 0; i < 6; ++i) {
+    SceneMesh fan;
+    fan.positions.push_back({0, 0, 0});
+    constexpr std::uint32_t kTriangles = 120;
+    for (std::uint32_t k = 0; k < 2 * kTriangles; ++k)
+      fan.positions.push_back(random.vector() * (k % 2 ? 1.0 : 0.3) * std::abs(random.real()));
+    for (std::uint32_t k = 0; k < kTriangles; ++k)
+      fan.triangles.push_back({0, 2 * k + 1, 2 * k + 2});
+    const TriangleMesh mesh = meshOf(fan);
+    for (const double thickness : {0.0, 0.004, 0.03}) {
+      std::vector<FloatPoint> floats(fan.positions.size());
+      toFloats(fan.positions, {}, floats.data());
+      TreePair shift{};
+      setShift(shift, {}, thickness);
+      const FloatPair floatPair{floats.data(), floats.data(),    nullptr,
+                                nullptr,       shift.shiftLower, shift.shiftUpper};
+      const MeshPair pair{mesh, mesh, {Method::Proximity, thickness, Contacts::All}, &floatPair};
+      ContactBuffers fast{}, oracle{};
+      findContacts(pair, candidatesOf(pair), fast);
+      findContactsByBruteForce(pair, oracle);
+      EXPECT_TRUE(sortedRows(fast.vertexTriangle) == sortedRows(oracle.vertexTriangle)) << i;
+      EXPECT_TRUE(sortedRows(fast.edgeEdge) == sortedRows(oracle.edgeEdge)) << i;
+      contacts += oracle.vertexTriangle.size() + oracle.edgeEdge.size();
+    }
+  }
+  EXPECT_GT(contacts, 1000u);
+}
+
+/// A vertex is not tested with the triangles around it, and of two points each pair is tested once.
+TEST(Proximity, ExcludesAVertexWithTheElementsAroundIt) {
+  const TriangleMesh triangles = meshOf(scenes::sheet(2)), other = triangles;
+  const MeshPair self{triangles, triangles, {}}, two{triangles, other, {}};
+  for (std::uint32_t v = 0; v < triangles.topology.vertexCount; ++v)
+    for (std::uint32_t t = 0; t < triangles.topology.triangles.size(); ++t) {
+      const Triangle& corners = triangles.topology.triangles[t];
+      EXPECT_EQ(self.excludesVertex(v, t),
+                std::find(corners.begin(), corners.end(), v) != corners.end());
+      EXPECT_FALSE(two.excludesVertex(v, t));
+    }
+  TriangleMesh points = triangles;
+  points.topology.type = GeometryType::Points;
+  for (std::uint32_t t = 0; t < 4; ++t) points.topology.triangles[t] = {t, t, t};
+  const MeshPair ofPoints{points, points, {}};
+  for (std::uint32_t v = 0; v < 4; ++v)
+    for (std::uint32_t t = 0; t < 4; ++t) EXPECT_EQ(ofPoints.excludesVertex(v, t), t <= v);
 }
 
 TEST(Proximity, ThicknessLargerThanEverythingAgreesWithBruteForce) {

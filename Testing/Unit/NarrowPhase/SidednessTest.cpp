@@ -104,6 +104,32 @@ std::vector<Row> outward(const Mesh& body, const std::vector<Touch>& touches, bo
   return rows;
 }
 
+/// The tip of a body touches a triangle whose normal points away from the body, or an edge that
+/// lies on one of its edges: contacts without a distance have no side.
+TEST(Sidedness, TouchingFeaturesAreKept) {
+  const Positions tip{{0, 0, 0}, {-1, -1, -2}, {1, -1, -2}, {0, 1, -2}},
+      plate{{-3, -3, 0}, {3, -3, 0}, {0, 3, 0}};
+  const std::vector<Triangle> faces{{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {1, 3, 2}};
+  for (const bool turned : {false, true})
+    for (const bool swapped : {false, true}) {
+      OctreeBasedCD detection(settingsOf(Engine::Octree));
+      const auto addTip = [&] { return detection.addTriangleMesh(tip, faces); };
+      const auto addPlate = [&] {
+        return detection.addTriangleMesh(
+            plate, std::vector<Triangle>{turned ? Triangle{0, 2, 1} : Triangle{0, 1, 2}});
+      };
+      const GeometryId first = swapped ? addPlate() : addTip(),
+                       second = swapped ? addTip() : addPlate(), body = swapped ? second : first;
+      detection.addCollisionPair(first, second, {.method = Method::Proximity, .thickness = 0.5});
+      detection.setCollisionFilter(body, {1, 1, Sidedness::Outer});
+      detection.detectCollision();
+      const CollisionData& data = detection.collisionData(first, second);
+      const auto& contacts = swapped ? data.triangleVertex() : data.vertexTriangle();
+      ASSERT_EQ(contacts.size(), 1u) << turned << swapped;
+      EXPECT_EQ(contacts[0].distance, 0.0);
+    }
+}
+
 struct SidedTool {
   Positions before, now;
   std::vector<Segment> segments;  ///< none: points
