@@ -226,7 +226,7 @@ TEST(ClosestPoint, CommonEndsAreNearest) {
 /// Their differences are moderate, but not their coordinates, whose error compensation would carry.
 TEST(ClosestPoint, NearlyParallelEdgesFarFromTheOriginAreDecidedExactly) {
   RandomFeatures random;
-  const auto onGrid = [&](int size) {
+  const auto onGrid = [&](int size) -> Vector3d {
     return Vector3d(random.below(size), random.below(size), random.below(size)) * 0x1p50;
   };
   for (int i = 0; i < 2000 && !HasFailure(); ++i) {

@@ -122,13 +122,13 @@ TEST(ImpactFilter, KeepsEveryTouchWhereProductsUnderflow) {
   HardCases hard(19);
   test::Random random(19);
   for (int i = 0; i < 3000; ++i) {
-    constexpr ImpactKind kKinds[] = {ImpactKind::TouchAtStart, ImpactKind::TouchAtEnd,
-                                     ImpactKind::TouchHalfway};
+    constexpr ImpactKind kTouches[] = {ImpactKind::TouchAtStart, ImpactKind::TouchAtEnd,
+                                       ImpactKind::TouchHalfway};
     const int axis = i % 2 ? random.below(3) : 3,
               exponent = i % 2 ? random.between(-550, -530) : random.between(-366, -345);
     Eight eight;
     for (ImpactCase& query : eight)
-      query = hard.next(kKinds[i % 3], i / 2 % 2).mapped([&](Eigen::Vector3d p) {
+      query = hard.next(kTouches[i % 3], i / 2 % 2).mapped([&](Eigen::Vector3d p) {
         for (int k = 0; k < 3; ++k) p[k] = std::ldexp(p[k], k == axis ? 900 : exponent);
         return p;
       });

@@ -126,11 +126,11 @@ TEST(TimeOfImpact, FindsEveryTouchOfFeaturesThatAreNearlyFlat) {
   HardCases hard(18);
   test::Random random(18);
   for (int i = 0; i < 20000; ++i) {
-    constexpr ImpactKind kKinds[] = {ImpactKind::TouchAtStart, ImpactKind::TouchAtEnd,
-                                     ImpactKind::TouchHalfway};
+    constexpr ImpactKind kTouches[] = {ImpactKind::TouchAtStart, ImpactKind::TouchAtEnd,
+                                       ImpactKind::TouchHalfway};
     const int axis = random.below(3), exponent = random.between(-1074, -1060),
               across = -random.below(12);
-    const ImpactCase query = hard.next(kKinds[i % 3]).mapped([&](Eigen::Vector3d p) {
+    const ImpactCase query = hard.next(kTouches[i % 3]).mapped([&](Eigen::Vector3d p) {
       for (int k = 0; k < 3; ++k) p[k] = std::ldexp(p[k], k == axis ? exponent : across);
       return p;
     });

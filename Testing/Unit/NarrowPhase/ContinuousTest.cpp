@@ -200,6 +200,7 @@ TEST(Continuous, ContactsBesideATouchAreReplacedByTheirImpacts) {
   const VertexTriangleContact atEnd{.vertex = 0,
                                     .triangle = 0,
                                     .corners = {0, 1, 2},
+                                    .barycentric = {0.25, 0.25, 0.5},
                                     .normal = {0, 0, -1},
                                     .distance = 0.25,
                                     .timeOfImpact = 1.0};

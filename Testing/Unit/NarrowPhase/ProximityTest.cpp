@@ -142,7 +142,7 @@ std::size_t expectSame(const SceneMesh& a, const SceneMesh& b, double thickness)
 
 // ---- Meshes ----
 
-class Random {
+class RandomVectors {
  public:
   double real() { return std::uniform_real_distribution<double>(-1, 1)(m_engine); }
   std::uint32_t below(std::uint32_t n) { return static_cast<std::uint32_t>(m_engine() % n); }
@@ -153,7 +153,8 @@ class Random {
 };
 
 /// Triangles between random vertices, with repeated corners and non-manifold edges.
-SceneMesh soup(std::uint32_t vertices, std::uint32_t triangles, double size, Random& random) {
+SceneMesh soup(std::uint32_t vertices, std::uint32_t triangles, double size,
+               RandomVectors& random) {
   SceneMesh mesh;
   for (std::uint32_t i = 0; i < vertices; ++i) mesh.positions.push_back(size * random.vector());
   for (std::uint32_t i = 0; i < triangles; ++i)
@@ -195,7 +196,7 @@ SceneMesh wavySheet(int cells, double phase) {
 // ---- Tests ----
 
 TEST(Proximity, RandomSoupsAgreeWithBruteForce) {
-  Random random;
+  RandomVectors random;
   std::size_t contacts = 0;
   for (int i = 0; i < 12; ++i) {
     SCOPED_TRACE("soup " + std::to_string(i));
@@ -246,7 +247,7 @@ TEST(Proximity, OffsetsAndScalesAgreeWithBruteForce) {
 }
 
 TEST(Proximity, DegenerateMeshesAgreeWithBruteForce) {
-  Random random;
+  RandomVectors random;
   SceneMesh degenerate = scenes::sheet(4);
   // Duplicate triangles, zero areas by value and by index, a point, slivers, huge and tiny ones.
   degenerate.triangles.push_back(degenerate.triangles[3]);
@@ -300,7 +301,7 @@ TEST(Proximity, FeaturesOfSegmentsAndPointsHaveTheirFirstName) {
 
 /// A crumpled fan of long and short triangles around one vertex, in floats.
 TEST(Proximity, TrianglesAroundOneVertexAgreeWithBruteForce) {
-  Random random;
+  RandomVectors random;
   std::size_t contacts = 0;
   for (int i = 0; i < 6; ++i) {
     SceneMesh fan;
