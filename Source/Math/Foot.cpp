@@ -34,13 +34,15 @@ double halvedWeight(const Weight& weight) {
   return std::clamp(0.5 * (1.0 + weight.coarse) + toGrid(0.5 * weight.fine), 0.0, 1.0);
 }
 
-/// Calls find(positions...) with positions scaled near 1, and scales the result back. Calls
-/// exactly(positions...) instead if scaling would lose a bit.
+/// Calls find(positions...) with positions scaled so that differences are near 1, and scales the
+/// result back. Calls exactly(positions...) instead if scaling would lose a bit, or make positions
+/// so large that their sums might overflow.
 template <class Find, class Exactly, class... Positions>
 Foot atModerateScale(double extent, Find&& find, Exactly&& exactly, const Positions&... positions) {
   const int exponent = exponentTowardsOne(extent);
   const auto keepsBits = [&](const Vector3d& p) {
-    return scaled(scaled(p, exponent), -exponent) == p;
+    const Vector3d moved = scaled(p, exponent);
+    return largest(moved) < kOverflowGuard && scaled(moved, -exponent) == p;
   };
   if (!(keepsBits(positions) && ...)) return exactly(positions...);
   Foot foot = find(scaled(positions, exponent)...);

@@ -132,6 +132,25 @@ TEST(ClosestPoint, EveryRegionBorderOfTwoEdgesIsCrossed) {
         }
 }
 
+/// Found by fuzzing: scaled so that the differences are near 1, the positions' sums overflow.
+TEST(ClosestPoint, SmallDifferencesFarFromTheOriginDoNotOverflow) {
+  checkEdgeEdge({Vector3d(2, 0, 0x1.fp-1021), Vector3d(2, 0, 0x1p-1050),
+                 Vector3d(2, 0, 0x1.74p-1021), Vector3d(2, 0, 0x1.74p-1021)});
+  RandomFeatures random;
+  for (int i = 0; i < 4000 && !HasFailure(); ++i) {
+    Four x;
+    const int axis = random.below(3), exponent = random.below(1060) - 1074;
+    const double far = std::ldexp(1.0, exponent + 1010 + random.below(25));
+    for (Vector3d& p : x) {
+      p = Vector3d(random.below(9), random.below(9), random.below(9));
+      for (double& coordinate : p) coordinate = std::ldexp(coordinate, exponent);
+      p[axis] = far;
+    }
+    checkVertexTriangle(x);
+    checkEdgeEdge(x);
+  }
+}
+
 /// Found by fuzzing: the weights of b and c are 1/2 and 2^-53 more, whose sum is rounded to 1.
 TEST(ClosestPoint, WeightsNextToTheLongestEdgeAreNotNegative) {
   checkVertexTriangle({Vector3d(0x1.0000000000003p-66, 0x1.78p+34, 0x1.78p+34),
