@@ -492,6 +492,40 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForEveryShape) {
   EXPECT_GT(touching, 50u);
 }
 
+/// All elements are nearly at the same distance. Floats cannot tell which pair is the nearest.
+TEST(GeometryDistances, OctreesAnswerAsBruteForceForParallelPlates) {
+  Random random(210);
+  for (int round = 0; round < casesOf(60); ++round) {
+    const auto rough = [&] {
+      Mesh plate = sheet(9, 0.0, 0.0);
+      const double noise = std::exp2(uniform(random, -50, -18));
+      for (Vector3d& p : plate.positions) p.z() = noise * uniform(random, -1, 1);
+      return testGeometry(plate);
+    };
+    const TestGeometry a = rough(), b = rough();
+    const Matrix3d turn = randomTurn(random);
+    const Vector3d far =
+        randomPoint(random, -1, 1) * (round % 2 ? 1.0 : std::exp2(uniform(random, 10, 30)));
+    const double size = 5.0 + far.norm();
+    {
+      TwoBodies both(a, b);
+      both.put(both.a, a, turn, far, round % 3 == 0);
+      both.put(both.b, b, turn, far + turn * Vector3d(0.1, 0.2, 0.3), round % 4 < 2);
+      expectSameAnswers(both, 0.0, size);
+    }
+    for (const AnalyticalGeometry& shape :
+         {AnalyticalGeometry(Plane{{0, 0, -0.25}, {0, 0, 1}, false}),
+          AnalyticalGeometry(Box{{0.5, 0.5, -0.5}, {2, 2, 0.2}}),
+          AnalyticalGeometry(Capsule{{0, 0.5, -0.5}, {1, 0.5, -0.5}, 0.2})}) {
+      TwoBodies both(a, shape);
+      both.put(both.a, a, turn, far, round % 3 == 0);
+      both.change([&](OctreeBasedCD& each) { each.setTransform(both.b, turn, far); });
+      expectSameAnswers(both, 0.0, size);
+    }
+    ASSERT_FALSE(::testing::Test::HasFailure()) << round;
+  }
+}
+
 TEST(GeometryDistances, TwoShapes) {
   Random random(210);
   const std::vector<AnalyticalGeometry> shapes = allShapes(random);

@@ -179,6 +179,37 @@ TEST(RoundRays, EnterAndLeaveLinesAndPoints) {
 }
 
 /// Overlapping and touching elements are one body.
+TEST(RoundRays, WeightsAreOfTheNearestPointOfTheElement) {
+  Random random(305);
+  std::size_t hits = 0;
+  for (int round = 0; round < casesOf(40); ++round) {
+    TestGeometry line{GeometryType::Lines, {}, {}, {{0, 1}, {1, 2}}, {}};
+    for (int i = 0; i < 3; ++i) {
+      line.positions.push_back(randomPoint(random, 0, 1));
+      line.radii.resize(3);
+      line.radii[i] = uniform(random, 0.01, 0.1);
+    }
+    const Both both(line);
+    for (int i = 0; i < 20; ++i) {
+      const Vector3d through =
+          line.positions[1] +
+          uniform(random, -1, 1) * (line.positions[i % 2 ? 0 : 2] - line.positions[1]);
+      const Vector3d direction = randomPoint(random, -1, 1);
+      for (const RayHit& hit : consistentHitsOfBalls(both, {through - 2 * direction, direction})) {
+        const auto& [p, q, _] = hit.vertices;
+        const Vector3d at = through + (hit.t - 2) * direction,
+                       u = line.positions[q] - line.positions[p];
+        const double along =
+            std::clamp((at - line.positions[p]).dot(u) / u.squaredNorm(), 0.0, 1.0);
+        EXPECT_NEAR(hit.weights[1] + hit.weights[2], along, 1e-12);
+        EXPECT_NEAR(hit.weights.sum(), 1.0, 1e-15);
+        ++hits;
+      }
+    }
+  }
+  EXPECT_GE(hits, leastOf(500));
+}
+
 TEST(RoundRays, OverlappingElementsAreOneBody) {
   const TestGeometry row{
       GeometryType::Points, {{0, 0, 0}, {1.5, 0, 0}, {3, 0, 0}, {10, 0, 0}}, {}, {}, {1.0}};

@@ -289,6 +289,39 @@ TEST(ShapeOverlap, BoxesHullsAndFrustumsPlacedAnywhere) {
   }
 }
 
+/// Planes of triangles that are a million times as large as a box pass by one of its corners.
+TEST(ShapeOverlap, LargeTrianglesAtACornerOfABox) {
+  Random random(509);
+  std::size_t found = 0, left = 0;
+  for (int round = 0; round < casesOf(40); ++round) {
+    const Vector3d half = randomPoint(random, 0.1, 1.0), centre = randomPoint(random, -1, 1);
+    TestGeometry large;
+    for (std::uint32_t i = 0; i < 30; ++i) {
+      const Vector3d normal = randomPoint(random, -1, 1).normalized(), u = normal.unitOrthogonal(),
+                     v = normal.cross(u);
+      const Vector3d corner = centre + Vector3d(half.array() * normal.array().sign());
+      const Vector3d at =
+          corner + uniform(random, -1, 1) * std::exp2(uniform(random, -40, -26)) * normal;
+      for (int k = 0; k < 3; ++k) {
+        const double angle = 2.1 * k + uniform(random, 0, 0.5);
+        large.positions.push_back(at + 1e6 * (std::cos(angle) * u + std::sin(angle) * v));
+      }
+      large.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    const Both both(large);
+    const PlacedShape shape{AnalyticalGeometry(Box{centre, half})};
+    const std::vector<Wide> corners = wideCorners(shape);
+    const std::size_t count =
+        expectGaps(both, shape, large.triangles, 1e-11, [&](const Triangle& t) {
+          return separation(corners, wideCorners(large.positions, t), true);
+        });
+    found += count;
+    left += large.triangles.size() - count;
+  }
+  EXPECT_GE(found, leastOf(300));
+  EXPECT_GE(left, leastOf(300));
+}
+
 /// A rotation that is orthonormal only within the tolerance, of a body far from its own origin.
 TEST(ShapeOverlap, InexactRotationsFarFromTheBodysOrigin) {
   Random random(508);

@@ -28,8 +28,8 @@ using Positions = std::vector<Eigen::Vector3d>;
 
 /// A ball that deforms, a cube of tetrahedra that deforms every third step, a body that
 /// setTransform() moves, a still sheet, points, and a capsule.
-struct Scene {
-  explicit Scene(const Settings& settings = {.threads = 1}) : collisions(settings) {
+struct SnapshotScene {
+  explicit SnapshotScene(const Settings& settings = {.threads = 1}) : collisions(settings) {
     Random random(7);
     const Mesh ballMesh = sphere(12, 16, {0.5, 0.5, 0.5}, 0.4), sheetMesh = sheet(8, 0.5, 0);
     rest = ballMesh.positions;
@@ -69,7 +69,7 @@ struct Scene {
 };
 
 /// A hash of the answers of many queries.
-std::uint64_t hashOf(const Scene& scene, const SpatialQueries& queries) {
+std::uint64_t hashOf(const SnapshotScene& scene, const SpatialQueries& queries) {
   std::uint64_t hash = 14695981039346656037u;
   const auto add = [&](double value) {
     hash = (hash ^ std::bit_cast<std::uint64_t>(value)) * 1099511628211u;
@@ -100,7 +100,7 @@ std::uint64_t hashOf(const Scene& scene, const SpatialQueries& queries) {
 }
 
 TEST(Snapshot, HasNumberAndTime) {
-  Scene scene;
+  SnapshotScene scene;
   EXPECT_EQ(scene.collisions.latestSnapshot(), nullptr);
   scene.collisions.publish();
   const auto first = scene.collisions.latestSnapshot();
@@ -116,7 +116,7 @@ TEST(Snapshot, HasNumberAndTime) {
 /// Snapshots keep the answers of their frame while the frame goes on, for both engines.
 TEST(Snapshot, AnswersAsItsFrameDid) {
   for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
-    Scene scene({.engine = engine, .threads = 1});
+    SnapshotScene scene({.engine = engine, .threads = 1});
     std::vector<std::shared_ptr<const Snapshot>> kept;
     std::vector<std::uint64_t> expected;
     for (int i = 0; i < 8; ++i) {
@@ -139,7 +139,7 @@ TEST(Snapshot, AnswersAsItsFrameDid) {
 /// are those of its frame. Nothing else orders the threads, so that ThreadSanitizer sees a race.
 TEST(Snapshot, IsIsolatedFromTheSimulation) {
   constexpr int kSteps = 60, kReaders = 2;
-  Scene scene;
+  SnapshotScene scene;
   std::vector<std::uint64_t> expected{0};  // by number
   std::vector<std::vector<std::pair<std::uint64_t, std::uint64_t>>> answers(kReaders);
   std::atomic<int> progress = 0, ends = 0;
@@ -171,7 +171,7 @@ TEST(Snapshot, IsIsolatedFromTheSimulation) {
 
 /// Threads that need the same preparation of one copy, through two snapshots.
 TEST(Snapshot, PreparesOnceForManyThreads) {
-  Scene scene;
+  SnapshotScene scene;
   scene.step(1);
   const std::uint64_t expected = hashOf(scene, scene.collisions.queries());
   scene.collisions.publish();
@@ -188,7 +188,7 @@ TEST(Snapshot, PreparesOnceForManyThreads) {
 }
 
 TEST(Snapshot, SharesGeometriesThatDidNotMove) {
-  Scene scene;
+  SnapshotScene scene;
   std::vector<std::shared_ptr<const Snapshot>> kept;
   for (int i = 1; i < 3; ++i) {
     scene.step(i);
@@ -262,7 +262,7 @@ TEST(Snapshot, SharesCopiesAndReusesMemory) {
   for (int i = 0; i < 5; ++i) held.push_back(take(2 + i));
   EXPECT_EQ(pool->copyCount(), 5u + 1u);
   EXPECT_EQ(pool->slotCount(), 5u);
-  const auto same = pool->take(source, 0);
+  auto same = pool->take(source, 0);
   EXPECT_EQ(pool->copyCount(), 5u + 1u);
   for (int i = 0; i < 5; ++i)
     EXPECT_EQ(held[i]->queries().closestPoint(GeometryId{0}, {0, 0, 99})->distance, 97 - i);
@@ -274,6 +274,9 @@ TEST(Snapshot, SharesCopiesAndReusesMemory) {
   held = {take(1)};
   EXPECT_EQ(pool->copyCount(), 5u + 1u);  // `same` has the removed geometry
   EXPECT_TRUE(same->contains(GeometryId{1}));
+  same.reset();
+  held = {take(2)};
+  EXPECT_EQ(pool->copyCount(), 5u);
 }
 
 /// The last reader of a snapshot lets go while the next snapshot is made.
@@ -315,7 +318,7 @@ TEST(Snapshot, PositionsStayFiniteAndInAnyRoundingMode) {
 }
 
 TEST(Snapshot, HasTheMotionOfItsStep) {
-  Scene scene;
+  SnapshotScene scene;
   scene.step(1);
   const Positions before(scene.collisions.positions(scene.ball).begin(),
                          scene.collisions.positions(scene.ball).end());
@@ -348,11 +351,11 @@ TEST(Snapshot, HasTheMotionOfItsStep) {
 }
 
 TEST(Snapshot, MayOutliveItsOwner) {
-  std::optional<Scene> scene(std::in_place);
+  std::optional<SnapshotScene> scene(std::in_place);
   scene->step(1);
   scene->collisions.publish();
   auto snapshot = scene->collisions.latestSnapshot();
-  Scene other;
+  SnapshotScene other;
   const std::uint64_t expected = hashOf(other, snapshot->queries());
   OctreeBasedCD moved = std::move(scene->collisions);
   EXPECT_EQ(moved.latestSnapshot(), snapshot);
@@ -372,7 +375,7 @@ TEST(Snapshot, MayOutliveItsOwner) {
 }
 
 TEST(Snapshot, KeepsRemovedGeometriesAndOldTopology) {
-  Scene scene;
+  SnapshotScene scene;
   scene.collisions.publish();
   const auto old = scene.collisions.latestSnapshot();
   const std::uint64_t expected = hashOf(scene, old->queries());
@@ -401,7 +404,7 @@ TEST(Snapshot, KeepsRemovedGeometriesAndOldTopology) {
 
 /// A tracker follows vertices from snapshot to snapshot as from frame to frame.
 TEST(Snapshot, ServesPenetrationTrackers) {
-  Scene scene;
+  SnapshotScene scene;
   PenetrationTracker inFrames(scene.points, scene.ball), inSnapshots(scene.points, scene.ball);
   for (int i = 0; i < 5; ++i) {
     scene.step(i);
@@ -416,7 +419,7 @@ TEST(Snapshot, ServesPenetrationTrackers) {
 
 /// The mutex is not held while a snapshot is released or published: a predicate may ask for it.
 TEST(Snapshot, IsAvailableWithinCallbacks) {
-  Scene scene;
+  SnapshotScene scene;
   scene.collisions.publish();
   int calls = 0;
   scene.collisions.addCollisionPair(scene.points, scene.ball, {Method::Proximity, 0.1});

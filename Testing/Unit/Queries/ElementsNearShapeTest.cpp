@@ -1,0 +1,185 @@
+#include "Queries/ElementsNearShape.h"
+
+#include "Common/RandomMeshes.h"
+#include "Common/ShapeTruth.h"
+#include "Unit/Math/RationalOracle.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+// Searches of one geometry's octree: elements that just touch what is searched, near and far from
+// the origin.
+
+namespace palpate::testing {
+namespace {
+
+/// A soup with an octree: in the world, or placed at both ends of a step.
+class Searched {
+ public:
+  Searched(Random& random, const Vector3d& offset, double size, bool isPlaced) {
+    const Mesh mesh = soup(random, 60, 0.1);
+    geometry.mesh.topology = MeshTopology(mesh.positions.size(), mesh.triangles);
+    geometry.revisions.topology = geometry.revisions.counter.next();
+    const auto bodyOf = [&](double motion) {
+      CountedVector<Vector3d> body;
+      for (const Vector3d& p : mesh.positions)
+        body.push_back(size * (p + motion * randomPoint(random, -1, 1)) +
+                       (isPlaced ? Vector3d(0, 0, 0) : offset));
+      return std::make_shared<const CountedVector<Vector3d>>(body);
+    };
+    geometry.mesh.now.setBody(bodyOf(0.0), m_revisions.next());
+    geometry.mesh.before.setBodyOf(geometry.mesh.now);
+    if (isPlaced) {
+      geometry.mesh.now.place({randomTurn(random), offset}, m_revisions.next());
+      geometry.mesh.before.place(
+          {randomTurn(random), offset + size * randomPoint(random, -0.1, 0.1)}, m_revisions.next());
+    } else {
+      geometry.mesh.before.setBody(bodyOf(0.1), m_revisions.next());
+    }
+    geometry.tree.setSwept(true);
+    geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.topology);
+    geometry.tree.update(geometry.mesh, geometry.revisions.topology,
+                         std::ldexp(1.0, -std::ilogb(size)), {}, m_thread);
+  }
+  const palpate::Positions& at(bool isEnd) const {
+    return isEnd ? geometry.mesh.now : geometry.mesh.before;
+  }
+  std::size_t elementCount() const { return geometry.mesh.topology.triangles.size(); }
+  const Triangle& corners(std::uint32_t element) const {
+    return geometry.mesh.topology.triangles[element];
+  }
+
+  SearchableGeometry geometry{GeometryId{0}};
+
+ private:
+  RevisionCounter m_revisions;
+  Threads m_thread{1};
+};
+
+/// Far away, coordinates are coarser than floats of the geometry's own frame.
+Searched anySearched(Random& random, int round, double& size, Vector3d& offset) {
+  size = std::exp2(uniform(random, -3, 3));
+  offset = randomPoint(random, -1, 1) * (round % 3 == 0 ? 1.0 : std::exp2(uniform(random, 20, 34)));
+  return {random, offset, size, round % 2 == 1};
+}
+
+TEST(ElementsNearShape, HoldAllElementsWithinTheDistance) {
+  Random random(21);
+  PointQueryStack stack;
+  Buffer<std::uint32_t> found;
+  std::size_t touching = 0, left = 0;
+  for (int round = 0; round < 1200; ++round) {
+    double size;
+    Vector3d offset;
+    const Searched searched = anySearched(random, round, size, offset);
+    const AnalyticalGeometry geometries[] = {
+        Sphere{{0, 0, 0}, 0.05 * size}, Capsule{{0, 0, 0}, {0.3 * size, 0, 0}, 0.05 * size},
+        Box{{0, 0, 0}, size * Vector3d(0.2, 0.1, 0.05)}, Plane{{0, 0, 0}, {1, 2, 3}, false},
+        Cylinder{{0, 0, 0}, {0, 0.2 * size, 0}, 0.1 * size}};
+    const AnalyticalGeometry& geometry = geometries[round % 5];
+    const auto pose = [&] {
+      return RigidTransform{randomTurn(random), offset + size * randomPoint(random, -0.3, 1.3)};
+    };
+    const Shape now(geometry, pose()), start(geometry, pose());
+    const bool wholeStep = random() % 2;
+    const Shape& before = wholeStep ? start : now;
+    const auto distanceOf = [&](std::uint32_t element) {
+      double least = INFINITY;
+      for (const std::uint32_t v : searched.corners(element)) {
+        least = std::min(least, now.signedDistance(searched.at(true)[v]).distance);
+        if (wholeStep)
+          least = std::min(least, before.signedDistance(searched.at(false)[v]).distance);
+      }
+      return least;
+    };
+    const double most =
+        std::max(0.0, distanceOf(static_cast<std::uint32_t>(random() % searched.elementCount())));
+    findElementsNear(searched.geometry, before, now, most, stack, found);
+    std::sort(found.begin(), found.end());
+    for (std::uint32_t element = 0; element < searched.elementCount(); ++element) {
+      if (distanceOf(element) > most) continue;
+      ++touching;
+      ASSERT_TRUE(std::binary_search(found.begin(), found.end(), element)) << round;
+    }
+    left += searched.elementCount() - found.size();
+  }
+  EXPECT_GT(touching, 10000u);
+  EXPECT_GT(left, 10000u);
+}
+
+TEST(ElementsNearShape, HoldAllElementsThatTouchABox) {
+  Random random(22);
+  PointQueryStack stack;
+  Buffer<std::uint32_t> found;
+  std::size_t touching = 0, left = 0;
+  for (int round = 0; round < 1200; ++round) {
+    double size;
+    Vector3d offset;
+    const Searched searched = anySearched(random, round, size, offset);
+    const bool wholeStep = random() % 2;
+    // A box with a corner of an element on its border.
+    const Triangle& corners =
+        searched.corners(static_cast<std::uint32_t>(random() % searched.elementCount()));
+    const Vector3d on = searched.at(true)[corners[random() % 3]];
+    Eigen::AlignedBox3d box(on - 0.1 * size * randomPoint(random, 0, 1),
+                            on + 0.1 * size * randomPoint(random, 0, 1));
+    const auto axis = static_cast<int>(random() % 3);
+    (random() % 2 ? box.min() : box.max())[axis] = on[axis];
+    findElementsNear(searched.geometry, box, wholeStep, stack, found);
+    std::sort(found.begin(), found.end());
+    for (std::uint32_t element = 0; element < searched.elementCount(); ++element) {
+      const auto touches = [&](std::uint32_t v) {
+        return box.contains(searched.at(true)[v]) ||
+               (wholeStep && box.contains(searched.at(false)[v]));
+      };
+      const Triangle& of = searched.corners(element);
+      if (std::none_of(of.begin(), of.end(), touches)) continue;
+      ++touching;
+      ASSERT_TRUE(std::binary_search(found.begin(), found.end(), element)) << round;
+    }
+    left += searched.elementCount() - found.size();
+  }
+  EXPECT_GT(touching, 1000u);
+  EXPECT_GT(left, 10000u);
+}
+
+/// Exact bounds of each element along each direction, in the frame of the floats.
+TEST(GeometryOctree, DopsEncloseTheirElements) {
+  using oracle::Rational;
+  Random random(23);
+  Threads thread(1);
+  for (int round = 0; round < 40; ++round) {
+    Searched searched(random, randomPoint(random, -5, 5), std::exp2(uniform(random, -20, 20)),
+                      true);
+    GeometryOctree& tree = searched.geometry.tree;
+    const OctreeBounds bounds = round % 2 ? OctreeBounds::Dop14 : OctreeBounds::Dop18;
+    tree.updateDops(searched.geometry.mesh, bounds, thread);
+    const OctreeDops& dops = tree.octree().dops();
+    ASSERT_EQ(dops.directions, directionCount(bounds));
+    const auto directions = dopDirections(dops.directions);
+    for (std::size_t place = 0; place < tree.ordered().size(); ++place)
+      for (std::size_t k = 3; k < directions.size(); ++k) {
+        std::array<Rational, 3> along;
+        for (std::size_t c = 0; c < 3; ++c)
+          for (int axis = 0; axis < 3; ++axis) {
+            const Rational from =
+                Rational(searched.geometry.mesh.now.body()[tree.ordered()[place][c]][axis]) -
+                Rational(tree.frame().origin[axis]);
+            along[c] += Rational(directions[k][static_cast<std::size_t>(axis)]) * from *
+                        Rational(tree.frame().scale);
+          }
+        const auto [least, most] = std::minmax_element(along.begin(), along.end());
+        ASSERT_TRUE(Rational(dops.lower[k][place]) <= *least) << round;
+        ASSERT_TRUE(Rational(dops.upper[k][place]) >= *most) << round;
+      }
+  }
+}
+
+}  // namespace
+}  // namespace palpate::testing
