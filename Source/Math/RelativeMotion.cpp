@@ -83,8 +83,9 @@ Interval RelativeMotion<kind>::separatedAround(double t, const Vector3d& largest
 }
 
 /// A corner's coordinate along n(t) is a quadratic, and not below its least Bernstein coefficient.
-/// |n(t)| is at most the larger length at the ends. The first direction separates at t0, and so is
-/// not zero.
+/// |n(t)| is at most the larger length at the ends. The first direction separates at t0 by more than
+/// kImpactUnderflow (separatedAround()), so that it is not zero, and that kAlongError of the largest
+/// coordinate along it covers underflow.
 template <ImpactQuery::Kind kind>
 bool RelativeMotion<kind>::separatedBetween(double t0, const Separation& first, double t1,
                                             const Separation& last, const Vector3d& largest,
@@ -92,8 +93,7 @@ bool RelativeMotion<kind>::separatedBetween(double t0, const Separation& first, 
   if (!(last.length > 0.0)) return false;
   const Vector3d m = first.direction / first.length, n = last.direction / last.length;
   const double needed = distance * (1.0 + kAlongError) +
-                        kAlongError * m.cwiseAbs().cwiseMax(n.cwiseAbs()).dot(largest) +
-                        kImpactUnderflow;
+                        kAlongError * m.cwiseAbs().cwiseMax(n.cwiseAbs()).dot(largest);
   for (const auto& ends : corner) {
     const Vector3d x = at(t0, ends), y = at(t1, ends);
     if (!(m.dot(x) > needed && n.dot(y) > needed && 0.5 * (m.dot(y) + n.dot(x)) > needed))

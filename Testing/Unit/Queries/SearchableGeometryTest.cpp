@@ -13,8 +13,8 @@
 #include <memory>
 #include <vector>
 
-// Searches of one geometry's octree: elements that just touch what is searched, near and far from
-// the origin.
+// Searches of geometries' octrees: elements that just touch what is searched, near and far from the
+// origin.
 
 namespace palpate::testing {
 namespace {
@@ -83,8 +83,9 @@ TEST(ElementsNearShape, HoldAllElementsWithinTheDistance) {
         Box{{0, 0, 0}, size * Vector3d(0.2, 0.1, 0.05)}, Plane{{0, 0, 0}, {1, 2, 3}, false},
         Cylinder{{0, 0, 0}, {0, 0.2 * size, 0}, 0.1 * size}};
     const AnalyticalGeometry& geometry = geometries[round % 5];
+    const double away = size * (round % 4 ? 1.0 : std::exp2(uniform(random, 0, 45)));
     const auto pose = [&] {
-      return RigidTransform{randomTurn(random), offset + size * randomPoint(random, -0.3, 1.3)};
+      return RigidTransform{randomTurn(random), offset + away * randomPoint(random, -0.3, 1.3)};
     };
     const Shape now(geometry, pose()), start(geometry, pose());
     const bool wholeStep = random() % 2;
@@ -146,6 +147,55 @@ TEST(ElementsNearShape, HoldAllElementsThatTouchABox) {
     left += searched.elementCount() - found.size();
   }
   EXPECT_GT(touching, 1000u);
+  EXPECT_GT(left, 10000u);
+}
+
+/// The boxes of elements in the world, which are exactly the thickness apart.
+TEST(TreesOf, HaveAllPairsOfBoxesWithinTheThickness) {
+  Random random(24);
+  std::size_t touching = 0, left = 0;
+  for (int round = 0; round < 600; ++round) {
+    double size;
+    Vector3d offset;
+    const Searched a = anySearched(random, round, size, offset);
+    const Searched b(random, offset + size * randomPoint(random, -1, 1),
+                     size * std::exp2(uniform(random, -2, 2)), random() % 2);
+    if (a.geometry.tree.frame().scale != b.geometry.tree.frame().scale) continue;
+    const bool wholeStep = random() % 2;
+    const auto boxOf = [&](const Searched& of, std::uint32_t element) {
+      Eigen::AlignedBox3d box;
+      for (const std::uint32_t v : of.corners(element)) {
+        box.extend(of.at(true)[v]);
+        if (wholeStep) box.extend(of.at(false)[v]);
+      }
+      return box;
+    };
+    const auto gapOf = [&](std::uint32_t i, std::uint32_t j) {
+      const Eigen::AlignedBox3d s = boxOf(a, i), t = boxOf(b, j);
+      return std::max({0.0, (s.min() - t.max()).maxCoeff(), (t.min() - s.max()).maxCoeff()});
+    };
+    const auto any = [&](const Searched& of) {
+      return static_cast<std::uint32_t>(random() % of.elementCount());
+    };
+    const double thickness = gapOf(any(a), any(b));
+    const TreePair trees = treesOf(a.geometry, b.geometry, thickness, wholeStep);
+    TraversalStack stack;
+    PairSink sink;
+    sink.start(nullptr, nullptr);
+    startPairs(trees, 30, stack);
+    const std::vector<NodePair> start(stack.pairs.begin(), stack.pairs.end());
+    traverse(trees, start, stack, sink);
+    std::vector<ElementPair> found(sink.kept().begin(), sink.kept().end());
+    std::sort(found.begin(), found.end());
+    for (std::uint32_t i = 0; i < a.elementCount(); ++i)
+      for (std::uint32_t j = 0; j < b.elementCount(); ++j) {
+        if (gapOf(i, j) > thickness) continue;
+        ++touching;
+        ASSERT_TRUE(std::binary_search(found.begin(), found.end(), ElementPair{i, j})) << round;
+      }
+    left += a.elementCount() * b.elementCount() - found.size();
+  }
+  EXPECT_GT(touching, 10000u);
   EXPECT_GT(left, 10000u);
 }
 
