@@ -20,9 +20,9 @@
 // effect of the same errors on |n| and |u| in products with the thickness. A comparison with NaN is
 // false, and drops no feature pair.
 //
-// The thresholds also cover underflow. A value of degree d in the edges is at most 14 |u|^d, and its
-// threshold at least 2^-15 |u|^(d - 1). Where the value is larger, edges are longer than 2^-19, and
-// what their products lose (2^-149 each) is far below the threshold.
+// The thresholds also cover underflow. A value of degree d in the edges is at most 14 |u|^d, and
+// its threshold at least 2^-15 |u|^(d - 1). Where the value is larger, edges are longer than 2^-19,
+// and what their products lose (2^-149 each) is far below the threshold.
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "NarrowPhase/ProximityFilter.cpp"
