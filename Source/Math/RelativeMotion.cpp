@@ -83,9 +83,9 @@ Interval RelativeMotion<kind>::separatedAround(double t, const Vector3d& largest
 }
 
 /// A corner's coordinate along n(t) is a quadratic, and not below its least Bernstein coefficient.
-/// |n(t)| is at most the larger length at the ends. The first direction separates at t0 by more than
-/// kImpactUnderflow (separatedAround()), so that it is not zero, and that kAlongError of the largest
-/// coordinate along it covers underflow.
+/// |n(t)| is at most the larger length at the ends. The first direction separates at t0 by more
+/// than kImpactUnderflow (separatedAround()), so that it is not zero, and that kAlongError of the
+/// largest coordinate along it covers underflow.
 template <ImpactQuery::Kind kind>
 bool RelativeMotion<kind>::separatedBetween(double t0, const Separation& first, double t1,
                                             const Separation& last, const Vector3d& largest,
