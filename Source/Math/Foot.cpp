@@ -172,7 +172,8 @@ Foot footOnFace(const Vector3d& p, const Vector3d& a, const Vector3d& b, const V
   if (!isModerate(extent))
     return atModerateScale(extent, footOnFace, exact::footOnPlane, p, a, b, c);
   std::optional<Foot> foot = footOnPlane(m, u, v, Range::ZeroToOne, extent);
-  if (!foot || !hasRightDistance(*foot, p, a, b, c)) return exact::footOnPlane(p, a, b, c);
+  if (!foot || !hasRightDistance(*foot, p, a, b, c) || foot->s - (1.0 - foot->t) > kWeightStep)
+    return exact::footOnPlane(p, a, b, c);
   foot->exact = foot->distance == 0.0;
   return *foot;
 }

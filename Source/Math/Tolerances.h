@@ -18,6 +18,9 @@ constexpr double kUnderflowGuardOfProducts = 0x1p-800;
 /// Adding and subtracting this rounds a weight to a multiple of 2^-26. Its product with half of a
 /// split double is then exact.
 constexpr double kCoarseWeight = 0x1.8p26;
+/// Weights are multiples of this. Those of a point inside a face sum to 1 and one of these at most,
+/// unless the weight along a short edge is off by more. Integers then replace both.
+constexpr double kWeightStep = 0x1p-53;
 /// The longest Newton step that is accepted after the coarse weight. Its own rounding is then 2^-70
 /// of the largest coordinate difference at the narrowest angle below. A longer step means that the
 /// first estimate was bad, as for a feature that is tiny compared to its distance.

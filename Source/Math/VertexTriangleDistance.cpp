@@ -136,7 +136,7 @@ VertexTriangleDistance finiteVertexTriangleDistance(const Vector3d& p, const Vec
     foot = footOnFace(p, *corners[i], *corners[j], *corners[k]);
     weights[j] = foot.s;
     weights[k] = foot.t;
-    // Rounding may push the sum past 1 by 2^-53, which the sum itself would lose.
+    // Rounding may push the sum past 1 by kWeightStep, which the sum itself would lose.
     weights[foot.s > foot.t ? j : k] -= std::max(0.0, foot.s - (1.0 - foot.t));
     weights[i] = (1.0 - weights[j]) - weights[k];
   }

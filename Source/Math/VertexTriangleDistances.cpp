@@ -324,6 +324,7 @@ class Feet {
     const V one = hn::Set(d, 1.0);
     V wb = toUnit(s + toGrid(sFine)), wc = toUnit(t + toGrid(tFine));
     const V excess = hn::Max(hn::Zero(d), wb - (one - wc));
+    foot.decided = hn::And(foot.decided, hn::Le(excess, hn::Set(d, kWeightStep)));
     const Mask ofB = hn::Gt(wb, wc);
     wb = hn::IfThenElse(ofB, wb - excess, wb);
     wc = hn::IfThenElse(ofB, wc, wc - excess);

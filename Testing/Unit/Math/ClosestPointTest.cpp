@@ -168,6 +168,26 @@ TEST(ClosestPoint, WeightsNextToTheLongestEdgeAreNotNegative) {
   }
 }
 
+/// Found by fuzzing: the weight along an edge that is 2^-52 of the others has an error, and the sum
+/// of the weights is past 1 by as much.
+TEST(ClosestPoint, WeightsAlongShortEdgesDoNotMoveThePoint) {
+  checkVertexTriangle({Vector3d(1, 0, 0x0.00000ffd1de4p-1022), Vector3d(1, -0x1.bp+4, -0x1.bp+4),
+                       Vector3d(1, -0x1.affffffffffffp+4, -0x1.b000000000001p+4),
+                       Vector3d(0x0.0005d61bba9e5p-1022, 0, 0x1.000ffffffff23p-895)});
+  RandomFeatures random;
+  for (int i = 0; i < 4000 && !HasFailure(); ++i) {
+    const Vector3d a = random.vector(),
+                   b = a + std::ldexp(1.0, -random.below(50)) * random.vector(),
+                   c = random.vector(), normal = (b - a).cross(c - a).normalized();
+    const double s = 0.5 * (1 + random.real());
+    const Vector3d p = (1 - s) * a + s * c +
+                       std::ldexp(1.0, -random.below(60)) * random.real() * (b - a) +
+                       random.vector().x() * normal;
+    checkVertexTriangle({p, a, b, c});
+    checkVertexTriangle({p, b, c, a});
+  }
+}
+
 /// Edges far apart for their length. Their common perpendicular passes exactly through an end, and
 /// products with the vector between the edges round.
 TEST(ClosestPoint, FarEdgesAreClassifiedExactly) {
