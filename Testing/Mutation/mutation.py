@@ -64,7 +64,7 @@ def unchanged():
 
 def choose():
     """The faults: for each module equally many of each kind, evenly spaced over its files."""
-    faults, left_out = [], unchanged()
+    faults, left_out, matched = [], unchanged(), set()
     for module in MODULES:
         found = {kind: [] for kind in KINDS}
         for path in sorted((ROOT / 'Source' / module).iterdir()):
@@ -72,6 +72,7 @@ def choose():
             name = str(path.relative_to(ROOT / 'Source'))
             for site in file.sites():
                 source = file.text[file.text.rfind('\n', 0, site.start) + 1:].split('\n', 1)[0].strip()
+                matched |= {(name, site.kind, source)} & left_out
                 before = re.sub(r'\s*\n\s*', ' ', file.text[site.start:site.end])
                 found[site.kind].append({
                     'module': module, 'file': name, 'line': file.text.count('\n', 0, site.start) + 1,
@@ -91,6 +92,8 @@ def choose():
                 ranges.append((fault['start'], fault['end']))
                 faults.append(fault)
                 count += 1
+    if matched != left_out:
+        sys.exit('unchanged.txt names faults that do not exist: ' + '; '.join(map(': '.join, sorted(left_out - matched))))
     faults.sort(key=lambda f: (MODULES.index(f['module']), f['file'], f['start']))
     for fault in faults:
         fault['key'] = hashlib.sha256('|'.join(

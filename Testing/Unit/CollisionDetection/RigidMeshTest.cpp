@@ -1,5 +1,6 @@
 #include "Common/ExpectRefused.h"
 #include "Common/RandomMeshes.h"
+#include "Common/ShapeTruth.h"
 
 #include <palpate/OctreeBasedCD.h>
 
@@ -16,11 +17,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 bool sameContacts(const CollisionData& a, const CollisionData& b) { return a.hash() == b.hash(); }
-
-Matrix3d anyRotation(Random& random) {
-  return Eigen::AngleAxisd(uniform(random, -3, 3), randomPoint(random, -1, 1).normalized())
-      .toRotationMatrix();
-}
 
 /// A ball, a sheet with its winding, the surface of a placed body, lines and points.
 struct Scene {
@@ -58,7 +54,7 @@ TEST(RigidMesh, HasTheContactsOfAPair) {
     std::size_t found = 0;
     CollisionData contacts;
     for (int i = 0; i < (engine == Engine::Octree ? 100 : 20); ++i) {
-      const Matrix3d rotation = anyRotation(random);
+      const Matrix3d rotation = randomTurn(random);
       const Vector3d translation = randomPoint(random, 0.1, 0.9);
       collisions.setTransform(tool, rotation, translation);
       collisions.detectCollision();

@@ -8,6 +8,7 @@
 #include "Common/RandomMeshes.h"
 #include "Common/Replayed.h"
 #include "Common/Sanitized.h"
+#include "Common/ShapeTruth.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -140,18 +141,11 @@ Body particlesInCube(Random& random, std::uint32_t count, double radius) {
   return points;
 }
 
-Matrix3d randomRotation(Random& random) {
-  return Eigen::Quaterniond(Eigen::Vector4d(uniform(random, -1, 1), uniform(random, -1, 1),
-                                            uniform(random, -1, 1), uniform(random, 0.1, 1))
-                                .normalized())
-      .toRotationMatrix();
-}
-
 /// One of each type, around the middle of the unit cube.
 std::vector<Placed> shapes(Random& random) {
   std::vector<Placed> all;
   const auto place = [&](const AnalyticalGeometry& geometry) {
-    all.push_back({geometry, randomRotation(random), randomPoint(random, 0.3, 0.7)});
+    all.push_back({geometry, randomTurn(random), randomPoint(random, 0.3, 0.7)});
   };
   place(Sphere{{0.01, 0, 0}, 0.25});
   place(Capsule{{-0.3, 0, 0}, {0.2, 0.1, 0}, 0.1});
@@ -389,7 +383,7 @@ TEST(Shapes, MoveWithTheirBodies) {
     const PairSettings pair{Method::Proximity, 0.05};
     const auto here = byElement(answer(body, shape, pair));
     for (int run = 0; run < 5; ++run) {
-      const Matrix3d turn = randomRotation(random);
+      const Matrix3d turn = randomTurn(random);
       const Vector3d shift = randomPoint(random, -4, 4);
       Body moved = body;
       for (Vector3d& p : moved.positions) p = turn * p + shift;
@@ -442,7 +436,7 @@ TEST(Shapes, MatchTheirTessellations) {
     cube.positions.push_back({v & 1 ? 0.3 : -0.3, v & 2 ? 0.2 : -0.2, v & 4 ? 0.1 : -0.1});
   int apart = 0;
   for (int run = 0; run < casesOf(20); ++run) {
-    const Matrix3d turn = randomRotation(random);
+    const Matrix3d turn = randomTurn(random);
     const Vector3d at = Vector3d::Constant(0.5) + 1.1 * randomPoint(random, -1, 1).normalized();
     for (const bool isBall : {true, false}) {
       Mesh mesh = isBall ? ball : cube;
@@ -476,7 +470,7 @@ TEST(Shapes, HullsMatchEqualBoxesAndCapsules) {
   const Mesh ball = sphere(16, 32, Vector3d::Zero(), 0.3);
   round = ball.positions;
   for (int run = 0; run < 6; ++run) {
-    const Matrix3d turn = randomRotation(random);
+    const Matrix3d turn = randomTurn(random);
     const Vector3d at = randomPoint(random, 0.3, 0.7);
     const PairSettings pair{Method::Proximity, 0.05, Contacts::All};
     const auto hull = byElement(answer(body, {ConvexHull{corners}, turn, at}, pair)),

@@ -3,6 +3,7 @@
 #include "Math/ExactClosestPoint.h"
 #include "Math/Foot.h"
 
+#include "Common/Sanitized.h"
 #include "DistanceCheck.h"
 
 #include <Eigen/Geometry>
@@ -137,7 +138,7 @@ TEST(ClosestPoint, SmallDifferencesFarFromTheOriginDoNotOverflow) {
   checkEdgeEdge({Vector3d(2, 0, 0x1.fp-1021), Vector3d(2, 0, 0x1p-1050),
                  Vector3d(2, 0, 0x1.74p-1021), Vector3d(2, 0, 0x1.74p-1021)});
   RandomFeatures random;
-  for (int i = 0; i < 4000 && !HasFailure(); ++i) {
+  for (int i = 0; i < testing::casesOf(4000) && !HasFailure(); ++i) {
     Four x;
     const int axis = random.below(3), exponent = random.below(1060) - 1074;
     const double far = std::ldexp(1.0, exponent + 1010 + random.below(25));
@@ -157,7 +158,7 @@ TEST(ClosestPoint, WeightsNextToTheLongestEdgeAreNotNegative) {
                        Vector3d(0x1.78p+34, 0x1.78p+35, 0x1.7800000000001p+34),
                        Vector3d(0, 0x1.68p+19, 0x1.aef94p-72), Vector3d(0, 0, 0)});
   RandomFeatures random;
-  for (int i = 0; i < 4000 && !HasFailure(); ++i) {
+  for (int i = 0; i < testing::casesOf(4000) && !HasFailure(); ++i) {
     const Vector3d b = random.vector(), c = random.vector(),
                    a = 0.5 * (b + c) + 0.3 * random.vector(),
                    normal = (b - a).cross(c - a).normalized();
@@ -175,7 +176,7 @@ TEST(ClosestPoint, WeightsAlongShortEdgesDoNotMoveThePoint) {
                        Vector3d(1, -0x1.affffffffffffp+4, -0x1.b000000000001p+4),
                        Vector3d(0x0.0005d61bba9e5p-1022, 0, 0x1.000ffffffff23p-895)});
   RandomFeatures random;
-  for (int i = 0; i < 4000 && !HasFailure(); ++i) {
+  for (int i = 0; i < testing::casesOf(4000) && !HasFailure(); ++i) {
     const Vector3d a = random.vector(),
                    b = a + std::ldexp(1.0, -random.below(50)) * random.vector(),
                    c = random.vector(), normal = (b - a).cross(c - a).normalized();

@@ -1,5 +1,6 @@
 #include "Math/ImpactFilter.h"
 
+#include "Common/Sanitized.h"
 #include "Core/SimdPath.h"
 #include "DistanceAtTime.h"
 
@@ -121,7 +122,7 @@ TEST(ImpactFilter, KeepsEveryQueryThatTouches) {
 TEST(ImpactFilter, KeepsEveryTouchWhereProductsUnderflow) {
   HardCases hard(19);
   test::Random random(19);
-  for (int i = 0; i < 3000; ++i) {
+  for (int i = 0; i < testing::casesOf(3000); ++i) {
     constexpr ImpactKind kTouches[] = {ImpactKind::TouchAtStart, ImpactKind::TouchAtEnd,
                                        ImpactKind::TouchHalfway};
     const int axis = i % 2 ? random.below(3) : 3,

@@ -1,5 +1,6 @@
 #include "NarrowPhase/ProximityFilter.h"
 
+#include "Common/Sanitized.h"
 #include "Core/SimdPath.h"
 #include "NarrowPhase/FeatureTests.h"
 #include "Math/ClosestPoint.h"
@@ -133,15 +134,20 @@ Pair pairOf(int kind, RandomPoints& random) {
   return x;
 }
 
+std::vector<Pair> batchOf(int kind, RandomPoints& random) {
+  std::vector<Pair> pairs;
+  for (int i = 0; i < TrianglePairBatch::kSize; ++i) pairs.push_back(pairOf(kind, random));
+  return pairs;
+}
+
 /// The thickness is exactly the distance of one of the feature pairs, which must be kept, or a
 /// little more.
 TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
   RandomPoints random;
   std::size_t within = 0;
-  for (int round = 0; round < 4400; ++round) {
+  for (int round = 0; round < testing::casesOf(4400); ++round) {
     const int kind = round % kKinds;
-    std::vector<Pair> pairs;
-    for (int i = 0; i < TrianglePairBatch::kSize; ++i) pairs.push_back(pairOf(kind, random));
+    const std::vector<Pair> pairs = batchOf(kind, random);
     const bool distinct = random.below(2) == 0;
     const Pair& chosen = pairs[random.below(TrianglePairBatch::kSize)];
     const int corner = random.below(6);
@@ -162,21 +168,19 @@ TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
       }
     }
   }
-  EXPECT_GT(within, 5000u);
+  EXPECT_GT(within, testing::leastOf(5000));
 }
 
 /// Edges whose closest points are ends are kept as well, up to a distance of their own.
 TEST(ProximityFilter, KeepsEdgesWithinTheCheckedDistance) {
   RandomPoints random;
   std::size_t ends = 0;
-  for (int round = 0; round < 2200; ++round) {
+  for (int round = 0; round < testing::casesOf(2200); ++round) {
     const int kind = round % kKinds;
-    std::vector<Pair> pairs;
-    for (int i = 0; i < TrianglePairBatch::kSize; ++i) {
-      pairs.push_back(pairOf(kind, random));
+    std::vector<Pair> pairs = batchOf(kind, random);
+    for (Pair& pair : pairs)
       if (random.below(2))  // in one plane
-        for (Vector3d& v : pairs.back()) v.z() = 0.25 * v.x();
-    }
+        for (Vector3d& v : pair) v.z() = 0.25 * v.x();
     const Pair& chosen = pairs[random.below(TrianglePairBatch::kSize)];
     const double checked =
         distanceOf(chosen, edgeTest(random.below(3), random.below(3)), false).value();
@@ -192,15 +196,13 @@ TEST(ProximityFilter, KeepsEdgesWithinTheCheckedDistance) {
               << "kind " << kind << ", round " << round << ", test " << test;
         }
   }
-  EXPECT_GT(ends, 5000u);
+  EXPECT_GT(ends, testing::leastOf(5000));
 }
 
 TEST(ProximityFilter, EverySimdPathDropsTheSamePairs) {
   RandomPoints random;
   for (int round = 0; round < 300; ++round) {
-    std::vector<Pair> pairs;
-    for (int i = 0; i < TrianglePairBatch::kSize; ++i)
-      pairs.push_back(pairOf(round % kKinds, random));
+    const std::vector<Pair> pairs = batchOf(round % kKinds, random);
     const double thickness = random.smallPower();
     useSimdPath("");
     const Possible best = filter(pairs, thickness, round % 2 == 0);
@@ -218,8 +220,7 @@ TEST(ProximityFilter, DropsNearlyAllPairsBeyondTheThickness) {
   const double thickness = 0.03;
   int kept = 0, contacts = 0, all = 0;
   for (int round = 0; round < 300; ++round) {
-    std::vector<Pair> pairs;
-    for (int i = 0; i < TrianglePairBatch::kSize; ++i) pairs.push_back(pairOf(round % 2, random));
+    const std::vector<Pair> pairs = batchOf(round % 2, random);
     const Possible possible = filter(pairs, thickness, true);
     for (std::size_t n = 0; n < pairs.size(); ++n) {
       all += kTests;

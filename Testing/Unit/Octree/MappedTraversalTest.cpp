@@ -2,6 +2,7 @@
 
 #include "BoxOctree.h"
 #include "Common/Sanitized.h"
+#include "Common/TraversedPairs.h"
 #include "Core/SimdPath.h"
 
 #include <gtest/gtest.h>
@@ -77,14 +78,7 @@ std::vector<ElementPair> pairsOf(const TreePair& trees) {
   std::vector<std::vector<ElementPair>> found;
   for (const std::string& path : simdPaths()) {
     useSimdPath(path);
-    TraversalStack stack;
-    PairSink sink;
-    sink.start(nullptr, nullptr);
-    startPairs(trees, 30, stack);
-    const std::vector<NodePair> start(stack.pairs.begin(), stack.pairs.end());
-    traverse(trees, start, stack, sink);
-    found.emplace_back(sink.kept().begin(), sink.kept().end());
-    std::sort(found.back().begin(), found.back().end());
+    found.push_back(testing::traversedPairs(trees));
     EXPECT_EQ(found.back(), found.front()) << path;
   }
   useSimdPath("");

@@ -1,6 +1,7 @@
 #include "Octree/Traversal.h"
 
 #include "BoxOctree.h"
+#include "Common/TraversedPairs.h"
 #include "Core/SimdPath.h"
 
 #include <gtest/gtest.h>
@@ -41,14 +42,8 @@ TEST(Traversal, FindsTheOverlapsOfShiftedBoxes) {
       TreePair trees{&a.octree, &b.octree};
       std::copy_n(shifts[low].begin(), 3, trees.shiftLower.begin());
       std::copy_n(shifts[high].begin(), 3, trees.shiftUpper.begin());
-      TraversalStack stack;
-      PairSink sink;
-      sink.start(nullptr, nullptr);
-      startPairs(trees, 20, stack);
-      const std::vector<NodePair> roots(stack.pairs.begin(), stack.pairs.end());
-      traverse(trees, roots, stack, sink);
-      std::vector<ElementPair> pairs(sink.kept().begin(), sink.kept().end()), expected;
-      std::sort(pairs.begin(), pairs.end());
+      const std::vector<ElementPair> pairs = testing::traversedPairs(trees, 20);
+      std::vector<ElementPair> expected;
       for (std::uint32_t i = 0; i < first.size(); ++i) {
         FloatBox box = first[i];
         for (std::size_t k = 0; k < 3; ++k) {
@@ -84,14 +79,8 @@ TEST(Traversal, FindsThePairsOfOneTree) {
       useSimdPath(path);
       TreePair trees{&tree.octree, &tree.octree};
       if (adjacent) trees.adjacency = ordered.data();
-      TraversalStack stack;
-      PairSink sink;
-      sink.start(nullptr, nullptr);
-      startPairs(trees, 20, stack);
-      const std::vector<NodePair> roots(stack.pairs.begin(), stack.pairs.end());
-      traverse(trees, roots, stack, sink);
-      std::vector<ElementPair> pairs(sink.kept().begin(), sink.kept().end()), expected;
-      std::sort(pairs.begin(), pairs.end());
+      const std::vector<ElementPair> pairs = testing::traversedPairs(trees, 20);
+      std::vector<ElementPair> expected;
       for (std::uint32_t i = 0; i < boxes.size(); ++i)
         for (std::uint32_t j = i + 1; j < boxes.size(); ++j)
           if (boxes[i].overlaps(boxes[j]) && !(adjacent && share(triangles[i], triangles[j])))

@@ -2,6 +2,7 @@
 
 #include "Common/RandomMeshes.h"
 #include "Common/ShapeTruth.h"
+#include "Common/TraversedPairs.h"
 #include "Unit/Math/RationalOracle.h"
 
 #include <Eigen/Geometry>
@@ -69,6 +70,19 @@ Searched anySearched(Random& random, int round, double& size, Vector3d& offset) 
   return {random, offset, size, round % 2 == 1};
 }
 
+/// Expects all elements that are near among those that were found. Returns how many are near.
+template <class IsNear>
+std::size_t expectFound(const Searched& searched, Buffer<std::uint32_t>& found, IsNear isNear) {
+  std::sort(found.begin(), found.end());
+  std::size_t count = 0;
+  for (std::uint32_t element = 0; element < searched.elementCount(); ++element) {
+    if (!isNear(element)) continue;
+    ++count;
+    EXPECT_TRUE(std::binary_search(found.begin(), found.end(), element)) << element;
+  }
+  return count;
+}
+
 TEST(ElementsNearShape, HoldAllElementsWithinTheDistance) {
   Random random(21);
   PointQueryStack stack;
@@ -102,12 +116,9 @@ TEST(ElementsNearShape, HoldAllElementsWithinTheDistance) {
     const double most =
         std::max(0.0, distanceOf(static_cast<std::uint32_t>(random() % searched.elementCount())));
     findElementsNear(searched.geometry, before, now, most, stack, found);
-    std::sort(found.begin(), found.end());
-    for (std::uint32_t element = 0; element < searched.elementCount(); ++element) {
-      if (distanceOf(element) > most) continue;
-      ++touching;
-      ASSERT_TRUE(std::binary_search(found.begin(), found.end(), element)) << round;
-    }
+    touching += expectFound(searched, found,
+                            [&](std::uint32_t element) { return distanceOf(element) <= most; });
+    ASSERT_FALSE(HasFailure()) << round;
     left += searched.elementCount() - found.size();
   }
   EXPECT_GT(touching, 10000u);
@@ -133,17 +144,14 @@ TEST(ElementsNearShape, HoldAllElementsThatTouchABox) {
     const auto axis = static_cast<int>(random() % 3);
     (random() % 2 ? box.min() : box.max())[axis] = on[axis];
     findElementsNear(searched.geometry, box, wholeStep, stack, found);
-    std::sort(found.begin(), found.end());
-    for (std::uint32_t element = 0; element < searched.elementCount(); ++element) {
-      const auto touches = [&](std::uint32_t v) {
+    touching += expectFound(searched, found, [&](std::uint32_t element) {
+      const Triangle& of = searched.corners(element);
+      return std::any_of(of.begin(), of.end(), [&](std::uint32_t v) {
         return box.contains(searched.at(true)[v]) ||
                (wholeStep && box.contains(searched.at(false)[v]));
-      };
-      const Triangle& of = searched.corners(element);
-      if (std::none_of(of.begin(), of.end(), touches)) continue;
-      ++touching;
-      ASSERT_TRUE(std::binary_search(found.begin(), found.end(), element)) << round;
-    }
+      });
+    });
+    ASSERT_FALSE(HasFailure()) << round;
     left += searched.elementCount() - found.size();
   }
   EXPECT_GT(touching, 1000u);
@@ -179,14 +187,7 @@ TEST(TreesOf, HaveAllPairsOfBoxesWithinTheThickness) {
     };
     const double thickness = gapOf(any(a), any(b));
     const TreePair trees = treesOf(a.geometry, b.geometry, thickness, wholeStep);
-    TraversalStack stack;
-    PairSink sink;
-    sink.start(nullptr, nullptr);
-    startPairs(trees, 30, stack);
-    const std::vector<NodePair> start(stack.pairs.begin(), stack.pairs.end());
-    traverse(trees, start, stack, sink);
-    std::vector<ElementPair> found(sink.kept().begin(), sink.kept().end());
-    std::sort(found.begin(), found.end());
+    const std::vector<ElementPair> found = traversedPairs(trees);
     for (std::uint32_t i = 0; i < a.elementCount(); ++i)
       for (std::uint32_t j = 0; j < b.elementCount(); ++j) {
         if (gapOf(i, j) > thickness) continue;
