@@ -244,10 +244,13 @@ struct Frame::Job : CountedObject {
     if (!job.kept.empty()) job.use(job, job.kept);
   }
 
-  /// Keeps pairs whose boxes overlap at the thickness of the traversal. Only the traversal of
-  /// mapped trees finds other pairs as well.
+  /// Keeps pairs whose boxes overlap at the thickness of the traversal. The traversal of mapped
+  /// trees finds other pairs as well. So does a search at the searchDistance if other pairs of the
+  /// geometries need boxes over the step.
   void keepNearby() {
-    if (trees.isMapped()) keepInWorld(std::max(record->plan.searchDistance, thickness));
+    const bool searches = record->plan.searchDistance > 0.0;
+    if (trees.isMapped() || (searches && record->hasWiderBoxes()))
+      keepInWorld(searches ? std::max(record->plan.step.motionWithRounding, thickness) : thickness);
   }
   void keepEnabled() {
     if (!record->anyDisabled()) return;

@@ -112,15 +112,13 @@ class Validation {
       const double lower = double{box.lower[k]} - cube.lower[k],
                    upper = double{box.upper[k]} - cube.lower[k];
       longest = std::max(longest, upper - lower);
-      // The cell of the centre is computed in float arithmetic relative to a cube up to 2^9 times
-      // as long, with four roundings of 2^-24 of that length. The margin for rounding in levels,
-      // 2^-10 of the size, is larger.
-      static_assert(Key::kMaxLevels == 9);
-      const double centre = 0.5 * (lower + upper), slack = cube.edge * 0x1p-13;
+      // The cell of the centre is computed in float arithmetic, relative to the root's cube or to
+      // one further down, with four roundings of 2^-24 of that cube's edge. An element on the wrong
+      // side of a border is as far outside all cells further down. Elements that are no longer than
+      // their cell are then within its loose bounds, up to the same slack.
+      const double centre = 0.5 * (lower + upper), slack = m_octree.rootCube().edge * 0x1p-22;
       if (centre < -slack || centre > cube.edge + slack)
         fail(node, "the centre of " + element() + " is outside its cell");
-      if (lower < -0.5 * cube.edge || upper > 1.5 * cube.edge)
-        fail(node, element() + " is outside its loose bounds");
     }
     if (longest > cube.edge) fail(node, element() + " is longer than its cell");
     // A split cell's own element is too large for the cell's children. A leaf may have elements of

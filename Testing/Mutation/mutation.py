@@ -102,8 +102,15 @@ def choose():
     return faults
 
 
+def write(path, text):
+    """A file that does not change keeps its time, so that less is built again."""
+    if not path.exists() or path.read_text() != text:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+
+
 def plant(faults, tree):
-    """Copies Source with the faults to the tree. Files that do not change keep their time."""
+    """Copies Source with the faults to the tree."""
     selector = '#pragma once\n#include <cstdlib>\nnamespace palpate {\n' \
                'inline const int plantedFault = [] {\n  const char* id = std::getenv("PALPATE_FAULT");\n' \
                '  return id ? std::atoi(id) : 0;\n}();\n}  // namespace palpate\n'
@@ -120,10 +127,7 @@ def plant(faults, tree):
                    f"{fault['before']}){lines}{text[last:]}"
         texts[name] = f'#include "{SELECTOR}"\n#line 1\n{text}'
     for name, text in texts.items():
-        path = tree / 'Source' / name
-        if not path.exists() or path.read_text() != text:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text)
+        write(tree / 'Source' / name, text)
 
 
 def configure(tree, build, library):
@@ -133,7 +137,7 @@ def configure(tree, build, library):
     data, testing = ROOT.parent / 'shared' / 'data', ROOT / 'Testing'
     launcher = os.environ.get('CMAKE_CXX_COMPILER_LAUNCHER', '')
     headers = build / 'precompiled.h'
-    headers.write_text(''.join(f'#include <{h}>\n' for h in [
+    write(headers, ''.join(f'#include <{h}>\n' for h in [
         'gtest/gtest.h', 'Eigen/Core', 'Eigen/Geometry', 'algorithm', 'array', 'cmath', 'functional', 'map', 'memory',
         'random', 'set', 'span', 'string', 'vector']))
     text = f"""flags = {FLAGS} -I{tree}/Source -I{tree}/Source/Public -I{testing} -I{ROOT}/Examples/Common {packages} $

@@ -73,7 +73,7 @@ class PALPATE_EXPORT LooseOctree {
   /// Checks every invariant of the trees. Each element is in exactly one node and within the fitted
   /// boxes above it. Fitted boxes are tight. Links agree in both directions. Free and used blocks
   /// add up to those allocated. After a rebuild, each element is in the cell of its centre and
-  /// inside that cell's loose bounds.
+  /// inside that cell's loose bounds, up to 2^-22 of the root's edge.
   ///
   /// Returns  one sentence for each violation.
   /// Cost     linear in the elements.

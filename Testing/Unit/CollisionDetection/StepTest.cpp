@@ -184,6 +184,23 @@ TEST_F(Step, StartedApartOfIntersectionNeedsTheSamePositions) {
 
 /// A solver with several detections in a step: `before` stays, and positions are corrected in
 /// between.
+/// The boxes at the end are further apart than the displacement. Those over the step, which the
+/// second pair needs, are not.
+TEST_F(Step, TrustInIntersectionDoesNotDependOnOtherPairs) {
+  const GeometryId other = m_detection.addTriangleMesh(at(0.01), triangle()),
+                   far = m_detection.addTriangleMesh(at(10), triangle());
+  m_detection.addCollisionPair(m_id, other, {.method = Method::Intersection});
+  for (const bool needsWholeStep : {false, true}) {
+    if (needsWholeStep) m_detection.addCollisionPair(m_id, far, {.method = Method::Continuous});
+    m_detection.setPositions(m_id, at(0), at(-0.05));
+    m_detection.detectCollision();
+    EXPECT_TRUE(m_detection.collisionData(m_id, other).validity().trusted) << needsWholeStep;
+    m_detection.setPositions(m_id, at(0), at(0.05));
+    m_detection.detectCollision();
+    EXPECT_FALSE(m_detection.collisionData(m_id, other).validity().trusted) << needsWholeStep;
+  }
+}
+
 TEST_F(Step, KeepsBeforeThroughSeveralDetections) {
   const GeometryId sheet = m_detection.addTriangleMesh(at(1), triangle());
   m_detection.addCollisionPair(m_id, sheet, {.method = Method::Continuous});

@@ -96,6 +96,21 @@ TEST(ClosestPoint, AgreesWithRationalArithmetic) {
   print("edge-edge", edgeEdge);
 }
 
+/// Features that touch are decided in integers.
+TEST(ClosestPoint, OrdinaryFeaturesNeedNoExactArithmetic) {
+  RandomFeatures random;
+  int exact = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Four x = configuration(0, random);
+    exact += vertexTriangleDistance(x[0], x[1], x[2], x[3]).exact;
+    exact += edgeEdgeDistance(x[0], x[1], x[2], x[3]).exact;
+  }
+  EXPECT_LT(exact, 4);
+  const Vector3d a(0, 0, 0), b(4, 0, 0), c(0, 4, 0);
+  EXPECT_TRUE(vertexTriangleDistance({1, 1, 0}, a, b, c).exact);
+  EXPECT_TRUE(edgeEdgeDistance(b, c, {1, 3, -1}, {1, 3, 2}).exact);
+}
+
 /// Each border between two regions is where a weight or an offset is zero.
 TEST(ClosestPoint, EveryRegionBorderOfATriangleIsCrossed) {
   const std::vector<std::array<Vector3d, 3>> triangles{

@@ -137,6 +137,34 @@ TEST(ImpactFilter, KeepsEveryTouchWhereProductsUnderflow) {
   }
 }
 
+/// One vertex is so far away along one axis that sums of products overflow.
+TEST(ImpactFilter, KeepsEveryTouchBesideOneHugeCoordinate) {
+  test::Random random(23);
+  for (int i = 0; i < testing::casesOf(2000); ++i) {
+    constexpr std::size_t kFar[2][2] = {{2, 3}, {1, 3}};
+    const std::size_t far = kFar[i % 2][random.below(2)];
+    const int axis = random.below(3);
+    Eight eight;
+    for (ImpactCase& query : eight) {
+      query.edges = i % 2;
+      for (std::size_t vertex = 0; vertex < 4; ++vertex) {
+        const double size = std::ldexp(1.0, -random.below(4));
+        for (std::size_t end = 0; end < 2; ++end) {
+          Eigen::Vector3d& p = query.positions[4 * end + vertex];
+          p = size * random.inCube();
+          if (vertex == far)
+            p[axis] = (random.below(2) ? 0x1p1023 : -0x1p1023) * (1.0 + random.unit());
+        }
+      }
+    }
+    const unsigned out = leftOut(eight, {});
+    for (std::size_t lane = 0; lane < eight.size(); ++lane)
+      if (out >> lane & 1) {
+        ASSERT_FALSE(impact::Query(eight[lane].edges, eight[lane].positions).firstTouch()) << i;
+      }
+  }
+}
+
 /// The distance of the features at some time, exactly or a little above it.
 TEST(ImpactFilter, KeepsEveryQueryThatComesWithinTheDistance) {
   HardCases hard(13);

@@ -102,6 +102,42 @@ TEST(ImpactSide, IsCorrectAtTheEndOfTheRange) {
   }
 }
 
+/// Where differences overflow, the side is exact, too. A vertex comes through the plane of a
+/// turning triangle twice: first beside the triangle, at a quarter of the step, and then from the
+/// other side through it.
+TEST(ImpactSide, IsTheLastOneBeforeTheTime) {
+  constexpr double kLarge = 0x1.fp1023;
+  for (const double side : {1.0, -1.0})
+    for (const double size : {1.0, kLarge}) {
+      const auto at = [&](double x, double y, double z) {
+        return Eigen::Vector3d(size * x, size * y, size * side * z);
+      };
+      const ImpactCase query{false,
+                             {at(-0.6, -1, -0.2), at(-1, 0, 0), at(1, 0, 0), at(-1, 1, -1),
+                              at(-0.6, 1, 0.4), at(-1, 0, 0), at(1, 0, 0), at(-1, 1, 1)}};
+      EXPECT_EQ(sideBefore(query.query(), 0.4), -side);
+      EXPECT_EQ(sideBefore(query.query(), 0.75), side);
+    }
+}
+
+/// Features come from either side, with either order of corners.
+TEST(ImpactSide, NormalsPointToWhereTheFirstFeatureCameFrom) {
+  for (const double side : {1.0, -1.0}) {
+    const Eigen::Vector3d up(0.0, 0.0, 0.01 * side), v(0.2, 0.3, 0.0), a(0, 0, 0), b(1, 0, 0),
+        c(0, 1, 0);
+    for (const ImpactCase& query :
+         {crossing(0.5, side, 0.7), crossing(0.5, side, 0.7).permuted({1, 0, 2, 3}),
+          ImpactCase{false, {v + up, a, b, c, v - up, a, b, c}},
+          ImpactCase{false, {v + up, a, c, b, v - up, a, c, b}}}) {
+      std::size_t exactDecisions = 0;
+      const Eigen::Vector3d normal =
+          normalOfTouch(query.query(), 0.5, positionsAt(query.query(), 0.5), exactDecisions);
+      EXPECT_LT((normal - side * Eigen::Vector3d::UnitZ()).norm(), 1e-15) << query.edges;
+      EXPECT_EQ(exactDecisions, 0u);
+    }
+  }
+}
+
 }  // namespace
 
 }  // namespace palpate

@@ -1,6 +1,7 @@
 #include "Math/RayTriangle.h"
 
 #include "Common/Sanitized.h"
+#include "Math/Tolerances.h"
 #include "RationalOracle.h"
 #include "TrianglePairs.h"
 
@@ -144,6 +145,42 @@ TEST(RayTriangle, AgreesWithRationalArithmeticNearBorders) {
   }
   EXPECT_GT(hits, cases / 4);
   EXPECT_LT(hits, cases * 3 / 4);
+}
+
+/// Rays that are nearly in the triangle's plane, and sizes that are not moderate.
+TEST(RayTriangle, FirstPointsAreWithinTheStatedError) {
+  Random random(33);
+  int hits = 0;
+  for (int i = 0; i < testing::casesOf(8000); ++i) {
+    constexpr int kExponents[] = {0, 0, 150, -150, 280, -280};
+    const int exponent = kExponents[i % 6];
+    Corners t = cornersOf([&] { return random.inCube(); });
+    const Eigen::Vector3d inPlane = (t[1] - t[0]) + random.unit() * (t[2] - t[0]);
+    const Eigen::Vector3d direction =
+                              inPlane + std::ldexp(1.0, -random.below(45)) * random.inCube(),
+                          origin = pointOn(t, random) - (0.2 + random.unit()) * direction;
+    for (Eigen::Vector3d& corner : t) corner = scaled(corner, exponent);
+    const RaySegment ray{scaled(origin, exponent), scaled(direction, exponent), -4.0, 4.0};
+    const std::optional<RayInterval> found = intersectRay(ray, t[0], t[1], t[2]);
+    if (!found) continue;
+    ++hits;
+    const std::optional<Shared> truth = sharedByRay(ray, t);
+    ASSERT_TRUE(truth) << i;
+    const RayPoint point = firstPoint(ray, *found, t[0], t[1], t[2]);
+    double extent = 0.0;
+    for (const Eigen::Vector3d& corner : t)
+      extent = std::max(extent, (corner - ray.origin).cwiseAbs().maxCoeff());
+    const double most = extent / ray.direction.cwiseAbs().maxCoeff();
+    const Rational error = abs(truth->first - Rational(point.t));
+    ASSERT_LE(error.get_d(), kRayError * most) << i;
+    const Eigen::Vector3d& w = point.weights;
+    ASSERT_GE(w.minCoeff(), 0.0) << i;
+    ASSERT_NEAR(w.sum(), 1.0, 0x1p-52) << i;
+    const Eigen::Vector3d away =
+        w[0] * t[0] + w[1] * t[1] + w[2] * t[2] - (ray.origin + point.t * ray.direction);
+    ASSERT_LE(away.cwiseAbs().maxCoeff(), 0x1p-44 * extent) << i;
+  }
+  EXPECT_GT(hits, static_cast<int>(testing::leastOf(4000)));
 }
 
 }  // namespace

@@ -209,6 +209,16 @@ TEST(RoundSegment, AnIntervalHoldsThePointsWithinTheRadiusOfATriangle) {
     const std::optional<RayInterval> interval =
         intersectRay(sizedRay, sized(a), sized(b), sized(c), std::ldexp(radius, exponent));
     found += interval.has_value();
+    // Each edge has a capsule in the body.
+    const Vector3d edges[][2] = {{a, b}, {b, c}, {c, a}};
+    for (const auto& [p, q] : edges) {
+      const double sizedRadius = std::ldexp(radius, exponent);
+      const RoundIntervals capsule =
+          intersectRay(sizedRay, sized(p), sized(q), sizedRadius, sizedRadius);
+      if (capsule.size == 0) continue;
+      ASSERT_TRUE(interval) << repeat;
+      ASSERT_GE(interval->error, capsule.intervals[0].error) << repeat;
+    }
     const std::vector<RayInterval> intervals(interval ? 1 : 0, interval.value_or(RayInterval{}));
     ASSERT_NO_FATAL_FAILURE(checkIntervals(intervals, ray, 1.0, [&](const Vector3d& at) {
       return vertexTriangleDistance(at, a, b, c).distance - radius;

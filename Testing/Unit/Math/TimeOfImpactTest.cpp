@@ -43,6 +43,22 @@ TEST(TimeOfImpact, AgreesWithOracleOnHardCases) {
   }
 }
 
+/// Exact arithmetic is slower by orders of magnitude.
+TEST(TimeOfImpact, OrdinaryQueriesNeedNoExactArithmetic) {
+  test::Random random(41);
+  const int cases = testing::casesOf(20000);
+  for (const bool edges : {false, true}) {
+    int impacts = 0, exact = 0;
+    for (int i = 0; i < cases; ++i) {
+      const ImpactResult result = findTouch(randomCase(random, edges).query(), 1e-6);
+      impacts += result.impact;
+      exact += result.exact;
+    }
+    EXPECT_GT(impacts, cases / 50) << edges;
+    EXPECT_LT(exact, cases / 1000) << edges;
+  }
+}
+
 TEST(TimeOfImpact, AgreesWithOracleOnSmallGrids) {
   test::Random random(1);
   int impacts = 0;

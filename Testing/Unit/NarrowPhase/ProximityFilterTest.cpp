@@ -66,7 +66,7 @@ class RandomPoints {
   std::mt19937_64 m_engine{3};
 };
 
-constexpr int kKinds = 11;
+constexpr int kKinds = 12;
 
 Pair pairOf(int kind, RandomPoints& random) {
   Pair x;
@@ -125,6 +125,14 @@ Pair pairOf(int kind, RandomPoints& random) {
       for (Vector3d& v : x) v[axis] *= size;
       break;
     }
+    case 11: {  // a small edge over the middle of a long one
+      const Vector3d u = x[1] - x[0], normal = u.cross(x[3]).normalized(),
+                     v = std::ldexp(1.0, -5 - random.below(15)) * normal.cross(x[4]);
+      x[3] = x[0] + 0.5 * u + random.real() * normal - 0.4 * v;
+      x[4] = x[3] + v;
+      x[5] = x[3] + v.norm() * x[5];
+      break;
+    }
     case 6: {  // any scale
       const double scale = std::ldexp(1.0, random.below(2000) - 1000);
       for (Vector3d& v : x) v *= scale;
@@ -145,7 +153,7 @@ std::vector<Pair> batchOf(int kind, RandomPoints& random) {
 TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
   RandomPoints random;
   std::size_t within = 0;
-  for (int round = 0; round < testing::casesOf(4400); ++round) {
+  for (int round = 0; round < testing::casesOf(4800); ++round) {
     const int kind = round % kKinds;
     const std::vector<Pair> pairs = batchOf(kind, random);
     const bool distinct = random.below(2) == 0;
@@ -175,7 +183,7 @@ TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
 TEST(ProximityFilter, KeepsEdgesWithinTheCheckedDistance) {
   RandomPoints random;
   std::size_t ends = 0;
-  for (int round = 0; round < testing::casesOf(2200); ++round) {
+  for (int round = 0; round < testing::casesOf(2400); ++round) {
     const int kind = round % kKinds;
     std::vector<Pair> pairs = batchOf(kind, random);
     for (Pair& pair : pairs)

@@ -526,6 +526,27 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForParallelPlates) {
   }
 }
 
+/// Only rounding decides which of the triangles around a far sphere is the nearest. The nearest
+/// corner of each is one of its box.
+TEST(GeometryDistances, OctreesAnswerAsBruteForceForTrianglesAtOneDistance) {
+  Random random(211);
+  for (int round = 0; round < casesOf(300); ++round) {
+    const double radius = std::exp2(uniform(random, 26, 36));
+    const Vector3d outward = randomPoint(random, -1, 1).normalized(), centre = radius * outward;
+    TestGeometry geometry = testGeometry(soup(random, 150, 0.1));
+    for (const Triangle& corners : geometry.triangles) {
+      const Vector3d at = (centre + randomPoint(random, -1, 1)).normalized() * radius - centre;
+      geometry.positions[corners[0]] = at;
+      for (const std::size_t i : {1, 2})
+        geometry.positions[corners[i]] = at + 0.3 * outward.cwiseProduct(randomPoint(random, 0, 1));
+    }
+    TwoBodies both(geometry, Sphere{{0, 0, 0}, 0.5});
+    both.put(both.a, geometry, Matrix3d::Identity(), centre, round % 2);
+    expectSameAnswers(both, 0.0, radius);
+    ASSERT_FALSE(::testing::Test::HasFailure()) << round;
+  }
+}
+
 TEST(GeometryDistances, TwoShapes) {
   Random random(210);
   const std::vector<AnalyticalGeometry> shapes = allShapes(random);
