@@ -1,5 +1,6 @@
 #include "Common/PairRun.h"
 #include "Common/DegenerateCases.h"
+#include "Common/FloatingPointMode.h"
 #include "Unit/Math/TrianglePairs.h"
 
 #include <palpate/ConstraintRows.h>
@@ -12,6 +13,7 @@
 
 #include <bit>
 #include <cfenv>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -20,7 +22,6 @@
 #include <type_traits>
 #include <unistd.h>
 #include <utility>
-#include <xmmintrin.h>
 
 // Results do not depend on the floating-point environment of the calling thread: rounding mode,
 // flushing denormals to zero as audio and graphics code often does, trapping exceptions. The
@@ -31,13 +32,12 @@ namespace {
 
 using namespace testing;
 
-constexpr unsigned kFlushToZero = 0x8000, kDenormalsAreZero = 0x0040;
-constexpr unsigned kBoth = kFlushToZero | kDenormalsAreZero;
+constexpr std::uint64_t kBoth = kFlushResults | kFlushOperands;
 
 struct Mode {
   const char* name;
   int rounding = FE_TONEAREST;
-  unsigned flags = 0;
+  std::uint64_t flags = 0;
   bool traps = false;
 };
 
@@ -58,7 +58,7 @@ class InMode {
     std::fegetenv(&m_before);
     std::feclearexcept(FE_ALL_EXCEPT);
     std::fesetround(mode.rounding);
-    _mm_setcsr(_mm_getcsr() | mode.flags);
+    addFloatingPointMode(mode.flags);
     if (mode.traps) feenableexcept(FE_ALL_EXCEPT);
   }
   ~InMode() { std::fesetenv(&m_before); }
@@ -73,9 +73,9 @@ class InMode {
 /// unchanged.
 template <class F>
 auto unchanged(F&& call) {
-  const unsigned before = _mm_getcsr();
+  const std::uint64_t before = floatingPointState();
   const auto result = call();
-  EXPECT_EQ(_mm_getcsr(), before);
+  EXPECT_EQ(floatingPointState(), before);
   return result;
 }
 
@@ -84,12 +84,12 @@ std::vector<Rows> answers(const DegenerateCase& input, const PairSettings& setti
                           const Mode& mode) {
   const std::vector<Eigen::Vector3d> aBefore = input.aBefore(), bBefore = input.bBefore();
   const InMode inMode(mode);
-  const unsigned set = _mm_getcsr();
+  const std::uint64_t set = floatingPointState();
   PairRun run(settingsOf(Engine::Octree, threads), input.a, input.b, settings);
   run.detection().setPositions(run.a(), aBefore, input.a.positions);
   run.detection().setPositions(run.b(), bBefore, input.b.positions);
   run.detection().detectCollision();
-  EXPECT_EQ(_mm_getcsr() & ~0x3fu, set & ~0x3fu);
+  EXPECT_EQ(floatingPointState() & ~kRaisedExceptions, set & ~kRaisedExceptions);
   return run.answers();
 }
 
@@ -109,7 +109,7 @@ TEST_P(FloatingPoint, ModeOfTheCallerChangesNoBit) {
     const std::vector<Rows> truth = answers(input, settings, 1, kStandard);
     // In a mode without denormals, a denormal thickness would be refused as zero.
     const bool denormal = settings.thickness < 0x1p-1022;
-    const unsigned both = kFlushToZero | (denormal ? 0 : kDenormalsAreZero);
+    const std::uint64_t both = kFlushResults | (denormal ? 0 : kFlushOperands);
     for (const Mode& mode : {Mode{"upward", FE_UPWARD}, Mode{"flushing", FE_TONEAREST, both},
                              Mode{"flushing and downward", FE_DOWNWARD, both},
                              Mode{"trapping", FE_TONEAREST, 0, true}}) {
@@ -210,10 +210,10 @@ Bits meshAnswers(const DegenerateCase& input, const PairSettings& settings, cons
   });
   std::vector<ConstraintRow> rows;
   std::vector<TripletOfBits> triplets;
-  const unsigned before = _mm_getcsr();
+  const std::uint64_t before = floatingPointState();
   appendRows(data, {0, aBefore, a.positions}, {first, bBefore, b.positions}, rows);
   appendTriplets(std::span<const ConstraintRow>(rows), triplets);
-  EXPECT_EQ(_mm_getcsr(), before);
+  EXPECT_EQ(floatingPointState(), before);
   Bits bits{data.hash()};
   for (const ConstraintRow& row : rows) {
     appendBits(bits, row.normal);

@@ -94,6 +94,16 @@ TEST(PointQueries, FindEveryOverlappingElement) {
       std::vector<std::uint32_t> found(stack.found.begin(), stack.found.end());
       std::sort(found.begin(), found.end());
       ASSERT_EQ(found, expected);
+      // Without their own boxes, elements come with those of their node.
+      found.clear();
+      forEachOverlapping(
+          *c.octree, [&](const FloatBox& stored) { return map(stored).overlaps(box); }, stack,
+          [&](std::uint32_t begin, std::uint32_t end) {
+            for (std::uint32_t i = begin; i < end; ++i) found.push_back(i);
+          });
+      std::sort(found.begin(), found.end());
+      ASSERT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
+      ASSERT_TRUE(std::includes(found.begin(), found.end(), expected.begin(), expected.end()));
       (expected.empty() ? none : all) += 1;
     }
   });

@@ -161,6 +161,15 @@ TEST(Validate, FindsElementsOutsideTheirCells) {
       "fits into a child cell", [&](const Cube& cube) { return about(cube, 0.5, 0.4); }, true);
 }
 
+TEST(Validate, AcceptsATreeThatGaveMemoryBack) {
+  for (const int directions : {3, 7, 9}) {
+    Tree tree(directions);
+    tree.octree.releaseMemory();
+    EXPECT_EQ(tree.octree.dops().directions, directions);
+    EXPECT_EQ(validate(tree.octree, true), std::vector<std::string>{});
+  }
+}
+
 TEST(Validate, FindsAnEmptyRoot) {
   BoxOctree tree;
   tree.build(Boxes(1, testing::boxAbout({0, 0, 0}, 1)), {}, Threads(1));

@@ -1,3 +1,4 @@
+#include "Common/FloatingPointMode.h"
 #include "Common/QueryCalls.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
@@ -6,12 +7,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cfenv>
 #include <cmath>
 #include <functional>
 #include <map>
 #include <set>
-
-#include <xmmintrin.h>
 
 namespace palpate {
 namespace {
@@ -216,10 +216,11 @@ TEST(InsideVertices, DoNotDependOnTheCallersFloatingPoint) {
   OctreeBasedCD detection;
   const GeometryId first = detection.addTriangleMesh(points.positions, points.triangles),
                    second = detection.addTriangleMesh(body.positions, body.triangles);
-  const unsigned before = _mm_getcsr();
-  _mm_setcsr(before | 0x8040);  // flush to zero, denormals are zero
+  std::fenv_t before;
+  std::fegetenv(&before);
+  testing::addFloatingPointMode(testing::kFlushResults | testing::kFlushOperands);
   const auto found = testing::insideVertices(detection, first, second);
-  _mm_setcsr(before);
+  std::fesetenv(&before);
   EXPECT_EQ(std::vector<InsideVertex>(found.begin(), found.end()), expected);
 }
 
@@ -269,6 +270,31 @@ TEST(InsideVertices, NeedAClosedBody) {
   const Mesh whole = testing::sphere(8, 8, {0, 0, 0}, 1);
   detection.setTriangles(a, whole.positions, whole.triangles);
   EXPECT_NO_THROW(testing::insideVertices(detection, b, a));
+}
+
+/// Two more triangles, each at an edge of its own.
+TEST(InsideVertices, ErrorsNameTheFirstEdge) {
+  Mesh fins = testing::sphere(8, 8, {0, 0, 0}, 1);
+  for (const Triangle& corners : {fins.triangles.front(), fins.triangles.back()}) {
+    fins.triangles.push_back(
+        {corners[0], corners[1], static_cast<std::uint32_t>(fins.positions.size())});
+    fins.positions.emplace_back(2, 2, 2);
+  }
+  const std::vector<Segment> shared = findMeshDefects(fins.triangles).shared;
+  ASSERT_EQ(shared.size(), 2u);
+  ASSERT_NE(shared[0][0], shared[1][0]);
+  OctreeBasedCD detection;
+  const GeometryId a = detection.addTriangleMesh(fins.positions, fins.triangles),
+                   b = detection.addTriangleMesh(fins.positions, fins.triangles);
+  try {
+    testing::insideVertices(detection, b, a);
+    ADD_FAILURE() << "no error";
+  } catch (const Error& error) {
+    const std::string expected = "; 2 edges belong to three triangles or more, the first is (" +
+                                 std::to_string(shared[0][0]) + ", " +
+                                 std::to_string(shared[0][1]) + ")";
+    EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
+  }
 }
 
 }  // namespace
