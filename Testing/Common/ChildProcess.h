@@ -11,9 +11,18 @@
 
 namespace palpate::testing {
 
+#ifdef PALPATE_EMULATED
+inline constexpr bool kEmulated = true;  ///< in an emulator that runs one process, as qemu-user
+#else
+inline constexpr bool kEmulated = false;
+#endif
+
 /// AddressSanitizer does not lock its allocator around fork(). If another thread of the parent
-/// allocates at that moment, the child finds the allocator locked for ever.
-inline constexpr bool kForksBesideThreads = !kAddressSanitizer;
+/// allocates at that moment, the child finds the allocator locked for ever. Emulators do not lock
+/// their own state either.
+inline constexpr bool kForksBesideThreads = !kAddressSanitizer && !kEmulated;
+inline constexpr const char* kNoForks =
+    "AddressSanitizer and emulators do not support fork() beside threads";
 
 /// The result of a child: "passed", "failed", "exit 3", or "signal 14" (SIGALRM: it hung). The
 /// child runs `body` and exits without running the exit handlers of the process.

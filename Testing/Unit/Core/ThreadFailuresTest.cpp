@@ -89,7 +89,8 @@ constexpr bool kStartsAsMany = true;
 #endif
 
 TEST(ThreadFailures, FewerThreadsDoTheWorkIfMemoryIsShort) {
-  if (testing::kSanitized) GTEST_SKIP() << "sanitizers reserve address space of their own";
+  if (testing::kSanitized || testing::kEmulated)
+    GTEST_SKIP() << "sanitizers and emulators reserve address space of their own";
   for (const std::size_t bytes : {std::size_t{16} << 20, std::size_t{200} << 20})
     EXPECT_EQ(inChild([&] {
                 limitAddressSpace(bytes);
@@ -118,7 +119,7 @@ void pauseFor(int repeat) {
 }
 
 TEST(ThreadFailures, ObjectCanBeDestroyedInTheChildOfAFork) {
-  if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
+  if (!testing::kForksBesideThreads) GTEST_SKIP() << testing::kNoForks;
   for (int repeat = 0; repeat < 50; ++repeat) {
     auto scene = std::make_unique<Scene>(Settings{.threads = 9});
     scene->hash();
@@ -133,7 +134,7 @@ TEST(ThreadFailures, ObjectCanBeDestroyedInTheChildOfAFork) {
 }
 
 TEST(ThreadFailures, FrameInTheChildOfAForkIsCorrect) {
-  if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
+  if (!testing::kForksBesideThreads) GTEST_SKIP() << testing::kNoForks;
   const std::uint64_t truth = serialHash();
   Scene scene({.threads = 3});
   for (int repeat = 0; repeat < 50; ++repeat) {
@@ -146,7 +147,8 @@ TEST(ThreadFailures, FrameInTheChildOfAForkIsCorrect) {
 }
 
 TEST(ThreadFailures, ObjectMadeInTheChildOfAForkHasThreads) {
-  if (testing::kSanitized) GTEST_SKIP() << "sanitizers do not start threads after a fork()";
+  if (testing::kSanitized || testing::kEmulated)
+    GTEST_SKIP() << "sanitizers and emulators do not start threads after a fork()";
   const Threads before(3);
   ASSERT_TRUE(everyIndexRuns(before));
   EXPECT_EQ(inChild([&] {
@@ -166,7 +168,7 @@ TEST(ThreadFailures, ObjectMadeInTheChildOfAForkHasThreads) {
 }
 
 TEST(ThreadFailures, ForkWhileAnotherThreadUsesThePoolIsSafe) {
-  if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
+  if (!testing::kForksBesideThreads) GTEST_SKIP() << testing::kNoForks;
   const std::shared_ptr<Executor> pool = makeThreadPool(3);
   std::atomic<bool> over{false};
   std::thread other([&] {
@@ -187,7 +189,7 @@ TEST(ThreadFailures, ForkWhileAnotherThreadUsesThePoolIsSafe) {
 
 #ifndef PALPATE_THREADS_TBB
 TEST(ThreadFailures, ForkInASharedTaskIsAnErrorInTheChild) {
-  if (!testing::kForksBesideThreads) GTEST_SKIP() << "AddressSanitizer's allocator may be locked";
+  if (!testing::kForksBesideThreads) GTEST_SKIP() << testing::kNoForks;
   const Threads threads(2);
   std::atomic<bool> forked{false}, parent{true};
   std::string outcome;
