@@ -127,15 +127,15 @@ class PenetrationTracker::Implementation::Search {
   }
 
   TrackedVertex operator()(const InsideVertex& nearest, const Eigen::Vector3d& p,
-                           const VertexState* last) {
-    if (!last) return {nearest, nearest, DirectionChange::Entered};
-    const Corners corners = cornersOf(m_body, m_body.mesh.topology.triangles[last->triangle]);
-    const Eigen::Matrix3d rotation = rotationOf(last->triangleAt, corners);
-    const Eigen::Vector3d direction = (rotation * last->direction).normalized();
+                           const VertexState* earlier) {
+    if (!earlier) return {nearest, nearest, DirectionChange::Entered};
+    const Corners corners = cornersOf(m_body, m_body.mesh.topology.triangles[earlier->triangle]);
+    const Eigen::Matrix3d rotation = rotationOf(earlier->triangleAt, corners);
+    const Eigen::Vector3d direction = (rotation * earlier->direction).normalized();
     const Eigen::Vector3d moved =
-        (p - pointAt(corners, last->barycentric)) -
-        rotation * (last->position - pointAt(last->triangleAt, last->barycentric));
-    const double turnByMotion = moved.norm() / std::sqrt(last->depth) / std::sqrt(nearest.depth);
+        (p - pointAt(corners, earlier->barycentric)) -
+        rotation * (earlier->position - pointAt(earlier->triangleAt, earlier->barycentric));
+    const double turnByMotion = moved.norm() / std::sqrt(earlier->depth) / std::sqrt(nearest.depth);
     if ((nearest.direction - direction).norm() <= TrackedVertex::kMaxTurn + turnByMotion)
       return {nearest, nearest, DirectionChange::None};
     if (const auto kept = firstHitAlong(nearest.vertex, p, direction,

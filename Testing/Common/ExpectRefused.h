@@ -4,19 +4,25 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <string>
 
 namespace palpate::testing {
 
-/// Expects that the call throws this error and that its message contains the words.
+/// Expects that the call throws this error, that its message contains the words, and that it names
+/// the geometry, if one is given.
 template <class Call>
-void expectRefused(ErrorCode code, const std::string& words, Call&& call) {
+void expectRefused(ErrorCode code, const std::string& words, Call&& call,
+                   std::optional<GeometryId> geometry = std::nullopt) {
   try {
     call();
     ADD_FAILURE() << "accepted; expected: " << words;
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), code);
     EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+    if (geometry) {
+      EXPECT_EQ(error.geometry(), geometry);
+    }
   }
 }
 
