@@ -16,7 +16,7 @@ struct SolidAngleShare {
   void add(const SolidAngleShare& other) { value += other.value, error += other.error; }
 };
 
-inline Eigen::Vector3d directionOf(const Eigen::Vector3d& v) {
+inline Eigen::Vector3d unitVector(const Eigen::Vector3d& v) {
   const double square = v.squaredNorm();
   return square > kUnderflowGuardOfProducts && square < kOverflowGuard
              ? Eigen::Vector3d(v / std::sqrt(square))
@@ -30,7 +30,7 @@ inline Eigen::Vector3d directionOf(const Eigen::Vector3d& v) {
 ///          vectors, and a bound on the error, which grows where p is near the triangle's border.
 inline SolidAngleShare solidAngleShare(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                                        const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
-  const Eigen::Vector3d u = directionOf(a - p), v = directionOf(b - p), w = directionOf(c - p);
+  const Eigen::Vector3d u = unitVector(a - p), v = unitVector(b - p), w = unitVector(c - p);
   const double sine = u.dot(v.cross(w)), cosine = 1 + u.dot(v) + v.dot(w) + w.dot(u);
   const double length = std::sqrt(sine * sine + cosine * cosine);
   const double share = std::atan2(sine, cosine) / (2 * std::numbers::pi);
