@@ -10,11 +10,14 @@
 #include <charconv>
 #include <fstream>
 #include <iterator>
+#include <locale>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <system_error>
 #include <type_traits>
 #include <utility>
+#include <version>
 
 namespace palpate {
 
@@ -74,6 +77,24 @@ class Writer {
   std::string m_text;
 };
 
+/// Whether the whole text is a number in hexadecimal digits, without a prefix.
+bool isHexadecimal(std::string_view text, double& value) {
+#ifdef __cpp_lib_to_chars
+  const auto [end, fault] =
+      std::from_chars(text.begin(), text.end(), value, std::chars_format::hex);
+  return end == text.end() && fault == std::errc();
+#else  // libc++ 14 has from_chars() for integers only
+  std::string prefixed(text);
+  const std::size_t start = text.starts_with('-') ? 1 : 0;
+  if (const std::string_view digits = "0123456789abcdefABCDEF.";
+      start < text.size() && digits.find(text[start]) != digits.npos)
+    prefixed.insert(start, "0x");
+  std::istringstream stream(prefixed);
+  stream.imbue(std::locale::classic());
+  return stream >> value && stream.peek() == std::istringstream::traits_type::eof();
+#endif
+}
+
 /// Reads such a text. Throws Error (ErrorCode::File) that names the file and the line.
 class Reader {
  public:
@@ -111,10 +132,7 @@ class Reader {
   }
   void real(double& value) {
     const std::string_view found = word();
-    if (const auto [end, fault] =
-            std::from_chars(found.begin(), found.end(), value, std::chars_format::hex);
-        end != found.end() || fault != std::errc())
-      fail(quoted(found) + " is not a number");
+    if (!isHexadecimal(found, value)) fail(quoted(found) + " is not a number");
   }
   /// Reads the number of items that follow. Refuses more than the rest of the file can hold if each
   /// takes at least so many characters, the space after it included.

@@ -28,7 +28,7 @@ check() {
   cmake -S . -B "$folder" -G Ninja -DCMAKE_BUILD_TYPE=Release -DPALPATE_WITH_VTK=OFF -DPALPATE_WITH_FCL=OFF \
     -DPALPATE_BUILD_EXAMPLES=OFF -DPALPATE_TEST_FOLDERS=Golden -DPALPATE_PRECOMPILED_HEADERS=ON "${chosen[@]}" >/dev/null &&
     cmake --build "$folder" --target Golden >"$folder/log.txt" || { tail -20 "$folder/log.txt"; return 1; }
-  ctest --test-dir "$folder" --output-on-failure >"$folder/log.txt" || { cat "$folder/log.txt"; return 1; }
+  ctest --test-dir "$folder" --timeout 7200 --output-on-failure >"$folder/log.txt" || { cat "$folder/log.txt"; return 1; }
 }
 failed=0
 for name in "$@"; do
