@@ -16,6 +16,7 @@ struct SolidAngleShare {
   void add(const SolidAngleShare& other) { value += other.value, error += other.error; }
 };
 
+/// v with length 1; zero if v is. Faster than directionOf() of shapes, which has other last bits.
 inline Eigen::Vector3d unitVector(const Eigen::Vector3d& v) {
   const double square = v.squaredNorm();
   return square > kUnderflowGuardOfProducts && square < kOverflowGuard
