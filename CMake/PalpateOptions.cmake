@@ -18,6 +18,11 @@ if(PALPATE_SANITIZE)
     # With this check clang 14 compiles some files for more than two minutes.
     target_compile_options(PalpateOptions INTERFACE -fno-sanitize=pointer-overflow)
   endif()
+  if(CMAKE_CXX_COMPILER_ID STREQUAL Clang AND PALPATE_SANITIZE MATCHES thread)
+    # Linked as C++, clang adds a part of ThreadSanitizer's runtime that defines `operator new`, which tests replace.
+    target_link_options(PalpateOptions INTERFACE --driver-mode=gcc)
+    target_link_libraries(PalpateOptions INTERFACE stdc++ m)
+  endif()
 endif()
 
 # A shared library of ours exports what is ours.
