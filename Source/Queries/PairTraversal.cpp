@@ -209,9 +209,9 @@ class PairDescent {
   struct Boxes {
     alignas(64) float lower[3][kSide], upper[3][kSide], heights[kSide];
 
-    HWY_ATTR HWY_INLINE void load(const PairSide& side, std::uint32_t first) {
+    HWY_ATTR HWY_INLINE void load(const PairSide& side, std::uint32_t first, std::size_t size) {
       const LeafTag d;
-      for (std::size_t i = 0; i < kSide; i += hn::Lanes(d)) {
+      for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
         const auto boxes = BoxLanes<LeafTag>::load(side.octree.boxes(), first + i).mapped(side.map);
         for (int k = 0; k < 3; ++k) {
           hn::Store(boxes.lower[k], d, lower[k] + i);
@@ -252,12 +252,12 @@ class PairDescent {
     const std::uint32_t beginB = beginOf(m_b.side(), b);
     for (found.placeA = beginOf(m_a.side(), a); found.placeA < a.end; found.placeA += kSide) {
       const std::uint32_t sizeA = std::min<std::uint32_t>(kSide, a.end - found.placeA);
-      boxesA.load(m_a.side(), found.placeA);
+      boxesA.load(m_a.side(), found.placeA, sizeA);
       const std::uint32_t rows = boxesA.near(boxB, sizeA, m_limit);
       if (rows == 0) continue;
       for (found.placeB = beginB; found.placeB < b.end; found.placeB += kSide) {
         const std::uint32_t sizeB = std::min<std::uint32_t>(kSide, b.end - found.placeB);
-        boxesB.load(m_b.side(), found.placeB);
+        boxesB.load(m_b.side(), found.placeB, sizeB);
         if (hasHeights()) m_b.copy(found.placeB, sizeB, boxesB.heights);
         std::uint32_t any = 0;
         found.near.fill(0);
