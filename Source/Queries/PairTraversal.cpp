@@ -209,6 +209,7 @@ class PairDescent {
   struct Boxes {
     alignas(64) float lower[3][kSide], upper[3][kSide], heights[kSide];
 
+    /// The first `size` boxes. The last vector's other lanes hold values that nothing may use.
     HWY_ATTR HWY_INLINE void load(const PairSide& side, std::uint32_t first, std::size_t size) {
       const LeafTag d;
       for (std::size_t i = 0; i < size; i += hn::Lanes(d)) {
