@@ -5,7 +5,9 @@
 #include "Math/Tolerances.h"
 #include "Core/FloatingPoint.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -152,6 +154,13 @@ bool isBeside(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
   return a != b && !isBefore(a, b) && !isBefore(b, a);
 }
 
+/// The mean of two weights, rounded to a multiple of 2^-53 as they are. One less the weights gives
+/// one less the mean.
+double middleOf(double v, double w) {
+  const double middle = 0.5 * v + 0.5 * w;
+  return middle < 0.5 ? (middle + 0.5) - 0.5 : middle;
+}
+
 EdgeFeature featureAt(double weight) {
   if (weight == 0.0) return EdgeFeature::Start;
   return weight == 1.0 ? EdgeFeature::End : EdgeFeature::Interior;
@@ -212,6 +221,38 @@ class EndFeet {
     return {isBeside(p0, q0, q1), isBeside(p1, q0, q1), isBeside(q0, p0, p1), isBeside(q1, p0, p1)};
   }
 
+  /// The index of the nearest of the chosen ends.
+  int nearestOf(const std::array<bool, 4>& chosen) const {
+    int nearest = -1;
+    for (int i = 0; i < 4; ++i)
+      if (chosen[i] && (nearest < 0 || distance(i) < distance(nearest))) nearest = i;
+    return nearest;
+  }
+
+  /// Ends beside the other edge are equally near, but rounding may make their vectors differ. The
+  /// mean of these does not depend on the order of the edges and of their ends.
+  void takeMean(EdgeEdgeDistance& answer, const std::array<bool, 4>& beside) const {
+    std::array<Vector3d, 4> differences, directions;
+    int count = 0;
+    bool equal = true;
+    for (int i = 0; i < 4; ++i) {
+      const double turn = !beside[i] ? 0.0 : i < 2 ? 1.0 : -1.0;
+      differences[i] = turn * m_ends[i].foot.difference;
+      directions[i] = turn * m_ends[i].foot.direction;
+      count += beside[i];
+      equal = equal && (!beside[i] || differences[i] == answer.difference);
+    }
+    if (equal) return;
+    // Quartered, so that the largest differences stay finite. Pairs first, so that no order of the
+    // edges and of their ends changes the sum.
+    const auto sum = [](const std::array<Vector3d, 4>& of) -> Vector3d {
+      return (0.25 * of[0] + 0.25 * of[1]) + (0.25 * of[2] + 0.25 * of[3]);
+    };
+    answer.difference = sum(differences) * (4.0 / count);
+    const Vector3d direction = sum(directions);
+    answer.normal = direction / std::sqrt(dot(direction, direction));
+  }
+
   /// Moves the closest points of parallel edges to the middle of the interval that the edges share,
   /// which runs from one end to another.
   void moveToMiddle(EdgeEdgeDistance& answer, const std::array<bool, 4>& beside) const {
@@ -226,8 +267,8 @@ class EndFeet {
       if (high < 0 || before(high, i)) high = i;
     }
     if (low == high) return;
-    answer.weightA = 0.5 * weightA(low) + 0.5 * weightA(high);
-    answer.weightB = 0.5 * weightB(low) + 0.5 * weightB(high);
+    answer.weightA = middleOf(weightA(low), weightA(high));
+    answer.weightB = middleOf(weightB(low), weightB(high));
     answer.featureA = featureAt(answer.weightA);
     answer.featureB = featureAt(answer.weightB);
   }
@@ -239,6 +280,17 @@ class EndFeet {
   std::array<EndFoot, 4> m_ends;
 };
 
+/// Whether edge p comes before edge q: by the lower end, then by the higher end, each compared by
+/// x, then y, then z. Equal edges do not precede each other.
+bool precedes(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0, const Vector3d& q1) {
+  using Point = std::array<double, 3>;
+  const auto ends = [](const Vector3d& start, const Vector3d& end) {
+    const Point s{start[0], start[1], start[2]}, e{end[0], end[1], end[2]};
+    return std::pair(std::min(s, e), std::max(s, e));
+  };
+  return ends(p0, p1) < ends(q0, q1);
+}
+
 /// The closest points of edges, where at least one point is an end.
 EdgeEdgeDistance endDistance(const EdgePair& edges, bool parallel, bool decidedExactly) {
   const EndFeet ends(edges);
@@ -246,14 +298,18 @@ EdgeEdgeDistance endDistance(const EdgePair& edges, bool parallel, bool decidedE
   int nearest = ends.nearest(tied);
   const std::array<bool, 4> beside = parallel ? ends.beside() : std::array<bool, 4>{};
   // For parallel edges, any pair within the shared interval will do, but no other.
-  for (int i = 0; i < 4 && !beside[nearest]; ++i)
-    if (beside[i]) nearest = i;
+  if (const int among = ends.nearestOf(beside); among >= 0) nearest = among;
   tied = tied && !beside[nearest] && !ends.isCommon(nearest);
   if (tied) nearest = exact::nearestEnd(edges.p0, edges.p1, edges.q0, edges.q1);
   EdgeEdgeDistance answer = ends.answer(nearest);
   answer.exact = answer.exact || decidedExactly || tied;
   answer.parallel = parallel;
-  if (parallel) ends.moveToMiddle(answer, beside);
+  if (!parallel) return answer;
+  if (answer.distance > 0.0)
+    ends.takeMean(answer, beside);
+  else if (precedes(edges.q0, edges.q1, edges.p0, edges.p1))
+    answer.normal = -answer.normal;
+  ends.moveToMiddle(answer, beside);
   return answer;
 }
 

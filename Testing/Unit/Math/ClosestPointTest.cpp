@@ -368,6 +368,44 @@ TEST(ClosestPoint, SwappingEdgesOrEndsSwapsTheResult) {
   }
 }
 
+/// Parallel edges in every relation: along an axis with coordinates of two decimals, or in any
+/// direction; side by side, behind each other, collinear.
+TEST(ClosestPoint, SwappingParallelEdgesOrEndsSwapsTheResult) {
+  RandomFeatures random;
+  int touching = 0;
+  for (int i = 0; i < 20000; ++i) {
+    Four x;
+    if (i % 2 == 0) {
+      const int axis = random.below(3);
+      for (Vector3d& p : x) p = Vector3d(random.below(1000), random.below(1000), 0) / 100;
+      x[1] = x[0], x[3] = x[2];
+      x[1][axis] += 0.01 * (1 + random.below(1000));
+      x[3][axis] -= 0.01 * (1 + random.below(1000));
+    } else {
+      const Vector3d along(random.below(64), random.below(64), random.below(64));
+      const Vector3d at(random.below(9), random.below(9), random.below(9));
+      x = {at, Vector3d(at + along), Vector3d(at + 0.5 * random.below(5) * along),
+           Vector3d(at - 0.25 * random.below(9) * along)};
+      if (random.below(2)) x[2] += Vector3d(3, -1, 2), x[3] += Vector3d(3, -1, 2);
+    }
+    const auto& [p0, p1, q0, q1] = x;
+    if (p0 == p1 || q0 == q1) continue;  // all weights name one point
+    if ((p0 == q0 && p1 == q1) || (p0 == q1 && p1 == q0)) continue;
+    const EdgeEdgeDistance answer = edgeEdgeDistance(p0, p1, q0, q1);
+    touching += answer.distance == 0.0;
+    EdgeEdgeDistance edges = edgeEdgeDistance(q0, q1, p0, p1);
+    std::swap(edges.weightA, edges.weightB);
+    edges.difference = -edges.difference;
+    edges.normal = -edges.normal;
+    ASSERT_EQ(bitsOf(edges), bitsOf(answer)) << i;
+    if (answer.parallel) ASSERT_EQ(edges.normal, answer.normal) << i;
+    EdgeEdgeDistance ends = edgeEdgeDistance(p0, p1, q1, q0);
+    ends.weightB = 1.0 - ends.weightB;
+    ASSERT_EQ(bitsOf(ends), bitsOf(answer)) << i;
+  }
+  EXPECT_GT(touching, 1000);
+}
+
 template <class Answer>
 Bits mirroredBits(Answer answer) {
   answer.difference[0] = -answer.difference[0];
