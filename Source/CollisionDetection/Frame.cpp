@@ -12,6 +12,7 @@
 #include "NarrowPhase/ElementBoxes.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/Intersection.h"
+#include "NarrowPhase/Piercing.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Queries/ElementsNearShape.h"
 #include "Shapes/ShapeContacts.h"
@@ -296,10 +297,12 @@ struct Frame::Job : CountedObject {
   void findAll(const MeshPair& meshes, std::span<const ElementPair> pairs) {
     const MemoryScope memory(MemoryStage::NarrowPhase);
     Stopwatch watch;
-    bool& intersecting = contacts.facts.startsIntersecting;
-    if (meshes.step.checksStart && !intersecting)
-      intersecting = anyIntersecting(meshes, true, pairs, intersections).has_value();
-    if (record->plan.runsIntersection && (intersecting || record->plan.startsIntersecting))
+    StepFacts& facts = contacts.facts;
+    if (meshes.step.checksStart && !facts.startsPiercing())
+      facts.atStart =
+          std::max(facts.atStart, meetingOf(meshes, true, pairs, intersections).meeting);
+    if (record->plan.runsIntersection &&
+        (facts.startsPiercing() || record->plan.startsIntersecting))
       detectIntersections(*this, pairs);
     else
       intersectionsMissed = true;
@@ -685,7 +688,7 @@ void Frame::findMissedIntersections(const Threads& threads) {
   };
   bool any = false;
   for (std::size_t i = 0; i < m_jobCount; ++i)
-    m_jobs[i]->record->plan.startsIntersecting |= m_jobs[i]->contacts.facts.startsIntersecting;
+    m_jobs[i]->record->plan.startsIntersecting |= m_jobs[i]->contacts.facts.startsPiercing();
   for (std::size_t i = 0; i < m_jobCount; ++i) any |= missed(*m_jobs[i]);
   if (!any) return;
   threads.forEach(m_jobCount, [&](std::size_t i) {
@@ -715,9 +718,9 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
       replaceByImpacts(record.meshes(), m_facts, *found, m_impacts);
     m_buffers.push_back(&m_impacts);
   }
-  m_facts.startsIntersecting |= record.plan.startsIntersecting;
+  if (record.plan.startsIntersecting) m_facts.atStart = Meeting::Piercing;
   std::size_t preferredBuffers = 0;
-  if (m_facts.startsIntersecting && record.plan.runsIntersection) {
+  if (m_facts.startsPiercing() && record.plan.runsIntersection) {
     preferredBuffers = m_intersections.size();
     m_buffers.insert(m_buffers.begin(), m_intersections.begin(), m_intersections.end());
   }

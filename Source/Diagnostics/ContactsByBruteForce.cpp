@@ -8,6 +8,7 @@
 #include "NarrowPhase/LineEdges.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
+#include "NarrowPhase/TouchNormal.h"
 #include "Shapes/ShapeContacts.h"
 
 #include <algorithm>
@@ -141,8 +142,10 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
       const Triangle& corners = triangles.topology.triangles[t];
       check.recordTriangle(t, !kSwapped, triangles.now[corners[0]], triangles.now[corners[1]],
                            triangles.now[corners[2]]);
+      VertexTriangleDistance separating = *answer;
+      turnToSeparate(features, v, t, separating, out.exactDecisions);
       auto& list = kSwapped ? out.triangleVertex : out.vertexTriangle;
-      list.push_back(contactOf(v, t, corners, *answer));
+      list.push_back(contactOf(v, t, corners, separating));
       list.back().distance = gap(t);
     }
   }
@@ -156,8 +159,8 @@ void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
   for (const std::uint32_t i : sample) {
     for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
       if (pair.excludesEdges(i, j) || pair.b.topology.edgeTriangles[j].empty()) continue;
-      const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(
-          pair.a.now[a[i][0]], pair.a.now[a[i][1]], pair.b.now[b[j][0]], pair.b.now[b[j][1]]);
+      EdgeEdgeDistance answer = finiteEdgeEdgeDistance(pair.a.now[a[i][0]], pair.a.now[a[i][1]],
+                                                       pair.b.now[b[j][0]], pair.b.now[b[j][1]]);
       ++out.featurePairs;
       out.exactDecisions += answer.exact;
       if (!(answer.distance <= pair.thicknessAtEnd())) continue;
@@ -172,6 +175,7 @@ void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
         continue;
       }
       check.recordEdges(a[i], b[j]);
+      turnToSeparate(features, i, j, answer, out.exactDecisions);
       out.edgeEdge.push_back(contactOf(a[i], b[j], answer));
     }
   }
@@ -224,7 +228,10 @@ void findLineEdges(const MeshPair& pair, std::span<const std::uint32_t> sample,
           pointInwardAtEnd(pair, i, j, nearby->centres))
         continue;
       out.exactDecisions += nearby->centres.exact;
-      out.edgeEdge.push_back(contactOf(a[i], b[j], nearby->centres));
+      EdgeEdgeDistance centres = nearby->centres;
+      turnToSeparate(Features<ImpactQuery::Kind::EdgeEdge>{pair.a, pair.b}, i, j, centres,
+                     out.exactDecisions);
+      out.edgeEdge.push_back(contactOf(a[i], b[j], centres));
       out.edgeEdge.back().distance = nearby->distance;
     }
 }

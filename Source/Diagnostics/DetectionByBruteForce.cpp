@@ -1,6 +1,8 @@
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "Diagnostics/ContactsByBruteForce.h"
-#include "NarrowPhase/StepCheck.h"
+#include "NarrowPhase/Piercing.h"
+
+#include <algorithm>
 
 namespace palpate {
 
@@ -12,11 +14,11 @@ void detectPairByBruteForce(const PairRecord& record, ContactBuffers& contacts,
              countB = static_cast<std::uint32_t>(meshes.b.topology.triangles.size());
   for (std::uint32_t a = 0; a < countA && meshes.step.checksStart; ++a)
     for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b)
-      contacts.facts.startsIntersecting |= meshes.a.topology.isEnabled(a) &&
-                                           meshes.b.topology.isEnabled(b) &&
-                                           intersect(meshes, true, {a, b}, intersections);
+      if (meshes.a.topology.isEnabled(a) && meshes.b.topology.isEnabled(b))
+        contacts.facts.atStart = std::max(
+            contacts.facts.atStart, meetingOf(meshes, true, ElementPair{a, b}, intersections));
   if (!record.plan.runsIntersection ||
-      !(contacts.facts.startsIntersecting || record.plan.startsIntersecting))
+      !(contacts.facts.startsPiercing() || record.plan.startsIntersecting))
     return;
   meshes.settings.method = Method::Intersection;
   findContactsByBruteForce(meshes, intersections);

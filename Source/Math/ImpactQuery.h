@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 
 namespace palpate {
 
@@ -71,9 +72,19 @@ int sideBefore(const ImpactQuery&, double time, std::size_t* exactDecisions = nu
 /// far from the origin, where positions would be rounded. If the differences overflow, positions
 /// are absolute.
 std::array<Eigen::Vector3d, 4> positionsAt(const ImpactQuery&, double time);
-/// The normal at a touch, from the positions at that time; for a minimum distance of zero.
-Eigen::Vector3d normalOfTouch(const ImpactQuery&, double time,
-                              const std::array<Eigen::Vector3d, 4>& positions,
-                              std::size_t& exactDecisions);
+/// From where the first feature comes to a touch, seen from the second one. Both are unit vectors.
+struct Approach {
+  /// From the second feature to the first, just before the touch. It is perpendicular to the edges
+  /// that hold the closest points, and right to some 2^-20.
+  Eigen::Vector3d side;
+  /// Against the relative motion of the two points that meet; zero if they do not move.
+  Eigen::Vector3d origin;
+};
+/// None if the features touch from the step's start on: no side exists then.
+std::optional<Approach> approachOf(const ImpactQuery&, double time);
+/// The normal of the plane through a touch, on the side where the first feature was before. None if
+/// the four vertices were always in one plane, as those of parallel edges are.
+std::optional<Eigen::Vector3d> normalOfPlane(const ImpactQuery&, double time,
+                                             std::size_t& exactDecisions);
 
 }  // namespace palpate

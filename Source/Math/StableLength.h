@@ -23,4 +23,14 @@ inline double stableLength(const Eigen::Vector3d& v) {
   return scale * std::sqrt((x * x + y * y) + z * z);
 }
 
+/// The vector with length 1, also among denormals, where Eigen's stableNormalized() loses bits.
+/// Zero if the vector is.
+inline Eigen::Vector3d stableUnit(const Eigen::Vector3d& v) {
+  const double most = v.cwiseAbs().maxCoeff();
+  if (most == 0.0) return v;
+  const Eigen::Vector3d scaled = v / most;
+  return scaled /
+         std::sqrt((scaled[0] * scaled[0] + scaled[1] * scaled[1]) + scaled[2] * scaled[2]);
+}
+
 }  // namespace palpate

@@ -94,6 +94,17 @@ constexpr double kSideError = 0x1p-46;
 /// Share of the step: how far before an impact sideBefore() evaluates the side first. It goes back
 /// further where that is too near to decide, so any value will do.
 constexpr double kFirstStepBack = 0x1p-44;
+/// Relative to the largest coordinate difference. Positions at a time are off by 2^-50 of it. The
+/// direction between two points at least this far apart is therefore right to 2^-24.
+constexpr double kCertainDirection = 0x1p-26;
+
+// ---- Normals of features that touch (NarrowPhase/TouchNormal.cpp) ----
+
+/// Sine of an angle: unit vectors that differ by less are equal. Above kCertainDirection's 2^-24 and
+/// the rounding of a star's directions, and far below any angle that matters to a solver.
+constexpr double kTouchAngle = 0x1p-20;
+/// L: shorter vectors are scaled up before they are interpolated in time.
+constexpr double kTinyLength = 0x1p-500;
 
 // ---- Shapes (Shapes, Queries/ElementsNearShape.cpp) ----
 

@@ -96,6 +96,7 @@ void MeshTopology::findOwners(const CountedVector<bool>& newIsDisabled) {
   edgeTriangles = std::move(atEdges);
   owned = std::move(owners);
   untestedVertices = untested;
+  hasOnlyClosedStars = std::find(closedStars.begin(), closedStars.end(), 0) == closedStars.end();
   hasClosedStar = std::move(closedStars);
 }
 

@@ -59,6 +59,7 @@ struct MeshTopology {
   CountedVector<bool> isUsed;         ///< per vertex: in a triangle, enabled or not
   /// Per vertex: each of its edges is in exactly two enabled triangles, in opposite directions.
   CountedVector<std::uint8_t> hasClosedStar;
+  bool hasOnlyClosedStars = true;           ///< the enabled triangles are a closed surface
   CountedVector<std::uint32_t> disabled{};  ///< disabled triangles, ascending
   CountedVector<bool> isDisabled{};         ///< per triangle; empty if none is disabled
   std::optional<bool> closed;               ///< and consistently oriented; set when first needed

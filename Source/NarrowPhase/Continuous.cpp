@@ -4,9 +4,11 @@
 #include "NarrowPhase/Filters.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
+#include "NarrowPhase/TouchNormal.h"
 #include "Math/ClosestPoint.h"
 #include "Math/ImpactFilter.h"
 #include "Math/MotionBound.h"
+#include "Math/Tolerances.h"
 
 #include <algorithm>
 #include <array>
@@ -117,6 +119,15 @@ class ContactFinder {
            bool swapped, const ImpactQuery& query, double time, bool store) {
     const std::array<Vector3d, 4> p = positionsAt(query, time);
     std::array<MeshFeature, 2> closestFeatures;
+    const auto complete = [&](auto& contact) {
+      const bool touch = m_settings.minimumDistance == 0.0 || contact.distance == 0.0;
+      contact.timeOfImpact = time;
+      contact.distance -= m_pair.a.largestRadius + m_pair.b.largestRadius;
+      if (touch)
+        contact.normal = touchNormal(features, firstId, secondId,
+                                     {closestFeatures[swapped], closestFeatures[!swapped]}, time,
+                                     contact.normal, m_out.exactDecisions);
+    };
     if (m_pair.settings.earliestTimeOnly) m_out.facts.clearance = 0.0;
     const auto isSuppressed = [&](const auto& closest, const Vector3d& direction, bool rejected) {
       if (store) m_check.recordImpact(features, firstId, secondId, time, closest.distance);
@@ -125,13 +136,12 @@ class ContactFinder {
     };
     if constexpr (kind == Kind::VertexTriangle) {
       const MeshTopology& topology = features.second.topology;
-      const auto closest = finiteVertexTriangleDistance(p[0], p[1], p[2], p[3]);
-      m_out.exactDecisions += closest.exact;
+      const auto closest = closestAt(finiteVertexTriangleDistance, query, time, p);
       VertexTriangleContact contact =
           contactOf(firstId, secondId, topology.triangles[secondId], closest);
-      complete(contact, query, time, p);
       closestFeatures[swapped] = {MeshFeature::Kind::Vertex, firstId};
       closestFeatures[!swapped] = featureOf(topology, secondId, closest.feature);
+      complete(contact);
       const Vector3d direction = swapped ? -contact.normal : contact.normal;
       if (isSuppressed(closest, direction, rejectsVertex(m_pair, firstId, secondId, swapped)))
         return false;
@@ -141,13 +151,12 @@ class ContactFinder {
     } else {
       const MeshTopology &firstTopology = features.first.topology,
                          &secondTopology = features.second.topology;
-      const auto closest = finiteEdgeEdgeDistance(p[0], p[1], p[2], p[3]);
-      m_out.exactDecisions += closest.exact;
+      const auto closest = closestAt(finiteEdgeEdgeDistance, query, time, p);
       EdgeEdgeContact contact =
           contactOf(firstTopology.edges[firstId], secondTopology.edges[secondId], closest);
-      complete(contact, query, time, p);
       closestFeatures = {featureOf(firstTopology, firstId, closest.featureA),
                          featureOf(secondTopology, secondId, closest.featureB)};
+      complete(contact);
       if (isSuppressed(closest, contact.normal, rejectsEdges(m_pair, firstId, secondId)))
         return false;
       if (!store) return true;
@@ -158,13 +167,18 @@ class ContactFinder {
   }
 
  private:
-  template <class Contact>
-  void complete(Contact& contact, const ImpactQuery& query, double time,
-                const std::array<Vector3d, 4>& p) {
-    contact.timeOfImpact = time;
-    contact.distance -= m_pair.a.largestRadius + m_pair.b.largestRadius;
-    if (m_settings.minimumDistance > 0.0) return;
-    contact.normal = normalOfTouch(query, time, p, m_out.exactDecisions);
+  /// The closest points at an impact. p: positionsAt(). Features that touch when the step begins
+  /// may be apart there by rounding; they are measured where they are.
+  template <class Measure>
+  auto closestAt(Measure&& measure, const ImpactQuery& query, double time,
+                 const std::array<Vector3d, 4>& p) {
+    auto closest = measure(p[0], p[1], p[2], p[3]);
+    m_out.exactDecisions += closest.exact;
+    double extent = 0.0;
+    for (int i = 1; i < 4; ++i) extent = std::max(extent, (p[i] - p[0]).cwiseAbs().maxCoeff());
+    if (time > 0.0 || closest.distance > kCertainDirection * extent) return closest;
+    const auto& v = query.vertices;
+    return measure(v[0].before, v[1].before, v[2].before, v[3].before);
   }
 
   const MeshPair& m_pair;

@@ -14,10 +14,8 @@ namespace palpate {
 ///
 /// timeOfImpact is not after the first impact and at most the settings' timeTolerance before it.
 /// All other members of a contact describe that time.
-/// With a thickness, the normal is that of the distance. With thickness 0, it is the normal of the
-/// contact plane, on the side where the vertex, or edge a, was before. If that feature was always
-/// in the plane, the normal is the triangle's winding normal or the cross product of the edges.
-/// For degenerate elements it is the axis that <palpate/Distance.h> defines.
+/// With a thickness, the normal is that of the distance. With thickness 0, and at distance 0, it is
+/// touchNormal(): on the side where the vertex, or edge a, was before.
 void findContinuous(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);
 
 /// The two meshes of feature pairs of one kind: vertices of `first` with triangles of `second`, or

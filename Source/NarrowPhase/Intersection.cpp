@@ -5,6 +5,7 @@
 #include "NarrowPhase/IntersectionFilter.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
+#include "NarrowPhase/TouchNormal.h"
 #include "Math/ClosestPoint.h"
 #include "Exact/Predicates.h"
 #include "Math/TriangleIntersection.h"
@@ -93,11 +94,16 @@ class IntersectionContacts {
 
   void addCorner(const MeshTriangle& of, int corner, const MeshTriangle& triangle,
                  Buffer<VertexTriangleContact>& contacts) {
-    if (rejectsVertex(m_pair, of.vertices[corner], triangle.id, &of == &m_b)) return;
+    const bool swapped = &of == &m_b;
+    if (rejectsVertex(m_pair, of.vertices[corner], triangle.id, swapped)) return;
     const auto& [a, b, c] = triangle.positions;
     VertexTriangleDistance answer = finiteVertexTriangleDistance(of.positions[corner], a, b, c);
     m_out.exactDecisions += answer.exact;
-    if (answer.distance > 0.0) turnToOutside(of.positions[corner], triangle.positions, answer);
+    if (answer.distance > 0.0)
+      turnToOutside(of.positions[corner], triangle.positions, answer);
+    else
+      turnToSeparate(Features<ImpactQuery::Kind::VertexTriangle>{of.mesh, triangle.mesh},
+                     of.vertices[corner], triangle.id, answer, m_out.exactDecisions);
     m_check.recordTriangle(triangle.id, &triangle == &m_b, a, b, c);
     contacts.push_back(contactOf(of.vertices[corner], triangle.id, triangle.vertices, answer));
   }
@@ -124,10 +130,12 @@ class IntersectionContacts {
     if (rejectsEdges(m_pair, edgeA, edgeB)) return;
     const Segment &p = m_a.mesh.topology.edges[edgeA], &q = m_b.mesh.topology.edges[edgeB];
     const auto &positionsA = m_a.mesh.now, &positionsB = m_b.mesh.now;
-    const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(positionsA[p[0]], positionsA[p[1]],
-                                                           positionsB[q[0]], positionsB[q[1]]);
+    EdgeEdgeDistance answer = finiteEdgeEdgeDistance(positionsA[p[0]], positionsA[p[1]],
+                                                     positionsB[q[0]], positionsB[q[1]]);
     m_out.exactDecisions += answer.exact;
     m_check.recordEdges(p, q);
+    turnToSeparate(Features<ImpactQuery::Kind::EdgeEdge>{m_pair.a, m_pair.b}, edgeA, edgeB, answer,
+                   m_out.exactDecisions);
     m_out.edgeEdge.push_back(contactOf(p, q, answer));
   }
 
@@ -158,6 +166,8 @@ void findOne(const MeshPair& pair, const ElementPair& candidate, TriangleInterse
   IntersectionContacts(pair, a, b, out).add(known);
 }
 
+}  // namespace
+
 void keepPossible(const MeshPair& pair, bool atStart, std::span<const ElementPair> candidates,
                   Buffer<PossibleIntersection>& possible) {
   const auto placed = [&](const TriangleMesh& mesh) {
@@ -165,8 +175,6 @@ void keepPossible(const MeshPair& pair, bool atStart, std::span<const ElementPai
   };
   keepPossiblyIntersecting(placed(pair.a), placed(pair.b), pair.self(), candidates, possible);
 }
-
-}  // namespace
 
 void findIntersections(const MeshPair& pair, std::span<const ElementPair> candidates,
                        ContactBuffers& out) {
@@ -177,27 +185,12 @@ void findIntersections(const MeshPair& pair, std::span<const ElementPair> candid
   out.exactDecisions += counts.undecided;
 }
 
-bool intersect(const MeshPair& pair, bool atStart, const ElementPair& candidate,
-               ContactBuffers& counts) {
-  SignCounts signs;
+TriangleIntersection intersectionOf(const MeshPair& pair, bool atStart, const ElementPair& ids,
+                                    SignCounts& counts) {
   const auto of = [&](const TriangleMesh& mesh, std::uint32_t triangle) {
     return MeshTriangle(mesh, triangle, atStart ? mesh.before : mesh.now);
   };
-  const bool found =
-      intersectionOf(pair, of(pair.a, candidate.a), of(pair.b, candidate.b), signs).intersect();
-  counts.exactDecisions += signs.undecided;
-  return found;
-}
-
-std::optional<ElementPair> anyIntersecting(const MeshPair& pair, bool atStart,
-                                           std::span<const ElementPair> candidates,
-                                           ContactBuffers& counts) {
-  keepPossible(pair, atStart, candidates, counts.possible);
-  counts.validityPairs += candidates.size();
-  for (const PossibleIntersection& possible : counts.possible)
-    if (possible.isKnown() || intersect(pair, atStart, possible.triangles, counts))
-      return possible.triangles;
-  return {};
+  return intersectionOf(pair, of(pair.a, ids.a), of(pair.b, ids.b), counts);
 }
 
 void addIntersection(const MeshPair& pair, const ElementPair& candidate, ContactBuffers& out) {

@@ -36,4 +36,10 @@ void findIntersections(const MeshPair&, std::span<const ElementPair> candidates,
 /// Does the same for one pair of triangles, without keepPossiblyIntersecting().
 void addIntersection(const MeshPair&, const ElementPair&, ContactBuffers& out);
 
+/// How two triangles of the meshes intersect, at the step's start or at its end.
+TriangleIntersection intersectionOf(const MeshPair&, bool atStart, const ElementPair&, SignCounts&);
+/// keepPossiblyIntersecting() at the step's start or at its end.
+void keepPossible(const MeshPair&, bool atStart, std::span<const ElementPair> candidates,
+                  Buffer<PossibleIntersection>& possible);
+
 }  // namespace palpate

@@ -1,6 +1,7 @@
 #include "NarrowPhase/LineEdges.h"
 
 #include "NarrowPhase/Filters.h"
+#include "NarrowPhase/TouchNormal.h"
 #include "Math/ClosestPoint.h"
 
 #include <utility>
@@ -69,8 +70,11 @@ void testLineEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edge
       !isDistinct(pair, edgeA, edgeB, nearby->features, out))
     return;
   if (pointInwardAtEnd(pair, edgeA, edgeB, nearby->centres)) return;
+  EdgeEdgeDistance centres = nearby->centres;
+  turnToSeparate(Features<ImpactQuery::Kind::EdgeEdge>{pair.a, pair.b}, edgeA, edgeB, centres,
+                 out.exactDecisions);
   out.edgeEdge.push_back(
-      contactOf(pair.a.topology.edges[edgeA], pair.b.topology.edges[edgeB], nearby->centres));
+      contactOf(pair.a.topology.edges[edgeA], pair.b.topology.edges[edgeB], centres));
   out.edgeEdge.back().distance = nearby->distance;
 }
 

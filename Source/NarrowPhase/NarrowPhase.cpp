@@ -11,13 +11,13 @@ namespace palpate {
 
 void StepFacts::clear() {
   clearance = std::numeric_limits<double>::infinity();
-  startsIntersecting = false;
+  atStart = Meeting::Apart;
   for (auto* list : {&verticesA, &verticesB, &degenerateA, &degenerateB}) list->clear();
 }
 
 void StepFacts::add(const StepFacts& other) {
   clearance = std::min(clearance, other.clearance);
-  startsIntersecting |= other.startsIntersecting;
+  atStart = std::max(atStart, other.atStart);
   for (auto list : {&StepFacts::verticesA, &StepFacts::verticesB, &StepFacts::degenerateA,
                     &StepFacts::degenerateB})
     (this->*list).insert((this->*list).end(), (other.*list).begin(), (other.*list).end());

@@ -87,12 +87,17 @@ struct MeshPair {
   }
 };
 
+/// How two surfaces meet. Bodies whose surfaces touch rest on each other; those that pierce overlap
+/// (NarrowPhase/Piercing.h).
+enum class Meeting : std::uint8_t { Apart, Touching, Piercing };
+
 /// What the narrow phase found out about the conditions of a pair's method. Ids may repeat.
 struct StepFacts {
   /// L: at the step's end, no feature pair that is a contact, filtered or not, is nearer than this.
   /// 0: a feature pair may have touched in the step.
   double clearance = std::numeric_limits<double>::infinity();
-  bool startsIntersecting = false;
+  Meeting atStart = Meeting::Apart;  ///< how the surfaces meet at the step's start, where checked
+  bool startsPiercing() const { return atStart == Meeting::Piercing; }
   Buffer<std::uint32_t> verticesA, verticesB;      ///< of features that may have touched
   Buffer<std::uint32_t> degenerateA, degenerateB;  ///< triangles without area in contacts
   void clear();

@@ -6,6 +6,7 @@
 #include "NarrowPhase/ProximityFilter.h"
 #include "NarrowPhase/SharedVertex.h"
 #include "NarrowPhase/StepCheck.h"
+#include "NarrowPhase/TouchNormal.h"
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
 
@@ -46,7 +47,7 @@ class VertexTriangleFinder {
   void test(std::uint32_t vertex, std::uint32_t triangle) {
     const Triangle& corners = m_topology.triangles[triangle];
     const Vector3d p = m_vertices[vertex];
-    const VertexTriangleDistance answer = finiteVertexTriangleDistance(
+    VertexTriangleDistance answer = finiteVertexTriangleDistance(
         p, m_positions[corners[0]], m_positions[corners[1]], m_positions[corners[2]]);
     m_exactDecisions += answer.exact;
     const double radii = m_pair.radii(vertex, corners, answer.barycentric, m_swapped);
@@ -64,6 +65,7 @@ class VertexTriangleFinder {
     }
     m_check.recordTriangle(triangle, !m_swapped, m_positions[corners[0]], m_positions[corners[1]],
                            m_positions[corners[2]]);
+    turnToSeparate(m_features, vertex, triangle, answer, m_exactDecisions);
     m_out.push_back(contactOf(vertex, triangle, corners, answer));
     m_out.back().distance -= radii;
   }
@@ -188,6 +190,7 @@ void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, S
   }
   const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
   check.recordEdges(p, q);
+  turnToSeparate(features, edgeA, edgeB, *answer, out.exactDecisions);
   out.edgeEdge.push_back(contactOf(p, q, *answer));
 }
 

@@ -73,13 +73,4 @@ class StepCheck {
 void replaceByImpacts(const MeshPair&, const StepFacts& touched, ContactBuffers& found,
                       ContactBuffers& out);
 
-/// Whether two triangles intersect at the step's start or at its end; exact. counts: receives
-/// exactDecisions.
-bool intersect(const MeshPair&, bool atStart, const ElementPair&, ContactBuffers& counts);
-/// Returns one of the candidates that intersect, if there is one. counts: receives exactDecisions
-/// and validityPairs, and serves as scratch.
-std::optional<ElementPair> anyIntersecting(const MeshPair&, bool atStart,
-                                           std::span<const ElementPair> candidates,
-                                           ContactBuffers& counts);
-
 }  // namespace palpate

@@ -194,13 +194,20 @@ class ShapeImpacts {
     m_earliest = query;
   }
 
+  /// The normal at an impact of features that were apart before the step.
+  template <class Closest>
+  Vector3d normalOfTouch(const ImpactQuery& query, const Closest& closest) {
+    if (const auto normal = normalOfPlane(query, m_time, m_out.exactDecisions)) return *normal;
+    const auto approach = approachOf(query, m_time);
+    return approach ? approach->side : closest.normal;
+  }
+
   NearestToShape nearest(ShapeElement element, const ImpactQuery& query) {
     const std::array<Vector3d, 4> p = positionsAt(query, m_time);
     NearestToShape nearest{Vector3d::UnitX(), {}, 0, true};
     const auto take = [&](const auto& closest) {
-      nearest.normal = m_settings.minimumDistance > 0
-                           ? closest.normal
-                           : normalOfTouch(query, m_time, p, m_out.exactDecisions);
+      nearest.normal =
+          m_settings.minimumDistance > 0 ? closest.normal : normalOfTouch(query, closest);
       nearest.distance = closest.distance - m_before.radius();
       m_out.exactDecisions += closest.exact;
     };

@@ -1,7 +1,6 @@
 #include "Validity/IntersectionAtEnd.h"
 
-#include "NarrowPhase/StepCheck.h"
-
+#include <algorithm>
 #include <cstdint>
 #include <span>
 
@@ -28,11 +27,13 @@ IntersectionAtEnd checkEnd(const MeshPair& pair, const CollisionData::Contents& 
     end.isKnown = batch.size() <= checksLeft;
     if (!end.isKnown) return;
     checksLeft -= batch.size();
-    end.intersecting = anyIntersecting(pair, false, batch, counts);
+    const SurfaceMeeting found = meetingOf(pair, false, batch, counts);
+    end.meeting = std::max(end.meeting, found.meeting);
+    end.piercing = found.piercing;
     batch.clear();
   };
   const auto add = [&](const auto& contact, Ids trianglesOfA, Ids trianglesOfB) {
-    if (end.intersecting || !end.isKnown ||
+    if (end.piercing || !end.isKnown ||
         contact.distance > (1.0 - contact.timeOfImpact) * pair.step.motion + rounding)
       return;
     for (const std::uint32_t a : trianglesOfA)
@@ -46,7 +47,7 @@ IntersectionAtEnd checkEnd(const MeshPair& pair, const CollisionData::Contents& 
     add(c, Ids(&c.triangle, 1), ofB.vertexTriangles[c.vertex]);
   for (const EdgeEdgeContact& c : contacts.edgeEdge)
     add(c, ofA.edgeTriangles[ofA.edgeOf(c.edgeA)], ofB.edgeTriangles[ofB.edgeOf(c.edgeB)]);
-  if (!end.intersecting && end.isKnown) check();
+  if (!end.piercing && end.isKnown) check();
   return end;
 }
 

@@ -2,22 +2,22 @@
 
 #include <palpate/CollisionData.h>
 
-#include "NarrowPhase/NarrowPhase.h"
+#include "NarrowPhase/Piercing.h"
 
 #include <optional>
 
 namespace palpate {
 
-/// Whether triangles intersect at a step's end, as far as its contacts determine this.
-struct IntersectionAtEnd {
-  std::optional<ElementPair> intersecting;  ///< a pair that does
-  /// If there is no such pair: whether it is certain that no triangles intersect at the step's end,
-  /// provided that none did at its start.
+/// How surfaces meet at a step's end, as far as its contacts determine this.
+struct IntersectionAtEnd : SurfaceMeeting {
+  /// If no pair of triangles pierces: whether `meeting` is certain, provided that none pierced at
+  /// the step's start.
   bool isKnown = true;
 };
 
 /// Tests the triangles around a step's contacts for intersections at the step's end. This suffices
-/// because triangles that were apart can only intersect where their features have touched.
+/// because triangles that were apart, or only touched, can only intersect where their features have
+/// touched.
 /// contacts: all contacts of the step, sorted. Features that may have touched must be among them by
 /// their impacts.
 /// Cost     tests at most one triangle pair for each contact and 32 more. If these do not suffice,

@@ -1,11 +1,12 @@
 #include "Validity/Trust.h"
 
 #include "Math/Tolerances.h"
-#include "NarrowPhase/StepCheck.h"
+#include "NarrowPhase/Piercing.h"
 #include "Validity/IntersectionAtEnd.h"
 
 #include <algorithm>
 #include <limits>
+#include <span>
 
 namespace palpate {
 
@@ -16,6 +17,10 @@ namespace {
 /// kFramesPerCheck frames on average. Up to four checks that were not needed are saved for later,
 /// with earliestTimeOnly one. Auto runs it whenever the start is unknown.
 constexpr int kFramesPerCheck = 16, kMaxCheckCredit = 4 * kFramesPerCheck;
+
+/// Intersecting triangle pairs that are classified together. Of most bodies that overlap one of the
+/// first pairs pierces.
+constexpr std::size_t kTogether = 64;
 
 /// Appends vertices that may have moved further than the limit relative to the other mesh, until
 /// `out` has Validity::kMaxFastVertices.
@@ -97,14 +102,14 @@ void Trust::start(const PairSettings& settings, const GeometryInStep& a, const G
     if (m_atEnd.version.isCurrent(before)) {
       m_atStart = m_atEnd;
     } else if (m_atEnd.version.isCurrent(statesOf(a, a.detected, b, b.detected)) &&
-               m_atEnd.position == Position::Apart &&
+               m_atEnd.meeting == Meeting::Apart &&
                largestMotion(a.correction, b.correction) < m_atEnd.clearance) {
-      m_atStart.position = Position::Apart;
+      m_atStart.meeting = Meeting::Apart;
       m_atStart.version.commit(before);
     }
   }
-  const bool startsApart = m_atStart.position == Position::Apart;
-  plan.startsIntersecting = m_atStart.position == Position::Intersecting;
+  const bool startsApart = m_atStart.meeting == Meeting::Apart;
+  plan.startsIntersecting = m_atStart.meeting == Meeting::Piercing;
 
   const std::array<Revision, 4> topologies{a.topology, a.enabled, b.topology, b.enabled};
   const int most = settings.earliestTimeOnly ? kFramesPerCheck : kMaxCheckCredit;
@@ -116,7 +121,7 @@ void Trust::start(const PairSettings& settings, const GeometryInStep& a, const G
     return;
   plan.runsIntersection = settings.method == Method::Auto;
   plan.step.checksStart =
-      !plan.startsIntersecting && (plan.runsIntersection || m_checkCredit >= kFramesPerCheck);
+      !m_atStart.meeting && (plan.runsIntersection || m_checkCredit >= kFramesPerCheck);
   if (plan.step.checksStart) m_checkCredit = std::max(m_checkCredit - kFramesPerCheck, 0);
   // The result cannot be trusted, so the step need not be examined.
   if (plan.method == Method::Proximity && settings.method == plan.method && !plan.step.checksStart)
@@ -148,17 +153,17 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   }
   if (plan.step.checksStart) {
     m_atStart = {};
-    m_atStart.position = facts.startsIntersecting ? Position::Intersecting : Position::Apart;
+    m_atStart.meeting = facts.atStart;
     m_atStart.version.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
   }
   const bool byField = plan.reason == MethodReason::AllowedError;
   const bool provenApart = byField && plan.motion > 0.0 && haveTriangles(a, b);
   if (provenApart) {
     m_atStart = {};
-    m_atStart.position = Position::Apart;
+    m_atStart.meeting = Meeting::Apart;
     m_atStart.version.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
   }
-  validity.startedApart = m_atStart.position == Position::Apart;
+  validity.startedApart = m_atStart.meeting == Meeting::Apart;
   validity.displacementLimit = displacementLimitOf(settings, a, b, plan);
   const bool listsFastVertices = !usesMotionTolerance(settings, a, b) &&
                                  plan.method != Method::Continuous && !meshes.hasShape();
@@ -177,15 +182,21 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   m_atEnd.clearance =
       plan.method == Method::Intersection ? 0.0 : std::min(facts.clearance, settings.thickness);
   if (!contents.intersectingTriangles.empty()) {
-    m_atEnd.position = Position::Intersecting;
-    m_atEnd.witness = contents.intersectingTriangles.front();
+    SurfaceMeeting found;
+    std::span<const ElementPair> left(contents.intersectingTriangles);
+    for (; !found.piercing && !left.empty(); left = left.subspan(std::min(left.size(), kTogether)))
+      found = meetingOf(meshes, false, left.first(std::min(left.size(), kTogether)), counts);
+    m_atEnd.meeting = found.piercing ? Meeting::Piercing : Meeting::Touching;
+    m_atEnd.witness = found.piercing;
   } else if (byField) {
     m_atEnd = m_atStart;
     m_atEnd.clearance = provenApart ? plan.motion : 0.0;
   } else if (plan.method == Method::Intersection) {
-    if (plan.motion == 0.0 && facts.clearance > 0.0) m_atEnd.position = Position::Apart;
+    if (plan.motion == 0.0 && facts.clearance > 0.0) m_atEnd.meeting = Meeting::Apart;
   } else if (trustedIfStraight && (facts.clearance > 0.0 || plan.motion == 0.0)) {
-    m_atEnd.position = Position::Apart;
+    m_atEnd.meeting = Meeting::Apart;
+  } else if (plan.motion == 0.0 && m_atStart.meeting == Meeting::Touching) {
+    m_atEnd.meeting = Meeting::Touching;
   } else if (plan.step.motion > 0.0 && settings.method != Method::Proximity) {
     findEnd(plan, facts, meshes, contents, counts);
   }
@@ -197,23 +208,23 @@ void Trust::findEnd(const PairPlan& plan, const StepFacts& facts, const MeshPair
   m_atEnd.clearance = 0.0;
   // Where Intersection ran, it has tested all pairs, and found none. With restDistance it has not
   // tested pairs that are near at rest.
-  if (plan.runsIntersection && facts.startsIntersecting) {
-    if (!meshes.nearAtRest) m_atEnd.position = Position::Apart;
+  if (plan.runsIntersection && facts.startsPiercing()) {
+    if (!meshes.nearAtRest) m_atEnd.meeting = Meeting::Apart;
     return;
   }
   // Earliest times come without contacts, and filtered features are not among the contacts.
   if (meshes.settings.earliestTimeOnly || meshes.hasFilters()) return;
   IntersectionAtEnd end;
-  if (m_atStart.position == Position::Intersecting && m_atStart.witness &&
-      intersect(meshes, false, *m_atStart.witness, counts))
-    end.intersecting = m_atStart.witness;
+  if (m_atStart.meeting == Meeting::Piercing && m_atStart.witness &&
+      meetingOf(meshes, false, *m_atStart.witness, counts) == Meeting::Piercing)
+    end.piercing = m_atStart.witness;
   else
     end = checkEnd(meshes, contents, counts);
-  if (end.intersecting) {
-    m_atEnd.position = Position::Intersecting;
-    m_atEnd.witness = end.intersecting;
-  } else if (contents.validity.startedApart && end.isKnown) {
-    m_atEnd.position = Position::Apart;
+  if (end.piercing) {
+    m_atEnd.meeting = Meeting::Piercing;
+    m_atEnd.witness = end.piercing;
+  } else if (m_atStart.meeting && m_atStart.meeting != Meeting::Piercing && end.isKnown) {
+    m_atEnd.meeting = end.meeting;
   }
 }
 

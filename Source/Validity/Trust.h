@@ -27,13 +27,12 @@ class Trust {
   void forget();
 
  private:
-  enum class Position { Unknown, Apart, Intersecting };
   /// One state of both geometries.
   struct KnownState {
     DerivedFrom<8> version;
-    Position position = Position::Unknown;
+    std::optional<Meeting> meeting;      ///< none: unknown
     double clearance = 0;                ///< L: if Apart, by at least this distance
-    std::optional<ElementPair> witness;  ///< if Intersecting, a pair that does, if known
+    std::optional<ElementPair> witness;  ///< if Piercing, a pair that does, if known
   };
 
   /// Determines m_atEnd where bounds on motion do not.

@@ -130,9 +130,9 @@ TEST(ImpactSide, NormalsPointToWhereTheFirstFeatureCameFrom) {
           ImpactCase{false, {v + up, a, b, c, v - up, a, b, c}},
           ImpactCase{false, {v + up, a, c, b, v - up, a, c, b}}}) {
       std::size_t exactDecisions = 0;
-      const Eigen::Vector3d normal =
-          normalOfTouch(query.query(), 0.5, positionsAt(query.query(), 0.5), exactDecisions);
-      EXPECT_LT((normal - side * Eigen::Vector3d::UnitZ()).norm(), 1e-15) << query.edges;
+      const auto normal = normalOfPlane(query.query(), 0.5, exactDecisions);
+      ASSERT_TRUE(normal);
+      EXPECT_LT((*normal - side * Eigen::Vector3d::UnitZ()).norm(), 1e-15) << query.edges;
       EXPECT_EQ(exactDecisions, 0u);
     }
   }

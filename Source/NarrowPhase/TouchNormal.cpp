@@ -1,0 +1,239 @@
+#include "NarrowPhase/TouchNormal.h"
+
+#include "Math/ClosestPoint.h"
+#include "Math/Foot.h"
+#include "Math/StableLength.h"
+#include "Math/Tolerances.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+using Kind = ImpactQuery::Kind;
+
+/// How much more the winding normals of a body count than those of an open surface. Any value above
+/// 1 makes the body decide.
+constexpr double kBodyWeight = 4.0;
+
+/// The triangles around a feature at a time of the step, seen from the feature.
+class Star {
+ public:
+  Star(const TriangleMesh& mesh, const MeshFeature& feature, double time)
+      : m_mesh(mesh), m_feature(feature), m_time(time) {}
+
+  /// Whether the winding normals point out of a body.
+  bool isOfBody() const { return m_mesh.topology.hasFaces() && m_mesh.topology.hasOnlyClosedStars; }
+
+  /// Calls f(normal) with the unit winding normal of each triangle with area.
+  template <class F>
+  void forEachNormal(F&& f) const {
+    forEachTriangle([&](const Triangle& t) {
+      const std::array<Vector3d, 3> p =
+          isAtEnd()
+              ? std::array{end()[t[0]], end()[t[1]], end()[t[2]]}
+              : std::array{Vector3d(Vector3d::Zero()), between(t[0], t[1]), between(t[0], t[2])};
+      if (hasArea(p[0], p[1], p[2])) f(windingNormal(p[0], p[1], p[2]));
+    });
+  }
+
+  /// Calls f(direction) with unit vectors that span the star: from the feature to the triangles'
+  /// other corners, and along the feature.
+  template <class F>
+  void forEachDirection(F&& f) const {
+    const auto pass = [&](const Vector3d& vector) {
+      if (vector != Vector3d::Zero()) f(stableUnit(vector));
+    };
+    if (m_feature.kind == MeshFeature::Kind::Vertex) {
+      forEachTriangle([&](const Triangle& corners) {
+        for (const std::uint32_t corner : corners) pass(between(m_feature.id, corner));
+      });
+      return;
+    }
+    if (m_feature.kind == MeshFeature::Kind::Face) {
+      const Triangle& corners = m_mesh.topology.triangles[m_feature.id];
+      for (int i = 0; i < 3; ++i) {
+        const Vector3d along = between(corners[i], corners[(i + 1) % 3]);
+        pass(along), pass(-along);
+      }
+      return;
+    }
+    const auto& [p, q] = m_mesh.topology.edges[m_feature.id];
+    const Vector3d along = stableUnit(between(p, q));
+    pass(along), pass(-along);
+    forEachTriangle([&, p = p, q = q](const Triangle& corners) {
+      for (const std::uint32_t corner : corners)
+        if (corner != p && corner != q) {
+          const Vector3d to = stableUnit(between(p, corner)), inward = to - to.dot(along) * along;
+          if (inward.norm() > kTouchAngle) pass(inward);
+        }
+    });
+  }
+
+  /// Calls f(direction) with the unit direction of each edge at a vertex, or of the edge.
+  template <class F>
+  void forEachEdge(F&& f) const {
+    if (m_feature.kind == MeshFeature::Kind::Vertex) return forEachDirection(f);
+    if (m_feature.kind == MeshFeature::Kind::Face) return;
+    const auto& [p, q] = m_mesh.topology.edges[m_feature.id];
+    const Vector3d along = between(p, q);
+    if (along != Vector3d::Zero()) f(stableUnit(along));
+  }
+
+ private:
+  template <class F>
+  void forEachTriangle(F&& f) const {
+    const MeshTopology& topology = m_mesh.topology;
+    if (m_feature.kind == MeshFeature::Kind::Face) return f(topology.triangles[m_feature.id]);
+    const IndexLists& lists = m_feature.kind == MeshFeature::Kind::Vertex ? topology.vertexTriangles
+                                                                          : topology.edgeTriangles;
+    for (const std::uint32_t t : lists[m_feature.id]) f(topology.triangles[t]);
+  }
+  bool isAtEnd() const { return m_time == 0.0 || m_time == 1.0; }
+  const Positions& end() const { return m_time == 1.0 ? m_mesh.now : m_mesh.before; }
+  /// The vector between two vertices, times a power of two if it is tiny: interpolated denormals
+  /// would have no direction.
+  Vector3d between(std::uint32_t p, std::uint32_t q) const {
+    Vector3d before = m_mesh.before[q] - m_mesh.before[p], now = m_mesh.now[q] - m_mesh.now[p];
+    if (isAtEnd()) return m_time == 1.0 ? now : before;
+    if (std::max(before.cwiseAbs().maxCoeff(), now.cwiseAbs().maxCoeff()) < kTinyLength) {
+      before /= kTinyLength;
+      now /= kTinyLength;
+    }
+    return (1.0 - m_time) * before + m_time * now;
+  }
+
+  const TriangleMesh& m_mesh;
+  const MeshFeature m_feature;
+  const double m_time;
+};
+
+bool isOnSideOf(const Approach& approach, const Vector3d& normal) {
+  return normal.dot(approach.side) > kTouchAngle && normal.dot(approach.origin) > kTouchAngle;
+}
+
+/// The best of the candidates so far, as touchNormal() orders them.
+class BestNormal {
+ public:
+  BestNormal(const Star& first, const Star& second, const std::optional<Approach>& approach,
+             const Vector3d& other)
+      : m_first(first), m_second(second), m_approach(approach), m_other(other) {}
+
+  /// kind: lower ones win among equally good candidates.
+  void offer(const Vector3d& normal, int kind) {
+    if (m_approach && !isOnSideOf(*m_approach, normal)) return;
+    const double agreement = m_approach ? normal.dot(m_approach->side) : agreementOf(normal);
+    const Rank rank{std::floor(violationOf(normal) / kTouchAngle),
+                    static_cast<double>(kind),
+                    -std::round(agreement / kTouchAngle),
+                    -std::round(normal.dot(m_other) / kTouchAngle),
+                    std::abs(normal[0]),
+                    std::abs(normal[1]),
+                    std::abs(normal[2])};
+    if (m_normal && !(rank < m_rank)) return;
+    m_normal = normal;
+    m_rank = rank;
+  }
+  void offerBoth(const Vector3d& normal, int kind) { offer(normal, kind), offer(-normal, kind); }
+  bool separates() const { return m_normal && m_rank[0] == 0.0; }
+  const Vector3d& other() const { return m_other; }
+  Vector3d normal() const { return m_normal.value_or(m_other); }
+
+ private:
+  /// The lowest wins: how far the normal fails to separate the stars, its kind, and how far it
+  /// agrees with the sides that are known. The last components leave no tie: the order of the
+  /// candidates, and which surface is the first one, change no result.
+  using Rank = std::array<double, 7>;
+
+  /// The sine of the largest angle by which a direction of a star is on the wrong side.
+  double violationOf(const Vector3d& normal) const {
+    double most = 0.0;
+    m_first.forEachDirection([&](const Vector3d& d) { most = std::max(most, -normal.dot(d)); });
+    m_second.forEachDirection([&](const Vector3d& d) { most = std::max(most, normal.dot(d)); });
+    return most;
+  }
+  double agreementOf(const Vector3d& normal) const {
+    const auto agreement = [&](const Star& star) {
+      double sum = 0.0, count = 0.0;
+      star.forEachNormal([&](const Vector3d& winding) { sum += normal.dot(winding), ++count; });
+      return count > 0.0 ? sum / count * (star.isOfBody() ? kBodyWeight : 1.0) : 0.0;
+    };
+    return agreement(m_second) - agreement(m_first);
+  }
+
+  const Star &m_first, &m_second;
+  const std::optional<Approach>& m_approach;
+  const Vector3d m_other;
+  std::optional<Vector3d> m_normal;
+  Rank m_rank{};
+};
+
+/// Offers every candidate that may be needed.
+void offerAll(const Star& first, const Star& second, BestNormal& best) {
+  for (const Star* star : {&second, &first})
+    star->forEachNormal([&](const Vector3d& normal) { best.offerBoth(normal, 0); });
+  if (!best.separates())
+    first.forEachEdge([&](const Vector3d& u) {
+      second.forEachEdge([&](const Vector3d& v) {
+        const Vector3d normal = u.cross(v);
+        if (normal.norm() > kTouchAngle) best.offerBoth(normal.normalized(), 1);
+      });
+    });
+  if (!best.separates()) best.offer(best.other(), 2);
+}
+
+/// Whether the features span a plane at an end of the step: the triangle has area, or the edges are
+/// not parallel. Within the step rounding hides that edges are parallel.
+bool spanPlane(const ImpactQuery& query, double time) {
+  if (time != 0.0 && time != 1.0) return false;
+  const auto at = [&](int i) -> const Vector3d& { return query.vertices[i].at(time == 1.0); };
+  return query.kind == Kind::VertexTriangle
+             ? hasArea(at(1), at(2), at(3))
+             : unitCross(at(0), at(1), at(2), at(3)) != Vector3d::Zero();
+}
+
+bool moves(const ImpactQuery& query) {
+  return std::any_of(query.vertices.begin(), query.vertices.end(),
+                     [](const ImpactQuery::Step& vertex) { return vertex.before != vertex.now; });
+}
+
+}  // namespace
+
+template <Kind kind>
+Vector3d touchNormal(const Features<kind>& of, std::uint32_t firstId, std::uint32_t secondId,
+                     const std::array<MeshFeature, 2>& holders, double time, const Vector3d& normal,
+                     std::size_t& exactDecisions) {
+  const ImpactQuery query = of.query(firstId, secondId);
+  using FeatureKind = MeshFeature::Kind;
+  const bool interiors = kind == Kind::VertexTriangle ? holders[1].kind == FeatureKind::Face
+                                                      : holders[0].kind == FeatureKind::Edge &&
+                                                            holders[1].kind == FeatureKind::Edge;
+  const Star first(of.first, holders[0], time), second(of.second, holders[1], time);
+  std::optional<Approach> approach;
+  if (moves(query) && interiors)
+    if (const auto found = normalOfPlane(query, time, exactDecisions)) return *found;
+  if (interiors && spanPlane(query, time)) {
+    BestNormal best(first, second, approach, normal);
+    best.offerBoth(normal, 0);
+    return best.normal();
+  }
+  if (moves(query)) approach = approachOf(query, time);
+  BestNormal best(first, second, approach, approach ? approach->side : normal);
+  offerAll(first, second, best);
+  return best.normal();
+}
+
+template Vector3d touchNormal(const Features<Kind::VertexTriangle>&, std::uint32_t, std::uint32_t,
+                              const std::array<MeshFeature, 2>&, double, const Vector3d&,
+                              std::size_t&);
+template Vector3d touchNormal(const Features<Kind::EdgeEdge>&, std::uint32_t, std::uint32_t,
+                              const std::array<MeshFeature, 2>&, double, const Vector3d&,
+                              std::size_t&);
+
+}  // namespace palpate

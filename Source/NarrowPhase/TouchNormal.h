@@ -1,0 +1,55 @@
+#pragma once
+
+#include "NarrowPhase/Continuous.h"
+#include "NarrowPhase/Proximity.h"
+
+#include <Eigen/Core>
+
+#include <array>
+#include <cstddef>
+
+namespace palpate {
+
+/// The normal of two features that meet at `time`: one that can separate the surfaces there. If the
+/// features' interiors meet and span a plane, it is that plane's normal, on the side that the step
+/// tells, or else that the stars tell. Otherwise the stars decide.
+///
+/// The *star* of a feature is the set of triangles, or segments, that hold it. A unit vector n
+/// separates two stars if no point of the first one is on the side of -n, and no point of the
+/// second one on the side of n. Candidates are of three kinds, in this order: the normals of both
+/// stars' triangles; the cross products of an edge of each star; and one that the step or the
+/// distance functions give. Those on the side from which the first feature came (Approach) compete.
+/// The one wins that is nearest to separating the stars, up to kTouchAngle. Among equals the first
+/// kind wins, then the least angle to the approach. If the step tells no side, the agreement with
+/// both surfaces' winding normals takes the place of that angle; a closed surface counts more.
+///
+/// holders   the features of Features::first and Features::second that hold the closest points
+/// time      in [0, 1] of the step, of the positions of the stars
+/// normal    from the distance functions
+/// Returns   a unit vector from Features::second to Features::first
+template <ImpactQuery::Kind kind>
+Eigen::Vector3d touchNormal(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId,
+                            const std::array<MeshFeature, 2>& holders, double time,
+                            const Eigen::Vector3d& normal, std::size_t& exactDecisions);
+
+/// Replaces the normal of a distance of 0 at the step's end by touchNormal().
+inline void turnToSeparate(const Features<ImpactQuery::Kind::VertexTriangle>& of,
+                           std::uint32_t vertex, std::uint32_t triangle,
+                           VertexTriangleDistance& measured, std::size_t& exactDecisions) {
+  if (measured.distance > 0.0) return;
+  const std::array<MeshFeature, 2> holders{
+      MeshFeature{MeshFeature::Kind::Vertex, vertex},
+      featureOf(of.second.topology, triangle, measured.feature)};
+  measured.normal =
+      touchNormal(of, vertex, triangle, holders, 1.0, measured.normal, exactDecisions);
+}
+inline void turnToSeparate(const Features<ImpactQuery::Kind::EdgeEdge>& of, std::uint32_t edgeA,
+                           std::uint32_t edgeB, EdgeEdgeDistance& measured,
+                           std::size_t& exactDecisions) {
+  if (measured.distance > 0.0) return;
+  const std::array<MeshFeature, 2> holders{featureOf(of.first.topology, edgeA, measured.featureA),
+                                           featureOf(of.second.topology, edgeB, measured.featureB)};
+  measured.normal = touchNormal(of, edgeA, edgeB, holders, 1.0, measured.normal, exactDecisions);
+}
+
+}  // namespace palpate

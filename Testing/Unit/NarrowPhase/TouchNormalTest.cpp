@@ -1,0 +1,280 @@
+#include <palpate/ConstraintRows.h>
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/RandomMeshes.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <vector>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+using testing::Mesh;
+
+/// A box whose faces are divided into n x n squares, wound outward.
+Mesh boxMesh(const Vector3d& lower, const Vector3d& upper, int n = 1) {
+  Mesh mesh;
+  std::vector<std::array<int, 3>> places;
+  const auto vertexAt = [&](const std::array<int, 3>& place) {
+    const auto known = std::find(places.begin(), places.end(), place);
+    if (known != places.end()) return static_cast<std::uint32_t>(known - places.begin());
+    const Vector3d share = Vector3d(place[0], place[1], place[2]) / n;
+    mesh.positions.push_back(lower + share.cwiseProduct(upper - lower));
+    places.push_back(place);
+    return static_cast<std::uint32_t>(places.size() - 1);
+  };
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int side : {0, 1})
+      for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) {
+          const auto corner = [&](int u, int v) {
+            std::array<int, 3> place{};
+            place[static_cast<std::size_t>(axis)] = side * n;
+            place[static_cast<std::size_t>((axis + 1) % 3)] = u;
+            place[static_cast<std::size_t>((axis + 2) % 3)] = v;
+            return vertexAt(place);
+          };
+          const std::uint32_t a = corner(i, j), b = corner(i + 1, j), c = corner(i + 1, j + 1),
+                              d = corner(i, j + 1);
+          mesh.triangles.push_back(side ? Triangle{a, b, c} : Triangle{a, c, b});
+          mesh.triangles.push_back(side ? Triangle{a, c, d} : Triangle{a, d, c});
+        }
+  return mesh;
+}
+
+/// A flat square of n x n squares in the plane z = height, wound up, or down if flipped.
+Mesh plate(int n, double halfSide, double height, bool flipped = false) {
+  Mesh mesh;
+  for (int j = 0; j <= n; ++j)
+    for (int i = 0; i <= n; ++i)
+      mesh.positions.push_back(
+          {halfSide * (2.0 * i / n - 1), halfSide * (2.0 * j / n - 1), height});
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      const auto a = static_cast<std::uint32_t>(j * (n + 1) + i);
+      const std::uint32_t b = a + 1, d = a + static_cast<std::uint32_t>(n) + 1, c = d + 1;
+      mesh.triangles.push_back(flipped ? Triangle{a, c, b} : Triangle{a, b, c});
+      mesh.triangles.push_back(flipped ? Triangle{a, d, c} : Triangle{a, c, d});
+    }
+  return mesh;
+}
+
+struct Case {
+  const char* name;
+  Mesh a, b;
+  Vector3d apart;  ///< unit: the direction in which a leaves b
+};
+
+/// Bodies that touch in a face, in part of one, or in an edge of a corner; moved apart by the gap.
+std::vector<Case> restingBodies(double gap) {
+  const Vector3d x = Vector3d::UnitX(), y = Vector3d::UnitY(), z = Vector3d::UnitZ();
+  const Mesh unit = boxMesh({0, 0, 0}, {1, 1, 1});
+  const auto box = [&](Vector3d lower, Vector3d upper, const Vector3d& apart, int n = 1) {
+    return boxMesh(lower + gap * apart, upper + gap * apart, n);
+  };
+  return {{"on a table", box({-.5, -.5, 0}, {.5, .5, 1}, z), plate(1, 2, 0), z},
+          {"on a table that is wound down", box({-.5, -.5, 0}, {.5, .5, 1}, z),
+           plate(1, 2, 0, true), z},
+          {"on a fine table", box({-.5, -.5, 0}, {.5, .5, 1}, z, 3), plate(8, 2, 0), z},
+          {"common face across x", box({1, 0, 0}, {2, 1, 1}, x), unit, x},
+          {"common face across y", box({0, 1, 0}, {1, 2, 1}, y), unit, y},
+          {"common face across z", box({0, 0, 1}, {1, 1, 2}, z), unit, z},
+          {"common face of small triangles", box({0, 0, 1}, {1, 1, 2}, z, 4),
+           boxMesh({0, 0, 0}, {1, 1, 1}, 4), z},
+          {"half of a face", box({.5, 0, 1}, {1.5, 1, 2}, z), unit, z},
+          {"inside a face", box({.25, .25, 1}, {.75, .75, 2}, z), unit, z}};
+}
+
+std::vector<ConstraintRow> rowsOf(const Case& bodies, const PairSettings& settings,
+                                  Validity* validity = nullptr) {
+  OctreeBasedCD collisions(Settings{.threads = 1});
+  const GeometryId a = collisions.addTriangleMesh(bodies.a.positions, bodies.a.triangles),
+                   b = collisions.addTriangleMesh(bodies.b.positions, bodies.b.triangles);
+  collisions.addCollisionPair(a, b, settings);
+  collisions.detectCollision();
+  std::vector<ConstraintRow> rows;
+  const auto first = static_cast<std::uint32_t>(bodies.a.positions.size());
+  appendRows(collisions.collisionData(a, b), {0, bodies.a.positions, bodies.a.positions},
+             {first, bodies.b.positions, bodies.b.positions}, rows);
+  if (validity) *validity = collisions.collisionData(a, b).validity();
+  return rows;
+}
+
+/// How far a row moves a along `apart`, for a unit of force: 1 if it only separates.
+double separation(const ConstraintRow& row, const Case& bodies) {
+  double weight = 0;
+  for (std::size_t i = 0; i < 4; ++i)
+    if (row.vertices[i] < bodies.a.positions.size()) weight += row.weights[i];
+  return weight * row.normal.dot(bodies.apart);
+}
+
+std::vector<PairSettings> everyMethod() {
+  std::vector<PairSettings> all;
+  for (const Contacts contacts : {Contacts::Distinct, Contacts::All})
+    for (const Method method : {Method::Auto, Method::Proximity, Method::Continuous})
+      all.push_back({.method = method, .thickness = 0.05, .contacts = contacts});
+  return all;
+}
+
+/// Law: bodies that touch without piercing have the contacts that they have a little apart, and
+/// each separates them.
+TEST(TouchNormal, RestingBodiesAreOnlyPushedApart) {
+  const std::vector<Case> touching = restingBodies(0), apart = restingBodies(1e-12);
+  for (const PairSettings& settings : everyMethod())
+    for (std::size_t i = 0; i < touching.size(); ++i) {
+      SCOPED_TRACE(std::string(touching[i].name) + ", method " +
+                   std::to_string(static_cast<int>(settings.method)) + ", contacts " +
+                   std::to_string(static_cast<int>(settings.contacts)));
+      Validity validity;
+      const auto rows = rowsOf(touching[i], settings, &validity);
+      EXPECT_FALSE(validity.startedApart);
+      EXPECT_FALSE(validity.trusted);
+      EXPECT_EQ(rows.size(), rowsOf(apart[i], settings).size());
+      EXPECT_FALSE(rows.empty());
+      // Which side an open surface has is not known to contacts between its edges and a face.
+      const double least = i == 1 && settings.contacts == Contacts::All ? -2 : 1 - 1e-12;
+      for (const ConstraintRow& row : rows) EXPECT_GE(separation(row, touching[i]), least);
+    }
+}
+
+/// Law: bodies that overlap by an aligned translation are in intersection, although their triangles
+/// only touch.
+TEST(TouchNormal, AlignedOverlapIsNoRest) {
+  for (const double overlap : {0.1, 0.3, 0.7}) {
+    const Case bodies{"", boxMesh({1 - overlap, 0, 0}, {2 - overlap, 1, 1}),
+                      boxMesh({0, 0, 0}, {1, 1, 1}), Vector3d::UnitX()};
+    Validity validity;
+    rowsOf(bodies, {.thickness = 0.01}, &validity);
+    EXPECT_FALSE(validity.startedApart);
+    OctreeBasedCD collisions;
+    const GeometryId a = collisions.addTriangleMesh(bodies.a.positions, bodies.a.triangles),
+                     b = collisions.addTriangleMesh(bodies.b.positions, bodies.b.triangles);
+    collisions.addCollisionPair(a, b, {.thickness = 0.01});
+    collisions.detectCollision();
+    EXPECT_FALSE(collisions.collisionData(a, b).intersectingTriangles().empty()) << overlap;
+  }
+}
+
+/// The rows of a step with one moving geometry, against where the features came from.
+struct Sides {
+  int contacts = 0, wrong = 0, across = 0;
+};
+
+template <class Add>
+void countSides(const std::array<std::vector<Vector3d>, 2>& before,
+                const std::array<std::vector<Vector3d>, 2>& now, Method method, Add&& add,
+                Sides& sides) {
+  OctreeBasedCD collisions(Settings{.threads = 1});
+  const GeometryId a = add(collisions, before[0]), b = add(collisions, before[1]);
+  collisions.addCollisionPair(a, b, {.method = method});
+  collisions.setPositions(a, before[0], now[0]);
+  collisions.setPositions(b, before[1], now[1]);
+  collisions.detectCollision();
+  const CollisionData& data = collisions.collisionData(a, b);
+  const auto count = [&](const auto& contact, const std::array<std::size_t, 4>& of) {
+    const Stencil s = stencil(contact);
+    Vector3d motion = Vector3d::Zero();
+    for (std::size_t i = 0; i < 4; ++i)
+      motion += s.weights[i] * (now[of[i]][s.vertices[i]] - before[of[i]][s.vertices[i]]);
+    const double approach = -motion.dot(contact.normal) / motion.norm();
+    ++sides.contacts;
+    sides.wrong += approach < -1e-6;
+    sides.across += std::abs(approach) <= 1e-6;
+  };
+  for (const auto& c : data.vertexTriangle()) count(c, {0, 1, 1, 1});
+  for (const auto& c : data.triangleVertex()) count(c, {1, 0, 0, 0});
+  for (const auto& c : data.edgeEdge()) count(c, {0, 0, 1, 1});
+}
+
+GeometryId addLine(OctreeBasedCD& collisions, const std::vector<Vector3d>& positions) {
+  return collisions.addLineMesh(positions, std::vector<Segment>{{0, 1}});
+}
+GeometryId addTriangle(OctreeBasedCD& collisions, const std::vector<Vector3d>& positions) {
+  return collisions.addTriangleMesh(positions, std::vector<Triangle>{{0, 1, 2}});
+}
+
+/// Positions on a lattice, so that edges stay exactly parallel and motion stays in one plane.
+class TouchSides : public ::testing::TestWithParam<Method> {
+ protected:
+  int between(int low, int high) {
+    return low + static_cast<int>(m_random() % static_cast<unsigned>(high - low + 1));
+  }
+  Vector3d vector(int most) {
+    return {static_cast<double>(between(-most, most)), static_cast<double>(between(-most, most)),
+            static_cast<double>(between(-most, most))};
+  }
+  static std::vector<Vector3d> moved(std::vector<Vector3d> positions, const Vector3d& by) {
+    for (Vector3d& p : positions) p += by;
+    return positions;
+  }
+
+ private:
+  testing::Random m_random{5};
+};
+
+/// Law: where edges are parallel throughout the step, the normal is on the side from which they
+/// came.
+TEST_P(TouchSides, OfParallelEdgesAreWhereTheyCameFrom) {
+  Sides lines, triangles;
+  for (int i = 0; i < 1000; ++i) {
+    const Vector3d u = vector(8), at = vector(4), w = vector(9);
+    if (w.cross(u).isZero()) continue;
+    std::vector<Vector3d> a{at, at + u};
+    std::vector<Vector3d> b = moved(a, 0.25 * between(-3, 3) * u - w);
+    countSides({a, b}, {a, moved(b, 2 * w)}, GetParam(), addLine, lines);
+    const Vector3d across = w - w.dot(u) / u.squaredNorm() * u;
+    const auto rounded = [](const Vector3d& p) { return Vector3d(p.array().round()); };
+    a.push_back(rounded(at + across + 0.1 * between(-9, 9) * u.cross(across)));
+    b.push_back(rounded(b[0] - across + 0.1 * between(-9, 9) * u.cross(across)));
+    countSides({a, b}, {a, moved(b, 2 * w)}, GetParam(), addTriangle, triangles);
+  }
+  EXPECT_GT(lines.contacts, 800);
+  EXPECT_GT(triangles.contacts, 2000);
+  for (const Sides& sides : {lines, triangles}) {
+    EXPECT_EQ(sides.wrong, 0);
+    EXPECT_EQ(sides.across, 0);
+  }
+}
+
+/// Law: motion within one plane has normals in that plane.
+TEST_P(TouchSides, OfMotionInOnePlaneAreInThePlane) {
+  Sides sides;
+  for (int i = 0; i < 1000; ++i) {
+    const Vector3d e = vector(4), f = vector(4);
+    if (e.cross(f).isZero()) continue;
+    const auto at = [&](double centre) {
+      return Vector3d((centre + between(-4, 4)) * e + between(-4, 4) * f);
+    };
+    const std::vector<Vector3d> a{at(-10), at(-10), at(-10)}, b{at(10), at(10), at(10)};
+    countSides({a, b}, {a, moved(b, -24 * e + between(-3, 3) * f)}, GetParam(), addTriangle, sides);
+  }
+  EXPECT_GT(sides.contacts, 2000);
+  EXPECT_EQ(sides.wrong, 0);
+  EXPECT_EQ(sides.across, 0);
+}
+
+/// Collinear segments that meet end to end, and ends that meet.
+TEST_P(TouchSides, OfEndsThatMeetAreWhereTheyCameFrom) {
+  Sides sides;
+  for (int i = 0; i < 500; ++i) {
+    const Vector3d u = vector(8), w = vector(9), v = vector(9);
+    if (u.isZero() || v.isZero() || w.cross(u).isZero()) continue;
+    const std::vector<Vector3d> a{Vector3d::Zero(), u}, behind{2 * u, 3 * u},
+        end = moved({u, u + v}, -w);
+    countSides({a, behind}, {a, moved(behind, -1.5 * u)}, GetParam(), addLine, sides);
+    countSides({a, end}, {a, moved(end, 2 * w)}, GetParam(), addLine, sides);
+  }
+  EXPECT_GT(sides.contacts, 800);
+  EXPECT_EQ(sides.wrong, 0);
+  EXPECT_EQ(sides.across, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, TouchSides, ::testing::Values(Method::Continuous, Method::Auto));
+
+}  // namespace
+
+}  // namespace palpate
