@@ -709,7 +709,10 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   m_facts.clear();
   m_impacts.clear();
   for (const auto* buffers : {&m_buffers, &m_intersections})
-    for (const ContactBuffers* found : *buffers) m_facts.add(found->facts);
+    for (const ContactBuffers* found : *buffers) {
+      m_facts.add(found->facts);
+      if (record.hasShape()) m_facts.addShape(*found, record.plan.method == Method::Continuous);
+    }
   for (auto list : {&StepFacts::verticesA, &StepFacts::verticesB, &StepFacts::degenerateA,
                     &StepFacts::degenerateB})
     sortUnique(m_facts.*list);

@@ -137,8 +137,7 @@ struct OctreeBasedCD::Implementation {
     for (const auto& record : pairs.records()) {
       const Method method = record->pair.settings.method;
       const bool moves = (detecting || method == Method::Auto) && method != Method::Proxy &&
-                         (method == Method::Continuous || method == Method::Auto ||
-                          (method != Method::DistanceField && !record->hasShape()));
+                         method != Method::DistanceField;
       if (moves)
         for (Geometry* geometry : {record->a, record->b}) geometry->motion.update(*geometry);
       record->plan = planOf(record->pair.settings, record->a->inStep(), record->b->inStep(), moves);

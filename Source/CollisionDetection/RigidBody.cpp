@@ -105,6 +105,13 @@ MotionRange RigidSearch::motion(const Geometry& geometry) {
     range.lower[k] =
         -step.largest(m_furthest[3 + k], growth, [&](const Vector3d& moved) { return -moved[k]; });
   }
+  if (geometry.shape && geometry.shape->now.isCylinder()) {
+    const Shape &before = geometry.shape->before, &now = geometry.shape->now;
+    const double turned = (now.axes().col(2) - before.axes().col(2)).norm() + kPlacedError;
+    const Vector3d ofRim = Vector3d::Constant(turned * now.radius());
+    range.lower -= ofRim;
+    range.upper += ofRim;
+  }
   return range;
 }
 
@@ -122,9 +129,14 @@ double RigidSearch::arcDeviation(const Geometry& geometry) {
   const auto across = [&](const Vector3d& v) -> Vector3d { return v - axis.dot(v) * axis; };
   Vector3d growth;
   for (int j = 0; j < 3; ++j) growth[j] = across(step.matrix().col(j)).norm();
-  return 0.5 * sine / (1.0 + std::abs(half.w())) *
-         step.largest(m_furthest[6], growth,
-                      [&](const Vector3d& moved) { return across(moved).norm(); });
+  const double deviation = 0.5 * sine / (1.0 + std::abs(half.w())) *
+                           step.largest(m_furthest[6], growth, [&](const Vector3d& moved) {
+                             return across(moved).norm();
+                           });
+  if (!(geometry.shape && geometry.shape->now.isCylinder() && deviation > 0.0)) return deviation;
+  const std::span<const Vector3d> ends = geometry.shape->now.corners();
+  const double slope = 4.0 * deviation / (ends[1] - ends[0]).stableNorm();
+  return deviation + slope * geometry.shape->now.radius();
 }
 
 }  // namespace palpate

@@ -119,9 +119,13 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
     };
     for (std::uint32_t t = 0; t < against.size(); ++t) {
       const VertexTriangleDistance* answer = against.answer(t);
-      if (!answer || !(gap(t) <= pair.thicknessAtEnd())) continue;
-      check.recordDistance(answer->distance);
-      if (check.addImpactIfTouched(features, v, t, kSwapped, answer->distance)) continue;
+      if (!answer) continue;
+      const double least =
+          answer->distance - pair.largestRadii(v, triangles.topology.triangles[t], kSwapped);
+      if (!(least <= pair.thicknessAtEnd())) continue;
+      check.recordDistance(least);
+      if (check.addImpactIfTouched(features, v, t, kSwapped, least)) continue;
+      if (!(gap(t) <= pair.thicknessAtEnd())) continue;
       const auto isRejected = [&](std::uint32_t triangle) {
         return rejectsVertex(pair, v, triangle, kSwapped) ||
                (!triangles.radii.empty() && !(gap(triangle) <= pair.thicknessAtEnd()));
@@ -217,11 +221,12 @@ bool isDistinctOfLines(const MeshPair& pair, const std::array<std::uint32_t, 2>&
 void findLineEdges(const MeshPair& pair, std::span<const std::uint32_t> sample,
                    ContactBuffers& out) {
   const CountedVector<Segment>&a = pair.a.topology.edges, &b = pair.b.topology.edges;
+  StepCheck check(pair, out);
   for (const std::uint32_t i : sample)
     for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
       if (pair.b.topology.edgeTriangles[j].empty()) continue;
       ++out.featurePairs;
-      const std::optional<NearbyEdges> nearby = measureEdges(pair, i, j);
+      const std::optional<NearbyEdges> nearby = measureEdges(pair, i, j, &check);
       if (!nearby ||
           (pair.settings.contacts == Contacts::Distinct &&
            !isDistinctOfLines(pair, {i, j}, nearby->features)) ||

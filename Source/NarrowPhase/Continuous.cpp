@@ -123,10 +123,12 @@ class ContactFinder {
       const bool touch = m_settings.minimumDistance == 0.0 || contact.distance == 0.0;
       contact.timeOfImpact = time;
       contact.distance -= m_pair.a.largestRadius + m_pair.b.largestRadius;
-      if (touch)
-        contact.normal = touchNormal(features, firstId, secondId,
-                                     {closestFeatures[swapped], closestFeatures[!swapped]}, time,
-                                     contact.normal, m_out.exactDecisions);
+      if (!touch) return;
+      const TouchNormal normal = touchNormal(features, firstId, secondId,
+                                             {closestFeatures[swapped], closestFeatures[!swapped]},
+                                             time, contact.normal, m_out.exactDecisions);
+      contact.normal = normal.direction;
+      m_out.facts.sideUnknown |= !normal.isSideKnown;
     };
     if (m_pair.settings.earliestTimeOnly) m_out.facts.clearance = 0.0;
     const auto isSuppressed = [&](const auto& closest, const Vector3d& direction, bool rejected) {

@@ -47,11 +47,12 @@ bool isDistinct(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
 }  // namespace
 
 std::optional<NearbyEdges> measureEdges(const MeshPair& pair, std::uint32_t edgeA,
-                                        std::uint32_t edgeB) {
+                                        std::uint32_t edgeB, StepCheck* check) {
   const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
   if (pair.excludesEdges(edgeA, edgeB) || areNearAtRest(pair, p, q)) return {};
   const EdgeEdgeDistance centres = finiteEdgeEdgeDistance(pair.a.now[p[0]], pair.a.now[p[1]],
                                                           pair.b.now[q[0]], pair.b.now[q[1]]);
+  if (check) check->recordGap(edgeA, edgeB, centres.distance - pair.largestRadii(p, q));
   const double radii = pair.a.radius(p, centres.weightA) + pair.b.radius(q, centres.weightB);
   const double distance = centres.distance - radii;
   if (!(distance <= pair.settings.thickness) || rejectsEdges(pair, edgeA, edgeB)) return {};
@@ -61,9 +62,9 @@ std::optional<NearbyEdges> measureEdges(const MeshPair& pair, std::uint32_t edge
                       featureOf(pair.b.topology, edgeB, centres.featureB)}};
 }
 
-void testLineEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
+void testLineEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, StepCheck& check,
                    ContactBuffers& out) {
-  const std::optional<NearbyEdges> nearby = measureEdges(pair, edgeA, edgeB);
+  const std::optional<NearbyEdges> nearby = measureEdges(pair, edgeA, edgeB, &check);
   if (!nearby) return;
   out.exactDecisions += nearby->centres.exact;
   if (pair.settings.contacts == Contacts::Distinct &&

@@ -4,6 +4,7 @@
 
 #include "NarrowPhase/NarrowPhase.h"
 #include "NarrowPhase/Proximity.h"
+#include "NarrowPhase/StepCheck.h"
 
 #include <array>
 #include <cstdint>
@@ -20,8 +21,9 @@ struct NearbyEdges {
 };
 
 /// Returns nothing if the edges are excluded, filtered or too far apart. Self-collision: pass the
-/// lower edge first.
-std::optional<NearbyEdges> measureEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB);
+/// lower edge first. check: if not null, records edges that are not excluded.
+std::optional<NearbyEdges> measureEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB,
+                                        StepCheck* check = nullptr);
 
 /// Appends the contact of two edges by Method::Proximity, where at least one edge is of a line
 /// mesh.
@@ -34,7 +36,8 @@ std::optional<NearbyEdges> measureEdges(const MeshPair&, std::uint32_t edgeA, st
 /// Source   Take one point on each of two edges. If the distance does not decrease along either
 ///          edge alone, the edges are nowhere nearer: the squared distance is convex in both
 ///          weights. Vertices that hold a contact are therefore local minima over all their edges.
-void testLineEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB, ContactBuffers& out);
+void testLineEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB, StepCheck&,
+                   ContactBuffers& out);
 
 /// Whether edge pairs report contacts between these features, of the pair's first and second mesh.
 /// They do not report a vertex against a triangle mesh.

@@ -11,16 +11,26 @@ namespace palpate {
 
 void StepFacts::clear() {
   clearance = std::numeric_limits<double>::infinity();
+  gapAtStart = std::numeric_limits<double>::infinity();
   atStart = Meeting::Apart;
+  sideUnknown = false;
   for (auto* list : {&verticesA, &verticesB, &degenerateA, &degenerateB}) list->clear();
 }
 
 void StepFacts::add(const StepFacts& other) {
   clearance = std::min(clearance, other.clearance);
+  gapAtStart = std::min(gapAtStart, other.gapAtStart);
   atStart = std::max(atStart, other.atStart);
+  sideUnknown |= other.sideUnknown;
   for (auto list : {&StepFacts::verticesA, &StepFacts::verticesB, &StepFacts::degenerateA,
                     &StepFacts::degenerateB})
     (this->*list).insert((this->*list).end(), (other.*list).begin(), (other.*list).end());
+}
+
+void StepFacts::addShape(const ShapeContactBuffers& found, bool atStart) {
+  double& gap = atStart ? gapAtStart : clearance;
+  gap = std::min(gap, found.shapeGap);
+  sideUnknown |= found.shapeSideUnknown;
 }
 
 void ContactBuffers::clear() {
@@ -30,6 +40,8 @@ void ContactBuffers::clear() {
   intersectingTriangles.clear();
   shape.clear();
   shapeShape.clear();
+  shapeGap = std::numeric_limits<double>::infinity();
+  shapeSideUnknown = false;
   featurePairs = exactDecisions = validityPairs = 0;
   facts.clear();
 }

@@ -30,6 +30,8 @@ struct StepPlan {
   double motionWithRounding = std::numeric_limits<double>::infinity();
   /// L: Auto's Proximity has no false negative among feature pairs that move at most this far.
   double slowMotion = 0.0;
+  /// L: touches on the arcs of bodies that turn are this much nearer than straight motion has them.
+  double arcDeviation = 0.0;
   double extraThickness = 0.0;  ///< L: added to the thickness for proximity at the step's end
   /// Auto: feature pairs that may have touched in the step are reported by their impact.
   bool reportsImpacts = false;
@@ -64,6 +66,22 @@ struct MeshPair {
     const TriangleMesh &vertices = swapped ? b : a, &others = swapped ? a : b;
     return vertices.radius(vertex) + others.radius(corners, barycentric);
   }
+  /// L: the largest radii of two features. Surfaces are at least their distance less this apart,
+  /// also where radii differ along an element.
+  double largestRadii(std::uint32_t vertex, const Triangle& corners, bool swapped) const {
+    const TriangleMesh &vertices = swapped ? b : a, &others = swapped ? a : b;
+    return vertices.radius(vertex) + largestRadius(others, corners);
+  }
+  double largestRadii(const Segment& ofA, const Segment& ofB) const {
+    return largestRadius(a, ofA) + largestRadius(b, ofB);
+  }
+  template <class Vertices>
+  static double largestRadius(const TriangleMesh& mesh, const Vertices& vertices) {
+    if (mesh.radii.empty()) return mesh.largestRadius;
+    double most = 0.0;
+    for (const std::uint32_t v : vertices) most = std::max(most, mesh.radii[v]);
+    return most;
+  }
   bool hasFilters() const { return nearAtRest || predicate || a.outerSideOnly || b.outerSideOnly; }
   bool hasShape() const { return shapeOfA || shapeOfB; }
   bool isShapePair() const { return shapeOfA && shapeOfB; }
@@ -94,14 +112,20 @@ enum class Meeting : std::uint8_t { Apart, Touching, Piercing };
 /// What the narrow phase found out about the conditions of a pair's method. Ids may repeat.
 struct StepFacts {
   /// L: at the step's end, no feature pair that is a contact, filtered or not, is nearer than this.
-  /// 0: a feature pair may have touched in the step.
+  /// 0: a feature pair may have touched in the step. Proximity subtracts radii.
   double clearance = std::numeric_limits<double>::infinity();
+  /// L, Continuous: at the step's start, no feature pair is nearer than this, less radii and
+  /// rounding errors. Infinity: none was within the thickness.
+  double gapAtStart = std::numeric_limits<double>::infinity();
+  bool sideUnknown = false;  ///< features touched, and the step does not tell from which side
   Meeting atStart = Meeting::Apart;  ///< how the surfaces meet at the step's start, where checked
   bool startsPiercing() const { return atStart == Meeting::Piercing; }
   Buffer<std::uint32_t> verticesA, verticesB;      ///< of features that may have touched
   Buffer<std::uint32_t> degenerateA, degenerateB;  ///< triangles without area in contacts
   void clear();
   void add(const StepFacts&);
+  /// Takes over what was found about a shape. atStart: with Continuous.
+  void addShape(const ShapeContactBuffers&, bool atStart);
 };
 
 /// What one worker found. Unsorted; cleared and filled again each frame.

@@ -50,11 +50,12 @@ class VertexTriangleFinder {
     VertexTriangleDistance answer = finiteVertexTriangleDistance(
         p, m_positions[corners[0]], m_positions[corners[1]], m_positions[corners[2]]);
     m_exactDecisions += answer.exact;
+    const double gap = answer.distance - m_pair.largestRadii(vertex, corners, m_swapped);
+    if (!(gap <= m_thickness)) return;
+    m_check.recordDistance(gap);
+    if (m_check.addImpactIfTouched(m_features, vertex, triangle, m_swapped, gap)) return;
     const double radii = m_pair.radii(vertex, corners, answer.barycentric, m_swapped);
     if (!(answer.distance - radii <= m_thickness)) return;
-    m_check.recordDistance(answer.distance);
-    if (m_check.addImpactIfTouched(m_features, vertex, triangle, m_swapped, answer.distance))
-      return;
     if (rejectsVertex(m_pair, vertex, triangle, m_swapped)) return;
     const MeshFeature feature = featureOf(m_topology, triangle, answer.feature);
     if (m_distinct && !isDistinct(vertex, triangle, feature)) return;
@@ -276,7 +277,7 @@ class ProximityFinder {
     std::uint32_t edgeA = a.triangleEdges[candidate.a][edgeNumber(ofA)];
     std::uint32_t edgeB = b.triangleEdges[candidate.b][edgeNumber(ofB)];
     if (m_pair.self() && edgeB < edgeA) std::swap(edgeA, edgeB);
-    if (m_pair.hasLines()) return testLineEdges(m_pair, edgeA, edgeB, m_out);
+    if (m_pair.hasLines()) return testLineEdges(m_pair, edgeA, edgeB, m_check, m_out);
     testEdges(m_pair, edgeA, edgeB, m_check, m_out);
   }
 

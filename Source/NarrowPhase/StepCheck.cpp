@@ -15,8 +15,9 @@ template <Kind kind>
 bool StepCheck::mayTouchInStep(const Features<kind>& features, std::uint32_t firstId,
                                std::uint32_t secondId, double distance) const {
   const StepPlan& step = m_pair.step;
-  return step.motion != 0.0 && !(distance > step.motionWithRounding) &&
-         mayHaveTouched<kind>(features.query(firstId, secondId), distance, step.motion);
+  const double onArcs = distance - step.arcDeviation;
+  return step.motion != 0.0 && !(onArcs > step.motionWithRounding) &&
+         mayHaveTouched<kind>(features.query(firstId, secondId), onArcs, step.motion);
 }
 
 template <Kind kind>
@@ -44,9 +45,11 @@ template <Kind kind>
 void StepCheck::recordImpact(const Features<kind>& features, std::uint32_t firstId,
                              std::uint32_t secondId, double time, double distance) {
   const StepPlan& step = m_pair.step;
-  double& clearance = m_out.facts.clearance;
-  if (clearance == 0.0 && !step.reportsImpacts) return;
   const double rounding = step.motionWithRounding - step.motion;
+  double &clearance = m_out.facts.clearance, &gap = m_out.facts.gapAtStart;
+  if (time == 0.0)
+    gap = std::min(gap, distance - (m_pair.a.largestRadius + m_pair.b.largestRadius) - rounding);
+  if (clearance == 0.0 && !step.reportsImpacts) return;
   double left = (1.0 - time) * step.motion + rounding;
   if (distance <= left)
     left = (1.0 - time) * motionBound<kind>(features.query(firstId, secondId)) + rounding;

@@ -21,8 +21,9 @@ class StepCheck {
     const StepPlan& step = m_pair.step;
     if (step.motion == 0.0) return 0.0;
     const double rounding = step.motionWithRounding - step.motion;
-    return std::min(step.motionWithRounding, step.reportsImpacts ? step.extraThickness + rounding
-                                                                 : m_pair.settings.thickness);
+    return std::min(
+        step.motionWithRounding + step.arcDeviation,
+        step.reportsImpacts ? step.extraThickness + rounding : m_pair.settings.thickness);
   }
 
   /// Records a feature pair that is at most thicknessAtEnd() apart.
@@ -36,6 +37,14 @@ class StepCheck {
   template <ImpactQuery::Kind kind>
   bool addImpactIfTouched(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId,
                           bool swapped, double distance);
+  /// The same for two edges whose radii may differ, at this distance less their largest radii. Only
+  /// records.
+  void recordGap(std::uint32_t edgeA, std::uint32_t edgeB, double gap) {
+    if (!(gap <= m_pair.settings.thickness)) return;
+    recordDistance(gap);
+    addImpactIfTouched(Features<ImpactQuery::Kind::EdgeEdge>{m_pair.a, m_pair.b}, edgeA, edgeB,
+                       false, gap);
+  }
 
   /// Auto with Contacts::Distinct: whether proximity at the step's end suffices for a feature pair,
   /// so that no impact has to be computed.
@@ -44,7 +53,7 @@ class StepCheck {
                          std::uint32_t secondId) const;
 
   /// Records an impact: lowers the clearance to what the rest of the step may leave of the
-  /// distance.
+  /// distance, and at the step's start the gap.
   template <ImpactQuery::Kind kind>
   void recordImpact(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId,
                     double time, double distance);

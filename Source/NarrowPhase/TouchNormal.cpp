@@ -206,9 +206,9 @@ bool moves(const ImpactQuery& query) {
 }  // namespace
 
 template <Kind kind>
-Vector3d touchNormal(const Features<kind>& of, std::uint32_t firstId, std::uint32_t secondId,
-                     const std::array<MeshFeature, 2>& holders, double time, const Vector3d& normal,
-                     std::size_t& exactDecisions) {
+TouchNormal touchNormal(const Features<kind>& of, std::uint32_t firstId, std::uint32_t secondId,
+                        const std::array<MeshFeature, 2>& holders, double time,
+                        const Vector3d& normal, std::size_t& exactDecisions) {
   const ImpactQuery query = of.query(firstId, secondId);
   using FeatureKind = MeshFeature::Kind;
   const bool interiors = kind == Kind::VertexTriangle ? holders[1].kind == FeatureKind::Face
@@ -217,23 +217,23 @@ Vector3d touchNormal(const Features<kind>& of, std::uint32_t firstId, std::uint3
   const Star first(of.first, holders[0], time), second(of.second, holders[1], time);
   std::optional<Approach> approach;
   if (moves(query) && interiors)
-    if (const auto found = normalOfPlane(query, time, exactDecisions)) return *found;
+    if (const auto found = normalOfPlane(query, time, exactDecisions)) return {*found, true};
   if (interiors && spanPlane(query, time)) {
     BestNormal best(first, second, approach, normal);
     best.offerBoth(normal, 0);
-    return best.normal();
+    return {best.normal(), false};
   }
   if (moves(query)) approach = approachOf(query, time);
   BestNormal best(first, second, approach, approach ? approach->side : normal);
   offerAll(first, second, best);
-  return best.normal();
+  return {best.normal(), approach.has_value()};
 }
 
-template Vector3d touchNormal(const Features<Kind::VertexTriangle>&, std::uint32_t, std::uint32_t,
-                              const std::array<MeshFeature, 2>&, double, const Vector3d&,
-                              std::size_t&);
-template Vector3d touchNormal(const Features<Kind::EdgeEdge>&, std::uint32_t, std::uint32_t,
-                              const std::array<MeshFeature, 2>&, double, const Vector3d&,
-                              std::size_t&);
+template TouchNormal touchNormal(const Features<Kind::VertexTriangle>&, std::uint32_t,
+                                 std::uint32_t, const std::array<MeshFeature, 2>&, double,
+                                 const Vector3d&, std::size_t&);
+template TouchNormal touchNormal(const Features<Kind::EdgeEdge>&, std::uint32_t, std::uint32_t,
+                                 const std::array<MeshFeature, 2>&, double, const Vector3d&,
+                                 std::size_t&);
 
 }  // namespace palpate

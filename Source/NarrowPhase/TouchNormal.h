@@ -10,6 +10,11 @@
 
 namespace palpate {
 
+struct TouchNormal {
+  Eigen::Vector3d direction;  ///< unit, from Features::second to Features::first
+  bool isSideKnown;           ///< whether the step tells from which side the first feature came
+};
+
 /// The normal of two features that meet at `time`: one that can separate the surfaces there. If the
 /// features' interiors meet and span a plane, it is that plane's normal, on the side that the step
 /// tells, or else that the stars tell. Otherwise the stars decide.
@@ -26,11 +31,10 @@ namespace palpate {
 /// holders   the features of Features::first and Features::second that hold the closest points
 /// time      in [0, 1] of the step, of the positions of the stars
 /// normal    from the distance functions
-/// Returns   a unit vector from Features::second to Features::first
 template <ImpactQuery::Kind kind>
-Eigen::Vector3d touchNormal(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId,
-                            const std::array<MeshFeature, 2>& holders, double time,
-                            const Eigen::Vector3d& normal, std::size_t& exactDecisions);
+TouchNormal touchNormal(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId,
+                        const std::array<MeshFeature, 2>& holders, double time,
+                        const Eigen::Vector3d& normal, std::size_t& exactDecisions);
 
 /// Replaces the normal of a distance of 0 at the step's end by touchNormal().
 inline void turnToSeparate(const Features<ImpactQuery::Kind::VertexTriangle>& of,
@@ -41,7 +45,7 @@ inline void turnToSeparate(const Features<ImpactQuery::Kind::VertexTriangle>& of
       MeshFeature{MeshFeature::Kind::Vertex, vertex},
       featureOf(of.second.topology, triangle, measured.feature)};
   measured.normal =
-      touchNormal(of, vertex, triangle, holders, 1.0, measured.normal, exactDecisions);
+      touchNormal(of, vertex, triangle, holders, 1.0, measured.normal, exactDecisions).direction;
 }
 inline void turnToSeparate(const Features<ImpactQuery::Kind::EdgeEdge>& of, std::uint32_t edgeA,
                            std::uint32_t edgeB, EdgeEdgeDistance& measured,
@@ -49,7 +53,8 @@ inline void turnToSeparate(const Features<ImpactQuery::Kind::EdgeEdge>& of, std:
   if (measured.distance > 0.0) return;
   const std::array<MeshFeature, 2> holders{featureOf(of.first.topology, edgeA, measured.featureA),
                                            featureOf(of.second.topology, edgeB, measured.featureB)};
-  measured.normal = touchNormal(of, edgeA, edgeB, holders, 1.0, measured.normal, exactDecisions);
+  measured.normal =
+      touchNormal(of, edgeA, edgeB, holders, 1.0, measured.normal, exactDecisions).direction;
 }
 
 }  // namespace palpate

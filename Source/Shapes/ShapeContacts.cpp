@@ -107,12 +107,17 @@ class ShapeImpacts {
     if (!time) return {};
     const PointShapeDistance atTime =
         ShapeStep(m_before, m_now).signedDistanceAt({m_mesh.before[v], m_mesh.now[v]}, *time);
+    recordTouchOfAxis();
     return ShapeImpact{*time, {Vector3d::UnitX(), atTime.normal, atTime.distance, true}};
   }
   std::optional<double> timeOfVertex(std::uint32_t v) {
     ++m_out.featurePairs;
     return ShapeStep(m_before, m_now)
         .firstTimeWithin({m_mesh.before[v], m_mesh.now[v]}, m_distance, m_settings.timeTolerance);
+  }
+  /// A cylinder without radius is a segment, which has no side where features touch it.
+  void recordTouchOfAxis() {
+    m_out.shapeSideUnknown |= m_before.isCylinder() && !(m_settings.minimumDistance > 0);
   }
   /// The first time at which an edge or a triangle is near the cylinder.
   std::optional<double> timeOfElement(ShapeElement element, const Triangle& vertices) {
@@ -133,6 +138,7 @@ class ShapeImpacts {
   std::optional<ShapeImpact> findOfCylinder(ShapeElement element, const Triangle& vertices) {
     const auto time = timeOfElement(element, vertices);
     if (!time) return {};
+    recordTouchOfAxis();
     std::optional<Shape>& shapeAtTime = m_out.shapePair.shapeAtTime;
     if (!shapeAtTime) shapeAtTime = m_before;
     shapeAtTime->placeBetween(m_before, m_now, *time);
@@ -199,6 +205,7 @@ class ShapeImpacts {
   Vector3d normalOfTouch(const ImpactQuery& query, const Closest& closest) {
     if (const auto normal = normalOfPlane(query, m_time, m_out.exactDecisions)) return *normal;
     const auto approach = approachOf(query, m_time);
+    m_out.shapeSideUnknown |= !approach;
     return approach ? approach->side : closest.normal;
   }
 
@@ -310,11 +317,23 @@ class ShapeContactFinder {
     if (!mayTouch(ends, limit)) return;
     NearestToShape first = nearest();
     m_out.exactDecisions += first.exact;
-    if (!m_continuous) return add(element, id, vertices, first, 1.0);
-    if (first.distance <= distance + error) return add(element, id, vertices, first, 0.0);
+    if (!m_continuous || first.distance <= distance + error) {
+      recordGap(vertices, first);
+      return add(element, id, vertices, first, m_continuous ? 0.0 : 1.0);
+    }
     if (first.distance > limit) return;
     if (const auto impact = m_impacts.find(element, vertices))
       add(element, id, vertices, impact->nearest, impact->time);
+  }
+
+  /// The least gap of all is that of a feature whose interior holds its nearest point, for some
+  /// feature does. Where radii differ, the largest bounds it.
+  void recordGap(const Triangle& vertices, const NearestToShape& nearest) {
+    const double gap = nearest.distance - m_mesh.largestRadius;
+    if (!nearest.inInterior) return;
+    double size = m_shape.magnitude() + m_thickness + m_mesh.largestRadius;
+    for (const std::uint32_t v : vertices) size += largest(m_positions[v]);
+    m_out.shapeGap = std::min(m_out.shapeGap, gap - kShapeBoundError * size);
   }
 
   NearestToShape nearestOfTriangle(const Triangle& corners) const {
@@ -362,6 +381,14 @@ void findShapeContacts(const TriangleMesh& mesh, const PlacedShape& shape,
 
 namespace {
 
+/// L: the radius of a ball about each point of a sphere's centre or a capsule's axis.
+double roundedBy(const Shape& shape) { return shape.isCylinder() ? 0.0 : shape.radius(); }
+
+/// L: of the distance of two shapes.
+double errorOfDistance(const Shape& a, const Shape& b) {
+  return 4.0 * kShapeBoundError * (a.magnitude() + b.magnitude());
+}
+
 /// Finds when two shapes come near each other within the step. The shapes are ordered first, so
 /// that the order of the pair does not matter.
 void findShapeImpact(const PlacedShape& first, const PlacedShape& second,
@@ -370,7 +397,8 @@ void findShapeImpact(const PlacedShape& first, const PlacedShape& second,
   const bool exchanged =
       b->before.precedes(a->before) || (!a->before.precedes(b->before) && b->now.precedes(a->now));
   if (exchanged) std::swap(a, b);
-  const double thickness = settings.thickness, timeTolerance = settings.timeTolerance;
+  const double thickness = settings.thickness, timeTolerance = settings.timeTolerance,
+               error = errorOfDistance(a->before, b->before);
   const MovingBody body = movingBody(b->before, b->now);
   std::optional<double> time;
   ShapePairDistance atTime{};
@@ -383,9 +411,17 @@ void findShapeImpact(const PlacedShape& first, const PlacedShape& second,
     time = approach.firstTimeWithin(thickness, timeTolerance);
     if (time && *time > 0) atTime = approach.nearestAt(*time);
     out.exactDecisions += approach.exactDecisions();
+    // Where the bodies without their radii all but touch, the direction is only rounding.
+    const double centres = atTime.distance + roundedBy(a->before) + roundedBy(b->before);
+    out.shapeSideUnknown |=
+        time && *time > 0 &&
+        !(centres > kApproachSlack * (a->before.magnitude() + b->before.magnitude()));
   }
   if (!time) return;
-  if (*time == 0) atTime = a->before.distanceFrom(b->before, out.shapePair);
+  if (*time == 0) {
+    atTime = a->before.distanceFrom(b->before, out.shapePair);
+    out.shapeGap = atTime.distance - error;
+  }
   if (exchanged) atTime = atTime.exchanged();
   out.shapeShape.push_back({atTime.pointA, atTime.pointB, atTime.normal, atTime.distance, *time});
 }
@@ -400,8 +436,10 @@ void findShapePair(const PlacedShape& a, const PlacedShape& b, const PairSetting
     findShapeImpact(a, b, settings, out);
   } else {
     const auto [pointA, pointB, normal, distance] = a.now.distanceFrom(b.now, out.shapePair);
-    if (distance <= settings.thickness)
+    if (distance <= settings.thickness) {
       out.shapeShape.push_back({pointA, pointB, normal, distance, 1.0});
+      out.shapeGap = distance - errorOfDistance(a.now, b.now);
+    }
   }
   out.exactDecisions += out.shapePair.polytope.exactDecisions() - before;
 }

@@ -9,6 +9,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 namespace palpate {
@@ -18,6 +19,10 @@ struct ShapeContactBuffers {
   Buffer<ShapeContact> shape;
   Buffer<ShapeShapeContact> shapeShape;
   ShapePairScratch shapePair;
+  /// L: no features are nearer than this, less radii and rounding errors; with Continuous at the
+  /// step's start, else at its end. Infinity: none is within the thickness.
+  double shapeGap = std::numeric_limits<double>::infinity();
+  bool shapeSideUnknown = false;   ///< as StepFacts::sideUnknown
   std::size_t featurePairs = 0;    ///< tested
   std::size_t exactDecisions = 0;  ///< left to exact arithmetic
 };

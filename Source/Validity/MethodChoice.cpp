@@ -10,6 +10,13 @@ bool haveTriangles(const GeometryInStep& a, const GeometryInStep& b) {
   return a.mesh.topology.hasFaces() && b.mesh.topology.hasFaces();
 }
 
+bool mayPierce(const GeometryInStep& a, const GeometryInStep& b) {
+  const auto hasEdges = [](const GeometryInStep& each) {
+    return each.mesh.topology.hasFaces() || each.mesh.topology.type == GeometryType::Lines;
+  };
+  return (a.mesh.topology.hasFaces() && hasEdges(b)) || (b.mesh.topology.hasFaces() && hasEdges(a));
+}
+
 bool hasContinuous(const GeometryInStep& a, const GeometryInStep& b) {
   return a.mesh.radii.empty() && b.mesh.radii.empty();
 }
@@ -39,6 +46,14 @@ static double extraThicknessOf(const PairSettings& settings, double motion) {
   return motion * (1.0 + kMotionSlack * settings.timeTolerance);
 }
 
+/// Features that touched in the step are at its end within their motion, and what arcs add.
+/// Proximity measures them if that is at most the thickness. Otherwise the result cannot be
+/// trusted, and the step need not be examined.
+static void examineProximity(double thickness, PairPlan& plan) {
+  plan.step.motion = plan.motion + plan.arcDeviation <= thickness ? plan.motion : 0.0;
+  plan.step.arcDeviation = plan.arcDeviation;
+}
+
 PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
                 bool moves) {
   PairPlan plan;
@@ -52,6 +67,10 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
   if (settings.method == Method::DistanceField) return plan;
   if (!haveTriangles(a, b)) {
     if (settings.method == Method::Auto) chooseMethod(settings, a, b, plan);
+    if (plan.method == Method::Proximity)
+      examineProximity(thickness, plan);
+    else if (mayPierce(a, b))
+      step.motion = plan.motion;
     return plan;
   }
   step.motion = plan.motion;
@@ -79,8 +98,8 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
   } else if (settings.method == Method::Intersection) {
     plan.searchDistance =
         plan.motion <= std::min(a.smallestHeight, b.smallestHeight) ? plan.motion : 0.0;
-  } else if (settings.method == Method::Proximity && plan.motion > thickness) {
-    step.motion = 0.0;  // the result cannot be trusted, so the step need not be examined
+  } else if (settings.method == Method::Proximity) {
+    examineProximity(thickness, plan);
   }
   return plan;
 }

@@ -52,9 +52,11 @@ struct PairPlan {
 bool hasContinuous(const GeometryInStep& a, const GeometryInStep& b);
 /// Whether Method::Proximity supports a pair of these geometries.
 bool hasProximity(const GeometryInStep& a, const GeometryInStep& b, double thickness);
-/// Whether both geometries have triangles. Only for these do the bounds on motion hold, because
-/// they have no radius. Other pairs are never trusted.
+/// Whether both geometries have triangles.
 bool haveTriangles(const GeometryInStep& a, const GeometryInStep& b);
+/// Whether elements may intersect although no features touch: an edge pierces a triangle. All other
+/// geometries that intersect have features, or a feature and a shape, at distance 0.
+bool mayPierce(const GeometryInStep& a, const GeometryInStep& b);
 
 /// The geometry whose field answers a pair by Method::DistanceField: an added field, else the
 /// second mesh if both have one.

@@ -62,13 +62,34 @@ double displacementLimitOf(const PairSettings& settings, const GeometryInStep& a
                                              : settings.thickness;
 }
 
+/// L: rounding errors of distances.
+double roundingOf(const StepPlan& step) { return step.motionWithRounding - step.motion; }
+
+/// Whether lines, points and shapes, less their radii, are known to be apart where the step starts.
+/// Each step measures it. Proximity also requires that they stay apart throughout; with a shape it
+/// knows only the motion of all.
+bool measuredApart(const MeshPair& meshes, const PairPlan& plan, const StepFacts& facts,
+                   double earliestTime) {
+  if (plan.byProxy) return false;
+  if (plan.method == Method::Continuous) {
+    // Earliest times come without distances, and without features that a filter refuses.
+    if (meshes.settings.earliestTimeOnly) return earliestTime > 0.0 && !meshes.hasFilters();
+    return facts.gapAtStart > 0.0;
+  }
+  if (plan.method != Method::Proximity) return false;
+  const double moved = plan.motion + plan.arcDeviation, left = meshes.hasShape() ? moved : 0.0;
+  return moved <= meshes.settings.thickness && facts.clearance > left + roundingOf(plan.step);
+}
+
 /// Whether the step met the method's conditions, if vertices move in straight lines. validity:
 /// startedApart and displacementLimit must be set. foundOrFar: triangles intersect at the end, or
 /// no boxes of triangles are within the displacement of each other there.
 bool meetsConditions(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
                      const PairPlan& plan, const StepFacts& facts, const Validity& validity,
                      bool foundOrFar) {
-  if (!haveTriangles(a, b) || plan.method == Method::DistanceField) return false;
+  if (plan.method == Method::DistanceField) return false;
+  if (!haveTriangles(a, b))
+    return validity.startedApart && (settings.earliestTimeOnly || !facts.sideUnknown);
   if (settings.method == Method::Auto)
     return plan.method == Method::Intersection || validity.startedApart;
   const bool isWithinLimit = plan.motion <= validity.displacementLimit;
@@ -76,8 +97,8 @@ bool meetsConditions(const PairSettings& settings, const GeometryInStep& a, cons
     case Method::Intersection:
       return plan.motion == 0.0 || (isWithinLimit && foundOrFar);
     case Method::Proximity:
-      return isWithinLimit && validity.startedApart && facts.verticesA.empty() &&
-             facts.verticesB.empty();
+      return plan.motion + plan.arcDeviation <= validity.displacementLimit &&
+             validity.startedApart && facts.verticesA.empty() && facts.verticesB.empty();
     default:
       return validity.startedApart;
   }
@@ -93,7 +114,8 @@ void Trust::forget() {
 void Trust::start(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
                   PairPlan& plan) {
   // Coordinates of two features within the thickness differ by at most this size.
-  const double size = a.extent + b.extent + settings.thickness + plan.step.extraThickness;
+  const double size = a.extent + b.extent + settings.thickness + plan.step.extraThickness +
+                      (a.mesh.largestRadius + b.mesh.largestRadius);
   plan.step.motionWithRounding = plan.step.motion + 2.0 * kMotionError * (plan.step.motion + size);
 
   const auto before = statesOf(a, a.mesh.before, b, b.mesh.before);
@@ -115,13 +137,13 @@ void Trust::start(const PairSettings& settings, const GeometryInStep& a, const G
   const int most = settings.earliestTimeOnly ? kFramesPerCheck : kMaxCheckCredit;
   m_checkCredit = m_topologies.isCurrent(topologies) ? std::min(m_checkCredit + 1, most) : most;
   m_topologies.commit(topologies);
-  if (!haveTriangles(a, b) || startsApart || plan.method == Method::Intersection ||
+  if (!mayPierce(a, b) || startsApart || plan.method == Method::Intersection ||
       plan.method == Method::DistanceField ||
       (plan.method == Method::Proximity && plan.motion > 0.0 && plan.step.motion == 0.0))
     return;
-  plan.runsIntersection = settings.method == Method::Auto;
-  plan.step.checksStart =
-      !m_atStart.meeting && (plan.runsIntersection || m_checkCredit >= kFramesPerCheck);
+  const bool isAuto = settings.method == Method::Auto;
+  plan.runsIntersection = isAuto && haveTriangles(a, b);
+  plan.step.checksStart = !m_atStart.meeting && (isAuto || m_checkCredit >= kFramesPerCheck);
   if (plan.step.checksStart) m_checkCredit = std::max(m_checkCredit - kFramesPerCheck, 0);
   // The result cannot be trusted, so the step need not be examined.
   if (plan.method == Method::Proximity && settings.method == plan.method && !plan.step.checksStart)
@@ -163,7 +185,10 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
     m_atStart.meeting = Meeting::Apart;
     m_atStart.version.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
   }
-  validity.startedApart = m_atStart.meeting == Meeting::Apart;
+  const bool surfacesApart = m_atStart.meeting == Meeting::Apart;
+  validity.startedApart =
+      (surfacesApart || !mayPierce(a, b)) &&
+      (haveTriangles(a, b) || measuredApart(meshes, plan, facts, contents.earliestTimeOfImpact));
   validity.displacementLimit = displacementLimitOf(settings, a, b, plan);
   const bool listsFastVertices = !usesMotionTolerance(settings, a, b) &&
                                  plan.method != Method::Continuous && !meshes.hasShape();
@@ -177,6 +202,7 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   validity.arcDeviation = plan.arcDeviation;
   validity.trusted = trustedIfStraight && validity.arcDeviation <= settings.thickness;
   validity.sideMayBeWrong = plan.method != Method::Intersection && !validity.trusted;
+  const bool findsImpacts = plan.swept() || plan.step.reportsImpacts;
   m_atEnd = {};
   // Intersection measures no distances: meshes that do not intersect may be arbitrarily near.
   m_atEnd.clearance =
@@ -193,11 +219,12 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
     m_atEnd.clearance = provenApart ? plan.motion : 0.0;
   } else if (plan.method == Method::Intersection) {
     if (plan.motion == 0.0 && facts.clearance > 0.0) m_atEnd.meeting = Meeting::Apart;
-  } else if (trustedIfStraight && (facts.clearance > 0.0 || plan.motion == 0.0)) {
+  } else if ((findsImpacts || plan.motion == 0.0 ? surfacesApart : trustedIfStraight) &&
+             (facts.clearance > 0.0 || plan.motion == 0.0)) {
     m_atEnd.meeting = Meeting::Apart;
   } else if (plan.motion == 0.0 && m_atStart.meeting == Meeting::Touching) {
     m_atEnd.meeting = Meeting::Touching;
-  } else if (plan.step.motion > 0.0 && settings.method != Method::Proximity) {
+  } else if (plan.step.motion > 0.0 && findsImpacts) {
     findEnd(plan, facts, meshes, contents, counts);
   }
   m_atEnd.version.commit(statesOf(a, a.mesh.now, b, b.mesh.now));

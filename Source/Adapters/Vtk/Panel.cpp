@@ -9,7 +9,7 @@ namespace palpate::vtk {
 
 namespace {
 
-/// Why the answer for two meshes is not trusted, in a few words.
+/// Why the answer is not trusted, in a few words.
 const char* reasonOf(const Validity& validity) {
   if (!validity.startedApart && validity.method != Method::Intersection)
     return "may intersect at the start";
@@ -30,8 +30,7 @@ const CollisionData& answerOf(const OctreeBasedCD& detection, GeometryId a, Geom
 }
 
 std::string panelText(const OctreeBasedCD& detection,
-                      const std::function<std::string(GeometryId)>& nameOf,
-                      const std::function<bool(GeometryId)>& isMesh, int frame,
+                      const std::function<std::string(GeometryId)>& nameOf, int frame,
                       double framesPerSecond) {
   constexpr std::size_t kMostReasons = 3;
   const FrameStatistics& statistics = detection.statistics();
@@ -59,8 +58,7 @@ std::string panelText(const OctreeBasedCD& detection,
     const Validity& validity = answerOf(detection, a, b).validity();
     trusted += validity.trusted;
     if (!validity.trusted && reasons++ < kMostReasons)
-      untrusted += "\n " + nameOf(a) + ", " + nameOf(b) + ": " +
-                   (isMesh(a) && isMesh(b) ? reasonOf(validity) : "not a pair of meshes");
+      untrusted += "\n " + nameOf(a) + ", " + nameOf(b) + ": " + reasonOf(validity);
   }
   add("trusted pairs %8zu of %zu", trusted, detection.pairs().size());
   text += untrusted;

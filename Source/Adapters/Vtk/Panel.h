@@ -11,9 +11,8 @@ namespace palpate::vtk {
 const CollisionData& answerOf(const OctreeBasedCD&, GeometryId a, GeometryId b);
 
 /// Lines of text about the last frame: contacts, times and validity. framesPerSecond: 0 is not
-/// shown. Pairs of other geometry types than meshes are never trusted.
+/// shown.
 std::string panelText(const OctreeBasedCD&, const std::function<std::string(GeometryId)>& nameOf,
-                      const std::function<bool(GeometryId)>& isMesh, int frame,
-                      double framesPerSecond);
+                      int frame, double framesPerSecond);
 
 }  // namespace palpate::vtk

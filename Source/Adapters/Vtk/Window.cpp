@@ -298,11 +298,7 @@ void Window::Implementation::drawAnnotations() {
   }
   if (!panel) return;
   const auto name = [this](GeometryId id) { return nameOf(id); };
-  const auto isMesh = [this](GeometryId id) {
-    const Mesh& mesh = problem.geometries[indices.at(id)];
-    return mesh.type == GeometryType::Triangles && !mesh.analytical;
-  };
-  panelText->SetInput(vtk::panelText(detection, name, isMesh, frames, framesPerSecond).c_str());
+  panelText->SetInput(vtk::panelText(detection, name, frames, framesPerSecond).c_str());
   vtkTextProperty* look = panelText->GetTextProperty();
   setTextLook(look, text * 4 / 5);
   look->SetFontFamilyToCourier();

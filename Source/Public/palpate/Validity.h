@@ -43,31 +43,31 @@ enum class MethodReason {
 ///          (2) if trusted, and `method` is Intersection: if the meshes touched within the step,
 ///          the answer is not empty. Normals are not certified, and the meshes may intersect. This
 ///          also holds where Auto answers by Intersection: at rest, without a thickness.
-///          (3) if not trusted, the answer may be right or wrong. For two meshes, Continuous and
-///          Auto miss no impact of straight motion even so. Only sides are then not certified, and
-///          impacts on the arcs of bodies that turn. Pairs with lines, points or shapes, pairs that
-///          collision filters separate, and answers of DistanceField are never trusted: the proofs
-///          are for two triangle or tetrahedral meshes, and for such a mesh with itself.
+///          (3) if not trusted, the answer may be right or wrong. Continuous and Auto miss no
+///          impact of straight motion even so, except where Auto answers lines and points with one
+///          radius per vertex. Only sides are then not certified, and impacts on the arcs of bodies
+///          that turn. Answers of DistanceField and of Proxy are never trusted, nor are pairs that
+///          collision filters separate.
 ///          (4) the laws are about one step. Features may have passed each other in an earlier
 ///          step, because its answer missed it or because the solver ignored an impact. The next
 ///          step may then be trusted, with startedApart, and its normals push further through.
 ///          Remember steps that were not trusted, or end steps with StepGuard.
-///          (5) the laws are about surfaces. A closed body wholly inside another intersects no
-///          surface: its answers may be trusted, and its normals push it deeper.
-///          SpatialQueries::findInsideVertices() finds such a body.
+///          (5) the laws are about surfaces. A closed mesh wholly inside another intersects no
+///          surface: its answers may be trusted, and its normals push it deeper. Queries find it
+///          (SpatialQueries::findInsideVertices()). Shapes and radii are solid.
 /// Cost     a small part of the frames' time, and more in frames that run the initial intersection
 ///          check (Docs/Algorithms/Validity.md, "Cost").
 /// Source   Docs/Algorithms/Validity.md has the conditions and their proofs.
 struct Validity {
   /// Whether the conditions of `method` held in this step. The laws say what follows from it.
   bool trusted = false;
-  /// Whether the surfaces are known not to intersect at the step's start, from an initial
-  /// intersection check, or from earlier frames and bounds on the motion since. True also if one
-  /// body is wholly inside the other. If false, the surfaces intersect, or the library does not
-  /// know. Two meshes by Auto: they intersect, unless `method` is Intersection or DistanceField.
-  /// Always false for pairs with lines, points or shapes. No check runs for Method::Intersection,
-  /// which needs none, and in steps in which the `displacement` of Method::Proximity exceeds its
-  /// limit.
+  /// Whether the surfaces are known not to intersect at the step's start, from distances there, an
+  /// initial intersection check, or earlier frames and bounds on the motion since. Lines and points
+  /// count with their radii, and shapes are solid; a mesh may be wholly inside another. If false,
+  /// they intersect, or the library does not know. By Auto they intersect, or radii or a shape
+  /// touch within rounding, unless `method` is Intersection, DistanceField or Proxy, or Proximity
+  /// with one radius per vertex. How deep radii and shapes overlap is the negative `distance` of
+  /// contacts at time 0. Proximity whose `displacement` exceeds its limit checks nothing.
   bool startedApart = false;
   /// Whether some normal may be on the wrong side, if `method` is Proximity, Continuous or Auto: it
   /// is then the opposite of `trusted`. Intersection knows no sides, and the value is always false
@@ -89,9 +89,9 @@ struct Validity {
   /// PairSettings::earliestTimeOnly, which gives no contacts.
   std::size_t atImpact = 0;
 
-  /// L: upper bound on the motion of any two features in the step, relative to each other. 0 for
-  /// pairs with a shape by Method::Proximity, which does not read the motion: fast shapes are not
-  /// noticed there.
+  /// L: upper bound on the motion of any two features in the step, relative to each other. Of a
+  /// cylinder that turns the rim counts, too. A plane that turns has no such bound; the value is
+  /// then that of one of its points.
   double displacement = 0;
   /// L: with Proximity and Intersection, the largest `displacement` that meets the method's
   /// condition: the thickness; the smallest height of a triangle, measured when the topology was
@@ -101,8 +101,8 @@ struct Validity {
   /// L: how far the straight motion of vertices is off the arcs of bodies that setTransform()
   /// turns. It bounds the distance of a vertex from its path if the body turned evenly about one
   /// axis and slid along it. It is the sum over both bodies, and infinity for a plane that turns.
-  /// If it exceeds the thickness, the answer is not trusted. 0 for pairs with a shape by
-  /// Method::Proximity, as for `displacement`.
+  /// If it exceeds the thickness, the answer is not trusted. With Proximity, it and `displacement`
+  /// together must not exceed the thickness.
   double arcDeviation = 0;
   /// L: feature pairs further apart at the step's end are contacts only by an impact. It is the
   /// thickness, with Auto up to the motion tolerance more, also where a field or a proxy answers; 0

@@ -1,0 +1,435 @@
+#include <palpate/SpatialQueries.h>
+#include <palpate/TimeOfImpact.h>
+
+#include "Common/Sanitized.h"
+#include "Common/ShapeTruth.h"
+#include "Common/TestGeometry.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <iostream>
+#include <map>
+#include <numbers>
+#include <optional>
+
+// Trust of pairs with lines, points and shapes. The truth is sampled: SpatialQueries::distance() at
+// many times of the step, where bodies that turn are on their arcs.
+
+namespace palpate::testing {
+namespace {
+
+constexpr int kSamples = 48;
+
+/// A body turns evenly about an axis and slides along it.
+struct Pose {
+  Matrix3d rotation = Matrix3d::Identity();
+  Vector3d translation = Vector3d::Zero();
+
+  Vector3d operator()(const Vector3d& p) const { return rotation * p + translation; }
+  Pose then(const Vector3d& axis, double angle, const Vector3d& through,
+            const Vector3d& slide) const {
+    const Matrix3d turn = Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
+    return {turn * rotation, turn * (translation - through) + through + slide};
+  }
+};
+
+/// One geometry of a pair and its step.
+struct Body {
+  std::optional<AnalyticalGeometry> shape;
+  TestGeometry geometry;
+  bool placed = false;
+  Positions before, now;  ///< in the body's frame
+  Pose pose;              ///< before the step
+  Vector3d axis = Vector3d::UnitX(), through = Vector3d::Zero(), slide = Vector3d::Zero();
+  double angle = 0;
+
+  GeometryId addTo(OctreeBasedCD& collisions) const {
+    return shape ? collisions.addAnalyticalGeometry(*shape) : geometry.addTo(collisions);
+  }
+  Pose poseAt(double s) const { return pose.then(axis, s * angle, through, s * slide); }
+  /// Places it where it is at the time s of its step.
+  void placeAt(double s, OctreeBasedCD& collisions, GeometryId id) const {
+    if (placed) {
+      const Pose at = poseAt(s);
+      collisions.setTransform(id, at.rotation, at.translation);
+      return;
+    }
+    Positions positions = before;
+    for (std::size_t v = 0; v < before.size(); ++v) positions[v] = (1 - s) * before[v] + s * now[v];
+    collisions.setPositions(id, positions);
+  }
+  /// A vertex on the straight way that the library takes.
+  Vector3d at(std::uint32_t v, double s) const {
+    if (!placed) return (1 - s) * before[v] + s * now[v];
+    return (1 - s) * pose(before[v]) + s * poseAt(1)(before[v]);
+  }
+  std::array<std::uint32_t, 3> element(std::uint32_t id) const {
+    if (geometry.type == GeometryType::Triangles) return geometry.triangles[id];
+    if (geometry.type == GeometryType::Points) return {id, id, id};
+    const auto& [p, q] = geometry.segments[id];
+    return {p, q, q};
+  }
+  double largestRadius() const {
+    return shape ? 0.0 : *std::max_element(geometry.radii.begin(), geometry.radii.end());
+  }
+};
+
+AnalyticalGeometry randomShape(Random& random, int kind) {
+  const double size = uniform(random, 0.05, 0.25);
+  const Vector3d half = randomPoint(random, -size, size), centre = randomPoint(random, -0.1, 0.1);
+  switch (kind) {
+    case 0:
+      return Sphere{centre, size};
+    case 1:
+      return Capsule{centre - half, centre + half, uniform(random, 0, 0.1)};
+    case 2:
+      return Plane{centre, randomPoint(random, -1, 1), random() % 2 == 0};
+    case 3:
+      return Box{centre, half.cwiseAbs()};
+    case 4:
+      return Cylinder{centre - half, centre + half, uniform(random, 0, 0.15)};
+    default:
+      ConvexHull hull;
+      for (int i = 0; i < 6; ++i) hull.points.push_back(randomPoint(random, -size, size));
+      return hull;
+  }
+}
+
+constexpr std::array<const char*, 9> kKinds{"triangles", "lines", "points",   "sphere", "capsule",
+                                            "plane",     "box",   "cylinder", "hull"};
+
+Body randomBody(Random& random, int kind) {
+  Body body;
+  if (kind >= 3) {
+    body.shape = randomShape(random, kind - 3);
+    body.placed = true;
+    body.pose = {randomTurn(random), randomPoint(random, 0, 1)};
+    return body;
+  }
+  const double radius = random() % 3 == 0 ? 0.0 : uniform(random, 0, 0.06);
+  if (kind == 0) body.geometry = testGeometry(soup(random, 4, 0.3));
+  if (kind == 1) body.geometry = thread(random, 4, 0.4, radius, false);
+  if (kind == 2) body.geometry = particles(random, 3, radius);
+  if (kind != 0 && random() % 4 == 0)
+    body.geometry = tapered(random, body.geometry, uniform(random, 0.01, 0.06));
+  body.placed = random() % 3 == 0;
+  body.before = body.now = body.geometry.positions;
+  if (body.placed) body.pose = {randomTurn(random), randomPoint(random, -0.3, 0.3)};
+  return body;
+}
+
+void move(Random& random, Body& body, double most) {
+  if (body.placed) {
+    body.axis = randomPoint(random, -1, 1);
+    body.through = randomPoint(random, 0, 1);
+    body.slide = uniform(random, -most, most) * body.axis.normalized();
+    body.angle = random() % 3 == 0 ? 0.0 : uniform(random, -2, 2) * most;
+    return;
+  }
+  const Vector3d all = randomPoint(random, -most, most);
+  body.now = body.before;
+  for (Vector3d& p : body.now) p += all + randomPoint(random, -0.2, 0.2) * most;
+}
+
+void endStep(Body& body) {
+  if (body.placed) body.pose = body.poseAt(1);
+  body.before = body.now;
+}
+
+/// What happened in a step, at sampled times.
+struct Truth {
+  bool startedApart = true;
+  std::vector<std::pair<double, std::array<std::uint32_t, 2>>> touches;  ///< time and elements
+};
+
+Truth truthOf(const Body& a, const Body& b) {
+  OctreeBasedCD collisions(settingsOf(Engine::BruteForce));
+  const GeometryId idA = a.addTo(collisions), idB = b.addTo(collisions);
+  Truth truth;
+  for (int i = 0; i <= kSamples; ++i) {
+    const double s = double(i) / kSamples;
+    a.placeAt(s, collisions, idA);
+    b.placeAt(s, collisions, idB);
+    const GeometryDistance nearest = collisions.queries().distance(idA, idB);
+    if (nearest.distance > 0) continue;
+    if (i == 0) truth.startedApart = false;
+    truth.touches.push_back({s, {nearest.a.element, nearest.b.element}});
+  }
+  return truth;
+}
+
+bool contain(const std::array<std::uint32_t, 3>& element, std::span<const std::uint32_t> vertices) {
+  return std::all_of(vertices.begin(), vertices.end(), [&](std::uint32_t v) {
+    return std::find(element.begin(), element.end(), v) != element.end();
+  });
+}
+
+/// Whether a contact is of features of these two elements.
+bool isReported(const CollisionData& data, const Body& a, const Body& b,
+                const std::array<std::uint32_t, 2>& elements) {
+  if (a.shape && b.shape) return !data.shapeShape().empty();
+  if (a.shape || b.shape) {
+    const Body& mesh = a.shape ? b : a;
+    const auto element = mesh.element(elements[a.shape ? 1 : 0]);
+    return std::any_of(data.shape().begin(), data.shape().end(),
+                       [&](const auto& c) { return contain(element, c.vertices); });
+  }
+  const auto ofA = a.element(elements[0]), ofB = b.element(elements[1]);
+  const auto any = [](const auto& list, auto&& isOne) {
+    return std::any_of(list.begin(), list.end(), isOne);
+  };
+  return any(data.vertexTriangle(),
+             [&](const auto& c) {
+               return contain(ofA, {{c.vertex}}) && contain(ofB, c.corners);
+             }) ||
+         any(data.triangleVertex(),
+             [&](const auto& c) {
+               return contain(ofB, {{c.vertex}}) && contain(ofA, c.corners);
+             }) ||
+         any(data.edgeEdge(),
+             [&](const auto& c) { return contain(ofA, c.edgeA) && contain(ofB, c.edgeB); });
+}
+
+/// A normal is right if the features did not pass each other before the contact's time, and it
+/// leads from one to the other where they are then, or just before.
+void expectSides(const CollisionData& data, const Body& a, const Body& b, bool isAtEnd) {
+  const auto timeBefore = [&](double time) { return isAtEnd ? 1.0 : std::max(0.0, time - 1e-6); };
+  const auto expectVertex = [&](const VertexTriangleContact& c, const Body& of, const Body& other) {
+    const double t = timeBefore(c.timeOfImpact);
+    std::array<std::array<Vector3d, 4>, 3> p;
+    for (int end = 0; end < 3; ++end) {
+      const double s = std::array{0.0, 1.0, t}[end];
+      p[end] = {of.at(c.vertex, s), other.at(c.corners[0], s), other.at(c.corners[1], s),
+                other.at(c.corners[2], s)};
+    }
+    const auto& [x, y, z] = p;
+    const auto passed = vertexTriangleTimeOfImpact(x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3]);
+    EXPECT_TRUE(!passed || *passed > t - 1e-5) << *passed << " " << t;
+    const auto at = vertexTriangleDistance(z[0], z[1], z[2], z[3]);
+    EXPECT_GT(c.normal.dot(at.difference), 0.0) << at.distance;
+  };
+  for (const VertexTriangleContact& c : data.vertexTriangle()) expectVertex(c, a, b);
+  for (const VertexTriangleContact& c : data.triangleVertex()) expectVertex(c, b, a);
+  for (const EdgeEdgeContact& c : data.edgeEdge()) {
+    const double t = timeBefore(c.timeOfImpact);
+    std::array<std::array<Vector3d, 4>, 3> p;
+    for (int end = 0; end < 3; ++end) {
+      const double s = std::array{0.0, 1.0, t}[end];
+      p[end] = {a.at(c.edgeA[0], s), a.at(c.edgeA[1], s), b.at(c.edgeB[0], s), b.at(c.edgeB[1], s)};
+    }
+    const auto& [x, y, z] = p;
+    const auto passed = edgeEdgeTimeOfImpact(x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3]);
+    EXPECT_TRUE(!passed || *passed > t - 1e-5) << *passed << " " << t;
+    const auto at = edgeEdgeDistance(z[0], z[1], z[2], z[3]);
+    EXPECT_GT(c.normal.dot(at.difference), 0.0) << at.distance;
+  }
+  for (const ShapeContact& c : data.shape()) EXPECT_GT(c.distance, -1e-9);
+  for (const ShapeShapeContact& c : data.shapeShape()) EXPECT_GT(c.distance, -1e-9);
+}
+
+/// Steps of a kind of pair, and how many of those that are right are trusted.
+struct Tally {
+  std::size_t steps = 0, apart = 0, right = 0, trusted = 0, withContacts = 0;
+};
+
+PairSettings randomSettings(Random& random) {
+  constexpr std::array kMethods{Method::Auto, Method::Continuous, Method::Proximity};
+  constexpr std::array kThicknesses{0.0, 0.02, 0.1};
+  PairSettings settings{kMethods[random() % 3], kThicknesses[random() % 3]};
+  settings.contacts = random() % 2 ? Contacts::All : Contacts::Distinct;
+  return settings;
+}
+
+void runHistory(Random& random, int kindA, int kindB, std::map<std::string, Tally>& tallies) {
+  Body a = randomBody(random, kindA), b = randomBody(random, kindB);
+  const PairSettings settings = randomSettings(random);
+  OctreeBasedCD collisions(settingsOf(Engine::Octree));
+  const GeometryId idA = a.addTo(collisions), idB = b.addTo(collisions);
+  try {
+    collisions.addCollisionPair(idA, idB, settings);
+  } catch (const Error&) {
+    return;  // per-vertex radii by Continuous, Proximity without any distance
+  }
+  const double most = std::pow(10.0, uniform(random, -4, -0.5));
+  for (int step = 0; step < 4; ++step) {
+    for (auto [body, id] : {std::pair(&a, idA), std::pair(&b, idB)}) {
+      if (random() % 4 == 0 && !body->placed)  // a solver corrected it
+        for (Vector3d& p : body->before) p += randomPoint(random, -0.01, 0.01);
+      body->angle = 0, body->slide.setZero(), body->now = body->before;
+      if (random() % 5 != 0) move(random, *body, most);
+      if (body->placed) {
+        const Pose end = body->poseAt(1);
+        collisions.setTransform(id, body->pose.rotation, body->pose.translation, end.rotation,
+                                end.translation);
+      } else {
+        collisions.setPositions(id, body->before, body->now);
+      }
+    }
+    collisions.detectCollision();
+    const CollisionData& data = collisions.collisionData(idA, idB);
+    const Validity& validity = data.validity();
+    const Truth truth = truthOf(a, b);
+    SCOPED_TRACE(::testing::Message()
+                 << kKinds[kindA] << " " << kKinds[kindB] << ", method "
+                 << static_cast<int>(settings.method) << ", thickness " << settings.thickness
+                 << ", step " << step << ", motion " << most << ", arc " << validity.arcDeviation);
+    const bool byProximity = validity.method == Method::Proximity;
+    const std::size_t contacts = validity.atEnd + validity.atImpact;
+    Tally& tally = tallies[std::string(kKinds[kindA]) + "-" + kKinds[kindB] + " " +
+                           (settings.method == Method::Auto         ? "Auto"
+                            : settings.method == Method::Continuous ? "Continuous"
+                                                                    : "Proximity")];
+    ++tally.steps;
+    tally.apart += truth.startedApart;
+    tally.right += truth.startedApart && validity.arcDeviation <= settings.thickness &&
+                   !(byProximity && !truth.touches.empty());
+    tally.trusted += validity.trusted;
+    tally.withContacts += validity.trusted && contacts > 0;
+    EXPECT_EQ(validity.sideMayBeWrong, !validity.trusted);
+    if (validity.startedApart) {
+      EXPECT_TRUE(truth.startedApart);
+    }
+    if (!truth.startedApart) {
+      EXPECT_FALSE(validity.trusted);
+    }
+    if (validity.trusted) {
+      if (byProximity) {
+        EXPECT_TRUE(truth.touches.empty());
+      }
+      for (const auto& [time, elements] : truth.touches) {
+        EXPECT_GT(contacts, 0u);
+        if (settings.contacts == Contacts::All)
+          EXPECT_TRUE(isReported(data, a, b, elements)) << "time " << time;
+      }
+      expectSides(data, a, b, byProximity);
+    }
+    collisions.advance();
+    endStep(a);
+    endStep(b);
+    if (::testing::Test::HasFailure()) return;
+  }
+}
+
+TEST(TrustOfTypes, IsNeverGivenToAnAnswerThatMissesATouchOrHasAWrongSide) {
+  Random random(7);
+  std::map<std::string, Tally> tallies;
+  for (int kindA = 0; kindA < 9; ++kindA)
+    for (int kindB = std::max(1, kindA); kindB < 9; ++kindB) {
+      if (kindA == 5 && kindB == 5) continue;  // two planes
+      for (int history = 0; history < casesOf(60); ++history) {
+        const bool swapped = random() % 2;
+        runHistory(random, swapped ? kindB : kindA, swapped ? kindA : kindB, tallies);
+        ASSERT_FALSE(HasFailure());
+      }
+    }
+  std::map<std::string, Tally> sums;
+  for (const auto& [name, tally] : tallies) {
+    Tally& sum = sums[name.substr(name.find(' ') + 1)];
+    sum.steps += tally.steps, sum.apart += tally.apart, sum.right += tally.right;
+    sum.trusted += tally.trusted, sum.withContacts += tally.withContacts;
+  }
+  for (const auto& [name, tally] : sums)
+    std::cout << name << ": " << tally.steps << " steps, " << tally.apart << " started apart, "
+              << tally.right << " right, trusted " << tally.trusted << ", of these with contacts "
+              << tally.withContacts << "\n";
+  for (const auto& [name, sum] : sums) {
+    EXPECT_GT(sum.trusted, sum.right / 2);
+    EXPECT_GE(sum.withContacts, leastOf(50));
+  }
+}
+
+/// Data/cases: a point on an arm of length 10 turns about y, and a wire crosses its arc after 15
+/// degrees. Its straight way passes the wire at a distance of 10 (1 - cos(15 degrees)).
+struct TurningTip {
+  OctreeBasedCD collisions;
+  GeometryId tip = collisions.addPointSet(Positions{{10, 0, 0}}, 0.3), wire;
+
+  TurningTip(double radius, double thickness) {
+    const Vector3d at = turned(15) * Vector3d(radius, 0, 0);
+    const Positions ends{at - Vector3d::UnitY(), at + Vector3d::UnitY()};
+    wire = collisions.addLineMesh(ends, std::vector<Segment>{{0, 1}});
+    collisions.addCollisionPair(tip, wire, {.thickness = thickness});
+    collisions.setTransform(tip, turned(0), Vector3d::Zero());
+    collisions.advance();
+  }
+  static Matrix3d turned(double degrees) {
+    return Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Vector3d::UnitY())
+        .toRotationMatrix();
+  }
+  /// Contacts, and whether they are trusted.
+  std::pair<std::size_t, bool> turnTo(double degrees) {
+    collisions.setTransform(tip, turned(degrees), Vector3d::Zero());
+    collisions.detectCollision();
+    const CollisionData& data = collisions.collisionData(tip, wire);
+    const std::pair answer(data.vertexTriangle().size(), data.validity().trusted);
+    collisions.advance();
+    return answer;
+  }
+};
+
+TEST(TrustOfTypes, TellsAStepWhoseArcMissesAWireFromOneThatIsShortEnough) {
+  using Answer = std::pair<std::size_t, bool>;
+  // The chord misses the first wire, and hits one that the arc misses.
+  EXPECT_EQ(TurningTip(10, 0).turnTo(30), Answer(0, false));
+  EXPECT_EQ(TurningTip(10.25, 0).turnTo(30), Answer(0, false));
+  EXPECT_EQ(TurningTip(9.5, 0).turnTo(30), Answer(1, false));
+  EXPECT_EQ(TurningTip(10, 0.1).turnTo(30), Answer(1, false));
+  EXPECT_EQ(TurningTip(10, 0.35).turnTo(30), Answer(1, true));
+  EXPECT_EQ(TurningTip(10.25, 0.35).turnTo(30), Answer(1, true));
+  // Half of the step is right, and trusted with a thickness of its arcDeviation, 0.086.
+  for (const double thickness : {0.0, 0.08, 0.09}) {
+    const bool isTrusted = thickness > 0.086;
+    EXPECT_EQ(TurningTip(10, thickness).turnTo(15), Answer(1, isTrusted));
+    EXPECT_EQ(TurningTip(10.25, thickness).turnTo(15), Answer(1, isTrusted));
+    TurningTip away(9.5, thickness);
+    EXPECT_EQ(away.turnTo(15), Answer(0, isTrusted));
+    EXPECT_EQ(away.turnTo(30), Answer(0, isTrusted));
+  }
+}
+
+/// A capsule without a thickness, as a shape and as a line with a radius, over a cloth.
+TEST(TrustOfTypes, ACapsuleInAClothIsSeenInEachStep) {
+  Mesh cloth = sheet(20, 0, 0);
+  for (Vector3d& x : cloth.positions) x.z() = 0;
+  const Vector3d p(0.31, 0.43, 0), q(0.72, 0.57, 0);
+  constexpr double kRadius = 0.05;
+  for (const bool isShape : {true, false})
+    for (const Method method : {Method::Auto, Method::Continuous})
+      for (const double height : {0.06, 0.045, 0.01, -0.04}) {
+        SCOPED_TRACE(::testing::Message() << isShape << " " << height);
+        OctreeBasedCD collisions;
+        const GeometryId sheet = collisions.addTriangleMesh(cloth.positions, cloth.triangles);
+        const GeometryId tool =
+            isShape
+                ? collisions.addAnalyticalGeometry(Capsule{p, q, kRadius})
+                : collisions.addLineMesh(Positions{p, q}, std::vector<Segment>{{0, 1}}, kRadius);
+        collisions.addCollisionPair(sheet, tool, {.method = method});
+        collisions.setTransform(tool, Matrix3d::Identity(), {0, 0, height});
+        collisions.advance();
+        for (int step = 1; step <= 3; ++step) {
+          collisions.setTransform(tool, Matrix3d::Identity(), {0, 0, height - 0.001 * step});
+          collisions.detectCollision();
+          const CollisionData& data = collisions.collisionData(sheet, tool);
+          const bool apart = height > kRadius;
+          EXPECT_EQ(data.validity().startedApart, apart);
+          EXPECT_EQ(data.validity().trusted, apart);
+          EXPECT_EQ(data.validity().sideMayBeWrong, !apart);
+          double deepest = 0, time = 0;
+          const auto take = [&](const auto& contacts) {
+            for (const auto& contact : contacts)
+              if (contact.distance < deepest)
+                deepest = contact.distance, time = contact.timeOfImpact;
+          };
+          take(data.shape()), take(data.vertexTriangle()), take(data.triangleVertex());
+          take(data.edgeEdge());
+          const double depth = kRadius - std::abs(height - 0.001 * (step - 1));
+          EXPECT_NEAR(deepest, apart ? 0.0 : -depth, 1e-12);
+          EXPECT_EQ(time, 0.0);
+          collisions.advance();
+        }
+      }
+}
+
+}  // namespace
+}  // namespace palpate::testing
