@@ -132,6 +132,17 @@ void move(Random& random, Body& body, double most) {
   for (Vector3d& p : body.now) p += all + randomPoint(random, -0.2, 0.2) * most;
 }
 
+/// Moves everything to a coarse grid, where features touch, are parallel and move within planes.
+void snap(Body& body) {
+  const auto toGrid = [](Vector3d& p) { p = (8 * p).array().round().matrix() / 8; };
+  for (Positions* positions : {&body.before, &body.now, &body.geometry.positions})
+    for (Vector3d& p : *positions) toGrid(p);
+  if (!body.placed) return;
+  body.angle = 0;
+  body.pose.rotation = Matrix3d::Identity();
+  toGrid(body.pose.translation), toGrid(body.slide);
+}
+
 void endStep(Body& body) {
   if (body.placed) body.pose = body.poseAt(1);
   body.before = body.now;
@@ -244,6 +255,8 @@ PairSettings randomSettings(Random& random) {
 void runHistory(Random& random, int kindA, int kindB, std::map<std::string, Tally>& tallies) {
   Body a = randomBody(random, kindA), b = randomBody(random, kindB);
   const PairSettings settings = randomSettings(random);
+  const bool onGrid = random() % 4 == 0;
+  if (onGrid) snap(a), snap(b);
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
   const GeometryId idA = a.addTo(collisions), idB = b.addTo(collisions);
   try {
@@ -251,13 +264,14 @@ void runHistory(Random& random, int kindA, int kindB, std::map<std::string, Tall
   } catch (const Error&) {
     return;  // per-vertex radii by Continuous, Proximity without any distance
   }
-  const double most = std::pow(10.0, uniform(random, -4, -0.5));
+  const double most = onGrid ? 0.3 : std::pow(10.0, uniform(random, -4, -0.5));
   for (int step = 0; step < 4; ++step) {
     for (auto [body, id] : {std::pair(&a, idA), std::pair(&b, idB)}) {
       if (random() % 4 == 0 && !body->placed)  // a solver corrected it
         for (Vector3d& p : body->before) p += randomPoint(random, -0.01, 0.01);
       body->angle = 0, body->slide.setZero(), body->now = body->before;
       if (random() % 5 != 0) move(random, *body, most);
+      if (onGrid) snap(*body);
       if (body->placed) {
         const Pose end = body->poseAt(1);
         collisions.setTransform(id, body->pose.rotation, body->pose.translation, end.rotation,
@@ -334,7 +348,7 @@ TEST(TrustOfTypes, IsNeverGivenToAnAnswerThatMissesATouchOrHasAWrongSide) {
               << tally.right << " right, trusted " << tally.trusted << ", of these with contacts "
               << tally.withContacts << "\n";
   for (const auto& [name, sum] : sums) {
-    EXPECT_GT(sum.trusted, sum.right / 2);
+    EXPECT_GT(sum.trusted, sum.right / 3);
     EXPECT_GE(sum.withContacts, leastOf(50));
   }
 }
