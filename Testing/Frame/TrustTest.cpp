@@ -313,8 +313,9 @@ void runHistory(Random& random, int kindA, int kindB, std::map<std::string, Tall
       }
       for (const auto& [time, elements] : truth.touches) {
         EXPECT_GT(contacts, 0u);
-        if (settings.contacts == Contacts::All)
+        if (settings.contacts == Contacts::All) {
           EXPECT_TRUE(isReported(data, a, b, elements)) << "time " << time;
+        }
       }
       expectSides(data, a, b, byProximity);
     }
@@ -443,6 +444,34 @@ TEST(TrustOfTypes, ACapsuleInAClothIsSeenInEachStep) {
           collisions.advance();
         }
       }
+}
+
+/// Without thickness and radii. Something falls onto a line along y, and the normals are known.
+TEST(TrustOfTypes, NeedsASideWhereNothingHasAThickness) {
+  const auto fall = [](TestGeometry falling) {
+    const TestGeometry line{GeometryType::Lines, {{0, -1, 0}, {0, 1, 0}}, {}, {{0, 1}}};
+    const PairSettings settings{Method::Continuous, 0};
+    Positions end = falling.positions;
+    for (Vector3d& p : falling.positions) p.z() += 1;
+    for (Vector3d& p : end) p.z() -= 1;
+    const CollisionData data =
+        answer(settingsOf(Engine::Octree), falling, line, settings, end, line.positions);
+    const Validity& validity = data.validity();
+    EXPECT_TRUE(validity.startedApart);
+    EXPECT_EQ(data.vertexTriangle().size() + data.triangleVertex().size() + data.edgeEdge().size(),
+              1u);
+    for (const auto& c : data.vertexTriangle())
+      EXPECT_TRUE(!validity.trusted || c.normal.z() > 0.5) << c.normal.transpose();
+    for (const auto& c : data.edgeEdge())
+      EXPECT_TRUE(!validity.trusted || c.normal.z() > 0.5) << c.normal.transpose();
+    return validity.trusted;
+  };
+  EXPECT_TRUE(fall({GeometryType::Lines, {{-1, 0, 0}, {1, 0, 0}}, {}, {{0, 1}}}));
+  EXPECT_TRUE(fall({GeometryType::Lines, {{-1, 0.5, -0.5}, {1, 0.25, 0.5}}, {}, {{0, 1}}}));
+  fall({GeometryType::Lines, {{0, -0.5, 0}, {0, 0.5, 0}}, {}, {{0, 1}}});  // parallel
+  fall({GeometryType::Lines, {{0, -0.5, 0}, {0, 0.5, 1}}, {}, {{0, 1}}});  // in one plane
+  fall({GeometryType::Points, {{0, 0.25, 0}}, {}, {}});
+  fall({GeometryType::Points, {{0, 1, 0}}, {}, {}});  // onto the end
 }
 
 }  // namespace
