@@ -12,6 +12,7 @@
 #include "NarrowPhase/ElementBoxes.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/Intersection.h"
+#include "NarrowPhase/Meeting.h"
 #include "NarrowPhase/Piercing.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Queries/ElementsNearShape.h"
@@ -407,7 +408,9 @@ struct Frame::Job : CountedObject {
   /// Auto: finds intersections at the step's end.
   static void detectIntersections(Job& job, std::span<const ElementPair> pairs) {
     const MemoryScope memory(MemoryStage::NarrowPhase);
-    findIntersections(job.record->meshes(), pairs, job.intersections);
+    const MeshPair meshes = job.record->meshes();
+    findIntersections(meshes, pairs, job.intersections);
+    if (meshes.step.motion > 0.0) findCrossingsAtStart(meshes, pairs, job.intersections);
   }
 
   void findEarliest(const MeshPair& meshes, std::span<const ElementPair> pairs) {
@@ -708,6 +711,10 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   const MemoryScope memory(MemoryStage::Results);
   m_facts.clear();
   m_impacts.clear();
+  m_pierced.clear();
+  const bool byIntersection = record.plan.method == Method::Intersection;
+  m_piercingContacts.find(record.meshes(), byIntersection ? m_buffers : m_intersections, m_pierced);
+  (byIntersection ? m_buffers : m_intersections).push_back(&m_pierced);
   for (const auto* buffers : {&m_buffers, &m_intersections})
     for (const ContactBuffers* found : *buffers) {
       m_facts.add(found->facts);
@@ -724,6 +731,9 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   if (record.plan.startsIntersecting) m_facts.atStart = Meeting::Piercing;
   std::size_t preferredBuffers = 0;
   if (m_facts.startsPiercing() && record.plan.runsIntersection) {
+    m_leaving.clear();
+    m_piercingContacts.findAtStart(record.meshes(), m_intersections, m_leaving);
+    m_knownSides.apply(record.meshes(), m_intersections, m_leaving, m_buffers);
     preferredBuffers = m_intersections.size();
     m_buffers.insert(m_buffers.begin(), m_intersections.begin(), m_intersections.end());
   }
@@ -737,7 +747,7 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
   record.trust.finish(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan,
                       m_facts, nearby, record.meshes(), contents, m_impacts);
-  statistics.exactDecisions += m_impacts.exactDecisions;
+  statistics.exactDecisions += m_impacts.exactDecisions + m_pierced.exactDecisions;
   statistics.validityPairs += m_impacts.validityPairs;
   // After trust.finish(), which tests the triangles around every impact.
   if (record.pair.settings.contacts == Contacts::Distinct &&

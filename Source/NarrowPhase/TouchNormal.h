@@ -40,7 +40,7 @@ TouchNormal touchNormal(const Features<kind>&, std::uint32_t firstId, std::uint3
 inline void turnToSeparate(const Features<ImpactQuery::Kind::VertexTriangle>& of,
                            std::uint32_t vertex, std::uint32_t triangle,
                            VertexTriangleDistance& measured, std::size_t& exactDecisions) {
-  if (measured.distance > 0.0) return;
+  if (measured.distance != 0.0) return;
   const std::array<MeshFeature, 2> holders{
       MeshFeature{MeshFeature::Kind::Vertex, vertex},
       featureOf(of.second.topology, triangle, measured.feature)};
@@ -50,7 +50,7 @@ inline void turnToSeparate(const Features<ImpactQuery::Kind::VertexTriangle>& of
 inline void turnToSeparate(const Features<ImpactQuery::Kind::EdgeEdge>& of, std::uint32_t edgeA,
                            std::uint32_t edgeB, EdgeEdgeDistance& measured,
                            std::size_t& exactDecisions) {
-  if (measured.distance > 0.0) return;
+  if (measured.distance != 0.0) return;
   const std::array<MeshFeature, 2> holders{featureOf(of.first.topology, edgeA, measured.featureA),
                                            featureOf(of.second.topology, edgeB, measured.featureB)};
   measured.normal =
