@@ -318,11 +318,20 @@ void KnownSides::apply(const MeshPair& pair, std::span<ContactBuffers* const> at
   const bool drops = pair.settings.contacts == Contacts::Distinct;
   // Turns a contact, or returns true if it is dropped. ofB: the mesh of each vertex.
   const auto settle = [&](auto& contact, const std::array<bool, 4>& ofB) {
+    constexpr bool isOfVertex = requires { contact.vertex; };
     const Stencil vertices = stencil(contact);
     Opinion opinion = ask(m_atEnd, vertices, ofB, contact.normal);
     if (drops && opinion.isKnown) return true;
-    if (!opinion.isKnown && contact.timeOfImpact < 1.0)
+    if (!opinion.isKnown && contact.timeOfImpact < 1.0) {
       opinion = ask(m_atStart, vertices, ofB, contact.normal);
+      if (drops && opinion.isKnown) {
+        const Stencil alone{vertices.vertices, {isOfVertex ? 1.0 : 0.0, 0.0, 0.0, 0.0}};
+        const Opinion own = ask(m_atStart, alone, ofB, contact.normal);
+        const double rest = opinion.agreement - own.agreement;
+        if (!own.isKnown || own.agreement * rest < 0.0) return true;
+        opinion = own;
+      }
+    }
     if (opinion.agreement < 0.0) {
       contact.normal = -contact.normal;
       contact.distance = -contact.distance;

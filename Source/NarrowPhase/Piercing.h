@@ -70,8 +70,9 @@ class PiercingContacts {
 ///          contacts of these vertices, because Intersection's contact stands for them.
 ///          Contacts::All turns those that are on the wrong side: the normal is reversed and the
 ///          distance becomes negative.
-///          (2) An impact of vertices that are behind at the step's start and not at its end is
-///          turned if it is on the wrong side: they leave.
+///          (2) Of vertices that are behind at the step's start and not at its end, which leave:
+///          an impact on the wrong side is turned. Contacts::Distinct keeps those impacts only in
+///          which such a vertex meets a triangle, unless other vertices that leave disagree.
 class KnownSides {
  public:
   /// atEnd, atStart: Intersection's contacts.

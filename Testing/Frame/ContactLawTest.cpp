@@ -58,6 +58,7 @@ class Law {
         m_asked(settings.method),
         m_method(data.validity().method),
         m_timeTolerance(settings.timeTolerance),
+        m_distinct(settings.contacts == Contacts::Distinct),
         m_seen(seen),
         m_hasCylinder(hasCylinder) {}
 
@@ -179,9 +180,10 @@ class Law {
     }
   }
 
-  /// Auto, in a step that starts in intersection.
+  /// Auto, in a step that starts in intersection. Impacts, and with Contacts::All other contacts,
+  /// may have been turned.
   bool isOfIntersection(const VertexTriangleContact& c) const {
-    return c.distance < 0 && !hasRadii();
+    return c.distance < 0 && !hasRadii() && c.timeOfImpact == 1.0 && m_distinct;
   }
   bool hasRadii() const { return m_a.radius(0) > 0 || m_b.radius(0) > 0; }
 
@@ -265,6 +267,7 @@ class Law {
   const Side &m_a, &m_b;
   const Method m_asked, m_method;
   const double m_timeTolerance;
+  bool m_distinct;
   Seen& m_seen;
   const bool m_hasCylinder;
 };

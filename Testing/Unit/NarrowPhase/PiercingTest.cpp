@@ -190,7 +190,8 @@ TEST(Piercing, EdgesThatHaveCrossedHaveADepth) {
 TEST(Piercing, TheDepthIsThatOfTheNearestTriangleAround) {
   for (int seed = 0; seed < 200; ++seed) {
     const TriangleMesh flat = plate();
-    Vertices positions(flat.now.begin(), flat.now.end());
+    Vertices positions;
+    for (std::size_t v = 0; v < flat.now.size(); ++v) positions.push_back(flat.now[v]);
     for (std::size_t v = 0; v < positions.size(); ++v)
       positions[v].z() = 0.05 * (static_cast<double>((v * 7 + seed * 13) % 11) / 5 - 1);
     std::vector<Triangle> triangles(flat.topology.triangles.begin(), flat.topology.triangles.end());
