@@ -33,7 +33,6 @@ World::BodyId World::add(Body body, std::span<const Vector3d> positions, double 
   body.first = m_solver.add(positions, inverseMass);
   body.count = static_cast<std::uint32_t>(positions.size());
   m_bodies.push_back(std::move(body));
-  m_guardIds.push_back({});
   return m_bodies.size() - 1;
 }
 
@@ -107,32 +106,22 @@ void World::pin(BodyId body, const std::function<bool(const Vector3d&)>& holds) 
 
 void World::addPair(BodyId a, BodyId b, const PairSettings& settings, double gap) {
   m_detection.addCollisionPair(m_bodies[a].id, m_bodies[b].id, settings);
+  m_guard.setGuarded(m_bodies[a].id, m_bodies[b].id, false);
   m_pairs.push_back({a, b, gap});
 }
 
-GeometryId World::guarded(BodyId id) {
-  const Body& body = m_bodies[id];
-  if (!m_guardIds[id])
-    m_guardIds[id] = body.type == GeometryType::Lines
-                         ? m_guard.addLineMesh(positions(id), body.segments)
-                         : m_guard.addTriangleMesh(positions(id), body.triangles);
-  return *m_guardIds[id];
-}
-
 void World::addGuard(BodyId a, BodyId b) {
-  const GeometryId first = guarded(a), second = guarded(b);
-  m_guard.addCollisionPair(first, second);
+  m_guard.setGuarded(m_bodies[a].id, m_bodies[b].id, true);
 }
 
 void World::addRigid(BodyId body, std::uint32_t count) {
   std::vector<GuardedVertex> vertices(count);
-  for (std::uint32_t i = 0; i < count; ++i) vertices[i] = {guarded(body), i};
+  for (std::uint32_t i = 0; i < count; ++i) vertices[i] = {m_bodies[body].id, i};
   m_guard.addRigidGroup(vertices);
 }
 
 void World::disable(BodyId body, std::span<const std::uint32_t> triangles) {
   m_detection.setDisabledElements(m_bodies[body].id, triangles);
-  if (m_guardIds[body]) m_guard.setDisabledElements(*m_guardIds[body], triangles);
 }
 
 void World::place(BodyId id, const Eigen::Matrix3d& rotation, const Vector3d& translation) {
@@ -220,10 +209,19 @@ void World::solve(int iterations) {
 
 void World::hold() {
   const Timed timed(m_times.hold);
-  m_steps.clear();
+  passPositions();
+  m_times.held += m_guard.hold();
   for (BodyId id = 0; id < m_bodies.size(); ++id)
-    if (m_guardIds[id]) m_steps.push_back({*m_guardIds[id], before(id), positions(id)});
-  m_times.held += m_guard.hold(m_steps);
+    if (const Body& body = m_bodies[id]; body.count > 0 && body.rest.empty()) {
+      const std::span<const Vector3d> held = m_detection.positions(body.id);
+      std::copy(held.begin(), held.end(), positions(id).begin());
+    }
+}
+
+double World::fraction(BodyId body, std::uint32_t vertex) const {
+  for (const HeldVertex& held : m_guard.held())
+    if (held.geometry == m_bodies[body].id && held.vertex == vertex) return held.fraction;
+  return 1.0;
 }
 
 void World::commit() {

@@ -7,7 +7,6 @@
 #include <palpate/StepGuard.h>
 
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,7 +20,7 @@ namespace palpate::scenes {
 ///     world.detect();                // before and now, contacts as rows
 ///     world.solve(iterations);       // corrects now
 ///   }
-///   world.hold();                    // what would still pass through stays where it was
+///   world.hold();                    // what would still pass through stops before
 ///   world.commit();                  // ends the step
 class World {
  public:
@@ -50,8 +49,7 @@ class World {
     std::size_t held = 0;      ///< particles
   };
 
-  explicit World(int threads)
-      : m_detection(Settings{.threads = threads}), m_guard(Settings{.threads = threads}) {}
+  explicit World(int threads) : m_detection(Settings{.threads = threads}), m_guard(m_detection) {}
 
   BodyId addMesh(std::string name, const SceneMesh& mesh, double inverseMass);
   /// Rigid: place() moves it, its octree stays as it is.
@@ -69,12 +67,12 @@ class World {
   void addVolume(BodyId, double compliance);
   /// Vertices for which this holds stay at their places, or are moved by hand.
   void pin(BodyId, const std::function<bool(const Eigen::Vector3d&)>&);
-  /// The first vertices of a body move together: hold() moves all back or none.
+  /// The first vertices of a body make one fraction of their steps in hold().
   void addRigid(BodyId, std::uint32_t count);
 
   /// gap: L, the distance that the solver keeps.
   void addPair(BodyId a, BodyId b, const PairSettings&, double gap);
-  /// These never pass through each other: hold() prevents it.
+  /// The bodies of this pair never pass through each other: hold() prevents it.
   void addGuard(BodyId a, BodyId b);
   /// Disables these triangles, as where something pierced them. All others are enabled.
   void disable(BodyId, std::span<const std::uint32_t> triangles);
@@ -90,9 +88,8 @@ class World {
 
   std::span<Eigen::Vector3d> positions(BodyId);  ///< now
   std::span<const Eigen::Vector3d> before(BodyId) const;
-  bool wasHeld(std::uint32_t particle) const {
-    return m_solver.now[particle] == m_solver.before[particle];
-  }
+  /// The fraction of its step that the last hold() let a vertex make.
+  double fraction(BodyId, std::uint32_t vertex) const;
   /// Forces on a body in the last step, along the normals of its contacts.
   Eigen::Vector3d force(BodyId) const;
 
@@ -114,16 +111,13 @@ class World {
  private:
   BodyId add(Body, std::span<const Eigen::Vector3d> positions, double inverseMass);
   SolverVertices vertices(BodyId) const;
-  void passPositions();        ///< of all bodies that deform, to the detection
-  GeometryId guarded(BodyId);  ///< its id in the guard, to which it is added once
+  void passPositions();  ///< of all bodies that deform, to the detection
 
   Xpbd m_solver;
   OctreeBasedCD m_detection;
   StepGuard m_guard;
   std::vector<Body> m_bodies;
-  std::vector<std::optional<GeometryId>> m_guardIds;  ///< by body; none: not guarded
   std::vector<Pair> m_pairs;
-  std::vector<GuardedStep> m_steps;
   std::vector<ConstraintRow> m_rows;
   std::vector<std::size_t> m_rowPairs;
   std::vector<Eigen::Vector3d> m_forces;  ///< by body

@@ -112,7 +112,7 @@ class Suturing : public LiveScene {
         m_world.solve(kIterations);
       }
       m_world.hold();
-      if (!m_world.wasHeld(0)) m_time = m_next;  // the hand waits for what holds the needle
+      m_time += m_world.fraction(m_thread, 0) * (m_next - m_time);  // the hand waits
       m_world.commit();
     }
     m_steps.push_back(line());

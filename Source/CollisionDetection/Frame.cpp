@@ -17,6 +17,7 @@
 #include "NarrowPhase/StepCheck.h"
 #include "Queries/ElementsNearShape.h"
 #include "Shapes/ShapeContacts.h"
+#include "Shapes/ShapeNearings.h"
 
 #include <algorithm>
 #include <atomic>
@@ -318,6 +319,9 @@ struct Frame::Job : CountedObject {
   void detectShape() {
     const MeshPair meshes = record->meshes();
     if (meshes.isShapePair()) {
+      if (meshes.keepsApart)
+        return findShapePairNearing(*meshes.shapeOfA, *meshes.shapeOfB,
+                                    meshes.settings.timeTolerance, contacts);
       findShapePair(*meshes.shapeOfA, *meshes.shapeOfB, meshes.settings, contacts);
       if (meshes.settings.earliestTimeOnly) takeEarliest(*record, contacts);
       return;
@@ -327,7 +331,11 @@ struct Frame::Job : CountedObject {
                      meshes.maxFeatureDistance(), queries, elements);
     const MemoryScope memory(MemoryStage::NarrowPhase);
     Stopwatch watch;
-    findShapeContacts(meshes.mesh(), meshes.shape(), meshes.settings, elements, contacts);
+    if (meshes.keepsApart)
+      findShapeNearings(meshes.mesh(), meshes.shape(), meshes.settings.timeTolerance, elements,
+                        contacts);
+    else
+      findShapeContacts(meshes.mesh(), meshes.shape(), meshes.settings, elements, contacts);
     if (meshes.settings.earliestTimeOnly) takeEarliest(*record, contacts);
     narrowMilliseconds += watch.lap();
   }
@@ -745,8 +753,9 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   describeField(record, contents);
   contents.earliestTimeOfImpact = record.earliest.load();
   if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
-  record.trust.finish(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan,
-                      m_facts, nearby, record.meshes(), contents, m_impacts);
+  if (!record.guarded)
+    record.trust.finish(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan,
+                        m_facts, nearby, record.meshes(), contents, m_impacts);
   statistics.exactDecisions += m_impacts.exactDecisions + m_pierced.exactDecisions;
   statistics.validityPairs += m_impacts.validityPairs;
   // After trust.finish(), which tests the triangles around every impact.

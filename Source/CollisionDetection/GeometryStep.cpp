@@ -114,6 +114,12 @@ void GeometryStep::setTransform(TriangleMesh& mesh, PlacedShape* shape,
   if (before || followsNow) std::swap(shape->before, *m_spareBefore);
 }
 
+void GeometryStep::restoreNow(TriangleMesh& mesh, PlacedShape* shape,
+                              const Positions& now) noexcept {
+  mesh.now = now;
+  if (shape) shape->now.place(shape->analytical, now.transform());  // into its own memory
+}
+
 void GeometryStep::advance(TriangleMesh& mesh, PlacedShape* shape) noexcept {
   // Both are placements of one shape, so that the assignment reuses the memory.
   if (shape && !mesh.before.isSameAs(mesh.now)) shape->before = shape->now;

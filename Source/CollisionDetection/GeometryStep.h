@@ -47,6 +47,9 @@ class GeometryStep {
   /// The end `now` becomes `before`.
   void advance(TriangleMesh&, PlacedShape* shape) noexcept;
 
+  /// Puts the end `now` back to what it was in this step, with its revisions.
+  void restoreNow(TriangleMesh&, PlacedShape*, const Positions& now) noexcept;
+
   void releaseMemory();  ///< frees arrays that only the next calls need
 
   /// A detection has used the end `now`.

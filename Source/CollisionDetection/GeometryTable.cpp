@@ -165,6 +165,11 @@ void GeometryTable::setTransform(GeometryId id, const std::optional<RigidTransfo
   ++m_state;
 }
 
+void GeometryTable::restoreNow(Geometry& geometry, const Positions& now) noexcept {
+  geometry.step.restoreNow(geometry.mesh, shapeOf(geometry), now);
+  ++m_state;
+}
+
 void GeometryTable::advance() noexcept {
   ++m_stepNumber;
   ++m_state;

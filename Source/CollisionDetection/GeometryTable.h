@@ -45,6 +45,8 @@ class GeometryTable {
 
   void setTransform(GeometryId, const std::optional<RigidTransform>& before,
                     const RigidTransform& now);
+  /// Puts the positions and the transform now back to those of earlier in this step.
+  void restoreNow(Geometry&, const Positions& now) noexcept;
   void advance() noexcept;
   std::uint64_t stepNumber() const { return m_stepNumber; }  ///< counts advance()
   /// A number for the present state of all positions, transforms, elements and shapes; not 0.

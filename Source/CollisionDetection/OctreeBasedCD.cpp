@@ -7,6 +7,7 @@
 #include "CollisionDetection/Order.h"
 #include "CollisionDetection/PairTable.h"
 #include "CollisionDetection/SettingsCheck.h"
+#include "CollisionDetection/StepSource.h"
 #include "Core/Stopwatch.h"
 #include "Core/Assert.h"
 #include "Core/FloatingPoint.h"
@@ -56,6 +57,7 @@ void checkCandidates(const PairRecord& record) {
 struct OctreeBasedCD::Implementation {
   class ChangeGuard;
   class QuerySource;
+  class GuardSource;
 
   explicit Implementation(const Settings& newSettings);
   ~Implementation();
@@ -73,6 +75,7 @@ struct OctreeBasedCD::Implementation {
   std::vector<PairRecord*> selectedPairs;
   AuditRecord audit;
   std::shared_ptr<QuerySource> querySource;
+  std::shared_ptr<GuardSource> guardSource;  ///< null before there is a StepGuard
   LatestSnapshot latestSnapshot;
   /// geometries.state() for which all octrees hold; 0: for none.
   std::atomic<std::uint64_t> octreesState = 0;
@@ -116,14 +119,18 @@ struct OctreeBasedCD::Implementation {
   }
 
   /// Updates the octrees. The next frame's statistics include updates for queries.
-  /// explicitly: the user called update(). The statistics are published at once, and count as
-  /// rebuilt or refitted only the trees that this call changed.
+  /// records: pairs that are planned. explicitly: the user called update(). The statistics are
+  /// published at once, and count as rebuilt or refitted only the trees that this call changed.
   /// detecting: plans include the motion of all pairs. Otherwise they include only the motion on
   /// which candidates depend.
   void update(bool explicitly = false, bool detecting = false) {
+    update(pairs.records(), explicitly, detecting,
+           markSkippedOctrees(detecting && octreesState != geometries.state()));
+  }
+  void update(std::span<const std::unique_ptr<PairRecord>> records, bool explicitly, bool detecting,
+              bool skips) {
     const MemoryScope memory(MemoryStage::Octrees);
     using Update = LooseOctree::Update;
-    const bool skips = markSkippedOctrees(detecting && octreesState != geometries.state());
     octreesState = 0;
     state->trees.clear();  // they are invalid until the update is complete
     if (!hasUpdates) updates = {};
@@ -134,7 +141,7 @@ struct OctreeBasedCD::Implementation {
       geometry->tree.boxMilliseconds = geometry->tree.octreeMilliseconds = 0;
     }
     Stopwatch watch;
-    for (const auto& record : pairs.records()) {
+    for (const auto& record : records) {
       const Method method = record->pair.settings.method;
       const bool moves = (detecting || method == Method::Auto) && method != Method::Proxy &&
                          method != Method::DistanceField;
@@ -263,6 +270,24 @@ struct OctreeBasedCD::Implementation {
     return built;
   }
 
+  /// For a StepGuard. Results and statistics of the table's pairs stay as they are.
+  void detect(const GuardedPairs& guarded) {
+    const MemoryScope memory(MemoryStage::Pairs);
+    update(guarded, false, true, markSkippedOctrees(false));
+    FrameStatistics unused;
+    selectedPairs.clear();
+    for (const auto& record : guarded)
+      if (record->collides() && !record->dataVersion.isCurrent(record->state()))
+        selectedPairs.push_back(record.get());
+    Settings withoutCandidates = settings;
+    withoutCandidates.keepCandidates = false;
+    if (settings.engine == Engine::Octree)
+      frame.detect(selectedPairs, withoutCandidates, threads, unused);
+    else
+      frame.detectByBruteForce(selectedPairs, withoutCandidates, unused);
+    for (PairRecord* record : selectedPairs) record->commit();
+  }
+
   void detect() {
     const MemoryScope memory(MemoryStage::Pairs);
     update(false, true);
@@ -315,8 +340,9 @@ namespace {
 /// needs.
 class OctreeBasedCD::Implementation::ChangeGuard {
  public:
-  explicit ChangeGuard(const std::unique_ptr<Implementation>& all)
-      : m_all(all.get()), m_memory(m_all ? m_all->budget : nullptr, MemoryStage::Geometries) {
+  explicit ChangeGuard(const std::unique_ptr<Implementation>& all) : ChangeGuard(all.get()) {}
+  explicit ChangeGuard(Implementation* all)
+      : m_all(all), m_memory(m_all ? m_all->budget : nullptr, MemoryStage::Geometries) {
     if (!m_all) throwMovedFrom();
     if (m_all->isBusy.exchange(true, std::memory_order_relaxed)) throwBusy();
   }
@@ -379,7 +405,35 @@ OctreeBasedCD::Implementation::Implementation(const Settings& newSettings)
   updateOctreeView();
 }
 
-OctreeBasedCD::Implementation::~Implementation() { querySource->close(); }
+/// The step of an OctreeBasedCD, for guards that may outlive it.
+class OctreeBasedCD::Implementation::GuardSource : public StepSource {
+ public:
+  explicit GuardSource(Implementation& all) : m_all(&all) {}
+  void close() { m_all = nullptr; }  ///< called when the OctreeBasedCD is destroyed
+
+  void change(const std::function<void()>& call) override {
+    read();
+    const ChangeGuard all(m_all);
+    all->withinLimit(call);
+  }
+  GeometryTable& geometries() const override { return read().geometries; }
+  const PairTable& pairs() const override { return read().pairs; }
+  const Threads& threads() const override { return read().threads; }
+  void detect(const GuardedPairs& guarded) override { read().detect(guarded); }
+
+ private:
+  Implementation& read() const {
+    if (!m_all)
+      throw Error(ErrorCode::InvalidCall, "the OctreeBasedCD of this StepGuard was destroyed");
+    return *m_all;
+  }
+  Implementation* m_all;
+};
+
+OctreeBasedCD::Implementation::~Implementation() {
+  querySource->close();
+  if (guardSource) guardSource->close();
+}
 
 void OctreeBasedCD::Implementation::releaseMemory() {
   frame = Frame();
@@ -544,6 +598,17 @@ TetrahedralSurface OctreeBasedCD::surface(GeometryId geometry) const {
   const Geometry& solid = read().geometries.at(geometry);
   checkMeshType(solid, true, "surface() is for tetrahedral meshes");
   return {solid.solid->topology.surface, solid.solid->topology.surfaceOwner};
+}
+
+Pose OctreeBasedCD::transform(GeometryId geometry) const {
+  const RigidTransform& now = read().geometries.at(geometry).mesh.now.transform();
+  return {now.rotation, now.translation};
+}
+
+std::shared_ptr<StepSource> OctreeBasedCD::stepSource() {
+  const Implementation::ChangeGuard all(m_implementation);
+  if (!all->guardSource) all->guardSource = std::make_shared<Implementation::GuardSource>(*all);
+  return all->guardSource;
 }
 
 void OctreeBasedCD::setCollisionFilter(GeometryId geometry, const CollisionFilter& filter) {

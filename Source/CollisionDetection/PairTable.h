@@ -44,17 +44,19 @@ struct PairRecord : CountedObject {
     PairSettings settings = pair.settings;
     settings.method = plan.method;
     if (settings.earliestTimeOnly) settings.contacts = Contacts::All;
+    const PairRecord& filters = guarded ? *guarded : *this;
     return {a->mesh,
             b->mesh,
             settings,
             floats,
             plan.step,
-            settings.restDistance > 0.0 ? &nearAtRest : nullptr,
-            predicate ? &predicate : nullptr,
+            settings.restDistance > 0.0 ? &filters.nearAtRest : nullptr,
+            filters.predicate ? &filters.predicate : nullptr,
             a->shape ? &*a->shape : nullptr,
             b->shape ? &*b->shape : nullptr,
             usesField() ? body().field.get() : nullptr,
-            usesField() ? &body().mesh : nullptr};
+            usesField() ? &body().mesh : nullptr,
+            guarded != nullptr};
   }
   /// Whether a distance field answers in this frame.
   bool usesField() const { return plan.method == Method::DistanceField; }
@@ -95,6 +97,8 @@ struct PairRecord : CountedObject {
   /// Whether stored boxes may enclose the whole step though this pair's method needs only its end.
   bool hasWiderBoxes() const { return !plan.swept() && (a->tree.isSwept() || b->tree.isSwept()); }
 
+  /// Of a StepGuard: the pair that it guards, whose filters apply. Null: a pair of the table.
+  const PairRecord* guarded = nullptr;
   std::size_t index = 0;  ///< in the table
   Revision settingsRevision;
   CollisionData data;  ///< of the last detection that was completed

@@ -11,6 +11,7 @@
 #include "NarrowPhase/StepCheck.h"
 #include "NarrowPhase/TouchNormal.h"
 #include "Shapes/ShapeContacts.h"
+#include "Shapes/ShapeNearings.h"
 
 #include <algorithm>
 #include <numeric>
@@ -352,6 +353,11 @@ FeatureLists everyFeature(const MeshPair& pair) {
 
 void findContactsByBruteForce(const MeshPair& pair, const FeatureLists& features,
                               ContactBuffers& out) {
+  if (pair.keepsApart && pair.isShapePair())
+    return findShapePairNearing(*pair.shapeOfA, *pair.shapeOfB, pair.settings.timeTolerance, out);
+  if (pair.keepsApart && pair.hasShape())
+    return findShapeNearings(pair.mesh(), pair.shape(), pair.settings.timeTolerance,
+                             features.trianglesOfA, out);
   if (pair.isShapePair()) return findShapePair(*pair.shapeOfA, *pair.shapeOfB, pair.settings, out);
   if (pair.hasShape())
     return findShapeContacts(pair.mesh(), pair.shape(), pair.settings, features.trianglesOfA, out);

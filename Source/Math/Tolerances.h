@@ -106,6 +106,20 @@ constexpr double kTouchAngle = 0x1p-20;
 /// L: shorter vectors are scaled up before they are interpolated in time.
 constexpr double kTinyLength = 0x1p-500;
 
+/// Relative to the largest coordinate difference and the radii: how much nearer than before the
+/// step findNearing() lets features come that begin within their radii. findApproach() reports
+/// nothing before features have come nearer by this much less kApproachError.
+constexpr double kNearingSlack = 0x1p-33;
+/// The same in time tolerances, relative to the motion: an impact may be reported one of them too
+/// early, and one more covers the error of the motion.
+constexpr double kNearingTolerances = 4;
+/// Segments whose radius varies are divided into this many pieces of one radius each where they
+/// begin within their largest radius. Any number will do; a larger one is less conservative.
+constexpr int kTaperPieces = 16;
+/// Most times at which findNearing() measures such segments. Any number will do; a larger one lets
+/// them move further along a surface.
+constexpr int kMostClearances = 32;
+
 // ---- Shapes (Shapes, Queries/ElementsNearShape.cpp) ----
 
 /// Weight on an edge: the width to which its point nearest to a shape is bracketed. A point this

@@ -8,6 +8,7 @@
 #include "Math/ClosestPoint.h"
 #include "Math/ImpactFilter.h"
 #include "Math/MotionBound.h"
+#include "Math/Nearing.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
@@ -82,7 +83,7 @@ void forEachLikelyPair(const MeshPair& pair, std::span<const ElementPair> candid
   findFeaturePairs(pair.a.topology, pair.b.topology, pair.floats, candidates, pairs);
   // An early exit: f rejects these pairs as well. It is not taken where validity needs the facts of
   // all feature pairs.
-  if (pair.nearAtRest && pair.step.motion == 0.0)
+  if (pair.nearAtRest && !pair.keepsApart && pair.step.motion == 0.0)
     std::erase_if(pairs.edgeEdge, [&](const FeaturePair& edges) {
       return areNearAtRest(pair, pair.a.topology.edges[edges.a], pair.b.topology.edges[edges.b]);
     });
@@ -106,7 +107,10 @@ class ContactFinder {
   bool operator()(const Features<kind>& features, std::uint32_t firstId, std::uint32_t secondId,
                   bool swapped) {
     const ImpactQuery query = features.query(firstId, secondId);
-    const ImpactResult answer = findImpact(query, m_settings);
+    const ImpactResult answer =
+        m_pair.keepsApart ? findNearing(query, radiiOf(m_pair, features, firstId, secondId),
+                                        m_settings.timeTolerance)
+                          : findImpact(query, m_settings);
     m_out.exactDecisions += answer.exact;
     return answer.impact && boxesMeet(query, m_settings.minimumDistance) &&
            add(features, firstId, secondId, swapped, query, answer.time, true);
@@ -169,6 +173,21 @@ class ContactFinder {
   }
 
  private:
+  /// The radii with which features keep apart. Features that are near at rest have none, because
+  /// the surfaces of a thread overlap there.
+  template <Kind kind>
+  static FeatureRadii radiiOf(const MeshPair& pair, const Features<kind>& features,
+                              std::uint32_t firstId, std::uint32_t secondId) {
+    const auto ids = features.vertices(firstId, secondId);
+    constexpr std::size_t kSecond = kind == Kind::VertexTriangle ? 1 : 2;
+    if (areNearAtRest(pair, std::span(ids).template first<kSecond>(),
+                      std::span(ids).template last<4 - kSecond>()))
+      return {};
+    FeatureRadii radii;
+    for (int i = 0; i < 4; ++i) radii[i] = features.meshOf(i).radius(ids[i]);
+    return radii;
+  }
+
   /// The closest points at an impact. p: positionsAt(). Features that touch when the step begins
   /// may be apart there by rounding; they are measured where they are.
   template <class Measure>

@@ -104,7 +104,9 @@ class Surface {
 bool rejectsVertex(const MeshPair& pair, std::uint32_t vertex, std::uint32_t triangle,
                    bool swapped) {
   const TriangleMesh& mesh = swapped ? pair.a : pair.b;
-  if (areNearAtRest(pair, std::array{vertex}, mesh.topology.triangles[triangle])) return true;
+  if (!pair.keepsApart &&
+      areNearAtRest(pair, std::array{vertex}, mesh.topology.triangles[triangle]))
+    return true;
   if (!pair.predicate) return false;
   using Kind = ContactFeatures::Kind;
   const std::array<std::uint32_t, 2> v{vertex, vertex}, t{triangle, triangle};
@@ -115,7 +117,7 @@ bool rejectsVertex(const MeshPair& pair, std::uint32_t vertex, std::uint32_t tri
 
 bool rejectsEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB) {
   const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
-  return areNearAtRest(pair, p, q) ||
+  return (!pair.keepsApart && areNearAtRest(pair, p, q)) ||
          (pair.predicate && !(*pair.predicate)({ContactFeatures::Kind::EdgeEdge, p, q}));
 }
 

@@ -54,6 +54,9 @@ struct MeshPair {
   /// Method::DistanceField: the field, and the mesh of its geometry, whose transform places it.
   const DistanceField* field = nullptr;
   const TriangleMesh* fieldMesh = nullptr;
+  /// For a StepGuard: Continuous reports features with radii, and elements and shapes, that come
+  /// nearer than findNearing() and findShapeNearings() let them.
+  bool keepsApart = false;
   double thicknessAtEnd() const { return settings.thickness + step.extraThickness; }
   /// L: features whose distance without radii is larger than this are no contacts.
   double maxFeatureDistance() const {

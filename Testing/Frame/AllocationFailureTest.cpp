@@ -382,30 +382,35 @@ TEST_P(AllocationFailure, LeavesTheStepGuardUnchanged) {
   bool threw = true;
   for (std::size_t n = 1; threw; ++n) {
     SCOPED_TRACE("allocation " + std::to_string(n));
-    StepGuard guard(settingsOf(Engine::Octree, GetParam())), unfailed;
-    std::array<GeometryId, 2> ids{};
-    for (StepGuard* each : {&guard, &unfailed}) {
-      ids = {each->addTriangleMesh(body.positions, body.triangles),
-             each->addTriangleMesh(floor.positions, floor.triangles)};
-      each->addCollisionPair(ids[0], ids[1]);
+    OctreeBasedCD collisions(settingsOf(Engine::Octree, GetParam())), unfailed;
+    StepGuard guard(collisions), other(unfailed);
+    for (OctreeBasedCD* each : {&collisions, &unfailed}) {
+      each->addTriangleMesh(body.positions, body.triangles);
+      each->addTriangleMesh(floor.positions, floor.triangles);
+      each->addCollisionPair(GeometryId{0}, GeometryId{1});
+      each->setPositions(GeometryId{0}, body.positions, bodyNow);
+      each->setPositions(GeometryId{1}, floor.positions, floorNow);
     }
-    Positions a = bodyNow, b = floorNow, sameA = bodyNow;
+    const auto ends = [](const OctreeBasedCD& each) {
+      std::vector<Positions> positions;
+      for (const GeometryId id : {GeometryId{0}, GeometryId{1}})
+        positions.emplace_back(each.positions(id).begin(), each.positions(id).end());
+      return positions;
+    };
+    threw = false;
     FailingAllocation::arm(n);
     try {
-      guard.hold(std::array{GuardedStep{ids[0], body.positions, a},
-                            GuardedStep{ids[1], floor.positions, b}});
+      guard.hold();
     } catch (const std::bad_alloc&) {
+      threw = true;
     }
     FailingAllocation::disarm();
-    threw = a == bodyNow && b == floorNow;
     if (!threw) break;
     ++failures;
     ASSERT_TRUE(guard.held().empty());
-    // The second geometry is not set: it is where it was added, not where the failed call moved it.
-    a = bodyNow;
-    guard.hold(std::array{GuardedStep{ids[0], body.positions, a}});
-    unfailed.hold(std::array{GuardedStep{ids[0], body.positions, sameA}});
-    ASSERT_EQ(a, sameA);
+    ASSERT_EQ(ends(collisions), (std::vector<Positions>{bodyNow, floorNow}));
+    ASSERT_EQ(guard.hold(), other.hold());
+    ASSERT_EQ(ends(collisions), ends(unfailed));
   }
   EXPECT_GT(failures, 20u);
 }

@@ -25,6 +25,8 @@
 
 namespace palpate {
 
+class StepSource;
+
 /// A pair of geometries that is tested in each frame, with its settings.
 struct CollisionPair {
   GeometryId a, b;
@@ -222,6 +224,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   void setTransform(GeometryId, const Eigen::Matrix3d& rotationBefore,
                     const Eigen::Vector3d& translationBefore, const Eigen::Matrix3d& rotation,
                     const Eigen::Vector3d& translation);
+  /// The pose now; the identity if setTransform() has not placed the geometry.
+  Pose transform(GeometryId) const;
   /// Sets which geometries this one collides with, and from which sides. Two geometries collide
   /// only if the mask of each contains a group of the other. A pair that does not collide has no
   /// contacts, no candidates and no cost, and is not trusted.
@@ -376,6 +380,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   CollisionProblem problem() const;
 
  private:
+  friend class StepGuard;
+  std::shared_ptr<StepSource> stepSource();
   using BatchFunction = void (*)(void*, const CollisionPair&, std::span<const ElementPair>);
   /// only: the pair, or null for every pair.
   void forEachCandidateBatch(const CollisionPair* only, BatchFunction, void* function);

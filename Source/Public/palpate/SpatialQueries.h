@@ -19,7 +19,6 @@
 
 namespace palpate {
 
-inline constexpr std::uint32_t kNoElement = 0xffffffff;
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// A point of a geometry's surface.

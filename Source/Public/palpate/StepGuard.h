@@ -2,10 +2,7 @@
 
 #include <palpate/Error.h>
 #include <palpate/Export.h>
-#include <palpate/Settings.h>
 #include <palpate/Types.h>
-
-#include <Eigen/Core>
 
 #include <cstddef>
 #include <cstdint>
@@ -14,134 +11,127 @@
 
 namespace palpate {
 
-/// The step of one geometry, for StepGuard::hold(). Each vertex moves in a straight line from
-/// `before` to `now`.
-struct GuardedStep {
-  GeometryId geometry;
-  std::span<const Eigen::Vector3d> before;  ///< L, one for each vertex
-  std::span<Eigen::Vector3d> now;           ///< L, one for each vertex; hold() may change it
-};
+class OctreeBasedCD;
 
-/// A vertex of one of the geometries of a StepGuard.
+/// A vertex of a geometry of an OctreeBasedCD. kNoElement: the whole geometry.
 struct GuardedVertex {
   GeometryId geometry;
-  std::uint32_t vertex;
+  std::uint32_t vertex = kNoElement;
   friend bool operator==(const GuardedVertex&, const GuardedVertex&) = default;
   friend auto operator<=>(const GuardedVertex&, const GuardedVertex&) = default;
 };
 
+/// A vertex that StepGuard::hold() did not let reach its `now`. kNoElement: a geometry that moves
+/// by its transform, as a whole.
+struct HeldVertex {
+  GeometryId geometry;
+  std::uint32_t vertex;
+  double fraction;  ///< of its step, in [0, 1)
+  friend bool operator==(const HeldVertex&, const HeldVertex&) = default;
+};
+
 /// Prevents geometries from passing through each other at the end of a solver's step. A solver
 /// meets constraints one after another, so that an impact may remain in its step. The function
-/// hold() finds features that touch within the step. It moves their vertices from `now` back to
-/// `before`, until no features touch.
+/// hold() shortens the steps of vertices, and of placed bodies, until nothing touches within the
+/// step.
 ///
-///   StepGuard guard;
-///   const GeometryId organ = guard.addTriangleMesh(positions, triangles);
-///   const GeometryId thread = guard.addLineMesh(line, segments);
-///   guard.addCollisionPair(organ, thread);
-///   guard.addCollisionPair(thread, thread);
+///   OctreeBasedCD collisions;   // with its geometries and pairs
+///   StepGuard guard(collisions);
 ///   // after the solver's last correction of a step:
-///   const std::array steps{GuardedStep{organ, before, now},
-///                          GuardedStep{thread, lineBefore, lineNow}};
-///   guard.hold(steps);
+///   collisions.setPositions(organ, corrected);
+///   collisions.setTransform(tool, rotation, translation);
+///   guard.hold();
+///   // collisions.positions(organ) and collisions.transform(tool) are to be used from here on
+///   collisions.advance();
 ///
-/// Features  a vertex and a triangle, or two edges, as in Method::Continuous without a thickness;
-///           for a geometry with itself those without a common vertex. Radii have no effect: lines
-///           are their centre lines, points are their centres. The surfaces of lines and points may
-///           therefore overlap after hold(), by less than the sum of their radii. Features that
-///           touch only at the first or the last moment of the step touch.
-/// Laws      (1) after hold() no features of the given pairs touch within the step. This is decided
-///           exactly on the given doubles.
-///           (2) after hold() each vertex is exactly at `before` or exactly at the `now` that the
-///           solver gave.
-///           (3) if the next `before` is this `now`, the next step starts without a touch.
-///           (4) if hold() moves n vertices back, it needs at most n + 1 rounds: each round except
-///           the last moves at least one vertex back, and no vertex moves back twice.
+/// Parts     A vertex is a part, and so is a geometry that setTransform() moves in the step, and a
+///           rigid group. A part makes a fraction of its step: a vertex ends at before + fraction *
+///           (now - before), rounded, and exactly at `now` for 1. The translation of a placed
+///           geometry changes likewise. Its rotation is the normalised interpolation of the
+///           quaternions, so that it stays rigid.
+/// Features  all pairs of the OctreeBasedCD are guarded, with its filters, predicates, restDistance
+///           and disabled elements, whatever their method and thickness. A vertex and a triangle,
+///           or two edges, touch as in Method::Continuous with thickness 0, also at the first or
+///           last moment only. Features of one geometry with a common vertex never touch.
+/// Radii     lines and points with a radius, and shapes, touch where the surfaces of their radii
+///           or the shape do. A segment whose radius varies counts with its largest radius, or if
+///           it begins nearer than that, with the radii of 16 pieces.
+/// Laws      After hold(), for the step from `before` to the positions now, as Continuous moves it:
+///           (1) features without radii do not touch. This is decided exactly on the doubles.
+///           (2) features with radii, and elements and shapes, come no nearer than their radii, or
+///           than where they began if that is nearer, less 2^-33 of their largest coordinate
+///           difference and radius and 2^-38 of their motion. For shapes this holds up to their
+///           own error (Docs/Accuracy.md).
+///           (3) a part that would touch nothing makes its whole step, unless shortening the
+///           step of another one brings that into its way.
+///           (4) of a touch, only parts that approach are shortened: by their normal motion, so
+///           that 1/8 of the room in front of them is left. What moves away or along is free. If
+///           that does not help in 8 rounds, all parts that are connected by touches are shortened
+///           by one factor: to 7/8 of the time of the first touch.
+///           (5) parts of one connected component do not change those of another one. Parts that
+///           are at rest or fixed do not connect others.
+///           (6) a part that moves keeps a positive fraction, unless less than rounding is left
+///           between it and what it would touch.
+///           (7) a second call changes nothing.
+/// Start     Features that touch when the step begins are a fault, except if they certainly part:
+///           if they are on two sides of a plane then, and strictly so at the step's end.
+///           Features with radii, and spheres and capsules, may overlap when the step begins, and
+///           come no nearer. A box, hull, cylinder or turning plane must not: no direction is
+///           known in which that can be proven.
 /// Limits    surfaces that cross already at `before` stay as they are: only features that touch
-///           count. Method::Intersection and Validity::startedApart find such surfaces. Analytical
-///           geometries and transforms are not guarded: add a tool as a mesh, with its vertices at
-///           both ends of the step.
-/// Cost      each round is one detection by Method::Continuous of the pairs whose positions changed
-///           since the round before, with octrees that belong to the guard. A geometry that you do
-///           not pass to hold() costs nothing. Steady steps allocate nothing, except for integers
-///           of exact arithmetic (Docs/Guarantees.md, "Memory").
-/// Order     results depend neither on the number of threads nor on the order of the steps.
+///           count. Method::Intersection and Validity::startedApart find such surfaces.
+/// Cost      each round is one detection of the pairs whose positions changed since the round
+///           before, with the octrees of the OctreeBasedCD. A step without a touch takes one. A
+///           component takes at most 13 rounds after it was last joined by another part, if it is
+///           held at all; components take theirs at the same time. Steady steps allocate nothing,
+///           except for integers of exact arithmetic (Docs/Guarantees.md, "Memory").
+/// Order     results depend neither on the number of threads nor on the order of calls.
 /// Errors    every function throws palpate::Error for invalid data, and then changes neither the
-///           guard nor the caller's positions. Every function that takes a GeometryId throws
-///           UnknownGeometry. After a move every function except assignment and destruction throws
-///           InvalidCall.
-/// Threads   use an object from one thread at a time. Two objects share nothing but an executor.
+///           guard nor the OctreeBasedCD. Every function that takes a GeometryId throws
+///           UnknownGeometry. After a move, and once the OctreeBasedCD was destroyed, every
+///           function except assignment and destruction throws InvalidCall.
+/// Threads   hold() counts as a call of the OctreeBasedCD that changes it.
 class PALPATE_EXPORT StepGuard {
  public:
-  /// settings: those of the detections; held vertices do not depend on them.
-  /// Errors   InvalidSettings.
-  explicit StepGuard(const Settings& = {});
+  /// The OctreeBasedCD may be moved, and may be destroyed before the guard.
+  explicit StepGuard(OctreeBasedCD&);
   StepGuard(StepGuard&&) noexcept;
   StepGuard& operator=(StepGuard&&) noexcept;
   ~StepGuard();
 
-  // These functions add geometries to the guard, which has ids of its own. Their parameters and
-  // errors are those of the functions of OctreeBasedCD with these names.
-
-  GeometryId addTriangleMesh(std::span<const Eigen::Vector3d> positions, std::span<const Triangle>);
-  /// The guard holds the surface. A vertex that belongs to no face of the surface never moves back
-  /// on its own.
-  GeometryId addTetrahedralMesh(std::span<const Eigen::Vector3d> positions,
-                                std::span<const Tetrahedron>);
-  GeometryId addLineMesh(std::span<const Eigen::Vector3d> positions, std::span<const Segment>);
-  GeometryId addPointSet(std::span<const Eigen::Vector3d> positions);
-  /// These set a new topology, as after a cut, with the errors of OctreeBasedCD. Vertices that stay
-  /// keep their groups and stay fixed; new vertices are free.
-  void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
-                    std::span<const Triangle>);
-  void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
-                     std::span<const Tetrahedron>);
-  /// Removes a geometry and its pairs.
-  void removeGeometry(GeometryId);
-
-  /// The two geometries must not pass through each other. a == b: the geometry must not pass
-  /// through itself.
+  /// Whether features of this pair, in either order, must not touch. True for every pair at first.
   ///
-  /// Errors   DuplicatePair.
-  void addCollisionPair(GeometryId a, GeometryId b);
-  void removeCollisionPair(GeometryId a, GeometryId b);  ///< in either order; throws UnknownPair
-  /// Disables these triangles, segments or points and enables all others. Other geometries may pass
-  /// through disabled elements, as where a needle pierced. A vertex or edge is enabled while an
-  /// enabled element holds it.
-  ///
-  /// Errors   IndexOutOfRange.
-  void setDisabledElements(GeometryId, std::span<const std::uint32_t> elements);
-
-  /// These vertices move back together: all or none. Groups with a common vertex become one group.
+  /// Errors   UnknownPair.
+  void setGuarded(GeometryId a, GeometryId b, bool guarded);
+  /// These vertices make one fraction of their steps. Groups with a common vertex become one group.
+  /// Use setTransform() for a rigid body: a group does not stay rigid while it turns. Groups of
+  /// placed geometries are for tools of several parts. A vertex that does not exist when hold() is
+  /// called does not count.
   ///
   /// Errors   IndexOutOfRange.
   void addRigidGroup(std::span<const GuardedVertex>);
-  /// The same for all vertices of a geometry.
-  void addRigidGroup(GeometryId);
-  /// These vertices of a geometry never move back, and all its other vertices may. Use it for a
-  /// tool that nothing holds. A group with a fixed vertex never moves back. If hold() throws
-  /// ImpactRemains, set the `now` of these vertices to `before` and call it again. Vertices that a
-  /// hand drives need not be fixed: hold() may then move them back, and the hand has to wait.
+  /// These vertices of a geometry always make their whole step; none is fixed but these.
+  /// {kNoElement}: all, or a shape. Use it for a tool that nothing holds. A group with a fixed
+  /// vertex is fixed. If hold() throws ImpactRemains, set the `now` of these vertices to `before`
+  /// and call it again. Vertices that a hand drives need not be fixed: hold() may then shorten
+  /// their step, and the hand has to wait.
   ///
   /// Errors   IndexOutOfRange.
   void setFixedVertices(GeometryId, std::span<const std::uint32_t> vertices);
 
-  /// Moves vertices in the given `now` back to their `before`, until no features touch within the
-  /// step. If features touch, all their vertices move back with their groups, except fixed ones. A
-  /// geometry without a step in `steps` is at rest, where the last successful hold() left it or
-  /// where it was added or received a topology. hold() changes your positions only: set them again
-  /// in the OctreeBasedCD before advance().
+  /// Shortens the steps of vertices and placed geometries of the OctreeBasedCD: sets their
+  /// positions and transforms now. Its results stay readable.
   ///
-  /// Returns  the number of vertices that moved back; vertices at rest do not count.
-  /// Errors   ImpactRemains if features touch and cannot move back: they touched before the step,
-  ///          or all their vertices that move are fixed. The message names geometries and features.
-  ///          UnknownGeometry, WrongPositionCount and NonFinitePosition as in setPositions() of
-  ///          OctreeBasedCD; InvalidSettings if a geometry has two steps.
-  std::size_t hold(std::span<const GuardedStep> steps);
+  /// Returns  the size of held().
+  /// Errors   ImpactRemains if features touch and cannot be shortened: they touched before the
+  ///          step, or all their vertices that move are fixed. The message names geometries and
+  ///          features. UnsupportedMethod for a pair with a DistanceField, which has no features.
+  ///          Those of OctreeBasedCD::detectCollision().
+  std::size_t hold();
 
-  /// The vertices that the last successful hold() moved back, ascending. The span is valid until
-  /// the next hold().
-  std::span<const GuardedVertex> held() const;
+  /// The vertices and placed geometries whose steps the last successful hold() shortened,
+  /// ascending. The span is valid until the next hold().
+  std::span<const HeldVertex> held() const;
   std::size_t rounds() const;  ///< number of detections in the last successful hold()
 
  private:

@@ -8,9 +8,12 @@
 
 namespace palpate {
 
-/// Identifies a geometry of one OctreeBasedCD or StepGuard. An id is never given out twice, also
-/// after its geometry was removed.
+/// Identifies a geometry of one OctreeBasedCD. An id is never given out twice, also after its
+/// geometry was removed.
 enum class GeometryId : std::uint32_t {};
+
+/// Stands for the index of an element or vertex where there is none, as in a shape.
+inline constexpr std::uint32_t kNoElement = 0xffffffff;
 
 /// The geometry type: what the elements of a geometry are. The surface of a tetrahedral mesh
 /// consists of Triangles. A Shape is an analytical shape, a Field a distance field; these have no
@@ -31,6 +34,12 @@ struct ElementPair {
   std::uint32_t b;
   friend bool operator==(const ElementPair&, const ElementPair&) = default;
   friend auto operator<=>(const ElementPair&, const ElementPair&) = default;
+};
+
+/// A rigid placement: a point x of the body's frame is at rotation x + translation in the world.
+struct Pose {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< L
 };
 
 /// A triangle mesh that stays in the caller's memory. A call that takes a view reads it and keeps

@@ -1,6 +1,5 @@
 #include <palpate/DistanceField.h>
 #include <palpate/OctreeBasedCD.h>
-#include <palpate/StepGuard.h>
 
 #include <gtest/gtest.h>
 
@@ -68,12 +67,6 @@ TEST(Range, OfPositions) {
                   [&](double x) { collisions.setPositions(mesh, corners(1), corners(x)); });
   expectPositions("geometry 0, vertex 2: position is",
                   [&](double x) { collisions.setTriangles(mesh, corners(x), kTriangle); });
-  StepGuard guard;
-  const GeometryId guarded = guard.addTriangleMesh(corners(1), kTriangle);
-  expectPositions("geometry 0, vertex 2: position before is", [&](double x) {
-    Positions before = corners(x), now = corners(1);
-    guard.hold(std::vector<GuardedStep>{{guarded, before, now}});
-  });
 }
 
 /// In every place of the vectors in which positions are checked.

@@ -394,11 +394,12 @@ TEST(SteadyFrame, AllocatesNothingInAGuard) {
   testing::Random random(9);
   const testing::Mesh body = testing::sphere(12, 16, {0.51, 0.47, 0.53}, 0.3),
                       floor = testing::sheet(12, 0.5, 0.3);
-  StepGuard guard({.threads = 1});
-  const GeometryId a = guard.addTriangleMesh(body.positions, body.triangles),
-                   b = guard.addTriangleMesh(floor.positions, floor.triangles);
-  guard.addCollisionPair(a, b);
-  guard.addCollisionPair(b, b);
+  OctreeBasedCD collisions({.threads = 1});
+  const GeometryId a = collisions.addTriangleMesh(body.positions, body.triangles),
+                   b = collisions.addTriangleMesh(floor.positions, floor.triangles);
+  collisions.addCollisionPair(a, b);
+  collisions.addCollisionPair(b, b);
+  StepGuard guard(collisions);
   const std::vector<std::uint32_t> fixed{0, 5};
   guard.setFixedVertices(b, fixed);
   std::vector<Eigen::Vector3d> far = body.positions, now, still;
@@ -409,8 +410,9 @@ TEST(SteadyFrame, AllocatesNothingInAGuard) {
     if (step == 10) before = allocations;
     now = far;
     still = floor.positions;
-    const GuardedStep steps[2]{{a, body.positions, now}, {b, floor.positions, still}};
-    held = guard.hold(steps);
+    collisions.setPositions(a, body.positions, now);
+    collisions.setPositions(b, floor.positions, still);
+    held = guard.hold();
   }
   EXPECT_EQ(allocations - before, 0u);
   EXPECT_GT(held, 10u);
