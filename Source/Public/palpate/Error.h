@@ -32,7 +32,7 @@ enum class ErrorCode {
   InvalidTransform,   ///< No rotation, or a translation that is beyond kLargestMeasure.
   SharedFace,         ///< A face belongs to more than two tetrahedra.
   InvalidCall,        ///< The object was moved from, is outdated, or is at work on another call.
-  ImpactRemains,      ///< Features touch within a step, and StepGuard may not move their vertices.
+  ImpactRemains,      ///< Features touch within a step, and StepGuard cannot shorten their steps.
   MemoryLimit,        ///< The answer needs more memory than the limit that you set.
   Cancelled,          ///< A progress callback returned false.
 };
