@@ -4,14 +4,21 @@
 
 #include <array>
 #include <cstdint>
-#include <type_traits>
+#include <utility>
 
 // Vectors of integers, either of fixed width or of any size.
 namespace palpate::exact {
 
-/// The type of a product: 128 bits for integers of 64 bits, the same type for others.
+using palpate::product;
+// Products of integers of fixed width are twice as wide. Those of any size stay so.
+inline Int128 product(std::int64_t a, std::int64_t b) { return Int128{a} * b; }
+inline Int256 product(Int128 a, std::int64_t b) { return product(a, Int128{b}); }
+inline Int512 product(const Int256& a, Int128 b) { return product(a, product(b, Int128{1})); }
+inline Integer product(const Integer& a, const Integer& b) { return a * b; }
+
+/// The type of a product.
 template <class T>
-using Wide = std::conditional_t<std::is_same_v<T, std::int64_t>, Int128, T>;
+using Wide = decltype(product(std::declval<T>(), std::declval<T>()));
 
 template <class T>
 using Vector = std::array<T, 3>;
@@ -22,18 +29,13 @@ Vector<T> operator-(const Vector<T>& a, const Vector<T>& b) {
 }
 template <class T>
 Wide<T> dot(const Vector<T>& a, const Vector<T>& b) {
-  return Wide<T>(a[0]) * b[0] + Wide<T>(a[1]) * b[1] + Wide<T>(a[2]) * b[2];
+  return product(a[0], b[0]) + product(a[1], b[1]) + product(a[2], b[2]);
 }
 template <class T>
 Vector<Wide<T>> cross(const Vector<T>& a, const Vector<T>& b) {
-  using W = Wide<T>;
-  return {W(a[1]) * b[2] - W(a[2]) * b[1], W(a[2]) * b[0] - W(a[0]) * b[2],
-          W(a[0]) * b[1] - W(a[1]) * b[0]};
+  return {product(a[1], b[2]) - product(a[2], b[1]), product(a[2], b[0]) - product(a[0], b[2]),
+          product(a[0], b[1]) - product(a[1], b[0])};
 }
-
-/// Products of integers of 128 bits have 256 bits.
-inline Integer product(const Integer& a, const Integer& b) { return a * b; }
-using palpate::product;
 
 /// (u x v) . w: six times the volume of the tetrahedron of the origin and three points. Coordinates
 /// of 64 bits must stay below 2^61.
@@ -47,5 +49,6 @@ auto volumeOf(const Vector<T>& u, const Vector<T>& v, const Vector<T>& w) {
 inline int signOf(const Integer& a) { return sgn(a); }
 inline int signOf(Int128 a) { return (a > 0) - (a < 0); }
 inline int signOf(const Int256& a) { return a.sign(); }
+inline int signOf(const Int512& a) { return a.sign(); }
 
 }  // namespace palpate::exact

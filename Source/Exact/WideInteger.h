@@ -40,6 +40,56 @@ inline Int256 product(Int128 a, Int128 b) {
   return (a < 0) == (b < 0) ? result : Int256{} - result;
 }
 
+/// A signed integer of 512 bits in two's complement: words of 64 bits, the lowest first.
+struct Int512 {
+  std::array<std::uint64_t, 8> words{};
+
+  int sign() const {
+    if (words.back() >> 63) return -1;
+    return std::any_of(words.begin(), words.end(), [](std::uint64_t word) { return word != 0; });
+  }
+  friend Int512 operator+(const Int512& a, const Int512& b) {
+    Int512 sum;
+    UnsignedInt128 carry = 0;
+    for (std::size_t i = 0; i < 8; ++i) {
+      carry += UnsignedInt128{a.words[i]} + b.words[i];
+      sum.words[i] = static_cast<std::uint64_t>(carry);
+      carry >>= 64;
+    }
+    return sum;
+  }
+  friend Int512 operator-(const Int512& a, const Int512& b) {
+    Int512 difference;
+    UnsignedInt128 borrow = 0;
+    for (std::size_t i = 0; i < 8; ++i) {
+      const UnsignedInt128 rest = UnsignedInt128{a.words[i]} - b.words[i] - borrow;
+      difference.words[i] = static_cast<std::uint64_t>(rest);
+      borrow = rest >> 127;
+    }
+    return difference;
+  }
+};
+
+inline Int512 product(const Int256& a, const Int256& b) {
+  const auto magnitude = [](const Int256& x) {
+    const auto& [high, low] = x.sign() < 0 ? Int256{} - x : x;
+    return std::array{static_cast<std::uint64_t>(low), static_cast<std::uint64_t>(low >> 64),
+                      static_cast<std::uint64_t>(high), static_cast<std::uint64_t>(high >> 64)};
+  };
+  const auto x = magnitude(a), y = magnitude(b);
+  Int512 result;
+  for (std::size_t i = 0; i < 4; ++i) {
+    UnsignedInt128 carry = 0;
+    for (std::size_t j = 0; j < 4; ++j) {
+      carry += UnsignedInt128{x[i]} * y[j] + result.words[i + j];
+      result.words[i + j] = static_cast<std::uint64_t>(carry);
+      carry >>= 64;
+    }
+    result.words[i + 4] = static_cast<std::uint64_t>(carry);
+  }
+  return (a.sign() < 0) == (b.sign() < 0) ? result : Int512{} - result;
+}
+
 /// |x| = mantissa 2^exponent.
 struct DoubleParts {
   std::uint64_t mantissa;
@@ -72,12 +122,13 @@ struct ExponentRange {
   }
 };
 
-/// Positions as exact integers in units of a power of two, if their differences fit in 61 bits.
-/// This holds for meshes near each other whose coordinates do not have many more bits than a
-/// double.
-template <std::size_t Count>
+/// Positions as exact integers in units of a power of two, if their differences fit. Differences of
+/// 61 bits (Coordinate = std::int64_t) are enough for meshes near each other whose coordinates do
+/// not have many more bits than a double. Differences of 125 bits (Int128) also hold a gap that is
+/// tiny compared to the coordinates.
+template <std::size_t Count, class Coordinate = std::int64_t>
 struct FixedGrid {
-  std::array<std::array<std::int64_t, 3>, Count> at;  ///< relative to the first position
+  std::array<std::array<Coordinate, 3>, Count> at;  ///< relative to the first position
   bool fits = true;
 
   template <class... Positions>
@@ -90,13 +141,14 @@ struct FixedGrid {
       for (std::size_t n = 0; n < Count; ++n) {
         const Int128 relative = integer((*all[n])[i], lowest) - origin;
         fits = fits && relative < kLimit && relative > -kLimit;
-        at[n][i] = static_cast<std::int64_t>(relative);
+        at[n][i] = static_cast<Coordinate>(relative);
       }
     }
   }
 
  private:
-  static constexpr Int128 kLimit = Int128{1} << 60;  // differences of two stay below 2^61
+  /// Differences of two stay below twice this.
+  static constexpr Int128 kLimit = Int128{1} << (8 * sizeof(Coordinate) - 4);
 
   static Int128 integer(double x, int lowest) {
     const auto [mantissa, exponent] = splitDouble(x);

@@ -46,6 +46,34 @@ bool areCertainlyParallel(const Difference& u, const Difference& v) {
   return true;
 }
 
+/// The components of a vector that are not zero, as bits.
+unsigned nonzeroOf(const Vector3d& a) {
+  return static_cast<unsigned>(a[0] != 0.0) | static_cast<unsigned>(a[1] != 0.0) << 1 |
+         static_cast<unsigned>(a[2] != 0.0) << 2;
+}
+/// The components of a cross product that may differ from zero. Those of the factors are given.
+unsigned nonzeroOfCross(unsigned a, unsigned b) {
+  // Component i is from components i + 1 and i + 2 of the factors.
+  const unsigned aNext = a >> 1 | a << 2, aLast = a >> 2 | a << 1, bNext = b >> 1 | b << 2,
+                 bLast = b >> 2 | b << 1;
+  return ((aNext & bLast) | (aLast & bNext)) & 7;
+}
+
+/// Whether products with a factor zero prove that the closest points of two lines, which are not
+/// parallel, are not both inside the edges: one is an end. This decides where features of meshes
+/// with edges along the axes, or in planes along them, are opposite each other.
+bool isCertainlyAtEnd(const EdgePair& edges) {
+  const unsigned u = nonzeroOf(edges.p1 - edges.p0), v = nonzeroOf(edges.q1 - edges.q0);
+  const unsigned normal = nonzeroOfCross(u, v);
+  for (const Vector3d* p : {&edges.p0, &edges.p1})
+    for (const Vector3d* q : {&edges.q0, &edges.q1}) {
+      // The closest point of line p is this end if (w x v) . (u x v) is zero.
+      const unsigned w = nonzeroOf(*p - *q);
+      if ((nonzeroOfCross(w, v) & normal) == 0 || (nonzeroOfCross(w, u) & normal) == 0) return true;
+    }
+  return false;
+}
+
 /// The terms that decide whether two lines are closest inside both edges: they are if `square` is
 /// more than s and t. Each term is off by its error at most.
 struct CrossingTerms {
@@ -102,8 +130,10 @@ CrossingDecision crossingOf(const EdgePair& edges) {
   const double uSum = sumOfMagnitudes(u.high), vSum = sumOfMagnitudes(v.high);
   const double mSum = sumOfMagnitudes(m.high) + uSum + vSum;
   if (mSum < kLargestModerate) {
-    if (const auto decision = roundedTerms(edges, mSum, uSum, vSum).decision())
-      return {*decision, false};
+    const CrossingTerms rounded = roundedTerms(edges, mSum, uSum, vSum);
+    if (const auto decision = rounded.decision()) return {*decision, false};
+    if (rounded.square > rounded.squareError && isCertainlyAtEnd(edges))
+      return {Crossing::Outside, false};
     if (areCertainlyParallel(difference(p1, p0), difference(q1, q0)))
       return {Crossing::Parallel, false};
     // The error of m is relative to the positions, which may be far from the origin.

@@ -55,10 +55,13 @@ Foot footOnPlane(const Vector<Integer>& from, const Vector<Integer>& u, const Ve
 
 // ---- Signs, in integers of fixed width if the positions fit, else of any size ----
 
-/// Calls decision(positions) with vectors of integers of fixed width if they fit, else of any size.
+/// Calls decision(positions) with vectors of integers of the least fixed width into which they fit,
+/// else of any size.
 template <class Decision, class... Positions>
 auto decide(Decision&& decision, const Positions&... positions) {
   if (const FixedGrid grid(positions...); grid.fits) return decision(grid.at);
+  if (const FixedGrid<sizeof...(Positions), Int128> grid(positions...); grid.fits)
+    return decision(grid.at);
   return decision(Integers(positions...).at);
 }
 
@@ -83,7 +86,7 @@ bool isAlong(const Vector<T>& p, const Vector<T>& a, const Vector<T>& b) {
 
 template <class T>
 bool isZero(const Vector<T>& a) {
-  return a[0] == 0 && a[1] == 0 && a[2] == 0;
+  return signOf(a[0]) == 0 && signOf(a[1]) == 0 && signOf(a[2]) == 0;
 }
 
 /// The longest edge of a triangle without area; the first one if several are equal.
@@ -92,7 +95,8 @@ int longestEdge(const std::array<Vector<T>, 4>& at) {
   int longest = 0;
   for (int i = 1; i < 3; ++i) {
     const Vector<T> edge = at[(i + 1) % 3] - at[i], best = at[(longest + 1) % 3] - at[longest];
-    if (dot(edge, edge) > dot(best, best)) longest = i;
+    const Wide<T> longer = dot(edge, edge) - dot(best, best);
+    if (signOf(longer) > 0) longest = i;
   }
   return longest;
 }

@@ -160,6 +160,14 @@ Integer integerOf(const Int256& a) {
   return value;
 }
 
+Integer integerOf(const Int512& a) {
+  Integer value = 0;
+  for (std::size_t i = a.words.size(); i-- > 0;)
+    value = (value << 64) + integerOf(UnsignedInt128{a.words[i]});
+  if (a.sign() < 0) value -= Integer(1) << 512;
+  return value;
+}
+
 TEST(WideInteger, ProductsSumsAndSignsAreThoseOfIntegers) {
   Random random(5);
   for (int repeat = 0; repeat < 20000; ++repeat) {
@@ -173,6 +181,14 @@ TEST(WideInteger, ProductsSumsAndSignsAreThoseOfIntegers) {
     ASSERT_EQ((p - p).sign(), 0);
     ASSERT_EQ(exact::signOf(a), sgn(integerOf(a)));
     ASSERT_EQ(exact::signOf(p), sgn(truthP));
+    const Int512 r = product(p, q), s = product(q, q);
+    const Integer truthR = truthP * truthQ, truthS = truthQ * truthQ;
+    ASSERT_TRUE(integerOf(r) == truthR) << repeat;
+    ASSERT_TRUE(integerOf(r + s) == truthR + truthS) << repeat;
+    ASSERT_TRUE(integerOf(r - s) == truthR - truthS) << repeat;
+    ASSERT_EQ((r - s).sign(), sgn(Integer(truthR - truthS)));
+    ASSERT_EQ((r - r).sign(), 0);
+    ASSERT_TRUE(integerOf(exact::product(p, c)) == truthP * integerOf(c));
   }
 }
 
