@@ -24,32 +24,51 @@ struct DisplacementBounds {
   }
 };
 
-/// Whether motionBound() of features of two triangles may exceed `slow` plus the rounding of the
-/// pair's motions. Rounding, and squares out of range, make it true for some slower triangles.
-bool mayBeFast(const DisplacementBounds& a, const DisplacementBounds& b, double slow) {
-  const Eigen::Array3d most = (a.upper - b.lower).abs().max((b.upper - a.lower).abs());
-  const double square = slow * slow;
-  return !(slow > 0.0 && square > kSmallestSlowSquare &&
-           most.square().sum() < square * (1 - kSlowSlack));
+/// Square of a bound on motionBound() of features of two triangles, without rounding.
+double motionSquare(const DisplacementBounds& a, const DisplacementBounds& b) {
+  return (a.upper - b.lower).abs().max((b.upper - a.lower).abs()).square().sum();
+}
+
+/// Whether motionBound() is at most `limit` plus the rounding of the pair's motions. Rounding, and
+/// squares out of range, make it false for some slower triangles.
+bool isCertainlyWithin(double motionSquare, double limit) {
+  const double square = limit * limit;
+  return limit > 0.0 && square > kSmallestSlowSquare && motionSquare < square * (1 - kSlowSlack);
+}
+
+/// Share of StepPlan::slowMotion. Where no feature moves further, most contacts of resting bodies
+/// are further apart than their features moved, so that no step has to be checked. Any value will
+/// do.
+constexpr double kCalmShare = 0.5;
+
+/// Divides the candidates: `calm` move at most kCalmShare of StepPlan::slowMotion, `part` further,
+/// and of these `fast` may move further than slowMotion.
+void divide(const MeshPair& pair, std::span<const ElementPair> candidates, ContactBuffers& out) {
+  for (auto* part : {&out.calm, &out.part, &out.fast}) part->clear();
+  const StepPlan& step = pair.step;
+  const double rounding = step.motionWithRounding - step.motion, slow = step.slowMotion - rounding,
+               calm = kCalmShare * step.slowMotion - rounding;
+  for (const ElementPair& candidate : candidates) {
+    const double square = motionSquare({pair.a, candidate.a}, {pair.b, candidate.b});
+    (isCertainlyWithin(square, calm) ? out.calm : out.part).push_back(candidate);
+    if (!isCertainlyWithin(square, slow)) out.fast.push_back(candidate);
+  }
 }
 
 }  // namespace
 
 void findAuto(const MeshPair& pair, std::span<const ElementPair> candidates, ContactBuffers& out) {
-  out.part.assign(candidates.begin(), candidates.end());
+  divide(pair, candidates, out);
   if (pair.floats) {
     FloatPair atEnd = *pair.floats;
     atEnd.beforeA = atEnd.beforeB = nullptr;
     keepOverlapping(pair.a.topology, pair.b.topology, atEnd, out.part);
   }
   findProximity(pair, out.part, out);
-  out.part.clear();
-  const StepPlan& step = pair.step;
-  const double slow = step.slowMotion - (step.motionWithRounding - step.motion);
-  for (const ElementPair& candidate : candidates)
-    if (mayBeFast({pair.a, candidate.a}, {pair.b, candidate.b}, slow))
-      out.part.push_back(candidate);
-  findFastImpacts(pair, out.part, out);
+  MeshPair calm = pair;
+  calm.step.motionOfCandidates = kCalmShare * pair.step.slowMotion;
+  findProximity(calm, out.calm, out);
+  findFastImpacts(pair, out.fast, out);
 }
 
 }  // namespace palpate

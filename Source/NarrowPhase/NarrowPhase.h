@@ -29,6 +29,8 @@ struct StepPlan {
   /// L: `motion` plus rounding errors. Features further apart at the step's end did not touch in
   /// the step.
   double motionWithRounding = std::numeric_limits<double>::infinity();
+  /// L: the same for the candidates at hand, if they are known to move less. With rounding.
+  double motionOfCandidates = std::numeric_limits<double>::infinity();
   /// L: Auto's Proximity has no false negative among feature pairs that move at most this far.
   double slowMotion = 0.0;
   /// L: touches on the arcs of bodies that turn are this much nearer than straight motion has them.
@@ -164,7 +166,7 @@ struct ContactBuffers : ShapeContactBuffers {
   Buffer<Crossing> crossingsAtStart;      ///< Auto, where the step begins in intersection
   Buffer<PiercedPair> pierced;            ///< the same
   FeaturePairs features;                  ///< scratch: of the present batch
-  Buffer<ElementPair> part;               ///< scratch: some pairs of the present batch
+  Buffer<ElementPair> part, calm, fast;   ///< scratch: some pairs of the present batch
   Buffer<PossibleIntersection> possible;  ///< scratch: of the present batch
   StepFacts facts;
   std::size_t validityPairs = 0;  ///< triangle pairs tested for Validity::startedApart

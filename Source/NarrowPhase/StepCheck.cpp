@@ -15,9 +15,9 @@ template <Kind kind>
 bool StepCheck::mayTouchInStep(const Features<kind>& features, std::uint32_t firstId,
                                std::uint32_t secondId, double distance) const {
   const StepPlan& step = m_pair.step;
-  const double onArcs = distance - step.arcDeviation;
-  return step.motion != 0.0 && !(onArcs > step.motionWithRounding) &&
-         mayHaveTouched<kind>(features.query(firstId, secondId), onArcs, step.motion);
+  return step.motion != 0.0 && !(distance > touchDistance()) &&
+         mayHaveTouched<kind>(features.query(firstId, secondId), distance - step.arcDeviation,
+                              step.motion);
 }
 
 template <Kind kind>

@@ -21,9 +21,8 @@ class StepCheck {
     const StepPlan& step = m_pair.step;
     if (step.motion == 0.0) return 0.0;
     const double rounding = step.motionWithRounding - step.motion;
-    return std::min(
-        step.motionWithRounding + step.arcDeviation,
-        step.reportsImpacts ? step.extraThickness + rounding : m_pair.settings.thickness);
+    return std::min(touchDistance(), step.reportsImpacts ? step.extraThickness + rounding
+                                                         : m_pair.settings.thickness);
   }
 
   /// Records a feature pair that is at most thicknessAtEnd() apart.
@@ -64,6 +63,11 @@ class StepCheck {
   void recordEdges(const Segment& p, const Segment& q);
 
  private:
+  /// L: features further apart at the step's end did not touch in the step.
+  double touchDistance() const {
+    return std::min(m_pair.step.motionWithRounding, m_pair.step.motionOfCandidates) +
+           m_pair.step.arcDeviation;
+  }
   /// Whether features at this distance at the step's end may have touched in the step.
   template <ImpactQuery::Kind kind>
   bool mayTouchInStep(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId,

@@ -1,6 +1,9 @@
 #include "Validity/IntersectionAtEnd.h"
 
+#include "Math/MotionBound.h"
+
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -10,6 +13,29 @@ namespace {
 
 /// Triangle pairs that may be tested besides one for each contact, and pairs tested together.
 constexpr std::size_t kFreeChecks = 32, kChecksTogether = 16;
+
+/// motionBound() of features whose vertices are `ids`, the first ones of mesh `a`.
+template <ImpactQuery::Kind kind>
+double motionOf(const TriangleMesh& a, const TriangleMesh& b,
+                const std::array<std::uint32_t, 4>& ids) {
+  constexpr std::size_t kFirsts = kind == ImpactQuery::Kind::VertexTriangle ? 1 : 2;
+  ImpactQuery query{kind, {}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const TriangleMesh& mesh = i < kFirsts ? a : b;
+    query.vertices[i] = {mesh.before[ids[i]], mesh.now[ids[i]]};
+  }
+  return motionBound<kind>(query);
+}
+
+double motionOf(const TriangleMesh& vertices, const TriangleMesh& triangles,
+                const VertexTriangleContact& c) {
+  const auto& [i, j, k] = c.corners;
+  return motionOf<ImpactQuery::Kind::VertexTriangle>(vertices, triangles, {c.vertex, i, j, k});
+}
+double motionOf(const TriangleMesh& a, const TriangleMesh& b, const EdgeEdgeContact& c) {
+  return motionOf<ImpactQuery::Kind::EdgeEdge>(a, b,
+                                               {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]});
+}
 
 }  // namespace
 
@@ -32,21 +58,26 @@ IntersectionAtEnd checkEnd(const MeshPair& pair, const CollisionData::Contents& 
     end.piercing = found.piercing;
     batch.clear();
   };
-  const auto add = [&](const auto& contact, Ids trianglesOfA, Ids trianglesOfB) {
-    if (end.piercing || !end.isKnown ||
-        contact.distance > (1.0 - contact.timeOfImpact) * pair.step.motion + rounding)
-      return;
+  // Whether the rest of the step may close the distance at the impact.
+  const auto mayTouch = [&](const TriangleMesh& first, const TriangleMesh& second,
+                            const auto& contact) {
+    const double left = 1.0 - contact.timeOfImpact;
+    return !end.piercing && end.isKnown && contact.distance <= left * pair.step.motion + rounding &&
+           contact.distance <= left * motionOf(first, second, contact) + rounding;
+  };
+  const auto add = [&](Ids trianglesOfA, Ids trianglesOfB) {
     for (const std::uint32_t a : trianglesOfA)
       for (const std::uint32_t b : trianglesOfB)
         if (!pair.self() || a != b) batch.push_back({a, b});
     if (batch.size() >= kChecksTogether) check();
   };
   for (const VertexTriangleContact& c : contacts.vertexTriangle)
-    add(c, ofA.vertexTriangles[c.vertex], Ids(&c.triangle, 1));
+    if (mayTouch(pair.a, pair.b, c)) add(ofA.vertexTriangles[c.vertex], Ids(&c.triangle, 1));
   for (const VertexTriangleContact& c : contacts.triangleVertex)
-    add(c, Ids(&c.triangle, 1), ofB.vertexTriangles[c.vertex]);
+    if (mayTouch(pair.b, pair.a, c)) add(Ids(&c.triangle, 1), ofB.vertexTriangles[c.vertex]);
   for (const EdgeEdgeContact& c : contacts.edgeEdge)
-    add(c, ofA.edgeTriangles[ofA.edgeOf(c.edgeA)], ofB.edgeTriangles[ofB.edgeOf(c.edgeB)]);
+    if (mayTouch(pair.a, pair.b, c))
+      add(ofA.edgeTriangles[ofA.edgeOf(c.edgeA)], ofB.edgeTriangles[ofB.edgeOf(c.edgeB)]);
   if (!end.piercing && end.isKnown) check();
   return end;
 }
