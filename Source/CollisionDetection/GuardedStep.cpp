@@ -281,12 +281,16 @@ void GuardedStep::addTouch(const Contact& placed, std::size_t pair, std::size_t 
     addMover(touch, second, kNoElement,
              -contact.normal.dot(displacementOf(second, contact.pointB)));
   } else {
-    if (contact.timeOfImpact == 0.0) {
+    if (contact.timeOfImpact < kEarlyTime) {
       const ImpactQuery query = queryOf(placed);
       ImpactQuery start = query;
       for (ImpactQuery::Step& step : start.vertices) step.now = step.before;
       touch.atStart = findTouch(start, kGuardTolerance).impact;
       if (touch.atStart && certainlyPart(query)) return;
+      // Only features without radii touch as their centre lines do.
+      if (const ImpactResult again = findTouch(query, kGuardTolerance);
+          again.impact && first.mesh.largestRadius + second.mesh.largestRadius == 0.0)
+        touch.time = again.time;
     }
     const Stencil of = stencil(contact);
     constexpr std::size_t kSecond = std::is_same_v<Kind, VertexTriangleContact> ? 1 : 2;

@@ -19,6 +19,10 @@ namespace palpate {
 /// Fraction of the step: the time tolerance of a StepGuard's detections. Far below any fraction
 /// that matters, so that a step is not shortened to nothing where time is left.
 constexpr double kGuardTolerance = 0x1p-40;
+/// The same for pairs without radii: exact arithmetic would decide smaller ones. Times below
+/// kEarlyTime are computed again.
+constexpr double kTouchTolerance = 0x1p-20;
+constexpr double kEarlyTime = 0x1p-12;
 
 /// What a StepGuard remembers from step to step. Ids and vertices that no longer exist do not
 /// count.
