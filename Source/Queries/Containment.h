@@ -24,6 +24,10 @@ void findInside(const SearchableGeometry& vertices, const SearchableGeometry& bo
 bool isInside(const SearchableGeometry& body, const Eigen::Vector3d& point, const InsideSettings&,
               Engine, PointQueryStack&);
 
+/// The winding number of a geometry's surface about a point, decided exactly; 0 on the surface.
+int windingNumber(const SearchableGeometry&, const Eigen::Vector3d& point, Engine,
+                  PointQueryStack&);
+
 /// Throws InvalidSettings for settings out of range.
 void checkSettings(const SearchableGeometry& body, const InsideSettings&);
 /// Throws NotClosed for a body without faces. For InsideRule::Closed it also throws NotClosed, with
