@@ -195,11 +195,11 @@ std::optional<BodyPair::Exit> BodyPair::lastExitOf(const PartVertex& vertex,
   const Vector3d& p = vertices(vertex.ofA).positions[vertex.vertex];
   RayHits hits(geometry(!vertex.ofA), {p, direction, begin, end}, m_engine == Engine::BruteForce,
                m_scratch.met);
-  std::optional<Exit> exit;
+  std::optional<Exit> last;
   hits.forAllParts([&](const RayHits::Part& part) {
-    if (part.last > begin) exit = Exit{part.last, part.exitElement};
+    if (part.last > begin) last = Exit{part.last, part.exitElement};
   });
-  return exit;
+  return last;
 }
 
 }  // namespace palpate
