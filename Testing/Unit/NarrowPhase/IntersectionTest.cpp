@@ -107,9 +107,10 @@ TEST(IntersectionRegression, VertexOfTheSecondMeshPiercesAFaceOfTheFirst) {
 }
 
 TEST(IntersectionRegression, ThreeEdgesCross) {
-  // Two edges of the first cross the ground's plane: one inside, one exactly on the edge y = 0.
+  // Two edges of the first cross the ground's plane: one inside, one exactly on the edge y = 0. The
+  // vertex that they share is behind the ground, and a corner of the ground behind the first.
   const Corners three{{{1, 1, 1}, {1, 1, -1}, {1, -1, 1}}};
-  expectContacts(three, kGround, {}, {}, {{1, 2, 0, 1}});
+  expectContacts(three, kGround, {{1, 0}}, {{1, 0}}, {{1, 2, 0, 1}});
 }
 
 TEST(IntersectionRegression, CoplanarTriangles) {
@@ -139,14 +140,13 @@ TEST(IntersectionRegression, EdgesShorterThanTwentyMillionths) {
 
 // ---- Definitions ----
 
-TEST(Intersection, OneEdgeOfEachIsAnEdgeEdgeContact) {
+/// An end of each crossing edge is behind the other triangle.
+TEST(Intersection, OneEdgeOfEachGivesTheEndsBehind) {
   const Corners interlocked{{{1, 1, -1}, {1, 1, 1}, {1, -5, 0.5}}};
-  expectContacts(interlocked, kGround, {}, {}, {{0, 1, 0, 1}});
+  expectContacts(interlocked, kGround, {{0, 0}}, {{0, 0}}, {});
   const ContactBuffers found = contactsOf(meshOf(interlocked), meshOf(kGround));
-  EXPECT_EQ(found.edgeEdge[0].distance, 1);
-  EXPECT_EQ(found.edgeEdge[0].normal, Vector3d::UnitY());  // from the ground's edge to the other
-  EXPECT_EQ(found.edgeEdge[0].weightA, 0.5);
-  EXPECT_EQ(found.edgeEdge[0].weightB, 0.25);
+  EXPECT_EQ(found.vertexTriangle[0].distance, -1);
+  EXPECT_EQ(found.vertexTriangle[0].normal, Vector3d::UnitZ());
 }
 
 TEST(Intersection, NormalsOfFacesAreWindingNormalsAndDistancesBehindThemAreNegative) {

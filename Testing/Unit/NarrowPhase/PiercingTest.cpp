@@ -99,7 +99,7 @@ VertexTriangleContact contactOfTip(const Vector3d& tip, double halfWidth = 0.7) 
 TEST(Piercing, ATipBelowAnInteriorFeatureHasItsDepth) {
   for (const auto& [x, y, feature] : {std::tuple{2.6, 2.3, TriangleFeature::Face},
                                       {2.5, 2.5, TriangleFeature::EdgeCA},
-                                      {2.5, 2.0, TriangleFeature::EdgeAB},
+                                      {2.5, 2.0, TriangleFeature::EdgeBC},
                                       {2.0, 2.4, TriangleFeature::EdgeBC},
                                       {2.0, 2.0, TriangleFeature::CornerC}}) {
     SCOPED_TRACE(std::to_string(x) + ", " + std::to_string(y));
@@ -112,11 +112,11 @@ TEST(Piercing, ATipBelowAnInteriorFeatureHasItsDepth) {
 
 /// The tip is beyond the border, and the sides of the pyramid pierce the plate.
 TEST(Piercing, ATipBelowAndBeyondTheBorderLeavesTowardsIt) {
-  const VertexTriangleContact edge = contactOfTip({2.3, -0.03, -0.04});
+  const VertexTriangleContact edge = contactOfTip({2.3, -0.03, -0.04}, 2);
   EXPECT_EQ(edge.feature, TriangleFeature::EdgeAB);
   EXPECT_NEAR(edge.distance, -0.05, 1e-16);
   EXPECT_TRUE(edge.normal.isApprox(Vector3d(0, 0.6, 0.8), 1e-14));
-  const VertexTriangleContact corner = contactOfTip({-0.02, -0.01, -0.02});
+  const VertexTriangleContact corner = contactOfTip({-0.02, -0.01, -0.02}, 2);
   EXPECT_EQ(corner.feature, TriangleFeature::CornerA);
   EXPECT_EQ(corner.corners[0], 0u);
   EXPECT_NEAR(corner.distance, -0.03, 1e-16);
