@@ -142,13 +142,13 @@ struct MeshFeature {
 };
 
 /// An edge that crosses a triangle of the other mesh: see PiercingContacts.
-struct Crossing {
+struct EdgeCrossing {
   bool ofB;  ///< the edge is of MeshPair::b, the triangle of MeshPair::a
   std::uint32_t edge;
   MeshFeature through;  ///< the feature of the triangle that the edge passes through
   std::uint32_t triangle;
   bool lowerIsBehind;  ///< whether the edge's first vertex is behind the triangle, or the second
-  auto operator<=>(const Crossing&) const = default;
+  auto operator<=>(const EdgeCrossing&) const = default;
 };
 
 /// Two triangles that pierce each other without touching. Bit i: edge i crosses the other triangle.
@@ -162,8 +162,8 @@ struct ContactBuffers : ShapeContactBuffers {
   Buffer<VertexTriangleContact> vertexTriangle, triangleVertex;
   Buffer<EdgeEdgeContact> edgeEdge;
   Buffer<ElementPair> intersectingTriangles;
-  Buffer<Crossing> crossings;             ///< Intersection: of all batches
-  Buffer<Crossing> crossingsAtStart;      ///< Auto, where the step begins in intersection
+  Buffer<EdgeCrossing> crossings;         ///< Intersection: of all batches
+  Buffer<EdgeCrossing> crossingsAtStart;  ///< Auto, where the step begins in intersection
   Buffer<PiercedPair> pierced;            ///< the same
   FeaturePairs features;                  ///< scratch: of the present batch
   Buffer<ElementPair> part, calm, fast;   ///< scratch: some pairs of the present batch

@@ -37,7 +37,7 @@ class CrossingEdges {
  public:
   /// ofB: the edges are of MeshPair::b.
   CrossingEdges(const MeshPair& pair, bool ofB, bool atStart, std::uint32_t triangle,
-                std::uint32_t crossed, Buffer<Crossing>& out)
+                std::uint32_t crossed, Buffer<EdgeCrossing>& out)
       : m_mesh(ofB ? pair.b : pair.a, atStart),
         m_others((ofB ? pair.a : pair.b).topology),
         m_ofB(ofB && !pair.self()),
@@ -77,18 +77,18 @@ class CrossingEdges {
   bool m_ofB;
   std::uint32_t m_triangle, m_crossed;
   Corners m_corners;
-  Buffer<Crossing>& m_out;
+  Buffer<EdgeCrossing>& m_out;
 };
 
 /// How often more an edge leaves the surface than it enters it, on the way from its first vertex.
 /// crossings: of one edge, sorted.
-int timesOfLeaving(std::span<const Crossing> crossings) {
+int timesOfLeaving(std::span<const EdgeCrossing> crossings) {
   int sum = 0;
   for (auto first = crossings.begin(); first != crossings.end();) {
-    const auto end = std::find_if(first, crossings.end(),
-                                  [&](const Crossing& c) { return c.through != first->through; });
+    const auto end = std::find_if(
+        first, crossings.end(), [&](const EdgeCrossing& c) { return c.through != first->through; });
     const bool leaves = first->lowerIsBehind;
-    if (std::all_of(first, end, [&](const Crossing& c) { return c.lowerIsBehind == leaves; }))
+    if (std::all_of(first, end, [&](const EdgeCrossing& c) { return c.lowerIsBehind == leaves; }))
       sum += leaves ? 1 : -1;
     first = end;
   }
@@ -173,7 +173,7 @@ class NearestInFront {
 }  // namespace
 
 void recordCrossings(const MeshPair& pair, bool atStart, const ElementPair& triangles,
-                     const TriangleIntersection& found, Buffer<Crossing>& out) {
+                     const TriangleIntersection& found, Buffer<EdgeCrossing>& out) {
   CrossingEdges ofA(pair, false, atStart, triangles.a, triangles.b, out),
       ofB(pair, true, atStart, triangles.b, triangles.a, out);
   const auto touches = [&](int i, int j) {
@@ -193,7 +193,7 @@ void recordCrossings(const MeshPair& pair, bool atStart, const ElementPair& tria
 }
 
 void PiercingContacts::collect(std::span<ContactBuffers* const> found,
-                               Buffer<Crossing> ContactBuffers::*list) {
+                               Buffer<EdgeCrossing> ContactBuffers::*list) {
   m_crossings.clear();
   for (const ContactBuffers* buffers : found)
     m_crossings.insert(m_crossings.end(), (buffers->*list).begin(), (buffers->*list).end());
@@ -240,7 +240,7 @@ void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuff
 void PiercingContacts::findBehind(const MeshPair& pair) {
   m_behind.clear();
   for (auto first = m_crossings.begin(); first != m_crossings.end();) {
-    const auto end = std::find_if(first, m_crossings.end(), [&](const Crossing& c) {
+    const auto end = std::find_if(first, m_crossings.end(), [&](const EdgeCrossing& c) {
       return c.ofB != first->ofB || c.edge != first->edge;
     });
     const int leaves = timesOfLeaving({first, end});

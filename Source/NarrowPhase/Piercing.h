@@ -14,7 +14,7 @@ namespace palpate {
 /// Appends the crossings of two intersecting triangles at the step's start or at its end. See
 /// PiercingContacts.
 void recordCrossings(const MeshPair&, bool atStart, const ElementPair&, const TriangleIntersection&,
-                     Buffer<Crossing>& out);
+                     Buffer<EdgeCrossing>& out);
 
 /// The contacts of triangles that pierce each other, without touching features. They depend on all
 /// crossings of a pair of meshes, and are therefore found after the last batch.
@@ -50,13 +50,13 @@ class PiercingContacts {
     std::uint32_t vertex, triangle;
     auto operator<=>(const Behind&) const = default;
   };
-  void collect(std::span<ContactBuffers* const> found, Buffer<Crossing> ContactBuffers::*list);
+  void collect(std::span<ContactBuffers* const> found, Buffer<EdgeCrossing> ContactBuffers::*list);
   void findBehind(const MeshPair&);
   void addDepths(const MeshPair&, bool atStart, ContactBuffers& out);
   bool isBehind(bool ofB, std::uint32_t vertex) const;
   bool hasEndBehind(const MeshPair&, const PiercedPair&) const;
 
-  Buffer<Crossing> m_crossings;
+  Buffer<EdgeCrossing> m_crossings;
   Buffer<Behind> m_behind;
 };
 
