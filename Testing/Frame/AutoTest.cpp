@@ -166,22 +166,11 @@ TEST(Auto, FindsEverythingThatContinuousFinds) {
   EXPECT_GT(found, 20000u / kShareOfCases);
 }
 
-/// The vertices that have a negative distance, by list.
-std::array<std::set<std::uint32_t>, 2> verticesBehind(const CollisionData& data) {
-  std::array<std::set<std::uint32_t>, 2> behind;
-  for (const auto& c : data.vertexTriangle())
-    if (c.distance < 0) behind[0].insert(c.vertex);
-  for (const auto& c : data.triangleVertex())
-    if (c.distance < 0) behind[1].insert(c.vertex);
-  return behind;
-}
-
 /// With Distinct, each contact of Continuous is present, or a contact of the same vertex (of one
-/// vertex of each edge) represents it. Exceptions are contacts of vertices that are behind the
-/// other mesh at an end of the step.
+/// vertex of each edge) represents it. This holds for steps that begin without intersections.
 TEST(Auto, DistinctContactsRepresentAllThatContinuousFinds) {
   Random random(13);
-  std::size_t found = 0, excepted = 0;
+  std::size_t found = 0;
   for (int i = 0; i < casesOf(1500); ++i) {
     const Motion& motion = kMotions[i % std::size(kMotions)];
     const Case c = randomCase(random, motion.slow * uniform(random, 0, 2), motion.fastShare,
@@ -208,20 +197,9 @@ TEST(Auto, DistinctContactsRepresentAllThatContinuousFinds) {
       return std::any_of(vertices.begin(), vertices.end(),
                          [&](std::uint32_t v) { return set.contains(v); });
     };
-    std::array<std::set<std::uint32_t>, 2> behind;
-    if (!run.data().validity().startedApart)
-      for (const bool atStart : {true, false}) {
-        PairRun ends(settingsOf(Engine::Octree), c.a, c.b, {Method::Intersection}, false);
-        const auto &a = atStart ? c.a.positions : c.aNow, &b = atStart ? c.b.positions : c.bNow;
-        ends.step(a, a, b, b);
-        auto found = verticesBehind(ends.data());
-        for (int i = 0; i < 2; ++i) behind[i].merge(found[i]);
-      }
+    // Contacts that stand for others may be of vertices behind, and not be reported.
+    if (!run.data().validity().startedApart) continue;
     const auto expectRepresented = [&](const auto& featureOfA, const auto& featureOfB) {
-      if (any(behind[0], featureOfA) || any(behind[1], featureOfB)) {
-        ++excepted;
-        return;
-      }
       EXPECT_TRUE(any(ofA, featureOfA) && any(ofB, featureOfB));
     };
     for (const auto& contact : truth.data().vertexTriangle())
@@ -233,7 +211,6 @@ TEST(Auto, DistinctContactsRepresentAllThatContinuousFinds) {
     found += idsOf(truth.data()).size();
     if (HasFailure()) FAIL() << motion.name << ", case " << i;
   }
-  EXPECT_LT(excepted, found / 2);
   EXPECT_GT(found, 10000u / kShareOfCases);
 }
 

@@ -425,8 +425,9 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
                     std::to_string(static_cast<int>(answered))]
         .counts[what];
   };
-  for (const char* what : {"behind", "in front", "edges"})
-    EXPECT_GT(count(Method::Intersection, Method::Intersection, what), leastOf(100)) << what;
+  EXPECT_GT(count(Method::Intersection, Method::Intersection, "behind"), leastOf(100));
+  for (const char* what : {"in front", "edges"})  // where no end of a crossing edge is behind
+    EXPECT_GT(count(Method::Intersection, Method::Intersection, what), leastOf(10)) << what;
   for (const Method method : {Method::Proximity, Method::Continuous}) {
     EXPECT_GT(count(method, method, "edges"), leastOf(1000));
     EXPECT_GT(count(method, method, "shape"), leastOf(1000));
@@ -436,8 +437,7 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
     for (const char* what : {"within an edge", "at an edge's end"})
       EXPECT_GT(count(method, method, what), leastOf(100)) << what;
   }
-  for (const Method method :
-       {Method::Intersection, Method::Proximity, Method::Continuous, Method::Auto})
+  for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto})
     EXPECT_GT(count(Method::Auto, method, "edges"), leastOf(100)) << static_cast<int>(method);
   EXPECT_GT(count(Method::Auto, Method::Intersection, "behind"), leastOf(30));
   EXPECT_GT(count(Method::Auto, Method::Continuous, "behind"), leastOf(10));
