@@ -45,7 +45,7 @@ Mesh block(const Vector3d& low, const Vector3d& high) {
   return mesh;
 }
 
-Eigen::Matrix3d randomTurn(Random& random) {
+Eigen::Matrix3d anyTurn(Random& random) {
   return Eigen::Quaterniond(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1),
                             uniform(random, -1, 1))
       .normalized()
@@ -160,8 +160,8 @@ TEST(Penetration, TheTranslationSeparatesBodiesOfAllKinds) {
   for (const Mesh& first : kinds)
     for (const Mesh& second : kinds)
       for (int i = 0; i < 4; ++i) {
-        const Mesh a = turned(first, randomTurn(random)),
-                   b = moved(turned(second, randomTurn(random)), randomPoint(random, -1.2, 1.2));
+        const Mesh a = turned(first, anyTurn(random)),
+                   b = moved(turned(second, anyTurn(random)), randomPoint(random, -1.2, 1.2));
         const Penetration p = Bodies(a, b).penetration();
         EXPECT_EQ(p.intersecting, !areApart(a, b));
         if (!p.intersecting) continue;
@@ -176,7 +176,7 @@ TEST(Penetration, APlacedBodyIsSeparatedByItsTranslation) {
   Random random(2);
   for (int i = 0; i < 20; ++i) {
     const Mesh a = torus(12, 6, 1.0, 0.3), b = sphere(6, 8, {0, 0, 0}, 1.0);
-    const Eigen::Matrix3d turn = randomTurn(random);
+    const Eigen::Matrix3d turn = anyTurn(random);
     const Vector3d shift = randomPoint(random, 100, 101), place = shift + Vector3d(0.6, 0.3, 0.2);
     Bodies bodies(a, b);
     bodies.collisions.setTransform(bodies.a, turn, shift);
@@ -248,8 +248,8 @@ TEST(Penetration, OfConvexBodiesNoTranslationIsShorter) {
   for (const Mesh& first : kinds)
     for (const Mesh& second : kinds)
       for (int i = 0; i < 5; ++i) {
-        const Mesh a = turned(first, randomTurn(random)),
-                   b = moved(turned(second, randomTurn(random)), randomPoint(random, -0.6, 0.6));
+        const Mesh a = turned(first, anyTurn(random)),
+                   b = moved(turned(second, anyTurn(random)), randomPoint(random, -0.6, 0.6));
         const Penetration p = Bodies(a, b).penetration();
         if (!p.intersecting) continue;
         EXPECT_NEAR(p.depth, leastTranslation(a, b), 1e-9);
