@@ -21,7 +21,9 @@ double millisecondsSince(std::chrono::steady_clock::time_point start) {
 }  // namespace
 
 RigidRun::RigidRun(const RigidScene& scene, const RigidContestant& contestant)
-    : m_method(contestant.method), m_isClosed(findMeshDefects(scene.body.triangles).closed()) {
+    : m_method(contestant.method),
+      m_thickness(scene.thickness),
+      m_isClosed(findMeshDefects(scene.body.triangles).closed()) {
   const auto start = std::chrono::steady_clock::now();
   const scenes::SceneMesh &body = scene.body, &tool = scene.tool;
   m_tool = tool.triangles.empty() ? m_detection.addPointSet(tool.positions)
@@ -55,6 +57,7 @@ double RigidRun::step(std::span<const Vector3d> now) {
 }
 
 double RigidRun::depth() const {
+  if (m_method == Method::Proximity) return m_thickness;
   return m_method == Method::Proxy ? data().validity().proxyDepth : kInfinity;
 }
 
@@ -88,7 +91,9 @@ void RigidScore::add(const RigidScene& scene, const RigidRun& run, std::span<con
   const double rounding = 1e-12 * (scene.thickness + scene.band), stated = run.errorBound(),
                bound = stated + rounding;
   // Proximity's answers have no error bound, but they are trusted or not.
-  const auto isSilent = [&](bool isDoubtful) { return hasSign ? !isDoubtful : run.isTrusted(); };
+  const auto isSilent = [&](bool isDoubtful) {
+    return !isDoubtful && (hasSign || run.isTrusted());
+  };
   statedWorst = std::max(statedWorst, stated);
   const std::vector<VertexClaim> reported = run.claims();
   claims += reported.size();

@@ -51,7 +51,8 @@ class RigidRun {
   std::vector<VertexClaim> claims() const;
   /// L: the error that the last answer states. 0: none.
   double errorBound() const { return data().errorBound(); }
-  /// L: vertices deeper than this may be missing; the last answer says so.
+  /// L: vertices deeper than this may be missing. Proximity examines surfaces only, and is trusted
+  /// even so (law 5 of Validity); a proxy's last answer says so.
   double depth() const;
   Method method() const { return m_method; }
   /// Whether distances from the body have a sign at the point.
@@ -68,6 +69,7 @@ class RigidRun {
   OctreeBasedCD m_detection{Settings{.threads = 1}};
   GeometryId m_tool{}, m_body{};
   Method m_method;
+  double m_thickness;                            ///< L
   bool m_isClosed;                               ///< the body
   std::shared_ptr<const DistanceField> m_field;  ///< Method::DistanceField
   double m_buildMilliseconds = 0;
