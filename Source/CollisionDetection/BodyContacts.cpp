@@ -26,7 +26,7 @@ bool mayBeBodies(const PairRecord& record) {
       record.meshes().hasFilters())
     return false;
   return !record.a->mesh.topology.triangles.empty() && !record.b->mesh.topology.triangles.empty() &&
-         isClosed(*record.a) && isClosed(*record.b);
+         hasClosedSurface(*record.a) && hasClosedSurface(*record.b);
 }
 
 Eigen::AlignedBox3d boxOf(const SearchableGeometry& geometry) {
@@ -157,16 +157,23 @@ class InnerSides {
   PointQueryStack& m_stack;
 };
 
-void removeImpacts(BodyContacts::Buffers step) {
+/// Both return whether they removed any.
+bool removeImpacts(BodyContacts::Buffers step) {
+  std::size_t removed = 0;
   for (ContactBuffers* buffers : step)
-    forEachTimed(*buffers, [](auto& list) {
-      std::erase_if(list, [](const auto& contact) { return contact.timeOfImpact < 1.0; });
+    forEachTimed(*buffers, [&](auto& list) {
+      removed +=
+          std::erase_if(list, [](const auto& contact) { return contact.timeOfImpact < 1.0; });
     });
+  return removed > 0;
 }
 
-void removeInner(BodyContacts::Buffers step, const InnerSides& sides) {
+bool removeInner(BodyContacts::Buffers step, const InnerSides& sides) {
+  std::size_t removed = 0;
   for (ContactBuffers* buffers : step)
-    sides.forEachList(*buffers, [](auto& list, auto&& isInner) { std::erase_if(list, isInner); });
+    sides.forEachList(*buffers,
+                      [&](auto& list, auto&& isInner) { removed += std::erase_if(list, isInner); });
+  return removed > 0;
 }
 
 /// Whether features leave a body within the step, as it seems by the normals of impacts.
@@ -185,6 +192,7 @@ bool anyLeaves(BodyContacts::Buffers step, const InnerSides& sides) {
 
 bool BodyContacts::find(const PairRecord& record, Engine engine, bool startsIntersecting,
                         Buffers local, Buffers step) {
+  m_hasRemoved = false;
   if (!mayBeBodies(record)) return false;
   const SearchableGeometry &a = *record.a, &b = *record.b;
   PointQueryStack& stack = m_scratch.pair.stack;
@@ -196,12 +204,12 @@ bool BodyContacts::find(const PairRecord& record, Engine engine, bool startsInte
     return false;
   const double extent = std::min(record.a->inStep().extent, record.b->inStep().extent);
   if (meet && areShallow(local, std::max(record.pair.settings.thickness, kShallowShare * extent))) {
-    removeInner(step, sides);
+    m_hasRemoved = removeInner(step, sides);
     return false;
   }
   const Penetration found = penetrationOf(a, b, engine, m_scratch);
   if (found.intersecting) addContacts(record, engine, found, local);
-  if (!found.intersecting && !meet) removeImpacts(step);
+  if (!found.intersecting && !meet) m_hasRemoved = removeImpacts(step);
   return found.intersecting;
 }
 

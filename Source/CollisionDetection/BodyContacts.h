@@ -28,6 +28,8 @@ class BodyContacts {
   ///          other body at the end, or that leave it within the step.
   bool find(const PairRecord&, Engine, bool startsIntersecting, Buffers local, Buffers step);
   ContactBuffers& contacts() { return m_contacts; }
+  /// Whether the last find() removed contacts of `step`.
+  bool hasRemoved() const { return m_hasRemoved; }
 
  private:
   void addContacts(const PairRecord&, Engine, const Penetration&, Buffers local);
@@ -36,6 +38,7 @@ class BodyContacts {
 
   PenetrationScratch m_scratch;
   ContactBuffers m_contacts;
+  bool m_hasRemoved = false;
 };
 
 }  // namespace palpate

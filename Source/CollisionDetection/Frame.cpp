@@ -722,10 +722,10 @@ std::size_t Frame::preferBodies(PairRecord& record, Engine engine, std::size_t p
   const BodyContacts::Buffers all(m_buffers);
   const bool byIntersection = record.plan.method == Method::Intersection;
   const BodyContacts::Buffers local = byIntersection ? all : BodyContacts::Buffers(m_intersections);
-  if (!m_bodies->find(record, engine, m_facts.startsPiercing(), local,
-                      all.subspan(byIntersection ? all.size() : preferred)))
-    return preferred;
-  record.plan.byBodies = true;
+  const bool areDeep = m_bodies->find(record, engine, m_facts.startsPiercing(), local,
+                                      all.subspan(byIntersection ? all.size() : preferred));
+  record.plan.byBodies = areDeep || m_bodies->hasRemoved();
+  if (!areDeep) return preferred;
   m_buffers.assign(1, &m_bodies->contacts());
   return 1;
 }
@@ -753,6 +753,7 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
     m_buffers.push_back(&m_impacts);
   }
   if (record.plan.startsIntersecting) m_facts.atStart = Meeting::Piercing;
+  record.plan.startsIntersecting = m_facts.startsPiercing();
   std::size_t preferredBuffers = 0;
   if (m_facts.startsPiercing() && record.plan.runsIntersection) {
     m_leaving.clear();

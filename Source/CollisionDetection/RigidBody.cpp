@@ -1,6 +1,7 @@
 #include "CollisionDetection/RigidBody.h"
 
 #include "CollisionDetection/Geometry.h"
+#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Octree/PointQueries.h"
 #include "Octree/Traversal.h"
@@ -135,7 +136,7 @@ double RigidSearch::arcDeviation(const Geometry& geometry) {
                            });
   if (!(geometry.shape && geometry.shape->now.isCylinder() && deviation > 0.0)) return deviation;
   const std::span<const Vector3d> ends = geometry.shape->now.corners();
-  const double slope = 4.0 * deviation / (ends[1] - ends[0]).stableNorm();
+  const double slope = 4.0 * deviation / stableLength(ends[1] - ends[0]);
   return deviation + slope * geometry.shape->now.radius();
 }
 

@@ -303,8 +303,8 @@ void append(const Buffer<Contact>& found, Buffer<Contact>& out) {
   out.insert(out.end(), found.begin(), found.end());
 }
 
-/// Contacts of triangles that pierce each other depend on all triangles: for a sample they are not
-/// found.
+/// Contacts of triangles that pierce each other depend on all triangles: for a sample they are left
+/// to the caller, with the crossings in `out`.
 void findIntersections(const MeshPair& pair, const FeatureLists& lists, ContactBuffers& out) {
   const auto countB = static_cast<std::uint32_t>(pair.b.topology.triangles.size());
   for (const std::uint32_t a : lists.trianglesOfA)

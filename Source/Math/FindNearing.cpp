@@ -2,6 +2,7 @@
 
 #include "Exact/Rational.h"
 #include "Math/ClosestPoint.h"
+#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
@@ -30,7 +31,7 @@ double motionOf(const ImpactQuery& query) {
   double most = 0;
   forEachVertexPair(query.kind, [&](int i, int j) {
     const auto &p = query.vertices[i], &q = query.vertices[j];
-    most = std::max(most, ((p.now - q.now) - (p.before - q.before)).stableNorm());
+    most = std::max(most, stableLength((p.now - q.now) - (p.before - q.before)));
   });
   return most;
 }

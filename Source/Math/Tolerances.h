@@ -100,9 +100,12 @@ constexpr double kCertainDirection = 0x1p-26;
 
 // ---- Normals of features that touch (NarrowPhase/TouchNormal.cpp) ----
 
-/// Sine of an angle: unit vectors that differ by less are equal. Above kCertainDirection's 2^-24 and
-/// the rounding of a star's directions, and far below any angle that matters to a solver.
+/// Sine of an angle: unit vectors that differ by less are equal. Above kCertainDirection's 2^-24
+/// and the rounding of a star's directions, and far below any angle that matters to a solver.
 constexpr double kTouchAngle = 0x1p-20;
+/// A weight: closest points this near to an edge or a corner meet it. Above the default
+/// timeTolerance, by which an impact may be early, and far below what matters to a solver.
+constexpr double kMeetingWeight = 0x1p-16;
 /// L: shorter vectors are scaled up before they are interpolated in time.
 constexpr double kTinyLength = 0x1p-500;
 

@@ -114,21 +114,29 @@ class Star {
   const double m_time;
 };
 
-bool isOnSideOf(const Approach& approach, const Vector3d& normal) {
-  return normal.dot(approach.side) > kTouchAngle && normal.dot(approach.origin) > kTouchAngle;
-}
+/// What the step tells about the side of the first feature.
+struct KnownSide {
+  Approach approach;
+  /// The normal of the plane through both features, on that side. None if they were always in it.
+  std::optional<Vector3d> plane;
+
+  bool has(const Vector3d& normal) const {
+    return normal.dot(approach.side) > kTouchAngle && normal.dot(approach.origin) > kTouchAngle &&
+           (!plane || normal.dot(*plane) > -kTouchAngle);
+  }
+};
 
 /// The best of the candidates so far, as touchNormal() orders them.
 class BestNormal {
  public:
-  BestNormal(const Star& first, const Star& second, const std::optional<Approach>& approach,
+  BestNormal(const Star& first, const Star& second, const std::optional<KnownSide>& side,
              const Vector3d& other)
-      : m_first(first), m_second(second), m_approach(approach), m_other(other) {}
+      : m_first(first), m_second(second), m_side(side), m_other(other) {}
 
   /// kind: lower ones win among equally good candidates.
   void offer(const Vector3d& normal, int kind) {
-    if (m_approach && !isOnSideOf(*m_approach, normal)) return;
-    const double agreement = m_approach ? normal.dot(m_approach->side) : agreementOf(normal);
+    if (m_side && !m_side->has(normal)) return;
+    const double agreement = m_side ? normal.dot(m_side->approach.side) : agreementOf(normal);
     const Rank rank{std::floor(violationOf(normal) / kTouchAngle),
                     static_cast<double>(kind),
                     -std::round(agreement / kTouchAngle),
@@ -168,7 +176,7 @@ class BestNormal {
   }
 
   const Star &m_first, &m_second;
-  const std::optional<Approach>& m_approach;
+  const std::optional<KnownSide>& m_side;
   const Vector3d m_other;
   std::optional<Vector3d> m_normal;
   Rank m_rank{};
@@ -215,18 +223,21 @@ TouchNormal touchNormal(const Features<kind>& of, std::uint32_t firstId, std::ui
                                                       : holders[0].kind == FeatureKind::Edge &&
                                                             holders[1].kind == FeatureKind::Edge;
   const Star first(of.first, holders[0], time), second(of.second, holders[1], time);
-  std::optional<Approach> approach;
-  if (moves(query) && interiors)
-    if (const auto found = normalOfPlane(query, time, exactDecisions)) return {*found, true};
+  std::optional<Vector3d> plane;
+  if (moves(query)) plane = normalOfPlane(query, time, exactDecisions);
+  if (plane && interiors) return {*plane, true};
+  std::optional<KnownSide> side;
   if (interiors && spanPlane(query, time)) {
-    BestNormal best(first, second, approach, normal);
+    BestNormal best(first, second, side, normal);
     best.offerBoth(normal, 0);
     return {best.normal(), false};
   }
-  if (moves(query)) approach = approachOf(query, time);
-  BestNormal best(first, second, approach, approach ? approach->side : normal);
+  if (moves(query))
+    if (const auto approach = approachOf(query, time)) side = KnownSide{*approach, plane};
+  BestNormal best(first, second, side, side ? side->approach.side : normal);
   offerAll(first, second, best);
-  return {best.normal(), approach.has_value()};
+  if (plane && !best.separates()) best.offer(*plane, 2);
+  return {best.normal(), side.has_value()};
 }
 
 template TouchNormal touchNormal(const Features<Kind::VertexTriangle>&, std::uint32_t,

@@ -6,7 +6,6 @@
 #include "Math/TranslationExit.h"
 #include "Queries/BodyOverlap.h"
 #include "Queries/HullSeparation.h"
-#include "Queries/ShortestTranslation.h"
 
 #include <Eigen/Geometry>
 
@@ -14,6 +13,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 namespace palpate {
@@ -198,7 +198,8 @@ class Search {
     if (found.separates && found.depth < m_best.depth) m_best = found;
   }
   void descend(const Translation& first) {
-    ShortestTranslation shortest;
+    ShortestTranslation& shortest = m_scratch.shortest;
+    shortest.clear();
     shortest.add(first.last.normal, first.last.normal.dot(first.depth * first.direction));
     double depth = first.depth;
     for (int i = 0; i < kMostDescents; ++i) {
@@ -218,14 +219,15 @@ class Search {
     seeds.clear();
     addNormals();
     addSphere();
-    for (auto& [bound, direction] : seeds) bound = boundOf(direction);
-    std::stable_sort(seeds.begin(), seeds.end(),
-                     [](const auto& l, const auto& r) { return l.first < r.first; });
+    for (auto& seed : seeds) seed.bound = boundOf(seed.direction);
+    std::sort(seeds.begin(), seeds.end(), [](const auto& l, const auto& r) {
+      return std::tie(l.bound, l.place) < std::tie(r.bound, r.place);
+    });
     int translations = 0;
-    for (const auto& [bound, direction] : seeds) {
+    for (const auto& seed : seeds) {
       if (translations++ == kMostTranslations && m_best.separates) break;
-      if (!(bound < m_best.depth)) break;
-      improve(direction, kWorthDescent * m_best.depth);
+      if (!(seed.bound < m_best.depth)) break;
+      improve(seed.direction, kWorthDescent * m_best.depth);
     }
   }
   double boundOf(const Vector3d& direction) {
@@ -239,8 +241,8 @@ class Search {
   void addSeed(const Vector3d& direction) {
     if (direction == Vector3d::Zero()) return;
     for (const auto& seed : m_scratch.seeds)
-      if (seed.second.dot(direction) > kSameNormal) return;
-    m_scratch.seeds.emplace_back(0.0, direction);
+      if (seed.direction.dot(direction) > kSameNormal) return;
+    m_scratch.seeds.push_back({direction, m_scratch.seeds.size()});
   }
   void addNormals() {
     const auto add = [&](bool ofA, std::uint32_t element) {
@@ -272,7 +274,8 @@ class Search {
         for (int z = -kSteps; z <= kSteps; ++z)
           if (std::max({std::abs(x), std::abs(y), std::abs(z)}) == kSteps) {
             const Vector3d direction(x, y, z);
-            m_scratch.seeds.emplace_back(0.0, direction / stableLength(direction));
+            m_scratch.seeds.push_back(
+                {direction / stableLength(direction), m_scratch.seeds.size()});
           }
   }
 

@@ -3,21 +3,31 @@
 #include <palpate/SpatialQueries.h>
 
 #include "Queries/BodyPair.h"
+#include "Queries/ShortestTranslation.h"
 #include "Shapes/Polytope.h"
 
 #include <Eigen/Core>
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
 namespace palpate {
 
 struct PenetrationScratch {
+  /// A direction to try.
+  struct Seed {
+    Eigen::Vector3d direction;
+    std::size_t place;  ///< in the order in which directions were found
+    double bound = 0;   ///< L: no translation along it that separates is shorter
+  };
+
   BodyPairScratch pair;
   Polytope difference;
-  std::vector<BodyPair::Meeting> meetings;                ///< where a is not moved
-  std::vector<std::uint32_t> insideA, insideB;            ///< some vertices inside the other body
-  std::vector<std::pair<double, Eigen::Vector3d>> seeds;  ///< directions, with a bound of the depth
+  ShortestTranslation shortest;
+  std::vector<BodyPair::Meeting> meetings;      ///< where a is not moved
+  std::vector<std::uint32_t> insideA, insideB;  ///< some vertices inside the other body
+  std::vector<Seed> seeds;
 };
 
 /// The translation of a that separates two closed meshes (SpatialQueries::penetration()).

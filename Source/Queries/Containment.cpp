@@ -163,8 +163,11 @@ void findInside(const SearchableGeometry& vertices, const SearchableGeometry& bo
 }
 
 bool isClosed(SearchableGeometry& body) {
+  return body.solid || hasClosedSurface(body);  // tetrahedra define their inside
+}
+
+bool hasClosedSurface(SearchableGeometry& body) {
   MeshTopology& topology = body.mesh.topology;
-  if (body.solid) return true;  // its tetrahedra define its inside
   if (!topology.hasFaces()) return false;
   if (!topology.closed) topology.closed = findMeshDefects(topology.triangles).closed();
   return *topology.closed;

@@ -35,5 +35,8 @@ void checkSettings(const SearchableGeometry& body, const InsideSettings&);
 void checkInside(SearchableGeometry& body, InsideRule);
 /// Whether checkInside() accepts a body with elements for InsideRule::Closed.
 bool isClosed(SearchableGeometry& body);
+/// Whether a body's triangles are closed and consistently oriented. Those of a tetrahedral mesh are
+/// not where parts of it hang together by an edge alone.
+bool hasClosedSurface(SearchableGeometry& body);
 
 }  // namespace palpate

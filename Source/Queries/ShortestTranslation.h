@@ -13,6 +13,10 @@ namespace palpate {
 /// tried.
 class ShortestTranslation {
  public:
+  void clear() {
+    m_normals.clear();
+    m_heights.clear();
+  }
   void add(const Eigen::Vector3d& normal, double height) {
     m_normals.push_back(normal);
     m_heights.push_back(height);

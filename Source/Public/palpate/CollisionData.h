@@ -38,9 +38,13 @@ namespace palpate {
 //          Intersection it has one contact of negative distance, with the nearest feature around
 //          the triangles that its edges pierce: a face, an edge or a vertex. It names the lowest
 //          triangle that holds this feature and behind which the vertex is.
-// Touch    If the centres are at distance 0, the normal is the winding normal or the cross product
-//          of the edges, as <palpate/Distance.h> states. Method::Continuous without a thickness
-//          turns it to the side from which the features came.
+// Touch    If the centres are at distance 0, or for an impact without a thickness, the normal is
+// one
+//          that can separate the surfaces: no triangle at the first feature lies on its back side,
+//          and none at the second one on its front side, as far as such a normal exists. It is
+//          the normal of a triangle at either feature, else the cross product of two edges there,
+//          else the direction from which the features came. Where the step tells that side, the
+//          normal is on it; otherwise closed surfaces tell it.
 // Side     A contact at the step's end by Proximity has the normal of the positions there. If the
 //          features have crossed, it is on the wrong side. An impact has the side from which its
 //          features came. If a step of Auto begins in intersection, contacts of vertices that are

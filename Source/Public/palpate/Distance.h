@@ -75,8 +75,8 @@ struct EdgeEdgeDistance {
 /// Returns  with the accuracy of vertexTriangleDistance(). At distance 0 the normal is the cross
 ///          product of p1 - p0 and q1 - q0. For parallel edges it is then the coordinate axis along
 ///          which both together extend least, x before y before z, and reversed if the positions of
-///          edge q come before those of edge p in lexicographic order. If parallel edges lie side by
-///          side, the closest points are in the middle of the stretch that they share.
+///          edge q come before those of edge p in lexicographic order. If parallel edges lie side
+///          by side, the closest points are in the middle of the stretch that they share.
 /// Laws     (1) swapping the ends of an edge turns its weight w into 1 - w; all else has the same
 ///          bits. At distance 0 it also reverses the normal of edges that are not parallel.
 ///          (2) swapping the edges swaps the weights and reverses difference and normal, unless

@@ -61,13 +61,14 @@ enum class MethodReason {
 struct Validity {
   /// Whether the conditions of `method` held in this step. The laws say what follows from it.
   bool trusted = false;
-  /// Whether the surfaces are known not to intersect at the step's start, from distances there, an
-  /// initial intersection check, or earlier frames and bounds on the motion since. Lines and points
-  /// count with their radii, and shapes are solid; a mesh may be wholly inside another. If false,
-  /// they intersect, or the library does not know. By Auto they intersect, or radii or a shape
-  /// touch within rounding, unless `method` is Intersection, DistanceField or Proxy, or Proximity
-  /// with one radius per vertex. How deep radii and shapes overlap is the negative `distance` of
-  /// contacts at time 0. Proximity whose `displacement` exceeds its limit checks nothing.
+  /// Whether the surfaces are known neither to intersect nor to touch at the step's start, from
+  /// distances there, an initial intersection check, or earlier frames and bounds on the motion
+  /// since. Lines and points count with their radii, and shapes are solid; a mesh may be wholly
+  /// inside another. If false, they intersect or touch, or the library does not know. By
+  /// Auto they do, radii and shapes within rounding, unless `method` is Intersection, DistanceField
+  /// or Proxy, or Proximity with one radius per vertex. How deep radii and shapes overlap is the
+  /// negative `distance` of contacts at time 0. Proximity whose `displacement` exceeds its limit
+  /// checks nothing.
   bool startedApart = false;
   /// Whether some normal may be on the wrong side, if `method` is Proximity, Continuous or Auto: it
   /// is then the opposite of `trusted`. Intersection knows no sides, and the value is always false
