@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <tuple>
@@ -99,11 +100,12 @@ class Search {
     const Vector3d shift = at.depth * at.direction;
     const double start = at.depth;
     bool any = false;
-    m_pair.forEachMeeting(shift, [&](const BodyPair::Meeting& meeting) {
+    const auto takeMeeting = [&](const BodyPair::Meeting& meeting) {
       any = true;
       takeExit(at, start, meeting);
       return true;
-    });
+    };
+    m_pair.forEachMeeting(shift, std::ref(takeMeeting));  // a copy would allocate
     if (any) return true;
     const auto part = m_pair.findInsidePart(shift);
     if (!part) return false;
