@@ -189,17 +189,4 @@ std::optional<RayHit> BodyPair::hitOf(const PartVertex& part, const Vector3d& sh
       .first(kLargest);
 }
 
-std::optional<BodyPair::Exit> BodyPair::lastExitOf(const PartVertex& vertex,
-                                                   const Vector3d& direction, double begin,
-                                                   double end) const {
-  const Vector3d& p = vertices(vertex.ofA).positions[vertex.vertex];
-  RayHits hits(geometry(!vertex.ofA), {p, direction, begin, end}, m_engine == Engine::BruteForce,
-               m_scratch.met);
-  std::optional<Exit> last;
-  hits.forAllParts([&](const RayHits::Part& part) {
-    if (part.last > begin) last = Exit{part.last, part.exitElement};
-  });
-  return last;
-}
-
 }  // namespace palpate

@@ -88,14 +88,6 @@ class BodyPair {
   /// by `shift`, against it.
   std::optional<RayHit> hitOf(const PartVertex&, const Eigen::Vector3d& shift,
                               const Eigen::Vector3d& direction) const;
-  /// Where a vertex, on its way along a direction from `begin` to `end`, passes the other body's
-  /// surface last. Both are L, from where it is.
-  struct Exit {
-    double distance;  ///< L, from where it is
-    std::uint32_t element;
-  };
-  std::optional<Exit> lastExitOf(const PartVertex&, const Eigen::Vector3d& direction, double begin,
-                                 double end) const;
 
  private:
   Eigen::Vector3d moved(std::uint32_t vertexOfA, const Eigen::Vector3d& shift) const;

@@ -42,9 +42,6 @@ struct PairPlan {
   /// Auto: an attached proxy answers all particles but those that may have an impact in the step.
   /// The method above answers the others.
   bool byProxy = false;
-  /// Auto: contacts of two bodies that are deep in each other stand for those of the method, or
-  /// contacts on an inner side of a body were removed.
-  bool byBodies = false;
   double proxyThickness = 0;        ///< L: up to which it reports contacts
   bool startsIntersecting = false;  ///< triangles are known to intersect at the step's start
   /// Whether the boxes enclose the motion over the whole step.
