@@ -12,7 +12,6 @@
 #include "NarrowPhase/ElementBoxes.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/Intersection.h"
-#include "NarrowPhase/Meeting.h"
 #include "NarrowPhase/Piercing.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Queries/ElementsNearShape.h"
@@ -416,9 +415,7 @@ struct Frame::Job : CountedObject {
   /// Auto: finds intersections at the step's end.
   static void detectIntersections(Job& job, std::span<const ElementPair> pairs) {
     const MemoryScope memory(MemoryStage::NarrowPhase);
-    const MeshPair meshes = job.record->meshes();
-    findIntersections(meshes, pairs, job.intersections);
-    if (meshes.step.motion > 0.0) findCrossingsAtStart(meshes, pairs, job.intersections);
+    findIntersections(job.record->meshes(), pairs, job.intersections);
   }
 
   void findEarliest(const MeshPair& meshes, std::span<const ElementPair> pairs) {
@@ -719,10 +716,6 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   const MemoryScope memory(MemoryStage::Results);
   m_facts.clear();
   m_impacts.clear();
-  m_pierced.clear();
-  const bool byIntersection = record.plan.method == Method::Intersection;
-  m_piercingContacts.find(record.meshes(), byIntersection ? m_buffers : m_intersections, m_pierced);
-  (byIntersection ? m_buffers : m_intersections).push_back(&m_pierced);
   for (const auto* buffers : {&m_buffers, &m_intersections})
     for (const ContactBuffers* found : *buffers) {
       m_facts.add(found->facts);
@@ -737,12 +730,8 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
     m_buffers.push_back(&m_impacts);
   }
   if (record.plan.startsIntersecting) m_facts.atStart = Meeting::Piercing;
-  record.plan.startsIntersecting = m_facts.startsPiercing();
   std::size_t preferredBuffers = 0;
   if (m_facts.startsPiercing() && record.plan.runsIntersection) {
-    m_leaving.clear();
-    m_piercingContacts.findAtStart(record.meshes(), m_intersections, m_leaving);
-    m_knownSides.apply(record.meshes(), m_intersections, m_leaving, m_buffers);
     preferredBuffers = m_intersections.size();
     m_buffers.insert(m_buffers.begin(), m_intersections.begin(), m_intersections.end());
   }
@@ -757,18 +746,15 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   if (!record.guarded)
     record.trust.finish(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan,
                         m_facts, nearby, record.meshes(), contents, m_impacts);
-  statistics.exactDecisions += m_impacts.exactDecisions + m_pierced.exactDecisions;
+  statistics.exactDecisions += m_impacts.exactDecisions;
   statistics.validityPairs += m_impacts.validityPairs;
   // After trust.finish(), which tests the triangles around every impact.
   if (record.pair.settings.contacts == Contacts::Distinct &&
       (record.plan.step.reportsImpacts || record.plan.method == Method::Continuous))
     m_firstImpacts.keep(
-        record.meshes(),
+        record.a == record.b,
         record.plan.step.reportsImpacts ? 1.0 : std::numeric_limits<double>::infinity(),
         m_orderScratch, contents);
-  if (const MeshPair meshes = record.meshes(); meshes.hasShape() && !meshes.isShapePair())
-    contents.shape.resize(m_distinctContacts.keep(meshes.mesh(), meshes.shape().now,
-                                                  meshes.settings, contents.shape));
   countContacts(record.plan, intersectionCount, contents);
   if (record.plan.byProxy) describeAsShape(record.a->mesh, contents);
   record.candidatesSorted = candidatesSorted;

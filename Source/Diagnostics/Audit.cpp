@@ -3,13 +3,9 @@
 #include <palpate/Capture.h>
 
 #include "CollisionDetection/DiagnosticsInterface.h"
-#include "CollisionDetection/ExcludedImpacts.h"
 #include "CollisionDetection/FirstImpacts.h"
 #include "CollisionDetection/Order.h"
 #include "NarrowPhase/Continuous.h"
-#include "NarrowPhase/Intersection.h"
-#include "NarrowPhase/Piercing.h"
-#include "Shapes/DistinctContacts.h"
 
 #include <algorithm>
 #include <array>
@@ -63,8 +59,7 @@ std::array<std::uint32_t, 3> idsOf(const ShapeContact& c) {
 int idsOf(const ShapeShapeContact&) { return 0; }  // there is one
 
 /// Decides which contacts a sample of features covers. Brute force for the sample finds every
-/// covered contact. Of Intersection all contacts are covered: they follow from the triangles that
-/// the answer lists.
+/// covered contact.
 class Coverage {
  public:
   Coverage(const MeshPair& meshes, const FeatureLists& sample)
@@ -74,16 +69,23 @@ class Coverage {
 
   bool coversVertexTriangle(const VertexTriangleContact& c) const {
     if (c.vertex >= m_meshes.a.topology.vertexCount) return true;  // there is no such vertex
-    return m_byTriangles || holds(m_sample.verticesOfA, c.vertex);
+    if (!m_byTriangles) return holds(m_sample.verticesOfA, c.vertex);
+    return all(m_meshes.a.topology.vertexTriangles[c.vertex], [&](std::uint32_t s) {
+      return coversTriangles({s, c.triangle});
+    });
   }
   bool coversTriangleVertex(const VertexTriangleContact& c) const {
-    return m_byTriangles || holds(m_sample.verticesOfB, c.vertex);
+    return m_byTriangles ? holds(m_sample.trianglesOfA, c.triangle)
+                         : holds(m_sample.verticesOfB, c.vertex);
   }
   bool coversEdges(const EdgeEdgeContact& c) const {
-    const std::uint32_t edgeA = m_meshes.a.topology.edgeOf(c.edgeA),
-                        edgeB = m_meshes.b.topology.edgeOf(c.edgeB);
+    const MeshTopology &a = m_meshes.a.topology, &b = m_meshes.b.topology;
+    const std::uint32_t edgeA = a.edgeOf(c.edgeA), edgeB = b.edgeOf(c.edgeB);
     if (edgeA == kNoEdge || edgeB == kNoEdge) return true;  // there are no such edges
-    return m_byTriangles || holds(m_sample.edgesOfA, edgeA);
+    if (!m_byTriangles) return holds(m_sample.edgesOfA, edgeA);
+    return all(a.edgeTriangles[edgeA], [&](std::uint32_t s) {
+      return all(b.edgeTriangles[edgeB], [&](std::uint32_t t) { return coversTriangles({s, t}); });
+    });
   }
   /// Vertices and edges are covered by the element that owns them.
   bool coversShape(const ShapeContact& c) const {
@@ -103,114 +105,15 @@ class Coverage {
   static bool holds(const std::vector<std::uint32_t>& list, std::uint32_t id) {
     return std::binary_search(list.begin(), list.end(), id);
   }
+  template <class F>
+  static bool all(std::span<const std::uint32_t> ids, F&& f) {
+    return std::all_of(ids.begin(), ids.end(), f);
+  }
 
   const MeshPair& m_meshes;
   const FeatureLists& m_sample;
   bool m_byTriangles;
 };
-
-/// Intersection: adds the contacts of triangles that are listed in the answer and not in the
-/// sample. pierced: receives the contacts that depend on all triangles that intersect.
-void addListed(const MeshPair& meshes, const Coverage& coverage, const CollisionData& answer,
-               ContactBuffers& contacts, ContactBuffers& pierced) {
-  const std::size_t countA = meshes.a.topology.triangles.size(),
-                    countB = meshes.b.topology.triangles.size();
-  for (const ElementPair& pair : answer.intersectingTriangles())
-    if (pair.a < countA && pair.b < countB && !coverage.coversTriangles(pair))
-      addIntersection(meshes, pair, contacts);
-  ContactBuffers* const found[] = {&contacts};
-  PiercingContacts().find(meshes, found, pierced);
-}
-
-/// Auto, in a step that begins in intersection: whether a contact may be left out because the sides
-/// of its vertices are known (KnownSides). These are vertices of triangles that intersect the other
-/// mesh at the step's start or at its end. Tests the triangles around them with all others.
-class KnownVertices {
- public:
-  explicit KnownVertices(const MeshPair& meshes) : m_meshes(meshes) {}
-
-  bool mayDrop(const VertexTriangleContact& c, bool swapped) const {
-    return intersects(swapped, c.vertex) || anyIntersects(!swapped, c.corners);
-  }
-  bool mayDrop(const EdgeEdgeContact& c) const {
-    return anyIntersects(false, c.edgeA) || anyIntersects(true, c.edgeB);
-  }
-
- private:
-  template <class Vertices>
-  bool anyIntersects(bool ofB, const Vertices& vertices) const {
-    return std::any_of(vertices.begin(), vertices.end(),
-                       [&](std::uint32_t v) { return intersects(ofB, v); });
-  }
-  bool intersects(bool ofB, std::uint32_t vertex) const {
-    const auto around = (ofB ? m_meshes.b : m_meshes.a).topology.vertexTriangles[vertex];
-    const MeshTopology& others = (ofB ? m_meshes.a : m_meshes.b).topology;
-    return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
-      for (std::uint32_t other = 0; other < others.triangles.size(); ++other)
-        if (others.isEnabled(other) &&
-            intersect(ofB ? ElementPair{other, triangle} : ElementPair{triangle, other}))
-          return true;
-      return false;
-    });
-  }
-  bool intersect(ElementPair pair) const {
-    if (m_meshes.self() && pair.b < pair.a) std::swap(pair.a, pair.b);
-    if (m_meshes.self() && pair.a == pair.b) return false;
-    SignCounts counts;
-    return intersectionOf(m_meshes, true, pair, counts).intersect() ||
-           intersectionOf(m_meshes, false, pair, counts).intersect();
-  }
-
-  const MeshPair& m_meshes;
-};
-
-/// Computes the impacts that the frame has in its lists. A pointer is valid until the next call.
-class ComputedImpacts {
- public:
-  explicit ComputedImpacts(const MeshPair& meshes) : m_meshes(meshes) {}
-
-  const VertexTriangleContact* ofVertex(std::uint32_t vertex, std::uint32_t triangle,
-                                        bool swapped) const {
-    m_found.clear();
-    if (m_meshes.excludesVertex(vertex, triangle)) return nullptr;
-    const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? m_meshes.b : m_meshes.a,
-                                                               swapped ? m_meshes.a : m_meshes.b};
-    addImpact(m_meshes, features, vertex, triangle, swapped, m_found);
-    const auto& list =
-        m_found.vertexTriangle.empty() ? m_found.triangleVertex : m_found.vertexTriangle;
-    return list.empty() ? nullptr : &list.front();
-  }
-  const EdgeEdgeContact* ofEdges(const Segment& a, const Segment& b) const {
-    m_found.clear();
-    const std::uint32_t edgeA = m_meshes.a.topology.edgeOf(a),
-                        edgeB = m_meshes.b.topology.edgeOf(b);
-    addImpact(m_meshes, Features<ImpactQuery::Kind::EdgeEdge>{m_meshes.a, m_meshes.b}, edgeA, edgeB,
-              false, m_found);
-    return m_found.edgeEdge.empty() ? nullptr : &m_found.edgeEdge.front();
-  }
-
- private:
-  const MeshPair& m_meshes;
-  mutable ContactBuffers m_found;
-};
-
-/// Contacts::Distinct for impacts: drops expected impacts that the elements around them exclude.
-void dropExcludedImpacts(const MeshPair& meshes, CollisionData::Contents& expected) {
-  const bool impactsOnly = meshes.settings.method == Method::Continuous;
-  if (meshes.settings.contacts != Contacts::Distinct || !mayExcludeImpacts(meshes) ||
-      !(impactsOnly || meshes.step.reportsImpacts))
-    return;
-  const ComputedImpacts impacts(meshes);
-  const ExcludedImpacts excluded(meshes, impacts);
-  forEachImpactList(expected, [&](auto& contacts, int list) {
-    std::erase_if(contacts, [&](const auto& contact) {
-      if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
-        return excluded.contain(contact);
-      else
-        return excluded.contain(contact, list == 1);
-    });
-  });
-}
 
 /// Contacts::Distinct for impacts: drops expected contacts for which an earlier contact is kept.
 /// The earlier contact is either expected, too, or in the answer if the sample does not cover it.
@@ -339,18 +242,11 @@ FeatureLists drawFeatures(const MeshPair& meshes, const CollisionPair& pair,
 }
 
 void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionData& data,
-           const AuditSettings& settings, std::uint64_t frame, bool sidesAreKnown,
-           std::vector<AuditFailure>& out) {
-  ContactBuffers contacts, pierced;
+           const AuditSettings& settings, std::uint64_t frame, std::vector<AuditFailure>& out) {
+  ContactBuffers contacts;
   const FeatureLists sample = drawFeatures(meshes, pair, settings, frame);
-  // Any contact with a shape may stand for one of the sample.
-  const bool needsAll =
-      meshes.hasShape() && !meshes.isShapePair() && meshes.settings.contacts == Contacts::Distinct;
-  const Coverage coverage(meshes, sample);
-  findContactsByBruteForce(meshes, needsAll ? everyFeature(meshes) : sample, contacts);
-  if (meshes.settings.method == Method::Intersection)
-    addListed(meshes, coverage, data, contacts, pierced);
-  ContactBuffers* const buffers[] = {&contacts, &pierced};
+  findContactsByBruteForce(meshes, sample, contacts);
+  ContactBuffers* const buffers[] = {&contacts};
   OrderScratch scratch;
   CollisionData::Contents expected;
   orderContacts(buffers, 0, scratch, expected);
@@ -361,17 +257,9 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
   // Auto replaces some of its contacts by those of other methods. Brute force for a sample does not
   // reproduce this, so that only missing contacts are reported.
   const bool isAuto = pair.settings.method == Method::Auto;
-  const KnownVertices known(meshes);
-  const auto mayBeDropped = [&](const Any& e, List list) {
-    if (const auto* c = std::get_if<VertexTriangleContact>(&e))
-      return known.mayDrop(*c, list == List::TriangleVertex);
-    const auto* c = std::get_if<EdgeEdgeContact>(&e);
-    return c && known.mayDrop(*c);
-  };
   const auto reporterFor = [&](List list) {
     return [=, &pair, &out](Fault fault, const Any& e, const Any& f) {
-      if (isAuto && (fault != Fault::FalseNegative || (sidesAreKnown && mayBeDropped(e, list))))
-        return;
+      if (isAuto && fault != Fault::FalseNegative) return;
       out.push_back({pair.a, pair.b, frame, fault, list, e, f, {}, {}});
     };
   };
@@ -382,13 +270,8 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
           reporterFor(List::Earliest)(Fault::FalseNegative, contact, {});
     });
   }
-  dropExcludedImpacts(meshes, expected);
   dropRepeatedImpacts(meshes, data, expected);
-  if (needsAll) {
-    expected.shape.resize(DistinctContacts().keep(meshes.mesh(), meshes.shape().now,
-                                                  meshes.settings, expected.shape));
-    std::erase_if(expected.shape, [&](const ShapeContact& c) { return !coverage.coversShape(c); });
-  }
+  const Coverage coverage(meshes, sample);
   const auto compareList = [&](const auto& truth, const auto& found, auto covers, List list) {
     compare(truth, found, std::bind_front(covers, &coverage), reporterFor(list));
   };
@@ -454,9 +337,7 @@ void auditFrame(const Settings& settings, const GeometryTable& geometries, const
     // Brute force over features does not reproduce proxies, whose contacts have an error.
     if (!pair->collides() || pair->usesProxy() || pair->plan.byProxy) continue;
     const std::size_t first = failures.size();
-    const bool sidesAreKnown = pair->plan.runsIntersection && pair->plan.startsIntersecting;
-    audit(pair->meshes(), pair->pair, pair->data, settings.audit, record.frame, sidesAreKnown,
-          failures);
+    audit(pair->meshes(), pair->pair, pair->data, settings.audit, record.frame, failures);
     const auto own = std::span(failures).subspan(first);
     if (own.empty() || settings.audit.folder.empty()) continue;
     if (record.files < settings.audit.maxFiles) {

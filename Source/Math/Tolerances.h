@@ -103,9 +103,6 @@ constexpr double kCertainDirection = 0x1p-26;
 /// Sine of an angle: unit vectors that differ by less are equal. Above kCertainDirection's 2^-24
 /// and the rounding of a star's directions, and far below any angle that matters to a solver.
 constexpr double kTouchAngle = 0x1p-20;
-/// A weight: closest points this near to an edge or a corner meet it. Above the default
-/// timeTolerance, by which an impact may be early, and far below what matters to a solver.
-constexpr double kMeetingWeight = 0x1p-16;
 /// L: shorter vectors are scaled up before they are interpolated in time.
 constexpr double kTinyLength = 0x1p-500;
 
@@ -229,22 +226,6 @@ constexpr double kOppositeSquare = 0x1p-80;
 /// Largest deviation from orthonormal of a triangle's edge, normal and the direction across both.
 /// Beyond it the normal is no more than rounding. Any value will do.
 constexpr double kAxesError = 0x1p-20;
-
-// ---- Penetration of bodies (Math/TranslationExit.cpp, Queries/BodyPenetration.cpp) ----
-
-/// Weight: how far beyond a feature's end two features may touch. It is far above the rounding of
-/// weights, and only says where a search continues; exact tests decide where it ends.
-constexpr double kExitWeight = 0x1p-30;
-/// Relative to the largest coordinate: by how much a translation is longer than where surfaces
-/// touch last. Any value well above the roundings of moved positions, some 2^-51, will do. Meshes
-/// whose vertices are in front of neighbouring faces by no more than this count as convex.
-constexpr double kExitSlack = 0x1p-40;
-/// Relative to the largest coordinate: a translation of convex meshes is minimal if none is shorter
-/// by more than this. It covers kExitSlack, and vertices in front of faces by that.
-constexpr double kMinimalSlack = 0x1p-36;
-/// Relative to the least depth so far: shorter improvements are not searched. Any small value will
-/// do.
-constexpr double kDepthGain = 0x1p-14;
 
 // ---- Triangles without area in contacts (NarrowPhase/StepCheck.cpp) ----
 

@@ -123,13 +123,14 @@ class ContactFinder {
            bool swapped, const ImpactQuery& query, double time, bool store) {
     const std::array<Vector3d, 4> p = positionsAt(query, time);
     std::array<MeshFeature, 2> closestFeatures;
-    const auto complete = [&](auto& contact, const std::array<MeshFeature, 2>& meeting) {
+    const auto complete = [&](auto& contact) {
       const bool touch = m_settings.minimumDistance == 0.0 || contact.distance == 0.0;
       contact.timeOfImpact = time;
       contact.distance -= m_pair.a.largestRadius + m_pair.b.largestRadius;
       if (!touch) return;
-      const TouchNormal normal = touchNormal(features, firstId, secondId, meeting, time,
-                                             contact.normal, m_out.exactDecisions);
+      const TouchNormal normal = touchNormal(features, firstId, secondId,
+                                             {closestFeatures[swapped], closestFeatures[!swapped]},
+                                             time, contact.normal, m_out.exactDecisions);
       contact.normal = normal.direction;
       m_out.facts.sideUnknown |= !normal.isSideKnown;
     };
@@ -146,9 +147,7 @@ class ContactFinder {
           contactOf(firstId, secondId, topology.triangles[secondId], closest);
       closestFeatures[swapped] = {MeshFeature::Kind::Vertex, firstId};
       closestFeatures[!swapped] = featureOf(topology, secondId, closest.feature);
-      complete(contact, {closestFeatures[swapped],
-                         featureOf(topology, secondId,
-                                   spannedFeature(contact.corners, meetingWeights(closest)))});
+      complete(contact);
       const Vector3d direction = swapped ? -contact.normal : contact.normal;
       if (isSuppressed(closest, direction, rejectsVertex(m_pair, firstId, secondId, swapped)))
         return false;
@@ -163,10 +162,7 @@ class ContactFinder {
           contactOf(firstTopology.edges[firstId], secondTopology.edges[secondId], closest);
       closestFeatures = {featureOf(firstTopology, firstId, closest.featureA),
                          featureOf(secondTopology, secondId, closest.featureB)};
-      complete(
-          contact,
-          {featureOf(firstTopology, firstId, spannedFeature(meetingWeight(closest.weightA))),
-           featureOf(secondTopology, secondId, spannedFeature(meetingWeight(closest.weightB)))});
+      complete(contact);
       if (isSuppressed(closest, contact.normal, rejectsEdges(m_pair, firstId, secondId)))
         return false;
       if (!store) return true;
@@ -190,15 +186,6 @@ class ContactFinder {
     FeatureRadii radii;
     for (int i = 0; i < 4; ++i) radii[i] = features.meshOf(i).radius(ids[i]);
     return radii;
-  }
-
-  /// The time of an impact may be early, and positions at that time are rounded. Features that hold
-  /// the closest points up to this weight therefore meet.
-  static double meetingWeight(double weight) {
-    return weight < kMeetingWeight ? 0.0 : weight > 1.0 - kMeetingWeight ? 1.0 : weight;
-  }
-  static Vector3d meetingWeights(const VertexTriangleDistance& closest) {
-    return closest.barycentric.unaryExpr(&meetingWeight);
   }
 
   /// The closest points at an impact. p: positionsAt(). Features that touch when the step begins

@@ -38,9 +38,6 @@ void ContactBuffers::clear() {
   triangleVertex.clear();
   edgeEdge.clear();
   intersectingTriangles.clear();
-  crossings.clear();
-  crossingsAtStart.clear();
-  pierced.clear();
   shape.clear();
   shapeShape.clear();
   shapeGap = std::numeric_limits<double>::infinity();

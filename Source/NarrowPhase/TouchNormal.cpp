@@ -18,6 +18,9 @@ namespace {
 using Eigen::Vector3d;
 using Kind = ImpactQuery::Kind;
 
+/// Cosines that differ by less agree equally well with a side. Far above the timeTolerance by which
+/// an impact may be early, so that symmetric surfaces have one answer. Any value will do.
+constexpr double kEqualAgreement = 0x1p-10;
 /// How much more the winding normals of a body count than those of an open surface. Any value above
 /// 1 makes the body decide.
 constexpr double kBodyWeight = 4.0;
@@ -139,8 +142,8 @@ class BestNormal {
     const double agreement = m_side ? normal.dot(m_side->approach.side) : agreementOf(normal);
     const Rank rank{std::floor(violationOf(normal) / kTouchAngle),
                     static_cast<double>(kind),
-                    -std::round(agreement / kTouchAngle),
-                    -std::round(normal.dot(m_other) / kTouchAngle),
+                    -std::round(agreement / kEqualAgreement),
+                    -std::round(normal.dot(m_other) / kEqualAgreement),
                     std::abs(normal[0]),
                     std::abs(normal[1]),
                     std::abs(normal[2])};

@@ -5,14 +5,12 @@
 
 #include "Core/MemoryBudget.h"
 #include "Core/Threads.h"
-#include "Queries/BodyPenetration.h"
 #include "Queries/PairTraversal.h"
 #include "Queries/PathIntervals.h"
 #include "Queries/PointDistances.h"
 #include "Queries/RayHits.h"
 #include "Queries/SearchableGeometry.h"
 #include "Queries/VertexSearch.h"
-#include "Shapes/DistinctContacts.h"
 #include "Shapes/PlacedShape.h"
 #include "Shapes/ShapeContacts.h"
 
@@ -43,11 +41,9 @@ class SpatialQueries::Source {
     std::vector<std::uint32_t> elements;
     Buffer<std::uint32_t> nearShape;
     ShapeContactBuffers shapeContacts;
-    DistinctContacts distinctContacts;
     KeptShapes shapes;
     PathScratch path;
     std::unique_ptr<PairScratch> pairs;  ///< null before distance() first needs it
-    PenetrationScratch penetration;
     std::vector<std::uint64_t> bits;
 
     /// Sorts different numbers: as bits of a field if they lie close together.

@@ -16,7 +16,6 @@
 #include "Queries/RayHits.h"
 #include "Queries/ElementsNearShape.h"
 #include "Queries/ShapeOverlap.h"
-#include "Queries/ShapePenetration.h"
 #include "Queries/ShapeRays.h"
 
 #include <algorithm>
@@ -556,13 +555,12 @@ void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
     else
       findElementsNear(geometry, tool.now, tool.now, thickness + geometry.mesh.largestRadius,
                        scratch->stack, near);
-    const PairSettings settings{Method::Proximity, thickness};
-    findShapeContacts(geometry.mesh, tool, settings, near, scratch->shapeContacts);
-    std::sort(found.begin(), found.end(), [](const ShapeContact& a, const ShapeContact& b) {
-      return std::tie(a.element, a.id, a.vertices) < std::tie(b.element, b.id, b.vertices);
-    });
-    found.resize(scratch->distinctContacts.keep(geometry.mesh, tool.now, settings, found));
+    findShapeContacts(geometry.mesh, tool, {Method::Proximity, thickness}, near,
+                      scratch->shapeContacts);
   }
+  std::sort(found.begin(), found.end(), [](const ShapeContact& a, const ShapeContact& b) {
+    return std::tie(a.element, a.id, a.vertices) < std::tie(b.element, b.id, b.vertices);
+  });
   out.reserve(found.size());  // nothing below throws
   out.assign(found.begin(), found.end());
 }
@@ -587,28 +585,6 @@ GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const 
     throw Error(ErrorCode::UnsupportedMethod,
                 nameOf(idA) + " and " + nameOf(idB) + " are both planes", idA);
   return distanceBetween(idA, first, idB, second, scratch->shapeContacts.shapePair);
-}
-
-Penetration SpatialQueries::penetration(GeometryId idA, GeometryId idB) const {
-  Source& source = valid();
-  const StandardFloatingPoint standard;
-  SearchableGeometry &a = source.at(idA), &b = source.at(idB);
-  if (idA == idB)
-    throw Error(ErrorCode::InvalidSettings,
-                "penetration() was called for " + nameOf(idA) + " twice", idA);
-  for (SearchableGeometry* const body : {&a, &b}) {
-    if (body->shape && body->shape->now.isTwoSided())
-      throw Error(ErrorCode::NotClosed,
-                  nameOf(body->id) + " is a two-sided plane, which has no inside", body->id);
-    if (!body->shape && !body->solid) source.prepareInside(*body, {});
-  }
-  const Source::Loan scratch(source);
-  if (!a.shape && !b.shape) return penetrationOf(a, b, source.engine(), scratch->penetration);
-  if (a.shape && b.shape && a.shape->now.isPlane() && b.shape->now.isPlane())
-    throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(idA) + " and " + nameOf(idB) + " are both planes", idA);
-  return shapePenetration(a, b, source.engine(), source.octreeSettings(), scratch->penetration,
-                          scratch->shapeContacts.shapePair);
 }
 
 void SpatialQueries::path(std::span<const Eigen::Vector3d> polyline, double radius,

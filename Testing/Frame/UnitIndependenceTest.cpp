@@ -85,6 +85,12 @@ class UnitIndependence : public ::testing::TestWithParam<MethodCase> {
     return settings().method == Method::Intersection && c.ids[0] != PlainContact::EdgeEdge;
   }
 
+  static bool meetInTheirInteriors(const PlainContact& c) {
+    const auto inside = [&](int i) { return c.weights[i] > 0 && c.weights[i] < 1; };
+    if (c.ids[0] == PlainContact::VertexVertex) return false;
+    return inside(0) && inside(1) && (c.ids[0] == PlainContact::EdgeEdge || inside(2));
+  }
+
   /// unit: the smallest difference of doubles, in the scene's own lengths.
   static void expectSame(const PlainContact& found, const PlainContact& truth, double unit) {
     SCOPED_TRACE("contact " + std::to_string(truth.ids[0]) + ": " + std::to_string(truth.ids[1]) +
@@ -95,6 +101,8 @@ class UnitIndependence : public ::testing::TestWithParam<MethodCase> {
       EXPECT_NEAR(found.time, truth.time, TimeOfImpactSettings{}.timeTolerance);
       // Where positions at that time have few bits, rounding decides which features meet.
       if (unit > 0x1p-45) return;
+      // At an edge or a corner that time decides among normals that separate equally well.
+      if (!meetInTheirInteriors(truth)) return;
       // The plane turns a little in that time. Features that never left it have no side.
       const bool turned = hasNoSide(truth) && found.normal.dot(truth.normal) < 0;
       const Vector3d expected = turned ? Vector3d(-truth.normal) : truth.normal;
@@ -119,8 +127,7 @@ TEST_P(UnitIndependence, ExactTransformationsChangeNothing) {
     const Placement own(scene, {});
     const PairRun truth = own.run(settings());
     EXPECT_TRUE(truth.answers().front().anything());
-    for (Transformation how : exactTransformations()) {
-      how.keepsTriangles = GetParam().settings.method == Method::Intersection;
+    for (const Transformation& how : exactTransformations()) {
       SCOPED_TRACE(how.name);
       const Placement placement(scene, how);
       const PairRun run = placement.run(settings());
