@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include <cmath>
 
 // Contacts do not depend on the unit of length, on where the scene is, or on how its elements are
@@ -85,10 +87,10 @@ class UnitIndependence : public ::testing::TestWithParam<MethodCase> {
     return settings().method == Method::Intersection && c.ids[0] != PlainContact::EdgeEdge;
   }
 
+  /// Edges may be parallel, and are left out.
   static bool meetInTheirInteriors(const PlainContact& c) {
-    const auto inside = [&](int i) { return c.weights[i] > 0 && c.weights[i] < 1; };
-    if (c.ids[0] == PlainContact::VertexVertex) return false;
-    return inside(0) && inside(1) && (c.ids[0] == PlainContact::EdgeEdge || inside(2));
+    return c.ids[0]<PlainContact::VertexVertex&& *
+                    std::min_element(c.weights.begin(), c.weights.end())> 1e-3;
   }
 
   /// unit: the smallest difference of doubles, in the scene's own lengths.
