@@ -264,7 +264,8 @@ void GuardedStep::addMover(Touch& touch, const Geometry& geometry, std::uint32_t
 
 template <class Contact>
 void GuardedStep::addTouch(const Contact& placed, std::size_t pair, std::size_t number) {
-  const auto& [contact, first, second] = placed;
+  const auto& contact = placed.contact;
+  const Geometry &first = placed.first, &second = placed.second;
   using Kind = std::decay_t<decltype(contact)>;
   Touch touch{{}, contact.timeOfImpact, contact.timeOfImpact == 0.0, pair, number};
   touch.movers.fill({kNoNode, 0.0});

@@ -190,10 +190,11 @@ class ContactFinder {
 
   /// The closest points at an impact. p: positionsAt(). Features that touch when the step begins
   /// may be apart there by rounding; they are measured where they are.
-  template <class Measure>
-  auto closestAt(Measure&& measure, const ImpactQuery& query, double time,
-                 const std::array<Vector3d, 4>& p) {
-    auto closest = measure(p[0], p[1], p[2], p[3]);
+  template <class Closest>
+  Closest closestAt(Closest measure(const Vector3d&, const Vector3d&, const Vector3d&,
+                                    const Vector3d&),
+                    const ImpactQuery& query, double time, const std::array<Vector3d, 4>& p) {
+    Closest closest = measure(p[0], p[1], p[2], p[3]);
     m_out.exactDecisions += closest.exact;
     double extent = 0.0;
     for (int i = 1; i < 4; ++i) extent = std::max(extent, (p[i] - p[0]).cwiseAbs().maxCoeff());

@@ -31,6 +31,7 @@ class Star {
   Star(const TriangleMesh& mesh, const MeshFeature& feature, double time)
       : m_mesh(mesh), m_feature(feature), m_time(time) {}
 
+  bool isAtEnd() const { return m_time == 0.0 || m_time == 1.0; }
   /// Whether the winding normals point out of a body.
   bool isOfBody() const { return m_mesh.topology.hasFaces() && m_mesh.topology.hasOnlyClosedStars; }
 
@@ -98,7 +99,6 @@ class Star {
                                                                           : topology.edgeTriangles;
     for (const std::uint32_t t : lists[m_feature.id]) f(topology.triangles[t]);
   }
-  bool isAtEnd() const { return m_time == 0.0 || m_time == 1.0; }
   const Positions& end() const { return m_time == 1.0 ? m_mesh.now : m_mesh.before; }
   /// The vector between two vertices, times a power of two if it is tiny: interpolated denormals
   /// would have no direction.
@@ -134,19 +134,23 @@ class BestNormal {
  public:
   BestNormal(const Star& first, const Star& second, const std::optional<KnownSide>& side,
              const Vector3d& other)
-      : m_first(first), m_second(second), m_side(side), m_other(other) {}
+      : m_first(first),
+        m_second(second),
+        m_side(side),
+        m_other(other),
+        m_equalAngle(first.isAtEnd() ? kTouchAngle : kEqualAgreement) {}
 
   /// kind: lower ones win among equally good candidates.
   void offer(const Vector3d& normal, int kind) {
     if (m_side && !m_side->has(normal)) return;
     const double agreement = m_side ? normal.dot(m_side->approach.side) : agreementOf(normal);
-    const Rank rank{std::floor(violationOf(normal) / kTouchAngle),
+    const Rank rank{std::round(violationOf(normal) / m_equalAngle),
                     static_cast<double>(kind),
                     -std::round(agreement / kEqualAgreement),
-                    -std::round(normal.dot(m_other) / kEqualAgreement),
                     std::abs(normal[0]),
                     std::abs(normal[1]),
-                    std::abs(normal[2])};
+                    std::abs(normal[2]),
+                    -std::round(normal.dot(m_other) / kEqualAgreement)};
     if (m_normal && !(rank < m_rank)) return;
     m_normal = normal;
     m_rank = rank;
@@ -158,8 +162,8 @@ class BestNormal {
 
  private:
   /// The lowest wins: how far the normal fails to separate the stars, its kind, and how far it
-  /// agrees with the sides that are known. The last components leave no tie: the order of the
-  /// candidates, and which surface is the first one, change no result.
+  /// agrees with the sides that are known. The last components leave ties only between
+  /// mirror images: otherwise numbering changes no result.
   using Rank = std::array<double, 7>;
 
   /// The sine of the largest angle by which a direction of a star is on the wrong side.
@@ -181,6 +185,7 @@ class BestNormal {
   const Star &m_first, &m_second;
   const std::optional<KnownSide>& m_side;
   const Vector3d m_other;
+  const double m_equalAngle;  ///< violations that differ by less are equal
   std::optional<Vector3d> m_normal;
   Rank m_rank{};
 };

@@ -32,6 +32,8 @@ struct Transformation {
   bool corners = false, triangles = false, vertices = false;  ///< permuted at random
   bool swapped = false;                                       ///< b is the first geometry
 
+  /// Whether triangles keep their outer sides.
+  bool keepsWinding() const { return !corners && mirror.prod() > 0; }
   Eigen::Vector3d place(const Eigen::Vector3d& p) const {
     return (p * scale).cwiseProduct(mirror) + translation;
   }
