@@ -12,6 +12,7 @@
 #include "NarrowPhase/ElementBoxes.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/Intersection.h"
+#include "NarrowPhase/Meeting.h"
 #include "NarrowPhase/Piercing.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Queries/ElementsNearShape.h"
@@ -415,7 +416,9 @@ struct Frame::Job : CountedObject {
   /// Auto: finds intersections at the step's end.
   static void detectIntersections(Job& job, std::span<const ElementPair> pairs) {
     const MemoryScope memory(MemoryStage::NarrowPhase);
-    findIntersections(job.record->meshes(), pairs, job.intersections);
+    const MeshPair meshes = job.record->meshes();
+    findIntersections(meshes, pairs, job.intersections);
+    if (meshes.step.motion > 0.0) findCrossingsAtStart(meshes, pairs, job.intersections);
   }
 
   void findEarliest(const MeshPair& meshes, std::span<const ElementPair> pairs) {
@@ -716,6 +719,10 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   const MemoryScope memory(MemoryStage::Results);
   m_facts.clear();
   m_impacts.clear();
+  m_pierced.clear();
+  const bool byIntersection = record.plan.method == Method::Intersection;
+  m_piercingContacts.find(record.meshes(), byIntersection ? m_buffers : m_intersections, m_pierced);
+  (byIntersection ? m_buffers : m_intersections).push_back(&m_pierced);
   for (const auto* buffers : {&m_buffers, &m_intersections})
     for (const ContactBuffers* found : *buffers) {
       m_facts.add(found->facts);
@@ -730,8 +737,13 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
     m_buffers.push_back(&m_impacts);
   }
   if (record.plan.startsIntersecting) m_facts.atStart = Meeting::Piercing;
+  record.plan.startsIntersecting = m_facts.startsPiercing();
   std::size_t preferredBuffers = 0;
-  if (m_facts.startsPiercing() && record.plan.runsIntersection) {
+  record.sidesAreKnown = m_facts.startsPiercing() && record.plan.runsIntersection;
+  if (record.sidesAreKnown) {
+    m_leaving.clear();
+    m_piercingContacts.findAtStart(record.meshes(), m_intersections, m_leaving);
+    m_knownSides.apply(record.meshes(), m_intersections, m_leaving, m_buffers);
     preferredBuffers = m_intersections.size();
     m_buffers.insert(m_buffers.begin(), m_intersections.begin(), m_intersections.end());
   }
@@ -746,7 +758,7 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
   if (!record.guarded)
     record.trust.finish(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan,
                         m_facts, nearby, record.meshes(), contents, m_impacts);
-  statistics.exactDecisions += m_impacts.exactDecisions;
+  statistics.exactDecisions += m_impacts.exactDecisions + m_pierced.exactDecisions;
   statistics.validityPairs += m_impacts.validityPairs;
   // After trust.finish(), which tests the triangles around every impact.
   if (record.pair.settings.contacts == Contacts::Distinct &&

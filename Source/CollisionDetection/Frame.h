@@ -8,6 +8,7 @@
 #include "CollisionDetection/PairTable.h"
 #include "Core/Threads.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "NarrowPhase/Piercing.h"
 #include "Octree/Traversal.h"
 
 #include <memory>
@@ -56,6 +57,9 @@ class Frame {
   TraversalStack m_stack;
   std::vector<ContactBuffers*> m_buffers, m_intersections;  ///< of the pair that finish() handles
   ContactBuffers m_impacts;
+  ContactBuffers m_pierced, m_leaving;  ///< of PiercingContacts, at the step's end and start
+  PiercingContacts m_piercingContacts;
+  KnownSides m_knownSides;
   StepFacts m_facts;
   OrderScratch m_orderScratch;
   FirstImpacts m_firstImpacts;

@@ -21,9 +21,10 @@ FeatureLists drawFeatures(const MeshPair&, const CollisionPair&, const AuditSett
 
 /// Compares `data` with brute force for a drawn sample of features. Appends false negatives, false
 /// positives, and contacts that differ. For Method::Auto it appends false negatives only, and with
-/// earliestTimeOnly impacts before the reported time.
+/// earliestTimeOnly impacts before the reported time. sidesAreKnown: Auto ran Intersection, as the
+/// step begins in intersection, and may leave out contacts of vertices whose side is known.
 void audit(const MeshPair&, const CollisionPair&, const CollisionData& data, const AuditSettings&,
-           std::uint64_t frame, std::vector<AuditFailure>& out);
+           std::uint64_t frame, bool sidesAreKnown, std::vector<AuditFailure>& out);
 
 /// The problem reduced to one of its pairs.
 CollisionProblem reducedToPair(const CollisionProblem&, GeometryId a, GeometryId b);

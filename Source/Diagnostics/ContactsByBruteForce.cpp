@@ -6,6 +6,7 @@
 #include "NarrowPhase/Filters.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/LineEdges.h"
+#include "NarrowPhase/Piercing.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
 #include "NarrowPhase/TouchNormal.h"
@@ -296,11 +297,30 @@ void findFastImpacts(const MeshPair& pair, const FeatureLists& lists, ContactBuf
       });
 }
 
+template <class Contact>
+void append(const Buffer<Contact>& found, Buffer<Contact>& out) {
+  out.insert(out.end(), found.begin(), found.end());
+}
+
+/// Contacts of triangles that pierce each other depend on all triangles: for a sample they are left
+/// to the caller, with the crossings in `out`.
 void findIntersections(const MeshPair& pair, const FeatureLists& lists, ContactBuffers& out) {
   const auto countB = static_cast<std::uint32_t>(pair.b.topology.triangles.size());
   for (const std::uint32_t a : lists.trianglesOfA)
     for (std::uint32_t b = pair.self() ? a + 1 : 0; b < countB; ++b)
       if (pair.b.topology.isEnabled(b)) addIntersection(pair, {a, b}, out);
+  const MeshTopology& ofA = pair.a.topology;
+  if (lists.trianglesOfA.size() + ofA.disabled.size() < ofA.triangles.size()) return;
+  ContactBuffers pierced;
+  ContactBuffers* const found[] = {&out};
+  PiercingContacts().find(pair, found, pierced);
+  out.crossings.clear();
+  out.pierced.clear();
+  append(pierced.vertexTriangle, out.vertexTriangle);
+  append(pierced.triangleVertex, out.triangleVertex);
+  append(pierced.edgeEdge, out.edgeEdge);
+  out.facts.add(pierced.facts);
+  out.exactDecisions += pierced.exactDecisions;
 }
 
 }  // namespace

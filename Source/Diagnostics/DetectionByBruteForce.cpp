@@ -1,6 +1,7 @@
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "Diagnostics/ContactsByBruteForce.h"
-#include "NarrowPhase/Piercing.h"
+#include "NarrowPhase/Intersection.h"
+#include "NarrowPhase/Meeting.h"
 
 #include <algorithm>
 
@@ -12,14 +13,21 @@ void detectPairByBruteForce(const PairRecord& record, ContactBuffers& contacts,
   findContactsByBruteForce(meshes, contacts);
   const auto countA = static_cast<std::uint32_t>(meshes.a.topology.triangles.size()),
              countB = static_cast<std::uint32_t>(meshes.b.topology.triangles.size());
-  for (std::uint32_t a = 0; a < countA && meshes.step.checksStart; ++a)
-    for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b)
-      if (meshes.a.topology.isEnabled(a) && meshes.b.topology.isEnabled(b))
-        contacts.facts.atStart = std::max(
-            contacts.facts.atStart, meetingOf(meshes, true, ElementPair{a, b}, intersections));
+  const auto forEachPair = [&](auto&& f) {
+    for (std::uint32_t a = 0; a < countA; ++a)
+      for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b)
+        if (meshes.a.topology.isEnabled(a) && meshes.b.topology.isEnabled(b)) f(ElementPair{a, b});
+  };
+  if (meshes.step.checksStart)
+    forEachPair([&](const ElementPair& pair) {
+      contacts.facts.atStart =
+          std::max(contacts.facts.atStart, meetingOf(meshes, true, pair, intersections));
+    });
   if (!record.plan.runsIntersection ||
       !(contacts.facts.startsPiercing() || record.plan.startsIntersecting))
     return;
+  if (meshes.step.motion > 0.0)
+    forEachPair([&](const ElementPair& pair) { addCrossingsAtStart(meshes, pair, intersections); });
   meshes.settings.method = Method::Intersection;
   findContactsByBruteForce(meshes, intersections);
 }

@@ -23,7 +23,7 @@ Vector3d crossingNormal(const EdgePair& edges) {
 }
 
 struct CrossingDecision {
-  Crossing crossing;
+  CrossingPlace crossing;
   bool exact;
 };
 
@@ -79,11 +79,11 @@ bool isCertainlyAtEnd(const EdgePair& edges) {
 struct CrossingTerms {
   double square, squareError, s, sError, t, tError;
 
-  std::optional<Crossing> decision() const {
+  std::optional<CrossingPlace> decision() const {
     if (s - square > sError + squareError || t - square > tError + squareError)
-      return Crossing::Outside;
+      return CrossingPlace::Outside;
     if (square - s > sError + squareError && square - t > tError + squareError)
-      return Crossing::Interior;
+      return CrossingPlace::Interior;
     return {};
   }
 };
@@ -133,9 +133,9 @@ CrossingDecision crossingOf(const EdgePair& edges) {
     const CrossingTerms rounded = roundedTerms(edges, mSum, uSum, vSum);
     if (const auto decision = rounded.decision()) return {*decision, false};
     if (rounded.square > rounded.squareError && isCertainlyAtEnd(edges))
-      return {Crossing::Outside, false};
+      return {CrossingPlace::Outside, false};
     if (areCertainlyParallel(difference(p1, p0), difference(q1, q0)))
-      return {Crossing::Parallel, false};
+      return {CrossingPlace::Parallel, false};
     // The error of m is relative to the positions, which may be far from the origin.
     const double positionSum = mSum + sumOfMagnitudes(p0) + sumOfMagnitudes(p1) +
                                sumOfMagnitudes(q0) + sumOfMagnitudes(q1);
@@ -358,7 +358,7 @@ std::optional<EdgeEdgeDistance> crossingEdgesDistance(const Vector3d& p0, const 
                                                       const Vector3d& q0, const Vector3d& q1) {
   const EdgePair edges(p0, p1, q0, q1);
   const CrossingDecision decision = crossingOf(edges);
-  if (decision.crossing != Crossing::Interior) return {};
+  if (decision.crossing != CrossingPlace::Interior) return {};
   return interiorDistance(edges, decision.exact);
 }
 
@@ -366,8 +366,8 @@ EdgeEdgeDistance finiteEdgeEdgeDistance(const Vector3d& p0, const Vector3d& p1, 
                                         const Vector3d& q1) {
   const EdgePair edges(p0, p1, q0, q1);
   const CrossingDecision decision = crossingOf(edges);
-  if (decision.crossing == Crossing::Interior) return interiorDistance(edges, decision.exact);
-  return endDistance(edges, decision.crossing == Crossing::Parallel, decision.exact);
+  if (decision.crossing == CrossingPlace::Interior) return interiorDistance(edges, decision.exact);
+  return endDistance(edges, decision.crossing == CrossingPlace::Parallel, decision.exact);
 }
 
 EdgeEdgeDistance edgeEdgeDistance(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0,

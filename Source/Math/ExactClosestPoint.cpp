@@ -127,9 +127,9 @@ TriangleFeature closestFeatureOf(const std::array<Vector<T>, 4>& at) {
 
 /// at: p0, p1, q0, q1.
 template <class T>
-Crossing crossingOf(const std::array<Vector<T>, 4>& at) {
+CrossingPlace crossingOf(const std::array<Vector<T>, 4>& at) {
   const Vector<T> u = at[1] - at[0], v = at[3] - at[2], from = at[0] - at[2];
-  if (isZero(cross(u, v))) return Crossing::Parallel;
+  if (isZero(cross(u, v))) return CrossingPlace::Parallel;
   const auto uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), uf = dot(u, from), vf = dot(v, from);
   using Product = decltype(product(uu, vv));  // not auto: sums of Integers are expressions
   const Product determinant = product(uu, vv) - product(uv, uv);
@@ -138,7 +138,7 @@ Crossing crossingOf(const std::array<Vector<T>, 4>& at) {
     return signOf(numerator) > 0 && signOf(rest) > 0;
   };
   const Product s = product(uv, vf) - product(vv, uf), t = product(uu, vf) - product(uv, uf);
-  return isInside(s) && isInside(t) ? Crossing::Interior : Crossing::Outside;
+  return isInside(s) && isInside(t) ? CrossingPlace::Interior : CrossingPlace::Outside;
 }
 
 }  // namespace
@@ -156,7 +156,8 @@ TriangleFeature closestFeature(const Vector3d& p, const Vector3d& a, const Vecto
   return decide([](const auto& at) { return closestFeatureOf(at); }, a, b, c, p);
 }
 
-Crossing crossing(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0, const Vector3d& q1) {
+CrossingPlace crossing(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0,
+                       const Vector3d& q1) {
   return decide([](const auto& at) { return crossingOf(at); }, p0, p1, q0, q1);
 }
 

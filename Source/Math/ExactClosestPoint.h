@@ -11,7 +11,7 @@ namespace palpate {
 
 /// The relation of two edges. Interior: the closest points of their lines lie strictly inside both
 /// edges. Parallel: exactly parallel, or one edge has no length.
-enum class Crossing { Interior, Outside, Parallel };
+enum class CrossingPlace { Interior, Outside, Parallel };
 
 }  // namespace palpate
 
@@ -41,8 +41,8 @@ Foot footOnLine(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen:
 Foot footOnPlane(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                  const Eigen::Vector3d& c);
 
-Crossing crossing(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1, const Eigen::Vector3d& q0,
-                  const Eigen::Vector3d& q1);
+CrossingPlace crossing(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
+                       const Eigen::Vector3d& q0, const Eigen::Vector3d& q1);
 /// The closest points p0 + s (p1 - p0) and q0 + t (q1 - q0) of two lines, which must not be
 /// parallel.
 Foot footBetweenLines(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,

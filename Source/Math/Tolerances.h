@@ -227,6 +227,22 @@ constexpr double kOppositeSquare = 0x1p-80;
 /// Beyond it the normal is no more than rounding. Any value will do.
 constexpr double kAxesError = 0x1p-20;
 
+// ---- Penetration of bodies (Math/TranslationExit.cpp, Queries/BodyPenetration.cpp) ----
+
+/// Weight: how far beyond a feature's end two features may touch. It is far above the rounding of
+/// weights, and only says where a search continues; exact tests decide where it ends.
+constexpr double kExitWeight = 0x1p-30;
+/// Relative to the largest coordinate: by how much a translation is longer than where surfaces
+/// touch last. Any value well above the roundings of moved positions, some 2^-51, will do. Meshes
+/// whose vertices are in front of neighbouring faces by no more than this count as convex.
+constexpr double kExitSlack = 0x1p-40;
+/// Relative to the largest coordinate: a translation of convex meshes is minimal if none is shorter
+/// by more than this. It covers kExitSlack, and vertices in front of faces by that.
+constexpr double kMinimalSlack = 0x1p-36;
+/// Relative to the least depth so far: shorter improvements are not searched. Any small value will
+/// do.
+constexpr double kDepthGain = 0x1p-14;
+
 // ---- Triangles without area in contacts (NarrowPhase/StepCheck.cpp) ----
 
 /// Squared sine of a triangle's angle above which the triangle certainly has area: u^2 and more.

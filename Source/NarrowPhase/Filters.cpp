@@ -121,6 +121,10 @@ bool rejectsEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB
          (pair.predicate && !(*pair.predicate)({ContactFeatures::Kind::EdgeEdge, p, q}));
 }
 
+bool liesBelow(const TriangleMesh& mesh, const MeshFeature& feature, const Vector3d& direction) {
+  return Surface(mesh, 1.0).isBelow(feature, direction);
+}
+
 bool pointsInward(const MeshPair& pair, const std::array<MeshFeature, 2>& features,
                   const Vector3d& direction, double time) {
   return (pair.a.outerSideOnly && Surface(pair.a, time).isBelow(features[0], -direction)) ||

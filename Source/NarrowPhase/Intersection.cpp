@@ -3,6 +3,7 @@
 #include "NarrowPhase/FeatureTests.h"
 #include "NarrowPhase/Filters.h"
 #include "NarrowPhase/IntersectionFilter.h"
+#include "NarrowPhase/Piercing.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
 #include "NarrowPhase/TouchNormal.h"
@@ -58,12 +59,8 @@ class IntersectionContacts {
                        ContactBuffers& out)
       : m_pair(pair), m_a(a), m_b(b), m_out(out), m_check(pair, out), m_self(pair.self()) {}
 
-  void add(const TriangleIntersection& intersection) {
-    const unsigned edgesOfA = intersection.edgesOfAThroughB,
-                   edgesOfB = intersection.edgesOfBThroughA;
-    if (intersection.touch()) {
-      addTouching(intersection);
-    } else if (std::popcount(edgesOfA) == 2) {
+  void addPierced(unsigned edgesOfA, unsigned edgesOfB) {
+    if (std::popcount(edgesOfA) == 2) {
       addCornerOfA(sharedCorner(edgesOfA));
     } else if (std::popcount(edgesOfB) == 2) {
       addCornerOfB(sharedCorner(edgesOfB));
@@ -72,7 +69,6 @@ class IntersectionContacts {
     }
   }
 
- private:
   /// Touching features also touch in the triangles that own them. Only the pair of these triangles
   /// adds the contact.
   void addTouching(const TriangleIntersection& intersection) {
@@ -87,6 +83,8 @@ class IntersectionContacts {
       }
     }
   }
+
+ private:
   void addCornerOfA(int i) { addCorner(m_a, i, m_b, m_out.vertexTriangle); }
   void addCornerOfB(int i) {
     addCorner(m_b, i, m_a, m_self ? m_out.vertexTriangle : m_out.triangleVertex);
@@ -108,20 +106,18 @@ class IntersectionContacts {
     contacts.push_back(contactOf(of.vertices[corner], triangle.id, triangle.vertices, answer));
   }
 
-  /// Turns the normal to the winding normal's side, and makes the distance of a vertex behind the
-  /// triangle negative. At distance zero the normal is the winding normal already.
+  /// Makes the distance of a vertex behind the triangle negative. At distance zero
+  /// turnToSeparate() finds the normal.
   void turnToOutside(const Eigen::Vector3d& p, const Corners& triangle,
                      VertexTriangleDistance& answer) {
     const auto& [a, b, c] = triangle;
     SignCounts counts;
     const bool behind = orient3d(a, b, c, p, counts) < 0;
     m_out.exactDecisions += counts.undecided;
-    // At a face this is the direction of the difference, and has the same bits for every vertex.
-    if (answer.feature == TriangleFeature::Face)
+    if (behind)
+      turnToFront(triangle, answer);
+    else if (answer.feature == TriangleFeature::Face)
       answer.normal = windingNormal(a, b, c);
-    else if (behind)
-      answer.normal = -answer.normal;
-    if (behind) answer.distance = -answer.distance;
   }
 
   void addEdges(int i, int j) {
@@ -133,10 +129,20 @@ class IntersectionContacts {
     EdgeEdgeDistance answer = finiteEdgeEdgeDistance(positionsA[p[0]], positionsA[p[1]],
                                                      positionsB[q[0]], positionsB[q[1]]);
     m_out.exactDecisions += answer.exact;
+    if (haveCrossed(edgeA, edgeB, answer)) {
+      answer.normal = -answer.normal;
+      answer.distance = -answer.distance;
+    }
     m_check.recordEdges(p, q);
     turnToSeparate(Features<ImpactQuery::Kind::EdgeEdge>{m_pair.a, m_pair.b}, edgeA, edgeB, answer,
                    m_out.exactDecisions);
     m_out.edgeEdge.push_back(contactOf(p, q, answer));
+  }
+
+  bool haveCrossed(std::uint32_t edgeA, std::uint32_t edgeB, const EdgeEdgeDistance& at) const {
+    return at.distance > 0.0 &&
+           liesBelow(m_pair.b, featureOf(m_pair.b.topology, edgeB, at.featureB), at.normal) &&
+           liesBelow(m_pair.a, featureOf(m_pair.a.topology, edgeA, at.featureA), -at.normal);
   }
 
   const MeshPair& m_pair;
@@ -163,7 +169,11 @@ void findOne(const MeshPair& pair, const ElementPair& candidate, TriangleInterse
     return;
   }
   out.intersectingTriangles.push_back(candidate);
-  IntersectionContacts(pair, a, b, out).add(known);
+  recordCrossings(pair, false, candidate, known, out.crossings);
+  if (known.touch())
+    IntersectionContacts(pair, a, b, out).addTouching(known);
+  else
+    out.pierced.push_back({candidate, known.edgesOfAThroughB, known.edgesOfBThroughA});
 }
 
 }  // namespace
@@ -185,12 +195,42 @@ void findIntersections(const MeshPair& pair, std::span<const ElementPair> candid
   out.exactDecisions += counts.undecided;
 }
 
+void findCrossingsAtStart(const MeshPair& pair, std::span<const ElementPair> candidates,
+                          ContactBuffers& out) {
+  keepPossible(pair, true, candidates, out.possible);
+  for (const PossibleIntersection& possible : out.possible)
+    addCrossingsAtStart(pair, possible.triangles, out);
+}
+
+void addCrossingsAtStart(const MeshPair& pair, const ElementPair& candidate, ContactBuffers& out) {
+  SignCounts counts;
+  const MeshTriangle a(pair.a, candidate.a, pair.a.before), b(pair.b, candidate.b, pair.b.before);
+  const TriangleIntersection found = intersectionOf(pair, a, b, counts);
+  if (found.intersect() && !areNearAtRest(pair, a.vertices, b.vertices))
+    recordCrossings(pair, true, candidate, found, out.crossingsAtStart);
+  out.exactDecisions += counts.undecided;
+}
+
 TriangleIntersection intersectionOf(const MeshPair& pair, bool atStart, const ElementPair& ids,
                                     SignCounts& counts) {
   const auto of = [&](const TriangleMesh& mesh, std::uint32_t triangle) {
     return MeshTriangle(mesh, triangle, atStart ? mesh.before : mesh.now);
   };
   return intersectionOf(pair, of(pair.a, ids.a), of(pair.b, ids.b), counts);
+}
+
+void turnToFront(const Corners& triangle, VertexTriangleDistance& answer) {
+  // At a face this is the direction of the difference, and has the same bits for every vertex.
+  answer.normal = answer.feature == TriangleFeature::Face
+                      ? windingNormal(triangle[0], triangle[1], triangle[2])
+                      : Eigen::Vector3d(-answer.normal);
+  answer.distance = -answer.distance;
+}
+
+void addPierced(const MeshPair& pair, const PiercedPair& pierced, ContactBuffers& out) {
+  const MeshTriangle a(pair.a, pierced.triangles.a, pair.a.now),
+      b(pair.b, pierced.triangles.b, pair.b.now);
+  IntersectionContacts(pair, a, b, out).addPierced(pierced.edgesOfA, pierced.edgesOfB);
 }
 
 void addIntersection(const MeshPair& pair, const ElementPair& candidate, ContactBuffers& out) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "Math/TriangleIntersection.h"
 #include "NarrowPhase/NarrowPhase.h"
 
 #include <span>
@@ -10,26 +11,31 @@ namespace palpate {
 ///
 /// The first rule that applies gives the contacts of two intersecting triangles:
 /// (1) Features touch: every vertex-triangle and edge-edge pair at distance zero.
-/// (2) Two edges of one triangle cross the other: the vertex that these edges share.
-/// (3) One edge of each triangle crosses the other: these two edges.
-/// Touching features are reported once, by the pair of triangles that own them. Other contacts are
-/// reported by several triangle pairs, each time with the same bits.
+/// (2) An end of a crossing edge is behind the surface: this end's contact with the nearest feature
+///     of the surface (PiercingContacts).
+/// (3) Two edges of one triangle cross the other: the vertex that these edges share.
+/// (4) One edge of each triangle crosses the other: these two edges.
+/// Touching features are reported once, by the pair of triangles that own them. findIntersections()
+/// adds only these. PiercingContacts adds the others after the last batch; of rules 3 and 4 several
+/// triangle pairs have the same contact, each time with the same bits.
 ///
 /// The winding normal points to the triangle's front. A vertex behind the triangle has a negative
-/// distance; distances of edges have no sign. The normal of a vertex-triangle contact is the
-/// winding normal if the closest point is in the triangle's interior or the vertex touches the
-/// triangle. If the closest point is on an edge or a corner, the normal is along the line through
-/// both points, on the winding normal's side. For a triangle without area, and for touching
-/// parallel edges, it is the axis that <palpate/Distance.h> defines.
+/// distance. The normal of a vertex-triangle contact is the winding normal if the closest point is
+/// in the triangle's interior or the vertex touches the triangle. If the closest point is on an
+/// edge or a corner, the normal is along the line through both points, on the winding normal's
+/// side. For a triangle without area, and for touching parallel edges, it is the axis that
+/// <palpate/Distance.h> defines.
+///
+/// Two edges have crossed if each of the closest points lies below the surface around the other
+/// (liesBelow()). Their distance is then negative, and the normal leads out.
 ///
 /// Self-collision: two triangles with common vertices intersect in three cases:
 /// (1) A vertex touches the other triangle and is not a corner of it.
 /// (2) An edge of one touches an edge of the other, and these have no common vertex.
 /// (3) An edge crosses the other triangle's interior.
-/// Case 3 alone gives no contact: no two edges of one triangle cross the other, and features that
-/// touch at the common vertex are excluded. The neighbouring triangle at that edge gives the
-/// contact, if it exists and has no vertex in common with the other triangle. Pairs with common
-/// vertices must be among the candidates.
+/// Case 3 alone gives no contact by rules 3 and 4: no two edges of one triangle cross the other,
+/// and features that touch at the common vertex are excluded. Pairs with common vertices must be
+/// among the candidates.
 void findIntersections(const MeshPair&, std::span<const ElementPair> candidates,
                        ContactBuffers& out);
 
@@ -41,5 +47,16 @@ TriangleIntersection intersectionOf(const MeshPair&, bool atStart, const Element
 /// keepPossiblyIntersecting() at the step's start or at its end.
 void keepPossible(const MeshPair&, bool atStart, std::span<const ElementPair> candidates,
                   Buffer<PossibleIntersection>& possible);
+/// Appends to out.crossingsAtStart how triangles cross at the step's start.
+void findCrossingsAtStart(const MeshPair&, std::span<const ElementPair> candidates,
+                          ContactBuffers& out);
+void addCrossingsAtStart(const MeshPair&, const ElementPair&, ContactBuffers& out);
+
+/// Adds the contact of two triangles by rule 3 or 4.
+void addPierced(const MeshPair&, const PiercedPair&, ContactBuffers& out);
+
+/// Makes a measured distance at a vertex strictly behind the triangle negative, with the normal
+/// that leads out.
+void turnToFront(const Corners& triangle, VertexTriangleDistance&);
 
 }  // namespace palpate

@@ -38,6 +38,9 @@ void ContactBuffers::clear() {
   triangleVertex.clear();
   edgeEdge.clear();
   intersectingTriangles.clear();
+  crossings.clear();
+  crossingsAtStart.clear();
+  pierced.clear();
   shape.clear();
   shapeShape.clear();
   shapeGap = std::numeric_limits<double>::infinity();

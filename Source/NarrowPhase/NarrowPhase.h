@@ -11,6 +11,7 @@
 #include "Shapes/ShapeContacts.h"
 
 #include <algorithm>
+#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -111,7 +112,7 @@ struct MeshPair {
 };
 
 /// How two surfaces meet. Bodies whose surfaces touch rest on each other; those that pierce overlap
-/// (NarrowPhase/Piercing.h).
+/// (NarrowPhase/Meeting.h).
 enum class Meeting : std::uint8_t { Apart, Touching, Piercing };
 
 /// What the narrow phase found out about the conditions of a pair's method. Ids may repeat.
@@ -133,11 +134,37 @@ struct StepFacts {
   void addShape(const ShapeContactBuffers&, bool atStart);
 };
 
+/// A feature of a mesh that holds a closest point, by the mesh's own ids.
+struct MeshFeature {
+  enum class Kind : std::uint8_t { Vertex, Edge, Face } kind;
+  std::uint32_t id;
+  auto operator<=>(const MeshFeature&) const = default;
+};
+
+/// An edge that crosses a triangle of the other mesh: see PiercingContacts.
+struct EdgeCrossing {
+  bool ofB;  ///< the edge is of MeshPair::b, the triangle of MeshPair::a
+  std::uint32_t edge;
+  MeshFeature through;  ///< the feature of the triangle that the edge passes through
+  std::uint32_t triangle;
+  bool lowerIsBehind;  ///< whether the edge's first vertex is behind the triangle, or the second
+  auto operator<=>(const EdgeCrossing&) const = default;
+};
+
+/// Two triangles that pierce each other without touching. Bit i: edge i crosses the other triangle.
+struct PiercedPair {
+  ElementPair triangles;
+  std::uint8_t edgesOfA, edgesOfB;
+};
+
 /// What one worker found. Unsorted; cleared and filled again each frame.
 struct ContactBuffers : ShapeContactBuffers {
   Buffer<VertexTriangleContact> vertexTriangle, triangleVertex;
   Buffer<EdgeEdgeContact> edgeEdge;
   Buffer<ElementPair> intersectingTriangles;
+  Buffer<EdgeCrossing> crossings;         ///< Intersection: of all batches
+  Buffer<EdgeCrossing> crossingsAtStart;  ///< Auto, where the step begins in intersection
+  Buffer<PiercedPair> pierced;            ///< the same
   FeaturePairs features;                  ///< scratch: of the present batch
   Buffer<ElementPair> part, calm, fast;   ///< scratch: some pairs of the present batch
   Buffer<PossibleIntersection> possible;  ///< scratch: of the present batch

@@ -1,223 +1,369 @@
 #include "NarrowPhase/Piercing.h"
 
+#include "NarrowPhase/Filters.h"
 #include "NarrowPhase/Intersection.h"
+#include "NarrowPhase/Proximity.h"
+#include "NarrowPhase/StepCheck.h"
+#include "Exact/Predicates.h"
+#include "Math/ClosestPoint.h"
 
 #include <algorithm>
-#include <array>
-#include <bit>
+#include <tuple>
 
 namespace palpate {
 
 namespace {
 
-using Eigen::Vector3d;
+/// A mesh at one end of the step.
+struct PlacedMesh {
+  const MeshTopology& topology;
+  const Positions& at;
 
-/// The sides of a plane on which some points lie.
-struct Sides {
-  bool front = false, behind = false;
-  void add(int side) {
-    front |= side > 0;
-    behind |= side < 0;
+  PlacedMesh(const TriangleMesh& mesh, bool atStart)
+      : topology(mesh.topology), at(atStart ? mesh.before : mesh.now) {}
+  Corners corners(std::uint32_t triangle) const {
+    const auto& [a, b, c] = topology.triangles[triangle];
+    return {at[a], at[b], at[c]};
   }
-  bool both() const { return front && behind; }
 };
 
-constexpr int next(int i) { return (i + 1) % 3; }
+int sideOf(const Corners& triangle, const Eigen::Vector3d& position) {
+  SignCounts counts;
+  return orient3d(triangle[0], triangle[1], triangle[2], position, counts);
+}
 
-/// One triangle of an intersecting pair, the other one, and the features of this one on that one.
-class Piercer {
+/// The edges of one triangle that cross a triangle of the other mesh.
+class CrossingEdges {
  public:
-  Piercer(const MeshPair& pair, bool atStart, const ElementPair& ids,
-          const TriangleIntersection& found, bool second, SignCounts& counts)
-      : m_topology((second ? pair.b : pair.a).topology),
-        m_otherTopology((second ? pair.a : pair.b).topology),
-        m_at(positionsOf(second ? pair.b : pair.a, atStart)),
-        m_corners(m_topology.triangles[second ? ids.b : ids.a]),
-        m_otherCorners(m_otherTopology.triangles[second ? ids.a : ids.b]),
-        m_triangle(second ? ids.b : ids.a),
-        m_cornersOn(second ? found.cornersOfBOnA : found.cornersOfAOnB),
-        m_edgesThrough(second ? found.edgesOfBThroughA : found.edgesOfAThroughB),
-        m_counts(counts) {
-    const Positions& other = positionsOf(second ? pair.a : pair.b, atStart);
-    for (int i = 0; i < 3; ++i) m_other[i] = other[m_otherCorners[i]];
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j)
-        if (found.touchingEdges &
-            (second ? TriangleIntersection::edgesBit(j, i) : TriangleIntersection::edgesBit(i, j)))
-          m_touched[i] |= static_cast<std::uint8_t>(1u << j);
-    for (int i = 0; i < 3; ++i) m_sides[i] = sideOf(m_corners[i]);
-  }
+  /// ofB: the edges are of MeshPair::b.
+  CrossingEdges(const MeshPair& pair, bool ofB, bool atStart, std::uint32_t triangle,
+                std::uint32_t crossed, Buffer<EdgeCrossing>& out)
+      : m_mesh(ofB ? pair.b : pair.a, atStart),
+        m_others((ofB ? pair.a : pair.b).topology),
+        m_ofB(ofB && !pair.self()),
+        m_triangle(triangle),
+        m_crossed(crossed),
+        m_corners(PlacedMesh(ofB ? pair.a : pair.b, atStart).corners(crossed)),
+        m_out(out) {}
 
-  bool passesThrough() const { return m_edgesThrough != 0; }
-  bool isOnBothSides() const {
-    Sides sides;
-    for (const int side : m_sides) sides.add(side);
-    return sides.both();
-  }
-  bool isInPlane() const { return m_sides[0] == 0 && m_sides[1] == 0 && m_sides[2] == 0; }
-  bool isClosed() const { return m_topology.hasFaces() && m_topology.hasOnlyClosedStars; }
+  void addThroughFace(int edge) { add(edge, {MeshFeature::Kind::Face, m_crossed}); }
 
-  /// Rules (2) and (3). bothClosed: for both surfaces.
-  bool piercesByStar(bool bothClosed) const {
-    const auto pierces = [&](const Sides& sides) {
-      return sides.both() || (bothClosed && sides.behind);
-    };
-    for (int i = 0; i < 3; ++i) {
-      if (isInInterior(i)) {
-        Sides sides;
-        for (const std::uint32_t t : m_topology.vertexTriangles[m_corners[i]]) addTo(sides, t);
-        if (pierces(sides)) return true;
-      }
-      if (!passesInterior(i)) continue;
-      Sides sides;
-      for (const std::uint32_t t :
-           m_topology.edgeTriangles[m_topology.triangleEdges[m_triangle][i]])
-        addTo(sides, t);
-      if (pierces(sides)) return true;
-    }
-    return false;
+  /// touched: bit i is set if the edge meets edge i of the crossed triangle.
+  void addIfThroughBorder(int edge, unsigned touched) {
+    const std::uint32_t id = m_mesh.topology.triangleEdges[m_triangle][edge];
+    if (touched == 0 || id == kNoEdge) return;
+    const Segment& ends = m_mesh.topology.edges[id];
+    if (side(ends[0]) * side(ends[1]) >= 0) return;
+    // It crosses the plane in one point. If that is on two edges, it is their common corner.
+    const auto feature = touched == 0b011   ? TriangleFeature::CornerB
+                         : touched == 0b110 ? TriangleFeature::CornerC
+                         : touched == 0b101 ? TriangleFeature::CornerA
+                         : touched == 0b001 ? TriangleFeature::EdgeAB
+                         : touched == 0b010 ? TriangleFeature::EdgeBC
+                                            : TriangleFeature::EdgeCA;
+    add(edge, featureOf(m_others, m_crossed, feature));
   }
-
-  /// Number of different points among the corners on the other triangle.
-  int cornersOn() const { return std::popcount(m_cornersOn); }
-  bool isOn(int corner) const { return m_cornersOn >> corner & 1; }
-  Vector3d corner(int i) const { return m_at[m_corners[i]]; }
-  /// The other triangle's edges that edge i touches between its own corners.
-  unsigned touchedBetweenCorners(int i) const {
-    return isOn(i) || isOn(next(i)) ? 0u : m_touched[i];
-  }
-  const Corners& other() const { return m_other; }
 
  private:
-  static const Positions& positionsOf(const TriangleMesh& mesh, bool atStart) {
-    return atStart ? mesh.before : mesh.now;
-  }
-  int sideOf(std::uint32_t vertex) const {
-    if (&m_topology == &m_otherTopology &&
-        std::find(m_otherCorners.begin(), m_otherCorners.end(), vertex) != m_otherCorners.end())
-      return 0;
-    return orient3d(m_other[0], m_other[1], m_other[2], m_at[vertex], m_counts);
-  }
-  void addTo(Sides& sides, std::uint32_t triangle) const {
-    for (const std::uint32_t v : m_topology.triangles[triangle]) sides.add(sideOf(v));
-  }
-  /// Whether a corner lies on the other triangle and on none of its edges.
-  bool isInInterior(int corner) const {
-    return isOn(corner) && m_touched[corner] == 0 && m_touched[next(next(corner))] == 0;
-  }
-  /// Whether an edge lies in the other triangle's plane and meets its interior.
-  bool passesInterior(int edge) const {
-    if (m_sides[edge] != 0 || m_sides[next(edge)] != 0) return false;
-    if (m_topology.triangleEdges[m_triangle][edge] == kNoEdge) return false;
-    if (isInInterior(edge) || isInInterior(next(edge))) return true;
-    const Vector3d p = corner(edge), q = corner(next(edge));
-    std::array<bool, 3> isOnLine;
-    for (int j = 0; j < 3; ++j) isOnLine[j] = areCollinear(p, q, m_other[j]);
-    for (int j = 0; j < 3; ++j)
-      if (isOnLine[j] && isOnLine[next(j)]) return false;  // along an edge of the other triangle
-    // It meets two edges of the other triangle away from their common corner.
-    for (int j = 0; j < 3; ++j)
-      if (m_touched[edge] >> j & 1 && m_touched[edge] >> next(j) & 1 && !isOnLine[next(j)])
-        return true;
-    return false;
-  }
-  bool areCollinear(const Vector3d& a, const Vector3d& b, const Vector3d& c) const {
-    for (int axis = 0; axis < 3; ++axis)
-      if (orient2d(axis, a, b, c, m_counts) != 0) return false;
-    return true;
+  int side(std::uint32_t vertex) const { return sideOf(m_corners, m_mesh.at[vertex]); }
+  void add(int edge, const MeshFeature& through) {
+    const std::uint32_t id = m_mesh.topology.triangleEdges[m_triangle][edge];
+    const bool lowerIsBehind = side(m_mesh.topology.edges[id][0]) < 0;
+    m_out.push_back({m_ofB, id, through, m_crossed, lowerIsBehind});
   }
 
-  const MeshTopology &m_topology, &m_otherTopology;
-  const Positions& m_at;
-  const Triangle &m_corners, &m_otherCorners;
-  const std::uint32_t m_triangle;
-  const unsigned m_cornersOn, m_edgesThrough;
-  SignCounts& m_counts;
-  Corners m_other;
-  std::array<std::uint8_t, 3> m_touched{};  ///< per edge, bit j: it touches edge j of the other
-  std::array<int, 3> m_sides;               ///< of the other's plane
+  PlacedMesh m_mesh;
+  const MeshTopology& m_others;
+  bool m_ofB;
+  std::uint32_t m_triangle, m_crossed;
+  Corners m_corners;
+  Buffer<EdgeCrossing>& m_out;
 };
 
-/// Whether two triangles that cross each other's planes have more than one point in common. Each
-/// point is a corner on the other triangle, or one at which two edges meet between their corners.
-bool haveTwoPointsInCommon(const Piercer& a, const Piercer& b, bool self) {
-  int count = a.cornersOn() + b.cornersOn();
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      if (a.isOn(i) && b.isOn(j) && a.corner(i) == b.corner(j)) --count;
-      count += (a.touchedBetweenCorners(i) >> j & 1) && (b.touchedBetweenCorners(j) >> i & 1);
-      // Of one mesh: a common vertex is a point in common, and not among the corners above.
-      count += self && !a.isOn(i) && a.corner(i) == b.corner(j);
-    }
-  return count > 1;
-}
-
-/// Rule (4), for triangles in one plane.
-bool overlapWithOneDirection(const Corners& a, const Corners& b, SignCounts& counts) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const int turnA = orient2d(axis, a[0], a[1], a[2], counts),
-              turnB = orient2d(axis, b[0], b[1], b[2], counts);
-    if (turnA == 0 || turnB == 0) continue;
-    const auto separates = [&](const Corners& t, int turn, const Corners& points) {
-      for (int i = 0; i < 3; ++i)
-        if (std::all_of(points.begin(), points.end(), [&](const Vector3d& p) {
-              return turn * orient2d(axis, t[i], t[next(i)], p, counts) <= 0;
-            }))
-          return true;
-      return false;
-    };
-    return turnA == turnB && !separates(a, turnA, b) && !separates(b, turnB, a);
+/// How often more an edge leaves the surface than it enters it, on the way from its first vertex.
+/// crossings: of one edge, sorted.
+int timesOfLeaving(std::span<const EdgeCrossing> crossings) {
+  int sum = 0;
+  for (auto first = crossings.begin(); first != crossings.end();) {
+    const auto end = std::find_if(
+        first, crossings.end(), [&](const EdgeCrossing& c) { return c.through != first->through; });
+    const bool leaves = first->lowerIsBehind;
+    if (std::all_of(first, end, [&](const EdgeCrossing& c) { return c.lowerIsBehind == leaves; }))
+      sum += leaves ? 1 : -1;
+    first = end;
   }
-  return false;
+  return sum;
 }
 
-bool pierce(const MeshPair& pair, bool atStart, const ElementPair& ids,
-            const TriangleIntersection& found, SignCounts& counts) {
-  if (!found.touch()) return true;
-  const Piercer a(pair, atStart, ids, found, false, counts),
-      b(pair, atStart, ids, found, true, counts);
-  if (a.passesThrough() || b.passesThrough()) return true;
-  if (a.isOnBothSides() && b.isOnBothSides() && haveTwoPointsInCommon(a, b, pair.self()))
-    return true;
-  const bool closed = a.isClosed() && b.isClosed();
-  if (a.isInPlane() && b.isInPlane() && closed &&
-      overlapWithOneDirection(b.other(), a.other(), counts))
-    return true;
-  return a.piercesByStar(closed) || b.piercesByStar(closed);
-}
+/// Searches the feature of a surface that is nearest to a vertex behind it.
+class NearestInFront {
+ public:
+  NearestInFront(const MeshPair& pair, bool ofB, bool atStart, std::uint32_t vertex)
+      : m_pair(pair),
+        m_mesh(ofB ? pair.a : pair.b, atStart),
+        m_vertex(vertex),
+        m_position(PlacedMesh(ofB ? pair.b : pair.a, atStart).at[vertex]) {}
 
-Meeting classify(const MeshPair& pair, bool atStart, const ElementPair& ids,
-                 TriangleIntersection known, SignCounts& counts) {
-  if (!known.intersect()) known = intersectionOf(pair, atStart, ids, counts);
-  if (!known.intersect()) return Meeting::Apart;
-  return pierce(pair, atStart, ids, known, counts) ? Meeting::Piercing : Meeting::Touching;
-}
+  /// Begins at a triangle behind which the vertex is, or goes on to it if it is nearer.
+  bool enter(std::uint32_t triangle) {
+    const VertexTriangleDistance found = measure(triangle);
+    if (m_isKnown && !(found.distance < m_nearest.distance)) return false;
+    m_isKnown = true;
+    m_triangle = triangle;
+    m_nearest = found;
+    return true;
+  }
+
+  /// Goes on to nearer triangles, and at last to the lowest one that holds the feature.
+  void walk() {
+    for (bool isNearer = true; isNearer;) {
+      isNearer = false;
+      for (const std::uint32_t t : holders(feature())) isNearer |= isAllowed(t) && enter(t);
+    }
+    const MeshFeature last = feature();
+    for (const std::uint32_t t : holders(last)) {
+      if (t >= m_triangle) return;
+      if (!isAllowed(t)) continue;
+      const VertexTriangleDistance found = measure(t);
+      if (featureOf(m_mesh.topology, t, found.feature) != last) continue;
+      m_triangle = t;
+      m_nearest = found;
+    }
+  }
+
+  std::uint32_t triangle() const { return m_triangle; }
+  Corners corners() const { return m_mesh.corners(m_triangle); }
+  bool exact() const { return m_nearest.exact; }
+  VertexTriangleContact contact() const {
+    VertexTriangleDistance answer = m_nearest;
+    if (answer.distance > 0.0) turnToFront(corners(), answer);
+    return contactOf(m_vertex, m_triangle, m_mesh.topology.triangles[m_triangle], answer);
+  }
+
+ private:
+  MeshFeature feature() const { return featureOf(m_mesh.topology, m_triangle, m_nearest.feature); }
+  std::span<const std::uint32_t> holders(const MeshFeature& feature) const {
+    switch (feature.kind) {
+      case MeshFeature::Kind::Vertex:
+        return m_mesh.topology.vertexTriangles[feature.id];
+      case MeshFeature::Kind::Edge:
+        return m_mesh.topology.edgeTriangles[feature.id];
+      case MeshFeature::Kind::Face:
+        break;
+    }
+    return {};
+  }
+  bool isAllowed(std::uint32_t triangle) const {
+    return !m_pair.excludesVertex(m_vertex, triangle) &&
+           sideOf(m_mesh.corners(triangle), m_position) < 0;
+  }
+  VertexTriangleDistance measure(std::uint32_t triangle) const {
+    const auto [a, b, c] = m_mesh.corners(triangle);
+    return finiteVertexTriangleDistance(m_position, a, b, c);
+  }
+
+  const MeshPair& m_pair;
+  PlacedMesh m_mesh;
+  std::uint32_t m_vertex, m_triangle = 0;
+  Eigen::Vector3d m_position;
+  VertexTriangleDistance m_nearest{};
+  bool m_isKnown = false;
+};
 
 }  // namespace
 
-Meeting meetingOf(const MeshPair& pair, bool atStart, const ElementPair& candidate,
-                  ContactBuffers& counts) {
-  SignCounts signs;
-  const Meeting meeting = classify(pair, atStart, candidate, {}, signs);
-  counts.exactDecisions += signs.undecided;
-  return meeting;
+void recordCrossings(const MeshPair& pair, bool atStart, const ElementPair& triangles,
+                     const TriangleIntersection& found, Buffer<EdgeCrossing>& out) {
+  CrossingEdges ofA(pair, false, atStart, triangles.a, triangles.b, out),
+      ofB(pair, true, atStart, triangles.b, triangles.a, out);
+  const auto touches = [&](int i, int j) {
+    return (found.touchingEdges & TriangleIntersection::edgesBit(i, j)) != 0;
+  };
+  for (int i = 0; i < 3; ++i) {
+    unsigned touchedOfB = 0, touchedOfA = 0;
+    for (int j = 0; j < 3; ++j) {
+      touchedOfB |= touches(i, j) << j;
+      touchedOfA |= touches(j, i) << j;
+    }
+    if (found.edgesOfAThroughB >> i & 1) ofA.addThroughFace(i);
+    if (found.edgesOfBThroughA >> i & 1) ofB.addThroughFace(i);
+    ofA.addIfThroughBorder(i, touchedOfB);
+    ofB.addIfThroughBorder(i, touchedOfA);
+  }
 }
 
-SurfaceMeeting meetingOf(const MeshPair& pair, bool atStart,
-                         std::span<const ElementPair> candidates, ContactBuffers& counts) {
-  keepPossible(pair, atStart, candidates, counts.possible);
-  counts.validityPairs += candidates.size();
-  SignCounts signs;
-  SurfaceMeeting all;
-  for (const PossibleIntersection& possible : counts.possible) {
-    const Meeting found = classify(pair, atStart, possible.triangles, possible.intersection, signs);
-    all.meeting = std::max(all.meeting, found);
-    if (found != Meeting::Piercing) continue;
-    all.piercing = possible.triangles;
-    break;
+void PiercingContacts::collect(std::span<ContactBuffers* const> found,
+                               Buffer<EdgeCrossing> ContactBuffers::*list) {
+  m_crossings.clear();
+  for (const ContactBuffers* buffers : found)
+    m_crossings.insert(m_crossings.end(), (buffers->*list).begin(), (buffers->*list).end());
+  std::sort(m_crossings.begin(), m_crossings.end());
+  m_crossings.erase(std::unique(m_crossings.begin(), m_crossings.end()), m_crossings.end());
+}
+
+void PiercingContacts::find(const MeshPair& pair, std::span<ContactBuffers* const> found,
+                            ContactBuffers& out) {
+  collect(found, &ContactBuffers::crossings);
+  findBehind(pair);
+  addDepths(pair, false, out);
+  for (const ContactBuffers* buffers : found)
+    for (const PiercedPair& pierced : buffers->pierced)
+      if (!hasEndBehind(pair, pierced)) addPierced(pair, pierced, out);
+}
+
+void PiercingContacts::findAtStart(const MeshPair& pair, std::span<ContactBuffers* const> found,
+                                   ContactBuffers& out) {
+  collect(found, &ContactBuffers::crossingsAtStart);
+  findBehind(pair);
+  addDepths(pair, true, out);
+}
+
+void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuffers& out) {
+  StepCheck check(pair, out);
+  for (auto first = m_behind.begin(); first != m_behind.end();) {
+    const bool ofB = first->ofB;
+    const std::uint32_t vertex = first->vertex;
+    NearestInFront nearest(pair, ofB, atStart, vertex);
+    for (; first != m_behind.end() && first->ofB == ofB && first->vertex == vertex; ++first)
+      nearest.enter(first->triangle);
+    nearest.walk();
+    out.exactDecisions += nearest.exact();
+    if (!atStart) {
+      if (rejectsVertex(pair, vertex, nearest.triangle(), ofB)) continue;
+      const auto [a, b, c] = nearest.corners();
+      check.recordTriangle(nearest.triangle(), !ofB, a, b, c);
+    }
+    (ofB ? out.triangleVertex : out.vertexTriangle).push_back(nearest.contact());
   }
-  counts.exactDecisions += signs.undecided;
-  return all;
+}
+
+void PiercingContacts::findBehind(const MeshPair& pair) {
+  m_behind.clear();
+  for (auto first = m_crossings.begin(); first != m_crossings.end();) {
+    const auto end = std::find_if(first, m_crossings.end(), [&](const EdgeCrossing& c) {
+      return c.ofB != first->ofB || c.edge != first->edge;
+    });
+    const int leaves = timesOfLeaving({first, end});
+    const Segment& ends = (first->ofB ? pair.b : pair.a).topology.edges[first->edge];
+    for (; first != end; ++first)
+      if (leaves != 0 && first->lowerIsBehind == (leaves > 0))
+        m_behind.push_back({first->ofB, ends[leaves < 0], first->triangle});
+  }
+  std::sort(m_behind.begin(), m_behind.end());
+  m_behind.erase(std::unique(m_behind.begin(), m_behind.end()), m_behind.end());
+}
+
+bool PiercingContacts::isBehind(bool ofB, std::uint32_t vertex) const {
+  const auto place = std::lower_bound(m_behind.begin(), m_behind.end(), Behind{ofB, vertex, 0});
+  return place != m_behind.end() && place->ofB == ofB && place->vertex == vertex;
+}
+
+bool PiercingContacts::hasEndBehind(const MeshPair& pair, const PiercedPair& pierced) const {
+  const auto isEndBehind = [&](bool ofB, const TriangleMesh& mesh, std::uint32_t triangle,
+                               unsigned edges) {
+    const Triangle& corners = mesh.topology.triangles[triangle];
+    for (int i = 0; i < 3; ++i)
+      if (edges >> i & 1 && (isBehind(ofB, corners[i]) || isBehind(ofB, corners[(i + 1) % 3])))
+        return true;
+    return false;
+  };
+  return isEndBehind(false, pair.a, pierced.triangles.a, pierced.edgesOfA) ||
+         isEndBehind(!pair.self(), pair.b, pierced.triangles.b, pierced.edgesOfB);
+}
+
+void KnownSides::add(const ContactBuffers& found, Buffer<Side>& sides) {
+  for (const auto* list : {&found.vertexTriangle, &found.triangleVertex})
+    for (const VertexTriangleContact& c : *list)
+      if (c.distance < 0.0)
+        sides.push_back({list == &found.triangleVertex, c.vertex, c.triangle, c.normal, false});
+}
+
+void KnownSides::sort(Buffer<Side>& sides) {
+  std::sort(sides.begin(), sides.end(), [](const Side& l, const Side& r) {
+    return std::tie(l.ofB, l.vertex, l.triangle) < std::tie(r.ofB, r.vertex, r.triangle);
+  });
+  const auto last = std::unique(sides.begin(), sides.end(), [](const Side& l, const Side& r) {
+    return std::tie(l.ofB, l.vertex, l.triangle) == std::tie(r.ofB, r.vertex, r.triangle);
+  });
+  sides.erase(last, sides.end());
+}
+
+KnownSides::SideRange KnownSides::sidesOf(Buffer<Side>& sides, bool ofB, std::uint32_t vertex) {
+  const auto isBefore = [&](const Side& side) {
+    return std::tie(side.ofB, side.vertex) < std::tie(ofB, vertex);
+  };
+  const auto first = std::partition_point(sides.begin(), sides.end(), isBefore);
+  return {first, std::find_if(first, sides.end(), [&](const Side& side) {
+            return side.ofB != ofB || side.vertex != vertex;
+          })};
+}
+
+KnownSides::Opinion KnownSides::ask(Buffer<Side>& sides, const Stencil& stencil,
+                                    const std::array<bool, 4>& ofB, const Eigen::Vector3d& normal) {
+  Opinion opinion;
+  for (int i = 0; i < 4; ++i) {
+    if (stencil.weights[i] == 0.0) continue;
+    for (const Side& side : sidesOf(sides, ofB[i], stencil.vertices[i])) {
+      opinion.isKnown = true;
+      opinion.isRepresented |= side.isRepresented;
+      opinion.agreement += stencil.weights[i] * normal.dot(side.outward);
+    }
+  }
+  return opinion;
+}
+
+void KnownSides::apply(const MeshPair& pair, std::span<ContactBuffers* const> atEnd,
+                       const ContactBuffers& atStart, std::span<ContactBuffers* const> others) {
+  m_atEnd.clear();
+  m_atStart.clear();
+  for (const ContactBuffers* found : atEnd) add(*found, m_atEnd);
+  add(atStart, m_atStart);
+  if (m_atEnd.empty() && m_atStart.empty()) return;
+  sort(m_atEnd);
+  sort(m_atStart);
+  const bool drops = pair.settings.contacts == Contacts::Distinct, b = !pair.self();
+  // ofB: the mesh of each vertex.
+  const auto represents = [&](const auto& contact, const std::array<bool, 4>& ofB) {
+    if constexpr (requires { contact.vertex; }) {
+      const Stencil all = stencil(contact), alone{all.vertices, {1.0, 0.0, 0.0, 0.0}};
+      if (contact.timeOfImpact == 1.0 || ask(m_atEnd, all, ofB, contact.normal).isKnown)
+        return false;
+      const Opinion own = ask(m_atStart, alone, ofB, contact.normal);
+      const double rest = ask(m_atStart, all, ofB, contact.normal).agreement - own.agreement;
+      return own.isKnown && own.agreement * rest >= 0.0;
+    }
+    return false;
+  };
+  // Turns a contact, or returns true if it is dropped.
+  const auto settle = [&](auto& contact, const std::array<bool, 4>& ofB) {
+    const Stencil vertices = stencil(contact);
+    Opinion opinion = ask(m_atEnd, vertices, ofB, contact.normal);
+    if (drops && opinion.isKnown) return true;
+    if (!opinion.isKnown && contact.timeOfImpact < 1.0) {
+      opinion = ask(m_atStart, vertices, ofB, contact.normal);
+      if (drops && opinion.isRepresented && !represents(contact, ofB)) return true;
+    }
+    if (opinion.agreement < 0.0) {
+      contact.normal = -contact.normal;
+      contact.distance = -contact.distance;
+    }
+    return false;
+  };
+  const std::array<bool, 4> vertexOfA{false, b, b, b}, vertexOfB{b, false, false, false};
+  if (drops)
+    for (const ContactBuffers* found : others) {
+      for (const VertexTriangleContact& c : found->vertexTriangle)
+        if (represents(c, vertexOfA))
+          for (Side& side : sidesOf(m_atStart, false, c.vertex)) side.isRepresented = true;
+      for (const VertexTriangleContact& c : found->triangleVertex)
+        if (represents(c, vertexOfB))
+          for (Side& side : sidesOf(m_atStart, b, c.vertex)) side.isRepresented = true;
+    }
+  for (ContactBuffers* found : others) {
+    std::erase_if(found->vertexTriangle, [&](auto& c) { return settle(c, vertexOfA); });
+    std::erase_if(found->triangleVertex, [&](auto& c) { return settle(c, vertexOfB); });
+    std::erase_if(found->edgeEdge, [&](auto& c) { return settle(c, {false, false, b, b}); });
+  }
 }
 
 }  // namespace palpate

@@ -1,36 +1,106 @@
 #pragma once
 
-#include "NarrowPhase/NarrowPhase.h"
+#include "Core/Buffer.h"
 #include "Math/TriangleIntersection.h"
+#include "NarrowPhase/NarrowPhase.h"
 
-#include <optional>
+#include <array>
+#include <compare>
+#include <cstdint>
+#include <ranges>
 #include <span>
 
 namespace palpate {
 
-/// How the surfaces meet in two triangles of the meshes, at the step's start or at its end. Exact.
-///
-/// Triangles that intersect pierce if one of these rules says so, and touch otherwise:
-/// (1) The triangles cross: both have corners strictly on either side of the other's plane, and
-///     they have more than one point in common.
-/// (2) A corner lies in the other triangle's interior, and the triangles around the corner have
-///     vertices strictly on both sides of that triangle; or an edge in the triangle's plane passes
-///     through its interior, and the edge's two triangles do.
-/// (3) The same with vertices strictly behind the triangle only, if both surfaces are closed: the
-///     two bodies overlap. A surface is closed if each edge is in two triangles of one winding.
-/// (4) Both surfaces are closed, and the triangles are in one plane, overlap in an area, and have
-///     normals of one direction.
-///
-/// counts: receives exactDecisions and validityPairs, and serves as scratch.
-Meeting meetingOf(const MeshPair&, bool atStart, const ElementPair&, ContactBuffers& counts);
+/// Appends the crossings of two intersecting triangles at the step's start or at its end. See
+/// PiercingContacts.
+void recordCrossings(const MeshPair&, bool atStart, const ElementPair&, const TriangleIntersection&,
+                     Buffer<EdgeCrossing>& out);
 
-/// How the surfaces meet in any of the candidates.
-struct SurfaceMeeting {
-  Meeting meeting = Meeting::Apart;
-  std::optional<ElementPair> piercing{};  ///< the first candidate that pierces
+/// The contacts of triangles that pierce each other, without touching features. They depend on all
+/// crossings of a pair of meshes, and are therefore found after the last batch.
+///
+/// Crossing an edge crosses a triangle if its ends are strictly on different sides of the
+///          triangle's plane and it meets the triangle, borders included. Crossings of one edge
+///          through one face, edge or vertex count once; where its triangles are crossed in both
+///          senses they count nothing.
+/// Behind   an edge leaves the surface at the crossings that lead from behind to the front. The end
+///          from which it leaves more often than it enters is behind the surface. Of a closed
+///          surface that does not cross itself, this end is inside and the other outside.
+/// Depth    a vertex behind a surface has one contact, with the nearest of the triangles that such
+///          edges cross, or with a nearer one. The search goes on from the feature with the
+///          closest point to all triangles that hold it, as long as one of them is nearer. It
+///          enters only triangles behind which the vertex is. The contact names the lowest of these
+///          that hold the closest feature. If the feature is an edge or a vertex, the normal leads
+///          from the vertex to the closest point.
+/// Pairs    triangles that pierce each other have the contact of Intersection.h, unless an end of
+///          one of the crossing edges is behind: that end's contact then stands for the pair.
+/// Law      the results do not depend on the order of crossings and pairs, nor on repeated ones.
+/// Cost     n log n in the crossings; a vertex behind measures the triangles on its way.
+class PiercingContacts {
+ public:
+  /// Appends all contacts at the step's end.
+  void find(const MeshPair&, std::span<ContactBuffers* const> found, ContactBuffers& out);
+  /// Appends the contacts of vertices that are behind a surface at the step's start, unfiltered.
+  void findAtStart(const MeshPair&, std::span<ContactBuffers* const> found, ContactBuffers& out);
+
+ private:
+  /// A vertex behind a triangle that one of its edges crosses. ofB: of MeshPair::b.
+  struct Behind {
+    bool ofB;
+    std::uint32_t vertex, triangle;
+    auto operator<=>(const Behind&) const = default;
+  };
+  void collect(std::span<ContactBuffers* const> found, Buffer<EdgeCrossing> ContactBuffers::*list);
+  void findBehind(const MeshPair&);
+  void addDepths(const MeshPair&, bool atStart, ContactBuffers& out);
+  bool isBehind(bool ofB, std::uint32_t vertex) const;
+  bool hasEndBehind(const MeshPair&, const PiercedPair&) const;
+
+  Buffer<EdgeCrossing> m_crossings;
+  Buffer<Behind> m_behind;
 };
-/// Stops at the first candidate that pierces.
-SurfaceMeeting meetingOf(const MeshPair&, bool atStart, std::span<const ElementPair> candidates,
-                         ContactBuffers& counts);
+
+/// Auto, in a step that begins in intersection: what Intersection's contacts tell about the sides
+/// of other contacts.
+///
+/// Sides    a vertex that is behind the other surface leaves it along the normal of its contact
+///          with a negative distance. A contact is on the wrong side if it moves the vertices of
+///          its closest points against that, by the weighted sum.
+/// Rule     (1) Of vertices that are behind at the step's end: Contacts::Distinct drops all other
+///          contacts of these vertices, because Intersection's contact stands for them.
+///          Contacts::All turns those that are on the wrong side: the normal is reversed and the
+///          distance becomes negative.
+///          (2) Of vertices that are behind at the step's start and not at its end, which leave:
+///          an impact on the wrong side is turned. Contacts::Distinct drops impacts of a vertex
+///          for which another one stands: one in which the vertex meets a triangle, and other
+///          vertices that leave do not disagree.
+class KnownSides {
+ public:
+  /// atEnd, atStart: Intersection's contacts.
+  void apply(const MeshPair&, std::span<ContactBuffers* const> atEnd, const ContactBuffers& atStart,
+             std::span<ContactBuffers* const> others);
+
+ private:
+  struct Side {
+    bool ofB;
+    std::uint32_t vertex, triangle;
+    Eigen::Vector3d outward;
+    bool isRepresented;  ///< an impact stands for the vertex
+  };
+  using SideRange = std::ranges::subrange<Buffer<Side>::iterator>;
+  /// What the sides of a contact's vertices say about it.
+  struct Opinion {
+    bool isKnown = false, isRepresented = false;
+    double agreement = 0.0;  ///< negative: the contact is on the wrong side
+  };
+  static void add(const ContactBuffers&, Buffer<Side>&);
+  static void sort(Buffer<Side>&);
+  static SideRange sidesOf(Buffer<Side>& sorted, bool ofB, std::uint32_t vertex);
+  static Opinion ask(Buffer<Side>& sorted, const Stencil&, const std::array<bool, 4>& ofB,
+                     const Eigen::Vector3d& normal);
+
+  Buffer<Side> m_atEnd, m_atStart;
+};
 
 }  // namespace palpate

@@ -16,13 +16,6 @@ namespace palpate {
 /// contacts of that vertex.
 void findProximity(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);
 
-/// A feature of a mesh that holds a closest point, by the mesh's own ids.
-struct MeshFeature {
-  enum class Kind : std::uint8_t { Vertex, Edge, Face } kind;
-  std::uint32_t id;
-  friend bool operator==(const MeshFeature&, const MeshFeature&) = default;
-};
-
 inline MeshFeature featureOf(const MeshTopology& topology, std::uint32_t triangle,
                              TriangleFeature feature) {
   const int i = static_cast<int>(feature);

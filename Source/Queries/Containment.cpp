@@ -138,6 +138,12 @@ bool isInside(const SearchableGeometry& body, const Eigen::Vector3d& point,
          InsideQuery(body, settings, engine, stack).evaluate(point).inside;
 }
 
+int windingNumber(const SearchableGeometry& body, const Eigen::Vector3d& point, Engine engine,
+                  PointQueryStack& stack) {
+  if (body.tree.octree().size() == 0) return 0;
+  return BodyQuery(body, engine, stack).windingNumber(point);
+}
+
 void findInside(const SearchableGeometry& vertices, const SearchableGeometry& body,
                 const InsideSettings& settings, Engine engine, const Threads& threads,
                 VertexSearch<InsideVertex>& scratch, std::vector<InsideVertex>& out) {
@@ -157,8 +163,11 @@ void findInside(const SearchableGeometry& vertices, const SearchableGeometry& bo
 }
 
 bool isClosed(SearchableGeometry& body) {
+  return body.solid || hasClosedSurface(body);  // tetrahedra define their inside
+}
+
+bool hasClosedSurface(SearchableGeometry& body) {
   MeshTopology& topology = body.mesh.topology;
-  if (body.solid) return true;  // its tetrahedra define its inside
   if (!topology.hasFaces()) return false;
   if (!topology.closed) topology.closed = findMeshDefects(topology.triangles).closed();
   return *topology.closed;

@@ -24,6 +24,10 @@ void findInside(const SearchableGeometry& vertices, const SearchableGeometry& bo
 bool isInside(const SearchableGeometry& body, const Eigen::Vector3d& point, const InsideSettings&,
               Engine, PointQueryStack&);
 
+/// The winding number of a geometry's surface about a point, decided exactly; 0 on the surface.
+int windingNumber(const SearchableGeometry&, const Eigen::Vector3d& point, Engine,
+                  PointQueryStack&);
+
 /// Throws InvalidSettings for settings out of range.
 void checkSettings(const SearchableGeometry& body, const InsideSettings&);
 /// Throws NotClosed for a body without faces. For InsideRule::Closed it also throws NotClosed, with
@@ -31,5 +35,8 @@ void checkSettings(const SearchableGeometry& body, const InsideSettings&);
 void checkInside(SearchableGeometry& body, InsideRule);
 /// Whether checkInside() accepts a body with elements for InsideRule::Closed.
 bool isClosed(SearchableGeometry& body);
+/// Whether a body's triangles are closed and consistently oriented. Those of a tetrahedral mesh are
+/// not where parts of it hang together by an edge alone.
+bool hasClosedSurface(SearchableGeometry& body);
 
 }  // namespace palpate

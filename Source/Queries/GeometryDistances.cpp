@@ -48,27 +48,7 @@ double magnitudeOf(const SearchableGeometry& geometry) {
   return worldOrigin(geometry).cwiseAbs().sum() + geometry.tree.frame().origin.cwiseAbs().sum();
 }
 
-/// The map of b's boxes to a's floats. a's rotation leaves distances from a's origin as they are
-/// within kOrthonormal.
-BoxMap mapBetween(const SearchableGeometry& a, const SearchableGeometry& b) {
-  BoxMap map;
-  const double scale = a.tree.frame().scale;
-  const Eigen::Matrix3d toA = rotationOf(a).transpose(), rotation = toA * rotationOf(b);
-  const Vector3d offset = toA * (worldOrigin(b) - worldOrigin(a)) * scale;
-  std::array<std::array<double, 3>, 3> matrix;
-  for (int k = 0; k < 3; ++k)
-    for (int j = 0; j < 3; ++j) matrix[k][j] = rotation(k, j);
-  setEnd(map.ends[0], matrix, {offset[0], offset[1], offset[2]}, 0.0,
-         4 * kPlacedError * scale * (magnitudeOf(a) + magnitudeOf(b)));
-  map.count = 1;
-  return map;
-}
-
 float up(double value) { return OutwardRounding::up(static_cast<float>(value)); }
-
-PairSide sideOf(const SearchableGeometry& geometry, const BoxMap& map) {
-  return {geometry.tree.octree(), geometry.tree.floats(), geometry.tree.ordered().data(), map};
-}
 
 /// A direction in the frame of a geometry's floats.
 std::array<float, 3> inFloats(const SearchableGeometry& geometry, const Vector3d& direction) {
@@ -94,6 +74,32 @@ double sizeOf(const FloatBox& box) {
   for (std::size_t k = 0; k < 3; ++k) size += double{box.upper[k]} - box.lower[k];
   return size;
 }
+
+}  // namespace
+
+BoxMap mapBetween(const SearchableGeometry& a, const SearchableGeometry& b, const Vector3d& shift) {
+  BoxMap map;
+  const double scale = a.tree.frame().scale;
+  const Eigen::Matrix3d toA = rotationOf(a).transpose(), rotation = toA * rotationOf(b);
+  const Vector3d offset = toA * ((worldOrigin(b) - worldOrigin(a)) - shift) * scale;
+  std::array<std::array<double, 3>, 3> matrix;
+  for (int k = 0; k < 3; ++k)
+    for (int j = 0; j < 3; ++j) matrix[k][j] = rotation(k, j);
+  setEnd(map.ends[0], matrix, {offset[0], offset[1], offset[2]}, 0.0,
+         4 * kPlacedError * scale * (magnitudeOf(a) + magnitudeOf(b) + shift.cwiseAbs().sum()));
+  map.count = 1;
+  return map;
+}
+
+PairSide sideOf(const SearchableGeometry& geometry, const BoxMap& map) {
+  return {geometry.tree.octree(), geometry.tree.floats(), geometry.tree.ordered().data(), map};
+}
+
+double boxErrorOf(const SearchableGeometry& a, const SearchableGeometry& b) {
+  return 4 * kOrthonormal * (sizeOf(a.tree.octree().box(0)) + sizeOf(b.tree.octree().box(0)));
+}
+
+namespace {
 
 /// The nearest pair of elements that was found so far.
 class NearestPair {
@@ -286,9 +292,7 @@ GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGe
   // The error covers that of computed distances. If positions are clamped to the floats' range, it
   // is so large that no pair of boxes is skipped.
   const double radii = a.mesh.largestRadius + b.mesh.largestRadius, scale = a.tree.frame().scale,
-               error =
-                   4 * kOrthonormal * (sizeOf(sideA.octree.box(0)) + sizeOf(sideB.octree.box(0))),
-               heightsError = heightsErrorOf(a) + heightsErrorOf(b);
+               error = boxErrorOf(a, b), heightsError = heightsErrorOf(a) + heightsErrorOf(b);
   const auto boundOf = [&] {
     const double distance = (nearest.distance() + radii) * scale * (1.0 + 4 * kOrthonormal) + error;
     PairBound bound{up(distance)};

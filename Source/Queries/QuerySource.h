@@ -5,6 +5,7 @@
 
 #include "Core/MemoryBudget.h"
 #include "Core/Threads.h"
+#include "Queries/BodyPenetration.h"
 #include "Queries/PairTraversal.h"
 #include "Queries/PathIntervals.h"
 #include "Queries/PointDistances.h"
@@ -44,6 +45,7 @@ class SpatialQueries::Source {
     KeptShapes shapes;
     PathScratch path;
     std::unique_ptr<PairScratch> pairs;  ///< null before distance() first needs it
+    PenetrationScratch penetration;
     std::vector<std::uint64_t> bits;
 
     /// Sorts different numbers: as bits of a field if they lie close together.

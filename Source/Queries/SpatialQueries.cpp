@@ -16,6 +16,7 @@
 #include "Queries/RayHits.h"
 #include "Queries/ElementsNearShape.h"
 #include "Queries/ShapeOverlap.h"
+#include "Queries/ShapePenetration.h"
 #include "Queries/ShapeRays.h"
 
 #include <algorithm>
@@ -585,6 +586,28 @@ GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const 
     throw Error(ErrorCode::UnsupportedMethod,
                 nameOf(idA) + " and " + nameOf(idB) + " are both planes", idA);
   return distanceBetween(idA, first, idB, second, scratch->shapeContacts.shapePair);
+}
+
+Penetration SpatialQueries::penetration(GeometryId idA, GeometryId idB) const {
+  Source& source = valid();
+  const StandardFloatingPoint standard;
+  SearchableGeometry &a = source.at(idA), &b = source.at(idB);
+  if (idA == idB)
+    throw Error(ErrorCode::InvalidSettings,
+                "penetration() was called for " + nameOf(idA) + " twice", idA);
+  for (SearchableGeometry* const body : {&a, &b}) {
+    if (body->shape && body->shape->now.isTwoSided())
+      throw Error(ErrorCode::NotClosed,
+                  nameOf(body->id) + " is a two-sided plane, which has no inside", body->id);
+    if (!body->shape && !body->solid) source.prepareInside(*body, {});
+  }
+  const Source::Loan scratch(source);
+  if (!a.shape && !b.shape) return penetrationOf(a, b, source.engine(), scratch->penetration);
+  if (a.shape && b.shape && a.shape->now.isPlane() && b.shape->now.isPlane())
+    throw Error(ErrorCode::UnsupportedMethod,
+                nameOf(idA) + " and " + nameOf(idB) + " are both planes", idA);
+  return shapePenetration(a, b, source.engine(), source.octreeSettings(), scratch->penetration,
+                          scratch->shapeContacts.shapePair);
 }
 
 void SpatialQueries::path(std::span<const Eigen::Vector3d> polyline, double radius,

@@ -127,6 +127,12 @@ Eigen::AlignedBox3d Shape::bounds() const {
   return {box.min() - margin, box.max() + margin};
 }
 
+void Shape::translate(const Vector3d& shift) {
+  m_p0 += shift;
+  m_p1 += shift;
+  placeCorners();
+}
+
 void Shape::placeBetween(const Shape& before, const Shape& now, double time) {
   const auto at = [&](std::size_t end) -> Vector3d {
     return (1.0 - time) * before.m_corners[end] + time * now.m_corners[end];

@@ -60,6 +60,8 @@ class Shape {
   /// Places the shape elsewhere. A box or a hull must be the constructor's; another shape must have
   /// the type of the constructor's.
   void place(const AnalyticalGeometry&, const RigidTransform&);
+  /// Moves the shape by a translation, L.
+  void translate(const Eigen::Vector3d& shift);
   /// Places a cylinder at a time of a step: a right cylinder between its end centres, which move
   /// linearly.
   void placeBetween(const Shape& before, const Shape& now, double time);

@@ -2,7 +2,7 @@
 
 #include <palpate/CollisionData.h>
 
-#include "NarrowPhase/Piercing.h"
+#include "NarrowPhase/Meeting.h"
 
 #include <optional>
 

@@ -1,7 +1,7 @@
 #include "Validity/Trust.h"
 
 #include "Math/Tolerances.h"
-#include "NarrowPhase/Piercing.h"
+#include "NarrowPhase/Meeting.h"
 #include "Validity/IntersectionAtEnd.h"
 
 #include <algorithm>

@@ -180,6 +180,8 @@ TABLES = {
     "features": metrics("features", "1 thread"),
     "continuous": metrics("continuous", "1 / 2 threads"),
     "validity": metrics("validity", "1 thread"),
+    "resting": metrics("resting", "1 thread"),
+    "aligned": metrics("aligned", "1 thread"),
     "queries": metrics("queries", "1 thread"),
     "fields": metrics("fields", "1 thread"),
     "spatial": spatial,

@@ -167,7 +167,7 @@ TEST(Auto, FindsEverythingThatContinuousFinds) {
 }
 
 /// With Distinct, each contact of Continuous is present, or a contact of the same vertex (of one
-/// vertex of each edge) represents it.
+/// vertex of each edge) represents it. This holds for steps that begin without intersections.
 TEST(Auto, DistinctContactsRepresentAllThatContinuousFinds) {
   Random random(13);
   std::size_t found = 0;
@@ -197,12 +197,17 @@ TEST(Auto, DistinctContactsRepresentAllThatContinuousFinds) {
       return std::any_of(vertices.begin(), vertices.end(),
                          [&](std::uint32_t v) { return set.contains(v); });
     };
+    // Contacts that stand for others may be of vertices behind, and not be reported.
+    if (!run.data().validity().startedApart) continue;
+    const auto expectRepresented = [&](const auto& featureOfA, const auto& featureOfB) {
+      EXPECT_TRUE(any(ofA, featureOfA) && any(ofB, featureOfB));
+    };
     for (const auto& contact : truth.data().vertexTriangle())
-      EXPECT_TRUE(ofA.contains(contact.vertex) && any(ofB, contact.corners));
+      expectRepresented(std::array{contact.vertex}, contact.corners);
     for (const auto& contact : truth.data().triangleVertex())
-      EXPECT_TRUE(ofB.contains(contact.vertex) && any(ofA, contact.corners));
+      expectRepresented(contact.corners, std::array{contact.vertex});
     for (const auto& contact : truth.data().edgeEdge())
-      EXPECT_TRUE(any(ofA, contact.edgeA) && any(ofB, contact.edgeB));
+      expectRepresented(contact.edgeA, contact.edgeB);
     found += idsOf(truth.data()).size();
     if (HasFailure()) FAIL() << motion.name << ", case " << i;
   }

@@ -58,6 +58,7 @@ class Law {
         m_asked(settings.method),
         m_method(data.validity().method),
         m_timeTolerance(settings.timeTolerance),
+        m_distinct(settings.contacts == Contacts::Distinct),
         m_seen(seen),
         m_hasCylinder(hasCylinder) {}
 
@@ -179,9 +180,10 @@ class Law {
     }
   }
 
-  /// Auto, in a step that starts in intersection.
+  /// Auto, in a step that starts in intersection. Impacts, and with Contacts::All other contacts,
+  /// may have been turned.
   bool isOfIntersection(const VertexTriangleContact& c) const {
-    return c.distance < 0 && !hasRadii();
+    return c.distance < 0 && !hasRadii() && c.timeOfImpact == 1.0 && m_distinct;
   }
   bool hasRadii() const { return m_a.radius(0) > 0 || m_b.radius(0) > 0; }
 
@@ -265,6 +267,7 @@ class Law {
   const Side &m_a, &m_b;
   const Method m_asked, m_method;
   const double m_timeTolerance;
+  bool m_distinct;
   Seen& m_seen;
   const bool m_hasCylinder;
 };
@@ -422,8 +425,9 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
                     std::to_string(static_cast<int>(answered))]
         .counts[what];
   };
-  for (const char* what : {"behind", "in front", "edges"})
-    EXPECT_GT(count(Method::Intersection, Method::Intersection, what), leastOf(100)) << what;
+  EXPECT_GT(count(Method::Intersection, Method::Intersection, "behind"), leastOf(100));
+  for (const char* what : {"in front", "edges"})  // where no end of a crossing edge is behind
+    EXPECT_GT(count(Method::Intersection, Method::Intersection, what), leastOf(10)) << what;
   for (const Method method : {Method::Proximity, Method::Continuous}) {
     EXPECT_GT(count(method, method, "edges"), leastOf(1000));
     EXPECT_GT(count(method, method, "shape"), leastOf(1000));
@@ -433,8 +437,7 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
     for (const char* what : {"within an edge", "at an edge's end"})
       EXPECT_GT(count(method, method, what), leastOf(100)) << what;
   }
-  for (const Method method :
-       {Method::Intersection, Method::Proximity, Method::Continuous, Method::Auto})
+  for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto})
     EXPECT_GT(count(Method::Auto, method, "edges"), leastOf(100)) << static_cast<int>(method);
   EXPECT_GT(count(Method::Auto, Method::Intersection, "behind"), leastOf(30));
   EXPECT_GT(count(Method::Auto, Method::Continuous, "behind"), leastOf(10));

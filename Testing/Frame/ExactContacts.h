@@ -9,6 +9,8 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
+#include <set>
 #include <vector>
 
 namespace palpate::testing {
@@ -26,7 +28,11 @@ class ExactContacts {
       : m_settings(settings),
         m_a{scene.a, scene.aBefore},
         m_b{self ? scene.a : scene.b, self ? scene.aBefore : scene.bBefore},
-        m_self(self) {}
+        m_self(self) {
+    if (settings.method != Method::Intersection) return;
+    m_depthsOfA = depths(m_a, m_b);
+    if (!self) m_depthsOfB = depths(m_b, m_a);
+  }
 
   Answer has(const Ids& ids) const {
     switch (ids[0]) {
@@ -151,6 +157,16 @@ class ExactContacts {
       const int x = side(p, q, a, b), y = side(p, q, b, c), z = side(p, q, c, a);
       return x != 0 && x == y && y == z;
     }
+    /// Of two triangles that pierce each other: an end of a crossing edge is behind the other mesh.
+    bool isBehind(const ExactContacts& scene, std::uint32_t s, std::uint32_t t) const {
+      const Depths &ofA = scene.m_depthsOfA, &ofB = scene.m_self ? ofA : scene.m_depthsOfB;
+      const Triangle &a = scene.m_a.triangles()[s], &b = scene.m_b.triangles()[t];
+      bool found = false;
+      for (int i = 0; i < 3; ++i)
+        for (const int end : {i, (i + 1) % 3})
+          found |= (throughB[i] && ofA.contains(a[end])) || (throughA[i] && ofB.contains(b[end]));
+      return found;
+    }
     static int count(const bool (&edges)[3]) { return edges[0] + edges[1] + edges[2]; }
     /// Corner i lies between the two edges that cross.
     static bool between(const bool (&edges)[3], int i) {
@@ -162,6 +178,110 @@ class ExactContacts {
       return touch ? edges[i][j] : count(throughB) == 1 && throughB[i] && throughA[j];
     }
   };
+
+  /// For each vertex behind the other mesh, the triangle of its contact.
+  using Depths = std::map<std::uint32_t, std::uint32_t>;
+
+  /// A triangle and the corners of its feature that holds a point.
+  struct Place {
+    std::uint32_t triangle;
+    Rational square;
+    std::set<std::uint32_t> feature;
+  };
+
+  bool mayMeet(const Moving& others, std::uint32_t t, const Segment& edge) const {
+    return !(m_self &&
+             (holds(others.triangles()[t], edge[0]) || holds(others.triangles()[t], edge[1])));
+  }
+  static int side(const Moving& others, std::uint32_t t, const Vector3d& p) {
+    const auto& [a, b, c] = others.triangles()[t];
+    return Meeting::side(others[a], others[b], others[c], p);
+  }
+
+  /// The corners of the feature of triangle t that a segment with its ends strictly on different
+  /// sides passes through; empty if it misses the triangle.
+  static std::set<std::uint32_t> crossed(const Vector3d& p, const Vector3d& q, const Moving& others,
+                                         std::uint32_t t) {
+    const Triangle& corners = others.triangles()[t];
+    std::set<std::uint32_t> feature(corners.begin(), corners.end());
+    int signs[3], most = 0, least = 0;
+    for (int i = 0; i < 3; ++i) {
+      signs[i] = Meeting::side(p, q, others[corners[i]], others[corners[(i + 1) % 3]]);
+      most = std::max(most, signs[i]), least = std::min(least, signs[i]);
+    }
+    if (most > 0 && least < 0) return {};
+    for (int i = 0; i < 3; ++i)
+      if (signs[i] == 0) feature.erase(corners[(i + 2) % 3]);
+    return feature;
+  }
+
+  Place place(const Vector3d& p, const Moving& others, std::uint32_t t) const {
+    const Triangle& corners = others.triangles()[t];
+    const oracle::Closest found =
+        oracle::vertexTriangle(p, others[corners[0]], others[corners[1]], others[corners[2]]);
+    Place result{t, found.square, {}};
+    for (int i = 0; i < 3; ++i)
+      if (found.weights[i] != 0) result.feature.insert(corners[i]);
+    return result;
+  }
+
+  Depths depths(const Moving& vertices, const Moving& others) const {
+    const auto count = static_cast<std::uint32_t>(others.triangles().size());
+    std::set<Segment> edges;
+    for (const Triangle& t : vertices.triangles())
+      for (int i = 0; i < 3; ++i)
+        edges.insert({std::min(t[i], t[(i + 1) % 3]), std::max(t[i], t[(i + 1) % 3])});
+    std::map<std::uint32_t, std::set<std::uint32_t>> starts;
+    for (const Segment& edge : edges) {
+      std::map<std::set<std::uint32_t>, std::set<int>> sides;  // of the first end, by feature
+      std::map<int, std::set<std::uint32_t>> triangles;        // by that side
+      for (std::uint32_t t = 0; t < count; ++t) {
+        if (!mayMeet(others, t, edge)) continue;
+        const Vector3d &p = vertices[edge[0]], &q = vertices[edge[1]];
+        const int first = side(others, t, p);
+        if (first * side(others, t, q) >= 0) continue;
+        const auto feature = crossed(p, q, others, t);
+        if (feature.empty()) continue;
+        sides[feature].insert(first);
+        triangles[first].insert(t);
+      }
+      int sum = 0;
+      for (const auto& [feature, signs] : sides)
+        if (signs.size() == 1) sum -= *signs.begin();
+      if (sum == 0) continue;
+      starts[edge[sum < 0]].merge(triangles[sum > 0 ? -1 : 1]);
+    }
+    Depths depths;
+    for (const auto& [vertex, first] : starts)
+      depths[vertex] = nearest(vertices[vertex], vertex, others, first);
+    return depths;
+  }
+
+  std::uint32_t nearest(const Vector3d& p, std::uint32_t vertex, const Moving& others,
+                        const std::set<std::uint32_t>& starts) const {
+    const auto nearestOf = [&](const std::set<std::uint32_t>& ids) {
+      Place best = place(p, others, *ids.begin());
+      for (const std::uint32_t t : ids)
+        if (Place found = place(p, others, t); found.square < best.square) best = found;
+      return best;
+    };
+    for (Place now = nearestOf(starts);;) {
+      std::set<std::uint32_t> around{now.triangle};
+      for (std::uint32_t t = 0; t < others.triangles().size(); ++t) {
+        const Triangle& corners = others.triangles()[t];
+        if (std::all_of(now.feature.begin(), now.feature.end(),
+                        [&](std::uint32_t c) { return holds(corners, c); }) &&
+            !(m_self && holds(corners, vertex)) && side(others, t, p) < 0)
+          around.insert(t);
+      }
+      const Place next = nearestOf(around);
+      if (next.square == now.square) {
+        for (const std::uint32_t t : around)
+          if (place(p, others, t).feature == now.feature) return t;
+      }
+      now = next;
+    }
+  }
 
   static int cornerOf(const Triangle& t, std::uint32_t v) {
     return t[0] == v ? 0 : t[1] == v ? 1 : 2;
@@ -176,13 +296,7 @@ class ExactContacts {
     const std::uint32_t v = ids[1], t = ids[2];
     switch (m_settings.method) {
       case Method::Intersection:
-        for (const std::uint32_t s : at(vertices, v)) {
-          const int corner = cornerOf(vertices.triangles()[s], v);
-          if (ids[0] == PlainContact::VertexTriangle ? Meeting(*this, s, t).cornerOfA(corner)
-                                                     : Meeting(*this, t, s).cornerOfB(corner))
-            return Answer::Yes;
-        }
-        return Answer::No;
+        return cornerMeets(vertices, ids) || isDepth(ids) ? Answer::Yes : Answer::No;
       case Method::Proximity: {
         if (m_settings.contacts == Contacts::Distinct) return distinct(vertices, triangles, ids);
         const auto positions = positionsOf(vertices, v, triangles, t);
@@ -197,14 +311,35 @@ class ExactContacts {
     }
   }
 
+  bool isDepth(const Ids& ids) const {
+    const Depths& depths = ids[0] == PlainContact::VertexTriangle ? m_depthsOfA : m_depthsOfB;
+    const auto found = depths.find(ids[1]);
+    return found != depths.end() && found->second == ids[2];
+  }
+  bool cornerMeets(const Moving& vertices, const Ids& ids) const {
+    const std::uint32_t v = ids[1], t = ids[2];
+    // A mesh with itself: the vertex may be of the pair's second triangle.
+    const bool first = ids[0] == PlainContact::VertexTriangle;
+    for (const std::uint32_t s : at(vertices, v)) {
+      const int corner = cornerOf(vertices.triangles()[s], v);
+      const Meeting meeting = first ? Meeting(*this, s, t) : Meeting(*this, t, s);
+      if (!(first ? meeting.cornerOfA(corner) : meeting.cornerOfB(corner))) continue;
+      if (meeting.touch || !(first ? meeting.isBehind(*this, s, t) : meeting.isBehind(*this, t, s)))
+        return true;
+    }
+    return false;
+  }
+
   Answer edges(const Segment& p, const Segment& q) const {
     switch (m_settings.method) {
       case Method::Intersection:
         for (const std::uint32_t s : at(m_a, p))
-          for (const std::uint32_t t : at(m_b, q))
-            if (Meeting(*this, s, t)
-                    .edgePair(edgeOf(m_a.triangles()[s], p), edgeOf(m_b.triangles()[t], q)))
+          for (const std::uint32_t t : at(m_b, q)) {
+            const Meeting meeting(*this, s, t);
+            if (meeting.edgePair(edgeOf(m_a.triangles()[s], p), edgeOf(m_b.triangles()[t], q)) &&
+                (meeting.touch || !meeting.isBehind(*this, s, t)))
               return Answer::Yes;
+          }
         return Answer::No;
       case Method::Proximity: {
         const std::array positions{m_a[p[0]], m_a[p[1]], m_b[q[0]], m_b[q[1]]};
@@ -258,6 +393,7 @@ class ExactContacts {
   PairSettings m_settings;
   Moving m_a, m_b;
   bool m_self;
+  Depths m_depthsOfA, m_depthsOfB;
 };
 
 }  // namespace palpate::testing

@@ -31,6 +31,11 @@ struct Transformation {
   Eigen::Vector3d translation{0, 0, 0};                       ///< after scaling
   bool corners = false, triangles = false, vertices = false;  ///< permuted at random
   bool swapped = false;                                       ///< b is the first geometry
+  /// Triangles keep their order and, mirrored or not, their front. The contacts of Intersection
+  /// depend on the front, and name the lowest triangle that holds the nearest feature.
+  bool keepsTriangles = false;
+
+  bool isMirrored() const { return mirror.prod() < 0; }
 
   /// Whether triangles keep their outer sides.
   bool keepsWinding() const { return !corners && mirror.prod() > 0; }
@@ -54,6 +59,9 @@ inline StepScene placed(StepScene scene, const Transformation& how) {
   for (auto* positions : {&scene.a.positions, &scene.b.positions, &scene.aBefore, &scene.bBefore})
     for (Eigen::Vector3d& p : *positions) p = how.place(p);
   scene.thickness *= how.scale;
+  if (how.keepsTriangles && how.isMirrored())
+    for (Mesh* mesh : {&scene.a, &scene.b})
+      for (Triangle& t : mesh->triangles) std::swap(t[1], t[2]);
   return scene;
 }
 
@@ -155,7 +163,7 @@ class Placement {
   Mesh placed(const Mesh& mesh, const std::vector<Eigen::Vector3d>& before,
               std::vector<Eigen::Vector3d>& newBefore, Names& names) {
     names.vertices = order(mesh.positions.size(), m_how.vertices);
-    names.triangles = order(mesh.triangles.size(), m_how.triangles);
+    names.triangles = order(mesh.triangles.size(), m_how.triangles && !m_how.keepsTriangles);
     std::vector<std::uint32_t> newId(names.vertices.size());
     Mesh out;
     for (std::uint32_t v = 0; v < names.vertices.size(); ++v) {
@@ -164,7 +172,9 @@ class Placement {
       newBefore.push_back(m_how.place(before[names.vertices[v]]));
     }
     for (const std::uint32_t t : names.triangles) {
-      const std::vector<std::uint32_t> corner = order(3, m_how.corners);
+      std::vector<std::uint32_t> corner = order(3, m_how.corners);
+      const bool isOdd = corner[1] != (corner[0] + 1) % 3;
+      if (m_how.keepsTriangles && isOdd != m_how.isMirrored()) std::swap(corner[1], corner[2]);
       const Triangle& old = mesh.triangles[t];
       out.triangles.push_back(
           {newId[old[corner[0]]], newId[old[corner[1]]], newId[old[corner[2]]]});

@@ -27,6 +27,10 @@ struct Judged {
   std::vector<std::vector<Touch>> touches;  ///< of each frame
   std::vector<Rest> rests;                  ///< at the end of each frame
   bool touchingAtStart = false, touching = false;
+
+  bool startsIntersecting(std::size_t frame) const {
+    return frame == 0 ? touchingAtStart : rests[frame - 1].intersect;
+  }
 };
 
 Judged judge(const Sweep& sweep, double value, testing::Random& random) {
@@ -130,8 +134,11 @@ bool isNear(const Rest& rest, const Claim& claim) {
 }
 
 /// Compares each feature pair with the definition of the method.
-void checkDefinition(Definition definition, const Claims& claims, const std::vector<Touch>& touches,
-                     const Rest& rest, double thickness, Tally& tally) {
+void checkDefinition(Definition definition, const Claims& claims, const Judged& judged,
+                     std::size_t frame, Tally& tally) {
+  const std::vector<Touch>& touches = judged.touches[frame];
+  const Rest& rest = judged.rests[frame];
+  const double thickness = judged.posed.thickness;
   if (definition == Definition::Intersection) {
     tally.featuresMissing += rest.intersect && claims.triangles.empty();
     tally.featuresExtra += !rest.intersect && !claims.triangles.empty();
@@ -144,7 +151,9 @@ void checkDefinition(Definition definition, const Claims& claims, const std::vec
     tally.featuresExtra += static_cast<std::size_t>(
         std::count_if(claims.claims.begin(), claims.claims.end(),
                       [&](const Claim& claim) { return !isNear(rest, claim); }));
-  } else if (definition == Definition::Auto) {
+  } else if (definition == Definition::DistinctAuto && judged.startsIntersecting(frame)) {
+    tally.featuresMissing += !touches.empty() && claims.claims.empty();
+  } else if (definition == Definition::Auto || definition == Definition::DistinctAuto) {
     for (const Touch& touch : touches) tally.featuresMissing += !reports(claims, touch);
   } else if (definition == Definition::Continuous) {
     for (const Touch& touch : touches) tally.featuresMissing += !reports(claims, touch.features);
@@ -187,8 +196,7 @@ void add(const Judged& judged, const Subject& subject, Tally& tally) {
       tally.wrongTrusted += wrong && *claims.trusted;
       tally.rightUntrusted += !wrong && !*claims.trusted;
     }
-    checkDefinition(subject.definition, claims, judged.touches[f], judged.rests[f],
-                    judged.posed.thickness, tally);
+    checkDefinition(subject.definition, claims, judged, f, tally);
   }
   const bool falseNegative = judged.touching && !reported;
   ++tally.cases;
@@ -209,7 +217,7 @@ std::vector<Subject> subjects() {
       {{"Proximity in substeps", "1/20 edge; 8 substeps"}, Definition::None},
       {{"Continuous", "exact"}, Definition::Continuous},
       {{"Auto", "1/20 edge"}, Definition::Auto},
-      {{"Auto: distinct", "1/20 edge"}, Definition::Auto},
+      {{"Auto: distinct", "1/20 edge"}, Definition::DistinctAuto},
       {{"FCL", "collide()"}, Definition::None}};
   std::vector<Subject> all;
   for (const accuracy::Contestant& contestant : accuracy::contestants()) {

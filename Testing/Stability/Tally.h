@@ -16,7 +16,10 @@ enum class Definition {
   Intersection,  ///< triangles that intersect at the end of a frame
   Proximity,     ///< features within the thickness at the end of a frame
   Continuous,    ///< features that touch within a frame, with the time
-  Auto           ///< at least all features that touch within a frame
+  Auto,          ///< at least all features that touch within a frame
+  /// The same. In a frame that begins in intersection, contacts of vertices that are known to be
+  /// behind the surface stand for others.
+  DistinctAuto
 };
 
 struct Subject {

@@ -12,7 +12,8 @@ namespace palpate {
 
 /// A contact in which a frame's CollisionData and brute force differ. This is a fault of the
 /// library. Method::Auto may mix the answers of several methods; for it the audit reports only
-/// missing contacts.
+/// missing contacts. Where a step begins in intersection it does not miss those of vertices of
+/// triangles that intersect, nor any of bodies of which Auto left out contacts on an inner side.
 struct AuditFailure {
   enum class Fault {
     /// Expected, not found. In List::Earliest: a contact is earlier than earliestTimeOfImpact().

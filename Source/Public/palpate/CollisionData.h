@@ -25,12 +25,19 @@ namespace palpate {
 //          relative motion.
 // Time     Proximity and Intersection test the step's end. Their contacts, and Auto's contacts from
 //          them, have the time 1.
-// Sign     A distance is negative in three cases. (1) Radii overlap. (2) An element is inside a
+// Sign     A distance is negative in five cases. (1) Radii overlap. (2) An element is inside a
 //          shape, or two shapes overlap. (3) A vertex-triangle contact of Method::Intersection,
 //          also as part of Auto, has its vertex behind the triangle; the winding normal points to
 //          the front. The normal of Intersection's vertex-triangle contacts is the winding normal
 //          if the triangle's interior holds the closest point. If an edge or a corner holds it, the
 //          normal lies along the line through both closest points, on the winding normal's side.
+//          (4) Two edges that pierce the triangles at each other have crossed, by Intersection:
+//          each of the closest points is below the surface at the other. (5) Auto, in a step that
+//          begins in intersection, turned a contact (Side).
+// Depth    A vertex is behind a surface if it is the end from which an edge leaves the surface. Of
+//          Intersection it has one contact of negative distance, with the nearest feature around
+//          the triangles that its edges pierce: a face, an edge or a vertex. It names the lowest
+//          triangle that holds this feature and behind which the vertex is.
 // Touch    If the centres are at distance 0, or for an impact without a thickness, the normal is
 // one
 //          that can separate the surfaces: no triangle at the first feature lies on its back side,
@@ -38,11 +45,12 @@ namespace palpate {
 //          the normal of a triangle at either feature, else the cross product of two edges there,
 //          else the direction from which the features came. Where the step tells that side, the
 //          normal is on it; otherwise closed surfaces tell it.
-// Side     A contact at the step's end, by Proximity or of two edges by Intersection, has the
-//          normal of the positions there. If the features have crossed, it is on the wrong side. An
-//          impact has the side from which its features came. If a step begins in intersection,
-//          features that leave a body come from its inside: their normals point back into it.
-//          Validity says whether sides are certified.
+// Side     A contact at the step's end by Proximity has the normal of the positions there. If the
+//          features have crossed, it is on the wrong side. An impact has the side from which its
+//          features came. If a step of Auto begins in intersection, contacts of vertices that are
+//          behind the other surface at its end, and impacts of those that leave it, have the side
+//          on which they leave. Then with Contacts::Distinct, vertices behind a surface have the
+//          contacts of Intersection only. Validity says whether sides are certified.
 
 /// A contact of a vertex with a triangle. A contact of a vertex with the segment {p, q} has the
 /// corners {p, q, q}. A contact of a vertex with the point p has the corners {p, p, p}.
@@ -50,8 +58,8 @@ struct VertexTriangleContact {
   std::uint32_t vertex, triangle;        ///< indices; `triangle` may be a segment or a point
   std::array<std::uint32_t, 3> corners;  ///< the vertices of the triangle, segment or point
   Eigen::Vector3d barycentric;           ///< weights of the corners at the closest point
-  /// Unit. It points from the triangle to the vertex, except where Intersection finds the vertex
-  /// behind the triangle: there it points from the vertex to the triangle.
+  /// Unit. It points from the triangle to the vertex, or from the vertex to the triangle where the
+  /// vertex is behind the surface, and the distance negative without radii.
   Eigen::Vector3d normal;
   double distance;      ///< L, at timeOfImpact, between the surfaces of the radii; sign: see above.
   double timeOfImpact;  ///< [0, 1] of the step; 1 for methods that test the step's end.
@@ -65,8 +73,9 @@ struct VertexTriangleContact {
 struct EdgeEdgeContact {
   std::array<std::uint32_t, 2> edgeA, edgeB;  ///< vertex indices, lower first
   double weightA, weightB;                    ///< closest point = p0 + weight (p1 - p0)
-  Eigen::Vector3d normal;                     ///< unit, from edge b to edge a
-  double distance;      ///< L, at timeOfImpact; negative only where radii overlap
+  /// Unit, from edge b to edge a; from a to b where the edges have crossed.
+  Eigen::Vector3d normal;
+  double distance;      ///< L, at timeOfImpact; negative where radii overlap or edges crossed.
   double timeOfImpact;  ///< [0, 1] of the step; 1 for methods that test the step's end
   /// The part that holds each closest point at that time: an end if the weight is 0 or 1.
   EdgeFeature featureA = EdgeFeature::Interior, featureB = EdgeFeature::Interior;
@@ -171,9 +180,10 @@ class PALPATE_EXPORT CollisionData {
   /// Edges of the first geometry with edges of the second.
   std::span<const EdgeEdgeContact> edgeEdge() const { return m_contents.edgeEdge; }
   /// Pairs of triangles that intersect at the step's end, from Method::Intersection, also as part
-  /// of Auto. Each pair has a contact unless a predicate refuses it. There is one exception for a
-  /// mesh with itself: two triangles with a common vertex that intersect only where an edge of one
-  /// pierces the other have no contact.
+  /// of Auto. Each pair has a contact unless a predicate refuses it: its own, or that of a vertex
+  /// behind the surface, which may be with another triangle. There is one exception for a mesh with
+  /// itself: two triangles with a common vertex that intersect only where an edge of one pierces
+  /// the other have no contact of their own.
   std::span<const ElementPair> intersectingTriangles() const {
     return m_contents.intersectingTriangles;
   }

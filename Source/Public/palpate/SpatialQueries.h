@@ -103,6 +103,17 @@ struct GeometryDistance {
   double distance;    ///< L, less the radii of lines and points; never negative
 };
 
+/// How two bodies are separated by a translation of one of them.
+struct Penetration {
+  bool intersecting;  ///< the bodies' insides have a common point, decided exactly for meshes
+  Eigen::Vector3d direction;  ///< unit; 0 if not intersecting
+  double depth;  ///< L: moving a by depth * direction separates the bodies; 0 if not intersecting
+  /// The points that meet last: a.position + depth * direction is at b.position. Their distance is
+  /// the depth. Both have element kNoElement if the bodies do not intersect.
+  SurfacePoint a, b;
+  bool minimal;  ///< no shorter translation separates the bodies, within the stated error
+};
+
 /// A part of a path that is in a body. Its ends are arc lengths, in L.
 struct PathInterval {
   GeometryId body;
@@ -267,6 +278,31 @@ class PALPATE_EXPORT SpatialQueries {
   ///          exactly. Distances have the accuracy of edgeEdgeDistance().
   /// Errors   InvalidSettings if both geometries are the same; UnsupportedMethod for two planes.
   GeometryDistance distance(GeometryId a, GeometryId b) const;
+  /// Finds a translation of a that separates two bodies: it leaves no common point of their
+  /// insides. Bodies are closed triangle meshes, tetrahedral meshes and shapes. A mesh's inside is
+  /// where the winding number of its surface is not 0; a tetrahedral mesh counts as its surface
+  /// does. Bodies that only touch, or are apart, do not intersect. A body wholly inside another
+  /// does.
+  ///
+  /// Meshes are tested after the translation: their surfaces then have no common point, and neither
+  /// is inside the other. These tests are exact for what you get by the translation: positions +
+  /// depth * direction, or of a body that setTransform() placed, its translation + depth *
+  /// direction. The depth is therefore larger than where the surfaces last touch, by about 2^-40 of
+  /// the largest coordinate.
+  ///
+  /// minimal  is true for two convex meshes or shapes, and for a plane. No translation is then
+  ///          shorter by more than 2^-36 of the largest coordinate. Meshes are convex up to 2^-40
+  ///          of it. The depth of other bodies is an upper bound. The search is local from some
+  ///          hundred directions, so that the bound is near the least depth as a rule.
+  /// Accuracy of a sphere, capsule or cylinder and a mesh: the distance of the shape decides after
+  ///          the translation, not an exact test. intersecting is then false for depths below 2^-36
+  ///          of the largest coordinate.
+  /// Errors   NotClosed for what has no inside: the message names the first edge of a mesh, as in
+  ///          findInsideVertices(); lines, points and two-sided planes; InvalidSettings if both
+  ///          geometries are the same; UnsupportedMethod for two planes.
+  /// Cost     some hundred rays and some ten searches of the intersecting triangles of both. Two
+  ///          organs of 3,000 triangles each take some milliseconds.
+  Penetration penetration(GeometryId a, GeometryId b) const;
   /// Follows a ball along a polyline, as a needle or a drill moves, and finds where it is in each
   /// body. With radius 0 it is a point.
   ///

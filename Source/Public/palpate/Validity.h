@@ -74,7 +74,7 @@ struct Validity {
   /// is then the opposite of `trusted`. Intersection knows no sides, and the value is always false
   /// there, which is no all-clear. Auto, too, answers by Intersection, at rest without a thickness.
   /// The normals of Intersection are never certified: those of vertices point to the front of the
-  /// triangle, and those of edges are on the wrong side where the edges have crossed.
+  /// triangle, and those of edges to the side on which the surfaces at both edges are outside.
   bool sideMayBeWrong = true;
 
   /// The main method that answered. Auto stands for Proximity and Continuous, feature by feature.

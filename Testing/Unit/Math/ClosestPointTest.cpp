@@ -661,15 +661,15 @@ TEST(ClosestPoint, EdgesOfGridsAreClassifiedExactly) {
     if (below(3) == 0) q1[below(3)] += (below(2) ? 1 : -1) * std::ldexp(1.0, -54);
     if (below(8) == 0)
       for (Vector3d* position : {&p0, &p1, &q0, &q1}) *position *= below(2) ? 0x1p-980 : 0x1p300;
-    const Crossing truth = exact::crossing(p0, p1, q0, q1);
+    const CrossingPlace truth = exact::crossing(p0, p1, q0, q1);
     const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(p0, p1, q0, q1);
-    ASSERT_EQ(answer.parallel, truth == Crossing::Parallel) << repeat;
-    ASSERT_EQ(crossingEdgesDistance(p0, p1, q0, q1).has_value(), truth == Crossing::Interior)
+    ASSERT_EQ(answer.parallel, truth == CrossingPlace::Parallel) << repeat;
+    ASSERT_EQ(crossingEdgesDistance(p0, p1, q0, q1).has_value(), truth == CrossingPlace::Interior)
         << repeat;
-    parallel += truth == Crossing::Parallel;
-    interior += truth == Crossing::Interior;
-    outside += truth == Crossing::Outside;
-    inIntegers += truth == Crossing::Parallel && answer.exact;
+    parallel += truth == CrossingPlace::Parallel;
+    interior += truth == CrossingPlace::Interior;
+    outside += truth == CrossingPlace::Outside;
+    inIntegers += truth == CrossingPlace::Parallel && answer.exact;
   }
   EXPECT_GT(parallel, 10000);
   EXPECT_GT(outside, 5000);

@@ -107,9 +107,10 @@ TEST(IntersectionRegression, VertexOfTheSecondMeshPiercesAFaceOfTheFirst) {
 }
 
 TEST(IntersectionRegression, ThreeEdgesCross) {
-  // Two edges of the first cross the ground's plane: one inside, one exactly on the edge y = 0.
+  // Two edges of the first cross the ground's plane: one inside, one exactly on the edge y = 0. The
+  // vertex that they share is behind the ground, and a corner of the ground behind the first.
   const Corners three{{{1, 1, 1}, {1, 1, -1}, {1, -1, 1}}};
-  expectContacts(three, kGround, {}, {}, {{1, 2, 0, 1}});
+  expectContacts(three, kGround, {{1, 0}}, {{1, 0}}, {{1, 2, 0, 1}});
 }
 
 TEST(IntersectionRegression, CoplanarTriangles) {
@@ -139,14 +140,13 @@ TEST(IntersectionRegression, EdgesShorterThanTwentyMillionths) {
 
 // ---- Definitions ----
 
-TEST(Intersection, OneEdgeOfEachIsAnEdgeEdgeContact) {
+/// An end of each crossing edge is behind the other triangle.
+TEST(Intersection, OneEdgeOfEachGivesTheEndsBehind) {
   const Corners interlocked{{{1, 1, -1}, {1, 1, 1}, {1, -5, 0.5}}};
-  expectContacts(interlocked, kGround, {}, {}, {{0, 1, 0, 1}});
+  expectContacts(interlocked, kGround, {{0, 0}}, {{0, 0}}, {});
   const ContactBuffers found = contactsOf(meshOf(interlocked), meshOf(kGround));
-  EXPECT_EQ(found.edgeEdge[0].distance, 1);
-  EXPECT_EQ(found.edgeEdge[0].normal, Vector3d::UnitY());  // from the ground's edge to the other
-  EXPECT_EQ(found.edgeEdge[0].weightA, 0.5);
-  EXPECT_EQ(found.edgeEdge[0].weightB, 0.25);
+  EXPECT_EQ(found.vertexTriangle[0].distance, -1);
+  EXPECT_EQ(found.vertexTriangle[0].normal, Vector3d::UnitZ());
 }
 
 TEST(Intersection, NormalsOfFacesAreWindingNormalsAndDistancesBehindThemAreNegative) {
@@ -157,7 +157,9 @@ TEST(Intersection, NormalsOfFacesAreWindingNormalsAndDistancesBehindThemAreNegat
   const Corners turned{{kGround[1], kGround[0], kGround[2]}};
   const ContactBuffers above = contactsOf(meshOf(kPiercing), meshOf(turned));
   EXPECT_EQ(above.vertexTriangle[0].normal, Vector3d(-Vector3d::UnitZ()));
-  EXPECT_EQ(above.vertexTriangle[0].distance, 1);
+  // The tip is in front of the turned ground, and the other two vertices are behind it.
+  ASSERT_EQ(above.vertexTriangle.size(), 2u);
+  for (const VertexTriangleContact& c : above.vertexTriangle) EXPECT_EQ(c.distance, -2);
 }
 
 /// The tip is below the ground and beyond its edge y = 0. The nearest point of the ground is (1, 0,
@@ -205,10 +207,11 @@ TEST(Intersection, SpheresIntersectInOneRingWithTheSameBitsFromEveryPair) {
   const ContactBuffers found = contactsOf(a, b);
   EXPECT_GT(found.intersectingTriangles.size(), 50u);
   expectSwaps(found, contactsOf(b, a));
-  // Every crossed face of either mesh has a neighbour across each crossing edge, so the ring
-  // closes.
-  EXPECT_GT(rowsOf(found.edgeEdge).size(), 20u);
-  EXPECT_LT(rowsOf(found.edgeEdge).size(), found.edgeEdge.size() + 1);
+  // One contact for each vertex that an edge connects to the outside; these stand for all pairs.
+  EXPECT_GT(rowsOf(found.vertexTriangle).size(), 5u);
+  EXPECT_EQ(rowsOf(found.vertexTriangle).size(), found.vertexTriangle.size());
+  EXPECT_TRUE(found.edgeEdge.empty());
+  for (const VertexTriangleContact& c : found.vertexTriangle) EXPECT_LT(c.distance, 0);
   EXPECT_EQ(found.exactDecisions, 0u);
 }
 
@@ -267,24 +270,9 @@ TEST(SelfIntersection, EdgeThroughAFaceAtACommonVertexIsListed) {
   EXPECT_TRUE(fanned({-1, -1, -1}, {-1, -1, 2}).intersectingTriangles.empty());
   const ContactBuffers found = fanned({1, 1, -1}, {1, 1, 2});
   EXPECT_EQ(found.intersectingTriangles, (Buffer<ElementPair>{{0, 1}}));
-  EXPECT_TRUE(found.vertexTriangle.empty() && found.edgeEdge.empty());
+  EXPECT_EQ(idsOf(rowsOf(found.vertexTriangle)), (std::vector<Row>{{3, 0}}));
+  EXPECT_TRUE(found.edgeEdge.empty());
   EXPECT_EQ(idsOf(rowsOf(fanned({1, 1, 0}, {1, 1, 2}).vertexTriangle)), (std::vector<Row>{{3, 0}}));
-}
-
-/// By definition: two edges of one must cross the other, or one of each.
-TEST(SelfIntersection, EdgeThroughAFaceHasAContactWithATriangleThatSharesNoVertex) {
-  const std::vector<Vector3d> positions{{0, 0, 0},  {4, 0, 0}, {0, 4, 0},
-                                        {1, 1, -1}, {1, 1, 2}, {8, 8, 1}};
-  const auto contactsWith = [&](const Triangle& across) {
-    return selfContactsOf(meshOf(positions, {{0, 1, 2}, {0, 3, 4}, across}));
-  };
-  const ContactBuffers apart = contactsWith({4, 3, 5});
-  EXPECT_EQ(apart.intersectingTriangles.size(), 2u);
-  EXPECT_EQ(idsOf(rowsOf(apart.edgeEdge)), (std::vector<Row>{{1, 2, 3, 4}}));
-  EXPECT_TRUE(apart.vertexTriangle.empty());
-  const ContactBuffers sharing = contactsWith({4, 3, 1});
-  EXPECT_EQ(sharing.intersectingTriangles.size(), 2u);
-  EXPECT_TRUE(sharing.vertexTriangle.empty() && sharing.edgeEdge.empty());
 }
 
 TEST(SelfIntersection, DuplicateTrianglesShareEverything) {
@@ -301,7 +289,9 @@ TEST(SelfIntersection, CommonVerticesExcludeTheirFeaturesAndNoOthers) {
     std::vector<Vector3d> positions(5);
     for (Vector3d& p : positions) p = random.onGrid(3);
     const Triangle s{0, 1, 2}, t = random.below(2) ? Triangle{0, 3, 4} : Triangle{3, 1, 0};
-    const ContactBuffers found = selfContactsOf(meshOf(positions, {s, t}));
+    ContactBuffers found = selfContactsOf(meshOf(positions, {s, t}));
+    // Without vertices that are behind.
+    std::erase_if(found.vertexTriangle, [](const auto& c) { return c.distance != 0; });
     const auto cornersOf = [&](const Triangle& u) {
       return Corners{positions[u[0]], positions[u[1]], positions[u[2]]};
     };

@@ -1,0 +1,192 @@
+#include "Queries/BodyPair.h"
+
+#include "Math/RayCrossing.h"
+#include "Math/Tolerances.h"
+#include "Queries/Containment.h"
+#include "Queries/GeometryDistances.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace palpate {
+
+using Eigen::Vector3d;
+
+void BodyVertices::assign(const SearchableGeometry& geometry) {
+  const auto& now = geometry.mesh.now;
+  positions.resize(now.size());
+  for (std::size_t v = 0; v < now.size(); ++v) positions[v] = now[v];
+  triangleOf.assign(now.size(), kNoElement);
+  m_links.resize(now.size());
+  std::iota(m_links.begin(), m_links.end(), 0u);
+  const auto root = [&](std::uint32_t v) {
+    while (m_links[v] != v) v = m_links[v] = m_links[m_links[v]];
+    return v;
+  };
+  box.setEmpty();
+  const auto& triangles = geometry.mesh.topology.triangles;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t)
+    for (const std::uint32_t v : triangles[t]) {
+      if (triangleOf[v] == kNoElement) triangleOf[v] = t, box.extend(positions[v]);
+      const std::uint32_t first = root(triangles[t][0]), second = root(v);
+      m_links[std::max(first, second)] = std::min(first, second);
+    }
+  parts.clear();
+  for (std::uint32_t v = 0; v < now.size(); ++v)
+    if (m_links[v] == v && triangleOf[v] != kNoElement) parts.push_back(v);
+}
+
+double BodyVertices::magnitude() const {
+  return std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+}
+
+double unitOf(double magnitude) { return std::exp2(-std::ilogb(std::max(magnitude, 0x1p-1000))); }
+
+Vector3d BodyVertices::furthest(const Vector3d& direction) const {
+  double most = -std::numeric_limits<double>::infinity();
+  std::size_t best = 0;
+  for (std::size_t v = 0; v < positions.size(); ++v) {
+    const double height = direction[0] * positions[v][0] + direction[1] * positions[v][1] +
+                          direction[2] * positions[v][2];
+    if (triangleOf[v] == kNoElement || !(height > most)) continue;
+    most = height;
+    best = v;
+  }
+  return positions[best];
+}
+
+BodyPair::BodyPair(const SearchableGeometry& a, const SearchableGeometry& b, Engine engine,
+                   BodyPairScratch& scratch)
+    : m_a(a), m_b(b), m_engine(engine), m_scratch(scratch) {
+  scratch.a.assign(a);
+  scratch.b.assign(b);
+  m_magnitude = std::max(scratch.a.magnitude(), scratch.b.magnitude());
+}
+
+Vector3d BodyPair::moved(std::uint32_t vertex, const Vector3d& shift) const {
+  const Positions& now = m_a.mesh.now;
+  if (!now.isPlaced()) return m_scratch.a.positions[vertex] + shift;
+  RigidTransform transform = now.transform();
+  transform.translation += shift;
+  return transform(now.body()[vertex]);
+}
+
+Corners BodyPair::cornersOfA(std::uint32_t element, const Vector3d& shift) const {
+  const Triangle& t = m_a.mesh.topology.triangles[element];
+  return {moved(t[0], shift), moved(t[1], shift), moved(t[2], shift)};
+}
+
+Corners BodyPair::cornersOfB(std::uint32_t element) const {
+  const Triangle& t = m_b.mesh.topology.triangles[element];
+  const auto& p = m_scratch.b.positions;
+  return {p[t[0]], p[t[1]], p[t[2]]};
+}
+
+void BodyPair::forEachMeeting(const Vector3d& shift,
+                              const std::function<bool(const Meeting&)>& f) const {
+  SignCounts counts;
+  Meeting meeting;
+  const auto test = [&](std::uint32_t elementB) {
+    meeting.elementB = elementB;
+    meeting.b = cornersOfB(elementB);
+    meeting.found = intersectTriangles(meeting.a, meeting.b, counts);
+    return !meeting.found.intersect() || f(meeting);
+  };
+  const auto setA = [&](std::uint32_t elementA) {
+    meeting.elementA = elementA;
+    meeting.a = cornersOfA(elementA, shift);
+  };
+  if (m_engine == Engine::BruteForce) {
+    const std::size_t sizeA = m_a.mesh.topology.triangles.size(),
+                      sizeB = m_b.mesh.topology.triangles.size();
+    for (std::uint32_t i = 0; i < sizeA; ++i) {
+      setA(i);
+      for (std::uint32_t j = 0; j < sizeB; ++j)
+        if (!test(j)) return;
+    }
+    return;
+  }
+  const std::span<const std::uint32_t> orderA = m_a.tree.octree().order(),
+                                       orderB = m_b.tree.octree().order();
+  if (!m_scratch.pairs) m_scratch.pairs = std::make_unique<PairScratch>();
+  PairBound bound;
+  bound.distance = OutwardRounding::up(static_cast<float>(boxErrorOf(m_a, m_b)));
+  forNearElements(
+      sideOf(m_a, {}), sideOf(m_b, mapBetween(m_a, m_b, shift)), bound, *m_scratch.pairs,
+      [&](const NearElements& near) {
+        for (std::uint32_t i = 0; i < NearElements::kSide; ++i) {
+          if (near.near[i]) setA(orderA[near.placeA + i]);
+          for (std::uint32_t bits = near.near[i]; bits; bits &= bits - 1)
+            if (!test(orderB[near.placeB + static_cast<std::uint32_t>(std::countr_zero(bits))])) {
+              bound.heights = -std::numeric_limits<float>::infinity();  // nothing is that low
+              return bound;
+            }
+        }
+        return bound;
+      });
+}
+
+int BodyPair::windingNumberOf(bool ofA, const Vector3d& p) const {
+  return windingNumber(geometry(ofA), p, m_engine, m_scratch.stack);
+}
+
+bool BodyPair::isInside(bool ofA, std::uint32_t vertex) const {
+  const Vector3d& p = vertices(ofA).positions[vertex];
+  return vertices(!ofA).box.contains(p) && windingNumberOf(!ofA, p) != 0;
+}
+
+bool BodyPair::isInBoth(const Vector3d& p) const {
+  return windingNumberOf(true, p) != 0 && windingNumberOf(false, p) != 0;
+}
+
+/// Tests every triangle, because no octree holds a where it is moved to. It is rare that a point
+/// must be tested.
+bool BodyPair::isInMovedA(const Vector3d& p, const Vector3d& shift) const {
+  SignCounts counts;
+  int number = 0;
+  for (std::uint32_t i = 0; i < m_a.mesh.topology.triangles.size(); ++i) {
+    const auto [a, b, c] = cornersOfA(i, shift);
+    const RayCrossing crossing = crossRay(0, false, p, a, b, c, counts);
+    if (crossing == RayCrossing::OnTriangle) return false;
+    number += static_cast<int>(crossing);
+  }
+  return number != 0;
+}
+
+std::optional<BodyPair::PartVertex> BodyPair::findInsidePart(const Vector3d& shift) const {
+  for (const std::uint32_t v : m_scratch.a.parts) {
+    const Vector3d p = moved(v, shift);
+    if (m_scratch.b.box.contains(p) && windingNumberOf(false, p) != 0) return PartVertex{true, v};
+  }
+  // The box of a where it is moved to, with its roundings.
+  const Vector3d slack =
+      Vector3d::Constant(kExitSlack * (m_magnitude + shift.cwiseAbs().maxCoeff()));
+  const Eigen::AlignedBox3d box(m_scratch.a.box.min() + shift - slack,
+                                m_scratch.a.box.max() + shift + slack);
+  for (const std::uint32_t v : m_scratch.b.parts) {
+    const Vector3d& p = m_scratch.b.positions[v];
+    if (box.contains(p) && isInMovedA(p, shift)) return PartVertex{false, v};
+  }
+  return {};
+}
+
+bool BodyPair::areApart(const Vector3d& shift) const {
+  bool apart = true;
+  forEachMeeting(shift, [&](const Meeting&) { return apart = false; });
+  return apart && !findInsidePart(shift);
+}
+
+std::optional<RayHit> BodyPair::hitOf(const PartVertex& part, const Vector3d& shift,
+                                      const Vector3d& direction) const {
+  const Vector3d& p = vertices(part.ofA).positions[part.vertex];
+  const Ray ray = part.ofA ? Ray{p + shift, direction} : Ray{p - shift, -direction};
+  constexpr double kLargest = std::numeric_limits<double>::max();
+  return RayHits(geometry(!part.ofA), {ray.origin, ray.direction, 0.0, kLargest},
+                 m_engine == Engine::BruteForce, m_scratch.met)
+      .first(kLargest);
+}
+
+}  // namespace palpate

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <palpate/Settings.h>
+
+#include "Math/TriangleIntersection.h"
+#include "Octree/PointQueries.h"
+#include "Queries/PairTraversal.h"
+#include "Queries/RayHits.h"
+#include "Queries/SearchableGeometry.h"
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace palpate {
+
+/// What a search needs of a mesh besides its octree.
+struct BodyVertices {
+  std::vector<Eigen::Vector3d> positions;  ///< L, in the world
+  std::vector<std::uint32_t> triangleOf;   ///< per vertex: its lowest triangle, or kNoElement
+  std::vector<std::uint32_t> parts;        ///< a vertex of each connected part of the surface
+  Eigen::AlignedBox3d box;                 ///< of the vertices that are in triangles
+
+  void assign(const SearchableGeometry&);
+  double magnitude() const;  ///< L: the largest coordinate
+  /// The vertex that is furthest along a direction.
+  Eigen::Vector3d furthest(const Eigen::Vector3d& direction) const;
+
+ private:
+  std::vector<std::uint32_t> m_links;  ///< per vertex: another vertex of its part, or itself
+};
+
+/// 1/L: a power of two that brings coordinates up to a magnitude to about 1, so that no product of
+/// lengths leaves the range of double.
+double unitOf(double magnitude);
+
+struct BodyPairScratch {
+  BodyVertices a, b;
+  std::unique_ptr<PairScratch> pairs;
+  PointQueryStack stack;
+  std::vector<RayHits::Met> met;
+};
+
+/// Two closed meshes with triangles, and exact tests of both where a is moved by a translation. A
+/// vertex of a is then where the caller finds it: at fl(position + shift), or of a placed body by
+/// the transform with the translation fl(translation + shift).
+class BodyPair {
+ public:
+  BodyPair(const SearchableGeometry& a, const SearchableGeometry& b, Engine, BodyPairScratch&);
+
+  const SearchableGeometry& geometry(bool ofA) const { return ofA ? m_a : m_b; }
+  const BodyVertices& vertices(bool ofA) const { return ofA ? m_scratch.a : m_scratch.b; }
+  double magnitude() const { return m_magnitude; }  ///< L: the largest coordinate
+
+  Corners cornersOfA(std::uint32_t element, const Eigen::Vector3d& shift) const;
+  Corners cornersOfB(std::uint32_t element) const;
+  /// Calls f for all pairs of triangles that have a common point, in any order, until it returns
+  /// false.
+  struct Meeting {
+    std::uint32_t elementA, elementB;
+    Corners a, b;  ///< a moved
+    TriangleIntersection found;
+  };
+  void forEachMeeting(const Eigen::Vector3d& shift,
+                      const std::function<bool(const Meeting&)>& f) const;
+
+  /// Whether a vertex is inside the other body, a not moved; not if it is on the surface.
+  bool isInside(bool ofA, std::uint32_t vertex) const;
+  /// The winding number of a body about a point, a not moved; 0 on the surface.
+  int windingNumberOf(bool ofA, const Eigen::Vector3d& p) const;
+  /// Whether a point is inside both bodies, a not moved.
+  bool isInBoth(const Eigen::Vector3d& p) const;
+  struct PartVertex {
+    bool ofA;
+    std::uint32_t vertex;
+  };
+  /// A vertex of a part of one surface that is inside the other body, where the surfaces have no
+  /// common point.
+  std::optional<PartVertex> findInsidePart(const Eigen::Vector3d& shift) const;
+  /// Whether the bodies have no common point.
+  bool areApart(const Eigen::Vector3d& shift) const;
+  /// Where a vertex of a, moved by `shift`, meets b along a direction; a vertex of b meets a, moved
+  /// by `shift`, against it.
+  std::optional<RayHit> hitOf(const PartVertex&, const Eigen::Vector3d& shift,
+                              const Eigen::Vector3d& direction) const;
+
+ private:
+  Eigen::Vector3d moved(std::uint32_t vertexOfA, const Eigen::Vector3d& shift) const;
+  bool isInMovedA(const Eigen::Vector3d& p, const Eigen::Vector3d& shift) const;
+
+  const SearchableGeometry &m_a, &m_b;
+  const Engine m_engine;
+  BodyPairScratch& m_scratch;
+  double m_magnitude;
+};
+
+}  // namespace palpate

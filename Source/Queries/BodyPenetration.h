@@ -1,0 +1,44 @@
+#pragma once
+
+#include <palpate/SpatialQueries.h>
+
+#include "Queries/BodyPair.h"
+#include "Queries/ShortestTranslation.h"
+#include "Shapes/Polytope.h"
+
+#include <Eigen/Core>
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace palpate {
+
+struct PenetrationScratch {
+  /// A direction to try.
+  struct Seed {
+    Eigen::Vector3d direction;
+    std::size_t place;  ///< in the order in which directions were found
+    double bound = 0;   ///< L: no translation along it that separates is shorter
+  };
+
+  BodyPairScratch pair;
+  Polytope difference;
+  ShortestTranslation shortest;
+  std::vector<BodyPair::Meeting> meetings;      ///< where a is not moved
+  std::vector<std::uint32_t> insideA, insideB;  ///< some vertices inside the other body
+  std::vector<Seed> seeds;
+};
+
+/// The translation of a that separates two closed meshes (SpatialQueries::penetration()).
+///
+/// Method   A translation along one direction is decided by steps: where the surfaces meet, or a
+///          part of one is inside the other body, it goes on until the last pair of triangles that
+///          meets comes apart. The directions are those that separate the convex hulls, normals of
+///          faces that meet or are inside, and a set around the sphere. Rays from inside vertices
+///          bound the depth of each from below. From the best ones the search goes on to the
+///          shortest translation that satisfies all contacts at which translations ended.
+Penetration penetrationOf(const SearchableGeometry& a, const SearchableGeometry& b, Engine,
+                          PenetrationScratch&);
+
+}  // namespace palpate

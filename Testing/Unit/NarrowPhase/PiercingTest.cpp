@@ -1,0 +1,218 @@
+#include "Diagnostics/ContactsByBruteForce.h"
+#include "NarrowPhase/NarrowPhase.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+namespace palpate::test {
+namespace {
+
+using Eigen::Vector3d;
+using Vertices = std::vector<Vector3d>;
+
+TriangleMesh piercingMesh(const Vertices& positions, const std::vector<Triangle>& triangles) {
+  return {MeshTopology(positions.size(), triangles), positions, positions};
+}
+
+ContactBuffers piercingContacts(const TriangleMesh& a, const TriangleMesh& b) {
+  ContactBuffers out;
+  findContactsByBruteForce({a, b, {.method = Method::Intersection}}, out);
+  return out;
+}
+
+/// A closed pyramid with its tip, vertex 0, down.
+TriangleMesh pyramid(const Vector3d& tip, double height, double halfWidth) {
+  Vertices positions{tip};
+  for (const auto& [x, y] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, 1}})
+    positions.push_back(tip + Vector3d(x * halfWidth, y * halfWidth, height));
+  return piercingMesh(positions,
+                      {{0, 2, 1}, {0, 3, 2}, {0, 4, 3}, {0, 1, 4}, {1, 2, 3}, {1, 3, 4}});
+}
+
+/// Vertex i + 5 j is at (i, j, 0) for 0 <= i, j <= 4. All diagonals are along (1, 1, 0).
+TriangleMesh plate() {
+  Vertices positions;
+  std::vector<Triangle> triangles;
+  for (std::uint32_t j = 0; j < 5; ++j)
+    for (std::uint32_t i = 0; i < 5; ++i) {
+      positions.emplace_back(i, j, 0);
+      const std::uint32_t v = 5 * j + i;
+      if (i < 4 && j < 4) {
+        triangles.push_back({v, v + 1, v + 6});
+        triangles.push_back({v, v + 6, v + 5});
+      }
+    }
+  return piercingMesh(positions, triangles);
+}
+
+TriangleMesh cuboid(const Vector3d& lower, const Vector3d& upper) {
+  Vertices positions;
+  for (int i = 0; i < 8; ++i)
+    positions.emplace_back(i & 1 ? upper.x() : lower.x(), i & 2 ? upper.y() : lower.y(),
+                           i & 4 ? upper.z() : lower.z());
+  return piercingMesh(positions, {{0, 2, 3},
+                                  {0, 3, 1},
+                                  {4, 5, 7},
+                                  {4, 7, 6},
+                                  {0, 1, 5},
+                                  {0, 5, 4},
+                                  {2, 6, 7},
+                                  {2, 7, 3},
+                                  {0, 4, 6},
+                                  {0, 6, 2},
+                                  {1, 3, 7},
+                                  {1, 7, 5}});
+}
+
+TriangleMesh turned(TriangleMesh mesh, const Eigen::AngleAxisd& by, const Vector3d& shift) {
+  Vertices positions;
+  for (std::size_t v = 0; v < mesh.now.size(); ++v) positions.push_back(by * mesh.now[v] + shift);
+  std::vector<Triangle> triangles(mesh.topology.triangles.begin(), mesh.topology.triangles.end());
+  return piercingMesh(positions, triangles);
+}
+
+Vector3d weightedSum(const VertexTriangleContact& c, const TriangleMesh& vertices,
+                     const TriangleMesh& triangles) {
+  Vector3d sum = vertices.now[c.vertex];
+  for (int i = 0; i < 3; ++i) sum -= c.barycentric[i] * triangles.now[c.corners[i]];
+  return sum;
+}
+
+/// The only contact of the tip, and of any vertex of the pyramid.
+VertexTriangleContact contactOfTip(const Vector3d& tip, double halfWidth = 0.7) {
+  const TriangleMesh a = pyramid(tip, 1, halfWidth), b = plate();
+  const ContactBuffers found = piercingContacts(a, b);
+  EXPECT_EQ(found.vertexTriangle.size(), 1u);
+  if (found.vertexTriangle.empty()) return {};
+  const VertexTriangleContact c = found.vertexTriangle[0];
+  EXPECT_EQ(c.vertex, 0u);
+  EXPECT_LE((weightedSum(c, a, b) - c.distance * c.normal).norm(), 1e-15);
+  const ContactBuffers swapped = piercingContacts(b, a);
+  EXPECT_EQ(swapped.triangleVertex.size(), 1u);
+  EXPECT_TRUE(swapped.triangleVertex[0] == c);
+  return c;
+}
+
+TEST(Piercing, ATipBelowAnInteriorFeatureHasItsDepth) {
+  for (const auto& [x, y, feature] : {std::tuple{2.6, 2.3, TriangleFeature::Face},
+                                      {2.5, 2.5, TriangleFeature::EdgeCA},
+                                      {2.5, 2.0, TriangleFeature::EdgeBC},
+                                      {2.0, 2.4, TriangleFeature::EdgeBC},
+                                      {2.0, 2.0, TriangleFeature::CornerC}}) {
+    SCOPED_TRACE(std::to_string(x) + ", " + std::to_string(y));
+    const VertexTriangleContact c = contactOfTip({x, y, -0.1});
+    EXPECT_EQ(c.feature, feature);
+    EXPECT_DOUBLE_EQ(c.distance, -0.1);
+    EXPECT_EQ(c.normal, Vector3d::UnitZ());
+  }
+}
+
+/// The tip is beyond the border, and the sides of the pyramid pierce the plate.
+TEST(Piercing, ATipBelowAndBeyondTheBorderLeavesTowardsIt) {
+  const VertexTriangleContact edge = contactOfTip({2.3, -0.03, -0.04}, 2);
+  EXPECT_EQ(edge.feature, TriangleFeature::EdgeAB);
+  EXPECT_NEAR(edge.distance, -0.05, 1e-16);
+  EXPECT_TRUE(edge.normal.isApprox(Vector3d(0, 0.6, 0.8), 1e-14));
+  const VertexTriangleContact corner = contactOfTip({-0.02, -0.01, -0.02}, 2);
+  EXPECT_EQ(corner.feature, TriangleFeature::CornerA);
+  EXPECT_EQ(corner.corners[0], 0u);
+  EXPECT_NEAR(corner.distance, -0.03, 1e-16);
+  EXPECT_TRUE(corner.normal.isApprox(Vector3d(2, 1, 2) / 3, 1e-14));
+}
+
+/// All four edges at the tip cross the plate in edges and vertices of it.
+TEST(Piercing, EdgesThroughEdgesAndVerticesCountOnce) {
+  const VertexTriangleContact inEdges = contactOfTip({2, 2, -0.5}, 1.0);
+  EXPECT_EQ(inEdges.feature, TriangleFeature::CornerC);
+  EXPECT_EQ(inEdges.distance, -0.5);
+  const TriangleMesh a = pyramid({2, 2, -0.5}, 1, 2), b = plate();
+  const ContactBuffers inVertices = piercingContacts(a, b);
+  ASSERT_EQ(std::count_if(inVertices.vertexTriangle.begin(), inVertices.vertexTriangle.end(),
+                          [](const auto& c) { return c.vertex == 0 && c.distance < 0; }),
+            1);
+}
+
+/// Its edges enter the bar and leave it: neither end is inside.
+TEST(Piercing, ANeedleThroughABarHasNoEndBehindIt) {
+  const TriangleMesh needle = cuboid({0.4, 0.4, -1}, {0.5, 0.5, 5}),
+                     bar = cuboid({0, 0, 0}, {1, 1, 0.2});
+  const ContactBuffers found = piercingContacts(needle, bar);
+  EXPECT_FALSE(found.intersectingTriangles.empty());
+  for (const VertexTriangleContact& c : found.vertexTriangle) {
+    const double z = needle.now[c.vertex].z();
+    const bool isTop = bar.now[c.corners[0]].z() == 0.2 && bar.now[c.corners[1]].z() == 0.2;
+    EXPECT_EQ(c.distance < 0, (z < 0) == isTop);
+  }
+}
+
+/// The corner is inside: its three faces are pierced by edges of the other cube, and it leaves
+/// through the nearest face.
+TEST(Piercing, CornersOfOverlappingCubesLeaveThroughTheNearestFace) {
+  const TriangleMesh a = cuboid({0.9, 0.8, 0.7}, {1.9, 1.8, 1.7}), b = cuboid({0, 0, 0}, {1, 1, 1});
+  const ContactBuffers found = piercingContacts(a, b);
+  ASSERT_EQ(found.vertexTriangle.size(), 1u);
+  EXPECT_EQ(found.vertexTriangle[0].vertex, 0u);
+  EXPECT_NEAR(found.vertexTriangle[0].distance, -0.1, 1e-15);
+  EXPECT_EQ(found.vertexTriangle[0].normal, Vector3d::UnitX());
+  ASSERT_EQ(found.triangleVertex.size(), 1u);
+  EXPECT_EQ(found.triangleVertex[0].vertex, 7u);
+  EXPECT_EQ(found.triangleVertex[0].normal, Vector3d(-Vector3d::UnitX()));
+  EXPECT_TRUE(found.edgeEdge.empty());
+}
+
+/// Two long roofs cross at a right angle, ridge below ridge by 0.1.
+TEST(Piercing, EdgesThatHaveCrossedHaveADepth) {
+  const double c = std::sqrt(0.5);
+  const TriangleMesh bar = cuboid({-5, -0.5, -0.5}, {5, 0.5, 0.5});
+  const auto diamond = [&](const Vector3d& shift) {
+    return turned(bar, Eigen::AngleAxisd(M_PI / 4, Vector3d::UnitX()), shift);
+  };
+  const TriangleMesh below = diamond({0, 0, 0});
+  const TriangleMesh above =
+      turned(diamond({0, 0, 0}), Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitZ()),
+             {0.013, 0.017, 2 * c - 0.1});
+  const ContactBuffers found = piercingContacts(above, below);
+  EXPECT_TRUE(found.vertexTriangle.empty() && found.triangleVertex.empty());
+  ASSERT_FALSE(found.edgeEdge.empty());
+  for (const EdgeEdgeContact& contact : found.edgeEdge) {
+    EXPECT_NEAR(contact.distance, -0.1, 1e-12);
+    EXPECT_TRUE(contact.normal.isApprox(Vector3d::UnitZ(), 1e-12));
+  }
+  const ContactBuffers swapped = piercingContacts(below, above);
+  ASSERT_EQ(swapped.edgeEdge.size(), found.edgeEdge.size());
+  EXPECT_TRUE(swapped.edgeEdge[0].normal.isApprox(-Vector3d::UnitZ(), 1e-12));
+}
+
+/// A bumpy plate: the depth is the least distance to any point near the tip.
+TEST(Piercing, TheDepthIsThatOfTheNearestTriangleAround) {
+  for (int seed = 0; seed < 200; ++seed) {
+    const TriangleMesh flat = plate();
+    Vertices positions;
+    for (std::size_t v = 0; v < flat.now.size(); ++v) positions.push_back(flat.now[v]);
+    for (std::size_t v = 0; v < positions.size(); ++v)
+      positions[v].z() = 0.05 * (static_cast<double>((v * 7 + seed * 13) % 11) / 5 - 1);
+    std::vector<Triangle> triangles(flat.topology.triangles.begin(), flat.topology.triangles.end());
+    const TriangleMesh b = piercingMesh(positions, triangles);
+    const Vector3d tip(1.5 + seed % 10 * 0.1, 1.5 + seed / 10 % 10 * 0.1, -0.15);
+    const TriangleMesh a = pyramid(tip, 1, 0.4 + 0.01 * (seed % 30));
+    const ContactBuffers found = piercingContacts(a, b);
+    double least = 1;
+    for (const auto& [p, q, r] : triangles)
+      least = std::min(
+          least, vertexTriangleDistance(tip, positions[p], positions[q], positions[r]).distance);
+    int ofTip = 0;
+    for (const VertexTriangleContact& c : found.vertexTriangle) {
+      if (c.vertex != 0) continue;
+      ++ofTip;
+      EXPECT_DOUBLE_EQ(c.distance, -least) << seed;
+      EXPECT_GT(c.normal.z(), 0.5);
+    }
+    EXPECT_EQ(ofTip, 1) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace palpate::test

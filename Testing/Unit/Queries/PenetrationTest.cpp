@@ -1,0 +1,443 @@
+#include "Common/ExpectRefused.h"
+#include "Common/PairRun.h"
+#include "Common/RandomMeshes.h"
+#include "Common/Solids.h"
+#include "Unit/Queries/Cube.h"
+
+#include <palpate/OctreeBasedCD.h>
+#include <palpate/Intersection.h>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+// Directions and depths of bodies: what a translation must do is tested on the moved positions, all
+// triangles against all.
+namespace palpate::testing {
+namespace {
+
+using Eigen::Vector3d;
+
+Mesh moved(Mesh mesh, const Vector3d& shift) {
+  for (Vector3d& p : mesh.positions) p += shift;
+  return mesh;
+}
+
+Mesh turned(Mesh mesh, const Eigen::Matrix3d& rotation) {
+  for (Vector3d& p : mesh.positions) p = rotation * p;
+  return mesh;
+}
+
+Mesh scaledBy(Mesh mesh, double factor) {
+  for (Vector3d& p : mesh.positions) p *= factor;
+  return mesh;
+}
+
+Mesh block(const Vector3d& low, const Vector3d& high) {
+  Mesh mesh = cube(0, 1);
+  for (Vector3d& p : mesh.positions) p = low + p.cwiseProduct(high - low);
+  return mesh;
+}
+
+Eigen::Matrix3d anyTurn(Random& random) {
+  return Eigen::Quaterniond(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1),
+                            uniform(random, -1, 1))
+      .normalized()
+      .toRotationMatrix();
+}
+
+Mesh torus(std::uint32_t around, std::uint32_t across, double radius, double thickness) {
+  Mesh mesh;
+  constexpr double kTurn = 6.283185307179586;
+  for (std::uint32_t i = 0; i < around; ++i)
+    for (std::uint32_t j = 0; j < across; ++j) {
+      const double u = kTurn * i / around, v = kTurn * j / across,
+                   r = radius + thickness * std::cos(v);
+      mesh.positions.emplace_back(r * std::cos(u), r * std::sin(u), thickness * std::sin(v));
+    }
+  const auto at = [&](std::uint32_t i, std::uint32_t j) {
+    return i % around * across + j % across;
+  };
+  for (std::uint32_t i = 0; i < around; ++i)
+    for (std::uint32_t j = 0; j < across; ++j) {
+      mesh.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+      mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+    }
+  return mesh;
+}
+
+/// A beam bent to a U: concave, with a slot that is open upward.
+Solid bracket(Random& random) {
+  return cells(3, random, [](const std::array<int, 3>& c) { return c[2] == 0 || c[0] != 1; });
+}
+
+struct Bodies {
+  Bodies(const Mesh& first, const Mesh& second, Engine engine = Engine::Octree)
+      : collisions(settingsOf(engine)),
+        a(collisions.addTriangleMesh(first.positions, first.triangles)),
+        b(collisions.addTriangleMesh(second.positions, second.triangles)) {}
+  Penetration penetration() { return collisions.queries().penetration(a, b); }
+
+  OctreeBasedCD collisions;
+  GeometryId a, b;
+};
+
+/// Whether no triangles have a common point, and no vertex of either is inside the other.
+bool areApart(const Mesh& a, const Mesh& b) {
+  for (const auto& [i, j, k] : a.triangles)
+    for (const auto& [p, q, r] : b.triangles)
+      if (trianglesIntersect(a.positions[i], a.positions[j], a.positions[k], b.positions[p],
+                             b.positions[q], b.positions[r]))
+        return false;
+  Bodies bodies(a, b);
+  std::vector<InsideVertex> inside;
+  bodies.collisions.queries().findInsideVertices(bodies.a, bodies.b, inside);
+  if (!inside.empty()) return false;
+  bodies.collisions.queries().findInsideVertices(bodies.b, bodies.a, inside);
+  return inside.empty();
+}
+
+void expectSame(const Penetration& p, const Penetration& q) {
+  EXPECT_EQ(p.intersecting, q.intersecting);
+  EXPECT_EQ(p.direction, q.direction);
+  EXPECT_EQ(p.depth, q.depth);
+  EXPECT_EQ(p.minimal, q.minimal);
+  for (const auto& [one, two] : {std::pair(p.a, q.a), std::pair(p.b, q.b)}) {
+    EXPECT_EQ(one.element, two.element);
+    EXPECT_EQ(one.weights, two.weights);
+    EXPECT_EQ(one.position, two.position);
+    EXPECT_EQ(one.distance, two.distance);
+  }
+}
+
+/// The laws of an answer for bodies that intersect.
+void expectSeparates(const Mesh& a, const Mesh& b, const Penetration& p, double size) {
+  ASSERT_TRUE(p.intersecting);
+  EXPECT_NEAR(p.direction.norm(), 1.0, 1e-12);
+  EXPECT_GT(p.depth, 0.0);
+  EXPECT_TRUE(areApart(moved(a, p.depth * p.direction), b));
+  EXPECT_LE((p.a.position + p.depth * p.direction - p.b.position).norm(), 1e-9 * size);
+  for (const auto& [point, mesh] : {std::pair(p.a, &a), std::pair(p.b, &b)}) {
+    ASSERT_LT(point.element, mesh->triangles.size());
+    EXPECT_EQ(point.vertices, mesh->triangles[point.element]);
+    EXPECT_GE(point.weights.minCoeff(), 0.0);
+    Vector3d position = Vector3d::Zero();
+    for (int i = 0; i < 3; ++i) position += point.weights[i] * mesh->positions[point.vertices[i]];
+    EXPECT_LE((position - point.position).norm(), 1e-12 * size);
+    EXPECT_EQ(point.distance, p.depth);
+  }
+}
+
+void expectApart(const Mesh& a, const Mesh& b) {
+  const Penetration p = Bodies(a, b).penetration();
+  EXPECT_FALSE(p.intersecting);
+  EXPECT_EQ(p.depth, 0.0);
+  EXPECT_EQ(p.direction, Vector3d::Zero());
+  EXPECT_EQ(p.a.element, kNoElement);
+  EXPECT_EQ(p.b.element, kNoElement);
+}
+
+std::vector<Mesh> bodiesOfAllKinds(Random& random) {
+  const Solid solid = bracket(random);
+  OctreeBasedCD collisions;
+  const GeometryId id = collisions.addTetrahedralMesh(solid.positions, solid.tetrahedra);
+  const auto surface = collisions.surface(id).triangles;
+  return {cube(-1, 1), sphere(6, 8, {0, 0, 0}, 1.2), torus(16, 8, 1.0, 0.3),
+          block({-1.5, -1, -0.05}, {1.5, 1, 0.05}),
+          moved(scaledBy({solid.positions, {surface.begin(), surface.end()}}, 0.7), {-1, -1, -1})};
+}
+
+TEST(Penetration, TheTranslationSeparatesBodiesOfAllKinds) {
+  Random random(1);
+  const std::vector<Mesh> kinds = bodiesOfAllKinds(random);
+  int intersecting = 0;
+  for (const Mesh& first : kinds)
+    for (const Mesh& second : kinds)
+      for (int i = 0; i < 4; ++i) {
+        const Mesh a = turned(first, anyTurn(random)),
+                   b = moved(turned(second, anyTurn(random)), randomPoint(random, -1.2, 1.2));
+        const Penetration p = Bodies(a, b).penetration();
+        EXPECT_EQ(p.intersecting, !areApart(a, b));
+        if (!p.intersecting) continue;
+        ++intersecting;
+        expectSeparates(a, b, p, 3.0);
+        expectSame(p, Bodies(a, b, Engine::BruteForce).penetration());
+      }
+  EXPECT_GT(intersecting, 60);
+}
+
+TEST(Penetration, APlacedBodyIsSeparatedByItsTranslation) {
+  Random random(2);
+  for (int i = 0; i < 20; ++i) {
+    const Mesh a = torus(12, 6, 1.0, 0.3), b = sphere(6, 8, {0, 0, 0}, 1.0);
+    const Eigen::Matrix3d turn = anyTurn(random);
+    const Vector3d shift = randomPoint(random, 100, 101), place = shift + Vector3d(0.6, 0.3, 0.2);
+    Bodies bodies(a, b);
+    bodies.collisions.setTransform(bodies.a, turn, shift);
+    bodies.collisions.setTransform(bodies.b, Eigen::Matrix3d::Identity(), place);
+    const Penetration p = bodies.penetration();
+    ASSERT_TRUE(p.intersecting);
+    const auto at = [](const Mesh& mesh, const Eigen::Matrix3d& r, const Vector3d& t) {
+      Mesh world = mesh;
+      for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+        const Vector3d& q = mesh.positions[v];
+        for (int k = 0; k < 3; ++k)
+          world.positions[v][k] = ((r(k, 0) * q[0] + r(k, 1) * q[1]) + r(k, 2) * q[2]) + t[k];
+      }
+      return world;
+    };
+    const Mesh fixed = at(b, Eigen::Matrix3d::Identity(), place);
+    EXPECT_FALSE(areApart(at(a, turn, shift), fixed));
+    EXPECT_TRUE(areApart(at(a, turn, shift + p.depth * p.direction), fixed));
+  }
+}
+
+TEST(Penetration, BoxesAreSeparatedAlongTheLeastOverlap) {
+  for (const double overlap : {0.1, 0.3, 0.6})
+    for (const Vector3d& aside : {Vector3d(0, 0, 0), Vector3d(0, 0.05, 0.03)}) {
+      const Mesh a = cube(0, 1), b = moved(a, Vector3d(1 - overlap, 0, 0) + aside);
+      const Penetration p = Bodies(a, b).penetration();
+      expectSeparates(a, b, p, 1.0);
+      EXPECT_NEAR(p.depth, overlap, 1e-11);
+      EXPECT_LE((p.direction - Vector3d(-1, 0, 0)).norm(), 1e-12);
+      EXPECT_TRUE(p.minimal);
+    }
+}
+
+/// The least translation of convex bodies: over the normals of all faces and of all pairs of edges.
+double leastTranslation(const Mesh& a, const Mesh& b) {
+  double least = std::numeric_limits<double>::infinity();
+  const auto take = [&](const Vector3d& normal) {
+    if (!(normal.norm() > 1e-9)) return;
+    for (const double sign : {1.0, -1.0}) {
+      const Vector3d d = sign * normal.normalized();
+      double most = -std::numeric_limits<double>::infinity(), lowest = -most;
+      for (const Vector3d& p : b.positions) most = std::max(most, d.dot(p));
+      for (const Vector3d& p : a.positions) lowest = std::min(lowest, d.dot(p));
+      least = std::min(least, most - lowest);
+    }
+  };
+  const auto edges = [](const Mesh& mesh) {
+    std::vector<Vector3d> all;
+    for (const Triangle& t : mesh.triangles)
+      for (int i = 0; i < 3; ++i)
+        if (t[i] < t[(i + 1) % 3])
+          all.push_back(mesh.positions[t[(i + 1) % 3]] - mesh.positions[t[i]]);
+    return all;
+  };
+  for (const Mesh* mesh : {&a, &b})
+    for (const auto& [i, j, k] : mesh->triangles)
+      take(
+          (mesh->positions[j] - mesh->positions[i]).cross(mesh->positions[k] - mesh->positions[i]));
+  for (const Vector3d& e : edges(a))
+    for (const Vector3d& f : edges(b)) take(e.normalized().cross(f.normalized()));
+  return least;
+}
+
+TEST(Penetration, OfConvexBodiesNoTranslationIsShorter) {
+  Random random(3);
+  const std::vector<Mesh> kinds{cube(-1, 1), block({-1, -0.5, -0.1}, {1, 0.5, 0.1}),
+                                sphere(2, 4, {0, 0, 0}, 1.0), sphere(4, 6, {0, 0, 0}, 1.1)};
+  int minimal = 0;
+  for (const Mesh& first : kinds)
+    for (const Mesh& second : kinds)
+      for (int i = 0; i < 5; ++i) {
+        const Mesh a = turned(first, anyTurn(random)),
+                   b = moved(turned(second, anyTurn(random)), randomPoint(random, -0.6, 0.6));
+        const Penetration p = Bodies(a, b).penetration();
+        if (!p.intersecting) continue;
+        EXPECT_NEAR(p.depth, leastTranslation(a, b), 1e-9);
+        EXPECT_TRUE(p.minimal);
+        ++minimal;
+      }
+  EXPECT_GT(minimal, 50);
+}
+
+TEST(Penetration, OfConcaveBodiesTheShortestWayOutIsFound) {
+  Random random(4);
+  const Solid solid = bracket(random);
+  Bodies bodies(cube(0, 1), cube(0, 1));
+  const GeometryId slot = bodies.collisions.addTetrahedralMesh(solid.positions, solid.tetrahedra);
+  const Mesh key = block({0.9, -0.5, 0.6}, {2.1, 3.5, 2.5});
+  const GeometryId id = bodies.collisions.addTriangleMesh(key.positions, key.triangles);
+  const Penetration p = bodies.collisions.queries().penetration(id, slot);
+  ASSERT_TRUE(p.intersecting);
+  EXPECT_NEAR(p.depth, 2.1, 1e-9);  // sideways, through one arm
+  EXPECT_FALSE(p.minimal);
+  // A key that fits leaves the bottom only.
+  bodies.collisions.setPositions(id, block({1.1, -0.5, 0.6}, {1.9, 3.5, 2.5}).positions);
+  const Penetration up = bodies.collisions.queries().penetration(id, slot);
+  EXPECT_NEAR(up.depth, 0.4, 1e-9);
+}
+
+TEST(Penetration, BodiesThatOnlyTouchDoNotIntersect) {
+  const Mesh unit = cube(0, 1);
+  expectApart(unit, moved(unit, {1, 0, 0}));          // a face on a face
+  expectApart(unit, moved(unit, {1, 0.25, 0.5}));     // parts of faces
+  expectApart(unit, moved(unit, {1, 1, 0}));          // an edge
+  expectApart(unit, moved(unit, {1, 1, 1}));          // a corner
+  expectApart(unit, moved(unit, {1 + 1e-12, 0, 0}));  // apart
+  expectApart(unit, block({-1, -1, -1}, {2, 2, 0}));  // on a larger face
+  Random random(5);
+  const Solid solid = bracket(random);
+  OctreeBasedCD collisions;
+  const GeometryId slot = collisions.addTetrahedralMesh(solid.positions, solid.tetrahedra);
+  const Mesh key = block({1, 0, 1}, {2, 3, 3});  // fills the slot exactly
+  const GeometryId id = collisions.addTriangleMesh(key.positions, key.triangles);
+  EXPECT_FALSE(collisions.queries().penetration(id, slot).intersecting);
+}
+
+TEST(Penetration, AlignedBodiesIntersectThoughNoEdgePiercesAFace) {
+  const Mesh unit = cube(0, 1);
+  for (const Mesh& other :
+       {unit, moved(unit, {0.5, 0, 0}), moved(unit, {0.25, 0.5, 0}), block({0, 0, 0}, {1, 1, 0.5}),
+        block({-1, 0, 0}, {2, 1, 1}), block({0.25, 0, -1}, {0.75, 1, 2})}) {
+    const Penetration p = Bodies(unit, other).penetration();
+    expectSeparates(unit, other, p, 2.0);
+    EXPECT_NEAR(p.depth, leastTranslation(unit, other), 1e-9);
+  }
+}
+
+TEST(Penetration, ABodyInsideAnotherIntersectsItUnlessItIsInAHollow) {
+  const Mesh outer = cube(-2, 2), inner = moved(sphere(5, 6, {0, 0, 0}, 0.5), {0.5, 0, 0});
+  const Penetration p = Bodies(inner, outer).penetration();
+  expectSeparates(inner, outer, p, 2.0);
+  EXPECT_LE(p.depth, 2.0 + 1e-9);
+  const Penetration other = Bodies(outer, inner).penetration();
+  expectSeparates(outer, inner, other, 2.0);
+  Mesh hollow = outer, cavity = cube(-1.5, 1.5);
+  for (Triangle& t : cavity.triangles) std::swap(t[1], t[2]);
+  append(hollow, cavity);
+  expectApart(inner, hollow);
+  expectApart(hollow, inner);
+}
+
+TEST(Penetration, ScalesWithTheBodies) {
+  const Mesh a = cube(0, 1), b = moved(sphere(6, 8, {0, 0, 0}, 1.0), {1.4, 0.6, 0.5});
+  const Penetration one = Bodies(a, b).penetration();
+  for (const double factor : {0x1p-300, 0x1p40, 0x1p300}) {
+    const Penetration p = Bodies(scaledBy(a, factor), scaledBy(b, factor)).penetration();
+    ASSERT_TRUE(p.intersecting);
+    EXPECT_NEAR(p.depth / factor, one.depth, 1e-9);
+    EXPECT_EQ(p.minimal, one.minimal);
+  }
+}
+
+TEST(Penetration, AFarOriginCostsRoundingOnly) {
+  const Mesh a = cube(0, 1);
+  for (const double far : {1e6, -1e9}) {
+    const Mesh p = moved(a, Vector3d::Constant(far)), q = moved(p, {0.75, 0, 0});
+    const Penetration found = Bodies(p, q).penetration();
+    ASSERT_TRUE(found.intersecting);
+    EXPECT_NEAR(found.depth, 0.25, 1e-11 * std::abs(far));
+    EXPECT_TRUE(areApart(moved(p, found.depth * found.direction), q));
+  }
+}
+
+/// A shape and a mesh in either order: the same answer, reversed.
+Penetration withShape(const Mesh& mesh, const AnalyticalGeometry& shape) {
+  OctreeBasedCD collisions;
+  const GeometryId a = collisions.addTriangleMesh(mesh.positions, mesh.triangles),
+                   b = collisions.addAnalyticalGeometry(shape);
+  const Penetration p = collisions.queries().penetration(a, b),
+                    q = collisions.queries().penetration(b, a);
+  EXPECT_EQ(p.intersecting, q.intersecting);
+  EXPECT_NEAR(p.depth, q.depth, 1e-9 + 0.02 * p.depth);
+  for (const auto& [answer, sign] : {std::pair(p, 1.0), std::pair(q, -1.0)}) {
+    if (!answer.intersecting) continue;
+    EXPECT_LE((answer.a.position + answer.depth * answer.direction - answer.b.position).norm(),
+              1e-9);
+    Mesh apart = moved(mesh, sign * answer.depth * answer.direction);
+    collisions.setPositions(a, apart.positions);
+    EXPECT_GT(collisions.queries().distance(a, b).distance, 0.0);
+    EXPECT_FALSE(collisions.queries().penetration(a, b).intersecting);
+    collisions.setPositions(a, mesh.positions);
+  }
+  return p;
+}
+
+TEST(Penetration, ShapesAndMeshesAreSeparated) {
+  const Mesh unit = cube(0, 1);
+  const auto expect = [&](const AnalyticalGeometry& shape, double depth,
+                          const Vector3d& direction) {
+    const Penetration p = withShape(unit, shape);
+    ASSERT_TRUE(p.intersecting);
+    EXPECT_NEAR(p.depth, depth, 1e-9);
+    EXPECT_LE((p.direction - direction).norm(), 1e-6);
+    EXPECT_TRUE(p.minimal);
+  };
+  expect(Sphere{{1.25, 0.5, 0.5}, 0.5}, 0.25, {-1, 0, 0});
+  expect(Sphere{{0.75, 0.5, 0.4}, 0.5}, 0.75, {-1, 0, 0});
+  expect(Capsule{{1.25, 0.5, -3}, {1.25, 0.5, 4}, 0.5}, 0.25, {-1, 0, 0});
+  expect(Cylinder{{1.25, 0.5, -3}, {1.25, 0.5, 4}, 0.5}, 0.25, {-1, 0, 0});
+  expect(Box{{1.25, 0.5, 0.5}, {0.5, 2, 2}}, 0.25, {-1, 0, 0});
+  expect(Plane{{0, 0, 0.25}, {0, 0, 3}}, 0.25, {0, 0, 1});
+  for (const AnalyticalGeometry& apart : std::vector<AnalyticalGeometry>{
+           Sphere{{1.5, 0.5, 0.5}, 0.5}, Box{{1.5, 0.5, 0.5}, {0.5, 2, 2}},
+           Plane{{0, 0, 0}, {0, 0, 1}}, Sphere{{1.6, 0.5, 0.5}, 0.5}, Sphere{{0.5, 0.5, 0.5}, 0.0}})
+    EXPECT_FALSE(withShape(unit, apart).intersecting);
+  const Mesh ring = torus(24, 12, 1.0, 0.3);
+  for (const AnalyticalGeometry& concave : std::vector<AnalyticalGeometry>{
+           Sphere{{0.05, 0.02, 0.1}, 0.75}, Capsule{{1, 0, -1}, {1, 0.1, 1}, 0.1},
+           Cylinder{{1, 0, -1}, {1, 0.1, 1}, 0.1}, Box{{1, 0, 0}, {0.1, 0.1, 1}}}) {
+    const Penetration p = withShape(ring, concave);
+    EXPECT_TRUE(p.intersecting);
+    EXPECT_FALSE(p.minimal);
+    EXPECT_LE(p.depth, 0.5);
+  }
+}
+
+TEST(Penetration, TwoShapesHaveTheirDistance) {
+  OctreeBasedCD collisions;
+  const GeometryId a = collisions.addAnalyticalGeometry(Box{{0, 0, 0}, {1, 1, 1}}),
+                   b = collisions.addAnalyticalGeometry(Box{{1.7, 0.1, 0}, {1, 1, 1}}),
+                   c = collisions.addAnalyticalGeometry(Sphere{{5, 0, 0}, 1}),
+                   floor = collisions.addAnalyticalGeometry(Plane{{0, 0, 0}, {0, 0, 1}});
+  const Penetration p = collisions.queries().penetration(a, b);
+  EXPECT_TRUE(p.intersecting);
+  EXPECT_TRUE(p.minimal);
+  EXPECT_NEAR(p.depth, 0.3, 1e-9);
+  EXPECT_LE((p.direction - Vector3d(-1, 0, 0)).norm(), 1e-9);
+  EXPECT_FALSE(collisions.queries().penetration(a, c).intersecting);
+  EXPECT_NEAR(collisions.queries().penetration(floor, a).depth, 1.0, 1e-9);
+}
+
+TEST(Penetration, RefusesWhatHasNoInside) {
+  Mesh open = cube(0, 1);
+  open.triangles.erase(open.triangles.begin());
+  Bodies bodies(cube(0, 1), open);
+  OctreeBasedCD& collisions = bodies.collisions;
+  const GeometryId lines = collisions.addLineMesh(open.positions, std::vector<Segment>{{0, 1}}),
+                   points = collisions.addPointSet(open.positions),
+                   plane = collisions.addAnalyticalGeometry(Plane{}),
+                   other = collisions.addAnalyticalGeometry(Plane{}),
+                   sheet = collisions.addAnalyticalGeometry(Plane{{0, 0, 0}, {0, 0, 1}, true});
+  const auto expect = [&](ErrorCode code, const std::string& words, GeometryId a, GeometryId b,
+                          GeometryId named) {
+    expectRefused(
+        code, words, [&] { collisions.queries().penetration(a, b); }, named);
+  };
+  const std::string edge = "3 edges belong to one triangle only, the first is (0, 4)";
+  expect(ErrorCode::NotClosed, edge, bodies.a, bodies.b, bodies.b);
+  expect(ErrorCode::NotClosed, edge, bodies.b, bodies.a, bodies.b);
+  expect(ErrorCode::NotClosed, edge, bodies.b, plane, bodies.b);
+  expect(ErrorCode::NotClosed, "line mesh", lines, bodies.a, lines);
+  expect(ErrorCode::NotClosed, "point set", bodies.a, points, points);
+  expect(ErrorCode::NotClosed, "two-sided", bodies.a, sheet, sheet);
+  expect(ErrorCode::UnsupportedMethod, "both planes", plane, other, plane);
+  expect(ErrorCode::InvalidSettings, "twice", bodies.a, bodies.a, bodies.a);
+}
+
+TEST(Penetration, AnEmptyMeshIntersectsNothing) {
+  Bodies bodies(cube(0, 1), Mesh{});
+  EXPECT_FALSE(bodies.penetration().intersecting);
+}
+
+}  // namespace
+}  // namespace palpate::testing
