@@ -10,6 +10,7 @@
 #include "NarrowPhase/NarrowPhase.h"
 #include "NarrowPhase/Piercing.h"
 #include "Octree/Traversal.h"
+#include "Shapes/DistinctContacts.h"
 
 #include <memory>
 #include <span>
@@ -63,6 +64,7 @@ class Frame {
   StepFacts m_facts;
   OrderScratch m_orderScratch;
   FirstImpacts m_firstImpacts;
+  DistinctContacts m_distinctContacts;
 };
 
 }  // namespace palpate

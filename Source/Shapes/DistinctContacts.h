@@ -1,0 +1,42 @@
+#pragma once
+
+#include <palpate/CollisionData.h>
+#include <palpate/Settings.h>
+
+#include "Core/Buffer.h"
+#include "Mesh/TriangleMesh.h"
+#include "Shapes/Shape.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+namespace palpate {
+
+/// Contacts::Distinct for a mesh and a shape: drops contacts of vertices and edges whose normal the
+/// elements around them exclude.
+///
+/// A triangle at a vertex or an edge excludes the direction to the shape if it leads into the
+/// triangle: the triangle then comes nearer to the shape than the vertex or edge. So does a segment
+/// at a vertex. A contact is dropped if such a triangle is itself a contact, or if another vertex
+/// or edge of it is a contact that is earlier, or as early and nearer.
+///
+/// Laws     (1) A contact of a triangle stays. Of the others, the first and nearest one stays. So
+///          does the first and nearest of each connected part of the mesh, for the same reason.
+///          (2) What is dropped does not depend on the order of the pair, nor on how the contacts
+///          were found.
+/// Cost     n log n in the number of contacts.
+class DistinctContacts {
+ public:
+  /// contacts: all of one pair, in the order of CollisionData::shape(). Returns how many of them
+  /// stay, at the front and in the same order.
+  std::size_t keep(const TriangleMesh&, const Shape&, const PairSettings&,
+                   std::span<ShapeContact> contacts);
+
+ private:
+  struct Search;
+  Buffer<std::uint8_t> m_dropped;  ///< per contact
+};
+
+}  // namespace palpate
