@@ -16,23 +16,32 @@ std::array<std::uint32_t, 3> keyOf(const ShapeContact& c) {
   return {static_cast<std::uint32_t>(c.element), c.id, c.vertices[1]};
 }
 
+bool isFirst(const ShapeContact& a, const ShapeContact& b) {
+  return std::tie(a.timeOfImpact, a.distance) < std::tie(b.timeOfImpact, b.distance);
+}
+
 }  // namespace
 
 struct DistinctContacts::Search {
   const TriangleMesh& mesh;
   const double timeTolerance;
   const std::span<const ShapeContact> contacts;
+  const std::span<const std::uint8_t> dropped;  ///< of contacts that are earlier or nearer: decided
 
   bool isDropped(const ShapeContact& c) const {
     const MeshTopology& topology = mesh.topology;
-    if (c.element == ShapeElement::Face) return false;
     const auto around =
         c.element == ShapeElement::Vertex
             ? topology.vertexTriangles[c.id]
             : topology.edgeTriangles[topology.edgeOf({c.vertices[0], c.vertices[1]})];
-    return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
-      return excludes(triangle, c) && standsFor(triangle, c);
-    });
+    bool isReplaced = false;
+    for (const std::uint32_t triangle : around) {
+      if (!excludes(triangle, c)) continue;
+      const StandIns standIns = standInsOf(triangle, c);
+      if (standIns.haveItsNormal) return false;
+      isReplaced |= standIns.exist;
+    }
+    return isReplaced;
   }
 
  private:
@@ -48,26 +57,31 @@ struct DistinctContacts::Search {
     });
   }
 
-  /// Whether the triangle is a contact, or another vertex or edge of it is a contact that is
-  /// earlier or nearer.
-  bool standsFor(std::uint32_t triangle, const ShapeContact& c) const {
+  struct StandIns {
+    bool exist = false, haveItsNormal = false;
+  };
+  /// The triangle, and other vertices and edges of it that are earlier or nearer, as far as they
+  /// are contacts. haveItsNormal: one that stays, other than the triangle, has the normal of c.
+  StandIns standInsOf(std::uint32_t triangle, const ShapeContact& c) const {
     const MeshTopology& topology = mesh.topology;
     const Triangle& corners = topology.triangles[triangle];
+    StandIns result;
     const ShapeContact* face = find(ShapeElement::Face, triangle, corners[1]);
-    if (face && face->timeOfImpact <= c.timeOfImpact + timeTolerance) return true;
-    const auto isFirst = [&](ShapeElement element, std::uint32_t id, std::uint32_t second) {
+    result.exist = face && face->timeOfImpact <= c.timeOfImpact + timeTolerance;
+    const auto add = [&](ShapeElement element, std::uint32_t id, std::uint32_t second) {
       const ShapeContact* other = find(element, id, second);
-      return other &&
-             std::tie(other->timeOfImpact, other->distance) < std::tie(c.timeOfImpact, c.distance);
+      if (!other || !isFirst(*other, c)) return;
+      result.exist = true;
+      result.haveItsNormal |= !dropped[static_cast<std::size_t>(other - contacts.data())] &&
+                              (other->normal - c.normal).norm() <= kNormalConeError;
     };
     for (int i = 0; i < 3; ++i) {
-      if (isFirst(ShapeElement::Vertex, corners[i], corners[i])) return true;
+      add(ShapeElement::Vertex, corners[i], corners[i]);
       const std::uint32_t edge = topology.triangleEdges[triangle][i];
-      if (edge == kNoEdge) continue;
-      const auto& [p, q] = topology.edges[edge];
-      if (isFirst(ShapeElement::Edge, p, q)) return true;
+      if (edge != kNoEdge)
+        add(ShapeElement::Edge, topology.edges[edge][0], topology.edges[edge][1]);
     }
-    return false;
+    return result;
   }
 
   const ShapeContact* find(ShapeElement element, std::uint32_t id, std::uint32_t second) const {
@@ -88,9 +102,14 @@ struct DistinctContacts::Search {
 std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape,
                                    const PairSettings& settings, std::span<ShapeContact> contacts) {
   if (settings.contacts == Contacts::All || shape.isPlane()) return contacts.size();
-  const Search search{mesh, settings.timeTolerance, contacts};
-  m_dropped.clear();
-  for (const ShapeContact& c : contacts) m_dropped.push_back(search.isDropped(c));
+  m_order.clear();
+  for (std::uint32_t i = 0; i < contacts.size(); ++i)
+    if (contacts[i].element != ShapeElement::Face) m_order.push_back(i);
+  std::sort(m_order.begin(), m_order.end(),
+            [&](std::uint32_t l, std::uint32_t r) { return isFirst(contacts[l], contacts[r]); });
+  m_dropped.assign(contacts.size(), 0);
+  const Search search{mesh, settings.timeTolerance, contacts, m_dropped};
+  for (const std::uint32_t i : m_order) m_dropped[i] = search.isDropped(contacts[i]);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < contacts.size(); ++i)
     if (!m_dropped[i]) contacts[kept++] = contacts[i];

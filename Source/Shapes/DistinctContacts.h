@@ -9,7 +9,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 
 namespace palpate {
@@ -19,8 +18,12 @@ namespace palpate {
 ///
 /// A triangle at a vertex or an edge excludes the direction to the shape if it leads into the
 /// triangle: the triangle then comes nearer to the shape than the vertex or edge. So does a segment
-/// at a vertex. A contact is dropped if such a triangle is itself a contact, or if another vertex
-/// or edge of it is a contact that is earlier, or as early and nearer.
+/// at a vertex. The triangle itself, or another vertex or edge of it that is earlier, or as early
+/// and nearer, is then a contact that stands for this one, and this one is dropped.
+///
+/// It stays if a vertex or edge that stands for it stays and has the same normal. Both are then
+/// over the same flat face of the shape, and none of them is tilted. A sheet that lies on a box
+/// needs the contacts of all its vertices. Contacts with a plane all have one normal, and all stay.
 ///
 /// Laws     (1) A contact of a triangle stays. Of the others, the first and nearest one stays. So
 ///          does the first and nearest of each connected part of the mesh, for the same reason.
@@ -36,6 +39,7 @@ class DistinctContacts {
 
  private:
   struct Search;
+  Buffer<std::uint32_t> m_order;   ///< contacts of vertices and edges, the first and nearest first
   Buffer<std::uint8_t> m_dropped;  ///< per contact
 };
 
