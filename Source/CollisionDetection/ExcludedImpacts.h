@@ -24,7 +24,8 @@ namespace palpate {
 /// Laws     (1) Of all impacts the first one stays, and of equally early ones the nearest. (2) An
 ///          excluded impact of a vertex has an earlier or nearer one of the same vertex. (3) An
 ///          excluded impact of an edge has an earlier or nearer one of the same edge or of one of
-///          its ends.
+///          its ends. In all three, one with a triangle's interior, at most the time tolerance
+///          later, may take its place.
 ///
 /// Impacts finds the impacts of all feature pairs. Each function returns a pointer, or null:
 ///   const VertexTriangleContact* ofVertex(vertex, triangle, swapped) const;

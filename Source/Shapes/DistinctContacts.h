@@ -25,8 +25,8 @@ namespace palpate {
 /// over the same flat face of the shape, and none of them is tilted. A sheet that lies on a box
 /// needs the contacts of all its vertices. Contacts with a plane all have one normal, and all stay.
 ///
-/// Laws     (1) A contact of a triangle stays. Of the others, the first and nearest one stays. So
-///          does the first and nearest of each connected part of the mesh, for the same reason.
+/// Laws     (1) A contact of a triangle stays. In each connected part of the mesh the first and
+///          nearest contact stays, or a triangle that is at most timeTolerance later stands for it.
 ///          (2) What is dropped does not depend on the order of the pair, nor on how the contacts
 ///          were found.
 /// Cost     n log n in the number of contacts.
