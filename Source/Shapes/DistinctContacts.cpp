@@ -26,22 +26,23 @@ struct DistinctContacts::Search {
   const TriangleMesh& mesh;
   const double timeTolerance;
   const std::span<const ShapeContact> contacts;
-  const std::span<const std::uint8_t> dropped;  ///< of contacts that are earlier or nearer: decided
+  const std::span<const State> states;  ///< decided for contacts that are earlier or nearer
 
-  bool isDropped(const ShapeContact& c) const {
+  State stateOf(const ShapeContact& c) const {
     const MeshTopology& topology = mesh.topology;
     const auto around =
         c.element == ShapeElement::Vertex
             ? topology.vertexTriangles[c.id]
             : topology.edgeTriangles[topology.edgeOf({c.vertices[0], c.vertices[1]})];
-    bool isReplaced = false;
+    bool isExcluded = false, isReplaced = false;
     for (const std::uint32_t triangle : around) {
       if (!excludes(triangle, c)) continue;
       const StandIns standIns = standInsOf(triangle, c);
-      if (standIns.haveItsNormal) return false;
+      if (standIns.haveItsNormal) return State::Proper;
+      isExcluded = true;
       isReplaced |= standIns.exist;
     }
-    return isReplaced;
+    return isReplaced ? State::Dropped : isExcluded ? State::Alone : State::Proper;
   }
 
  private:
@@ -61,7 +62,7 @@ struct DistinctContacts::Search {
     bool exist = false, haveItsNormal = false;
   };
   /// The triangle, and other vertices and edges of it that are earlier or nearer, as far as they
-  /// are contacts. haveItsNormal: one that stays, other than the triangle, has the normal of c.
+  /// are contacts. haveItsNormal: one that is proper, other than the triangle, has the normal of c.
   StandIns standInsOf(std::uint32_t triangle, const ShapeContact& c) const {
     const MeshTopology& topology = mesh.topology;
     const Triangle& corners = topology.triangles[triangle];
@@ -72,8 +73,9 @@ struct DistinctContacts::Search {
       const ShapeContact* other = find(element, id, second);
       if (!other || !isFirst(*other, c)) return;
       result.exist = true;
-      result.haveItsNormal |= !dropped[static_cast<std::size_t>(other - contacts.data())] &&
-                              (other->normal - c.normal).norm() <= kNormalConeError;
+      result.haveItsNormal |=
+          states[static_cast<std::size_t>(other - contacts.data())] == State::Proper &&
+          (other->normal - c.normal).norm() <= kNormalConeError;
     };
     for (int i = 0; i < 3; ++i) {
       add(ShapeElement::Vertex, corners[i], corners[i]);
@@ -107,12 +109,12 @@ std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape,
     if (contacts[i].element != ShapeElement::Face) m_order.push_back(i);
   std::sort(m_order.begin(), m_order.end(),
             [&](std::uint32_t l, std::uint32_t r) { return isFirst(contacts[l], contacts[r]); });
-  m_dropped.assign(contacts.size(), 0);
-  const Search search{mesh, settings.timeTolerance, contacts, m_dropped};
-  for (const std::uint32_t i : m_order) m_dropped[i] = search.isDropped(contacts[i]);
+  m_states.assign(contacts.size(), State::Proper);
+  const Search search{mesh, settings.timeTolerance, contacts, m_states};
+  for (const std::uint32_t i : m_order) m_states[i] = search.stateOf(contacts[i]);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < contacts.size(); ++i)
-    if (!m_dropped[i]) contacts[kept++] = contacts[i];
+    if (m_states[i] != State::Dropped) contacts[kept++] = contacts[i];
   return kept;
 }
 

@@ -21,9 +21,10 @@ namespace palpate {
 /// at a vertex. The triangle itself, or another vertex or edge of it that is earlier, or as early
 /// and nearer, is then a contact that stands for this one, and this one is dropped.
 ///
-/// It stays if a vertex or edge that stands for it stays and has the same normal. Both are then
-/// over the same flat face of the shape, and none of them is tilted. A sheet that lies on a box
-/// needs the contacts of all its vertices. Contacts with a plane all have one normal, and all stay.
+/// It stays if a vertex or edge that stands for it has the same normal, and no triangle excludes
+/// that one. Both are then over the same flat face of the shape, and none of them is tilted. A
+/// sheet that lies on a box needs the contacts of all its vertices. Contacts with a plane all have
+/// one normal, and all stay.
 ///
 /// Laws     (1) A contact of a triangle stays. In each connected part of the mesh the first and
 ///          nearest contact stays, or a triangle that is at most timeTolerance later stands for it.
@@ -38,9 +39,12 @@ class DistinctContacts {
                    std::span<ShapeContact> contacts);
 
  private:
+  /// Proper: no triangle excludes it, or a proper one that stands for it has its normal. Alone: no
+  /// contact stands for it, though a triangle excludes it.
+  enum class State : std::uint8_t { Proper, Alone, Dropped };
   struct Search;
-  Buffer<std::uint32_t> m_order;   ///< contacts of vertices and edges, the first and nearest first
-  Buffer<std::uint8_t> m_dropped;  ///< per contact
+  Buffer<std::uint32_t> m_order;  ///< contacts of vertices and edges, the first and nearest first
+  Buffer<State> m_states;         ///< per contact
 };
 
 }  // namespace palpate

@@ -741,7 +741,7 @@ TEST(Shapes, CapturesAndAuditIncludeThem) {
     }
     collisions.detectCollision();
     EXPECT_TRUE(collisions.auditFailures().empty());
-    EXPECT_GT(collisions.statistics().contacts, 100u);
+    EXPECT_GT(collisions.statistics().contacts, 50u);
     replayed(collisions);
   }
 }
