@@ -136,8 +136,8 @@ enum class Contacts {
   ///
   /// Of shapes, lines and points no contact with a vertex or an edge of a mesh has a normal that a
   /// triangle there excludes, as it leads into the triangle by more than rounding. A nearer or
-  /// earlier contact at that triangle stands for it. A flat floor therefore has no contacts with its
-  /// inner edges. Docs/Shapes.md has the exceptions.
+  /// earlier contact at that triangle stands for it. A flat floor therefore has no contacts with
+  /// its inner edges. Docs/Shapes.md has the exceptions.
   Distinct,
   All  ///< every feature pair that the method's definition includes
 };
