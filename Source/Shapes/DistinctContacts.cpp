@@ -25,19 +25,20 @@ bool isFirst(const ShapeContact& a, const ShapeContact& b) {
 struct DistinctContacts::Search {
   const TriangleMesh& mesh;
   const double timeTolerance;
+  const bool hasFlatFaces;  ///< of the shape: only then two contacts have one normal
   const std::span<const ShapeContact> contacts;
-  const std::span<const State> states;  ///< decided for contacts that are earlier or nearer
+  const std::array<std::size_t, 4> begins;  ///< of the contacts of vertices, edges and triangles
+  const std::span<const State> states;      ///< decided for contacts that are earlier or nearer
 
   State stateOf(const ShapeContact& c) const {
-    const MeshTopology& topology = mesh.topology;
-    const auto around =
-        c.element == ShapeElement::Vertex
-            ? topology.vertexTriangles[c.id]
-            : topology.edgeTriangles[topology.edgeOf({c.vertices[0], c.vertices[1]})];
     bool isExcluded = false, isReplaced = false;
-    for (const std::uint32_t triangle : around) {
-      if (!excludes(triangle, c)) continue;
+    for (const std::uint32_t triangle : mesh.topology.vertexTriangles[c.vertices[0]]) {
+      const Triangle& corners = mesh.topology.triangles[triangle];
+      const bool isAround =
+          std::find(corners.begin(), corners.end(), c.vertices[1]) != corners.end();
+      if (!isAround || !excludes(corners, c)) continue;
       const StandIns standIns = standInsOf(triangle, c);
+      if (standIns.exist && !hasFlatFaces) return State::Dropped;
       if (standIns.haveItsNormal) return State::Proper;
       isExcluded = true;
       isReplaced |= standIns.exist;
@@ -46,8 +47,7 @@ struct DistinctContacts::Search {
   }
 
  private:
-  bool excludes(std::uint32_t triangle, const ShapeContact& c) const {
-    const Triangle& corners = mesh.topology.triangles[triangle];
+  bool excludes(const Triangle& corners, const ShapeContact& c) const {
     const Vector3d p = at(c.vertices[0], c.timeOfImpact);
     return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
       if (corner == c.vertices[0] || corner == c.vertices[1]) return false;
@@ -67,8 +67,7 @@ struct DistinctContacts::Search {
     const MeshTopology& topology = mesh.topology;
     const Triangle& corners = topology.triangles[triangle];
     StandIns result;
-    const ShapeContact* face = find(ShapeElement::Face, triangle, corners[1]);
-    result.exist = face && face->timeOfImpact <= c.timeOfImpact + timeTolerance;
+    const auto isComplete = [&] { return result.exist && !hasFlatFaces; };
     const auto add = [&](ShapeElement element, std::uint32_t id, std::uint32_t second) {
       const ShapeContact* other = find(element, id, second);
       if (!other || !isFirst(*other, c)) return;
@@ -77,21 +76,27 @@ struct DistinctContacts::Search {
           states[static_cast<std::size_t>(other - contacts.data())] == State::Proper &&
           (other->normal - c.normal).norm() <= kNormalConeError;
     };
-    for (int i = 0; i < 3; ++i) {
-      add(ShapeElement::Vertex, corners[i], corners[i]);
-      const std::uint32_t edge = topology.triangleEdges[triangle][i];
-      if (edge != kNoEdge)
+    // The corners across come first: one of them is most often a contact.
+    for (const std::uint32_t v : corners)
+      if (v != c.vertices[0] && v != c.vertices[1] && !isComplete())
+        add(ShapeElement::Vertex, v, v);
+    for (const std::uint32_t edge : topology.triangleEdges[triangle])
+      if (edge != kNoEdge && !isComplete())
         add(ShapeElement::Edge, topology.edges[edge][0], topology.edges[edge][1]);
-    }
+    if (result.exist) return result;
+    const ShapeContact* face = find(ShapeElement::Face, triangle, corners[1]);
+    result.exist = face && face->timeOfImpact <= c.timeOfImpact + timeTolerance;
     return result;
   }
 
   const ShapeContact* find(ShapeElement element, std::uint32_t id, std::uint32_t second) const {
     const std::array<std::uint32_t, 3> key{static_cast<std::uint32_t>(element), id, second};
+    const auto kind = static_cast<std::size_t>(element);
+    const auto list = contacts.subspan(begins[kind], begins[kind + 1] - begins[kind]);
     const auto place =
-        std::lower_bound(contacts.begin(), contacts.end(), key,
+        std::lower_bound(list.begin(), list.end(), key,
                          [](const ShapeContact& c, const auto& k) { return keyOf(c) < k; });
-    return place != contacts.end() && keyOf(*place) == key ? &*place : nullptr;
+    return place != list.end() && keyOf(*place) == key ? &*place : nullptr;
   }
 
   Vector3d at(std::uint32_t vertex, double time) const {
@@ -107,10 +112,24 @@ std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape,
   m_order.clear();
   for (std::uint32_t i = 0; i < contacts.size(); ++i)
     if (contacts[i].element != ShapeElement::Face) m_order.push_back(i);
-  std::sort(m_order.begin(), m_order.end(),
-            [&](std::uint32_t l, std::uint32_t r) { return isFirst(contacts[l], contacts[r]); });
+  const bool hasFlatFaces = shape.isCylinder() || shape.faces().size() > 1;
+  if (hasFlatFaces)
+    std::sort(m_order.begin(), m_order.end(),
+              [&](std::uint32_t l, std::uint32_t r) { return isFirst(contacts[l], contacts[r]); });
   m_states.assign(contacts.size(), State::Proper);
-  const Search search{mesh, settings.timeTolerance, contacts, m_states};
+  const auto beginOf = [&](ShapeElement element) {
+    return static_cast<std::size_t>(
+        std::partition_point(contacts.begin(), contacts.end(),
+                             [&](const ShapeContact& c) { return c.element < element; }) -
+        contacts.begin());
+  };
+  const Search search{
+      mesh,
+      settings.timeTolerance,
+      hasFlatFaces,
+      contacts,
+      {0, beginOf(ShapeElement::Edge), beginOf(ShapeElement::Face), contacts.size()},
+      m_states};
   for (const std::uint32_t i : m_order) m_states[i] = search.stateOf(contacts[i]);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < contacts.size(); ++i)
