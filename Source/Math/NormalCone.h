@@ -1,17 +1,12 @@
 #pragma once
 
+#include "Math/Tolerances.h"
+
 #include <Eigen/Core>
 
 #include <cmath>
 
 namespace palpate {
-
-/// Component of a contact's normal along a unit direction, towards which it certainly leads. A
-/// normal is off by the rounding of coordinates, 2^-50 at most, over the distance that it was
-/// computed from. The normals of bodies that lie flat on each other differ by no more.
-constexpr double kNormalConeError = 0x1p-40;
-/// L²: squared lengths above this, and products with them, lose nothing significant to underflow.
-constexpr double kSmallestEdgeSquare = 0x1p-900;
 
 // The normal cone of a feature has the directions in which no element at the feature comes nearer.
 // The two functions below test one element. direction: unit, from the feature to the other closest

@@ -273,16 +273,20 @@ bool excludes(const Moving& body, const Triangle& element, const ShapeContact& c
 
 /// The law of Contacts::Distinct: a contact of a vertex or an edge that an element excludes is left
 /// out if the element has a contact in its interior, at most timeTolerance later, or another one
-/// that is earlier, or as early and nearer. It stays if such another one stays and has its normal,
-/// and with planes. No part of the body loses its first contact to a later one.
+/// that is earlier, or as early and nearer. It stays if such another one has its normal, over one
+/// flat face of the shape, and is proper: not excluded, or excluded and kept for the same reason.
+/// With planes all stay. No part of the body loses its first contact to a later one.
 void expectDistinct(const CollisionData& all, const CollisionData& distinct, const Moving& body,
                     const Tool& tool, const PairSettings& pair) {
   std::vector<Triangle> elements = body.geometry.triangles;
   for (const auto& [p, q] : body.geometry.segments) elements.push_back({p, q, q});
-  std::vector<ShapeContact> order(all.shape().begin(), all.shape().end()), kept;
+  std::vector<ShapeContact> order(all.shape().begin(), all.shape().end()), kept, proper;
+  const bool isPlane = std::holds_alternative<Plane>(tool.geometry),
+             isRound = std::holds_alternative<Sphere>(tool.geometry) ||
+                       std::holds_alternative<Capsule>(tool.geometry);
   std::stable_sort(order.begin(), order.end(), isEarlierOrNearer);
   for (const ShapeContact& c : order) {
-    bool isReplaced = false, isAlike = std::holds_alternative<Plane>(tool.geometry);
+    bool isExcluded = false, isReplaced = false, isAlike = isPlane;
     for (const Triangle& element : elements) {
       if (c.element == ShapeElement::Face || !excludes(body, element, c)) continue;
       const auto standsIn = [&](const ShapeContact& f) {
@@ -291,12 +295,14 @@ void expectDistinct(const CollisionData& all, const CollisionData& distinct, con
                    ? f.timeOfImpact <= c.timeOfImpact + pair.timeTolerance
                    : isEarlierOrNearer(f, c);
       };
+      isExcluded = true;
       isReplaced |= std::any_of(order.begin(), order.end(), standsIn);
-      isAlike |= std::any_of(kept.begin(), kept.end(), [&](const ShapeContact& f) {
+      isAlike |= !isRound && std::any_of(proper.begin(), proper.end(), [&](const ShapeContact& f) {
         return f.element != ShapeElement::Face && standsIn(f) &&
                (f.normal - c.normal).norm() <= 1e-12;
       });
     }
+    if (!isExcluded || isAlike) proper.push_back(c);
     if (!isReplaced || isAlike) kept.push_back(c);
   }
   ASSERT_EQ(distinct.shape().size(), kept.size());

@@ -737,7 +737,7 @@ TEST(Shapes, CapturesAndAuditIncludeThem) {
     for (const Placed& shape : shapes(random)) {
       const GeometryId tool = collisions.addAnalyticalGeometry(shape.geometry);
       collisions.setTransform(tool, shape.rotation, shape.translation);
-      collisions.addCollisionPair(tool, mesh, {Method::Proximity, 0.02});
+      collisions.addCollisionPair(tool, mesh, {Method::Proximity, 0.03});
     }
     collisions.detectCollision();
     EXPECT_TRUE(collisions.auditFailures().empty());

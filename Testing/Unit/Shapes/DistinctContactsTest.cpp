@@ -62,12 +62,12 @@ Mesh flatFloor(Random& random, bool irregular, const Matrix3d& turn) {
 }
 
 /// A mesh and a shape that moves from one position to another.
-struct Scene {
+struct FloorScene {
   OctreeBasedCD collisions;
   GeometryId mesh, tool;
 
-  Scene(const Mesh& body, const AnalyticalGeometry& shape, const PairSettings& settings,
-        Engine engine = Engine::Octree)
+  FloorScene(const Mesh& body, const AnalyticalGeometry& shape, const PairSettings& settings,
+             Engine engine = Engine::Octree)
       : collisions(settingsOf(engine)),
         mesh(collisions.addTriangleMesh(body.positions, body.triangles)),
         tool(collisions.addAnalyticalGeometry(shape)) {
@@ -85,7 +85,7 @@ struct Scene {
 std::vector<ShapeContact> contactsOf(const Mesh& body, const AnalyticalGeometry& shape,
                                      const PairSettings& settings, const Matrix3d& turn,
                                      const Vector3d& from, const Vector3d& to) {
-  return Scene(body, shape, settings).contacts(turn, from, to);
+  return FloorScene(body, shape, settings).contacts(turn, from, to);
 }
 
 /// One of each type but planes, about as large as 1.
@@ -286,7 +286,7 @@ struct Sliding {
 Sliding slide(const Mesh& floor, const AnalyticalGeometry& shape, const Matrix3d& floorTurn,
               const Matrix3d& turn, Method method, double depth) {
   constexpr double kThickness = 0.05, kGap = 0.025, kStep = 0.01;
-  Scene scene(floor, shape, {method, kThickness});
+  FloorScene scene(floor, shape, {method, kThickness});
   const Vector3d up = floorTurn.col(2), ahead = floorTurn * Vector3d(0.8, 0.6, 0);
   const double low = depthOf(shape, turn, up);
   Vector3d x = (low + kGap - depth) * up - ahead, v = 1.5 * ahead;
@@ -348,7 +348,7 @@ TEST(DistinctContacts, OfAStepKeepTheFirstImpact) {
     const Vector3d from(uniform(random, -1, 1), uniform(random, -1, 1), 1.3),
         to = from + Vector3d(0.2, 0.1, -0.5);
     for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
-      Scene distinct(floor, Sphere{Vector3d::Zero(), 1.0}, {Method::Continuous, 0.05}, engine),
+      FloorScene distinct(floor, Sphere{Vector3d::Zero(), 1.0}, {Method::Continuous, 0.05}, engine),
           all(floor, Sphere{Vector3d::Zero(), 1.0}, {Method::Continuous, 0.05, Contacts::All},
               engine);
       const auto few = distinct.contacts(Matrix3d::Identity(), from, to),
