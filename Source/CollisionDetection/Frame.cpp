@@ -714,6 +714,23 @@ void Frame::findMissedIntersections(const Threads& threads) {
   });
 }
 
+/// Auto: of closed bodies that intersect when the step begins, takes only contacts on outer sides.
+/// Returns the number of preferred buffers.
+std::size_t Frame::preferBodies(PairRecord& record, Engine engine, std::size_t preferred) {
+  record.byBodies = false;
+  if (record.pair.settings.method != Method::Auto || record.hasShape()) return preferred;
+  if (!m_bodies) m_bodies = std::make_unique<BodyContacts>();
+  const BodyContacts::Buffers all(m_buffers);
+  const bool byIntersection = record.plan.method == Method::Intersection;
+  const BodyContacts::Buffers local = byIntersection ? all : BodyContacts::Buffers(m_intersections);
+  const bool areDeep = m_bodies->find(record, engine, m_facts.startsPiercing(), local,
+                                      all.subspan(byIntersection ? all.size() : preferred));
+  record.byBodies = areDeep || m_bodies->hasRemoved();
+  if (!areDeep) return preferred;
+  m_buffers.assign(1, &m_bodies->contacts());
+  return 1;
+}
+
 void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const Settings& settings,
                    FrameStatistics& statistics) {
   const MemoryScope memory(MemoryStage::Results);
@@ -747,6 +764,7 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
     preferredBuffers = m_intersections.size();
     m_buffers.insert(m_buffers.begin(), m_intersections.begin(), m_intersections.end());
   }
+  preferredBuffers = preferBodies(record, settings.engine, preferredBuffers);
   // A feature pair that Intersection reports is not reported by distance or impact as well: where
   // the step starts intersecting only Intersection knows the side.
   CollisionData::Contents& contents = record.next.contents();
@@ -759,6 +777,7 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
     record.trust.finish(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan,
                         m_facts, nearby, record.meshes(), contents, m_impacts);
   statistics.exactDecisions += m_impacts.exactDecisions + m_pierced.exactDecisions;
+  if (m_bodies && record.byBodies) statistics.exactDecisions += m_bodies->contacts().exactDecisions;
   statistics.validityPairs += m_impacts.validityPairs;
   // After trust.finish(), which tests the triangles around every impact.
   if (record.pair.settings.contacts == Contacts::Distinct &&

@@ -3,6 +3,7 @@
 #include <palpate/FrameStatistics.h>
 #include <palpate/Settings.h>
 
+#include "CollisionDetection/BodyContacts.h"
 #include "CollisionDetection/FirstImpacts.h"
 #include "CollisionDetection/Order.h"
 #include "CollisionDetection/PairTable.h"
@@ -47,6 +48,7 @@ class Frame {
   void describeProxy(std::span<const std::unique_ptr<Job>>, PairRecord&);
   void writeProxyContacts(std::span<const std::unique_ptr<Job>>, const Threads&, PairRecord&);
   void finish(PairRecord&, bool nearby, bool candidatesSorted, const Settings&, FrameStatistics&);
+  std::size_t preferBodies(PairRecord&, Engine, std::size_t preferred);
   void findMissedIntersections(const Threads&);
   Job& newJob(PairRecord&);
 
@@ -61,6 +63,7 @@ class Frame {
   ContactBuffers m_pierced, m_leaving;  ///< of PiercingContacts, at the step's end and start
   PiercingContacts m_piercingContacts;
   KnownSides m_knownSides;
+  std::unique_ptr<BodyContacts> m_bodies;  ///< null before a pair first needs it
   StepFacts m_facts;
   OrderScratch m_orderScratch;
   FirstImpacts m_firstImpacts;

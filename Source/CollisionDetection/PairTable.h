@@ -106,6 +106,7 @@ struct PairRecord : CountedObject {
   bool hasData = false;            ///< a detection was completed
   CollisionData next;              ///< of the detection that runs
   bool sidesAreKnown = false;      ///< whether KnownSides changed the last answer
+  bool byBodies = false;           ///< whether BodyContacts changed the last answer
   std::atomic<double> earliest;    ///< PairSettings::earliestTimeOnly: found so far in this frame
   std::size_t candidateCount = 0;  ///< number of candidates when last found
   std::unique_ptr<FieldScratch> fieldScratch;

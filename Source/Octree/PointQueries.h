@@ -4,6 +4,7 @@
 #include "Octree/BoxMap.h"
 #include "Octree/Octree.h"
 
+#include <cstddef>
 #include <cstdint>
 
 namespace palpate {
@@ -12,7 +13,8 @@ namespace palpate {
 /// query that ended with an exception does not affect the next one.
 struct PointQueryStack {
   Buffer<OctreeNode> nodes;
-  Buffer<std::uint32_t> found;  ///< of findOverlapping()
+  Buffer<std::uint32_t> found;     ///< of findOverlapping()
+  std::size_t exactDecisions = 0;  ///< of all queries, until the caller clears it
 };
 
 /// Descends from the root into the nodes that `enter(node)` accepts. It calls enter() for each node

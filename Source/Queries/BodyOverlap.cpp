@@ -56,7 +56,7 @@ bool overlapBeside(const BodyPair& pair, const Vector3d& p, const BodyPair::Meet
   return false;
 }
 
-bool overlapWhereTouching(const BodyPair& pair, const std::vector<BodyPair::Meeting>& meetings) {
+bool overlapWhereTouching(const BodyPair& pair, const CountedVector<BodyPair::Meeting>& meetings) {
   for (const bool ofA : {true, false}) {
     const BodyVertices& vertices = pair.vertices(ofA);
     for (std::uint32_t v = 0; v < vertices.positions.size(); ++v)
@@ -69,7 +69,7 @@ bool overlapWhereTouching(const BodyPair& pair, const std::vector<BodyPair::Meet
 
 }  // namespace
 
-bool overlap(const BodyPair& pair, std::vector<BodyPair::Meeting>& meetings) {
+bool overlap(const BodyPair& pair, CountedVector<BodyPair::Meeting>& meetings) {
   meetings.clear();
   bool pierce = false;
   pair.forEachMeeting(Vector3d::Zero(), [&](const BodyPair::Meeting& meeting) {

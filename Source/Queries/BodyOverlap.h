@@ -13,7 +13,7 @@ namespace palpate {
 /// surfaces only touch, all vertices are tested, and points beside the common points of triangles.
 /// Each of these tests is exact and proves an overlap. Faces that lie in each other within rounding
 /// may overlap by less than the points are beside them, which is then a touch.
-bool overlap(const BodyPair&, std::vector<BodyPair::Meeting>& meetings);
+bool overlap(const BodyPair&, CountedVector<BodyPair::Meeting>& meetings);
 
 /// Whether a mesh is convex: its faces are seen from one point inside each on one side, and no
 /// vertex is in front of a neighbouring face by more than kExitSlack of the largest coordinate.

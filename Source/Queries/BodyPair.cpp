@@ -10,6 +10,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 namespace palpate {
 
@@ -93,6 +94,7 @@ void BodyPair::forEachMeeting(const Vector3d& shift,
     meeting.elementB = elementB;
     meeting.b = cornersOfB(elementB);
     meeting.found = intersectTriangles(meeting.a, meeting.b, counts);
+    m_scratch.stack.exactDecisions += std::exchange(counts.undecided, 0);
     return !meeting.found.intersect() || f(meeting);
   };
   const auto setA = [&](std::uint32_t elementA) {
@@ -147,13 +149,15 @@ bool BodyPair::isInBoth(const Vector3d& p) const {
 bool BodyPair::isInMovedA(const Vector3d& p, const Vector3d& shift) const {
   SignCounts counts;
   int number = 0;
+  bool on = false;
   for (std::uint32_t i = 0; i < m_a.mesh.topology.triangles.size(); ++i) {
     const auto [a, b, c] = cornersOfA(i, shift);
     const RayCrossing crossing = crossRay(0, false, p, a, b, c, counts);
-    if (crossing == RayCrossing::OnTriangle) return false;
-    number += static_cast<int>(crossing);
+    on |= crossing == RayCrossing::OnTriangle;
+    if (!on) number += static_cast<int>(crossing);
   }
-  return number != 0;
+  m_scratch.stack.exactDecisions += counts.undecided;
+  return !on && number != 0;
 }
 
 std::optional<BodyPair::PartVertex> BodyPair::findInsidePart(const Vector3d& shift) const {
@@ -184,9 +188,25 @@ std::optional<RayHit> BodyPair::hitOf(const PartVertex& part, const Vector3d& sh
   const Vector3d& p = vertices(part.ofA).positions[part.vertex];
   const Ray ray = part.ofA ? Ray{p + shift, direction} : Ray{p - shift, -direction};
   constexpr double kLargest = std::numeric_limits<double>::max();
-  return RayHits(geometry(!part.ofA), {ray.origin, ray.direction, 0.0, kLargest},
-                 m_engine == Engine::BruteForce, m_scratch.met)
-      .first(kLargest);
+  RayHits hits(geometry(!part.ofA), {ray.origin, ray.direction, 0.0, kLargest},
+               m_engine == Engine::BruteForce, m_scratch.met);
+  const std::optional<RayHit> first = hits.first(kLargest);
+  m_scratch.stack.exactDecisions += hits.exactDecisions();
+  return first;
+}
+
+std::optional<BodyPair::Exit> BodyPair::lastExitOf(const PartVertex& vertex,
+                                                   const Vector3d& direction, double begin,
+                                                   double end) const {
+  const Vector3d& p = vertices(vertex.ofA).positions[vertex.vertex];
+  RayHits hits(geometry(!vertex.ofA), {p, direction, begin, end}, m_engine == Engine::BruteForce,
+               m_scratch.met);
+  std::optional<Exit> last;
+  hits.forAllParts([&](const RayHits::Part& part) {
+    if (part.last > begin) last = Exit{part.last, part.exitElement};
+  });
+  m_scratch.stack.exactDecisions += hits.exactDecisions();
+  return last;
 }
 
 }  // namespace palpate

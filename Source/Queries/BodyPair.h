@@ -1,5 +1,6 @@
 #pragma once
 
+#include <palpate/CountedVector.h>
 #include <palpate/Settings.h>
 
 #include "Math/TriangleIntersection.h"
@@ -21,10 +22,10 @@ namespace palpate {
 
 /// What a search needs of a mesh besides its octree.
 struct BodyVertices {
-  std::vector<Eigen::Vector3d> positions;  ///< L, in the world
-  std::vector<std::uint32_t> triangleOf;   ///< per vertex: its lowest triangle, or kNoElement
-  std::vector<std::uint32_t> parts;        ///< a vertex of each connected part of the surface
-  Eigen::AlignedBox3d box;                 ///< of the vertices that are in triangles
+  CountedVector<Eigen::Vector3d> positions;  ///< L, in the world
+  CountedVector<std::uint32_t> triangleOf;   ///< per vertex: its lowest triangle, or kNoElement
+  CountedVector<std::uint32_t> parts;        ///< a vertex of each connected part of the surface
+  Eigen::AlignedBox3d box;                   ///< of the vertices that are in triangles
 
   void assign(const SearchableGeometry&);
   double magnitude() const;  ///< L: the largest coordinate
@@ -32,7 +33,7 @@ struct BodyVertices {
   Eigen::Vector3d furthest(const Eigen::Vector3d& direction) const;
 
  private:
-  std::vector<std::uint32_t> m_links;  ///< per vertex: another vertex of its part, or itself
+  CountedVector<std::uint32_t> m_links;  ///< per vertex: another vertex of its part, or itself
 };
 
 /// 1/L: a power of two that brings coordinates up to a magnitude to about 1, so that no product of
@@ -88,6 +89,14 @@ class BodyPair {
   /// by `shift`, against it.
   std::optional<RayHit> hitOf(const PartVertex&, const Eigen::Vector3d& shift,
                               const Eigen::Vector3d& direction) const;
+  /// Where a vertex, on its way along a direction from `begin` to `end`, passes the other body's
+  /// surface last. Both are L, from where it is.
+  struct Exit {
+    double distance;  ///< L, from where it is
+    std::uint32_t element;
+  };
+  std::optional<Exit> lastExitOf(const PartVertex&, const Eigen::Vector3d& direction, double begin,
+                                 double end) const;
 
  private:
   Eigen::Vector3d moved(std::uint32_t vertexOfA, const Eigen::Vector3d& shift) const;

@@ -157,10 +157,10 @@ class Search {
 
   // ---- Vertices inside the other body ----
 
-  const std::vector<std::uint32_t>& insideOf(bool ofA) const {
+  const CountedVector<std::uint32_t>& insideOf(bool ofA) const {
     return ofA ? m_scratch.insideA : m_scratch.insideB;
   }
-  void findInside(bool ofA, std::vector<std::uint32_t>& inside) {
+  void findInside(bool ofA, CountedVector<std::uint32_t>& inside) {
     const BodyVertices& own = m_pair.vertices(ofA);
     const Eigen::AlignedBox3d& other = m_pair.vertices(!ofA).box;
     inside.clear();

@@ -25,9 +25,9 @@ struct PenetrationScratch {
   BodyPairScratch pair;
   Polytope difference;
   ShortestTranslation shortest;
-  std::vector<BodyPair::Meeting> meetings;      ///< where a is not moved
-  std::vector<std::uint32_t> insideA, insideB;  ///< some vertices inside the other body
-  std::vector<Seed> seeds;
+  CountedVector<BodyPair::Meeting> meetings;      ///< where a is not moved
+  CountedVector<std::uint32_t> insideA, insideB;  ///< some vertices inside the other body
+  CountedVector<Seed> seeds;
 };
 
 /// The translation of a that separates two closed meshes (SpatialQueries::penetration()).

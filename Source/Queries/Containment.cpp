@@ -69,6 +69,7 @@ class BodyQuery {
       findOverlapping(m_geometry.tree.octree(), m_frame.map(), ray, m_stack);
       for (const std::uint32_t i : m_stack.found) count(i);
     }
+    m_stack.exactDecisions += counts.undecided;
     return on ? 0 : number;
   }
 

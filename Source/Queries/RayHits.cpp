@@ -200,6 +200,7 @@ int RayHits::compare(const Met& one, bool lastOfFirst, const Met& two, bool last
   const Positions& now = m_geometry.mesh.now;
   const Vector3d a = now[first[0]], b = now[first[1]], c = now[first[2]], d = now[second[0]],
                  e = now[second[1]], f = now[second[2]];
+  ++m_exactDecisions;
   return exact::compareRayEnds(m_ray, {a, b, c, lastOfFirst}, {d, e, f, lastOfSecond});
 }
 

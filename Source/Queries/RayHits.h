@@ -48,6 +48,8 @@ class RayHits {
                     std::array<std::vector<Met>, kRaysInFlight>& scratch, const RayHit& none,
                     std::span<RayHit> out);
   bool any();
+  /// Number of comparisons of hits by exact arithmetic so far.
+  std::size_t exactDecisions() const { return m_exactDecisions; }
   /// All hits by ascending t. out: hits are appended.
   void all(std::vector<RayHit>& out);
   /// Calls f(part) for all parts by ascending t.
@@ -114,6 +116,7 @@ class RayHits {
   const double m_radius;
   const bool m_isSolid;  ///< elements with radii
   std::vector<Met>& m_met;
+  mutable std::size_t m_exactDecisions = 0;
 
   // Of collect():
   Wanted m_wanted;

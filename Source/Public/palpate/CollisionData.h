@@ -51,6 +51,9 @@ namespace palpate {
 //          behind the other surface at its end, and impacts of those that leave it, have the side
 //          on which they leave. Then with Contacts::Distinct, vertices behind a surface have the
 //          contacts of Intersection only. Validity says whether sides are certified.
+// Bodies   Where a step of Auto begins with two closed bodies deep in each other, all contacts have
+//          one direction along which the bodies leave each other. The distance is measured along
+//          it, to where the vertex leaves the other body; it is negative until then.
 
 /// A contact of a vertex with a triangle. A contact of a vertex with the segment {p, q} has the
 /// corners {p, q, q}. A contact of a vertex with the point p has the corners {p, p, p}.

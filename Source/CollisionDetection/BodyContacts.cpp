@@ -1,0 +1,228 @@
+#include "CollisionDetection/BodyContacts.h"
+
+#include "Math/ClosestPoint.h"
+#include "Math/RayCrossing.h"
+#include "Math/StableLength.h"
+#include "Math/Tolerances.h"
+#include "Queries/Containment.h"
+
+#include <algorithm>
+
+namespace palpate {
+
+using Eigen::Vector3d;
+
+namespace {
+
+/// Whether contacts of bodies may stand for those of a pair.
+bool mayBeBodies(const PairRecord& record) {
+  const PairSettings& settings = record.pair.settings;
+  if (settings.method != Method::Auto || settings.earliestTimeOnly || record.a == record.b ||
+      record.hasShape() || record.usesField() || record.plan.byProxy || record.anyDisabled() ||
+      record.meshes().hasFilters())
+    return false;
+  return !record.a->mesh.topology.triangles.empty() && !record.b->mesh.topology.triangles.empty() &&
+         hasClosedSurface(*record.a) && hasClosedSurface(*record.b);
+}
+
+Eigen::AlignedBox3d boxOf(const SearchableGeometry& geometry) {
+  const Vector3d origin = worldOrigin(geometry);
+  const FloatBox box = worldMap(geometry, origin, 0.0, false)(geometry.tree.octree().box(0));
+  const double unit = 1.0 / geometry.tree.frame().scale;
+  const auto corner = [&](const std::array<float, 4>& c) {
+    return Vector3d(origin + unit * Vector3d(c[0], c[1], c[2]));
+  };
+  return {corner(box.lower), corner(box.upper)};
+}
+
+/// The winding number of a surface about a point at the start of the step. Tests all triangles.
+int windingNumberBefore(const TriangleMesh& mesh, const Vector3d& p, PointQueryStack& stack) {
+  SignCounts counts;
+  int number = 0;
+  bool on = false;
+  for (const auto& [a, b, c] : mesh.topology.triangles) {
+    const RayCrossing crossing =
+        crossRay(0, false, p, mesh.before[a], mesh.before[b], mesh.before[c], counts);
+    on |= crossing == RayCrossing::OnTriangle;
+    if (!on) number += static_cast<int>(crossing);
+  }
+  stack.exactDecisions += counts.undecided;
+  return on ? 0 : number;
+}
+
+bool wasInside(const SearchableGeometry& inner, const SearchableGeometry& outer,
+               PointQueryStack& stack) {
+  const std::uint32_t vertex = inner.mesh.topology.triangles[0][0];
+  return windingNumberBefore(outer.mesh, inner.mesh.before[vertex], stack) != 0;
+}
+
+/// Whether a vertex of a body whose box is in that of another one is inside it, at both ends of the
+/// step.
+bool isInside(const SearchableGeometry& inner, const SearchableGeometry& outer, Engine engine,
+              PointQueryStack& stack) {
+  const std::uint32_t vertex = inner.mesh.topology.triangles[0][0];
+  return boxOf(outer).contains(boxOf(inner)) &&
+         windingNumber(outer, inner.mesh.now[vertex], engine, stack) != 0 &&
+         wasInside(inner, outer, stack);
+}
+
+/// Calls f(normal along which the contact pushes a, whether it is of edges).
+template <class F>
+void forEachPush(std::span<ContactBuffers* const> local, F&& f) {
+  for (const ContactBuffers* buffers : local) {
+    for (const auto& contact : buffers->vertexTriangle) f(contact.normal, false);
+    for (const auto& contact : buffers->triangleVertex) f(Vector3d(-contact.normal), false);
+    for (const auto& contact : buffers->edgeEdge) f(contact.normal, true);
+  }
+}
+
+/// Cosine of the angle within which all contacts push if they push to one side.
+constexpr double kSameSide = 0.5;
+
+/// Whether all contacts push to where vertices do. They then separate the bodies.
+bool agree(std::span<ContactBuffers* const> local) {
+  Vector3d sum = Vector3d::Zero();
+  forEachPush(local, [&](const Vector3d& normal, bool ofEdges) {
+    if (!ofEdges) sum += normal;
+  });
+  bool all = sum != Vector3d::Zero();
+  const double least = kSameSide * stableLength(sum);
+  forEachPush(local, [&](const Vector3d& normal, bool) { all &= normal.dot(sum) >= least; });
+  return all;
+}
+
+bool anyIntersecting(std::span<ContactBuffers* const> local) {
+  return std::any_of(local.begin(), local.end(), [](const ContactBuffers* buffers) {
+    return !buffers->intersectingTriangles.empty();
+  });
+}
+
+/// The sum of the normals of the triangles at an edge.
+Vector3d normalOfEdge(const TriangleMesh& mesh, const Segment& edge) {
+  Vector3d sum = Vector3d::Zero();
+  const std::uint32_t id = mesh.topology.edgeOf(edge);
+  for (const std::uint32_t t : mesh.topology.edgeTriangles[id]) {
+    const auto& [p, q, r] = mesh.topology.triangles[t];
+    sum += windingNormal(mesh.now[p], mesh.now[q], mesh.now[r]);
+  }
+  return sum;
+}
+
+/// Whether an impact's normal is that of a feature which leaves a body.
+bool leaves(const TriangleMesh& body, const VertexTriangleContact& c) {
+  const auto& [p, q, r] = c.corners;
+  return c.normal.dot(windingNormal(body.now[p], body.now[q], body.now[r])) < 0;
+}
+bool leaves(const TriangleMesh& a, const TriangleMesh& b, const EdgeEdgeContact& c) {
+  return c.normal.dot(normalOfEdge(b, c.edgeB)) < 0 || c.normal.dot(normalOfEdge(a, c.edgeA)) > 0;
+}
+bool anyLeaves(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step) {
+  const auto any = [](const auto& list, auto&& isLeaving) {
+    return std::any_of(list.begin(), list.end(), [&](const auto& contact) {
+      return contact.timeOfImpact < 1.0 && isLeaving(contact);
+    });
+  };
+  return std::any_of(step.begin(), step.end(), [&](const ContactBuffers* found) {
+    return any(found->vertexTriangle, [&](const auto& c) { return leaves(b, c); }) ||
+           any(found->triangleVertex, [&](const auto& c) { return leaves(a, c); }) ||
+           any(found->edgeEdge, [&](const auto& c) { return leaves(a, b, c); });
+  });
+}
+
+/// Returns whether it removed any.
+bool removeImpacts(BodyContacts::Buffers step) {
+  std::size_t removed = 0;
+  for (ContactBuffers* buffers : step)
+    forEachTimed(*buffers, [&](auto& list) {
+      removed +=
+          std::erase_if(list, [](const auto& contact) { return contact.timeOfImpact < 1.0; });
+    });
+  return removed > 0;
+}
+
+}  // namespace
+
+bool BodyContacts::find(const PairRecord& record, Engine engine, bool startsIntersecting,
+                        Buffers local, Buffers step) {
+  m_hasRemoved = false;
+  if (!mayBeBodies(record)) return false;
+  const SearchableGeometry &a = *record.a, &b = *record.b;
+  PointQueryStack& stack = m_scratch.pair.stack;
+  m_contacts.clear();
+  stack.exactDecisions = 0;
+  const bool meet = anyIntersecting(local);
+  if (meet && agree(local)) return false;
+  const bool overlapped =
+      startsIntersecting || meet || isInside(a, b, engine, stack) ||
+      isInside(b, a, engine, stack) ||
+      (anyLeaves(a.mesh, b.mesh, step) && (wasInside(a, b, stack) || wasInside(b, a, stack)));
+  if (!overlapped) return false;
+  const Penetration found = penetrationOf(a, b, engine, m_scratch);
+  if (found.intersecting) addContacts(record, engine, found, local);
+  if (!found.intersecting && !meet) m_hasRemoved = removeImpacts(step);
+  m_contacts.exactDecisions = stack.exactDecisions;
+  return found.intersecting;
+}
+
+void BodyContacts::addContacts(const PairRecord& record, Engine engine, const Penetration& found,
+                               Buffers local) {
+  auto& triangles = m_contacts.intersectingTriangles;
+  for (const ContactBuffers* buffers : local)
+    triangles.insert(triangles.end(), buffers->intersectingTriangles.begin(),
+                     buffers->intersectingTriangles.end());
+  // Intersection did not run if the surfaces were apart at the start.
+  if (triangles.empty())
+    for (const BodyPair::Meeting& meeting : m_scratch.meetings)
+      triangles.push_back({meeting.elementA, meeting.elementB});
+  const BodyPair pair(*record.a, *record.b, engine, m_scratch.pair);
+  for (const bool ofA : {true, false})
+    addVertices(pair, ofA, found, record.pair.settings.thickness);
+  addEdges(found);
+}
+
+/// Each vertex that passes the other surface on the way out, where it passes it last; and each that
+/// has passed it by the thickness at most, so that it stays there.
+void BodyContacts::addVertices(const BodyPair& pair, bool ofA, const Penetration& penetration,
+                               double thickness) {
+  const BodyVertices& own = pair.vertices(ofA);
+  const Vector3d direction = ofA ? penetration.direction : Vector3d(-penetration.direction);
+  for (std::uint32_t v = 0; v < own.positions.size(); ++v) {
+    if (own.triangleOf[v] == kNoElement) continue;
+    const auto exit = pair.lastExitOf({ofA, v}, direction, -thickness, penetration.depth);
+    if (!exit) continue;
+    const Triangle& corners = pair.geometry(!ofA).mesh.topology.triangles[exit->element];
+    const auto& [p, q, r] = corners;
+    const auto& positions = pair.vertices(!ofA).positions;
+    const VertexTriangleDistance at = finiteVertexTriangleDistance(
+        own.positions[v] + exit->distance * direction, positions[p], positions[q], positions[r]);
+    auto& list = ofA ? m_contacts.vertexTriangle : m_contacts.triangleVertex;
+    list.push_back(
+        {v, exit->element, corners, at.barycentric, direction, -exit->distance, 1.0, at.feature});
+  }
+}
+
+/// The edges that meet last, if edges do. Vertices alone would leave the bodies where they cross.
+void BodyContacts::addEdges(const Penetration& penetration) {
+  struct Edge {
+    std::array<std::uint32_t, 2> vertices;
+    double weight;  ///< of the second vertex
+  };
+  const auto edgeOf = [](const SurfacePoint& point) {
+    int least = 0;
+    point.weights.minCoeff(&least);
+    const int i = (least + 1) % 3, j = (least + 2) % 3;
+    const std::uint32_t p = point.vertices[static_cast<std::size_t>(i)],
+                        q = point.vertices[static_cast<std::size_t>(j)];
+    return p < q ? Edge{{p, q}, point.weights[j]} : Edge{{q, p}, point.weights[i]};
+  };
+  const auto isOnEdge = [](const SurfacePoint& point) {
+    return (point.weights.array() > kExitWeight).count() == 2;
+  };
+  if (!isOnEdge(penetration.a) || !isOnEdge(penetration.b)) return;
+  const Edge a = edgeOf(penetration.a), b = edgeOf(penetration.b);
+  m_contacts.edgeEdge.push_back({a.vertices, b.vertices, a.weight, b.weight, penetration.direction,
+                                 -penetration.depth, 1.0, EdgeFeature::Interior,
+                                 EdgeFeature::Interior});
+}
+
+}  // namespace palpate

@@ -1,0 +1,177 @@
+#include "Common/ContactRows.h"
+#include "Common/PairRun.h"
+#include "Common/RandomMeshes.h"
+
+#include <palpate/ConstraintRows.h>
+#include <palpate/OctreeBasedCD.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+// Closed bodies that overlap when the simulation begins: a solver separates them by Auto's
+// contacts.
+namespace palpate::testing {
+namespace {
+
+using Eigen::Vector3d;
+
+Mesh boxMesh(const Vector3d& low, const Vector3d& high) {
+  Mesh mesh;
+  for (int v = 0; v < 8; ++v)
+    mesh.positions.emplace_back(v & 1 ? high[0] : low[0], v & 2 ? high[1] : low[1],
+                                v & 4 ? high[2] : low[2]);
+  mesh.triangles = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
+                    {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
+  return mesh;
+}
+
+struct Overlap {
+  Mesh a, b;
+};
+
+std::vector<Overlap> overlaps() {
+  std::vector<Overlap> all;
+  const Mesh unit = boxMesh({0, 0, 0}, {1, 1, 1}), ball = sphere(8, 10, {0, 0, 0}, 1.0);
+  for (const double share : {0.1, 0.3, 0.6}) {
+    all.push_back({unit, boxMesh({1 - share, 0, 0}, {2 - share, 1, 1})});
+    all.push_back({unit, boxMesh({1 - share, 0.05, 0.03}, {2 - share, 1.05, 1.03})});
+    all.push_back({ball, sphere(9, 12, {2 - 2 * share, 0.02, 0.01}, 1.0)});
+    all.push_back({boxMesh({-1, -1, -0.02}, {1, 1, 0.02}),
+                   boxMesh({-0.99, -0.01, -2 + 2 * share}, {1.03, 0.03, 2 * share})});
+  }
+  all.push_back({sphere(5, 6, {0.6, 0.55, 0.5}, 0.2), unit});
+  return all;
+}
+
+class Simulation {
+ public:
+  Simulation(const Overlap& bodies, bool isRigid)
+      : m_sizeA(bodies.a.positions.size()), m_isRigid(isRigid), m_x(bodies.a.positions) {
+    m_x.insert(m_x.end(), bodies.b.positions.begin(), bodies.b.positions.end());
+    for (const bool ofA : {true, false}) {
+      const Mesh& mesh = ofA ? bodies.a : bodies.b;
+      (ofA ? m_a : m_b) = m_collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+    }
+    PairSettings settings;
+    settings.thickness = 0.05;
+    m_collisions.addCollisionPair(m_a, m_b, settings);
+  }
+  bool intersect() {
+    set();
+    return m_collisions.queries().penetration(m_a, m_b).intersecting;
+  }
+  void step() {
+    set();
+    m_collisions.detectCollision();
+    std::vector<ConstraintRow> rows;
+    const std::vector<Vector3d> a = side(true), b = side(false);
+    appendRows(m_collisions.collisionData(m_a, m_b), {0, a, a},
+               {static_cast<std::uint32_t>(m_sizeA), b, b}, rows);
+    std::vector<double> forces(rows.size(), 0.0);
+    for (int round = 0; round < 50; ++round)
+      for (std::size_t i = 0; i < rows.size(); ++i) solve(rows[i], forces[i]);
+    set();
+    m_collisions.advance();
+  }
+
+ private:
+  std::vector<Vector3d> side(bool ofA) const {
+    const auto middle = m_x.begin() + static_cast<std::ptrdiff_t>(m_sizeA);
+    return ofA ? std::vector<Vector3d>(m_x.begin(), middle)
+               : std::vector<Vector3d>(middle, m_x.end());
+  }
+  void set() {
+    m_collisions.setPositions(m_a, side(true));
+    m_collisions.setPositions(m_b, side(false));
+  }
+  void solve(const ConstraintRow& row, double& force) {
+    double mass = 0;
+    for (const double w : row.weights) mass += w * w;
+    if (m_isRigid) mass = 2;
+    const double change = std::max(-force, (0.025 - row.gap(m_x)) / mass);
+    force += change;
+    if (!m_isRigid) {
+      for (std::size_t i = 0; i < 4; ++i)
+        m_x[row.vertices[i]] += change * row.weights[i] * row.normal;
+      return;
+    }
+    double ofA = 0;  // the weights of a body sum to 1 or to -1
+    for (std::size_t i = 0; i < 4; ++i)
+      if (row.vertices[i] < m_sizeA) ofA += row.weights[i];
+    for (std::size_t v = 0; v < m_x.size(); ++v)
+      m_x[v] += (v < m_sizeA ? change : -change) * ofA * row.normal;
+  }
+
+  OctreeBasedCD m_collisions;
+  GeometryId m_a{}, m_b{};
+  const std::size_t m_sizeA;
+  const bool m_isRigid;
+  std::vector<Vector3d> m_x;
+};
+
+TEST(BodyContacts, ASolverSeparatesBodiesThatOverlapAtTheStart) {
+  for (const Overlap& bodies : overlaps())
+    for (const bool isRigid : {false, true}) {
+      Simulation simulation(bodies, isRigid);
+      EXPECT_TRUE(simulation.intersect());
+      for (int step = 0; step < 20; ++step) simulation.step();
+      EXPECT_FALSE(simulation.intersect()) << &bodies - overlaps().data() << isRigid;
+    }
+}
+
+TEST(BodyContacts, HaveOneDirectionAndSatisfyTheLawOfContacts) {
+  for (const Overlap& bodies : overlaps()) {
+    std::array<Rows, 2> rows;
+    for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
+      OctreeBasedCD collisions(settingsOf(engine));
+      const GeometryId a = collisions.addTriangleMesh(bodies.a.positions, bodies.a.triangles),
+                       b = collisions.addTriangleMesh(bodies.b.positions, bodies.b.triangles);
+      PairSettings settings;
+      settings.thickness = 0.05;
+      collisions.addCollisionPair(a, b, settings);
+      collisions.detectCollision();
+      const CollisionData& data = collisions.collisionData(a, b);
+      rows[engine == Engine::BruteForce] = Rows(data);
+      const Penetration p = collisions.queries().penetration(a, b);
+      double deepest = 0;
+      for (const bool ofA : {true, false})
+        for (const auto& c : ofA ? data.vertexTriangle() : data.triangleVertex()) {
+          const Mesh &own = ofA ? bodies.a : bodies.b, &other = ofA ? bodies.b : bodies.a;
+          Vector3d sum = own.positions[c.vertex];
+          for (int i = 0; i < 3; ++i) sum -= c.barycentric[i] * other.positions[c.corners[i]];
+          EXPECT_LE((sum - c.distance * c.normal).norm(), 1e-12);
+          EXPECT_EQ(c.normal, ofA ? p.direction : Vector3d(-p.direction));
+          deepest = std::max(deepest, -c.distance);
+        }
+      for (const auto& c : data.edgeEdge()) deepest = std::max(deepest, -c.distance);
+      EXPECT_NEAR(deepest, p.depth, 1e-9);
+    }
+    EXPECT_EQ(rows[0], rows[1]);
+  }
+}
+
+TEST(BodyContacts, ShallowVerticesAndOpenMeshesKeepLocalNormals) {
+  // The tip of a body is 0.01 behind a face.
+  Mesh tip = sphere(3, 4, {0.45, 0.55, 1.19}, 0.2);
+  for (const bool isOpen : {false, true}) {
+    Mesh unit = boxMesh({0, 0, 0}, {1, 1, 1});
+    if (isOpen) unit.triangles.erase(unit.triangles.begin()), tip.positions.back()[2] -= 0.2;
+    OctreeBasedCD collisions;
+    const GeometryId a = collisions.addTriangleMesh(tip.positions, tip.triangles),
+                     b = collisions.addTriangleMesh(unit.positions, unit.triangles);
+    PairSettings settings;
+    settings.thickness = 0.05;
+    collisions.addCollisionPair(a, b, settings);
+    collisions.detectCollision();
+    bool found = false;
+    for (const auto& c : collisions.collisionData(a, b).vertexTriangle())
+      found |= c.distance < 0 && c.normal == Vector3d::UnitZ();
+    EXPECT_TRUE(found);
+  }
+}
+
+}  // namespace
+}  // namespace palpate::testing
