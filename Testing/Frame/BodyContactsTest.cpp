@@ -122,7 +122,16 @@ TEST(BodyContacts, ASolverSeparatesBodiesThatOverlapAtTheStart) {
     }
 }
 
-TEST(BodyContacts, HaveOneDirectionAndSatisfyTheLawOfContacts) {
+/// Whether the directions are within 60 degrees of their mean.
+bool agree(const std::vector<Vector3d>& directions) {
+  Vector3d sum = Vector3d::Zero();
+  for (const Vector3d& d : directions) sum += d;
+  return std::all_of(directions.begin(), directions.end(),
+                     [&](const Vector3d& d) { return d.dot(sum) >= 0.5 * sum.norm(); });
+}
+
+TEST(BodyContacts, HaveOneDirectionOrAgreeAndSatisfyTheLawOfContacts) {
+  int ofBodies = 0;
   for (const Overlap& bodies : overlaps()) {
     std::array<Rows, 2> rows;
     for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
@@ -137,20 +146,32 @@ TEST(BodyContacts, HaveOneDirectionAndSatisfyTheLawOfContacts) {
       rows[engine == Engine::BruteForce] = Rows(data);
       const Penetration p = collisions.queries().penetration(a, b);
       double deepest = 0;
+      std::vector<Vector3d> pushes;
       for (const bool ofA : {true, false})
         for (const auto& c : ofA ? data.vertexTriangle() : data.triangleVertex()) {
           const Mesh &own = ofA ? bodies.a : bodies.b, &other = ofA ? bodies.b : bodies.a;
           Vector3d sum = own.positions[c.vertex];
           for (int i = 0; i < 3; ++i) sum -= c.barycentric[i] * other.positions[c.corners[i]];
           EXPECT_LE((sum - c.distance * c.normal).norm(), 1e-12);
-          EXPECT_EQ(c.normal, ofA ? p.direction : Vector3d(-p.direction));
+          pushes.push_back(ofA ? c.normal : Vector3d(-c.normal));
           deepest = std::max(deepest, -c.distance);
         }
-      for (const auto& c : data.edgeEdge()) deepest = std::max(deepest, -c.distance);
-      EXPECT_NEAR(deepest, p.depth, 1e-9);
+      for (const auto& c : data.edgeEdge()) {
+        pushes.push_back(c.normal);
+        deepest = std::max(deepest, -c.distance);
+      }
+      ASSERT_FALSE(pushes.empty());
+      const bool haveOneDirection = std::all_of(
+          pushes.begin(), pushes.end(), [&](const Vector3d& d) { return d == p.direction; });
+      if (haveOneDirection) {
+        EXPECT_NEAR(deepest, p.depth, 1e-9);
+      }
+      EXPECT_TRUE(haveOneDirection || agree(pushes));
+      ofBodies += haveOneDirection;
     }
     EXPECT_EQ(rows[0], rows[1]);
   }
+  EXPECT_GE(ofBodies, 12);
 }
 
 TEST(BodyContacts, ShallowVerticesAndOpenMeshesKeepLocalNormals) {
