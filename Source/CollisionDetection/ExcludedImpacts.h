@@ -80,7 +80,7 @@ class ExcludedImpacts {
   template <class F>
   static bool anyAround(const TriangleMesh& mesh, const Segment& feature,
                         const Eigen::Vector3d& direction, double time, F&& f) {
-    const auto& [p, q] = feature;
+    const std::uint32_t p = feature[0], q = feature[1];
     const MeshTopology& topology = mesh.topology;
     const auto at = [&](std::uint32_t v) -> Eigen::Vector3d {
       return (1.0 - time) * mesh.before[v] + time * mesh.now[v];

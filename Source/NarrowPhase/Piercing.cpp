@@ -288,7 +288,8 @@ void KnownSides::sort(Buffer<Side>& sides) {
   sides.erase(last, sides.end());
 }
 
-KnownSides::SideRange KnownSides::sidesOf(Buffer<Side>& sides, bool ofB, std::uint32_t vertex) {
+std::span<KnownSides::Side> KnownSides::sidesOf(Buffer<Side>& sides, bool ofB,
+                                                std::uint32_t vertex) {
   const auto isBefore = [&](const Side& side) {
     return std::tie(side.ofB, side.vertex) < std::tie(ofB, vertex);
   };

@@ -7,7 +7,6 @@
 #include <array>
 #include <compare>
 #include <cstdint>
-#include <ranges>
 #include <span>
 
 namespace palpate {
@@ -88,7 +87,6 @@ class KnownSides {
     Eigen::Vector3d outward;
     bool isRepresented;  ///< an impact stands for the vertex
   };
-  using SideRange = std::ranges::subrange<Buffer<Side>::iterator>;
   /// What the sides of a contact's vertices say about it.
   struct Opinion {
     bool isKnown = false, isRepresented = false;
@@ -96,7 +94,7 @@ class KnownSides {
   };
   static void add(const ContactBuffers&, Buffer<Side>&);
   static void sort(Buffer<Side>&);
-  static SideRange sidesOf(Buffer<Side>& sorted, bool ofB, std::uint32_t vertex);
+  static std::span<Side> sidesOf(Buffer<Side>& sorted, bool ofB, std::uint32_t vertex);
   static Opinion ask(Buffer<Side>& sorted, const Stencil&, const std::array<bool, 4>& ofB,
                      const Eigen::Vector3d& normal);
 

@@ -338,10 +338,13 @@ double leastAround(const Body& body, const Element& element,
                    const std::map<Element, ShapeContact>& all) {
   double least = std::numeric_limits<double>::infinity();
   for (std::uint32_t t = 0; element[0] < 2 && t < body.elements.size(); ++t) {
-    const auto& [a, b, c] = body.elements[t];
-    const auto has = [&](std::uint32_t v) { return v == a || v == b || v == c; };
+    const Triangle& corners = body.elements[t];
+    const auto has = [&](std::uint32_t v) {
+      return std::find(corners.begin(), corners.end(), v) != corners.end();
+    };
     if (!has(element[1]) || !has(element[2])) continue;
     const bool isSegment = body.type == GeometryType::Lines;
+    const std::uint32_t a = corners[0], b = corners[1];
     const auto found =
         all.find(isSegment ? Element{1, std::min(a, b), std::max(a, b)} : Element{2, t, b});
     if (found != all.end()) least = std::min(least, found->second.distance);

@@ -268,7 +268,8 @@ TEST(Audit, ComparesWithAutoWhatKnownSidesDoNotConcern) {
           sidesAreKnown, out);
     return out;
   };
-  const auto [ofA, ofB] = intersectingVertices(scene);
+  const auto intersecting = intersectingVertices(scene);
+  const auto &ofA = intersecting[0], &ofB = intersecting[1];
   const auto concerns = [&](const AuditFailure& failure) {
     const auto any = [](const auto& vertices, const std::set<std::uint32_t>& known) {
       return std::any_of(vertices.begin(), vertices.end(),
