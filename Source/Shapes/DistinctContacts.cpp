@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <tuple>
 
 namespace palpate {
@@ -11,6 +12,10 @@ namespace palpate {
 namespace {
 
 using Eigen::Vector3d;
+
+/// Cosine: only a normal this near to a cylinder's axis may be that of an end face. Any value below
+/// 1 will do.
+constexpr double kNearAxis = 0.999;
 
 std::array<std::uint32_t, 3> keyOf(const ShapeContact& c) {
   return {static_cast<std::uint32_t>(c.element), c.id, c.vertices[1]};
@@ -30,13 +35,19 @@ struct DistinctContacts::Search {
   const std::array<std::size_t, 4> begins;  ///< of the contacts of vertices, edges and triangles
   const std::span<const State> states;      ///< decided for contacts that are earlier or nearer
 
+  /// Whether an element around the feature of a contact excludes its normal.
+  bool isExcluded(const ShapeContact& c) const {
+    const auto around = mesh.topology.vertexTriangles[c.vertices[0]];
+    return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
+      const Triangle& corners = mesh.topology.triangles[triangle];
+      return isAround(corners, c) && excludes(corners, c);
+    });
+  }
   State stateOf(const ShapeContact& c) const {
     bool isExcluded = false, isReplaced = false;
     for (const std::uint32_t triangle : mesh.topology.vertexTriangles[c.vertices[0]]) {
       const Triangle& corners = mesh.topology.triangles[triangle];
-      const bool isAround =
-          std::find(corners.begin(), corners.end(), c.vertices[1]) != corners.end();
-      if (!isAround || !excludes(corners, c)) continue;
+      if (!isAround(corners, c) || !excludes(corners, c)) continue;
       const StandIns standIns = standInsOf(triangle, c);
       if (standIns.exist && !hasFlatFaces) return State::Dropped;
       if (standIns.haveItsNormal) return State::Proper;
@@ -47,6 +58,9 @@ struct DistinctContacts::Search {
   }
 
  private:
+  static bool isAround(const Triangle& corners, const ShapeContact& c) {
+    return std::find(corners.begin(), corners.end(), c.vertices[1]) != corners.end();
+  }
   bool excludes(const Triangle& corners, const ShapeContact& c) const {
     const Vector3d p = at(c.vertices[0], c.timeOfImpact);
     return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
@@ -109,13 +123,8 @@ struct DistinctContacts::Search {
 std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape,
                                    const PairSettings& settings, std::span<ShapeContact> contacts) {
   if (settings.contacts == Contacts::All || shape.isPlane()) return contacts.size();
-  m_order.clear();
-  for (std::uint32_t i = 0; i < contacts.size(); ++i)
-    if (contacts[i].element != ShapeElement::Face) m_order.push_back(i);
   const bool hasFlatFaces = shape.isCylinder() || shape.faces().size() > 1;
-  if (hasFlatFaces)
-    std::sort(m_order.begin(), m_order.end(),
-              [&](std::uint32_t l, std::uint32_t r) { return isFirst(contacts[l], contacts[r]); });
+  m_order.clear();
   m_states.assign(contacts.size(), State::Proper);
   const auto beginOf = [&](ShapeElement element) {
     return static_cast<std::size_t>(
@@ -130,6 +139,28 @@ std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape,
       contacts,
       {0, beginOf(ShapeElement::Edge), beginOf(ShapeElement::Face), contacts.size()},
       m_states};
+  // Where the distance from the shape is smooth, the element that excludes a normal comes nearer.
+  // At the step's end nothing but filters, disabled elements and different radii keep it, or a
+  // feature of it, from being a contact. The distance is smooth outside, and inside a capsule
+  // except on its axis.
+  const bool areReplaced = settings.method == Method::Proximity && !mesh.outerSideOnly &&
+                           mesh.topology.disabled.empty() && mesh.radii.empty();
+  const double smoothBeyond = (hasFlatFaces ? 0.0 : -0.5 * shape.radius()) - mesh.largestRadius;
+  const auto mayBeFlat = [&](const ShapeContact& c) {
+    return hasFlatFaces &&
+           !(shape.isCylinder() && std::abs(shape.axes().col(2).dot(c.normal)) < kNearAxis);
+  };
+  for (std::uint32_t i = 0; i < contacts.size(); ++i) {
+    const ShapeContact& c = contacts[i];
+    if (c.element == ShapeElement::Face || !search.isExcluded(c)) continue;
+    if (areReplaced && c.distance > smoothBeyond && !mayBeFlat(c))
+      m_states[i] = State::Dropped;
+    else
+      m_order.push_back(i);
+  }
+  if (hasFlatFaces)
+    std::sort(m_order.begin(), m_order.end(),
+              [&](std::uint32_t l, std::uint32_t r) { return isFirst(contacts[l], contacts[r]); });
   for (const std::uint32_t i : m_order) m_states[i] = search.stateOf(contacts[i]);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < contacts.size(); ++i)

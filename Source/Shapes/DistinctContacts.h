@@ -43,8 +43,9 @@ class DistinctContacts {
   /// contact stands for it, though a triangle excludes it.
   enum class State : std::uint8_t { Proper, Alone, Dropped };
   struct Search;
-  Buffer<std::uint32_t> m_order;  ///< contacts of vertices and edges, the first and nearest first
-  Buffer<State> m_states;         ///< per contact
+  Buffer<std::uint32_t>
+      m_order;             ///< contacts whose stand-ins are searched, first and nearest first
+  Buffer<State> m_states;  ///< per contact
 };
 
 }  // namespace palpate
