@@ -3,12 +3,14 @@
 #include <palpate/CollisionData.h>
 
 #include "Math/NormalCone.h"
+#include "Math/StableLength.h"
 #include "NarrowPhase/NarrowPhase.h"
 
 #include <algorithm>
 #include <array>
 #include <cstdint>
 #include <tuple>
+#include <type_traits>
 
 namespace palpate {
 
@@ -19,7 +21,8 @@ namespace palpate {
 /// leads into the triangle: the triangle then comes nearer to the other feature. The impact is
 /// excluded if the other feature has an impact with this triangle, or with one of its edges, that
 /// is earlier, or as early and nearer. An impact with the triangle's interior may be up to the time
-/// tolerance later, as it is never excluded.
+/// tolerance later, as it is never excluded. The triangle must exclude the direction at the step's
+/// end as well: a surface that a solver has bent around the other feature needs all its contacts.
 ///
 /// Laws     (1) Of all impacts the first one stays, and of equally early ones the nearest. (2) An
 ///          excluded impact of a vertex has an earlier or nearer one of the same vertex. (3) An
@@ -42,24 +45,42 @@ class ExcludedImpacts {
     const int i = static_cast<int>(c.feature);
     const Segment feature = i < 3 ? Segment{c.corners[i], c.corners[i]}
                                   : Segment{c.corners[i - 3], c.corners[(i - 2) % 3]};
-    return anyAround(swapped ? m_pair.a : m_pair.b, feature, c.normal, c.timeOfImpact,
+    return anyAround(swapped ? m_pair.a : m_pair.b, feature, {c.normal, c.timeOfImpact},
+                     atEnd(c, swapped ? m_pair.b : m_pair.a, swapped ? m_pair.a : m_pair.b),
                      [&](std::uint32_t triangle) {
                        return standsFor(m_impacts.ofVertex(c.vertex, triangle, swapped), c);
                      });
   }
   bool contain(const EdgeEdgeContact& c) const {
-    return isExcludedBy(m_pair.b, c.edgeB, c.featureB, c.edgeA, c.normal, c, false) ||
-           isExcludedBy(m_pair.a, c.edgeA, c.featureA, c.edgeB, -c.normal, c, true);
+    const Direction end = atEnd(c, m_pair.a, m_pair.b);
+    return isExcludedBy(m_pair.b, c.edgeB, c.featureB, c.edgeA, c.normal, end, c, false) ||
+           isExcludedBy(m_pair.a, c.edgeA, c.featureA, c.edgeB, -c.normal, {-end.vector, end.time},
+                        c, true);
   }
 
  private:
+  /// From the closest point of a triangle mesh's feature to the other one, at a time.
+  struct Direction {
+    Eigen::Vector3d vector;  ///< unit
+    double time;
+  };
+  /// Between the same points at the step's end.
+  template <class Contact>
+  static Direction atEnd(const Contact& c, const TriangleMesh& first, const TriangleMesh& second) {
+    constexpr int kSecond = std::is_same_v<Contact, VertexTriangleContact> ? 1 : 2;
+    const Stencil of = stencil(c);
+    Eigen::Vector3d difference = Eigen::Vector3d::Zero();
+    for (int i = 0; i < 4; ++i)
+      difference += of.weights[i] * (i < kSecond ? first : second).now[of.vertices[i]];
+    return {difference == Eigen::Vector3d::Zero() ? c.normal : stableUnit(difference), 1.0};
+  }
   /// swapped: the edge, which is the other one than the mesh's, is of MeshPair::b.
   bool isExcludedBy(const TriangleMesh& mesh, const Segment& ends, EdgeFeature feature,
-                    const Segment& edge, const Eigen::Vector3d& direction, const EdgeEdgeContact& c,
-                    bool swapped) const {
+                    const Segment& edge, const Eigen::Vector3d& direction, const Direction& end,
+                    const EdgeEdgeContact& c, bool swapped) const {
     if (!mesh.topology.hasFaces()) return false;
     const Segment closest{ends[feature == EdgeFeature::End], ends[feature != EdgeFeature::Start]};
-    return anyAround(mesh, closest, direction, c.timeOfImpact, [&](std::uint32_t triangle) {
+    return anyAround(mesh, closest, {direction, c.timeOfImpact}, end, [&](std::uint32_t triangle) {
       const auto ofVertex = [&](std::uint32_t v) {
         return standsFor(m_impacts.ofVertex(v, triangle, swapped), c);
       };
@@ -75,27 +96,29 @@ class ExcludedImpacts {
     });
   }
 
-  /// Whether a direction from a vertex {v, v} or an edge leads into one of the elements around it
+  /// Whether two directions from a vertex {v, v} or an edge lead into one of the elements around it
   /// that `f` accepts.
   template <class F>
-  static bool anyAround(const TriangleMesh& mesh, const Segment& feature,
-                        const Eigen::Vector3d& direction, double time, F&& f) {
+  static bool anyAround(const TriangleMesh& mesh, const Segment& feature, const Direction& one,
+                        const Direction& two, F&& f) {
     const std::uint32_t p = feature[0], q = feature[1];
     const MeshTopology& topology = mesh.topology;
-    const auto at = [&](std::uint32_t v) -> Eigen::Vector3d {
-      return (1.0 - time) * mesh.before[v] + time * mesh.now[v];
-    };
-    const auto leadsTo = [&](std::uint32_t corner) {
-      if (corner == p || corner == q) return false;
-      return p == q ? leadsTowards(direction, at(p), at(corner))
-                    : leadsInto(direction, at(p), at(q), at(corner));
+    const auto leads = [&](const Triangle& corners, const Direction& direction) {
+      const auto at = [&](std::uint32_t v) -> Eigen::Vector3d {
+        return (1.0 - direction.time) * mesh.before[v] + direction.time * mesh.now[v];
+      };
+      return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
+        if (corner == p || corner == q) return false;
+        return p == q ? leadsTowards(direction.vector, at(p), at(corner))
+                      : leadsInto(direction.vector, at(p), at(q), at(corner));
+      });
     };
     const auto around =
         p == q ? topology.vertexTriangles[p]
                : topology.edgeTriangles[topology.edgeOf({std::min(p, q), std::max(p, q)})];
     return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
       const Triangle& corners = topology.triangles[triangle];
-      return std::any_of(corners.begin(), corners.end(), leadsTo) && f(triangle);
+      return leads(corners, one) && leads(corners, two) && f(triangle);
     });
   }
 

@@ -29,6 +29,7 @@ bool isFirst(const ShapeContact& a, const ShapeContact& b) {
 
 struct DistinctContacts::Search {
   const TriangleMesh& mesh;
+  const Shape& shape;  ///< at the step's end
   const double timeTolerance;
   const bool hasFlatFaces;  ///< of the shape: only then two contacts have one normal
   const std::span<const ShapeContact> contacts;
@@ -62,14 +63,24 @@ struct DistinctContacts::Search {
     return std::find(corners.begin(), corners.end(), c.vertices[1]) != corners.end();
   }
   bool excludes(const Triangle& corners, const ShapeContact& c) const {
-    const Vector3d p = at(c.vertices[0], c.timeOfImpact);
+    return excludesAt(corners, c, c.normal, c.timeOfImpact) &&
+           (c.timeOfImpact == 1.0 || excludesAt(corners, c, normalAtEnd(c), 1.0));
+  }
+  bool excludesAt(const Triangle& corners, const ShapeContact& c, const Vector3d& normal,
+                  double time) const {
+    const Vector3d p = at(c.vertices[0], time);
     return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
       if (corner == c.vertices[0] || corner == c.vertices[1]) return false;
-      const Vector3d r = at(corner, c.timeOfImpact);
-      return c.element == ShapeElement::Vertex
-                 ? leadsTowards(-c.normal, p, r)
-                 : leadsInto(-c.normal, p, at(c.vertices[1], c.timeOfImpact), r);
+      const Vector3d r = at(corner, time);
+      return c.element == ShapeElement::Vertex ? leadsTowards(-normal, p, r)
+                                               : leadsInto(-normal, p, at(c.vertices[1], time), r);
     });
+  }
+  /// Of the contact's point on the mesh at the step's end.
+  Vector3d normalAtEnd(const ShapeContact& c) const {
+    Vector3d point = Vector3d::Zero();
+    for (int i = 0; i < 3; ++i) point += c.weights[i] * mesh.now[c.vertices[i]];
+    return shape.signedDistance(point).normal;
   }
 
   struct StandIns {
@@ -134,6 +145,7 @@ std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape,
   };
   const Search search{
       mesh,
+      shape,
       settings.timeTolerance,
       hasFlatFaces,
       contacts,

@@ -21,6 +21,9 @@ namespace palpate {
 /// at a vertex. The triangle itself, or another vertex or edge of it that is earlier, or as early
 /// and nearer, is then a contact that stands for this one, and this one is dropped.
 ///
+/// The direction at the step's end must be excluded as well: a surface that a solver has bent
+/// around the shape needs all its contacts.
+///
 /// It stays if a vertex or edge that stands for it has the same normal, and no triangle excludes
 /// that one. Both are then over the same flat face of the shape, and none of them is tilted. A
 /// sheet that lies on a box needs the contacts of all its vertices. Contacts with a plane all have
