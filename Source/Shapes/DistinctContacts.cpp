@@ -17,10 +17,6 @@ using Eigen::Vector3d;
 /// 1 will do.
 constexpr double kNearAxis = 0.999;
 
-std::array<std::uint32_t, 3> keyOf(const ShapeContact& c) {
-  return {static_cast<std::uint32_t>(c.element), c.id, c.vertices[1]};
-}
-
 bool isFirst(const ShapeContact& a, const ShapeContact& b) {
   return std::tie(a.timeOfImpact, a.distance) < std::tie(b.timeOfImpact, b.distance);
 }
@@ -33,8 +29,8 @@ struct DistinctContacts::Search {
   const double timeTolerance;
   const bool hasFlatFaces;  ///< of the shape: only then two contacts have one normal
   const std::span<const ShapeContact> contacts;
-  const std::array<std::size_t, 4> begins;  ///< of the contacts of vertices, edges and triangles
-  const std::span<const State> states;      ///< decided for contacts that are earlier or nearer
+  const std::array<Buffer<std::uint32_t>, 3>& firsts;
+  const std::span<const State> states;  ///< decided for contacts that are earlier or nearer
 
   /// Whether an element around the feature of a contact excludes its normal.
   bool isExcluded(const ShapeContact& c) const {
@@ -115,13 +111,14 @@ struct DistinctContacts::Search {
   }
 
   const ShapeContact* find(ShapeElement element, std::uint32_t id, std::uint32_t second) const {
-    const std::array<std::uint32_t, 3> key{static_cast<std::uint32_t>(element), id, second};
-    const auto kind = static_cast<std::size_t>(element);
-    const auto list = contacts.subspan(begins[kind], begins[kind + 1] - begins[kind]);
-    const auto place =
-        std::lower_bound(list.begin(), list.end(), key,
-                         [](const ShapeContact& c, const auto& k) { return keyOf(c) < k; });
-    return place != list.end() && keyOf(*place) == key ? &*place : nullptr;
+    std::uint32_t i = firsts[static_cast<std::size_t>(element)][id];
+    if (element != ShapeElement::Edge) return i == kNoElement ? nullptr : &contacts[i];
+    for (; i < contacts.size(); ++i) {
+      const ShapeContact& c = contacts[i];
+      if (c.element != element || c.id != id) break;
+      if (c.vertices[1] == second) return &c;
+    }
+    return nullptr;
   }
 
   Vector3d at(std::uint32_t vertex, double time) const {
@@ -137,20 +134,8 @@ std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape,
   const bool hasFlatFaces = shape.isCylinder() || shape.faces().size() > 1;
   m_order.clear();
   m_states.assign(contacts.size(), State::Proper);
-  const auto beginOf = [&](ShapeElement element) {
-    return static_cast<std::size_t>(
-        std::partition_point(contacts.begin(), contacts.end(),
-                             [&](const ShapeContact& c) { return c.element < element; }) -
-        contacts.begin());
-  };
-  const Search search{
-      mesh,
-      shape,
-      settings.timeTolerance,
-      hasFlatFaces,
-      contacts,
-      {0, beginOf(ShapeElement::Edge), beginOf(ShapeElement::Face), contacts.size()},
-      m_states};
+  const Search search{mesh,     shape,   settings.timeTolerance, hasFlatFaces, contacts,
+                      m_firsts, m_states};
   // Where the distance from the shape is smooth, the element that excludes a normal comes nearer.
   // At the step's end nothing but filters, disabled elements and different radii keep it, or a
   // feature of it, from being a contact. The distance is smooth outside, and inside a capsule
@@ -173,7 +158,17 @@ std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape,
   if (hasFlatFaces)
     std::sort(m_order.begin(), m_order.end(),
               [&](std::uint32_t l, std::uint32_t r) { return isFirst(contacts[l], contacts[r]); });
-  for (const std::uint32_t i : m_order) m_states[i] = search.stateOf(contacts[i]);
+  if (!m_order.empty()) {
+    m_firsts[0].resize(mesh.topology.vertexCount, kNoElement);
+    m_firsts[1].resize(mesh.topology.vertexCount, kNoElement);
+    m_firsts[2].resize(mesh.topology.triangles.size(), kNoElement);
+    const auto placeOf = [&](std::size_t i) -> std::uint32_t& {
+      return m_firsts[static_cast<std::size_t>(contacts[i].element)][contacts[i].id];
+    };
+    for (std::size_t i = contacts.size(); i-- > 0;) placeOf(i) = static_cast<std::uint32_t>(i);
+    for (const std::uint32_t i : m_order) m_states[i] = search.stateOf(contacts[i]);
+    for (std::size_t i = 0; i < contacts.size(); ++i) placeOf(i) = kNoElement;
+  }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < contacts.size(); ++i)
     if (m_states[i] != State::Dropped) contacts[kept++] = contacts[i];

@@ -7,6 +7,7 @@
 #include "Mesh/TriangleMesh.h"
 #include "Shapes/Shape.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -46,9 +47,10 @@ class DistinctContacts {
   /// contact stands for it, though a triangle excludes it.
   enum class State : std::uint8_t { Proper, Alone, Dropped };
   struct Search;
-  Buffer<std::uint32_t>
-      m_order;             ///< contacts whose stand-ins are searched, first and nearest first
-  Buffer<State> m_states;  ///< per contact
+  Buffer<std::uint32_t> m_order;  ///< contacts that need a search, the first and nearest first
+  Buffer<State> m_states;         ///< per contact
+  /// Per id, of each ShapeElement: its first contact, or kNoElement. Between calls all are that.
+  std::array<Buffer<std::uint32_t>, 3> m_firsts;
 };
 
 }  // namespace palpate
