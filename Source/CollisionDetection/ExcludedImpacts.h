@@ -2,8 +2,8 @@
 
 #include <palpate/CollisionData.h>
 
+#include "Math/ClosestPoint.h"
 #include "Math/NormalCone.h"
-#include "Math/StableLength.h"
 #include "NarrowPhase/NarrowPhase.h"
 
 #include <algorithm>
@@ -21,7 +21,7 @@ namespace palpate {
 /// leads into the triangle: the triangle then comes nearer to the other feature. The impact is
 /// excluded if the other feature has an impact with this triangle, or with one of its edges, that
 /// is earlier, or as early and nearer. An impact with the triangle's interior may be up to the time
-/// tolerance later, as it is never excluded. The triangle must exclude the direction at the step's
+/// tolerance later, as it is never excluded. A triangle must exclude the direction at the step's
 /// end as well: a surface that a solver has bent around the other feature needs all its contacts.
 ///
 /// Laws     (1) Of all impacts the first one stays, and of equally early ones the nearest. (2) An
@@ -45,42 +45,31 @@ class ExcludedImpacts {
     const int i = static_cast<int>(c.feature);
     const Segment feature = i < 3 ? Segment{c.corners[i], c.corners[i]}
                                   : Segment{c.corners[i - 3], c.corners[(i - 2) % 3]};
-    return anyAround(swapped ? m_pair.a : m_pair.b, feature, {c.normal, c.timeOfImpact},
-                     atEnd(c, swapped ? m_pair.b : m_pair.a, swapped ? m_pair.a : m_pair.b),
-                     [&](std::uint32_t triangle) {
-                       return standsFor(m_impacts.ofVertex(c.vertex, triangle, swapped), c);
-                     });
+    const TriangleMesh &points = swapped ? m_pair.b : m_pair.a,
+                       &mesh = swapped ? m_pair.a : m_pair.b;
+    const auto standsIn = [&](std::uint32_t triangle) {
+      return standsFor(m_impacts.ofVertex(c.vertex, triangle, swapped), c);
+    };
+    const auto atEnd = [&] {
+      const Eigen::Vector3d p = mesh.now[feature[0]], q = mesh.now[feature[1]];
+      return finiteVertexTriangleDistance(points.now[c.vertex], p, q, q).normal;
+    };
+    return anyAround(mesh, feature, c.normal, c.timeOfImpact, standsIn) &&
+           isExcludedAtEnd(mesh, feature, atEnd);
   }
   bool contain(const EdgeEdgeContact& c) const {
-    const Direction end = atEnd(c, m_pair.a, m_pair.b);
-    return isExcludedBy(m_pair.b, c.edgeB, c.featureB, c.edgeA, c.normal, end, c, false) ||
-           isExcludedBy(m_pair.a, c.edgeA, c.featureA, c.edgeB, -c.normal, {-end.vector, end.time},
-                        c, true);
+    return isExcludedBy(m_pair.b, c.edgeB, c.featureB, c.edgeA, c.normal, c, false) ||
+           isExcludedBy(m_pair.a, c.edgeA, c.featureA, c.edgeB, -c.normal, c, true);
   }
 
  private:
-  /// From the closest point of a triangle mesh's feature to the other one, at a time.
-  struct Direction {
-    Eigen::Vector3d vector;  ///< unit
-    double time;
-  };
-  /// Between the same points at the step's end.
-  template <class Contact>
-  static Direction atEnd(const Contact& c, const TriangleMesh& first, const TriangleMesh& second) {
-    constexpr int kSecond = std::is_same_v<Contact, VertexTriangleContact> ? 1 : 2;
-    const Stencil of = stencil(c);
-    Eigen::Vector3d difference = Eigen::Vector3d::Zero();
-    for (int i = 0; i < 4; ++i)
-      difference += of.weights[i] * (i < kSecond ? first : second).now[of.vertices[i]];
-    return {difference == Eigen::Vector3d::Zero() ? c.normal : stableUnit(difference), 1.0};
-  }
   /// swapped: the edge, which is the other one than the mesh's, is of MeshPair::b.
   bool isExcludedBy(const TriangleMesh& mesh, const Segment& ends, EdgeFeature feature,
-                    const Segment& edge, const Eigen::Vector3d& direction, const Direction& end,
-                    const EdgeEdgeContact& c, bool swapped) const {
+                    const Segment& edge, const Eigen::Vector3d& direction, const EdgeEdgeContact& c,
+                    bool swapped) const {
     if (!mesh.topology.hasFaces()) return false;
     const Segment closest{ends[feature == EdgeFeature::End], ends[feature != EdgeFeature::Start]};
-    return anyAround(mesh, closest, {direction, c.timeOfImpact}, end, [&](std::uint32_t triangle) {
+    const auto standsIn = [&](std::uint32_t triangle) {
       const auto ofVertex = [&](std::uint32_t v) {
         return standsFor(m_impacts.ofVertex(v, triangle, swapped), c);
       };
@@ -93,32 +82,45 @@ class ExcludedImpacts {
       return std::any_of(edge.begin(), edge.end(), ofVertex) ||
              std::any_of(sides.begin(), sides.end(),
                          [&](std::uint32_t side) { return side != kNoEdge && ofEdge(side); });
-    });
+    };
+    const auto atEnd = [&] {
+      const Positions& lines = (swapped ? m_pair.b : m_pair.a).now;
+      return finiteEdgeEdgeDistance(lines[edge[0]], lines[edge[1]], mesh.now[closest[0]],
+                                    mesh.now[closest[1]])
+          .normal;
+    };
+    return anyAround(mesh, closest, direction, c.timeOfImpact, standsIn) &&
+           isExcludedAtEnd(mesh, closest, atEnd);
   }
 
-  /// Whether two directions from a vertex {v, v} or an edge lead into one of the elements around it
+  template <class F>
+  static bool isExcludedAtEnd(const TriangleMesh& mesh, const Segment& feature,
+                              F&& directionAtEnd) {
+    return anyAround(
+        mesh, feature, directionAtEnd(), 1.0, [](std::uint32_t) { return true; }, kBentSurface);
+  }
+  /// Whether a direction from a vertex {v, v} or an edge leads into one of the elements around it
   /// that `f` accepts.
   template <class F>
-  static bool anyAround(const TriangleMesh& mesh, const Segment& feature, const Direction& one,
-                        const Direction& two, F&& f) {
+  static bool anyAround(const TriangleMesh& mesh, const Segment& feature,
+                        const Eigen::Vector3d& direction, double time, F&& f,
+                        double least = kNormalConeError) {
     const std::uint32_t p = feature[0], q = feature[1];
     const MeshTopology& topology = mesh.topology;
-    const auto leads = [&](const Triangle& corners, const Direction& direction) {
-      const auto at = [&](std::uint32_t v) -> Eigen::Vector3d {
-        return (1.0 - direction.time) * mesh.before[v] + direction.time * mesh.now[v];
-      };
-      return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
-        if (corner == p || corner == q) return false;
-        return p == q ? leadsTowards(direction.vector, at(p), at(corner))
-                      : leadsInto(direction.vector, at(p), at(q), at(corner));
-      });
+    const auto at = [&](std::uint32_t v) -> Eigen::Vector3d {
+      return (1.0 - time) * mesh.before[v] + time * mesh.now[v];
+    };
+    const auto leadsTo = [&](std::uint32_t corner) {
+      if (corner == p || corner == q) return false;
+      return p == q ? leadsTowards(direction, at(p), at(corner), least)
+                    : leadsInto(direction, at(p), at(q), at(corner), least);
     };
     const auto around =
         p == q ? topology.vertexTriangles[p]
                : topology.edgeTriangles[topology.edgeOf({std::min(p, q), std::max(p, q)})];
     return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
       const Triangle& corners = topology.triangles[triangle];
-      return leads(corners, one) && leads(corners, two) && f(triangle);
+      return std::any_of(corners.begin(), corners.end(), leadsTo) && f(triangle);
     });
   }
 

@@ -249,6 +249,9 @@ constexpr double kDepthGain = 0x1p-14;
 /// normal is off by the rounding of coordinates, 2^-50 at most, over the distance that it was
 /// computed from. The normals of bodies that lie flat on each other differ by no more.
 constexpr double kNormalConeError = 0x1p-40;
+/// The same at the end of a step: surfaces that are bent by less need no contacts for it. Any small
+/// angle will do.
+constexpr double kBentSurface = -0x1p-8;
 /// L²: squared lengths above this, and products with them, lose nothing significant to underflow.
 constexpr double kSmallestEdgeSquare = 0x1p-900;
 

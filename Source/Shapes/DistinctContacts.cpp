@@ -32,19 +32,25 @@ struct DistinctContacts::Search {
   const std::array<Buffer<std::uint32_t>, 3>& firsts;
   const std::span<const State> states;  ///< decided for contacts that are earlier or nearer
 
-  /// Whether an element around the feature of a contact excludes its normal.
+  /// Whether elements around the feature of a contact exclude its normal, and that at the end.
   bool isExcluded(const ShapeContact& c) const {
     const auto around = mesh.topology.vertexTriangles[c.vertices[0]];
-    return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
-      const Triangle& corners = mesh.topology.triangles[triangle];
-      return isAround(corners, c) && excludes(corners, c);
-    });
+    const auto isExcludedAt = [&](const Vector3d& normal, double time, double least) {
+      return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
+        const Triangle& corners = mesh.topology.triangles[triangle];
+        return isAround(corners, c) && excludes(corners, c, normal, time, least);
+      });
+    };
+    return isExcludedAt(c.normal, c.timeOfImpact, kNormalConeError) &&
+           (c.timeOfImpact == 1.0 || isExcludedAt(normalAtEnd(c), 1.0, kBentSurface));
   }
   State stateOf(const ShapeContact& c) const {
     bool isExcluded = false, isReplaced = false;
     for (const std::uint32_t triangle : mesh.topology.vertexTriangles[c.vertices[0]]) {
       const Triangle& corners = mesh.topology.triangles[triangle];
-      if (!isAround(corners, c) || !excludes(corners, c)) continue;
+      if (!isAround(corners, c) ||
+          !excludes(corners, c, c.normal, c.timeOfImpact, kNormalConeError))
+        continue;
       const StandIns standIns = standInsOf(triangle, c);
       if (standIns.exist && !hasFlatFaces) return State::Dropped;
       if (standIns.haveItsNormal) return State::Proper;
@@ -58,18 +64,15 @@ struct DistinctContacts::Search {
   static bool isAround(const Triangle& corners, const ShapeContact& c) {
     return std::find(corners.begin(), corners.end(), c.vertices[1]) != corners.end();
   }
-  bool excludes(const Triangle& corners, const ShapeContact& c) const {
-    return excludesAt(corners, c, c.normal, c.timeOfImpact) &&
-           (c.timeOfImpact == 1.0 || excludesAt(corners, c, normalAtEnd(c), 1.0));
-  }
-  bool excludesAt(const Triangle& corners, const ShapeContact& c, const Vector3d& normal,
-                  double time) const {
+  bool excludes(const Triangle& corners, const ShapeContact& c, const Vector3d& normal, double time,
+                double least) const {
     const Vector3d p = at(c.vertices[0], time);
     return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
       if (corner == c.vertices[0] || corner == c.vertices[1]) return false;
       const Vector3d r = at(corner, time);
-      return c.element == ShapeElement::Vertex ? leadsTowards(-normal, p, r)
-                                               : leadsInto(-normal, p, at(c.vertices[1], time), r);
+      return c.element == ShapeElement::Vertex
+                 ? leadsTowards(-normal, p, r, least)
+                 : leadsInto(-normal, p, at(c.vertices[1], time), r, least);
     });
   }
   /// Of the contact's point on the mesh at the step's end.
