@@ -169,9 +169,9 @@ void expectOutward(const Mesh& body, const SidedTool& tool, const PairSettings& 
     PairSettings every = pair;
     every.contacts = Contacts::All;
     edges.clear();
-    for (const auto& c :
-         answer(settingsOf(Engine::BruteForce), body, tool, every, Sidedness::Both).edgeEdge())
-      edges.push_back(touchOf(c, body));
+    const CollisionData everything =
+        answer(settingsOf(Engine::BruteForce), body, tool, every, Sidedness::Both);
+    for (const auto& c : everything.edgeEdge()) edges.push_back(touchOf(c, body));
     const std::vector<Row> possible = outward(body, edges, false, truth.edgeEdge, told);
     const auto contains = [](const std::vector<Row>& all, const std::vector<Row>& some) {
       return std::includes(all.begin(), all.end(), some.begin(), some.end());
