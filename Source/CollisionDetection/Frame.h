@@ -11,7 +11,6 @@
 #include "NarrowPhase/NarrowPhase.h"
 #include "NarrowPhase/Piercing.h"
 #include "Octree/Traversal.h"
-#include "Shapes/DistinctContacts.h"
 
 #include <memory>
 #include <span>
@@ -67,7 +66,6 @@ class Frame {
   StepFacts m_facts;
   OrderScratch m_orderScratch;
   FirstImpacts m_firstImpacts;
-  DistinctContacts m_distinctContacts;
 };
 
 }  // namespace palpate

@@ -231,8 +231,7 @@ void findLineEdges(const MeshPair& pair, std::span<const std::uint32_t> sample,
       const std::optional<NearbyEdges> nearby = measureEdges(pair, i, j, &check);
       if (!nearby ||
           (pair.settings.contacts == Contacts::Distinct &&
-           (!isDistinctOfLines(pair, {i, j}, nearby->features) ||
-            isExcludedByFaces(pair, i, j, *nearby))) ||
+           !isDistinctOfLines(pair, {i, j}, nearby->features)) ||
           pointInwardAtEnd(pair, i, j, nearby->centres))
         continue;
       out.exactDecisions += nearby->centres.exact;
