@@ -157,7 +157,7 @@ bool BodyContacts::find(const PairRecord& record, Engine engine, bool startsInte
       isInside(b, a, engine, stack) ||
       (anyLeaves(a.mesh, b.mesh, step) && (wasInside(a, b, stack) || wasInside(b, a, stack)));
   if (!overlapped) return false;
-  const Penetration found = penetrationOf(a, b, engine, m_scratch);
+  const Penetration found = penetrationOf(a, b, engine, m_scratch, kQuick);
   if (found.intersecting) addContacts(record, engine, found, local);
   if (!found.intersecting && !meet) m_hasRemoved = removeImpacts(step);
   m_contacts.exactDecisions = stack.exactDecisions;

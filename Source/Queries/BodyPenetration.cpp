@@ -23,11 +23,9 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr std::size_t kMostInside = 1024;  ///< vertices of a body that are tested
-constexpr std::size_t kMostRays = 8;       ///< of vertices that bound one translation
-constexpr std::size_t kMostNormals = 32;   ///< directions from faces
-constexpr int kMostSteps = 256;            ///< of one translation
-constexpr int kMostTranslations = 24;      ///< from directions, each followed by a descent
+constexpr std::size_t kMostRays = 8;      ///< of vertices that bound one translation
+constexpr std::size_t kMostNormals = 32;  ///< directions from faces
+constexpr int kMostSteps = 256;           ///< of one translation
 constexpr int kMostDescents = 10;
 /// A direction whose translation is longer than the best one by more than this starts no descent.
 constexpr double kWorthDescent = 1.15;
@@ -51,9 +49,10 @@ struct Translation {
 
 class Search {
  public:
-  Search(const BodyPair& pair, PenetrationScratch& scratch)
+  Search(const BodyPair& pair, PenetrationScratch& scratch, const PenetrationEffort& effort)
       : m_pair(pair),
         m_scratch(scratch),
+        m_effort(effort),
         m_unit(unitOf(pair.magnitude())),
         m_slack(kExitSlack * pair.magnitude()) {}
 
@@ -166,7 +165,7 @@ class Search {
     inside.clear();
     for (std::uint32_t v = 0; v < own.positions.size(); ++v)
       if (own.triangleOf[v] != kNoElement && other.contains(own.positions[v])) inside.push_back(v);
-    const std::size_t stride = inside.size() / kMostInside + 1;
+    const std::size_t stride = inside.size() / m_effort.inside + 1;
     std::size_t count = 0;
     for (std::size_t i = 0; i < inside.size(); i += stride)
       if (m_pair.isInside(ofA, inside[i])) inside[count++] = inside[i];
@@ -220,14 +219,14 @@ class Search {
     auto& seeds = m_scratch.seeds;
     seeds.clear();
     addNormals();
-    addSphere();
+    if (m_effort.aroundTheSphere || !m_best.separates) addSphere();
     for (auto& seed : seeds) seed.bound = boundOf(seed.direction);
     std::sort(seeds.begin(), seeds.end(), [](const auto& l, const auto& r) {
       return std::tie(l.bound, l.place) < std::tie(r.bound, r.place);
     });
     int translations = 0;
     for (const auto& seed : seeds) {
-      if (translations++ == kMostTranslations && m_best.separates) break;
+      if (translations++ >= m_effort.translations && m_best.separates) break;
       if (!(seed.bound < m_best.depth)) break;
       improve(seed.direction, kWorthDescent * m_best.depth);
     }
@@ -310,6 +309,7 @@ class Search {
 
   const BodyPair& m_pair;
   PenetrationScratch& m_scratch;
+  const PenetrationEffort m_effort;
   const double m_unit;   ///< 1/L: brings coordinates to about 1
   const double m_slack;  ///< L
   Translation m_best;
@@ -319,7 +319,7 @@ class Search {
 }  // namespace
 
 Penetration penetrationOf(const SearchableGeometry& a, const SearchableGeometry& b, Engine engine,
-                          PenetrationScratch& scratch) {
+                          PenetrationScratch& scratch, const PenetrationEffort& effort) {
   const auto none = [](const SearchableGeometry& geometry) {
     return SurfacePoint{geometry.id, kNoElement, {}, Vector3d::Zero(), Vector3d::Zero(), 0.0};
   };
@@ -327,7 +327,7 @@ Penetration penetrationOf(const SearchableGeometry& a, const SearchableGeometry&
   if (a.mesh.topology.triangles.empty() || b.mesh.topology.triangles.empty()) return apart;
   const BodyPair pair(a, b, engine, scratch.pair);
   if (!overlap(pair, scratch.meetings)) return apart;
-  return Search(pair, scratch).run();
+  return Search(pair, scratch, effort).run();
 }
 
 }  // namespace palpate

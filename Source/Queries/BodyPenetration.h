@@ -30,6 +30,17 @@ struct PenetrationScratch {
   CountedVector<Seed> seeds;
 };
 
+/// How far a search goes on after it has found a translation that separates.
+struct PenetrationEffort {
+  int translations;      ///< so many directions start a descent; more if none of them separates
+  std::size_t inside;    ///< vertices of a body that are tested
+  bool aroundTheSphere;  ///< whether directions around the sphere are tried
+};
+/// For the query.
+constexpr PenetrationEffort kThorough{24, 1024, true};
+/// For contacts of bodies: a direction that leaves is enough.
+constexpr PenetrationEffort kQuick{2, 64, false};
+
 /// The translation of a that separates two closed meshes (SpatialQueries::penetration()).
 ///
 /// Method   A translation along one direction is decided by steps: where the surfaces meet, or a
@@ -39,6 +50,6 @@ struct PenetrationScratch {
 ///          bound the depth of each from below. From the best ones the search goes on to the
 ///          shortest translation that satisfies all contacts at which translations ended.
 Penetration penetrationOf(const SearchableGeometry& a, const SearchableGeometry& b, Engine,
-                          PenetrationScratch&);
+                          PenetrationScratch&, const PenetrationEffort& = kThorough);
 
 }  // namespace palpate
