@@ -21,6 +21,8 @@ using Kind = ImpactQuery::Kind;
 /// Cosines that differ by less agree equally well with a side. Far above the timeTolerance by which
 /// an impact may be early, so that symmetric surfaces have one answer. Any value will do.
 constexpr double kEqualAgreement = 0x1p-10;
+/// The triangles of a star that count: candidates and their tests are cubic in their number.
+constexpr std::size_t kMostTriangles = 16;
 /// How much more the winding normals of a body count than those of an open surface. Any value above
 /// 1 makes the body decide.
 constexpr double kBodyWeight = 4.0;
@@ -97,7 +99,9 @@ class Star {
     if (m_feature.kind == MeshFeature::Kind::Face) return f(topology.triangles[m_feature.id]);
     const IndexLists& lists = m_feature.kind == MeshFeature::Kind::Vertex ? topology.vertexTriangles
                                                                           : topology.edgeTriangles;
-    for (const std::uint32_t t : lists[m_feature.id]) f(topology.triangles[t]);
+    const auto around = lists[m_feature.id];
+    for (const std::uint32_t t : around.first(std::min(around.size(), kMostTriangles)))
+      f(topology.triangles[t]);
   }
   const Positions& end() const { return m_time == 1.0 ? m_mesh.now : m_mesh.before; }
   /// The vector between two vertices, times a power of two if it is tiny: interpolated denormals

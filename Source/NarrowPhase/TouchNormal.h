@@ -21,13 +21,13 @@ struct TouchNormal {
 ///
 /// The *star* of a feature is the set of triangles, or segments, that hold it. A unit vector n
 /// separates two stars if no point of the first one is on the side of -n, and no point of the
-/// second one on the side of n. Candidates are of three kinds, in this order: the normals of both
-/// stars' triangles; the cross products of an edge of each star; and one that the step or the
-/// distance functions give. Those on the side from which the first feature came (Approach) compete.
-/// The one wins that is nearest to separating the stars, up to kTouchAngle, or within the step up
-/// to 2^-10. Among equals the first kind wins, then the least angle to the approach. If the step
-/// tells no side, the agreement with both surfaces' winding normals takes the place of that angle;
-/// a closed surface counts more.
+/// second one on the side of n. Of a vertex in more than 16 triangles the first 16 count.
+/// Candidates are of three kinds, in this order: the normals of both stars' triangles; the cross
+/// products of an edge of each star; and one that the step or the distance functions give. Those on
+/// the side from which the first feature came (Approach) compete. The one wins that is nearest to
+/// separating the stars, up to kTouchAngle, or within the step up to 2^-10. Among equals the first
+/// kind wins, then the least angle to the approach. If the step tells no side, the agreement with
+/// both surfaces' winding normals takes the place of that angle; a closed surface counts more.
 ///
 /// holders   the features of Features::first and Features::second that hold the closest points
 /// time      in [0, 1] of the step, of the positions of the stars
