@@ -144,12 +144,12 @@ bool removeImpacts(BodyContacts::Buffers step) {
 
 bool BodyContacts::find(const PairRecord& record, Engine engine, bool startsIntersecting,
                         Buffers local, Buffers step) {
+  PointQueryStack& stack = m_scratch.pair.stack;
   m_hasRemoved = false;
+  stack.exactDecisions = 0;
+  m_contacts.clear();
   if (!mayBeBodies(record)) return false;
   const SearchableGeometry &a = *record.a, &b = *record.b;
-  PointQueryStack& stack = m_scratch.pair.stack;
-  m_contacts.clear();
-  stack.exactDecisions = 0;
   const bool meet = anyIntersecting(local);
   if (meet && agree(local)) return false;
   const bool overlapped =
@@ -160,7 +160,6 @@ bool BodyContacts::find(const PairRecord& record, Engine engine, bool startsInte
   const Penetration found = penetrationOf(a, b, engine, m_scratch, kQuick);
   if (found.intersecting) addContacts(record, engine, found, local);
   if (!found.intersecting && !meet) m_hasRemoved = removeImpacts(step);
-  m_contacts.exactDecisions = stack.exactDecisions;
   return found.intersecting;
 }
 

@@ -4,6 +4,7 @@
 #include "NarrowPhase/NarrowPhase.h"
 #include "Queries/BodyPenetration.h"
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -29,6 +30,8 @@ class BodyContacts {
   /// Cost     of bodies that are deep in each other: that of penetrationOf(), on one thread
   bool find(const PairRecord&, Engine, bool startsIntersecting, Buffers local, Buffers step);
   ContactBuffers& contacts() { return m_contacts; }
+  /// Of the last find(): the number of decisions by exact arithmetic.
+  std::size_t exactDecisions() const { return m_scratch.pair.stack.exactDecisions; }
   /// Whether the last find() removed contacts of `step`.
   bool hasRemoved() const { return m_hasRemoved; }
 

@@ -726,6 +726,7 @@ std::size_t Frame::preferBodies(PairRecord& record, Engine engine, std::size_t p
   const bool areDeep = m_bodies->find(record, engine, m_facts.startsPiercing(), local,
                                       all.subspan(byIntersection ? all.size() : preferred));
   record.byBodies = areDeep || m_bodies->hasRemoved();
+  m_pierced.exactDecisions += m_bodies->exactDecisions();
   if (!areDeep) return preferred;
   m_buffers.assign(1, &m_bodies->contacts());
   return 1;
@@ -777,7 +778,6 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
     record.trust.finish(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan,
                         m_facts, nearby, record.meshes(), contents, m_impacts);
   statistics.exactDecisions += m_impacts.exactDecisions + m_pierced.exactDecisions;
-  if (m_bodies && record.byBodies) statistics.exactDecisions += m_bodies->contacts().exactDecisions;
   statistics.validityPairs += m_impacts.validityPairs;
   // After trust.finish(), which tests the triangles around every impact.
   if (record.pair.settings.contacts == Contacts::Distinct &&

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 namespace palpate {
@@ -21,8 +22,9 @@ using Kind = ImpactQuery::Kind;
 /// Cosines that differ by less agree equally well with a side. Far above the timeTolerance by which
 /// an impact may be early, so that symmetric surfaces have one answer. Any value will do.
 constexpr double kEqualAgreement = 0x1p-10;
-/// The triangles of a star that count: candidates and their tests are cubic in their number.
+/// Of so many triangles of a star there are candidates. All of its triangles judge them.
 constexpr std::size_t kMostTriangles = 16;
+constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 /// How much more the winding normals of a body count than those of an open surface. Any value above
 /// 1 makes the body decide.
 constexpr double kBodyWeight = 4.0;
@@ -37,28 +39,32 @@ class Star {
   /// Whether the winding normals point out of a body.
   bool isOfBody() const { return m_mesh.topology.hasFaces() && m_mesh.topology.hasOnlyClosedStars; }
 
-  /// Calls f(normal) with the unit winding normal of each triangle with area.
+  /// Calls f(normal) with the unit winding normal of each triangle with area. most: of about so
+  /// many triangles, evenly chosen.
   template <class F>
-  void forEachNormal(F&& f) const {
-    forEachTriangle([&](const Triangle& t) {
+  void forEachNormal(F&& f, std::size_t most = kAll) const {
+    anyTriangle(most, [&](const Triangle& t) {
       const std::array<Vector3d, 3> p =
           isAtEnd()
               ? std::array{end()[t[0]], end()[t[1]], end()[t[2]]}
               : std::array{Vector3d(Vector3d::Zero()), between(t[0], t[1]), between(t[0], t[2])};
       if (hasArea(p[0], p[1], p[2])) f(windingNormal(p[0], p[1], p[2]));
+      return false;
     });
   }
 
-  /// Calls f(direction) with unit vectors that span the star: from the feature to the triangles'
-  /// other corners, and along the feature.
+  /// Calls f(direction) with unit vectors that span the star, until it returns true: from the
+  /// feature to the triangles' other corners, and along the feature.
   template <class F>
-  void forEachDirection(F&& f) const {
-    const auto pass = [&](const Vector3d& vector) {
-      if (vector != Vector3d::Zero()) f(stableUnit(vector));
+  void anyDirection(F&& f, std::size_t most = kAll) const {
+    const auto passes = [&](const Vector3d& vector) {
+      return vector != Vector3d::Zero() && f(stableUnit(vector));
     };
     if (m_feature.kind == MeshFeature::Kind::Vertex) {
-      forEachTriangle([&](const Triangle& corners) {
-        for (const std::uint32_t corner : corners) pass(between(m_feature.id, corner));
+      anyTriangle(most, [&](const Triangle& corners) {
+        return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
+          return passes(between(m_feature.id, corner));
+        });
       });
       return;
     }
@@ -66,26 +72,28 @@ class Star {
       const Triangle& corners = m_mesh.topology.triangles[m_feature.id];
       for (int i = 0; i < 3; ++i) {
         const Vector3d along = between(corners[i], corners[(i + 1) % 3]);
-        pass(along), pass(-along);
+        if (passes(along) || passes(-along)) return;
       }
       return;
     }
-    const auto& [p, q] = m_mesh.topology.edges[m_feature.id];
+    const std::uint32_t p = m_mesh.topology.edges[m_feature.id][0],
+                        q = m_mesh.topology.edges[m_feature.id][1];
     const Vector3d along = stableUnit(between(p, q));
-    pass(along), pass(-along);
-    forEachTriangle([&, p = p, q = q](const Triangle& corners) {
-      for (const std::uint32_t corner : corners)
-        if (corner != p && corner != q) {
-          const Vector3d to = stableUnit(between(p, corner)), inward = to - to.dot(along) * along;
-          if (inward.norm() > kTouchAngle) pass(inward);
-        }
+    if (passes(along) || passes(-along)) return;
+    anyTriangle(most, [&](const Triangle& corners) {
+      return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
+        if (corner == p || corner == q) return false;
+        const Vector3d to = stableUnit(between(p, corner)), inward = to - to.dot(along) * along;
+        return inward.norm() > kTouchAngle && passes(inward);
+      });
     });
   }
 
   /// Calls f(direction) with the unit direction of each edge at a vertex, or of the edge.
   template <class F>
-  void forEachEdge(F&& f) const {
-    if (m_feature.kind == MeshFeature::Kind::Vertex) return forEachDirection(f);
+  void forEachEdge(F&& f, std::size_t most) const {
+    if (m_feature.kind == MeshFeature::Kind::Vertex)
+      return anyDirection([&](const Vector3d& d) { return f(d), false; }, most);
     if (m_feature.kind == MeshFeature::Kind::Face) return;
     const auto& [p, q] = m_mesh.topology.edges[m_feature.id];
     const Vector3d along = between(p, q);
@@ -93,15 +101,20 @@ class Star {
   }
 
  private:
+  /// Calls f for the triangles, or for about `most` of them, until it returns true.
   template <class F>
-  void forEachTriangle(F&& f) const {
+  void anyTriangle(std::size_t most, F&& f) const {
     const MeshTopology& topology = m_mesh.topology;
-    if (m_feature.kind == MeshFeature::Kind::Face) return f(topology.triangles[m_feature.id]);
+    if (m_feature.kind == MeshFeature::Kind::Face) {
+      f(topology.triangles[m_feature.id]);
+      return;
+    }
     const IndexLists& lists = m_feature.kind == MeshFeature::Kind::Vertex ? topology.vertexTriangles
                                                                           : topology.edgeTriangles;
     const auto around = lists[m_feature.id];
-    for (const std::uint32_t t : around.first(std::min(around.size(), kMostTriangles)))
-      f(topology.triangles[t]);
+    const std::size_t stride = around.size() > most ? around.size() / most + 1 : 1;
+    for (std::size_t i = 0; i < around.size(); i += stride)
+      if (f(topology.triangles[around[i]])) return;
   }
   const Positions& end() const { return m_time == 1.0 ? m_mesh.now : m_mesh.before; }
   /// The vector between two vertices, times a power of two if it is tiny: interpolated denormals
@@ -170,11 +183,16 @@ class BestNormal {
   /// mirror images: otherwise numbering changes no result.
   using Rank = std::array<double, 7>;
 
-  /// The sine of the largest angle by which a direction of a star is on the wrong side.
+  /// The sine of the largest angle by which a direction of a star is on the wrong side; or of one
+  /// by which the normal is worse than the best one.
   double violationOf(const Vector3d& normal) const {
+    const double limit =
+        m_normal ? (m_rank[0] + 1.0) * m_equalAngle : std::numeric_limits<double>::infinity();
     double most = 0.0;
-    m_first.forEachDirection([&](const Vector3d& d) { most = std::max(most, -normal.dot(d)); });
-    m_second.forEachDirection([&](const Vector3d& d) { most = std::max(most, normal.dot(d)); });
+    const auto isBeyond = [&](double sine) { return (most = std::max(most, sine)) > limit; };
+    m_first.anyDirection([&](const Vector3d& d) { return isBeyond(-normal.dot(d)); });
+    if (most <= limit)
+      m_second.anyDirection([&](const Vector3d& d) { return isBeyond(normal.dot(d)); });
     return most;
   }
   double agreementOf(const Vector3d& normal) const {
@@ -197,14 +215,18 @@ class BestNormal {
 /// Offers every candidate that may be needed.
 void offerAll(const Star& first, const Star& second, BestNormal& best) {
   for (const Star* star : {&second, &first})
-    star->forEachNormal([&](const Vector3d& normal) { best.offerBoth(normal, 0); });
+    star->forEachNormal([&](const Vector3d& normal) { best.offerBoth(normal, 0); }, kMostTriangles);
   if (!best.separates())
-    first.forEachEdge([&](const Vector3d& u) {
-      second.forEachEdge([&](const Vector3d& v) {
-        const Vector3d normal = u.cross(v);
-        if (normal.norm() > kTouchAngle) best.offerBoth(normal.normalized(), 1);
-      });
-    });
+    first.forEachEdge(
+        [&](const Vector3d& u) {
+          second.forEachEdge(
+              [&](const Vector3d& v) {
+                const Vector3d normal = u.cross(v);
+                if (normal.norm() > kTouchAngle) best.offerBoth(normal.normalized(), 1);
+              },
+              kMostTriangles);
+        },
+        kMostTriangles);
   if (!best.separates()) best.offer(best.other(), 2);
 }
 

@@ -21,7 +21,7 @@ struct TouchNormal {
 ///
 /// The *star* of a feature is the set of triangles, or segments, that hold it. A unit vector n
 /// separates two stars if no point of the first one is on the side of -n, and no point of the
-/// second one on the side of n. Of a vertex in more than 16 triangles the first 16 count.
+/// second one on the side of n. Of a vertex in more than 16 triangles about 16 give candidates.
 /// Candidates are of three kinds, in this order: the normals of both stars' triangles; the cross
 /// products of an edge of each star; and one that the step or the distance functions give. Those on
 /// the side from which the first feature came (Approach) compete. The one wins that is nearest to
