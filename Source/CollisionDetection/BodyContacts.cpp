@@ -35,25 +35,19 @@ Eigen::AlignedBox3d boxOf(const SearchableGeometry& geometry) {
   return {corner(box.lower), corner(box.upper)};
 }
 
-/// The winding number of a surface about a point at the start of the step. Tests all triangles.
-int windingNumberBefore(const TriangleMesh& mesh, const Vector3d& p, PointQueryStack& stack) {
-  SignCounts counts;
-  int number = 0;
-  bool on = false;
-  for (const auto& [a, b, c] : mesh.topology.triangles) {
-    const RayCrossing crossing =
-        crossRay(0, false, p, mesh.before[a], mesh.before[b], mesh.before[c], counts);
-    on |= crossing == RayCrossing::OnTriangle;
-    if (!on) number += static_cast<int>(crossing);
-  }
-  stack.exactDecisions += counts.undecided;
-  return on ? 0 : number;
-}
-
+/// Whether a vertex of a body was inside another one at the step's start. Tests all triangles.
 bool wasInside(const SearchableGeometry& inner, const SearchableGeometry& outer,
                PointQueryStack& stack) {
-  const std::uint32_t vertex = inner.mesh.topology.triangles[0][0];
-  return windingNumberBefore(outer.mesh, inner.mesh.before[vertex], stack) != 0;
+  const auto cornersOf = [&](std::size_t i) -> Corners {
+    const auto& [a, b, c] = outer.mesh.topology.triangles[i];
+    const Positions& before = outer.mesh.before;
+    return {before[a], before[b], before[c]};
+  };
+  SignCounts counts;
+  const int number = windingNumber(outer.mesh.topology.triangles.size(), cornersOf,
+                                   inner.mesh.before[inner.mesh.topology.triangles[0][0]], counts);
+  stack.exactDecisions += counts.undecided;
+  return number != 0;
 }
 
 /// Whether a vertex of a body whose box is in that of another one is inside it, at both ends of the

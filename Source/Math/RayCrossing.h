@@ -3,6 +3,7 @@
 #include "Exact/Predicates.h"
 #include "Math/ExactClosestPoint.h"
 
+#include <cstddef>
 #include <cstdint>
 
 namespace palpate {
@@ -43,6 +44,21 @@ inline RayCrossing crossRay(int axis, bool against, const Eigen::Vector3d& p,
     return RayCrossing::OnTriangle;
   if (!passes || (side == facing) != against) return RayCrossing::None;  // it is behind the start
   return (facing > 0) != against ? RayCrossing::Leaving : RayCrossing::Entering;
+}
+
+/// The winding number about p of a closed surface with the triangles cornersOf(0) to
+/// cornersOf(count - 1), counted along the first axis; 0 if p is on a triangle.
+template <class CornersOf>
+int windingNumber(std::size_t count, CornersOf&& cornersOf, const Eigen::Vector3d& p,
+                  SignCounts& counts) {
+  int number = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto& [a, b, c] = cornersOf(i);
+    const RayCrossing crossing = crossRay(0, false, p, a, b, c, counts);
+    if (crossing == RayCrossing::OnTriangle) return 0;
+    number += static_cast<int>(crossing);
+  }
+  return number;
 }
 
 }  // namespace palpate

@@ -148,16 +148,12 @@ bool BodyPair::isInBoth(const Vector3d& p) const {
 /// must be tested.
 bool BodyPair::isInMovedA(const Vector3d& p, const Vector3d& shift) const {
   SignCounts counts;
-  int number = 0;
-  bool on = false;
-  for (std::uint32_t i = 0; i < m_a.mesh.topology.triangles.size(); ++i) {
-    const auto [a, b, c] = cornersOfA(i, shift);
-    const RayCrossing crossing = crossRay(0, false, p, a, b, c, counts);
-    on |= crossing == RayCrossing::OnTriangle;
-    if (!on) number += static_cast<int>(crossing);
-  }
+  const auto cornersOf = [&](std::size_t i) {
+    return cornersOfA(static_cast<std::uint32_t>(i), shift);
+  };
+  const int number = windingNumber(m_a.mesh.topology.triangles.size(), cornersOf, p, counts);
   m_scratch.stack.exactDecisions += counts.undecided;
-  return !on && number != 0;
+  return number != 0;
 }
 
 std::optional<BodyPair::PartVertex> BodyPair::findInsidePart(const Vector3d& shift) const {

@@ -18,16 +18,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-Mesh boxMesh(const Vector3d& low, const Vector3d& high) {
-  Mesh mesh;
-  for (int v = 0; v < 8; ++v)
-    mesh.positions.emplace_back(v & 1 ? high[0] : low[0], v & 2 ? high[1] : low[1],
-                                v & 4 ? high[2] : low[2]);
-  mesh.triangles = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
-                    {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
-  return mesh;
-}
-
 struct Overlap {
   Mesh a, b;
 };

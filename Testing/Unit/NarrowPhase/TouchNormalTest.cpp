@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 namespace palpate {
@@ -16,7 +17,7 @@ using Eigen::Vector3d;
 using testing::Mesh;
 
 /// A box whose faces are divided into n x n squares, wound outward.
-Mesh boxMesh(const Vector3d& lower, const Vector3d& upper, int n = 1) {
+Mesh dividedBox(const Vector3d& lower, const Vector3d& upper, int n = 1) {
   Mesh mesh;
   std::vector<std::array<int, 3>> places;
   const auto vertexAt = [&](const std::array<int, 3>& place) {
@@ -72,9 +73,9 @@ struct Case {
 /// Bodies that touch in a face, in part of one, or in an edge of a corner; moved apart by the gap.
 std::vector<Case> restingBodies(double gap) {
   const Vector3d x = Vector3d::UnitX(), y = Vector3d::UnitY(), z = Vector3d::UnitZ();
-  const Mesh unit = boxMesh({0, 0, 0}, {1, 1, 1});
+  const Mesh unit = dividedBox({0, 0, 0}, {1, 1, 1});
   const auto box = [&](Vector3d lower, Vector3d upper, const Vector3d& apart, int n = 1) {
-    return boxMesh(lower + gap * apart, upper + gap * apart, n);
+    return dividedBox(lower + gap * apart, upper + gap * apart, n);
   };
   return {{"on a table", box({-.5, -.5, 0}, {.5, .5, 1}, z), plate(1, 2, 0), z},
           {"on a table that is wound down", box({-.5, -.5, 0}, {.5, .5, 1}, z),
@@ -84,7 +85,7 @@ std::vector<Case> restingBodies(double gap) {
           {"common face across y", box({0, 1, 0}, {1, 2, 1}, y), unit, y},
           {"common face across z", box({0, 0, 1}, {1, 1, 2}, z), unit, z},
           {"common face of small triangles", box({0, 0, 1}, {1, 1, 2}, z, 4),
-           boxMesh({0, 0, 0}, {1, 1, 1}, 4), z},
+           dividedBox({0, 0, 0}, {1, 1, 1}, 4), z},
           {"half of a face", box({.5, 0, 1}, {1.5, 1, 2}, z), unit, z},
           {"inside a face", box({.25, .25, 1}, {.75, .75, 2}, z), unit, z}};
 }
@@ -141,12 +142,43 @@ TEST(TouchNormal, RestingBodiesAreOnlyPushedApart) {
     }
 }
 
+/// A cone from its tip at 0 to a circle in the plane z = height, of n triangles; wound outward.
+Mesh cone(std::uint32_t n, double radius, double height) {
+  Mesh mesh{{{0, 0, 0}}, {}};
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const double angle = 2 * 3.14159265358979323846 * i / n;
+    mesh.positions.push_back({radius * std::cos(angle), radius * std::sin(angle), height});
+    const std::uint32_t p = i + 1, q = (i + 1) % n + 1;
+    mesh.triangles.push_back(height > 0 ? Triangle{0, q, p} : Triangle{0, p, q});
+  }
+  return mesh;
+}
+
+/// Law: where two tips meet, each row separates all triangles of both, however many there are.
+TEST(TouchNormal, TipsInManyTrianglesAreSeparated) {
+  for (const std::uint32_t n : {5u, 16u, 17u, 40u, 200u}) {
+    SCOPED_TRACE(n);
+    const Case tips{"tips", cone(n, 3.0, 1.0), cone(n, 0.2, -1.0), Vector3d::UnitZ()};
+    for (const Method method : {Method::Auto, Method::Proximity}) {
+      SCOPED_TRACE(static_cast<int>(method));
+      const auto rows = rowsOf(tips, {.method = method, .thickness = 0.01});
+      EXPECT_FALSE(rows.empty());
+      for (const ConstraintRow& row : rows) {
+        const Vector3d up = row.normal * (separation(row, tips) < 0 ? -1 : 1);
+        for (const Vector3d& p : tips.a.positions) EXPECT_GE(up.dot(p), -1e-12);
+        for (const Vector3d& p : tips.b.positions) EXPECT_LE(up.dot(p), 1e-12);
+        EXPECT_GT(separation(row, tips), 0);
+      }
+    }
+  }
+}
+
 /// Law: bodies that overlap by an aligned translation are in intersection, although their triangles
 /// only touch.
 TEST(TouchNormal, AlignedOverlapIsNoRest) {
   for (const double overlap : {0.1, 0.3, 0.7}) {
-    const Case bodies{"", boxMesh({1 - overlap, 0, 0}, {2 - overlap, 1, 1}),
-                      boxMesh({0, 0, 0}, {1, 1, 1}), Vector3d::UnitX()};
+    const Case bodies{"", dividedBox({1 - overlap, 0, 0}, {2 - overlap, 1, 1}),
+                      dividedBox({0, 0, 0}, {1, 1, 1}), Vector3d::UnitX()};
     Validity validity;
     rowsOf(bodies, {.thickness = 0.01}, &validity);
     EXPECT_FALSE(validity.startedApart);
