@@ -188,6 +188,7 @@ void BodyContacts::addVertices(const BodyPair& pair, bool ofA, const Penetration
     const auto& positions = pair.vertices(!ofA).positions;
     const VertexTriangleDistance at = finiteVertexTriangleDistance(
         own.positions[v] + exit->distance * direction, positions[p], positions[q], positions[r]);
+    m_scratch.pair.stack.exactDecisions += at.exact;
     auto& list = ofA ? m_contacts.vertexTriangle : m_contacts.triangleVertex;
     list.push_back(
         {v, exit->element, corners, at.barycentric, direction, -exit->distance, 1.0, at.feature});

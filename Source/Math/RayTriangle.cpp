@@ -171,7 +171,9 @@ int compareRayEnds(const RaySegment& ray, const RayEnd& one, const RayEnd& two) 
 namespace {
 
 std::optional<RayInterval> intersectRayExactly(const RaySegment& ray, const Eigen::Vector3d& a,
-                                               const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+                                               const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                                               std::size_t* exactDecisions) {
+  if (exactDecisions) ++*exactDecisions;
   const exact::RayProblem problem(ray, a, b, c);
   const auto interval = exact::intersect(ray, problem);
   if (!interval) return {};
@@ -209,7 +211,8 @@ struct CrossProduct {
 }  // namespace
 
 std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vector3d& a,
-                                        const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+                                        const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                                        std::size_t* exactDecisions) {
   const Eigen::Vector3d p = a - ray.origin, q = b - ray.origin, r = c - ray.origin;
   // The volumes of the ray's direction with each edge, as seen from the origin.
   const CrossProduct first(ray.direction, p);
@@ -219,7 +222,7 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
   const Volume bc = CrossProduct(ray.direction, q).volume(r);
   const int ofBc = bc.sign();
   if (ofAb * ofBc < 0 || ofBc * ofCa < 0) return {};
-  if (ofAb == 0 || ofBc == 0 || ofCa == 0) return intersectRayExactly(ray, a, b, c);
+  if (ofAb == 0 || ofBc == 0 || ofCa == 0) return intersectRayExactly(ray, a, b, c, exactDecisions);
   // The direction's volume with the triangle is their sum.
   const double facing = (ab.value - ac.value) + bc.value,
                facingError =
@@ -230,14 +233,16 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
   const double error =
       (height.error + std::abs(t) * facingError) / std::abs(facing) * (1.0 + 0x1p-40) +
       std::abs(t) * 0x1p-52;
-  if (!(std::abs(facing) > facingError)) return intersectRayExactly(ray, a, b, c);
+  if (!(std::abs(facing) > facingError)) return intersectRayExactly(ray, a, b, c, exactDecisions);
   if (t + error < ray.tMin || t - error > ray.tMax) return {};
-  if (!(t - error >= ray.tMin && t + error <= ray.tMax)) return intersectRayExactly(ray, a, b, c);
+  if (!(t - error >= ray.tMin && t + error <= ray.tMax))
+    return intersectRayExactly(ray, a, b, c, exactDecisions);
   return RayInterval{t, t, error, static_cast<std::int8_t>(ofAb), ofAb < 0};
 }
 
 RayPoint firstPoint(const RaySegment& ray, const RayInterval& interval, const Eigen::Vector3d& a,
-                    const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+                    const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                    std::size_t* exactDecisions) {
   const Eigen::Vector3d& d = ray.direction;
   const Difference p = difference(a, ray.origin), u = difference(b, a), v = difference(c, a);
   const double extent =
@@ -266,7 +271,8 @@ RayPoint firstPoint(const RaySegment& ray, const RayInterval& interval, const Ei
                  ofC = std::clamp(dot(u.high.cross(onPlane), normal) / square, 0.0, 1.0 - ofB);
     return {t + step, {(1.0 - ofB) - ofC, ofB, ofC}};
   }
-  const auto exact = interval.error <= most ? interval : *intersectRayExactly(ray, a, b, c);
+  const auto exact =
+      interval.error <= most ? interval : *intersectRayExactly(ray, a, b, c, exactDecisions);
   const Eigen::Vector3d point = ray.origin + exact.first * d;
   return {exact.first, finiteVertexTriangleDistance(point, a, b, c).barycentric};
 }

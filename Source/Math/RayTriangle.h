@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -36,8 +37,10 @@ struct RayInterval {
 
 /// None if the ray misses the triangle. The ends' errors may be some 2^-47 of the largest
 /// coordinate difference, divided by the sine of the angle between ray and triangle.
+/// exactDecisions: counts how often exact arithmetic decides, here and in firstPoint().
 std::optional<RayInterval> intersectRay(const RaySegment&, const Eigen::Vector3d& a,
-                                        const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+                                        const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                                        std::size_t* exactDecisions = nullptr);
 
 /// Finds quickly that a line misses a triangle.
 ///
@@ -91,7 +94,8 @@ struct RayPoint {
 };
 /// The first point of an interval that intersectRay() returned for this triangle.
 RayPoint firstPoint(const RaySegment&, const RayInterval&, const Eigen::Vector3d& a,
-                    const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+                    const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                    std::size_t* exactDecisions = nullptr);
 
 namespace exact {
 

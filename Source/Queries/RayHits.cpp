@@ -113,7 +113,8 @@ void RayHits::intersect(std::uint32_t place, F&& f) const {
   const auto& [a, b, c] = m_geometry.tree.ordered()[place];
   const TriangleMesh& mesh = m_geometry.mesh;
   if (!m_isSolid) {
-    if (const auto interval = intersectRay(m_ray, mesh.now[a], mesh.now[b], mesh.now[c]))
+    if (const auto interval =
+            intersectRay(m_ray, mesh.now[a], mesh.now[b], mesh.now[c], &m_exactDecisions))
       f(*interval);
     return;
   }
@@ -209,7 +210,7 @@ RayHit RayHits::hitOf(const Met& met, double t, bool frontFace, bool crosses) co
   const Positions& now = m_geometry.mesh.now;
   const Vector3d a = now[corners[0]], b = now[corners[1]], c = now[corners[2]];
   if (!m_isSolid) {
-    const RayPoint at = firstPoint(m_ray, met.interval, a, b, c);
+    const RayPoint at = firstPoint(m_ray, met.interval, a, b, c, &m_exactDecisions);
     return {m_geometry.id, met.element, corners, at.weights, at.t, frontFace, crosses};
   }
   // A segment without length is a ball of its larger radius.

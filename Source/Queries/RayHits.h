@@ -48,7 +48,7 @@ class RayHits {
                     std::array<std::vector<Met>, kRaysInFlight>& scratch, const RayHit& none,
                     std::span<RayHit> out);
   bool any();
-  /// Number of comparisons of hits by exact arithmetic so far.
+  /// Number of decisions about triangles and their hits by exact arithmetic so far.
   std::size_t exactDecisions() const { return m_exactDecisions; }
   /// All hits by ascending t. out: hits are appended.
   void all(std::vector<RayHit>& out);
