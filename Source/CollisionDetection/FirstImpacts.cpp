@@ -1,5 +1,7 @@
 #include "CollisionDetection/FirstImpacts.h"
 
+#include "CollisionDetection/ExcludedImpacts.h"
+
 #include <algorithm>
 #include <tuple>
 #include <type_traits>
@@ -23,6 +25,31 @@ ImpactFeatures inOrder(std::uint64_t first, std::uint64_t second, bool swap) {
   return swap ? ImpactFeatures{second, first} : ImpactFeatures{first, second};
 }
 
+/// The contact whose key, which ascends, is the given one.
+template <class Contact, class Key, class KeyOf>
+const Contact* find(const CountedVector<Contact>& contacts, const Key& key, KeyOf&& keyOf) {
+  const auto place = std::lower_bound(contacts.begin(), contacts.end(), key,
+                                      [&](const Contact& c, const Key& k) { return keyOf(c) < k; });
+  return place != contacts.end() && keyOf(*place) == key ? &*place : nullptr;
+}
+
+/// Finds impacts in sorted contents.
+struct ListedImpacts {
+  const CollisionData::Contents& contents;
+  const VertexTriangleContact* ofVertex(std::uint32_t vertex, std::uint32_t triangle,
+                                        bool swapped) const {
+    if (swapped)
+      return find(contents.triangleVertex, std::pair(triangle, vertex),
+                  [](const auto& c) { return std::pair(c.triangle, c.vertex); });
+    return find(contents.vertexTriangle, std::pair(vertex, triangle),
+                [](const auto& c) { return std::pair(c.vertex, c.triangle); });
+  }
+  const EdgeEdgeContact* ofEdges(const Segment& a, const Segment& b) const {
+    return find(contents.edgeEdge, std::pair(a, b),
+                [](const auto& c) { return std::pair(c.edgeA, c.edgeB); });
+  }
+};
+
 }  // namespace
 
 std::optional<ImpactFeatures> sharedFeatures(const VertexTriangleContact& c, bool swapped,
@@ -41,28 +68,33 @@ std::optional<ImpactFeatures> sharedFeatures(const EdgeEdgeContact& c, bool self
   return inOrder(a, b, self && b < a);
 }
 
-void FirstImpacts::keep(bool self, double end, const OrderScratch& ordered,
+void FirstImpacts::keep(const MeshPair& meshes, double end, const OrderScratch& ordered,
                         CollisionData::Contents& contents) {
   m_entries.clear();
+  const ListedImpacts listed{contents};
+  const ExcludedImpacts excluded(meshes, listed);
+  const bool mayExclude = mayExcludeImpacts(meshes);
   forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
     const Buffer<std::uint8_t>& preferred = ordered.preferred[list];
+    m_dropped[list].assign(contacts.size(), 0);
     for (std::uint32_t i = 0; i < contacts.size(); ++i) {
       const auto& contact = contacts[i];
       if (!(contact.timeOfImpact < end) || (!preferred.empty() && preferred[i])) continue;
       std::optional<ImpactFeatures> features;
-      if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
-        features = sharedFeatures(contact, self);
-      else
-        features = sharedFeatures(contact, list == 1, self);
-      if (features) m_entries.push_back({*features, contact.timeOfImpact, list, i});
+      if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>) {
+        m_dropped[list][i] = mayExclude && excluded.contain(contact);
+        features = sharedFeatures(contact, meshes.self());
+      } else {
+        m_dropped[list][i] = mayExclude && excluded.contain(contact, list == 1);
+        features = sharedFeatures(contact, list == 1, meshes.self());
+      }
+      if (features && !m_dropped[list][i])
+        m_entries.push_back({*features, contact.timeOfImpact, list, i});
     }
   });
   std::sort(m_entries.begin(), m_entries.end(), [](const Entry& l, const Entry& r) {
     return std::tie(l.features, l.time, l.list, l.index) <
            std::tie(r.features, r.time, r.list, r.index);
-  });
-  forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
-    m_dropped[list].assign(contacts.size(), 0);
   });
   for (std::size_t i = 1; i < m_entries.size(); ++i)
     if (m_entries[i].features == m_entries[i - 1].features)

@@ -40,8 +40,9 @@ class FirstImpacts {
  public:
   /// Call after orderContacts() has filled the contents with this scratch. Contacts from its
   /// preferred buffers are kept, and so are contacts with a time of impact of at least `end`. No
-  /// contact is dropped because of one of these.
-  void keep(bool self, double end, const OrderScratch&, CollisionData::Contents&);
+  /// contact is dropped because of one of these. Drops ExcludedImpacts first: they stand for no
+  /// other.
+  void keep(const MeshPair&, double end, const OrderScratch&, CollisionData::Contents&);
 
  private:
   struct Entry {

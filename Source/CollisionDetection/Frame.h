@@ -11,6 +11,7 @@
 #include "NarrowPhase/NarrowPhase.h"
 #include "NarrowPhase/Piercing.h"
 #include "Octree/Traversal.h"
+#include "Shapes/DistinctContacts.h"
 
 #include <memory>
 #include <span>
@@ -66,6 +67,7 @@ class Frame {
   StepFacts m_facts;
   OrderScratch m_orderScratch;
   FirstImpacts m_firstImpacts;
+  DistinctContacts m_distinctContacts;
 };
 
 }  // namespace palpate

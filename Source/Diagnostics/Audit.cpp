@@ -3,11 +3,13 @@
 #include <palpate/Capture.h>
 
 #include "CollisionDetection/DiagnosticsInterface.h"
+#include "CollisionDetection/ExcludedImpacts.h"
 #include "CollisionDetection/FirstImpacts.h"
 #include "CollisionDetection/Order.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Piercing.h"
+#include "Shapes/DistinctContacts.h"
 
 #include <algorithm>
 #include <array>
@@ -162,6 +164,54 @@ class KnownVertices {
   const MeshPair& m_meshes;
 };
 
+/// Computes the impacts that the frame has in its lists. A pointer is valid until the next call.
+class ComputedImpacts {
+ public:
+  explicit ComputedImpacts(const MeshPair& meshes) : m_meshes(meshes) {}
+
+  const VertexTriangleContact* ofVertex(std::uint32_t vertex, std::uint32_t triangle,
+                                        bool swapped) const {
+    m_found.clear();
+    if (m_meshes.excludesVertex(vertex, triangle)) return nullptr;
+    const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? m_meshes.b : m_meshes.a,
+                                                               swapped ? m_meshes.a : m_meshes.b};
+    addImpact(m_meshes, features, vertex, triangle, swapped, m_found);
+    const auto& list =
+        m_found.vertexTriangle.empty() ? m_found.triangleVertex : m_found.vertexTriangle;
+    return list.empty() ? nullptr : &list.front();
+  }
+  const EdgeEdgeContact* ofEdges(const Segment& a, const Segment& b) const {
+    m_found.clear();
+    const std::uint32_t edgeA = m_meshes.a.topology.edgeOf(a),
+                        edgeB = m_meshes.b.topology.edgeOf(b);
+    addImpact(m_meshes, Features<ImpactQuery::Kind::EdgeEdge>{m_meshes.a, m_meshes.b}, edgeA, edgeB,
+              false, m_found);
+    return m_found.edgeEdge.empty() ? nullptr : &m_found.edgeEdge.front();
+  }
+
+ private:
+  const MeshPair& m_meshes;
+  mutable ContactBuffers m_found;
+};
+
+/// Contacts::Distinct for impacts: drops expected impacts that the elements around them exclude.
+void dropExcludedImpacts(const MeshPair& meshes, CollisionData::Contents& expected) {
+  const bool impactsOnly = meshes.settings.method == Method::Continuous;
+  if (meshes.settings.contacts != Contacts::Distinct || !mayExcludeImpacts(meshes) ||
+      !(impactsOnly || meshes.step.reportsImpacts))
+    return;
+  const ComputedImpacts impacts(meshes);
+  const ExcludedImpacts excluded(meshes, impacts);
+  forEachImpactList(expected, [&](auto& contacts, int list) {
+    std::erase_if(contacts, [&](const auto& contact) {
+      if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
+        return excluded.contain(contact);
+      else
+        return excluded.contain(contact, list == 1);
+    });
+  });
+}
+
 /// Contacts::Distinct for impacts: drops expected contacts for which an earlier contact is kept.
 /// The earlier contact is either expected, too, or in the answer if the sample does not cover it.
 void dropRepeatedImpacts(const MeshPair& meshes, const CollisionData& answer,
@@ -294,7 +344,10 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
   ContactBuffers contacts, pierced;
   const FeatureLists sample = drawFeatures(meshes, pair, settings, frame);
   const Coverage coverage(meshes, sample);
-  findContactsByBruteForce(meshes, sample, contacts);
+  // Any contact with a shape may stand for one of the sample.
+  const bool needsAll =
+      meshes.hasShape() && !meshes.isShapePair() && meshes.settings.contacts == Contacts::Distinct;
+  findContactsByBruteForce(meshes, needsAll ? everyFeature(meshes) : sample, contacts);
   if (meshes.settings.method == Method::Intersection)
     addListed(meshes, coverage, data, contacts, pierced);
   ContactBuffers* const buffers[] = {&contacts, &pierced};
@@ -329,7 +382,13 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
           reporterFor(List::Earliest)(Fault::FalseNegative, contact, {});
     });
   }
+  dropExcludedImpacts(meshes, expected);
   dropRepeatedImpacts(meshes, data, expected);
+  if (needsAll) {
+    expected.shape.resize(DistinctContacts().keep(meshes.mesh(), meshes.shape().now,
+                                                  meshes.settings, expected.shape));
+    std::erase_if(expected.shape, [&](const ShapeContact& c) { return !coverage.coversShape(c); });
+  }
   const auto compareList = [&](const auto& truth, const auto& found, auto covers, List list) {
     compare(truth, found, std::bind_front(covers, &coverage), reporterFor(list));
   };

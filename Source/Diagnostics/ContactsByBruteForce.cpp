@@ -231,7 +231,8 @@ void findLineEdges(const MeshPair& pair, std::span<const std::uint32_t> sample,
       const std::optional<NearbyEdges> nearby = measureEdges(pair, i, j, &check);
       if (!nearby ||
           (pair.settings.contacts == Contacts::Distinct &&
-           !isDistinctOfLines(pair, {i, j}, nearby->features)) ||
+           (!isDistinctOfLines(pair, {i, j}, nearby->features) ||
+            isExcludedByFaces(pair, i, j, *nearby))) ||
           pointInwardAtEnd(pair, i, j, nearby->centres))
         continue;
       out.exactDecisions += nearby->centres.exact;

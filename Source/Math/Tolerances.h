@@ -243,6 +243,18 @@ constexpr double kMinimalSlack = 0x1p-36;
 /// do.
 constexpr double kDepthGain = 0x1p-14;
 
+// ---- Normals that elements exclude (Math/NormalCone.h) ----
+
+/// Component of a contact's normal along a unit direction, towards which it certainly leads. A
+/// normal is off by the rounding of coordinates, 2^-50 at most, over the distance that it was
+/// computed from. The normals of bodies that lie flat on each other differ by no more.
+constexpr double kNormalConeError = 0x1p-40;
+/// About the sine of an angle: surfaces that are bent by less at the end of a step need no contacts
+/// for it. Any small angle will do.
+constexpr double kBentSurface = 0x1p-8;
+/// L²: squared lengths above this, and products with them, lose nothing significant to underflow.
+constexpr double kSmallestEdgeSquare = 0x1p-900;
+
 // ---- Triangles without area in contacts (NarrowPhase/StepCheck.cpp) ----
 
 /// Squared sine of a triangle's angle above which the triangle certainly has area: u^2 and more.

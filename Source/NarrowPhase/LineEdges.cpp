@@ -3,12 +3,16 @@
 #include "NarrowPhase/Filters.h"
 #include "NarrowPhase/TouchNormal.h"
 #include "Math/ClosestPoint.h"
+#include "Math/NormalCone.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace palpate {
 
 namespace {
+
+using Eigen::Vector3d;
 
 /// Calls f(edge) once for each edge that holds the feature, until f returns false. Returns whether
 /// all calls returned true.
@@ -44,7 +48,65 @@ bool isDistinct(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
   });
 }
 
+/// Whether a line's vertex has a contact with the interior of a triangle, and is at most as far
+/// away as the edges. swapped: the line is MeshPair::b.
+bool isOverFace(const MeshPair& pair, std::uint32_t vertex, std::uint32_t triangle, bool swapped,
+                double distance) {
+  const TriangleMesh &line = swapped ? pair.b : pair.a, &mesh = swapped ? pair.a : pair.b;
+  const Triangle& corners = mesh.topology.triangles[triangle];
+  const VertexTriangleDistance measured = finiteVertexTriangleDistance(
+      line.now[vertex], mesh.now[corners[0]], mesh.now[corners[1]], mesh.now[corners[2]]);
+  return measured.feature == TriangleFeature::Face &&
+         measured.distance - line.radius(vertex) <= distance &&
+         !rejectsVertex(pair, vertex, triangle, swapped) &&
+         !pointsInwardAtEnd(pair, vertex, {MeshFeature::Kind::Face, triangle}, measured, swapped);
+}
+
+/// Whether the line's edge comes nearer to another edge of a triangle. Where its closest point is
+/// its end, that vertex has a contact.
+bool isNearerToSide(const MeshPair& pair, std::uint32_t edge, std::uint32_t triangle, bool swapped,
+                    double distance) {
+  const auto& sides = (swapped ? pair.a : pair.b).topology.triangleEdges[triangle];
+  return std::any_of(sides.begin(), sides.end(), [&](std::uint32_t side) {
+    if (side == kNoEdge) return false;
+    const auto other = swapped ? measureEdges(pair, side, edge) : measureEdges(pair, edge, side);
+    return other && other->distance < distance &&
+           (areReportedByEdges(pair, other->features) || !pair.hasFilters());
+  });
+}
+
 }  // namespace
+
+bool isExcludedByFaces(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
+                       const NearbyEdges& nearby) {
+  const bool swapped = pair.a.topology.hasFaces();
+  const TriangleMesh &line = swapped ? pair.b : pair.a, &mesh = swapped ? pair.a : pair.b;
+  const MeshTopology& topology = mesh.topology;
+  if (!topology.hasFaces()) return false;
+  const std::uint32_t edge = swapped ? edgeB : edgeA;
+  const MeshFeature& feature = nearby.features[!swapped];
+  const bool isVertex = feature.kind == MeshFeature::Kind::Vertex;
+  const Segment ends = isVertex ? Segment{feature.id, feature.id} : topology.edges[feature.id];
+  const Vector3d towardsLine = swapped ? Vector3d(-nearby.centres.normal) : nearby.centres.normal;
+  const Vector3d p = mesh.now[ends[0]], q = mesh.now[ends[1]];
+  const auto leadsTo = [&](std::uint32_t corner) {
+    if (corner == ends[0] || corner == ends[1]) return false;
+    const Vector3d r = mesh.now[corner];
+    return isVertex ? leadsTowards(towardsLine, p, r) : leadsInto(towardsLine, p, q, r);
+  };
+  const auto around =
+      isVertex ? topology.vertexTriangles[feature.id] : topology.edgeTriangles[feature.id];
+  return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
+    const Triangle& corners = topology.triangles[triangle];
+    if (std::none_of(corners.begin(), corners.end(), leadsTo)) return false;
+    const Segment& vertices = line.topology.edges[edge];
+    return std::any_of(vertices.begin(), vertices.end(),
+                       [&](std::uint32_t v) {
+                         return isOverFace(pair, v, triangle, swapped, nearby.distance);
+                       }) ||
+           isNearerToSide(pair, edge, triangle, swapped, nearby.distance);
+  });
+}
 
 std::optional<NearbyEdges> measureEdges(const MeshPair& pair, std::uint32_t edgeA,
                                         std::uint32_t edgeB, StepCheck* check) {
@@ -68,7 +130,8 @@ void testLineEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edge
   if (!nearby) return;
   out.exactDecisions += nearby->centres.exact;
   if (pair.settings.contacts == Contacts::Distinct &&
-      !isDistinct(pair, edgeA, edgeB, nearby->features, out))
+      (!isDistinct(pair, edgeA, edgeB, nearby->features, out) ||
+       isExcludedByFaces(pair, edgeA, edgeB, *nearby)))
     return;
   if (pointInwardAtEnd(pair, edgeA, edgeB, nearby->centres)) return;
   EdgeEdgeDistance centres = nearby->centres;

@@ -32,12 +32,22 @@ std::optional<NearbyEdges> measureEdges(const MeshPair&, std::uint32_t edgeA, st
 /// if all of these pairs have their closest points on the two features, and only by the lowest
 /// pair. Otherwise some pair is at least as near elsewhere, and reports its contact there. With a
 /// triangle mesh, a contact is not reported where the closest point on the line is a vertex:
-/// vertices of lines are tested against whole triangles.
+/// vertices of lines are tested against whole triangles. Nor is it where isExcludedByFaces() holds.
 /// Source   Take one point on each of two edges. If the distance does not decrease along either
 ///          edge alone, the edges are nowhere nearer: the squared distance is convex in both
 ///          weights. Vertices that hold a contact are therefore local minima over all their edges.
 void testLineEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB, StepCheck&,
                    ContactBuffers& out);
+
+/// Contacts::Distinct: whether the triangles around a mesh's closest edge or vertex exclude the
+/// direction to the line, as it leads into one of them. The line then comes nearer to that
+/// triangle. The contact is excluded if the line's edge has a contact there that is at least as
+/// near: one of its ends over the triangle, or a nearer one with another edge of the triangle.
+/// False for two line meshes. nearby: of these edges.
+///
+/// Law      Of the contacts of a line's edge, the nearest one stays.
+bool isExcludedByFaces(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB,
+                       const NearbyEdges& nearby);
 
 /// Whether edge pairs report contacts between these features, of the pair's first and second mesh.
 /// They do not report a vertex against a triangle mesh.

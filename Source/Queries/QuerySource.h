@@ -12,6 +12,7 @@
 #include "Queries/RayHits.h"
 #include "Queries/SearchableGeometry.h"
 #include "Queries/VertexSearch.h"
+#include "Shapes/DistinctContacts.h"
 #include "Shapes/PlacedShape.h"
 #include "Shapes/ShapeContacts.h"
 
@@ -42,6 +43,7 @@ class SpatialQueries::Source {
     std::vector<std::uint32_t> elements;
     Buffer<std::uint32_t> nearShape;
     ShapeContactBuffers shapeContacts;
+    DistinctContacts distinctContacts;
     KeptShapes shapes;
     PathScratch path;
     std::unique_ptr<PairScratch> pairs;  ///< null before distance() first needs it

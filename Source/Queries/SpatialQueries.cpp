@@ -556,12 +556,13 @@ void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
     else
       findElementsNear(geometry, tool.now, tool.now, thickness + geometry.mesh.largestRadius,
                        scratch->stack, near);
-    findShapeContacts(geometry.mesh, tool, {Method::Proximity, thickness}, near,
-                      scratch->shapeContacts);
+    const PairSettings settings{Method::Proximity, thickness};
+    findShapeContacts(geometry.mesh, tool, settings, near, scratch->shapeContacts);
+    std::sort(found.begin(), found.end(), [](const ShapeContact& a, const ShapeContact& b) {
+      return std::tie(a.element, a.id, a.vertices) < std::tie(b.element, b.id, b.vertices);
+    });
+    found.resize(scratch->distinctContacts.keep(geometry.mesh, tool.now, settings, found));
   }
-  std::sort(found.begin(), found.end(), [](const ShapeContact& a, const ShapeContact& b) {
-    return std::tie(a.element, a.id, a.vertices) < std::tie(b.element, b.id, b.vertices);
-  });
   out.reserve(found.size());  // nothing below throws
   out.assign(found.begin(), found.end());
 }

@@ -133,6 +133,11 @@ enum class Contacts {
   /// remains. A dropped contact is therefore never the first impact of its features. Every vertex
   /// with a weight other than 0 keeps its earliest time, and earliestTimeOfImpact() is that of All.
   /// Docs/SupportMatrix.md has the reasons.
+  ///
+  /// Of shapes, lines and points no contact with a vertex or an edge of a mesh has a normal that a
+  /// triangle there excludes, as it leads into the triangle by more than rounding. A nearer or
+  /// earlier contact at that triangle stands for it. A flat floor therefore has no contacts with
+  /// its inner edges. Docs/Shapes.md has the exceptions.
   Distinct,
   All  ///< every feature pair that the method's definition includes
 };

