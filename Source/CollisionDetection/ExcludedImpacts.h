@@ -2,7 +2,6 @@
 
 #include <palpate/CollisionData.h>
 
-#include "Math/ClosestPoint.h"
 #include "Math/NormalCone.h"
 #include "NarrowPhase/NarrowPhase.h"
 
@@ -10,135 +9,161 @@
 #include <array>
 #include <cstdint>
 #include <tuple>
-#include <type_traits>
 
 namespace palpate {
 
-/// Contacts::Distinct for impacts of lines and points: whether the elements around the features
-/// that hold an impact's closest points exclude its normal.
+/// Contacts::Distinct for impacts of lines and points: which impacts are excluded, and which others
+/// stand for these.
 ///
 /// A triangle at a closest edge or vertex excludes the direction to the other closest point if it
-/// leads into the triangle: the triangle then comes nearer to the other feature. The impact is
-/// excluded if the other feature has an impact with this triangle, or with one of its edges, that
-/// is earlier, or as early and nearer. An impact with the triangle's interior may be up to the time
-/// tolerance later, as it is never excluded. A triangle must exclude the direction at the step's
-/// end as well: a surface that a solver has bent around the other feature needs all its contacts.
+/// leads into the triangle: the triangle then comes nearer to the other feature. So does a segment
+/// at a vertex. An excluded impact of a vertex, or of a line's edge, is dropped if another impact
+/// that is not excluded, of the same vertex, or of the same edge or one of its ends,
+/// (1) is earlier, or as early and nearer; one with a triangle's interior may be up to
+///     timeTolerance later,
+/// (2) has a tangent plane that contains the other element at the step's end, and
+/// (3) holds the vertex or edge in front of that plane: at the step's end, no point of it is nearer
+///     to the plane than its row, or that of another such impact with the plane, says.
+/// So the rows that stay keep the vertex or edge away from the element. Tissue that is bent, or
+/// that bends around a tool within the step, keeps all its contacts.
 ///
-/// Laws     (1) Of all impacts the first one stays, and of equally early ones the nearest. (2) An
-///          excluded impact of a vertex has an earlier or nearer one of the same vertex. (3) An
-///          excluded impact of an edge has an earlier or nearer one of the same edge or of one of
-///          its ends. In all three, one with a triangle's interior, at most the time tolerance
-///          later, may take its place.
-///
-/// Impacts finds the impacts of all feature pairs. Each function returns a pointer, or null:
-///   const VertexTriangleContact* ofVertex(vertex, triangle, swapped) const;
-///   const EdgeEdgeContact* ofEdges(const Segment& edgeA, const Segment& edgeB) const;
-/// swapped: the vertex is of MeshPair::b.
-template <class Impacts>
+/// Laws     (1) Of all impacts the first one stays, and of equally early ones the nearest, or one
+///          with a triangle's interior that is at most timeTolerance later stands for it. (2) For a
+///          dropped impact of a vertex one of the same vertex stays. (3) For a dropped impact of an
+///          edge one of the same edge or of one of its ends stays.
 class ExcludedImpacts {
  public:
-  ExcludedImpacts(const MeshPair& pair, const Impacts& impacts)
-      : m_pair(pair), m_impacts(impacts) {}
+  explicit ExcludedImpacts(const MeshPair& pair) : m_pair(pair) {}
 
-  bool contain(const VertexTriangleContact& c, bool swapped) const {
+  /// Whether the rule is for this pair: one of its meshes has lines or points.
+  bool mayExclude() const {
+    return !(m_pair.a.topology.hasFaces() && m_pair.b.topology.hasFaces());
+  }
+  /// Whether edges of the pair's second mesh are those of lines near a triangle mesh.
+  bool linesAreSecond() const { return m_pair.a.topology.hasFaces(); }
+  const Segment& lineEdge(const EdgeEdgeContact& c) const {
+    return linesAreSecond() ? c.edgeB : c.edgeA;
+  }
+
+  /// swapped: the vertex is of MeshPair::b.
+  bool isExcluded(const VertexTriangleContact& c, bool swapped) const {
     if (c.feature == TriangleFeature::Face) return false;
     const int i = static_cast<int>(c.feature);
     const Segment feature = i < 3 ? Segment{c.corners[i], c.corners[i]}
                                   : Segment{c.corners[i - 3], c.corners[(i - 2) % 3]};
-    const TriangleMesh &points = swapped ? m_pair.b : m_pair.a,
-                       &mesh = swapped ? m_pair.a : m_pair.b;
-    const auto standsIn = [&](std::uint32_t triangle) {
-      return standsFor(m_impacts.ofVertex(c.vertex, triangle, swapped), c);
-    };
-    const auto atEnd = [&] {
-      const Eigen::Vector3d p = mesh.now[feature[0]], q = mesh.now[feature[1]];
-      return finiteVertexTriangleDistance(points.now[c.vertex], p, q, q).normal;
-    };
-    return anyAround(mesh, feature, c.normal, c.timeOfImpact, standsIn) &&
-           isExcludedAtEnd(mesh, feature, atEnd);
+    return excludes(swapped ? m_pair.a : m_pair.b, feature, c.normal, c.timeOfImpact);
   }
-  bool contain(const EdgeEdgeContact& c) const {
-    return isExcludedBy(m_pair.b, c.edgeB, c.featureB, c.edgeA, c.normal, c, false) ||
-           isExcludedBy(m_pair.a, c.edgeA, c.featureA, c.edgeB, -c.normal, c, true);
+  bool isExcluded(const EdgeEdgeContact& c) const {
+    return isExcludedBy(m_pair.b, c.edgeB, c.featureB, c.normal, c.timeOfImpact) ||
+           isExcludedBy(m_pair.a, c.edgeA, c.featureA, -c.normal, c.timeOfImpact);
+  }
+
+  // Whether another impact stands for an excluded one. anyOf(f): whether f is true for an impact
+  // that is not excluded, of the same vertex; or for an edge pair, of the same edge of a line or of
+  // one of its ends.
+
+  template <class AnyOf>
+  bool isReplaced(const VertexTriangleContact& c, bool swapped, AnyOf&& anyOf) const {
+    return anyOf([&](const VertexTriangleContact& s) {
+      return isInTime(s, c) &&
+             areInPlane(planeOf(s, swapped), swapped ? m_pair.a : m_pair.b, c.corners);
+    });
+  }
+  template <class AnyOf>
+  bool isReplaced(const EdgeEdgeContact& c, AnyOf&& anyOf) const {
+    return anyOf([&](const auto& s) {
+      TangentPlane plane = planeOf(s, linesAreSecond());
+      if (!isInTime(s, c) || !areInPlane(plane, mesh(), linesAreSecond() ? c.edgeA : c.edgeB))
+        return false;
+      anyOf([&](const auto& other) {
+        const TangentPlane itsPlane = planeOf(other, linesAreSecond());
+        if (plane.isSameAs(itsPlane)) plane.gap = std::min(plane.gap, itsPlane.gap);
+        return false;
+      });
+      const Segment& edge = lineEdge(c);
+      return std::all_of(edge.begin(), edge.end(), [&](std::uint32_t v) {
+        return plane.hasInFront(lines().now[v], lines().radius(v));
+      });
+    });
   }
 
  private:
-  /// swapped: the edge, which is the other one than the mesh's, is of MeshPair::b.
-  bool isExcludedBy(const TriangleMesh& mesh, const Segment& ends, EdgeFeature feature,
-                    const Segment& edge, const Eigen::Vector3d& direction, const EdgeEdgeContact& c,
-                    bool swapped) const {
-    if (!mesh.topology.hasFaces()) return false;
-    const Segment closest{ends[feature == EdgeFeature::End], ends[feature != EdgeFeature::Start]};
-    const auto standsIn = [&](std::uint32_t triangle) {
-      const auto ofVertex = [&](std::uint32_t v) {
-        return standsFor(m_impacts.ofVertex(v, triangle, swapped), c);
-      };
-      const auto ofEdge = [&](std::uint32_t side) {
-        const Segment& other = mesh.topology.edges[side];
-        return standsFor(swapped ? m_impacts.ofEdges(other, edge) : m_impacts.ofEdges(edge, other),
-                         c);
-      };
-      const auto& sides = mesh.topology.triangleEdges[triangle];
-      return std::any_of(edge.begin(), edge.end(), ofVertex) ||
-             std::any_of(sides.begin(), sides.end(),
-                         [&](std::uint32_t side) { return side != kNoEdge && ofEdge(side); });
-    };
-    const auto atEnd = [&] {
-      const Positions& lines = (swapped ? m_pair.b : m_pair.a).now;
-      return finiteEdgeEdgeDistance(lines[edge[0]], lines[edge[1]], mesh.now[closest[0]],
-                                    mesh.now[closest[1]])
-          .normal;
-    };
-    return anyAround(mesh, closest, direction, c.timeOfImpact, standsIn) &&
-           isExcludedAtEnd(mesh, closest, atEnd);
-  }
+  using Vector3d = Eigen::Vector3d;
 
-  template <class F>
-  static bool isExcludedAtEnd(const TriangleMesh& mesh, const Segment& feature,
-                              F&& directionAtEnd) {
-    return anyAround(
-        mesh, feature, directionAtEnd(), 1.0, [](std::uint32_t) { return true; }, kBentSurface);
+  static Vector3d at(const TriangleMesh& mesh, std::uint32_t vertex, double time) {
+    return (1.0 - time) * mesh.before[vertex] + time * mesh.now[vertex];
   }
-  /// Whether a direction from a vertex {v, v} or an edge leads into one of the elements around it
-  /// that `f` accepts.
-  template <class F>
-  static bool anyAround(const TriangleMesh& mesh, const Segment& feature,
-                        const Eigen::Vector3d& direction, double time, F&& f, double bend = 0.0) {
+  // Of lines near a triangle mesh.
+  const TriangleMesh& mesh() const { return linesAreSecond() ? m_pair.a : m_pair.b; }
+  const TriangleMesh& lines() const { return linesAreSecond() ? m_pair.b : m_pair.a; }
+
+  bool isExcludedBy(const TriangleMesh& mesh, const Segment& ends, EdgeFeature feature,
+                    const Vector3d& direction, double time) const {
+    const Segment closest{ends[feature == EdgeFeature::End], ends[feature != EdgeFeature::Start]};
+    return mesh.topology.hasFaces() && excludes(mesh, closest, direction, time);
+  }
+  /// Whether a direction from a vertex {v, v} or an edge leads into an element around it.
+  static bool excludes(const TriangleMesh& mesh, const Segment& feature, const Vector3d& direction,
+                       double time) {
     const std::uint32_t p = feature[0], q = feature[1];
     const MeshTopology& topology = mesh.topology;
-    const auto at = [&](std::uint32_t v) -> Eigen::Vector3d {
-      return (1.0 - time) * mesh.before[v] + time * mesh.now[v];
-    };
     const auto leadsTo = [&](std::uint32_t corner) {
       if (corner == p || corner == q) return false;
-      return p == q ? leadsTowards(direction, at(p), at(corner), bend)
-                    : leadsInto(direction, at(p), at(q), at(corner), bend);
+      return p == q ? leadsTowards(direction, at(mesh, p, time), at(mesh, corner, time))
+                    : leadsInto(direction, at(mesh, p, time), at(mesh, q, time),
+                                at(mesh, corner, time));
     };
     const auto around =
         p == q ? topology.vertexTriangles[p]
                : topology.edgeTriangles[topology.edgeOf({std::min(p, q), std::max(p, q)})];
     return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
       const Triangle& corners = topology.triangles[triangle];
-      return std::any_of(corners.begin(), corners.end(), leadsTo) && f(triangle);
+      return std::any_of(corners.begin(), corners.end(), leadsTo);
     });
   }
 
-  template <class Found, class Contact>
-  bool standsFor(const Found* found, const Contact& c) const {
-    if (!found) return false;
-    if constexpr (std::is_same_v<Found, VertexTriangleContact>)
-      if (found->feature == TriangleFeature::Face)
-        return found->timeOfImpact <= c.timeOfImpact + m_pair.settings.timeTolerance;
-    return std::tie(found->timeOfImpact, found->distance) < std::tie(c.timeOfImpact, c.distance);
+  bool isInTime(const VertexTriangleContact& s, const auto& c) const {
+    return s.feature == TriangleFeature::Face
+               ? s.timeOfImpact <= c.timeOfImpact + m_pair.settings.timeTolerance
+               : isEarlierOrNearer(s, c);
+  }
+  bool isInTime(const EdgeEdgeContact& s, const auto& c) const { return isEarlierOrNearer(s, c); }
+  static bool isEarlierOrNearer(const auto& s, const auto& c) {
+    return std::tie(s.timeOfImpact, s.distance) < std::tie(c.timeOfImpact, c.distance);
   }
 
-  const MeshPair& m_pair;
-  const Impacts& m_impacts;
-};
+  TangentPlane planeOf(const VertexTriangleContact& s, bool swapped) const {
+    const TriangleMesh &vertices = swapped ? m_pair.b : m_pair.a,
+                       &mesh = swapped ? m_pair.a : m_pair.b;
+    Vector3d point = Vector3d::Zero();
+    for (int i = 0; i < 3; ++i) point += s.barycentric[i] * mesh.now[s.corners[i]];
+    return planeAt(s.normal, point, mesh.radius(s.corners, s.barycentric), vertices.now[s.vertex],
+                   vertices.radius(s.vertex));
+  }
+  TangentPlane planeOf(const EdgeEdgeContact& s, bool second) const {
+    const auto pointOf = [](const TriangleMesh& mesh, const Segment& edge, double weight) {
+      return Vector3d((1.0 - weight) * mesh.now[edge[0]] + weight * mesh.now[edge[1]]);
+    };
+    const Vector3d a = pointOf(m_pair.a, s.edgeA, s.weightA),
+                   b = pointOf(m_pair.b, s.edgeB, s.weightB);
+    const double radiusA = m_pair.a.radius(s.edgeA, s.weightA),
+                 radiusB = m_pair.b.radius(s.edgeB, s.weightB);
+    return second ? planeAt(-s.normal, a, radiusA, b, radiusB)
+                  : planeAt(s.normal, b, radiusB, a, radiusA);
+  }
+  TangentPlane planeAt(const Vector3d& up, const Vector3d& point, double radius,
+                       const Vector3d& other, double otherRadius) const {
+    return {up, point, radius, up.dot(other - point) - radius - otherRadius,
+            m_pair.settings.thickness};
+  }
 
-/// Whether the class is for this pair: one of its meshes has lines or points.
-inline bool mayExcludeImpacts(const MeshPair& pair) {
-  return !(pair.a.topology.hasFaces() && pair.b.topology.hasFaces());
-}
+  template <class Vertices>
+  static bool areInPlane(const TangentPlane& plane, const TriangleMesh& mesh,
+                         const Vertices& vertices) {
+    return std::all_of(vertices.begin(), vertices.end(),
+                       [&](std::uint32_t v) { return plane.touches(mesh.now[v], mesh.radius(v)); });
+  }
+  const MeshPair& m_pair;
+};
 
 }  // namespace palpate

@@ -50,6 +50,10 @@ class FirstImpacts {
     double time;
     std::uint32_t list, index;
   };
+  void sortEntries();
+  void dropExcluded(const MeshPair&, double end, const OrderScratch&,
+                    const CollisionData::Contents&);
+
   Buffer<Entry> m_entries;
   std::array<Buffer<std::uint8_t>, 3> m_dropped;  ///< by list and index
 };

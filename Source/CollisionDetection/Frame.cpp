@@ -787,8 +787,9 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
         record.plan.step.reportsImpacts ? 1.0 : std::numeric_limits<double>::infinity(),
         m_orderScratch, contents);
   if (const MeshPair meshes = record.meshes(); meshes.hasShape() && !meshes.isShapePair())
-    contents.shape.resize(m_distinctContacts.keep(meshes.mesh(), meshes.shape().now,
-                                                  meshes.settings, contents.shape));
+    contents.shape.resize(m_distinctContacts.keep(
+        meshes.mesh(), meshes.shape().now, meshes.poses().before.transform(),
+        meshes.poses().now.transform(), meshes.settings, contents.shape));
   countContacts(record.plan, intersectionCount, contents);
   if (record.plan.byProxy) describeAsShape(record.a->mesh, contents);
   record.candidatesSorted = candidatesSorted;

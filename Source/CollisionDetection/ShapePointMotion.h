@@ -2,10 +2,15 @@
 
 #include <palpate/ConstraintRows.h>
 
+#include "Mesh/PointMotion.h"
+
 namespace palpate {
 
-/// L: the displacement over the step of the shape's point that is at `point` at a time of the step.
-/// Each point of the shape moves in a straight line.
-Eigen::Vector3d displacementAt(const ShapeMotion&, const Eigen::Vector3d& point, double time);
+/// The same for a shape's motion as a solver passes it.
+inline Eigen::Vector3d displacementAt(const ShapeMotion& motion, const Eigen::Vector3d& point,
+                                      double time) {
+  return displacementAt({motion.rotationBefore, motion.translationBefore},
+                        {motion.rotation, motion.translation}, point, time);
+}
 
 }  // namespace palpate

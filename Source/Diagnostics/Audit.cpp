@@ -164,50 +164,77 @@ class KnownVertices {
   const MeshPair& m_meshes;
 };
 
-/// Computes the impacts that the frame has in its lists. A pointer is valid until the next call.
-class ComputedImpacts {
+/// Contacts::Distinct for impacts of lines and points: drops excluded impacts for which others
+/// stand. Computes all impacts of their vertices and edges.
+class ExcludedByBruteForce {
  public:
-  explicit ComputedImpacts(const MeshPair& meshes) : m_meshes(meshes) {}
+  explicit ExcludedByBruteForce(const MeshPair& meshes) : m_meshes(meshes), m_rule(meshes) {}
 
-  const VertexTriangleContact* ofVertex(std::uint32_t vertex, std::uint32_t triangle,
-                                        bool swapped) const {
-    m_found.clear();
-    if (m_meshes.excludesVertex(vertex, triangle)) return nullptr;
-    const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? m_meshes.b : m_meshes.a,
-                                                               swapped ? m_meshes.a : m_meshes.b};
-    addImpact(m_meshes, features, vertex, triangle, swapped, m_found);
-    const auto& list =
-        m_found.vertexTriangle.empty() ? m_found.triangleVertex : m_found.vertexTriangle;
-    return list.empty() ? nullptr : &list.front();
+  bool isDropped(const VertexTriangleContact& c, bool swapped) {
+    if (!m_rule.isExcluded(c, swapped)) return false;
+    m_ofVertices.clear();
+    addImpactsOf(c.vertex, swapped);
+    return m_rule.isReplaced(c, swapped, [&](auto&& f) { return anyOfVertices(swapped, f); });
   }
-  const EdgeEdgeContact* ofEdges(const Segment& a, const Segment& b) const {
-    m_found.clear();
-    const std::uint32_t edgeA = m_meshes.a.topology.edgeOf(a),
-                        edgeB = m_meshes.b.topology.edgeOf(b);
-    addImpact(m_meshes, Features<ImpactQuery::Kind::EdgeEdge>{m_meshes.a, m_meshes.b}, edgeA, edgeB,
-              false, m_found);
-    return m_found.edgeEdge.empty() ? nullptr : &m_found.edgeEdge.front();
+  bool isDropped(const EdgeEdgeContact& c) {
+    if (!m_rule.isExcluded(c)) return false;
+    const bool swapped = m_rule.linesAreSecond();
+    const Segment& edge = m_rule.lineEdge(c);
+    m_ofVertices.clear();
+    for (const std::uint32_t end : edge) addImpactsOf(end, swapped);
+    findImpactsOf(edge);
+    return m_rule.isReplaced(c, [&](auto&& f) {
+      return std::any_of(m_ofEdge.edgeEdge.begin(), m_ofEdge.edgeEdge.end(),
+                         [&](const auto& s) { return !m_rule.isExcluded(s) && f(s); }) ||
+             anyOfVertices(swapped, f);
+    });
   }
 
  private:
+  template <class F>
+  bool anyOfVertices(bool swapped, F&& f) const {
+    const auto& impacts = swapped ? m_ofVertices.triangleVertex : m_ofVertices.vertexTriangle;
+    return std::any_of(impacts.begin(), impacts.end(),
+                       [&](const auto& s) { return !m_rule.isExcluded(s, swapped) && f(s); });
+  }
+  void addImpactsOf(std::uint32_t vertex, bool swapped) {
+    const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? m_meshes.b : m_meshes.a,
+                                                               swapped ? m_meshes.a : m_meshes.b};
+    const MeshTopology& others = (swapped ? m_meshes.a : m_meshes.b).topology;
+    for (std::uint32_t t = 0; t < others.triangles.size(); ++t)
+      if (others.isEnabled(t) && !m_meshes.excludesVertex(vertex, t))
+        addImpact(m_meshes, features, vertex, t, swapped, m_ofVertices);
+  }
+  /// Of an edge of a line near a triangle mesh.
+  void findImpactsOf(const Segment& edge) {
+    const bool second = m_rule.linesAreSecond();
+    const Features<ImpactQuery::Kind::EdgeEdge> features{m_meshes.a, m_meshes.b};
+    const std::uint32_t line = (second ? m_meshes.b : m_meshes.a).topology.edgeOf(edge);
+    const MeshTopology& others = (second ? m_meshes.a : m_meshes.b).topology;
+    m_ofEdge.clear();
+    for (std::uint32_t other = 0; other < others.edges.size(); ++other)
+      if (!others.edgeTriangles[other].empty())
+        addImpact(m_meshes, features, second ? other : line, second ? line : other, false,
+                  m_ofEdge);
+  }
+
   const MeshPair& m_meshes;
-  mutable ContactBuffers m_found;
+  const ExcludedImpacts m_rule;
+  ContactBuffers m_ofVertices, m_ofEdge;
 };
 
-/// Contacts::Distinct for impacts: drops expected impacts that the elements around them exclude.
 void dropExcludedImpacts(const MeshPair& meshes, CollisionData::Contents& expected) {
   const bool impactsOnly = meshes.settings.method == Method::Continuous;
-  if (meshes.settings.contacts != Contacts::Distinct || !mayExcludeImpacts(meshes) ||
+  if (meshes.settings.contacts != Contacts::Distinct || !ExcludedImpacts(meshes).mayExclude() ||
       !(impactsOnly || meshes.step.reportsImpacts))
     return;
-  const ComputedImpacts impacts(meshes);
-  const ExcludedImpacts excluded(meshes, impacts);
+  ExcludedByBruteForce excluded(meshes);
   forEachImpactList(expected, [&](auto& contacts, int list) {
     std::erase_if(contacts, [&](const auto& contact) {
       if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
-        return excluded.contain(contact);
+        return excluded.isDropped(contact);
       else
-        return excluded.contain(contact, list == 1);
+        return excluded.isDropped(contact, list == 1);
     });
   });
 }
@@ -385,8 +412,9 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
   dropExcludedImpacts(meshes, expected);
   dropRepeatedImpacts(meshes, data, expected);
   if (needsAll) {
-    expected.shape.resize(DistinctContacts().keep(meshes.mesh(), meshes.shape().now,
-                                                  meshes.settings, expected.shape));
+    expected.shape.resize(DistinctContacts().keep(
+        meshes.mesh(), meshes.shape().now, meshes.poses().before.transform(),
+        meshes.poses().now.transform(), meshes.settings, expected.shape));
     std::erase_if(expected.shape, [&](const ShapeContact& c) { return !coverage.coversShape(c); });
   }
   const auto compareList = [&](const auto& truth, const auto& found, auto covers, List list) {

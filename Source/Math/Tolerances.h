@@ -249,9 +249,14 @@ constexpr double kDepthGain = 0x1p-14;
 /// normal is off by the rounding of coordinates, 2^-50 at most, over the distance that it was
 /// computed from. The normals of bodies that lie flat on each other differ by no more.
 constexpr double kNormalConeError = 0x1p-40;
-/// About the sine of an angle: surfaces that are bent by less at the end of a step need no contacts
-/// for it. Any small angle will do.
-constexpr double kBentSurface = 0x1p-8;
+/// Of the thickness: features at most this far from a contact's tangent plane are in it. Soft
+/// tissue bends by more around a tool, and then needs all its contacts: with 2^-4, tools sink twice
+/// as often into a sheet that rows push away.
+constexpr double kPlaneShare = 0x1p-7;
+/// Sine of an angle, and a share of a shape's size: normals that differ by less, at points further
+/// apart, are of one flat or straight part of the shape. Any small angle and share will do.
+constexpr double kSamePartAngle = 0x1p-10;
+constexpr double kSamePartShare = 0x1p-3;
 /// L²: squared lengths above this, and products with them, lose nothing significant to underflow.
 constexpr double kSmallestEdgeSquare = 0x1p-900;
 

@@ -27,8 +27,8 @@ void StepFacts::add(const StepFacts& other) {
     (this->*list).insert((this->*list).end(), (other.*list).begin(), (other.*list).end());
 }
 
-void StepFacts::addShape(const ShapeContactBuffers& found, bool atStart) {
-  double& gap = atStart ? gapAtStart : clearance;
+void StepFacts::addShape(const ShapeContactBuffers& found, bool isAtStart) {
+  double& gap = isAtStart ? gapAtStart : clearance;
   gap = std::min(gap, found.shapeGap);
   sideUnknown |= found.shapeSideUnknown;
 }

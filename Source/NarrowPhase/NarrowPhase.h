@@ -94,6 +94,8 @@ struct MeshPair {
   /// For a pair with a shape or a field: the mesh of the other geometry; and the shape.
   const TriangleMesh& mesh() const { return shapeOfA || fieldMesh == &a ? b : a; }
   const PlacedShape& shape() const { return *(shapeOfA ? shapeOfA : shapeOfB); }
+  /// The mesh that has the shape's poses.
+  const TriangleMesh& poses() const { return shapeOfA ? a : b; }
   bool hasLines() const {
     return a.topology.type == GeometryType::Lines || b.topology.type == GeometryType::Lines;
   }

@@ -561,7 +561,8 @@ void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
     std::sort(found.begin(), found.end(), [](const ShapeContact& a, const ShapeContact& b) {
       return std::tie(a.element, a.id, a.vertices) < std::tie(b.element, b.id, b.vertices);
     });
-    found.resize(scratch->distinctContacts.keep(geometry.mesh, tool.now, settings, found));
+    found.resize(
+        scratch->distinctContacts.keep(geometry.mesh, tool.now, pose, pose, settings, found));
   }
   out.reserve(found.size());  // nothing below throws
   out.assign(found.begin(), found.end());

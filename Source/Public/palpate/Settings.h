@@ -134,10 +134,8 @@ enum class Contacts {
   /// with a weight other than 0 keeps its earliest time, and earliestTimeOfImpact() is that of All.
   /// Docs/SupportMatrix.md has the reasons.
   ///
-  /// Of shapes, lines and points no contact with a vertex or an edge of a mesh has a normal that a
-  /// triangle there excludes, as it leads into the triangle by more than rounding. A nearer or
-  /// earlier contact at that triangle stands for it. A flat floor therefore has no contacts with
-  /// its inner edges. Docs/Shapes.md has the exceptions.
+  /// Shapes, lines and points have no contacts with the inner edges and vertices of a flat part of
+  /// a mesh, whose normals would be tilted (Docs/Shapes.md, "Edges of flat floors").
   Distinct,
   All  ///< every feature pair that the method's definition includes
 };

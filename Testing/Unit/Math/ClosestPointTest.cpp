@@ -398,7 +398,9 @@ TEST(ClosestPoint, SwappingParallelEdgesOrEndsSwapsTheResult) {
     edges.difference = -edges.difference;
     edges.normal = -edges.normal;
     ASSERT_EQ(bitsOf(edges), bitsOf(answer)) << i;
-    if (answer.parallel) ASSERT_EQ(edges.normal, answer.normal) << i;
+    if (answer.parallel) {
+      ASSERT_EQ(edges.normal, answer.normal) << i;
+    }
     EdgeEdgeDistance ends = edgeEdgeDistance(p0, p1, q1, q0);
     ends.weightB = 1.0 - ends.weightB;
     ASSERT_EQ(bitsOf(ends), bitsOf(answer)) << i;

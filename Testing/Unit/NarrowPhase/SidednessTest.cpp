@@ -173,8 +173,8 @@ void expectOutward(const Mesh& body, const SidedTool& tool, const PairSettings& 
         answer(settingsOf(Engine::BruteForce), body, tool, every, Sidedness::Both);
     for (const auto& c : everything.edgeEdge()) edges.push_back(touchOf(c, body));
     const std::vector<Row> possible = outward(body, edges, false, truth.edgeEdge, told);
-    const auto contains = [](const std::vector<Row>& all, const std::vector<Row>& some) {
-      return std::includes(all.begin(), all.end(), some.begin(), some.end());
+    const auto contains = [](const std::vector<Row>& whole, const std::vector<Row>& some) {
+      return std::includes(whole.begin(), whole.end(), some.begin(), some.end());
     };
     EXPECT_TRUE(contains(truth.edgeEdge, kept) && contains(possible, truth.edgeEdge));
     EXPECT_LT(truth.edgeEdge.size(), possible.size());

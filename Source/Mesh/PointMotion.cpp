@@ -1,4 +1,4 @@
-#include "CollisionDetection/ShapePointMotion.h"
+#include "Mesh/PointMotion.h"
 
 #include <Eigen/Geometry>
 
@@ -17,12 +17,12 @@ Vector3d solve(const Matrix3d& matrix, const Vector3d& right) {
 
 }  // namespace
 
-Vector3d displacementAt(const ShapeMotion& motion, const Vector3d& point, double time) {
-  const Matrix3d rotation = (1 - time) * motion.rotationBefore + time * motion.rotation;
-  const Vector3d translation = (1 - time) * motion.translationBefore + time * motion.translation;
+Vector3d displacementAt(const RigidTransform& before, const RigidTransform& now,
+                        const Vector3d& point, double time) {
+  const Matrix3d rotation = (1 - time) * before.rotation + time * now.rotation;
+  const Vector3d translation = (1 - time) * before.translation + time * now.translation;
   const Vector3d body = solve(rotation, point - translation);
-  return (motion.rotation - motion.rotationBefore) * body +
-         (motion.translation - motion.translationBefore);
+  return (now.rotation - before.rotation) * body + (now.translation - before.translation);
 }
 
 }  // namespace palpate

@@ -1,0 +1,121 @@
+#pragma once
+
+#include <palpate/CollisionData.h>
+
+#include "Common/ShapeTruth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <tuple>
+#include <vector>
+
+namespace palpate::testing {
+
+/// The definition of Contacts::Distinct for a mesh and a shape, which is no plane.
+struct DistinctTruth {
+  const std::vector<Vector3d>&before, &now;
+  const std::vector<Triangle>& elements;  ///< segments as {p, q, q}
+  double radius;
+  const PlacedShape &atStart, &atEnd;
+  double thickness, timeTolerance;
+
+  Vector3d at(std::uint32_t v, double time) const { return (1 - time) * before[v] + time * now[v]; }
+  static bool has(const Triangle& element, std::uint32_t v) {
+    return std::find(element.begin(), element.end(), v) != element.end();
+  }
+
+  /// Whether the direction from a contact's vertex or edge to the shape leads into an element
+  /// there.
+  bool isExcluded(const ShapeContact& c) const {
+    const auto& [p, q, unused] = c.vertices;
+    if (c.element == ShapeElement::Face) return false;
+    for (const Triangle& element : elements) {
+      if (!has(element, p) || !has(element, q)) continue;
+      for (const std::uint32_t v : element) {
+        if (v == p || v == q) continue;
+        const Vector3d way = at(v, c.timeOfImpact) - at(p, c.timeOfImpact);
+        Vector3d inwards = way;
+        if (p != q) {
+          const Vector3d along = (at(q, c.timeOfImpact) - at(p, c.timeOfImpact)).normalized();
+          inwards -= inwards.dot(along) * along;
+        }
+        if (-c.normal.dot(inwards) > 1e-12 * way.lpNorm<1>()) return true;
+      }
+    }
+    return false;
+  }
+
+  Vector3d pointAtEnd(const ShapeContact& c) const {
+    Vector3d point = Vector3d::Zero();
+    for (int i = 0; i < 3; ++i) point += c.weights[i] * now[c.vertices[i]];
+    return point;
+  }
+
+  /// Whether each contact stays. gaps: of their rows at the step's end.
+  std::vector<char> kept(std::span<const ShapeContact> all, std::span<const double> gaps) const {
+    const auto isFirst = [&](std::size_t l, std::size_t r) {
+      return std::tie(all[l].timeOfImpact, all[l].distance) <
+             std::tie(all[r].timeOfImpact, all[r].distance);
+    };
+    std::vector<std::size_t> proper, excluded;
+    for (std::size_t i = 0; i < all.size(); ++i)
+      (isExcluded(all[i]) ? excluded : proper).push_back(i);
+    std::stable_sort(proper.begin(), proper.end(), isFirst);
+    std::vector<char> stays(all.size(), true);
+    const double near = thickness / 128 + 1e-12;
+    for (int planes = 0; planes < 8 && !proper.empty(); ++planes) {
+      const std::size_t first = proper.front();
+      const ShapeContact& s = all[first];
+      const double height = s.normal.dot(pointAtEnd(s));
+      double gap = gaps[first];
+      std::erase_if(proper, [&](std::size_t i) {
+        if ((all[i].normal - s.normal).norm() > 1e-12 ||
+            std::abs(s.normal.dot(pointAtEnd(all[i])) - height) > 2 * near)
+          return false;
+        gap = std::min(gap, gaps[i]);
+        return true;
+      });
+      // The shape is on the side that the normal comes from.
+      if (reachOf(atEnd, s.normal) > height - radius - gap + near) continue;
+      std::erase_if(excluded, [&](std::size_t i) {
+        const ShapeContact& c = all[i];
+        const bool inTime = isFirst(first, i) || (s.element == ShapeElement::Face &&
+                                                  s.timeOfImpact <= c.timeOfImpact + timeTolerance),
+                   isIn = std::all_of(c.vertices.begin(), c.vertices.end(), [&](std::uint32_t v) {
+                     return std::abs(s.normal.dot(now[v]) - height) <= near;
+                   });
+        // At another part of a flat side of the shape, the same normal is no tilted one.
+        const bool isAlike = (c.normal - s.normal).norm() <= 0x1p-10 &&
+                             (endOnShape(c) - endOnShape(s)).norm() > 0.125 * sizeOf(atEnd);
+        if (!inTime || !isIn || isAlike) return false;
+        stays[i] = false;
+        return true;
+      });
+    }
+    return stays;
+  }
+
+ private:
+  /// The contact's point on the shape, at the step's end.
+  Vector3d endOnShape(const ShapeContact& c) const {
+    const double t = c.timeOfImpact;
+    const Matrix3d turn = (1 - t) * atStart.rotation + t * atEnd.rotation;
+    const Vector3d place = (1 - t) * atStart.translation + t * atEnd.translation;
+    return atEnd.rotation * turn.inverse() * (c.pointOnShape - place) + atEnd.translation;
+  }
+  static double sizeOf(const PlacedShape& shape) {
+    if (const auto* cylinder = std::get_if<Cylinder>(&shape.geometry))
+      return (shape.rotation * (cylinder->p1 - cylinder->p0)).cwiseAbs().maxCoeff() +
+             cylinder->radius;
+    double radius = 0, longest = 0;
+    const std::vector<Vector3d> corners = cornersOf(shape, radius);
+    for (const Vector3d& p : corners)
+      longest = std::max(longest, (p - corners.front()).cwiseAbs().maxCoeff());
+    return longest + radius;
+  }
+};
+
+}  // namespace palpate::testing
