@@ -92,9 +92,18 @@ FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
   return floats;
 }
 
-void sortUnique(Buffer<std::uint32_t>& ids) {
-  std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+/// Sorts ids, which are below `count`, and keeps each once.
+void sortUnique(Buffer<std::uint32_t>& ids, std::size_t count, Buffer<std::uint8_t>& flags) {
+  if (ids.size() < count) {
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    return;
+  }
+  flags.assign(count, 0);
+  for (const std::uint32_t id : ids) flags[id] = 1;
+  ids.clear();
+  for (std::uint32_t id = 0; id < count; ++id)
+    if (flags[id]) ids.push_back(id);
 }
 
 std::size_t sizeOf(const CollisionData::Contents& contents) {
@@ -746,9 +755,11 @@ void Frame::finish(PairRecord& record, bool nearby, bool candidatesSorted, const
       m_facts.add(found->facts);
       if (record.hasShape()) m_facts.addShape(*found, record.plan.method == Method::Continuous);
     }
-  for (auto list : {&StepFacts::verticesA, &StepFacts::verticesB, &StepFacts::degenerateA,
-                    &StepFacts::degenerateB})
-    sortUnique(m_facts.*list);
+  const TriangleMesh &a = record.a->mesh, &b = record.b->mesh;
+  sortUnique(m_facts.verticesA, a.now.size(), m_flags);
+  sortUnique(m_facts.verticesB, b.now.size(), m_flags);
+  sortUnique(m_facts.degenerateA, a.topology.triangles.size(), m_flags);
+  sortUnique(m_facts.degenerateB, b.topology.triangles.size(), m_flags);
   if (record.plan.step.reportsImpacts && m_facts.clearance == 0.0) {
     for (ContactBuffers* found : m_buffers)
       replaceByImpacts(record.meshes(), m_facts, *found, m_impacts);

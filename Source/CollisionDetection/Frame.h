@@ -68,6 +68,7 @@ class Frame {
   OrderScratch m_orderScratch;
   FirstImpacts m_firstImpacts;
   DistinctContacts m_distinctContacts;
+  Buffer<std::uint8_t> m_flags;  ///< scratch
 };
 
 }  // namespace palpate

@@ -4,6 +4,7 @@
 #include "Math/Tolerances.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace palpate {
 
@@ -25,12 +26,19 @@ double sizeAtEnd(const ImpactQuery& query) {
 
 template <ImpactQuery::Kind kind>
 double motionBound(const ImpactQuery& query) {
+  const auto motionOf = [&](const ImpactQuery::Difference& d) -> Vector3d {
+    return (query.vertices[d[0]].at(1) - query.vertices[d[1]].at(1)) -
+           (query.vertices[d[0]].at(0) - query.vertices[d[1]].at(0));
+  };
+  double square = 0.0;
+  for (const ImpactQuery::Difference& d : ImpactQuery::corners(kind))
+    square = std::max(square, motionOf(d).squaredNorm());
   double motion = 0.0;
-  for (const ImpactQuery::Difference& d : ImpactQuery::corners(kind)) {
-    const Vector3d now = query.vertices[d[0]].at(1) - query.vertices[d[1]].at(1),
-                   before = query.vertices[d[0]].at(0) - query.vertices[d[1]].at(0);
-    motion = std::max(motion, stableLength(now - before));
-  }
+  if (square > kSmallestSlowSquare && std::isfinite(square))
+    motion = std::sqrt(square);
+  else
+    for (const ImpactQuery::Difference& d : ImpactQuery::corners(kind))
+      motion = std::max(motion, stableLength(motionOf(d)));
   return motion + kMotionError * (motion + sizeAtEnd<kind>(query));
 }
 

@@ -59,7 +59,8 @@ constexpr std::size_t kVertices = 8;  ///< in a block
 
 using Eigen::Vector3d;
 
-constexpr std::size_t kSampled = 512;  ///< vertices of a mesh that meanMotion() samples
+constexpr std::size_t kSampled = 512;  ///< pairs of vertices that fastShare() samples
+constexpr std::size_t kStride = 197;   ///< spreads them over the second mesh; any odd number
 
 void MotionRange::add(const MotionRange& other) {
   if (other.isEmpty) return;
@@ -101,22 +102,16 @@ double smallestMotion(const MotionRange& a, const MotionRange& b) {
   return stableLength(least) * (1.0 - kMotionError);
 }
 
-double meanMotion(const TriangleMesh& a, const TriangleMesh& b) {
-  if (a.now.size() == 0 || b.now.size() == 0) return 0.0;
-  Vector3d means[2] = {Vector3d::Zero(), Vector3d::Zero()};
-  double squares = 0.0;
-  for (const bool second : {false, true}) {
-    const TriangleMesh& mesh = second ? b : a;
-    const std::size_t step = 1 + mesh.now.size() / kSampled,
-                      count = 1 + (mesh.now.size() - 1) / step;
-    const double weight = 1.0 / static_cast<double>(count);
-    for (std::size_t v = 0; v < mesh.now.size(); v += step) {
-      const Vector3d moved = mesh.now[v] - mesh.before[v];
-      means[second] += weight * moved;
-      squares += weight * moved.squaredNorm();
-    }
+double fastShare(const TriangleMesh& a, const TriangleMesh& b, double limit) {
+  const std::size_t countA = a.now.size(), countB = b.now.size();
+  if (countA == 0 || countB == 0) return 0.0;
+  std::size_t fast = 0;
+  for (std::size_t i = 0; i < kSampled; ++i) {
+    const std::size_t v = i * countA / kSampled, w = i * kStride % kSampled * countB / kSampled;
+    const Vector3d motion = (a.now[v] - a.before[v]) - (b.now[w] - b.before[w]);
+    fast += !(motion.squaredNorm() <= limit * limit);
   }
-  return std::sqrt(std::max(0.0, squares - 2.0 * means[0].dot(means[1])));
+  return static_cast<double>(fast) / kSampled;
 }
 
 }  // namespace palpate

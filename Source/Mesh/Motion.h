@@ -29,8 +29,8 @@ MotionRange motionRange(const Positions& before, const Positions& now);
 /// further, and none less far. Common motion, such as a translation of both, does not count.
 double largestMotion(const MotionRange&, const MotionRange&);
 double smallestMotion(const MotionRange&, const MotionRange&);
-/// L: root mean square of the relative motion over pairs of one vertex of each, for a sample of a
-/// few hundred vertices.
-double meanMotion(const TriangleMesh&, const TriangleMesh&);
+/// The share of pairs of one vertex of each that move further than `limit`, L, relative to each
+/// other, for a sample of a few hundred pairs.
+double fastShare(const TriangleMesh&, const TriangleMesh&, double limit);
 
 }  // namespace palpate

@@ -5,6 +5,10 @@
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
 namespace palpate {
 
 namespace {
@@ -13,6 +17,7 @@ namespace {
 struct DisplacementBounds {
   Eigen::Array3d lower, upper;
 
+  DisplacementBounds() = default;
   DisplacementBounds(const TriangleMesh& mesh, std::uint32_t triangle) {
     const auto& [a, b, c] = mesh.topology.triangles[triangle];
     const auto moved = [&](std::uint32_t v) -> Eigen::Array3d {
@@ -22,6 +27,27 @@ struct DisplacementBounds {
     lower = ofA.min(ofB).min(ofC);
     upper = ofA.max(ofB).max(ofC);
   }
+};
+
+/// The bounds of a mesh's triangles. Those of consecutive candidates are mostly known already.
+class KnownBounds {
+ public:
+  explicit KnownBounds(const TriangleMesh& mesh) : m_mesh(mesh) { m_triangles.fill(kNoElement); }
+
+  const DisplacementBounds& of(std::uint32_t triangle) {
+    const std::size_t place = triangle % kPlaces;
+    if (m_triangles[place] != triangle) {
+      m_triangles[place] = triangle;
+      m_bounds[place] = DisplacementBounds(m_mesh, triangle);
+    }
+    return m_bounds[place];
+  }
+
+ private:
+  static constexpr std::size_t kPlaces = 64;  ///< any number will do
+  const TriangleMesh& m_mesh;
+  std::array<std::uint32_t, kPlaces> m_triangles;
+  std::array<DisplacementBounds, kPlaces> m_bounds;
 };
 
 /// Square of a bound on motionBound() of features of two triangles, without rounding.
@@ -48,8 +74,9 @@ void divide(const MeshPair& pair, std::span<const ElementPair> candidates, Conta
   const StepPlan& step = pair.step;
   const double rounding = step.motionWithRounding - step.motion, slow = step.slowMotion - rounding,
                calm = kCalmShare * step.slowMotion - rounding;
+  KnownBounds ofA(pair.a), ofB(pair.b);
   for (const ElementPair& candidate : candidates) {
-    const double square = motionSquare({pair.a, candidate.a}, {pair.b, candidate.b});
+    const double square = motionSquare(ofA.of(candidate.a), ofB.of(candidate.b));
     (isCertainlyWithin(square, calm) ? out.calm : out.part).push_back(candidate);
     if (!isCertainlyWithin(square, slow)) out.fast.push_back(candidate);
   }
@@ -62,7 +89,8 @@ void findAuto(const MeshPair& pair, std::span<const ElementPair> candidates, Con
   if (pair.floats) {
     FloatPair atEnd = *pair.floats;
     atEnd.beforeA = atEnd.beforeB = nullptr;
-    keepOverlapping(pair.a.topology, pair.b.topology, atEnd, out.part);
+    for (auto* slow : {&out.part, &out.calm})
+      keepOverlapping(pair.a.topology, pair.b.topology, atEnd, *slow);
   }
   findProximity(pair, out.part, out);
   MeshPair calm = pair;

@@ -36,6 +36,10 @@ static void chooseMethod(const PairSettings& settings, const GeometryInStep& a,
   plan.reason = still ? MethodReason::Still : MethodReason::NoAlternative;
 }
 
+/// Auto: the largest share of pairs that move further than the tolerance, for which Proximity of
+/// the others pays off.
+constexpr double kMostFast = 0.4;
+
 static double motionToleranceOf(const PairSettings& settings) {
   return settings.motionTolerance < 0 ? settings.thickness / 2 : settings.motionTolerance;
 }
@@ -86,7 +90,7 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
       plan.method = Method::Proximity;
       plan.reason = MethodReason::Slow;
     } else if (smallestMotion(a.range, b.range) > plan.motionTolerance ||
-               meanMotion(a.mesh, b.mesh) > plan.motionTolerance) {
+               fastShare(a.mesh, b.mesh, plan.motionTolerance) > kMostFast) {
       plan.method = Method::Continuous;
       plan.reason = MethodReason::Fast;
     } else {

@@ -48,8 +48,7 @@ TEST(Motion, RangeMatchesEachVertexOnEverySimdPath) {
   useSimdPath("");
 }
 
-/// The mean is of a sample, which contains all vertices of small meshes.
-TEST(Motion, MeanMatchesThatOfAllPairs) {
+TEST(Motion, FastShareIsAboutThatOfAllPairs) {
   std::mt19937 random(2);
   std::normal_distribution<double> normal;
   const auto mesh = [&](int vertices) {
@@ -59,16 +58,20 @@ TEST(Motion, MeanMatchesThatOfAllPairs) {
     return TriangleMesh{MeshTopology(before.size(), {}), now, before};
   };
   const TriangleMesh a = mesh(300), b = mesh(70), many = mesh(20000);
-  const auto mean = [](const TriangleMesh& s, const TriangleMesh& t) {
-    double squares = 0;
+  const auto share = [](const TriangleMesh& s, const TriangleMesh& t, double limit) {
+    std::size_t fast = 0;
     for (std::size_t i = 0; i < s.now.size(); ++i)
       for (std::size_t j = 0; j < t.now.size(); ++j)
-        squares += (s.now[i] - s.before[i] - t.now[j] + t.before[j]).squaredNorm();
-    return std::sqrt(squares / static_cast<double>(s.now.size() * t.now.size()));
+        fast += (s.now[i] - s.before[i] - t.now[j] + t.before[j]).norm() > limit;
+    return static_cast<double>(fast) / static_cast<double>(s.now.size() * t.now.size());
   };
-  EXPECT_NEAR(meanMotion(a, b), mean(a, b), 1e-12);
-  EXPECT_NEAR(meanMotion(many, b), mean(many, b), 0.05 * mean(many, b));
-  EXPECT_EQ(meanMotion(a, mesh(0)), 0.0);
+  for (const double limit : {1.0, 2.0, 3.0, 4.0}) {
+    EXPECT_NEAR(fastShare(a, b, limit), share(a, b, limit), 0.06) << limit;
+    EXPECT_NEAR(fastShare(many, b, limit), share(many, b, limit), 0.06) << limit;
+  }
+  EXPECT_EQ(fastShare(a, b, 100.0), 0.0);
+  EXPECT_EQ(fastShare(a, b, 0.0), 1.0);
+  EXPECT_EQ(fastShare(a, mesh(0), 1.0), 0.0);
 }
 
 }  // namespace
