@@ -62,9 +62,21 @@ int side(const ImpactQuery& query, double time, std::size_t* exactDecisions) {
   }
 }
 
+/// Whether all vertices have one coordinate in common at both ends: aligned features that slide.
+bool stayInAxisPlane(const ImpactQuery& query) {
+  const auto isShared = [&](int axis) {
+    const ImpactQuery::Step& first = query.vertices[0];
+    return std::all_of(query.vertices.begin(), query.vertices.end(), [&](const auto& vertex) {
+      return vertex.before[axis] == first.before[axis] && vertex.now[axis] == first.now[axis];
+    });
+  };
+  return isShared(0) || isShared(1) || isShared(2);
+}
+
 }  // namespace
 
 int sideBefore(const ImpactQuery& query, double time, std::size_t* exactDecisions) {
+  if (stayInAxisPlane(query)) return 0;
   return query.kind == ImpactQuery::Kind::VertexTriangle
              ? side<ImpactQuery::Kind::VertexTriangle>(query, time, exactDecisions)
              : side<ImpactQuery::Kind::EdgeEdge>(query, time, exactDecisions);

@@ -159,9 +159,11 @@ class BestNormal {
 
   /// kind: lower ones win among equally good candidates.
   void offer(const Vector3d& normal, int kind) {
-    if (m_side && !m_side->has(normal)) return;
-    const double agreement = m_side ? normal.dot(m_side->approach.side) : agreementOf(normal);
-    const Rank rank{std::round(violationOf(normal) / m_equalAngle),
+    if (m_normal == normal || (m_side && !m_side->has(normal))) return;
+    const double violation = std::round(violationOf(normal) / m_equalAngle);
+    if (m_normal && violation > m_rank[0]) return;
+    const double agreement = normal.dot(m_side ? m_side->approach.side : knownSides());
+    const Rank rank{violation,
                     static_cast<double>(kind),
                     -std::round(agreement / kEqualAgreement),
                     std::abs(normal[0]),
@@ -195,20 +197,23 @@ class BestNormal {
       m_second.anyDirection([&](const Vector3d& d) { return isBeyond(normal.dot(d)); });
     return most;
   }
-  double agreementOf(const Vector3d& normal) const {
-    const auto agreement = [&](const Star& star) {
-      double sum = 0.0, count = 0.0;
-      star.forEachNormal([&](const Vector3d& winding) { sum += normal.dot(winding), ++count; });
-      return count > 0.0 ? sum / count * (star.isOfBody() ? kBodyWeight : 1.0) : 0.0;
+  /// The mean winding normal of the second star, less that of the first.
+  const Vector3d& knownSides() {
+    const auto meanOf = [](const Star& star) -> Vector3d {
+      Vector3d sum = Vector3d::Zero();
+      double count = 0.0;
+      star.forEachNormal([&](const Vector3d& winding) { sum += winding, ++count; });
+      return count > 0.0 ? sum / count * (star.isOfBody() ? kBodyWeight : 1.0) : sum;
     };
-    return agreement(m_second) - agreement(m_first);
+    if (!m_sides) m_sides = meanOf(m_second) - meanOf(m_first);
+    return *m_sides;
   }
 
   const Star &m_first, &m_second;
   const std::optional<KnownSide>& m_side;
   const Vector3d m_other;
   const double m_equalAngle;  ///< violations that differ by less are equal
-  std::optional<Vector3d> m_normal;
+  std::optional<Vector3d> m_sides, m_normal;
   Rank m_rank{};
 };
 
