@@ -72,9 +72,9 @@ class ExcludedImpacts {
   template <class AnyOf>
   bool isReplaced(const EdgeEdgeContact& c, AnyOf&& anyOf) const {
     return anyOf([&](const auto& s) {
+      if (!isInTime(s, c)) return false;
       TangentPlane plane = planeOf(s, linesAreSecond());
-      if (!isInTime(s, c) || !areInPlane(plane, mesh(), linesAreSecond() ? c.edgeA : c.edgeB))
-        return false;
+      if (!areInPlane(plane, mesh(), linesAreSecond() ? c.edgeA : c.edgeB)) return false;
       anyOf([&](const auto& other) {
         const TangentPlane itsPlane = planeOf(other, linesAreSecond());
         if (plane.isSameAs(itsPlane)) plane.gap = std::min(plane.gap, itsPlane.gap);
@@ -107,18 +107,17 @@ class ExcludedImpacts {
                        double time) {
     const std::uint32_t p = feature[0], q = feature[1];
     const MeshTopology& topology = mesh.topology;
+    const Vector3d start = at(mesh, p, time), end = p == q ? start : at(mesh, q, time);
     const auto leadsTo = [&](std::uint32_t corner) {
       if (corner == p || corner == q) return false;
-      return p == q ? leadsTowards(direction, at(mesh, p, time), at(mesh, corner, time))
-                    : leadsInto(direction, at(mesh, p, time), at(mesh, q, time),
-                                at(mesh, corner, time));
+      return p == q ? leadsTowards(direction, start, at(mesh, corner, time))
+                    : leadsInto(direction, start, end, at(mesh, corner, time));
     };
-    const auto around =
-        p == q ? topology.vertexTriangles[p]
-               : topology.edgeTriangles[topology.edgeOf({std::min(p, q), std::max(p, q)})];
+    const auto around = topology.vertexTriangles[p];
     return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
       const Triangle& corners = topology.triangles[triangle];
-      return std::any_of(corners.begin(), corners.end(), leadsTo);
+      return std::find(corners.begin(), corners.end(), q) != corners.end() &&
+             std::any_of(corners.begin(), corners.end(), leadsTo);
     });
   }
 

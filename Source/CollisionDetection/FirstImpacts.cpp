@@ -3,6 +3,8 @@
 #include "CollisionDetection/ExcludedImpacts.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <numeric>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -32,10 +34,6 @@ bool isImpact(const auto& contact, std::uint32_t list, std::uint32_t index, doub
   return contact.timeOfImpact < end && (preferred.empty() || !preferred[index]);
 }
 
-/// Of points and lines: the vertex, or the edge, that an impact is of, as a key.
-ImpactFeatures keyOf(std::uint32_t vertex) { return {0, vertex}; }
-ImpactFeatures keyOf(const Segment& edge) { return {1, std::uint64_t{edge[0]} << 32 | edge[1]}; }
-
 }  // namespace
 
 std::optional<ImpactFeatures> sharedFeatures(const VertexTriangleContact& c, bool swapped,
@@ -54,47 +52,63 @@ std::optional<ImpactFeatures> sharedFeatures(const EdgeEdgeContact& c, bool self
   return inOrder(a, b, self && b < a);
 }
 
-void FirstImpacts::sortEntries() {
-  std::sort(m_entries.begin(), m_entries.end(), [](const Entry& l, const Entry& r) {
-    return std::tie(l.features, l.time, l.list, l.index) <
-           std::tie(r.features, r.time, r.list, r.index);
-  });
-}
-
-/// Drops excluded impacts for which others stand.
+/// Drops excluded impacts for which others stand. These are looked up by their vertex, or by the
+/// first vertex of their line's edge.
 void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderScratch& ordered,
                                 const CollisionData::Contents& contents) {
   const ExcludedImpacts rule(meshes);
   if (!rule.mayExclude()) return;
-  m_entries.clear();  // of impacts that are not excluded
-  bool any = false;
+  const std::uint32_t lines = rule.linesAreSecond();  // as the list of their vertices
+  const auto numberOf = [&](std::uint32_t list, std::uint32_t vertex) {
+    return list == 1 ? meshes.a.now.size() + vertex : vertex;
+  };
+  const auto placeOf = [&](const auto& contact, std::uint32_t list) {
+    if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
+      return numberOf(lines, rule.lineEdge(contact)[0]);
+    else
+      return numberOf(list, contact.vertex);
+  };
+  std::size_t proper = 0, excluded = 0;
   forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
     for (std::uint32_t i = 0; i < contacts.size(); ++i) {
-      const auto& contact = contacts[i];
-      if (!isImpact(contact, list, i, end, ordered)) continue;
-      bool excluded;
-      ImpactFeatures key;
-      if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
-        excluded = rule.isExcluded(contact), key = keyOf(rule.lineEdge(contact));
+      if (!isImpact(contacts[i], list, i, end, ordered)) continue;
+      if constexpr (std::is_same_v<decltype(contacts[i]), const EdgeEdgeContact&>)
+        m_dropped[list][i] = rule.isExcluded(contacts[i]);
       else
-        excluded = rule.isExcluded(contact, list == 1), key = keyOf(contact.vertex);
-      any |= excluded;
-      m_dropped[list][i] = excluded;
-      if (!excluded) m_entries.push_back({key, contact.timeOfImpact, list, i});
+        m_dropped[list][i] = rule.isExcluded(contacts[i], list == 1);
+      (m_dropped[list][i] ? excluded : proper) += 1;
     }
   });
-  if (!any) return;
-  sortEntries();
-  const auto anyOf = [&](const ImpactFeatures& key, auto&& f) {
-    auto at =
-        std::lower_bound(m_entries.begin(), m_entries.end(), key,
-                         [](const Entry& e, const ImpactFeatures& k) { return e.features < k; });
-    for (; at != m_entries.end() && at->features == key; ++at)
-      if (f(*at)) return true;
-    return false;
+  if (excluded == 0) return;
+  // A counting sort: m_starts[n + 1] becomes the end of the impacts of vertex n.
+  m_starts.assign(meshes.a.now.size() + meshes.b.now.size() + 2, 0);
+  m_proper.resize(proper);
+  const auto forEachProper = [&](auto&& f) {
+    forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
+      for (std::uint32_t i = 0; i < contacts.size(); ++i)
+        if (!m_dropped[list][i] && isImpact(contacts[i], list, i, end, ordered))
+          f(placeOf(contacts[i], list), Place{list, i});
+    });
   };
-  const auto ofVertex = [&](const Entry& entry) -> const VertexTriangleContact& {
-    return (entry.list == 0 ? contents.vertexTriangle : contents.triangleVertex)[entry.index];
+  forEachProper([&](std::size_t n, Place) { ++m_starts[n + 2]; });
+  std::partial_sum(m_starts.begin(), m_starts.end(), m_starts.begin());
+  forEachProper([&](std::size_t n, Place place) { m_proper[m_starts[n + 1]++] = place; });
+
+  const auto anyAt = [&](std::size_t n, auto&& f) {
+    return std::any_of(m_proper.begin() + m_starts[n], m_proper.begin() + m_starts[n + 1], f);
+  };
+  // Whether f holds for an impact of the vertex, or of the edge.
+  const auto anyOfVertex = [&](std::uint32_t list, std::uint32_t vertex, auto&& f) {
+    return anyAt(numberOf(list, vertex), [&](Place s) {
+      return s.list != 2 &&
+             f((s.list == 0 ? contents.vertexTriangle : contents.triangleVertex)[s.index]);
+    });
+  };
+  const auto anyOfEdge = [&](const Segment& edge, auto&& f) {
+    return anyAt(numberOf(lines, edge[0]), [&](Place s) {
+      return s.list == 2 && rule.lineEdge(contents.edgeEdge[s.index]) == edge &&
+             f(contents.edgeEdge[s.index]);
+    });
   };
   forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
     for (std::uint32_t i = 0; i < contacts.size(); ++i) {
@@ -102,16 +116,13 @@ void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderS
       const auto& c = contacts[i];
       if constexpr (std::is_same_v<decltype(c), const EdgeEdgeContact&>)
         m_dropped[list][i] = rule.isReplaced(c, [&](auto&& f) {
-          const auto isTrueFor = [&](const Entry& entry) { return f(ofVertex(entry)); };
           const Segment& edge = rule.lineEdge(c);
-          return anyOf(keyOf(edge),
-                       [&](const Entry& entry) { return f(contents.edgeEdge[entry.index]); }) ||
-                 anyOf(keyOf(edge[0]), isTrueFor) || anyOf(keyOf(edge[1]), isTrueFor);
+          return anyOfEdge(edge, f) || anyOfVertex(lines, edge[0], f) ||
+                 anyOfVertex(lines, edge[1], f);
         });
       else
-        m_dropped[list][i] = rule.isReplaced(c, list == 1, [&](auto&& f) {
-          return anyOf(keyOf(c.vertex), [&](const Entry& entry) { return f(ofVertex(entry)); });
-        });
+        m_dropped[list][i] =
+            rule.isReplaced(c, list == 1, [&](auto&& f) { return anyOfVertex(list, c.vertex, f); });
     }
   });
 }
@@ -135,7 +146,10 @@ void FirstImpacts::keep(const MeshPair& meshes, double end, const OrderScratch& 
       if (features) m_entries.push_back({*features, contact.timeOfImpact, list, i});
     }
   });
-  sortEntries();
+  std::sort(m_entries.begin(), m_entries.end(), [](const Entry& l, const Entry& r) {
+    return std::tie(l.features[0], l.features[1], l.time, l.list, l.index) <
+           std::tie(r.features[0], r.features[1], r.time, r.list, r.index);
+  });
   for (std::size_t i = 1; i < m_entries.size(); ++i)
     if (m_entries[i].features == m_entries[i - 1].features)
       m_dropped[m_entries[i].list][m_entries[i].index] = 1;

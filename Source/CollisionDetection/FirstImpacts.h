@@ -50,11 +50,15 @@ class FirstImpacts {
     double time;
     std::uint32_t list, index;
   };
-  void sortEntries();
   void dropExcluded(const MeshPair&, double end, const OrderScratch&,
                     const CollisionData::Contents&);
 
+  struct Place {
+    std::uint32_t list, index;
+  };
   Buffer<Entry> m_entries;
+  Buffer<Place> m_proper;                         ///< impacts that are not excluded, by vertex
+  Buffer<std::uint32_t> m_starts;                 ///< of each vertex, in m_proper
   std::array<Buffer<std::uint8_t>, 3> m_dropped;  ///< by list and index
 };
 
