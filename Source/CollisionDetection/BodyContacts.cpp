@@ -110,28 +110,39 @@ bool leaves(const TriangleMesh& body, const VertexTriangleContact& c) {
 bool leaves(const TriangleMesh& a, const TriangleMesh& b, const EdgeEdgeContact& c) {
   return c.normal.dot(normalOfEdge(b, c.edgeB)) < 0 || c.normal.dot(normalOfEdge(a, c.edgeA)) > 0;
 }
-bool anyLeaves(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step) {
-  const auto any = [](const auto& list, auto&& isLeaving) {
-    return std::any_of(list.begin(), list.end(), [&](const auto& contact) {
-      return contact.timeOfImpact < 1.0 && isLeaving(contact);
-    });
+/// Calls f(list, isLeaving) for the three lists. isLeaving: whether a contact is such an impact.
+template <class F>
+void forEachList(const TriangleMesh& a, const TriangleMesh& b, ContactBuffers& found, F&& f) {
+  const auto pass = [&](auto& list, auto&& isOut) {
+    f(list, [&](const auto& contact) { return contact.timeOfImpact < 1.0 && isOut(contact); });
   };
-  return std::any_of(step.begin(), step.end(), [&](const ContactBuffers* found) {
-    return any(found->vertexTriangle, [&](const auto& c) { return leaves(b, c); }) ||
-           any(found->triangleVertex, [&](const auto& c) { return leaves(a, c); }) ||
-           any(found->edgeEdge, [&](const auto& c) { return leaves(a, b, c); });
-  });
+  pass(found.vertexTriangle, [&](const auto& c) { return leaves(b, c); });
+  pass(found.triangleVertex, [&](const auto& c) { return leaves(a, c); });
+  pass(found.edgeEdge, [&](const auto& c) { return leaves(a, b, c); });
 }
 
-/// Returns whether it removed any.
-bool removeImpacts(BodyContacts::Buffers step) {
-  std::size_t removed = 0;
-  for (ContactBuffers* buffers : step)
-    forEachTimed(*buffers, [&](auto& list) {
-      removed +=
-          std::erase_if(list, [](const auto& contact) { return contact.timeOfImpact < 1.0; });
+bool anyLeaves(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step) {
+  bool any = false;
+  for (ContactBuffers* found : step)
+    forEachList(a, b, *found, [&](const auto& list, auto&& isLeaving) {
+      any = any || std::any_of(list.begin(), list.end(), isLeaving);
     });
-  return removed > 0;
+  return any;
+}
+
+/// Turns these impacts, so that they push the feature on out. Returns whether there were any.
+bool turnLeaving(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step) {
+  bool any = false;
+  for (ContactBuffers* found : step)
+    forEachList(a, b, *found, [&](auto& list, auto&& isLeaving) {
+      for (auto& contact : list) {
+        if (!isLeaving(contact)) continue;
+        any = true;
+        contact.normal = -contact.normal;
+        contact.distance = -contact.distance;
+      }
+    });
+  return any;
 }
 
 }  // namespace
@@ -139,7 +150,7 @@ bool removeImpacts(BodyContacts::Buffers step) {
 bool BodyContacts::find(const PairRecord& record, Engine engine, bool startsIntersecting,
                         Buffers local, Buffers step) {
   PointQueryStack& stack = m_scratch.pair.stack;
-  m_hasRemoved = false;
+  m_hasTurned = false;
   stack.exactDecisions = 0;
   m_contacts.clear();
   if (!mayBeBodies(record)) return false;
@@ -153,7 +164,7 @@ bool BodyContacts::find(const PairRecord& record, Engine engine, bool startsInte
   if (!overlapped) return false;
   const Penetration found = penetrationOf(a, b, engine, m_scratch, kQuick);
   if (found.intersecting) addContacts(record, engine, found, local);
-  if (!found.intersecting && !meet) m_hasRemoved = removeImpacts(step);
+  if (!found.intersecting && !meet) m_hasTurned = turnLeaving(a.mesh, b.mesh, step);
   return found.intersecting;
 }
 

@@ -23,7 +23,7 @@ class BodyContacts {
   /// Bodies are deep in each other if contacts of Intersection push by more than 60 degrees away
   /// from the mean of its vertex-triangle contacts, if there are none of these, or if one body is
   /// wholly inside the other. Where a body that was inside is outside at the end, impacts within
-  /// the step are removed: they would pull it back.
+  /// the step that would pull it back are turned: they push it on out.
   ///
   /// local    the contacts of Intersection at the end, with the triangles that intersect
   /// step     the other contacts
@@ -32,8 +32,8 @@ class BodyContacts {
   ContactBuffers& contacts() { return m_contacts; }
   /// Of the last find(): the number of decisions by exact arithmetic.
   std::size_t exactDecisions() const { return m_scratch.pair.stack.exactDecisions; }
-  /// Whether the last find() removed contacts of `step`.
-  bool hasRemoved() const { return m_hasRemoved; }
+  /// Whether the last find() turned contacts of `step`.
+  bool hasTurned() const { return m_hasTurned; }
 
  private:
   void addContacts(const PairRecord&, Engine, const Penetration&, Buffers local);
@@ -42,7 +42,7 @@ class BodyContacts {
 
   PenetrationScratch m_scratch;
   ContactBuffers m_contacts;
-  bool m_hasRemoved = false;
+  bool m_hasTurned = false;
 };
 
 }  // namespace palpate

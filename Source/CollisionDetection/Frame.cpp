@@ -734,7 +734,7 @@ std::size_t Frame::preferBodies(PairRecord& record, Engine engine, std::size_t p
   const BodyContacts::Buffers local = byIntersection ? all : BodyContacts::Buffers(m_intersections);
   const bool areDeep = m_bodies->find(record, engine, m_facts.startsPiercing(), local,
                                       all.subspan(byIntersection ? all.size() : preferred));
-  record.byBodies = areDeep || m_bodies->hasRemoved();
+  record.byBodies = areDeep || m_bodies->hasTurned();
   m_pierced.exactDecisions += m_bodies->exactDecisions();
   if (!areDeep) return preferred;
   m_buffers.assign(1, &m_bodies->contacts());

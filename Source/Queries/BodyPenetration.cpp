@@ -121,8 +121,10 @@ class Search {
       return std::pair(meeting.elementA, meeting.elementB) <
              std::pair(at.last.elementA, at.last.elementB);
     };
-    if (!(depth > at.depth || (depth == at.depth && depth > start && precedes()))) return;
-    at.depth = depth;
+    // Bodies that overlap by less than rounding may have no exit after the start.
+    const bool isOnly = at.last.elementA == kNoElement && exit.t > -kInfinity;
+    if (!(isOnly || depth > at.depth || (depth == at.depth && depth > start && precedes()))) return;
+    at.depth = std::max(at.depth, depth);
     at.last = {meeting.elementA, meeting.elementB, exit.weightsA, exit.weightsB, exit.normal};
   }
   /// Moves on to where a vertex meets the other surface.
@@ -287,6 +289,10 @@ class Search {
     return m_best.separates && hulls.direction != Vector3d::Zero() &&
            m_best.depth <= (hulls.depth - hulls.gap) / m_unit + most && areConvex();
   }
+  ElementPair firstMeeting() const {
+    if (m_scratch.meetings.empty()) return {0, 0};
+    return {m_scratch.meetings.front().elementA, m_scratch.meetings.front().elementB};
+  }
   bool areConvex() const {
     if (!m_areConvex) m_areConvex = isConvex(m_pair, true) && isConvex(m_pair, false);
     return *m_areConvex;
@@ -303,7 +309,12 @@ class Search {
           weights[i] * m_pair.vertices(ofA).positions[vertices[static_cast<std::size_t>(i)]];
     return {geometry.id, element, vertices, weights, position, m_best.depth};
   }
-  Penetration result() const {
+  Penetration result() {
+    if (m_best.last.elementA == kNoElement) {  // no exit was found in floating point
+      const Vector3d middle = Vector3d::Constant(1.0 / 3.0);
+      const auto& [a, b] = firstMeeting();
+      m_best.last = {a, b, middle, middle, m_best.direction};
+    }
     return {true, m_best.direction, m_best.depth, pointOf(true), pointOf(false), false};
   }
 

@@ -24,15 +24,22 @@ class Step {
        const RigidTransform& now, const PairSettings& settings)
       : m_mesh(mesh), m_shape(shape), m_before(before), m_now(now), m_settings(settings) {}
 
-  /// Whether elements around the contact's vertex or edge exclude its normal.
+  /// Whether elements around the vertex or edge that holds the contact's point exclude its normal.
   bool isExcluded(const ShapeContact& c) const {
-    if (c.element == ShapeElement::Face) return false;
-    const auto around = m_mesh.topology.vertexTriangles[c.vertices[0]];
+    Segment feature{};
+    std::size_t count = 0;
+    for (int i = 0; i < 3; ++i) {
+      if (c.weights[i] <= 2 * kEdgeWeight) continue;
+      if (count == 2) return false;  // in the triangle's interior
+      feature[count++] = c.vertices[static_cast<std::size_t>(i)];
+    }
+    if (count == 1) feature[1] = feature[0];
+    const auto around = m_mesh.topology.vertexTriangles[feature[0]];
     return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
       const Triangle& corners = m_mesh.topology.triangles[triangle];
-      return std::find(corners.begin(), corners.end(), c.vertices[1]) != corners.end() &&
+      return std::find(corners.begin(), corners.end(), feature[1]) != corners.end() &&
              std::any_of(corners.begin(), corners.end(),
-                         [&](std::uint32_t corner) { return leadsTo(corner, c); });
+                         [&](std::uint32_t corner) { return leadsTo(corner, feature, c); });
     });
   }
 
@@ -70,8 +77,8 @@ class Step {
   }
 
  private:
-  bool leadsTo(std::uint32_t corner, const ShapeContact& c) const {
-    const auto& [p, q, unused] = c.vertices;
+  bool leadsTo(std::uint32_t corner, const Segment& feature, const ShapeContact& c) const {
+    const auto& [p, q] = feature;
     if (corner == p || corner == q) return false;
     const double time = c.timeOfImpact;
     return p == q ? leadsTowards(-c.normal, at(p, time), at(corner, time))

@@ -30,8 +30,11 @@ struct DistinctTruth {
   /// Whether the direction from a contact's vertex or edge to the shape leads into an element
   /// there.
   bool isExcluded(const ShapeContact& c) const {
-    const auto& [p, q, unused] = c.vertices;
-    if (c.element == ShapeElement::Face) return false;
+    std::vector<std::uint32_t> holders;  // a point on the boundary counts as inside by rounding
+    for (int i = 0; i < 3; ++i)
+      if (c.weights[i] > 0x1p-49) holders.push_back(c.vertices[i]);
+    if (holders.size() == 3) return false;
+    const std::uint32_t p = holders.front(), q = holders.back();
     for (const Triangle& element : elements) {
       if (!has(element, p) || !has(element, q)) continue;
       for (const std::uint32_t v : element) {

@@ -1,10 +1,12 @@
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
 
 #include <palpate/ConstraintRows.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -182,6 +184,43 @@ TEST(BodyContacts, ShallowVerticesAndOpenMeshesKeepLocalNormals) {
       found |= c.distance < 0 && c.normal == Vector3d::UnitZ();
     EXPECT_TRUE(found);
   }
+}
+
+/// Two closed bodies whose edges touch, so that rounding decides whether they overlap. One slides
+/// along the other.
+TEST(BodyContacts, EdgesThatTouchHaveAContactThatSeparates) {
+  const std::vector<Triangle> triangles{{0, 1, 2}, {1, 0, 3}, {0, 2, 3}, {2, 1, 3}};
+  const std::vector<Vector3d> lower{{-1, 0, 0}, {1, 0, 0}, {0, 0.8, -1}, {0, -0.8, -1}},
+      upper{{0.1, 1, 0}, {0.1, -1, 0}, {0.9, 0, 1}, {-0.7, 0, 1}};
+  Random random(8);
+  std::size_t starts = 0;
+  for (int run = 0; run < 600; ++run) {
+    if (isLeftOut(run)) continue;
+    const Eigen::Quaterniond turn =
+        Eigen::Quaterniond(Eigen::Vector4d(uniform(random, -1, 1), uniform(random, -1, 1),
+                                           uniform(random, -1, 1), uniform(random, 0.1, 1)))
+            .normalized();
+    const Vector3d place = randomPoint(random, -20, 20);
+    std::vector<Vector3d> a, before, now;
+    for (const Vector3d& p : lower) a.push_back(turn * p + place);
+    for (const Vector3d& p : upper) before.push_back(turn * p + place);
+    for (const Vector3d& p : upper)
+      now.push_back(turn * (p + (run % 3 == 0 ? Vector3d(0, 0, 0) : Vector3d(0.01, 0.02, 0))) +
+                    place);
+    OctreeBasedCD collisions;
+    const GeometryId idA = collisions.addTriangleMesh(a, triangles),
+                     idB = collisions.addTriangleMesh(before, triangles);
+    collisions.addCollisionPair(idA, idB, {.thickness = 0.02});
+    collisions.setPositions(idB, before, now);
+    collisions.detectCollision();
+    const CollisionData& data = collisions.collisionData(idA, idB);
+    starts += !data.validity().startedApart;
+    EXPECT_GE(data.edgeEdge().size(), 1u) << run;
+    // The normal points from b, which is above, to a.
+    for (const EdgeEdgeContact& c : data.edgeEdge())
+      EXPECT_LT(c.normal.dot(turn * Vector3d::UnitZ()), -0.9) << run;
+  }
+  EXPECT_GT(starts, leastOf(100));
 }
 
 }  // namespace

@@ -316,6 +316,33 @@ TEST(DistinctContacts, LetABodySlideOverAFlatFloorWithoutLossOfSpeed) {
   }
 }
 
+/// A cylinder that turns over a regular grid comes near whole triangles at their corners.
+TEST(DistinctContacts, OfACylinderThatTurnsOverAFlatFloorHaveItsNormal) {
+  Random random(6);
+  const Mesh floor = floorOf(random, 20, 1.0, false, [](double, double) { return 0.0; });
+  const Cylinder cylinder{{-2, 0, 0}, {2, 0, 0}, 1.0};
+  std::size_t contacts = 0;
+  for (const Method method : {Method::Continuous, Method::Auto})
+    for (const double gap : {0.1, 0.001})
+      for (const double start : {0.0, 0.1, 0.37, 0.9})
+        for (const double turn : {0.05, 0.1, 0.3})
+          for (const double thickness : {0.2, 0.5}) {
+            FloorScene scene(floor, cylinder, {method, thickness});
+            const auto turnBy = [](double angle) -> Matrix3d {
+              return Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix();
+            };
+            const Vector3d at(0.25, 0.125, 1 + gap);
+            scene.collisions.setTransform(scene.tool, turnBy(start), at, turnBy(start + turn), at);
+            scene.collisions.detectCollision();
+            for (const ShapeContact& c :
+                 scene.collisions.collisionData(scene.mesh, scene.tool).shape()) {
+              ++contacts;
+              EXPECT_LE(c.normal.cross(Vector3d::UnitZ()).norm(), tiltOf(cylinder));
+            }
+          }
+  EXPECT_GT(contacts, 300u);
+}
+
 /// Contacts of an impact are dropped by the same rule: a ball falls on a flat floor.
 TEST(DistinctContacts, OfAStepKeepTheFirstImpact) {
   Random random(5);
