@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <array>
 #include <set>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -361,11 +362,11 @@ TEST(DistinctContacts, OfAStepKeepTheFirstImpact) {
           distinct.collisions.collisionData(distinct.mesh, distinct.tool).earliestTimeOfImpact(),
           all.collisions.collisionData(all.mesh, all.tool).earliestTimeOfImpact());
       ASSERT_FALSE(few.empty());
-      const auto isEarlier = [](const auto& l, const auto& r) {
-        return l.timeOfImpact < r.timeOfImpact;
+      const auto isFirst = [](const auto& l, const auto& r) {
+        return std::tie(l.timeOfImpact, l.distance) < std::tie(r.timeOfImpact, r.distance);
       };
-      EXPECT_EQ(*std::min_element(few.begin(), few.end(), isEarlier),
-                *std::min_element(many.begin(), many.end(), isEarlier));
+      EXPECT_EQ(*std::min_element(few.begin(), few.end(), isFirst),
+                *std::min_element(many.begin(), many.end(), isFirst));
     }
   }
 }
