@@ -2,8 +2,9 @@
 
 #include <palpate/CollisionData.h>
 
-#include "Math/NormalCone.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Math/NormalCone.h"
+#include "Mesh/ExcludedDirections.h"
 
 #include <algorithm>
 #include <array>
@@ -51,7 +52,7 @@ class ExcludedImpacts {
     const int i = static_cast<int>(c.feature);
     const Segment feature = i < 3 ? Segment{c.corners[i], c.corners[i]}
                                   : Segment{c.corners[i - 3], c.corners[(i - 2) % 3]};
-    return excludes(swapped ? m_pair.a : m_pair.b, feature, c.normal, c.timeOfImpact);
+    return excludesDirection(swapped ? m_pair.a : m_pair.b, feature, c.normal, c.timeOfImpact);
   }
   bool isExcluded(const EdgeEdgeContact& c) const {
     return isExcludedBy(m_pair.b, c.edgeB, c.featureB, c.normal, c.timeOfImpact) ||
@@ -90,9 +91,6 @@ class ExcludedImpacts {
  private:
   using Vector3d = Eigen::Vector3d;
 
-  static Vector3d at(const TriangleMesh& mesh, std::uint32_t vertex, double time) {
-    return (1.0 - time) * mesh.before[vertex] + time * mesh.now[vertex];
-  }
   // Of lines near a triangle mesh.
   const TriangleMesh& mesh() const { return linesAreSecond() ? m_pair.a : m_pair.b; }
   const TriangleMesh& lines() const { return linesAreSecond() ? m_pair.b : m_pair.a; }
@@ -100,27 +98,8 @@ class ExcludedImpacts {
   bool isExcludedBy(const TriangleMesh& mesh, const Segment& ends, EdgeFeature feature,
                     const Vector3d& direction, double time) const {
     const Segment closest{ends[feature == EdgeFeature::End], ends[feature != EdgeFeature::Start]};
-    return mesh.topology.hasFaces() && excludes(mesh, closest, direction, time);
+    return mesh.topology.hasFaces() && excludesDirection(mesh, closest, direction, time);
   }
-  /// Whether a direction from a vertex {v, v} or an edge leads into an element around it.
-  static bool excludes(const TriangleMesh& mesh, const Segment& feature, const Vector3d& direction,
-                       double time) {
-    const std::uint32_t p = feature[0], q = feature[1];
-    const MeshTopology& topology = mesh.topology;
-    const Vector3d start = at(mesh, p, time), end = p == q ? start : at(mesh, q, time);
-    const auto leadsTo = [&](std::uint32_t corner) {
-      if (corner == p || corner == q) return false;
-      return p == q ? leadsTowards(direction, start, at(mesh, corner, time))
-                    : leadsInto(direction, start, end, at(mesh, corner, time));
-    };
-    const auto around = topology.vertexTriangles[p];
-    return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
-      const Triangle& corners = topology.triangles[triangle];
-      return std::find(corners.begin(), corners.end(), q) != corners.end() &&
-             std::any_of(corners.begin(), corners.end(), leadsTo);
-    });
-  }
-
   bool isInTime(const VertexTriangleContact& s, const auto& c) const {
     return s.feature == TriangleFeature::Face
                ? s.timeOfImpact <= c.timeOfImpact + m_pair.settings.timeTolerance

@@ -37,9 +37,8 @@ inline bool leadsInto(const Eigen::Vector3d& direction, const Eigen::Vector3d& p
 
 /// The plane that touches a body at a contact's point, at the end of a step.
 ///
-/// Law      if the other body stays in front of the plane by a gap, it stays away from everything
-/// in
-///          the plane by that gap, less slack.
+/// Law      if the other body stays in front of the plane by a gap, it stays away by that gap, less
+///          slack, from everything in the plane.
 struct TangentPlane {
   Eigen::Vector3d up;  ///< unit, from the body towards the other one
   double height;       ///< L: of the body's surface, along `up`

@@ -1,6 +1,7 @@
 #include "Shapes/DistinctContacts.h"
 
 #include "Math/NormalCone.h"
+#include "Mesh/ExcludedDirections.h"
 #include "Mesh/PointMotion.h"
 
 #include <algorithm>
@@ -34,13 +35,7 @@ class Step {
       feature[count++] = c.vertices[static_cast<std::size_t>(i)];
     }
     if (count == 1) feature[1] = feature[0];
-    const auto around = m_mesh.topology.vertexTriangles[feature[0]];
-    return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
-      const Triangle& corners = m_mesh.topology.triangles[triangle];
-      return std::find(corners.begin(), corners.end(), feature[1]) != corners.end() &&
-             std::any_of(corners.begin(), corners.end(),
-                         [&](std::uint32_t corner) { return leadsTo(corner, feature, c); });
-    });
+    return excludesDirection(m_mesh, feature, -c.normal, c.timeOfImpact);
   }
 
   TangentPlane planeOf(const ShapeContact& c) const {
@@ -77,19 +72,6 @@ class Step {
   }
 
  private:
-  bool leadsTo(std::uint32_t corner, const Segment& feature, const ShapeContact& c) const {
-    const auto& [p, q] = feature;
-    if (corner == p || corner == q) return false;
-    const double time = c.timeOfImpact;
-    return p == q ? leadsTowards(-c.normal, at(p, time), at(corner, time))
-                  : leadsInto(-c.normal, at(p, time), at(q, time), at(corner, time));
-  }
-  Vector3d at(std::uint32_t vertex, double time) const {
-    if (time == 1.0) return m_mesh.now[vertex];
-    if (time == 0.0) return m_mesh.before[vertex];
-    return (1.0 - time) * m_mesh.before[vertex] + time * m_mesh.now[vertex];
-  }
-
   const TriangleMesh& m_mesh;
   const Shape& m_shape;
   const RigidTransform &m_before, &m_now;

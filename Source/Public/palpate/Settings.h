@@ -134,8 +134,8 @@ enum class Contacts {
   /// with a weight other than 0 keeps its earliest time, and earliestTimeOfImpact() is that of All.
   /// Docs/SupportMatrix.md has the reasons.
   ///
-  /// Shapes, lines and points have no contacts with the inner edges and vertices of a flat part of
-  /// a mesh, whose normals would be tilted (Docs/Shapes.md, "Edges of flat floors").
+  /// Except: shapes, lines and points have no contacts with inner edges and vertices of flat parts
+  /// of a mesh. Their normals would be tilted (Docs/Shapes.md, "Edges of flat floors").
   Distinct,
   All  ///< every feature pair that the method's definition includes
 };

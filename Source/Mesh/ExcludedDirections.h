@@ -1,0 +1,35 @@
+#pragma once
+
+#include "Math/NormalCone.h"
+#include "Mesh/TriangleMesh.h"
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cstdint>
+
+namespace palpate {
+
+/// Whether an element around a mesh's vertex {v, v}, or edge, excludes a unit direction from there
+/// at a time of the step: the direction leads into the element.
+inline bool excludesDirection(const TriangleMesh& mesh, const Segment& feature,
+                              const Eigen::Vector3d& direction, double time) {
+  const std::uint32_t p = feature[0], q = feature[1];
+  const auto at = [&](std::uint32_t v) -> Eigen::Vector3d {
+    return (1.0 - time) * mesh.before[v] + time * mesh.now[v];
+  };
+  const Eigen::Vector3d start = at(p), end = p == q ? start : at(q);
+  const auto leadsTo = [&](std::uint32_t corner) {
+    if (corner == p || corner == q) return false;
+    return p == q ? leadsTowards(direction, start, at(corner))
+                  : leadsInto(direction, start, end, at(corner));
+  };
+  const auto around = mesh.topology.vertexTriangles[p];
+  return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
+    const Triangle& corners = mesh.topology.triangles[triangle];
+    return std::find(corners.begin(), corners.end(), q) != corners.end() &&
+           std::any_of(corners.begin(), corners.end(), leadsTo);
+  });
+}
+
+}  // namespace palpate
