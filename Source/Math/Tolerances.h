@@ -42,6 +42,12 @@ constexpr double kSliverAngleSquare = 0x1p-40;
 constexpr double kAccurateCrossError = 0x1p-52;
 constexpr double kAccurateCrossLoss = 0x1p-101;
 
+/// Relative to the size of both elements' boxes and the thickness: by how much the gap between the
+/// boxes may be more than a thickness that a computed distance does not exceed. A distance is off
+/// by 2^-49 of the size (edgeEdgeDistance()). The gap, the sum of thickness and radii, and the
+/// subtraction of radii add less than 2^-50 of size and thickness.
+constexpr double kBoxGapError = 0x1p-48;
+
 // ---- Impacts (RelativeMotion.cpp, FindTouch.cpp, FindApproach.cpp, ImpactFilter.cpp) ----
 
 /// L. The bounds hold for coordinate differences up to this. No product then overflows, and

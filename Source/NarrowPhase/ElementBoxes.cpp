@@ -1,5 +1,7 @@
 #include "NarrowPhase/ElementBoxes.h"
 
+#include "Math/Tolerances.h"
+
 #include <algorithm>
 #include <array>
 
@@ -17,6 +19,11 @@ Eigen::AlignedBox3d elementBox(const TriangleMesh& mesh, std::uint32_t element, 
 bool overlap(const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b, double thickness) {
   return ((a.min() - b.max()).array() <= thickness).all() &&
          ((b.min() - a.max()).array() <= thickness).all();
+}
+
+bool mayBeWithin(const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b, double thickness) {
+  const double size = (a.max().cwiseMax(b.max()) - a.min().cwiseMin(b.min())).maxCoeff();
+  return overlap(a, b, thickness + std::min(kBoxGapError * (size + thickness), thickness));
 }
 
 namespace {
@@ -50,7 +57,7 @@ void keepOverlapping(const MeshPair& meshes, bool swept, double thickness,
                      Buffer<ElementPair>& pairs) {
   BoxCache ofA(meshes.a, swept), ofB(meshes.b, swept);
   std::erase_if(pairs, [&](const ElementPair& pair) {
-    return !overlap(ofA.box(pair.a), ofB.box(pair.b), thickness);
+    return !mayBeWithin(ofA.box(pair.a), ofB.box(pair.b), thickness);
   });
 }
 

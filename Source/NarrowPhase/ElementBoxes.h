@@ -17,7 +17,11 @@ Eigen::AlignedBox3d elementBox(const TriangleMesh&, std::uint32_t element, bool 
 /// Whether the gap between two boxes is at most the thickness along every axis.
 bool overlap(const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b, double thickness);
 
-/// Keeps the pairs whose elements' boxes overlap at this thickness.
+/// The same within rounding: true for all elements whose distance may be computed as at most the
+/// thickness, unless it is off by more than the thickness. Without a thickness it is exact.
+bool mayBeWithin(const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b, double thickness);
+
+/// Keeps the pairs whose elements may be within this thickness by their boxes.
 void keepOverlapping(const MeshPair&, bool swept, double thickness, Buffer<ElementPair>& pairs);
 
 }  // namespace palpate
