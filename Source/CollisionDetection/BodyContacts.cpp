@@ -190,9 +190,11 @@ void BodyContacts::addVertices(const BodyPair& pair, bool ofA, const Penetration
                                double thickness) {
   const BodyVertices& own = pair.vertices(ofA);
   const Vector3d direction = ofA ? penetration.direction : Vector3d(-penetration.direction);
+  // The last of them passes at the depth, within rounding.
+  const double end = penetration.depth + kExitSlack * pair.magnitude();
   for (std::uint32_t v = 0; v < own.positions.size(); ++v) {
     if (own.triangleOf[v] == kNoElement) continue;
-    const auto exit = pair.lastExitOf({ofA, v}, direction, -thickness, penetration.depth);
+    const auto exit = pair.lastExitOf({ofA, v}, direction, -thickness, end);
     if (!exit) continue;
     const Triangle& corners = pair.geometry(!ofA).mesh.topology.triangles[exit->element];
     const auto& [p, q, r] = corners;

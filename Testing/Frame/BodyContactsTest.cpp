@@ -166,6 +166,45 @@ TEST(BodyContacts, HaveOneDirectionOrAgreeAndSatisfyTheLawOfContacts) {
   EXPECT_GE(ofBodies, 12);
 }
 
+/// The feature that leaves last has a contact, wherever rounding puts its way out: turned bodies
+/// and turned positions, which differ by rounding, have contacts of the same depth.
+TEST(BodyContacts, TheDeepestFeatureHasAContact) {
+  Random random(41);
+  const Mesh unit = boxMesh({-1, -1, -1}, {1, 1, 1});
+  int deep = 0;
+  for (int repeat = 0; repeat < casesOf(400); ++repeat) {
+    const double far = std::exp2(uniform(random, -3, 13));
+    const Vector3d at = randomPoint(random, -far, far), by = randomPoint(random, -1.3, 1.3);
+    const auto turnedAt = [&](const Vector3d& place) {
+      const Vector3d axis = randomPoint(random, -1, 1).normalized();
+      return Eigen::Translation3d(place) * Eigen::AngleAxisd(uniform(random, 0, 3), axis);
+    };
+    const Eigen::Isometry3d poses[] = {turnedAt(at), turnedAt(at + by)};
+    double ofTurned = 0, ofMoved = 0;
+    for (const bool areTurned : {true, false}) {
+      OctreeBasedCD collisions;
+      GeometryId ids[2];
+      for (int i = 0; i < 2; ++i) {
+        std::vector<Vector3d> positions = unit.positions;
+        if (!areTurned)
+          for (Vector3d& p : positions) p = poses[i] * p;
+        ids[i] = collisions.addTriangleMesh(positions, unit.triangles);
+        if (areTurned) collisions.setTransform(ids[i], poses[i].linear(), poses[i].translation());
+      }
+      collisions.addCollisionPair(ids[0], ids[1], {.thickness = 0.05});
+      collisions.detectCollision();
+      const CollisionData& data = collisions.collisionData(ids[0], ids[1]);
+      double& least = (areTurned ? ofTurned : ofMoved) = 0;
+      for (const auto& c : data.vertexTriangle()) least = std::min(least, c.distance);
+      for (const auto& c : data.triangleVertex()) least = std::min(least, c.distance);
+      for (const auto& c : data.edgeEdge()) least = std::min(least, c.distance);
+    }
+    EXPECT_NEAR(ofTurned, ofMoved, 1e-12 * far + 1e-9) << repeat;
+    deep += ofMoved < -0.1;
+  }
+  EXPECT_GE(deep, leastOf(399));
+}
+
 TEST(BodyContacts, ShallowVerticesAndOpenMeshesKeepLocalNormals) {
   // The tip of a body is 0.01 behind a face.
   Mesh tip = sphere(3, 4, {0.45, 0.55, 1.19}, 0.2);
