@@ -6,7 +6,7 @@ set -euo pipefail
 build="cmake ninja-build g++ pkg-config libeigen3-dev libtbb-dev libhwy-dev libgmp-dev libmeshoptimizer-dev
   libvtk9-dev libfcl-dev libccd-dev libcli11-dev nlohmann-json3-dev xvfb xauth libgl1-mesa-dri"
 test="python3 libgtest-dev libcgal-dev libmpfr-dev clang-format-14 qemu-user
-  clang-14 libclang-rt-14-dev g++-aarch64-linux-gnu"
+  clang-14 libclang-rt-14-dev g++-aarch64-linux-gnu chromium"
 docs="doxygen python3-sphinx furo python3-myst-parser python3-breathe"
 figures="python3 python3-matplotlib python3-pil"
 benchmark="python3 libbenchmark-dev libembree-dev libbullet-dev libcgal-dev libnanoflann-dev

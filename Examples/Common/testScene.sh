@@ -32,17 +32,14 @@ run
 [[ $(wc -l <"$folder/run/frames.csv") -eq $((frames + 1)) ]] || fail "frames.csv has not a line per frame"
 grep -q "${hash##* }" "$folder/run/report.html" || fail "report.html has not the hash"
 grep -qE '(src|href)="?http' "$folder/run/report.html" && fail "report.html needs a network"
-for browser in chromium chromium-browser google-chrome none; do command -v $browser >/dev/null && break; done
-if [[ $browser == none ]]; then
-  echo "skipped: no browser is installed to open report.html in"
-else  # it draws the page, and a mouse over a point brings its figures
-  hover='<script>document.querySelector("circle").dispatchEvent(new MouseEvent("mousemove", {clientX: 200, clientY: 200}))</script>'
-  (cat "$folder/run/report.html"; echo "$hover") >"$folder/hover.html"
-  timeout 60 $browser --headless --no-sandbox --disable-gpu --virtual-time-budget=5000 --dump-dom "file://$folder/hover.html" \
-    2>/dev/null >"$folder/dom" || fail "$browser does not open report.html"
-  grep -q "<circle" "$folder/dom" || fail "$browser draws no report.html"
-  grep -q 'id="tip"[^>]*display: block[^>]*><b>frame ms: frame 0</b><div>' "$folder/dom" || fail "no figures at the mouse: $(grep -o 'id="tip".\{0,200\}' "$folder/dom")"
-fi
+# A browser draws the page, and a mouse over a point brings its figures.
+command -v chromium >/dev/null || fail "chromium is not installed (CMake/packages.sh test)"
+hover='<script>document.querySelector("#chart path").dispatchEvent(new MouseEvent("mousemove", {clientX: 200, clientY: 200}))</script>'
+(cat "$folder/run/report.html"; echo "$hover") >"$folder/hover.html"
+timeout 60 chromium --headless --no-sandbox --disable-gpu --virtual-time-budget=5000 --dump-dom "file://$folder/hover.html" \
+  2>/dev/null >"$folder/dom" || fail "chromium does not open report.html"
+[[ $(grep -o '<path[^>]*tabindex' "$folder/dom" | wc -l) -ge $frames ]] || fail "report.html has not a point for each frame"
+grep -q 'id="tip"[^>]*display: block[^>]*><b>frame ms: frame 0</b><div>' "$folder/dom" || fail "no figures at the mouse: $(grep -o 'id="tip".\{0,200\}' "$folder/dom")"
 grep -q "no picture" "$folder/text" || fail "nothing said about the picture"
 "$program" $options --frames 2 --paraview --out "$folder/series" >"$folder/text" || fail "the series"
 [[ $(grep -c '<DataSet' "$folder"/series/paraview/*.pvd) -eq 6 ]] || fail "the .pvd has not three parts of two frames"
