@@ -20,6 +20,9 @@ struct PointShapeDistance {
   Eigen::Vector3d normal;  ///< unit; the direction in which the distance grows fastest
 };
 
+/// L: how much the sides of an element rise along a normal. 0: they are perpendicular to it.
+double riseOf(std::span<const Eigen::Vector3d> sides, const Eigen::Vector3d& normal);
+
 /// The fewest of the points that span the same affine space as all of them: one point, the two ends
 /// of a line, three points of a plane, or four points with a volume. The decisions are exact.
 std::vector<Eigen::Vector3d> spanOf(std::span<const Eigen::Vector3d> points);
@@ -65,6 +68,11 @@ class Polytope {
   bool hasFace(std::uint32_t face) const { return m_planes[face].face == face; }
 
   PointShapeDistance signedDistance(const Eigen::Vector3d& x, double tie) const;
+  /// The same where an element has its least distance: of planes that are equally near a point
+  /// inside, the one most nearly parallel to the element counts. sides: an edge, or two sides of a
+  /// triangle.
+  PointShapeDistance leastDistance(const Eigen::Vector3d& x, std::span<const Eigen::Vector3d> sides,
+                                   double tie) const;
   /// The face nearest to x. For x inside, only the faces in the plane that signedDistance()
   /// measures from are considered.
   OnFace nearest(const Eigen::Vector3d& x, double tie) const;

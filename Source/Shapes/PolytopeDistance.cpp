@@ -163,6 +163,26 @@ PointShapeDistance Polytope::signedDistance(const Vector3d& x, double tie) const
   return {on.from.distance, on.from.normal};
 }
 
+double riseOf(std::span<const Vector3d> sides, const Vector3d& normal) {
+  double rise = 0;
+  for (const Vector3d& side : sides) rise += std::abs(dot(side, normal));
+  return rise;
+}
+
+PointShapeDistance Polytope::leastDistance(const Vector3d& x, std::span<const Vector3d> sides,
+                                           double tie) const {
+  const PointShapeDistance any = signedDistance(x, tie);
+  if (any.distance > tie) return any;
+  const Plane* flattest = nullptr;
+  double least = kInfinity;
+  for (const Plane& plane : m_planes) {
+    if (!(plane.height(x) >= any.distance - tie)) continue;
+    const double rise = riseOf(sides, plane.normal);
+    if (rise < least) flattest = &plane, least = rise;
+  }
+  return flattest ? PointShapeDistance{any.distance, flattest->normal} : any;
+}
+
 Vector3d Polytope::support(const Vector3d& direction, double tie) const {
   double most = -kInfinity;
   for (const Vector3d& p : m_points) most = std::max(most, dot(direction, p));

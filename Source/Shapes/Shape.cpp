@@ -189,6 +189,19 @@ PointShapeDistance Shape::atBody(const Vector3d& u, double tie,
   return {beyond[nearest], components.directions[nearest]};
 }
 
+PointShapeDistance Shape::leastAtBody(const Vector3d& u, std::span<const Vector3d> sides) const {
+  double tie = kOnSurface * m_magnitude;
+  for (const Vector3d& side : sides) tie += 2 * kEdgeWeight * largest(side);
+  if (m_hull) return m_hull->leastDistance(u, sides, tie);
+  PointShapeDistance least = atBody(u, tie);
+  if (!isCylinder() || least.distance > tie) return least;
+  const Components components = componentsOf(u, tie);
+  const auto& [lengths, directions] = components;
+  if (std::abs((lengths[0] - m_sizes[0]) - (lengths[1] - m_sizes[1])) <= tie)
+    least.normal = directions[riseOf(sides, directions[1]) < riseOf(sides, directions[0]) ? 1 : 0];
+  return least;
+}
+
 PointShapeDistance Shape::distanceFromCylinder(const Vector3d& fromCentre,
                                                const Vector3d& axis) const {
   const Eigen::Matrix3d axes = axis == Vector3d::Zero() ? m_axes : axesAlong(axis);
@@ -239,9 +252,14 @@ NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const 
     }
   }
   const Vector3d from = inBody(p), along = inBody(q) - from;
-  const auto slope = [&](double t) { return atBody(from + t * along, 0).normal.dot(along); };
+  const auto slope = [&](double t) {
+    const double rise = atBody(from + t * along, 0).normal.dot(along);
+    return std::abs(rise) <= kOnSurface * m_magnitude ? 0.0 : rise;
+  };
   const auto at = [&](double t, bool inInterior) {
-    const PointShapeDistance least = atBody(from + t * along, kOnSurface * m_magnitude);
+    const Vector3d u = from + t * along;
+    const PointShapeDistance least =
+        inInterior ? leastAtBody(u, {&along, 1}) : atBody(u, kOnSurface * m_magnitude);
     return NearestToShape{{1.0 - t, t, 0.0}, m_axes * least.normal, least.distance, inInterior};
   };
   if (m_hull) {
@@ -282,7 +300,8 @@ Vector3d Shape::nearestOfPlane(const Vector3d& normal, double height) const {
   const double level = std::min(0.0, std::max(deepest, (height - supportHeight) / all));
   Vector3d point = Vector3d::Zero();
   for (int i = 0; i < 2; ++i)
-    if (lengths[i] > 0) point += (m_sizes[i] + level) * directions[i];
+    if (lengths[i] * m_sizes[i] > kOnSurface * m_magnitude)
+      point += (m_sizes[i] + level) * directions[i];
   const double pointHeight = supportHeight + level * all;
   return pointHeight > height ? Vector3d(height / pointHeight * point) : point;
 }
@@ -339,8 +358,10 @@ std::optional<NearestToShape> Shape::nearestInTriangle(const Vector3d& a, const 
   const Vector3d& weights = on.barycentric;
   if (on.distance > kOnSurface * m_magnitude)  // the point is the shape's nearest to the plane
     return NearestToShape{weights, normal, on.distance, true};
-  const PointShapeDistance least = signedDistance(weights[0] * a + weights[1] * b + weights[2] * c);
-  return NearestToShape{weights, least.normal, least.distance, true};
+  const Vector3d sides[] = {m_axes.transpose() * (b - a), m_axes.transpose() * (c - a)};
+  const PointShapeDistance least =
+      leastAtBody(inBody(weights[0] * a + weights[1] * b + weights[2] * c), sides);
+  return NearestToShape{weights, m_axes * least.normal, least.distance, true};
 }
 
 /// nearestInTriangle() for a hull. The triangle is in the body's frame.
@@ -358,8 +379,9 @@ std::optional<NearestToShape> Shape::nearestToHull(const Vector3d& a, const Vect
   }
   const std::optional<Vector3d> weights = m_hull->leastInTriangle(a, b, c, tie);
   if (!weights) return {};
+  const Vector3d sides[] = {b - a, c - a};
   const PointShapeDistance least =
-      m_hull->signedDistance((*weights)[0] * a + (*weights)[1] * b + (*weights)[2] * c, tie);
+      leastAtBody((*weights)[0] * a + (*weights)[1] * b + (*weights)[2] * c, sides);
   return NearestToShape{*weights, m_axes * least.normal, least.distance, true};
 }
 

@@ -146,6 +146,10 @@ class Shape {
   /// The same for a cylinder with other sizes.
   PointShapeDistance atBody(const Eigen::Vector3d& u, double tie,
                             const std::array<double, 2>& sizes) const;
+  /// Where an element has its least distance in its interior: of surfaces that are equally near
+  /// inside, that most nearly parallel to the element counts. All in the body's frame.
+  PointShapeDistance leastAtBody(const Eigen::Vector3d& u,
+                                 std::span<const Eigen::Vector3d> sides) const;
   Eigen::Vector3d nearestOfPlane(const Eigen::Vector3d& normal, double height) const;
   std::optional<NearestToShape> nearestToHull(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                               const Eigen::Vector3d& c) const;

@@ -18,7 +18,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kThickness = 0.02, kGap = 0.01;
+constexpr double kPressThickness = 0.02, kPressGap = 0.01;
 
 class Press {
  public:
@@ -27,11 +27,11 @@ class Press {
     m_rest = m_sheet.positions;
     m_body = m_collisions.addTriangleMesh(m_rest, m_sheet.triangles);
     m_tool = m_collisions.addAnalyticalGeometry(tool);
-    m_collisions.addCollisionPair(m_body, m_tool, {.thickness = kThickness});
+    m_collisions.addCollisionPair(m_body, m_tool, {.thickness = kPressThickness});
     m_truthBody = m_truth.addTriangleMesh(m_rest, m_sheet.triangles);
     m_truthTool = m_truth.addAnalyticalGeometry(tool);
     m_truth.addCollisionPair(m_truthBody, m_truthTool,
-                             {Method::Proximity, 5 * kThickness, Contacts::All});
+                             {Method::Proximity, 5 * kPressThickness, Contacts::All});
   }
 
   /// L: the distance after the step. At most eight rounds meet all rows.
@@ -45,7 +45,7 @@ class Press {
       appendRows(m_collisions.collisionData(m_body, m_tool), {0, m_before, m_sheet.positions}, {},
                  rows, motion);
       const bool areMet = std::all_of(rows.begin(), rows.end(), [&](const ConstraintRow& row) {
-        return row.gap(m_sheet.positions) >= 0.9 * kGap;
+        return row.gap(m_sheet.positions) >= 0.9 * kPressGap;
       });
       if (round > 0 && areMet) break;
       for (int i = 0; i < 30; ++i) {
@@ -60,7 +60,7 @@ class Press {
     m_truth.setPositions(m_truthBody, m_sheet.positions);
     m_truth.setTransform(m_truthTool, Eigen::Matrix3d::Identity(), at);
     m_truth.detectCollision();
-    double least = 5 * kThickness;
+    double least = 5 * kPressThickness;
     for (const ShapeContact& c : m_truth.collisionData(m_truthBody, m_truthTool).shape())
       least = std::min(least, c.distance);
     return least;
@@ -85,7 +85,7 @@ class Press {
     if (!isFixed(q)) m_sheet.positions[q] -= along;
   }
   void push(const ConstraintRow& row) {
-    const double missing = kGap - row.gap(m_sheet.positions);
+    const double missing = kPressGap - row.gap(m_sheet.positions);
     double mass = 0;
     for (std::size_t i = 0; i < 4; ++i)
       if (!isFixed(row.vertices[i])) mass += row.weights[i] * row.weights[i];
@@ -102,7 +102,7 @@ class Press {
   GeometryId m_body{}, m_tool{}, m_truthBody{}, m_truthTool{};
 };
 
-/// The solver wants kGap. One that loses the contacts it needs comes to less than 0.1 of it.
+/// The solver wants kPressGap. One that loses the contacts it needs comes to less than 0.1 of it.
 TEST(SoftSheet, DistinctContactsHoldAToolThatIsPressedIn) {
   for (const auto& [tool, height] : std::vector<std::pair<AnalyticalGeometry, double>>{
            {Sphere{{0, 0, 0}, 0.15}, 0.15},
@@ -110,16 +110,16 @@ TEST(SoftSheet, DistinctContactsHoldAToolThatIsPressedIn) {
            {Box{{0, 0, 0}, {0.15, 0.1, 0.05}}, 0.05},
            {Cylinder{{-0.15, 0, 0}, {0.15, 0.02, 0}, 0.08}, 0.08}}) {
     Press press(tool);
-    press.step({0.5, 0.5, height + 2 * kThickness});
-    double least = kThickness;
+    press.step({0.5, 0.5, height + 2 * kPressThickness});
+    double least = kPressThickness;
     for (int i = 0; i < 150; ++i) {
       const double depth = 0.002 * std::min(i, 75), angle = 0.06 * i;
       const Vector3d at(0.5 + 0.15 * std::sin(angle), 0.5 + 0.1 * std::sin(0.7 * angle),
-                        height + kThickness - depth);
+                        height + kPressThickness - depth);
       least = std::min(least, press.step(at));
     }
-    EXPECT_GT(least, 0.3 * kGap) << "shape " << tool.index();
-    EXPECT_LT(least, 1.05 * kGap) << "shape " << tool.index();
+    EXPECT_GT(least, 0.3 * kPressGap) << "shape " << tool.index();
+    EXPECT_LT(least, 1.05 * kPressGap) << "shape " << tool.index();
   }
 }
 

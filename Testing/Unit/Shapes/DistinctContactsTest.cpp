@@ -344,6 +344,46 @@ TEST(DistinctContacts, OfACylinderThatTurnsOverAFlatFloorHaveItsNormal) {
   EXPECT_GT(contacts, 300u);
 }
 
+/// A body that stands in a floor, or touches it: several of its surfaces may be equally near to an
+/// edge or a triangle. The one that lies along it counts, so that the body is pushed out.
+TEST(DistinctContacts, OfABodyThatStandsInAFloorLeadOut) {
+  Random random(8);
+  std::size_t contacts = 0;
+  for (int run = 0; run < casesOf(60); ++run) {
+    const Matrix3d floorTurn = run % 3 == 0 ? Matrix3d::Identity() : Matrix3d(randomTurn(random));
+    const Vector3d up = floorTurn.col(2);
+    Mesh floor = run % 2 ? floorOf(random, 24, 0.3, false, [](double, double) { return 0.0; })
+                         : floorOf(random, 1, 7.2, false, [](double, double) { return 0.0; });
+    for (Vector3d& p : floor.positions) p = floorTurn * p;
+    const Vector3d axis(uniform(random, -1, 1), uniform(random, -1, 1), 0);
+    for (const double tilt : {0.0, 1e-9, 0.02}) {
+      const Matrix3d turn = floorTurn *
+                            Eigen::AngleAxisd(tilt, axis.normalized()).toRotationMatrix() *
+                            Eigen::AngleAxisd(uniform(random, 0, 6), Vector3d::UnitZ());
+      for (const AnalyticalGeometry& shape : std::vector<AnalyticalGeometry>{
+               Box{{0, 0, 0}, {1, 0.7, 0.5}}, Cylinder{{0, 0, -0.5}, {0, 0, 0.5}, 0.7},
+               Cylinder{{-1, 0, 0}, {1, 0, 0}, 0.4},
+               ConvexHull{{{1, 0, -0.4}, {-1, 0, -0.4}, {0, 1, -0.4}, {0, -1, -0.4}, {0, 0, 1}}}})
+        for (const double depth : {0.0, 1e-14, 1e-9, 1e-3, 0.05}) {
+          const Vector3d at = floorTurn * Vector3d(uniform(random, -1, 1), uniform(random, -1, 1),
+                                                   depthOf(shape, turn, up) - depth);
+          bool separates = false;
+          for (const ShapeContact& c :
+               contactsOf(floor, shape, {Method::Proximity, 0.02}, turn, at, at)) {
+            const bool leadsOut = c.normal.dot(up) < -0.999;
+            if (tilt < 0.01 || c.element == ShapeElement::Face) {
+              EXPECT_TRUE(leadsOut) << shape.index() << ' ' << tilt << ' ' << depth;
+            }
+            separates = separates || leadsOut;
+            ++contacts;
+          }
+          EXPECT_TRUE(separates) << shape.index() << ' ' << tilt << ' ' << depth;
+        }
+    }
+  }
+  EXPECT_GT(contacts, leastOf(20000));
+}
+
 /// Contacts of an impact are dropped by the same rule: a ball falls on a flat floor.
 TEST(DistinctContacts, OfAStepKeepTheFirstImpact) {
   Random random(5);
