@@ -352,11 +352,14 @@ std::optional<NearestToShape> Shape::nearestInTriangle(const Vector3d& a, const 
   if (m_type < Type::Capsule || normal == Vector3d::Zero()) return {};
   double height = normal.dot(a - m_p0);
   if (height < 0) normal = -normal, height = -height;
-  const Vector3d point = m_p0 + m_axes * nearestOfPlane(m_axes.transpose() * normal, height);
+  const Vector3d across = m_axes.transpose() * normal;
+  const Vector3d point = m_p0 + m_axes * nearestOfPlane(across, height);
   const VertexTriangleDistance on = finiteVertexTriangleDistance(point, a, b, c);
   if (on.feature != TriangleFeature::Face) return {};
   const Vector3d& weights = on.barycentric;
-  if (on.distance > kOnSurface * m_magnitude)  // the point is the shape's nearest to the plane
+  const Components components = componentsOf(across, 0);
+  const double reach = components.lengths[0] * m_sizes[0] + components.lengths[1] * m_sizes[1];
+  if (height > reach - kOnSurface * m_magnitude)  // the point is the shape's nearest to the plane
     return NearestToShape{weights, normal, on.distance, true};
   const Vector3d sides[] = {m_axes.transpose() * (b - a), m_axes.transpose() * (c - a)};
   const PointShapeDistance least =

@@ -57,6 +57,19 @@ struct DistinctTruth {
     return point;
   }
 
+  /// Whether the shape has sunk into a triangle's interior.
+  static bool isSunk(const ShapeContact& c) {
+    return c.element == ShapeElement::Face && c.distance < 0;
+  }
+  /// Towards the plane of a contact from the shape: where the shape has sunk in, that of the
+  /// triangle.
+  Vector3d acrossPlane(const ShapeContact& c) const {
+    if (!isSunk(c)) return c.normal;
+    const auto& [p, q, r] = c.vertices;
+    const Vector3d normal = (now[q] - now[p]).cross(now[r] - now[p]).normalized();
+    return normal.dot(c.normal) > 0 ? normal : Vector3d(-normal);
+  }
+
   /// Whether each contact stays. gaps: of their rows at the step's end.
   std::vector<char> kept(std::span<const ShapeContact> all, std::span<const double> gaps) const {
     const auto isFirst = [&](std::size_t l, std::size_t r) {
@@ -72,23 +85,24 @@ struct DistinctTruth {
     for (int planes = 0; planes < 8 && !proper.empty(); ++planes) {
       const std::size_t first = proper.front();
       const ShapeContact& s = all[first];
-      const double height = s.normal.dot(pointAtEnd(s));
+      const Vector3d down = acrossPlane(s);
+      const double height = down.dot(pointAtEnd(s));
       double gap = gaps[first];
       std::erase_if(proper, [&](std::size_t i) {
-        if ((all[i].normal - s.normal).norm() > 1e-12 ||
-            std::abs(s.normal.dot(pointAtEnd(all[i])) - height) > 2 * near)
+        if ((acrossPlane(all[i]) - down).norm() > 1e-12 ||
+            std::abs(down.dot(pointAtEnd(all[i])) - height) > 2 * near)
           return false;
         gap = std::min(gap, gaps[i]);
         return true;
       });
       // The shape is on the side that the normal comes from.
-      if (reachOf(atEnd, s.normal) > height - radius - gap + near) continue;
+      if (!isSunk(s) && reachOf(atEnd, down) > height - radius - gap + near) continue;
       std::erase_if(excluded, [&](std::size_t i) {
         const ShapeContact& c = all[i];
         const bool inTime = isFirst(first, i) || (s.element == ShapeElement::Face &&
                                                   s.timeOfImpact <= c.timeOfImpact + timeTolerance),
                    isIn = std::all_of(c.vertices.begin(), c.vertices.end(), [&](std::uint32_t v) {
-                     return std::abs(s.normal.dot(now[v]) - height) <= near;
+                     return std::abs(down.dot(now[v]) - height) <= near;
                    });
         // At another part of a flat side of the shape, the same normal is no tilted one.
         const bool isAlike = (c.normal - s.normal).norm() <= 0x1p-10 &&
@@ -110,14 +124,10 @@ struct DistinctTruth {
     return atEnd.rotation * turn.inverse() * (c.pointOnShape - place) + atEnd.translation;
   }
   static double sizeOf(const PlacedShape& shape) {
-    if (const auto* cylinder = std::get_if<Cylinder>(&shape.geometry))
-      return (shape.rotation * (cylinder->p1 - cylinder->p0)).cwiseAbs().maxCoeff() +
-             cylinder->radius;
-    double radius = 0, longest = 0;
-    const std::vector<Vector3d> corners = cornersOf(shape, radius);
-    for (const Vector3d& p : corners)
-      longest = std::max(longest, (p - corners.front()).cwiseAbs().maxCoeff());
-    return longest + radius;
+    double size = 0;
+    for (int k = 0; k < 3; ++k)
+      size = std::max(size, reachOf(shape, Vector3d::Unit(k)) + reachOf(shape, -Vector3d::Unit(k)));
+    return size;
   }
 };
 
