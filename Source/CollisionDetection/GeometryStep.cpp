@@ -3,6 +3,7 @@
 #include <palpate/Error.h>
 
 #include "CollisionDetection/GeometryChecks.h"
+#include "Mesh/Rotation.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
@@ -88,14 +89,16 @@ void GeometryStep::place(TriangleMesh& mesh, Positions& end,
 }
 
 void GeometryStep::setTransform(TriangleMesh& mesh, PlacedShape* shape,
-                                const std::optional<RigidTransform>& before,
-                                const RigidTransform& now) {
-  const auto check = [&](const RigidTransform& transform, const char* which) {
+                                const std::optional<RigidTransform>& givenBefore,
+                                const RigidTransform& givenNow) {
+  const auto checked = [&](const RigidTransform& transform, const char* which) {
     if (const std::string fault = faultOf(transform); !fault.empty())
       throw Error(ErrorCode::InvalidTransform, nameOf(m_id) + ": " + which + fault, m_id);
+    return withExactRotation(transform);
   };
-  if (before) check(*before, "before: ");
-  check(now, before ? "now: " : "");
+  std::optional<RigidTransform> before;
+  if (givenBefore) before = checked(*givenBefore, "before: ");
+  const RigidTransform now = checked(givenNow, before ? "now: " : "");
   const bool followsNow = m_isNew && !m_transformGiven && !before;
   if (shape) {
     m_spare->place(shape->analytical, now);

@@ -85,8 +85,7 @@ void SpatialQueries::contacts(GeometryId id, RigidMesh& mesh, const Eigen::Matri
   const StandardFloatingPoint standard;
   if (!mesh.m_implementation)
     throw Error(ErrorCode::InvalidCall, "this RigidMesh object was moved from");
-  const RigidTransform pose{rotation, translation};
-  checkPose(pose, "the query's mesh");
+  const RigidTransform pose = checkedPose({rotation, translation}, "the query's mesh");
   checkLength(thickness, "thickness", true);
   const SearchableGeometry& a = source.at(id);
   checkHasElements(a);

@@ -146,9 +146,11 @@ constexpr double kSmallestShapePairGap = 0x1p-1068;
 /// Squared sine of the angle between a direction and a capsule's axis. Below it, another direction
 /// across the axis is used. Any value will do.
 constexpr double kAcrossSquare = 0x1p-10;
-/// Largest deviation of R^T R from the identity. Users' rotations are this exact; boxes and
-/// cylinders use the nearest rotation that is exact to double.
+/// Largest deviation of R^T R from the identity. Rotations are this exact; boxes and cylinders use
+/// the nearest rotation that is exact to double.
 constexpr double kOrthonormal = 1e-9;
+/// The same of a user's rotation, which is made exact: in float, or a product of some of these.
+constexpr double kRoughRotation = 1e-5;
 /// Error of a distance bounded from a box's centre, relative to the magnitudes of the box and the
 /// shape: some twenty roundings.
 constexpr double kShapeBoundError = 0x1p-46;

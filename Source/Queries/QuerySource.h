@@ -144,7 +144,8 @@ void checkVertices(const SearchableGeometry& vertices, GeometryId body);
 void checkLength(double length, const char* name, bool finite);
 /// Throws UnsupportedMethod for an analytical shape.
 void checkHasElements(const SearchableGeometry&);
-/// Throws InvalidTransform. what: the start of the message.
-void checkPose(const RigidTransform&, const char* what);
+/// The pose that is used for one that a user passes (withExactRotation()). Throws InvalidTransform.
+/// what: the start of the message.
+RigidTransform checkedPose(const RigidTransform&, const char* what);
 
 }  // namespace palpate

@@ -18,6 +18,7 @@
 #include "Queries/ShapeOverlap.h"
 #include "Queries/ShapePenetration.h"
 #include "Queries/ShapeRays.h"
+#include "Mesh/Rotation.h"
 
 #include <algorithm>
 #include <atomic>
@@ -159,9 +160,10 @@ void checkHasElements(const SearchableGeometry& geometry) {
                 nameOf(geometry.id) + " is a shape: it has no elements", geometry.id);
 }
 
-void checkPose(const RigidTransform& pose, const char* what) {
+RigidTransform checkedPose(const RigidTransform& pose, const char* what) {
   if (const std::string fault = faultOf(pose); !fault.empty())
     throw Error(ErrorCode::InvalidTransform, std::string(what) + ": " + fault);
+  return withExactRotation(pose);
 }
 
 namespace {
@@ -503,14 +505,12 @@ void SpatialQueries::elementsWithin(GeometryId id, const Eigen::Vector3d& point,
 namespace {
 
 /// Throws InvalidShape or InvalidTransform.
-RigidTransform checkedPose(const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
+RigidTransform poseOfQuery(const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
                            const Eigen::Vector3d& translation) {
   std::optional<std::size_t> element;
   if (const std::string fault = faultOf(shape, element); !fault.empty())
     throw Error(ErrorCode::InvalidShape, "the query's shape: " + fault, {}, element);
-  const RigidTransform pose{rotation, translation};
-  checkPose(pose, "the query's shape");
-  return pose;
+  return checkedPose({rotation, translation}, "the query's shape");
 }
 
 }  // namespace
@@ -521,7 +521,7 @@ void SpatialQueries::overlapping(GeometryId id, const AnalyticalGeometry& shape,
                                  std::vector<std::uint32_t>& elements) const {
   Source& source = valid();
   const StandardFloatingPoint standard;
-  const RigidTransform pose = checkedPose(shape, rotation, translation);
+  const RigidTransform pose = poseOfQuery(shape, rotation, translation);
   const SearchableGeometry& geometry = source.at(id);
   checkHasElements(geometry);
   const Source::Loan scratch(source);
@@ -540,7 +540,7 @@ void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
                               double thickness, std::vector<ShapeContact>& out) const {
   Source& source = valid();
   const StandardFloatingPoint standard;
-  const RigidTransform pose = checkedPose(shape, rotation, translation);
+  const RigidTransform pose = poseOfQuery(shape, rotation, translation);
   checkLength(thickness, "thickness", true);
   const SearchableGeometry& geometry = source.at(id);
   checkHasElements(geometry);

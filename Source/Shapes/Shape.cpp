@@ -2,6 +2,7 @@
 
 #include "Core/Text.h"
 #include "Shapes/ShapeLengths.h"
+#include "Mesh/Rotation.h"
 #include "Math/ClosestPoint.h"
 #include "Exact/Compensated.h"
 #include "Math/Foot.h"
@@ -423,10 +424,10 @@ std::string faultOf(const AnalyticalGeometry& geometry, std::optional<std::size_
 
 std::string faultOf(const RigidTransform& transform) {
   const Eigen::Matrix3d& r = transform.rotation;
-  const double off = (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (!r.allFinite() || !(off <= kOrthonormal) || !(r.determinant() > 0))
+  const double off = deviationFromRotation(r);
+  if (!r.allFinite() || !(off <= kRoughRotation) || !(r.determinant() > 0))
     return "rotation is not a rotation matrix: R^T R differs from the identity by " + textOf(off) +
-           ", and its determinant is " + textOf(r.determinant());
+           ", at most 1e-05 is allowed, and its determinant is " + textOf(r.determinant());
   if (isWithinRange(transform.translation)) return {};
   return "translation is " + textOf(transform.translation) + "; it must be " + kRangeRule;
 }

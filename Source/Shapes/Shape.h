@@ -204,7 +204,7 @@ void forEachField(Geometry& geometry, F&& f) {
 /// Describes what is invalid in a shape's measures; empty if they are valid. element: the index of
 /// a hull's invalid point.
 std::string faultOf(const AnalyticalGeometry&, std::optional<std::size_t>& element);
-/// The same for a transform, whose matrix must be a rotation within 1e-9.
+/// The same for a transform, whose matrix must be a rotation within kRoughRotation.
 std::string faultOf(const RigidTransform&);
 
 }  // namespace palpate

@@ -191,8 +191,9 @@ void FclEngine::setTransform(GeometryId id, const Eigen::Matrix3d& rotation,
                              const Vector3d& translation) {
   m_implementation->input.setTransform(id, rotation, translation);
   fcl::Transform3d& frame = m_implementation->bodies[id].frame;
-  frame.linear() = rotation;
-  frame.translation() = translation;
+  const Pose pose = m_implementation->input.transform(id);
+  frame.linear() = pose.rotation;
+  frame.translation() = pose.translation;
 }
 
 void FclEngine::addCollisionPair(GeometryId a, GeometryId b, const PairSettings& settings) {

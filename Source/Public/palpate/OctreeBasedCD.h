@@ -213,8 +213,11 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// and transform are independent of each other. Vertices move in straight lines between the two
   /// ends (Validity::arcDeviation).
   ///
+  /// A rotation may come from floats. If an entry of R^T R is off the identity by more than 1e-9,
+  /// the nearest rotation counts instead; transform() returns it.
+  ///
   /// Errors   InvalidTransform if `rotation` is no rotation: an entry of R^T R is off the identity
-  ///          by more than 1e-9, or the determinant is not positive. InvalidTransform also if an
+  ///          by more than 1e-5, or the determinant is not positive. InvalidTransform also if an
   ///          entry is not finite, or if the translation is beyond kLargestMeasure.
   ///          UnsupportedMethod if the geometry has a pair with itself.
   /// Cost     does not grow with the size of the geometry, with one exception: each call
@@ -224,7 +227,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   void setTransform(GeometryId, const Eigen::Matrix3d& rotationBefore,
                     const Eigen::Vector3d& translationBefore, const Eigen::Matrix3d& rotation,
                     const Eigen::Vector3d& translation);
-  /// The pose now; the identity if setTransform() has not placed the geometry.
+  /// The pose now, with the rotation that counts; the identity if setTransform() has not placed the
+  /// geometry.
   Pose transform(GeometryId) const;
   /// Sets which geometries this one collides with, and from which sides. Two geometries collide
   /// only if the mask of each contains a group of the other. A pair that does not collide has no

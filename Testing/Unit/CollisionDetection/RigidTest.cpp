@@ -856,6 +856,63 @@ TEST(Rigid, ArcDeviationIsMeasured) {
   }
 }
 
+/// Rotations from floats: one, and products of six.
+TEST(Rigid, RotationsFromFloatsAreMadeExact) {
+  Random random(14);
+  const TestGeometry body = testGeometry(soup(random, 40, 0.2)),
+                     other = testGeometry(soup(random, 40, 0.2));
+  const auto floatRotation = [&] {
+    Eigen::Vector4f q;
+    for (float& x : q) x = static_cast<float>(uniform(random, -1, 1));
+    return Eigen::Quaternionf(q).normalized().toRotationMatrix();
+  };
+  std::size_t rough = 0, contacts = 0;
+  for (int repeat = 0; repeat < casesOf(300); ++repeat) {
+    Eigen::Matrix3f given = floatRotation();
+    const Eigen::Matrix3f turn = floatRotation();
+    if (repeat % 10 == 0)
+      for (int i = 0; i < 5; ++i) given = given * turn;
+    const Matrix3d rotation = given.cast<double>();
+    const Vector3d at = randomPoint(random, -0.2, 0.2);
+    rough += (rotation.transpose() * rotation - Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-9;
+    OctreeBasedCD collisions(settingsOf(Engine::Octree)), truth(settingsOf(Engine::Octree));
+    const auto place = [&](OctreeBasedCD& each, const Matrix3d& r) {
+      const GeometryId a = body.addTo(each), b = other.addTo(each);
+      each.addCollisionPair(a, b, {Method::Proximity, 0.05});
+      each.setTransform(a, r, at);
+      each.detectCollision();
+      return each.collisionData(a, b).hash();
+    };
+    const std::uint64_t hash = place(collisions, rotation);
+    const Pose pose = collisions.transform(GeometryId{0});
+    const Eigen::JacobiSVD<Matrix3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    EXPECT_LE((pose.rotation - svd.matrixU() * svd.matrixV().transpose()).cwiseAbs().maxCoeff(),
+              1e-14 + 2e-9 * (pose.rotation == rotation));
+    EXPECT_EQ(pose.translation, at);
+    // An exact rotation keeps its bits.
+    EXPECT_EQ(place(truth, pose.rotation), hash);
+    EXPECT_EQ(truth.transform(GeometryId{0}).rotation, pose.rotation);
+    contacts += collisions.statistics().contacts;
+
+    const auto overlapping = [&](const Matrix3d& r) {
+      std::vector<std::uint32_t> elements;
+      collisions.queries().overlapping(GeometryId{1}, Box{{0, 0, 0}, {0.4, 0.1, 0.2}}, r, at,
+                                       elements);
+      return elements;
+    };
+    EXPECT_EQ(overlapping(rotation), overlapping(pose.rotation));
+    const auto contactsOf = [&](const Matrix3d& r) {
+      RigidMesh mesh(body.positions, body.triangles);
+      CollisionData data;
+      collisions.queries().contacts(GeometryId{1}, mesh, r, at, 0.05, data);
+      return data.hash();
+    };
+    EXPECT_EQ(contactsOf(rotation), contactsOf(pose.rotation));
+  }
+  EXPECT_GT(rough, leastOf(290));
+  EXPECT_GT(contacts, leastOf(1000));
+}
+
 TEST(Rigid, BadTransformsAreRefused) {
   using Code = ErrorCode;
   Random random(12);
@@ -873,7 +930,7 @@ TEST(Rigid, BadTransformsAreRefused) {
   };
   const Matrix3d one = Matrix3d::Identity();
   Matrix3d skewed = one;
-  skewed(0, 1) = 2e-9;
+  skewed(0, 1) = 2e-5;
   const Positions given = collisions.problem().geometries[0].now;
   for (const Matrix3d& bad : {skewed, Matrix3d(-one), Matrix3d(NAN * one), Matrix3d(2 * one)})
     expectRefused(Code::InvalidTransform, "geometry 0: ", [&] {
