@@ -8,12 +8,14 @@
 namespace palpate::scenes {
 
 void writeWhole(const std::filesystem::path& path, const std::string& content) {
+  std::error_code fault;
+  if (std::filesystem::exists(path, fault) && !std::filesystem::is_regular_file(path, fault))
+    throw Error(ErrorCode::File, "\"" + path.string() + "\" is no regular file.");
   std::filesystem::path partial = path;
   partial += ".part";
   std::ofstream file(partial, std::ios::binary);
   file << content;
   file.close();
-  std::error_code fault;
   if (file.good()) std::filesystem::rename(partial, path, fault);
   if (file.good() && !fault) return;
   std::error_code ignored;

@@ -3,6 +3,7 @@
 #include "CollisionDetection/SettingsCheck.h"
 #include "Diagnostics/Audit.h"
 #include "Core/FloatingPoint.h"
+#include "Core/WholeFile.h"
 #include "Shapes/Shape.h"
 
 #include <algorithm>
@@ -412,22 +413,7 @@ void writeCapture(const CollisionProblem& problem, const std::filesystem::path& 
                       ", which a capture cannot hold; CollisionProblem holds it",
                   geometry.id);
   checkReadable(problem);
-  const std::string text = textOf(problem);
-  std::filesystem::path partial = path;
-  partial += ".part";
-  std::error_code fault;
-  try {
-    std::ofstream file(partial, std::ios::binary);
-    file << text;
-    file.close();
-    if (file.good()) std::filesystem::rename(partial, path, fault);
-    if (file.good() && !fault) return;
-  } catch (...) {
-    std::filesystem::remove(partial, fault);
-    throw;
-  }
-  std::filesystem::remove(partial, fault);
-  throw Error(ErrorCode::File, "the capture \"" + path.string() + "\" cannot be written");
+  writeWholeFile(path, textOf(problem), "the capture");
 }
 
 void capture(const OctreeBasedCD& detection, const std::filesystem::path& path) {

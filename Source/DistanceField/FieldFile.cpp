@@ -3,6 +3,8 @@
 #include <palpate/AnalyticalGeometry.h>
 #include <palpate/Error.h>
 
+#include "Core/WholeFile.h"
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -151,16 +153,7 @@ void writeField(const FieldCells& cells, const std::filesystem::path& path) {
     for (const float value : leaf) file.real(value);
   file.integer(checksumOf(file.bytes()));
 
-  std::filesystem::path partial = path;
-  partial += ".part";
-  std::error_code fault;
-  std::ofstream out(partial, std::ios::binary);
-  out << file.bytes();
-  out.close();
-  if (out.good()) std::filesystem::rename(partial, path, fault);
-  if (out.good() && !fault) return;
-  std::filesystem::remove(partial, fault);
-  throw Error(ErrorCode::File, "the distance field \"" + path.string() + "\" cannot be written");
+  writeWholeFile(path, file.bytes(), "the distance field");
 }
 
 FieldCells readField(const std::filesystem::path& path) {
