@@ -1,6 +1,7 @@
 #include "Queries/GeometryDistances.h"
 
 #include "Math/ClosestPoint.h"
+#include "Math/ConvexMinimum.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Octree/BoxMap.h"
@@ -274,6 +275,22 @@ void descend(const SearchableGeometry& geometry, bool bruteForce, double best, B
   }
 }
 
+/// The centre of the ball of a tapered segment that is nearest to a shape.
+NearestToShape nearestBallTo(const Shape& shape, const Element& segment) {
+  const auto at = [&](double t) {
+    return shape.signedDistance((1.0 - t) * segment[0] + t * segment[1]);
+  };
+  const double start = segment.radius(std::size_t{0}),
+               change = segment.radius(std::size_t{1}) - start;
+  const Vector3d along = segment[1] - segment[0];
+  const Tangent least = leastTangent([&](double t) -> Tangent {
+    const PointShapeDistance centre = at(t);
+    return {t, centre.distance - (start + t * change), centre.normal.dot(along) - change};
+  });
+  const PointShapeDistance nearest = at(least.at);
+  return {edgeWeights(0, least.at), nearest.normal, nearest.distance, false};
+}
+
 }  // namespace
 
 GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGeometry& b,
@@ -338,7 +355,9 @@ GeometryDistance distanceBetween(const SearchableGeometry& geometry, GeometryId 
         };
         for (std::size_t i = 0; i < 3; ++i) {
           if (!corners.hasEdge(i)) continue;
-          const NearestToShape found = shape.nearestOfEdge(corners[i], corners[i + 1]);
+          const NearestToShape found = corners.isTapered()
+                                           ? nearestBallTo(shape, corners)
+                                           : shape.nearestOfEdge(corners[i], corners[i + 1]);
           take(found, edgeWeights(i, found.weights[1]));
         }
         if (corners.isPoint()) {

@@ -3,6 +3,7 @@
 #include "Math/ClosestPoint.h"
 #include "Math/RoundSegment.h"
 #include "Math/Tolerances.h"
+#include "Queries/ElementDistance.h"
 
 #include <Eigen/Geometry>
 
@@ -123,9 +124,9 @@ void RayHits::intersect(std::uint32_t place, F&& f) const {
       f(*interval);
     return;
   }
-  const RoundIntervals parts = intersectRay(m_ray, mesh.now[a], mesh.now[b],
-                                            mesh.radius(a) + m_radius, mesh.radius(b) + m_radius);
-  for (std::size_t i = 0; i < parts.size; ++i) f(parts.intervals[i]);
+  if (const auto interval = intersectRay(m_ray, mesh.now[a], mesh.now[b], mesh.radius(a) + m_radius,
+                                         mesh.radius(b) + m_radius))
+    f(*interval);
 }
 
 void RayHits::add(std::uint32_t place) {
@@ -213,11 +214,13 @@ RayHit RayHits::hitOf(const Met& met, double t, bool frontFace, bool crosses) co
     const RayPoint at = firstPoint(m_ray, met.interval, a, b, c, &m_exactDecisions);
     return {m_geometry.id, met.element, corners, at.weights, at.t, frontFace, crosses};
   }
-  // A segment without length is a ball of its larger radius.
   const TriangleMesh& mesh = m_geometry.mesh;
-  if (a == b && b == c && mesh.radius(corners[0]) < mesh.radius(corners[1]))
-    return {m_geometry.id, met.element, corners, Vector3d::UnitY(), t, frontFace, crosses};
   const Vector3d point = m_ray.origin + t * m_ray.direction;
+  if (mesh.radius(corners[0]) != mesh.radius(corners[1])) {
+    const double weight =
+        nearestBall(point, a, b, mesh.radius(corners[0]), mesh.radius(corners[1]));
+    return {m_geometry.id, met.element, corners, edgeWeights(0, weight), t, frontFace, crosses};
+  }
   const Vector3d weights = finiteVertexTriangleDistance(point, a, b, c).barycentric;
   return {m_geometry.id, met.element, corners, weights, t, frontFace, crosses};
 }
