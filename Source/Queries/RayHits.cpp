@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <memory>
 
 namespace palpate {
@@ -202,6 +203,15 @@ int RayHits::compare(const Met& one, bool lastOfFirst, const Met& two, bool last
   const Positions& now = m_geometry.mesh.now;
   const Vector3d a = now[first[0]], b = now[first[1]], c = now[first[2]], d = now[second[0]],
                  e = now[second[1]], f = now[second[2]];
+  // Triangles with the same corners share the same part of the ray.
+  const auto hasAll = [](const Vector3d& p, const Vector3d& q, const Vector3d& r,
+                         std::initializer_list<const Vector3d*> others) {
+    return std::all_of(others.begin(), others.end(), [&](const Vector3d* other) {
+      return *other == p || *other == q || *other == r;
+    });
+  };
+  if (lastOfFirst == lastOfSecond && hasAll(a, b, c, {&d, &e, &f}) && hasAll(d, e, f, {&a, &b, &c}))
+    return 0;
   ++m_exactDecisions;
   return exact::compareRayEnds(m_ray, {a, b, c, lastOfFirst}, {d, e, f, lastOfSecond});
 }
