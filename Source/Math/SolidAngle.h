@@ -25,6 +25,23 @@ inline Eigen::Vector3d unitVector(const Eigen::Vector3d& v) {
              : v.stableNormalized();
 }
 
+/// solidAngleShare() near the triangle's plane, where the sine is rounding. The side of the plane
+/// is decided exactly, because the share jumps from -1/2 to 1/2 in the triangle.
+[[gnu::noinline]] inline SolidAngleShare shareNearPlane(const Eigen::Vector3d& p,
+                                                        const Eigen::Vector3d& a,
+                                                        const Eigen::Vector3d& b,
+                                                        const Eigen::Vector3d& c, double share,
+                                                        double cosine, double length) {
+  if (p == a || p == b || p == c) return {0, 1};
+  if (cosine < 0) {
+    SignCounts counts;
+    const int side = orient3d(a, b, c, p, counts);
+    if (side == 0) return {0, 0.5};
+    share = side < 0 ? std::abs(share) : -std::abs(share);
+  }
+  return {share, length > 2 * kSolidAngleError ? 2 * kSolidAngleError / length : 1.0};
+}
+
 /// The share of all directions from p that a triangle covers. Positive from behind, where the
 /// triangle's winding normal leads away from p.
 ///
@@ -36,17 +53,10 @@ inline SolidAngleShare solidAngleShare(const Eigen::Vector3d& p, const Eigen::Ve
   const Eigen::Vector3d u = unitVector(a - p), v = unitVector(b - p), w = unitVector(c - p);
   const double sine = u.dot(v.cross(w)), cosine = 1 + u.dot(v) + v.dot(w) + w.dot(u);
   const double length = std::sqrt(sine * sine + cosine * cosine);
-  double share = std::atan2(sine, cosine) / (2 * std::numbers::pi);
-  if (!(std::abs(sine) > kSolidAngleError)) {
-    // Near the plane. Its side is exact, because the share jumps from -1/2 to 1/2 in the triangle.
-    if (p == a || p == b || p == c) return {0, 1};
-    SignCounts counts;
-    const int side = cosine < 0 ? orient3d(a, b, c, p, counts) : 0;
-    if (cosine < 0 && side == 0) return {0, 0.5};
-    if (side != 0) share = side < 0 ? std::abs(share) : -std::abs(share);
-    return {share, length > 2 * kSolidAngleError ? 2 * kSolidAngleError / length : 1.0};
-  }
-  return {share, length > kSolidAngleError ? std::min(1.0, kSolidAngleError / length) : 1.0};
+  const double share = std::atan2(sine, cosine) / (2 * std::numbers::pi);
+  if (!(std::abs(sine) > kSolidAngleError))
+    return shareNearPlane(p, a, b, c, share, cosine, length);
+  return {share, std::min(1.0, kSolidAngleError / length)};
 }
 
 }  // namespace palpate
